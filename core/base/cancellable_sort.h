@@ -1,0 +1,52 @@
+// Sorting that a run can be cancelled in.
+#ifndef WELLSPACE_CORE_BASE_CANCELLABLE_SORT_H_
+#define WELLSPACE_CORE_BASE_CANCELLABLE_SORT_H_
+
+#include <algorithm>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "core/base/run_context.h"
+#include "core/base/status_macros.h"
+
+namespace wellspace::core {
+
+// Sorts `items` by the strict order `less`: sorted runs are merged pair by pair, with a look at `context` every few
+// thousand items.
+//
+// Complexity: O(n log n), with space for a second copy of the items.
+// Errors:     CANCELLED, DEADLINE_EXCEEDED; the items are then in any order, some of them twice.
+// Source:     bottom-up merge sort.
+template <typename T, typename Less>
+absl::Status CancellableSort(std::vector<T>& items, Less less, const RunContext& context) {
+  constexpr size_t kRun = size_t{1} << 13;
+  const size_t count = items.size();
+  for (size_t begin = 0; begin < count; begin += kRun) {
+    WELLSPACE_RETURN_IF_ERROR(context.Check());
+    std::sort(items.begin() + begin, items.begin() + std::min(count, begin + kRun), less);
+  }
+  std::vector<T> merged(count > kRun ? count : 0);
+  for (size_t width = kRun; width < count; width *= 2) {
+    for (size_t begin = 0; begin < count; begin += 2 * width) {
+      size_t left = begin;
+      size_t right = std::min(count, begin + width);
+      const size_t left_end = right;
+      const size_t right_end = std::min(count, begin + 2 * width);
+      for (size_t to = begin; to < right_end; ++to) {
+        if (to % kRun == 0) {
+          WELLSPACE_RETURN_IF_ERROR(context.Check());
+        }
+        const bool from_right = left == left_end || (right < right_end && less(items[right], items[left]));
+        merged[to] = from_right ? items[right++] : items[left++];
+      }
+    }
+    std::swap(items, merged);
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_BASE_CANCELLABLE_SORT_H_

@@ -1,0 +1,77 @@
+// What a running computation shares with whoever started it: cancellation one way, progress the other.
+#ifndef WELLSPACE_CORE_BASE_RUN_CONTEXT_H_
+#define WELLSPACE_CORE_BASE_RUN_CONTEXT_H_
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+
+#include "absl/status/status.h"
+#include "absl/time/time.h"
+
+namespace wellspace::core {
+
+enum class Phase : int { kWaiting = 0, kTree, kRefinement, kSimplices, kDone };
+inline constexpr int kPhaseCount = 5;
+
+// "waiting", "tree", "refinement", "simplices", "done".
+const char* PhaseName(Phase phase);
+
+struct Progress {
+  Phase phase = Phase::kWaiting;
+  uint64_t vertices = 0;            // in the mesh so far
+  uint64_t estimated_vertices = 0;  // of the finished mesh, roughly, at the default rho; 0 while unknown
+  uint64_t simplices = 0;           // so far
+  int bucket = 0;                   // floor(log_b) of the edge length that the refinement works at
+  double fraction = 0;              // of the whole run, in [0, 1], never decreasing
+};
+
+// One run of the mesher: its owner cancels it and looks at its progress, the mesher polls it at checkpoints.
+//
+// Thread safety: thread-safe. Cancel and Snapshot may be called from any thread at any time.
+// Invariants: (1) the first cancellation's reason is the one reported; (2) Snapshot().fraction never decreases.
+class RunContext {
+ public:
+  RunContext() = default;
+  RunContext(const RunContext&) = delete;
+  RunContext& operator=(const RunContext&) = delete;
+
+  // Asks the run to stop. The run then returns `Cancelled` or `DeadlineExceeded`.
+  void Cancel();
+  void ExceedDeadline();
+
+  bool IsCancelled() const { return state_.load(std::memory_order_relaxed) != State::kRunning; }
+
+  // Ok while the run may go on, else why it may not. Cheap enough for every few microseconds.
+  absl::Status Check() const;
+
+  Progress Snapshot() const;
+
+  // For the mesher alone.
+  void EnterPhase(Phase phase);
+  void SetVertices(uint64_t vertices) { vertices_.store(vertices, std::memory_order_relaxed); }
+  void SetEstimatedVertices(uint64_t vertices) { estimated_vertices_.store(vertices, std::memory_order_relaxed); }
+  void AddSimplices(uint64_t count) { simplices_.fetch_add(count, std::memory_order_relaxed); }
+  void SetBucket(int bucket) { bucket_.store(bucket, std::memory_order_relaxed); }
+  // `done` in [0, 1] of the current phase.
+  void SetPhaseFraction(double done);
+
+  // Wall-clock time spent in `phase` so far.
+  absl::Duration TimeIn(Phase phase) const;
+
+ private:
+  enum class State : int { kRunning, kCancelled, kDeadlineExceeded };
+
+  std::atomic<State> state_{State::kRunning};
+  std::atomic<Phase> phase_{Phase::kWaiting};
+  std::atomic<uint64_t> vertices_{0};
+  std::atomic<uint64_t> estimated_vertices_{0};
+  std::atomic<uint64_t> simplices_{0};
+  std::atomic<int> bucket_{0};
+  std::atomic<double> fraction_{0};
+  std::array<std::atomic<int64_t>, kPhaseCount> entered_ns_{};
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_BASE_RUN_CONTEXT_H_

@@ -1,0 +1,354 @@
+#include "core/geometry/exact_measure.h"
+
+#include <algorithm>
+#include <bit>
+#include <boost/multiprecision/cpp_int.hpp>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+
+namespace wellspace::core {
+namespace {
+
+// 512 bits are kept inside the object: enough for the determinants of most clouds without any allocation.
+using BigInteger = boost::multiprecision::number<
+    boost::multiprecision::cpp_int_backend<512, 0, boost::multiprecision::signed_magnitude,
+                                           boost::multiprecision::unchecked>,
+    boost::multiprecision::et_off>;
+
+template <typename T, int N>
+using Matrix = std::array<std::array<T, N>, N>;
+
+template <typename T, int N>
+Matrix<T, N - 1> MinorOfFirstRow(const Matrix<T, N>& m, int skip) {
+  Matrix<T, N - 1> minor;
+  for (int row = 1; row < N; ++row) {
+    for (int column = 0, to = 0; column < N; ++column) {
+      if (column != skip) {
+        minor[row - 1][to++] = m[row][column];
+      }
+    }
+  }
+  return minor;
+}
+
+constexpr int Factorial(int n) { return n <= 1 ? 1 : n * Factorial(n - 1); }
+
+// ---- The filter
+// -----------------------------------------------------------------------------------------------------------------
+
+// A determinant in doubles, and its permanent: the same expansion over absolute values.
+struct Estimate {
+  double determinant = 0;
+  double permanent = 0;
+};
+
+template <int N>
+Estimate EstimateDeterminant(const Matrix<double, N>& m) {
+  if constexpr (N == 1) {
+    return {m[0][0], std::abs(m[0][0])};
+  } else {
+    Estimate sum;
+    for (int column = 0; column < N; ++column) {
+      const Estimate minor = EstimateDeterminant<N - 1>(MinorOfFirstRow<double, N>(m, column));
+      const double term = m[0][column] * minor.determinant;
+      sum.determinant = column % 2 == 0 ? sum.determinant + term : sum.determinant - term;
+      sum.permanent += std::abs(m[0][column]) * minor.permanent;
+    }
+    return sum;
+  }
+}
+
+// Every one of the N! products of the expansion passes through the roundings of its N entries, N - 1 multiplications
+// and, at the levels of 2 to N, at most 1, ..., N - 1 additions that count (the first, to zero, is exact).
+constexpr int ExpansionRoundings(int n) { return (n - 1) + n * (n - 1) / 2; }
+
+// The sign of the determinant that `estimate` approximates, when it is certain.
+//
+// Let K be the largest number of roundings that a product passes through, u = 2^-53. Without underflow each product
+// carries a factor in [(1 - u)^K, (1 + u)^K], so |error| <= g P, g = K u / (1 - K u), P the exact permanent; the
+// computed permanent is at least (1 - g) P. g / (1 - g) < (K + 1) u for K < 100, and one more u covers the rounding of
+// the bound itself. Underflow: entries are scaled to absolute values below 2 (lifted ones below 4 D), there are fewer
+// than 2^10 operations, and each adds less than 2^-1074, later multiplied by less than 2^20: below 2^-1000 in all. NaN
+// and infinities fail the comparison.
+std::optional<Sign> CertainSign(const Estimate& estimate, int roundings) {
+  const double bound = (roundings + 2) * 0x1p-53 * estimate.permanent + 0x1p-1000;
+  if (estimate.determinant > bound) {
+    return Sign::kPositive;
+  }
+  if (estimate.determinant < -bound) {
+    return Sign::kNegative;
+  }
+  return std::nullopt;
+}
+
+// points[i] - origin, all scaled by the same power of two to a largest absolute value in [1, 2), or below where that
+// power would overflow. Every difference is rounded once.
+template <int D, size_t Count>
+std::array<Point<D>, Count> ScaledDifferences(const std::array<Point<D>, Count>& points, const Point<D>& origin) {
+  std::array<Point<D>, Count> out;
+  double largest = 0;
+  for (size_t i = 0; i < Count; ++i) {
+    out[i] = Difference<D>(points[i], origin);
+    for (const double x : out[i]) {
+      largest = std::max(largest, std::abs(x));
+    }
+  }
+  if (largest > 0 && std::isfinite(largest)) {
+    const double factor = std::scalbn(1.0, std::min(-std::ilogb(largest), 1000));
+    for (Point<D>& difference : out) {
+      for (double& x : difference) {
+        x *= factor;
+      }
+    }
+  }
+  return out;
+}
+
+template <int D>
+std::optional<Sign> FilterOrientation(const Simplex<D>& simplex) {
+  std::array<Point<D>, D> corners;
+  std::copy_n(simplex.begin() + 1, D, corners.begin());
+  // One rounding in each of the D entries of a product.
+  return CertainSign(EstimateDeterminant<D>(ScaledDifferences<D, D>(corners, simplex[0])), D + ExpansionRoundings(D));
+}
+
+template <int D>
+std::optional<Sign> FilterInSphere(const Simplex<D>& simplex, const Point<D>& q) {
+  const std::array<Point<D>, D + 1> differences = ScaledDifferences<D, D + 1>(simplex, q);
+  Matrix<double, D + 1> rows;
+  for (int i = 0; i <= D; ++i) {
+    std::copy_n(differences[i].begin(), D, rows[i].begin());
+    rows[i][D] = NormSq<D>(differences[i]);
+  }
+  // D entries are differences; the lifted one has 2 of differences, 1 of the square and D - 1 of the sum.
+  return CertainSign(EstimateDeterminant<D + 1>(rows), D + (D + 2) + ExpansionRoundings(D + 1));
+}
+
+// ---- The exact stage
+// ------------------------------------------------------------------------------------------------------------
+
+// A double as mantissa * 2^exponent, the mantissa odd or zero.
+struct Dyadic {
+  int64_t mantissa = 0;
+  int exponent = 0;
+};
+
+Dyadic ToDyadic(double value) {
+  if (value == 0) {
+    return {};
+  }
+  int exponent = 0;
+  const auto mantissa = static_cast<int64_t>(std::scalbn(std::frexp(value, &exponent), 53));
+  const int zeros = std::countr_zero(static_cast<uint64_t>(mantissa));
+  return {mantissa / (int64_t{1} << zeros), exponent - 53 + zeros};
+}
+
+// Points as integers: points[i][k] * 2^exponent.
+template <int D, size_t Count>
+struct Grid {
+  std::array<std::array<BigInteger, D>, Count> points;
+  int exponent = 0;
+};
+
+// The points on the coarsest grid of a power of two that holds all of their coordinates.
+template <int D, size_t Count>
+Grid<D, Count> ToGrid(const std::array<Point<D>, Count>& points) {
+  std::array<std::array<Dyadic, D>, Count> dyadic;
+  int exponent = std::numeric_limits<int>::max();
+  for (size_t i = 0; i < Count; ++i) {
+    for (int k = 0; k < D; ++k) {
+      dyadic[i][k] = ToDyadic(points[i][k]);
+      if (dyadic[i][k].mantissa != 0) {
+        exponent = std::min(exponent, dyadic[i][k].exponent);
+      }
+    }
+  }
+  Grid<D, Count> grid;
+  grid.exponent = exponent == std::numeric_limits<int>::max() ? 0 : exponent;
+  for (size_t i = 0; i < Count; ++i) {
+    for (int k = 0; k < D; ++k) {
+      if (dyadic[i][k].mantissa != 0) {
+        grid.points[i][k] = dyadic[i][k].mantissa;
+        grid.points[i][k] <<= dyadic[i][k].exponent - grid.exponent;
+      }
+    }
+  }
+  return grid;
+}
+
+template <int N>
+BigInteger Determinant(const Matrix<BigInteger, N>& m) {
+  if constexpr (N == 1) {
+    return m[0][0];
+  } else if constexpr (N == 2) {
+    return m[0][0] * m[1][1] - m[0][1] * m[1][0];
+  } else {
+    BigInteger sum = 0;
+    for (int column = 0; column < N; ++column) {
+      const BigInteger term = m[0][column] * Determinant<N - 1>(MinorOfFirstRow<BigInteger, N>(m, column));
+      sum = column % 2 == 0 ? BigInteger(sum + term) : BigInteger(sum - term);
+    }
+    return sum;
+  }
+}
+
+Sign SignOf(const BigInteger& value) { return static_cast<Sign>(value.sign()); }
+
+// The rows p_i - p_0 on the grid of the corners.
+template <int D>
+Matrix<BigInteger, D> EdgeRows(const Grid<D, D + 1>& grid) {
+  Matrix<BigInteger, D> rows;
+  for (int i = 0; i < D; ++i) {
+    for (int k = 0; k < D; ++k) {
+      rows[i][k] = grid.points[i + 1][k] - grid.points[0][k];
+    }
+  }
+  return rows;
+}
+
+template <size_t N>
+BigInteger NormSq(const std::array<BigInteger, N>& row) {
+  BigInteger sum = 0;
+  for (const BigInteger& x : row) {
+    sum += x * x;
+  }
+  return sum;
+}
+
+// value * 2^exponent, cut off to 63 bits and then rounded.
+double Rounded(const BigInteger& value, int exponent) {
+  if (value == 0) {
+    return 0;
+  }
+  const BigInteger magnitude = abs(value);
+  const int excess = std::max(0, static_cast<int>(msb(magnitude)) - 62);
+  const auto head = static_cast<double>(static_cast<uint64_t>(BigInteger(magnitude >> excess)));
+  return std::scalbn(value < 0 ? -head : head, exponent + excess);
+}
+
+// numerator / denominator * 2^exponent, within a relative error of 2^-50.
+double RoundedQuotient(const BigInteger& numerator, const BigInteger& denominator, int exponent) {
+  if (numerator == 0) {
+    return 0;
+  }
+  const int bits =
+      static_cast<int>(msb(BigInteger(abs(denominator)))) - static_cast<int>(msb(BigInteger(abs(numerator))));
+  const int shift = std::max(0, bits + 64);
+  return Rounded(BigInteger((numerator << shift) / denominator), exponent - shift);
+}
+
+}  // namespace
+
+template <int D>
+MeasuredSign Orientation(const Simplex<D>& simplex) {
+  if (const std::optional<Sign> sign = FilterOrientation<D>(simplex)) {
+    return {*sign, Stage::kFilter};
+  }
+  return {SignOf(Determinant<D>(EdgeRows<D>(ToGrid<D, D + 1>(simplex)))), Stage::kBigInteger};
+}
+
+template <int D>
+MeasuredSign InSphere(const Simplex<D>& simplex, const Point<D>& q) {
+  // det(p_i - q, |p_i - q|^2) has the sign (-1)^D for q inside a simplex of positive orientation.
+  constexpr Sign kInside = D % 2 == 0 ? Sign::kPositive : Sign::kNegative;
+  if (const std::optional<Sign> sign = FilterInSphere<D>(simplex, q)) {
+    return {*sign * kInside, Stage::kFilter};
+  }
+  std::array<Point<D>, D + 2> points;
+  std::copy(simplex.begin(), simplex.end(), points.begin());
+  points[D + 1] = q;
+  const Grid<D, D + 2> grid = ToGrid<D, D + 2>(points);
+  Matrix<BigInteger, D + 1> rows;
+  for (int i = 0; i <= D; ++i) {
+    std::array<BigInteger, D> difference;
+    for (int k = 0; k < D; ++k) {
+      difference[k] = grid.points[i][k] - grid.points[D + 1][k];
+    }
+    std::copy(difference.begin(), difference.end(), rows[i].begin());
+    rows[i][D] = NormSq(difference);
+  }
+  return {SignOf(Determinant<D + 1>(rows)) * kInside, Stage::kBigInteger};
+}
+
+template <int D>
+Point<D> ExactCircumcentreOffset(const Simplex<D>& simplex) {
+  // With rows w_i = p_i - p_0, the centre x solves w_i . x = |w_i|^2 / 2; by Cramer's rule.
+  const Grid<D, D + 1> grid = ToGrid<D, D + 1>(simplex);
+  const Matrix<BigInteger, D> edges = EdgeRows<D>(grid);
+  const BigInteger determinant = Determinant<D>(edges);
+  Point<D> offset;
+  if (determinant == 0) {
+    offset.fill(std::numeric_limits<double>::infinity());
+    return offset;
+  }
+  for (int k = 0; k < D; ++k) {
+    Matrix<BigInteger, D> replaced = edges;
+    for (int i = 0; i < D; ++i) {
+      replaced[i][k] = NormSq(edges[i]);
+    }
+    offset[k] = RoundedQuotient(Determinant<D>(replaced), determinant, grid.exponent - 1);
+  }
+  return offset;
+}
+
+// The sum is total * 2^exponent / D!.
+template <int D>
+struct ExactVolumeSum<D>::Impl {
+  BigInteger total = 0;
+  int exponent = 0;
+
+  void AddTerm(BigInteger term, int term_exponent) {
+    if (term_exponent < exponent) {
+      total <<= exponent - term_exponent;
+      exponent = term_exponent;
+    } else {
+      term <<= term_exponent - exponent;
+    }
+    total += term;
+  }
+};
+
+template <int D>
+ExactVolumeSum<D>::ExactVolumeSum() : impl_(std::make_unique<Impl>()) {}
+
+template <int D>
+ExactVolumeSum<D>::~ExactVolumeSum() = default;
+
+template <int D>
+void ExactVolumeSum<D>::Add(const Simplex<D>& simplex) {
+  const Grid<D, D + 1> grid = ToGrid<D, D + 1>(simplex);
+  impl_->AddTerm(Determinant<D>(EdgeRows<D>(grid)), D * grid.exponent);
+}
+
+template <int D>
+void ExactVolumeSum<D>::Subtract(const Box<D>& box) {
+  const Grid<D, 2> grid = ToGrid<D, 2>({box.low, box.high});
+  BigInteger volume = Factorial(D);
+  for (int k = 0; k < D; ++k) {
+    volume *= grid.points[1][k] - grid.points[0][k];
+  }
+  impl_->AddTerm(-volume, D * grid.exponent);
+}
+
+template <int D>
+Sign ExactVolumeSum<D>::sign() const {
+  return SignOf(impl_->total);
+}
+
+template <int D>
+double ExactVolumeSum<D>::value() const {
+  return Rounded(impl_->total, impl_->exponent) / Factorial(D);
+}
+
+template MeasuredSign Orientation<2>(const Simplex<2>&);
+template MeasuredSign Orientation<3>(const Simplex<3>&);
+template MeasuredSign InSphere<2>(const Simplex<2>&, const Point<2>&);
+template MeasuredSign InSphere<3>(const Simplex<3>&, const Point<3>&);
+template Point<2> ExactCircumcentreOffset<2>(const Simplex<2>&);
+template Point<3> ExactCircumcentreOffset<3>(const Simplex<3>&);
+template class ExactVolumeSum<2>;
+template class ExactVolumeSum<3>;
+
+}  // namespace wellspace::core

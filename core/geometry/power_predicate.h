@@ -1,0 +1,75 @@
+// The one decision that Voronoi cells rest on, taken exactly: does a bisector cut off a node?
+#ifndef WELLSPACE_CORE_GEOMETRY_POWER_PREDICATE_H_
+#define WELLSPACE_CORE_GEOMETRY_POWER_PREDICATE_H_
+
+#include <array>
+#include <cstdint>
+
+#include "core/geometry/point.h"
+
+namespace wellspace::core {
+
+enum class Sign : int { kNegative = -1, kZero = 0, kPositive = 1 };
+
+constexpr Sign operator-(Sign s) { return static_cast<Sign>(-static_cast<int>(s)); }
+constexpr Sign operator*(Sign a, Sign b) { return static_cast<Sign>(static_cast<int>(a) * static_cast<int>(b)); }
+
+// A plane that bounds the cell of a site: the bisector with another vertex, or a wall x[axis] = coordinate.
+template <int D>
+struct PlaneSource {
+  Point<D> generator{};   // of a bisector
+  double coordinate = 0;  // of a wall
+  int axis = -1;          // of a wall; -1 for a bisector
+
+  bool IsWall() const { return axis >= 0; }
+};
+
+// What becomes of exact ties.
+enum class TieRule {
+  kKeep,     // a node on the bisector stays; for cells that stand alone
+  kPerturb,  // decided by a symbolic perturbation of the vertices' weights, the same for every site; for stars that
+             // must agree
+};
+
+// How a decision was reached, for tests and statistics.
+enum class Stage { kFilter, kInteger, kBigInteger };
+
+struct ExactDecision {
+  Sign sign = Sign::kZero;  // kPositive: cut off
+  Stage stage = Stage::kInteger;
+  bool perturbed = false;  // the exact value was zero, and TieRule::kPerturb decided
+};
+
+// On which side of the bisector of `site` and `u` lies the node where the D planes `planes` of the cell of `site` meet:
+// kPositive on the side of `u`, kNegative on the side of `site`, kZero (only with TieRule::kKeep) on it.
+//
+// With n_j . x = c_j the planes relative to the site (bisector of w = p_j - site: n = w, c = |w|^2 / 2; wall: n =
+// e_axis) and the node x = A^-1 c, the value is g = w_u . x - |w_u|^2 / 2 = - det [A c; w_u c_u] / det A, evaluated in
+// integers: all coordinates are multiples of one power of two. 128 bits are used where a bound on the determinants
+// allows it, else arbitrary precision.
+//
+// The perturbation gives vertex k the weight W_k = eps^(rank), rank by coordinates, lexicographically greatest first,
+// so that c_j becomes (|w_j|^2 + W_site - W_j) / 2. g is linear in the weights: with w_u = sum_j lambda_j n_j, 2 g
+// gains W_u - sum_j lambda_j W_j + (sum_j lambda_j - 1) W_site over the bisectors j, and the first coefficient in the
+// order of ranks that is not zero decides; that of W_u is 1, so one always does. Coordinates are not touched: what is
+// coplanar stays so.
+//
+// Laws:       (1) antisymmetric in orientation: the order of `planes` does not matter; (2) scaling by powers of two and
+//             translations that are exact do not change the result; (3) with kPerturb the result is never kZero.
+// REQUIRES:   finite coordinates; the planes meet in one point (det A != 0); u different from the site and all
+//             generators.
+// Complexity: O(D!) operations on integers of (D + 2) times the bits of the coordinates.
+// Errors:     none.
+// Source:     ours; the determinant is that of the power test of regular triangulations.
+template <int D>
+ExactDecision DecideCut(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u,
+                        TieRule rule);
+
+extern template ExactDecision DecideCut<2>(const Point<2>&, const std::array<PlaneSource<2>, 2>&, const Point<2>&,
+                                           TieRule);
+extern template ExactDecision DecideCut<3>(const Point<3>&, const std::array<PlaneSource<3>, 3>&, const Point<3>&,
+                                           TieRule);
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_GEOMETRY_POWER_PREDICATE_H_

@@ -1,0 +1,124 @@
+#include "core/refine/steiner_point.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace wellspace::core {
+namespace {
+
+template <int D>
+SteinerPoint<D> Relative(const Polytope<D>& cell, const Point<D>& x) {
+  SteinerPoint<D> point;
+  for (int i = 0; i < D; ++i) {
+    point.position[i] = cell.site()[i] + x[i];
+  }
+  point.empty_radius_sq = NormSq<D>(x);
+  return point;
+}
+
+}  // namespace
+
+template <int D>
+double OffCenterFactor(double rho) {
+  if constexpr (D == 2) {
+    const double height = rho + std::sqrt(std::max(0.0, rho * rho - 0.25));
+    return 0.996 * std::sqrt(height * height + 0.25) / rho;
+  } else {
+    return rho >= 1.15 ? 1.1 : 1.5;
+  }
+}
+
+template <int D>
+SteinerPoint<D> OffCenter(const Polytope<D>& cell, int node, int plane, double rho, double factor) {
+  const Point<D>& x = cell.nodes()[node].x;
+  const double edge_sq = 2 * cell.plane(plane).offset;
+  const double distance_sq = factor * factor * rho * rho * edge_sq;
+  if (NormSq<D>(x) <= distance_sq) {
+    return Relative<D>(cell, x);
+  }
+  Point<D> middle;
+  Point<D> along;
+  for (int i = 0; i < D; ++i) {
+    middle[i] = 0.5 * cell.plane(plane).normal[i];
+    along[i] = x[i] - middle[i];
+  }
+  // `along` is in the bisector, so at right angles to `middle`.
+  double t = std::sqrt((distance_sq - 0.25 * edge_sq) / NormSq<D>(along));
+  for (int j = 0; j < cell.plane_count(); ++j) {
+    const Plane<D>& bound = cell.plane(j);
+    const double slope = Dot<D>(bound.normal, along);
+    const double gap = bound.offset - Dot<D>(bound.normal, middle);
+    // A wall's normal points up its axis: turned outward here.
+    const double outward = bound.kind == PlaneKind::kBisector || bound.face % 2 == 1 ? 1 : -1;
+    if (j != plane && outward * gap < 0 && outward * slope < 0) {
+      t = std::max(t, gap / slope);
+    }
+  }
+  t = std::min(t, 1.0);
+  for (int i = 0; i < D; ++i) {
+    middle[i] += t * along[i];
+  }
+  return Relative<D>(cell, middle);
+}
+
+template <int D>
+SteinerPoint<D> EncroachmentPoint(const Polytope<D>& cell, int face) {
+  Point<D> sum{};
+  int count = 0;
+  for (const CellNode<D>& node : cell.nodes()) {
+    for (const uint16_t index : node.planes) {
+      const Plane<D>& plane = cell.plane(index);
+      if (plane.kind == PlaneKind::kFace && plane.face == face) {
+        for (int i = 0; i < D; ++i) {
+          sum[i] += node.x[i];
+        }
+        ++count;
+      }
+    }
+  }
+  for (double& s : sum) {
+    s /= count;
+  }
+  SteinerPoint<D> point = Relative<D>(cell, sum);
+  for (int index = 0; index < 2 * D; ++index) {
+    if (cell.plane(index).kind == PlaneKind::kFace && cell.plane(index).face == face) {
+      point.position[face / 2] = cell.plane(index).source.coordinate;
+    }
+  }
+  return point;
+}
+
+template <int D>
+SteinerPoint<D> SnapToBoundary(const Box<D>& box, SteinerPoint<D> point) {
+  for (int i = 0; i < D; ++i) {
+    point.position[i] = std::clamp(point.position[i], box.low[i], box.high[i]);
+  }
+  while (true) {
+    int nearest = -1;
+    double nearest_sq = 0.5 * point.empty_radius_sq;
+    const FaceMask faces = box.FacesOf(point.position);
+    for (int face = 0; face < 2 * D; ++face) {
+      const double distance = box.DistanceToFace(point.position, face);
+      if (((faces >> face) & 1) == 0 && distance * distance < nearest_sq) {
+        nearest_sq = distance * distance;
+        nearest = face;
+      }
+    }
+    if (nearest < 0) {
+      return point;
+    }
+    point.position[nearest / 2] = box.FaceCoordinate(nearest);
+    point.empty_radius_sq -= nearest_sq;
+  }
+}
+
+template double OffCenterFactor<2>(double);
+template double OffCenterFactor<3>(double);
+template SteinerPoint<2> OffCenter<2>(const Polytope<2>&, int, int, double, double);
+template SteinerPoint<3> OffCenter<3>(const Polytope<3>&, int, int, double, double);
+template SteinerPoint<2> EncroachmentPoint<2>(const Polytope<2>&, int);
+template SteinerPoint<3> EncroachmentPoint<3>(const Polytope<3>&, int);
+template SteinerPoint<2> SnapToBoundary<2>(const Box<2>&, SteinerPoint<2>);
+template SteinerPoint<3> SnapToBoundary<3>(const Box<3>&, SteinerPoint<3>);
+
+}  // namespace wellspace::core

@@ -1,0 +1,46 @@
+// The mesh as the union of the stars of its vertices.
+#ifndef WELLSPACE_CORE_SIMPLEX_SIMPLICES_H_
+#define WELLSPACE_CORE_SIMPLEX_SIMPLICES_H_
+
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "core/base/run_context.h"
+#include "core/voronoi/query_structure.h"
+
+namespace wellspace::core {
+
+struct Simplices {
+  // simplex_count x (D + 1) output indices, row-major; positively oriented, lowest vertex first.
+  std::vector<uint32_t> indices;
+  double max_radius_edge = 0;
+  double min_angle_deg = std::numeric_limits<double>::infinity();
+  QueryCounters counters;
+};
+
+// Computes every vertex's whole Voronoi cell; each of its nodes is a simplex, emitted by the vertex with the lowest
+// output index. Vertices are taken along the Z curve of the tree, in blocks that threads share out.
+//
+// Shapes:     output_index: vertex_count entries, a permutation: the index in the output of each vertex.
+// REQUIRES:   `structure` refined: no circumcentre outside the box.
+// Guarantees: (1) a Delaunay triangulation of the vertices that decomposes the box; (2) the same order for any number
+//             of threads.
+// Complexity: O(m) for m vertices.
+// Errors:     CANCELLED, DEADLINE_EXCEEDED.
+// Threads:    uses `threads`, at most as many as the machine has cores.
+// Source:     [HT08] §1 and §2.
+template <int D>
+absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, std::span<const uint32_t> output_index,
+                                           int threads, RunContext& context);
+
+extern template absl::StatusOr<Simplices> ComputeSimplices<2>(const QueryStructure<2>&, std::span<const uint32_t>, int,
+                                                              RunContext&);
+extern template absl::StatusOr<Simplices> ComputeSimplices<3>(const QueryStructure<3>&, std::span<const uint32_t>, int,
+                                                              RunContext&);
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_SIMPLEX_SIMPLICES_H_

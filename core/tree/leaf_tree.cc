@@ -1,0 +1,335 @@
+#include "core/tree/leaf_tree.h"
+
+#include <algorithm>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
+
+namespace wellspace::core {
+
+template <int D>
+absl::Status LeafTree<D>::Build(const Box<D>& box, std::span<const Point<D>> points, uint64_t max_leaves,
+                                const RunContext& context) {
+  const MortonGrid<D> grid(box);
+  box_ = box;
+  max_level_ = static_cast<uint8_t>(grid.levels());
+  points_ = points;
+  leaf_count_ = 1;
+  leaf_of_.assign(points.size(), kNoNode);
+  Node root;
+  root.low = grid.root_low();
+  root.side = grid.root_side();
+  root.neighbour.fill(kNoNode);
+  nodes_.assign(1, root);
+  ranges_.assign(1, Range{0, static_cast<uint32_t>(points.size())});
+  pending_.assign(grid.levels() + 1, {});
+  pending_[0].push_back(NodeId{0});
+
+  uint32_t looked_at = 0;
+  for (int level = 0; level < max_level_; ++level) {
+    // Crowded leaves first: then the neighbours of those that are looked at more closely hold few points each. Both
+    // loops also meet the leaves that balance appends meanwhile.
+    for (const bool only_crowded : {true, false}) {
+      for (size_t i = 0; i < pending_[level].size(); ++i) {
+        const NodeId leaf = pending_[level][i];
+        if (At(leaf).first_child != kNoNode) {
+          continue;
+        }
+        if (ranges_[Index(leaf)].size() > kLeafCapacity || (!only_crowded && IsTooCoarse(leaf))) {
+          Split(leaf);
+        }
+        if (leaf_count_ > max_leaves) {
+          return absl::ResourceExhaustedError(
+              absl::StrCat("the tree over the points needs more than ", max_leaves,
+                           " leaves, so the mesh would have too many vertices; raise max_vertices"));
+        }
+        if ((++looked_at & 1023) == 0) {
+          WELLSPACE_RETURN_IF_ERROR(context.Check());
+        }
+      }
+    }
+    pending_[level] = {};
+  }
+
+  for (uint32_t i = 0; i < node_count(); ++i) {
+    if (i % 4096 == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
+    if (!IsLeaf(NodeId{i})) {
+      continue;
+    }
+    for (uint32_t v = ranges_[i].begin; v < ranges_[i].end; ++v) {
+      Append(NodeId{i}, VertexId{v}, points[v]);
+    }
+  }
+  points_ = {};
+  ranges_ = {};
+  pending_ = {};
+  near_ = {};
+  visited_ = {};
+  return absl::OkStatus();
+}
+
+template <int D>
+void LeafTree<D>::Insert(VertexId near, VertexId v, const Point<D>& p) {
+  NodeId leaf = LeafHolding(near == kNoVertex ? NodeId{0} : leaf_of(near), p);
+  while (At(leaf).bucket != kNoBucket && buckets_[At(leaf).bucket].count == kLeafCapacity && CanSplit(leaf)) {
+    Split(leaf);
+    leaf = Child(At(leaf), ChildHolding(At(leaf), p));
+  }
+  leaf_of_.push_back(kNoNode);
+  Append(leaf, v, p);
+}
+
+template <int D>
+void LeafTree<D>::Append(NodeId leaf, VertexId v, const Point<D>& p) {
+  Node& node = At(leaf);
+  if (node.bucket == kNoBucket) {
+    if (free_buckets_.empty()) {
+      node.bucket = static_cast<uint32_t>(buckets_.size());
+      buckets_.emplace_back();
+    } else {
+      node.bucket = free_buckets_.back();
+      free_buckets_.pop_back();
+      buckets_[node.bucket].count = 0;
+    }
+  }
+  Bucket& bucket = buckets_[node.bucket];
+  bucket.ids[bucket.count] = v;
+  bucket.positions[bucket.count] = p;
+  ++bucket.count;
+  leaf_of_[Index(v)] = leaf;
+}
+
+// Which child of `node` a point of its cube belongs to; for a point outside, the child that is nearest. A point on the
+// high face of the box stays on the low side of a cut there, since nothing of the box lies on the other.
+template <int D>
+int LeafTree<D>::ChildHolding(const Node& node, const Point<D>& p) const {
+  int child = 0;
+  for (int i = 0; i < D; ++i) {
+    const double middle = node.low[i] + 0.5 * node.side;
+    if (p[i] >= middle && middle < box_.high[i]) {
+      child |= 1 << i;
+    }
+  }
+  return child;
+}
+
+template <int D>
+NodeId LeafTree<D>::LeafHolding(NodeId start, const Point<D>& p) const {
+  NodeId at = start;
+  while (true) {
+    const Node& node = At(at);
+    if (node.first_child != kNoNode) {
+      at = Child(node, ChildHolding(node, p));
+      continue;
+    }
+    // Step through the face that p is farthest beyond. Cubes are half open, but for the high faces of the box.
+    int face = -1;
+    double farthest = -1;
+    for (int i = 0; i < D; ++i) {
+      const double high = node.low[i] + node.side;
+      if (p[i] < node.low[i] && node.low[i] - p[i] > farthest) {
+        farthest = node.low[i] - p[i];
+        face = FaceIndex(i, false);
+      } else if (p[i] >= high && high < box_.high[i] && p[i] - high > farthest) {
+        farthest = p[i] - high;
+        face = FaceIndex(i, true);
+      }
+    }
+    if (face < 0) {
+      return at;
+    }
+    at = node.neighbour[face];
+  }
+}
+
+template <int D>
+void LeafTree<D>::Split(NodeId leaf) {
+  SplitLargerNeighbours(leaf);
+  const NodeId first{node_count()};
+  nodes_.resize(nodes_.size() + kChildren);
+  Node& parent = At(leaf);
+  parent.first_child = first;
+  uint32_t inside = 0;
+  for (int child = 0; child < kChildren; ++child) {
+    Node& node = At(Child(parent, child));
+    node.side = 0.5 * parent.side;
+    node.level = static_cast<uint8_t>(parent.level + 1);
+    for (int i = 0; i < D; ++i) {
+      node.low[i] = parent.low[i] + ((child >> i) & 1) * node.side;
+      node.outside = node.outside || node.low[i] >= box_.high[i];
+    }
+    inside += node.outside ? 0 : 1;
+  }
+  leaf_count_ += inside - 1;
+  LinkChildren(leaf);
+  if (!pending_.empty()) {
+    DistributeRange(leaf);
+  } else {
+    DistributeBucket(leaf);
+  }
+}
+
+// Splits every leaf that touches `leaf` and is larger: reached through faces, one axis after the other.
+template <int D>
+void LeafTree<D>::SplitLargerNeighbours(NodeId leaf) {
+  SplitLargerNeighboursFrom(leaf, leaf, 0);
+}
+
+template <int D>
+void LeafTree<D>::SplitLargerNeighboursFrom(NodeId leaf, NodeId at, int axis) {
+  if (axis == D) {
+    return;
+  }
+  SplitLargerNeighboursFrom(leaf, at, axis + 1);
+  for (const bool high : {false, true}) {
+    const int face = FaceIndex(axis, high);
+    NodeId beyond = At(at).neighbour[face];
+    if (beyond == kNoNode) {
+      continue;
+    }
+    if (At(beyond).level < At(leaf).level) {
+      Split(beyond);
+      beyond = At(at).neighbour[face];
+    }
+    SplitLargerNeighboursFrom(leaf, beyond, axis + 1);
+  }
+}
+
+// Sets the neighbours of the new children of `parent`, and those of nodes around that had `parent` for a neighbour.
+//
+// REQUIRES:   the nodes around `parent` are at its level.
+template <int D>
+void LeafTree<D>::LinkChildren(NodeId parent) {
+  for (int child = 0; child < kChildren; ++child) {
+    const NodeId id = Child(At(parent), child);
+    for (int face = 0; face < kFaces; ++face) {
+      const int axis = face / 2;
+      const bool high = face % 2 == 1;
+      const int mirrored = child ^ (1 << axis);
+      NodeId beyond = kNoNode;
+      if (((child >> axis) & 1) != (high ? 1 : 0)) {
+        beyond = Child(At(parent), mirrored);
+      } else if (const NodeId around = At(parent).neighbour[face]; around != kNoNode) {
+        beyond = At(around).first_child == kNoNode ? around : Child(At(around), mirrored);
+      }
+      if (beyond != kNoNode && At(beyond).outside) {
+        beyond = kNoNode;
+      }
+      At(id).neighbour[face] = beyond;
+      if (beyond != kNoNode && At(beyond).level == At(id).level && !At(id).outside) {
+        At(beyond).neighbour[FaceIndex(axis, !high)] = id;
+      }
+    }
+  }
+}
+
+template <int D>
+void LeafTree<D>::DistributeRange(NodeId parent) {
+  const Node& node = At(parent);
+  ranges_.resize(nodes_.size());
+  Range rest = ranges_[Index(parent)];
+  for (int child = 0; child < kChildren; ++child) {
+    const auto begin = points_.begin() + rest.begin;
+    const auto end = points_.begin() + rest.end;
+    const auto past =
+        std::partition_point(begin, end, [&](const Point<D>& p) { return ChildHolding(node, p) <= child; });
+    const uint32_t middle = rest.begin + static_cast<uint32_t>(past - begin);
+    const NodeId id = Child(node, child);
+    ranges_[Index(id)] = Range{rest.begin, middle};
+    rest.begin = middle;
+    if (!At(id).outside) {
+      pending_[At(id).level].push_back(id);
+    }
+  }
+}
+
+template <int D>
+void LeafTree<D>::DistributeBucket(NodeId parent) {
+  const uint32_t old = At(parent).bucket;
+  if (old == kNoBucket) {
+    return;
+  }
+  At(parent).bucket = kNoBucket;
+  const Bucket bucket = buckets_[old];
+  free_buckets_.push_back(old);
+  for (uint32_t i = 0; i < bucket.count; ++i) {
+    const Point<D>& p = bucket.positions[i];
+    Append(Child(At(parent), ChildHolding(At(parent), p)), bucket.ids[i], p);
+  }
+}
+
+// Whether lfs somewhere on the leaf is below side / kCoarseness, up to a factor of two; see HasNearFeatures.
+template <int D>
+bool LeafTree<D>::IsTooCoarse(NodeId leaf) {
+  const Box<D> cube = BoxOf(leaf);
+  const double side = At(leaf).side;
+  if (side > box_.ShortestSide()) {
+    return true;
+  }
+  const double reach = side / kCoarseness;
+  near_.clear();
+  visited_.assign(1, leaf);
+  for (size_t i = 0; i < visited_.size(); ++i) {
+    const NodeId at = visited_[i];
+    const Range range = ranges_[Index(at)];
+    if (range.size() > kLeafCapacity) {
+      return true;  // it is half as large and will be split again, so that balance asks for this leaf to be split
+    }
+    for (uint32_t v = range.begin; v < range.end; ++v) {
+      if (DistanceSq<D>(points_[v], cube) <= reach * reach) {
+        near_.push_back(points_[v]);
+      }
+    }
+    ForEachFaceNeighbour(at, [&](NodeId beyond) {
+      if (DistanceSq<D>(BoxOf(beyond), cube) <= reach * reach &&
+          std::find(visited_.begin(), visited_.end(), beyond) == visited_.end()) {
+        visited_.push_back(beyond);
+      }
+    });
+  }
+  return HasNearFeatures(cube, reach);
+}
+
+// Whether two features (points of near_, faces of the box that a point does not lie on) are both within `reach` of one
+// point of `cube`, looked for where it is best for the pair: at the projection of the points' midpoint on the cube, or
+// of the point itself. A pair within reach / 2 of a common point of the cube is always found, as projecting does not
+// expand.
+template <int D>
+bool LeafTree<D>::HasNearFeatures(const Box<D>& cube, double reach) const {
+  const double reach_sq = reach * reach;
+  const auto project = [&](Point<D> p) {
+    for (int i = 0; i < D; ++i) {
+      p[i] = std::clamp(p[i], std::max(cube.low[i], box_.low[i]), std::min(cube.high[i], box_.high[i]));
+    }
+    return p;
+  };
+  for (size_t i = 0; i < near_.size(); ++i) {
+    const Point<D>& a = near_[i];
+    const Point<D> own = project(a);
+    const FaceMask faces = box_.FacesOf(a);
+    for (int face = 0; face < kFaces; ++face) {
+      if (((faces >> face) & 1) == 0 && box_.DistanceToFace(own, face) <= reach) {
+        return true;
+      }
+    }
+    for (size_t j = 0; j < i; ++j) {
+      const Point<D>& b = near_[j];
+      Point<D> middle;
+      for (int k = 0; k < D; ++k) {
+        middle[k] = 0.5 * (a[k] + b[k]);
+      }
+      const Point<D> x = project(middle);
+      if (DistanceSq<D>(a, x) <= reach_sq && DistanceSq<D>(b, x) <= reach_sq) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+template class LeafTree<2>;
+template class LeafTree<3>;
+
+}  // namespace wellspace::core

@@ -1,0 +1,202 @@
+// The balanced 2^D-tree whose leaves hold the vertices: where a vertex lies, and what lies around it.
+#ifndef WELLSPACE_CORE_TREE_LEAF_TREE_H_
+#define WELLSPACE_CORE_TREE_LEAF_TREE_H_
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "core/base/ids.h"
+#include "core/base/run_context.h"
+#include "core/geometry/box.h"
+#include "core/geometry/point.h"
+#include "core/tree/morton.h"
+
+namespace wellspace::core {
+
+// The leaves are cubes; they cover the box, do not overlap, and no two that touch, be it in a corner, differ by more
+// than a factor of two in side.
+//
+// Thread safety: thread-compatible.
+// Invariants:
+//   (1) a vertex lies in the closed cube of its leaf;
+//   (2) balance: the levels of touching leaves differ by at most one;
+//   (3) property B of [HT08] §5 after Build: a leaf of side s that is longer than the grid's cubes has lfs >= s / (2 kCoarseness)
+//       everywhere; and a node of side S is split only if S exceeds the box's shortest side, or it holds more than kLeafCapacity
+//       points, or two features are within S / kCoarseness of it and twice that of each other, or, for balance, a node of side S / 2
+//       that touches it is split. Here the features are the points and the faces of the box, a face not to a point that lies on it;
+//   (4) a leaf holds at most kLeafCapacity vertices, unless it is as small as the grid allows;
+//   (5) neighbour(node, face) is the node of the same level beyond the face, or the larger leaf there, or none beyond
+//   the box.
+template <int D>
+class LeafTree {
+ public:
+  static constexpr int kChildren = 1 << D;
+  static constexpr int kFaces = 2 * D;
+  static constexpr int kLeafCapacity = D == 2 ? 16 : D == 3 ? 16 : 4 << D;
+  // A leaf may be this many times larger than lfs on it. At least 2, so that the neighbours of a leaf hold all that is
+  // near it.
+  static constexpr double kCoarseness = 32;
+
+  // The vertices of one leaf, side by side.
+  struct Bucket {
+    uint32_t count = 0;
+    std::array<VertexId, kLeafCapacity> ids;
+    std::array<Point<D>, kLeafCapacity> positions;
+  };
+
+  // Builds the tree over `box` for `points`, sorted in Morton order on MortonGrid(box) and distinct as cubes of it;
+  // vertex i is points[i].
+  //
+  // Complexity: O(D 2^D L) for L leaves.
+  // Errors:     RESOURCE_EXHAUSTED when it would have more than `max_leaves` leaves; CANCELLED, DEADLINE_EXCEEDED.
+  // Source:     [HT08] §5; levels from the top down over sorted ranges instead of Bern, Eppstein and Teng's merging,
+  //             which matters only when leaves are compressed; here every leaf is one that a mesh of optimal size
+  //             needs.
+  absl::Status Build(const Box<D>& box, std::span<const Point<D>> points, uint64_t max_leaves,
+                     const RunContext& context);
+
+  // Adds vertex `v`, the one after the last, at `p`, walking from the leaf of `near`, or from the root for kNoVertex;
+  // splits a leaf that is full.
+  //
+  // REQUIRES:   p in the box; v == vertex_count().
+  // Complexity: O(1 + leaves between near and p).
+  // Source:     [HT08] §5, AddVertex.
+  void Insert(VertexId near, VertexId v, const Point<D>& p);
+
+  NodeId leaf_of(VertexId v) const { return leaf_of_[Index(v)]; }
+  uint32_t vertex_count() const { return static_cast<uint32_t>(leaf_of_.size()); }
+  uint64_t leaf_count() const { return leaf_count_; }
+  // Nodes are numbered from 0; not every one is a leaf.
+  uint32_t node_count() const { return static_cast<uint32_t>(nodes_.size()); }
+  // Whether `node` is a leaf that covers a part of the box.
+  bool IsLeaf(NodeId node) const { return At(node).first_child == kNoNode && !At(node).outside; }
+  Box<D> BoxOf(NodeId node) const { return At(node).Cube(); }
+  int level(NodeId node) const { return At(node).level; }
+
+  // The vertices in a leaf, or null for none.
+  const Bucket* BucketOf(NodeId leaf) const {
+    const uint32_t bucket = At(leaf).bucket;
+    return bucket == kNoBucket ? nullptr : &buckets_[bucket];
+  }
+
+  // Calls f(NodeId) for every leaf, along the Z curve.
+  //
+  // Complexity: O(nodes).
+  template <typename F>
+  void ForEachLeaf(F&& f, NodeId from = NodeId{0}) const {
+    const Node& node = At(from);
+    if (node.outside) {
+      return;
+    }
+    if (node.first_child == kNoNode) {
+      f(from);
+      return;
+    }
+    for (int child = 0; child < kChildren; ++child) {
+      ForEachLeaf(f, Child(node, child));
+    }
+  }
+
+  // Calls f(NodeId) for each leaf that shares a part of a facet with `leaf`.
+  //
+  // Complexity: O(D 2^D), for most leaves O(D).
+  template <typename F>
+  void ForEachFaceNeighbour(NodeId leaf, F&& f) const {
+    const Node& node = At(leaf);
+    for (int face = 0; face < kFaces; ++face) {
+      const NodeId beyond = node.neighbour[face];
+      if (beyond == kNoNode) {
+        continue;
+      }
+      const Node& other = At(beyond);
+      if (other.first_child == kNoNode) {
+        f(beyond);
+        continue;
+      }
+      const int axis = face / 2;
+      const int facing = face % 2 == 0 ? 1 : 0;
+      for (int child = 0; child < kChildren; ++child) {
+        const NodeId id = Child(other, child);
+        if (((child >> axis) & 1) == facing && !At(id).outside) {
+          f(id);
+        }
+      }
+    }
+  }
+
+ private:
+  static constexpr uint32_t kNoBucket = ~uint32_t{0};
+
+  struct Node {
+    Point<D> low;
+    double side = 0;
+    std::array<NodeId, kFaces> neighbour;
+    NodeId first_child = kNoNode;
+    uint32_t bucket = kNoBucket;
+    uint8_t level = 0;
+    bool outside = false;  // no part of the box in its interior
+
+    Box<D> Cube() const {
+      Box<D> cube{low, low};
+      for (int i = 0; i < D; ++i) {
+        cube.high[i] += side;
+      }
+      return cube;
+    }
+  };
+
+  // The points of a node under construction.
+  struct Range {
+    uint32_t begin = 0;
+    uint32_t end = 0;
+    uint32_t size() const { return end - begin; }
+  };
+
+  const Node& At(NodeId id) const { return nodes_[Index(id)]; }
+  Node& At(NodeId id) { return nodes_[Index(id)]; }
+  static NodeId Child(const Node& node, int child) {
+    return NodeId{Index(node.first_child) + static_cast<uint32_t>(child)};
+  }
+
+  int ChildHolding(const Node& node, const Point<D>& p) const;
+  NodeId LeafHolding(NodeId start, const Point<D>& p) const;
+  bool CanSplit(NodeId leaf) const { return At(leaf).level < max_level_; }
+
+  // Splits a leaf into its children, and before that, for balance, larger leaves that touch it.
+  void Split(NodeId leaf);
+  void SplitLargerNeighbours(NodeId leaf);
+  void SplitLargerNeighboursFrom(NodeId leaf, NodeId at, int axis);
+  void LinkChildren(NodeId parent);
+  void DistributeRange(NodeId parent);
+  void DistributeBucket(NodeId parent);
+  void Append(NodeId leaf, VertexId v, const Point<D>& p);
+
+  // The split rule of Build.
+  bool IsTooCoarse(NodeId leaf);
+  bool HasNearFeatures(const Box<D>& cube, double reach) const;
+
+  Box<D> box_;
+  uint8_t max_level_ = 0;
+  uint64_t leaf_count_ = 0;
+  std::vector<Node> nodes_;
+  std::vector<Bucket> buckets_;
+  std::vector<uint32_t> free_buckets_;
+  std::vector<NodeId> leaf_of_;
+
+  // During Build only.
+  std::span<const Point<D>> points_;
+  std::vector<Range> ranges_;                 // by node
+  std::vector<std::vector<NodeId>> pending_;  // leaves to be looked at, by level
+  std::vector<Point<D>> near_;                // points near the leaf that is looked at
+  std::vector<NodeId> visited_;
+};
+
+extern template class LeafTree<2>;
+extern template class LeafTree<3>;
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_TREE_LEAF_TREE_H_

@@ -1,0 +1,91 @@
+// The integer grid under the 2^D-tree, and the Morton (Z) order on it.
+#ifndef WELLSPACE_CORE_TREE_MORTON_H_
+#define WELLSPACE_CORE_TREE_MORTON_H_
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include "core/geometry/box.h"
+#include "core/geometry/point.h"
+
+namespace wellspace::core {
+
+template <int D>
+using GridPoint = std::array<uint64_t, D>;
+
+// A grid of cubes of side `quantum`, a power of two, over a box: so fine that it tells apart all points that the mesher
+// serves, so coarse that every corner of every cube is a double. Hence comparing a coordinate with a side of a tree
+// node is exact.
+//
+// Invariants: (1) the root cube [root_low, root_low + root_side]^D contains the box and root_side = quantum * 2^levels;
+// (2) all corners of cubes are exact doubles, since their multiples of quantum stay below 2^53.
+template <int D>
+class MortonGrid {
+ public:
+  explicit MortonGrid(const Box<D>& box) {
+    double magnitude = 0;
+    for (int i = 0; i < D; ++i) {
+      magnitude = std::max({magnitude, std::abs(box.low[i]), std::abs(box.high[i])});
+    }
+    const int exponent = std::ilogb(magnitude) + 1 - kBits;  // magnitude / quantum < 2^kBits
+    quantum_ = std::ldexp(1.0, exponent);
+    uint64_t extent = 1;
+    for (int i = 0; i < D; ++i) {
+      const double first = std::floor(box.low[i] / quantum_);
+      root_low_[i] = first * quantum_;
+      // The last cube that the box reaches into: a coordinate on the box's high face belongs to it.
+      last_[i] = static_cast<uint64_t>(std::ceil(box.high[i] / quantum_) - first) - 1;
+      extent = std::max(extent, last_[i] + 1);
+    }
+    while ((uint64_t{1} << levels_) < extent) {
+      ++levels_;
+    }
+  }
+
+  double quantum() const { return quantum_; }
+  int levels() const { return levels_; }
+  const Point<D>& root_low() const { return root_low_; }
+  double root_side() const { return std::ldexp(quantum_, levels_); }
+
+  // The cube of the grid that holds `p`, a point of the box.
+  GridPoint<D> CubeOf(const Point<D>& p) const {
+    GridPoint<D> cube;
+    for (int i = 0; i < D; ++i) {
+      const double steps = std::floor(p[i] / quantum_) - root_low_[i] / quantum_;
+      cube[i] = std::min(static_cast<uint64_t>(steps), last_[i]);
+    }
+    return cube;
+  }
+
+ private:
+  static constexpr int kBits = 51;
+
+  double quantum_ = 0;
+  int levels_ = 0;
+  Point<D> root_low_;
+  GridPoint<D> last_;
+};
+
+// Whether `a` comes before `b` on the Z curve on which axis D - 1 is the most significant of a level.
+//
+// Complexity: O(D).
+// Source:     T. Chan 2002: the axis with the highest differing bit decides.
+template <int D>
+inline bool MortonLess(const GridPoint<D>& a, const GridPoint<D>& b) {
+  int axis = D - 1;
+  uint64_t highest = a[axis] ^ b[axis];
+  for (int i = D - 2; i >= 0; --i) {
+    const uint64_t difference = a[i] ^ b[i];
+    if (highest < difference && highest < (highest ^ difference)) {
+      axis = i;
+      highest = difference;
+    }
+  }
+  return a[axis] < b[axis];
+}
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_TREE_MORTON_H_

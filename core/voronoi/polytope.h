@@ -1,0 +1,122 @@
+// The Voronoi cell of one vertex under construction: a bounded simple polytope, cut by one bisector after the other.
+#ifndef WELLSPACE_CORE_VORONOI_POLYTOPE_H_
+#define WELLSPACE_CORE_VORONOI_POLYTOPE_H_
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/base/ids.h"
+#include "core/geometry/box.h"
+#include "core/geometry/point.h"
+#include "core/geometry/power_predicate.h"
+
+namespace wellspace::core {
+
+// What a bounding plane of a cell is.
+enum class PlaneKind : uint8_t {
+  kBisector,
+  kFace,  // of the box
+  kClip,  // of the cube that a clipped cell is computed in, or of the walls far outside the box
+};
+
+template <int D>
+struct Plane {
+  PlaneKind kind = PlaneKind::kBisector;
+  uint8_t face = 0;             // FaceIndex, unless a bisector
+  VertexId vertex = kNoVertex;  // of a bisector
+  Point<D> normal;              // relative to the site: normal . x = offset; for a bisector the vector to its vertex
+  double offset = 0;
+  double length = 0;      // |normal|
+  PlaneSource<D> source;  // exact
+};
+
+template <int D>
+struct CellNode {
+  Point<D> x;                      // relative to the site
+  double radius_sq = 0;            // |x|^2
+  double slack = 0;                // twice the error of x in any direction and of products with it, per unit of length
+  std::array<uint16_t, D> planes;  // indices of the planes that meet here
+  std::array<uint16_t, D> neighbours;  // neighbours[k]: the node at the other end of the edge that leaves planes[k]
+};
+
+// How often the stages after the floating-point filter were needed.
+struct DecisionCounters {
+  uint64_t exact = 0;
+  uint64_t perturbed = 0;
+};
+
+// Thread safety: thread-compatible. Reused from site to site: no allocation once warm.
+// Invariants: (1) the graph of nodes is that of a simple polytope: every node has D planes and D neighbours, an edge
+// joins two nodes that share D - 1 planes; (2) the node set is the one exact arithmetic and the tie rule give, whatever
+// the rounding.
+template <int D>
+class Polytope {
+ public:
+  // Begins with the box [low, high], which holds `site` and whose faces are of kind `kinds[FaceIndex]`.
+  void Reset(const Point<D>& site, const Box<D>& bounds, const std::array<PlaneKind, 2 * D>& kinds, TieRule rule);
+
+  // Cuts the cell by the bisector of its site and `u`, keeping the site's side. Returns whether anything was cut off.
+  //
+  // REQUIRES:   u != site, and not cut by before.
+  // Guarantees: (1) the result is a subset of the cell; (2) exact: the nodes are those of the exact cell under the tie
+  //             rule.
+  // Complexity: O(nodes); no allocation once warm.
+  // Errors:     none.
+  // Source:     the cell as a simple polytope is usual since Tanemura, Ogawa and Ogita 1983.
+  bool Cut(VertexId u, const Point<D>& position);
+
+  // Whether some vertex in `cube` (absolute coordinates) could still cut the cell: whether some node x has dist(x,
+  // cube) <= |x - site|, decided generously where rounding leaves a doubt.
+  //
+  // Complexity: O(nodes).
+  // Errors:     none.
+  // Source:     [HT08] §6 with the polytope in the place of the ball: |x p|^2 - |x site|^2 is affine in x for fixed p,
+  //             so its least value over the cell is at a node.
+  bool Reaches(const Box<D>& cube) const;
+
+  const Point<D>& site() const { return site_; }
+  // The squared distance from the site to the farthest node.
+  double reach_sq() const { return reach_sq_; }
+  std::span<const CellNode<D>> nodes() const { return nodes_; }
+  const Plane<D>& plane(int index) const { return planes_[index]; }
+  int plane_count() const { return static_cast<int>(planes_.size()); }
+  uint64_t cuts() const { return cuts_; }
+  const DecisionCounters& counters() const { return counters_; }
+
+ private:
+  struct End {
+    uint16_t node;
+    uint8_t slot;
+  };
+
+  bool IsCutOff(const CellNode<D>& node, double excess, const Plane<D>& plane);
+  void MakeNewNodes(uint16_t plane);
+  void Place(CellNode<D>& node, uint16_t kept, uint16_t removed);
+  void LinkNewNodes(uint16_t plane, uint16_t first_new);
+  void DropRemovedNodes();
+  void UpdateReach();
+
+  Point<D> site_;
+  TieRule rule_ = TieRule::kKeep;
+  double reach_sq_ = 0;
+  std::vector<Plane<D>> planes_;
+  std::vector<CellNode<D>> nodes_;
+  uint64_t cuts_ = 0;
+  DecisionCounters counters_;
+
+  // Scratch of Cut, by node.
+  std::vector<double> excess_;
+  std::vector<uint8_t> is_removed_;
+  std::vector<uint16_t> removed_;
+  std::vector<End>
+      open_end_;  // by plane: a new node whose edge along that plane and the new one still lacks its other end
+};
+
+extern template class Polytope<2>;
+extern template class Polytope<3>;
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_VORONOI_POLYTOPE_H_

@@ -1,0 +1,140 @@
+// The query structure of [HT08]: vertices in a balanced 2^D-tree that answers which part of a Voronoi cell matters.
+#ifndef WELLSPACE_CORE_VORONOI_QUERY_STRUCTURE_H_
+#define WELLSPACE_CORE_VORONOI_QUERY_STRUCTURE_H_
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "core/base/ids.h"
+#include "core/base/run_context.h"
+#include "core/geometry/box.h"
+#include "core/geometry/point.h"
+#include "core/tree/leaf_tree.h"
+#include "core/voronoi/polytope.h"
+
+namespace wellspace::core {
+
+// What queries have cost.
+struct QueryCounters {
+  uint64_t queries = 0;
+  uint64_t leaves = 0;    // opened
+  uint64_t vertices = 0;  // found in them
+  uint64_t cuts = 0;      // bisectors that cut something off
+  uint64_t max_leaves = 0;
+  DecisionCounters decisions;
+
+  void Add(const QueryCounters& other);
+};
+
+// The scratch space of queries, owned by the caller and reused, with the cell that the last one computed.
+template <int D>
+struct Workspace {
+  struct Candidate {
+    double distance_sq;
+    NodeId leaf;
+  };
+  struct Near {
+    double distance_sq;
+    uint32_t slot;
+  };
+
+  Polytope<D> cell;
+  QueryCounters counters;
+  // Private to the queries.
+  std::vector<uint32_t> seen;  // by tree node: the query that last met it
+  uint32_t query = 0;
+  std::vector<Candidate> queue;
+  std::vector<Near> near;
+};
+
+struct Neighbor {
+  VertexId vertex = kNoVertex;
+  double distance_sq = 0;
+};
+
+// Thread safety: thread-compatible; queries with different workspaces may run at once, AddVertex alone.
+// Invariants: (1) vertices are distinct and lie in the box; (2) faces(v) are exactly the faces of the box that v lies
+// on.
+template <int D>
+class QueryStructure {
+ public:
+  // Builds the structure for `points`, then adds the corners of the box that are not among them.
+  //
+  // REQUIRES:   points distinct as cubes of MortonGrid(box), sorted in its Morton order, in the box.
+  // Complexity: O(L) for L leaves; O(n log n) has been paid for sorting.
+  // Errors:     RESOURCE_EXHAUSTED when more than `max_leaves` leaves would be needed; CANCELLED, DEADLINE_EXCEEDED.
+  // Source:     [HT08] Figure 3, INITIALIZE.
+  absl::Status Initialize(const Box<D>& box, std::vector<Point<D>> points, uint64_t max_leaves,
+                          const RunContext& context);
+
+  // The vertex nearest to `v`, and its squared distance. Exact up to rounding, where the paper asks for a constant
+  // factor: the scan stops as soon as it is known.
+  //
+  // REQUIRES:   there is another vertex.
+  // Complexity: O(1) when bottom-up.
+  // Errors:     none.
+  // Source:     [HT08] Figure 3, APPROXIMATENN.
+  Neighbor NearestNeighbor(VertexId v, Workspace<D>& workspace) const;
+
+  // Computes in workspace.cell the Voronoi cell of `v` in the box, clipped by the cube of half side `radius` about v.
+  // Ties are kept.
+  //
+  // Units:      radius in those of the coordinates; [HT08]'s beta NN(v).
+  // REQUIRES:   radius > 0.
+  // Guarantees: (1) exact: every node's ball through v is empty of vertices; (2) every node is on bisectors, faces of
+  //             the box, or the clip cube.
+  // Complexity: O(1) amortised over a bottom-up run; counted in workspace.counters.
+  // Errors:     none.
+  // Source:     [HT08] Figure 6; leaves in order of their distance, opened by Polytope::Reaches, through facets of
+  //             leaves alone: a ball about a node through v is convex, so a generic path in it from v to any leaf it
+  //             meets crosses only facets of leaves that it meets.
+  void ClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace) const;
+
+  // Computes in workspace.cell the whole Voronoi cell of `v`, inside walls one side of the box beyond it, ties
+  // perturbed.
+  //
+  // Guarantees: (1) cells of different sites agree: they are those of one regular triangulation, the Delaunay
+  //             triangulation of infinitesimally weighted vertices.
+  // Complexity: O(1) once refined.
+  // Errors:     none.
+  // Source:     [HT08] §1, "the entire Voronoi cell of any vertex".
+  void Voronoi(VertexId v, Workspace<D>& workspace) const;
+
+  // Adds a vertex at `p`, near `near`; kNoVertex if none is known.
+  //
+  // REQUIRES:   p in the box and different from all vertices.
+  // Complexity: O(1) when p is in the clipped cell of `near` in a bottom-up run.
+  // Errors:     none.
+  // Source:     [HT08] Figure 3, ADDVERTEX.
+  VertexId AddVertex(VertexId near, const Point<D>& p);
+
+  const Box<D>& box() const { return box_; }
+  uint32_t vertex_count() const { return static_cast<uint32_t>(points_.size()); }
+  const Point<D>& point(VertexId v) const { return points_[Index(v)]; }
+  FaceMask faces(VertexId v) const { return faces_[Index(v)]; }
+  const LeafTree<D>& tree() const { return tree_; }
+
+ private:
+  void BeginQuery(Workspace<D>& workspace) const;
+  bool MarkSeen(NodeId leaf, Workspace<D>& workspace) const;
+  // Calls open(leaf) for leaves outward from that of v: as long as reach_sq() says for those whose distance allows it,
+  // and wants(leaf) agrees.
+  template <typename ReachSq, typename Wants, typename Open>
+  void ScanOutward(VertexId v, Workspace<D>& workspace, ReachSq reach_sq, Wants wants, Open open) const;
+  void Scan(VertexId v, Workspace<D>& workspace) const;
+  void CutByLeaf(VertexId v, NodeId leaf, Workspace<D>& workspace) const;
+
+  Box<D> box_;
+  LeafTree<D> tree_;
+  std::vector<Point<D>> points_;
+  std::vector<FaceMask> faces_;
+};
+
+extern template class QueryStructure<2>;
+extern template class QueryStructure<3>;
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_VORONOI_QUERY_STRUCTURE_H_
