@@ -1,0 +1,17 @@
+// The checksum of the chunks of a mesh, for those who write and those who read them.
+#ifndef WELLSPACE_PROTO_CHECKSUM_H_
+#define WELLSPACE_PROTO_CHECKSUM_H_
+
+#include <cstddef>
+#include <cstdint>
+
+namespace wellspace {
+
+// CRC32C of `size` bytes, as MeshChunk.crc32c defines it for arrays in memory.
+//
+// Threads:    thread-safe.
+uint32_t Crc32c(const void* data, size_t size);
+
+}  // namespace wellspace
+
+#endif  // WELLSPACE_PROTO_CHECKSUM_H_

@@ -1,0 +1,135 @@
+#include "server/convert.h"
+
+#include <algorithm>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "server/errors.h"
+
+namespace wellspace::server {
+namespace {
+
+grpc::Status InvalidParameter(const std::string& message, const std::string& field) {
+  return MakeError(v1::ERROR_REASON_INVALID_PARAMETERS, message, absl::StrCat("parameters.", field));
+}
+
+// Validates what is set in `parameters` so far, blaming `field` as the one that was set last.
+grpc::Status Validate(const core::MeshParameters& parameters, const std::string& field) {
+  const absl::Status status = core::ValidateParameters(parameters);
+  return status.ok() ? grpc::Status::OK : InvalidParameter(std::string(status.message()), field);
+}
+
+v1::MeshStatistics StatisticsToProto(const core::MeshStatistics& statistics) {
+  v1::MeshStatistics message;
+  message.set_input_points(statistics.input_points);
+  message.set_duplicates(statistics.duplicates);
+  message.set_vertices(statistics.vertices);
+  message.set_simplices(statistics.simplices);
+  message.set_max_radius_edge(statistics.max_radius_edge);
+  message.set_min_angle_deg(statistics.min_angle_deg);
+  message.set_peak_memory_bytes(statistics.peak_memory_bytes);
+
+  v1::PhaseSeconds* seconds = message.mutable_seconds();
+  seconds->set_tree(statistics.tree_seconds);
+  seconds->set_refinement(statistics.refinement_seconds);
+  seconds->set_simplices(statistics.simplices_seconds);
+  seconds->set_total(statistics.total_seconds);
+
+  v1::OperationCounters* counters = message.mutable_counters();
+  counters->set_tree_leaves(statistics.tree_leaves);
+  counters->set_cells_computed(statistics.cells_computed);
+  counters->set_leaves_visited(statistics.leaves_visited);
+  counters->set_vertices_visited(statistics.vertices_visited);
+  counters->set_cuts(statistics.cuts);
+  counters->set_max_leaves_visited(statistics.max_leaves_visited);
+  counters->set_stars_computed(statistics.stars_computed);
+  counters->set_star_leaves_visited(statistics.star_leaves_visited);
+  counters->set_star_vertices_visited(statistics.star_vertices_visited);
+  counters->set_star_cuts(statistics.star_cuts);
+  counters->set_max_star_leaves_visited(statistics.max_star_leaves_visited);
+  counters->set_exact_predicates(statistics.exact_predicates);
+  counters->set_perturbed_predicates(statistics.perturbed_predicates);
+  return message;
+}
+
+}  // namespace
+
+grpc::Status ParametersFromProto(const v1::MeshParameters& message, const ServiceOptions& options,
+                                 core::MeshParameters* parameters) {
+  // The fields are set one by one, the others still at their defaults, so that the core's validation, the only one there is, shows
+  // which of them it refuses.
+  *parameters = core::MeshParameters();
+  parameters->dimension = message.dimension();
+  if (grpc::Status status = Validate(*parameters, "dimension"); !status.ok()) {
+    return status;
+  }
+  parameters->rho = message.rho();
+  if (grpc::Status status = Validate(*parameters, "rho"); !status.ok()) {
+    return status;
+  }
+  if (message.has_margin()) {
+    parameters->margin = message.margin();
+    if (grpc::Status status = Validate(*parameters, "margin"); !status.ok()) {
+      return status;
+    }
+  }
+  if (message.has_domain()) {
+    // An empty domain would pass for an absent one in the core.
+    if (message.domain().low().empty() || message.domain().high().empty()) {
+      return InvalidParameter(
+          absl::StrCat("the domain has ", message.domain().low_size(), " low and ", message.domain().high_size(),
+                       " high coordinates; expected ", message.dimension(), " of each, or no domain"),
+          "domain");
+    }
+    parameters->domain_low.assign(message.domain().low().begin(), message.domain().low().end());
+    parameters->domain_high.assign(message.domain().high().begin(), message.domain().high().end());
+    if (grpc::Status status = Validate(*parameters, "domain"); !status.ok()) {
+      return status;
+    }
+  }
+  if (message.threads() != 0) {
+    parameters->threads = message.threads();
+    if (grpc::Status status = Validate(*parameters, "threads"); !status.ok()) {
+      return status;
+    }
+  }
+  parameters->threads = std::min(parameters->threads, options.max_threads);
+  if (message.max_vertices() > options.max_vertices) {
+    return InvalidParameter(absl::StrCat("max_vertices is ", message.max_vertices(), "; this server accepts at most ",
+                                         options.max_vertices, ", or 0 for that"),
+                            "max_vertices");
+  }
+  parameters->max_vertices = message.max_vertices() == 0 ? options.max_vertices : message.max_vertices();
+  return Validate(*parameters, "max_vertices");
+}
+
+v1::MeshMetadata MetadataToProto(const core::Mesh& mesh, uint64_t chunk_count) {
+  v1::MeshMetadata metadata;
+  metadata.set_dimension(mesh.dimension);
+  metadata.mutable_domain()->mutable_low()->Assign(mesh.domain_low.begin(), mesh.domain_low.end());
+  metadata.mutable_domain()->mutable_high()->Assign(mesh.domain_high.begin(), mesh.domain_high.end());
+  metadata.set_vertex_count(mesh.vertex_count());
+  metadata.set_simplex_count(mesh.simplex_count());
+  metadata.set_input_point_count(mesh.input_vertex.size());
+  metadata.set_chunk_count(chunk_count);
+  *metadata.mutable_statistics() = StatisticsToProto(mesh.statistics);
+  return metadata;
+}
+
+v1::Phase PhaseToProto(core::Phase phase) {
+  switch (phase) {
+    case core::Phase::kWaiting:
+      return v1::PHASE_WAITING;
+    case core::Phase::kTree:
+      return v1::PHASE_TREE;
+    case core::Phase::kRefinement:
+      return v1::PHASE_REFINEMENT;
+    case core::Phase::kSimplices:
+      return v1::PHASE_SIMPLICES;
+    case core::Phase::kDone:
+      return v1::PHASE_DONE;
+  }
+  return v1::PHASE_UNSPECIFIED;
+}
+
+}  // namespace wellspace::server

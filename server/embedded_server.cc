@@ -1,0 +1,48 @@
+#include "server/embedded_server.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <iostream>
+#include <thread>
+
+#include "server/server.h"
+#include "spdlog/sinks/null_sink.h"
+
+namespace wellspace::server {
+namespace {
+
+std::unique_ptr<Server> StartWithoutListener(int workers) {
+  ServerOptions options;
+  options.service.workers = std::max(1, workers);
+  options.service.max_threads = std::max(1u, std::thread::hardware_concurrency());
+  // The process's own machine is the limit: nobody else is to be protected.
+  options.service.max_points = core::kDefaultMaxVertices;
+  options.service.max_vertices = core::kDefaultMaxVertices;
+  auto log = std::make_shared<spdlog::logger>("embedded", std::make_shared<spdlog::sinks::null_sink_mt>());
+  absl::StatusOr<std::unique_ptr<Server>> server = Server::Start(options, std::move(log));
+  if (!server.ok()) {
+    std::cerr << "embedded server: " << server.status() << std::endl;
+    std::abort();  // without a listener nothing can fail
+  }
+  return *std::move(server);
+}
+
+}  // namespace
+
+class EmbeddedServer::Impl {
+ public:
+  explicit Impl(int workers) : server_(StartWithoutListener(workers)) {}
+
+  Server& server() { return *server_; }
+
+ private:
+  std::unique_ptr<Server> server_;
+};
+
+EmbeddedServer::EmbeddedServer(int workers) : impl_(std::make_unique<Impl>(workers)) {}
+
+EmbeddedServer::~EmbeddedServer() = default;
+
+std::shared_ptr<grpc::Channel> EmbeddedServer::Channel() { return impl_->server().InProcessChannel(); }
+
+}  // namespace wellspace::server

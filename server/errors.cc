@@ -1,0 +1,94 @@
+#include "server/errors.h"
+
+#include <exception>
+#include <new>
+
+#include "absl/strings/str_cat.h"
+#include "google/rpc/error_details.pb.h"
+#include "google/rpc/status.pb.h"
+
+namespace wellspace::server {
+namespace {
+
+constexpr int kRetrySeconds = 1;
+
+grpc::StatusCode CodeOf(v1::ErrorReason reason) {
+  switch (reason) {
+    case v1::ERROR_REASON_EMPTY_REQUEST:
+    case v1::ERROR_REASON_PARAMETERS_MISSING:
+    case v1::ERROR_REASON_PARAMETERS_REPEATED:
+    case v1::ERROR_REASON_INVALID_PARAMETERS:
+    case v1::ERROR_REASON_INVALID_CHUNK_SHAPE:
+    case v1::ERROR_REASON_INVALID_POINTS:
+      return grpc::StatusCode::INVALID_ARGUMENT;
+    case v1::ERROR_REASON_TOO_MANY_POINTS:
+    case v1::ERROR_REASON_MESH_TOO_LARGE:
+    case v1::ERROR_REASON_QUEUE_FULL:
+    case v1::ERROR_REASON_OUT_OF_MEMORY:
+      return grpc::StatusCode::RESOURCE_EXHAUSTED;
+    case v1::ERROR_REASON_SERVER_STOPPING:
+      return grpc::StatusCode::UNAVAILABLE;
+    default:
+      return grpc::StatusCode::INTERNAL;
+  }
+}
+
+bool PassesWithTime(v1::ErrorReason reason) {
+  return reason == v1::ERROR_REASON_QUEUE_FULL || reason == v1::ERROR_REASON_OUT_OF_MEMORY ||
+         reason == v1::ERROR_REASON_SERVER_STOPPING;
+}
+
+}  // namespace
+
+grpc::Status MakeError(v1::ErrorReason reason, const std::string& message, const std::string& field) {
+  google::rpc::Status details;
+  details.set_code(CodeOf(reason));
+  details.set_message(message);
+  google::rpc::ErrorInfo info;
+  info.set_reason(v1::ErrorReason_Name(reason));
+  info.set_domain(kErrorDomain);
+  details.add_details()->PackFrom(info);
+  if (!field.empty()) {
+    google::rpc::BadRequest bad_request;
+    google::rpc::BadRequest::FieldViolation* violation = bad_request.add_field_violations();
+    violation->set_field(field);
+    violation->set_description(message);
+    details.add_details()->PackFrom(bad_request);
+  }
+  if (PassesWithTime(reason)) {
+    google::rpc::RetryInfo retry;
+    retry.mutable_retry_delay()->set_seconds(kRetrySeconds);
+    details.add_details()->PackFrom(retry);
+  }
+  return grpc::Status(CodeOf(reason), message, details.SerializeAsString());
+}
+
+grpc::Status FromCoreStatus(const absl::Status& status) {
+  const std::string message(status.message());
+  switch (status.code()) {
+    case absl::StatusCode::kOk:
+      return grpc::Status::OK;
+    case absl::StatusCode::kInvalidArgument:
+      return MakeError(v1::ERROR_REASON_INVALID_POINTS, message, "points.coordinates");
+    case absl::StatusCode::kResourceExhausted:
+      return MakeError(v1::ERROR_REASON_MESH_TOO_LARGE, message);
+    case absl::StatusCode::kCancelled:
+      return grpc::Status(grpc::StatusCode::CANCELLED, message);
+    case absl::StatusCode::kDeadlineExceeded:
+      return grpc::Status(grpc::StatusCode::DEADLINE_EXCEEDED, message);
+    default:
+      return MakeError(v1::ERROR_REASON_INTERNAL, absl::StrCat("internal error: ", message));
+  }
+}
+
+grpc::Status RunGuarded(const std::function<grpc::Status()>& work) {
+  try {
+    return work();
+  } catch (const std::bad_alloc&) {
+    return MakeError(v1::ERROR_REASON_OUT_OF_MEMORY, "the server has not enough memory for this job");
+  } catch (const std::exception& exception) {
+    return MakeError(v1::ERROR_REASON_INTERNAL, absl::StrCat("internal error: ", exception.what()));
+  }
+}
+
+}  // namespace wellspace::server

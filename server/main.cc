@@ -1,0 +1,139 @@
+// wellspaced: serves wellspace.v1 until SIGTERM or SIGINT.
+//
+// Exit codes: 0 stopped by a signal, 1 cannot serve, 2 wrong options.
+#include <pthread.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "CLI/CLI.hpp"
+#include "absl/strings/str_cat.h"
+#include "server/server.h"
+#include "server/version.h"
+#include "spdlog/async.h"
+#include "spdlog/async_logger.h"
+#include "spdlog/sinks/stdout_sinks.h"
+
+namespace wellspace::server {
+namespace {
+
+constexpr int kExitWrongOptions = 2;
+constexpr int kLogQueue = 8192;
+constexpr double kMaxGraceSeconds = 86'400;
+
+struct Flags {
+  ServerOptions server{.listen = "127.0.0.1:7233", .insecure_remote = false, .service = {}};
+  double grace_seconds = 10;
+  std::string log_level = "info";
+};
+
+void Declare(CLI::App& app, Flags& flags) {
+  ServiceOptions& service = flags.server.service;
+  app.set_version_flag("--version", std::string("wellspaced ") + kVersion);
+  app.add_option("--listen", flags.server.listen, "Address to listen on; port 0 takes a free one")
+      ->type_name("HOST:PORT")
+      ->capture_default_str();
+  app.add_flag("--insecure-remote", flags.server.insecure_remote,
+               "Allow to listen, in plain text and without authentication, where other machines can connect");
+  app.add_option("--workers", service.workers, "Jobs that run at once")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  app.add_option("--max-queued", service.max_queued_jobs, "Jobs that wait for a worker; more are refused")
+      ->check(CLI::Range(0, 100'000))
+      ->capture_default_str();
+  app.add_option("--max-points", service.max_points, "Most points of a call")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--max-vertices", service.max_vertices, "Most vertices of a mesh")
+      ->check(CLI::Range(uint64_t{1}, core::kDefaultMaxVertices))
+      ->capture_default_str();
+  // A CLI::Range would let NaN pass.
+  const CLI::Validator finite_grace(
+      [](const std::string& text) {
+        double seconds = 0;
+        return CLI::detail::lexical_cast(text, seconds) && seconds >= 0 && seconds <= kMaxGraceSeconds
+                   ? std::string()
+                   : absl::StrCat("Value ", text, " not in range 0 to ", kMaxGraceSeconds);
+      },
+      "SECONDS");
+  app.add_option("--grace", flags.grace_seconds, "Time that running work gets to end after SIGTERM or SIGINT")
+      ->check(finite_grace)
+      ->capture_default_str();
+  app.add_option("--log-level", flags.log_level, "What to log on standard error")
+      ->check(CLI::IsMember({"debug", "info", "warning", "error", "off"}))
+      ->capture_default_str();
+}
+
+// A logger that never holds up its caller: a thread writes, and when it cannot follow, the oldest lines are lost.
+std::shared_ptr<spdlog::logger> MakeLogger(const std::string& level,
+                                           const std::shared_ptr<spdlog::details::thread_pool>& writer) {
+  auto log = std::make_shared<spdlog::async_logger>("wellspaced", std::make_shared<spdlog::sinks::stderr_sink_mt>(),
+                                                    writer, spdlog::async_overflow_policy::overrun_oldest);
+  log->set_level(spdlog::level::from_str(level));
+  log->flush_on(spdlog::level::info);
+  log->set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %l %v");
+  return log;
+}
+
+// SIGTERM and SIGINT, blocked in this thread and all that it starts later, to be waited for.
+class StopSignals {
+ public:
+  StopSignals() {
+    sigemptyset(&set_);
+    sigaddset(&set_, SIGTERM);
+    sigaddset(&set_, SIGINT);
+    pthread_sigmask(SIG_BLOCK, &set_, nullptr);
+  }
+
+  int Wait() {
+    int received = 0;
+    sigwait(&set_, &received);
+    return received;
+  }
+
+  // From now on the signals end the process, as they do by default.
+  void Release() { pthread_sigmask(SIG_UNBLOCK, &set_, nullptr); }
+
+ private:
+  sigset_t set_;
+};
+
+int Main(int argc, char** argv) {
+  Flags flags;
+  flags.server.service.workers = std::max(1u, std::thread::hardware_concurrency());
+  flags.server.service.max_threads = flags.server.service.workers;
+  CLI::App app("Makes well-spaced simplicial meshes from clouds of points, as a gRPC service.", "wellspaced");
+  Declare(app, flags);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kExitWrongOptions;
+  }
+
+  StopSignals signals;
+  signal(SIGPIPE, SIG_IGN);  // standard output or error may be a pipe whose reader has gone
+  const auto writer = std::make_shared<spdlog::details::thread_pool>(kLogQueue, 1);
+  const std::shared_ptr<spdlog::logger> log = MakeLogger(flags.log_level, writer);
+  absl::StatusOr<std::unique_ptr<Server>> server = Server::Start(flags.server, log);
+  if (!server.ok()) {
+    std::cerr << "wellspaced: " << server.status().message() << std::endl;
+    return 1;
+  }
+  std::cout << "listening on " << (*server)->address() << std::endl;
+
+  const int received = signals.Wait();
+  log->info("signal={} stopping grace={}", received, flags.grace_seconds);
+  signals.Release();
+  (*server)->Shutdown(absl::Seconds(flags.grace_seconds));
+  log->info("stopped");
+  return 0;
+}
+
+}  // namespace
+}  // namespace wellspace::server
+
+int main(int argc, char** argv) { return wellspace::server::Main(argc, argv); }

@@ -1,0 +1,46 @@
+// wellspace.v1.MeshingService: translates calls into jobs.
+#ifndef WELLSPACE_SERVER_MESHING_SERVICE_H_
+#define WELLSPACE_SERVER_MESHING_SERVICE_H_
+
+#include <memory>
+
+#include "server/background.h"
+#include "server/call_registry.h"
+#include "server/jobs.h"
+#include "server/mesh_points_call.h"
+#include "server/options.h"
+#include "spdlog/logger.h"
+#include "wellspace/v1/meshing.grpc.pb.h"
+
+namespace wellspace::server {
+
+// The service and the threads that work for it.
+//
+// Thread safety: thread-safe.
+// REQUIRES:   the gRPC server has ended all calls before this is destroyed.
+class MeshingService final : public v1::MeshingService::CallbackService {
+ public:
+  MeshingService(const ServiceOptions& options, std::shared_ptr<spdlog::logger> log, Mesher mesher);
+
+  grpc::ServerBidiReactor<v1::MeshPointsRequest, v1::MeshPointsResponse>* MeshPoints(
+      grpc::CallbackServerContext* context) override;
+  grpc::ServerUnaryReactor* GetServerInfo(grpc::CallbackServerContext* context, const v1::GetServerInfoRequest* request,
+                                          v1::GetServerInfoResponse* response) override;
+
+  // The calls of MeshPoints that are under way.
+  CallRegistry& calls() { return calls_; }
+
+ private:
+  const ServiceOptions options_;
+  const std::shared_ptr<spdlog::logger> log_;
+  const Mesher mesher_;
+  CallRegistry calls_;
+  // Jobs end before the background thread, to which they post.
+  Background background_;
+  JobPool jobs_;
+  const CallEnvironment environment_;
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_MESHING_SERVICE_H_

@@ -1,0 +1,97 @@
+#include "server/server.h"
+
+#include <chrono>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
+#include "grpcpp/ext/proto_server_reflection_plugin.h"
+#include "grpcpp/health_check_service_interface.h"
+#include "grpcpp/security/server_credentials.h"
+#include "grpcpp/server_builder.h"
+#include "server/listen_address.h"
+
+namespace wellspace::server {
+namespace {
+
+// Dead peers are found by pings; clients may ping as often as ours do.
+constexpr int kKeepaliveMs = 30'000;
+constexpr int kKeepaliveTimeoutMs = 10'000;
+constexpr int kMinClientPingMs = 10'000;
+
+// Aborted calls get this long to send their status, and idle clients to close their connections, before both are cut off.
+constexpr std::chrono::milliseconds kFarewell(500);
+
+// gRPC keeps these settings for the whole process.
+void EnableHealthAndReflection() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    grpc::EnableDefaultHealthCheckService(true);
+    grpc::reflection::InitProtoReflectionServerBuilderPlugin();
+  });
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& options, std::shared_ptr<spdlog::logger> log,
+                                                      Mesher mesher) {
+  EnableHealthAndReflection();
+  grpc::ServerBuilder builder;
+  builder.SetMaxReceiveMessageSize(kMaxRequestBytes);
+  builder.SetMaxSendMessageSize(kMaxResponseBytes);
+  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);  // two servers on one port would share its calls unseen
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
+  builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
+  builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kMinClientPingMs);
+
+  ListenAddress address;
+  int port = 0;
+  if (!options.listen.empty()) {
+    WELLSPACE_ASSIGN_OR_RETURN(address, ParseListenAddress(options.listen));
+    if (!address.IsLoopback() && !options.insecure_remote) {
+      return absl::FailedPreconditionError(
+          absl::StrCat("refuses to listen on ", address.ToString(),
+                       ": other machines could reach it, in plain text and without authentication; listen on 127.0.0.1 "
+                       "or [::1], or allow it with --insecure-remote"));
+    }
+    builder.AddListeningPort(address.ToString(), grpc::InsecureServerCredentials(), &port);
+  }
+
+  std::unique_ptr<Server> server(new Server(options, std::move(log), std::move(mesher)));
+  builder.RegisterService(&server->service_);
+  server->server_ = builder.BuildAndStart();
+  if (server->server_ == nullptr || (!options.listen.empty() && port == 0)) {
+    return absl::UnavailableError(
+        absl::StrCat("cannot listen on ", options.listen, "; is the port in use, or the address not of this machine?"));
+  }
+  if (!options.listen.empty()) {
+    address.port = static_cast<uint16_t>(port);
+    server->address_ = address.ToString();
+  }
+  server->server_->GetHealthCheckService()->SetServingStatus(v1::MeshingService::service_full_name(), true);
+  return server;
+}
+
+Server::~Server() { Shutdown(absl::ZeroDuration()); }
+
+std::shared_ptr<grpc::Channel> Server::InProcessChannel() {
+  grpc::ChannelArguments arguments;
+  arguments.SetMaxReceiveMessageSize(kMaxRequestBytes);
+  return server_->InProcessChannel(arguments);
+}
+
+void Server::Shutdown(absl::Duration grace) {
+  if (server_ == nullptr) {
+    return;
+  }
+  std::call_once(shut_down_, [this, grace] {
+    server_->GetHealthCheckService()->SetServingStatus(false);
+    service_.calls().Close();
+    if (!service_.calls().WaitUntilEmpty(grace)) {
+      service_.calls().AbortAll();
+    }
+    server_->Shutdown(std::chrono::system_clock::now() + kFarewell);
+    server_->Wait();
+  });
+}
+
+}  // namespace wellspace::server

@@ -1,0 +1,68 @@
+// The gRPC server around the service.
+#ifndef WELLSPACE_SERVER_SERVER_H_
+#define WELLSPACE_SERVER_SERVER_H_
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+
+#include "absl/status/statusor.h"
+#include "absl/time/time.h"
+#include "grpcpp/channel.h"
+#include "grpcpp/server.h"
+#include "server/meshing_service.h"
+#include "server/options.h"
+#include "spdlog/logger.h"
+
+namespace wellspace::server {
+
+struct ServerOptions {
+  std::string listen;            // HOST:PORT, port 0 takes a free one; empty: no listener
+  bool insecure_remote = false;  // allows plain text on addresses that other machines can reach
+  ServiceOptions service;
+};
+
+// Serves MeshingService, health and reflection.
+//
+// Thread safety: thread-safe.
+class Server {
+ public:
+  // Starts to serve. Tests put another mesher in the place of the core.
+  //
+  // Errors:     INVALID_ARGUMENT (listen), FAILED_PRECONDITION (a remote listener without insecure_remote), UNAVAILABLE
+  //             (the address cannot be listened on).
+  static absl::StatusOr<std::unique_ptr<Server>> Start(const ServerOptions& options,
+                                                       std::shared_ptr<spdlog::logger> log,
+                                                       Mesher mesher = core::MeshPoints);
+
+  // Shuts down at once.
+  ~Server();
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  // HOST:PORT with the port in use; empty without a listener.
+  const std::string& address() const { return address_; }
+
+  // A channel to this server that needs no listener. To be destroyed, with all that was made of it, before the server.
+  std::shared_ptr<grpc::Channel> InProcessChannel();
+
+  // Not serving from now on: health says so, new calls end with UNAVAILABLE. Calls that are under way may go on for `grace`, then
+  // end with UNAVAILABLE. Returns when all have ended, shortly after `grace` at the latest. Further calls return at once.
+  //
+  // REQUIRES:   grace is finite.
+  void Shutdown(absl::Duration grace);
+
+ private:
+  Server(const ServerOptions& options, std::shared_ptr<spdlog::logger> log, Mesher mesher)
+      : service_(options.service, std::move(log), std::move(mesher)) {}
+
+  MeshingService service_;
+  std::string address_;
+  std::unique_ptr<grpc::Server> server_;
+  std::once_flag shut_down_;
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_SERVER_H_
