@@ -1,0 +1,106 @@
+// wellspace check: is it a mesh, and how good is it?
+#include <algorithm>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_format.h"
+#include "client/cli/commands/commands.h"
+#include "client/cli/exit_codes.h"
+#include "client/cli/options.h"
+#include "client/cli/progress_bar.h"
+#include "client/formats/read_cloud.h"
+#include "client/formats/read_mesh.h"
+#include "core/simplex/validate.h"
+
+namespace wellspace::cli {
+namespace {
+
+// The smallest angle of a regular simplex, which no other exceeds.
+double BestAngle(int dimension) { return dimension == 2 ? 60.0 : 70.528779365509308; }
+
+void PrintReport(const core::QualityReport& report, int dimension) {
+  const char* angle = dimension == 2 ? "angle" : "dihedral angle";
+  std::cout << absl::StrFormat("%-24s %s\n", "vertices", WithThousands(report.vertices))
+            << absl::StrFormat("%-24s %s\n", dimension == 2 ? "triangles" : "tetrahedra",
+                               WithThousands(report.simplices));
+  if (report.simplices == 0) {
+    return;
+  }
+  std::cout << absl::StrFormat("%-24s %.9g\n", "largest radius-edge", report.max_radius_edge)
+            << absl::StrFormat("%-24s %.6g\u00b0\n", std::string("smallest ") + angle, report.min_angle_deg)
+            << absl::StrFormat("%-24s %.6g\u00b0\n", std::string("largest ") + angle, report.max_angle_deg)
+            << "simplices by their smallest " << angle << ":\n";
+  constexpr int kBarColumns = 40;
+  const uint64_t tallest = *std::max_element(report.angle_histogram.begin(), report.angle_histogram.end());
+  const double width = BestAngle(dimension) / core::kHistogramBins;
+  for (int bin = 0; bin < core::kHistogramBins; ++bin) {
+    const uint64_t count = report.angle_histogram[bin];
+    // Rounded up, so that a single bad simplex shows.
+    const int columns = static_cast<int>((count * kBarColumns + tallest - 1) / std::max<uint64_t>(tallest, 1));
+    std::cout << absl::StrFormat("  %5.1f - %4.1f\u00b0 %14s %s\n", bin * width, (bin + 1) * width,
+                                 WithThousands(count), std::string(columns, '#'));
+  }
+}
+
+struct CheckCommand {
+  std::string mesh_path;
+  std::string cloud_path;
+  std::string cloud_format;
+  double rho = 0;
+
+  int Run() const;
+};
+
+int CheckCommand::Run() const {
+  const absl::StatusOr<formats::Mesh> mesh = formats::ReadMesh(mesh_path);
+  if (!mesh.ok()) {
+    return ReportError(mesh.status());
+  }
+  std::vector<double> cloud;
+  if (!cloud_path.empty()) {
+    absl::StatusOr<formats::PointCloud> read =
+        formats::ReadCloud(cloud_path, {.format = cloud_format, .dimension = mesh->dimension});
+    if (!read.ok()) {
+      return ReportError(read.status());
+    }
+    cloud = std::move(read->points);
+  }
+  const core::MeshView view = {.dimension = mesh->dimension, .points = mesh->points, .simplices = mesh->simplices};
+  absl::Status status = core::ValidateIndices(view);
+  if (status.ok()) {
+    PrintReport(core::MeasureQuality(view), mesh->dimension);
+    status = core::ValidateMesh(view, {.rho = rho, .cloud = cloud});
+  }
+  if (!status.ok()) {
+    std::cout << "violation: " << std::string(status.message()) << "\n";
+    return kExitFailed;
+  }
+  std::cout << "valid\n";
+  return kExitOk;
+}
+
+}  // namespace
+
+void AddCheckCommand(CLI::App& app, int& exit_code) {
+  const auto command = std::make_shared<CheckCommand>();
+  CLI::App* check = app.add_subcommand("check",
+                                       "Check a mesh: indices, orientation, topology, exact total volume, the Delaunay "
+                                       "property, circumcentres, and what the "
+                                       "options ask for; print its figures and `valid` or the first violation");
+  check->footer(kExitCodesHelp);
+  check
+      ->add_option("MESH", command->mesh_path,
+                   "File of the mesh (.vtu, or .node with .ele), or - for standard input (vtu)")
+      ->required();
+  check->add_option("--cloud", command->cloud_path, "File of points that must be the first vertices, to the bit");
+  check->add_option("--input-format", command->cloud_format, "Format of the cloud; default: by its extension")
+      ->check(CLI::IsMember(formats::CloudFormats()));
+  AddNumber(*check, "--rho", command->rho, "Bound that circumradius / shortest edge must obey")
+      ->check(CLI::PositiveNumber);
+  check->callback([command, &exit_code] { exit_code = command->Run(); });
+}
+
+}  // namespace wellspace::cli

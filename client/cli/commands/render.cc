@@ -1,0 +1,77 @@
+// wellspace render: a picture of a mesh.
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "client/cli/commands/commands.h"
+#include "client/cli/exit_codes.h"
+#include "client/cli/options.h"
+#include "client/cli/render/painter.h"
+#include "client/cli/render/scene.h"
+#include "client/formats/read_mesh.h"
+
+namespace wellspace::cli {
+namespace {
+
+struct RenderCommand {
+  std::string mesh_path;
+  std::string picture_path;
+  int width = 1600;
+  std::vector<double> plane;  // empty, or normal and offset
+  std::string up = "z";
+
+  absl::Status Render() const;
+};
+
+absl::Status RenderCommand::Render() const {
+  if (!plane.empty() && plane.size() != 4) {
+    return absl::InvalidArgumentError(absl::StrCat("--plane: expected 4 numbers nx,ny,nz,d, got ", plane.size()));
+  }
+  const absl::StatusOr<render::PictureFormat> format = render::PictureFormatOf(picture_path);
+  if (!format.ok()) {
+    return format.status();
+  }
+  const absl::StatusOr<formats::Mesh> mesh = formats::ReadMesh(mesh_path);
+  if (!mesh.ok()) {
+    return mesh.status();
+  }
+  render::View view;
+  view.up = up[0] - 'x';
+  if (!plane.empty()) {
+    view.plane = {.normal = {plane[0], plane[1], plane[2]}, .offset = plane[3]};
+  }
+  const absl::StatusOr<render::Scene> scene = render::MakeScene(mesh->View(), view);
+  if (!scene.ok()) {
+    return absl::Status(scene.status().code(), absl::StrCat(mesh_path, ": ", scene.status().message()));
+  }
+  return render::WritePicture(*scene, width, *format, picture_path);
+}
+
+}  // namespace
+
+void AddRenderCommand(CLI::App& app, int& exit_code) {
+  const auto command = std::make_shared<RenderCommand>();
+  CLI::App* render = app.add_subcommand(
+      "render", "Draw a mesh, coloured by the smallest angle of each simplex; 3-D meshes are cut open by a plane");
+  render->footer(kExitCodesHelp);
+  render
+      ->add_option("MESH", command->mesh_path,
+                   "File of the mesh (.vtu, or .node with .ele), or - for standard input (vtu)")
+      ->required();
+  render->add_option("-o,--output", command->picture_path, "File of the picture, .png or .svg")->required();
+  render->add_option("--width", command->width, "Width in pixels")
+      ->capture_default_str()
+      ->check(CLI::Range(render::kMinWidth, render::kMaxWidth));
+  AddNumbers(*render, "--plane", command->plane,
+             "nx,ny,nz,d: cut off what lies at n·x > d; default: half of the box, across x");
+  render->add_option("--up", command->up, "Axis that points upwards in the picture of a 3-D mesh")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"x", "y", "z"}));
+  render->callback([command, &exit_code] {
+    const absl::Status status = command->Render();
+    exit_code = status.ok() ? kExitOk : ReportError(status);
+  });
+}
+
+}  // namespace wellspace::cli

@@ -1,0 +1,43 @@
+#include "client/cli/exit_codes.h"
+
+#include <iostream>
+
+namespace wellspace::cli {
+
+const char kExitCodesHelp[] =
+    "Exit codes:\n"
+    "  0    done; `check`: the mesh is valid\n"
+    "  1    `check` found a violation, or the work failed\n"
+    "  2    wrong usage, or a file that cannot be read or is not valid\n"
+    "  3    the server cannot be reached, or stopped\n"
+    "  4    a limit of vertices, memory or disk was reached\n"
+    "  5    --timeout passed\n"
+    "  130  interrupted by Ctrl-C (143 by SIGTERM); the work is cancelled, no file is left half written\n";
+
+int ExitCodeOf(const absl::Status& status) {
+  switch (status.code()) {
+    case absl::StatusCode::kOk:
+      return kExitOk;
+    case absl::StatusCode::kInvalidArgument:
+    case absl::StatusCode::kNotFound:
+    case absl::StatusCode::kPermissionDenied:
+    case absl::StatusCode::kOutOfRange:
+      return kExitBadInput;
+    case absl::StatusCode::kUnavailable:
+      return kExitUnavailable;
+    case absl::StatusCode::kResourceExhausted:
+      return kExitExhausted;
+    case absl::StatusCode::kDeadlineExceeded:
+      return kExitTimeout;
+    default:
+      return kExitFailed;
+  }
+}
+
+int ReportError(const absl::Status& status) {
+  std::cerr << "wellspace: " << std::string(status.message()) << " [" << absl::StatusCodeToString(status.code())
+            << "]\n";
+  return ExitCodeOf(status);
+}
+
+}  // namespace wellspace::cli

@@ -1,0 +1,27 @@
+// What the tool tells the shell.
+#ifndef WELLSPACE_CLIENT_CLI_EXIT_CODES_H_
+#define WELLSPACE_CLIENT_CLI_EXIT_CODES_H_
+
+#include "absl/status/status.h"
+
+namespace wellspace::cli {
+
+inline constexpr int kExitOk = 0;
+inline constexpr int kExitFailed = 1;       // `check` found a violation, or the work failed for no reason below
+inline constexpr int kExitBadInput = 2;     // wrong usage, or a file that cannot be read or is not valid
+inline constexpr int kExitUnavailable = 3;  // the server cannot be reached or stopped
+inline constexpr int kExitExhausted = 4;    // a limit of vertices, memory or disk was reached
+inline constexpr int kExitTimeout = 5;      // --timeout passed
+inline constexpr int kExitSignal = 128;     // plus the number of the signal: 130 for Ctrl-C
+
+// The table above, for --help.
+extern const char kExitCodesHelp[];
+
+int ExitCodeOf(const absl::Status& status);
+
+// Prints an error on standard error and returns its exit code.
+int ReportError(const absl::Status& status);
+
+}  // namespace wellspace::cli
+
+#endif  // WELLSPACE_CLIENT_CLI_EXIT_CODES_H_

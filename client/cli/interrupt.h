@@ -1,0 +1,41 @@
+// Ctrl-C as a stop token.
+#ifndef WELLSPACE_CLIENT_CLI_INTERRUPT_H_
+#define WELLSPACE_CLIENT_CLI_INTERRUPT_H_
+
+#include <atomic>
+#include <csignal>
+#include <stop_token>
+#include <thread>
+
+namespace wellspace::cli {
+
+// While it lives, the first SIGINT or SIGTERM requests a stop instead of ending the process; the second one ends it at
+// once.
+//
+// Signals are blocked and taken from a signalfd, so that no handler runs: threads started after it inherit the mask.
+// REQUIRES:   only the calling thread runs, or the others block these signals too. Thread safety: thread-safe.
+class Interrupt {
+ public:
+  Interrupt();
+  ~Interrupt();
+  Interrupt(const Interrupt&) = delete;
+  Interrupt& operator=(const Interrupt&) = delete;
+
+  std::stop_token token() const { return stop_.get_token(); }
+  // The signal that came, or 0.
+  int signal() const { return signal_.load(); }
+
+ private:
+  void Wait();
+
+  sigset_t previous_mask_;
+  int signals_;  // signalfd
+  int end_;      // eventfd
+  std::atomic<int> signal_{0};
+  std::stop_source stop_;
+  std::thread thread_;
+};
+
+}  // namespace wellspace::cli
+
+#endif  // WELLSPACE_CLIENT_CLI_INTERRUPT_H_

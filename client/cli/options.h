@@ -1,0 +1,23 @@
+// Options that several commands have, and the kinds that CLI11 lacks.
+#ifndef WELLSPACE_CLIENT_CLI_OPTIONS_H_
+#define WELLSPACE_CLIENT_CLI_OPTIONS_H_
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+namespace wellspace::cli {
+
+// A finite number, correctly rounded (CLI11 rounds twice).
+CLI::Option* AddNumber(CLI::App& command, const std::string& name, double& value, const std::string& description);
+
+// Finite numbers separated by commas.
+CLI::Option* AddNumbers(CLI::App& command, const std::string& name, std::vector<double>& values,
+                        const std::string& description);
+
+// --server, or the environment's WELLSPACE_SERVER.
+CLI::Option* AddServer(CLI::App& command, std::string& address);
+
+}  // namespace wellspace::cli
+
+#endif  // WELLSPACE_CLIENT_CLI_OPTIONS_H_

@@ -1,0 +1,38 @@
+// A line on a terminal that shows how far a mesh is.
+#ifndef WELLSPACE_CLIENT_CLI_PROGRESS_BAR_H_
+#define WELLSPACE_CLIENT_CLI_PROGRESS_BAR_H_
+
+#include <cstdint>
+#include <string>
+
+#include "client/client.h"
+
+namespace wellspace::cli {
+
+// "1,234,567".
+std::string WithThousands(uint64_t number);
+
+// Draws on standard error when that is a terminal; otherwise does nothing. The line goes with the object.
+//
+// Thread safety: thread-compatible.
+class ProgressBar {
+ public:
+  explicit ProgressBar(bool wanted);
+  ~ProgressBar();
+  ProgressBar(const ProgressBar&) = delete;
+  ProgressBar& operator=(const ProgressBar&) = delete;
+
+  void Update(const client::Progress& progress);
+  void Clear();
+
+ private:
+  const bool enabled_;
+  bool drawn_ = false;
+};
+
+// The line without colours and control characters, at most 79 columns wide.
+std::string ProgressLine(const client::Progress& progress);
+
+}  // namespace wellspace::cli
+
+#endif  // WELLSPACE_CLIENT_CLI_PROGRESS_BAR_H_

@@ -1,0 +1,63 @@
+#include "client/cli/statistics.h"
+
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "client/cli/progress_bar.h"
+
+namespace wellspace::cli {
+namespace {
+
+nlohmann::ordered_json DuplicateOf(const client::Mesh& mesh) {
+  nlohmann::ordered_json pairs = nlohmann::ordered_json::array();
+  // Distinct points become vertices 0, 1, ... in the order of their first appearance.
+  uint32_t distinct = 0;
+  for (size_t i = 0; i < mesh.input_vertex.size(); ++i) {
+    if (mesh.input_vertex[i] == distinct) {
+      ++distinct;
+    } else {
+      pairs.push_back({i, mesh.input_vertex[i]});
+    }
+  }
+  return pairs;
+}
+
+const char* AngleName(int dimension) { return dimension == 2 ? "min_angle_deg" : "min_dihedral_deg"; }
+
+}  // namespace
+
+std::string StatisticsJson(const client::Mesh& mesh) {
+  const client::MeshStatistics& statistics = mesh.statistics;
+  nlohmann::ordered_json json;
+  json["dimension"] = mesh.dimension;
+  json["domain_low"] = mesh.domain_low;
+  json["domain_high"] = mesh.domain_high;
+  json["input_points"] = statistics.input_points;
+  json["duplicates"] = statistics.duplicates;
+  json["vertices"] = statistics.vertices;
+  json["simplices"] = statistics.simplices;
+  json["max_radius_edge"] = statistics.max_radius_edge;
+  json[AngleName(mesh.dimension)] = statistics.min_angle_deg;
+  json["seconds"] = statistics.seconds;
+  json["peak_memory_bytes"] = statistics.peak_memory_bytes;
+  json["counters"] = statistics.counters;
+  json["duplicate_of"] = DuplicateOf(mesh);
+  return json.dump(2) + "\n";
+}
+
+std::string Summary(const client::Mesh& mesh) {
+  const client::MeshStatistics& statistics = mesh.statistics;
+  const auto total = statistics.seconds.find("total");
+  return absl::StrCat(
+      WithThousands(statistics.input_points), " points",
+      statistics.duplicates == 0 ? "" : absl::StrCat(" (", WithThousands(statistics.duplicates), " duplicates)"),
+      " -> ", WithThousands(statistics.vertices), " vertices, ", WithThousands(statistics.simplices),
+      mesh.dimension == 2 ? " triangles" : " tetrahedra",
+      absl::StrFormat("; radius-edge at most %.4f, %s at least %.2f\u00b0", statistics.max_radius_edge,
+                      mesh.dimension == 2 ? "angles" : "dihedral angles", statistics.min_angle_deg),
+      total == statistics.seconds.end() ? "" : absl::StrFormat("; %.2f s", total->second));
+}
+
+}  // namespace wellspace::cli

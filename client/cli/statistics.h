@@ -1,0 +1,26 @@
+// What is told about a finished mesh.
+#ifndef WELLSPACE_CLIENT_CLI_STATISTICS_H_
+#define WELLSPACE_CLIENT_CLI_STATISTICS_H_
+
+#include <string>
+
+#include "client/client.h"
+
+namespace wellspace::cli {
+
+// One JSON object:
+//   dimension, domain_low, domain_high
+//   input_points, duplicates, vertices, simplices, max_radius_edge, min_angle_deg (2-D) or min_dihedral_deg (3-D)
+//   seconds:  {tree, refinement, simplices, ..., total}, without reading and writing files
+//   peak_memory_bytes, counters
+//   duplicate_of: [[i, v], ...]: input point i is equal to an earlier one, and both became vertex v. The other input
+//   points
+//                 are, in their order, the first vertices.
+std::string StatisticsJson(const client::Mesh& mesh);
+
+// "5 points -> 17 vertices, 20 triangles; ...", one line without its end.
+std::string Summary(const client::Mesh& mesh);
+
+}  // namespace wellspace::cli
+
+#endif  // WELLSPACE_CLIENT_CLI_STATISTICS_H_

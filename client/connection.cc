@@ -1,0 +1,173 @@
+#include "client/connection.h"
+
+#include <algorithm>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include "absl/strings/cord.h"
+#include "absl/time/clock.h"
+#include "client/mesh_assembler.h"
+#include "google/rpc/status.pb.h"
+#include "grpcpp/channel.h"
+#include "grpcpp/client_context.h"
+#include "wellspace/v1/meshing.grpc.pb.h"
+
+namespace wellspace::client {
+namespace {
+
+// Of the coordinates of one request, so that the message stays below 1 MiB.
+constexpr size_t kChunkBytes = 1024 * 1024 - 64;
+
+using MeshPointsStream = grpc::ClientReaderWriter<v1::MeshPointsRequest, v1::MeshPointsResponse>;
+
+absl::Status FromGrpcStatus(const grpc::Status& status) {
+  absl::Status result(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
+  google::rpc::Status details;
+  if (!result.ok() && details.ParseFromString(status.error_details())) {
+    for (const google::protobuf::Any& detail : details.details()) {
+      result.SetPayload(detail.type_url(), absl::Cord(detail.value()));
+    }
+  }
+  return result;
+}
+
+const char* PhaseName(v1::Phase phase) {
+  switch (phase) {
+    case v1::PHASE_WAITING:
+      return "waiting";
+    case v1::PHASE_TREE:
+      return "tree";
+    case v1::PHASE_REFINEMENT:
+      return "refinement";
+    case v1::PHASE_SIMPLICES:
+      return "simplices";
+    case v1::PHASE_DONE:
+      return "done";
+    default:
+      return "unknown";  // of a newer server
+  }
+}
+
+Progress ProgressFromProto(const v1::ProgressEvent& event) {
+  return Progress{.phase = PhaseName(event.phase()),
+                  .vertices = event.vertices(),
+                  .estimated_vertices = event.estimated_vertices(),
+                  .simplices = event.simplices(),
+                  .fraction = event.fraction()};
+}
+
+v1::MeshPointsRequest ParametersRequest(const MeshOptions& options) {
+  v1::MeshPointsRequest request;
+  v1::MeshParameters* parameters = request.mutable_parameters();
+  parameters->set_dimension(options.dimension);
+  parameters->set_rho(options.rho);
+  if (!options.domain_low.empty() || !options.domain_high.empty()) {
+    parameters->mutable_domain()->mutable_low()->Assign(options.domain_low.begin(), options.domain_low.end());
+    parameters->mutable_domain()->mutable_high()->Assign(options.domain_high.begin(), options.domain_high.end());
+  }
+  parameters->set_margin(options.margin);
+  parameters->set_max_vertices(options.max_vertices);
+  parameters->set_threads(options.threads);
+  return request;
+}
+
+// Sends everything and half-closes. Stops early when the call has ended; its status says why.
+void Upload(const MeshOptions& options, std::span<const double> points, MeshPointsStream& stream) {
+  if (!stream.Write(ParametersRequest(options))) {
+    return;
+  }
+  const size_t row = std::max(1, options.dimension);
+  const size_t chunk_size = std::max<size_t>(1, kChunkBytes / sizeof(double) / row) * row;
+  v1::MeshPointsRequest request;
+  while (!points.empty()) {
+    const std::span<const double> chunk = points.first(std::min(points.size(), chunk_size));
+    request.mutable_points()->mutable_coordinates()->Assign(chunk.begin(), chunk.end());
+    if (!stream.Write(request)) {
+      return;
+    }
+    points = points.subspan(chunk.size());
+  }
+  stream.WritesDone();
+}
+
+class GrpcConnection final : public Connection {
+ public:
+  explicit GrpcConnection(std::shared_ptr<grpc::Channel> channel)
+      : stub_(v1::MeshingService::NewStub(std::move(channel))) {}
+
+  absl::StatusOr<Mesh> MeshPoints(const MeshOptions& options, std::span<const double> points,
+                                  const std::function<void(const Progress&)>& on_progress,
+                                  std::stop_token stop) override;
+  absl::StatusOr<ServerInfo> GetServerInfo() override;
+
+ private:
+  const std::unique_ptr<v1::MeshingService::Stub> stub_;
+};
+
+absl::StatusOr<Mesh> GrpcConnection::MeshPoints(const MeshOptions& options, std::span<const double> points,
+                                                const std::function<void(const Progress&)>& on_progress,
+                                                std::stop_token stop) {
+  grpc::ClientContext context;
+  if (options.timeout < absl::InfiniteDuration()) {
+    context.set_deadline(absl::ToChronoTime(absl::Now() + options.timeout));
+  }
+  const std::unique_ptr<MeshPointsStream> stream = stub_->MeshPoints(&context);
+  std::stop_callback cancel(stop, [&context] { context.TryCancel(); });
+
+  // Points go up while answers come down: the server may fail the call before it has all.
+  std::jthread uploader([&] { Upload(options, points, *stream); });
+  const int dimension = std::max(1, options.dimension);
+  MeshAssembler assembler(dimension, points.size() / dimension);
+  absl::Status damage;
+  v1::MeshPointsResponse response;
+  while (damage.ok() && stream->Read(&response)) {
+    if (response.has_metadata()) {
+      damage = assembler.SetMetadata(response.metadata());
+    } else if (response.has_chunk()) {
+      damage = assembler.AddChunk(response.chunk());
+    } else if (response.has_progress() && on_progress != nullptr) {
+      on_progress(ProgressFromProto(response.progress()));
+    }
+  }
+  if (!damage.ok()) {
+    context.TryCancel();
+  }
+  uploader.join();
+  const grpc::Status status = stream->Finish();
+  if (!damage.ok()) {
+    return damage;
+  }
+  if (status.error_code() == grpc::StatusCode::CANCELLED && stop.stop_requested()) {
+    return absl::CancelledError("cancelled by the caller");
+  }
+  if (!status.ok()) {
+    return FromGrpcStatus(status);
+  }
+  return assembler.Finish();
+}
+
+absl::StatusOr<ServerInfo> GrpcConnection::GetServerInfo() {
+  grpc::ClientContext context;
+  v1::GetServerInfoResponse response;
+  if (const grpc::Status status = stub_->GetServerInfo(&context, v1::GetServerInfoRequest(), &response); !status.ok()) {
+    return FromGrpcStatus(status);
+  }
+  ServerInfo info;
+  info.version = response.version();
+  info.dimensions.assign(response.dimensions().begin(), response.dimensions().end());
+  info.max_points = response.max_points();
+  info.max_vertices = response.max_vertices();
+  info.workers = response.workers();
+  info.running_jobs = response.running_jobs();
+  info.queued_jobs = response.queued_jobs();
+  return info;
+}
+
+}  // namespace
+
+std::shared_ptr<Connection> MakeConnection(std::shared_ptr<grpc::Channel> channel) {
+  return std::make_shared<GrpcConnection>(std::move(channel));
+}
+
+}  // namespace wellspace::client

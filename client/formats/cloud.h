@@ -1,0 +1,48 @@
+// A cloud of points as it was read from a file.
+#ifndef WELLSPACE_CLIENT_FORMATS_CLOUD_H_
+#define WELLSPACE_CLIENT_FORMATS_CLOUD_H_
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace wellspace::formats {
+
+inline constexpr int kMinDimension = 2;
+inline constexpr int kMaxDimension = 3;
+
+// The line of a file that each point came from. Points on consecutive lines cost nothing: only the first point after a
+// gap (a comment, a blank line) is stored.
+//
+// Thread safety: thread-compatible.
+class LineIndex {
+ public:
+  // Notes that the next point came from `line`. Lines never decrease.
+  void Add(uint64_t line);
+  // The line of point `point`. REQUIRES: point < size().
+  uint64_t LineOf(uint64_t point) const;
+  uint64_t size() const { return size_; }
+
+ private:
+  struct Run {
+    uint64_t first_point;
+    uint64_t first_line;
+  };
+  std::vector<Run> runs_;
+  uint64_t size_ = 0;
+};
+
+struct PointCloud {
+  std::string name;  // of the file, as messages say it
+  int dimension = 0;
+  std::vector<double> points;  // size() x dimension, row-major
+  LineIndex lines;
+
+  uint64_t size() const { return lines.size(); }
+  // "cloud.csv:17", where point `point` was read. REQUIRES: point < size().
+  std::string Origin(uint64_t point) const;
+};
+
+}  // namespace wellspace::formats
+
+#endif  // WELLSPACE_CLIENT_FORMATS_CLOUD_H_

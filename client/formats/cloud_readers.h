@@ -1,0 +1,23 @@
+// The readers behind ReadCloud, one for each format. Each fills `cloud.dimension`, `points` and `lines`; `dimension` is
+// what the file must have, or 0. Private to this folder.
+#ifndef WELLSPACE_CLIENT_FORMATS_CLOUD_READERS_H_
+#define WELLSPACE_CLIENT_FORMATS_CLOUD_READERS_H_
+
+#include <cstdint>
+
+#include "absl/status/status.h"
+#include "client/formats/cloud.h"
+#include "client/formats/line_reader.h"
+
+namespace wellspace::formats {
+
+absl::Status ReadCsv(LineReader& reader, int dimension, PointCloud& cloud);
+absl::Status ReadXyz(LineReader& reader, int dimension, PointCloud& cloud);
+absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud);
+
+// ReadNode that also tells the index of the first point, 0 or 1.
+absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud, uint64_t& index_base);
+
+}  // namespace wellspace::formats
+
+#endif  // WELLSPACE_CLIENT_FORMATS_CLOUD_READERS_H_

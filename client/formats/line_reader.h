@@ -1,0 +1,79 @@
+// Text files, line by line, in bounded memory.
+#ifndef WELLSPACE_CLIENT_FORMATS_LINE_READER_H_
+#define WELLSPACE_CLIENT_FORMATS_LINE_READER_H_
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+namespace wellspace::formats {
+
+// The name that stands for standard input or standard output.
+inline constexpr std::string_view kStandardStream = "-";
+
+// No line of a file of numbers is longer; a longer one means that the file is something else.
+inline constexpr size_t kMaxLineBytes = 1 << 20;
+
+// A file open for reading.
+//
+// Thread safety: thread-compatible.
+class InputFile {
+ public:
+  // `path` "-" is standard input. Errors: NOT_FOUND, PERMISSION_DENIED…, naming the file; INVALID_ARGUMENT for a
+  // folder.
+  static absl::StatusOr<InputFile> Open(const std::string& path);
+  InputFile(InputFile&& other) noexcept;
+  InputFile& operator=(InputFile&&) = delete;
+  ~InputFile();
+
+  // "cloud.csv" or "<stdin>", for messages.
+  const std::string& name() const { return name_; }
+  // Up to `size` bytes; 0 at the end of the file.
+  absl::StatusOr<size_t> Read(char* buffer, size_t size);
+  // All that is left.
+  absl::StatusOr<std::string> ReadAll();
+
+ private:
+  InputFile(int descriptor, std::string name) : descriptor_(descriptor), name_(std::move(name)) {}
+  int descriptor_;
+  std::string name_;
+};
+
+// Lines end in LF or CRLF; a byte order mark at the start of the file is skipped.
+//
+// Thread safety: thread-compatible.
+class LineReader {
+ public:
+  explicit LineReader(InputFile file);
+
+  // The next line, valid until the next call. False at the end of the file and on an error, which status() tells apart.
+  bool Next(std::string_view& line);
+  // Like Next, but skips what is blank or a comment, and cuts the comment off; a comment starts at '#'.
+  bool NextContent(std::string_view& line);
+
+  const absl::Status& status() const { return status_; }
+  const std::string& name() const { return file_.name(); }
+  // Of the line that was returned last; the first is 1.
+  uint64_t line_number() const { return line_number_; }
+  // INVALID_ARGUMENT at the line that was returned last; of an empty file, at line 1.
+  absl::Status Error(std::string_view message) const;
+
+ private:
+  bool Fill();
+
+  InputFile file_;
+  std::string buffer_;
+  size_t begin_ = 0;  // of the bytes not yet returned
+  size_t end_ = 0;
+  bool at_end_ = false;
+  uint64_t line_number_ = 0;
+  absl::Status status_;
+};
+
+}  // namespace wellspace::formats
+
+#endif  // WELLSPACE_CLIENT_FORMATS_LINE_READER_H_

@@ -1,0 +1,32 @@
+// A mesh as files hold it.
+#ifndef WELLSPACE_CLIENT_FORMATS_MESH_H_
+#define WELLSPACE_CLIENT_FORMATS_MESH_H_
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace wellspace::formats {
+
+// Simplices: triangles in 2-D, tetrahedra in 3-D.
+struct MeshView {
+  int dimension = 0;
+  std::span<const double> points;       // vertex_count x dimension, row-major
+  std::span<const uint32_t> simplices;  // simplex_count x (dimension + 1), row-major
+  uint64_t input_vertices = 0;          // so many of the first vertices are input points; the others were added
+
+  uint64_t vertex_count() const { return dimension == 0 ? 0 : points.size() / dimension; }
+  uint64_t simplex_count() const { return dimension == 0 ? 0 : simplices.size() / (dimension + 1); }
+};
+
+struct Mesh {
+  int dimension = 0;
+  std::vector<double> points;
+  std::vector<uint32_t> simplices;
+
+  MeshView View() const { return {.dimension = dimension, .points = points, .simplices = simplices}; }
+};
+
+}  // namespace wellspace::formats
+
+#endif  // WELLSPACE_CLIENT_FORMATS_MESH_H_

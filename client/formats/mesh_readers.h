@@ -1,0 +1,18 @@
+// The readers behind ReadMesh, one for each format. Private to this folder.
+#ifndef WELLSPACE_CLIENT_FORMATS_MESH_READERS_H_
+#define WELLSPACE_CLIENT_FORMATS_MESH_READERS_H_
+
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "client/formats/mesh.h"
+
+namespace wellspace::formats {
+
+absl::StatusOr<Mesh> ReadVtu(const std::string& path);
+// `path` is that of either file.
+absl::StatusOr<Mesh> ReadNodeAndEle(const std::string& path);
+
+}  // namespace wellspace::formats
+
+#endif  // WELLSPACE_CLIENT_FORMATS_MESH_READERS_H_

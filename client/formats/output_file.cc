@@ -1,0 +1,135 @@
+#include "client/formats/output_file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <climits>
+#include <cstdio>
+#include <cstdlib>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "client/formats/line_reader.h"
+
+namespace wellspace::formats {
+namespace {
+
+constexpr size_t kBufferBytes = 1 << 18;
+
+absl::Status WriteError(int error, const std::string& path) {
+  return absl::ErrnoToStatus(error, absl::StrCat("cannot write ", path));
+}
+
+// The file that `path` leads to, so that a rename replaces the file and not the link to it.
+std::string ResolveLinks(const std::string& path) {
+  char resolved[PATH_MAX];
+  return realpath(path.c_str(), resolved) != nullptr ? std::string(resolved) : path;
+}
+
+}  // namespace
+
+absl::StatusOr<OutputFile> OutputFile::Create(const std::string& path, std::stop_token stop) {
+  if (path == kStandardStream) {
+    return OutputFile(STDOUT_FILENO, "<stdout>", "", std::move(stop));
+  }
+  struct stat attributes;
+  const bool exists = stat(path.c_str(), &attributes) == 0;
+  if (exists && S_ISDIR(attributes.st_mode)) {
+    return absl::InvalidArgumentError(absl::StrCat("cannot write ", path, ": it is a folder; expected a file"));
+  }
+  if (exists && !S_ISREG(attributes.st_mode)) {
+    const int descriptor = open(path.c_str(), O_WRONLY | O_CLOEXEC);
+    if (descriptor < 0) {
+      return WriteError(errno, path);
+    }
+    return OutputFile(descriptor, path, "", std::move(stop));
+  }
+  const std::string target = ResolveLinks(path);
+  // O_EXCL makes the name ours; the mode leaves the rights to the umask, as for any file.
+  for (int attempt = 0;; ++attempt) {
+    const std::string temporary = absl::StrCat(target, ".", getpid(), "-", attempt, ".tmp");
+    const int descriptor = open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (descriptor >= 0) {
+      return OutputFile(descriptor, target, temporary, std::move(stop));
+    }
+    if (errno != EEXIST) {
+      return WriteError(errno, path);
+    }
+  }
+}
+
+OutputFile::OutputFile(int descriptor, std::string path, std::string temporary, std::stop_token stop)
+    : descriptor_(descriptor), path_(std::move(path)), temporary_(std::move(temporary)), stop_(std::move(stop)) {
+  buffer_.reserve(kBufferBytes);
+}
+
+OutputFile::OutputFile(OutputFile&& other) noexcept
+    : descriptor_(std::exchange(other.descriptor_, -1)),
+      path_(std::move(other.path_)),
+      temporary_(std::exchange(other.temporary_, {})),
+      stop_(std::move(other.stop_)),
+      buffer_(std::move(other.buffer_)),
+      status_(std::move(other.status_)) {}
+
+OutputFile::~OutputFile() {
+  if (descriptor_ > STDERR_FILENO) {
+    close(descriptor_);
+  }
+  if (!temporary_.empty()) {
+    unlink(temporary_.c_str());
+  }
+}
+
+void OutputFile::Write(std::string_view bytes) {
+  if (buffer_.size() + bytes.size() > kBufferBytes) {
+    Send(buffer_);
+    buffer_.clear();
+  }
+  if (bytes.size() >= kBufferBytes) {
+    Send(bytes);
+  } else {
+    buffer_.append(bytes);
+  }
+}
+
+void OutputFile::Send(std::string_view bytes) {
+  while (status_.ok() && !bytes.empty()) {
+    if (stop_.stop_requested()) {
+      status_ = absl::CancelledError(absl::StrCat("cancelled while writing ", path_));
+      return;
+    }
+    const ssize_t sent = write(descriptor_, bytes.data(), bytes.size());
+    if (sent >= 0) {
+      bytes.remove_prefix(sent);
+    } else if (errno != EINTR) {
+      status_ = WriteError(errno, path_);
+    }
+  }
+}
+
+absl::Status OutputFile::Flush() {
+  Send(buffer_);
+  buffer_.clear();
+  return status_;
+}
+
+absl::Status OutputFile::Commit() {
+  if (absl::Status status = Flush(); !status.ok()) {
+    return status;
+  }
+  // Some file systems report a failed write only here.
+  if (descriptor_ > STDERR_FILENO && close(std::exchange(descriptor_, -1)) != 0) {
+    return WriteError(errno, path_);
+  }
+  if (!temporary_.empty()) {
+    if (std::rename(temporary_.c_str(), path_.c_str()) != 0) {
+      return WriteError(errno, path_);
+    }
+    temporary_.clear();
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace wellspace::formats

@@ -1,0 +1,51 @@
+// Files that appear complete or not at all.
+#ifndef WELLSPACE_CLIENT_FORMATS_OUTPUT_FILE_H_
+#define WELLSPACE_CLIENT_FORMATS_OUTPUT_FILE_H_
+
+#include <stop_token>
+#include <string>
+#include <string_view>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+
+namespace wellspace::formats {
+
+// Writes beside the wanted file under a temporary name and renames on Commit; without Commit the temporary file goes
+// and the wanted one stays as it was. "-" is standard output; that, and what is no regular file (a pipe, a device), is
+// written directly.
+//
+// Errors are kept: after the first one, writes do nothing and Commit returns it.
+//
+// Thread safety: thread-compatible.
+class OutputFile {
+ public:
+  // The file will be `path`. Writing ends with CANCELLED once `stop` asks for it.
+  static absl::StatusOr<OutputFile> Create(const std::string& path, std::stop_token stop = {});
+  OutputFile(OutputFile&& other) noexcept;
+  OutputFile& operator=(OutputFile&&) = delete;
+  ~OutputFile();
+
+  void Write(std::string_view bytes);
+  // Sends what is buffered to the system. Returns the first error so far.
+  absl::Status Flush();
+  // Flushes and gives the file its name.
+  absl::Status Commit();
+
+  const absl::Status& status() const { return status_; }
+
+ private:
+  OutputFile(int descriptor, std::string path, std::string temporary, std::stop_token stop);
+  void Send(std::string_view bytes);
+
+  int descriptor_;
+  std::string path_;
+  std::string temporary_;  // empty: the descriptor is the wanted file itself
+  std::stop_token stop_;
+  std::string buffer_;
+  absl::Status status_;
+};
+
+}  // namespace wellspace::formats
+
+#endif  // WELLSPACE_CLIENT_FORMATS_OUTPUT_FILE_H_

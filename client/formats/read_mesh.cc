@@ -1,0 +1,33 @@
+#include "client/formats/read_mesh.h"
+
+#include <span>
+#include <vector>
+
+#include "client/formats/line_reader.h"
+#include "client/formats/mesh_readers.h"
+#include "client/formats/registry.h"
+
+namespace wellspace::formats {
+namespace {
+
+using MeshReader = absl::StatusOr<Mesh> (*)(const std::string&);
+
+std::span<const Format<MeshReader>> Readers() {
+  static const std::vector<Format<MeshReader>> readers = {
+      {"vtu", {".vtu"}, ReadVtu},
+      {"node", {".node", ".ele"}, ReadNodeAndEle},
+  };
+  return readers;
+}
+
+}  // namespace
+
+absl::StatusOr<Mesh> ReadMesh(const std::string& path) {
+  const auto row = FindFormat(Readers(), path, path == kStandardStream ? "vtu" : "");
+  if (!row.ok()) {
+    return row.status();
+  }
+  return (*row)->handler(path);
+}
+
+}  // namespace wellspace::formats

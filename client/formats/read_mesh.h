@@ -1,0 +1,26 @@
+// Meshes from files.
+//
+// Formats:
+//   vtu   VTK's XML, one piece of triangles in the plane z = 0 or of tetrahedra; arrays in ascii, or inline in base64,
+//         compressed by zlib or not; either byte order.
+//   node  TetGen's and Triangle's pair of .node and .ele, given by either name.
+#ifndef WELLSPACE_CLIENT_FORMATS_READ_MESH_H_
+#define WELLSPACE_CLIENT_FORMATS_READ_MESH_H_
+
+#include <string>
+
+#include "absl/status/statusor.h"
+#include "client/formats/mesh.h"
+
+namespace wellspace::formats {
+
+// Reads the mesh of `path`; standard input ("-") is vtu.
+//
+// Guarantees: coordinates are those of the file, to the bit; every index of a simplex is that of a vertex. Nothing else
+//             is checked: the simplices need not form a mesh.
+// Errors:     of opening and reading; INVALID_ARGUMENT "FILE:LINE: …" for what is not such a mesh.
+absl::StatusOr<Mesh> ReadMesh(const std::string& path);
+
+}  // namespace wellspace::formats
+
+#endif  // WELLSPACE_CLIENT_FORMATS_READ_MESH_H_

@@ -1,0 +1,208 @@
+// TetGen's and Triangle's .node and .ele.
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "client/formats/cloud_readers.h"
+#include "client/formats/mesh_readers.h"
+#include "client/formats/mesh_writers.h"
+#include "client/formats/number.h"
+
+namespace wellspace::formats {
+namespace {
+
+// What a header says is not believed: more is reserved only as more lines arrive.
+constexpr uint64_t kMaxReserved = 1 << 16;
+
+constexpr uint64_t kMaxHeaderValue = std::numeric_limits<uint32_t>::max();
+
+// The unsigned numbers of a header line; those that are missing stay 0.
+template <size_t N>
+absl::Status ReadHeader(LineReader& reader, std::string_view line, size_t required,
+                        const std::array<const char*, N>& names, std::array<uint64_t, N>& values) {
+  FieldSplitter fields(line, ' ');
+  std::string_view field;
+  size_t count = 0;
+  while (fields.Next(field)) {
+    if (count == N) {
+      return reader.Error(absl::StrCat("expected at most ", N, " numbers in the header, got also ", Quote(field)));
+    }
+    if (!ParseUnsigned(field, kMaxHeaderValue, values[count])) {
+      return reader.Error(
+          absl::StrCat("expected the ", names[count], ", a whole number below 2^32, got ", Quote(field)));
+    }
+    ++count;
+  }
+  if (count < required) {
+    return reader.Error(absl::StrCat("expected the ", names[count], " in the header, got only ", count, " number",
+                                     count == 1 ? "" : "s"));
+  }
+  return absl::OkStatus();
+}
+
+// Reads the index at the start of a line. That of the first line, 0 or 1, is the base of the others.
+absl::Status ReadIndex(LineReader& reader, FieldSplitter& fields, uint64_t position, uint64_t& index_base) {
+  std::string_view field;
+  fields.Next(field);
+  uint64_t index = 0;
+  const bool is_number = ParseUnsigned(field, std::numeric_limits<uint64_t>::max(), index);
+  if (position == 0) {
+    if (!is_number || index > 1) {
+      return reader.Error(absl::StrCat("expected index 0 or 1, got ", Quote(field)));
+    }
+    index_base = index;
+  } else if (!is_number || index != position + index_base) {
+    return reader.Error(absl::StrCat("expected index ", position + index_base, ", got ", Quote(field)));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CountError(LineReader& reader, uint64_t count, const char* what, uint64_t got) {
+  if (!reader.status().ok()) {
+    return reader.status();
+  }
+  return reader.Error(absl::StrCat("expected ", count, " ", what, ", as the header says, got ", got));
+}
+
+absl::Status ExpectEnd(LineReader& reader, uint64_t count, const char* what) {
+  std::string_view line;
+  if (reader.NextContent(line)) {
+    return reader.Error(absl::StrCat("expected the end of the file after ", count, " ", what,
+                                     ", as the header says, got ", Quote(line)));
+  }
+  return reader.status();
+}
+
+absl::Status ReadEle(LineReader& reader, uint64_t vertices, uint64_t index_base, Mesh& mesh) {
+  const uint64_t corners = mesh.dimension + 1;
+  const char* what = mesh.dimension == 2 ? "triangles" : "tetrahedra";
+  std::string_view line;
+  if (!reader.NextContent(line)) {
+    return reader.status().ok() ? reader.Error("expected a header, got an empty file") : reader.status();
+  }
+  std::array<uint64_t, 3> header{};
+  const std::array names = {"number of simplices", "number of nodes of each", "number of attributes"};
+  if (absl::Status status = ReadHeader<3>(reader, line, 2, names, header); !status.ok()) {
+    return status;
+  }
+  const auto [count, nodes, attributes] = header;
+  if (nodes != corners) {
+    return reader.Error(absl::StrCat("expected ", corners, " nodes for each of the ", what, ", got ", nodes));
+  }
+  mesh.simplices.reserve(std::min(count, kMaxReserved) * corners);
+  uint64_t element_base = 0;
+  for (uint64_t simplex = 0; simplex < count; ++simplex) {
+    if (!reader.NextContent(line)) {
+      return CountError(reader, count, what, simplex);
+    }
+    FieldSplitter fields(line, ' ');
+    if (absl::Status status = ReadIndex(reader, fields, simplex, element_base); !status.ok()) {
+      return status;
+    }
+    std::string_view field;
+    for (uint64_t corner = 0; corner < corners; ++corner) {
+      if (!fields.Next(field)) {
+        return reader.Error(absl::StrCat("expected ", corners, " nodes, got ", corner));
+      }
+      uint64_t node = 0;
+      if (!ParseUnsigned(field, std::numeric_limits<uint32_t>::max(), node) || node < index_base ||
+          node - index_base >= vertices) {
+        return reader.Error(absl::StrCat("expected a node from ", index_base, " to below ", vertices + index_base,
+                                         ", got ", Quote(field)));
+      }
+      mesh.simplices.push_back(static_cast<uint32_t>(node - index_base));
+    }
+    for (uint64_t attribute = 0; fields.Next(field); ++attribute) {
+      if (attribute == attributes) {
+        return reader.Error(
+            absl::StrCat("expected ", corners, " nodes and ", attributes, " attributes, got also ", Quote(field)));
+      }
+    }
+  }
+  return ExpectEnd(reader, count, what);
+}
+
+}  // namespace
+
+absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud) {
+  uint64_t index_base = 0;
+  return ReadNode(reader, dimension, cloud, index_base);
+}
+
+absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud, uint64_t& index_base) {
+  std::string_view line;
+  if (!reader.NextContent(line)) {
+    return reader.status().ok() ? reader.Error("expected a header, got an empty file") : reader.status();
+  }
+  std::array<uint64_t, 4> header{};
+  const std::array names = {"number of points", "dimension", "number of attributes", "number of markers"};
+  if (absl::Status status = ReadHeader<4>(reader, line, 2, names, header); !status.ok()) {
+    return status;
+  }
+  const auto [count, columns, attributes, markers] = header;
+  if (columns < kMinDimension || columns > kMaxDimension) {
+    return reader.Error(absl::StrCat("expected dimension 2 or 3, got ", columns));
+  }
+  if (dimension != 0 && static_cast<int>(columns) != dimension) {
+    return reader.Error(absl::StrCat("expected dimension ", dimension, ", got ", columns));
+  }
+  cloud.dimension = static_cast<int>(columns);
+  cloud.points.reserve(std::min(count, kMaxReserved) * columns);
+  for (uint64_t point = 0; point < count; ++point) {
+    if (!reader.NextContent(line)) {
+      return CountError(reader, count, "points", point);
+    }
+    FieldSplitter fields(line, ' ');
+    if (absl::Status status = ReadIndex(reader, fields, point, index_base); !status.ok()) {
+      return status;
+    }
+    std::string_view field;
+    for (uint64_t axis = 0; axis < columns; ++axis) {
+      if (!fields.Next(field)) {
+        return reader.Error(absl::StrCat("expected ", columns, " coordinates, got ", axis));
+      }
+      double value = 0;
+      if (absl::Status status = ParseFinite(field, value); !status.ok()) {
+        return reader.Error(absl::StrCat("coordinate ", axis + 1, ": ", status.message()));
+      }
+      cloud.points.push_back(value);
+    }
+    // Attributes and markers may be missing, as they may for TetGen, but there must not be more than announced.
+    for (uint64_t extra = 0; fields.Next(field); ++extra) {
+      if (extra == attributes + markers) {
+        return reader.Error(absl::StrCat("expected ", columns, " coordinates and ", extra,
+                                         " attributes and markers, as the header says, got also ", Quote(field)));
+      }
+    }
+    cloud.lines.Add(reader.line_number());
+  }
+  return ExpectEnd(reader, count, "points");
+}
+
+absl::StatusOr<Mesh> ReadNodeAndEle(const std::string& path) {
+  absl::StatusOr<InputFile> node_file = InputFile::Open(WithExtension(path, ".node"));
+  if (!node_file.ok()) {
+    return node_file.status();
+  }
+  absl::StatusOr<InputFile> ele_file = InputFile::Open(WithExtension(path, ".ele"));
+  if (!ele_file.ok()) {
+    return ele_file.status();
+  }
+  PointCloud cloud;
+  uint64_t index_base = 0;
+  LineReader nodes(*std::move(node_file));
+  if (absl::Status status = ReadNode(nodes, 0, cloud, index_base); !status.ok()) {
+    return status;
+  }
+  Mesh mesh{.dimension = cloud.dimension, .points = std::move(cloud.points), .simplices = {}};
+  LineReader simplices(*std::move(ele_file));
+  if (absl::Status status = ReadEle(simplices, cloud.size(), index_base, mesh); !status.ok()) {
+    return status;
+  }
+  return mesh;
+}
+
+}  // namespace wellspace::formats

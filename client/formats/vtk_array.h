@@ -1,0 +1,88 @@
+// The inline binary form of data arrays in VTK's XML files: base64 of blocks, each compressed by zlib or not at all.
+//
+// Compressed:   base64(header) base64(blocks); header: number of blocks, bytes of a block, bytes of the last block when
+// it is
+//               shorter (else 0), then the compressed bytes of each block.
+// Uncompressed: base64(header data); header: number of bytes.
+#ifndef WELLSPACE_CLIENT_FORMATS_VTK_ARRAY_H_
+#define WELLSPACE_CLIENT_FORMATS_VTK_ARRAY_H_
+
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "client/formats/output_file.h"
+
+namespace wellspace::formats {
+
+// Compresses one array, block by block, and writes it.
+//
+// Thread safety: thread-compatible.
+class VtkArrayWriter {
+ public:
+  // Bytes are compressed in blocks of this size; every type's size divides it.
+  static constexpr size_t kBlockBytes = 1 << 19;
+
+  VtkArrayWriter() { block_.reserve(kBlockBytes); }
+
+  template <typename T>
+  void Add(T value) {
+    const size_t size = block_.size();
+    block_.resize(size + sizeof(T));
+    std::memcpy(block_.data() + size, &value, sizeof(T));
+    if (block_.size() == kBlockBytes) {
+      CompressBlock();
+    }
+  }
+
+  // Writes header and blocks. Header words are UInt64, bytes in the machine's order.
+  absl::Status Finish(OutputFile& output);
+
+ private:
+  void CompressBlock();
+
+  std::string block_;
+  std::string compressed_;
+  std::vector<uint64_t> compressed_sizes_;
+  uint64_t last_block_bytes_ = 0;
+  absl::Status status_;
+};
+
+// How a file says that its arrays are stored.
+struct VtkEncoding {
+  bool compressed = false;
+  bool big_endian = false;
+  int header_word_bytes = 4;  // 4 or 8
+};
+
+// The bytes of one array. Sizes in `text` are checked against what is there before anything is allocated by them.
+//
+// Errors:     INVALID_ARGUMENT, a message without a location.
+absl::StatusOr<std::string> DecodeVtkArray(std::string_view text, const VtkEncoding& encoding);
+
+// The words of type T in `bytes`, swapped when the file is of the other byte order. REQUIRES: sizeof(T) * (i + 1) <=
+// bytes.size().
+template <typename T>
+T LoadWord(std::string_view bytes, size_t i, bool big_endian) {
+  char word[sizeof(T)];
+  for (size_t k = 0; k < sizeof(T); ++k) {
+    word[big_endian ? sizeof(T) - 1 - k : k] = bytes[sizeof(T) * i + k];
+  }
+  T value;
+  std::memcpy(&value, word, sizeof(T));
+  return value;
+}
+
+// base64 of `bytes`, appended to `text`.
+void AppendBase64(std::string_view bytes, std::string& text);
+
+// Reverses AppendBase64, also for the concatenation of several outputs; blanks and ends of lines are skipped.
+absl::StatusOr<std::string> DecodeBase64(std::string_view text);
+
+}  // namespace wellspace::formats
+
+#endif  // WELLSPACE_CLIENT_FORMATS_VTK_ARRAY_H_
