@@ -1,0 +1,22 @@
+# Warnings, sanitizers and the shape of every target of the project.
+
+add_library(wellspace_options INTERFACE)
+target_compile_options(wellspace_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor)
+target_include_directories(wellspace_options INTERFACE ${PROJECT_SOURCE_DIR})
+option(WELLSPACE_WERROR "Treat warnings as errors" ON)
+if(WELLSPACE_WERROR)
+  target_compile_options(wellspace_options INTERFACE -Werror)
+endif()
+if(WELLSPACE_SANITIZE)
+  add_compile_options(-fsanitize=${WELLSPACE_SANITIZE} -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=${WELLSPACE_SANITIZE})
+endif()
+
+# wellspace_library(NAME SOURCES… [PUBLIC libs…] [PRIVATE libs…]) makes target wellspace_NAME with alias wellspace::NAME.
+function(wellspace_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
+  add_library(wellspace_${name} STATIC ${ARG_SOURCES})
+  add_library(wellspace::${name} ALIAS wellspace_${name})
+  target_link_libraries(wellspace_${name} PUBLIC ${ARG_PUBLIC} PRIVATE wellspace_options ${ARG_PRIVATE})
+  target_include_directories(wellspace_${name} PUBLIC ${PROJECT_SOURCE_DIR})
+endfunction()

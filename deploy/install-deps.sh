@@ -1,0 +1,61 @@
+#!/usr/bin/env bash
+# Installs the Debian 12 packages that Wellspace needs. The one place with package lists.
+#
+#   deploy/install-deps.sh [GROUP…]        groups: build test lint tidy fuzz bench runtime dev; default: build test
+#
+# As root, or through sudo. Installs only what is missing; does not touch the network when nothing is.
+set -euo pipefail
+
+# What a group needs, without what its packages already depend on (libgrpc++-dev brings OpenSSL, RE2, c-ares and gRPC's core).
+declare -A packages=(
+  [build]="g++ cmake ninja-build pkg-config libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
+           libabsl-dev libc-ares-dev libspdlog-dev libboost-dev libtbb-dev libcli11-dev nlohmann-json3-dev libcairo2-dev
+           zlib1g-dev libfast-float-dev python3"
+  [test]="libgtest-dev libgmock-dev libcgal-dev python3 python3-meshio python3-numpy python3-grpcio python3-protobuf"
+  [lint]="git clang-format-14 python3"
+  [tidy]="clang-tidy-14"
+  [fuzz]="clang-14 libclang-rt-14-dev"
+  [bench]="tetgen libtet1.5-dev libcgal-dev voro++-dev python3 python3-numpy"
+  [runtime]="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libtbb12 libcairo2 zlib1g"
+)
+packages[dev]="${packages[build]} ${packages[test]} ${packages[lint]} ${packages[tidy]} ${packages[fuzz]}"
+
+as_root() {
+  if [[ "$(id -u)" -eq 0 ]]; then
+    "$@"
+  elif ! command -v sudo >/dev/null; then
+    echo "install-deps: run as root or install sudo; missing packages: ${missing[*]}" >&2
+    exit 1
+  elif [[ -t 0 ]]; then
+    sudo "$@"
+  else
+    sudo -n "$@" # without a terminal a password prompt would hang
+  fi
+}
+
+wanted=()
+for group in "${@:-build test}"; do
+  for name in ${group}; do
+    if [[ -z "${packages[${name}]:-}" ]]; then
+      echo "install-deps: unknown group '${name}'; groups are: ${!packages[*]}" >&2
+      exit 2
+    fi
+    # shellcheck disable=SC2206 # a list of words by design
+    wanted+=(${packages[${name}]})
+  done
+done
+
+missing=()
+for package in $(printf '%s\n' "${wanted[@]}" | sort -u); do
+  status="$(dpkg-query --show --showformat='${db:Status-Status}' "${package}" 2>/dev/null || true)"
+  # A package for several architectures reports one word for each.
+  [[ "${status}" == *installed* && "${status}" != *not-installed* ]] || missing+=("${package}")
+done
+if [[ ${#missing[@]} -eq 0 ]]; then
+  exit 0
+fi
+
+echo "install-deps: installing ${missing[*]}" >&2
+options=(-qq -y -o Dpkg::Use-Pty=0 --no-install-recommends -o Acquire::Retries=3 -o DPkg::Lock::Timeout=300)
+as_root env DEBIAN_FRONTEND=noninteractive apt-get "${options[@]}" update </dev/null
+as_root env DEBIAN_FRONTEND=noninteractive apt-get "${options[@]}" install "${missing[@]}" </dev/null

@@ -1,0 +1,24 @@
+# Sourced by the scripts: the root of the repository, and how many jobs a build may run.
+# shellcheck shell=bash
+
+set -euo pipefail
+ROOT="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
+cd "${ROOT}"
+
+# One compiler per core, but at most one per 1.5 GB of free memory: gRPC's headers are hungry.
+build_jobs() {
+  local cores memory_kb by_memory
+  cores="$(nproc)"
+  memory_kb="$(awk '/^MemAvailable:/ {print $2}' /proc/meminfo)"
+  by_memory=$((memory_kb / 1500000))
+  if ((by_memory < 1)); then by_memory=1; fi
+  echo $((cores < by_memory ? cores : by_memory))
+}
+
+# build PRESET [CMAKE OPTION…]: configures and builds build/PRESET.
+build() {
+  local preset="$1"
+  shift
+  cmake --preset "${preset}" "$@" </dev/null
+  cmake --build --preset "${preset}" --parallel "$(build_jobs)" </dev/null
+}

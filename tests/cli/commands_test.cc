@@ -1,0 +1,379 @@
+// The program from the outside: what it prints, writes and returns.
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <pty.h>
+#include <sched.h>
+#include <signal.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "client/formats/read_mesh.h"
+#include "tests/cli/process.h"
+#include "tests/formats/temporary_folder.h"
+
+namespace wellspace {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+
+constexpr char kPlane[] = "x,y\n0,0\n1,0.1\n0.4,0.9\n0.5,0.45\n0,0\n0.1,0.2\n";
+constexpr char kSpace[] = "0 0 0\n1 0 0.1\n0 1 0\n0.1 0 1\n0.3 0.3 0.35\n0.31 0.3 0.35\n";
+
+class CommandsTest : public testing::Test {
+ protected:
+  std::string Path(const std::string& name) const { return folder_.Path(name); }
+
+  // Meshes `cloud`, which must succeed, to the file `output`.
+  void Mesh(std::string_view cloud, const std::string& output, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments = {"mesh", folder_.Write("cloud.csv", cloud), "-o", Path(output)};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const RunResult result = RunWellspace(arguments);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+  }
+
+  // Fails the test unless meshing `cloud` ends with `exit_code`, nothing written; returns what was printed.
+  std::string MeshFails(const std::string& name, std::string_view cloud, int exit_code,
+                        const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments = {"mesh", folder_.Write(name, cloud), "-o", Path("out.vtu")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const int files = folder_.FileCount();
+    const RunResult result = RunWellspace(arguments);
+    EXPECT_EQ(result.exit_code, exit_code) << result.err;
+    EXPECT_EQ(folder_.FileCount(), files);
+    EXPECT_THAT(result.out, IsEmpty());
+    return result.err;
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(CommandsTest, HelpAndVersion) {
+  const RunResult help = RunWellspace({"--help"});
+  EXPECT_EQ(help.exit_code, 0);
+  EXPECT_THAT(help.out, AllOf(HasSubstr("mesh"), HasSubstr("check"), HasSubstr("render"), HasSubstr("server"),
+                              HasSubstr("Exit codes:"), HasSubstr("130")));
+  for (const char* command : {"mesh", "check", "render", "server"}) {
+    const RunResult result = RunWellspace({command, "--help"});
+    EXPECT_EQ(result.exit_code, 0) << command;
+    EXPECT_THAT(result.out, HasSubstr("Usage:")) << command;
+  }
+  const RunResult version = RunWellspace({"--version"});
+  EXPECT_EQ(version.exit_code, 0);
+  EXPECT_THAT(version.out, testing::StartsWith("wellspace "));
+}
+
+TEST_F(CommandsTest, WrongUsageIsExitCode2) {
+  const std::string cloud = folder_.Write("cloud.csv", kPlane);
+  const std::string out = Path("out.vtu");
+  const std::vector<std::vector<std::string>> wrong = {
+      {},
+      {"knit"},
+      {"mesh"},
+      {"mesh", cloud},
+      {"mesh", cloud, "-o", out, "--dimension", "4"},
+      {"mesh", cloud, "-o", out, "--dimension", "3"},
+      {"mesh", cloud, "-o", out, "--rho", "two"},
+      {"mesh", cloud, "-o", out, "--rho", "nan"},
+      {"mesh", cloud, "-o", out, "--rho", "0.3"},
+      {"mesh", cloud, "-o", out, "--margin", "-1"},
+      {"mesh", cloud, "-o", out, "--domain", "0,0,1"},
+      {"mesh", cloud, "-o", out, "--domain", "0,0,0,1,1,1", "--dimension", "2"},
+      {"mesh", cloud, "-o", out, "--domain", "0,0,1,1", "--margin", "0.1"},
+      {"mesh", cloud, "-o", out, "--threads", "0"},
+      {"mesh", cloud, "-o", out, "--max-vertices", "-1"},
+      {"mesh", cloud, "-o", out, "--timeout", "0"},
+      {"mesh", cloud, "-o", out, "--format", "stl"},
+      {"mesh", cloud, "-o", Path("out.stl")},
+      {"mesh", cloud, "-o", Path("none/out.vtu")},
+      {"mesh", cloud, "-o", "-", "--stats", "-"},
+      {"mesh", cloud, "-o", "-", "--format", "node"},
+      {"mesh", Path("none.csv"), "-o", out},
+      {"check"},
+      {"check", Path("none.vtu")},
+      {"render", Path("none.vtu"), "-o", Path("a.png")},
+      {"render", Path("none.vtu"), "-o", Path("a.gif")},
+      {"render", Path("none.vtu"), "-o", Path("a.png"), "--width", "7"},
+      {"render", Path("none.vtu"), "-o", Path("a.png"), "--plane", "1,2,3"},
+      {"server"},
+  };
+  for (const std::vector<std::string>& arguments : wrong) {
+    const RunResult result = RunWellspace(arguments);
+    EXPECT_EQ(result.exit_code, 2) << testing::PrintToString(arguments) << result.err;
+    EXPECT_THAT(result.err, Not(IsEmpty())) << testing::PrintToString(arguments);
+    EXPECT_EQ(folder_.FileCount(), 1) << testing::PrintToString(arguments);
+  }
+}
+
+TEST_F(CommandsTest, BadCloudsAreToldWithTheirLine) {
+  EXPECT_THAT(MeshFails("bad.csv", "x,y,z\n1,2,3\n4,5\n", 2), HasSubstr("bad.csv:3: expected 3 coordinates, got 2"));
+  EXPECT_THAT(MeshFails("bad.csv", "1,2\n3,nan\n", 2), HasSubstr("bad.csv:2: field 2: expected a finite number"));
+  EXPECT_THAT(MeshFails("bad.xyz", "1 2 3\n\n4 five 6\n", 2), HasSubstr("bad.xyz:3: field 2: expected a number"));
+  EXPECT_THAT(MeshFails("bad.node", "2 3\n1 0 0 0\n", 2), HasSubstr("bad.node:2: expected 2 points"));
+  EXPECT_THAT(MeshFails("bad.csv", "", 2), HasSubstr("bad.csv: no points"));
+}
+
+// The server names the index of a point, the tool adds where it was read.
+TEST_F(CommandsTest, ErrorsOfTheServerAboutPointsAreToldWithTheirLine) {
+  EXPECT_THAT(MeshFails("far.csv", "# two points\n0.5,0.5\n\n0.5,7\n", 2, {"--domain", "0,0,1,1"}),
+              AllOf(HasSubstr("far.csv:4: "), HasSubstr("points[1]"), HasSubstr("7")));
+  EXPECT_THAT(MeshFails("near.csv", "x,y\n1,1\n1,1.0000000000000002\n0,0\n", 2),
+              AllOf(HasSubstr("near.csv:"), HasSubstr("points[0]"), HasSubstr("points[1]")));
+}
+
+TEST_F(CommandsTest, MeshAndCheckInThePlane) {
+  Mesh(kPlane, "plane.vtu", {"--stats", Path("stats.json")});
+  const RunResult check =
+      RunWellspace({"check", Path("plane.vtu"), "--cloud", Path("cloud.csv"), "--rho", "1.41421357"});
+  EXPECT_EQ(check.exit_code, 0) << check.out;
+  EXPECT_THAT(check.out, AllOf(HasSubstr("triangles"), HasSubstr("smallest angle"), EndsWith("valid\n")));
+
+  const nlohmann::json stats = nlohmann::json::parse(folder_.Read("stats.json"));
+  const absl::StatusOr<formats::Mesh> mesh = formats::ReadMesh(Path("plane.vtu"));
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_EQ(stats["dimension"], 2);
+  EXPECT_EQ(stats["input_points"], 6);
+  EXPECT_EQ(stats["duplicates"], 1);
+  EXPECT_EQ(stats["duplicate_of"], nlohmann::json::parse("[[4, 0]]"));
+  EXPECT_EQ(stats["vertices"], mesh->points.size() / 2);
+  EXPECT_EQ(stats["simplices"], mesh->simplices.size() / 3);
+  EXPECT_LE(stats["max_radius_edge"], std::sqrt(2) * (1 + 1e-9));
+  EXPECT_GT(stats["min_angle_deg"], 20);
+  EXPECT_GT(stats["peak_memory_bytes"], 1 << 20);
+  EXPECT_FALSE(stats["counters"].empty());
+  for (const char* phase : {"tree", "refinement", "simplices", "total"}) {
+    EXPECT_GE(stats["seconds"][phase], 0) << phase;
+  }
+}
+
+TEST_F(CommandsTest, MeshAndCheckInSpace) {
+  Mesh(kSpace, "space.node", {"--rho", "2", "--domain", "-1,-1,-1,2,2,2", "--stats", Path("stats.json")});
+  EXPECT_THAT(folder_.Read("space.node"), HasSubstr(" 3 0 0\n0 0 0 0\n1 1 0 0.1\n"));
+  EXPECT_THAT(folder_.Read("space.ele"), HasSubstr(" 4 0\n0 "));
+  for (const char* name : {"space.node", "space.ele"}) {
+    const RunResult check = RunWellspace({"check", Path(name), "--cloud", Path("cloud.csv"), "--rho", "2.0000001"});
+    EXPECT_EQ(check.exit_code, 0) << check.out;
+    EXPECT_THAT(check.out, AllOf(HasSubstr("tetrahedra"), HasSubstr("smallest dihedral angle"), EndsWith("valid\n")));
+  }
+  const nlohmann::json stats = nlohmann::json::parse(folder_.Read("stats.json"));
+  EXPECT_TRUE(stats.contains("min_dihedral_deg"));
+  EXPECT_EQ(stats["domain_low"], nlohmann::json::parse("[-1.0, -1.0, -1.0]"));
+  EXPECT_EQ(stats["domain_high"], nlohmann::json::parse("[2.0, 2.0, 2.0]"));
+}
+
+TEST_F(CommandsTest, EmptyCloudInADomain) {
+  Mesh("", "empty.vtu", {"--domain", "0,0,1,1"});
+  EXPECT_EQ(RunWellspace({"check", Path("empty.vtu")}).exit_code, 0);
+}
+
+TEST_F(CommandsTest, StandardStreams) {
+  const RunResult mesh =
+      RunWellspace({"mesh", "-", "-o", "-"}, {.input = kPlane, .environment = {}, .error_descriptor = -1});
+  ASSERT_EQ(mesh.exit_code, 0) << mesh.err;
+  EXPECT_THAT(mesh.out, testing::StartsWith("<?xml"));
+  EXPECT_THAT(mesh.err, AllOf(HasSubstr("6 points (1 duplicates) -> "), EndsWith(" s\n")));
+  const RunResult check = RunWellspace({"check", "-"}, {.input = mesh.out, .environment = {}, .error_descriptor = -1});
+  EXPECT_EQ(check.exit_code, 0) << check.err << check.out;
+
+  const RunResult quiet =
+      RunWellspace({"mesh", "-", "-o", Path("out.vtu"), "--input-format", "xyz", "--stats", "-", "--quiet"},
+                   {.input = kSpace, .environment = {}, .error_descriptor = -1});
+  EXPECT_EQ(quiet.exit_code, 0);
+  EXPECT_THAT(quiet.err, IsEmpty());
+  EXPECT_EQ(nlohmann::json::parse(quiet.out)["input_points"], 6);
+  const RunResult bad =
+      RunWellspace({"mesh", "-", "-o", "-"}, {.input = "1,2\n3\n", .environment = {}, .error_descriptor = -1});
+  EXPECT_EQ(bad.exit_code, 2);
+  EXPECT_THAT(bad.err, HasSubstr("<stdin>:2: expected 2 coordinates, got 1"));
+}
+
+TEST_F(CommandsTest, CheckFindsPlantedFaults) {
+  Mesh(kPlane, "good.node");
+  const absl::StatusOr<formats::Mesh> good = formats::ReadMesh(Path("good.node"));
+  ASSERT_TRUE(good.ok()) << good.status();
+  // Checks a mesh with one thing changed.
+  const auto check = [this](const formats::Mesh& mesh) {
+    std::ofstream nodes(Path("bad.node"));
+    nodes.precision(17);
+    nodes << mesh.points.size() / 2 << " 2 0 0\n";
+    for (size_t i = 0; i < mesh.points.size() / 2; ++i) {
+      nodes << i << " " << mesh.points[2 * i] << " " << mesh.points[2 * i + 1] << "\n";
+    }
+    std::ofstream simplices(Path("bad.ele"));
+    simplices << mesh.simplices.size() / 3 << " 3 0\n";
+    for (size_t i = 0; i < mesh.simplices.size() / 3; ++i) {
+      simplices << i << " " << mesh.simplices[3 * i] << " " << mesh.simplices[3 * i + 1] << " "
+                << mesh.simplices[3 * i + 2] << "\n";
+    }
+    nodes.close();
+    simplices.close();
+    return RunWellspace({"check", Path("bad.ele"), "--cloud", Path("cloud.csv")});
+  };
+  EXPECT_EQ(check(*good).exit_code, 0);
+
+  formats::Mesh missing = *good;
+  missing.simplices.resize(missing.simplices.size() - 3);
+  formats::Mesh inverted = *good;
+  std::swap(inverted.simplices[0], inverted.simplices[1]);
+  formats::Mesh moved = *good;
+  moved.points[0] += 1e-9;
+  formats::Mesh twice = *good;
+  twice.simplices[1] = twice.simplices[0];
+  for (const formats::Mesh& bad : {missing, inverted, moved, twice}) {
+    const RunResult result = check(bad);
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_THAT(result.out, AllOf(HasSubstr("violation: "), Not(HasSubstr("valid\n"))));
+  }
+  const RunResult rho = RunWellspace({"check", Path("good.node"), "--rho", "0.6"});
+  EXPECT_EQ(rho.exit_code, 1);
+  EXPECT_THAT(rho.out, HasSubstr("violation: "));
+}
+
+uint32_t BigEndian(const std::string& bytes, size_t at) {
+  uint32_t value = 0;
+  for (size_t i = 0; i < 4 && at + i < bytes.size(); ++i) {
+    value = value << 8 | static_cast<uint8_t>(bytes[at + i]);
+  }
+  return value;
+}
+
+TEST_F(CommandsTest, RenderMakesPictures) {
+  Mesh(kPlane, "plane.vtu");
+  Mesh(kSpace, "space.vtu");
+  for (const char* name : {"plane.vtu", "space.vtu"}) {
+    const RunResult png = RunWellspace({"render", Path(name), "-o", Path("a.png"), "--width", "500"});
+    ASSERT_EQ(png.exit_code, 0) << png.err;
+    EXPECT_EQ(folder_.Read("a.png").substr(1, 3), "PNG");
+    EXPECT_EQ(BigEndian(folder_.Read("a.png"), 16), 500u);
+    const RunResult svg = RunWellspace({"render", Path(name), "-o", Path("a.svg"), "--width", "700"});
+    ASSERT_EQ(svg.exit_code, 0) << svg.err;
+    EXPECT_THAT(folder_.Read("a.svg"), AllOf(HasSubstr("width=\"700px\""), HasSubstr("</svg>")));
+  }
+  const std::string picture = folder_.Read("a.svg");
+  EXPECT_EQ(
+      RunWellspace({"render", Path("space.vtu"), "-o", Path("a.svg"), "--plane", "-1,0.5,0,0", "--up", "y"}).exit_code,
+      0);
+  EXPECT_NE(folder_.Read("a.svg"), picture);
+  const RunResult nothing = RunWellspace({"render", Path("space.vtu"), "-o", Path("none.png"), "--plane", "1,0,0,-50"});
+  EXPECT_EQ(nothing.exit_code, 2);
+  EXPECT_THAT(nothing.err, HasSubstr("space.vtu: the plane cuts off all"));
+}
+
+TEST_F(CommandsTest, ServerInfoOfTheEmbeddedServer) {
+  const RunResult result = RunWellspace({"server", "info"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, AllOf(HasSubstr("embedded"), HasSubstr("version"), HasSubstr("2, 3"), HasSubstr("workers")));
+}
+
+TEST_F(CommandsTest, UnreachableServerIsExitCode3) {
+  // Nothing listens on a port that is bound but not listened on.
+  const int socket_descriptor = socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address = {};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t length = sizeof(address);
+  ASSERT_EQ(bind(socket_descriptor, reinterpret_cast<sockaddr*>(&address), length), 0);
+  ASSERT_EQ(getsockname(socket_descriptor, reinterpret_cast<sockaddr*>(&address), &length), 0);
+  const std::string server = "127.0.0.1:" + std::to_string(ntohs(address.sin_port));
+  EXPECT_EQ(RunWellspace({"server", "info", "--server", server}).exit_code, 3);
+  EXPECT_THAT(MeshFails("cloud.csv", kPlane, 3, {"--server", server}), HasSubstr("server " + server + ": "));
+  const RunResult by_environment = RunWellspace(
+      {"server", "info"}, {.input = "", .environment = {"WELLSPACE_SERVER=" + server}, .error_descriptor = -1});
+  EXPECT_EQ(by_environment.exit_code, 3);
+  close(socket_descriptor);
+}
+
+TEST_F(CommandsTest, LimitIsExitCode4AndTimeoutIsExitCode5) {
+  EXPECT_THAT(MeshFails("cloud.csv", kPlane, 4, {"--max-vertices", "7"}), HasSubstr("7"));
+  EXPECT_THAT(MeshFails("cloud.csv", kPlane, 5, {"--timeout", "1e-9"}), HasSubstr("--timeout: 1e-09 seconds passed"));
+}
+
+// Reads what a descriptor has until it ends.
+std::string ReadAll(int descriptor) {
+  std::string text;
+  char buffer[4096];
+  for (ssize_t got = 0; (got = read(descriptor, buffer, sizeof(buffer))) > 0;) {
+    text.append(buffer, got);
+  }
+  return text;
+}
+
+TEST_F(CommandsTest, ProgressBarOnlyOnATerminalAndUnlessQuiet) {
+  const std::string cloud = folder_.Write("cloud.csv", kPlane);
+  for (const bool quiet : {false, true}) {
+    int terminal = -1;
+    int error = -1;
+    ASSERT_EQ(openpty(&terminal, &error, nullptr, nullptr, nullptr), 0);
+    std::vector<std::string> arguments = {"mesh", cloud, "-o", Path("out.vtu")};
+    if (quiet) {
+      arguments.push_back("--quiet");
+    }
+    EXPECT_EQ(RunWellspace(arguments, {.input = "", .environment = {}, .error_descriptor = error}).exit_code, 0);
+    close(error);
+    const std::string shown = ReadAll(terminal);
+    close(terminal);
+    if (quiet) {
+      EXPECT_THAT(shown, IsEmpty());
+    } else {
+      EXPECT_THAT(shown, AllOf(HasSubstr("\r"), HasSubstr("% "), HasSubstr("6 points")));
+    }
+  }
+  EXPECT_THAT(RunWellspace({"mesh", cloud, "-o", Path("out.vtu")}).err, Not(HasSubstr("\r")));
+}
+
+bool IsPending(pid_t process, int signal) {
+  std::ifstream status("/proc/" + std::to_string(process) + "/status");
+  std::string line;
+  while (std::getline(status, line)) {
+    if (line.substr(0, 7) == "ShdPnd:") {
+      return (std::stoull(line.substr(7), nullptr, 16) >> (signal - 1) & 1) != 0;
+    }
+  }
+  return false;
+}
+
+// The program is stopped while it writes a big mesh into a pipe that nobody empties, so that the signal finds it at
+// work.
+TEST_F(CommandsTest, CtrlCIsExitCode130) {
+  std::string grid;
+  for (int i = 0; i < 150; ++i) {
+    for (int j = 0; j < 150; ++j) {
+      grid += std::to_string(i) + " " + std::to_string(j * 1.0625 + i * 0.25) + "\n";
+    }
+  }
+  const std::string cloud = folder_.Write("grid.csv", grid);
+  for (const int signal : {SIGINT, SIGTERM}) {
+    const std::string pipe = Path("pipe" + std::to_string(signal));
+    ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+    Process process({"mesh", cloud, "-o", pipe, "--format", "vtu"});
+    const int reader = open(pipe.c_str(), O_RDONLY);  // returns once the program opens it for writing
+    ASSERT_GE(reader, 0);
+    ASSERT_EQ(kill(process.id(), signal), 0);
+    while (IsPending(process.id(), signal)) {
+      sched_yield();
+    }
+    const std::string written = ReadAll(reader);
+    close(reader);
+    const RunResult result = process.Wait();
+    EXPECT_EQ(result.exit_code, 128 + signal) << result.err;
+    EXPECT_THAT(result.err, HasSubstr("cancelled while writing"));
+    EXPECT_THAT(written, Not(HasSubstr("</VTKFile>")));
+  }
+}
+
+}  // namespace
+}  // namespace wellspace

@@ -1,0 +1,296 @@
+#include <cairo.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <vector>
+
+#include "client/cli/render/colour_ramp.h"
+#include "client/cli/render/painter.h"
+#include "client/cli/render/scene.h"
+#include "core/mesher.h"
+#include "core/simplex/quality.h"
+#include "tests/formats/temporary_folder.h"
+#include "tests/support/meshes.h"
+
+namespace wellspace::render {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+uint64_t Seed() {
+  const char* wanted = std::getenv("WELLSPACE_SEED");
+  return wanted != nullptr ? std::strtoull(wanted, nullptr, 10) : 20240611;
+}
+
+formats::Mesh Square() { return {.dimension = 2, .points = {0, 0, 2, 0, 2, 1, 0, 1}, .simplices = {0, 1, 2, 0, 2, 3}}; }
+
+formats::Mesh Cubes(uint32_t n) {
+  const test::TestMesh grid = test::KuhnGrid(3, n);
+  return {.dimension = 3, .points = grid.points, .simplices = grid.simplices};
+}
+
+double Area(const Facet& facet) {
+  const auto& c = facet.corners;
+  return std::abs((c[1][0] - c[0][0]) * (c[2][1] - c[0][1]) - (c[2][0] - c[0][0]) * (c[1][1] - c[0][1])) / 2;
+}
+
+double TotalArea(const Scene& scene) {
+  double sum = 0;
+  for (const Facet& facet : scene.facets) {
+    sum += Area(facet);
+  }
+  return sum;
+}
+
+TEST(SceneTest, PlaneMeshIsDrawnAsItIs) {
+  const absl::StatusOr<Scene> scene = MakeScene(Square().View(), {});
+  ASSERT_TRUE(scene.ok()) << scene.status();
+  EXPECT_EQ(scene->facets.size(), 2u);
+  EXPECT_EQ(scene->width, 2);
+  EXPECT_EQ(scene->height, 1);
+  EXPECT_NEAR(TotalArea(*scene), 2, 1e-6);
+  EXPECT_NEAR(scene->facets[0].angle_deg, std::atan2(1, 2) * 180 / std::numbers::pi, 1e-4);
+  EXPECT_EQ(scene->best_angle_deg, 60);
+}
+
+// A convex body covers its picture exactly once.
+TEST(SceneTest, VisibleFacetsOfAConvexBodyCoverItsShadowOnce) {
+  const Plane everything = {.normal = {0, 0, 1}, .offset = 100};
+  const absl::StatusOr<Scene> scene = MakeScene(Cubes(3).View(), {.plane = everything, .up = 2});
+  ASSERT_TRUE(scene.ok()) << scene.status();
+  EXPECT_EQ(scene->facets.size(), 3u * 2 * 3 * 3);  // three of the six sides, two triangles for each square
+  // The direction towards the spectator, as MakeCamera has it: the shadow of the unit cube is the sum of its
+  // coordinates.
+  const double norm = std::hypot(1, 0.55, 0.4);
+  EXPECT_NEAR(TotalArea(*scene), 9 * (1 + 0.55 + 0.4) / norm, 1e-4);
+}
+
+TEST(SceneTest, CutKeepsTheSideThatTheNormalDoesNotPointTo) {
+  const formats::Mesh cubes = Cubes(4);
+  const absl::StatusOr<Scene> half = MakeScene(cubes.View(), {.plane = Plane{{0, 0, 2}, 4}, .up = 2});  // z <= 2
+  const absl::StatusOr<Scene> whole = MakeScene(cubes.View(), {.plane = Plane{{0, 0, 2}, 80}, .up = 2});
+  ASSERT_TRUE(half.ok() && whole.ok());
+  EXPECT_LT(half->height, whole->height);
+  EXPECT_EQ(half->facets.size(), 2u * (4 * 4 + 2 * 4 + 2 * 4));
+  EXPECT_EQ(whole->facets.size(), 2u * 3 * 4 * 4);
+}
+
+using Vector = std::array<double, 3>;
+
+double Dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+// Where the line of sight through (x, y) meets the tetrahedron `corners`, given as (x, y, depth): the depth at which it
+// enters, or minus infinity when it misses.
+double EntryDepth(const std::array<Vector, 4>& corners, double x, double y) {
+  double nearest = -std::numeric_limits<double>::infinity();
+  for (int skipped = 0; skipped < 4; ++skipped) {
+    const Vector& a = corners[(skipped + 1) % 4];
+    const Vector& b = corners[(skipped + 2) % 4];
+    const Vector& c = corners[(skipped + 3) % 4];
+    const auto area = [](double ux, double uy, double vx, double vy) { return ux * vy - uy * vx; };
+    const double whole = area(b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]);
+    const double beta = area(x - a[0], y - a[1], c[0] - a[0], c[1] - a[1]) / whole;
+    const double gamma = area(b[0] - a[0], b[1] - a[1], x - a[0], y - a[1]) / whole;
+    if (beta >= 0 && gamma >= 0 && beta + gamma <= 1) {
+      nearest = std::max(nearest, a[2] + beta * (b[2] - a[2]) + gamma * (c[2] - a[2]));
+    }
+  }
+  return nearest;
+}
+
+bool Covers(const Facet& facet, double x, double y) {
+  bool positive = false;
+  bool negative = false;
+  for (int i = 0; i < 3; ++i) {
+    const auto& a = facet.corners[i];
+    const auto& b = facet.corners[(i + 1) % 3];
+    const double side = (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]);
+    positive |= side > 0;
+    negative |= side < 0;
+  }
+  return !(positive && negative);
+}
+
+// At every sample, what is painted last is the tetrahedron that a line of sight enters first, found among all of them.
+TEST(SceneTest, PaintersOrderShowsWhatIsInFront) {
+  const uint64_t seed = Seed();
+  SCOPED_TRACE(testing::Message() << "WELLSPACE_SEED=" << seed);
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  std::vector<double> cloud;
+  for (int i = 0; i < 240; ++i) {
+    cloud.push_back(i % 3 == 0 ? uniform(random) : std::pow(uniform(random), 3));
+  }
+  core::RunContext context;
+  core::MeshParameters parameters;
+  parameters.dimension = 3;
+  const absl::StatusOr<core::Mesh> mesh = core::MeshPoints(parameters, cloud, context);
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  const formats::MeshView view = {
+      .dimension = 3, .points = mesh->points, .simplices = mesh->simplices, .input_vertices = 0};
+  const absl::StatusOr<Scene> scene = MakeScene(view, {.plane = Plane{{1, 0, 0}, 0.5}, .up = 2});
+  ASSERT_TRUE(scene.ok()) << scene.status();
+
+  // The directions of the picture for a cut across x: from the front, a little from the side (y) and from above (z).
+  const double norm = std::hypot(1, 0.55, 0.4);
+  const Vector towards = {1 / norm, 0.55 / norm, 0.4 / norm};
+  const double side = std::hypot(towards[0], towards[1]);
+  const Vector right = {-towards[1] / side, towards[0] / side, 0};
+  const Vector up = {towards[1] * right[2] - towards[2] * right[1], towards[2] * right[0] - towards[0] * right[2],
+                     towards[0] * right[1] - towards[1] * right[0]};
+  std::vector<std::array<Vector, 4>> kept;
+  std::vector<double> angles;
+  double low_x = std::numeric_limits<double>::infinity();
+  double low_y = low_x;
+  for (uint64_t simplex = 0; simplex < mesh->simplex_count(); ++simplex) {
+    core::Simplex<3> corners;
+    std::array<Vector, 4> projected;
+    double centroid_x = 0;
+    for (int i = 0; i < 4; ++i) {
+      std::copy_n(&mesh->points[3 * mesh->simplices[4 * simplex + i]], 3, corners[i].begin());
+      projected[i] = {Dot(corners[i], right), Dot(corners[i], up), Dot(corners[i], towards)};
+      centroid_x += corners[i][0] / 4;
+    }
+    if (centroid_x <= 0.5) {
+      kept.push_back(projected);
+      angles.push_back(core::Angles<3>(corners).min_deg);
+      for (const Vector& corner : projected) {
+        low_x = std::min(low_x, corner[0]);
+        low_y = std::min(low_y, corner[1]);
+      }
+    }
+  }
+  int overlaps = 0;
+  for (int sample = 0; sample < 20000; ++sample) {
+    const double x = uniform(random) * scene->width;
+    const double y = uniform(random) * scene->height;
+    double painted = -1;
+    int covers = 0;
+    for (const Facet& facet : scene->facets) {
+      if (Covers(facet, x, y)) {
+        painted = facet.angle_deg;
+        ++covers;
+      }
+    }
+    // Only where facets overlap does their order matter; the first samples look everywhere.
+    if (covers < 2 && sample >= 400) {
+      continue;
+    }
+    overlaps += covers < 2 ? 0 : 1;
+    double nearest = -std::numeric_limits<double>::infinity();
+    double expected = -1;
+    for (size_t k = 0; k < kept.size(); ++k) {
+      const double depth = EntryDepth(kept[k], low_x + x, low_y + y);
+      if (depth > nearest) {
+        nearest = depth;
+        expected = angles[k];
+      }
+    }
+    ASSERT_NEAR(painted, expected, 1e-3) << x << " " << y;
+  }
+  EXPECT_GT(overlaps, 100);
+}
+
+TEST(SceneTest, Errors) {
+  const auto message = [](const formats::Mesh& mesh, const View& view) {
+    const absl::StatusOr<Scene> scene = MakeScene(mesh.View(), view);
+    EXPECT_EQ(scene.status().code(), absl::StatusCode::kInvalidArgument);
+    return std::string(scene.status().message());
+  };
+  EXPECT_THAT(message({.dimension = 3, .points = {}, .simplices = {}}, {}), HasSubstr("no simplices"));
+  EXPECT_THAT(message(Square(), {.plane = Plane{{1, 0, 0}, 0}, .up = 2}), HasSubstr("3-D meshes only"));
+  EXPECT_THAT(message(Cubes(1), {.plane = Plane{{0, 0, 0}, 1}, .up = 2}), HasSubstr("normal has a direction"));
+  EXPECT_THAT(message(Cubes(1), {.plane = Plane{{1, 0, 0}, -1}, .up = 2}), HasSubstr("cuts off all of the 6"));
+  formats::Mesh huge = Square();
+  huge.points[0] = -1e300;
+  EXPECT_THAT(message(huge, {}), HasSubstr("at most 1e150"));
+}
+
+TEST(ColourRampTest, LightnessGrows) {
+  double last = -1;
+  for (int i = 0; i <= 100; ++i) {
+    const Colour colour = RampColour(i / 100.0);
+    const double lightness =
+        0.2126 * std::pow(colour.red, 2.2) + 0.7152 * std::pow(colour.green, 2.2) + 0.0722 * std::pow(colour.blue, 2.2);
+    EXPECT_GT(lightness, last) << i;
+    last = lightness;
+  }
+  EXPECT_EQ(RampColour(-1).red, RampColour(0).red);
+  EXPECT_EQ(RampColour(2).red, RampColour(1).red);
+}
+
+uint32_t BigEndian(const std::string& bytes, size_t at) {
+  uint32_t value = 0;
+  for (size_t i = 0; i < 4; ++i) {
+    value = value << 8 | static_cast<uint8_t>(bytes[at + i]);
+  }
+  return value;
+}
+
+TEST(PainterTest, PngIsWhiteOutsideAndColouredByAngleInside) {
+  TemporaryFolder folder;
+  const absl::StatusOr<Scene> scene = MakeScene(Square().View(), {});
+  const std::string path = folder.Path("square.png");
+  ASSERT_TRUE(WritePicture(*scene, 800, PictureFormat::kPng, path).ok());
+  EXPECT_EQ(BigEndian(folder.Read("square.png"), 16), 800u);
+
+  cairo_surface_t* picture = cairo_image_surface_create_from_png(path.c_str());
+  ASSERT_EQ(cairo_surface_status(picture), CAIRO_STATUS_SUCCESS);
+  const int height = cairo_image_surface_get_height(picture);
+  const auto pixel = [picture](int x, int y) {
+    uint32_t value = 0;
+    std::memcpy(&value, cairo_image_surface_get_data(picture) + y * cairo_image_surface_get_stride(picture) + 4 * x, 4);
+    return value & 0xffffff;
+  };
+  EXPECT_EQ(pixel(2, 2), 0xffffffu);
+  EXPECT_EQ(pixel(797, height - 3), 0xffffffu);
+  const Colour expected = RampColour(26.565 / 60);
+  const uint32_t inside = pixel(500, height / 2 + 60);
+  EXPECT_NEAR(inside >> 16 & 255, 255 * expected.red, 2);
+  EXPECT_NEAR(inside >> 8 & 255, 255 * expected.green, 2);
+  EXPECT_NEAR(inside & 255, 255 * expected.blue, 2);
+  cairo_surface_destroy(picture);
+}
+
+TEST(PainterTest, SizesStayWithinBounds) {
+  TemporaryFolder folder;
+  for (const double height : {1e-3, 1.0, 1e3}) {
+    formats::Mesh strip = Square();
+    strip.points[5] = strip.points[7] = height;
+    const absl::StatusOr<Scene> scene = MakeScene(strip.View(), {});
+    ASSERT_TRUE(WritePicture(*scene, kMinWidth, PictureFormat::kPng, folder.Path("strip.png")).ok());
+    const std::string png = folder.Read("strip.png");
+    EXPECT_EQ(BigEndian(png, 16), static_cast<uint32_t>(kMinWidth));
+    EXPECT_LE(BigEndian(png, 20), 2u * kMinWidth + 100);
+  }
+}
+
+TEST(PainterTest, Svg) {
+  TemporaryFolder folder;
+  const absl::StatusOr<Scene> scene = MakeScene(Square().View(), {});
+  ASSERT_TRUE(WritePicture(*scene, 640, PictureFormat::kSvg, folder.Path("square.svg")).ok());
+  const std::string svg = folder.Read("square.svg");
+  EXPECT_THAT(svg, StartsWith("<?xml"));
+  EXPECT_THAT(svg, HasSubstr("width=\"640px\""));
+  EXPECT_THAT(svg, HasSubstr("</svg>"));
+}
+
+TEST(PainterTest, Errors) {
+  const absl::StatusOr<Scene> scene = MakeScene(Square().View(), {});
+  EXPECT_EQ(WritePicture(*scene, 640, PictureFormat::kPng, "/dev/full").code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(WritePicture(*scene, 640, PictureFormat::kPng, "/none/a.png").code(), absl::StatusCode::kNotFound);
+  EXPECT_FALSE(PictureFormatOf("a.gif").ok());
+  EXPECT_EQ(*PictureFormatOf("a.SVG"), PictureFormat::kSvg);
+}
+
+}  // namespace
+}  // namespace wellspace::render

@@ -1,0 +1,178 @@
+#include "client/mesh_assembler.h"
+
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include "proto/checksum.h"
+
+namespace wellspace::client {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+// The answer of a server: the unit square as two triangles, one input point at its origin.
+struct Answer {
+  v1::MeshMetadata metadata;
+  std::vector<v1::MeshChunk> chunks;
+};
+
+void Sign(v1::MeshChunk& chunk) {
+  if (!chunk.points().empty()) {
+    chunk.set_crc32c(Crc32c(chunk.points().data(), chunk.points_size() * sizeof(double)));
+  } else if (!chunk.simplices().empty()) {
+    chunk.set_crc32c(Crc32c(chunk.simplices().data(), chunk.simplices_size() * sizeof(uint32_t)));
+  } else {
+    chunk.set_crc32c(Crc32c(chunk.input_vertices().data(), chunk.input_vertices_size() * sizeof(uint32_t)));
+  }
+}
+
+Answer GoodAnswer() {
+  Answer answer;
+  v1::MeshMetadata& metadata = answer.metadata;
+  metadata.set_dimension(2);
+  for (int axis = 0; axis < 2; ++axis) {
+    metadata.mutable_domain()->add_low(0);
+    metadata.mutable_domain()->add_high(1);
+  }
+  metadata.set_vertex_count(4);
+  metadata.set_simplex_count(2);
+  metadata.set_input_point_count(1);
+  metadata.set_chunk_count(4);
+  metadata.mutable_statistics()->set_vertices(4);
+  metadata.mutable_statistics()->mutable_seconds()->set_refinement(0.25);
+  metadata.mutable_statistics()->mutable_counters()->set_cuts(12);
+  answer.chunks.resize(4);
+  for (int i = 0; i < 4; ++i) {
+    answer.chunks[i].set_index(i);
+  }
+  const std::vector<double> first = {0, 0, 1, 0};
+  const std::vector<double> second = {0, 1, 1, 1};
+  const std::vector<uint32_t> simplices = {0, 1, 2, 1, 3, 2};
+  answer.chunks[0].mutable_points()->Assign(first.begin(), first.end());
+  answer.chunks[1].mutable_points()->Assign(second.begin(), second.end());
+  answer.chunks[2].mutable_simplices()->Assign(simplices.begin(), simplices.end());
+  answer.chunks[3].add_input_vertices(0);
+  for (v1::MeshChunk& chunk : answer.chunks) {
+    Sign(chunk);
+  }
+  return answer;
+}
+
+absl::StatusOr<Mesh> Assemble(const Answer& answer) {
+  MeshAssembler assembler(2, 1);
+  if (absl::Status status = assembler.SetMetadata(answer.metadata); !status.ok()) {
+    return status;
+  }
+  for (const v1::MeshChunk& chunk : answer.chunks) {
+    if (absl::Status status = assembler.AddChunk(chunk); !status.ok()) {
+      return status;
+    }
+  }
+  return assembler.Finish();
+}
+
+TEST(MeshAssembler, AssemblesAMesh) {
+  const absl::StatusOr<Mesh> mesh = Assemble(GoodAnswer());
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_EQ(mesh->dimension, 2);
+  EXPECT_THAT(mesh->domain_low, ElementsAre(0, 0));
+  EXPECT_THAT(mesh->domain_high, ElementsAre(1, 1));
+  EXPECT_THAT(mesh->points, ElementsAre(0, 0, 1, 0, 0, 1, 1, 1));
+  EXPECT_THAT(mesh->simplices, ElementsAre(0, 1, 2, 1, 3, 2));
+  EXPECT_THAT(mesh->input_vertex, ElementsAre(0));
+  EXPECT_EQ(mesh->statistics.vertices, 4u);
+  EXPECT_EQ(mesh->statistics.seconds.at("refinement"), 0.25);
+  EXPECT_EQ(mesh->statistics.seconds.size(), 4u);
+  EXPECT_EQ(mesh->statistics.counters.at("cuts"), 12u);
+  EXPECT_EQ(mesh->statistics.counters.count("tree_leaves"), 1u);
+}
+
+struct Damage {
+  std::string name;
+  std::string message;  // a part of it
+  std::function<void(Answer&)> spoil;
+};
+
+class MeshAssemblerRefuses : public ::testing::TestWithParam<Damage> {};
+
+TEST_P(MeshAssemblerRefuses, ADamagedAnswer) {
+  Answer answer = GoodAnswer();
+  GetParam().spoil(answer);
+  const absl::StatusOr<Mesh> mesh = Assemble(answer);
+  ASSERT_FALSE(mesh.ok());
+  EXPECT_EQ(mesh.status().code(), absl::StatusCode::kDataLoss);
+  EXPECT_THAT(std::string(mesh.status().message()), HasSubstr(GetParam().message));
+}
+
+constexpr uint64_t kHuge = std::numeric_limits<uint64_t>::max();
+
+INSTANTIATE_TEST_SUITE_P(
+    All, MeshAssemblerRefuses,
+    ::testing::Values(
+        Damage{"Dimension", "dimension 3", [](Answer& a) { a.metadata.set_dimension(3); }},
+        Damage{"DomainShort", "1 low", [](Answer& a) { a.metadata.mutable_domain()->mutable_low()->RemoveLast(); }},
+        Damage{"NoDomain", "0 low", [](Answer& a) { a.metadata.clear_domain(); }},
+        Damage{"VertexCountHuge", "more than can be", [](Answer& a) { a.metadata.set_vertex_count(kHuge); }},
+        Damage{"SimplexCountHuge", "more than can be", [](Answer& a) { a.metadata.set_simplex_count(kHuge); }},
+        Damage{"InputCount", "1 were sent", [](Answer& a) { a.metadata.set_input_point_count(2); }},
+        Damage{"ChunkCountHuge", "chunks", [](Answer& a) { a.metadata.set_chunk_count(kHuge); }},
+        Damage{"VertexCountHigh", "4 of 5 vertices", [](Answer& a) { a.metadata.set_vertex_count(5); }},
+        Damage{"VertexCountLow", "more than the announced 3", [](Answer& a) { a.metadata.set_vertex_count(3); }},
+        Damage{"SimplexCountHigh", "2 of 3 simplices", [](Answer& a) { a.metadata.set_simplex_count(3); }},
+        Damage{"SimplexCountLow", "more than the announced 1", [](Answer& a) { a.metadata.set_simplex_count(1); }},
+        Damage{"ChunkMissing", "3 of 4 chunks", [](Answer& a) { a.chunks.pop_back(); }},
+        Damage{"ChunkTwice", "where chunk", [](Answer& a) { a.chunks[2] = a.chunks[1]; }},
+        Damage{"ChunkTooMany", "chunk 4", [](Answer& a) { a.chunks.emplace_back(a.chunks[3]).set_index(4); }},
+        Damage{"ChunksSwapped", "where chunk 0", [](Answer& a) { std::swap(a.chunks[0], a.chunks[1]); }},
+        Damage{"ChunkEmpty", "0 arrays", [](Answer& a) { a.chunks[3].clear_input_vertices(); }},
+        Damage{"TwoArrays", "2 arrays", [](Answer& a) { a.chunks[0].add_simplices(0); }},
+        Damage{"BitFlippedInPoints", "CRC32C", [](Answer& a) { a.chunks[0].set_points(0, -0.0); }},
+        Damage{"BitFlippedInSimplices", "CRC32C", [](Answer& a) { a.chunks[2].set_simplices(0, 1); }},
+        Damage{"BitFlippedInInputVertices", "CRC32C", [](Answer& a) { a.chunks[3].set_input_vertices(0, 1); }},
+        Damage{"BitFlippedInChecksum", "CRC32C", [](Answer& a) { a.chunks[1].set_crc32c(a.chunks[1].crc32c() ^ 1); }},
+        Damage{"RaggedPoints", "no multiple of 2",
+               [](Answer& a) {
+                 a.chunks[0].mutable_points()->RemoveLast();
+                 Sign(a.chunks[0]);
+               }},
+        Damage{"RaggedSimplices", "no multiple of 3",
+               [](Answer& a) {
+                 a.chunks[2].mutable_simplices()->RemoveLast();
+                 Sign(a.chunks[2]);
+               }},
+        Damage{"SimplexOfNoVertex", "name vertex 4 of 4",
+               [](Answer& a) {
+                 a.chunks[2].set_simplices(3, 4);
+                 Sign(a.chunks[2]);
+               }},
+        Damage{"InputOfNoVertex", "name vertex 4294967295 of 4",
+               [](Answer& a) {
+                 a.chunks[3].set_input_vertices(0, 0xFFFFFFFFu);
+                 Sign(a.chunks[3]);
+               }}),
+    [](const auto& test) { return test.param.name; });
+
+TEST(MeshAssembler, RefusesAChunkBeforeTheMetadata) {
+  MeshAssembler assembler(2, 1);
+  EXPECT_EQ(assembler.AddChunk(GoodAnswer().chunks[0]).code(), absl::StatusCode::kDataLoss);
+}
+
+TEST(MeshAssembler, RefusesASecondMetadata) {
+  MeshAssembler assembler(2, 1);
+  ASSERT_TRUE(assembler.SetMetadata(GoodAnswer().metadata).ok());
+  EXPECT_EQ(assembler.SetMetadata(GoodAnswer().metadata).code(), absl::StatusCode::kDataLoss);
+}
+
+TEST(MeshAssembler, RefusesAnEndWithoutAMesh) {
+  EXPECT_EQ(MeshAssembler(2, 1).Finish().status().code(), absl::StatusCode::kDataLoss);
+}
+
+}  // namespace
+}  // namespace wellspace::client

@@ -1,0 +1,500 @@
+// Refinement and its parts: schedule, assessment of cells, Steiner points.
+#include "core/refine/refine.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/refine/assessment.h"
+#include "core/refine/schedule.h"
+#include "core/refine/steiner_point.h"
+#include "tests/support/brute_force.h"
+#include "tests/support/clouds.h"
+
+namespace wellspace::core {
+namespace {
+
+using test::Seed;
+using test::SplitMix64;
+using ::testing::HasSubstr;
+
+constexpr uint64_t kMany = 1'000'000;
+
+template <int D>
+QueryStructure<D> MakeStructure(std::vector<Point<D>> points) {
+  RunContext context;
+  QueryStructure<D> structure;
+  const absl::Status made = structure.Initialize(test::UnitBox<D>(), std::move(points), kMany, context);
+  EXPECT_TRUE(made.ok()) << made;
+  return structure;
+}
+
+template <int D>
+RefinementParameters Defaults() {
+  return {.rho = D == 2 ? std::sqrt(2.0) : 2.0, .max_vertices = kMany, .min_edge = 0x1p-48};
+}
+
+template <int D>
+absl::Status RefineQuietly(const RefinementParameters& parameters, QueryStructure<D>& structure) {
+  RunContext context;
+  QueryCounters counters;
+  return Refine<D>(parameters, structure, context, counters);
+}
+
+// What Refine promises of the whole cell of `v`, computed by a look at all vertices.
+template <int D>
+void ExpectRefined(const QueryStructure<D>& structure, VertexId v, double rho, Polytope<D>& cell) {
+  test::CutByAllInBox<D>(structure, v, cell);
+  for (const CellNode<D>& node : cell.nodes()) {
+    double shortest = std::numeric_limits<double>::infinity();
+    bool is_circumcenter = true;
+    for (const uint16_t index : node.planes) {
+      const Plane<D>& plane = cell.plane(index);
+      if (plane.kind == PlaneKind::kFace) {
+        is_circumcenter = false;
+        ASSERT_TRUE((structure.faces(v) >> plane.face) & 1)
+            << "the cell of vertex " << Index(v) << " touches face " << int{plane.face};
+      } else {
+        shortest = std::min(shortest, plane.length);
+      }
+    }
+    if (is_circumcenter) {
+      ASSERT_LE(std::sqrt(node.radius_sq), rho * shortest * (1 + 1e-9)) << "at vertex " << Index(v);
+    }
+  }
+}
+
+template <typename T>
+class RefineTest : public ::testing::Test {
+ protected:
+  RefineTest() : trace_(__FILE__, __LINE__, "seed " + std::to_string(seed_)) {}
+
+  const uint64_t seed_ = Seed(1995);
+  SplitMix64 random_{seed_};
+  ::testing::ScopedTrace trace_;
+};
+TYPED_TEST_SUITE(RefineTest, test::Dimensions);
+
+TYPED_TEST(RefineTest, EveryCellIsGoodInTheEnd) {
+  constexpr int D = TypeParam::kValue;
+  for (const std::string_view kind : test::AllKinds()) {
+    SCOPED_TRACE(std::string(kind));
+    QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, D == 2 ? 25 : 6));
+    const RefinementParameters parameters = Defaults<D>();
+    const absl::Status refined = RefineQuietly<D>(parameters, structure);
+    ASSERT_TRUE(refined.ok()) << refined;
+    Polytope<D> cell;
+    const uint32_t stride = structure.vertex_count() / 200 + 1;
+    for (uint32_t v = static_cast<uint32_t>(this->random_.Below(stride)); v < structure.vertex_count(); v += stride) {
+      ExpectRefined<D>(structure, VertexId{v}, parameters.rho, cell);
+      ASSERT_FALSE(this->HasFatalFailure());
+    }
+  }
+}
+
+TYPED_TEST(RefineTest, KeepsTheTighterBoundsToo) {
+  constexpr int D = TypeParam::kValue;
+  RefinementParameters parameters = Defaults<D>();
+  parameters.rho = D == 2 ? 0.95 : 1.3;
+  QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", D == 2 ? 20 : 4));
+  const absl::Status refined = RefineQuietly<D>(parameters, structure);
+  ASSERT_TRUE(refined.ok()) << refined;
+  Polytope<D> cell;
+  const uint32_t stride = structure.vertex_count() / 200 + 1;
+  for (uint32_t v = 0; v < structure.vertex_count(); v += stride) {
+    ExpectRefined<D>(structure, VertexId{v}, parameters.rho, cell);
+    ASSERT_FALSE(this->HasFatalFailure());
+  }
+}
+
+TYPED_TEST(RefineTest, InputVerticesStayWhereTheyAre) {
+  constexpr int D = TypeParam::kValue;
+  const std::vector<Point<D>> points = test::SortedCloud<D>("boundary", 20);
+  QueryStructure<D> structure = MakeStructure<D>(points);
+  ASSERT_TRUE(RefineQuietly<D>(Defaults<D>(), structure).ok());
+  for (uint32_t v = 0; v < points.size(); ++v) {
+    EXPECT_EQ(structure.point(VertexId{v}), points[v]);
+  }
+  for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
+    EXPECT_TRUE(structure.box().Contains(structure.point(VertexId{v})));
+    EXPECT_EQ(structure.faces(VertexId{v}), structure.box().FacesOf(structure.point(VertexId{v})));
+  }
+}
+
+// Guarantee (2).
+TYPED_TEST(RefineTest, IsDeterministic) {
+  constexpr int D = TypeParam::kValue;
+  std::array<QueryStructure<D>, 2> structures;
+  for (QueryStructure<D>& structure : structures) {
+    structure = MakeStructure<D>(test::SortedCloud<D>("rounded", 20));
+    ASSERT_TRUE(RefineQuietly<D>(Defaults<D>(), structure).ok());
+  }
+  ASSERT_EQ(structures[0].vertex_count(), structures[1].vertex_count());
+  for (uint32_t v = 0; v < structures[0].vertex_count(); ++v) {
+    ASSERT_EQ(structures[0].point(VertexId{v}), structures[1].point(VertexId{v}));
+  }
+}
+
+TYPED_TEST(RefineTest, ARefinedStructureNeedsNothingMore) {
+  constexpr int D = TypeParam::kValue;
+  QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", 20));
+  ASSERT_TRUE(RefineQuietly<D>(Defaults<D>(), structure).ok());
+  const uint32_t count = structure.vertex_count();
+  ASSERT_TRUE(RefineQuietly<D>(Defaults<D>(), structure).ok());
+  EXPECT_EQ(structure.vertex_count(), count);
+}
+
+// Size-conforming: NN(v) >= lfs(v) / (1 + c) with c = r / (r - 1), r = rho / sqrt 2 in 2-D and rho / 2 in 3-D for the boundary.
+TYPED_TEST(RefineTest, VerticesAreNoCloserThanFeaturesAskFor) {
+  constexpr int D = TypeParam::kValue;
+  for (const std::string_view kind : {"uniform", "clusters", "boundary", "lines"}) {
+    SCOPED_TRACE(std::string(kind));
+    RefinementParameters parameters = Defaults<D>();
+    parameters.rho = D == 2 ? 2 : 4;
+    QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, 40));
+    std::vector<Point<D>> features;
+    for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
+      features.push_back(structure.point(VertexId{v}));
+    }
+    ASSERT_TRUE(RefineQuietly<D>(parameters, structure).ok());
+    const double r = D == 2 ? parameters.rho / std::sqrt(2.0) : parameters.rho / 2;
+    const double c = r / (r - 1);
+    for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
+      const double lfs = test::LocalFeatureSize<D>(structure.box(), features, structure.point(VertexId{v}));
+      ASSERT_GE(std::sqrt(test::NearestDistanceSq<D>(structure, VertexId{v})), lfs / (1 + c)) << "vertex " << v;
+    }
+  }
+}
+
+// Guarantee (1): what a bucket adds is no closer to what is there than the bucket's edges allow, as long as nothing is snapped; a
+// projection on up to D faces shortens its empty radius by at most sqrt 2 each.
+TYPED_TEST(RefineTest, NewVerticesAreAsFarApartAsTheBucketSays) {
+  constexpr int D = TypeParam::kValue;
+  for (const std::string_view kind : {"uniform", "clusters", "boundary", "log-uniform"}) {
+    SCOPED_TRACE(std::string(kind));
+    QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, D == 2 ? 40 : 10));
+    const RefinementParameters parameters = Defaults<D>();
+    RunContext context;
+    QueryCounters counters;
+    uint32_t expected = structure.vertex_count();
+    double worst = std::numeric_limits<double>::infinity();
+    const absl::Status status = Refine<D>(parameters, structure, context, counters, [&](const QueryStructure<D>& at) {
+      ASSERT_EQ(at.vertex_count(), ++expected) << "one vertex a step";
+      const double bucket_begins = parameters.min_edge * std::pow(std::sqrt(2.0), context.Snapshot().bucket);
+      const double nearest = std::sqrt(test::NearestDistanceSq<D>(at, VertexId{at.vertex_count() - 1}));
+      worst = std::min(worst, nearest / bucket_begins);
+    });
+    ASSERT_TRUE(status.ok()) << status;
+    EXPECT_GE(worst, std::pow(0.5, 0.5 * D));
+    EXPECT_EQ(context.Snapshot().vertices, structure.vertex_count());
+    EXPECT_GE(counters.queries, structure.vertex_count());
+  }
+}
+
+TYPED_TEST(RefineTest, EndsAtMaxVerticesWithTheStructureUsable) {
+  constexpr int D = TypeParam::kValue;
+  QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", 30));
+  RefinementParameters parameters = Defaults<D>();
+  parameters.max_vertices = structure.vertex_count() + 25;
+  const absl::Status status = RefineQuietly<D>(parameters, structure);
+  EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_THAT(std::string(status.message()), HasSubstr("max_vertices = " + std::to_string(parameters.max_vertices)));
+  ASSERT_EQ(structure.vertex_count(), parameters.max_vertices);
+  Workspace<D> workspace;
+  Polytope<D> slow;
+  for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
+    structure.ClippedVoronoi(VertexId{v}, 10, workspace);
+    test::CutByAllInBox<D>(structure, VertexId{v}, slow);
+    ASSERT_TRUE(test::HaveSameNodes<D>(workspace.cell, slow));
+  }
+  ASSERT_TRUE(RefineQuietly<D>(Defaults<D>(), structure).ok()) << "with a larger budget it goes on";
+  ExpectRefined<D>(structure, VertexId{0}, parameters.rho, slow);
+}
+
+TYPED_TEST(RefineTest, EndsAtTheShortestEdge) {
+  constexpr int D = TypeParam::kValue;
+  QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("clusters", D == 2 ? 100 : 60));
+  RefinementParameters parameters = Defaults<D>();
+  parameters.min_edge = 0.1;
+  const uint32_t inputs = structure.vertex_count();
+  const absl::Status status = RefineQuietly<D>(parameters, structure);
+  EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_THAT(std::string(status.message()), HasSubstr("edge of length"));
+  for (uint32_t v = inputs; v < structure.vertex_count(); ++v) {
+    // Snapped points keep an empty ball that the box's faces bound, never a shorter distance.
+    EXPECT_GE(std::sqrt(test::NearestDistanceSq<D>(structure, VertexId{v})), parameters.min_edge * (1 - 1e-9));
+  }
+  Workspace<D> workspace;
+  structure.Voronoi(VertexId{0}, workspace);
+  EXPECT_TRUE(test::HasEmptyBalls<D>(structure, VertexId{0}, workspace.cell));
+}
+
+TYPED_TEST(RefineTest, CancelFromTheObserverEndsTheRun) {
+  constexpr int D = TypeParam::kValue;
+  for (const bool deadline : {false, true}) {
+    QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", 100));
+    RunContext context;
+    QueryCounters counters;
+    int steps = 0;
+    int steps_after = 0;
+    const absl::Status status = Refine<D>(Defaults<D>(), structure, context, counters, [&](const QueryStructure<D>&) {
+      steps_after += context.IsCancelled() ? 1 : 0;
+      if (++steps == 20) {
+        deadline ? context.ExceedDeadline() : context.Cancel();
+      }
+    });
+    EXPECT_EQ(status.code(), deadline ? absl::StatusCode::kDeadlineExceeded : absl::StatusCode::kCancelled);
+    EXPECT_LE(steps_after, 3) << "only the cell at hand may be finished";
+    ASSERT_TRUE(RefineQuietly<D>(Defaults<D>(), structure).ok()) << "the structure stays usable";
+  }
+}
+
+TYPED_TEST(RefineTest, SnappedPointsAreInTheBoxAndExactlyOnFaces) {
+  constexpr int D = TypeParam::kValue;
+  Box<D> box;
+  for (int k = 0; k < D; ++k) {
+    box.low[k] = -0.3 * (k + 1);
+    box.high[k] = 0.7;
+  }
+  int snapped_often = 0;
+  for (int i = 0; i < 2000; ++i) {
+    SteinerPoint<D> point;
+    for (int k = 0; k < D; ++k) {
+      const double t = this->random_.Below(4) == 0 ? 0.02 * this->random_.Unit() : this->random_.Unit();
+      point.position[k] = box.low[k] + t * (box.high[k] - box.low[k]);
+    }
+    point.empty_radius_sq = std::pow(0.3 * this->random_.Unit(), 2);
+    const SteinerPoint<D> snapped = SnapToBoundary<D>(box, point);
+    ASSERT_TRUE(box.Contains(snapped.position));
+    double moved_sq = 0;
+    int moved = 0;
+    for (int k = 0; k < D; ++k) {
+      const double by = snapped.position[k] - point.position[k];
+      if (by != 0) {
+        ASSERT_TRUE(snapped.position[k] == box.low[k] || snapped.position[k] == box.high[k]);
+        moved_sq += by * by;
+        ++moved;
+      }
+    }
+    snapped_often += moved > 1 ? 1 : 0;
+    ASSERT_NEAR(snapped.empty_radius_sq, point.empty_radius_sq - moved_sq, 1e-12);
+    ASSERT_GE(snapped.empty_radius_sq, point.empty_radius_sq * std::pow(0.5, moved) * (1 - 1e-12));
+    for (int face = 0; face < 2 * D; ++face) {
+      const double distance = box.DistanceToFace(snapped.position, face);
+      ASSERT_TRUE(distance == 0 || distance * distance >= 0.5 * snapped.empty_radius_sq);
+    }
+  }
+  EXPECT_GT(snapped_often, 10);
+}
+
+// Guarantees of OffCenter, for the nodes of cells of many shapes.
+TYPED_TEST(RefineTest, OffCentersAreInTheCellAndFarEnough) {
+  constexpr int D = TypeParam::kValue;
+  int moved = 0;
+  for (const std::string_view kind : {"uniform", "boundary", "clusters", "lines"}) {
+    const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, 30));
+    Polytope<D> cell;
+    for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
+      test::CutByAllInBox<D>(structure, VertexId{v}, cell);
+      for (size_t i = 0; i < cell.nodes().size(); ++i) {
+        for (const uint16_t index : cell.nodes()[i].planes) {
+          const Plane<D>& plane = cell.plane(index);
+          if (plane.kind != PlaneKind::kBisector) {
+            continue;
+          }
+          const double rho = 1 + this->random_.Unit();
+          const double factor = 1 + this->random_.Unit();
+          const auto point = OffCenter<D>(cell, static_cast<int>(i), index, rho, factor);
+          const double radius = std::sqrt(point.empty_radius_sq);
+          const double node_radius = std::sqrt(cell.nodes()[i].radius_sq);
+          const double rounding = 1e-9 + std::min(cell.nodes()[i].slack, 1e-6);
+          ASSERT_GE(radius, std::min(node_radius, rho * plane.length) * (1 - 1e-9));
+          ASSERT_LE(radius, node_radius * (1 + 1e-9));
+          moved += radius < 0.99 * node_radius ? 1 : 0;
+          ASSERT_NEAR(std::sqrt(DistanceSq<D>(point.position, structure.point(VertexId{v}))), radius, rounding);
+          for (uint32_t u = 0; u < structure.vertex_count(); ++u) {
+            ASSERT_GE(std::sqrt(DistanceSq<D>(point.position, structure.point(VertexId{u}))), radius - rounding);
+          }
+        }
+      }
+    }
+  }
+  EXPECT_GT(moved, 20);
+}
+
+// A site in the middle of the unit box, its cell not cut by anything: every node is on foreign faces.
+TYPED_TEST(RefineTest, EncroachmentPointIsTheMeanOfTheFacetsNodes) {
+  constexpr int D = TypeParam::kValue;
+  std::array<PlaneKind, 2 * D> kinds;
+  kinds.fill(PlaneKind::kFace);
+  Point<D> site;
+  site.fill(0.4);
+  Polytope<D> cell;
+  cell.Reset(site, test::UnitBox<D>(), kinds, TieRule::kKeep);
+  for (int face = 0; face < 2 * D; ++face) {
+    const auto point = EncroachmentPoint<D>(cell, face);
+    double distance_sq = 0;
+    for (int k = 0; k < D; ++k) {
+      const double expected = k == face / 2 ? face % 2 : 0.5;
+      EXPECT_DOUBLE_EQ(point.position[k], expected);
+      distance_sq += (expected - 0.4) * (expected - 0.4);
+    }
+    EXPECT_EQ(point.position[face / 2], face % 2) << "exactly on the face";
+    EXPECT_NEAR(point.empty_radius_sq, distance_sq, 1e-15);
+  }
+  const Assessment found = Assess<D>(cell, 0, 1.5, 1);
+  EXPECT_EQ(found.encroached_face % 2, 0) << "the low faces are nearer";
+  EXPECT_LT(found.bad_node, 0);
+  EXPECT_FALSE(found.is_clipped);
+  EXPECT_FALSE(found.IsGood());
+}
+
+// The cell of corner 0 of an empty unit box: a cube of side 1/2, all nodes but the far one on the site's own faces.
+TYPED_TEST(RefineTest, AssessesTheCellOfACorner) {
+  constexpr int D = TypeParam::kValue;
+  const QueryStructure<D> structure = MakeStructure<D>({});
+  Workspace<D> workspace;
+  structure.ClippedVoronoi(VertexId{0}, 10, workspace);
+  const FaceMask faces = structure.faces(VertexId{0});
+  const double far = std::sqrt(0.25 * D);
+
+  const Assessment good = Assess<D>(workspace.cell, faces, far + 1e-9, 100);
+  EXPECT_TRUE(good.IsGood());
+  EXPECT_DOUBLE_EQ(good.radius_sq, 0.25 * D);
+
+  const Assessment bad = Assess<D>(workspace.cell, faces, far - 1e-9, 1);
+  EXPECT_FALSE(bad.IsGood());
+  ASSERT_GE(bad.bad_node, 0);
+  EXPECT_DOUBLE_EQ(workspace.cell.nodes()[bad.bad_node].radius_sq, 0.25 * D);
+  EXPECT_EQ(workspace.cell.plane(bad.bad_plane).length, 1);
+  EXPECT_EQ(bad.next_edge_sq, Assessment::kNone);
+
+  // The same node belongs to an edge that is too long to be looked at now.
+  const Assessment later = Assess<D>(workspace.cell, faces, far - 1e-9, 0.99);
+  EXPECT_LT(later.bad_node, 0);
+  EXPECT_DOUBLE_EQ(later.next_edge_sq, 1);
+  EXPECT_FALSE(later.IsGood());
+
+  // A node on an own face at (1/2, ...) that is too far asks for nothing, but keeps the site from being done for good.
+  const double on_face = std::sqrt(0.25 * (D - 1));
+  EXPECT_EQ(Assess<D>(workspace.cell, faces, on_face - 1e-9, 0.99).radius_sq, Assessment::kNone);
+  EXPECT_DOUBLE_EQ(Assess<D>(workspace.cell, faces, on_face + 1e-9, 0.99).radius_sq, 0.25 * D);
+
+  structure.ClippedVoronoi(VertexId{0}, 0.4, workspace);
+  const Assessment clipped = Assess<D>(workspace.cell, faces, 2, 100);
+  EXPECT_TRUE(clipped.is_clipped);
+  EXPECT_FALSE(clipped.IsGood());
+}
+
+TEST(SteinerPointTest, OffCenterLiesWhereTheNewTriangleJustKeepsRho) {
+  for (const double rho : {1.0, std::sqrt(2.0), 2.0, 3.0}) {
+    // The triangle of v = 0, u = (1, 0) and the point of their bisector at distance T has circumradius T^2 / (2 h).
+    const double distance = OffCenterFactor<2>(rho) * rho;
+    const double radius = distance * distance / (2 * std::sqrt(distance * distance - 0.25));
+    EXPECT_LE(radius, rho);
+    EXPECT_GE(radius, 0.99 * rho);
+  }
+}
+
+// v = 0, u = (1, 0): the bisector x = 1/2, its node at height 5 from (0, 10), 2 from (0, 4).
+TEST(SteinerPointTest, OffCenterByHand) {
+  std::array<PlaneKind, 4> kinds;
+  kinds.fill(PlaneKind::kFace);
+  const auto off_center = [&](std::vector<Point<2>> others, Point<2> at, double rho, double factor) {
+    Polytope<2> cell;
+    cell.Reset({0, 0}, {{-100, -100}, {100, 100}}, kinds, TieRule::kKeep);
+    cell.Cut(VertexId{0}, {1, 0});
+    for (uint32_t i = 0; i < others.size(); ++i) {
+      cell.Cut(VertexId{i + 1}, others[i]);
+    }
+    for (size_t i = 0; i < cell.nodes().size(); ++i) {
+      if (DistanceSq<2>(cell.nodes()[i].x, at) < 1e-12) {
+        return OffCenter<2>(cell, static_cast<int>(i), 4, rho, factor);
+      }
+    }
+    ADD_FAILURE() << "no such node";
+    return SteinerPoint<2>{};
+  };
+  const auto far = off_center({{0, 10}}, {0.5, 5}, 2, 1.25);
+  EXPECT_DOUBLE_EQ(far.position[0], 0.5);
+  EXPECT_DOUBLE_EQ(far.position[1], std::sqrt(6.25 - 0.25));
+  EXPECT_DOUBLE_EQ(far.empty_radius_sq, 6.25);
+
+  const auto circumcenter = off_center({{0, 4}}, {0.5, 2}, 2, 1.25);
+  EXPECT_DOUBLE_EQ(circumcenter.position[1], 2);
+
+  // (1/2, -1/20) cuts the segment off below height 2.475, above the off-centre at sqrt(3.75).
+  const auto stopped = off_center({{0, 10}, {0.5, -0.05}}, {0.5, 5}, 2, 1);
+  EXPECT_DOUBLE_EQ(stopped.position[0], 0.5);
+  EXPECT_NEAR(stopped.position[1], 2.475, 1e-12);
+}
+
+TEST(SteinerPointTest, SnapsByHand) {
+  const Box<2> box = test::UnitBox<2>();
+  const auto snap = [&](Point<2> p, double radius) { return SnapToBoundary<2>(box, {p, radius * radius}); };
+  EXPECT_EQ(snap({0.15, 0.5}, 0.2).position, (Point<2>{0.15, 0.5})) << "farther than 0.2 / sqrt 2";
+  EXPECT_EQ(snap({0.1, 0.5}, 0.2).position, (Point<2>{0, 0.5}));
+  EXPECT_NEAR(snap({0.1, 0.5}, 0.2).empty_radius_sq, 0.03, 1e-15);
+  EXPECT_EQ(snap({0.05, 0.96}, 0.2).position, (Point<2>{0, 1}));
+  EXPECT_NEAR(snap({0.05, 0.96}, 0.2).empty_radius_sq, 0.04 - 0.0016 - 0.0025, 1e-15);
+  EXPECT_EQ(snap({-1e-17, 0.5}, 0.2).position, (Point<2>{0, 0.5})) << "rounded out of the box";
+  EXPECT_EQ(snap({0, 0.5}, 0.4).position, (Point<2>{0, 0.5})) << "on a face already";
+}
+
+TEST(ScheduleTest, BucketsDivideLengthsByTheRatio) {
+  const Schedule schedule(1e-3, 1.5);
+  EXPECT_EQ(schedule.BucketOf(0), 0);
+  EXPECT_EQ(schedule.BucketOf(1e-3), 0);
+  for (int bucket = 0; bucket < 60; ++bucket) {
+    EXPECT_EQ(schedule.BucketOf(schedule.UpperLength(bucket) * (1 - 1e-9)), bucket);
+    EXPECT_EQ(schedule.BucketOf(schedule.UpperLength(bucket) * (1 + 1e-9)), bucket + 1);
+  }
+}
+
+// Invariants, against a model that remembers for each vertex its bucket and when it came there.
+TEST(ScheduleTest, BehavesAsItsModel) {
+  const uint64_t seed = Seed(4711);
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  SplitMix64 random(seed);
+  Schedule schedule(1, 2);
+  std::map<uint32_t, std::pair<int, int>> model;
+  for (int time = 0; time < 20000; ++time) {
+    if (random.Below(5) < 3) {
+      const uint32_t v = static_cast<uint32_t>(random.Below(100));
+      const int bucket = static_cast<int>(random.Below(40));
+      if (random.Below(2) == 0) {
+        schedule.AddToBucket(VertexId{v}, bucket);
+      } else {
+        schedule.Add(VertexId{v}, 1.5 * std::ldexp(1.0, bucket));
+      }
+      if (!model.contains(v) || model[v].first > bucket) {
+        model[v] = {bucket, time};
+      }
+      continue;
+    }
+    const auto next = std::min_element(model.begin(), model.end(), [](const auto& a, const auto& b) {
+      return a.second.first != b.second.first ? a.second.first < b.second.first : a.second.second > b.second.second;
+    });
+    VertexId v{};
+    int bucket = -1;
+    ASSERT_EQ(schedule.Pop(v, bucket), next != model.end());
+    if (next != model.end()) {
+      ASSERT_EQ(Index(v), next->first);
+      ASSERT_EQ(bucket, next->second.first);
+      model.erase(next);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace wellspace::core

@@ -1,0 +1,497 @@
+// The tree against its definition, by a look at all pairs of leaves.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/geometry/exact_measure.h"
+#include "core/tree/leaf_tree.h"
+#include "core/tree/morton.h"
+#include "tests/support/brute_force.h"
+#include "tests/support/clouds.h"
+
+namespace wellspace::core {
+namespace {
+
+using test::MortonSorted;
+using test::Seed;
+using test::SplitMix64;
+using ::testing::HasSubstr;
+
+constexpr uint64_t kManyLeaves = 1'000'000;
+
+template <int D>
+LeafTree<D> BuildTree(const Box<D>& box, const std::vector<Point<D>>& points) {
+  RunContext context;
+  LeafTree<D> tree;
+  const absl::Status built = tree.Build(box, points, kManyLeaves, context);
+  EXPECT_TRUE(built.ok()) << built;
+  return tree;
+}
+
+template <int D>
+std::vector<NodeId> LeavesOf(const LeafTree<D>& tree) {
+  std::vector<NodeId> leaves;
+  tree.ForEachLeaf([&](NodeId leaf) { leaves.push_back(leaf); });
+  return leaves;
+}
+
+template <int D>
+double SideOf(const Box<D>& cube) {
+  return cube.high[0] - cube.low[0];
+}
+
+// The part of a cube in the box; empty where low >= high on some axis.
+template <int D>
+Box<D> Clipped(Box<D> cube, const Box<D>& box) {
+  for (int k = 0; k < D; ++k) {
+    cube.low[k] = std::max(cube.low[k], box.low[k]);
+    cube.high[k] = std::min(cube.high[k], box.high[k]);
+  }
+  return cube;
+}
+
+template <int D>
+bool HasInterior(const Box<D>& box) {
+  for (int k = 0; k < D; ++k) {
+    if (!(box.low[k] < box.high[k])) {
+      return false;
+    }
+  }
+  return true;
+}
+
+// On how many axes two boxes overlap, and on how many they merely touch.
+struct Contact {
+  int overlaps = 0;
+  int touches = 0;
+};
+
+template <int D>
+Contact ContactOf(const Box<D>& a, const Box<D>& b) {
+  Contact contact;
+  for (int k = 0; k < D; ++k) {
+    const double low = std::max(a.low[k], b.low[k]);
+    const double high = std::min(a.high[k], b.high[k]);
+    contact.overlaps += low < high ? 1 : 0;
+    contact.touches += low == high ? 1 : 0;
+  }
+  return contact;
+}
+
+// The leaves are cubes of the grid; they cover the box and do not overlap; invariants (2) and (5).
+template <int D>
+void ExpectBalancedPartition(const LeafTree<D>& tree, const Box<D>& box) {
+  const MortonGrid<D> grid(box);
+  const std::vector<NodeId> leaves = LeavesOf<D>(tree);
+  ASSERT_EQ(leaves.size(), tree.leaf_count());
+  ASSERT_EQ(leaves.size(), static_cast<size_t>(std::count_if(leaves.begin(), leaves.end(),
+                                                             [&](NodeId leaf) { return tree.IsLeaf(leaf); })));
+  std::vector<Box<D>> cubes;
+  ExactVolumeSum<D> uncovered;
+  Box<D> negative = box;
+  std::swap(negative.low[0], negative.high[0]);
+  uncovered.Subtract(negative);
+  for (const NodeId leaf : leaves) {
+    const Box<D> cube = tree.BoxOf(leaf);
+    cubes.push_back(cube);
+    for (int k = 0; k < D; ++k) {
+      ASSERT_EQ(cube.high[k] - cube.low[k], std::ldexp(grid.root_side(), -tree.level(leaf)));
+      ASSERT_EQ(std::remainder(cube.low[k] - grid.root_low()[k], SideOf<D>(cube)), 0);
+    }
+    ASSERT_TRUE(HasInterior<D>(Clipped<D>(cube, box))) << "a leaf outside the box";
+    uncovered.Subtract(Clipped<D>(cube, box));
+  }
+  EXPECT_EQ(uncovered.sign(), Sign::kZero) << uncovered.value() << " of the box is not covered, or covered twice";
+
+  for (size_t i = 0; i < leaves.size(); ++i) {
+    std::set<uint32_t> expected;
+    for (size_t j = 0; j < leaves.size(); ++j) {
+      const Contact contact = ContactOf<D>(cubes[i], cubes[j]);
+      if (i == j || contact.overlaps + contact.touches < D) {
+        continue;
+      }
+      ASSERT_GT(contact.touches, 0) << "leaves " << Index(leaves[i]) << " and " << Index(leaves[j]) << " overlap";
+      ASSERT_LE(std::abs(tree.level(leaves[i]) - tree.level(leaves[j])), 1) << "unbalanced";
+      if (contact.touches == 1) {
+        expected.insert(Index(leaves[j]));
+      }
+    }
+    std::set<uint32_t> found;
+    tree.ForEachFaceNeighbour(
+        leaves[i], [&](NodeId beyond) { ASSERT_TRUE(found.insert(Index(beyond)).second) << "a neighbour twice"; });
+    ASSERT_EQ(found, expected) << "of leaf " << Index(leaves[i]);
+  }
+}
+
+// Invariants (1) and (4); every vertex is where leaf_of says, and nowhere else.
+template <int D>
+void ExpectVerticesInPlace(const LeafTree<D>& tree, const std::vector<Point<D>>& points) {
+  ASSERT_EQ(tree.vertex_count(), points.size());
+  size_t held = 0;
+  for (const NodeId leaf : LeavesOf<D>(tree)) {
+    const auto* bucket = tree.BucketOf(leaf);
+    if (bucket == nullptr) {
+      continue;
+    }
+    ASSERT_LE(bucket->count, static_cast<uint32_t>(LeafTree<D>::kLeafCapacity));
+    held += bucket->count;
+    for (uint32_t i = 0; i < bucket->count; ++i) {
+      ASSERT_LT(Index(bucket->ids[i]), points.size());
+      ASSERT_EQ(tree.leaf_of(bucket->ids[i]), leaf);
+      ASSERT_EQ(bucket->positions[i], points[Index(bucket->ids[i])]);
+      ASSERT_TRUE(tree.BoxOf(leaf).Contains(bucket->positions[i]));
+    }
+  }
+  EXPECT_EQ(held, points.size());
+}
+
+// Invariant (3), lower bound: sampled at the corners of a leaf, inside, and where points are nearest to it.
+template <int D>
+void ExpectLeavesNoCoarserThanFeatures(const LeafTree<D>& tree, const Box<D>& box, const std::vector<Point<D>>& points,
+                                       SplitMix64& random) {
+  const int grid_levels = MortonGrid<D>(box).levels();
+  for (const NodeId leaf : LeavesOf<D>(tree)) {
+    const Box<D> cube = Clipped<D>(tree.BoxOf(leaf), box);
+    const double least = SideOf<D>(tree.BoxOf(leaf)) / (2 * LeafTree<D>::kCoarseness);
+    if (tree.level(leaf) == grid_levels) {
+      continue;
+    }
+    ASSERT_LE(SideOf<D>(tree.BoxOf(leaf)), box.ShortestSide());
+    std::vector<Point<D>> samples;
+    for (int i = 0; i < 8 + (1 << D); ++i) {
+      Point<D> x;
+      for (int k = 0; k < D; ++k) {
+        const double t = i < (1 << D) ? (i >> k) & 1 : random.Unit();
+        x[k] = std::clamp(cube.low[k] + t * (cube.high[k] - cube.low[k]), cube.low[k], cube.high[k]);
+      }
+      samples.push_back(x);
+    }
+    for (Point<D> p : points) {
+      if (DistanceSq<D>(p, cube) <= least * least) {
+        for (int k = 0; k < D; ++k) {
+          p[k] = std::clamp(p[k], cube.low[k], cube.high[k]);
+        }
+        samples.push_back(p);
+      }
+    }
+    for (const Point<D>& x : samples) {
+      ASSERT_GE(test::LocalFeatureSize<D>(box, points, x), least * (1 - 1e-12))
+          << "in leaf " << Index(leaf) << " at " << ::testing::PrintToString(x);
+    }
+  }
+}
+
+// Whether two features are near enough to the cube and each other for it to be too coarse.
+template <int D>
+bool AreFeaturesNear(const Box<D>& cube, const Box<D>& box, const std::vector<Point<D>>& points) {
+  const double reach = SideOf<D>(cube) / LeafTree<D>::kCoarseness * (1 + 1e-12);
+  for (size_t i = 0; i < points.size(); ++i) {
+    if (DistanceSq<D>(points[i], cube) > reach * reach) {
+      continue;
+    }
+    for (int face = 0; face < 2 * D; ++face) {
+      if (((box.FacesOf(points[i]) >> face) & 1) == 0 && box.DistanceToFace(points[i], face) <= 2 * reach) {
+        return true;
+      }
+    }
+    for (size_t j = 0; j < i; ++j) {
+      if (DistanceSq<D>(points[j], cube) <= reach * reach && DistanceSq<D>(points[i], points[j]) <= 4 * reach * reach) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+// Invariant (3), upper bound: every inner node had a reason to be split.
+template <int D>
+void ExpectEverySplitHasAReason(const LeafTree<D>& tree, const Box<D>& box, const std::vector<Point<D>>& points) {
+  std::vector<NodeId> inner;
+  for (uint32_t i = 0; i < tree.node_count(); ++i) {
+    if (!tree.IsLeaf(NodeId{i}) && HasInterior<D>(Clipped<D>(tree.BoxOf(NodeId{i}), box))) {
+      inner.push_back(NodeId{i});
+    }
+  }
+  for (const NodeId node : inner) {
+    const Box<D> cube = tree.BoxOf(node);
+    const auto held = std::count_if(points.begin(), points.end(), [&](const Point<D>& p) { return cube.Contains(p); });
+    const auto is_smaller_beside = [&](NodeId other) {
+      const Contact contact = ContactOf<D>(tree.BoxOf(other), cube);
+      return tree.level(other) == tree.level(node) + 1 && contact.touches > 0 &&
+             contact.overlaps + contact.touches == D;
+    };
+    ASSERT_TRUE(SideOf<D>(cube) > box.ShortestSide() || held > LeafTree<D>::kLeafCapacity ||
+                AreFeaturesNear<D>(cube, box, points) || std::any_of(inner.begin(), inner.end(), is_smaller_beside))
+        << "node " << Index(node) << " on level " << tree.level(node) << " was split for nothing";
+  }
+}
+
+template <int D>
+void ExpectInvariants(const LeafTree<D>& tree, const Box<D>& box, const std::vector<Point<D>>& points) {
+  ExpectBalancedPartition<D>(tree, box);
+  ExpectVerticesInPlace<D>(tree, points);
+}
+
+template <int D>
+void ExpectBuildInvariants(const Box<D>& box, const std::vector<Point<D>>& points, SplitMix64& random) {
+  const LeafTree<D> tree = BuildTree<D>(box, points);
+  ExpectInvariants<D>(tree, box, points);
+  ExpectLeavesNoCoarserThanFeatures<D>(tree, box, points, random);
+  ExpectEverySplitHasAReason<D>(tree, box, points);
+}
+
+// A box, and how points of the unit box are brought there: the faces on the faces exactly.
+template <int D>
+Box<D> MakeBox(double low, const Point<D>& sides) {
+  Box<D> box;
+  for (int k = 0; k < D; ++k) {
+    box.low[k] = low;
+    box.high[k] = low + sides[k];
+  }
+  return box;
+}
+
+template <int D>
+std::vector<Point<D>> Stretched(std::vector<Point<D>> points, const Box<D>& box) {
+  for (Point<D>& p : points) {
+    for (int k = 0; k < D; ++k) {
+      p[k] = p[k] == 1 ? box.high[k] : std::min(box.low[k] + p[k] * (box.high[k] - box.low[k]), box.high[k]);
+    }
+  }
+  return points;
+}
+
+template <int D>
+std::vector<Box<D>> Boxes() {
+  Point<D> cube;
+  cube.fill(1);
+  Point<D> odd = cube;
+  odd[0] = 0.7;
+  odd[D - 1] = 1.3;
+  Point<D> elongated;
+  elongated.fill(1e-3);
+  elongated[0] = 1;
+  Point<D> exact = cube;
+  exact[D - 1] = 0x1p-3;
+  return {MakeBox<D>(0, cube), MakeBox<D>(-0.3, odd), MakeBox<D>(1e6, cube), MakeBox<D>(12.3, elongated),
+          MakeBox<D>(-1, exact)};
+}
+
+template <typename T>
+class TreeTest : public ::testing::Test {
+ protected:
+  TreeTest() : trace_(__FILE__, __LINE__, "seed " + std::to_string(seed_)) {}
+
+  const uint64_t seed_ = Seed(1990);
+  SplitMix64 random_{seed_};
+  ::testing::ScopedTrace trace_;
+};
+TYPED_TEST_SUITE(TreeTest, test::Dimensions);
+
+TYPED_TEST(TreeTest, EmptyCloudGivesLeavesNoLongerThanTheBox) {
+  constexpr int D = TypeParam::kValue;
+  for (const Box<D>& box : Boxes<D>()) {
+    SCOPED_TRACE(::testing::PrintToString(box.low) + ::testing::PrintToString(box.high));
+    ExpectBuildInvariants<D>(box, {}, this->random_);
+  }
+}
+
+TYPED_TEST(TreeTest, BuildKeepsTheInvariantsOnEveryKindOfCloud) {
+  constexpr int D = TypeParam::kValue;
+  for (const std::string_view kind : test::AllKinds()) {
+    SCOPED_TRACE(std::string(kind));
+    ExpectBuildInvariants<D>(test::UnitBox<D>(), test::SortedCloud<D>(kind, D == 2 ? 60 : 14), this->random_);
+  }
+}
+
+TYPED_TEST(TreeTest, BuildKeepsTheInvariantsInEveryBox) {
+  constexpr int D = TypeParam::kValue;
+  for (const Box<D>& box : Boxes<D>()) {
+    SCOPED_TRACE(::testing::PrintToString(box.low) + ::testing::PrintToString(box.high));
+    for (const std::string_view kind : {"boundary", "uniform"}) {
+      const auto cloud = test::ToPoints<D>(test::MakeCloud(kind, D, D == 2 ? 40 : 10));
+      ExpectBuildInvariants<D>(box, MortonSorted<D>(box, Stretched<D>(cloud, box)), this->random_);
+    }
+  }
+}
+
+TYPED_TEST(TreeTest, CrowdedLeavesAreSplit) {
+  constexpr int D = TypeParam::kValue;
+  ExpectBuildInvariants<D>(test::UnitBox<D>(), test::SortedCloud<D>("grid", D == 2 ? 400 : 125), this->random_);
+}
+
+// Points where leaves meet: in the middle, on faces, edges and corners, the high ones too.
+TYPED_TEST(TreeTest, PointsBetweenLeavesBelongToOne) {
+  constexpr int D = TypeParam::kValue;
+  std::vector<Point<D>> points;
+  const int steps = D == 2 ? 8 : 2;
+  const int count = D == 2 ? (steps + 1) * (steps + 1) : (steps + 1) * (steps + 1) * (steps + 1);
+  for (int i = 0; i < count; ++i) {
+    Point<D> p;
+    for (int k = 0, rest = i; k < D; ++k, rest /= steps + 1) {
+      p[k] = static_cast<double>(rest % (steps + 1)) / steps;
+    }
+    points.push_back(p);
+  }
+  ExpectBuildInvariants<D>(test::UnitBox<D>(), MortonSorted<D>(test::UnitBox<D>(), points), this->random_);
+}
+
+// Points draw nearer to one place, so that leaf after leaf is split, and larger ones beside them for balance.
+TYPED_TEST(TreeTest, InsertKeepsTheInvariants) {
+  constexpr int D = TypeParam::kValue;
+  uint64_t new_leaves = 0;
+  for (const Box<D>& box : Boxes<D>()) {
+    SCOPED_TRACE(::testing::PrintToString(box.low) + ::testing::PrintToString(box.high));
+    std::vector<Point<D>> points =
+        MortonSorted<D>(box, Stretched<D>(test::ToPoints<D>(test::MakeCloud("boundary", D, D == 2 ? 30 : 8)), box));
+    LeafTree<D> tree = BuildTree<D>(box, points);
+    const MortonGrid<D> grid(box);
+    std::set<GridPoint<D>> taken;
+    for (const Point<D>& p : points) {
+      taken.insert(grid.CubeOf(p));
+    }
+    const uint64_t leaves = tree.leaf_count();
+    Point<D> center;
+    for (double& x : center) {
+      x = this->random_.Below(3) == 0 ? 1 : this->random_.Unit();
+    }
+    const size_t inserts = D == 2 ? 200 : 120;
+    for (size_t i = 0; i < inserts; ++i) {
+      const double radius = std::pow(10.0, -3.0 * static_cast<double>(i) / static_cast<double>(inserts));
+      Point<D> p;
+      for (int k = 0; k < D; ++k) {
+        p[k] = std::clamp(center[k] + radius * (2 * this->random_.Unit() - 1), 0.0, 1.0);
+      }
+      p = Stretched<D>({p}, box)[0];
+      if (!taken.insert(grid.CubeOf(p)).second) {
+        continue;  // clamped to where one is already
+      }
+      const VertexId v{tree.vertex_count()};
+      const VertexId near = Index(v) == 0 || i % 5 == 0 ? kNoVertex : VertexId(this->random_.Below(Index(v)));
+      tree.Insert(near, v, p);
+      points.push_back(p);
+      ASSERT_EQ(tree.vertex_count(), points.size());
+    }
+    new_leaves += tree.leaf_count() - leaves;
+    ExpectInvariants<D>(tree, box, points);
+  }
+  EXPECT_GT(new_leaves, 20u);
+}
+
+// From wherever the walk starts, it ends in the same leaf.
+TYPED_TEST(TreeTest, InsertFindsTheLeafFromAnywhere) {
+  constexpr int D = TypeParam::kValue;
+  const std::vector<Point<D>> points = test::SortedCloud<D>("boundary", 30);
+  const LeafTree<D> built = BuildTree<D>(test::UnitBox<D>(), points);
+  const VertexId v{built.vertex_count()};
+  for (int i = 0; i < 40; ++i) {
+    Point<D> p;
+    for (double& x : p) {
+      const uint64_t place = this->random_.Below(4);
+      x = place == 0 ? 0 : place == 1 ? 1 : place == 2 ? 0.5 : this->random_.Unit();
+    }
+    LeafTree<D> from_root = built;
+    from_root.Insert(kNoVertex, v, p);
+    for (int start = 0; start < 5; ++start) {
+      LeafTree<D> tree = built;
+      tree.Insert(VertexId(this->random_.Below(points.size())), v, p);
+      ASSERT_EQ(tree.leaf_of(v), from_root.leaf_of(v)) << ::testing::PrintToString(p);
+    }
+  }
+}
+
+TYPED_TEST(TreeTest, BuildAnewForgetsTheOldTree) {
+  constexpr int D = TypeParam::kValue;
+  LeafTree<D> tree = BuildTree<D>(test::UnitBox<D>(), test::SortedCloud<D>("uniform", 50));
+  const std::vector<Point<D>> points = test::SortedCloud<D>("boundary", 20);
+  RunContext context;
+  ASSERT_TRUE(tree.Build(test::UnitBox<D>(), points, kManyLeaves, context).ok());
+  ExpectInvariants<D>(tree, test::UnitBox<D>(), points);
+}
+
+TYPED_TEST(TreeTest, BuildEndsAtItsBudget) {
+  constexpr int D = TypeParam::kValue;
+  const std::vector<Point<D>> points = test::SortedCloud<D>("uniform", 100);
+  RunContext context;
+  const uint64_t needed = BuildTree<D>(test::UnitBox<D>(), points).leaf_count();
+  LeafTree<D> tree;
+  EXPECT_TRUE(tree.Build(test::UnitBox<D>(), points, needed, context).ok());
+  const absl::Status refused = tree.Build(test::UnitBox<D>(), points, needed - 1, context);
+  EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_THAT(std::string(refused.message()), HasSubstr("more than " + std::to_string(needed - 1) + " leaves"));
+}
+
+TYPED_TEST(TreeTest, BuildCanBeCancelled) {
+  constexpr int D = TypeParam::kValue;
+  const std::vector<Point<D>> points = test::SortedCloud<D>("uniform", 2000);
+  LeafTree<D> tree;
+  RunContext cancelled;
+  cancelled.Cancel();
+  EXPECT_EQ(tree.Build(test::UnitBox<D>(), points, kManyLeaves, cancelled).code(), absl::StatusCode::kCancelled);
+  RunContext late;
+  late.ExceedDeadline();
+  EXPECT_EQ(tree.Build(test::UnitBox<D>(), points, kManyLeaves, late).code(), absl::StatusCode::kDeadlineExceeded);
+}
+
+// Invariants of MortonGrid.
+TYPED_TEST(TreeTest, GridHoldsTheBoxInExactCubes) {
+  constexpr int D = TypeParam::kValue;
+  for (const Box<D>& box : Boxes<D>()) {
+    const MortonGrid<D> grid(box);
+    EXPECT_EQ(grid.root_side(), std::ldexp(grid.quantum(), grid.levels()));
+    for (int k = 0; k < D; ++k) {
+      EXPECT_LE(grid.root_low()[k], box.low[k]);
+      EXPECT_GE(grid.root_low()[k] + grid.root_side(), box.high[k]);
+    }
+    for (int i = 0; i < 200; ++i) {
+      Point<D> p;
+      for (int k = 0; k < D; ++k) {
+        p[k] = std::min(box.low[k] + this->random_.Unit() * (box.high[k] - box.low[k]), box.high[k]);
+      }
+      const GridPoint<D> cube = grid.CubeOf(p);
+      for (int k = 0; k < D; ++k) {
+        const double low = grid.root_low()[k] + static_cast<double>(cube[k]) * grid.quantum();
+        EXPECT_LE(low, p[k]);
+        EXPECT_GE(low + grid.quantum(), p[k]);
+      }
+    }
+    for (const uint64_t last : grid.CubeOf(box.high)) {
+      EXPECT_LT(last, uint64_t{1} << grid.levels());
+    }
+  }
+}
+
+// The Z order by its definition: the bits of all axes interleaved, axis D - 1 first.
+TYPED_TEST(TreeTest, MortonOrderIsThatOfInterleavedBits) {
+  constexpr int D = TypeParam::kValue;
+  const auto interleaved = [](const GridPoint<D>& p) {
+    std::vector<uint64_t> bits;
+    for (int bit = 51; bit >= 0; --bit) {
+      for (int k = D - 1; k >= 0; --k) {
+        bits.push_back(p[k] >> bit & 1);
+      }
+    }
+    return bits;
+  };
+  for (int i = 0; i < 500; ++i) {
+    GridPoint<D> a;
+    GridPoint<D> b;
+    for (int k = 0; k < D; ++k) {
+      a[k] = this->random_.Next() >> (12 + this->random_.Below(52));
+      b[k] = this->random_.Below(2) == 0 ? a[k] : this->random_.Next() >> (12 + this->random_.Below(52));
+    }
+    EXPECT_EQ(MortonLess<D>(a, b), interleaved(a) < interleaved(b))
+        << ::testing::PrintToString(a) << ::testing::PrintToString(b);
+  }
+}
+
+}  // namespace
+}  // namespace wellspace::core

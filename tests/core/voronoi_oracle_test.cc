@@ -1,0 +1,280 @@
+// Queries against a look at every vertex, at many stages of refinement and on degenerate clouds.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/refine/refine.h"
+#include "core/voronoi/query_structure.h"
+#include "tests/support/brute_force.h"
+#include "tests/support/clouds.h"
+
+namespace wellspace::core {
+namespace {
+
+using test::CutByAll;
+using test::HasEmptyBalls;
+using test::HaveSameNodes;
+using test::IsSimplePolytope;
+using test::NamesOf;
+using test::Seed;
+using test::SplitMix64;
+
+constexpr uint64_t kManyLeaves = 1'000'000;
+
+template <int D>
+QueryStructure<D> MakeStructure(const Box<D>& box, std::vector<Point<D>> points) {
+  RunContext context;
+  QueryStructure<D> structure;
+  const absl::Status made = structure.Initialize(box, std::move(points), kManyLeaves, context);
+  EXPECT_TRUE(made.ok()) << made;
+  return structure;
+}
+
+// The cube that ClippedVoronoi clips by.
+template <int D>
+struct ClipCube {
+  ClipCube(const QueryStructure<D>& structure, VertexId v, double radius) : bounds(structure.box()) {
+    kinds.fill(PlaneKind::kFace);
+    for (int face = 0; face < 2 * D; ++face) {
+      const double at = structure.point(v)[face / 2] + (face % 2 == 0 ? -radius : radius);
+      double& bound = face % 2 == 0 ? bounds.low[face / 2] : bounds.high[face / 2];
+      if (face % 2 == 0 ? at > bound : at < bound) {
+        bound = at;
+        kinds[face] = PlaneKind::kClip;
+      }
+    }
+  }
+
+  Box<D> bounds;
+  std::array<PlaneKind, 2 * D> kinds;
+};
+
+// Walls one longest side of the box beyond it, as Voronoi has them.
+template <int D>
+Box<D> WallsAround(Box<D> box) {
+  const double side = box.LongestSide();
+  for (int k = 0; k < D; ++k) {
+    box.low[k] -= side;
+    box.high[k] += side;
+  }
+  return box;
+}
+
+template <int D>
+class QueryChecker {
+ public:
+  explicit QueryChecker(SplitMix64& random) : random_(random) {}
+
+  void CheckAll(const QueryStructure<D>& structure, VertexId v) {
+    SCOPED_TRACE("vertex " + std::to_string(Index(v)) + " of " + std::to_string(structure.vertex_count()));
+    const double nearest_sq = test::NearestDistanceSq<D>(structure, v);
+    const Neighbor found = structure.NearestNeighbor(v, fast_);
+    ASSERT_EQ(found.distance_sq, nearest_sq);
+    ASSERT_NE(found.vertex, v);
+    ASSERT_EQ(DistanceSq<D>(structure.point(found.vertex), structure.point(v)), nearest_sq);
+    for (const double factor : {0.4, 1.0, 4.0, 1e3}) {
+      CheckClipped(structure, v, factor * std::sqrt(nearest_sq) * (0.75 + 0.5 * random_.Unit()));
+    }
+    CheckWhole(structure, v);
+  }
+
+ private:
+  void CheckClipped(const QueryStructure<D>& structure, VertexId v, double radius) {
+    SCOPED_TRACE("clipped at " + std::to_string(radius));
+    structure.ClippedVoronoi(v, radius, fast_);
+    ASSERT_TRUE(IsSimplePolytope<D>(fast_.cell));
+    ASSERT_TRUE(HasEmptyBalls<D>(structure, v, fast_.cell));
+    const ClipCube<D> cube(structure, v, radius);
+    for (int face = 0; face < 2 * D; ++face) {
+      ASSERT_EQ(fast_.cell.plane(face).kind, cube.kinds[face]);
+      ASSERT_EQ(fast_.cell.plane(face).source.coordinate, cube.bounds.FaceCoordinate(face));
+    }
+    CutByAll<D>(structure, v, cube.bounds, cube.kinds, TieRule::kKeep, random_.Next(), slow_);
+    ASSERT_TRUE(HaveSameNodes<D>(fast_.cell, slow_));
+  }
+
+  // The perturbation leaves no choice, so the cells agree plane by plane.
+  void CheckWhole(const QueryStructure<D>& structure, VertexId v) {
+    structure.Voronoi(v, fast_);
+    ASSERT_TRUE(IsSimplePolytope<D>(fast_.cell));
+    ASSERT_TRUE(HasEmptyBalls<D>(structure, v, fast_.cell));
+    std::array<PlaneKind, 2 * D> kinds;
+    kinds.fill(PlaneKind::kClip);
+    CutByAll<D>(structure, v, WallsAround<D>(structure.box()), kinds, TieRule::kPerturb, random_.Next(), slow_);
+    ASSERT_EQ(NamesOf<D>(fast_.cell), NamesOf<D>(slow_));
+  }
+
+  SplitMix64& random_;
+  Workspace<D> fast_;
+  Polytope<D> slow_;
+};
+
+template <typename T>
+class VoronoiOracleTest : public ::testing::Test {
+ protected:
+  VoronoiOracleTest() : trace_(__FILE__, __LINE__, "seed " + std::to_string(seed_)) {}
+
+  const uint64_t seed_ = Seed(1908);
+  SplitMix64 random_{seed_};
+  ::testing::ScopedTrace trace_;
+};
+TYPED_TEST_SUITE(VoronoiOracleTest, test::Dimensions);
+
+TYPED_TEST(VoronoiOracleTest, InitializeAddsTheCornersThatAreMissing) {
+  constexpr int D = TypeParam::kValue;
+  Point<D> high;
+  high.fill(1);
+  Point<D> on_face;
+  on_face.fill(0.25);
+  on_face[0] = 1;
+  const QueryStructure<D> structure = MakeStructure<D>(test::UnitBox<D>(), {on_face, high});
+  ASSERT_EQ(structure.vertex_count(), 1u + (1u << D));
+  EXPECT_EQ(structure.point(VertexId{0}), on_face);
+  EXPECT_EQ(structure.point(VertexId{1}), high);
+  for (int corner = 0; corner < (1 << D) - 1; ++corner) {
+    const VertexId v{2 + static_cast<uint32_t>(corner)};
+    for (int k = 0; k < D; ++k) {
+      EXPECT_EQ(structure.point(v)[k], (corner >> k) & 1);
+    }
+    EXPECT_EQ(structure.faces(v), CornerFaces<D>(corner));
+  }
+  EXPECT_EQ(structure.faces(VertexId{0}), 1u << FaceIndex(0, true));
+}
+
+// Before any refinement queries may take long, but are as exact.
+TYPED_TEST(VoronoiOracleTest, QueriesAreExactOnEveryKindOfCloud) {
+  constexpr int D = TypeParam::kValue;
+  for (const std::string_view kind : test::AllKinds()) {
+    SCOPED_TRACE(std::string(kind));
+    const QueryStructure<D> structure =
+        MakeStructure<D>(test::UnitBox<D>(), test::SortedCloud<D>(kind, D == 2 ? 60 : 30));
+    QueryChecker<D> checker(this->random_);
+    for (int i = 0; i < 6; ++i) {
+      checker.CheckAll(structure, VertexId(this->random_.Below(structure.vertex_count())));
+      ASSERT_FALSE(this->HasFatalFailure());
+    }
+  }
+}
+
+TYPED_TEST(VoronoiOracleTest, QueriesAreExactInElongatedAndOffsetBoxes) {
+  constexpr int D = TypeParam::kValue;
+  for (const double low : {0.0, -0.3, 1e5}) {
+    Box<D> box;
+    for (int k = 0; k < D; ++k) {
+      box.low[k] = low;
+      box.high[k] = low + (k == 0 ? 30 : 0.9);
+    }
+    std::vector<Point<D>> points = test::ToPoints<D>(test::MakeCloud("boundary", D, 40));
+    for (Point<D>& p : points) {
+      for (int k = 0; k < D; ++k) {
+        p[k] = p[k] == 1 ? box.high[k] : box.low[k] + p[k] * (box.high[k] - box.low[k]);
+      }
+    }
+    const QueryStructure<D> structure = MakeStructure<D>(box, test::MortonSorted<D>(box, points));
+    QueryChecker<D> checker(this->random_);
+    for (int i = 0; i < 10; ++i) {
+      checker.CheckAll(structure, VertexId(this->random_.Below(structure.vertex_count())));
+      ASSERT_FALSE(this->HasFatalFailure());
+    }
+  }
+}
+
+TYPED_TEST(VoronoiOracleTest, QueriesAreExactAtEveryStageOfRefinement) {
+  constexpr int D = TypeParam::kValue;
+  uint32_t steps = 0;
+  for (const std::string_view kind : {"uniform", "cospherical", "boundary", "lines", "log-uniform"}) {
+    SCOPED_TRACE(std::string(kind));
+    QueryStructure<D> structure = MakeStructure<D>(test::UnitBox<D>(), test::SortedCloud<D>(kind, D == 2 ? 60 : 16));
+    QueryChecker<D> checker(this->random_);
+    RunContext context;
+    QueryCounters counters;
+    const RefinementObserver<D> observer = [&](const QueryStructure<D>& at) {
+      if (steps++ % 30 == 0 && !this->HasFatalFailure()) {
+        checker.CheckAll(at, VertexId(this->random_.Below(at.vertex_count())));
+        checker.CheckAll(at, VertexId{at.vertex_count() - 1});
+      }
+    };
+    const RefinementParameters parameters{.rho = 2, .max_vertices = 600, .min_edge = 1e-9};
+    const absl::Status status = Refine<D>(parameters, structure, context, counters, observer);
+    EXPECT_TRUE(status.ok() || status.code() == absl::StatusCode::kResourceExhausted) << status;
+    ASSERT_FALSE(this->HasFatalFailure());
+  }
+  EXPECT_GT(steps, 300u);
+}
+
+// Guarantee (1) of Voronoi: u's cell has v for a neighbour in just the nodes where v's has u.
+TYPED_TEST(VoronoiOracleTest, CellsOfDifferentSitesAgree) {
+  constexpr int D = TypeParam::kValue;
+  for (const std::string_view kind : {"grid", "cospherical", "boundary", "rounded", "uniform"}) {
+    SCOPED_TRACE(std::string(kind));
+    const QueryStructure<D> structure = MakeStructure<D>(test::UnitBox<D>(), test::SortedCloud<D>(kind, 60));
+    std::map<std::vector<uint32_t>, int> seen;  // simplices, and from how many of their corners
+    Workspace<D> workspace;
+    for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
+      structure.Voronoi(VertexId{v}, workspace);
+      for (const CellNode<D>& node : workspace.cell.nodes()) {
+        std::vector<uint32_t> corners = {v};
+        for (const uint16_t index : node.planes) {
+          const Plane<D>& plane = workspace.cell.plane(index);
+          if (plane.kind == PlaneKind::kBisector) {
+            corners.push_back(Index(plane.vertex));
+          }
+        }
+        if (corners.size() == D + 1) {
+          std::sort(corners.begin(), corners.end());
+          ++seen[corners];
+        }
+      }
+    }
+    EXPECT_GT(seen.size(), structure.vertex_count());
+    for (const auto& [corners, count] : seen) {
+      ASSERT_EQ(count, D + 1) << ::testing::PrintToString(corners);
+    }
+  }
+}
+
+// One workspace serves structures of any size, one after the other.
+TYPED_TEST(VoronoiOracleTest, WorkspaceKeepsNothingFromTheLastQuery) {
+  constexpr int D = TypeParam::kValue;
+  const QueryStructure<D> large = MakeStructure<D>(test::UnitBox<D>(), test::SortedCloud<D>("uniform", 100));
+  const QueryStructure<D> small = MakeStructure<D>(test::UnitBox<D>(), test::SortedCloud<D>("uniform", 10));
+  Workspace<D> used;
+  for (int i = 0; i < 20; ++i) {
+    for (const QueryStructure<D>* structure : {&large, &small}) {
+      const VertexId v = VertexId(this->random_.Below(structure->vertex_count()));
+      structure->Voronoi(v, used);
+      Workspace<D> fresh;
+      structure->Voronoi(v, fresh);
+      ASSERT_EQ(NamesOf<D>(used.cell), NamesOf<D>(fresh.cell));
+      ASSERT_EQ(used.counters.queries, 2u * i + (structure == &large ? 1 : 2));
+    }
+  }
+}
+
+TYPED_TEST(VoronoiOracleTest, CountersCountWhatQueriesDo) {
+  constexpr int D = TypeParam::kValue;
+  const QueryStructure<D> structure = MakeStructure<D>(test::UnitBox<D>(), {});
+  Workspace<D> workspace;
+  // The corners of the unit box: the cell of one is the box of half the side about it, cut by D others; leaves are few.
+  structure.ClippedVoronoi(VertexId{0}, 10, workspace);
+  EXPECT_EQ(workspace.counters.queries, 1u);
+  EXPECT_EQ(workspace.counters.cuts, static_cast<uint64_t>(D));
+  EXPECT_EQ(workspace.counters.vertices, (uint64_t{1} << D));
+  EXPECT_EQ(workspace.counters.leaves, structure.tree().leaf_count());
+  EXPECT_EQ(workspace.counters.max_leaves, workspace.counters.leaves);
+  QueryCounters sum = workspace.counters;
+  sum.Add(workspace.counters);
+  EXPECT_EQ(sum.queries, 2u);
+  EXPECT_EQ(sum.cuts, 2u * D);
+  EXPECT_EQ(sum.max_leaves, workspace.counters.max_leaves);
+}
+
+}  // namespace
+}  // namespace wellspace::core

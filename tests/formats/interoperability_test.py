@@ -1,0 +1,88 @@
+"""Other people's programs read what Wellspace writes, and Wellspace reads what they write; every bit the same."""
+import os
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+import meshio
+import numpy
+
+CONVERT_MESH = os.environ["CONVERT_MESH"]
+
+
+def random_mesh(dimension, vertices=3000, simplices=20000):
+    random = numpy.random.default_rng(5)
+    points = random.integers(0, 2**64, size=(vertices, dimension), dtype=numpy.uint64).view(numpy.float64)
+    points = numpy.where(numpy.isfinite(points), points, 0.1)
+    cells = random.integers(0, vertices, size=(simplices, dimension + 1))
+    return points, cells
+
+
+def pad(points):
+    return numpy.hstack([points, numpy.zeros((len(points), 3 - points.shape[1]))])
+
+
+def cell_type(dimension):
+    return "triangle" if dimension == 2 else "tetra"
+
+
+class Interoperability(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def convert(self, source, target):
+        subprocess.run([CONVERT_MESH, self.folder / source, self.folder / target], check=True, timeout=60)
+
+    def assert_same_bits(self, mesh, points, cells, dimension):
+        self.assertEqual(mesh.points.dtype, numpy.float64)
+        numpy.testing.assert_array_equal(mesh.points.view(numpy.uint64), points.view(numpy.uint64))
+        self.assertEqual([block.type for block in mesh.cells], [cell_type(dimension)])
+        numpy.testing.assert_array_equal(mesh.cells[0].data, cells)
+
+    def write_pair(self, name, points, cells):
+        with open(self.folder / f"{name}.node", "w") as nodes:
+            nodes.write(f"{len(points)} {points.shape[1]} 0 0\n")
+            nodes.writelines(f"{i} {' '.join(map(repr, map(float, p)))}\n" for i, p in enumerate(points))
+        with open(self.folder / f"{name}.ele", "w") as simplices:
+            simplices.write(f"{len(cells)} {cells.shape[1]} 0\n")
+            simplices.writelines(f"{i} {' '.join(map(str, c))}\n" for i, c in enumerate(cells))
+
+    def test_meshio_reads_our_vtu(self):
+        for dimension in (2, 3):
+            with self.subTest(dimension=dimension):
+                points, cells = random_mesh(dimension)
+                self.write_pair("mesh", points, cells)
+                self.convert("mesh.node", "mesh.vtu")
+                mesh = meshio.read(self.folder / "mesh.vtu")
+                self.assert_same_bits(mesh, pad(points), cells, dimension)
+                numpy.testing.assert_array_equal(mesh.point_data["input"], numpy.zeros(len(points)))
+
+    def test_we_read_the_vtu_of_meshio(self):
+        for dimension in (2, 3):
+            for options in ({"binary": False}, {"binary": True, "compression": None},
+                            {"binary": True, "compression": "zlib"}):
+                with self.subTest(dimension=dimension, **options):
+                    points, cells = random_mesh(dimension)
+                    theirs = meshio.Mesh(pad(points), [(cell_type(dimension), cells)])
+                    if not options["binary"]:  # meshio writes 11 digits
+                        theirs.points = numpy.round(numpy.clip(theirs.points, -1e6, 1e6), 3)
+                    theirs.write(self.folder / "theirs.vtu", **options)
+                    self.convert("theirs.vtu", "ours.vtu")
+                    self.assert_same_bits(meshio.read(self.folder / "ours.vtu"),
+                                          meshio.read(self.folder / "theirs.vtu").points, cells, dimension)
+
+    def test_meshio_reads_our_tetgen_pair_and_we_read_its(self):
+        points, cells = random_mesh(3)
+        meshio.Mesh(points, [("tetra", cells)]).write(self.folder / "theirs.vtu")
+        self.convert("theirs.vtu", "ours.node")
+        self.assert_same_bits(meshio.read(self.folder / "ours.node"), points, cells, 3)
+        meshio.Mesh(points, [("tetra", cells)]).write(self.folder / "theirs.node", float_fmt=".17e")
+        self.convert("theirs.ele", "again.vtu")
+        self.assert_same_bits(meshio.read(self.folder / "again.vtu"), points, cells, 3)
+
+
+if __name__ == "__main__":
+    unittest.main()

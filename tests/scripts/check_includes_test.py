@@ -1,0 +1,104 @@
+"""scripts/check_includes finds planted violations, and nothing in what is allowed."""
+
+import pathlib
+import subprocess
+import tempfile
+import unittest
+
+SCRIPT = pathlib.Path(__file__).resolve().parents[2] / "scripts" / "check_includes"
+
+# A small project in order; each test plants one line in it.
+SOUND = {
+    "core/base/ids.h": "#include <cstdint>\n",
+    "core/geometry/point.h": '#include "core/base/ids.h"\n',
+    "core/simplex/validate.h": '#include "absl/status/status.h"\n#include "core/geometry/point.h"\n',
+    "core/simplex/star.h": '#include "core/simplex/validate.h"\n',
+    "core/mesher.h": '#include "core/simplex/star.h"\n',
+    "server/embedded_server.h": "#include <memory>\n",
+    "server/convert.cc": '#include "core/mesher.h"\n#include "wellspace/v1/mesh.pb.h"\n#include <grpcpp/grpcpp.h>\n',
+    "client/client.h": '#include "absl/time/time.h"\n',
+    "client/connection.cc": '#include "client/client.h"\n#include "wellspace/v1/meshing.grpc.pb.h"\n',
+    "client/formats/vtu.cc": '#include "client/formats/vtu.h"\n#include <zlib.h>\n',
+    "client/cli/main.cc": '#include "client/formats/vtu.h"\n#include "server/embedded_server.h"\n#include "core/simplex/validate.h"\n',
+    "client/formats/vtu.h": "#include <string>\n",
+    "tests/core/mesher_test.cc": '#include "core/mesher.h"\n#include "gtest/gtest.h"\n',
+}
+
+
+class CheckIncludesTest(unittest.TestCase):
+    def run_with(self, path=None, line=""):
+        """Runs the script on the sound project with `line` as the last of `path`; returns its exit code and lines."""
+        with tempfile.TemporaryDirectory() as folder:
+            root = pathlib.Path(folder)
+            files = dict(SOUND)
+            if path:
+                files[path] = files.get(path, "") + line + "\n"
+            for name, text in files.items():
+                (root / name).parent.mkdir(parents=True, exist_ok=True)
+                (root / name).write_text(text, encoding="utf-8")
+            result = subprocess.run([SCRIPT, root], capture_output=True, text=True, check=False)
+            self.assertEqual(result.stderr, "")
+            return result.returncode, result.stdout.splitlines()
+
+    def assert_found(self, path, line, message):
+        code, lines = self.run_with(path, line)
+        number = SOUND.get(path, "").count("\n") + 1
+        self.assertEqual(code, 1)
+        self.assertEqual(len(lines), 1, lines)
+        self.assertTrue(lines[0].startswith(f"{path}:{number}: "), lines[0])
+        self.assertIn(message, lines[0])
+
+    def test_accepts_the_order_of_the_house(self):
+        self.assertEqual(self.run_with(), (0, []))
+
+    def test_lower_part_of_core_includes_higher_part(self):
+        self.assert_found("core/base/ids.h", '#include "core/geometry/point.h"', "core/base may include only core/base")
+
+    def test_part_of_core_includes_the_mesher(self):
+        self.assert_found("core/simplex/star.h", '#include "core/mesher.h"', "core/simplex may include only")
+
+    def test_core_includes_server(self):
+        self.assert_found("core/mesher.h", '#include "server/embedded_server.h"', "core may include only")
+
+    def test_core_sees_grpc_protobuf_logging_or_messages(self):
+        for header in ("grpcpp/grpcpp.h", "google/protobuf/message.h", "spdlog/spdlog.h", "wellspace/v1/mesh.pb.h"):
+            self.assert_found("core/base/ids.h", f"#include <{header}>", "must not see")
+
+    def test_formats_see_messages(self):
+        self.assert_found("client/formats/vtu.cc", '#include "proto/wellspace/v1/mesh.pb.h"', "must not see")
+
+    def test_formats_see_the_client_library(self):
+        self.assert_found("client/formats/vtu.cc", '#include "client/client.h"', "client/formats may include only")
+
+    def test_client_library_includes_core(self):
+        self.assert_found("client/connection.cc", '#include "core/mesher.h"', "client may include only client, proto")
+
+    def test_client_library_includes_server(self):
+        self.assert_found("client/connection.cc", '#  include "server/embedded_server.h"', "client may include only")
+
+    def test_cli_includes_more_of_core_than_the_validators(self):
+        self.assert_found("client/cli/main.cc", '#include "core/mesher.h"', "client/cli may include only")
+
+    def test_server_includes_client(self):
+        self.assert_found("server/convert.cc", '#include "client/client.h"', "server may include only")
+
+    def test_product_includes_tests(self):
+        self.assert_found("server/convert.cc", '#include "tests/core/mesher_test.cc"', "server may include only")
+
+    def test_own_header_in_angle_brackets(self):
+        self.assert_found("server/convert.cc", "#include <core/mesher.h>", "with quotes")
+
+    def test_relative_include(self):
+        self.assert_found("core/mesher.h", '#include "../server/embedded_server.h"', "from the root")
+        self.assert_found("core/simplex/star.h", '#include "validate.h"', "from the root")
+
+    def test_header_that_does_not_exist(self):
+        self.assert_found("core/mesher.h", '#include "core/simplex/stars.h"', "no such file")
+
+    def test_folder_without_a_rule(self):
+        self.assert_found("core/magic/spell.h", "", "no rule for this folder")
+        self.assert_found("gui/window.cc", "", "no rule for this folder")
+
+
+if __name__ == "__main__":
+    unittest.main()

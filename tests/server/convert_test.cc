@@ -1,0 +1,257 @@
+#include "server/convert.h"
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include "server/cloud_receiver.h"
+#include "server/errors.h"
+#include "tests/server/service_harness.h"
+
+namespace wellspace::server {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+ServiceOptions SmallLimits() {
+  ServiceOptions options;
+  options.max_points = 10;
+  options.max_vertices = 1000;
+  options.max_threads = 2;
+  return options;
+}
+
+TEST(ParametersFromProto, FillsInDefaults) {
+  v1::MeshParameters message;
+  message.set_dimension(2);
+  core::MeshParameters parameters;
+  ASSERT_TRUE(ParametersFromProto(message, SmallLimits(), &parameters).ok());
+  EXPECT_EQ(parameters.dimension, 2);
+  EXPECT_EQ(parameters.rho, 0);
+  EXPECT_EQ(parameters.margin, core::MeshParameters().margin);
+  EXPECT_TRUE(parameters.domain_low.empty());
+  EXPECT_EQ(parameters.threads, 1);
+  EXPECT_EQ(parameters.max_vertices, 1000u);
+}
+
+TEST(ParametersFromProto, TakesEveryField) {
+  v1::MeshParameters message = UnitCubeParameters();
+  message.set_rho(2.5);
+  message.set_margin(0.5);
+  message.set_max_vertices(77);
+  message.set_threads(2);
+  core::MeshParameters parameters;
+  ASSERT_TRUE(ParametersFromProto(message, SmallLimits(), &parameters).ok());
+  EXPECT_EQ(parameters.rho, 2.5);
+  EXPECT_EQ(parameters.margin, 0.5);
+  EXPECT_THAT(parameters.domain_low, ElementsAre(0, 0, 0));
+  EXPECT_THAT(parameters.domain_high, ElementsAre(1, 1, 1));
+  EXPECT_EQ(parameters.max_vertices, 77u);
+  EXPECT_EQ(parameters.threads, 2);
+}
+
+TEST(ParametersFromProto, TakesFewerThreadsThanAskedFor) {
+  v1::MeshParameters message = UnitCubeParameters();
+  message.set_threads(64);
+  core::MeshParameters parameters;
+  ASSERT_TRUE(ParametersFromProto(message, SmallLimits(), &parameters).ok());
+  EXPECT_EQ(parameters.threads, 2);
+}
+
+struct BadParameters {
+  std::string name;
+  std::string field;
+  std::function<void(v1::MeshParameters&)> spoil;
+};
+
+class ParametersFromProtoRefuses : public ::testing::TestWithParam<BadParameters> {};
+
+TEST_P(ParametersFromProtoRefuses, NamingTheField) {
+  v1::MeshParameters message = UnitCubeParameters();
+  GetParam().spoil(message);
+  core::MeshParameters parameters;
+  const grpc::Status status = ParametersFromProto(message, SmallLimits(), &parameters);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  const ErrorDetails details = DetailsOf(status);
+  EXPECT_EQ(details.reason, "INVALID_PARAMETERS");
+  EXPECT_EQ(details.field, GetParam().field) << status.error_message();
+  EXPECT_FALSE(details.may_retry);
+  EXPECT_FALSE(status.error_message().empty());
+}
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+INSTANTIATE_TEST_SUITE_P(
+    All, ParametersFromProtoRefuses,
+    ::testing::Values(
+        BadParameters{"DimensionZero", "parameters.dimension", [](auto& p) { p.set_dimension(0); }},
+        BadParameters{"DimensionOne", "parameters.dimension", [](auto& p) { p.set_dimension(1); }},
+        BadParameters{"DimensionNegative", "parameters.dimension", [](auto& p) { p.set_dimension(-3); }},
+        BadParameters{"DimensionHuge", "parameters.dimension", [](auto& p) { p.set_dimension(1 << 30); }},
+        BadParameters{"RhoSmall", "parameters.rho", [](auto& p) { p.set_rho(0.5); }},
+        BadParameters{"RhoNegative", "parameters.rho", [](auto& p) { p.set_rho(-2); }},
+        BadParameters{"RhoNan", "parameters.rho", [](auto& p) { p.set_rho(std::nan("")); }},
+        BadParameters{"MarginNegative", "parameters.margin", [](auto& p) { p.set_margin(-0.5); }},
+        BadParameters{"MarginNan", "parameters.margin", [](auto& p) { p.set_margin(std::nan("")); }},
+        BadParameters{"MarginInfinite", "parameters.margin", [](auto& p) { p.set_margin(kInfinity); }},
+        BadParameters{"DomainEmpty", "parameters.domain", [](auto& p) { p.mutable_domain()->Clear(); }},
+        BadParameters{"DomainWithoutHigh", "parameters.domain", [](auto& p) { p.mutable_domain()->clear_high(); }},
+        BadParameters{"DomainShort", "parameters.domain",
+                      [](auto& p) { p.mutable_domain()->mutable_low()->RemoveLast(); }},
+        BadParameters{"DomainLong", "parameters.domain",
+                      [](auto& p) {
+                        p.mutable_domain()->add_low(0);
+                        p.mutable_domain()->add_high(1);
+                      }},
+        BadParameters{"DomainFlat", "parameters.domain", [](auto& p) { p.mutable_domain()->set_high(1, 0); }},
+        BadParameters{"DomainInverted", "parameters.domain", [](auto& p) { p.mutable_domain()->set_high(1, -1); }},
+        BadParameters{"DomainNan", "parameters.domain", [](auto& p) { p.mutable_domain()->set_low(2, std::nan("")); }},
+        BadParameters{"DomainInfinite", "parameters.domain",
+                      [](auto& p) { p.mutable_domain()->set_high(0, kInfinity); }},
+        BadParameters{"ThreadsNegative", "parameters.threads", [](auto& p) { p.set_threads(-1); }},
+        BadParameters{"MaxVerticesAboveTheServers", "parameters.max_vertices",
+                      [](auto& p) { p.set_max_vertices(1001); }}),
+    [](const auto& test) { return test.param.name; });
+
+v1::MeshPointsRequest ParametersRequest() {
+  v1::MeshPointsRequest request;
+  *request.mutable_parameters() = UnitCubeParameters();
+  return request;
+}
+
+v1::MeshPointsRequest PointsRequest(const std::vector<double>& coordinates) {
+  v1::MeshPointsRequest request;
+  request.mutable_points()->mutable_coordinates()->Assign(coordinates.begin(), coordinates.end());
+  return request;
+}
+
+// What `receiver` says to `request`.
+grpc::Status Accept(CloudReceiver& receiver, v1::MeshPointsRequest request) { return receiver.Accept(&request); }
+
+TEST(CloudReceiver, CollectsChunksInOrder) {
+  const ServiceOptions options = SmallLimits();
+  CloudReceiver receiver(options);
+  EXPECT_FALSE(receiver.has_parameters());
+  ASSERT_TRUE(Accept(receiver, ParametersRequest()).ok());
+  EXPECT_TRUE(receiver.has_parameters());
+  ASSERT_TRUE(Accept(receiver, PointsRequest({1, 2, 3})).ok());
+  ASSERT_TRUE(Accept(receiver, PointsRequest({})).ok());
+  ASSERT_TRUE(Accept(receiver, PointsRequest({4, 5, 6, 7, 8, 9})).ok());
+  ASSERT_TRUE(receiver.AcceptEnd().ok());
+  EXPECT_EQ(receiver.point_count(), 3u);
+  PointChunks points = receiver.TakePoints();
+  EXPECT_EQ(points.coordinate_count(), 9u);
+  EXPECT_THAT(points.Flatten(), ElementsAre(1, 2, 3, 4, 5, 6, 7, 8, 9));
+  EXPECT_TRUE(points.Flatten().empty());
+  EXPECT_TRUE(receiver.TakePoints().Flatten().empty());
+}
+
+TEST(CloudReceiver, AcceptsAsManyPointsAsAllowedAndNotOneMore) {
+  const ServiceOptions options = SmallLimits();
+  CloudReceiver receiver(options);
+  ASSERT_TRUE(Accept(receiver, ParametersRequest()).ok());
+  ASSERT_TRUE(Accept(receiver, PointsRequest(std::vector<double>(30))).ok());
+  const grpc::Status status = Accept(receiver, PointsRequest({1, 2, 3}));
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(DetailsOf(status).reason, "TOO_MANY_POINTS");
+  EXPECT_THAT(status.error_message(), HasSubstr("10"));
+  EXPECT_EQ(receiver.point_count(), 10u);
+}
+
+TEST(CloudReceiver, RefusesPointsBeforeParameters) {
+  const ServiceOptions options = SmallLimits();
+  CloudReceiver receiver(options);
+  const grpc::Status status = Accept(receiver, PointsRequest({1, 2, 3}));
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(DetailsOf(status).reason, "PARAMETERS_MISSING");
+  EXPECT_EQ(DetailsOf(status).field, "parameters");
+}
+
+TEST(CloudReceiver, RefusesAnEndBeforeParameters) {
+  const ServiceOptions options = SmallLimits();
+  const grpc::Status status = CloudReceiver(options).AcceptEnd();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(DetailsOf(status).reason, "PARAMETERS_MISSING");
+}
+
+TEST(CloudReceiver, RefusesParametersTwice) {
+  const ServiceOptions options = SmallLimits();
+  CloudReceiver receiver(options);
+  ASSERT_TRUE(Accept(receiver, ParametersRequest()).ok());
+  const grpc::Status status = Accept(receiver, ParametersRequest());
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(DetailsOf(status).reason, "PARAMETERS_REPEATED");
+  EXPECT_EQ(DetailsOf(status).field, "parameters");
+}
+
+TEST(CloudReceiver, RefusesAnEmptyRequest) {
+  const ServiceOptions options = SmallLimits();
+  CloudReceiver receiver(options);
+  const grpc::Status status = Accept(receiver, v1::MeshPointsRequest());
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(DetailsOf(status).reason, "EMPTY_REQUEST");
+}
+
+TEST(CloudReceiver, RefusesAPartOfAPoint) {
+  const ServiceOptions options = SmallLimits();
+  CloudReceiver receiver(options);
+  ASSERT_TRUE(Accept(receiver, ParametersRequest()).ok());
+  ASSERT_TRUE(Accept(receiver, PointsRequest({1, 2, 3})).ok());
+  const grpc::Status status = Accept(receiver, PointsRequest({1, 2, 3, 4}));
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(DetailsOf(status).reason, "INVALID_CHUNK_SHAPE");
+  EXPECT_EQ(DetailsOf(status).field, "points.coordinates");
+  EXPECT_THAT(status.error_message(), HasSubstr("4 coordinates"));
+}
+
+TEST(CloudReceiver, KeepsRefusingAfterBadParameters) {
+  const ServiceOptions options = SmallLimits();
+  CloudReceiver receiver(options);
+  v1::MeshPointsRequest request;
+  request.mutable_parameters()->set_dimension(0);
+  EXPECT_EQ(DetailsOf(receiver.Accept(&request)).reason, "INVALID_PARAMETERS");
+  EXPECT_EQ(DetailsOf(Accept(receiver, PointsRequest({1, 2, 3}))).reason, "PARAMETERS_MISSING");
+}
+
+TEST(MetadataToProto, CountsAndStatistics) {
+  core::MeshParameters parameters;
+  const core::Mesh mesh = MakeFakeMesh(parameters, std::vector<double>{0.25, 0.5, 0.75});
+  const v1::MeshMetadata metadata = MetadataToProto(mesh, 5);
+  EXPECT_EQ(metadata.dimension(), 3);
+  EXPECT_THAT(metadata.domain().low(), ElementsAre(0, 0, 0));
+  EXPECT_THAT(metadata.domain().high(), ElementsAre(1, 1, 1));
+  EXPECT_EQ(metadata.vertex_count(), 9u);
+  EXPECT_EQ(metadata.simplex_count(), 9u);
+  EXPECT_EQ(metadata.input_point_count(), 1u);
+  EXPECT_EQ(metadata.chunk_count(), 5u);
+  EXPECT_EQ(metadata.statistics().counters().cuts(), 42u);
+  EXPECT_EQ(metadata.statistics().seconds().total(), 0.5);
+}
+
+TEST(MakeError, EveryReasonHasACode) {
+  for (int number = 1; number <= v1::ErrorReason_MAX; ++number) {
+    ASSERT_TRUE(v1::ErrorReason_IsValid(number)) << number;
+    const auto reason = static_cast<v1::ErrorReason>(number);
+    const grpc::Status status = MakeError(reason, "why");
+    EXPECT_EQ(status.error_message(), "why");
+    EXPECT_EQ("ERROR_REASON_" + DetailsOf(status).reason, v1::ErrorReason_Name(reason));
+    EXPECT_EQ(status.error_code() == grpc::StatusCode::INTERNAL, reason == v1::ERROR_REASON_INTERNAL);
+  }
+}
+
+TEST(FromCoreStatus, TellsTheKindsApart) {
+  EXPECT_TRUE(FromCoreStatus(absl::OkStatus()).ok());
+  EXPECT_EQ(DetailsOf(FromCoreStatus(absl::InvalidArgumentError("x"))).reason, "INVALID_POINTS");
+  EXPECT_EQ(DetailsOf(FromCoreStatus(absl::ResourceExhaustedError("x"))).reason, "MESH_TOO_LARGE");
+  EXPECT_EQ(DetailsOf(FromCoreStatus(absl::UnknownError("x"))).reason, "INTERNAL");
+  EXPECT_EQ(FromCoreStatus(absl::CancelledError("x")).error_code(), grpc::StatusCode::CANCELLED);
+  EXPECT_EQ(FromCoreStatus(absl::DeadlineExceededError("x")).error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
+}
+
+}  // namespace
+}  // namespace wellspace::server

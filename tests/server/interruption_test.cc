@@ -1,0 +1,273 @@
+// Calls that end before their time: cancel, deadline, a stopping server, a reader that does not read.
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "gtest/gtest.h"
+#include "tests/server/service_harness.h"
+
+namespace wellspace::server {
+namespace {
+
+constexpr absl::Duration kIdleWithin = absl::Milliseconds(100);
+
+std::vector<double> RandomPoints(size_t count) {
+  std::mt19937_64 generator(11);
+  std::uniform_real_distribution<double> uniform(0.01, 0.99);
+  std::vector<double> points(count * 3);
+  for (double& coordinate : points) {
+    coordinate = uniform(generator);
+  }
+  return points;
+}
+
+class Interrupted : public ::testing::TestWithParam<Transport> {};
+
+INSTANTIATE_TEST_SUITE_P(Transports, Interrupted, ::testing::Values(Transport::kInProcess, Transport::kLoopback),
+                         [](const auto& test) {
+                           return test.param == Transport::kInProcess ? "InProcess" : "Loopback";
+                         });
+
+TEST_P(Interrupted, CancelFreesTheWorker) {
+  Event started;
+  ServiceHarness harness(EndlessMesher(started), {}, GetParam());
+  TestCall call(harness.stub());
+  call.Send(UnitCubeParameters());
+  call.HalfClose();
+  ASSERT_TRUE(started.Wait());
+  EXPECT_EQ(harness.Info().running_jobs(), 1);
+  call.Cancel();
+  EXPECT_LE(harness.TimeUntilIdle(), kIdleWithin);
+  EXPECT_EQ(call.Finish().error_code(), grpc::StatusCode::CANCELLED);
+  EXPECT_TRUE(harness.log().WaitFor("code=CANCELLED"));
+}
+
+TEST_P(Interrupted, CancelInEveryPhaseOfTheCoreFreesTheWorker) {
+  ServiceHarness harness(core::MeshPoints, {}, GetParam());
+  const std::vector<double> points = RandomPoints(20'000);
+  for (const v1::Phase phase : {v1::PHASE_WAITING, v1::PHASE_TREE, v1::PHASE_REFINEMENT}) {
+    TestCall call(harness.stub());
+    call.Send(UnitCubeParameters());
+    call.Send(points);
+    call.HalfClose();
+    v1::MeshPointsResponse response;
+    do {
+      ASSERT_TRUE(call.Read(&response));
+      ASSERT_TRUE(response.has_progress());
+    } while (response.progress().phase() < phase);
+    call.Cancel();
+    EXPECT_LE(harness.TimeUntilIdle(), kIdleWithin) << v1::Phase_Name(phase);
+    EXPECT_EQ(call.Finish().error_code(), grpc::StatusCode::CANCELLED);
+  }
+}
+
+TEST_P(Interrupted, CancelWhileWaitingLeavesTheQueue) {
+  Event started;
+  ServiceHarness harness(EndlessMesher(started), {}, GetParam());
+  TestCall running(harness.stub());
+  running.Send(UnitCubeParameters());
+  running.HalfClose();
+  ASSERT_TRUE(started.Wait());
+  TestCall waiting(harness.stub());
+  waiting.Send(UnitCubeParameters());
+  waiting.HalfClose();
+  while (harness.Info().queued_jobs() == 0) {
+    std::this_thread::yield();
+  }
+  waiting.Cancel();
+  EXPECT_EQ(waiting.Finish().error_code(), grpc::StatusCode::CANCELLED);
+  ASSERT_TRUE(harness.log().WaitFor("code=CANCELLED"));
+  EXPECT_EQ(harness.Info().queued_jobs(), 0);
+  EXPECT_EQ(harness.Info().running_jobs(), 1);
+}
+
+TEST_P(Interrupted, CancelWhileSending) {
+  ServiceHarness harness(FakeMesher, {}, GetParam());
+  TestCall call(harness.stub());
+  call.Send(UnitCubeParameters());
+  call.Send(RandomPoints(1000));
+  v1::MeshPointsResponse response;
+  ASSERT_TRUE(call.Read(&response));  // the server has the parameters
+  call.Cancel();
+  EXPECT_EQ(call.Finish().error_code(), grpc::StatusCode::CANCELLED);
+  EXPECT_TRUE(harness.log().WaitFor("code=CANCELLED"));
+  EXPECT_EQ(harness.Info().running_jobs(), 0);
+}
+
+TEST_P(Interrupted, CancelWhileReceivingTheMesh) {
+  ServiceHarness harness(FakeMesher, {}, GetParam());
+  TestCall call(harness.stub());
+  call.Send(UnitCubeParameters());
+  for (int i = 0; i < 10; ++i) {
+    call.Send(RandomPoints(40'000));
+  }
+  call.HalfClose();
+  v1::MeshPointsResponse response;
+  do {
+    ASSERT_TRUE(call.Read(&response));
+  } while (!response.has_chunk());
+  call.Cancel();
+  EXPECT_EQ(call.Finish().error_code(), grpc::StatusCode::CANCELLED);
+  EXPECT_TRUE(harness.log().WaitFor("code=CANCELLED"));
+}
+
+TEST_P(Interrupted, DeadlineFreesTheWorker) {
+  Event started;
+  ServiceHarness harness(EndlessMesher(started), {}, GetParam());
+  TestCall call(harness.stub(), absl::Milliseconds(300));
+  call.Send(UnitCubeParameters());
+  call.HalfClose();
+  ASSERT_TRUE(started.Wait());
+  EXPECT_EQ(call.Finish().error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
+  EXPECT_LE(harness.TimeUntilIdle(), kIdleWithin);
+  EXPECT_TRUE(harness.log().WaitFor("code=DEADLINE_EXCEEDED"));
+}
+
+TEST_P(Interrupted, ServerStopsDuringTheWork) {
+  Event started;
+  ServiceHarness harness(EndlessMesher(started), {}, GetParam());
+  TestCall call(harness.stub());
+  call.Send(UnitCubeParameters());
+  call.HalfClose();
+  ASSERT_TRUE(started.Wait());
+  harness.server().Shutdown(absl::ZeroDuration());
+  const grpc::Status status = call.Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::UNAVAILABLE);
+  EXPECT_EQ(DetailsOf(status).reason, "SERVER_STOPPING");
+  EXPECT_TRUE(DetailsOf(status).may_retry);
+}
+
+TEST_P(Interrupted, ServerStopsDuringTheUpload) {
+  ServiceHarness harness(FakeMesher, {}, GetParam());
+  TestCall call(harness.stub());
+  call.Send(UnitCubeParameters());
+  call.Send(RandomPoints(1000));
+  v1::MeshPointsResponse response;
+  ASSERT_TRUE(call.Read(&response));  // the server has the parameters
+  std::thread stopper([&harness] { harness.server().Shutdown(absl::ZeroDuration()); });
+  const grpc::Status status = call.Finish();
+  stopper.join();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::UNAVAILABLE);
+  EXPECT_EQ(DetailsOf(status).reason, "SERVER_STOPPING") << status.error_message();
+}
+
+TEST_P(Interrupted, ServerStopsUnderAReaderThatDoesNotRead) {
+  ServiceHarness harness(FakeMesher, {}, GetParam());
+  TestCall call(harness.stub());
+  call.Send(UnitCubeParameters());
+  for (int i = 0; i < 10; ++i) {
+    call.Send(RandomPoints(40'000));
+  }
+  call.HalfClose();
+  v1::MeshPointsResponse response;
+  do {
+    ASSERT_TRUE(call.Read(&response));
+  } while (!response.has_chunk());
+  const absl::Time begin = absl::Now();
+  harness.server().Shutdown(absl::ZeroDuration());
+  EXPECT_LT(absl::Now() - begin, absl::Seconds(10));
+  EXPECT_FALSE(call.Finish().ok());
+}
+
+TEST_P(Interrupted, RunningWorkGoesOnDuringTheGracePeriodAndNewCallsAreRefused) {
+  Event started;
+  Event go_on;
+  ServiceHarness harness(
+      [&](const core::MeshParameters& parameters, std::span<const double> points, core::RunContext&) {
+        started.Set();
+        EXPECT_TRUE(go_on.Wait());
+        return MakeFakeMesh(parameters, points);
+      },
+      {}, GetParam());
+  TestCall call(harness.stub());
+  call.Send(UnitCubeParameters());
+  call.HalfClose();
+  ASSERT_TRUE(started.Wait());
+  std::thread stopper([&harness] { harness.server().Shutdown(absl::Minutes(5)); });
+
+  // Calls until the server refuses them; until then they wait behind the first.
+  grpc::Status refused;
+  while (refused.error_code() != grpc::StatusCode::UNAVAILABLE) {
+    TestCall late(harness.stub(), absl::Milliseconds(50));
+    refused = late.Finish();
+  }
+  EXPECT_EQ(DetailsOf(refused).reason, "SERVER_STOPPING");
+
+  go_on.Set();
+  const grpc::Status status = call.Finish();
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(call.metadata.size(), 1u);
+  stopper.join();
+}
+
+TEST(SlowReader, CostsABoundedBufferAndHoldsUpNobodyElse) {
+  ServiceHarness harness;
+  TestCall slow(harness.stub());
+  TestCall other(harness.stub());
+  for (TestCall* call : {&slow, &other}) {
+    call->Send(UnitCubeParameters());
+    for (int i = 0; i < 10; ++i) {
+      call->Send(RandomPoints(40'000));
+    }
+  }
+  slow.HalfClose();
+  v1::MeshPointsResponse response;
+  do {
+    ASSERT_TRUE(slow.Read(&response));
+  } while (!response.has_chunk());
+  ASSERT_TRUE(harness.log().WaitFor("call=1 chunk=2 made"));
+
+  // The chunks of both calls are made in turn; while all of the other's were, the slow one's would have been, too.
+  other.HalfClose();
+  ASSERT_TRUE(other.Finish().ok());
+  EXPECT_GE(other.chunks.size(), 16u);
+  // One was read, one is being written, the others wait, and the in-process transport may hold one more.
+  EXPECT_LE(harness.log().Count("call=1 chunk="), 3u + MeshPointsCall::kChunksAhead);
+
+  ASSERT_TRUE(slow.Finish().ok());
+  EXPECT_EQ(slow.chunks.size(), slow.metadata.at(0).chunk_count());
+  EXPECT_EQ(slow.chunks.size(), other.chunks.size());
+  EXPECT_EQ(harness.log().Count("call=1 chunk="), slow.chunks.size());
+}
+
+TEST(ManyCalls, StartedAndCancelledAtRandomLeaveNothingBehind) {
+  ServiceOptions options;
+  options.workers = 2;
+  options.max_queued_jobs = 4;
+  ServiceHarness harness(FakeMesher, options, Transport::kLoopback);
+  std::vector<std::thread> clients;
+  for (unsigned seed = 0; seed < 4; ++seed) {
+    clients.emplace_back([&harness, seed] {
+      std::mt19937 generator(seed);
+      for (int i = 0; i < 50; ++i) {
+        TestCall call(harness.stub());
+        const unsigned fate = generator() % 4;
+        call.Send(UnitCubeParameters());
+        if (fate == 0) {
+          continue;  // the destructor cancels
+        }
+        call.Send(RandomPoints(1 + generator() % 3000));
+        call.HalfClose();
+        if (fate == 1) {
+          call.Cancel();
+        }
+        const grpc::Status status = call.Finish();
+        EXPECT_TRUE(status.ok() || status.error_code() == grpc::StatusCode::CANCELLED ||
+                    status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED)
+            << status.error_message();
+      }
+    });
+  }
+  for (std::thread& client : clients) {
+    client.join();
+  }
+  EXPECT_TRUE(harness.log().WaitFor("method=MeshPoints", 1));
+  harness.TimeUntilIdle();
+  EXPECT_EQ(harness.Info().running_jobs() + harness.Info().queued_jobs(), 0);
+}
+
+}  // namespace
+}  // namespace wellspace::server

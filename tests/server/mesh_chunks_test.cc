@@ -1,0 +1,81 @@
+#include "server/mesh_chunks.h"
+
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "gtest/gtest.h"
+#include "proto/checksum.h"
+#include "tests/server/service_harness.h"
+
+namespace wellspace::server {
+namespace {
+
+// The examples of RFC 3720, appendix B.4.
+TEST(Crc32c, Rfc3720Examples) {
+  EXPECT_EQ(Crc32c("", 0), 0u);
+  EXPECT_EQ(Crc32c("123456789", 9), 0xE3069283u);
+  const std::string zeros(32, '\0');
+  EXPECT_EQ(Crc32c(zeros.data(), zeros.size()), 0x8A9136AAu);
+  const std::string ones(32, '\xFF');
+  EXPECT_EQ(Crc32c(ones.data(), ones.size()), 0x62A8AB43u);
+  std::string ascending;
+  for (char c = 0; c < 32; ++c) {
+    ascending.push_back(c);
+  }
+  EXPECT_EQ(Crc32c(ascending.data(), ascending.size()), 0x46DD794Eu);
+}
+
+class MeshChunksOf : public ::testing::TestWithParam<std::tuple<int, size_t, uint64_t>> {};
+
+TEST_P(MeshChunksOf, AddUpToTheMesh) {
+  const auto [dimension, point_count, max_bytes] = GetParam();
+  core::MeshParameters parameters;
+  parameters.dimension = dimension;
+  std::vector<double> points(point_count * dimension);
+  for (size_t i = 0; i < points.size(); ++i) {
+    points[i] = static_cast<double>(i) / 7;
+  }
+  const core::Mesh mesh = MakeFakeMesh(parameters, points);
+  const MeshChunks chunks(mesh, max_bytes);
+  core::Mesh sum;
+  for (uint64_t index = 0; index < chunks.count(); ++index) {
+    v1::MeshPointsResponse response;
+    *response.mutable_chunk() = chunks.Make(index);
+    const v1::MeshChunk& chunk = response.chunk();
+    EXPECT_LE(response.ByteSizeLong(), max_bytes);
+    EXPECT_EQ(chunk.index(), index);
+    EXPECT_EQ(1, !chunk.points().empty() + !chunk.simplices().empty() + !chunk.input_vertices().empty());
+    EXPECT_EQ(chunk.points_size() % dimension, 0);
+    EXPECT_EQ(chunk.simplices_size() % (dimension + 1), 0);
+    if (!chunk.points().empty()) {
+      EXPECT_TRUE(sum.simplices.empty());
+      EXPECT_EQ(chunk.crc32c(), Crc32c(chunk.points().data(), chunk.points_size() * sizeof(double)));
+    } else if (!chunk.simplices().empty()) {
+      EXPECT_TRUE(sum.input_vertex.empty());
+      EXPECT_EQ(chunk.crc32c(), Crc32c(chunk.simplices().data(), chunk.simplices_size() * sizeof(uint32_t)));
+    } else {
+      EXPECT_EQ(chunk.crc32c(), Crc32c(chunk.input_vertices().data(), chunk.input_vertices_size() * sizeof(uint32_t)));
+    }
+    sum.points.insert(sum.points.end(), chunk.points().begin(), chunk.points().end());
+    sum.simplices.insert(sum.simplices.end(), chunk.simplices().begin(), chunk.simplices().end());
+    sum.input_vertex.insert(sum.input_vertex.end(), chunk.input_vertices().begin(), chunk.input_vertices().end());
+  }
+  EXPECT_EQ(sum.points, mesh.points);
+  EXPECT_EQ(sum.simplices, mesh.simplices);
+  EXPECT_EQ(sum.input_vertex, mesh.input_vertex);
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, MeshChunksOf,
+                         ::testing::Combine(::testing::Values(2, 3), ::testing::Values(0, 1, 2, 3, 100, 1000),
+                                            ::testing::Values(128, 200, 1000, kMaxResponseBytes)));
+
+TEST(MeshChunks, LargeMeshFillsItsChunks) {
+  const MeshChunks chunks(MakeFakeMesh(core::MeshParameters(), std::vector<double>(3 * 200'000)));
+  const uint64_t bytes = 200'000 * (3 * sizeof(double) + 4 * sizeof(uint32_t) + sizeof(uint32_t));
+  EXPECT_LE(chunks.count(), bytes / kMaxResponseBytes + 4);
+  EXPECT_GT(chunks.Make(0).ByteSizeLong(), kMaxResponseBytes - 1024u);
+}
+
+}  // namespace
+}  // namespace wellspace::server

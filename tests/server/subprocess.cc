@@ -1,0 +1,70 @@
+#include "tests/server/subprocess.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <stdexcept>
+
+extern char** environ;
+
+namespace wellspace::server {
+
+Subprocess::Subprocess(const std::string& name, std::vector<std::string> arguments) {
+  const char* folder = std::getenv("WELLSPACE_BIN_DIR");
+  if (folder == nullptr) {
+    throw std::runtime_error("WELLSPACE_BIN_DIR is not set: run this test with ctest");
+  }
+  std::string program = std::string(folder) + "/" + name;
+  std::vector<char*> argv = {program.data()};
+  for (std::string& argument : arguments) {
+    argv.push_back(argument.data());
+  }
+  argv.push_back(nullptr);
+
+  int ends[2];
+  if (pipe2(ends, O_CLOEXEC) != 0) {
+    throw std::runtime_error("no pipe");
+  }
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
+  const int error = posix_spawn(&pid_, program.c_str(), &actions, nullptr, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  close(ends[1]);
+  output_ = fdopen(ends[0], "r");
+  if (error != 0) {
+    fclose(output_);
+    throw std::runtime_error("cannot start " + program);
+  }
+}
+
+Subprocess::~Subprocess() {
+  if (pid_ > 0) {
+    Signal(SIGKILL);
+    Wait();
+  }
+  fclose(output_);
+}
+
+std::string Subprocess::ReadLine() {
+  std::string line;
+  for (int c = fgetc(output_); c != EOF && c != '\n'; c = fgetc(output_)) {
+    line.push_back(static_cast<char>(c));
+  }
+  return line;
+}
+
+void Subprocess::Signal(int signal) { kill(pid_, signal); }
+
+int Subprocess::Wait() {
+  int state = 0;
+  waitpid(pid_, &state, 0);
+  pid_ = -1;
+  return WIFEXITED(state) ? WEXITSTATUS(state) : -WTERMSIG(state);
+}
+
+}  // namespace wellspace::server

@@ -1,0 +1,39 @@
+// A program that runs beside the test.
+#ifndef WELLSPACE_TESTS_SERVER_SUBPROCESS_H_
+#define WELLSPACE_TESTS_SERVER_SUBPROCESS_H_
+
+#include <sys/types.h>
+
+#include <cstdio>
+#include <string>
+#include <vector>
+
+namespace wellspace::server {
+
+// Killed with SIGKILL at the latest on destruction.
+//
+// Thread safety: thread-compatible.
+class Subprocess {
+ public:
+  // Starts WELLSPACE_BIN_DIR/`name`. Its standard output is read here, its standard error is the test's.
+  Subprocess(const std::string& name, std::vector<std::string> arguments);
+  ~Subprocess();
+  Subprocess(const Subprocess&) = delete;
+  Subprocess& operator=(const Subprocess&) = delete;
+
+  // The next line of its standard output, without its end; empty at the end of the output.
+  std::string ReadLine();
+
+  void Signal(int signal);
+
+  // Waits for its end. Its exit code, or minus the signal that ended it.
+  int Wait();
+
+ private:
+  pid_t pid_ = -1;
+  FILE* output_ = nullptr;
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_TESTS_SERVER_SUBPROCESS_H_
