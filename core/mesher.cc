@@ -227,7 +227,7 @@ absl::Status CheckSeparation(const SortedCloud<D>& cloud, const QueryStructure<D
     WELLSPACE_RETURN_IF_ERROR(context.Check());
     const VertexId v{i};
     const size_t input = cloud.first_input[i];
-    const auto [nearest, nearest_sq] = structure.NearestNeighbor(v, workspace);
+    const auto [nearest, nearest_sq] = structure.ApproximateNearestNeighbor(v, workspace);
     if (nearest_sq < least * least) {
       const bool is_input = Index(nearest) < cloud.points.size();
       return absl::InvalidArgumentError(absl::StrFormat(

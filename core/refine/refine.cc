@@ -65,7 +65,7 @@ class Refiner {
     for (uint32_t i = 0; i < structure_.vertex_count(); ++i) {
       WELLSPACE_RETURN_IF_ERROR(context_.Check());
       const VertexId v{i};
-      double length = std::sqrt(structure_.NearestNeighbor(v, workspace).distance_sq);
+      double length = std::sqrt(structure_.ApproximateNearestNeighbor(v, workspace).distance_sq);
       for (int face = 0; face < 2 * D; ++face) {
         if (((structure_.faces(v) >> face) & 1) == 0) {
           length = std::min(length, structure_.box().DistanceToFace(structure_.point(v), face));

@@ -1,6 +1,7 @@
 #include "core/tree/leaf_tree.h"
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
@@ -95,6 +96,9 @@ void LeafTree<D>::Append(NodeId leaf, VertexId v, const Point<D>& p) {
     }
   }
   Bucket& bucket = buckets_[node.bucket];
+  if (bucket.count == kLeafCapacity) {
+    std::abort();  // more vertices in one cube of the grid than callers may put there
+  }
   bucket.ids[bucket.count] = v;
   bucket.positions[bucket.count] = p;
   ++bucket.count;

@@ -23,11 +23,12 @@ namespace wellspace::core {
 // Invariants:
 //   (1) a vertex lies in the closed cube of its leaf;
 //   (2) balance: the levels of touching leaves differ by at most one;
-//   (3) property B of [HT08] §5 after Build: a leaf of side s that is longer than the grid's cubes has lfs >= s / (2 kCoarseness)
-//       everywhere; and a node of side S is split only if S exceeds the box's shortest side, or it holds more than kLeafCapacity
-//       points, or two features are within S / kCoarseness of it and twice that of each other, or, for balance, a node of side S / 2
-//       that touches it is split. Here the features are the points and the faces of the box, a face not to a point that lies on it;
-//   (4) a leaf holds at most kLeafCapacity vertices, unless it is as small as the grid allows;
+//   (3) property B of [HT08] §5 after Build: a leaf longer than the grid's cubes, of side s, has lfs >= s / (2
+//       kCoarseness) everywhere; and a node of side S is split only if S exceeds the box's shortest side, or it holds
+//       more than kLeafCapacity points, or two features are within S / kCoarseness of it and twice that of each other,
+//       or, for balance, a node of side S / 2 that touches it is split. The features are the points and the faces of
+//       the box, a face not to a point that lies on it;
+//   (4) a leaf holds at most kLeafCapacity vertices;
 //   (5) neighbour(node, face) is the node of the same level beyond the face, or the larger leaf there, or none beyond
 //   the box.
 template <int D>
@@ -61,7 +62,7 @@ class LeafTree {
   // Adds vertex `v`, the one after the last, at `p`, walking from the leaf of `near`, or from the root for kNoVertex;
   // splits a leaf that is full.
   //
-  // REQUIRES:   p in the box; v == vertex_count().
+  // REQUIRES:   p in the box; v == vertex_count(); no more than kLeafCapacity vertices in one cube of the grid.
   // Complexity: O(1 + leaves between near and p).
   // Source:     [HT08] §5, AddVertex.
   void Insert(VertexId near, VertexId v, const Point<D>& p);

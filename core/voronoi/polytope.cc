@@ -72,6 +72,7 @@ void Polytope<D>::Reset(const Point<D>& site, const Box<D>& bounds, const std::a
     }
     node.radius_sq = NormSq<D>(node.x);
     node.slack = 16 * kUnit * std::sqrt(node.radius_sq);
+    node.reach = std::sqrt(node.radius_sq) + node.slack;
   }
   UpdateReach();
 }
@@ -82,7 +83,7 @@ bool Polytope<D>::Cut(VertexId u, const Point<D>& position) {
   plane.vertex = u;
   plane.normal = Difference<D>(position, site_);
   const double length_sq = NormSq<D>(plane.normal);
-  if (length_sq > 4 * (1 + 16 * kUnit) * reach_sq_) {
+  if (length_sq > CutLimitSq()) {
     return false;
   }
   plane.offset = 0.5 * length_sq;
@@ -183,6 +184,7 @@ void Polytope<D>::Place(CellNode<D>& node, uint16_t kept, uint16_t removed) {
     node.radius_sq = NormSq<D>(node.x);
     const double radius = std::sqrt(node.radius_sq);
     node.slack = 64 * kUnit * product * (sum + radius) / determinant + 16 * kUnit * radius;
+    node.reach = radius + node.slack;
     return;
   }
   const double span = excess_[removed] - excess_[kept];
@@ -191,6 +193,7 @@ void Polytope<D>::Place(CellNode<D>& node, uint16_t kept, uint16_t removed) {
     node.x[i] = nodes_[kept].x[i] + t * (nodes_[removed].x[i] - nodes_[kept].x[i]);
   }
   node.radius_sq = std::max(nodes_[kept].radius_sq, nodes_[removed].radius_sq);
+  node.reach = std::max(nodes_[kept].reach, nodes_[removed].reach);
   node.slack = std::numeric_limits<double>::infinity();
 }
 
@@ -258,10 +261,11 @@ void Polytope<D>::DropRemovedNodes() {
 
 template <int D>
 void Polytope<D>::UpdateReach() {
-  reach_sq_ = 0;
+  double reach = 0;
   for (const CellNode<D>& node : nodes_) {
-    reach_sq_ = std::max(reach_sq_, node.radius_sq);
+    reach = std::max(reach, node.reach);
   }
+  reach_sq_ = reach * reach;
 }
 
 template <int D>

@@ -36,6 +36,7 @@ template <int D>
 struct CellNode {
   Point<D> x;                      // relative to the site
   double radius_sq = 0;            // |x|^2
+  double reach = 0;                // at least the exact |x|
   double slack = 0;                // twice the error of x in any direction and of products with it, per unit of length
   std::array<uint16_t, D> planes;  // indices of the planes that meet here
   std::array<uint16_t, D> neighbours;  // neighbours[k]: the node at the other end of the edge that leaves planes[k]
@@ -77,8 +78,10 @@ class Polytope {
   bool Reaches(const Box<D>& cube) const;
 
   const Point<D>& site() const { return site_; }
-  // The squared distance from the site to the farthest node.
+  // At least the squared distance from the site to the farthest node.
   double reach_sq() const { return reach_sq_; }
+  // A vertex whose computed squared distance from the site is larger than this cannot cut the cell.
+  double CutLimitSq() const { return 4 * (1 + 0x1p-49) * reach_sq_; }
   std::span<const CellNode<D>> nodes() const { return nodes_; }
   const Plane<D>& plane(int index) const { return planes_[index]; }
   int plane_count() const { return static_cast<int>(planes_.size()); }

@@ -120,7 +120,7 @@ void QueryStructure<D>::ScanOutward(VertexId v, Workspace<D>& workspace, ReachSq
 }
 
 template <int D>
-Neighbor QueryStructure<D>::NearestNeighbor(VertexId v, Workspace<D>& workspace) const {
+Neighbor QueryStructure<D>::ApproximateNearestNeighbor(VertexId v, Workspace<D>& workspace) const {
   const Point<D>& site = point(v);
   Neighbor nearest{kNoVertex, std::numeric_limits<double>::infinity()};
   ScanOutward(
@@ -173,9 +173,8 @@ void QueryStructure<D>::Voronoi(VertexId v, Workspace<D>& workspace) const {
 
 template <int D>
 void QueryStructure<D>::Scan(VertexId v, Workspace<D>& workspace) const {
-  // A vertex cuts only if it is nearer than twice the farthest node; a little is added for rounding.
   ScanOutward(
-      v, workspace, [&] { return 4 * (1 + 0x1p-40) * workspace.cell.reach_sq(); },
+      v, workspace, [&] { return workspace.cell.CutLimitSq(); },
       [&](NodeId leaf) { return workspace.cell.Reaches(tree_.BoxOf(leaf)); },
       [&](NodeId leaf) { CutByLeaf(v, leaf, workspace); });
   workspace.counters.cuts += workspace.cell.cuts();
@@ -192,7 +191,7 @@ void QueryStructure<D>::CutByLeaf(VertexId v, NodeId leaf, Workspace<D>& workspa
   }
   workspace.counters.vertices += bucket->count;
   const Point<D>& site = workspace.cell.site();
-  const double limit_sq = 4 * (1 + 0x1p-40) * workspace.cell.reach_sq();
+  const double limit_sq = workspace.cell.CutLimitSq();
   workspace.near.clear();
   for (uint32_t i = 0; i < bucket->count; ++i) {
     const double distance_sq = DistanceSq<D>(bucket->positions[i], site);

@@ -76,7 +76,7 @@ class QueryStructure {
   // Complexity: O(1) when bottom-up.
   // Errors:     none.
   // Source:     [HT08] Figure 3, APPROXIMATENN.
-  Neighbor NearestNeighbor(VertexId v, Workspace<D>& workspace) const;
+  Neighbor ApproximateNearestNeighbor(VertexId v, Workspace<D>& workspace) const;
 
   // Computes in workspace.cell the Voronoi cell of `v` in the box, clipped by the cube of half side `radius` about v.
   // Ties are kept.
