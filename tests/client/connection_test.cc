@@ -138,12 +138,13 @@ TEST(Connection, SendsEverythingToTheBitInSmallRequests) {
   }
   points[0] = -0.0;
   points[1] = std::numeric_limits<double>::denorm_min();
-  Upload upload;
-  FakeServer server([&upload](grpc::ServerContext&, Stream& stream) {
-    upload = ReadUpload(stream);
+  std::promise<Upload> seen;
+  FakeServer server([&seen](grpc::ServerContext&, Stream& stream) {
+    seen.set_value(ReadUpload(stream));
     return grpc::Status(grpc::StatusCode::NOT_FOUND, "seen");
   });
   EXPECT_EQ(server.Client().MeshPoints(options, points).status(), absl::NotFoundError("seen"));
+  const Upload upload = seen.get_future().get();
   EXPECT_TRUE(upload.in_order);
   EXPECT_LE(upload.largest_request, 1u << 20);
   EXPECT_EQ(upload.parameters.dimension(), 2);
@@ -159,13 +160,13 @@ TEST(Connection, SendsEverythingToTheBitInSmallRequests) {
 }
 
 TEST(Connection, LeavesOutTheDomainWhenThereIsNone) {
-  bool had_domain = true;
-  FakeServer server([&had_domain](grpc::ServerContext&, Stream& stream) {
-    had_domain = ReadUpload(stream).parameters.has_domain();
+  std::promise<Upload> seen;
+  FakeServer server([&seen](grpc::ServerContext&, Stream& stream) {
+    seen.set_value(ReadUpload(stream));
     return grpc::Status(grpc::StatusCode::NOT_FOUND, "");
   });
   EXPECT_FALSE(server.Client().MeshPoints({}, std::vector<double>{1, 2, 3}).ok());
-  EXPECT_FALSE(had_domain);
+  EXPECT_FALSE(seen.get_future().get().parameters.has_domain());
 }
 
 TEST(Connection, ReportsProgressAndReturnsTheMesh) {

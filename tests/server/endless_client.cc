@@ -18,7 +18,7 @@ int main(int argc, char** argv) {
   }
   std::mt19937_64 generator(3);
   std::uniform_real_distribution<double> uniform(0, 1);
-  std::vector<double> points(3 * 300'000);
+  std::vector<double> points(3 * 100'000);
   for (double& coordinate : points) {
     coordinate = uniform(generator);
   }

@@ -10,6 +10,7 @@
 #include "client/client.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include "tests/server/patience.h"
 #include "tests/server/subprocess.h"
 
 namespace wellspace::server {
@@ -100,7 +101,7 @@ TEST(Wellspaced, AKilledClientFreesItsWorker) {
   ASSERT_EQ(client.Wait(), -SIGKILL);
   while (observer.GetServerInfo()->running_jobs != 0 && absl::Now() - killed < absl::Minutes(1)) {
   }
-  EXPECT_LE(absl::Now() - killed, absl::Milliseconds(100));
+  EXPECT_LE(absl::Now() - killed, kIdleWithin);
   daemon.process().Signal(SIGTERM);
   EXPECT_EQ(daemon.process().Wait(), 0);
 }
