@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <string>
 #include <utility>
@@ -260,10 +259,8 @@ absl::StatusOr<Mesh> MeshPointsIn(const MeshParameters& parameters, std::span<co
   WELLSPACE_RETURN_IF_ERROR(CheckDomain<D>(box));
   WELLSPACE_ASSIGN_OR_RETURN(SortedCloud<D> cloud, SortCloud<D>(box, points, context));
 
-  // Vertices have 32-bit numbers, of which the last is none.
   const uint64_t max_vertices =
-      std::min<uint64_t>(parameters.max_vertices == 0 ? kDefaultMaxVertices : parameters.max_vertices,
-                         std::numeric_limits<uint32_t>::max() - 1);
+      std::min(parameters.max_vertices == 0 ? kDefaultMaxVertices : parameters.max_vertices, kMaxVertices);
   const size_t input_count = cloud.points.size();
   if (input_count + (size_t{1} << D) > max_vertices) {
     return absl::ResourceExhaustedError(absl::StrCat("the ", input_count,
@@ -393,10 +390,10 @@ absl::StatusOr<Mesh> MeshPoints(const MeshParameters& parameters, std::span<cons
     return absl::InvalidArgumentError(absl::StrCat(
         "points: ", points.size(), " coordinates are not a multiple of the dimension, ", parameters.dimension));
   }
-  if (points.size() / parameters.dimension >= std::numeric_limits<uint32_t>::max()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("points: ", points.size() / parameters.dimension,
-                     " are more than vertices can be numbered; fewer than 2^32 - 1 are accepted"));
+  if (points.size() / parameters.dimension > kMaxVertices) {
+    return absl::InvalidArgumentError(absl::StrCat("points: ", points.size() / parameters.dimension,
+                                                   " are more than vertices can be numbered; at most ", kMaxVertices,
+                                                   " are accepted"));
   }
   return parameters.dimension == 2 ? MeshPointsIn<2>(parameters, points, context)
                                    : MeshPointsIn<3>(parameters, points, context);

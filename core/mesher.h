@@ -33,7 +33,10 @@ struct MeshParameters {
   int threads = 1;
 };
 
-inline constexpr uint64_t kDefaultMaxVertices = 1'000'000'000;
+// Vertices have 32-bit numbers, of which the last is none.
+inline constexpr uint64_t kMaxVertices = 0xffff'fffe;
+// What a machine with 24 GiB of memory can mesh in 3-D.
+inline constexpr uint64_t kDefaultMaxVertices = 50'000'000;
 
 // The default of `rho` in dimension D; the smallest value that is accepted.
 double DefaultRho(int dimension);

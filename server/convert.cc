@@ -96,10 +96,11 @@ grpc::Status ParametersFromProto(const v1::MeshParameters& message, const Servic
   parameters->threads = std::min(parameters->threads, options.max_threads);
   if (message.max_vertices() > options.max_vertices) {
     return InvalidParameter(absl::StrCat("max_vertices is ", message.max_vertices(), "; this server accepts at most ",
-                                         options.max_vertices, ", or 0 for that"),
+                                         options.max_vertices, ", or 0 for the default"),
                             "max_vertices");
   }
-  parameters->max_vertices = message.max_vertices() == 0 ? options.max_vertices : message.max_vertices();
+  parameters->max_vertices =
+      message.max_vertices() == 0 ? std::min(options.max_vertices, core::kDefaultMaxVertices) : message.max_vertices();
   return Validate(*parameters, "max_vertices");
 }
 

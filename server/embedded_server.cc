@@ -16,8 +16,8 @@ std::unique_ptr<Server> StartWithoutListener(int workers) {
   options.service.workers = std::max(1, workers);
   options.service.max_threads = std::max(1u, std::thread::hardware_concurrency());
   // The process's own machine is the limit: nobody else is to be protected.
-  options.service.max_points = core::kDefaultMaxVertices;
-  options.service.max_vertices = core::kDefaultMaxVertices;
+  options.service.max_points = core::kMaxVertices;
+  options.service.max_vertices = core::kMaxVertices;
   auto log = std::make_shared<spdlog::logger>("embedded", std::make_shared<spdlog::sinks::null_sink_mt>());
   absl::StatusOr<std::unique_ptr<Server>> server = Server::Start(options, std::move(log));
   if (!server.ok()) {

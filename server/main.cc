@@ -49,7 +49,7 @@ void Declare(CLI::App& app, Flags& flags) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   app.add_option("--max-vertices", service.max_vertices, "Most vertices of a mesh")
-      ->check(CLI::Range(uint64_t{1}, core::kDefaultMaxVertices))
+      ->check(CLI::Range(uint64_t{1}, core::kMaxVertices))
       ->capture_default_str();
   // A CLI::Range would let NaN pass.
   const CLI::Validator finite_grace(

@@ -4,6 +4,8 @@
 
 #include <cstdint>
 
+#include "core/mesher.h"
+
 namespace wellspace::server {
 
 // Most bytes of a serialized request message; what gRPC takes by default.
@@ -17,7 +19,7 @@ struct ServiceOptions {
   int max_queued_jobs = 16;  // jobs that wait for a worker
   int max_threads = 1;       // of one job, at least 1
   uint64_t max_points = 10'000'000;
-  uint64_t max_vertices = 100'000'000;
+  uint64_t max_vertices = core::kDefaultMaxVertices;
 };
 
 }  // namespace wellspace::server

@@ -181,7 +181,8 @@ void AddMeshCommand(CLI::App& app, int& exit_code) {
   AddNumber(*mesh, "--margin", command->options.margin,
             "Grow the bounding box of the points on every side by this times its longest side; default: 0.25")
       ->excludes(domain);
-  mesh->add_option("--max-vertices", command->options.max_vertices, "Fail before the mesh has more vertices than this");
+  mesh->add_option("--max-vertices", command->options.max_vertices,
+                   "Fail before the mesh has more vertices than this; 50 million by default");
   mesh->add_option("--threads", command->options.threads, "Threads that mesh; default: the server's choice")
       ->check(CLI::Range(1, 1024));
   AddServer(*mesh, command->server);
