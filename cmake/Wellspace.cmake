@@ -11,6 +11,11 @@ if(WELLSPACE_SANITIZE)
   add_compile_options(-fsanitize=${WELLSPACE_SANITIZE} -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${WELLSPACE_SANITIZE})
 endif()
+if(WELLSPACE_FUZZ)
+  # Everything reports its coverage; only the fuzz targets link libFuzzer's main.
+  add_compile_options(-fsanitize=fuzzer-no-link)
+  add_link_options(-fsanitize=fuzzer-no-link)
+endif()
 
 # wellspace_library(NAME SOURCES… [PUBLIC libs…] [PRIVATE libs…]) makes target wellspace_NAME with alias wellspace::NAME.
 function(wellspace_library name)

@@ -52,11 +52,12 @@ class TableReader {
     }
     if (seen[0] && seen[1]) {
       coordinate_of_field_ = std::move(coordinates);
+      named_dimension_ = seen[2] ? 3 : 2;
     }
   }
 
   absl::Status ReadRow(std::string_view line) {
-    std::array<double, kMaxDimension> point;
+    std::array<double, kMaxDimension> point{};
     int count = 0;
     FieldSplitter fields(line, separator_);
     std::string_view field;
@@ -73,7 +74,7 @@ class TableReader {
       }
     }
     if (cloud_.dimension == 0) {
-      if (absl::Status status = SetDimension(count); !status.ok()) {
+      if (absl::Status status = SetDimension(named_dimension_ != 0 ? named_dimension_ : count); !status.ok()) {
         return status;
       }
     }
@@ -112,6 +113,7 @@ class TableReader {
   char separator_ = ' ';
   bool skip_after_third_ = false;
   std::vector<int> coordinate_of_field_;  // empty: field i holds coordinate i
+  int named_dimension_ = 0;               // coordinates that the header names; 0: none
 };
 
 char SeparatorOf(std::string_view line) {

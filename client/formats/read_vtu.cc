@@ -46,7 +46,7 @@ class VtuReader {
           return xml_.status();
         case XmlScanner::Piece::kEnd:
           return path_.empty() ? absl::OkStatus()
-                               : xml_.Error(absl::StrCat("the file ends inside <", path_.back(), ">"));
+                               : xml_.Error(absl::StrCat("the file ends inside element ", Quote(path_.back())));
         case XmlScanner::Piece::kText:
           break;
         case XmlScanner::Piece::kStartTag:

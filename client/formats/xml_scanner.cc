@@ -105,7 +105,8 @@ bool XmlScanner::ReadAttributes(std::string_view text) {
     if (equals == std::string_view::npos) {
       return false;
     }
-    const std::string_view key = text.substr(0, std::min(equals, text.find_first_of(kSpace)));
+    std::string_view key = text.substr(0, equals);
+    key = key.substr(0, key.find_first_of(kSpace));
     text = SkipSpace(text.substr(equals + 1));
     if (text.empty() || (text[0] != '"' && text[0] != '\'')) {
       return false;

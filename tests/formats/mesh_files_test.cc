@@ -191,7 +191,18 @@ TEST_F(MeshFilesTest, VtuErrors) {
   EXPECT_THAT(message("</Piece>", "</Piece><Piece NumberOfPoints=\"0\" NumberOfCells=\"0\"/>"),
               HasSubstr("expected one <Piece>"));
   EXPECT_THAT(message("</VTKFile>", "<AppendedData/></VTKFile>"), HasSubstr("got appended data"));
+  EXPECT_THAT(message("</UnstructuredGrid>\n</VTKFile>\n", "<\x01>"),
+              HasSubstr("the file ends inside element \"\\x01\""));
   EXPECT_THAT(ReadBad("mesh.vtu", ""), HasSubstr("expected one <Piece>"));
+}
+
+// Every attribute is looked at once, not all that follow it with each of them: that would take hours here.
+TEST_F(MeshFilesTest, VtuTagOfAMillionAttributes) {
+  std::string tag = "<VTKFile ";
+  for (int i = 0; i < 1'000'000; ++i) {
+    tag += "a=''";
+  }
+  EXPECT_THAT(ReadBad("mesh.vtu", tag + ">"), HasSubstr("mesh.vtu:1: expected <VTKFile type="));
 }
 
 // Whatever a cut or a flipped byte does to a file, it is read or refused; under a sanitizer this shows more.

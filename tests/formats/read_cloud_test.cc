@@ -69,6 +69,11 @@ TEST_F(ReadCloudTest, CsvHeaderSelectsNamedColumns) {
   EXPECT_THAT(cloud.points, ElementsAre(1, 2, 3, 4, 5, 6));
 }
 
+TEST_F(ReadCloudTest, CsvRowsHaveEveryColumnThatTheHeaderNames) {
+  EXPECT_EQ(ReadBad("cloud.csv", "x,z,y\n1,2\n"), "cloud.csv:2: expected 3 coordinates, got 2");
+  EXPECT_EQ(ReadBad("cloud.csv", "x,y,name\n1\n"), "cloud.csv:2: expected 2 coordinates, got 1");
+}
+
 TEST_F(ReadCloudTest, XyzPlainSkipsColumnsAfterThird) {
   EXPECT_THAT(ReadGood("cloud.xyz", "1 2 3 255 0 0\n4 5 6 0 255 0\n").points, ElementsAre(1, 2, 3, 4, 5, 6));
   EXPECT_EQ(ReadGood("cloud.xyz", "1 2\n3 4\n").dimension, 2);

@@ -1,0 +1,103 @@
+// Every reader of meshes, on any text, and the decoder of VTK's binary arrays.
+//
+// Input: a digit from 0 to 2, then
+//   0  a .vtu file;
+//   1  a .node file, '|', the .ele file;
+//   2  a byte whose lowest bits say compressed, big-endian, eight-byte header; the bytes of an array before they were put into base64.
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "client/formats/read_mesh.h"
+#include "client/formats/vtk_array.h"
+#include "client/formats/write_mesh.h"
+#include "tests/fuzz/fuzz.h"
+#include "tests/fuzz/scratch_folder.h"
+
+namespace wellspace::fuzz {
+namespace {
+
+using formats::Mesh;
+
+void RequireInvalidArgument(const absl::Status& status) {
+  Require(status.code() == absl::StatusCode::kInvalidArgument, "bad input is an INVALID_ARGUMENT:", status.ToString());
+}
+
+template <typename T>
+bool AreSameBits(const std::vector<T>& a, const std::vector<T>& b) {
+  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
+}
+
+void RequireMesh(const Mesh& mesh) {
+  Require(mesh.dimension == 2 || mesh.dimension == 3, "the dimension is 2 or 3");
+  Require(mesh.points.size() % mesh.dimension == 0, "every vertex has all its coordinates");
+  Require(mesh.simplices.size() % (mesh.dimension + 1) == 0, "every simplex has all its vertices");
+  for (const uint32_t vertex : mesh.simplices) {
+    Require(vertex < mesh.View().vertex_count(), "a simplex has vertices of the mesh");
+  }
+}
+
+// Reads the mesh of `path`, writes it as `copy` and reads that.
+void ReadWriteRead(const std::string& path, const std::string& copy) {
+  const absl::StatusOr<Mesh> mesh = formats::ReadMesh(path);
+  if (!mesh.ok()) {
+    RequireInvalidArgument(mesh.status());
+    RequireClearMessage({mesh.status().message().data(), mesh.status().message().size()});
+    return;
+  }
+  RequireMesh(*mesh);
+  const absl::Status written = formats::WriteMesh(copy, "", mesh->View());
+  Require(written.ok(), "a mesh can be written:", written.ToString());
+  const absl::StatusOr<Mesh> again = formats::ReadMesh(copy);
+  Require(again.ok(), "a mesh can be read again:", again.status().ToString());
+  Require(again->dimension == mesh->dimension && AreSameBits(again->points, mesh->points) &&
+              AreSameBits(again->simplices, mesh->simplices),
+          "a mesh reads back to the bit");
+}
+
+void ReadVtu(std::string_view document) {
+  const ScratchFolder& folder = ScratchFolder::Get();
+  ReadWriteRead(folder.Write("mesh.vtu", document), folder.Path("again.vtu"));
+}
+
+void ReadNodeAndEle(std::string_view both) {
+  const ScratchFolder& folder = ScratchFolder::Get();
+  const size_t split = std::min(both.find('|'), both.size());
+  folder.Write("mesh.ele", both.substr(std::min(split + 1, both.size())));
+  ReadWriteRead(folder.Write("mesh.node", both.substr(0, split)), folder.Path("again.node"));
+}
+
+void DecodeArray(uint8_t flags, std::string_view array) {
+  const formats::VtkEncoding encoding = {
+      .compressed = (flags & 1) != 0, .big_endian = (flags & 2) != 0, .header_word_bytes = (flags & 4) != 0 ? 8 : 4};
+  std::string text;
+  formats::AppendBase64(array, text);
+  const absl::StatusOr<std::string> bytes = formats::DecodeBase64(text);
+  Require(bytes.ok() && *bytes == array, "base64 goes there and back");
+  if (const absl::StatusOr<std::string> decoded = formats::DecodeVtkArray(text, encoding); !decoded.ok()) {
+    RequireInvalidArgument(decoded.status());
+  }
+}
+
+}  // namespace
+}  // namespace wellspace::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  wellspace::fuzz::ByteReader bytes(data, size);
+  switch (static_cast<uint8_t>(bytes.Next() - '0') % 3) {
+    case 0:
+      wellspace::fuzz::ReadVtu(bytes.TakeText());
+      break;
+    case 1:
+      wellspace::fuzz::ReadNodeAndEle(bytes.TakeText());
+      break;
+    default: {
+      const uint8_t flags = bytes.Next();
+      wellspace::fuzz::DecodeArray(flags, bytes.TakeText());
+    }
+  }
+  return 0;
+}
