@@ -152,7 +152,8 @@ PlaneName NameOf(const Plane<D>& plane) {
 template <int D>
 ExactCell<D> ComputeExactCell(std::span<const IntegerPoint<D>> vertices, size_t site, const IntegerPoint<D>& low,
                               const IntegerPoint<D>& high, bool weighted) {
-  const auto [planes, shift] = PlanesOf<D>(vertices, site, low, high, weighted);
+  const ExactPlanes<D> exact = PlanesOf<D>(vertices, site, low, high, weighted);
+  const std::vector<ExactPlane<D>>& planes = exact.planes;  // clang 14 captures no structured bindings
   ExactCell<D> cell;
   ForEachChoice<D>(planes.size(), [&](const std::array<size_t, D>& chosen) {
     if (std::find(chosen.begin(), chosen.end(), site) != chosen.end()) {
@@ -175,7 +176,7 @@ ExactCell<D> ComputeExactCell(std::span<const IntegerPoint<D>> vertices, size_t 
     Point<D> position;
     for (int k = 0; k < D; ++k) {
       name[k] = static_cast<PlaneName>(chosen[k] < vertices.size() ? 2 * D + chosen[k] : chosen[k] - vertices.size());
-      const cpp_int scale = x->denominator << (shift + 1);
+      const cpp_int scale = x->denominator << (exact.shift + 1);
       position[k] = static_cast<double>(cpp_rational(x->numerator[k], scale)) + 0.0;
     }
     std::sort(name.begin(), name.end());
