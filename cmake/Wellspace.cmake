@@ -10,6 +10,8 @@ endif()
 if(WELLSPACE_SANITIZE)
   add_compile_options(-fsanitize=${WELLSPACE_SANITIZE} -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${WELLSPACE_SANITIZE})
+  # What sanitizers add to the code makes g++ see uninitialised values that are none.
+  target_compile_options(wellspace_options INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
 endif()
 if(WELLSPACE_FUZZ)
   # Everything reports its coverage; only the fuzz targets link libFuzzer's main.

@@ -34,6 +34,9 @@ constexpr int kMaxScaleExponent = 60;
 // A leaf of the tree holds more than one in kLeavesPerVertex of the finished mesh's vertices; see RefinementParameters.
 constexpr uint64_t kLeavesPerVertex = 8;
 
+// Larger ones leave no room for sums and products.
+constexpr double kMaxCoordinate = 0x1p1000;
+
 // Cheap steps between two looks at the context.
 constexpr size_t kCheckInterval = size_t{1} << 16;
 
@@ -99,10 +102,10 @@ template <int D>
 absl::Status CheckDomain(const Box<D>& box) {
   double magnitude = 0;
   for (int i = 0; i < D; ++i) {
-    if (!std::isfinite(box.low[i]) || !std::isfinite(box.high[i]) || !std::isfinite(box.high[i] - box.low[i])) {
-      return absl::InvalidArgumentError(absl::StrCat("domain: its extent along axis ", i, ", from ", box.low[i], " to ",
-                                                     box.high[i],
-                                                     ", is beyond the range of doubles; scale the points down"));
+    if (!(std::abs(box.low[i]) <= kMaxCoordinate && std::abs(box.high[i]) <= kMaxCoordinate)) {
+      return absl::InvalidArgumentError(absl::StrFormat(
+          "domain: along axis %d it goes from %g to %g; coordinates must be at most 2^1000; scale the points down", i,
+          box.low[i], box.high[i]));
     }
     magnitude = std::max({magnitude, std::abs(box.low[i]), std::abs(box.high[i])});
   }
@@ -172,7 +175,16 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Box<D>& box, std::span<const doub
           "points[", i, "] = ", FormatCoordinates(p), " lies outside the domain ", FormatCoordinates(box.low), " to ",
           FormatCoordinates(box.high), "; enlarge the domain or drop the point"));
     }
-    entries[i] = {grid.CubeOf(scaled(p)), static_cast<uint32_t>(i)};
+    const Point<D> scaled_p = scaled(p);
+    for (int k = 0; k < D; ++k) {
+      if (scaled_p[k] / cloud.scale != p[k]) {
+        return absl::InvalidArgumentError(absl::StrFormat(
+            "points[%d]: coordinate %d is %g, too small for the arithmetic of doubles beside a domain of "
+            "side %g; make it 0, or give a smaller domain",
+            i, k, p[k], box.LongestSide()));
+      }
+    }
+    entries[i] = {grid.CubeOf(scaled_p), static_cast<uint32_t>(i)};
   }
   // Points of one cube are equal, or too close to be served.
   WELLSPACE_RETURN_IF_ERROR(CancellableSort(
