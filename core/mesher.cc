@@ -31,7 +31,7 @@ constexpr double kMinEdgeSteps = 4;
 // lengths overflows.
 constexpr int kMaxScaleExponent = 60;
 
-// A leaf of the tree holds more than one in kLeavesPerVertex of the finished mesh's vertices; see RefinementParameters.
+// Leaves that the tree may have for each vertex of the budget; around isolated close pairs balance costs up to about two.
 constexpr uint64_t kLeavesPerVertex = 8;
 
 // Larger ones leave no room for sums and products.
