@@ -7,18 +7,37 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "core/base/dimensions.h"
 #include "core/base/run_context.h"
 
 namespace wellspace::core {
 
-inline constexpr int kMinDimension = 2;
-inline constexpr int kMaxDimension = 3;
+// What every simplex has to be.
+enum class Criterion {
+  kRadiusEdge,  // circumradius <= rho * (its shortest edge); what Ruppert, Shewchuk, Triangle and TetGen promise
+  kWellSpaced,  // [HT08]'s: no node of a vertex's Voronoi cell is farther from it than rho * (distance to its nearest
+                // neighbour); stronger, and three to four times as many vertices
+};
+
+// A box in which simplices are small.
+struct SizeBox {
+  std::vector<double> low;   // dimension
+  std::vector<double> high;  // dimension
+  // No simplex whose circumball meets the box has a larger circumradius.
+  double max_circumradius = 0;
+};
 
 struct MeshParameters {
-  int dimension = 3;
+  int dimension = 3;  // kMinDimension to kMaxDimension
 
-  // Bound on circumradius / shortest edge of every simplex. 0 means the default: sqrt(2) in 2-D, 2 in 3-D.
+  // The bound of the criterion. 0 means DefaultRho(dimension).
   double rho = 0;
+  Criterion criterion = Criterion::kRadiusEdge;
+
+  // No simplex has a larger circumradius. 0 means no bound.
+  double max_circumradius = 0;
+  // Boxes in which it is smaller still. Away from a box, sizes grow no faster than the distance from it.
+  std::vector<SizeBox> size_boxes;
 
   // Low and high corner of the box to be meshed, `dimension` numbers each. Both empty: the bounding box of the points,
   // grown on every side by `margin` times its longest side.

@@ -1,0 +1,16 @@
+// The dimensions that the core is built for.
+#ifndef WELLSPACE_CORE_BASE_DIMENSIONS_H_
+#define WELLSPACE_CORE_BASE_DIMENSIONS_H_
+
+namespace wellspace::core {
+
+inline constexpr int kMinDimension = 2;
+inline constexpr int kMaxDimension = 6;
+
+}  // namespace wellspace::core
+
+// Expands X(D) for every dimension: the explicit instantiations at the end of a source file. Headers declare templates
+// whose definitions only that file has.
+#define WELLSPACE_FOR_EACH_DIMENSION(X) X(2) X(3) X(4) X(5) X(6)
+
+#endif  // WELLSPACE_CORE_BASE_DIMENSIONS_H_
