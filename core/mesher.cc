@@ -3,39 +3,34 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 #include <numeric>
-#include <string>
+#include <optional>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_format.h"
-#include "absl/strings/str_join.h"
-#include "core/base/cancellable_sort.h"
+#include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
-#include "core/geometry/box.h"
+#include "core/input_cloud.h"
 #include "core/refine/refine.h"
+#include "core/simplex/quality.h"
 #include "core/simplex/simplices.h"
-#include "core/tree/morton.h"
+#include "core/simplex/validate.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {
 namespace {
 
-// Vertices nearer than this many steps of the Morton grid are refused as input: coordinates of Steiner points around
-// them would be too coarse to keep rho. The refinement gives up on shorter edges than its own bound.
-constexpr double kMinInputSteps = 64;
+// The refinement gives up on edges of fewer steps of the Morton grid.
 constexpr double kMinEdgeSteps = 4;
-
-// The longest side of a domain is scaled to about 1 when it is beyond these powers of two, so that no product of
-// lengths overflows.
-constexpr int kMaxScaleExponent = 60;
 
 // Leaves that the tree may have for each vertex of the budget; around isolated close pairs balance costs up to about two.
 constexpr uint64_t kLeavesPerVertex = 8;
 
-// Larger ones leave no room for sums and products.
-constexpr double kMaxCoordinate = 0x1p1000;
+// Two ways to compute the quality of a simplex differ by less.
+constexpr double kWorstTolerance = 1e-9;
 
 // Cheap steps between two looks at the context.
 constexpr size_t kCheckInterval = size_t{1} << 16;
@@ -46,319 +41,485 @@ uint64_t PeakMemoryBytes() {
   return static_cast<uint64_t>(usage.ru_maxrss) * 1024;
 }
 
-std::string FormatCoordinates(std::span<const double> p) {
-  return absl::StrCat(
-      "(", absl::StrJoin(p, ", ", [](std::string* out, double x) { absl::StrAppendFormat(out, "%.17g", x); }), ")");
+uint64_t VertexBudget(const MeshParameters& parameters) {
+  return std::min(parameters.max_vertices == 0 ? kDefaultMaxVertices : parameters.max_vertices, kMaxVertices);
 }
 
 template <int D>
-Point<D> PointAt(std::span<const double> points, size_t index) {
-  Point<D> p;
-  std::copy_n(points.begin() + static_cast<std::ptrdiff_t>(index * D), D, p.begin());
-  return p;
-}
-
-template <int D>
-absl::Status CheckFinite(std::span<const double> points) {
-  for (size_t i = 0; i < points.size(); ++i) {
-    if (!std::isfinite(points[i])) {
-      return absl::InvalidArgumentError(absl::StrCat("points[", i / D, "]: coordinate ", i % D, " is ", points[i],
-                                                     "; coordinates must be finite numbers"));
-    }
-  }
-  return absl::OkStatus();
-}
-
-template <int D>
-absl::StatusOr<Box<D>> DomainOf(const MeshParameters& parameters, std::span<const double> points) {
+Box<D> BoxOf(const std::vector<double>& low, const std::vector<double>& high) {
   Box<D> box;
-  if (!parameters.domain_low.empty()) {
-    std::copy_n(parameters.domain_low.begin(), D, box.low.begin());
-    std::copy_n(parameters.domain_high.begin(), D, box.high.begin());
-    return box;
-  }
-  if (points.empty()) {
-    return absl::InvalidArgumentError(
-        "points: there are none and no domain is given; give a domain or at least one point");
-  }
-  box.low = box.high = PointAt<D>(points, 0);
-  for (size_t i = 0; i < points.size(); ++i) {
-    box.low[i % D] = std::min(box.low[i % D], points[i]);
-    box.high[i % D] = std::max(box.high[i % D], points[i]);
-  }
-  double side = box.LongestSide();
-  if (side == 0) {
-    side = 1;  // one point, once or more often: any size serves
-  }
-  const double grow = parameters.margin * side;
-  for (int i = 0; i < D; ++i) {
-    box.low[i] -= grow;
-    box.high[i] += grow;
-  }
+  std::copy_n(low.begin(), D, box.low.begin());
+  std::copy_n(high.begin(), D, box.high.begin());
   return box;
 }
 
-template <int D>
-absl::Status CheckDomain(const Box<D>& box) {
-  double magnitude = 0;
-  for (int i = 0; i < D; ++i) {
-    if (!(std::abs(box.low[i]) <= kMaxCoordinate && std::abs(box.high[i]) <= kMaxCoordinate)) {
-      return absl::InvalidArgumentError(absl::StrFormat(
-          "domain: along axis %d it goes from %g to %g; coordinates must be at most 2^1000; scale the points down", i,
-          box.low[i], box.high[i]));
-    }
-    magnitude = std::max({magnitude, std::abs(box.low[i]), std::abs(box.high[i])});
-  }
-  for (int i = 0; i < D; ++i) {
-    // The negation also catches a margin of zero around points in a plane.
-    if (!(box.high[i] - box.low[i] > 0x1p-40 * magnitude) || box.high[i] - box.low[i] < 0x1p-900) {
-      return absl::InvalidArgumentError(absl::StrFormat(
-          "domain: its extent along axis %d, from %.17g to %.17g, is too small; it must be at least 2^-40 of the "
-          "largest coordinate, %g; give a larger domain or margin, or move the points nearer to the origin",
-          i, box.low[i], box.high[i], magnitude));
-    }
+absl::Status CheckThreads(int threads) {
+  if (threads < 1 || threads > 1024) {
+    return absl::InvalidArgumentError(absl::StrCat("threads: ", threads, " is not allowed; 1 to 1024 is"));
   }
   return absl::OkStatus();
 }
 
-// The distinct points of a cloud in the order that the query structure wants, scaled by a power of two.
+// Refuses what is no whole number of points.
+absl::Status CheckShape(std::span<const double> points, int dimension) {
+  if (points.size() % dimension != 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("points: ", points.size(), " coordinates are not a multiple of the dimension, ", dimension));
+  }
+  if (points.size() / dimension > kMaxVertices) {
+    return absl::InvalidArgumentError(absl::StrCat("points: ", points.size() / dimension,
+                                                   " are more than vertices can be numbered; at most ", kMaxVertices,
+                                                   " are accepted"));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckSizeBox(const SizeBox& size, size_t index, int dimension) {
+  const auto refuse = [index](const auto&... text) {
+    return absl::InvalidArgumentError(absl::StrCat("size_boxes[", index, "]", text...));
+  };
+  if (size.low.size() != static_cast<size_t>(dimension) || size.high.size() != static_cast<size_t>(dimension)) {
+    return refuse(": ", size.low.size(), " low and ", size.high.size(), " high coordinates; ", dimension,
+                  " of each are needed");
+  }
+  for (int i = 0; i < dimension; ++i) {
+    if (!(std::isfinite(size.low[i]) && std::isfinite(size.high[i]) && size.low[i] <= size.high[i])) {
+      return refuse(": along axis ", i, " it goes from ", size.low[i], " to ", size.high[i],
+                    "; finite numbers are needed, the low one not above the high one");
+    }
+  }
+  if (!(size.max_circumradius > 0 && std::isfinite(size.max_circumradius))) {
+    return refuse(".max_circumradius: ", size.max_circumradius, " is not allowed; a number above 0 is");
+  }
+  return absl::OkStatus();
+}
+
 template <int D>
-struct SortedCloud {
-  double scale = 1;
-  Box<D> box;
-  double grid_step = 0;
-  std::vector<Point<D>> points;        // distinct, in Morton order
-  std::vector<uint32_t> first_input;   // by sorted point: the first input equal to it
-  std::vector<uint32_t> input_vertex;  // by input: its rank among the distinct points in the order of first appearance
-  std::vector<uint32_t> output_index;  // by sorted point: the same rank
+class MesherIn final : public Mesher {
+ public:
+  absl::Status Initialize(const MeshParameters& parameters, std::span<const double> points, RunContext& context) {
+    WELLSPACE_RETURN_IF_ERROR(CheckShape(points, D));
+    context.EnterPhase(Phase::kTree);
+    Box<D> box;
+    if (parameters.domain_low.empty()) {
+      WELLSPACE_ASSIGN_OR_RETURN(box, BoxAround<D>(points, parameters.margin));
+    } else {
+      box = BoxOf<D>(parameters.domain_low, parameters.domain_high);
+    }
+    WELLSPACE_ASSIGN_OR_RETURN(domain_, Domain<D>::Of(box));
+    WELLSPACE_ASSIGN_OR_RETURN(const SortedCloud<D> cloud, SortCloud<D>(domain_, points, context));
+    const size_t distinct = cloud.points.size();
+    const uint64_t max_vertices = VertexBudget(parameters);
+    if (distinct + (size_t{1} << D) > max_vertices) {
+      return absl::ResourceExhaustedError(
+          absl::StrCat("the ", distinct, " distinct points and the domain's corners are more than ",
+                       "max_vertices = ", max_vertices, " vertices; raise max_vertices"));
+    }
+    WELLSPACE_RETURN_IF_ERROR(
+        structure_.Initialize(domain_.scaled_box, cloud.points, kLeavesPerVertex * max_vertices + (1u << D), context));
+    WELLSPACE_RETURN_IF_ERROR(CheckSeparation<D>(domain_, cloud, structure_, points, context));
+
+    // Vertices are named in the order of the input's first appearances.
+    std::vector<uint32_t> rank(distinct);
+    uint32_t next = 0;
+    input_vertex_.resize(cloud.sorted_index.size());
+    for (uint32_t i = 0; i < cloud.sorted_index.size(); ++i) {
+      const uint32_t sorted = cloud.sorted_index[i];
+      if (cloud.first_input[sorted] == i) {
+        NoteNegativeZeros(points, i, next);
+        rank[sorted] = next++;
+      }
+      input_vertex_[i] = rank[sorted];
+    }
+    output_index_ = std::move(rank);
+    vertex_at_.resize(distinct);
+    for (uint32_t i = 0; i < distinct; ++i) {
+      vertex_at_[output_index_[i]] = VertexId{i};
+    }
+    distinct_count_ = distinct;
+    distinct_input_ = distinct;
+    refinement_.emplace(structure_, kMinEdgeSteps * domain_.grid_step);
+    context.SetVertices(structure_.vertex_count());
+    context.SetEstimatedVertices(distinct + structure_.tree().leaf_count());
+    tree_seconds_ = absl::ToDoubleSeconds(context.TimeIn(Phase::kTree));
+    return absl::OkStatus();
+  }
+
+  int dimension() const override { return D; }
+  uint64_t vertex_count() const override { return structure_.vertex_count(); }
+
+  absl::Status Refine(const MeshParameters& parameters, RunContext& context) override {
+    WELLSPACE_RETURN_IF_ERROR(ValidateParameters(parameters));
+    if (parameters.dimension != D) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("dimension: ", parameters.dimension, " is not that of the mesh, ", D));
+    }
+    context.EnterPhase(Phase::kRefinement);
+    Demands<D> demands;
+    demands.criterion = parameters.criterion;
+    demands.rho = parameters.rho == 0 ? DefaultRho(D) : parameters.rho;
+    if (parameters.max_circumradius != 0) {
+      demands.sizes.max_circumradius = parameters.max_circumradius * domain_.scale;
+    }
+    for (const SizeBox& size : parameters.size_boxes) {
+      const Box<D> box = BoxOf<D>(size.low, size.high);
+      demands.sizes.regions.push_back(
+          {{domain_.Scaled(box.low), domain_.Scaled(box.high)}, size.max_circumradius * domain_.scale});
+    }
+    is_refined_ = false;
+    absl::Status status = refinement_->Run(demands, VertexBudget(parameters), context);
+    is_refined_ = status.ok();
+    refinement_seconds_ += absl::ToDoubleSeconds(context.TimeIn(Phase::kRefinement));
+    return status;
+  }
+
+  absl::StatusOr<std::vector<uint32_t>> AddPoints(std::span<const double> points, RunContext& context) override {
+    WELLSPACE_RETURN_IF_ERROR(CheckShape(points, D));
+    WELLSPACE_ASSIGN_OR_RETURN(const SortedCloud<D> cloud, SortCloud<D>(domain_, points, context));
+    // The points among themselves, and beside the faces of the box.
+    QueryStructure<D> apart;
+    WELLSPACE_RETURN_IF_ERROR(
+        apart.Initialize(domain_.scaled_box, cloud.points, kLeavesPerVertex * kDefaultMaxVertices, context));
+    WELLSPACE_RETURN_IF_ERROR(CheckSeparation<D>(domain_, cloud, apart, points, context));
+    std::vector<VertexId> known(cloud.points.size(), kNoVertex);
+    for (size_t i = 0; i < cloud.points.size(); ++i) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+      WELLSPACE_ASSIGN_OR_RETURN(known[i], Find(cloud.points[i], points, cloud.first_input[i]));
+    }
+    if (structure_.vertex_count() + cloud.points.size() > kMaxVertices) {
+      return absl::ResourceExhaustedError(absl::StrCat("points: ", cloud.points.size(), " beside ", vertex_count(),
+                                                       " vertices are more than can be numbered, ", kMaxVertices));
+    }
+    for (size_t i = 0; i < cloud.points.size(); ++i) {
+      if (known[i] == kNoVertex) {
+        known[i] = Add(kNoVertex, cloud.points[i]);
+        ++distinct_input_;
+        NoteNegativeZeros(points, cloud.first_input[i], OutputIndex(known[i]));
+      }
+    }
+    std::vector<uint32_t> vertices;
+    vertices.reserve(cloud.sorted_index.size());
+    for (const uint32_t sorted : cloud.sorted_index) {
+      vertices.push_back(OutputIndex(known[sorted]));
+    }
+    input_vertex_.insert(input_vertex_.end(), vertices.begin(), vertices.end());
+    context.SetVertices(structure_.vertex_count());
+    return vertices;
+  }
+
+  absl::StatusOr<uint32_t> AddVertex(uint32_t near, std::span<const double> point) override {
+    WELLSPACE_RETURN_IF_ERROR(CheckVertices({&near, 1}));
+    if (point.size() != D) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("point: it has ", point.size(), " coordinates; ", D, " are needed"));
+    }
+    if (structure_.vertex_count() >= kMaxVertices) {
+      return absl::ResourceExhaustedError(absl::StrCat("no more than ", kMaxVertices, " vertices can be numbered"));
+    }
+    const RunContext context;
+    WELLSPACE_ASSIGN_OR_RETURN(const SortedCloud<D> cloud, SortCloud<D>(domain_, point, context));
+    const VertexId start = VertexOf(near);
+    WELLSPACE_ASSIGN_OR_RETURN(VertexId v, Find(cloud.points[0], point, 0, start));
+    if (v == kNoVertex) {
+      v = Add(start, cloud.points[0]);
+      ++distinct_input_;
+      NoteNegativeZeros(point, 0, OutputIndex(v));
+    }
+    input_vertex_.push_back(OutputIndex(v));
+    return OutputIndex(v);
+  }
+
+  absl::StatusOr<std::vector<double>> NearestNeighborDistances(std::span<const uint32_t> vertices) const override {
+    WELLSPACE_RETURN_IF_ERROR(CheckVertices(vertices));
+    std::vector<double> distances;
+    distances.reserve(vertices.size());
+    Workspace<D> workspace;
+    for (const uint32_t vertex : vertices) {
+      const double distance_sq = structure_.ApproximateNearestNeighbor(VertexOf(vertex), workspace).distance_sq;
+      distances.push_back(std::sqrt(distance_sq) / domain_.scale);
+    }
+    return distances;
+  }
+
+  absl::StatusOr<std::vector<Cell>> ClippedCells(std::span<const uint32_t> vertices, double beta) const override {
+    WELLSPACE_RETURN_IF_ERROR(CheckVertices(vertices));
+    if (!(beta >= 1 && std::isfinite(beta))) {
+      return absl::InvalidArgumentError(absl::StrCat("beta: ", beta, " is not allowed; a number of at least 1 is"));
+    }
+    std::vector<Cell> cells;
+    cells.reserve(vertices.size());
+    Workspace<D> workspace;
+    for (const uint32_t vertex : vertices) {
+      const VertexId v = VertexOf(vertex);
+      const double nearest = std::sqrt(structure_.ApproximateNearestNeighbor(v, workspace).distance_sq);
+      structure_.ClippedVoronoi(v, beta * nearest, workspace);
+      cells.push_back(Describe(vertex, beta * nearest, workspace.cell));
+    }
+    return cells;
+  }
+
+  absl::StatusOr<Mesh> Extract(int threads, RunContext& context) override {
+    WELLSPACE_RETURN_IF_ERROR(CheckRefined(threads));
+    context.EnterPhase(Phase::kSimplices);
+    ExtendOutputIndex();
+    WELLSPACE_ASSIGN_OR_RETURN(Simplices simplices, ComputeSimplices<D>(structure_, output_index_, threads, context));
+    Mesh mesh;
+    mesh.dimension = D;
+    mesh.domain_low.assign(domain_.box.low.begin(), domain_.box.low.end());
+    mesh.domain_high.assign(domain_.box.high.begin(), domain_.box.high.end());
+    WELLSPACE_RETURN_IF_ERROR(AppendPoints(0, mesh.points, context));
+    mesh.simplices = std::move(simplices.indices);
+    mesh.input_vertex = input_vertex_;
+    mesh.statistics.max_radius_edge = simplices.max_radius_edge;
+    mesh.statistics.min_angle_deg = simplices.min_angle_deg;
+    stars_.Add(simplices.counters);
+    context.EnterPhase(Phase::kDone);
+    simplices_seconds_ += absl::ToDoubleSeconds(context.TimeIn(Phase::kSimplices));
+    FinishMesh(mesh);
+    return mesh;
+  }
+
+  absl::Status Update(Mesh& mesh, int threads, RunContext& context) override {
+    WELLSPACE_RETURN_IF_ERROR(CheckRefined(threads));
+    if (mesh.dimension != D || mesh.vertex_count() != extracted_vertices_ ||
+        mesh.simplex_count() != extracted_simplices_) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("mesh: it has ", mesh.vertex_count(), " vertices and ", mesh.simplex_count(), " simplices in ",
+                       mesh.dimension, "-D; the last that was extracted has ", extracted_vertices_, " and ",
+                       extracted_simplices_, " in ", D, "-D, and only that can be updated"));
+    }
+    context.EnterPhase(Phase::kSimplices);
+    ExtendOutputIndex();
+    WELLSPACE_ASSIGN_OR_RETURN(
+        const std::vector<VertexId> changed,
+        ChangedVertices<D>(structure_, VertexId{static_cast<uint32_t>(extracted_vertices_)}, context));
+    WELLSPACE_ASSIGN_OR_RETURN(Simplices simplices,
+                               ComputeSimplicesAmong<D>(structure_, changed, output_index_, threads, context));
+    std::vector<double> added;
+    WELLSPACE_RETURN_IF_ERROR(AppendPoints(extracted_vertices_, added, context));
+    mesh.points.insert(mesh.points.end(), added.begin(), added.end());
+    const bool worst_has_gone = DropSimplicesAmong(changed, mesh);
+    mesh.simplices.insert(mesh.simplices.end(), simplices.indices.begin(), simplices.indices.end());
+    mesh.input_vertex = input_vertex_;
+    if (worst_has_gone) {
+      const QualityReport report = MeasureQuality({D, mesh.points, mesh.simplices});
+      mesh.statistics.max_radius_edge = report.max_radius_edge;
+      mesh.statistics.min_angle_deg = report.min_angle_deg;
+    } else {
+      mesh.statistics.max_radius_edge = std::max(mesh.statistics.max_radius_edge, simplices.max_radius_edge);
+      mesh.statistics.min_angle_deg = std::min(mesh.statistics.min_angle_deg, simplices.min_angle_deg);
+    }
+    stars_.Add(simplices.counters);
+    context.EnterPhase(Phase::kDone);
+    simplices_seconds_ += absl::ToDoubleSeconds(context.TimeIn(Phase::kSimplices));
+    FinishMesh(mesh);
+    return absl::OkStatus();
+  }
+
+ private:
+  // Refuses numbers that are no vertex.
+  absl::Status CheckVertices(std::span<const uint32_t> vertices) const {
+    for (size_t i = 0; i < vertices.size(); ++i) {
+      if (vertices[i] >= structure_.vertex_count()) {
+        return absl::OutOfRangeError(
+            absl::StrCat("vertices[", i, "]: ", vertices[i], " is no vertex; there are ", structure_.vertex_count()));
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status CheckRefined(int threads) const {
+    if (!is_refined_) {
+      return absl::FailedPreconditionError(
+          "the mesh has not been refined since vertices were last added; refine it first");
+    }
+    return CheckThreads(threads);
+  }
+
+  // Vertices beyond the distinct input points have the same number outside as inside.
+  uint32_t OutputIndex(VertexId v) const { return Index(v) < distinct_count_ ? output_index_[Index(v)] : Index(v); }
+  VertexId VertexOf(uint32_t output_index) const {
+    return output_index < distinct_count_ ? vertex_at_[output_index] : VertexId{output_index};
+  }
+  void ExtendOutputIndex() {
+    const auto old = static_cast<std::ptrdiff_t>(output_index_.size());
+    output_index_.resize(structure_.vertex_count());
+    std::iota(output_index_.begin() + old, output_index_.end(), static_cast<uint32_t>(old));
+  }
+
+  // The vertex at `p`, which is input `index` of `points`; kNoVertex if there is none, and none too close.
+  absl::StatusOr<VertexId> Find(const Point<D>& p, std::span<const double> points, size_t index,
+                                VertexId near = kNoVertex) {
+    const auto [nearest, distance_sq] = structure_.NearestTo(p, near, workspace_);
+    if (distance_sq == 0) {
+      return nearest;
+    }
+    if (distance_sq < domain_.MinSeparation() * domain_.MinSeparation()) {
+      return TooCloseError<D>(domain_, points, index, std::sqrt(distance_sq),
+                              absl::StrCat("vertex ", OutputIndex(nearest)));
+    }
+    return kNoVertex;
+  }
+
+  VertexId Add(VertexId near, const Point<D>& p) {
+    const VertexId v = structure_.AddVertex(near, p);
+    refinement_->VertexAdded(v);
+    is_refined_ = false;
+    return v;
+  }
+
+  // The computation has no negative zeros, the mesh those of its points.
+  void NoteNegativeZeros(std::span<const double> points, size_t index, uint32_t vertex) {
+    for (int k = 0; k < D; ++k) {
+      const double x = points[index * D + k];
+      if (x == 0 && std::signbit(x)) {
+        negative_zeros_.push_back(size_t{vertex} * D + k);
+      }
+    }
+  }
+
+  // Appends the coordinates of the vertices from number `first` on.
+  absl::Status AppendPoints(uint64_t first, std::vector<double>& out, const RunContext& context) const {
+    const uint64_t count = structure_.vertex_count();
+    out.reserve(out.size() + (count - first) * D);
+    for (uint64_t i = first; i < count; ++i) {
+      if (i % kCheckInterval == 0) {
+        WELLSPACE_RETURN_IF_ERROR(context.Check());
+      }
+      const Point<D> p = domain_.Unscaled(structure_.point(VertexOf(static_cast<uint32_t>(i))));
+      out.insert(out.end(), p.begin(), p.end());
+    }
+    for (const size_t at : negative_zeros_) {
+      if (at >= first * D) {
+        out[at - first * D] = -0.0;
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  // Removes from `mesh` the simplices all of whose vertices are in `vertices`; returns whether one of them may have been
+  // the worst.
+  bool DropSimplicesAmong(std::span<const VertexId> vertices, Mesh& mesh) const {
+    std::vector<bool> is_among(structure_.vertex_count(), false);
+    for (const VertexId v : vertices) {
+      is_among[OutputIndex(v)] = true;
+    }
+    bool worst_has_gone = false;
+    const size_t size = mesh.simplices.size();
+    size_t kept = 0;
+    for (size_t at = 0; at < size; at += D + 1) {
+      const uint32_t* corners = &mesh.simplices[at];
+      if (!std::all_of(corners, corners + D + 1, [&](uint32_t vertex) { return is_among[vertex]; })) {
+        std::copy_n(corners, D + 1, &mesh.simplices[kept]);
+        kept += D + 1;
+        continue;
+      }
+      Simplex<D> simplex;
+      for (int k = 0; k <= D; ++k) {
+        simplex[k] = structure_.point(VertexOf(corners[k]));
+      }
+      worst_has_gone = worst_has_gone ||
+                       RadiusEdgeRatio<D>(simplex) >= mesh.statistics.max_radius_edge * (1 - kWorstTolerance) ||
+                       Angles<D>(simplex).min_deg <= mesh.statistics.min_angle_deg * (1 + kWorstTolerance);
+    }
+    mesh.simplices.resize(kept);
+    return worst_has_gone;
+  }
+
+  Cell Describe(uint32_t vertex, double clip_radius, const Polytope<D>& polytope) const {
+    Cell cell;
+    cell.vertex = vertex;
+    cell.clip_radius = clip_radius / domain_.scale;
+    for (const CellNode<D>& node : polytope.nodes()) {
+      Point<D> x = polytope.site();
+      for (int k = 0; k < D; ++k) {
+        x[k] += node.x[k];
+      }
+      x = domain_.Unscaled(x);
+      cell.nodes.insert(cell.nodes.end(), x.begin(), x.end());
+      for (const uint16_t index : node.planes) {
+        const Plane<D>& plane = polytope.plane(index);
+        cell.is_clipped = cell.is_clipped || plane.kind == PlaneKind::kClip;
+        if (plane.kind == PlaneKind::kBisector) {
+          cell.neighbours.push_back(OutputIndex(plane.vertex));
+        }
+      }
+    }
+    std::sort(cell.neighbours.begin(), cell.neighbours.end());
+    cell.neighbours.erase(std::unique(cell.neighbours.begin(), cell.neighbours.end()), cell.neighbours.end());
+    return cell;
+  }
+
+  // Notes an extracted mesh, and sets its statistics but for those of its simplices' shapes.
+  void FinishMesh(Mesh& mesh) {
+    extracted_vertices_ = structure_.vertex_count();
+    extracted_simplices_ = mesh.simplex_count();
+    const QueryCounters cells = refinement_->counters();
+    MeshStatistics& statistics = mesh.statistics;
+    statistics.input_points = input_vertex_.size();
+    statistics.duplicates = input_vertex_.size() - distinct_input_;
+    statistics.vertices = mesh.vertex_count();
+    statistics.simplices = mesh.simplex_count();
+    statistics.tree_seconds = tree_seconds_;
+    statistics.refinement_seconds = refinement_seconds_;
+    statistics.simplices_seconds = simplices_seconds_;
+    statistics.total_seconds = tree_seconds_ + refinement_seconds_ + simplices_seconds_;
+    statistics.peak_memory_bytes = PeakMemoryBytes();
+    statistics.tree_leaves = structure_.tree().leaf_count();
+    statistics.cells_computed = cells.queries;
+    statistics.leaves_visited = cells.leaves;
+    statistics.vertices_visited = cells.vertices;
+    statistics.cuts = cells.cuts;
+    statistics.max_leaves_visited = cells.max_leaves;
+    statistics.stars_computed = stars_.queries;
+    statistics.star_leaves_visited = stars_.leaves;
+    statistics.star_vertices_visited = stars_.vertices;
+    statistics.star_cuts = stars_.cuts;
+    statistics.max_star_leaves_visited = stars_.max_leaves;
+    statistics.exact_predicates = cells.decisions.exact + stars_.decisions.exact;
+    statistics.perturbed_predicates = cells.decisions.perturbed + stars_.decisions.perturbed;
+  }
+
+  Domain<D> domain_;
+  QueryStructure<D> structure_;
+  std::optional<Refinement<D>> refinement_;
+  bool is_refined_ = false;
+
+  uint64_t distinct_count_ = 0;         // vertices that were given to Initialize
+  std::vector<uint32_t> output_index_;  // by vertex; of the first distinct_count_ at least
+  std::vector<VertexId> vertex_at_;     // by output index, of the first distinct_count_
+  std::vector<uint32_t> input_vertex_;  // by point given
+  uint64_t distinct_input_ = 0;         // different vertices among them
+  std::vector<size_t> negative_zeros_;  // places in Mesh::points
+
+  uint64_t extracted_vertices_ = 0;  // of the last mesh made
+  uint64_t extracted_simplices_ = 0;
+  QueryCounters stars_;
+  double tree_seconds_ = 0;
+  double refinement_seconds_ = 0;
+  double simplices_seconds_ = 0;
+  Workspace<D> workspace_;
 };
 
-// The end of the errors that refuse points which are too close together.
 template <int D>
-std::string TooCloseRemedy(const SortedCloud<D>& cloud) {
-  return absl::StrFormat(
-      "too close for the arithmetic of doubles in this domain (at least %g is needed); merge them, or give a smaller "
-      "domain nearer to "
-      "the origin",
-      kMinInputSteps * cloud.grid_step / cloud.scale);
-}
-
-template <int D>
-absl::StatusOr<SortedCloud<D>> SortCloud(const Box<D>& box, std::span<const double> points, const RunContext& context) {
-  SortedCloud<D> cloud;
-  const int exponent = std::ilogb(box.LongestSide());
-  cloud.scale = std::abs(exponent) <= kMaxScaleExponent ? 1.0 : std::ldexp(1.0, -exponent);
-  const auto scaled = [&](Point<D> p) {
-    for (double& x : p) {
-      x = x * cloud.scale + 0.0;  // no negative zero: equal points have equal bits
-    }
-    return p;
-  };
-  cloud.box = Box<D>{scaled(box.low), scaled(box.high)};
-  const MortonGrid<D> grid(cloud.box);
-  cloud.grid_step = grid.quantum();
-
-  struct Entry {
-    GridPoint<D> cube;
-    uint32_t input;
-  };
-  const auto point_of = [&](const Entry& entry) { return scaled(PointAt<D>(points, entry.input)); };
-  const size_t count = points.size() / D;
-  std::vector<Entry> entries(count);
-  for (size_t i = 0; i < count; ++i) {
-    if (i % kCheckInterval == 0) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-    }
-    const Point<D> p = PointAt<D>(points, i);
-    if (!box.Contains(p)) {
-      return absl::InvalidArgumentError(absl::StrCat(
-          "points[", i, "] = ", FormatCoordinates(p), " lies outside the domain ", FormatCoordinates(box.low), " to ",
-          FormatCoordinates(box.high), "; enlarge the domain or drop the point"));
-    }
-    const Point<D> scaled_p = scaled(p);
-    for (int k = 0; k < D; ++k) {
-      if (scaled_p[k] / cloud.scale != p[k]) {
-        return absl::InvalidArgumentError(absl::StrFormat(
-            "points[%d]: coordinate %d is %g, too small for the arithmetic of doubles beside a domain of "
-            "side %g; make it 0, or give a smaller domain",
-            i, k, p[k], box.LongestSide()));
-      }
-    }
-    entries[i] = {grid.CubeOf(scaled_p), static_cast<uint32_t>(i)};
-  }
-  // Points of one cube are equal, or too close to be served.
-  WELLSPACE_RETURN_IF_ERROR(CancellableSort(
-      entries,
-      [](const Entry& a, const Entry& b) {
-        return a.cube != b.cube ? MortonLess<D>(a.cube, b.cube) : a.input < b.input;
-      },
-      context));
-
-  cloud.points.reserve(count);
-  cloud.input_vertex.assign(count, 0);
-  for (size_t i = 0; i < count; ++i) {
-    if (i % kCheckInterval == 0) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-    }
-    const Point<D> p = point_of(entries[i]);
-    if (i == 0 || entries[i].cube != entries[i - 1].cube) {
-      cloud.points.push_back(p);
-      cloud.first_input.push_back(entries[i].input);
-    } else if (p != cloud.points.back()) {
-      const uint32_t first = cloud.first_input.back();
-      const uint32_t second = entries[i].input;
-      return absl::InvalidArgumentError(absl::StrFormat(
-          "points[%d] = %s is only %g from points[%d], %s", second, FormatCoordinates(PointAt<D>(points, second)),
-          std::sqrt(DistanceSq<D>(p, cloud.points.back())) / cloud.scale, first, TooCloseRemedy(cloud)));
-    }
-    // For now the sorted rank; below that by first appearance.
-    cloud.input_vertex[entries[i].input] = static_cast<uint32_t>(cloud.points.size() - 1);
-  }
-  cloud.output_index.assign(cloud.points.size(), 0);
-  uint32_t next = 0;
-  for (uint32_t i = 0; i < count; ++i) {
-    const uint32_t sorted = cloud.input_vertex[i];
-    if (cloud.first_input[sorted] == i) {
-      cloud.output_index[sorted] = next++;
-    }
-  }
-  for (uint32_t& vertex : cloud.input_vertex) {
-    vertex = cloud.output_index[vertex];
-  }
-  return cloud;
-}
-
-// Refuses points nearer to each other, or to a face of the box that they do not lie on, than the arithmetic serves.
-template <int D>
-absl::Status CheckSeparation(const SortedCloud<D>& cloud, const QueryStructure<D>& structure,
-                             std::span<const double> points, const RunContext& context) {
-  const double least = kMinInputSteps * cloud.grid_step;
-  Workspace<D> workspace;
-  for (uint32_t i = 0; i < cloud.points.size(); ++i) {
-    WELLSPACE_RETURN_IF_ERROR(context.Check());
-    const VertexId v{i};
-    const size_t input = cloud.first_input[i];
-    const auto [nearest, nearest_sq] = structure.ApproximateNearestNeighbor(v, workspace);
-    if (nearest_sq < least * least) {
-      const bool is_input = Index(nearest) < cloud.points.size();
-      return absl::InvalidArgumentError(absl::StrFormat(
-          "points[%d] = %s is only %g from %s, %s", input, FormatCoordinates(PointAt<D>(points, input)),
-          std::sqrt(nearest_sq) / cloud.scale,
-          is_input ? absl::StrCat("points[", cloud.first_input[Index(nearest)], "]") : "a corner of the domain",
-          TooCloseRemedy(cloud)));
-    }
-    for (int face = 0; face < 2 * D; ++face) {
-      const double distance = cloud.box.DistanceToFace(structure.point(v), face);
-      if (distance > 0 && distance < least) {
-        return absl::InvalidArgumentError(
-            absl::StrFormat("points[%d] = %s is only %g from the %s face of axis %d of the domain, too close for the "
-                            "arithmetic of doubles (on it, or "
-                            "at least %g away, is needed); move the domain's face",
-                            input, FormatCoordinates(PointAt<D>(points, input)), distance / cloud.scale,
-                            face % 2 == 0 ? "low" : "high", face / 2, least / cloud.scale));
-      }
-    }
-  }
-  return absl::OkStatus();
-}
-
-template <int D>
-absl::StatusOr<Mesh> MeshPointsIn(const MeshParameters& parameters, std::span<const double> points,
-                                  RunContext& context) {
-  context.EnterPhase(Phase::kTree);
-  WELLSPACE_RETURN_IF_ERROR(CheckFinite<D>(points));
-  WELLSPACE_ASSIGN_OR_RETURN(const Box<D> box, DomainOf<D>(parameters, points));
-  WELLSPACE_RETURN_IF_ERROR(CheckDomain<D>(box));
-  WELLSPACE_ASSIGN_OR_RETURN(SortedCloud<D> cloud, SortCloud<D>(box, points, context));
-
-  const uint64_t max_vertices =
-      std::min(parameters.max_vertices == 0 ? kDefaultMaxVertices : parameters.max_vertices, kMaxVertices);
-  const size_t input_count = cloud.points.size();
-  if (input_count + (size_t{1} << D) > max_vertices) {
-    return absl::ResourceExhaustedError(absl::StrCat("the ", input_count,
-                                                     " distinct points and the domain's corners are more than ",
-                                                     "max_vertices = ", max_vertices, " vertices; raise max_vertices"));
-  }
-  QueryStructure<D> structure;
-  WELLSPACE_RETURN_IF_ERROR(
-      structure.Initialize(cloud.box, cloud.points, kLeavesPerVertex * max_vertices + (1u << D), context));
-  WELLSPACE_RETURN_IF_ERROR(CheckSeparation<D>(cloud, structure, points, context));
-  context.SetVertices(structure.vertex_count());
-  context.SetEstimatedVertices(input_count + structure.tree().leaf_count());
-
-  context.EnterPhase(Phase::kRefinement);
-  RefinementParameters refinement;
-  refinement.rho = parameters.rho == 0 ? DefaultRho(D) : parameters.rho;
-  refinement.max_vertices = max_vertices;
-  refinement.min_edge = kMinEdgeSteps * cloud.grid_step;
-  QueryCounters cells;
-  WELLSPACE_RETURN_IF_ERROR(Refine<D>(refinement, structure, context, cells));
-
-  context.EnterPhase(Phase::kSimplices);
-  std::vector<uint32_t> output_index = std::move(cloud.output_index);
-  output_index.resize(structure.vertex_count());
-  std::iota(output_index.begin() + static_cast<std::ptrdiff_t>(input_count), output_index.end(),
-            static_cast<uint32_t>(input_count));
-  WELLSPACE_ASSIGN_OR_RETURN(Simplices simplices,
-                             ComputeSimplices<D>(structure, output_index, parameters.threads, context));
-
-  Mesh mesh;
-  mesh.dimension = D;
-  mesh.domain_low.assign(box.low.begin(), box.low.end());
-  mesh.domain_high.assign(box.high.begin(), box.high.end());
-  mesh.points.resize(size_t{structure.vertex_count()} * D);
-  for (uint32_t i = 0; i < structure.vertex_count(); ++i) {
-    if (i % kCheckInterval == 0) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-    }
-    Point<D> p;
-    if (i < input_count) {
-      p = PointAt<D>(points, cloud.first_input[i]);
-    } else {
-      p = structure.point(VertexId{i});
-      for (double& x : p) {
-        x /= cloud.scale;
-      }
-    }
-    std::copy_n(p.begin(), D, mesh.points.begin() + static_cast<std::ptrdiff_t>(size_t{output_index[i]} * D));
-  }
-  mesh.simplices = std::move(simplices.indices);
-  mesh.input_vertex = std::move(cloud.input_vertex);
-  context.EnterPhase(Phase::kDone);
-
-  MeshStatistics& statistics = mesh.statistics;
-  statistics.input_points = points.size() / D;
-  statistics.duplicates = statistics.input_points - input_count;
-  statistics.vertices = mesh.vertex_count();
-  statistics.simplices = mesh.simplex_count();
-  statistics.max_radius_edge = simplices.max_radius_edge;
-  statistics.min_angle_deg = simplices.min_angle_deg;
-  statistics.tree_seconds = absl::ToDoubleSeconds(context.TimeIn(Phase::kTree));
-  statistics.refinement_seconds = absl::ToDoubleSeconds(context.TimeIn(Phase::kRefinement));
-  statistics.simplices_seconds = absl::ToDoubleSeconds(context.TimeIn(Phase::kSimplices));
-  statistics.total_seconds = statistics.tree_seconds + statistics.refinement_seconds + statistics.simplices_seconds;
-  statistics.peak_memory_bytes = PeakMemoryBytes();
-  statistics.tree_leaves = structure.tree().leaf_count();
-  statistics.cells_computed = cells.queries;
-  statistics.leaves_visited = cells.leaves;
-  statistics.vertices_visited = cells.vertices;
-  statistics.cuts = cells.cuts;
-  statistics.max_leaves_visited = cells.max_leaves;
-  statistics.stars_computed = simplices.counters.queries;
-  statistics.star_leaves_visited = simplices.counters.leaves;
-  statistics.star_vertices_visited = simplices.counters.vertices;
-  statistics.star_cuts = simplices.counters.cuts;
-  statistics.max_star_leaves_visited = simplices.counters.max_leaves;
-  statistics.exact_predicates = cells.decisions.exact + simplices.counters.decisions.exact;
-  statistics.perturbed_predicates = cells.decisions.perturbed + simplices.counters.decisions.perturbed;
-  return mesh;
+absl::StatusOr<std::unique_ptr<Mesher>> CreateIn(const MeshParameters& parameters, std::span<const double> points,
+                                                 RunContext& context) {
+  auto mesher = std::make_unique<MesherIn<D>>();
+  WELLSPACE_RETURN_IF_ERROR(mesher->Initialize(parameters, points, context));
+  return mesher;
 }
 
 }  // namespace
 
-double DefaultRho(int dimension) { return dimension == 2 ? std::sqrt(2.0) : 2.0; }
+double DefaultRho(int dimension) {
+  constexpr std::array<double, 7> kDefaults = {0, 0, std::numbers::sqrt2, 2, 2.9, 4.1, 5.8};
+  return kDefaults[dimension];
+}
 
-double MinimumRho(int dimension) { return dimension == 2 ? 0.9 : 1.1; }
+double MinimumRho(int dimension) {
+  constexpr std::array<double, 7> kMinimums = {0, 0, 0.9, 1.1, 1.5, 2, 3};
+  return kMinimums[dimension];
+}
 
 absl::Status ValidateParameters(const MeshParameters& parameters) {
   const int dimension = parameters.dimension;
@@ -390,25 +551,34 @@ absl::Status ValidateParameters(const MeshParameters& parameters) {
     return absl::InvalidArgumentError(
         absl::StrCat("margin: ", parameters.margin, " is not allowed; 0 to 1e6 times the longest side is"));
   }
-  if (parameters.threads < 1 || parameters.threads > 1024) {
-    return absl::InvalidArgumentError(absl::StrCat("threads: ", parameters.threads, " is not allowed; 1 to 1024 is"));
+  if (!(parameters.max_circumradius >= 0 && std::isfinite(parameters.max_circumradius))) {
+    return absl::InvalidArgumentError(absl::StrCat("max_circumradius: ", parameters.max_circumradius,
+                                                   " is not allowed; a number above 0 is, or 0 for no bound"));
   }
-  return absl::OkStatus();
+  for (size_t i = 0; i < parameters.size_boxes.size(); ++i) {
+    WELLSPACE_RETURN_IF_ERROR(CheckSizeBox(parameters.size_boxes[i], i, dimension));
+  }
+  return CheckThreads(parameters.threads);
+}
+
+absl::StatusOr<std::unique_ptr<Mesher>> Mesher::Create(const MeshParameters& parameters, std::span<const double> points,
+                                                       RunContext& context) {
+  WELLSPACE_RETURN_IF_ERROR(ValidateParameters(parameters));
+  switch (parameters.dimension) {
+#define WELLSPACE_CASE(D) \
+  case D:                 \
+    return CreateIn<D>(parameters, points, context);
+    WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_CASE)
+#undef WELLSPACE_CASE
+    default:
+      return absl::InternalError("ValidateParameters lets no other dimension pass");
+  }
 }
 
 absl::StatusOr<Mesh> MeshPoints(const MeshParameters& parameters, std::span<const double> points, RunContext& context) {
-  WELLSPACE_RETURN_IF_ERROR(ValidateParameters(parameters));
-  if (points.size() % parameters.dimension != 0) {
-    return absl::InvalidArgumentError(absl::StrCat(
-        "points: ", points.size(), " coordinates are not a multiple of the dimension, ", parameters.dimension));
-  }
-  if (points.size() / parameters.dimension > kMaxVertices) {
-    return absl::InvalidArgumentError(absl::StrCat("points: ", points.size() / parameters.dimension,
-                                                   " are more than vertices can be numbered; at most ", kMaxVertices,
-                                                   " are accepted"));
-  }
-  return parameters.dimension == 2 ? MeshPointsIn<2>(parameters, points, context)
-                                   : MeshPointsIn<3>(parameters, points, context);
+  WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<Mesher> mesher, Mesher::Create(parameters, points, context));
+  WELLSPACE_RETURN_IF_ERROR(mesher->Refine(parameters, context));
+  return mesher->Extract(parameters.threads, context);
 }
 
 }  // namespace wellspace::core

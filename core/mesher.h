@@ -3,21 +3,16 @@
 #define WELLSPACE_CORE_MESHER_H_
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "absl/status/statusor.h"
 #include "core/base/dimensions.h"
 #include "core/base/run_context.h"
+#include "core/refine/criterion.h"
 
 namespace wellspace::core {
-
-// What every simplex has to be.
-enum class Criterion {
-  kRadiusEdge,  // circumradius <= rho * (its shortest edge); what Ruppert, Shewchuk, Triangle and TetGen promise
-  kWellSpaced,  // [HT08]'s: no node of a vertex's Voronoi cell is farther from it than rho * (distance to its nearest
-                // neighbour); stronger, and three to four times as many vertices
-};
 
 // A box in which simplices are small.
 struct SizeBox {
@@ -57,7 +52,8 @@ inline constexpr uint64_t kMaxVertices = 0xffff'fffe;
 // What a machine with 24 GiB of memory can mesh in 3-D.
 inline constexpr uint64_t kDefaultMaxVertices = 50'000'000;
 
-// The default of `rho` in dimension D; the smallest value that is accepted.
+// The default of `rho`, for which refinement ends whatever the input: sqrt(2) in 2-D, 2 in 3-D, 2.9, 4.1 and 5.8 in 4-D
+// to 6-D, 2^((D-1)/2) rounded up; and the smallest value that is accepted.
 double DefaultRho(int dimension);
 double MinimumRho(int dimension);
 
@@ -97,12 +93,13 @@ struct Mesh {
   std::vector<double> domain_low;   // dimension
   std::vector<double> domain_high;  // dimension
   // vertex_count x dimension, row-major. The distinct input points come first, in the order of their first appearance
-  // and with their bits unchanged; then the corners of the box that are not input points; then the Steiner vertices.
+  // and with their bits unchanged; then the corners of the box that are not input points; then the others in the order
+  // in which they were inserted: Steiner vertices and points added later.
   std::vector<double> points;
   // simplex_count x (dimension + 1) indices of vertices, row-major; each simplex positively oriented, its lowest vertex
   // first.
   std::vector<uint32_t> simplices;
-  // input_points entries: the vertex that each input point became.
+  // The vertex that each input point became; then those of the points added later, in the order of adding.
   std::vector<uint32_t> input_vertex;
   MeshStatistics statistics;
 
@@ -110,24 +107,114 @@ struct Mesh {
   uint64_t simplex_count() const { return dimension == 0 ? 0 : simplices.size() / (dimension + 1); }
 };
 
+// What a mesh would take, foretold from the tree over its points.
+struct MeshEstimate {
+  uint64_t vertices = 0;
+  uint64_t simplices = 0;
+  uint64_t memory_bytes = 0;  // peak, of the meshing itself
+  uint64_t tree_leaves = 0;
+};
+
+// A clipped Voronoi cell, as [HT08] Definition 2 has it but with a cube in the place of the ball.
+struct Cell {
+  uint32_t vertex = 0;
+  double clip_radius = 0;            // half the side of the cube about the vertex; the cell is also clipped by the box
+  std::vector<double> nodes;         // node_count x dimension, row-major
+  std::vector<uint32_t> neighbours;  // the vertices whose bisectors with `vertex` bound the cell, ascending
+  bool is_clipped = false;           // it reaches the cube; if not, it is the whole Voronoi cell in the box
+};
+
 // Refuses parameters that no cloud could make valid: dimension, rho, domain, margin, threads.
 //
 // Errors:     INVALID_ARGUMENT, naming the field, its value and what would be accepted.
 absl::Status ValidateParameters(const MeshParameters& parameters);
 
-// Meshes `points` in their box: every simplex has circumradius <= rho * (its shortest edge), every input point is a
-// vertex.
+// A mesh in the making and after: the query structure of [HT08] with its refinement. Vertices can be added to a refined
+// mesh, and it be refined again, at the cost of what has changed.
 //
-// Shapes:     points: n x dimension, row-major; n may be 0 when a domain is given.
-// Units:      any length, the same on every axis.
-// Guarantees: (1) the simplices are a Delaunay triangulation of the vertices and decompose exactly the box; (2) rho
-//             holds for each; (3) no circumcentre lies outside the box; (4) the mesh depends neither on `threads` nor
-//             on the machine.
+// Vertices are named by their index in the mesh, which never changes. The mesh depends neither on the order of the points
+// (but for the numbering of vertices), nor on the number of threads, nor on the machine.
+//
+// Thread safety: thread-compatible: const functions may run at once, others alone. A RunContext may be observed and
+// cancelled from other threads.
+class Mesher {
+ public:
+  virtual ~Mesher() = default;
+
+  // Builds the tree over `points` in their box.
+  //
+  // Shapes:     points: n x dimension, row-major; n may be 0 when a domain is given.
+  // Units:      any length, the same on every axis.
+  // Complexity: O(n log n + L) for L leaves.
+  // Errors:     INVALID_ARGUMENT (parameters; NaN, infinite or outside coordinates; points closer than double
+  //             arithmetic can serve), RESOURCE_EXHAUSTED (max_vertices), CANCELLED, DEADLINE_EXCEEDED.
+  // Source:     [HT08] Figure 3, INITIALIZE.
+  static absl::StatusOr<std::unique_ptr<Mesher>> Create(const MeshParameters& parameters,
+                                                        std::span<const double> points, RunContext& context);
+
+  virtual int dimension() const = 0;
+  virtual uint64_t vertex_count() const = 0;
+
+  // Adds Steiner vertices until the criterion and the sizes of `parameters` are met. Of these rho, criterion, sizes and
+  // max_vertices count; the box is that of Create.
+  //
+  // Complexity: O(m) queries the first time and for other demands than the last; else in proportion to what was added
+  //             since.
+  // Errors:     INVALID_ARGUMENT (parameters), RESOURCE_EXHAUSTED (max_vertices, smallest edge), CANCELLED,
+  //             DEADLINE_EXCEEDED. Nothing is lost: a later call takes up the work where it was left.
+  // Source:     [HT08] Figure 4.
+  virtual absl::Status Refine(const MeshParameters& parameters, RunContext& context) = 0;
+
+  // Adds vertices at `points`, n x dimension: all of them or, on an error, none. Returns the vertex of each point; one
+  // that is a vertex already is not added again. Then the mesh wants to be refined again.
+  //
+  // Complexity: O(n (log n + depth of the tree)) and O(1) queries a point in a refined mesh.
+  // Errors:     INVALID_ARGUMENT as in Create, naming the point, also when it is too close to a vertex;
+  //             RESOURCE_EXHAUSTED when vertices can no longer be numbered; CANCELLED, DEADLINE_EXCEEDED.
+  virtual absl::StatusOr<std::vector<uint32_t>> AddPoints(std::span<const double> points, RunContext& context) = 0;
+
+  // The same for one point that is in the cell of vertex `near`, or not far: found by a walk from leaf to leaf.
+  //
+  // Complexity: O(1) there.
+  // Errors:     as AddPoints; OUT_OF_RANGE when there is no vertex `near`.
+  // Source:     [HT08] Figure 3, ADDVERTEX.
+  virtual absl::StatusOr<uint32_t> AddVertex(uint32_t near, std::span<const double> point) = 0;
+
+  // The distance from each of `vertices` to its nearest other vertex; exact, where the paper asks for a constant factor.
+  //
+  // Complexity: O(1) each in a refined mesh or bottom-up.
+  // Errors:     OUT_OF_RANGE, naming the first vertex that does not exist.
+  // Source:     [HT08] Figure 3, APPROXIMATENN.
+  virtual absl::StatusOr<std::vector<double>> NearestNeighborDistances(std::span<const uint32_t> vertices) const = 0;
+
+  // The Voronoi cells of `vertices`, each clipped at beta times the distance to the vertex' nearest neighbour.
+  //
+  // Complexity: O(1) each in a refined mesh or bottom-up.
+  // Errors:     OUT_OF_RANGE as above; INVALID_ARGUMENT unless beta is a number of at least 1.
+  // Source:     [HT08] Figure 3, CLIPPEDVORONOI.
+  virtual absl::StatusOr<std::vector<Cell>> ClippedCells(std::span<const uint32_t> vertices, double beta) const = 0;
+
+  // The refined mesh.
+  //
+  // Guarantees: (1) the simplices are a Delaunay triangulation of the vertices and decompose exactly the box; (2) the
+  //             criterion holds for each; (3) no circumcentre lies outside the box.
+  // Complexity: O(m) time and memory.
+  // Errors:     FAILED_PRECONDITION unless refined since vertices were last added; CANCELLED, DEADLINE_EXCEEDED.
+  // Threads:    uses `threads`, at most as many as the machine has cores.
+  virtual absl::StatusOr<Mesh> Extract(int threads, RunContext& context) = 0;
+
+  // Brings `mesh`, the last that Extract or Update made, up to date: replaces the simplices around the vertices added
+  // since. The simplices are those that Extract would give, in another order.
+  //
+  // Complexity: O(1) for each vertex added, and one pass over the indices of the mesh.
+  // Errors:     as Extract; INVALID_ARGUMENT for another mesh. On an error `mesh` is unchanged.
+  virtual absl::Status Update(Mesh& mesh, int threads, RunContext& context) = 0;
+};
+
+// Meshes `points` in their box: Create, Refine, Extract.
+//
 // Complexity: O(n log n + m) time for m output vertices, O(m) memory.
-// Errors:     INVALID_ARGUMENT (parameters; NaN, infinite or outside coordinates; points closer than double arithmetic
-//             can serve), RESOURCE_EXHAUSTED (max_vertices, smallest edge), CANCELLED and DEADLINE_EXCEEDED (context).
-// Threads:    thread-safe; `context` may be observed and cancelled from other threads.
-// Source:     [HT08] Figure 4.
+// Errors:     those of its parts.
 absl::StatusOr<Mesh> MeshPoints(const MeshParameters& parameters, std::span<const double> points, RunContext& context);
 
 }  // namespace wellspace::core

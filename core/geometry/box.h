@@ -30,6 +30,8 @@ struct Box {
   Point<D> low;
   Point<D> high;
 
+  bool operator==(const Box&) const = default;
+
   // The coordinate that all points of face `face` share.
   double FaceCoordinate(int face) const { return face % 2 == 0 ? low[face / 2] : high[face / 2]; }
 

@@ -3,15 +3,36 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/dimensions.h"
+
 namespace wellspace::core {
+namespace {
+
+// The squared length of the shortest edge that a bisector of the cell stands for.
+template <int D>
+double ShortestEdgeSq(const Polytope<D>& cell) {
+  double shortest = Assessment::kNone;
+  for (const CellNode<D>& node : cell.nodes()) {
+    for (const uint16_t index : node.planes) {
+      const Plane<D>& plane = cell.plane(index);
+      if (plane.kind == PlaneKind::kBisector) {
+        shortest = std::min(shortest, 2 * plane.offset);
+      }
+    }
+  }
+  return shortest;
+}
+
+}  // namespace
 
 template <int D>
-Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, double rho, double edge_limit_sq) {
+Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const Demands<D>& demands, double edge_limit_sq) {
   Assessment result;
-  result.next_edge_sq = Assessment::kNone;
-  double bad_edge_sq = Assessment::kNone;
+  double bad_radius_sq = 0;
   double nearest_face = Assessment::kNone;
-  const double rho_sq = rho * rho;
+  const double rho_sq = demands.rho * demands.rho;
+  const bool has_sizes = !demands.sizes.IsUnbounded();
+  const double cell_edge_sq = demands.criterion == Criterion::kWellSpaced ? ShortestEdgeSq(cell) : Assessment::kNone;
   for (size_t i = 0; i < cell.nodes().size(); ++i) {
     const CellNode<D>& node = cell.nodes()[i];
     double edge_sq = Assessment::kNone;
@@ -38,24 +59,47 @@ Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, double rho, doub
       }
     }
     result.radius_sq = std::max(result.radius_sq, node.radius_sq);
-    if (node.radius_sq <= rho_sq * edge_sq || on_face) {
+    if (on_face) {
       continue;
     }
+    double bound_sq = rho_sq * std::min(edge_sq, cell_edge_sq);
+    bool is_too_large = false;
+    if (node.radius_sq <= bound_sq) {
+      bound_sq = Assessment::kNone;
+    }
     if (on_own_face) {
-      result.radius_sq = Assessment::kNone;
-    } else if (edge_sq > edge_limit_sq) {
-      result.next_edge_sq = std::min(result.next_edge_sq, edge_sq);
-    } else if (edge_sq < bad_edge_sq ||
-               (edge_sq == bad_edge_sq && node.radius_sq > cell.nodes()[result.bad_node].radius_sq)) {
-      bad_edge_sq = edge_sq;
+      result.radius_sq = bound_sq == Assessment::kNone ? result.radius_sq : Assessment::kNone;
+      continue;
+    }
+    if (has_sizes) {
+      Point<D> x = cell.site();
+      for (int k = 0; k < D; ++k) {
+        x[k] += node.x[k];
+      }
+      const double size_sq = demands.sizes.AtSq(x);
+      if (node.radius_sq > size_sq && size_sq < bound_sq) {
+        bound_sq = size_sq;
+        is_too_large = true;
+      }
+    }
+    if (bound_sq == Assessment::kNone) {
+      continue;
+    }
+    if (bound_sq > rho_sq * edge_limit_sq) {
+      result.next_edge_sq = std::min(result.next_edge_sq, bound_sq / rho_sq);
+    } else if (bound_sq < result.bound_sq || (bound_sq == result.bound_sq && node.radius_sq > bad_radius_sq)) {
+      result.bound_sq = bound_sq;
       result.bad_node = static_cast<int>(i);
       result.bad_plane = edge_plane;
+      result.is_too_large = is_too_large;
+      bad_radius_sq = node.radius_sq;
     }
   }
   return result;
 }
 
-template Assessment Assess<2>(const Polytope<2>&, FaceMask, double, double);
-template Assessment Assess<3>(const Polytope<3>&, FaceMask, double, double);
+#define WELLSPACE_INSTANTIATE(D) template Assessment Assess<D>(const Polytope<D>&, FaceMask, const Demands<D>&, double);
+WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
+#undef WELLSPACE_INSTANTIATE
 
 }  // namespace wellspace::core

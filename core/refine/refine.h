@@ -1,44 +1,102 @@
-// Bottom-up refinement: Steiner points until every simplex keeps the bound on its radius-edge ratio.
+// Bottom-up refinement: Steiner points until every simplex is as the demands say.
 #ifndef WELLSPACE_CORE_REFINE_REFINE_H_
 #define WELLSPACE_CORE_REFINE_REFINE_H_
 
 #include <cstdint>
 #include <functional>
+#include <optional>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "core/base/run_context.h"
+#include "core/refine/assessment.h"
+#include "core/refine/criterion.h"
+#include "core/refine/schedule.h"
+#include "core/refine/steiner_point.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {
 
-struct RefinementParameters {
-  double rho = 0;
-  uint64_t max_vertices = 0;
-  double min_edge = 0;  // no vertex is added nearer than this to another
+// Why a vertex was inserted.
+enum class Reason {
+  kRatio,         // a node broke rho
+  kSize,          // a node was farther than the sizes allow
+  kEncroachment,  // the cell touched a face of the box that its site does not lie on
 };
 
-// Called after each step with the structure as it is then; for tests.
-template <int D>
-using RefinementObserver = std::function<void(const QueryStructure<D>&)>;
+// An insertion that has just happened.
+struct Insertion {
+  Reason reason = Reason::kRatio;
+  VertexId near = kNoVertex;   // the vertex whose cell was looked at
+  VertexId other = kNoVertex;  // for kRatio, the other end of the edge
+  VertexId vertex = kNoVertex;
+  double edge_sq = 0;        // the edge that asked for it; the distance between `near` and the face for an encroachment
+  double edge_limit_sq = 0;  // all edges that ask for something are at least 1 / sqrt 2 times as long
+  double empty_radius_sq = 0;  // no older vertex is nearer to it, up to rounding
+};
 
-// Adds vertices to `structure` until (1) no Delaunay simplex of the box has circumradius > rho * shortest edge, and (2)
-// no Voronoi cell touches a face of the box that its vertex does not lie on, so that the Delaunay triangulation
-// decomposes exactly the box.
+// Called after each insertion with the structure as it is then; for tests.
+template <int D>
+using RefinementObserver = std::function<void(const QueryStructure<D>&, const Insertion&)>;
+
+// The refinement of one structure, which may be run again: after an error, after vertices were added, for other demands.
 //
-// REQUIRES:   rho at least MinimumRho(D).
-// Guarantees: (1) bottom-up: the vertex whose cell is looked at has an edge shorter, up to the ratio of a bucket, than
-//             all that wait; (2) deterministic.
-// Complexity: O(m) queries for m vertices in the end.
-// Errors:     RESOURCE_EXHAUSTED with the bound that was met; CANCELLED, DEADLINE_EXCEEDED. `structure` stays usable.
-// Source:     [HT08] Figure 4; see docs/design/core.md.
+// Thread safety: thread-compatible.
+// Invariants: every vertex either waits, or its cell is as the demands of the last run say, for as long as no vertex is
+// added that it has not been told of.
 template <int D>
-absl::Status Refine(const RefinementParameters& parameters, QueryStructure<D>& structure, RunContext& context,
-                    QueryCounters& counters, const RefinementObserver<D>& observer = nullptr);
+class Refinement {
+ public:
+  // No vertex is added nearer than `min_edge` to another.
+  Refinement(QueryStructure<D>& structure, double min_edge);
 
-extern template absl::Status Refine<2>(const RefinementParameters&, QueryStructure<2>&, RunContext&, QueryCounters&,
-                                       const RefinementObserver<2>&);
-extern template absl::Status Refine<3>(const RefinementParameters&, QueryStructure<3>&, RunContext&, QueryCounters&,
-                                       const RefinementObserver<3>&);
+  // Adds vertices until (1) no Delaunay simplex of the box breaks the demands, and (2) no Voronoi cell touches a face of
+  // the box that its vertex does not lie on, so that the Delaunay triangulation decomposes exactly the box.
+  //
+  // REQUIRES:   rho at least MinimumRho(D).
+  // Guarantees: (1) bottom-up, [HT08] Definition 1: the vertex whose cell is looked at has an edge shorter, up to the
+  //             ratio of a bucket, than all that wait; (2) deterministic.
+  // Complexity: O(m) queries for m vertices in the end; when run again for the same demands, in proportion to what was
+  //             added since and to what that makes necessary.
+  // Errors:     RESOURCE_EXHAUSTED with the bound that was met; CANCELLED, DEADLINE_EXCEEDED. All stays usable: a later
+  //             run takes up the work where it was left.
+  // Source:     [HT08] Figure 4; see docs/design/refine.md.
+  absl::Status Run(const Demands<D>& demands, uint64_t max_vertices, RunContext& context,
+                   const RefinementObserver<D>& observer = nullptr);
+
+  // Tells of the vertex `x`, which somebody else has added to the structure since the last run.
+  //
+  // Complexity: O(1) in a refined structure.
+  void VertexAdded(VertexId x);
+
+  // What all queries have cost.
+  QueryCounters counters() const;
+
+ private:
+  absl::Status ScheduleAll(const Demands<D>& demands);
+  double FirstEdgeSq(const Demands<D>& demands, VertexId v, double nearest_sq) const;
+  absl::Status Improve(VertexId v, int bucket);
+  absl::Status Insert(Insertion insertion, const SteinerPoint<D>& point);
+  void LookAtNew(VertexId x, VertexId near, double radius_sq);
+  void Settle(VertexId v, const Assessment& found, double clip, int earliest, const Polytope<D>& cell);
+  void WakeNeighbours(const Polytope<D>& cell, VertexId but);
+
+  QueryStructure<D>& structure_;
+  const double min_edge_;
+  Schedule schedule_;
+  std::vector<double> radius_sq_;      // R(v)^2 where v is done, else infinite
+  std::vector<uint8_t> is_announced_;  // its neighbours have been looked at in view of it
+  std::optional<Demands<D>> demands_;  // of the last run, once all vertices have been scheduled for them
+  Workspace<D> own_;                   // the cell that is improved
+  Workspace<D> new_;                   // the cell of the vertex just added
+
+  // Of the run.
+  double off_center_factor_ = 0;
+  double clip_factor_ = 0;
+  uint64_t max_vertices_ = 0;
+  RunContext* context_ = nullptr;
+  const RefinementObserver<D>* observer_ = nullptr;
+};
 
 }  // namespace wellspace::core
 

@@ -2,6 +2,7 @@
 #ifndef WELLSPACE_CORE_REFINE_SCHEDULE_H_
 #define WELLSPACE_CORE_REFINE_SCHEDULE_H_
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -12,22 +13,24 @@
 
 namespace wellspace::core {
 
+// Buckets are one power of two of the squared length wide, the square root of 2 in length. (The paper has 2: finer
+// buckets make smaller meshes for more work.) Powers of two need no logarithm, so that all machines sort alike.
+//
 // Thread safety: thread-compatible.
 // Invariants: (1) a vertex waits in one bucket at most; (2) Pop takes from the lowest bucket that is not empty, the
 // last come first.
 class Schedule {
  public:
-  // Lengths are told apart from `shortest` up; `base` is the ratio of one bucket's lengths to those of the one before.
-  Schedule(double shortest, double base) : shortest_(shortest), base_(base), log_base_(std::log(base)) {}
+  // Lengths below `shortest` fall into the lowest bucket.
+  explicit Schedule(double shortest) : first_exponent_(std::ilogb(shortest * shortest)) {}
 
-  int BucketOf(double length) const {
-    return length > shortest_ ? static_cast<int>(std::log(length / shortest_) / log_base_) : 0;
-  }
-  // The length at which `bucket` ends.
-  double UpperLength(int bucket) const { return shortest_ * std::pow(base_, bucket + 1); }
+  // REQUIRES:   length_sq is a finite number above zero.
+  int BucketOf(double length_sq) const { return std::max(0, std::ilogb(length_sq) - first_exponent_); }
+  // The squared length at which `bucket` ends.
+  double UpperLengthSq(int bucket) const { return std::ldexp(1.0, first_exponent_ + bucket + 1); }
 
-  // Puts `v` in the bucket of `length`, unless it waits in that one or a lower one already.
-  void Add(VertexId v, double length) { AddToBucket(v, BucketOf(length)); }
+  // Puts `v` in the bucket of a length, unless it waits in that one or a lower one already.
+  void Add(VertexId v, double length_sq) { AddToBucket(v, BucketOf(length_sq)); }
 
   void AddToBucket(VertexId v, int bucket) {
     if (Index(v) >= waits_in_.size()) {
@@ -44,6 +47,8 @@ class Schedule {
     buckets_[bucket].push_back(v);
     lowest_ = bucket < lowest_ ? bucket : lowest_;
   }
+
+  bool Waits(VertexId v) const { return Index(v) < waits_in_.size() && waits_in_[Index(v)] != kNowhere; }
 
   // How many vertices wait.
   size_t size() const { return size_; }
@@ -68,9 +73,7 @@ class Schedule {
  private:
   static constexpr int16_t kNowhere = std::numeric_limits<int16_t>::max();
 
-  double shortest_;
-  double base_;
-  double log_base_;
+  int first_exponent_;
   int lowest_ = 0;
   size_t size_ = 0;
   std::vector<std::vector<VertexId>> buckets_;

@@ -2,9 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "core/base/dimensions.h"
 
 namespace wellspace::core {
 namespace {
+
+// An off-centre lies on a bisector only if its squared distance from the site is at least this times the edge's.
+constexpr double kLeastHeight = 0.5;
 
 template <int D>
 SteinerPoint<D> Relative(const Polytope<D>& cell, const Point<D>& x) {
@@ -29,12 +35,19 @@ double OffCenterFactor(double rho) {
 }
 
 template <int D>
-SteinerPoint<D> OffCenter(const Polytope<D>& cell, int node, int plane, double rho, double factor) {
+SteinerPoint<D> OffCenter(const Polytope<D>& cell, int node, int plane, double distance_sq) {
   const Point<D>& x = cell.nodes()[node].x;
-  const double edge_sq = 2 * cell.plane(plane).offset;
-  const double distance_sq = factor * factor * rho * rho * edge_sq;
   if (NormSq<D>(x) <= distance_sq) {
     return Relative<D>(cell, x);
+  }
+  const double edge_sq = plane >= 0 ? 2 * cell.plane(plane).offset : std::numeric_limits<double>::infinity();
+  if (distance_sq < kLeastHeight * edge_sq) {
+    const double t = std::sqrt(distance_sq / NormSq<D>(x));
+    Point<D> p = x;
+    for (double& coordinate : p) {
+      coordinate *= t;
+    }
+    return Relative<D>(cell, p);
   }
   Point<D> middle;
   Point<D> along;
@@ -112,13 +125,12 @@ SteinerPoint<D> SnapToBoundary(const Box<D>& box, SteinerPoint<D> point) {
   }
 }
 
-template double OffCenterFactor<2>(double);
-template double OffCenterFactor<3>(double);
-template SteinerPoint<2> OffCenter<2>(const Polytope<2>&, int, int, double, double);
-template SteinerPoint<3> OffCenter<3>(const Polytope<3>&, int, int, double, double);
-template SteinerPoint<2> EncroachmentPoint<2>(const Polytope<2>&, int);
-template SteinerPoint<3> EncroachmentPoint<3>(const Polytope<3>&, int);
-template SteinerPoint<2> SnapToBoundary<2>(const Box<2>&, SteinerPoint<2>);
-template SteinerPoint<3> SnapToBoundary<3>(const Box<3>&, SteinerPoint<3>);
+#define WELLSPACE_INSTANTIATE(D)                                               \
+  template double OffCenterFactor<D>(double);                                  \
+  template SteinerPoint<D> OffCenter<D>(const Polytope<D>&, int, int, double); \
+  template SteinerPoint<D> EncroachmentPoint<D>(const Polytope<D>&, int);      \
+  template SteinerPoint<D> SnapToBoundary<D>(const Box<D>&, SteinerPoint<D>);
+WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
+#undef WELLSPACE_INSTANTIATE
 
 }  // namespace wellspace::core

@@ -15,21 +15,25 @@ struct SteinerPoint {
 };
 
 // How far from the site, relative to rho times the edge, an off-centre lies at most: a hair below Üngör's distance in
-// 2-D, where the new triangle just keeps rho; 1.1 in 3-D. Measured, see docs/design/core.md.
+// 2-D, where the new triangle just keeps rho; 1.1 in higher dimensions. Measured, see docs/design/refine.md.
 template <int D>
 double OffCenterFactor(double rho);
 
-// A point of the cell for its bad node `node`, whose shortest edge is that of plane `plane`: the node itself, or the
-// point of the segment from it towards the edge's midpoint at distance factor * rho * |edge| from the site, as far as
-// the segment is in the cell.
+// The same relative to the largest circumradius that the sizes allow.
+inline constexpr double kSizeFactor = 1.5;
+
+// A point of the cell for its bad node `node`, which lies on the bisector `plane`, or on none (-1): the node itself if
+// its squared distance from the site is at most distance_sq; else the point at that distance on the segment from it
+// towards the midpoint of the edge, as far as the segment is in the cell. Where the bisector is too far for that, or
+// there is none, on the segment towards the site.
 //
 // Guarantees: (1) in the closed cell up to rounding, so that its distance to the site is that to its nearest vertex;
-//             (2) not nearer to the site than min(node, rho * |edge|).
+//             (2) not nearer to the site than min(node, sqrt(distance_sq)).
 // Complexity: O(planes).
 // Errors:     none.
 // Source:     [Ung04].
 template <int D>
-SteinerPoint<D> OffCenter(const Polytope<D>& cell, int node, int plane, double rho, double factor);
+SteinerPoint<D> OffCenter(const Polytope<D>& cell, int node, int plane, double distance_sq);
 
 // A point of the cell's facet on face `face` of the box: the mean of its nodes.
 //
@@ -48,15 +52,6 @@ SteinerPoint<D> EncroachmentPoint(const Polytope<D>& cell, int face);
 // Source:     docs/design/core.md, the loop.
 template <int D>
 SteinerPoint<D> SnapToBoundary(const Box<D>& box, SteinerPoint<D> point);
-
-extern template double OffCenterFactor<2>(double);
-extern template double OffCenterFactor<3>(double);
-extern template SteinerPoint<2> OffCenter<2>(const Polytope<2>&, int, int, double, double);
-extern template SteinerPoint<3> OffCenter<3>(const Polytope<3>&, int, int, double, double);
-extern template SteinerPoint<2> EncroachmentPoint<2>(const Polytope<2>&, int);
-extern template SteinerPoint<3> EncroachmentPoint<3>(const Polytope<3>&, int);
-extern template SteinerPoint<2> SnapToBoundary<2>(const Box<2>&, SteinerPoint<2>);
-extern template SteinerPoint<3> SnapToBoundary<3>(const Box<3>&, SteinerPoint<3>);
 
 }  // namespace wellspace::core
 

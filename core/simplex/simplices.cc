@@ -9,6 +9,7 @@
 #include <atomic>
 #include <utility>
 
+#include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
 #include "core/simplex/quality.h"
 
@@ -17,10 +18,11 @@ namespace {
 
 constexpr size_t kBlockSize = 512;
 
-// Appends the simplices of the cell in `workspace` whose lowest vertex is its site `v`.
-template <int D>
+// Appends the simplices of the cell in `workspace` whose lowest vertex is its site `v` and whose other vertices are
+// wanted.
+template <int D, typename IsWanted>
 void EmitStar(const QueryStructure<D>& structure, VertexId v, std::span<const uint32_t> output_index,
-              const Workspace<D>& workspace, Simplices& out) {
+              const Workspace<D>& workspace, IsWanted is_wanted, Simplices& out) {
   for (const CellNode<D>& node : workspace.cell.nodes()) {
     std::array<std::pair<uint32_t, VertexId>, D + 1> corners;
     corners[0] = {output_index[Index(v)], v};
@@ -30,7 +32,7 @@ void EmitStar(const QueryStructure<D>& structure, VertexId v, std::span<const ui
       is_ours = plane.kind == PlaneKind::kBisector;
       if (is_ours) {
         corners[k + 1] = {output_index[Index(plane.vertex)], plane.vertex};
-        is_ours = corners[k + 1].first > corners[0].first;
+        is_ours = corners[k + 1].first > corners[0].first && is_wanted(plane.vertex);
       }
     }
     if (!is_ours) {
@@ -52,20 +54,11 @@ void EmitStar(const QueryStructure<D>& structure, VertexId v, std::span<const ui
   }
 }
 
-}  // namespace
-
-template <int D>
-absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, std::span<const uint32_t> output_index,
-                                           int threads, RunContext& context) {
-  std::vector<VertexId> order;
-  order.reserve(structure.vertex_count());
-  structure.tree().ForEachLeaf([&](NodeId leaf) {
-    const auto* bucket = structure.tree().BucketOf(leaf);
-    for (uint32_t i = 0; bucket != nullptr && i < bucket->count && !context.IsCancelled(); ++i) {
-      order.push_back(bucket->ids[i]);
-    }
-  });
-
+// The simplices of the stars of `order` whose vertices are all wanted, in blocks that threads share out.
+template <int D, typename IsWanted>
+absl::StatusOr<Simplices> ComputeStars(const QueryStructure<D>& structure, std::span<const VertexId> order,
+                                       std::span<const uint32_t> output_index, IsWanted is_wanted, int threads,
+                                       RunContext& context) {
   std::vector<Simplices> blocks((order.size() + kBlockSize - 1) / kBlockSize);
   tbb::enumerable_thread_specific<Workspace<D>> workspaces;
   std::atomic<size_t> blocks_done{0};
@@ -76,7 +69,7 @@ absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, s
       const size_t end = std::min(order.size(), (block + 1) * kBlockSize);
       for (size_t i = block * kBlockSize; i < end && !context.IsCancelled(); ++i) {
         structure.Voronoi(order[i], workspace);
-        EmitStar<D>(structure, order[i], output_index, workspace, blocks[block]);
+        EmitStar<D>(structure, order[i], output_index, workspace, is_wanted, blocks[block]);
       }
       context.AddSimplices(blocks[block].indices.size() / (D + 1));
       context.SetPhaseFraction(static_cast<double>(++blocks_done) / static_cast<double>(blocks.size()));
@@ -103,9 +96,65 @@ absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, s
   return all;
 }
 
-template absl::StatusOr<Simplices> ComputeSimplices<2>(const QueryStructure<2>&, std::span<const uint32_t>, int,
-                                                       RunContext&);
-template absl::StatusOr<Simplices> ComputeSimplices<3>(const QueryStructure<3>&, std::span<const uint32_t>, int,
-                                                       RunContext&);
+}  // namespace
+
+template <int D>
+absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, std::span<const uint32_t> output_index,
+                                           int threads, RunContext& context) {
+  std::vector<VertexId> order;
+  order.reserve(structure.vertex_count());
+  structure.tree().ForEachLeaf([&](NodeId leaf) {
+    const auto* bucket = structure.tree().BucketOf(leaf);
+    for (uint32_t i = 0; bucket != nullptr && i < bucket->count && !context.IsCancelled(); ++i) {
+      order.push_back(bucket->ids[i]);
+    }
+  });
+  return ComputeStars<D>(
+      structure, order, output_index, [](VertexId) { return true; }, threads, context);
+}
+
+template <int D>
+absl::StatusOr<std::vector<VertexId>> ChangedVertices(const QueryStructure<D>& structure, VertexId first_new,
+                                                      const RunContext& context) {
+  std::vector<VertexId> changed;
+  Workspace<D> workspace;
+  for (uint32_t i = Index(first_new); i < structure.vertex_count(); ++i) {
+    WELLSPACE_RETURN_IF_ERROR(context.Check());
+    changed.push_back(VertexId{i});
+    structure.Voronoi(VertexId{i}, workspace);
+    for (const CellNode<D>& node : workspace.cell.nodes()) {
+      for (const uint16_t index : node.planes) {
+        if (workspace.cell.plane(index).kind == PlaneKind::kBisector) {
+          changed.push_back(workspace.cell.plane(index).vertex);
+        }
+      }
+    }
+  }
+  std::sort(changed.begin(), changed.end());
+  changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
+  return changed;
+}
+
+template <int D>
+absl::StatusOr<Simplices> ComputeSimplicesAmong(const QueryStructure<D>& structure, std::span<const VertexId> vertices,
+                                                std::span<const uint32_t> output_index, int threads,
+                                                RunContext& context) {
+  std::vector<bool> is_among(structure.vertex_count(), false);
+  for (const VertexId v : vertices) {
+    is_among[Index(v)] = true;
+  }
+  return ComputeStars<D>(
+      structure, vertices, output_index, [&](VertexId v) { return is_among[Index(v)]; }, threads, context);
+}
+
+#define WELLSPACE_INSTANTIATE(D)                                                                                   \
+  template absl::StatusOr<Simplices> ComputeSimplices<D>(const QueryStructure<D>&, std::span<const uint32_t>, int, \
+                                                         RunContext&);                                             \
+  template absl::StatusOr<std::vector<VertexId>> ChangedVertices<D>(const QueryStructure<D>&, VertexId,            \
+                                                                    const RunContext&);                            \
+  template absl::StatusOr<Simplices> ComputeSimplicesAmong<D>(const QueryStructure<D>&, std::span<const VertexId>, \
+                                                              std::span<const uint32_t>, int, RunContext&);
+WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
+#undef WELLSPACE_INSTANTIATE
 
 }  // namespace wellspace::core

@@ -36,10 +36,23 @@ template <int D>
 absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, std::span<const uint32_t> output_index,
                                            int threads, RunContext& context);
 
-extern template absl::StatusOr<Simplices> ComputeSimplices<2>(const QueryStructure<2>&, std::span<const uint32_t>, int,
-                                                              RunContext&);
-extern template absl::StatusOr<Simplices> ComputeSimplices<3>(const QueryStructure<3>&, std::span<const uint32_t>, int,
-                                                              RunContext&);
+// Those vertices whose stars an insertion of the vertices from `first_new` on can have changed: these, and all that now
+// share a simplex with one. (A vertex without a new neighbour has the cell that it had.) Ascending.
+//
+// Complexity: O(1) for each new vertex in a refined structure.
+// Errors:     CANCELLED, DEADLINE_EXCEEDED.
+template <int D>
+absl::StatusOr<std::vector<VertexId>> ChangedVertices(const QueryStructure<D>& structure, VertexId first_new,
+                                                      const RunContext& context);
+
+// The simplices all of whose vertices are among `vertices`, otherwise as ComputeSimplices.
+//
+// REQUIRES:   `vertices` ascending.
+// Complexity: O(vertices), and a bit for each vertex of the structure.
+template <int D>
+absl::StatusOr<Simplices> ComputeSimplicesAmong(const QueryStructure<D>& structure, std::span<const VertexId> vertices,
+                                                std::span<const uint32_t> output_index, int threads,
+                                                RunContext& context);
 
 }  // namespace wellspace::core
 

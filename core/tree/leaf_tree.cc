@@ -4,6 +4,7 @@
 #include <cstdlib>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::core {
@@ -73,7 +74,7 @@ absl::Status LeafTree<D>::Build(const Box<D>& box, std::span<const Point<D>> poi
 
 template <int D>
 void LeafTree<D>::Insert(VertexId near, VertexId v, const Point<D>& p) {
-  NodeId leaf = LeafHolding(near == kNoVertex ? NodeId{0} : leaf_of(near), p);
+  NodeId leaf = LeafHolding(near, p);
   while (At(leaf).bucket != kNoBucket && buckets_[At(leaf).bucket].count == kLeafCapacity && CanSplit(leaf)) {
     Split(leaf);
     leaf = Child(At(leaf), ChildHolding(At(leaf), p));
@@ -120,8 +121,8 @@ int LeafTree<D>::ChildHolding(const Node& node, const Point<D>& p) const {
 }
 
 template <int D>
-NodeId LeafTree<D>::LeafHolding(NodeId start, const Point<D>& p) const {
-  NodeId at = start;
+NodeId LeafTree<D>::LeafHolding(VertexId near, const Point<D>& p) const {
+  NodeId at = near == kNoVertex ? NodeId{0} : leaf_of(near);
   while (true) {
     const Node& node = At(at);
     if (node.first_child != kNoNode) {
@@ -333,7 +334,8 @@ bool LeafTree<D>::HasNearFeatures(const Box<D>& cube, double reach) const {
   return false;
 }
 
-template class LeafTree<2>;
-template class LeafTree<3>;
+#define WELLSPACE_INSTANTIATE(D) template class LeafTree<D>;
+WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
+#undef WELLSPACE_INSTANTIATE
 
 }  // namespace wellspace::core

@@ -67,6 +67,12 @@ class LeafTree {
   // Source:     [HT08] §5, AddVertex.
   void Insert(VertexId near, VertexId v, const Point<D>& p);
 
+  // The leaf that `p` belongs to, walked to from the leaf of `near`, or from the root for kNoVertex.
+  //
+  // REQUIRES:   p in the box.
+  // Complexity: O(1 + leaves between near and p), or O(depth).
+  NodeId LeafHolding(VertexId near, const Point<D>& p) const;
+
   NodeId leaf_of(VertexId v) const { return leaf_of_[Index(v)]; }
   uint32_t vertex_count() const { return static_cast<uint32_t>(leaf_of_.size()); }
   uint64_t leaf_count() const { return leaf_count_; }
@@ -163,7 +169,6 @@ class LeafTree {
   }
 
   int ChildHolding(const Node& node, const Point<D>& p) const;
-  NodeId LeafHolding(NodeId start, const Point<D>& p) const;
   bool CanSplit(NodeId leaf) const { return At(leaf).level < max_level_; }
 
   // Splits a leaf into its children, and before that, for balance, larger leaves that touch it.
@@ -194,9 +199,6 @@ class LeafTree {
   std::vector<Point<D>> near_;                // points near the leaf that is looked at
   std::vector<NodeId> visited_;
 };
-
-extern template class LeafTree<2>;
-extern template class LeafTree<3>;
 
 }  // namespace wellspace::core
 

@@ -1,28 +1,42 @@
 #include "core/voronoi/polytope.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
 #include <utility>
 
+#include "core/base/dimensions.h"
+
 namespace wellspace::core {
 namespace {
 
 constexpr double kUnit = 0x1p-53;  // relative rounding error
-constexpr uint16_t kNoNodeIndex = std::numeric_limits<uint16_t>::max();
 
-// Solves normal_j . x = offset_j. Returns the determinant; x is valid unless that is zero.
+// A node in doubles, and a bound on |x - exact x|; infinite where there is none.
 template <int D>
-double Solve(const std::array<const Plane<D>*, D>& planes, Point<D>& x) {
-  static_assert(D == 2 || D == 3);
+struct Placement {
+  Point<D> x;
+  double error = std::numeric_limits<double>::infinity();
+};
+
+// The meeting point of D planes by Cramer's rule, D <= 3.
+//
+// With a_j = |n_j|, P = prod a_j and S = sum_j |c_j| P / a_j, the numerators are sums of products bounded by S, the
+// determinant by sqrt(D) P; each factor carries at most one rounding (n) or D + 3 (c), each product and sum one more: at
+// most 14 u for D <= 3. So, where |det| > 256 u P, a coordinate is wrong by at most 18 u (S + |x| P) / |det|, and x by
+// sqrt(D) < 2 times that; 64 u is used.
+template <int D>
+Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D <= 3) {
+  Placement<D> placed;
+  double determinant = 0;
   if constexpr (D == 2) {
     const Point<2>& a = planes[0]->normal;
     const Point<2>& b = planes[1]->normal;
-    const double determinant = a[0] * b[1] - a[1] * b[0];
+    determinant = a[0] * b[1] - a[1] * b[0];
     const double inverse = 1 / determinant;
-    x[0] = (planes[0]->offset * b[1] - planes[1]->offset * a[1]) * inverse;
-    x[1] = (planes[1]->offset * a[0] - planes[0]->offset * b[0]) * inverse;
-    return determinant;
+    placed.x[0] = (planes[0]->offset * b[1] - planes[1]->offset * a[1]) * inverse;
+    placed.x[1] = (planes[1]->offset * a[0] - planes[0]->offset * b[0]) * inverse;
   } else {
     const auto cross = [](const Point<3>& a, const Point<3>& b) {
       return Point<3>{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
@@ -30,13 +44,101 @@ double Solve(const std::array<const Plane<D>*, D>& planes, Point<D>& x) {
     const Point<3> bc = cross(planes[1]->normal, planes[2]->normal);
     const Point<3> ca = cross(planes[2]->normal, planes[0]->normal);
     const Point<3> ab = cross(planes[0]->normal, planes[1]->normal);
-    const double determinant = Dot<3>(planes[0]->normal, bc);
+    determinant = Dot<3>(planes[0]->normal, bc);
     const double inverse = 1 / determinant;
     for (int i = 0; i < 3; ++i) {
-      x[i] = (planes[0]->offset * bc[i] + planes[1]->offset * ca[i] + planes[2]->offset * ab[i]) * inverse;
+      placed.x[i] = (planes[0]->offset * bc[i] + planes[1]->offset * ca[i] + planes[2]->offset * ab[i]) * inverse;
     }
-    return determinant;
   }
+  double product = 1;
+  double sum = 0;
+  for (const Plane<D>* plane : planes) {
+    product *= plane->length;
+    sum += std::abs(plane->offset) / plane->length;
+  }
+  determinant = std::abs(determinant);
+  if (determinant > 256 * kUnit * product) {
+    placed.error = 64 * kUnit * product * (sum + std::sqrt(NormSq<D>(placed.x))) / determinant;
+  }
+  return placed;
+}
+
+// The same by an approximate inverse and the residual, D > 3.
+//
+// Scale the planes to unit normals: A x = c, and let A*, c*, x* be the exact ones. The rows of A carry at most 3 u each
+// (difference, length, quotient), c at most (D + 6) u |c|, in norm. Let Y be any matrix and F = |Y A - I| in the
+// Frobenius norm, computed with an error below (2 D + 4) u |Y| |A|, |A| = sqrt(D); that of A* adds 3 u |Y| sqrt(D). If F*
+// <= 1/2 then |A*^-1| <= 2 |Y|. The residual r = A x - c, computed with an error below (D + 2) u (|a_j| |x| + |c_j|) in
+// each component, differs from A* x - c* by 3 u |x| + (D + 6) u |c_j| more; so |x - x*| <= 2 |Y| (|r| + (2 D + 10) u
+// sqrt(D) (|x| + max |c|)).
+template <int D>
+Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D > 3) {
+  std::array<Point<D>, D> a;
+  Point<D> c;
+  double largest_offset = 0;
+  for (int j = 0; j < D; ++j) {
+    for (int i = 0; i < D; ++i) {
+      a[j][i] = planes[j]->normal[i] / planes[j]->length;
+    }
+    c[j] = planes[j]->offset / planes[j]->length;
+    largest_offset = std::max(largest_offset, std::abs(c[j]));
+  }
+  // Gauss and Jordan with row pivots turn the left half into I and the right half into Y.
+  std::array<std::array<double, 2 * D>, D> m{};
+  for (int j = 0; j < D; ++j) {
+    std::copy(a[j].begin(), a[j].end(), m[j].begin());
+    m[j][D + j] = 1;
+  }
+  for (int k = 0; k < D; ++k) {
+    int pivot = k;
+    for (int j = k + 1; j < D; ++j) {
+      pivot = std::abs(m[j][k]) > std::abs(m[pivot][k]) ? j : pivot;
+    }
+    if (m[pivot][k] == 0) {
+      return {};
+    }
+    std::swap(m[k], m[pivot]);
+    const double inverse = 1 / m[k][k];
+    for (int i = k; i < 2 * D; ++i) {
+      m[k][i] *= inverse;
+    }
+    for (int j = 0; j < D; ++j) {
+      const double factor = m[j][k];
+      for (int i = k; i < 2 * D && j != k; ++i) {
+        m[j][i] -= factor * m[k][i];
+      }
+    }
+  }
+  Placement<D> placed;
+  double inverse_sq = 0;
+  double defect_sq = 0;
+  for (int i = 0; i < D; ++i) {
+    placed.x[i] = 0;
+    for (int j = 0; j < D; ++j) {
+      placed.x[i] += m[i][D + j] * c[j];
+      inverse_sq += m[i][D + j] * m[i][D + j];
+      double entry = i == j ? -1 : 0;
+      for (int k = 0; k < D; ++k) {
+        entry += m[i][D + k] * a[k][j];
+      }
+      defect_sq += entry * entry;
+    }
+  }
+  const double root = std::sqrt(static_cast<double>(D));
+  const double inverse_norm = std::sqrt(inverse_sq);
+  if (!(std::sqrt(defect_sq) + (2 * D + 8) * kUnit * root * inverse_norm < 0.5)) {
+    return placed;
+  }
+  double residual_sq = 0;
+  for (int j = 0; j < D; ++j) {
+    const double r = Dot<D>(a[j], placed.x) - c[j];
+    residual_sq += r * r;
+  }
+  // One more part in a hundred pays for the roundings of the bound itself.
+  placed.error =
+      2.02 * inverse_norm *
+      (std::sqrt(residual_sq) + (2 * D + 10) * kUnit * root * (std::sqrt(NormSq<D>(placed.x)) + largest_offset));
+  return placed;
 }
 
 }  // namespace
@@ -68,7 +170,7 @@ void Polytope<D>::Reset(const Point<D>& site, const Box<D>& bounds, const std::a
       const int face = FaceIndex(axis, ((corner >> axis) & 1) != 0);
       node.x[axis] = planes_[face].offset;
       node.planes[axis] = static_cast<uint16_t>(face);
-      node.neighbours[axis] = static_cast<uint16_t>(corner ^ (1 << axis));
+      node.neighbours[axis] = static_cast<Index>(corner ^ (1 << axis));
     }
     node.radius_sq = NormSq<D>(node.x);
     node.slack = 16 * kUnit * std::sqrt(node.radius_sq);
@@ -97,7 +199,7 @@ bool Polytope<D>::Cut(VertexId u, const Point<D>& position) {
     excess_[i] = Dot<D>(nodes_[i].x, plane.normal) - plane.offset;
     is_removed_[i] = IsCutOff(nodes_[i], excess_[i], plane) ? 1 : 0;
     if (is_removed_[i] != 0) {
-      removed_.push_back(static_cast<uint16_t>(i));
+      removed_.push_back(static_cast<Index>(i));
     }
   }
   if (removed_.empty()) {
@@ -112,12 +214,12 @@ bool Polytope<D>::Cut(VertexId u, const Point<D>& position) {
   return true;
 }
 
-// The sign of excess = x . w - c, where the computed value differs from the exact one by at most slack |w| + 8 u c: the
-// error of x is in slack (twice that of a coordinate, and sqrt(D) < 2), w has one rounding a coordinate, the product D
-// + 1 more, c D + 3, the difference one; 16 u |x| of the slack pays for those of the product.
+// The sign of excess = x . w - c, where the computed value differs from the exact one by at most slack |w| + (D + 5) u c: the
+// error of x is in slack, w has one rounding a coordinate, the product D more, c D + 2, the difference one; 16 u |x| of
+// the slack pays for those of the product.
 template <int D>
 bool Polytope<D>::IsCutOff(const CellNode<D>& node, double excess, const Plane<D>& plane) {
-  const double error = node.slack * plane.length + 8 * kUnit * plane.offset;
+  const double error = node.slack * plane.length + (D + 5) * kUnit * plane.offset;
   if (excess > error) {
     return true;
   }
@@ -137,21 +239,21 @@ bool Polytope<D>::IsCutOff(const CellNode<D>& node, double excess, const Plane<D
 // One new node on each edge between a node that stays and one that goes.
 template <int D>
 void Polytope<D>::MakeNewNodes(uint16_t plane) {
-  const auto first_new = static_cast<uint16_t>(nodes_.size());
-  for (const uint16_t removed : removed_) {
+  const auto first_new = static_cast<Index>(nodes_.size());
+  for (const Index removed : removed_) {
     for (int k = 0; k < D; ++k) {
-      const uint16_t kept = nodes_[removed].neighbours[k];
+      const Index kept = nodes_[removed].neighbours[k];
       if (is_removed_[kept] != 0) {
         continue;
       }
-      const auto index = static_cast<uint16_t>(nodes_.size());
+      const auto index = static_cast<Index>(nodes_.size());
       CellNode<D> node;
       node.planes = nodes_[removed].planes;
       node.planes[k] = plane;
-      node.neighbours.fill(kNoNodeIndex);
+      node.neighbours.fill(kNoNode);
       node.neighbours[k] = kept;
       Place(node, kept, removed);
-      for (uint16_t& back : nodes_[kept].neighbours) {
+      for (Index& back : nodes_[kept].neighbours) {
         if (back == removed) {
           back = index;
           break;
@@ -164,26 +266,21 @@ void Polytope<D>::MakeNewNodes(uint16_t plane) {
   LinkNewNodes(plane, first_new);
 }
 
-// Computes a node's position and its error. With a_j = |n_j|, P = prod a_j and S = sum_j |c_j| P / a_j, the numerators
-// are sums of products bounded by S, the determinant by sqrt(D) P; each factor carries at most one rounding (n) or D +
-// 3 (c), each product and sum one more: at most 14 u for D <= 3. So, where |det| > 256 u P, a coordinate is wrong by at
-// most 18 u (S + |x| P) / |det|; 32 is used. Where the determinant is less sure than that the node is put between the
-// ends of its edge, and left to the exact stage.
+// Computes a node's position and its error. Where the planes are too nearly dependent for a bound, the node is put
+// between the ends of its edge, and left to the exact stage.
 template <int D>
-void Polytope<D>::Place(CellNode<D>& node, uint16_t kept, uint16_t removed) {
+void Polytope<D>::Place(CellNode<D>& node, Index kept, Index removed) {
   std::array<const Plane<D>*, D> planes;
-  double product = 1;
-  double sum = 0;
   for (int k = 0; k < D; ++k) {
     planes[k] = &planes_[node.planes[k]];
-    product *= planes[k]->length;
-    sum += std::abs(planes[k]->offset) / planes[k]->length;
   }
-  const double determinant = std::abs(Solve<D>(planes, node.x));
-  if (determinant > 256 * kUnit * product) {
+  const Placement<D> placed = Meet<D>(planes);
+  node.slack = placed.error;
+  if (std::isfinite(placed.error)) {
+    node.x = placed.x;
     node.radius_sq = NormSq<D>(node.x);
     const double radius = std::sqrt(node.radius_sq);
-    node.slack = 64 * kUnit * product * (sum + radius) / determinant + 16 * kUnit * radius;
+    node.slack += 16 * kUnit * radius;
     node.reach = radius + node.slack;
     return;
   }
@@ -194,62 +291,97 @@ void Polytope<D>::Place(CellNode<D>& node, uint16_t kept, uint16_t removed) {
   }
   node.radius_sq = std::max(nodes_[kept].radius_sq, nodes_[removed].radius_sq);
   node.reach = std::max(nodes_[kept].reach, nodes_[removed].reach);
-  node.slack = std::numeric_limits<double>::infinity();
 }
 
 // Joins the new nodes along the edges of the new facet: two are joined if they share D - 2 planes beside the new one.
+// Exact decisions leave no edge with one end.
 template <int D>
-void Polytope<D>::LinkNewNodes(uint16_t plane, uint16_t first_new) {
-  static_assert(D == 2 || D == 3);
-  if (open_end_.size() < planes_.size()) {
-    open_end_.resize(planes_.size(), End{kNoNodeIndex, 0});
-  }
-  int open = 0;
-  for (auto index = first_new; index < nodes_.size(); ++index) {
-    for (uint8_t slot = 0; slot < D; ++slot) {
-      if (nodes_[index].planes[slot] == plane) {
-        continue;
-      }
-      // The plane that the edge runs along beside the new one; in 2-D the new plane alone.
-      uint16_t along = plane;
-      for (int other = 0; other < D && D == 3; ++other) {
-        if (other != slot && nodes_[index].planes[other] != plane) {
-          along = nodes_[index].planes[other];
+void Polytope<D>::LinkNewNodes(uint16_t plane, Index first_new) {
+  if constexpr (D <= 3) {
+    // The other plane numbers the edges; in 2-D there is one edge, which runs along the new plane alone.
+    if (open_end_.size() < planes_.size()) {
+      open_end_.resize(planes_.size());
+    }
+    int open = 0;
+    for (auto index = first_new; index < nodes_.size(); ++index) {
+      for (uint8_t slot = 0; slot < D; ++slot) {
+        if (nodes_[index].planes[slot] == plane) {
+          continue;
+        }
+        uint16_t along = plane;
+        for (int other = 0; other < D && D == 3; ++other) {
+          if (other != slot && nodes_[index].planes[other] != plane) {
+            along = nodes_[index].planes[other];
+          }
+        }
+        End& end = open_end_[along];
+        if (end.node == kNoNode) {
+          end = {index, slot};
+          ++open;
+        } else {
+          Join({index, slot}, end);
+          end = {};
+          --open;
         }
       }
-      End& end = open_end_[along];
-      if (end.node == kNoNodeIndex) {
-        end = {index, slot};
-        ++open;
-      } else {
-        nodes_[index].neighbours[slot] = end.node;
-        nodes_[end.node].neighbours[end.slot] = index;
-        end.node = kNoNodeIndex;
-        --open;
+    }
+    if (open != 0) {
+      std::abort();
+    }
+  } else {
+    ridges_.clear();
+    for (auto index = first_new; index < nodes_.size(); ++index) {
+      for (uint8_t slot = 0; slot < D; ++slot) {
+        if (nodes_[index].planes[slot] == plane) {
+          continue;
+        }
+        Ridge ridge;
+        ridge.end = {index, slot};
+        int count = 0;
+        for (int other = 0; other < D; ++other) {
+          if (other != slot && nodes_[index].planes[other] != plane) {
+            ridge.planes[count++] = nodes_[index].planes[other];
+          }
+        }
+        std::sort(ridge.planes.begin(), ridge.planes.end());
+        ridges_.push_back(ridge);
       }
     }
+    std::sort(ridges_.begin(), ridges_.end(), [](const Ridge& a, const Ridge& b) { return a.planes < b.planes; });
+    if (ridges_.size() % 2 != 0) {
+      std::abort();
+    }
+    for (size_t i = 0; i < ridges_.size(); i += 2) {
+      if (ridges_[i].planes != ridges_[i + 1].planes) {
+        std::abort();
+      }
+      Join(ridges_[i].end, ridges_[i + 1].end);
+    }
   }
-  if (open != 0) {
-    std::abort();  // exact decisions cannot leave an edge with one end
-  }
+}
+
+template <int D>
+void Polytope<D>::Join(End a, End b) {
+  nodes_[a.node].neighbours[a.slot] = b.node;
+  nodes_[b.node].neighbours[b.slot] = a.node;
 }
 
 // Moves nodes from the end into the places of removed ones.
 template <int D>
 void Polytope<D>::DropRemovedNodes() {
-  for (const uint16_t hole : removed_) {
+  for (const Index hole : removed_) {
     while (!nodes_.empty() && is_removed_[nodes_.size() - 1] != 0) {
       nodes_.pop_back();
     }
     if (hole >= nodes_.size()) {
       return;
     }
-    const auto last = static_cast<uint16_t>(nodes_.size() - 1);
+    const auto last = static_cast<Index>(nodes_.size() - 1);
     nodes_[hole] = nodes_[last];
     is_removed_[hole] = 0;
     nodes_.pop_back();
-    for (const uint16_t neighbour : nodes_[hole].neighbours) {
-      for (uint16_t& back : nodes_[neighbour].neighbours) {
+    for (const Index neighbour : nodes_[hole].neighbours) {
+      for (Index& back : nodes_[neighbour].neighbours) {
         if (back == last) {
           back = hole;
           break;
@@ -291,7 +423,8 @@ bool Polytope<D>::Reaches(const Box<D>& cube) const {
   return false;
 }
 
-template class Polytope<2>;
-template class Polytope<3>;
+#define WELLSPACE_INSTANTIATE(D) template class Polytope<D>;
+WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
+#undef WELLSPACE_INSTANTIATE
 
 }  // namespace wellspace::core

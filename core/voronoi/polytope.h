@@ -4,7 +4,9 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "core/base/ids.h"
@@ -32,14 +34,18 @@ struct Plane {
   PlaneSource<D> source;  // exact
 };
 
+// Numbers the nodes of a cell: a mesh in 6-D has cells of more than 2^16.
+template <int D>
+using NodeIndex = std::conditional_t<(D <= 4), uint16_t, uint32_t>;
+
 template <int D>
 struct CellNode {
-  Point<D> x;                      // relative to the site
-  double radius_sq = 0;            // |x|^2
-  double reach = 0;                // at least the exact |x|
-  double slack = 0;                // twice the error of x in any direction and of products with it, per unit of length
-  std::array<uint16_t, D> planes;  // indices of the planes that meet here
-  std::array<uint16_t, D> neighbours;  // neighbours[k]: the node at the other end of the edge that leaves planes[k]
+  Point<D> x;                              // relative to the site
+  double radius_sq = 0;                    // |x|^2
+  double reach = 0;                        // at least the exact |x|
+  double slack = 0;                        // bounds the error of x, and of products with it, per unit of length
+  std::array<uint16_t, D> planes;          // indices of the planes that meet here
+  std::array<NodeIndex<D>, D> neighbours;  // neighbours[k]: the node at the other end of the edge that leaves planes[k]
 };
 
 // How often the stages after the floating-point filter were needed.
@@ -89,15 +95,25 @@ class Polytope {
   const DecisionCounters& counters() const { return counters_; }
 
  private:
+  using Index = NodeIndex<D>;
+  static constexpr Index kNoNode = std::numeric_limits<Index>::max();
+
+  // A new node whose edge that leaves planes[slot] lacks its other end.
   struct End {
-    uint16_t node;
-    uint8_t slot;
+    Index node = kNoNode;
+    uint8_t slot = 0;
+  };
+  // The same, with the D - 2 planes that the edge runs along beside the new one, ascending.
+  struct Ridge {
+    std::array<uint16_t, D - 2> planes;
+    End end;
   };
 
   bool IsCutOff(const CellNode<D>& node, double excess, const Plane<D>& plane);
   void MakeNewNodes(uint16_t plane);
-  void Place(CellNode<D>& node, uint16_t kept, uint16_t removed);
-  void LinkNewNodes(uint16_t plane, uint16_t first_new);
+  void Place(CellNode<D>& node, Index kept, Index removed);
+  void LinkNewNodes(uint16_t plane, Index first_new);
+  void Join(End a, End b);
   void DropRemovedNodes();
   void UpdateReach();
 
@@ -109,16 +125,13 @@ class Polytope {
   uint64_t cuts_ = 0;
   DecisionCounters counters_;
 
-  // Scratch of Cut, by node.
-  std::vector<double> excess_;
-  std::vector<uint8_t> is_removed_;
-  std::vector<uint16_t> removed_;
-  std::vector<End>
-      open_end_;  // by plane: a new node whose edge along that plane and the new one still lacks its other end
+  // Scratch of Cut.
+  std::vector<double> excess_;       // by node
+  std::vector<uint8_t> is_removed_;  // by node
+  std::vector<Index> removed_;
+  std::vector<End> open_end_;  // by the plane that an edge runs along; D <= 3
+  std::vector<Ridge> ridges_;  // D > 3
 };
-
-extern template class Polytope<2>;
-extern template class Polytope<3>;
 
 }  // namespace wellspace::core
 

@@ -4,6 +4,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::core {
@@ -78,16 +79,14 @@ bool QueryStructure<D>::MarkSeen(NodeId leaf, Workspace<D>& workspace) const {
 
 template <int D>
 template <typename ReachSq, typename Wants, typename Open>
-void QueryStructure<D>::ScanOutward(VertexId v, Workspace<D>& workspace, ReachSq reach_sq, Wants wants,
-                                    Open open) const {
+void QueryStructure<D>::ScanOutward(const Point<D>& site, NodeId own, Workspace<D>& workspace, ReachSq reach_sq,
+                                    Wants wants, Open open) const {
   using Candidate = typename Workspace<D>::Candidate;
   // A heap with the nearest leaf on top; of two as near, that of the lower number.
   const auto later = [](const Candidate& a, const Candidate& b) {
     return a.distance_sq != b.distance_sq ? a.distance_sq > b.distance_sq : Index(a.leaf) > Index(b.leaf);
   };
   BeginQuery(workspace);
-  const Point<D>& site = point(v);
-  const NodeId own = tree_.leaf_of(v);
   MarkSeen(own, workspace);
   workspace.queue.push_back({0, own});
   uint64_t leaves = 0;
@@ -121,15 +120,25 @@ void QueryStructure<D>::ScanOutward(VertexId v, Workspace<D>& workspace, ReachSq
 
 template <int D>
 Neighbor QueryStructure<D>::ApproximateNearestNeighbor(VertexId v, Workspace<D>& workspace) const {
-  const Point<D>& site = point(v);
+  return Nearest(point(v), tree_.leaf_of(v), v, workspace);
+}
+
+template <int D>
+Neighbor QueryStructure<D>::NearestTo(const Point<D>& p, VertexId near, Workspace<D>& workspace) const {
+  return Nearest(p, tree_.LeafHolding(near, p), kNoVertex, workspace);
+}
+
+// The vertex other than `but` that is nearest to `p`, a point of `leaf`.
+template <int D>
+Neighbor QueryStructure<D>::Nearest(const Point<D>& p, NodeId leaf, VertexId but, Workspace<D>& workspace) const {
   Neighbor nearest{kNoVertex, std::numeric_limits<double>::infinity()};
   ScanOutward(
-      v, workspace, [&] { return nearest.distance_sq; }, [](NodeId) { return true; },
-      [&](NodeId leaf) {
-        const auto* bucket = tree_.BucketOf(leaf);
+      p, leaf, workspace, [&] { return nearest.distance_sq; }, [](NodeId) { return true; },
+      [&](NodeId opened) {
+        const auto* bucket = tree_.BucketOf(opened);
         for (uint32_t i = 0; bucket != nullptr && i < bucket->count; ++i) {
-          const double distance_sq = DistanceSq<D>(bucket->positions[i], site);
-          if (distance_sq < nearest.distance_sq && bucket->ids[i] != v) {
+          const double distance_sq = DistanceSq<D>(bucket->positions[i], p);
+          if (distance_sq < nearest.distance_sq && bucket->ids[i] != but) {
             nearest = {bucket->ids[i], distance_sq};
           }
         }
@@ -174,7 +183,7 @@ void QueryStructure<D>::Voronoi(VertexId v, Workspace<D>& workspace) const {
 template <int D>
 void QueryStructure<D>::Scan(VertexId v, Workspace<D>& workspace) const {
   ScanOutward(
-      v, workspace, [&] { return workspace.cell.CutLimitSq(); },
+      point(v), tree_.leaf_of(v), workspace, [&] { return workspace.cell.CutLimitSq(); },
       [&](NodeId leaf) { return workspace.cell.Reaches(tree_.BoxOf(leaf)); },
       [&](NodeId leaf) { CutByLeaf(v, leaf, workspace); });
   workspace.counters.cuts += workspace.cell.cuts();
@@ -207,7 +216,8 @@ void QueryStructure<D>::CutByLeaf(VertexId v, NodeId leaf, Workspace<D>& workspa
   }
 }
 
-template class QueryStructure<2>;
-template class QueryStructure<3>;
+#define WELLSPACE_INSTANTIATE(D) template class QueryStructure<D>;
+WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
+#undef WELLSPACE_INSTANTIATE
 
 }  // namespace wellspace::core

@@ -78,6 +78,14 @@ class QueryStructure {
   // Source:     [HT08] Figure 3, APPROXIMATENN.
   Neighbor ApproximateNearestNeighbor(VertexId v, Workspace<D>& workspace) const;
 
+  // The vertex nearest to the point `p`, which need not be one; looked for outward from `near` (kNoVertex if none is
+  // known). If p is a vertex the distance is 0.
+  //
+  // REQUIRES:   there is a vertex; p in the box.
+  // Complexity: O(1) when bottom-up and near; O(depth of the tree) more when no vertex is known.
+  // Errors:     none.
+  Neighbor NearestTo(const Point<D>& p, VertexId near, Workspace<D>& workspace) const;
+
   // Computes in workspace.cell the Voronoi cell of `v` in the box, clipped by the cube of half side `radius` about v.
   // Ties are kept.
   //
@@ -119,10 +127,12 @@ class QueryStructure {
  private:
   void BeginQuery(Workspace<D>& workspace) const;
   bool MarkSeen(NodeId leaf, Workspace<D>& workspace) const;
-  // Calls open(leaf) for leaves outward from that of v: as long as reach_sq() says for those whose distance allows it,
-  // and wants(leaf) agrees.
+  // Calls open(leaf) for leaves outward from `own`, which holds `site`: as long as reach_sq() says for those whose
+  // distance allows it, and wants(leaf) agrees.
   template <typename ReachSq, typename Wants, typename Open>
-  void ScanOutward(VertexId v, Workspace<D>& workspace, ReachSq reach_sq, Wants wants, Open open) const;
+  void ScanOutward(const Point<D>& site, NodeId own, Workspace<D>& workspace, ReachSq reach_sq, Wants wants,
+                   Open open) const;
+  Neighbor Nearest(const Point<D>& p, NodeId leaf, VertexId but, Workspace<D>& workspace) const;
   void Scan(VertexId v, Workspace<D>& workspace) const;
   void CutByLeaf(VertexId v, NodeId leaf, Workspace<D>& workspace) const;
 
@@ -131,9 +141,6 @@ class QueryStructure {
   std::vector<Point<D>> points_;
   std::vector<FaceMask> faces_;
 };
-
-extern template class QueryStructure<2>;
-extern template class QueryStructure<3>;
 
 }  // namespace wellspace::core
 

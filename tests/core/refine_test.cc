@@ -39,16 +39,28 @@ QueryStructure<D> MakeStructure(std::vector<Point<D>> points) {
   return structure;
 }
 
+struct Parameters {
+  double rho = 0;
+  uint64_t max_vertices = kMany;
+  double min_edge = 0x1p-48;
+};
+
 template <int D>
-RefinementParameters Defaults() {
-  return {.rho = D == 2 ? std::sqrt(2.0) : 2.0, .max_vertices = kMany, .min_edge = 0x1p-48};
+Parameters Defaults() {
+  return {.rho = D == 2 ? std::sqrt(2.0) : 2.0};
 }
 
 template <int D>
-absl::Status RefineQuietly(const RefinementParameters& parameters, QueryStructure<D>& structure) {
+absl::Status Refine(const Parameters& parameters, QueryStructure<D>& structure, RunContext& context,
+                    const RefinementObserver<D>& observer = nullptr) {
+  Refinement<D> refinement(structure, parameters.min_edge);
+  return refinement.Run({.rho = parameters.rho, .sizes = {}}, parameters.max_vertices, context, observer);
+}
+
+template <int D>
+absl::Status RefineQuietly(const Parameters& parameters, QueryStructure<D>& structure) {
   RunContext context;
-  QueryCounters counters;
-  return Refine<D>(parameters, structure, context, counters);
+  return Refine<D>(parameters, structure, context);
 }
 
 // What Refine promises of the whole cell of `v`, computed by a look at all vertices.
@@ -90,7 +102,7 @@ TYPED_TEST(RefineTest, EveryCellIsGoodInTheEnd) {
   for (const std::string_view kind : test::AllKinds()) {
     SCOPED_TRACE(std::string(kind));
     QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, D == 2 ? 25 : 6));
-    const RefinementParameters parameters = Defaults<D>();
+    const Parameters parameters = Defaults<D>();
     const absl::Status refined = RefineQuietly<D>(parameters, structure);
     ASSERT_TRUE(refined.ok()) << refined;
     Polytope<D> cell;
@@ -104,7 +116,7 @@ TYPED_TEST(RefineTest, EveryCellIsGoodInTheEnd) {
 
 TYPED_TEST(RefineTest, KeepsTheTighterBoundsToo) {
   constexpr int D = TypeParam::kValue;
-  RefinementParameters parameters = Defaults<D>();
+  Parameters parameters = Defaults<D>();
   parameters.rho = D == 2 ? 0.95 : 1.3;
   QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", D == 2 ? 20 : 4));
   const absl::Status refined = RefineQuietly<D>(parameters, structure);
@@ -154,21 +166,27 @@ TYPED_TEST(RefineTest, ARefinedStructureNeedsNothingMore) {
   EXPECT_EQ(structure.vertex_count(), count);
 }
 
-// Size-conforming: NN(v) >= lfs(v) / (1 + c) with c = r / (r - 1), r = rho / sqrt 2 in 2-D and rho / 2 in 3-D for the boundary.
+// Size-conforming up to the boundary: NN(v) >= lfs(v) / (1 + C). An interior Steiner vertex has lfs(x) <= C_0 r(x), r(x) its
+// distance from the nearest vertex when inserted, with C_0 = 1 + C / rho; each of up to D projections on faces of the box, or
+// encroachments across one, turns a constant C into sqrt 2 C + 1.
 TYPED_TEST(RefineTest, VerticesAreNoCloserThanFeaturesAskFor) {
   constexpr int D = TypeParam::kValue;
   for (const std::string_view kind : {"uniform", "clusters", "boundary", "lines"}) {
     SCOPED_TRACE(std::string(kind));
-    RefinementParameters parameters = Defaults<D>();
-    parameters.rho = D == 2 ? 2 : 4;
+    const double growth = std::pow(2.0, 0.5 * D);
+    Parameters parameters = Defaults<D>();
+    parameters.rho = 2 * growth;
+    double added = 0;
+    for (int k = 0; k < D; ++k) {
+      added = std::sqrt(2.0) * added + 1;
+    }
+    const double c = growth * (1 + added / parameters.rho) / (1 - growth / parameters.rho) + added;
     QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, 40));
     std::vector<Point<D>> features;
     for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
       features.push_back(structure.point(VertexId{v}));
     }
     ASSERT_TRUE(RefineQuietly<D>(parameters, structure).ok());
-    const double r = D == 2 ? parameters.rho / std::sqrt(2.0) : parameters.rho / 2;
-    const double c = r / (r - 1);
     for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
       const double lfs = test::LocalFeatureSize<D>(structure.box(), features, structure.point(VertexId{v}));
       ASSERT_GE(std::sqrt(test::NearestDistanceSq<D>(structure, VertexId{v})), lfs / (1 + c)) << "vertex " << v;
@@ -183,28 +201,28 @@ TYPED_TEST(RefineTest, NewVerticesAreAsFarApartAsTheBucketSays) {
   for (const std::string_view kind : {"uniform", "clusters", "boundary", "log-uniform"}) {
     SCOPED_TRACE(std::string(kind));
     QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, D == 2 ? 40 : 10));
-    const RefinementParameters parameters = Defaults<D>();
+    const Parameters parameters = Defaults<D>();
     RunContext context;
-    QueryCounters counters;
     uint32_t expected = structure.vertex_count();
     double worst = std::numeric_limits<double>::infinity();
-    const absl::Status status = Refine<D>(parameters, structure, context, counters, [&](const QueryStructure<D>& at) {
-      ASSERT_EQ(at.vertex_count(), ++expected) << "one vertex a step";
-      const double bucket_begins = parameters.min_edge * std::pow(std::sqrt(2.0), context.Snapshot().bucket);
-      const double nearest = std::sqrt(test::NearestDistanceSq<D>(at, VertexId{at.vertex_count() - 1}));
-      worst = std::min(worst, nearest / bucket_begins);
-    });
+    const absl::Status status =
+        Refine<D>(parameters, structure, context, [&](const QueryStructure<D>& at, const Insertion& insertion) {
+          ASSERT_EQ(at.vertex_count(), ++expected) << "one vertex a step";
+          ASSERT_EQ(Index(insertion.vertex), expected - 1);
+          const double bucket_begins = std::sqrt(insertion.edge_limit_sq / 2);
+          const double nearest = std::sqrt(test::NearestDistanceSq<D>(at, VertexId{at.vertex_count() - 1}));
+          worst = std::min(worst, nearest / bucket_begins);
+        });
     ASSERT_TRUE(status.ok()) << status;
     EXPECT_GE(worst, std::pow(0.5, 0.5 * D));
     EXPECT_EQ(context.Snapshot().vertices, structure.vertex_count());
-    EXPECT_GE(counters.queries, structure.vertex_count());
   }
 }
 
 TYPED_TEST(RefineTest, EndsAtMaxVerticesWithTheStructureUsable) {
   constexpr int D = TypeParam::kValue;
   QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", 30));
-  RefinementParameters parameters = Defaults<D>();
+  Parameters parameters = Defaults<D>();
   parameters.max_vertices = structure.vertex_count() + 25;
   const absl::Status status = RefineQuietly<D>(parameters, structure);
   EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
@@ -224,7 +242,7 @@ TYPED_TEST(RefineTest, EndsAtMaxVerticesWithTheStructureUsable) {
 TYPED_TEST(RefineTest, EndsAtTheShortestEdge) {
   constexpr int D = TypeParam::kValue;
   QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("clusters", D == 2 ? 100 : 60));
-  RefinementParameters parameters = Defaults<D>();
+  Parameters parameters = Defaults<D>();
   parameters.min_edge = 0.1;
   const uint32_t inputs = structure.vertex_count();
   const absl::Status status = RefineQuietly<D>(parameters, structure);
@@ -244,15 +262,15 @@ TYPED_TEST(RefineTest, CancelFromTheObserverEndsTheRun) {
   for (const bool deadline : {false, true}) {
     QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", 100));
     RunContext context;
-    QueryCounters counters;
     int steps = 0;
     int steps_after = 0;
-    const absl::Status status = Refine<D>(Defaults<D>(), structure, context, counters, [&](const QueryStructure<D>&) {
-      steps_after += context.IsCancelled() ? 1 : 0;
-      if (++steps == 20) {
-        deadline ? context.ExceedDeadline() : context.Cancel();
-      }
-    });
+    const absl::Status status =
+        Refine<D>(Defaults<D>(), structure, context, [&](const QueryStructure<D>&, const Insertion&) {
+          steps_after += context.IsCancelled() ? 1 : 0;
+          if (++steps == 20) {
+            deadline ? context.ExceedDeadline() : context.Cancel();
+          }
+        });
     EXPECT_EQ(status.code(), deadline ? absl::StatusCode::kDeadlineExceeded : absl::StatusCode::kCancelled);
     EXPECT_LE(steps_after, 3) << "only the cell at hand may be finished";
     ASSERT_TRUE(RefineQuietly<D>(Defaults<D>(), structure).ok()) << "the structure stays usable";
@@ -314,7 +332,8 @@ TYPED_TEST(RefineTest, OffCentersAreInTheCellAndFarEnough) {
           }
           const double rho = 1 + this->random_.Unit();
           const double factor = 1 + this->random_.Unit();
-          const auto point = OffCenter<D>(cell, static_cast<int>(i), index, rho, factor);
+          const double distance_sq = std::pow(factor * rho * plane.length, 2);
+          const auto point = OffCenter<D>(cell, static_cast<int>(i), index, distance_sq);
           const double radius = std::sqrt(point.empty_radius_sq);
           const double node_radius = std::sqrt(cell.nodes()[i].radius_sq);
           const double rounding = 1e-9 + std::min(cell.nodes()[i].slack, 1e-6);
@@ -352,7 +371,7 @@ TYPED_TEST(RefineTest, EncroachmentPointIsTheMeanOfTheFacetsNodes) {
     EXPECT_EQ(point.position[face / 2], face % 2) << "exactly on the face";
     EXPECT_NEAR(point.empty_radius_sq, distance_sq, 1e-15);
   }
-  const Assessment found = Assess<D>(cell, 0, 1.5, 1);
+  const Assessment found = Assess<D>(cell, 0, {.rho = 1.5, .sizes = {}}, 1);
   EXPECT_EQ(found.encroached_face % 2, 0) << "the low faces are nearer";
   EXPECT_LT(found.bad_node, 0);
   EXPECT_FALSE(found.is_clipped);
@@ -368,11 +387,11 @@ TYPED_TEST(RefineTest, AssessesTheCellOfACorner) {
   const FaceMask faces = structure.faces(VertexId{0});
   const double far = std::sqrt(0.25 * D);
 
-  const Assessment good = Assess<D>(workspace.cell, faces, far + 1e-9, 100);
+  const Assessment good = Assess<D>(workspace.cell, faces, {.rho = far + 1e-9, .sizes = {}}, 100);
   EXPECT_TRUE(good.IsGood());
   EXPECT_DOUBLE_EQ(good.radius_sq, 0.25 * D);
 
-  const Assessment bad = Assess<D>(workspace.cell, faces, far - 1e-9, 1);
+  const Assessment bad = Assess<D>(workspace.cell, faces, {.rho = far - 1e-9, .sizes = {}}, 1);
   EXPECT_FALSE(bad.IsGood());
   ASSERT_GE(bad.bad_node, 0);
   EXPECT_DOUBLE_EQ(workspace.cell.nodes()[bad.bad_node].radius_sq, 0.25 * D);
@@ -380,18 +399,18 @@ TYPED_TEST(RefineTest, AssessesTheCellOfACorner) {
   EXPECT_EQ(bad.next_edge_sq, Assessment::kNone);
 
   // The same node belongs to an edge that is too long to be looked at now.
-  const Assessment later = Assess<D>(workspace.cell, faces, far - 1e-9, 0.99);
+  const Assessment later = Assess<D>(workspace.cell, faces, {.rho = far - 1e-9, .sizes = {}}, 0.99);
   EXPECT_LT(later.bad_node, 0);
   EXPECT_DOUBLE_EQ(later.next_edge_sq, 1);
   EXPECT_FALSE(later.IsGood());
 
   // A node on an own face at (1/2, ...) that is too far asks for nothing, but keeps the site from being done for good.
   const double on_face = std::sqrt(0.25 * (D - 1));
-  EXPECT_EQ(Assess<D>(workspace.cell, faces, on_face - 1e-9, 0.99).radius_sq, Assessment::kNone);
-  EXPECT_DOUBLE_EQ(Assess<D>(workspace.cell, faces, on_face + 1e-9, 0.99).radius_sq, 0.25 * D);
+  EXPECT_EQ(Assess<D>(workspace.cell, faces, {.rho = on_face - 1e-9, .sizes = {}}, 0.99).radius_sq, Assessment::kNone);
+  EXPECT_DOUBLE_EQ(Assess<D>(workspace.cell, faces, {.rho = on_face + 1e-9, .sizes = {}}, 0.99).radius_sq, 0.25 * D);
 
   structure.ClippedVoronoi(VertexId{0}, 0.4, workspace);
-  const Assessment clipped = Assess<D>(workspace.cell, faces, 2, 100);
+  const Assessment clipped = Assess<D>(workspace.cell, faces, {.rho = 2, .sizes = {}}, 100);
   EXPECT_TRUE(clipped.is_clipped);
   EXPECT_FALSE(clipped.IsGood());
 }
@@ -419,7 +438,7 @@ TEST(SteinerPointTest, OffCenterByHand) {
     }
     for (size_t i = 0; i < cell.nodes().size(); ++i) {
       if (DistanceSq<2>(cell.nodes()[i].x, at) < 1e-12) {
-        return OffCenter<2>(cell, static_cast<int>(i), 4, rho, factor);
+        return OffCenter<2>(cell, static_cast<int>(i), 4, std::pow(factor * rho, 2));
       }
     }
     ADD_FAILURE() << "no such node";
@@ -451,13 +470,13 @@ TEST(SteinerPointTest, SnapsByHand) {
   EXPECT_EQ(snap({0, 0.5}, 0.4).position, (Point<2>{0, 0.5})) << "on a face already";
 }
 
-TEST(ScheduleTest, BucketsDivideLengthsByTheRatio) {
-  const Schedule schedule(1e-3, 1.5);
-  EXPECT_EQ(schedule.BucketOf(0), 0);
-  EXPECT_EQ(schedule.BucketOf(1e-3), 0);
+TEST(ScheduleTest, BucketsDivideSquaredLengthsByTwo) {
+  const Schedule schedule(1e-3);
+  EXPECT_EQ(schedule.BucketOf(1e-9), 0);
+  EXPECT_EQ(schedule.BucketOf(1e-6), 0);
   for (int bucket = 0; bucket < 60; ++bucket) {
-    EXPECT_EQ(schedule.BucketOf(schedule.UpperLength(bucket) * (1 - 1e-9)), bucket);
-    EXPECT_EQ(schedule.BucketOf(schedule.UpperLength(bucket) * (1 + 1e-9)), bucket + 1);
+    EXPECT_EQ(schedule.BucketOf(std::nextafter(schedule.UpperLengthSq(bucket), 0)), bucket);
+    EXPECT_EQ(schedule.BucketOf(schedule.UpperLengthSq(bucket)), bucket + 1);
   }
 }
 
@@ -466,7 +485,7 @@ TEST(ScheduleTest, BehavesAsItsModel) {
   const uint64_t seed = Seed(4711);
   SCOPED_TRACE("seed " + std::to_string(seed));
   SplitMix64 random(seed);
-  Schedule schedule(1, 2);
+  Schedule schedule(1);
   std::map<uint32_t, std::pair<int, int>> model;
   for (int time = 0; time < 20000; ++time) {
     if (random.Below(5) < 3) {

@@ -194,15 +194,14 @@ TYPED_TEST(VoronoiOracleTest, QueriesAreExactAtEveryStageOfRefinement) {
     QueryStructure<D> structure = MakeStructure<D>(test::UnitBox<D>(), test::SortedCloud<D>(kind, D == 2 ? 60 : 16));
     QueryChecker<D> checker(this->random_);
     RunContext context;
-    QueryCounters counters;
-    const RefinementObserver<D> observer = [&](const QueryStructure<D>& at) {
+    const RefinementObserver<D> observer = [&](const QueryStructure<D>& at, const Insertion&) {
       if (steps++ % 30 == 0 && !this->HasFatalFailure()) {
         checker.CheckAll(at, VertexId(this->random_.Below(at.vertex_count())));
         checker.CheckAll(at, VertexId{at.vertex_count() - 1});
       }
     };
-    const RefinementParameters parameters{.rho = 2, .max_vertices = 600, .min_edge = 1e-9};
-    const absl::Status status = Refine<D>(parameters, structure, context, counters, observer);
+    Refinement<D> refinement(structure, 1e-9);
+    const absl::Status status = refinement.Run({.rho = 2, .sizes = {}}, 600, context, observer);
     EXPECT_TRUE(status.ok() || status.code() == absl::StatusCode::kResourceExhausted) << status;
     ASSERT_FALSE(this->HasFatalFailure());
   }

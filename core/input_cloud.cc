@@ -1,0 +1,226 @@
+#include "core/input_cloud.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
+#include "core/base/cancellable_sort.h"
+#include "core/base/dimensions.h"
+#include "core/base/status_macros.h"
+#include "core/tree/morton.h"
+
+namespace wellspace::core {
+namespace {
+
+// The longest side of a domain is scaled to about 1 when it is beyond these powers of two.
+constexpr int kMaxScaleExponent = 60;
+
+// Larger ones leave no room for sums and products.
+constexpr double kMaxCoordinate = 0x1p1000;
+
+// Cheap steps between two looks at the context.
+constexpr size_t kCheckInterval = size_t{1} << 16;
+
+std::string FormatCoordinates(std::span<const double> p) {
+  return absl::StrCat(
+      "(", absl::StrJoin(p, ", ", [](std::string* out, double x) { absl::StrAppendFormat(out, "%.17g", x); }), ")");
+}
+
+template <int D>
+absl::Status CheckFinite(std::span<const double> points) {
+  for (size_t i = 0; i < points.size(); ++i) {
+    if (!std::isfinite(points[i])) {
+      return absl::InvalidArgumentError(absl::StrCat("points[", i / D, "]: coordinate ", i % D, " is ", points[i],
+                                                     "; coordinates must be finite numbers"));
+    }
+  }
+  return absl::OkStatus();
+}
+
+template <int D>
+absl::Status CheckBox(const Box<D>& box) {
+  double magnitude = 0;
+  for (int i = 0; i < D; ++i) {
+    if (!(std::abs(box.low[i]) <= kMaxCoordinate && std::abs(box.high[i]) <= kMaxCoordinate)) {
+      return absl::InvalidArgumentError(absl::StrFormat(
+          "domain: along axis %d it goes from %g to %g; coordinates must be at most 2^1000; scale the points down", i,
+          box.low[i], box.high[i]));
+    }
+    magnitude = std::max({magnitude, std::abs(box.low[i]), std::abs(box.high[i])});
+  }
+  for (int i = 0; i < D; ++i) {
+    // The negation also catches a margin of zero around points in a plane.
+    if (!(box.high[i] - box.low[i] > 0x1p-40 * magnitude) || box.high[i] - box.low[i] < 0x1p-900) {
+      return absl::InvalidArgumentError(absl::StrFormat(
+          "domain: its extent along axis %d, from %.17g to %.17g, is too small; it must be at least 2^-40 of the "
+          "largest coordinate, %g; give a larger domain or margin, or move the points nearer to the origin",
+          i, box.low[i], box.high[i], magnitude));
+    }
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+template <int D>
+Point<D> PointAt(std::span<const double> points, size_t index) {
+  Point<D> p;
+  std::copy_n(points.begin() + static_cast<std::ptrdiff_t>(index * D), D, p.begin());
+  return p;
+}
+
+template <int D>
+absl::StatusOr<Domain<D>> Domain<D>::Of(const Box<D>& box) {
+  WELLSPACE_RETURN_IF_ERROR(CheckBox<D>(box));
+  Domain domain;
+  domain.box = box;
+  const int exponent = std::ilogb(box.LongestSide());
+  domain.scale = std::abs(exponent) <= kMaxScaleExponent ? 1.0 : std::ldexp(1.0, -exponent);
+  domain.scaled_box = Box<D>{domain.Scaled(box.low), domain.Scaled(box.high)};
+  domain.grid_step = MortonGrid<D>(domain.scaled_box).quantum();
+  return domain;
+}
+
+template <int D>
+absl::StatusOr<Box<D>> BoxAround(std::span<const double> points, double margin) {
+  WELLSPACE_RETURN_IF_ERROR(CheckFinite<D>(points));
+  Box<D> box;
+  if (points.empty()) {
+    return absl::InvalidArgumentError(
+        "points: there are none and no domain is given; give a domain or at least one point");
+  }
+  box.low = box.high = PointAt<D>(points, 0);
+  for (size_t i = 0; i < points.size(); ++i) {
+    box.low[i % D] = std::min(box.low[i % D], points[i]);
+    box.high[i % D] = std::max(box.high[i % D], points[i]);
+  }
+  double side = box.LongestSide();
+  if (side == 0) {
+    side = 1;  // one point, once or more often: any size serves
+  }
+  const double grow = margin * side;
+  for (int i = 0; i < D; ++i) {
+    box.low[i] -= grow;
+    box.high[i] += grow;
+  }
+  return box;
+}
+
+template <int D>
+absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<const double> points,
+                                         const RunContext& context) {
+  WELLSPACE_RETURN_IF_ERROR(CheckFinite<D>(points));
+  const Box<D>& box = domain.box;
+  SortedCloud<D> cloud;
+  const MortonGrid<D> grid(domain.scaled_box);
+  struct Entry {
+    GridPoint<D> cube;
+    uint32_t input;
+  };
+  const auto point_of = [&](const Entry& entry) { return domain.Scaled(PointAt<D>(points, entry.input)); };
+  const size_t count = points.size() / D;
+  std::vector<Entry> entries(count);
+  for (size_t i = 0; i < count; ++i) {
+    if (i % kCheckInterval == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
+    const Point<D> p = PointAt<D>(points, i);
+    if (!box.Contains(p)) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          "points[", i, "] = ", FormatCoordinates(p), " lies outside the domain ", FormatCoordinates(box.low), " to ",
+          FormatCoordinates(box.high), "; enlarge the domain or drop the point"));
+    }
+    const Point<D> scaled_p = domain.Scaled(p);
+    for (int k = 0; k < D; ++k) {
+      if (scaled_p[k] / domain.scale != p[k]) {
+        return absl::InvalidArgumentError(absl::StrFormat(
+            "points[%d]: coordinate %d is %g, too small for the arithmetic of doubles beside a domain of "
+            "side %g; make it 0, or give a smaller domain",
+            i, k, p[k], box.LongestSide()));
+      }
+    }
+    entries[i] = {grid.CubeOf(scaled_p), static_cast<uint32_t>(i)};
+  }
+  // Points of one cube are equal, or too close to be served.
+  WELLSPACE_RETURN_IF_ERROR(CancellableSort(
+      entries,
+      [](const Entry& a, const Entry& b) {
+        return a.cube != b.cube ? MortonLess<D>(a.cube, b.cube) : a.input < b.input;
+      },
+      context));
+
+  cloud.points.reserve(count);
+  cloud.sorted_index.assign(count, 0);
+  for (size_t i = 0; i < count; ++i) {
+    if (i % kCheckInterval == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
+    const Point<D> p = point_of(entries[i]);
+    if (i == 0 || entries[i].cube != entries[i - 1].cube) {
+      cloud.points.push_back(p);
+      cloud.first_input.push_back(entries[i].input);
+    } else if (p != cloud.points.back()) {
+      return TooCloseError<D>(domain, points, entries[i].input, std::sqrt(DistanceSq<D>(p, cloud.points.back())),
+                              absl::StrCat("points[", cloud.first_input.back(), "]"));
+    }
+    cloud.sorted_index[entries[i].input] = static_cast<uint32_t>(cloud.points.size() - 1);
+  }
+  return cloud;
+}
+
+template <int D>
+absl::Status TooCloseError(const Domain<D>& domain, std::span<const double> points, size_t index, double distance,
+                           std::string_view other) {
+  return absl::InvalidArgumentError(absl::StrFormat(
+      "points[%d] = %s is only %g from %s, too close for the arithmetic of doubles in this domain (at least %g is "
+      "needed); merge them, or give a smaller domain nearer to the origin",
+      index, FormatCoordinates(PointAt<D>(points, index)), distance / domain.scale, other,
+      domain.MinSeparation() / domain.scale));
+}
+
+template <int D>
+absl::Status CheckSeparation(const Domain<D>& domain, const SortedCloud<D>& cloud, const QueryStructure<D>& structure,
+                             std::span<const double> points, const RunContext& context) {
+  const double least = domain.MinSeparation();
+  Workspace<D> workspace;
+  for (uint32_t i = 0; i < cloud.points.size(); ++i) {
+    WELLSPACE_RETURN_IF_ERROR(context.Check());
+    const VertexId v{i};
+    const size_t input = cloud.first_input[i];
+    const auto [nearest, nearest_sq] = structure.ApproximateNearestNeighbor(v, workspace);
+    if (nearest_sq < least * least) {
+      const bool is_input = Index(nearest) < cloud.points.size();
+      return TooCloseError<D>(
+          domain, points, input, std::sqrt(nearest_sq),
+          is_input ? absl::StrCat("points[", cloud.first_input[Index(nearest)], "]") : "a corner of the domain");
+    }
+    for (int face = 0; face < 2 * D; ++face) {
+      const double distance = domain.scaled_box.DistanceToFace(structure.point(v), face);
+      if (distance > 0 && distance < least) {
+        return absl::InvalidArgumentError(
+            absl::StrFormat("points[%d] = %s is only %g from the %s face of axis %d of the domain, too close for the "
+                            "arithmetic of doubles (on it, or "
+                            "at least %g away, is needed); move the domain's face",
+                            input, FormatCoordinates(PointAt<D>(points, input)), distance / domain.scale,
+                            face % 2 == 0 ? "low" : "high", face / 2, least / domain.scale));
+      }
+    }
+  }
+  return absl::OkStatus();
+}
+
+#define WELLSPACE_INSTANTIATE(D)                                                                                       \
+  template struct Domain<D>;                                                                                           \
+  template Point<D> PointAt<D>(std::span<const double>, size_t);                                                       \
+  template absl::StatusOr<Box<D>> BoxAround<D>(std::span<const double>, double);                                       \
+  template absl::StatusOr<SortedCloud<D>> SortCloud<D>(const Domain<D>&, std::span<const double>, const RunContext&);  \
+  template absl::Status TooCloseError<D>(const Domain<D>&, std::span<const double>, size_t, double, std::string_view); \
+  template absl::Status CheckSeparation<D>(const Domain<D>&, const SortedCloud<D>&, const QueryStructure<D>&,          \
+                                           std::span<const double>, const RunContext&);
+WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
+#undef WELLSPACE_INSTANTIATE
+
+}  // namespace wellspace::core

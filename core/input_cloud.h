@@ -1,0 +1,90 @@
+// The points that a mesh is made of: checked, put on the scale of the computation, sorted, without duplicates.
+#ifndef WELLSPACE_CORE_INPUT_CLOUD_H_
+#define WELLSPACE_CORE_INPUT_CLOUD_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "core/base/run_context.h"
+#include "core/geometry/box.h"
+#include "core/geometry/point.h"
+#include "core/voronoi/query_structure.h"
+
+namespace wellspace::core {
+
+// The box that is meshed, and the power of two that brings it to a scale on which no product of lengths overflows.
+template <int D>
+struct Domain {
+  Box<D> box;         // as given
+  Box<D> scaled_box;  // of the computation
+  double scale = 1;
+  double grid_step = 0;  // of the Morton grid, scaled
+
+  // Vertices nearer than this, scaled, are refused as input: coordinates of Steiner points around them would be too
+  // coarse to keep rho.
+  double MinSeparation() const { return 64 * grid_step; }
+
+  // No negative zero: equal points have equal bits.
+  Point<D> Scaled(Point<D> p) const {
+    for (double& x : p) {
+      x = x * scale + 0.0;
+    }
+    return p;
+  }
+  Point<D> Unscaled(Point<D> p) const {
+    for (double& x : p) {
+      x /= scale;
+    }
+    return p;
+  }
+
+  // Errors:     INVALID_ARGUMENT for a box that doubles cannot serve.
+  static absl::StatusOr<Domain> Of(const Box<D>& box);
+};
+
+// Row `index` of points, n x D, row-major.
+template <int D>
+Point<D> PointAt(std::span<const double> points, size_t index);
+
+// The bounding box of `points`, grown on every side by `margin` times its longest side.
+//
+// Errors:     INVALID_ARGUMENT when there are none, or one is not finite.
+template <int D>
+absl::StatusOr<Box<D>> BoxAround(std::span<const double> points, double margin);
+
+// A cloud without its duplicates, in the order that the query structure wants.
+template <int D>
+struct SortedCloud {
+  std::vector<Point<D>> points;        // distinct, in Morton order, scaled
+  std::vector<uint32_t> first_input;   // by sorted point: the first input equal to it
+  std::vector<uint32_t> sorted_index;  // by input: its sorted point
+};
+
+// Errors:     INVALID_ARGUMENT, naming the point: not finite, outside the domain, too small for its scale, too close to
+//             another one; CANCELLED, DEADLINE_EXCEEDED.
+// Complexity: O(n log n).
+template <int D>
+absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<const double> points,
+                                         const RunContext& context);
+
+// The error for point `index` of `points`, which is only `distance`, scaled, from what `other` names.
+template <int D>
+absl::Status TooCloseError(const Domain<D>& domain, std::span<const double> points, size_t index, double distance,
+                           std::string_view other);
+
+// Refuses points nearer to each other, to a corner of the box, or to a face of it that they do not lie on, than the
+// arithmetic serves. The vertices of `structure` are those of `cloud`, in its order, then the corners.
+//
+// Errors:     INVALID_ARGUMENT, naming the point; CANCELLED, DEADLINE_EXCEEDED.
+// Complexity: O(n) queries.
+template <int D>
+absl::Status CheckSeparation(const Domain<D>& domain, const SortedCloud<D>& cloud, const QueryStructure<D>& structure,
+                             std::span<const double> points, const RunContext& context);
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_INPUT_CLOUD_H_
