@@ -32,12 +32,12 @@ struct MeshParameters {
   // No simplex has a larger circumradius. 0 means no bound.
   double max_circumradius = 0;
   // Boxes in which it is smaller still. Away from a box, sizes grow no faster than the distance from it.
-  std::vector<SizeBox> size_boxes;
+  std::vector<SizeBox> size_boxes{};
 
   // Low and high corner of the box to be meshed, `dimension` numbers each. Both empty: the bounding box of the points,
   // grown on every side by `margin` times its longest side.
-  std::vector<double> domain_low;
-  std::vector<double> domain_high;
+  std::vector<double> domain_low{};
+  std::vector<double> domain_high{};
   double margin = 0.25;
 
   // The run ends with RESOURCE_EXHAUSTED before the mesh has more vertices than this. 0 means kDefaultMaxVertices.

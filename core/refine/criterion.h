@@ -17,7 +17,7 @@ template <int D>
 struct Demands {
   Criterion criterion = Criterion::kRadiusEdge;
   double rho = 0;
-  SizeField<D> sizes;
+  SizeField<D> sizes{};
 
   bool operator==(const Demands&) const = default;
 };

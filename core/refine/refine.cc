@@ -21,6 +21,12 @@ constexpr double kNewClipFactor = 1.5;
 // Vertices looked at between two reports of progress.
 constexpr uint64_t kReportInterval = 256;
 
+template <int D>
+bool IsOnFace(const Polytope<D>& cell, const CellNode<D>& node) {
+  return std::any_of(node.planes.begin(), node.planes.end(),
+                     [&](uint16_t index) { return cell.plane(index).kind == PlaneKind::kFace; });
+}
+
 }  // namespace
 
 template <int D>
@@ -147,7 +153,7 @@ void Refinement<D>::Settle(VertexId v, const Assessment& found, double clip, int
     radius_sq_[Index(v)] = found.radius_sq;
     if (is_announced_[Index(v)] == 0) {
       is_announced_[Index(v)] = 1;
-      WakeNeighbours(cell, kNoVertex);
+      WakeNeighbours(cell, [this](VertexId u) { return !schedule_.Waits(u); });
     }
     return;
   }
@@ -193,7 +199,7 @@ void Refinement<D>::LookAtNew(VertexId x, VertexId near, double radius_sq) {
   structure_.ClippedVoronoi(x, clip, new_);
   const Assessment found = Assess<D>(new_.cell, structure_.faces(x), *demands_, schedule_.UpperLengthSq(bucket));
   is_announced_[Index(x)] = found.is_clipped ? 0 : 1;
-  WakeNeighbours(new_.cell, near);
+  WakeNeighbours(new_.cell, [near](VertexId u) { return u != near; });
   if (found.bad_node >= 0) {
     schedule_.Add(x, found.bound_sq / (demands_->rho * demands_->rho));
   } else if (found.encroached_face >= 0) {
@@ -203,18 +209,26 @@ void Refinement<D>::LookAtNew(VertexId x, VertexId near, double radius_sq) {
   }
 }
 
-// Schedules those neighbours of a cell's site whose farthest node may be too far now that the site is their neighbour.
+// Schedules those neighbours of a cell's site that it may have spoiled, and that `may_wake` allows. A simplex that breaks
+// rho has the site for a corner; its shortest edge is one of the site's, and then the site sees to it, or has belonged to
+// a cell that kept rho, and still does. What is left:
+// - well-spaced: the site may be the nearest neighbour now, so that other nodes are too far;
+// - a node on one of the neighbour's own faces was too far and asked for nothing: it may have become a circumcentre if
+//   this cell touches the face beside it.
 template <int D>
-void Refinement<D>::WakeNeighbours(const Polytope<D>& cell, VertexId but) {
+template <typename MayWake>
+void Refinement<D>::WakeNeighbours(const Polytope<D>& cell, MayWake may_wake) {
   const double rho_sq = demands_->rho * demands_->rho;
   for (const CellNode<D>& node : cell.nodes()) {
     for (const uint16_t index : node.planes) {
       const Plane<D>& plane = cell.plane(index);
-      if (plane.kind != PlaneKind::kBisector || plane.vertex == but) {
+      if (plane.kind != PlaneKind::kBisector || !may_wake(plane.vertex)) {
         continue;
       }
       double& radius_sq = radius_sq_[Index(plane.vertex)];
-      if (radius_sq > rho_sq * 2 * plane.offset) {
+      if (demands_->criterion == Criterion::kWellSpaced
+              ? radius_sq > rho_sq * 2 * plane.offset
+              : radius_sq == Assessment::kNone && !schedule_.Waits(plane.vertex) && IsOnFace(cell, node)) {
         radius_sq = Assessment::kNone;
         schedule_.Add(plane.vertex, 2 * plane.offset);
       }

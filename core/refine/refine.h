@@ -79,7 +79,8 @@ class Refinement {
   absl::Status Insert(Insertion insertion, const SteinerPoint<D>& point);
   void LookAtNew(VertexId x, VertexId near, double radius_sq);
   void Settle(VertexId v, const Assessment& found, double clip, int earliest, const Polytope<D>& cell);
-  void WakeNeighbours(const Polytope<D>& cell, VertexId but);
+  template <typename MayWake>
+  void WakeNeighbours(const Polytope<D>& cell, MayWake may_wake);
 
   QueryStructure<D>& structure_;
   const double min_edge_;

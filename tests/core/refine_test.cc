@@ -54,7 +54,7 @@ template <int D>
 absl::Status Refine(const Parameters& parameters, QueryStructure<D>& structure, RunContext& context,
                     const RefinementObserver<D>& observer = nullptr) {
   Refinement<D> refinement(structure, parameters.min_edge);
-  return refinement.Run({.rho = parameters.rho, .sizes = {}}, parameters.max_vertices, context, observer);
+  return refinement.Run({.rho = parameters.rho}, parameters.max_vertices, context, observer);
 }
 
 template <int D>
@@ -371,7 +371,7 @@ TYPED_TEST(RefineTest, EncroachmentPointIsTheMeanOfTheFacetsNodes) {
     EXPECT_EQ(point.position[face / 2], face % 2) << "exactly on the face";
     EXPECT_NEAR(point.empty_radius_sq, distance_sq, 1e-15);
   }
-  const Assessment found = Assess<D>(cell, 0, {.rho = 1.5, .sizes = {}}, 1);
+  const Assessment found = Assess<D>(cell, 0, {.rho = 1.5}, 1);
   EXPECT_EQ(found.encroached_face % 2, 0) << "the low faces are nearer";
   EXPECT_LT(found.bad_node, 0);
   EXPECT_FALSE(found.is_clipped);
@@ -387,11 +387,11 @@ TYPED_TEST(RefineTest, AssessesTheCellOfACorner) {
   const FaceMask faces = structure.faces(VertexId{0});
   const double far = std::sqrt(0.25 * D);
 
-  const Assessment good = Assess<D>(workspace.cell, faces, {.rho = far + 1e-9, .sizes = {}}, 100);
+  const Assessment good = Assess<D>(workspace.cell, faces, {.rho = far + 1e-9}, 100);
   EXPECT_TRUE(good.IsGood());
   EXPECT_DOUBLE_EQ(good.radius_sq, 0.25 * D);
 
-  const Assessment bad = Assess<D>(workspace.cell, faces, {.rho = far - 1e-9, .sizes = {}}, 1);
+  const Assessment bad = Assess<D>(workspace.cell, faces, {.rho = far - 1e-9}, 1);
   EXPECT_FALSE(bad.IsGood());
   ASSERT_GE(bad.bad_node, 0);
   EXPECT_DOUBLE_EQ(workspace.cell.nodes()[bad.bad_node].radius_sq, 0.25 * D);
@@ -399,18 +399,18 @@ TYPED_TEST(RefineTest, AssessesTheCellOfACorner) {
   EXPECT_EQ(bad.next_edge_sq, Assessment::kNone);
 
   // The same node belongs to an edge that is too long to be looked at now.
-  const Assessment later = Assess<D>(workspace.cell, faces, {.rho = far - 1e-9, .sizes = {}}, 0.99);
+  const Assessment later = Assess<D>(workspace.cell, faces, {.rho = far - 1e-9}, 0.99);
   EXPECT_LT(later.bad_node, 0);
   EXPECT_DOUBLE_EQ(later.next_edge_sq, 1);
   EXPECT_FALSE(later.IsGood());
 
   // A node on an own face at (1/2, ...) that is too far asks for nothing, but keeps the site from being done for good.
   const double on_face = std::sqrt(0.25 * (D - 1));
-  EXPECT_EQ(Assess<D>(workspace.cell, faces, {.rho = on_face - 1e-9, .sizes = {}}, 0.99).radius_sq, Assessment::kNone);
-  EXPECT_DOUBLE_EQ(Assess<D>(workspace.cell, faces, {.rho = on_face + 1e-9, .sizes = {}}, 0.99).radius_sq, 0.25 * D);
+  EXPECT_EQ(Assess<D>(workspace.cell, faces, {.rho = on_face - 1e-9}, 0.99).radius_sq, Assessment::kNone);
+  EXPECT_DOUBLE_EQ(Assess<D>(workspace.cell, faces, {.rho = on_face + 1e-9}, 0.99).radius_sq, 0.25 * D);
 
   structure.ClippedVoronoi(VertexId{0}, 0.4, workspace);
-  const Assessment clipped = Assess<D>(workspace.cell, faces, {.rho = 2, .sizes = {}}, 100);
+  const Assessment clipped = Assess<D>(workspace.cell, faces, {.rho = 2}, 100);
   EXPECT_TRUE(clipped.is_clipped);
   EXPECT_FALSE(clipped.IsGood());
 }

@@ -201,7 +201,7 @@ TYPED_TEST(VoronoiOracleTest, QueriesAreExactAtEveryStageOfRefinement) {
       }
     };
     Refinement<D> refinement(structure, 1e-9);
-    const absl::Status status = refinement.Run({.rho = 2, .sizes = {}}, 600, context, observer);
+    const absl::Status status = refinement.Run({.rho = 2}, 600, context, observer);
     EXPECT_TRUE(status.ok() || status.code() == absl::StatusCode::kResourceExhausted) << status;
     ASSERT_FALSE(this->HasFatalFailure());
   }

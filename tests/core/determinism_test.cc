@@ -1,0 +1,87 @@
+// One mesh for one input: whatever the order of the points, the number of threads, the machine.
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <ostream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/mesher.h"
+#include "tests/support/canonical.h"
+#include "tests/support/clouds.h"
+
+namespace wellspace::core {
+namespace {
+
+using test::Canonical;
+using test::CanonicalMesh;
+using test::MakeCloud;
+
+struct GoldenMesh {
+  std::string_view name;
+  std::string_view kind;
+  int dimension;
+  size_t points;
+  MeshParameters parameters;
+  uint64_t vertices;
+  uint64_t hash;
+};
+
+void PrintTo(const GoldenMesh& golden, std::ostream* out) { *out << golden.name; }
+
+// Made by this very test. A change of the algorithm changes them, and says so in CHANGELOG.md; nothing else may.
+std::vector<GoldenMesh> GoldenMeshes() {
+  return {
+      {"uniform_2", "uniform", 2, 2000, {}, 0, 0},
+      {"uniform_2_well_spaced", "uniform", 2, 1000, {.criterion = Criterion::kWellSpaced}, 0, 0},
+      {"lines_2_tight", "lines", 2, 1000, {.rho = 1}, 0, 0},
+      {"grid_2", "grid", 2, 1000, {}, 0, 0},
+      {"cospherical_2", "cospherical", 2, 500, {}, 0, 0},
+      {"uniform_2_sized", "uniform", 2, 100, {.max_circumradius = 0.02}, 0, 0},
+      {"uniform_3", "uniform", 3, 1000, {}, 0, 0},
+      {"uniform_3_well_spaced", "uniform", 3, 300, {.criterion = Criterion::kWellSpaced}, 0, 0},
+      {"grid_3", "grid", 3, 1000, {}, 0, 0},
+      {"rounded_3", "rounded", 3, 1000, {}, 0, 0},
+      {"boundary_3", "boundary", 3, 300, {}, 0, 0},
+      {"skew_3", "skew", 3, 300, {}, 0, 0},
+      {"uniform_3_boxed", "uniform", 3, 100, {.size_boxes = {{{0.2, 0.2, 0.2}, {0.4, 0.4, 0.4}, 0.03}}}, 0, 0},
+  };
+}
+
+class DeterminismTest : public ::testing::TestWithParam<GoldenMesh> {
+ protected:
+  Mesh MeshOf(const std::vector<double>& cloud, int threads) {
+    MeshParameters parameters = GetParam().parameters;
+    parameters.dimension = GetParam().dimension;
+    parameters.domain_low = test::UnitLow(parameters.dimension);
+    parameters.domain_high = test::UnitHigh(parameters.dimension);
+    parameters.threads = threads;
+    RunContext context;
+    absl::StatusOr<Mesh> mesh = MeshPoints(parameters, cloud, context);
+    EXPECT_TRUE(mesh.ok()) << mesh.status();
+    return mesh.ok() ? *std::move(mesh) : Mesh{};
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(Golden, DeterminismTest, ::testing::ValuesIn(GoldenMeshes()),
+                         [](const auto& golden) { return std::string(golden.param.name); });
+
+TEST_P(DeterminismTest, IsTheMeshItAlwaysWas) {
+  const Mesh mesh = MeshOf(MakeCloud(GetParam().kind, GetParam().dimension, GetParam().points), 1);
+  EXPECT_EQ(mesh.vertex_count(), GetParam().vertices);
+  EXPECT_EQ(test::Hash(Canonical(mesh)), GetParam().hash) << std::hex << "0x" << test::Hash(Canonical(mesh));
+}
+
+TEST_P(DeterminismTest, OrderOfThePointsAndThreadsDoNotMatter) {
+  const std::vector<double> cloud = MakeCloud(GetParam().kind, GetParam().dimension, GetParam().points);
+  const CanonicalMesh expected = Canonical(MeshOf(cloud, 1));
+  for (const uint64_t seed : {1, 2, 3}) {
+    const Mesh shuffled = MeshOf(test::Shuffled(cloud, GetParam().dimension, seed), static_cast<int>(seed));
+    EXPECT_TRUE(Canonical(shuffled) == expected) << "seed " << seed;
+  }
+  EXPECT_EQ(MeshOf(cloud, 1).simplices, MeshOf(cloud, 4).simplices) << "not even the order of the simplices";
+}
+
+}  // namespace
+}  // namespace wellspace::core

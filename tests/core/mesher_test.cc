@@ -1,0 +1,343 @@
+// core::Mesher: what can be done to a mesh once it is made.
+#include "core/mesher.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "core/simplex/validate.h"
+#include "tests/support/canonical.h"
+#include "tests/support/clouds.h"
+
+namespace wellspace::core {
+namespace {
+
+using test::Canonical;
+using test::MakeCloud;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+MeshParameters InUnitBox(int dimension) {
+  MeshParameters parameters;
+  parameters.dimension = dimension;
+  parameters.domain_low = test::UnitLow(dimension);
+  parameters.domain_high = test::UnitHigh(dimension);
+  return parameters;
+}
+
+std::vector<double> PointsOf(const Mesh& mesh, std::span<const uint32_t> vertices) {
+  std::vector<double> points;
+  for (const uint32_t v : vertices) {
+    const auto begin = mesh.points.begin() + static_cast<std::ptrdiff_t>(size_t{v} * mesh.dimension);
+    points.insert(points.end(), begin, begin + mesh.dimension);
+  }
+  return points;
+}
+
+class MesherTest : public ::testing::TestWithParam<int> {
+ protected:
+  std::unique_ptr<Mesher> Create(std::span<const double> cloud) {
+    absl::StatusOr<std::unique_ptr<Mesher>> mesher = Mesher::Create(parameters_, cloud, context_);
+    EXPECT_TRUE(mesher.ok()) << mesher.status();
+    return *std::move(mesher);
+  }
+
+  Mesh Extract(Mesher& mesher) {
+    absl::StatusOr<Mesh> mesh = mesher.Extract(1, context_);
+    EXPECT_TRUE(mesh.ok()) << mesh.status();
+    return *std::move(mesh);
+  }
+
+  void ExpectValid(const Mesh& mesh) {
+    ValidationOptions options;
+    options.rho = parameters_.rho == 0 ? DefaultRho(mesh.dimension) : parameters_.rho;
+    EXPECT_EQ(ValidateMesh({mesh.dimension, mesh.points, mesh.simplices}, options), absl::OkStatus());
+  }
+
+  size_t Cells(const Mesh& mesh) { return mesh.statistics.cells_computed; }
+
+  const int d_ = GetParam();
+  MeshParameters parameters_ = InUnitBox(d_);
+  RunContext context_;
+};
+
+INSTANTIATE_TEST_SUITE_P(Dimensions, MesherTest, ::testing::Range(kMinDimension, kMaxDimension + 1));
+
+TEST_P(MesherTest, PointsAddedToARefinedMeshBecomeVerticesOfAValidOne) {
+  for (const char* kind : {"uniform", "grid", "boundary", "rounded"}) {
+    SCOPED_TRACE(kind);
+    const size_t n = d_ <= 3 ? 300 : 10;
+    const std::vector<double> cloud = MakeCloud(kind, d_, n);
+    const auto mesher = Create(cloud);
+    ASSERT_EQ(mesher->Refine(parameters_, context_), absl::OkStatus());
+    Mesh mesh = Extract(*mesher);
+    const Mesh before = mesh;
+    std::vector<double> given = cloud;
+    for (const size_t count : {size_t{1}, n / 5, n}) {
+      const std::vector<double> added = MakeCloud("uniform", d_, count);
+      absl::StatusOr<std::vector<uint32_t>> vertices = mesher->AddPoints(added, context_);
+      ASSERT_TRUE(vertices.ok()) << vertices.status();
+      ASSERT_EQ(mesher->Refine(parameters_, context_), absl::OkStatus());
+      ASSERT_EQ(mesher->Update(mesh, 1, context_), absl::OkStatus());
+      given.insert(given.end(), added.begin(), added.end());
+      EXPECT_EQ(PointsOf(mesh, *vertices), added);
+      EXPECT_EQ(PointsOf(mesh, mesh.input_vertex), given);
+      ExpectValid(mesh);
+      EXPECT_TRUE(Canonical(mesh) == Canonical(Extract(*mesher))) << "an update is what a new extraction gives";
+    }
+    EXPECT_TRUE(std::equal(before.points.begin(), before.points.end(), mesh.points.begin())) << "vertices stay";
+    EXPECT_EQ(mesh.statistics.vertices, mesh.vertex_count());
+    EXPECT_EQ(mesh.statistics.input_points, given.size() / d_);
+    const QualityReport quality = MeasureQuality({d_, mesh.points, mesh.simplices});
+    EXPECT_DOUBLE_EQ(mesh.statistics.max_radius_edge, quality.max_radius_edge);
+    EXPECT_DOUBLE_EQ(mesh.statistics.min_angle_deg, quality.min_angle_deg);
+  }
+}
+
+// The bound is on operations: the cells that an edit computes do not grow with the mesh.
+TEST_P(MesherTest, EditsAreLocal) {
+  if (d_ > 3) {
+    GTEST_SKIP() << "no mesh in this dimension is large enough to tell";
+  }
+  for (const size_t n : {500, 20000}) {
+    const auto mesher = Create(MakeCloud("uniform", d_, n));
+    ASSERT_EQ(mesher->Refine(parameters_, context_), absl::OkStatus());
+    Mesh mesh = Extract(*mesher);
+    const uint64_t cells = mesh.statistics.cells_computed;
+    const uint64_t stars = mesh.statistics.stars_computed;
+    ASSERT_TRUE(mesher->AddPoints(MakeCloud("uniform", d_, 20), context_).ok());
+    ASSERT_EQ(mesher->Refine(parameters_, context_), absl::OkStatus());
+    ASSERT_EQ(mesher->Update(mesh, 1, context_), absl::OkStatus());
+    EXPECT_LT(mesh.statistics.cells_computed - cells, 20u * 20) << n;
+    EXPECT_LT(mesh.statistics.stars_computed - stars, 20u * (d_ == 2 ? 30 : 100)) << n;
+  }
+}
+
+TEST_P(MesherTest, OrderInABatchDoesNotMatter) {
+  const size_t n = d_ <= 3 ? 200 : 10;
+  const std::vector<double> cloud = MakeCloud("uniform", d_, n);
+  const std::vector<double> added = MakeCloud("uniform", d_, n / 2);
+  std::vector<test::CanonicalMesh> meshes;
+  for (const uint64_t seed : {1, 2}) {
+    const auto mesher = Create(test::Shuffled(cloud, d_, seed));
+    ASSERT_EQ(mesher->Refine(parameters_, context_), absl::OkStatus());
+    ASSERT_TRUE(mesher->AddPoints(test::Shuffled(added, d_, seed), context_).ok());
+    ASSERT_EQ(mesher->Refine(parameters_, context_), absl::OkStatus());
+    meshes.push_back(Canonical(Extract(*mesher)));
+  }
+  EXPECT_TRUE(meshes[0] == meshes[1]);
+}
+
+TEST_P(MesherTest, AVertexAddedNearAnotherIsTheSameAsInABatch) {
+  const size_t n = d_ <= 3 ? 200 : 10;
+  const std::vector<double> cloud = MakeCloud("uniform", d_, n);
+  std::vector<double> point(d_, 0.4375);
+  std::vector<test::CanonicalMesh> meshes;
+  for (const bool near : {false, true}) {
+    const auto mesher = Create(cloud);
+    ASSERT_EQ(mesher->Refine(parameters_, context_), absl::OkStatus());
+    if (near) {
+      const absl::StatusOr<uint32_t> vertex = mesher->AddVertex(3, point);
+      ASSERT_TRUE(vertex.ok()) << vertex.status();
+      EXPECT_EQ(*vertex, mesher->vertex_count() - 1);
+      EXPECT_EQ(*mesher->AddVertex(*vertex, point), *vertex) << "it is there already";
+    } else {
+      ASSERT_TRUE(mesher->AddPoints(point, context_).ok());
+    }
+    ASSERT_EQ(mesher->Refine(parameters_, context_), absl::OkStatus());
+    meshes.push_back(Canonical(Extract(*mesher)));
+  }
+  EXPECT_TRUE(meshes[0] == meshes[1]);
+}
+
+TEST_P(MesherTest, APointThatIsAVertexIsNotAddedAgain) {
+  const std::vector<double> cloud = MakeCloud("uniform", d_, 8);
+  const auto mesher = Create(cloud);
+  ASSERT_EQ(mesher->Refine(parameters_, context_), absl::OkStatus());
+  Mesh mesh = Extract(*mesher);
+  const uint32_t steiner = static_cast<uint32_t>(mesh.vertex_count() - 1);
+  std::vector<double> again = PointsOf(mesh, std::vector<uint32_t>{steiner, 2, 8});
+  absl::StatusOr<std::vector<uint32_t>> vertices = mesher->AddPoints(again, context_);
+  ASSERT_TRUE(vertices.ok()) << vertices.status();
+  EXPECT_THAT(*vertices, ElementsAre(steiner, 2, 8));
+  ASSERT_EQ(mesher->Update(mesh, 1, context_), absl::OkStatus()) << "nothing has changed, so it is still refined";
+  EXPECT_EQ(mesh.vertex_count(), mesher->vertex_count());
+}
+
+TEST_P(MesherTest, ABatchWithABadPointAddsNothing) {
+  const auto mesher = Create(MakeCloud("uniform", d_, 8));
+  ASSERT_EQ(mesher->Refine(parameters_, context_), absl::OkStatus());
+  const uint64_t count = mesher->vertex_count();
+  const std::vector<double> good(d_, 0.3);
+  std::vector<double> too_close = good;
+  too_close[0] += 1e-15;
+  std::vector<double> outside = good;
+  outside[d_ - 1] = 1.5;
+  std::vector<double> no_number = good;
+  no_number[0] = std::numeric_limits<double>::quiet_NaN();
+  std::vector<double> by_a_face = good;
+  by_a_face[0] = 1e-15;
+  struct Case {
+    std::vector<double> bad;
+    std::string message;
+  };
+  for (const Case& c : {Case{too_close, "points[0]"}, Case{outside, "points[1]"}, Case{no_number, "points[1]"},
+                        Case{by_a_face, "points[1]"}}) {
+    std::vector<double> batch = good;
+    batch.insert(batch.end(), c.bad.begin(), c.bad.end());
+    const auto added = mesher->AddPoints(batch, context_);
+    EXPECT_EQ(added.status().code(), absl::StatusCode::kInvalidArgument) << added.status();
+    EXPECT_THAT(std::string(added.status().message()), HasSubstr(c.message));
+    EXPECT_EQ(mesher->vertex_count(), count);
+  }
+  Mesh mesh = Extract(*mesher);
+  std::vector<double> by_a_vertex = PointsOf(mesh, std::vector<uint32_t>{5});
+  by_a_vertex[0] += 2e-15;
+  const auto added = mesher->AddPoints(by_a_vertex, context_);
+  EXPECT_EQ(added.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(added.status().message()), AllOf(HasSubstr("points[0]"), HasSubstr("vertex 5")));
+  EXPECT_EQ(mesher->AddPoints(std::vector<double>(d_ + 1, 0.5), context_).status().code(),
+            absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(mesher->AddVertex(static_cast<uint32_t>(count), good).status().code(), absl::StatusCode::kOutOfRange);
+  EXPECT_EQ(mesher->AddVertex(0, std::vector<double>(d_ - 1, 0.5)).status().code(), absl::StatusCode::kInvalidArgument);
+}
+
+TEST_P(MesherTest, GoesOnAfterABudgetThatWasTooSmall) {
+  const std::vector<double> cloud = MakeCloud("uniform", d_, d_ <= 3 ? 100 : 8);
+  const auto whole = Create(cloud);
+  ASSERT_EQ(whole->Refine(parameters_, context_), absl::OkStatus());
+  const auto mesher = Create(cloud);
+  MeshParameters small = parameters_;
+  small.max_vertices = mesher->vertex_count() + 7;
+  while (small.max_vertices < whole->vertex_count()) {
+    EXPECT_EQ(mesher->Refine(small, context_).code(), absl::StatusCode::kResourceExhausted);
+    EXPECT_EQ(mesher->vertex_count(), small.max_vertices);
+    EXPECT_EQ(mesher->Extract(1, context_).status().code(), absl::StatusCode::kFailedPrecondition);
+    small.max_vertices += whole->vertex_count() / 3;
+  }
+  ASSERT_EQ(mesher->Refine(parameters_, context_), absl::OkStatus());
+  ExpectValid(Extract(*mesher));
+}
+
+TEST_P(MesherTest, CanBeRefinedFurther) {
+  const auto mesher = Create(MakeCloud("uniform", d_, d_ <= 3 ? 50 : 5));
+  ASSERT_EQ(mesher->Refine(parameters_, context_), absl::OkStatus());
+  Mesh mesh = Extract(*mesher);
+  uint64_t vertices = mesher->vertex_count();
+  MeshParameters finer = parameters_;
+  finer.rho = 0.9 * DefaultRho(d_);
+  finer.max_circumradius = d_ == 2 ? 0.05 : d_ == 3 ? 0.12 : 0.6;
+  ASSERT_EQ(mesher->Refine(finer, context_), absl::OkStatus());
+  EXPECT_GT(mesher->vertex_count(), vertices);
+  ASSERT_EQ(mesher->Update(mesh, 1, context_), absl::OkStatus());
+  parameters_.rho = finer.rho;
+  ExpectValid(mesh);
+  EXPECT_TRUE(Canonical(mesh) == Canonical(Extract(*mesher)));
+  vertices = mesher->vertex_count();
+  ASSERT_EQ(mesher->Refine(finer, context_), absl::OkStatus());
+  EXPECT_EQ(mesher->vertex_count(), vertices) << "the same demands are met already";
+}
+
+TEST_P(MesherTest, NegativeZerosKeepTheirBits) {
+  parameters_.domain_low.assign(d_, -1);
+  std::vector<double> cloud = {};
+  for (int i = 0; i < 3; ++i) {
+    for (int k = 0; k < d_; ++k) {
+      cloud.push_back(k == i % d_ ? -0.0 : 0.25 * (i + 1));
+    }
+  }
+  const auto mesher = Create(cloud);
+  ASSERT_EQ(mesher->Refine(parameters_, context_), absl::OkStatus());
+  Mesh mesh = Extract(*mesher);
+  std::vector<double> added(d_, -0.5);
+  added[0] = -0.0;
+  const absl::StatusOr<std::vector<uint32_t>> vertices = mesher->AddPoints(added, context_);
+  ASSERT_TRUE(vertices.ok()) << vertices.status();
+  ASSERT_EQ(mesher->Refine(parameters_, context_), absl::OkStatus());
+  ASSERT_EQ(mesher->Update(mesh, 1, context_), absl::OkStatus());
+  for (const Mesh& each : {mesh, Extract(*mesher)}) {
+    for (size_t i = 0; i < cloud.size(); ++i) {
+      EXPECT_EQ(std::signbit(each.points[i]), std::signbit(cloud[i])) << i;
+    }
+    EXPECT_TRUE(std::signbit(each.points[size_t{vertices->front()} * d_]));
+  }
+}
+
+// The cells of a refined mesh, not clipped, have for neighbours just the vertices that share a simplex, but for ties.
+TEST_P(MesherTest, CellsAreThoseOfTheMesh) {
+  const auto mesher = Create(MakeCloud("uniform", d_, d_ <= 3 ? 60 : 5));
+  ASSERT_EQ(mesher->Refine(parameters_, context_), absl::OkStatus());
+  const Mesh mesh = Extract(*mesher);
+  std::vector<std::set<uint32_t>> neighbours(mesh.vertex_count());
+  for (size_t at = 0; at < mesh.simplices.size(); at += d_ + 1) {
+    for (int i = 0; i <= d_; ++i) {
+      for (int k = 0; k <= d_; ++k) {
+        if (i != k) {
+          neighbours[mesh.simplices[at + i]].insert(mesh.simplices[at + k]);
+        }
+      }
+    }
+  }
+  std::vector<uint32_t> all;
+  for (uint32_t v = 0; v < mesh.vertex_count(); v += d_ <= 3 ? 1 : 97) {
+    all.push_back(v);
+  }
+  const absl::StatusOr<std::vector<Cell>> cells = mesher->ClippedCells(all, 1e3);
+  const absl::StatusOr<std::vector<double>> nearest = mesher->NearestNeighborDistances(all);
+  ASSERT_TRUE(cells.ok() && nearest.ok());
+  ASSERT_EQ(cells->size(), all.size());
+  for (size_t i = 0; i < all.size(); ++i) {
+    const Cell& cell = (*cells)[i];
+    const std::set<uint32_t>& expected = neighbours[all[i]];
+    EXPECT_EQ(cell.vertex, all[i]);
+    EXPECT_FALSE(cell.is_clipped);
+    EXPECT_TRUE(std::includes(expected.begin(), expected.end(), cell.neighbours.begin(), cell.neighbours.end()));
+    double shortest = std::numeric_limits<double>::infinity();
+    for (const uint32_t u : expected) {
+      double sum = 0;
+      for (int k = 0; k < d_; ++k) {
+        sum += std::pow(mesh.points[size_t{u} * d_ + k] - mesh.points[size_t{all[i]} * d_ + k], 2);
+      }
+      shortest = std::min(shortest, std::sqrt(sum));
+    }
+    EXPECT_NEAR((*nearest)[i], shortest, 1e-12);
+    EXPECT_DOUBLE_EQ(cell.clip_radius, 1e3 * (*nearest)[i]);
+  }
+  const absl::StatusOr<std::vector<Cell>> clipped = mesher->ClippedCells(all, 1);
+  ASSERT_TRUE(clipped.ok());
+  EXPECT_TRUE(std::any_of(clipped->begin(), clipped->end(), [](const Cell& cell) { return cell.is_clipped; }));
+  EXPECT_EQ(mesher->ClippedCells(all, 0.5).status().code(), absl::StatusCode::kInvalidArgument);
+  all = {0, static_cast<uint32_t>(mesh.vertex_count())};
+  EXPECT_EQ(mesher->ClippedCells(all, 2).status().code(), absl::StatusCode::kOutOfRange);
+  EXPECT_THAT(std::string(mesher->NearestNeighborDistances(all).status().message()), HasSubstr("vertices[1]"));
+}
+
+TEST_P(MesherTest, OnlyTheLastMeshCanBeUpdated) {
+  const auto mesher = Create(MakeCloud("uniform", d_, 5));
+  ASSERT_EQ(mesher->Refine(parameters_, context_), absl::OkStatus());
+  Mesh mesh = Extract(*mesher);
+  Mesh other = mesh;
+  other.simplices.resize(other.simplices.size() - (d_ + 1));
+  EXPECT_EQ(mesher->Update(other, 1, context_).code(), absl::StatusCode::kInvalidArgument);
+  ASSERT_TRUE(mesher->AddPoints(std::vector<double>(d_, 0.71), context_).ok());
+  EXPECT_EQ(mesher->Update(mesh, 1, context_).code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(mesher->Extract(0, context_).status().code(), absl::StatusCode::kFailedPrecondition);
+  ASSERT_EQ(mesher->Refine(parameters_, context_), absl::OkStatus());
+  EXPECT_EQ(mesher->Extract(0, context_).status().code(), absl::StatusCode::kInvalidArgument) << "threads";
+  MeshParameters wrong = parameters_;
+  wrong.dimension = d_ == 2 ? 3 : 2;
+  wrong.domain_low = wrong.domain_high = {};
+  EXPECT_EQ(mesher->Refine(wrong, context_).code(), absl::StatusCode::kInvalidArgument);
+}
+
+}  // namespace
+}  // namespace wellspace::core
