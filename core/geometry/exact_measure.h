@@ -27,7 +27,7 @@ struct MeasuredSign {
 //
 // Laws:       (1) kZero iff the corners lie in one hyperplane; (2) exchanging two corners negates it.
 // REQUIRES:   finite coordinates.
-// Complexity: D! operations in doubles; on doubt D! operations on integers of D times the bits that the coordinates
+// Complexity: O(D 2^D) operations in doubles; on doubt as many on integers of D times the bits that the coordinates
 //             span.
 // Errors:     none.
 template <int D>
@@ -39,7 +39,7 @@ MeasuredSign Orientation(const Simplex<D>& simplex);
 // Laws:       (1) kZero iff q is on the sphere, or the simplex is flat and q in its hyperplane; (2) exchanging two
 //             corners negates it; (3) exchanging q and a corner negates it.
 // REQUIRES:   finite coordinates.
-// Complexity: (D + 1)! operations in doubles; on doubt as many on integers of D + 2 times the bits that the coordinates
+// Complexity: O(D 2^D) operations in doubles; on doubt as many on integers of D + 2 times the bits that the coordinates
 //             span.
 // Errors:     none.
 template <int D>
@@ -49,7 +49,7 @@ MeasuredSign InSphere(const Simplex<D>& simplex, const Point<D>& q);
 // simplex.
 //
 // REQUIRES:   finite coordinates.
-// Complexity: D * D! operations on integers of D + 1 times the bits that the coordinates span.
+// Complexity: O(D^2 2^D) operations on integers of D + 1 times the bits that the coordinates span.
 // Errors:     none.
 template <int D>
 Point<D> ExactCircumcentreOffset(const Simplex<D>& simplex);
@@ -68,7 +68,7 @@ class ExactVolumeSum {
   ExactVolumeSum& operator=(const ExactVolumeSum&) = delete;
 
   // REQUIRES:   finite coordinates.
-  // Complexity: D! operations on integers of D times the bits that the coordinates span.
+  // Complexity: O(D 2^D) operations on integers of D times the bits that the coordinates span.
   // Errors:     none.
   void Add(const Simplex<D>& simplex);
   void Subtract(const Box<D>& box);
@@ -81,15 +81,6 @@ class ExactVolumeSum {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
-
-extern template MeasuredSign Orientation<2>(const Simplex<2>&);
-extern template MeasuredSign Orientation<3>(const Simplex<3>&);
-extern template MeasuredSign InSphere<2>(const Simplex<2>&, const Point<2>&);
-extern template MeasuredSign InSphere<3>(const Simplex<3>&, const Point<3>&);
-extern template Point<2> ExactCircumcentreOffset<2>(const Simplex<2>&);
-extern template Point<3> ExactCircumcentreOffset<3>(const Simplex<3>&);
-extern template class ExactVolumeSum<2>;
-extern template class ExactVolumeSum<3>;
 
 }  // namespace wellspace::core
 

@@ -6,7 +6,9 @@
 #include <limits>
 #include <numeric>
 
+#include "core/base/dimensions.h"
 #include "core/tree/morton.h"
+#include "tests/support/bareiss.h"
 #include "tests/support/clouds.h"
 
 namespace wellspace::test {
@@ -36,16 +38,6 @@ struct ExactPlane {
   bool keeps_above = false;
 };
 
-template <int D>
-cpp_int Determinant(const std::array<std::array<cpp_int, D>, D>& m) {
-  if constexpr (D == 2) {
-    return m[0][0] * m[1][1] - m[0][1] * m[1][0];
-  } else {
-    return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
-           m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
-  }
-}
-
 // A point as numerators over one positive denominator, by Cramer's rule.
 template <int D>
 struct HomogeneousPoint {
@@ -60,7 +52,7 @@ std::optional<HomogeneousPoint<D>> Meet(const std::array<const ExactPlane<D>*, D
     normals[j] = planes[j]->normal;
   }
   HomogeneousPoint<D> x;
-  x.denominator = Determinant<D>(normals);
+  x.denominator = BareissDeterminant<D>(normals);
   if (x.denominator == 0) {
     return std::nullopt;
   }
@@ -71,7 +63,7 @@ std::optional<HomogeneousPoint<D>> Meet(const std::array<const ExactPlane<D>*, D
     for (int j = 0; j < D; ++j) {
       replaced[j][k] = planes[j]->offset;
     }
-    x.numerator[k] = sign * Determinant<D>(replaced);
+    x.numerator[k] = sign * BareissDeterminant<D>(replaced);
   }
   return x;
 }
@@ -407,8 +399,6 @@ std::vector<Point<D>> SortedCloud(std::string_view kind, size_t n) {
 #define WELLSPACE_INSTANTIATE(D)                                                                                    \
   template ExactCell<D> ComputeExactCell<D>(std::span<const IntegerPoint<D>>, size_t, const IntegerPoint<D>&,       \
                                             const IntegerPoint<D>&, bool);                                          \
-  template std::optional<Sign> ExactSide<D>(std::span<const IntegerPoint<D>>, size_t, const std::array<size_t, D>&, \
-                                            size_t, const IntegerPoint<D>&, const IntegerPoint<D>&, bool);          \
   template std::set<NodeName<D>> NamesOf<D>(const Polytope<D>&);                                                    \
   template ::testing::AssertionResult IsSimplePolytope<D>(const Polytope<D>&);                                      \
   template ::testing::AssertionResult HaveSameNodes<D>(const Polytope<D>&, const Polytope<D>&);                     \
@@ -423,6 +413,12 @@ std::vector<Point<D>> SortedCloud(std::string_view kind, size_t n) {
   template std::vector<Point<D>> SortedCloud<D>(std::string_view, size_t)
 WELLSPACE_INSTANTIATE(2);
 WELLSPACE_INSTANTIATE(3);
+#undef WELLSPACE_INSTANTIATE
+
+#define WELLSPACE_INSTANTIATE(D)                                                                                    \
+  template std::optional<Sign> ExactSide<D>(std::span<const IntegerPoint<D>>, size_t, const std::array<size_t, D>&, \
+                                            size_t, const IntegerPoint<D>&, const IntegerPoint<D>&, bool);
+WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 
 }  // namespace wellspace::test

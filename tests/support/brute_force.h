@@ -17,14 +17,10 @@
 #include "core/geometry/point.h"
 #include "core/voronoi/polytope.h"
 #include "core/voronoi/query_structure.h"
+#include "tests/support/dimensions.h"
 
 namespace wellspace::test {
 
-// The dimension of a typed test.
-template <int N>
-struct Dimension {
-  static constexpr int kValue = N;
-};
 using Dimensions = ::testing::Types<Dimension<2>, Dimension<3>>;
 
 // Coordinates below 2^10, so that the weights below are small enough to be as good as infinitesimal.
