@@ -4,145 +4,52 @@
 #include <bit>
 #include <boost/multiprecision/cpp_int.hpp>
 #include <cmath>
-#include <cstring>
+#include <cstdint>
 #include <limits>
+#include <optional>
+
+#include "core/base/dimensions.h"
+#include "core/geometry/fixed_integer.h"
+#include "core/geometry/minors.h"
 
 namespace wellspace::core {
 namespace {
 
-using BigInteger = boost::multiprecision::number<
-    boost::multiprecision::cpp_int_backend<512, 0, boost::multiprecision::signed_magnitude,
-                                           boost::multiprecision::unchecked>,
-    boost::multiprecision::et_off>;
-__extension__ using Integer128 = __int128;
+// ---- The decision, whatever the type of its numbers
 
-// A double as mantissa * 2^exponent, the mantissa odd or zero.
-struct Scaled {
-  int64_t mantissa = 0;
-  int exponent = 0;
+// Rows (n_j, 2 c_j) of the D planes, the last one (w_u, |w_u|^2), in multiples of one power of two. A wall's row is
+// negated where its offset is negative: that changes the sign of both determinants, and the offsets are never negative.
+template <typename Ring, int D>
+struct Rows {
+  std::array<std::array<typename Ring::Entry, D>, D + 1> normals;
+  std::array<typename Ring::Offset, D + 1> offsets;
 };
 
-Scaled Decompose(double value) {
-  if (value == 0) {
-    return {0, std::numeric_limits<int>::max()};
-  }
-  int exponent = 0;
-  const auto mantissa = static_cast<int64_t>(std::ldexp(std::frexp(value, &exponent), 53));
-  const int zeros = std::countr_zero(static_cast<uint64_t>(mantissa));
-  return {mantissa >> zeros, exponent - 53 + zeros};
+template <typename Number>
+Sign SignOf(const Number& value) {
+  return static_cast<Sign>(value.sign());
 }
 
-template <typename Int>
-Int ScaledTo(const Scaled& value, int exponent) {
-  if (value.mantissa == 0) {
-    return Int(0);
-  }
-  return Int(value.mantissa) << (value.exponent - exponent);
+template <int Limbs>
+Sign SignOf(const FixedInteger<Limbs>& value) {
+  return value.IsNegative() ? Sign::kNegative : value.IsZero() ? Sign::kZero : Sign::kPositive;
 }
 
-template <typename Int>
-Sign SignOf(const Int& value) {
-  return value > 0 ? Sign::kPositive : value < 0 ? Sign::kNegative : Sign::kZero;
-}
-
-// Expansion by the first row.
-template <typename Int, int N>
-Int Determinant(const std::array<std::array<Int, N>, N>& m) {
-  if constexpr (N == 1) {
-    return m[0][0];
-  } else if constexpr (N == 2) {
-    return m[0][0] * m[1][1] - m[0][1] * m[1][0];
-  } else {
-    Int sum(0);
-    for (int skip = 0; skip < N; ++skip) {
-      if (m[0][skip] == 0) {
-        continue;
-      }
-      std::array<std::array<Int, N - 1>, N - 1> minor;
-      for (int row = 1; row < N; ++row) {
-        for (int column = 0, to = 0; column < N; ++column) {
-          if (column != skip) {
-            minor[row - 1][to++] = m[row][column];
-          }
-        }
-      }
-      const Int term = m[0][skip] * Determinant<Int, N - 1>(minor);
-      sum = skip % 2 == 0 ? Int(sum + term) : Int(sum - term);
-    }
-    return sum;
-  }
-}
-
-// The coordinates that a decision depends on, and their common scale.
-template <int D>
-struct Operands {
-  std::array<Scaled, D> site;
-  std::array<std::array<Scaled, D>, D> generators;  // of bisectors
-  std::array<Scaled, D> walls;
-  std::array<Scaled, D> u;
-  int low_exponent = std::numeric_limits<int>::max();
-  int high_exponent = std::numeric_limits<int>::min();  // all absolute values are below 2^high_exponent
-
-  void Include(const Scaled& value) {
-    if (value.mantissa != 0) {
-      low_exponent = std::min(low_exponent, value.exponent);
-      high_exponent =
-          std::max(high_exponent,
-                   value.exponent + static_cast<int>(std::bit_width(static_cast<uint64_t>(std::abs(value.mantissa)))));
-    }
-  }
-};
-
-template <typename Int, int D>
-ExactDecision Decide(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u, TieRule rule,
-                     const Operands<D>& operands) {
-  ExactDecision decision;
-  const int scale = operands.low_exponent;
-  std::array<Int, D> origin;
-  for (int i = 0; i < D; ++i) {
-    origin[i] = ScaledTo<Int>(operands.site[i], scale);
-  }
-  // Rows (n_j, 2 c_j), then (w_u, 2 c_u).
-  std::array<std::array<Int, D + 1>, D + 1> bordered;
-  const auto set_bisector = [&](std::array<Int, D + 1>& row, const std::array<Scaled, D>& generator) {
-    row[D] = Int(0);
-    for (int i = 0; i < D; ++i) {
-      row[i] = ScaledTo<Int>(generator[i], scale) - origin[i];
-      row[D] += row[i] * row[i];
-    }
-  };
+// The perturbation's word on an exact zero; see the header. `minors` are those without one row, the last row first.
+template <typename Ring, int D>
+Sign BreakTie(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u,
+              const std::array<typename Ring::template Minor<D>, D + 1>& minors) {
+  const Sign a_sign = SignOf(minors[0]);
+  // lambda_j det A is the determinant of A with w_u in the place of row j: the minor without row j, after D - 1 - j
+  // exchanges of rows.
+  auto site_coefficient = minors[0];
+  Ring::Negate(site_coefficient);
+  std::array<Sign, D> lambda;
   for (int j = 0; j < D; ++j) {
-    if (planes[j].IsWall()) {
-      bordered[j].fill(Int(0));
-      const int axis = planes[j].axis;
-      bordered[j][axis] = Int(1);
-      bordered[j][D] = 2 * (ScaledTo<Int>(operands.walls[j], scale) - origin[axis]);
-    } else {
-      set_bisector(bordered[j], operands.generators[j]);
-    }
-  }
-  set_bisector(bordered[D], operands.u);
-
-  std::array<std::array<Int, D>, D> a;
-  for (int row = 0; row < D; ++row) {
-    std::copy_n(bordered[row].begin(), D, a[row].begin());
-  }
-  const Sign a_sign = SignOf(Determinant<Int, D>(a));
-  decision.sign = -(SignOf(Determinant<Int, D + 1>(bordered)) * a_sign);
-  if (decision.sign != Sign::kZero || rule == TieRule::kKeep) {
-    return decision;
-  }
-
-  decision.perturbed = true;
-  // lambda_j det A is the determinant of A with row j replaced by w_u.
-  std::array<Int, D> lambda;
-  Int site_coefficient = -Determinant<Int, D>(a);
-  for (int j = 0; j < D; ++j) {
-    auto replaced = a;
-    std::copy_n(bordered[D].begin(), D, replaced[j].begin());
-    lambda[j] = Determinant<Int, D>(replaced);
+    const bool negate = (D - 1 - j) % 2 == 1;
+    lambda[j] = negate ? -SignOf(minors[D - j]) : SignOf(minors[D - j]);
     if (!planes[j].IsWall()) {
-      site_coefficient += lambda[j];
+      Ring::Add(site_coefficient, negate, minors[D - j]);
     }
   }
   // The vertices by rank, with the signs of their weights' coefficients.
@@ -163,13 +70,327 @@ ExactDecision Decide(const Point<D>& site, const std::array<PlaneSource<D>, D>& 
   insert(site, SignOf(site_coefficient) * a_sign);
   for (int j = 0; j < D; ++j) {
     if (!planes[j].IsWall()) {
-      insert(planes[j].generator, -(SignOf(lambda[j]) * a_sign));
+      insert(planes[j].generator, -(lambda[j] * a_sign));
     }
   }
-  for (int k = 0; k < count && decision.sign == Sign::kZero; ++k) {
-    decision.sign = ranked[k].coefficient;
+  for (int k = 0; k < count; ++k) {
+    if (ranked[k].coefficient != Sign::kZero) {
+      return ranked[k].coefficient;
+    }
+  }
+  return Sign::kPositive;  // not reached: that of u is positive
+}
+
+template <typename Ring, int D>
+ExactDecision Decide(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u, TieRule rule,
+                     const Rows<Ring, D>& rows) {
+  ExactDecision decision;
+  decision.stage = Ring::kStage;
+  const auto minors = MinorsOf<Ring, D>(rows.normals);
+  typename Ring::template Bordered<D> bordered{};
+  for (int row = 0; row <= D; ++row) {
+    Ring::AddProduct(bordered, rows.offsets[row], (row + D) % 2 == 1, minors[D - row]);
+  }
+  decision.sign = -(SignOf(bordered) * SignOf(minors[0]));
+  if (decision.sign == Sign::kZero && rule == TieRule::kPerturb) {
+    decision.sign = BreakTie<Ring, D>(site, planes, u, minors);
+    decision.perturbed = true;
   }
   return decision;
+}
+
+// ---- Integers of fixed width
+
+// Differences d of coordinates with |d| < 2^b, b = 64 B - 2, in B limbs.
+//
+// All results fit. A minor of k rows is at most k^(k/2) 2^(k b) (Hadamard), and k/2 log2 k <= 0, 1, 3, 4, 6, 8 for k =
+// 1, ..., 6: with its sign k b + 9 bits at most for k = 6, and 64 B k = k b + 2 k are there (k = 2: 2 b + 2 of 2 b + 4;
+// 3: + 4 of 6; 4: + 5 of 8; 5: + 7 of 10; 6: + 9 of 12). An offset is a sum of D squares, below 2^(2 b + 3), or twice a
+// difference, in 2 B limbs of 2 b + 4 bits. The bordered determinant is a sum of D + 1 products of the two: below 2^((D
+// + 2) b) times D (D + 1) D^(D/2), with its sign (D + 2) b + 5, 8, 10, 12, 15 bits for D = 2, ..., 6, and there are (D +
+// 2) b + 2 (D + 2) = ... + 8, 10, 12, 14, 16. The coefficient of the site is a sum of D + 1 minors of D rows: D b + 4,
+// 6, 8, 10, 12 bits, and exactly so many are there. Sums on the way may wrap: arithmetic is modulo a power of two.
+template <int B>
+struct FixedRing {
+  static constexpr Stage kStage = B == 1 ? Stage::kInteger : Stage::kWideInteger;
+  static constexpr int kDifferenceBits = 64 * B - 2;
+  using Entry = SignedMagnitude<B>;
+  using Offset = SignedMagnitude<2 * B>;
+  template <int K>
+  using Minor = FixedInteger<K * B>;
+  template <int D>
+  using Bordered = FixedInteger<(D + 2) * B>;
+
+  static Minor<1> ToMinor(const Entry& entry) {
+    Minor<1> minor;
+    minor.Add({entry.magnitude}, entry.is_negative);
+    return minor;
+  }
+  template <int L, int M, int N>
+  static void AddProduct(FixedInteger<L>& sum, const SignedMagnitude<M>& factor, bool negate,
+                         const FixedInteger<N>& minor) {
+    core::AddProduct(sum, factor, negate, minor);
+  }
+  template <int L>
+  static void Negate(FixedInteger<L>& value) {
+    const FixedInteger<L> copy = value;
+    value = {};
+    value.Add(copy, true);
+  }
+  template <int L>
+  static void Add(FixedInteger<L>& sum, bool negate, const FixedInteger<L>& term) {
+    sum.Add(term, negate);
+  }
+  static void AddSquare(Offset& sum, const Entry& entry) {
+    if constexpr (B == 1) {
+      const Unsigned128 total = (Unsigned128{sum.magnitude[1]} << 64 | sum.magnitude[0]) +
+                                Unsigned128{entry.magnitude[0]} * entry.magnitude[0];
+      sum.magnitude = {static_cast<uint64_t>(total), static_cast<uint64_t>(total >> 64)};
+    } else {
+      FixedInteger<2 * B> total{sum.magnitude};
+      core::AddProduct(total, Entry{entry.magnitude, false}, false, FixedInteger<B>{entry.magnitude});
+      sum.magnitude = total.limbs;
+    }
+  }
+  static Offset Twice(const Entry& entry) {
+    Offset offset{{}, false};
+    uint64_t carry = 0;
+    for (int i = 0; i < B; ++i) {
+      offset.magnitude[i] = entry.magnitude[i] << 1 | carry;
+      carry = entry.magnitude[i] >> 63;
+    }
+    return offset;
+  }
+};
+
+// A difference of two doubles as the sum of two: the rounded one and its error, exact unless it overflows.
+//
+// Source: D. E. Knuth, The Art of Computer Programming 2, section 4.2.2, Theorem B.
+struct ExactDifference {
+  double high;
+  double low;
+};
+
+inline ExactDifference Subtract(double a, double b) {
+  const double difference = a - b;
+  const double b_virtual = a - difference;
+  const double a_virtual = difference + b_virtual;
+  return {difference, (b_virtual - b) + (a - a_virtual)};
+}
+
+// The differences of a decision: by plane to its generator or, on the axis, to its wall; last, to u.
+template <int D>
+struct Differences {
+  std::array<std::array<ExactDifference, D>, D + 1> rows;
+  int exponent;  // all are below 2^(exponent + 1); 1024 if one overflowed
+
+  Differences(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u) {
+    // The bits of positive doubles have the order of the numbers.
+    uint64_t largest = 0;
+    const auto set = [&](ExactDifference& to, double a, double b) {
+      to = Subtract(a, b);
+      largest = std::max(largest, std::bit_cast<uint64_t>(to.high) & ~(uint64_t{1} << 63));
+    };
+    for (int j = 0; j < D; ++j) {
+      if (planes[j].IsWall()) {
+        rows[j].fill({0, 0});
+        set(rows[j][planes[j].axis], planes[j].coordinate, site[planes[j].axis]);
+      } else {
+        for (int i = 0; i < D; ++i) {
+          set(rows[j][i], planes[j].generator[i], site[i]);
+        }
+      }
+    }
+    for (int i = 0; i < D; ++i) {
+      set(rows[D][i], u[i], site[i]);
+    }
+    exponent = static_cast<int>(largest >> 52) - 1023;
+  }
+};
+
+// Calls to_entry(difference, entry) for every difference and completes the rows; false as soon as one call is.
+template <int D, int B, typename ToEntry>
+inline bool FillRows(const Differences<D>& differences, const std::array<PlaneSource<D>, D>& planes, ToEntry to_entry,
+                     Rows<FixedRing<B>, D>& rows) {
+  using Ring = FixedRing<B>;
+  for (int j = 0; j <= D; ++j) {
+    if (j < D && planes[j].IsWall()) {
+      const int axis = planes[j].axis;
+      typename Ring::Entry offset{};
+      if (!to_entry(differences.rows[j][axis], offset)) {
+        return false;
+      }
+      rows.normals[j].fill({{}, false});
+      rows.normals[j][axis].magnitude[0] = 1;
+      rows.normals[j][axis].is_negative = offset.is_negative;
+      rows.offsets[j] = Ring::Twice(offset);
+      continue;
+    }
+    rows.offsets[j] = {{}, false};
+    for (int i = 0; i < D; ++i) {
+      if (!to_entry(differences.rows[j][i], rows.normals[j][i])) {
+        return false;
+      }
+      Ring::AddSquare(rows.offsets[j], rows.normals[j][i]);
+    }
+  }
+  return true;
+}
+
+// 2^exponent for -1022 <= exponent <= 1023.
+double PowerOfTwo(int exponent) { return std::bit_cast<double>(static_cast<uint64_t>(exponent + 1023) << 52); }
+
+// The rows in units of 2^(exponent - 61), in which all differences are below 2^62; false where they are no integers.
+template <int D>
+bool ToRows(const Differences<D>& differences, const std::array<PlaneSource<D>, D>& planes,
+            Rows<FixedRing<1>, D>& rows) {
+  const int unit = differences.exponent - (FixedRing<1>::kDifferenceBits - 1);
+  if (unit < -1022 || differences.exponent > 1023) {
+    return false;
+  }
+  const double factor = PowerOfTwo(-unit);
+  const double inverse = PowerOfTwo(unit);
+  // Of both products only the second has to be exact, and it is: an integer of 53 bits times a power of two that is a
+  // normal number.
+  const auto to_integer = [&](double x, int64_t& integer) {
+    integer = static_cast<int64_t>(x * factor);
+    return static_cast<double>(integer) * inverse == x;
+  };
+  return FillRows<D, 1>(
+      differences, planes,
+      [&](const ExactDifference& x, SignedMagnitude<1>& entry) {
+        int64_t high = 0;
+        if (!to_integer(x.high, high)) {
+          return false;
+        }
+        if (x.low != 0) {
+          int64_t low = 0;
+          if (!to_integer(x.low, low)) {
+            return false;
+          }
+          high += low;
+        }
+        entry.is_negative = high < 0;
+        entry.magnitude[0] = static_cast<uint64_t>(high < 0 ? -high : high);
+        return true;
+      },
+      rows);
+}
+
+// A double as mantissa * 2^exponent, the mantissa odd or zero.
+struct Scaled {
+  int64_t mantissa = 0;
+  int exponent = 0;
+};
+
+Scaled Decompose(double value) {
+  if (value == 0) {
+    return {0, std::numeric_limits<int>::max()};
+  }
+  int exponent = 0;
+  const auto mantissa = static_cast<int64_t>(std::ldexp(std::frexp(value, &exponent), 53));
+  const int zeros = std::countr_zero(static_cast<uint64_t>(mantissa));
+  return {mantissa >> zeros, exponent - 53 + zeros};
+}
+
+// The rows in units of the finest difference, if they fit in 126 bits.
+template <int D>
+bool ToRows(const Differences<D>& differences, const std::array<PlaneSource<D>, D>& planes,
+            Rows<FixedRing<2>, D>& rows) {
+  if (differences.exponent > 1023) {
+    return false;
+  }
+  int unit = std::numeric_limits<int>::max();
+  for (const auto& row : differences.rows) {
+    for (const ExactDifference& x : row) {
+      unit = std::min({unit, Decompose(x.high).exponent, Decompose(x.low).exponent});
+    }
+  }
+  // Subnormal numbers have an exponent field of 0.
+  if (std::max(differences.exponent, -1022) + 1 - unit > FixedRing<2>::kDifferenceBits) {
+    return false;
+  }
+  const auto to_integer = [unit](double x) -> Signed128 {
+    const Scaled scaled = Decompose(x);
+    return scaled.mantissa == 0 ? 0 : Signed128{scaled.mantissa} * (Signed128{1} << (scaled.exponent - unit));
+  };
+  return FillRows<D, 2>(
+      differences, planes,
+      [&](const ExactDifference& x, SignedMagnitude<2>& entry) {
+        const Signed128 value = to_integer(x.high) + to_integer(x.low);
+        const auto magnitude = static_cast<Unsigned128>(value < 0 ? -value : value);
+        entry.is_negative = value < 0;
+        entry.magnitude = {static_cast<uint64_t>(magnitude), static_cast<uint64_t>(magnitude >> 64)};
+        return true;
+      },
+      rows);
+}
+
+// ---- Integers of any size
+
+struct BigRing {
+  // 512 bits are kept inside the object.
+  using Integer = boost::multiprecision::number<
+      boost::multiprecision::cpp_int_backend<512, 0, boost::multiprecision::signed_magnitude,
+                                             boost::multiprecision::unchecked>,
+      boost::multiprecision::et_off>;
+  static constexpr Stage kStage = Stage::kBigInteger;
+  using Entry = Integer;
+  using Offset = Integer;
+  template <int K>
+  using Minor = Integer;
+  template <int D>
+  using Bordered = Integer;
+
+  static Integer ToMinor(const Integer& entry) { return entry; }
+  static void AddProduct(Integer& sum, const Integer& factor, bool negate, const Integer& minor) {
+    Add(sum, negate, Integer(factor * minor));
+  }
+  static void Negate(Integer& value) { value = -value; }
+  static void Add(Integer& sum, bool negate, const Integer& term) {
+    if (negate) {
+      sum -= term;
+    } else {
+      sum += term;
+    }
+  }
+};
+
+// The rows from the coordinates: their differences could overflow.
+template <int D>
+Rows<BigRing, D> ToBigRows(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u) {
+  int unit = std::numeric_limits<int>::max();
+  const auto include = [&](double x) { unit = std::min(unit, Decompose(x).exponent); };
+  std::for_each(site.begin(), site.end(), include);
+  std::for_each(u.begin(), u.end(), include);
+  for (const PlaneSource<D>& plane : planes) {
+    if (plane.IsWall()) {
+      include(plane.coordinate);
+    } else {
+      std::for_each(plane.generator.begin(), plane.generator.end(), include);
+    }
+  }
+  const auto to_integer = [unit](double x) {
+    const Scaled scaled = Decompose(x);
+    return scaled.mantissa == 0 ? BigRing::Integer(0) : BigRing::Integer(scaled.mantissa) << (scaled.exponent - unit);
+  };
+  std::array<BigRing::Integer, D> origin;
+  std::transform(site.begin(), site.end(), origin.begin(), to_integer);
+  Rows<BigRing, D> rows;
+  for (int j = 0; j <= D; ++j) {
+    if (j < D && planes[j].IsWall()) {
+      const int axis = planes[j].axis;
+      rows.normals[j][axis] = 1;
+      rows.offsets[j] = 2 * (to_integer(planes[j].coordinate) - origin[axis]);
+      continue;
+    }
+    const Point<D>& generator = j < D ? planes[j].generator : u;
+    for (int i = 0; i < D; ++i) {
+      rows.normals[j][i] = to_integer(generator[i]) - origin[i];
+      rows.offsets[j] += rows.normals[j][i] * rows.normals[j][i];
+    }
+  }
+  return rows;
 }
 
 }  // namespace
@@ -177,44 +398,19 @@ ExactDecision Decide(const Point<D>& site, const std::array<PlaneSource<D>, D>& 
 template <int D>
 ExactDecision DecideCut(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u,
                         TieRule rule) {
-  Operands<D> operands;
-  const auto decompose = [&](const Point<D>& p, std::array<Scaled, D>& to) {
-    for (int i = 0; i < D; ++i) {
-      to[i] = Decompose(p[i]);
-      operands.Include(to[i]);
-    }
-  };
-  decompose(site, operands.site);
-  decompose(u, operands.u);
-  for (int j = 0; j < D; ++j) {
-    if (planes[j].IsWall()) {
-      operands.walls[j] = Decompose(planes[j].coordinate);
-      operands.Include(operands.walls[j]);
-    } else {
-      decompose(planes[j].generator, operands.generators[j]);
-    }
+  const Differences<D> differences(site, planes, u);
+  if (Rows<FixedRing<1>, D> rows; ToRows<D>(differences, planes, rows)) {
+    return Decide<FixedRing<1>, D>(site, planes, u, rule, rows);
   }
-  if (operands.low_exponent == std::numeric_limits<int>::max()) {
-    operands.low_exponent = 0;  // every coordinate is zero
-    operands.high_exponent = 0;
+  if (Rows<FixedRing<2>, D> rows; ToRows<D>(differences, planes, rows)) {
+    return Decide<FixedRing<2>, D>(site, planes, u, rule, rows);
   }
-  // With b bits a coordinate, a difference has b + 1 and a squared norm 2 (b + 1) + ceil(log2 D): so the bordered
-  // determinant, a sum of (D + 1)! products of D differences and a norm, has at most (D + 2) (b + 1) + ceil(log2 D) +
-  // ceil(log2 (D + 1)!) bits; the sum of lambdas has fewer.
-  const int bits = operands.high_exponent - operands.low_exponent;
-  constexpr int kSlack = D == 2 ? 1 + 3 : D == 3 ? 2 + 5 : 3 + 13;
-  ExactDecision decision;
-  if ((D + 2) * (bits + 1) + kSlack <= 126) {
-    decision = Decide<Integer128, D>(site, planes, u, rule, operands);
-    decision.stage = Stage::kInteger;
-  } else {
-    decision = Decide<BigInteger, D>(site, planes, u, rule, operands);
-    decision.stage = Stage::kBigInteger;
-  }
-  return decision;
+  return Decide<BigRing, D>(site, planes, u, rule, ToBigRows<D>(site, planes, u));
 }
 
-template ExactDecision DecideCut<2>(const Point<2>&, const std::array<PlaneSource<2>, 2>&, const Point<2>&, TieRule);
-template ExactDecision DecideCut<3>(const Point<3>&, const std::array<PlaneSource<3>, 3>&, const Point<3>&, TieRule);
+#define WELLSPACE_INSTANTIATE(D) \
+  template ExactDecision DecideCut<D>(const Point<D>&, const std::array<PlaneSource<D>, D>&, const Point<D>&, TieRule);
+WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
+#undef WELLSPACE_INSTANTIATE
 
 }  // namespace wellspace::core

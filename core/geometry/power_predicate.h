@@ -31,8 +31,14 @@ enum class TieRule {
              // must agree
 };
 
-// How a decision was reached, for tests and statistics.
-enum class Stage { kFilter, kInteger, kBigInteger };
+// How a sign was found, for tests and statistics: the cheapest stage that serves.
+enum class Stage {
+  kFilter,       // in doubles, certain by a bound on the error
+  kInteger,      // in integers of fixed width: all differences of coordinates are multiples of one power of two, below
+                 // 2^62 times it
+  kWideInteger,  // the same, 2^126
+  kBigInteger,   // in integers of any size
+};
 
 struct ExactDecision {
   Sign sign = Sign::kZero;  // kPositive: cut off
@@ -45,8 +51,7 @@ struct ExactDecision {
 //
 // With n_j . x = c_j the planes relative to the site (bisector of w = p_j - site: n = w, c = |w|^2 / 2; wall: n =
 // e_axis) and the node x = A^-1 c, the value is g = w_u . x - |w_u|^2 / 2 = - det [A c; w_u c_u] / det A, evaluated in
-// integers: all coordinates are multiples of one power of two. 128 bits are used where a bound on the determinants
-// allows it, else arbitrary precision.
+// integers: all differences are multiples of one power of two. Never kFilter: who calls has filtered already.
 //
 // The perturbation gives vertex k the weight W_k = eps^(rank), rank by coordinates, lexicographically greatest first,
 // so that c_j becomes (|w_j|^2 + W_site - W_j) / 2. g is linear in the weights: with w_u = sum_j lambda_j n_j, 2 g
@@ -58,17 +63,13 @@ struct ExactDecision {
 //             translations that are exact do not change the result; (3) with kPerturb the result is never kZero.
 // REQUIRES:   finite coordinates; the planes meet in one point (det A != 0); u different from the site and all
 //             generators.
-// Complexity: O(D!) operations on integers of (D + 2) times the bits of the coordinates.
+// Complexity: O(D 2^D) products; with kInteger, of one word by at most D of them (3-D: 0.16 us, 6-D: 2.5 us).
 // Errors:     none.
-// Source:     ours; the determinant is that of the power test of regular triangulations.
+// Source:     ours; the determinant is that of the power test of regular triangulations. docs/design/geometry.md has
+//             the bounds and what was measured.
 template <int D>
 ExactDecision DecideCut(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u,
                         TieRule rule);
-
-extern template ExactDecision DecideCut<2>(const Point<2>&, const std::array<PlaneSource<2>, 2>&, const Point<2>&,
-                                           TieRule);
-extern template ExactDecision DecideCut<3>(const Point<3>&, const std::array<PlaneSource<3>, 3>&, const Point<3>&,
-                                           TieRule);
 
 }  // namespace wellspace::core
 

@@ -1,7 +1,7 @@
 // The laws of DecideCut between bisectors, and its agreement with InSphere, which shares no arithmetic with it.
 //
-// Input: a byte (bit 0: dimension, bit 1: coordinates of eight bytes, the bits of a double; else of one, a grid line and tiny steps;
-// the others: the exponent of the tiny step), then the coordinates of a site, D generators and u.
+// Input: a byte (bits 0 to 2: dimension; bit 3: coordinates of eight bytes, the bits of a double; else of one, a grid line and tiny
+// steps; the others: a quarter of the exponent of the tiny step), then the coordinates of a site, D generators and u.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -165,12 +165,24 @@ void RequireLaws(ByteReader& bytes, bool any_bits, double step) {
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   wellspace::fuzz::ByteReader bytes(data, size);
   const uint8_t shape = bytes.Next();
-  const bool any_bits = (shape & 2) != 0;
-  const double step = std::ldexp(1.0, -(shape >> 2));
-  if ((shape & 1) == 0) {
-    wellspace::fuzz::RequireLaws<2>(bytes, any_bits, step);
-  } else {
-    wellspace::fuzz::RequireLaws<3>(bytes, any_bits, step);
+  const bool any_bits = (shape & 8) != 0;
+  const double step = std::ldexp(1.0, -4 * (shape >> 4));
+  switch (shape & 7) {
+    case 0:
+      wellspace::fuzz::RequireLaws<2>(bytes, any_bits, step);
+      break;
+    case 1:
+      wellspace::fuzz::RequireLaws<3>(bytes, any_bits, step);
+      break;
+    case 2:
+      wellspace::fuzz::RequireLaws<4>(bytes, any_bits, step);
+      break;
+    case 3:
+      wellspace::fuzz::RequireLaws<5>(bytes, any_bits, step);
+      break;
+    default:
+      wellspace::fuzz::RequireLaws<6>(bytes, any_bits, step);
+      break;
   }
   return 0;
 }
