@@ -512,12 +512,12 @@ absl::StatusOr<std::unique_ptr<Mesher>> CreateIn(const MeshParameters& parameter
 }  // namespace
 
 double DefaultRho(int dimension) {
-  constexpr std::array<double, 7> kDefaults = {0, 0, std::numbers::sqrt2, 2, 2.9, 4.1, 5.8};
+  constexpr std::array<double, kMaxDimension + 1> kDefaults = {0, 0, std::numbers::sqrt2, 2, 2.9, 4.1, 5.8};
   return kDefaults[dimension];
 }
 
 double MinimumRho(int dimension) {
-  constexpr std::array<double, 7> kMinimums = {0, 0, 0.9, 1.1, 1.5, 2, 3};
+  constexpr std::array<double, kMaxDimension + 1> kMinimums = {0, 0, 0.9, 1.1, 1.5, 2, 3};
   return kMinimums[dimension];
 }
 

@@ -10,17 +10,9 @@
 #include "absl/status/statusor.h"
 #include "core/base/dimensions.h"
 #include "core/base/run_context.h"
-#include "core/refine/criterion.h"
+#include "core/geometry/criterion.h"
 
 namespace wellspace::core {
-
-// A box in which simplices are small.
-struct SizeBox {
-  std::vector<double> low;   // dimension
-  std::vector<double> high;  // dimension
-  // No simplex whose circumball meets the box has a larger circumradius.
-  double max_circumradius = 0;
-};
 
 struct MeshParameters {
   int dimension = 3;  // kMinDimension to kMaxDimension

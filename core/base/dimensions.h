@@ -5,12 +5,12 @@
 namespace wellspace::core {
 
 inline constexpr int kMinDimension = 2;
-inline constexpr int kMaxDimension = 3;
+inline constexpr int kMaxDimension = 6;
 
 }  // namespace wellspace::core
 
 // Expands X(D) for every dimension: the explicit instantiations at the end of a source file. Headers declare templates
 // whose definitions only that file has.
-#define WELLSPACE_FOR_EACH_DIMENSION(X) X(2) X(3)
+#define WELLSPACE_FOR_EACH_DIMENSION(X) X(2) X(3) X(4) X(5) X(6)
 
 #endif  // WELLSPACE_CORE_BASE_DIMENSIONS_H_

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "core/geometry/box.h"
-#include "core/refine/criterion.h"
+#include "core/refine/demands.h"
 #include "core/voronoi/polytope.h"
 
 namespace wellspace::core {

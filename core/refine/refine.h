@@ -10,7 +10,7 @@
 #include "absl/status/status.h"
 #include "core/base/run_context.h"
 #include "core/refine/assessment.h"
-#include "core/refine/criterion.h"
+#include "core/refine/demands.h"
 #include "core/refine/schedule.h"
 #include "core/refine/steiner_point.h"
 #include "core/voronoi/query_structure.h"

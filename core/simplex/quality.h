@@ -18,8 +18,8 @@ struct AngleRange {
 // REQUIRES:   coordinates of absolute value at most 2^1000.
 // Guarantees: (1) the length, and each coordinate up to that length, are within a relative error of 1e-10, however flat
 //             the simplex.
-// Complexity: O(D!); for a flat one (determinant below 2^-10 of its extent) on integers of the bits that the
-//             coordinates span.
+// Complexity: O(D 2^D); for a flat one (2-D and 3-D: determinant below 2^-6 of its extent; else where the bound on the
+//             rounding says so) O(D^2 2^D) on integers of the bits that the coordinates span.
 // Errors:     none.
 template <int D>
 Point<D> CircumcentreOffset(const Simplex<D>& simplex);
@@ -34,22 +34,18 @@ Point<D> CircumcentreOffset(const Simplex<D>& simplex);
 template <int D>
 double RadiusEdgeRatio(const Simplex<D>& simplex);
 
-// The smallest and the largest angle of a triangle, or dihedral angle of a tetrahedron, in degrees.
+// The smallest and the largest angle of a triangle, or angle between two facets of a simplex (the dihedral angles of a
+// tetrahedron), in degrees.
 //
 // REQUIRES:   coordinates of absolute value at most 2^1000.
-// Guarantees: (1) an absolute error below 1e-11 / s^2 degrees, s the sine of the smallest angle of its triangles; (2)
-//             orientation does not matter; (3) a flat simplex has 0 and 180.
-// Complexity: O(D^3), two arc tangents.
+// Guarantees: (1) an absolute error below, in 2-D and 3-D, 1e-11 / s^2 degrees, s the sine of the smallest angle of its
+//             triangles; from 4-D on 1e-11 / s, s the least over its facets of (D - 1)! volume / (product of the
+//             lengths of the edges at its lowest corner); (2) orientation does not matter; (3) a flat simplex has 0 and
+//             180.
+// Complexity: O(D^4 + D^2 2^D), two arc tangents.
 // Errors:     none.
 template <int D>
 AngleRange Angles(const Simplex<D>& simplex);
-
-extern template Point<2> CircumcentreOffset<2>(const Simplex<2>&);
-extern template Point<3> CircumcentreOffset<3>(const Simplex<3>&);
-extern template double RadiusEdgeRatio<2>(const Simplex<2>&);
-extern template double RadiusEdgeRatio<3>(const Simplex<3>&);
-extern template AngleRange Angles<2>(const Simplex<2>&);
-extern template AngleRange Angles<3>(const Simplex<3>&);
 
 }  // namespace wellspace::core
 

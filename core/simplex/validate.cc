@@ -3,12 +3,15 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
+#include <numbers>
 #include <numeric>
 #include <string>
 #include <vector>
 
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
+#include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
 #include "core/geometry/box.h"
 #include "core/geometry/exact_measure.h"
@@ -28,8 +31,9 @@ absl::Status Violation(const absl::FormatSpec<Args...>& format, const Args&... a
 
 // What every check needs before it may look at a vertex of a simplex.
 absl::Status CheckShape(const MeshView& mesh) {
-  if (mesh.dimension != 2 && mesh.dimension != 3) {
-    return absl::InvalidArgumentError(absl::StrFormat("dimension is %d; 2 and 3 are supported", mesh.dimension));
+  if (mesh.dimension < kMinDimension || mesh.dimension > kMaxDimension) {
+    return absl::InvalidArgumentError(
+        absl::StrFormat("dimension is %d; %d to %d are supported", mesh.dimension, kMinDimension, kMaxDimension));
   }
   const size_t d = static_cast<size_t>(mesh.dimension);
   if (mesh.points.size() % d != 0) {
@@ -65,6 +69,24 @@ Point<D> PointAt(std::span<const double> points, size_t index) {
   Point<D> out;
   std::copy_n(points.begin() + static_cast<std::ptrdiff_t>(index * D), D, out.begin());
   return out;
+}
+
+// |a - b|, without overflow or underflow on the way.
+template <int D>
+double Distance(const Point<D>& a, const Point<D>& b) {
+  Point<D> difference = Difference<D>(a, b);
+  double largest = 0;
+  for (const double x : difference) {
+    largest = std::max(largest, std::abs(x));
+  }
+  if (largest == 0 || !std::isfinite(largest)) {
+    return largest;
+  }
+  const int exponent = std::ilogb(largest);
+  for (double& x : difference) {
+    x = std::scalbn(x, -exponent);
+  }
+  return std::scalbn(std::sqrt(NormSq<D>(difference)), exponent);
 }
 
 // The checks of one mesh of sound shape; the facet table is shared between them.
@@ -176,6 +198,65 @@ class Checker {
     return absl::OkStatus();
   }
 
+  absl::Status WellSpaced(double rho) const {
+    std::vector<double> nearest(VertexCount(), std::numeric_limits<double>::infinity());
+    for (size_t s = 0; s < SimplexCount(); ++s) {
+      const Simplex<D> corners = Corners(s);
+      for (int i = 0; i <= D; ++i) {
+        for (int j = 0; j < i; ++j) {
+          const double length = Distance<D>(corners[i], corners[j]);
+          nearest[Index(s, i)] = std::min(nearest[Index(s, i)], length);
+          nearest[Index(s, j)] = std::min(nearest[Index(s, j)], length);
+        }
+      }
+    }
+    for (size_t s = 0; s < SimplexCount(); ++s) {
+      const double radius = Distance<D>(CircumcentreOffset<D>(Corners(s)), Point<D>{});
+      for (int i = 0; i <= D; ++i) {
+        const double bound = rho * nearest[Index(s, i)];
+        if (!(radius <= bound * (1 + kRelativeTolerance))) {
+          return Violation(
+              "vertex %d: simplex %d (%s) has circumradius %.17g, more than rho * shortest edge = %.17g * %.17g = "
+              "%.17g",
+              Index(s, i), s, IndexText(s), radius, rho, nearest[Index(s, i)], bound);
+        }
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status Sizing(double max_circumradius, std::span<const SizeBox> boxes) const {
+    WELLSPACE_RETURN_IF_ERROR(CheckSizes(max_circumradius, boxes));
+    if (max_circumradius == 0 && boxes.empty()) {
+      return absl::OkStatus();
+    }
+    for (size_t s = 0; s < SimplexCount(); ++s) {
+      const Simplex<D> corners = Corners(s);
+      const Point<D> offset = CircumcentreOffset<D>(corners);
+      const double radius = Distance<D>(offset, Point<D>{});
+      if (max_circumradius > 0 && !(radius <= max_circumradius * (1 + kRelativeTolerance))) {
+        return Violation("simplex %d (%s) has circumradius %.17g, more than %.17g", s, IndexText(s), radius,
+                         max_circumradius);
+      }
+      for (size_t b = 0; b < boxes.size(); ++b) {
+        // Relative to the corner, so that the distance has an error in proportion to itself and the radius.
+        Point<D> gap;
+        for (int k = 0; k < D; ++k) {
+          gap[k] = std::max(
+              {boxes[b].low[k] - corners[0][k] - offset[k], 0.0, offset[k] - (boxes[b].high[k] - corners[0][k])});
+        }
+        const double distance = Distance<D>(gap, Point<D>{});
+        if (!(radius <= std::max(boxes[b].max_circumradius, distance) * (1 + kRelativeTolerance))) {
+          return Violation(
+              "simplex %d (%s) has circumradius %.17g, more than the %.17g of size box %d, at a distance of %.17g from "
+              "it",
+              s, IndexText(s), radius, boxes[b].max_circumradius, b, distance);
+        }
+      }
+    }
+    return absl::OkStatus();
+  }
+
   absl::Status Circumcentres() const {
     const double tolerance = kRelativeTolerance * box_.LongestSide();
     for (size_t s = 0; s < SimplexCount(); ++s) {
@@ -227,7 +308,7 @@ class Checker {
   }
 
   QualityReport Quality() const {
-    constexpr double kBinWidth = (D == 2 ? 60.0 : 70.53) / kHistogramBins;
+    const double bin_width = LargestSmallestAngle(D) / kHistogramBins;
     QualityReport report;
     report.vertices = VertexCount();
     report.simplices = SimplexCount();
@@ -238,12 +319,38 @@ class Checker {
       const AngleRange angles = Angles<D>(corners);
       report.min_angle_deg = std::min(report.min_angle_deg, angles.min_deg);
       report.max_angle_deg = std::max(report.max_angle_deg, angles.max_deg);
-      ++report.angle_histogram[std::min(kHistogramBins - 1, static_cast<int>(angles.min_deg / kBinWidth))];
+      ++report.angle_histogram[std::min(kHistogramBins - 1, static_cast<int>(angles.min_deg / bin_width))];
     }
     return report;
   }
 
  private:
+  static absl::Status CheckSizes(double max_circumradius, std::span<const SizeBox> boxes) {
+    if (!(max_circumradius >= 0 && std::isfinite(max_circumradius))) {
+      return absl::InvalidArgumentError(
+          absl::StrFormat("max_circumradius is %g; a finite number, 0 or more, is needed", max_circumradius));
+    }
+    for (size_t b = 0; b < boxes.size(); ++b) {
+      const SizeBox& box = boxes[b];
+      if (box.low.size() != D || box.high.size() != D) {
+        return absl::InvalidArgumentError(absl::StrFormat(
+            "size box %d has corners of %d and %d coordinates; %d are needed", b, box.low.size(), box.high.size(), D));
+      }
+      for (int k = 0; k < D; ++k) {
+        if (!(std::isfinite(box.low[k]) && std::isfinite(box.high[k]) && box.low[k] <= box.high[k])) {
+          return absl::InvalidArgumentError(absl::StrFormat(
+              "size box %d reaches from %g to %g on axis %d; finite numbers in ascending order are needed", b,
+              box.low[k], box.high[k], k));
+        }
+      }
+      if (!(box.max_circumradius > 0 && std::isfinite(box.max_circumradius))) {
+        return absl::InvalidArgumentError(absl::StrFormat(
+            "size box %d: max_circumradius is %g; a positive, finite number is needed", b, box.max_circumradius));
+      }
+    }
+    return absl::OkStatus();
+  }
+
   // A facet by its ascending vertices, as seen from one of its simplices.
   struct Facet {
     std::array<uint32_t, D> vertices;
@@ -351,12 +458,14 @@ class Checker {
 template <typename Check>
 absl::Status RunCheck(const MeshView& mesh, Check check) {
   WELLSPACE_RETURN_IF_ERROR(CheckShape(mesh));
-  if (mesh.dimension == 2) {
-    Checker<2> checker(mesh);
-    return check(checker);
+#define WELLSPACE_RUN(D)      \
+  if (mesh.dimension == D) {  \
+    Checker<D> checker(mesh); \
+    return check(checker);    \
   }
-  Checker<3> checker(mesh);
-  return check(checker);
+  WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_RUN)
+#undef WELLSPACE_RUN
+  return absl::InternalError("a dimension without a checker");
 }
 
 absl::Status CheckRho(double rho) {
@@ -367,6 +476,10 @@ absl::Status CheckRho(double rho) {
 }
 
 }  // namespace
+
+double LargestSmallestAngle(int dimension) {
+  return dimension == 2 ? 60 : dimension == 3 ? 70.53 : std::acos(1.0 / dimension) * 180 / std::numbers::pi;
+}
 
 QualityReport MeasureQuality(const MeshView& mesh) {
   QualityReport report;
@@ -406,6 +519,15 @@ absl::Status ValidateRadiusEdge(const MeshView& mesh, double rho) {
   return RunCheck(mesh, [rho](const auto& checker) { return checker.RadiusEdge(rho); });
 }
 
+absl::Status ValidateWellSpaced(const MeshView& mesh, double rho) {
+  WELLSPACE_RETURN_IF_ERROR(CheckRho(rho));
+  return RunCheck(mesh, [rho](const auto& checker) { return checker.WellSpaced(rho); });
+}
+
+absl::Status ValidateSizing(const MeshView& mesh, double max_circumradius, std::span<const SizeBox> boxes) {
+  return RunCheck(mesh, [&](const auto& checker) { return checker.Sizing(max_circumradius, boxes); });
+}
+
 absl::Status ValidateCircumcentres(const MeshView& mesh) {
   return RunCheck(mesh, [](const auto& checker) { return checker.Circumcentres(); });
 }
@@ -425,9 +547,11 @@ absl::Status ValidateMesh(const MeshView& mesh, const ValidationOptions& options
     WELLSPACE_RETURN_IF_ERROR(checker.Volume());
     WELLSPACE_RETURN_IF_ERROR(checker.Delaunay());
     if (options.rho != 0) {
-      WELLSPACE_RETURN_IF_ERROR(checker.RadiusEdge(options.rho));
+      WELLSPACE_RETURN_IF_ERROR(options.criterion == Criterion::kWellSpaced ? checker.WellSpaced(options.rho)
+                                                                            : checker.RadiusEdge(options.rho));
     }
     WELLSPACE_RETURN_IF_ERROR(checker.Circumcentres());
+    WELLSPACE_RETURN_IF_ERROR(checker.Sizing(options.max_circumradius, options.size_boxes));
     if (!options.cloud.empty()) {
       WELLSPACE_RETURN_IF_ERROR(checker.Cloud(options.cloud));
     }

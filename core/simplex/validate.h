@@ -11,6 +11,7 @@
 #include <span>
 
 #include "absl/status/status.h"
+#include "core/geometry/criterion.h"
 
 namespace wellspace::core {
 
@@ -27,12 +28,14 @@ struct QualityReport {
   uint64_t vertices = 0;
   uint64_t simplices = 0;
   double max_radius_edge = 0;  // largest circumradius / shortest edge; infinite if a simplex is flat
-  double min_angle_deg = 0;    // 2-D: smallest angle; 3-D: smallest dihedral angle
+  double min_angle_deg = 0;    // 2-D: smallest angle; else smallest angle between two facets of a simplex
   double max_angle_deg = 0;
-  // Simplices by their smallest angle: bin i holds [i, i + 1) * w degrees, w = 60 / kHistogramBins (2-D), 70.53 /
-  // kHistogramBins (3-D).
+  // Simplices by their smallest angle: bin i holds [i, i + 1) * w degrees, w = LargestSmallestAngle / kHistogramBins.
   std::array<uint64_t, kHistogramBins> angle_histogram{};
 };
+
+// The smallest angle of a regular simplex in degrees, which no simplex exceeds: acos(1 / dimension). 60 in 2-D, 70.53 in 3-D.
+double LargestSmallestAngle(int dimension);
 
 // Measures every simplex.
 //
@@ -43,7 +46,7 @@ struct QualityReport {
 QualityReport MeasureQuality(const MeshView& mesh);
 
 // Each check returns OK, or FAILED_PRECONDITION naming the first violation (simplex, vertex, value, bound). Anything
-// may be passed in: INVALID_ARGUMENT for a dimension other than 2 and 3 or arrays that do not hold whole rows; indices
+// may be passed in: INVALID_ARGUMENT for a dimension out of 2 to 6 or arrays that do not hold whole rows; indices
 // out of range and coordinates that are not finite or beyond 2^1000 are found by every check. The box is the bounding
 // box of the mesh's points.
 //
@@ -67,6 +70,20 @@ absl::Status ValidateDelaunay(const MeshView& mesh);
 // Every simplex has circumradius <= rho * shortest edge * (1 + 1e-9). INVALID_ARGUMENT unless rho is positive and
 // finite.
 absl::Status ValidateRadiusEdge(const MeshView& mesh, double rho);
+// Every vertex v has circumradius <= rho * (its shortest edge) * (1 + 1e-9) for each of its simplices. INVALID_ARGUMENT
+// unless rho is positive and finite.
+//
+// That is R(v) <= rho NN(v), R(v) the distance from v to the farthest node of its Voronoi cell in the box: in a Delaunay
+// triangulation the nearest neighbour is at the end of an edge. When all circumcentres lie in the box, a node of the
+// cell is either one of them, or lies on faces of the box, where the dual of a boundary facet (or of an edge, triangle,
+// ... of several) leaves it: at the circumcentre of that facet, whose circumradius is at most that of the simplex.
+//
+// REQUIRES:   ValidateDelaunay and ValidateCircumcentres are OK.
+absl::Status ValidateWellSpaced(const MeshView& mesh, double rho);
+// Every simplex has circumradius R <= max_circumradius, where that is not 0; and R <= max(H, dist(circumcentre, box))
+// for each of `boxes`, H its bound: no circumball that meets the box is larger. Each times 1 + 1e-9. INVALID_ARGUMENT
+// for bounds that are negative or not finite, of a box also 0, and for boxes that are none.
+absl::Status ValidateSizing(const MeshView& mesh, double max_circumradius, std::span<const SizeBox> boxes);
 // Every circumcentre lies in the box, up to 1e-9 times its longest side.
 absl::Status ValidateCircumcentres(const MeshView& mesh);
 // The distinct points of `cloud` (n x dimension), in order of first appearance, are the first vertices of the mesh, to
@@ -74,11 +91,15 @@ absl::Status ValidateCircumcentres(const MeshView& mesh);
 absl::Status ValidateCloud(const MeshView& mesh, std::span<const double> cloud);
 
 struct ValidationOptions {
-  double rho = 0;                 // 0: not checked
-  std::span<const double> cloud;  // empty: not checked
+  double rho = 0;  // bound of the criterion; 0: not checked
+  Criterion criterion = Criterion::kRadiusEdge;
+  double max_circumradius = 0;            // 0: not checked
+  std::span<const SizeBox> size_boxes{};  // empty: not checked
+  std::span<const double> cloud{};        // empty: not checked
 };
 
-// All of the above in this order.
+// All of the above, in the order Indices, Orientation, Topology, Volume, Delaunay, RadiusEdge or WellSpaced, Circumcentres,
+// Sizing, Cloud.
 absl::Status ValidateMesh(const MeshView& mesh, const ValidationOptions& options);
 
 }  // namespace wellspace::core

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <boost/multiprecision/cpp_bin_float.hpp>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -9,6 +11,7 @@
 
 #include "core/simplex/validate.h"
 #include "tests/support/clouds.h"
+#include "tests/support/dimensions.h"
 #include "tests/support/meshes.h"
 
 namespace wellspace::core {
@@ -103,12 +106,160 @@ TEST(QualityTest, FlatSimplices) {
 
 template <typename T>
 class TypedQualityTest : public ::testing::Test {};
-template <int N>
-struct Dimension {
-  static constexpr int kValue = N;
-};
-using Dimensions = ::testing::Types<Dimension<2>, Dimension<3>>;
-TYPED_TEST_SUITE(TypedQualityTest, Dimensions);
+TYPED_TEST_SUITE(TypedQualityTest, test::AllDimensions);
+
+TYPED_TEST(TypedQualityTest, RegularSimplex) {
+  constexpr int D = TypeParam::kValue;
+  Simplex<D> simplex{};
+  simplex[0].fill((1 - std::sqrt(D + 1.0)) / D);
+  for (int i = 0; i < D; ++i) {
+    simplex[i + 1][i] = 1;
+  }
+  EXPECT_NEAR(RadiusEdgeRatio<D>(simplex), std::sqrt(D / (2 * (D + 1.0))), 1e-14);
+  EXPECT_NEAR(Angles<D>(simplex).min_deg, std::acos(1.0 / D) / kDegree, 1e-11);
+  EXPECT_NEAR(Angles<D>(simplex).max_deg, std::acos(1.0 / D) / kDegree, 1e-11);
+}
+
+TYPED_TEST(TypedQualityTest, CornerOfTheCubeInEveryDimension) {
+  // Right angles, and those between a coordinate plane and the plane where the coordinates sum up to 1.
+  constexpr int D = TypeParam::kValue;
+  Simplex<D> simplex{};
+  for (int i = 0; i < D; ++i) {
+    simplex[i + 1][i] = 1;
+  }
+  EXPECT_NEAR(RadiusEdgeRatio<D>(simplex), std::sqrt(D / 4.0), 1e-14);
+  EXPECT_NEAR(Angles<D>(simplex).min_deg, std::acos(1 / std::sqrt(D)) / kDegree, 1e-11);
+  EXPECT_NEAR(Angles<D>(simplex).max_deg, 90, 1e-11);
+}
+
+// The apex of a simplex comes down on the middle of the facet below: the angles at that facet go to zero, some others to 180.
+TYPED_TEST(TypedQualityTest, FlatInEveryDimension) {
+  constexpr int D = TypeParam::kValue;
+  Simplex<D> simplex{};
+  for (int i = 1; i < D; ++i) {
+    simplex[i][i - 1] = 1;
+  }
+  simplex[D].fill(1.0 / 8);
+  for (double h = 0.125; h > 1e-130; h /= 1024) {
+    simplex[D][D - 1] = h;
+    // The facet opposite to the origin lies in sum x_i + ((1 - (D - 1) / 8) / h) x_(D - 1) = 1 (all i but the last), the
+    // one opposite to e_i in x_i = x_(D - 1) / (8 h): the least angle is that of one of them with the base.
+    const double to_origin = std::atan(h * std::sqrt(D - 1.0) / (1 - (D - 1) / 8.0));
+    const double smallest = std::min(to_origin, std::atan(8 * h));
+    EXPECT_NEAR(Angles<D>(simplex).min_deg, smallest / kDegree, 1e-10) << "h = " << h;
+    EXPECT_LE(Angles<D>(simplex).max_deg, 180);
+    if (h < 1e-6) {
+      EXPECT_GT(Angles<D>(simplex).max_deg, 179.99);
+    }
+    EXPECT_TRUE(std::isfinite(RadiusEdgeRatio<D>(simplex)));
+  }
+  simplex[D][D - 1] = 0;
+  EXPECT_EQ(Angles<D>(simplex).min_deg, 0);
+  EXPECT_EQ(Angles<D>(simplex).max_deg, 180);
+  EXPECT_EQ(RadiusEdgeRatio<D>(simplex), kInfinity);
+  simplex.fill(simplex[0]);
+  EXPECT_EQ(Angles<D>(simplex).min_deg, 0);
+  EXPECT_EQ(Angles<D>(simplex).max_deg, 180);
+  EXPECT_EQ(RadiusEdgeRatio<D>(simplex), kInfinity);
+}
+
+using Wide = boost::multiprecision::number<boost::multiprecision::cpp_bin_float<80>, boost::multiprecision::et_off>;
+
+// Inverts by elimination; the matrix has to be regular.
+template <int D>
+std::array<std::array<Wide, D>, D> Inverse(std::array<std::array<Wide, D>, D> m) {
+  std::array<std::array<Wide, D>, D> inverse{};
+  for (int i = 0; i < D; ++i) {
+    inverse[i][i] = 1;
+  }
+  for (int column = 0; column < D; ++column) {
+    int pivot = column;
+    for (int row = column; row < D; ++row) {
+      pivot = abs(m[row][column]) > abs(m[pivot][column]) ? row : pivot;
+    }
+    std::swap(m[pivot], m[column]);
+    std::swap(inverse[pivot], inverse[column]);
+    for (int row = 0; row < D; ++row) {
+      if (row == column) {
+        continue;
+      }
+      const Wide factor = m[row][column] / m[column][column];
+      for (int k = 0; k < D; ++k) {
+        m[row][k] -= factor * m[column][k];
+        inverse[row][k] -= factor * inverse[column][k];
+      }
+    }
+  }
+  for (int row = 0; row < D; ++row) {
+    for (int k = 0; k < D; ++k) {
+      inverse[row][k] /= m[row][row];
+    }
+  }
+  return inverse;
+}
+
+// With 80 digits, by gradients of barycentric coordinates from an inverse matrix, and arc cosines.
+template <int D>
+AngleRange OracleAngles(const Simplex<D>& simplex) {
+  std::array<std::array<Wide, D>, D> edges;
+  for (int i = 0; i < D; ++i) {
+    for (int k = 0; k < D; ++k) {
+      edges[i][k] = Wide(simplex[i + 1][k]) - simplex[0][k];
+    }
+  }
+  const auto inverse = Inverse<D>(edges);
+  std::array<std::array<Wide, D>, D + 1> gradients{};
+  for (int i = 0; i < D; ++i) {
+    for (int k = 0; k < D; ++k) {
+      gradients[i + 1][k] = inverse[k][i];
+      gradients[0][k] -= inverse[k][i];
+    }
+  }
+  const auto dot = [](const auto& a, const auto& b) {
+    return std::inner_product(a.begin(), a.end(), b.begin(), Wide(0));
+  };
+  Wide smallest = 4;
+  Wide largest = 0;
+  for (int i = 0; i <= D; ++i) {
+    for (int j = 0; j < i; ++j) {
+      const Wide angle = acos(Wide(-dot(gradients[i], gradients[j]) /
+                                   sqrt(Wide(dot(gradients[i], gradients[i]) * dot(gradients[j], gradients[j])))));
+      smallest = std::min(smallest, angle);
+      largest = std::max(largest, angle);
+    }
+  }
+  return {static_cast<double>(smallest) / kDegree, static_cast<double>(largest) / kDegree};
+}
+
+TYPED_TEST(TypedQualityTest, AnglesAgreeWithEightyDigits) {
+  constexpr int D = TypeParam::kValue;
+  const uint64_t seed = Seed(7);
+  SCOPED_TRACE(seed);
+  SplitMix64 random(seed);
+  for (int round = 0; round < 200; ++round) {
+    // The last corner comes near to the plane of the others, which stay well apart, at the corner of a cube.
+    Simplex<D> simplex = RandomSimplex<D>(random);
+    for (int i = 0; i < D; ++i) {
+      for (double& x : simplex[i]) {
+        x /= 4 * D;
+      }
+      if (i > 0) {
+        simplex[i][i - 1] += 1;
+      }
+    }
+    const double height = std::pow(10.0, -12 * random.Unit());
+    for (int k = 0; k < D; ++k) {
+      double mean = 0;
+      for (int i = 0; i < D; ++i) {
+        mean += simplex[i][k] / D;
+      }
+      simplex[D][k] = mean + height * (simplex[D][k] - mean);
+    }
+    const AngleRange expected = OracleAngles<D>(simplex);
+    EXPECT_NEAR(Angles<D>(simplex).min_deg, expected.min_deg, 1e-10);
+    EXPECT_NEAR(Angles<D>(simplex).max_deg, expected.max_deg, 1e-10);
+  }
+}
 
 TYPED_TEST(TypedQualityTest, PowersOfTwoDoNotChangeTheQuality) {
   constexpr int D = TypeParam::kValue;
@@ -186,6 +337,16 @@ TEST(MeasureQualityTest, KuhnGrids) {
   EXPECT_NEAR(report3.max_radius_edge, std::sqrt(0.75), 1e-14);
   EXPECT_NEAR(report3.min_angle_deg, 45, 1e-11);
   EXPECT_NEAR(report3.max_angle_deg, 90, 1e-11);
+  for (const int d : {4, 5, 6}) {
+    const TestMesh grid = KuhnGrid(d, 1);
+    const QualityReport high = MeasureQuality(grid.View());
+    EXPECT_EQ(high.vertices, grid.VertexCount());
+    EXPECT_EQ(high.simplices, grid.SimplexCount());
+    EXPECT_NEAR(high.max_radius_edge, std::sqrt(d / 4.0), 1e-14);
+    EXPECT_NEAR(high.min_angle_deg, 45, 1e-11);
+    EXPECT_NEAR(high.max_angle_deg, 90, 1e-11);
+    EXPECT_EQ(high.angle_histogram[static_cast<size_t>(45 * kHistogramBins / LargestSmallestAngle(d))], high.simplices);
+  }
   EXPECT_EQ(std::accumulate(report3.angle_histogram.begin(), report3.angle_histogram.end(), uint64_t{0}), 384u);
 }
 
@@ -200,6 +361,17 @@ TEST(MeasureQualityTest, HistogramCountsSmallestAngles) {
   // A regular triangle or tetrahedron belongs to the last bin, however its angles are rounded.
   const TestMesh regular = {3, {0, 0, 0, 1, 0, 1, 1, 1, 0, 0, 1, 1}, {0, 1, 2, 3}};
   EXPECT_EQ(MeasureQuality(regular.View()).angle_histogram[kHistogramBins - 1], 1u);
+  for (const int d : {4, 5, 6}) {
+    TestMesh simplex{.dimension = d, .points = {}, .simplices = {}};
+    simplex.points.assign(static_cast<size_t>(d), (1 - std::sqrt(d + 1.0)) / d);
+    for (uint32_t i = 0; i <= static_cast<uint32_t>(d); ++i) {
+      simplex.simplices.push_back(i);
+      for (uint32_t k = 0; i > 0 && k < static_cast<uint32_t>(d); ++k) {
+        simplex.points.push_back(k == i - 1 ? 1 : 0);
+      }
+    }
+    EXPECT_EQ(MeasureQuality(simplex.View()).angle_histogram[kHistogramBins - 1], 1u);
+  }
 }
 
 TEST(MeasureQualityTest, RefusedMeshHasCountsOnly) {

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/str_format.h"
 #include "tests/support/clouds.h"
 #include "tests/support/meshes.h"
 
@@ -52,6 +53,8 @@ const std::vector<Check>& AllChecks() {
                              ValidateVolume,
                              ValidateDelaunay,
                              [](const MeshView& mesh) { return ValidateRadiusEdge(mesh, 2); },
+                             [](const MeshView& mesh) { return ValidateWellSpaced(mesh, 2); },
+                             [](const MeshView& mesh) { return ValidateSizing(mesh, 1000, {}); },
                              ValidateCircumcentres,
                              [](const MeshView& mesh) { return ValidateCloud(mesh, mesh.points); },
                              [](const MeshView& mesh) { return ValidateMesh(mesh, {}); }};
@@ -61,12 +64,23 @@ const std::vector<Check>& AllChecks() {
 class ValidateTest : public ::testing::TestWithParam<int> {
  protected:
   int D() const { return GetParam(); }
-  // Three cells along each axis; CentralVertex lies inside.
-  TestMesh Grid() const { return KuhnGrid(D(), 3); }
-  size_t CentralVertex() const { return D() == 2 ? 5 : 21; }
+  uint32_t Cells() const { return D() <= 3 ? 3 : D() == 4 ? 2 : 1; }
+  TestMesh Grid() const { return KuhnGrid(D(), Cells()); }
+  // Of volume 1 / D! each.
+  double SimplexVolume() const { return 1 / std::tgamma(D() + 1.0); }
+  // With vertices inside; CentralVertex is one.
+  uint32_t InteriorCells() const { return std::max(Cells(), 2u); }
+  TestMesh InteriorGrid() const { return KuhnGrid(D(), InteriorCells()); }
+  size_t CentralVertex() const {
+    size_t vertex = 0;
+    for (int k = 0; k < D(); ++k) {
+      vertex = vertex * (InteriorCells() + 1) + 1;
+    }
+    return vertex;
+  }
 };
 
-INSTANTIATE_TEST_SUITE_P(Dimensions, ValidateTest, ::testing::Values(2, 3));
+INSTANTIATE_TEST_SUITE_P(Dimensions, ValidateTest, ::testing::Range(2, 7));
 
 TEST_P(ValidateTest, AcceptsGridsAtEveryScale) {
   struct Frame {
@@ -77,10 +91,16 @@ TEST_P(ValidateTest, AcceptsGridsAtEveryScale) {
   // origin.
   for (const Frame frame : {Frame{0, 1}, Frame{0, 0x1p-500}, Frame{0, 0x1p500}, Frame{-0x1p998, 0x1p997},
                             Frame{0x1p20, 0x1p-30}, Frame{-1, 0x1p-52}, Frame{0, 0x1p-1074}}) {
-    const TestMesh mesh = KuhnGrid(D(), 3, frame.low, frame.spacing);
-    EXPECT_TRUE(ValidateMesh(mesh.View(), {.rho = 0.8661, .cloud = mesh.points}).ok())
-        << frame.low << " + " << frame.spacing << ": "
-        << ValidateMesh(mesh.View(), {.rho = 0.8661, .cloud = mesh.points});
+    const TestMesh mesh = KuhnGrid(D(), Cells(), frame.low, frame.spacing);
+    for (const Criterion criterion : {Criterion::kRadiusEdge, Criterion::kWellSpaced}) {
+      const absl::Status status =
+          ValidateMesh(mesh.View(), {.rho = std::sqrt(D() / 4.0),
+                                     .criterion = criterion,
+                                     .max_circumradius = std::max(frame.spacing * std::sqrt(D() / 4.0), 0x1p-1000),
+                                     .size_boxes = {},
+                                     .cloud = mesh.points});
+      EXPECT_TRUE(status.ok()) << frame.low << " + " << frame.spacing << ": " << status;
+    }
   }
 }
 
@@ -94,15 +114,17 @@ TEST_P(ValidateTest, EveryCheckAcceptsAGrid) {
 TEST_P(ValidateTest, RefusesWhatIsNoMeshAtAll) {
   for (const Check& check : AllChecks()) {
     TestMesh mesh = Grid();
-    mesh.dimension = 4;
-    EXPECT_THAT(check(mesh.View()), Refuses("dimension is 4; 2 and 3 are supported"));
+    mesh.dimension = 7;
+    EXPECT_THAT(check(mesh.View()), Refuses("dimension is 7; 2 to 6 are supported"));
+    mesh.dimension = 1;
+    EXPECT_THAT(check(mesh.View()), Refuses("dimension is 1; 2 to 6 are supported"));
     mesh.dimension = 0;
     EXPECT_THAT(check(mesh.View()), Refuses("dimension is 0"));
     mesh.dimension = -1;
     EXPECT_THAT(check(mesh.View()), Refuses("dimension is -1"));
 
     mesh = Grid();
-    mesh.points.pop_back();
+    mesh.points.push_back(0);
     EXPECT_THAT(check(mesh.View()), Refuses("coordinates of points are no multiple of the dimension"));
     mesh = Grid();
     mesh.simplices.pop_back();
@@ -168,7 +190,7 @@ TEST_P(ValidateTest, OrientationFindsMirroredAndFlatSimplices) {
 
 TEST_P(ValidateTest, MovedVertexIsFound) {
   // Inside its star a vertex may move: the simplices still decompose the box, but they are not Delaunay any more.
-  TestMesh mesh = Grid();
+  TestMesh mesh = InteriorGrid();
   mesh.Vertex(CentralVertex())[0] += 0.25;
   EXPECT_TRUE(ValidateOrientation(mesh.View()).ok());
   EXPECT_TRUE(ValidateTopology(mesh.View()).ok());
@@ -177,7 +199,8 @@ TEST_P(ValidateTest, MovedVertexIsFound) {
   EXPECT_THAT(ValidateMesh(mesh.View(), {}), Violates(HasSubstr("lies inside the circumsphere of simplex")));
 
   // Out of its star it turns simplices around; the sum of signed volumes cannot tell.
-  mesh.Vertex(CentralVertex())[0] += 1;
+  mesh.Vertex(CentralVertex())[0] = 1.75;
+  mesh.Vertex(CentralVertex())[1] = 0.25;
   EXPECT_THAT(ValidateOrientation(mesh.View()), Violates(HasSubstr("orientation")));
   EXPECT_THAT(ValidateTopology(mesh.View()), Violates(HasSubstr("on the same side of their facet")));
   EXPECT_TRUE(ValidateVolume(mesh.View()).ok());
@@ -186,9 +209,12 @@ TEST_P(ValidateTest, MovedVertexIsFound) {
 TEST_P(ValidateTest, VolumeIsExactToTheLastBit) {
   // A vertex on a face, not at its corner, moves inward by one ulp.
   TestMesh mesh = Grid();
-  const size_t on_face = D() == 2 ? 7 : 23;
-  ASSERT_EQ(mesh.Vertex(on_face)[D() - 1], 3);
-  mesh.Vertex(on_face)[D() - 1] = std::nextafter(3.0, 0.0);
+  size_t on_face = CentralVertex() + Cells() - 1;
+  if (Cells() == 1) {
+    on_face = mesh.VertexCount() - 1;  // a corner; there are others on all of its faces
+  }
+  ASSERT_EQ(mesh.Vertex(on_face)[D() - 1], Cells());
+  mesh.Vertex(on_face)[D() - 1] = std::nextafter(Cells(), 0.0);
   EXPECT_THAT(ValidateVolume(mesh.View()), Violates(HasSubstr("the volumes of the simplices exceed that of the box")));
   EXPECT_THAT(ValidateTopology(mesh.View()), Violates(HasSubstr("lies on no face of the box")));
 }
@@ -197,7 +223,7 @@ TEST_P(ValidateTest, DroppedSimplexIsFound) {
   TestMesh mesh = Grid();
   mesh.simplices.erase(mesh.simplices.begin() + 4 * (D() + 1), mesh.simplices.begin() + 5 * (D() + 1));
   EXPECT_THAT(ValidateTopology(mesh.View()), Violates(HasSubstr("alone, but lies on no face of the box")));
-  EXPECT_THAT(ValidateVolume(mesh.View()), Violates(HasSubstr(D() == 2 ? "by -0.5" : "by -0.16666666666666666")));
+  EXPECT_THAT(ValidateVolume(mesh.View()), Violates(HasSubstr(absl::StrFormat("by %.17g", -SimplexVolume()))));
 }
 
 TEST_P(ValidateTest, DuplicatedSimplexIsFound) {
@@ -206,7 +232,7 @@ TEST_P(ValidateTest, DuplicatedSimplexIsFound) {
   mesh.simplices.insert(mesh.simplices.end(), corners.begin(), corners.end());
   EXPECT_THAT(ValidateTopology(mesh.View()),
               Violates(AnyOf(HasSubstr("belongs to 3 simplices: "), HasSubstr("on the same side of their facet"))));
-  EXPECT_THAT(ValidateVolume(mesh.View()), Violates(HasSubstr(D() == 2 ? "by 0.5" : "by 0.16666666666666666")));
+  EXPECT_THAT(ValidateVolume(mesh.View()), Violates(HasSubstr(absl::StrFormat("by %.17g", SimplexVolume()))));
 }
 
 TEST_P(ValidateTest, DoubleCoverIsFound) {
@@ -220,11 +246,26 @@ TEST_P(ValidateTest, DoubleCoverIsFound) {
     mesh.simplices.push_back(v + first);
   }
   EXPECT_TRUE(ValidateTopology(mesh.View()).ok());
-  EXPECT_THAT(ValidateVolume(mesh.View()), Violates(HasSubstr(D() == 2 ? "by 9;" : "by 27;")));
+  EXPECT_THAT(ValidateVolume(mesh.View()), Violates(HasSubstr(absl::StrFormat("by %g;", std::pow(Cells(), D())))));
   EXPECT_THAT(ValidateIndices(mesh.View()), Violates(HasSubstr("are equal")));
 }
 
-TEST_P(ValidateTest, BothTriangulationsOfCosphericalPointsAreDelaunay) {
+TEST_P(ValidateTest, FlippedSimplicesAreFound) {
+  const BothTriangulations flat = test::TwoApexes(D(), 0.5);
+  const BothTriangulations tall = test::TwoApexes(D(), 2);
+  for (const TestMesh& mesh : {flat.first, flat.second, tall.first, tall.second}) {
+    ASSERT_TRUE(ValidateOrientation(mesh.View()).ok()) << ValidateOrientation(mesh.View());
+  }
+  EXPECT_THAT(ValidateDelaunay(flat.first.View()), Violates(HasSubstr("lies inside the circumsphere of simplex")));
+  EXPECT_TRUE(ValidateDelaunay(flat.second.View()).ok()) << ValidateDelaunay(flat.second.View());
+  EXPECT_TRUE(ValidateDelaunay(tall.first.View()).ok()) << ValidateDelaunay(tall.first.View());
+  EXPECT_THAT(ValidateDelaunay(tall.second.View()), Violates(HasSubstr("lies inside the circumsphere of simplex")));
+}
+
+class ValidateCosphericalTest : public ValidateTest {};
+INSTANTIATE_TEST_SUITE_P(Dimensions, ValidateCosphericalTest, ::testing::Values(2, 3));
+
+TEST_P(ValidateCosphericalTest, BothTriangulationsAreDelaunay) {
   // Exactly cospherical; then one vertex moves one ulp in or out, and exactly one of the two is right.
   const std::vector<double> circle = {3, 4, -4, 3, -5, 0, 0, -5};
   const std::vector<double> sphere = {3, 4, 0, -4, 3, 0, 0, -5, 0, 0, 0, 5, 0, 0, -5};
@@ -263,6 +304,92 @@ TEST_P(ValidateTest, RadiusEdge) {
     EXPECT_THAT(ValidateRadiusEdge(mesh.View(), rho), Refuses("rho is "));
   }
   EXPECT_THAT(ValidateMesh(mesh.View(), {.rho = kNaN, .cloud = {}}), Refuses("rho is nan"));
+}
+
+TEST_P(ValidateTest, WellSpaced) {
+  // In the large cell simplices have edges of at least 2 and circumradius sqrt(D), but the vertex in the middle of the mesh has
+  // a neighbour at 1. The ratio of a single simplex is largest where one side is 1: sqrt(4 D - 3) / 2, which is less.
+  const TestMesh mesh = test::KuhnGridOn(D(), {0, 2, 3});
+  const double ratio = std::sqrt(D());
+  EXPECT_TRUE(ValidateWellSpaced(mesh.View(), ratio).ok()) << ValidateWellSpaced(mesh.View(), ratio);
+  EXPECT_TRUE(ValidateWellSpaced(mesh.View(), ratio * (1 - 0.9e-9)).ok());
+  const auto too_large = Violates(AllOf(HasSubstr("vertex "), HasSubstr("more than rho * shortest edge = ")));
+  EXPECT_THAT(ValidateWellSpaced(mesh.View(), ratio * (1 - 1.1e-9)), too_large);
+  EXPECT_TRUE(ValidateRadiusEdge(mesh.View(), ratio * (1 - 1e-3)).ok());
+  const ValidationOptions well_spaced = {.rho = ratio * (1 - 1e-3), .criterion = Criterion::kWellSpaced};
+  if (D() < 6) {
+    EXPECT_THAT(ValidateMesh(mesh.View(), well_spaced), too_large);
+    EXPECT_TRUE(ValidateMesh(mesh.View(), {.rho = well_spaced.rho}).ok());
+  }
+  for (const double rho : {0.0, -1.0, kNaN, kInfinity}) {
+    EXPECT_THAT(ValidateWellSpaced(mesh.View(), rho), Refuses("rho is "));
+  }
+}
+
+TEST_P(ValidateTest, SizingEverywhere) {
+  const TestMesh mesh = Grid();
+  const double radius = std::sqrt(D()) / 2;
+  EXPECT_TRUE(ValidateSizing(mesh.View(), 0, {}).ok());
+  EXPECT_TRUE(ValidateSizing(mesh.View(), radius * (1 - 0.9e-9), {}).ok());
+  const auto too_large = Violates(AllOf(HasSubstr("simplex 0 ("), HasSubstr("has circumradius ")));
+  EXPECT_THAT(ValidateSizing(mesh.View(), radius * (1 - 1.1e-9), {}), too_large);
+  EXPECT_THAT(ValidateMesh(mesh.View(), {.max_circumradius = radius * 0.99}), too_large);
+  for (const double bad : {-1.0, kNaN, kInfinity}) {
+    EXPECT_THAT(ValidateSizing(mesh.View(), bad, {}), Refuses("max_circumradius is "));
+  }
+}
+
+TEST_P(ValidateTest, SizingInBoxes) {
+  // All circumcentres are middles of cells; their balls reach sqrt(D) / 2 far.
+  const TestMesh mesh = Grid();
+  const double radius = std::sqrt(D()) / 2;
+  SizeBox box;
+  box.low.assign(static_cast<size_t>(D()), 0.25);
+  box.high.assign(static_cast<size_t>(D()), 0.75);
+  box.max_circumradius = radius * (1 - 0.9e-9);
+  EXPECT_TRUE(ValidateSizing(mesh.View(), 0, {&box, 1}).ok());
+  box.max_circumradius = radius * (1 - 1.1e-9);
+  const auto too_large =
+      Violates(AllOf(HasSubstr("simplex 0 ("), HasSubstr("of size box 1, at a distance of 0 from it")));
+  SizeBox harmless = box;
+  harmless.max_circumradius = 100;
+  const std::vector<SizeBox> boxes = {harmless, box};
+  EXPECT_THAT(ValidateSizing(mesh.View(), 0, boxes), too_large);
+  EXPECT_THAT(ValidateMesh(mesh.View(), {.size_boxes = boxes}), too_large);
+
+  // A box outside the mesh, far along the first axis, that the balls of the nearest cells just do not, or do, meet.
+  const double middle = Cells() - 0.5;
+  SizeBox outside;
+  outside.low.assign(static_cast<size_t>(D()), -1);
+  outside.high.assign(static_cast<size_t>(D()), 10);
+  outside.max_circumradius = 1e-3;
+  outside.high[0] = 100;
+  outside.low[0] = middle + radius * (1 - 0.9e-9);
+  EXPECT_TRUE(ValidateSizing(mesh.View(), 0, {&outside, 1}).ok()) << ValidateSizing(mesh.View(), 0, {&outside, 1});
+  outside.low[0] = middle + radius * (1 - 1.1e-9);
+  EXPECT_THAT(ValidateSizing(mesh.View(), 0, {&outside, 1}), Violates(HasSubstr("of size box 0, at a distance of ")));
+}
+
+TEST_P(ValidateTest, SizeBoxesThatAreNone) {
+  const TestMesh mesh = Grid();
+  SizeBox good;
+  good.low.assign(static_cast<size_t>(D()), 0);
+  good.high.assign(static_cast<size_t>(D()), 1);
+  good.max_circumradius = 100;
+  EXPECT_TRUE(ValidateSizing(mesh.View(), 0, {&good, 1}).ok());
+  SizeBox bad = good;
+  bad.high.pop_back();
+  EXPECT_THAT(ValidateSizing(mesh.View(), 0, {&bad, 1}), Refuses("size box 0 has corners of "));
+  bad = good;
+  bad.low[1] = 2;
+  EXPECT_THAT(ValidateSizing(mesh.View(), 0, {&bad, 1}), Refuses("size box 0 reaches from 2 to 1 on axis 1"));
+  bad.low[1] = kNaN;
+  EXPECT_THAT(ValidateSizing(mesh.View(), 0, {&bad, 1}), Refuses("size box 0 reaches from nan to 1 on axis 1"));
+  for (const double bound : {0.0, -1.0, kNaN, kInfinity}) {
+    bad = good;
+    bad.max_circumradius = bound;
+    EXPECT_THAT(ValidateSizing(mesh.View(), 0, {&bad, 1}), Refuses("size box 0: max_circumradius is "));
+  }
 }
 
 TEST_P(ValidateTest, CircumcentreOutsideIsFound) {
@@ -338,8 +465,8 @@ TEST_P(ValidateTest, NoiseIsRefused) {
   const uint64_t seed = test::Seed(8);
   SCOPED_TRACE(seed);
   test::SplitMix64 random(seed);
-  for (int round = 0; round < 200; ++round) {
-    TestMesh mesh = Grid();
+  for (int round = 0; round < (D() <= 3 ? 200 : 7 - D()); ++round) {
+    TestMesh mesh = D() <= 3 ? Grid() : KuhnGrid(D(), 1);
     for (uint32_t& v : mesh.simplices) {
       v = static_cast<uint32_t>(random.Below(mesh.VertexCount()));
     }

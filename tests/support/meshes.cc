@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <numeric>
 #include <utility>
 
@@ -55,6 +56,14 @@ TestMesh KuhnGrid(int dimension, uint32_t cells, double low, double spacing) {
   return mesh;
 }
 
+TestMesh KuhnGridOn(int dimension, const std::vector<double>& lines) {
+  TestMesh mesh = KuhnGrid(dimension, static_cast<uint32_t>(lines.size()) - 1);
+  for (double& x : mesh.points) {
+    x = lines[static_cast<size_t>(x)];
+  }
+  return mesh;
+}
+
 TestMesh ConeOverUnitBox(const std::vector<double>& apex) {
   const int d = static_cast<int>(apex.size());
   TestMesh cube = KuhnGrid(d, 1);
@@ -88,6 +97,49 @@ BothTriangulations Quadrilateral(const std::vector<double>& abcd) {
 
 BothTriangulations Bipyramid(const std::vector<double>& abcde) {
   return {{3, abcde, {0, 1, 2, 3, 0, 2, 1, 4}}, {3, abcde, {0, 1, 4, 3, 1, 2, 4, 3, 2, 0, 4, 3}}};
+}
+
+BothTriangulations TwoApexes(int dimension, double height) {
+  const size_t d = static_cast<size_t>(dimension);
+  const auto corners = static_cast<uint32_t>(d);  // of the facet: 0 to d - 1; then the apexes
+  // A regular simplex in d - 1 coordinates: its corners minus their mean.
+  std::vector<double> points((d + 2) * d, 0.0);
+  const double last = d == 2 ? -1 : (1 - std::sqrt(static_cast<double>(d))) / static_cast<double>(d - 1);
+  for (size_t i = 0; i < d; ++i) {
+    double norm_sq = 0;
+    for (size_t k = 0; k + 1 < d; ++k) {
+      const double mean = d == 2 ? 0 : (1 + last) / static_cast<double>(d);
+      points[i * d + k] = (i + 1 == d ? last : i == k ? 1 : 0) - mean;
+      norm_sq += points[i * d + k] * points[i * d + k];
+    }
+    for (size_t k = 0; k + 1 < d; ++k) {
+      points[i * d + k] /= std::sqrt(norm_sq);
+    }
+  }
+  points[d * d + d - 1] = height;
+  points[(d + 1) * d + d - 1] = -height;
+  BothTriangulations both = {{dimension, points, {}}, {dimension, points, {}}};
+  const auto append = [](TestMesh& mesh, std::vector<uint32_t> simplex, bool negative) {
+    if (negative) {
+      std::swap(simplex[0], simplex[1]);
+    }
+    mesh.simplices.insert(mesh.simplices.end(), simplex.begin(), simplex.end());
+  };
+  // The orientation of the facet and the upper apex, by the one of them that is positive; all others follow from it.
+  std::vector<uint32_t> upper(d + 1);
+  std::iota(upper.begin(), upper.end(), 0);
+  TestMesh probe{dimension, points, upper};
+  const bool negative = !core::ValidateOrientation(probe.View()).ok();
+  append(both.first, upper, negative);
+  std::vector<uint32_t> lower = upper;
+  lower[d] = corners + 1;
+  append(both.first, lower, !negative);
+  for (uint32_t skip = 0; skip < corners; ++skip) {
+    std::vector<uint32_t> around = upper;
+    around[skip] = corners + 1;
+    append(both.second, around, negative);
+  }
+  return both;
 }
 
 }  // namespace wellspace::test

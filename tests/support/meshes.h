@@ -26,6 +26,10 @@ struct TestMesh {
 // triangulation when the coordinates are exact.
 TestMesh KuhnGrid(int dimension, uint32_t cells, double low = 0, double spacing = 1);
 
+// KuhnGrid with the lines of the grid at `lines`, the same on every axis. Cells are boxes, hence cospherical: Delaunay
+// again when the coordinates are exact.
+TestMesh KuhnGridOn(int dimension, const std::vector<double>& lines);
+
 // The unit box as a cone from `apex` (D coordinates, inside) over its triangulated boundary. The apex is vertex
 // 2^dimension.
 TestMesh ConeOverUnitBox(const std::vector<double>& apex);
@@ -39,6 +43,11 @@ struct BothTriangulations {
 BothTriangulations Quadrilateral(const std::vector<double>& abcd);
 // Bipyramid with triangle a b c and apexes d above and e below: two tetrahedra at a b c, three around d e.
 BothTriangulations Bipyramid(const std::vector<double>& abcde);
+
+// In any dimension: D corners of a facet and an apex at a distance of `height` on either side of it; two simplices at the
+// facet, D around the line between the apexes. The facet's corners are at a distance of 1 to its middle, so the first is
+// Delaunay for height > 1 only, the second for height < 1 only.
+BothTriangulations TwoApexes(int dimension, double height);
 
 }  // namespace wellspace::test
 
