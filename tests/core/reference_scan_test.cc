@@ -29,7 +29,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // The fast scan opens at most this many times the leaves that the reference does, and as many more: it takes leaves by
 // plain distance, so it may open some before it has seen the vertices that rule them out. Measured over seven seeds of
-// these tests (5000 queries): no query more than 1.5 times (3 for 2), no cloud on average more than 1.2 times.
+// these tests (4500 queries): no query more than 1.5 times (3 for 2), no cloud on average more than 1.2 times.
 constexpr double kMostFactor = 1.5;
 constexpr uint64_t kMostMore = 2;
 constexpr double kMostFactorOfCloud = 1.3;
