@@ -262,7 +262,7 @@ class Certifier {
     // What the rounding of the exact node itself allows for.
     const double rounding = 16 * kUnit * exact.reach;
     const double off = std::sqrt(DistanceSq<D>(node.x, exact.x));
-    if (!(off <= 0.5 * node.slack + rounding)) {
+    if (!(off <= node.slack + rounding)) {
       return Violation("node ", i, " is ", off, " from where its planes meet; its slack is ", node.slack);
     }
     if (!(std::abs(std::sqrt(node.radius_sq) - exact.reach) <= node.slack + rounding)) {

@@ -439,8 +439,7 @@ WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #define WELLSPACE_INSTANTIATE(D) \
   template ReferenceScan<D> ReferenceClippedVoronoi<D>(const QueryStructure<D>&, VertexId, double);
 // Only these have a QueryStructure yet.
-WELLSPACE_INSTANTIATE(2)
-WELLSPACE_INSTANTIATE(3)
+WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 
 }  // namespace wellspace::core

@@ -182,13 +182,12 @@ TYPED_TEST(CertificateTest, CellsHaveOneAtEveryStageOfRefinement) {
     QueryStructure<D> structure = MakeStructure<D>(test::UnitBox<D>(), test::SortedCloud<D>(kind, D == 2 ? 60 : 20));
     Workspace<D> workspace;
     RunContext context;
-    QueryCounters counters;
     uint32_t steps = 0;
     double radius = 0;
     VertexId v{};
     bool is_begun = false;
     absl::Status certified;
-    const RefinementObserver<D> observer = [&](const QueryStructure<D>& at) {
+    const RefinementObserver<D> observer = [&](const QueryStructure<D>& at, const Insertion&) {
       if (!certified.ok()) {
         return;
       }
@@ -206,9 +205,8 @@ TYPED_TEST(CertificateTest, CellsHaveOneAtEveryStageOfRefinement) {
         certified = CertifyCell<D>(at, v, radius, workspace.cell);
       }
     };
-    const RefinementParameters parameters{
-        .rho = D == 2 ? std::sqrt(2.0) : 2.0, .max_vertices = 100'000, .min_edge = 0x1p-48};
-    const absl::Status refined = Refine<D>(parameters, structure, context, counters, observer);
+    Refinement<D> refinement(structure, 0x1p-48);
+    const absl::Status refined = refinement.Run({.rho = D == 2 ? std::sqrt(2.0) : 2.0}, 100'000, context, observer);
     ASSERT_TRUE(refined.ok()) << refined;
     ASSERT_TRUE(certified.ok()) << certified;
     EXPECT_GT(steps, 20u);

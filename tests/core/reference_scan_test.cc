@@ -467,9 +467,8 @@ TYPED_TEST(ReferenceScanTest, AgreesWithTheFastScanAtEveryStageOfRefinement) {
     QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, D == 2 ? 80 : 20));
     ScanComparer<D> comparer;
     RunContext context;
-    QueryCounters counters;
     uint32_t steps = 0;
-    const RefinementObserver<D> observer = [&](const QueryStructure<D>& at) {
+    const RefinementObserver<D> observer = [&](const QueryStructure<D>& at, const Insertion&) {
       if (steps++ % 40 != 0 || this->HasFatalFailure()) {
         return;
       }
@@ -479,9 +478,8 @@ TYPED_TEST(ReferenceScanTest, AgreesWithTheFastScanAtEveryStageOfRefinement) {
       const VertexId any = VertexId(this->random_.Below(at.vertex_count()));
       comparer.Compare(at, any, 4 * std::sqrt(test::NearestDistanceSq<D>(at, any)));
     };
-    const RefinementParameters parameters{
-        .rho = D == 2 ? std::sqrt(2.0) : 2.0, .max_vertices = 100'000, .min_edge = 0x1p-48};
-    const absl::Status status = Refine<D>(parameters, structure, context, counters, observer);
+    Refinement<D> refinement(structure, 0x1p-48);
+    const absl::Status status = refinement.Run({.rho = D == 2 ? std::sqrt(2.0) : 2.0}, 100'000, context, observer);
     ASSERT_TRUE(status.ok()) << status;
     this->ExpectFewLeaves(test::CloudName(kind, D) + "_during", comparer.totals());
     ScanComparer<D> afterwards;

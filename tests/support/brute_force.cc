@@ -215,7 +215,7 @@ template <int D>
       return ::testing::AssertionFailure() << "node " << i << " has a plane twice";
     }
     for (int k = 0; k < D; ++k) {
-      const uint16_t j = nodes[i].neighbours[k];
+      const size_t j = nodes[i].neighbours[k];
       if (j >= nodes.size() || j == i) {
         return ::testing::AssertionFailure() << "node " << i << " has the neighbour " << j;
       }
