@@ -63,7 +63,7 @@ struct ExactDecision {
 //             translations that are exact do not change the result; (3) with kPerturb the result is never kZero.
 // REQUIRES:   finite coordinates; the planes meet in one point (det A != 0); u different from the site and all
 //             generators.
-// Complexity: O(D 2^D) products; with kInteger, of one word by at most D of them (3-D: 0.16 us, 6-D: 2.5 us).
+// Complexity: O(D 2^D) products; with kInteger, of one word by at most D of them (3-D: 0.16 us, 6-D: 2.7 us).
 // Errors:     none.
 // Source:     ours; the determinant is that of the power test of regular triangulations. docs/design/geometry.md has
 //             the bounds and what was measured.
