@@ -1,0 +1,41 @@
+// How large a mesh will be, before it is made.
+#ifndef WELLSPACE_CORE_REFINE_ESTIMATE_H_
+#define WELLSPACE_CORE_REFINE_ESTIMATE_H_
+
+#include "absl/status/statusor.h"
+#include "core/base/run_context.h"
+#include "core/refine/demands.h"
+#include "core/voronoi/query_structure.h"
+
+namespace wellspace::core {
+
+struct SizeEstimate {
+  double vertices = 0;
+  double simplices = 0;
+  double bytes = 0;  // that meshing takes at its peak: structure, refinement, stars and the mesh itself
+  // The standard error of `vertices`, as a share of it, that comes from not looking at every leaf; 0 where all were
+  // looked at. The error of the model is not in it.
+  double sampling_error = 0;
+};
+
+// Predicts what refinement for `demands` will make of `structure`.
+//
+// Shapes:     structure: as QueryStructure::Initialize leaves it; nothing has been refined.
+// Units:      counts and bytes.
+// REQUIRES:   demands.rho at least MinimumRho(D).
+// Guarantees: (1) by the radius-edge criterion without sizes, each figure is right within a factor of 1.5 at rho =
+//             sqrt(2) in 2-D and 2 in 3-D, and of 2 from rho = 1 in 2-D and 1.2 in 3-D, on the clouds and with the
+//             exceptions that docs/design/estimate.md lists; for D > 3 an order of magnitude; (2) deterministic;
+//             (3) vertices are never fewer than the structure has already.
+// Complexity: O(n + L) for n points in L leaves, with small constants, and a number of looks for nearest points that
+//             depends on the cloud's kind but not on n, of O(log n) each.
+// Errors:     CANCELLED, DEADLINE_EXCEEDED.
+// Threads:    thread-compatible.
+// Source:     Ruppert 1995 (the size of a mesh is the integral of lfs^-D up to constants); docs/design/estimate.md.
+template <int D>
+absl::StatusOr<SizeEstimate> EstimateSize(const QueryStructure<D>& structure, const Demands<D>& demands,
+                                          const RunContext& context);
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_REFINE_ESTIMATE_H_

@@ -1,0 +1,133 @@
+// The two points of a fixed set that are nearest to a place.
+#ifndef WELLSPACE_CORE_REFINE_NEAREST_POINTS_H_
+#define WELLSPACE_CORE_REFINE_NEAREST_POINTS_H_
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "core/base/run_context.h"
+#include "core/base/status_macros.h"
+#include "core/geometry/box.h"
+#include "core/geometry/point.h"
+
+namespace wellspace::core {
+
+struct NearestTwo {
+  double first_sq = std::numeric_limits<double>::infinity();
+  double second_sq = std::numeric_limits<double>::infinity();
+  uint32_t first = 0;
+};
+
+// Finds points near any place: boxes around runs of points in Morton order, and around pairs of boxes. A tree would walk
+// through its empty leaves, of which there may be many between far points.
+//
+// Thread safety: thread-compatible.
+template <int D>
+class NearestPoints {
+ public:
+  // REQUIRES:   points in Morton order; in any other Nearest is right, but slow.
+  // Complexity: O(n).
+  // Errors:     CANCELLED, DEADLINE_EXCEEDED.
+  absl::Status Build(std::vector<Point<D>> points, const RunContext& context) {
+    points_ = std::move(points);
+    if (points_.empty()) {
+      return absl::OkStatus();
+    }
+    std::vector<Box<D>> runs;
+    runs.reserve((points_.size() + kRun - 1) / kRun);
+    for (size_t i = 0; i < points_.size(); ++i) {
+      if (i % kRun == 0) {
+        WELLSPACE_RETURN_IF_ERROR(context.Check());
+        runs.push_back({points_[i], points_[i]});
+      } else {
+        Grow(runs.back(), points_[i], points_[i]);
+      }
+    }
+    levels_.push_back(std::move(runs));
+    while (levels_.back().size() > 1) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+      const std::vector<Box<D>>& below = levels_.back();
+      std::vector<Box<D>> boxes;
+      boxes.reserve((below.size() + 1) / 2);
+      for (size_t i = 0; i < below.size(); ++i) {
+        if (i % 2 == 0) {
+          boxes.push_back(below[i]);
+        } else {
+          Grow(boxes.back(), below[i].low, below[i].high);
+        }
+      }
+      levels_.push_back(std::move(boxes));
+    }
+    return absl::OkStatus();
+  }
+
+  size_t size() const { return points_.size(); }
+  const Point<D>& operator[](size_t i) const { return points_[i]; }
+
+  // The two points nearest to `x`, other than point number `but`. Distances are infinite where there are no such points.
+  //
+  // Complexity: O(log n) for most clouds and places.
+  // Errors:     none.
+  NearestTwo Nearest(const Point<D>& x, size_t but = ~size_t{0}) const {
+    NearestTwo result;
+    if (!points_.empty()) {
+      Descend(x, but, static_cast<int>(levels_.size()) - 1, 0, 0, result);
+    }
+    return result;
+  }
+
+ private:
+  static constexpr size_t kRun = 8;
+
+  static void Grow(Box<D>& box, const Point<D>& low, const Point<D>& high) {
+    for (int i = 0; i < D; ++i) {
+      box.low[i] = std::min(box.low[i], low[i]);
+      box.high[i] = std::max(box.high[i], high[i]);
+    }
+  }
+
+  void Descend(const Point<D>& x, size_t but, int level, size_t index, double distance_sq, NearestTwo& result) const {
+    if (distance_sq >= result.second_sq) {
+      return;
+    }
+    if (level == 0) {
+      for (size_t i = index * kRun; i < std::min(points_.size(), (index + 1) * kRun); ++i) {
+        const double d = i == but ? std::numeric_limits<double>::infinity() : DistanceSq<D>(x, points_[i]);
+        if (d < result.first_sq) {
+          result.second_sq = std::exchange(result.first_sq, d);
+          result.first = static_cast<uint32_t>(i);
+        } else {
+          result.second_sq = std::min(result.second_sq, d);
+        }
+      }
+      return;
+    }
+    const std::vector<Box<D>>& below = levels_[level - 1];
+    size_t near = 2 * index;
+    double near_sq = DistanceSq<D>(x, below[near]);
+    if (near + 1 == below.size()) {
+      Descend(x, but, level - 1, near, near_sq, result);
+      return;
+    }
+    size_t far = near + 1;
+    double far_sq = DistanceSq<D>(x, below[far]);
+    if (far_sq < near_sq) {
+      std::swap(near, far);
+      std::swap(near_sq, far_sq);
+    }
+    Descend(x, but, level - 1, near, near_sq, result);
+    Descend(x, but, level - 1, far, far_sq, result);
+  }
+
+  std::vector<Point<D>> points_;
+  std::vector<std::vector<Box<D>>> levels_;
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_REFINE_NEAREST_POINTS_H_
