@@ -21,6 +21,8 @@ uint64_t LineIndex::LineOf(uint64_t point) const {
   return run.first_line + (point - run.first_point);
 }
 
-std::string PointCloud::Origin(uint64_t point) const { return absl::StrCat(name, ":", lines.LineOf(point)); }
+std::string PointCloud::Origin(uint64_t point) const {
+  return lines.size() == 0 ? absl::StrCat(name, "[", point, "]") : absl::StrCat(name, ":", lines.LineOf(point));
+}
 
 }  // namespace wellspace::formats

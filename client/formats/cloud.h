@@ -9,7 +9,7 @@
 namespace wellspace::formats {
 
 inline constexpr int kMinDimension = 2;
-inline constexpr int kMaxDimension = 3;
+inline constexpr int kMaxDimension = 6;
 
 // The line of a file that each point came from. Points on consecutive lines cost nothing: only the first point after a
 // gap (a comment, a blank line) is stored.
@@ -36,10 +36,11 @@ struct PointCloud {
   std::string name;  // of the file, as messages say it
   int dimension = 0;
   std::vector<double> points;  // size() x dimension, row-major
-  LineIndex lines;
+  LineIndex lines;             // of every point, or of none when the file has no lines
 
-  uint64_t size() const { return lines.size(); }
-  // "cloud.csv:17", where point `point` was read. REQUIRES: point < size().
+  uint64_t size() const { return dimension == 0 ? 0 : points.size() / dimension; }
+  // Where point `point` was read: "cloud.csv:17" or, in a file without lines, "cloud.npy[16]", counted from 0.
+  // REQUIRES: point < size().
   std::string Origin(uint64_t point) const;
 };
 

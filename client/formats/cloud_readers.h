@@ -1,5 +1,5 @@
-// The readers behind ReadCloud, one for each format. Each fills `cloud.dimension`, `points` and `lines`; `dimension` is
-// what the file must have, or 0. Private to this folder.
+// The readers behind ReadCloud, one for each format. Each fills `cloud.dimension` and `points`, those of text `lines`,
+// too; `dimension` is what the file must have, or 0. REQUIRES: cloud.name is set. Private to this folder.
 #ifndef WELLSPACE_CLIENT_FORMATS_CLOUD_READERS_H_
 #define WELLSPACE_CLIENT_FORMATS_CLOUD_READERS_H_
 
@@ -14,6 +14,7 @@ namespace wellspace::formats {
 absl::Status ReadCsv(LineReader& reader, int dimension, PointCloud& cloud);
 absl::Status ReadXyz(LineReader& reader, int dimension, PointCloud& cloud);
 absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud);
+absl::Status ReadNpy(InputFile& file, int dimension, PointCloud& cloud);
 
 // ReadNode that also tells the index of the first point, 0 or 1.
 absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud, uint64_t& index_base);

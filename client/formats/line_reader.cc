@@ -77,6 +77,26 @@ absl::StatusOr<std::string> InputFile::ReadAll() {
   }
 }
 
+std::optional<uint64_t> InputFile::size() const {
+  struct stat attributes;
+  if (fstat(descriptor_, &attributes) != 0 || !S_ISREG(attributes.st_mode)) {
+    return std::nullopt;
+  }
+  return static_cast<uint64_t>(attributes.st_size);
+}
+
+absl::StatusOr<size_t> InputFile::ReadAt(uint64_t offset, char* buffer, size_t size) {
+  while (true) {
+    const ssize_t got = pread(descriptor_, buffer, size, static_cast<off_t>(offset));
+    if (got >= 0) {
+      return static_cast<size_t>(got);
+    }
+    if (errno != EINTR) {
+      return absl::ErrnoToStatus(errno, absl::StrCat("cannot read ", name_));
+    }
+  }
+}
+
 LineReader::LineReader(InputFile file) : file_(std::move(file)) {}
 
 absl::Status LineReader::Error(std::string_view message) const {

@@ -3,6 +3,7 @@
 #define WELLSPACE_CLIENT_FORMATS_LINE_READER_H_
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -36,6 +37,10 @@ class InputFile {
   absl::StatusOr<size_t> Read(char* buffer, size_t size);
   // All that is left.
   absl::StatusOr<std::string> ReadAll();
+  // How many bytes the file has; none when it is no regular file (a pipe, a device).
+  std::optional<uint64_t> size() const;
+  // Up to `size` bytes from `offset` on, wherever Read is; 0 at the end of the file. REQUIRES: the file is regular.
+  absl::StatusOr<size_t> ReadAt(uint64_t offset, char* buffer, size_t size);
 
  private:
   InputFile(int descriptor, std::string name) : descriptor_(descriptor), name_(std::move(name)) {}

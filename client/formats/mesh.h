@@ -8,6 +8,11 @@
 
 namespace wellspace::formats {
 
+// "triangles", "tetrahedra" or, in higher dimensions, "simplices".
+inline const char* SimplexName(int dimension) {
+  return dimension == 2 ? "triangles" : dimension == 3 ? "tetrahedra" : "simplices";
+}
+
 // Simplices: triangles in 2-D, tetrahedra in 3-D.
 struct MeshView {
   int dimension = 0;

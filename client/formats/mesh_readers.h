@@ -10,6 +10,7 @@
 namespace wellspace::formats {
 
 absl::StatusOr<Mesh> ReadVtu(const std::string& path);
+absl::StatusOr<Mesh> ReadNpz(const std::string& path);
 // `path` is that of either file.
 absl::StatusOr<Mesh> ReadNodeAndEle(const std::string& path);
 

@@ -11,6 +11,7 @@
 namespace wellspace::formats {
 
 absl::Status WriteVtu(const std::string& path, const MeshView& mesh, std::stop_token stop);
+absl::Status WriteNpz(const std::string& path, const MeshView& mesh, std::stop_token stop);
 // `path` is that of either file; both are written.
 absl::Status WriteNodeAndEle(const std::string& path, const MeshView& mesh, std::stop_token stop);
 

@@ -71,6 +71,7 @@ OutputFile::OutputFile(OutputFile&& other) noexcept
       temporary_(std::exchange(other.temporary_, {})),
       stop_(std::move(other.stop_)),
       buffer_(std::move(other.buffer_)),
+      size_(other.size_),
       status_(std::move(other.status_)) {}
 
 OutputFile::~OutputFile() {
@@ -83,6 +84,7 @@ OutputFile::~OutputFile() {
 }
 
 void OutputFile::Write(std::string_view bytes) {
+  size_ += bytes.size();
   if (buffer_.size() + bytes.size() > kBufferBytes) {
     Send(buffer_);
     buffer_.clear();
@@ -103,6 +105,19 @@ void OutputFile::Send(std::string_view bytes) {
     const ssize_t sent = write(descriptor_, bytes.data(), bytes.size());
     if (sent >= 0) {
       bytes.remove_prefix(sent);
+    } else if (errno != EINTR) {
+      status_ = WriteError(errno, path_);
+    }
+  }
+}
+
+void OutputFile::Overwrite(uint64_t offset, std::string_view bytes) {
+  Flush().IgnoreError();  // kept in status_
+  while (status_.ok() && !bytes.empty()) {
+    const ssize_t sent = pwrite(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
+    if (sent >= 0) {
+      bytes.remove_prefix(sent);
+      offset += sent;
     } else if (errno != EINTR) {
       status_ = WriteError(errno, path_);
     }

@@ -2,6 +2,7 @@
 #ifndef WELLSPACE_CLIENT_FORMATS_OUTPUT_FILE_H_
 #define WELLSPACE_CLIENT_FORMATS_OUTPUT_FILE_H_
 
+#include <cstdint>
 #include <stop_token>
 #include <string>
 #include <string_view>
@@ -27,6 +28,12 @@ class OutputFile {
   ~OutputFile();
 
   void Write(std::string_view bytes);
+  // Replaces bytes that were written before, from `offset` on. REQUIRES: offset + bytes.size() <= size(); IsSeekable().
+  void Overwrite(uint64_t offset, std::string_view bytes);
+  // How many bytes were written.
+  uint64_t size() const { return size_; }
+  // Whether Overwrite can be used: not on standard output, a pipe or a device.
+  bool IsSeekable() const { return !temporary_.empty(); }
   // Sends what is buffered to the system. Returns the first error so far.
   absl::Status Flush();
   // Flushes and gives the file its name.
@@ -43,6 +50,7 @@ class OutputFile {
   std::string temporary_;  // empty: the descriptor is the wanted file itself
   std::stop_token stop_;
   std::string buffer_;
+  uint64_t size_ = 0;
   absl::Status status_;
 };
 

@@ -10,13 +10,24 @@
 namespace wellspace::formats {
 namespace {
 
-using CloudReader = absl::Status (*)(LineReader&, int, PointCloud&);
+using CloudReader = absl::Status (*)(InputFile&, int, PointCloud&);
+
+// A reader of lines as a reader of a file.
+template <absl::Status (*kReader)(LineReader&, int, PointCloud&)>
+absl::Status ReadText(InputFile& file, int dimension, PointCloud& cloud) {
+  LineReader reader(std::move(file));
+  if (absl::Status status = kReader(reader, dimension, cloud); !status.ok()) {
+    return status;
+  }
+  return reader.status();
+}
 
 std::span<const Format<CloudReader>> Readers() {
   static const std::vector<Format<CloudReader>> readers = {
-      {"csv", {".csv", ".tsv", ".txt", ".dat"}, ReadCsv},
-      {"xyz", {".xyz"}, ReadXyz},
-      {"node", {".node"}, ReadNode},
+      {"csv", {".csv", ".tsv", ".txt", ".dat"}, ReadText<ReadCsv>},
+      {"xyz", {".xyz"}, ReadText<ReadXyz>},
+      {"node", {".node"}, ReadText<ReadNode>},
+      {"npy", {".npy"}, ReadNpy},
   };
   return readers;
 }
@@ -37,12 +48,8 @@ absl::StatusOr<PointCloud> ReadCloud(const std::string& path, const CloudOptions
   }
   PointCloud cloud;
   cloud.name = file->name();
-  LineReader reader(*std::move(file));
-  if (absl::Status status = (*row)->handler(reader, options.dimension, cloud); !status.ok()) {
+  if (absl::Status status = (*row)->handler(*file, options.dimension, cloud); !status.ok()) {
     return status;
-  }
-  if (!reader.status().ok()) {
-    return reader.status();
   }
   if (cloud.dimension == 0) {
     if (options.dimension == 0) {

@@ -2,16 +2,15 @@
 //
 // Formats:
 //   csv   One point a line; fields separated by commas, semicolons, or blanks and tabs, as the first line has them. A
-//   first line
-//         without any number is a header; when it names columns x and y (and z), those are read and the others are
-//         skipped.
-//   xyz   One point a line, separated by blanks; columns after the third are skipped. Or as in chemistry: the number of
-//   points,
-//         a line of comment, then that many lines, each of which may start with a symbol.
-//   node  TetGen's and Triangle's: "points dimension attributes markers", then a line "index x y [z] attributes marker"
-//   for each
-//         point, counted from 0 or 1.
-// In all of them '#' starts a comment and blank lines are skipped.
+//         first line without any number is a header; when it names columns x and y (and z), those are read and the
+//         others are skipped, unless CloudOptions::dimension is above 3.
+//   xyz   One point a line, separated by blanks; columns after the third are skipped, or after as many as
+//         CloudOptions::dimension if that is above 3. Or as in chemistry: the number of points, a line of comment, then
+//         that many lines, each of which may start with a symbol.
+//   node  TetGen's and Triangle's: "points dimension attributes markers", then a line "index x y [z ...] attributes
+//         marker" for each point, counted from 0 or 1.
+//   npy   numpy's: one array, points x dimension, of type Float64 or Float32, little-endian, in C or Fortran order.
+// In those of text '#' starts a comment and blank lines are skipped.
 #ifndef WELLSPACE_CLIENT_FORMATS_READ_CLOUD_H_
 #define WELLSPACE_CLIENT_FORMATS_READ_CLOUD_H_
 
@@ -34,9 +33,10 @@ std::vector<std::string> CloudFormats();
 // Reads the points of `path`, in the order of the file; "-" is standard input.
 //
 // Guarantees: coordinates are correctly rounded, to the bit.
-// Complexity: one pass; memory for the points, and a buffer of at most about a line.
+// Complexity: one pass; memory for the points, and a buffer of at most about a line; twice the points for an array in
+//             Fortran order.
 // Errors:     of opening and reading; INVALID_ARGUMENT "FILE:LINE: …" for what is not a cloud of finite points of one
-//             dimension (2 or 3), and for a file without points when `dimension` is 0.
+//             dimension (2 to 6), and for a file of text without points when `dimension` is 0.
 absl::StatusOr<PointCloud> ReadCloud(const std::string& path, const CloudOptions& options = {});
 
 }  // namespace wellspace::formats

@@ -15,6 +15,7 @@ using MeshReader = absl::StatusOr<Mesh> (*)(const std::string&);
 std::span<const Format<MeshReader>> Readers() {
   static const std::vector<Format<MeshReader>> readers = {
       {"vtu", {".vtu"}, ReadVtu},
+      {"npz", {".npz"}, ReadNpz},
       {"node", {".node", ".ele"}, ReadNodeAndEle},
   };
   return readers;

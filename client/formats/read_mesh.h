@@ -3,6 +3,8 @@
 // Formats:
 //   vtu   VTK's XML, one piece of triangles in the plane z = 0 or of tetrahedra; arrays in ascii, or inline in base64,
 //         compressed by zlib or not; either byte order.
+//   npz   numpy's archive of arrays: `points` of type Float64 or Float32, vertices x dimension; `simplices` of type Int32,
+//         Int64, UInt32 or UInt64, simplices x (dimension + 1); little-endian, in C or Fortran order. Others are ignored.
 //   node  TetGen's and Triangle's pair of .node and .ele, given by either name.
 #ifndef WELLSPACE_CLIENT_FORMATS_READ_MESH_H_
 #define WELLSPACE_CLIENT_FORMATS_READ_MESH_H_

@@ -1,6 +1,8 @@
 // CSV and XYZ: one point a line.
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,7 +25,8 @@ class TableReader {
       : reader_(reader), wanted_dimension_(dimension), cloud_(cloud) {}
 
   void set_separator(char separator) { separator_ = separator; }
-  void SkipColumnsAfterThird() { skip_after_third_ = true; }
+  // Columns after the third are skipped, or after as many as the cloud must have if these are more.
+  void SkipColumnsAfterThird() { columns_ = std::max(3, wanted_dimension_); }
 
   bool IsHeader(std::string_view line) const {
     FieldSplitter fields(line, separator_);
@@ -36,10 +39,12 @@ class TableReader {
     return true;
   }
 
-  // Takes the columns called x, y and z when there are an x and a y; otherwise all of them.
+  // Takes the columns called x, y and z when there are an x and a y, unless more dimensions are wanted than have such
+  // names; otherwise all of them.
   void UseHeader(std::string_view line) {
+    constexpr int kNames = 3;
     std::vector<int> coordinates;
-    std::array<bool, kMaxDimension> seen{};
+    std::array<bool, kNames> seen{};
     FieldSplitter fields(line, separator_);
     std::string_view field;
     while (fields.Next(field)) {
@@ -50,7 +55,7 @@ class TableReader {
         seen[name - 'x'] = true;
       }
     }
-    if (seen[0] && seen[1]) {
+    if (seen[0] && seen[1] && wanted_dimension_ <= kNames) {
       coordinate_of_field_ = std::move(coordinates);
       named_dimension_ = seen[2] ? 3 : 2;
     }
@@ -89,7 +94,7 @@ class TableReader {
  private:
   int CoordinateOf(size_t field) const {
     if (coordinate_of_field_.empty()) {
-      return skip_after_third_ && field >= kMaxDimension ? kSkipped : static_cast<int>(field);
+      return field >= columns_ ? kSkipped : static_cast<int>(field);
     }
     return field < coordinate_of_field_.size() ? coordinate_of_field_[field] : kSkipped;
   }
@@ -100,7 +105,7 @@ class TableReader {
     }
     if (count < kMinDimension || count > kMaxDimension) {
       return reader_.Error(absl::StrCat(
-          "expected ", kMinDimension, " or ", kMaxDimension, " coordinates, got ", count,
+          "expected ", kMinDimension, " to ", kMaxDimension, " coordinates, got ", count,
           separator_ == ' ' ? "" : absl::StrCat(" (fields are separated by \"", std::string(1, separator_), "\")")));
     }
     cloud_.dimension = count;
@@ -111,9 +116,9 @@ class TableReader {
   const int wanted_dimension_;
   PointCloud& cloud_;
   char separator_ = ' ';
-  bool skip_after_third_ = false;
-  std::vector<int> coordinate_of_field_;  // empty: field i holds coordinate i
-  int named_dimension_ = 0;               // coordinates that the header names; 0: none
+  size_t columns_ = std::numeric_limits<int>::max();  // that are read, when no header names them
+  std::vector<int> coordinate_of_field_;              // empty: field i holds coordinate i
+  int named_dimension_ = 0;                           // coordinates that the header names; 0: none
 };
 
 char SeparatorOf(std::string_view line) {

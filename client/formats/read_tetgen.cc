@@ -78,7 +78,7 @@ absl::Status ExpectEnd(LineReader& reader, uint64_t count, const char* what) {
 
 absl::Status ReadEle(LineReader& reader, uint64_t vertices, uint64_t index_base, Mesh& mesh) {
   const uint64_t corners = mesh.dimension + 1;
-  const char* what = mesh.dimension == 2 ? "triangles" : "tetrahedra";
+  const char* what = SimplexName(mesh.dimension);
   std::string_view line;
   if (!reader.NextContent(line)) {
     return reader.status().ok() ? reader.Error("expected a header, got an empty file") : reader.status();
@@ -144,7 +144,8 @@ absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud, uint
   }
   const auto [count, columns, attributes, markers] = header;
   if (columns < kMinDimension || columns > kMaxDimension) {
-    return reader.Error(absl::StrCat("expected dimension 2 or 3, got ", columns));
+    return reader.Error(
+        absl::StrCat("expected a dimension from ", kMinDimension, " to ", kMaxDimension, ", got ", columns));
   }
   if (dimension != 0 && static_cast<int>(columns) != dimension) {
     return reader.Error(absl::StrCat("expected dimension ", dimension, ", got ", columns));
@@ -199,7 +200,7 @@ absl::StatusOr<Mesh> ReadNodeAndEle(const std::string& path) {
   }
   Mesh mesh{.dimension = cloud.dimension, .points = std::move(cloud.points), .simplices = {}};
   LineReader simplices(*std::move(ele_file));
-  if (absl::Status status = ReadEle(simplices, cloud.size(), index_base, mesh); !status.ok()) {
+  if (absl::Status status = ReadEle(simplices, mesh.View().vertex_count(), index_base, mesh); !status.ok()) {
     return status;
   }
   return mesh;

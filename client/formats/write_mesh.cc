@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "client/formats/cloud.h"
 #include "client/formats/line_reader.h"
 #include "client/formats/mesh_writers.h"
 #include "client/formats/registry.h"
@@ -15,34 +16,49 @@
 namespace wellspace::formats {
 namespace {
 
-using MeshWriter = absl::Status (*)(const std::string&, const MeshView&, std::stop_token);
+struct MeshWriter {
+  absl::Status (*write)(const std::string&, const MeshView&, std::stop_token);
+  int max_dimension;
+  // Why it cannot go to a pipe or a device; null: it can.
+  const char* needs_file;
+};
 
 std::span<const Format<MeshWriter>> Writers() {
   static const std::vector<Format<MeshWriter>> writers = {
-      {"vtu", {".vtu"}, WriteVtu},
-      {"node", {".node", ".ele"}, WriteNodeAndEle},
+      {"vtu", {".vtu"}, {WriteVtu, 3, nullptr}},
+      {"npz", {".npz"}, {WriteNpz, kMaxDimension, "npz is a zip archive, completed from its start"}},
+      {"node", {".node", ".ele"}, {WriteNodeAndEle, kMaxDimension, "node is a pair of files"}},
   };
   return writers;
 }
 
-absl::StatusOr<MeshWriter> FindWriter(const std::string& path, const std::string& format) {
+// `dimension` is that of the mesh, or 0 when it is not known.
+absl::StatusOr<MeshWriter> FindWriter(const std::string& path, const std::string& format, int dimension) {
   const bool is_stream = path == kStandardStream;
   const auto row = FindFormat(Writers(), path, format.empty() && is_stream ? "vtu" : format);
   if (!row.ok()) {
     return row.status();
   }
-  if (is_stream && (*row)->handler == WriteNodeAndEle) {
-    return absl::InvalidArgumentError("node is a pair of files and cannot go to standard output; expected vtu");
+  const MeshWriter& writer = (*row)->handler;
+  if (is_stream && writer.needs_file != nullptr) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(writer.needs_file, " and cannot go to standard output; expected vtu, or a file"));
   }
-  return (*row)->handler;
+  if (dimension > writer.max_dimension) {
+    return absl::InvalidArgumentError(absl::StrCat("cannot write ", path, ": ", (*row)->name, " holds meshes up to ",
+                                                   writer.max_dimension, "-D, and this one is ", dimension,
+                                                   "-D; expected npz, a file of numpy"));
+  }
+  return writer;
 }
 
 }  // namespace
 
 std::vector<std::string> MeshFormats() { return FormatNames(Writers()); }
 
-absl::Status CheckMeshOutput(const std::string& path, const std::string& format) {
-  if (const absl::StatusOr<MeshWriter> writer = FindWriter(path, format); !writer.ok()) {
+absl::Status CheckMeshOutput(const std::string& path, const std::string& format, int dimension) {
+  const absl::StatusOr<MeshWriter> writer = FindWriter(path, format, dimension);
+  if (!writer.ok()) {
     return writer.status();
   }
   if (path == kStandardStream) {
@@ -56,6 +72,10 @@ absl::Status CheckMeshOutput(const std::string& path, const std::string& format)
     return absl::InvalidArgumentError(absl::StrCat("cannot write ", path, ": it is a folder; expected a file"));
   }
   const bool is_device = exists && !S_ISREG(attributes.st_mode);
+  if (is_device && writer->needs_file != nullptr) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("cannot write ", path, ": ", writer->needs_file, "; expected the name of a regular file"));
+  }
   if (access(is_device ? path.c_str() : folder.c_str(), W_OK) != 0) {
     return absl::ErrnoToStatus(errno, absl::StrCat("cannot write ", path));
   }
@@ -63,11 +83,11 @@ absl::Status CheckMeshOutput(const std::string& path, const std::string& format)
 }
 
 absl::Status WriteMesh(const std::string& path, const std::string& format, const MeshView& mesh, std::stop_token stop) {
-  const absl::StatusOr<MeshWriter> writer = FindWriter(path, format);
+  const absl::StatusOr<MeshWriter> writer = FindWriter(path, format, mesh.dimension);
   if (!writer.ok()) {
     return writer.status();
   }
-  return (*writer)(path, mesh, std::move(stop));
+  return writer->write(path, mesh, std::move(stop));
 }
 
 }  // namespace wellspace::formats

@@ -1,6 +1,7 @@
 // TetGen's and Triangle's .node and .ele.
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "client/formats/mesh_writers.h"
 #include "client/formats/number.h"
 #include "client/formats/output_file.h"
@@ -12,7 +13,7 @@ namespace {
 void WriteNodes(const MeshView& mesh, OutputFile& output) {
   std::string line;
   AppendNumber(mesh.vertex_count(), line);
-  line += mesh.dimension == 2 ? " 2 0 0\n" : " 3 0 0\n";
+  absl::StrAppend(&line, " ", mesh.dimension, " 0 0\n");
   output.Write(line);
   for (uint64_t vertex = 0; vertex < mesh.vertex_count() && output.status().ok(); ++vertex) {
     line.clear();
@@ -30,7 +31,7 @@ void WriteSimplices(const MeshView& mesh, OutputFile& output) {
   const int corners = mesh.dimension + 1;
   std::string line;
   AppendNumber(mesh.simplex_count(), line);
-  line += mesh.dimension == 2 ? " 3 0\n" : " 4 0\n";
+  absl::StrAppend(&line, " ", corners, " 0\n");
   output.Write(line);
   for (uint64_t simplex = 0; simplex < mesh.simplex_count() && output.status().ok(); ++simplex) {
     line.clear();

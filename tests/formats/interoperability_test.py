@@ -33,8 +33,8 @@ class Interoperability(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.folder = pathlib.Path(folder.name)
 
-    def convert(self, source, target):
-        subprocess.run([CONVERT_MESH, self.folder / source, self.folder / target], check=True, timeout=60)
+    def convert(self, source, target, *options):
+        subprocess.run([CONVERT_MESH, *options, self.folder / source, self.folder / target], check=True, timeout=60)
 
     def assert_same_bits(self, mesh, points, cells, dimension):
         self.assertEqual(mesh.points.dtype, numpy.float64)
@@ -82,6 +82,47 @@ class Interoperability(unittest.TestCase):
         meshio.Mesh(points, [("tetra", cells)]).write(self.folder / "theirs.node", float_fmt=".17e")
         self.convert("theirs.ele", "again.vtu")
         self.assert_same_bits(meshio.read(self.folder / "again.vtu"), points, cells, 3)
+
+    def test_numpy_reads_our_npz(self):
+        for dimension in (2, 4, 6):
+            with self.subTest(dimension=dimension):
+                points, cells = random_mesh(dimension)
+                self.write_pair("mesh", points, cells)
+                self.convert("mesh.node", "mesh.npz")
+                with numpy.load(self.folder / "mesh.npz", allow_pickle=False) as mesh:
+                    self.assertEqual(sorted(mesh.files), ["points", "simplices"])
+                    self.assertEqual((mesh["points"].dtype, mesh["simplices"].dtype), (numpy.float64, numpy.uint32))
+                    self.assertTrue(mesh["points"].flags.c_contiguous and mesh["simplices"].flags.c_contiguous)
+                    numpy.testing.assert_array_equal(mesh["points"].view(numpy.uint64), points.view(numpy.uint64))
+                    numpy.testing.assert_array_equal(mesh["simplices"], cells)
+
+    def test_we_read_the_npz_of_numpy(self):
+        for save in (numpy.savez, numpy.savez_compressed):
+            for index_type in ("int32", "int64", "uint32", "uint64"):
+                for order in "CF":
+                    with self.subTest(save=save.__name__, index_type=index_type, order=order):
+                        points, cells = random_mesh(5, 300, 2000)
+                        save(self.folder / "theirs.npz", simplices=cells.astype(index_type, order=order),
+                             comment=numpy.array("ignored"), points=numpy.asarray(points, order=order))
+                        self.convert("theirs.npz", "ours.npz")
+                        with numpy.load(self.folder / "ours.npz", allow_pickle=False) as mesh:
+                            numpy.testing.assert_array_equal(mesh["points"].view(numpy.uint64),
+                                                             points.view(numpy.uint64))
+                            numpy.testing.assert_array_equal(mesh["simplices"], cells)
+
+    def test_we_read_the_npy_of_numpy(self):
+        points = random_mesh(4)[0]
+        with numpy.errstate(over="ignore"):
+            floats = points.astype(numpy.float32)
+        floats = numpy.where(numpy.isfinite(floats), floats, numpy.float32(0.1))
+        for cloud in (points, numpy.asfortranarray(points), floats):
+            with self.subTest(type=cloud.dtype, fortran=cloud.flags.f_contiguous):
+                numpy.save(self.folder / "cloud.npy", cloud)
+                self.convert("cloud.npy", "cloud.npz", "--cloud")
+                with numpy.load(self.folder / "cloud.npz", allow_pickle=False) as mesh:
+                    numpy.testing.assert_array_equal(mesh["points"].view(numpy.uint64),
+                                                     cloud.astype(numpy.float64, order="C").view(numpy.uint64))
+                    self.assertEqual(mesh["simplices"].shape, (0, 5))
 
 
 if __name__ == "__main__":

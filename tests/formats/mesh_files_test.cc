@@ -1,14 +1,20 @@
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
+#include <array>
 #include <bit>
 #include <limits>
 #include <random>
 
+#include "client/formats/npy.h"
+#include "client/formats/output_file.h"
 #include "client/formats/read_cloud.h"
 #include "client/formats/read_mesh.h"
 #include "client/formats/write_mesh.h"
+#include "client/formats/zip_file.h"
 #include "tests/formats/temporary_folder.h"
 
 namespace wellspace::formats {
@@ -71,8 +77,23 @@ TEST_P(RoundTripTest, KeepsEveryBit) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Formats, RoundTripTest,
-                         testing::Combine(testing::Values("mesh.vtu", "mesh.node", "mesh.1.ele"),
+                         testing::Combine(testing::Values("mesh.vtu", "mesh.npz", "mesh.node", "mesh.1.ele"),
                                           testing::Values(2, 3)));
+INSTANTIATE_TEST_SUITE_P(FormatsOfHigherDimensions, RoundTripTest,
+                         testing::Combine(testing::Values("mesh.npz", "mesh.node"), testing::Values(4, 5, 6)));
+
+TEST_F(MeshFilesTest, VtuRefusesMoreThanThreeDimensionsAndNamesNpz) {
+  const Mesh mesh = RandomMesh(4, 10, 10);
+  const std::string path = folder_.Path("mesh.vtu");
+  for (const absl::Status& status : {WriteMesh(path, "", mesh.View()), CheckMeshOutput(path, "", 4)}) {
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+    EXPECT_THAT(std::string(status.message()),
+                HasSubstr("mesh.vtu: vtu holds meshes up to 3-D, and this one is 4-D; expected npz"));
+  }
+  EXPECT_EQ(folder_.FileCount(), 0);
+  EXPECT_TRUE(CheckMeshOutput(path, "", 3).ok());
+  EXPECT_TRUE(CheckMeshOutput(path, "npz", 6).ok());
+}
 
 TEST_F(MeshFilesTest, NodeFileIsAlsoACloud) {
   const Mesh mesh = RandomMesh(3, 100, 10);
@@ -88,6 +109,8 @@ TEST_F(MeshFilesTest, OutputIsCheckedBeforeAnythingIsComputed) {
   EXPECT_TRUE(CheckMeshOutput("-", "").ok());
   EXPECT_TRUE(CheckMeshOutput("/dev/null", "vtu").ok());
   EXPECT_EQ(CheckMeshOutput("-", "node").code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(CheckMeshOutput("-", "npz").code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(CheckMeshOutput("/dev/null", "npz").code(), absl::StatusCode::kInvalidArgument);
   EXPECT_EQ(CheckMeshOutput(folder_.Path("mesh.stl"), "").code(), absl::StatusCode::kInvalidArgument);
   EXPECT_EQ(CheckMeshOutput(folder_.Path(""), "vtu").code(), absl::StatusCode::kInvalidArgument);
   EXPECT_EQ(CheckMeshOutput(folder_.Path("none/mesh.vtu"), "").code(), absl::StatusCode::kNotFound);
@@ -97,12 +120,12 @@ TEST_F(MeshFilesTest, CancelledWriteLeavesTheOldFileAndNoOther) {
   const Mesh mesh = RandomMesh(3, 50000, 50000);
   std::stop_source source;
   source.request_stop();
-  for (const char* name : {"mesh.vtu", "mesh.node"}) {
+  for (const char* name : {"mesh.vtu", "mesh.npz", "mesh.node"}) {
     folder_.Write(name, "old");
     EXPECT_EQ(WriteMesh(folder_.Path(name), "", mesh.View(), source.get_token()).code(), absl::StatusCode::kCancelled);
     EXPECT_EQ(folder_.Read(name), "old");
   }
-  EXPECT_EQ(folder_.FileCount(), 2);
+  EXPECT_EQ(folder_.FileCount(), 3);
 }
 
 TEST_F(MeshFilesTest, FailedWriteSaysWhy) {
@@ -224,6 +247,131 @@ TEST_F(MeshFilesTest, DamagedVtuIsNoTrouble) {
       }
     }
   }
+}
+
+// An array as a .npy has it.
+std::string NpyText(const std::string& type, uint64_t rows, uint64_t columns, std::string_view values) {
+  return NpyPreamble(type, rows, columns).append(values);
+}
+
+std::string BytesOf(const auto& values) {
+  return std::string(reinterpret_cast<const char*>(std::data(values)), std::size(values) * sizeof(values[0]));
+}
+
+class NpzTest : public MeshFilesTest {
+ protected:
+  // The path of an archive with these members.
+  std::string WriteArchive(const std::vector<std::pair<std::string, std::string>>& members) {
+    absl::StatusOr<OutputFile> output = OutputFile::Create(folder_.Path("mesh.npz"));
+    EXPECT_TRUE(output.ok()) << output.status();
+    ZipWriter archive(*output);
+    for (const auto& [name, content] : members) {
+      archive.Begin(name, content.size());
+      archive.Write(content);
+    }
+    EXPECT_TRUE(archive.Finish().ok());
+    EXPECT_TRUE(output->Commit().ok());
+    return folder_.Path("mesh.npz");
+  }
+
+  // The message of the refusal of an archive of the two arrays, after the folder's name.
+  std::string Refusal(const std::string& points, const std::string& simplices) {
+    const absl::StatusOr<Mesh> mesh =
+        ReadMesh(WriteArchive({{"points.npy", points}, {"other.npy", "?"}, {"simplices.npy", simplices}}));
+    EXPECT_EQ(mesh.status().code(), absl::StatusCode::kInvalidArgument) << mesh.status();
+    return std::string(mesh.status().message()).substr(folder_.Path("").size());
+  }
+
+  const std::string points_ = NpyText("<f8", 3, 2, BytesOf(std::array{0.0, 0.0, 1.0, 0.0, 0.0, 1.5}));
+  const std::string simplices_ = NpyText("<u4", 1, 3, BytesOf(std::array<uint32_t, 3>{0, 1, 2}));
+};
+
+TEST_F(NpzTest, TakesWholeNumbersOfEitherSizeAndSign) {
+  const auto read = [this](const std::string& type, const std::string& values) {
+    const absl::StatusOr<Mesh> mesh =
+        ReadMesh(WriteArchive({{"simplices.npy", NpyText(type, 1, 3, values)}, {"points.npy", points_}}));
+    EXPECT_TRUE(mesh.ok()) << mesh.status();
+    return mesh.ok() ? mesh->simplices : std::vector<uint32_t>();
+  };
+  EXPECT_THAT(read("<u4", BytesOf(std::array<uint32_t, 3>{0, 1, 2})), ElementsAre(0, 1, 2));
+  EXPECT_THAT(read("<i4", BytesOf(std::array<int32_t, 3>{2, 1, 0})), ElementsAre(2, 1, 0));
+  EXPECT_THAT(read("<u8", BytesOf(std::array<uint64_t, 3>{1, 0, 2})), ElementsAre(1, 0, 2));
+  EXPECT_THAT(read("<i8", BytesOf(std::array<int64_t, 3>{1, 2, 0})), ElementsAre(1, 2, 0));
+}
+
+TEST_F(NpzTest, Errors) {
+  EXPECT_THAT(ReadBad("mesh.npz", ""), HasSubstr("mesh.npz: expected a zip archive"));
+  EXPECT_THAT(ReadBad("mesh.npz", points_), HasSubstr("mesh.npz: expected a zip archive"));
+  const absl::Status missing = ReadMesh(WriteArchive({{"points.npy", points_}})).status();
+  EXPECT_EQ(missing.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(missing.message()), HasSubstr("mesh.npz: expected a member \"simplices.npy\""));
+  const auto indices = [](const std::string& type, const auto& values) {
+    return NpyText(type, 1, std::size(values), BytesOf(values));
+  };
+  EXPECT_EQ(Refusal(points_, indices("<u4", std::array<uint32_t, 3>{0, 1, 3})),
+            "mesh.npz: simplices.npy: expected indices from 0 to below the number of points, got 3 at [0, 2]");
+  EXPECT_THAT(Refusal(points_, indices("<i4", std::array<int32_t, 3>{0, -1, 2})), HasSubstr("got -1 at [0, 1]"));
+  EXPECT_THAT(Refusal(points_, indices("<i8", std::array<int64_t, 3>{-1, 1, 2})), HasSubstr("got -1 at [0, 0]"));
+  EXPECT_THAT(Refusal(points_, indices("<u8", std::array<uint64_t, 3>{1ull << 32, 1, 2})),
+              HasSubstr("got 4294967296 at [0, 0]"));
+  EXPECT_EQ(Refusal(points_, indices("<u4", std::array<uint32_t, 4>{0, 1, 2, 0})),
+            "mesh.npz: simplices.npy: expected 3 columns for simplices of points with 2 coordinates, got 4");
+  EXPECT_THAT(Refusal(points_, indices("<f8", std::array<double, 3>{0, 1, 2})),
+              HasSubstr("simplices.npy: expected whole numbers of type \"<i4\""));
+  EXPECT_THAT(Refusal(NpyText(">f8", 3, 2, std::string(48, '\0')), simplices_),
+              HasSubstr("points.npy: expected numbers of type \"<f8\" or \"<f4\", got \">f8\""));
+  EXPECT_THAT(Refusal(NpyText("<f8", 3, 7, std::string(168, '\0')), simplices_),
+              HasSubstr("points.npy: expected fewer than 2^32 rows and 2 to 6 columns"));
+  EXPECT_THAT(Refusal(points_ + "x", simplices_), HasSubstr("points.npy: expected 48 bytes of values"));
+  EXPECT_THAT(Refusal(points_.substr(0, 100), simplices_), HasSubstr("points.npy: the array ends after 100 bytes"));
+  EXPECT_THAT(Refusal("", simplices_), HasSubstr("points.npy: the array ends after 0 bytes, inside its header"));
+  // What a header says is not believed.
+  EXPECT_THAT(Refusal(NpyText("<f8", uint64_t{1} << 31, 2, "none"), simplices_), HasSubstr("got 4"));
+}
+
+TEST_F(NpzTest, NeedsARegularFile) {
+  const std::string path = folder_.Path("pipe.npz");
+  ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);
+  const int keep_open = open(path.c_str(), O_RDWR);
+  const absl::Status read = ReadMesh(path).status();
+  EXPECT_THAT(std::string(read.message()), HasSubstr("pipe.npz: expected a regular file"));
+  const absl::Status written = WriteMesh(path, "", RandomMesh(2, 10, 10).View());
+  EXPECT_THAT(std::string(written.message()), HasSubstr("needs a regular file"));
+  close(keep_open);
+}
+
+TEST_F(NpzTest, TheSameMeshGivesTheSameBytes) {
+  const Mesh mesh = RandomMesh(4, 1000, 3000);
+  ASSERT_TRUE(WriteMesh(folder_.Path("a.npz"), "", mesh.View()).ok());
+  ASSERT_TRUE(WriteMesh(folder_.Path("b.npz"), "", mesh.View()).ok());
+  EXPECT_EQ(folder_.Read("a.npz"), folder_.Read("b.npz"));
+}
+
+// The checksums and sizes of the archive leave no damage unseen that reaches the arrays.
+TEST_F(NpzTest, DamagedNpzIsNoTrouble) {
+  const Mesh mesh = RandomMesh(3, 20, 20);
+  ASSERT_TRUE(WriteMesh(folder_.Path("good.npz"), "", mesh.View()).ok());
+  const std::string good = folder_.Read("good.npz");
+  int refused = 0;
+  const auto try_to_read = [&](const std::string& damaged) {
+    const absl::StatusOr<Mesh> read = ReadMesh(folder_.Write("damaged.npz", damaged));
+    if (read.ok()) {
+      EXPECT_EQ(Bits(read->points), Bits(mesh.points));
+      EXPECT_EQ(read->simplices, mesh.simplices);
+    } else {
+      EXPECT_EQ(read.status().code(), absl::StatusCode::kInvalidArgument) << read.status();
+      ++refused;
+    }
+  };
+  for (size_t size = 0; size < good.size(); size += 7) {
+    try_to_read(good.substr(0, size));
+  }
+  for (size_t i = 0; i < good.size(); i += 3) {
+    std::string damaged = good;
+    damaged[i] = static_cast<char>(damaged[i] ^ 1 << i % 8);
+    try_to_read(damaged);
+  }
+  EXPECT_GT(refused, 300);
 }
 
 TEST_F(MeshFilesTest, EleErrors) {

@@ -79,6 +79,23 @@ TEST_F(ReadCloudTest, XyzPlainSkipsColumnsAfterThird) {
   EXPECT_EQ(ReadGood("cloud.xyz", "1 2\n3 4\n").dimension, 2);
 }
 
+TEST_F(ReadCloudTest, UpToSixDimensions) {
+  EXPECT_THAT(ReadGood("cloud.csv", "1,2,3,4\n5,6,7,8\n").points, ElementsAre(1, 2, 3, 4, 5, 6, 7, 8));
+  EXPECT_EQ(ReadGood("cloud.csv", "a b c d e\n1 2 3 4 5\n").dimension, 5);
+  EXPECT_EQ(ReadGood("cloud.node", "1 6 0 0\n0 1 2 3 4 5 6\n").dimension, 6);
+  EXPECT_EQ(ReadBad("cloud.csv", "1 2 3 4 5 6 7\n"), "cloud.csv:1: expected 2 to 6 coordinates, got 7");
+}
+
+// The names x, y and z choose among columns only where they can name all coordinates that are wanted.
+TEST_F(ReadCloudTest, NamesAndSkippedColumnsWhenMoreThanThreeDimensionsAreWanted) {
+  const CloudOptions four = {.format = "", .dimension = 4};
+  EXPECT_THAT(ReadGood("cloud.csv", "x,y,z,w\n1,2,3,4\n").points, ElementsAre(1, 2, 3));
+  EXPECT_THAT(ReadGood("cloud.csv", "x,y,z,w\n1,2,3,4\n", four).points, ElementsAre(1, 2, 3, 4));
+  EXPECT_EQ(ReadBad("cloud.csv", "x,y,z\n1,2,3\n", four), "cloud.csv:2: expected 4 coordinates, got 3");
+  EXPECT_THAT(ReadGood("cloud.xyz", "1 2 3 4 255\n", four).points, ElementsAre(1, 2, 3, 4));
+  EXPECT_EQ(ReadBad("cloud.xyz", "1 2 3\n", four), "cloud.xyz:1: expected 4 coordinates, got 3");
+}
+
 TEST_F(ReadCloudTest, XyzOfChemistry) {
   const PointCloud cloud = ReadGood("water.xyz", "3\n\nO 0 0 0.1\nH 0 0.7 -0.4\n 0 -0.7 -0.4\n");
   EXPECT_THAT(cloud.points, ElementsAre(0, 0, 0.1, 0, 0.7, -0.4, 0, -0.7, -0.4));
@@ -100,7 +117,8 @@ TEST_F(ReadCloudTest, NodeErrors) {
   EXPECT_EQ(ReadBad("a.node", ""), "a.node:1: expected a header, got an empty file");
   EXPECT_THAT(ReadBad("a.node", "2\n"), HasSubstr("a.node:1: expected the dimension"));
   EXPECT_THAT(ReadBad("a.node", "-2 2 0 0\n"), HasSubstr("a.node:1: expected the number of points"));
-  EXPECT_THAT(ReadBad("a.node", "1 4 0 0\n0 1 2 3 4\n"), HasSubstr("a.node:1: expected dimension 2 or 3, got 4"));
+  EXPECT_THAT(ReadBad("a.node", "1 7 0 0\n0 1 2 3 4 5 6 7\n"),
+              HasSubstr("a.node:1: expected a dimension from 2 to 6, got 7"));
   EXPECT_EQ(ReadBad("a.node", "4000000000 3 0 0\n0 1 2 3\n"),
             "a.node:2: expected 4000000000 points, as the header says, got 1");
   EXPECT_EQ(ReadBad("a.node", "1 2 0 0\n5 1 2\n"), "a.node:2: expected index 0 or 1, got \"5\"");
@@ -120,9 +138,9 @@ TEST_F(ReadCloudTest, ErrorsNameFileAndLine) {
   EXPECT_EQ(ReadBad("cloud.csv", "-inf,2\n"), "cloud.csv:1: field 1: expected a finite number, got \"-inf\"");
   EXPECT_THAT(ReadBad("cloud.csv", "1,1e999\n"),
               HasSubstr("cloud.csv:1: field 2: expected a number of magnitude below"));
-  EXPECT_EQ(ReadBad("cloud.csv", "1\n2\n"), "cloud.csv:1: expected 2 or 3 coordinates, got 1");
-  EXPECT_EQ(ReadBad("cloud.csv", "1,2,3,4\n"),
-            "cloud.csv:1: expected 2 or 3 coordinates, got 4 (fields are separated by \",\")");
+  EXPECT_EQ(ReadBad("cloud.csv", "1\n2\n"), "cloud.csv:1: expected 2 to 6 coordinates, got 1");
+  EXPECT_EQ(ReadBad("cloud.csv", "1,2,3,4,5,6,7\n"),
+            "cloud.csv:1: expected 2 to 6 coordinates, got 7 (fields are separated by \",\")");
   EXPECT_THAT(ReadBad("cloud.csv", std::string_view("1,2\n\0\x01,3\n", 10)), HasSubstr("got \"\\x00\\x01\""));
 }
 
@@ -143,7 +161,7 @@ TEST_F(ReadCloudTest, FormatByNameAndByExtension) {
               HasSubstr("no format is known by the extension \".stl\"; expected one of .csv"));
   EXPECT_THAT(ReadBad("cloud", "1 2\n"), HasSubstr("no format is known by the extension \"\""));
   EXPECT_THAT(ReadBad("cloud.csv", "1 2\n", {.format = "las", .dimension = 0}),
-              HasSubstr("expected one of csv, xyz, node"));
+              HasSubstr("expected one of csv, xyz, node, npy"));
 }
 
 TEST_F(ReadCloudTest, FilesThatCannotBeRead) {

@@ -1,6 +1,6 @@
 // Every reader of clouds, on any text.
 //
-// Input: a digit from 0 to 8, that is the format (csv, xyz, node) + 3 * the dimension that is asked for (any, 2, 3); the file.
+// Input: a character that chooses among kChoices, '0' the first, '1' the second and so on; the file.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -20,16 +20,30 @@ namespace {
 using formats::CloudOptions;
 using formats::PointCloud;
 
-constexpr std::array kFormats = {"csv", "xyz", "node"};
-constexpr std::array kDimensions = {0, 2, 3};
+// A format, and the dimension that is asked for.
+struct Choice {
+  const char* format;
+  int dimension;
+};
+constexpr std::array kChoices = {
+    Choice{"csv", 0}, Choice{"xyz", 0}, Choice{"node", 0}, Choice{"csv", 2}, Choice{"xyz", 2}, Choice{"node", 2},
+    Choice{"csv", 3}, Choice{"xyz", 3}, Choice{"node", 3}, Choice{"npy", 0}, Choice{"npy", 2}, Choice{"npy", 5},
+    Choice{"csv", 4}, Choice{"xyz", 4}, Choice{"node", 4}, Choice{"xyz", 6},
+};
 
 void RequireCloud(const PointCloud& cloud, const CloudOptions& options) {
-  Require(cloud.dimension == 2 || cloud.dimension == 3, "the dimension is 2 or 3");
+  Require(cloud.dimension >= formats::kMinDimension && cloud.dimension <= formats::kMaxDimension,
+          "the dimension is one of those that there are");
   Require(options.dimension == 0 || cloud.dimension == options.dimension, "the dimension is the one asked for");
   Require(cloud.points.size() == cloud.size() * cloud.dimension, "every point has all its coordinates");
   for (const double x : cloud.points) {
     Require(std::isfinite(x), "coordinates are finite");
   }
+  if (options.format == "npy") {
+    Require(cloud.lines.size() == 0, "an array has no lines");
+    return;
+  }
+  Require(cloud.lines.size() == cloud.size(), "every point has a line");
   uint64_t line = 0;
   for (uint64_t point = 0; point < cloud.size(); ++point) {
     Require(cloud.lines.LineOf(point) > line, "every point has a line of its own, in order");
@@ -53,9 +67,8 @@ std::string ToCsv(const PointCloud& cloud) {
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace wellspace;
   fuzz::ByteReader bytes(data, size);
-  const size_t choice = static_cast<uint8_t>(bytes.Next() - '0') % 9;
-  const formats::CloudOptions options = {.format = fuzz::kFormats[choice % 3],
-                                         .dimension = fuzz::kDimensions[choice / 3]};
+  const fuzz::Choice& choice = fuzz::kChoices[static_cast<uint8_t>(bytes.Next() - '0') % fuzz::kChoices.size()];
+  const formats::CloudOptions options = {.format = choice.format, .dimension = choice.dimension};
   const fuzz::ScratchFolder& folder = fuzz::ScratchFolder::Get();
   const auto cloud = formats::ReadCloud(folder.Write("cloud", bytes.TakeText()), options);
   if (!cloud.ok()) {

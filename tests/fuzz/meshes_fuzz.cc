@@ -1,9 +1,11 @@
 // Every reader of meshes, on any text, and the decoder of VTK's binary arrays.
 //
-// Input: a digit from 0 to 2, then
+// Input: a digit from 0 to 4, then
 //   0  a .vtu file;
 //   1  a .node file, '|', the .ele file;
-//   2  a byte whose lowest bits say compressed, big-endian, eight-byte header; the bytes of an array before they were put into base64.
+//   2  a byte whose lowest bits say compressed, big-endian, eight-byte header; the bytes of an array before they were put into base64;
+//   3  a .npz file;
+//   4  two bytes, the length of the first array of a .npz in little-endian order; that array and the second one, each a .npy.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -11,9 +13,12 @@
 #include <string_view>
 #include <vector>
 
+#include "client/formats/cloud.h"
+#include "client/formats/output_file.h"
 #include "client/formats/read_mesh.h"
 #include "client/formats/vtk_array.h"
 #include "client/formats/write_mesh.h"
+#include "client/formats/zip_file.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/fuzz/scratch_folder.h"
 
@@ -32,7 +37,8 @@ bool AreSameBits(const std::vector<T>& a, const std::vector<T>& b) {
 }
 
 void RequireMesh(const Mesh& mesh) {
-  Require(mesh.dimension == 2 || mesh.dimension == 3, "the dimension is 2 or 3");
+  Require(mesh.dimension >= formats::kMinDimension && mesh.dimension <= formats::kMaxDimension,
+          "the dimension is one of those that there are");
   Require(mesh.points.size() % mesh.dimension == 0, "every vertex has all its coordinates");
   Require(mesh.simplices.size() % (mesh.dimension + 1) == 0, "every simplex has all its vertices");
   for (const uint32_t vertex : mesh.simplices) {
@@ -70,6 +76,25 @@ void ReadNodeAndEle(std::string_view both) {
   ReadWriteRead(folder.Write("mesh.node", both.substr(0, split)), folder.Path("again.node"));
 }
 
+void ReadNpz(std::string_view archive) {
+  const ScratchFolder& folder = ScratchFolder::Get();
+  ReadWriteRead(folder.Write("mesh.npz", archive), folder.Path("again.npz"));
+}
+
+// The checksums of an archive keep the fuzzer out: this makes them.
+void ReadArrays(std::string_view points, std::string_view simplices) {
+  const ScratchFolder& folder = ScratchFolder::Get();
+  absl::StatusOr<formats::OutputFile> output = formats::OutputFile::Create(folder.Path("mesh.npz"));
+  Require(output.ok(), "a file can be written:", output.status().ToString());
+  formats::ZipWriter archive(*output);
+  archive.Begin("points.npy", points.size());
+  archive.Write(points);
+  archive.Begin("simplices.npy", simplices.size());
+  archive.Write(simplices);
+  Require(archive.Finish().ok() && output->Commit().ok(), "an archive can be written");
+  ReadWriteRead(folder.Path("mesh.npz"), folder.Path("again.npz"));
+}
+
 void DecodeArray(uint8_t flags, std::string_view array) {
   const formats::VtkEncoding encoding = {
       .compressed = (flags & 1) != 0, .big_endian = (flags & 2) != 0, .header_word_bytes = (flags & 4) != 0 ? 8 : 4};
@@ -87,16 +112,27 @@ void DecodeArray(uint8_t flags, std::string_view array) {
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   wellspace::fuzz::ByteReader bytes(data, size);
-  switch (static_cast<uint8_t>(bytes.Next() - '0') % 3) {
+  switch (static_cast<uint8_t>(bytes.Next() - '0') % 5) {
     case 0:
       wellspace::fuzz::ReadVtu(bytes.TakeText());
       break;
     case 1:
       wellspace::fuzz::ReadNodeAndEle(bytes.TakeText());
       break;
-    default: {
+    case 2: {
       const uint8_t flags = bytes.Next();
       wellspace::fuzz::DecodeArray(flags, bytes.TakeText());
+      break;
+    }
+    case 3:
+      wellspace::fuzz::ReadNpz(bytes.TakeText());
+      break;
+    default: {
+      size_t length = bytes.Next();
+      length += size_t{256} * bytes.Next();
+      const std::string_view arrays = bytes.TakeText();
+      length = std::min(length, arrays.size());
+      wellspace::fuzz::ReadArrays(arrays.substr(0, length), arrays.substr(length));
     }
   }
   return 0;
