@@ -78,14 +78,19 @@ absl::Status CheckSizeBox(const SizeBox& size, size_t index, int dimension) {
   const auto refuse = [index](const auto&... text) {
     return absl::InvalidArgumentError(absl::StrCat("size_boxes[", index, "]", text...));
   };
-  if (size.low.size() != static_cast<size_t>(dimension) || size.high.size() != static_cast<size_t>(dimension)) {
-    return refuse(": ", size.low.size(), " low and ", size.high.size(), " high coordinates; ", dimension,
-                  " of each are needed");
+  if (size.low.size() != static_cast<size_t>(dimension)) {
+    return refuse(".low: ", size.low.size(), " coordinates; ", dimension, " are needed");
+  }
+  if (size.high.size() != static_cast<size_t>(dimension)) {
+    return refuse(".high: ", size.high.size(), " coordinates; ", dimension, " are needed");
   }
   for (int i = 0; i < dimension; ++i) {
-    if (!(std::isfinite(size.low[i]) && std::isfinite(size.high[i]) && size.low[i] <= size.high[i])) {
-      return refuse(": along axis ", i, " it goes from ", size.low[i], " to ", size.high[i],
-                    "; finite numbers are needed, the low one not above the high one");
+    if (!std::isfinite(size.low[i])) {
+      return refuse(".low[", i, "]: ", size.low[i], " is not allowed; a finite number is");
+    }
+    if (!(std::isfinite(size.high[i]) && size.low[i] <= size.high[i])) {
+      return refuse(".high[", i, "]: ", size.high[i], " is not allowed; a finite number not below the low one, ",
+                    size.low[i], ", is");
     }
   }
   if (!(size.max_circumradius > 0 && std::isfinite(size.max_circumradius))) {
