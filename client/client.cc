@@ -35,6 +35,11 @@ absl::StatusOr<Mesh> Client::MeshPoints(const MeshOptions& options, std::span<co
   return connection_->MeshPoints(options, points, on_progress, std::move(stop));
 }
 
+absl::StatusOr<MeshEstimate> Client::EstimateMesh(const MeshOptions& options, std::span<const double> points,
+                                                  std::stop_token stop) {
+  return connection_->EstimateMesh(options, points, std::move(stop));
+}
+
 absl::StatusOr<ServerInfo> Client::GetServerInfo() { return connection_->GetServerInfo(); }
 
 absl::StatusOr<Client> Connect(const std::string& address) {

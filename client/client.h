@@ -20,10 +20,23 @@ namespace wellspace::client {
 
 class Connection;
 
+// What `rho` bounds; see the proto's Criterion.
+enum class Criterion { kRadiusEdge, kWellSpaced };
+
+// A box in which simplices are small; see the proto's SizeBox.
+struct SizeBox {
+  std::vector<double> low;
+  std::vector<double> high;
+  double max_circumradius = 0;
+};
+
 // What to mesh and how. Zero or empty means the server's default, as the comments of the proto's MeshParameters say.
 struct MeshOptions {
   int dimension = 3;
   double rho = 0;
+  Criterion criterion = Criterion::kRadiusEdge;
+  double max_circumradius = 0;
+  std::vector<SizeBox> size_boxes;
   std::vector<double> domain_low;
   std::vector<double> domain_high;
   double margin = 0.25;
@@ -46,7 +59,7 @@ struct MeshStatistics {
   uint64_t vertices = 0;
   uint64_t simplices = 0;
   double max_radius_edge = 0;
-  double min_angle_deg = 0;               // 3-D: smallest dihedral angle
+  double min_angle_deg = 0;               // above 2-D: smallest dihedral angle
   std::map<std::string, double> seconds;  // by phase, and "total"
   uint64_t peak_memory_bytes = 0;
   std::map<std::string, uint64_t> counters;
@@ -60,6 +73,14 @@ struct Mesh {
   std::vector<uint32_t> simplices;     // simplex_count x (dimension + 1), row-major
   std::vector<uint32_t> input_vertex;  // per input point: the vertex it became
   MeshStatistics statistics;
+};
+
+// How large a mesh would be.
+struct MeshEstimate {
+  uint64_t vertices = 0;
+  uint64_t simplices = 0;
+  uint64_t memory_bytes = 0;  // most that the server would take at once
+  uint64_t tree_leaves = 0;
 };
 
 struct ServerInfo {
@@ -86,11 +107,20 @@ class Client {
                                   const std::function<void(const Progress&)>& on_progress = nullptr,
                                   std::stop_token stop = {});
 
+  // Estimates the mesh that MeshPoints would make of the same arguments.
+  // Errors:     as of MeshPoints.
+  absl::StatusOr<MeshEstimate> EstimateMesh(const MeshOptions& options, std::span<const double> points,
+                                            std::stop_token stop = {});
+
   absl::StatusOr<ServerInfo> GetServerInfo();
 
  private:
   std::shared_ptr<Connection> connection_;
 };
+
+// The path of the field that the server blames for an error, from the request on, such as "parameters.rho"; empty when it
+// blames none.
+std::string BlamedField(const absl::Status& status);
 
 // Connects to HOST:PORT in plain text. Lazy: errors show in the first call.
 absl::StatusOr<Client> Connect(const std::string& address);

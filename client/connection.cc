@@ -6,8 +6,10 @@
 #include <utility>
 
 #include "absl/strings/cord.h"
+#include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "client/mesh_assembler.h"
+#include "google/rpc/error_details.pb.h"
 #include "google/rpc/status.pb.h"
 #include "grpcpp/channel.h"
 #include "grpcpp/client_context.h"
@@ -62,6 +64,15 @@ v1::MeshPointsRequest ParametersRequest(const MeshOptions& options) {
   v1::MeshParameters* parameters = request.mutable_parameters();
   parameters->set_dimension(options.dimension);
   parameters->set_rho(options.rho);
+  parameters->set_criterion(options.criterion == Criterion::kWellSpaced ? v1::CRITERION_WELL_SPACED
+                                                                        : v1::CRITERION_RADIUS_EDGE);
+  parameters->set_max_circumradius(options.max_circumradius);
+  for (const SizeBox& box : options.size_boxes) {
+    v1::SizeBox* message = parameters->add_size_boxes();
+    message->mutable_low()->Assign(box.low.begin(), box.low.end());
+    message->mutable_high()->Assign(box.high.begin(), box.high.end());
+    message->set_max_circumradius(box.max_circumradius);
+  }
   if (!options.domain_low.empty() || !options.domain_high.empty()) {
     parameters->mutable_domain()->mutable_low()->Assign(options.domain_low.begin(), options.domain_low.end());
     parameters->mutable_domain()->mutable_high()->Assign(options.domain_high.begin(), options.domain_high.end());
@@ -73,7 +84,8 @@ v1::MeshPointsRequest ParametersRequest(const MeshOptions& options) {
 }
 
 // Sends everything and half-closes. Stops early when the call has ended; its status says why.
-void Upload(const MeshOptions& options, std::span<const double> points, MeshPointsStream& stream) {
+template <typename Stream>
+void Upload(const MeshOptions& options, std::span<const double> points, Stream& stream) {
   if (!stream.Write(ParametersRequest(options))) {
     return;
   }
@@ -91,6 +103,20 @@ void Upload(const MeshOptions& options, std::span<const double> points, MeshPoin
   stream.WritesDone();
 }
 
+void SetDeadline(const MeshOptions& options, grpc::ClientContext& context) {
+  if (options.timeout < absl::InfiniteDuration()) {
+    context.set_deadline(absl::ToChronoTime(absl::Now() + options.timeout));
+  }
+}
+
+// The status of a call that the caller could cancel by `stop`.
+absl::Status StatusOf(const grpc::Status& status, const std::stop_token& stop) {
+  if (status.error_code() == grpc::StatusCode::CANCELLED && stop.stop_requested()) {
+    return absl::CancelledError("cancelled by the caller");
+  }
+  return FromGrpcStatus(status);
+}
+
 class GrpcConnection final : public Connection {
  public:
   explicit GrpcConnection(std::shared_ptr<grpc::Channel> channel)
@@ -99,6 +125,8 @@ class GrpcConnection final : public Connection {
   absl::StatusOr<Mesh> MeshPoints(const MeshOptions& options, std::span<const double> points,
                                   const std::function<void(const Progress&)>& on_progress,
                                   std::stop_token stop) override;
+  absl::StatusOr<MeshEstimate> EstimateMesh(const MeshOptions& options, std::span<const double> points,
+                                            std::stop_token stop) override;
   absl::StatusOr<ServerInfo> GetServerInfo() override;
 
  private:
@@ -109,9 +137,7 @@ absl::StatusOr<Mesh> GrpcConnection::MeshPoints(const MeshOptions& options, std:
                                                 const std::function<void(const Progress&)>& on_progress,
                                                 std::stop_token stop) {
   grpc::ClientContext context;
-  if (options.timeout < absl::InfiniteDuration()) {
-    context.set_deadline(absl::ToChronoTime(absl::Now() + options.timeout));
-  }
+  SetDeadline(options, context);
   const std::unique_ptr<MeshPointsStream> stream = stub_->MeshPoints(&context);
   std::stop_callback cancel(stop, [&context] { context.TryCancel(); });
 
@@ -138,13 +164,27 @@ absl::StatusOr<Mesh> GrpcConnection::MeshPoints(const MeshOptions& options, std:
   if (!damage.ok()) {
     return damage;
   }
-  if (status.error_code() == grpc::StatusCode::CANCELLED && stop.stop_requested()) {
-    return absl::CancelledError("cancelled by the caller");
-  }
   if (!status.ok()) {
-    return FromGrpcStatus(status);
+    return StatusOf(status, stop);
   }
   return assembler.Finish();
+}
+
+absl::StatusOr<MeshEstimate> GrpcConnection::EstimateMesh(const MeshOptions& options, std::span<const double> points,
+                                                          std::stop_token stop) {
+  grpc::ClientContext context;
+  SetDeadline(options, context);
+  v1::EstimateMeshResponse response;
+  const std::unique_ptr<grpc::ClientWriter<v1::MeshPointsRequest>> stream = stub_->EstimateMesh(&context, &response);
+  std::stop_callback cancel(stop, [&context] { context.TryCancel(); });
+  Upload(options, points, *stream);
+  if (const grpc::Status status = stream->Finish(); !status.ok()) {
+    return StatusOf(status, stop);
+  }
+  return MeshEstimate{.vertices = response.vertices(),
+                      .simplices = response.simplices(),
+                      .memory_bytes = response.memory_bytes(),
+                      .tree_leaves = response.tree_leaves()};
 }
 
 absl::StatusOr<ServerInfo> GrpcConnection::GetServerInfo() {
@@ -165,6 +205,17 @@ absl::StatusOr<ServerInfo> GrpcConnection::GetServerInfo() {
 }
 
 }  // namespace
+
+std::string BlamedField(const absl::Status& status) {
+  google::rpc::BadRequest bad_request;
+  const std::string type = absl::StrCat("type.googleapis.com/", bad_request.GetTypeName());
+  const absl::optional<absl::Cord> payload = status.GetPayload(type);
+  if (!payload.has_value() || !bad_request.ParseFromString(std::string(*payload)) ||
+      bad_request.field_violations().empty()) {
+    return "";
+  }
+  return bad_request.field_violations(0).field();
+}
 
 std::shared_ptr<Connection> MakeConnection(std::shared_ptr<grpc::Channel> channel) {
   return std::make_shared<GrpcConnection>(std::move(channel));

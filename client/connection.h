@@ -30,6 +30,8 @@ class Connection {
   virtual absl::StatusOr<Mesh> MeshPoints(const MeshOptions& options, std::span<const double> points,
                                           const std::function<void(const Progress&)>& on_progress,
                                           std::stop_token stop) = 0;
+  virtual absl::StatusOr<MeshEstimate> EstimateMesh(const MeshOptions& options, std::span<const double> points,
+                                                    std::stop_token stop) = 0;
   virtual absl::StatusOr<ServerInfo> GetServerInfo() = 0;
 };
 

@@ -209,6 +209,14 @@ class Mesher {
 // Errors:     those of its parts.
 absl::StatusOr<Mesh> MeshPoints(const MeshParameters& parameters, std::span<const double> points, RunContext& context);
 
+// Estimates the mesh that MeshPoints would make, without making it.
+//
+// Shapes:     points: n x dimension, row-major.
+// Errors:     those of MeshPoints about parameters, points and the context.
+// Threads:    thread-safe, as MeshPoints.
+absl::StatusOr<MeshEstimate> EstimateMesh(const MeshParameters& parameters, std::span<const double> points,
+                                          RunContext& context);
+
 }  // namespace wellspace::core
 
 #endif  // WELLSPACE_CORE_MESHER_H_

@@ -13,10 +13,42 @@ grpc::Status InvalidParameter(const std::string& message, const std::string& fie
   return MakeError(v1::ERROR_REASON_INVALID_PARAMETERS, message, absl::StrCat("parameters.", field));
 }
 
-// Validates what is set in `parameters` so far, blaming `field` as the one that was set last.
+// The path that the core's `message` begins with, up to its colon, if it leads deeper into `field`; otherwise `field`.
+std::string DeepestField(const std::string& message, const std::string& field) {
+  const std::string path = message.substr(0, message.find(':'));
+  const bool is_deeper = path.size() > field.size() && path.compare(0, field.size(), field) == 0 &&
+                         (path[field.size()] == '[' || path[field.size()] == '.');
+  return is_deeper ? path : field;
+}
+
+// Validates what is set in `parameters` so far, blaming `field`, or a part of it, as the one that was set last.
 grpc::Status Validate(const core::MeshParameters& parameters, const std::string& field) {
   const absl::Status status = core::ValidateParameters(parameters);
-  return status.ok() ? grpc::Status::OK : InvalidParameter(std::string(status.message()), field);
+  if (status.ok()) {
+    return grpc::Status::OK;
+  }
+  const std::string message(status.message());
+  return InvalidParameter(message, DeepestField(message, field));
+}
+
+bool CriterionFromProto(v1::Criterion criterion, core::Criterion* result) {
+  switch (criterion) {
+    case v1::CRITERION_UNSPECIFIED:
+    case v1::CRITERION_RADIUS_EDGE:
+      *result = core::Criterion::kRadiusEdge;
+      return true;
+    case v1::CRITERION_WELL_SPACED:
+      *result = core::Criterion::kWellSpaced;
+      return true;
+    default:
+      return false;  // of a newer client
+  }
+}
+
+core::SizeBox SizeBoxFromProto(const v1::SizeBox& message) {
+  return core::SizeBox{.low = {message.low().begin(), message.low().end()},
+                       .high = {message.high().begin(), message.high().end()},
+                       .max_circumradius = message.max_circumradius()};
 }
 
 v1::MeshStatistics StatisticsToProto(const core::MeshStatistics& statistics) {
@@ -63,6 +95,13 @@ grpc::Status ParametersFromProto(const v1::MeshParameters& message, const Servic
   if (grpc::Status status = Validate(*parameters, "dimension"); !status.ok()) {
     return status;
   }
+  if (!CriterionFromProto(message.criterion(), &parameters->criterion)) {
+    return InvalidParameter(
+        absl::StrCat("criterion: ", static_cast<int>(message.criterion()), " is not known; ",
+                     static_cast<int>(v1::CRITERION_RADIUS_EDGE), " (radius-edge) and ",
+                     static_cast<int>(v1::CRITERION_WELL_SPACED), " (well-spaced) are, and 0 for the default"),
+        "criterion");
+  }
   parameters->rho = message.rho();
   if (grpc::Status status = Validate(*parameters, "rho"); !status.ok()) {
     return status;
@@ -86,6 +125,17 @@ grpc::Status ParametersFromProto(const v1::MeshParameters& message, const Servic
     if (grpc::Status status = Validate(*parameters, "domain"); !status.ok()) {
       return status;
     }
+  }
+  parameters->max_circumradius = message.max_circumradius();
+  if (grpc::Status status = Validate(*parameters, "max_circumradius"); !status.ok()) {
+    return status;
+  }
+  // At once: one by one would look at many boxes many times.
+  for (const v1::SizeBox& box : message.size_boxes()) {
+    parameters->size_boxes.push_back(SizeBoxFromProto(box));
+  }
+  if (grpc::Status status = Validate(*parameters, "size_boxes"); !status.ok()) {
+    return status;
   }
   if (message.threads() != 0) {
     parameters->threads = message.threads();
@@ -115,6 +165,15 @@ v1::MeshMetadata MetadataToProto(const core::Mesh& mesh, uint64_t chunk_count) {
   metadata.set_chunk_count(chunk_count);
   *metadata.mutable_statistics() = StatisticsToProto(mesh.statistics);
   return metadata;
+}
+
+v1::EstimateMeshResponse EstimateToProto(const core::MeshEstimate& estimate) {
+  v1::EstimateMeshResponse message;
+  message.set_vertices(estimate.vertices);
+  message.set_simplices(estimate.simplices);
+  message.set_memory_bytes(estimate.memory_bytes);
+  message.set_tree_leaves(estimate.tree_leaves);
+  return message;
 }
 
 v1::Phase PhaseToProto(core::Phase phase) {

@@ -23,6 +23,8 @@ grpc::Status ParametersFromProto(const v1::MeshParameters& message, const Servic
 // The metadata of `mesh`, to be followed by `chunk_count` chunks.
 v1::MeshMetadata MetadataToProto(const core::Mesh& mesh, uint64_t chunk_count);
 
+v1::EstimateMeshResponse EstimateToProto(const core::MeshEstimate& estimate);
+
 v1::Phase PhaseToProto(core::Phase phase);
 
 }  // namespace wellspace::server

@@ -3,17 +3,22 @@
 #include <utility>
 
 #include "core/mesher.h"
+#include "server/estimate_mesh_call.h"
+#include "server/mesh_points_call.h"
 #include "server/version.h"
 
 namespace wellspace::server {
 
-MeshingService::MeshingService(const ServiceOptions& options, std::shared_ptr<spdlog::logger> log, Mesher mesher)
+MeshingService::MeshingService(const ServiceOptions& options, std::shared_ptr<spdlog::logger> log, Mesher mesher,
+                               Estimator estimator)
     : options_(options),
       log_(std::move(log)),
       mesher_(std::move(mesher)),
+      estimator_(std::move(estimator)),
       jobs_(options_.workers, options_.max_queued_jobs),
       environment_{.options = options_,
                    .mesher = mesher_,
+                   .estimator = estimator_,
                    .jobs = jobs_,
                    .background = background_,
                    .calls = calls_,
@@ -22,6 +27,11 @@ MeshingService::MeshingService(const ServiceOptions& options, std::shared_ptr<sp
 grpc::ServerBidiReactor<v1::MeshPointsRequest, v1::MeshPointsResponse>* MeshingService::MeshPoints(
     grpc::CallbackServerContext* context) {
   return MeshPointsCall::Start(environment_, context);
+}
+
+grpc::ServerReadReactor<v1::MeshPointsRequest>* MeshingService::EstimateMesh(grpc::CallbackServerContext* context,
+                                                                             v1::EstimateMeshResponse* response) {
+  return EstimateMeshCall::Start(environment_, context, response);
 }
 
 grpc::ServerUnaryReactor* MeshingService::GetServerInfo(grpc::CallbackServerContext* context,

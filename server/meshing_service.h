@@ -6,8 +6,8 @@
 
 #include "server/background.h"
 #include "server/call_registry.h"
+#include "server/cloud_call.h"
 #include "server/jobs.h"
-#include "server/mesh_points_call.h"
 #include "server/options.h"
 #include "spdlog/logger.h"
 #include "wellspace/v1/meshing.grpc.pb.h"
@@ -20,20 +20,24 @@ namespace wellspace::server {
 // REQUIRES:   the gRPC server has ended all calls before this is destroyed.
 class MeshingService final : public v1::MeshingService::CallbackService {
  public:
-  MeshingService(const ServiceOptions& options, std::shared_ptr<spdlog::logger> log, Mesher mesher);
+  MeshingService(const ServiceOptions& options, std::shared_ptr<spdlog::logger> log, Mesher mesher,
+                 Estimator estimator);
 
   grpc::ServerBidiReactor<v1::MeshPointsRequest, v1::MeshPointsResponse>* MeshPoints(
       grpc::CallbackServerContext* context) override;
+  grpc::ServerReadReactor<v1::MeshPointsRequest>* EstimateMesh(grpc::CallbackServerContext* context,
+                                                               v1::EstimateMeshResponse* response) override;
   grpc::ServerUnaryReactor* GetServerInfo(grpc::CallbackServerContext* context, const v1::GetServerInfoRequest* request,
                                           v1::GetServerInfoResponse* response) override;
 
-  // The calls of MeshPoints that are under way.
+  // The calls that take a cloud and are under way.
   CallRegistry& calls() { return calls_; }
 
  private:
   const ServiceOptions options_;
   const std::shared_ptr<spdlog::logger> log_;
   const Mesher mesher_;
+  const Estimator estimator_;
   CallRegistry calls_;
   // Jobs end before the background thread, to which they post.
   Background background_;

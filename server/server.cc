@@ -33,7 +33,7 @@ void EnableHealthAndReflection() {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& options, std::shared_ptr<spdlog::logger> log,
-                                                      Mesher mesher) {
+                                                      Mesher mesher, Estimator estimator) {
   EnableHealthAndReflection();
   grpc::ServerBuilder builder;
   builder.SetMaxReceiveMessageSize(kMaxRequestBytes);
@@ -56,7 +56,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
     builder.AddListeningPort(address.ToString(), grpc::InsecureServerCredentials(), &port);
   }
 
-  std::unique_ptr<Server> server(new Server(options, std::move(log), std::move(mesher)));
+  std::unique_ptr<Server> server(new Server(options, std::move(log), std::move(mesher), std::move(estimator)));
   builder.RegisterService(&server->service_);
   server->server_ = builder.BuildAndStart();
   if (server->server_ == nullptr || (!options.listen.empty() && port == 0)) {

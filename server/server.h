@@ -28,13 +28,14 @@ struct ServerOptions {
 // Thread safety: thread-safe.
 class Server {
  public:
-  // Starts to serve. Tests put another mesher in the place of the core.
+  // Starts to serve. Tests put other work in the place of the core's.
   //
   // Errors:     INVALID_ARGUMENT (listen), FAILED_PRECONDITION (a remote listener without insecure_remote), UNAVAILABLE
   //             (the address cannot be listened on).
   static absl::StatusOr<std::unique_ptr<Server>> Start(const ServerOptions& options,
                                                        std::shared_ptr<spdlog::logger> log,
-                                                       Mesher mesher = core::MeshPoints);
+                                                       Mesher mesher = core::MeshPoints,
+                                                       Estimator estimator = core::EstimateMesh);
 
   // Shuts down at once.
   ~Server();
@@ -54,8 +55,8 @@ class Server {
   void Shutdown(absl::Duration grace);
 
  private:
-  Server(const ServerOptions& options, std::shared_ptr<spdlog::logger> log, Mesher mesher)
-      : service_(options.service, std::move(log), std::move(mesher)) {}
+  Server(const ServerOptions& options, std::shared_ptr<spdlog::logger> log, Mesher mesher, Estimator estimator)
+      : service_(options.service, std::move(log), std::move(mesher), std::move(estimator)) {}
 
   MeshingService service_;
   std::string address_;

@@ -33,9 +33,12 @@ using Stream = grpc::ServerReaderWriter<v1::MeshPointsResponse, v1::MeshPointsRe
 // Answers MeshPoints as the test says.
 class FakeServer final : public v1::MeshingService::Service {
  public:
+  using Estimator = std::function<grpc::Status(grpc::ServerContext&, grpc::ServerReader<v1::MeshPointsRequest>&,
+                                               v1::EstimateMeshResponse&)>;
   using Behaviour = std::function<grpc::Status(grpc::ServerContext&, Stream&)>;
 
-  explicit FakeServer(Behaviour behaviour) : behaviour_(std::move(behaviour)) {
+  explicit FakeServer(Behaviour behaviour, Estimator estimator = nullptr)
+      : behaviour_(std::move(behaviour)), estimator_(std::move(estimator)) {
     grpc::ServerBuilder builder;
     builder.RegisterService(this);
     server_ = builder.BuildAndStart();
@@ -44,6 +47,11 @@ class FakeServer final : public v1::MeshingService::Service {
 
   grpc::Status MeshPoints(grpc::ServerContext* context, Stream* stream) override {
     return behaviour_(*context, *stream);
+  }
+
+  grpc::Status EstimateMesh(grpc::ServerContext* context, grpc::ServerReader<v1::MeshPointsRequest>* stream,
+                            v1::EstimateMeshResponse* response) override {
+    return estimator_(*context, *stream, *response);
   }
 
   grpc::Status GetServerInfo(grpc::ServerContext* /*context*/, const v1::GetServerInfoRequest* /*request*/,
@@ -64,6 +72,7 @@ class FakeServer final : public v1::MeshingService::Service {
 
  private:
   const Behaviour behaviour_;
+  const Estimator estimator_;
   std::unique_ptr<grpc::Server> server_;
 };
 
@@ -75,7 +84,8 @@ struct Upload {
   bool in_order = true;
 };
 
-Upload ReadUpload(Stream& stream) {
+template <typename AnyStream>
+Upload ReadUpload(AnyStream& stream) {
   Upload upload;
   v1::MeshPointsRequest request;
   for (bool first = true; stream.Read(&request); first = false) {
@@ -159,6 +169,30 @@ TEST(Connection, SendsEverythingToTheBitInSmallRequests) {
                          [](double a, double b) { return std::bit_cast<uint64_t>(a) == std::bit_cast<uint64_t>(b); }));
 }
 
+TEST(Connection, SendsCriterionAndSizes) {
+  MeshOptions options = UnitSquare();
+  options.criterion = Criterion::kWellSpaced;
+  options.max_circumradius = 0.5;
+  options.size_boxes = {{.low = {0, 0.25}, .high = {1, 2}, .max_circumradius = 0.125},
+                        {.low = {3}, .high = {}, .max_circumradius = 0}};
+  std::promise<Upload> seen;
+  FakeServer server([&seen](grpc::ServerContext&, Stream& stream) {
+    seen.set_value(ReadUpload(stream));
+    return grpc::Status(grpc::StatusCode::NOT_FOUND, "");
+  });
+  EXPECT_FALSE(server.Client().MeshPoints(options, {}).ok());
+  const v1::MeshParameters parameters = seen.get_future().get().parameters;
+  EXPECT_EQ(parameters.criterion(), v1::CRITERION_WELL_SPACED);
+  EXPECT_EQ(parameters.max_circumradius(), 0.5);
+  ASSERT_EQ(parameters.size_boxes_size(), 2);
+  EXPECT_THAT(parameters.size_boxes(0).low(), ElementsAre(0, 0.25));
+  EXPECT_THAT(parameters.size_boxes(0).high(), ElementsAre(1, 2));
+  EXPECT_EQ(parameters.size_boxes(0).max_circumradius(), 0.125);
+  // The server judges, not the client.
+  EXPECT_THAT(parameters.size_boxes(1).low(), ElementsAre(3));
+  EXPECT_TRUE(parameters.size_boxes(1).high().empty());
+}
+
 TEST(Connection, LeavesOutTheDomainWhenThereIsNone) {
   std::promise<Upload> seen;
   FakeServer server([&seen](grpc::ServerContext&, Stream& stream) {
@@ -206,6 +240,23 @@ TEST(Connection, KeepsTheServersErrorAndItsDetails) {
   google::rpc::ErrorInfo returned;
   ASSERT_TRUE(returned.ParseFromString(std::string(*payload)));
   EXPECT_EQ(returned.reason(), info.reason());
+  EXPECT_EQ(BlamedField(status), "");
+}
+
+TEST(Connection, TellsTheFieldThatTheServerBlames) {
+  google::rpc::BadRequest bad_request;
+  bad_request.add_field_violations()->set_field("parameters.rho");
+  google::rpc::Status details;
+  details.add_details()->PackFrom(google::rpc::ErrorInfo());
+  details.add_details()->PackFrom(bad_request);
+  FakeServer server([&details](grpc::ServerContext&, Stream&) {
+    return grpc::Status(grpc::StatusCode::INVALID_ARGUMENT, "rho is bad", details.SerializeAsString());
+  });
+  EXPECT_EQ(BlamedField(server.Client().MeshPoints(UnitSquare(), {}).status()), "parameters.rho");
+  EXPECT_EQ(BlamedField(absl::OkStatus()), "");
+  absl::Status damaged = absl::InvalidArgumentError("");
+  damaged.SetPayload("type.googleapis.com/google.rpc.BadRequest", absl::Cord("\xff"));
+  EXPECT_EQ(BlamedField(damaged), "");
 }
 
 TEST(Connection, AServerThatFailsEarlyEndsTheUpload) {
@@ -289,6 +340,52 @@ TEST(Connection, TimeoutEndsTheCall) {
   }
 }
 
+TEST(Connection, EstimateSendsTheCloudAndReturnsTheFigures) {
+  const std::vector<double> points(2 * 200'001, 0.25);
+  std::promise<Upload> seen;
+  FakeServer server(WorkForever, [&seen](grpc::ServerContext&, auto& stream, v1::EstimateMeshResponse& response) {
+    seen.set_value(ReadUpload(stream));
+    response.set_vertices(uint64_t{1} << 40);
+    response.set_simplices(2);
+    response.set_memory_bytes(3);
+    response.set_tree_leaves(4);
+    return grpc::Status::OK;
+  });
+  const absl::StatusOr<MeshEstimate> estimate = server.Client().EstimateMesh(UnitSquare(), points);
+  ASSERT_TRUE(estimate.ok()) << estimate.status();
+  EXPECT_EQ(estimate->vertices, uint64_t{1} << 40);
+  EXPECT_EQ(estimate->simplices, 2u);
+  EXPECT_EQ(estimate->memory_bytes, 3u);
+  EXPECT_EQ(estimate->tree_leaves, 4u);
+  const Upload upload = seen.get_future().get();
+  EXPECT_TRUE(upload.in_order);
+  EXPECT_EQ(upload.parameters.dimension(), 2);
+  EXPECT_EQ(upload.points, points);
+}
+
+TEST(Connection, EstimateEndsByErrorStopAndTimeout) {
+  const auto refuse = [](grpc::ServerContext&, auto&, v1::EstimateMeshResponse&) {
+    return grpc::Status(grpc::StatusCode::RESOURCE_EXHAUSTED, "too many points");
+  };
+  FakeServer strict(WorkForever, refuse);
+  EXPECT_EQ(strict.Client().EstimateMesh(UnitSquare(), std::vector<double>(2 * 4'000'000)).status(),
+            absl::ResourceExhaustedError("too many points"));
+
+  std::stop_source stop;
+  FakeServer endless(WorkForever, [&stop](grpc::ServerContext& context, auto& stream, v1::EstimateMeshResponse&) {
+    ReadUpload(stream);
+    stop.request_stop();
+    while (!context.IsCancelled()) {
+    }
+    return grpc::Status::CANCELLED;
+  });
+  EXPECT_EQ(endless.Client().EstimateMesh(UnitSquare(), {}, stop.get_token()).status(),
+            absl::CancelledError("cancelled by the caller"));
+  MeshOptions options = UnitSquare();
+  options.timeout = absl::Milliseconds(50);
+  EXPECT_EQ(endless.Client().EstimateMesh(options, {}).status().code(), absl::StatusCode::kDeadlineExceeded);
+}
+
 TEST(Connection, GetServerInfo) {
   FakeServer server(WorkForever);
   const absl::StatusOr<ServerInfo> info = server.Client().GetServerInfo();
@@ -325,6 +422,8 @@ class MockConnection : public Connection {
               (const MeshOptions&, std::span<const double>, const std::function<void(const Progress&)>&,
                std::stop_token),
               (override));
+  MOCK_METHOD(absl::StatusOr<MeshEstimate>, EstimateMesh,
+              (const MeshOptions&, std::span<const double>, std::stop_token), (override));
   MOCK_METHOD(absl::StatusOr<ServerInfo>, GetServerInfo, (), (override));
 };
 
@@ -335,8 +434,11 @@ TEST(Client, PassesCallsToItsConnection) {
   EXPECT_CALL(*connection,
               MeshPoints(::testing::Field(&MeshOptions::dimension, 2), ::testing::SizeIs(2), testing::_, testing::_))
       .WillOnce(::testing::Return(absl::AbortedError("mesh")));
+  EXPECT_CALL(*connection, EstimateMesh(::testing::Field(&MeshOptions::dimension, 2), ::testing::SizeIs(2), testing::_))
+      .WillOnce(::testing::Return(absl::AbortedError("estimate")));
   EXPECT_CALL(*connection, GetServerInfo()).WillOnce(::testing::Return(absl::AbortedError("info")));
   EXPECT_EQ(client.MeshPoints(UnitSquare(), points).status(), absl::AbortedError("mesh"));
+  EXPECT_EQ(client.EstimateMesh(UnitSquare(), points).status(), absl::AbortedError("estimate"));
   EXPECT_EQ(client.GetServerInfo().status(), absl::AbortedError("info"));
 }
 

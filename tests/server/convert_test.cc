@@ -26,6 +26,17 @@ ServiceOptions SmallLimits() {
   return options;
 }
 
+// A box from `low` to `high` on each of three axes.
+v1::SizeBox& AddSizeBox(v1::MeshParameters& parameters, double low, double high, double max_circumradius) {
+  v1::SizeBox& box = *parameters.add_size_boxes();
+  for (int axis = 0; axis < 3; ++axis) {
+    box.add_low(low);
+    box.add_high(high);
+  }
+  box.set_max_circumradius(max_circumradius);
+  return box;
+}
+
 TEST(ParametersFromProto, FillsInDefaults) {
   v1::MeshParameters message;
   message.set_dimension(2);
@@ -37,6 +48,9 @@ TEST(ParametersFromProto, FillsInDefaults) {
   EXPECT_TRUE(parameters.domain_low.empty());
   EXPECT_EQ(parameters.threads, 1);
   EXPECT_EQ(parameters.max_vertices, 1000u);
+  EXPECT_EQ(parameters.criterion, core::Criterion::kRadiusEdge);
+  EXPECT_EQ(parameters.max_circumradius, 0);
+  EXPECT_TRUE(parameters.size_boxes.empty());
 }
 
 TEST(ParametersFromProto, TakesEveryField) {
@@ -45,6 +59,10 @@ TEST(ParametersFromProto, TakesEveryField) {
   message.set_margin(0.5);
   message.set_max_vertices(77);
   message.set_threads(2);
+  message.set_criterion(v1::CRITERION_WELL_SPACED);
+  message.set_max_circumradius(0.5);
+  AddSizeBox(message, 0.25, 0.75, 0.125);
+  AddSizeBox(message, -1, 2, 0.25);
   core::MeshParameters parameters;
   ASSERT_TRUE(ParametersFromProto(message, SmallLimits(), &parameters).ok());
   EXPECT_EQ(parameters.rho, 2.5);
@@ -53,6 +71,25 @@ TEST(ParametersFromProto, TakesEveryField) {
   EXPECT_THAT(parameters.domain_high, ElementsAre(1, 1, 1));
   EXPECT_EQ(parameters.max_vertices, 77u);
   EXPECT_EQ(parameters.threads, 2);
+  EXPECT_EQ(parameters.criterion, core::Criterion::kWellSpaced);
+  EXPECT_EQ(parameters.max_circumradius, 0.5);
+  ASSERT_EQ(parameters.size_boxes.size(), 2u);
+  EXPECT_THAT(parameters.size_boxes[0].low, ElementsAre(0.25, 0.25, 0.25));
+  EXPECT_THAT(parameters.size_boxes[0].high, ElementsAre(0.75, 0.75, 0.75));
+  EXPECT_EQ(parameters.size_boxes[0].max_circumradius, 0.125);
+  EXPECT_EQ(parameters.size_boxes[1].max_circumradius, 0.25);
+}
+
+TEST(ParametersFromProto, EveryDimensionHasItsDefaults) {
+  for (int dimension = core::kMinDimension; dimension <= core::kMaxDimension; ++dimension) {
+    v1::MeshParameters message = UnitCubeParameters(dimension);
+    core::MeshParameters parameters;
+    ASSERT_TRUE(ParametersFromProto(message, SmallLimits(), &parameters).ok()) << dimension;
+    message.set_rho(core::MinimumRho(dimension));
+    EXPECT_TRUE(ParametersFromProto(message, SmallLimits(), &parameters).ok()) << dimension;
+    message.set_rho(core::MinimumRho(dimension) * 0.999);
+    EXPECT_EQ(DetailsOf(ParametersFromProto(message, SmallLimits(), &parameters)).field, "parameters.rho") << dimension;
+  }
 }
 
 TEST(ParametersFromProto, TakesFewerThreadsThanAskedFor) {
@@ -113,6 +150,36 @@ INSTANTIATE_TEST_SUITE_P(
         BadParameters{"DomainNan", "parameters.domain", [](auto& p) { p.mutable_domain()->set_low(2, std::nan("")); }},
         BadParameters{"DomainInfinite", "parameters.domain",
                       [](auto& p) { p.mutable_domain()->set_high(0, kInfinity); }},
+        BadParameters{"DimensionSeven", "parameters.dimension", [](auto& p) { p.set_dimension(7); }},
+        BadParameters{"CriterionUnknown", "parameters.criterion",
+                      [](auto& p) { p.set_criterion(static_cast<v1::Criterion>(3)); }},
+        BadParameters{"CircumradiusNegative", "parameters.max_circumradius",
+                      [](auto& p) { p.set_max_circumradius(-1); }},
+        BadParameters{"CircumradiusNan", "parameters.max_circumradius",
+                      [](auto& p) { p.set_max_circumradius(std::nan("")); }},
+        BadParameters{"CircumradiusInfinite", "parameters.max_circumradius",
+                      [](auto& p) { p.set_max_circumradius(kInfinity); }},
+        BadParameters{"SizeBoxInverted", "parameters.size_boxes[2].high[1]",
+                      [](auto& p) {
+                        AddSizeBox(p, 0, 1, 0.5);
+                        AddSizeBox(p, 0, 1, 0.5);
+                        AddSizeBox(p, 0, 1, 0.5).set_high(1, -0.5);
+                      }},
+        BadParameters{"SizeBoxNan", "parameters.size_boxes[0].low[2]",
+                      [](auto& p) { AddSizeBox(p, 0, 1, 0.5).set_low(2, std::nan("")); }},
+        BadParameters{"SizeBoxInfinite", "parameters.size_boxes[0].high[0]",
+                      [](auto& p) { AddSizeBox(p, 0, 1, 0.5).set_high(0, kInfinity); }},
+        BadParameters{"SizeBoxShort", "parameters.size_boxes[0].low",
+                      [](auto& p) { AddSizeBox(p, 0, 1, 0.5).mutable_low()->RemoveLast(); }},
+        BadParameters{"SizeBoxLong", "parameters.size_boxes[1].high",
+                      [](auto& p) {
+                        AddSizeBox(p, 0, 1, 0.5);
+                        AddSizeBox(p, 0, 1, 0.5).add_high(1);
+                      }},
+        BadParameters{"SizeBoxWithoutSize", "parameters.size_boxes[0].max_circumradius",
+                      [](auto& p) { AddSizeBox(p, 0, 1, 0); }},
+        BadParameters{"SizeBoxSizeNan", "parameters.size_boxes[0].max_circumradius",
+                      [](auto& p) { AddSizeBox(p, 0, 1, std::nan("")); }},
         BadParameters{"ThreadsNegative", "parameters.threads", [](auto& p) { p.set_threads(-1); }},
         BadParameters{"MaxVerticesAboveTheServers", "parameters.max_vertices",
                       [](auto& p) { p.set_max_vertices(1001); }}),
@@ -231,6 +298,15 @@ TEST(MetadataToProto, CountsAndStatistics) {
   EXPECT_EQ(metadata.chunk_count(), 5u);
   EXPECT_EQ(metadata.statistics().counters().cuts(), 42u);
   EXPECT_EQ(metadata.statistics().seconds().total(), 0.5);
+}
+
+TEST(EstimateToProto, TakesEveryField) {
+  const v1::EstimateMeshResponse message =
+      EstimateToProto({.vertices = 1, .simplices = 2, .memory_bytes = 3, .tree_leaves = 4});
+  EXPECT_EQ(message.vertices(), 1u);
+  EXPECT_EQ(message.simplices(), 2u);
+  EXPECT_EQ(message.memory_bytes(), 3u);
+  EXPECT_EQ(message.tree_leaves(), 4u);
 }
 
 TEST(MakeError, EveryReasonHasACode) {

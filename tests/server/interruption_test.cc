@@ -6,6 +6,7 @@
 
 #include "absl/time/clock.h"
 #include "gtest/gtest.h"
+#include "server/mesh_points_call.h"
 #include "tests/server/patience.h"
 #include "tests/server/service_harness.h"
 

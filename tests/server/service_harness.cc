@@ -86,6 +86,13 @@ absl::StatusOr<core::Mesh> FakeMesher(const core::MeshParameters& parameters, st
   return MakeFakeMesh(parameters, points);
 }
 
+absl::StatusOr<core::MeshEstimate> FakeEstimator(const core::MeshParameters& parameters, std::span<const double> points,
+                                                 core::RunContext& /*context*/) {
+  const uint64_t count = points.size() / parameters.dimension;
+  return core::MeshEstimate{
+      .vertices = count, .simplices = 2 * count, .memory_bytes = 3 * count, .tree_leaves = 4 * count};
+}
+
 Mesher EndlessMesher(Event& started) {
   return [&started](const core::MeshParameters&, std::span<const double>,
                     core::RunContext& context) -> absl::StatusOr<core::Mesh> {
@@ -214,13 +221,14 @@ size_t LogLines::Count(const std::string& part) const {
                        [&](const std::string& line) { return line.find(part) != std::string::npos; });
 }
 
-ServiceHarness::ServiceHarness(Mesher mesher, const ServiceOptions& options, Transport transport) {
+ServiceHarness::ServiceHarness(Mesher mesher, const ServiceOptions& options, Transport transport, Estimator estimator) {
   auto logger = std::make_shared<spdlog::logger>("test", std::make_shared<LinesSink>(log_));
   logger->set_level(spdlog::level::debug);
   ServerOptions server_options;
   server_options.service = options;
   server_options.listen = transport == Transport::kLoopback ? "127.0.0.1:0" : "";
-  absl::StatusOr<std::unique_ptr<Server>> server = Server::Start(server_options, std::move(logger), std::move(mesher));
+  absl::StatusOr<std::unique_ptr<Server>> server =
+      Server::Start(server_options, std::move(logger), std::move(mesher), std::move(estimator));
   if (!server.ok()) {
     throw std::runtime_error(server.status().ToString());
   }

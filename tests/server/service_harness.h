@@ -38,6 +38,10 @@ absl::StatusOr<core::Mesh> FakeMesher(const core::MeshParameters& parameters, st
 // A mesher that sets `started` and then works until its context is cancelled.
 Mesher EndlessMesher(Event& started);
 
+// As many vertices as points, and so on.
+absl::StatusOr<core::MeshEstimate> FakeEstimator(const core::MeshParameters& parameters, std::span<const double> points,
+                                                 core::RunContext& context);
+
 // The details of an error.
 struct ErrorDetails {
   std::string reason;  // without the prefix ERROR_REASON_
@@ -100,7 +104,7 @@ enum class Transport { kInProcess, kLoopback };
 class ServiceHarness {
  public:
   explicit ServiceHarness(Mesher mesher = FakeMesher, const ServiceOptions& options = {},
-                          Transport transport = Transport::kInProcess);
+                          Transport transport = Transport::kInProcess, Estimator estimator = FakeEstimator);
 
   Server& server() { return *server_; }
   LogLines& log() { return *log_; }

@@ -62,7 +62,7 @@ TEST(Wellspaced, WithoutGraceEndsRunningCallsAtOnce) {
   ASSERT_EQ(client.ReadLine(), "running");
   daemon.process().Signal(SIGTERM);
   EXPECT_EQ(daemon.process().Wait(), 0);
-  EXPECT_THAT(client.ReadLine(), HasSubstr("UNAVAILABLE: the server stopped before the mesh was delivered"));
+  EXPECT_THAT(client.ReadLine(), HasSubstr("UNAVAILABLE: the server stopped before the answer was delivered"));
   EXPECT_EQ(client.Wait(), 1);
 }
 
@@ -72,7 +72,7 @@ TEST(Wellspaced, AfterTheGracePeriodEndsRunningCalls) {
   ASSERT_EQ(client.ReadLine(), "running");
   daemon.process().Signal(SIGTERM);
   EXPECT_EQ(daemon.process().Wait(), 0);
-  EXPECT_THAT(client.ReadLine(), HasSubstr("UNAVAILABLE: the server stopped before the mesh was delivered"));
+  EXPECT_THAT(client.ReadLine(), HasSubstr("UNAVAILABLE: the server stopped before the answer was delivered"));
   EXPECT_EQ(client.Wait(), 1);
 }
 

@@ -1,0 +1,41 @@
+#include "server/estimate_mesh_call.h"
+
+#include <utility>
+#include <vector>
+
+#include "server/convert.h"
+#include "server/errors.h"
+
+namespace wellspace::server {
+
+EstimateMeshCall* EstimateMeshCall::Start(const CallEnvironment& environment, grpc::CallbackServerContext* context,
+                                          v1::EstimateMeshResponse* response) {
+  std::shared_ptr<EstimateMeshCall> call(new EstimateMeshCall(environment, context, response));
+  Begin(call);
+  return call.get();
+}
+
+void EstimateMeshCall::Work(PointChunks& points, core::RunContext& context) {
+  core::MeshEstimate estimate{};
+  grpc::Status status = RunGuarded([&] {
+    const std::vector<double> coordinates = points.Flatten();
+    const absl::StatusOr<core::MeshEstimate> made = environment().estimator(parameters(), coordinates, context);
+    if (made.ok()) {
+      estimate = *made;
+    }
+    return FromCoreStatus(made.status());
+  });
+  std::lock_guard lock(mutex_);
+  if (ending()) {
+    return;
+  }
+  if (!status.ok()) {
+    EndFailed(std::move(status));
+    return;
+  }
+  vertices_ = estimate.vertices;
+  *response_ = EstimateToProto(estimate);
+  End(grpc::Status::OK);
+}
+
+}  // namespace wellspace::server

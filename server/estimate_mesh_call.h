@@ -1,0 +1,34 @@
+// One call of EstimateMesh.
+#ifndef WELLSPACE_SERVER_ESTIMATE_MESH_CALL_H_
+#define WELLSPACE_SERVER_ESTIMATE_MESH_CALL_H_
+
+#include <cstdint>
+
+#include "grpcpp/support/server_callback.h"
+#include "server/cloud_call.h"
+#include "wellspace/v1/meshing.pb.h"
+
+namespace wellspace::server {
+
+// A CloudCall whose job estimates, and whose answer is one message.
+class EstimateMeshCall final : public CloudCall<grpc::ServerReadReactor<v1::MeshPointsRequest>> {
+ public:
+  // Begins to serve the call of `context`. The call deletes itself. REQUIRES: `response` is valid until its end.
+  static EstimateMeshCall* Start(const CallEnvironment& environment, grpc::CallbackServerContext* context,
+                                 v1::EstimateMeshResponse* response);
+
+ private:
+  EstimateMeshCall(const CallEnvironment& environment, grpc::CallbackServerContext* context,
+                   v1::EstimateMeshResponse* response)
+      : CloudCall(environment, context, "EstimateMesh"), response_(response) {}
+
+  void Work(PointChunks& points, core::RunContext& context) override;
+  uint64_t VertexCount() const override { return vertices_; }
+
+  v1::EstimateMeshResponse* const response_;  // guarded by mutex_; gRPC's from Finish on
+  uint64_t vertices_ = 0;                     // guarded by mutex_
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_ESTIMATE_MESH_CALL_H_
