@@ -16,6 +16,7 @@ int main(int argc, char** argv) {
   app.footer(kExitCodesHelp);
   int exit_code = kExitOk;
   AddMeshCommand(app, exit_code);
+  AddEstimateCommand(app, exit_code);
   AddCheckCommand(app, exit_code);
   AddRenderCommand(app, exit_code);
   AddServerCommand(app, exit_code);

@@ -15,6 +15,10 @@ CLI::Option* AddNumber(CLI::App& command, const std::string& name, double& value
 CLI::Option* AddNumbers(CLI::App& command, const std::string& name, std::vector<double>& values,
                         const std::string& description);
 
+// The same, as often as it is given: one list of numbers each time.
+CLI::Option* AddNumberLists(CLI::App& command, const std::string& name, std::vector<std::vector<double>>& lists,
+                            const std::string& description);
+
 // --server, or the environment's WELLSPACE_SERVER.
 CLI::Option* AddServer(CLI::App& command, std::string& address);
 

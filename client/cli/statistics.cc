@@ -1,11 +1,13 @@
 #include "client/cli/statistics.h"
 
+#include <array>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "client/cli/progress_bar.h"
+#include "client/formats/mesh.h"
 
 namespace wellspace::cli {
 namespace {
@@ -53,11 +55,46 @@ std::string Summary(const client::Mesh& mesh) {
   return absl::StrCat(
       WithThousands(statistics.input_points), " points",
       statistics.duplicates == 0 ? "" : absl::StrCat(" (", WithThousands(statistics.duplicates), " duplicates)"),
-      " -> ", WithThousands(statistics.vertices), " vertices, ", WithThousands(statistics.simplices),
-      mesh.dimension == 2 ? " triangles" : " tetrahedra",
+      " -> ", WithThousands(statistics.vertices), " vertices, ", WithThousands(statistics.simplices), " ",
+      formats::SimplexName(mesh.dimension),
       absl::StrFormat("; radius-edge at most %.4f, %s at least %.2f\u00b0", statistics.max_radius_edge,
                       mesh.dimension == 2 ? "angles" : "dihedral angles", statistics.min_angle_deg),
       total == statistics.seconds.end() ? "" : absl::StrFormat("; %.2f s", total->second));
+}
+
+std::string EstimateJson(const client::MeshEstimate& estimate, int dimension) {
+  nlohmann::ordered_json json;
+  json["dimension"] = dimension;
+  json["vertices"] = estimate.vertices;
+  json["simplices"] = estimate.simplices;
+  json["memory_bytes"] = estimate.memory_bytes;
+  json["tree_leaves"] = estimate.tree_leaves;
+  return json.dump(2) + "\n";
+}
+
+std::string EstimateText(const client::MeshEstimate& estimate, int dimension) {
+  const auto line = [](const char* name, const std::string& value) {
+    return absl::StrFormat("%-14s %s\n", name, value);
+  };
+  return absl::StrCat(line("vertices", WithThousands(estimate.vertices)),
+                      line(formats::SimplexName(dimension), WithThousands(estimate.simplices)),
+                      line("memory", WithBinaryUnit(estimate.memory_bytes)),
+                      line("tree leaves", WithThousands(estimate.tree_leaves)));
+}
+
+std::string WithBinaryUnit(uint64_t bytes) {
+  constexpr std::array kUnits = {"B", "KiB", "MiB", "GiB", "TiB", "PiB", "EiB"};
+  if (bytes < 1024) {
+    return absl::StrCat(bytes, " ", kUnits[0]);
+  }
+  auto value = static_cast<double>(bytes);
+  size_t unit = 0;
+  // What would be printed as 1024 goes on to the next unit.
+  while (value >= 1023.5 && unit + 1 < kUnits.size()) {
+    value /= 1024;
+    ++unit;
+  }
+  return absl::StrFormat("%.*f %s", value < 9.95 ? 1 : 0, value, kUnits[unit]);
 }
 
 }  // namespace wellspace::cli

@@ -10,16 +10,24 @@ namespace wellspace::cli {
 
 // One JSON object:
 //   dimension, domain_low, domain_high
-//   input_points, duplicates, vertices, simplices, max_radius_edge, min_angle_deg (2-D) or min_dihedral_deg (3-D)
+//   input_points, duplicates, vertices, simplices, max_radius_edge, min_angle_deg (2-D) or min_dihedral_deg (above)
 //   seconds:  {tree, refinement, simplices, ..., total}, without reading and writing files
 //   peak_memory_bytes, counters
 //   duplicate_of: [[i, v], ...]: input point i is equal to an earlier one, and both became vertex v. The other input
-//   points
-//                 are, in their order, the first vertices.
+//                 points are, in their order, the first vertices.
 std::string StatisticsJson(const client::Mesh& mesh);
 
 // "5 points -> 17 vertices, 20 triangles; ...", one line without its end.
 std::string Summary(const client::Mesh& mesh);
+
+// One JSON object: dimension, vertices, simplices, memory_bytes, tree_leaves.
+std::string EstimateJson(const client::MeshEstimate& estimate, int dimension);
+
+// The same for people: lines "vertices  1,234", memory as "1.5 GiB".
+std::string EstimateText(const client::MeshEstimate& estimate, int dimension);
+
+// "512 B", "1.5 GiB", "37 MiB": two digits or more, in the largest binary unit of which there is one.
+std::string WithBinaryUnit(uint64_t bytes);
 
 }  // namespace wellspace::cli
 

@@ -9,6 +9,7 @@
 
 #include "client/cli/exit_codes.h"
 #include "client/cli/interrupt.h"
+#include "client/cli/meshing_options.h"
 #include "client/cli/options.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/statistics.h"
@@ -87,6 +88,69 @@ TEST(SummaryTest, OneLine) {
   EXPECT_THAT(line, HasSubstr("6 points (3 duplicates) -> 1,007 vertices, 0 tetrahedra"));
   EXPECT_THAT(line, HasSubstr("dihedral angles at least 20.50\u00b0; 1.50 s"));
   EXPECT_EQ(line.find('\n'), std::string::npos);
+}
+
+TEST(SummaryTest, NamesTheSimplicesOfTheDimension) {
+  EXPECT_THAT(Summary(SmallMesh(2)), HasSubstr(" triangles"));
+  EXPECT_THAT(Summary(SmallMesh(4)), HasSubstr(" simplices"));
+}
+
+constexpr client::MeshEstimate kEstimate = {
+    .vertices = 1234567, .simplices = 7654321, .memory_bytes = uint64_t{3} << 29, .tree_leaves = 42};
+
+TEST(EstimateTest, ForProgramsAndForPeople) {
+  EXPECT_EQ(nlohmann::json::parse(EstimateJson(kEstimate, 3)), nlohmann::json::parse(R"({
+    "dimension": 3, "vertices": 1234567, "simplices": 7654321, "memory_bytes": 1610612736, "tree_leaves": 42})"));
+  EXPECT_EQ(EstimateText(kEstimate, 3),
+            "vertices       1,234,567\n"
+            "tetrahedra     7,654,321\n"
+            "memory         1.5 GiB\n"
+            "tree leaves    42\n");
+}
+
+TEST(WithBinaryUnitTest, RoundsToWhatPeopleRead) {
+  EXPECT_EQ(WithBinaryUnit(0), "0 B");
+  EXPECT_EQ(WithBinaryUnit(1023), "1023 B");
+  EXPECT_EQ(WithBinaryUnit(1024), "1.0 KiB");
+  EXPECT_EQ(WithBinaryUnit(10'188), "9.9 KiB");
+  EXPECT_EQ(WithBinaryUnit(10'189), "10 KiB");
+  EXPECT_EQ(WithBinaryUnit(1023 << 10), "1023 KiB");
+  EXPECT_EQ(WithBinaryUnit((1 << 20) - 1), "1.0 MiB");
+  EXPECT_EQ(WithBinaryUnit(~uint64_t{0}), "16 EiB");
+}
+
+TEST(SizeBoxesTest, HaveTwoCornersAndASize) {
+  const auto boxes = SizeBoxesOf({{0, 1, 2, 3, 0.5}, {-1, -1, 1, 1, 0.25}}, 2);
+  ASSERT_TRUE(boxes.ok()) << boxes.status();
+  ASSERT_EQ(boxes->size(), 2u);
+  EXPECT_THAT((*boxes)[0].low, ElementsAre(0, 1));
+  EXPECT_THAT((*boxes)[0].high, ElementsAre(2, 3));
+  EXPECT_EQ((*boxes)[0].max_circumradius, 0.5);
+  EXPECT_EQ((*boxes)[1].max_circumradius, 0.25);
+  EXPECT_TRUE(SizeBoxesOf({std::vector<double>(13, 1)}, 0).ok());
+  const auto message = [](const std::vector<double>& numbers, int dimension) {
+    const absl::Status status = SizeBoxesOf({{0, 0, 1, 1, 1}, numbers}, dimension).status();
+    EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
+    return std::string(status.message());
+  };
+  EXPECT_EQ(message({0, 0.5, 1, 1}, 0),
+            "--size-box 0,0.5,1,1: expected low corner, high corner and size, 5 numbers in 2-D to 13 in 6-D, got 4");
+  EXPECT_THAT(message({0, 1, 1}, 0), HasSubstr("got 3"));
+  EXPECT_THAT(message(std::vector<double>(15, 1), 0), HasSubstr("got 15"));
+  EXPECT_EQ(message({0, 0, 0, 1, 1, 1, 2}, 2),
+            "--size-box 0,0,0,1,1,1,2: expected low corner, high corner and size, 5 numbers in 2-D, got 7");
+}
+
+TEST(OptionsTest, ListsOfNumbersComeAsOftenAsTheyAreGiven) {
+  CLI::App app;
+  std::vector<std::vector<double>> lists;
+  std::string positional;
+  AddNumberLists(app, "--box", lists, "");
+  app.add_option("IN", positional);
+  app.parse("--box -1,2,.5 cloud.csv --box 3,4");
+  EXPECT_THAT(lists, ElementsAre(ElementsAre(-1, 2, 0.5), ElementsAre(3, 4)));
+  EXPECT_EQ(positional, "cloud.csv");
+  EXPECT_THROW(app.parse("--box 1,x"), CLI::ValidationError);
 }
 
 TEST(OptionsTest, NumbersAreCorrectlyRoundedAndMayBeNegative) {

@@ -65,9 +65,9 @@ class CommandsTest : public testing::Test {
 TEST_F(CommandsTest, HelpAndVersion) {
   const RunResult help = RunWellspace({"--help"});
   EXPECT_EQ(help.exit_code, 0);
-  EXPECT_THAT(help.out, AllOf(HasSubstr("mesh"), HasSubstr("check"), HasSubstr("render"), HasSubstr("server"),
-                              HasSubstr("Exit codes:"), HasSubstr("130")));
-  for (const char* command : {"mesh", "check", "render", "server"}) {
+  EXPECT_THAT(help.out, AllOf(HasSubstr("mesh"), HasSubstr("estimate"), HasSubstr("check"), HasSubstr("render"),
+                              HasSubstr("server"), HasSubstr("Exit codes:"), HasSubstr("130")));
+  for (const char* command : {"mesh", "estimate", "check", "render", "server"}) {
     const RunResult result = RunWellspace({command, "--help"});
     EXPECT_EQ(result.exit_code, 0) << command;
     EXPECT_THAT(result.out, HasSubstr("Usage:")) << command;
@@ -85,7 +85,9 @@ TEST_F(CommandsTest, WrongUsageIsExitCode2) {
       {"knit"},
       {"mesh"},
       {"mesh", cloud},
-      {"mesh", cloud, "-o", out, "--dimension", "4"},
+      {"mesh", cloud, "-o", out, "--dimension", "1"},
+      {"mesh", cloud, "-o", out, "--dimension", "7"},
+      {"mesh", cloud, "-o", out, "--criterion", "round"},
       {"mesh", cloud, "-o", out, "--dimension", "3"},
       {"mesh", cloud, "-o", out, "--rho", "two"},
       {"mesh", cloud, "-o", out, "--rho", "nan"},
@@ -103,6 +105,11 @@ TEST_F(CommandsTest, WrongUsageIsExitCode2) {
       {"mesh", cloud, "-o", "-", "--stats", "-"},
       {"mesh", cloud, "-o", "-", "--format", "node"},
       {"mesh", Path("none.csv"), "-o", out},
+      {"estimate"},
+      {"estimate", cloud, "-o", out},
+      {"estimate", cloud, "--rho", "0.3"},
+      {"estimate", cloud, "--size-box", "0,0,1,1"},
+      {"estimate", Path("none.csv")},
       {"check"},
       {"check", Path("none.vtu")},
       {"render", Path("none.vtu"), "-o", Path("a.png")},
@@ -117,6 +124,76 @@ TEST_F(CommandsTest, WrongUsageIsExitCode2) {
     EXPECT_THAT(result.err, Not(IsEmpty())) << testing::PrintToString(arguments);
     EXPECT_EQ(folder_.FileCount(), 1) << testing::PrintToString(arguments);
   }
+}
+
+// Options that are well-formed but cannot be are judged by the server; the tool says which option it was.
+TEST_F(CommandsTest, WrongOptionsAreNamedWithTheirValueAndWhatWouldDo) {
+  const std::vector<std::pair<std::vector<std::string>, std::string>> wrong = {
+      {{"--domain", "0,0,1"},
+       "--domain 0,0,1: expected low corner and high corner, 4 numbers in 2-D to 12 in 6-D, got 3"},
+      {{"--domain", "0,0,0,1,1,1", "--dimension", "2"}, "--domain 0,0,0,1,1,1: expected 4 numbers with --dimension 2"},
+      {{"--domain", "0,0,1,0"}, "--domain: domain: along axis 1 it goes from 0 to 0; finite numbers are needed"},
+      {{"--rho", "0.3"}, "--rho: rho: 0.3 is not allowed in 2-D; "},
+      {{"--margin", "-1"}, "--margin: margin: -1 is not allowed; "},
+      {{"--size", "-2"}, "--size: max_circumradius: -2 is not allowed; "},
+      {{"--size", "small"}, "--size: expected a number, got \"small\""},
+      {{"--size-box", "0,0,1,1"}, "--size-box 0,0,1,1: expected low corner, high corner and size, 5 numbers in 2-D"},
+      {{"--size-box", "0,0,0,1,1,1,0.1"}, "cloud.csv:2: expected 3 coordinates, got 2"},
+      {{"--size-box", "0,0,0,1,1,1,0.1", "--dimension", "2"}, "5 numbers in 2-D, got 7"},
+      {{"--size-box", "0,0,1,1,0.1", "--size-box", "0,0.5,1,0.25,0.1"},
+       "--size-box 0,0.5,1,0.25,0.1: size_boxes[1].high[1]: 0.25 is not allowed; "},
+      {{"--size-box", "0,0,1,1,0"}, "--size-box 0,0,1,1,0: size_boxes[0].max_circumradius: 0 is not allowed; "},
+      {{"--size-box", "0,0,1,x,1"}, "--size-box: expected a number, got \"x\""},
+      {{"--criterion", "round"}, "--criterion: round not in {radius-edge,well-spaced}"},
+  };
+  for (const auto& [options, message] : wrong) {
+    EXPECT_THAT(MeshFails("cloud.csv", kPlane, 2, options), HasSubstr(message)) << testing::PrintToString(options);
+  }
+}
+
+TEST_F(CommandsTest, EstimateForPeopleAndForPrograms) {
+  const std::string cloud = folder_.Write("cloud.csv", kPlane);
+  const RunResult text = RunWellspace({"estimate", cloud, "--stats", Path("stats.json"), "--size", "0.3"});
+  ASSERT_EQ(text.exit_code, 0) << text.err;
+  EXPECT_THAT(text.out,
+              AllOf(HasSubstr("vertices "), HasSubstr("triangles "), HasSubstr("memory "), HasSubstr("iB\n")));
+  const nlohmann::json stats = nlohmann::json::parse(folder_.Read("stats.json"));
+  EXPECT_EQ(stats["dimension"], 2);
+  EXPECT_GT(stats["vertices"], 5);
+  EXPECT_GT(stats["simplices"], 5);
+  EXPECT_GT(stats["memory_bytes"], 1000);
+  const RunResult json = RunWellspace({"estimate", cloud, "--stats", "-", "--size", "0.3"});
+  EXPECT_EQ(nlohmann::json::parse(json.out), stats);
+  EXPECT_EQ(folder_.FileCount(), 2);
+}
+
+TEST_F(CommandsTest, SizesAndTheCriterionMakeMoreVertices) {
+  const auto vertices = [this](const std::vector<std::string>& options) {
+    Mesh(kPlane, "plane.vtu", options);
+    return formats::ReadMesh(Path("plane.vtu"))->View().vertex_count();
+  };
+  const uint64_t plain = vertices({});
+  EXPECT_GT(vertices({"--criterion", "well-spaced"}), plain);
+  EXPECT_GT(vertices({"--size", "0.05"}), 2 * plain);
+  EXPECT_GT(vertices({"--size-box", "0,0,0.1,0.1,0.02", "--size-box", "0.8,0.8,0.9,0.9,0.02"}), plain + 20);
+}
+
+std::string PointsOf4D() {
+  std::string text;
+  for (int i = 0; i < 12; ++i) {
+    for (int axis = 0; axis < 4; ++axis) {
+      text += std::to_string(std::fmod(0.1 + i * (0.6180339887 + 0.137 * axis), 1)) + (axis == 3 ? "\n" : ",");
+    }
+  }
+  return text;
+}
+
+// Before anything is meshed.
+TEST_F(CommandsTest, VtuIsRefusedAbove3D) {
+  EXPECT_THAT(MeshFails("cloud.csv", PointsOf4D(), 2), HasSubstr("expected npz"));
+  const RunResult stream = RunWellspace({"mesh", "-", "-o", "-", "--dimension", "5"});
+  EXPECT_EQ(stream.exit_code, 2);
+  EXPECT_THAT(stream.err, HasSubstr("vtu holds meshes up to 3-D, and this one is 5-D; expected npz"));
 }
 
 TEST_F(CommandsTest, BadCloudsAreToldWithTheirLine) {

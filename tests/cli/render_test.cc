@@ -207,6 +207,8 @@ TEST(SceneTest, Errors) {
     return std::string(scene.status().message());
   };
   EXPECT_THAT(message({.dimension = 3, .points = {}, .simplices = {}}, {}), HasSubstr("no simplices"));
+  EXPECT_THAT(message({.dimension = 4, .points = std::vector<double>(20), .simplices = {0, 1, 2, 3, 4}}, {}),
+              HasSubstr("only 2-D and 3-D meshes can be drawn, and this one is 4-D"));
   EXPECT_THAT(message(Square(), {.plane = Plane{{1, 0, 0}, 0}, .up = 2}), HasSubstr("3-D meshes only"));
   EXPECT_THAT(message(Cubes(1), {.plane = Plane{{0, 0, 0}, 1}, .up = 2}), HasSubstr("normal has a direction"));
   EXPECT_THAT(message(Cubes(1), {.plane = Plane{{1, 0, 0}, -1}, .up = 2}), HasSubstr("cuts off all of the 6"));

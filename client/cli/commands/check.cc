@@ -1,7 +1,9 @@
 // wellspace check: is it a mesh, and how good is it?
 #include <algorithm>
+#include <cmath>
 #include <iostream>
 #include <memory>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,14 +20,13 @@
 namespace wellspace::cli {
 namespace {
 
-// The smallest angle of a regular simplex, which no other exceeds.
-double BestAngle(int dimension) { return dimension == 2 ? 60.0 : 70.528779365509308; }
+// The (dihedral) angle of a regular simplex in degrees, which the smallest of no other exceeds.
+double BestAngle(int dimension) { return std::acos(1.0 / dimension) * 180 / std::numbers::pi; }
 
 void PrintReport(const core::QualityReport& report, int dimension) {
   const char* angle = dimension == 2 ? "angle" : "dihedral angle";
   std::cout << absl::StrFormat("%-24s %s\n", "vertices", WithThousands(report.vertices))
-            << absl::StrFormat("%-24s %s\n", dimension == 2 ? "triangles" : "tetrahedra",
-                               WithThousands(report.simplices));
+            << absl::StrFormat("%-24s %s\n", formats::SimplexName(dimension), WithThousands(report.simplices));
   if (report.simplices == 0) {
     return;
   }
@@ -93,7 +94,7 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
   check->footer(kExitCodesHelp);
   check
       ->add_option("MESH", command->mesh_path,
-                   "File of the mesh (.vtu, or .node with .ele), or - for standard input (vtu)")
+                   "File of the mesh (.vtu, .npz, or .node with .ele), or - for standard input (vtu)")
       ->required();
   check->add_option("--cloud", command->cloud_path, "File of points that must be the first vertices, to the bit");
   check->add_option("--input-format", command->cloud_format, "Format of the cloud; default: by its extension")

@@ -8,6 +8,7 @@ namespace wellspace::cli {
 
 // REQUIRES, for each: `exit_code` outlives `app`.
 void AddMeshCommand(CLI::App& app, int& exit_code);
+void AddEstimateCommand(CLI::App& app, int& exit_code);
 void AddCheckCommand(CLI::App& app, int& exit_code);
 void AddRenderCommand(CLI::App& app, int& exit_code);
 void AddServerCommand(CLI::App& app, int& exit_code);

@@ -53,11 +53,12 @@ absl::Status RenderCommand::Render() const {
 void AddRenderCommand(CLI::App& app, int& exit_code) {
   const auto command = std::make_shared<RenderCommand>();
   CLI::App* render = app.add_subcommand(
-      "render", "Draw a mesh, coloured by the smallest angle of each simplex; 3-D meshes are cut open by a plane");
+      "render",
+      "Draw a 2-D or 3-D mesh, coloured by the smallest angle of each simplex; 3-D meshes are cut open by a plane");
   render->footer(kExitCodesHelp);
   render
       ->add_option("MESH", command->mesh_path,
-                   "File of the mesh (.vtu, or .node with .ele), or - for standard input (vtu)")
+                   "File of the mesh (.vtu, .npz, or .node with .ele), or - for standard input (vtu)")
       ->required();
   render->add_option("-o,--output", command->picture_path, "File of the picture, .png or .svg")->required();
   render->add_option("--width", command->width, "Width in pixels")

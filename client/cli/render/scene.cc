@@ -298,6 +298,10 @@ absl::StatusOr<Scene> MakeCutScene(const formats::MeshView& mesh, const View& vi
 }  // namespace
 
 absl::StatusOr<Scene> MakeScene(const formats::MeshView& mesh, const View& view) {
+  if (mesh.dimension > 3) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("only 2-D and 3-D meshes can be drawn, and this one is ", mesh.dimension, "-D"));
+  }
   if (mesh.simplex_count() == 0) {
     return absl::InvalidArgumentError("the mesh has no simplices; expected at least one to draw");
   }

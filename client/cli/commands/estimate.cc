@@ -1,0 +1,50 @@
+// wellspace estimate: how large would the mesh of a cloud be?
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "client/cli/commands/commands.h"
+#include "client/cli/exit_codes.h"
+#include "client/cli/meshing_options.h"
+#include "client/cli/statistics.h"
+#include "client/formats/line_reader.h"
+
+namespace wellspace::cli {
+namespace {
+
+constexpr char kFooter[] =
+    "Examples:\n"
+    "  wellspace estimate cow.csv --size 0.01\n"
+    "  wellspace estimate cow.csv --stats - --server mesher:7233\n";
+
+int RunEstimate(MeshingOptions& options) {
+  if (const absl::Status status = options.Check(); !status.ok()) {
+    return ReportError(status);
+  }
+  return options.Run([&options](client::Client& client, const client::MeshOptions& mesh_options,
+                                const formats::PointCloud& cloud, const Interrupt& interrupt) {
+    const absl::StatusOr<client::MeshEstimate> estimate =
+        client.EstimateMesh(mesh_options, cloud.points, interrupt.token());
+    if (!estimate.ok()) {
+      return estimate.status();
+    }
+    if (!options.quiet() && options.statistics() != formats::kStandardStream) {
+      std::cout << EstimateText(*estimate, cloud.dimension);
+    }
+    return options.WriteStatistics(EstimateJson(*estimate, cloud.dimension));
+  });
+}
+
+}  // namespace
+
+void AddEstimateCommand(CLI::App& app, int& exit_code) {
+  const auto options = std::make_shared<MeshingOptions>();
+  CLI::App* estimate = app.add_subcommand(
+      "estimate", "Estimate how large the mesh of a point cloud would be, and the memory that meshing it would take");
+  estimate->footer(absl::StrCat(kCloudsHelp, kFooter, "\n", kExitCodesHelp));
+  options->AddTo(*estimate);
+  estimate->callback([options, &exit_code] { exit_code = RunEstimate(*options); });
+}
+
+}  // namespace wellspace::cli
