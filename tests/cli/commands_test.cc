@@ -188,6 +188,19 @@ std::string PointsOf4D() {
   return text;
 }
 
+TEST_F(CommandsTest, MeshAndCheckIn4D) {
+  Mesh(PointsOf4D(), "mesh.npz", {"--stats", Path("stats.json")});
+  const RunResult check = RunWellspace({"check", Path("mesh.npz"), "--cloud", Path("cloud.csv"), "--rho", "2.9000001"});
+  EXPECT_EQ(check.exit_code, 0) << check.out << check.err;
+  EXPECT_THAT(check.out, AllOf(HasSubstr("simplices"), EndsWith("valid\n")));
+  const nlohmann::json stats = nlohmann::json::parse(folder_.Read("stats.json"));
+  EXPECT_EQ(stats["dimension"], 4);
+  EXPECT_EQ(stats["input_points"], 12);
+  const RunResult render = RunWellspace({"render", Path("mesh.npz"), "-o", Path("a.png")});
+  EXPECT_EQ(render.exit_code, 2);
+  EXPECT_THAT(render.err, HasSubstr("mesh.npz: only 2-D and 3-D meshes can be drawn, and this one is 4-D"));
+}
+
 // Before anything is meshed.
 TEST_F(CommandsTest, VtuIsRefusedAbove3D) {
   EXPECT_THAT(MeshFails("cloud.csv", PointsOf4D(), 2), HasSubstr("expected npz"));

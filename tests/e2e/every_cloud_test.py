@@ -79,6 +79,25 @@ class EveryCloud(unittest.TestCase):
                 with self.subTest(name=name, dimension=d), tempfile.TemporaryDirectory() as folder:
                     self.assert_meshed(pathlib.Path(folder), points, d, rho)
 
+    def test_four_dimensions_by_arrays(self):
+        points = numpy.array(make_clouds.cloud("inner", 4, 20))
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            numpy.save(folder / "cloud.npy", points)
+            self.run_tool("mesh", folder / "cloud.npy", "-o", folder / "mesh.npz", "--domain", "0,0,0,0,1,1,1,1", "--stats",
+                          folder / "stats.json", "--quiet")
+            self.run_tool("check", folder / "mesh.npz", "--cloud", folder / "cloud.npy", "--rho", "2.9")
+            stats = json.loads((folder / "stats.json").read_text())
+            with numpy.load(folder / "mesh.npz", allow_pickle=False) as mesh:
+                vertices, simplices = mesh["points"], mesh["simplices"]
+        self.assertEqual(vertices.shape, (stats["vertices"], 4))
+        self.assertEqual(simplices.shape, (stats["simplices"], 5))
+        numpy.testing.assert_array_equal(vertices[:20], points)
+        edges = vertices[simplices]
+        volumes = numpy.linalg.det(edges[:, 1:] - edges[:, :1]) / 24
+        self.assertGreater(volumes.min(), 0)
+        self.assertAlmostEqual(volumes.sum(), 1, places=12)
+
     def test_examples(self):
         for name, d in (("coast-110m", 2), ("spot", 3)):
             with self.subTest(name=name), tempfile.TemporaryDirectory() as folder:

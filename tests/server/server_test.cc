@@ -170,7 +170,7 @@ TEST(Server, InfoTellsLimitsAndLoad) {
   ServiceHarness harness(EndlessMesher(started), options);
   v1::GetServerInfoResponse info = harness.Info();
   EXPECT_EQ(info.version(), WELLSPACE_VERSION);
-  EXPECT_THAT(info.dimensions(), ElementsAre(2, 3));
+  EXPECT_THAT(info.dimensions(), ElementsAre(2, 3, 4, 5, 6));
   EXPECT_EQ(info.max_points(), 123u);
   EXPECT_EQ(info.max_vertices(), 456u);
   EXPECT_EQ(info.max_request_bytes(), 4u << 20);
