@@ -55,8 +55,8 @@ const char kCloudsHelp[] =
     "Clouds:  .csv .tsv .txt .dat (columns separated by commas, semicolons or blanks; a header may name x, y, z),\n"
     "         .xyz, .node, .npy; \"-\" is standard input (csv, or --input-format)\n";
 
-void AddCriterion(CLI::App& command, client::Criterion& criterion) {
-  command
+CLI::Option* AddCriterion(CLI::App& command, client::Criterion& criterion) {
+  return command
       .add_option_function<std::string>(
           "--criterion",
           [&criterion](const std::string& name) {

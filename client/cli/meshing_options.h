@@ -19,7 +19,7 @@ namespace wellspace::cli {
 extern const char kCloudsHelp[];
 
 // --criterion; default: radius-edge.
-void AddCriterion(CLI::App& command, client::Criterion& criterion);
+CLI::Option* AddCriterion(CLI::App& command, client::Criterion& criterion);
 // --size and --size-box. Boxes are taken as they are written; see SizeBoxesOf.
 void AddSizes(CLI::App& command, double& max_circumradius, std::vector<std::vector<double>>& size_boxes);
 // The boxes of --size-box.

@@ -333,6 +333,40 @@ TEST_F(CommandsTest, CheckFindsPlantedFaults) {
   EXPECT_THAT(rho.out, HasSubstr("violation: "));
 }
 
+TEST_F(CommandsTest, CheckHoldsMeshesToTheCriterionAndToSizes) {
+  Mesh(kPlane, "plain.vtu");
+  Mesh(kPlane, "well.vtu", {"--criterion", "well-spaced"});
+  Mesh(kPlane, "small.vtu", {"--size", "0.2", "--size-box", "0,0,0.25,0.25,0.05"});
+  const auto check = [this](const std::string& name, const std::vector<std::string>& options) {
+    std::vector<std::string> arguments = {"check", Path(name)};
+    arguments.insert(arguments.end(), options.begin(), options.end());
+    return RunWellspace(arguments);
+  };
+  const std::vector<std::string> well_spaced = {"--criterion", "well-spaced", "--rho", "1.41421357"};
+  EXPECT_EQ(check("well.vtu", well_spaced).exit_code, 0);
+  const RunResult ill = check("plain.vtu", well_spaced);
+  EXPECT_EQ(ill.exit_code, 1);
+  EXPECT_THAT(ill.out, HasSubstr("violation: "));
+  const std::vector<std::string> sizes = {"--size", "0.2", "--size-box", "0,0,0.25,0.25,0.05"};
+  EXPECT_EQ(check("small.vtu", sizes).exit_code, 0);
+  EXPECT_EQ(check("plain.vtu", sizes).exit_code, 1);
+  EXPECT_EQ(check("small.vtu", {"--size", "0.15"}).exit_code, 1);
+  EXPECT_EQ(check("small.vtu", {"--size-box", "0.5,0.5,1,1,0.05"}).exit_code, 1);
+  // What cannot be asked for is no violation.
+  const std::vector<std::pair<std::vector<std::string>, std::string>> wrong = {
+      {{"--criterion", "well-spaced"}, "--criterion requires --rho"},
+      {{"--size", "-1"}, "max_circumradius is -1; "},
+      {{"--size-box", "0,0,0,1,1,1,1"},
+       "--size-box 0,0,0,1,1,1,1: expected low corner, high corner and size, 5 numbers"},
+      {{"--size-box", "1,0,0,1,1"}, "size box 0 reaches from 1 to 0 on axis 0; "},
+  };
+  for (const auto& [options, message] : wrong) {
+    const RunResult result = check("small.vtu", options);
+    EXPECT_EQ(result.exit_code, 2) << testing::PrintToString(options) << result.out;
+    EXPECT_THAT(result.err, HasSubstr(message)) << testing::PrintToString(options);
+  }
+}
+
 uint32_t BigEndian(const std::string& bytes, size_t at) {
   uint32_t value = 0;
   for (size_t i = 0; i < 4 && at + i < bytes.size(); ++i) {

@@ -1,9 +1,7 @@
 // wellspace check: is it a mesh, and how good is it?
 #include <algorithm>
-#include <cmath>
 #include <iostream>
 #include <memory>
-#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,6 +9,7 @@
 #include "absl/strings/str_format.h"
 #include "client/cli/commands/commands.h"
 #include "client/cli/exit_codes.h"
+#include "client/cli/meshing_options.h"
 #include "client/cli/options.h"
 #include "client/cli/progress_bar.h"
 #include "client/formats/read_cloud.h"
@@ -19,9 +18,6 @@
 
 namespace wellspace::cli {
 namespace {
-
-// The (dihedral) angle of a regular simplex in degrees, which the smallest of no other exceeds.
-double BestAngle(int dimension) { return std::acos(1.0 / dimension) * 180 / std::numbers::pi; }
 
 void PrintReport(const core::QualityReport& report, int dimension) {
   const char* angle = dimension == 2 ? "angle" : "dihedral angle";
@@ -36,7 +32,7 @@ void PrintReport(const core::QualityReport& report, int dimension) {
             << "simplices by their smallest " << angle << ":\n";
   constexpr int kBarColumns = 40;
   const uint64_t tallest = *std::max_element(report.angle_histogram.begin(), report.angle_histogram.end());
-  const double width = BestAngle(dimension) / core::kHistogramBins;
+  const double width = core::LargestSmallestAngle(dimension) / core::kHistogramBins;
   for (int bin = 0; bin < core::kHistogramBins; ++bin) {
     const uint64_t count = report.angle_histogram[bin];
     // Rounded up, so that a single bad simplex shows.
@@ -51,14 +47,34 @@ struct CheckCommand {
   std::string cloud_path;
   std::string cloud_format;
   double rho = 0;
+  client::Criterion criterion = client::Criterion::kRadiusEdge;
+  double max_circumradius = 0;
+  std::vector<std::vector<double>> size_boxes;
 
+  absl::StatusOr<std::vector<core::SizeBox>> SizeBoxes(int dimension) const;
   int Run() const;
 };
+
+absl::StatusOr<std::vector<core::SizeBox>> CheckCommand::SizeBoxes(int dimension) const {
+  absl::StatusOr<std::vector<client::SizeBox>> read = SizeBoxesOf(size_boxes, dimension);
+  if (!read.ok()) {
+    return read.status();
+  }
+  std::vector<core::SizeBox> boxes;
+  for (client::SizeBox& box : *read) {
+    boxes.push_back({std::move(box.low), std::move(box.high), box.max_circumradius});
+  }
+  return boxes;
+}
 
 int CheckCommand::Run() const {
   const absl::StatusOr<formats::Mesh> mesh = formats::ReadMesh(mesh_path);
   if (!mesh.ok()) {
     return ReportError(mesh.status());
+  }
+  const absl::StatusOr<std::vector<core::SizeBox>> boxes = SizeBoxes(mesh->dimension);
+  if (!boxes.ok()) {
+    return ReportError(boxes.status());
   }
   std::vector<double> cloud;
   if (!cloud_path.empty()) {
@@ -73,7 +89,16 @@ int CheckCommand::Run() const {
   absl::Status status = core::ValidateIndices(view);
   if (status.ok()) {
     PrintReport(core::MeasureQuality(view), mesh->dimension);
-    status = core::ValidateMesh(view, {.rho = rho, .cloud = cloud});
+    const bool is_well_spaced = criterion == client::Criterion::kWellSpaced;
+    status = core::ValidateMesh(
+        view, {.rho = rho,
+               .criterion = is_well_spaced ? core::Criterion::kWellSpaced : core::Criterion::kRadiusEdge,
+               .max_circumradius = max_circumradius,
+               .size_boxes = *boxes,
+               .cloud = cloud});
+  }
+  if (absl::IsInvalidArgument(status)) {  // what was asked for cannot be
+    return ReportError(status);
   }
   if (!status.ok()) {
     std::cout << "violation: " << std::string(status.message()) << "\n";
@@ -99,8 +124,11 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
   check->add_option("--cloud", command->cloud_path, "File of points that must be the first vertices, to the bit");
   check->add_option("--input-format", command->cloud_format, "Format of the cloud; default: by its extension")
       ->check(CLI::IsMember(formats::CloudFormats()));
-  AddNumber(*check, "--rho", command->rho, "Bound that circumradius / shortest edge must obey")
-      ->check(CLI::PositiveNumber);
+  CLI::Option* rho =
+      AddNumber(*check, "--rho", command->rho, "Bound that the criterion must obey; default: not checked")
+          ->check(CLI::PositiveNumber);
+  AddCriterion(*check, command->criterion)->needs(rho);
+  AddSizes(*check, command->max_circumradius, command->size_boxes);
   check->callback([command, &exit_code] { exit_code = command->Run(); });
 }
 
