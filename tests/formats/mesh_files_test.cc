@@ -329,6 +329,22 @@ TEST_F(NpzTest, Errors) {
   EXPECT_THAT(Refusal(NpyText("<f8", uint64_t{1} << 31, 2, "none"), simplices_), HasSubstr("got 4"));
 }
 
+// The fields of zip64 are chosen by the size that is announced: here they are there without gigabytes.
+TEST_F(NpzTest, MembersAnnouncedAsHuge) {
+  absl::StatusOr<OutputFile> output = OutputFile::Create(folder_.Path("mesh.npz"));
+  ASSERT_TRUE(output.ok()) << output.status();
+  ZipWriter archive(*output);
+  for (const auto& [name, content] : {std::pair("points.npy", points_), std::pair("simplices.npy", simplices_)}) {
+    archive.Begin(name, uint64_t{1} << 33);
+    archive.Write(content);
+  }
+  ASSERT_TRUE(archive.Finish().ok());
+  ASSERT_TRUE(output->Commit().ok());
+  const absl::StatusOr<Mesh> mesh = ReadMesh(folder_.Path("mesh.npz"));
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_THAT(mesh->simplices, ElementsAre(0, 1, 2));
+}
+
 TEST_F(NpzTest, NeedsARegularFile) {
   const std::string path = folder_.Path("pipe.npz");
   ASSERT_EQ(mkfifo(path.c_str(), 0600), 0);
