@@ -14,6 +14,7 @@
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
 #include "core/input_cloud.h"
+#include "core/refine/estimate.h"
 #include "core/refine/refine.h"
 #include "core/simplex/quality.h"
 #include "core/simplex/simplices.h"
@@ -141,6 +142,7 @@ class MesherIn final : public Mesher {
     for (uint32_t i = 0; i < distinct; ++i) {
       vertex_at_[output_index_[i]] = VertexId{i};
     }
+    built_count_ = structure_.vertex_count();
     distinct_count_ = distinct;
     distinct_input_ = distinct;
     refinement_.emplace(structure_, kMinEdgeSteps * domain_.grid_step);
@@ -154,25 +156,10 @@ class MesherIn final : public Mesher {
   uint64_t vertex_count() const override { return structure_.vertex_count(); }
 
   absl::Status Refine(const MeshParameters& parameters, RunContext& context) override {
-    WELLSPACE_RETURN_IF_ERROR(ValidateParameters(parameters));
-    if (parameters.dimension != D) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("dimension: ", parameters.dimension, " is not that of the mesh, ", D));
-    }
+    WELLSPACE_RETURN_IF_ERROR(CheckParameters(parameters));
     context.EnterPhase(Phase::kRefinement);
-    Demands<D> demands;
-    demands.criterion = parameters.criterion;
-    demands.rho = parameters.rho == 0 ? DefaultRho(D) : parameters.rho;
-    if (parameters.max_circumradius != 0) {
-      demands.sizes.max_circumradius = parameters.max_circumradius * domain_.scale;
-    }
-    for (const SizeBox& size : parameters.size_boxes) {
-      const Box<D> box = BoxOf<D>(size.low, size.high);
-      demands.sizes.regions.push_back(
-          {{domain_.Scaled(box.low), domain_.Scaled(box.high)}, size.max_circumradius * domain_.scale});
-    }
     is_refined_ = false;
-    absl::Status status = refinement_->Run(demands, VertexBudget(parameters), context);
+    absl::Status status = refinement_->Run(DemandsOf(parameters), VertexBudget(parameters), context);
     is_refined_ = status.ok();
     refinement_seconds_ += absl::ToDoubleSeconds(context.TimeIn(Phase::kRefinement));
     return status;
@@ -321,7 +308,46 @@ class MesherIn final : public Mesher {
     return absl::OkStatus();
   }
 
+  absl::StatusOr<MeshEstimate> Estimate(const MeshParameters& parameters, const RunContext& context) const override {
+    WELLSPACE_RETURN_IF_ERROR(CheckParameters(parameters));
+    if (structure_.vertex_count() > built_count_) {
+      return absl::FailedPreconditionError(
+          "vertices have been inserted since the mesher was created; an estimate is made before that");
+    }
+    WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size, EstimateSize<D>(structure_, DemandsOf(parameters), context));
+    MeshEstimate estimate;
+    estimate.vertices = static_cast<uint64_t>(size.vertices);
+    estimate.simplices = static_cast<uint64_t>(size.simplices);
+    estimate.memory_bytes = static_cast<uint64_t>(size.bytes);
+    estimate.tree_leaves = structure_.tree().leaf_count();
+    return estimate;
+  }
+
  private:
+  static absl::Status CheckParameters(const MeshParameters& parameters) {
+    WELLSPACE_RETURN_IF_ERROR(ValidateParameters(parameters));
+    if (parameters.dimension != D) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("dimension: ", parameters.dimension, " is not that of the mesh, ", D));
+    }
+    return absl::OkStatus();
+  }
+
+  Demands<D> DemandsOf(const MeshParameters& parameters) const {
+    Demands<D> demands;
+    demands.criterion = parameters.criterion;
+    demands.rho = parameters.rho == 0 ? DefaultRho(D) : parameters.rho;
+    if (parameters.max_circumradius != 0) {
+      demands.sizes.max_circumradius = parameters.max_circumradius * domain_.scale;
+    }
+    for (const SizeBox& size : parameters.size_boxes) {
+      const Box<D> box = BoxOf<D>(size.low, size.high);
+      demands.sizes.regions.push_back(
+          {{domain_.Scaled(box.low), domain_.Scaled(box.high)}, size.max_circumradius * domain_.scale});
+    }
+    return demands;
+  }
+
   // Refuses numbers that are no vertex.
   absl::Status CheckVertices(std::span<const uint32_t> vertices) const {
     for (size_t i = 0; i < vertices.size(); ++i) {
@@ -490,7 +516,8 @@ class MesherIn final : public Mesher {
   std::optional<Refinement<D>> refinement_;
   bool is_refined_ = false;
 
-  uint64_t distinct_count_ = 0;         // vertices that were given to Initialize
+  uint64_t built_count_ = 0;            // vertices after Initialize: input points and corners of the box
+  uint64_t distinct_count_ = 0;         // the former
   std::vector<uint32_t> output_index_;  // by vertex; of the first distinct_count_ at least
   std::vector<VertexId> vertex_at_;     // by output index, of the first distinct_count_
   std::vector<uint32_t> input_vertex_;  // by point given
@@ -584,6 +611,12 @@ absl::StatusOr<Mesh> MeshPoints(const MeshParameters& parameters, std::span<cons
   WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<Mesher> mesher, Mesher::Create(parameters, points, context));
   WELLSPACE_RETURN_IF_ERROR(mesher->Refine(parameters, context));
   return mesher->Extract(parameters.threads, context);
+}
+
+absl::StatusOr<MeshEstimate> EstimateMesh(const MeshParameters& parameters, std::span<const double> points,
+                                          RunContext& context) {
+  WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<Mesher> mesher, Mesher::Create(parameters, points, context));
+  return mesher->Estimate(parameters, context);
 }
 
 }  // namespace wellspace::core

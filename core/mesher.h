@@ -201,6 +201,13 @@ class Mesher {
   // Complexity: O(1) for each vertex added, and one pass over the indices of the mesh.
   // Errors:     as Extract; INVALID_ARGUMENT for another mesh. On an error `mesh` is unchanged.
   virtual absl::Status Update(Mesh& mesh, int threads, RunContext& context) = 0;
+
+  // What the mesh would take with these parameters, from the tree as Create left it.
+  //
+  // Errors:     INVALID_ARGUMENT (parameters); FAILED_PRECONDITION once vertices have been inserted; CANCELLED,
+  //             DEADLINE_EXCEEDED.
+  // Source:     docs/design/estimate.md.
+  virtual absl::StatusOr<MeshEstimate> Estimate(const MeshParameters& parameters, const RunContext& context) const = 0;
 };
 
 // Meshes `points` in their box: Create, Refine, Extract.

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "core/base/dimensions.h"
+#include "core/geometry/rounded_quotient.h"
 
 namespace wellspace::core {
 namespace {
@@ -254,28 +255,6 @@ BigInteger NormSq(const std::array<BigInteger, N>& row) {
     sum += x * x;
   }
   return sum;
-}
-
-// value * 2^exponent, cut off to 63 bits and then rounded.
-double Rounded(const BigInteger& value, int exponent) {
-  if (value == 0) {
-    return 0;
-  }
-  const BigInteger magnitude = abs(value);
-  const int excess = std::max(0, static_cast<int>(msb(magnitude)) - 62);
-  const auto head = static_cast<double>(static_cast<uint64_t>(BigInteger(magnitude >> excess)));
-  return std::scalbn(value < 0 ? -head : head, exponent + excess);
-}
-
-// numerator / denominator * 2^exponent, within a relative error of 2^-50.
-double RoundedQuotient(const BigInteger& numerator, const BigInteger& denominator, int exponent) {
-  if (numerator == 0) {
-    return 0;
-  }
-  const int bits =
-      static_cast<int>(msb(BigInteger(abs(denominator)))) - static_cast<int>(msb(BigInteger(abs(numerator))));
-  const int shift = std::max(0, bits + 64);
-  return Rounded(BigInteger((numerator << shift) / denominator), exponent - shift);
 }
 
 }  // namespace

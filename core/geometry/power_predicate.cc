@@ -11,6 +11,7 @@
 #include "core/base/dimensions.h"
 #include "core/geometry/fixed_integer.h"
 #include "core/geometry/minors.h"
+#include "core/geometry/rounded_quotient.h"
 
 namespace wellspace::core {
 namespace {
@@ -356,9 +357,15 @@ struct BigRing {
   }
 };
 
+template <int D>
+struct BigRows {
+  Rows<BigRing, D> rows;
+  int unit;  // of the differences, as an exponent of 2
+};
+
 // The rows from the coordinates: their differences could overflow.
 template <int D>
-Rows<BigRing, D> ToBigRows(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u) {
+BigRows<D> ToBigRows(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u) {
   int unit = std::numeric_limits<int>::max();
   const auto include = [&](double x) { unit = std::min(unit, Decompose(x).exponent); };
   std::for_each(site.begin(), site.end(), include);
@@ -376,7 +383,9 @@ Rows<BigRing, D> ToBigRows(const Point<D>& site, const std::array<PlaneSource<D>
   };
   std::array<BigRing::Integer, D> origin;
   std::transform(site.begin(), site.end(), origin.begin(), to_integer);
-  Rows<BigRing, D> rows;
+  BigRows<D> big;
+  big.unit = unit;
+  Rows<BigRing, D>& rows = big.rows;
   for (int j = 0; j <= D; ++j) {
     if (j < D && planes[j].IsWall()) {
       const int axis = planes[j].axis;
@@ -390,7 +399,7 @@ Rows<BigRing, D> ToBigRows(const Point<D>& site, const std::array<PlaneSource<D>
       rows.offsets[j] += rows.normals[j][i] * rows.normals[j][i];
     }
   }
-  return rows;
+  return big;
 }
 
 }  // namespace
@@ -405,11 +414,31 @@ ExactDecision DecideCut(const Point<D>& site, const std::array<PlaneSource<D>, D
   if (Rows<FixedRing<2>, D> rows; ToRows<D>(differences, planes, rows)) {
     return Decide<FixedRing<2>, D>(site, planes, u, rule, rows);
   }
-  return Decide<BigRing, D>(site, planes, u, rule, ToBigRows<D>(site, planes, u));
+  return Decide<BigRing, D>(site, planes, u, rule, ToBigRows<D>(site, planes, u).rows);
 }
 
-#define WELLSPACE_INSTANTIATE(D) \
-  template ExactDecision DecideCut<D>(const Point<D>&, const std::array<PlaneSource<D>, D>&, const Point<D>&, TieRule);
+template <int D>
+Point<D> ExactMeetingPoint(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes) {
+  // In units of 2^unit the coordinates solve 2 n_j . x = 2 c_j; by Cramer's rule.
+  const BigRows<D> big = ToBigRows<D>(site, planes, site);
+  std::array<std::array<BigRing::Integer, D>, D> normals;
+  std::copy_n(big.rows.normals.begin(), D, normals.begin());
+  const BigRing::Integer determinant = MinorsOf<BigRing, D>(normals)[0];
+  Point<D> x;
+  for (int k = 0; k < D; ++k) {
+    auto replaced = normals;
+    for (int j = 0; j < D; ++j) {
+      replaced[j][k] = big.rows.offsets[j];
+    }
+    x[k] = RoundedQuotient(MinorsOf<BigRing, D>(replaced)[0], determinant, big.unit - 1);
+  }
+  return x;
+}
+
+#define WELLSPACE_INSTANTIATE(D)                                                                              \
+  template ExactDecision DecideCut<D>(const Point<D>&, const std::array<PlaneSource<D>, D>&, const Point<D>&, \
+                                      TieRule);                                                               \
+  template Point<D> ExactMeetingPoint<D>(const Point<D>&, const std::array<PlaneSource<D>, D>&);
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 

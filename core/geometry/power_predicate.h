@@ -71,6 +71,15 @@ template <int D>
 ExactDecision DecideCut(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u,
                         TieRule rule);
 
+// The point where D planes meet, relative to `site`, for planes so nearly dependent that doubles cannot tell where.
+//
+// REQUIRES:   as DecideCut.
+// Guarantees: (1) each coordinate is within a relative error of 2^-50 of the exact one.
+// Complexity: D determinants of integers of (D + 1) times the bits that the coordinates span.
+// Errors:     none.
+template <int D>
+Point<D> ExactMeetingPoint(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes);
+
 }  // namespace wellspace::core
 
 #endif  // WELLSPACE_CORE_GEOMETRY_POWER_PREDICATE_H_

@@ -252,7 +252,7 @@ void Polytope<D>::MakeNewNodes(uint16_t plane) {
       node.planes[k] = plane;
       node.neighbours.fill(kNoNode);
       node.neighbours[k] = kept;
-      Place(node, kept, removed);
+      Place(node);
       for (Index& back : nodes_[kept].neighbours) {
         if (back == removed) {
           back = index;
@@ -266,31 +266,27 @@ void Polytope<D>::MakeNewNodes(uint16_t plane) {
   LinkNewNodes(plane, first_new);
 }
 
-// Computes a node's position and its error. Where the planes are too nearly dependent for a bound, the node is put
-// between the ends of its edge, and left to the exact stage.
+// Computes a node's position and its error; exactly where the planes are too nearly dependent for a bound.
 template <int D>
-void Polytope<D>::Place(CellNode<D>& node, Index kept, Index removed) {
+void Polytope<D>::Place(CellNode<D>& node) const {
   std::array<const Plane<D>*, D> planes;
   for (int k = 0; k < D; ++k) {
     planes[k] = &planes_[node.planes[k]];
   }
-  const Placement<D> placed = Meet<D>(planes);
-  node.slack = placed.error;
-  if (std::isfinite(placed.error)) {
-    node.x = placed.x;
-    node.radius_sq = NormSq<D>(node.x);
-    const double radius = std::sqrt(node.radius_sq);
-    node.slack += 16 * kUnit * radius;
-    node.reach = radius + node.slack;
-    return;
+  Placement<D> placed = Meet<D>(planes);
+  if (!std::isfinite(placed.error)) {
+    std::array<PlaneSource<D>, D> sources;
+    for (int k = 0; k < D; ++k) {
+      sources[k] = planes[k]->source;
+    }
+    placed.x = ExactMeetingPoint<D>(site_, sources);
+    placed.error = 8 * kUnit * std::sqrt(NormSq<D>(placed.x));
   }
-  const double span = excess_[removed] - excess_[kept];
-  const double t = span > 0 ? std::min(1.0, std::max(0.0, -excess_[kept] / span)) : 0.5;
-  for (int i = 0; i < D; ++i) {
-    node.x[i] = nodes_[kept].x[i] + t * (nodes_[removed].x[i] - nodes_[kept].x[i]);
-  }
-  node.radius_sq = std::max(nodes_[kept].radius_sq, nodes_[removed].radius_sq);
-  node.reach = std::max(nodes_[kept].reach, nodes_[removed].reach);
+  node.x = placed.x;
+  node.radius_sq = NormSq<D>(node.x);
+  const double radius = std::sqrt(node.radius_sq);
+  node.slack = placed.error + 16 * kUnit * radius;
+  node.reach = radius + node.slack;
 }
 
 // Joins the new nodes along the edges of the new facet: two are joined if they share D - 2 planes beside the new one.
@@ -335,15 +331,19 @@ void Polytope<D>::LinkNewNodes(uint16_t plane, Index first_new) {
         if (nodes_[index].planes[slot] == plane) {
           continue;
         }
-        Ridge ridge;
-        ridge.end = {index, slot};
+        static_assert(D <= 6);
+        std::array<uint16_t, D - 2> along;
         int count = 0;
         for (int other = 0; other < D; ++other) {
           if (other != slot && nodes_[index].planes[other] != plane) {
-            ridge.planes[count++] = nodes_[index].planes[other];
+            along[count++] = nodes_[index].planes[other];
           }
         }
-        std::sort(ridge.planes.begin(), ridge.planes.end());
+        std::sort(along.begin(), along.end());
+        Ridge ridge{0, {index, slot}};
+        for (const uint16_t each : along) {
+          ridge.planes = ridge.planes << 16 | each;
+        }
         ridges_.push_back(ridge);
       }
     }

@@ -103,15 +103,15 @@ class Polytope {
     Index node = kNoNode;
     uint8_t slot = 0;
   };
-  // The same, with the D - 2 planes that the edge runs along beside the new one, ascending.
+  // The same, with the D - 2 planes that the edge runs along beside the new one, ascending, 16 bits each.
   struct Ridge {
-    std::array<uint16_t, D - 2> planes;
+    uint64_t planes;
     End end;
   };
 
   bool IsCutOff(const CellNode<D>& node, double excess, const Plane<D>& plane);
   void MakeNewNodes(uint16_t plane);
-  void Place(CellNode<D>& node, Index kept, Index removed);
+  void Place(CellNode<D>& node) const;
   void LinkNewNodes(uint16_t plane, Index first_new);
   void Join(End a, End b);
   void DropRemovedNodes();
