@@ -63,6 +63,23 @@ absl::Status CheckBox(const Box<D>& box) {
   return absl::OkStatus();
 }
 
+// Refuses point `index` if it is nearer to a face of the box that it does not lie on than the arithmetic serves.
+template <int D>
+absl::Status CheckFaces(const Domain<D>& domain, std::span<const double> points, size_t index) {
+  const Point<D> p = domain.Scaled(PointAt<D>(points, index));
+  for (int face = 0; face < 2 * D; ++face) {
+    const double distance = domain.scaled_box.DistanceToFace(p, face);
+    if (distance > 0 && distance < domain.MinSeparation()) {
+      return absl::InvalidArgumentError(absl::StrFormat(
+          "points[%d] = %s is only %g from the %s face of axis %d of the domain, too close for the arithmetic of "
+          "doubles (on it, or at least %g away, is needed); move the domain's face",
+          index, FormatCoordinates(PointAt<D>(points, index)), distance / domain.scale, face % 2 == 0 ? "low" : "high",
+          face / 2, domain.MinSeparation() / domain.scale));
+    }
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 template <int D>
@@ -160,6 +177,7 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<cons
     }
     const Point<D> p = point_of(entries[i]);
     if (i == 0 || entries[i].cube != entries[i - 1].cube) {
+      WELLSPACE_RETURN_IF_ERROR(CheckFaces<D>(domain, points, entries[i].input));
       cloud.points.push_back(p);
       cloud.first_input.push_back(entries[i].input);
     } else if (p != cloud.points.back()) {
@@ -183,30 +201,21 @@ absl::Status TooCloseError(const Domain<D>& domain, std::span<const double> poin
 
 template <int D>
 absl::Status CheckSeparation(const Domain<D>& domain, const SortedCloud<D>& cloud, const QueryStructure<D>& structure,
-                             std::span<const double> points, const RunContext& context) {
+                             uint32_t first, std::span<const double> points, const RunContext& context) {
   const double least = domain.MinSeparation();
   Workspace<D> workspace;
   for (uint32_t i = 0; i < cloud.points.size(); ++i) {
     WELLSPACE_RETURN_IF_ERROR(context.Check());
-    const VertexId v{i};
+    const VertexId v{first + i};
     const size_t input = cloud.first_input[i];
     const auto [nearest, nearest_sq] = structure.ApproximateNearestNeighbor(v, workspace);
-    if (nearest_sq < least * least) {
-      const bool is_input = Index(nearest) < cloud.points.size();
+    // A distance of 0 is that of a point on a corner, which is one vertex with it in the mesh.
+    if (nearest_sq > 0 && nearest_sq < least * least) {
+      const uint32_t other = Index(nearest) - first;  // a corner before them wraps around
+      const bool is_input = other < cloud.points.size();
       return TooCloseError<D>(
           domain, points, input, std::sqrt(nearest_sq),
-          is_input ? absl::StrCat("points[", cloud.first_input[Index(nearest)], "]") : "a corner of the domain");
-    }
-    for (int face = 0; face < 2 * D; ++face) {
-      const double distance = domain.scaled_box.DistanceToFace(structure.point(v), face);
-      if (distance > 0 && distance < least) {
-        return absl::InvalidArgumentError(
-            absl::StrFormat("points[%d] = %s is only %g from the %s face of axis %d of the domain, too close for the "
-                            "arithmetic of doubles (on it, or "
-                            "at least %g away, is needed); move the domain's face",
-                            input, FormatCoordinates(PointAt<D>(points, input)), distance / domain.scale,
-                            face % 2 == 0 ? "low" : "high", face / 2, least / domain.scale));
-      }
+          is_input ? absl::StrCat("points[", cloud.first_input[other], "]") : "a corner of the domain");
     }
   }
   return absl::OkStatus();
@@ -219,7 +228,7 @@ absl::Status CheckSeparation(const Domain<D>& domain, const SortedCloud<D>& clou
   template absl::StatusOr<SortedCloud<D>> SortCloud<D>(const Domain<D>&, std::span<const double>, const RunContext&);  \
   template absl::Status TooCloseError<D>(const Domain<D>&, std::span<const double>, size_t, double, std::string_view); \
   template absl::Status CheckSeparation<D>(const Domain<D>&, const SortedCloud<D>&, const QueryStructure<D>&,          \
-                                           std::span<const double>, const RunContext&);
+                                           uint32_t, std::span<const double>, const RunContext&);
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 

@@ -65,7 +65,7 @@ struct SortedCloud {
 };
 
 // Errors:     INVALID_ARGUMENT, naming the point: not finite, outside the domain, too small for its scale, too close to
-//             another one; CANCELLED, DEADLINE_EXCEEDED.
+//             a face of the box that it does not lie on, or, in one cube of the Morton grid, to another one; CANCELLED, DEADLINE_EXCEEDED.
 // Complexity: O(n log n).
 template <int D>
 absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<const double> points,
@@ -76,14 +76,14 @@ template <int D>
 absl::Status TooCloseError(const Domain<D>& domain, std::span<const double> points, size_t index, double distance,
                            std::string_view other);
 
-// Refuses points nearer to each other, to a corner of the box, or to a face of it that they do not lie on, than the
-// arithmetic serves. The vertices of `structure` are those of `cloud`, in its order, then the corners.
+// Refuses points nearer to each other, or to a corner of the box, than the arithmetic serves. The vertices of `structure` are those of `cloud`, in its order and from number `first` on, and the
+// corners. A point on a corner is no error.
 //
 // Errors:     INVALID_ARGUMENT, naming the point; CANCELLED, DEADLINE_EXCEEDED.
 // Complexity: O(n) queries.
 template <int D>
 absl::Status CheckSeparation(const Domain<D>& domain, const SortedCloud<D>& cloud, const QueryStructure<D>& structure,
-                             std::span<const double> points, const RunContext& context);
+                             uint32_t first, std::span<const double> points, const RunContext& context);
 
 }  // namespace wellspace::core
 

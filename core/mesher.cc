@@ -123,7 +123,7 @@ class MesherIn final : public Mesher {
     }
     WELLSPACE_RETURN_IF_ERROR(
         structure_.Initialize(domain_.scaled_box, cloud.points, kLeavesPerVertex * max_vertices + (1u << D), context));
-    WELLSPACE_RETURN_IF_ERROR(CheckSeparation<D>(domain_, cloud, structure_, points, context));
+    WELLSPACE_RETURN_IF_ERROR(CheckSeparation<D>(domain_, cloud, structure_, 0, points, context));
 
     // Vertices are named in the order of the input's first appearances.
     std::vector<uint32_t> rank(distinct);
@@ -171,8 +171,13 @@ class MesherIn final : public Mesher {
     // The points among themselves, and beside the faces of the box.
     QueryStructure<D> apart;
     WELLSPACE_RETURN_IF_ERROR(
-        apart.Initialize(domain_.scaled_box, cloud.points, kLeavesPerVertex * kDefaultMaxVertices, context));
-    WELLSPACE_RETURN_IF_ERROR(CheckSeparation<D>(domain_, cloud, apart, points, context));
+        apart.Initialize(domain_.scaled_box, {}, kLeavesPerVertex * kDefaultMaxVertices, context));
+    const uint32_t corners = apart.vertex_count();
+    for (const Point<D>& p : cloud.points) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+      apart.AddVertex(kNoVertex, p);
+    }
+    WELLSPACE_RETURN_IF_ERROR(CheckSeparation<D>(domain_, cloud, apart, corners, points, context));
     std::vector<VertexId> known(cloud.points.size(), kNoVertex);
     for (size_t i = 0; i < cloud.points.size(); ++i) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());

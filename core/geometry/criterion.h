@@ -10,7 +10,7 @@ namespace wellspace::core {
 enum class Criterion {
   kRadiusEdge,  // circumradius <= rho * (its shortest edge); what Ruppert, Shewchuk, Triangle and TetGen promise
   kWellSpaced,  // [HT08]'s: no node of a vertex's Voronoi cell is farther from it than rho * (distance to its nearest
-                // neighbour); stronger, and three to four times as many vertices
+                // neighbour); stronger, and about two and a half times as many vertices
 };
 
 // A box in which simplices are small.

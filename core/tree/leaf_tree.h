@@ -37,10 +37,10 @@ class LeafTree {
   static constexpr int kChildren = 1 << D;
   static constexpr int kFaces = 2 * D;
   // In 5-D and 6-D a vertex has hundreds of neighbours and a node 32 or 64 children: fewer, larger leaves serve better.
-  static constexpr int kLeafCapacity = D <= 3 ? 16 : D == 4 ? 64 : 16 << D;
+  static constexpr int kLeafCapacity = D <= 3 ? 32 : D == 4 ? 64 : 16 << D;
   // A leaf may be this many times larger than lfs on it. At least 2, so that the neighbours of a leaf hold all that is
   // near it.
-  static constexpr double kCoarseness = D <= 4 ? 32 : 1024;
+  static constexpr double kCoarseness = D <= 4 ? 128 : 1024;
 
   // The vertices of one leaf, side by side.
   struct Bucket {

@@ -45,6 +45,10 @@ std::vector<GoldenMesh> GoldenMeshes() {
       {"rounded_3", "rounded", 3, 1000, {}, 0, 0},
       {"boundary_3", "boundary", 3, 300, {}, 0, 0},
       {"skew_3", "skew", 3, 300, {}, 0, 0},
+      {"uniform_4", "uniform", 4, 20, {}, 0, 0},
+      {"rounded_4_well_spaced", "rounded", 4, 10, {.criterion = Criterion::kWellSpaced}, 0, 0},
+      {"uniform_5", "uniform", 5, 2, {}, 0, 0},
+      {"none_6", "none", 6, 0, {}, 0, 0},
       {"uniform_3_boxed", "uniform", 3, 100, {.size_boxes = {{{0.2, 0.2, 0.2}, {0.4, 0.4, 0.4}, 0.03}}}, 0, 0},
   };
 }
