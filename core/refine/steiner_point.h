@@ -39,7 +39,7 @@ SteinerPoint<D> OffCenter(const Polytope<D>& cell, int node, int plane, double d
 //
 // Complexity: O(nodes).
 // Errors:     none.
-// Source:     docs/design/core.md, the loop.
+// Source:     docs/design/refine.md, the faces of the box.
 template <int D>
 SteinerPoint<D> EncroachmentPoint(const Polytope<D>& cell, int face);
 
@@ -49,7 +49,7 @@ SteinerPoint<D> EncroachmentPoint(const Polytope<D>& cell, int face);
 // Guarantees: (1) the result is in the box, and has the coordinate of each of its faces exactly.
 // Complexity: O(D^2).
 // Errors:     none.
-// Source:     docs/design/core.md, the loop.
+// Source:     docs/design/refine.md, the faces of the box.
 template <int D>
 SteinerPoint<D> SnapToBoundary(const Box<D>& box, SteinerPoint<D> point);
 
