@@ -43,7 +43,7 @@ TEST(CloudsTest, EqualToTheReferenceScript) {
 
 TEST(CloudsTest, DegenerateCloudsLieInTheUnitBox) {
   for (const std::string_view kind : kDegenerateKinds) {
-    for (const int dimension : {2, 3}) {
+    for (const int dimension : {2, 3, 4, 5, 6}) {
       const std::vector<double> cloud = MakeCloud(kind, dimension, 200);
       EXPECT_TRUE(std::all_of(cloud.begin(), cloud.end(), [](double x) { return 0 <= x && x <= 1; })) << kind;
       if (kind != "none" && kind != "one" && kind != "slanted") {
@@ -54,11 +54,11 @@ TEST(CloudsTest, DegenerateCloudsLieInTheUnitBox) {
 }
 
 TEST(CloudsTest, CosphericalPointsAreExactlySo) {
-  for (const int dimension : {2, 3}) {
+  for (const int dimension : {2, 3, 4, 5, 6}) {
     const std::vector<double> cloud = MakeCloud("cospherical", dimension, 300);
     const size_t d = static_cast<size_t>(dimension);
     ASSERT_EQ(cloud.size(), 300 * d);
-    std::set<double> squares;  // every term is an integer multiple of 2^-34: no rounding
+    std::set<double> squares;  // every term is an integer multiple of 2^-34 or more: no rounding
     for (size_t i = 0; i < 300; ++i) {
       double sum = 0;
       for (size_t k = 0; k < d; ++k) {

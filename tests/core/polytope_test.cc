@@ -13,10 +13,13 @@
 
 #include "tests/support/brute_force.h"
 #include "tests/support/clouds.h"
+#include "tests/support/exact_nodes.h"
 
 namespace wellspace::core {
 namespace {
 
+using test::ByDimension;
+using test::HasNodesWithinSlack;
 using test::IntegerPoint;
 using test::IsSimplePolytope;
 using test::NamesOf;
@@ -59,10 +62,10 @@ IntegerCloud<D> DrawGridCloud(int64_t range, size_t count, SplitMix64& random) {
   return cloud;
 }
 
-// Lattice points of the circle of radius 65 or the sphere of radius 15, antipodes among them, and its centre not.
+// Lattice points of the circle of radius 65 or the spheres of radius 15, antipodes among them, and its centre not.
 template <int D>
 IntegerCloud<D> DrawSphereCloud(size_t count, SplitMix64& random) {
-  const int64_t radius = D == 2 ? 65 : 15;
+  const int64_t radius = ByDimension<D>({65, 15});
   std::set<IntegerPoint<D>> seen;
   IntegerCloud<D> cloud;
   cloud.low.fill(-100);
@@ -135,7 +138,7 @@ class PolytopeTest : public ::testing::Test {
   SplitMix64 random_{seed_};
   ::testing::ScopedTrace trace_;
 };
-TYPED_TEST_SUITE(PolytopeTest, test::Dimensions);
+TYPED_TEST_SUITE(PolytopeTest, test::AllDimensions);
 
 TYPED_TEST(PolytopeTest, BeginsAsTheBox) {
   constexpr int D = TypeParam::kValue;
@@ -168,8 +171,8 @@ TYPED_TEST(PolytopeTest, PerturbedCellIsThatOfTheWeightedVertices) {
   constexpr int D = TypeParam::kValue;
   uint64_t perturbed = 0;
   for (const int64_t range : {3, 4, 1000}) {
-    for (int i = 0; i < (D == 2 ? 30 : 6); ++i) {
-      const IntegerCloud<D> cloud = DrawGridCloud<D>(range, D == 2 ? 8 : 10, this->random_);
+    for (int i = 0; i < ByDimension<D>({30, 6, 3, 1}); ++i) {
+      const IntegerCloud<D> cloud = DrawGridCloud<D>(range, ByDimension<D>({8, 10, 8, 7, 5}), this->random_);
       Polytope<D> cell;
       CutAll<D>(cloud, 0, DrawOrder<D>(cloud, 0, this->random_), TieRule::kPerturb, cell);
       ASSERT_TRUE(IsSimplePolytope<D>(cell));
@@ -185,8 +188,8 @@ TYPED_TEST(PolytopeTest, PerturbedCellIsThatOfTheWeightedVertices) {
 TYPED_TEST(PolytopeTest, KeptCellHasTheNodesOfTheUnweightedOne) {
   constexpr int D = TypeParam::kValue;
   for (const int64_t range : {3, 4, 1000}) {
-    for (int i = 0; i < (D == 2 ? 30 : 6); ++i) {
-      const IntegerCloud<D> cloud = DrawGridCloud<D>(range, D == 2 ? 8 : 10, this->random_);
+    for (int i = 0; i < ByDimension<D>({30, 6, 3, 1}); ++i) {
+      const IntegerCloud<D> cloud = DrawGridCloud<D>(range, ByDimension<D>({8, 10, 8, 7, 5}), this->random_);
       Polytope<D> cell;
       CutAll<D>(cloud, 0, DrawOrder<D>(cloud, 0, this->random_), TieRule::kKeep, cell);
       ASSERT_TRUE(IsSimplePolytope<D>(cell));
@@ -199,8 +202,8 @@ TYPED_TEST(PolytopeTest, KeptCellHasTheNodesOfTheUnweightedOne) {
 
 TYPED_TEST(PolytopeTest, CosphericalVerticesGiveOneCellInAnyOrder) {
   constexpr int D = TypeParam::kValue;
-  for (int i = 0; i < 4; ++i) {
-    const IntegerCloud<D> cloud = DrawSphereCloud<D>(D == 2 ? 24 : 12, this->random_);
+  for (int i = 0; i < ByDimension<D>({4, 4, 3, 1}); ++i) {
+    const IntegerCloud<D> cloud = DrawSphereCloud<D>(ByDimension<D>({24, 12, 9, 7, 5}), this->random_);
     Polytope<D> cell;
     const auto exact = test::ComputeExactCell<D>(cloud.vertices, 0, cloud.low, cloud.high, true);
     for (int j = 0; j < 40; ++j) {
@@ -217,8 +220,9 @@ TYPED_TEST(PolytopeTest, CosphericalVerticesGiveOneCellInAnyOrder) {
 // Guarantees (1) and (2), Cut's result and Reaches, after each cut.
 TYPED_TEST(PolytopeTest, EachCutOnlyRemoves) {
   constexpr int D = TypeParam::kValue;
-  for (int i = 0; i < 10; ++i) {
-    const IntegerCloud<D> cloud = DrawGridCloud<D>(i % 2 == 0 ? 5 : 1000, 20, this->random_);
+  for (int i = 0; i < ByDimension<D>({10, 10, 10, 4}); ++i) {
+    const IntegerCloud<D> cloud =
+        DrawGridCloud<D>(i % 2 == 0 ? 5 : 1000, ByDimension<D>({20, 20, 20, 12, 8}), this->random_);
     const Point<D> site = ToPoint<D>(cloud.vertices[0]);
     Polytope<D> cell;
     cell.Reset(site, cloud.Bounds(), Faces<D>(), i % 4 < 2 ? TieRule::kKeep : TieRule::kPerturb);
@@ -230,6 +234,7 @@ TYPED_TEST(PolytopeTest, EachCutOnlyRemoves) {
       const bool reaches = cell.Reaches(Box<D>{position, position});
       const bool has_cut = cell.Cut(VertexId(u), position);
       ASSERT_TRUE(IsSimplePolytope<D>(cell));
+      ASSERT_TRUE(HasNodesWithinSlack<D>(cell));
       ASSERT_TRUE(reaches || !has_cut) << "a vertex that Reaches excludes has cut";
       ASSERT_EQ(has_cut, NamesOf<D>(cell) != before);
       ASSERT_LE(cell.reach_sq(), reach_sq * (1 + 1e-12));
@@ -298,6 +303,140 @@ TYPED_TEST(PolytopeTest, ReachesExactlyTheBoxesOfVerticesThatWouldCut) {
   }
   EXPECT_GT(reached, 50);
   EXPECT_GT(missed, 50);
+}
+
+// ---- Positions of nodes
+// ---------------------------------------------------------------------------------------------------------
+
+// D planes through the neighbourhood of one site: bisectors and walls, the last one as dependent on the others as `gap`
+// says, of length 1 if it is 1.
+template <int D>
+std::array<PlaneSource<D>, D> DrawPlanes(const Point<D>& site, double gap, SplitMix64& random) {
+  std::array<PlaneSource<D>, D> planes;
+  Point<D> last{};
+  for (int j = 0; j < D; ++j) {
+    PlaneSource<D>& plane = planes[j];
+    if (j + 1 < D && random.Below(4) == 0) {
+      plane.axis = static_cast<int>(random.Below(D));
+      plane.coordinate = site[plane.axis] + random.Unit();
+      last[plane.axis] += random.Unit();
+      continue;
+    }
+    const double factor = random.Unit() - 0.5;
+    for (int k = 0; k < D; ++k) {
+      const double w = j + 1 < D ? random.Unit() - 0.5 : last[k] + gap * (random.Unit() - 0.5);
+      plane.generator[k] = site[k] + w;
+      last[k] += factor * w;
+    }
+  }
+  return planes;
+}
+
+// Guarantee (1) of ExactMeetingPoint, also where a double more or less turns the planes around.
+TYPED_TEST(PolytopeTest, ExactMeetingPointIsRightTo50Bits) {
+  constexpr int D = TypeParam::kValue;
+  int met = 0;
+  for (int i = 0; i < 600; ++i) {
+    const double scale = i % 5 == 0 ? 0x1p-30 : i % 7 == 0 ? 1e5 : 1;
+    Point<D> site;
+    for (double& x : site) {
+      x = i % 3 == 0 ? 0 : scale * (this->random_.Unit() - 0.5);
+    }
+    const auto planes = DrawPlanes<D>(site, std::ldexp(1.0, -(i % 60)), this->random_);
+    if (test::DoMeet<D>(site, planes)) {
+      ++met;
+      ASSERT_TRUE(test::IsMeetingPointTo<D>(50, site, planes, ExactMeetingPoint<D>(site, planes)))
+          << "planes dependent to " << i % 60 << " bits";
+    }
+  }
+  EXPECT_GT(met, 300);
+}
+
+// Where the bound of a node's error comes from a determinant (D <= 3) or a residual: few planes, so that nodes are where
+// many shapes of cells have them, in boxes whose planes are more and more nearly dependent on the bisectors.
+TYPED_TEST(PolytopeTest, NodesAreWithinTheirSlackOfWherePlanesMeet) {
+  constexpr int D = TypeParam::kValue;
+  for (int i = 0; i < ByDimension<D>({300, 200, 60, 20, 8}); ++i) {
+    const double flatness = std::ldexp(1.0, -(i % 53));
+    const int flat_axes = 1 + static_cast<int>(this->random_.Below(D - 1));
+    Box<D> box;
+    box.low.fill(-1);
+    box.high.fill(1);
+    Point<D> site;
+    for (double& x : site) {
+      x = i % 2 == 0 ? 0 : 1e-3 * this->random_.Unit();
+    }
+    Polytope<D> cell;
+    cell.Reset(site, box, Faces<D>(), i % 4 < 2 ? TieRule::kKeep : TieRule::kPerturb);
+    for (uint32_t u = 0; u < D + 6; ++u) {
+      Point<D> p = site;
+      for (int k = 0; k < D; ++k) {
+        p[k] += (k < flat_axes ? flatness : 1) * (2 * this->random_.Unit() - 1);
+      }
+      cell.Cut(VertexId{u}, p);
+    }
+    ASSERT_TRUE(IsSimplePolytope<D>(cell));
+    ASSERT_TRUE(HasNodesWithinSlack<D>(cell)) << "flat to " << i % 53 << " bits";
+  }
+}
+
+// Vertices on one sphere of D - 1 coordinates, a few units of 2^-50 apart in the last one: along that axis, in the sphere's
+// centre, the cell has nodes whose planes are as nearly dependent, so that no bound is to be had in doubles.
+TYPED_TEST(PolytopeTest, NodesOfNearlyDependentPlanesArePlacedExactly) {
+  constexpr int D = TypeParam::kValue;
+  int placed_exactly = 0;
+  for (int i = 0; i < ByDimension<D>({40, 40, 20, 6, 3}); ++i) {
+    // Radius 5 about the origin: all permutations of (3, 4, 0, ...) and (5, 0, ...), with signs.
+    const auto draw = [&] {
+      Point<D> p{};
+      if (D == 2 || this->random_.Below(3) == 0) {
+        p[this->random_.Below(D - 1)] = this->random_.Below(2) == 0 ? 5 : -5;
+      } else {
+        const uint64_t axis = this->random_.Below(D - 1);
+        const uint64_t other = (axis + 1 + this->random_.Below(D - 2)) % (D - 1);
+        p[axis] = this->random_.Below(2) == 0 ? 3 : -3;
+        p[other] = this->random_.Below(2) == 0 ? 4 : -4;
+      }
+      return p;
+    };
+    const Point<D> site = draw();
+    std::vector<Point<D>> others;
+    while (others.size() < 2 * D + 2) {
+      Point<D> p = draw();
+      if (p != site) {
+        p[D - 1] = 0x1p-50 * (static_cast<double>(this->random_.Below(33)) - 16);
+        others.push_back(p);
+      }
+    }
+    std::sort(others.begin(), others.end());
+    others.erase(std::unique(others.begin(), others.end()), others.end());
+    Box<D> box;
+    box.low.fill(-8);
+    box.high.fill(8);
+    std::set<test::NodeName<D>> names;
+    for (int order = 0; order < 3; ++order) {
+      Polytope<D> cell;
+      cell.Reset(site, box, Faces<D>(), order == 0 ? TieRule::kKeep : TieRule::kPerturb);
+      for (size_t j = 0; j < others.size(); ++j) {
+        const size_t u = order < 2 ? j : others.size() - 1 - j;
+        cell.Cut(VertexId(u), others[u]);
+      }
+      ASSERT_TRUE(IsSimplePolytope<D>(cell));
+      ASSERT_TRUE(HasNodesWithinSlack<D>(cell));
+      for (const CellNode<D>& node : cell.nodes()) {
+        // The bounds of doubles are larger by far.
+        const bool is_corner = std::all_of(node.planes.begin(), node.planes.end(),
+                                           [&](uint16_t index) { return cell.plane(index).source.IsWall(); });
+        placed_exactly += !is_corner && node.slack < 25 * 0x1p-53 * std::sqrt(node.radius_sq) ? 1 : 0;
+      }
+      if (order == 1) {
+        names = NamesOf<D>(cell);
+      } else if (order == 2) {
+        ASSERT_EQ(NamesOf<D>(cell), names) << "depends on the order of cuts";
+      }
+    }
+  }
+  EXPECT_GT(placed_exactly, 10);
 }
 
 // Lattice points of the circle of radius 5^7 13^6 about the origin, counter-clockwise: products of powers of Gaussian primes and

@@ -70,7 +70,7 @@ std::optional<core::Sign> ExactSide(std::span<const IntegerPoint<D>> vertices, s
 template <int D>
 std::set<NodeName<D>> NamesOf(const core::Polytope<D>& cell);
 
-// Invariant (1) of Polytope: a graph of a simple polytope. In 3-D by Euler's formula, in 2-D one cycle.
+// Invariant (1) of Polytope: a graph of a simple polytope, connected, whose faces obey the formula of Euler and Poincare.
 template <int D>
 ::testing::AssertionResult IsSimplePolytope(const core::Polytope<D>& cell);
 

@@ -13,8 +13,11 @@ namespace {
 
 using Cloud = std::vector<double>;
 
+constexpr int kMaxDimension = 6;
+using Coordinates = std::array<double, kMaxDimension>;
+
 // A direction drawn from the normal distribution, and its length.
-double DrawDirection(SplitMix64& random, int d, std::array<double, 3>& g) {
+double DrawDirection(SplitMix64& random, int d, Coordinates& g) {
   double sum = 0;
   for (int k = 0; k < d; ++k) {
     g[k] = random.Gauss();
@@ -42,7 +45,7 @@ Cloud Inner(SplitMix64& random, int d, size_t n) {
 
 Cloud Sphere(SplitMix64& random, int d, size_t n) {
   Cloud out;
-  std::array<double, 3> g;
+  Coordinates g;
   while (out.size() < n * d) {
     const double length = DrawDirection(random, d, g);
     for (int k = 0; k < d && length > 0; ++k) {
@@ -53,7 +56,7 @@ Cloud Sphere(SplitMix64& random, int d, size_t n) {
 }
 
 Cloud Clusters(SplitMix64& random, int d, size_t n) {
-  std::array<std::array<double, 3>, 6> centres;
+  std::array<Coordinates, 6> centres;
   for (auto& centre : centres) {
     for (int k = 0; k < d; ++k) {
       centre[k] = 0.3 + 0.4 * random.Unit();
@@ -62,7 +65,7 @@ Cloud Clusters(SplitMix64& random, int d, size_t n) {
   Cloud out;
   while (out.size() < n * d) {
     const int c = static_cast<int>(out.size() / d % 6);
-    std::array<double, 3> p;
+    Coordinates p;
     for (int k = 0; k < d; ++k) {
       p[k] = centres[c][k] + 0.5 * std::pow(10.0, -1 - c) * random.Gauss();
     }
@@ -98,7 +101,10 @@ Cloud Moment(SplitMix64&, int d, size_t n) {
 Cloud Grid(SplitMix64&, int d, size_t n) {
   const auto side = static_cast<size_t>(std::lround(std::pow(static_cast<double>(n), 1.0 / d)));
   const double spacing = 0.5 / static_cast<double>(std::bit_ceil(side));  // exact
-  const size_t count = d == 2 ? side * side : side * side * side;
+  size_t count = 1;
+  for (int k = 0; k < d; ++k) {
+    count *= side;
+  }
   Cloud out(count * d);
   for (size_t i = 0; i < count; ++i) {
     size_t rest = i;
@@ -111,7 +117,7 @@ Cloud Grid(SplitMix64&, int d, size_t n) {
 }
 
 Cloud Lines(SplitMix64& random, int d, size_t n) {
-  std::array<std::array<std::array<double, 3>, 2>, 5> segments;
+  std::array<std::array<Coordinates, 2>, 5> segments;
   for (auto& segment : segments) {
     for (auto& end : segment) {
       for (int k = 0; k < d; ++k) {
@@ -132,7 +138,7 @@ Cloud Lines(SplitMix64& random, int d, size_t n) {
 
 Cloud Annuli(SplitMix64& random, int d, size_t n) {
   Cloud out;
-  std::array<double, 3> g;
+  Coordinates g;
   for (size_t i = 0; i < n; ++i) {
     const double radius = 0.45 * std::pow(0.5, static_cast<double>(i % 12));
     const double length = DrawDirection(random, d, g);
@@ -148,7 +154,10 @@ Cloud Annuli(SplitMix64& random, int d, size_t n) {
 
 Cloud None(SplitMix64&, int, size_t) { return {}; }
 
-Cloud One(SplitMix64&, int d, size_t) { return d == 2 ? Cloud{0.3, 0.6} : Cloud{0.3, 0.6, 0.7}; }
+Cloud One(SplitMix64&, int d, size_t) {
+  constexpr Coordinates kPoint = {0.3, 0.6, 0.7, 0.4, 0.45, 0.55};
+  return {kPoint.begin(), kPoint.begin() + d};
+}
 
 Cloud Collinear(SplitMix64& random, int d, size_t n) {
   Cloud out(n * d, 0.5);
@@ -175,21 +184,37 @@ Cloud Coplanar(SplitMix64& random, int d, size_t n) {
   return out;
 }
 
+// Calls visit(x) for every x of `count` whole numbers >= 0 with a sum below `limit`, the last one counting fastest.
+template <typename Visit>
+void ForEachBelow(int count, int64_t limit, const Visit& visit, std::vector<int64_t> x = {}) {
+  if (count == 0) {
+    visit(x);
+    return;
+  }
+  for (int64_t i = 0; i < limit; ++i) {
+    x.push_back(i);
+    ForEachBelow(count - 1, limit - i, visit, x);
+    x.pop_back();
+  }
+}
+
 Cloud Slanted(SplitMix64&, int d, size_t n) {
-  const auto side = static_cast<int64_t>(std::pow(static_cast<double>(n) * (d == 2 ? 1 : 2), 1.0 / (d - 1)));
+  // There are about side^(d - 1) / (d - 1)! points.
+  double factorial = 1;
+  for (int k = 2; k < d; ++k) {
+    factorial *= k;
+  }
+  const auto side = static_cast<int64_t>(std::pow(static_cast<double>(n) * factorial, 1.0 / (d - 1)));
   const double spacing = 0.5 / static_cast<double>(std::bit_ceil(static_cast<uint64_t>(side)));
   Cloud out;
-  for (int64_t i = 0; i < side; ++i) {
-    if (d == 2) {
-      out.insert(out.end(),
-                 {0.25 + spacing * static_cast<double>(i), 0.25 + spacing * static_cast<double>(side - 1 - i)});
-      continue;
+  ForEachBelow(d - 1, side, [&](const std::vector<int64_t>& x) {
+    int64_t rest = side - 1;
+    for (const int64_t i : x) {
+      out.push_back(0.25 + spacing * static_cast<double>(i));
+      rest -= i;
     }
-    for (int64_t j = 0; i + j < side; ++j) {
-      out.insert(out.end(), {0.25 + spacing * static_cast<double>(i), 0.25 + spacing * static_cast<double>(j),
-                             0.25 + spacing * static_cast<double>(side - 1 - i - j)});
-    }
-  }
+    out.push_back(0.25 + spacing * static_cast<double>(rest));
+  });
   return out;
 }
 
@@ -204,26 +229,35 @@ Cloud Duplicates(SplitMix64& random, int d, size_t n) {
   return out;
 }
 
+using LatticePoint = std::array<int64_t, kMaxDimension>;
+
+// Appends the lattice points p with p_0^2 + ... + p_axis^2 = rest, whatever the coordinates beyond.
+void AppendLatticeSphere(int axis, int64_t radius, int64_t rest, LatticePoint p, std::vector<LatticePoint>& found) {
+  if (axis > 0) {
+    for (p[axis] = -radius; p[axis] <= radius; ++p[axis]) {
+      AppendLatticeSphere(axis - 1, radius, rest - p[axis] * p[axis], p, found);
+    }
+    return;
+  }
+  p[0] = std::lround(std::sqrt(static_cast<double>(std::max<int64_t>(rest, 0))));
+  if (p[0] * p[0] == rest) {
+    found.push_back(p);
+    if (p[0] != 0) {
+      p[0] = -p[0];
+      found.push_back(p);
+    }
+  }
+}
+
 // Lattice points at exactly one distance from the centre of the box; 32045 = 5 * 13 * 17 * 29 makes 324 of them in the
 // plane.
 Cloud Cospherical(SplitMix64& random, int d, size_t n) {
-  const int64_t radius = d == 2 ? 32045 : 325;
-  const double unit = d == 2 ? 0x1p-17 : 0x1p-10;
-  std::vector<std::array<int64_t, 3>> found;
-  const int64_t first = d == 2 ? 0 : -radius;
-  const int64_t last = d == 2 ? 0 : radius;
-  for (int64_t z = first; z <= last; ++z) {
-    for (int64_t y = -radius; y <= radius; ++y) {
-      const int64_t rest = radius * radius - y * y - z * z;
-      const auto x = static_cast<int64_t>(std::lround(std::sqrt(static_cast<double>(std::max<int64_t>(rest, 0)))));
-      if (x * x == rest) {
-        found.push_back({x, y, z});
-        if (x != 0) {
-          found.push_back({-x, y, z});
-        }
-      }
-    }
-  }
+  constexpr std::array<int64_t, 5> kRadius = {32045, 325, 25, 9, 5};
+  constexpr std::array kUnit = {0x1p-17, 0x1p-10, 0x1p-6, 0x1p-5, 0x1p-4};
+  const int64_t radius = kRadius[d - 2];
+  const double unit = kUnit[d - 2];
+  std::vector<LatticePoint> found;
+  AppendLatticeSphere(d - 1, radius, radius * radius, {}, found);
   for (size_t i = found.size(); i > 1; --i) {
     std::swap(found[i - 1], found[random.Below(i)]);
   }
@@ -255,7 +289,7 @@ Cloud Rounded(SplitMix64& random, int d, size_t n) {
 
 Cloud LogUniform(SplitMix64& random, int d, size_t n) {
   Cloud out;
-  std::array<double, 3> g;
+  Coordinates g;
   for (size_t i = 0; i < n; ++i) {
     const double radius = 0.4 * std::pow(10.0, -9 * (static_cast<double>(i) + random.Unit()) / static_cast<double>(n));
     const double length = DrawDirection(random, d, g);

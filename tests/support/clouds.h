@@ -47,7 +47,7 @@ std::string CloudName(std::string_view kind, int dimension);
 
 // A cloud in the unit box of about n points (grid, one, none, slanted: as many as fit), row-major.
 //
-// REQUIRES:   kind is one of the above; dimension is 2 or 3.
+// REQUIRES:   kind is one of the above; dimension is 2 to 6.
 std::vector<double> MakeCloud(std::string_view kind, int dimension, size_t n);
 
 // The same points in another order.
