@@ -141,6 +141,8 @@ absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
       Settle(v, found, clip, bucket + 1, own_.cell);
       return absl::OkStatus();
     }
+    // In 5-D and 6-D a cell may ask for a dozen points, which take milliseconds each.
+    WELLSPACE_RETURN_IF_ERROR(context_->Check());
     WELLSPACE_RETURN_IF_ERROR(Insert(insertion, SnapToBoundary<D>(structure_.box(), point)));
   }
 }

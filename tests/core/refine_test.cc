@@ -24,6 +24,7 @@
 namespace wellspace::core {
 namespace {
 
+using test::ByDimension;
 using test::Seed;
 using test::SplitMix64;
 using ::testing::HasSubstr;
@@ -47,7 +48,7 @@ struct Parameters {
 
 template <int D>
 Parameters Defaults() {
-  return {.rho = D == 2 ? std::sqrt(2.0) : 2.0};
+  return {.rho = ByDimension<D>({std::sqrt(2.0), 2.0, 2.9, 4.1})};
 }
 
 template <int D>
@@ -95,18 +96,18 @@ class RefineTest : public ::testing::Test {
   SplitMix64 random_{seed_};
   ::testing::ScopedTrace trace_;
 };
-TYPED_TEST_SUITE(RefineTest, test::Dimensions);
+TYPED_TEST_SUITE(RefineTest, test::UpTo5);
 
 TYPED_TEST(RefineTest, EveryCellIsGoodInTheEnd) {
   constexpr int D = TypeParam::kValue;
-  for (const std::string_view kind : test::AllKinds()) {
+  for (const std::string_view kind : test::SomeKinds(D)) {
     SCOPED_TRACE(std::string(kind));
-    QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, D == 2 ? 25 : 6));
+    QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, ByDimension<D>({25, 6, 4, 1})));
     const Parameters parameters = Defaults<D>();
     const absl::Status refined = RefineQuietly<D>(parameters, structure);
     ASSERT_TRUE(refined.ok()) << refined;
     Polytope<D> cell;
-    const uint32_t stride = structure.vertex_count() / 200 + 1;
+    const uint32_t stride = structure.vertex_count() / ByDimension<D>({200, 200, 40, 5}) + 1;
     for (uint32_t v = static_cast<uint32_t>(this->random_.Below(stride)); v < structure.vertex_count(); v += stride) {
       ExpectRefined<D>(structure, VertexId{v}, parameters.rho, cell);
       ASSERT_FALSE(this->HasFatalFailure());
@@ -117,12 +118,13 @@ TYPED_TEST(RefineTest, EveryCellIsGoodInTheEnd) {
 TYPED_TEST(RefineTest, KeepsTheTighterBoundsToo) {
   constexpr int D = TypeParam::kValue;
   Parameters parameters = Defaults<D>();
-  parameters.rho = D == 2 ? 0.95 : 1.3;
-  QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", D == 2 ? 20 : 4));
+  parameters.rho = ByDimension<D>({0.95, 1.3, 2.0, 3.0});
+  QueryStructure<D> structure = MakeStructure<D>(
+      test::SortedCloud<D>(ByDimension<D>({"uniform", "uniform", "uniform", "inner"}), ByDimension<D>({20, 4, 3, 1})));
   const absl::Status refined = RefineQuietly<D>(parameters, structure);
   ASSERT_TRUE(refined.ok()) << refined;
   Polytope<D> cell;
-  const uint32_t stride = structure.vertex_count() / 200 + 1;
+  const uint32_t stride = structure.vertex_count() / ByDimension<D>({200, 200, 40, 5}) + 1;
   for (uint32_t v = 0; v < structure.vertex_count(); v += stride) {
     ExpectRefined<D>(structure, VertexId{v}, parameters.rho, cell);
     ASSERT_FALSE(this->HasFatalFailure());
@@ -131,7 +133,7 @@ TYPED_TEST(RefineTest, KeepsTheTighterBoundsToo) {
 
 TYPED_TEST(RefineTest, InputVerticesStayWhereTheyAre) {
   constexpr int D = TypeParam::kValue;
-  const std::vector<Point<D>> points = test::SortedCloud<D>("boundary", 20);
+  const std::vector<Point<D>> points = test::SortedCloud<D>("boundary", ByDimension<D>({20, 20, 10, 2}));
   QueryStructure<D> structure = MakeStructure<D>(points);
   ASSERT_TRUE(RefineQuietly<D>(Defaults<D>(), structure).ok());
   for (uint32_t v = 0; v < points.size(); ++v) {
@@ -148,7 +150,7 @@ TYPED_TEST(RefineTest, IsDeterministic) {
   constexpr int D = TypeParam::kValue;
   std::array<QueryStructure<D>, 2> structures;
   for (QueryStructure<D>& structure : structures) {
-    structure = MakeStructure<D>(test::SortedCloud<D>("rounded", 20));
+    structure = MakeStructure<D>(test::SortedCloud<D>("rounded", ByDimension<D>({20, 20, 10, 1})));
     ASSERT_TRUE(RefineQuietly<D>(Defaults<D>(), structure).ok());
   }
   ASSERT_EQ(structures[0].vertex_count(), structures[1].vertex_count());
@@ -159,7 +161,7 @@ TYPED_TEST(RefineTest, IsDeterministic) {
 
 TYPED_TEST(RefineTest, ARefinedStructureNeedsNothingMore) {
   constexpr int D = TypeParam::kValue;
-  QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", 20));
+  QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", ByDimension<D>({20, 20, 10, 1})));
   ASSERT_TRUE(RefineQuietly<D>(Defaults<D>(), structure).ok());
   const uint32_t count = structure.vertex_count();
   ASSERT_TRUE(RefineQuietly<D>(Defaults<D>(), structure).ok());
@@ -181,7 +183,7 @@ TYPED_TEST(RefineTest, VerticesAreNoCloserThanFeaturesAskFor) {
       added = std::sqrt(2.0) * added + 1;
     }
     const double c = growth * (1 + added / parameters.rho) / (1 - growth / parameters.rho) + added;
-    QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, 40));
+    QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, ByDimension<D>({40, 40, 10, 1})));
     std::vector<Point<D>> features;
     for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
       features.push_back(structure.point(VertexId{v}));
@@ -198,12 +200,14 @@ TYPED_TEST(RefineTest, VerticesAreNoCloserThanFeaturesAskFor) {
 // projection on up to D faces shortens its empty radius by at most sqrt 2 each.
 TYPED_TEST(RefineTest, NewVerticesAreAsFarApartAsTheBucketSays) {
   constexpr int D = TypeParam::kValue;
+  uint32_t inserted = 0;
   for (const std::string_view kind : {"uniform", "clusters", "boundary", "log-uniform"}) {
     SCOPED_TRACE(std::string(kind));
-    QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, D == 2 ? 40 : 10));
+    QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, ByDimension<D>({40, 10, 6, 1})));
     const Parameters parameters = Defaults<D>();
     RunContext context;
-    uint32_t expected = structure.vertex_count();
+    const uint32_t before = structure.vertex_count();
+    uint32_t expected = before;
     double worst = std::numeric_limits<double>::infinity();
     const absl::Status status =
         Refine<D>(parameters, structure, context, [&](const QueryStructure<D>& at, const Insertion& insertion) {
@@ -215,13 +219,17 @@ TYPED_TEST(RefineTest, NewVerticesAreAsFarApartAsTheBucketSays) {
         });
     ASSERT_TRUE(status.ok()) << status;
     EXPECT_GE(worst, std::pow(0.5, 0.5 * D));
-    EXPECT_EQ(context.Snapshot().vertices, structure.vertex_count());
+    inserted += structure.vertex_count() - before;
+    if (structure.vertex_count() > before) {
+      EXPECT_EQ(context.Snapshot().vertices, structure.vertex_count());
+    }
   }
+  EXPECT_GT(inserted, 100u);
 }
 
 TYPED_TEST(RefineTest, EndsAtMaxVerticesWithTheStructureUsable) {
   constexpr int D = TypeParam::kValue;
-  QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", 30));
+  QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", ByDimension<D>({30, 30, 10, 1})));
   Parameters parameters = Defaults<D>();
   parameters.max_vertices = structure.vertex_count() + 25;
   const absl::Status status = RefineQuietly<D>(parameters, structure);
@@ -241,7 +249,7 @@ TYPED_TEST(RefineTest, EndsAtMaxVerticesWithTheStructureUsable) {
 
 TYPED_TEST(RefineTest, EndsAtTheShortestEdge) {
   constexpr int D = TypeParam::kValue;
-  QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("clusters", D == 2 ? 100 : 60));
+  QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("clusters", ByDimension<D>({100, 60, 30, 10})));
   Parameters parameters = Defaults<D>();
   parameters.min_edge = 0.1;
   const uint32_t inputs = structure.vertex_count();
@@ -260,7 +268,7 @@ TYPED_TEST(RefineTest, EndsAtTheShortestEdge) {
 TYPED_TEST(RefineTest, CancelFromTheObserverEndsTheRun) {
   constexpr int D = TypeParam::kValue;
   for (const bool deadline : {false, true}) {
-    QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", 100));
+    QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", ByDimension<D>({100, 100, 20, 2})));
     RunContext context;
     int steps = 0;
     int steps_after = 0;
@@ -272,7 +280,7 @@ TYPED_TEST(RefineTest, CancelFromTheObserverEndsTheRun) {
           }
         });
     EXPECT_EQ(status.code(), deadline ? absl::StatusCode::kDeadlineExceeded : absl::StatusCode::kCancelled);
-    EXPECT_LE(steps_after, 3) << "only the cell at hand may be finished";
+    EXPECT_EQ(steps_after, 0) << "not even the cell at hand is finished";
     ASSERT_TRUE(RefineQuietly<D>(Defaults<D>(), structure).ok()) << "the structure stays usable";
   }
 }
@@ -320,7 +328,7 @@ TYPED_TEST(RefineTest, OffCentersAreInTheCellAndFarEnough) {
   constexpr int D = TypeParam::kValue;
   int moved = 0;
   for (const std::string_view kind : {"uniform", "boundary", "clusters", "lines"}) {
-    const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, 30));
+    const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, ByDimension<D>({30, 30, 8, 3})));
     Polytope<D> cell;
     for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
       test::CutByAllInBox<D>(structure, VertexId{v}, cell);

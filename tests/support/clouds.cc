@@ -273,8 +273,10 @@ Cloud Cospherical(SplitMix64& random, int d, size_t n) {
 
 Cloud Boundary(SplitMix64& random, int d, size_t n) {
   Cloud out;
+  // Above 3-D in an order in which the first few are of many sorts already.
+  const size_t step = d <= 3 ? 1 : 97;
   for (size_t i = 0; i < n; ++i) {
-    for (size_t k = 0, rest = i; k < static_cast<size_t>(d); ++k, rest /= 3) {
+    for (size_t k = 0, rest = step * i; k < static_cast<size_t>(d); ++k, rest /= 3) {
       out.push_back(rest % 3 == 0 ? 0.0 : rest % 3 == 1 ? 1.0 : random.Unit());
     }
   }
@@ -352,6 +354,16 @@ std::vector<std::string_view> AllKinds() {
   std::vector<std::string_view> kinds(kReferenceKinds.begin(), kReferenceKinds.end());
   kinds.insert(kinds.end(), kDegenerateKinds.begin(), kDegenerateKinds.end());
   return kinds;
+}
+
+std::vector<std::string_view> SomeKinds(int dimension) {
+  if (dimension <= 4) {
+    return AllKinds();
+  }
+  if (dimension == 5) {
+    return {"uniform", "grid", "diagonal", "cospherical", "boundary", "log-uniform"};
+  }
+  return {"cospherical", "boundary"};
 }
 
 std::string CloudName(std::string_view kind, int dimension) {

@@ -42,6 +42,9 @@ inline constexpr std::array<std::string_view, 11> kDegenerateKinds = {
 // Both lists in one.
 std::vector<std::string_view> AllKinds();
 
+// As many of them as a dimension has time for: all up to 4-D; in 5-D a cell takes 10 times as long, in 6-D 100 times.
+std::vector<std::string_view> SomeKinds(int dimension);
+
 // A name for a test about such a cloud: letters, digits and underscores.
 std::string CloudName(std::string_view kind, int dimension);
 
