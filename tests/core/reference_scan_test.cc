@@ -19,6 +19,7 @@
 namespace wellspace::core {
 namespace {
 
+using test::ByDimension;
 using test::HaveSameNodes;
 using test::IsSimplePolytope;
 using test::Seed;
@@ -167,9 +168,7 @@ class EmptyBallProgramTest : public ::testing::Test {
   SplitMix64 random_{seed_};
   ::testing::ScopedTrace trace_;
 };
-using ProgramDimensions = ::testing::Types<test::Dimension<2>, test::Dimension<3>, test::Dimension<4>,
-                                           test::Dimension<5>, test::Dimension<6>>;
-TYPED_TEST_SUITE(EmptyBallProgramTest, ProgramDimensions);
+TYPED_TEST_SUITE(EmptyBallProgramTest, test::AllDimensions);
 
 TYPED_TEST(EmptyBallProgramTest, WithoutVerticesTheDiameterIsTheDistance) {
   constexpr int D = TypeParam::kValue;
@@ -193,7 +192,7 @@ TYPED_TEST(EmptyBallProgramTest, DiameterToAPointIsThatOfTheDefinition) {
   int finite = 0;
   int infinite = 0;
   // The enumeration looks at some (8 + 2 D)^(D - 1) / (D - 1)! balls.
-  for (int i = 0; i < (D <= 3 ? 200 : D == 4 ? 60 : D == 5 ? 20 : 6); ++i) {
+  for (int i = 0; i < ByDimension<D>({200, 200, 60, 20, 6}); ++i) {
     // On every other round vertices and points of a small grid, so that many balls are tied.
     const bool is_grid = i % 2 == 0;
     const auto draw = [&] {
@@ -441,16 +440,16 @@ class ReferenceScanTest : public ::testing::Test {
   SplitMix64 random_{seed_};
   ::testing::ScopedTrace trace_;
 };
-TYPED_TEST_SUITE(ReferenceScanTest, test::Dimensions);
+TYPED_TEST_SUITE(ReferenceScanTest, test::UpTo4);
 
 // As in a bottom-up run: radii in proportion to NN.
 TYPED_TEST(ReferenceScanTest, AgreesWithTheFastScanBeforeRefinement) {
   constexpr int D = TypeParam::kValue;
   for (const std::string_view kind : test::AllKinds()) {
     SCOPED_TRACE(std::string(kind));
-    const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, D == 2 ? 1000 : 250));
+    const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, ByDimension<D>({1000, 250, 12})));
     ScanComparer<D> comparer;
-    for (int i = 0; i < 12; ++i) {
+    for (int i = 0; i < ByDimension<D>({12, 12, 1}); ++i) {
       const VertexId v = VertexId(this->random_.Below(structure.vertex_count()));
       const double nearest = std::sqrt(test::NearestDistanceSq<D>(structure, v));
       comparer.Compare(structure, v, nearest * (0.4 + 3.6 * this->random_.Unit()));
@@ -464,12 +463,12 @@ TYPED_TEST(ReferenceScanTest, AgreesWithTheFastScanAtEveryStageOfRefinement) {
   constexpr int D = TypeParam::kValue;
   for (const std::string_view kind : {"uniform", "clusters", "grid", "cospherical", "skew"}) {
     SCOPED_TRACE(std::string(kind));
-    QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, D == 2 ? 80 : 20));
+    QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, ByDimension<D>({80, 20, 6})));
     ScanComparer<D> comparer;
     RunContext context;
     uint32_t steps = 0;
     const RefinementObserver<D> observer = [&](const QueryStructure<D>& at, const Insertion&) {
-      if (steps++ % 40 != 0 || this->HasFatalFailure()) {
+      if (steps++ % ByDimension<D>({40, 40, 160}) != 0 || this->HasFatalFailure()) {
         return;
       }
       // The vertex just added, clipped as refinement does, and any other.
@@ -479,11 +478,12 @@ TYPED_TEST(ReferenceScanTest, AgreesWithTheFastScanAtEveryStageOfRefinement) {
       comparer.Compare(at, any, 4 * std::sqrt(test::NearestDistanceSq<D>(at, any)));
     };
     Refinement<D> refinement(structure, 0x1p-48);
-    const absl::Status status = refinement.Run({.rho = D == 2 ? std::sqrt(2.0) : 2.0}, 100'000, context, observer);
+    const absl::Status status =
+        refinement.Run({.rho = ByDimension<D>({std::sqrt(2.0), 2.0, 2.9})}, 100'000, context, observer);
     ASSERT_TRUE(status.ok()) << status;
     this->ExpectFewLeaves(test::CloudName(kind, D) + "_during", comparer.totals());
     ScanComparer<D> afterwards;
-    for (int i = 0; i < 8; ++i) {
+    for (int i = 0; i < ByDimension<D>({8, 8, 2}); ++i) {
       // Whole cells too: any radius is cheap now.
       const VertexId v = VertexId(this->random_.Below(structure.vertex_count()));
       const double nearest = std::sqrt(test::NearestDistanceSq<D>(structure, v));
