@@ -1,9 +1,11 @@
 // The mesher on small degenerate clouds: coordinates of a coarse grid, some a few tiny steps off, on the faces of the box or near them.
 //
-// Input: five bytes of parameters (see ReadParameters), then a byte for each coordinate (see ReadCoordinate).
+// Input: five bytes of parameters and what the first of them asks for besides (see ReadTask), then a byte for each coordinate
+// (see ReadCoordinate).
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 #include <vector>
 
 #include "core/mesher.h"
@@ -13,8 +15,9 @@
 namespace wellspace::fuzz {
 namespace {
 
-constexpr size_t kMaxPoints = 24;
-constexpr uint64_t kMaxVertices = 2000;
+// By dimension: under the sanitizers a mesh of 150 vertices in 4-D or 5-D takes seconds.
+constexpr std::array<size_t, 4> kMaxPoints = {24, 24, 4, 2};
+constexpr std::array<uint64_t, 4> kMaxVertices = {2000, 1000, 150, 220};
 
 // Coordinates are grid lines 0 to 7 times this.
 constexpr double kGridStep = 0.125;
@@ -29,20 +32,43 @@ struct Placement {
   double Of(double x) const { return (x + offset) * scale; }
 };
 
-// Byte 0: bit 0 dimension, bits 1 and 2 the box: grown by a quarter, not grown, the grid's, the grid's but flat. Byte 1: the exponent
-// of the tiny step. Byte 2: offset. Byte 3: scale. Byte 4: rho.
-core::MeshParameters ReadParameters(ByteReader& bytes, Placement& placement) {
+// What is done with the points.
+struct Task {
+  core::MeshParameters parameters;
+  Placement placement;
+  // Of an edit: how many of the last points are added later, how, and the parameters then.
+  bool is_edit = false;
+  size_t added_points = 0;
+  bool one_by_one = false;
+  core::MeshParameters then;
+};
+
+// Byte 0: bit 0 dimension 2 or 3, bits 1 and 2 the box: grown by a quarter, not grown, the grid's, the grid's but flat; bit 3 two
+// dimensions more; bit 4 well-spaced; bit 5 sizes; bit 6 an edit. Byte 1: the exponent of the tiny step. Byte 2: offset. Byte 3:
+// scale. Byte 4: rho.
+//
+// With sizes a byte more: the lowest two bits the bound everywhere, if any, the next two that of a box, the next three where it is,
+// the last one whether it is a point.
+//
+// With an edit a byte more: the lowest three bits how many points come later, the next one whether one by one, the next two rho
+// then, the next one the other criterion, the last one no sizes any more.
+Task ReadTask(ByteReader& bytes) {
   constexpr std::array kOffsets = {0.0, -0.5, 1.0, 0x1p20, -0x1p35};
   constexpr std::array kScales = {1.0, 3.0, 0x1p-40, 0x1p100, 0x1p-700, 0x1p900};
   constexpr std::array kRhoFactors = {0.0, 1.0, 1.25, 2.0, 100.0};
+  Task task;
+  core::MeshParameters& parameters = task.parameters;
+  Placement& placement = task.placement;
   const uint8_t shape = bytes.Next();
   placement.tiny_step = std::ldexp(1.0, -(bytes.Next() % 64));
   placement.offset = kOffsets[bytes.Next() % kOffsets.size()];
   placement.scale = kScales[bytes.Next() % kScales.size()];
-  core::MeshParameters parameters;
-  parameters.dimension = (shape & 1) != 0 ? 3 : 2;
+  parameters.dimension = 2 + (shape & 1) + ((shape >> 3 & 1) != 0 ? 2 : 0);
   parameters.rho = kRhoFactors[bytes.Next() % kRhoFactors.size()] * core::MinimumRho(parameters.dimension);
-  parameters.max_vertices = kMaxVertices;
+  parameters.max_vertices = kMaxVertices[parameters.dimension - 2];
+  if ((shape >> 4 & 1) != 0) {
+    parameters.criterion = core::Criterion::kWellSpaced;
+  }
   const int box = shape >> 1 & 3;
   if (box < 2) {
     parameters.margin = box == 0 ? 0.25 : 0;
@@ -53,7 +79,36 @@ core::MeshParameters ReadParameters(ByteReader& bytes, Placement& placement) {
       parameters.domain_high.back() = placement.Of(kGridStep);
     }
   }
-  return parameters;
+  if ((shape >> 5 & 1) != 0) {
+    const uint8_t sizes = bytes.Next();
+    const double everywhere = std::array{0.0, 1.0, 0.5, 0.25}[sizes & 3];
+    const double inside = std::array{0.0, 0.5, 0.125, 0x1p-6}[sizes >> 2 & 3];
+    parameters.max_circumradius = everywhere * placement.scale;
+    if (inside > 0) {
+      const double low = (sizes >> 4 & 7) * kGridStep;
+      const double high = low + ((sizes >> 7) != 0 ? 0 : kGridStep);
+      parameters.size_boxes.push_back({std::vector<double>(parameters.dimension, placement.Of(low)),
+                                       std::vector<double>(parameters.dimension, placement.Of(high)),
+                                       inside * placement.scale});
+    }
+  }
+  task.is_edit = (shape >> 6 & 1) != 0;
+  if (task.is_edit) {
+    const uint8_t edit = bytes.Next();
+    task.added_points = edit & 7;
+    task.one_by_one = (edit >> 3 & 1) != 0;
+    task.then = parameters;
+    task.then.rho = kRhoFactors[edit >> 4 & 3] * core::MinimumRho(parameters.dimension);
+    if ((edit >> 6 & 1) != 0) {
+      task.then.criterion = parameters.criterion == core::Criterion::kWellSpaced ? core::Criterion::kRadiusEdge
+                                                                                 : core::Criterion::kWellSpaced;
+    }
+    if ((edit >> 7) != 0) {
+      task.then.max_circumradius = 0;
+      task.then.size_boxes.clear();
+    }
+  }
+  return task;
 }
 
 // The lowest three bits: the grid line. The next three: how many tiny steps off. The highest two: at once much nearer to the first
@@ -72,20 +127,27 @@ double ReadCoordinate(ByteReader& bytes, const Placement& placement) {
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace wellspace;
   fuzz::ByteReader bytes(data, size);
-  fuzz::Placement placement;
-  const core::MeshParameters parameters = fuzz::ReadParameters(bytes, placement);
+  const fuzz::Task task = fuzz::ReadTask(bytes);
+  const core::MeshParameters& parameters = task.parameters;
   const size_t dimension = parameters.dimension;
   std::vector<double> points;
-  while (bytes.size() >= dimension && points.size() < fuzz::kMaxPoints * dimension) {
+  while (bytes.size() >= dimension && points.size() < fuzz::kMaxPoints[dimension - 2] * dimension) {
     for (size_t axis = 0; axis < dimension; ++axis) {
-      const double x = fuzz::ReadCoordinate(bytes, placement);
+      const double x = fuzz::ReadCoordinate(bytes, task.placement);
       // Clamped, so that boxes get points on their faces rather than outside.
       points.push_back(
           parameters.domain_low.empty() ? x : std::clamp(x, parameters.domain_low[axis], parameters.domain_high[axis]));
     }
   }
-  if (core::ValidateParameters(parameters).ok()) {
+  if (!core::ValidateParameters(parameters).ok()) {
+    return 0;
+  }
+  if (!task.is_edit) {
     fuzz::RequireMeshOrRefusal(parameters, points);
+  } else if (core::ValidateParameters(task.then).ok()) {
+    const size_t added = std::min(points.size(), task.added_points * dimension);
+    const std::span<const double> all(points);
+    fuzz::RequireEditOrRefusal(parameters, all.first(all.size() - added), task.then, all.last(added), task.one_by_one);
   }
   return 0;
 }
