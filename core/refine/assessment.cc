@@ -68,7 +68,7 @@ Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const Demands<D>
       bound_sq = Assessment::kNone;
     }
     if (on_own_face) {
-      result.radius_sq = bound_sq == Assessment::kNone ? result.radius_sq : Assessment::kNone;
+      result.own_face_edge_sq = std::min(result.own_face_edge_sq, bound_sq / rho_sq);
       continue;
     }
     if (has_sizes) {

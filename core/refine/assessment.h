@@ -24,9 +24,11 @@ struct Assessment {
   int encroached_face = -1;
   // The cell reaches the cube that it was clipped by.
   bool is_clipped = false;
-  // The farthest node; infinite if a node on one of the site's own faces is too far for its edge: no circumcentre, so it
-  // asks for nothing now, but the site must look again once a new vertex cuts the facet there.
+  // The farthest node.
   double radius_sq = 0;
+  // The shortest edge with a node on one of the site's own faces that is too far for it: no circumcentre, so it asks for
+  // nothing now, but the site must look again, with that edge, once a new vertex cuts the facet there.
+  double own_face_edge_sq = kNone;
 
   bool IsGood() const { return bad_node < 0 && encroached_face < 0 && !is_clipped && next_edge_sq == kNone; }
 

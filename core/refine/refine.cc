@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/dimensions.h"
@@ -20,6 +22,27 @@ constexpr double kNewClipFactor = 1.5;
 
 // Vertices looked at between two reports of progress.
 constexpr uint64_t kReportInterval = 256;
+
+// The checking build.
+#ifdef WELLSPACE_CHECKS
+constexpr bool kChecks = true;
+#else
+constexpr bool kChecks = false;
+#endif
+// All vertices are looked at once for every so many that are taken from the schedule, relative to their number.
+constexpr uint64_t kCheckShare = 16;
+// What rounding may do: to lengths, relatively; to coordinates, relative to the largest.
+constexpr double kLengthRounding = 1e-9;
+constexpr double kCoordinateRounding = 0x1p-49;
+
+// Aborts unless `holds`. The text is put together only then.
+template <typename... Text>
+void Require(bool holds, const Text&... text) {
+  if (!holds) {
+    std::fprintf(stderr, "refinement breaks its guarantees: %s\n", absl::StrCat(text...).c_str());
+    std::abort();
+  }
+}
 
 template <int D>
 bool IsOnFace(const Polytope<D>& cell, const CellNode<D>& node) {
@@ -122,8 +145,18 @@ absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
   const double edge_limit_sq = schedule_.UpperLengthSq(bucket);
   const double clip = clip_factor_ * std::sqrt(edge_limit_sq);
   structure_.ClippedVoronoi(v, clip, own_);
+  if constexpr (kChecks) {
+    CheckOrder(v, bucket);
+  }
   while (true) {
     const Assessment found = Assess<D>(own_.cell, structure_.faces(v), *demands_, edge_limit_sq);
+    if (schedule_.HasBelow(bucket)) {
+      // What was just added asks for something by a shorter edge than this bucket's: that comes first.
+      const double own_sq = found.bad_node >= 0 ? found.bound_sq / (demands_->rho * demands_->rho) : edge_limit_sq;
+      radius_sq_[Index(v)] = Assessment::kNone;
+      schedule_.AddToBucket(v, std::min(bucket, schedule_.BucketOf(own_sq)));
+      return absl::OkStatus();
+    }
     Insertion insertion{.near = v, .edge_limit_sq = edge_limit_sq};
     SteinerPoint<D> point;
     if (found.bad_node >= 0) {
@@ -136,14 +169,14 @@ absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
       insertion.reason = Reason::kEncroachment;
       const double distance = structure_.box().DistanceToFace(structure_.point(v), found.encroached_face);
       insertion.edge_sq = distance * distance;
-      point = EncroachmentPoint<D>(own_.cell, found.encroached_face);
+      point = EncroachmentPoint<D>(own_.cell, structure_.faces(v), found.encroached_face);
     } else {
       Settle(v, found, clip, bucket + 1, own_.cell);
       return absl::OkStatus();
     }
     // In 5-D and 6-D a cell may ask for a dozen points, which take milliseconds each.
     WELLSPACE_RETURN_IF_ERROR(context_->Check());
-    WELLSPACE_RETURN_IF_ERROR(Insert(insertion, SnapToBoundary<D>(structure_.box(), point)));
+    WELLSPACE_RETURN_IF_ERROR(Insert(insertion, point));
   }
 }
 
@@ -151,15 +184,16 @@ absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
 // `earliest`.
 template <int D>
 void Refinement<D>::Settle(VertexId v, const Assessment& found, double clip, int earliest, const Polytope<D>& cell) {
+  radius_sq_[Index(v)] = found.own_face_edge_sq != Assessment::kNone ? -found.own_face_edge_sq
+                         : found.IsGood()                            ? found.radius_sq
+                                                                     : Assessment::kNone;
   if (found.IsGood()) {
-    radius_sq_[Index(v)] = found.radius_sq;
     if (is_announced_[Index(v)] == 0) {
       is_announced_[Index(v)] = 1;
       WakeNeighbours(cell, [this](VertexId u) { return !schedule_.Waits(u); });
     }
     return;
   }
-  radius_sq_[Index(v)] = Assessment::kNone;
   double next_sq = found.next_edge_sq;
   if (found.is_clipped) {
     // Beyond the clip only edges longer than this can be bad, or ones that share a node with a shorter edge.
@@ -169,7 +203,8 @@ void Refinement<D>::Settle(VertexId v, const Assessment& found, double clip, int
 }
 
 template <int D>
-absl::Status Refinement<D>::Insert(Insertion insertion, const SteinerPoint<D>& point) {
+absl::Status Refinement<D>::Insert(Insertion insertion, const SteinerPoint<D>& candidate) {
+  const SteinerPoint<D> point = SnapToBoundary<D>(structure_.box(), candidate);
   if (structure_.vertex_count() >= max_vertices_) {
     return absl::ResourceExhaustedError(absl::StrCat("the mesh needs more than max_vertices = ", max_vertices_,
                                                      " vertices; raise max_vertices or rho"));
@@ -178,6 +213,9 @@ absl::Status Refinement<D>::Insert(Insertion insertion, const SteinerPoint<D>& p
     return absl::ResourceExhaustedError(absl::StrCat(
         "refinement came to an edge of length ", std::sqrt(std::max(0.0, point.empty_radius_sq)),
         ", below the smallest that double arithmetic serves here, ", min_edge_, "; raise rho = ", demands_->rho));
+  }
+  if constexpr (kChecks) {
+    CheckInsertion(insertion, candidate, point);
   }
   insertion.vertex = structure_.AddVertex(insertion.near, point.position);
   insertion.empty_radius_sq = point.empty_radius_sq;
@@ -228,13 +266,76 @@ void Refinement<D>::WakeNeighbours(const Polytope<D>& cell, MayWake may_wake) {
         continue;
       }
       double& radius_sq = radius_sq_[Index(plane.vertex)];
-      if (demands_->criterion == Criterion::kWellSpaced
-              ? radius_sq > rho_sq * 2 * plane.offset
-              : radius_sq == Assessment::kNone && !schedule_.Waits(plane.vertex) && IsOnFace(cell, node)) {
+      const bool was_cut = radius_sq < 0 && IsOnFace(cell, node);
+      const bool is_too_far = demands_->criterion == Criterion::kWellSpaced && radius_sq > rho_sq * 2 * plane.offset;
+      if (was_cut || is_too_far) {
+        const double edge_sq = was_cut ? std::min(-radius_sq, 2 * plane.offset) : 2 * plane.offset;
         radius_sq = Assessment::kNone;
-        schedule_.Add(plane.vertex, 2 * plane.offset);
+        schedule_.Add(plane.vertex, edge_sq);
       }
     }
+  }
+}
+
+// That nobody waits below `bucket`, from which `v` was taken: the neighbours in the cell each time, all now and then.
+template <int D>
+void Refinement<D>::CheckOrder(VertexId v, int bucket) {
+  const auto check = [&](VertexId u) {
+    Require(!schedule_.WaitsBelow(u, bucket), "vertex ", Index(v), " is looked at for edges up to ",
+            std::sqrt(schedule_.UpperLengthSq(bucket)), " while vertex ", Index(u), " waits for a shorter one");
+  };
+  for (const CellNode<D>& node : own_.cell.nodes()) {
+    for (const uint16_t index : node.planes) {
+      if (own_.cell.plane(index).kind == PlaneKind::kBisector) {
+        check(own_.cell.plane(index).vertex);
+      }
+    }
+  }
+  if (++unchecked_ * kCheckShare > structure_.vertex_count()) {
+    unchecked_ = 0;
+    for (uint32_t u = 0; u < structure_.vertex_count(); ++u) {
+      check(VertexId{u});
+    }
+  }
+}
+
+// [HT08] Definition 1 at an insertion, before it is made: (1), that the edge is the bucket's, the place, and the empty ball.
+template <int D>
+void Refinement<D>::CheckInsertion(const Insertion& insertion, const SteinerPoint<D>& candidate,
+                                   const SteinerPoint<D>& point) {
+  const Box<D>& box = structure_.box();
+  const double edge = std::sqrt(insertion.edge_sq);
+  const double limit = std::sqrt(insertion.edge_limit_sq);
+  const double distance = std::sqrt(candidate.empty_radius_sq);
+  const double radius = std::sqrt(point.empty_radius_sq);
+  const bool encroaches = insertion.reason == Reason::kEncroachment;
+  const auto which = [&] {
+    return absl::StrCat(encroaches ? "the face" : "the edge", " of length ", edge, " at vertex ", Index(insertion.near),
+                        ", in the bucket up to ", limit, ", asks for a point at distance ", distance, " and radius ",
+                        radius, ": ");
+  };
+  const double least = (encroaches ? 1 : demands_->rho) * edge * (1 - kLengthRounding);
+  const double most = std::sqrt(D) * clip_factor_ * limit * (1 + kLengthRounding);
+  if (!(distance >= least && distance <= most)) {
+    Require(false, which(), "it has to be from ", least, " to ", most);
+  }
+  if (!encroaches && !(edge <= limit * (1 + kLengthRounding))) {
+    Require(false, which(), "the edge is for a later bucket");
+  }
+  // A projection takes at most half of the squared radius; where the box is thin, what it takes is also less than that.
+  const double kept = std::ldexp(1.0, 1 - D) * candidate.empty_radius_sq;
+  const double thin = std::ldexp(box.ShortestSide() * box.ShortestSide(), 2 - D);
+  if (!(point.empty_radius_sq >= std::min(kept, thin) * (1 - kLengthRounding))) {
+    Require(false, which(), "projections shortened the radius too much");
+  }
+  double magnitude = 0;
+  for (int i = 0; i < D; ++i) {
+    magnitude = std::max({magnitude, std::abs(box.low[i]), std::abs(box.high[i])});
+  }
+  const Neighbor nearest = structure_.NearestTo(point.position, insertion.near, check_);
+  const double allowed = radius * (1 - kLengthRounding) - kCoordinateRounding * magnitude;
+  if (!(box.Contains(point.position) && std::sqrt(nearest.distance_sq) >= allowed)) {
+    Require(false, which(), "vertex ", Index(nearest.vertex), " is at distance ", std::sqrt(nearest.distance_sq));
   }
 }
 

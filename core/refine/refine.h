@@ -40,6 +40,8 @@ template <int D>
 using RefinementObserver = std::function<void(const QueryStructure<D>&, const Insertion&)>;
 
 // The refinement of one structure, which may be run again: after an error, after vertices were added, for other demands.
+// Built with WELLSPACE_CHECKS it asserts at each insertion what docs/design/guarantees.md promises of it, as far as that
+// can be seen nearby, and aborts with the figures.
 //
 // Thread safety: thread-compatible.
 // Invariants: every vertex either waits, or its cell is as the demands of the last run say, for as long as no vertex is
@@ -76,16 +78,20 @@ class Refinement {
   absl::Status ScheduleAll(const Demands<D>& demands);
   double FirstEdgeSq(const Demands<D>& demands, VertexId v, double nearest_sq) const;
   absl::Status Improve(VertexId v, int bucket);
-  absl::Status Insert(Insertion insertion, const SteinerPoint<D>& point);
+  absl::Status Insert(Insertion insertion, const SteinerPoint<D>& candidate);
   void LookAtNew(VertexId x, VertexId near, double radius_sq);
   void Settle(VertexId v, const Assessment& found, double clip, int earliest, const Polytope<D>& cell);
   template <typename MayWake>
   void WakeNeighbours(const Polytope<D>& cell, MayWake may_wake);
+  void CheckOrder(VertexId v, int bucket);
+  void CheckInsertion(const Insertion& insertion, const SteinerPoint<D>& candidate, const SteinerPoint<D>& point);
 
   QueryStructure<D>& structure_;
   const double min_edge_;
   Schedule schedule_;
-  std::vector<double> radius_sq_;      // R(v)^2 where v is done, else infinite
+  // R(v)^2 where v is done, else infinite; but where a node on one of v's faces is too far for its edge, minus the
+  // squared length of that edge.
+  std::vector<double> radius_sq_;
   std::vector<uint8_t> is_announced_;  // its neighbours have been looked at in view of it
   std::optional<Demands<D>> demands_;  // of the last run, once all vertices have been scheduled for them
   Workspace<D> own_;                   // the cell that is improved
@@ -97,6 +103,10 @@ class Refinement {
   uint64_t max_vertices_ = 0;
   RunContext* context_ = nullptr;
   const RefinementObserver<D>* observer_ = nullptr;
+
+  // Of the checking build.
+  uint64_t unchecked_ = 0;  // vertices taken from the schedule since all have been looked at
+  Workspace<D> check_;
 };
 
 }  // namespace wellspace::core

@@ -48,6 +48,12 @@ class Schedule {
     lowest_ = bucket < lowest_ ? bucket : lowest_;
   }
 
+  // Whether `v` waits in a bucket below `bucket`.
+  bool WaitsBelow(VertexId v, int bucket) const { return Index(v) < waits_in_.size() && waits_in_[Index(v)] < bucket; }
+
+  // Whether a vertex may wait below `bucket`: never right after Pop took one from there, until one is added.
+  bool HasBelow(int bucket) const { return lowest_ < bucket; }
+
   bool Waits(VertexId v) const { return Index(v) < waits_in_.size() && waits_in_[Index(v)] != kNowhere; }
 
   // How many vertices wait.

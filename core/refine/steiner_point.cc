@@ -74,20 +74,38 @@ SteinerPoint<D> OffCenter(const Polytope<D>& cell, int node, int plane, double d
   return Relative<D>(cell, middle);
 }
 
+// The faces of the box that a node lies on.
 template <int D>
-SteinerPoint<D> EncroachmentPoint(const Polytope<D>& cell, int face) {
+FaceMask FacesOf(const Polytope<D>& cell, const CellNode<D>& node) {
+  FaceMask faces = 0;
+  for (const uint16_t index : node.planes) {
+    const Plane<D>& plane = cell.plane(index);
+    if (plane.kind == PlaneKind::kFace) {
+      faces = static_cast<FaceMask>(faces | (1u << plane.face));
+    }
+  }
+  return faces;
+}
+
+template <int D>
+SteinerPoint<D> EncroachmentPoint(const Polytope<D>& cell, FaceMask site_faces, int face) {
+  const unsigned on_face = 1u << face;
+  const unsigned opposite = 1u << (face ^ 1);
   Point<D> sum{};
   int count = 0;
-  for (const CellNode<D>& node : cell.nodes()) {
-    for (const uint16_t index : node.planes) {
-      const Plane<D>& plane = cell.plane(index);
-      if (plane.kind == PlaneKind::kFace && plane.face == face) {
+  const auto add = [&](unsigned wanted) {
+    for (const CellNode<D>& node : cell.nodes()) {
+      if ((FacesOf<D>(cell, node) & wanted) == wanted) {
         for (int i = 0; i < D; ++i) {
           sum[i] += node.x[i];
         }
         ++count;
       }
     }
+  };
+  add(on_face | (site_faces & ~opposite));
+  if (count == 0) {  // ties hide the faces of a node
+    add(on_face);
   }
   for (double& s : sum) {
     s /= count;
@@ -125,10 +143,10 @@ SteinerPoint<D> SnapToBoundary(const Box<D>& box, SteinerPoint<D> point) {
   }
 }
 
-#define WELLSPACE_INSTANTIATE(D)                                               \
-  template double OffCenterFactor<D>(double);                                  \
-  template SteinerPoint<D> OffCenter<D>(const Polytope<D>&, int, int, double); \
-  template SteinerPoint<D> EncroachmentPoint<D>(const Polytope<D>&, int);      \
+#define WELLSPACE_INSTANTIATE(D)                                                    \
+  template double OffCenterFactor<D>(double);                                       \
+  template SteinerPoint<D> OffCenter<D>(const Polytope<D>&, int, int, double);      \
+  template SteinerPoint<D> EncroachmentPoint<D>(const Polytope<D>&, FaceMask, int); \
   template SteinerPoint<D> SnapToBoundary<D>(const Box<D>&, SteinerPoint<D>);
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE

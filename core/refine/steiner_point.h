@@ -35,13 +35,16 @@ inline constexpr double kSizeFactor = 1.5;
 template <int D>
 SteinerPoint<D> OffCenter(const Polytope<D>& cell, int node, int plane, double distance_sq);
 
-// A point of the cell's facet on face `face` of the box: the mean of its nodes.
+// A point of the cell's facet on face `face` of the box: the mean of its nodes that also lie on those of `site_faces`,
+// the faces that the site lies on, that meet `face`. There are such nodes: an empty ball about a point of the cell stays
+// empty when it is projected on one of them. So a vertex of a face never makes another face's vertices denser than those
+// of the edge between the two.
 //
 // Complexity: O(nodes).
 // Errors:     none.
-// Source:     docs/design/refine.md, the faces of the box.
+// Source:     docs/design/refine.md.
 template <int D>
-SteinerPoint<D> EncroachmentPoint(const Polytope<D>& cell, int face);
+SteinerPoint<D> EncroachmentPoint(const Polytope<D>& cell, FaceMask site_faces, int face);
 
 // Projects a point on each face, the nearest first, that it is too near to: nearer than its empty radius over sqrt 2.
 // As nothing lies beyond the face the projection keeps an empty ball, whose radius is updated.

@@ -369,7 +369,7 @@ TYPED_TEST(RefineTest, EncroachmentPointIsTheMeanOfTheFacetsNodes) {
   Polytope<D> cell;
   cell.Reset(site, test::UnitBox<D>(), kinds, TieRule::kKeep);
   for (int face = 0; face < 2 * D; ++face) {
-    const auto point = EncroachmentPoint<D>(cell, face);
+    const auto point = EncroachmentPoint<D>(cell, 0, face);
     double distance_sq = 0;
     for (int k = 0; k < D; ++k) {
       const double expected = k == face / 2 ? face % 2 : 0.5;
@@ -384,6 +384,30 @@ TYPED_TEST(RefineTest, EncroachmentPointIsTheMeanOfTheFacetsNodes) {
   EXPECT_LT(found.bad_node, 0);
   EXPECT_FALSE(found.is_clipped);
   EXPECT_FALSE(found.IsGood());
+}
+
+// The same cell, of a site on the low faces of all axes but the first: its points on the high face of that are on an edge of the
+// box.
+TYPED_TEST(RefineTest, EncroachmentPointStaysOnTheSitesFaces) {
+  constexpr int D = TypeParam::kValue;
+  std::array<PlaneKind, 2 * D> kinds;
+  kinds.fill(PlaneKind::kFace);
+  Point<D> site{};
+  site[0] = 0.4;
+  Polytope<D> cell;
+  cell.Reset(site, test::UnitBox<D>(), kinds, TieRule::kKeep);
+  const FaceMask faces = test::UnitBox<D>().FacesOf(site);
+  const auto point = EncroachmentPoint<D>(cell, faces, FaceIndex(0, true));
+  EXPECT_EQ(point.position[0], 1);
+  for (int k = 1; k < D; ++k) {
+    EXPECT_EQ(point.position[k], 0);
+  }
+  EXPECT_DOUBLE_EQ(point.empty_radius_sq, 0.6 * 0.6);
+  // The high face of axis 1 is opposite to one of the site's.
+  const auto across = EncroachmentPoint<D>(cell, faces, FaceIndex(1, true));
+  EXPECT_DOUBLE_EQ(across.position[0], 0.5);
+  EXPECT_EQ(across.position[1], 1);
+  EXPECT_EQ(across.position[D - 1], D == 2 ? 1 : 0);
 }
 
 // The cell of corner 0 of an empty unit box: a cube of side 1/2, all nodes but the far one on the site's own faces.
@@ -412,10 +436,12 @@ TYPED_TEST(RefineTest, AssessesTheCellOfACorner) {
   EXPECT_DOUBLE_EQ(later.next_edge_sq, 1);
   EXPECT_FALSE(later.IsGood());
 
-  // A node on an own face at (1/2, ...) that is too far asks for nothing, but keeps the site from being done for good.
+  // A node on an own face at (1/2, ...) that is too far asks for nothing, but is remembered with its edge.
   const double on_face = std::sqrt(0.25 * (D - 1));
-  EXPECT_EQ(Assess<D>(workspace.cell, faces, {.rho = on_face - 1e-9}, 0.99).radius_sq, Assessment::kNone);
-  EXPECT_DOUBLE_EQ(Assess<D>(workspace.cell, faces, {.rho = on_face + 1e-9}, 0.99).radius_sq, 0.25 * D);
+  const Assessment remembered = Assess<D>(workspace.cell, faces, {.rho = on_face - 1e-9}, 0.99);
+  EXPECT_DOUBLE_EQ(remembered.own_face_edge_sq, 1);
+  EXPECT_DOUBLE_EQ(remembered.radius_sq, 0.25 * D);
+  EXPECT_EQ(Assess<D>(workspace.cell, faces, {.rho = on_face + 1e-9}, 0.99).own_face_edge_sq, Assessment::kNone);
 
   structure.ClippedVoronoi(VertexId{0}, 0.4, workspace);
   const Assessment clipped = Assess<D>(workspace.cell, faces, {.rho = 2}, 100);
