@@ -65,12 +65,13 @@ Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D <= 3)
 
 // The same by an approximate inverse and the residual, D > 3.
 //
-// Scale the planes to unit normals: A x = c, and let A*, c*, x* be the exact ones. The rows of A carry at most 3 u each
-// (difference, length, quotient), c at most (D + 6) u |c|, in norm. Let Y be any matrix and F = |Y A - I| in the
-// Frobenius norm, computed with an error below (2 D + 4) u |Y| |A|, |A| = sqrt(D); that of A* adds 3 u |Y| sqrt(D). If F*
-// <= 1/2 then |A*^-1| <= 2 |Y|. The residual r = A x - c, computed with an error below (D + 2) u (|a_j| |x| + |c_j|) in
-// each component, differs from A* x - c* by 3 u |x| + (D + 6) u |c_j| more; so |x - x*| <= 2 |Y| (|r| + (2 D + 10) u
-// sqrt(D) (|x| + max |c|)).
+// Divide each plane by the length of its normal as computed, which is as good a scale as the exact one: A x = c, and let
+// A*, c*, x* be the exact ones. The rows of A carry at most 3 u each (difference, quotient; with lengths a few u off 1),
+// c at most (D + 6) u |c|, in norm. Let Y be any matrix and F = |Y A - I| in the Frobenius norm, computed with an error
+// below (D + 1) u (|Y| |A| + sqrt(D)) < (2 D + 4) u |Y| |A|, |A| = sqrt(D), since sqrt(D) <= |Y| |A| + F; that of A* adds
+// 3 u |Y| sqrt(D). If F* <= 1/2 then |A*^-1| <= 2 |Y|. The residual r = A x - c, computed with an error below (D + 2) u
+// (|a_j| |x| + |c_j|) in each component, differs from A* x - c* by 3 u |x| + (D + 6) u |c_j| more; so |x - x*| <= 2 |Y|
+// (|r| + (2 D + 10) u sqrt(D) (|x| + max |c|)).
 template <int D>
 Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D > 3) {
   std::array<Point<D>, D> a;
