@@ -438,7 +438,6 @@ WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 
 #define WELLSPACE_INSTANTIATE(D) \
   template ReferenceScan<D> ReferenceClippedVoronoi<D>(const QueryStructure<D>&, VertexId, double);
-// Only these have a QueryStructure yet.
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 
