@@ -224,6 +224,11 @@ void GuaranteeChecker<D>::CheckPlace(const QueryStructure<D>& structure, const I
   const double most = std::sqrt(D) * ClipFactor(demands_.rho) * limit;
   Expect(from_near <= most + std::sqrt(std::max(0.0, most * most - radius * radius)) + slack, insertion, "at ",
          from_near, " it is farther than a node can be, ", most);
+  if (insertion.reason == Reason::kRatio && demands_.criterion == Criterion::kRadiusEdge &&
+      structure.faces(insertion.near) == 0) {
+    Expect(edge >= kGamma * limit * (1 - 1e-9), insertion, "edge ", edge, " is of an earlier bucket than that of ",
+           limit);
+  }
   Expect(encroaches || edge <= limit * (1 + 1e-9), insertion, "edge ", edge, " is of a later bucket than that of ",
          limit);
 }
