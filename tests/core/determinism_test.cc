@@ -85,12 +85,16 @@ TEST_P(DeterminismTest, IsTheMeshItAlwaysWas) {
 
 TEST_P(DeterminismTest, OrderOfThePointsAndThreadsDoNotMatter) {
   const std::vector<double> cloud = MakeCloud(GetParam().kind, GetParam().dimension, GetParam().points);
-  const CanonicalMesh expected = Canonical(MeshOf(cloud, 1));
-  for (const uint64_t seed : {1, 2, 3}) {
-    const Mesh shuffled = MeshOf(test::Shuffled(cloud, GetParam().dimension, seed), static_cast<int>(seed));
+  if (cloud.empty()) {
+    return;  // there is no order
+  }
+  const Mesh unshuffled = MeshOf(cloud, 1);
+  const CanonicalMesh expected = Canonical(unshuffled);
+  for (const uint64_t seed : {1, 2}) {
+    const Mesh shuffled = MeshOf(test::Shuffled(cloud, GetParam().dimension, seed), static_cast<int>(2 * seed));
     EXPECT_TRUE(Canonical(shuffled) == expected) << "seed " << seed;
   }
-  EXPECT_EQ(MeshOf(cloud, 1).simplices, MeshOf(cloud, 4).simplices) << "not even the order of the simplices";
+  EXPECT_EQ(unshuffled.simplices, MeshOf(cloud, 4).simplices) << "not even the order of the simplices";
 }
 
 }  // namespace

