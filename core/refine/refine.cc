@@ -314,8 +314,13 @@ void Refinement<D>::CheckInsertion(const Insertion& insertion, const SteinerPoin
                         ", in the bucket up to ", limit, ", asks for a point at distance ", distance, " and radius ",
                         radius, ": ");
   };
+  double rounding = 0;
+  for (int i = 0; i < D; ++i) {
+    rounding = std::max({rounding, std::abs(box.low[i]), std::abs(box.high[i])});
+  }
+  rounding *= kCoordinateRounding;
   const double least = (encroaches ? 1 : demands_->rho) * edge * (1 - kLengthRounding);
-  const double most = std::sqrt(D) * clip_factor_ * limit * (1 + kLengthRounding);
+  const double most = std::sqrt(D) * clip_factor_ * limit * (1 + kLengthRounding) + rounding;
   if (!(distance >= least && distance <= most)) {
     Require(false, which(), "it has to be from ", least, " to ", most);
   }
@@ -328,12 +333,8 @@ void Refinement<D>::CheckInsertion(const Insertion& insertion, const SteinerPoin
   if (!(point.empty_radius_sq >= std::min(kept, thin) * (1 - kLengthRounding))) {
     Require(false, which(), "projections shortened the radius too much");
   }
-  double magnitude = 0;
-  for (int i = 0; i < D; ++i) {
-    magnitude = std::max({magnitude, std::abs(box.low[i]), std::abs(box.high[i])});
-  }
   const Neighbor nearest = structure_.NearestTo(point.position, insertion.near, check_);
-  const double allowed = radius * (1 - kLengthRounding) - kCoordinateRounding * magnitude;
+  const double allowed = radius * (1 - kLengthRounding) - rounding;
   if (!(box.Contains(point.position) && std::sqrt(nearest.distance_sq) >= allowed)) {
     Require(false, which(), "vertex ", Index(nearest.vertex), " is at distance ", std::sqrt(nearest.distance_sq));
   }
