@@ -83,13 +83,6 @@ absl::Status CheckFaces(const Domain<D>& domain, std::span<const double> points,
 }  // namespace
 
 template <int D>
-Point<D> PointAt(std::span<const double> points, size_t index) {
-  Point<D> p;
-  std::copy_n(points.begin() + static_cast<std::ptrdiff_t>(index * D), D, p.begin());
-  return p;
-}
-
-template <int D>
 absl::StatusOr<Domain<D>> Domain<D>::Of(const Box<D>& box) {
   WELLSPACE_RETURN_IF_ERROR(CheckBox<D>(box));
   Domain domain;
@@ -223,7 +216,6 @@ absl::Status CheckSeparation(const Domain<D>& domain, const SortedCloud<D>& clou
 
 #define WELLSPACE_INSTANTIATE(D)                                                                                       \
   template struct Domain<D>;                                                                                           \
-  template Point<D> PointAt<D>(std::span<const double>, size_t);                                                       \
   template absl::StatusOr<Box<D>> BoxAround<D>(std::span<const double>, double);                                       \
   template absl::StatusOr<SortedCloud<D>> SortCloud<D>(const Domain<D>&, std::span<const double>, const RunContext&);  \
   template absl::Status TooCloseError<D>(const Domain<D>&, std::span<const double>, size_t, double, std::string_view); \

@@ -46,10 +46,6 @@ struct Domain {
   static absl::StatusOr<Domain> Of(const Box<D>& box);
 };
 
-// Row `index` of points, n x D, row-major.
-template <int D>
-Point<D> PointAt(std::span<const double> points, size_t index);
-
 // The bounding box of `points`, grown on every side by `margin` times its longest side.
 //
 // Errors:     INVALID_ARGUMENT when there are none, or one is not finite.

@@ -189,9 +189,7 @@ class MesherIn final : public Mesher {
     }
     for (size_t i = 0; i < cloud.points.size(); ++i) {
       if (known[i] == kNoVertex) {
-        known[i] = Add(kNoVertex, cloud.points[i]);
-        ++distinct_input_;
-        NoteNegativeZeros(points, cloud.first_input[i], OutputIndex(known[i]));
+        known[i] = Add(kNoVertex, cloud.points[i], points, cloud.first_input[i]);
       }
     }
     std::vector<uint32_t> vertices;
@@ -218,9 +216,7 @@ class MesherIn final : public Mesher {
     const VertexId start = VertexOf(near);
     WELLSPACE_ASSIGN_OR_RETURN(VertexId v, Find(cloud.points[0], point, 0, start));
     if (v == kNoVertex) {
-      v = Add(start, cloud.points[0]);
-      ++distinct_input_;
-      NoteNegativeZeros(point, 0, OutputIndex(v));
+      v = Add(start, cloud.points[0], point, 0);
     }
     input_vertex_.push_back(OutputIndex(v));
     return OutputIndex(v);
@@ -397,10 +393,13 @@ class MesherIn final : public Mesher {
     return kNoVertex;
   }
 
-  VertexId Add(VertexId near, const Point<D>& p) {
+  // Adds a vertex at `p`, which is input `index` of `points`.
+  VertexId Add(VertexId near, const Point<D>& p, std::span<const double> points, size_t index) {
     const VertexId v = structure_.AddVertex(near, p);
     refinement_->VertexAdded(v);
     is_refined_ = false;
+    ++distinct_input_;
+    NoteNegativeZeros(points, index, OutputIndex(v));
     return v;
   }
 

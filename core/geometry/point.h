@@ -2,12 +2,23 @@
 #ifndef WELLSPACE_CORE_GEOMETRY_POINT_H_
 #define WELLSPACE_CORE_GEOMETRY_POINT_H_
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
+#include <span>
 
 namespace wellspace::core {
 
 template <int D>
 using Point = std::array<double, D>;
+
+// Row `index` of points, n x D, row-major.
+template <int D>
+inline Point<D> PointAt(std::span<const double> points, size_t index) {
+  Point<D> p;
+  std::copy_n(points.begin() + static_cast<std::ptrdiff_t>(index * D), D, p.begin());
+  return p;
+}
 
 template <int D>
 inline Point<D> Difference(const Point<D>& a, const Point<D>& b) {

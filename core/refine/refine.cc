@@ -44,12 +44,6 @@ void Require(bool holds, const Text&... text) {
   }
 }
 
-template <int D>
-bool IsOnFace(const Polytope<D>& cell, const CellNode<D>& node) {
-  return std::any_of(node.planes.begin(), node.planes.end(),
-                     [&](uint16_t index) { return cell.plane(index).kind == PlaneKind::kFace; });
-}
-
 }  // namespace
 
 template <int D>
@@ -266,7 +260,7 @@ void Refinement<D>::WakeNeighbours(const Polytope<D>& cell, MayWake may_wake) {
         continue;
       }
       double& radius_sq = radius_sq_[Index(plane.vertex)];
-      const bool was_cut = radius_sq < 0 && IsOnFace(cell, node);
+      const bool was_cut = radius_sq < 0 && cell.FacesOf(node) != 0;
       const bool is_too_far = demands_->criterion == Criterion::kWellSpaced && radius_sq > rho_sq * 2 * plane.offset;
       if (was_cut || is_too_far) {
         const double edge_sq = was_cut ? std::min(-radius_sq, 2 * plane.offset) : 2 * plane.offset;

@@ -74,19 +74,6 @@ SteinerPoint<D> OffCenter(const Polytope<D>& cell, int node, int plane, double d
   return Relative<D>(cell, middle);
 }
 
-// The faces of the box that a node lies on.
-template <int D>
-FaceMask FacesOf(const Polytope<D>& cell, const CellNode<D>& node) {
-  FaceMask faces = 0;
-  for (const uint16_t index : node.planes) {
-    const Plane<D>& plane = cell.plane(index);
-    if (plane.kind == PlaneKind::kFace) {
-      faces = static_cast<FaceMask>(faces | (1u << plane.face));
-    }
-  }
-  return faces;
-}
-
 template <int D>
 SteinerPoint<D> EncroachmentPoint(const Polytope<D>& cell, FaceMask site_faces, int face) {
   const unsigned on_face = 1u << face;
@@ -95,7 +82,7 @@ SteinerPoint<D> EncroachmentPoint(const Polytope<D>& cell, FaceMask site_faces, 
   int count = 0;
   const auto add = [&](unsigned wanted) {
     for (const CellNode<D>& node : cell.nodes()) {
-      if ((FacesOf<D>(cell, node) & wanted) == wanted) {
+      if ((cell.FacesOf(node) & wanted) == wanted) {
         for (int i = 0; i < D; ++i) {
           sum[i] += node.x[i];
         }

@@ -64,13 +64,6 @@ absl::Status CheckShape(const MeshView& mesh) {
   return absl::OkStatus();
 }
 
-template <int D>
-Point<D> PointAt(std::span<const double> points, size_t index) {
-  Point<D> out;
-  std::copy_n(points.begin() + static_cast<std::ptrdiff_t>(index * D), D, out.begin());
-  return out;
-}
-
 // |a - b|, without overflow or underflow on the way.
 template <int D>
 double Distance(const Point<D>& a, const Point<D>& b) {

@@ -23,6 +23,25 @@ enum class PlaneKind : uint8_t {
   kClip,  // of the cube that a clipped cell is computed in, or of the walls far outside the box
 };
 
+// What a cell about `site` begins with: `box`, clipped by the cube of half side `radius` about the site. `kinds` says by
+// FaceIndex what its faces are.
+template <int D>
+Box<D> ClippedBox(const Box<D>& box, const Point<D>& site, double radius, std::array<PlaneKind, 2 * D>& kinds) {
+  Box<D> bounds = box;
+  kinds.fill(PlaneKind::kFace);
+  for (int i = 0; i < D; ++i) {
+    if (site[i] - radius > bounds.low[i]) {
+      bounds.low[i] = site[i] - radius;
+      kinds[FaceIndex(i, false)] = PlaneKind::kClip;
+    }
+    if (site[i] + radius < bounds.high[i]) {
+      bounds.high[i] = site[i] + radius;
+      kinds[FaceIndex(i, true)] = PlaneKind::kClip;
+    }
+  }
+  return bounds;
+}
+
 template <int D>
 struct Plane {
   PlaneKind kind = PlaneKind::kBisector;
@@ -82,6 +101,17 @@ class Polytope {
   // Source:     [HT08] §6 with the polytope in the place of the ball: |x p|^2 - |x site|^2 is affine in x for fixed p,
   //             so its least value over the cell is at a node.
   bool Reaches(const Box<D>& cube) const;
+
+  // The faces of the box that a node of the cell lies on.
+  FaceMask FacesOf(const CellNode<D>& node) const {
+    FaceMask faces = 0;
+    for (const uint16_t index : node.planes) {
+      if (planes_[index].kind == PlaneKind::kFace) {
+        faces = static_cast<FaceMask>(faces | (1u << planes_[index].face));
+      }
+    }
+    return faces;
+  }
 
   const Point<D>& site() const { return site_; }
   // At least the squared distance from the site to the farthest node.

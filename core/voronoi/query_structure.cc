@@ -149,19 +149,8 @@ Neighbor QueryStructure<D>::Nearest(const Point<D>& p, NodeId leaf, VertexId but
 template <int D>
 void QueryStructure<D>::ClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace) const {
   const Point<D>& site = point(v);
-  Box<D> bounds = box_;
   std::array<PlaneKind, 2 * D> kinds;
-  kinds.fill(PlaneKind::kFace);
-  for (int i = 0; i < D; ++i) {
-    if (site[i] - radius > bounds.low[i]) {
-      bounds.low[i] = site[i] - radius;
-      kinds[FaceIndex(i, false)] = PlaneKind::kClip;
-    }
-    if (site[i] + radius < bounds.high[i]) {
-      bounds.high[i] = site[i] + radius;
-      kinds[FaceIndex(i, true)] = PlaneKind::kClip;
-    }
-  }
+  const Box<D> bounds = ClippedBox<D>(box_, site, radius, kinds);
   workspace.cell.Reset(site, bounds, kinds, TieRule::kKeep);
   Scan(v, workspace);
 }

@@ -360,22 +360,9 @@ template <int D>
 ReferenceScan<D> ReferenceClippedVoronoi(const QueryStructure<D>& structure, VertexId v, double radius) {
   const Point<D>& site = structure.point(v);
   const LeafTree<D>& tree = structure.tree();
-  Box<D> bounds = structure.box();
   std::array<PlaneKind, 2 * D> kinds;
-  kinds.fill(PlaneKind::kFace);
-  Box<D> centres;
-  for (int i = 0; i < D; ++i) {
-    if (site[i] - radius > bounds.low[i]) {
-      bounds.low[i] = site[i] - radius;
-      kinds[FaceIndex(i, false)] = PlaneKind::kClip;
-    }
-    if (site[i] + radius < bounds.high[i]) {
-      bounds.high[i] = site[i] + radius;
-      kinds[FaceIndex(i, true)] = PlaneKind::kClip;
-    }
-    centres.low[i] = bounds.low[i] - site[i];
-    centres.high[i] = bounds.high[i] - site[i];
-  }
+  const Box<D> bounds = ClippedBox<D>(structure.box(), site, radius, kinds);
+  const Box<D> centres{Difference<D>(bounds.low, site), Difference<D>(bounds.high, site)};
 
   ReferenceScan<D> scan;
   scan.cell.Reset(site, bounds, kinds, TieRule::kKeep);
