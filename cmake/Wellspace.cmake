@@ -11,6 +11,10 @@ endif()
 if(WELLSPACE_SANITIZE)
   add_compile_options(-fsanitize=${WELLSPACE_SANITIZE} -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${WELLSPACE_SANITIZE})
+  if(WELLSPACE_SANITIZE MATCHES "undefined")
+    # These two triple the time of compilation, and find nothing here that a crash or AddressSanitizer would not.
+    add_compile_options(-fno-sanitize=null,alignment)
+  endif()
 endif()
 if(WELLSPACE_FUZZ)
   # Everything reports its coverage; only the fuzz targets link libFuzzer's main.

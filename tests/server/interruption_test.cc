@@ -207,23 +207,25 @@ TEST_P(Interrupted, RunningWorkGoesOnDuringTheGracePeriodAndNewCallsAreRefused) 
 
 TEST(SlowReader, CostsABoundedBufferAndHoldsUpNobodyElse) {
   ServiceHarness harness;
-  TestCall slow(harness.stub());
-  TestCall other(harness.stub());
-  for (TestCall* call : {&slow, &other}) {
-    call->Send(UnitCubeParameters());
+  const auto send_points = [](TestCall& call) {
+    call.Send(UnitCubeParameters());
     for (int i = 0; i < 10; ++i) {
-      call->Send(RandomPoints(40'000));
+      call.Send(RandomPoints(40'000));
     }
-  }
-  slow.HalfClose();
+    call.HalfClose();
+  };
+  TestCall slow(harness.stub());
+  send_points(slow);
   v1::MeshPointsResponse response;
   do {
     ASSERT_TRUE(slow.Read(&response));
   } while (!response.has_chunk());
   ASSERT_TRUE(harness.log().WaitFor("call=1 chunk=2 made"));
 
-  // The chunks of both calls are made in turn; while all of the other's were, the slow one's would have been, too.
-  other.HalfClose();
+  // The chunks of both calls are made in turn; while all of the other's were, the slow one's would have been, too. The other
+  // begins only now: calls are numbered in the order in which the server sees them.
+  TestCall other(harness.stub());
+  send_points(other);
   ASSERT_TRUE(other.Finish().ok());
   EXPECT_GE(other.chunks.size(), 16u);
   // One was read, one is being written, the others wait, and the in-process transport may hold one more.
