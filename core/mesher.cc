@@ -3,9 +3,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 #include <optional>
 #include <utility>
@@ -54,13 +52,6 @@ Box<D> BoxOf(const std::vector<double>& low, const std::vector<double>& high) {
   return box;
 }
 
-absl::Status CheckThreads(int threads) {
-  if (threads < 1 || threads > 1024) {
-    return absl::InvalidArgumentError(absl::StrCat("threads: ", threads, " is not allowed; 1 to 1024 is"));
-  }
-  return absl::OkStatus();
-}
-
 // Refuses what is no whole number of points.
 absl::Status CheckShape(std::span<const double> points, int dimension) {
   if (points.size() % dimension != 0) {
@@ -71,31 +62,6 @@ absl::Status CheckShape(std::span<const double> points, int dimension) {
     return absl::InvalidArgumentError(absl::StrCat("points: ", points.size() / dimension,
                                                    " are more than vertices can be numbered; at most ", kMaxVertices,
                                                    " are accepted"));
-  }
-  return absl::OkStatus();
-}
-
-absl::Status CheckSizeBox(const SizeBox& size, size_t index, int dimension) {
-  const auto refuse = [index](const auto&... text) {
-    return absl::InvalidArgumentError(absl::StrCat("size_boxes[", index, "]", text...));
-  };
-  if (size.low.size() != static_cast<size_t>(dimension)) {
-    return refuse(".low: ", size.low.size(), " coordinates; ", dimension, " are needed");
-  }
-  if (size.high.size() != static_cast<size_t>(dimension)) {
-    return refuse(".high: ", size.high.size(), " coordinates; ", dimension, " are needed");
-  }
-  for (int i = 0; i < dimension; ++i) {
-    if (!std::isfinite(size.low[i])) {
-      return refuse(".low[", i, "]: ", size.low[i], " is not allowed; a finite number is");
-    }
-    if (!(std::isfinite(size.high[i]) && size.low[i] <= size.high[i])) {
-      return refuse(".high[", i, "]: ", size.high[i], " is not allowed; a finite number not below the low one, ",
-                    size.low[i], ", is");
-    }
-  }
-  if (!(size.max_circumradius > 0 && std::isfinite(size.max_circumradius))) {
-    return refuse(".max_circumradius: ", size.max_circumradius, " is not allowed; a number above 0 is");
   }
   return absl::OkStatus();
 }
@@ -546,56 +512,6 @@ absl::StatusOr<std::unique_ptr<Mesher>> CreateIn(const MeshParameters& parameter
 }
 
 }  // namespace
-
-double DefaultRho(int dimension) {
-  constexpr std::array<double, kMaxDimension + 1> kDefaults = {0, 0, std::numbers::sqrt2, 2, 2.9, 4.1, 5.8};
-  return kDefaults[dimension];
-}
-
-double MinimumRho(int dimension) {
-  constexpr std::array<double, kMaxDimension + 1> kMinimums = {0, 0, 0.9, 1.1, 1.5, 2, 3};
-  return kMinimums[dimension];
-}
-
-absl::Status ValidateParameters(const MeshParameters& parameters) {
-  const int dimension = parameters.dimension;
-  if (dimension < kMinDimension || dimension > kMaxDimension) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("dimension: ", dimension, " is not supported; ", kMinDimension, " to ", kMaxDimension, " are"));
-  }
-  if (parameters.rho != 0 && !(parameters.rho >= MinimumRho(dimension) && std::isfinite(parameters.rho))) {
-    return absl::InvalidArgumentError(absl::StrCat("rho: ", parameters.rho, " is not allowed in ", dimension,
-                                                   "-D; refinement ends for ", MinimumRho(dimension),
-                                                   " or more, and the default is ", DefaultRho(dimension)));
-  }
-  if (parameters.domain_low.size() != parameters.domain_high.size() ||
-      (!parameters.domain_low.empty() && parameters.domain_low.size() != static_cast<size_t>(dimension))) {
-    return absl::InvalidArgumentError(absl::StrCat("domain: ", parameters.domain_low.size(), " low and ",
-                                                   parameters.domain_high.size(), " high coordinates; ", dimension,
-                                                   " of each are needed, or none"));
-  }
-  for (size_t i = 0; i < parameters.domain_low.size(); ++i) {
-    const double low = parameters.domain_low[i];
-    const double high = parameters.domain_high[i];
-    if (!std::isfinite(low) || !std::isfinite(high) || !(low < high)) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("domain: along axis ", i, " it goes from ", low, " to ", high,
-                       "; finite numbers are needed, the low one less than the high one"));
-    }
-  }
-  if (!(parameters.margin >= 0 && parameters.margin <= 1e6)) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("margin: ", parameters.margin, " is not allowed; 0 to 1e6 times the longest side is"));
-  }
-  if (!(parameters.max_circumradius >= 0 && std::isfinite(parameters.max_circumradius))) {
-    return absl::InvalidArgumentError(absl::StrCat("max_circumradius: ", parameters.max_circumradius,
-                                                   " is not allowed; a number above 0 is, or 0 for no bound"));
-  }
-  for (size_t i = 0; i < parameters.size_boxes.size(); ++i) {
-    WELLSPACE_RETURN_IF_ERROR(CheckSizeBox(parameters.size_boxes[i], i, dimension));
-  }
-  return CheckThreads(parameters.threads);
-}
 
 absl::StatusOr<std::unique_ptr<Mesher>> Mesher::Create(const MeshParameters& parameters, std::span<const double> points,
                                                        RunContext& context) {

@@ -8,46 +8,10 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "core/base/dimensions.h"
 #include "core/base/run_context.h"
-#include "core/geometry/criterion.h"
+#include "core/mesh_parameters.h"
 
 namespace wellspace::core {
-
-struct MeshParameters {
-  int dimension = 3;  // kMinDimension to kMaxDimension
-
-  // The bound of the criterion. 0 means DefaultRho(dimension).
-  double rho = 0;
-  Criterion criterion = Criterion::kRadiusEdge;
-
-  // No simplex has a larger circumradius. 0 means no bound.
-  double max_circumradius = 0;
-  // Boxes in which it is smaller still. Away from a box, sizes grow no faster than the distance from it.
-  std::vector<SizeBox> size_boxes{};
-
-  // Low and high corner of the box to be meshed, `dimension` numbers each. Both empty: the bounding box of the points,
-  // grown on every side by `margin` times its longest side.
-  std::vector<double> domain_low{};
-  std::vector<double> domain_high{};
-  double margin = 0.25;
-
-  // The run ends with RESOURCE_EXHAUSTED before the mesh has more vertices than this. 0 means kDefaultMaxVertices.
-  uint64_t max_vertices = 0;
-
-  // Worker threads of this run, at least 1.
-  int threads = 1;
-};
-
-// Vertices have 32-bit numbers, of which the last is none.
-inline constexpr uint64_t kMaxVertices = 0xffff'fffe;
-// What a machine with 24 GiB of memory can mesh in 3-D.
-inline constexpr uint64_t kDefaultMaxVertices = 50'000'000;
-
-// The default of `rho`, for which refinement ends whatever the input: sqrt(2) in 2-D, 2 in 3-D, 2.9, 4.1 and 5.8 in 4-D
-// to 6-D, 2^((D-1)/2) rounded up; and the smallest value that is accepted.
-double DefaultRho(int dimension);
-double MinimumRho(int dimension);
 
 // What a run did: counts of the paper's operations, by which its O(1) claims are tested, and the figures of the mesh.
 struct MeshStatistics {
@@ -115,11 +79,6 @@ struct Cell {
   std::vector<uint32_t> neighbours;  // the vertices whose bisectors with `vertex` bound the cell, ascending
   bool is_clipped = false;           // it reaches the cube; if not, it is the whole Voronoi cell in the box
 };
-
-// Refuses parameters that no cloud could make valid: dimension, rho, domain, margin, threads.
-//
-// Errors:     INVALID_ARGUMENT, naming the field, its value and what would be accepted.
-absl::Status ValidateParameters(const MeshParameters& parameters);
 
 // A mesh in the making and after: the query structure of [HT08] with its refinement. Vertices can be added to a refined
 // mesh, and it be refined again, at the cost of what has changed.

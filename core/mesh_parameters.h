@@ -1,0 +1,61 @@
+// What is asked of a mesh, and which of it can be served.
+#ifndef WELLSPACE_CORE_MESH_PARAMETERS_H_
+#define WELLSPACE_CORE_MESH_PARAMETERS_H_
+
+#include <cstdint>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "core/base/dimensions.h"
+#include "core/geometry/criterion.h"
+
+namespace wellspace::core {
+
+struct MeshParameters {
+  int dimension = 3;  // kMinDimension to kMaxDimension
+
+  // The bound of the criterion. 0 means DefaultRho(dimension).
+  double rho = 0;
+  Criterion criterion = Criterion::kRadiusEdge;
+
+  // No simplex has a larger circumradius. 0 means no bound.
+  double max_circumradius = 0;
+  // Boxes in which it is smaller still. Away from a box, sizes grow no faster than the distance from it.
+  std::vector<SizeBox> size_boxes{};
+
+  // Low and high corner of the box to be meshed, `dimension` numbers each. Both empty: the bounding box of the points,
+  // grown on every side by `margin` times its longest side.
+  std::vector<double> domain_low{};
+  std::vector<double> domain_high{};
+  double margin = 0.25;
+
+  // The run ends with RESOURCE_EXHAUSTED before the mesh has more vertices than this. 0 means kDefaultMaxVertices.
+  uint64_t max_vertices = 0;
+
+  // Worker threads of this run, at least 1.
+  int threads = 1;
+};
+
+// Vertices have 32-bit numbers, of which the last is none.
+inline constexpr uint64_t kMaxVertices = 0xffff'fffe;
+// What a machine with 24 GiB of memory can mesh in 3-D.
+inline constexpr uint64_t kDefaultMaxVertices = 50'000'000;
+
+// The default of `rho`, for which refinement ends whatever the input: sqrt(2) in 2-D, 2 in 3-D, 2.9, 4.1 and 5.8 in 4-D
+// to 6-D, 2^((D-1)/2) rounded up; and the smallest value that is accepted.
+double DefaultRho(int dimension);
+double MinimumRho(int dimension);
+
+// Refuses parameters that no cloud could make valid: dimension, rho, sizes, domain, margin, threads.
+//
+// Errors:     INVALID_ARGUMENT, naming the field, its value and what would be accepted.
+absl::Status ValidateParameters(const MeshParameters& parameters);
+
+// Refuses numbers of threads that no run could use.
+//
+// Errors:     INVALID_ARGUMENT, naming `threads`, its value and what would be accepted.
+absl::Status CheckThreads(int threads);
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_MESH_PARAMETERS_H_
