@@ -59,9 +59,7 @@ Progress ProgressFromProto(const v1::ProgressEvent& event) {
                   .fraction = event.fraction()};
 }
 
-v1::MeshPointsRequest ParametersRequest(const MeshOptions& options) {
-  v1::MeshPointsRequest request;
-  v1::MeshParameters* parameters = request.mutable_parameters();
+void SetParameters(const MeshOptions& options, v1::MeshParameters* parameters) {
   parameters->set_dimension(options.dimension);
   parameters->set_rho(options.rho);
   parameters->set_criterion(options.criterion == Criterion::kWellSpaced ? v1::CRITERION_WELL_SPACED
@@ -80,18 +78,18 @@ v1::MeshPointsRequest ParametersRequest(const MeshOptions& options) {
   parameters->set_margin(options.margin);
   parameters->set_max_vertices(options.max_vertices);
   parameters->set_threads(options.threads);
-  return request;
 }
 
 // Sends everything and half-closes. Stops early when the call has ended; its status says why.
-template <typename Stream>
+template <typename Request, typename Stream>
 void Upload(const MeshOptions& options, std::span<const double> points, Stream& stream) {
-  if (!stream.Write(ParametersRequest(options))) {
+  Request request;
+  SetParameters(options, request.mutable_parameters());
+  if (!stream.Write(request)) {
     return;
   }
   const size_t row = std::max(1, options.dimension);
   const size_t chunk_size = std::max<size_t>(1, kChunkBytes / sizeof(double) / row) * row;
-  v1::MeshPointsRequest request;
   while (!points.empty()) {
     const std::span<const double> chunk = points.first(std::min(points.size(), chunk_size));
     request.mutable_points()->mutable_coordinates()->Assign(chunk.begin(), chunk.end());
@@ -142,7 +140,7 @@ absl::StatusOr<Mesh> GrpcConnection::MeshPoints(const MeshOptions& options, std:
   std::stop_callback cancel(stop, [&context] { context.TryCancel(); });
 
   // Points go up while answers come down: the server may fail the call before it has all.
-  std::jthread uploader([&] { Upload(options, points, *stream); });
+  std::jthread uploader([&] { Upload<v1::MeshPointsRequest>(options, points, *stream); });
   const int dimension = std::max(1, options.dimension);
   MeshAssembler assembler(dimension, points.size() / dimension);
   absl::Status damage;
@@ -175,9 +173,9 @@ absl::StatusOr<MeshEstimate> GrpcConnection::EstimateMesh(const MeshOptions& opt
   grpc::ClientContext context;
   SetDeadline(options, context);
   v1::EstimateMeshResponse response;
-  const std::unique_ptr<grpc::ClientWriter<v1::MeshPointsRequest>> stream = stub_->EstimateMesh(&context, &response);
+  const std::unique_ptr<grpc::ClientWriter<v1::EstimateMeshRequest>> stream = stub_->EstimateMesh(&context, &response);
   std::stop_callback cancel(stop, [&context] { context.TryCancel(); });
-  Upload(options, points, *stream);
+  Upload<v1::EstimateMeshRequest>(options, points, *stream);
   if (const grpc::Status status = stream->Finish(); !status.ok()) {
     return StatusOf(status, stop);
   }

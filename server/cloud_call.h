@@ -45,14 +45,14 @@ struct CallEnvironment {
 };
 
 // The reactor of one call. Its requests go to a CloudReceiver; at their end a job is queued; what becomes of its result is up to the
-// class that derives from this. `Reactor` is gRPC's, for the kind of stream that answers.
+// class that derives from this. `Reactor` is gRPC's, for the kind of stream that answers, and `Request` what it reads.
 //
 // Lifetime: held by itself until OnDone, and by whatever else may still call it: its job and tasks of the background thread.
 // Thread safety: thread-safe: reactions, the worker, the background thread and Abort may come at the same time.
 // Invariants: (1) Finish is called once, not while IsWriting(); (2) once ending() is true, no read, write, job or task is started any
 // more; (3) the lock order is this call's mutex, then those of what it uses.
-template <typename Reactor>
-class CloudCall : public Reactor, public std::enable_shared_from_this<CloudCall<Reactor>> {
+template <typename Reactor, typename Request>
+class CloudCall : public Reactor, public std::enable_shared_from_this<CloudCall<Reactor, Request>> {
  public:
   // Ends the call with UNAVAILABLE, since the server stops.
   void Abort();
@@ -121,14 +121,14 @@ class CloudCall : public Reactor, public std::enable_shared_from_this<CloudCall<
   // Guarded by mutex_.
   std::shared_ptr<CloudCall> self_;
   CloudReceiver receiver_;
-  v1::MeshPointsRequest request_;  // of the read in flight
+  Request request_;  // of the read in flight
   bool ending_ = false;
   grpc::Status final_status_;
   std::shared_ptr<Job> job_;
 };
 
-template <typename Reactor>
-void CloudCall<Reactor>::Begin(const std::shared_ptr<CloudCall>& call) {
+template <typename Reactor, typename Request>
+void CloudCall<Reactor, Request>::Begin(const std::shared_ptr<CloudCall>& call) {
   std::lock_guard lock(call->mutex_);
   call->self_ = call;
   const CallRegistry::Admission admission = call->environment_.calls.Add([weak = call->weak_from_this()] {
@@ -144,14 +144,14 @@ void CloudCall<Reactor>::Begin(const std::shared_ptr<CloudCall>& call) {
   }
 }
 
-template <typename Reactor>
-void CloudCall<Reactor>::Abort() {
+template <typename Reactor, typename Request>
+void CloudCall<Reactor, Request>::Abort() {
   std::lock_guard lock(mutex_);
   End(MakeError(v1::ERROR_REASON_SERVER_STOPPING, "the server stopped before the answer was delivered"));
 }
 
-template <typename Reactor>
-void CloudCall<Reactor>::OnReadDone(bool ok) {
+template <typename Reactor, typename Request>
+void CloudCall<Reactor, Request>::OnReadDone(bool ok) {
   std::lock_guard lock(mutex_);
   if (ending_) {
     return;
@@ -174,8 +174,8 @@ void CloudCall<Reactor>::OnReadDone(bool ok) {
   this->StartRead(&request_);
 }
 
-template <typename Reactor>
-void CloudCall<Reactor>::SubmitJob() {
+template <typename Reactor, typename Request>
+void CloudCall<Reactor, Request>::SubmitJob() {
   if (grpc::Status status = receiver_.AcceptEnd(); !status.ok()) {
     End(std::move(status));
     return;
@@ -189,24 +189,24 @@ void CloudCall<Reactor>::SubmitJob() {
   }
 }
 
-template <typename Reactor>
-void CloudCall<Reactor>::OnCancel() {
+template <typename Reactor, typename Request>
+void CloudCall<Reactor, Request>::OnCancel() {
   std::lock_guard lock(mutex_);
   const bool late = absl::FromChrono(context_->deadline()) <= absl::Now() + kDeadlineSlack;
   End(late ? grpc::Status(grpc::StatusCode::DEADLINE_EXCEEDED, "the deadline of the call passed")
            : grpc::Status(grpc::StatusCode::CANCELLED, "the client cancelled the call or is gone"));
 }
 
-template <typename Reactor>
-void CloudCall<Reactor>::EndFailed(grpc::Status status) {
+template <typename Reactor, typename Request>
+void CloudCall<Reactor, Request>::EndFailed(grpc::Status status) {
   if (status.error_code() == grpc::StatusCode::INTERNAL) {
     environment_.log.error("call={} {}", id_, status.error_message());
   }
   End(std::move(status));
 }
 
-template <typename Reactor>
-void CloudCall<Reactor>::End(grpc::Status status) {
+template <typename Reactor, typename Request>
+void CloudCall<Reactor, Request>::End(grpc::Status status) {
   if (ending_) {
     return;
   }
@@ -222,8 +222,8 @@ void CloudCall<Reactor>::End(grpc::Status status) {
   }
 }
 
-template <typename Reactor>
-void CloudCall<Reactor>::OnDone() {
+template <typename Reactor, typename Request>
+void CloudCall<Reactor, Request>::OnDone() {
   std::shared_ptr<CloudCall> self;
   {
     std::lock_guard lock(mutex_);

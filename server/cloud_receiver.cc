@@ -25,18 +25,22 @@ std::vector<double> PointChunks::Flatten() {
   return coordinates;
 }
 
-grpc::Status CloudReceiver::Accept(v1::MeshPointsRequest* request) {
+template <typename Request>
+grpc::Status CloudReceiver::Accept(Request* request) {
   switch (request->request_case()) {
-    case v1::MeshPointsRequest::kParameters:
+    case Request::kParameters:
       return AcceptParameters(request->parameters());
-    case v1::MeshPointsRequest::kPoints:
+    case Request::kPoints:
       return AcceptPoints(request->mutable_points());
-    case v1::MeshPointsRequest::REQUEST_NOT_SET:
+    case Request::REQUEST_NOT_SET:
       break;
   }
   return MakeError(v1::ERROR_REASON_EMPTY_REQUEST, "a request has neither parameters nor points; set one of them",
                    "request");
 }
+
+template grpc::Status CloudReceiver::Accept(v1::MeshPointsRequest*);
+template grpc::Status CloudReceiver::Accept(v1::EstimateMeshRequest*);
 
 grpc::Status CloudReceiver::AcceptEnd() const {
   if (!has_parameters_) {

@@ -1,4 +1,4 @@
-// What a client sends in one call of MeshPoints: parameters, then points.
+// What a client sends in one call of MeshPoints or EstimateMesh: parameters, then points.
 #ifndef WELLSPACE_SERVER_CLOUD_RECEIVER_H_
 #define WELLSPACE_SERVER_CLOUD_RECEIVER_H_
 
@@ -47,7 +47,8 @@ class CloudReceiver {
   //
   // Errors:     EMPTY_REQUEST, PARAMETERS_MISSING, PARAMETERS_REPEATED, INVALID_PARAMETERS, INVALID_CHUNK_SHAPE,
   //             TOO_MANY_POINTS; the call is to be ended.
-  grpc::Status Accept(v1::MeshPointsRequest* request);
+  template <typename Request>
+  grpc::Status Accept(Request* request);
 
   // To be called when the client has ended its stream.
   //

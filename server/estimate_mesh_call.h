@@ -11,7 +11,8 @@
 namespace wellspace::server {
 
 // A CloudCall whose job estimates, and whose answer is one message.
-class EstimateMeshCall final : public CloudCall<grpc::ServerReadReactor<v1::MeshPointsRequest>> {
+class EstimateMeshCall final
+    : public CloudCall<grpc::ServerReadReactor<v1::EstimateMeshRequest>, v1::EstimateMeshRequest> {
  public:
   // Begins to serve the call of `context`. The call deletes itself. REQUIRES: `response` is valid until its end.
   static EstimateMeshCall* Start(const CallEnvironment& environment, grpc::CallbackServerContext* context,

@@ -18,7 +18,8 @@ namespace wellspace::server {
 // the background thread, at most kChunksAhead before they are written.
 //
 // Invariants: those of CloudCall, and one write is in flight at most.
-class MeshPointsCall final : public CloudCall<grpc::ServerBidiReactor<v1::MeshPointsRequest, v1::MeshPointsResponse>> {
+class MeshPointsCall final
+    : public CloudCall<grpc::ServerBidiReactor<v1::MeshPointsRequest, v1::MeshPointsResponse>, v1::MeshPointsRequest> {
  public:
   static constexpr int kChunksAhead = 2;
 

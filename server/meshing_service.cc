@@ -29,8 +29,8 @@ grpc::ServerBidiReactor<v1::MeshPointsRequest, v1::MeshPointsResponse>* MeshingS
   return MeshPointsCall::Start(environment_, context);
 }
 
-grpc::ServerReadReactor<v1::MeshPointsRequest>* MeshingService::EstimateMesh(grpc::CallbackServerContext* context,
-                                                                             v1::EstimateMeshResponse* response) {
+grpc::ServerReadReactor<v1::EstimateMeshRequest>* MeshingService::EstimateMesh(grpc::CallbackServerContext* context,
+                                                                               v1::EstimateMeshResponse* response) {
   return EstimateMeshCall::Start(environment_, context, response);
 }
 

@@ -25,8 +25,8 @@ class MeshingService final : public v1::MeshingService::CallbackService {
 
   grpc::ServerBidiReactor<v1::MeshPointsRequest, v1::MeshPointsResponse>* MeshPoints(
       grpc::CallbackServerContext* context) override;
-  grpc::ServerReadReactor<v1::MeshPointsRequest>* EstimateMesh(grpc::CallbackServerContext* context,
-                                                               v1::EstimateMeshResponse* response) override;
+  grpc::ServerReadReactor<v1::EstimateMeshRequest>* EstimateMesh(grpc::CallbackServerContext* context,
+                                                                 v1::EstimateMeshResponse* response) override;
   grpc::ServerUnaryReactor* GetServerInfo(grpc::CallbackServerContext* context, const v1::GetServerInfoRequest* request,
                                           v1::GetServerInfoResponse* response) override;
 

@@ -33,7 +33,7 @@ using Stream = grpc::ServerReaderWriter<v1::MeshPointsResponse, v1::MeshPointsRe
 // Answers MeshPoints as the test says.
 class FakeServer final : public v1::MeshingService::Service {
  public:
-  using Estimator = std::function<grpc::Status(grpc::ServerContext&, grpc::ServerReader<v1::MeshPointsRequest>&,
+  using Estimator = std::function<grpc::Status(grpc::ServerContext&, grpc::ServerReader<v1::EstimateMeshRequest>&,
                                                v1::EstimateMeshResponse&)>;
   using Behaviour = std::function<grpc::Status(grpc::ServerContext&, Stream&)>;
 
@@ -49,7 +49,7 @@ class FakeServer final : public v1::MeshingService::Service {
     return behaviour_(*context, *stream);
   }
 
-  grpc::Status EstimateMesh(grpc::ServerContext* context, grpc::ServerReader<v1::MeshPointsRequest>* stream,
+  grpc::Status EstimateMesh(grpc::ServerContext* context, grpc::ServerReader<v1::EstimateMeshRequest>* stream,
                             v1::EstimateMeshResponse* response) override {
     return estimator_(*context, *stream, *response);
   }
@@ -84,10 +84,10 @@ struct Upload {
   bool in_order = true;
 };
 
-template <typename AnyStream>
+template <typename Request, typename AnyStream>
 Upload ReadUpload(AnyStream& stream) {
   Upload upload;
-  v1::MeshPointsRequest request;
+  Request request;
   for (bool first = true; stream.Read(&request); first = false) {
     upload.in_order = upload.in_order && request.has_parameters() == first;
     upload.largest_request = std::max(upload.largest_request, request.ByteSizeLong());
@@ -150,7 +150,7 @@ TEST(Connection, SendsEverythingToTheBitInSmallRequests) {
   points[1] = std::numeric_limits<double>::denorm_min();
   std::promise<Upload> seen;
   FakeServer server([&seen](grpc::ServerContext&, Stream& stream) {
-    seen.set_value(ReadUpload(stream));
+    seen.set_value(ReadUpload<v1::MeshPointsRequest>(stream));
     return grpc::Status(grpc::StatusCode::NOT_FOUND, "seen");
   });
   EXPECT_EQ(server.Client().MeshPoints(options, points).status(), absl::NotFoundError("seen"));
@@ -177,7 +177,7 @@ TEST(Connection, SendsCriterionAndSizes) {
                         {.low = {3}, .high = {}, .max_circumradius = 0}};
   std::promise<Upload> seen;
   FakeServer server([&seen](grpc::ServerContext&, Stream& stream) {
-    seen.set_value(ReadUpload(stream));
+    seen.set_value(ReadUpload<v1::MeshPointsRequest>(stream));
     return grpc::Status(grpc::StatusCode::NOT_FOUND, "");
   });
   EXPECT_FALSE(server.Client().MeshPoints(options, {}).ok());
@@ -196,7 +196,7 @@ TEST(Connection, SendsCriterionAndSizes) {
 TEST(Connection, LeavesOutTheDomainWhenThereIsNone) {
   std::promise<Upload> seen;
   FakeServer server([&seen](grpc::ServerContext&, Stream& stream) {
-    seen.set_value(ReadUpload(stream));
+    seen.set_value(ReadUpload<v1::MeshPointsRequest>(stream));
     return grpc::Status(grpc::StatusCode::NOT_FOUND, "");
   });
   EXPECT_FALSE(server.Client().MeshPoints({}, std::vector<double>{1, 2, 3}).ok());
@@ -206,7 +206,7 @@ TEST(Connection, LeavesOutTheDomainWhenThereIsNone) {
 TEST(Connection, ReportsProgressAndReturnsTheMesh) {
   FakeServer server([](grpc::ServerContext&, Stream& stream) {
     WriteProgress(stream, v1::PHASE_WAITING, 0);
-    Upload upload = ReadUpload(stream);
+    Upload upload = ReadUpload<v1::MeshPointsRequest>(stream);
     upload.points = {0.25, 0.75};
     WriteProgress(stream, v1::PHASE_REFINEMENT, 0.5);
     WriteProgress(stream, v1::PHASE_DONE, 1);
@@ -272,7 +272,7 @@ TEST(Connection, AServerThatFailsEarlyEndsTheUpload) {
 TEST(Connection, ADamagedChunkIsDataLossAndCancelsTheCall) {
   std::promise<void> refused;
   FakeServer server([&refused](grpc::ServerContext&, Stream& stream) {
-    Upload upload = ReadUpload(stream);
+    Upload upload = ReadUpload<v1::MeshPointsRequest>(stream);
     upload.points = {0.25, 0.75};
     stream.Write(MetadataFor(upload));
     v1::MeshPointsResponse chunk = ChunkFor(upload);
@@ -288,7 +288,7 @@ TEST(Connection, ADamagedChunkIsDataLossAndCancelsTheCall) {
 
 TEST(Connection, AnAnnouncementThatLiesCostsNothing) {
   FakeServer server([](grpc::ServerContext&, Stream& stream) {
-    Upload upload = ReadUpload(stream);
+    Upload upload = ReadUpload<v1::MeshPointsRequest>(stream);
     v1::MeshPointsResponse metadata = MetadataFor(upload);
     metadata.mutable_metadata()->set_vertex_count(0xFFFFFFFF);
     metadata.mutable_metadata()->set_simplex_count(uint64_t{1} << 40);
@@ -301,7 +301,7 @@ TEST(Connection, AnAnnouncementThatLiesCostsNothing) {
 
 TEST(Connection, AnEndWithoutMeshIsDataLoss) {
   FakeServer server([](grpc::ServerContext&, Stream& stream) {
-    ReadUpload(stream);
+    ReadUpload<v1::MeshPointsRequest>(stream);
     return grpc::Status::OK;
   });
   EXPECT_EQ(server.Client().MeshPoints(UnitSquare(), {}).status().code(), absl::StatusCode::kDataLoss);
@@ -344,7 +344,7 @@ TEST(Connection, EstimateSendsTheCloudAndReturnsTheFigures) {
   const std::vector<double> points(2 * 200'001, 0.25);
   std::promise<Upload> seen;
   FakeServer server(WorkForever, [&seen](grpc::ServerContext&, auto& stream, v1::EstimateMeshResponse& response) {
-    seen.set_value(ReadUpload(stream));
+    seen.set_value(ReadUpload<v1::EstimateMeshRequest>(stream));
     response.set_vertices(uint64_t{1} << 40);
     response.set_simplices(2);
     response.set_memory_bytes(3);
@@ -373,7 +373,7 @@ TEST(Connection, EstimateEndsByErrorStopAndTimeout) {
 
   std::stop_source stop;
   FakeServer endless(WorkForever, [&stop](grpc::ServerContext& context, auto& stream, v1::EstimateMeshResponse&) {
-    ReadUpload(stream);
+    ReadUpload<v1::EstimateMeshRequest>(stream);
     stop.request_stop();
     while (!context.IsCancelled()) {
     }

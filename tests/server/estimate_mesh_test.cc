@@ -20,12 +20,12 @@ class EstimateCall {
   explicit EstimateCall(v1::MeshingService::Stub& stub) : stream_(stub.EstimateMesh(&context_, &response)) {}
 
   bool Send(const v1::MeshParameters& parameters) {
-    v1::MeshPointsRequest request;
+    v1::EstimateMeshRequest request;
     *request.mutable_parameters() = parameters;
     return stream_->Write(request);
   }
   bool Send(const std::vector<double>& coordinates) {
-    v1::MeshPointsRequest request;
+    v1::EstimateMeshRequest request;
     request.mutable_points()->mutable_coordinates()->Assign(coordinates.begin(), coordinates.end());
     return stream_->Write(request);
   }
@@ -37,7 +37,7 @@ class EstimateCall {
 
  private:
   grpc::ClientContext context_;
-  std::unique_ptr<grpc::ClientWriter<v1::MeshPointsRequest>> stream_;
+  std::unique_ptr<grpc::ClientWriter<v1::EstimateMeshRequest>> stream_;
 };
 
 // Sends the parameters, if any, and `points`; returns how the call ends.
