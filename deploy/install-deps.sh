@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that Wellspace needs. The one place with package lists.
 #
-#   deploy/install-deps.sh [GROUP…]        groups: build test lint tidy fuzz bench runtime dev; default: build test
+#   deploy/install-deps.sh [GROUP…]        groups: build test lint tidy fuzz node bench runtime dev; default: build test
 #
 # As root, or through sudo. Installs only what is missing; does not touch the network when nothing is.
 set -euo pipefail
@@ -15,6 +15,7 @@ declare -A packages=(
   [lint]="git clang-format-14 python3"
   [tidy]="clang-tidy-14"
   [fuzz]="clang-14 libclang-rt-14-dev"
+  [node]="nodejs npm"
   [bench]="tetgen python3"
   [runtime]="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libtbb12 libcairo2 zlib1g libminizip1"
 )
