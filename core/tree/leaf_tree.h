@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <deque>
 #include <span>
 #include <vector>
 
@@ -189,7 +190,7 @@ class LeafTree {
   uint8_t max_level_ = 0;
   uint64_t leaf_count_ = 0;
   std::vector<Node> nodes_;
-  std::vector<Bucket> buckets_;
+  std::deque<Bucket> buckets_;  // their addresses stay, so that growing copies none
   std::vector<uint32_t> free_buckets_;
   std::vector<NodeId> leaf_of_;
 
