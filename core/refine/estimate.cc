@@ -405,9 +405,33 @@ constexpr size_t kLeastLeaves = 256;
 constexpr uint64_t kLooksPerLeaf = 4096;
 constexpr uint64_t kLooks = uint64_t{1} << 17;
 
-// The sum of all leaves' shares, and the standard error of the vertices.
+// Leaves that refinement leaves behind.
+struct Leaves {
+  double all = 0;
+  double filled = 0;  // those with vertices
+};
+
+// What becomes of a leaf that holds `vertices` in the end, `at_first` before refinement: it is split for as long as its
+// parts are too full. How many there will be is known to about a quarter. Vertices keep apart, so that leaves of less than
+// one hold one at most.
+template <int D>
+Leaves LeavesOf(double vertices, double at_first) {
+  constexpr double kCapacity = LeafTree<D>::kLeafCapacity;
+  constexpr double kChildren = LeafTree<D>::kChildren;
+  Leaves result{1.0, at_first > 0 ? 1.0 : std::min(1.0, vertices)};
+  const double split = std::clamp(2 * (vertices / kCapacity - 0.75), 0.0, 1.0);
+  if (split > 0) {
+    const Leaves child = LeavesOf<D>(vertices / kChildren, 0);
+    result.all = std::lerp(result.all, kChildren * child.all, split);
+    result.filled = std::lerp(result.filled, kChildren * child.filled, split);
+  }
+  return result;
+}
+
+// The sums over all leaves, and the standard error of the vertices.
 struct Sample {
   Share sum;
+  Leaves leaves;
   double error = 0;
 };
 
@@ -441,6 +465,11 @@ absl::StatusOr<Sample> SampleLeaves(const QueryStructure<D>& structure, Integrat
     const Share share = integrator.IntegrateLeaf(structure.tree().BoxOf(leaves[taken]), full_looks);
     Add(sample.sum, share);
     const double vertices = Sum(integrator.VerticesOf(share.terms)) + share.sizes;
+    const auto* const bucket = structure.tree().BucketOf(leaves[taken]);
+    const double at_first = bucket == nullptr ? 0.0 : bucket->count;
+    const Leaves become = LeavesOf<D>(at_first + vertices, at_first);
+    sample.leaves.all += become.all;
+    sample.leaves.filled += become.filled;
     sum += vertices;
     sum_sq += vertices * vertices;
     ++taken;
@@ -460,6 +489,8 @@ absl::StatusOr<Sample> SampleLeaves(const QueryStructure<D>& structure, Integrat
     term *= factor;
   }
   sample.sum.sizes *= factor;
+  sample.leaves.all *= factor;
+  sample.leaves.filled *= factor;
   sample.error = taken == count ? 0.0 : sample.error;
   return sample;
 }
@@ -487,28 +518,23 @@ double SimplicesOf(double vertices, double on_boundary) {
   }
 }
 
-// Leaves that refinement leaves behind hold so many vertices, if it had to split at all.
-template <int D>
-constexpr double kVerticesPerSplitLeaf = D == 2 ? 5.0 : 3.6;
-
-// What a process allocates whatever the mesh: scratch space, threads, their stacks.
-constexpr double kFixedBytes = 2e6;
+// What a process touches whatever the mesh, as measured: code, threads, their stacks and scratch space.
+constexpr double kFixedBytes = 3.4e6;
 
 // The memory at its peak, when stars are put together. Vectors grow by doubling, but of what they reserve only what they
 // use is ever touched.
 template <int D>
-double BytesOf(double leaves_before, double vertices, double simplices) {
-  const double leaves = std::pow(std::pow(leaves_before, 4) + std::pow(vertices / kVerticesPerSplitLeaf<D>, 4), 0.25);
-  const double nodes = leaves * (1 << D) / ((1 << D) - 1);
-  const double buckets = leaves * -std::expm1(-vertices / leaves);  // of leaves with vertices
-  // A node, as LeafTree has it privately, and three marks of the queries' scratch space.
-  const double node_bytes = 16 * D + 24 + 3 * sizeof(uint32_t);
+double BytesOf(const Leaves& leaves, double vertices, double simplices) {
+  constexpr double kChildren = LeafTree<D>::kChildren;
+  const double nodes = leaves.all * kChildren / (kChildren - 1);
+  // Beside the nodes, three marks of the queries' scratch space.
+  const double node_bytes = LeafTree<D>::NodeBytes() + 3 * sizeof(uint32_t);
   // Coordinates in the structure and in the mesh; leaf, faces, radius, place in the schedule, numbers in the output.
   const double vertex_bytes = 2 * sizeof(Point<D>) + 32;
-  // Indices in blocks, which grow by doubling, and in the mesh.
+  // Indices in blocks and in the mesh.
   const double simplex_bytes = 2.0 * (D + 1) * sizeof(uint32_t);
-  return kFixedBytes + nodes * node_bytes + buckets * sizeof(typename LeafTree<D>::Bucket) + vertices * vertex_bytes +
-         simplices * simplex_bytes;
+  return kFixedBytes + nodes * node_bytes + leaves.filled * sizeof(typename LeafTree<D>::Bucket) +
+         vertices * vertex_bytes + simplices * simplex_bytes;
 }
 
 }  // namespace
@@ -527,8 +553,7 @@ absl::StatusOr<SizeEstimate> EstimateSize(const QueryStructure<D>& structure, co
   SizeEstimate estimate;
   estimate.vertices = structure.vertex_count() + Sum(added) + sample.sum.sizes;
   estimate.simplices = SimplicesOf<D>(estimate.vertices, on_boundary);
-  estimate.bytes =
-      BytesOf<D>(static_cast<double>(structure.tree().leaf_count()), estimate.vertices, estimate.simplices);
+  estimate.bytes = BytesOf<D>(sample.leaves, estimate.vertices, estimate.simplices);
   estimate.sampling_error = sample.error / estimate.vertices;
   return estimate;
 }

@@ -3,6 +3,7 @@
 #define WELLSPACE_CORE_TREE_LEAF_TREE_H_
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <span>
@@ -80,6 +81,8 @@ class LeafTree {
   uint64_t leaf_count() const { return leaf_count_; }
   // Nodes are numbered from 0; not every one is a leaf.
   uint32_t node_count() const { return static_cast<uint32_t>(nodes_.size()); }
+  // What a node takes, but for the vertices in it.
+  static constexpr size_t NodeBytes() { return sizeof(Node); }
   // Whether `node` is a leaf that covers a part of the box.
   bool IsLeaf(NodeId node) const { return At(node).first_child == kNoNode && !At(node).outside; }
   Box<D> BoxOf(NodeId node) const { return At(node).Cube(); }
