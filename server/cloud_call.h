@@ -15,6 +15,7 @@
 #include "absl/time/time.h"
 #include "core/mesher.h"
 #include "grpcpp/server_context.h"
+#include "server/authenticator.h"
 #include "server/background.h"
 #include "server/call_registry.h"
 #include "server/cloud_receiver.h"
@@ -38,6 +39,7 @@ struct CallEnvironment {
   const ServiceOptions& options;
   const Mesher& mesher;
   const Estimator& estimator;
+  const Authenticator& authenticator;
   JobPool& jobs;
   Background& background;
   CallRegistry& calls;
@@ -99,6 +101,8 @@ class CloudCall : public Reactor, public std::enable_shared_from_this<CloudCall<
 
   const CallEnvironment& environment() const { return environment_; }
   uint64_t id() const { return id_; }
+  // Constant from Begin on.
+  const Caller& caller() const { return caller_; }
   // Constant once there is a job.
   const core::MeshParameters& parameters() const { return receiver_.parameters(); }
 
@@ -117,6 +121,7 @@ class CloudCall : public Reactor, public std::enable_shared_from_this<CloudCall<
   const std::string peer_;
   const absl::Time start_;
   uint64_t id_ = 0;
+  Caller caller_;
 
   // Guarded by mutex_.
   std::shared_ptr<CloudCall> self_;
@@ -137,10 +142,13 @@ void CloudCall<Reactor, Request>::Begin(const std::shared_ptr<CloudCall>& call) 
     }
   });
   call->id_ = admission.id;
-  if (admission.admitted) {
-    call->StartRead(&call->request_);
-  } else {
+  if (grpc::Status status = call->environment_.authenticator.Authenticate(*call->context_, &call->caller_);
+      !status.ok()) {
+    call->End(std::move(status));
+  } else if (!admission.admitted) {
     call->End(MakeError(v1::ERROR_REASON_SERVER_STOPPING, "the server is stopping and takes no new calls"));
+  } else {
+    call->StartRead(&call->request_);
   }
 }
 
@@ -228,9 +236,9 @@ void CloudCall<Reactor, Request>::OnDone() {
   {
     std::lock_guard lock(mutex_);
     const auto code = static_cast<absl::StatusCode>(final_status_.error_code());
-    environment_.log.info("call={} method={} peer={} code={} seconds={:.3f} points={} vertices={}{}{}", id_, method_,
-                          peer_, absl::StatusCodeToString(code), absl::ToDoubleSeconds(absl::Now() - start_),
-                          receiver_.point_count(), VertexCount(),
+    environment_.log.info("call={} method={} tenant={} peer={} code={} seconds={:.3f} points={} vertices={}{}{}", id_,
+                          method_, caller_.tenant, peer_, absl::StatusCodeToString(code),
+                          absl::ToDoubleSeconds(absl::Now() - start_), receiver_.point_count(), VertexCount(),
                           final_status_.ok() ? "" : " message=", final_status_.error_message());
     self = std::move(self_);
   }

@@ -28,6 +28,8 @@ grpc::StatusCode CodeOf(v1::ErrorReason reason) {
       return grpc::StatusCode::RESOURCE_EXHAUSTED;
     case v1::ERROR_REASON_SERVER_STOPPING:
       return grpc::StatusCode::UNAVAILABLE;
+    case v1::ERROR_REASON_UNAUTHENTICATED:
+      return grpc::StatusCode::UNAUTHENTICATED;
     default:
       return grpc::StatusCode::INTERNAL;
   }

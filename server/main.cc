@@ -26,7 +26,7 @@ constexpr int kLogQueue = 8192;
 constexpr double kMaxGraceSeconds = 86'400;
 
 struct Flags {
-  ServerOptions server{.listen = "127.0.0.1:7233", .insecure_remote = false, .service = {}};
+  ServerOptions server{.listen = "127.0.0.1:7233", .insecure_remote = false, .service = {}, .demands = {}};
   double grace_seconds = 10;
   std::string log_level = "info";
 };

@@ -9,16 +9,18 @@
 
 namespace wellspace::server {
 
-MeshingService::MeshingService(const ServiceOptions& options, std::shared_ptr<spdlog::logger> log, Mesher mesher,
-                               Estimator estimator)
+MeshingService::MeshingService(const ServiceOptions& options, const Authenticator& authenticator,
+                               std::shared_ptr<spdlog::logger> log, Mesher mesher, Estimator estimator)
     : options_(options),
       log_(std::move(log)),
       mesher_(std::move(mesher)),
       estimator_(std::move(estimator)),
+      authenticator_(authenticator),
       jobs_(options_.workers, options_.max_queued_jobs),
       environment_{.options = options_,
                    .mesher = mesher_,
                    .estimator = estimator_,
+                   .authenticator = authenticator_,
                    .jobs = jobs_,
                    .background = background_,
                    .calls = calls_,
@@ -37,6 +39,12 @@ grpc::ServerReadReactor<v1::EstimateMeshRequest>* MeshingService::EstimateMesh(g
 grpc::ServerUnaryReactor* MeshingService::GetServerInfo(grpc::CallbackServerContext* context,
                                                         const v1::GetServerInfoRequest* /*request*/,
                                                         v1::GetServerInfoResponse* response) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  Caller caller;
+  if (const grpc::Status status = authenticator_.Authenticate(*context, &caller); !status.ok()) {
+    reactor->Finish(status);
+    return reactor;
+  }
   response->set_version(kVersion);
   for (int dimension = core::kMinDimension; dimension <= core::kMaxDimension; ++dimension) {
     response->add_dimensions(dimension);
@@ -49,7 +57,6 @@ grpc::ServerUnaryReactor* MeshingService::GetServerInfo(grpc::CallbackServerCont
   const JobPool::Load load = jobs_.GetLoad();
   response->set_running_jobs(load.running);
   response->set_queued_jobs(load.queued);
-  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
   reactor->Finish(grpc::Status::OK);
   return reactor;
 }

@@ -4,6 +4,7 @@
 
 #include <memory>
 
+#include "server/authenticator.h"
 #include "server/background.h"
 #include "server/call_registry.h"
 #include "server/cloud_call.h"
@@ -20,8 +21,9 @@ namespace wellspace::server {
 // REQUIRES:   the gRPC server has ended all calls before this is destroyed.
 class MeshingService final : public v1::MeshingService::CallbackService {
  public:
-  MeshingService(const ServiceOptions& options, std::shared_ptr<spdlog::logger> log, Mesher mesher,
-                 Estimator estimator);
+  // `authenticator` outlives this.
+  MeshingService(const ServiceOptions& options, const Authenticator& authenticator, std::shared_ptr<spdlog::logger> log,
+                 Mesher mesher, Estimator estimator);
 
   grpc::ServerBidiReactor<v1::MeshPointsRequest, v1::MeshPointsResponse>* MeshPoints(
       grpc::CallbackServerContext* context) override;
@@ -38,6 +40,7 @@ class MeshingService final : public v1::MeshingService::CallbackService {
   const std::shared_ptr<spdlog::logger> log_;
   const Mesher mesher_;
   const Estimator estimator_;
+  const Authenticator& authenticator_;
   CallRegistry calls_;
   // Jobs end before the background thread, to which they post.
   Background background_;

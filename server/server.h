@@ -11,6 +11,7 @@
 #include "absl/time/time.h"
 #include "grpcpp/channel.h"
 #include "grpcpp/server.h"
+#include "server/authenticator.h"
 #include "server/meshing_service.h"
 #include "server/options.h"
 #include "spdlog/logger.h"
@@ -21,6 +22,7 @@ struct ServerOptions {
   std::string listen;            // HOST:PORT, port 0 takes a free one; empty: no listener
   bool insecure_remote = false;  // allows plain text on addresses that other machines can reach
   ServiceOptions service;
+  Authenticator::Demands demands;  // on callers
 };
 
 // Serves MeshingService, health and reflection.
@@ -56,8 +58,10 @@ class Server {
 
  private:
   Server(const ServerOptions& options, std::shared_ptr<spdlog::logger> log, Mesher mesher, Estimator estimator)
-      : service_(options.service, std::move(log), std::move(mesher), std::move(estimator)) {}
+      : authenticator_(options.demands),
+        service_(options.service, authenticator_, std::move(log), std::move(mesher), std::move(estimator)) {}
 
+  Authenticator authenticator_;
   MeshingService service_;
   std::string address_;
   std::unique_ptr<grpc::Server> server_;
