@@ -26,6 +26,20 @@ struct Progress {
   double fraction = 0;              // of the whole run, in [0, 1], never decreasing
 };
 
+// Whoever lends runs their memory. Both calls count what a run holds in all, its input excepted.
+//
+// Thread safety: thread-safe.
+class MemoryLender {
+ public:
+  virtual ~MemoryLender() = default;
+
+  // Asked before work that is estimated to hold `bytes` at its peak. May wait until they can be had; an error ends the run.
+  virtual absl::Status Reserve(uint64_t bytes) = 0;
+
+  // Asked now and then while a run works, with what it holds or is about to. Does not wait; an error ends the run.
+  virtual absl::Status Allow(uint64_t bytes) = 0;
+};
+
 // One run of the mesher: its owner cancels it and looks at its progress, the mesher polls it at checkpoints.
 //
 // Thread safety: thread-safe. Cancel and Snapshot may be called from any thread at any time.
@@ -47,6 +61,16 @@ class RunContext {
 
   Progress Snapshot() const;
 
+  // Who lends the run its memory; null, as at first: nobody does, and it may have all. To be set before the run.
+  void SetMemoryLender(MemoryLender* lender) { lender_ = lender; }
+  bool HasMemoryLender() const { return lender_ != nullptr; }
+  absl::Status ReserveMemory(uint64_t bytes) const {
+    return lender_ == nullptr ? absl::OkStatus() : lender_->Reserve(bytes);
+  }
+  absl::Status AllowMemory(uint64_t bytes) const {
+    return lender_ == nullptr ? absl::OkStatus() : lender_->Allow(bytes);
+  }
+
   // For the mesher alone.
   void EnterPhase(Phase phase);
   void SetVertices(uint64_t vertices) { vertices_.store(vertices, std::memory_order_relaxed); }
@@ -62,6 +86,7 @@ class RunContext {
  private:
   enum class State : int { kRunning, kCancelled, kDeadlineExceeded };
 
+  MemoryLender* lender_ = nullptr;
   std::atomic<State> state_{State::kRunning};
   std::atomic<Phase> phase_{Phase::kWaiting};
   std::atomic<uint64_t> vertices_{0};
