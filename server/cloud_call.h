@@ -21,6 +21,7 @@
 #include "server/cloud_receiver.h"
 #include "server/errors.h"
 #include "server/jobs.h"
+#include "server/memory_budget.h"
 #include "server/options.h"
 #include "spdlog/logger.h"
 #include "wellspace/v1/meshing.pb.h"
@@ -40,6 +41,7 @@ struct CallEnvironment {
   const Mesher& mesher;
   const Estimator& estimator;
   const Authenticator& authenticator;
+  MemoryBudget& memory;
   JobPool& jobs;
   Background& background;
   CallRegistry& calls;
@@ -77,7 +79,7 @@ class CloudCall : public Reactor, public std::enable_shared_from_this<CloudCall<
   static void Begin(const std::shared_ptr<CloudCall>& call);
 
   // On a worker: works, and hands over what came of it.
-  virtual void Work(PointChunks& points, core::RunContext& context) = 0;
+  virtual void Work(PointChunks& points, Job& job) = 0;
 
   // The following are called with mutex_ held, and want it to be held when they are called.
 
@@ -190,10 +192,13 @@ void CloudCall<Reactor, Request>::SubmitJob() {
   }
   // std::function wants to be copied, points do not.
   auto points = std::make_shared<PointChunks>(receiver_.TakePoints());
-  job_ = environment_.jobs.Submit(
-      [self = this->shared_from_this(), points](core::RunContext& context) { self->Work(*points, context); });
+  JobPool::Submission submission =
+      environment_.jobs.Submit({.tenant = caller_.tenant, .work = [self = this->shared_from_this(), points](Job& job) {
+                                  self->Work(*points, job);
+                                }});
+  job_ = std::move(submission.job);
   if (job_ == nullptr) {
-    End(MakeError(v1::ERROR_REASON_QUEUE_FULL, "too many jobs are waiting on this server; try again later"));
+    End(std::move(submission.refusal));
   }
 }
 

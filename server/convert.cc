@@ -176,6 +176,13 @@ v1::EstimateMeshResponse EstimateToProto(const core::MeshEstimate& estimate) {
   return message;
 }
 
+google::protobuf::Duration DurationToProto(absl::Duration duration) {
+  google::protobuf::Duration message;
+  message.set_seconds(absl::IDivDuration(duration, absl::Seconds(1), &duration));
+  message.set_nanos(static_cast<int32_t>(absl::ToInt64Nanoseconds(duration)));
+  return message;
+}
+
 v1::Phase PhaseToProto(core::Phase phase) {
   switch (phase) {
     case core::Phase::kWaiting:

@@ -4,7 +4,9 @@
 
 #include <cstdint>
 
+#include "absl/time/time.h"
 #include "core/mesher.h"
+#include "google/protobuf/duration.pb.h"
 #include "grpcpp/support/status.h"
 #include "server/options.h"
 #include "wellspace/v1/mesh.pb.h"
@@ -24,6 +26,9 @@ grpc::Status ParametersFromProto(const v1::MeshParameters& message, const Servic
 v1::MeshMetadata MetadataToProto(const core::Mesh& mesh, uint64_t chunk_count);
 
 v1::EstimateMeshResponse EstimateToProto(const core::MeshEstimate& estimate);
+
+// REQUIRES:   finite.
+google::protobuf::Duration DurationToProto(absl::Duration duration);
 
 v1::Phase PhaseToProto(core::Phase phase);
 

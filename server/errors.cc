@@ -3,7 +3,9 @@
 #include <exception>
 #include <new>
 
+#include "absl/strings/cord.h"
 #include "absl/strings/str_cat.h"
+#include "absl/types/optional.h"
 #include "google/rpc/error_details.pb.h"
 #include "google/rpc/status.pb.h"
 
@@ -11,6 +13,10 @@ namespace wellspace::server {
 namespace {
 
 constexpr int kRetrySeconds = 1;
+
+// Marks the status of a MEMORY_LIMIT; its value is kMayRetry or empty.
+constexpr char kMemoryLimitPayload[] = "wellspace.v1/MEMORY_LIMIT";
+constexpr char kMayRetry[] = "retry";
 
 grpc::StatusCode CodeOf(v1::ErrorReason reason) {
   switch (reason) {
@@ -25,6 +31,8 @@ grpc::StatusCode CodeOf(v1::ErrorReason reason) {
     case v1::ERROR_REASON_MESH_TOO_LARGE:
     case v1::ERROR_REASON_QUEUE_FULL:
     case v1::ERROR_REASON_OUT_OF_MEMORY:
+    case v1::ERROR_REASON_MEMORY_LIMIT:
+    case v1::ERROR_REASON_QUOTA_EXCEEDED:
       return grpc::StatusCode::RESOURCE_EXHAUSTED;
     case v1::ERROR_REASON_SERVER_STOPPING:
       return grpc::StatusCode::UNAVAILABLE;
@@ -37,12 +45,10 @@ grpc::StatusCode CodeOf(v1::ErrorReason reason) {
 
 bool PassesWithTime(v1::ErrorReason reason) {
   return reason == v1::ERROR_REASON_QUEUE_FULL || reason == v1::ERROR_REASON_OUT_OF_MEMORY ||
-         reason == v1::ERROR_REASON_SERVER_STOPPING;
+         reason == v1::ERROR_REASON_QUOTA_EXCEEDED || reason == v1::ERROR_REASON_SERVER_STOPPING;
 }
 
-}  // namespace
-
-grpc::Status MakeError(v1::ErrorReason reason, const std::string& message, const std::string& field) {
+grpc::Status Make(v1::ErrorReason reason, const std::string& message, const std::string& field, bool may_retry) {
   google::rpc::Status details;
   details.set_code(CodeOf(reason));
   details.set_message(message);
@@ -57,12 +63,24 @@ grpc::Status MakeError(v1::ErrorReason reason, const std::string& message, const
     violation->set_description(message);
     details.add_details()->PackFrom(bad_request);
   }
-  if (PassesWithTime(reason)) {
+  if (may_retry) {
     google::rpc::RetryInfo retry;
     retry.mutable_retry_delay()->set_seconds(kRetrySeconds);
     details.add_details()->PackFrom(retry);
   }
   return grpc::Status(CodeOf(reason), message, details.SerializeAsString());
+}
+
+}  // namespace
+
+grpc::Status MakeError(v1::ErrorReason reason, const std::string& message, const std::string& field) {
+  return Make(reason, message, field, PassesWithTime(reason));
+}
+
+absl::Status MemoryLimitError(const std::string& message, bool may_retry) {
+  absl::Status status = absl::ResourceExhaustedError(message);
+  status.SetPayload(kMemoryLimitPayload, absl::Cord(may_retry ? kMayRetry : ""));
+  return status;
 }
 
 grpc::Status FromCoreStatus(const absl::Status& status) {
@@ -73,6 +91,9 @@ grpc::Status FromCoreStatus(const absl::Status& status) {
     case absl::StatusCode::kInvalidArgument:
       return MakeError(v1::ERROR_REASON_INVALID_POINTS, message, "points.coordinates");
     case absl::StatusCode::kResourceExhausted:
+      if (const absl::optional<absl::Cord> payload = status.GetPayload(kMemoryLimitPayload); payload.has_value()) {
+        return Make(v1::ERROR_REASON_MEMORY_LIMIT, message, "", *payload == kMayRetry);
+      }
       return MakeError(v1::ERROR_REASON_MESH_TOO_LARGE, message);
     case absl::StatusCode::kCancelled:
       return grpc::Status(grpc::StatusCode::CANCELLED, message);

@@ -21,6 +21,9 @@ inline constexpr char kErrorDomain[] = "wellspace.v1";
 // Threads:    thread-safe.
 grpc::Status MakeError(v1::ErrorReason reason, const std::string& message, const std::string& field = "");
 
+// A RESOURCE_EXHAUSTED that FromCoreStatus makes a MEMORY_LIMIT, with RetryInfo if asking again may help.
+absl::Status MemoryLimitError(const std::string& message, bool may_retry);
+
 // The status of a run that the core ended with `status`. The parameters were validated before, so that an INVALID_ARGUMENT is about
 // the points.
 grpc::Status FromCoreStatus(const absl::Status& status);

@@ -15,11 +15,11 @@ EstimateMeshCall* EstimateMeshCall::Start(const CallEnvironment& environment, gr
   return call.get();
 }
 
-void EstimateMeshCall::Work(PointChunks& points, core::RunContext& context) {
+void EstimateMeshCall::Work(PointChunks& points, Job& job) {
   core::MeshEstimate estimate{};
   grpc::Status status = RunGuarded([&] {
     const std::vector<double> coordinates = points.Flatten();
-    const absl::StatusOr<core::MeshEstimate> made = environment().estimator(parameters(), coordinates, context);
+    const absl::StatusOr<core::MeshEstimate> made = environment().estimator(parameters(), coordinates, job.context());
     if (made.ok()) {
       estimate = *made;
     }

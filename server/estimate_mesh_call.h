@@ -23,7 +23,7 @@ class EstimateMeshCall final
                    v1::EstimateMeshResponse* response)
       : CloudCall(environment, context, "EstimateMesh"), response_(response) {}
 
-  void Work(PointChunks& points, core::RunContext& context) override;
+  void Work(PointChunks& points, Job& job) override;
   uint64_t VertexCount() const override { return vertices_; }
 
   v1::EstimateMeshResponse* const response_;  // guarded by mutex_; gRPC's from Finish on

@@ -2,81 +2,381 @@
 
 #include <algorithm>
 
-namespace wellspace::server {
+#include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
+#include "server/errors.h"
 
-JobPool::JobPool(int workers, int max_queued) : capacity_(static_cast<size_t>(workers) + max_queued) {
-  workers_.reserve(workers);
-  for (int i = 0; i < workers; ++i) {
-    workers_.emplace_back([this] { RunWorker(); });
+namespace wellspace::server {
+namespace {
+
+constexpr char kJob[] = "the job";
+
+}  // namespace
+
+Job::Job(JobPool& pool, JobRequest request)
+    : pool_(pool), tenant_(std::move(request.tenant)), held_(std::move(request.held)), work_(std::move(request.work)) {
+  if (pool_.memory_.is_limited()) {
+    memory_ = pool_.memory_.ReserveNothing();
+    context_.SetMemoryLender(this);
+  }
+}
+
+void Job::ReleaseHeld() {
+  MemoryReservation released;  // without the lock
+  std::lock_guard lock(memory_mutex_);
+  released = std::move(held_);
+}
+
+MemoryReservation Job::TakeMemory(uint64_t bytes) {
+  std::lock_guard lock(memory_mutex_);
+  return memory_.Split(bytes);
+}
+
+absl::Status Job::Reserve(uint64_t bytes) { return pool_.Reserve(*this, bytes); }
+
+absl::Status Job::Allow(uint64_t bytes) {
+  std::lock_guard lock(memory_mutex_);
+  if (bytes <= memory_.bytes() || memory_.Resize(bytes + bytes / 8) || memory_.Resize(bytes)) {
+    return absl::OkStatus();
+  }
+  return pool_.memory_.Refusal(bytes, kJob);
+}
+
+uint64_t Job::PassingBytes() const {
+  std::lock_guard lock(memory_mutex_);
+  return held_.passing_bytes() + memory_.passing_bytes();
+}
+
+void Job::ReleaseAll() {
+  MemoryReservation held;
+  MemoryReservation memory;
+  std::lock_guard lock(memory_mutex_);
+  held = std::move(held_);
+  memory = std::move(memory_);
+}
+
+JobPool::JobPool(const Limits& limits, MemoryBudget& memory) : limits_(limits), memory_(memory) {
+  memory_.SetReleaseListener([this] {
+    std::lock_guard lock(mutex_);
+    Dispatch();
+  });
+  std::lock_guard lock(mutex_);
+  for (int i = 0; i < limits_.workers; ++i) {
+    StartThread();
   }
 }
 
 JobPool::~JobPool() {
-  std::deque<std::shared_ptr<Job>> dropped;
-  {
-    std::lock_guard lock(mutex_);
-    stopping_ = true;
-    dropped.swap(queue_);
-    for (const std::shared_ptr<Job>& job : running_) {
-      job->context_.Cancel();
+  memory_.SetReleaseListener(nullptr);
+  std::map<std::string, Line> dropped;
+  std::deque<std::shared_ptr<Job>> not_begun;
+  std::unique_lock lock(mutex_);
+  stopping_ = true;
+  dropped.swap(lines_);
+  turns_.clear();
+  not_begun.swap(started_);
+  for (const std::shared_ptr<Job>& job : begun_) {
+    job->context_.Cancel();
+    if (job->state_ == Job::State::kWaiting) {
+      Resume(*job);
     }
   }
   wake_.notify_all();
-  for (std::thread& worker : workers_) {
-    worker.join();
+  wake_.wait(lock, [this] { return threads_.empty(); });
+  lock.unlock();
+  for (std::thread& thread : ended_threads_) {
+    thread.join();
   }
-  for (const std::shared_ptr<Job>& job : dropped) {
+  const auto drop = [](const std::shared_ptr<Job>& job) {
     job->context_.Cancel();
     job->work_ = nullptr;
+    job->ReleaseAll();
+  };
+  for (const auto& [tenant, line] : dropped) {
+    std::for_each(line.begin(), line.end(), drop);
   }
+  std::for_each(not_begun.begin(), not_begun.end(), drop);
 }
 
-std::shared_ptr<Job> JobPool::Submit(Job::Work work) {
-  auto job = std::make_shared<Job>(std::move(work));
+JobPool::Submission JobPool::Submit(JobRequest request) {
+  const std::shared_ptr<Job> job(new Job(*this, std::move(request)));
+  grpc::Status refusal;
   {
     std::lock_guard lock(mutex_);
-    if (stopping_ || queue_.size() + running_.size() >= capacity_) {
-      return nullptr;
+    const auto of_tenant = jobs_of_.find(job->tenant_);
+    if (stopping_ || InLine() + running_ >= static_cast<size_t>(limits_.workers) + limits_.max_queued) {
+      refusal = MakeError(v1::ERROR_REASON_QUEUE_FULL,
+                          absl::StrCat("this server runs ", running_, " jobs and has ", InLine(),
+                                       " more in line, which is all that it takes; try again later"));
+    } else if (of_tenant != jobs_of_.end() && of_tenant->second >= limits_.max_per_tenant) {
+      refusal = MakeError(v1::ERROR_REASON_QUOTA_EXCEEDED,
+                          absl::StrCat(of_tenant->second, " jobs of this tenant run or are in line; it may have ",
+                                       limits_.max_per_tenant, "; try again later"));
+    } else {
+      ++jobs_of_[job->tenant_];
+      job->sequence_ = next_sequence_++;
+      Enter(job);
+      Dispatch();
+      return Submission{.job = job, .refusal = {}};
     }
-    queue_.push_back(job);
   }
-  wake_.notify_one();
-  return job;
+  job->work_ = nullptr;
+  job->ReleaseAll();
+  return Submission{.job = nullptr, .refusal = std::move(refusal)};
 }
 
 void JobPool::Cancel(const std::shared_ptr<Job>& job) {
   job->context_.Cancel();
   Job::Work dropped;  // freed without the lock: it may hold much
-  std::lock_guard lock(mutex_);
-  const auto waiting = std::find(queue_.begin(), queue_.end(), job);
-  if (waiting != queue_.end()) {
-    dropped = std::exchange(job->work_, nullptr);
-    queue_.erase(waiting);
+  {
+    std::lock_guard lock(mutex_);
+    switch (job->state_) {
+      case Job::State::kQueued:
+        dropped = std::exchange(job->work_, nullptr);
+        Leave(*job);
+        EndOf(*job);
+        break;
+      case Job::State::kWaiting:  // it unwinds, whether there is a worker for it or not
+        Leave(*job);
+        Resume(*job);
+        break;
+      case Job::State::kRunning:
+      case Job::State::kDone:
+        return;
+    }
+    Dispatch();
+  }
+  if (dropped != nullptr) {
+    dropped = nullptr;
+    job->ReleaseAll();
   }
 }
 
 JobPool::Load JobPool::GetLoad() const {
   std::lock_guard lock(mutex_);
-  return Load{.running = static_cast<int>(running_.size()), .queued = static_cast<int>(queue_.size())};
+  return Load{.running = running_, .queued = static_cast<int>(InLine())};
 }
 
-void JobPool::RunWorker() {
+absl::Status JobPool::Reserve(Job& job, uint64_t bytes) {
+  WELLSPACE_RETURN_IF_ERROR(job.context_.Check());
+  const uint64_t lasting = memory_.lasting();
+  if (bytes > memory_.limit() - std::min(lasting, memory_.limit())) {
+    return memory_.Refusal(bytes, kJob);
+  }
+  {
+    MemoryReservation spare;  // released without the locks
+    std::lock_guard lock(job.memory_mutex_);
+    if (bytes <= job.memory_.bytes()) {
+      spare = job.memory_.Split(job.memory_.bytes() - bytes);
+      return absl::OkStatus();
+    }
+  }
+  std::unique_lock lock(mutex_);
+  if (std::exchange(job.is_refused_, false)) {
+    return memory_.Refusal(bytes, kJob);
+  }
+  job.wanted_bytes_ = bytes;
+  if (Claimant() == nullptr && TakeWanted(job)) {
+    CountPassing();
+    return absl::OkStatus();
+  }
+  return WaitInLine(job, lock);
+}
+
+absl::Status JobPool::WaitInLine(Job& job, std::unique_lock<std::mutex>& lock) {
+  if (stopping_) {
+    return job.context_.Check();
+  }
+  job.state_ = Job::State::kWaiting;
+  job.passed_over_ = 0;
+  Enter(job.shared_from_this());
+  --running_;
+  ++blocked_;
+  if (threads_.size() - blocked_ < static_cast<size_t>(limits_.workers)) {
+    StartThread();
+  }
+  Dispatch();
+  job.wake_.wait(lock, [&job] { return job.state_ == Job::State::kRunning; });
+  --blocked_;
+  wake_.notify_all();  // a thread may be one too many now
+  WELLSPACE_RETURN_IF_ERROR(job.context_.Check());
+  if (std::exchange(job.is_refused_, false)) {
+    return memory_.Refusal(job.wanted_bytes_, kJob);
+  }
+  return absl::OkStatus();
+}
+
+void JobPool::Dispatch() {
+  while (running_ < limits_.workers && !turns_.empty() && StartNext()) {
+  }
+}
+
+bool JobPool::StartNext() {
+  if (const std::shared_ptr<Job> claimant = Claimant(); claimant != nullptr) {
+    if (StartFirstOf(claimant->tenant_)) {
+      return true;
+    }
+    if (running_ > 0) {
+      return false;
+    }
+    claimant->passed_over_ = 0;  // what it waits for is no job's: others go on
+  }
+  for (const std::string& tenant : std::list<std::string>(turns_)) {
+    if (StartFirstOf(tenant)) {
+      CountPassing();
+      return true;
+    }
+  }
+  const std::shared_ptr<Job> victim = VictimOfDeadlock();
+  if (victim == nullptr) {
+    return false;
+  }
+  victim->is_refused_ = true;
+  Start(victim);
+  return true;
+}
+
+bool JobPool::StartFirstOf(const std::string& tenant) {
+  const std::shared_ptr<Job> job = lines_.at(tenant).front();
+  if (job->state_ == Job::State::kWaiting && !TakeWanted(*job)) {
+    return false;
+  }
+  Start(job);
+  return true;
+}
+
+void JobPool::Start(const std::shared_ptr<Job>& job) {
+  Leave(*job);
+  if (lines_.contains(job->tenant_)) {  // whose next job comes after those of others
+    turns_.remove(job->tenant_);
+    turns_.push_back(job->tenant_);
+  }
+  if (job->state_ == Job::State::kWaiting) {
+    Resume(*job);
+    return;
+  }
+  job->state_ = Job::State::kRunning;
+  ++running_;
+  started_.push_back(job);
+  wake_.notify_all();
+}
+
+void JobPool::Resume(Job& job) {
+  job.state_ = Job::State::kRunning;
+  ++running_;
+  job.wake_.notify_one();
+}
+
+bool JobPool::TakeWanted(Job& job) {
+  std::lock_guard lock(job.memory_mutex_);
+  return job.memory_.Resize(job.wanted_bytes_);
+}
+
+void JobPool::CountPassing() {
+  for (const auto& [tenant, line] : lines_) {
+    if (line.front()->state_ == Job::State::kWaiting) {
+      ++line.front()->passed_over_;
+    }
+  }
+}
+
+std::shared_ptr<Job> JobPool::Claimant() const {
+  std::shared_ptr<Job> claimant;
+  for (const auto& [tenant, line] : lines_) {
+    const std::shared_ptr<Job>& first = line.front();
+    if (first->state_ == Job::State::kWaiting && first->passed_over_ >= kMostPassing &&
+        (claimant == nullptr || first->sequence_ < claimant->sequence_)) {
+      claimant = first;
+    }
+  }
+  return claimant;
+}
+
+std::shared_ptr<Job> JobPool::VictimOfDeadlock() const {
+  if (running_ > 0) {
+    return nullptr;
+  }
+  const uint64_t passing = memory_.passing();
+  uint64_t in_line = 0;
+  std::shared_ptr<Job> youngest;
+  for (const auto& [tenant, line] : lines_) {
+    for (const std::shared_ptr<Job>& job : line) {
+      in_line += job->PassingBytes();
+      if (youngest == nullptr || job->sequence_ > youngest->sequence_) {
+        youngest = job;
+      }
+    }
+  }
+  return passing <= in_line ? youngest : nullptr;
+}
+
+void JobPool::Enter(const std::shared_ptr<Job>& job) {
+  Line& line = lines_[job->tenant_];
+  if (line.empty()) {
+    turns_.push_back(job->tenant_);
+  }
+  const auto younger = std::find_if(
+      line.begin(), line.end(), [&](const std::shared_ptr<Job>& other) { return other->sequence_ > job->sequence_; });
+  line.insert(younger, job);
+}
+
+void JobPool::Leave(const Job& job) {
+  const auto line = lines_.find(job.tenant_);
+  std::erase_if(line->second, [&job](const std::shared_ptr<Job>& other) { return other.get() == &job; });
+  if (line->second.empty()) {
+    lines_.erase(line);
+    turns_.remove(job.tenant_);
+  }
+}
+
+void JobPool::EndOf(Job& job) {
+  job.state_ = Job::State::kDone;
+  const auto of_tenant = jobs_of_.find(job.tenant_);
+  if (--of_tenant->second == 0) {
+    jobs_of_.erase(of_tenant);
+  }
+}
+
+size_t JobPool::InLine() const {
+  size_t count = 0;
+  for (const auto& [tenant, line] : lines_) {
+    count += line.size();
+  }
+  return count;
+}
+
+void JobPool::StartThread() {
+  for (std::thread& thread : ended_threads_) {
+    thread.join();  // it has let go of the lock for the last time
+  }
+  ended_threads_.clear();
+  const auto self = threads_.emplace(threads_.end());
+  *self = std::thread([this, self] { RunWorker(self); });
+}
+
+void JobPool::RunWorker(std::list<std::thread>::iterator self) {
   std::unique_lock lock(mutex_);
   while (true) {
-    wake_.wait(lock, [this] { return stopping_ || !queue_.empty(); });
-    if (stopping_) {
-      return;
+    wake_.wait(lock, [this] { return stopping_ || !started_.empty() || HasSurplusThread(); });
+    if (started_.empty()) {
+      break;
     }
-    std::shared_ptr<Job> job = std::move(queue_.front());
-    queue_.pop_front();
-    running_.insert(job);
+    const std::shared_ptr<Job> job = std::move(started_.front());
+    started_.pop_front();
+    begun_.insert(job);
     Job::Work work = std::exchange(job->work_, nullptr);
     lock.unlock();
-    work(job->context_);
+    work(*job);
     work = nullptr;
+    job->ReleaseAll();
     lock.lock();
-    running_.erase(job);
+    begun_.erase(job);
+    --running_;
+    EndOf(*job);
+    Dispatch();
   }
+  ended_threads_.splice(ended_threads_.end(), threads_, self);
+  wake_.notify_all();
 }
 
 }  // namespace wellspace::server

@@ -1,76 +1,194 @@
-// The workers that mesh, and the queue before them.
+// The workers that mesh, and the line before them.
 #ifndef WELLSPACE_SERVER_JOBS_H_
 #define WELLSPACE_SERVER_JOBS_H_
 
 #include <condition_variable>
+#include <cstdint>
 #include <deque>
 #include <functional>
+#include <list>
+#include <map>
 #include <memory>
 #include <mutex>
+#include <string>
 #include <thread>
 #include <unordered_set>
 #include <utility>
 #include <vector>
 
 #include "core/base/run_context.h"
+#include "grpcpp/support/status.h"
+#include "server/memory_budget.h"
 
 namespace wellspace::server {
 
-// A piece of work for a JobPool, and the context by which it is watched and cancelled.
-class Job {
+class Job;
+class JobPool;
+
+// What is to be done, and for whom.
+struct JobRequest {
+  std::string tenant{};
+  // Of what the work brings along, such as its points; released with the work, at the latest.
+  MemoryReservation held{};
+  // Has to return soon after the context of its job is cancelled, and must not throw.
+  std::function<void(Job&)> work{};
+};
+
+// A piece of work for a JobPool, and the context by which it is watched and cancelled. The context's memory is lent by the job: a run
+// that reserves memory which is not there gives its worker to another job and waits in line for it.
+//
+// Thread safety: thread-safe.
+class Job final : private core::MemoryLender, public std::enable_shared_from_this<Job> {
  public:
-  using Work = std::function<void(core::RunContext&)>;
+  using Work = std::function<void(Job&)>;
 
-  explicit Job(Work work) : work_(std::move(work)) {}
-
+  core::RunContext& context() { return context_; }
   const core::RunContext& context() const { return context_; }
+  const std::string& tenant() const { return tenant_; }
+
+  // The following are for the work alone.
+
+  // Releases what the request brought along, once the work has let go of it.
+  void ReleaseHeld();
+
+  // Hands over `bytes`, or all, of what the run has reserved: for what outlives the job.
+  MemoryReservation TakeMemory(uint64_t bytes);
 
  private:
   friend class JobPool;
 
+  Job(JobPool& pool, JobRequest request);
+
+  // As MemoryLender has them. Errors: CANCELLED; those of MemoryBudget::Reserve, when the bytes are more than all of the budget, more
+  // than sessions leave of it, or, for Allow, more than can be had now; and when all jobs wait for what others of them have.
+  absl::Status Reserve(uint64_t bytes) override;
+  absl::Status Allow(uint64_t bytes) override;
+
+  // What would be freed if it ended.
+  uint64_t PassingBytes() const;
+  void ReleaseAll();
+
+  JobPool& pool_;
+  const std::string tenant_;
   core::RunContext context_;
-  Work work_;  // empty once taken by a worker or cancelled
+
+  mutable std::mutex memory_mutex_;  // after the pool's
+  MemoryReservation held_;           // guarded by memory_mutex_
+  MemoryReservation memory_;         // guarded by memory_mutex_
+
+  enum class State { kQueued, kRunning, kWaiting, kDone };
+
+  // Guarded by the pool's mutex.
+  State state_ = State::kQueued;
+  uint64_t sequence_ = 0;
+  Work work_;                     // empty once taken by a worker or cancelled
+  uint64_t wanted_bytes_ = 0;     // while kWaiting
+  int passed_over_ = 0;           // jobs that were started while this one, first of its tenant, waited for memory
+  bool is_refused_ = false;       // its next Reserve fails
+  std::condition_variable wake_;  // of the thread that waits
 };
 
-// A fixed number of worker threads and a bounded first-in first-out queue.
+// A fixed number of jobs that run at once, and a bounded line of others that wait for it.
+//
+// The line is fair: tenants take turns, and within a tenant who came first is first. A job that waits for memory keeps its place; those
+// of its tenant stay behind it, those of others may pass, but only kMostPassing times. When all jobs wait for memory that others of
+// them have, the youngest is refused.
 //
 // Thread safety: thread-safe. Work runs without any lock of the pool held.
-// Invariants: (1) at most `workers` jobs run and at most `max_queued` more wait; (2) the work of a job runs at most once, and never
-// after Cancel found it waiting; (3) the work and all that it holds is freed when it returns or is cancelled, not when its Job is.
+// Invariants: (1) at most `workers` jobs run and at most `max_queued` more are in line, `max_per_tenant` of one tenant; (2) the work of a
+// job runs at most once, and never after Cancel found it in line; (3) the work and all that it holds is freed when it returns or is
+// cancelled, not when its Job is; (4) there are at most as many threads as workers and tenants in line.
 class JobPool {
  public:
-  struct Load {
-    int running = 0;
-    int queued = 0;
+  static constexpr int kMostPassing = 16;
+
+  struct Limits {
+    int workers = 1;         // at least 1
+    int max_queued = 0;      // at least 0
+    int max_per_tenant = 1;  // at least 1
   };
 
-  // REQUIRES:   workers >= 1 && max_queued >= 0.
-  JobPool(int workers, int max_queued);
+  struct Load {
+    int running = 0;
+    int queued = 0;  // for a worker or for memory
+  };
+
+  struct Submission {
+    std::shared_ptr<Job> job;  // null if refused
+    grpc::Status refusal;      // QUEUE_FULL, or QUOTA_EXCEEDED when the tenant has as many jobs as it may have
+  };
+
+  // REQUIRES:   `memory` outlives this.
+  JobPool(const Limits& limits, MemoryBudget& memory);
   // Cancels all jobs and waits for those that run.
   ~JobPool();
   JobPool(const JobPool&) = delete;
   JobPool& operator=(const JobPool&) = delete;
 
-  // Queues `work`, which must return soon after its context is cancelled and must not throw. Null when the queue is full.
-  std::shared_ptr<Job> Submit(Job::Work work);
+  // Takes a job into the line.
+  Submission Submit(JobRequest request);
 
-  // Cancels the context of `job`; one that waits leaves the queue at once. Does not wait for one that runs.
+  // Cancels the context of `job`; one in line that has not begun leaves it at once. Does not wait for one that runs.
   void Cancel(const std::shared_ptr<Job>& job);
 
   Load GetLoad() const;
 
  private:
-  void RunWorker();
+  friend class Job;
 
-  const size_t capacity_;  // jobs that run or wait
+  // One tenant's jobs in line, in the order of their sequence.
+  using Line = std::deque<std::shared_ptr<Job>>;
+
+  // What Job::Reserve does.
+  absl::Status Reserve(Job& job, uint64_t bytes);
+  // Lets the thread of `job`, which cannot have its memory now, wait in line for it.
+  absl::Status WaitInLine(Job& job, std::unique_lock<std::mutex>& lock);
+
+  // The following want mutex_ to be held.
+
+  // Starts jobs as long as there are workers for them. To be called when anything has changed.
+  void Dispatch();
+  // Starts the job whose turn it is, or refuses one where nothing else helps. False when all have to wait.
+  bool StartNext();
+  // Starts or resumes the first job of `tenant`, unless it waits for memory that is not there.
+  bool StartFirstOf(const std::string& tenant);
+  // Takes `job` out of the line and gives it a worker.
+  void Start(const std::shared_ptr<Job>& job);
+  // Gives its worker back to a job that waited.
+  void Resume(Job& job);
+  // Sets aside what `job` wants; says whether there was room.
+  bool TakeWanted(Job& job);
+  // A job was given its worker or its memory: those that wait for memory have been passed.
+  void CountPassing();
+  // The job that has been passed often enough, the oldest of them; null for none.
+  std::shared_ptr<Job> Claimant() const;
+  // The youngest job in line if all memory that work could free is that of jobs in line; null otherwise.
+  std::shared_ptr<Job> VictimOfDeadlock() const;
+  void Enter(const std::shared_ptr<Job>& job);
+  void Leave(const Job& job);
+  void EndOf(Job& job);
+  size_t InLine() const;
+  bool HasSurplusThread() const { return threads_.size() - blocked_ > static_cast<size_t>(limits_.workers); }
+  void StartThread();
+
+  void RunWorker(std::list<std::thread>::iterator self);
+
+  const Limits limits_;
+  MemoryBudget& memory_;
   mutable std::mutex mutex_;
   std::condition_variable wake_;
   // Guarded by mutex_.
-  std::deque<std::shared_ptr<Job>> queue_;
-  std::unordered_set<std::shared_ptr<Job>> running_;
+  uint64_t next_sequence_ = 0;
+  std::map<std::string, Line> lines_;               // none is empty
+  std::list<std::string> turns_;                    // of lines_, who is next first
+  std::map<std::string, int> jobs_of_;              // by tenant, in line or running
+  std::deque<std::shared_ptr<Job>> started_;        // wait for their thread to wake
+  std::unordered_set<std::shared_ptr<Job>> begun_;  // have a thread: they run, or wait for memory
+  int running_ = 0;                                 // have a worker: started_, and begun_ that do not wait
   bool stopping_ = false;
-
-  std::vector<std::thread> workers_;
+  std::list<std::thread> threads_;
+  std::list<std::thread> ended_threads_;  // to be joined
+  size_t blocked_ = 0;                    // threads whose job waits for memory
 };
 
 }  // namespace wellspace::server

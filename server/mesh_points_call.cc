@@ -16,11 +16,11 @@ MeshPointsCall* MeshPointsCall::Start(const CallEnvironment& environment, grpc::
   return call.get();
 }
 
-void MeshPointsCall::Work(PointChunks& points, core::RunContext& context) {
+void MeshPointsCall::Work(PointChunks& points, Job& job) {
   std::shared_ptr<const MeshChunks> mesh;
   grpc::Status status = RunGuarded([&] {
     const std::vector<double> coordinates = points.Flatten();
-    absl::StatusOr<core::Mesh> made = environment().mesher(parameters(), coordinates, context);
+    absl::StatusOr<core::Mesh> made = environment().mesher(parameters(), coordinates, job.context());
     if (!made.ok()) {
       return FromCoreStatus(made.status());
     }
@@ -36,7 +36,7 @@ void MeshPointsCall::Work(PointChunks& points, core::RunContext& context) {
     return;
   }
   mesh_ = std::move(mesh);
-  core::Progress progress = context.Snapshot();
+  core::Progress progress = job.context().Snapshot();
   progress.vertices = mesh_->mesh().vertex_count();
   progress.simplices = mesh_->mesh().simplex_count();
   ready_.clear();  // an event that has not left yet is outdated

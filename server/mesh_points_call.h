@@ -32,7 +32,7 @@ class MeshPointsCall final
   MeshPointsCall(const CallEnvironment& environment, grpc::CallbackServerContext* context)
       : CloudCall(environment, context, "MeshPoints") {}
 
-  void Work(PointChunks& points, core::RunContext& context) override;
+  void Work(PointChunks& points, Job& job) override;
   void OnParameters() override { ScheduleTick(); }
   bool IsWriting() const override { return writing_; }
   void DropAnswer() override { ready_.clear(); }

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "core/mesher.h"
+#include "server/convert.h"
 #include "server/estimate_mesh_call.h"
 #include "server/mesh_points_call.h"
 #include "server/version.h"
@@ -16,11 +17,16 @@ MeshingService::MeshingService(const ServiceOptions& options, const Authenticato
       mesher_(std::move(mesher)),
       estimator_(std::move(estimator)),
       authenticator_(authenticator),
-      jobs_(options_.workers, options_.max_queued_jobs),
+      memory_(options_.max_memory_bytes),
+      jobs_({.workers = options_.workers,
+             .max_queued = options_.max_queued_jobs,
+             .max_per_tenant = options_.max_jobs_per_tenant},
+            memory_),
       environment_{.options = options_,
                    .mesher = mesher_,
                    .estimator = estimator_,
                    .authenticator = authenticator_,
+                   .memory = memory_,
                    .jobs = jobs_,
                    .background = background_,
                    .calls = calls_,
@@ -54,6 +60,12 @@ grpc::ServerUnaryReactor* MeshingService::GetServerInfo(grpc::CallbackServerCont
   response->set_max_request_bytes(kMaxRequestBytes);
   response->set_workers(options_.workers);
   response->set_max_queued_jobs(options_.max_queued_jobs);
+  response->set_max_sessions(options_.max_sessions);
+  response->set_max_sessions_per_tenant(options_.max_sessions_per_tenant);
+  *response->mutable_default_ttl() = DurationToProto(options_.default_ttl);
+  *response->mutable_max_ttl() = DurationToProto(options_.max_ttl);
+  *response->mutable_stall_limit() = DurationToProto(options_.stall_limit);
+  response->set_max_memory_bytes(options_.max_memory_bytes);
   const JobPool::Load load = jobs_.GetLoad();
   response->set_running_jobs(load.running);
   response->set_queued_jobs(load.queued);

@@ -9,6 +9,7 @@
 #include "server/call_registry.h"
 #include "server/cloud_call.h"
 #include "server/jobs.h"
+#include "server/memory_budget.h"
 #include "server/options.h"
 #include "spdlog/logger.h"
 #include "wellspace/v1/meshing.grpc.pb.h"
@@ -42,6 +43,7 @@ class MeshingService final : public v1::MeshingService::CallbackService {
   const Estimator estimator_;
   const Authenticator& authenticator_;
   CallRegistry calls_;
+  MemoryBudget memory_;
   // Jobs end before the background thread, to which they post.
   Background background_;
   JobPool jobs_;

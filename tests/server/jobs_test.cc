@@ -3,7 +3,9 @@
 #include <atomic>
 #include <memory>
 #include <optional>
+#include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "gtest/gtest.h"
@@ -12,18 +14,35 @@
 namespace wellspace::server {
 namespace {
 
-void WorkUntilCancelled(core::RunContext& context) {
-  while (!context.IsCancelled()) {
+void WorkUntilCancelled(Job& job) {
+  while (!job.context().IsCancelled()) {
     std::this_thread::yield();
   }
 }
 
+// A pool, and submitting without ceremony: null when refused.
+class Pool {
+ public:
+  Pool(int workers, int max_queued, int max_per_tenant = 1000, uint64_t max_memory_bytes = 0)
+      : memory(max_memory_bytes),
+        pool({.workers = workers, .max_queued = max_queued, .max_per_tenant = max_per_tenant}, memory) {}
+
+  std::shared_ptr<Job> Submit(Job::Work work, const std::string& tenant = "default") {
+    return pool.Submit({.tenant = tenant, .work = std::move(work)}).job;
+  }
+  void Cancel(const std::shared_ptr<Job>& job) { pool.Cancel(job); }
+  JobPool::Load GetLoad() const { return pool.GetLoad(); }
+
+  MemoryBudget memory;
+  JobPool pool;
+};
+
 TEST(JobPool, RunsWhatWasSubmittedInOrder) {
   std::vector<int> order;
   Event done;
-  JobPool pool(1, 10);
+  Pool pool(1, 10);
   for (int i = 0; i < 5; ++i) {
-    ASSERT_NE(pool.Submit([&order, &done, i](core::RunContext&) {
+    ASSERT_NE(pool.Submit([&order, &done, i](Job&) {
       order.push_back(i);
       if (i == 4) {
         done.Set();
@@ -36,7 +55,7 @@ TEST(JobPool, RunsWhatWasSubmittedInOrder) {
 }
 
 TEST(JobPool, HoldsNoMoreThanWorkersAndQueue) {
-  JobPool pool(2, 3);
+  Pool pool(2, 3);
   std::vector<std::shared_ptr<Job>> jobs;
   for (int i = 0; i < 5; ++i) {
     jobs.push_back(pool.Submit(WorkUntilCancelled));
@@ -48,7 +67,7 @@ TEST(JobPool, HoldsNoMoreThanWorkersAndQueue) {
 }
 
 TEST(JobPool, WithoutQueueTakesAJobForEachWorker) {
-  JobPool pool(1, 0);
+  Pool pool(1, 0);
   EXPECT_NE(pool.Submit(WorkUntilCancelled), nullptr);
   EXPECT_EQ(pool.Submit(WorkUntilCancelled), nullptr);
 }
@@ -56,14 +75,14 @@ TEST(JobPool, WithoutQueueTakesAJobForEachWorker) {
 TEST(JobPool, CancelBeforeStartNeverRunsTheWorkAndFreesIt) {
   std::atomic<bool> ran = false;
   auto held = std::make_shared<int>(0);
-  JobPool pool(1, 4);
+  Pool pool(1, 4);
   Event started;
-  const std::shared_ptr<Job> blocker = pool.Submit([&started](core::RunContext& context) {
+  const std::shared_ptr<Job> blocker = pool.Submit([&started](Job& job) {
     started.Set();
-    WorkUntilCancelled(context);
+    WorkUntilCancelled(job);
   });
   ASSERT_TRUE(started.Wait());
-  const std::shared_ptr<Job> waiting = pool.Submit([&ran, held](core::RunContext&) { ran = true; });
+  const std::shared_ptr<Job> waiting = pool.Submit([&ran, held](Job&) { ran = true; });
   EXPECT_EQ(pool.GetLoad().queued, 1);
   EXPECT_EQ(held.use_count(), 2);
   pool.Cancel(waiting);
@@ -72,33 +91,33 @@ TEST(JobPool, CancelBeforeStartNeverRunsTheWorkAndFreesIt) {
   EXPECT_EQ(pool.GetLoad().running, 1);
   EXPECT_TRUE(waiting->context().IsCancelled());
   Event after;
-  ASSERT_NE(pool.Submit([&after](core::RunContext&) { after.Set(); }), nullptr);
+  ASSERT_NE(pool.Submit([&after](Job&) { after.Set(); }), nullptr);
   pool.Cancel(blocker);
   ASSERT_TRUE(after.Wait());
   EXPECT_FALSE(ran);
 }
 
 TEST(JobPool, CancelWhileRunningCancelsTheContextAndFreesTheWorker) {
-  JobPool pool(1, 1);
+  Pool pool(1, 1);
   Event started;
   Event next;
   absl::Status seen;
-  const std::shared_ptr<Job> job = pool.Submit([&](core::RunContext& context) {
+  const std::shared_ptr<Job> job = pool.Submit([&](Job& running) {
     started.Set();
-    WorkUntilCancelled(context);
-    seen = context.Check();
+    WorkUntilCancelled(running);
+    seen = running.context().Check();
   });
   ASSERT_TRUE(started.Wait());
   pool.Cancel(job);
-  ASSERT_NE(pool.Submit([&next](core::RunContext&) { next.Set(); }), nullptr);
+  ASSERT_NE(pool.Submit([&next](Job&) { next.Set(); }), nullptr);
   ASSERT_TRUE(next.Wait());
   EXPECT_EQ(seen.code(), absl::StatusCode::kCancelled);
 }
 
 TEST(JobPool, CancelAfterTheEndDoesNoHarm) {
-  JobPool pool(1, 1);
+  Pool pool(1, 1);
   Event done;
-  const std::shared_ptr<Job> job = pool.Submit([&done](core::RunContext&) { done.Set(); });
+  const std::shared_ptr<Job> job = pool.Submit([&done](Job&) { done.Set(); });
   ASSERT_TRUE(done.Wait());
   pool.Cancel(job);
   pool.Cancel(job);
@@ -107,14 +126,14 @@ TEST(JobPool, CancelAfterTheEndDoesNoHarm) {
 TEST(JobPool, DestructionCancelsAndDrains) {
   std::atomic<bool> ended = false;
   std::atomic<bool> second_ran = false;
-  std::optional<JobPool> pool(std::in_place, 1, 4);
+  std::optional<Pool> pool(std::in_place, 1, 4);
   Event started;
-  pool->Submit([&](core::RunContext& context) {
+  pool->Submit([&](Job& job) {
     started.Set();
-    WorkUntilCancelled(context);
+    WorkUntilCancelled(job);
     ended = true;
   });
-  const std::shared_ptr<Job> second = pool->Submit([&](core::RunContext&) { second_ran = true; });
+  const std::shared_ptr<Job> second = pool->Submit([&](Job&) { second_ran = true; });
   ASSERT_TRUE(started.Wait());
   pool.reset();
   EXPECT_TRUE(ended);
@@ -127,12 +146,12 @@ TEST(JobPool, ManyThreadsSubmitAndCancel) {
   constexpr int kJobs = 200;
   std::atomic<int> ran = 0;
   {
-    JobPool pool(2, 8);
+    Pool pool(2, 8);
     std::vector<std::thread> threads;
     for (int t = 0; t < kThreads; ++t) {
       threads.emplace_back([&pool, &ran] {
         for (int i = 0; i < kJobs; ++i) {
-          const std::shared_ptr<Job> job = pool.Submit([&ran](core::RunContext&) { ++ran; });
+          const std::shared_ptr<Job> job = pool.Submit([&ran](Job&) { ++ran; });
           if (job != nullptr && i % 3 == 0) {
             pool.Cancel(job);
           }
@@ -147,7 +166,7 @@ TEST(JobPool, ManyThreadsSubmitAndCancel) {
     }
     // The workers have survived: as soon as there is room, a job runs.
     Event last_ran;
-    while (pool.Submit([&last_ran](core::RunContext&) { last_ran.Set(); }) == nullptr) {
+    while (pool.Submit([&last_ran](Job&) { last_ran.Set(); }) == nullptr) {
       std::this_thread::yield();
     }
     EXPECT_TRUE(last_ran.Wait());
