@@ -38,6 +38,8 @@ grpc::StatusCode CodeOf(v1::ErrorReason reason) {
       return grpc::StatusCode::UNAVAILABLE;
     case v1::ERROR_REASON_UNAUTHENTICATED:
       return grpc::StatusCode::UNAUTHENTICATED;
+    case v1::ERROR_REASON_READER_STALLED:
+      return grpc::StatusCode::DEADLINE_EXCEEDED;
     default:
       return grpc::StatusCode::INTERNAL;
   }

@@ -8,13 +8,6 @@
 
 namespace wellspace::server {
 
-EstimateMeshCall* EstimateMeshCall::Start(const CallEnvironment& environment, grpc::CallbackServerContext* context,
-                                          v1::EstimateMeshResponse* response) {
-  std::shared_ptr<EstimateMeshCall> call(new EstimateMeshCall(environment, context, response));
-  Begin(call);
-  return call.get();
-}
-
 void EstimateMeshCall::Work(PointChunks& points, Job& job) {
   core::MeshEstimate estimate{};
   grpc::Status status = RunGuarded([&] {

@@ -14,15 +14,12 @@ namespace wellspace::server {
 class EstimateMeshCall final
     : public CloudCall<grpc::ServerReadReactor<v1::EstimateMeshRequest>, v1::EstimateMeshRequest> {
  public:
-  // Begins to serve the call of `context`. The call deletes itself. REQUIRES: `response` is valid until its end.
-  static EstimateMeshCall* Start(const CallEnvironment& environment, grpc::CallbackServerContext* context,
-                                 v1::EstimateMeshResponse* response);
-
- private:
+  // REQUIRES:   `response` is valid until the end of the call.
   EstimateMeshCall(const CallEnvironment& environment, grpc::CallbackServerContext* context,
                    v1::EstimateMeshResponse* response)
       : CloudCall(environment, context, "EstimateMesh"), response_(response) {}
 
+ private:
   void Work(PointChunks& points, Job& job) override;
   uint64_t VertexCount() const override { return vertices_; }
 

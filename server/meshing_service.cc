@@ -1,5 +1,6 @@
 #include "server/meshing_service.h"
 
+#include <memory>
 #include <utility>
 
 #include "core/mesher.h"
@@ -34,12 +35,12 @@ MeshingService::MeshingService(const ServiceOptions& options, const Authenticato
 
 grpc::ServerBidiReactor<v1::MeshPointsRequest, v1::MeshPointsResponse>* MeshingService::MeshPoints(
     grpc::CallbackServerContext* context) {
-  return MeshPointsCall::Start(environment_, context);
+  return MeshPointsCall::Begin(std::make_shared<MeshPointsCall>(environment_, context));
 }
 
 grpc::ServerReadReactor<v1::EstimateMeshRequest>* MeshingService::EstimateMesh(grpc::CallbackServerContext* context,
                                                                                v1::EstimateMeshResponse* response) {
-  return EstimateMeshCall::Start(environment_, context, response);
+  return EstimateMeshCall::Begin(std::make_shared<EstimateMeshCall>(environment_, context, response));
 }
 
 grpc::ServerUnaryReactor* MeshingService::GetServerInfo(grpc::CallbackServerContext* context,

@@ -6,8 +6,8 @@
 
 #include "server/authenticator.h"
 #include "server/background.h"
+#include "server/call_environment.h"
 #include "server/call_registry.h"
-#include "server/cloud_call.h"
 #include "server/jobs.h"
 #include "server/memory_budget.h"
 #include "server/options.h"

@@ -1,4 +1,5 @@
 // Calls that end before their time: cancel, deadline, a stopping server, a reader that does not read.
+#include <chrono>
 #include <random>
 #include <string>
 #include <thread>
@@ -6,7 +7,6 @@
 
 #include "absl/time/clock.h"
 #include "gtest/gtest.h"
-#include "server/mesh_points_call.h"
 #include "tests/server/patience.h"
 #include "tests/server/service_harness.h"
 
@@ -21,6 +21,24 @@ std::vector<double> RandomPoints(size_t count) {
     coordinate = uniform(generator);
   }
   return points;
+}
+
+// A cloud that makes some sixteen chunks.
+void SendLargeCloud(TestCall& call) {
+  call.Send(UnitCubeParameters());
+  for (int i = 0; i < 10; ++i) {
+    call.Send(RandomPoints(40'000));
+  }
+  call.HalfClose();
+}
+
+// The same, and reads up to the first chunk.
+void ReadFirstChunk(TestCall& call) {
+  SendLargeCloud(call);
+  v1::MeshPointsResponse response;
+  do {
+    ASSERT_TRUE(call.Read(&response));
+  } while (!response.has_chunk());
 }
 
 class Interrupted : public ::testing::TestWithParam<Transport> {};
@@ -99,15 +117,7 @@ TEST_P(Interrupted, CancelWhileSending) {
 TEST_P(Interrupted, CancelWhileReceivingTheMesh) {
   ServiceHarness harness(FakeMesher, {}, GetParam());
   TestCall call(harness.stub());
-  call.Send(UnitCubeParameters());
-  for (int i = 0; i < 10; ++i) {
-    call.Send(RandomPoints(40'000));
-  }
-  call.HalfClose();
-  v1::MeshPointsResponse response;
-  do {
-    ASSERT_TRUE(call.Read(&response));
-  } while (!response.has_chunk());
+  ASSERT_NO_FATAL_FAILURE(ReadFirstChunk(call));
   call.Cancel();
   EXPECT_EQ(call.Finish().error_code(), grpc::StatusCode::CANCELLED);
   EXPECT_TRUE(harness.log().WaitFor("code=CANCELLED"));
@@ -159,15 +169,7 @@ TEST_P(Interrupted, ServerStopsDuringTheUpload) {
 TEST_P(Interrupted, ServerStopsUnderAReaderThatDoesNotRead) {
   ServiceHarness harness(FakeMesher, {}, GetParam());
   TestCall call(harness.stub());
-  call.Send(UnitCubeParameters());
-  for (int i = 0; i < 10; ++i) {
-    call.Send(RandomPoints(40'000));
-  }
-  call.HalfClose();
-  v1::MeshPointsResponse response;
-  do {
-    ASSERT_TRUE(call.Read(&response));
-  } while (!response.has_chunk());
+  ASSERT_NO_FATAL_FAILURE(ReadFirstChunk(call));
   const absl::Time begin = absl::Now();
   harness.server().Shutdown(absl::ZeroDuration());
   EXPECT_LT(absl::Now() - begin, absl::Seconds(10));
@@ -205,31 +207,51 @@ TEST_P(Interrupted, RunningWorkGoesOnDuringTheGracePeriodAndNewCallsAreRefused) 
   stopper.join();
 }
 
+TEST_P(Interrupted, AReaderThatStopsReadingIsDropped) {
+  ServiceOptions options;
+  options.stall_limit = absl::Milliseconds(200);
+  ServiceHarness harness(FakeMesher, options, GetParam());
+  TestCall call(harness.stub());
+  ASSERT_NO_FATAL_FAILURE(ReadFirstChunk(call));
+  ASSERT_TRUE(harness.log().WaitFor("code=DEADLINE_EXCEEDED"));
+  const grpc::Status status = call.Finish();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
+  EXPECT_NE(status.error_message().find("READER_STALLED"), std::string::npos) << status.error_message();
+}
+
+TEST(SlowReader, IsNotDroppedAsLongAsItReads) {
+  ServiceOptions options;
+  options.stall_limit = absl::Seconds(1);
+  ServiceHarness harness(FakeMesher, options, Transport::kLoopback);
+  TestCall call(harness.stub());
+  ASSERT_NO_FATAL_FAILURE(ReadFirstChunk(call));
+  const absl::Time begin = absl::Now();
+  v1::MeshPointsResponse response;
+  while (call.Read(&response)) {
+    if (absl::Now() - begin <= options.stall_limit) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));  // what makes it slow
+    }
+  }
+  EXPECT_GT(absl::Now() - begin, options.stall_limit);
+  const grpc::Status status = call.Finish();
+  EXPECT_TRUE(status.ok()) << status.error_message();
+  EXPECT_EQ(call.chunks.size(), call.metadata.at(0).chunk_count());
+}
+
 TEST(SlowReader, CostsABoundedBufferAndHoldsUpNobodyElse) {
   ServiceHarness harness;
-  const auto send_points = [](TestCall& call) {
-    call.Send(UnitCubeParameters());
-    for (int i = 0; i < 10; ++i) {
-      call.Send(RandomPoints(40'000));
-    }
-    call.HalfClose();
-  };
   TestCall slow(harness.stub());
-  send_points(slow);
-  v1::MeshPointsResponse response;
-  do {
-    ASSERT_TRUE(slow.Read(&response));
-  } while (!response.has_chunk());
-  ASSERT_TRUE(harness.log().WaitFor("call=1 chunk=2 made"));
+  ASSERT_NO_FATAL_FAILURE(ReadFirstChunk(slow));
+  ASSERT_TRUE(harness.log().WaitFor("call=1 chunk=1"));
 
-  // The chunks of both calls are made in turn; while all of the other's were, the slow one's would have been, too. The other
-  // begins only now: calls are numbered in the order in which the server sees them.
+  // Were more of the slow one's chunks to be made, they would be while all of the other's are. The other begins only now: calls are
+  // numbered in the order in which the server sees them.
   TestCall other(harness.stub());
-  send_points(other);
+  SendLargeCloud(other);
   ASSERT_TRUE(other.Finish().ok());
   EXPECT_GE(other.chunks.size(), 16u);
-  // One was read, one is being written, the others wait, and the in-process transport may hold one more.
-  EXPECT_LE(harness.log().Count("call=1 chunk="), 3u + MeshPointsCall::kChunksAhead);
+  // One was read, one is being written, and the in-process transport may hold one more.
+  EXPECT_LE(harness.log().Count("call=1 chunk="), 3u);
 
   ASSERT_TRUE(slow.Finish().ok());
   EXPECT_EQ(slow.chunks.size(), slow.metadata.at(0).chunk_count());

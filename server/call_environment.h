@@ -1,0 +1,42 @@
+// What all calls share.
+#ifndef WELLSPACE_SERVER_CALL_ENVIRONMENT_H_
+#define WELLSPACE_SERVER_CALL_ENVIRONMENT_H_
+
+#include <functional>
+#include <span>
+
+#include "absl/status/statusor.h"
+#include "core/mesher.h"
+#include "server/authenticator.h"
+#include "server/background.h"
+#include "server/call_registry.h"
+#include "server/jobs.h"
+#include "server/memory_budget.h"
+#include "server/options.h"
+#include "spdlog/logger.h"
+
+namespace wellspace::server {
+
+// What meshes: core::MeshPoints, or what a test puts in its place.
+using Mesher =
+    std::function<absl::StatusOr<core::Mesh>(const core::MeshParameters&, std::span<const double>, core::RunContext&)>;
+// What estimates: core::EstimateMesh, or what a test puts in its place.
+using Estimator = std::function<absl::StatusOr<core::MeshEstimate>(const core::MeshParameters&, std::span<const double>,
+                                                                   core::RunContext&)>;
+
+// What all calls share; outlives them.
+struct CallEnvironment {
+  const ServiceOptions& options;
+  const Mesher& mesher;
+  const Estimator& estimator;
+  const Authenticator& authenticator;
+  MemoryBudget& memory;
+  JobPool& jobs;
+  Background& background;
+  CallRegistry& calls;
+  spdlog::logger& log;
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_CALL_ENVIRONMENT_H_
