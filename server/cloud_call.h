@@ -9,16 +9,18 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "grpcpp/support/byte_buffer.h"
 #include "server/call.h"
 #include "server/cloud_receiver.h"
 #include "server/errors.h"
 #include "server/jobs.h"
+#include "server/wire.h"
 #include "wellspace/v1/meshing.pb.h"
 
 namespace wellspace::server {
 
 // A Call whose requests go to a CloudReceiver; at their end a job is queued; what becomes of its result is up to the class that derives
-// from this. `Reactor` is gRPC's, for the kind of stream that answers, and `Request` what it reads.
+// from this. `Reactor` is gRPC's, for the kind of stream that answers; it reads bytes, which are `Request`s.
 //
 // Thread safety and invariants: those of Call.
 template <typename Reactor, typename Request>
@@ -56,7 +58,7 @@ class CloudCall : public Call<Reactor> {
 
   // Guarded by mutex_.
   CloudReceiver receiver_;
-  Request request_;  // of the read in flight
+  grpc::ByteBuffer request_;  // of the read in flight
   std::shared_ptr<Job> job_;
 };
 
@@ -74,7 +76,12 @@ void CloudCall<Reactor, Request>::OnReadDone(bool ok) {
     return;
   }
   const bool had_parameters = receiver_.has_parameters();
-  if (grpc::Status status = receiver_.Accept(&request_); !status.ok()) {
+  Request request;
+  grpc::Status status = ParseRequest(&request_, &request);
+  if (status.ok()) {
+    status = receiver_.Accept(&request);
+  }
+  if (!status.ok()) {
     this->End(std::move(status));
     return;
   }

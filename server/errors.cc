@@ -26,6 +26,7 @@ grpc::StatusCode CodeOf(v1::ErrorReason reason) {
     case v1::ERROR_REASON_INVALID_PARAMETERS:
     case v1::ERROR_REASON_INVALID_CHUNK_SHAPE:
     case v1::ERROR_REASON_INVALID_POINTS:
+    case v1::ERROR_REASON_MALFORMED_REQUEST:
       return grpc::StatusCode::INVALID_ARGUMENT;
     case v1::ERROR_REASON_TOO_MANY_POINTS:
     case v1::ERROR_REASON_MESH_TOO_LARGE:

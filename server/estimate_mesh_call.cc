@@ -5,6 +5,7 @@
 
 #include "server/convert.h"
 #include "server/errors.h"
+#include "server/wire.h"
 
 namespace wellspace::server {
 
@@ -27,7 +28,7 @@ void EstimateMeshCall::Work(PointChunks& points, Job& job) {
     return;
   }
   vertices_ = estimate.vertices;
-  *response_ = EstimateToProto(estimate);
+  *response_ = Serialize(EstimateToProto(estimate));
   End(grpc::Status::OK);
 }
 

@@ -11,20 +11,18 @@
 namespace wellspace::server {
 
 // A CloudCall whose job estimates, and whose answer is one message.
-class EstimateMeshCall final
-    : public CloudCall<grpc::ServerReadReactor<v1::EstimateMeshRequest>, v1::EstimateMeshRequest> {
+class EstimateMeshCall final : public CloudCall<grpc::ServerReadReactor<grpc::ByteBuffer>, v1::EstimateMeshRequest> {
  public:
   // REQUIRES:   `response` is valid until the end of the call.
-  EstimateMeshCall(const CallEnvironment& environment, grpc::CallbackServerContext* context,
-                   v1::EstimateMeshResponse* response)
+  EstimateMeshCall(const CallEnvironment& environment, grpc::CallbackServerContext* context, grpc::ByteBuffer* response)
       : CloudCall(environment, context, "EstimateMesh"), response_(response) {}
 
  private:
   void Work(PointChunks& points, Job& job) override;
   uint64_t VertexCount() const override { return vertices_; }
 
-  v1::EstimateMeshResponse* const response_;  // guarded by mutex_; gRPC's from Finish on
-  uint64_t vertices_ = 0;                     // guarded by mutex_
+  grpc::ByteBuffer* const response_;  // guarded by mutex_; gRPC's from Finish on
+  uint64_t vertices_ = 0;             // guarded by mutex_
 };
 
 }  // namespace wellspace::server

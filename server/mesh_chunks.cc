@@ -1,28 +1,45 @@
 #include "server/mesh_chunks.h"
 
 #include <algorithm>
+#include <array>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "google/protobuf/io/coded_stream.h"
+#include "google/protobuf/io/zero_copy_stream_impl_lite.h"
+#include "google/protobuf/wire_format_lite.h"
+#include "grpcpp/support/slice.h"
 #include "proto/checksum.h"
+#include "wellspace/v1/mesh.pb.h"
 
 namespace wellspace::server {
 namespace {
+
+using google::protobuf::internal::WireFormatLite;
 
 // Tags, lengths, index and checksum around the values of a chunk, generously.
 constexpr uint64_t kEnvelopeBytes = 64;
 
 uint64_t DivideUp(uint64_t dividend, uint64_t divisor) { return (dividend + divisor - 1) / divisor; }
 
-// Appends rows [begin, begin + rows) of `values` (rows of `width` numbers), cut at the end, to `field` and returns their checksum.
+// Rows [begin, begin + rows) of `values` (rows of `width` numbers), cut at the end.
 template <typename T>
-uint32_t CopyRows(const std::vector<T>& values, uint64_t width, uint64_t begin, uint64_t rows,
-                  google::protobuf::RepeatedField<T>* field) {
-  const T* first = values.data() + begin * width;
-  const T* last = values.data() + std::min<uint64_t>(values.size(), (begin + rows) * width);
-  field->Reserve(static_cast<int>(last - first));
-  field->Add(first, last);
-  return Crc32c(first, (last - first) * sizeof(T));
+MeshChunks::Chunk Rows(int field, const std::vector<T>& values, uint64_t width, uint64_t begin, uint64_t rows) {
+  const uint64_t first = begin * width;
+  const uint64_t last = std::min<uint64_t>(values.size(), (begin + rows) * width);
+  return {.field = field, .data = values.data() + first, .size = (last - first) * sizeof(T)};
+}
+
+// What a field of `size` bytes begins with.
+std::string TagOf(int field, uint64_t size) {
+  std::string tag;
+  google::protobuf::io::StringOutputStream stream(&tag);
+  google::protobuf::io::CodedOutputStream output(&stream);
+  output.WriteTag(WireFormatLite::MakeTag(field, WireFormatLite::WIRETYPE_LENGTH_DELIMITED));
+  output.WriteVarint64(size);
+  output.Trim();
+  return tag;
 }
 
 }  // namespace
@@ -37,21 +54,36 @@ MeshChunks::MeshChunks(core::Mesh mesh, uint64_t max_bytes) : mesh_(std::move(me
   input_chunks_ = DivideUp(mesh_.input_vertex.size(), inputs_per_chunk_);
 }
 
-v1::MeshChunk MeshChunks::Make(uint64_t index) const {
-  v1::MeshChunk chunk;
-  chunk.set_index(index);
+MeshChunks::Chunk MeshChunks::Get(uint64_t index) const {
   if (index < point_chunks_) {
-    chunk.set_crc32c(
-        CopyRows(mesh_.points, mesh_.dimension, index * points_per_chunk_, points_per_chunk_, chunk.mutable_points()));
-  } else if (index -= point_chunks_; index < simplex_chunks_) {
-    chunk.set_crc32c(CopyRows(mesh_.simplices, mesh_.dimension + 1, index * simplices_per_chunk_, simplices_per_chunk_,
-                              chunk.mutable_simplices()));
-  } else {
-    index -= simplex_chunks_;
-    chunk.set_crc32c(
-        CopyRows(mesh_.input_vertex, 1, index * inputs_per_chunk_, inputs_per_chunk_, chunk.mutable_input_vertices()));
+    return Rows(v1::MeshChunk::kPointsFieldNumber, mesh_.points, mesh_.dimension, index * points_per_chunk_,
+                points_per_chunk_);
   }
-  return chunk;
+  index -= point_chunks_;
+  if (index < simplex_chunks_) {
+    return Rows(v1::MeshChunk::kSimplicesFieldNumber, mesh_.simplices, mesh_.dimension + 1,
+                index * simplices_per_chunk_, simplices_per_chunk_);
+  }
+  index -= simplex_chunks_;
+  return Rows(v1::MeshChunk::kInputVerticesFieldNumber, mesh_.input_vertex, 1, index * inputs_per_chunk_,
+              inputs_per_chunk_);
+}
+
+// The arrays are the last fields of a chunk: what stands before them is small, and they follow as they are.
+grpc::ByteBuffer SerializeChunk(const std::shared_ptr<const MeshChunks>& mesh, uint64_t index, int field) {
+  const MeshChunks::Chunk chunk = mesh->Get(index);
+  v1::MeshChunk message;
+  message.set_index(index);
+  message.set_crc32c(Crc32c(chunk.data, chunk.size));
+  const std::string before_values = message.SerializeAsString() + TagOf(chunk.field, chunk.size);
+  const std::string head = TagOf(field, before_values.size() + chunk.size) + before_values;
+
+  auto* holder = new std::shared_ptr<const MeshChunks>(mesh);
+  const std::array<grpc::Slice, 2> slices = {
+      grpc::Slice(head), grpc::Slice(
+                             const_cast<void*>(chunk.data), chunk.size,  // gRPC only reads
+                             [](void* held) { delete static_cast<std::shared_ptr<const MeshChunks>*>(held); }, holder)};
+  return grpc::ByteBuffer(slices.data(), slices.size());
 }
 
 }  // namespace wellspace::server

@@ -3,29 +3,34 @@
 #define WELLSPACE_SERVER_MESH_CHUNKS_H_
 
 #include <cstdint>
+#include <memory>
 
 #include "core/mesher.h"
+#include "grpcpp/support/byte_buffer.h"
 #include "server/options.h"
-#include "wellspace/v1/mesh.pb.h"
 
 namespace wellspace::server {
 
-// Makes any chunk of a mesh when it is asked for, so that only those on their way take memory besides the mesh.
+// How a mesh is cut.
 //
 // Thread safety: immutable; thread-safe.
-// Invariants: the same mesh gives the same chunks, byte for byte; each fits into a response of kMaxResponseBytes.
+// Invariants: the same mesh is always cut alike; each chunk fits into a response of kMaxResponseBytes.
 class MeshChunks {
  public:
+  // Some values of one array of the mesh, as they lie in memory and on the wire.
+  struct Chunk {
+    int field = 0;  // of v1.MeshChunk
+    const void* data = nullptr;
+    uint64_t size = 0;  // bytes
+  };
+
   explicit MeshChunks(core::Mesh mesh, uint64_t max_bytes = kMaxResponseBytes);
 
   const core::Mesh& mesh() const { return mesh_; }
   uint64_t count() const { return point_chunks_ + simplex_chunks_ + input_chunks_; }
 
-  // The chunk number `index` with its checksum.
-  //
   // REQUIRES:   index < count().
-  // Complexity: O(bytes of the chunk).
-  v1::MeshChunk Make(uint64_t index) const;
+  Chunk Get(uint64_t index) const;
 
  private:
   core::Mesh mesh_;
@@ -36,6 +41,14 @@ class MeshChunks {
   uint64_t simplex_chunks_ = 0;
   uint64_t input_chunks_ = 0;
 };
+
+// A response that has nothing but the chunk number `index` of `mesh`, with its checksum, in field `field`: serialized as protocol
+// buffers would, but without a copy of the values. They are those of the mesh, which lives as long as the answer.
+//
+// REQUIRES:   index < mesh->count().
+// Guarantees: the same bytes whenever it is asked.
+// Complexity: one pass over the values, for the checksum.
+grpc::ByteBuffer SerializeChunk(const std::shared_ptr<const MeshChunks>& mesh, uint64_t index, int field);
 
 }  // namespace wellspace::server
 

@@ -6,6 +6,7 @@
 #include "absl/time/clock.h"
 #include "server/convert.h"
 #include "server/errors.h"
+#include "server/wire.h"
 
 namespace wellspace::server {
 
@@ -54,7 +55,7 @@ void MeshPointsCall::Tick() {
   ScheduleTick();
 }
 
-std::optional<v1::MeshPointsResponse> MeshPointsCall::NextResponse() {
+std::optional<grpc::ByteBuffer> MeshPointsCall::NextResponse() {
   v1::MeshPointsResponse response;
   if (event_.has_value()) {
     *response.mutable_progress() = *std::exchange(event_, std::nullopt);
@@ -65,12 +66,12 @@ std::optional<v1::MeshPointsResponse> MeshPointsCall::NextResponse() {
     *response.mutable_metadata() = MetadataToProto(mesh_->mesh(), mesh_->count());
   } else if (next_chunk_ < mesh_->count()) {
     environment().log.debug("call={} chunk={}", id(), next_chunk_);
-    *response.mutable_chunk() = mesh_->Make(next_chunk_++);
+    return SerializeChunk(mesh_, next_chunk_++, v1::MeshPointsResponse::kChunkFieldNumber);
   } else {
     End(grpc::Status::OK);
     return std::nullopt;
   }
-  return response;
+  return Serialize(response);
 }
 
 }  // namespace wellspace::server

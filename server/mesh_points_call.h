@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 
+#include "grpcpp/support/byte_buffer.h"
 #include "grpcpp/support/server_callback.h"
 #include "server/cloud_call.h"
 #include "server/mesh_chunks.h"
@@ -21,8 +22,8 @@ namespace wellspace::server {
 // Thread safety and invariants: those of ResponseStream.
 class MeshPointsCall final
     : public ResponseStream<
-          CloudCall<grpc::ServerBidiReactor<v1::MeshPointsRequest, v1::MeshPointsResponse>, v1::MeshPointsRequest>,
-          v1::MeshPointsResponse> {
+          CloudCall<grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>, v1::MeshPointsRequest>,
+          grpc::ByteBuffer> {
  public:
   MeshPointsCall(const CallEnvironment& environment, grpc::CallbackServerContext* context)
       : ResponseStream(environment, context, "MeshPoints") {}
@@ -31,7 +32,7 @@ class MeshPointsCall final
   void Work(PointChunks& points, Job& job) override;
   void OnParameters() override { ScheduleTick(); }
   uint64_t VertexCount() const override { return mesh_ == nullptr ? 0 : mesh_->mesh().vertex_count(); }
-  std::optional<v1::MeshPointsResponse> NextResponse() override;
+  std::optional<grpc::ByteBuffer> NextResponse() override;
 
   // On the background thread.
   void Tick();

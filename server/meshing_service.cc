@@ -33,13 +33,13 @@ MeshingService::MeshingService(const ServiceOptions& options, const Authenticato
                    .calls = calls_,
                    .log = *log_} {}
 
-grpc::ServerBidiReactor<v1::MeshPointsRequest, v1::MeshPointsResponse>* MeshingService::MeshPoints(
+grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* MeshingService::MeshPoints(
     grpc::CallbackServerContext* context) {
   return MeshPointsCall::Begin(std::make_shared<MeshPointsCall>(environment_, context));
 }
 
-grpc::ServerReadReactor<v1::EstimateMeshRequest>* MeshingService::EstimateMesh(grpc::CallbackServerContext* context,
-                                                                               v1::EstimateMeshResponse* response) {
+grpc::ServerReadReactor<grpc::ByteBuffer>* MeshingService::EstimateMesh(grpc::CallbackServerContext* context,
+                                                                        grpc::ByteBuffer* response) {
   return EstimateMeshCall::Begin(std::make_shared<EstimateMeshCall>(environment_, context, response));
 }
 

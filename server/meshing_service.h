@@ -16,20 +16,23 @@
 
 namespace wellspace::server {
 
-// The service and the threads that work for it.
+// The service and the threads that work for it. Streams are read and written as bytes: see ParseRequest and SerializeChunk.
 //
 // Thread safety: thread-safe.
 // REQUIRES:   the gRPC server has ended all calls before this is destroyed.
-class MeshingService final : public v1::MeshingService::CallbackService {
+class MeshingService final
+    : public v1::MeshingService::WithRawCallbackMethod_MeshPoints<
+          v1::MeshingService::WithRawCallbackMethod_EstimateMesh<
+              v1::MeshingService::WithCallbackMethod_GetServerInfo<v1::MeshingService::Service>>> {
  public:
   // `authenticator` outlives this.
   MeshingService(const ServiceOptions& options, const Authenticator& authenticator, std::shared_ptr<spdlog::logger> log,
                  Mesher mesher, Estimator estimator);
 
-  grpc::ServerBidiReactor<v1::MeshPointsRequest, v1::MeshPointsResponse>* MeshPoints(
+  grpc::ServerBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer>* MeshPoints(
       grpc::CallbackServerContext* context) override;
-  grpc::ServerReadReactor<v1::EstimateMeshRequest>* EstimateMesh(grpc::CallbackServerContext* context,
-                                                                 v1::EstimateMeshResponse* response) override;
+  grpc::ServerReadReactor<grpc::ByteBuffer>* EstimateMesh(grpc::CallbackServerContext* context,
+                                                          grpc::ByteBuffer* response) override;
   grpc::ServerUnaryReactor* GetServerInfo(grpc::CallbackServerContext* context, const v1::GetServerInfoRequest* request,
                                           v1::GetServerInfoResponse* response) override;
 

@@ -1,5 +1,7 @@
 #include "server/mesh_chunks.h"
 
+#include <memory>
+#include <optional>
 #include <random>
 #include <string>
 #include <tuple>
@@ -41,6 +43,16 @@ TEST(Crc32c, IsTheSameOnEveryProcessor) {
   EXPECT_EQ(Crc32c(bytes.data(), bytes.size()), PortableCrc32c(bytes.data(), bytes.size()));
 }
 
+std::string BytesOf(const grpc::ByteBuffer& buffer) {
+  std::vector<grpc::Slice> slices;
+  EXPECT_TRUE(buffer.Dump(&slices).ok());
+  std::string bytes;
+  for (const grpc::Slice& slice : slices) {
+    bytes.append(slice.begin(), slice.end());
+  }
+  return bytes;
+}
+
 class MeshChunksOf : public ::testing::TestWithParam<std::tuple<int, size_t, uint64_t>> {};
 
 TEST_P(MeshChunksOf, AddUpToTheMesh) {
@@ -52,13 +64,15 @@ TEST_P(MeshChunksOf, AddUpToTheMesh) {
     points[i] = static_cast<double>(i) / 7;
   }
   const core::Mesh mesh = MakeFakeMesh(parameters, points);
-  const MeshChunks chunks(mesh, max_bytes);
+  const auto chunks = std::make_shared<MeshChunks>(mesh, max_bytes);
   core::Mesh sum;
-  for (uint64_t index = 0; index < chunks.count(); ++index) {
+  for (uint64_t index = 0; index < chunks->count(); ++index) {
+    const std::string bytes = BytesOf(SerializeChunk(chunks, index, v1::MeshPointsResponse::kChunkFieldNumber));
     v1::MeshPointsResponse response;
-    *response.mutable_chunk() = chunks.Make(index);
+    ASSERT_TRUE(response.ParseFromString(bytes));
+    EXPECT_EQ(response.SerializeAsString(), bytes);
     const v1::MeshChunk& chunk = response.chunk();
-    EXPECT_LE(response.ByteSizeLong(), max_bytes);
+    EXPECT_LE(bytes.size(), max_bytes);
     EXPECT_EQ(chunk.index(), index);
     EXPECT_EQ(1, !chunk.points().empty() + !chunk.simplices().empty() + !chunk.input_vertices().empty());
     EXPECT_EQ(chunk.points_size() % dimension, 0);
@@ -86,10 +100,22 @@ INSTANTIATE_TEST_SUITE_P(Sizes, MeshChunksOf,
                                             ::testing::Values(128, 200, 1000, kMaxResponseBytes)));
 
 TEST(MeshChunks, LargeMeshFillsItsChunks) {
-  const MeshChunks chunks(MakeFakeMesh(core::MeshParameters(), std::vector<double>(3 * 200'000)));
+  const auto chunks = std::make_shared<MeshChunks>(MakeFakeMesh(core::MeshParameters(), std::vector<double>(600'000)));
   const uint64_t bytes = 200'000 * (3 * sizeof(double) + 4 * sizeof(uint32_t) + sizeof(uint32_t));
-  EXPECT_LE(chunks.count(), bytes / kMaxResponseBytes + 4);
-  EXPECT_GT(chunks.Make(0).ByteSizeLong(), kMaxResponseBytes - 1024u);
+  EXPECT_LE(chunks->count(), bytes / kMaxResponseBytes + 4);
+  EXPECT_GT(SerializeChunk(chunks, 0, 1).Length(), kMaxResponseBytes - 1024u);
+}
+
+TEST(MeshChunks, AMeshLivesAsLongAsItsChunks) {
+  auto chunks = std::make_shared<const MeshChunks>(MakeFakeMesh(core::MeshParameters(), std::vector<double>(300, 0.5)));
+  const std::weak_ptr<const MeshChunks> watch = chunks;
+  const std::string bytes = BytesOf(SerializeChunk(chunks, 0, 1));
+  std::optional<grpc::ByteBuffer> on_its_way = SerializeChunk(chunks, 0, 1);
+  chunks.reset();
+  EXPECT_FALSE(watch.expired());
+  EXPECT_EQ(BytesOf(*on_its_way), bytes);
+  on_its_way.reset();
+  EXPECT_TRUE(watch.expired());
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include "absl/time/clock.h"
 #include "core/simplex/validate.h"
 #include "gmock/gmock.h"
+#include "grpcpp/generic/generic_stub.h"
 #include "gtest/gtest.h"
 #include "proto/checksum.h"
 #include "server/errors.h"
@@ -292,6 +293,46 @@ TEST(MeshPointsFailsWith, EmptyRequest) {
   const grpc::Status status = stream->Finish();
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
   EXPECT_EQ(DetailsOf(status).reason, "EMPTY_REQUEST");
+}
+
+// gRPC itself would take such a request for the end of the stream, and the points before it for the whole cloud.
+TEST(MeshPointsFailsWith, MalformedRequest) {
+  ServiceHarness harness;
+  for (const char* method : {"MeshPoints", "EstimateMesh"}) {
+    grpc::ClientContext context;
+    grpc::CompletionQueue queue;
+    grpc::GenericStub stub(harness.channel());
+    const auto stream = stub.PrepareCall(&context, std::string("/wellspace.v1.MeshingService/") + method, &queue);
+    const auto done = [&queue] {
+      void* tag = nullptr;
+      bool ok = false;
+      return queue.Next(&tag, &ok) && ok;
+    };
+    const auto write = [&](const std::string& bytes) {
+      const grpc::Slice slice(bytes);
+      stream->Write(grpc::ByteBuffer(&slice, 1), nullptr);
+      return done();
+    };
+    v1::MeshPointsRequest parameters;
+    *parameters.mutable_parameters() = UnitCubeParameters();
+    stream->StartCall(nullptr);
+    ASSERT_TRUE(done());
+    ASSERT_TRUE(write(parameters.SerializeAsString()));
+    if (write("\x12\x7F half a message")) {
+      stream->WritesDone(nullptr);
+      done();
+    }
+    grpc::ByteBuffer response;
+    do {
+      stream->Read(&response, nullptr);
+    } while (done());
+    grpc::Status status;
+    stream->Finish(&status, nullptr);
+    ASSERT_TRUE(done());
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT) << status.error_message();
+    EXPECT_EQ(DetailsOf(status).reason, "MALFORMED_REQUEST");
+    EXPECT_THAT(status.error_message(), HasSubstr(std::string(method) + "Request"));
+  }
 }
 
 TEST(MeshPointsFailsWith, QueueFull) {
