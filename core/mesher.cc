@@ -28,6 +28,17 @@ constexpr double kMinEdgeSteps = 4;
 // Leaves that the tree may have for each vertex of the budget; around isolated close pairs balance costs up to about two.
 constexpr uint64_t kLeavesPerVertex = 8;
 
+// What building the tree takes for each point, at most in all but the most uneven clouds: keys to sort by, the point twice, a place in
+// a leaf that has just been split, some indices.
+template <int D>
+constexpr uint64_t kTreeBytes = 2 * sizeof(Point<D>) + sizeof(uint64_t) * D + 24 +
+                                sizeof(typename LeafTree<D>::Bucket) * LeafTree<D>::kChildren
+                                    / LeafTree<D>::kLeafCapacity;
+constexpr uint64_t kFixedBytes = uint64_t{4} << 20;
+
+// What is reserved for a mesh, over what it is estimated to take.
+constexpr double kReserve = 1.25;
+
 // Two ways to compute the quality of a simplex differ by less.
 constexpr double kWorstTolerance = 1e-9;
 
@@ -72,6 +83,7 @@ class MesherIn final : public Mesher {
   absl::Status Initialize(const MeshParameters& parameters, std::span<const double> points, RunContext& context) {
     WELLSPACE_RETURN_IF_ERROR(CheckShape(points, D));
     context.EnterPhase(Phase::kTree);
+    WELLSPACE_RETURN_IF_ERROR(context.ReserveMemory(kFixedBytes + points.size() / D * kTreeBytes<D>));
     Box<D> box;
     if (parameters.domain_low.empty()) {
       WELLSPACE_ASSIGN_OR_RETURN(box, BoxAround<D>(points, parameters.margin));
@@ -527,8 +539,19 @@ absl::StatusOr<std::unique_ptr<Mesher>> Mesher::Create(const MeshParameters& par
   }
 }
 
+absl::Status ReserveMemory(const Mesher& mesher, const MeshParameters& parameters, const RunContext& context) {
+  if (!context.HasMemoryLender()) {
+    return absl::OkStatus();
+  }
+  WELLSPACE_ASSIGN_OR_RETURN(const MeshEstimate estimate, mesher.Estimate(parameters, context));
+  const uint64_t vertices = std::max<uint64_t>(1, estimate.vertices);
+  const double share = std::min(1.0, static_cast<double>(VertexBudget(parameters)) / static_cast<double>(vertices));
+  return context.ReserveMemory(static_cast<uint64_t>(static_cast<double>(estimate.memory_bytes) * share * kReserve));
+}
+
 absl::StatusOr<Mesh> MeshPoints(const MeshParameters& parameters, std::span<const double> points, RunContext& context) {
   WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<Mesher> mesher, Mesher::Create(parameters, points, context));
+  WELLSPACE_RETURN_IF_ERROR(ReserveMemory(*mesher, parameters, context));
   WELLSPACE_RETURN_IF_ERROR(mesher->Refine(parameters, context));
   return mesher->Extract(parameters.threads, context);
 }

@@ -96,9 +96,9 @@ class Mesher {
   //
   // Shapes:     points: n x dimension, row-major; n may be 0 when a domain is given.
   // Units:      any length, the same on every axis.
-  // Complexity: O(n log n + L) for L leaves.
+  // Complexity: O(n log n + L) for L leaves. Reserves memory for them first.
   // Errors:     INVALID_ARGUMENT (parameters; NaN, infinite or outside coordinates; points closer than double
-  //             arithmetic can serve), RESOURCE_EXHAUSTED (max_vertices), CANCELLED, DEADLINE_EXCEEDED.
+  //             arithmetic can serve), RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED, DEADLINE_EXCEEDED.
   // Source:     [HT08] Figure 3, INITIALIZE.
   static absl::StatusOr<std::unique_ptr<Mesher>> Create(const MeshParameters& parameters,
                                                         std::span<const double> points, RunContext& context);
@@ -111,7 +111,7 @@ class Mesher {
   //
   // Complexity: O(m) queries the first time and for other demands than the last; else in proportion to what was added
   //             since.
-  // Errors:     INVALID_ARGUMENT (parameters), RESOURCE_EXHAUSTED (max_vertices, smallest edge), CANCELLED,
+  // Errors:     INVALID_ARGUMENT (parameters), RESOURCE_EXHAUSTED (max_vertices, smallest edge, memory of the context), CANCELLED,
   //             DEADLINE_EXCEEDED. Nothing is lost: a later call takes up the work where it was left.
   // Source:     [HT08] Figure 4.
   virtual absl::Status Refine(const MeshParameters& parameters, RunContext& context) = 0;
@@ -150,7 +150,7 @@ class Mesher {
   // Guarantees: (1) the simplices are a Delaunay triangulation of the vertices and decompose exactly the box; (2) the
   //             criterion holds for each; (3) no circumcentre lies outside the box.
   // Complexity: O(m) time and memory.
-  // Errors:     FAILED_PRECONDITION unless refined since vertices were last added; CANCELLED, DEADLINE_EXCEEDED.
+  // Errors:     FAILED_PRECONDITION unless refined since vertices were last added; RESOURCE_EXHAUSTED (memory of the context); CANCELLED, DEADLINE_EXCEEDED.
   // Threads:    uses `threads`, at most as many as the machine has cores.
   virtual absl::StatusOr<Mesh> Extract(int threads, RunContext& context) = 0;
 
@@ -169,7 +169,13 @@ class Mesher {
   virtual absl::StatusOr<MeshEstimate> Estimate(const MeshParameters& parameters, const RunContext& context) const = 0;
 };
 
-// Meshes `points` in their box: Create, Refine, Extract.
+// Reserves what Refine and Extract are estimated to take of the memory that the context lends: as much as the estimate says, and a
+// quarter more, but no more than max_vertices allows. Does nothing without a lender.
+//
+// Errors:     those of Estimate; RESOURCE_EXHAUSTED, or another of the lender.
+absl::Status ReserveMemory(const Mesher& mesher, const MeshParameters& parameters, const RunContext& context);
+
+// Meshes `points` in their box: Create, ReserveMemory, Refine, Extract.
 //
 // Complexity: O(n log n + m) time for m output vertices, O(m) memory.
 // Errors:     those of its parts.

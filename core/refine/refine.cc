@@ -76,6 +76,7 @@ absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices
       return status;
     }
     if (++improved % kReportInterval == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(structure_.MemoryBytes() + MemoryBytes()));
       context.SetBucket(bucket);
       context.SetPhaseFraction(1 - static_cast<double>(schedule_.size()) / structure_.vertex_count());
     }
@@ -92,6 +93,12 @@ void Refinement<D>::VertexAdded(VertexId x) {
   is_announced_.resize(structure_.vertex_count(), 0);
   const double nearest_sq = structure_.ApproximateNearestNeighbor(x, own_).distance_sq;
   LookAtNew(x, kNoVertex, FirstEdgeSq(*demands_, x, nearest_sq));
+}
+
+template <int D>
+uint64_t Refinement<D>::MemoryBytes() const {
+  return schedule_.MemoryBytes() + radius_sq_.size() * sizeof(double) + is_announced_.size() +
+         (own_.seen.size() + new_.seen.size()) * sizeof(uint32_t);
 }
 
 template <int D>

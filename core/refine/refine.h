@@ -60,7 +60,7 @@ class Refinement {
   //             ratio of a bucket, than all that wait; (2) deterministic.
   // Complexity: O(m) queries for m vertices in the end; when run again for the same demands, in proportion to what was
   //             added since and to what that makes necessary.
-  // Errors:     RESOURCE_EXHAUSTED with the bound that was met; CANCELLED, DEADLINE_EXCEEDED. All stays usable: a later
+  // Errors:     RESOURCE_EXHAUSTED with the bound that was met, one of the context's memory too; CANCELLED, DEADLINE_EXCEEDED. All stays usable: a later
   //             run takes up the work where it was left.
   // Source:     [HT08] Figure 4; see docs/design/refine.md.
   absl::Status Run(const Demands<D>& demands, uint64_t max_vertices, RunContext& context,
@@ -70,6 +70,9 @@ class Refinement {
   //
   // Complexity: O(1) in a refined structure.
   void VertexAdded(VertexId x);
+
+  // What the refinement takes in memory beside the structure.
+  uint64_t MemoryBytes() const;
 
   // What all queries have cost.
   QueryCounters counters() const;

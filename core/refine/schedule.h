@@ -59,6 +59,9 @@ class Schedule {
   // How many vertices wait.
   size_t size() const { return size_; }
 
+  // What the schedule takes in memory, but for what has moved on.
+  uint64_t MemoryBytes() const { return waits_in_.size() * sizeof(int16_t) + size_ * sizeof(VertexId); }
+
   // Takes a vertex from the lowest bucket; false when none waits.
   bool Pop(VertexId& v, int& bucket) {
     for (; static_cast<size_t>(lowest_) < buckets_.size(); ++lowest_) {

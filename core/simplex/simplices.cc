@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <mutex>
 #include <utility>
 
 #include "core/base/dimensions.h"
@@ -60,6 +61,13 @@ absl::StatusOr<Simplices> ComputeStars(const QueryStructure<D>& structure, std::
                                        std::span<const uint32_t> output_index, IsWanted is_wanted, int threads,
                                        RunContext& context) {
   std::vector<Simplices> blocks((order.size() + kBlockSize - 1) / kBlockSize);
+  // What is held besides the indices; of the scratch space, the marks by node count.
+  const uint64_t held_bytes = structure.MemoryBytes() + output_index.size_bytes() + order.size_bytes() +
+                              static_cast<uint64_t>(threads) * structure.tree().node_count() * sizeof(uint32_t);
+  std::atomic<uint64_t> index_bytes{0};
+  std::mutex mutex;
+  absl::Status memory;  // guarded by mutex: the first refusal
+  std::atomic<bool> is_refused{false};
   tbb::enumerable_thread_specific<Workspace<D>> workspaces;
   std::atomic<size_t> blocks_done{0};
   tbb::task_arena arena(std::min(threads, tbb::info::default_concurrency()));
@@ -67,22 +75,28 @@ absl::StatusOr<Simplices> ComputeStars(const QueryStructure<D>& structure, std::
     tbb::parallel_for(size_t{0}, blocks.size(), [&](size_t block) {
       Workspace<D>& workspace = workspaces.local();
       const size_t end = std::min(order.size(), (block + 1) * kBlockSize);
-      for (size_t i = block * kBlockSize; i < end && !context.IsCancelled(); ++i) {
+      for (size_t i = block * kBlockSize;
+           i < end && !context.IsCancelled() && !is_refused.load(std::memory_order_relaxed); ++i) {
         structure.Voronoi(order[i], workspace);
         EmitStar<D>(structure, order[i], output_index, workspace, is_wanted, blocks[block]);
+      }
+      const uint64_t bytes = blocks[block].indices.size() * sizeof(uint32_t);
+      if (absl::Status status = context.AllowMemory(held_bytes + (index_bytes += bytes)); !status.ok()) {
+        std::lock_guard lock(mutex);
+        memory.Update(std::move(status));
+        is_refused = true;
       }
       context.AddSimplices(blocks[block].indices.size() / (D + 1));
       context.SetPhaseFraction(static_cast<double>(++blocks_done) / static_cast<double>(blocks.size()));
     });
   });
   WELLSPACE_RETURN_IF_ERROR(context.Check());
+  WELLSPACE_RETURN_IF_ERROR(memory);
+  // Once more, beside the blocks.
+  WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(held_bytes + 2 * index_bytes));
 
   Simplices all;
-  size_t size = 0;
-  for (const Simplices& block : blocks) {
-    size += block.indices.size();
-  }
-  all.indices.reserve(size);
+  all.indices.reserve(index_bytes / sizeof(uint32_t));
   for (Simplices& block : blocks) {
     WELLSPACE_RETURN_IF_ERROR(context.Check());
     all.indices.insert(all.indices.end(), block.indices.begin(), block.indices.end());

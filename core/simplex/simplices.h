@@ -29,7 +29,7 @@ struct Simplices {
 // Guarantees: (1) a Delaunay triangulation of the vertices that decomposes the box; (2) the same order for any number
 //             of threads.
 // Complexity: O(m) for m vertices.
-// Errors:     CANCELLED, DEADLINE_EXCEEDED.
+// Errors:     RESOURCE_EXHAUSTED of the context's memory; CANCELLED, DEADLINE_EXCEEDED.
 // Threads:    uses `threads`, at most as many as the machine has cores.
 // Source:     [HT08] §1 and §2.
 template <int D>

@@ -47,6 +47,7 @@ absl::Status LeafTree<D>::Build(const Box<D>& box, std::span<const Point<D>> poi
         }
         if ((++looked_at & 1023) == 0) {
           WELLSPACE_RETURN_IF_ERROR(context.Check());
+          WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(MemoryBytes() + points.size_bytes()));
         }
       }
     }
@@ -56,6 +57,7 @@ absl::Status LeafTree<D>::Build(const Box<D>& box, std::span<const Point<D>> poi
   for (uint32_t i = 0; i < node_count(); ++i) {
     if (i % 4096 == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
+      WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(MemoryBytes() + points.size_bytes()));
     }
     if (!IsLeaf(NodeId{i})) {
       continue;

@@ -55,7 +55,8 @@ class LeafTree {
   // vertex i is points[i].
   //
   // Complexity: O(D 2^D L) for L leaves.
-  // Errors:     RESOURCE_EXHAUSTED when it would have more than `max_leaves` leaves; CANCELLED, DEADLINE_EXCEEDED.
+  // Errors:     RESOURCE_EXHAUSTED when it would have more than `max_leaves` leaves, or of the context's memory;
+  //             CANCELLED, DEADLINE_EXCEEDED.
   // Source:     [HT08] §5; levels from the top down over sorted ranges instead of Bern, Eppstein and Teng's merging,
   //             which matters only when leaves are compressed; here every leaf is one that a mesh of optimal size
   //             needs.
@@ -83,6 +84,11 @@ class LeafTree {
   uint32_t node_count() const { return static_cast<uint32_t>(nodes_.size()); }
   // What a node takes, but for the vertices in it.
   static constexpr size_t NodeBytes() { return sizeof(Node); }
+  // What the tree takes in memory.
+  uint64_t MemoryBytes() const {
+    return nodes_.size() * sizeof(Node) + buckets_.size() * sizeof(Bucket) + ranges_.size() * sizeof(Range) +
+           leaf_of_.size() * sizeof(NodeId);
+  }
   // Whether `node` is a leaf that covers a part of the box.
   bool IsLeaf(NodeId node) const { return At(node).first_child == kNoNode && !At(node).outside; }
   Box<D> BoxOf(NodeId node) const { return At(node).Cube(); }

@@ -64,7 +64,7 @@ class QueryStructure {
   //
   // REQUIRES:   points distinct as cubes of MortonGrid(box), sorted in its Morton order, in the box.
   // Complexity: O(L) for L leaves; O(n log n) has been paid for sorting.
-  // Errors:     RESOURCE_EXHAUSTED when more than `max_leaves` leaves would be needed; CANCELLED, DEADLINE_EXCEEDED.
+  // Errors:     RESOURCE_EXHAUSTED when more than `max_leaves` leaves would be needed, or of the context's memory; CANCELLED, DEADLINE_EXCEEDED.
   // Source:     [HT08] Figure 3, INITIALIZE.
   absl::Status Initialize(const Box<D>& box, std::vector<Point<D>> points, uint64_t max_leaves,
                           const RunContext& context);
@@ -123,6 +123,10 @@ class QueryStructure {
   const Point<D>& point(VertexId v) const { return points_[Index(v)]; }
   FaceMask faces(VertexId v) const { return faces_[Index(v)]; }
   const LeafTree<D>& tree() const { return tree_; }
+  // What the structure takes in memory.
+  uint64_t MemoryBytes() const {
+    return tree_.MemoryBytes() + points_.size() * sizeof(Point<D>) + faces_.size() * sizeof(FaceMask);
+  }
 
  private:
   void BeginQuery(Workspace<D>& workspace) const;
