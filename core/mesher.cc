@@ -143,8 +143,15 @@ class MesherIn final : public Mesher {
     return status;
   }
 
-  absl::StatusOr<std::vector<uint32_t>> AddPoints(std::span<const double> points, RunContext& context) override {
+  absl::StatusOr<std::vector<uint32_t>> AddPointsNear(std::span<const double> points, std::span<const uint32_t> near,
+                                                      RunContext& context) override {
     WELLSPACE_RETURN_IF_ERROR(CheckShape(points, D));
+    if (!near.empty() && near.size() != points.size() / D) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("near: it has ", near.size(), " vertices for ", points.size() / D, " points"));
+    }
+    WELLSPACE_RETURN_IF_ERROR(CheckVertices(near));
+    const auto start = [&](size_t input) { return near.empty() ? kNoVertex : VertexOf(near[input]); };
     WELLSPACE_ASSIGN_OR_RETURN(const SortedCloud<D> cloud, SortCloud<D>(domain_, points, context));
     // The points among themselves, and beside the faces of the box.
     QueryStructure<D> apart;
@@ -159,7 +166,8 @@ class MesherIn final : public Mesher {
     std::vector<VertexId> known(cloud.points.size(), kNoVertex);
     for (size_t i = 0; i < cloud.points.size(); ++i) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
-      WELLSPACE_ASSIGN_OR_RETURN(known[i], Find(cloud.points[i], points, cloud.first_input[i]));
+      WELLSPACE_ASSIGN_OR_RETURN(known[i],
+                                 Find(cloud.points[i], points, cloud.first_input[i], start(cloud.first_input[i])));
     }
     if (structure_.vertex_count() + cloud.points.size() > kMaxVertices) {
       return absl::ResourceExhaustedError(absl::StrCat("points: ", cloud.points.size(), " beside ", vertex_count(),
@@ -167,7 +175,7 @@ class MesherIn final : public Mesher {
     }
     for (size_t i = 0; i < cloud.points.size(); ++i) {
       if (known[i] == kNoVertex) {
-        known[i] = Add(kNoVertex, cloud.points[i], points, cloud.first_input[i]);
+        known[i] = Add(start(cloud.first_input[i]), cloud.points[i], points, cloud.first_input[i]);
       }
     }
     std::vector<uint32_t> vertices;

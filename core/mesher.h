@@ -122,7 +122,19 @@ class Mesher {
   // Complexity: O(n (log n + depth of the tree)) and O(1) queries a point in a refined mesh.
   // Errors:     INVALID_ARGUMENT as in Create, naming the point, also when it is too close to a vertex;
   //             RESOURCE_EXHAUSTED when vertices can no longer be numbered; CANCELLED, DEADLINE_EXCEEDED.
-  virtual absl::StatusOr<std::vector<uint32_t>> AddPoints(std::span<const double> points, RunContext& context) = 0;
+  absl::StatusOr<std::vector<uint32_t>> AddPoints(std::span<const double> points, RunContext& context) {
+    return AddPointsNear(points, {}, context);
+  }
+
+  // The same for points of which each is in the cell of its vertex of `near`, or not far: found by a walk from leaf to leaf. `near`
+  // has n vertices, or none.
+  //
+  // Complexity: O(1) a point there, besides sorting.
+  // Errors:     as AddPoints; OUT_OF_RANGE, naming the first vertex that does not exist; INVALID_ARGUMENT for another number of
+  //             vertices than points.
+  // Source:     [HT08] Figure 3, ADDVERTEX.
+  virtual absl::StatusOr<std::vector<uint32_t>> AddPointsNear(std::span<const double> points,
+                                                              std::span<const uint32_t> near, RunContext& context) = 0;
 
   // The same for one point that is in the cell of vertex `near`, or not far: found by a walk from leaf to leaf.
   //

@@ -3,6 +3,7 @@
 #define WELLSPACE_SERVER_CALL_ENVIRONMENT_H_
 
 #include <functional>
+#include <memory>
 #include <span>
 
 #include "absl/status/statusor.h"
@@ -17,6 +18,9 @@
 
 namespace wellspace::server {
 
+class RequestIds;
+class SessionStore;
+
 // What meshes: core::MeshPoints, or what a test puts in its place.
 using Mesher =
     std::function<absl::StatusOr<core::Mesh>(const core::MeshParameters&, std::span<const double>, core::RunContext&)>;
@@ -24,16 +28,23 @@ using Mesher =
 using Estimator = std::function<absl::StatusOr<core::MeshEstimate>(const core::MeshParameters&, std::span<const double>,
                                                                    core::RunContext&)>;
 
+// What begins the mesh of a session: core::Mesher::Create, or what a test puts in its place.
+using MesherFactory = std::function<absl::StatusOr<std::unique_ptr<core::Mesher>>(
+    const core::MeshParameters&, std::span<const double>, core::RunContext&)>;
+
 // What all calls share; outlives them.
 struct CallEnvironment {
   const ServiceOptions& options;
   const Mesher& mesher;
   const Estimator& estimator;
+  const MesherFactory& create_mesher;
   const Authenticator& authenticator;
   MemoryBudget& memory;
   JobPool& jobs;
   Background& background;
   CallRegistry& calls;
+  SessionStore& sessions;
+  RequestIds& request_ids;
   spdlog::logger& log;
 };
 

@@ -154,6 +154,44 @@ grpc::Status ParametersFromProto(const v1::MeshParameters& message, const Servic
   return Validate(*parameters, "max_vertices");
 }
 
+v1::MeshParameters ParametersToProto(const core::MeshParameters& parameters) {
+  v1::MeshParameters message;
+  message.set_dimension(parameters.dimension);
+  message.set_rho(parameters.rho == 0 ? core::DefaultRho(parameters.dimension) : parameters.rho);
+  switch (parameters.criterion) {
+    case core::Criterion::kRadiusEdge:
+      message.set_criterion(v1::CRITERION_RADIUS_EDGE);
+      break;
+    case core::Criterion::kWellSpaced:
+      message.set_criterion(v1::CRITERION_WELL_SPACED);
+      break;
+  }
+  if (parameters.domain_low.empty()) {
+    message.set_margin(parameters.margin);
+  } else {
+    message.mutable_domain()->mutable_low()->Assign(parameters.domain_low.begin(), parameters.domain_low.end());
+    message.mutable_domain()->mutable_high()->Assign(parameters.domain_high.begin(), parameters.domain_high.end());
+  }
+  message.set_max_circumradius(parameters.max_circumradius);
+  for (const core::SizeBox& box : parameters.size_boxes) {
+    v1::SizeBox* size_box = message.add_size_boxes();
+    size_box->mutable_low()->Assign(box.low.begin(), box.low.end());
+    size_box->mutable_high()->Assign(box.high.begin(), box.high.end());
+    size_box->set_max_circumradius(box.max_circumradius);
+  }
+  message.set_max_vertices(parameters.max_vertices);
+  message.set_threads(parameters.threads);
+  return message;
+}
+
+google::protobuf::Timestamp TimeToProto(absl::Time time) {
+  google::protobuf::Timestamp message;
+  const int64_t seconds = absl::ToUnixSeconds(time);
+  message.set_seconds(seconds);
+  message.set_nanos(static_cast<int32_t>(absl::ToInt64Nanoseconds(time - absl::FromUnixSeconds(seconds))));
+  return message;
+}
+
 v1::MeshMetadata MetadataToProto(const core::Mesh& mesh, uint64_t chunk_count) {
   v1::MeshMetadata metadata;
   metadata.set_dimension(mesh.dimension);

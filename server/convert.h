@@ -7,6 +7,7 @@
 #include "absl/time/time.h"
 #include "core/mesher.h"
 #include "google/protobuf/duration.pb.h"
+#include "google/protobuf/timestamp.pb.h"
 #include "grpcpp/support/status.h"
 #include "server/options.h"
 #include "wellspace/v1/mesh.pb.h"
@@ -21,6 +22,11 @@ namespace wellspace::server {
 // Errors:     INVALID_PARAMETERS with the path of the first wrong field.
 grpc::Status ParametersFromProto(const v1::MeshParameters& message, const ServiceOptions& options,
                                  core::MeshParameters* parameters);
+
+// The parameters with every default that does not depend on points filled in.
+v1::MeshParameters ParametersToProto(const core::MeshParameters& parameters);
+
+google::protobuf::Timestamp TimeToProto(absl::Time time);
 
 // The metadata of `mesh`, to be followed by `chunk_count` chunks.
 v1::MeshMetadata MetadataToProto(const core::Mesh& mesh, uint64_t chunk_count);

@@ -7,7 +7,6 @@
 #include "absl/strings/str_cat.h"
 #include "absl/types/optional.h"
 #include "google/rpc/error_details.pb.h"
-#include "google/rpc/status.pb.h"
 
 namespace wellspace::server {
 namespace {
@@ -27,6 +26,8 @@ grpc::StatusCode CodeOf(v1::ErrorReason reason) {
     case v1::ERROR_REASON_INVALID_CHUNK_SHAPE:
     case v1::ERROR_REASON_INVALID_POINTS:
     case v1::ERROR_REASON_MALFORMED_REQUEST:
+    case v1::ERROR_REASON_REQUEST_ID_REUSED:
+    case v1::ERROR_REASON_INVALID_REQUEST:
       return grpc::StatusCode::INVALID_ARGUMENT;
     case v1::ERROR_REASON_TOO_MANY_POINTS:
     case v1::ERROR_REASON_MESH_TOO_LARGE:
@@ -34,9 +35,22 @@ grpc::StatusCode CodeOf(v1::ErrorReason reason) {
     case v1::ERROR_REASON_OUT_OF_MEMORY:
     case v1::ERROR_REASON_MEMORY_LIMIT:
     case v1::ERROR_REASON_QUOTA_EXCEEDED:
+    case v1::ERROR_REASON_TOO_MANY_SESSIONS:
       return grpc::StatusCode::RESOURCE_EXHAUSTED;
     case v1::ERROR_REASON_SERVER_STOPPING:
       return grpc::StatusCode::UNAVAILABLE;
+    case v1::ERROR_REASON_SESSION_NOT_FOUND:
+    case v1::ERROR_REASON_OPERATION_NOT_FOUND:
+      return grpc::StatusCode::NOT_FOUND;
+    case v1::ERROR_REASON_SESSION_BUSY:
+    case v1::ERROR_REASON_MESH_NOT_READY:
+      return grpc::StatusCode::FAILED_PRECONDITION;
+    case v1::ERROR_REASON_REVISION_MISMATCH:
+      return grpc::StatusCode::ABORTED;
+    case v1::ERROR_REASON_UPLOAD_GAP:
+    case v1::ERROR_REASON_CHUNK_OUT_OF_RANGE:
+    case v1::ERROR_REASON_VERTEX_OUT_OF_RANGE:
+      return grpc::StatusCode::OUT_OF_RANGE;
     case v1::ERROR_REASON_UNAUTHENTICATED:
       return grpc::StatusCode::UNAUTHENTICATED;
     case v1::ERROR_REASON_READER_STALLED:
@@ -105,6 +119,16 @@ grpc::Status FromCoreStatus(const absl::Status& status) {
     default:
       return MakeError(v1::ERROR_REASON_INTERNAL, absl::StrCat("internal error: ", message));
   }
+}
+
+google::rpc::Status StatusToProto(const grpc::Status& status) {
+  google::rpc::Status message;
+  if (!message.ParseFromString(status.error_details())) {
+    message.Clear();
+  }
+  message.set_code(status.error_code());
+  message.set_message(status.error_message());
+  return message;
 }
 
 grpc::Status RunGuarded(const std::function<grpc::Status()>& work) {

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "absl/status/status.h"
+#include "google/rpc/status.pb.h"
 #include "grpcpp/support/status.h"
 #include "wellspace/v1/errors.pb.h"
 
@@ -27,6 +28,9 @@ absl::Status MemoryLimitError(const std::string& message, bool may_retry);
 // The status of a run that the core ended with `status`. The parameters were validated before, so that an INVALID_ARGUMENT is about
 // the points.
 grpc::Status FromCoreStatus(const absl::Status& status);
+
+// `status` as a message, as it would reach a client.
+google::rpc::Status StatusToProto(const grpc::Status& status);
 
 // Runs `work` and returns its status; an exception that escapes it becomes OUT_OF_MEMORY or INTERNAL.
 grpc::Status RunGuarded(const std::function<grpc::Status()>& work);

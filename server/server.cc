@@ -1,5 +1,6 @@
 #include "server/server.h"
 
+#include <array>
 #include <chrono>
 
 #include "absl/strings/str_cat.h"
@@ -33,7 +34,7 @@ void EnableHealthAndReflection() {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& options, std::shared_ptr<spdlog::logger> log,
-                                                      Mesher mesher, Estimator estimator) {
+                                                      Mesher mesher, Estimator estimator, MesherFactory create_mesher) {
   EnableHealthAndReflection();
   grpc::ServerBuilder builder;
   builder.SetMaxReceiveMessageSize(kMaxRequestBytes);
@@ -56,8 +57,12 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
     builder.AddListeningPort(address.ToString(), grpc::InsecureServerCredentials(), &port);
   }
 
-  std::unique_ptr<Server> server(new Server(options, std::move(log), std::move(mesher), std::move(estimator)));
-  builder.RegisterService(&server->service_);
+  std::unique_ptr<Server> server(
+      new Server(options, std::move(log), std::move(mesher), std::move(estimator), std::move(create_mesher)));
+  const std::array<grpc::Service*, 3> services = {&server->meshing_, &server->sessions_, &server->operations_};
+  for (grpc::Service* service : services) {
+    builder.RegisterService(service);
+  }
   server->server_ = builder.BuildAndStart();
   if (server->server_ == nullptr || (!options.listen.empty() && port == 0)) {
     return absl::UnavailableError(
@@ -67,7 +72,10 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
     address.port = static_cast<uint16_t>(port);
     server->address_ = address.ToString();
   }
-  server->server_->GetHealthCheckService()->SetServingStatus(v1::MeshingService::service_full_name(), true);
+  for (const char* service : {v1::MeshingService::service_full_name(), v1::SessionService::service_full_name(),
+                              v1::OperationService::service_full_name()}) {
+    server->server_->GetHealthCheckService()->SetServingStatus(service, true);
+  }
   return server;
 }
 
@@ -85,9 +93,9 @@ void Server::Shutdown(absl::Duration grace) {
   }
   std::call_once(shut_down_, [this, grace] {
     server_->GetHealthCheckService()->SetServingStatus(false);
-    service_.calls().Close();
-    if (!service_.calls().WaitUntilEmpty(grace)) {
-      service_.calls().AbortAll();
+    backend_.calls().Close();
+    if (!backend_.calls().WaitUntilEmpty(grace)) {
+      backend_.calls().AbortAll();
     }
     server_->Shutdown(std::chrono::system_clock::now() + kFarewell);
     server_->Wait();

@@ -12,8 +12,11 @@
 #include "grpcpp/channel.h"
 #include "grpcpp/server.h"
 #include "server/authenticator.h"
+#include "server/backend.h"
 #include "server/meshing_service.h"
+#include "server/operation_service.h"
 #include "server/options.h"
+#include "server/session_service.h"
 #include "spdlog/logger.h"
 
 namespace wellspace::server {
@@ -25,7 +28,7 @@ struct ServerOptions {
   Authenticator::Demands demands;  // on callers
 };
 
-// Serves MeshingService, health and reflection.
+// Serves the services of wellspace.v1, health and reflection.
 //
 // Thread safety: thread-safe.
 class Server {
@@ -37,7 +40,8 @@ class Server {
   static absl::StatusOr<std::unique_ptr<Server>> Start(const ServerOptions& options,
                                                        std::shared_ptr<spdlog::logger> log,
                                                        Mesher mesher = core::MeshPoints,
-                                                       Estimator estimator = core::EstimateMesh);
+                                                       Estimator estimator = core::EstimateMesh,
+                                                       MesherFactory create_mesher = core::Mesher::Create);
 
   // Shuts down at once.
   ~Server();
@@ -57,12 +61,17 @@ class Server {
   void Shutdown(absl::Duration grace);
 
  private:
-  Server(const ServerOptions& options, std::shared_ptr<spdlog::logger> log, Mesher mesher, Estimator estimator)
+  Server(const ServerOptions& options, std::shared_ptr<spdlog::logger> log, Mesher mesher, Estimator estimator,
+         MesherFactory create_mesher)
       : authenticator_(options.demands),
-        service_(options.service, authenticator_, std::move(log), std::move(mesher), std::move(estimator)) {}
+        backend_(options.service, authenticator_, std::move(log), std::move(mesher), std::move(estimator),
+                 std::move(create_mesher)) {}
 
   Authenticator authenticator_;
-  MeshingService service_;
+  Backend backend_;
+  MeshingService meshing_{backend_.environment()};
+  SessionService sessions_{backend_.environment()};
+  OperationService operations_{backend_.environment()};
   std::string address_;
   std::unique_ptr<grpc::Server> server_;
   std::once_flag shut_down_;

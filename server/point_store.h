@@ -1,0 +1,41 @@
+// The points of a session, as they came.
+#ifndef WELLSPACE_SERVER_POINT_STORE_H_
+#define WELLSPACE_SERVER_POINT_STORE_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <span>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "core/base/run_context.h"
+
+namespace wellspace::server {
+
+// Coordinates that grow at the end. They lie in blocks, so that growing never copies much, however small the pieces are.
+//
+// Thread safety: thread-compatible.
+class PointStore {
+ public:
+  // Complexity: O(size of `coordinates`).
+  void Append(std::span<const double> coordinates);
+
+  uint64_t coordinate_count() const { return coordinate_count_; }
+
+  // The coordinates from number `first` on.
+  //
+  // REQUIRES:   first <= coordinate_count().
+  // Errors:     CANCELLED, DEADLINE_EXCEEDED.
+  absl::StatusOr<std::vector<double>> CopyFrom(uint64_t first, const core::RunContext& context) const;
+
+ private:
+  static constexpr size_t kBlockSize = size_t{1} << 17;  // coordinates: 1 MiB
+
+  std::deque<std::vector<double>> blocks_;  // of kBlockSize coordinates; the last one may have fewer
+  uint64_t coordinate_count_ = 0;
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_POINT_STORE_H_

@@ -1,0 +1,149 @@
+#include "server/refinement.h"
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "absl/time/clock.h"
+#include "core/base/status_macros.h"
+#include "core/mesher.h"
+#include "server/errors.h"
+#include "server/progress_pacer.h"
+
+namespace wellspace::server {
+namespace {
+
+constexpr size_t kCopyBlock = size_t{1} << 20;  // numbers copied between two looks at the context
+
+template <typename T>
+absl::StatusOr<std::vector<T>> Copy(const std::vector<T>& values, const core::RunContext& context) {
+  std::vector<T> copy;
+  copy.reserve(values.size());
+  for (size_t begin = 0; begin < values.size(); begin += kCopyBlock) {
+    WELLSPACE_RETURN_IF_ERROR(context.Check());
+    const T* first = values.data() + begin;
+    copy.insert(copy.end(), first, first + std::min(kCopyBlock, values.size() - begin));
+  }
+  return copy;
+}
+
+// Downloads may still read the last mesh: the next one is made of a copy.
+absl::StatusOr<core::Mesh> Copy(const core::Mesh& mesh, const core::RunContext& context) {
+  core::Mesh copy;
+  copy.dimension = mesh.dimension;
+  copy.domain_low = mesh.domain_low;
+  copy.domain_high = mesh.domain_high;
+  copy.statistics = mesh.statistics;
+  WELLSPACE_ASSIGN_OR_RETURN(copy.points, Copy(mesh.points, context));
+  WELLSPACE_ASSIGN_OR_RETURN(copy.simplices, Copy(mesh.simplices, context));
+  return copy;  // Update makes input_vertex anew
+}
+
+absl::StatusOr<core::Mesh> MeshFirst(const CallEnvironment& environment, const Session& session,
+                                     core::MeshParameters parameters, core::RunContext& context, SessionWork& work) {
+  if (work.mesh != nullptr) {  // built anew, in the box that it has had
+    parameters.domain_low = work.mesh->chunks.mesh().domain_low;
+    parameters.domain_high = work.mesh->chunks.mesh().domain_high;
+  }
+  std::unique_ptr<core::Mesher> mesher;
+  {
+    WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> points, session.points().CopyFrom(0, context));
+    WELLSPACE_ASSIGN_OR_RETURN(mesher, environment.create_mesher(parameters, points, context));
+  }
+  WELLSPACE_RETURN_IF_ERROR(mesher->Refine(parameters, context));
+  WELLSPACE_ASSIGN_OR_RETURN(core::Mesh mesh, mesher->Extract(parameters.threads, context));
+  work.mesher = std::move(mesher);
+  work.meshed_points = session.points().coordinate_count() / parameters.dimension;
+  return mesh;
+}
+
+absl::StatusOr<core::Mesh> MeshAgain(const Session& session, const core::MeshParameters& parameters,
+                                     core::RunContext& context, SessionWork& work) {
+  context.EnterPhase(core::Phase::kTree);
+  {
+    WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> points,
+                               session.points().CopyFrom(work.meshed_points * parameters.dimension, context));
+    WELLSPACE_RETURN_IF_ERROR(work.mesher->AddPoints(points, context).status());
+    work.meshed_points += points.size() / parameters.dimension;
+  }
+  WELLSPACE_RETURN_IF_ERROR(work.mesher->Refine(parameters, context));
+  WELLSPACE_ASSIGN_OR_RETURN(core::Mesh mesh, Copy(work.mesh->chunks.mesh(), context));
+  WELLSPACE_RETURN_IF_ERROR(work.mesher->Update(mesh, parameters.threads, context));
+  return mesh;
+}
+
+void Run(const CallEnvironment& environment, Session& session, Operation& operation, Job& job) {
+  core::RunContext& context = job.context();
+  const absl::Time start = absl::Now();
+  std::optional<SessionWork> work = session.BeginWork(operation);
+  if (!work.has_value()) {
+    return;
+  }
+  std::optional<core::Mesh> mesh;
+  bool has_returned = false;
+  const grpc::Status status = RunGuarded([&] {
+    absl::StatusOr<core::Mesh> made = work->mesher == nullptr
+                                          ? MeshFirst(environment, session, operation.parameters(), context, *work)
+                                          : MeshAgain(session, operation.parameters(), context, *work);
+    has_returned = true;
+    if (made.ok()) {
+      mesh = *std::move(made);
+    }
+    return FromCoreStatus(made.status());
+  });
+  if (!has_returned) {  // an exception went through the mesher: nobody knows what it is like
+    work->mesher = nullptr;
+    work->meshed_points = 0;
+  }
+  const absl::Duration time = absl::Now() - start;
+  if (status.error_code() == grpc::StatusCode::INTERNAL) {
+    environment.log.error("operation={} {}", operation.name(), status.error_message());
+  }
+  environment.log.info("operation={} tenant={} code={} seconds={:.3f} points={} vertices={}{}{}", operation.name(),
+                       session.tenant(), absl::StatusCodeToString(static_cast<absl::StatusCode>(status.error_code())),
+                       absl::ToDoubleSeconds(time), work->meshed_points, mesh.has_value() ? mesh->vertex_count() : 0,
+                       status.ok() ? "" : " message=", status.error_message());
+  session.EndWork(operation, status, *std::move(work), std::move(mesh));
+}
+
+void Tick(Background& background, const std::weak_ptr<Operation>& weak) {
+  const std::shared_ptr<Operation> operation = weak.lock();
+  if (operation != nullptr && operation->Tick(absl::Now())) {
+    background.PostAfter(ProgressPacer::kMinInterval, [&background, weak] { Tick(background, weak); });
+  }
+}
+
+}  // namespace
+
+grpc::Status StartRefinement(const CallEnvironment& environment, const std::shared_ptr<Session>& session,
+                             const core::MeshParameters& parameters, uint64_t expected_revision,
+                             std::shared_ptr<Operation>* operation) {
+  const auto submit = [&](const std::shared_ptr<Operation>& started) {
+    JobPool::Submission submission =
+        environment.jobs.Submit({.tenant = session->tenant(), .work = [&environment, session, started](Job& job) {
+                                   Run(environment, *session, *started, job);
+                                 }});
+    if (submission.job == nullptr) {
+      return submission.refusal;
+    }
+    started->SetJob(std::move(submission.job));
+    return grpc::Status::OK;
+  };
+  if (grpc::Status status = session->StartOperation(parameters, expected_revision, submit, operation); !status.ok()) {
+    return status;
+  }
+  environment.background.Post(
+      [&background = environment.background, weak = std::weak_ptr(*operation)] { Tick(background, weak); });
+  return grpc::Status::OK;
+}
+
+void CancelOperation(const CallEnvironment& environment, Session& session, Operation& operation) {
+  const std::shared_ptr<Job> job = operation.job();  // null once it has ended
+  session.EndWaiting(operation);
+  if (job != nullptr) {
+    environment.jobs.Cancel(job);
+  }
+}
+
+}  // namespace wellspace::server

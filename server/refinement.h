@@ -1,0 +1,32 @@
+// The work of operations.
+#ifndef WELLSPACE_SERVER_REFINEMENT_H_
+#define WELLSPACE_SERVER_REFINEMENT_H_
+
+#include <cstdint>
+#include <memory>
+
+#include "core/mesh_parameters.h"
+#include "grpcpp/support/status.h"
+#include "server/call_environment.h"
+#include "server/operation.h"
+#include "server/session.h"
+
+namespace wellspace::server {
+
+// Starts an operation that refines `session` with `parameters`, on a worker: from its points the first time, from then on by what has
+// changed.
+//
+// A first refinement that does not succeed leaves nothing behind but the points. A later one leaves what it has added, and the next one
+// goes on from there; one that ran out of memory gives up the structure, and the next one builds it anew.
+//
+// Errors:     QUEUE_FULL, QUOTA_EXCEEDED (jobs); those of Session::StartOperation.
+grpc::Status StartRefinement(const CallEnvironment& environment, const std::shared_ptr<Session>& session,
+                             const core::MeshParameters& parameters, uint64_t expected_revision,
+                             std::shared_ptr<Operation>* operation);
+
+// Ends an operation that waits; has one that runs end soon.
+void CancelOperation(const CallEnvironment& environment, Session& session, Operation& operation);
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_REFINEMENT_H_

@@ -1,0 +1,219 @@
+// A session: a domain, a cloud of points and the mesh over it.
+#ifndef WELLSPACE_SERVER_SESSION_H_
+#define WELLSPACE_SERVER_SESSION_H_
+
+#include <atomic>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <shared_mutex>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "absl/time/time.h"
+#include "core/mesher.h"
+#include "grpcpp/support/status.h"
+#include "server/mesh_chunks.h"
+#include "server/operation.h"
+#include "server/options.h"
+#include "server/point_store.h"
+#include "wellspace/v1/sessions.pb.h"
+
+namespace wellspace::server {
+
+// Says what time it is; never goes back.
+using Clock = std::function<absl::Time()>;
+
+// What a tenant has in all of its sessions.
+struct TenantUsage {
+  std::atomic<uint64_t> points{0};
+};
+
+// The mesh of a session as it was at one revision. Immutable: a download holds it for as long as it wants.
+struct MeshSnapshot {
+  uint64_t revision = 0;
+  MeshChunks chunks;
+};
+
+// What AddVertices did.
+struct AddedVertices {
+  std::vector<uint32_t> vertices;  // by point
+  uint64_t revision = 0;           // of the session
+};
+
+// What an operation works on. The session has given it away until the operation has ended.
+struct SessionWork {
+  std::unique_ptr<core::Mesher> mesher;      // null: there is none yet
+  uint64_t meshed_points = 0;                // of the session's points, those that `mesher` has
+  std::shared_ptr<const MeshSnapshot> mesh;  // the last one; null: there is none yet
+};
+
+// Thread safety: thread-safe.
+// Invariants: (1) revision grows with every change of the points or of the mesh; (2) while an operation is under way, or vertices are
+// being added, points, mesh and mesher are touched by nothing else; (3) a refinement that did not succeed leaves every point in its
+// place; (4) the lock order is this session's mutex, then that of its operations and of the JobPool.
+class Session {
+ public:
+  struct Settings {
+    std::string tenant;
+    std::string name;  // "sessions/{session}"
+    core::MeshParameters parameters;
+    std::map<std::string, std::string> labels;
+    absl::Duration ttl;
+    absl::Time create_time;
+  };
+
+  // REQUIRES:   `options` outlives this.
+  Session(Settings settings, const ServiceOptions& options, Clock clock, std::shared_ptr<TenantUsage> usage);
+  ~Session();
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  const std::string& tenant() const { return tenant_; }
+  const std::string& name() const { return name_; }
+  int dimension() const { return dimension_; }
+  absl::Time create_time() const { return create_time_; }
+  core::MeshParameters parameters() const;
+  v1::Session Describe() const;
+  bool HasLabels(const std::map<std::string, std::string>& labels) const;
+
+  // Renews the lease; false when it has run out already.
+  bool Renew();
+  // A session with a SessionUse, or with an operation under way, does not expire.
+  bool IsExpired() const;
+
+  // Changes what is given.
+  //
+  // Errors:     REVISION_MISMATCH.
+  grpc::Status Update(std::optional<std::map<std::string, std::string>> labels, std::optional<absl::Duration> ttl,
+                      uint64_t expected_revision);
+
+  // From now on all that changes or asks for points and mesh ends with SESSION_NOT_FOUND. For a session that leaves its store; returns
+  // the operation that is under way, if there is one, which is to be cancelled.
+  //
+  // Errors:     REVISION_MISMATCH, SESSION_NOT_FOUND (it was closed before): nothing has been done.
+  grpc::Status Close(uint64_t expected_revision, std::shared_ptr<Operation>* under_way);
+  // The same if the lease has run out, so that nothing is under way; says whether it has.
+  bool CloseIfExpired();
+
+  // Appends those of `coordinates`, whole points of which the first is number `offset` of the session, that it does not have yet.
+  // `expected_revision` 0: any.
+  //
+  // Errors:     INVALID_CHUNK_SHAPE, INVALID_POINTS, UPLOAD_GAP, SESSION_BUSY, TOO_MANY_POINTS, QUOTA_EXCEEDED,
+  //             REVISION_MISMATCH, SESSION_NOT_FOUND. Nothing has been appended.
+  grpc::Status Append(uint64_t offset, std::span<const double> coordinates, uint64_t expected_revision);
+  // Points and revision, as one.
+  v1::UploadPointsResponse Committed() const;
+
+  // The last mesh; null before the first.
+  std::shared_ptr<const MeshSnapshot> mesh() const;
+
+  // Runs `query` on this thread, a worker's. Any number of queries run at once. An operation that begins waits for those that run:
+  // keep each short (some milliseconds) and ask again for the next batch.
+  // `version` is that of the structure: 0 for the first batch, which sets it; for later ones as it was set.
+  //
+  // Errors:     MESH_NOT_READY, SESSION_BUSY, SESSION_NOT_FOUND; REVISION_MISMATCH when the structure is no longer at `version`;
+  //             those of `query`.
+  grpc::Status Query(uint64_t* version, const std::function<grpc::Status(const core::Mesher&)>& query) const;
+
+  // Adds vertices at `points` on this thread, a worker's: all or, on an error, none. `near` has a vertex for each, or is empty.
+  //
+  // Errors:     MESH_NOT_READY, SESSION_BUSY, INVALID_CHUNK_SHAPE, INVALID_REQUEST (the length of `near`), INVALID_POINTS,
+  //             VERTEX_OUT_OF_RANGE, TOO_MANY_POINTS, QUOTA_EXCEEDED, REVISION_MISMATCH, SESSION_NOT_FOUND; CANCELLED.
+  grpc::Status AddVertices(std::span<const double> points, std::span<const uint32_t> near, uint64_t expected_revision,
+                           core::RunContext& context, AddedVertices* added);
+
+  // Begins an operation, of which `submit` queues the work, or says why it cannot be. It is called with the session's lock held, and
+  // the work may begin at once.
+  //
+  // Errors:     SESSION_BUSY, REVISION_MISMATCH, SESSION_NOT_FOUND; those of `submit`.
+  grpc::Status StartOperation(const core::MeshParameters& parameters, uint64_t expected_revision,
+                              const std::function<grpc::Status(const std::shared_ptr<Operation>&)>& submit,
+                              std::shared_ptr<Operation>* operation);
+  // On the worker: what to work on; nothing if the operation has ended before it could begin.
+  std::optional<SessionWork> BeginWork(Operation& operation);
+  // On the worker: takes back what BeginWork gave, and ends the operation with `status`. On success `mesh` is the new mesh.
+  void EndWork(Operation& operation, const grpc::Status& status, SessionWork work, std::optional<core::Mesh> mesh);
+  // Ends an operation that still waits for a worker as CANCELLED; false when it does not.
+  bool EndWaiting(Operation& operation);
+
+  // Errors:     OPERATION_NOT_FOUND.
+  grpc::Status FindOperation(const std::string& operation_name, std::shared_ptr<Operation>* operation) const;
+  // Those after number `after`, the oldest first, at most `count`.
+  std::vector<std::shared_ptr<Operation>> ListOperations(uint64_t after, size_t count) const;
+
+  // The points. To be called by the operation that is under way.
+  const PointStore& points() const { return points_; }
+
+ private:
+  friend class SessionUse;
+
+  // What changes the points or the mesh, and lets nothing else do so.
+  enum class Busy { kNo, kOperation, kAddingVertices };
+
+  // The following want mutex_ to be held.
+  grpc::Status CheckOpen() const;
+  grpc::Status CheckRevision(uint64_t expected_revision) const;
+  grpc::Status CheckIdle() const;
+  // All three.
+  grpc::Status CheckReadyForChange(uint64_t expected_revision) const;
+  // Takes `count` more points into the account of the session and its tenant, or says why it may not have them.
+  grpc::Status TakePoints(uint64_t count);
+  // Refuses what no mesh of this session could have. `first` is the number of the first point.
+  grpc::Status CheckCoordinates(uint64_t first, std::span<const double> coordinates) const;
+  absl::Time ExpireTime() const;
+  void CloseNow();
+
+  // Without it, once nothing can begin a query any more: waits for those that run.
+  void WaitForQueries();
+
+  const std::string tenant_;
+  const std::string name_;
+  const int dimension_;
+  const absl::Time create_time_;
+  const ServiceOptions& options_;
+  const Clock clock_;
+  const std::shared_ptr<TenantUsage> usage_;
+
+  mutable std::shared_mutex queries_mutex_;  // after mutex_; held shared by queries
+  mutable std::mutex mutex_;
+  // Guarded by mutex_.
+  core::MeshParameters parameters_;
+  std::map<std::string, std::string> labels_;
+  absl::Duration ttl_;
+  absl::Time last_use_;
+  int uses_ = 0;
+  bool is_closed_ = false;
+  Busy busy_ = Busy::kNo;
+  bool is_ready_ = false;  // the mesh is that of all points
+  uint64_t revision_ = 1;
+  uint64_t point_count_ = 0;        // with those that AddVertices is adding
+  PointStore points_;               // see invariant (2)
+  SessionWork work_;                // its mesher is away while an operation is under way; see invariant (2)
+  uint64_t structure_version_ = 0;  // of what queries see; 0: nothing yet
+  uint64_t next_operation_ = 1;
+  std::deque<std::shared_ptr<Operation>> operations_;  // ascending by number
+};
+
+// Keeps a session from expiring, and renews its lease at the end.
+class SessionUse {
+ public:
+  explicit SessionUse(std::shared_ptr<Session> session);
+  ~SessionUse();
+  SessionUse(const SessionUse&) = delete;
+  SessionUse& operator=(const SessionUse&) = delete;
+
+  Session& session() const { return *session_; }
+
+ private:
+  const std::shared_ptr<Session> session_;
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_SESSION_H_

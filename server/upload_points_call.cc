@@ -1,0 +1,61 @@
+#include "server/upload_points_call.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "server/errors.h"
+#include "server/resource_names.h"
+#include "server/wire.h"
+#include "wellspace/v1/sessions.pb.h"
+
+namespace wellspace::server {
+
+void UploadPointsCall::OnReadDone(bool ok) {
+  std::lock_guard lock(mutex_);
+  if (ending()) {
+    return;
+  }
+  if (ok) {
+    if (grpc::Status status = Accept(); !status.ok()) {
+      End(std::move(status));
+    } else {
+      StartRead(&request_);
+    }
+  } else if (context()->IsCancelled()) {
+    return;  // OnCancel ends the call
+  } else if (session_ == nullptr) {
+    End(MakeError(v1::ERROR_REASON_EMPTY_REQUEST,
+                  "the stream ended before any request; send the name of the session first", "name"));
+  } else {
+    *response_ = Serialize(session_->Committed());
+    End(grpc::Status::OK);
+  }
+}
+
+grpc::Status UploadPointsCall::Accept() {
+  v1::UploadPointsRequest request;
+  if (grpc::Status status = ParseRequest(&request_, &request); !status.ok()) {
+    return status;
+  }
+  uint64_t expected_revision = 0;
+  if (session_ == nullptr) {
+    if (grpc::Status status = FindSession(environment(), caller(), request.name(), &session_); !status.ok()) {
+      return status;
+    }
+    expected_revision = request.expected_revision();
+  }
+  const google::protobuf::RepeatedField<double>& coordinates = request.points().coordinates();
+  coordinate_count_ += coordinates.size();
+  return RunGuarded([&] {
+    return session_->Append(request.point_offset(), {coordinates.data(), static_cast<size_t>(coordinates.size())},
+                            expected_revision);
+  });
+}
+
+std::string UploadPointsCall::Figures() const {
+  return session_ == nullptr
+             ? ""
+             : absl::StrCat(" session=", session_->name(), " points=", coordinate_count_ / session_->dimension());
+}
+
+}  // namespace wellspace::server

@@ -1,0 +1,43 @@
+// One call of UploadPoints.
+#ifndef WELLSPACE_SERVER_UPLOAD_POINTS_CALL_H_
+#define WELLSPACE_SERVER_UPLOAD_POINTS_CALL_H_
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "grpcpp/support/byte_buffer.h"
+#include "grpcpp/support/server_callback.h"
+#include "server/call.h"
+#include "server/session.h"
+
+namespace wellspace::server {
+
+// Commits each message before it reads the next.
+//
+// Thread safety and invariants: those of Call.
+class UploadPointsCall final : public Call<grpc::ServerReadReactor<grpc::ByteBuffer>> {
+ public:
+  // REQUIRES:   `response` is valid until the end of the call.
+  UploadPointsCall(const CallEnvironment& environment, grpc::CallbackServerContext* context, grpc::ByteBuffer* response)
+      : Call(environment, context, "UploadPoints"), response_(response) {}
+
+  void OnReadDone(bool ok) override;
+
+ private:
+  void OnBegin() override { StartRead(&request_); }
+  std::string Figures() const override;
+
+  // The following want mutex_ to be held.
+  grpc::Status Accept();
+
+  grpc::ByteBuffer* const response_;  // gRPC's from Finish on
+  // Guarded by mutex_.
+  grpc::ByteBuffer request_;          // of the read in flight
+  std::shared_ptr<Session> session_;  // null before the first message
+  uint64_t coordinate_count_ = 0;     // received
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_UPLOAD_POINTS_CALL_H_
