@@ -104,7 +104,8 @@ enum class Transport { kInProcess, kLoopback };
 class ServiceHarness {
  public:
   explicit ServiceHarness(Mesher mesher = FakeMesher, const ServiceOptions& options = {},
-                          Transport transport = Transport::kInProcess, Estimator estimator = FakeEstimator);
+                          Transport transport = Transport::kInProcess, Estimator estimator = FakeEstimator,
+                          MesherFactory create_mesher = core::Mesher::Create);
 
   Server& server() { return *server_; }
   LogLines& log() { return *log_; }
