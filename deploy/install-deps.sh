@@ -9,7 +9,7 @@ set -euo pipefail
 # What a group needs, without what its packages already depend on (libgrpc++-dev brings OpenSSL, RE2, c-ares and gRPC's core).
 declare -A packages=(
   [build]="g++ cmake ninja-build pkg-config libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
-           libabsl-dev libc-ares-dev libspdlog-dev libboost-dev libtbb-dev libcli11-dev nlohmann-json3-dev libcairo2-dev
+           libabsl-dev libc-ares-dev libspdlog-dev libboost-dev libtbb-dev libcli11-dev nlohmann-json3-dev prometheus-cpp-dev libcairo2-dev
            zlib1g-dev libminizip-dev python3"
   [test]="libgtest-dev libgmock-dev libcgal-dev python3 python3-meshio python3-numpy"
   [lint]="git clang-format-14 python3"
@@ -17,7 +17,8 @@ declare -A packages=(
   [fuzz]="clang-14 libclang-rt-14-dev"
   [node]="nodejs npm"
   [bench]="tetgen python3"
-  [runtime]="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libtbb12 libcairo2 zlib1g libminizip1"
+  [runtime]="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libtbb12 libprometheus-cpp-pull1.0 libcairo2 zlib1g
+             libminizip1"
 )
 packages[dev]="${packages[build]} ${packages[test]} ${packages[lint]} ${packages[tidy]} ${packages[fuzz]}"
 

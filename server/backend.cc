@@ -13,8 +13,8 @@ constexpr absl::Duration kExpiryInterval = absl::Seconds(1);
 
 }  // namespace
 
-Backend::Backend(const ServiceOptions& options, const Authenticator& authenticator, std::shared_ptr<spdlog::logger> log,
-                 Mesher mesher, Estimator estimator, MesherFactory create_mesher)
+Backend::Backend(const ServiceOptions& options, const Authenticator& authenticator, Observability& observability,
+                 std::shared_ptr<spdlog::logger> log, Mesher mesher, Estimator estimator, MesherFactory create_mesher)
     : options_(options),
       log_(std::move(log)),
       mesher_(std::move(mesher)),
@@ -34,12 +34,31 @@ Backend::Backend(const ServiceOptions& options, const Authenticator& authenticat
                    .calls = calls_,
                    .sessions = sessions_,
                    .request_ids = request_ids_,
+                   .observability = observability,
                    .log = *log_},
       jobs_({.workers = options_.workers,
              .max_queued = options_.max_queued_jobs,
              .max_per_tenant = options_.max_jobs_per_tenant},
             memory_) {
+  AddGauges(observability.metrics());
   ScheduleExpiry();
+}
+
+void Backend::AddGauges(Metrics& metrics) {
+  metrics.AddGauge("wellspace_workers", "Jobs that can run at once.",
+                   [this] { return static_cast<double>(options_.workers); });
+  metrics.AddGauge("wellspace_jobs_running", "Jobs that run.",
+                   [this] { return static_cast<double>(jobs_.GetLoad().running); });
+  metrics.AddGauge("wellspace_jobs_queued", "Jobs that wait for a worker.",
+                   [this] { return static_cast<double>(jobs_.GetLoad().queued); });
+  metrics.AddGauge("wellspace_jobs_queue_capacity", "Jobs that can wait for a worker; more are refused.",
+                   [this] { return static_cast<double>(options_.max_queued_jobs); });
+  metrics.AddGauge("wellspace_memory_reserved_bytes", "Memory that jobs, sessions and calls have reserved.",
+                   [this] { return static_cast<double>(memory_.reserved()); });
+  metrics.AddGauge("wellspace_memory_lasting_bytes", "Of that, what sessions keep.",
+                   [this] { return static_cast<double>(memory_.lasting()); });
+  metrics.AddGauge("wellspace_memory_limit_bytes", "Most that can be reserved; 0: no limit.",
+                   [this] { return memory_.is_limited() ? static_cast<double>(memory_.limit()) : 0; });
 }
 
 void Backend::ScheduleExpiry() {

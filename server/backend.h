@@ -11,6 +11,7 @@
 #include "server/jobs.h"
 #include "server/memory_budget.h"
 #include "server/memory_session_store.h"
+#include "server/observability.h"
 #include "server/options.h"
 #include "server/request_ids.h"
 #include "spdlog/logger.h"
@@ -23,15 +24,16 @@ namespace wellspace::server {
 // REQUIRES:   the gRPC server has ended all calls before this is destroyed.
 class Backend {
  public:
-  // `authenticator` outlives this.
-  Backend(const ServiceOptions& options, const Authenticator& authenticator, std::shared_ptr<spdlog::logger> log,
-          Mesher mesher, Estimator estimator, MesherFactory create_mesher);
+  // `authenticator` outlives this; `observability` too, but reads nothing any more when this is destroyed.
+  Backend(const ServiceOptions& options, const Authenticator& authenticator, Observability& observability,
+          std::shared_ptr<spdlog::logger> log, Mesher mesher, Estimator estimator, MesherFactory create_mesher);
 
   const CallEnvironment& environment() const { return environment_; }
   CallRegistry& calls() { return calls_; }
 
  private:
   void ScheduleExpiry();
+  void AddGauges(Metrics& metrics);
 
   const ServiceOptions options_;
   const std::shared_ptr<spdlog::logger> log_;

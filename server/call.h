@@ -1,4 +1,4 @@
-// What all calls that we serve with a reactor of our own have in common: admission, an end, a line in the log.
+// What all calls that we serve with a reactor of our own have in common: admission and an end.
 #ifndef WELLSPACE_SERVER_CALL_H_
 #define WELLSPACE_SERVER_CALL_H_
 
@@ -6,16 +6,15 @@
 #include <functional>
 #include <memory>
 #include <mutex>
-#include <string>
 #include <utility>
 
-#include "absl/status/status.h"
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 #include "grpcpp/server_context.h"
 #include "server/authenticator.h"
 #include "server/call_environment.h"
 #include "server/errors.h"
+#include "server/log_fields.h"
 
 namespace wellspace::server {
 
@@ -38,9 +37,8 @@ class Call : public Reactor, public std::enable_shared_from_this<Call<Reactor>> 
   void OnDone() final;
 
  protected:
-  // `method` is its name in the log.
-  Call(const CallEnvironment& environment, grpc::CallbackServerContext* context, const char* method)
-      : environment_(environment), context_(context), method_(method), peer_(context->peer()), start_(absl::Now()) {}
+  Call(const CallEnvironment& environment, grpc::CallbackServerContext* context)
+      : environment_(environment), context_(context) {}
 
   // The following are called with mutex_ held, and want it to be held when they are called.
 
@@ -50,14 +48,12 @@ class Call : public Reactor, public std::enable_shared_from_this<Call<Reactor>> 
   virtual bool IsWriting() const { return false; }
   // The call ends: its work is to be cancelled, and what it still holds can go.
   virtual void OnEnd() {}
-  // What the log says of the call besides its end: " name=value" for each figure.
-  virtual std::string Figures() const { return ""; }
+  // What the log says of the call besides its end.
+  virtual LogFields Figures() const { return {}; }
 
   // Ends the call with `status`: now, or when the write in flight is done. Only the first call counts.
   void End(grpc::Status status);
-  // Ends the call with the error of its work, which the log should know.
-  void EndFailed(grpc::Status status);
-  void FinishNow() { this->Finish(final_status_); }
+  void FinishNow();
   bool ending() const { return ending_; }
 
   const CallEnvironment& environment() const { return environment_; }
@@ -91,9 +87,6 @@ class Call : public Reactor, public std::enable_shared_from_this<Call<Reactor>> 
 
   const CallEnvironment& environment_;
   grpc::CallbackServerContext* const context_;  // valid until OnDone
-  const char* const method_;
-  const std::string peer_;
-  const absl::Time start_;
   uint64_t id_ = 0;
   Caller caller_;
 
@@ -135,14 +128,6 @@ void Call<Reactor>::OnCancel() {
 }
 
 template <typename Reactor>
-void Call<Reactor>::EndFailed(grpc::Status status) {
-  if (status.error_code() == grpc::StatusCode::INTERNAL) {
-    environment_.log.error("call={} {}", id_, status.error_message());
-  }
-  End(std::move(status));
-}
-
-template <typename Reactor>
 void Call<Reactor>::End(grpc::Status status) {
   if (ending_) {
     return;
@@ -156,15 +141,16 @@ void Call<Reactor>::End(grpc::Status status) {
 }
 
 template <typename Reactor>
+void Call<Reactor>::FinishNow() {
+  environment_.observability.calls().Note(context_, Figures());
+  this->Finish(final_status_);
+}
+
+template <typename Reactor>
 void Call<Reactor>::OnDone() {
   std::shared_ptr<Call> self;
   {
     std::lock_guard lock(mutex_);
-    const auto code = static_cast<absl::StatusCode>(final_status_.error_code());
-    environment_.log.info("call={} method={} tenant={} peer={} code={} seconds={:.3f}{}{}{}", id_, method_,
-                          caller_.tenant, peer_, absl::StatusCodeToString(code),
-                          absl::ToDoubleSeconds(absl::Now() - start_), Figures(),
-                          final_status_.ok() ? "" : " message=", final_status_.error_message());
     self = std::move(self_);
   }
   environment_.calls.Remove(id_);

@@ -13,6 +13,7 @@
 #include "server/call_registry.h"
 #include "server/jobs.h"
 #include "server/memory_budget.h"
+#include "server/observability.h"
 #include "server/options.h"
 #include "spdlog/logger.h"
 
@@ -45,6 +46,7 @@ struct CallEnvironment {
   CallRegistry& calls;
   SessionStore& sessions;
   RequestIds& request_ids;
+  Observability& observability;
   spdlog::logger& log;
 };
 

@@ -8,7 +8,6 @@
 #include <string>
 #include <utility>
 
-#include "absl/strings/str_cat.h"
 #include "grpcpp/support/byte_buffer.h"
 #include "server/call.h"
 #include "server/cloud_receiver.h"
@@ -29,9 +28,8 @@ class CloudCall : public Call<Reactor> {
   void OnReadDone(bool ok) final;
 
  protected:
-  // `method` is its name in the log.
-  CloudCall(const CallEnvironment& environment, grpc::CallbackServerContext* context, const char* method)
-      : Call<Reactor>(environment, context, method), receiver_(environment.options) {}
+  CloudCall(const CallEnvironment& environment, grpc::CallbackServerContext* context)
+      : Call<Reactor>(environment, context), receiver_(environment.options) {}
 
   // On a worker: works, and hands over what came of it.
   virtual void Work(PointChunks& points, Job& job) = 0;
@@ -45,8 +43,8 @@ class CloudCall : public Call<Reactor> {
 
   void OnBegin() final { this->StartRead(&request_); }
   void OnEnd() override;
-  std::string Figures() const final {
-    return absl::StrCat(" points=", receiver_.point_count(), " vertices=", VertexCount());
+  LogFields Figures() const final {
+    return LogFields().Add("points", receiver_.point_count()).Add("vertices", VertexCount());
   }
   // Null before it is queued.
   const std::shared_ptr<Job>& job() const { return job_; }
@@ -110,6 +108,7 @@ void CloudCall<Reactor, Request>::SubmitJob() {
 
 template <typename Reactor, typename Request>
 void CloudCall<Reactor, Request>::OnEnd() {
+  this->environment().observability.work().points_received += receiver_.point_count();
   receiver_.TakePoints();
   if (job_ != nullptr) {
     this->environment().jobs.Cancel(job_);

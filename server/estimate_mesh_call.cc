@@ -24,7 +24,7 @@ void EstimateMeshCall::Work(PointChunks& points, Job& job) {
     return;
   }
   if (!status.ok()) {
-    EndFailed(std::move(status));
+    End(std::move(status));
     return;
   }
   vertices_ = estimate.vertices;

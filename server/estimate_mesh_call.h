@@ -15,7 +15,7 @@ class EstimateMeshCall final : public CloudCall<grpc::ServerReadReactor<grpc::By
  public:
   // REQUIRES:   `response` is valid until the end of the call.
   EstimateMeshCall(const CallEnvironment& environment, grpc::CallbackServerContext* context, grpc::ByteBuffer* response)
-      : CloudCall(environment, context, "EstimateMesh"), response_(response) {}
+      : CloudCall(environment, context), response_(response) {}
 
  private:
   void Work(PointChunks& points, Job& job) override;

@@ -12,23 +12,24 @@
 
 #include "CLI/CLI.hpp"
 #include "absl/strings/str_cat.h"
+#include "server/log.h"
 #include "server/server.h"
 #include "server/version.h"
 #include "spdlog/async.h"
-#include "spdlog/async_logger.h"
-#include "spdlog/sinks/stdout_sinks.h"
 
 namespace wellspace::server {
 namespace {
 
 constexpr int kExitWrongOptions = 2;
-constexpr int kLogQueue = 8192;
+constexpr int kLogQueue = 8192;  // lines
 constexpr double kMaxGraceSeconds = 86'400;
 
 struct Flags {
-  ServerOptions server{.listen = "127.0.0.1:7233", .insecure_remote = false, .service = {}, .demands = {}};
+  ServerOptions server{
+      .listen = "127.0.0.1:7233", .insecure_remote = false, .service = {}, .demands = {}, .observability = {}};
   double grace_seconds = 10;
   std::string log_level = "info";
+  std::string log_format = "text";
 };
 
 void Declare(CLI::App& app, Flags& flags) {
@@ -66,17 +67,15 @@ void Declare(CLI::App& app, Flags& flags) {
   app.add_option("--log-level", flags.log_level, "What to log on standard error")
       ->check(CLI::IsMember({"debug", "info", "warning", "error", "off"}))
       ->capture_default_str();
-}
-
-// A logger that never holds up its caller: a thread writes, and when it cannot follow, the oldest lines are lost.
-std::shared_ptr<spdlog::logger> MakeLogger(const std::string& level,
-                                           const std::shared_ptr<spdlog::details::thread_pool>& writer) {
-  auto log = std::make_shared<spdlog::async_logger>("wellspaced", std::make_shared<spdlog::sinks::stderr_sink_mt>(),
-                                                    writer, spdlog::async_overflow_policy::overrun_oldest);
-  log->set_level(spdlog::level::from_str(level));
-  log->flush_on(spdlog::level::info);
-  log->set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %l %v");
-  return log;
+  app.add_option("--log-format", flags.log_format, "How to log: a line of text or a JSON object each")
+      ->check(CLI::IsMember({"text", "json"}))
+      ->capture_default_str();
+  app.add_option("--metrics-listen", flags.server.observability.metrics_listen,
+                 "Address of an HTTP listener with /metrics for Prometheus; default: none")
+      ->type_name("HOST:PORT");
+  app.add_option("--admin-listen", flags.server.observability.admin_listen,
+                 "Address, on the loopback, of a gRPC listener with channelz; default: none")
+      ->type_name("HOST:PORT");
 }
 
 // SIGTERM and SIGINT, blocked in this thread and all that it starts later, to be waited for.
@@ -117,19 +116,27 @@ int Main(int argc, char** argv) {
   StopSignals signals;
   signal(SIGPIPE, SIG_IGN);  // standard output or error may be a pipe whose reader has gone
   const auto writer = std::make_shared<spdlog::details::thread_pool>(kLogQueue, 1);
-  const std::shared_ptr<spdlog::logger> log = MakeLogger(flags.log_level, writer);
+  const std::shared_ptr<spdlog::logger> log =
+      MakeLogger(flags.log_level, flags.log_format == "json" ? LogFormat::kJson : LogFormat::kText, writer);
   absl::StatusOr<std::unique_ptr<Server>> server = Server::Start(flags.server, log);
   if (!server.ok()) {
     std::cerr << "wellspaced: " << server.status().message() << std::endl;
     return 1;
   }
   std::cout << "listening on " << (*server)->address() << std::endl;
+  const Observability& observability = (*server)->observability();
+  if (!observability.metrics_address().empty()) {
+    std::cout << "metrics on " << observability.metrics_address() << std::endl;
+  }
+  if (!observability.admin_address().empty()) {
+    std::cout << "admin on " << observability.admin_address() << std::endl;
+  }
 
   const int received = signals.Wait();
-  log->info("signal={} stopping grace={}", received, flags.grace_seconds);
+  log->info("event=stopping signal={} grace={}", received, flags.grace_seconds);
   signals.Release();
   (*server)->Shutdown(absl::Seconds(flags.grace_seconds));
-  log->info("stopped");
+  log->info("event=stopped");
   return 0;
 }
 

@@ -19,6 +19,8 @@ void MeshPointsCall::Work(PointChunks& points, Job& job) {
       return FromCoreStatus(made.status());
     }
     mesh = std::make_shared<MeshChunks>(*std::move(made));
+    environment().observability.work().vertices_made += mesh->mesh().vertex_count();
+    environment().observability.work().simplices_made += mesh->mesh().simplex_count();
     return grpc::Status::OK;
   });
   std::lock_guard lock(mutex_);
@@ -26,7 +28,7 @@ void MeshPointsCall::Work(PointChunks& points, Job& job) {
     return;
   }
   if (!status.ok()) {
-    EndFailed(std::move(status));
+    End(std::move(status));
     return;
   }
   mesh_ = std::move(mesh);

@@ -26,7 +26,7 @@ class MeshPointsCall final
           grpc::ByteBuffer> {
  public:
   MeshPointsCall(const CallEnvironment& environment, grpc::CallbackServerContext* context)
-      : ResponseStream(environment, context, "MeshPoints") {}
+      : ResponseStream(environment, context) {}
 
  private:
   void Work(PointChunks& points, Job& job) override;

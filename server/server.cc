@@ -63,6 +63,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
   for (grpc::Service* service : services) {
     builder.RegisterService(service);
   }
+  server->observability_.Watch(builder);
   server->server_ = builder.BuildAndStart();
   if (server->server_ == nullptr || (!options.listen.empty() && port == 0)) {
     return absl::UnavailableError(
@@ -72,14 +73,27 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
     address.port = static_cast<uint16_t>(port);
     server->address_ = address.ToString();
   }
-  for (const char* service : {v1::MeshingService::service_full_name(), v1::SessionService::service_full_name(),
-                              v1::OperationService::service_full_name()}) {
+  for (const std::string& service : ServiceNames()) {
     server->server_->GetHealthCheckService()->SetServingStatus(service, true);
   }
+  WELLSPACE_RETURN_IF_ERROR(server->observability_.Listen(options.observability));
   return server;
 }
 
-Server::~Server() { Shutdown(absl::ZeroDuration()); }
+Server::~Server() {
+  Shutdown(absl::ZeroDuration());
+  observability_.Stop();
+}
+
+std::vector<std::string> Server::ServiceNames() {
+  return {v1::MeshingService::service_full_name(), v1::SessionService::service_full_name(),
+          v1::OperationService::service_full_name()};
+}
+
+std::string Server::TenantOf(const grpc::ServerContextBase& context) const {
+  Caller caller;
+  return authenticator_.Authenticate(context, &caller).ok() ? caller.tenant : "";
+}
 
 std::shared_ptr<grpc::Channel> Server::InProcessChannel() {
   grpc::ChannelArguments arguments;

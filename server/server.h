@@ -6,6 +6,7 @@
 #include <mutex>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
@@ -14,6 +15,7 @@
 #include "server/authenticator.h"
 #include "server/backend.h"
 #include "server/meshing_service.h"
+#include "server/observability.h"
 #include "server/operation_service.h"
 #include "server/options.h"
 #include "server/session_service.h"
@@ -26,6 +28,7 @@ struct ServerOptions {
   bool insecure_remote = false;  // allows plain text on addresses that other machines can reach
   ServiceOptions service;
   Authenticator::Demands demands;  // on callers
+  ObservabilityOptions observability;
 };
 
 // Serves the services of wellspace.v1, health and reflection.
@@ -36,7 +39,7 @@ class Server {
   // Starts to serve. Tests put other work in the place of the core's.
   //
   // Errors:     INVALID_ARGUMENT (listen), FAILED_PRECONDITION (a remote listener without insecure_remote), UNAVAILABLE
-  //             (the address cannot be listened on).
+  //             (the address cannot be listened on); those of Observability::Listen.
   static absl::StatusOr<std::unique_ptr<Server>> Start(const ServerOptions& options,
                                                        std::shared_ptr<spdlog::logger> log,
                                                        Mesher mesher = core::MeshPoints,
@@ -50,6 +53,7 @@ class Server {
 
   // HOST:PORT with the port in use; empty without a listener.
   const std::string& address() const { return address_; }
+  const Observability& observability() const { return observability_; }
 
   // A channel to this server that needs no listener. To be destroyed, with all that was made of it, before the server.
   std::shared_ptr<grpc::Channel> InProcessChannel();
@@ -64,10 +68,19 @@ class Server {
   Server(const ServerOptions& options, std::shared_ptr<spdlog::logger> log, Mesher mesher, Estimator estimator,
          MesherFactory create_mesher)
       : authenticator_(options.demands),
-        backend_(options.service, authenticator_, std::move(log), std::move(mesher), std::move(estimator),
-                 std::move(create_mesher)) {}
+        observability_(ServiceNames(), log,
+                       [this](const grpc::ServerContextBase& context) { return TenantOf(context); }),
+        backend_(options.service, authenticator_, observability_, std::move(log), std::move(mesher),
+                 std::move(estimator), std::move(create_mesher)) {}
+
+  // Of the services that are ours.
+  static std::vector<std::string> ServiceNames();
+
+  // "" for a caller whom the authenticator refuses.
+  std::string TenantOf(const grpc::ServerContextBase& context) const;
 
   Authenticator authenticator_;
+  Observability observability_;
   Backend backend_;
   MeshingService meshing_{backend_.environment()};
   SessionService sessions_{backend_.environment()};

@@ -2,7 +2,6 @@
 #include "server/server.h"
 
 #include <algorithm>
-#include <future>
 #include <memory>
 #include <span>
 #include <string>
@@ -20,6 +19,7 @@
 #include "gtest/gtest.h"
 #include "server/embedded_server.h"
 #include "spdlog/sinks/null_sink.h"
+#include "tests/server/raw_call.h"
 #include "tests/server/service_harness.h"
 
 namespace wellspace::server {
@@ -32,44 +32,9 @@ std::shared_ptr<spdlog::logger> NoLog() {
   return std::make_shared<spdlog::logger>("none", std::make_shared<spdlog::sinks::null_sink_mt>());
 }
 
-grpc::ByteBuffer BufferOf(const std::string& bytes) {
-  const grpc::Slice slice(bytes);
-  return grpc::ByteBuffer(&slice, 1);
+RawAnswer CheckHealth(const std::shared_ptr<grpc::Channel>& channel, const std::string& service) {
+  return CallUnary(channel, "/grpc.health.v1.Health/Check", HealthRequest(service));
 }
-
-std::string BytesOf(const grpc::ByteBuffer& buffer) {
-  grpc::Slice slice;
-  EXPECT_TRUE(buffer.DumpToSingleSlice(&slice).ok());
-  return std::string(reinterpret_cast<const char*>(slice.begin()), slice.size());
-}
-
-// Calls grpc.health.v1.Health.Check, whose messages Debian does not package: the request has the name of the service as field 1, the
-// response the status as field 1, where 1 is SERVING and 2 is NOT_SERVING.
-struct Health {
-  grpc::Status status;
-  std::string response;
-};
-Health CheckHealth(const std::shared_ptr<grpc::Channel>& channel, const std::string& service) {
-  std::string request;
-  if (!service.empty()) {
-    request = std::string("\x0a") + static_cast<char>(service.size()) + service;
-  }
-  grpc::GenericStub stub(channel);
-  grpc::ClientContext context;
-  const grpc::ByteBuffer request_buffer = BufferOf(request);
-  grpc::ByteBuffer response;
-  std::promise<grpc::Status> promise;
-  stub.UnaryCall(&context, "/grpc.health.v1.Health/Check", grpc::StubOptions(), &request_buffer, &response,
-                 [&promise](grpc::Status status) { promise.set_value(std::move(status)); });
-  Health health{.status = promise.get_future().get(), .response = ""};
-  if (health.status.ok()) {
-    health.response = BytesOf(response);
-  }
-  return health;
-}
-
-constexpr char kServing[] = "\x08\x01";
-constexpr char kNotServing[] = "\x08\x02";
 
 TEST(Server, HealthSaysServing) {
   ServiceHarness harness(FakeMesher, {}, Transport::kLoopback);
@@ -93,7 +58,7 @@ TEST(Server, HealthSaysNotServingWhileStopping) {
   call.HalfClose();
   ASSERT_TRUE(started.Wait());
   std::thread stopper([&harness] { harness.server().Shutdown(absl::Minutes(5)); });
-  Health health;
+  RawAnswer health;
   do {
     health = CheckHealth(harness.channel(), "wellspace.v1.MeshingService");
   } while (health.status.ok() && health.response == kServing);
@@ -101,6 +66,63 @@ TEST(Server, HealthSaysNotServingWhileStopping) {
   go_on.Set();
   EXPECT_TRUE(call.Finish().ok());
   stopper.join();
+}
+
+// Watches the health of a service.
+class WatchHealth final : public grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
+ public:
+  WatchHealth(const std::shared_ptr<grpc::Channel>& channel, const std::string& service)
+      : stub_(channel), request_(BufferOf(HealthRequest(service))) {
+    stub_.PrepareBidiStreamingCall(&context_, "/grpc.health.v1.Health/Watch", grpc::StubOptions(), this);
+    StartWriteLast(&request_, grpc::WriteOptions());
+    StartRead(&response_);
+    StartCall();
+  }
+
+  // Waits until the service was said to be serving, and until it was said not to be.
+  bool WaitForServing() { return serving_.Wait(); }
+  bool WaitForNotServing() { return not_serving_.Wait(); }
+  grpc::Status Finish() {
+    EXPECT_TRUE(done_.Wait());
+    return status_;
+  }
+
+  void OnReadDone(bool ok) override {
+    if (ok) {
+      const std::string health = BytesOf(response_);
+      (health == kServing ? serving_ : not_serving_).Set();
+      response_.Clear();
+      StartRead(&response_);
+    }
+  }
+
+  void OnDone(const grpc::Status& status) override {
+    status_ = status;
+    done_.Set();
+  }
+
+ private:
+  grpc::GenericStub stub_;
+  grpc::ClientContext context_;
+  const grpc::ByteBuffer request_;
+  grpc::ByteBuffer response_;
+  grpc::Status status_;
+  Event serving_;
+  Event not_serving_;
+  Event done_;
+};
+
+TEST(Server, WatchersOfHealthAreToldThatItStops) {
+  ServiceHarness harness(FakeMesher, {}, Transport::kLoopback);
+  WatchHealth all(harness.channel(), "");
+  WatchHealth one(harness.channel(), "wellspace.v1.MeshingService");
+  ASSERT_TRUE(all.WaitForServing());
+  ASSERT_TRUE(one.WaitForServing());
+  harness.server().Shutdown(absl::ZeroDuration());
+  EXPECT_TRUE(all.WaitForNotServing());
+  EXPECT_TRUE(one.WaitForNotServing());
+  EXPECT_FALSE(all.Finish().ok());
+  EXPECT_FALSE(one.Finish().ok());
 }
 
 // Asks for all services by reflection. Its messages are not packaged either, but the server's library has them compiled in.

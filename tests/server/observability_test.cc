@@ -1,0 +1,240 @@
+// What a server shows of itself: the line of each call, metrics, channelz.
+#include <algorithm>
+#include <memory>
+#include <regex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include "prometheus/text_serializer.h"
+#include "tests/server/raw_call.h"
+#include "tests/server/service_harness.h"
+
+namespace wellspace::server {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr char kSecret[] = "swordfish";
+
+// All metrics, in the format of Prometheus.
+std::string Scrape(ServiceHarness& harness) {
+  std::string text;
+  for (const auto& collectable : harness.server().observability().metrics().Collectables()) {
+    text += prometheus::TextSerializer().Serialize(collectable->Collect());
+  }
+  return text;
+}
+
+// The value of a series; -1 if there is none.
+double ValueOf(const std::string& metrics, const std::string& series) {
+  const std::string start = absl::StrCat("\n", series, " ");
+  const size_t found = absl::StrCat("\n", metrics).find(start);
+  return found == std::string::npos ? -1 : std::stod(metrics.substr(found + start.size() - 1));
+}
+
+std::string Labels(const std::string& type, const std::string& service, const std::string& method,
+                   const std::string& code = "") {
+  return absl::StrCat("{", code.empty() ? "" : absl::StrCat("grpc_code=\"", code, "\","), "grpc_method=\"", method,
+                      "\",grpc_service=\"", service, "\",grpc_type=\"", type, "\"}");
+}
+
+std::string MeshPointsLabels(const std::string& code = "") {
+  return Labels("bidi_stream", "wellspace.v1.MeshingService", "MeshPoints", code);
+}
+
+TEST(CallMetrics, CountACallWithItsMessagesAndItsTime) {
+  ServiceHarness harness;
+  TestCall call(harness.stub());
+  call.Send(UnitCubeParameters());
+  call.Send(std::vector<double>(3 * 5));
+  call.Send(std::vector<double>(3 * 2));
+  call.HalfClose();
+  ASSERT_TRUE(call.Finish().ok());
+  const std::string metrics = Scrape(harness);
+  EXPECT_EQ(ValueOf(metrics, "grpc_server_started_total" + MeshPointsLabels()), 1);
+  EXPECT_EQ(ValueOf(metrics, "grpc_server_handled_total" + MeshPointsLabels("OK")), 1);
+  EXPECT_EQ(ValueOf(metrics, "grpc_server_msg_received_total" + MeshPointsLabels()), 3);
+  EXPECT_EQ(ValueOf(metrics, "grpc_server_msg_sent_total" + MeshPointsLabels()),
+            static_cast<double>(call.events.size() + call.metadata.size() + call.chunks.size()));
+  EXPECT_EQ(ValueOf(metrics, "grpc_server_handling_seconds_count" + MeshPointsLabels()), 1);
+  EXPECT_EQ(ValueOf(metrics, "wellspace_points_received_total"), 7);
+  EXPECT_EQ(ValueOf(metrics, "wellspace_vertices_made_total"), 7 + 8);
+}
+
+TEST(CallMetrics, CountErrorsByCodeAndCallsOfAllServices) {
+  ServiceHarness harness(FakeMesher, {}, Transport::kLoopback);
+  TestCall call(harness.stub());
+  call.HalfClose();
+  ASSERT_EQ(call.Finish().error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  harness.Info();
+  ASSERT_EQ(CallUnary(harness.channel(), "/grpc.health.v1.Health/Check", HealthRequest("")).response, kServing);
+  ASSERT_FALSE(CallUnary(harness.channel(), "/grpc.health.v1.Health/Check", HealthRequest("unheard")).status.ok());
+  const std::string metrics = Scrape(harness);
+  EXPECT_EQ(ValueOf(metrics, "grpc_server_handled_total" + MeshPointsLabels("InvalidArgument")), 1);
+  EXPECT_EQ(ValueOf(metrics, "grpc_server_handled_total" + MeshPointsLabels("OK")), 0);
+  const std::string service = "wellspace.v1.MeshingService";
+  EXPECT_EQ(ValueOf(metrics, "grpc_server_handled_total" + Labels("unary", service, "GetServerInfo", "OK")), 1);
+  EXPECT_EQ(ValueOf(metrics, "grpc_server_msg_received_total" + Labels("unary", service, "GetServerInfo")), 1);
+  EXPECT_EQ(ValueOf(metrics, "grpc_server_msg_sent_total" + Labels("unary", service, "GetServerInfo")), 1);
+  EXPECT_EQ(ValueOf(metrics, "grpc_server_started_total" + Labels("client_stream", service, "EstimateMesh")), 0);
+  EXPECT_EQ(ValueOf(metrics, "grpc_server_handled_total" + Labels("unary", "grpc.health.v1.Health", "Check", "OK")), 1);
+  EXPECT_EQ(
+      ValueOf(metrics, "grpc_server_handled_total" + Labels("unary", "grpc.health.v1.Health", "Check", "NotFound")), 1);
+}
+
+TEST(CallMetrics, ACancelledCallIsHandled) {
+  Event started;
+  ServiceHarness harness(EndlessMesher(started));
+  TestCall call(harness.stub());
+  call.Send(UnitCubeParameters());
+  call.HalfClose();
+  ASSERT_TRUE(started.Wait());
+  std::string metrics = Scrape(harness);
+  EXPECT_EQ(ValueOf(metrics, "wellspace_jobs_running"), 1);
+  EXPECT_EQ(ValueOf(metrics, "wellspace_calls_in_flight"), 1);
+  call.Cancel();
+  ASSERT_TRUE(harness.log().WaitFor("code=CANCELLED"));
+  harness.TimeUntilIdle();
+  metrics = Scrape(harness);
+  EXPECT_EQ(ValueOf(metrics, "grpc_server_handled_total" + MeshPointsLabels("Canceled")), 1);
+  EXPECT_EQ(ValueOf(metrics, "wellspace_jobs_running"), 0);
+}
+
+TEST(CallMetrics, WhatClientsSendMakesNoSeries) {
+  ServiceHarness harness(FakeMesher, {}, Transport::kLoopback);
+  const auto count = [](const std::string& metrics) { return std::count(metrics.begin(), metrics.end(), '\n'); };
+  const auto lines = count(Scrape(harness));
+  for (const char* path : {"/wellspace.v1.MeshingService/Nonsense", "/no.Service/Nonsense", "/Nonsense"}) {
+    EXPECT_EQ(CallUnary(harness.channel(), path, "").status.error_code(), grpc::StatusCode::UNIMPLEMENTED) << path;
+  }
+  const std::string metrics = Scrape(harness);
+  EXPECT_EQ(
+      ValueOf(metrics, "grpc_server_handled_total" + Labels("bidi_stream", "unknown", "unknown", "Unimplemented")), 3);
+  EXPECT_EQ(count(metrics), lines);
+  EXPECT_THAT(metrics, Not(HasSubstr("Nonsense")));
+  EXPECT_TRUE(harness.log().WaitFor("service=no.Service method=Nonsense"));
+}
+
+TEST(Metrics, TellOfTheProcess) {
+  ServiceHarness harness;
+  const std::string metrics = Scrape(harness);
+  EXPECT_GT(ValueOf(metrics, "process_resident_memory_bytes"), 1e6);
+  EXPECT_GT(ValueOf(metrics, "process_cpu_seconds_total"), 0);
+  EXPECT_GT(ValueOf(metrics, "process_open_fds"), 2);
+  EXPECT_GE(ValueOf(metrics, "process_max_fds"), ValueOf(metrics, "process_open_fds"));
+  const double now = absl::ToDoubleSeconds(absl::Now() - absl::UnixEpoch());
+  EXPECT_LE(ValueOf(metrics, "process_start_time_seconds"), now + 1);
+  EXPECT_GE(ValueOf(metrics, "process_start_time_seconds"), now - 86'400);
+  EXPECT_EQ(ValueOf(metrics, absl::StrCat("wellspace_build_info{version=\"", WELLSPACE_VERSION, "\"}")), 1);
+}
+
+// GetServerInfo with metadata; the answer's request id.
+std::string RequestIdOfInfo(ServiceHarness& harness, const std::vector<std::pair<std::string, std::string>>& metadata) {
+  grpc::ClientContext context;
+  for (const auto& [key, value] : metadata) {
+    context.AddMetadata(key, value);
+  }
+  v1::GetServerInfoResponse response;
+  EXPECT_TRUE(harness.stub().GetServerInfo(&context, v1::GetServerInfoRequest(), &response).ok());
+  const auto trailing = context.GetServerTrailingMetadata().find("x-request-id");
+  return trailing == context.GetServerTrailingMetadata().end()
+             ? ""
+             : std::string(trailing->second.data(), trailing->second.size());
+}
+
+TEST(CallLog, HasOneLineForEachCallWithAllThatIdentifiesIt) {
+  ServiceHarness harness(FakeMesher, {}, Transport::kLoopback);
+  const std::string trace = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01";
+  EXPECT_EQ(RequestIdOfInfo(harness, {{"x-request-id", "Solver_7.1-a"}, {"traceparent", trace}}), "Solver_7.1-a");
+  EXPECT_TRUE(harness.log().WaitFor("event=call request_id=Solver_7.1-a tenant=default peer=ipv4:127.0.0.1:"));
+  EXPECT_TRUE(harness.log().WaitFor("service=wellspace.v1.MeshingService method=GetServerInfo code=OK seconds=0.0"));
+  EXPECT_TRUE(harness.log().WaitFor("traceparent=" + trace));
+  EXPECT_EQ(harness.log().Count("event=call"), 1u);
+  TestCall call(harness.stub());
+  call.HalfClose();
+  EXPECT_FALSE(call.Finish().ok());
+  EXPECT_TRUE(harness.log().WaitFor("code=INVALID_ARGUMENT"));
+  EXPECT_TRUE(harness.log().WaitFor("points=0 vertices=0 message=\""));
+  EXPECT_EQ(harness.log().Count("event=call"), 2u);
+}
+
+TEST(CallLog, MakesRequestIdsWhereClientsSendNoneOrNonsense) {
+  ServiceHarness harness(FakeMesher, {}, Transport::kLoopback);
+  const std::string first = RequestIdOfInfo(harness, {});
+  const std::string second = RequestIdOfInfo(harness, {{"x-request-id", "a b=c"}});
+  const std::string third = RequestIdOfInfo(harness, {{"x-request-id", std::string(65, 'a')}});
+  const std::regex made("[0-9a-f]{8}-[0-9]+");
+  for (const std::string& id : {first, second, third}) {
+    EXPECT_TRUE(std::regex_match(id, made)) << id;
+    EXPECT_TRUE(harness.log().WaitFor("request_id=" + id));
+  }
+  EXPECT_NE(first, second);
+  EXPECT_NE(second, third);
+}
+
+TEST(CallLog, NeitherLogNorMetricsHaveSecretsOrOtherMetadata) {
+  ServiceHarness harness(FakeMesher, {}, Transport::kLoopback);
+  RequestIdOfInfo(harness, {{"authorization", absl::StrCat("Bearer ", kSecret)},
+                            {"cookie", kSecret},
+                            {"x-api-key", kSecret},
+                            {"traceparent", kSecret}});
+  ASSERT_TRUE(harness.log().WaitFor("method=GetServerInfo"));
+  EXPECT_EQ(harness.log().Count(kSecret), 0u);
+  EXPECT_THAT(Scrape(harness), Not(HasSubstr(kSecret)));
+}
+
+TEST(Channelz, IsServedOnTheAdminListenerOnly) {
+  ServerOptions options;
+  options.listen = "127.0.0.1:0";
+  options.observability.admin_listen = "127.0.0.1:0";
+  // The first server makes channelz known to gRPC; the second is built after that.
+  std::vector<std::unique_ptr<Server>> servers;
+  for (int i = 0; i < 2; ++i) {
+    absl::StatusOr<std::unique_ptr<Server>> server = Server::Start(options, std::make_shared<spdlog::logger>("none"));
+    ASSERT_TRUE(server.ok()) << server.status();
+    servers.push_back(*std::move(server));
+  }
+  for (const auto& server : servers) {
+    const auto ask = [](const std::string& address) {
+      return CallUnary(grpc::CreateChannel(address, grpc::InsecureChannelCredentials()),
+                       "/grpc.channelz.v1.Channelz/GetServers", "");
+    };
+    EXPECT_EQ(ask(server->address()).status.error_code(), grpc::StatusCode::UNIMPLEMENTED);
+    const RawAnswer answer = ask(server->observability().admin_address());
+    EXPECT_TRUE(answer.status.ok()) << answer.status.error_message();
+    EXPECT_THAT(answer.response, HasSubstr("listener ipv4:127.0.0.1"));
+  }
+}
+
+TEST(Channelz, IsRefusedWhereOtherMachinesCouldSeeIt) {
+  ServerOptions options;
+  options.observability.admin_listen = "0.0.0.0:0";
+  const absl::Status status = Server::Start(options, std::make_shared<spdlog::logger>("none")).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(status.message(), AllOf(HasSubstr("0.0.0.0:0"), HasSubstr("127.0.0.1")));
+}
+
+TEST(MetricsEndpoint, SaysWhyItCannotListen) {
+  const auto start = [](const std::string& listen) {
+    ServerOptions options;
+    options.observability.metrics_listen = listen;
+    return Server::Start(options, std::make_shared<spdlog::logger>("none"));
+  };
+  EXPECT_EQ(start("nonsense").status().code(), absl::StatusCode::kInvalidArgument);
+  const absl::StatusOr<std::unique_ptr<Server>> first = start("localhost:0");
+  ASSERT_TRUE(first.ok()) << first.status();
+  const std::string address = (*first)->observability().metrics_address();
+  const absl::Status taken = start(address).status();
+  EXPECT_EQ(taken.code(), absl::StatusCode::kUnavailable);
+  EXPECT_THAT(taken.message(), HasSubstr(address));
+}
+
+}  // namespace
+}  // namespace wellspace::server
