@@ -17,6 +17,10 @@ constexpr int kMaxResponseBytes = 4 * 1024 * 1024;
 constexpr int kKeepaliveMs = 20'000;
 constexpr int kKeepaliveTimeoutMs = 10'000;
 
+// How soon after a lost connection a new one is tried, and how much later each time.
+constexpr int kInitialReconnectMs = 200;
+constexpr int kMaxReconnectMs = 5'000;
+
 bool IsHostAndPort(const std::string& address) {
   const size_t colon = address.rfind(':');
   if (colon == std::string::npos || colon == 0) {
@@ -31,8 +35,17 @@ bool IsHostAndPort(const std::string& address) {
 }  // namespace
 
 absl::StatusOr<Mesh> Client::MeshPoints(const MeshOptions& options, std::span<const double> points,
-                                        const std::function<void(const Progress&)>& on_progress, std::stop_token stop) {
-  return connection_->MeshPoints(options, points, on_progress, std::move(stop));
+                                        const OnProgress& on_progress, std::stop_token stop) {
+  MeshCollector collector;
+  if (absl::Status status = MeshPoints(options, points, collector, on_progress, std::move(stop)); !status.ok()) {
+    return status;
+  }
+  return std::move(collector.mesh());
+}
+
+absl::Status Client::MeshPoints(const MeshOptions& options, std::span<const double> points, MeshSink& sink,
+                                const OnProgress& on_progress, std::stop_token stop) {
+  return connection_->MeshPoints(options, points, sink, on_progress, std::move(stop));
 }
 
 absl::StatusOr<MeshEstimate> Client::EstimateMesh(const MeshOptions& options, std::span<const double> points,
@@ -40,7 +53,88 @@ absl::StatusOr<MeshEstimate> Client::EstimateMesh(const MeshOptions& options, st
   return connection_->EstimateMesh(options, points, std::move(stop));
 }
 
-absl::StatusOr<ServerInfo> Client::GetServerInfo() { return connection_->GetServerInfo(); }
+absl::StatusOr<ServerInfo> Client::GetServerInfo(const CallOptions& call) { return connection_->GetServerInfo(call); }
+
+absl::StatusOr<Health> Client::CheckHealth(const std::string& service, const CallOptions& call) {
+  return connection_->CheckHealth(service, call);
+}
+
+absl::StatusOr<Session> Client::CreateSession(const SessionOptions& options, const CallOptions& call) {
+  return connection_->CreateSession(options, call);
+}
+
+absl::StatusOr<Session> Client::GetSession(const std::string& session, const CallOptions& call) {
+  return connection_->GetSession(session, call);
+}
+
+absl::StatusOr<SessionPage> Client::ListSessions(const Labels& labels, const PageOptions& page,
+                                                 const CallOptions& call) {
+  return connection_->ListSessions(labels, page, call);
+}
+
+absl::StatusOr<Session> Client::UpdateSession(const std::string& session, const SessionChange& change,
+                                              const CallOptions& call) {
+  return connection_->UpdateSession(session, change, call);
+}
+
+absl::Status Client::DeleteSession(const std::string& session, const CallOptions& call) {
+  return connection_->DeleteSession(session, call);
+}
+
+absl::StatusOr<Uploaded> Client::UploadPoints(const std::string& session, PointSource& source,
+                                              std::optional<uint64_t> offset, const OnPoints& on_points,
+                                              const CallOptions& call) {
+  return connection_->UploadPoints(session, source, offset, on_points, call);
+}
+
+absl::Status Client::DownloadMesh(const std::string& session, MeshSink& sink, uint64_t revision,
+                                  const OnChunks& on_chunks, const CallOptions& call) {
+  return connection_->DownloadMesh(session, sink, revision, on_chunks, call);
+}
+
+absl::StatusOr<Operation> Client::StartRefinement(const std::string& session,
+                                                  const std::optional<MeshOptions>& parameters,
+                                                  const CallOptions& call) {
+  return connection_->StartRefinement(session, parameters, call);
+}
+
+absl::StatusOr<Operation> Client::GetOperation(const std::string& operation, const CallOptions& call) {
+  return connection_->GetOperation(operation, call);
+}
+
+absl::StatusOr<OperationPage> Client::ListOperations(const std::string& session, const PageOptions& page,
+                                                     const CallOptions& call) {
+  return connection_->ListOperations(session, page, call);
+}
+
+absl::StatusOr<Operation> Client::CancelOperation(const std::string& operation, const CallOptions& call) {
+  return connection_->CancelOperation(operation, call);
+}
+
+absl::StatusOr<Operation> Client::WatchOperation(const std::string& operation, const OnProgress& on_progress,
+                                                 std::optional<uint64_t> after_sequence, const CallOptions& call) {
+  return connection_->WatchOperation(operation, on_progress, after_sequence, call);
+}
+
+absl::Status Client::ApproximateNearestNeighbors(const std::string& session, std::span<const uint32_t> vertices,
+                                                 const OnDistances& on_distances, const CallOptions& call) {
+  return connection_->ApproximateNearestNeighbors(session, vertices, on_distances, call);
+}
+
+absl::Status Client::ClippedVoronoiCells(const std::string& session, std::span<const uint32_t> vertices, double beta,
+                                         const OnCells& on_cells, const CallOptions& call) {
+  return connection_->ClippedVoronoiCells(session, vertices, beta, on_cells, call);
+}
+
+absl::Status Client::VoronoiCells(const std::string& session, std::span<const uint32_t> vertices,
+                                  const OnCells& on_cells, const CallOptions& call) {
+  return connection_->VoronoiCells(session, vertices, on_cells, call);
+}
+
+absl::StatusOr<AddedVertices> Client::AddVertices(const std::string& session, std::span<const double> points,
+                                                  std::span<const uint32_t> near, const CallOptions& call) {
+  return connection_->AddVertices(session, points, near, call);
+}
 
 absl::StatusOr<Client> Connect(const std::string& address) {
   if (!IsHostAndPort(address)) {
@@ -51,6 +145,8 @@ absl::StatusOr<Client> Connect(const std::string& address) {
   arguments.SetMaxReceiveMessageSize(kMaxResponseBytes);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
+  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kInitialReconnectMs);
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kMaxReconnectMs);
   return Client(MakeConnection(grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments)));
 }
 

@@ -1,11 +1,13 @@
-// The C++ client library: a mesh from a wellspaced server, near or far.
+// The C++ client library: meshes and sessions of a wellspaced server, near or far.
+//
+// examples/session.cc is a whole program.
 #ifndef WELLSPACE_CLIENT_CLIENT_H_
 #define WELLSPACE_CLIENT_CLIENT_H_
 
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <stop_token>
 #include <string>
@@ -15,112 +17,126 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
+#include "client/error_details.h"
+#include "client/mesh.h"
+#include "client/point_source.h"
+#include "client/session.h"
 
 namespace wellspace::client {
 
 class Connection;
 
-// What `rho` bounds; see the proto's Criterion.
-enum class Criterion { kRadiusEdge, kWellSpaced };
-
-// A box in which simplices are small; see the proto's SizeBox.
-struct SizeBox {
-  std::vector<double> low;
-  std::vector<double> high;
-  double max_circumradius = 0;
-};
-
-// What to mesh and how. Zero or empty means the server's default, as the comments of the proto's MeshParameters say.
-struct MeshOptions {
-  int dimension = 3;
-  double rho = 0;
-  Criterion criterion = Criterion::kRadiusEdge;
-  double max_circumradius = 0;
-  std::vector<SizeBox> size_boxes;
-  std::vector<double> domain_low;
-  std::vector<double> domain_high;
-  double margin = 0.25;
-  uint64_t max_vertices = 0;
-  int threads = 0;
-  absl::Duration timeout = absl::InfiniteDuration();  // of the whole call
-};
-
-struct Progress {
-  std::string phase;
-  uint64_t vertices = 0;
-  uint64_t estimated_vertices = 0;  // 0 while unknown
-  uint64_t simplices = 0;
-  double fraction = 0;  // in [0, 1], never decreasing
-};
-
-struct MeshStatistics {
-  uint64_t input_points = 0;
-  uint64_t duplicates = 0;
-  uint64_t vertices = 0;
-  uint64_t simplices = 0;
-  double max_radius_edge = 0;
-  double min_angle_deg = 0;               // above 2-D: smallest dihedral angle
-  std::map<std::string, double> seconds;  // by phase, and "total"
-  uint64_t peak_memory_bytes = 0;
-  std::map<std::string, uint64_t> counters;
-};
-
-struct Mesh {
-  int dimension = 0;
-  std::vector<double> domain_low;
-  std::vector<double> domain_high;
-  std::vector<double> points;          // vertex_count x dimension, row-major; the distinct input points first
-  std::vector<uint32_t> simplices;     // simplex_count x (dimension + 1), row-major
-  std::vector<uint32_t> input_vertex;  // per input point: the vertex it became
-  MeshStatistics statistics;
-};
-
-// How large a mesh would be.
-struct MeshEstimate {
-  uint64_t vertices = 0;
-  uint64_t simplices = 0;
-  uint64_t memory_bytes = 0;  // most that the server would take at once
-  uint64_t tree_leaves = 0;
-};
-
+// See the proto's GetServerInfoResponse.
 struct ServerInfo {
   std::string version;
   std::vector<int> dimensions;
   uint64_t max_points = 0;
   uint64_t max_vertices = 0;
+  uint64_t max_request_bytes = 0;
   int workers = 0;
+  int max_queued_jobs = 0;
   int running_jobs = 0;
   int queued_jobs = 0;
+  uint64_t max_sessions = 0;
+  uint64_t max_sessions_per_tenant = 0;
+  absl::Duration default_ttl;
+  absl::Duration max_ttl;
+  absl::Duration stall_limit;
+  uint64_t max_memory_bytes = 0;  // 0: no limit
 };
 
-// A thin face over a Connection.
+// What a server says of its health, or of that of one of its services.
+enum class Health { kUnknown, kServing, kNotServing };
+
+using OnProgress = std::function<void(const Progress&)>;
+// `done` of `total` chunks of a download have arrived.
+using OnChunks = std::function<void(uint64_t done, uint64_t total)>;
+// So many points of an upload are on their way or with the server.
+using OnPoints = std::function<void(uint64_t points)>;
+// Takes a batch of an answer; an error ends the call with it.
+using OnDistances = std::function<absl::Status(std::span<const double>)>;
+using OnCells = std::function<absl::Status(const CellBatch&)>;
+
+// A thin face over a Connection, which has the deadlines, repeats what a broken connection interrupted, and goes on with uploads, watches
+// and downloads where they were.
+//
+// Callbacks may be empty; they are called by the thread that made the call, while it waits.
+//
+// Errors of all calls: the server's, unchanged; CANCELLED when `stop` asks for it; DEADLINE_EXCEEDED when `timeout` has passed; UNAVAILABLE
+// when the server cannot be reached, after patient attempts; DATA_LOSS when its answer contradicts itself; those of sinks, sources and
+// callbacks. BlamedField and ReasonOf tell more.
 //
 // Thread safety: thread-safe.
 class Client {
  public:
   explicit Client(std::shared_ptr<Connection> connection) : connection_(std::move(connection)) {}
 
-  // Meshes `points` (n x dimension, row-major), calling `on_progress` from the calling thread's call as events arrive.
-  // Errors:     the server's, unchanged; CANCELLED when `stop` asks for it; UNAVAILABLE when the server cannot be
-  //             reached.
+  // Meshes `points` (n x dimension, row-major).
   absl::StatusOr<Mesh> MeshPoints(const MeshOptions& options, std::span<const double> points,
-                                  const std::function<void(const Progress&)>& on_progress = nullptr,
-                                  std::stop_token stop = {});
+                                  const OnProgress& on_progress = nullptr, std::stop_token stop = {});
+  // The same into a sink, for meshes that need not fit into memory.
+  absl::Status MeshPoints(const MeshOptions& options, std::span<const double> points, MeshSink& sink,
+                          const OnProgress& on_progress = nullptr, std::stop_token stop = {});
 
   // Estimates the mesh that MeshPoints would make of the same arguments.
-  // Errors:     as of MeshPoints.
   absl::StatusOr<MeshEstimate> EstimateMesh(const MeshOptions& options, std::span<const double> points,
                                             std::stop_token stop = {});
 
-  absl::StatusOr<ServerInfo> GetServerInfo();
+  absl::StatusOr<ServerInfo> GetServerInfo(const CallOptions& call = {});
+  // `service` empty: of the whole server. NOT_FOUND for a service that the server does not know.
+  absl::StatusOr<Health> CheckHealth(const std::string& service = "", const CallOptions& call = {});
+
+  // Sessions; see the proto's SessionService. `session` is a name, "sessions/{session}".
+  absl::StatusOr<Session> CreateSession(const SessionOptions& options, const CallOptions& call = {});
+  absl::StatusOr<Session> GetSession(const std::string& session, const CallOptions& call = {});
+  // Those that have all of `labels`, a page at a time.
+  absl::StatusOr<SessionPage> ListSessions(const Labels& labels = {}, const PageOptions& page = {},
+                                           const CallOptions& call = {});
+  absl::StatusOr<Session> UpdateSession(const std::string& session, const SessionChange& change,
+                                        const CallOptions& call = {});
+  absl::Status DeleteSession(const std::string& session, const CallOptions& call = {});
+
+  // Adds the points of `source` to a session. `offset` is the number of the session's points before the first of them: what is there
+  // from it on is not sent again, so that an upload that broke off is simply repeated with the same offset. Absent: after the
+  // points that are there when the call begins.
+  // `call.expected_revision` is that before the call.
+  absl::StatusOr<Uploaded> UploadPoints(const std::string& session, PointSource& source,
+                                        std::optional<uint64_t> offset = std::nullopt,
+                                        const OnPoints& on_points = nullptr, const CallOptions& call = {});
+
+  // Streams the mesh of a session into `sink`: that of `revision`, 0: the last one. A broken connection costs nothing but time.
+  absl::Status DownloadMesh(const std::string& session, MeshSink& sink, uint64_t revision = 0,
+                            const OnChunks& on_chunks = nullptr, const CallOptions& call = {});
+
+  // Operations; see the proto's OperationService. `operation` is a name, "sessions/{session}/operations/{operation}".
+  // `parameters` absent: the session's.
+  absl::StatusOr<Operation> StartRefinement(const std::string& session,
+                                            const std::optional<MeshOptions>& parameters = std::nullopt,
+                                            const CallOptions& call = {});
+  absl::StatusOr<Operation> GetOperation(const std::string& operation, const CallOptions& call = {});
+  absl::StatusOr<OperationPage> ListOperations(const std::string& session, const PageOptions& page = {},
+                                               const CallOptions& call = {});
+  absl::StatusOr<Operation> CancelOperation(const std::string& operation, const CallOptions& call = {});
+  // Waits until an operation ends, and returns it: its error is in it, not in the call's status. Events up to `after_sequence` are not
+  // told again. Giving up the watch leaves the operation alone.
+  absl::StatusOr<Operation> WatchOperation(const std::string& operation, const OnProgress& on_progress = nullptr,
+                                           std::optional<uint64_t> after_sequence = std::nullopt,
+                                           const CallOptions& call = {});
+
+  // The query structure; see the proto's QueryService. Answers come in the order of `vertices`; empty: of all vertices.
+  absl::Status ApproximateNearestNeighbors(const std::string& session, std::span<const uint32_t> vertices,
+                                           const OnDistances& on_distances, const CallOptions& call = {});
+  absl::Status ClippedVoronoiCells(const std::string& session, std::span<const uint32_t> vertices, double beta,
+                                   const OnCells& on_cells, const CallOptions& call = {});
+  absl::Status VoronoiCells(const std::string& session, std::span<const uint32_t> vertices, const OnCells& on_cells,
+                            const CallOptions& call = {});
+  // `points`: k x dimension, row-major. `near`: a vertex near each, or empty.
+  absl::StatusOr<AddedVertices> AddVertices(const std::string& session, std::span<const double> points,
+                                            std::span<const uint32_t> near = {}, const CallOptions& call = {});
 
  private:
   std::shared_ptr<Connection> connection_;
 };
-
-// The path of the field that the server blames for an error, from the request on, such as "parameters.rho"; empty when it
-// blames none.
-std::string BlamedField(const absl::Status& status);
 
 // Connects to HOST:PORT in plain text. Lazy: errors show in the first call.
 absl::StatusOr<Client> Connect(const std::string& address);

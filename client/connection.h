@@ -2,13 +2,16 @@
 #ifndef WELLSPACE_CLIENT_CONNECTION_H_
 #define WELLSPACE_CLIENT_CONNECTION_H_
 
-#include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <stop_token>
+#include <string>
 
+#include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "client/client.h"
+#include "client/retry.h"
 
 namespace grpc {
 class Channel;
@@ -16,7 +19,7 @@ class Channel;
 
 namespace wellspace::client {
 
-// The calls of the service in terms of the library; a test may put its own in the place of gRPC.
+// The calls of the service in terms of the library; a test may put its own in the place of gRPC. See Client for each.
 //
 // Thread safety: implementations are thread-safe.
 class Connection {
@@ -26,20 +29,48 @@ class Connection {
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
 
-  // See Client.
-  virtual absl::StatusOr<Mesh> MeshPoints(const MeshOptions& options, std::span<const double> points,
-                                          const std::function<void(const Progress&)>& on_progress,
-                                          std::stop_token stop) = 0;
+  virtual absl::Status MeshPoints(const MeshOptions& options, std::span<const double> points, MeshSink& sink,
+                                  const OnProgress& on_progress, std::stop_token stop) = 0;
   virtual absl::StatusOr<MeshEstimate> EstimateMesh(const MeshOptions& options, std::span<const double> points,
                                                     std::stop_token stop) = 0;
-  virtual absl::StatusOr<ServerInfo> GetServerInfo() = 0;
+  virtual absl::StatusOr<ServerInfo> GetServerInfo(const CallOptions& call) = 0;
+  virtual absl::StatusOr<Health> CheckHealth(const std::string& service, const CallOptions& call) = 0;
+
+  virtual absl::StatusOr<Session> CreateSession(const SessionOptions& options, const CallOptions& call) = 0;
+  virtual absl::StatusOr<Session> GetSession(const std::string& session, const CallOptions& call) = 0;
+  virtual absl::StatusOr<SessionPage> ListSessions(const Labels& labels, const PageOptions& page,
+                                                   const CallOptions& call) = 0;
+  virtual absl::StatusOr<Session> UpdateSession(const std::string& session, const SessionChange& change,
+                                                const CallOptions& call) = 0;
+  virtual absl::Status DeleteSession(const std::string& session, const CallOptions& call) = 0;
+  virtual absl::StatusOr<Uploaded> UploadPoints(const std::string& session, PointSource& source,
+                                                std::optional<uint64_t> offset, const OnPoints& on_points,
+                                                const CallOptions& call) = 0;
+  virtual absl::Status DownloadMesh(const std::string& session, MeshSink& sink, uint64_t revision,
+                                    const OnChunks& on_chunks, const CallOptions& call) = 0;
+
+  virtual absl::StatusOr<Operation> StartRefinement(const std::string& session,
+                                                    const std::optional<MeshOptions>& parameters,
+                                                    const CallOptions& call) = 0;
+  virtual absl::StatusOr<Operation> GetOperation(const std::string& operation, const CallOptions& call) = 0;
+  virtual absl::StatusOr<OperationPage> ListOperations(const std::string& session, const PageOptions& page,
+                                                       const CallOptions& call) = 0;
+  virtual absl::StatusOr<Operation> CancelOperation(const std::string& operation, const CallOptions& call) = 0;
+  virtual absl::StatusOr<Operation> WatchOperation(const std::string& operation, const OnProgress& on_progress,
+                                                   std::optional<uint64_t> after_sequence, const CallOptions& call) = 0;
+
+  virtual absl::Status ApproximateNearestNeighbors(const std::string& session, std::span<const uint32_t> vertices,
+                                                   const OnDistances& on_distances, const CallOptions& call) = 0;
+  virtual absl::Status ClippedVoronoiCells(const std::string& session, std::span<const uint32_t> vertices, double beta,
+                                           const OnCells& on_cells, const CallOptions& call) = 0;
+  virtual absl::Status VoronoiCells(const std::string& session, std::span<const uint32_t> vertices,
+                                    const OnCells& on_cells, const CallOptions& call) = 0;
+  virtual absl::StatusOr<AddedVertices> AddVertices(const std::string& session, std::span<const double> points,
+                                                    std::span<const uint32_t> near, const CallOptions& call) = 0;
 };
 
 // A connection over `channel`, for example that of an embedded server.
-//
-// Errors of the calls: the server's code and message unchanged, its google.rpc details as payloads under their type URLs; DATA_LOSS
-// when an answer contradicts itself or its checksums.
-std::shared_ptr<Connection> MakeConnection(std::shared_ptr<grpc::Channel> channel);
+std::shared_ptr<Connection> MakeConnection(std::shared_ptr<grpc::Channel> channel, const RetryPolicy& policy = {});
 
 }  // namespace wellspace::client
 

@@ -28,14 +28,19 @@ TEST(WithThousandsTest, GroupsByThree) {
 }
 
 TEST(ProgressLineTest, ShowsPhaseFractionAndVerticesWithin79Columns) {
-  const std::string line = ProgressLine(
-      {.phase = "refinement", .vertices = 1234567, .estimated_vertices = 0, .simplices = 0, .fraction = 0.5});
+  const std::string line = ProgressLine({.phase = "refinement",
+                                         .vertices = 1234567,
+                                         .estimated_vertices = 0,
+                                         .simplices = 0,
+                                         .fraction = 0.5,
+                                         .sequence = 0});
   EXPECT_EQ(line, "refinement [###############---------------]  50%  1,234,567 vertices");
   const std::string longest = ProgressLine({.phase = std::string(100, 'x'),
                                             .vertices = ~uint64_t{0},
                                             .estimated_vertices = 0,
                                             .simplices = 0,
-                                            .fraction = 7});
+                                            .fraction = 7,
+                                            .sequence = 0});
   EXPECT_LE(longest.size(), 79u);
   EXPECT_THAT(longest, HasSubstr("100%"));
 }

@@ -415,32 +415,5 @@ TEST(Connect, AServerThatIsNotThereIsUnavailable) {
             absl::StatusCode::kUnavailable);
 }
 
-// A connection need not be gRPC's.
-class MockConnection : public Connection {
- public:
-  MOCK_METHOD(absl::StatusOr<Mesh>, MeshPoints,
-              (const MeshOptions&, std::span<const double>, const std::function<void(const Progress&)>&,
-               std::stop_token),
-              (override));
-  MOCK_METHOD(absl::StatusOr<MeshEstimate>, EstimateMesh,
-              (const MeshOptions&, std::span<const double>, std::stop_token), (override));
-  MOCK_METHOD(absl::StatusOr<ServerInfo>, GetServerInfo, (), (override));
-};
-
-TEST(Client, PassesCallsToItsConnection) {
-  auto connection = std::make_shared<MockConnection>();
-  Client client(connection);
-  const std::vector<double> points = {1, 2};
-  EXPECT_CALL(*connection,
-              MeshPoints(::testing::Field(&MeshOptions::dimension, 2), ::testing::SizeIs(2), testing::_, testing::_))
-      .WillOnce(::testing::Return(absl::AbortedError("mesh")));
-  EXPECT_CALL(*connection, EstimateMesh(::testing::Field(&MeshOptions::dimension, 2), ::testing::SizeIs(2), testing::_))
-      .WillOnce(::testing::Return(absl::AbortedError("estimate")));
-  EXPECT_CALL(*connection, GetServerInfo()).WillOnce(::testing::Return(absl::AbortedError("info")));
-  EXPECT_EQ(client.MeshPoints(UnitSquare(), points).status(), absl::AbortedError("mesh"));
-  EXPECT_EQ(client.EstimateMesh(UnitSquare(), points).status(), absl::AbortedError("estimate"));
-  EXPECT_EQ(client.GetServerInfo().status(), absl::AbortedError("info"));
-}
-
 }  // namespace
 }  // namespace wellspace::client

@@ -1,4 +1,4 @@
-#include "client/mesh_assembler.h"
+#include "client/mesh_receiver.h"
 
 #include <cstdint>
 #include <functional>
@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/status/statusor.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "proto/checksum.h"
@@ -65,20 +66,26 @@ Answer GoodAnswer() {
   return answer;
 }
 
+constexpr MeshReceiver::Expectation kOnePointIn2D = {.dimension = 2, .input_points = 1};
+
 absl::StatusOr<Mesh> Assemble(const Answer& answer) {
-  MeshAssembler assembler(2, 1);
-  if (absl::Status status = assembler.SetMetadata(answer.metadata); !status.ok()) {
+  MeshCollector collector;
+  MeshReceiver receiver(collector, kOnePointIn2D);
+  if (absl::Status status = receiver.SetMetadata(answer.metadata); !status.ok()) {
     return status;
   }
   for (const v1::MeshChunk& chunk : answer.chunks) {
-    if (absl::Status status = assembler.AddChunk(chunk); !status.ok()) {
+    if (absl::Status status = receiver.AddChunk(chunk); !status.ok()) {
       return status;
     }
   }
-  return assembler.Finish();
+  if (absl::Status status = receiver.Finish(); !status.ok()) {
+    return status;
+  }
+  return std::move(collector.mesh());
 }
 
-TEST(MeshAssembler, AssemblesAMesh) {
+TEST(MeshReceiver, AssemblesAMesh) {
   const absl::StatusOr<Mesh> mesh = Assemble(GoodAnswer());
   ASSERT_TRUE(mesh.ok()) << mesh.status();
   EXPECT_EQ(mesh->dimension, 2);
@@ -100,9 +107,9 @@ struct Damage {
   std::function<void(Answer&)> spoil;
 };
 
-class MeshAssemblerRefuses : public ::testing::TestWithParam<Damage> {};
+class MeshReceiverRefuses : public ::testing::TestWithParam<Damage> {};
 
-TEST_P(MeshAssemblerRefuses, ADamagedAnswer) {
+TEST_P(MeshReceiverRefuses, ADamagedAnswer) {
   Answer answer = GoodAnswer();
   GetParam().spoil(answer);
   const absl::StatusOr<Mesh> mesh = Assemble(answer);
@@ -114,7 +121,7 @@ TEST_P(MeshAssemblerRefuses, ADamagedAnswer) {
 constexpr uint64_t kHuge = std::numeric_limits<uint64_t>::max();
 
 INSTANTIATE_TEST_SUITE_P(
-    All, MeshAssemblerRefuses,
+    All, MeshReceiverRefuses,
     ::testing::Values(
         Damage{"Dimension", "dimension 3", [](Answer& a) { a.metadata.set_dimension(3); }},
         Damage{"DomainShort", "1 low", [](Answer& a) { a.metadata.mutable_domain()->mutable_low()->RemoveLast(); }},
@@ -123,14 +130,20 @@ INSTANTIATE_TEST_SUITE_P(
         Damage{"SimplexCountHuge", "more than can be", [](Answer& a) { a.metadata.set_simplex_count(kHuge); }},
         Damage{"InputCount", "1 were sent", [](Answer& a) { a.metadata.set_input_point_count(2); }},
         Damage{"ChunkCountHuge", "chunks", [](Answer& a) { a.metadata.set_chunk_count(kHuge); }},
-        Damage{"VertexCountHigh", "4 of 5 vertices", [](Answer& a) { a.metadata.set_vertex_count(5); }},
+        Damage{"VertexCountHigh", "simplices after 4 of 5 points", [](Answer& a) { a.metadata.set_vertex_count(5); }},
         Damage{"VertexCountLow", "more than the announced 3", [](Answer& a) { a.metadata.set_vertex_count(3); }},
-        Damage{"SimplexCountHigh", "2 of 3 simplices", [](Answer& a) { a.metadata.set_simplex_count(3); }},
+        Damage{"SimplexCountHigh", "input vertices after 2 of 3 simplices", [](Answer& a) { a.metadata.set_simplex_count(3); }},
         Damage{"SimplexCountLow", "more than the announced 1", [](Answer& a) { a.metadata.set_simplex_count(1); }},
         Damage{"ChunkMissing", "3 of 4 chunks", [](Answer& a) { a.chunks.pop_back(); }},
         Damage{"ChunkTwice", "where chunk", [](Answer& a) { a.chunks[2] = a.chunks[1]; }},
         Damage{"ChunkTooMany", "chunk 4", [](Answer& a) { a.chunks.emplace_back(a.chunks[3]).set_index(4); }},
         Damage{"ChunksSwapped", "where chunk 0", [](Answer& a) { std::swap(a.chunks[0], a.chunks[1]); }},
+        Damage{"ArraysSwapped", "simplices after 2 of 4 points",
+               [](Answer& a) {
+                 std::swap(a.chunks[1], a.chunks[2]);
+                 a.chunks[1].set_index(1);
+                 a.chunks[2].set_index(2);
+               }},
         Damage{"ChunkEmpty", "0 arrays", [](Answer& a) { a.chunks[3].clear_input_vertices(); }},
         Damage{"TwoArrays", "2 arrays", [](Answer& a) { a.chunks[0].add_simplices(0); }},
         Damage{"BitFlippedInPoints", "CRC32C", [](Answer& a) { a.chunks[0].set_points(0, -0.0); }},
@@ -159,19 +172,60 @@ INSTANTIATE_TEST_SUITE_P(
                }}),
     [](const auto& test) { return test.param.name; });
 
-TEST(MeshAssembler, RefusesAChunkBeforeTheMetadata) {
-  MeshAssembler assembler(2, 1);
-  EXPECT_EQ(assembler.AddChunk(GoodAnswer().chunks[0]).code(), absl::StatusCode::kDataLoss);
+TEST(MeshReceiver, RefusesAChunkBeforeTheMetadata) {
+  MeshCollector collector;
+  MeshReceiver receiver(collector, kOnePointIn2D);
+  EXPECT_EQ(receiver.AddChunk(GoodAnswer().chunks[0]).code(), absl::StatusCode::kDataLoss);
 }
 
-TEST(MeshAssembler, RefusesASecondMetadata) {
-  MeshAssembler assembler(2, 1);
-  ASSERT_TRUE(assembler.SetMetadata(GoodAnswer().metadata).ok());
-  EXPECT_EQ(assembler.SetMetadata(GoodAnswer().metadata).code(), absl::StatusCode::kDataLoss);
+TEST(MeshReceiver, RefusesASecondMetadata) {
+  MeshCollector collector;
+  MeshReceiver receiver(collector, kOnePointIn2D);
+  ASSERT_TRUE(receiver.SetMetadata(GoodAnswer().metadata).ok());
+  EXPECT_EQ(receiver.SetMetadata(GoodAnswer().metadata).code(), absl::StatusCode::kDataLoss);
 }
 
-TEST(MeshAssembler, RefusesAnEndWithoutAMesh) {
-  EXPECT_EQ(MeshAssembler(2, 1).Finish().status().code(), absl::StatusCode::kDataLoss);
+TEST(MeshReceiver, RefusesAnEndWithoutAMesh) {
+  MeshCollector collector;
+  EXPECT_EQ(MeshReceiver(collector, kOnePointIn2D).Finish().code(), absl::StatusCode::kDataLoss);
+}
+
+// Broken off after each number of chunks in turn.
+TEST(MeshReceiver, ContinuesWhereTheStreamBrokeOff) {
+  const Answer answer = GoodAnswer();
+  const absl::StatusOr<Mesh> whole = Assemble(answer);
+  ASSERT_TRUE(whole.ok());
+  for (size_t broken_at = 0; broken_at <= answer.chunks.size(); ++broken_at) {
+    MeshCollector collector;
+    MeshReceiver receiver(collector, {.dimension = std::nullopt, .input_points = std::nullopt});
+    ASSERT_TRUE(receiver.SetMetadata(answer.metadata).ok());
+    for (size_t i = 0; i < broken_at; ++i) {
+      ASSERT_TRUE(receiver.AddChunk(answer.chunks[i]).ok());
+    }
+    EXPECT_EQ(receiver.next_chunk(), broken_at);
+    receiver.Continue();
+    EXPECT_EQ(receiver.AddChunk(answer.chunks[0]).code(), absl::StatusCode::kDataLoss);
+    ASSERT_TRUE(receiver.SetMetadata(answer.metadata).ok());
+    for (size_t i = broken_at; i < answer.chunks.size(); ++i) {
+      ASSERT_TRUE(receiver.AddChunk(answer.chunks[i]).ok());
+    }
+    ASSERT_TRUE(receiver.Finish().ok());
+    EXPECT_EQ(collector.mesh().points, whole->points);
+    EXPECT_EQ(collector.mesh().simplices, whole->simplices);
+    EXPECT_EQ(collector.mesh().input_vertex, whole->input_vertex);
+  }
+}
+
+TEST(MeshReceiver, RefusesToContinueAnotherMesh) {
+  MeshCollector collector;
+  MeshReceiver receiver(collector, kOnePointIn2D);
+  v1::MeshMetadata metadata = GoodAnswer().metadata;
+  ASSERT_TRUE(receiver.SetMetadata(metadata).ok());
+  receiver.Continue();
+  metadata.set_revision(7);
+  const absl::Status status = receiver.SetMetadata(metadata);
+  EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss);
+  EXPECT_THAT(std::string(status.message()), HasSubstr("another mesh: revision 7"));
 }
 
 }  // namespace

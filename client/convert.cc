@@ -1,0 +1,257 @@
+#include "client/convert.h"
+
+#include <map>
+#include <numeric>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "client/error_details.h"
+#include "google/protobuf/descriptor.h"
+#include "google/protobuf/message.h"
+
+namespace wellspace::client {
+namespace {
+
+const char* PhaseName(v1::Phase phase) {
+  switch (phase) {
+    case v1::PHASE_WAITING:
+      return "waiting";
+    case v1::PHASE_TREE:
+      return "tree";
+    case v1::PHASE_REFINEMENT:
+      return "refinement";
+    case v1::PHASE_SIMPLICES:
+      return "simplices";
+    case v1::PHASE_DONE:
+      return "done";
+    default:
+      return "unknown";  // of a newer server
+  }
+}
+
+SessionState StateFromProto(v1::Session::State state) {
+  switch (state) {
+    case v1::Session::STATE_OPEN:
+      return SessionState::kOpen;
+    case v1::Session::STATE_REFINING:
+      return SessionState::kRefining;
+    case v1::Session::STATE_READY:
+      return SessionState::kReady;
+    default:
+      return SessionState::kUnknown;
+  }
+}
+
+OperationState StateFromProto(v1::Operation::State state) {
+  switch (state) {
+    case v1::Operation::STATE_QUEUED:
+      return OperationState::kQueued;
+    case v1::Operation::STATE_RUNNING:
+      return OperationState::kRunning;
+    case v1::Operation::STATE_SUCCEEDED:
+      return OperationState::kSucceeded;
+    case v1::Operation::STATE_FAILED:
+      return OperationState::kFailed;
+    case v1::Operation::STATE_CANCELLED:
+      return OperationState::kCancelled;
+    default:
+      return OperationState::kUnknown;
+  }
+}
+
+absl::Duration DurationFromProto(const google::protobuf::Duration& message) {
+  return absl::Seconds(message.seconds()) + absl::Nanoseconds(message.nanos());
+}
+
+absl::Time TimeFromProto(const google::protobuf::Timestamp& message) {
+  return absl::FromUnixSeconds(message.seconds()) + absl::Nanoseconds(message.nanos());
+}
+
+template <typename T>
+std::vector<T> VectorOf(const google::protobuf::RepeatedField<T>& values) {
+  return std::vector<T>(values.begin(), values.end());
+}
+
+// The values of a message whose fields are all numbers of type T, by the names of the fields: a client shows counters that it does
+// not know by name.
+std::map<std::string, uint64_t> CountersByName(const v1::OperationCounters& counters) {
+  std::map<std::string, uint64_t> by_name;
+  const google::protobuf::Descriptor* descriptor = counters.GetDescriptor();
+  for (int i = 0; i < descriptor->field_count(); ++i) {
+    const google::protobuf::FieldDescriptor* field = descriptor->field(i);
+    by_name[field->name()] = counters.GetReflection()->GetUInt64(counters, field);
+  }
+  return by_name;
+}
+
+MeshStatistics StatisticsFromProto(const v1::MeshStatistics& message) {
+  MeshStatistics statistics;
+  statistics.input_points = message.input_points();
+  statistics.duplicates = message.duplicates();
+  statistics.vertices = message.vertices();
+  statistics.simplices = message.simplices();
+  statistics.max_radius_edge = message.max_radius_edge();
+  statistics.min_angle_deg = message.min_angle_deg();
+  statistics.seconds["tree"] = message.seconds().tree();
+  statistics.seconds["refinement"] = message.seconds().refinement();
+  statistics.seconds["simplices"] = message.seconds().simplices();
+  statistics.seconds["total"] = message.seconds().total();
+  statistics.peak_memory_bytes = message.peak_memory_bytes();
+  statistics.counters = CountersByName(message.counters());
+  return statistics;
+}
+
+}  // namespace
+
+void SetDuration(absl::Duration duration, google::protobuf::Duration* message) {
+  absl::Duration rest;
+  message->set_seconds(absl::IDivDuration(duration, absl::Seconds(1), &rest));
+  message->set_nanos(static_cast<int32_t>(absl::ToInt64Nanoseconds(rest)));
+}
+
+void SetParameters(const MeshOptions& options, v1::MeshParameters* parameters) {
+  parameters->set_dimension(options.dimension);
+  parameters->set_rho(options.rho);
+  parameters->set_criterion(options.criterion == Criterion::kWellSpaced ? v1::CRITERION_WELL_SPACED
+                                                                        : v1::CRITERION_RADIUS_EDGE);
+  parameters->set_max_circumradius(options.max_circumradius);
+  for (const SizeBox& box : options.size_boxes) {
+    v1::SizeBox* message = parameters->add_size_boxes();
+    message->mutable_low()->Assign(box.low.begin(), box.low.end());
+    message->mutable_high()->Assign(box.high.begin(), box.high.end());
+    message->set_max_circumradius(box.max_circumradius);
+  }
+  if (!options.domain_low.empty() || !options.domain_high.empty()) {
+    parameters->mutable_domain()->mutable_low()->Assign(options.domain_low.begin(), options.domain_low.end());
+    parameters->mutable_domain()->mutable_high()->Assign(options.domain_high.begin(), options.domain_high.end());
+  }
+  parameters->set_margin(options.margin);
+  parameters->set_max_vertices(options.max_vertices);
+  parameters->set_threads(options.threads);
+}
+
+MeshOptions OptionsFromProto(const v1::MeshParameters& parameters) {
+  MeshOptions options;
+  options.dimension = parameters.dimension();
+  options.rho = parameters.rho();
+  options.criterion =
+      parameters.criterion() == v1::CRITERION_WELL_SPACED ? Criterion::kWellSpaced : Criterion::kRadiusEdge;
+  options.max_circumradius = parameters.max_circumradius();
+  for (const v1::SizeBox& box : parameters.size_boxes()) {
+    options.size_boxes.push_back(
+        {.low = VectorOf(box.low()), .high = VectorOf(box.high()), .max_circumradius = box.max_circumradius()});
+  }
+  options.domain_low = VectorOf(parameters.domain().low());
+  options.domain_high = VectorOf(parameters.domain().high());
+  if (parameters.has_margin()) {
+    options.margin = parameters.margin();
+  }
+  options.max_vertices = parameters.max_vertices();
+  options.threads = parameters.threads();
+  return options;
+}
+
+Progress ProgressFromProto(const v1::ProgressEvent& event) {
+  return Progress{.phase = PhaseName(event.phase()),
+                  .vertices = event.vertices(),
+                  .estimated_vertices = event.estimated_vertices(),
+                  .simplices = event.simplices(),
+                  .fraction = event.fraction(),
+                  .sequence = event.sequence()};
+}
+
+MeshHeader HeaderFromProto(const v1::MeshMetadata& metadata) {
+  return MeshHeader{.dimension = metadata.dimension(),
+                    .domain_low = VectorOf(metadata.domain().low()),
+                    .domain_high = VectorOf(metadata.domain().high()),
+                    .vertex_count = metadata.vertex_count(),
+                    .simplex_count = metadata.simplex_count(),
+                    .input_point_count = metadata.input_point_count(),
+                    .chunk_count = metadata.chunk_count(),
+                    .revision = metadata.revision(),
+                    .statistics = StatisticsFromProto(metadata.statistics())};
+}
+
+ServerInfo InfoFromProto(const v1::GetServerInfoResponse& response) {
+  return ServerInfo{.version = response.version(),
+                    .dimensions = VectorOf(response.dimensions()),
+                    .max_points = response.max_points(),
+                    .max_vertices = response.max_vertices(),
+                    .max_request_bytes = response.max_request_bytes(),
+                    .workers = response.workers(),
+                    .max_queued_jobs = response.max_queued_jobs(),
+                    .running_jobs = response.running_jobs(),
+                    .queued_jobs = response.queued_jobs(),
+                    .max_sessions = response.max_sessions(),
+                    .max_sessions_per_tenant = response.max_sessions_per_tenant(),
+                    .default_ttl = DurationFromProto(response.default_ttl()),
+                    .max_ttl = DurationFromProto(response.max_ttl()),
+                    .stall_limit = DurationFromProto(response.stall_limit()),
+                    .max_memory_bytes = response.max_memory_bytes()};
+}
+
+Session SessionFromProto(const v1::Session& message) {
+  return Session{.name = message.name(),
+                 .state = StateFromProto(message.state()),
+                 .parameters = OptionsFromProto(message.parameters()),
+                 .labels = Labels(message.labels().begin(), message.labels().end()),
+                 .ttl = DurationFromProto(message.ttl()),
+                 .create_time = TimeFromProto(message.create_time()),
+                 .expire_time = TimeFromProto(message.expire_time()),
+                 .revision = message.revision(),
+                 .committed_points = message.committed_points(),
+                 .vertex_count = message.vertex_count(),
+                 .simplex_count = message.simplex_count(),
+                 .last_operation = message.last_operation()};
+}
+
+Operation OperationFromProto(const v1::Operation& message) {
+  Operation operation;
+  operation.name = message.name();
+  operation.state = StateFromProto(message.state());
+  operation.parameters = OptionsFromProto(message.parameters());
+  operation.progress = ProgressFromProto(message.progress());
+  operation.error = absl::Status(static_cast<absl::StatusCode>(message.error().code()), message.error().message());
+  if (!operation.error.ok()) {
+    AddDetails(message.error(), operation.error);
+  }
+  operation.create_time = TimeFromProto(message.create_time());
+  if (message.has_start_time()) {
+    operation.start_time = TimeFromProto(message.start_time());
+  }
+  if (message.has_end_time()) {
+    operation.end_time = TimeFromProto(message.end_time());
+  }
+  operation.mesh_revision = message.mesh_revision();
+  return operation;
+}
+
+absl::StatusOr<CellBatch> CellsFromProto(const v1::VoronoiCellBatch& message) {
+  const int cells = message.vertices_size();
+  if (message.clip_radii_size() != cells || message.is_clipped_size() != cells || message.node_counts_size() != cells ||
+      message.neighbour_counts_size() != cells) {
+    return absl::DataLossError(absl::StrCat("the server's answer is damaged: ", cells, " cells with ",
+                                            message.clip_radii_size(), " radii, ", message.is_clipped_size(),
+                                            " flags, ", message.node_counts_size(), " counts of nodes and ",
+                                            message.neighbour_counts_size(), " counts of neighbours"));
+  }
+  const uint64_t nodes = std::accumulate(message.node_counts().begin(), message.node_counts().end(), uint64_t{0});
+  const uint64_t neighbours =
+      std::accumulate(message.neighbour_counts().begin(), message.neighbour_counts().end(), uint64_t{0});
+  const uint64_t coordinates = message.nodes_size();
+  if (neighbours != static_cast<uint64_t>(message.neighbours_size()) ||
+      (nodes == 0 ? coordinates != 0 : coordinates % nodes != 0 || coordinates == 0)) {
+    return absl::DataLossError(absl::StrCat("the server's answer is damaged: ", coordinates, " coordinates of ", nodes,
+                                            " nodes, ", message.neighbours_size(), " of ", neighbours, " neighbours"));
+  }
+  return CellBatch{.dimension = nodes == 0 ? 0 : static_cast<int>(coordinates / nodes),
+                   .vertices = VectorOf(message.vertices()),
+                   .clip_radii = VectorOf(message.clip_radii()),
+                   .is_clipped = VectorOf(message.is_clipped()),
+                   .node_counts = VectorOf(message.node_counts()),
+                   .nodes = VectorOf(message.nodes()),
+                   .neighbour_counts = VectorOf(message.neighbour_counts()),
+                   .neighbours = VectorOf(message.neighbours())};
+}
+
+}  // namespace wellspace::client

@@ -1,0 +1,33 @@
+// Messages of the service from and to the types of the library. Private to this folder.
+#ifndef WELLSPACE_CLIENT_CONVERT_H_
+#define WELLSPACE_CLIENT_CONVERT_H_
+
+#include "absl/status/statusor.h"
+#include "client/client.h"
+#include "client/mesh.h"
+#include "client/session.h"
+#include "wellspace/v1/mesh.pb.h"
+#include "wellspace/v1/meshing.pb.h"
+#include "wellspace/v1/operations.pb.h"
+#include "wellspace/v1/progress.pb.h"
+#include "wellspace/v1/queries.pb.h"
+#include "wellspace/v1/sessions.pb.h"
+
+namespace wellspace::client {
+
+void SetParameters(const MeshOptions& options, v1::MeshParameters* parameters);
+void SetDuration(absl::Duration duration, google::protobuf::Duration* message);
+
+MeshOptions OptionsFromProto(const v1::MeshParameters& parameters);
+Progress ProgressFromProto(const v1::ProgressEvent& event);
+MeshHeader HeaderFromProto(const v1::MeshMetadata& metadata);
+ServerInfo InfoFromProto(const v1::GetServerInfoResponse& response);
+Session SessionFromProto(const v1::Session& message);
+Operation OperationFromProto(const v1::Operation& message);
+
+// Errors:     DATA_LOSS when the counts do not fit the arrays.
+absl::StatusOr<CellBatch> CellsFromProto(const v1::VoronoiCellBatch& message);
+
+}  // namespace wellspace::client
+
+#endif  // WELLSPACE_CLIENT_CONVERT_H_

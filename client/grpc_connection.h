@@ -1,0 +1,96 @@
+// The Connection over gRPC. Private to this folder.
+#ifndef WELLSPACE_CLIENT_GRPC_CONNECTION_H_
+#define WELLSPACE_CLIENT_GRPC_CONNECTION_H_
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "client/connection.h"
+#include "client/retry.h"
+#include "grpc/health/v1/health.grpc.pb.h"
+#include "wellspace/v1/meshing.grpc.pb.h"
+#include "wellspace/v1/operations.grpc.pb.h"
+#include "wellspace/v1/queries.grpc.pb.h"
+#include "wellspace/v1/sessions.grpc.pb.h"
+
+namespace wellspace::client {
+
+class GrpcConnection final : public Connection {
+ public:
+  GrpcConnection(const std::shared_ptr<grpc::Channel>& channel, const RetryPolicy& policy);
+
+  // grpc_meshing.cc
+  absl::Status MeshPoints(const MeshOptions& options, std::span<const double> points, MeshSink& sink,
+                          const OnProgress& on_progress, std::stop_token stop) override;
+  absl::StatusOr<MeshEstimate> EstimateMesh(const MeshOptions& options, std::span<const double> points,
+                                            std::stop_token stop) override;
+  absl::StatusOr<ServerInfo> GetServerInfo(const CallOptions& call) override;
+  absl::StatusOr<Health> CheckHealth(const std::string& service, const CallOptions& call) override;
+
+  // grpc_sessions.cc
+  absl::StatusOr<Session> CreateSession(const SessionOptions& options, const CallOptions& call) override;
+  absl::StatusOr<Session> GetSession(const std::string& session, const CallOptions& call) override;
+  absl::StatusOr<SessionPage> ListSessions(const Labels& labels, const PageOptions& page,
+                                           const CallOptions& call) override;
+  absl::StatusOr<Session> UpdateSession(const std::string& session, const SessionChange& change,
+                                        const CallOptions& call) override;
+  absl::Status DeleteSession(const std::string& session, const CallOptions& call) override;
+
+  // grpc_transfers.cc
+  absl::StatusOr<Uploaded> UploadPoints(const std::string& session, PointSource& source, std::optional<uint64_t> offset,
+                                        const OnPoints& on_points, const CallOptions& call) override;
+  absl::Status DownloadMesh(const std::string& session, MeshSink& sink, uint64_t revision, const OnChunks& on_chunks,
+                            const CallOptions& call) override;
+
+  // grpc_operations.cc
+  absl::StatusOr<Operation> StartRefinement(const std::string& session, const std::optional<MeshOptions>& parameters,
+                                            const CallOptions& call) override;
+  absl::StatusOr<Operation> GetOperation(const std::string& operation, const CallOptions& call) override;
+  absl::StatusOr<OperationPage> ListOperations(const std::string& session, const PageOptions& page,
+                                               const CallOptions& call) override;
+  absl::StatusOr<Operation> CancelOperation(const std::string& operation, const CallOptions& call) override;
+  absl::StatusOr<Operation> WatchOperation(const std::string& operation, const OnProgress& on_progress,
+                                           std::optional<uint64_t> after_sequence, const CallOptions& call) override;
+
+  // grpc_queries.cc
+  absl::Status ApproximateNearestNeighbors(const std::string& session, std::span<const uint32_t> vertices,
+                                           const OnDistances& on_distances, const CallOptions& call) override;
+  absl::Status ClippedVoronoiCells(const std::string& session, std::span<const uint32_t> vertices, double beta,
+                                   const OnCells& on_cells, const CallOptions& call) override;
+  absl::Status VoronoiCells(const std::string& session, std::span<const uint32_t> vertices, const OnCells& on_cells,
+                            const CallOptions& call) override;
+  absl::StatusOr<AddedVertices> AddVertices(const std::string& session, std::span<const double> points,
+                                            std::span<const uint32_t> near, const CallOptions& call) override;
+
+ private:
+  // Makes a unary call until its status is final; the answer is in `response`.
+  template <typename Stub, typename Request, typename Response>
+  absl::Status Call(Stub& stub, grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
+                    const Request& request, const CallOptions& call, Response* response) {
+    return retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
+      CallContext context(attempt);
+      return FromGrpcStatus((stub.*method)(context.get(), request, response));
+    });
+  }
+
+  // One attempt at GetSession.
+  absl::StatusOr<v1::Session> FetchSession(const std::string& session, const Attempt& attempt);
+
+  Retrier retrier_;
+  const std::unique_ptr<v1::MeshingService::Stub> meshing_;
+  const std::unique_ptr<v1::SessionService::Stub> sessions_;
+  const std::unique_ptr<v1::OperationService::Stub> operations_;
+  const std::unique_ptr<v1::QueryService::Stub> queries_;
+  const std::unique_ptr<grpc::health::v1::Health::Stub> health_;
+};
+
+// The largest number of whole rows of `row` doubles that a request of less than 1 MiB holds; at least 1.
+size_t RowsOfARequest(size_t row);
+
+// The id of a call that changes something: the caller's, or a random one of 128 bits.
+std::string RequestIdOf(const CallOptions& call);
+
+}  // namespace wellspace::client
+
+#endif  // WELLSPACE_CLIENT_GRPC_CONNECTION_H_

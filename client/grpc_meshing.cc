@@ -1,0 +1,123 @@
+// MeshingService and health on the client's side.
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+#include "client/convert.h"
+#include "client/grpc_connection.h"
+#include "client/mesh_receiver.h"
+
+namespace wellspace::client {
+namespace {
+
+using MeshPointsStream = grpc::ClientReaderWriter<v1::MeshPointsRequest, v1::MeshPointsResponse>;
+
+// Sends everything and half-closes. Stops early when the call has ended; its status says why.
+template <typename Request, typename Stream>
+void Upload(const MeshOptions& options, std::span<const double> points, Stream& stream) {
+  Request request;
+  SetParameters(options, request.mutable_parameters());
+  if (!stream.Write(request)) {
+    return;
+  }
+  const size_t row = std::max(1, options.dimension);
+  const size_t chunk_size = RowsOfARequest(row) * row;
+  while (!points.empty()) {
+    const std::span<const double> chunk = points.first(std::min(points.size(), chunk_size));
+    request.mutable_points()->mutable_coordinates()->Assign(chunk.begin(), chunk.end());
+    if (!stream.Write(request)) {
+      return;
+    }
+    points = points.subspan(chunk.size());
+  }
+  stream.WritesDone();
+}
+
+}  // namespace
+
+absl::Status GrpcConnection::MeshPoints(const MeshOptions& options, std::span<const double> points, MeshSink& sink,
+                                        const OnProgress& on_progress, std::stop_token stop) {
+  const int dimension = std::max(1, options.dimension);
+  return retrier_.Run(options.timeout, stop, [&](Attempt& attempt) {
+    CallContext context(attempt);
+    const std::unique_ptr<MeshPointsStream> stream = meshing_->MeshPoints(context.get());
+    // Points go up while answers come down: the server may fail the call before it has all.
+    std::jthread uploader([&] { Upload<v1::MeshPointsRequest>(options, points, *stream); });
+    MeshReceiver receiver(sink, {.dimension = dimension, .input_points = points.size() / dimension});
+    absl::Status damage;
+    bool has_begun = false;  // the work: it is not done twice
+    v1::MeshPointsResponse response;
+    while (damage.ok() && stream->Read(&response)) {
+      has_begun = has_begun || !response.has_progress() || response.progress().phase() != v1::PHASE_WAITING;
+      if (response.has_metadata()) {
+        damage = receiver.SetMetadata(response.metadata());
+      } else if (response.has_chunk()) {
+        damage = receiver.AddChunk(response.chunk());
+      } else if (response.has_progress() && on_progress != nullptr) {
+        on_progress(ProgressFromProto(response.progress()));
+      }
+    }
+    if (!damage.ok()) {
+      context.Cancel();
+    }
+    uploader.join();
+    const absl::Status status = FromGrpcStatus(stream->Finish());
+    if (!damage.ok()) {
+      return attempt.Final(damage);
+    }
+    if (!status.ok()) {
+      const bool is_cancelled = absl::IsCancelled(status);  // by the caller, perhaps: the Retrier knows
+      return has_begun && !is_cancelled ? attempt.Final(status) : status;
+    }
+    return attempt.Final(receiver.Finish());
+  });
+}
+
+absl::StatusOr<MeshEstimate> GrpcConnection::EstimateMesh(const MeshOptions& options, std::span<const double> points,
+                                                          std::stop_token stop) {
+  v1::EstimateMeshResponse response;
+  const absl::Status status = retrier_.Run(options.timeout, stop, [&](Attempt& attempt) {
+    CallContext context(attempt);
+    const std::unique_ptr<grpc::ClientWriter<v1::EstimateMeshRequest>> stream =
+        meshing_->EstimateMesh(context.get(), &response);
+    Upload<v1::EstimateMeshRequest>(options, points, *stream);
+    return FromGrpcStatus(stream->Finish());
+  });
+  if (!status.ok()) {
+    return status;
+  }
+  return MeshEstimate{.vertices = response.vertices(),
+                      .simplices = response.simplices(),
+                      .memory_bytes = response.memory_bytes(),
+                      .tree_leaves = response.tree_leaves()};
+}
+
+absl::StatusOr<ServerInfo> GrpcConnection::GetServerInfo(const CallOptions& call) {
+  v1::GetServerInfoResponse response;
+  if (absl::Status status =
+          Call(*meshing_, &v1::MeshingService::Stub::GetServerInfo, v1::GetServerInfoRequest(), call, &response);
+      !status.ok()) {
+    return status;
+  }
+  return InfoFromProto(response);
+}
+
+absl::StatusOr<Health> GrpcConnection::CheckHealth(const std::string& service, const CallOptions& call) {
+  grpc::health::v1::HealthCheckRequest request;
+  request.set_service(service);
+  grpc::health::v1::HealthCheckResponse response;
+  if (absl::Status status = Call(*health_, &grpc::health::v1::Health::Stub::Check, request, call, &response);
+      !status.ok()) {
+    return status;
+  }
+  switch (response.status()) {
+    case grpc::health::v1::HealthCheckResponse::SERVING:
+      return Health::kServing;
+    case grpc::health::v1::HealthCheckResponse::NOT_SERVING:
+      return Health::kNotServing;
+    default:
+      return Health::kUnknown;
+  }
+}
+
+}  // namespace wellspace::client

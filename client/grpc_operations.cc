@@ -1,0 +1,104 @@
+// OperationService on the client's side.
+#include "client/convert.h"
+#include "client/grpc_connection.h"
+
+namespace wellspace::client {
+
+absl::StatusOr<Operation> GrpcConnection::StartRefinement(const std::string& session,
+                                                          const std::optional<MeshOptions>& parameters,
+                                                          const CallOptions& call) {
+  v1::StartRefinementRequest request;
+  request.set_name(session);
+  if (parameters.has_value()) {
+    SetParameters(*parameters, request.mutable_parameters());
+  }
+  request.set_request_id(RequestIdOf(call));
+  request.set_expected_revision(call.expected_revision);
+  v1::StartRefinementResponse response;
+  if (absl::Status status = Call(*operations_, &v1::OperationService::Stub::StartRefinement, request, call, &response);
+      !status.ok()) {
+    return status;
+  }
+  return OperationFromProto(response.operation());
+}
+
+absl::StatusOr<Operation> GrpcConnection::GetOperation(const std::string& operation, const CallOptions& call) {
+  v1::GetOperationRequest request;
+  request.set_name(operation);
+  v1::GetOperationResponse response;
+  if (absl::Status status = Call(*operations_, &v1::OperationService::Stub::GetOperation, request, call, &response);
+      !status.ok()) {
+    return status;
+  }
+  return OperationFromProto(response.operation());
+}
+
+absl::StatusOr<OperationPage> GrpcConnection::ListOperations(const std::string& session, const PageOptions& page,
+                                                             const CallOptions& call) {
+  v1::ListOperationsRequest request;
+  request.set_parent(session);
+  request.set_page_size(page.page_size);
+  request.set_page_token(page.page_token);
+  v1::ListOperationsResponse response;
+  if (absl::Status status = Call(*operations_, &v1::OperationService::Stub::ListOperations, request, call, &response);
+      !status.ok()) {
+    return status;
+  }
+  OperationPage result;
+  for (const v1::Operation& operation : response.operations()) {
+    result.operations.push_back(OperationFromProto(operation));
+  }
+  result.next_page_token = response.next_page_token();
+  return result;
+}
+
+absl::StatusOr<Operation> GrpcConnection::CancelOperation(const std::string& operation, const CallOptions& call) {
+  v1::CancelOperationRequest request;
+  request.set_name(operation);
+  v1::CancelOperationResponse response;
+  if (absl::Status status = Call(*operations_, &v1::OperationService::Stub::CancelOperation, request, call, &response);
+      !status.ok()) {
+    return status;
+  }
+  return OperationFromProto(response.operation());
+}
+
+absl::StatusOr<Operation> GrpcConnection::WatchOperation(const std::string& operation, const OnProgress& on_progress,
+                                                         std::optional<uint64_t> after_sequence,
+                                                         const CallOptions& call) {
+  std::optional<Operation> ended;
+  const absl::Status status = retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
+    v1::WatchOperationRequest request;
+    request.set_name(operation);
+    if (after_sequence.has_value()) {
+      request.set_after_sequence(*after_sequence);
+    }
+    CallContext context(attempt);
+    const std::unique_ptr<grpc::ClientReader<v1::WatchOperationResponse>> stream =
+        operations_->WatchOperation(context.get(), request);
+    v1::WatchOperationResponse response;
+    while (stream->Read(&response)) {
+      attempt.NoteProgress();
+      if (response.has_operation()) {
+        ended = OperationFromProto(response.operation());
+      } else if (response.has_progress()) {
+        after_sequence = response.progress().sequence();
+        if (on_progress != nullptr) {
+          on_progress(ProgressFromProto(response.progress()));
+        }
+      }
+    }
+    const absl::Status end = FromGrpcStatus(stream->Finish());
+    if (ended.has_value()) {
+      return absl::OkStatus();
+    }
+    return end.ok() ? attempt.Final(absl::DataLossError("the server ended the watch without the operation's end"))
+                    : end;
+  });
+  if (!status.ok()) {
+    return status;
+  }
+  return *std::move(ended);
+}
+
+}  // namespace wellspace::client

@@ -1,0 +1,146 @@
+// QueryService on the client's side.
+#include <algorithm>
+#include <functional>
+
+#include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "client/convert.h"
+#include "client/grpc_connection.h"
+
+namespace wellspace::client {
+namespace {
+
+// Of one request, which then has half a MiB.
+constexpr size_t kVerticesOfARequest = 1 << 17;
+
+// Makes as many calls as the vertices take, and goes on after the last answered vertex when a connection breaks off. Answers of a call
+// about all vertices are not counted beforehand: it is repeated only as long as nothing has come.
+//
+// `open` starts a call with a request of these vertices; `take` hands a response on, and says how many vertices it was about.
+template <typename Request, typename Response>
+absl::Status StreamAnswers(
+    Retrier& retrier, Request request, std::span<const uint32_t> vertices, const CallOptions& call,
+    const std::function<std::unique_ptr<grpc::ClientReader<Response>>(grpc::ClientContext*, const Request&)>& open,
+    const std::function<absl::StatusOr<size_t>(const Response&)>& take) {
+  const bool all = vertices.empty();
+  size_t answered = 0;
+  const auto answer_part = [&](size_t end, Attempt& attempt) {
+    request.mutable_vertices()->Assign(vertices.begin() + (all ? 0 : answered), vertices.begin() + end);
+    CallContext context(attempt);
+    const std::unique_ptr<grpc::ClientReader<Response>> stream = open(context.get(), request);
+    absl::Status damage;
+    Response response;
+    while (damage.ok() && stream->Read(&response)) {
+      const absl::StatusOr<size_t> taken = take(response);
+      damage = taken.status();
+      answered += taken.value_or(0);
+      if (!all && answered > end) {
+        damage = absl::DataLossError(absl::StrCat("the server's answer is damaged: more than ", end, " vertices"));
+      }
+      attempt.NoteProgress();
+    }
+    if (!damage.ok()) {
+      context.Cancel();
+    }
+    const absl::Status status = FromGrpcStatus(stream->Finish());
+    if (!damage.ok()) {
+      return attempt.Final(damage);
+    }
+    if (!status.ok()) {
+      return all && answered > 0 && !absl::IsCancelled(status) ? attempt.Final(status) : status;
+    }
+    if (!all && answered != end) {
+      return attempt.Final(
+          absl::DataLossError(absl::StrCat("the server's answer is damaged: ", answered, " of ", end, " vertices")));
+    }
+    return absl::OkStatus();
+  };
+  const absl::Time deadline = absl::Now() + call.timeout;
+  do {
+    const size_t end = std::min(vertices.size(), answered + kVerticesOfARequest);
+    if (absl::Status status =
+            retrier.Run(deadline - absl::Now(), call.stop, [&](Attempt& attempt) { return answer_part(end, attempt); });
+        !status.ok()) {
+      return status;
+    }
+  } while (!all && answered < vertices.size());
+  return absl::OkStatus();
+}
+
+template <typename Response>
+std::function<absl::StatusOr<size_t>(const Response&)> HandOn(const OnCells& on_cells) {
+  return [&on_cells](const Response& response) -> absl::StatusOr<size_t> {
+    const absl::StatusOr<CellBatch> cells = CellsFromProto(response.cells());
+    if (!cells.ok()) {
+      return cells.status();
+    }
+    if (absl::Status status = on_cells(*cells); !status.ok()) {
+      return status;
+    }
+    return cells->vertices.size();
+  };
+}
+
+}  // namespace
+
+absl::Status GrpcConnection::ApproximateNearestNeighbors(const std::string& session, std::span<const uint32_t> vertices,
+                                                         const OnDistances& on_distances, const CallOptions& call) {
+  v1::ApproximateNearestNeighborsRequest request;
+  request.set_name(session);
+  return StreamAnswers<v1::ApproximateNearestNeighborsRequest, v1::ApproximateNearestNeighborsResponse>(
+      retrier_, request, vertices, call,
+      [this](grpc::ClientContext* context, const v1::ApproximateNearestNeighborsRequest& part) {
+        return queries_->ApproximateNearestNeighbors(context, part);
+      },
+      [&on_distances](const v1::ApproximateNearestNeighborsResponse& response) -> absl::StatusOr<size_t> {
+        const size_t count = response.distances_size();
+        if (absl::Status status = on_distances({response.distances().data(), count}); !status.ok()) {
+          return status;
+        }
+        return count;
+      });
+}
+
+absl::Status GrpcConnection::ClippedVoronoiCells(const std::string& session, std::span<const uint32_t> vertices,
+                                                 double beta, const OnCells& on_cells, const CallOptions& call) {
+  v1::ClippedVoronoiCellsRequest request;
+  request.set_name(session);
+  request.set_beta(beta);
+  return StreamAnswers<v1::ClippedVoronoiCellsRequest, v1::ClippedVoronoiCellsResponse>(
+      retrier_, request, vertices, call,
+      [this](grpc::ClientContext* context, const v1::ClippedVoronoiCellsRequest& part) {
+        return queries_->ClippedVoronoiCells(context, part);
+      },
+      HandOn<v1::ClippedVoronoiCellsResponse>(on_cells));
+}
+
+absl::Status GrpcConnection::VoronoiCells(const std::string& session, std::span<const uint32_t> vertices,
+                                          const OnCells& on_cells, const CallOptions& call) {
+  v1::VoronoiCellsRequest request;
+  request.set_name(session);
+  return StreamAnswers<v1::VoronoiCellsRequest, v1::VoronoiCellsResponse>(
+      retrier_, request, vertices, call,
+      [this](grpc::ClientContext* context, const v1::VoronoiCellsRequest& part) {
+        return queries_->VoronoiCells(context, part);
+      },
+      HandOn<v1::VoronoiCellsResponse>(on_cells));
+}
+
+absl::StatusOr<AddedVertices> GrpcConnection::AddVertices(const std::string& session, std::span<const double> points,
+                                                          std::span<const uint32_t> near, const CallOptions& call) {
+  v1::AddVerticesRequest request;
+  request.set_name(session);
+  request.mutable_points()->Assign(points.begin(), points.end());
+  request.mutable_near()->Assign(near.begin(), near.end());
+  request.set_request_id(RequestIdOf(call));
+  request.set_expected_revision(call.expected_revision);
+  v1::AddVerticesResponse response;
+  if (absl::Status status = Call(*queries_, &v1::QueryService::Stub::AddVertices, request, call, &response);
+      !status.ok()) {
+    return status;
+  }
+  return AddedVertices{.vertices = {response.vertices().begin(), response.vertices().end()},
+                       .revision = response.revision()};
+}
+
+}  // namespace wellspace::client

@@ -1,0 +1,97 @@
+// SessionService on the client's side, but for the streams.
+#include "client/convert.h"
+#include "client/grpc_connection.h"
+
+namespace wellspace::client {
+
+absl::StatusOr<Session> GrpcConnection::CreateSession(const SessionOptions& options, const CallOptions& call) {
+  v1::CreateSessionRequest request;
+  SetParameters(options.parameters, request.mutable_parameters());
+  request.mutable_labels()->insert(options.labels.begin(), options.labels.end());
+  if (options.ttl.has_value()) {
+    SetDuration(*options.ttl, request.mutable_ttl());
+  }
+  request.set_request_id(RequestIdOf(call));
+  v1::CreateSessionResponse response;
+  if (absl::Status status = Call(*sessions_, &v1::SessionService::Stub::CreateSession, request, call, &response);
+      !status.ok()) {
+    return status;
+  }
+  return SessionFromProto(response.session());
+}
+
+absl::StatusOr<v1::Session> GrpcConnection::FetchSession(const std::string& session, const Attempt& attempt) {
+  v1::GetSessionRequest request;
+  request.set_name(session);
+  v1::GetSessionResponse response;
+  CallContext context(attempt);
+  if (absl::Status status = FromGrpcStatus(sessions_->GetSession(context.get(), request, &response)); !status.ok()) {
+    return status;
+  }
+  return response.session();
+}
+
+absl::StatusOr<Session> GrpcConnection::GetSession(const std::string& session, const CallOptions& call) {
+  absl::StatusOr<v1::Session> found;
+  const absl::Status status = retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
+    found = FetchSession(session, attempt);
+    return found.status();
+  });
+  if (!status.ok()) {
+    return status;
+  }
+  return SessionFromProto(*found);
+}
+
+absl::StatusOr<SessionPage> GrpcConnection::ListSessions(const Labels& labels, const PageOptions& page,
+                                                         const CallOptions& call) {
+  v1::ListSessionsRequest request;
+  request.set_page_size(page.page_size);
+  request.set_page_token(page.page_token);
+  request.mutable_labels()->insert(labels.begin(), labels.end());
+  v1::ListSessionsResponse response;
+  if (absl::Status status = Call(*sessions_, &v1::SessionService::Stub::ListSessions, request, call, &response);
+      !status.ok()) {
+    return status;
+  }
+  SessionPage result;
+  for (const v1::Session& session : response.sessions()) {
+    result.sessions.push_back(SessionFromProto(session));
+  }
+  result.next_page_token = response.next_page_token();
+  return result;
+}
+
+absl::StatusOr<Session> GrpcConnection::UpdateSession(const std::string& session, const SessionChange& change,
+                                                      const CallOptions& call) {
+  v1::UpdateSessionRequest request;
+  request.mutable_session()->set_name(session);
+  request.mutable_update_mask();
+  if (change.labels.has_value()) {
+    request.mutable_session()->mutable_labels()->insert(change.labels->begin(), change.labels->end());
+    request.mutable_update_mask()->add_paths("labels");
+  }
+  if (change.ttl.has_value()) {
+    SetDuration(*change.ttl, request.mutable_session()->mutable_ttl());
+    request.mutable_update_mask()->add_paths("ttl");
+  }
+  request.set_request_id(RequestIdOf(call));
+  request.set_expected_revision(call.expected_revision);
+  v1::UpdateSessionResponse response;
+  if (absl::Status status = Call(*sessions_, &v1::SessionService::Stub::UpdateSession, request, call, &response);
+      !status.ok()) {
+    return status;
+  }
+  return SessionFromProto(response.session());
+}
+
+absl::Status GrpcConnection::DeleteSession(const std::string& session, const CallOptions& call) {
+  v1::DeleteSessionRequest request;
+  request.set_name(session);
+  request.set_request_id(RequestIdOf(call));
+  request.set_expected_revision(call.expected_revision);
+  v1::DeleteSessionResponse response;
+  return Call(*sessions_, &v1::SessionService::Stub::DeleteSession, request, call, &response);
+}
+
+}  // namespace wellspace::client

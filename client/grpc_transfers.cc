@@ -1,0 +1,161 @@
+// Uploads and downloads of sessions, which go on where a connection broke off.
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "client/convert.h"
+#include "client/grpc_connection.h"
+#include "client/mesh_receiver.h"
+
+namespace wellspace::client {
+namespace {
+
+// One upload of a source, in as many streams as it takes.
+class Upload {
+ public:
+  Upload(PointSource& source, std::optional<uint64_t> offset, const OnPoints& on_points, const CallOptions& call)
+      : source_(source), offset_(offset), on_points_(on_points), expected_revision_(call.expected_revision) {}
+
+  // One attempt. `session` is as it was found just now.
+  absl::Status Run(v1::SessionService::Stub& stub, const v1::Session& session, Attempt& attempt);
+
+  Uploaded result() const { return {response_.committed_points(), response_.revision()}; }
+
+ private:
+  using Stream = grpc::ClientWriter<v1::UploadPointsRequest>;
+
+  // Sends what is left of the source and half-closes; an error is the source's. Stops early when the call has ended.
+  absl::Status Send(Stream& stream, v1::UploadPointsRequest& request);
+
+  PointSource& source_;
+  std::optional<uint64_t> offset_;
+  const OnPoints& on_points_;
+  uint64_t expected_revision_;
+  uint64_t committed_ = 0;  // as far as is known
+  std::vector<double> rows_;
+  v1::UploadPointsResponse response_;
+};
+
+absl::Status Upload::Send(Stream& stream, v1::UploadPointsRequest& request) {
+  // The first message may be without points: it says which session it is.
+  if (!stream.Write(request)) {
+    return absl::OkStatus();
+  }
+  const int dimension = source_.dimension();
+  rows_.resize(RowsOfARequest(dimension) * dimension);
+  while (true) {
+    const absl::StatusOr<uint64_t> read = source_.Read(rows_);
+    if (!read.ok()) {
+      return read.status();
+    }
+    if (*read == 0) {
+      break;
+    }
+    request.mutable_points()->mutable_coordinates()->Assign(rows_.begin(), rows_.begin() + *read * dimension);
+    if (!stream.Write(request)) {
+      return absl::OkStatus();
+    }
+    request.set_point_offset(request.point_offset() + *read);
+    if (on_points_ != nullptr) {
+      on_points_(request.point_offset() - *offset_);
+    }
+  }
+  stream.WritesDone();
+  return absl::OkStatus();
+}
+
+absl::Status Upload::Run(v1::SessionService::Stub& stub, const v1::Session& session, Attempt& attempt) {
+  if (session.parameters().dimension() != source_.dimension()) {
+    return attempt.Final(absl::InvalidArgumentError(absl::StrCat("the points are ", source_.dimension(),
+                                                                 "-D; expected ", session.parameters().dimension(),
+                                                                 "-D, as the session ", session.name(), " is")));
+  }
+  if (session.committed_points() > committed_) {
+    committed_ = session.committed_points();
+    attempt.NoteProgress();
+  }
+  if (!offset_.has_value()) {
+    offset_ = session.committed_points();
+  }
+  const uint64_t first = std::max(*offset_, session.committed_points()) - *offset_;
+  if (absl::Status status = source_.Seek(first); !status.ok()) {
+    return attempt.Final(status);
+  }
+  v1::UploadPointsRequest request;
+  request.set_name(session.name());
+  request.set_point_offset(*offset_ + first);
+  // What the attempts before this one committed has changed the revision.
+  request.set_expected_revision(std::exchange(expected_revision_, 0));
+  CallContext context(attempt);
+  const std::unique_ptr<Stream> stream = stub.UploadPoints(context.get(), &response_);
+  const absl::Status unreadable = Send(*stream, request);
+  if (!unreadable.ok()) {
+    context.Cancel();
+  }
+  const absl::Status status = FromGrpcStatus(stream->Finish());
+  if (!unreadable.ok()) {
+    return attempt.Final(unreadable);
+  }
+  if (status.ok() && response_.committed_points() < request.point_offset()) {
+    return attempt.Final(
+        absl::DataLossError(absl::StrCat("the server has ", response_.committed_points(),
+                                         " points after points up to number ", request.point_offset(), " were sent")));
+  }
+  return status;
+}
+
+}  // namespace
+
+absl::StatusOr<Uploaded> GrpcConnection::UploadPoints(const std::string& session, PointSource& source,
+                                                      std::optional<uint64_t> offset, const OnPoints& on_points,
+                                                      const CallOptions& call) {
+  Upload upload(source, offset, on_points, call);
+  const absl::Status status = retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
+    const absl::StatusOr<v1::Session> found = FetchSession(session, attempt);
+    return found.ok() ? upload.Run(*sessions_, *found, attempt) : found.status();
+  });
+  if (!status.ok()) {
+    return status;
+  }
+  return upload.result();
+}
+
+absl::Status GrpcConnection::DownloadMesh(const std::string& session, MeshSink& sink, uint64_t revision,
+                                          const OnChunks& on_chunks, const CallOptions& call) {
+  MeshReceiver receiver(sink, {.dimension = std::nullopt, .input_points = std::nullopt});
+  return retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
+    v1::DownloadMeshRequest request;
+    request.set_name(session);
+    request.set_revision(receiver.has_metadata() ? receiver.header().revision : revision);
+    request.set_next_chunk(receiver.next_chunk());
+    receiver.Continue();
+    CallContext context(attempt);
+    const std::unique_ptr<grpc::ClientReader<v1::DownloadMeshResponse>> stream =
+        sessions_->DownloadMesh(context.get(), request);
+    absl::Status damage;
+    v1::DownloadMeshResponse response;
+    while (damage.ok() && stream->Read(&response)) {
+      if (response.has_metadata()) {
+        damage = receiver.SetMetadata(response.metadata());
+      } else if (response.has_chunk()) {
+        damage = receiver.AddChunk(response.chunk());
+        attempt.NoteProgress();
+      }
+      if (damage.ok() && on_chunks != nullptr) {
+        on_chunks(receiver.next_chunk(), receiver.header().chunk_count);
+      }
+    }
+    if (!damage.ok()) {
+      context.Cancel();
+    }
+    const absl::Status status = FromGrpcStatus(stream->Finish());
+    if (!damage.ok()) {
+      return attempt.Final(damage);
+    }
+    // A connection that breaks after the last chunk costs nothing.
+    return status.ok() || receiver.has_all_chunks() ? attempt.Final(receiver.Finish()) : status;
+  });
+}
+
+}  // namespace wellspace::client

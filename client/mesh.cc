@@ -1,0 +1,28 @@
+#include "client/mesh.h"
+
+namespace wellspace::client {
+
+absl::Status MeshCollector::Begin(const MeshHeader& header) {
+  mesh_.dimension = header.dimension;
+  mesh_.domain_low = header.domain_low;
+  mesh_.domain_high = header.domain_high;
+  mesh_.statistics = header.statistics;
+  return absl::OkStatus();
+}
+
+absl::Status MeshCollector::AddPoints(std::span<const double> points) {
+  mesh_.points.insert(mesh_.points.end(), points.begin(), points.end());
+  return absl::OkStatus();
+}
+
+absl::Status MeshCollector::AddSimplices(std::span<const uint32_t> simplices) {
+  mesh_.simplices.insert(mesh_.simplices.end(), simplices.begin(), simplices.end());
+  return absl::OkStatus();
+}
+
+absl::Status MeshCollector::AddInputVertices(std::span<const uint32_t> vertices) {
+  mesh_.input_vertex.insert(mesh_.input_vertex.end(), vertices.begin(), vertices.end());
+  return absl::OkStatus();
+}
+
+}  // namespace wellspace::client

@@ -1,0 +1,137 @@
+// Meshes as the client library has them, and where they go while they arrive.
+#ifndef WELLSPACE_CLIENT_MESH_H_
+#define WELLSPACE_CLIENT_MESH_H_
+
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/time/time.h"
+
+namespace wellspace::client {
+
+// What `rho` bounds; see the proto's Criterion.
+enum class Criterion { kRadiusEdge, kWellSpaced };
+
+// A box in which simplices are small; see the proto's SizeBox.
+struct SizeBox {
+  std::vector<double> low;
+  std::vector<double> high;
+  double max_circumradius = 0;
+};
+
+// What to mesh and how. Zero or empty means the server's default, as the comments of the proto's MeshParameters say.
+struct MeshOptions {
+  int dimension = 3;
+  double rho = 0;
+  Criterion criterion = Criterion::kRadiusEdge;
+  double max_circumradius = 0;
+  std::vector<SizeBox> size_boxes;
+  std::vector<double> domain_low;
+  std::vector<double> domain_high;
+  double margin = 0.25;
+  uint64_t max_vertices = 0;
+  int threads = 0;
+  absl::Duration timeout = absl::InfiniteDuration();  // of MeshPoints and EstimateMesh: of the whole call
+};
+
+struct Progress {
+  std::string phase;
+  uint64_t vertices = 0;
+  uint64_t estimated_vertices = 0;  // 0 while unknown
+  uint64_t simplices = 0;
+  double fraction = 0;    // in [0, 1], never decreasing
+  uint64_t sequence = 0;  // number of the event
+};
+
+struct MeshStatistics {
+  uint64_t input_points = 0;
+  uint64_t duplicates = 0;
+  uint64_t vertices = 0;
+  uint64_t simplices = 0;
+  double max_radius_edge = 0;
+  double min_angle_deg = 0;               // above 2-D: smallest dihedral angle
+  std::map<std::string, double> seconds;  // by phase, and "total"
+  uint64_t peak_memory_bytes = 0;
+  std::map<std::string, uint64_t> counters;
+};
+
+// What is known of a mesh before its arrays.
+struct MeshHeader {
+  int dimension = 0;
+  std::vector<double> domain_low;
+  std::vector<double> domain_high;
+  uint64_t vertex_count = 0;
+  uint64_t simplex_count = 0;
+  uint64_t input_point_count = 0;
+  uint64_t chunk_count = 0;
+  uint64_t revision = 0;  // of the session's mesh; 0 in the answer of MeshPoints
+  MeshStatistics statistics;
+};
+
+struct Mesh {
+  int dimension = 0;
+  std::vector<double> domain_low;
+  std::vector<double> domain_high;
+  std::vector<double> points;          // vertex_count x dimension, row-major; the distinct input points first
+  std::vector<uint32_t> simplices;     // simplex_count x (dimension + 1), row-major
+  std::vector<uint32_t> input_vertex;  // per input point: the vertex it became
+  MeshStatistics statistics;
+};
+
+// Takes a mesh piece by piece, so that it need not fit into memory.
+//
+// Calls come in the order of the functions below, from one thread, those for the arrays as often as there are pieces of them.
+// Pieces are whole rows; those of one array follow one another, and add up to what the header says; every number of a vertex is
+// below vertex_count. Each piece comes once, however often the connection broke meanwhile. After an error no further call comes,
+// and the error is what the client's call returns.
+class MeshSink {
+ public:
+  MeshSink() = default;
+  virtual ~MeshSink() = default;
+  MeshSink(const MeshSink&) = delete;
+  MeshSink& operator=(const MeshSink&) = delete;
+
+  virtual absl::Status Begin(const MeshHeader& header) = 0;
+  // Rows of `dimension` coordinates.
+  virtual absl::Status AddPoints(std::span<const double> points) = 0;
+  // Rows of dimension + 1 vertices.
+  virtual absl::Status AddSimplices(std::span<const uint32_t> simplices) = 0;
+  // For the next input points the vertices that they became.
+  virtual absl::Status AddInputVertices(std::span<const uint32_t> vertices) = 0;
+  // The mesh is complete.
+  virtual absl::Status Finish() = 0;
+};
+
+// Keeps the whole mesh in memory, which grows with what arrives, not with what was announced.
+//
+// Thread safety: thread-compatible.
+class MeshCollector final : public MeshSink {
+ public:
+  absl::Status Begin(const MeshHeader& header) override;
+  absl::Status AddPoints(std::span<const double> points) override;
+  absl::Status AddSimplices(std::span<const uint32_t> simplices) override;
+  absl::Status AddInputVertices(std::span<const uint32_t> vertices) override;
+  absl::Status Finish() override { return absl::OkStatus(); }
+
+  // What has been collected; to be moved from when the mesh is complete.
+  Mesh& mesh() { return mesh_; }
+
+ private:
+  Mesh mesh_;
+};
+
+// How large a mesh would be.
+struct MeshEstimate {
+  uint64_t vertices = 0;
+  uint64_t simplices = 0;
+  uint64_t memory_bytes = 0;  // most that the server would take at once
+  uint64_t tree_leaves = 0;
+};
+
+}  // namespace wellspace::client
+
+#endif  // WELLSPACE_CLIENT_MESH_H_

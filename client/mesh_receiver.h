@@ -1,0 +1,68 @@
+// A mesh from the chunks of a stream, with nothing that the server says believed unchecked.
+#ifndef WELLSPACE_CLIENT_MESH_RECEIVER_H_
+#define WELLSPACE_CLIENT_MESH_RECEIVER_H_
+
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "absl/status/status.h"
+#include "client/mesh.h"
+#include "wellspace/v1/mesh.pb.h"
+
+namespace wellspace::client {
+
+// Takes the metadata, then the chunks in their order; what is right goes to a sink at once.
+//
+// Thread safety: thread-compatible.
+// Invariants: nothing of the mesh is kept.
+class MeshReceiver {
+ public:
+  // What the mesh is known to be.
+  struct Expectation {
+    std::optional<int> dimension;
+    std::optional<uint64_t> input_points;
+  };
+
+  // REQUIRES:   `sink` outlives this.
+  MeshReceiver(MeshSink& sink, const Expectation& expectation) : sink_(sink), expectation_(expectation) {}
+
+  // The stream broke off, and another follows: the same metadata, then the chunks from next_chunk() on.
+  void Continue() { expects_metadata_ = true; }
+
+  // Errors:     DATA_LOSS, naming what is wrong; those of the sink. The stream is to be given up.
+  absl::Status SetMetadata(const v1::MeshMetadata& metadata);
+  absl::Status AddChunk(const v1::MeshChunk& chunk);
+
+  // To be called once the last stream has ended.
+  //
+  // Errors:     DATA_LOSS when something is missing; those of the sink.
+  absl::Status Finish();
+
+  bool has_metadata() const { return has_metadata_; }
+  bool has_all_chunks() const { return has_metadata_ && next_chunk_ == header_.chunk_count; }
+  uint64_t next_chunk() const { return next_chunk_; }
+  const MeshHeader& header() const { return header_; }
+
+ private:
+  // The arrays, in their order.
+  enum Array { kPoints, kSimplices, kInputVertices, kArrays };
+
+  absl::Status CheckMetadata(const MeshHeader& header) const;
+  uint64_t WidthOf(int array) const;
+  uint64_t SizeOf(int array) const;  // in numbers
+  // Whether `values` may follow what has come of `array`.
+  absl::Status CheckOrder(Array array, uint64_t values) const;
+
+  MeshSink& sink_;
+  const Expectation expectation_;
+  bool expects_metadata_ = true;
+  bool has_metadata_ = false;
+  MeshHeader header_;
+  uint64_t next_chunk_ = 0;
+  std::array<uint64_t, kArrays> received_ = {};  // numbers
+};
+
+}  // namespace wellspace::client
+
+#endif  // WELLSPACE_CLIENT_MESH_RECEIVER_H_

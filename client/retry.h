@@ -1,0 +1,100 @@
+// When a call is made again.
+#ifndef WELLSPACE_CLIENT_RETRY_H_
+#define WELLSPACE_CLIENT_RETRY_H_
+
+#include <atomic>
+#include <functional>
+#include <stop_token>
+#include <utility>
+
+#include "absl/status/status.h"
+#include "absl/time/time.h"
+#include "grpcpp/client_context.h"
+#include "grpcpp/support/status.h"
+
+namespace wellspace::client {
+
+// How patient a connection is. An attempt that brought something (a chunk, an event, committed points) is not counted: those after it
+// begin anew.
+struct RetryPolicy {
+  // Attempts in a row that may fail, with a server that has answered before; at least 1.
+  int max_attempts = 8;
+
+  // The same with a server that has never answered: its address may be wrong.
+  int max_first_attempts = 3;
+
+  // Waiting time before the second attempt; grows by `multiplier` for each further one, up to `max_backoff`. A random half of it is
+  // left out, so that clients of a server that comes back do not come all at once. What the server asks for (google.rpc.RetryInfo)
+  // is waited for in full.
+  absl::Duration initial_backoff = absl::Milliseconds(200);
+  double multiplier = 2;
+  absl::Duration max_backoff = absl::Seconds(10);
+};
+
+// The status of a call as the library returns it: code, message, and the google.rpc details as payloads under their type URLs.
+absl::Status FromGrpcStatus(const grpc::Status& status);
+
+// Whether the same call may succeed later: UNAVAILABLE, a reader that stalled, and what has a google.rpc.RetryInfo.
+bool IsWorthRepeating(const absl::Status& status);
+
+// One attempt at a call.
+//
+// Thread safety: thread-compatible.
+class Attempt {
+ public:
+  Attempt(absl::Time deadline, std::stop_token stop) : deadline_(deadline), stop_(std::move(stop)) {}
+
+  absl::Time deadline() const { return deadline_; }
+  const std::stop_token& stop() const { return stop_; }
+
+  // The server has answered with something that the call keeps.
+  void NoteProgress() { progressed_ = true; }
+  bool progressed() const { return progressed_; }
+
+  // `status` is the call's, whatever it is. Returns it.
+  absl::Status Final(absl::Status status) {
+    is_final_ = true;
+    return status;
+  }
+  bool is_final() const { return is_final_; }
+
+ private:
+  const absl::Time deadline_;
+  const std::stop_token stop_;
+  bool progressed_ = false;
+  bool is_final_ = false;
+};
+
+// The context of one call of an attempt, with its deadline; cancelled when a stop is asked for.
+class CallContext {
+ public:
+  explicit CallContext(const Attempt& attempt);
+
+  grpc::ClientContext* get() { return &context_; }
+  void Cancel() { context_.TryCancel(); }
+
+ private:
+  grpc::ClientContext context_;
+  std::stop_callback<std::function<void()>> cancel_;
+};
+
+// Makes calls until they succeed or another attempt makes no sense.
+//
+// Thread safety: thread-safe.
+class Retrier {
+ public:
+  explicit Retrier(const RetryPolicy& policy) : policy_(policy) {}
+
+  // Calls `attempt` until it is final, succeeds, fails with what is not worth repeating, or too often; or until `timeout` has passed.
+  // Errors:     the last attempt's; CANCELLED "cancelled by the caller" when `stop` asked for it.
+  absl::Status Run(absl::Duration timeout, const std::stop_token& stop,
+                   const std::function<absl::Status(Attempt&)>& attempt);
+
+ private:
+  const RetryPolicy policy_;
+  std::atomic<bool> reached_{false};
+};
+
+}  // namespace wellspace::client
+
+#endif  // WELLSPACE_CLIENT_RETRY_H_

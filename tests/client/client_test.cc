@@ -1,0 +1,154 @@
+// The Client over a connection that is not gRPC's.
+#include "client/client.h"
+
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "client/connection.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+namespace wellspace::client {
+namespace {
+
+using ::testing::_;
+using ::testing::Field;
+using ::testing::Return;
+using ::testing::SizeIs;
+
+class MockConnection : public Connection {
+ public:
+  MOCK_METHOD(absl::Status, MeshPoints,
+              (const MeshOptions&, std::span<const double>, MeshSink&, const OnProgress&, std::stop_token), (override));
+  MOCK_METHOD(absl::StatusOr<MeshEstimate>, EstimateMesh,
+              (const MeshOptions&, std::span<const double>, std::stop_token), (override));
+  MOCK_METHOD(absl::StatusOr<ServerInfo>, GetServerInfo, (const CallOptions&), (override));
+  MOCK_METHOD(absl::StatusOr<Health>, CheckHealth, (const std::string&, const CallOptions&), (override));
+  MOCK_METHOD(absl::StatusOr<Session>, CreateSession, (const SessionOptions&, const CallOptions&), (override));
+  MOCK_METHOD(absl::StatusOr<Session>, GetSession, (const std::string&, const CallOptions&), (override));
+  MOCK_METHOD(absl::StatusOr<SessionPage>, ListSessions, (const Labels&, const PageOptions&, const CallOptions&),
+              (override));
+  MOCK_METHOD(absl::StatusOr<Session>, UpdateSession, (const std::string&, const SessionChange&, const CallOptions&),
+              (override));
+  MOCK_METHOD(absl::Status, DeleteSession, (const std::string&, const CallOptions&), (override));
+  MOCK_METHOD(absl::StatusOr<Uploaded>, UploadPoints,
+              (const std::string&, PointSource&, std::optional<uint64_t>, const OnPoints&, const CallOptions&),
+              (override));
+  MOCK_METHOD(absl::Status, DownloadMesh,
+              (const std::string&, MeshSink&, uint64_t, const OnChunks&, const CallOptions&), (override));
+  MOCK_METHOD(absl::StatusOr<Operation>, StartRefinement,
+              (const std::string&, const std::optional<MeshOptions>&, const CallOptions&), (override));
+  MOCK_METHOD(absl::StatusOr<Operation>, GetOperation, (const std::string&, const CallOptions&), (override));
+  MOCK_METHOD(absl::StatusOr<OperationPage>, ListOperations,
+              (const std::string&, const PageOptions&, const CallOptions&), (override));
+  MOCK_METHOD(absl::StatusOr<Operation>, CancelOperation, (const std::string&, const CallOptions&), (override));
+  MOCK_METHOD(absl::StatusOr<Operation>, WatchOperation,
+              (const std::string&, const OnProgress&, std::optional<uint64_t>, const CallOptions&), (override));
+  MOCK_METHOD(absl::Status, ApproximateNearestNeighbors,
+              (const std::string&, std::span<const uint32_t>, const OnDistances&, const CallOptions&), (override));
+  MOCK_METHOD(absl::Status, ClippedVoronoiCells,
+              (const std::string&, std::span<const uint32_t>, double, const OnCells&, const CallOptions&), (override));
+  MOCK_METHOD(absl::Status, VoronoiCells,
+              (const std::string&, std::span<const uint32_t>, const OnCells&, const CallOptions&), (override));
+  MOCK_METHOD(absl::StatusOr<AddedVertices>, AddVertices,
+              (const std::string&, std::span<const double>, std::span<const uint32_t>, const CallOptions&), (override));
+};
+
+absl::Status E(const char* what) { return absl::AbortedError(what); }
+
+TEST(Client, PassesMeshingToItsConnection) {
+  auto connection = std::make_shared<MockConnection>();
+  Client client(connection);
+  const std::vector<double> points = {1, 2};
+  MeshOptions options;
+  options.dimension = 2;
+  EXPECT_CALL(*connection, MeshPoints(Field(&MeshOptions::dimension, 2), SizeIs(2), _, _, _))
+      .WillOnce(Return(E("mesh")))
+      .WillOnce([](const auto&, const auto&, MeshSink& sink, const auto&, auto) {
+        EXPECT_TRUE(sink.AddInputVertices(std::vector<uint32_t>{7}).ok());
+        return sink.Finish();
+      });
+  EXPECT_CALL(*connection, EstimateMesh(Field(&MeshOptions::dimension, 2), SizeIs(2), _))
+      .WillOnce(Return(E("estimate")));
+  EXPECT_CALL(*connection, GetServerInfo(_)).WillOnce(Return(E("info")));
+  EXPECT_CALL(*connection, CheckHealth("a", _)).WillOnce(Return(E("health")));
+  EXPECT_EQ(client.MeshPoints(options, points).status(), E("mesh"));
+  EXPECT_EQ(client.MeshPoints(options, points)->input_vertex, std::vector<uint32_t>{7});
+  EXPECT_EQ(client.EstimateMesh(options, points).status(), E("estimate"));
+  EXPECT_EQ(client.GetServerInfo().status(), E("info"));
+  EXPECT_EQ(client.CheckHealth("a").status(), E("health"));
+}
+
+TEST(Client, PassesSessionsAndOperationsToItsConnection) {
+  auto connection = std::make_shared<MockConnection>();
+  Client client(connection);
+  const CallOptions call = {.timeout = absl::Seconds(3), .stop = {}, .request_id = "r", .expected_revision = 4};
+  const auto is_call =
+      ::testing::AllOf(Field(&CallOptions::timeout, absl::Seconds(3)), Field(&CallOptions::request_id, "r"),
+                       Field(&CallOptions::expected_revision, 4));
+  const std::vector<double> points = {1, 2};
+  SpanSource source(2, points);
+  MeshCollector sink;
+  EXPECT_CALL(*connection, CreateSession(_, is_call)).WillOnce(Return(E("create")));
+  EXPECT_CALL(*connection, GetSession("s", is_call)).WillOnce(Return(E("get")));
+  EXPECT_CALL(*connection, ListSessions(SizeIs(1), Field(&PageOptions::page_token, "t"), is_call))
+      .WillOnce(Return(E("list")));
+  EXPECT_CALL(*connection, UpdateSession("s", _, is_call)).WillOnce(Return(E("update")));
+  EXPECT_CALL(*connection, DeleteSession("s", is_call)).WillOnce(Return(E("delete")));
+  EXPECT_CALL(*connection, UploadPoints("s", ::testing::Ref(source), std::optional<uint64_t>(5), _, is_call))
+      .WillOnce(Return(E("upload")));
+  EXPECT_CALL(*connection, DownloadMesh("s", ::testing::Ref(sink), 6, _, is_call)).WillOnce(Return(E("download")));
+  EXPECT_CALL(*connection, StartRefinement("s", _, is_call)).WillOnce(Return(E("start")));
+  EXPECT_CALL(*connection, GetOperation("o", is_call)).WillOnce(Return(E("operation")));
+  EXPECT_CALL(*connection, ListOperations("s", Field(&PageOptions::page_size, 2), is_call))
+      .WillOnce(Return(E("operations")));
+  EXPECT_CALL(*connection, CancelOperation("o", is_call)).WillOnce(Return(E("cancel")));
+  EXPECT_CALL(*connection, WatchOperation("o", _, std::optional<uint64_t>(8), is_call)).WillOnce(Return(E("watch")));
+  EXPECT_EQ(client.CreateSession({}, call).status(), E("create"));
+  EXPECT_EQ(client.GetSession("s", call).status(), E("get"));
+  EXPECT_EQ(client.ListSessions({{"a", "b"}}, {.page_size = 0, .page_token = "t"}, call).status(), E("list"));
+  EXPECT_EQ(client.UpdateSession("s", {}, call).status(), E("update"));
+  EXPECT_EQ(client.DeleteSession("s", call), E("delete"));
+  EXPECT_EQ(client.UploadPoints("s", source, 5, nullptr, call).status(), E("upload"));
+  EXPECT_EQ(client.DownloadMesh("s", sink, 6, nullptr, call), E("download"));
+  EXPECT_EQ(client.StartRefinement("s", std::nullopt, call).status(), E("start"));
+  EXPECT_EQ(client.GetOperation("o", call).status(), E("operation"));
+  EXPECT_EQ(client.ListOperations("s", {.page_size = 2, .page_token = ""}, call).status(), E("operations"));
+  EXPECT_EQ(client.CancelOperation("o", call).status(), E("cancel"));
+  EXPECT_EQ(client.WatchOperation("o", nullptr, 8, call).status(), E("watch"));
+}
+
+TEST(Client, PassesQueriesToItsConnection) {
+  auto connection = std::make_shared<MockConnection>();
+  Client client(connection);
+  const std::vector<uint32_t> vertices = {1, 2, 3};
+  const std::vector<double> points = {1, 2};
+  EXPECT_CALL(*connection, ApproximateNearestNeighbors("s", SizeIs(3), _, _)).WillOnce(Return(E("nearest")));
+  EXPECT_CALL(*connection, ClippedVoronoiCells("s", SizeIs(3), 4, _, _)).WillOnce(Return(E("clipped")));
+  EXPECT_CALL(*connection, VoronoiCells("s", SizeIs(3), _, _)).WillOnce(Return(E("cells")));
+  EXPECT_CALL(*connection, AddVertices("s", SizeIs(2), SizeIs(3), _)).WillOnce(Return(E("add")));
+  EXPECT_EQ(client.ApproximateNearestNeighbors("s", vertices, nullptr), E("nearest"));
+  EXPECT_EQ(client.ClippedVoronoiCells("s", vertices, 4, nullptr), E("clipped"));
+  EXPECT_EQ(client.VoronoiCells("s", vertices, nullptr), E("cells"));
+  EXPECT_EQ(client.AddVertices("s", points, vertices).status(), E("add"));
+}
+
+TEST(SpanSource, SeeksAndReadsWholeRows) {
+  const std::vector<double> points = {1, 2, 3, 4, 5, 6};
+  SpanSource source(2, points);
+  std::vector<double> rows(4);
+  ASSERT_TRUE(source.Seek(1).ok());
+  EXPECT_EQ(*source.Read(rows), 2u);
+  EXPECT_EQ(rows, (std::vector<double>{3, 4, 5, 6}));
+  EXPECT_EQ(*source.Read(rows), 0u);
+  ASSERT_TRUE(source.Seek(99).ok());
+  EXPECT_EQ(*source.Read(rows), 0u);
+  ASSERT_TRUE(source.Seek(0).ok());
+  EXPECT_EQ(*source.Read(rows), 2u);
+  EXPECT_EQ(*source.Read(rows), 1u);
+  EXPECT_EQ(rows[0], 5);
+}
+
+}  // namespace
+}  // namespace wellspace::client

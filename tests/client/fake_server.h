@@ -1,0 +1,178 @@
+// A server of the generated services that answers as a test says.
+#ifndef WELLSPACE_TESTS_CLIENT_FAKE_SERVER_H_
+#define WELLSPACE_TESTS_CLIENT_FAKE_SERVER_H_
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "client/client.h"
+#include "client/connection.h"
+#include "google/rpc/error_details.pb.h"
+#include "google/rpc/status.pb.h"
+#include "grpcpp/grpcpp.h"
+#include "wellspace/v1/operations.grpc.pb.h"
+#include "wellspace/v1/queries.grpc.pb.h"
+#include "wellspace/v1/sessions.grpc.pb.h"
+
+namespace wellspace::client {
+
+// An error as the server makes it; `retry_ms` >= 0 adds a RetryInfo.
+inline grpc::Status MakeError(grpc::StatusCode code, const std::string& message, const std::string& reason,
+                              int retry_ms = -1) {
+  google::rpc::Status details;
+  google::rpc::ErrorInfo info;
+  info.set_reason(reason);
+  details.add_details()->PackFrom(info);
+  if (retry_ms >= 0) {
+    google::rpc::RetryInfo retry;
+    retry.mutable_retry_delay()->set_nanos(retry_ms * 1'000'000);
+    details.add_details()->PackFrom(retry);
+  }
+  return grpc::Status(code, message, details.SerializeAsString());
+}
+
+// A connection that breaks, as gRPC tells it.
+inline grpc::Status Broken() { return grpc::Status(grpc::StatusCode::UNAVAILABLE, "Socket closed"); }
+
+// Patience that a test has time for.
+inline RetryPolicy QuickRetries() {
+  return {.max_attempts = 4,
+          .max_first_attempts = 2,
+          .initial_backoff = absl::Milliseconds(1),
+          .multiplier = 2,
+          .max_backoff = absl::Milliseconds(4)};
+}
+
+template <typename Request, typename Response>
+using Unary = std::function<grpc::Status(const Request&, Response&)>;
+template <typename Request, typename Response>
+using Streaming = std::function<grpc::Status(grpc::ServerContext&, const Request&, grpc::ServerWriter<Response>&)>;
+
+// What each call does; those that a test leaves empty are UNIMPLEMENTED.
+struct FakeSessions final : v1::SessionService::Service {
+  Unary<v1::CreateSessionRequest, v1::CreateSessionResponse> create;
+  Unary<v1::GetSessionRequest, v1::GetSessionResponse> get;
+  Unary<v1::ListSessionsRequest, v1::ListSessionsResponse> list;
+  Unary<v1::UpdateSessionRequest, v1::UpdateSessionResponse> update;
+  Unary<v1::DeleteSessionRequest, v1::DeleteSessionResponse> remove;
+  std::function<grpc::Status(grpc::ServerContext&, grpc::ServerReader<v1::UploadPointsRequest>&,
+                             v1::UploadPointsResponse&)>
+      upload;
+  Streaming<v1::DownloadMeshRequest, v1::DownloadMeshResponse> download;
+
+  grpc::Status CreateSession(grpc::ServerContext* /*context*/, const v1::CreateSessionRequest* request,
+                             v1::CreateSessionResponse* response) override {
+    return create(*request, *response);
+  }
+  grpc::Status GetSession(grpc::ServerContext* /*context*/, const v1::GetSessionRequest* request,
+                          v1::GetSessionResponse* response) override {
+    return get(*request, *response);
+  }
+  grpc::Status ListSessions(grpc::ServerContext* /*context*/, const v1::ListSessionsRequest* request,
+                            v1::ListSessionsResponse* response) override {
+    return list(*request, *response);
+  }
+  grpc::Status UpdateSession(grpc::ServerContext* /*context*/, const v1::UpdateSessionRequest* request,
+                             v1::UpdateSessionResponse* response) override {
+    return update(*request, *response);
+  }
+  grpc::Status DeleteSession(grpc::ServerContext* /*context*/, const v1::DeleteSessionRequest* request,
+                             v1::DeleteSessionResponse* response) override {
+    return remove(*request, *response);
+  }
+  grpc::Status UploadPoints(grpc::ServerContext* context, grpc::ServerReader<v1::UploadPointsRequest>* reader,
+                            v1::UploadPointsResponse* response) override {
+    return upload(*context, *reader, *response);
+  }
+  grpc::Status DownloadMesh(grpc::ServerContext* context, const v1::DownloadMeshRequest* request,
+                            grpc::ServerWriter<v1::DownloadMeshResponse>* writer) override {
+    return download(*context, *request, *writer);
+  }
+};
+
+struct FakeOperations final : v1::OperationService::Service {
+  Unary<v1::StartRefinementRequest, v1::StartRefinementResponse> start;
+  Unary<v1::GetOperationRequest, v1::GetOperationResponse> get;
+  Unary<v1::ListOperationsRequest, v1::ListOperationsResponse> list;
+  Unary<v1::CancelOperationRequest, v1::CancelOperationResponse> cancel;
+  Streaming<v1::WatchOperationRequest, v1::WatchOperationResponse> watch;
+
+  grpc::Status StartRefinement(grpc::ServerContext* /*context*/, const v1::StartRefinementRequest* request,
+                               v1::StartRefinementResponse* response) override {
+    return start(*request, *response);
+  }
+  grpc::Status GetOperation(grpc::ServerContext* /*context*/, const v1::GetOperationRequest* request,
+                            v1::GetOperationResponse* response) override {
+    return get(*request, *response);
+  }
+  grpc::Status ListOperations(grpc::ServerContext* /*context*/, const v1::ListOperationsRequest* request,
+                              v1::ListOperationsResponse* response) override {
+    return list(*request, *response);
+  }
+  grpc::Status CancelOperation(grpc::ServerContext* /*context*/, const v1::CancelOperationRequest* request,
+                               v1::CancelOperationResponse* response) override {
+    return cancel(*request, *response);
+  }
+  grpc::Status WatchOperation(grpc::ServerContext* context, const v1::WatchOperationRequest* request,
+                              grpc::ServerWriter<v1::WatchOperationResponse>* writer) override {
+    return watch(*context, *request, *writer);
+  }
+};
+
+struct FakeQueries final : v1::QueryService::Service {
+  Streaming<v1::ApproximateNearestNeighborsRequest, v1::ApproximateNearestNeighborsResponse> nearest;
+  Streaming<v1::ClippedVoronoiCellsRequest, v1::ClippedVoronoiCellsResponse> clipped;
+  Streaming<v1::VoronoiCellsRequest, v1::VoronoiCellsResponse> cells;
+  Unary<v1::AddVerticesRequest, v1::AddVerticesResponse> add;
+
+  grpc::Status ApproximateNearestNeighbors(
+      grpc::ServerContext* context, const v1::ApproximateNearestNeighborsRequest* request,
+      grpc::ServerWriter<v1::ApproximateNearestNeighborsResponse>* writer) override {
+    return nearest(*context, *request, *writer);
+  }
+  grpc::Status ClippedVoronoiCells(grpc::ServerContext* context, const v1::ClippedVoronoiCellsRequest* request,
+                                   grpc::ServerWriter<v1::ClippedVoronoiCellsResponse>* writer) override {
+    return clipped(*context, *request, *writer);
+  }
+  grpc::Status VoronoiCells(grpc::ServerContext* context, const v1::VoronoiCellsRequest* request,
+                            grpc::ServerWriter<v1::VoronoiCellsResponse>* writer) override {
+    return cells(*context, *request, *writer);
+  }
+  grpc::Status AddVertices(grpc::ServerContext* /*context*/, const v1::AddVerticesRequest* request,
+                           v1::AddVerticesResponse* response) override {
+    return add(*request, *response);
+  }
+};
+
+// To be told what to do before the first call.
+class FakeServer {
+ public:
+  FakeServer() {
+    grpc::ServerBuilder builder;
+    builder.RegisterService(&sessions);
+    builder.RegisterService(&operations);
+    builder.RegisterService(&queries);
+    server_ = builder.BuildAndStart();
+  }
+  ~FakeServer() { server_->Shutdown(std::chrono::system_clock::now() + std::chrono::seconds(30)); }
+  FakeServer(const FakeServer&) = delete;
+  FakeServer& operator=(const FakeServer&) = delete;
+
+  client::Client Client(const RetryPolicy& policy = QuickRetries()) {
+    return client::Client(MakeConnection(server_->InProcessChannel(grpc::ChannelArguments()), policy));
+  }
+
+  FakeSessions sessions;
+  FakeOperations operations;
+  FakeQueries queries;
+
+ private:
+  std::unique_ptr<grpc::Server> server_;
+};
+
+}  // namespace wellspace::client
+
+#endif  // WELLSPACE_TESTS_CLIENT_FAKE_SERVER_H_

@@ -1,0 +1,490 @@
+// Sessions, operations and queries of the client library, and when it tries again.
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include "tests/client/fake_server.h"
+
+namespace wellspace::client {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+
+constexpr char kSession[] = "sessions/one";
+constexpr char kOperation[] = "sessions/one/operations/two";
+
+v1::Session MakeSession() {
+  v1::Session session;
+  session.set_name(kSession);
+  session.set_state(v1::Session::STATE_READY);
+  session.mutable_parameters()->set_dimension(2);
+  session.mutable_parameters()->set_rho(1.5);
+  session.mutable_parameters()->set_margin(0);
+  session.mutable_parameters()->set_criterion(v1::CRITERION_WELL_SPACED);
+  v1::SizeBox* box = session.mutable_parameters()->add_size_boxes();
+  box->add_low(1);
+  box->add_high(2);
+  box->set_max_circumradius(0.5);
+  (*session.mutable_labels())["job"] = "7";
+  session.mutable_ttl()->set_seconds(90);
+  session.mutable_ttl()->set_nanos(500'000'000);
+  session.mutable_create_time()->set_seconds(1'000);
+  session.mutable_expire_time()->set_seconds(2'000);
+  session.set_revision(3);
+  session.set_committed_points(4);
+  session.set_vertex_count(5);
+  session.set_simplex_count(6);
+  session.set_last_operation(kOperation);
+  return session;
+}
+
+void ExpectIsTheSession(const Session& session) {
+  EXPECT_EQ(session.name, kSession);
+  EXPECT_EQ(session.state, SessionState::kReady);
+  EXPECT_EQ(session.parameters.dimension, 2);
+  EXPECT_EQ(session.parameters.rho, 1.5);
+  EXPECT_EQ(session.parameters.margin, 0);
+  EXPECT_EQ(session.parameters.criterion, Criterion::kWellSpaced);
+  ASSERT_THAT(session.parameters.size_boxes, SizeIs(1));
+  EXPECT_THAT(session.parameters.size_boxes[0].high, ElementsAre(2));
+  EXPECT_EQ(session.labels, (Labels{{"job", "7"}}));
+  EXPECT_EQ(session.ttl, absl::Milliseconds(90'500));
+  EXPECT_EQ(session.create_time, absl::FromUnixSeconds(1'000));
+  EXPECT_EQ(session.expire_time, absl::FromUnixSeconds(2'000));
+  EXPECT_EQ(session.revision, 3u);
+  EXPECT_EQ(session.committed_points, 4u);
+  EXPECT_EQ(session.vertex_count, 5u);
+  EXPECT_EQ(session.simplex_count, 6u);
+  EXPECT_EQ(session.last_operation, kOperation);
+}
+
+TEST(Sessions, CreateSendsAllAndARequestIdOfItsOwn) {
+  FakeServer server;
+  std::vector<v1::CreateSessionRequest> requests;
+  server.sessions.create = [&requests](const v1::CreateSessionRequest& request, v1::CreateSessionResponse& response) {
+    requests.push_back(request);
+    *response.mutable_session() = MakeSession();
+    return grpc::Status::OK;
+  };
+  SessionOptions options;
+  options.parameters.dimension = 4;
+  options.parameters.max_circumradius = 0.25;
+  options.labels = {{"a", "b"}};
+  options.ttl = absl::Milliseconds(1500);
+  Client client = server.Client();
+  const absl::StatusOr<Session> session = client.CreateSession(options);
+  ASSERT_TRUE(session.ok()) << session.status();
+  ExpectIsTheSession(*session);
+  ASSERT_TRUE(client.CreateSession({}).ok());
+  CallOptions call;
+  call.request_id = "mine";
+  ASSERT_TRUE(client.CreateSession({}, call).ok());
+  ASSERT_THAT(requests, SizeIs(3));
+  EXPECT_EQ(requests[0].parameters().dimension(), 4);
+  EXPECT_EQ(requests[0].parameters().max_circumradius(), 0.25);
+  EXPECT_EQ(requests[0].labels().at("a"), "b");
+  EXPECT_EQ(requests[0].ttl().seconds(), 1);
+  EXPECT_EQ(requests[0].ttl().nanos(), 500'000'000);
+  EXPECT_FALSE(requests[1].has_ttl());
+  EXPECT_THAT(requests[0].request_id(), SizeIs(32));
+  EXPECT_NE(requests[0].request_id(), requests[1].request_id());
+  EXPECT_EQ(requests[2].request_id(), "mine");
+}
+
+TEST(Sessions, GetListUpdateDelete) {
+  FakeServer server;
+  server.sessions.get = [](const v1::GetSessionRequest& request, v1::GetSessionResponse& response) {
+    EXPECT_EQ(request.name(), kSession);
+    *response.mutable_session() = MakeSession();
+    return grpc::Status::OK;
+  };
+  server.sessions.list = [](const v1::ListSessionsRequest& request, v1::ListSessionsResponse& response) {
+    EXPECT_EQ(request.page_size(), 2);
+    EXPECT_EQ(request.page_token(), "here");
+    EXPECT_EQ(request.labels().at("job"), "7");
+    *response.add_sessions() = MakeSession();
+    response.set_next_page_token("there");
+    return grpc::Status::OK;
+  };
+  std::vector<v1::UpdateSessionRequest> updates;
+  server.sessions.update = [&updates](const v1::UpdateSessionRequest& request, v1::UpdateSessionResponse& response) {
+    updates.push_back(request);
+    *response.mutable_session() = MakeSession();
+    return grpc::Status::OK;
+  };
+  server.sessions.remove = [](const v1::DeleteSessionRequest& request, v1::DeleteSessionResponse&) {
+    EXPECT_EQ(request.name(), kSession);
+    EXPECT_EQ(request.expected_revision(), 9u);
+    return grpc::Status::OK;
+  };
+  Client client = server.Client();
+  const absl::StatusOr<Session> session = client.GetSession(kSession);
+  ASSERT_TRUE(session.ok()) << session.status();
+  ExpectIsTheSession(*session);
+  const absl::StatusOr<SessionPage> page = client.ListSessions({{"job", "7"}}, {.page_size = 2, .page_token = "here"});
+  ASSERT_TRUE(page.ok()) << page.status();
+  ASSERT_THAT(page->sessions, SizeIs(1));
+  ExpectIsTheSession(page->sessions[0]);
+  EXPECT_EQ(page->next_page_token, "there");
+  ASSERT_TRUE(client.UpdateSession(kSession, {.labels = Labels{}, .ttl = std::nullopt}).ok());
+  ASSERT_TRUE(client.UpdateSession(kSession, {.labels = std::nullopt, .ttl = absl::Seconds(5)}).ok());
+  ASSERT_THAT(updates, SizeIs(2));
+  EXPECT_THAT(updates[0].update_mask().paths(), ElementsAre("labels"));
+  EXPECT_THAT(updates[1].update_mask().paths(), ElementsAre("ttl"));
+  EXPECT_EQ(updates[1].session().ttl().seconds(), 5);
+  CallOptions call;
+  call.expected_revision = 9;
+  EXPECT_TRUE(client.DeleteSession(kSession, call).ok());
+}
+
+v1::Operation MakeOperation(v1::Operation::State state) {
+  v1::Operation operation;
+  operation.set_name(kOperation);
+  operation.set_state(state);
+  operation.mutable_parameters()->set_dimension(2);
+  operation.mutable_progress()->set_vertices(8);
+  operation.mutable_create_time()->set_seconds(10);
+  if (state == v1::Operation::STATE_FAILED) {
+    const grpc::Status error =
+        MakeError(grpc::StatusCode::RESOURCE_EXHAUSTED, "too many vertices", "ERROR_REASON_MESH_TOO_LARGE");
+    operation.mutable_error()->ParseFromString(error.error_details());
+    operation.mutable_error()->set_code(error.error_code());
+    operation.mutable_error()->set_message(error.error_message());
+    operation.mutable_start_time()->set_seconds(11);
+    operation.mutable_end_time()->set_seconds(12);
+  }
+  return operation;
+}
+
+TEST(Operations, StartGetListCancel) {
+  FakeServer server;
+  std::vector<v1::StartRefinementRequest> starts;
+  server.operations.start = [&starts](const v1::StartRefinementRequest& request,
+                                      v1::StartRefinementResponse& response) {
+    starts.push_back(request);
+    *response.mutable_operation() = MakeOperation(v1::Operation::STATE_QUEUED);
+    return grpc::Status::OK;
+  };
+  server.operations.get = [](const v1::GetOperationRequest& request, v1::GetOperationResponse& response) {
+    EXPECT_EQ(request.name(), kOperation);
+    *response.mutable_operation() = MakeOperation(v1::Operation::STATE_FAILED);
+    return grpc::Status::OK;
+  };
+  server.operations.list = [](const v1::ListOperationsRequest& request, v1::ListOperationsResponse& response) {
+    EXPECT_EQ(request.parent(), kSession);
+    *response.add_operations() = MakeOperation(v1::Operation::STATE_RUNNING);
+    response.set_next_page_token("more");
+    return grpc::Status::OK;
+  };
+  server.operations.cancel = [](const v1::CancelOperationRequest& request, v1::CancelOperationResponse& response) {
+    EXPECT_EQ(request.name(), kOperation);
+    *response.mutable_operation() = MakeOperation(v1::Operation::STATE_CANCELLED);
+    return grpc::Status::OK;
+  };
+  Client client = server.Client();
+  MeshOptions parameters;
+  parameters.rho = 3;
+  ASSERT_TRUE(client.StartRefinement(kSession, parameters).ok());
+  const absl::StatusOr<Operation> started = client.StartRefinement(kSession);
+  ASSERT_TRUE(started.ok()) << started.status();
+  EXPECT_EQ(started->state, OperationState::kQueued);
+  EXPECT_FALSE(started->start_time.has_value());
+  EXPECT_TRUE(started->error.ok());
+  ASSERT_THAT(starts, SizeIs(2));
+  EXPECT_EQ(starts[0].parameters().rho(), 3);
+  EXPECT_FALSE(starts[1].has_parameters());
+  EXPECT_FALSE(starts[1].request_id().empty());
+  const absl::StatusOr<Operation> failed = client.GetOperation(kOperation);
+  ASSERT_TRUE(failed.ok()) << failed.status();
+  EXPECT_EQ(failed->state, OperationState::kFailed);
+  EXPECT_EQ(failed->error.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(ReasonOf(failed->error), "ERROR_REASON_MESH_TOO_LARGE");
+  EXPECT_EQ(failed->end_time, absl::FromUnixSeconds(12));
+  const absl::StatusOr<OperationPage> page = client.ListOperations(kSession);
+  ASSERT_TRUE(page.ok()) << page.status();
+  EXPECT_THAT(page->operations, SizeIs(1));
+  EXPECT_EQ(page->next_page_token, "more");
+  EXPECT_EQ(client.CancelOperation(kOperation)->state, OperationState::kCancelled);
+}
+
+TEST(Operations, AWatchIsJoinedAgainAfterTheLastEvent) {
+  FakeServer server;
+  std::vector<v1::WatchOperationRequest> requests;
+  server.operations.watch = [&requests](grpc::ServerContext&, const v1::WatchOperationRequest& request, auto& writer) {
+    requests.push_back(request);
+    const uint64_t next = request.has_after_sequence() ? request.after_sequence() + 1 : 0;
+    v1::WatchOperationResponse response;
+    response.mutable_progress()->set_sequence(next);
+    response.mutable_progress()->set_phase(v1::PHASE_REFINEMENT);
+    writer.Write(response);
+    if (next < 6) {
+      return Broken();
+    }
+    *response.mutable_operation() = MakeOperation(v1::Operation::STATE_SUCCEEDED);
+    writer.Write(response);
+    return grpc::Status::OK;
+  };
+  std::vector<uint64_t> sequences;
+  const absl::StatusOr<Operation> operation = server.Client().WatchOperation(
+      kOperation, [&sequences](const Progress& progress) { sequences.push_back(progress.sequence); });
+  ASSERT_TRUE(operation.ok()) << operation.status();
+  EXPECT_EQ(operation->state, OperationState::kSucceeded);
+  EXPECT_THAT(sequences, ElementsAre(0, 1, 2, 3, 4, 5, 6));
+  EXPECT_FALSE(requests[0].has_after_sequence());
+  EXPECT_EQ(requests[6].after_sequence(), 5u);
+  ASSERT_TRUE(server.Client().WatchOperation(kOperation, nullptr, 6).ok());
+  EXPECT_EQ(requests[7].after_sequence(), 6u);
+}
+
+TEST(Operations, AWatchWithoutAnEndIsDataLoss) {
+  FakeServer server;
+  server.operations.watch = [](grpc::ServerContext&, const auto&, auto&) { return grpc::Status::OK; };
+  EXPECT_EQ(server.Client().WatchOperation(kOperation).status().code(), absl::StatusCode::kDataLoss);
+}
+
+// A batch of cells of `vertices`, each a triangle with one neighbour.
+v1::VoronoiCellBatch MakeCells(const std::vector<uint32_t>& vertices) {
+  v1::VoronoiCellBatch cells;
+  for (const uint32_t vertex : vertices) {
+    cells.add_vertices(vertex);
+    cells.add_clip_radii(std::numeric_limits<double>::infinity());
+    cells.add_is_clipped(false);
+    cells.add_node_counts(3);
+    for (int i = 0; i < 6; ++i) {
+      cells.add_nodes(vertex + i);
+    }
+    cells.add_neighbour_counts(1);
+    cells.add_neighbours(vertex + 1);
+  }
+  return cells;
+}
+
+// Answers one vertex a message, and breaks off after so many messages.
+template <typename Request, typename Writer>
+grpc::Status AnswerSome(const Request& request, size_t count, Writer& writer) {
+  v1::VoronoiCellsResponse response;
+  for (size_t i = 0; i < std::min<size_t>(count, request.vertices_size()); ++i) {
+    *response.mutable_cells() = MakeCells({request.vertices(static_cast<int>(i))});
+    writer.Write(response);
+  }
+  return count < static_cast<size_t>(request.vertices_size()) ? Broken() : grpc::Status::OK;
+}
+
+TEST(Queries, GoOnAfterTheLastAnsweredVertex) {
+  FakeServer server;
+  int calls = 0;
+  server.queries.cells = [&calls](grpc::ServerContext&, const v1::VoronoiCellsRequest& request, auto& writer) {
+    ++calls;
+    EXPECT_EQ(request.name(), kSession);
+    return AnswerSome(request, 2, writer);
+  };
+  std::vector<uint32_t> answered;
+  const std::vector<uint32_t> vertices = {9, 3, 7, 1, 5};
+  const absl::Status status = server.Client().VoronoiCells(kSession, vertices, [&answered](const CellBatch& cells) {
+    answered.insert(answered.end(), cells.vertices.begin(), cells.vertices.end());
+    EXPECT_EQ(cells.dimension, 2);
+    EXPECT_THAT(cells.node_counts, ElementsAre(3));
+    EXPECT_FALSE(cells.is_clipped[0]);
+    return absl::OkStatus();
+  });
+  ASSERT_TRUE(status.ok()) << status;
+  EXPECT_EQ(answered, vertices);
+  EXPECT_EQ(calls, 3);
+}
+
+TEST(Queries, ManyVerticesGoInSeveralRequests) {
+  FakeServer server;
+  size_t largest = 0;
+  server.queries.nearest = [&largest](grpc::ServerContext&, const v1::ApproximateNearestNeighborsRequest& request,
+                                      auto& writer) {
+    largest = std::max(largest, request.ByteSizeLong());
+    v1::ApproximateNearestNeighborsResponse response;
+    for (const uint32_t vertex : request.vertices()) {
+      response.add_distances(vertex);
+    }
+    writer.Write(response);
+    return grpc::Status::OK;
+  };
+  std::vector<uint32_t> vertices(300'000);
+  std::iota(vertices.begin(), vertices.end(), 0);
+  std::vector<double> distances;
+  const absl::Status status =
+      server.Client().ApproximateNearestNeighbors(kSession, vertices, [&distances](std::span<const double> batch) {
+        distances.insert(distances.end(), batch.begin(), batch.end());
+        return absl::OkStatus();
+      });
+  ASSERT_TRUE(status.ok()) << status;
+  EXPECT_EQ(distances, std::vector<double>(vertices.begin(), vertices.end()));
+  EXPECT_LT(largest, 1u << 20);
+}
+
+TEST(Queries, OfAllVerticesAreRepeatedOnlyFromTheStart) {
+  FakeServer server;
+  int calls = 0;
+  bool answers_first = false;
+  server.queries.clipped = [&](grpc::ServerContext&, const v1::ClippedVoronoiCellsRequest& request, auto& writer) {
+    ++calls;
+    EXPECT_EQ(request.beta(), 4);
+    EXPECT_TRUE(request.vertices().empty());
+    if (calls == 1 && !answers_first) {
+      return Broken();
+    }
+    v1::ClippedVoronoiCellsResponse response;
+    *response.mutable_cells() = MakeCells({0, 1});
+    writer.Write(response);
+    return calls == 1 ? Broken() : grpc::Status::OK;
+  };
+  size_t cells = 0;
+  const auto count = [&cells](const CellBatch& batch) {
+    cells += batch.vertices.size();
+    return absl::OkStatus();
+  };
+  EXPECT_TRUE(server.Client().ClippedVoronoiCells(kSession, {}, 4, count).ok());
+  EXPECT_EQ(calls, 2);
+  EXPECT_EQ(cells, 2u);
+  calls = 0;
+  answers_first = true;
+  EXPECT_EQ(server.Client().ClippedVoronoiCells(kSession, {}, 4, count), absl::UnavailableError("Socket closed"));
+  EXPECT_EQ(calls, 1);
+}
+
+TEST(Queries, DamagedAnswersAreDataLoss) {
+  using Spoil = void (*)(v1::VoronoiCellBatch&);
+  const std::vector<Spoil> damages = {
+      [](v1::VoronoiCellBatch& cells) { cells.mutable_clip_radii()->RemoveLast(); },
+      [](v1::VoronoiCellBatch& cells) { cells.add_is_clipped(true); },
+      [](v1::VoronoiCellBatch& cells) { cells.mutable_nodes()->RemoveLast(); },
+      [](v1::VoronoiCellBatch& cells) { cells.clear_nodes(); },
+      [](v1::VoronoiCellBatch& cells) { cells.set_node_counts(0, 0xFFFFFFFF); },
+      [](v1::VoronoiCellBatch& cells) { cells.add_neighbours(1); },
+      [](v1::VoronoiCellBatch& cells) { cells.set_neighbour_counts(0, 0xFFFFFFFF); },
+      [](v1::VoronoiCellBatch& cells) { cells.Clear(); },  // too few
+      [](v1::VoronoiCellBatch& cells) {
+        cells = MakeCells({0, 1, 2, 3, 4});
+      },  // too many
+  };
+  const std::vector<uint32_t> vertices = {0, 1};
+  for (size_t i = 0; i < damages.size(); ++i) {
+    FakeServer server;
+    server.queries.cells = [&](grpc::ServerContext&, const auto&, auto& writer) {
+      v1::VoronoiCellsResponse response;
+      *response.mutable_cells() = MakeCells({0, 1});
+      damages[i](*response.mutable_cells());
+      writer.Write(response);
+      return grpc::Status::OK;
+    };
+    EXPECT_EQ(
+        server.Client().VoronoiCells(kSession, vertices, [](const CellBatch&) { return absl::OkStatus(); }).code(),
+        absl::StatusCode::kDataLoss)
+        << i;
+  }
+}
+
+TEST(Queries, ACallbackThatFailsEndsTheCall) {
+  FakeServer server;
+  server.queries.cells = [](grpc::ServerContext&, const v1::VoronoiCellsRequest& request, auto& writer) {
+    return AnswerSome(request, 2, writer);
+  };
+  const std::vector<uint32_t> vertices = {0, 1};
+  EXPECT_EQ(
+      server.Client().VoronoiCells(kSession, vertices, [](const CellBatch&) { return absl::UnavailableError("full"); }),
+      absl::UnavailableError("full"));
+}
+
+TEST(Queries, AddVertices) {
+  FakeServer server;
+  server.queries.add = [](const v1::AddVerticesRequest& request, v1::AddVerticesResponse& response) {
+    EXPECT_THAT(request.points(), ElementsAre(0.5, -0.0));
+    EXPECT_TRUE(std::signbit(request.points(1)));
+    EXPECT_THAT(request.near(), ElementsAre(3));
+    EXPECT_EQ(request.expected_revision(), 6u);
+    EXPECT_FALSE(request.request_id().empty());
+    response.add_vertices(11);
+    response.set_revision(7);
+    return grpc::Status::OK;
+  };
+  CallOptions call;
+  call.expected_revision = 6;
+  const absl::StatusOr<AddedVertices> added =
+      server.Client().AddVertices(kSession, std::vector<double>{0.5, -0.0}, std::vector<uint32_t>{3}, call);
+  ASSERT_TRUE(added.ok()) << added.status();
+  EXPECT_THAT(added->vertices, ElementsAre(11));
+  EXPECT_EQ(added->revision, 7u);
+}
+
+// A server whose DeleteSession fails with `errors`, one after the other, then succeeds.
+class Failing {
+ public:
+  Failing(FakeServer& server, std::vector<grpc::Status> errors) : errors_(std::move(errors)) {
+    server.sessions.remove = [this](const v1::DeleteSessionRequest& request, v1::DeleteSessionResponse&) {
+      request_ids.insert(request.request_id());
+      return calls < errors_.size() ? errors_[calls++] : (++calls, grpc::Status::OK);
+    };
+  }
+
+  size_t calls = 0;
+  std::set<std::string> request_ids;
+
+ private:
+  const std::vector<grpc::Status> errors_;
+};
+
+TEST(Retries, RepeatWhatMaySucceedLaterUnderOneRequestId) {
+  FakeServer server;
+  Failing failing(server, {Broken(), MakeError(grpc::StatusCode::RESOURCE_EXHAUSTED, "queue full",
+                                               "ERROR_REASON_QUEUE_FULL", /*retry_ms=*/2)});
+  EXPECT_TRUE(server.Client().DeleteSession(kSession).ok());
+  EXPECT_EQ(failing.calls, 3u);
+  EXPECT_THAT(failing.request_ids, SizeIs(1));
+}
+
+TEST(Retries, DoNotRepeatWhatWillFailAgain) {
+  FakeServer server;
+  Failing failing(server, {MakeError(grpc::StatusCode::RESOURCE_EXHAUSTED, "quota", "ERROR_REASON_QUOTA_EXCEEDED")});
+  const absl::Status status = server.Client().DeleteSession(kSession);
+  EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(failing.calls, 1u);
+}
+
+TEST(Retries, AServerThatNeverAnsweredGetsLessPatience) {
+  FakeServer server;
+  const std::vector<grpc::Status> broken(20, Broken());
+  Failing failing(server, broken);
+  server.sessions.get = [](const auto&, auto&) { return grpc::Status(grpc::StatusCode::NOT_FOUND, "none"); };
+  Client client = server.Client();
+  EXPECT_EQ(client.DeleteSession(kSession), absl::UnavailableError("Socket closed"));
+  EXPECT_EQ(failing.calls, 2u);
+  EXPECT_EQ(client.GetSession(kSession).status(), absl::NotFoundError("none"));
+  EXPECT_EQ(client.DeleteSession(kSession), absl::UnavailableError("Socket closed"));
+  EXPECT_EQ(failing.calls, 6u);
+}
+
+TEST(Retries, EndAtTheDeadlineAndByAStop) {
+  FakeServer server;
+  const std::vector<grpc::Status> later(
+      20, MakeError(grpc::StatusCode::UNAVAILABLE, "stopping", "ERROR_REASON_SERVER_STOPPING", /*retry_ms=*/900));
+  Failing failing(server, later);
+  CallOptions call;
+  call.timeout = absl::Milliseconds(500);
+  EXPECT_EQ(server.Client().DeleteSession(kSession, call).message(), "stopping");
+  EXPECT_EQ(failing.calls, 1u);  // another attempt would be too late
+
+  std::stop_source stop;
+  server.sessions.remove = [&stop](const auto&, auto&) {
+    stop.request_stop();
+    return MakeError(grpc::StatusCode::UNAVAILABLE, "stopping", "ERROR_REASON_SERVER_STOPPING", /*retry_ms=*/999);
+  };
+  call.timeout = absl::InfiniteDuration();
+  call.stop = stop.get_token();
+  EXPECT_EQ(server.Client().DeleteSession(kSession, call), absl::CancelledError("cancelled by the caller"));
+}
+
+}  // namespace
+}  // namespace wellspace::client

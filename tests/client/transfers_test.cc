@@ -1,0 +1,323 @@
+// Uploads and downloads that break off and go on.
+#include <cstdint>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include "proto/checksum.h"
+#include "tests/client/fake_server.h"
+
+namespace wellspace::client {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr char kSession[] = "sessions/one";
+
+// A session's points, as a server keeps them.
+class FakeCloud {
+ public:
+  explicit FakeCloud(FakeServer& server, int dimension = 2) : dimension_(dimension) {
+    server.sessions.get = [this](const v1::GetSessionRequest& request, v1::GetSessionResponse& response) {
+      response.mutable_session()->set_name(request.name());
+      response.mutable_session()->mutable_parameters()->set_dimension(dimension_);
+      response.mutable_session()->set_committed_points(points.size() / dimension_);
+      return grpc::Status::OK;
+    };
+    server.sessions.upload = [this](grpc::ServerContext&, auto& reader, v1::UploadPointsResponse& response) {
+      ++calls;
+      v1::UploadPointsRequest request;
+      for (bool first = true; reader.Read(&request); first = false) {
+        if (first) {
+          names.push_back(request.name());
+          expected_revisions.push_back(request.expected_revision());
+        }
+        largest_request = std::max(largest_request, request.ByteSizeLong());
+        const uint64_t committed = points.size() / dimension_;
+        if (request.point_offset() > committed) {
+          return MakeError(grpc::StatusCode::OUT_OF_RANGE, "a gap", "ERROR_REASON_UPLOAD_GAP");
+        }
+        const auto& coordinates = request.points().coordinates();
+        const uint64_t known = (committed - request.point_offset()) * dimension_;
+        if (known < static_cast<uint64_t>(coordinates.size())) {
+          resent += known;
+          points.insert(points.end(), coordinates.begin() + known, coordinates.end());
+        }
+        if (breaks_left > 0 && request.points().coordinates_size() > 0) {
+          --breaks_left;
+          return Broken();
+        }
+      }
+      response.set_committed_points(points.size() / dimension_ - lost);
+      response.set_revision(7);
+      return grpc::Status::OK;
+    };
+  }
+
+  std::vector<double> points;
+  int breaks_left = 0;  // after so many messages
+  uint64_t lost = 0;    // points that it does not admit
+  int calls = 0;
+  uint64_t resent = 0;  // numbers that came although they were there
+  size_t largest_request = 0;
+  std::vector<std::string> names;
+  std::vector<uint64_t> expected_revisions;
+
+ private:
+  const int dimension_;
+};
+
+std::vector<double> Numbers(size_t count) {
+  std::vector<double> numbers(count);
+  std::iota(numbers.begin(), numbers.end(), 0.5);
+  return numbers;
+}
+
+TEST(Upload, SendsAllPointsInSmallRequests) {
+  FakeServer server;
+  FakeCloud cloud(server);
+  const std::vector<double> points = Numbers(2 * 200'001);
+  SpanSource source(2, points);
+  uint64_t told = 0;
+  CallOptions call;
+  call.expected_revision = 3;
+  const absl::StatusOr<Uploaded> uploaded = server.Client().UploadPoints(
+      kSession, source, std::nullopt, [&told](uint64_t sent) { told = sent; }, call);
+  ASSERT_TRUE(uploaded.ok()) << uploaded.status();
+  EXPECT_EQ(uploaded->committed_points, 200'001u);
+  EXPECT_EQ(uploaded->revision, 7u);
+  EXPECT_EQ(told, 200'001u);
+  EXPECT_EQ(cloud.points, points);
+  EXPECT_LE(cloud.largest_request, 1u << 20);
+  EXPECT_THAT(cloud.names, ElementsAre(kSession));
+  EXPECT_THAT(cloud.expected_revisions, ElementsAre(3));
+}
+
+TEST(Upload, GoesOnAtTheCommittedPointsHoweverOftenItBreaks) {
+  FakeServer server;
+  FakeCloud cloud(server);
+  cloud.points = {-1, -1};  // of an earlier upload
+  cloud.breaks_left = 5;    // more than attempts in a row
+  const std::vector<double> points = Numbers(2 * 500'000);
+  SpanSource source(2, points);
+  CallOptions call;
+  call.expected_revision = 3;
+  const absl::StatusOr<Uploaded> uploaded = server.Client().UploadPoints(kSession, source, std::nullopt, nullptr, call);
+  ASSERT_TRUE(uploaded.ok()) << uploaded.status();
+  EXPECT_EQ(cloud.calls, 6);
+  EXPECT_EQ(cloud.resent, 0u);
+  EXPECT_EQ(cloud.points[0], -1);
+  EXPECT_EQ(std::vector<double>(cloud.points.begin() + 2, cloud.points.end()), points);
+  EXPECT_THAT(cloud.expected_revisions, ElementsAre(3, 0, 0, 0, 0, 0));
+}
+
+TEST(Upload, ARepetitionWithTheSameOffsetSendsOnlyWhatIsMissing) {
+  FakeServer server;
+  FakeCloud cloud(server);
+  cloud.points = {0.5, 1.5, 2.5, 3.5};
+  const std::vector<double> points = Numbers(6);
+  SpanSource source(2, points);
+  ASSERT_TRUE(server.Client().UploadPoints(kSession, source, 0).ok());
+  EXPECT_EQ(cloud.points, points);
+  EXPECT_EQ(cloud.resent, 0u);
+  ASSERT_TRUE(server.Client().UploadPoints(kSession, source, 0).ok());
+  EXPECT_EQ(cloud.points, points);
+}
+
+TEST(Upload, ErrorsOfTheServerAndOfTheSource) {
+  FakeServer server;
+  FakeCloud cloud(server);
+  const std::vector<double> points = Numbers(6);
+  SpanSource source(2, points);
+  const absl::Status gap = server.Client().UploadPoints(kSession, source, 5).status();
+  EXPECT_EQ(gap.code(), absl::StatusCode::kOutOfRange);
+  EXPECT_EQ(ReasonOf(gap), "ERROR_REASON_UPLOAD_GAP");
+
+  SpanSource solid(3, points);
+  const absl::Status dimension = server.Client().UploadPoints(kSession, solid).status();
+  EXPECT_EQ(dimension.code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(dimension.message()), HasSubstr("the points are 3-D; expected 2-D"));
+
+  class Unreadable final : public PointSource {
+    int dimension() const override { return 2; }
+    absl::Status Seek(uint64_t) override { return absl::OkStatus(); }
+    absl::StatusOr<uint64_t> Read(std::span<double>) override { return absl::UnavailableError("disk"); }
+  } unreadable;
+  EXPECT_EQ(server.Client().UploadPoints(kSession, unreadable).status(), absl::UnavailableError("disk"));
+  EXPECT_EQ(cloud.calls, 2);
+
+  cloud.lost = 1;
+  EXPECT_EQ(server.Client().UploadPoints(kSession, source).status().code(), absl::StatusCode::kDataLoss);
+}
+
+TEST(Upload, GivesUpAfterAttemptsWithoutProgress) {
+  FakeServer server;
+  FakeCloud cloud(server);
+  server.sessions.upload = [&cloud](grpc::ServerContext&, auto&, auto&) {
+    ++cloud.calls;
+    return Broken();
+  };
+  const std::vector<double> points = Numbers(6);
+  SpanSource source(2, points);
+  EXPECT_EQ(server.Client().UploadPoints(kSession, source).status(), absl::UnavailableError("Socket closed"));
+  EXPECT_EQ(cloud.calls, QuickRetries().max_first_attempts);
+}
+
+// A session's mesh of one simplex per chunk, as a server keeps it.
+class FakeMesh {
+ public:
+  explicit FakeMesh(FakeServer& server) {
+    metadata.set_dimension(2);
+    for (int axis = 0; axis < 2; ++axis) {
+      metadata.mutable_domain()->add_low(0);
+      metadata.mutable_domain()->add_high(1);
+    }
+    metadata.set_vertex_count(4);
+    metadata.set_simplex_count(2);
+    metadata.set_input_point_count(1);
+    metadata.set_chunk_count(4);
+    metadata.set_revision(5);
+    chunks.resize(4);
+    chunks[0].mutable_points()->Add(kPoints.begin(), kPoints.end());
+    chunks[0].set_crc32c(Crc32c(kPoints.data(), sizeof(double) * kPoints.size()));
+    for (int i = 0; i < 2; ++i) {
+      chunks[1 + i].mutable_simplices()->Add(kSimplices.begin() + 3 * i, kSimplices.begin() + 3 * i + 3);
+      chunks[1 + i].set_crc32c(Crc32c(kSimplices.data() + 3 * i, 3 * sizeof(uint32_t)));
+    }
+    chunks[3].add_input_vertices(0);
+    const uint32_t zero = 0;
+    chunks[3].set_crc32c(Crc32c(&zero, sizeof(zero)));
+    for (int i = 0; i < 4; ++i) {
+      chunks[i].set_index(i);
+    }
+    server.sessions.download = [this](grpc::ServerContext&, const v1::DownloadMeshRequest& request, auto& writer) {
+      requests.push_back(request);
+      v1::DownloadMeshResponse response;
+      *response.mutable_metadata() = metadata;
+      writer.Write(response);
+      for (uint64_t i = request.next_chunk(); i < chunks.size(); ++i) {
+        if (i >= breaks_before) {
+          breaks_before = i + 1;
+          return end;
+        }
+        *response.mutable_chunk() = chunks[i];
+        writer.Write(response);
+      }
+      if (breaks_before == chunks.size()) {
+        return end;
+      }
+      return grpc::Status::OK;
+    };
+  }
+
+  static inline const std::vector<double> kPoints = {0, 0, 1, 0, 0, 1, 1, 1};
+  static inline const std::vector<uint32_t> kSimplices = {0, 1, 2, 1, 3, 2};
+  v1::MeshMetadata metadata;
+  std::vector<v1::MeshChunk> chunks;
+  uint64_t breaks_before = UINT64_MAX;  // this chunk, then every further one
+  grpc::Status end = Broken();
+  std::vector<v1::DownloadMeshRequest> requests;
+};
+
+TEST(Download, ReturnsTheMesh) {
+  FakeServer server;
+  FakeMesh mesh(server);
+  MeshCollector sink;
+  std::vector<uint64_t> done;
+  const absl::Status status = server.Client().DownloadMesh(kSession, sink, 5, [&done](uint64_t chunks, uint64_t total) {
+    done.push_back(chunks);
+    EXPECT_EQ(total, 4u);
+  });
+  ASSERT_TRUE(status.ok()) << status;
+  EXPECT_EQ(sink.mesh().points, FakeMesh::kPoints);
+  EXPECT_EQ(sink.mesh().simplices, FakeMesh::kSimplices);
+  EXPECT_THAT(done, ElementsAre(0, 1, 2, 3, 4));
+  ASSERT_EQ(mesh.requests.size(), 1u);
+  EXPECT_EQ(mesh.requests[0].name(), kSession);
+  EXPECT_EQ(mesh.requests[0].revision(), 5u);
+}
+
+TEST(Download, GoesOnAtTheNextChunkOfTheSameRevision) {
+  for (const grpc::Status& end : {Broken(), MakeError(grpc::StatusCode::DEADLINE_EXCEEDED, "the reader stalled",
+                                                      "ERROR_REASON_READER_STALLED")}) {
+    FakeServer server;
+    FakeMesh mesh(server);
+    mesh.breaks_before = 0;
+    mesh.end = end;
+    MeshCollector sink;
+    const absl::Status status = server.Client().DownloadMesh(kSession, sink);
+    ASSERT_TRUE(status.ok()) << status;
+    EXPECT_EQ(sink.mesh().points, FakeMesh::kPoints);
+    EXPECT_EQ(sink.mesh().simplices, FakeMesh::kSimplices);
+    EXPECT_EQ(sink.mesh().input_vertex, std::vector<uint32_t>{0});
+    // Broken before chunks 0 to 3, and once more after the last, which costs no further call.
+    ASSERT_EQ(mesh.requests.size(), 5u);
+    EXPECT_EQ(mesh.requests[0].revision(), 0u);
+    for (size_t i = 1; i < 5; ++i) {
+      EXPECT_EQ(mesh.requests[i].revision(), 5u);
+      EXPECT_EQ(mesh.requests[i].next_chunk(), i - 1);
+    }
+  }
+}
+
+TEST(Download, AMeshThatHasChangedMeanwhileIsAnError) {
+  FakeServer server;
+  FakeMesh mesh(server);
+  mesh.breaks_before = 2;
+  const auto download = server.sessions.download;
+  server.sessions.download = [&](grpc::ServerContext& context, const v1::DownloadMeshRequest& request, auto& writer) {
+    return mesh.requests.empty()
+               ? download(context, request, writer)
+               : MakeError(grpc::StatusCode::FAILED_PRECONDITION, "at revision 9", "ERROR_REASON_REVISION_MISMATCH");
+  };
+  MeshCollector sink;
+  const absl::Status status = server.Client().DownloadMesh(kSession, sink);
+  EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(ReasonOf(status), "ERROR_REASON_REVISION_MISMATCH");
+}
+
+TEST(Download, ASinkThatFailsEndsIt) {
+  FakeServer server;
+  FakeMesh mesh(server);
+  class FullDisk final : public MeshSink {
+    absl::Status Begin(const MeshHeader&) override { return absl::OkStatus(); }
+    absl::Status AddPoints(std::span<const double>) override { return absl::OkStatus(); }
+    absl::Status AddSimplices(std::span<const uint32_t>) override { return absl::UnavailableError("disk full"); }
+    absl::Status AddInputVertices(std::span<const uint32_t>) override { return absl::OkStatus(); }
+    absl::Status Finish() override { return absl::OkStatus(); }
+  } sink;
+  EXPECT_EQ(server.Client().DownloadMesh(kSession, sink), absl::UnavailableError("disk full"));
+  EXPECT_EQ(mesh.requests.size(), 1u);
+}
+
+TEST(Download, DamageIsDataLoss) {
+  FakeServer server;
+  FakeMesh mesh(server);
+  mesh.chunks[1].set_simplices(0, 3);
+  MeshCollector sink;
+  EXPECT_EQ(server.Client().DownloadMesh(kSession, sink).code(), absl::StatusCode::kDataLoss);
+}
+
+TEST(Download, StopsWhenItIsAskedTo) {
+  FakeServer server;
+  FakeMesh mesh(server);
+  server.sessions.download = [](grpc::ServerContext& context, const auto&, auto& writer) {
+    v1::DownloadMeshResponse response;
+    while (!context.IsCancelled()) {
+      writer.Write(response);
+    }
+    return grpc::Status::CANCELLED;
+  };
+  std::stop_source stop;
+  MeshCollector sink;
+  const absl::Status status = server.Client().DownloadMesh(
+      kSession, sink, 0, [&stop](uint64_t, uint64_t) { stop.request_stop(); },
+      {.timeout = absl::InfiniteDuration(), .stop = stop.get_token(), .request_id = "", .expected_revision = 0});
+  EXPECT_EQ(status, absl::CancelledError("cancelled by the caller"));
+}
+
+}  // namespace
+}  // namespace wellspace::client
