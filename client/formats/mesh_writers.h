@@ -1,19 +1,29 @@
-// The writers behind WriteMesh, one for each format. Private to this folder.
+// The writers behind CreateMesh, one for each format. Private to this folder.
 #ifndef WELLSPACE_CLIENT_FORMATS_MESH_WRITERS_H_
 #define WELLSPACE_CLIENT_FORMATS_MESH_WRITERS_H_
 
+#include <cstdint>
+#include <memory>
 #include <stop_token>
 #include <string>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "client/formats/mesh.h"
+#include "client/formats/write_mesh.h"
 
 namespace wellspace::formats {
 
-absl::Status WriteVtu(const std::string& path, const MeshView& mesh, std::stop_token stop);
-absl::Status WriteNpz(const std::string& path, const MeshView& mesh, std::stop_token stop);
+absl::StatusOr<std::unique_ptr<MeshWriter>> CreateVtu(const std::string& path, const MeshShape& shape,
+                                                      std::stop_token stop);
+absl::StatusOr<std::unique_ptr<MeshWriter>> CreateNpz(const std::string& path, const MeshShape& shape,
+                                                      std::stop_token stop);
 // `path` is that of either file; both are written.
-absl::Status WriteNodeAndEle(const std::string& path, const MeshView& mesh, std::stop_token stop);
+absl::StatusOr<std::unique_ptr<MeshWriter>> CreateNodeAndEle(const std::string& path, const MeshShape& shape,
+                                                             std::stop_token stop);
+
+// INTERNAL unless as many rows have come as `shape` says.
+absl::Status CheckComplete(const MeshShape& shape, uint64_t vertices, uint64_t simplices);
 
 // "a/mesh.ele" of "a/mesh.node" and the other way round: `path` with its extension replaced.
 std::string WithExtension(const std::string& path, const std::string& extension);

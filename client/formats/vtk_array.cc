@@ -2,6 +2,7 @@
 
 #include <zlib.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <limits>
@@ -148,41 +149,78 @@ absl::StatusOr<std::string> DecodeBase64(std::string_view text) {
   return bytes;
 }
 
-void VtkArrayWriter::CompressBlock() {
-  const size_t begin = compressed_.size();
-  uLongf size = compressBound(block_.size());
-  compressed_.resize(begin + size);
-  const int result = compress2(reinterpret_cast<Bytef*>(compressed_.data() + begin), &size,
-                               reinterpret_cast<const Bytef*>(block_.data()), block_.size(), kCompressionLevel);
-  if (result != Z_OK && status_.ok()) {
-    status_ = absl::ResourceExhaustedError(absl::StrCat("zlib could not compress a block: ", zError(result)));
+VtkArrayWriter::VtkArrayWriter(OutputFile& output, uint64_t bytes)
+    : output_(output), bytes_(bytes), header_offset_(output.size()) {
+  block_.reserve(std::min<uint64_t>(bytes, kBlockBytes));
+  if (output_.IsSeekable()) {
+    compressed_sizes_.resize((bytes + kBlockBytes - 1) / kBlockBytes);
+    output_.Write(Header());  // its place
+    compressed_sizes_.clear();
   }
-  compressed_.resize(begin + size);
-  compressed_sizes_.push_back(size);
-  last_block_bytes_ = block_.size() == kBlockBytes ? 0 : block_.size();
+}
+
+std::string VtkArrayWriter::Header() const {
+  std::vector<uint64_t> words = {compressed_sizes_.size(), kBlockBytes, bytes_ % kBlockBytes};
+  words.insert(words.end(), compressed_sizes_.begin(), compressed_sizes_.end());
+  std::string text;
+  AppendBase64({reinterpret_cast<const char*>(words.data()), words.size() * sizeof(uint64_t)}, text);
+  return text;
+}
+
+void VtkArrayWriter::Send(bool is_end) {
+  // A multiple of three bytes at a time, so that only the last piece is padded.
+  constexpr size_t kPieceBytes = 3 << 16;
+  const size_t end = is_end ? pending_.size() : pending_.size() / 3 * 3;
+  std::string text;
+  for (size_t begin = 0; begin < end; begin += kPieceBytes) {
+    text.clear();
+    AppendBase64(std::string_view(pending_).substr(begin, std::min(kPieceBytes, end - begin)), text);
+    output_.Write(text);
+  }
+  pending_.erase(0, end);
+}
+
+void VtkArrayWriter::CompressBlock() {
+  added_ += block_.size();
+  if (status_.ok() && !output_.status().ok()) {
+    status_ = output_.status();
+  }
+  if (status_.ok()) {
+    const size_t begin = pending_.size();
+    uLongf size = compressBound(block_.size());
+    pending_.resize(begin + size);
+    const int result = compress2(reinterpret_cast<Bytef*>(pending_.data() + begin), &size,
+                                 reinterpret_cast<const Bytef*>(block_.data()), block_.size(), kCompressionLevel);
+    if (result != Z_OK) {
+      status_ = absl::ResourceExhaustedError(absl::StrCat("zlib could not compress a block: ", zError(result)));
+    }
+    pending_.resize(begin + size);
+    compressed_sizes_.push_back(size);
+    if (output_.IsSeekable()) {
+      Send(/*is_end=*/false);
+    }
+  }
   block_.clear();
 }
 
-absl::Status VtkArrayWriter::Finish(OutputFile& output) {
+absl::Status VtkArrayWriter::Finish() {
   if (!block_.empty()) {
     CompressBlock();
+  }
+  if (status_.ok() && added_ != bytes_) {
+    status_ = absl::InternalError(absl::StrCat("an array of ", bytes_, " bytes got ", added_));
   }
   if (!status_.ok()) {
     return status_;
   }
-  std::vector<uint64_t> header = {compressed_sizes_.size(), kBlockBytes, last_block_bytes_};
-  header.insert(header.end(), compressed_sizes_.begin(), compressed_sizes_.end());
-  std::string text;
-  AppendBase64({reinterpret_cast<const char*>(header.data()), header.size() * sizeof(uint64_t)}, text);
-  output.Write(text);
-  // A multiple of three bytes at a time, so that only the last piece is padded.
-  constexpr size_t kPieceBytes = 3 << 16;
-  for (size_t begin = 0; begin < compressed_.size(); begin += kPieceBytes) {
-    text.clear();
-    AppendBase64(std::string_view(compressed_).substr(begin, kPieceBytes), text);
-    output.Write(text);
+  if (output_.IsSeekable()) {
+    Send(/*is_end=*/true);
+    output_.Overwrite(header_offset_, Header());
+  } else {
+    output_.Write(Header());
+    Send(/*is_end=*/true);
   }
-  return output.status();
+  return output_.status();
 }
 
 absl::StatusOr<std::string> DecodeVtkArray(std::string_view text, const VtkEncoding& encoding) {

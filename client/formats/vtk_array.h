@@ -21,14 +21,17 @@ namespace wellspace::formats {
 
 // Compresses one array, block by block, and writes it.
 //
+// Memory: two blocks where the output is seekable; otherwise the compressed array, whose header has to come first.
 // Thread safety: thread-compatible.
 class VtkArrayWriter {
  public:
   // Bytes are compressed in blocks of this size; every type's size divides it.
   static constexpr size_t kBlockBytes = 1 << 19;
 
-  VtkArrayWriter() { block_.reserve(kBlockBytes); }
+  // The array will have `bytes` bytes. REQUIRES: `output` outlives this, and nobody else writes to it before Finish.
+  VtkArrayWriter(OutputFile& output, uint64_t bytes);
 
+  // REQUIRES:   no more than `bytes` are added.
   template <typename T>
   void Add(T value) {
     const size_t size = block_.size();
@@ -39,16 +42,24 @@ class VtkArrayWriter {
     }
   }
 
-  // Writes header and blocks. Header words are UInt64, bytes in the machine's order.
-  absl::Status Finish(OutputFile& output);
+  // Completes header and blocks. Header words are UInt64, bytes in the machine's order.
+  //
+  // Errors:     the first of all so far; INTERNAL when fewer bytes were added than announced.
+  absl::Status Finish();
 
  private:
   void CompressBlock();
+  // base64 of whole groups of three bytes of `pending_`, and of all at the end.
+  void Send(bool is_end);
+  std::string Header() const;
 
+  OutputFile& output_;
+  const uint64_t bytes_;
+  const uint64_t header_offset_;
   std::string block_;
-  std::string compressed_;
+  std::string pending_;  // compressed, not yet written
   std::vector<uint64_t> compressed_sizes_;
-  uint64_t last_block_bytes_ = 0;
+  uint64_t added_ = 0;
   absl::Status status_;
 };
 

@@ -16,30 +16,30 @@
 namespace wellspace::formats {
 namespace {
 
-struct MeshWriter {
-  absl::Status (*write)(const std::string&, const MeshView&, std::stop_token);
+struct WriterKind {
+  absl::StatusOr<std::unique_ptr<MeshWriter>> (*create)(const std::string&, const MeshShape&, std::stop_token);
   int max_dimension;
   // Why it cannot go to a pipe or a device; null: it can.
   const char* needs_file;
 };
 
-std::span<const Format<MeshWriter>> Writers() {
-  static const std::vector<Format<MeshWriter>> writers = {
-      {"vtu", {".vtu"}, {WriteVtu, 3, nullptr}},
-      {"npz", {".npz"}, {WriteNpz, kMaxDimension, "npz is a zip archive, completed from its start"}},
-      {"node", {".node", ".ele"}, {WriteNodeAndEle, kMaxDimension, "node is a pair of files"}},
+std::span<const Format<WriterKind>> Writers() {
+  static const std::vector<Format<WriterKind>> writers = {
+      {"vtu", {".vtu"}, {CreateVtu, 3, nullptr}},
+      {"npz", {".npz"}, {CreateNpz, kMaxDimension, "npz is a zip archive, completed from its start"}},
+      {"node", {".node", ".ele"}, {CreateNodeAndEle, kMaxDimension, "node is a pair of files"}},
   };
   return writers;
 }
 
 // `dimension` is that of the mesh, or 0 when it is not known.
-absl::StatusOr<MeshWriter> FindWriter(const std::string& path, const std::string& format, int dimension) {
+absl::StatusOr<WriterKind> FindWriter(const std::string& path, const std::string& format, int dimension) {
   const bool is_stream = path == kStandardStream;
   const auto row = FindFormat(Writers(), path, format.empty() && is_stream ? "vtu" : format);
   if (!row.ok()) {
     return row.status();
   }
-  const MeshWriter& writer = (*row)->handler;
+  const WriterKind& writer = (*row)->handler;
   if (is_stream && writer.needs_file != nullptr) {
     return absl::InvalidArgumentError(
         absl::StrCat(writer.needs_file, " and cannot go to standard output; expected vtu, or a file"));
@@ -57,7 +57,7 @@ absl::StatusOr<MeshWriter> FindWriter(const std::string& path, const std::string
 std::vector<std::string> MeshFormats() { return FormatNames(Writers()); }
 
 absl::Status CheckMeshOutput(const std::string& path, const std::string& format, int dimension) {
-  const absl::StatusOr<MeshWriter> writer = FindWriter(path, format, dimension);
+  const absl::StatusOr<WriterKind> writer = FindWriter(path, format, dimension);
   if (!writer.ok()) {
     return writer.status();
   }
@@ -82,12 +82,35 @@ absl::Status CheckMeshOutput(const std::string& path, const std::string& format,
   return absl::OkStatus();
 }
 
-absl::Status WriteMesh(const std::string& path, const std::string& format, const MeshView& mesh, std::stop_token stop) {
-  const absl::StatusOr<MeshWriter> writer = FindWriter(path, format, mesh.dimension);
+absl::Status CheckComplete(const MeshShape& shape, uint64_t vertices, uint64_t simplices) {
+  if (vertices != shape.vertex_count || simplices != shape.simplex_count) {
+    return absl::InternalError(absl::StrCat("a mesh of ", shape.vertex_count, " vertices and ", shape.simplex_count,
+                                            " simplices got ", vertices, " and ", simplices));
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMesh(const std::string& path, const std::string& format,
+                                                       const MeshShape& shape, std::stop_token stop) {
+  const absl::StatusOr<WriterKind> writer = FindWriter(path, format, shape.dimension);
   if (!writer.ok()) {
     return writer.status();
   }
-  return writer->write(path, mesh, std::move(stop));
+  return writer->create(path, shape, std::move(stop));
+}
+
+absl::Status WriteMesh(const std::string& path, const std::string& format, const MeshView& mesh, std::stop_token stop) {
+  const absl::StatusOr<std::unique_ptr<MeshWriter>> writer = CreateMesh(path, format, mesh.Shape(), std::move(stop));
+  if (!writer.ok()) {
+    return writer.status();
+  }
+  if (absl::Status status = (*writer)->AddPoints(mesh.points); !status.ok()) {
+    return status;
+  }
+  if (absl::Status status = (*writer)->AddSimplices(mesh.simplices); !status.ok()) {
+    return status;
+  }
+  return (*writer)->Commit();
 }
 
 }  // namespace wellspace::formats

@@ -10,11 +10,15 @@
 #ifndef WELLSPACE_CLIENT_FORMATS_WRITE_MESH_H_
 #define WELLSPACE_CLIENT_FORMATS_WRITE_MESH_H_
 
+#include <cstdint>
+#include <memory>
+#include <span>
 #include <stop_token>
 #include <string>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "client/formats/mesh.h"
 
 namespace wellspace::formats {
@@ -25,6 +29,36 @@ std::vector<std::string> MeshFormats();
 // Tells early whether WriteMesh would refuse `path` and `format` for a mesh of `dimension` (0: not known yet), as far as
 // that can be known without writing.
 absl::Status CheckMeshOutput(const std::string& path, const std::string& format, int dimension = 0);
+
+// Writes a mesh piece by piece, so that it need not fit into memory.
+//
+// Memory: a few blocks for a regular file; for vtu into a pipe or a device the compressed array that is being written.
+// Thread safety: thread-compatible.
+class MeshWriter {
+ public:
+  virtual ~MeshWriter() = default;
+  MeshWriter(const MeshWriter&) = delete;
+  MeshWriter& operator=(const MeshWriter&) = delete;
+
+  // The next rows of the arrays: all points, then all simplices. Returns the first error of all so far.
+  // REQUIRES:   whole rows, no more than the shape says, no points after simplices.
+  virtual absl::Status AddPoints(std::span<const double> points) = 0;
+  virtual absl::Status AddSimplices(std::span<const uint32_t> simplices) = 0;
+
+  // Gives the file its name. Without it, no file is left or changed.
+  // Errors:     the first of all so far; INTERNAL when rows are missing.
+  virtual absl::Status Commit() = 0;
+
+ protected:
+  MeshWriter() = default;
+};
+
+// A writer to `path`; "-" is standard output. `format` empty: by the extension; standard output is vtu. Ends with CANCELLED once `stop`
+// asks for it.
+//
+// Errors:     as of WriteMesh.
+absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMesh(const std::string& path, const std::string& format,
+                                                       const MeshShape& shape, std::stop_token stop = {});
 
 // Writes `mesh` to `path`; "-" is standard output. `format` empty: by the extension; standard output is vtu.
 //

@@ -1,4 +1,7 @@
 // TetGen's and Triangle's .node and .ele.
+#include <span>
+#include <string>
+#include <type_traits>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -10,40 +13,66 @@
 namespace wellspace::formats {
 namespace {
 
-void WriteNodes(const MeshView& mesh, OutputFile& output) {
-  std::string line;
-  AppendNumber(mesh.vertex_count(), line);
-  absl::StrAppend(&line, " ", mesh.dimension, " 0 0\n");
-  output.Write(line);
-  for (uint64_t vertex = 0; vertex < mesh.vertex_count() && output.status().ok(); ++vertex) {
-    line.clear();
-    AppendNumber(vertex, line);
-    for (int axis = 0; axis < mesh.dimension; ++axis) {
-      line += ' ';
-      AppendNumber(mesh.points[vertex * mesh.dimension + axis], line);
-    }
-    line += '\n';
-    output.Write(line);
+class NodeAndEleWriter final : public MeshWriter {
+ public:
+  NodeAndEleWriter(OutputFile nodes, OutputFile simplices, const MeshShape& shape)
+      : shape_(shape), nodes_(std::move(nodes)), simplices_(std::move(simplices)) {
+    nodes_.Write(absl::StrCat(shape.vertex_count, " ", shape.dimension, " 0 0\n"));
+    simplices_.Write(absl::StrCat(shape.simplex_count, " ", shape.dimension + 1, " 0\n"));
   }
-}
 
-void WriteSimplices(const MeshView& mesh, OutputFile& output) {
-  const int corners = mesh.dimension + 1;
-  std::string line;
-  AppendNumber(mesh.simplex_count(), line);
-  absl::StrAppend(&line, " ", corners, " 0\n");
-  output.Write(line);
-  for (uint64_t simplex = 0; simplex < mesh.simplex_count() && output.status().ok(); ++simplex) {
-    line.clear();
-    AppendNumber(simplex, line);
-    for (int corner = 0; corner < corners; ++corner) {
-      line += ' ';
-      AppendNumber(uint64_t{mesh.simplices[simplex * corners + corner]}, line);
-    }
-    line += '\n';
-    output.Write(line);
+  absl::Status AddPoints(std::span<const double> points) override {
+    return WriteRows(points, shape_.dimension, vertices_written_, nodes_);
   }
-}
+
+  absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
+    return WriteRows(simplices, shape_.dimension + 1, simplices_written_, simplices_);
+  }
+
+  absl::Status Commit() override {
+    if (absl::Status status = CheckComplete(shape_, vertices_written_, simplices_written_); !status.ok()) {
+      return status;
+    }
+    // Neither file appears before both are written.
+    for (OutputFile* output : {&nodes_, &simplices_}) {
+      if (absl::Status status = output->Flush(); !status.ok()) {
+        return status;
+      }
+    }
+    if (absl::Status status = nodes_.Commit(); !status.ok()) {
+      return status;
+    }
+    return simplices_.Commit();
+  }
+
+ private:
+  // Rows with their numbers, from `written` on.
+  template <typename T>
+  absl::Status WriteRows(std::span<const T> values, int width, uint64_t& written, OutputFile& output) {
+    for (; !values.empty() && output.status().ok(); values = values.subspan(width)) {
+      line_.clear();
+      AppendNumber(written++, line_);
+      for (const T value : values.first(width)) {
+        line_ += ' ';
+        if constexpr (std::is_same_v<T, double>) {
+          AppendNumber(value, line_);
+        } else {
+          AppendNumber(uint64_t{value}, line_);
+        }
+      }
+      line_ += '\n';
+      output.Write(line_);
+    }
+    return output.status();
+  }
+
+  const MeshShape shape_;
+  OutputFile nodes_;
+  OutputFile simplices_;
+  uint64_t vertices_written_ = 0;
+  uint64_t simplices_written_ = 0;
+  std::string line_;
+};
 
 }  // namespace
 
@@ -51,7 +80,8 @@ std::string WithExtension(const std::string& path, const std::string& extension)
   return path.substr(0, path.size() - ExtensionOf(path).size()) + extension;
 }
 
-absl::Status WriteNodeAndEle(const std::string& path, const MeshView& mesh, std::stop_token stop) {
+absl::StatusOr<std::unique_ptr<MeshWriter>> CreateNodeAndEle(const std::string& path, const MeshShape& shape,
+                                                             std::stop_token stop) {
   absl::StatusOr<OutputFile> nodes = OutputFile::Create(WithExtension(path, ".node"), stop);
   if (!nodes.ok()) {
     return nodes.status();
@@ -60,18 +90,7 @@ absl::Status WriteNodeAndEle(const std::string& path, const MeshView& mesh, std:
   if (!simplices.ok()) {
     return simplices.status();
   }
-  WriteNodes(mesh, *nodes);
-  WriteSimplices(mesh, *simplices);
-  // Neither file appears before both are written.
-  for (OutputFile* output : {&*nodes, &*simplices}) {
-    if (absl::Status status = output->Flush(); !status.ok()) {
-      return status;
-    }
-  }
-  if (absl::Status status = nodes->Commit(); !status.ok()) {
-    return status;
-  }
-  return simplices->Commit();
+  return std::make_unique<NodeAndEleWriter>(*std::move(nodes), *std::move(simplices), shape);
 }
 
 }  // namespace wellspace::formats

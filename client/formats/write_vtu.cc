@@ -1,4 +1,7 @@
 // VTK's XML for unstructured grids.
+#include <optional>
+#include <span>
+#include <string>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -12,90 +15,110 @@ namespace {
 constexpr uint8_t kTriangle = 5;
 constexpr uint8_t kTetrahedron = 10;
 
-// Writes one data array; `add` puts its values in a VtkArrayWriter.
-template <typename Add>
-absl::Status WriteArray(const std::string& attributes, OutputFile& output, Add add) {
-  output.Write(absl::StrCat("        <DataArray ", attributes, " format=\"binary\">\n"));
-  VtkArrayWriter array;
-  add(array);
-  if (absl::Status status = array.Finish(output); !status.ok()) {
-    return status;
+class VtuWriter final : public MeshWriter {
+ public:
+  VtuWriter(OutputFile output, const MeshShape& shape) : shape_(shape), output_(std::move(output)) {
+    output_.Write(
+        "<?xml version=\"1.0\"?>\n"
+        "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\" "
+        "compressor=\"vtkZLibDataCompressor\">\n"
+        "  <UnstructuredGrid>\n");
+    output_.Write(absl::StrCat("    <Piece NumberOfPoints=\"", shape_.vertex_count, "\" NumberOfCells=\"",
+                               shape_.simplex_count, "\">\n      <PointData>\n"));
+    BeginArray("type=\"UInt8\" Name=\"input\"", shape_.vertex_count);
+    for (uint64_t vertex = 0; vertex < shape_.vertex_count; ++vertex) {
+      array_->Add<uint8_t>(vertex < shape_.input_vertices ? 1 : 0);
+    }
+    EndArray();
+    output_.Write("      </PointData>\n      <Points>\n");
+    BeginArray("type=\"Float64\" Name=\"Points\" NumberOfComponents=\"3\"", shape_.vertex_count * 3 * sizeof(double));
   }
-  output.Write("\n        </DataArray>\n");
-  return output.status();
-}
 
-absl::Status WriteInputFlags(const MeshView& mesh, OutputFile& output) {
-  return WriteArray("type=\"UInt8\" Name=\"input\"", output, [&mesh](VtkArrayWriter& array) {
-    for (uint64_t vertex = 0; vertex < mesh.vertex_count(); ++vertex) {
-      array.Add<uint8_t>(vertex < mesh.input_vertices ? 1 : 0);
+  absl::Status AddPoints(std::span<const double> points) override {
+    for (; !points.empty() && Status().ok(); points = points.subspan(shape_.dimension)) {
+      for (int axis = 0; axis < 3; ++axis) {
+        array_->Add<double>(axis < shape_.dimension ? points[axis] : 0.0);
+      }
+      ++vertices_;
     }
-  });
-}
-
-absl::Status WritePoints(const MeshView& mesh, OutputFile& output) {
-  return WriteArray("type=\"Float64\" Name=\"Points\" NumberOfComponents=\"3\"", output,
-                    [&mesh](VtkArrayWriter& array) {
-                      for (uint64_t vertex = 0; vertex < mesh.vertex_count(); ++vertex) {
-                        for (int axis = 0; axis < 3; ++axis) {
-                          array.Add<double>(axis < mesh.dimension ? mesh.points[vertex * mesh.dimension + axis] : 0.0);
-                        }
-                      }
-                    });
-}
-
-absl::Status WriteCells(const MeshView& mesh, OutputFile& output) {
-  absl::Status status = WriteArray("type=\"Int64\" Name=\"connectivity\"", output, [&mesh](VtkArrayWriter& array) {
-    for (const uint32_t vertex : mesh.simplices) {
-      array.Add<int64_t>(vertex);
-    }
-  });
-  if (!status.ok()) {
-    return status;
+    return Status();
   }
-  status = WriteArray("type=\"Int64\" Name=\"offsets\"", output, [&mesh](VtkArrayWriter& array) {
-    const int64_t corners = mesh.dimension + 1;
-    for (uint64_t simplex = 0; simplex < mesh.simplex_count(); ++simplex) {
-      array.Add<int64_t>((static_cast<int64_t>(simplex) + 1) * corners);
+
+  absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
+    BeginCells();
+    for (size_t i = 0; i < simplices.size() && Status().ok(); ++i) {
+      array_->Add<int64_t>(simplices[i]);
     }
-  });
-  if (!status.ok()) {
-    return status;
+    simplices_ += simplices.size() / (shape_.dimension + 1);
+    return Status();
   }
-  return WriteArray("type=\"UInt8\" Name=\"types\"", output, [&mesh](VtkArrayWriter& array) {
-    for (uint64_t simplex = 0; simplex < mesh.simplex_count(); ++simplex) {
-      array.Add<uint8_t>(mesh.dimension == 2 ? kTriangle : kTetrahedron);
+
+  absl::Status Commit() override {
+    BeginCells();
+    EndArray();
+    const int64_t corners = shape_.dimension + 1;
+    BeginArray("type=\"Int64\" Name=\"offsets\"", shape_.simplex_count * sizeof(int64_t));
+    for (uint64_t simplex = 0; simplex < shape_.simplex_count; ++simplex) {
+      array_->Add<int64_t>((static_cast<int64_t>(simplex) + 1) * corners);
     }
-  });
-}
+    EndArray();
+    BeginArray("type=\"UInt8\" Name=\"types\"", shape_.simplex_count);
+    for (uint64_t simplex = 0; simplex < shape_.simplex_count; ++simplex) {
+      array_->Add<uint8_t>(shape_.dimension == 2 ? kTriangle : kTetrahedron);
+    }
+    EndArray();
+    output_.Write("      </Cells>\n    </Piece>\n  </UnstructuredGrid>\n</VTKFile>\n");
+    if (absl::Status status = Status(); !status.ok()) {
+      return status;
+    }
+    if (absl::Status status = CheckComplete(shape_, vertices_, simplices_); !status.ok()) {
+      return status;
+    }
+    return output_.Commit();
+  }
+
+ private:
+  const absl::Status& Status() const { return status_.ok() ? output_.status() : status_; }
+
+  void BeginArray(const std::string& attributes, uint64_t bytes) {
+    output_.Write(absl::StrCat("        <DataArray ", attributes, " format=\"binary\">\n"));
+    array_.emplace(output_, bytes);
+  }
+
+  void EndArray() {
+    if (absl::Status status = array_->Finish(); status_.ok()) {
+      status_ = std::move(status);
+    }
+    output_.Write("\n        </DataArray>\n");
+  }
+
+  void BeginCells() {
+    if (!std::exchange(has_cells_, true)) {
+      EndArray();
+      output_.Write("      </Points>\n      <Cells>\n");
+      BeginArray("type=\"Int64\" Name=\"connectivity\"",
+                 shape_.simplex_count * (shape_.dimension + 1) * sizeof(int64_t));
+    }
+  }
+
+  const MeshShape shape_;
+  OutputFile output_;
+  std::optional<VtkArrayWriter> array_;  // the one that is being written
+  bool has_cells_ = false;               // the element
+  uint64_t vertices_ = 0;
+  uint64_t simplices_ = 0;
+  absl::Status status_;
+};
 
 }  // namespace
 
-absl::Status WriteVtu(const std::string& path, const MeshView& mesh, std::stop_token stop) {
+absl::StatusOr<std::unique_ptr<MeshWriter>> CreateVtu(const std::string& path, const MeshShape& shape,
+                                                      std::stop_token stop) {
   absl::StatusOr<OutputFile> output = OutputFile::Create(path, std::move(stop));
   if (!output.ok()) {
     return output.status();
   }
-  output->Write(
-      "<?xml version=\"1.0\"?>\n"
-      "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\" "
-      "compressor=\"vtkZLibDataCompressor\">\n"
-      "  <UnstructuredGrid>\n");
-  output->Write(absl::StrCat("    <Piece NumberOfPoints=\"", mesh.vertex_count(), "\" NumberOfCells=\"",
-                             mesh.simplex_count(), "\">\n      <PointData>\n"));
-  if (absl::Status status = WriteInputFlags(mesh, *output); !status.ok()) {
-    return status;
-  }
-  output->Write("      </PointData>\n      <Points>\n");
-  if (absl::Status status = WritePoints(mesh, *output); !status.ok()) {
-    return status;
-  }
-  output->Write("      </Points>\n      <Cells>\n");
-  if (absl::Status status = WriteCells(mesh, *output); !status.ok()) {
-    return status;
-  }
-  output->Write("      </Cells>\n    </Piece>\n  </UnstructuredGrid>\n</VTKFile>\n");
-  return output->Commit();
+  return std::make_unique<VtuWriter>(*std::move(output), shape);
 }
 
 }  // namespace wellspace::formats

@@ -31,6 +31,7 @@ class ZipWriter {
   void Write(std::string_view bytes);
   // Ends the archive. Returns the first error of all so far; `output` is to be committed next.
   absl::Status Finish();
+  const absl::Status& status() const { return status_; }
 
  private:
   struct Archive;

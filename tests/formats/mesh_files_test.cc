@@ -1,6 +1,7 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -81,6 +82,70 @@ INSTANTIATE_TEST_SUITE_P(Formats, RoundTripTest,
                                           testing::Values(2, 3)));
 INSTANTIATE_TEST_SUITE_P(FormatsOfHigherDimensions, RoundTripTest,
                          testing::Combine(testing::Values("mesh.npz", "mesh.node"), testing::Values(4, 5, 6)));
+
+// Whole and in pieces.
+TEST_P(RoundTripTest, PiecesMakeTheSameFile) {
+  const auto& [name, dimension] = GetParam();
+  const Mesh mesh = RandomMesh(dimension, 30000, 60000);
+  ASSERT_TRUE(WriteMesh(folder_.Path(name), "", mesh.View()).ok());
+  const std::string whole = folder_.Read(name);
+  const absl::StatusOr<std::unique_ptr<MeshWriter>> writer = CreateMesh(folder_.Path(name), "", mesh.View().Shape());
+  ASSERT_TRUE(writer.ok()) << writer.status();
+  const auto pieces = [](const auto& values, size_t row, const auto& add) {
+    const size_t piece = 777 * row;
+    for (size_t begin = 0; begin < values.size(); begin += piece) {
+      ASSERT_TRUE(add(std::span(values).subspan(begin, std::min(piece, values.size() - begin))).ok());
+    }
+  };
+  pieces(mesh.points, dimension, [&writer](std::span<const double> part) { return (*writer)->AddPoints(part); });
+  pieces(mesh.simplices, dimension + 1,
+         [&writer](std::span<const uint32_t> part) { return (*writer)->AddSimplices(part); });
+  EXPECT_EQ(folder_.Read(name), whole);  // the old one, until the new one is complete
+  ASSERT_TRUE((*writer)->Commit().ok());
+  EXPECT_EQ(folder_.Read(name), whole);
+}
+
+TEST_F(MeshFilesTest, MissingRowsAreAnErrorAndNoFile) {
+  const Mesh mesh = RandomMesh(3, 10, 10);
+  for (const char* name : {"mesh.vtu", "mesh.npz", "mesh.node"}) {
+    const absl::StatusOr<std::unique_ptr<MeshWriter>> writer = CreateMesh(folder_.Path(name), "", mesh.View().Shape());
+    ASSERT_TRUE(writer.ok()) << writer.status();
+    ASSERT_TRUE((*writer)->AddPoints(mesh.points).ok());
+    ASSERT_TRUE((*writer)->AddSimplices(std::span(mesh.simplices).first(4)).ok());
+    EXPECT_EQ((*writer)->Commit().code(), absl::StatusCode::kInternal) << name;
+  }
+  EXPECT_EQ(folder_.FileCount(), 0);
+}
+
+// A mesh of 200 MB goes to disk with a tenth of that in memory.
+TEST_F(MeshFilesTest, StreamsAreWrittenInBoundedMemory) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "sanitizers keep memory that was given back";
+#endif
+  constexpr uint64_t kVertices = 8 << 20;
+  const std::vector<double> points(3 << 12, 0.25);
+  const std::vector<uint32_t> simplices(4 << 12, 7);
+  const auto peak_kib = [] {
+    rusage usage;
+    getrusage(RUSAGE_SELF, &usage);
+    return usage.ru_maxrss;
+  };
+  const long before = peak_kib();
+  for (const char* name : {"mesh.vtu", "mesh.npz"}) {
+    const absl::StatusOr<std::unique_ptr<MeshWriter>> writer =
+        CreateMesh(folder_.Path(name), "",
+                   {.dimension = 3, .vertex_count = kVertices, .simplex_count = 1 << 14, .input_vertices = 1});
+    ASSERT_TRUE(writer.ok()) << writer.status();
+    for (uint64_t i = 0; i < kVertices; i += 1 << 12) {
+      ASSERT_TRUE((*writer)->AddPoints(points).ok());
+    }
+    for (int i = 0; i < 4; ++i) {
+      ASSERT_TRUE((*writer)->AddSimplices(simplices).ok());
+    }
+    ASSERT_TRUE((*writer)->Commit().ok());
+  }
+  EXPECT_LT(peak_kib() - before, 20'000);
+}
 
 TEST_F(MeshFilesTest, VtuRefusesMoreThanThreeDimensionsAndNamesNpz) {
   const Mesh mesh = RandomMesh(4, 10, 10);

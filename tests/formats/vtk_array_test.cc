@@ -30,11 +30,11 @@ std::string Encode(uint64_t count) {
   TemporaryFolder folder;
   {
     absl::StatusOr<OutputFile> file = OutputFile::Create(folder.Path("array"));
-    VtkArrayWriter writer;
+    VtkArrayWriter writer(*file, count * sizeof(uint64_t));
     for (uint64_t i = 0; i < count; ++i) {
       writer.Add<uint64_t>(i * i);
     }
-    EXPECT_TRUE(writer.Finish(*file).ok());
+    EXPECT_TRUE(writer.Finish().ok());
     EXPECT_TRUE(file->Commit().ok());
   }
   return folder.Read("array");

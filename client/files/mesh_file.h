@@ -1,0 +1,52 @@
+// Meshes from a server to disk while they arrive.
+#ifndef WELLSPACE_CLIENT_FILES_MESH_FILE_H_
+#define WELLSPACE_CLIENT_FILES_MESH_FILE_H_
+
+#include <memory>
+#include <stop_token>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "client/formats/write_mesh.h"
+#include "client/mesh.h"
+
+namespace wellspace::client {
+
+// Writes a mesh to a file, in the memory of formats::MeshWriter. The file appears complete or not at all.
+//
+// Errors:     those of formats::CreateMesh and formats::MeshWriter.
+// Thread safety: thread-compatible.
+class MeshFile final : public MeshSink {
+ public:
+  // See formats::CreateMesh.
+  MeshFile(std::string path, std::string format = "", std::stop_token stop = {})
+      : path_(std::move(path)), format_(std::move(format)), stop_(std::move(stop)) {}
+
+  absl::Status Begin(const MeshHeader& header) override;
+  absl::Status AddPoints(std::span<const double> points) override { return writer_->AddPoints(points); }
+  absl::Status AddSimplices(std::span<const uint32_t> simplices) override { return writer_->AddSimplices(simplices); }
+  absl::Status AddInputVertices(std::span<const uint32_t> vertices) override;
+  absl::Status Finish() override { return writer_->Commit(); }
+
+  // No format holds which vertex each input point became: this keeps it in memory. To be called before Begin.
+  void KeepInputVertices() { keeps_input_vertices_ = true; }
+
+  // What has been told of the mesh, and what was kept.
+  const MeshHeader& header() const { return header_; }
+  const std::vector<uint32_t>& input_vertex() const { return input_vertex_; }
+
+ private:
+  const std::string path_;
+  const std::string format_;
+  const std::stop_token stop_;
+  MeshHeader header_;
+  std::unique_ptr<formats::MeshWriter> writer_;
+  bool keeps_input_vertices_ = false;
+  std::vector<uint32_t> input_vertex_;
+};
+
+}  // namespace wellspace::client
+
+#endif  // WELLSPACE_CLIENT_FILES_MESH_FILE_H_
