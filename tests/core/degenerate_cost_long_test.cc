@@ -12,6 +12,7 @@
 
 #include "core/mesher.h"
 #include "tests/support/clouds.h"
+#include "tests/support/parameters.h"
 
 namespace wellspace::core {
 namespace {
@@ -19,10 +20,7 @@ namespace {
 constexpr double kBound = 3;
 
 double BestSeconds(int dimension, const std::vector<double>& cloud) {
-  MeshParameters parameters;
-  parameters.dimension = dimension;
-  parameters.domain_low = test::UnitLow(dimension);
-  parameters.domain_high = test::UnitHigh(dimension);
+  const MeshParameters parameters = test::InUnitBox(dimension);
   double best = std::numeric_limits<double>::infinity();
   for (int i = 0; i < 3; ++i) {
     RunContext context;

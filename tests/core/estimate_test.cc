@@ -16,23 +16,12 @@
 #include "core/refine/nearest_points.h"
 #include "tests/support/brute_force.h"
 #include "tests/support/clouds.h"
+#include "tests/support/structures.h"
 
 namespace wellspace::core {
 namespace {
 
-template <int D>
-QueryStructure<D> MakeStructure(const Box<D>& box, std::vector<Point<D>> points) {
-  RunContext context;
-  QueryStructure<D> structure;
-  const absl::Status made = structure.Initialize(box, std::move(points), 10'000'000, context);
-  EXPECT_TRUE(made.ok()) << made;
-  return structure;
-}
-
-template <int D>
-QueryStructure<D> MakeStructure(std::string_view kind, size_t n) {
-  return MakeStructure<D>(test::UnitBox<D>(), test::SortedCloud<D>(kind, n));
-}
+using test::MakeStructure;
 
 template <int D>
 SizeEstimate Estimate(const QueryStructure<D>& structure, const Demands<D>& demands) {
@@ -98,7 +87,7 @@ TYPED_TEST(EstimateTest, IsNearWhatMeshingMakes) {
   const std::vector<double> rhos = D == 2 ? std::vector{1.0, DefaultRho(2), 5.0, 1000.0} : std::vector{1.2, 2.0, 5.0};
   for (const std::string_view kind : test::kReferenceKinds) {
     const size_t n = D == 2 ? 500 : 100;
-    const QueryStructure<D> structure = MakeStructure<D>(kind, n);
+    const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, n));
     for (const double rho : rhos) {
       SCOPED_TRACE(std::string(kind) + ", rho " + std::to_string(rho));
       MeshParameters parameters;
@@ -123,12 +112,12 @@ TYPED_TEST(EstimateTest, TendsToTheInputAndTheBoxAsRhoGrows) {
   constexpr int D = TypeParam::kValue;
   for (const std::string_view kind : {"inner", "clusters", "grid"}) {
     SCOPED_TRACE(std::string(kind));
-    const QueryStructure<D> structure = MakeStructure<D>(kind, 1000);
+    const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, 1000));
     const SizeEstimate estimate = Estimate<D>(structure, RadiusEdge<D>(1e6));
     EXPECT_LE(estimate.vertices, 1.15 * structure.vertex_count());
   }
   // Two corners of the box are as far apart as its points are from each other: nothing is missing.
-  const SizeEstimate empty = Estimate<D>(MakeStructure<D>("none", 0), RadiusEdge<D>(DefaultRho(D)));
+  const SizeEstimate empty = Estimate<D>(MakeStructure<D>({}), RadiusEdge<D>(DefaultRho(D)));
   EXPECT_NEAR(empty.vertices, 1 << D, 0.5);
 }
 
@@ -137,7 +126,7 @@ TYPED_TEST(EstimateTest, FallsWithRhoDownToWhatThereIs) {
   constexpr int D = TypeParam::kValue;
   for (const std::string_view kind : test::AllKinds()) {
     SCOPED_TRACE(std::string(kind));
-    const QueryStructure<D> structure = MakeStructure<D>(kind, 100);
+    const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, 100));
     double before = 0;
     for (const double rho : {0.9, 1.0, 1.1, 1.3, 1.7, 2.5, 4.0, 20.0, 100.0, 5000.0}) {
       if (rho < MinimumRho(D)) {
@@ -156,7 +145,7 @@ TYPED_TEST(EstimateTest, FallsWithRhoDownToWhatThereIs) {
 // Guarantee (2).
 TYPED_TEST(EstimateTest, IsTheSameEveryTime) {
   constexpr int D = TypeParam::kValue;
-  const QueryStructure<D> structure = MakeStructure<D>("clusters", 2000);
+  const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("clusters", 2000));
   const SizeEstimate first = Estimate<D>(structure, RadiusEdge<D>(2));
   const SizeEstimate second = Estimate<D>(structure, RadiusEdge<D>(2));
   EXPECT_EQ(first.vertices, second.vertices);
@@ -167,7 +156,7 @@ TYPED_TEST(EstimateTest, IsTheSameEveryTime) {
 TYPED_TEST(EstimateTest, DoesNotDependOnTheUnitOfLength) {
   constexpr int D = TypeParam::kValue;
   std::vector<Point<D>> points = test::SortedCloud<D>("uniform", 300);
-  const SizeEstimate unit = Estimate<D>(MakeStructure<D>(test::UnitBox<D>(), points), RadiusEdge<D>(2));
+  const SizeEstimate unit = Estimate<D>(MakeStructure<D>(points), RadiusEdge<D>(2));
   Box<D> box = test::UnitBox<D>();
   box.high.fill(0x1p30);
   for (Point<D>& p : points) {
@@ -182,10 +171,10 @@ TYPED_TEST(EstimateTest, DoesNotDependOnTheUnitOfLength) {
 
 TYPED_TEST(EstimateTest, LooksAtEveryLeafOfSmallCloudsAndAtEnoughOfLargeOnes) {
   constexpr int D = TypeParam::kValue;
-  const QueryStructure<D> small = MakeStructure<D>("uniform", 50);
+  const QueryStructure<D> small = MakeStructure<D>(test::SortedCloud<D>("uniform", 50));
   ASSERT_LT(small.tree().leaf_count(), 256u);
   EXPECT_EQ(Estimate<D>(small, RadiusEdge<D>(2)).sampling_error, 0);
-  const QueryStructure<D> large = MakeStructure<D>("annuli", 5000);
+  const QueryStructure<D> large = MakeStructure<D>(test::SortedCloud<D>("annuli", 5000));
   const double error = Estimate<D>(large, RadiusEdge<D>(2)).sampling_error;
   EXPECT_GT(error, 0);
   EXPECT_LE(error, 0.05);
@@ -193,7 +182,7 @@ TYPED_TEST(EstimateTest, LooksAtEveryLeafOfSmallCloudsAndAtEnoughOfLargeOnes) {
 
 TYPED_TEST(EstimateTest, SizesAloneAskForVerticesByVolume) {
   constexpr int D = TypeParam::kValue;
-  const QueryStructure<D> structure = MakeStructure<D>("none", 0);
+  const QueryStructure<D> structure = MakeStructure<D>({});
   Demands<D> demands = RadiusEdge<D>(2);
   demands.sizes.max_circumradius = 0.04;
   const double coarse = Estimate<D>(structure, demands).vertices;
@@ -213,7 +202,7 @@ TYPED_TEST(EstimateTest, SizesAloneAskForVerticesByVolume) {
 
 TYPED_TEST(EstimateTest, SizesLargerThanTheMeshHasAnywayChangeNothing) {
   constexpr int D = TypeParam::kValue;
-  const QueryStructure<D> structure = MakeStructure<D>("uniform", 500);
+  const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", 500));
   Demands<D> demands = RadiusEdge<D>(2);
   const double without = Estimate<D>(structure, demands).vertices;
   demands.sizes.max_circumradius = 10;
@@ -222,7 +211,7 @@ TYPED_TEST(EstimateTest, SizesLargerThanTheMeshHasAnywayChangeNothing) {
 
 TYPED_TEST(EstimateTest, WellSpacedVerticesAreMore) {
   constexpr int D = TypeParam::kValue;
-  const QueryStructure<D> structure = MakeStructure<D>("uniform", 500);
+  const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", 500));
   Demands<D> demands = RadiusEdge<D>(DefaultRho(D));
   const double radius_edge = Estimate<D>(structure, demands).vertices;
   demands.criterion = Criterion::kWellSpaced;
@@ -231,7 +220,7 @@ TYPED_TEST(EstimateTest, WellSpacedVerticesAreMore) {
 
 TYPED_TEST(EstimateTest, EndsWhenCancelled) {
   constexpr int D = TypeParam::kValue;
-  const QueryStructure<D> structure = MakeStructure<D>("uniform", 100);
+  const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", 100));
   RunContext cancelled;
   cancelled.Cancel();
   EXPECT_EQ(EstimateSize<D>(structure, RadiusEdge<D>(2), cancelled).status().code(), absl::StatusCode::kCancelled);

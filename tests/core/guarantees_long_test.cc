@@ -1,21 +1,18 @@
 // The guarantees of docs/design/guarantees.md on larger clouds, for more seeds.
 #include <gtest/gtest.h>
 
-#include <string>
 #include <string_view>
 
 #include "tests/core/guarantee_runs.h"
+#include "tests/support/seeded_test.h"
 
 namespace wellspace::test {
 namespace {
 
 template <typename T>
-class GuaranteesLongTest : public ::testing::Test {
+class GuaranteesLongTest : public test::SeededTest {
  protected:
-  GuaranteesLongTest() : trace_(__FILE__, __LINE__, "seed " + std::to_string(seed_)) {}
-
-  const uint64_t seed_ = Seed(1995);
-  ::testing::ScopedTrace trace_;
+  GuaranteesLongTest() : SeededTest(1995) {}
 };
 TYPED_TEST_SUITE(GuaranteesLongTest, Dimensions);
 

@@ -14,6 +14,7 @@
 
 #include "core/mesher.h"
 #include "tests/core/guarantee_runs.h"
+#include "tests/support/seeded_test.h"
 
 namespace wellspace::test {
 namespace {
@@ -30,12 +31,9 @@ using core::SizeBox;
 using core::VertexId;
 
 template <typename T>
-class GuaranteesTest : public ::testing::Test {
+class GuaranteesTest : public test::SeededTest {
  protected:
-  GuaranteesTest() : trace_(__FILE__, __LINE__, "seed " + std::to_string(seed_)) {}
-
-  const uint64_t seed_ = Seed(2008);
-  ::testing::ScopedTrace trace_;
+  GuaranteesTest() : SeededTest(2008) {}
 };
 TYPED_TEST_SUITE(GuaranteesTest, Dimensions);
 

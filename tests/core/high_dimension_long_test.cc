@@ -6,15 +6,13 @@
 #include "core/mesher.h"
 #include "core/simplex/validate.h"
 #include "tests/support/clouds.h"
+#include "tests/support/parameters.h"
 
 namespace wellspace::core {
 namespace {
 
 Mesh ValidMesh(int dimension, const std::vector<double>& cloud) {
-  MeshParameters parameters;
-  parameters.dimension = dimension;
-  parameters.domain_low = test::UnitLow(dimension);
-  parameters.domain_high = test::UnitHigh(dimension);
+  const MeshParameters parameters = test::InUnitBox(dimension);
   RunContext context;
   const absl::StatusOr<Mesh> mesh = MeshPoints(parameters, cloud, context);
   EXPECT_TRUE(mesh.ok()) << mesh.status();

@@ -15,10 +15,12 @@
 #include "core/mesher.h"
 #include "core/simplex/validate.h"
 #include "tests/support/clouds.h"
+#include "tests/support/parameters.h"
 
 namespace wellspace::core {
 namespace {
 
+using test::InUnitBox;
 using test::MakeCloud;
 using test::SplitMix64;
 using ::testing::AllOf;
@@ -37,14 +39,6 @@ MATCHER_P2(Fails, code, message, "") {
 template <typename Message>
 auto Refuses(const Message& message) {
   return Fails(absl::StatusCode::kInvalidArgument, message);
-}
-
-MeshParameters InUnitBox(int dimension) {
-  MeshParameters parameters;
-  parameters.dimension = dimension;
-  parameters.domain_low = test::UnitLow(dimension);
-  parameters.domain_high = test::UnitHigh(dimension);
-  return parameters;
 }
 
 absl::StatusOr<Mesh> MeshOf(const MeshParameters& parameters, std::span<const double> points) {

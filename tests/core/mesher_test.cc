@@ -16,23 +16,17 @@
 #include "core/simplex/validate.h"
 #include "tests/support/canonical.h"
 #include "tests/support/clouds.h"
+#include "tests/support/parameters.h"
 
 namespace wellspace::core {
 namespace {
 
 using test::Canonical;
+using test::InUnitBox;
 using test::MakeCloud;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-MeshParameters InUnitBox(int dimension) {
-  MeshParameters parameters;
-  parameters.dimension = dimension;
-  parameters.domain_low = test::UnitLow(dimension);
-  parameters.domain_high = test::UnitHigh(dimension);
-  return parameters;
-}
 
 std::vector<double> PointsOf(const Mesh& mesh, std::span<const uint32_t> vertices) {
   std::vector<double> points;

@@ -13,6 +13,7 @@
 #include "core/simplex/validate.h"
 #include "tests/support/cgal_oracle.h"
 #include "tests/support/clouds.h"
+#include "tests/support/parameters.h"
 
 namespace wellspace::core {
 namespace {
@@ -85,10 +86,7 @@ Classified Classify(const MeshView& mesh) {
 
 template <int D>
 void CompareWithCgal(const std::vector<double>& cloud, bool general_position) {
-  MeshParameters parameters;
-  parameters.dimension = D;
-  parameters.domain_low = test::UnitLow(D);
-  parameters.domain_high = test::UnitHigh(D);
+  const MeshParameters parameters = test::InUnitBox(D);
   RunContext context;
   const absl::StatusOr<Mesh> mesh = MeshPoints(parameters, cloud, context);
   ASSERT_TRUE(mesh.ok()) << mesh.status();

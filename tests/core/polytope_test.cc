@@ -8,12 +8,12 @@
 #include <cmath>
 #include <numeric>
 #include <set>
-#include <string>
 #include <vector>
 
 #include "tests/support/brute_force.h"
 #include "tests/support/clouds.h"
 #include "tests/support/exact_nodes.h"
+#include "tests/support/seeded_test.h"
 
 namespace wellspace::core {
 namespace {
@@ -23,7 +23,6 @@ using test::HasNodesWithinSlack;
 using test::IntegerPoint;
 using test::IsSimplePolytope;
 using test::NamesOf;
-using test::Seed;
 using test::SplitMix64;
 using test::ToPoint;
 
@@ -130,13 +129,9 @@ template <int D>
 }
 
 template <typename T>
-class PolytopeTest : public ::testing::Test {
+class PolytopeTest : public test::SeededTest {
  protected:
-  PolytopeTest() : trace_(__FILE__, __LINE__, "seed " + std::to_string(seed_)) {}
-
-  const uint64_t seed_ = Seed(1983);
-  SplitMix64 random_{seed_};
-  ::testing::ScopedTrace trace_;
+  PolytopeTest() : SeededTest(1983) {}
 };
 TYPED_TEST_SUITE(PolytopeTest, test::AllDimensions);
 

@@ -8,7 +8,6 @@
 #include <limits>
 #include <numeric>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "core/geometry/exact_measure.h"
@@ -16,12 +15,12 @@
 #include "tests/support/brute_force.h"
 #include "tests/support/clouds.h"
 #include "tests/support/dimensions.h"
+#include "tests/support/seeded_test.h"
 
 namespace wellspace::core {
 namespace {
 
 using test::IntegerPoint;
-using test::Seed;
 using test::SplitMix64;
 using test::ToPoint;
 
@@ -145,13 +144,9 @@ Decided<D> DrawCubeCorners(SplitMix64& random) {
 }
 
 template <typename T>
-class PredicateTest : public ::testing::Test {
+class PredicateTest : public test::SeededTest {
  protected:
-  PredicateTest() : trace_(__FILE__, __LINE__, "seed " + std::to_string(seed_)) {}
-
-  const uint64_t seed_ = Seed(2008);
-  SplitMix64 random_{seed_};
-  ::testing::ScopedTrace trace_;
+  PredicateTest() : SeededTest(2008) {}
 };
 TYPED_TEST_SUITE(PredicateTest, test::AllDimensions);
 

@@ -15,6 +15,8 @@
 #include "core/refine/refine.h"
 #include "tests/support/brute_force.h"
 #include "tests/support/clouds.h"
+#include "tests/support/seeded_test.h"
+#include "tests/support/structures.h"
 
 namespace wellspace::core {
 namespace {
@@ -22,10 +24,9 @@ namespace {
 using test::ByDimension;
 using test::HaveSameNodes;
 using test::IsSimplePolytope;
-using test::Seed;
+using test::MakeStructure;
 using test::SplitMix64;
 
-constexpr uint64_t kManyLeaves = 1'000'000;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // The fast scan opens at most this many times the leaves that the reference does, and as many more: it takes leaves by
@@ -34,15 +35,6 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMostFactor = 1.5;
 constexpr uint64_t kMostMore = 2;
 constexpr double kMostFactorOfCloud = 1.3;
-
-template <int D>
-QueryStructure<D> MakeStructure(std::vector<Point<D>> points) {
-  RunContext context;
-  QueryStructure<D> structure;
-  const absl::Status made = structure.Initialize(test::UnitBox<D>(), std::move(points), kManyLeaves, context);
-  EXPECT_TRUE(made.ok()) << made;
-  return structure;
-}
 
 template <int D>
 Point<D> DrawPoint(double half_side, SplitMix64& random) {
@@ -160,13 +152,9 @@ double DiameterByEnumeration(const Box<D>& centres, const std::vector<Point<D>>&
 }
 
 template <typename T>
-class EmptyBallProgramTest : public ::testing::Test {
+class EmptyBallProgramTest : public test::SeededTest {
  protected:
-  EmptyBallProgramTest() : trace_(__FILE__, __LINE__, "seed " + std::to_string(seed_)) {}
-
-  const uint64_t seed_ = Seed(2008);
-  SplitMix64 random_{seed_};
-  ::testing::ScopedTrace trace_;
+  EmptyBallProgramTest() : SeededTest(2008) {}
 };
 TYPED_TEST_SUITE(EmptyBallProgramTest, test::AllDimensions);
 
@@ -420,9 +408,9 @@ class ScanComparer {
 };
 
 template <typename T>
-class ReferenceScanTest : public ::testing::Test {
+class ReferenceScanTest : public test::SeededTest {
  protected:
-  ReferenceScanTest() : trace_(__FILE__, __LINE__, "seed " + std::to_string(seed_)) {}
+  ReferenceScanTest() : SeededTest(1969) {}
 
   // Holds the average, and leaves the figures in the test's XML output.
   void ExpectFewLeaves(const std::string& name, const Totals& totals) {
@@ -435,10 +423,6 @@ class ReferenceScanTest : public ::testing::Test {
     this->RecordProperty(name + "_programs_per_query", std::to_string(per_query(totals.programs)));
     EXPECT_LE(per_query(totals.fast_leaves), kMostFactorOfCloud * per_query(totals.reference_leaves));
   }
-
-  const uint64_t seed_ = Seed(1969);
-  SplitMix64 random_{seed_};
-  ::testing::ScopedTrace trace_;
 };
 TYPED_TEST_SUITE(ReferenceScanTest, test::UpTo4);
 

@@ -20,25 +20,19 @@
 #include "core/refine/steiner_point.h"
 #include "tests/support/brute_force.h"
 #include "tests/support/clouds.h"
+#include "tests/support/seeded_test.h"
+#include "tests/support/structures.h"
 
 namespace wellspace::core {
 namespace {
 
 using test::ByDimension;
+using test::MakeStructure;
 using test::Seed;
 using test::SplitMix64;
 using ::testing::HasSubstr;
 
 constexpr uint64_t kMany = 1'000'000;
-
-template <int D>
-QueryStructure<D> MakeStructure(std::vector<Point<D>> points) {
-  RunContext context;
-  QueryStructure<D> structure;
-  const absl::Status made = structure.Initialize(test::UnitBox<D>(), std::move(points), kMany, context);
-  EXPECT_TRUE(made.ok()) << made;
-  return structure;
-}
 
 struct Parameters {
   double rho = 0;
@@ -88,13 +82,9 @@ void ExpectRefined(const QueryStructure<D>& structure, VertexId v, double rho, P
 }
 
 template <typename T>
-class RefineTest : public ::testing::Test {
+class RefineTest : public test::SeededTest {
  protected:
-  RefineTest() : trace_(__FILE__, __LINE__, "seed " + std::to_string(seed_)) {}
-
-  const uint64_t seed_ = Seed(1995);
-  SplitMix64 random_{seed_};
-  ::testing::ScopedTrace trace_;
+  RefineTest() : SeededTest(1995) {}
 };
 TYPED_TEST_SUITE(RefineTest, test::UpTo5);
 

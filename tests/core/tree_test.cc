@@ -16,13 +16,13 @@
 #include "core/tree/morton.h"
 #include "tests/support/brute_force.h"
 #include "tests/support/clouds.h"
+#include "tests/support/seeded_test.h"
 
 namespace wellspace::core {
 namespace {
 
 using test::ByDimension;
 using test::MortonSorted;
-using test::Seed;
 using test::SplitMix64;
 using ::testing::HasSubstr;
 
@@ -291,13 +291,9 @@ std::vector<Box<D>> Boxes() {
 }
 
 template <typename T>
-class TreeTest : public ::testing::Test {
+class TreeTest : public test::SeededTest {
  protected:
-  TreeTest() : trace_(__FILE__, __LINE__, "seed " + std::to_string(seed_)) {}
-
-  const uint64_t seed_ = Seed(1990);
-  SplitMix64 random_{seed_};
-  ::testing::ScopedTrace trace_;
+  TreeTest() : SeededTest(1990) {}
 };
 TYPED_TEST_SUITE(TreeTest, test::AllDimensions);
 

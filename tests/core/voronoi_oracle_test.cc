@@ -7,13 +7,14 @@
 #include <map>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "core/refine/refine.h"
 #include "core/voronoi/query_structure.h"
 #include "tests/support/brute_force.h"
 #include "tests/support/clouds.h"
+#include "tests/support/seeded_test.h"
+#include "tests/support/structures.h"
 
 namespace wellspace::core {
 namespace {
@@ -23,20 +24,9 @@ using test::CutByAll;
 using test::HasEmptyBalls;
 using test::HaveSameNodes;
 using test::IsSimplePolytope;
+using test::MakeStructure;
 using test::NamesOf;
-using test::Seed;
 using test::SplitMix64;
-
-constexpr uint64_t kManyLeaves = 1'000'000;
-
-template <int D>
-QueryStructure<D> MakeStructure(const Box<D>& box, std::vector<Point<D>> points) {
-  RunContext context;
-  QueryStructure<D> structure;
-  const absl::Status made = structure.Initialize(box, std::move(points), kManyLeaves, context);
-  EXPECT_TRUE(made.ok()) << made;
-  return structure;
-}
 
 // The cube that ClippedVoronoi clips by.
 template <int D>
@@ -118,13 +108,9 @@ class QueryChecker {
 };
 
 template <typename T>
-class VoronoiOracleTest : public ::testing::Test {
+class VoronoiOracleTest : public test::SeededTest {
  protected:
-  VoronoiOracleTest() : trace_(__FILE__, __LINE__, "seed " + std::to_string(seed_)) {}
-
-  const uint64_t seed_ = Seed(1908);
-  SplitMix64 random_{seed_};
-  ::testing::ScopedTrace trace_;
+  VoronoiOracleTest() : SeededTest(1908) {}
 };
 TYPED_TEST_SUITE(VoronoiOracleTest, test::UpTo5);
 
@@ -135,7 +121,7 @@ TYPED_TEST(VoronoiOracleTest, InitializeAddsTheCornersThatAreMissing) {
   Point<D> on_face;
   on_face.fill(0.25);
   on_face[0] = 1;
-  const QueryStructure<D> structure = MakeStructure<D>(test::UnitBox<D>(), {on_face, high});
+  const QueryStructure<D> structure = MakeStructure<D>({on_face, high});
   ASSERT_EQ(structure.vertex_count(), 1u + (1u << D));
   EXPECT_EQ(structure.point(VertexId{0}), on_face);
   EXPECT_EQ(structure.point(VertexId{1}), high);
@@ -154,8 +140,7 @@ TYPED_TEST(VoronoiOracleTest, QueriesAreExactOnEveryKindOfCloud) {
   constexpr int D = TypeParam::kValue;
   for (const std::string_view kind : test::SomeKinds(D)) {
     SCOPED_TRACE(std::string(kind));
-    const QueryStructure<D> structure =
-        MakeStructure<D>(test::UnitBox<D>(), test::SortedCloud<D>(kind, ByDimension<D>({60, 30, 16, 4})));
+    const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, ByDimension<D>({60, 30, 16, 4})));
     QueryChecker<D> checker(this->random_);
     for (int i = 0; i < ByDimension<D>({6, 6, 4, 1}); ++i) {
       checker.CheckAll(structure, VertexId(this->random_.Below(structure.vertex_count())));
@@ -169,8 +154,7 @@ TYPED_TEST(VoronoiOracleTest, NearestToIsTheNearestOfAll) {
   constexpr int D = TypeParam::kValue;
   for (const std::string_view kind : test::SomeKinds(D)) {
     SCOPED_TRACE(std::string(kind));
-    const QueryStructure<D> structure =
-        MakeStructure<D>(test::UnitBox<D>(), test::SortedCloud<D>(kind, ByDimension<D>({60, 60, 30, 6})));
+    const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, ByDimension<D>({60, 60, 30, 6})));
     Workspace<D> workspace;
     for (int i = 0; i < ByDimension<D>({40, 40, 20, 10}); ++i) {
       const VertexId any = VertexId(this->random_.Below(structure.vertex_count()));
@@ -223,8 +207,7 @@ TYPED_TEST(VoronoiOracleTest, QueriesAreExactAtEveryStageOfRefinement) {
   uint32_t steps = 0;
   for (const std::string_view kind : {"uniform", "cospherical", "boundary", "lines", "log-uniform"}) {
     SCOPED_TRACE(std::string(kind));
-    QueryStructure<D> structure =
-        MakeStructure<D>(test::UnitBox<D>(), test::SortedCloud<D>(kind, ByDimension<D>({60, 16, 6, 1})));
+    QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, ByDimension<D>({60, 16, 6, 1})));
     QueryChecker<D> checker(this->random_);
     RunContext context;
     const RefinementObserver<D> observer = [&](const QueryStructure<D>& at, const Insertion&) {
@@ -246,8 +229,7 @@ TYPED_TEST(VoronoiOracleTest, CellsOfDifferentSitesAgree) {
   constexpr int D = TypeParam::kValue;
   for (const std::string_view kind : {"grid", "cospherical", "boundary", "rounded", "uniform"}) {
     SCOPED_TRACE(std::string(kind));
-    const QueryStructure<D> structure =
-        MakeStructure<D>(test::UnitBox<D>(), test::SortedCloud<D>(kind, ByDimension<D>({60, 60, 30, 6})));
+    const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, ByDimension<D>({60, 60, 30, 6})));
     std::map<std::vector<uint32_t>, int> seen;  // simplices, and from how many of their corners
     Workspace<D> workspace;
     for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
@@ -277,8 +259,8 @@ TYPED_TEST(VoronoiOracleTest, CellsOfDifferentSitesAgree) {
 TYPED_TEST(VoronoiOracleTest, WorkspaceKeepsNothingFromTheLastQuery) {
   constexpr int D = TypeParam::kValue;
   const QueryStructure<D> large =
-      MakeStructure<D>(test::UnitBox<D>(), test::SortedCloud<D>("uniform", ByDimension<D>({100, 100, 100, 30})));
-  const QueryStructure<D> small = MakeStructure<D>(test::UnitBox<D>(), test::SortedCloud<D>("uniform", 10));
+      MakeStructure<D>(test::SortedCloud<D>("uniform", ByDimension<D>({100, 100, 100, 30})));
+  const QueryStructure<D> small = MakeStructure<D>(test::SortedCloud<D>("uniform", 10));
   Workspace<D> used;
   for (int i = 0; i < 20; ++i) {
     for (const QueryStructure<D>* structure : {&large, &small}) {
@@ -294,7 +276,7 @@ TYPED_TEST(VoronoiOracleTest, WorkspaceKeepsNothingFromTheLastQuery) {
 
 TYPED_TEST(VoronoiOracleTest, CountersCountWhatQueriesDo) {
   constexpr int D = TypeParam::kValue;
-  const QueryStructure<D> structure = MakeStructure<D>(test::UnitBox<D>(), {});
+  const QueryStructure<D> structure = MakeStructure<D>({});
   Workspace<D> workspace;
   // The corners of the unit box: the cell of one is the box of half the side about it, cut by D others; leaves are few.
   structure.ClippedVoronoi(VertexId{0}, 10, workspace);
