@@ -68,7 +68,7 @@ grpc::Status List(const CallEnvironment& environment, const Caller& caller, cons
 grpc::ServerUnaryReactor* OperationService::StartRefinement(grpc::CallbackServerContext* context,
                                                             const v1::StartRefinementRequest* request,
                                                             v1::StartRefinementResponse* response) {
-  return UnaryCall::ServeOnce(environment_, context, "StartRefinement", request, response,
+  return UnaryCall::ServeOnce(environment_, context, request, response,
                               [this, request](const Caller& caller, v1::StartRefinementResponse& answer) {
                                 return Start(environment_, caller, *request, answer.mutable_operation());
                               });
@@ -77,7 +77,7 @@ grpc::ServerUnaryReactor* OperationService::StartRefinement(grpc::CallbackServer
 grpc::ServerUnaryReactor* OperationService::GetOperation(grpc::CallbackServerContext* context,
                                                          const v1::GetOperationRequest* request,
                                                          v1::GetOperationResponse* response) {
-  return UnaryCall::Serve(environment_, context, "GetOperation", response,
+  return UnaryCall::Serve(environment_, context, response,
                           [this, request](const Caller& caller, v1::GetOperationResponse& answer) {
                             FoundOperation found;
                             grpc::Status status = FindOperation(environment_, caller, request->name(), &found);
@@ -91,7 +91,7 @@ grpc::ServerUnaryReactor* OperationService::GetOperation(grpc::CallbackServerCon
 grpc::ServerUnaryReactor* OperationService::ListOperations(grpc::CallbackServerContext* context,
                                                            const v1::ListOperationsRequest* request,
                                                            v1::ListOperationsResponse* response) {
-  return UnaryCall::Serve(environment_, context, "ListOperations", response,
+  return UnaryCall::Serve(environment_, context, response,
                           [this, request](const Caller& caller, v1::ListOperationsResponse& answer) {
                             return List(environment_, caller, *request, answer);
                           });
@@ -100,7 +100,7 @@ grpc::ServerUnaryReactor* OperationService::ListOperations(grpc::CallbackServerC
 grpc::ServerUnaryReactor* OperationService::CancelOperation(grpc::CallbackServerContext* context,
                                                             const v1::CancelOperationRequest* request,
                                                             v1::CancelOperationResponse* response) {
-  return UnaryCall::Serve(environment_, context, "CancelOperation", response,
+  return UnaryCall::Serve(environment_, context, response,
                           [this, request](const Caller& caller, v1::CancelOperationResponse& answer) {
                             FoundOperation found;
                             grpc::Status status = FindOperation(environment_, caller, request->name(), &found);

@@ -142,7 +142,7 @@ grpc::Status Delete(const CallEnvironment& environment, const Caller& caller, co
 grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerContext* context,
                                                         const v1::CreateSessionRequest* request,
                                                         v1::CreateSessionResponse* response) {
-  return UnaryCall::ServeOnce(environment_, context, "CreateSession", request, response,
+  return UnaryCall::ServeOnce(environment_, context, request, response,
                               [this, request](const Caller& caller, v1::CreateSessionResponse& answer) {
                                 return Create(environment_, caller, *request, answer.mutable_session());
                               });
@@ -151,7 +151,7 @@ grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerCont
 grpc::ServerUnaryReactor* SessionService::GetSession(grpc::CallbackServerContext* context,
                                                      const v1::GetSessionRequest* request,
                                                      v1::GetSessionResponse* response) {
-  return UnaryCall::Serve(environment_, context, "GetSession", response,
+  return UnaryCall::Serve(environment_, context, response,
                           [this, request](const Caller& caller, v1::GetSessionResponse& answer) {
                             std::shared_ptr<Session> session;
                             grpc::Status status = FindSession(environment_, caller, request->name(), &session);
@@ -165,7 +165,7 @@ grpc::ServerUnaryReactor* SessionService::GetSession(grpc::CallbackServerContext
 grpc::ServerUnaryReactor* SessionService::ListSessions(grpc::CallbackServerContext* context,
                                                        const v1::ListSessionsRequest* request,
                                                        v1::ListSessionsResponse* response) {
-  return UnaryCall::Serve(environment_, context, "ListSessions", response,
+  return UnaryCall::Serve(environment_, context, response,
                           [this, request](const Caller& caller, v1::ListSessionsResponse& answer) {
                             return List(environment_, caller, *request, answer);
                           });
@@ -174,7 +174,7 @@ grpc::ServerUnaryReactor* SessionService::ListSessions(grpc::CallbackServerConte
 grpc::ServerUnaryReactor* SessionService::UpdateSession(grpc::CallbackServerContext* context,
                                                         const v1::UpdateSessionRequest* request,
                                                         v1::UpdateSessionResponse* response) {
-  return UnaryCall::ServeOnce(environment_, context, "UpdateSession", request, response,
+  return UnaryCall::ServeOnce(environment_, context, request, response,
                               [this, request](const Caller& caller, v1::UpdateSessionResponse& answer) {
                                 return Update(environment_, caller, *request, answer.mutable_session());
                               });
@@ -183,7 +183,7 @@ grpc::ServerUnaryReactor* SessionService::UpdateSession(grpc::CallbackServerCont
 grpc::ServerUnaryReactor* SessionService::DeleteSession(grpc::CallbackServerContext* context,
                                                         const v1::DeleteSessionRequest* request,
                                                         v1::DeleteSessionResponse* response) {
-  return UnaryCall::ServeOnce(environment_, context, "DeleteSession", request, response,
+  return UnaryCall::ServeOnce(environment_, context, request, response,
                               [this, request](const Caller& caller, v1::DeleteSessionResponse& /*answer*/) {
                                 return Delete(environment_, caller, *request);
                               });

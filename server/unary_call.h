@@ -16,14 +16,13 @@ namespace wellspace::server {
 // Thread safety and invariants: those of Call.
 class UnaryCall final : public Call<grpc::ServerUnaryReactor> {
  public:
-  UnaryCall(const CallEnvironment& environment, grpc::CallbackServerContext* context, const char* method)
-      : Call(environment, context, method) {}
+  UnaryCall(const CallEnvironment& environment, grpc::CallbackServerContext* context) : Call(environment, context) {}
 
   // Serves a call that `handler` answers at once: grpc::Status handler(const Caller&, Response&).
   template <typename Response, typename Handler>
   static grpc::ServerUnaryReactor* Serve(const CallEnvironment& environment, grpc::CallbackServerContext* context,
-                                         const char* method, Response* response, const Handler& handler) {
-    const auto call = std::make_shared<UnaryCall>(environment, context, method);
+                                         Response* response, const Handler& handler) {
+    const auto call = std::make_shared<UnaryCall>(environment, context);
     Begin(call);
     if (call->is_admitted_) {
       call->EndWith(RunGuarded([&] { return handler(call->caller(), *response); }));
@@ -34,9 +33,8 @@ class UnaryCall final : public Call<grpc::ServerUnaryReactor> {
   // The same for a request with a request_id: `handler` is asked once, however often the call is repeated.
   template <typename Request, typename Response, typename Handler>
   static grpc::ServerUnaryReactor* ServeOnce(const CallEnvironment& environment, grpc::CallbackServerContext* context,
-                                             const char* method, const Request* request, Response* response,
-                                             const Handler& handler) {
-    const auto call = std::make_shared<UnaryCall>(environment, context, method);
+                                             const Request* request, Response* response, const Handler& handler) {
+    const auto call = std::make_shared<UnaryCall>(environment, context);
     Begin(call);
     if (call->is_admitted_) {
       const auto work = [&](const RequestIds::Done& done) {
@@ -56,7 +54,7 @@ class UnaryCall final : public Call<grpc::ServerUnaryReactor> {
 
   void EndWith(grpc::Status status) {
     std::lock_guard lock(mutex_);
-    EndFailed(std::move(status));
+    End(std::move(status));
   }
 
   void EndWith(const RequestIds::Answer& answer, google::protobuf::Message& response) {
@@ -67,7 +65,7 @@ class UnaryCall final : public Call<grpc::ServerUnaryReactor> {
     if (answer.status.ok()) {
       response.ParseFromString(answer.response);
     }
-    EndFailed(answer.status);
+    End(answer.status);
   }
 
   bool is_admitted_ = false;  // set before the call is known to others

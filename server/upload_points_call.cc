@@ -52,10 +52,12 @@ grpc::Status UploadPointsCall::Accept() {
   });
 }
 
-std::string UploadPointsCall::Figures() const {
-  return session_ == nullptr
-             ? ""
-             : absl::StrCat(" session=", session_->name(), " points=", coordinate_count_ / session_->dimension());
+LogFields UploadPointsCall::Figures() const {
+  LogFields figures;
+  if (session_ != nullptr) {
+    figures.Add("session", session_->name()).Add("points", coordinate_count_ / session_->dimension());
+  }
+  return figures;
 }
 
 }  // namespace wellspace::server

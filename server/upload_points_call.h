@@ -20,13 +20,13 @@ class UploadPointsCall final : public Call<grpc::ServerReadReactor<grpc::ByteBuf
  public:
   // REQUIRES:   `response` is valid until the end of the call.
   UploadPointsCall(const CallEnvironment& environment, grpc::CallbackServerContext* context, grpc::ByteBuffer* response)
-      : Call(environment, context, "UploadPoints"), response_(response) {}
+      : Call(environment, context), response_(response) {}
 
   void OnReadDone(bool ok) override;
 
  private:
   void OnBegin() override { StartRead(&request_); }
-  std::string Figures() const override;
+  LogFields Figures() const override;
 
   // The following want mutex_ to be held.
   grpc::Status Accept();

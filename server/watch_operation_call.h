@@ -25,7 +25,7 @@ class WatchOperationCall final
  public:
   WatchOperationCall(const CallEnvironment& environment, grpc::CallbackServerContext* context,
                      const v1::WatchOperationRequest& request)
-      : ResponseStream(environment, context, "WatchOperation"), name_(request.name()) {
+      : ResponseStream(environment, context), name_(request.name()) {
     if (request.has_after_sequence()) {
       after_ = request.after_sequence();
     }
@@ -34,7 +34,7 @@ class WatchOperationCall final
 
  private:
   void OnBegin() override;
-  std::string Figures() const override { return " operation=" + name_; }
+  LogFields Figures() const override { return LogFields().Add("operation", name_); }
   std::optional<v1::WatchOperationResponse> NextResponse() override;
 
   // When the operation has changed, on any thread.
