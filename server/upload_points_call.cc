@@ -2,7 +2,6 @@
 
 #include <utility>
 
-#include "absl/strings/str_cat.h"
 #include "server/errors.h"
 #include "server/resource_names.h"
 #include "server/wire.h"
