@@ -52,13 +52,10 @@ grpc::Status List(const CallEnvironment& environment, const Caller& caller, cons
   if (grpc::Status status = PositionFromProto(request.page_token(), list, 0, &after); !status.ok()) {
     return status;
   }
-  std::vector<std::shared_ptr<Operation>> operations = session->ListOperations(after, count + 1);
-  if (operations.size() > count) {
-    operations.pop_back();
-    response.set_next_page_token(MakePageToken(list, operations.back()->number()));
-  }
-  for (const std::shared_ptr<Operation>& operation : operations) {
-    *response.add_operations() = operation->Describe();
+  const std::vector<std::shared_ptr<Operation>> operations = session->ListOperations(after, count + 1);
+  const size_t listed = FillPage(operations, count, response.mutable_operations());
+  if (listed < operations.size()) {
+    response.set_next_page_token(MakePageToken(list, operations[listed - 1]->number()));
   }
   return grpc::Status::OK;
 }

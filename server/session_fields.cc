@@ -17,6 +17,7 @@ namespace {
 constexpr int kMaxLabels = 64;
 constexpr size_t kMaxKeyCharacters = 63;
 constexpr size_t kMaxValueCharacters = 255;
+constexpr size_t kMaxParametersBytes = size_t{kMaxResponseBytes} / 2;
 constexpr absl::Duration kMinTtl = absl::Seconds(1);
 constexpr int32_t kNanosPerSecond = 1'000'000'000;
 
@@ -97,9 +98,22 @@ grpc::Status PositionFromProto(const std::string& token, const std::string& list
   return grpc::Status::OK;
 }
 
+grpc::Status CheckParametersSize(const core::MeshParameters& parameters) {
+  const size_t bytes = ParametersToProto(parameters).ByteSizeLong();
+  return bytes <= kMaxParametersBytes
+             ? grpc::Status::OK
+             : MakeError(v1::ERROR_REASON_INVALID_PARAMETERS,
+                         absl::StrCat("size_boxes has ", parameters.size_boxes.size(), " boxes, and the parameters ",
+                                      bytes, " bytes; a session's may have at most ", kMaxParametersBytes),
+                         "parameters.size_boxes");
+}
+
 grpc::Status ParametersForSession(const v1::MeshParameters& message, const ServiceOptions& options,
                                   const Session& session, core::MeshParameters* parameters) {
   if (grpc::Status status = ParametersFromProto(message, options, parameters); !status.ok()) {
+    return status;
+  }
+  if (grpc::Status status = CheckParametersSize(*parameters); !status.ok()) {
     return status;
   }
   const core::MeshParameters known = session.parameters();

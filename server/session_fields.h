@@ -42,6 +42,11 @@ grpc::Status PageSizeFromProto(int32_t page_size, size_t* count);
 // Errors:     INVALID_REQUEST.
 grpc::Status PositionFromProto(const std::string& token, const std::string& list, uint64_t begin, uint64_t* position);
 
+// Refuses parameters that are too large to be sent with every answer about their session.
+//
+// Errors:     INVALID_PARAMETERS.
+grpc::Status CheckParametersSize(const core::MeshParameters& parameters);
+
 // The parameters of a refinement of `session` that is asked for with `message`.
 //
 // Errors:     INVALID_PARAMETERS, also for another dimension or domain than the session's.

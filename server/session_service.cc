@@ -28,6 +28,9 @@ grpc::Status Create(const CallEnvironment& environment, const Caller& caller, co
       !status.ok()) {
     return status;
   }
+  if (grpc::Status status = CheckParametersSize(settings.parameters); !status.ok()) {
+    return status;
+  }
   if (grpc::Status status = LabelsFromProto(request.labels(), "labels", &settings.labels); !status.ok()) {
     return status;
   }
@@ -68,15 +71,12 @@ grpc::Status List(const CallEnvironment& environment, const Caller& caller, cons
   if (grpc::Status status = PositionFromProto(request.page_token(), list, 0, &after); !status.ok()) {
     return status;
   }
-  std::vector<std::shared_ptr<Session>> sessions =
+  const std::vector<std::shared_ptr<Session>> sessions =
       environment.sessions.List(caller.tenant, absl::FromUnixNanos(static_cast<int64_t>(after)), count + 1, labels);
-  if (sessions.size() > count) {
-    sessions.pop_back();
+  const size_t listed = FillPage(sessions, count, response.mutable_sessions());
+  if (listed < sessions.size()) {
     response.set_next_page_token(
-        MakePageToken(list, static_cast<uint64_t>(absl::ToUnixNanos(sessions.back()->create_time()))));
-  }
-  for (const std::shared_ptr<Session>& session : sessions) {
-    *response.add_sessions() = session->Describe();
+        MakePageToken(list, static_cast<uint64_t>(absl::ToUnixNanos(sessions[listed - 1]->create_time()))));
   }
   return grpc::Status::OK;
 }

@@ -1,0 +1,39 @@
+#include "server/point_store.h"
+
+#include <numeric>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+namespace wellspace::server {
+namespace {
+
+TEST(PointStore, GivesBackWhatCameInAnyPieces) {
+  std::vector<double> all(500'000);
+  std::iota(all.begin(), all.end(), 0.0);
+  PointStore store;
+  size_t at = 0;
+  for (size_t piece = 0; at < all.size(); piece = piece * 3 + 1) {  // 0, 1, 4, … beyond a block
+    const size_t count = std::min(piece, all.size() - at);
+    store.Append({all.data() + at, count});
+    at += count;
+  }
+  EXPECT_EQ(store.coordinate_count(), all.size());
+  const core::RunContext context;
+  for (const size_t first : {size_t{0}, size_t{1}, size_t{131'071}, size_t{131'072}, size_t{400'001}, all.size()}) {
+    const auto copy = store.CopyFrom(first, context);
+    ASSERT_TRUE(copy.ok());
+    EXPECT_EQ(*copy, std::vector<double>(all.begin() + static_cast<std::ptrdiff_t>(first), all.end())) << first;
+  }
+}
+
+TEST(PointStore, CopyingCanBeCancelled) {
+  PointStore store;
+  store.Append(std::vector<double>(10, 1.0));
+  core::RunContext context;
+  context.Cancel();
+  EXPECT_EQ(store.CopyFrom(0, context).status().code(), absl::StatusCode::kCancelled);
+}
+
+}  // namespace
+}  // namespace wellspace::server

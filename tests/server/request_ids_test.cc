@@ -1,0 +1,132 @@
+#include "server/request_ids.h"
+
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "gtest/gtest.h"
+#include "tests/server/service_harness.h"
+#include "wellspace/v1/sessions.pb.h"
+
+namespace wellspace::server {
+namespace {
+
+class RequestIdsTest : public ::testing::Test {
+ protected:
+  // Asks, and answers with `answer` when it is the first time.
+  RequestIds::Answer Ask(const std::string& id, const std::string& name, const RequestIds::Answer& answer,
+                         const std::string& tenant = "a") {
+    v1::DeleteSessionRequest request;
+    request.set_name(name);
+    RequestIds::Answer got;
+    got.response = "never answered";
+    ids_.Once(
+        tenant, id, request,
+        [&](const RequestIds::Done& done) {
+          ++done_;
+          done(answer);
+        },
+        [&](const RequestIds::Answer& given) { got = given; });
+    return got;
+  }
+
+  absl::Time now_ = absl::FromUnixSeconds(1'000'000);
+  RequestIds ids_{[this] { return now_; }};
+  int done_ = 0;
+};
+
+RequestIds::Answer Ok(const std::string& response) { return {grpc::Status::OK, response}; }
+
+TEST_F(RequestIdsTest, ARepeatedCallGetsTheFirstAnswer) {
+  EXPECT_EQ(Ask("1", "x", Ok("first")).response, "first");
+  EXPECT_EQ(Ask("1", "x", Ok("second")).response, "first");
+  EXPECT_EQ(Ask("2", "x", Ok("other id")).response, "other id");
+  EXPECT_EQ(Ask("1", "x", Ok("other tenant"), "b").response, "other tenant");
+  EXPECT_EQ(done_, 3);
+}
+
+TEST_F(RequestIdsTest, NoIdIsNeverARepetition) {
+  EXPECT_EQ(Ask("", "x", Ok("first")).response, "first");
+  EXPECT_EQ(Ask("", "x", Ok("second")).response, "second");
+}
+
+TEST_F(RequestIdsTest, AnotherRequestWithTheSameIdIsRefused) {
+  Ask("1", "x", Ok("first"));
+  const grpc::Status status = Ask("1", "y", Ok("second")).status;
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(DetailsOf(status).reason, "REQUEST_ID_REUSED");
+  EXPECT_EQ(DetailsOf(status).field, "request_id");
+  EXPECT_EQ(done_, 1);
+}
+
+TEST_F(RequestIdsTest, TheOrderOfLabelsIsNoOtherRequest) {
+  v1::CreateSessionRequest forward;
+  v1::CreateSessionRequest backward;
+  for (int i = 0; i < 64; ++i) {
+    (*forward.mutable_labels())[absl::StrCat("key", i)] = "value";
+    (*backward.mutable_labels())[absl::StrCat("key", 63 - i)] = "value";
+  }
+  const auto work = [&](const RequestIds::Done& done) {
+    ++done_;
+    done(Ok("answer"));
+  };
+  ids_.Once("a", "1", forward, work, [](const RequestIds::Answer&) {});
+  ids_.Once("a", "1", backward, work, [](const RequestIds::Answer& answer) { EXPECT_TRUE(answer.status.ok()); });
+  EXPECT_EQ(done_, 1);
+}
+
+TEST_F(RequestIdsTest, WhatFailedMayBeTriedAgain) {
+  EXPECT_FALSE(Ask("1", "x", {grpc::Status(grpc::StatusCode::ABORTED, ""), ""}).status.ok());
+  EXPECT_EQ(Ask("1", "x", Ok("second")).response, "second");
+}
+
+TEST_F(RequestIdsTest, AnswersAreForgottenAfterTheirTime) {
+  Ask("1", "x", Ok("first"));
+  now_ += RequestIds::kKeptFor;
+  EXPECT_EQ(Ask("1", "x", Ok("second")).response, "first");
+  now_ += absl::Nanoseconds(1);
+  EXPECT_EQ(Ask("1", "x", Ok("third")).response, "third");
+}
+
+TEST_F(RequestIdsTest, TheOldestGoWhenThereAreTooMany) {
+  for (size_t i = 0; i < RequestIds::kMaxPerTenant; ++i) {
+    Ask(absl::StrCat(i), "x", Ok("first"));
+  }
+  EXPECT_EQ(Ask("0", "x", Ok("second")).response, "first");
+  Ask("one more", "x", Ok("first"));
+  EXPECT_EQ(Ask("1", "x", Ok("second")).response, "first");
+  EXPECT_EQ(Ask("0", "x", Ok("second")).response, "second");
+}
+
+TEST_F(RequestIdsTest, AnswersTakeBoundedMemory) {
+  const std::string large(RequestIds::kMaxBytesPerTenant / 4, 'x');
+  for (int i = 0; i < 5; ++i) {
+    Ask(absl::StrCat(i), "x", Ok(large));
+  }
+  EXPECT_EQ(Ask("4", "x", Ok("second")).response, large);
+  EXPECT_EQ(Ask("0", "x", Ok("second")).response, "second");
+}
+
+TEST_F(RequestIdsTest, TheLengthOfAnIdIsLimited) {
+  EXPECT_TRUE(Ask(std::string(RequestIds::kMaxLength, 'x'), "x", Ok("")).status.ok());
+  const grpc::Status status = Ask(std::string(RequestIds::kMaxLength + 1, 'x'), "x", Ok("")).status;
+  EXPECT_EQ(DetailsOf(status).reason, "INVALID_REQUEST");
+  EXPECT_EQ(DetailsOf(status).field, "request_id");
+}
+
+TEST_F(RequestIdsTest, ACallThatRepeatsOneUnderWayGetsItsAnswer) {
+  v1::DeleteSessionRequest request;
+  RequestIds::Done first_is_done;
+  std::vector<std::string> answers;
+  const auto note = [&](const RequestIds::Answer& answer) { answers.push_back(answer.response); };
+  ids_.Once(
+      "a", "1", request, [&](RequestIds::Done done) { first_is_done = std::move(done); }, note);
+  ids_.Once(
+      "a", "1", request, [&](const RequestIds::Done&) { ADD_FAILURE() << "done twice"; }, note);
+  EXPECT_TRUE(answers.empty());
+  first_is_done(Ok("answer"));
+  EXPECT_EQ(answers, std::vector<std::string>(2, "answer"));
+}
+
+}  // namespace
+}  // namespace wellspace::server

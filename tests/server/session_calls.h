@@ -1,0 +1,97 @@
+// The calls of SessionService and OperationService, one line each, and a core::Mesher that does what a test says.
+#ifndef WELLSPACE_TESTS_SERVER_SESSION_CALLS_H_
+#define WELLSPACE_TESTS_SERVER_SESSION_CALLS_H_
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/time/time.h"
+#include "core/mesher.h"
+#include "grpcpp/grpcpp.h"
+#include "server/call_environment.h"
+#include "wellspace/v1/operations.grpc.pb.h"
+#include "wellspace/v1/sessions.grpc.pb.h"
+
+namespace wellspace::server {
+
+// What a phase of a ScriptedMesher does; its status ends the run.
+using PhaseScript = std::function<absl::Status(core::Phase, core::RunContext&)>;
+
+// Meshers that enter the phases of the core, run `script` in each, and have a mesh of MakeFakeMesh.
+MesherFactory ScriptedMesher(PhaseScript script);
+
+// Works in `phase` until its context is cancelled, and calls `begun` before.
+PhaseScript EndlessIn(core::Phase phase, std::function<void()> begun);
+
+// A call of WatchOperation.
+class Watch {
+ public:
+  Watch(v1::OperationService::Stub& stub, const std::string& name, std::optional<uint64_t> after = std::nullopt,
+        std::optional<absl::Duration> timeout = std::nullopt);
+  // Cancels the call if Finish was not called.
+  ~Watch();
+
+  // Reads the next response, which is kept in the members below, too. False at the end of the stream.
+  bool Read();
+  // Reads until an event is of `phase` or a later one; false at the end of the stream.
+  bool ReadUntil(v1::Phase phase);
+  void Cancel() { context_.TryCancel(); }
+  // Reads all that is still to come and returns the status.
+  grpc::Status Finish();
+
+  std::vector<v1::ProgressEvent> events;
+  std::vector<absl::Time> times;  // of their arrival
+  std::optional<v1::Operation> operation;
+
+ private:
+  grpc::ClientContext context_;
+  std::unique_ptr<grpc::ClientReader<v1::WatchOperationResponse>> stream_;
+  bool finished_ = false;
+};
+
+class SessionCalls {
+ public:
+  explicit SessionCalls(const std::shared_ptr<grpc::Channel>& channel);
+
+  // Every call may want to have its status looked at; `*status` is where. Without, it has to be OK.
+  v1::Session Create(const v1::CreateSessionRequest& request, grpc::Status* status = nullptr);
+  // The unit cube as domain.
+  v1::Session Create(int dimension = 3);
+  v1::Session Get(const std::string& name, grpc::Status* status = nullptr);
+  v1::ListSessionsResponse List(const v1::ListSessionsRequest& request, grpc::Status* status = nullptr);
+  v1::Session Update(const v1::UpdateSessionRequest& request, grpc::Status* status = nullptr);
+  void Delete(const v1::DeleteSessionRequest& request, grpc::Status* status = nullptr);
+  void Delete(const std::string& name, grpc::Status* status = nullptr);
+  // One stream of these requests.
+  v1::UploadPointsResponse Upload(const std::vector<v1::UploadPointsRequest>& requests, grpc::Status* status = nullptr);
+  v1::UploadPointsResponse Upload(const std::string& name, uint64_t offset, const std::vector<double>& coordinates,
+                                  grpc::Status* status = nullptr);
+
+  v1::Operation Start(const v1::StartRefinementRequest& request, grpc::Status* status = nullptr);
+  v1::Operation Start(const std::string& name, grpc::Status* status = nullptr);
+  v1::Operation GetOperation(const std::string& name, grpc::Status* status = nullptr);
+  v1::ListOperationsResponse ListOperations(const v1::ListOperationsRequest& request, grpc::Status* status = nullptr);
+  v1::Operation Cancel(const std::string& name, grpc::Status* status = nullptr);
+  // Starts a refinement and watches it to its end.
+  v1::Operation Refine(const std::string& name);
+
+  v1::SessionService::Stub& sessions() { return *sessions_; }
+  v1::OperationService::Stub& operations() { return *operations_; }
+
+ private:
+  const std::unique_ptr<v1::SessionService::Stub> sessions_;
+  const std::unique_ptr<v1::OperationService::Stub> operations_;
+};
+
+v1::UploadPointsRequest UploadRequest(const std::string& name, uint64_t offset, const std::vector<double>& coordinates);
+
+// Points of the unit cube, away from its faces.
+std::vector<double> UniformPoints(size_t count, int dimension, uint64_t seed);
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_TESTS_SERVER_SESSION_CALLS_H_

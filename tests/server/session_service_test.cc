@@ -1,0 +1,374 @@
+// The calls of SessionService over a channel.
+#include <limits>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "gtest/gtest.h"
+#include "tests/server/service_harness.h"
+#include "tests/server/session_calls.h"
+
+namespace wellspace::server {
+namespace {
+
+class SessionServiceTest : public ::testing::Test {
+ protected:
+  void ExpectError(grpc::StatusCode code, const std::string& reason, const std::string& field = "") {
+    EXPECT_EQ(status_.error_code(), code) << status_.error_message();
+    EXPECT_EQ(DetailsOf(status_).reason, reason) << status_.error_message();
+    EXPECT_EQ(DetailsOf(status_).field, field) << status_.error_message();
+  }
+
+  ServiceHarness harness_{FakeMesher,
+                          {.max_points = 1'000'000},
+                          Transport::kInProcess,
+                          FakeEstimator,
+                          ScriptedMesher([](core::Phase, core::RunContext& context) { return context.Check(); })};
+  SessionCalls calls_{harness_.channel()};
+  grpc::Status status_;
+};
+
+v1::CreateSessionRequest CreateRequest() {
+  v1::CreateSessionRequest request;
+  *request.mutable_parameters() = UnitCubeParameters(2);
+  return request;
+}
+
+TEST_F(SessionServiceTest, ANewSessionSaysWhatItIs) {
+  v1::CreateSessionRequest request = CreateRequest();
+  (*request.mutable_labels())["project"] = "wing";
+  request.mutable_ttl()->set_seconds(60);
+  const v1::Session session = calls_.Create(request);
+  EXPECT_EQ(session.name().substr(0, 9), "sessions/");
+  EXPECT_EQ(session.state(), v1::Session::STATE_OPEN);
+  EXPECT_EQ(session.parameters().dimension(), 2);
+  EXPECT_EQ(session.parameters().rho(), core::DefaultRho(2)) << "defaults are resolved";
+  EXPECT_EQ(session.parameters().criterion(), v1::CRITERION_RADIUS_EDGE);
+  EXPECT_GT(session.parameters().max_vertices(), 0u);
+  EXPECT_EQ(session.labels().at("project"), "wing");
+  EXPECT_EQ(session.ttl().seconds(), 60);
+  EXPECT_NEAR(session.expire_time().seconds() - session.create_time().seconds(), 60, 5);
+  EXPECT_EQ(session.revision(), 1u);
+  EXPECT_EQ(session.committed_points(), 0u);
+  EXPECT_EQ(session.last_operation(), "");
+  EXPECT_EQ(calls_.Get(session.name()).name(), session.name());
+}
+
+TEST_F(SessionServiceTest, CreateRefusesWhatIsNotValid) {
+  v1::CreateSessionRequest request;
+  request.mutable_parameters()->set_dimension(7);
+  calls_.Create(request, &status_);
+  ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_PARAMETERS", "parameters.dimension");
+
+  request = CreateRequest();
+  (*request.mutable_labels())[""] = "value";
+  calls_.Create(request, &status_);
+  ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_REQUEST", "labels");
+
+  request = CreateRequest();
+  (*request.mutable_labels())[std::string(64, 'k')] = "value";
+  calls_.Create(request, &status_);
+  ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_REQUEST", "labels");
+
+  request = CreateRequest();
+  (*request.mutable_labels())["key"] = std::string(256, 'v');
+  calls_.Create(request, &status_);
+  ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_REQUEST", "labels");
+
+  request = CreateRequest();
+  for (int i = 0; i < 65; ++i) {
+    (*request.mutable_labels())[absl::StrCat(i)] = "value";
+  }
+  calls_.Create(request, &status_);
+  ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_REQUEST", "labels");
+
+  for (const auto& [seconds, nanos] : std::vector<std::pair<int64_t, int32_t>>{
+           {0, 999'999'999}, {-5, 0}, {1, -1}, {1'000'000'000, 0}, {60, 1'000'000'000}}) {
+    request = CreateRequest();
+    request.mutable_ttl()->set_seconds(seconds);
+    request.mutable_ttl()->set_nanos(nanos);
+    calls_.Create(request, &status_);
+    ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_REQUEST", "ttl");
+  }
+
+  request = CreateRequest();
+  for (int i = 0; i < 20'000; ++i) {
+    v1::SizeBox* box = request.mutable_parameters()->add_size_boxes();
+    box->mutable_low()->Resize(2, 0.25);
+    box->mutable_high()->Resize(2, 0.75);
+    box->set_max_circumradius(0.1);
+  }
+  calls_.Create(request, &status_);
+  ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_PARAMETERS", "parameters.size_boxes");
+}
+
+TEST_F(SessionServiceTest, LabelsMayHaveAsManyCharactersOfAnyLength) {
+  v1::CreateSessionRequest request = CreateRequest();
+  std::string key;
+  for (int i = 0; i < 63; ++i) {
+    key += "\xe2\x88\x87";  // nabla
+  }
+  (*request.mutable_labels())[key] = "";
+  EXPECT_EQ(calls_.Create(request).labels_size(), 1);
+}
+
+TEST_F(SessionServiceTest, NamesThatNameNothing) {
+  for (const char* name : {"", "sessions", "sessions/", "operations/1", "sessions/a/b", "/sessions/a"}) {
+    calls_.Get(name, &status_);
+    ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_REQUEST", "name");
+  }
+  calls_.Get("sessions/00000000000000000000000000000000", &status_);
+  ExpectError(grpc::StatusCode::NOT_FOUND, "SESSION_NOT_FOUND");
+  calls_.Get("sessions/" + std::string(100'000, 'x'), &status_);
+  ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_REQUEST", "name");
+}
+
+TEST_F(SessionServiceTest, UpdateChangesWhatTheMaskNames) {
+  v1::CreateSessionRequest create = CreateRequest();
+  (*create.mutable_labels())["a"] = "1";
+  const v1::Session session = calls_.Create(create);
+
+  v1::UpdateSessionRequest request;
+  request.mutable_session()->set_name(session.name());
+  (*request.mutable_session()->mutable_labels())["b"] = "2";
+  request.mutable_session()->mutable_ttl()->set_seconds(7);
+  request.mutable_update_mask()->add_paths("ttl");
+  v1::Session updated = calls_.Update(request);
+  EXPECT_EQ(updated.ttl().seconds(), 7);
+  EXPECT_TRUE(updated.labels().contains("a"));
+
+  request.mutable_update_mask()->set_paths(0, "labels");
+  request.mutable_session()->mutable_ttl()->set_seconds(8);
+  updated = calls_.Update(request);
+  EXPECT_EQ(updated.ttl().seconds(), 7);
+  EXPECT_FALSE(updated.labels().contains("a"));
+  EXPECT_TRUE(updated.labels().contains("b"));
+  EXPECT_EQ(updated.revision(), session.revision()) << "neither points nor mesh have changed";
+
+  request.mutable_update_mask()->set_paths(0, "revision");
+  calls_.Update(request, &status_);
+  ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_REQUEST", "update_mask");
+
+  request.clear_update_mask();
+  request.mutable_session()->clear_ttl();
+  updated = calls_.Update(request);
+  EXPECT_EQ(updated.ttl().seconds(), absl::ToInt64Seconds(ServiceOptions().default_ttl));
+}
+
+TEST_F(SessionServiceTest, ListsPageByPage) {
+  std::vector<std::string> created;
+  for (int i = 0; i < 7; ++i) {
+    v1::CreateSessionRequest request = CreateRequest();
+    (*request.mutable_labels())["parity"] = i % 2 == 0 ? "even" : "odd";
+    created.push_back(calls_.Create(request).name());
+  }
+  std::vector<std::string> listed;
+  v1::ListSessionsRequest request;
+  request.set_page_size(3);
+  std::string second_page;
+  do {
+    const v1::ListSessionsResponse page = calls_.List(request);
+    EXPECT_LE(page.sessions_size(), 3);
+    for (const v1::Session& session : page.sessions()) {
+      listed.push_back(session.name());
+    }
+    request.set_page_token(page.next_page_token());
+    second_page = second_page.empty() ? page.next_page_token() : second_page;
+  } while (!request.page_token().empty());
+  EXPECT_EQ(listed, created);
+
+  request.set_page_size(0);
+  (*request.mutable_labels())["parity"] = "odd";
+  EXPECT_EQ(calls_.List(request).sessions_size(), 3);
+  request.set_page_token(second_page);
+  calls_.List(request, &status_);
+  ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_REQUEST", "page_token");
+  request.set_page_token("0");
+  calls_.List(request, &status_);
+  ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_REQUEST", "page_token");
+  request.clear_page_token();
+  request.set_page_size(-1);
+  calls_.List(request, &status_);
+  ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_REQUEST", "page_size");
+}
+
+TEST_F(SessionServiceTest, APageHasNoMoreThanAMessageMay) {
+  constexpr int kSessions = 6;
+  for (int i = 0; i < kSessions; ++i) {
+    v1::CreateSessionRequest request = CreateRequest();
+    for (int box = 0; box < 7000; ++box) {
+      v1::SizeBox* size_box = request.mutable_parameters()->add_size_boxes();
+      size_box->mutable_low()->Resize(2, 0.25);
+      size_box->mutable_high()->Resize(2, 0.75);
+      size_box->set_max_circumradius(0.1);
+    }
+    calls_.Create(request);
+  }
+  v1::ListSessionsRequest request;
+  int listed = 0;
+  do {
+    const v1::ListSessionsResponse page = calls_.List(request);
+    EXPECT_LE(page.ByteSizeLong(), size_t{kMaxResponseBytes});
+    listed += page.sessions_size();
+    request.set_page_token(page.next_page_token());
+  } while (!request.page_token().empty());
+  EXPECT_EQ(listed, kSessions);
+}
+
+TEST_F(SessionServiceTest, ADeletedSessionIsGone) {
+  const v1::Session session = calls_.Create(2);
+  calls_.Delete(session.name());
+  calls_.Get(session.name(), &status_);
+  ExpectError(grpc::StatusCode::NOT_FOUND, "SESSION_NOT_FOUND");
+  calls_.Delete(session.name(), &status_);
+  ExpectError(grpc::StatusCode::NOT_FOUND, "SESSION_NOT_FOUND");
+  EXPECT_EQ(calls_.List({}).sessions_size(), 0);
+}
+
+TEST_F(SessionServiceTest, ARepeatedCallIsDoneOnce) {
+  v1::CreateSessionRequest create = CreateRequest();
+  create.set_request_id("create");
+  const v1::Session session = calls_.Create(create);
+  EXPECT_EQ(calls_.Create(create).name(), session.name());
+  EXPECT_EQ(calls_.List({}).sessions_size(), 1);
+  create.mutable_ttl()->set_seconds(5);
+  calls_.Create(create, &status_);
+  ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "REQUEST_ID_REUSED", "request_id");
+
+  v1::DeleteSessionRequest erase;
+  erase.set_name(session.name());
+  erase.set_request_id("delete");
+  calls_.Delete(erase);
+  calls_.Delete(erase);  // though it is gone
+}
+
+TEST_F(SessionServiceTest, ACallForAnotherRevisionChangesNothing) {
+  const v1::Session session = calls_.Create(2);
+  calls_.Upload(session.name(), 0, {0.25, 0.25, 0.75, 0.75});
+  EXPECT_EQ(calls_.Get(session.name()).revision(), 2u);
+
+  v1::UpdateSessionRequest update;
+  update.mutable_session()->set_name(session.name());
+  update.set_expected_revision(1);
+  calls_.Update(update, &status_);
+  ExpectError(grpc::StatusCode::ABORTED, "REVISION_MISMATCH");
+
+  v1::UploadPointsRequest upload = UploadRequest(session.name(), 2, {0.5, 0.5});
+  upload.set_expected_revision(1);
+  calls_.Upload({upload}, &status_);
+  ExpectError(grpc::StatusCode::ABORTED, "REVISION_MISMATCH");
+
+  v1::DeleteSessionRequest erase;
+  erase.set_name(session.name());
+  erase.set_expected_revision(1);
+  calls_.Delete(erase, &status_);
+  ExpectError(grpc::StatusCode::ABORTED, "REVISION_MISMATCH");
+  EXPECT_EQ(calls_.Get(session.name()).committed_points(), 2u);
+
+  upload.set_expected_revision(2);
+  EXPECT_EQ(calls_.Upload({upload, UploadRequest("", 3, {0.6, 0.5})}).revision(), 4u);
+  erase.set_expected_revision(4);
+  calls_.Delete(erase);
+}
+
+// "Sessions leaked by clients that died".
+TEST_F(SessionServiceTest, ASessionThatNobodyUsesIsDeleted) {
+  v1::CreateSessionRequest request = CreateRequest();
+  request.mutable_ttl()->set_seconds(1);
+  const v1::Session session = calls_.Create(request);
+  EXPECT_TRUE(harness_.log().WaitFor(absl::StrCat("session=", session.name(), " expired")));
+  calls_.Get(session.name(), &status_);
+  ExpectError(grpc::StatusCode::NOT_FOUND, "SESSION_NOT_FOUND");
+}
+
+TEST_F(SessionServiceTest, PointsComeInAnyPiecesAndAreNeverTakenTwice) {
+  const v1::Session session = calls_.Create(2);
+  const std::vector<double> points = UniformPoints(10, 2, 1);
+  const auto piece = [&](size_t begin, size_t end) {
+    return std::vector<double>(points.begin() + static_cast<std::ptrdiff_t>(2 * begin),
+                               points.begin() + static_cast<std::ptrdiff_t>(2 * end));
+  };
+  v1::UploadPointsResponse response =
+      calls_.Upload({UploadRequest(session.name(), 0, piece(0, 3)), UploadRequest("", 3, piece(3, 3)),
+                     UploadRequest("", 3, piece(3, 4))});
+  EXPECT_EQ(response.committed_points(), 4u);
+  EXPECT_EQ(response.revision(), 3u);
+  response = calls_.Upload(session.name(), 0, piece(0, 4));
+  EXPECT_EQ(response.committed_points(), 4u) << "repeated";
+  EXPECT_EQ(response.revision(), 3u);
+  response = calls_.Upload(session.name(), 2, piece(2, 9));
+  EXPECT_EQ(response.committed_points(), 9u) << "overlapping";
+  calls_.Upload(session.name(), 10, piece(9, 10), &status_);
+  ExpectError(grpc::StatusCode::OUT_OF_RANGE, "UPLOAD_GAP", "point_offset");
+  calls_.Upload(session.name(), 9, piece(9, 10));
+  EXPECT_EQ(calls_.Refine(session.name()).state(), v1::Operation::STATE_SUCCEEDED);
+  EXPECT_EQ(calls_.Get(session.name()).committed_points(), 10u);
+}
+
+TEST_F(SessionServiceTest, WhatCameBeforeABadChunkIsCommitted) {
+  const v1::Session session = calls_.Create(2);
+  calls_.Upload({UploadRequest(session.name(), 0, {0.25, 0.25}), UploadRequest("", 1, {0.5, 0.5, 0.5})}, &status_);
+  ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_CHUNK_SHAPE", "points.coordinates");
+  EXPECT_EQ(calls_.Get(session.name()).committed_points(), 1u);
+  for (const double bad :
+       {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1.5, -0.1}) {
+    calls_.Upload({UploadRequest(session.name(), 1, {0.75, 0.25, 0.5, bad})}, &status_);
+    ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_POINTS", "points.coordinates");
+    EXPECT_NE(status_.error_message().find("point 2: coordinate 1"), std::string::npos) << status_.error_message();
+    EXPECT_EQ(calls_.Get(session.name()).committed_points(), 1u);
+  }
+}
+
+TEST_F(SessionServiceTest, WhatWasReceivedIsCommittedThoughTheCallBreaksOff) {
+  const v1::Session session = calls_.Create(2);
+  {
+    grpc::ClientContext context;
+    v1::UploadPointsResponse response;
+    const auto stream = calls_.sessions().UploadPoints(&context, &response);
+    ASSERT_TRUE(stream->Write(UploadRequest(session.name(), 0, {0.25, 0.25})));
+    while (calls_.Get(session.name()).committed_points() == 0) {
+    }
+    context.TryCancel();
+    EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::CANCELLED);
+  }
+  EXPECT_EQ(calls_.Upload(session.name(), 1, {0.5, 0.5}).committed_points(), 2u);
+}
+
+TEST_F(SessionServiceTest, AnUploadNeedsANameFirst) {
+  calls_.Upload({}, &status_);
+  ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "EMPTY_REQUEST", "name");
+  calls_.Upload({UploadRequest("", 0, {0.5, 0.5})}, &status_);
+  ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_REQUEST", "name");
+}
+
+TEST_F(SessionServiceTest, AnUploadIsLimited) {
+  const v1::Session session = calls_.Create(2);
+  for (uint64_t offset = 0; offset < 1'000'000; offset += 100'000) {
+    calls_.Upload(session.name(), offset, std::vector<double>(200'000, 0.5));
+  }
+  calls_.Upload(session.name(), 1'000'000, {0.5, 0.5}, &status_);
+  ExpectError(grpc::StatusCode::RESOURCE_EXHAUSTED, "TOO_MANY_POINTS");
+}
+
+TEST_F(SessionServiceTest, AStoppingServerTakesNoCalls) {
+  Event started;
+  ServiceHarness harness(EndlessMesher(started));
+  SessionCalls calls(harness.channel());
+  TestCall running(harness.stub());
+  running.Send(UnitCubeParameters());
+  running.HalfClose();
+  ASSERT_TRUE(started.Wait());
+  std::thread stop([&] { harness.server().Shutdown(absl::Seconds(2)); });
+  do {
+    calls.List({}, &status_);
+  } while (status_.ok());
+  EXPECT_EQ(status_.error_code(), grpc::StatusCode::UNAVAILABLE);
+  running.Cancel();
+  stop.join();
+}
+
+}  // namespace
+}  // namespace wellspace::server

@@ -1,0 +1,174 @@
+// Sessions and their store, with a clock that the test moves.
+#include <set>
+#include <string>
+#include <vector>
+
+#include "gtest/gtest.h"
+#include "server/memory_session_store.h"
+#include "tests/server/service_harness.h"
+
+namespace wellspace::server {
+namespace {
+
+class SessionStoreTest : public ::testing::Test {
+ protected:
+  std::shared_ptr<Session> Create(const std::string& tenant = "a", absl::Duration ttl = absl::Minutes(1),
+                                  std::map<std::string, std::string> labels = {}) {
+    std::shared_ptr<Session> session;
+    status_ = store_.Create({.tenant = tenant, .parameters = {.dimension = 2}, .labels = std::move(labels), .ttl = ttl},
+                            &session);
+    return session;
+  }
+
+  bool Finds(const Session& session, const std::string& tenant = "a") {
+    std::shared_ptr<Session> found;
+    status_ = store_.Find(tenant, session.name(), &found);
+    return status_.ok();
+  }
+
+  ServiceOptions options_{
+      .max_points = 10, .max_points_per_tenant = 15, .max_sessions = 5, .max_sessions_per_tenant = 3};
+  absl::Time now_ = absl::FromUnixSeconds(1'000'000);
+  MemorySessionStore store_{options_, [this] { return now_; }};
+  grpc::Status status_;
+};
+
+TEST_F(SessionStoreTest, NamesCannotBeGuessed) {
+  std::set<std::string> names;
+  for (int i = 0; i < 1000; ++i) {
+    const std::shared_ptr<Session> session = Create();
+    ASSERT_NE(session, nullptr);
+    names.insert(session->name());
+    EXPECT_EQ(session->name().size(), std::string("sessions/").size() + 32);
+    store_.Remove(*session);
+  }
+  EXPECT_EQ(names.size(), 1000u);
+}
+
+TEST_F(SessionStoreTest, AnotherTenantsSessionDoesNotExist) {
+  const std::shared_ptr<Session> session = Create("a");
+  EXPECT_TRUE(Finds(*session, "a"));
+  EXPECT_FALSE(Finds(*session, "b"));
+  const grpc::Status of_other = status_;
+  store_.Remove(*session);
+  EXPECT_FALSE(Finds(*session, "a"));
+  EXPECT_EQ(status_.error_message(), of_other.error_message()) << "whether a session exists can be told";
+  EXPECT_EQ(status_.error_details(), of_other.error_details());
+  EXPECT_EQ(DetailsOf(of_other).reason, "SESSION_NOT_FOUND");
+  EXPECT_TRUE(store_.List("b", absl::InfinitePast(), 10, {}).empty());
+}
+
+TEST_F(SessionStoreTest, AnUnusedSessionExpires) {
+  const std::shared_ptr<Session> session = Create("a", absl::Seconds(10));
+  now_ += absl::Seconds(9);
+  EXPECT_TRUE(Finds(*session)) << "and renews the lease";
+  now_ += absl::Seconds(9);
+  EXPECT_EQ(store_.List("a", absl::InfinitePast(), 10, {}).size(), 1u) << "and renews nothing";
+  now_ += absl::Seconds(1);
+  EXPECT_TRUE(store_.List("a", absl::InfinitePast(), 10, {}).empty());
+  EXPECT_FALSE(Finds(*session)) << "though nobody has swept yet";
+  EXPECT_EQ(DetailsOf(status_).reason, "SESSION_NOT_FOUND");
+  EXPECT_EQ(store_.RemoveExpired().size(), 1u);
+  EXPECT_TRUE(store_.RemoveExpired().empty());
+}
+
+TEST_F(SessionStoreTest, ASessionInUseDoesNotExpire) {
+  const std::shared_ptr<Session> session = Create("a", absl::Seconds(10));
+  {
+    const SessionUse use(session);
+    now_ += absl::Hours(1);
+    EXPECT_TRUE(store_.RemoveExpired().empty());
+  }
+  now_ += absl::Seconds(9);
+  EXPECT_FALSE(session->IsExpired()) << "the end of a use renews the lease";
+  now_ += absl::Seconds(1);
+  EXPECT_TRUE(session->IsExpired());
+}
+
+TEST_F(SessionStoreTest, ASessionWithAnOperationDoesNotExpire) {
+  const std::shared_ptr<Session> session = Create("a", absl::Seconds(10));
+  std::shared_ptr<Operation> operation;
+  ASSERT_TRUE(session
+                  ->StartOperation(
+                      {.dimension = 2}, 0, [](const auto&) { return grpc::Status::OK; }, &operation)
+                  .ok());
+  now_ += absl::Hours(1);
+  EXPECT_TRUE(store_.RemoveExpired().empty());
+  EXPECT_TRUE(session->EndWaiting(*operation));
+  now_ += absl::Seconds(10);
+  EXPECT_EQ(store_.RemoveExpired().size(), 1u);
+}
+
+TEST_F(SessionStoreTest, SessionsAreLimitedByTenantAndInAll) {
+  std::vector<std::shared_ptr<Session>> sessions;
+  for (int i = 0; i < 3; ++i) {
+    sessions.push_back(Create("a"));
+    ASSERT_NE(sessions.back(), nullptr);
+  }
+  EXPECT_EQ(Create("a"), nullptr);
+  EXPECT_EQ(status_.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(DetailsOf(status_).reason, "QUOTA_EXCEEDED");
+  ASSERT_NE(Create("b"), nullptr);
+  ASSERT_NE(Create("b"), nullptr);
+  EXPECT_EQ(Create("b"), nullptr);
+  EXPECT_EQ(DetailsOf(status_).reason, "TOO_MANY_SESSIONS");
+  EXPECT_TRUE(store_.Remove(*sessions[1]));
+  EXPECT_FALSE(store_.Remove(*sessions[1]));
+  EXPECT_NE(Create("a"), nullptr);
+}
+
+TEST_F(SessionStoreTest, ListsInTheOrderOfCreationWhateverTheClockSays) {
+  std::vector<std::string> created;
+  for (int i = 0; i < 3; ++i) {
+    created.push_back(Create("a", absl::Minutes(1), {{"even", i % 2 == 0 ? "yes" : "no"}})->name());
+  }
+  Create("b");
+  const auto listed = store_.List("a", absl::InfinitePast(), 10, {});
+  ASSERT_EQ(listed.size(), 3u);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(listed[i]->name(), created[i]);
+    EXPECT_EQ(store_.List("a", listed[i]->create_time(), 10, {}).size(), 2u - i);
+  }
+  EXPECT_EQ(store_.List("a", absl::InfinitePast(), 2, {}).size(), 2u);
+  EXPECT_EQ(store_.List("a", absl::InfinitePast(), 10, {{"even", "yes"}}).size(), 2u);
+  EXPECT_EQ(store_.List("a", absl::InfinitePast(), 10, {{"even", "yes"}, {"odd", ""}}).size(), 0u);
+}
+
+TEST_F(SessionStoreTest, PointsAreLimitedBySessionAndByTenant) {
+  const std::shared_ptr<Session> first = Create();
+  const std::shared_ptr<Session> second = Create();
+  EXPECT_TRUE(first->Append(0, std::vector<double>(20, 0.5), 0).ok());
+  const grpc::Status too_many = first->Append(10, std::vector<double>(2, 0.5), 0);
+  EXPECT_EQ(DetailsOf(too_many).reason, "TOO_MANY_POINTS");
+  EXPECT_EQ(DetailsOf(second->Append(0, std::vector<double>(12, 0.5), 0)).reason, "QUOTA_EXCEEDED");
+  EXPECT_EQ(second->Committed().committed_points(), 0u);
+  EXPECT_TRUE(second->Append(0, std::vector<double>(10, 0.5), 0).ok());
+  EXPECT_TRUE(Create("b")->Append(0, std::vector<double>(20, 0.5), 0).ok());
+  std::shared_ptr<Operation> under_way;
+  ASSERT_TRUE(first->Close(0, &under_way).ok());
+  EXPECT_EQ(under_way, nullptr);
+  EXPECT_TRUE(second->Append(5, std::vector<double>(10, 0.5), 0).ok()) << "the points of the closed one are free";
+  EXPECT_EQ(DetailsOf(first->Append(10, {}, 0)).reason, "SESSION_NOT_FOUND");
+}
+
+TEST_F(SessionStoreTest, KeepsTheLastHundredOperations) {
+  const std::shared_ptr<Session> session = Create();
+  for (int i = 0; i < 103; ++i) {
+    std::shared_ptr<Operation> operation;
+    ASSERT_TRUE(session
+                    ->StartOperation(
+                        {.dimension = 2}, 0, [](const auto&) { return grpc::Status::OK; }, &operation)
+                    .ok());
+    session->EndWaiting(*operation);
+  }
+  const auto kept = session->ListOperations(0, 1000);
+  ASSERT_EQ(kept.size(), 100u);
+  EXPECT_EQ(kept.front()->number(), 4u);
+  EXPECT_EQ(session->ListOperations(101, 1000).size(), 2u);
+  std::shared_ptr<Operation> found;
+  EXPECT_TRUE(session->FindOperation(session->name() + "/operations/103", &found).ok());
+  EXPECT_EQ(DetailsOf(session->FindOperation(session->name() + "/operations/3", &found)).reason, "OPERATION_NOT_FOUND");
+}
+
+}  // namespace
+}  // namespace wellspace::server
