@@ -13,6 +13,7 @@
 #include "server/cloud_receiver.h"
 #include "server/errors.h"
 #include "server/jobs.h"
+#include "server/memory_budget.h"
 #include "server/wire.h"
 #include "wellspace/v1/meshing.pb.h"
 
@@ -41,7 +42,7 @@ class CloudCall : public Call<Reactor> {
   // Of the mesh, for the log; 0 when there is none.
   virtual uint64_t VertexCount() const = 0;
 
-  void OnBegin() final { this->StartRead(&request_); }
+  void OnBegin() final;
   void OnEnd() override;
   LogFields Figures() const final {
     return LogFields().Add("points", receiver_.point_count()).Add("vertices", VertexCount());
@@ -52,13 +53,39 @@ class CloudCall : public Call<Reactor> {
   const core::MeshParameters& parameters() const { return receiver_.parameters(); }
 
  private:
+  // While a message comes, its bytes and the message made of them.
+  static constexpr uint64_t kMessageBytes = 2 * kMaxRequestBytes;
+
   void SubmitJob();
+  // Sets memory aside for the points so far, and for the next message.
+  //
+  // Errors:     MEMORY_LIMIT.
+  grpc::Status ReserveForNext();
 
   // Guarded by mutex_.
   CloudReceiver receiver_;
   grpc::ByteBuffer request_;  // of the read in flight
+  MemoryReservation received_;
   std::shared_ptr<Job> job_;
 };
+
+template <typename Reactor, typename Request>
+void CloudCall<Reactor, Request>::OnBegin() {
+  received_ = this->environment().memory.ReserveNothing();
+  if (grpc::Status status = ReserveForNext(); !status.ok()) {
+    this->End(std::move(status));
+    return;
+  }
+  this->StartRead(&request_);
+}
+
+template <typename Reactor, typename Request>
+grpc::Status CloudCall<Reactor, Request>::ReserveForNext() {
+  const uint64_t bytes = receiver_.point_bytes() + kMessageBytes;
+  return received_.Resize(bytes)
+             ? grpc::Status::OK
+             : FromCoreStatus(this->environment().memory.Refusal(bytes, "the next part of the cloud"));
+}
 
 template <typename Reactor, typename Request>
 void CloudCall<Reactor, Request>::OnReadDone(bool ok) {
@@ -79,6 +106,9 @@ void CloudCall<Reactor, Request>::OnReadDone(bool ok) {
   if (status.ok()) {
     status = receiver_.Accept(&request);
   }
+  if (status.ok()) {
+    status = ReserveForNext();
+  }
   if (!status.ok()) {
     this->End(std::move(status));
     return;
@@ -95,10 +125,12 @@ void CloudCall<Reactor, Request>::SubmitJob() {
     this->End(std::move(status));
     return;
   }
+  (void)received_.Resize(receiver_.point_bytes());  // no more than it was
   // std::function wants to be copied, points do not.
   auto points = std::make_shared<PointChunks>(receiver_.TakePoints());
   JobPool::Submission submission = this->environment().jobs.Submit(
       {.tenant = this->caller().tenant,
+       .held = std::move(received_),
        .work = [self = this->template SharedAs<CloudCall>(), points](Job& job) { self->Work(*points, job); }});
   job_ = std::move(submission.job);
   if (job_ == nullptr) {
@@ -110,6 +142,7 @@ template <typename Reactor, typename Request>
 void CloudCall<Reactor, Request>::OnEnd() {
   this->environment().observability.work().points_received += receiver_.point_count();
   receiver_.TakePoints();
+  received_.Release();
   if (job_ != nullptr) {
     this->environment().jobs.Cancel(job_);
   }

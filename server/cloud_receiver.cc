@@ -14,10 +14,10 @@ void PointChunks::Append(google::protobuf::RepeatedField<double>* coordinates) {
   chunks_.emplace_back().Swap(coordinates);
 }
 
-std::vector<double> PointChunks::Flatten() {
+std::vector<double> PointChunks::Flatten(const core::RunContext& context) {
   std::vector<double> coordinates;
   coordinates.reserve(coordinate_count_);
-  while (!chunks_.empty()) {
+  while (!chunks_.empty() && !context.IsCancelled()) {
     coordinates.insert(coordinates.end(), chunks_.front().begin(), chunks_.front().end());
     chunks_.pop_front();
   }

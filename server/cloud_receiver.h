@@ -25,8 +25,8 @@ class PointChunks {
 
   uint64_t coordinate_count() const { return coordinate_count_; }
 
-  // All coordinates in order; the chunks are freed as they are copied. Leaves this empty.
-  std::vector<double> Flatten();
+  // All coordinates in order; the chunks are freed as they are copied. Leaves this empty. Of a cancelled run, not all.
+  std::vector<double> Flatten(const core::RunContext& context);
 
  private:
   std::deque<google::protobuf::RepeatedField<double>> chunks_;
@@ -58,6 +58,8 @@ class CloudReceiver {
   bool has_parameters() const { return has_parameters_; }
   const core::MeshParameters& parameters() const { return parameters_; }
   uint64_t point_count() const { return point_count_; }
+  // Of the points that it holds.
+  uint64_t point_bytes() const { return points_.coordinate_count() * sizeof(double); }
 
   // Hands over the points.
   PointChunks TakePoints() { return std::exchange(points_, PointChunks()); }

@@ -12,7 +12,7 @@ namespace wellspace::server {
 void EstimateMeshCall::Work(PointChunks& points, Job& job) {
   core::MeshEstimate estimate{};
   grpc::Status status = RunGuarded([&] {
-    const std::vector<double> coordinates = points.Flatten();
+    const std::vector<double> coordinates = points.Flatten(job.context());
     const absl::StatusOr<core::MeshEstimate> made = environment().estimator(parameters(), coordinates, job.context());
     if (made.ok()) {
       estimate = *made;

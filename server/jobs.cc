@@ -16,7 +16,7 @@ constexpr char kJob[] = "the job";
 Job::Job(JobPool& pool, JobRequest request)
     : pool_(pool), tenant_(std::move(request.tenant)), held_(std::move(request.held)), work_(std::move(request.work)) {
   if (pool_.memory_.is_limited()) {
-    memory_ = pool_.memory_.ReserveNothing();
+    memory_ = request.memory.bytes() > 0 ? std::move(request.memory) : pool_.memory_.ReserveNothing();
     context_.SetMemoryLender(this);
   }
 }
@@ -160,12 +160,13 @@ JobPool::Load JobPool::GetLoad() const {
 absl::Status JobPool::Reserve(Job& job, uint64_t bytes) {
   WELLSPACE_RETURN_IF_ERROR(job.context_.Check());
   const uint64_t lasting = memory_.lasting();
-  if (bytes > memory_.limit() - std::min(lasting, memory_.limit())) {
-    return memory_.Refusal(bytes, kJob);
-  }
   {
     MemoryReservation spare;  // released without the locks
     std::lock_guard lock(job.memory_mutex_);
+    const uint64_t own = job.memory_.bytes() - job.memory_.passing_bytes();
+    if (bytes > memory_.limit() - std::min(lasting - std::min(lasting, own), memory_.limit())) {
+      return memory_.Refusal(bytes, kJob);
+    }
     if (bytes <= job.memory_.bytes()) {
       spare = job.memory_.Split(job.memory_.bytes() - bytes);
       return absl::OkStatus();
@@ -177,7 +178,6 @@ absl::Status JobPool::Reserve(Job& job, uint64_t bytes) {
   }
   job.wanted_bytes_ = bytes;
   if (Claimant() == nullptr && TakeWanted(job)) {
-    CountPassing();
     return absl::OkStatus();
   }
   return WaitInLine(job, lock);

@@ -30,6 +30,8 @@ struct JobRequest {
   std::string tenant{};
   // Of what the work brings along, such as its points; released with the work, at the latest.
   MemoryReservation held{};
+  // Of what is there already for the run to go on with, such as its mesher; counts as what the run has reserved.
+  MemoryReservation memory{};
   // Has to return soon after the context of its job is cancelled, and must not throw.
   std::function<void(Job&)> work{};
 };
@@ -158,7 +160,7 @@ class JobPool {
   void Resume(Job& job);
   // Sets aside what `job` wants; says whether there was room.
   bool TakeWanted(Job& job);
-  // A job was given its worker or its memory: those that wait for memory have been passed.
+  // A job was given a worker: those that wait for memory have been passed.
   void CountPassing();
   // The job that has been passed often enough, the oldest of them; null for none.
   std::shared_ptr<Job> Claimant() const;

@@ -11,7 +11,8 @@
 #include <thread>
 
 #include "CLI/CLI.hpp"
-#include "absl/strings/str_cat.h"
+#include "absl/time/time.h"
+#include "server/limit_flags.h"
 #include "server/log.h"
 #include "server/server.h"
 #include "server/version.h"
@@ -22,48 +23,26 @@ namespace {
 
 constexpr int kExitWrongOptions = 2;
 constexpr int kLogQueue = 8192;  // lines
-constexpr double kMaxGraceSeconds = 86'400;
+constexpr absl::Duration kMaxGrace = absl::Hours(24);
 
 struct Flags {
   ServerOptions server{
       .listen = "127.0.0.1:7233", .insecure_remote = false, .service = {}, .demands = {}, .observability = {}};
-  double grace_seconds = 10;
+  absl::Duration grace = absl::Seconds(10);
   std::string log_level = "info";
   std::string log_format = "text";
 };
 
 void Declare(CLI::App& app, Flags& flags) {
-  ServiceOptions& service = flags.server.service;
   app.set_version_flag("--version", std::string("wellspaced ") + kVersion);
   app.add_option("--listen", flags.server.listen, "Address to listen on; port 0 takes a free one")
       ->type_name("HOST:PORT")
       ->capture_default_str();
   app.add_flag("--insecure-remote", flags.server.insecure_remote,
                "Allow to listen, in plain text and without authentication, where other machines can connect");
-  app.add_option("--workers", service.workers, "Jobs that run at once")
-      ->check(CLI::Range(1, 1024))
-      ->capture_default_str();
-  app.add_option("--max-queued", service.max_queued_jobs, "Jobs that wait for a worker; more are refused")
-      ->check(CLI::Range(0, 100'000))
-      ->capture_default_str();
-  app.add_option("--max-points", service.max_points, "Most points of a call")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.add_option("--max-vertices", service.max_vertices, "Most vertices of a mesh")
-      ->check(CLI::Range(uint64_t{1}, core::kMaxVertices))
-      ->capture_default_str();
-  // A CLI::Range would let NaN pass.
-  const CLI::Validator finite_grace(
-      [](const std::string& text) {
-        double seconds = 0;
-        return CLI::detail::lexical_cast(text, seconds) && seconds >= 0 && seconds <= kMaxGraceSeconds
-                   ? std::string()
-                   : absl::StrCat("Value ", text, " not in range 0 to ", kMaxGraceSeconds);
-      },
-      "SECONDS");
-  app.add_option("--grace", flags.grace_seconds, "Time that running work gets to end after SIGTERM or SIGINT")
-      ->check(finite_grace)
-      ->capture_default_str();
+  DeclareLimits(app, flags.server.service);
+  AddSeconds(app, "--grace", flags.grace, absl::ZeroDuration(), kMaxGrace,
+             "Time that running work gets to end after SIGTERM or SIGINT");
   app.add_option("--log-level", flags.log_level, "What to log on standard error")
       ->check(CLI::IsMember({"debug", "info", "warning", "error", "off"}))
       ->capture_default_str();
@@ -76,6 +55,7 @@ void Declare(CLI::App& app, Flags& flags) {
   app.add_option("--admin-listen", flags.server.observability.admin_listen,
                  "Address, on the loopback, of a gRPC listener with channelz; default: none")
       ->type_name("HOST:PORT");
+  DeclareConfigFile(app);
 }
 
 // SIGTERM and SIGINT, blocked in this thread and all that it starts later, to be waited for.
@@ -133,9 +113,9 @@ int Main(int argc, char** argv) {
   }
 
   const int received = signals.Wait();
-  log->info("event=stopping signal={} grace={}", received, flags.grace_seconds);
+  log->info("event=stopping signal={} grace={}", received, absl::FormatDuration(flags.grace));
   signals.Release();
-  (*server)->Shutdown(absl::Seconds(flags.grace_seconds));
+  (*server)->Shutdown(flags.grace);
   log->info("event=stopped");
   return 0;
 }

@@ -21,6 +21,9 @@ using google::protobuf::internal::WireFormatLite;
 // Tags, lengths, index and checksum around the values of a chunk, generously.
 constexpr uint64_t kEnvelopeBytes = 64;
 
+// Chunks that a stream holds a copy of: one that is written, one in the buffers of the connection.
+constexpr uint64_t kChunksOnTheirWay = 2;
+
 uint64_t DivideUp(uint64_t dividend, uint64_t divisor) { return (dividend + divisor - 1) / divisor; }
 
 // Rows [begin, begin + rows) of `values` (rows of `width` numbers), cut at the end.
@@ -52,6 +55,11 @@ MeshChunks::MeshChunks(core::Mesh mesh, uint64_t max_bytes) : mesh_(std::move(me
   point_chunks_ = DivideUp(mesh_.vertex_count(), points_per_chunk_);
   simplex_chunks_ = DivideUp(mesh_.simplex_count(), simplices_per_chunk_);
   input_chunks_ = DivideUp(mesh_.input_vertex.size(), inputs_per_chunk_);
+}
+
+uint64_t MeshChunks::memory_bytes() const {
+  return kChunksOnTheirWay * kMaxResponseBytes + mesh_.points.capacity() * sizeof(double) +
+         (mesh_.simplices.capacity() + mesh_.input_vertex.capacity()) * sizeof(uint32_t);
 }
 
 MeshChunks::Chunk MeshChunks::Get(uint64_t index) const {

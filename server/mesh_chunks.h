@@ -4,16 +4,18 @@
 
 #include <cstdint>
 #include <memory>
+#include <utility>
 
 #include "core/mesher.h"
 #include "grpcpp/support/byte_buffer.h"
+#include "server/memory_budget.h"
 #include "server/options.h"
 
 namespace wellspace::server {
 
 // How a mesh is cut.
 //
-// Thread safety: immutable; thread-safe.
+// Thread safety: const functions are thread-safe.
 // Invariants: the same mesh is always cut alike; each chunk fits into a response of kMaxResponseBytes.
 class MeshChunks {
  public:
@@ -26,6 +28,11 @@ class MeshChunks {
 
   explicit MeshChunks(core::Mesh mesh, uint64_t max_bytes = kMaxResponseBytes);
 
+  // What the mesh takes, and chunks on their way.
+  uint64_t memory_bytes() const;
+  // Keeps what is reserved for it as long as the mesh lives.
+  void KeepMemory(MemoryReservation memory) { memory_ = std::move(memory); }
+
   const core::Mesh& mesh() const { return mesh_; }
   uint64_t count() const { return point_chunks_ + simplex_chunks_ + input_chunks_; }
 
@@ -33,6 +40,7 @@ class MeshChunks {
   Chunk Get(uint64_t index) const;
 
  private:
+  MemoryReservation memory_;
   core::Mesh mesh_;
   uint64_t points_per_chunk_ = 0;     // rows
   uint64_t simplices_per_chunk_ = 0;  // rows

@@ -11,14 +11,15 @@
 namespace wellspace::server {
 
 void MeshPointsCall::Work(PointChunks& points, Job& job) {
-  std::shared_ptr<const MeshChunks> mesh;
+  std::shared_ptr<MeshChunks> mesh;
   grpc::Status status = RunGuarded([&] {
-    const std::vector<double> coordinates = points.Flatten();
+    const std::vector<double> coordinates = points.Flatten(job.context());
     absl::StatusOr<core::Mesh> made = environment().mesher(parameters(), coordinates, job.context());
     if (!made.ok()) {
       return FromCoreStatus(made.status());
     }
     mesh = std::make_shared<MeshChunks>(*std::move(made));
+    mesh->KeepMemory(job.TakeMemory(mesh->memory_bytes()));
     environment().observability.work().vertices_made += mesh->mesh().vertex_count();
     environment().observability.work().simplices_made += mesh->mesh().simplex_count();
     return grpc::Status::OK;

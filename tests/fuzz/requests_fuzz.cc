@@ -80,7 +80,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   server::PointChunks chunks = receiver.TakePoints();
   fuzz::Require(chunks.coordinate_count() == receiver.point_count() * receiver.parameters().dimension,
                 "coordinates are counted");
-  const std::vector<double> points = chunks.Flatten();
+  const std::vector<double> points = chunks.Flatten(core::RunContext());
   fuzz::Require(points.size() == sent.size() &&
                     (sent.empty() || std::memcmp(points.data(), sent.data(), sent.size() * sizeof(double)) == 0),
                 "points arrive in order and to the bit");

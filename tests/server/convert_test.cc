@@ -213,9 +213,9 @@ TEST(CloudReceiver, CollectsChunksInOrder) {
   EXPECT_EQ(receiver.point_count(), 3u);
   PointChunks points = receiver.TakePoints();
   EXPECT_EQ(points.coordinate_count(), 9u);
-  EXPECT_THAT(points.Flatten(), ElementsAre(1, 2, 3, 4, 5, 6, 7, 8, 9));
-  EXPECT_TRUE(points.Flatten().empty());
-  EXPECT_TRUE(receiver.TakePoints().Flatten().empty());
+  EXPECT_THAT(points.Flatten(core::RunContext()), ElementsAre(1, 2, 3, 4, 5, 6, 7, 8, 9));
+  EXPECT_TRUE(points.Flatten(core::RunContext()).empty());
+  EXPECT_TRUE(receiver.TakePoints().Flatten(core::RunContext()).empty());
 }
 
 TEST(CloudReceiver, AcceptsAsManyPointsAsAllowedAndNotOneMore) {

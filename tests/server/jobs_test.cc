@@ -3,12 +3,15 @@
 #include <atomic>
 #include <memory>
 #include <optional>
+#include <random>
 #include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "gtest/gtest.h"
+#include "server/errors.h"
+#include "server/options.h"
 #include "tests/server/service_harness.h"
 
 namespace wellspace::server {
@@ -172,6 +175,332 @@ TEST(JobPool, ManyThreadsSubmitAndCancel) {
     EXPECT_TRUE(last_ran.Wait());
   }
   EXPECT_LE(ran, kThreads * kJobs);
+}
+
+// A job that, once the test lets it, reserves memory and keeps it until the test lets it end.
+struct Needy {
+  explicit Needy(uint64_t wanted) : bytes(wanted) {}
+
+  Job::Work Work() {
+    return [this](Job& job) {
+      began.Set();
+      status = job.context().ReserveMemory(bytes);
+      reserved.Set();
+      if (status.ok()) {
+        EXPECT_TRUE(may_end.Wait());
+      }
+      ended.Set();
+    };
+  }
+
+  const uint64_t bytes;
+  absl::Status status;
+  Event began;
+  Event reserved;
+  Event may_end;
+  Event ended;
+};
+
+constexpr uint64_t kMegabyte = uint64_t{1} << 20;
+// A budget of 100 MB.
+constexpr uint64_t kMaxMemory = kProcessMemoryBytes + 100 * kMegabyte;
+
+// Waits until so many jobs are in line.
+void WaitForQueued(const Pool& pool, int count) {
+  while (pool.GetLoad().queued != count) {
+    std::this_thread::yield();
+  }
+}
+
+TEST(JobPool, TenantsTakeTurns) {
+  std::vector<std::string> order;
+  Event go;
+  Event done;
+  Pool pool(1, 20);
+  ASSERT_NE(pool.Submit([&go](Job&) { EXPECT_TRUE(go.Wait()); }, "first"), nullptr);
+  const auto submit = [&](const std::string& tenant, int number) {
+    ASSERT_NE(pool.Submit(
+                  [&order, &done, tenant, number](Job&) {
+                    order.push_back(tenant + std::to_string(number));
+                    if (order.size() == 7) {
+                      done.Set();
+                    }
+                  },
+                  tenant),
+              nullptr);
+  };
+  for (int i = 0; i < 4; ++i) {
+    submit("a", i);
+  }
+  submit("b", 0);
+  submit("b", 1);
+  submit("c", 0);
+  go.Set();
+  ASSERT_TRUE(done.Wait());
+  EXPECT_EQ(order, std::vector<std::string>({"a0", "b0", "c0", "a1", "b1", "a2", "a3"}));
+}
+
+TEST(JobPool, RefusesWhatIsAboveATenantsShareAndTakesThoseOfOthers) {
+  Pool pool(1, 10, 2);
+  ASSERT_NE(pool.Submit(WorkUntilCancelled, "a"), nullptr);
+  const std::shared_ptr<Job> second = pool.Submit(WorkUntilCancelled, "a");
+  ASSERT_NE(second, nullptr);
+  const JobPool::Submission refused = pool.pool.Submit({.tenant = "a", .work = WorkUntilCancelled});
+  EXPECT_EQ(refused.job, nullptr);
+  EXPECT_EQ(refused.refusal.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(DetailsOf(refused.refusal).reason, "QUOTA_EXCEEDED");
+  EXPECT_TRUE(DetailsOf(refused.refusal).may_retry);
+  EXPECT_NE(pool.Submit(WorkUntilCancelled, "b"), nullptr);
+  pool.Cancel(second);
+  EXPECT_NE(pool.Submit(WorkUntilCancelled, "a"), nullptr);
+}
+
+TEST(JobPool, AFullQueueSaysHowFull) {
+  Pool pool(1, 0);
+  ASSERT_NE(pool.Submit(WorkUntilCancelled), nullptr);
+  const JobPool::Submission refused = pool.pool.Submit({.tenant = "a", .work = WorkUntilCancelled});
+  EXPECT_EQ(DetailsOf(refused.refusal).reason, "QUEUE_FULL");
+  EXPECT_NE(refused.refusal.error_message().find("runs 1 jobs and has 0 more in line"), std::string::npos);
+}
+
+TEST(JobPool, ALargeJobWaitsForMemoryWhileSmallOnesOfOthersFinish) {
+  Needy holder(60 * kMegabyte);
+  Needy large(80 * kMegabyte);
+  Pool pool(2, 20, 20, kMaxMemory);
+  ASSERT_NE(pool.Submit(holder.Work(), "a"), nullptr);
+  ASSERT_TRUE(holder.reserved.Wait());
+  ASSERT_NE(pool.Submit(large.Work(), "a"), nullptr);
+  ASSERT_TRUE(large.began.Wait());
+  WaitForQueued(pool, 1);
+  EXPECT_EQ(pool.GetLoad().running, 1);  // it has given its worker away
+  for (int i = 0; i < 5; ++i) {
+    Needy small(kMegabyte);
+    small.may_end.Set();
+    ASSERT_NE(pool.Submit(small.Work(), "b"), nullptr);
+    ASSERT_TRUE(small.ended.Wait());
+    EXPECT_TRUE(small.status.ok()) << small.status;
+  }
+  EXPECT_EQ(pool.GetLoad().queued, 1);
+  holder.may_end.Set();
+  ASSERT_TRUE(large.reserved.Wait());
+  EXPECT_TRUE(large.status.ok()) << large.status;
+  EXPECT_EQ(pool.memory.reserved(), large.bytes);
+  large.may_end.Set();
+  ASSERT_TRUE(large.ended.Wait());
+}
+
+TEST(JobPool, AJobThatWasPassedOftenGoesFirst) {
+  Needy holder(60 * kMegabyte);
+  Needy large(80 * kMegabyte);
+  Pool pool(2, 100, 100, kMaxMemory);
+  pool.Submit(holder.Work(), "a");
+  ASSERT_TRUE(holder.reserved.Wait());
+  pool.Submit(large.Work(), "b");
+  ASSERT_TRUE(large.began.Wait());
+  WaitForQueued(pool, 1);
+  int passed = 0;
+  while (true) {
+    Needy small(kMegabyte);
+    small.may_end.Set();
+    const std::shared_ptr<Job> job = pool.Submit(small.Work(), "c");
+    if (pool.GetLoad().queued == 2) {  // nobody passes any more
+      EXPECT_FALSE(large.reserved.IsSet());
+      holder.may_end.Set();
+      ASSERT_TRUE(large.reserved.Wait());
+      EXPECT_TRUE(large.status.ok()) << large.status;
+      large.may_end.Set();
+      ASSERT_TRUE(small.ended.Wait());
+      break;
+    }
+    ASSERT_TRUE(small.ended.Wait());
+    ++passed;
+    ASSERT_LE(passed, JobPool::kMostPassing);
+    while (pool.GetLoad().running > 1) {
+      std::this_thread::yield();
+    }
+  }
+  EXPECT_GE(passed, JobPool::kMostPassing - 1);  // the last to pass may have to wait when it asks for its memory
+}
+
+TEST(JobPool, WhatNeverFitsIsRefusedAtOnceWithFiguresAndNoRetry) {
+  Needy huge(101 * kMegabyte);
+  Pool pool(1, 1, 1, kMaxMemory);
+  pool.Submit(huge.Work());
+  ASSERT_TRUE(huge.ended.Wait());
+  const grpc::Status status = FromCoreStatus(huge.status);
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(DetailsOf(status).reason, "MEMORY_LIMIT");
+  EXPECT_FALSE(DetailsOf(status).may_retry);
+  EXPECT_EQ(status.error_message(),
+            "the job needs 105.9 MB of memory; this server has 104.9 MB for all work: make it smaller");
+}
+
+TEST(JobPool, WhatSessionsLeaveNoRoomForIsRefusedAtOnceButMayBeRetried) {
+  Needy large(80 * kMegabyte);
+  Pool pool(1, 1, 1, kMaxMemory);
+  absl::StatusOr<MemoryReservation> session = pool.memory.Reserve(30 * kMegabyte, "a session");
+  ASSERT_TRUE(session.ok());
+  session->MakeLasting();
+  pool.Submit(large.Work());
+  ASSERT_TRUE(large.ended.Wait());
+  EXPECT_EQ(DetailsOf(FromCoreStatus(large.status)).reason, "MEMORY_LIMIT");
+  EXPECT_TRUE(DetailsOf(FromCoreStatus(large.status)).may_retry);
+}
+
+TEST(JobPool, WhenAllWaitForOneAnotherTheYoungestIsRefusedAndTheOldestGoesOn) {
+  // Each has a tree, and wants more beside it than the others' trees leave.
+  struct WithTree {
+    absl::Status tree;
+    absl::Status mesh;
+    Event has_tree;
+    Event ended;
+    Job::Work Work(Event& go) {
+      return [this, &go](Job& job) {
+        tree = job.context().ReserveMemory(30 * kMegabyte);
+        has_tree.Set();
+        EXPECT_TRUE(go.Wait());
+        mesh = job.context().ReserveMemory(70 * kMegabyte);
+        ended.Set();
+      };
+    }
+  };
+  Event go;
+  WithTree jobs[3];
+  Pool pool(3, 10, 10, kMaxMemory);
+  for (WithTree& job : jobs) {
+    ASSERT_NE(pool.Submit(job.Work(go), std::to_string(&job - jobs)), nullptr);
+    ASSERT_TRUE(job.has_tree.Wait());
+  }
+  go.Set();
+  for (WithTree& job : jobs) {
+    ASSERT_TRUE(job.ended.Wait());
+    EXPECT_TRUE(job.tree.ok());
+  }
+  EXPECT_TRUE(jobs[0].mesh.ok()) << jobs[0].mesh;
+  EXPECT_TRUE(jobs[1].mesh.ok()) << jobs[1].mesh;
+  EXPECT_EQ(DetailsOf(FromCoreStatus(jobs[2].mesh)).reason, "MEMORY_LIMIT");
+  EXPECT_TRUE(DetailsOf(FromCoreStatus(jobs[2].mesh)).may_retry);
+}
+
+TEST(JobPool, AJobThatOutgrowsItsReservationTakesWhatIsLeftThenEnds) {
+  absl::Status less;
+  absl::Status more;
+  absl::Status all;
+  Event ended;
+  Pool pool(1, 1, 1, kMaxMemory);
+  pool.Submit([&](Job& job) {
+    EXPECT_TRUE(job.context().ReserveMemory(10 * kMegabyte).ok());
+    less = job.context().AllowMemory(9 * kMegabyte);
+    more = job.context().AllowMemory(100 * kMegabyte);
+    all = job.context().AllowMemory(100 * kMegabyte + 1);
+    ended.Set();
+  });
+  ASSERT_TRUE(ended.Wait());
+  EXPECT_TRUE(less.ok()) << less;
+  EXPECT_TRUE(more.ok()) << more;
+  EXPECT_EQ(DetailsOf(FromCoreStatus(all)).reason, "MEMORY_LIMIT");
+}
+
+TEST(JobPool, CancelWhileWaitingForMemoryEndsTheWaitAtOnce) {
+  Needy holder(60 * kMegabyte);
+  Needy large(80 * kMegabyte);
+  Pool pool(1, 10, 10, kMaxMemory);
+  pool.Submit(holder.Work());
+  ASSERT_TRUE(holder.began.Wait());
+  ASSERT_TRUE(holder.reserved.Wait());
+  // With one worker the large one could not even begin; memory that is held outside jobs makes it wait.
+  holder.may_end.Set();
+  ASSERT_TRUE(holder.ended.Wait());
+  absl::StatusOr<MemoryReservation> call = pool.memory.Reserve(60 * kMegabyte, "a call");
+  while (!call.ok()) {
+    call = pool.memory.Reserve(60 * kMegabyte, "a call");
+  }
+  const std::shared_ptr<Job> job = pool.Submit(large.Work());
+  ASSERT_TRUE(large.began.Wait());
+  WaitForQueued(pool, 1);
+  pool.Cancel(job);
+  ASSERT_TRUE(large.ended.Wait());
+  EXPECT_EQ(large.status.code(), absl::StatusCode::kCancelled);
+}
+
+TEST(JobPool, DestructionEndsThoseThatWaitForMemory) {
+  Needy large(80 * kMegabyte);
+  std::optional<Pool> pool(std::in_place, 1, 10, 10, kMaxMemory);
+  absl::StatusOr<MemoryReservation> call = pool->memory.Reserve(60 * kMegabyte, "a call");
+  ASSERT_TRUE(call.ok());
+  pool->Submit(large.Work());
+  ASSERT_TRUE(large.began.Wait());
+  WaitForQueued(*pool, 1);
+  call->Release();  // the budget goes with the pool: it may or may not be served before
+  large.may_end.Set();
+  pool.reset();
+  EXPECT_TRUE(large.ended.IsSet());
+}
+
+TEST(JobPool, WhatTheWorkHoldsIsReleasedWithIt) {
+  Event done;
+  Pool pool(1, 1, 1, kMaxMemory);
+  absl::StatusOr<MemoryReservation> held = pool.memory.Reserve(10 * kMegabyte, "points");
+  ASSERT_TRUE(held.ok());
+  MemoryReservation kept;
+  pool.pool.Submit({.tenant = "a", .held = *std::move(held), .work = [&](Job& job) {
+                      EXPECT_TRUE(job.context().ReserveMemory(20 * kMegabyte).ok());
+                      EXPECT_EQ(pool.memory.reserved(), 30 * kMegabyte);
+                      job.ReleaseHeld();
+                      EXPECT_EQ(pool.memory.reserved(), 20 * kMegabyte);
+                      kept = job.TakeMemory(5 * kMegabyte);
+                      done.Set();
+                    }});
+  ASSERT_TRUE(done.Wait());
+  while (pool.GetLoad().running > 0) {
+    std::this_thread::yield();
+  }
+  EXPECT_EQ(pool.memory.reserved(), 5 * kMegabyte);
+  kept.Release();
+  EXPECT_EQ(pool.memory.reserved(), 0u);
+}
+
+TEST(JobPool, ManyTenantsWithTenTimesTheMemoryAllFinish) {
+  constexpr int kTenants = 8;
+  constexpr int kJobs = 50;
+  std::atomic<uint64_t> most = 0;
+  std::atomic<int> finished = 0;
+  std::atomic<int> refused = 0;
+  Pool pool(4, kTenants * kJobs, kJobs, kMaxMemory);
+  std::vector<std::thread> threads;
+  for (int t = 0; t < kTenants; ++t) {
+    threads.emplace_back([&, t] {
+      std::mt19937 generator(t);
+      for (int i = 0; i < kJobs; ++i) {
+        const uint64_t tree = (1 + generator() % 10) * kMegabyte;
+        const uint64_t mesh = tree * (1 + generator() % 9);
+        const auto work = [&, tree, mesh](Job& job) {
+          absl::Status status = job.context().ReserveMemory(tree);
+          if (status.ok()) {
+            status = job.context().ReserveMemory(mesh);
+          }
+          uint64_t seen = most;
+          const uint64_t now = pool.memory.reserved();
+          while (seen < now && !most.compare_exchange_weak(seen, now)) {
+          }
+          ++(status.ok() ? finished : refused);
+        };
+        ASSERT_NE(pool.Submit(work, std::to_string(t)), nullptr);
+      }
+    });
+  }
+  for (std::thread& thread : threads) {
+    thread.join();
+  }
+  while (finished + refused < kTenants * kJobs) {
+    std::this_thread::yield();
+  }
+  EXPECT_LE(most, pool.memory.limit());
+  EXPECT_GE(finished, kTenants * kJobs * 9 / 10);  // the others got into a deadlock of trees
+  while (pool.GetLoad().running > 0) {
+    std::this_thread::yield();
+  }
+  EXPECT_EQ(pool.memory.reserved(), 0u);
 }
 
 }  // namespace

@@ -47,6 +47,11 @@ void Event::Set() {
   set_changed_.notify_all();
 }
 
+bool Event::IsSet() const {
+  std::lock_guard lock(mutex_);
+  return set_;
+}
+
 bool Event::Wait() {
   std::unique_lock lock(mutex_);
   return set_changed_.wait_for(lock, kPatience, [this] { return set_; });

@@ -23,9 +23,10 @@ class Event {
   void Set();
   // False when it did not happen for a minute: the test has failed.
   bool Wait();
+  bool IsSet() const;
 
  private:
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable set_changed_;
   bool set_ = false;
 };

@@ -1,0 +1,120 @@
+#include "server/limit_flags.h"
+
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+
+namespace wellspace::server {
+namespace {
+
+constexpr uint64_t kMany = std::numeric_limits<int64_t>::max();
+
+// CLI11's reader of TOML, with errors that name the key: values are checked after the file is read, where CLI11 knows only the option.
+class TomlFile final : public CLI::ConfigBase {
+ public:
+  explicit TomlFile(const CLI::App& app) : app_(app) {}
+
+  std::vector<CLI::ConfigItem> from_config(std::istream& input) const override {
+    std::vector<CLI::ConfigItem> keys = ConfigBase::from_config(input);
+    for (const CLI::ConfigItem& item : keys) {
+      const CLI::Option* option = item.parents.empty() ? app_.get_option_no_throw("--" + item.name) : nullptr;
+      if (option == nullptr || !option->get_configurable()) {
+        throw CLI::ConfigError(
+            absl::StrCat("--config: ", item.fullname(), " is no key; keys are the options without --"));
+      }
+    }
+    return keys;
+  }
+
+ private:
+  const CLI::App& app_;
+};
+
+template <typename T>
+void AddCount(CLI::App& app, const std::string& name, T& value, uint64_t least, uint64_t most,
+              const std::string& description) {
+  app.add_option(name, value, description)
+      ->check(CLI::Range(static_cast<T>(least), static_cast<T>(most)))
+      ->capture_default_str();
+}
+
+// An amount of memory: 0, or at least kMinMemoryBytes.
+uint64_t ParseMemory(const std::string& text) {
+  uint64_t bytes = 0;
+  bool is_size = false;
+  try {
+    std::string plain = text;
+    is_size = CLI::AsSizeValue(/*kb_is_1000=*/false)(plain).empty() && absl::SimpleAtoi(plain, &bytes);
+  } catch (const CLI::ValidationError&) {  // an unknown unit
+  }
+  if (!is_size || (bytes != 0 && bytes < kMinMemoryBytes)) {
+    throw CLI::ValidationError("--max-memory", absl::StrCat(text, " is no limit of memory; 0 (none) is, or at least ",
+                                                            kMinMemoryBytes >> 20, "MB, as 512MB or 12GB"));
+  }
+  return bytes;
+}
+
+}  // namespace
+
+CLI::Option* AddSeconds(CLI::App& app, const std::string& name, absl::Duration& value, absl::Duration least,
+                        absl::Duration most, const std::string& description) {
+  const auto parse = [name, &value, least, most](const std::string& text) {
+    double seconds = 0;
+    // The comparison lets no NaN pass.
+    if (!absl::SimpleAtod(text, &seconds) || !(absl::Seconds(seconds) >= least && absl::Seconds(seconds) <= most) ||
+        seconds != seconds) {
+      throw CLI::ValidationError(name, absl::StrCat(text, " is no number of seconds from ",
+                                                    absl::ToDoubleSeconds(least), " to ", absl::ToDoubleSeconds(most)));
+    }
+    value = absl::Seconds(seconds);
+  };
+  return app.add_option_function<std::string>(name, parse, description)
+      ->type_name("SECONDS")
+      ->default_str(absl::StrCat(absl::ToDoubleSeconds(value)));
+}
+
+void DeclareLimits(CLI::App& app, ServiceOptions& service) {
+  AddCount(app, "--workers", service.workers, 1, 1024, "Jobs that run at once");
+  AddCount(app, "--max-threads", service.max_threads, 1, 1024, "Most threads of one job");
+  AddCount(app, "--max-queued", service.max_queued_jobs, 0, 100'000, "Jobs that wait for a worker; more are refused");
+  AddCount(app, "--max-jobs-per-tenant", service.max_jobs_per_tenant, 1, 100'000,
+           "Jobs of one tenant that run or wait; more are refused");
+  app.add_option_function<std::string>(
+         "--max-memory", [&service](const std::string& text) { service.max_memory_bytes = ParseMemory(text); },
+         "Most resident memory of this process, as 512MB or 12GB; work that needs more is refused; 0: no limit")
+      ->type_name("SIZE")
+      ->default_str(absl::StrCat(service.max_memory_bytes));
+  AddCount(app, "--max-points", service.max_points, 1, kMany, "Most points of a call or a session");
+  AddCount(app, "--max-vertices", service.max_vertices, 1, core::kMaxVertices, "Most vertices of a mesh");
+  AddCount(app, "--max-points-per-tenant", service.max_points_per_tenant, 1, kMany,
+           "Most points of all sessions of one tenant");
+  AddCount(app, "--max-sessions", service.max_sessions, 1, kMany, "Most sessions at a time");
+  AddCount(app, "--max-sessions-per-tenant", service.max_sessions_per_tenant, 1, kMany,
+           "Most sessions of one tenant at a time");
+  AddSeconds(app, "--default-ttl", service.default_ttl, absl::Seconds(1), absl::Hours(24 * 3650),
+             "How long a session lives without use when its client does not say");
+  AddSeconds(app, "--max-ttl", service.max_ttl, absl::Seconds(1), absl::Hours(24 * 3650),
+             "How long it may live without use at most");
+  AddSeconds(app, "--stall-limit", service.stall_limit, absl::Milliseconds(1), absl::Hours(24),
+             "How long a stream waits for a client that does not read");
+  app.callback([&service] {
+    if (service.default_ttl > service.max_ttl) {
+      throw CLI::ValidationError("--default-ttl",
+                                 absl::StrCat(absl::ToDoubleSeconds(service.default_ttl), " is more than --max-ttl, ",
+                                              absl::ToDoubleSeconds(service.max_ttl)));
+    }
+  });
+}
+
+void DeclareConfigFile(CLI::App& app) {
+  app.config_formatter(std::make_shared<TomlFile>(app));
+  app.set_config("--config", "", "Options in a TOML file: keys are the options without --; the command line wins")
+      ->type_name("FILE");
+  app.allow_config_extras(CLI::config_extras_mode::error);
+}
+
+}  // namespace wellspace::server
