@@ -132,6 +132,11 @@ class MesherIn final : public Mesher {
 
   int dimension() const override { return D; }
   uint64_t vertex_count() const override { return structure_.vertex_count(); }
+  uint64_t memory_bytes() const override {
+    return structure_.MemoryBytes() + refinement_->MemoryBytes() +
+           (output_index_.size() + vertex_at_.size() + input_vertex_.size()) * sizeof(uint32_t) +
+           negative_zeros_.size() * sizeof(size_t);
+  }
 
   absl::Status Refine(const MeshParameters& parameters, RunContext& context) override {
     WELLSPACE_RETURN_IF_ERROR(CheckParameters(parameters));

@@ -105,6 +105,8 @@ class Mesher {
 
   virtual int dimension() const = 0;
   virtual uint64_t vertex_count() const = 0;
+  // What it holds in memory, but for a few scratch buffers. Unit: bytes.
+  virtual uint64_t memory_bytes() const = 0;
 
   // Adds Steiner vertices until the criterion and the sizes of `parameters` are met. Of these rho, criterion, sizes and
   // max_vertices count; the box is that of Create.

@@ -22,7 +22,7 @@ Backend::Backend(const ServiceOptions& options, const Authenticator& authenticat
       create_mesher_(std::move(create_mesher)),
       request_ids_(absl::Now),
       memory_(options_.max_memory_bytes),
-      sessions_(options_, absl::Now),
+      sessions_(options_, memory_, absl::Now),
       environment_{.options = options_,
                    .mesher = mesher_,
                    .estimator = estimator_,

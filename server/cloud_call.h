@@ -53,9 +53,6 @@ class CloudCall : public Call<Reactor> {
   const core::MeshParameters& parameters() const { return receiver_.parameters(); }
 
  private:
-  // While a message comes, its bytes and the message made of them.
-  static constexpr uint64_t kMessageBytes = 2 * kMaxRequestBytes;
-
   void SubmitJob();
   // Sets memory aside for the points so far, and for the next message.
   //

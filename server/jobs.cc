@@ -16,7 +16,7 @@ constexpr char kJob[] = "the job";
 Job::Job(JobPool& pool, JobRequest request)
     : pool_(pool), tenant_(std::move(request.tenant)), held_(std::move(request.held)), work_(std::move(request.work)) {
   if (pool_.memory_.is_limited()) {
-    memory_ = request.memory.bytes() > 0 ? std::move(request.memory) : pool_.memory_.ReserveNothing();
+    memory_ = pool_.memory_.ReserveNothing();
     context_.SetMemoryLender(this);
   }
 }
@@ -25,6 +25,13 @@ void Job::ReleaseHeld() {
   MemoryReservation released;  // without the lock
   std::lock_guard lock(memory_mutex_);
   released = std::move(held_);
+}
+
+void Job::GiveMemory(MemoryReservation memory) {
+  std::lock_guard lock(memory_mutex_);
+  if (memory.bytes() > 0) {
+    memory_ = std::move(memory);
+  }
 }
 
 MemoryReservation Job::TakeMemory(uint64_t bytes) {

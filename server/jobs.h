@@ -30,8 +30,6 @@ struct JobRequest {
   std::string tenant{};
   // Of what the work brings along, such as its points; released with the work, at the latest.
   MemoryReservation held{};
-  // Of what is there already for the run to go on with, such as its mesher; counts as what the run has reserved.
-  MemoryReservation memory{};
   // Has to return soon after the context of its job is cancelled, and must not throw.
   std::function<void(Job&)> work{};
 };
@@ -52,6 +50,11 @@ class Job final : private core::MemoryLender, public std::enable_shared_from_thi
 
   // Releases what the request brought along, once the work has let go of it.
   void ReleaseHeld();
+
+  // Hands in what is reserved for what the run goes on with, such as its mesher: it counts as reserved by the run.
+  //
+  // REQUIRES:   the run has reserved nothing yet.
+  void GiveMemory(MemoryReservation memory);
 
   // Hands over `bytes`, or all, of what the run has reserved: for what outlives the job.
   MemoryReservation TakeMemory(uint64_t bytes);

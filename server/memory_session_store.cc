@@ -23,8 +23,8 @@ std::string UnguessableName() {
 
 }  // namespace
 
-MemorySessionStore::MemorySessionStore(const ServiceOptions& options, Clock clock)
-    : options_(options), clock_(std::move(clock)) {}
+MemorySessionStore::MemorySessionStore(const ServiceOptions& options, MemoryBudget& memory, Clock clock)
+    : options_(options), memory_(memory), clock_(std::move(clock)) {}
 
 grpc::Status MemorySessionStore::Create(NewSession settings, std::shared_ptr<Session>* session) {
   std::lock_guard lock(mutex_);
@@ -46,7 +46,7 @@ grpc::Status MemorySessionStore::Create(NewSession settings, std::shared_ptr<Ses
                                                          .labels = std::move(settings.labels),
                                                          .ttl = settings.ttl,
                                                          .create_time = last_create_time_},
-                                       options_, clock_, tenant.usage);
+                                       options_, memory_, clock_, tenant.usage);
   tenant.sessions.emplace(last_create_time_, *session);
   by_name_.emplace((*session)->name(), *session);
   return grpc::Status::OK;

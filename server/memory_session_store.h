@@ -10,6 +10,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "server/memory_budget.h"
 #include "server/options.h"
 #include "server/session_store.h"
 
@@ -19,8 +20,8 @@ namespace wellspace::server {
 // Invariants: those of SessionStore. Locks of sessions are taken with that of the store held, never the other way round.
 class MemorySessionStore final : public SessionStore {
  public:
-  // REQUIRES:   `options` outlives this and all sessions.
-  MemorySessionStore(const ServiceOptions& options, Clock clock);
+  // REQUIRES:   `options` and `memory` outlive this and all sessions.
+  MemorySessionStore(const ServiceOptions& options, MemoryBudget& memory, Clock clock);
 
   grpc::Status Create(NewSession settings, std::shared_ptr<Session>* session) override;
   grpc::Status Find(const std::string& tenant, const std::string& name, std::shared_ptr<Session>* session) override;
@@ -36,6 +37,7 @@ class MemorySessionStore final : public SessionStore {
   };
 
   const ServiceOptions& options_;
+  MemoryBudget& memory_;
   const Clock clock_;
   std::mutex mutex_;
   // Guarded by mutex_.

@@ -12,6 +12,9 @@ namespace wellspace::server {
 // Most bytes of a serialized request message; what gRPC takes by default.
 inline constexpr int kMaxRequestBytes = 4 * 1024 * 1024;
 
+// What a request takes in memory while it comes: its bytes and the message made of them.
+inline constexpr uint64_t kMessageBytes = 2 * kMaxRequestBytes;
+
 // Most bytes of a serialized response message with a chunk.
 inline constexpr int kMaxResponseBytes = 1024 * 1024;
 

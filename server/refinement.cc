@@ -14,6 +14,9 @@
 namespace wellspace::server {
 namespace {
 
+// A mesher that needs more memory than there is, and this many times what it had before, is given up.
+constexpr double kGrown = 1.25;
+
 constexpr size_t kCopyBlock = size_t{1} << 20;  // numbers copied between two looks at the context
 
 template <typename T>
@@ -51,6 +54,7 @@ absl::StatusOr<core::Mesh> MeshFirst(const CallEnvironment& environment, const S
     WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> points, session.points().CopyFrom(0, context));
     WELLSPACE_ASSIGN_OR_RETURN(mesher, environment.create_mesher(parameters, points, context));
   }
+  WELLSPACE_RETURN_IF_ERROR(core::ReserveMemory(*mesher, parameters, context));
   WELLSPACE_RETURN_IF_ERROR(mesher->Refine(parameters, context));
   WELLSPACE_ASSIGN_OR_RETURN(core::Mesh mesh, mesher->Extract(parameters.threads, context));
   work.mesher = std::move(mesher);
@@ -68,6 +72,7 @@ absl::StatusOr<core::Mesh> MeshAgain(const Session& session, const core::MeshPar
     work.meshed_points += points.size() / parameters.dimension;
   }
   WELLSPACE_RETURN_IF_ERROR(work.mesher->Refine(parameters, context));
+  WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(work.mesher->memory_bytes() + work.mesh->chunks.memory_bytes()));
   WELLSPACE_ASSIGN_OR_RETURN(core::Mesh mesh, Copy(work.mesh->chunks.mesh(), context));
   WELLSPACE_RETURN_IF_ERROR(work.mesher->Update(mesh, parameters.threads, context));
   return mesh;
@@ -80,21 +85,36 @@ void Run(const CallEnvironment& environment, Session& session, Operation& operat
   if (!work.has_value()) {
     return;
   }
-  std::optional<core::Mesh> mesh;
+  const uint64_t bytes_before = work->mesher == nullptr ? 0 : work->mesher->memory_bytes();
+  job.GiveMemory(std::move(work->memory));
+  std::shared_ptr<MeshSnapshot> mesh;
   bool has_returned = false;
   const grpc::Status status = RunGuarded([&] {
     absl::StatusOr<core::Mesh> made = work->mesher == nullptr
                                           ? MeshFirst(environment, session, operation.parameters(), context, *work)
                                           : MeshAgain(session, operation.parameters(), context, *work);
-    has_returned = true;
     if (made.ok()) {
-      mesh = *std::move(made);
+      mesh = std::make_shared<MeshSnapshot>(*std::move(made));
     }
+    has_returned = true;
     return FromCoreStatus(made.status());
   });
-  if (!has_returned) {  // an exception went through the mesher: nobody knows what it is like
-    work->mesher = nullptr;
-    work->meshed_points = 0;
+  if (work->mesher != nullptr) {
+    const bool has_outgrown = IsMemoryLimit(status) && static_cast<double>(work->mesher->memory_bytes()) >
+                                                           kGrown * static_cast<double>(bytes_before);
+    // Nobody knows what a mesher is like that an exception went through.
+    if (!has_returned || has_outgrown) {
+      work->mesher = nullptr;
+      work->meshed_points = 0;
+    } else {
+      work->memory = job.TakeMemory(work->mesher->memory_bytes());
+      work->memory.MakeLasting();
+    }
+  }
+  if (mesh != nullptr) {
+    MemoryReservation memory = job.TakeMemory(mesh->chunks.memory_bytes());
+    memory.MakeLasting();
+    mesh->chunks.KeepMemory(std::move(memory));
   }
   const absl::Duration time = absl::Now() - start;
   if (status.error_code() == grpc::StatusCode::INTERNAL) {
@@ -102,7 +122,8 @@ void Run(const CallEnvironment& environment, Session& session, Operation& operat
   }
   environment.log.info("operation={} tenant={} code={} seconds={:.3f} points={} vertices={}{}{}", operation.name(),
                        session.tenant(), absl::StatusCodeToString(static_cast<absl::StatusCode>(status.error_code())),
-                       absl::ToDoubleSeconds(time), work->meshed_points, mesh.has_value() ? mesh->vertex_count() : 0,
+                       absl::ToDoubleSeconds(time), work->meshed_points,
+                       mesh == nullptr ? 0 : mesh->chunks.mesh().vertex_count(),
                        status.ok() ? "" : " message=", status.error_message());
   session.EndWork(operation, status, *std::move(work), std::move(mesh));
 }

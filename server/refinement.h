@@ -17,7 +17,7 @@ namespace wellspace::server {
 // changed.
 //
 // A first refinement that does not succeed leaves nothing behind but the points. A later one leaves what it has added, and the next one
-// goes on from there; one that ran out of memory gives up the structure, and the next one builds it anew.
+// goes on from there; one that has grown until memory ran out gives up the structure, and the next one builds it anew.
 //
 // Errors:     QUEUE_FULL, QUOTA_EXCEEDED (jobs); those of Session::StartOperation.
 grpc::Status StartRefinement(const CallEnvironment& environment, const std::shared_ptr<Session>& session,

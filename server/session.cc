@@ -15,18 +15,23 @@ constexpr size_t kKeptOperations = 100;
 
 }  // namespace
 
-Session::Session(Settings settings, const ServiceOptions& options, Clock clock, std::shared_ptr<TenantUsage> usage)
+Session::Session(Settings settings, const ServiceOptions& options, MemoryBudget& memory, Clock clock,
+                 std::shared_ptr<TenantUsage> usage)
     : tenant_(std::move(settings.tenant)),
       name_(std::move(settings.name)),
       dimension_(settings.parameters.dimension),
       create_time_(settings.create_time),
       options_(options),
+      memory_(memory),
       clock_(std::move(clock)),
       usage_(std::move(usage)),
       parameters_(std::move(settings.parameters)),
       labels_(std::move(settings.labels)),
       ttl_(settings.ttl),
-      last_use_(settings.create_time) {}
+      last_use_(settings.create_time),
+      point_memory_(memory.ReserveNothing()) {
+  point_memory_.MakeLasting();
+}
 
 Session::~Session() {
   if (!is_closed_) {
@@ -181,8 +186,20 @@ grpc::Status Session::TakePoints(uint64_t count) {
                      absl::StrCat("your sessions would have ", all, " points together; they may have at most ",
                                   options_.max_points_per_tenant));
   }
+  if (const uint64_t bytes = (point_count_ + count) * dimension_ * sizeof(double); !point_memory_.Resize(bytes)) {
+    usage_->points -= count;
+    return FromCoreStatus(memory_.Refusal(bytes, "the points of a session"));
+  }
   point_count_ += count;
   return grpc::Status::OK;
+}
+
+void Session::ReturnPoints(uint64_t count) {
+  point_count_ -= count;
+  (void)point_memory_.Resize(point_count_ * dimension_ * sizeof(double));  // shrinking never fails
+  if (!is_closed_) {
+    usage_->points -= count;
+  }
 }
 
 grpc::Status Session::CheckCoordinates(uint64_t first, std::span<const double> coordinates) const {
@@ -345,10 +362,7 @@ grpc::Status Session::AddVertices(std::span<const double> points, std::span<cons
     is_ready_ = false;
     ++revision_;
   } else {
-    point_count_ -= points.size() / dimension_;
-    if (!is_closed_) {
-      usage_->points -= points.size() / dimension_;
-    }
+    ReturnPoints(points.size() / dimension_);
   }
   if (uploaded > 0 || status.ok()) {
     ++structure_version_;
@@ -393,17 +407,20 @@ std::optional<SessionWork> Session::BeginWork(Operation& operation) {
   }
   WaitForQueries();
   std::lock_guard lock(mutex_);
-  return SessionWork{.mesher = std::move(work_.mesher), .meshed_points = work_.meshed_points, .mesh = work_.mesh};
+  return SessionWork{.mesher = std::move(work_.mesher),
+                     .meshed_points = work_.meshed_points,
+                     .mesh = work_.mesh,
+                     .memory = std::move(work_.memory)};
 }
 
 void Session::EndWork(Operation& operation, const grpc::Status& status, SessionWork work,
-                      std::optional<core::Mesh> mesh) {
+                      std::shared_ptr<MeshSnapshot> mesh) {
   {
     std::lock_guard lock(mutex_);
     const absl::Time now = clock_();
     if (status.ok()) {
-      work.mesh =
-          std::make_shared<MeshSnapshot>(MeshSnapshot{.revision = ++revision_, .chunks = MeshChunks(*std::move(mesh))});
+      mesh->revision = ++revision_;
+      work.mesh = std::move(mesh);
       is_ready_ = true;
       const core::Mesh& made = work.mesh->chunks.mesh();
       operation.Succeed(now, revision_, made.vertex_count(), made.simplex_count());

@@ -13,11 +13,13 @@
 #include <shared_mutex>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/time/time.h"
 #include "core/mesher.h"
 #include "grpcpp/support/status.h"
+#include "server/memory_budget.h"
 #include "server/mesh_chunks.h"
 #include "server/operation.h"
 #include "server/options.h"
@@ -36,7 +38,9 @@ struct TenantUsage {
 
 // The mesh of a session as it was at one revision. Immutable: a download holds it for as long as it wants.
 struct MeshSnapshot {
-  uint64_t revision = 0;
+  explicit MeshSnapshot(core::Mesh mesh) : chunks(std::move(mesh)) {}
+
+  uint64_t revision = 0;  // set by the session
   MeshChunks chunks;
 };
 
@@ -51,6 +55,7 @@ struct SessionWork {
   std::unique_ptr<core::Mesher> mesher;      // null: there is none yet
   uint64_t meshed_points = 0;                // of the session's points, those that `mesher` has
   std::shared_ptr<const MeshSnapshot> mesh;  // the last one; null: there is none yet
+  MemoryReservation memory;                  // of `mesher`
 };
 
 // Thread safety: thread-safe.
@@ -68,8 +73,9 @@ class Session {
     absl::Time create_time;
   };
 
-  // REQUIRES:   `options` outlives this.
-  Session(Settings settings, const ServiceOptions& options, Clock clock, std::shared_ptr<TenantUsage> usage);
+  // REQUIRES:   `options` and `memory` outlive this.
+  Session(Settings settings, const ServiceOptions& options, MemoryBudget& memory, Clock clock,
+          std::shared_ptr<TenantUsage> usage);
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
@@ -104,7 +110,7 @@ class Session {
   // Appends those of `coordinates`, whole points of which the first is number `offset` of the session, that it does not have yet.
   // `expected_revision` 0: any.
   //
-  // Errors:     INVALID_CHUNK_SHAPE, INVALID_POINTS, UPLOAD_GAP, SESSION_BUSY, TOO_MANY_POINTS, QUOTA_EXCEEDED,
+  // Errors:     INVALID_CHUNK_SHAPE, INVALID_POINTS, UPLOAD_GAP, SESSION_BUSY, TOO_MANY_POINTS, QUOTA_EXCEEDED, MEMORY_LIMIT,
   //             REVISION_MISMATCH, SESSION_NOT_FOUND. Nothing has been appended.
   grpc::Status Append(uint64_t offset, std::span<const double> coordinates, uint64_t expected_revision);
   // Points and revision, as one.
@@ -137,8 +143,8 @@ class Session {
                               std::shared_ptr<Operation>* operation);
   // On the worker: what to work on; nothing if the operation has ended before it could begin.
   std::optional<SessionWork> BeginWork(Operation& operation);
-  // On the worker: takes back what BeginWork gave, and ends the operation with `status`. On success `mesh` is the new mesh.
-  void EndWork(Operation& operation, const grpc::Status& status, SessionWork work, std::optional<core::Mesh> mesh);
+  // On the worker: takes back what BeginWork gave, and ends the operation with `status`. `mesh` is the new mesh if that is OK.
+  void EndWork(Operation& operation, const grpc::Status& status, SessionWork work, std::shared_ptr<MeshSnapshot> mesh);
   // Ends an operation that still waits for a worker as CANCELLED; false when it does not.
   bool EndWaiting(Operation& operation);
 
@@ -164,6 +170,8 @@ class Session {
   grpc::Status CheckReadyForChange(uint64_t expected_revision) const;
   // Takes `count` more points into the account of the session and its tenant, or says why it may not have them.
   grpc::Status TakePoints(uint64_t count);
+  // Takes them out again.
+  void ReturnPoints(uint64_t count);
   // Refuses what no mesh of this session could have. `first` is the number of the first point.
   grpc::Status CheckCoordinates(uint64_t first, std::span<const double> coordinates) const;
   absl::Time ExpireTime() const;
@@ -177,6 +185,7 @@ class Session {
   const int dimension_;
   const absl::Time create_time_;
   const ServiceOptions& options_;
+  MemoryBudget& memory_;
   const Clock clock_;
   const std::shared_ptr<TenantUsage> usage_;
 
@@ -194,6 +203,7 @@ class Session {
   uint64_t revision_ = 1;
   uint64_t point_count_ = 0;        // with those that AddVertices is adding
   PointStore points_;               // see invariant (2)
+  MemoryReservation point_memory_;  // of point_count_ points
   SessionWork work_;                // its mesher is away while an operation is under way; see invariant (2)
   uint64_t structure_version_ = 0;  // of what queries see; 0: nothing yet
   uint64_t next_operation_ = 1;

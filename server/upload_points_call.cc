@@ -9,6 +9,16 @@
 
 namespace wellspace::server {
 
+void UploadPointsCall::OnBegin() {
+  absl::StatusOr<MemoryReservation> memory = environment().memory.Reserve(kMessageBytes, "an upload");
+  if (!memory.ok()) {
+    End(FromCoreStatus(memory.status()));
+    return;
+  }
+  memory_ = *std::move(memory);
+  StartRead(&request_);
+}
+
 void UploadPointsCall::OnReadDone(bool ok) {
   std::lock_guard lock(mutex_);
   if (ending()) {

@@ -9,6 +9,7 @@
 #include "grpcpp/support/byte_buffer.h"
 #include "grpcpp/support/server_callback.h"
 #include "server/call.h"
+#include "server/memory_budget.h"
 #include "server/session.h"
 
 namespace wellspace::server {
@@ -25,7 +26,7 @@ class UploadPointsCall final : public Call<grpc::ServerReadReactor<grpc::ByteBuf
   void OnReadDone(bool ok) override;
 
  private:
-  void OnBegin() override { StartRead(&request_); }
+  void OnBegin() override;
   LogFields Figures() const override;
 
   // The following want mutex_ to be held.
@@ -35,6 +36,7 @@ class UploadPointsCall final : public Call<grpc::ServerReadReactor<grpc::ByteBuf
   // Guarded by mutex_.
   grpc::ByteBuffer request_;          // of the read in flight
   std::shared_ptr<Session> session_;  // null before the first message
+  MemoryReservation memory_;          // of the message that comes
   uint64_t coordinate_count_ = 0;     // received
 };
 

@@ -21,6 +21,7 @@ class FakeSessionMesher final : public core::Mesher {
 
   int dimension() const override { return parameters_.dimension; }
   uint64_t vertex_count() const override { return MakeFakeMesh(parameters_, points_).vertex_count(); }
+  uint64_t memory_bytes() const override { return points_.size() * sizeof(double); }
   absl::Status Refine(const core::MeshParameters&, core::RunContext& context) override {
     return Enter(core::Phase::kRefinement, context);
   }

@@ -29,7 +29,8 @@ class SessionStoreTest : public ::testing::Test {
   ServiceOptions options_{
       .max_points = 10, .max_points_per_tenant = 15, .max_sessions = 5, .max_sessions_per_tenant = 3};
   absl::Time now_ = absl::FromUnixSeconds(1'000'000);
-  MemorySessionStore store_{options_, [this] { return now_; }};
+  MemoryBudget memory_{0};
+  MemorySessionStore store_{options_, memory_, [this] { return now_; }};
   grpc::Status status_;
 };
 
