@@ -1,5 +1,6 @@
 #include "proto/checksum.h"
 
+#include <array>
 #include <bit>
 #include <boost/crc.hpp>
 #include <cstring>
@@ -16,14 +17,81 @@ static_assert(std::endian::native == std::endian::little);
 #if defined(__x86_64__)
 namespace {
 
-// Eight bytes an instruction; each waits for the one before, which makes some 7 GB/s.
+constexpr uint32_t kPolynomial = 0x82F63B78;  // of RFC 3720, the lowest bit first
+
+// A linear map of checksums, by what it makes of each bit.
+using Map = std::array<uint32_t, 32>;
+
+constexpr uint32_t Apply(const Map& map, uint32_t crc) {
+  uint32_t result = 0;
+  for (int bit = 0; bit < 32; ++bit) {
+    result ^= (crc >> bit & 1) != 0 ? map[bit] : 0;
+  }
+  return result;
+}
+
+// What 2^exponent zero bits make of a checksum.
+constexpr Map ZeroBits(int exponent) {
+  Map map = {kPolynomial};
+  for (int bit = 1; bit < 32; ++bit) {
+    map[bit] = uint32_t{1} << (bit - 1);
+  }
+  for (; exponent > 0; --exponent) {
+    Map squared = {};
+    for (int bit = 0; bit < 32; ++bit) {
+      squared[bit] = Apply(map, map[bit]);
+    }
+    map = squared;
+  }
+  return map;
+}
+
+// A map by what it makes of each byte.
+class ByteMap {
+ public:
+  explicit constexpr ByteMap(const Map& map) {
+    for (int byte = 0; byte < 4; ++byte) {
+      for (uint32_t value = 0; value < 256; ++value) {
+        table_[byte][value] = Apply(map, value << (8 * byte));
+      }
+    }
+  }
+
+  uint32_t operator()(uint32_t crc) const {
+    return table_[0][crc & 0xFF] ^ table_[1][crc >> 8 & 0xFF] ^ table_[2][crc >> 16 & 0xFF] ^ table_[3][crc >> 24];
+  }
+
+ private:
+  std::array<std::array<uint32_t, 256>, 4> table_ = {};
+};
+
+constexpr size_t kLaneBytes = 4096;
+constexpr ByteMap kSkipLane(ZeroBits(15));      // kLaneBytes zero bytes
+constexpr ByteMap kSkipTwoLanes(ZeroBits(16));  // twice as many
+
+uint64_t WordAt(const char* bytes) {
+  uint64_t word;
+  std::memcpy(&word, bytes, sizeof(word));
+  return word;
+}
+
+// The instruction takes eight bytes, and three cycles until the next can go on from it: three lanes at once keep it busy. A checksum is
+// linear: that of a block is the exclusive or of those of its lanes, each followed by zeros in the place of the lanes behind it.
 __attribute__((target("sse4.2"))) uint32_t Crc32cBySse42(const void* data, size_t size) {
   const char* bytes = static_cast<const char*>(data);
   uint64_t crc = 0xFFFFFFFF;
+  for (; size >= 3 * kLaneBytes; bytes += 3 * kLaneBytes, size -= 3 * kLaneBytes) {
+    uint64_t second = 0;
+    uint64_t third = 0;
+    for (size_t i = 0; i < kLaneBytes; i += sizeof(uint64_t)) {
+      crc = _mm_crc32_u64(crc, WordAt(bytes + i));
+      second = _mm_crc32_u64(second, WordAt(bytes + kLaneBytes + i));
+      third = _mm_crc32_u64(third, WordAt(bytes + 2 * kLaneBytes + i));
+    }
+    crc = kSkipTwoLanes(static_cast<uint32_t>(crc)) ^ kSkipLane(static_cast<uint32_t>(second)) ^ third;
+  }
   for (; size >= sizeof(uint64_t); bytes += sizeof(uint64_t), size -= sizeof(uint64_t)) {
-    uint64_t word;
-    std::memcpy(&word, bytes, sizeof(word));
-    crc = _mm_crc32_u64(crc, word);
+    crc = _mm_crc32_u64(crc, WordAt(bytes));
   }
   auto rest = static_cast<uint32_t>(crc);
   for (; size > 0; ++bytes, --size) {

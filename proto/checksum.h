@@ -12,7 +12,7 @@ namespace wellspace {
 // Threads:    thread-safe.
 uint32_t Crc32c(const void* data, size_t size);
 
-// The same on a processor that has no instruction for it; slower by more than ten times.
+// The same on a processor that has no instruction for it; a hundred times slower.
 uint32_t PortableCrc32c(const void* data, size_t size);
 
 }  // namespace wellspace
