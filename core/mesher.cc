@@ -227,8 +227,13 @@ class MesherIn final : public Mesher {
 
   absl::StatusOr<std::vector<Cell>> ClippedCells(std::span<const uint32_t> vertices, double beta) const override {
     WELLSPACE_RETURN_IF_ERROR(CheckVertices(vertices));
-    if (!(beta >= 1 && std::isfinite(beta))) {
+    if (!(beta >= 1)) {
       return absl::InvalidArgumentError(absl::StrCat("beta: ", beta, " is not allowed; a number of at least 1 is"));
+    }
+    // A cube of this half side about any point of the box holds the box.
+    double whole = 0;
+    for (int k = 0; k < D; ++k) {
+      whole = std::max(whole, 2 * (structure_.box().high[k] - structure_.box().low[k]));
     }
     std::vector<Cell> cells;
     cells.reserve(vertices.size());
@@ -236,8 +241,9 @@ class MesherIn final : public Mesher {
     for (const uint32_t vertex : vertices) {
       const VertexId v = VertexOf(vertex);
       const double nearest = std::sqrt(structure_.ApproximateNearestNeighbor(v, workspace).distance_sq);
-      structure_.ClippedVoronoi(v, beta * nearest, workspace);
-      cells.push_back(Describe(vertex, beta * nearest, workspace.cell));
+      const double radius = beta * nearest;
+      structure_.ClippedVoronoi(v, std::isinf(radius) ? whole : radius, workspace);
+      cells.push_back(Describe(vertex, radius, workspace.cell));
     }
     return cells;
   }

@@ -152,7 +152,8 @@ class Mesher {
   // Source:     [HT08] Figure 3, APPROXIMATENN.
   virtual absl::StatusOr<std::vector<double>> NearestNeighborDistances(std::span<const uint32_t> vertices) const = 0;
 
-  // The Voronoi cells of `vertices`, each clipped at beta times the distance to the vertex' nearest neighbour.
+  // The Voronoi cells of `vertices` in the box, each clipped at beta times the distance to the vertex' nearest neighbour;
+  // whole ones when beta is infinite.
   //
   // Complexity: O(1) each in a refined mesh or bottom-up.
   // Errors:     OUT_OF_RANGE as above; INVALID_ARGUMENT unless beta is a number of at least 1.

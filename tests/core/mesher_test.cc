@@ -40,6 +40,15 @@ std::vector<double> PointsOf(const Mesh& mesh, std::span<const uint32_t> vertice
 // As many uniform points as make a mesh in little time, at most n.
 size_t Few(int dimension, size_t n) { return std::min<size_t>(n, dimension <= 3 ? n : dimension == 4 ? 8 : 2); }
 
+// The nodes of `cell`, in whichever order the cell has them.
+std::multiset<std::vector<double>> NodesOf(const Cell& cell, int dimension) {
+  std::multiset<std::vector<double>> nodes;
+  for (auto node = cell.nodes.begin(); node != cell.nodes.end(); node += dimension) {
+    nodes.emplace(node, node + dimension);
+  }
+  return nodes;
+}
+
 class MesherTest : public ::testing::TestWithParam<int> {
  protected:
   std::unique_ptr<Mesher> Create(std::span<const double> cloud) {
@@ -315,10 +324,20 @@ TEST_P(MesherTest, CellsAreThoseOfTheMesh) {
     EXPECT_NEAR((*nearest)[i], shortest, 1e-12);
     EXPECT_DOUBLE_EQ(cell.clip_radius, 1e3 * (*nearest)[i]);
   }
+  const absl::StatusOr<std::vector<Cell>> whole = mesher->ClippedCells(all, std::numeric_limits<double>::infinity());
+  ASSERT_TRUE(whole.ok());
+  for (size_t i = 0; i < all.size(); ++i) {  // 1e3 was as good as infinite
+    EXPECT_EQ(NodesOf((*whole)[i], d_), NodesOf((*cells)[i], d_));
+    EXPECT_EQ((*whole)[i].neighbours, (*cells)[i].neighbours);
+    EXPECT_EQ((*whole)[i].clip_radius, std::numeric_limits<double>::infinity());
+    EXPECT_FALSE((*whole)[i].is_clipped);
+  }
   const absl::StatusOr<std::vector<Cell>> clipped = mesher->ClippedCells(all, 1);
   ASSERT_TRUE(clipped.ok());
   EXPECT_TRUE(std::any_of(clipped->begin(), clipped->end(), [](const Cell& cell) { return cell.is_clipped; }));
-  EXPECT_EQ(mesher->ClippedCells(all, 0.5).status().code(), absl::StatusCode::kInvalidArgument);
+  for (const double beta : {0.5, std::numeric_limits<double>::quiet_NaN()}) {
+    EXPECT_EQ(mesher->ClippedCells(all, beta).status().code(), absl::StatusCode::kInvalidArgument);
+  }
   all = {0, static_cast<uint32_t>(mesh.vertex_count())};
   EXPECT_EQ(mesher->ClippedCells(all, 2).status().code(), absl::StatusCode::kOutOfRange);
   EXPECT_THAT(std::string(mesher->NearestNeighborDistances(all).status().message()), HasSubstr("vertices[1]"));
