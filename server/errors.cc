@@ -65,9 +65,10 @@ bool PassesWithTime(v1::ErrorReason reason) {
          reason == v1::ERROR_REASON_QUOTA_EXCEEDED || reason == v1::ERROR_REASON_SERVER_STOPPING;
 }
 
-grpc::Status Make(v1::ErrorReason reason, const std::string& message, const std::string& field, bool may_retry) {
+grpc::Status Make(grpc::StatusCode code, v1::ErrorReason reason, const std::string& message, const std::string& field,
+                  bool may_retry) {
   google::rpc::Status details;
-  details.set_code(CodeOf(reason));
+  details.set_code(code);
   details.set_message(message);
   google::rpc::ErrorInfo info;
   info.set_reason(v1::ErrorReason_Name(reason));
@@ -85,13 +86,18 @@ grpc::Status Make(v1::ErrorReason reason, const std::string& message, const std:
     retry.mutable_retry_delay()->set_seconds(kRetrySeconds);
     details.add_details()->PackFrom(retry);
   }
-  return grpc::Status(CodeOf(reason), message, details.SerializeAsString());
+  return grpc::Status(code, message, details.SerializeAsString());
 }
 
 }  // namespace
 
 grpc::Status MakeError(v1::ErrorReason reason, const std::string& message, const std::string& field) {
-  return Make(reason, message, field, PassesWithTime(reason));
+  return MakeError(CodeOf(reason), reason, message, field);
+}
+
+grpc::Status MakeError(grpc::StatusCode code, v1::ErrorReason reason, const std::string& message,
+                       const std::string& field) {
+  return Make(code, reason, message, field, PassesWithTime(reason));
 }
 
 absl::Status MemoryLimitError(const std::string& message, bool may_retry) {
@@ -109,7 +115,8 @@ grpc::Status FromCoreStatus(const absl::Status& status) {
       return MakeError(v1::ERROR_REASON_INVALID_POINTS, message, "points.coordinates");
     case absl::StatusCode::kResourceExhausted:
       if (const absl::optional<absl::Cord> payload = status.GetPayload(kMemoryLimitPayload); payload.has_value()) {
-        return Make(v1::ERROR_REASON_MEMORY_LIMIT, message, "", *payload == kMayRetry);
+        return Make(CodeOf(v1::ERROR_REASON_MEMORY_LIMIT), v1::ERROR_REASON_MEMORY_LIMIT, message, "",
+                    *payload == kMayRetry);
       }
       return MakeError(v1::ERROR_REASON_MESH_TOO_LARGE, message);
     case absl::StatusCode::kCancelled:

@@ -21,6 +21,9 @@ inline constexpr char kErrorDomain[] = "wellspace.v1";
 // REQUIRES:   reason != ERROR_REASON_UNSPECIFIED.
 // Threads:    thread-safe.
 grpc::Status MakeError(v1::ErrorReason reason, const std::string& message, const std::string& field = "");
+// The same for a reason that comes with more than one code.
+grpc::Status MakeError(grpc::StatusCode code, v1::ErrorReason reason, const std::string& message,
+                       const std::string& field);
 
 // A RESOURCE_EXHAUSTED that FromCoreStatus makes a MEMORY_LIMIT, with RetryInfo if asking again may help.
 absl::Status MemoryLimitError(const std::string& message, bool may_retry);

@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/time/time.h"
 #include "server/convert.h"
+#include "server/download_mesh_call.h"
 #include "server/errors.h"
 #include "server/page_token.h"
 #include "server/refinement.h"
@@ -192,6 +193,11 @@ grpc::ServerUnaryReactor* SessionService::DeleteSession(grpc::CallbackServerCont
 grpc::ServerReadReactor<grpc::ByteBuffer>* SessionService::UploadPoints(grpc::CallbackServerContext* context,
                                                                         grpc::ByteBuffer* response) {
   return UploadPointsCall::Begin(std::make_shared<UploadPointsCall>(environment_, context, response));
+}
+
+grpc::ServerWriteReactor<grpc::ByteBuffer>* SessionService::DownloadMesh(grpc::CallbackServerContext* context,
+                                                                         const grpc::ByteBuffer* request) {
+  return DownloadMeshCall::Begin(std::make_shared<DownloadMeshCall>(environment_, context, *request));
 }
 
 }  // namespace wellspace::server

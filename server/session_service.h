@@ -7,11 +7,12 @@
 
 namespace wellspace::server {
 
-// Points are read as bytes: see ParseRequest.
+// Points are read, and meshes written, as bytes: see ParseRequest and SerializeChunk.
 //
 // Thread safety: thread-safe.
 class SessionService final
-    : public v1::SessionService::WithRawCallbackMethod_UploadPoints<v1::SessionService::CallbackService> {
+    : public v1::SessionService::WithRawCallbackMethod_UploadPoints<
+          v1::SessionService::WithRawCallbackMethod_DownloadMesh<v1::SessionService::CallbackService>> {
  public:
   // REQUIRES:   `environment` outlives this.
   explicit SessionService(const CallEnvironment& environment) : environment_(environment) {}
@@ -28,6 +29,8 @@ class SessionService final
                                           v1::DeleteSessionResponse* response) override;
   grpc::ServerReadReactor<grpc::ByteBuffer>* UploadPoints(grpc::CallbackServerContext* context,
                                                           grpc::ByteBuffer* response) override;
+  grpc::ServerWriteReactor<grpc::ByteBuffer>* DownloadMesh(grpc::CallbackServerContext* context,
+                                                           const grpc::ByteBuffer* request) override;
 
  private:
   const CallEnvironment& environment_;
