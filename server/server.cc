@@ -38,7 +38,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
   EnableHealthAndReflection();
   grpc::ServerBuilder builder;
   builder.SetMaxReceiveMessageSize(kMaxRequestBytes);
-  builder.SetMaxSendMessageSize(kMaxResponseBytes);
+  builder.SetMaxSendMessageSize(kMaxSentBytes);
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);  // two servers on one port would share its calls unseen
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
@@ -59,7 +59,8 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
 
   std::unique_ptr<Server> server(
       new Server(options, std::move(log), std::move(mesher), std::move(estimator), std::move(create_mesher)));
-  const std::array<grpc::Service*, 3> services = {&server->meshing_, &server->sessions_, &server->operations_};
+  const std::array<grpc::Service*, 4> services = {&server->meshing_, &server->sessions_, &server->operations_,
+                                                  &server->queries_};
   for (grpc::Service* service : services) {
     builder.RegisterService(service);
   }
@@ -87,7 +88,7 @@ Server::~Server() {
 
 std::vector<std::string> Server::ServiceNames() {
   return {v1::MeshingService::service_full_name(), v1::SessionService::service_full_name(),
-          v1::OperationService::service_full_name()};
+          v1::OperationService::service_full_name(), v1::QueryService::service_full_name()};
 }
 
 std::string Server::TenantOf(const grpc::ServerContextBase& context) const {

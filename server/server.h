@@ -18,6 +18,7 @@
 #include "server/observability.h"
 #include "server/operation_service.h"
 #include "server/options.h"
+#include "server/query_service.h"
 #include "server/session_service.h"
 #include "spdlog/logger.h"
 
@@ -85,6 +86,7 @@ class Server {
   MeshingService meshing_{backend_.environment()};
   SessionService sessions_{backend_.environment()};
   OperationService operations_{backend_.environment()};
+  QueryService queries_{backend_.environment()};
   std::string address_;
   std::unique_ptr<grpc::Server> server_;
   std::once_flag shut_down_;

@@ -1,0 +1,100 @@
+#include "server/add_vertices_call.h"
+
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "server/errors.h"
+#include "server/resource_names.h"
+
+namespace wellspace::server {
+namespace {
+
+// What one request asks for; outlives its call, for those that repeat it.
+struct Addition {
+  SessionUse use;
+  std::vector<double> points;
+  std::vector<uint32_t> near;
+  uint64_t expected_revision = 0;
+};
+
+// On a worker.
+RequestIds::Answer Add(const Addition& addition, core::RunContext& context) {
+  v1::AddVerticesResponse response;
+  grpc::Status status = RunGuarded([&] {
+    AddedVertices added;
+    grpc::Status ended =
+        addition.use.session().AddVertices(addition.points, addition.near, addition.expected_revision, context, &added);
+    if (ended.ok()) {
+      response.mutable_vertices()->Add(added.vertices.begin(), added.vertices.end());
+      response.set_revision(added.revision);
+    }
+    return ended;
+  });
+  return {std::move(status), response.SerializeAsString()};
+}
+
+}  // namespace
+
+grpc::ServerUnaryReactor* AddVerticesCall::Serve(const CallEnvironment& environment,
+                                                 grpc::CallbackServerContext* context,
+                                                 const v1::AddVerticesRequest* request,
+                                                 v1::AddVerticesResponse* response) {
+  const auto call = std::make_shared<AddVerticesCall>(environment, context, request, response);
+  Begin(call);
+  if (call->is_admitted_) {
+    environment.request_ids.Once(
+        call->caller().tenant, request->request_id(), *request,
+        [&call](RequestIds::Done done) { call->Submit(std::move(done)); },
+        [call](const RequestIds::Answer& answer) { call->EndWith(answer); });
+  }
+  return call.get();
+}
+
+void AddVerticesCall::Submit(RequestIds::Done done) {
+  std::shared_ptr<Session> session;
+  if (grpc::Status status = FindSession(environment(), caller(), request_->name(), &session); !status.ok()) {
+    done({std::move(status), ""});
+    return;
+  }
+  const std::shared_ptr<const Addition> addition(
+      new Addition{.use = SessionUse(std::move(session)),
+                   .points = {request_->points().begin(), request_->points().end()},
+                   .near = {request_->near().begin(), request_->near().end()},
+                   .expected_revision = request_->expected_revision()});
+  JobPool::Submission submission = environment().jobs.Submit(
+      {.tenant = caller().tenant, .work = [addition, done](Job& job) { done(Add(*addition, job.context())); }});
+  if (submission.job == nullptr) {
+    done({std::move(submission.refusal), ""});
+    return;
+  }
+  std::lock_guard lock(mutex_);
+  job_ = std::move(submission.job);
+  if (ending()) {
+    OnEnd();
+  }
+}
+
+void AddVerticesCall::OnEnd() {
+  // A call with a request_id may be repeated by one that waits for the same answer.
+  if (job_ != nullptr && request_->request_id().empty()) {
+    job_->context().Cancel();
+  }
+}
+
+void AddVerticesCall::EndWith(const RequestIds::Answer& answer) {
+  std::lock_guard lock(mutex_);
+  if (ending()) {
+    return;  // the response is gRPC's already
+  }
+  if (answer.status.ok()) {
+    response_->ParseFromString(answer.response);
+    added_ = response_->vertices_size();
+  }
+  EndFailed(answer.status);
+}
+
+std::string AddVerticesCall::Figures() const { return absl::StrCat(" points=", added_); }
+
+}  // namespace wellspace::server
