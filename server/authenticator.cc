@@ -69,6 +69,11 @@ grpc::Status Authenticator::Authenticate(const grpc::ServerContextBase& context,
   return grpc::Status::OK;
 }
 
+void Authenticator::SetDemands(Demands demands) {
+  std::lock_guard lock(mutex_);
+  demands_ = std::move(demands);
+}
+
 void Authenticator::SetTokens(std::shared_ptr<const TokenTable> tokens) {
   std::lock_guard lock(mutex_);
   demands_.tokens = std::move(tokens);

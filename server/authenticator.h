@@ -39,7 +39,8 @@ class Authenticator {
   // Guarantees: the message has nothing of what the caller showed.
   grpc::Status Authenticate(const grpc::ServerContextBase& context, Caller* caller) const;
 
-  // Calls that come from now on are measured by `tokens`. REQUIRES: there have been tokens from the start.
+  // These are for calls that come from now on.
+  void SetDemands(Demands demands);
   void SetTokens(std::shared_ptr<const TokenTable> tokens);
 
  private:

@@ -1,6 +1,9 @@
 // wellspaced: serves wellspace.v1 until SIGTERM or SIGINT.
 //
-// Exit codes: 0 stopped by a signal, 1 cannot serve, 2 wrong options.
+//     wellspaced hash-token TENANT < TOKEN >> TOKENS
+// makes a line for --token-file.
+//
+// Exit codes: 0 stopped by a signal, 1 cannot serve, 2 wrong options or no token.
 #include <pthread.h>
 #include <signal.h>
 
@@ -15,6 +18,7 @@
 #include "server/limit_flags.h"
 #include "server/log.h"
 #include "server/server.h"
+#include "server/tokens.h"
 #include "server/version.h"
 #include "spdlog/async.h"
 
@@ -26,20 +30,35 @@ constexpr int kLogQueue = 8192;  // lines
 constexpr absl::Duration kMaxGrace = absl::Hours(24);
 
 struct Flags {
-  ServerOptions server{
-      .listen = "127.0.0.1:7233", .insecure_remote = false, .service = {}, .demands = {}, .observability = {}};
+  ServerOptions server;
   absl::Duration grace = absl::Seconds(10);
   std::string log_level = "info";
   std::string log_format = "text";
+  std::string hash_for_tenant;  // makes a line of tokens and does not serve
 };
+
+void DeclareSecurity(CLI::App& app, SecurityOptions& security) {
+  app.add_option("--tls-cert", security.tls.certificate, "Certificates of this server in PEM, its own first")
+      ->type_name("FILE");
+  app.add_option("--tls-key", security.tls.key, "Private key of this server in PEM")->type_name("FILE");
+  app.add_option("--tls-client-ca", security.tls.client_ca,
+                 "Authorities, in PEM, whose client certificates are demanded; the common name is the tenant")
+      ->type_name("FILE");
+  app.add_flag("--tls-require-client-cert", security.tls.require_client_certificate,
+               "Break off connections without a client certificate in the handshake already");
+  app.add_option("--token-file", security.token_file,
+                 "Lines TENANT sha256:HEX, one for each token; `wellspaced hash-token` makes them")
+      ->type_name("FILE");
+  app.add_flag("--insecure-remote", security.insecure_remote,
+               "Allow to listen in plain text, or without authentication, where other machines can connect");
+}
 
 void Declare(CLI::App& app, Flags& flags) {
   app.set_version_flag("--version", std::string("wellspaced ") + kVersion);
   app.add_option("--listen", flags.server.listen, "Address to listen on; port 0 takes a free one")
       ->type_name("HOST:PORT")
       ->capture_default_str();
-  app.add_flag("--insecure-remote", flags.server.insecure_remote,
-               "Allow to listen, in plain text and without authentication, where other machines can connect");
+  DeclareSecurity(app, flags.server.security);
   DeclareLimits(app, flags.server.service);
   AddSeconds(app, "--grace", flags.grace, absl::ZeroDuration(), kMaxGrace,
              "Time that running work gets to end after SIGTERM or SIGINT");
@@ -56,6 +75,21 @@ void Declare(CLI::App& app, Flags& flags) {
                  "Address, on the loopback, of a gRPC listener with channelz; default: none")
       ->type_name("HOST:PORT");
   DeclareConfigFile(app);
+  app.add_subcommand("hash-token", "Print the line of --token-file for the token that is read from standard input")
+      ->add_option("tenant", flags.hash_for_tenant, "Tenant whose calls show the token")
+      ->required();
+}
+
+int HashToken(const std::string& tenant) {
+  std::string token;
+  std::getline(std::cin, token);
+  const absl::StatusOr<std::string> line = MakeTokenLine(tenant, token);
+  if (!line.ok()) {
+    std::cerr << "wellspaced: " << line.status().message() << std::endl;
+    return kExitWrongOptions;
+  }
+  std::cout << *line << std::endl;
+  return 0;
 }
 
 // SIGTERM and SIGINT, blocked in this thread and all that it starts later, to be waited for.
@@ -83,6 +117,7 @@ class StopSignals {
 
 int Main(int argc, char** argv) {
   Flags flags;
+  flags.server.listen = "127.0.0.1:7233";
   flags.server.service.workers = std::max(1u, std::thread::hardware_concurrency());
   flags.server.service.max_threads = flags.server.service.workers;
   CLI::App app("Makes well-spaced simplicial meshes from clouds of points, as a gRPC service.", "wellspaced");
@@ -91,6 +126,9 @@ int Main(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kExitWrongOptions;
+  }
+  if (!flags.hash_for_tenant.empty()) {
+    return HashToken(flags.hash_for_tenant);
   }
 
   StopSignals signals;

@@ -7,7 +7,6 @@
 #include "core/base/status_macros.h"
 #include "grpcpp/ext/proto_server_reflection_plugin.h"
 #include "grpcpp/health_check_service_interface.h"
-#include "grpcpp/security/server_credentials.h"
 #include "grpcpp/server_builder.h"
 #include "server/listen_address.h"
 
@@ -36,6 +35,7 @@ void EnableHealthAndReflection() {
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& options, std::shared_ptr<spdlog::logger> log,
                                                       Mesher mesher, Estimator estimator, MesherFactory create_mesher) {
   EnableHealthAndReflection();
+  WELLSPACE_ASSIGN_OR_RETURN(std::unique_ptr<Security> security, Security::Load(options.security, log));
   grpc::ServerBuilder builder;
   builder.SetMaxReceiveMessageSize(kMaxRequestBytes);
   builder.SetMaxSendMessageSize(kMaxSentBytes);
@@ -48,17 +48,11 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
   int port = 0;
   if (!options.listen.empty()) {
     WELLSPACE_ASSIGN_OR_RETURN(address, ParseListenAddress(options.listen));
-    if (!address.IsLoopback() && !options.insecure_remote) {
-      return absl::FailedPreconditionError(
-          absl::StrCat("refuses to listen on ", address.ToString(),
-                       ": other machines could reach it, in plain text and without authentication; listen on 127.0.0.1 "
-                       "or [::1], or allow it with --insecure-remote"));
-    }
-    builder.AddListeningPort(address.ToString(), grpc::InsecureServerCredentials(), &port);
+    WELLSPACE_RETURN_IF_ERROR(security->AddListener(address, builder, &port));
   }
 
-  std::unique_ptr<Server> server(
-      new Server(options, std::move(log), std::move(mesher), std::move(estimator), std::move(create_mesher)));
+  std::unique_ptr<Server> server(new Server(options.service, std::move(security), std::move(log), std::move(mesher),
+                                            std::move(estimator), std::move(create_mesher)));
   const std::array<grpc::Service*, 4> services = {&server->meshing_, &server->sessions_, &server->operations_,
                                                   &server->queries_};
   for (grpc::Service* service : services) {
@@ -93,7 +87,7 @@ std::vector<std::string> Server::ServiceNames() {
 
 std::string Server::TenantOf(const grpc::ServerContextBase& context) const {
   Caller caller;
-  return authenticator_.Authenticate(context, &caller).ok() ? caller.tenant : "";
+  return security_->authenticator().Authenticate(context, &caller).ok() ? caller.tenant : "";
 }
 
 std::shared_ptr<grpc::Channel> Server::InProcessChannel() {

@@ -12,23 +12,22 @@
 #include "absl/time/time.h"
 #include "grpcpp/channel.h"
 #include "grpcpp/server.h"
-#include "server/authenticator.h"
 #include "server/backend.h"
 #include "server/meshing_service.h"
 #include "server/observability.h"
 #include "server/operation_service.h"
 #include "server/options.h"
 #include "server/query_service.h"
+#include "server/security.h"
 #include "server/session_service.h"
 #include "spdlog/logger.h"
 
 namespace wellspace::server {
 
 struct ServerOptions {
-  std::string listen;            // HOST:PORT, port 0 takes a free one; empty: no listener
-  bool insecure_remote = false;  // allows plain text on addresses that other machines can reach
+  std::string listen;  // HOST:PORT, port 0 takes a free one; empty: no listener
   ServiceOptions service;
-  Authenticator::Demands demands;  // on callers
+  SecurityOptions security;
   ObservabilityOptions observability;
 };
 
@@ -39,8 +38,8 @@ class Server {
  public:
   // Starts to serve. Tests put other work in the place of the core's.
   //
-  // Errors:     INVALID_ARGUMENT (listen), FAILED_PRECONDITION (a remote listener without insecure_remote), UNAVAILABLE
-  //             (the address cannot be listened on); those of Observability::Listen.
+  // Errors:     INVALID_ARGUMENT (listen), those of Security::Load and AddListener, UNAVAILABLE (the address cannot be
+  //             listened on); those of Observability::Listen.
   static absl::StatusOr<std::unique_ptr<Server>> Start(const ServerOptions& options,
                                                        std::shared_ptr<spdlog::logger> log,
                                                        Mesher mesher = core::MeshPoints,
@@ -66,12 +65,12 @@ class Server {
   void Shutdown(absl::Duration grace);
 
  private:
-  Server(const ServerOptions& options, std::shared_ptr<spdlog::logger> log, Mesher mesher, Estimator estimator,
-         MesherFactory create_mesher)
-      : authenticator_(options.demands),
+  Server(const ServiceOptions& options, std::unique_ptr<Security> security, std::shared_ptr<spdlog::logger> log,
+         Mesher mesher, Estimator estimator, MesherFactory create_mesher)
+      : security_(std::move(security)),
         observability_(ServiceNames(), log,
                        [this](const grpc::ServerContextBase& context) { return TenantOf(context); }),
-        backend_(options.service, authenticator_, observability_, std::move(log), std::move(mesher),
+        backend_(options, security_->authenticator(), observability_, std::move(log), std::move(mesher),
                  std::move(estimator), std::move(create_mesher)) {}
 
   // Of the services that are ours.
@@ -80,7 +79,7 @@ class Server {
   // "" for a caller whom the authenticator refuses.
   std::string TenantOf(const grpc::ServerContextBase& context) const;
 
-  Authenticator authenticator_;
+  const std::unique_ptr<const Security> security_;
   Observability observability_;
   Backend backend_;
   MeshingService meshing_{backend_.environment()};

@@ -40,7 +40,8 @@ TEST(Crc32c, IsTheSameOnEveryProcessor) {
       EXPECT_EQ(Crc32c(bytes.data() + begin, size), PortableCrc32c(bytes.data() + begin, size));
     }
   }
-  for (const size_t size : {12'287, 12'288, 12'289, 24'577, 36'871, 100'000}) {  // about the blocks that are taken at once
+  for (const size_t size :
+       {12'287, 12'288, 12'289, 24'577, 36'871, 100'000}) {  // about the blocks that are taken at once
     EXPECT_EQ(Crc32c(bytes.data(), size), PortableCrc32c(bytes.data(), size));
   }
 }

@@ -211,7 +211,7 @@ TEST(Server, InfoTellsLimitsAndLoad) {
 absl::Status StartOn(const std::string& listen, bool insecure_remote = false) {
   ServerOptions options;
   options.listen = listen;
-  options.insecure_remote = insecure_remote;
+  options.security.insecure_remote = insecure_remote;
   return Server::Start(options, NoLog()).status();
 }
 

@@ -1,0 +1,71 @@
+// What a server demands of those who connect, and how it comes by it.
+#ifndef WELLSPACE_SERVER_SECURITY_H_
+#define WELLSPACE_SERVER_SECURITY_H_
+
+#include <memory>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "absl/time/time.h"
+#include "grpcpp/server_builder.h"
+#include "server/authenticator.h"
+#include "server/file_watch.h"
+#include "server/listen_address.h"
+#include "server/tls.h"
+#include "spdlog/logger.h"
+
+namespace wellspace::server {
+
+struct SecurityOptions {
+  TlsOptions tls;
+  std::string token_file;        // of TokenTable; empty: callers need no token
+  bool insecure_remote = false;  // allows remote listeners without TLS, or without any demand on callers
+  absl::Duration reload_interval = absl::Seconds(1);  // how often files are looked at
+
+  // Clients with certificates are asked to connect anew after so long, so that those that have expired or lost their authority get no
+  // further. Calls under way are not disturbed.
+  absl::Duration max_connection_age = absl::Hours(1);
+};
+
+// Certificates and tokens, read again when their files change.
+//
+// A file that has become unreadable or wrong is reported in the log: of tokens, those that were known stay known; of TLS, new
+// connections fail until the files are right again.
+//
+// Thread safety: thread-safe.
+class Security {
+ public:
+  // Reads the files.
+  //
+  // Errors:     as of CheckTlsFiles; INVALID_ARGUMENT: the token file has a wrong line; NOT_FOUND and so on: it cannot be read.
+  static absl::StatusOr<std::unique_ptr<Security>> Load(const SecurityOptions& options,
+                                                        std::shared_ptr<spdlog::logger> log);
+
+  const Authenticator& authenticator() const { return authenticator_; }
+
+  // Has `builder` listen on `address`; `port` is set to the port in use, 0 when that fails.
+  //
+  // Errors:     FAILED_PRECONDITION: other machines could reach it, in plain text or without having to say who they are, and
+  //             nothing says that this is wanted.
+  absl::Status AddListener(const ListenAddress& address, grpc::ServerBuilder& builder, int* port) const;
+
+ private:
+  Security(const SecurityOptions& options, std::shared_ptr<spdlog::logger> log);
+
+  void Watch();
+  absl::StatusOr<TokenTable> ReadTokens() const;
+  absl::Status CheckListener(const ListenAddress& address) const;
+  void OnTokensChange();
+  void OnTlsChange() const;
+
+  const SecurityOptions options_;
+  const std::shared_ptr<spdlog::logger> log_;
+  Authenticator authenticator_;
+  FileWatch tls_watch_;
+  FileWatch token_watch_;
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_SECURITY_H_
