@@ -1,11 +1,7 @@
 #include "client/client.h"
 
-#include <charconv>
-
-#include "absl/strings/str_cat.h"
+#include "client/channel.h"
 #include "client/connection.h"
-#include "grpcpp/create_channel.h"
-#include "grpcpp/security/credentials.h"
 
 namespace wellspace::client {
 namespace {
@@ -20,17 +16,6 @@ constexpr int kKeepaliveTimeoutMs = 10'000;
 // How soon after a lost connection a new one is tried, and how much later each time.
 constexpr int kInitialReconnectMs = 200;
 constexpr int kMaxReconnectMs = 5'000;
-
-bool IsHostAndPort(const std::string& address) {
-  const size_t colon = address.rfind(':');
-  if (colon == std::string::npos || colon == 0) {
-    return false;
-  }
-  uint16_t port = 0;
-  const char* last = address.data() + address.size();
-  const auto [end, code] = std::from_chars(address.data() + colon + 1, last, port);
-  return code == std::errc() && end == last && port != 0;
-}
 
 }  // namespace
 
@@ -136,18 +121,18 @@ absl::StatusOr<AddedVertices> Client::AddVertices(const std::string& session, st
   return connection_->AddVertices(session, points, near, call);
 }
 
-absl::StatusOr<Client> Connect(const std::string& address) {
-  if (!IsHostAndPort(address)) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("'", address, "' is no address of a server; expected HOST:PORT with a port from 1 to 65535"));
-  }
+absl::StatusOr<Client> Connect(const std::string& address, const ConnectOptions& options) {
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxResponseBytes);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kInitialReconnectMs);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kMaxReconnectMs);
-  return Client(MakeConnection(grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments)));
+  absl::StatusOr<std::shared_ptr<grpc::Channel>> channel = OpenChannel(address, options, arguments);
+  if (!channel.ok()) {
+    return channel.status();
+  }
+  return Client(MakeConnection(*std::move(channel)));
 }
 
 }  // namespace wellspace::client

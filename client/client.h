@@ -17,6 +17,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
+#include "client/connect_options.h"
 #include "client/error_details.h"
 #include "client/mesh.h"
 #include "client/point_source.h"
@@ -138,8 +139,11 @@ class Client {
   std::shared_ptr<Connection> connection_;
 };
 
-// Connects to HOST:PORT in plain text. Lazy: errors show in the first call.
-absl::StatusOr<Client> Connect(const std::string& address);
+// Connects to HOST:PORT. Lazy: errors of the connection show in the first call.
+//
+// Errors:     INVALID_ARGUMENT: the address; options that contradict each other; a file that has not what it should have.
+//             FAILED_PRECONDITION: the token would leave this machine in plain text. NOT_FOUND: a file cannot be read.
+absl::StatusOr<Client> Connect(const std::string& address, const ConnectOptions& options = {});
 
 }  // namespace wellspace::client
 

@@ -12,6 +12,7 @@ const char kExitCodesHelp[] =
     "  3    the server cannot be reached, or stopped\n"
     "  4    a limit of vertices, memory or disk was reached\n"
     "  5    --timeout passed\n"
+    "  6    the server wants other credentials, or its certificate is not trusted\n"
     "  130  interrupted by Ctrl-C (143 by SIGTERM); the work is cancelled, no file is left half written\n";
 
 int ExitCodeOf(const absl::Status& status) {
@@ -29,6 +30,8 @@ int ExitCodeOf(const absl::Status& status) {
       return kExitExhausted;
     case absl::StatusCode::kDeadlineExceeded:
       return kExitTimeout;
+    case absl::StatusCode::kUnauthenticated:
+      return kExitUnauthenticated;
     default:
       return kExitFailed;
   }

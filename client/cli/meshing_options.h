@@ -10,6 +10,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "client/cli/interrupt.h"
+#include "client/cli/server_link.h"
 #include "client/client.h"
 #include "client/formats/cloud.h"
 
@@ -62,7 +63,7 @@ class MeshingOptions {
   std::string input_;
   std::string input_format_;
   std::string statistics_;
-  std::string server_;
+  ServerChoice server_;
   int dimension_ = 0;
   std::vector<double> domain_;
   std::vector<std::vector<double>> size_boxes_;

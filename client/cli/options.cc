@@ -1,5 +1,7 @@
 #include "client/cli/options.h"
 
+#include <cstdlib>
+
 #include "absl/status/status.h"
 #include "client/formats/number.h"
 
@@ -52,11 +54,29 @@ CLI::Option* AddNumberLists(CLI::App& command, const std::string& name, std::vec
       ->type_name("NUMBER,...");
 }
 
-CLI::Option* AddServer(CLI::App& command, std::string& address) {
-  return command
-      .add_option("--server", address, "Server to use, HOST:PORT; without one, the same code runs in this process")
-      ->envname("WELLSPACE_SERVER")
-      ->type_name("ADDRESS");
+void AddServer(CLI::App& command, ServerChoice& choice) {
+  client::ConnectOptions& connect = choice.connect;
+  const auto add = [&command](const std::string& name, std::string& value, const std::string& variable,
+                              const std::string& type, const std::string& description) {
+    return command.add_option(name, value, description)->envname(variable)->type_name(type)->group("Server");
+  };
+  add("--server", choice.address, "WELLSPACE_SERVER", "ADDRESS",
+      "Server to use, HOST:PORT; without one, the same code runs in this process");
+  command.add_flag("--tls", connect.tls, "Use TLS, and trust the authorities that this machine trusts")
+      ->envname("WELLSPACE_TLS")
+      ->group("Server");
+  add("--tls-ca", connect.tls_ca, "WELLSPACE_TLS_CA", "FILE", "Use TLS, and trust these authorities, in PEM");
+  add("--tls-cert", connect.tls_certificate, "WELLSPACE_TLS_CERT", "FILE", "Client certificate to show, in PEM");
+  add("--tls-key", connect.tls_key, "WELLSPACE_TLS_KEY", "FILE", "Private key of the client certificate, in PEM");
+  add("--token-file", connect.token_file, "WELLSPACE_TOKEN_FILE", "FILE",
+      "File with the token to show; the environment's WELLSPACE_TOKEN can have the token itself");
+  command
+      .add_flag("--insecure-remote", connect.insecure_remote,
+                "Allow to send the token to another machine in plain text")
+      ->group("Server");
+  if (const char* token = std::getenv("WELLSPACE_TOKEN"); token != nullptr) {
+    connect.token = token;
+  }
 }
 
 }  // namespace wellspace::cli

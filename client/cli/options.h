@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "client/cli/server_link.h"
+
 namespace wellspace::cli {
 
 // A finite number, correctly rounded (CLI11 rounds twice).
@@ -19,8 +21,10 @@ CLI::Option* AddNumbers(CLI::App& command, const std::string& name, std::vector<
 CLI::Option* AddNumberLists(CLI::App& command, const std::string& name, std::vector<std::vector<double>>& lists,
                             const std::string& description);
 
-// --server, or the environment's WELLSPACE_SERVER.
-CLI::Option* AddServer(CLI::App& command, std::string& address);
+// --server, and how to talk to it: --tls, --tls-ca, --tls-cert, --tls-key, --token-file, --insecure-remote; the environment's
+// WELLSPACE_SERVER, WELLSPACE_TLS_CA, …, and WELLSPACE_TOKEN for the token itself, which --token-file
+// overrules.
+void AddServer(CLI::App& command, ServerChoice& choice);
 
 }  // namespace wellspace::cli
 

@@ -7,14 +7,18 @@
 
 namespace wellspace::cli {
 
-absl::StatusOr<std::unique_ptr<ServerLink>> ServerLink::Open(const std::string& address) {
-  std::unique_ptr<ServerLink> link(new ServerLink(address));
-  if (address.empty()) {
+absl::StatusOr<std::unique_ptr<ServerLink>> ServerLink::Open(const ServerChoice& choice) {
+  std::unique_ptr<ServerLink> link(new ServerLink(choice.address));
+  if (choice.address.empty()) {
     link->server_ = std::make_unique<server::EmbeddedServer>(/*workers=*/1);
     link->client_.emplace(client::MakeConnection(link->server_->Channel()));
     return link;
   }
-  absl::StatusOr<client::Client> client = client::Connect(address);
+  client::ConnectOptions connect = choice.connect;
+  if (!connect.token_file.empty()) {
+    connect.token.clear();  // of the environment
+  }
+  absl::StatusOr<client::Client> client = client::Connect(choice.address, connect);
   if (!client.ok()) {
     return client.status();
   }

@@ -14,11 +14,16 @@
 
 namespace wellspace::cli {
 
+struct ServerChoice {
+  std::string address;  // HOST:PORT; empty: the embedded server
+  client::ConnectOptions connect;
+};
+
 // Thread safety: thread-compatible; the client is thread-safe.
 class ServerLink {
  public:
-  // `address` empty starts the embedded server. REQUIRES: an Interrupt that is to be heard was made before.
-  static absl::StatusOr<std::unique_ptr<ServerLink>> Open(const std::string& address);
+  // REQUIRES:   an Interrupt that is to be heard was made before.
+  static absl::StatusOr<std::unique_ptr<ServerLink>> Open(const ServerChoice& choice);
 
   client::Client& client() { return *client_; }
 

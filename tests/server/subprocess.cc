@@ -13,7 +13,7 @@ extern char** environ;
 
 namespace wellspace::server {
 
-Subprocess::Subprocess(const std::string& name, std::vector<std::string> arguments) {
+Subprocess::Subprocess(const std::string& name, std::vector<std::string> arguments, const std::string& error_path) {
   const char* folder = std::getenv("WELLSPACE_BIN_DIR");
   if (folder == nullptr) {
     throw std::runtime_error("WELLSPACE_BIN_DIR is not set: run this test with ctest");
@@ -32,6 +32,9 @@ Subprocess::Subprocess(const std::string& name, std::vector<std::string> argumen
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
+  if (!error_path.empty()) {
+    posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, error_path.c_str(), O_WRONLY | O_CREAT, 0600);
+  }
   const int error = posix_spawn(&pid_, program.c_str(), &actions, nullptr, argv.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
   close(ends[1]);

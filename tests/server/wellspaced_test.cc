@@ -1,15 +1,14 @@
 // The real program, with clients in other processes.
 #include <signal.h>
 
-#include <algorithm>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "absl/time/clock.h"
 #include "client/client.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include "tests/server/daemon.h"
 #include "tests/server/patience.h"
 #include "tests/server/subprocess.h"
 
@@ -17,30 +16,6 @@ namespace wellspace::server {
 namespace {
 
 using ::testing::HasSubstr;
-
-// A wellspaced on a free port.
-class Daemon {
- public:
-  explicit Daemon(std::vector<std::string> arguments = {}) : process_("wellspaced", Listening(std::move(arguments))) {
-    const std::string line = process_.ReadLine();
-    const std::string prefix = "listening on ";
-    EXPECT_EQ(line.substr(0, prefix.size()), prefix);
-    address_ = line.substr(std::min(line.size(), prefix.size()));
-  }
-
-  Subprocess& process() { return process_; }
-  const std::string& address() const { return address_; }
-  client::Client Client() { return client::Connect(address_).value(); }
-
- private:
-  static std::vector<std::string> Listening(std::vector<std::string> arguments) {
-    arguments.insert(arguments.end(), {"--listen", "127.0.0.1:0"});
-    return arguments;
-  }
-
-  Subprocess process_;
-  std::string address_;
-};
 
 TEST(Wellspaced, MeshesAndStops) {
   for (const int signal : {SIGTERM, SIGINT}) {

@@ -14,8 +14,8 @@
 namespace wellspace::cli {
 namespace {
 
-int PrintServerInfo(const std::string& address) {
-  absl::StatusOr<std::unique_ptr<ServerLink>> link = ServerLink::Open(address);
+int PrintServerInfo(const ServerChoice& choice) {
+  absl::StatusOr<std::unique_ptr<ServerLink>> link = ServerLink::Open(choice);
   if (!link.ok()) {
     return ReportError(link.status());
   }
@@ -26,7 +26,7 @@ int PrintServerInfo(const std::string& address) {
   const auto print = [](const char* name, const std::string& value) {
     std::cout << absl::StrFormat("%-14s %s\n", name, value);
   };
-  print("server", address.empty() ? "embedded" : address);
+  print("server", choice.address.empty() ? "embedded" : choice.address);
   print("version", info->version);
   print("dimensions", absl::StrJoin(info->dimensions, ", "));
   print("max points", WithThousands(info->max_points));
@@ -44,9 +44,9 @@ void AddServerCommand(CLI::App& app, int& exit_code) {
   server->require_subcommand(1);
   CLI::App* info = server->add_subcommand("info", "Print version, limits and load");
   info->footer(kExitCodesHelp);
-  const auto address = std::make_shared<std::string>();
-  AddServer(*info, *address);
-  info->callback([address, &exit_code] { exit_code = PrintServerInfo(*address); });
+  const auto choice = std::make_shared<ServerChoice>();
+  AddServer(*info, *choice);
+  info->callback([choice, &exit_code] { exit_code = PrintServerInfo(*choice); });
 }
 
 }  // namespace wellspace::cli

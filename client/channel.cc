@@ -1,0 +1,207 @@
+#include "client/channel.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cstdint>
+#include <fstream>
+#include <optional>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_cat.h"
+#include "grpcpp/create_channel.h"
+#include "grpcpp/security/credentials.h"
+#include "grpcpp/support/client_interceptor.h"
+
+namespace wellspace::client {
+namespace {
+
+// The host of HOST:PORT without brackets; none when `address` is not of that form.
+std::optional<std::string> HostOf(const std::string& address) {
+  const size_t colon = address.rfind(':');
+  if (colon == std::string::npos || colon == 0) {
+    return std::nullopt;
+  }
+  uint16_t port = 0;
+  const char* last = address.data() + address.size();
+  const auto [end, code] = std::from_chars(address.data() + colon + 1, last, port);
+  if (code != std::errc() || end != last || port == 0) {
+    return std::nullopt;
+  }
+  std::string host = address.substr(0, colon);
+  return host.front() == '[' && host.back() == ']' ? host.substr(1, host.size() - 2) : host;
+}
+
+bool IsLoopback(const std::string& host) {
+  const bool ipv4 = host.find_first_not_of("0123456789.") == std::string::npos;
+  return host == "localhost" || host == "::1" || (ipv4 && host.rfind("127.", 0) == 0);
+}
+
+absl::StatusOr<std::string> ReadFile(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream content;
+  if (!(content << file.rdbuf())) {
+    return absl::NotFoundError(absl::StrCat("cannot read ", path, ", or it is empty"));
+  }
+  return content.str();
+}
+
+absl::Status ReadPem(const std::string& path, std::string* content) {
+  if (path.empty()) {
+    return absl::OkStatus();
+  }
+  absl::StatusOr<std::string> read = ReadFile(path);
+  if (!read.ok()) {
+    return read.status();
+  }
+  if (read->find("-----BEGIN ") == std::string::npos) {
+    return absl::InvalidArgumentError(absl::StrCat(path, ": expected PEM, which begins with -----BEGIN"));
+  }
+  *content = *std::move(read);
+  return absl::OkStatus();
+}
+
+bool UsesTls(const ConnectOptions& options) {
+  return options.tls || !options.tls_ca.empty() || !options.tls_certificate.empty() || !options.tls_key.empty();
+}
+
+absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> MakeCredentials(const ConnectOptions& options) {
+  if (!UsesTls(options)) {
+    return grpc::InsecureChannelCredentials();
+  }
+  if (options.tls_certificate.empty() != options.tls_key.empty()) {
+    return absl::InvalidArgumentError("a client certificate wants its key, and a key its certificate");
+  }
+  grpc::SslCredentialsOptions ssl;
+  for (const auto& [path, content] : {std::pair(&options.tls_ca, &ssl.pem_root_certs),
+                                      {&options.tls_certificate, &ssl.pem_cert_chain},
+                                      {&options.tls_key, &ssl.pem_private_key}}) {
+    if (absl::Status status = ReadPem(*path, content); !status.ok()) {
+      return status;
+    }
+  }
+  return grpc::SslCredentials(ssl);
+}
+
+// The token that a call shows.
+//
+// Thread safety: immutable; the file is read by the thread that calls.
+class TokenSource {
+ public:
+  // Errors:     INVALID_ARGUMENT: two tokens, or none that metadata could carry. NOT_FOUND: the file cannot be read.
+  static absl::StatusOr<TokenSource> Make(const ConnectOptions& options) {
+    if (!options.token.empty() && !options.token_file.empty()) {
+      return absl::InvalidArgumentError("both a token and a file with a token; expected one of them");
+    }
+    TokenSource source(options);
+    if (source.exists()) {
+      if (absl::StatusOr<std::string> token = source.Read(); !token.ok()) {
+        return token.status();
+      }
+    }
+    return source;
+  }
+
+  bool exists() const { return !token_.empty() || !file_.empty(); }
+
+  absl::StatusOr<std::string> Read() const {
+    std::string token = token_;
+    if (!file_.empty()) {
+      absl::StatusOr<std::string> content = ReadFile(file_);
+      if (!content.ok()) {
+        return content.status();
+      }
+      token = *std::move(content);
+    }
+    absl::StripAsciiWhitespace(&token);
+    if (token.empty() ||
+        !std::all_of(token.begin(), token.end(), [](unsigned char c) { return absl::ascii_isgraph(c); })) {
+      return absl::InvalidArgumentError(
+          absl::StrCat(file_.empty() ? "the token" : file_, ": expected one token of visible characters of ASCII"));
+    }
+    return token;
+  }
+
+ private:
+  explicit TokenSource(const ConnectOptions& options) : token_(options.token), file_(options.token_file) {}
+
+  std::string token_;
+  std::string file_;
+};
+
+// Adds the token to what a call sends; tells servers that cannot be trusted from those that cannot be reached.
+class CredentialsInterceptor final : public grpc::experimental::Interceptor {
+ public:
+  explicit CredentialsInterceptor(const TokenSource& source) : source_(source) {}
+
+  void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
+    using grpc::experimental::InterceptionHookPoints;
+    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_INITIAL_METADATA) && source_.exists()) {
+      // Without a token that can be read, the server says what it thinks of that.
+      if (const absl::StatusOr<std::string> token = source_.Read(); token.ok()) {
+        methods->GetSendInitialMetadata()->emplace("authorization", absl::StrCat("Bearer ", *token));
+      }
+    }
+    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::POST_RECV_STATUS)) {
+      Explain(*methods->GetRecvStatus());
+    }
+    methods->Proceed();
+  }
+
+ private:
+  // gRPC knows only that it could not connect.
+  static void Explain(grpc::Status& status) {
+    if (status.error_code() == grpc::StatusCode::UNAVAILABLE &&
+        status.error_message().find("handshake failed") != std::string::npos) {
+      status = grpc::Status(
+          grpc::StatusCode::UNAUTHENTICATED,
+          absl::StrCat("the server's certificate is not trusted, or it speaks no TLS: ", status.error_message()));
+    }
+  }
+
+  const TokenSource& source_;
+};
+
+class CredentialsInterceptorFactory final : public grpc::experimental::ClientInterceptorFactoryInterface {
+ public:
+  explicit CredentialsInterceptorFactory(TokenSource source) : source_(std::move(source)) {}
+
+  grpc::experimental::Interceptor* CreateClientInterceptor(grpc::experimental::ClientRpcInfo* /*info*/) override {
+    return new CredentialsInterceptor(source_);
+  }
+
+ private:
+  const TokenSource source_;
+};
+
+}  // namespace
+
+absl::StatusOr<std::shared_ptr<grpc::Channel>> OpenChannel(const std::string& address, const ConnectOptions& options,
+                                                           const grpc::ChannelArguments& arguments) {
+  const std::optional<std::string> host = HostOf(address);
+  if (!host.has_value()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("'", address, "' is no address of a server; expected HOST:PORT with a port from 1 to 65535"));
+  }
+  absl::StatusOr<TokenSource> token = TokenSource::Make(options);
+  if (!token.ok()) {
+    return token.status();
+  }
+  const absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> credentials = MakeCredentials(options);
+  if (!credentials.ok()) {
+    return credentials.status();
+  }
+  if (token->exists() && !UsesTls(options) && !options.insecure_remote && !IsLoopback(*host)) {
+    return absl::FailedPreconditionError(absl::StrCat("would send the token to ", address,
+                                                      " in plain text; use TLS, or allow it with --insecure-remote"));
+  }
+  std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> interceptors;
+  interceptors.push_back(std::make_unique<CredentialsInterceptorFactory>(*std::move(token)));
+  return grpc::experimental::CreateCustomChannelWithInterceptors(address, *credentials, arguments,
+                                                                 std::move(interceptors));
+}
+
+}  // namespace wellspace::client

@@ -1,0 +1,46 @@
+// The real server, in a process of its own.
+#ifndef WELLSPACE_TESTS_SERVER_DAEMON_H_
+#define WELLSPACE_TESTS_SERVER_DAEMON_H_
+
+#include <algorithm>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client/client.h"
+#include "gtest/gtest.h"
+#include "tests/server/subprocess.h"
+
+namespace wellspace::server {
+
+// A wellspaced on a free port.
+class Daemon {
+ public:
+  // Its standard error is the test's, or goes to the file `error_path`.
+  explicit Daemon(std::vector<std::string> arguments = {}, const std::string& error_path = "")
+      : process_("wellspaced", Listening(std::move(arguments)), error_path) {
+    const std::string line = process_.ReadLine();
+    const std::string prefix = "listening on ";
+    EXPECT_EQ(line.substr(0, prefix.size()), prefix);
+    address_ = line.substr(std::min(line.size(), prefix.size()));
+  }
+
+  Subprocess& process() { return process_; }
+  const std::string& address() const { return address_; }
+  client::Client Client(const client::ConnectOptions& options = {}) {
+    return client::Connect(address_, options).value();
+  }
+
+ private:
+  static std::vector<std::string> Listening(std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), {"--listen", "127.0.0.1:0"});
+    return arguments;
+  }
+
+  Subprocess process_;
+  std::string address_;
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_TESTS_SERVER_DAEMON_H_
