@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "absl/time/clock.h"
+#include "server/log_fields.h"
 
 namespace wellspace::server {
 namespace {
@@ -40,19 +41,21 @@ Backend::Backend(const ServiceOptions& options, const Authenticator& authenticat
              .max_queued = options_.max_queued_jobs,
              .max_per_tenant = options_.max_jobs_per_tenant},
             memory_) {
-  AddGauges(observability.metrics());
+  AddMetrics(observability.metrics());
   ScheduleExpiry();
 }
 
-void Backend::AddGauges(Metrics& metrics) {
+void Backend::AddMetrics(Metrics& metrics) {
   metrics.AddGauge("wellspace_workers", "Jobs that can run at once.",
                    [this] { return static_cast<double>(options_.workers); });
   metrics.AddGauge("wellspace_jobs_running", "Jobs that run.",
                    [this] { return static_cast<double>(jobs_.GetLoad().running); });
-  metrics.AddGauge("wellspace_jobs_queued", "Jobs that wait for a worker.",
+  metrics.AddGauge("wellspace_jobs_queued", "Jobs that wait for a worker or for memory.",
                    [this] { return static_cast<double>(jobs_.GetLoad().queued); });
-  metrics.AddGauge("wellspace_jobs_queue_capacity", "Jobs that can wait for a worker; more are refused.",
+  metrics.AddGauge("wellspace_jobs_queue_capacity", "Jobs that can wait; more are refused.",
                    [this] { return static_cast<double>(options_.max_queued_jobs); });
+  metrics.AddGauge("wellspace_sessions", "Sessions of all tenants.",
+                   [this] { return static_cast<double>(sessions_.Count()); });
   metrics.AddGauge("wellspace_memory_reserved_bytes", "Memory that jobs, sessions and calls have reserved.",
                    [this] { return static_cast<double>(memory_.reserved()); });
   metrics.AddGauge("wellspace_memory_lasting_bytes", "Of that, what sessions keep.",
@@ -64,7 +67,7 @@ void Backend::AddGauges(Metrics& metrics) {
 void Backend::ScheduleExpiry() {
   background_.PostAfter(kExpiryInterval, [this] {
     for (const std::shared_ptr<Session>& session : sessions_.RemoveExpired()) {
-      log_->info("session={} expired", session->name());
+      log_->info(LogFields().Add("event", "session_expired").Add("session", session->name()).text());
     }
     ScheduleExpiry();
   });

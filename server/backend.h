@@ -33,7 +33,7 @@ class Backend {
 
  private:
   void ScheduleExpiry();
-  void AddGauges(Metrics& metrics);
+  void AddMetrics(Metrics& metrics);
 
   const ServiceOptions options_;
   const std::shared_ptr<spdlog::logger> log_;

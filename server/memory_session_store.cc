@@ -95,6 +95,11 @@ bool MemorySessionStore::Remove(const Session& session) {
   return true;
 }
 
+size_t MemorySessionStore::Count() const {
+  std::lock_guard lock(mutex_);
+  return by_name_.size();
+}
+
 std::vector<std::shared_ptr<Session>> MemorySessionStore::RemoveExpired() {
   std::vector<std::shared_ptr<Session>> expired;
   {

@@ -28,6 +28,7 @@ class MemorySessionStore final : public SessionStore {
   std::vector<std::shared_ptr<Session>> List(const std::string& tenant, absl::Time after, size_t count,
                                              const std::map<std::string, std::string>& labels) override;
   bool Remove(const Session& session) override;
+  size_t Count() const override;
   std::vector<std::shared_ptr<Session>> RemoveExpired() override;
 
  private:
@@ -39,7 +40,7 @@ class MemorySessionStore final : public SessionStore {
   const ServiceOptions& options_;
   MemoryBudget& memory_;
   const Clock clock_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   // Guarded by mutex_.
   std::unordered_map<std::string, std::shared_ptr<Session>> by_name_;
   std::map<std::string, Tenant> tenants_;  // those that have sessions

@@ -9,6 +9,7 @@
 #include "core/base/status_macros.h"
 #include "core/mesher.h"
 #include "server/errors.h"
+#include "server/log_fields.h"
 #include "server/progress_pacer.h"
 
 namespace wellspace::server {
@@ -116,15 +117,20 @@ void Run(const CallEnvironment& environment, Session& session, Operation& operat
     memory.MakeLasting();
     mesh->chunks.KeepMemory(std::move(memory));
   }
-  const absl::Duration time = absl::Now() - start;
-  if (status.error_code() == grpc::StatusCode::INTERNAL) {
-    environment.log.error("operation={} {}", operation.name(), status.error_message());
+  if (mesh != nullptr) {
+    environment.observability.work().vertices_made += mesh->chunks.mesh().vertex_count();
+    environment.observability.work().simplices_made += mesh->chunks.mesh().simplex_count();
   }
-  environment.log.info("operation={} tenant={} code={} seconds={:.3f} points={} vertices={}{}{}", operation.name(),
-                       session.tenant(), absl::StatusCodeToString(static_cast<absl::StatusCode>(status.error_code())),
-                       absl::ToDoubleSeconds(time), work->meshed_points,
-                       mesh == nullptr ? 0 : mesh->chunks.mesh().vertex_count(),
-                       status.ok() ? "" : " message=", status.error_message());
+  LogFields fields;
+  fields.Add("event", "refinement").Add("operation", operation.name()).Add("tenant", session.tenant());
+  fields.Add("code", absl::StatusCodeToString(static_cast<absl::StatusCode>(status.error_code())));
+  fields.Add("seconds", absl::ToDoubleSeconds(absl::Now() - start)).Add("points", work->meshed_points);
+  fields.Add("vertices", mesh == nullptr ? 0 : mesh->chunks.mesh().vertex_count());
+  if (!status.ok()) {
+    fields.Add("message", status.error_message());
+  }
+  environment.log.log(status.error_code() == grpc::StatusCode::INTERNAL ? spdlog::level::err : spdlog::level::info,
+                      "{}", fields.text());
   session.EndWork(operation, status, *std::move(work), std::move(mesh));
 }
 

@@ -50,6 +50,9 @@ class SessionStore {
   // Takes `session` out of the store. False when it is not there any more.
   virtual bool Remove(const Session& session) = 0;
 
+  // How many there are, of all tenants.
+  virtual size_t Count() const = 0;
+
   // Takes those out whose lease has run out.
   virtual std::vector<std::shared_ptr<Session>> RemoveExpired() = 0;
 };

@@ -55,6 +55,7 @@ grpc::Status UploadPointsCall::Accept() {
   }
   const google::protobuf::RepeatedField<double>& coordinates = request.points().coordinates();
   coordinate_count_ += coordinates.size();
+  environment().observability.work().points_received += coordinates.size() / session_->dimension();
   return RunGuarded([&] {
     return session_->Append(request.point_offset(), {coordinates.data(), static_cast<size_t>(coordinates.size())},
                             expected_revision);
