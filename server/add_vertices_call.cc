@@ -92,9 +92,9 @@ void AddVerticesCall::EndWith(const RequestIds::Answer& answer) {
     response_->ParseFromString(answer.response);
     added_ = response_->vertices_size();
   }
-  EndFailed(answer.status);
+  End(answer.status);
 }
 
-std::string AddVerticesCall::Figures() const { return absl::StrCat(" points=", added_); }
+LogFields AddVerticesCall::Figures() const { return LogFields().Add("points", added_); }
 
 }  // namespace wellspace::server

@@ -26,12 +26,12 @@ class AddVerticesCall final : public Call<grpc::ServerUnaryReactor> {
 
   AddVerticesCall(const CallEnvironment& environment, grpc::CallbackServerContext* context,
                   const v1::AddVerticesRequest* request, v1::AddVerticesResponse* response)
-      : Call(environment, context, "AddVertices"), request_(request), response_(response) {}
+      : Call(environment, context), request_(request), response_(response) {}
 
  private:
   void OnBegin() override { is_admitted_ = true; }
   void OnEnd() override;
-  std::string Figures() const override;
+  LogFields Figures() const override;
 
   // Has the vertices added, and `done` called with what came of it.
   void Submit(RequestIds::Done done);

@@ -68,11 +68,13 @@ std::optional<grpc::ByteBuffer> DownloadMeshCall::NextResponse() {
                         v1::DownloadMeshResponse::kChunkFieldNumber);
 }
 
-std::string DownloadMeshCall::Figures() const {
-  return mesh_ == nullptr
-             ? ""
-             : absl::StrCat(" vertices=", mesh_->chunks.mesh().vertex_count(),
-                            " chunks=", next_chunk_ - request_.next_chunk(), " of ", mesh_->chunks.count());
+LogFields DownloadMeshCall::Figures() const {
+  LogFields figures;
+  if (mesh_ != nullptr) {
+    figures.Add("vertices", mesh_->chunks.mesh().vertex_count());
+    figures.Add("chunks", next_chunk_ - request_.next_chunk()).Add("of_chunks", mesh_->chunks.count());
+  }
+  return figures;
 }
 
 }  // namespace wellspace::server

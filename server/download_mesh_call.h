@@ -24,12 +24,12 @@ class DownloadMeshCall final
  public:
   DownloadMeshCall(const CallEnvironment& environment, grpc::CallbackServerContext* context,
                    const grpc::ByteBuffer& request)
-      : ResponseStream(environment, context, "DownloadMesh"), bytes_(request) {}
+      : ResponseStream(environment, context), bytes_(request) {}
 
  private:
   void OnBegin() override;
   void OnEnd() override { use_.reset(); }
-  std::string Figures() const override;
+  LogFields Figures() const override;
   std::optional<grpc::ByteBuffer> NextResponse() override;
 
   // Wants mutex_ to be held: finds the mesh.

@@ -89,7 +89,7 @@ void QueryCall::MakeBatches(Job& job) {
       return;
     }
     if (!status.ok()) {
-      EndFailed(std::move(status));
+      End(std::move(status));
       return;
     }
     if (batch.Valid()) {
@@ -165,6 +165,6 @@ void QueryCall::OnEnd() {
   }
 }
 
-std::string QueryCall::Figures() const { return absl::StrCat(" batches=", batches_); }
+LogFields QueryCall::Figures() const { return LogFields().Add("batches", batches_); }
 
 }  // namespace wellspace::server

@@ -30,9 +30,9 @@ class QueryCall final : public ResponseStream<Call<grpc::ServerWriteReactor<grpc
  public:
   static constexpr size_t kBatchesAhead = 4;
 
-  QueryCall(const CallEnvironment& environment, grpc::CallbackServerContext* context, const char* method,
-            VertexQueryParser parse, const grpc::ByteBuffer& request)
-      : ResponseStream(environment, context, method), parse_(parse), bytes_(request) {}
+  QueryCall(const CallEnvironment& environment, grpc::CallbackServerContext* context, VertexQueryParser parse,
+            const grpc::ByteBuffer& request)
+      : ResponseStream(environment, context), parse_(parse), bytes_(request) {}
 
  private:
   // Whether batches are being made.
@@ -40,7 +40,7 @@ class QueryCall final : public ResponseStream<Call<grpc::ServerWriteReactor<grpc
 
   void OnBegin() override;
   void OnEnd() override;
-  std::string Figures() const override;
+  LogFields Figures() const override;
   std::optional<grpc::ByteBuffer> NextResponse() override;
 
   // On the background thread: the line was full.

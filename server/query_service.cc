@@ -10,19 +10,17 @@ namespace wellspace::server {
 
 grpc::ServerWriteReactor<grpc::ByteBuffer>* QueryService::ApproximateNearestNeighbors(
     grpc::CallbackServerContext* context, const grpc::ByteBuffer* request) {
-  return QueryCall::Begin(std::make_shared<QueryCall>(environment_, context, "ApproximateNearestNeighbors",
-                                                      &ParseNearestNeighbors, *request));
+  return QueryCall::Begin(std::make_shared<QueryCall>(environment_, context, &ParseNearestNeighbors, *request));
 }
 
 grpc::ServerWriteReactor<grpc::ByteBuffer>* QueryService::ClippedVoronoiCells(grpc::CallbackServerContext* context,
                                                                               const grpc::ByteBuffer* request) {
-  return QueryCall::Begin(
-      std::make_shared<QueryCall>(environment_, context, "ClippedVoronoiCells", &ParseClippedCells, *request));
+  return QueryCall::Begin(std::make_shared<QueryCall>(environment_, context, &ParseClippedCells, *request));
 }
 
 grpc::ServerWriteReactor<grpc::ByteBuffer>* QueryService::VoronoiCells(grpc::CallbackServerContext* context,
                                                                        const grpc::ByteBuffer* request) {
-  return QueryCall::Begin(std::make_shared<QueryCall>(environment_, context, "VoronoiCells", &ParseCells, *request));
+  return QueryCall::Begin(std::make_shared<QueryCall>(environment_, context, &ParseCells, *request));
 }
 
 grpc::ServerUnaryReactor* QueryService::AddVertices(grpc::CallbackServerContext* context,

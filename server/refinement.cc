@@ -116,8 +116,6 @@ void Run(const CallEnvironment& environment, Session& session, Operation& operat
     MemoryReservation memory = job.TakeMemory(mesh->chunks.memory_bytes());
     memory.MakeLasting();
     mesh->chunks.KeepMemory(std::move(memory));
-  }
-  if (mesh != nullptr) {
     environment.observability.work().vertices_made += mesh->chunks.mesh().vertex_count();
     environment.observability.work().simplices_made += mesh->chunks.mesh().simplex_count();
   }
