@@ -14,6 +14,7 @@ class FakeSessionMesher final : public core::Mesher {
 
   int dimension() const override { return mesh_->dimension; }
   uint64_t vertex_count() const override { return mesh_->vertex_count(); }
+  uint64_t memory_bytes() const override { return 0; }
   absl::Status Refine(const core::MeshParameters&, core::RunContext&) override { return absl::OkStatus(); }
   absl::StatusOr<std::vector<uint32_t>> AddPointsNear(std::span<const double> points, std::span<const uint32_t>,
                                                       core::RunContext&) override {

@@ -1,0 +1,77 @@
+// Sessions on a server with little memory: "refinement that eats the memory" ends with figures, and nothing else ends with it.
+#include <string>
+#include <vector>
+
+#include "gtest/gtest.h"
+#include "tests/server/service_harness.h"
+#include "tests/server/session_calls.h"
+
+namespace wellspace::server {
+namespace {
+
+class SessionMemoryTest : public ::testing::Test {
+ protected:
+  // Refines with circumradii of at most `size`.
+  v1::Operation Refine(const std::string& name, double size) {
+    v1::StartRefinementRequest request;
+    request.set_name(name);
+    *request.mutable_parameters() = UnitCubeParameters();
+    request.mutable_parameters()->set_max_circumradius(size);
+    Watch watch(calls_.operations(), calls_.Start(request).name());
+    EXPECT_TRUE(watch.Finish().ok());
+    return watch.operation.value_or(v1::Operation());
+  }
+
+  void ExpectMemoryLimit(const v1::Operation& operation) {
+    EXPECT_EQ(operation.state(), v1::Operation::STATE_FAILED);
+    EXPECT_EQ(operation.error().code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+    const grpc::Status status(grpc::StatusCode::RESOURCE_EXHAUSTED, "", operation.error().SerializeAsString());
+    EXPECT_EQ(DetailsOf(status).reason, "MEMORY_LIMIT") << operation.error().message();
+  }
+
+  ServiceHarness harness_{core::MeshPoints, {.max_memory_bytes = kMinMemoryBytes}};
+  SessionCalls calls_{harness_.channel()};
+};
+
+TEST_F(SessionMemoryTest, ARefinementThatNeedsTooMuchFailsAndLeavesTheSessionAsItWas) {
+  const std::string name = calls_.Create().name();
+  calls_.Upload(name, 0, UniformPoints(1000, 3, 5));
+  ExpectMemoryLimit(Refine(name, 0.001));
+  v1::Session session = calls_.Get(name);
+  EXPECT_EQ(session.state(), v1::Session::STATE_OPEN);
+  EXPECT_EQ(session.committed_points(), 1000u);
+  EXPECT_EQ(Refine(name, 0).state(), v1::Operation::STATE_SUCCEEDED) << "with less it goes";
+
+  const uint64_t vertices = calls_.Get(name).vertex_count();
+  ExpectMemoryLimit(Refine(name, 0.001));  // no estimate now: it has to grow until it is stopped
+  session = calls_.Get(name);
+  EXPECT_EQ(session.state(), v1::Session::STATE_OPEN);
+  EXPECT_EQ(session.committed_points(), 1000u);
+  EXPECT_EQ(session.vertex_count(), vertices) << "the last mesh is there still";
+  EXPECT_EQ(Refine(name, 0).state(), v1::Operation::STATE_SUCCEEDED) << "built anew";
+  EXPECT_EQ(calls_.Get(name).vertex_count(), vertices) << "and the same";
+}
+
+TEST_F(SessionMemoryTest, ADeletedSessionMakesRoomForOthers) {
+  constexpr size_t kPiece = 40'000;
+  const std::vector<double> piece = UniformPoints(kPiece, 3, 7);
+  const std::string first = calls_.Create().name();
+  grpc::Status status;
+  uint64_t committed = 0;
+  for (; status.ok(); committed += kPiece) {
+    calls_.Upload(first, committed, piece, &status);
+  }
+  EXPECT_EQ(DetailsOf(status).reason, "MEMORY_LIMIT") << status.error_message();
+  EXPECT_EQ(calls_.Get(first).committed_points(), committed - kPiece);
+  const std::string second = calls_.Create().name();
+  calls_.Upload(second, 0, piece, &status);
+  EXPECT_EQ(DetailsOf(status).reason, "MEMORY_LIMIT") << status.error_message();
+  calls_.Delete(first);
+  do {
+    calls_.Upload(second, 0, piece, &status);  // the memory is free shortly after
+  } while (status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_TRUE(status.ok()) << status.error_message();
+}
+
+}  // namespace
+}  // namespace wellspace::server
