@@ -1,6 +1,9 @@
 #include "client/cli/exit_codes.h"
 
 #include <iostream>
+#include <string>
+
+#include "client/cli/json.h"
 
 namespace wellspace::cli {
 
@@ -8,11 +11,12 @@ const char kExitCodesHelp[] =
     "Exit codes:\n"
     "  0    done; `check`: the mesh is valid\n"
     "  1    `check` found a violation, or the work failed\n"
-    "  2    wrong usage, or a file that cannot be read or is not valid\n"
+    "  2    wrong usage, or a file or a session that is not there or not valid\n"
     "  3    the server cannot be reached, or stopped\n"
     "  4    a limit of vertices, memory or disk was reached\n"
     "  5    --timeout passed\n"
     "  6    the server wants other credentials, or its certificate is not trusted\n"
+    "  7    the session is in another state, or at another revision, than the command needs\n"
     "  130  interrupted by Ctrl-C (143 by SIGTERM); the work is cancelled, no file is left half written\n";
 
 int ExitCodeOf(const absl::Status& status) {
@@ -32,14 +36,21 @@ int ExitCodeOf(const absl::Status& status) {
       return kExitTimeout;
     case absl::StatusCode::kUnauthenticated:
       return kExitUnauthenticated;
+    case absl::StatusCode::kFailedPrecondition:
+    case absl::StatusCode::kAborted:
+      return kExitConflict;
     default:
       return kExitFailed;
   }
 }
 
-int ReportError(const absl::Status& status) {
-  std::cerr << "wellspace: " << std::string(status.message()) << " [" << absl::StatusCodeToString(status.code())
-            << "]\n";
+int ReportError(const absl::Status& status, OutputFormat format) {
+  const std::string code = absl::StatusCodeToString(status.code());
+  if (format == OutputFormat::kText) {
+    std::cerr << "wellspace: " << std::string(status.message()) << " [" << code << "]\n";
+    return ExitCodeOf(status);
+  }
+  std::cerr << nlohmann::ordered_json{{"error", ErrorJson(status)}}.dump() << "\n";
   return ExitCodeOf(status);
 }
 

@@ -13,15 +13,20 @@ inline constexpr int kExitUnavailable = 3;      // the server cannot be reached 
 inline constexpr int kExitExhausted = 4;        // a limit of vertices, memory or disk was reached
 inline constexpr int kExitTimeout = 5;          // --timeout passed
 inline constexpr int kExitUnauthenticated = 6;  // the server does not take the credentials, or its own are not trusted
-inline constexpr int kExitSignal = 128;         // plus the number of the signal: 130 for Ctrl-C
+inline constexpr int kExitConflict = 7;  // the session is in another state, or at another revision, than is needed
+inline constexpr int kExitSignal = 128;  // plus the number of the signal: 130 for Ctrl-C
 
 // The table above, for --help.
 extern const char kExitCodesHelp[];
 
 int ExitCodeOf(const absl::Status& status);
 
-// Prints an error on standard error and returns its exit code.
-int ReportError(const absl::Status& status);
+// How results and errors are printed.
+enum class OutputFormat { kText, kJson };
+
+// Prints an error on standard error and returns its exit code. As JSON: {"error": {"code", "reason", "field", "message"}} in one line,
+// without the reason and the field where the server gave none.
+int ReportError(const absl::Status& status, OutputFormat format = OutputFormat::kText);
 
 }  // namespace wellspace::cli
 

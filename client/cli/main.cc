@@ -15,11 +15,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(kExitCodesHelp);
   int exit_code = kExitOk;
-  AddMeshCommand(app, exit_code);
-  AddEstimateCommand(app, exit_code);
-  AddCheckCommand(app, exit_code);
-  AddRenderCommand(app, exit_code);
-  AddServerCommand(app, exit_code);
+  AddCommands(app, exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -21,31 +21,40 @@ std::string WithThousands(uint64_t number) {
   return text;
 }
 
-std::string ProgressLine(const client::Progress& progress) {
+std::string ProgressLine(const std::string& phase, double fraction, const std::string& amount) {
   constexpr int kBarColumns = 30;
-  const double fraction = std::clamp(progress.fraction, 0.0, 1.0);
-  const int filled = static_cast<int>(fraction * kBarColumns);
-  std::string line = absl::StrFormat("%-10.12s [%s%s] %3d%%  %s vertices", progress.phase, std::string(filled, '#'),
-                                     std::string(kBarColumns - filled, '-'), static_cast<int>(fraction * 100),
-                                     WithThousands(progress.vertices));
+  const double part = std::clamp(fraction, 0.0, 1.0);
+  const int filled = static_cast<int>(part * kBarColumns);
+  std::string line = absl::StrFormat("%-10.12s [%s%s] %3d%%  %s", phase, std::string(filled, '#'),
+                                     std::string(kBarColumns - filled, '-'), static_cast<int>(part * 100), amount);
   return line.substr(0, 79);
+}
+
+std::string ProgressLine(const client::Progress& progress) {
+  return ProgressLine(progress.phase, progress.fraction, WithThousands(progress.vertices) + " vertices");
 }
 
 ProgressBar::ProgressBar(bool wanted) : enabled_(wanted && isatty(STDERR_FILENO) == 1) {}
 
 ProgressBar::~ProgressBar() { Clear(); }
 
-void ProgressBar::Update(const client::Progress& progress) {
-  if (enabled_) {
-    std::cerr << "\r" << ProgressLine(progress) << "\x1b[K" << std::flush;
-    drawn_ = true;
+void ProgressBar::Update(const client::Progress& progress) { Draw(ProgressLine(progress)); }
+
+void ProgressBar::Update(const std::string& phase, double fraction, const std::string& amount) {
+  Draw(ProgressLine(phase, fraction, amount));
+}
+
+void ProgressBar::Draw(const std::string& line) {
+  if (enabled_ && line != drawn_) {
+    std::cerr << "\r" << line << "\x1b[K" << std::flush;
+    drawn_ = line;
   }
 }
 
 void ProgressBar::Clear() {
-  if (drawn_) {
+  if (!drawn_.empty()) {
     std::cerr << "\r\x1b[K" << std::flush;
-    drawn_ = false;
+    drawn_.clear();
   }
 }
 

@@ -23,14 +23,19 @@ class ProgressBar {
   ProgressBar& operator=(const ProgressBar&) = delete;
 
   void Update(const client::Progress& progress);
+  // The same for other work: its name, how much of it is done, in [0, 1], and that in words.
+  void Update(const std::string& phase, double fraction, const std::string& amount);
   void Clear();
 
  private:
+  void Draw(const std::string& line);
+
   const bool enabled_;
-  bool drawn_ = false;
+  std::string drawn_;  // the line on the terminal; empty: none
 };
 
 // The line without colours and control characters, at most 79 columns wide.
+std::string ProgressLine(const std::string& phase, double fraction, const std::string& amount);
 std::string ProgressLine(const client::Progress& progress);
 
 }  // namespace wellspace::cli

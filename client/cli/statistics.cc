@@ -12,15 +12,15 @@
 namespace wellspace::cli {
 namespace {
 
-nlohmann::ordered_json DuplicateOf(const client::Mesh& mesh) {
+nlohmann::ordered_json DuplicateOf(std::span<const uint32_t> input_vertex) {
   nlohmann::ordered_json pairs = nlohmann::ordered_json::array();
   // Distinct points become vertices 0, 1, ... in the order of their first appearance.
   uint32_t distinct = 0;
-  for (size_t i = 0; i < mesh.input_vertex.size(); ++i) {
-    if (mesh.input_vertex[i] == distinct) {
+  for (size_t i = 0; i < input_vertex.size(); ++i) {
+    if (input_vertex[i] == distinct) {
       ++distinct;
     } else {
-      pairs.push_back({i, mesh.input_vertex[i]});
+      pairs.push_back({i, input_vertex[i]});
     }
   }
   return pairs;
@@ -30,7 +30,7 @@ const char* AngleName(int dimension) { return dimension == 2 ? "min_angle_deg" :
 
 }  // namespace
 
-std::string StatisticsJson(const client::Mesh& mesh) {
+std::string StatisticsJson(const client::MeshHeader& mesh, std::span<const uint32_t> input_vertex) {
   const client::MeshStatistics& statistics = mesh.statistics;
   nlohmann::ordered_json json;
   json["dimension"] = mesh.dimension;
@@ -45,11 +45,11 @@ std::string StatisticsJson(const client::Mesh& mesh) {
   json["seconds"] = statistics.seconds;
   json["peak_memory_bytes"] = statistics.peak_memory_bytes;
   json["counters"] = statistics.counters;
-  json["duplicate_of"] = DuplicateOf(mesh);
+  json["duplicate_of"] = DuplicateOf(input_vertex);
   return json.dump(2) + "\n";
 }
 
-std::string Summary(const client::Mesh& mesh) {
+std::string Summary(const client::MeshHeader& mesh) {
   const client::MeshStatistics& statistics = mesh.statistics;
   const auto total = statistics.seconds.find("total");
   return absl::StrCat(

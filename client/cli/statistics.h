@@ -2,6 +2,8 @@
 #ifndef WELLSPACE_CLIENT_CLI_STATISTICS_H_
 #define WELLSPACE_CLIENT_CLI_STATISTICS_H_
 
+#include <cstdint>
+#include <span>
 #include <string>
 
 #include "client/client.h"
@@ -14,11 +16,11 @@ namespace wellspace::cli {
 //   seconds:  {tree, refinement, simplices, ..., total}, without reading and writing files
 //   peak_memory_bytes, counters
 //   duplicate_of: [[i, v], ...]: input point i is equal to an earlier one, and both became vertex v. The other input
-//                 points are, in their order, the first vertices.
-std::string StatisticsJson(const client::Mesh& mesh);
+//                 points are, in their order, the first vertices. `input_vertex` says which vertex each became.
+std::string StatisticsJson(const client::MeshHeader& mesh, std::span<const uint32_t> input_vertex);
 
 // "5 points -> 17 vertices, 20 triangles; ...", one line without its end.
-std::string Summary(const client::Mesh& mesh);
+std::string Summary(const client::MeshHeader& mesh);
 
 // One JSON object: dimension, vertices, simplices, memory_bytes, tree_leaves.
 std::string EstimateJson(const client::MeshEstimate& estimate, int dimension);

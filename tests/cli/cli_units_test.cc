@@ -48,7 +48,9 @@ TEST(ProgressLineTest, ShowsPhaseFractionAndVerticesWithin79Columns) {
 TEST(ExitCodeTest, OfEveryKindOfError) {
   EXPECT_EQ(ExitCodeOf(absl::OkStatus()), 0);
   EXPECT_EQ(ExitCodeOf(absl::InternalError("")), 1);
-  EXPECT_EQ(ExitCodeOf(absl::FailedPreconditionError("")), 1);
+  EXPECT_EQ(ExitCodeOf(absl::CancelledError("")), 1);
+  EXPECT_EQ(ExitCodeOf(absl::FailedPreconditionError("")), 7);
+  EXPECT_EQ(ExitCodeOf(absl::AbortedError("")), 7);
   EXPECT_EQ(ExitCodeOf(absl::InvalidArgumentError("")), 2);
   EXPECT_EQ(ExitCodeOf(absl::NotFoundError("")), 2);
   EXPECT_EQ(ExitCodeOf(absl::PermissionDeniedError("")), 2);
@@ -57,12 +59,13 @@ TEST(ExitCodeTest, OfEveryKindOfError) {
   EXPECT_EQ(ExitCodeOf(absl::DeadlineExceededError("")), 5);
 }
 
-client::Mesh SmallMesh(int dimension) {
-  client::Mesh mesh;
+const std::vector<uint32_t> kInputVertex = {0, 1, 0, 2, 2, 1};
+
+client::MeshHeader SmallMesh(int dimension) {
+  client::MeshHeader mesh;
   mesh.dimension = dimension;
   mesh.domain_low = std::vector<double>(dimension, 0.1);
   mesh.domain_high = std::vector<double>(dimension, 1);
-  mesh.input_vertex = {0, 1, 0, 2, 2, 1};
   mesh.statistics.input_points = 6;
   mesh.statistics.duplicates = 3;
   mesh.statistics.vertices = 1007;
@@ -73,7 +76,7 @@ client::Mesh SmallMesh(int dimension) {
 }
 
 TEST(StatisticsJsonTest, HasEveryFigure) {
-  const nlohmann::json json = nlohmann::json::parse(StatisticsJson(SmallMesh(2)));
+  const nlohmann::json json = nlohmann::json::parse(StatisticsJson(SmallMesh(2), kInputVertex));
   EXPECT_EQ(json["dimension"], 2);
   EXPECT_EQ(json["domain_low"][0], 0.1);
   EXPECT_EQ(json["input_points"], 6);
@@ -83,7 +86,7 @@ TEST(StatisticsJsonTest, HasEveryFigure) {
   EXPECT_EQ(json["seconds"]["total"], 1.5);
   EXPECT_EQ(json["counters"]["cuts"], 77);
   EXPECT_EQ(json["duplicate_of"], nlohmann::json::parse("[[2, 0], [4, 2], [5, 1]]"));
-  const nlohmann::json solid = nlohmann::json::parse(StatisticsJson(SmallMesh(3)));
+  const nlohmann::json solid = nlohmann::json::parse(StatisticsJson(SmallMesh(3), kInputVertex));
   EXPECT_EQ(solid["min_dihedral_deg"], 20.5);
   EXPECT_FALSE(solid.contains("min_angle_deg"));
 }

@@ -494,7 +494,7 @@ TEST_F(CommandsTest, CtrlCIsExitCode130) {
     close(reader);
     const RunResult result = process.Wait();
     EXPECT_EQ(result.exit_code, 128 + signal) << result.err;
-    EXPECT_THAT(result.err, HasSubstr("cancelled while writing"));
+    EXPECT_THAT(result.err, HasSubstr("cancelled"));
     EXPECT_THAT(written, Not(HasSubstr("</VTKFile>")));
   }
 }

@@ -152,6 +152,7 @@ class FakeServer {
  public:
   FakeServer() {
     grpc::ServerBuilder builder;
+    builder.AddListeningPort("127.0.0.1:0", grpc::InsecureServerCredentials(), &port_);
     builder.RegisterService(&sessions);
     builder.RegisterService(&operations);
     builder.RegisterService(&queries);
@@ -165,11 +166,15 @@ class FakeServer {
     return client::Client(MakeConnection(server_->InProcessChannel(grpc::ChannelArguments()), policy));
   }
 
+  // For clients in other processes.
+  std::string address() const { return "127.0.0.1:" + std::to_string(port_); }
+
   FakeSessions sessions;
   FakeOperations operations;
   FakeQueries queries;
 
  private:
+  int port_ = 0;
   std::unique_ptr<grpc::Server> server_;
 };
 

@@ -9,15 +9,28 @@
 #include "absl/strings/str_format.h"
 #include "client/cli/commands/commands.h"
 #include "client/cli/exit_codes.h"
-#include "client/cli/meshing_options.h"
 #include "client/cli/options.h"
+#include "client/cli/parameter_options.h"
 #include "client/cli/progress_bar.h"
+#include "client/cli/remote_command.h"
 #include "client/formats/read_cloud.h"
 #include "client/formats/read_mesh.h"
 #include "core/simplex/validate.h"
 
 namespace wellspace::cli {
 namespace {
+
+Json ReportJson(const core::QualityReport& report, int dimension) {
+  Json json;
+  json["dimension"] = dimension;
+  json["vertices"] = report.vertices;
+  json["simplices"] = report.simplices;
+  json["max_radius_edge"] = report.max_radius_edge;
+  json["min_angle_deg"] = report.min_angle_deg;
+  json["max_angle_deg"] = report.max_angle_deg;
+  json["angle_histogram"] = report.angle_histogram;
+  return json;
+}
 
 void PrintReport(const core::QualityReport& report, int dimension) {
   const char* angle = dimension == 2 ? "angle" : "dihedral angle";
@@ -50,6 +63,7 @@ struct CheckCommand {
   client::Criterion criterion = client::Criterion::kRadiusEdge;
   double max_circumradius = 0;
   std::vector<std::vector<double>> size_boxes;
+  OutputFormat format = OutputFormat::kText;
 
   absl::StatusOr<std::vector<core::SizeBox>> SizeBoxes(int dimension) const;
   int Run() const;
@@ -70,25 +84,31 @@ absl::StatusOr<std::vector<core::SizeBox>> CheckCommand::SizeBoxes(int dimension
 int CheckCommand::Run() const {
   const absl::StatusOr<formats::Mesh> mesh = formats::ReadMesh(mesh_path);
   if (!mesh.ok()) {
-    return ReportError(mesh.status());
+    return ReportError(mesh.status(), format);
   }
   const absl::StatusOr<std::vector<core::SizeBox>> boxes = SizeBoxes(mesh->dimension);
   if (!boxes.ok()) {
-    return ReportError(boxes.status());
+    return ReportError(boxes.status(), format);
   }
   std::vector<double> cloud;
   if (!cloud_path.empty()) {
     absl::StatusOr<formats::PointCloud> read =
         formats::ReadCloud(cloud_path, {.format = cloud_format, .dimension = mesh->dimension});
     if (!read.ok()) {
-      return ReportError(read.status());
+      return ReportError(read.status(), format);
     }
     cloud = std::move(read->points);
   }
   const core::MeshView view = {.dimension = mesh->dimension, .points = mesh->points, .simplices = mesh->simplices};
   absl::Status status = core::ValidateIndices(view);
+  Json json = Json::object();
   if (status.ok()) {
-    PrintReport(core::MeasureQuality(view), mesh->dimension);
+    const core::QualityReport report = core::MeasureQuality(view);
+    if (format == OutputFormat::kJson) {
+      json = ReportJson(report, mesh->dimension);
+    } else {
+      PrintReport(report, mesh->dimension);
+    }
     const bool is_well_spaced = criterion == client::Criterion::kWellSpaced;
     status = core::ValidateMesh(
         view, {.rho = rho,
@@ -98,7 +118,13 @@ int CheckCommand::Run() const {
                .cloud = cloud});
   }
   if (absl::IsInvalidArgument(status)) {  // what was asked for cannot be
-    return ReportError(status);
+    return ReportError(status, format);
+  }
+  if (format == OutputFormat::kJson) {
+    json["valid"] = status.ok();
+    json["violation"] = status.ok() ? Json(nullptr) : Json(std::string(status.message()));
+    PrintJson(json);
+    return status.ok() ? kExitOk : kExitFailed;
   }
   if (!status.ok()) {
     std::cout << "violation: " << std::string(status.message()) << "\n";
@@ -120,8 +146,10 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
   check
       ->add_option("MESH", command->mesh_path,
                    "File of the mesh (.vtu, .npz, or .node with .ele), or - for standard input (vtu)")
-      ->required();
-  check->add_option("--cloud", command->cloud_path, "File of points that must be the first vertices, to the bit");
+      ->required()
+      ->type_name("FILE");
+  check->add_option("--cloud", command->cloud_path, "File of points that must be the first vertices, to the bit")
+      ->type_name("FILE");
   check->add_option("--input-format", command->cloud_format, "Format of the cloud; default: by its extension")
       ->check(CLI::IsMember(formats::CloudFormats()));
   CLI::Option* rho =
@@ -129,6 +157,7 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
           ->check(CLI::PositiveNumber);
   AddCriterion(*check, command->criterion)->needs(rho);
   AddSizes(*check, command->max_circumradius, command->size_boxes);
+  AddOutput(*check, command->format);
   check->callback([command, &exit_code] { exit_code = command->Run(); });
 }
 

@@ -1,4 +1,4 @@
-// The commands of the tool. Each function adds one to `app`; when it is run, it sets `exit_code`.
+// The commands of the tool. Each function adds one to `app`, or a few that belong together; when one is run, it sets `exit_code`.
 #ifndef WELLSPACE_CLIENT_CLI_COMMANDS_COMMANDS_H_
 #define WELLSPACE_CLIENT_CLI_COMMANDS_COMMANDS_H_
 
@@ -9,9 +9,17 @@ namespace wellspace::cli {
 // REQUIRES, for each: `exit_code` outlives `app`.
 void AddMeshCommand(CLI::App& app, int& exit_code);
 void AddEstimateCommand(CLI::App& app, int& exit_code);
+void AddSessionCommands(CLI::App& app, int& exit_code);    // session create, list, show, update, delete
+void AddTransferCommands(CLI::App& app, int& exit_code);   // upload, download
+void AddOperationCommands(CLI::App& app, int& exit_code);  // refine, watch, cancel
+void AddQueryCommands(CLI::App& app, int& exit_code);      // cells, add
 void AddCheckCommand(CLI::App& app, int& exit_code);
 void AddRenderCommand(CLI::App& app, int& exit_code);
-void AddServerCommand(CLI::App& app, int& exit_code);
+void AddServerCommands(CLI::App& app, int& exit_code);      // server info, health
+void AddCompletionCommands(CLI::App& app, int& exit_code);  // completion bash, manual
+
+// All of them.
+void AddCommands(CLI::App& app, int& exit_code);
 
 }  // namespace wellspace::cli
 

@@ -8,7 +8,6 @@
 #include "client/cli/exit_codes.h"
 #include "client/cli/meshing_options.h"
 #include "client/cli/statistics.h"
-#include "client/formats/line_reader.h"
 
 namespace wellspace::cli {
 namespace {
@@ -20,7 +19,7 @@ constexpr char kFooter[] =
 
 int RunEstimate(MeshingOptions& options) {
   if (const absl::Status status = options.Check(); !status.ok()) {
-    return ReportError(status);
+    return ReportError(status, options.remote().format());
   }
   return options.Run([&options](client::Client& client, const client::MeshOptions& mesh_options,
                                 const formats::PointCloud& cloud, const Interrupt& interrupt) {
@@ -29,7 +28,7 @@ int RunEstimate(MeshingOptions& options) {
     if (!estimate.ok()) {
       return estimate.status();
     }
-    if (!options.quiet() && options.statistics() != formats::kStandardStream) {
+    if (!options.remote().quiet() && !options.has_figures_on_stdout()) {
       std::cout << EstimateText(*estimate, cloud.dimension);
     }
     return options.WriteStatistics(EstimateJson(*estimate, cloud.dimension));

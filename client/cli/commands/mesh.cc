@@ -9,6 +9,7 @@
 #include "client/cli/meshing_options.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/statistics.h"
+#include "client/files/mesh_file.h"
 #include "client/formats/line_reader.h"
 #include "client/formats/write_mesh.h"
 
@@ -16,7 +17,6 @@ namespace wellspace::cli {
 namespace {
 
 constexpr char kFooter[] =
-    "Meshes:  .vtu (2-D and 3-D), .npz (arrays of numpy), .node and .ele (a pair); \"-\" is standard output (vtu)\n"
     "Examples:\n"
     "  wellspace mesh coast.csv -o coast.vtu --rho 1.5 --stats -\n"
     "  wellspace mesh cow.csv -o cow.node --domain -1,-1,-1,1,1,1 --server mesher:7233\n"
@@ -30,7 +30,6 @@ struct MeshCommand {
   absl::Status CheckOptions() const;
   absl::Status Mesh(client::Client& client, const client::MeshOptions& mesh_options, const formats::PointCloud& cloud,
                     const Interrupt& interrupt) const;
-  absl::Status Finish(const client::Mesh& mesh, const Interrupt& interrupt) const;
   int Run();
 };
 
@@ -38,27 +37,10 @@ absl::Status MeshCommand::CheckOptions() const {
   if (absl::Status status = options.Check(); !status.ok()) {
     return status;
   }
-  if (options.statistics() == formats::kStandardStream && output == formats::kStandardStream) {
-    return absl::InvalidArgumentError("--stats and --output: only one of them can be standard output");
+  if (options.has_figures_on_stdout() && output == formats::kStandardStream) {
+    return absl::InvalidArgumentError("--stats or --output json, and --out: only one of them can be standard output");
   }
   return formats::CheckMeshOutput(output, format, options.dimension());
-}
-
-absl::Status MeshCommand::Finish(const client::Mesh& mesh, const Interrupt& interrupt) const {
-  const formats::MeshView view = {.dimension = mesh.dimension,
-                                  .points = mesh.points,
-                                  .simplices = mesh.simplices,
-                                  .input_vertices = mesh.statistics.input_points - mesh.statistics.duplicates};
-  if (absl::Status status = formats::WriteMesh(output, format, view, interrupt.token()); !status.ok()) {
-    return status;
-  }
-  if (absl::Status status = options.WriteStatistics(StatisticsJson(mesh)); !status.ok()) {
-    return status;
-  }
-  if (!options.quiet()) {
-    std::cerr << Summary(mesh) << (output == formats::kStandardStream ? "" : " -> " + output) << "\n";
-  }
-  return absl::OkStatus();
 }
 
 absl::Status MeshCommand::Mesh(client::Client& client, const client::MeshOptions& mesh_options,
@@ -67,17 +49,29 @@ absl::Status MeshCommand::Mesh(client::Client& client, const client::MeshOptions
   if (absl::Status status = formats::CheckMeshOutput(output, format, cloud.dimension); !status.ok()) {
     return status;
   }
-  ProgressBar bar(!options.quiet());
-  const absl::StatusOr<client::Mesh> mesh = client.MeshPoints(
-      mesh_options, cloud.points, [&bar](const client::Progress& progress) { bar.Update(progress); },
-      interrupt.token());
-  bar.Clear();
-  return mesh.ok() ? Finish(*mesh, interrupt) : mesh.status();
+  client::MeshFile file(output, format, interrupt.token());
+  file.KeepInputVertices();
+  {
+    ProgressBar bar(!options.remote().quiet());
+    const absl::Status status = client.MeshPoints(
+        mesh_options, cloud.points, file, [&bar](const client::Progress& progress) { bar.Update(progress); },
+        interrupt.token());
+    if (!status.ok()) {
+      return status;
+    }
+  }
+  if (absl::Status status = options.WriteStatistics(StatisticsJson(file.header(), file.input_vertex())); !status.ok()) {
+    return status;
+  }
+  if (!options.remote().quiet()) {
+    std::cerr << Summary(file.header()) << (output == formats::kStandardStream ? "" : " -> " + output) << "\n";
+  }
+  return absl::OkStatus();
 }
 
 int MeshCommand::Run() {
   if (const absl::Status status = CheckOptions(); !status.ok()) {
-    return ReportError(status);
+    return ReportError(status, options.remote().format());
   }
   return options.Run([this](client::Client& client, const client::MeshOptions& mesh_options,
                             const formats::PointCloud& cloud,
@@ -89,11 +83,9 @@ int MeshCommand::Run() {
 void AddMeshCommand(CLI::App& app, int& exit_code) {
   const auto command = std::make_shared<MeshCommand>();
   CLI::App* mesh = app.add_subcommand("mesh", "Mesh a point cloud");
-  mesh->footer(absl::StrCat(kCloudsHelp, kFooter, "\n", kExitCodesHelp));
+  mesh->footer(absl::StrCat(kCloudsHelp, kMeshesHelp, kFooter, "\n", kExitCodesHelp));
   command->options.AddTo(*mesh);
-  mesh->add_option("-o,--output", command->output, "File of the mesh, or - for standard output")->required();
-  mesh->add_option("--format", command->format, "Format of the mesh; default: by the extension of its file")
-      ->check(CLI::IsMember(formats::MeshFormats()));
+  AddMeshOutput(*mesh, command->output, command->format);
   mesh->callback([command, &exit_code] { exit_code = command->Run(); });
 }
 

@@ -59,8 +59,11 @@ void AddRenderCommand(CLI::App& app, int& exit_code) {
   render
       ->add_option("MESH", command->mesh_path,
                    "File of the mesh (.vtu, .npz, or .node with .ele), or - for standard input (vtu)")
-      ->required();
-  render->add_option("-o,--output", command->picture_path, "File of the picture, .png or .svg")->required();
+      ->required()
+      ->type_name("FILE");
+  render->add_option("-o,--out", command->picture_path, "File of the picture, .png or .svg")
+      ->required()
+      ->type_name("FILE");
   render->add_option("--width", command->width, "Width in pixels")
       ->capture_default_str()
       ->check(CLI::Range(render::kMinWidth, render::kMaxWidth));

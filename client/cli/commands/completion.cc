@@ -1,0 +1,35 @@
+// wellspace completion, manual: help for shells and for man.
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "client/cli/commands/commands.h"
+#include "client/cli/exit_codes.h"
+#include "client/cli/help_pages.h"
+
+namespace wellspace::cli {
+
+void AddCompletionCommands(CLI::App& app, int& exit_code) {
+  const auto shell = std::make_shared<std::string>();
+  CLI::App* completion =
+      app.add_subcommand("completion", "Print a script that makes a shell complete the tool's words");
+  completion->footer(
+      "Example:\n"
+      "  wellspace completion bash > ~/.local/share/bash-completion/completions/wellspace\n");
+  completion->add_option("SHELL", *shell, "The shell")->required()->check(CLI::IsMember({"bash"}));
+  completion->callback([&app, shell, &exit_code] {
+    std::cout << BashCompletion(app) << std::flush;
+    exit_code = std::cout ? kExitOk : kExitFailed;
+  });
+
+  CLI::App* manual = app.add_subcommand("manual", "Print the manual page wellspace(1)");
+  manual->footer(
+      "Example:\n"
+      "  wellspace manual | man -l -\n");
+  manual->callback([&app, &exit_code] {
+    std::cout << ManualPage(app, WELLSPACE_VERSION) << std::flush;
+    exit_code = std::cout ? kExitOk : kExitFailed;
+  });
+}
+
+}  // namespace wellspace::cli

@@ -1,0 +1,189 @@
+// wellspace refine, watch, cancel: the long work on a session.
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "client/cli/commands/commands.h"
+#include "client/cli/parameter_options.h"
+#include "client/cli/progress_bar.h"
+#include "client/cli/remote_command.h"
+#include "client/cli/session_options.h"
+
+namespace wellspace::cli {
+namespace {
+
+// How an operation ended, as a status.
+absl::Status EndOf(const client::Operation& operation) {
+  if (operation.state == client::OperationState::kSucceeded) {
+    return absl::OkStatus();
+  }
+  return operation.error.ok() ? absl::CancelledError(absl::StrCat(operation.name, " was cancelled")) : operation.error;
+}
+
+// Follows an operation to its end on the terminal, or as lines of JSON.
+absl::StatusOr<client::Operation> Follow(client::Client& client, const RemoteCommand& remote, const std::string& name,
+                                         const client::CallOptions& call, bool prints_events) {
+  ProgressBar bar(!remote.quiet() && !remote.json());
+  const auto on_progress = [&](const client::Progress& progress) {
+    if (prints_events && remote.json()) {
+      PrintJson(ProgressJson(progress), /*indented=*/false);
+    }
+    bar.Update(progress);
+  };
+  return client.WatchOperation(name, on_progress, std::nullopt, call);
+}
+
+void PrintEnd(const RemoteCommand& remote, const client::Operation& operation, bool indented) {
+  if (remote.json()) {
+    PrintJson(OperationJson(operation), indented);
+  } else if (operation.state == client::OperationState::kSucceeded && !remote.quiet()) {
+    std::cout << operation.name << " succeeded: " << WithThousands(operation.progress.vertices)
+              << " vertices, revision " << operation.mesh_revision << "\n";
+  }
+}
+
+struct OperationCommand {
+  RemoteCommand remote;
+  ParameterOptions parameters;
+  std::string name;
+  bool detach = false;
+  uint64_t expected_revision = 0;
+
+  absl::StatusOr<client::Operation> Start(client::Client& client, client::CallOptions call) const;
+  int Refine() const;
+  int Watch() const;
+  int Cancel() const;
+};
+
+absl::StatusOr<client::Operation> OperationCommand::Start(client::Client& client, client::CallOptions call) const {
+  std::optional<client::MeshOptions> changed;
+  if (parameters.has_quality()) {
+    const absl::StatusOr<client::Session> session = client.GetSession(name, call);
+    if (!session.ok()) {
+      return session.status();
+    }
+    absl::StatusOr<client::MeshOptions> replaced = parameters.Replace(session->parameters);
+    if (!replaced.ok()) {
+      return replaced.status();
+    }
+    changed = *std::move(replaced);
+  }
+  // Not stopped by Ctrl-C: who does not hear that an operation was started cannot cancel it.
+  call.stop = {};
+  call.expected_revision = expected_revision;
+  absl::StatusOr<client::Operation> started = client.StartRefinement(name, changed, call);
+  return started.ok() ? started : parameters.Explain(started.status());
+}
+
+// Ends an operation after Ctrl-C. Returns what the command ends with.
+absl::Status CancelNow(client::Client& client, const std::string& operation) {
+  client::CallOptions call;
+  call.timeout = absl::Seconds(10);
+  if (const absl::StatusOr<client::Operation> cancelled = client.CancelOperation(operation, call); !cancelled.ok()) {
+    return absl::CancelledError(
+        absl::StrCat("interrupted; ", operation, " could not be cancelled: ", cancelled.status().message()));
+  }
+  return absl::CancelledError(absl::StrCat("interrupted; ", operation, " is cancelled, its session keeps its points"));
+}
+
+int OperationCommand::Refine() const {
+  if (const absl::Status status = parameters.Check(); !status.ok()) {
+    return ReportError(status, remote.format());
+  }
+  return remote.Run(
+      [this](client::Client& client, const client::CallOptions& call, const Interrupt& interrupt) -> absl::Status {
+        const absl::StatusOr<client::Operation> started = Start(client, call);
+        if (!started.ok()) {
+          return started.status();
+        }
+        if (detach) {
+          remote.json() ? PrintJson(OperationJson(*started)) : static_cast<void>(std::cout << started->name << "\n");
+          return absl::OkStatus();
+        }
+        const absl::StatusOr<client::Operation> ended =
+            Follow(client, remote, started->name, call, /*prints_events=*/false);
+        if (!ended.ok()) {
+          if (interrupt.signal() != 0) {
+            return CancelNow(client, started->name);
+          }
+          return absl::Status(ended.status().code(),
+                              absl::StrCat(ended.status().message(), "; ", started->name, " goes on"));
+        }
+        PrintEnd(remote, *ended, /*indented=*/true);
+        return parameters.Explain(EndOf(*ended));
+      });
+}
+
+int OperationCommand::Watch() const {
+  return remote.Run([this](client::Client& client, const client::CallOptions& call, const Interrupt&) -> absl::Status {
+    const absl::StatusOr<std::string> operation = FindOperation(client, name, call);
+    if (!operation.ok()) {
+      return operation.status();
+    }
+    const absl::StatusOr<client::Operation> ended = Follow(client, remote, *operation, call, /*prints_events=*/true);
+    if (!ended.ok()) {
+      return ended.status();
+    }
+    PrintEnd(remote, *ended, /*indented=*/false);
+    return EndOf(*ended);
+  });
+}
+
+int OperationCommand::Cancel() const {
+  return remote.Run([this](client::Client& client, const client::CallOptions& call, const Interrupt&) -> absl::Status {
+    const absl::StatusOr<std::string> operation = FindOperation(client, name, call);
+    if (!operation.ok()) {
+      return operation.status();
+    }
+    if (const absl::StatusOr<client::Operation> asked = client.CancelOperation(*operation, call); !asked.ok()) {
+      return asked.status();
+    }
+    const absl::StatusOr<client::Operation> ended = client.WatchOperation(*operation, nullptr, std::nullopt, call);
+    if (!ended.ok()) {
+      return ended.status();
+    }
+    if (remote.json()) {
+      PrintJson(OperationJson(*ended));
+    } else if (!remote.quiet()) {
+      std::cout << ended->name << " " << StateName(ended->state) << "\n";
+    }
+    return absl::OkStatus();
+  });
+}
+
+}  // namespace
+
+void AddOperationCommands(CLI::App& app, int& exit_code) {
+  const auto refine = std::make_shared<OperationCommand>();
+  CLI::App* refine_app = app.add_subcommand(
+      "refine", "Refine the mesh of a session, and wait until it is done; Ctrl-C cancels the refinement");
+  refine_app->footer(kExitCodesHelp);
+  AddSession(*refine_app, refine->name);
+  refine->parameters.AddQualityTo(*refine_app);
+  refine_app->add_flag("--detach", refine->detach,
+                       "Do not wait: print the name of the operation, for watch and cancel");
+  AddExpectedRevision(*refine_app, refine->expected_revision);
+  refine->remote.AddTo(*refine_app, RemoteCommand::Needs::kLastingServer);
+  refine_app->callback([refine, &exit_code] { exit_code = refine->Refine(); });
+
+  const auto watch = std::make_shared<OperationCommand>();
+  CLI::App* watch_app =
+      app.add_subcommand("watch",
+                         "Follow an operation to its end; Ctrl-C leaves it alone. As JSON: an event a "
+                         "line, then the operation in one line");
+  watch_app->footer(kExitCodesHelp);
+  AddOperation(*watch_app, watch->name);
+  watch->remote.AddTo(*watch_app, RemoteCommand::Needs::kLastingServer);
+  watch_app->callback([watch, &exit_code] { exit_code = watch->Watch(); });
+
+  const auto cancel = std::make_shared<OperationCommand>();
+  CLI::App* cancel_app =
+      app.add_subcommand("cancel", "Cancel an operation, and wait until it has ended; its session keeps its points");
+  cancel_app->footer(kExitCodesHelp);
+  AddOperation(*cancel_app, cancel->name);
+  cancel->remote.AddTo(*cancel_app, RemoteCommand::Needs::kLastingServer);
+  cancel_app->callback([cancel, &exit_code] { exit_code = cancel->Cancel(); });
+}
+
+}  // namespace wellspace::cli

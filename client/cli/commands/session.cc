@@ -1,0 +1,247 @@
+// wellspace session: create, list, show, update and delete sessions of a server.
+#include <iostream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
+#include "client/cli/commands/commands.h"
+#include "client/cli/options.h"
+#include "client/cli/parameter_options.h"
+#include "client/cli/progress_bar.h"
+#include "client/cli/remote_command.h"
+#include "client/cli/session_options.h"
+
+namespace wellspace::cli {
+namespace {
+
+std::string LabelsText(const client::Labels& labels) { return absl::StrJoin(labels, " ", absl::PairFormatter("=")); }
+
+void PrintSession(const client::Session& session, bool json) {
+  if (json) {
+    PrintJson(SessionJson(session));
+    return;
+  }
+  const auto print = [](const char* name, const std::string& value) {
+    std::cout << absl::StrFormat("%-16s %s\n", name, value);
+  };
+  print("name", session.name);
+  print("state", StateName(session.state));
+  print("dimension", absl::StrCat(session.parameters.dimension));
+  print("points", WithThousands(session.committed_points));
+  print("vertices", WithThousands(session.vertex_count));
+  print("simplices", WithThousands(session.simplex_count));
+  print("revision", absl::StrCat(session.revision));
+  print("last operation", session.last_operation.empty() ? "none" : session.last_operation);
+  print("labels", LabelsText(session.labels));
+  print("ttl", absl::StrFormat("%g s", absl::ToDoubleSeconds(session.ttl)));
+  print("created", TimeText(session.create_time));
+  print("expires", TimeText(session.expire_time));
+}
+
+struct SessionCommand {
+  RemoteCommand remote;
+  ParameterOptions parameters;
+  std::string session;
+  std::vector<std::string> sessions;
+  client::Labels labels;
+  bool clear_labels = false;
+  double ttl_seconds = 0;  // 0: not given
+  uint64_t limit = 0;      // 0: none
+  uint64_t expected_revision = 0;
+
+  std::optional<absl::Duration> Ttl() const {
+    return ttl_seconds > 0 ? std::make_optional(absl::Seconds(ttl_seconds)) : std::nullopt;
+  }
+
+  int Create();
+  int List();
+  int Show();
+  int Update();
+  int Delete();
+};
+
+int SessionCommand::Create() {
+  absl::Status status = parameters.Check();
+  if (status.ok() && parameters.dimension() == 0) {
+    status = absl::InvalidArgumentError("--dimension: is required; expected 2 to 6, or --domain");
+  }
+  const absl::StatusOr<client::MeshOptions> options = status.ok() ? parameters.For(parameters.dimension()) : status;
+  if (!options.ok()) {
+    return ReportError(options.status(), remote.format());
+  }
+  return remote.Run([&](client::Client& client, const client::CallOptions& call, const Interrupt&) {
+    const absl::StatusOr<client::Session> created =
+        client.CreateSession({.parameters = *options, .labels = labels, .ttl = Ttl()}, call);
+    if (!created.ok()) {
+      return parameters.Explain(created.status());
+    }
+    if (remote.json()) {
+      PrintJson(SessionJson(*created));
+    } else {
+      std::cout << created->name << "\n";
+    }
+    return absl::OkStatus();
+  });
+}
+
+int SessionCommand::List() {
+  return remote.Run([&](client::Client& client, const client::CallOptions& call, const Interrupt&) -> absl::Status {
+    Json json = Json::array();
+    client::PageOptions page;
+    uint64_t listed = 0;
+    if (!remote.json() && !remote.quiet()) {
+      std::cout << absl::StrFormat("%-44s %-9s %12s %12s  %-20s  %s\n", "NAME", "STATE", "POINTS", "VERTICES",
+                                   "EXPIRES", "LABELS");
+    }
+    do {
+      constexpr uint64_t kLargestPage = 1000;
+      page.page_size = static_cast<int>(limit == 0 ? 0 : std::min(limit - listed, kLargestPage));
+      const absl::StatusOr<client::SessionPage> result = client.ListSessions(labels, page, call);
+      if (!result.ok()) {
+        return result.status();
+      }
+      for (const client::Session& one : result->sessions) {
+        ++listed;
+        if (remote.json()) {
+          json.push_back(SessionJson(one));
+        } else {
+          std::cout << absl::StrFormat("%-44s %-9s %12s %12s  %-20s  %s\n", one.name, StateName(one.state),
+                                       WithThousands(one.committed_points), WithThousands(one.vertex_count),
+                                       TimeText(one.expire_time), LabelsText(one.labels));
+        }
+      }
+      page.page_token = result->next_page_token;
+    } while (!page.page_token.empty() && (limit == 0 || listed < limit));
+    if (remote.json()) {
+      PrintJson(json);
+    }
+    return absl::OkStatus();
+  });
+}
+
+int SessionCommand::Show() {
+  return remote.Run([&](client::Client& client, const client::CallOptions& call, const Interrupt&) {
+    const absl::StatusOr<client::Session> found = client.GetSession(session, call);
+    if (found.ok()) {
+      PrintSession(*found, remote.json());
+    }
+    return found.status();
+  });
+}
+
+int SessionCommand::Update() {
+  client::SessionChange change;
+  change.ttl = Ttl();
+  if (!labels.empty() || clear_labels) {
+    change.labels = labels;
+  }
+  if (!change.ttl.has_value() && !change.labels.has_value()) {
+    return ReportError(absl::InvalidArgumentError("nothing to change; expected --ttl, --label or --clear-labels"),
+                       remote.format());
+  }
+  return remote.Run([&](client::Client& client, client::CallOptions call, const Interrupt&) {
+    call.expected_revision = expected_revision;
+    const absl::StatusOr<client::Session> updated = client.UpdateSession(session, change, call);
+    if (updated.ok() && (remote.json() || !remote.quiet())) {
+      PrintSession(*updated, remote.json());
+    }
+    return updated.status();
+  });
+}
+
+int SessionCommand::Delete() {
+  return remote.Run([&](client::Client& client, client::CallOptions call, const Interrupt&) -> absl::Status {
+    call.expected_revision = expected_revision;
+    for (const std::string& one : sessions) {
+      if (absl::Status status = client.DeleteSession(one, call); !status.ok()) {
+        return absl::Status(status.code(), absl::StrCat(one, ": ", status.message()));
+      }
+    }
+    if (remote.json()) {
+      PrintJson({{"deleted", sessions}});
+    }
+    return absl::OkStatus();
+  });
+}
+
+// Adds a subcommand that runs `member`.
+CLI::App* Add(CLI::App& session, const char* name, const char* description,
+              const std::shared_ptr<SessionCommand>& command, int (SessionCommand::*member)(), int& exit_code) {
+  CLI::App* app = session.add_subcommand(name, description);
+  app->footer(kExitCodesHelp);
+  app->callback([command, member, &exit_code] { exit_code = (command.get()->*member)(); });
+  return app;
+}
+
+CLI::Option* AddTtl(CLI::App& app, double& seconds) {
+  return AddNumber(app, "--ttl", seconds,
+                   "Seconds that the session lives without any use; default: as the server likes it")
+      ->check(CLI::PositiveNumber);
+}
+
+void AddCreate(CLI::App& session, int& exit_code) {
+  const auto command = std::make_shared<SessionCommand>();
+  CLI::App* app =
+      Add(session, "create", "Create a session, and print its name", command, &SessionCommand::Create, exit_code);
+  command->parameters.AddSpaceTo(*app);
+  command->parameters.AddQualityTo(*app);
+  AddLabels(*app, command->labels, "Label of the session; may be given more than once");
+  AddTtl(*app, command->ttl_seconds);
+  command->remote.AddTo(*app, RemoteCommand::Needs::kLastingServer);
+}
+
+void AddList(CLI::App& session, int& exit_code) {
+  const auto command = std::make_shared<SessionCommand>();
+  CLI::App* app = Add(session, "list", "List sessions, the oldest first", command, &SessionCommand::List, exit_code);
+  AddLabels(*app, command->labels, "Only sessions with this label; may be given more than once");
+  app->add_option("--limit", command->limit, "Most sessions to list; default: all")->check(CLI::PositiveNumber);
+  command->remote.AddTo(*app, RemoteCommand::Needs::kLastingServer);
+}
+
+void AddShow(CLI::App& session, int& exit_code) {
+  const auto command = std::make_shared<SessionCommand>();
+  CLI::App* app =
+      Add(session, "show", "Show a session, and renew its lease", command, &SessionCommand::Show, exit_code);
+  AddSession(*app, command->session);
+  command->remote.AddTo(*app, RemoteCommand::Needs::kLastingServer);
+}
+
+void AddUpdate(CLI::App& session, int& exit_code) {
+  const auto command = std::make_shared<SessionCommand>();
+  CLI::App* app = Add(session, "update", "Change the labels or the time to live of a session", command,
+                      &SessionCommand::Update, exit_code);
+  AddSession(*app, command->session);
+  CLI::Option* labels =
+      AddLabels(*app, command->labels, "Label in the place of all that there are; may be given more than once");
+  app->add_flag("--clear-labels", command->clear_labels, "Remove all labels")->excludes(labels);
+  AddTtl(*app, command->ttl_seconds);
+  AddExpectedRevision(*app, command->expected_revision);
+  command->remote.AddTo(*app, RemoteCommand::Needs::kLastingServer);
+}
+
+void AddDelete(CLI::App& session, int& exit_code) {
+  const auto command = std::make_shared<SessionCommand>();
+  CLI::App* app = Add(session, "delete", "Delete sessions with their points and meshes", command,
+                      &SessionCommand::Delete, exit_code);
+  AddSessions(*app, command->sessions);
+  AddExpectedRevision(*app, command->expected_revision);
+  command->remote.AddTo(*app, RemoteCommand::Needs::kLastingServer);
+}
+
+}  // namespace
+
+void AddSessionCommands(CLI::App& app, int& exit_code) {
+  CLI::App* session = app.add_subcommand("session", "Create, list, show, update and delete sessions of a server");
+  session->require_subcommand(1);
+  session->footer(kExitCodesHelp);
+  AddCreate(*session, exit_code);
+  AddList(*session, exit_code);
+  AddShow(*session, exit_code);
+  AddUpdate(*session, exit_code);
+  AddDelete(*session, exit_code);
+}
+
+}  // namespace wellspace::cli

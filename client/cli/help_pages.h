@@ -1,0 +1,18 @@
+// What is told of the tool elsewhere than in --help, made of the same descriptions.
+#ifndef WELLSPACE_CLIENT_CLI_HELP_PAGES_H_
+#define WELLSPACE_CLIENT_CLI_HELP_PAGES_H_
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+namespace wellspace::cli {
+
+// A script that makes bash complete commands, options, the values of options that have few, and names of files.
+std::string BashCompletion(const CLI::App& app);
+
+// The manual page wellspace(1), in the macros of man(7). `version` is that of the tool.
+std::string ManualPage(const CLI::App& app, const std::string& version);
+
+}  // namespace wellspace::cli
+
+#endif  // WELLSPACE_CLIENT_CLI_HELP_PAGES_H_

@@ -1,0 +1,138 @@
+#include "client/cli/json.h"
+
+namespace wellspace::cli {
+namespace {
+
+Json OptionalTime(const std::optional<absl::Time>& time) {
+  return time.has_value() ? Json(TimeText(*time)) : Json(nullptr);
+}
+
+}  // namespace
+
+const char* StateName(client::SessionState state) {
+  switch (state) {
+    case client::SessionState::kOpen:
+      return "open";
+    case client::SessionState::kRefining:
+      return "refining";
+    case client::SessionState::kReady:
+      return "ready";
+    default:
+      return "unknown";  // of a newer server
+  }
+}
+
+const char* StateName(client::OperationState state) {
+  switch (state) {
+    case client::OperationState::kQueued:
+      return "queued";
+    case client::OperationState::kRunning:
+      return "running";
+    case client::OperationState::kSucceeded:
+      return "succeeded";
+    case client::OperationState::kFailed:
+      return "failed";
+    case client::OperationState::kCancelled:
+      return "cancelled";
+    default:
+      return "unknown";  // of a newer server
+  }
+}
+
+std::string TimeText(absl::Time time) { return absl::FormatTime("%Y-%m-%d%ET%H:%M:%SZ", time, absl::UTCTimeZone()); }
+
+Json ErrorJson(const absl::Status& status) {
+  Json json;
+  json["code"] = absl::StatusCodeToString(status.code());
+  if (const std::string reason = client::ReasonOf(status); !reason.empty()) {
+    json["reason"] = reason;
+  }
+  if (const std::string field = client::BlamedField(status); !field.empty()) {
+    json["field"] = field;
+  }
+  json["message"] = std::string(status.message());
+  return json;
+}
+
+Json ParametersJson(const client::MeshOptions& parameters) {
+  Json json;
+  json["dimension"] = parameters.dimension;
+  json["rho"] = parameters.rho;
+  json["criterion"] = parameters.criterion == client::Criterion::kWellSpaced ? "well-spaced" : "radius-edge";
+  json["max_circumradius"] = parameters.max_circumradius;
+  json["size_boxes"] = Json::array();
+  for (const client::SizeBox& box : parameters.size_boxes) {
+    json["size_boxes"].push_back({{"low", box.low}, {"high", box.high}, {"max_circumradius", box.max_circumradius}});
+  }
+  const bool has_domain = !parameters.domain_low.empty();
+  json["domain_low"] = has_domain ? Json(parameters.domain_low) : Json(nullptr);
+  json["domain_high"] = has_domain ? Json(parameters.domain_high) : Json(nullptr);
+  json["margin"] = parameters.margin;
+  json["max_vertices"] = parameters.max_vertices;
+  json["threads"] = parameters.threads;
+  return json;
+}
+
+Json SessionJson(const client::Session& session) {
+  Json json;
+  json["name"] = session.name;
+  json["state"] = StateName(session.state);
+  json["parameters"] = ParametersJson(session.parameters);
+  json["labels"] = session.labels;
+  json["ttl_seconds"] = absl::ToDoubleSeconds(session.ttl);
+  json["create_time"] = TimeText(session.create_time);
+  json["expire_time"] = TimeText(session.expire_time);
+  json["revision"] = session.revision;
+  json["committed_points"] = session.committed_points;
+  json["vertex_count"] = session.vertex_count;
+  json["simplex_count"] = session.simplex_count;
+  json["last_operation"] = session.last_operation.empty() ? Json(nullptr) : Json(session.last_operation);
+  return json;
+}
+
+Json ProgressJson(const client::Progress& progress) {
+  Json json;
+  json["sequence"] = progress.sequence;
+  json["phase"] = progress.phase;
+  json["vertices"] = progress.vertices;
+  json["estimated_vertices"] = progress.estimated_vertices;
+  json["simplices"] = progress.simplices;
+  json["fraction"] = progress.fraction;
+  return json;
+}
+
+Json OperationJson(const client::Operation& operation) {
+  Json json;
+  json["name"] = operation.name;
+  json["state"] = StateName(operation.state);
+  json["parameters"] = ParametersJson(operation.parameters);
+  json["progress"] = ProgressJson(operation.progress);
+  json["error"] = operation.error.ok() ? Json(nullptr) : ErrorJson(operation.error);
+  json["create_time"] = TimeText(operation.create_time);
+  json["start_time"] = OptionalTime(operation.start_time);
+  json["end_time"] = OptionalTime(operation.end_time);
+  json["mesh_revision"] = operation.mesh_revision;
+  return json;
+}
+
+Json ServerInfoJson(const client::ServerInfo& info) {
+  Json json;
+  json["version"] = info.version;
+  json["dimensions"] = info.dimensions;
+  json["max_points"] = info.max_points;
+  json["max_vertices"] = info.max_vertices;
+  json["max_request_bytes"] = info.max_request_bytes;
+  json["workers"] = info.workers;
+  json["max_queued_jobs"] = info.max_queued_jobs;
+  json["running_jobs"] = info.running_jobs;
+  json["queued_jobs"] = info.queued_jobs;
+  json["max_sessions"] = info.max_sessions;
+  json["max_sessions_per_tenant"] = info.max_sessions_per_tenant;
+  json["default_ttl_seconds"] = absl::ToDoubleSeconds(info.default_ttl);
+  json["max_ttl_seconds"] = absl::ToDoubleSeconds(info.max_ttl);
+  json["stall_limit_seconds"] = absl::ToDoubleSeconds(info.stall_limit);
+  json["max_memory_bytes"] = info.max_memory_bytes;
+  return json;
+}
+
+}  // namespace wellspace::cli

@@ -1,0 +1,39 @@
+// What the tool prints with --output json.
+#ifndef WELLSPACE_CLIENT_CLI_JSON_H_
+#define WELLSPACE_CLIENT_CLI_JSON_H_
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "absl/status/status.h"
+#include "client/client.h"
+
+namespace wellspace::cli {
+
+using Json = nlohmann::ordered_json;
+
+// Times are RFC 3339 in UTC, durations seconds, names of states lower case. Absent: null.
+
+// code, reason and field (where the server gave one), message.
+Json ErrorJson(const absl::Status& status);
+// dimension, rho, criterion, max_circumradius, size_boxes, domain_low, domain_high, margin, max_vertices, threads.
+Json ParametersJson(const client::MeshOptions& parameters);
+// name, state, parameters, labels, ttl_seconds, create_time, expire_time, revision, committed_points, vertex_count, simplex_count,
+// last_operation.
+Json SessionJson(const client::Session& session);
+// sequence, phase, vertices, estimated_vertices, simplices, fraction.
+Json ProgressJson(const client::Progress& progress);
+// name, state, parameters, progress, error, create_time, start_time, end_time, mesh_revision.
+Json OperationJson(const client::Operation& operation);
+// Every field of client::ServerInfo.
+Json ServerInfoJson(const client::ServerInfo& info);
+
+// "open", "running" and so on.
+const char* StateName(client::SessionState state);
+const char* StateName(client::OperationState state);
+// "2026-01-31T23:59:59Z".
+std::string TimeText(absl::Time time);
+
+}  // namespace wellspace::cli
+
+#endif  // WELLSPACE_CLIENT_CLI_JSON_H_

@@ -1,0 +1,178 @@
+#include "client/cli/parameter_options.h"
+
+#include <algorithm>
+#include <charconv>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "client/cli/options.h"
+#include "client/error_details.h"
+#include "client/formats/cloud.h"
+
+namespace wellspace::cli {
+namespace {
+
+constexpr char kRadiusEdge[] = "radius-edge";
+constexpr char kWellSpaced[] = "well-spaced";
+
+bool IsDimension(size_t dimension) {
+  return dimension >= formats::kMinDimension && dimension <= formats::kMaxDimension;
+}
+
+// Numbers as they might have been written.
+std::string Text(const std::vector<double>& numbers) { return absl::StrJoin(numbers, ","); }
+
+}  // namespace
+
+CLI::Option* AddCriterion(CLI::App& command, client::Criterion& criterion) {
+  return command
+      .add_option_function<std::string>(
+          "--criterion",
+          [&criterion](const std::string& name) {
+            criterion = name == kWellSpaced ? client::Criterion::kWellSpaced : client::Criterion::kRadiusEdge;
+          },
+          "What --rho bounds: radius-edge, circumradius / shortest edge of every simplex; or well-spaced, for every "
+          "vertex the farthest node of its Voronoi cell / its nearest neighbour, which is stronger; default: "
+          "radius-edge")
+      ->check(CLI::IsMember({kRadiusEdge, kWellSpaced}));
+}
+
+void AddSizes(CLI::App& command, double& max_circumradius, std::vector<std::vector<double>>& size_boxes) {
+  AddNumber(command, "--size", max_circumradius, "Bound on the circumradius of every simplex; default: none");
+  AddNumberLists(command, "--size-box", size_boxes,
+                 "Low corner, high corner and a bound on the circumradius of every simplex whose circumball meets this "
+                 "box; may be given more than once");
+}
+
+absl::StatusOr<std::vector<client::SizeBox>> SizeBoxesOf(const std::vector<std::vector<double>>& size_boxes,
+                                                         int dimension) {
+  std::vector<client::SizeBox> boxes;
+  for (const std::vector<double>& numbers : size_boxes) {
+    const size_t corner = numbers.size() / 2;
+    const bool is_expected = dimension == 0 ? IsDimension(corner) : corner == static_cast<size_t>(dimension);
+    if (!is_expected || numbers.size() % 2 == 0) {
+      return absl::InvalidArgumentError(absl::StrCat(
+          "--size-box ", Text(numbers), ": expected low corner, high corner and size, ",
+          dimension == 0 ? absl::StrCat(2 * formats::kMinDimension + 1, " numbers in ", formats::kMinDimension,
+                                        "-D to ", 2 * formats::kMaxDimension + 1, " in ", formats::kMaxDimension, "-D")
+                         : absl::StrCat(2 * dimension + 1, " numbers in ", dimension, "-D"),
+          ", got ", numbers.size()));
+    }
+    boxes.push_back({.low = {numbers.begin(), numbers.begin() + corner},
+                     .high = {numbers.begin() + corner, numbers.end() - 1},
+                     .max_circumradius = numbers.back()});
+  }
+  return boxes;
+}
+
+void ParameterOptions::AddSpaceTo(CLI::App& command) {
+  command.add_option("--dimension", dimension_, "Dimension; default: as many as the points have coordinates")
+      ->check(CLI::Range(formats::kMinDimension, formats::kMaxDimension));
+  CLI::Option* domain =
+      AddNumbers(command, "--domain", domain_, "Box to be meshed, low corner then high corner; default: by --margin");
+  AddNumber(command, "--margin", options_.margin,
+            "Grow the bounding box of the points on every side by this times its longest side; default: 0.25")
+      ->excludes(domain);
+}
+
+void ParameterOptions::AddQualityTo(CLI::App& command) {
+  AddCriterion(command, options_.criterion);
+  AddNumber(command, "--rho", options_.rho,
+            "Bound of the criterion; default: that of the dimension, sqrt(2) in 2-D, 2 in 3-D");
+  AddSizes(command, options_.max_circumradius, size_boxes_);
+  command.add_option("--max-vertices", options_.max_vertices,
+                     "Fail before the mesh has more vertices than this; 50 million by default");
+  command.add_option("--threads", options_.threads, "Threads that mesh; default: the server's choice")
+      ->check(CLI::Range(1, 1024));
+  for (const char* name : {"--criterion", "--rho", "--size", "--size-box", "--max-vertices", "--threads"}) {
+    quality_.push_back(command.get_option(name));
+  }
+}
+
+int ParameterOptions::dimension() const {
+  if (dimension_ != 0 || !domain_.empty()) {
+    return dimension_ != 0 ? dimension_ : static_cast<int>(domain_.size() / 2);
+  }
+  return size_boxes_.empty() ? 0 : static_cast<int>(size_boxes_.front().size() / 2);
+}
+
+absl::Status ParameterOptions::Check() const {
+  if (!domain_.empty() && (domain_.size() % 2 != 0 || !IsDimension(domain_.size() / 2))) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("--domain ", Text(domain_), ": expected low corner and high corner, ", 2 * formats::kMinDimension,
+                     " numbers in ", formats::kMinDimension, "-D to ", 2 * formats::kMaxDimension, " in ",
+                     formats::kMaxDimension, "-D, got ", domain_.size()));
+  }
+  if (!domain_.empty() && domain_.size() != 2u * dimension()) {
+    return absl::InvalidArgumentError(absl::StrCat("--domain ", Text(domain_), ": expected ", 2 * dimension(),
+                                                   " numbers with --dimension ", dimension(), ", got ",
+                                                   domain_.size()));
+  }
+  return SizeBoxesOf(size_boxes_, IsDimension(dimension()) ? dimension() : 0).status();
+}
+
+absl::StatusOr<client::MeshOptions> ParameterOptions::For(int dimension) const {
+  absl::StatusOr<std::vector<client::SizeBox>> boxes = SizeBoxesOf(size_boxes_, dimension);
+  if (!boxes.ok()) {
+    return boxes.status();
+  }
+  client::MeshOptions options = options_;
+  options.dimension = dimension;
+  options.size_boxes = *std::move(boxes);
+  options.domain_low.assign(domain_.begin(), domain_.begin() + domain_.size() / 2);
+  options.domain_high.assign(domain_.begin() + domain_.size() / 2, domain_.end());
+  return options;
+}
+
+bool ParameterOptions::has_quality() const {
+  return std::any_of(quality_.begin(), quality_.end(), [](const CLI::Option* option) { return option->count() > 0; });
+}
+
+absl::StatusOr<client::MeshOptions> ParameterOptions::Replace(client::MeshOptions parameters) const {
+  absl::StatusOr<client::MeshOptions> given = For(parameters.dimension);
+  if (!given.ok()) {
+    return given;
+  }
+  const auto replace = [this](size_t option, auto& old_value, auto&& value) {
+    if (quality_[option]->count() > 0) {
+      old_value = std::forward<decltype(value)>(value);
+    }
+  };
+  replace(0, parameters.criterion, given->criterion);
+  replace(1, parameters.rho, given->rho);
+  replace(2, parameters.max_circumradius, given->max_circumradius);
+  replace(3, parameters.size_boxes, std::move(given->size_boxes));
+  replace(4, parameters.max_vertices, given->max_vertices);
+  replace(5, parameters.threads, given->threads);
+  return parameters;
+}
+
+std::string ParameterOptions::OptionOf(const std::string& field) const {
+  constexpr std::string_view kParameters = "parameters.";
+  if (field.compare(0, kParameters.size(), kParameters) != 0) {
+    return "";
+  }
+  const std::string name = field.substr(kParameters.size());
+  constexpr std::string_view kSizeBoxes = "size_boxes[";
+  size_t index = 0;
+  if (name.compare(0, kSizeBoxes.size(), kSizeBoxes) == 0 &&
+      std::from_chars(name.data() + kSizeBoxes.size(), name.data() + name.size(), index).ec == std::errc() &&
+      index < size_boxes_.size()) {
+    return absl::StrCat("--size-box ", Text(size_boxes_[index]));
+  }
+  if (name == "max_circumradius") {
+    return "--size";
+  }
+  std::string option = "--" + name;
+  std::replace(option.begin(), option.end(), '_', '-');
+  return option;
+}
+
+absl::Status ParameterOptions::Explain(const absl::Status& status) const {
+  const std::string option =
+      status.code() == absl::StatusCode::kInvalidArgument ? OptionOf(client::BlamedField(status)) : "";
+  return option.empty() ? status : absl::InvalidArgumentError(absl::StrCat(option, ": ", status.message()));
+}
+
+}  // namespace wellspace::cli

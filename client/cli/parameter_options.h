@@ -1,0 +1,61 @@
+// The options that say what a mesh is to be.
+#ifndef WELLSPACE_CLIENT_CLI_PARAMETER_OPTIONS_H_
+#define WELLSPACE_CLIENT_CLI_PARAMETER_OPTIONS_H_
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "client/mesh.h"
+
+namespace wellspace::cli {
+
+// --criterion; default: radius-edge.
+CLI::Option* AddCriterion(CLI::App& command, client::Criterion& criterion);
+// --size and --size-box. Boxes are taken as they are written; see SizeBoxesOf.
+void AddSizes(CLI::App& command, double& max_circumradius, std::vector<std::vector<double>>& size_boxes);
+// The boxes of --size-box.
+//
+// Errors:     INVALID_ARGUMENT unless each has 2 D + 1 numbers, D = `dimension`, or any that there is when that is 0.
+absl::StatusOr<std::vector<client::SizeBox>> SizeBoxesOf(const std::vector<std::vector<double>>& size_boxes,
+                                                         int dimension);
+
+// Thread safety: thread-compatible.
+class ParameterOptions {
+ public:
+  // Adds --dimension, --domain and --margin. REQUIRES: this outlives `command`, here and below.
+  void AddSpaceTo(CLI::App& command);
+  // Adds the others.
+  void AddQualityTo(CLI::App& command);
+
+  // As far as the options tell it; 0: not known.
+  int dimension() const;
+
+  // What can be known to be wrong before the dimension is.
+  absl::Status Check() const;
+
+  // What they say of a mesh of `dimension`.
+  absl::StatusOr<client::MeshOptions> For(int dimension) const;
+
+  // Whether any of AddQualityTo's was given; if so, `parameters` with these in the place of its own.
+  bool has_quality() const;
+  absl::StatusOr<client::MeshOptions> Replace(client::MeshOptions parameters) const;
+
+  // `status`, with the option that the server blames: "--rho: …" for "parameters.rho". As it is when it blames none of these.
+  absl::Status Explain(const absl::Status& status) const;
+
+ private:
+  std::string OptionOf(const std::string& field) const;
+
+  int dimension_ = 0;
+  std::vector<double> domain_;
+  std::vector<std::vector<double>> size_boxes_;
+  client::MeshOptions options_;
+  std::vector<CLI::Option*> quality_;  // in the order of AddQualityTo
+};
+
+}  // namespace wellspace::cli
+
+#endif  // WELLSPACE_CLIENT_CLI_PARAMETER_OPTIONS_H_

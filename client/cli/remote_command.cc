@@ -1,0 +1,98 @@
+#include "client/cli/remote_command.h"
+
+#include <charconv>
+#include <iostream>
+#include <memory>
+#include <string_view>
+
+#include "absl/strings/str_cat.h"
+#include "client/cli/options.h"
+
+namespace wellspace::cli {
+
+void AddOutput(CLI::App& command, OutputFormat& format) {
+  command
+      .add_option_function<std::string>(
+          "--output",
+          [&format](const std::string& name) { format = name == "json" ? OutputFormat::kJson : OutputFormat::kText; },
+          "How results and errors are printed; default: text")
+      ->check(CLI::IsMember({"text", "json"}));
+}
+
+void PrintJson(const Json& json, bool indented) { std::cout << json.dump(indented ? 2 : -1) << "\n" << std::flush; }
+
+// The server knows points by their index; who wrote the file knows them by their line.
+absl::Status WithOrigins(const absl::Status& status, const formats::PointCloud& cloud, uint64_t first_index) {
+  constexpr std::string_view kPoint = "points[";
+  std::string message(status.message());
+  std::string first_origin;
+  for (size_t at = message.find(kPoint); at != std::string::npos; at = message.find(kPoint, at)) {
+    at += kPoint.size();
+    uint64_t point = 0;
+    const char* end = message.data() + message.size();
+    const std::from_chars_result result = std::from_chars(message.data() + at, end, point);
+    if (result.ec != std::errc() || result.ptr == end || *result.ptr != ']' || point < first_index ||
+        point - first_index >= cloud.size()) {
+      continue;
+    }
+    if (first_origin.empty()) {
+      first_origin = cloud.Origin(point - first_index);
+    } else {
+      message.insert(result.ptr + 1 - message.data(), absl::StrCat(" (", cloud.Origin(point - first_index), ")"));
+    }
+  }
+  return absl::Status(status.code(), first_origin.empty() ? message : absl::StrCat(first_origin, ": ", message));
+}
+
+void RemoteCommand::AddTo(CLI::App& command, Needs needs) {
+  const CLI::App* parent = command.get_parent();
+  const bool is_nested = parent != nullptr && parent->get_parent() != nullptr;
+  name_ = absl::StrCat(is_nested ? absl::StrCat(parent->get_name(), " ") : "", command.get_name());
+  needs_ = needs;
+  AddServer(command, server_);
+  AddNumber(command, "--timeout", timeout_seconds_, "Give up after so many seconds; default: never")
+      ->check(CLI::PositiveNumber);
+  AddOutput(command, format_);
+  command.add_flag("-q,--quiet", quiet_, "Print errors and results only");
+}
+
+absl::Duration RemoteCommand::timeout() const {
+  return timeout_seconds_ > 0 ? absl::Seconds(timeout_seconds_) : absl::InfiniteDuration();
+}
+
+absl::Status RemoteCommand::Explain(const absl::Status& status) const {
+  if (status.code() == absl::StatusCode::kDeadlineExceeded && timeout_seconds_ > 0) {
+    return absl::DeadlineExceededError(absl::StrCat("--timeout: ", timeout_seconds_, " seconds passed"));
+  }
+  return status;
+}
+
+int RemoteCommand::Run(const Work& work) const {
+  if (needs_ == Needs::kLastingServer && server_.address.empty()) {
+    return ReportError(
+        absl::InvalidArgumentError(absl::StrCat(
+            name_,
+            ": needs a server: give --server HOST:PORT, or set WELLSPACE_SERVER. Without one a server runs inside this "
+            "process and ends with it, and its sessions would end, too")),
+        format_);
+  }
+  Interrupt interrupt;
+  absl::StatusOr<std::unique_ptr<ServerLink>> link = ServerLink::Open(server_);
+  if (!link.ok()) {
+    // Nothing was called yet: it is the options that are wrong.
+    return ReportError(
+        absl::IsFailedPrecondition(link.status()) ? absl::InvalidArgumentError(link.status().message()) : link.status(),
+        format_);
+  }
+  client::CallOptions call;
+  call.timeout = timeout();
+  call.stop = interrupt.token();
+  const absl::Status status = work((*link)->client(), call, interrupt);
+  if (status.ok()) {
+    return kExitOk;
+  }
+  const int exit_code = ReportError((*link)->Explain(Explain(status)), format_);
+  return interrupt.signal() != 0 ? kExitSignal + interrupt.signal() : exit_code;
+}
+
+}  // namespace wellspace::cli

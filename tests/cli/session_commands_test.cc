@@ -1,0 +1,502 @@
+// The commands about sessions from the outside, with a server of the test's making.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <future>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "client/formats/read_mesh.h"
+#include "proto/checksum.h"
+#include "tests/cli/process.h"
+#include "tests/client/fake_server.h"
+#include "tests/formats/temporary_folder.h"
+
+namespace wellspace {
+namespace {
+
+using client::FakeServer;
+using client::MakeError;
+using nlohmann::json;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::StartsWith;
+
+constexpr char kSession[] = "sessions/one";
+constexpr char kOperation[] = "sessions/one/operations/two";
+
+v1::Session MakeSession() {
+  v1::Session session;
+  session.set_name(kSession);
+  session.set_state(v1::Session::STATE_OPEN);
+  session.mutable_parameters()->set_dimension(2);
+  session.mutable_parameters()->set_rho(1.5);
+  session.mutable_parameters()->set_threads(3);
+  session.mutable_ttl()->set_seconds(90);
+  (*session.mutable_labels())["job"] = "7";
+  session.set_revision(2);
+  session.set_committed_points(1234);
+  session.set_last_operation(kOperation);
+  return session;
+}
+
+v1::Operation MakeOperation(v1::Operation::State state) {
+  v1::Operation operation;
+  operation.set_name(kOperation);
+  operation.set_state(state);
+  operation.mutable_progress()->set_vertices(4321);
+  operation.set_mesh_revision(3);
+  return operation;
+}
+
+class SessionCommandsTest : public testing::Test {
+ protected:
+  SessionCommandsTest() {
+    server_.sessions.get = [](const v1::GetSessionRequest& request, v1::GetSessionResponse& response) {
+      *response.mutable_session() = MakeSession();
+      return request.name() == kSession ? grpc::Status::OK
+                                        : MakeError(grpc::StatusCode::NOT_FOUND, "no session " + request.name(),
+                                                    "ERROR_REASON_SESSION_NOT_FOUND");
+    };
+  }
+
+  RunResult Run(std::vector<std::string> arguments, const std::string& input = "") {
+    return RunWellspace(
+        arguments, {.input = input, .environment = {"WELLSPACE_SERVER=" + server_.address()}, .error_descriptor = -1});
+  }
+
+  // The operation ends as `end` when it is watched.
+  void OperationsEndAs(const v1::Operation& end) {
+    server_.operations.start = [this](const v1::StartRefinementRequest& request,
+                                      v1::StartRefinementResponse& response) {
+      started_ = request;
+      *response.mutable_operation() = MakeOperation(v1::Operation::STATE_QUEUED);
+      return grpc::Status::OK;
+    };
+    server_.operations.watch = [end](grpc::ServerContext&, const v1::WatchOperationRequest& request, auto& writer) {
+      EXPECT_EQ(request.name(), kOperation);
+      v1::WatchOperationResponse response;
+      response.mutable_progress()->set_phase(v1::PHASE_REFINEMENT);
+      response.mutable_progress()->set_fraction(0.5);
+      writer.Write(response);
+      *response.mutable_operation() = end;
+      writer.Write(response);
+      return grpc::Status::OK;
+    };
+  }
+
+  TemporaryFolder folder_;
+  FakeServer server_;
+  v1::StartRefinementRequest started_;
+};
+
+TEST(SessionCommandsWithoutServer, SayWhatTheyNeed) {
+  TemporaryFolder folder;
+  const std::string cloud = folder.Write("cloud.csv", "0,0\n");
+  const std::vector<std::vector<std::string>> commands = {
+      {"session", "create", "--dimension", "2"},
+      {"session", "list"},
+      {"session", "show", "a"},
+      {"session", "update", "a", "--ttl", "9"},
+      {"session", "delete", "a"},
+      {"upload", "a", cloud},
+      {"refine", "a"},
+      {"watch", "a"},
+      {"cancel", "a"},
+      {"download", "a", "-o", folder.Path("a.vtu")},
+      {"cells", "a"},
+      {"add", "a", cloud},
+  };
+  for (const std::vector<std::string>& command : commands) {
+    const RunResult result = RunWellspace(command);
+    EXPECT_EQ(result.exit_code, 2) << testing::PrintToString(command);
+    EXPECT_THAT(result.err, AllOf(HasSubstr(command[0]), HasSubstr("needs a server: give --server HOST:PORT, or set "
+                                                                   "WELLSPACE_SERVER")));
+  }
+}
+
+TEST_F(SessionCommandsTest, CreatePrintsTheName) {
+  v1::CreateSessionRequest seen;
+  server_.sessions.create = [&seen](const v1::CreateSessionRequest& request, v1::CreateSessionResponse& response) {
+    seen = request;
+    *response.mutable_session() = MakeSession();
+    return grpc::Status::OK;
+  };
+  const RunResult text = Run({"session", "create", "--domain", "0,0,1,2", "--size-box", "0,0,1,1,0.5", "--rho", "1.5",
+                              "--label", "job=7", "--label", "note=a=b", "--ttl", "1.5"});
+  ASSERT_EQ(text.exit_code, 0) << text.err;
+  EXPECT_EQ(text.out, "sessions/one\n");
+  EXPECT_EQ(seen.parameters().dimension(), 2);
+  EXPECT_THAT(seen.parameters().domain().high(), ElementsAre(1, 2));
+  EXPECT_EQ(seen.parameters().size_boxes(0).max_circumradius(), 0.5);
+  EXPECT_EQ(seen.labels().at("job"), "7");
+  EXPECT_EQ(seen.labels().at("note"), "a=b");
+  EXPECT_EQ(seen.ttl().seconds(), 1);
+  const RunResult result = Run({"session", "create", "--dimension", "2", "--output", "json"});
+  const json session = json::parse(result.out);
+  EXPECT_EQ(session["name"], kSession);
+  EXPECT_EQ(session["state"], "open");
+  EXPECT_EQ(session["parameters"]["rho"], 1.5);
+  EXPECT_EQ(session["labels"]["job"], "7");
+  EXPECT_EQ(session["ttl_seconds"], 90);
+  EXPECT_EQ(session["create_time"], "1970-01-01T00:00:00Z");
+  EXPECT_EQ(Run({"session", "create"}).exit_code, 2);
+  EXPECT_EQ(Run({"session", "create", "--dimension", "2", "--label", "x"}).exit_code, 2);
+}
+
+TEST_F(SessionCommandsTest, ErrorsOfTheServerNameTheOptionAndTheReason) {
+  server_.sessions.create = [](const auto&, auto&) {
+    google::rpc::BadRequest blame;
+    blame.add_field_violations()->set_field("parameters.rho");
+    google::rpc::ErrorInfo info;
+    info.set_reason("ERROR_REASON_INVALID_PARAMETERS");
+    google::rpc::Status details;
+    details.add_details()->PackFrom(info);
+    details.add_details()->PackFrom(blame);
+    return grpc::Status(grpc::StatusCode::INVALID_ARGUMENT, "rho: too small", details.SerializeAsString());
+  };
+  const RunResult text = Run({"session", "create", "--dimension", "2", "--rho", "0.1"});
+  EXPECT_EQ(text.exit_code, 2);
+  EXPECT_EQ(text.err, "wellspace: --rho: rho: too small [INVALID_ARGUMENT]\n");
+  const RunResult missing = Run({"session", "show", "other", "--output", "json"});
+  EXPECT_EQ(missing.exit_code, 2);
+  EXPECT_EQ(json::parse(missing.err), json::parse(R"({"error": {"code": "NOT_FOUND",
+      "reason": "ERROR_REASON_SESSION_NOT_FOUND", "message": "no session sessions/other"}})"));
+  EXPECT_THAT(missing.out, IsEmpty());
+}
+
+TEST_F(SessionCommandsTest, ShowTakesEitherFormOfAName) {
+  for (const char* name : {"one", "sessions/one"}) {
+    const RunResult result = Run({"session", "show", name});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(result.out, AllOf(HasSubstr("sessions/one\n"), HasSubstr("1,234"), HasSubstr("job=7")));
+  }
+}
+
+TEST_F(SessionCommandsTest, ListGoesThroughAllPages) {
+  std::vector<v1::ListSessionsRequest> requests;
+  server_.sessions.list = [&requests](const v1::ListSessionsRequest& request, v1::ListSessionsResponse& response) {
+    requests.push_back(request);
+    for (int i = 0; i < (request.page_size() == 0 ? 2 : std::min(2, request.page_size())); ++i) {
+      *response.add_sessions() = MakeSession();
+    }
+    if (request.page_token().size() < 2) {
+      response.set_next_page_token(request.page_token() + "x");
+    }
+    return grpc::Status::OK;
+  };
+  const RunResult all = Run({"session", "list", "--output", "json", "--label", "job=7"});
+  ASSERT_EQ(all.exit_code, 0) << all.err;
+  EXPECT_EQ(json::parse(all.out).size(), 6u);
+  ASSERT_EQ(requests.size(), 3u);
+  EXPECT_EQ(requests[2].page_token(), "xx");
+  EXPECT_EQ(requests[2].labels().at("job"), "7");
+  const RunResult some = Run({"session", "list", "--limit", "3", "--quiet"});
+  ASSERT_EQ(some.exit_code, 0) << some.err;
+  EXPECT_EQ(std::count(some.out.begin(), some.out.end(), '\n'), 3);
+  EXPECT_THAT(some.out, StartsWith("sessions/one"));
+}
+
+TEST_F(SessionCommandsTest, UpdateAndDelete) {
+  v1::UpdateSessionRequest update;
+  server_.sessions.update = [&update](const v1::UpdateSessionRequest& request, v1::UpdateSessionResponse& response) {
+    update = request;
+    *response.mutable_session() = MakeSession();
+    return grpc::Status::OK;
+  };
+  std::vector<std::string> deleted;
+  server_.sessions.remove = [&deleted](const v1::DeleteSessionRequest& request, v1::DeleteSessionResponse&) {
+    deleted.push_back(request.name());
+    return request.name() == "sessions/busy"
+               ? MakeError(grpc::StatusCode::ABORTED, "at revision 9", "ERROR_REASON_REVISION_MISMATCH")
+               : grpc::Status::OK;
+  };
+  ASSERT_EQ(Run({"session", "update", "one", "--ttl", "5", "--expected-revision", "2"}).exit_code, 0);
+  EXPECT_THAT(update.update_mask().paths(), ElementsAre("ttl"));
+  EXPECT_EQ(update.expected_revision(), 2u);
+  ASSERT_EQ(Run({"session", "update", "one", "--clear-labels"}).exit_code, 0);
+  EXPECT_THAT(update.update_mask().paths(), ElementsAre("labels"));
+  EXPECT_TRUE(update.session().labels().empty());
+  EXPECT_EQ(Run({"session", "update", "one"}).exit_code, 2);
+  const RunResult two = Run({"session", "delete", "one", "sessions/two", "--output", "json"});
+  EXPECT_EQ(two.exit_code, 0) << two.err;
+  EXPECT_EQ(json::parse(two.out), json::parse(R"({"deleted": ["sessions/one", "sessions/two"]})"));
+  const RunResult busy = Run({"session", "delete", "busy"});
+  EXPECT_EQ(busy.exit_code, 7);
+  EXPECT_THAT(busy.err, HasSubstr("sessions/busy: at revision 9"));
+  EXPECT_THAT(deleted, ElementsAre("sessions/one", "sessions/two", "sessions/busy"));
+}
+
+TEST_F(SessionCommandsTest, UploadSendsTheFileAndNamesLinesInErrors) {
+  std::vector<double> points;
+  uint64_t offset = 0;
+  bool refuses = false;
+  server_.sessions.upload = [&](grpc::ServerContext&, auto& reader, v1::UploadPointsResponse& response) {
+    v1::UploadPointsRequest request;
+    points.clear();
+    while (reader.Read(&request)) {
+      offset = points.empty() ? request.point_offset() : offset;
+      points.insert(points.end(), request.points().coordinates().begin(), request.points().coordinates().end());
+    }
+    response.set_committed_points(offset + points.size() / 2);
+    response.set_revision(5);
+    return refuses ? MakeError(grpc::StatusCode::INVALID_ARGUMENT, "points[1235] is outside the domain",
+                               "ERROR_REASON_INVALID_POINTS")
+                   : grpc::Status::OK;
+  };
+  const std::string cloud = folder_.Write("cloud.csv", "x,y\n1,2\n\n3,4\n");
+  const RunResult text = Run({"upload", "one", cloud});
+  ASSERT_EQ(text.exit_code, 0) << text.err;
+  EXPECT_EQ(text.out, "sessions/one: 1,236 points, revision 5\n");
+  EXPECT_THAT(points, ElementsAre(1, 2, 3, 4));
+  EXPECT_EQ(offset, 1234u);
+  const RunResult piped = Run({"upload", "one", "-", "--offset", "1233", "--output", "json"}, "1,2\n3,4\n");
+  ASSERT_EQ(piped.exit_code, 0) << piped.err;
+  EXPECT_EQ(json::parse(piped.out),
+            json::parse(R"({"session": "sessions/one", "committed_points": 1235, "revision": 5})"));
+  EXPECT_THAT(points, ElementsAre(3, 4));
+  refuses = true;
+  const RunResult outside = Run({"upload", "one", cloud});
+  EXPECT_EQ(outside.exit_code, 2);
+  EXPECT_THAT(outside.err, HasSubstr("cloud.csv:4: points[1235] is outside"));
+  const RunResult solid = Run({"upload", "one", "-"}, "1,2,3\n");
+  EXPECT_EQ(solid.exit_code, 2);
+  EXPECT_THAT(solid.err, HasSubstr("<stdin>:1: expected 2 coordinates, got 3"));
+}
+
+TEST_F(SessionCommandsTest, RefineWaitsForTheEnd) {
+  OperationsEndAs(MakeOperation(v1::Operation::STATE_SUCCEEDED));
+  const RunResult text = Run({"refine", "one"});
+  ASSERT_EQ(text.exit_code, 0) << text.err;
+  EXPECT_EQ(text.out, "sessions/one/operations/two succeeded: 4,321 vertices, revision 3\n");
+  EXPECT_FALSE(started_.has_parameters());
+  const RunResult result = Run({"refine", "one", "--output", "json", "--rho", "3", "--expected-revision", "8"});
+  EXPECT_EQ(json::parse(result.out)["state"], "succeeded");
+  // What is not given stays as the session has it.
+  EXPECT_EQ(started_.parameters().dimension(), 2);
+  EXPECT_EQ(started_.parameters().rho(), 3);
+  EXPECT_EQ(started_.parameters().threads(), 3);
+  EXPECT_EQ(started_.expected_revision(), 8u);
+  const RunResult detached = Run({"refine", "one", "--detach"});
+  EXPECT_EQ(detached.out, std::string(kOperation) + "\n");
+}
+
+TEST_F(SessionCommandsTest, AFailedOperationIsTheCommandsError) {
+  v1::Operation failed = MakeOperation(v1::Operation::STATE_FAILED);
+  failed.mutable_error()->set_code(grpc::StatusCode::RESOURCE_EXHAUSTED);
+  failed.mutable_error()->set_message("too many vertices");
+  OperationsEndAs(failed);
+  for (const char* command : {"refine", "watch"}) {
+    const RunResult result = Run({command, "one"});
+    EXPECT_EQ(result.exit_code, 4);
+    EXPECT_EQ(result.err, "wellspace: too many vertices [RESOURCE_EXHAUSTED]\n");
+    EXPECT_THAT(result.out, IsEmpty());
+  }
+}
+
+TEST_F(SessionCommandsTest, WatchPrintsEventsAsLinesOfJson) {
+  OperationsEndAs(MakeOperation(v1::Operation::STATE_SUCCEEDED));
+  const RunResult result = Run({"watch", kOperation, "--output", "json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const size_t end = result.out.find('\n');
+  EXPECT_EQ(json::parse(result.out.substr(0, end))["phase"], "refinement");
+  EXPECT_EQ(json::parse(result.out.substr(end))["mesh_revision"], 3);
+}
+
+TEST_F(SessionCommandsTest, CancelWaitsForTheEnd) {
+  OperationsEndAs(MakeOperation(v1::Operation::STATE_CANCELLED));
+  server_.operations.cancel = [](const v1::CancelOperationRequest& request, v1::CancelOperationResponse& response) {
+    EXPECT_EQ(request.name(), kOperation);
+    *response.mutable_operation() = MakeOperation(v1::Operation::STATE_RUNNING);
+    return grpc::Status::OK;
+  };
+  for (const char* name : {"one", kOperation}) {
+    const RunResult result = Run({"cancel", name});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(result.out, "sessions/one/operations/two cancelled\n");
+  }
+}
+
+// The signal comes when the watch stands.
+TEST_F(SessionCommandsTest, CtrlCCancelsTheRefinementButNotAWatchedOne) {
+  OperationsEndAs({});
+  std::promise<void> watched;
+  int cancelled = 0;
+  server_.operations.watch = [&watched](grpc::ServerContext& context, const auto&, auto& writer) {
+    writer.Write({});
+    watched.set_value();
+    while (!context.IsCancelled()) {
+      writer.Write({});
+    }
+    return grpc::Status::CANCELLED;
+  };
+  server_.operations.cancel = [&cancelled](const v1::CancelOperationRequest& request, auto&) {
+    EXPECT_EQ(request.name(), kOperation);
+    ++cancelled;
+    return grpc::Status::OK;
+  };
+  for (const char* command : {"refine", "watch"}) {
+    watched = {};
+    cancelled = 0;
+    Process process({command, "one", "--server", server_.address()});
+    watched.get_future().wait();
+    ASSERT_EQ(kill(process.id(), SIGINT), 0);
+    const RunResult result = process.Wait();
+    EXPECT_EQ(result.exit_code, 130) << result.err;
+    EXPECT_EQ(cancelled, command == std::string("refine") ? 1 : 0);
+  }
+}
+
+TEST_F(SessionCommandsTest, DownloadWritesTheMesh) {
+  server_.sessions.download = [](grpc::ServerContext&, const v1::DownloadMeshRequest& request, auto& writer) {
+    if (request.revision() > 5) {
+      return MakeError(grpc::StatusCode::FAILED_PRECONDITION, "at revision 5", "ERROR_REASON_REVISION_MISMATCH");
+    }
+    const std::vector<double> points = {0, 0, 1, 0, 0, 1, 1, 1};
+    const std::vector<uint32_t> simplices = {0, 1, 2, 1, 3, 2};
+    v1::DownloadMeshResponse response;
+    v1::MeshMetadata& metadata = *response.mutable_metadata();
+    metadata.set_dimension(2);
+    for (int axis = 0; axis < 2; ++axis) {
+      metadata.mutable_domain()->add_low(0);
+      metadata.mutable_domain()->add_high(1);
+    }
+    metadata.set_vertex_count(4);
+    metadata.set_simplex_count(2);
+    metadata.set_chunk_count(2);
+    metadata.set_revision(5);
+    writer.Write(response);
+    response.mutable_chunk()->mutable_points()->Add(points.begin(), points.end());
+    response.mutable_chunk()->set_crc32c(Crc32c(points.data(), points.size() * sizeof(double)));
+    writer.Write(response);
+    response.mutable_chunk()->Clear();
+    response.mutable_chunk()->set_index(1);
+    response.mutable_chunk()->mutable_simplices()->Add(simplices.begin(), simplices.end());
+    response.mutable_chunk()->set_crc32c(Crc32c(simplices.data(), simplices.size() * sizeof(uint32_t)));
+    writer.Write(response);
+    return grpc::Status::OK;
+  };
+  for (const char* name : {"a.vtu", "a.npz", "a.node"}) {
+    const RunResult result = Run({"download", "one", "-o", folder_.Path(name)});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const absl::StatusOr<formats::Mesh> mesh = formats::ReadMesh(folder_.Path(name));
+    ASSERT_TRUE(mesh.ok()) << mesh.status();
+    EXPECT_THAT(mesh->simplices, ElementsAre(0, 1, 2, 1, 3, 2));
+    EXPECT_THAT(mesh->points, ElementsAre(0, 0, 1, 0, 0, 1, 1, 1));
+  }
+  const RunResult piped = Run({"download", "one", "-o", "-", "--quiet"});
+  EXPECT_EQ(piped.exit_code, 0);
+  EXPECT_EQ(piped.out, folder_.Read("a.vtu"));
+  EXPECT_THAT(piped.err, IsEmpty());
+  const int files = folder_.FileCount();
+  const RunResult figures = Run({"download", "one", "-o", folder_.Path("a.npz"), "--output", "json"});
+  EXPECT_EQ(json::parse(figures.out)["dimension"], 2);
+  EXPECT_EQ(Run({"download", "one", "-o", folder_.Path("b.vtu"), "--revision", "6"}).exit_code, 7);
+  EXPECT_EQ(Run({"download", "one", "-o", "-", "--output", "json"}).exit_code, 2);
+  EXPECT_EQ(Run({"download", "one", "-o", folder_.Path("b.stl")}).exit_code, 2);
+  EXPECT_EQ(folder_.FileCount(), files);
+}
+
+TEST_F(SessionCommandsTest, CellsAsTextAndAsJson) {
+  std::vector<uint32_t> asked;
+  double beta = 0;
+  const auto answer = [&asked](const auto& request, v1::VoronoiCellBatch& cells, double radius) {
+    asked.assign(request.vertices().begin(), request.vertices().end());
+    for (const uint32_t vertex : asked) {
+      cells.add_vertices(vertex);
+      cells.add_clip_radii(radius);
+      cells.add_is_clipped(vertex == 7);
+      cells.add_node_counts(vertex == 7 ? 2 : 1);
+      for (int i = 0; i < (vertex == 7 ? 4 : 2); ++i) {
+        cells.add_nodes(i + 0.5);
+      }
+      cells.add_neighbour_counts(2);
+      cells.add_neighbours(vertex + 1);
+      cells.add_neighbours(vertex + 2);
+    }
+  };
+  server_.queries.cells = [&](grpc::ServerContext&, const v1::VoronoiCellsRequest& request, auto& writer) {
+    v1::VoronoiCellsResponse response;
+    answer(request, *response.mutable_cells(), std::numeric_limits<double>::infinity());
+    writer.Write(response);
+    return grpc::Status::OK;
+  };
+  server_.queries.clipped = [&](grpc::ServerContext&, const v1::ClippedVoronoiCellsRequest& request, auto& writer) {
+    beta = request.beta();
+    v1::ClippedVoronoiCellsResponse response;
+    answer(request, *response.mutable_cells(), 0.25);
+    writer.Write(response);
+    return grpc::Status::OK;
+  };
+  server_.queries.nearest = [](grpc::ServerContext&, const v1::ApproximateNearestNeighborsRequest& request,
+                               auto& writer) {
+    EXPECT_THAT(request.vertices(), IsEmpty());
+    v1::ApproximateNearestNeighborsResponse response;
+    response.add_distances(0.5);
+    response.add_distances(0.25);
+    writer.Write(response);
+    return grpc::Status::OK;
+  };
+  const RunResult text = Run({"cells", "one", "7", "3"});
+  ASSERT_EQ(text.exit_code, 0) << text.err;
+  EXPECT_EQ(text.out, "7 inf 1 0.5,1.5;2.5,3.5 8;9\n3 inf 0 0.5,1.5 4;5\n");
+  const RunResult clipped =
+      Run({"cells", "one", "--beta", "4", "--vertices", "-", "--output", "json"}, "7, 3\n# no\n1\n");
+  ASSERT_EQ(clipped.exit_code, 0) << clipped.err;
+  EXPECT_EQ(beta, 4);
+  EXPECT_THAT(asked, ElementsAre(7, 3, 1));
+  EXPECT_EQ(json::parse(clipped.out.substr(0, clipped.out.find('\n'))),
+            json::parse(R"({"vertex": 7, "clip_radius": 0.25,
+      "is_clipped": true, "nodes": [[0.5, 1.5], [2.5, 3.5]], "neighbours": [8, 9]})"));
+  ASSERT_EQ(Run({"cells", "one", "3", "-o", folder_.Path("cells.txt")}).exit_code, 0);
+  EXPECT_EQ(folder_.Read("cells.txt"), "3 inf 0 0.5,1.5 4;5\n");
+  EXPECT_EQ(Run({"cells", "one", "--nearest"}).out, "0 0.5\n1 0.25\n");
+  EXPECT_EQ(Run({"cells", "one", "--nearest", "--output", "json"}).out,
+            "{\"vertex\":0,\"distance\":0.5}\n{\"vertex\":1,\"distance\":0.25}\n");
+  const RunResult none = Run({"cells", "one", "--vertices", "-"}, "");
+  EXPECT_EQ(none.exit_code, 0);
+  EXPECT_THAT(none.out, IsEmpty());
+  const RunResult wrong = Run({"cells", "one", "--vertices", "-"}, "1\ntwo\n");
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_THAT(wrong.err, HasSubstr("<stdin>:2: expected the number of a vertex, got \"two\""));
+}
+
+TEST_F(SessionCommandsTest, AddPrintsTheVertices) {
+  server_.queries.add = [](const v1::AddVerticesRequest& request, v1::AddVerticesResponse& response) {
+    EXPECT_THAT(request.points(), ElementsAre(1, 2, 3, 4));
+    response.add_vertices(8);
+    response.add_vertices(9);
+    response.set_revision(6);
+    return request.near().empty() || request.near(1) == 5
+               ? grpc::Status::OK
+               : MakeError(grpc::StatusCode::INVALID_ARGUMENT, "points[1] is outside", "ERROR_REASON_INVALID_POINTS");
+  };
+  EXPECT_EQ(Run({"add", "one", "-"}, "1,2\n3,4\n").out, "8\n9\n");
+  const std::string near = folder_.Write("near", "4 5");
+  EXPECT_EQ(json::parse(Run({"add", "one", "-", "--near", near, "--output", "json"}, "1,2\n3,4\n").out),
+            json::parse(R"({"vertices": [8, 9], "revision": 6})"));
+  const RunResult few = Run({"add", "one", "-", "--near", folder_.Write("few", "4")}, "1,2\n3,4\n");
+  EXPECT_EQ(few.exit_code, 2);
+  EXPECT_THAT(few.err, HasSubstr("expected a vertex for each of 2 points, got 1"));
+  const RunResult outside = Run({"add", "one", "-", "--near", folder_.Write("far", "4 6")}, "1,2\n3,4\n");
+  EXPECT_EQ(outside.exit_code, 2);
+  EXPECT_THAT(outside.err, HasSubstr("<stdin>:2: points[1] is outside"));
+}
+
+TEST_F(SessionCommandsTest, TimeoutIsExitCode5AndLeavesTheOperationAlone) {
+  OperationsEndAs({});
+  server_.operations.watch = [](grpc::ServerContext& context, const auto&, auto& writer) {
+    while (!context.IsCancelled()) {
+      writer.Write({});
+    }
+    return grpc::Status::CANCELLED;
+  };
+  EXPECT_EQ(Run({"watch", kOperation, "--timeout", "0.2"}).exit_code, 5);
+}
+
+}  // namespace
+}  // namespace wellspace
