@@ -94,6 +94,10 @@ void AddVerticesCall::EndWith(const RequestIds::Answer& answer) {
   End(answer.status);
 }
 
-LogFields AddVerticesCall::Figures() const { return LogFields().Add("points", added_); }
+LogFields AddVerticesCall::Figures() const {
+  LogFields figures;
+  figures.Add("session", request_->name()).Add("points", added_);
+  return figures;
+}
 
 }  // namespace wellspace::server

@@ -4,11 +4,11 @@
 
 #include <cstdint>
 #include <memory>
-#include <string>
 
 #include "grpcpp/support/server_callback.h"
 #include "server/call.h"
 #include "server/jobs.h"
+#include "server/log_fields.h"
 #include "server/request_ids.h"
 #include "server/session.h"
 #include "wellspace/v1/queries.pb.h"

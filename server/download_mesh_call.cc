@@ -71,8 +71,9 @@ std::optional<grpc::ByteBuffer> DownloadMeshCall::NextResponse() {
 LogFields DownloadMeshCall::Figures() const {
   LogFields figures;
   if (mesh_ != nullptr) {
-    figures.Add("vertices", mesh_->chunks.mesh().vertex_count());
-    figures.Add("chunks", next_chunk_ - request_.next_chunk()).Add("of_chunks", mesh_->chunks.count());
+    figures.Add("session", request_.name())
+        .Add("vertices", mesh_->chunks.mesh().vertex_count())
+        .Add("chunks", next_chunk_ - request_.next_chunk());
   }
   return figures;
 }

@@ -5,11 +5,11 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <string>
 
 #include "grpcpp/support/byte_buffer.h"
 #include "grpcpp/support/server_callback.h"
 #include "server/call.h"
+#include "server/log_fields.h"
 #include "server/response_stream.h"
 #include "server/session.h"
 #include "wellspace/v1/sessions.pb.h"

@@ -36,6 +36,13 @@ void QueryCall::OnBegin() {
 }
 
 grpc::Status QueryCall::Find() {
+  // The request as bytes and as numbers; batches that wait, one that is made, and one that is written.
+  const uint64_t bytes = 2 * bytes_.Length() + (kBatchesAhead + 3) * kMaxResponseBytes;
+  absl::StatusOr<MemoryReservation> memory = environment().memory.Reserve(bytes, "the batches of a query");
+  if (!memory.ok()) {
+    return FromCoreStatus(memory.status());
+  }
+  memory_ = *std::move(memory);
   if (grpc::Status status = parse_(&bytes_, &request_); !status.ok()) {
     return status;
   }
@@ -165,6 +172,10 @@ void QueryCall::OnEnd() {
   }
 }
 
-LogFields QueryCall::Figures() const { return LogFields().Add("batches", batches_); }
+LogFields QueryCall::Figures() const {
+  LogFields figures;
+  figures.Add("session", request_.session).Add("batches", batches_);
+  return figures;
+}
 
 }  // namespace wellspace::server

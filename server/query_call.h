@@ -6,12 +6,13 @@
 #include <deque>
 #include <memory>
 #include <optional>
-#include <string>
 
 #include "grpcpp/support/byte_buffer.h"
 #include "grpcpp/support/server_callback.h"
 #include "server/call.h"
 #include "server/jobs.h"
+#include "server/log_fields.h"
+#include "server/memory_budget.h"
 #include "server/response_stream.h"
 #include "server/session.h"
 #include "server/vertex_query.h"
@@ -70,6 +71,7 @@ class QueryCall final : public ResponseStream<Call<grpc::ServerWriteReactor<grpc
   grpc::ByteBuffer bytes_;
   Work work_ = Work::kIdle;
   std::shared_ptr<Job> job_;
+  MemoryReservation memory_;  // of batches and request
   std::deque<grpc::ByteBuffer> ready_;
   uint64_t batches_ = 0;  // sent
 };

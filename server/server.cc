@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
+#include "grpc/grpc.h"
 #include "grpcpp/ext/proto_server_reflection_plugin.h"
 #include "grpcpp/health_check_service_interface.h"
 #include "grpcpp/server_builder.h"
@@ -25,6 +26,8 @@ constexpr std::chrono::milliseconds kFarewell(500);
 void EnableHealthAndReflection() {
   static std::once_flag once;
   std::call_once(once, [] {
+    // The last one to leave gRPC would wait up to 10 seconds for its poller of writes that did not go out at once: nobody is the last.
+    grpc_init();
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
   });
