@@ -126,7 +126,7 @@ INSTANTIATE_TEST_SUITE_P(Dimensions, QueriesIn, ::testing::Values(2, 3, 4));
 
 TEST_P(QueriesIn, AnswerAsTheCore) {
   const int dimension = GetParam();
-  const std::vector<double> points = RandomPoints(3, dimension == 4 ? 5 : 300, dimension);
+  const std::vector<double> points = UniformPoints(dimension == 4 ? 5 : 300, dimension, 3);
   ServiceHarness harness;
   SessionClient client(harness.channel(), UnitCubeParameters(dimension));
   client.Upload(points);
@@ -152,7 +152,7 @@ TEST_P(QueriesIn, AnswerAsTheCore) {
 TEST(Queries, HundredThousandCellsComeInOneStream) {
   ServiceHarness harness(FakeMesher, {}, Transport::kLoopback);
   SessionClient client(harness.channel());
-  client.Upload(RandomPoints(4, 300, 3));
+  client.Upload(UniformPoints(300, 3, 4));
   client.Refine();
   const uint32_t vertex_count = static_cast<uint32_t>(client.Get().vertex_count());
   std::vector<uint32_t> vertices(100'000);
@@ -172,7 +172,7 @@ TEST(Queries, HundredThousandCellsComeInOneStream) {
 TEST(Queries, NoVerticesMeanAll) {
   ServiceHarness harness;
   SessionClient client(harness.channel());
-  client.Upload(RandomPoints(5, 50, 3));
+  client.Upload(UniformPoints(50, 3, 5));
   client.Refine();
   const uint64_t vertex_count = client.Get().vertex_count();
   EXPECT_EQ(Distances(client, {}).size(), vertex_count);
@@ -195,7 +195,7 @@ class ManyCells : public ::testing::Test {
 
   void Begin() {
     harness_ = std::make_unique<ServiceHarness>(EndlessMesher(started_), options_, Transport::kInProcess, FakeEstimator,
-                                                FakeMesherOf(MakeLargeMesh(6'000'000)));
+                                                FixedMesher(MakeLargeMesh(6'000'000)));
     client_ = std::make_unique<SessionClient>(harness_->channel());
     client_->Refine();
     v1::VoronoiCellsRequest request;
@@ -347,7 +347,7 @@ TEST(QueryFails, WithQueueFullBeforeItHasBegun) {
 class AddVerticesTo : public ::testing::Test {
  protected:
   AddVerticesTo() {
-    client_.Upload(RandomPoints(6, 100, 3));
+    client_.Upload(UniformPoints(100, 3, 6));
     client_.Refine();
   }
 

@@ -16,11 +16,18 @@ namespace {
 
 class FakeSessionMesher final : public core::Mesher {
  public:
-  FakeSessionMesher(core::MeshParameters parameters, std::span<const double> points, PhaseScript script)
-      : parameters_(std::move(parameters)), points_(points.begin(), points.end()), script_(std::move(script)) {}
+  // `mesh` null: that of MakeFakeMesh.
+  FakeSessionMesher(core::MeshParameters parameters, std::span<const double> points, PhaseScript script,
+                    std::shared_ptr<const core::Mesh> mesh = nullptr)
+      : parameters_(std::move(parameters)),
+        points_(points.begin(), points.end()),
+        script_(std::move(script)),
+        mesh_(std::move(mesh)) {}
 
   int dimension() const override { return parameters_.dimension; }
-  uint64_t vertex_count() const override { return MakeFakeMesh(parameters_, points_).vertex_count(); }
+  uint64_t vertex_count() const override {
+    return mesh_ != nullptr ? mesh_->vertex_count() : MakeFakeMesh(parameters_, points_).vertex_count();
+  }
   uint64_t memory_bytes() const override { return points_.size() * sizeof(double); }
   absl::Status Refine(const core::MeshParameters&, core::RunContext& context) override {
     return Enter(core::Phase::kRefinement, context);
@@ -41,7 +48,7 @@ class FakeSessionMesher final : public core::Mesher {
   absl::StatusOr<core::Mesh> Extract(int, core::RunContext& context) override {
     WELLSPACE_RETURN_IF_ERROR(Enter(core::Phase::kSimplices, context));
     context.EnterPhase(core::Phase::kDone);
-    return MakeFakeMesh(parameters_, points_);
+    return mesh_ != nullptr ? *mesh_ : MakeFakeMesh(parameters_, points_);
   }
   absl::Status Update(core::Mesh& mesh, int threads, core::RunContext& context) override {
     WELLSPACE_ASSIGN_OR_RETURN(mesh, Extract(threads, context));
@@ -60,6 +67,7 @@ class FakeSessionMesher final : public core::Mesher {
   const core::MeshParameters parameters_;
   std::vector<double> points_;
   const PhaseScript script_;
+  const std::shared_ptr<const core::Mesh> mesh_;
 };
 
 template <typename Stub, typename Request, typename Response>
@@ -84,6 +92,15 @@ MesherFactory ScriptedMesher(PhaseScript script) {
     context.EnterPhase(core::Phase::kTree);
     WELLSPACE_RETURN_IF_ERROR(script(core::Phase::kTree, context));
     return std::make_unique<FakeSessionMesher>(parameters, points, script);
+  };
+}
+
+MesherFactory FixedMesher(core::Mesh mesh) {
+  return [shared = std::make_shared<const core::Mesh>(std::move(mesh))](
+             const core::MeshParameters& parameters, std::span<const double> points, core::RunContext&) {
+    const auto script = [](core::Phase, core::RunContext& context) { return context.Check(); };
+    return absl::StatusOr<std::unique_ptr<core::Mesher>>(
+        std::make_unique<FakeSessionMesher>(parameters, points, script, shared));
   };
 }
 

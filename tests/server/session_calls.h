@@ -24,6 +24,9 @@ using PhaseScript = std::function<absl::Status(core::Phase, core::RunContext&)>;
 // Meshers that enter the phases of the core, run `script` in each, and have a mesh of MakeFakeMesh.
 MesherFactory ScriptedMesher(PhaseScript script);
 
+// Meshers of which every mesh is `mesh`.
+MesherFactory FixedMesher(core::Mesh mesh);
+
 // Works in `phase` until its context is cancelled, and calls `begun` before.
 PhaseScript EndlessIn(core::Phase phase, std::function<void()> begun);
 

@@ -1,57 +1,15 @@
 #include "tests/server/session_client.h"
 
-#include <random>
-#include <utility>
+#include <algorithm>
 
 #include "gtest/gtest.h"
 
 namespace wellspace::server {
 namespace {
 
-class FakeSessionMesher final : public core::Mesher {
- public:
-  explicit FakeSessionMesher(std::shared_ptr<const core::Mesh> mesh) : mesh_(std::move(mesh)) {}
-
-  int dimension() const override { return mesh_->dimension; }
-  uint64_t vertex_count() const override { return mesh_->vertex_count(); }
-  uint64_t memory_bytes() const override { return 0; }
-  absl::Status Refine(const core::MeshParameters&, core::RunContext&) override { return absl::OkStatus(); }
-  absl::StatusOr<std::vector<uint32_t>> AddPointsNear(std::span<const double> points, std::span<const uint32_t>,
-                                                      core::RunContext&) override {
-    return std::vector<uint32_t>(points.size() / mesh_->dimension);
-  }
-  absl::StatusOr<uint32_t> AddVertex(uint32_t near, std::span<const double>) override { return near; }
-  absl::StatusOr<std::vector<double>> NearestNeighborDistances(std::span<const uint32_t> vertices) const override {
-    return std::vector<double>(vertices.begin(), vertices.end());
-  }
-  absl::StatusOr<std::vector<core::Cell>> ClippedCells(std::span<const uint32_t> vertices, double) const override {
-    std::vector<core::Cell> cells(vertices.size());
-    for (size_t i = 0; i < vertices.size(); ++i) {
-      cells[i].vertex = vertices[i];
-    }
-    return cells;
-  }
-  absl::StatusOr<core::Mesh> Extract(int, core::RunContext&) override { return *mesh_; }
-  absl::Status Update(core::Mesh& mesh, int, core::RunContext&) override {
-    mesh = *mesh_;
-    return absl::OkStatus();
-  }
-  absl::StatusOr<core::MeshEstimate> Estimate(const core::MeshParameters&, const core::RunContext&) const override {
-    return core::MeshEstimate{};
-  }
-
- private:
-  const std::shared_ptr<const core::Mesh> mesh_;
-};
+constexpr size_t kUploadChunk = 120'000;  // numbers; a multiple of 2, 3, 4, 5 and 6
 
 }  // namespace
-
-MesherFactory FakeMesherOf(core::Mesh mesh) {
-  return [shared = std::make_shared<const core::Mesh>(std::move(mesh))](const core::MeshParameters&,
-                                                                        std::span<const double>, core::RunContext&) {
-    return absl::StatusOr<std::unique_ptr<core::Mesher>>(std::make_unique<FakeSessionMesher>(shared));
-  };
-}
 
 core::Mesh MakeLargeMesh(uint64_t simplex_count) {
   core::Mesh mesh;
@@ -71,82 +29,28 @@ core::Mesh MakeLargeMesh(uint64_t simplex_count) {
   return mesh;
 }
 
-std::vector<double> RandomPoints(uint64_t seed, size_t count, int dimension) {
-  std::mt19937_64 generator(seed);
-  std::uniform_real_distribution<double> uniform(0.01, 0.99);
-  std::vector<double> points(count * dimension);
-  for (double& coordinate : points) {
-    coordinate = uniform(generator);
-  }
-  return points;
-}
-
 SessionClient::SessionClient(const std::shared_ptr<grpc::Channel>& channel, const v1::MeshParameters& parameters)
-    : sessions_(v1::SessionService::NewStub(channel)),
-      operations_(v1::OperationService::NewStub(channel)),
-      queries_(v1::QueryService::NewStub(channel)) {
-  grpc::ClientContext context;
+    : calls_(channel), queries_(v1::QueryService::NewStub(channel)) {
   v1::CreateSessionRequest request;
   *request.mutable_parameters() = parameters;
-  v1::CreateSessionResponse response;
-  const grpc::Status status = sessions_->CreateSession(&context, request, &response);
-  EXPECT_TRUE(status.ok()) << status.error_message();
-  name_ = response.session().name();
-}
-
-v1::Session SessionClient::Get() {
-  grpc::ClientContext context;
-  v1::GetSessionRequest request;
-  request.set_name(name_);
-  v1::GetSessionResponse response;
-  const grpc::Status status = sessions_->GetSession(&context, request, &response);
-  EXPECT_TRUE(status.ok()) << status.error_message();
-  return response.session();
+  name_ = calls_.Create(request).name();
 }
 
 void SessionClient::Upload(const std::vector<double>& coordinates) {
-  constexpr size_t kChunk = 120'000;  // a multiple of 2, 3, 4, 5 and 6
   const v1::Session session = Get();
-  grpc::ClientContext context;
-  v1::UploadPointsResponse response;
-  const auto stream = sessions_->UploadPoints(&context, &response);
-  for (size_t begin = 0; begin < coordinates.size(); begin += kChunk) {
-    v1::UploadPointsRequest request;
-    request.set_name(name_);
-    request.set_point_offset(session.committed_points() + begin / session.parameters().dimension());
-    const size_t end = std::min(coordinates.size(), begin + kChunk);
-    request.mutable_points()->mutable_coordinates()->Add(coordinates.begin() + begin, coordinates.begin() + end);
-    if (!stream->Write(request)) {
-      break;
-    }
+  std::vector<v1::UploadPointsRequest> requests;
+  for (size_t begin = 0; begin < coordinates.size(); begin += kUploadChunk) {
+    const size_t end = std::min(coordinates.size(), begin + kUploadChunk);
+    requests.push_back(UploadRequest(name_, session.committed_points() + begin / session.parameters().dimension(),
+                                     {coordinates.begin() + begin, coordinates.begin() + end}));
   }
-  stream->WritesDone();
-  const grpc::Status status = stream->Finish();
-  EXPECT_TRUE(status.ok()) << status.error_message();
-}
-
-std::string SessionClient::Start() {
-  grpc::ClientContext context;
-  v1::StartRefinementRequest request;
-  request.set_name(name_);
-  v1::StartRefinementResponse response;
-  const grpc::Status status = operations_->StartRefinement(&context, request, &response);
-  EXPECT_TRUE(status.ok()) << status.error_message();
-  return response.operation().name();
+  calls_.Upload(requests);
 }
 
 v1::Operation SessionClient::Refine() {
-  grpc::ClientContext context;
-  v1::WatchOperationRequest request;
-  request.set_name(Start());
-  const auto stream = operations_->WatchOperation(&context, request);
-  v1::WatchOperationResponse response;
-  while (stream->Read(&response)) {
-  }
-  const grpc::Status status = stream->Finish();
-  EXPECT_TRUE(status.ok()) << status.error_message();
-  EXPECT_EQ(response.operation().state(), v1::Operation::STATE_SUCCEEDED) << response.ShortDebugString();
-  return response.operation();
+  const v1::Operation operation = calls_.Refine(name_);
+  EXPECT_EQ(operation.state(), v1::Operation::STATE_SUCCEEDED) << operation.ShortDebugString();
+  return operation;
 }
 
 Download SessionClient::DownloadMesh(uint64_t revision, uint64_t next_chunk, std::optional<size_t> stop_after) {
@@ -155,7 +59,7 @@ Download SessionClient::DownloadMesh(uint64_t revision, uint64_t next_chunk, std
   request.set_name(name_);
   request.set_revision(revision);
   request.set_next_chunk(next_chunk);
-  const auto stream = sessions_->DownloadMesh(&context, request);
+  const auto stream = calls_.sessions().DownloadMesh(&context, request);
   Download download;
   v1::DownloadMeshResponse response;
   while ((!stop_after.has_value() || download.chunks.size() < *stop_after) && stream->Read(&response)) {

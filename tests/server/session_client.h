@@ -1,32 +1,23 @@
-// A session of a ServiceHarness on the client's side, and a core::Mesher that does as good as nothing.
+// One session of a ServiceHarness on the client's side, meshes and all.
 #ifndef WELLSPACE_TESTS_SERVER_SESSION_CLIENT_H_
 #define WELLSPACE_TESTS_SERVER_SESSION_CLIENT_H_
 
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "grpcpp/grpcpp.h"
-#include "server/call_environment.h"
 #include "tests/server/service_harness.h"
-#include "wellspace/v1/operations.grpc.pb.h"
+#include "tests/server/session_calls.h"
 #include "wellspace/v1/queries.grpc.pb.h"
-#include "wellspace/v1/sessions.grpc.pb.h"
 
 namespace wellspace::server {
 
-// Makes mesher whose mesh is `mesh`, whatever the points.
-MesherFactory FakeMesherOf(core::Mesh mesh);
-
-// A mesh of `simplex_count` simplices in 3-D, which no geometry would allow: the arrays are as long as they would be, and have something else
-// in every row.
+// A mesh of `simplex_count` simplices in 3-D, which no geometry would allow: the arrays are as long as they would be, and have something
+// else in every row.
 core::Mesh MakeLargeMesh(uint64_t simplex_count);
-
-// Points of the unit cube.
-std::vector<double> RandomPoints(uint64_t seed, size_t count, int dimension);
 
 // What a download brought.
 struct Download {
@@ -42,16 +33,13 @@ class SessionClient {
                          const v1::MeshParameters& parameters = UnitCubeParameters());
 
   const std::string& name() const { return name_; }
-  v1::SessionService::Stub& sessions() { return *sessions_; }
-  v1::OperationService::Stub& operations() { return *operations_; }
+  SessionCalls& calls() { return calls_; }
   v1::QueryService::Stub& queries() { return *queries_; }
 
-  v1::Session Get();
+  v1::Session Get() { return calls_.Get(name_); }
   // Adds points after those that the session has.
   void Upload(const std::vector<double>& coordinates);
-  // Starts a refinement; its name.
-  std::string Start();
-  // The same, and waits for its end.
+  // Has the session refined, and waits for the end.
   v1::Operation Refine();
 
   // Downloads the mesh from `next_chunk` on. Breaks off when `stop_after` chunks have come.
@@ -59,8 +47,7 @@ class SessionClient {
                         std::optional<size_t> stop_after = std::nullopt);
 
  private:
-  const std::unique_ptr<v1::SessionService::Stub> sessions_;
-  const std::unique_ptr<v1::OperationService::Stub> operations_;
+  SessionCalls calls_;
   const std::unique_ptr<v1::QueryService::Stub> queries_;
   std::string name_;
 };
