@@ -29,6 +29,8 @@ Observability::Observability(const std::vector<std::string>& services, std::shar
   add("wellspace_points_received_total", "Points that clients have sent.", work_.points_received);
   add("wellspace_vertices_made_total", "Vertices of finished meshes.", work_.vertices_made);
   add("wellspace_simplices_made_total", "Simplices of finished meshes.", work_.simplices_made);
+  add("wellspace_cells_served_total", "Vertices that queries, for cells or neighbours, were answered for.",
+      work_.cells_served);
 }
 
 void Observability::Watch(grpc::ServerBuilder& builder) {

@@ -1,15 +1,18 @@
 #include "server/process_metrics.h"
 
 #include <sys/resource.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <system_error>
 
 #include "absl/time/clock.h"
+#include "absl/time/time.h"
 #include "server/metrics.h"
 
 namespace wellspace::server {
@@ -45,15 +48,14 @@ double MaxFiles() {
   return getrlimit(RLIMIT_NOFILE, &limit) == 0 ? static_cast<double>(limit.rlim_cur) : 0;
 }
 
-// When the process started, from the time since boot of both; [proc(5)] counts the fields of /proc/self/stat.
+// When the process started. /proc/self/stat has it as its 22nd field, in ticks since the machine booted.
 double StartSeconds() {
   std::ifstream stat("/proc/self/stat");
   std::string text;
   std::getline(stat, text);
   const size_t name_end = text.rfind(')');  // the name may have blanks
-  std::ifstream uptime("/proc/uptime");
-  double seconds_up = 0;
-  if (name_end == std::string::npos || !(uptime >> seconds_up)) {
+  timespec since_boot{};
+  if (name_end == std::string::npos || clock_gettime(CLOCK_BOOTTIME, &since_boot) != 0) {
     return 0;
   }
   constexpr int kFieldsFromStateToStart = 20;
@@ -64,8 +66,9 @@ double StartSeconds() {
   if (begin == std::string::npos) {
     return 0;
   }
-  const double started_up = std::strtod(text.c_str() + begin, nullptr) / static_cast<double>(sysconf(_SC_CLK_TCK));
-  return absl::ToDoubleSeconds(absl::Now() - absl::UnixEpoch()) - seconds_up + started_up;
+  const double started = std::strtod(text.c_str() + begin, nullptr) / static_cast<double>(sysconf(_SC_CLK_TCK));
+  return absl::ToDoubleSeconds(absl::Now() - absl::UnixEpoch()) -
+         absl::ToDoubleSeconds(absl::DurationFromTimespec(since_boot)) + started;
 }
 
 }  // namespace

@@ -147,6 +147,9 @@ grpc::Status QueryCall::Ask(const core::Mesher& mesher) {
   }
   const absl::Status asked = request_.query->Ask(mesher, some);
   next_ += size;
+  if (asked.ok()) {
+    environment().observability.work().cells_served += size;
+  }
   return FromCoreStatus(asked);
 }
 

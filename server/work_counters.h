@@ -12,6 +12,7 @@ struct WorkCounters {
   std::atomic<uint64_t> points_received{0};
   std::atomic<uint64_t> vertices_made{0};   // of meshes that were finished
   std::atomic<uint64_t> simplices_made{0};  // of meshes that were finished
+  std::atomic<uint64_t> cells_served{0};    // vertices that queries were answered for
 };
 
 }  // namespace wellspace::server

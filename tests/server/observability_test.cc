@@ -13,6 +13,7 @@
 #include "prometheus/text_serializer.h"
 #include "tests/server/raw_call.h"
 #include "tests/server/service_harness.h"
+#include "tests/server/session_calls.h"
 
 namespace wellspace::server {
 namespace {
@@ -120,6 +121,38 @@ TEST(CallMetrics, WhatClientsSendMakesNoSeries) {
   EXPECT_EQ(count(metrics), lines);
   EXPECT_THAT(metrics, Not(HasSubstr("Nonsense")));
   EXPECT_TRUE(harness.log().WaitFor("service=no.Service method=Nonsense"));
+}
+
+TEST(Metrics, TellOfSessionsAndWhatIsMadeInThem) {
+  ServiceHarness harness(FakeMesher, {}, Transport::kLoopback);
+  {
+    SessionCalls calls(harness.channel());
+    const std::string name = calls.Create(2).name();
+    calls.Create(2);
+    calls.Upload(name, 0, UniformPoints(5, 2, /*seed=*/1));
+    const v1::Operation operation = calls.Refine(name);
+    const std::string metrics = Scrape(harness);
+    EXPECT_EQ(ValueOf(metrics, "wellspace_sessions"), 2);
+    EXPECT_EQ(ValueOf(metrics, "wellspace_points_received_total"), 5);
+    EXPECT_EQ(ValueOf(metrics, "wellspace_vertices_made_total"), static_cast<double>(operation.progress().vertices()));
+    EXPECT_GT(ValueOf(metrics, "wellspace_simplices_made_total"), 0);
+    EXPECT_TRUE(
+        harness.log().WaitFor(absl::StrCat("event=refinement operation=", operation.name(), " tenant=default")));
+    EXPECT_TRUE(harness.log().WaitFor(absl::StrCat("session=", name, " points=5")));
+
+    grpc::ClientContext context;
+    v1::VoronoiCellsRequest request;
+    request.set_name(name);
+    v1::VoronoiCellsResponse response;
+    const auto stream = v1::QueryService::NewStub(harness.channel())->VoronoiCells(&context, request);
+    while (stream->Read(&response)) {
+    }
+    EXPECT_TRUE(stream->Finish().ok());
+    EXPECT_EQ(ValueOf(Scrape(harness), "wellspace_cells_served_total"),
+              static_cast<double>(operation.progress().vertices()));
+    calls.Delete(name);
+  }
+  EXPECT_EQ(ValueOf(Scrape(harness), "wellspace_sessions"), 1);
 }
 
 TEST(Metrics, TellOfTheProcess) {
