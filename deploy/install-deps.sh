@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that Wellspace needs. The one place with package lists.
 #
-#   deploy/install-deps.sh [GROUP…]        groups: build test lint tidy fuzz node bench runtime dev; default: build test
+#   deploy/install-deps.sh [GROUP…]        groups: build test lint tidy fuzz node bench container monitoring runtime dev; default: build test
 #
 # As root, or through sudo. Installs only what is missing; does not touch the network when nothing is.
 set -euo pipefail
@@ -9,14 +9,16 @@ set -euo pipefail
 # What a group needs, without what its packages already depend on (libgrpc++-dev brings OpenSSL, RE2, c-ares and gRPC's core).
 declare -A packages=(
   [build]="g++ cmake ninja-build pkg-config libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
-           libabsl-dev libc-ares-dev libspdlog-dev libboost-dev libtbb-dev libcli11-dev nlohmann-json3-dev prometheus-cpp-dev libcairo2-dev
-           zlib1g-dev libminizip-dev python3"
+           libabsl-dev libc-ares-dev libspdlog-dev libboost-dev libtbb-dev libcli11-dev nlohmann-json3-dev
+           prometheus-cpp-dev libcairo2-dev zlib1g-dev libminizip-dev python3"
   [test]="libgtest-dev libgmock-dev libcgal-dev python3 python3-meshio python3-numpy openssl"
   [lint]="git clang-format-14 python3"
   [tidy]="clang-tidy-14"
   [fuzz]="clang-14 libclang-rt-14-dev"
   [node]="nodejs npm"
   [bench]="tetgen python3"
+  [container]="debootstrap podman buildah"
+  [monitoring]="prometheus"
   [runtime]="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libtbb12 libprometheus-cpp-pull1.0 libcairo2 zlib1g
              libminizip1"
 )
