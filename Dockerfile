@@ -1,7 +1,9 @@
 # wellspaced, and the command line tool beside it.
 #
 #   docker build -t wellspace .
-#   docker run --rm -p 127.0.0.1:7233:7233 wellspace
+#   docker run --rm --read-only --cap-drop ALL -p 127.0.0.1:7233:7233 wellspace
+#
+# deploy/compose.yaml runs it with Prometheus and Grafana.
 FROM debian:bookworm-slim AS build
 COPY deploy/install-deps.sh /usr/src/wellspace/deploy/
 RUN /usr/src/wellspace/deploy/install-deps.sh build
@@ -14,13 +16,17 @@ RUN cmake --preset release -DWELLSPACE_TESTS=OFF \
 FROM debian:bookworm-slim
 COPY deploy/install-deps.sh /tmp/
 RUN /tmp/install-deps.sh runtime && rm -rf /tmp/install-deps.sh /var/lib/apt/lists/* \
- && useradd --system --no-create-home --shell /usr/sbin/nologin wellspace
+ && useradd --system --uid 7233 --no-create-home --shell /usr/sbin/nologin wellspace
 COPY LICENSE README.md /usr/share/doc/wellspace/
 COPY --from=build /usr/src/wellspace/build/release/bin/wellspace /usr/src/wellspace/build/release/bin/wellspaced /usr/local/bin/
-USER wellspace
-EXPOSE 7233
+USER 7233
+EXPOSE 7233 9464
 STOPSIGNAL SIGTERM
+# Of the tool, for the health check and `docker exec`.
+ENV WELLSPACE_SERVER=127.0.0.1:7233
+HEALTHCHECK --interval=30s --timeout=5s --start-period=10s CMD ["wellspace", "server", "health"]
 ENTRYPOINT ["wellspaced"]
-# A container is reached through its own address, never through its loopback. The server has no transport security of its own here:
-# publish the port to the loopback of the host, as above, or to a private network, or put a proxy with TLS in front.
-CMD ["--listen", "0.0.0.0:7233", "--insecure-remote"]
+# A container is reached through its own address, never through its loopback: publish the port to the loopback of the host, as above, or to
+# a private network; for others, mount certificates and tokens (docs/security.md) and name them in the place of --insecure-remote.
+# `docker stop` kills after ten seconds; work has ended before that.
+CMD ["--listen", "0.0.0.0:7233", "--insecure-remote", "--grace", "8"]
