@@ -426,6 +426,7 @@ void Session::EndWork(Operation& operation, const grpc::Status& status, SessionW
       operation.Succeed(now, revision_, made.vertex_count(), made.simplex_count());
     } else {
       operation.Fail(now, status);
+      is_ready_ = false;
     }
     std::swap(work_, work);  // what was there is freed without the lock
     ++structure_version_;
@@ -442,6 +443,7 @@ bool Session::EndWaiting(Operation& operation) {
       return false;
     }
     busy_ = Busy::kNo;
+    is_ready_ = false;
     last_use_ = clock_();
     operation.Fail(last_use_, grpc::Status(grpc::StatusCode::CANCELLED, "the operation was cancelled"));
   }

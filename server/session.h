@@ -199,7 +199,7 @@ class Session {
   int uses_ = 0;
   bool is_closed_ = false;
   Busy busy_ = Busy::kNo;
-  bool is_ready_ = false;  // the mesh is that of all points
+  bool is_ready_ = false;  // the last operation succeeded, and no points have come since
   uint64_t revision_ = 1;
   uint64_t point_count_ = 0;        // with those that AddVertices is adding
   PointStore points_;               // see invariant (2)

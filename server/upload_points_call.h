@@ -27,6 +27,7 @@ class UploadPointsCall final : public Call<grpc::ServerReadReactor<grpc::ByteBuf
 
  private:
   void OnBegin() override;
+  void OnEnd() override { memory_.Release(); }
   LogFields Figures() const override;
 
   // The following want mutex_ to be held.

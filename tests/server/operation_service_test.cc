@@ -226,6 +226,25 @@ TEST_F(OperationServiceTest, CancelInEveryPhaseLeavesTheSessionOpenWithAllItsPoi
   }
 }
 
+TEST_F(OperationServiceTest, ARefinementThatDoesNotSucceedMakesAReadySessionOpen) {
+  const std::string name = MakeSession();
+  calls_.Refine(name);
+  script_.Set([](core::Phase, core::RunContext&) { return absl::ResourceExhaustedError("too large"); });
+  EXPECT_EQ(calls_.Refine(name).state(), v1::Operation::STATE_FAILED);
+  EXPECT_EQ(calls_.Get(name).state(), v1::Session::STATE_OPEN);
+  EXPECT_EQ(calls_.Get(name).vertex_count(), 7u) << "the last mesh is there still";
+
+  script_.Set(nullptr);
+  calls_.Refine(name);
+  Event begun;
+  script_.Set(EndlessIn(core::Phase::kTree, [&] { begun.Set(); }));
+  const std::string running = calls_.Start(MakeSession()).name();
+  ASSERT_TRUE(begun.Wait());
+  calls_.Cancel(calls_.Start(name).name());
+  EXPECT_EQ(calls_.Get(name).state(), v1::Session::STATE_OPEN);
+  calls_.Cancel(running);
+}
+
 TEST_F(OperationServiceTest, AFailedRefinementLeavesTheSessionOpenWithAllItsPoints) {
   const std::string name = MakeSession();
   for (const core::Phase failing : {core::Phase::kTree, core::Phase::kRefinement, core::Phase::kSimplices}) {

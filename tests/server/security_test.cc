@@ -39,8 +39,8 @@ bool Eventually(const std::function<bool()>& done) {
 class SecurityTest : public ::testing::Test {
  protected:
   void Start() {
-    harness_ =
-        std::make_unique<ServiceHarness>(FakeMesher, ServiceOptions(), Transport::kLoopback, FakeEstimator, security_);
+    harness_ = std::make_unique<ServiceHarness>(FakeMesher, ServiceOptions(), Transport::kLoopback, FakeEstimator,
+                                                core::Mesher::Create, security_);
   }
 
   // Certificates for a server and its clients.

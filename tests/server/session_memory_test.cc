@@ -9,6 +9,8 @@
 namespace wellspace::server {
 namespace {
 
+constexpr size_t kPiece = 40'000;  // points of a message
+
 class SessionMemoryTest : public ::testing::Test {
  protected:
   // Refines with circumradii of at most `size`.
@@ -34,6 +36,14 @@ class SessionMemoryTest : public ::testing::Test {
 };
 
 TEST_F(SessionMemoryTest, ARefinementThatNeedsTooMuchFailsAndLeavesTheSessionAsItWas) {
+  // Another session takes two thirds of the memory: what is left is used up sooner.
+  const std::string other = calls_.Create().name();
+  std::vector<v1::UploadPointsRequest> requests;
+  for (uint64_t offset = 0; offset < 45 * kPiece; offset += kPiece) {
+    requests.push_back(UploadRequest(other, offset, std::vector<double>(3 * kPiece, 0.5)));
+  }
+  calls_.Upload(requests);
+
   const std::string name = calls_.Create().name();
   calls_.Upload(name, 0, UniformPoints(1000, 3, 5));
   ExpectMemoryLimit(Refine(name, 0.001));
@@ -53,7 +63,6 @@ TEST_F(SessionMemoryTest, ARefinementThatNeedsTooMuchFailsAndLeavesTheSessionAsI
 }
 
 TEST_F(SessionMemoryTest, ADeletedSessionMakesRoomForOthers) {
-  constexpr size_t kPiece = 40'000;
   const std::vector<double> piece = UniformPoints(kPiece, 3, 7);
   const std::string first = calls_.Create().name();
   grpc::Status status;

@@ -279,7 +279,7 @@ TEST_F(SessionServiceTest, ASessionThatNobodyUsesIsDeleted) {
   v1::CreateSessionRequest request = CreateRequest();
   request.mutable_ttl()->set_seconds(1);
   const v1::Session session = calls_.Create(request);
-  EXPECT_TRUE(harness_.log().WaitFor(absl::StrCat("session=", session.name(), " expired")));
+  EXPECT_TRUE(harness_.log().WaitFor(absl::StrCat("event=session_expired session=", session.name())));
   calls_.Get(session.name(), &status_);
   ExpectError(grpc::StatusCode::NOT_FOUND, "SESSION_NOT_FOUND");
 }
