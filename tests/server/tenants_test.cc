@@ -1,0 +1,191 @@
+// Tenants and each other's sessions, over real connections.
+#include <string>
+#include <vector>
+
+#include "absl/strings/match.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_replace.h"
+#include "client/client.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include "tests/formats/temporary_folder.h"
+#include "tests/server/raw_call.h"
+#include "tests/server/service_harness.h"
+#include "wellspace/v1/operations.pb.h"
+#include "wellspace/v1/queries.pb.h"
+#include "wellspace/v1/sessions.pb.h"
+
+namespace wellspace::server {
+namespace {
+
+using ::testing::IsEmpty;
+using ::testing::Not;
+using ::testing::SizeIs;
+
+const std::string kAcme(40, 'a');
+const std::string kBeta(40, 'b');
+
+// A server with two tenants, of whom acme has a session with a mesh.
+class TenantsTest : public ::testing::Test {
+ protected:
+  TenantsTest()
+      : harness_(FakeMesher, {}, Transport::kLoopback, FakeEstimator, core::Mesher::Create, Security()),
+        acme_(ClientWith(kAcme)),
+        beta_(ClientWith(kBeta)) {
+    session_ = acme_.CreateSession(Options(), First()).value().name;
+    const std::vector<double> points = {0.25, 0.25, 0.75, 0.25, 0.5, 0.75};
+    client::SpanSource source(2, points);
+    EXPECT_TRUE(acme_.UploadPoints(session_, source).ok());
+    operation_ = acme_.StartRefinement(session_).value().name;
+    EXPECT_EQ(acme_.WatchOperation(operation_).value().state, client::OperationState::kSucceeded);
+  }
+
+  static client::SessionOptions Options() {
+    client::SessionOptions options;
+    options.parameters.dimension = 2;
+    options.parameters.domain_low = {0, 0};
+    options.parameters.domain_high = {1, 1};
+    options.labels = {{"project", "secret"}};
+    return options;
+  }
+
+  static client::CallOptions First() {
+    client::CallOptions call;
+    call.request_id = "first";
+    return call;
+  }
+
+  SecurityOptions Security() {
+    SecurityOptions security;
+    security.token_file =
+        folder_.Write("tokens", absl::StrCat(*MakeTokenLine("acme", kAcme), "\n", *MakeTokenLine("beta", kBeta)));
+    return security;
+  }
+
+  client::Client ClientWith(const std::string& token) {
+    return client::Connect(harness_.server().address(), {.token = token}).value();
+  }
+
+  // How one call of `method` about `name` ends for beta.
+  grpc::Status CallAsBeta(const google::protobuf::MethodDescriptor& method, const std::string& name) {
+    const std::unique_ptr<google::protobuf::Message> request(
+        google::protobuf::MessageFactory::generated_factory()->GetPrototype(method.input_type())->New());
+    SetName(*request, name);
+    if (const auto* beta = request->GetDescriptor()->FindFieldByName("beta"); beta != nullptr) {
+      request->GetReflection()->SetDouble(request.get(), beta, 1);  // looked at before the name
+    }
+    grpc::ClientContext context;
+    context.AddMetadata("authorization", "Bearer " + kBeta);
+    const std::string path = absl::StrCat("/", method.service()->full_name(), "/", method.name());
+    return CallUnary(harness_.channel(), path, request->SerializeAsString(), context).status;
+  }
+
+  // Puts `name` where the request says what it is about.
+  static void SetName(google::protobuf::Message& request, const std::string& name) {
+    const google::protobuf::Reflection& reflection = *request.GetReflection();
+    for (const char* field_name : {"name", "parent"}) {
+      if (const auto* field = request.GetDescriptor()->FindFieldByName(field_name); field != nullptr) {
+        reflection.SetString(&request, field, name);
+        return;
+      }
+    }
+    const auto* session = request.GetDescriptor()->FindFieldByName("session");
+    ASSERT_NE(session, nullptr) << request.GetDescriptor()->full_name();
+    SetName(*reflection.MutableMessage(&request, session), name);
+  }
+
+  // All methods that are about a session or an operation.
+  static std::vector<const google::protobuf::MethodDescriptor*> Methods() {
+    std::vector<const google::protobuf::MethodDescriptor*> methods;
+    for (const google::protobuf::FileDescriptor* file :
+         {v1::Session::descriptor()->file(), v1::Operation::descriptor()->file(),
+          v1::VoronoiCellsRequest::descriptor()->file()}) {
+      for (int i = 0; i < file->service(0)->method_count(); ++i) {
+        const google::protobuf::MethodDescriptor* method = file->service(0)->method(i);
+        if (method->name() != "CreateSession" && method->name() != "ListSessions") {
+          methods.push_back(method);
+        }
+      }
+    }
+    return methods;
+  }
+
+  const std::string& NameFor(const google::protobuf::MethodDescriptor& method) const {
+    return absl::EndsWith(method.name(), "Operation") ? operation_ : session_;
+  }
+
+  TemporaryFolder folder_;
+  ServiceHarness harness_;
+  client::Client acme_;
+  client::Client beta_;
+  std::string session_;
+  std::string operation_;
+};
+
+// A name of the same form that nobody has.
+std::string Unused(std::string name) {
+  char& letter = name[std::string("sessions/").size()];
+  letter = letter == 'a' ? 'b' : 'a';
+  return name;
+}
+
+TEST_F(TenantsTest, AnothersSessionIsAsIfThereWereNone) {
+  const client::Session before = acme_.GetSession(session_).value();
+  ASSERT_THAT(Methods(), SizeIs(14));
+  for (const google::protobuf::MethodDescriptor* method : Methods()) {
+    const std::string& name = NameFor(*method);
+    const std::string unused = Unused(name);
+    const grpc::Status status = CallAsBeta(*method, name);
+    const grpc::Status none = CallAsBeta(*method, unused);
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::NOT_FOUND)
+        << method->full_name() << ": " << status.error_message();
+    EXPECT_EQ(none.error_code(), status.error_code()) << method->full_name();
+    EXPECT_EQ(absl::StrReplaceAll(none.error_message(), {{Unused(session_), session_}}), status.error_message());
+    EXPECT_EQ(DetailsOf(status).reason, DetailsOf(none).reason);
+  }
+  const client::Session after = acme_.GetSession(session_).value();
+  EXPECT_EQ(after.revision, before.revision);
+  EXPECT_EQ(after.labels, before.labels);
+  EXPECT_EQ(after.last_operation, before.last_operation);
+  EXPECT_EQ(after.state, client::SessionState::kReady);
+  EXPECT_TRUE(acme_.GetOperation(operation_).ok());
+  EXPECT_EQ(acme_.DeleteSession(session_), absl::OkStatus());
+}
+
+TEST_F(TenantsTest, ListsHaveOnlyOnesOwn) {
+  ASSERT_TRUE(acme_.CreateSession(Options()).ok());
+  const client::SessionPage first = acme_.ListSessions({}, {.page_size = 1, .page_token = ""}).value();
+  ASSERT_THAT(first.sessions, SizeIs(1));
+  ASSERT_THAT(first.next_page_token, Not(IsEmpty()));
+  EXPECT_THAT(beta_.ListSessions()->sessions, IsEmpty());
+  EXPECT_THAT(beta_.ListSessions({{"project", "secret"}})->sessions, IsEmpty());
+  // Another's place in a list leads to nothing.
+  const absl::StatusOr<client::SessionPage> page =
+      beta_.ListSessions({}, {.page_size = 1, .page_token = first.next_page_token});
+  EXPECT_TRUE(!page.ok() || page->sessions.empty());
+}
+
+TEST_F(TenantsTest, RequestIdsAreOnesOwn) {
+  const absl::StatusOr<client::Session> theirs = beta_.CreateSession(Options(), First());
+  ASSERT_TRUE(theirs.ok()) << theirs.status();
+  EXPECT_NE(theirs->name, session_);
+  EXPECT_EQ(acme_.CreateSession(Options(), First())->name, session_);
+  EXPECT_EQ(acme_.GetSession(theirs->name).status().code(), absl::StatusCode::kNotFound);
+}
+
+TEST_F(TenantsTest, NamesHaveNothingInCommon) {
+  const std::string other = acme_.CreateSession(Options()).value().name;
+  const size_t prefix = std::string("sessions/").size();
+  const std::string a = session_.substr(prefix);
+  const std::string b = other.substr(prefix);
+  ASSERT_EQ(a.size(), b.size());
+  EXPECT_GE(a.size(), 16u);
+  int equal = 0;
+  for (size_t i = 0; i < a.size(); ++i) {
+    equal += a[i] == b[i] ? 1 : 0;
+  }
+  EXPECT_LE(equal, static_cast<int>(a.size()) / 2);
+}
+
+}  // namespace
+}  // namespace wellspace::server
