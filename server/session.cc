@@ -216,7 +216,7 @@ grpc::Status Session::CheckCoordinates(uint64_t first, std::span<const double> c
     if (low->empty() ? !std::isfinite(x) : !(x >= (*low)[axis] && x <= (*high)[axis])) {
       return MakeError(
           v1::ERROR_REASON_INVALID_POINTS,
-          absl::StrCat("point ", first + i / dimension_, ": coordinate ", axis, " is ", x, "; ",
+          absl::StrCat("points[", first + i / dimension_, "]: coordinate ", axis, " is ", x, "; ",
                        low->empty() ? "a finite number is needed"
                                     : absl::StrCat("in the domain it is from ", (*low)[axis], " to ", (*high)[axis])),
           "points.coordinates");

@@ -545,7 +545,7 @@ TEST_F(RefinedByTheCore, TheDomainIsFixedByTheFirstMesh) {
   grpc::Status status;
   calls_.Upload(name, 2, {1, 5, 1, 5.5}, &status);
   EXPECT_EQ(DetailsOf(status).reason, "INVALID_POINTS");
-  EXPECT_NE(status.error_message().find("point 3: coordinate 1 is 5.5; in the domain it is from -1 to 5"),
+  EXPECT_NE(status.error_message().find("points[3]: coordinate 1 is 5.5; in the domain it is from -1 to 5"),
             std::string::npos)
       << status.error_message();
   calls_.Upload(name, 2, {1, 5});

@@ -317,7 +317,7 @@ TEST_F(SessionServiceTest, WhatCameBeforeABadChunkIsCommitted) {
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1.5, -0.1}) {
     calls_.Upload({UploadRequest(session.name(), 1, {0.75, 0.25, 0.5, bad})}, &status_);
     ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_POINTS", "points.coordinates");
-    EXPECT_NE(status_.error_message().find("point 2: coordinate 1"), std::string::npos) << status_.error_message();
+    EXPECT_NE(status_.error_message().find("points[2]: coordinate 1"), std::string::npos) << status_.error_message();
     EXPECT_EQ(calls_.Get(session.name()).committed_points(), 1u);
   }
 }
