@@ -22,7 +22,8 @@ void AddOutput(CLI::App& command, OutputFormat& format) {
 void PrintJson(const Json& json, bool indented) { std::cout << json.dump(indented ? 2 : -1) << "\n" << std::flush; }
 
 // The server knows points by their index; who wrote the file knows them by their line.
-absl::Status WithOrigins(const absl::Status& status, const formats::PointCloud& cloud, uint64_t first_index) {
+absl::Status WithOrigins(const absl::Status& status, uint64_t first_index, uint64_t count,
+                         const std::function<std::string(uint64_t)>& origin) {
   constexpr std::string_view kPoint = "points[";
   std::string message(status.message());
   std::string first_origin;
@@ -32,16 +33,20 @@ absl::Status WithOrigins(const absl::Status& status, const formats::PointCloud& 
     const char* end = message.data() + message.size();
     const std::from_chars_result result = std::from_chars(message.data() + at, end, point);
     if (result.ec != std::errc() || result.ptr == end || *result.ptr != ']' || point < first_index ||
-        point - first_index >= cloud.size()) {
+        point - first_index >= count) {
       continue;
     }
     if (first_origin.empty()) {
-      first_origin = cloud.Origin(point - first_index);
+      first_origin = origin(point - first_index);
     } else {
-      message.insert(result.ptr + 1 - message.data(), absl::StrCat(" (", cloud.Origin(point - first_index), ")"));
+      message.insert(result.ptr + 1 - message.data(), absl::StrCat(" (", origin(point - first_index), ")"));
     }
   }
   return absl::Status(status.code(), first_origin.empty() ? message : absl::StrCat(first_origin, ": ", message));
+}
+
+absl::Status WithOrigins(const absl::Status& status, const formats::PointCloud& cloud) {
+  return WithOrigins(status, 0, cloud.size(), [&cloud](uint64_t point) { return cloud.Origin(point); });
 }
 
 void RemoteCommand::AddTo(CLI::App& command, Needs needs) {

@@ -22,8 +22,11 @@ void AddOutput(CLI::App& command, OutputFormat& format);
 // Prints `json` on standard output, in one line or indented.
 void PrintJson(const Json& json, bool indented = true);
 
-// `status`, with the file and the line of each point that the server names by its index.
-absl::Status WithOrigins(const absl::Status& status, const formats::PointCloud& cloud, uint64_t first_index = 0);
+// `status`, with the file and the line of each point that the server names by its index; those of the file are `count` from
+// `first_index` on, and `origin` tells where each was read.
+absl::Status WithOrigins(const absl::Status& status, uint64_t first_index, uint64_t count,
+                         const std::function<std::string(uint64_t)>& origin);
+absl::Status WithOrigins(const absl::Status& status, const formats::PointCloud& cloud);
 
 // Thread safety: thread-compatible.
 class RemoteCommand {

@@ -85,7 +85,7 @@ std::optional<uint64_t> InputFile::size() const {
   return static_cast<uint64_t>(attributes.st_size);
 }
 
-absl::StatusOr<size_t> InputFile::ReadAt(uint64_t offset, char* buffer, size_t size) {
+absl::StatusOr<size_t> InputFile::ReadAt(uint64_t offset, char* buffer, size_t size) const {
   while (true) {
     const ssize_t got = pread(descriptor_, buffer, size, static_cast<off_t>(offset));
     if (got >= 0) {

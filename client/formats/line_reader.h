@@ -40,7 +40,7 @@ class InputFile {
   // How many bytes the file has; none when it is no regular file (a pipe, a device).
   std::optional<uint64_t> size() const;
   // Up to `size` bytes from `offset` on, wherever Read is; 0 at the end of the file. REQUIRES: the file is regular.
-  absl::StatusOr<size_t> ReadAt(uint64_t offset, char* buffer, size_t size);
+  absl::StatusOr<size_t> ReadAt(uint64_t offset, char* buffer, size_t size) const;
 
  private:
   InputFile(int descriptor, std::string name) : descriptor_(descriptor), name_(std::move(name)) {}

@@ -48,6 +48,9 @@ class NpyReader {
 
   uint64_t rows() const { return header_.shape[0]; }
   uint64_t columns() const { return header_.shape[1]; }
+  const NpyHeader& header() const { return header_; }
+  // Where in the source the values begin. REQUIRES: none has been read.
+  uint64_t values_offset() const { return taken_; }
 
   // The values, row by row, whichever order the array is stored in; then expects the end of the source. To be called once.
   //

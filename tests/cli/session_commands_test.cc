@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "client/formats/npy.h"
 #include "client/formats/read_mesh.h"
 #include "proto/checksum.h"
 #include "tests/cli/process.h"
@@ -263,6 +264,13 @@ TEST_F(SessionCommandsTest, UploadSendsTheFileAndNamesLinesInErrors) {
   const RunResult outside = Run({"upload", "one", cloud});
   EXPECT_EQ(outside.exit_code, 2);
   EXPECT_THAT(outside.err, HasSubstr("cloud.csv:4: points[1235] is outside"));
+  // Read while it is sent.
+  const double numbers[] = {5, 6, 7, 8};
+  std::string array = formats::NpyPreamble("<f8", 2, 2);
+  array.append(reinterpret_cast<const char*>(numbers), sizeof(numbers));
+  const RunResult numpy = Run({"upload", "one", folder_.Write("cloud.npy", array)});
+  EXPECT_THAT(points, ElementsAre(5, 6, 7, 8));
+  EXPECT_THAT(numpy.err, HasSubstr("cloud.npy[1]: points[1235] is outside"));
   const RunResult solid = Run({"upload", "one", "-"}, "1,2,3\n");
   EXPECT_EQ(solid.exit_code, 2);
   EXPECT_THAT(solid.err, HasSubstr("<stdin>:1: expected 2 coordinates, got 3"));

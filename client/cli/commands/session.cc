@@ -187,6 +187,7 @@ void AddCreate(CLI::App& session, int& exit_code) {
   CLI::App* app =
       Add(session, "create", "Create a session, and print its name", command, &SessionCommand::Create, exit_code);
   command->parameters.AddSpaceTo(*app);
+  app->get_option("--dimension")->description("Dimension; required unless --domain tells it");
   command->parameters.AddQualityTo(*app);
   AddLabels(*app, command->labels, "Label of the session; may be given more than once");
   AddTtl(*app, command->ttl_seconds);

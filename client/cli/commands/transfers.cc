@@ -11,9 +11,10 @@
 #include "client/cli/remote_command.h"
 #include "client/cli/session_options.h"
 #include "client/cli/statistics.h"
+#include "client/files/cloud_file.h"
 #include "client/files/mesh_file.h"
 #include "client/formats/line_reader.h"
-#include "client/formats/read_cloud.h"
+#include "client/formats/write_mesh.h"
 
 namespace wellspace::cli {
 namespace {
@@ -34,25 +35,26 @@ absl::Status UploadCommand::Upload(client::Client& client, client::CallOptions c
   if (!found.ok()) {
     return found.status();
   }
-  const absl::StatusOr<formats::PointCloud> cloud =
-      formats::ReadCloud(input, {.format = input_format, .dimension = found->parameters.dimension});
-  if (!cloud.ok()) {
-    return cloud.status();
+  const absl::StatusOr<std::unique_ptr<client::CloudFile>> opened =
+      client::CloudFile::Open(input, {.format = input_format, .dimension = found->parameters.dimension});
+  if (!opened.ok()) {
+    return opened.status();
   }
-  client::SpanSource source(cloud->dimension, cloud->points);
+  client::CloudFile& cloud = **opened;
   const uint64_t first = offset.value_or(found->committed_points);
   call.expected_revision = expected_revision;
   absl::StatusOr<client::Uploaded> uploaded = absl::InternalError("no upload");
   {
     ProgressBar bar(!remote.quiet() && !remote.json());
-    const double total = std::max<double>(1, cloud->size());
+    const double total = std::max<double>(1, cloud.size());
     uploaded = client.UploadPoints(
-        session, source, first,
+        session, cloud, first,
         [&](uint64_t points) { bar.Update("upload", points / total, absl::StrCat(WithThousands(points), " points")); },
         call);
   }
   if (!uploaded.ok()) {
-    return WithOrigins(uploaded.status(), *cloud, first);
+    return WithOrigins(uploaded.status(), first, cloud.size(),
+                       [&cloud](uint64_t point) { return cloud.Origin(point); });
   }
   if (remote.json()) {
     PrintJson(

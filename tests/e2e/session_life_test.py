@@ -1,0 +1,151 @@
+"""The life of a session through the tool and the C++ library's example, with the real server."""
+import json
+import os
+import pathlib
+import random
+import signal
+import subprocess
+import tempfile
+import unittest
+
+BIN = pathlib.Path(os.environ["WELLSPACE_BIN_DIR"])
+COAST = pathlib.Path(os.environ["WELLSPACE_EXAMPLES_DIR"]) / "coast-110m.csv"
+
+
+def csv(points):
+    return "".join(",".join(map(repr, point)) + "\n" for point in points)
+
+
+def uniform(count, seed):
+    generator = random.Random(seed)
+    return [(generator.random(), generator.random()) for _ in range(count)]
+
+
+class SessionLife(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.server = subprocess.Popen([BIN / "wellspaced", "--listen", "127.0.0.1:0"], stdout=subprocess.PIPE,
+                                      stderr=subprocess.DEVNULL, text=True)
+        cls.address = cls.server.stdout.readline().removeprefix("listening on ").strip()
+        cls.environment = os.environ | {"WELLSPACE_SERVER": cls.address}
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.server.terminate()
+        cls.server.wait(timeout=60)
+        cls.server.stdout.close()
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def run_tool(self, *arguments, exit_code=0, text="", program="wellspace"):
+        done = subprocess.run([BIN / program, *map(str, arguments)], capture_output=True, text=True, input=text, timeout=240,
+                              env=self.environment, check=False)
+        self.assertEqual(done.returncode, exit_code, (arguments, done.stderr, done.stdout))
+        return done.stdout if exit_code == 0 else done.stderr
+
+    def run_json(self, *arguments, **keywords):
+        return json.loads(self.run_tool(*arguments, "--output", "json", **keywords))
+
+    def create(self, *options):
+        name = self.run_tool("session", "create", *options).strip()
+        self.addCleanup(lambda: subprocess.run([BIN / "wellspace", "session", "delete", name], env=self.environment,
+                                               stderr=subprocess.DEVNULL, check=False))
+        return name
+
+    def test_a_session_makes_the_mesh_that_one_call_makes(self):
+        name = self.create("--dimension", 2, "--label", "who=e2e")
+        points = COAST.read_text().splitlines()[1:]
+        for part, offset in ((points[:2000], 0), (points[:3000], 0), (points[3000:], None)):  # a repetition, then the rest
+            self.run_tool("upload", name, "-", *(["--offset", offset] if offset is not None else []),
+                          text="\n".join(part) + "\n")
+        self.assertEqual(self.run_json("session", "show", name)["committed_points"], len(points))
+        operation = self.run_json("refine", name)
+        self.assertEqual(operation["state"], "succeeded")
+        session = self.run_json("session", "show", name)
+        self.assertEqual(session["state"], "ready")
+        self.assertEqual(session["last_operation"], operation["name"])
+        self.run_tool("download", name, "-o", self.folder / "session.npz", "--revision", operation["mesh_revision"])
+        self.run_tool("mesh", COAST, "-o", self.folder / "mesh.npz")
+        self.assertEqual((self.folder / "session.npz").read_bytes(), (self.folder / "mesh.npz").read_bytes())
+        events = [json.loads(line) for line in self.run_tool("watch", operation["name"], "--output", "json").splitlines()]
+        self.assertEqual(events[-1]["state"], "succeeded")
+        listed = self.run_json("session", "list", "--label", "who=e2e")
+        self.assertEqual([one["name"] for one in listed], [name])
+        self.run_tool("session", "delete", name)
+        self.assertIn("NOT_FOUND", self.run_tool("session", "show", name, exit_code=2))
+
+    def test_points_are_added_to_a_mesh(self):
+        name = self.create("--domain", "0,0,1,1")
+        cloud, more = uniform(300, 1), uniform(50, 2)
+        self.run_tool("upload", name, "-", text=csv(cloud))
+        self.run_tool("refine", name)
+        added = self.run_json("add", name, "-", text=csv(more))
+        self.assertEqual(len(added["vertices"]), 50)
+        self.assertEqual(self.run_json("session", "show", name)["state"], "open")
+        self.run_tool("refine", name, "--size", 0.05)
+        self.run_tool("download", name, "-o", self.folder / "mesh.vtu")
+        (self.folder / "all.csv").write_text(csv(cloud + more))
+        report = self.run_json("check", self.folder / "mesh.vtu", "--rho", "1.41421357", "--size", 0.05)
+        self.assertTrue(report["valid"])
+        vertices = self.run_json("session", "show", name)["vertex_count"]
+        self.assertEqual(report["vertices"], vertices)
+
+        nearest = [line.split() for line in self.run_tool("cells", name, "--nearest").splitlines()]
+        self.assertEqual([int(vertex) for vertex, _ in nearest], list(range(vertices)))
+        cells = [json.loads(line) for line in self.run_tool("cells", name, "--output", "json").splitlines()]
+        self.assertEqual(len(cells), vertices)
+        neighbours = {cell["vertex"]: set(cell["neighbours"]) for cell in cells}
+        for vertex, others in neighbours.items():
+            for other in others:
+                self.assertIn(vertex, neighbours[other])
+        clipped = self.run_json("cells", name, 7, "--beta", 1.5)
+        self.assertEqual(clipped["vertex"], 7)
+        self.assertEqual(clipped["clip_radius"], 1.5 * float(nearest[7][1]))
+        self.assertIn("OUT_OF_RANGE", self.run_tool("cells", name, vertices, exit_code=2))
+
+    def test_ctrl_c_cancels_the_refinement_and_the_session_keeps_its_points(self):
+        name = self.create("--domain", "0,0,1,1", "--size", 0.0005)
+        self.run_tool("upload", name, "-", text=csv(uniform(100, 3)))
+        operation = self.run_tool("refine", name, "--detach").strip()
+        self.assertIn("SESSION_BUSY", self.run_tool("refine", name, "--output", "json", exit_code=7))
+        self.assertIn("cancelled", self.run_tool("cancel", name))
+        self.assertIn("CANCELLED", self.run_tool("watch", operation, exit_code=1))
+
+        refine = subprocess.Popen([BIN / "wellspace", "refine", name], env=self.environment, stderr=subprocess.PIPE, text=True)
+        while self.run_json("session", "show", name)["last_operation"] == operation:
+            pass
+        refine.send_signal(signal.SIGINT)
+        _, errors = refine.communicate(timeout=60)
+        self.assertEqual(refine.returncode, 130, errors)
+        self.run_tool("watch", name, exit_code=1)
+        session = self.run_json("session", "show", name)
+        self.assertEqual((session["state"], session["committed_points"]), ("open", 100))
+
+    def test_errors_name_the_line_and_the_option(self):
+        name = self.create("--domain", "0,0,1,1")
+        outside = self.run_tool("upload", name, "-", text="0.5,0.5\n\n0.5,7\n", exit_code=2)
+        self.assertIn("<stdin>:3: ", outside)
+        self.assertIn("MESH_NOT_READY", self.run_tool("download", name, "-o", self.folder / "a.vtu", "--output", "json",
+                                                      exit_code=7))
+        self.assertIn("--rho: ", self.run_tool("refine", name, "--rho", 0.1, exit_code=2))
+        self.assertIn("MISMATCH", self.run_tool("refine", name, "--expected-revision", 99, "--output", "json", exit_code=7))
+
+    def test_the_server_tells_about_itself(self):
+        self.assertEqual(self.run_tool("server", "health"), "serving\n")
+        self.assertEqual(self.run_tool("server", "health", "--service", "wellspace.v1.SessionService"), "serving\n")
+        self.run_tool("server", "health", "--service", "no.such.Service", exit_code=2)
+        self.assertEqual(self.run_json("server", "info")["server"], self.address)
+
+    def test_the_example_of_the_library(self):
+        mesh = self.folder / "example.npz"
+        out = self.run_tool(self.address, COAST, mesh, program="session_example")
+        self.assertIn(" vertices, ", out)
+        self.run_tool("check", mesh, "--rho", "1.41421357")
+        self.assertEqual(self.run_json("session", "list", "--label", "made-by=session_example"), [])
+
+
+if __name__ == "__main__":
+    unittest.main()
