@@ -139,7 +139,10 @@ v1::MeshParameters UnitCubeParameters(int dimension) {
   return parameters;
 }
 
-TestCall::TestCall(v1::MeshingService::Stub& stub, std::optional<absl::Duration> timeout) {
+TestCall::TestCall(v1::MeshingService::Stub& stub, std::optional<absl::Duration> timeout, const std::string& token) {
+  if (!token.empty()) {
+    context_.AddMetadata("authorization", "Bearer " + token);
+  }
   if (timeout.has_value()) {
     context_.set_deadline(absl::ToChronoTime(absl::Now() + *timeout));
   }

@@ -57,7 +57,8 @@ v1::MeshParameters UnitCubeParameters(int dimension = 3);
 // One call of MeshPoints on the client's side.
 class TestCall {
  public:
-  explicit TestCall(v1::MeshingService::Stub& stub, std::optional<absl::Duration> timeout = std::nullopt);
+  explicit TestCall(v1::MeshingService::Stub& stub, std::optional<absl::Duration> timeout = std::nullopt,
+                    const std::string& token = "");
   // Cancels the call if Finish was not called.
   ~TestCall();
 

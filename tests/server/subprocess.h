@@ -25,6 +25,8 @@ class Subprocess {
   // The next line of its standard output, without its end; empty at the end of the output.
   std::string ReadLine();
 
+  pid_t pid() const { return pid_; }
+
   void Signal(int signal);
 
   // Waits for its end. Its exit code, or minus the signal that ended it.
