@@ -72,6 +72,7 @@ struct Estimate {
 
   Estimate() = default;
   explicit Estimate(double entry) : determinant(entry), permanent(std::abs(entry)) {}
+  Estimate(double the_determinant, double the_permanent) : determinant(the_determinant), permanent(the_permanent) {}
   void Add(double entry, const Estimate& minor, bool negative) {
     const double term = entry * minor.determinant;
     determinant = negative ? determinant - term : determinant + term;
@@ -120,23 +121,29 @@ std::optional<Sign> CertainSign(const Estimate& estimate, int roundings) {
   return std::nullopt;
 }
 
+template <int D, size_t Count>
+struct Scaled {
+  std::array<Point<D>, Count> points;
+  double factor = 1;
+};
+
 // points[i] - origin, all scaled by the same power of two to a largest absolute value in [1, 2), or below where that
 // power would overflow. Every difference is rounded once.
 template <int D, size_t Count>
-std::array<Point<D>, Count> ScaledDifferences(const std::array<Point<D>, Count>& points, const Point<D>& origin) {
-  std::array<Point<D>, Count> out;
+Scaled<D, Count> ScaledDifferences(const std::array<Point<D>, Count>& points, const Point<D>& origin) {
+  Scaled<D, Count> out;
   double largest = 0;
   for (size_t i = 0; i < Count; ++i) {
-    out[i] = Difference<D>(points[i], origin);
-    for (const double x : out[i]) {
+    out.points[i] = Difference<D>(points[i], origin);
+    for (const double x : out.points[i]) {
       largest = std::max(largest, std::abs(x));
     }
   }
   if (largest > 0 && std::isfinite(largest)) {
-    const double factor = std::scalbn(1.0, std::min(-std::ilogb(largest), 1000));
-    for (Point<D>& difference : out) {
+    out.factor = std::scalbn(1.0, std::min(-std::ilogb(largest), 1000));
+    for (Point<D>& difference : out.points) {
       for (double& x : difference) {
-        x *= factor;
+        x *= out.factor;
       }
     }
   }
@@ -148,12 +155,13 @@ std::optional<Sign> FilterOrientation(const Simplex<D>& simplex) {
   std::array<Point<D>, D> corners;
   std::copy_n(simplex.begin() + 1, D, corners.begin());
   // One rounding in each of the D entries of a product.
-  return CertainSign(EstimateDeterminant<D>(ScaledDifferences<D, D>(corners, simplex[0])), D + ExpansionRoundings(D));
+  return CertainSign(EstimateDeterminant<D>(ScaledDifferences<D, D>(corners, simplex[0]).points),
+                     D + ExpansionRoundings(D));
 }
 
 template <int D>
 std::optional<Sign> FilterInSphere(const Simplex<D>& simplex, const Point<D>& q) {
-  const std::array<Point<D>, D + 1> differences = ScaledDifferences<D, D + 1>(simplex, q);
+  const std::array<Point<D>, D + 1> differences = ScaledDifferences<D, D + 1>(simplex, q).points;
   Matrix<double, D + 1> rows;
   for (int i = 0; i <= D; ++i) {
     std::copy_n(differences[i].begin(), D, rows[i].begin());
@@ -161,6 +169,31 @@ std::optional<Sign> FilterInSphere(const Simplex<D>& simplex, const Point<D>& q)
   }
   // D entries are differences; the lifted one has 2 of differences, 1 of the square and D - 1 of the sum.
   return CertainSign(EstimateDeterminant<D + 1>(rows), D + (D + 2) + ExpansionRoundings(D + 1));
+}
+
+// The same with weights, at most the square of the largest difference. A lifted entry is a sum of which only the terms
+// bound the error, so the permanent is that of the terms' absolute values; two more roundings add them up.
+template <int D>
+std::optional<Sign> FilterInPowerSphere(const Simplex<D>& simplex, const std::array<double, D + 1>& weights,
+                                        const Point<D>& q, double q_weight) {
+  const auto [differences, factor] = ScaledDifferences<D, D + 1>(simplex, q);
+  Matrix<double, D + 1> rows;
+  Matrix<double, D + 1> magnitudes;
+  const double lift = q_weight * factor * factor;
+  for (int i = 0; i <= D; ++i) {
+    std::copy_n(differences[i].begin(), D, rows[i].begin());
+    std::copy_n(differences[i].begin(), D, magnitudes[i].begin());
+    const double norm_sq = NormSq<D>(differences[i]);
+    const double weight = weights[i] * factor * factor;
+    if (!(std::abs(weight) <= 1 && std::abs(lift) <= 1)) {
+      return std::nullopt;
+    }
+    rows[i][D] = norm_sq - weight + lift;
+    magnitudes[i][D] = norm_sq + std::abs(weight) + std::abs(lift);
+  }
+  const Estimate estimate{EstimateDeterminant<D + 1>(rows).determinant,
+                          EstimateDeterminant<D + 1>(magnitudes).permanent};
+  return CertainSign(estimate, D + (D + 4) + ExpansionRoundings(D + 1));
 }
 
 // ---- The exact stage
@@ -267,17 +300,35 @@ MeasuredSign Orientation(const Simplex<D>& simplex) {
   return {SignOf(Determinant<D>(EdgeRows<D>(ToGrid<D, D + 1>(simplex)))), Stage::kBigInteger};
 }
 
+namespace {
+
+// det(p_i - q, |p_i - q|^2 - W_i + W_q) has the sign (-1)^D for q inside a simplex of positive orientation.
 template <int D>
-MeasuredSign InSphere(const Simplex<D>& simplex, const Point<D>& q) {
-  // det(p_i - q, |p_i - q|^2) has the sign (-1)^D for q inside a simplex of positive orientation.
-  constexpr Sign kInside = D % 2 == 0 ? Sign::kPositive : Sign::kNegative;
-  if (const std::optional<Sign> sign = FilterInSphere<D>(simplex, q)) {
-    return {*sign * kInside, Stage::kFilter};
-  }
+constexpr Sign kInside = D % 2 == 0 ? Sign::kPositive : Sign::kNegative;
+
+template <int D>
+Sign ExactInPowerSphere(const Simplex<D>& simplex, const std::array<double, D + 1>& weights, const Point<D>& q,
+                        double q_weight) {
   std::array<Point<D>, D + 2> points;
   std::copy(simplex.begin(), simplex.end(), points.begin());
   points[D + 1] = q;
   const Grid<D, D + 2> grid = ToGrid<D, D + 2>(points);
+  // Lifted entries in a unit 2^finer smaller than the square of the grid's, in which the weights are integers too.
+  std::array<Dyadic, D + 2> lifts;
+  int finer = 0;
+  for (int i = 0; i <= D + 1; ++i) {
+    lifts[i] = ToDyadic(i <= D ? weights[i] : q_weight);
+    if (lifts[i].mantissa != 0) {
+      finer = std::max(finer, 2 * grid.exponent - lifts[i].exponent);
+    }
+  }
+  const auto to_integer = [&](const Dyadic& lift) {
+    BigInteger value = lift.mantissa;
+    if (lift.mantissa != 0) {
+      value <<= lift.exponent - (2 * grid.exponent - finer);
+    }
+    return value;
+  };
   Matrix<BigInteger, D + 1> rows;
   for (int i = 0; i <= D; ++i) {
     std::array<BigInteger, D> difference;
@@ -286,8 +337,29 @@ MeasuredSign InSphere(const Simplex<D>& simplex, const Point<D>& q) {
     }
     std::copy(difference.begin(), difference.end(), rows[i].begin());
     rows[i][D] = NormSq(difference);
+    rows[i][D] <<= finer;
+    rows[i][D] += to_integer(lifts[D + 1]) - to_integer(lifts[i]);
   }
-  return {SignOf(Determinant<D + 1>(rows)) * kInside, Stage::kBigInteger};
+  return SignOf(Determinant<D + 1>(rows)) * kInside<D>;
+}
+
+}  // namespace
+
+template <int D>
+MeasuredSign InSphere(const Simplex<D>& simplex, const Point<D>& q) {
+  if (const std::optional<Sign> sign = FilterInSphere<D>(simplex, q)) {
+    return {*sign * kInside<D>, Stage::kFilter};
+  }
+  return {ExactInPowerSphere<D>(simplex, {}, q, 0), Stage::kBigInteger};
+}
+
+template <int D>
+MeasuredSign InPowerSphere(const Simplex<D>& simplex, const std::array<double, D + 1>& weights, const Point<D>& q,
+                           double q_weight) {
+  if (const std::optional<Sign> sign = FilterInPowerSphere<D>(simplex, weights, q, q_weight)) {
+    return {*sign * kInside<D>, Stage::kFilter};
+  }
+  return {ExactInPowerSphere<D>(simplex, weights, q, q_weight), Stage::kBigInteger};
 }
 
 template <int D>
@@ -360,10 +432,12 @@ double ExactVolumeSum<D>::value() const {
   return Rounded(impl_->total, impl_->exponent) / Factorial(D);
 }
 
-#define WELLSPACE_INSTANTIATE(D)                                         \
-  template MeasuredSign Orientation<D>(const Simplex<D>&);               \
-  template MeasuredSign InSphere<D>(const Simplex<D>&, const Point<D>&); \
-  template Point<D> ExactCircumcentreOffset<D>(const Simplex<D>&);       \
+#define WELLSPACE_INSTANTIATE(D)                                                                               \
+  template MeasuredSign Orientation<D>(const Simplex<D>&);                                                     \
+  template MeasuredSign InSphere<D>(const Simplex<D>&, const Point<D>&);                                       \
+  template MeasuredSign InPowerSphere<D>(const Simplex<D>&, const std::array<double, D + 1>&, const Point<D>&, \
+                                         double);                                                              \
+  template Point<D> ExactCircumcentreOffset<D>(const Simplex<D>&);                                             \
   template class ExactVolumeSum<D>;
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE

@@ -45,6 +45,17 @@ MeasuredSign Orientation(const Simplex<D>& simplex);
 template <int D>
 MeasuredSign InSphere(const Simplex<D>& simplex, const Point<D>& q);
 
+// The same for weighted vertices: whether the power of `q`, |q - c|^2 - r^2 - W_q, to the sphere (c, r) that is orthogonal
+// to the corners is negative (kPositive: q has to be joined to them), zero or positive.
+//
+// Laws:       as InSphere, which it is when all weights are equal.
+// REQUIRES:   finite coordinates and weights.
+// Complexity: as InSphere.
+// Errors:     none.
+template <int D>
+MeasuredSign InPowerSphere(const Simplex<D>& simplex, const std::array<double, D + 1>& weights, const Point<D>& q,
+                           double q_weight);
+
 // circumcentre - p_0, each coordinate within a relative error of 2^-50 of the exact value; infinities for a flat
 // simplex.
 //

@@ -100,17 +100,36 @@ ExactDecision Decide(const Point<D>& site, const std::array<PlaneSource<D>, D>& 
   return decision;
 }
 
+// ---- Doubles as integers
+
+// A double as mantissa * 2^exponent, the mantissa odd or zero.
+struct Scaled {
+  int64_t mantissa = 0;
+  int exponent = 0;
+};
+
+Scaled Decompose(double value) {
+  if (value == 0) {
+    return {0, std::numeric_limits<int>::max()};
+  }
+  int exponent = 0;
+  const auto mantissa = static_cast<int64_t>(std::ldexp(std::frexp(value, &exponent), 53));
+  const int zeros = std::countr_zero(static_cast<uint64_t>(mantissa));
+  return {mantissa >> zeros, exponent - 53 + zeros};
+}
+
 // ---- Integers of fixed width
 
 // Differences d of coordinates with |d| < 2^b, b = 64 B - 2, in B limbs.
 //
 // All results fit. A minor of k rows is at most k^(k/2) 2^(k b) (Hadamard), and k/2 log2 k <= 0, 1, 3, 4, 6, 8 for k =
 // 1, ..., 6: with its sign k b + 9 bits at most for k = 6, and 64 B k = k b + 2 k are there (k = 2: 2 b + 2 of 2 b + 4;
-// 3: + 4 of 6; 4: + 5 of 8; 5: + 7 of 10; 6: + 9 of 12). An offset is a sum of D squares, below 2^(2 b + 3), or twice a
-// difference, in 2 B limbs of 2 b + 4 bits. The bordered determinant is a sum of D + 1 products of the two: below 2^((D
-// + 2) b) times D (D + 1) D^(D/2), with its sign (D + 2) b + 5, 8, 10, 12, 15 bits for D = 2, ..., 6, and there are (D +
-// 2) b + 2 (D + 2) = ... + 8, 10, 12, 14, 16. The coefficient of the site is a sum of D + 1 minors of D rows: D b + 4,
-// 6, 8, 10, 12 bits, and exactly so many are there. Sums on the way may wrap: arithmetic is modulo a power of two.
+// 3: + 4 of 6; 4: + 5 of 8; 5: + 7 of 10; 6: + 9 of 12). An offset is a sum of D squares, with a weight at most twice
+// that, below 2^(2 b + 4), or twice a difference, in 2 B limbs of 2 b + 4 bits. The bordered determinant is a sum of D +
+// 1 products of the two: below 2^((D + 2) b) times 2 D (D + 1) D^(D/2), with its sign (D + 2) b + 6, 9, 11, 13, 16 bits
+// for D = 2, ..., 6, and there are (D + 2) b + 2 (D + 2) = ... + 8, 10, 12, 14, 16. The coefficient of the site is a sum
+// of D + 1 minors of D rows: D b + 4, 6, 8, 10, 12 bits, and exactly so many are there. Sums on the way may wrap:
+// arithmetic is modulo a power of two.
 template <int B>
 struct FixedRing {
   static constexpr Stage kStage = B == 1 ? Stage::kInteger : Stage::kWideInteger;
@@ -152,6 +171,28 @@ struct FixedRing {
       core::AddProduct(total, Entry{entry.magnitude, false}, false, FixedInteger<B>{entry.magnitude});
       sum.magnitude = total.limbs;
     }
+  }
+  // Adds a weight, or takes it off, in the square of the unit of entries, 2^unit; false where it is no integer of it.
+  // Sums may wrap on the way: the last one is not negative.
+  static bool AddWeight(Offset& sum, double weight, bool negate, int unit) {
+    if (weight == 0) {
+      return true;
+    }
+    const Scaled scaled = Decompose(weight);
+    const int shift = scaled.exponent - 2 * unit;
+    if (shift < 0 || shift + 53 > 2 * kDifferenceBits) {
+      return false;
+    }
+    FixedInteger<2 * B> term;
+    const Unsigned128 bits = Unsigned128{static_cast<uint64_t>(scaled.mantissa)} << (shift % 64);
+    term.limbs[shift / 64] = static_cast<uint64_t>(bits);
+    if (shift / 64 + 1 < 2 * B) {
+      term.limbs[shift / 64 + 1] = static_cast<uint64_t>(bits >> 64);
+    }
+    FixedInteger<2 * B> total{sum.magnitude};
+    total.Add(term, negate);
+    sum.magnitude = total.limbs;
+    return true;
   }
   static Offset Twice(const Entry& entry) {
     Offset offset{{}, false};
@@ -211,8 +252,8 @@ struct Differences {
 
 // Calls to_entry(difference, entry) for every difference and completes the rows; false as soon as one call is.
 template <int D, int B, typename ToEntry>
-inline bool FillRows(const Differences<D>& differences, const std::array<PlaneSource<D>, D>& planes, ToEntry to_entry,
-                     Rows<FixedRing<B>, D>& rows) {
+inline bool FillRows(const Differences<D>& differences, const std::array<PlaneSource<D>, D>& planes,
+                     const DecisionWeights<D>* weights, int unit, ToEntry to_entry, Rows<FixedRing<B>, D>& rows) {
   using Ring = FixedRing<B>;
   for (int j = 0; j <= D; ++j) {
     if (j < D && planes[j].IsWall()) {
@@ -234,6 +275,11 @@ inline bool FillRows(const Differences<D>& differences, const std::array<PlaneSo
       }
       Ring::AddSquare(rows.offsets[j], rows.normals[j][i]);
     }
+    if (weights != nullptr &&
+        !(Ring::AddWeight(rows.offsets[j], weights->site, false, unit) &&
+          Ring::AddWeight(rows.offsets[j], j < D ? weights->generators[j] : weights->u, true, unit))) {
+      return false;
+    }
   }
   return true;
 }
@@ -244,7 +290,7 @@ double PowerOfTwo(int exponent) { return std::bit_cast<double>(static_cast<uint6
 // The rows in units of 2^(exponent - 61), in which all differences are below 2^62; false where they are no integers.
 template <int D>
 bool ToRows(const Differences<D>& differences, const std::array<PlaneSource<D>, D>& planes,
-            Rows<FixedRing<1>, D>& rows) {
+            const DecisionWeights<D>* weights, Rows<FixedRing<1>, D>& rows) {
   const int unit = differences.exponent - (FixedRing<1>::kDifferenceBits - 1);
   if (unit < -1022 || differences.exponent > 1023) {
     return false;
@@ -258,7 +304,7 @@ bool ToRows(const Differences<D>& differences, const std::array<PlaneSource<D>, 
     return static_cast<double>(integer) * inverse == x;
   };
   return FillRows<D, 1>(
-      differences, planes,
+      differences, planes, weights, unit,
       [&](const ExactDifference& x, SignedMagnitude<1>& entry) {
         int64_t high = 0;
         if (!to_integer(x.high, high)) {
@@ -278,26 +324,10 @@ bool ToRows(const Differences<D>& differences, const std::array<PlaneSource<D>, 
       rows);
 }
 
-// A double as mantissa * 2^exponent, the mantissa odd or zero.
-struct Scaled {
-  int64_t mantissa = 0;
-  int exponent = 0;
-};
-
-Scaled Decompose(double value) {
-  if (value == 0) {
-    return {0, std::numeric_limits<int>::max()};
-  }
-  int exponent = 0;
-  const auto mantissa = static_cast<int64_t>(std::ldexp(std::frexp(value, &exponent), 53));
-  const int zeros = std::countr_zero(static_cast<uint64_t>(mantissa));
-  return {mantissa >> zeros, exponent - 53 + zeros};
-}
-
 // The rows in units of the finest difference, if they fit in 126 bits.
 template <int D>
 bool ToRows(const Differences<D>& differences, const std::array<PlaneSource<D>, D>& planes,
-            Rows<FixedRing<2>, D>& rows) {
+            const DecisionWeights<D>* weights, Rows<FixedRing<2>, D>& rows) {
   if (differences.exponent > 1023) {
     return false;
   }
@@ -316,7 +346,7 @@ bool ToRows(const Differences<D>& differences, const std::array<PlaneSource<D>, 
     return scaled.mantissa == 0 ? 0 : Signed128{scaled.mantissa} * (Signed128{1} << (scaled.exponent - unit));
   };
   return FillRows<D, 2>(
-      differences, planes,
+      differences, planes, weights, unit,
       [&](const ExactDifference& x, SignedMagnitude<2>& entry) {
         const Signed128 value = to_integer(x.high) + to_integer(x.low);
         const auto magnitude = static_cast<Unsigned128>(value < 0 ? -value : value);
@@ -365,8 +395,19 @@ struct BigRows {
 
 // The rows from the coordinates: their differences could overflow.
 template <int D>
-BigRows<D> ToBigRows(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u) {
+BigRows<D> ToBigRows(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u,
+                     const DecisionWeights<D>* weights) {
   int unit = std::numeric_limits<int>::max();
+  const auto include_weight = [&](double weight) {
+    if (weight != 0) {
+      unit = std::min(unit, (Decompose(weight).exponent - 1) / 2);  // not above half of it, whatever its sign
+    }
+  };
+  if (weights != nullptr) {
+    include_weight(weights->site);
+    include_weight(weights->u);
+    std::for_each(weights->generators.begin(), weights->generators.end(), include_weight);
+  }
   const auto include = [&](double x) { unit = std::min(unit, Decompose(x).exponent); };
   std::for_each(site.begin(), site.end(), include);
   std::for_each(u.begin(), u.end(), include);
@@ -398,8 +439,34 @@ BigRows<D> ToBigRows(const Point<D>& site, const std::array<PlaneSource<D>, D>& 
       rows.normals[j][i] = to_integer(generator[i]) - origin[i];
       rows.offsets[j] += rows.normals[j][i] * rows.normals[j][i];
     }
+    if (weights != nullptr) {
+      const auto to_square = [unit](double weight) {
+        const Scaled scaled = Decompose(weight);
+        return scaled.mantissa == 0 ? BigRing::Integer(0)
+                                    : BigRing::Integer(scaled.mantissa) << (scaled.exponent - 2 * unit);
+      };
+      rows.offsets[j] += to_square(weights->site) - to_square(j < D ? weights->generators[j] : weights->u);
+    }
   }
   return big;
+}
+
+}  // namespace
+
+namespace {
+
+// `weights` is null where all are zero.
+template <int D>
+ExactDecision DecideByStages(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u,
+                             const DecisionWeights<D>* weights, TieRule rule) {
+  const Differences<D> differences(site, planes, u);
+  if (Rows<FixedRing<1>, D> rows; ToRows<D>(differences, planes, weights, rows)) {
+    return Decide<FixedRing<1>, D>(site, planes, u, rule, rows);
+  }
+  if (Rows<FixedRing<2>, D> rows; ToRows<D>(differences, planes, weights, rows)) {
+    return Decide<FixedRing<2>, D>(site, planes, u, rule, rows);
+  }
+  return Decide<BigRing, D>(site, planes, u, rule, ToBigRows<D>(site, planes, u, weights).rows);
 }
 
 }  // namespace
@@ -407,20 +474,19 @@ BigRows<D> ToBigRows(const Point<D>& site, const std::array<PlaneSource<D>, D>& 
 template <int D>
 ExactDecision DecideCut(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u,
                         TieRule rule) {
-  const Differences<D> differences(site, planes, u);
-  if (Rows<FixedRing<1>, D> rows; ToRows<D>(differences, planes, rows)) {
-    return Decide<FixedRing<1>, D>(site, planes, u, rule, rows);
-  }
-  if (Rows<FixedRing<2>, D> rows; ToRows<D>(differences, planes, rows)) {
-    return Decide<FixedRing<2>, D>(site, planes, u, rule, rows);
-  }
-  return Decide<BigRing, D>(site, planes, u, rule, ToBigRows<D>(site, planes, u).rows);
+  return DecideByStages<D>(site, planes, u, nullptr, rule);
+}
+
+template <int D>
+ExactDecision DecidePowerCut(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u,
+                             const DecisionWeights<D>& weights, TieRule rule) {
+  return DecideByStages<D>(site, planes, u, &weights, rule);
 }
 
 template <int D>
 Point<D> ExactMeetingPoint(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes) {
   // In units of 2^unit the coordinates solve 2 n_j . x = 2 c_j; by Cramer's rule.
-  const BigRows<D> big = ToBigRows<D>(site, planes, site);
+  const BigRows<D> big = ToBigRows<D>(site, planes, site, nullptr);
   std::array<std::array<BigRing::Integer, D>, D> normals;
   std::copy_n(big.rows.normals.begin(), D, normals.begin());
   const BigRing::Integer determinant = MinorsOf<BigRing, D>(normals)[0];
@@ -435,9 +501,11 @@ Point<D> ExactMeetingPoint(const Point<D>& site, const std::array<PlaneSource<D>
   return x;
 }
 
-#define WELLSPACE_INSTANTIATE(D)                                                                              \
-  template ExactDecision DecideCut<D>(const Point<D>&, const std::array<PlaneSource<D>, D>&, const Point<D>&, \
-                                      TieRule);                                                               \
+#define WELLSPACE_INSTANTIATE(D)                                                                                   \
+  template ExactDecision DecideCut<D>(const Point<D>&, const std::array<PlaneSource<D>, D>&, const Point<D>&,      \
+                                      TieRule);                                                                    \
+  template ExactDecision DecidePowerCut<D>(const Point<D>&, const std::array<PlaneSource<D>, D>&, const Point<D>&, \
+                                           const DecisionWeights<D>&, TieRule);                                    \
   template Point<D> ExactMeetingPoint<D>(const Point<D>&, const std::array<PlaneSource<D>, D>&);
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE

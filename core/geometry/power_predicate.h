@@ -71,6 +71,25 @@ template <int D>
 ExactDecision DecideCut(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u,
                         TieRule rule);
 
+// The weights of a decision's vertices.
+template <int D>
+struct DecisionWeights {
+  double site = 0;
+  std::array<double, D> generators{};  // by plane; those of walls do not matter
+  double u = 0;
+};
+
+// The same for weighted vertices: distances are powers |x p|^2 - W_p, so |w|^2 + W_site - W_p takes the place of |w|^2
+// everywhere, and the perturbation is added to the weights.
+//
+// REQUIRES:   as DecideCut; weights finite, not negative, and none larger than the squared distance between its vertex
+//             and the site.
+// Complexity: as DecideCut.
+// Errors:     none.
+template <int D>
+ExactDecision DecidePowerCut(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u,
+                             const DecisionWeights<D>& weights, TieRule rule);
+
 // The point where D planes meet, relative to `site`, for planes so nearly dependent that doubles cannot tell where.
 //
 // REQUIRES:   as DecideCut.

@@ -37,13 +37,14 @@ Sign OracleOrientation(const std::array<IntegerPoint<D>, D + 1>& p) {
 }
 
 template <int D>
-Sign OracleInSphere(const std::array<IntegerPoint<D>, D + 1>& p, const IntegerPoint<D>& q) {
+Sign OracleInSphere(const std::array<IntegerPoint<D>, D + 1>& p, const IntegerPoint<D>& q,
+                    const std::array<int64_t, D + 2>& weights = {}) {
   std::array<std::array<cpp_int, D + 2>, D + 2> m;
   for (int i = 0; i <= D + 1; ++i) {
     const IntegerPoint<D>& point = i <= D ? p[i] : q;
     m[i][0] = 1;
     std::copy(point.begin(), point.end(), m[i].begin() + 1);
-    m[i][D + 1] = 0;
+    m[i][D + 1] = -weights[i];
     for (const int64_t x : point) {
       m[i][D + 1] += cpp_int(x) * x;
     }
@@ -102,6 +103,15 @@ TYPED_TEST(ExactMeasureTest, SignsAgreeWithIntegerOracle) {
       ASSERT_EQ(Orientation<D>(simplex).sign, orientation) << "range " << draw.range << ", round " << round;
       const MeasuredSign in_sphere = InSphere<D>(simplex, ToPoint<D>(q, draw.scale));
       ASSERT_EQ(in_sphere.sign, OracleInSphere<D>(integers, q)) << "range " << draw.range << ", round " << round;
+      if (draw.scale == 1) {
+        std::array<int64_t, D + 2> weights;
+        std::generate(weights.begin(), weights.end(), [&] { return static_cast<int64_t>(random.Below(4)); });
+        std::array<double, D + 1> of_simplex;
+        std::copy_n(weights.begin(), D + 1, of_simplex.begin());
+        const Sign power =
+            InPowerSphere<D>(simplex, of_simplex, ToPoint<D>(q, 1), static_cast<double>(weights[D + 1])).sign;
+        ASSERT_EQ(power, OracleInSphere<D>(integers, q, weights)) << "range " << draw.range << ", round " << round;
+      }
       if (in_sphere.sign == Sign::kZero) {
         ++zeros;
         EXPECT_EQ(in_sphere.stage, Stage::kBigInteger);

@@ -254,6 +254,60 @@ TYPED_TEST(PredicateTest, NegativeZeroIsZero) {
   }
 }
 
+// DecidePowerCut against InPowerSphere, which shares no arithmetic with it; whole weights make for ties.
+TYPED_TEST(PredicateTest, WeightsCountAsPowers) {
+  constexpr int D = TypeParam::kValue;
+  int ties = 0;
+  for (const Inputs inputs : kAllInputs) {
+    for (int i = 0; i < 300; ++i) {
+      const Decided<D> p = Draw<D>(inputs, this->random_);
+      double least_sq = std::numeric_limits<double>::infinity();
+      for (size_t a = 0; a < p.size(); ++a) {
+        for (size_t b = 0; b < a; ++b) {
+          least_sq = std::min(least_sq, DistanceSq<D>(p[a], p[b]));
+        }
+      }
+      const bool is_exact = inputs == Inputs::kSmallGrid || inputs == Inputs::kLargeGrid;  // least_sq
+      std::array<double, D + 2> weights;
+      for (double& weight : weights) {
+        weight = i % 2 == 0 && is_exact
+                     ? least_sq * static_cast<double>(this->random_.Below(2))
+                     : static_cast<float>(least_sq) * 0.999F * static_cast<float>(this->random_.Unit());
+      }
+      DecisionWeights<D> decision_weights{.site = weights[0], .generators = {}, .u = weights[D + 1]};
+      std::copy_n(weights.begin() + 1, D, decision_weights.generators.begin());
+      std::array<double, D + 1> simplex_weights;
+      std::copy_n(weights.begin(), D + 1, simplex_weights.begin());
+      const Sign expected = InPowerSphere<D>(SimplexOf<D>(p), simplex_weights, p[D + 1], weights[D + 1]).sign *
+                            Orientation<D>(SimplexOf<D>(p)).sign;
+      const auto decide = [&](TieRule rule) {
+        return DecidePowerCut<D>(p[0], BisectorsOf<D>(p), p[D + 1], decision_weights, rule).sign;
+      };
+      ASSERT_EQ(decide(TieRule::kKeep), expected) << ::testing::PrintToString(p) << ::testing::PrintToString(weights);
+      ASSERT_NE(decide(TieRule::kPerturb), Sign::kZero);
+      if (expected != Sign::kZero) {
+        ASSERT_EQ(decide(TieRule::kPerturb), expected);
+      } else {
+        ++ties;
+      }
+    }
+  }
+  EXPECT_GT(ties, D <= 4 ? 5 : 0);
+}
+
+// Equal weights are none.
+TYPED_TEST(PredicateTest, EqualWeightsChangeNothing) {
+  constexpr int D = TypeParam::kValue;
+  for (int i = 0; i < 300; ++i) {
+    const Decided<D> p = Draw<D>(Inputs::kSmallGrid, this->random_);
+    DecisionWeights<D> weights{.site = 0.75, .generators = {}, .u = 0.75};
+    weights.generators.fill(0.75);
+    for (const TieRule rule : {TieRule::kKeep, TieRule::kPerturb}) {
+      ASSERT_EQ(DecidePowerCut<D>(p[0], BisectorsOf<D>(p), p[D + 1], weights, rule).sign, Decide<D>(p, rule).sign);
+    }
+  }
+}
+
 // A wall at `coordinate` bounds the cell as does the bisector with the site's mirror image beyond it.
 TYPED_TEST(PredicateTest, AWallIsTheBisectorWithTheMirrorImage) {
   constexpr int D = TypeParam::kValue;
