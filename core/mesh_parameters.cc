@@ -47,6 +47,8 @@ double MinimumRho(int dimension) {
   return kMinimums[dimension];
 }
 
+double DefaultMinDihedral(int) { return 0; }
+
 absl::Status ValidateParameters(const MeshParameters& parameters) {
   const int dimension = parameters.dimension;
   if (dimension < kMinDimension || dimension > kMaxDimension) {
@@ -83,6 +85,18 @@ absl::Status ValidateParameters(const MeshParameters& parameters) {
   }
   for (size_t i = 0; i < parameters.size_boxes.size(); ++i) {
     WELLSPACE_RETURN_IF_ERROR(CheckSizeBox(parameters.size_boxes[i], i, dimension));
+  }
+  if (parameters.min_dihedral.has_value()) {
+    const double most = dimension == 3 ? kMostMinDihedral : 0;
+    if (!(*parameters.min_dihedral >= 0 && *parameters.min_dihedral <= most)) {
+      return absl::InvalidArgumentError(absl::StrCat("min_dihedral: ", *parameters.min_dihedral, " is not allowed in ",
+                                                     dimension, "-D; ", dimension == 3 ? "0 to " : "", most,
+                                                     dimension == 3 ? " degrees are" : " is, for none of that"));
+    }
+  }
+  if (parameters.pump_weights && dimension < 3) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("pump_weights: true is not allowed in ", dimension, "-D, where there are no slivers; false is"));
   }
   return CheckThreads(parameters.threads);
 }

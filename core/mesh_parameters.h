@@ -3,6 +3,7 @@
 #define WELLSPACE_CORE_MESH_PARAMETERS_H_
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -22,6 +23,14 @@ struct MeshParameters {
   double max_circumradius = 0;
   // Boxes in which it is smaller still. Away from a box, sizes grow no faster than the distance from it.
   std::vector<SizeBox> size_boxes{};
+
+  // Refine moves vertices, all but those that were given, and adds some, until no dihedral angle is smaller, in degrees;
+  // what cannot be mended is counted in the statistics. 0 for none of that; none means DefaultMinDihedral(dimension).
+  // Allowed in 3-D, up to kMostMinDihedral.
+  std::optional<double> min_dihedral{};
+
+  // Extract gives vertices weights, under which the regular triangulation has better simplices. From 3-D on.
+  bool pump_weights = false;
 
   // Low and high corner of the box to be meshed, `dimension` numbers each. Both empty: the bounding box of the points,
   // grown on every side by `margin` times its longest side.
@@ -46,7 +55,11 @@ inline constexpr uint64_t kDefaultMaxVertices = 50'000'000;
 double DefaultRho(int dimension);
 double MinimumRho(int dimension);
 
-// Refuses parameters that no cloud could make valid: dimension, rho, sizes, domain, margin, threads.
+inline constexpr double kMostMinDihedral = 18;
+// The default of `min_dihedral`.
+double DefaultMinDihedral(int dimension);
+
+// Refuses parameters that no cloud could make valid: dimension, rho, sizes, slivers, domain, margin, threads.
 //
 // Errors:     INVALID_ARGUMENT, naming the field, its value and what would be accepted.
 absl::Status ValidateParameters(const MeshParameters& parameters);

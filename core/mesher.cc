@@ -1,22 +1,24 @@
 #include "core/mesher.h"
 
-#include <sys/resource.h>
-
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <optional>
+#include <type_traits>
 #include <utility>
+#include <variant>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
 #include "core/input_cloud.h"
+#include "core/mesh_parts.h"
 #include "core/refine/estimate.h"
 #include "core/refine/refine.h"
 #include "core/simplex/quality.h"
 #include "core/simplex/simplices.h"
 #include "core/simplex/validate.h"
+#include "core/sliver/sliver_stage.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {
@@ -39,17 +41,12 @@ constexpr uint64_t kFixedBytes = uint64_t{4} << 20;
 // What is reserved for a mesh, over what it is estimated to take.
 constexpr double kReserve = 1.25;
 
-// Two ways to compute the quality of a simplex differ by less.
-constexpr double kWorstTolerance = 1e-9;
+// What the triangulation takes for each vertex of a mesh in 3-D while it is made: 6.5 simplices with their neighbours, and
+// a list of their facets.
+constexpr uint64_t kTriangulationBytes = 450;
 
 // Cheap steps between two looks at the context.
 constexpr size_t kCheckInterval = size_t{1} << 16;
-
-uint64_t PeakMemoryBytes() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<uint64_t>(usage.ru_maxrss) * 1024;
-}
 
 uint64_t VertexBudget(const MeshParameters& parameters) {
   return std::min(parameters.max_vertices == 0 ? kDefaultMaxVertices : parameters.max_vertices, kMaxVertices);
@@ -123,6 +120,7 @@ class MesherIn final : public Mesher {
     built_count_ = structure_.vertex_count();
     distinct_count_ = distinct;
     distinct_input_ = distinct;
+    is_given_.assign(built_count_, true);
     refinement_.emplace(structure_, kMinEdgeSteps * domain_.grid_step);
     context.SetVertices(structure_.vertex_count());
     context.SetEstimatedVertices(distinct + structure_.tree().leaf_count());
@@ -133,7 +131,7 @@ class MesherIn final : public Mesher {
   int dimension() const override { return D; }
   uint64_t vertex_count() const override { return structure_.vertex_count(); }
   uint64_t memory_bytes() const override {
-    return structure_.MemoryBytes() + refinement_->MemoryBytes() +
+    return structure_.MemoryBytes() + refinement_->MemoryBytes() + SliverMemoryBytes() +
            (output_index_.size() + vertex_at_.size() + input_vertex_.size()) * sizeof(uint32_t) +
            negative_zeros_.size() * sizeof(size_t);
   }
@@ -143,8 +141,13 @@ class MesherIn final : public Mesher {
     context.EnterPhase(Phase::kRefinement);
     is_refined_ = false;
     absl::Status status = refinement_->Run(DemandsOf(parameters), VertexBudget(parameters), context);
-    is_refined_ = status.ok();
     refinement_seconds_ += absl::ToDoubleSeconds(context.TimeIn(Phase::kRefinement));
+    is_given_.resize(structure_.vertex_count(), false);
+    pumps_ = parameters.pump_weights;
+    if (status.ok()) {
+      status = MendSlivers(parameters, context);
+    }
+    is_refined_ = status.ok();
     return status;
   }
 
@@ -182,6 +185,7 @@ class MesherIn final : public Mesher {
       if (known[i] == kNoVertex) {
         known[i] = Add(start(cloud.first_input[i]), cloud.points[i], points, cloud.first_input[i]);
       }
+      is_given_[Index(known[i])] = true;
     }
     std::vector<uint32_t> vertices;
     vertices.reserve(cloud.sorted_index.size());
@@ -209,6 +213,7 @@ class MesherIn final : public Mesher {
     if (v == kNoVertex) {
       v = Add(start, cloud.points[0], point, 0);
     }
+    is_given_[Index(v)] = true;
     input_vertex_.push_back(OutputIndex(v));
     return OutputIndex(v);
   }
@@ -243,16 +248,17 @@ class MesherIn final : public Mesher {
       const double nearest = std::sqrt(structure_.ApproximateNearestNeighbor(v, workspace).distance_sq);
       const double radius = beta * nearest;
       structure_.ClippedVoronoi(v, std::isinf(radius) ? whole : radius, workspace);
-      cells.push_back(Describe(vertex, radius, workspace.cell));
+      cells.push_back(
+          DescribeCell<D>(vertex, radius, workspace.cell, domain_, [this](VertexId u) { return OutputIndex(u); }));
     }
     return cells;
   }
 
   absl::StatusOr<Mesh> Extract(int threads, RunContext& context) override {
     WELLSPACE_RETURN_IF_ERROR(CheckRefined(threads));
-    context.EnterPhase(Phase::kSimplices);
     ExtendOutputIndex();
-    WELLSPACE_ASSIGN_OR_RETURN(Simplices simplices, ComputeSimplices<D>(structure_, output_index_, threads, context));
+    WELLSPACE_ASSIGN_OR_RETURN(WeightedSimplices weighted, MakeSimplices(threads, context));
+    Simplices& simplices = weighted.simplices;
     Mesh mesh;
     mesh.dimension = D;
     mesh.domain_low.assign(domain_.box.low.begin(), domain_.box.low.end());
@@ -260,11 +266,18 @@ class MesherIn final : public Mesher {
     WELLSPACE_RETURN_IF_ERROR(AppendPoints(0, mesh.points, context));
     mesh.simplices = std::move(simplices.indices);
     mesh.input_vertex = input_vertex_;
+    mesh.weights = std::move(weighted.weights);
+    for (double& weight : mesh.weights) {
+      weight /= domain_.scale * domain_.scale;
+    }
     mesh.statistics.max_radius_edge = simplices.max_radius_edge;
     mesh.statistics.min_angle_deg = simplices.min_angle_deg;
     stars_.Add(simplices.counters);
     context.EnterPhase(Phase::kDone);
-    simplices_seconds_ += absl::ToDoubleSeconds(context.TimeIn(Phase::kSimplices));
+    if (!MakesWhole()) {
+      simplices_seconds_ += absl::ToDoubleSeconds(context.TimeIn(Phase::kSimplices));
+    }
+    has_moved_ = false;
     FinishMesh(mesh);
     return mesh;
   }
@@ -278,6 +291,10 @@ class MesherIn final : public Mesher {
                        mesh.dimension, "-D; the last that was extracted has ", extracted_vertices_, " and ",
                        extracted_simplices_, " in ", D, "-D, and only that can be updated"));
     }
+    if (MakesWhole() || has_moved_ || !mesh.weights.empty()) {
+      WELLSPACE_ASSIGN_OR_RETURN(mesh, Extract(threads, context));
+      return absl::OkStatus();
+    }
     context.EnterPhase(Phase::kSimplices);
     ExtendOutputIndex();
     WELLSPACE_ASSIGN_OR_RETURN(
@@ -288,7 +305,12 @@ class MesherIn final : public Mesher {
     std::vector<double> added;
     WELLSPACE_RETURN_IF_ERROR(AppendPoints(extracted_vertices_, added, context));
     mesh.points.insert(mesh.points.end(), added.begin(), added.end());
-    const bool worst_has_gone = DropSimplicesAmong(changed, mesh);
+    std::vector<bool> has_changed(structure_.vertex_count(), false);
+    for (const VertexId v : changed) {
+      has_changed[OutputIndex(v)] = true;
+    }
+    const bool worst_has_gone = DropSimplicesAmong<D>(
+        has_changed, [this](uint32_t v) -> const Point<D>& { return structure_.point(VertexOf(v)); }, mesh);
     mesh.simplices.insert(mesh.simplices.end(), simplices.indices.begin(), simplices.indices.end());
     mesh.input_vertex = input_vertex_;
     if (worst_has_gone) {
@@ -346,6 +368,55 @@ class MesherIn final : public Mesher {
     return demands;
   }
 
+  // Mends slivers if that is asked for; what is kept for that goes if it is not.
+  absl::Status MendSlivers(const MeshParameters& parameters, RunContext& context) {
+    if constexpr (D == 3) {
+      const double min_dihedral = parameters.min_dihedral.value_or(DefaultMinDihedral(D));
+      if (min_dihedral > 0) {
+        WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(memory_bytes() + vertex_count() * kTriangulationBytes));
+        const MendDemands demands{DemandsOf(parameters), min_dihedral, kMinEdgeSteps * domain_.grid_step,
+                                  VertexBudget(parameters)};
+        const uint64_t moves = slivers_.statistics().moves;
+        const absl::Status status =
+            slivers_.Mend(structure_, *refinement_, is_given_, demands, parameters.threads, context);
+        has_moved_ = has_moved_ || slivers_.statistics().moves > moves;
+        context.SetVertices(structure_.vertex_count());
+        return status;
+      }
+    }
+    if constexpr (D >= 3) {
+      slivers_.Forget();
+    }
+    return absl::OkStatus();
+  }
+
+  uint64_t SliverMemoryBytes() const {
+    if constexpr (D >= 3) {
+      return slivers_.MemoryBytes();
+    }
+    return 0;
+  }
+
+  // Whether the mesh is that of the sliver stage, and not made of stars.
+  bool MakesWhole() const {
+    if constexpr (D >= 3) {
+      return pumps_ || slivers_.HasTriangulation();
+    }
+    return false;
+  }
+
+  absl::StatusOr<WeightedSimplices> MakeSimplices(int threads, RunContext& context) {
+    if constexpr (D >= 3) {
+      if (MakesWhole()) {
+        return slivers_.ToSimplices(structure_, output_index_, pumps_, threads, context);
+      }
+    }
+    context.EnterPhase(Phase::kSimplices);
+    WeightedSimplices made;
+    WELLSPACE_ASSIGN_OR_RETURN(made.simplices, ComputeSimplices<D>(structure_, output_index_, threads, context));
+    return made;
+  }
+
   // Refuses numbers that are no vertex.
   absl::Status CheckVertices(std::span<const uint32_t> vertices) const {
     for (size_t i = 0; i < vertices.size(); ++i) {
@@ -393,6 +464,7 @@ class MesherIn final : public Mesher {
   // Adds a vertex at `p`, which is input `index` of `points`.
   VertexId Add(VertexId near, const Point<D>& p, std::span<const double> points, size_t index) {
     const VertexId v = structure_.AddVertex(near, p);
+    is_given_.resize(structure_.vertex_count(), true);
     refinement_->VertexAdded(v);
     is_refined_ = false;
     ++distinct_input_;
@@ -429,64 +501,10 @@ class MesherIn final : public Mesher {
     return absl::OkStatus();
   }
 
-  // Removes from `mesh` the simplices all of whose vertices are in `vertices`; returns whether one of them may have been
-  // the worst.
-  bool DropSimplicesAmong(std::span<const VertexId> vertices, Mesh& mesh) const {
-    std::vector<bool> is_among(structure_.vertex_count(), false);
-    for (const VertexId v : vertices) {
-      is_among[OutputIndex(v)] = true;
-    }
-    bool worst_has_gone = false;
-    const size_t size = mesh.simplices.size();
-    size_t kept = 0;
-    for (size_t at = 0; at < size; at += D + 1) {
-      const uint32_t* corners = &mesh.simplices[at];
-      if (!std::all_of(corners, corners + D + 1, [&](uint32_t vertex) { return is_among[vertex]; })) {
-        std::copy_n(corners, D + 1, &mesh.simplices[kept]);
-        kept += D + 1;
-        continue;
-      }
-      Simplex<D> simplex;
-      for (int k = 0; k <= D; ++k) {
-        simplex[k] = structure_.point(VertexOf(corners[k]));
-      }
-      worst_has_gone = worst_has_gone ||
-                       RadiusEdgeRatio<D>(simplex) >= mesh.statistics.max_radius_edge * (1 - kWorstTolerance) ||
-                       Angles<D>(simplex).min_deg <= mesh.statistics.min_angle_deg * (1 + kWorstTolerance);
-    }
-    mesh.simplices.resize(kept);
-    return worst_has_gone;
-  }
-
-  Cell Describe(uint32_t vertex, double clip_radius, const Polytope<D>& polytope) const {
-    Cell cell;
-    cell.vertex = vertex;
-    cell.clip_radius = clip_radius / domain_.scale;
-    for (const CellNode<D>& node : polytope.nodes()) {
-      Point<D> x = polytope.site();
-      for (int k = 0; k < D; ++k) {
-        x[k] += node.x[k];
-      }
-      x = domain_.Unscaled(x);
-      cell.nodes.insert(cell.nodes.end(), x.begin(), x.end());
-      for (const uint16_t index : node.planes) {
-        const Plane<D>& plane = polytope.plane(index);
-        cell.is_clipped = cell.is_clipped || plane.kind == PlaneKind::kClip;
-        if (plane.kind == PlaneKind::kBisector) {
-          cell.neighbours.push_back(OutputIndex(plane.vertex));
-        }
-      }
-    }
-    std::sort(cell.neighbours.begin(), cell.neighbours.end());
-    cell.neighbours.erase(std::unique(cell.neighbours.begin(), cell.neighbours.end()), cell.neighbours.end());
-    return cell;
-  }
-
   // Notes an extracted mesh, and sets its statistics but for those of its simplices' shapes.
   void FinishMesh(Mesh& mesh) {
     extracted_vertices_ = structure_.vertex_count();
     extracted_simplices_ = mesh.simplex_count();
-    const QueryCounters cells = refinement_->counters();
     MeshStatistics& statistics = mesh.statistics;
     statistics.input_points = input_vertex_.size();
     statistics.duplicates = input_vertex_.size() - distinct_input_;
@@ -495,27 +513,24 @@ class MesherIn final : public Mesher {
     statistics.tree_seconds = tree_seconds_;
     statistics.refinement_seconds = refinement_seconds_;
     statistics.simplices_seconds = simplices_seconds_;
-    statistics.total_seconds = tree_seconds_ + refinement_seconds_ + simplices_seconds_;
-    statistics.peak_memory_bytes = PeakMemoryBytes();
     statistics.tree_leaves = structure_.tree().leaf_count();
-    statistics.cells_computed = cells.queries;
-    statistics.leaves_visited = cells.leaves;
-    statistics.vertices_visited = cells.vertices;
-    statistics.cuts = cells.cuts;
-    statistics.max_leaves_visited = cells.max_leaves;
-    statistics.stars_computed = stars_.queries;
-    statistics.star_leaves_visited = stars_.leaves;
-    statistics.star_vertices_visited = stars_.vertices;
-    statistics.star_cuts = stars_.cuts;
-    statistics.max_star_leaves_visited = stars_.max_leaves;
-    statistics.exact_predicates = cells.decisions.exact + stars_.decisions.exact;
-    statistics.perturbed_predicates = cells.decisions.perturbed + stars_.decisions.perturbed;
+    QueryCounters stars = stars_;
+    if constexpr (D >= 3) {
+      stars.Add(slivers_.statistics().star_queries);
+      SetSliverFigures(slivers_.statistics(), statistics);
+    }
+    SetQueryFigures(refinement_->counters(), stars, statistics);
+    SetTotals(statistics);
   }
 
   Domain<D> domain_;
   QueryStructure<D> structure_;
   std::optional<Refinement<D>> refinement_;
   bool is_refined_ = false;
+  [[no_unique_address]] std::conditional_t<(D >= 3), SliverStage<D>, std::monostate> slivers_;
+  bool pumps_ = false;
+  bool has_moved_ = false;      // a vertex, since the last mesh
+  std::vector<bool> is_given_;  // by vertex: an input point, or a corner of the box
 
   uint64_t built_count_ = 0;            // vertices after Initialize: input points and corners of the box
   uint64_t distinct_count_ = 0;         // the former

@@ -10,39 +10,9 @@
 #include "absl/status/statusor.h"
 #include "core/base/run_context.h"
 #include "core/mesh_parameters.h"
+#include "core/mesh_statistics.h"
 
 namespace wellspace::core {
-
-// What a run did: counts of the paper's operations, by which its O(1) claims are tested, and the figures of the mesh.
-struct MeshStatistics {
-  uint64_t input_points = 0;
-  uint64_t duplicates = 0;  // input points equal to an earlier one
-  uint64_t vertices = 0;
-  uint64_t simplices = 0;
-
-  double max_radius_edge = 0;
-  double min_angle_deg = 0;  // 2-D: smallest angle of a triangle; 3-D: smallest dihedral angle of a tetrahedron
-
-  double tree_seconds = 0;
-  double refinement_seconds = 0;
-  double simplices_seconds = 0;
-  double total_seconds = 0;
-  uint64_t peak_memory_bytes = 0;  // of the whole process
-
-  uint64_t tree_leaves = 0;     // when the mesh was done
-  uint64_t cells_computed = 0;  // ClippedVoronoi queries of the refinement
-  uint64_t leaves_visited = 0;  // by them
-  uint64_t vertices_visited = 0;
-  uint64_t cuts = 0;
-  uint64_t max_leaves_visited = 0;  // by a single one
-  uint64_t stars_computed = 0;      // Voronoi queries of the simplices
-  uint64_t star_leaves_visited = 0;
-  uint64_t star_vertices_visited = 0;
-  uint64_t star_cuts = 0;
-  uint64_t max_star_leaves_visited = 0;
-  uint64_t exact_predicates = 0;      // decisions that the floating-point filter could not take
-  uint64_t perturbed_predicates = 0;  // of these, exact zeros, decided by the perturbation
-};
 
 struct Mesh {
   int dimension = 0;
@@ -57,6 +27,9 @@ struct Mesh {
   std::vector<uint32_t> simplices;
   // The vertex that each input point became; then those of the points added later, in the order of adding.
   std::vector<uint32_t> input_vertex;
+  // The weight of each vertex, a squared length; the mesh is their regular triangulation. Empty where all are zero, and
+  // the mesh is Delaunay.
+  std::vector<double> weights;
   MeshStatistics statistics;
 
   uint64_t vertex_count() const { return dimension == 0 ? 0 : points.size() / dimension; }
@@ -108,14 +81,15 @@ class Mesher {
   // What it holds in memory, but for a few scratch buffers. Unit: bytes.
   virtual uint64_t memory_bytes() const = 0;
 
-  // Adds Steiner vertices until the criterion and the sizes of `parameters` are met. Of these rho, criterion, sizes and
-  // max_vertices count; the box is that of Create.
+  // Adds Steiner vertices until the criterion and the sizes of `parameters` are met, then mends slivers, for which these
+  // vertices move too. Of the parameters rho, criterion, sizes, min_dihedral, pump_weights, max_vertices and threads
+  // count; the box is that of Create.
   //
   // Complexity: O(m) queries the first time and for other demands than the last; else in proportion to what was added
   //             since.
   // Errors:     INVALID_ARGUMENT (parameters), RESOURCE_EXHAUSTED (max_vertices, smallest edge, memory of the context), CANCELLED,
   //             DEADLINE_EXCEEDED. Nothing is lost: a later call takes up the work where it was left.
-  // Source:     [HT08] Figure 4.
+  // Source:     [HT08] Figure 4; docs/design/sliver.md.
   virtual absl::Status Refine(const MeshParameters& parameters, RunContext& context) = 0;
 
   // Adds vertices at `points`, n x dimension: all of them or, on an error, none. Returns the vertex of each point; one
@@ -163,16 +137,17 @@ class Mesher {
   // The refined mesh.
   //
   // Guarantees: (1) the simplices are a Delaunay triangulation of the vertices and decompose exactly the box; (2) the
-  //             criterion holds for each; (3) no circumcentre lies outside the box.
+  //             criterion holds for each; (3) no circumcentre lies outside the box. With weights they are the regular
+  //             triangulation, and (2) and (3) are those of the Delaunay triangulation before.
   // Complexity: O(m) time and memory.
   // Errors:     FAILED_PRECONDITION unless refined since vertices were last added; RESOURCE_EXHAUSTED (memory of the context); CANCELLED, DEADLINE_EXCEEDED.
   // Threads:    uses `threads`, at most as many as the machine has cores.
   virtual absl::StatusOr<Mesh> Extract(int threads, RunContext& context) = 0;
 
   // Brings `mesh`, the last that Extract or Update made, up to date: replaces the simplices around the vertices added
-  // since. The simplices are those that Extract would give, in another order.
+  // since, and moves those that have moved. The simplices are those that Extract would give, in another order.
   //
-  // Complexity: O(1) for each vertex added, and one pass over the indices of the mesh.
+  // Complexity: O(1) for each vertex added, and one pass over the indices of the mesh; with pump_weights as Extract.
   // Errors:     as Extract; INVALID_ARGUMENT for another mesh. On an error `mesh` is unchanged.
   virtual absl::Status Update(Mesh& mesh, int threads, RunContext& context) = 0;
 

@@ -231,6 +231,8 @@ v1::Phase PhaseToProto(core::Phase phase) {
       return v1::PHASE_REFINEMENT;
     case core::Phase::kSimplices:
       return v1::PHASE_SIMPLICES;
+    case core::Phase::kSlivers:
+      return v1::PHASE_SLIVERS;
     case core::Phase::kDone:
       return v1::PHASE_DONE;
   }

@@ -8,7 +8,7 @@ namespace wellspace::core {
 namespace {
 
 // The share of a run's time that has passed when a phase begins: rough, only for progress bars.
-constexpr std::array<double, kPhaseCount> kPhaseStart = {0.0, 0.0, 0.05, 0.65, 1.0};
+constexpr std::array<double, kPhaseCount> kPhaseStart = {0.0, 0.0, 0.05, 0.5, 0.8, 1.0};
 
 }  // namespace
 
@@ -22,6 +22,8 @@ const char* PhaseName(Phase phase) {
       return "refinement";
     case Phase::kSimplices:
       return "simplices";
+    case Phase::kSlivers:
+      return "slivers";
     case Phase::kDone:
       return "done";
   }

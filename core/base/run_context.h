@@ -11,10 +11,10 @@
 
 namespace wellspace::core {
 
-enum class Phase : int { kWaiting = 0, kTree, kRefinement, kSimplices, kDone };
-inline constexpr int kPhaseCount = 5;
+enum class Phase : int { kWaiting = 0, kTree, kRefinement, kSimplices, kSlivers, kDone };
+inline constexpr int kPhaseCount = 6;
 
-// "waiting", "tree", "refinement", "simplices", "done".
+// "waiting", "tree", "refinement", "simplices", "slivers", "done".
 const char* PhaseName(Phase phase);
 
 struct Progress {

@@ -102,6 +102,17 @@ uint64_t Refinement<D>::MemoryBytes() const {
 }
 
 template <int D>
+void Refinement<D>::CellChanged(VertexId v, double nearest_sq) {
+  radius_sq_.resize(structure_.vertex_count(), Assessment::kNone);
+  is_announced_.resize(structure_.vertex_count(), 1);
+  const bool is_on_face = structure_.faces(v) != 0;
+  radius_sq_[Index(v)] = is_on_face ? -nearest_sq : Assessment::kNone;
+  if (is_on_face && demands_->criterion == Criterion::kWellSpaced) {
+    schedule_.Add(v, nearest_sq);  // what is remembered for the faces leaves no room for the radius
+  }
+}
+
+template <int D>
 QueryCounters Refinement<D>::counters() const {
   QueryCounters counters = own_.counters;
   counters.Add(new_.counters);

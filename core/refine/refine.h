@@ -74,6 +74,14 @@ class Refinement {
   // What the refinement takes in memory beside the structure.
   uint64_t MemoryBytes() const;
 
+  // Tells that the cell of `v`, which may be new, has changed, but is as the demands of the last run say; `nearest_sq` is
+  // at most the squared distance to its nearest neighbour. What is remembered of the cell is forgotten: an insertion
+  // nearby has v looked at again in any case that could matter.
+  //
+  // REQUIRES:   the last run was for the end.
+  // Complexity: O(1).
+  void CellChanged(VertexId v, double nearest_sq);
+
   // What all queries have cost.
   QueryCounters counters() const;
 

@@ -44,6 +44,10 @@ absl::Status CheckShape(const MeshView& mesh) {
     return absl::InvalidArgumentError(
         absl::StrFormat("%d indices of simplices are no multiple of %d, dimension + 1", mesh.simplices.size(), d + 1));
   }
+  if (!mesh.weights.empty() && mesh.weights.size() != mesh.points.size() / d) {
+    return absl::InvalidArgumentError(absl::StrFormat("%d weights are not one for each of the %d vertices",
+                                                      mesh.weights.size(), mesh.points.size() / d));
+  }
   if (mesh.points.empty() || mesh.simplices.empty()) {
     return Violation("the mesh has %d vertices and %d simplices; at least one of each is needed",
                      mesh.points.size() / d, mesh.simplices.size() / (d + 1));
@@ -88,7 +92,7 @@ double Distance(const Point<D>& a, const Point<D>& b) {
 template <int D>
 class Checker {
  public:
-  explicit Checker(const MeshView& mesh) : points_(mesh.points), simplices_(mesh.simplices) {
+  explicit Checker(const MeshView& mesh) : points_(mesh.points), simplices_(mesh.simplices), weights_(mesh.weights) {
     box_.low = box_.high = Vertex(0);
     for (size_t v = 1; v < VertexCount(); ++v) {
       const Point<D> p = Vertex(v);
@@ -168,12 +172,29 @@ class Checker {
   }
 
   absl::Status Delaunay() {
+    for (size_t v = 0; v < weights_.size(); ++v) {
+      if (!(weights_[v] >= 0 && std::isfinite(weights_[v]))) {
+        return Violation("vertex %d has weight %g; it has to be finite and not negative", v, weights_[v]);
+      }
+    }
     return ForEachFacet([this](const Facet* facets, size_t count) -> absl::Status {
       if (count == 2) {
         const uint32_t apex = Index(facets[1].simplex, facets[1].apex);
-        if (InSphere<D>(Corners(facets[0].simplex), Vertex(apex)).sign == Sign::kPositive) {
-          return Violation("vertex %d lies inside the circumsphere of simplex %d (%s)", apex, facets[0].simplex,
-                           IndexText(facets[0].simplex));
+        const Simplex<D> corners = Corners(facets[0].simplex);
+        if (weights_.empty()) {
+          if (InSphere<D>(corners, Vertex(apex)).sign == Sign::kPositive) {
+            return Violation("vertex %d lies inside the circumsphere of simplex %d (%s)", apex, facets[0].simplex,
+                             IndexText(facets[0].simplex));
+          }
+        } else {
+          std::array<double, D + 1> weights;
+          for (int i = 0; i <= D; ++i) {
+            weights[i] = weights_[Index(facets[0].simplex, i)];
+          }
+          if (InPowerSphere<D>(corners, weights, Vertex(apex), weights_[apex]).sign == Sign::kPositive) {
+            return Violation("vertex %d, of weight %.17g, has negative power to the orthosphere of simplex %d (%s)",
+                             apex, weights_[apex], facets[0].simplex, IndexText(facets[0].simplex));
+          }
         }
       }
       return absl::OkStatus();
@@ -186,6 +207,21 @@ class Checker {
       if (!(ratio <= rho * (1 + kRelativeTolerance))) {
         return Violation("simplex %d (%s) has circumradius / shortest edge = %.17g, above %.17g", s, IndexText(s),
                          ratio, rho);
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status MinAngle(double min_angle_deg) const {
+    if (!(min_angle_deg >= 0 && min_angle_deg <= LargestSmallestAngle(D))) {
+      return absl::InvalidArgumentError(
+          absl::StrFormat("min_angle_deg is %g; 0 to %g are possible", min_angle_deg, LargestSmallestAngle(D)));
+    }
+    for (size_t s = 0; s < SimplexCount(); ++s) {
+      const double angle = core::Angles<D>(Corners(s)).min_deg;
+      if (!(angle >= min_angle_deg * (1 - kRelativeTolerance))) {
+        return Violation("simplex %d (%s) has an angle of %.17g degrees, below %.17g", s, IndexText(s), angle,
+                         min_angle_deg);
       }
     }
     return absl::OkStatus();
@@ -443,6 +479,7 @@ class Checker {
 
   std::span<const double> points_;
   std::span<const uint32_t> simplices_;
+  std::span<const double> weights_;
   Box<D> box_;
   std::vector<Facet> facets_;  // ascending; made when first needed
 };
@@ -521,6 +558,10 @@ absl::Status ValidateSizing(const MeshView& mesh, double max_circumradius, std::
   return RunCheck(mesh, [&](const auto& checker) { return checker.Sizing(max_circumradius, boxes); });
 }
 
+absl::Status ValidateAngles(const MeshView& mesh, double min_angle_deg) {
+  return RunCheck(mesh, [min_angle_deg](const auto& checker) { return checker.MinAngle(min_angle_deg); });
+}
+
 absl::Status ValidateCircumcentres(const MeshView& mesh) {
   return RunCheck(mesh, [](const auto& checker) { return checker.Circumcentres(); });
 }
@@ -533,18 +574,23 @@ absl::Status ValidateMesh(const MeshView& mesh, const ValidationOptions& options
   if (options.rho != 0) {
     WELLSPACE_RETURN_IF_ERROR(CheckRho(options.rho));
   }
-  return RunCheck(mesh, [&options](auto& checker) -> absl::Status {
+  return RunCheck(mesh, [&mesh, &options](auto& checker) -> absl::Status {
     WELLSPACE_RETURN_IF_ERROR(checker.Indices());
     WELLSPACE_RETURN_IF_ERROR(checker.Orientation());
     WELLSPACE_RETURN_IF_ERROR(checker.Topology());
     WELLSPACE_RETURN_IF_ERROR(checker.Volume());
     WELLSPACE_RETURN_IF_ERROR(checker.Delaunay());
-    if (options.rho != 0) {
-      WELLSPACE_RETURN_IF_ERROR(options.criterion == Criterion::kWellSpaced ? checker.WellSpaced(options.rho)
-                                                                            : checker.RadiusEdge(options.rho));
+    if (mesh.weights.empty()) {
+      if (options.rho != 0) {
+        WELLSPACE_RETURN_IF_ERROR(options.criterion == Criterion::kWellSpaced ? checker.WellSpaced(options.rho)
+                                                                              : checker.RadiusEdge(options.rho));
+      }
+      WELLSPACE_RETURN_IF_ERROR(checker.Circumcentres());
+      WELLSPACE_RETURN_IF_ERROR(checker.Sizing(options.max_circumradius, options.size_boxes));
     }
-    WELLSPACE_RETURN_IF_ERROR(checker.Circumcentres());
-    WELLSPACE_RETURN_IF_ERROR(checker.Sizing(options.max_circumradius, options.size_boxes));
+    if (options.min_angle_deg != 0) {
+      WELLSPACE_RETURN_IF_ERROR(checker.MinAngle(options.min_angle_deg));
+    }
     if (!options.cloud.empty()) {
       WELLSPACE_RETURN_IF_ERROR(checker.Cloud(options.cloud));
     }

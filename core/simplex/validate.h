@@ -20,6 +20,7 @@ struct MeshView {
   int dimension = 0;
   std::span<const double> points;       // vertex_count x dimension, row-major
   std::span<const uint32_t> simplices;  // simplex_count x (dimension + 1), row-major
+  std::span<const double> weights{};    // vertex_count squared lengths, or empty: all zero
 };
 
 inline constexpr int kHistogramBins = 18;
@@ -63,7 +64,9 @@ absl::Status ValidateTopology(const MeshView& mesh);
 // The volumes of the simplices sum exactly to the volume of the box.
 absl::Status ValidateVolume(const MeshView& mesh);
 // No vertex lies strictly inside a circumsphere, by Delaunay's lemma: it is enough that none of two simplices with a
-// common facet contains the other's apex.
+// common facet contains the other's apex. With weights: no vertex has a negative power to the sphere that is orthogonal
+// to a simplex' weighted vertices, so that the mesh is their regular triangulation; every weight is finite and not
+// negative.
 //
 // REQUIRES:   ValidateOrientation, ValidateTopology and ValidateVolume are OK.
 absl::Status ValidateDelaunay(const MeshView& mesh);
@@ -84,6 +87,9 @@ absl::Status ValidateWellSpaced(const MeshView& mesh, double rho);
 // for each of `boxes`, H its bound: no circumball that meets the box is larger. Each times 1 + 1e-9. INVALID_ARGUMENT
 // for bounds that are negative or not finite, of a box also 0, and for boxes that are none.
 absl::Status ValidateSizing(const MeshView& mesh, double max_circumradius, std::span<const SizeBox> boxes);
+// No angle between two facets of a simplex (in 2-D, of a triangle) is below min_angle_deg * (1 - 1e-9). INVALID_ARGUMENT
+// unless that is from 0 to LargestSmallestAngle.
+absl::Status ValidateAngles(const MeshView& mesh, double min_angle_deg);
 // Every circumcentre lies in the box, up to 1e-9 times its longest side.
 absl::Status ValidateCircumcentres(const MeshView& mesh);
 // The distinct points of `cloud` (n x dimension), in order of first appearance, are the first vertices of the mesh, to
@@ -96,10 +102,12 @@ struct ValidationOptions {
   double max_circumradius = 0;            // 0: not checked
   std::span<const SizeBox> size_boxes{};  // empty: not checked
   std::span<const double> cloud{};        // empty: not checked
+  double min_angle_deg = 0;               // 0: not checked
 };
 
 // All of the above, in the order Indices, Orientation, Topology, Volume, Delaunay, RadiusEdge or WellSpaced, Circumcentres,
-// Sizing, Cloud.
+// Sizing, Angles, Cloud. Of a mesh with weights RadiusEdge, WellSpaced, Circumcentres and Sizing are not checked: they are
+// promises about Delaunay simplices.
 absl::Status ValidateMesh(const MeshView& mesh, const ValidationOptions& options);
 
 }  // namespace wellspace::core

@@ -75,14 +75,35 @@ absl::Status LeafTree<D>::Build(const Box<D>& box, std::span<const Point<D>> poi
 }
 
 template <int D>
-void LeafTree<D>::Insert(VertexId near, VertexId v, const Point<D>& p) {
+NodeId LeafTree<D>::LeafWithRoom(VertexId near, const Point<D>& p) {
   NodeId leaf = LeafHolding(near, p);
   while (At(leaf).bucket != kNoBucket && buckets_[At(leaf).bucket].count == kLeafCapacity && CanSplit(leaf)) {
     Split(leaf);
     leaf = Child(At(leaf), ChildHolding(At(leaf), p));
   }
+  return leaf;
+}
+
+template <int D>
+void LeafTree<D>::Insert(VertexId near, VertexId v, const Point<D>& p) {
+  const NodeId leaf = LeafWithRoom(near, p);
   leaf_of_.push_back(kNoNode);
   Append(leaf, v, p);
+}
+
+template <int D>
+void LeafTree<D>::Move(VertexId v, const Point<D>& p) {
+  Bucket& bucket = buckets_[At(leaf_of(v)).bucket];
+  const auto slot =
+      static_cast<size_t>(std::find(bucket.ids.begin(), bucket.ids.begin() + bucket.count, v) - bucket.ids.begin());
+  if (LeafHolding(v, p) == leaf_of(v)) {
+    bucket.positions[slot] = p;
+    return;
+  }
+  --bucket.count;
+  bucket.ids[slot] = bucket.ids[bucket.count];
+  bucket.positions[slot] = bucket.positions[bucket.count];
+  Append(LeafWithRoom(v, p), v, p);
 }
 
 template <int D>

@@ -71,6 +71,12 @@ class LeafTree {
   // Source:     [HT08] §5, AddVertex.
   void Insert(VertexId near, VertexId v, const Point<D>& p);
 
+  // Puts vertex `v` at `p`, walking from its leaf.
+  //
+  // REQUIRES:   as Insert; v is a vertex.
+  // Complexity: O(1 + leaves between its places).
+  void Move(VertexId v, const Point<D>& p);
+
   // The leaf that `p` belongs to, walked to from the leaf of `near`, or from the root for kNoVertex.
   //
   // REQUIRES:   p in the box.
@@ -190,6 +196,7 @@ class LeafTree {
   void DistributeRange(NodeId parent);
   void DistributeBucket(NodeId parent);
   void Append(NodeId leaf, VertexId v, const Point<D>& p);
+  NodeId LeafWithRoom(VertexId near, const Point<D>& p);
 
   // The split rule of Build.
   bool IsTooCoarse(NodeId leaf);

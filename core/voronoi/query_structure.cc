@@ -57,6 +57,12 @@ VertexId QueryStructure<D>::AddVertex(VertexId near, const Point<D>& p) {
 }
 
 template <int D>
+void QueryStructure<D>::MoveVertex(VertexId v, const Point<D>& p) {
+  tree_.Move(v, p);
+  points_[Index(v)] = p;
+}
+
+template <int D>
 void QueryStructure<D>::BeginQuery(Workspace<D>& workspace) const {
   ++workspace.counters.queries;
   workspace.queue.clear();

@@ -118,6 +118,13 @@ class QueryStructure {
   // Source:     [HT08] Figure 3, ADDVERTEX.
   VertexId AddVertex(VertexId near, const Point<D>& p);
 
+  // Puts vertex `v` at `p`.
+  //
+  // REQUIRES:   p in the box, on the same of its faces as v, and different from all other vertices.
+  // Complexity: O(1) when p is in the cell of v.
+  // Errors:     none.
+  void MoveVertex(VertexId v, const Point<D>& p);
+
   const Box<D>& box() const { return box_; }
   uint32_t vertex_count() const { return static_cast<uint32_t>(points_.size()); }
   const Point<D>& point(VertexId v) const { return points_[Index(v)]; }

@@ -12,7 +12,8 @@
 namespace wellspace::core {
 namespace {
 
-constexpr std::array kPhases = {Phase::kWaiting, Phase::kTree, Phase::kRefinement, Phase::kSimplices, Phase::kDone};
+constexpr std::array kPhases = {Phase::kWaiting,   Phase::kTree,    Phase::kRefinement,
+                                Phase::kSimplices, Phase::kSlivers, Phase::kDone};
 
 TEST(RunContextTest, BeginsRunningAndWaiting) {
   const RunContext context;
@@ -88,7 +89,7 @@ TEST(RunContextTest, FractionNeverDecreasesAndEndsAtOne) {
 
 TEST(RunContextTest, FractionNeverDecreasesForAWatcherOfManyWorkers) {
   RunContext context;
-  context.EnterPhase(Phase::kSimplices);
+  context.EnterPhase(Phase::kSlivers);
   std::atomic<int> working{2};
   std::vector<std::thread> workers;
   for (int offset = 0; offset < 2; ++offset) {
@@ -130,7 +131,7 @@ TEST(RunContextTest, PhasesHaveDifferentNames) {
   for (const Phase phase : kPhases) {
     names.insert(PhaseName(phase));
   }
-  EXPECT_EQ(names, (std::set<std::string>{"waiting", "tree", "refinement", "simplices", "done"}));
+  EXPECT_EQ(names, (std::set<std::string>{"waiting", "tree", "refinement", "simplices", "slivers", "done"}));
   EXPECT_EQ(static_cast<int>(kPhases.size()), kPhaseCount);
 }
 

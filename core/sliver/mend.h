@@ -1,0 +1,106 @@
+// Tetrahedra that are too flat are mended: vertices move a little, and where that is not enough some are added.
+#ifndef WELLSPACE_CORE_SLIVER_MEND_H_
+#define WELLSPACE_CORE_SLIVER_MEND_H_
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "core/base/run_context.h"
+#include "core/refine/demands.h"
+#include "core/sliver/tetrahedron.h"
+#include "core/sliver/triangulation.h"
+
+namespace wellspace::core {
+
+struct MendDemands {
+  Demands<3> demands;       // that the mesh keeps, and has to go on keeping
+  double min_dihedral = 0;  // degrees: a tetrahedron with a smaller dihedral angle is a sliver
+  double min_edge = 0;      // no shorter edge is made
+  uint64_t max_vertices = 0;
+};
+
+struct MendReport {
+  uint64_t slivers = 0;       // found
+  uint64_t slivers_left = 0;  // that could not be mended
+  uint64_t moves = 0;         // of vertices; one may move more than once
+  uint64_t added = 0;         // vertices
+};
+
+// Mends the slivers of a Delaunay triangulation that keeps `demands`.
+//
+// Thread safety: thread-compatible.
+// Invariants: after every step (1) the triangulation is that of Delaunay and keeps the demands; (2) vertices that are
+// fixed are where they were, those on faces of the box on the same faces; (3) of the simplices that a step replaces and
+// makes, the flattest is made better.
+class Mender {
+ public:
+  // Shapes:     is_fixed: by vertex; true where it must not move. One entry is added for each vertex added.
+  Mender(Triangulation<3>& triangulation, std::vector<bool>& is_fixed, const MendDemands& demands);
+
+  // Looks at `suspects`, simplices of the triangulation, and mends what slivers there are, and what new ones that makes.
+  //
+  // Guarantees: (1) deterministic; (2) ends: see docs/design/sliver.md.
+  // Complexity: O(1) expected for each sliver; O(vertices) under the criterion well-spaced.
+  // Errors:     RESOURCE_EXHAUSTED (max_vertices), CANCELLED, DEADLINE_EXCEEDED; the invariants hold all the same.
+  // Source:     moves: Tournois, Srinivasan and Alliez 2009, with sampled in the place of followed gradients.
+  absl::Status Run(std::span<const SimplexId> suspects, RunContext& context);
+
+  const MendReport& report() const { return report_; }
+  // The vertices that have moved, ascending; added ones are those with the highest numbers.
+  std::vector<VertexId> MovedVertices() const;
+  // The vertices that have got other simplices, ascending.
+  std::vector<VertexId> ChangedVertices() const;
+
+ private:
+  // A sliver by its number, and its vertices, for numbers are used again.
+  struct Sliver {
+    SimplexId simplex;
+    std::array<VertexId, 4> vertices;
+  };
+  // How hard to try.
+  struct Effort {
+    int samples = 0;
+    bool may_move_neighbours = false;
+    bool may_insert = false;
+    bool may_insert_poor = false;  // where the new vertex has slivers, though better ones
+  };
+
+  bool IsThere(const Sliver& sliver) const;
+  double CosineOf(SimplexId s);
+  bool IsAdmissible(const TetrahedronMeasure& measure, const std::array<VertexId, 4>& vertices, VertexId moved) const;
+  bool KeepsNearestNeighbours(const Point<3>& p, VertexId moved);
+  double TryAt(const Point<3>& p, VertexId v, double limit);
+  void Note(std::span<const SimplexId> created);
+  Point<3> RandomInBall();
+
+  bool Mend(const Sliver& sliver, const Effort& effort);
+  bool Move(VertexId v, const Sliver& sliver, int samples);
+  absl::Status Insert(const Sliver& sliver, const Effort& effort);
+
+  Triangulation<3>& triangulation_;
+  std::vector<bool>& is_fixed_;
+  const MendDemands demands_;
+  double flat_cosine_ = 0;  // above it an angle is too small
+  MendReport report_;
+  std::vector<VertexId> moved_;
+  std::vector<VertexId> changed_;
+  std::vector<double> nearest_sq_;  // at most the squared distance to the nearest neighbour; for well-spaced only
+  std::vector<double> cosine_;      // by simplex; kUnknown where it has not been asked for
+  std::vector<Sliver> next_;        // to be looked at
+  uint64_t random_ = 0;
+
+  // Scratch.
+  Cavity cavity_;
+  std::vector<SimplexId> star_;
+  std::vector<SimplexId> hole_;
+  std::vector<double> hole_cosine_;
+  std::vector<SimplexId> created_;
+  double edge_limit_sq_ = 0;  // of TryAt, under well-spaced
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_SLIVER_MEND_H_

@@ -1,0 +1,247 @@
+#include "core/sliver/sliver_stage.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
+#include "core/base/status_macros.h"
+#include "core/simplex/quality.h"
+#include "core/sliver/pump.h"
+#include "core/sliver/tetrahedron.h"
+
+namespace wellspace::core {
+namespace {
+
+// Where more than one in so many vertices is new, the triangulation is made anew.
+constexpr uint32_t kFewNew = 8;
+// Simplices between two looks at the context.
+constexpr uint32_t kCheckInterval = 1 << 14;
+// Two ways to compute the quality of a tetrahedron differ by less.
+constexpr double kTolerance = 1e-9;
+
+// Adds the time that it lives, less what another clock has counted meanwhile, to a number of seconds.
+class Stopwatch {
+ public:
+  Stopwatch(double& seconds, const double& other)
+      : seconds_(seconds), other_(other), other_before_(other), start_(absl::Now()) {}
+  ~Stopwatch() { seconds_ += absl::ToDoubleSeconds(absl::Now() - start_) - (other_ - other_before_); }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+
+ private:
+  double& seconds_;
+  const double& other_;
+  const double other_before_;
+  const absl::Time start_;
+};
+
+// Appends simplex `s`, lowest output index first, the others ascending but for an exchange of the last two that keeps it
+// positive.
+template <int D>
+void Emit(const Triangulation<D>& triangulation, SimplexId s, std::span<const uint32_t> output_index,
+          std::vector<uint32_t>& out) {
+  std::array<uint32_t, D + 1> corners;
+  bool is_odd = false;
+  for (int i = 0; i <= D; ++i) {
+    const uint32_t index = output_index[Index(triangulation.item(s).vertices[i])];
+    int at = i;
+    for (; at > 0 && corners[at - 1] > index; --at) {
+      corners[at] = corners[at - 1];
+      is_odd = !is_odd;
+    }
+    corners[at] = index;
+  }
+  if (is_odd) {
+    std::swap(corners[D - 1], corners[D]);
+  }
+  out.insert(out.end(), corners.begin(), corners.end());
+}
+
+// Whether the simplex may be the worst of all so far in one of the two measures, by a cheaper computation.
+template <int D>
+class WorstCandidates {
+ public:
+  bool MayBeWorst(const Simplex<D>& corners) {
+    if constexpr (D == 3) {
+      const TetrahedronMeasure measure = MeasureTetrahedron(corners);
+      const double ratio_sq = measure.radius_sq / measure.edge_sq;
+      const bool may_be = !(measure.cosine < cosine_ - kTolerance && ratio_sq < ratio_sq_ * (1 - kTolerance));
+      cosine_ = std::max(cosine_, measure.cosine);
+      ratio_sq_ = std::max(ratio_sq_, ratio_sq);
+      return may_be;
+    } else {
+      return true;
+    }
+  }
+
+ private:
+  double cosine_ = -1;
+  double ratio_sq_ = 0;
+};
+
+}  // namespace
+
+template <int D>
+absl::StatusOr<Triangulation<D>> SliverStage<D>::Triangulate(const QueryStructure<D>& structure, int threads,
+                                                             RunContext& context) {
+  context.EnterPhase(Phase::kSimplices);
+  const double no_time = 0;
+  const Stopwatch stopwatch(statistics_.star_seconds, no_time);
+  // By the structure's own numbers, which do not depend on the order of the input.
+  std::vector<uint32_t> identity(structure.vertex_count());
+  std::iota(identity.begin(), identity.end(), uint32_t{0});
+  WELLSPACE_ASSIGN_OR_RETURN(const Simplices simplices, ComputeSimplices<D>(structure, identity, threads, context));
+  statistics_.star_queries.Add(simplices.counters);
+  if (statistics_.min_angle_deg == 0) {
+    statistics_.min_angle_deg = simplices.min_angle_deg;
+  }
+  std::vector<Point<D>> points;
+  points.reserve(structure.vertex_count());
+  for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
+    points.push_back(structure.point(VertexId{v}));
+  }
+  Triangulation<D> triangulation;
+  WELLSPACE_RETURN_IF_ERROR(triangulation.Build(structure.box(), std::move(points), simplices.indices, context));
+  return triangulation;
+}
+
+// Adds the structure's new vertices to the triangulation, or makes it.
+template <int D>
+absl::Status SliverStage<D>::FollowStructure(const QueryStructure<D>& structure, int threads, RunContext& context) {
+  const uint32_t count = structure.vertex_count();
+  if (triangulation_.has_value() && (count - triangulation_->vertex_count()) > count / kFewNew) {
+    triangulation_.reset();
+  }
+  if (!triangulation_.has_value()) {
+    WELLSPACE_ASSIGN_OR_RETURN(triangulation_, Triangulate(structure, threads, context));
+    return absl::OkStatus();
+  }
+  Workspace<D> workspace;
+  Cavity cavity;
+  std::vector<SimplexId> created;
+  VertexId last{0};
+  for (uint32_t i = triangulation_->vertex_count(); i < count; ++i) {
+    const absl::Status status = context.Check();
+    if (!status.ok()) {
+      return status;
+    }
+    const Point<D>& p = structure.point(VertexId{i});
+    const VertexId nearest = structure.ApproximateNearestNeighbor(VertexId{i}, workspace).vertex;
+    const VertexId start = Index(nearest) < i ? nearest : last;
+    triangulation_->FindCavity(triangulation_->Locate(p, start), p, cavity);
+    last = triangulation_->AddVertex();
+    triangulation_->Insert(last, p, 0, cavity, created);
+  }
+  return absl::OkStatus();
+}
+
+template <int D>
+absl::Status SliverStage<D>::Mend(QueryStructure<3>& structure, Refinement<3>& refinement, std::vector<bool>& is_fixed,
+                                  const MendDemands& demands, int threads, RunContext& context) requires(D == 3) {
+  const Stopwatch stopwatch(statistics_.seconds, statistics_.star_seconds);
+  WELLSPACE_RETURN_IF_ERROR(FollowStructure(structure, threads, context));
+  context.EnterPhase(Phase::kSlivers);
+  const uint32_t count = structure.vertex_count();
+  std::vector<SimplexId> suspects;
+  suspects.reserve(triangulation_->simplex_limit());
+  for (uint32_t s = 0; s < triangulation_->simplex_limit(); ++s) {
+    suspects.push_back(SimplexId{s});
+  }
+  Mender mender(*triangulation_, is_fixed, demands);
+  const absl::Status status = mender.Run(suspects, context);
+  statistics_.slivers += mender.report().slivers;
+  statistics_.slivers_left = mender.report().slivers_left;
+  statistics_.moves += mender.report().moves;
+  statistics_.added += mender.report().added;
+  // Moves first of all: a new vertex may be where another one was.
+  for (const VertexId v : mender.MovedVertices()) {
+    if (Index(v) < count) {
+      structure.MoveVertex(v, triangulation_->point(v));
+    }
+  }
+  std::vector<SimplexId> star;
+  for (uint32_t v = count; v < triangulation_->vertex_count(); ++v) {
+    // A neighbour that the structure has already.
+    triangulation_->Star(VertexId{v}, star);
+    VertexId near = kNoVertex;
+    for (const SimplexId s : star) {
+      for (const VertexId u : triangulation_->item(s).vertices) {
+        near = Index(u) < v ? u : near;
+      }
+    }
+    structure.AddVertex(near, triangulation_->point(VertexId{v}));
+  }
+  for (const VertexId v : mender.ChangedVertices()) {
+    triangulation_->Star(v, star);
+    double nearest_sq = std::numeric_limits<double>::infinity();
+    for (const SimplexId s : star) {
+      for (const VertexId u : triangulation_->item(s).vertices) {
+        if (u != v) {
+          nearest_sq = std::min(nearest_sq, DistanceSq<3>(triangulation_->point(u), triangulation_->point(v)));
+        }
+      }
+    }
+    refinement.CellChanged(v, nearest_sq);
+  }
+  return status;
+}
+
+template <int D>
+absl::StatusOr<WeightedSimplices> SliverStage<D>::ToSimplices(const QueryStructure<D>& structure,
+                                                              std::span<const uint32_t> output_index, bool pump,
+                                                              int threads, RunContext& context) {
+  const Stopwatch stopwatch(statistics_.seconds, statistics_.star_seconds);
+  WeightedSimplices out;
+  statistics_.weighted = 0;
+  if (!pump) {
+    context.EnterPhase(Phase::kSlivers);
+  }
+  std::optional<Triangulation<D>> pumped;
+  if (pump) {
+    // A copy: what is mended later has no weights.
+    if (triangulation_.has_value()) {
+      pumped = triangulation_;
+    } else {
+      WELLSPACE_ASSIGN_OR_RETURN(pumped, Triangulate(structure, threads, context));
+    }
+    context.EnterPhase(Phase::kSlivers);
+    WELLSPACE_ASSIGN_OR_RETURN(statistics_.weighted, PumpWeights<D>(*pumped, context));
+    if (statistics_.weighted > 0) {
+      out.weights.resize(pumped->vertex_count());
+      for (uint32_t v = 0; v < pumped->vertex_count(); ++v) {
+        out.weights[output_index[v]] = pumped->weight(VertexId{v});
+      }
+    }
+  }
+  const Triangulation<D>& triangulation = pumped.has_value() ? *pumped : *triangulation_;
+  Simplices& simplices = out.simplices;
+  simplices.indices.reserve(size_t{triangulation.simplex_limit()} * (D + 1));
+  WorstCandidates<D> candidates;
+  for (uint32_t i = 0; i < triangulation.simplex_limit(); ++i) {
+    if (i % kCheckInterval == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
+    const SimplexId s{i};
+    if (!triangulation.IsIn(s)) {
+      continue;
+    }
+    Emit<D>(triangulation, s, output_index, simplices.indices);
+    const Simplex<D> corners = triangulation.Corners(s);
+    if (candidates.MayBeWorst(corners)) {
+      simplices.max_radius_edge = std::max(simplices.max_radius_edge, RadiusEdgeRatio<D>(corners));
+      simplices.min_angle_deg = std::min(simplices.min_angle_deg, Angles<D>(corners).min_deg);
+    }
+  }
+  return out;
+}
+
+template class SliverStage<3>;
+template class SliverStage<4>;
+template class SliverStage<5>;
+template class SliverStage<6>;
+
+}  // namespace wellspace::core

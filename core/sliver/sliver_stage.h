@@ -1,0 +1,83 @@
+// The slivers of a refined mesh, between refinement and output: mended by moves and new vertices, or pumped away.
+#ifndef WELLSPACE_CORE_SLIVER_SLIVER_STAGE_H_
+#define WELLSPACE_CORE_SLIVER_SLIVER_STAGE_H_
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "core/base/run_context.h"
+#include "core/refine/refine.h"
+#include "core/simplex/simplices.h"
+#include "core/sliver/mend.h"
+#include "core/sliver/triangulation.h"
+#include "core/voronoi/query_structure.h"
+
+namespace wellspace::core {
+
+// Over the life of a stage.
+struct SliverStatistics {
+  uint64_t slivers = 0;       // that Mend found
+  uint64_t slivers_left = 0;  // by the last Mend
+  uint64_t moves = 0;
+  uint64_t added = 0;
+  uint64_t weighted = 0;       // vertices with a weight in the last mesh
+  double min_angle_deg = 0;    // before the first Mend
+  QueryCounters star_queries;  // of the triangulation
+  double star_seconds = 0;     // for them
+  double seconds = 0;          // for all the rest
+};
+
+struct WeightedSimplices {
+  Simplices simplices;
+  std::vector<double> weights;  // by output index, in the structure's unit; empty where all are zero
+};
+
+// Keeps the Delaunay triangulation of a structure while its mesh is mended, and follows what is added to the structure
+// in between. D >= 3.
+//
+// Thread safety: thread-compatible.
+// Invariants: the triangulation, if there is one, is that of the structure's first vertices, where they are.
+template <int D>
+class SliverStage {
+ public:
+  // Mends the slivers, and tells structure and refinement what has changed, on an error too. 3-D.
+  //
+  // REQUIRES:   the structure is refined for demands.demands; is_fixed has an entry for each of its vertices.
+  // Complexity: O(m) the first time; then O(1) for each vertex added since and each sliver, and a look at every simplex.
+  // Errors:     RESOURCE_EXHAUSTED (max_vertices), CANCELLED, DEADLINE_EXCEEDED; all stays usable.
+  // Threads:    uses `threads` for the stars that the triangulation is made of.
+  absl::Status Mend(QueryStructure<3>& structure, Refinement<3>& refinement, std::vector<bool>& is_fixed,
+                    const MendDemands& demands, int threads, RunContext& context) requires(D == 3);
+
+  // The simplices of the mended mesh; with `pump`, of its regular triangulation under pumped weights. Order and form of
+  // the simplices are independent of the number of threads.
+  //
+  // Shapes:     output_index: as for ComputeSimplices.
+  // REQUIRES:   no vertex has been added since Mend; or `pump`.
+  // Complexity: O(m).
+  // Errors:     CANCELLED, DEADLINE_EXCEEDED.
+  absl::StatusOr<WeightedSimplices> ToSimplices(const QueryStructure<D>& structure,
+                                                std::span<const uint32_t> output_index, bool pump, int threads,
+                                                RunContext& context);
+
+  // What the stage takes in memory.
+  uint64_t MemoryBytes() const { return triangulation_.has_value() ? triangulation_->MemoryBytes() : 0; }
+  bool HasTriangulation() const { return triangulation_.has_value(); }
+  // Lets go of the triangulation. To be called when the structure changes and Mend will not.
+  void Forget() { triangulation_.reset(); }
+  const SliverStatistics& statistics() const { return statistics_; }
+
+ private:
+  absl::Status FollowStructure(const QueryStructure<D>& structure, int threads, RunContext& context);
+  absl::StatusOr<Triangulation<D>> Triangulate(const QueryStructure<D>& structure, int threads, RunContext& context);
+
+  std::optional<Triangulation<D>> triangulation_;
+  SliverStatistics statistics_;
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_SLIVER_SLIVER_STAGE_H_
