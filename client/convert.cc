@@ -22,6 +22,8 @@ const char* PhaseName(v1::Phase phase) {
       return "refinement";
     case v1::PHASE_SIMPLICES:
       return "simplices";
+    case v1::PHASE_SLIVERS:
+      return "slivers";
     case v1::PHASE_DONE:
       return "done";
     default:

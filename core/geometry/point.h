@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <span>
 
@@ -46,6 +47,24 @@ inline double NormSq(const Point<D>& a) {
 template <int D>
 inline double DistanceSq(const Point<D>& a, const Point<D>& b) {
   return NormSq<D>(Difference<D>(a, b));
+}
+
+// |a - b|, without overflow or underflow on the way.
+template <int D>
+inline double Distance(const Point<D>& a, const Point<D>& b) {
+  Point<D> difference = Difference<D>(a, b);
+  double largest = 0;
+  for (const double x : difference) {
+    largest = std::max(largest, std::abs(x));
+  }
+  if (largest == 0 || !std::isfinite(largest)) {
+    return largest;
+  }
+  const int exponent = std::ilogb(largest);
+  for (double& x : difference) {
+    x = std::scalbn(x, -exponent);
+  }
+  return std::scalbn(std::sqrt(NormSq<D>(difference)), exponent);
 }
 
 }  // namespace wellspace::core

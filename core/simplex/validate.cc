@@ -68,24 +68,6 @@ absl::Status CheckShape(const MeshView& mesh) {
   return absl::OkStatus();
 }
 
-// |a - b|, without overflow or underflow on the way.
-template <int D>
-double Distance(const Point<D>& a, const Point<D>& b) {
-  Point<D> difference = Difference<D>(a, b);
-  double largest = 0;
-  for (const double x : difference) {
-    largest = std::max(largest, std::abs(x));
-  }
-  if (largest == 0 || !std::isfinite(largest)) {
-    return largest;
-  }
-  const int exponent = std::ilogb(largest);
-  for (double& x : difference) {
-    x = std::scalbn(x, -exponent);
-  }
-  return std::scalbn(std::sqrt(NormSq<D>(difference)), exponent);
-}
-
 // The checks of one mesh of sound shape; the facet table is shared between them.
 //
 // Thread safety: thread-compatible.
@@ -172,29 +154,24 @@ class Checker {
   }
 
   absl::Status Delaunay() {
-    for (size_t v = 0; v < weights_.size(); ++v) {
-      if (!(weights_[v] >= 0 && std::isfinite(weights_[v]))) {
-        return Violation("vertex %d has weight %g; it has to be finite and not negative", v, weights_[v]);
-      }
+    const auto wrong =
+        std::find_if(weights_.begin(), weights_.end(), [](double w) { return !(w >= 0 && std::isfinite(w)); });
+    if (wrong != weights_.end()) {
+      return Violation("vertex %d has weight %g; it has to be finite and not negative", wrong - weights_.begin(),
+                       *wrong);
     }
     return ForEachFacet([this](const Facet* facets, size_t count) -> absl::Status {
       if (count == 2) {
         const uint32_t apex = Index(facets[1].simplex, facets[1].apex);
         const Simplex<D> corners = Corners(facets[0].simplex);
-        if (weights_.empty()) {
-          if (InSphere<D>(corners, Vertex(apex)).sign == Sign::kPositive) {
-            return Violation("vertex %d lies inside the circumsphere of simplex %d (%s)", apex, facets[0].simplex,
-                             IndexText(facets[0].simplex));
-          }
-        } else {
-          std::array<double, D + 1> weights;
-          for (int i = 0; i <= D; ++i) {
-            weights[i] = weights_[Index(facets[0].simplex, i)];
-          }
-          if (InPowerSphere<D>(corners, weights, Vertex(apex), weights_[apex]).sign == Sign::kPositive) {
-            return Violation("vertex %d, of weight %.17g, has negative power to the orthosphere of simplex %d (%s)",
-                             apex, weights_[apex], facets[0].simplex, IndexText(facets[0].simplex));
-          }
+        const Sign sign =
+            weights_.empty() ? InSphere<D>(corners, Vertex(apex)).sign
+                             : InPowerSphere<D>(corners, Weights(facets[0].simplex), Vertex(apex), weights_[apex]).sign;
+        if (sign == Sign::kPositive) {
+          return Violation(
+              "vertex %d %s simplex %d (%s)", apex,
+              weights_.empty() ? "lies inside the circumsphere of" : "has negative power to the orthosphere of",
+              facets[0].simplex, IndexText(facets[0].simplex));
         }
       }
       return absl::OkStatus();
@@ -400,6 +377,14 @@ class Checker {
     Simplex<D> out;
     for (int i = 0; i <= D; ++i) {
       out[i] = Vertex(Index(simplex, i));
+    }
+    return out;
+  }
+
+  std::array<double, D + 1> Weights(size_t simplex) const {
+    std::array<double, D + 1> out;
+    for (int i = 0; i <= D; ++i) {
+      out[i] = weights_[Index(simplex, i)];
     }
     return out;
   }

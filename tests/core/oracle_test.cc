@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <string>
 #include <string_view>
@@ -180,6 +181,36 @@ TYPED_TEST(PredicateOracleTest, SignsAgreeNearDegeneracy) {
   }
   EXPECT_GT(filtered, 100);
   EXPECT_GT(exact, 100);
+}
+
+// The pumped mesh is CGAL's regular triangulation of its weights, where no tie leaves a choice: the points are in general
+// position but for those on the faces of the box, and there the facets' simplices need not be the same.
+TEST(WeightedOracleTest, APumpedMeshIsTheRegularTriangulation) {
+  MeshParameters parameters{.dimension = 3};
+  parameters.domain_low = test::UnitLow(3);
+  parameters.domain_high = test::UnitHigh(3);
+  parameters.min_dihedral = 0;
+  parameters.pump_weights = true;
+  RunContext context;
+  const absl::StatusOr<Mesh> mesh = MeshPoints(parameters, MakeCloud("uniform", 3, 500), context);
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  ASSERT_GT(mesh->statistics.weighted_vertices, 50);
+  const auto sorted = [](const std::vector<uint32_t>& simplices) {
+    SimplexSet all;
+    for (size_t at = 0; at < simplices.size(); at += 4) {
+      std::vector<uint32_t> simplex(simplices.begin() + static_cast<std::ptrdiff_t>(at),
+                                    simplices.begin() + static_cast<std::ptrdiff_t>(at) + 4);
+      std::sort(simplex.begin(), simplex.end());
+      all.push_back(std::move(simplex));
+    }
+    std::sort(all.begin(), all.end());
+    return all;
+  };
+  const SimplexSet ours = sorted(mesh->simplices);
+  const SimplexSet theirs = sorted(test::CgalRegular(mesh->points, mesh->weights).simplices);
+  SimplexSet only_ours;
+  std::set_difference(ours.begin(), ours.end(), theirs.begin(), theirs.end(), std::back_inserter(only_ours));
+  EXPECT_EQ(only_ours.size(), 0) << "of " << ours.size();
 }
 
 }  // namespace

@@ -101,6 +101,27 @@ TEST_P(SliverTest, PumpingMakesTheWorstBetter) {
   EXPECT_EQ(mesh.weights.empty(), mesh.statistics.weighted_vertices == 0);
 }
 
+TEST(SliverValidationTest, WrongWeightsAreFound) {
+  const std::vector<double> cloud = test::MakeCloud("uniform", 3, 200);
+  const MeshParameters parameters = InUnitBox(3, 0, true);
+  const Mesh mesh = MeshOf(parameters, cloud);
+  ASSERT_TRUE(Validate(parameters, mesh, cloud).ok());
+  Mesh faulty = mesh;
+  faulty.weights[7] = -1e-9;
+  EXPECT_THAT(std::string(Validate(parameters, faulty, cloud).message()), HasSubstr("vertex 7 has weight -1e-09"));
+  faulty.weights.pop_back();
+  EXPECT_EQ(Validate(parameters, faulty, cloud).code(), absl::StatusCode::kInvalidArgument);
+  // Each weight counts: none can be taken from the one that has most, nor all.
+  faulty.weights = mesh.weights;
+  *std::max_element(faulty.weights.begin(), faulty.weights.end()) = 0;
+  EXPECT_THAT(std::string(Validate(parameters, faulty, cloud).message()), HasSubstr("negative power"));
+  faulty.weights.clear();
+  EXPECT_THAT(std::string(Validate(parameters, faulty, cloud).message()), HasSubstr("inside the circumsphere"));
+  MeshParameters better = parameters;
+  better.min_dihedral = std::ceil(mesh.statistics.min_angle_deg + 1);
+  EXPECT_THAT(std::string(Validate(better, mesh, cloud).message()), HasSubstr("has an angle of"));
+}
+
 TEST_P(SliverTest, OrderOfThePointsAndThreadsDoNotMatter) {
   for (const bool pump : {false, true}) {
     MeshParameters parameters = InUnitBox(3, pump ? 0 : 15, pump);

@@ -3,6 +3,7 @@
 #include <CGAL/Delaunay_triangulation_2.h>
 #include <CGAL/Delaunay_triangulation_3.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Regular_triangulation_3.h>
 #include <CGAL/Triangulation_vertex_base_with_info_2.h>
 #include <CGAL/Triangulation_vertex_base_with_info_3.h>
 
@@ -20,6 +21,12 @@ using Delaunay2 = CGAL::Delaunay_triangulation_2<
 using Delaunay3 = CGAL::Delaunay_triangulation_3<
     Kernel, CGAL::Triangulation_data_structure_3<CGAL::Triangulation_vertex_base_with_info_3<uint32_t, Kernel>,
                                                  CGAL::Delaunay_triangulation_cell_base_3<Kernel>>>;
+
+using Regular3 = CGAL::Regular_triangulation_3<
+    Kernel,
+    CGAL::Triangulation_data_structure_3<CGAL::Triangulation_vertex_base_with_info_3<
+                                             uint32_t, Kernel, CGAL::Regular_triangulation_vertex_base_3<Kernel>>,
+                                         CGAL::Regular_triangulation_cell_base_3<Kernel>>>;
 
 Point2 ToCgal(const core::Point<2>& p) { return {p[0], p[1]}; }
 Point3 ToCgal(const core::Point<3>& p) { return {p[0], p[1], p[2]}; }
@@ -52,6 +59,22 @@ TestMesh CgalDelaunay(int dimension, std::span<const double> points) {
       for (int i = 0; i < 4; ++i) {
         mesh.simplices.push_back(cell->vertex(i)->info());
       }
+    }
+  }
+  return mesh;
+}
+
+TestMesh CgalRegular(std::span<const double> points, std::span<const double> weights) {
+  TestMesh mesh{.dimension = 3, .points = {points.begin(), points.end()}, .simplices = {}};
+  std::vector<std::pair<Regular3::Weighted_point, uint32_t>> numbered;
+  for (uint32_t v = 0; v < weights.size(); ++v) {
+    numbered.emplace_back(
+        Regular3::Weighted_point(Point3(points[3 * v], points[3 * v + 1], points[3 * v + 2]), weights[v]), v);
+  }
+  const Regular3 regular(numbered.begin(), numbered.end());
+  for (auto cell = regular.finite_cells_begin(); cell != regular.finite_cells_end(); ++cell) {
+    for (int i = 0; i < 4; ++i) {
+      mesh.simplices.push_back(cell->vertex(i)->info());
     }
   }
   return mesh;

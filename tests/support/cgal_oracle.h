@@ -13,6 +13,9 @@ namespace wellspace::test {
 // the points numbered as given.
 TestMesh CgalDelaunay(int dimension, std::span<const double> points);
 
+// The regular triangulation of weighted points in 3-D (weights squared lengths, one a point), likewise.
+TestMesh CgalRegular(std::span<const double> points, std::span<const double> weights);
+
 // As core::Orientation and core::InSphere.
 template <int D>
 core::Sign CgalOrientation(const core::Simplex<D>& simplex);
