@@ -11,6 +11,16 @@
 namespace wellspace::server {
 namespace {
 
+// Without a listener nothing can fail but for want of memory, threads or file descriptors, for which there is no remedy.
+template <typename T>
+T ValueOrAbort(absl::StatusOr<T> value) {
+  if (!value.ok()) {
+    std::cerr << "embedded server: " << value.status() << std::endl;
+    std::abort();
+  }
+  return *std::move(value);
+}
+
 std::unique_ptr<Server> StartWithoutListener(int workers) {
   ServerOptions options;
   options.service.workers = std::max(1, workers);
@@ -19,12 +29,7 @@ std::unique_ptr<Server> StartWithoutListener(int workers) {
   options.service.max_points = core::kMaxVertices;
   options.service.max_vertices = core::kMaxVertices;
   auto log = std::make_shared<spdlog::logger>("embedded", std::make_shared<spdlog::sinks::null_sink_mt>());
-  absl::StatusOr<std::unique_ptr<Server>> server = Server::Start(options, std::move(log));
-  if (!server.ok()) {
-    std::cerr << "embedded server: " << server.status() << std::endl;
-    std::abort();  // without a listener nothing can fail
-  }
-  return *std::move(server);
+  return ValueOrAbort(Server::Start(options, std::move(log)));
 }
 
 }  // namespace
@@ -43,6 +48,8 @@ EmbeddedServer::EmbeddedServer(int workers) : impl_(std::make_unique<Impl>(worke
 
 EmbeddedServer::~EmbeddedServer() = default;
 
-std::shared_ptr<grpc::Channel> EmbeddedServer::Channel() { return impl_->server().InProcessChannel(); }
+std::shared_ptr<grpc::Channel> EmbeddedServer::Channel() {
+  return ValueOrAbort(impl_->server().InProcessChannel());
+}
 
 }  // namespace wellspace::server

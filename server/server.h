@@ -56,7 +56,9 @@ class Server {
   const Observability& observability() const { return observability_; }
 
   // A channel to this server that needs no listener. To be destroyed, with all that was made of it, before the server.
-  std::shared_ptr<grpc::Channel> InProcessChannel();
+  //
+  // Errors:     that of the system when the process is out of file descriptors.
+  absl::StatusOr<std::shared_ptr<grpc::Channel>> InProcessChannel();
 
   // Not serving from now on: health says so, new calls end with UNAVAILABLE. Calls that are under way may go on for `grace`, then
   // end with UNAVAILABLE. Returns when all have ended, shortly after `grace` at the latest. Further calls return at once.

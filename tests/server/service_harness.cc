@@ -245,7 +245,7 @@ ServiceHarness::ServiceHarness(Mesher mesher, const ServiceOptions& options, Tra
   server_ = *std::move(server);
   channel_ = transport == Transport::kLoopback
                  ? grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials())
-                 : server_->InProcessChannel();
+                 : server_->InProcessChannel().value();
   stub_ = v1::MeshingService::NewStub(channel_);
 }
 
