@@ -11,7 +11,7 @@ declare -A packages=(
   [build]="g++ cmake ninja-build pkg-config libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
            libabsl-dev libc-ares-dev libspdlog-dev libboost-dev libtbb-dev libcli11-dev nlohmann-json3-dev
            prometheus-cpp-dev libcairo2-dev zlib1g-dev libminizip-dev python3"
-  [test]="libgtest-dev libgmock-dev libcgal-dev python3 python3-meshio python3-numpy openssl"
+  [test]="libgtest-dev libgmock-dev libcgal-dev python3 python3-grpcio python3-meshio python3-numpy openssl"
   [lint]="git clang-format-14 python3"
   [tidy]="clang-tidy-14"
   [fuzz]="clang-14 libclang-rt-14-dev"

@@ -23,12 +23,11 @@ build() {
   cmake --build --preset "${preset}" --parallel "$(build_jobs)" </dev/null
 }
 
-# node_modules FOLDER: installs what FOLDER/package-lock.json says, if it is not there yet. Development only.
+# node_modules FOLDER: installs what FOLDER/package-lock.json says, if it is not there yet; fails if it cannot. Development only.
 node_modules() {
   # Node.js from elsewhere brings npm along, and Debian's package npm would contradict it.
-  if ! command -v npm >/dev/null; then deploy/install-deps.sh node; fi
+  if ! command -v npm >/dev/null; then deploy/install-deps.sh node || return; fi
   if [[ ! "$1/node_modules/.package-lock.json" -nt "$1/package-lock.json" ]]; then
-    npm ci --prefix "$1" --ignore-scripts --no-audit --no-fund </dev/null
-    touch "$1/node_modules/.package-lock.json"
+    npm ci --prefix "$1" --ignore-scripts --no-audit --no-fund </dev/null && touch "$1/node_modules/.package-lock.json"
   fi
 }

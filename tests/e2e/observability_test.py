@@ -1,18 +1,16 @@
 """wellspaced as those see it who run it: /metrics over HTTP, logs as JSON, dashboard and alerts of metrics that there are."""
 import http.client
 import json
-import os
 import pathlib
 import re
 import shutil
-import signal
 import socket
 import subprocess
 import tempfile
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-BIN = pathlib.Path(os.environ["WELLSPACE_BIN_DIR"])
+from wellspaced import BIN, ROOT, Wellspaced
+
 CLOUD = ROOT / "examples" / "spot.csv"
 POINTS = 2930  # of the cloud
 
@@ -22,34 +20,14 @@ OF_PROMETHEUS = {"up"}
 WORDS = set("sum by rate changes histogram_quantile label_values job instance le grpc_type grpc_service grpc_method grpc_code".split())
 
 
-class Daemon:
-    """A wellspaced on free ports that logs JSON to a file."""
+class Daemon(Wellspaced):
+    """With metrics, and a log of JSON in a file."""
 
     def __init__(self, folder, *arguments):
         self.log = folder / "log"
         with open(self.log, "wb") as log:
-            self.process = subprocess.Popen(
-                [BIN / "wellspaced", "--listen", "127.0.0.1:0", "--metrics-listen", "127.0.0.1:0", "--log-format", "json",
-                 "--workers", "2", *arguments], stdout=subprocess.PIPE, stderr=log, text=True)
-        self.address = self.read_address("listening on ")
+            super().__init__("--metrics-listen", "127.0.0.1:0", "--log-format", "json", "--workers", "2", *arguments, log=log)
         self.metrics_address = self.read_address("metrics on ")
-
-    def read_address(self, prefix):
-        line = self.process.stdout.readline()
-        assert line.startswith(prefix), line
-        return line.removeprefix(prefix).strip()
-
-    def stop(self):
-        self.process.send_signal(signal.SIGTERM)
-        code = self.process.wait(timeout=600)
-        self.process.stdout.close()
-        return code
-
-    def kill(self):
-        if self.process.poll() is None:
-            self.process.kill()
-            self.process.wait()
-        self.process.stdout.close()
 
     def get(self, path):
         connection = http.client.HTTPConnection(self.metrics_address, timeout=600)

@@ -8,7 +8,8 @@ import subprocess
 import tempfile
 import unittest
 
-BIN = pathlib.Path(os.environ["WELLSPACE_BIN_DIR"])
+from wellspaced import BIN, PATIENCE, Wellspaced
+
 COAST = pathlib.Path(os.environ["WELLSPACE_EXAMPLES_DIR"]) / "coast-110m.csv"
 
 
@@ -24,16 +25,13 @@ def uniform(count, seed):
 class SessionLife(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.server = subprocess.Popen([BIN / "wellspaced", "--listen", "127.0.0.1:0"], stdout=subprocess.PIPE,
-                                      stderr=subprocess.DEVNULL, text=True)
-        cls.address = cls.server.stdout.readline().removeprefix("listening on ").strip()
+        cls.server = Wellspaced()
+        cls.address = cls.server.address
         cls.environment = os.environ | {"WELLSPACE_SERVER": cls.address}
 
     @classmethod
     def tearDownClass(cls):
-        cls.server.terminate()
-        cls.server.wait(timeout=60)
-        cls.server.stdout.close()
+        cls.server.stop()
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -41,7 +39,7 @@ class SessionLife(unittest.TestCase):
         self.folder = pathlib.Path(folder.name)
 
     def run_tool(self, *arguments, exit_code=0, text="", program="wellspace"):
-        done = subprocess.run([BIN / program, *map(str, arguments)], capture_output=True, text=True, input=text, timeout=240,
+        done = subprocess.run([BIN / program, *map(str, arguments)], capture_output=True, text=True, input=text, timeout=PATIENCE,
                               env=self.environment, check=False)
         self.assertEqual(done.returncode, exit_code, (arguments, done.stderr, done.stdout))
         return done.stdout if exit_code == 0 else done.stderr
@@ -118,7 +116,7 @@ class SessionLife(unittest.TestCase):
         while self.run_json("session", "show", name)["last_operation"] == operation:
             pass
         refine.send_signal(signal.SIGINT)
-        _, errors = refine.communicate(timeout=60)
+        _, errors = refine.communicate(timeout=PATIENCE)
         self.assertEqual(refine.returncode, 130, errors)
         self.run_tool("watch", name, exit_code=1)
         session = self.run_json("session", "show", name)
