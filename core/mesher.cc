@@ -45,6 +45,10 @@ constexpr double kReserve = 1.25;
 // a list of their facets.
 constexpr uint64_t kTriangulationBytes = 450;
 
+// Smaller clouds are refined, without sizes, before anybody could want to know how large the mesh will be.
+template <int D>
+constexpr uint64_t kForetoldPoints = D == 2 ? 10'000 : 2'000;
+
 // Cheap steps between two looks at the context.
 constexpr size_t kCheckInterval = size_t{1} << 16;
 
@@ -123,7 +127,6 @@ class MesherIn final : public Mesher {
     is_given_.assign(built_count_, true);
     refinement_.emplace(structure_, kMinEdgeSteps * domain_.grid_step);
     context.SetVertices(structure_.vertex_count());
-    context.SetEstimatedVertices(distinct + structure_.tree().leaf_count());
     tree_seconds_ = absl::ToDoubleSeconds(context.TimeIn(Phase::kTree));
     return absl::OkStatus();
   }
@@ -139,6 +142,7 @@ class MesherIn final : public Mesher {
   absl::Status Refine(const MeshParameters& parameters, RunContext& context) override {
     WELLSPACE_RETURN_IF_ERROR(CheckParameters(parameters));
     context.EnterPhase(Phase::kRefinement);
+    WELLSPACE_RETURN_IF_ERROR(ForetellVertices(parameters, context));
     is_refined_ = false;
     absl::Status status = refinement_->Run(DemandsOf(parameters), VertexBudget(parameters), context);
     refinement_seconds_ += absl::ToDoubleSeconds(context.TimeIn(Phase::kRefinement));
@@ -366,6 +370,17 @@ class MesherIn final : public Mesher {
           {{domain_.Scaled(box.low), domain_.Scaled(box.high)}, size.max_circumradius * domain_.scale});
     }
     return demands;
+  }
+
+  // Tells the context how many vertices a first refinement will end with, if that takes long enough to be worth an estimate.
+  absl::Status ForetellVertices(const MeshParameters& parameters, RunContext& context) const {
+    const bool has_sizes = parameters.max_circumradius != 0 || !parameters.size_boxes.empty();
+    if (structure_.vertex_count() > built_count_ || (!has_sizes && structure_.vertex_count() < kForetoldPoints<D>)) {
+      return absl::OkStatus();
+    }
+    WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size, EstimateSize<D>(structure_, DemandsOf(parameters), context));
+    context.SetEstimatedVertices(static_cast<uint64_t>(size.vertices));
+    return absl::OkStatus();
   }
 
   // Mends slivers if that is asked for; what is kept for that goes if it is not.

@@ -20,7 +20,7 @@ const char* PhaseName(Phase phase);
 struct Progress {
   Phase phase = Phase::kWaiting;
   uint64_t vertices = 0;            // in the mesh so far
-  uint64_t estimated_vertices = 0;  // of the finished mesh, roughly, at the default rho; 0 while unknown
+  uint64_t estimated_vertices = 0;  // of the finished mesh, roughly; 0 while unknown
   uint64_t simplices = 0;           // so far
   int bucket = 0;                   // floor(log_b) of the edge length that the refinement works at
   double fraction = 0;              // of the whole run, in [0, 1], never decreasing

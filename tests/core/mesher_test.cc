@@ -169,6 +169,56 @@ TEST_P(MesherTest, AVertexAddedNearAnotherIsTheSameAsInABatch) {
   EXPECT_TRUE(meshes[0] == meshes[1]);
 }
 
+TEST_P(MesherTest, PointsAddedNearVerticesAreTheSameAsInABatch) {
+  const std::vector<double> cloud = MakeCloud("uniform", d_, Few(d_, 200));
+  const std::vector<double> points = MakeCloud("inner", d_, 5);
+  // `near` is a hint: any vertex will do, of the cloud, of the box or of Steiner.
+  const auto near = [&](uint32_t first, uint32_t step) {
+    std::vector<uint32_t> vertices(points.size() / d_);
+    for (uint32_t i = 0; i < vertices.size(); ++i) {
+      vertices[i] = first + i * step;
+    }
+    return vertices;
+  };
+  const auto together = Create(cloud);
+  ASSERT_EQ(together->Refine(parameters_, context_), absl::OkStatus());
+  const absl::StatusOr<std::vector<uint32_t>> expected = together->AddPoints(points, context_);
+  ASSERT_TRUE(expected.ok()) << expected.status();
+  ASSERT_EQ(together->Refine(parameters_, context_), absl::OkStatus());
+  const test::CanonicalMesh mesh = Canonical(Extract(*together));
+  for (const std::vector<uint32_t>& hints : {near(0, 0), near(1, 1)}) {
+    const auto mesher = Create(cloud);
+    ASSERT_EQ(mesher->Refine(parameters_, context_), absl::OkStatus());
+    const absl::StatusOr<std::vector<uint32_t>> vertices = mesher->AddPointsNear(points, hints, context_);
+    ASSERT_TRUE(vertices.ok()) << vertices.status();
+    EXPECT_EQ(*vertices, *expected);
+    const absl::StatusOr<std::vector<uint32_t>> again = mesher->AddPointsNear(points, *vertices, context_);
+    ASSERT_TRUE(again.ok()) << again.status();
+    EXPECT_EQ(*again, *vertices) << "they are there already";
+    ASSERT_EQ(mesher->Refine(parameters_, context_), absl::OkStatus());
+    EXPECT_TRUE(Canonical(Extract(*mesher)) == mesh);
+  }
+}
+
+TEST_P(MesherTest, PointsNearWhatIsNoVertexAreNotAdded) {
+  const auto mesher = Create(MakeCloud("uniform", d_, Few(d_, 8)));
+  ASSERT_EQ(mesher->Refine(parameters_, context_), absl::OkStatus());
+  const auto count = static_cast<uint32_t>(mesher->vertex_count());
+  const std::vector<double> points = MakeCloud("inner", d_, 3);
+  const auto out_of_range = mesher->AddPointsNear(points, std::vector<uint32_t>{0, count, count + 1}, context_);
+  EXPECT_EQ(out_of_range.status().code(), absl::StatusCode::kOutOfRange);
+  EXPECT_THAT(std::string(out_of_range.status().message()), AllOf(HasSubstr("[1]"), HasSubstr(std::to_string(count))));
+  const auto too_few = mesher->AddPointsNear(points, std::vector<uint32_t>{0, 1}, context_);
+  EXPECT_EQ(too_few.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(std::string(too_few.status().message()), HasSubstr("2 vertices for 3 points"));
+  RunContext cancelled;
+  cancelled.Cancel();
+  EXPECT_EQ(mesher->AddPointsNear(points, std::vector<uint32_t>{0, 1, 2}, cancelled).status().code(),
+            absl::StatusCode::kCancelled);
+  EXPECT_EQ(mesher->vertex_count(), count);
+  EXPECT_TRUE(mesher->Extract(1, context_).ok()) << "nothing has changed";
+}
+
 TEST_P(MesherTest, APointThatIsAVertexIsNotAddedAgain) {
   const std::vector<double> cloud = MakeCloud("uniform", d_, Few(d_, 8));
   const auto mesher = Create(cloud);
@@ -238,6 +288,31 @@ TEST_P(MesherTest, GoesOnAfterABudgetThatWasTooSmall) {
   }
   ASSERT_EQ(mesher->Refine(parameters_, context_), absl::OkStatus());
   ExpectValid(Extract(*mesher));
+}
+
+// What a refinement that is stopped at its first vertex foretells against what it makes when it is not.
+void ExpectForetold(const MeshParameters& parameters, std::span<const double> cloud, double factor) {
+  RunContext context;
+  const auto mesher = *Mesher::Create(parameters, cloud, context);
+  MeshParameters budget = parameters;
+  budget.max_vertices = mesher->vertex_count() + 1;
+  EXPECT_EQ(mesher->Refine(budget, context).code(), absl::StatusCode::kResourceExhausted);
+  const auto foretold = static_cast<double>(context.Snapshot().estimated_vertices);
+  RunContext again;
+  EXPECT_EQ(mesher->Refine(parameters, again), absl::OkStatus());
+  EXPECT_LT(foretold, factor * static_cast<double>(mesher->vertex_count()));
+  EXPECT_GT(factor * foretold, static_cast<double>(mesher->vertex_count()));
+  EXPECT_EQ(again.Snapshot().estimated_vertices, 0u) << "unknown";
+}
+
+TEST_P(MesherTest, ForetellsItsVerticesWhereThereAreSizes) {
+  parameters_.max_circumradius = d_ == 2 ? 0.03 : d_ == 3 ? 0.12 : 0.5;
+  ExpectForetold(parameters_, MakeCloud("uniform", d_, Few(d_, 200)), d_ <= 3 ? 1.5 : 10);
+}
+
+TEST(LargeMesherTest, ForetellsItsVertices) {
+  ExpectForetold(InUnitBox(2), MakeCloud("uniform", 2, 20'000), 1.5);
+  ExpectForetold(InUnitBox(3), MakeCloud("uniform", 3, 5'000), 1.5);
 }
 
 TEST_P(MesherTest, CanBeRefinedFurther) {
