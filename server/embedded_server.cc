@@ -48,8 +48,6 @@ EmbeddedServer::EmbeddedServer(int workers) : impl_(std::make_unique<Impl>(worke
 
 EmbeddedServer::~EmbeddedServer() = default;
 
-std::shared_ptr<grpc::Channel> EmbeddedServer::Channel() {
-  return ValueOrAbort(impl_->server().InProcessChannel());
-}
+std::shared_ptr<grpc::Channel> EmbeddedServer::Channel() { return ValueOrAbort(impl_->server().InProcessChannel()); }
 
 }  // namespace wellspace::server
