@@ -108,6 +108,9 @@ absl::StatusOr<std::shared_ptr<grpc::Channel>> Server::InProcessChannel() {
   grpc::AddInsecureChannelFromFd(server_.get(), ends[0]);
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxRequestBytes);
+  // A window of one message; gRPC's grows with what is read, to many times as much as a client without a network has use for.
+  arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
+  arguments.SetInt(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, kMaxResponseBytes);
   return grpc::CreateCustomInsecureChannelFromFd("in-process", ends[1], arguments);
 }
 
