@@ -29,7 +29,8 @@ struct MeshParameters {
   // Allowed in 3-D, up to kMostMinDihedral.
   std::optional<double> min_dihedral{};
 
-  // Extract gives vertices weights, under which the regular triangulation has better simplices. From 3-D on.
+  // Extract gives vertices weights, under which the regular triangulation has better simplices; with min_dihedral only if
+  // slivers are left. From 3-D on.
   bool pump_weights = false;
 
   // Low and high corner of the box to be meshed, `dimension` numbers each. Both empty: the bounding box of the points,

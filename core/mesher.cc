@@ -41,10 +41,6 @@ constexpr uint64_t kFixedBytes = uint64_t{4} << 20;
 // What is reserved for a mesh, over what it is estimated to take.
 constexpr double kReserve = 1.25;
 
-// What the triangulation takes for each vertex of a mesh in 3-D while it is made: 6.5 simplices with their neighbours, and
-// a list of their facets.
-constexpr uint64_t kTriangulationBytes = 450;
-
 // Smaller clouds are refined, without sizes, before anybody could want to know how large the mesh will be.
 template <int D>
 constexpr uint64_t kForetoldPoints = D == 2 ? 10'000 : 2'000;
@@ -147,7 +143,6 @@ class MesherIn final : public Mesher {
     absl::Status status = refinement_->Run(DemandsOf(parameters), VertexBudget(parameters), context);
     refinement_seconds_ += absl::ToDoubleSeconds(context.TimeIn(Phase::kRefinement));
     is_given_.resize(structure_.vertex_count(), false);
-    pumps_ = parameters.pump_weights;
     if (status.ok()) {
       status = MendSlivers(parameters, context);
     }
@@ -343,6 +338,11 @@ class MesherIn final : public Mesher {
     estimate.vertices = static_cast<uint64_t>(size.vertices);
     estimate.simplices = static_cast<uint64_t>(size.simplices);
     estimate.memory_bytes = static_cast<uint64_t>(size.bytes);
+    if constexpr (D >= 3) {
+      if (MinDihedralOf(parameters) > 0 || parameters.pump_weights) {
+        estimate.memory_bytes += SliverStage<D>::EstimateBytes(estimate.vertices, estimate.simplices);
+      }
+    }
     estimate.tree_leaves = structure_.tree().leaf_count();
     return estimate;
   }
@@ -383,12 +383,11 @@ class MesherIn final : public Mesher {
     return absl::OkStatus();
   }
 
-  // Mends slivers if that is asked for; what is kept for that goes if it is not.
+  // Mends slivers if that is asked for; what is kept for that goes if it is not. Decides whether the mesh is pumped: a mesh
+  // without slivers stays Delaunay.
   absl::Status MendSlivers(const MeshParameters& parameters, RunContext& context) {
     if constexpr (D == 3) {
-      const double min_dihedral = parameters.min_dihedral.value_or(DefaultMinDihedral(D));
-      if (min_dihedral > 0) {
-        WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(memory_bytes() + vertex_count() * kTriangulationBytes));
+      if (const double min_dihedral = MinDihedralOf(parameters); min_dihedral > 0) {
         const MendDemands demands{DemandsOf(parameters), min_dihedral, kMinEdgeSteps * domain_.grid_step,
                                   VertexBudget(parameters)};
         const uint64_t moves = slivers_.statistics().moves;
@@ -396,13 +395,19 @@ class MesherIn final : public Mesher {
             slivers_.Mend(structure_, *refinement_, is_given_, demands, parameters.threads, context);
         has_moved_ = has_moved_ || slivers_.statistics().moves > moves;
         context.SetVertices(structure_.vertex_count());
+        pumps_ = parameters.pump_weights && slivers_.statistics().slivers_left > 0;
         return status;
       }
     }
     if constexpr (D >= 3) {
       slivers_.Forget();
     }
+    pumps_ = parameters.pump_weights;
     return absl::OkStatus();
+  }
+
+  static double MinDihedralOf(const MeshParameters& parameters) {
+    return parameters.min_dihedral.value_or(DefaultMinDihedral(D));
   }
 
   uint64_t SliverMemoryBytes() const {

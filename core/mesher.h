@@ -82,7 +82,7 @@ class Mesher {
   virtual uint64_t memory_bytes() const = 0;
 
   // Adds Steiner vertices until the criterion and the sizes of `parameters` are met, then mends slivers, for which these
-  // vertices move too. Of the parameters rho, criterion, sizes, min_dihedral, pump_weights, max_vertices and threads
+  // vertices move too; with pump_weights, Extract gives weights if slivers are left, or nothing was mended. Of the parameters rho, criterion, sizes, min_dihedral, pump_weights, max_vertices and threads
   // count; the box is that of Create.
   //
   // Complexity: O(m) queries the first time and for other demands than the last; else in proportion to what was added

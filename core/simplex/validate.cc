@@ -321,10 +321,14 @@ class Checker {
     report.min_angle_deg = 180;
     for (size_t s = 0; s < SimplexCount(); ++s) {
       const Simplex<D> corners = Corners(s);
-      report.max_radius_edge = std::max(report.max_radius_edge, RadiusEdgeRatio<D>(corners));
+      const double ratio = RadiusEdgeRatio<D>(corners);
+      report.max_radius_edge = std::max(report.max_radius_edge, ratio);
+      ++report.radius_edge_ratios[static_cast<size_t>(std::min<double>(kRatioBins - 1, ratio / kRatioWidth))];
       const AngleRange angles = Angles<D>(corners);
       report.min_angle_deg = std::min(report.min_angle_deg, angles.min_deg);
       report.max_angle_deg = std::max(report.max_angle_deg, angles.max_deg);
+      ++report.min_angles[std::min(kDegrees - 1, static_cast<int>(angles.min_deg))];
+      ++report.max_angles[std::min(kDegrees - 1, static_cast<int>(angles.max_deg))];
       ++report.angle_histogram[std::min(kHistogramBins - 1, static_cast<int>(angles.min_deg / bin_width))];
     }
     return report;

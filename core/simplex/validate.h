@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstdint>
+#include <numeric>
 #include <span>
 
 #include "absl/status/status.h"
@@ -24,6 +25,9 @@ struct MeshView {
 };
 
 inline constexpr int kHistogramBins = 18;
+inline constexpr int kDegrees = 180;
+inline constexpr int kRatioBins = 80;
+inline constexpr double kRatioWidth = 0.05;
 
 struct QualityReport {
   uint64_t vertices = 0;
@@ -33,6 +37,16 @@ struct QualityReport {
   double max_angle_deg = 0;
   // Simplices by their smallest angle: bin i holds [i, i + 1) * w degrees, w = LargestSmallestAngle / kHistogramBins.
   std::array<uint64_t, kHistogramBins> angle_histogram{};
+  // Simplices by their smallest and by their largest angle, bin i for [i, i + 1) degrees.
+  std::array<uint64_t, kDegrees> min_angles{};
+  std::array<uint64_t, kDegrees> max_angles{};
+  // Simplices by radius-edge ratio, bin i for [i, i + 1) * kRatioWidth, the last one for all above.
+  std::array<uint64_t, kRatioBins> radius_edge_ratios{};
+
+  // Simplices with an angle below `degrees`. REQUIRES: 0 <= degrees <= kDegrees.
+  uint64_t CountBelow(int degrees) const {
+    return std::accumulate(min_angles.begin(), min_angles.begin() + degrees, uint64_t{0});
+  }
 };
 
 // The smallest angle of a regular simplex in degrees, which no simplex exceeds: acos(1 / dimension). 60 in 2-D, 70.53 in 3-D.

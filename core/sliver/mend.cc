@@ -38,26 +38,23 @@ double FlatCosine(double degrees) {
   return std::ldexp(std::floor(std::ldexp(std::cos(degrees * std::numbers::pi / 180), 30)) - 1, -30);
 }
 
-std::vector<VertexId> Distinct(std::vector<VertexId> vertices) {
-  std::sort(vertices.begin(), vertices.end());
-  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
-  return vertices;
-}
-
 bool IsBetter(double cosine, double than) { return 1 - cosine >= kGain * (1 - than); }
 
 }  // namespace
 
-Mender::Mender(Triangulation<3>& triangulation, std::vector<bool>& is_fixed, const MendDemands& demands)
+Mender::Mender(Triangulation<3>& triangulation, std::vector<bool>& is_fixed, const MendDemands& demands,
+               MendObserver& observer)
     : triangulation_(triangulation),
       is_fixed_(is_fixed),
       demands_(demands),
+      observer_(observer),
       flat_cosine_(FlatCosine(demands.min_dihedral)) {}
 
-absl::Status Mender::Run(std::span<const SimplexId> suspects, RunContext& context) {
+absl::Status Mender::Run(RunContext& context) {
   if (demands_.demands.criterion == Criterion::kWellSpaced) {
     nearest_sq_.assign(triangulation_.vertex_count(), std::numeric_limits<double>::infinity());
     for (uint32_t s = 0; s < triangulation_.simplex_limit(); ++s) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
       if (triangulation_.IsIn(SimplexId{s})) {
         const auto& vertices = triangulation_.item(SimplexId{s}).vertices;
         for (const VertexId u : vertices) {
@@ -72,13 +69,18 @@ absl::Status Mender::Run(std::span<const SimplexId> suspects, RunContext& contex
     }
   }
   next_.clear();
-  for (const SimplexId s : suspects) {
+  for (uint32_t i = 0; i < triangulation_.simplex_limit(); ++i) {
+    WELLSPACE_RETURN_IF_ERROR(context.Check());
+    const SimplexId s{i};
     if (triangulation_.IsIn(s) && CosineOf(s) > flat_cosine_) {
       next_.push_back({s, triangulation_.item(s).vertices});
     }
   }
   report_.slivers += next_.size();
+  report_.slivers_left = next_.size();
   for (int pass = 0; pass < kPasses && !next_.empty(); ++pass) {
+    WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(observer_.MemoryBytes() + triangulation_.MemoryBytes() +
+                                                  cosine_.size() * sizeof(double) + next_.size() * sizeof(Sliver)));
     Effort effort;
     effort.samples = pass < kEarlyPasses
                          ? kSamples
@@ -104,14 +106,10 @@ absl::Status Mender::Run(std::span<const SimplexId> suspects, RunContext& contex
     }
     next_.clear();
     std::copy_if(left.begin(), left.end(), std::back_inserter(next_), [this](const Sliver& s) { return IsThere(s); });
+    report_.slivers_left = next_.size();
   }
-  report_.slivers_left = next_.size();
   return absl::OkStatus();
 }
-
-std::vector<VertexId> Mender::MovedVertices() const { return Distinct(moved_); }
-
-std::vector<VertexId> Mender::ChangedVertices() const { return Distinct(changed_); }
 
 bool Mender::IsThere(const Sliver& sliver) const {
   return triangulation_.IsIn(sliver.simplex) && triangulation_.item(sliver.simplex).vertices == sliver.vertices;
@@ -202,6 +200,16 @@ void Mender::Note(std::span<const SimplexId> created) {
       next_.push_back({s, vertices});
     }
   }
+}
+
+// Tells whose stars have changed since the last time.
+void Mender::ReportStars() {
+  std::sort(changed_.begin(), changed_.end());
+  changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
+  for (const VertexId v : changed_) {
+    observer_.StarChanged(v);
+  }
+  changed_.clear();
 }
 
 // SplitMix64: Steele, Lea and Flood 2014.
@@ -319,10 +327,11 @@ bool Mender::Move(VertexId v, const Sliver& sliver, int samples) {
   }
   std::erase_if(hole_, [this](SimplexId s) { return triangulation_.IsInCavity(s); });
   triangulation_.Insert(v, to, 0, cavity_, created_);
+  ++report_.moves;
   Note(hole_);
   Note(created_);
-  moved_.push_back(v);
-  ++report_.moves;
+  observer_.VertexMoved(v);
+  ReportStars();
   return true;
 }
 
@@ -377,8 +386,11 @@ absl::Status Mender::Insert(const Sliver& sliver, const Effort& effort) {
     nearest_sq_.push_back(edge_limit_sq_);
   }
   triangulation_.Insert(v, to, 0, cavity_, created_);
-  Note(created_);
   ++report_.added;
+  Note(created_);
+  const auto& vertices = triangulation_.item(created_.front()).vertices;
+  observer_.VertexAdded(v, vertices[vertices[0] == v ? 1 : 0]);
+  ReportStars();
   return absl::OkStatus();
 }
 

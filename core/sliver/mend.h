@@ -29,6 +29,19 @@ struct MendReport {
   uint64_t added = 0;         // vertices
 };
 
+// Hears of every step, once the triangulation has taken it.
+class MendObserver {
+ public:
+  virtual ~MendObserver() = default;
+  virtual void VertexMoved(VertexId v) = 0;
+  // `near` is a neighbour of the new vertex.
+  virtual void VertexAdded(VertexId v, VertexId near) = 0;
+  // The simplices of `v` are others; after the above.
+  virtual void StarChanged(VertexId v) = 0;
+  // What is held in memory beside the triangulation.
+  virtual uint64_t MemoryBytes() const = 0;
+};
+
 // Mends the slivers of a Delaunay triangulation that keeps `demands`.
 //
 // Thread safety: thread-compatible.
@@ -38,21 +51,19 @@ struct MendReport {
 class Mender {
  public:
   // Shapes:     is_fixed: by vertex; true where it must not move. One entry is added for each vertex added.
-  Mender(Triangulation<3>& triangulation, std::vector<bool>& is_fixed, const MendDemands& demands);
+  Mender(Triangulation<3>& triangulation, std::vector<bool>& is_fixed, const MendDemands& demands,
+         MendObserver& observer);
 
-  // Looks at `suspects`, simplices of the triangulation, and mends what slivers there are, and what new ones that makes.
+  // Mends what slivers there are, and what new ones that makes.
   //
   // Guarantees: (1) deterministic; (2) ends: see docs/design/sliver.md.
-  // Complexity: O(1) expected for each sliver; O(vertices) under the criterion well-spaced.
-  // Errors:     RESOURCE_EXHAUSTED (max_vertices), CANCELLED, DEADLINE_EXCEEDED; the invariants hold all the same.
+  // Complexity: O(1) expected for each sliver, and a look at every simplex.
+  // Errors:     RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED, DEADLINE_EXCEEDED; the invariants hold
+  //             all the same.
   // Source:     moves: Tournois, Srinivasan and Alliez 2009, with sampled in the place of followed gradients.
-  absl::Status Run(std::span<const SimplexId> suspects, RunContext& context);
+  absl::Status Run(RunContext& context);
 
   const MendReport& report() const { return report_; }
-  // The vertices that have moved, ascending; added ones are those with the highest numbers.
-  std::vector<VertexId> MovedVertices() const;
-  // The vertices that have got other simplices, ascending.
-  std::vector<VertexId> ChangedVertices() const;
 
  private:
   // A sliver by its number, and its vertices, for numbers are used again.
@@ -74,6 +85,7 @@ class Mender {
   bool KeepsNearestNeighbours(const Point<3>& p, VertexId moved);
   double TryAt(const Point<3>& p, VertexId v, double limit);
   void Note(std::span<const SimplexId> created);
+  void ReportStars();
   Point<3> RandomInBall();
 
   bool Mend(const Sliver& sliver, const Effort& effort);
@@ -83,10 +95,9 @@ class Mender {
   Triangulation<3>& triangulation_;
   std::vector<bool>& is_fixed_;
   const MendDemands demands_;
+  MendObserver& observer_;
   double flat_cosine_ = 0;  // above it an angle is too small
   MendReport report_;
-  std::vector<VertexId> moved_;
-  std::vector<VertexId> changed_;
   std::vector<double> nearest_sq_;  // at most the squared distance to the nearest neighbour; for well-spaced only
   std::vector<double> cosine_;      // by simplex; kUnknown where it has not been asked for
   std::vector<Sliver> next_;        // to be looked at
@@ -98,7 +109,8 @@ class Mender {
   std::vector<SimplexId> hole_;
   std::vector<double> hole_cosine_;
   std::vector<SimplexId> created_;
-  double edge_limit_sq_ = 0;  // of TryAt, under well-spaced
+  std::vector<VertexId> changed_;  // vertices of new simplices
+  double edge_limit_sq_ = 0;       // of TryAt, under well-spaced
 };
 
 }  // namespace wellspace::core

@@ -18,7 +18,7 @@ namespace {
 
 // Where more than one in so many vertices is new, the triangulation is made anew.
 constexpr uint32_t kFewNew = 8;
-// Simplices between two looks at the context.
+// Simplices or vertices between two looks at the context.
 constexpr uint32_t kCheckInterval = 1 << 14;
 // Two ways to compute the quality of a tetrahedron differ by less.
 constexpr double kTolerance = 1e-9;
@@ -83,6 +83,37 @@ class WorstCandidates {
   double ratio_sq_ = 0;
 };
 
+// Has structure and refinement follow the triangulation step by step, so that mending may end after any of them.
+class Follower final : public MendObserver {
+ public:
+  Follower(Triangulation<3>& triangulation, QueryStructure<3>& structure, Refinement<3>& refinement)
+      : triangulation_(triangulation), structure_(structure), refinement_(refinement) {}
+
+  void VertexMoved(VertexId v) override { structure_.MoveVertex(v, triangulation_.point(v)); }
+  void VertexAdded(VertexId v, VertexId near) override { structure_.AddVertex(near, triangulation_.point(v)); }
+
+  void StarChanged(VertexId v) override {
+    triangulation_.Star(v, star_);
+    double nearest_sq = std::numeric_limits<double>::infinity();
+    for (const SimplexId s : star_) {
+      for (const VertexId u : triangulation_.item(s).vertices) {
+        if (u != v) {
+          nearest_sq = std::min(nearest_sq, DistanceSq<3>(triangulation_.point(u), triangulation_.point(v)));
+        }
+      }
+    }
+    refinement_.CellChanged(v, nearest_sq);
+  }
+
+  uint64_t MemoryBytes() const override { return structure_.MemoryBytes() + refinement_.MemoryBytes(); }
+
+ private:
+  Triangulation<3>& triangulation_;
+  QueryStructure<3>& structure_;
+  Refinement<3>& refinement_;
+  std::vector<SimplexId> star_;
+};
+
 }  // namespace
 
 template <int D>
@@ -99,9 +130,15 @@ absl::StatusOr<Triangulation<D>> SliverStage<D>::Triangulate(const QueryStructur
   if (statistics_.min_angle_deg == 0) {
     statistics_.min_angle_deg = simplices.min_angle_deg;
   }
+  WELLSPACE_RETURN_IF_ERROR(
+      context.AllowMemory(structure.MemoryBytes() + simplices.indices.size() * sizeof(uint32_t) +
+                          Triangulation<D>::BuildBytes(structure.vertex_count(), simplices.indices.size() / (D + 1))));
   std::vector<Point<D>> points;
   points.reserve(structure.vertex_count());
   for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
+    if (v % kCheckInterval == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
     points.push_back(structure.point(VertexId{v}));
   }
   Triangulation<D> triangulation;
@@ -145,48 +182,13 @@ absl::Status SliverStage<D>::Mend(QueryStructure<3>& structure, Refinement<3>& r
   const Stopwatch stopwatch(statistics_.seconds, statistics_.star_seconds);
   WELLSPACE_RETURN_IF_ERROR(FollowStructure(structure, threads, context));
   context.EnterPhase(Phase::kSlivers);
-  const uint32_t count = structure.vertex_count();
-  std::vector<SimplexId> suspects;
-  suspects.reserve(triangulation_->simplex_limit());
-  for (uint32_t s = 0; s < triangulation_->simplex_limit(); ++s) {
-    suspects.push_back(SimplexId{s});
-  }
-  Mender mender(*triangulation_, is_fixed, demands);
-  const absl::Status status = mender.Run(suspects, context);
+  Follower follower(*triangulation_, structure, refinement);
+  Mender mender(*triangulation_, is_fixed, demands, follower);
+  const absl::Status status = mender.Run(context);
   statistics_.slivers += mender.report().slivers;
   statistics_.slivers_left = mender.report().slivers_left;
   statistics_.moves += mender.report().moves;
   statistics_.added += mender.report().added;
-  // Moves first of all: a new vertex may be where another one was.
-  for (const VertexId v : mender.MovedVertices()) {
-    if (Index(v) < count) {
-      structure.MoveVertex(v, triangulation_->point(v));
-    }
-  }
-  std::vector<SimplexId> star;
-  for (uint32_t v = count; v < triangulation_->vertex_count(); ++v) {
-    // A neighbour that the structure has already.
-    triangulation_->Star(VertexId{v}, star);
-    VertexId near = kNoVertex;
-    for (const SimplexId s : star) {
-      for (const VertexId u : triangulation_->item(s).vertices) {
-        near = Index(u) < v ? u : near;
-      }
-    }
-    structure.AddVertex(near, triangulation_->point(VertexId{v}));
-  }
-  for (const VertexId v : mender.ChangedVertices()) {
-    triangulation_->Star(v, star);
-    double nearest_sq = std::numeric_limits<double>::infinity();
-    for (const SimplexId s : star) {
-      for (const VertexId u : triangulation_->item(s).vertices) {
-        if (u != v) {
-          nearest_sq = std::min(nearest_sq, DistanceSq<3>(triangulation_->point(u), triangulation_->point(v)));
-        }
-      }
-    }
-    refinement.CellChanged(v, nearest_sq);
-  }
   return status;
 }
 
@@ -202,15 +204,16 @@ absl::StatusOr<WeightedSimplices> SliverStage<D>::ToSimplices(const QueryStructu
   }
   std::optional<Triangulation<D>> pumped;
   if (pump) {
-    // A copy: what is mended later has no weights.
+    // What is mended later has no weights, and is triangulated anew.
     if (triangulation_.has_value()) {
-      pumped = triangulation_;
+      pumped = std::exchange(triangulation_, std::nullopt);
     } else {
       WELLSPACE_ASSIGN_OR_RETURN(pumped, Triangulate(structure, threads, context));
     }
     context.EnterPhase(Phase::kSlivers);
     WELLSPACE_ASSIGN_OR_RETURN(statistics_.weighted, PumpWeights<D>(*pumped, context));
     if (statistics_.weighted > 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
       out.weights.resize(pumped->vertex_count());
       for (uint32_t v = 0; v < pumped->vertex_count(); ++v) {
         out.weights[output_index[v]] = pumped->weight(VertexId{v});

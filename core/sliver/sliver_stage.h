@@ -47,7 +47,7 @@ class SliverStage {
   //
   // REQUIRES:   the structure is refined for demands.demands; is_fixed has an entry for each of its vertices.
   // Complexity: O(m) the first time; then O(1) for each vertex added since and each sliver, and a look at every simplex.
-  // Errors:     RESOURCE_EXHAUSTED (max_vertices), CANCELLED, DEADLINE_EXCEEDED; all stays usable.
+  // Errors:     RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED, DEADLINE_EXCEEDED; all stays usable.
   // Threads:    uses `threads` for the stars that the triangulation is made of.
   absl::Status Mend(QueryStructure<3>& structure, Refinement<3>& refinement, std::vector<bool>& is_fixed,
                     const MendDemands& demands, int threads, RunContext& context) requires(D == 3);
@@ -58,10 +58,17 @@ class SliverStage {
   // Shapes:     output_index: as for ComputeSimplices.
   // REQUIRES:   no vertex has been added since Mend; or `pump`.
   // Complexity: O(m).
-  // Errors:     CANCELLED, DEADLINE_EXCEEDED.
+  // Errors:     RESOURCE_EXHAUSTED (memory of the context), CANCELLED, DEADLINE_EXCEEDED.
   absl::StatusOr<WeightedSimplices> ToSimplices(const QueryStructure<D>& structure,
                                                 std::span<const uint32_t> output_index, bool pump, int threads,
                                                 RunContext& context);
+
+  // What the stage takes at its peak, estimated: of what the simplices take for a while, room that stars have taken before
+  // is not counted again.
+  static uint64_t EstimateBytes(uint64_t vertices, uint64_t simplices) {
+    return vertices * sizeof(Point<D>) + Triangulation<D>::BuildBytes(vertices, simplices) -
+           simplices * (D + 1) * sizeof(uint32_t);
+  }
 
   // What the stage takes in memory.
   uint64_t MemoryBytes() const { return triangulation_.has_value() ? triangulation_->MemoryBytes() : 0; }

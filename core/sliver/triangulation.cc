@@ -3,14 +3,21 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <utility>
 
+#include "absl/strings/str_cat.h"
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
 #include "core/geometry/minors.h"
 
 namespace wellspace::core {
 namespace {
+
+// Simplices or vertices between two looks at the context.
+constexpr size_t kCheckInterval = 4096;
+// There is room for one more in so many simplices before they have to be moved.
+constexpr size_t kRoomToGrow = 16;
 
 constexpr int Factorial(int n) { return n <= 1 ? 1 : n * Factorial(n - 1); }
 
@@ -71,12 +78,21 @@ absl::Status Triangulation<D>::Build(const Box<D>& box, std::vector<Point<D>> po
     faces_.push_back(box_.FacesOf(p));
   }
   simplex_of_.assign(points_.size(), kNoSimplex);
+  if (simplices.size() > std::numeric_limits<uint32_t>::max()) {
+    return absl::ResourceExhaustedError(absl::StrCat("a mesh of ", simplices.size() / (D + 1),
+                                                     " simplices is too large to be mended or pumped; at most ",
+                                                     std::numeric_limits<uint32_t>::max() / (D + 1), " are accepted"));
+  }
   const size_t count = simplices.size() / (D + 1);
+  items_.reserve(count + count / kRoomToGrow);
   items_.assign(count, {});
   free_.clear();
   mark_.assign(count, 0);
   stamp_ = 0;
   for (size_t s = 0; s < count; ++s) {
+    if (s % kCheckInterval == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
     for (int i = 0; i <= D; ++i) {
       const VertexId v{simplices[s * (D + 1) + i]};
       items_[s].vertices[i] = v;
@@ -98,6 +114,9 @@ absl::Status Triangulation<D>::Build(const Box<D>& box, std::vector<Point<D>> po
   };
   std::vector<uint32_t> begin(points_.size() + 1, 0);
   for (size_t s = 0; s < count; ++s) {
+    if (s % kCheckInterval == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
     for (int slot = 0; slot <= D; ++slot) {
       ++begin[lowest_of(s, slot) + 1];
     }
@@ -109,13 +128,16 @@ absl::Status Triangulation<D>::Build(const Box<D>& box, std::vector<Point<D>> po
   std::vector<uint32_t> at(count * (D + 1));
   std::vector<uint32_t> next(begin.begin(), begin.end() - 1);
   for (size_t s = 0; s < count; ++s) {
+    if (s % kCheckInterval == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
     for (int slot = 0; slot <= D; ++slot) {
       at[next[lowest_of(s, slot)]++] = static_cast<uint32_t>(s * (D + 1)) + static_cast<uint32_t>(slot);
     }
   }
   std::vector<Facet> facets;
   for (uint32_t v = 0; v < points_.size(); ++v) {
-    if (v % 4096 == 0) {
+    if (v % kCheckInterval == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
     facets.clear();

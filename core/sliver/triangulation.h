@@ -68,7 +68,7 @@ class Triangulation {
   //
   // Shapes:     simplices: count x (D + 1) indices of points, positively oriented.
   // Complexity: O(points + simplices).
-  // Errors:     CANCELLED, DEADLINE_EXCEEDED.
+  // Errors:     RESOURCE_EXHAUSTED (facets cannot be numbered), CANCELLED, DEADLINE_EXCEEDED.
   absl::Status Build(const Box<D>& box, std::vector<Point<D>> points, std::span<const uint32_t> simplices,
                      const RunContext& context);
 
@@ -98,6 +98,12 @@ class Triangulation {
   uint64_t MemoryBytes() const {
     return points_.size() * (sizeof(Point<D>) + sizeof(FaceMask) + sizeof(double) + sizeof(SimplexId)) +
            items_.size() * (sizeof(Item) + sizeof(uint32_t));
+  }
+
+  // What Build takes at its peak, its arguments not counted.
+  static uint64_t BuildBytes(uint64_t points, uint64_t simplices) {
+    return points * (sizeof(FaceMask) + sizeof(double) + sizeof(SimplexId) + 2 * sizeof(uint32_t)) +
+           simplices * (sizeof(Item) + (D + 2) * sizeof(uint32_t));
   }
 
   // The simplices of vertex `v`.

@@ -358,6 +358,13 @@ TEST(MeasureQualityTest, HistogramCountsSmallestAngles) {
   EXPECT_EQ(report.angle_histogram[7], 1u);
   EXPECT_EQ(report.angle_histogram[10], 2u);
   EXPECT_EQ(report.angle_histogram[16], 1u);
+  EXPECT_EQ(report.min_angles[26], 1u);
+  EXPECT_EQ(report.min_angles[33], 2u);
+  EXPECT_EQ(report.min_angles[56], 1u);
+  EXPECT_EQ(report.CountBelow(33), 1u);
+  EXPECT_EQ(report.CountBelow(34), 3u);
+  EXPECT_EQ(std::accumulate(report.max_angles.begin(), report.max_angles.end(), uint64_t{0}), 4u);
+  EXPECT_EQ(std::accumulate(report.radius_edge_ratios.begin(), report.radius_edge_ratios.end(), uint64_t{0}), 4u);
   // A regular triangle or tetrahedron belongs to the last bin, however its angles are rounded.
   const TestMesh regular = {3, {0, 0, 0, 1, 0, 1, 1, 1, 0, 0, 1, 1}, {0, 1, 2, 3}};
   EXPECT_EQ(MeasureQuality(regular.View()).angle_histogram[kHistogramBins - 1], 1u);

@@ -88,6 +88,19 @@ TEST_P(SliverTest, EveryAngleIsReachedByADelaunayMesh) {
   }
 }
 
+// A Delaunay mesh is better than a regular one: weights are for slivers that are left.
+TEST_P(SliverTest, WeightsOnlyWhereSliversAreLeft) {
+  for (const Criterion criterion : {Criterion::kRadiusEdge, Criterion::kWellSpaced}) {
+    MeshParameters parameters = InUnitBox(3, 18, true);
+    parameters.criterion = criterion;
+    const Mesh mesh = MeshOf(parameters, cloud_);
+    parameters.min_dihedral = 0;
+    EXPECT_TRUE(Validate(parameters, mesh, cloud_).ok()) << Validate(parameters, mesh, cloud_);
+    EXPECT_EQ(mesh.weights.empty(), mesh.statistics.slivers_left == 0);
+    EXPECT_TRUE(criterion == Criterion::kWellSpaced || mesh.weights.empty());
+  }
+}
+
 TEST_P(SliverTest, PumpingMakesTheWorstBetter) {
   const MeshParameters parameters = InUnitBox(3, 0, true);
   const Mesh plain = MeshOf(InUnitBox(3, 0), cloud_);
@@ -250,26 +263,89 @@ TEST(SliverSessionTest, AnEditedMeshIsMendedAgain) {
   EXPECT_TRUE(Validate(parameters, *mesh, cloud).ok()) << Validate(parameters, *mesh, cloud);
 }
 
+// Lends memory, but at the n-th time it is asked in the phase of slivers: then it refuses, or cancels the run.
+class LenderWithATurn final : public MemoryLender {
+ public:
+  LenderWithATurn(RunContext& context, int turn, bool cancels) : context_(context), turn_(turn), cancels_(cancels) {
+    context.SetMemoryLender(this);
+  }
+  absl::Status Reserve(uint64_t) override { return absl::OkStatus(); }
+  absl::Status Allow(uint64_t) override {
+    if (context_.Snapshot().phase != Phase::kSlivers || asked_++ != turn_) {
+      return absl::OkStatus();
+    }
+    if (cancels_) {
+      context_.Cancel();
+      return absl::OkStatus();
+    }
+    return absl::ResourceExhaustedError("no more");
+  }
+  int asked() const { return asked_; }
+
+ private:
+  RunContext& context_;
+  const int turn_;
+  const bool cancels_;
+  int asked_ = 0;
+};
+
+// Between any two passes mending can be stopped; what it has done is valid, and a later run goes on from there.
+TEST(SliverSessionTest, StoppedAfterAnyPassItGoesOn) {
+  const std::vector<double> cloud = test::MakeCloud("uniform", 3, 300);
+  const MeshParameters parameters = InUnitBox(3, 18);
+  for (const bool cancels : {false, true}) {
+    for (int turn = 0;; ++turn) {
+      SCOPED_TRACE(turn);
+      RunContext stopped;
+      LenderWithATurn lender(stopped, turn, cancels);
+      auto mesher = Mesher::Create(parameters, cloud, stopped);
+      ASSERT_TRUE(mesher.ok()) << mesher.status();
+      const absl::Status status = (*mesher)->Refine(parameters, stopped);
+      if (lender.asked() <= turn) {
+        EXPECT_TRUE(status.ok()) << status;
+        EXPECT_GT(turn, 2);
+        break;
+      }
+      EXPECT_EQ(status.code(), cancels ? absl::StatusCode::kCancelled : absl::StatusCode::kResourceExhausted);
+      RunContext context;
+      // Left as it is it would be a mesh already.
+      MeshParameters plain = parameters;
+      plain.min_dihedral = 0;
+      for (const MeshParameters& next : {plain, parameters}) {
+        ASSERT_TRUE((*mesher)->Refine(next, context).ok());
+        const absl::StatusOr<Mesh> mesh = (*mesher)->Extract(1, context);
+        ASSERT_TRUE(mesh.ok()) << mesh.status();
+        EXPECT_TRUE(Validate(next, *mesh, cloud).ok()) << Validate(next, *mesh, cloud);
+      }
+    }
+  }
+}
+
 TEST(SliverSessionTest, CancelledInAnyPhaseItGoesOn) {
   const std::vector<double> cloud = test::MakeCloud("uniform", 3, 300);
-  const MeshParameters parameters = InUnitBox(3, 15, true);
-  const Mesh expected = MeshOf(parameters, cloud);
-  RunContext fresh;
-  auto mesher = Mesher::Create(parameters, cloud, fresh);
-  ASSERT_TRUE(mesher.ok()) << mesher.status();
-  RunContext cancelled;
-  cancelled.Cancel();
-  EXPECT_EQ((*mesher)->Refine(parameters, cancelled).code(), absl::StatusCode::kCancelled);
-  MeshParameters plain = parameters;
-  plain.min_dihedral = 0;
-  ASSERT_TRUE((*mesher)->Refine(plain, fresh).ok());
-  EXPECT_EQ((*mesher)->Refine(parameters, cancelled).code(), absl::StatusCode::kCancelled);
-  ASSERT_TRUE((*mesher)->Refine(parameters, fresh).ok());
-  EXPECT_EQ((*mesher)->Extract(1, cancelled).status().code(), absl::StatusCode::kCancelled);
-  const absl::StatusOr<Mesh> mesh = (*mesher)->Extract(1, fresh);
-  ASSERT_TRUE(mesh.ok()) << mesh.status();
-  EXPECT_EQ(test::Canonical(*mesh), test::Canonical(expected));
-  EXPECT_EQ(mesh->weights, expected.weights);
+  for (const bool pumps : {false, true}) {
+    const MeshParameters parameters = InUnitBox(3, pumps ? 0 : 15, pumps);
+    const Mesh expected = MeshOf(parameters, cloud);
+    RunContext fresh;
+    auto mesher = Mesher::Create(parameters, cloud, fresh);
+    ASSERT_TRUE(mesher.ok()) << mesher.status();
+    RunContext cancelled;
+    cancelled.Cancel();
+    EXPECT_EQ((*mesher)->Refine(parameters, cancelled).code(), absl::StatusCode::kCancelled);
+    MeshParameters plain = parameters;
+    plain.min_dihedral = 0;
+    plain.pump_weights = false;
+    ASSERT_TRUE((*mesher)->Refine(plain, fresh).ok());
+    if (!pumps) {
+      EXPECT_EQ((*mesher)->Refine(parameters, cancelled).code(), absl::StatusCode::kCancelled);
+    }
+    ASSERT_TRUE((*mesher)->Refine(parameters, fresh).ok());
+    EXPECT_EQ((*mesher)->Extract(1, cancelled).status().code(), absl::StatusCode::kCancelled);
+    const absl::StatusOr<Mesh> mesh = (*mesher)->Extract(1, fresh);
+    ASSERT_TRUE(mesh.ok()) << mesh.status();
+    EXPECT_EQ(test::Canonical(*mesh), test::Canonical(expected));
+    EXPECT_EQ(mesh->weights, expected.weights);
+  }
 }
 
 }  // namespace
