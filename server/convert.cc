@@ -60,12 +60,24 @@ v1::MeshStatistics StatisticsToProto(const core::MeshStatistics& statistics) {
   message.set_max_radius_edge(statistics.max_radius_edge);
   message.set_min_angle_deg(statistics.min_angle_deg);
   message.set_peak_memory_bytes(statistics.peak_memory_bytes);
+  message.set_triangulation(statistics.weighted_vertices > 0 ? v1::TRIANGULATION_REGULAR : v1::TRIANGULATION_DELAUNAY);
 
   v1::PhaseSeconds* seconds = message.mutable_seconds();
   seconds->set_tree(statistics.tree_seconds);
   seconds->set_refinement(statistics.refinement_seconds);
   seconds->set_simplices(statistics.simplices_seconds);
+  seconds->set_slivers(statistics.sliver_seconds);
   seconds->set_total(statistics.total_seconds);
+
+  if (statistics.unmended_min_angle_deg > 0) {
+    v1::SliverStatistics* slivers = message.mutable_slivers();
+    slivers->set_found(statistics.slivers);
+    slivers->set_left(statistics.slivers_left);
+    slivers->set_moves(statistics.sliver_moves);
+    slivers->set_added_vertices(statistics.sliver_vertices);
+    slivers->set_weighted_vertices(statistics.weighted_vertices);
+    slivers->set_min_angle_before_deg(statistics.unmended_min_angle_deg);
+  }
 
   v1::OperationCounters* counters = message.mutable_counters();
   counters->set_tree_leaves(statistics.tree_leaves);
@@ -137,6 +149,16 @@ grpc::Status ParametersFromProto(const v1::MeshParameters& message, const Servic
   if (grpc::Status status = Validate(*parameters, "size_boxes"); !status.ok()) {
     return status;
   }
+  if (message.has_min_dihedral()) {
+    parameters->min_dihedral = message.min_dihedral();
+    if (grpc::Status status = Validate(*parameters, "min_dihedral"); !status.ok()) {
+      return status;
+    }
+  }
+  parameters->pump_weights = message.pump_weights();
+  if (grpc::Status status = Validate(*parameters, "pump_weights"); !status.ok()) {
+    return status;
+  }
   if (message.threads() != 0) {
     parameters->threads = message.threads();
     if (grpc::Status status = Validate(*parameters, "threads"); !status.ok()) {
@@ -179,6 +201,8 @@ v1::MeshParameters ParametersToProto(const core::MeshParameters& parameters) {
     size_box->mutable_high()->Assign(box.high.begin(), box.high.end());
     size_box->set_max_circumradius(box.max_circumradius);
   }
+  message.set_min_dihedral(parameters.min_dihedral.value_or(core::DefaultMinDihedral(parameters.dimension)));
+  message.set_pump_weights(parameters.pump_weights);
   message.set_max_vertices(parameters.max_vertices);
   message.set_threads(parameters.threads);
   return message;
@@ -201,6 +225,7 @@ v1::MeshMetadata MetadataToProto(const core::Mesh& mesh, uint64_t chunk_count) {
   metadata.set_simplex_count(mesh.simplex_count());
   metadata.set_input_point_count(mesh.input_vertex.size());
   metadata.set_chunk_count(chunk_count);
+  metadata.set_has_weights(!mesh.weights.empty());
   *metadata.mutable_statistics() = StatisticsToProto(mesh.statistics);
   return metadata;
 }

@@ -51,14 +51,16 @@ MeshChunks::MeshChunks(core::Mesh mesh, uint64_t max_bytes) : mesh_(std::move(me
   const uint64_t bytes = std::max(max_bytes, 2 * kEnvelopeBytes) - kEnvelopeBytes;
   points_per_chunk_ = bytes / (sizeof(double) * mesh_.dimension);
   simplices_per_chunk_ = bytes / (sizeof(uint32_t) * (mesh_.dimension + 1));
+  weights_per_chunk_ = bytes / sizeof(double);
   inputs_per_chunk_ = bytes / sizeof(uint32_t);
   point_chunks_ = DivideUp(mesh_.vertex_count(), points_per_chunk_);
+  weight_chunks_ = DivideUp(mesh_.weights.size(), weights_per_chunk_);
   simplex_chunks_ = DivideUp(mesh_.simplex_count(), simplices_per_chunk_);
   input_chunks_ = DivideUp(mesh_.input_vertex.size(), inputs_per_chunk_);
 }
 
 uint64_t MeshChunks::memory_bytes() const {
-  return kChunksOnTheirWay * kMaxResponseBytes + mesh_.points.capacity() * sizeof(double) +
+  return kChunksOnTheirWay * kMaxResponseBytes + (mesh_.points.capacity() + mesh_.weights.capacity()) * sizeof(double) +
          (mesh_.simplices.capacity() + mesh_.input_vertex.capacity()) * sizeof(uint32_t);
 }
 
@@ -68,6 +70,10 @@ MeshChunks::Chunk MeshChunks::Get(uint64_t index) const {
                 points_per_chunk_);
   }
   index -= point_chunks_;
+  if (index < weight_chunks_) {
+    return Rows(v1::MeshChunk::kWeightsFieldNumber, mesh_.weights, 1, index * weights_per_chunk_, weights_per_chunk_);
+  }
+  index -= weight_chunks_;
   if (index < simplex_chunks_) {
     return Rows(v1::MeshChunk::kSimplicesFieldNumber, mesh_.simplices, mesh_.dimension + 1,
                 index * simplices_per_chunk_, simplices_per_chunk_);

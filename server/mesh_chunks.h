@@ -34,7 +34,7 @@ class MeshChunks {
   void KeepMemory(MemoryReservation memory) { memory_ = std::move(memory); }
 
   const core::Mesh& mesh() const { return mesh_; }
-  uint64_t count() const { return point_chunks_ + simplex_chunks_ + input_chunks_; }
+  uint64_t count() const { return point_chunks_ + weight_chunks_ + simplex_chunks_ + input_chunks_; }
 
   // REQUIRES:   index < count().
   Chunk Get(uint64_t index) const;
@@ -44,8 +44,10 @@ class MeshChunks {
   core::Mesh mesh_;
   uint64_t points_per_chunk_ = 0;     // rows
   uint64_t simplices_per_chunk_ = 0;  // rows
+  uint64_t weights_per_chunk_ = 0;
   uint64_t inputs_per_chunk_ = 0;
   uint64_t point_chunks_ = 0;
+  uint64_t weight_chunks_ = 0;
   uint64_t simplex_chunks_ = 0;
   uint64_t input_chunks_ = 0;
 };

@@ -40,6 +40,7 @@ absl::StatusOr<core::Mesh> Copy(const core::Mesh& mesh, const core::RunContext& 
   copy.domain_high = mesh.domain_high;
   copy.statistics = mesh.statistics;
   WELLSPACE_ASSIGN_OR_RETURN(copy.points, Copy(mesh.points, context));
+  WELLSPACE_ASSIGN_OR_RETURN(copy.weights, Copy(mesh.weights, context));
   WELLSPACE_ASSIGN_OR_RETURN(copy.simplices, Copy(mesh.simplices, context));
   return copy;  // Update makes input_vertex anew
 }

@@ -51,6 +51,8 @@ TEST(ParametersFromProto, FillsInDefaults) {
   EXPECT_EQ(parameters.criterion, core::Criterion::kRadiusEdge);
   EXPECT_EQ(parameters.max_circumradius, 0);
   EXPECT_TRUE(parameters.size_boxes.empty());
+  EXPECT_FALSE(parameters.min_dihedral.has_value());
+  EXPECT_FALSE(parameters.pump_weights);
 }
 
 TEST(ParametersFromProto, TakesEveryField) {
@@ -63,6 +65,8 @@ TEST(ParametersFromProto, TakesEveryField) {
   message.set_max_circumradius(0.5);
   AddSizeBox(message, 0.25, 0.75, 0.125);
   AddSizeBox(message, -1, 2, 0.25);
+  message.set_min_dihedral(0);
+  message.set_pump_weights(true);
   core::MeshParameters parameters;
   ASSERT_TRUE(ParametersFromProto(message, SmallLimits(), &parameters).ok());
   EXPECT_EQ(parameters.rho, 2.5);
@@ -78,6 +82,8 @@ TEST(ParametersFromProto, TakesEveryField) {
   EXPECT_THAT(parameters.size_boxes[0].high, ElementsAre(0.75, 0.75, 0.75));
   EXPECT_EQ(parameters.size_boxes[0].max_circumradius, 0.125);
   EXPECT_EQ(parameters.size_boxes[1].max_circumradius, 0.25);
+  EXPECT_EQ(parameters.min_dihedral, 0.0);
+  EXPECT_TRUE(parameters.pump_weights);
 }
 
 TEST(ParametersFromProto, EveryDimensionHasItsDefaults) {
@@ -133,6 +139,24 @@ INSTANTIATE_TEST_SUITE_P(
         BadParameters{"RhoSmall", "parameters.rho", [](auto& p) { p.set_rho(0.5); }},
         BadParameters{"RhoNegative", "parameters.rho", [](auto& p) { p.set_rho(-2); }},
         BadParameters{"RhoNan", "parameters.rho", [](auto& p) { p.set_rho(std::nan("")); }},
+        BadParameters{"MinDihedralNegative", "parameters.min_dihedral", [](auto& p) { p.set_min_dihedral(-1); }},
+        BadParameters{"MinDihedralNan", "parameters.min_dihedral", [](auto& p) { p.set_min_dihedral(std::nan("")); }},
+        BadParameters{"MinDihedralLarge", "parameters.min_dihedral", [](auto& p) { p.set_min_dihedral(18.01); }},
+        BadParameters{"MinDihedralIn2D", "parameters.min_dihedral",
+                      [](auto& p) {
+                        p = UnitCubeParameters(2);
+                        p.set_min_dihedral(12);
+                      }},
+        BadParameters{"MinDihedralIn4D", "parameters.min_dihedral",
+                      [](auto& p) {
+                        p = UnitCubeParameters(4);
+                        p.set_min_dihedral(12);
+                      }},
+        BadParameters{"PumpWeightsIn2D", "parameters.pump_weights",
+                      [](auto& p) {
+                        p = UnitCubeParameters(2);
+                        p.set_pump_weights(true);
+                      }},
         BadParameters{"MarginNegative", "parameters.margin", [](auto& p) { p.set_margin(-0.5); }},
         BadParameters{"MarginNan", "parameters.margin", [](auto& p) { p.set_margin(std::nan("")); }},
         BadParameters{"MarginInfinite", "parameters.margin", [](auto& p) { p.set_margin(kInfinity); }},
@@ -298,6 +322,34 @@ TEST(MetadataToProto, CountsAndStatistics) {
   EXPECT_EQ(metadata.chunk_count(), 5u);
   EXPECT_EQ(metadata.statistics().counters().cuts(), 42u);
   EXPECT_EQ(metadata.statistics().seconds().total(), 0.5);
+  EXPECT_FALSE(metadata.has_weights());
+  EXPECT_EQ(metadata.statistics().triangulation(), v1::TRIANGULATION_DELAUNAY);
+  EXPECT_FALSE(metadata.statistics().has_slivers());
+}
+
+TEST(MetadataToProto, SaysWhatWasDoneAgainstSlivers) {
+  core::Mesh mesh = MakeFakeMesh(core::MeshParameters(), std::vector<double>{0.25, 0.5, 0.75});
+  mesh.statistics.slivers = 7;
+  mesh.statistics.slivers_left = 1;
+  mesh.statistics.sliver_moves = 5;
+  mesh.statistics.sliver_vertices = 2;
+  mesh.statistics.unmended_min_angle_deg = 0.25;
+  mesh.statistics.sliver_seconds = 0.125;
+  v1::MeshStatistics statistics = MetadataToProto(mesh, 1).statistics();
+  EXPECT_EQ(statistics.triangulation(), v1::TRIANGULATION_DELAUNAY);
+  EXPECT_EQ(statistics.slivers().found(), 7u);
+  EXPECT_EQ(statistics.slivers().left(), 1u);
+  EXPECT_EQ(statistics.slivers().moves(), 5u);
+  EXPECT_EQ(statistics.slivers().added_vertices(), 2u);
+  EXPECT_EQ(statistics.slivers().min_angle_before_deg(), 0.25);
+  EXPECT_EQ(statistics.seconds().slivers(), 0.125);
+
+  mesh.weights.assign(mesh.vertex_count(), 0.5);
+  mesh.statistics.weighted_vertices = mesh.vertex_count();
+  const v1::MeshMetadata metadata = MetadataToProto(mesh, 1);
+  EXPECT_TRUE(metadata.has_weights());
+  EXPECT_EQ(metadata.statistics().triangulation(), v1::TRIANGULATION_REGULAR);
+  EXPECT_EQ(metadata.statistics().slivers().weighted_vertices(), mesh.vertex_count());
 }
 
 TEST(EstimateToProto, TakesEveryField) {

@@ -56,17 +56,20 @@ std::string BytesOf(const grpc::ByteBuffer& buffer) {
   return bytes;
 }
 
-class MeshChunksOf : public ::testing::TestWithParam<std::tuple<int, size_t, uint64_t>> {};
+class MeshChunksOf : public ::testing::TestWithParam<std::tuple<int, size_t, uint64_t, bool>> {};
 
 TEST_P(MeshChunksOf, AddUpToTheMesh) {
-  const auto [dimension, point_count, max_bytes] = GetParam();
+  const auto [dimension, point_count, max_bytes, has_weights] = GetParam();
   core::MeshParameters parameters;
   parameters.dimension = dimension;
   std::vector<double> points(point_count * dimension);
   for (size_t i = 0; i < points.size(); ++i) {
     points[i] = static_cast<double>(i) / 7;
   }
-  const core::Mesh mesh = MakeFakeMesh(parameters, points);
+  core::Mesh mesh = MakeFakeMesh(parameters, points);
+  for (uint64_t vertex = 0; has_weights && vertex < mesh.vertex_count(); ++vertex) {
+    mesh.weights.push_back(static_cast<double>(vertex) / 16);
+  }
   const auto chunks = std::make_shared<MeshChunks>(mesh, max_bytes);
   core::Mesh sum;
   for (uint64_t index = 0; index < chunks->count(); ++index) {
@@ -77,12 +80,16 @@ TEST_P(MeshChunksOf, AddUpToTheMesh) {
     const v1::MeshChunk& chunk = response.chunk();
     EXPECT_LE(bytes.size(), max_bytes);
     EXPECT_EQ(chunk.index(), index);
-    EXPECT_EQ(1, !chunk.points().empty() + !chunk.simplices().empty() + !chunk.input_vertices().empty());
+    EXPECT_EQ(1, !chunk.points().empty() + !chunk.weights().empty() + !chunk.simplices().empty() +
+                     !chunk.input_vertices().empty());
     EXPECT_EQ(chunk.points_size() % dimension, 0);
     EXPECT_EQ(chunk.simplices_size() % (dimension + 1), 0);
     if (!chunk.points().empty()) {
-      EXPECT_TRUE(sum.simplices.empty());
+      EXPECT_TRUE(sum.weights.empty() && sum.simplices.empty());
       EXPECT_EQ(chunk.crc32c(), Crc32c(chunk.points().data(), chunk.points_size() * sizeof(double)));
+    } else if (!chunk.weights().empty()) {
+      EXPECT_TRUE(sum.simplices.empty());
+      EXPECT_EQ(chunk.crc32c(), Crc32c(chunk.weights().data(), chunk.weights_size() * sizeof(double)));
     } else if (!chunk.simplices().empty()) {
       EXPECT_TRUE(sum.input_vertex.empty());
       EXPECT_EQ(chunk.crc32c(), Crc32c(chunk.simplices().data(), chunk.simplices_size() * sizeof(uint32_t)));
@@ -90,17 +97,19 @@ TEST_P(MeshChunksOf, AddUpToTheMesh) {
       EXPECT_EQ(chunk.crc32c(), Crc32c(chunk.input_vertices().data(), chunk.input_vertices_size() * sizeof(uint32_t)));
     }
     sum.points.insert(sum.points.end(), chunk.points().begin(), chunk.points().end());
+    sum.weights.insert(sum.weights.end(), chunk.weights().begin(), chunk.weights().end());
     sum.simplices.insert(sum.simplices.end(), chunk.simplices().begin(), chunk.simplices().end());
     sum.input_vertex.insert(sum.input_vertex.end(), chunk.input_vertices().begin(), chunk.input_vertices().end());
   }
   EXPECT_EQ(sum.points, mesh.points);
+  EXPECT_EQ(sum.weights, mesh.weights);
   EXPECT_EQ(sum.simplices, mesh.simplices);
   EXPECT_EQ(sum.input_vertex, mesh.input_vertex);
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, MeshChunksOf,
                          ::testing::Combine(::testing::Values(2, 3), ::testing::Values(0, 1, 2, 3, 100, 1000),
-                                            ::testing::Values(128, 200, 1000, kMaxResponseBytes)));
+                                            ::testing::Values(128, 200, 1000, kMaxResponseBytes), ::testing::Bool()));
 
 TEST(MeshChunks, LargeMeshFillsItsChunks) {
   const auto chunks = std::make_shared<MeshChunks>(MakeFakeMesh(core::MeshParameters(), std::vector<double>(600'000)));
