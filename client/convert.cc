@@ -86,6 +86,17 @@ std::map<std::string, uint64_t> CountersByName(const v1::OperationCounters& coun
   return by_name;
 }
 
+Triangulation TriangulationFromProto(v1::Triangulation triangulation) {
+  switch (triangulation) {
+    case v1::TRIANGULATION_DELAUNAY:
+      return Triangulation::kDelaunay;
+    case v1::TRIANGULATION_REGULAR:
+      return Triangulation::kRegular;
+    default:
+      return Triangulation::kUnknown;
+  }
+}
+
 MeshStatistics StatisticsFromProto(const v1::MeshStatistics& message) {
   MeshStatistics statistics;
   statistics.input_points = message.input_points();
@@ -97,7 +108,18 @@ MeshStatistics StatisticsFromProto(const v1::MeshStatistics& message) {
   statistics.seconds["tree"] = message.seconds().tree();
   statistics.seconds["refinement"] = message.seconds().refinement();
   statistics.seconds["simplices"] = message.seconds().simplices();
+  statistics.seconds["slivers"] = message.seconds().slivers();
   statistics.seconds["total"] = message.seconds().total();
+  statistics.triangulation = TriangulationFromProto(message.triangulation());
+  if (message.has_slivers()) {
+    const v1::SliverStatistics& slivers = message.slivers();
+    statistics.slivers = {.found = slivers.found(),
+                          .left = slivers.left(),
+                          .moves = slivers.moves(),
+                          .added_vertices = slivers.added_vertices(),
+                          .weighted_vertices = slivers.weighted_vertices(),
+                          .min_angle_before_deg = slivers.min_angle_before_deg()};
+  }
   statistics.peak_memory_bytes = message.peak_memory_bytes();
   statistics.counters = CountersByName(message.counters());
   return statistics;
@@ -127,6 +149,10 @@ void SetParameters(const MeshOptions& options, v1::MeshParameters* parameters) {
     parameters->mutable_domain()->mutable_low()->Assign(options.domain_low.begin(), options.domain_low.end());
     parameters->mutable_domain()->mutable_high()->Assign(options.domain_high.begin(), options.domain_high.end());
   }
+  if (options.min_dihedral.has_value()) {
+    parameters->set_min_dihedral(*options.min_dihedral);
+  }
+  parameters->set_pump_weights(options.pump_weights);
   parameters->set_margin(options.margin);
   parameters->set_max_vertices(options.max_vertices);
   parameters->set_threads(options.threads);
@@ -143,6 +169,10 @@ MeshOptions OptionsFromProto(const v1::MeshParameters& parameters) {
     options.size_boxes.push_back(
         {.low = VectorOf(box.low()), .high = VectorOf(box.high()), .max_circumradius = box.max_circumradius()});
   }
+  if (parameters.has_min_dihedral()) {
+    options.min_dihedral = parameters.min_dihedral();
+  }
+  options.pump_weights = parameters.pump_weights();
   options.domain_low = VectorOf(parameters.domain().low());
   options.domain_high = VectorOf(parameters.domain().high());
   if (parameters.has_margin()) {
@@ -171,6 +201,7 @@ MeshHeader HeaderFromProto(const v1::MeshMetadata& metadata) {
                     .input_point_count = metadata.input_point_count(),
                     .chunk_count = metadata.chunk_count(),
                     .revision = metadata.revision(),
+                    .has_weights = metadata.has_weights(),
                     .statistics = StatisticsFromProto(metadata.statistics())};
 }
 

@@ -15,6 +15,11 @@ absl::Status MeshCollector::AddPoints(std::span<const double> points) {
   return absl::OkStatus();
 }
 
+absl::Status MeshCollector::AddWeights(std::span<const double> weights) {
+  mesh_.weights.insert(mesh_.weights.end(), weights.begin(), weights.end());
+  return absl::OkStatus();
+}
+
 absl::Status MeshCollector::AddSimplices(std::span<const uint32_t> simplices) {
   mesh_.simplices.insert(mesh_.simplices.end(), simplices.begin(), simplices.end());
   return absl::OkStatus();

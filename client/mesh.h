@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -30,6 +31,8 @@ struct MeshOptions {
   Criterion criterion = Criterion::kRadiusEdge;
   double max_circumradius = 0;
   std::vector<SizeBox> size_boxes;
+  std::optional<double> min_dihedral;  // degrees; 0: slivers are left as they are
+  bool pump_weights = false;
   std::vector<double> domain_low;
   std::vector<double> domain_high;
   double margin = 0.25;
@@ -47,14 +50,29 @@ struct Progress {
   uint64_t sequence = 0;  // number of the event
 };
 
+// Which triangulation of its vertices a mesh is; see the proto's Triangulation.
+enum class Triangulation { kUnknown, kDelaunay, kRegular };
+
+// What was done against slivers; see the proto's SliverStatistics.
+struct SliverStatistics {
+  uint64_t found = 0;
+  uint64_t left = 0;
+  uint64_t moves = 0;
+  uint64_t added_vertices = 0;
+  uint64_t weighted_vertices = 0;
+  double min_angle_before_deg = 0;
+};
+
 struct MeshStatistics {
   uint64_t input_points = 0;
   uint64_t duplicates = 0;
   uint64_t vertices = 0;
   uint64_t simplices = 0;
   double max_radius_edge = 0;
-  double min_angle_deg = 0;               // above 2-D: smallest dihedral angle
-  std::map<std::string, double> seconds;  // by phase, and "total"
+  double min_angle_deg = 0;  // above 2-D: smallest dihedral angle
+  Triangulation triangulation = Triangulation::kUnknown;
+  std::optional<SliverStatistics> slivers;  // none: nothing was asked for
+  std::map<std::string, double> seconds;    // by phase, and "total"
   uint64_t peak_memory_bytes = 0;
   std::map<std::string, uint64_t> counters;
 };
@@ -69,6 +87,7 @@ struct MeshHeader {
   uint64_t input_point_count = 0;
   uint64_t chunk_count = 0;
   uint64_t revision = 0;  // of the session's mesh; 0 in the answer of MeshPoints
+  bool has_weights = false;
   MeshStatistics statistics;
 };
 
@@ -77,6 +96,7 @@ struct Mesh {
   std::vector<double> domain_low;
   std::vector<double> domain_high;
   std::vector<double> points;          // vertex_count x dimension, row-major; the distinct input points first
+  std::vector<double> weights;         // vertex_count squared lengths, of a regular triangulation; else empty
   std::vector<uint32_t> simplices;     // simplex_count x (dimension + 1), row-major
   std::vector<uint32_t> input_vertex;  // per input point: the vertex it became
   MeshStatistics statistics;
@@ -98,6 +118,8 @@ class MeshSink {
   virtual absl::Status Begin(const MeshHeader& header) = 0;
   // Rows of `dimension` coordinates.
   virtual absl::Status AddPoints(std::span<const double> points) = 0;
+  // The next vertices' weights, if the header has_weights.
+  virtual absl::Status AddWeights(std::span<const double> weights) = 0;
   // Rows of dimension + 1 vertices.
   virtual absl::Status AddSimplices(std::span<const uint32_t> simplices) = 0;
   // For the next input points the vertices that they became.
@@ -113,6 +135,7 @@ class MeshCollector final : public MeshSink {
  public:
   absl::Status Begin(const MeshHeader& header) override;
   absl::Status AddPoints(std::span<const double> points) override;
+  absl::Status AddWeights(std::span<const double> weights) override;
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override;
   absl::Status AddInputVertices(std::span<const uint32_t> vertices) override;
   absl::Status Finish() override { return absl::OkStatus(); }

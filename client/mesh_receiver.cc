@@ -23,7 +23,7 @@ constexpr uint64_t kMaxSimplices = uint64_t{1} << 40;
 constexpr uint64_t kMaxInputPoints = uint64_t{1} << 40;
 constexpr int kMaxDimension = 64;
 
-constexpr const char* kArrayNames[] = {"points", "simplices", "input vertices"};
+constexpr const char* kArrayNames[] = {"points", "weights", "simplices", "input vertices"};
 
 template <typename T>
 std::span<const T> SpanOf(const google::protobuf::RepeatedField<T>& values) {
@@ -53,6 +53,7 @@ uint64_t MeshReceiver::WidthOf(int array) const {
 
 uint64_t MeshReceiver::SizeOf(int array) const {
   const uint64_t rows = array == kPoints      ? header_.vertex_count
+                        : array == kWeights   ? (header_.has_weights ? header_.vertex_count : 0)
                         : array == kSimplices ? header_.simplex_count
                                               : header_.input_point_count;
   return rows * WidthOf(array);
@@ -89,10 +90,11 @@ absl::Status MeshReceiver::SetMetadata(const v1::MeshMetadata& metadata) {
     return status;
   }
   if (has_metadata_) {
-    const bool is_the_same =
-        header.revision == header_.revision && header.dimension == header_.dimension &&
-        header.vertex_count == header_.vertex_count && header.simplex_count == header_.simplex_count &&
-        header.input_point_count == header_.input_point_count && header.chunk_count == header_.chunk_count;
+    const bool is_the_same = header.revision == header_.revision && header.dimension == header_.dimension &&
+                             header.vertex_count == header_.vertex_count &&
+                             header.simplex_count == header_.simplex_count &&
+                             header.input_point_count == header_.input_point_count &&
+                             header.chunk_count == header_.chunk_count && header.has_weights == header_.has_weights;
     return is_the_same ? absl::OkStatus()
                        : Contradiction("a continued download of another mesh: revision ", header.revision, " with ",
                                        header.vertex_count, " vertices after revision ", header_.revision, " with ",
@@ -133,12 +135,17 @@ absl::Status MeshReceiver::AddChunk(const v1::MeshChunk& chunk) {
     return Contradiction("chunk ", chunk.index(), " where chunk ", next_chunk_, " of ", header_.chunk_count,
                          " was expected");
   }
-  const int arrays = !chunk.points().empty() + !chunk.simplices().empty() + !chunk.input_vertices().empty();
+  const int arrays =
+      !chunk.points().empty() + !chunk.weights().empty() + !chunk.simplices().empty() + !chunk.input_vertices().empty();
   if (arrays != 1) {
     return Contradiction("chunk ", chunk.index(), " has ", arrays, " arrays; expected one");
   }
-  const Array array = !chunk.points().empty() ? kPoints : !chunk.simplices().empty() ? kSimplices : kInputVertices;
+  const Array array = !chunk.points().empty()      ? kPoints
+                      : !chunk.weights().empty()   ? kWeights
+                      : !chunk.simplices().empty() ? kSimplices
+                                                   : kInputVertices;
   const uint32_t checksum = array == kPoints      ? ChecksumOf(chunk.points())
+                            : array == kWeights   ? ChecksumOf(chunk.weights())
                             : array == kSimplices ? ChecksumOf(chunk.simplices())
                                                   : ChecksumOf(chunk.input_vertices());
   if (checksum != chunk.crc32c()) {
@@ -146,10 +153,11 @@ absl::Status MeshReceiver::AddChunk(const v1::MeshChunk& chunk) {
                          absl::Hex(chunk.crc32c(), absl::kZeroPad8), " as sent");
   }
   const uint64_t values = array == kPoints      ? chunk.points_size()
+                          : array == kWeights   ? chunk.weights_size()
                           : array == kSimplices ? chunk.simplices_size()
                                                 : chunk.input_vertices_size();
   absl::Status status = CheckOrder(array, values);
-  if (status.ok() && array != kPoints) {
+  if (status.ok() && (array == kSimplices || array == kInputVertices)) {
     status = CheckVertices(array == kSimplices ? chunk.simplices() : chunk.input_vertices(), header_.vertex_count,
                            kArrayNames[array]);
   }
@@ -161,6 +169,8 @@ absl::Status MeshReceiver::AddChunk(const v1::MeshChunk& chunk) {
   switch (array) {
     case kPoints:
       return sink_.AddPoints(SpanOf(chunk.points()));
+    case kWeights:
+      return sink_.AddWeights(SpanOf(chunk.weights()));
     case kSimplices:
       return sink_.AddSimplices(SpanOf(chunk.simplices()));
     default:

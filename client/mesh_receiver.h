@@ -46,7 +46,7 @@ class MeshReceiver {
 
  private:
   // The arrays, in their order.
-  enum Array { kPoints, kSimplices, kInputVertices, kArrays };
+  enum Array { kPoints, kWeights, kSimplices, kInputVertices, kArrays };
 
   absl::Status CheckMetadata(const MeshHeader& header) const;
   uint64_t WidthOf(int array) const;

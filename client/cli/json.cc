@@ -64,6 +64,8 @@ Json ParametersJson(const client::MeshOptions& parameters) {
   for (const client::SizeBox& box : parameters.size_boxes) {
     json["size_boxes"].push_back({{"low", box.low}, {"high", box.high}, {"max_circumradius", box.max_circumradius}});
   }
+  json["min_dihedral"] = parameters.min_dihedral.has_value() ? Json(*parameters.min_dihedral) : Json(nullptr);
+  json["pump_weights"] = parameters.pump_weights;
   const bool has_domain = !parameters.domain_low.empty();
   json["domain_low"] = has_domain ? Json(parameters.domain_low) : Json(nullptr);
   json["domain_high"] = has_domain ? Json(parameters.domain_high) : Json(nullptr);

@@ -26,13 +26,23 @@ std::vector<double> ParseList(const std::string& name, const std::string& text) 
   return values;
 }
 
-}  // namespace
-
-CLI::Option* AddNumber(CLI::App& command, const std::string& name, double& value, const std::string& description) {
+template <typename Number>
+CLI::Option* AddNumberTo(CLI::App& command, const std::string& name, Number& value, const std::string& description) {
   return command
       .add_option_function<std::string>(
           name, [name, &value](const std::string& text) { value = ParseOption(name, text); }, description)
       ->type_name("NUMBER");
+}
+
+}  // namespace
+
+CLI::Option* AddNumber(CLI::App& command, const std::string& name, double& value, const std::string& description) {
+  return AddNumberTo(command, name, value, description);
+}
+
+CLI::Option* AddNumber(CLI::App& command, const std::string& name, std::optional<double>& value,
+                       const std::string& description) {
+  return AddNumberTo(command, name, value, description);
 }
 
 CLI::Option* AddNumbers(CLI::App& command, const std::string& name, std::vector<double>& values,

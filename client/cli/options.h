@@ -3,6 +3,7 @@
 #define WELLSPACE_CLIENT_CLI_OPTIONS_H_
 
 #include <CLI/CLI.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,8 @@ namespace wellspace::cli {
 
 // A finite number, correctly rounded (CLI11 rounds twice).
 CLI::Option* AddNumber(CLI::App& command, const std::string& name, double& value, const std::string& description);
+CLI::Option* AddNumber(CLI::App& command, const std::string& name, std::optional<double>& value,
+                       const std::string& description);
 
 // Finite numbers separated by commas.
 CLI::Option* AddNumbers(CLI::App& command, const std::string& name, std::vector<double>& values,

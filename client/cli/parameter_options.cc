@@ -81,11 +81,18 @@ void ParameterOptions::AddQualityTo(CLI::App& command) {
   AddNumber(command, "--rho", options_.rho,
             "Bound of the criterion; default: that of the dimension, sqrt(2) in 2-D, 2 in 3-D");
   AddSizes(command, options_.max_circumradius, size_boxes_);
+  AddNumber(command, "--min-dihedral", options_.min_dihedral,
+            "3-D: move and add vertices until no dihedral angle is smaller, in degrees, up to 18; 0: leave slivers as "
+            "they are; default: the server's");
+  command.add_flag("--pump-weights", options_.pump_weights,
+                   "From 3-D on: give vertices weights that make the worst simplices better; the mesh is then their "
+                   "regular triangulation, not Delaunay. After --min-dihedral only if that has left slivers");
   command.add_option("--max-vertices", options_.max_vertices,
                      "Fail before the mesh has more vertices than this; 50 million by default");
   command.add_option("--threads", options_.threads, "Threads that mesh; default: the server's choice")
       ->check(CLI::Range(1, 1024));
-  for (const char* name : {"--criterion", "--rho", "--size", "--size-box", "--max-vertices", "--threads"}) {
+  for (const char* name : {"--criterion", "--rho", "--size", "--size-box", "--min-dihedral", "--pump-weights",
+                           "--max-vertices", "--threads"}) {
     quality_.push_back(command.get_option(name));
   }
 }
@@ -143,8 +150,10 @@ absl::StatusOr<client::MeshOptions> ParameterOptions::Replace(client::MeshOption
   replace(1, parameters.rho, given->rho);
   replace(2, parameters.max_circumradius, given->max_circumradius);
   replace(3, parameters.size_boxes, std::move(given->size_boxes));
-  replace(4, parameters.max_vertices, given->max_vertices);
-  replace(5, parameters.threads, given->threads);
+  replace(4, parameters.min_dihedral, given->min_dihedral);
+  replace(5, parameters.pump_weights, given->pump_weights);
+  replace(6, parameters.max_vertices, given->max_vertices);
+  replace(7, parameters.threads, given->threads);
   return parameters;
 }
 

@@ -28,6 +28,42 @@ nlohmann::ordered_json DuplicateOf(std::span<const uint32_t> input_vertex) {
 
 const char* AngleName(int dimension) { return dimension == 2 ? "min_angle_deg" : "min_dihedral_deg"; }
 
+const char* TriangulationName(client::Triangulation triangulation) {
+  switch (triangulation) {
+    case client::Triangulation::kDelaunay:
+      return "delaunay";
+    case client::Triangulation::kRegular:
+      return "regular";
+    default:
+      return "unknown";  // of an older server
+  }
+}
+
+nlohmann::ordered_json SliversJson(const client::SliverStatistics& slivers) {
+  nlohmann::ordered_json json;
+  json["found"] = slivers.found;
+  json["left"] = slivers.left;
+  json["moves"] = slivers.moves;
+  json["added_vertices"] = slivers.added_vertices;
+  json["weighted_vertices"] = slivers.weighted_vertices;
+  json["min_angle_before_deg"] = slivers.min_angle_before_deg;
+  return json;
+}
+
+// "; Delaunay, from 0.05° by 3 moves, 1 added vertices".
+std::string SliversText(const client::SliverStatistics& slivers) {
+  std::string text = absl::StrFormat(
+      "; %s, from %.2f\u00b0 by %s moves, %s added vertices", slivers.weighted_vertices == 0 ? "Delaunay" : "regular",
+      slivers.min_angle_before_deg, WithThousands(slivers.moves), WithThousands(slivers.added_vertices));
+  if (slivers.weighted_vertices != 0) {
+    absl::StrAppend(&text, ", ", WithThousands(slivers.weighted_vertices), " weights");
+  }
+  if (slivers.left != 0) {
+    absl::StrAppend(&text, "; ", WithThousands(slivers.left), " slivers could not be mended");
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string StatisticsJson(const client::MeshHeader& mesh, std::span<const uint32_t> input_vertex) {
@@ -42,6 +78,8 @@ std::string StatisticsJson(const client::MeshHeader& mesh, std::span<const uint3
   json["simplices"] = statistics.simplices;
   json["max_radius_edge"] = statistics.max_radius_edge;
   json[AngleName(mesh.dimension)] = statistics.min_angle_deg;
+  json["triangulation"] = TriangulationName(statistics.triangulation);
+  json["slivers"] = statistics.slivers.has_value() ? SliversJson(*statistics.slivers) : nlohmann::ordered_json();
   json["seconds"] = statistics.seconds;
   json["peak_memory_bytes"] = statistics.peak_memory_bytes;
   json["counters"] = statistics.counters;
@@ -59,6 +97,7 @@ std::string Summary(const client::MeshHeader& mesh) {
       formats::SimplexName(mesh.dimension),
       absl::StrFormat("; radius-edge at most %.4f, %s at least %.2f\u00b0", statistics.max_radius_edge,
                       mesh.dimension == 2 ? "angles" : "dihedral angles", statistics.min_angle_deg),
+      statistics.slivers.has_value() ? SliversText(*statistics.slivers) : "",
       total == statistics.seconds.end() ? "" : absl::StrFormat("; %.2f s", total->second));
 }
 

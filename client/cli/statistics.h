@@ -13,6 +13,8 @@ namespace wellspace::cli {
 // One JSON object:
 //   dimension, domain_low, domain_high
 //   input_points, duplicates, vertices, simplices, max_radius_edge, min_angle_deg (2-D) or min_dihedral_deg (above)
+//   triangulation: "delaunay" or "regular"
+//   slivers:  {found, left, moves, added_vertices, weighted_vertices, min_angle_before_deg}, null if nothing was asked for
 //   seconds:  {tree, refinement, simplices, ..., total}, without reading and writing files
 //   peak_memory_bytes, counters
 //   duplicate_of: [[i, v], ...]: input point i is equal to an earlier one, and both became vertex v. The other input

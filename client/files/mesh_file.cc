@@ -9,6 +9,7 @@ absl::Status MeshFile::Begin(const MeshHeader& header) {
       .vertex_count = header.vertex_count,
       .simplex_count = header.simplex_count,
       .input_vertices = header.statistics.input_points - header.statistics.duplicates,
+      .has_weights = header.has_weights,
   };
   absl::StatusOr<std::unique_ptr<formats::MeshWriter>> writer = formats::CreateMesh(path_, format_, shape, stop_);
   if (!writer.ok()) {

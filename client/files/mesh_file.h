@@ -26,6 +26,7 @@ class MeshFile final : public MeshSink {
 
   absl::Status Begin(const MeshHeader& header) override;
   absl::Status AddPoints(std::span<const double> points) override { return writer_->AddPoints(points); }
+  absl::Status AddWeights(std::span<const double> weights) override { return writer_->AddWeights(weights); }
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override { return writer_->AddSimplices(simplices); }
   absl::Status AddInputVertices(std::span<const uint32_t> vertices) override;
   absl::Status Finish() override { return writer_->Commit(); }

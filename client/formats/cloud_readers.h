@@ -4,6 +4,7 @@
 #define WELLSPACE_CLIENT_FORMATS_CLOUD_READERS_H_
 
 #include <cstdint>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "client/formats/cloud.h"
@@ -16,8 +17,9 @@ absl::Status ReadXyz(LineReader& reader, int dimension, PointCloud& cloud);
 absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud);
 absl::Status ReadNpy(InputFile& file, int dimension, PointCloud& cloud);
 
-// ReadNode that also tells the index of the first point, 0 or 1.
-absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud, uint64_t& index_base);
+// ReadNode that also tells the index of the first point, 0 or 1, and the points' weights, if the file has them.
+absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud, uint64_t& index_base,
+                      std::vector<double>& weights);
 
 }  // namespace wellspace::formats
 

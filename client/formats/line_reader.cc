@@ -168,7 +168,9 @@ bool LineReader::Next(std::string_view& line) {
 
 bool LineReader::NextContent(std::string_view& line) {
   while (Next(line)) {
+    comment_ = {};
     if (const size_t comment = line.find('#'); comment != std::string_view::npos) {
+      comment_ = TrimBlanks(line.substr(comment + 1));
       line = line.substr(0, comment);
     }
     line = TrimBlanks(line);

@@ -23,7 +23,10 @@ absl::StatusOr<std::unique_ptr<MeshWriter>> CreateNodeAndEle(const std::string& 
                                                              std::stop_token stop);
 
 // INTERNAL unless as many rows have come as `shape` says.
-absl::Status CheckComplete(const MeshShape& shape, uint64_t vertices, uint64_t simplices);
+absl::Status CheckComplete(const MeshShape& shape, uint64_t vertices, uint64_t weights, uint64_t simplices);
+
+// The comment that ends the header of a .node whose attribute is the weight of its points.
+inline constexpr char kWeightsComment[] = "weights";
 
 // "a/mesh.ele" of "a/mesh.node" and the other way round: `path` with its extension replaced.
 std::string WithExtension(const std::string& path, const std::string& extension);

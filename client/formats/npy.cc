@@ -117,10 +117,11 @@ absl::StatusOr<NpyHeader> ParseNpyHeader(std::string_view text) {
   return header;
 }
 
-std::string NpyPreamble(const std::string& type, uint64_t rows, uint64_t columns) {
+std::string NpyPreamble(const std::string& type, uint64_t rows, std::optional<uint64_t> columns) {
   constexpr size_t kAlignment = 64;
-  std::string header =
-      absl::StrCat("{'descr': '", type, "', 'fortran_order': False, 'shape': (", rows, ", ", columns, "), }");
+  // Python writes a tuple of one as (7,).
+  std::string header = absl::StrCat("{'descr': '", type, "', 'fortran_order': False, 'shape': (", rows, ",",
+                                    columns.has_value() ? absl::StrCat(" ", *columns) : "", "), }");
   std::string text(kMagic);
   text.append("\x01\x00", 2);
   const size_t bare = text.size() + sizeof(uint16_t) + header.size() + 1;
@@ -131,9 +132,10 @@ std::string NpyPreamble(const std::string& type, uint64_t rows, uint64_t columns
   return text + header;
 }
 
-absl::StatusOr<NpyReader> NpyReader::Open(std::string name, ByteSource source, std::optional<uint64_t> size) {
+absl::StatusOr<NpyReader> NpyReader::Open(std::string name, ByteSource source, std::optional<uint64_t> size,
+                                          size_t dimensions) {
   NpyReader reader(std::move(name), std::move(source), size);
-  if (absl::Status status = reader.ReadHeader(); !status.ok()) {
+  if (absl::Status status = reader.ReadHeader(dimensions); !status.ok()) {
     return status;
   }
   return reader;
@@ -169,7 +171,7 @@ absl::Status NpyReader::ExpectEnd() {
                    : Error(absl::StrCat("expected the end after ", taken_, " bytes, as the header says, got more"));
 }
 
-absl::Status NpyReader::ReadHeader() {
+absl::Status NpyReader::ReadHeader(size_t dimensions) {
   std::string magic(kMagic.size() + 2, '\0');
   if (absl::Status status = Take(magic.data(), magic.size()); !status.ok()) {
     return status;
@@ -199,9 +201,10 @@ absl::Status NpyReader::ReadHeader() {
     return Error(std::string(header.status().message()));
   }
   header_ = *std::move(header);
-  if (header_.shape.size() != 2) {
-    return Error(
-        absl::StrCat("expected an array of 2 dimensions, rows and columns, got one of ", header_.shape.size()));
+  if (header_.shape.size() != dimensions) {
+    return Error(absl::StrCat("expected an array of ",
+                              dimensions == 1 ? "1 dimension" : "2 dimensions, rows and columns", ", got one of ",
+                              header_.shape.size()));
   }
   // So that no product of these overflows.
   constexpr uint64_t kMaxRows = uint64_t{1} << 48;

@@ -32,10 +32,11 @@ struct NpyHeader {
 // Errors:     INVALID_ARGUMENT, a message without a location.
 absl::StatusOr<NpyHeader> ParseNpyHeader(std::string_view text);
 
-// What stands before the values of an array in C order, in version 1.0, padded as numpy does.
-std::string NpyPreamble(const std::string& type, uint64_t rows, uint64_t columns);
+// What stands before the values of an array in C order, in version 1.0, padded as numpy does; without columns it has one
+// dimension.
+std::string NpyPreamble(const std::string& type, uint64_t rows, std::optional<uint64_t> columns);
 
-// Reads one array of rows and columns from a source, in bounded memory besides the array.
+// Reads one array of rows and columns, or of rows alone, from a source, in bounded memory besides the array.
 //
 // Thread safety: thread-compatible.
 class NpyReader {
@@ -43,11 +44,13 @@ class NpyReader {
   // Reads magic and header. `name` is that of the array, for messages. The source has `size` bytes, if that is known: what the
   // header says is not believed beyond it.
   //
-  // Errors:     of the source; INVALID_ARGUMENT "NAME: …" for what is not an array of two dimensions.
-  static absl::StatusOr<NpyReader> Open(std::string name, ByteSource source, std::optional<uint64_t> size);
+  // REQUIRES:   dimensions is 1 or 2.
+  // Errors:     of the source; INVALID_ARGUMENT "NAME: …" for what is not an array of so many dimensions.
+  static absl::StatusOr<NpyReader> Open(std::string name, ByteSource source, std::optional<uint64_t> size,
+                                        size_t dimensions = 2);
 
   uint64_t rows() const { return header_.shape[0]; }
-  uint64_t columns() const { return header_.shape[1]; }
+  uint64_t columns() const { return header_.shape.size() == 1 ? 1 : header_.shape[1]; }
   const NpyHeader& header() const { return header_; }
   // Where in the source the values begin. REQUIRES: none has been read.
   uint64_t values_offset() const { return taken_; }
@@ -66,7 +69,7 @@ class NpyReader {
   absl::Status Error(std::string_view message) const;
   // Exactly `size` bytes.
   absl::Status Take(char* buffer, size_t size);
-  absl::Status ReadHeader();
+  absl::Status ReadHeader(size_t dimensions);
   absl::Status ExpectEnd();
   // The row and column of the value number `index` in the order of the source.
   std::string PlaceOf(uint64_t index) const;

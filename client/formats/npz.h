@@ -5,6 +5,7 @@
 namespace wellspace::formats {
 
 inline constexpr char kNpzPoints[] = "points.npy";        // vertex_count x dimension
+inline constexpr char kNpzWeights[] = "weights.npy";      // vertex_count, of regular triangulations only
 inline constexpr char kNpzSimplices[] = "simplices.npy";  // simplex_count x (dimension + 1), indices of points
 
 }  // namespace wellspace::formats

@@ -1,4 +1,4 @@
-// numpy's .npz: a mesh as two arrays.
+// numpy's .npz: a mesh as two arrays, or three with weights.
 #include <algorithm>
 #include <limits>
 #include <memory>
@@ -16,14 +16,15 @@
 namespace wellspace::formats {
 namespace {
 
-absl::StatusOr<NpyReader> OpenArray(ZipReader& archive, const std::string& file, const std::string& member) {
+absl::StatusOr<NpyReader> OpenArray(ZipReader& archive, const std::string& file, const std::string& member,
+                                    size_t dimensions = 2) {
   const absl::StatusOr<uint64_t> size = archive.Begin(member);
   if (!size.ok()) {
     return size.status();
   }
   return NpyReader::Open(
       absl::StrCat(file, ": ", member), [&archive](char* buffer, size_t bytes) { return archive.Read(buffer, bytes); },
-      *size);
+      *size, dimensions);
 }
 
 }  // namespace
@@ -52,6 +53,19 @@ absl::StatusOr<Mesh> ReadNpz(const std::string& path) {
   Mesh mesh{.dimension = static_cast<int>(columns), .points = {}, .simplices = {}};
   if (absl::Status status = points->ReadNumbers(mesh.points); !status.ok()) {
     return status;
+  }
+  if ((*archive)->Has(kNpzWeights)) {
+    absl::StatusOr<NpyReader> weights = OpenArray(**archive, name, kNpzWeights, 1);
+    if (!weights.ok()) {
+      return weights.status();
+    }
+    if (weights->rows() != vertices) {
+      return absl::InvalidArgumentError(absl::StrCat(name, ": ", kNpzWeights, ": expected ", vertices,
+                                                     " weights, one for each point, got ", weights->rows()));
+    }
+    if (absl::Status status = weights->ReadNumbers(mesh.weights); !status.ok()) {
+      return status;
+    }
   }
   absl::StatusOr<NpyReader> simplices = OpenArray(**archive, name, kNpzSimplices);
   if (!simplices.ok()) {

@@ -4,6 +4,7 @@
 #include <limits>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/cloud_readers.h"
@@ -129,10 +130,12 @@ absl::Status ReadEle(LineReader& reader, uint64_t vertices, uint64_t index_base,
 
 absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud) {
   uint64_t index_base = 0;
-  return ReadNode(reader, dimension, cloud, index_base);
+  std::vector<double> weights;
+  return ReadNode(reader, dimension, cloud, index_base, weights);
 }
 
-absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud, uint64_t& index_base) {
+absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud, uint64_t& index_base,
+                      std::vector<double>& weights) {
   std::string_view line;
   if (!reader.NextContent(line)) {
     return reader.status().ok() ? reader.Error("expected a header, got an empty file") : reader.status();
@@ -150,6 +153,7 @@ absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud, uint
   if (dimension != 0 && static_cast<int>(columns) != dimension) {
     return reader.Error(absl::StrCat("expected dimension ", dimension, ", got ", columns));
   }
+  const bool has_weights = attributes == 1 && reader.comment() == kWeightsComment;
   cloud.dimension = static_cast<int>(columns);
   cloud.points.reserve(std::min(count, kMaxReserved) * columns);
   for (uint64_t point = 0; point < count; ++point) {
@@ -173,10 +177,20 @@ absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud, uint
     }
     // Attributes and markers may be missing, as they may for TetGen, but there must not be more than announced.
     for (uint64_t extra = 0; fields.Next(field); ++extra) {
+      if (has_weights && extra == 0) {
+        double value = 0;
+        if (absl::Status status = ParseFinite(field, value); !status.ok()) {
+          return reader.Error(absl::StrCat("weight: ", status.message()));
+        }
+        weights.push_back(value);
+      }
       if (extra == attributes + markers) {
         return reader.Error(absl::StrCat("expected ", columns, " coordinates and ", extra,
                                          " attributes and markers, as the header says, got also ", Quote(field)));
       }
+    }
+    if (has_weights && weights.size() != point + 1) {
+      return reader.Error("expected a weight after the coordinates, as the header says, got none");
     }
     cloud.lines.Add(reader.line_number());
   }
@@ -194,11 +208,13 @@ absl::StatusOr<Mesh> ReadNodeAndEle(const std::string& path) {
   }
   PointCloud cloud;
   uint64_t index_base = 0;
+  std::vector<double> weights;
   LineReader nodes(*std::move(node_file));
-  if (absl::Status status = ReadNode(nodes, 0, cloud, index_base); !status.ok()) {
+  if (absl::Status status = ReadNode(nodes, 0, cloud, index_base, weights); !status.ok()) {
     return status;
   }
-  Mesh mesh{.dimension = cloud.dimension, .points = std::move(cloud.points), .simplices = {}};
+  Mesh mesh{
+      .dimension = cloud.dimension, .points = std::move(cloud.points), .simplices = {}, .weights = std::move(weights)};
   LineReader simplices(*std::move(ele_file));
   if (absl::Status status = ReadEle(simplices, mesh.View().vertex_count(), index_base, mesh); !status.ok()) {
     return status;

@@ -100,6 +100,10 @@ class VtuReader {
     if (parent == "Points") {
       return ReadPoints();
     }
+    if (parent == "PointData" && xml_.Attribute("Name") == "weights") {
+      has_weights_ = true;
+      return ReadArray<double>(weights_);
+    }
     return parent == "Cells" ? ReadCellArray() : absl::OkStatus();
   }
 
@@ -239,9 +243,13 @@ class VtuReader {
       return FileError(absl::StrCat("expected a type and an offset for each of ", cell_count_, " cells, got ",
                                     types_.size(), " types and ", offsets_.size(), " offsets"));
     }
+    if (has_weights_ && weights_.size() != point_count_) {
+      return FileError(absl::StrCat("expected a weight for each of ", point_count_, " points, got ", weights_.size()));
+    }
     constexpr int64_t kTriangle = 5;
     constexpr int64_t kTetrahedron = 10;
     Mesh mesh;
+    mesh.weights = weights_;
     mesh.dimension = !types_.empty() && types_[0] == kTriangle ? 2 : 3;
     const int64_t expected_type = mesh.dimension == 2 ? kTriangle : kTetrahedron;
     const size_t corners = mesh.dimension + 1;
@@ -293,6 +301,8 @@ class VtuReader {
   uint64_t point_count_ = 0;
   uint64_t cell_count_ = 0;
   std::vector<double> coordinates_;
+  bool has_weights_ = false;
+  std::vector<double> weights_;
   std::vector<int64_t> connectivity_;
   std::vector<int64_t> offsets_;
   std::vector<int64_t> types_;

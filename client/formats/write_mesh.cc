@@ -82,10 +82,13 @@ absl::Status CheckMeshOutput(const std::string& path, const std::string& format,
   return absl::OkStatus();
 }
 
-absl::Status CheckComplete(const MeshShape& shape, uint64_t vertices, uint64_t simplices) {
+absl::Status CheckComplete(const MeshShape& shape, uint64_t vertices, uint64_t weights, uint64_t simplices) {
   if (vertices != shape.vertex_count || simplices != shape.simplex_count) {
     return absl::InternalError(absl::StrCat("a mesh of ", shape.vertex_count, " vertices and ", shape.simplex_count,
                                             " simplices got ", vertices, " and ", simplices));
+  }
+  if (const uint64_t expected = shape.has_weights ? shape.vertex_count : 0; weights != expected) {
+    return absl::InternalError(absl::StrCat("a mesh of ", expected, " weights got ", weights));
   }
   return absl::OkStatus();
 }
@@ -105,6 +108,10 @@ absl::Status WriteMesh(const std::string& path, const std::string& format, const
     return writer.status();
   }
   if (absl::Status status = (*writer)->AddPoints(mesh.points); !status.ok()) {
+    return status;
+  }
+  if (absl::Status status = mesh.weights.empty() ? absl::OkStatus() : (*writer)->AddWeights(mesh.weights);
+      !status.ok()) {
     return status;
   }
   if (absl::Status status = (*writer)->AddSimplices(mesh.simplices); !status.ok()) {

@@ -2,11 +2,12 @@
 //
 // Formats:
 //   vtu   VTK's XML, 2-D and 3-D only: arrays inline in base64, compressed by zlib; points padded to 3-D; point data
-//         "input", 1 for the vertices that are input points.
+//         "input", 1 for the vertices that are input points, and "weights", if there are any.
 //   npz   numpy's archive of arrays: `points` of type Float64, vertices x dimension; `simplices` of type UInt32,
-//         simplices x (dimension + 1); deflated.
+//         simplices x (dimension + 1); `weights` of type Float64, one for each vertex, if there are any; deflated.
 //   node  TetGen's and Triangle's pair of .node and .ele, given by either name; indices start at 0. TetGen itself knows
-//         3-D only, Triangle 2-D.
+//         3-D only, Triangle 2-D. Weights are the only attribute of .node; the comment "# weights" at the end of
+//         its header says so.
 #ifndef WELLSPACE_CLIENT_FORMATS_WRITE_MESH_H_
 #define WELLSPACE_CLIENT_FORMATS_WRITE_MESH_H_
 
@@ -32,7 +33,8 @@ absl::Status CheckMeshOutput(const std::string& path, const std::string& format,
 
 // Writes a mesh piece by piece, so that it need not fit into memory.
 //
-// Memory: a few blocks for a regular file; for vtu into a pipe or a device the compressed array that is being written.
+// Memory: a few blocks for a regular file; for vtu into a pipe or a device the compressed array that is being written; for node
+//         with weights the points.
 // Thread safety: thread-compatible.
 class MeshWriter {
  public:
@@ -40,9 +42,11 @@ class MeshWriter {
   MeshWriter(const MeshWriter&) = delete;
   MeshWriter& operator=(const MeshWriter&) = delete;
 
-  // The next rows of the arrays: all points, then all simplices. Returns the first error of all so far.
-  // REQUIRES:   whole rows, no more than the shape says, no points after simplices.
+  // The next rows of the arrays: all points, then all weights if the shape has them, then all simplices. Returns the first
+  // error of all so far.
+  // REQUIRES:   whole rows, no more than the shape says, nothing of an array before another that goes first.
   virtual absl::Status AddPoints(std::span<const double> points) = 0;
+  virtual absl::Status AddWeights(std::span<const double> weights) = 0;
   virtual absl::Status AddSimplices(std::span<const uint32_t> simplices) = 0;
 
   // Gives the file its name. Without it, no file is left or changed.

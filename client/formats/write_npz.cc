@@ -1,5 +1,7 @@
-// numpy's .npz: a mesh as two arrays.
-#include <string_view>
+// numpy's .npz: a mesh as two arrays, or three with weights.
+#include <optional>
+#include <span>
+#include <string>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -24,6 +26,13 @@ class NpzWriter final : public MeshWriter {
     return archive_.status();
   }
 
+  absl::Status AddWeights(std::span<const double> weights) override {
+    BeginWeights();
+    Write(weights);
+    weights_ += weights.size();
+    return archive_.status();
+  }
+
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
     BeginSimplices();
     Write(simplices);
@@ -36,17 +45,23 @@ class NpzWriter final : public MeshWriter {
     if (absl::Status status = archive_.Finish(); !status.ok()) {
       return status;
     }
-    if (absl::Status status = CheckComplete(shape_, vertices_, simplices_); !status.ok()) {
+    if (absl::Status status = CheckComplete(shape_, vertices_, weights_, simplices_); !status.ok()) {
       return status;
     }
     return output_.Commit();
   }
 
  private:
-  void Begin(const char* member, const char* type, uint64_t rows, uint64_t columns, size_t value_bytes) {
+  void Begin(const char* member, const char* type, uint64_t rows, std::optional<uint64_t> columns, size_t value_bytes) {
     const std::string preamble = NpyPreamble(type, rows, columns);
-    archive_.Begin(member, preamble.size() + rows * columns * value_bytes);
+    archive_.Begin(member, preamble.size() + rows * columns.value_or(1) * value_bytes);
     archive_.Write(preamble);
+  }
+
+  void BeginWeights() {
+    if (!std::exchange(has_weights_, true)) {
+      Begin(kNpzWeights, "<f8", shape_.vertex_count, std::nullopt, sizeof(double));
+    }
   }
 
   void BeginSimplices() {
@@ -63,8 +78,10 @@ class NpzWriter final : public MeshWriter {
   const MeshShape shape_;
   OutputFile output_;
   ZipWriter archive_;
+  bool has_weights_ = false;    // the member
   bool has_simplices_ = false;  // the member
   uint64_t vertices_ = 0;
+  uint64_t weights_ = 0;
   uint64_t simplices_ = 0;
 };
 

@@ -3,6 +3,7 @@
 #include <string>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/mesh_writers.h"
@@ -17,20 +18,39 @@ class NodeAndEleWriter final : public MeshWriter {
  public:
   NodeAndEleWriter(OutputFile nodes, OutputFile simplices, const MeshShape& shape)
       : shape_(shape), nodes_(std::move(nodes)), simplices_(std::move(simplices)) {
-    nodes_.Write(absl::StrCat(shape.vertex_count, " ", shape.dimension, " 0 0\n"));
+    nodes_.Write(absl::StrCat(shape.vertex_count, " ", shape.dimension,
+                              shape.has_weights ? absl::StrCat(" 1 0 # ", kWeightsComment) : " 0 0", "\n"));
     simplices_.Write(absl::StrCat(shape.simplex_count, " ", shape.dimension + 1, " 0\n"));
   }
 
+  // A weight is on the line of its point: points are kept until their weights come.
   absl::Status AddPoints(std::span<const double> points) override {
-    return WriteRows(points, shape_.dimension, vertices_written_, nodes_);
+    if (!shape_.has_weights) {
+      return WriteRows(points, {}, shape_.dimension, vertices_written_, nodes_);
+    }
+    points_.insert(points_.end(), points.begin(), points.end());
+    return nodes_.status();
+  }
+
+  absl::Status AddWeights(std::span<const double> weights) override {
+    const uint64_t first = vertices_written_ * shape_.dimension;
+    const uint64_t count = weights.size() * shape_.dimension;
+    if (first + count > points_.size()) {
+      return absl::InternalError(absl::StrCat("a mesh got ", vertices_written_ + weights.size(), " weights and ",
+                                              points_.size() / shape_.dimension, " points"));
+    }
+    return WriteRows(std::span<const double>(points_).subspan(first, count), weights, shape_.dimension,
+                     vertices_written_, nodes_);
   }
 
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
-    return WriteRows(simplices, shape_.dimension + 1, simplices_written_, simplices_);
+    return WriteRows(simplices, {}, shape_.dimension + 1, simplices_written_, simplices_);
   }
 
   absl::Status Commit() override {
-    if (absl::Status status = CheckComplete(shape_, vertices_written_, simplices_written_); !status.ok()) {
+    if (absl::Status status =
+            CheckComplete(shape_, vertices_written_, shape_.has_weights ? vertices_written_ : 0, simplices_written_);
+        !status.ok()) {
       return status;
     }
     // Neither file appears before both are written.
@@ -46,9 +66,10 @@ class NodeAndEleWriter final : public MeshWriter {
   }
 
  private:
-  // Rows with their numbers, from `written` on.
+  // Rows with their numbers, from `written` on, each followed by one of `weights`, unless there are none.
   template <typename T>
-  absl::Status WriteRows(std::span<const T> values, int width, uint64_t& written, OutputFile& output) {
+  absl::Status WriteRows(std::span<const T> values, std::span<const double> weights, int width, uint64_t& written,
+                         OutputFile& output) {
     for (; !values.empty() && output.status().ok(); values = values.subspan(width)) {
       line_.clear();
       AppendNumber(written++, line_);
@@ -59,6 +80,11 @@ class NodeAndEleWriter final : public MeshWriter {
         } else {
           AppendNumber(uint64_t{value}, line_);
         }
+      }
+      if (!weights.empty()) {
+        line_ += ' ';
+        AppendNumber(weights.front(), line_);
+        weights = weights.subspan(1);
       }
       line_ += '\n';
       output.Write(line_);
@@ -71,6 +97,7 @@ class NodeAndEleWriter final : public MeshWriter {
   OutputFile simplices_;
   uint64_t vertices_written_ = 0;
   uint64_t simplices_written_ = 0;
+  std::vector<double> points_;  // with weights: all
   std::string line_;
 };
 

@@ -24,13 +24,7 @@ class VtuWriter final : public MeshWriter {
         "compressor=\"vtkZLibDataCompressor\">\n"
         "  <UnstructuredGrid>\n");
     output_.Write(absl::StrCat("    <Piece NumberOfPoints=\"", shape_.vertex_count, "\" NumberOfCells=\"",
-                               shape_.simplex_count, "\">\n      <PointData>\n"));
-    BeginArray("type=\"UInt8\" Name=\"input\"", shape_.vertex_count);
-    for (uint64_t vertex = 0; vertex < shape_.vertex_count; ++vertex) {
-      array_->Add<uint8_t>(vertex < shape_.input_vertices ? 1 : 0);
-    }
-    EndArray();
-    output_.Write("      </PointData>\n      <Points>\n");
+                               shape_.simplex_count, "\">\n      <Points>\n"));
     BeginArray("type=\"Float64\" Name=\"Points\" NumberOfComponents=\"3\"", shape_.vertex_count * 3 * sizeof(double));
   }
 
@@ -41,6 +35,15 @@ class VtuWriter final : public MeshWriter {
       }
       ++vertices_;
     }
+    return Status();
+  }
+
+  absl::Status AddWeights(std::span<const double> weights) override {
+    BeginPointData();
+    for (size_t i = 0; i < weights.size() && Status().ok(); ++i) {
+      array_->Add<double>(weights[i]);
+    }
+    weights_ += weights.size();
     return Status();
   }
 
@@ -71,7 +74,7 @@ class VtuWriter final : public MeshWriter {
     if (absl::Status status = Status(); !status.ok()) {
       return status;
     }
-    if (absl::Status status = CheckComplete(shape_, vertices_, simplices_); !status.ok()) {
+    if (absl::Status status = CheckComplete(shape_, vertices_, weights_, simplices_); !status.ok()) {
       return status;
     }
     return output_.Commit();
@@ -92,10 +95,27 @@ class VtuWriter final : public MeshWriter {
     output_.Write("\n        </DataArray>\n");
   }
 
+  void BeginPointData() {
+    if (std::exchange(has_point_data_, true)) {
+      return;
+    }
+    EndArray();
+    output_.Write("      </Points>\n      <PointData>\n");
+    BeginArray("type=\"UInt8\" Name=\"input\"", shape_.vertex_count);
+    for (uint64_t vertex = 0; vertex < shape_.vertex_count; ++vertex) {
+      array_->Add<uint8_t>(vertex < shape_.input_vertices ? 1 : 0);
+    }
+    if (shape_.has_weights) {
+      EndArray();
+      BeginArray("type=\"Float64\" Name=\"weights\"", shape_.vertex_count * sizeof(double));
+    }
+  }
+
   void BeginCells() {
     if (!std::exchange(has_cells_, true)) {
+      BeginPointData();
       EndArray();
-      output_.Write("      </Points>\n      <Cells>\n");
+      output_.Write("      </PointData>\n      <Cells>\n");
       BeginArray("type=\"Int64\" Name=\"connectivity\"",
                  shape_.simplex_count * (shape_.dimension + 1) * sizeof(int64_t));
     }
@@ -104,8 +124,10 @@ class VtuWriter final : public MeshWriter {
   const MeshShape shape_;
   OutputFile output_;
   std::optional<VtkArrayWriter> array_;  // the one that is being written
+  bool has_point_data_ = false;          // the element
   bool has_cells_ = false;               // the element
   uint64_t vertices_ = 0;
+  uint64_t weights_ = 0;
   uint64_t simplices_ = 0;
   absl::Status status_;
 };

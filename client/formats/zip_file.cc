@@ -27,6 +27,9 @@ constexpr uint64_t kZip64Bytes = 0xff00'0000;
 
 constexpr uLong kEncrypted = 1;  // flag
 
+// For unzLocateFile.
+constexpr int kCaseSensitive = 1;
+
 // Turns what minizip gives for an end of a seek into a position. False when it lies outside the file.
 bool Seek(ZPOS64_T offset, int origin, uint64_t size, uint64_t& position) {
   const uint64_t base = origin == ZLIB_FILEFUNC_SEEK_SET ? 0 : origin == ZLIB_FILEFUNC_SEEK_CUR ? position : size;
@@ -233,8 +236,11 @@ absl::Status ZipReader::Error(std::string_view message) const {
       absl::StrCat(archive_->file.name(), ": ", member_, ": ", absl::string_view(message.data(), message.size())));
 }
 
+bool ZipReader::Has(const std::string& name) const {
+  return unzLocateFile(archive_->zip, name.c_str(), kCaseSensitive) == UNZ_OK;
+}
+
 absl::StatusOr<uint64_t> ZipReader::Begin(const std::string& name) {
-  constexpr int kCaseSensitive = 1;
   unzCloseCurrentFile(archive_->zip);
   member_ = name;
   const int located = unzLocateFile(archive_->zip, name.c_str(), kCaseSensitive);

@@ -55,6 +55,9 @@ class ZipReader {
   ZipReader(const ZipReader&) = delete;
   ZipReader& operator=(const ZipReader&) = delete;
 
+  // Whether there is a member `name`.
+  bool Has(const std::string& name) const;
+
   // Goes to the start of member `name`; returns its size, which is at most about a thousand times that of the file.
   //
   // Errors:     of reading; INVALID_ARGUMENT "FILE: NAME: …" for a member that is not there or cannot be read.

@@ -27,6 +27,8 @@ struct Answer {
 void Sign(v1::MeshChunk& chunk) {
   if (!chunk.points().empty()) {
     chunk.set_crc32c(Crc32c(chunk.points().data(), chunk.points_size() * sizeof(double)));
+  } else if (!chunk.weights().empty()) {
+    chunk.set_crc32c(Crc32c(chunk.weights().data(), chunk.weights_size() * sizeof(double)));
   } else if (!chunk.simplices().empty()) {
     chunk.set_crc32c(Crc32c(chunk.simplices().data(), chunk.simplices_size() * sizeof(uint32_t)));
   } else {
@@ -66,6 +68,25 @@ Answer GoodAnswer() {
   return answer;
 }
 
+// The same as a regular triangulation: a chunk of weights after the points.
+Answer WeightedAnswer() {
+  Answer answer = GoodAnswer();
+  answer.metadata.set_has_weights(true);
+  answer.metadata.set_chunk_count(5);
+  answer.metadata.mutable_statistics()->set_triangulation(v1::TRIANGULATION_REGULAR);
+  answer.metadata.mutable_statistics()->mutable_slivers()->set_weighted_vertices(2);
+  v1::MeshChunk chunk;
+  for (const double weight : {0.0, 0.125, 0.0, 0.25}) {
+    chunk.add_weights(weight);
+  }
+  Sign(chunk);
+  answer.chunks.insert(answer.chunks.begin() + 2, chunk);
+  for (uint64_t i = 0; i < answer.chunks.size(); ++i) {
+    answer.chunks[i].set_index(i);
+  }
+  return answer;
+}
+
 constexpr MeshReceiver::Expectation kOnePointIn2D = {.dimension = 2, .input_points = 1};
 
 absl::StatusOr<Mesh> Assemble(const Answer& answer) {
@@ -96,9 +117,20 @@ TEST(MeshReceiver, AssemblesAMesh) {
   EXPECT_THAT(mesh->input_vertex, ElementsAre(0));
   EXPECT_EQ(mesh->statistics.vertices, 4u);
   EXPECT_EQ(mesh->statistics.seconds.at("refinement"), 0.25);
-  EXPECT_EQ(mesh->statistics.seconds.size(), 4u);
+  EXPECT_EQ(mesh->statistics.seconds.size(), 5u);
+  EXPECT_TRUE(mesh->weights.empty());
+  EXPECT_FALSE(mesh->statistics.slivers.has_value());
   EXPECT_EQ(mesh->statistics.counters.at("cuts"), 12u);
   EXPECT_EQ(mesh->statistics.counters.count("tree_leaves"), 1u);
+}
+
+TEST(MeshReceiver, AssemblesAMeshWithWeights) {
+  const absl::StatusOr<Mesh> mesh = Assemble(WeightedAnswer());
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_THAT(mesh->weights, ElementsAre(0, 0.125, 0, 0.25));
+  EXPECT_EQ(mesh->statistics.triangulation, Triangulation::kRegular);
+  ASSERT_TRUE(mesh->statistics.slivers.has_value());
+  EXPECT_EQ(mesh->statistics.slivers->weighted_vertices, 2u);
 }
 
 struct Damage {
@@ -164,6 +196,29 @@ INSTANTIATE_TEST_SUITE_P(
                [](Answer& a) {
                  a.chunks[2].set_simplices(3, 4);
                  Sign(a.chunks[2]);
+               }},
+        Damage{"WeightsMissing", "simplices after 0 of 4 weights",
+               [](Answer& a) {
+                 a = WeightedAnswer();
+                 a.metadata.set_chunk_count(4);
+                 a.chunks.erase(a.chunks.begin() + 2);
+                 a.chunks[2].set_index(2);
+               }},
+        Damage{"WeightsNotAnnounced", "more than the announced 0 weights",
+               [](Answer& a) {
+                 a = WeightedAnswer();
+                 a.metadata.set_has_weights(false);
+               }},
+        Damage{"WeightsFew", "simplices after 3 of 4 weights",
+               [](Answer& a) {
+                 a = WeightedAnswer();
+                 a.chunks[2].mutable_weights()->RemoveLast();
+                 Sign(a.chunks[2]);
+               }},
+        Damage{"BitFlippedInWeights", "CRC32C",
+               [](Answer& a) {
+                 a = WeightedAnswer();
+                 a.chunks[2].set_weights(0, -0.0);
                }},
         Damage{"InputOfNoVertex", "name vertex 4294967295 of 4",
                [](Answer& a) {

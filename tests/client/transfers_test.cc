@@ -285,6 +285,7 @@ TEST(Download, ASinkThatFailsEndsIt) {
   class FullDisk final : public MeshSink {
     absl::Status Begin(const MeshHeader&) override { return absl::OkStatus(); }
     absl::Status AddPoints(std::span<const double>) override { return absl::OkStatus(); }
+    absl::Status AddWeights(std::span<const double>) override { return absl::OkStatus(); }
     absl::Status AddSimplices(std::span<const uint32_t>) override { return absl::UnavailableError("disk full"); }
     absl::Status AddInputVertices(std::span<const uint32_t>) override { return absl::OkStatus(); }
     absl::Status Finish() override { return absl::OkStatus(); }

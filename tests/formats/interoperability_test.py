@@ -96,6 +96,24 @@ class Interoperability(unittest.TestCase):
                     numpy.testing.assert_array_equal(mesh["points"].view(numpy.uint64), points.view(numpy.uint64))
                     numpy.testing.assert_array_equal(mesh["simplices"], cells)
 
+    def test_others_read_our_weights(self):
+        points, cells = random_mesh(3)
+        weights = numpy.random.default_rng(7).random(len(points))
+        numpy.savez(self.folder / "theirs.npz", points=points, simplices=cells, weights=weights)
+        self.convert("theirs.npz", "ours.vtu")
+        mesh = meshio.read(self.folder / "ours.vtu")
+        self.assert_same_bits(mesh, points, cells, 3)
+        numpy.testing.assert_array_equal(mesh.point_data["weights"], weights)
+        numpy.testing.assert_array_equal(mesh.point_data["input"], numpy.zeros(len(points)))
+        self.convert("ours.vtu", "ours.node")
+        mesh = meshio.read(self.folder / "ours.node")
+        self.assert_same_bits(mesh, points, cells, 3)
+        self.convert("ours.node", "ours.npz")
+        with numpy.load(self.folder / "ours.npz", allow_pickle=False) as arrays:
+            self.assertEqual(sorted(arrays.files), ["points", "simplices", "weights"])
+            self.assertEqual((arrays["weights"].dtype, arrays["weights"].shape), (numpy.float64, (len(points),)))
+            numpy.testing.assert_array_equal(arrays["weights"], weights)
+
     def test_we_read_the_npz_of_numpy(self):
         for save in (numpy.savez, numpy.savez_compressed):
             for index_type in ("int32", "int64", "uint32", "uint64"):

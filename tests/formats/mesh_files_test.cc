@@ -74,6 +74,21 @@ TEST_P(RoundTripTest, KeepsEveryBit) {
     EXPECT_EQ(read->dimension, dimension);
     EXPECT_EQ(Bits(read->points), Bits(mesh.points));
     EXPECT_EQ(read->simplices, mesh.simplices);
+    EXPECT_TRUE(read->weights.empty());
+  }
+}
+
+TEST_P(RoundTripTest, KeepsEveryBitOfWeights) {
+  const auto& [name, dimension] = GetParam();
+  for (const uint64_t vertices : {uint64_t{3}, uint64_t{23000}}) {
+    Mesh mesh = RandomMesh(dimension, vertices, 2 * vertices);
+    mesh.weights.assign(mesh.points.begin(), mesh.points.begin() + static_cast<ptrdiff_t>(vertices));
+    ASSERT_TRUE(WriteMesh(folder_.Path(name), "", mesh.View()).ok());
+    const absl::StatusOr<Mesh> read = ReadMesh(folder_.Path(name));
+    ASSERT_TRUE(read.ok()) << read.status();
+    EXPECT_EQ(Bits(read->points), Bits(mesh.points));
+    EXPECT_EQ(Bits(read->weights), Bits(mesh.weights));
+    EXPECT_EQ(read->simplices, mesh.simplices);
   }
 }
 
@@ -86,7 +101,8 @@ INSTANTIATE_TEST_SUITE_P(FormatsOfHigherDimensions, RoundTripTest,
 // Whole and in pieces.
 TEST_P(RoundTripTest, PiecesMakeTheSameFile) {
   const auto& [name, dimension] = GetParam();
-  const Mesh mesh = RandomMesh(dimension, 30000, 60000);
+  Mesh mesh = RandomMesh(dimension, 30000, 60000);
+  mesh.weights.assign(30000, 0.1);
   ASSERT_TRUE(WriteMesh(folder_.Path(name), "", mesh.View()).ok());
   const std::string whole = folder_.Read(name);
   const absl::StatusOr<std::unique_ptr<MeshWriter>> writer = CreateMesh(folder_.Path(name), "", mesh.View().Shape());
@@ -98,6 +114,7 @@ TEST_P(RoundTripTest, PiecesMakeTheSameFile) {
     }
   };
   pieces(mesh.points, dimension, [&writer](std::span<const double> part) { return (*writer)->AddPoints(part); });
+  pieces(mesh.weights, 1, [&writer](std::span<const double> part) { return (*writer)->AddWeights(part); });
   pieces(mesh.simplices, dimension + 1,
          [&writer](std::span<const uint32_t> part) { return (*writer)->AddSimplices(part); });
   EXPECT_EQ(folder_.Read(name), whole);  // the old one, until the new one is complete
@@ -115,6 +132,35 @@ TEST_F(MeshFilesTest, MissingRowsAreAnErrorAndNoFile) {
     EXPECT_EQ((*writer)->Commit().code(), absl::StatusCode::kInternal) << name;
   }
   EXPECT_EQ(folder_.FileCount(), 0);
+}
+
+TEST_F(MeshFilesTest, MissingWeightsAreAnErrorAndNoFile) {
+  Mesh mesh = RandomMesh(3, 10, 10);
+  mesh.weights.assign(10, 0.25);
+  for (const char* name : {"mesh.vtu", "mesh.npz", "mesh.node"}) {
+    const absl::StatusOr<std::unique_ptr<MeshWriter>> writer = CreateMesh(folder_.Path(name), "", mesh.View().Shape());
+    ASSERT_TRUE(writer.ok()) << writer.status();
+    ASSERT_TRUE((*writer)->AddPoints(mesh.points).ok());
+    ASSERT_TRUE((*writer)->AddWeights(std::span(mesh.weights).first(9)).ok());
+    (*writer)->AddSimplices(mesh.simplices).IgnoreError();  // some notice it here
+    EXPECT_EQ((*writer)->Commit().code(), absl::StatusCode::kInternal) << name;
+  }
+  EXPECT_EQ(folder_.FileCount(), 0);
+}
+
+// An attribute is a weight only where the header says so.
+TEST_F(MeshFilesTest, WeightsOfANode) {
+  folder_.Write("mesh.ele", "1 3 0\n0 0 1 2\n");
+  const auto read = [this](const std::string& header, const std::string& last) {
+    return ReadMesh(folder_.Write("mesh.node", header + "\n0 0 0 1\n1 1 0 0.25\n2 0 1" + last + "\n"));
+  };
+  EXPECT_TRUE(read("3 2 1 0", " 2")->weights.empty());
+  EXPECT_TRUE(read("3 2 1 0 # heat", " 2")->weights.empty());
+  EXPECT_THAT(read("3 2 1 0 # weights", " 2")->weights, ElementsAre(1, 0.25, 2));
+  EXPECT_THAT(read("3 2 1 1 # weights", " 2 1")->weights, ElementsAre(1, 0.25, 2));
+  EXPECT_THAT(std::string(read("3 2 1 0 # weights", "").status().message()),
+              HasSubstr("mesh.node:4: expected a weight after the coordinates"));
+  EXPECT_THAT(std::string(read("3 2 1 0 # weights", " nan").status().message()), HasSubstr("mesh.node:4: weight: "));
 }
 
 // A mesh of 200 MB goes to disk with a tenth of that in memory.
@@ -274,6 +320,8 @@ TEST_F(MeshFilesTest, VtuErrors) {
   EXPECT_THAT(message("0 1 2<", "0 1 2 0<"), HasSubstr("expected 3 vertices for 1 triangles, got 4"));
   EXPECT_THAT(message(">5<", ">9<"), HasSubstr("got 3"));
   EXPECT_THAT(message(">3<", ">4<"), HasSubstr("cell 0: expected offset 3, got 4"));
+  EXPECT_THAT(message("heat\" format=\"ascii\">1 2 3", "weights\" format=\"ascii\">1 2"),
+              HasSubstr("expected a weight for each of 3 points, got 2"));
   EXPECT_THAT(message("</Cells>", "</Cell>"),
               HasSubstr("mesh.vtu:15: expected the end of \"Cells\", got that of \"Cell\""));
   EXPECT_THAT(message("</Piece>", "</Piece><Piece NumberOfPoints=\"0\" NumberOfCells=\"0\"/>"),
@@ -390,6 +438,16 @@ TEST_F(NpzTest, Errors) {
   EXPECT_THAT(Refusal(points_ + "x", simplices_), HasSubstr("points.npy: expected 48 bytes of values"));
   EXPECT_THAT(Refusal(points_.substr(0, 100), simplices_), HasSubstr("points.npy: the array ends after 100 bytes"));
   EXPECT_THAT(Refusal("", simplices_), HasSubstr("points.npy: the array ends after 0 bytes, inside its header"));
+  const auto weights_refusal = [this](const std::string& weights) {
+    const absl::StatusOr<Mesh> mesh =
+        ReadMesh(WriteArchive({{"points.npy", points_}, {"weights.npy", weights}, {"simplices.npy", simplices_}}));
+    return std::string(mesh.status().message());
+  };
+  const std::array pair = {0.5, 0.25};
+  EXPECT_THAT(weights_refusal(NpyPreamble("<f8", 2, std::nullopt).append(BytesOf(pair))),
+              HasSubstr("mesh.npz: weights.npy: expected 3 weights, one for each point, got 2"));
+  EXPECT_THAT(weights_refusal(NpyText("<f8", 1, 2, BytesOf(pair))),
+              HasSubstr("weights.npy: expected an array of 1 dimension, got one of 2"));
   // What a header says is not believed.
   EXPECT_THAT(Refusal(NpyText("<f8", uint64_t{1} << 31, 2, "none"), simplices_), HasSubstr("got 4"));
 }

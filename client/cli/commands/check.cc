@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "client/cli/commands/commands.h"
 #include "client/cli/exit_codes.h"
@@ -20,7 +21,11 @@
 namespace wellspace::cli {
 namespace {
 
-Json ReportJson(const core::QualityReport& report, int dimension) {
+// How flat a sliver is, for what is reported of a mesh. Unit: degrees.
+constexpr int kFlat = 5;
+constexpr int kSliver = 12;
+
+Json ReportJson(const core::QualityReport& report, int dimension, bool has_weights) {
   Json json;
   json["dimension"] = dimension;
   json["vertices"] = report.vertices;
@@ -28,8 +33,18 @@ Json ReportJson(const core::QualityReport& report, int dimension) {
   json["max_radius_edge"] = report.max_radius_edge;
   json["min_angle_deg"] = report.min_angle_deg;
   json["max_angle_deg"] = report.max_angle_deg;
+  json["below_5_deg"] = report.CountBelow(kFlat);
+  json["below_12_deg"] = report.CountBelow(kSliver);
   json["angle_histogram"] = report.angle_histogram;
+  json["triangulation"] = has_weights ? "regular" : "delaunay";
   return json;
+}
+
+// "below 5°   12 (0.0034 %)".
+std::string Slivers(int degrees, const core::QualityReport& report) {
+  const uint64_t count = report.CountBelow(degrees);
+  return absl::StrFormat("%-25s %s (%.4f %%)\n", absl::StrFormat("below %d\u00b0", degrees), WithThousands(count),
+                         100.0 * static_cast<double>(count) / static_cast<double>(report.simplices));
 }
 
 void PrintReport(const core::QualityReport& report, int dimension) {
@@ -42,7 +57,7 @@ void PrintReport(const core::QualityReport& report, int dimension) {
   std::cout << absl::StrFormat("%-24s %.9g\n", "largest radius-edge", report.max_radius_edge)
             << absl::StrFormat("%-24s %.6g\u00b0\n", std::string("smallest ") + angle, report.min_angle_deg)
             << absl::StrFormat("%-24s %.6g\u00b0\n", std::string("largest ") + angle, report.max_angle_deg)
-            << "simplices by their smallest " << angle << ":\n";
+            << Slivers(kFlat, report) << Slivers(kSliver, report) << "simplices by their smallest " << angle << ":\n";
   constexpr int kBarColumns = 40;
   const uint64_t tallest = *std::max_element(report.angle_histogram.begin(), report.angle_histogram.end());
   const double width = core::LargestSmallestAngle(dimension) / core::kHistogramBins;
@@ -63,6 +78,7 @@ struct CheckCommand {
   client::Criterion criterion = client::Criterion::kRadiusEdge;
   double max_circumradius = 0;
   std::vector<std::vector<double>> size_boxes;
+  double min_dihedral = 0;
   OutputFormat format = OutputFormat::kText;
 
   absl::StatusOr<std::vector<core::SizeBox>> SizeBoxes(int dimension) const;
@@ -90,6 +106,13 @@ int CheckCommand::Run() const {
   if (!boxes.ok()) {
     return ReportError(boxes.status(), format);
   }
+  if (!mesh->weights.empty() && (rho != 0 || max_circumradius != 0 || !size_boxes.empty())) {
+    return ReportError(absl::InvalidArgumentError(absl::StrCat(
+                           mesh_path,
+                           ": --rho, --size and --size-box are about Delaunay simplices, and this mesh has "
+                           "weights; expected a mesh without, or --min-dihedral")),
+                       format);
+  }
   std::vector<double> cloud;
   if (!cloud_path.empty()) {
     absl::StatusOr<formats::PointCloud> read =
@@ -99,13 +122,14 @@ int CheckCommand::Run() const {
     }
     cloud = std::move(read->points);
   }
-  const core::MeshView view = {.dimension = mesh->dimension, .points = mesh->points, .simplices = mesh->simplices};
+  const core::MeshView view = {
+      .dimension = mesh->dimension, .points = mesh->points, .simplices = mesh->simplices, .weights = mesh->weights};
   absl::Status status = core::ValidateIndices(view);
   Json json = Json::object();
   if (status.ok()) {
     const core::QualityReport report = core::MeasureQuality(view);
     if (format == OutputFormat::kJson) {
-      json = ReportJson(report, mesh->dimension);
+      json = ReportJson(report, mesh->dimension, !mesh->weights.empty());
     } else {
       PrintReport(report, mesh->dimension);
     }
@@ -115,7 +139,8 @@ int CheckCommand::Run() const {
                .criterion = is_well_spaced ? core::Criterion::kWellSpaced : core::Criterion::kRadiusEdge,
                .max_circumradius = max_circumradius,
                .size_boxes = *boxes,
-               .cloud = cloud});
+               .cloud = cloud,
+               .min_angle_deg = min_dihedral});
   }
   if (absl::IsInvalidArgument(status)) {  // what was asked for cannot be
     return ReportError(status, format);
@@ -130,6 +155,9 @@ int CheckCommand::Run() const {
     std::cout << "violation: " << std::string(status.message()) << "\n";
     return kExitFailed;
   }
+  if (!mesh->weights.empty()) {
+    std::cout << "the regular triangulation of its weights\n";
+  }
   std::cout << "valid\n";
   return kExitOk;
 }
@@ -138,10 +166,11 @@ int CheckCommand::Run() const {
 
 void AddCheckCommand(CLI::App& app, int& exit_code) {
   const auto command = std::make_shared<CheckCommand>();
-  CLI::App* check = app.add_subcommand("check",
-                                       "Check a mesh: indices, orientation, topology, exact total volume, the Delaunay "
-                                       "property, circumcentres, and what the "
-                                       "options ask for; print its figures and `valid` or the first violation");
+  CLI::App* check = app.add_subcommand(
+      "check",
+      "Check a mesh: indices, orientation, topology, exact total volume, the Delaunay "
+      "property or, with weights, that of their regular triangulation, "
+      "circumcentres, and what the options ask for; print its figures and `valid` or the first violation");
   check->footer(kExitCodesHelp);
   check
       ->add_option("MESH", command->mesh_path,
@@ -157,6 +186,9 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
           ->check(CLI::PositiveNumber);
   AddCriterion(*check, command->criterion)->needs(rho);
   AddSizes(*check, command->max_circumradius, command->size_boxes);
+  AddNumber(*check, "--min-dihedral", command->min_dihedral,
+            "Bound on the dihedral angles, in 2-D on the angles, in degrees; default: not checked")
+      ->check(CLI::PositiveNumber);
   AddOutput(*check, command->format);
   check->callback([command, &exit_code] { exit_code = command->Run(); });
 }
