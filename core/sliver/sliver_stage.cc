@@ -177,8 +177,9 @@ absl::Status SliverStage<D>::FollowStructure(const QueryStructure<D>& structure,
 }
 
 template <int D>
-absl::Status SliverStage<D>::Mend(QueryStructure<3>& structure, Refinement<3>& refinement, std::vector<bool>& is_fixed,
-                                  const MendDemands& demands, int threads, RunContext& context) requires(D == 3) {
+template <int E>
+absl::Status SliverStage<D>::Mend(QueryStructure<E>& structure, Refinement<E>& refinement, std::vector<bool>& is_fixed,
+                                  const MendDemands& demands, int threads, RunContext& context) requires(E == 3) {
   const Stopwatch stopwatch(statistics_.seconds, statistics_.star_seconds);
   WELLSPACE_RETURN_IF_ERROR(FollowStructure(structure, threads, context));
   context.EnterPhase(Phase::kSlivers);
@@ -246,5 +247,7 @@ template class SliverStage<3>;
 template class SliverStage<4>;
 template class SliverStage<5>;
 template class SliverStage<6>;
+template absl::Status SliverStage<3>::Mend(QueryStructure<3>&, Refinement<3>&, std::vector<bool>&, const MendDemands&,
+                                           int, RunContext&);
 
 }  // namespace wellspace::core

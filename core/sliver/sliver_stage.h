@@ -49,8 +49,10 @@ class SliverStage {
   // Complexity: O(m) the first time; then O(1) for each vertex added since and each sliver, and a look at every simplex.
   // Errors:     RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED, DEADLINE_EXCEEDED; all stays usable.
   // Threads:    uses `threads` for the stars that the triangulation is made of.
-  absl::Status Mend(QueryStructure<3>& structure, Refinement<3>& refinement, std::vector<bool>& is_fixed,
-                    const MendDemands& demands, int threads, RunContext& context) requires(D == 3);
+  // A template, since clang 14 would instantiate it in other dimensions otherwise.
+  template <int E = D>
+  absl::Status Mend(QueryStructure<E>& structure, Refinement<E>& refinement, std::vector<bool>& is_fixed,
+                    const MendDemands& demands, int threads, RunContext& context) requires(E == 3);
 
   // The simplices of the mended mesh; with `pump`, of its regular triangulation under pumped weights. Order and form of
   // the simplices are independent of the number of threads.
