@@ -158,9 +158,12 @@ class FakeServer {
     builder.RegisterService(&queries);
     server_ = builder.BuildAndStart();
   }
-  ~FakeServer() { server_->Shutdown(std::chrono::system_clock::now() + std::chrono::seconds(30)); }
+  ~FakeServer() { Shutdown(); }
   FakeServer(const FakeServer&) = delete;
   FakeServer& operator=(const FakeServer&) = delete;
+
+  // Returns when no call is being answered any more. Further calls return at once.
+  void Shutdown() { server_->Shutdown(std::chrono::system_clock::now() + std::chrono::seconds(30)); }
 
   client::Client Client(const RetryPolicy& policy = QuickRetries()) {
     return client::Client(MakeConnection(server_->InProcessChannel(grpc::ChannelArguments()), policy));

@@ -169,7 +169,7 @@ TEST(Upload, GivesUpAfterAttemptsWithoutProgress) {
 // A session's mesh of one simplex per chunk, as a server keeps it.
 class FakeMesh {
  public:
-  explicit FakeMesh(FakeServer& server) {
+  explicit FakeMesh(FakeServer& server) : server_(server) {
     metadata.set_dimension(2);
     for (int axis = 0; axis < 2; ++axis) {
       metadata.mutable_domain()->add_low(0);
@@ -212,6 +212,10 @@ class FakeMesh {
       return grpc::Status::OK;
     };
   }
+  // The client may be done with a call that is still being answered.
+  ~FakeMesh() { server_.Shutdown(); }
+  FakeMesh(const FakeMesh&) = delete;
+  FakeMesh& operator=(const FakeMesh&) = delete;
 
   static inline const std::vector<double> kPoints = {0, 0, 1, 0, 0, 1, 1, 1};
   static inline const std::vector<uint32_t> kSimplices = {0, 1, 2, 1, 3, 2};
@@ -220,6 +224,9 @@ class FakeMesh {
   uint64_t breaks_before = UINT64_MAX;  // this chunk, then every further one
   grpc::Status end = Broken();
   std::vector<v1::DownloadMeshRequest> requests;
+
+ private:
+  FakeServer& server_;
 };
 
 TEST(Download, ReturnsTheMesh) {
