@@ -14,6 +14,7 @@
 #include "server/errors.h"
 #include "server/jobs.h"
 #include "server/memory_budget.h"
+#include "server/request_stream.h"
 #include "server/wire.h"
 #include "wellspace/v1/meshing.pb.h"
 
@@ -22,15 +23,12 @@ namespace wellspace::server {
 // A Call whose requests go to a CloudReceiver; at their end a job is queued; what becomes of its result is up to the class that derives
 // from this. `Reactor` is gRPC's, for the kind of stream that answers; it reads bytes, which are `Request`s.
 //
-// Thread safety and invariants: those of Call.
+// Thread safety and invariants: those of RequestStream.
 template <typename Reactor, typename Request>
-class CloudCall : public Call<Reactor> {
- public:
-  void OnReadDone(bool ok) final;
-
+class CloudCall : public RequestStream<Call<Reactor>> {
  protected:
   CloudCall(const CallEnvironment& environment, grpc::CallbackServerContext* context)
-      : Call<Reactor>(environment, context), receiver_(environment.options) {}
+      : RequestStream<Call<Reactor>>(environment, context), receiver_(environment.options) {}
 
   // On a worker: works, and hands over what came of it.
   virtual void Work(PointChunks& points, Job& job) = 0;
@@ -43,6 +41,8 @@ class CloudCall : public Call<Reactor> {
   virtual uint64_t VertexCount() const = 0;
 
   void OnBegin() final;
+  void OnRequest(grpc::ByteBuffer* bytes) final;
+  void OnRequestsEnd() final { SubmitJob(); }
   void OnEnd() override;
   LogFields Figures() const final {
     return LogFields().Add("points", receiver_.point_count()).Add("vertices", VertexCount());
@@ -61,7 +61,6 @@ class CloudCall : public Call<Reactor> {
 
   // Guarded by mutex_.
   CloudReceiver receiver_;
-  grpc::ByteBuffer request_;  // of the read in flight
   MemoryReservation received_;
   std::shared_ptr<Job> job_;
 };
@@ -73,7 +72,7 @@ void CloudCall<Reactor, Request>::OnBegin() {
     this->End(std::move(status));
     return;
   }
-  this->StartRead(&request_);
+  this->ReadNext();
 }
 
 template <typename Reactor, typename Request>
@@ -85,21 +84,10 @@ grpc::Status CloudCall<Reactor, Request>::ReserveForNext() {
 }
 
 template <typename Reactor, typename Request>
-void CloudCall<Reactor, Request>::OnReadDone(bool ok) {
-  std::lock_guard lock(this->mutex_);
-  if (this->ending()) {
-    return;
-  }
-  if (!ok) {
-    // Either the client has sent all, or it is gone; in the latter case OnCancel ends the call, at the latest right after this.
-    if (!this->context()->IsCancelled()) {
-      SubmitJob();
-    }
-    return;
-  }
+void CloudCall<Reactor, Request>::OnRequest(grpc::ByteBuffer* bytes) {
   const bool had_parameters = receiver_.has_parameters();
   Request request;
-  grpc::Status status = ParseRequest(&request_, &request);
+  grpc::Status status = ParseRequest(bytes, &request);
   if (status.ok()) {
     status = receiver_.Accept(&request);
   }
@@ -113,7 +101,7 @@ void CloudCall<Reactor, Request>::OnReadDone(bool ok) {
   if (!had_parameters) {
     OnParameters();
   }
-  this->StartRead(&request_);
+  this->ReadNext();
 }
 
 template <typename Reactor, typename Request>

@@ -54,6 +54,7 @@ grpc::StatusCode CodeOf(v1::ErrorReason reason) {
     case v1::ERROR_REASON_UNAUTHENTICATED:
       return grpc::StatusCode::UNAUTHENTICATED;
     case v1::ERROR_REASON_READER_STALLED:
+    case v1::ERROR_REASON_SENDER_STALLED:
       return grpc::StatusCode::DEADLINE_EXCEEDED;
     default:
       return grpc::StatusCode::INTERNAL;

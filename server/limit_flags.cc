@@ -101,6 +101,8 @@ void DeclareLimits(CLI::App& app, ServiceOptions& service) {
              "How long it may live without use at most");
   AddSeconds(app, "--stall-limit", service.stall_limit, absl::Milliseconds(1), absl::Hours(24),
              "How long a stream waits for a client that does not read");
+  AddSeconds(app, "--upload-stall-limit", service.upload_stall_limit, absl::Milliseconds(1), absl::Hours(24),
+             "How long a stream waits for the next message of a client that sends");
   app.callback([&service] {
     if (service.default_ttl > service.max_ttl) {
       throw CLI::ValidationError("--default-ttl",

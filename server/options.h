@@ -49,6 +49,9 @@ struct ServiceOptions {
 
   // How long a stream waits for a client that does not read.
   absl::Duration stall_limit = absl::Minutes(1);
+
+  // How long it waits for the next message of a client that sends.
+  absl::Duration upload_stall_limit = absl::Minutes(5);
 };
 
 }  // namespace wellspace::server

@@ -2,7 +2,6 @@
 #ifndef WELLSPACE_SERVER_RESPONSE_STREAM_H_
 #define WELLSPACE_SERVER_RESPONSE_STREAM_H_
 
-#include <chrono>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -12,6 +11,7 @@
 #include "absl/time/time.h"
 #include "grpc/grpc.h"
 #include "server/errors.h"
+#include "server/stall_watch.h"
 
 namespace wellspace::server {
 
@@ -39,17 +39,13 @@ class ResponseStream : public Base {
   bool IsWriting() const final { return writing_; }
 
  private:
-  using Clock = std::chrono::steady_clock;
-
   // On the background thread, when a write may have taken too long.
   void CheckStall();
-  void ScheduleStallCheck();
 
   // Guarded by mutex_.
   Response response_;  // of the write in flight
   bool writing_ = false;
-  Clock::time_point write_start_;
-  bool stall_check_scheduled_ = false;
+  StallWatch stall_{this->environment().background, this->environment().options.stall_limit};
 };
 
 template <typename Base, typename Response>
@@ -63,8 +59,7 @@ void ResponseStream<Base, Response>::WriteNext() {
   }
   response_ = *std::move(next);
   writing_ = true;
-  write_start_ = Clock::now();
-  ScheduleStallCheck();
+  stall_.Begin(this->WeakCall(&ResponseStream::CheckStall));
   this->StartWrite(&response_);
 }
 
@@ -72,6 +67,7 @@ template <typename Base, typename Response>
 void ResponseStream<Base, Response>::OnWriteDone(bool ok) {
   std::lock_guard lock(this->mutex_);
   writing_ = false;
+  stall_.End();
   if (this->ending()) {
     this->FinishNow();
   } else if (!ok) {
@@ -81,34 +77,16 @@ void ResponseStream<Base, Response>::OnWriteDone(bool ok) {
   }
 }
 
-// One check at a time is enough: when it finds a younger write than the one it was made for, it makes the next.
-template <typename Base, typename Response>
-void ResponseStream<Base, Response>::ScheduleStallCheck() {
-  if (stall_check_scheduled_) {
-    return;
-  }
-  stall_check_scheduled_ = true;
-  const absl::Duration waited = absl::FromChrono(Clock::now() - write_start_);
-  this->environment().background.PostAfter(this->environment().options.stall_limit - waited,
-                                           this->WeakCall(&ResponseStream::CheckStall));
-}
-
 template <typename Base, typename Response>
 void ResponseStream<Base, Response>::CheckStall() {
   std::lock_guard lock(this->mutex_);
-  stall_check_scheduled_ = false;
-  if (!writing_ || this->ending()) {
-    return;
-  }
-  const absl::Duration limit = this->environment().options.stall_limit;
-  if (absl::FromChrono(Clock::now() - write_start_) < limit) {
-    ScheduleStallCheck();
+  if (this->ending() || !stall_.IsStalled(this->WeakCall(&ResponseStream::CheckStall))) {
     return;
   }
   grpc::Status status =
       MakeError(v1::ERROR_REASON_READER_STALLED,
                 absl::StrCat("READER_STALLED: the client has not taken a message of the answer within ",
-                             absl::FormatDuration(limit), "; read it faster, or go on where it ended"));
+                             absl::FormatDuration(stall_.limit()), "; read it faster, or go on where it ended"));
   const std::string message = status.error_message();
   this->End(std::move(status));
   // Finish would wait behind the write. This sends code and message ahead of it, and ends the write.

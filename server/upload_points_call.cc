@@ -16,23 +16,19 @@ void UploadPointsCall::OnBegin() {
     return;
   }
   memory_ = *std::move(memory);
-  StartRead(&request_);
+  ReadNext();
 }
 
-void UploadPointsCall::OnReadDone(bool ok) {
-  std::lock_guard lock(mutex_);
-  if (ending()) {
-    return;
+void UploadPointsCall::OnRequest(grpc::ByteBuffer* bytes) {
+  if (grpc::Status status = Accept(bytes); !status.ok()) {
+    End(std::move(status));
+  } else {
+    ReadNext();
   }
-  if (ok) {
-    if (grpc::Status status = Accept(); !status.ok()) {
-      End(std::move(status));
-    } else {
-      StartRead(&request_);
-    }
-  } else if (context()->IsCancelled()) {
-    return;  // OnCancel ends the call
-  } else if (session_ == nullptr) {
+}
+
+void UploadPointsCall::OnRequestsEnd() {
+  if (session_ == nullptr) {
     End(MakeError(v1::ERROR_REASON_EMPTY_REQUEST,
                   "the stream ended before any request; send the name of the session first", "name"));
   } else {
@@ -41,9 +37,9 @@ void UploadPointsCall::OnReadDone(bool ok) {
   }
 }
 
-grpc::Status UploadPointsCall::Accept() {
+grpc::Status UploadPointsCall::Accept(grpc::ByteBuffer* bytes) {
   v1::UploadPointsRequest request;
-  if (grpc::Status status = ParseRequest(&request_, &request); !status.ok()) {
+  if (grpc::Status status = ParseRequest(bytes, &request); !status.ok()) {
     return status;
   }
   uint64_t expected_revision = 0;

@@ -10,6 +10,7 @@
 #include "grpcpp/support/server_callback.h"
 #include "server/call.h"
 #include "server/memory_budget.h"
+#include "server/request_stream.h"
 #include "server/session.h"
 
 namespace wellspace::server {
@@ -17,25 +18,24 @@ namespace wellspace::server {
 // Commits each message before it reads the next.
 //
 // Thread safety and invariants: those of Call.
-class UploadPointsCall final : public Call<grpc::ServerReadReactor<grpc::ByteBuffer>> {
+class UploadPointsCall final : public RequestStream<Call<grpc::ServerReadReactor<grpc::ByteBuffer>>> {
  public:
   // REQUIRES:   `response` is valid until the end of the call.
   UploadPointsCall(const CallEnvironment& environment, grpc::CallbackServerContext* context, grpc::ByteBuffer* response)
-      : Call(environment, context), response_(response) {}
-
-  void OnReadDone(bool ok) override;
+      : RequestStream(environment, context), response_(response) {}
 
  private:
   void OnBegin() override;
+  void OnRequest(grpc::ByteBuffer* bytes) override;
+  void OnRequestsEnd() override;
   void OnEnd() override { memory_.Release(); }
   LogFields Figures() const override;
 
   // The following want mutex_ to be held.
-  grpc::Status Accept();
+  grpc::Status Accept(grpc::ByteBuffer* bytes);
 
   grpc::ByteBuffer* const response_;  // gRPC's from Finish on
   // Guarded by mutex_.
-  grpc::ByteBuffer request_;          // of the read in flight
   std::shared_ptr<Session> session_;  // null before the first message
   MemoryReservation memory_;          // of the message that comes
   uint64_t coordinate_count_ = 0;     // received

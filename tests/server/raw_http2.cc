@@ -1,0 +1,202 @@
+#include "tests/server/raw_http2.h"
+
+#include <arpa/inet.h>
+#include <errno.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <sys/time.h>
+#include <unistd.h>
+
+#include <utility>
+
+#include "absl/strings/numbers.h"
+#include "absl/strings/str_cat.h"
+#include "gtest/gtest.h"
+
+namespace wellspace::server {
+namespace {
+
+constexpr size_t kFrameHeaderBytes = 9;
+constexpr int kPatienceSeconds = 60;
+
+uint32_t ReadBigEndian(std::string_view bytes) {
+  uint32_t value = 0;
+  for (const char byte : bytes) {
+    value = value << 8 | static_cast<uint8_t>(byte);
+  }
+  return value;
+}
+
+// A string of HPACK, without Huffman's code: its length with a prefix of seven bits.
+std::string HpackString(std::string_view text) {
+  constexpr size_t kPrefix = 127;
+  std::string bytes;
+  if (text.size() < kPrefix) {
+    bytes.push_back(static_cast<char>(text.size()));
+  } else {
+    const size_t rest = text.size() - kPrefix;
+    bytes.push_back(static_cast<char>(kPrefix));
+    bytes.push_back(static_cast<char>(0x80 | (rest & 0x7f)));
+    bytes.push_back(static_cast<char>(rest >> 7));
+  }
+  return bytes.append(text);
+}
+
+}  // namespace
+
+std::string Frame::Serialize() const {
+  std::string bytes = BigEndian(static_cast<uint32_t>(payload.size())).substr(1);
+  bytes.push_back(static_cast<char>(type));
+  bytes.push_back(static_cast<char>(flags));
+  return bytes + BigEndian(stream) + payload;
+}
+
+std::string BigEndian(uint32_t value) {
+  std::string bytes;
+  for (const int shift : {24, 16, 8, 0}) {
+    bytes.push_back(static_cast<char>(value >> shift));
+  }
+  return bytes;
+}
+
+std::string ConnectionStart() {
+  return "PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + Frame{.type = Frame::kSettings}.Serialize();
+}
+
+std::string Header(std::string_view name, std::string_view value) {
+  return absl::StrCat(std::string(1, '\0'), HpackString(name), HpackString(value));
+}
+
+std::string CallHeaders(std::string_view path) {
+  return Header(":method", "POST") + Header(":scheme", "http") + Header(":path", path) +
+         Header(":authority", "localhost") + Header("te", "trailers") + Header("content-type", "application/grpc");
+}
+
+Frame BeginCall(uint32_t stream, std::string_view path) {
+  return {.type = Frame::kHeaders, .flags = Frame::kEndHeaders, .stream = stream, .payload = CallHeaders(path)};
+}
+
+Frame ResetCall(uint32_t stream) {
+  constexpr uint32_t kCancel = 8;
+  return {.type = Frame::kRstStream, .stream = stream, .payload = BigEndian(kCancel)};
+}
+
+std::string GrpcMessage(std::string_view bytes, std::optional<uint32_t> length, uint8_t flag) {
+  return absl::StrCat(std::string(1, static_cast<char>(flag)), BigEndian(length.value_or(bytes.size())),
+                      std::string(bytes));
+}
+
+RawConnection::RawConnection(const std::string& address) : socket_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+  const size_t colon = address.rfind(':');
+  int port = 0;
+  EXPECT_TRUE(absl::SimpleAtoi(address.substr(colon + 1), &port)) << address;
+  sockaddr_in server = {};
+  server.sin_family = AF_INET;
+  server.sin_port = htons(static_cast<uint16_t>(port));
+  EXPECT_EQ(inet_pton(AF_INET, address.substr(0, colon).c_str(), &server.sin_addr), 1) << address;
+  const timeval patience = {.tv_sec = kPatienceSeconds, .tv_usec = 0};
+  setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
+  setsockopt(socket_, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof(patience));
+  EXPECT_EQ(connect(socket_, reinterpret_cast<const sockaddr*>(&server), sizeof(server)), 0) << address;
+}
+
+RawConnection::~RawConnection() {
+  if (socket_ >= 0) {
+    close(socket_);
+  }
+}
+
+RawConnection::RawConnection(RawConnection&& other) noexcept : socket_(std::exchange(other.socket_, -1)) {}
+
+bool RawConnection::Send(std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t sent = send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    if (sent <= 0) {
+      return false;
+    }
+    bytes.remove_prefix(sent);
+  }
+  return true;
+}
+
+bool RawConnection::Begin() {
+  return Send(ConnectionStart()) && ReadUntil(Frame::kSettings).has_value() &&
+         Send(Frame{.type = Frame::kSettings, .flags = Frame::kAck});
+}
+
+std::string RawConnection::ReadBytes(size_t size) {
+  std::string bytes(size, '\0');
+  size_t taken = 0;
+  while (taken < size) {
+    const ssize_t got = recv(socket_, bytes.data() + taken, size - taken, 0);
+    if (got <= 0) {
+      break;
+    }
+    taken += got;
+  }
+  bytes.resize(taken);
+  return bytes;
+}
+
+std::optional<Frame> RawConnection::Read() {
+  const std::string header = ReadBytes(kFrameHeaderBytes);
+  if (header.size() < kFrameHeaderBytes) {
+    return std::nullopt;
+  }
+  const std::string_view view = header;
+  const size_t length = ReadBigEndian(view.substr(0, 3));
+  Frame frame = {.type = static_cast<uint8_t>(view[3]),
+                 .flags = static_cast<uint8_t>(view[4]),
+                 .stream = ReadBigEndian(view.substr(5)),
+                 .payload = ReadBytes(length)};
+  return frame.payload.size() == length ? std::optional(std::move(frame)) : std::nullopt;
+}
+
+std::optional<Frame> RawConnection::ReadUntil(uint8_t type) {
+  std::optional<Frame> frame = Read();
+  while (frame.has_value() && frame->type != type) {
+    frame = Read();
+  }
+  return frame;
+}
+
+bool RawConnection::IsClosedByServer() {
+  char buffer[4096];
+  ssize_t got = 1;
+  while (got > 0) {
+    got = recv(socket_, buffer, sizeof(buffer), 0);
+  }
+  return got == 0 || errno == ECONNRESET;
+}
+
+bool RawConnection::IsAlive() {
+  const std::string payload = "are you?";
+  Send(Frame{.type = Frame::kPing, .payload = payload});
+  std::optional<Frame> frame = ReadUntil(Frame::kPing);
+  while (frame.has_value() && !(frame->flags == Frame::kAck && frame->payload == payload)) {
+    frame = ReadUntil(Frame::kPing);
+  }
+  return frame.has_value();
+}
+
+int RawConnection::ReadStatus(uint32_t stream) {
+  constexpr std::string_view kName = "grpc-status";
+  while (const std::optional<Frame> frame = Read()) {
+    if (frame->stream != stream) {
+      continue;
+    }
+    const size_t name = frame->type == Frame::kHeaders ? frame->payload.find(kName) : std::string::npos;
+    int status = -1;
+    if (name != std::string::npos) {
+      const std::string value = frame->payload.substr(name + kName.size());
+      EXPECT_TRUE(absl::SimpleAtoi(value.substr(1, static_cast<uint8_t>(value[0])), &status));
+      return status;
+    }
+    if (frame->type == Frame::kRstStream) {
+      return -1;
+    }
+  }
+  return -1;
+}
+
+}  // namespace wellspace::server
