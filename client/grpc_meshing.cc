@@ -6,6 +6,7 @@
 #include "client/convert.h"
 #include "client/grpc_connection.h"
 #include "client/mesh_receiver.h"
+#include "client/request_writer.h"
 
 namespace wellspace::client {
 namespace {
@@ -78,10 +79,11 @@ absl::StatusOr<MeshEstimate> GrpcConnection::EstimateMesh(const MeshOptions& opt
   v1::EstimateMeshResponse response;
   const absl::Status status = retrier_.Run(options.timeout, stop, [&](Attempt& attempt) {
     CallContext context(attempt);
-    const std::unique_ptr<grpc::ClientWriter<v1::EstimateMeshRequest>> stream =
-        meshing_->EstimateMesh(context.get(), &response);
-    Upload<v1::EstimateMeshRequest>(options, points, *stream);
-    return FromGrpcStatus(stream->Finish());
+    RequestWriter<v1::EstimateMeshRequest> stream([&](grpc::CompletionQueue* queue) {
+      return meshing_->PrepareAsyncEstimateMesh(context.get(), &response, queue);
+    });
+    Upload<v1::EstimateMeshRequest>(options, points, stream);
+    return FromGrpcStatus(stream.Finish());
   });
   if (!status.ok()) {
     return status;

@@ -7,6 +7,7 @@
 #include "client/convert.h"
 #include "client/grpc_connection.h"
 #include "client/mesh_receiver.h"
+#include "client/request_writer.h"
 
 namespace wellspace::client {
 namespace {
@@ -23,7 +24,7 @@ class Upload {
   Uploaded result() const { return {response_.committed_points(), response_.revision()}; }
 
  private:
-  using Stream = grpc::ClientWriter<v1::UploadPointsRequest>;
+  using Stream = RequestWriter<v1::UploadPointsRequest>;
 
   // Sends what is left of the source and half-closes; an error is the source's. Stops early when the call has ended.
   absl::Status Send(Stream& stream, v1::UploadPointsRequest& request);
@@ -88,12 +89,13 @@ absl::Status Upload::Run(v1::SessionService::Stub& stub, const v1::Session& sess
   // What the attempts before this one committed has changed the revision.
   request.set_expected_revision(std::exchange(expected_revision_, 0));
   CallContext context(attempt);
-  const std::unique_ptr<Stream> stream = stub.UploadPoints(context.get(), &response_);
-  const absl::Status unreadable = Send(*stream, request);
+  Stream stream(
+      [&](grpc::CompletionQueue* queue) { return stub.PrepareAsyncUploadPoints(context.get(), &response_, queue); });
+  const absl::Status unreadable = Send(stream, request);
   if (!unreadable.ok()) {
     context.Cancel();
   }
-  const absl::Status status = FromGrpcStatus(stream->Finish());
+  const absl::Status status = FromGrpcStatus(stream.Finish());
   if (!unreadable.ok()) {
     return attempt.Final(unreadable);
   }

@@ -46,13 +46,20 @@ class ByteReader {
     return taken;
   }
 
-  // All that is left, as text.
-  std::string_view TakeText() {
-    const std::span<const uint8_t> taken = Take(rest_.size());
-    return {reinterpret_cast<const char*>(taken.data()), taken.size()};
+  // The bytes after a length of two bytes, low one first; or as many as are left.
+  std::string_view TakeBlock() {
+    const size_t low = Next();
+    return Text(Take(low | size_t{Next()} << 8));
   }
 
+  // All that is left, as text.
+  std::string_view TakeText() { return Text(Take(rest_.size())); }
+
  private:
+  static std::string_view Text(std::span<const uint8_t> bytes) {
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+  }
+
   std::span<const uint8_t> rest_;
 };
 
