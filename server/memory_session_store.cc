@@ -1,24 +1,25 @@
 #include "server/memory_session_store.h"
 
+#include <unistd.h>
+
 #include <algorithm>
-#include <array>
-#include <functional>
-#include <random>
+#include <cstdlib>
 #include <utility>
 
+#include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "server/errors.h"
 
 namespace wellspace::server {
 namespace {
 
-// 128 bits of the system's own random numbers.
+// 128 bits of the generator that the kernel has for keys; std::random_device does not promise as much.
 std::string UnguessableName() {
-  std::random_device random;
-  std::array<uint32_t, 4> bits{};
-  std::generate(bits.begin(), bits.end(), std::ref(random));
-  return absl::StrCat("sessions/", absl::Hex(bits[0], absl::kZeroPad8), absl::Hex(bits[1], absl::kZeroPad8),
-                      absl::Hex(bits[2], absl::kZeroPad8), absl::Hex(bits[3], absl::kZeroPad8));
+  std::string bits(16, '\0');
+  if (getentropy(bits.data(), bits.size()) != 0) {
+    std::abort();  // no kernel that this runs on is without
+  }
+  return absl::StrCat("sessions/", absl::BytesToHexString(bits));
 }
 
 }  // namespace

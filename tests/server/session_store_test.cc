@@ -1,8 +1,12 @@
 // Sessions and their store, with a clock that the test moves.
+#include <array>
+#include <cmath>
+#include <cstdint>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "absl/strings/escaping.h"
 #include "gtest/gtest.h"
 #include "server/memory_session_store.h"
 #include "tests/server/service_harness.h"
@@ -35,15 +39,27 @@ class SessionStoreTest : public ::testing::Test {
 };
 
 TEST_F(SessionStoreTest, NamesCannotBeGuessed) {
+  constexpr int kNames = 1000;
+  constexpr size_t kBits = 128;
+  const size_t prefix = std::string("sessions/").size();
   std::set<std::string> names;
-  for (int i = 0; i < 1000; ++i) {
+  std::array<int, kBits> ones{};
+  for (int i = 0; i < kNames; ++i) {
     const std::shared_ptr<Session> session = Create();
     ASSERT_NE(session, nullptr);
     names.insert(session->name());
-    EXPECT_EQ(session->name().size(), std::string("sessions/").size() + 32);
+    const std::string bytes = absl::HexStringToBytes(session->name().substr(prefix));
+    ASSERT_EQ(8 * bytes.size(), kBits);
+    for (size_t bit = 0; bit < kBits; ++bit) {
+      ones[bit] += static_cast<uint8_t>(bytes[bit / 8]) >> bit % 8 & 1;
+    }
     store_.Remove(*session);
   }
-  EXPECT_EQ(names.size(), 1000u);
+  EXPECT_EQ(names.size(), kNames);
+  // No bit of them is known: each is a one about half of the time, within seven standard deviations.
+  for (const int count : ones) {
+    EXPECT_NEAR(count, kNames / 2, 7 * std::sqrt(kNames / 4.0));
+  }
 }
 
 TEST_F(SessionStoreTest, AnotherTenantsSessionDoesNotExist) {
