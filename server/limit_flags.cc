@@ -112,6 +112,14 @@ void DeclareLimits(CLI::App& app, ServiceOptions& service) {
   });
 }
 
+void DeclareConnections(CLI::App& app, ConnectionOptions& connections) {
+  AddSeconds(app, "--handshake-timeout", connections.handshake_timeout, absl::Seconds(1), absl::Hours(1),
+             "How long a connection may take before it speaks HTTP/2, TLS included");
+  AddSeconds(app, "--max-connection-idle", connections.max_idle, absl::Seconds(1), absl::Hours(24 * 14),
+             "How long a connection is kept without any call");
+  AddCount(app, "--max-streams", connections.max_streams, 1, 1'000'000, "Calls at once on one connection");
+}
+
 void DeclareConfigFile(CLI::App& app) {
   app.config_formatter(std::make_shared<TomlFile>(app));
   app.set_config("--config", "", "Options in a TOML file: keys are the options without --; the command line wins")

@@ -7,11 +7,15 @@
 #include "CLI/CLI.hpp"
 #include "absl/time/time.h"
 #include "server/options.h"
+#include "server/server.h"
 
 namespace wellspace::server {
 
 // Declares all limits of `service`, with what it has now for defaults, and checks of their values.
 void DeclareLimits(CLI::App& app, ServiceOptions& service);
+
+// Declares those of `connections` likewise.
+void DeclareConnections(CLI::App& app, ConnectionOptions& connections);
 
 // --config FILE: every option of `app`, without its dashes, is a key of a TOML file; the command line wins. Keys that are no option and
 // values that an option does not take are refused, naming the key.

@@ -60,6 +60,7 @@ void Declare(CLI::App& app, Flags& flags) {
       ->capture_default_str();
   DeclareSecurity(app, flags.server.security);
   DeclareLimits(app, flags.server.service);
+  DeclareConnections(app, flags.server.connections);
   AddSeconds(app, "--grace", flags.grace, absl::ZeroDuration(), kMaxGrace,
              "Time that running work gets to end after SIGTERM or SIGINT");
   app.add_option("--log-level", flags.log_level, "What to log on standard error")

@@ -75,7 +75,7 @@ void Security::OnTlsChange() const {
   log_->info("certificates read again from {}", options_.tls.certificate);
 }
 
-absl::Status Security::CheckListener(const ListenAddress& address) const {
+absl::Status Security::CheckAddress(const ListenAddress& address) const {
   if (address.IsLoopback() || options_.insecure_remote) {
     return absl::OkStatus();
   }
@@ -96,17 +96,17 @@ absl::Status Security::CheckListener(const ListenAddress& address) const {
   return absl::OkStatus();
 }
 
-absl::Status Security::AddListener(const ListenAddress& address, grpc::ServerBuilder& builder, int* port) const {
-  WELLSPACE_RETURN_IF_ERROR(CheckListener(address));
+absl::StatusOr<std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor>> Security::AddAcceptor(
+    const ListenAddress& address, grpc::ServerBuilder& builder) const {
+  WELLSPACE_RETURN_IF_ERROR(CheckAddress(address));
   if (!options_.tls.client_ca.empty()) {
     builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_AGE_MS,
                                static_cast<int>(absl::ToInt64Milliseconds(options_.max_connection_age)));
   }
-  builder.AddListeningPort(address.ToString(),
-                           options_.tls.enabled() ? MakeTlsCredentials(options_.tls, options_.reload_interval)
-                                                  : grpc::InsecureServerCredentials(),
-                           port);
-  return absl::OkStatus();
+  return builder.experimental().AddExternalConnectionAcceptor(
+      grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
+      options_.tls.enabled() ? MakeTlsCredentials(options_.tls, options_.reload_interval)
+                             : grpc::InsecureServerCredentials());
 }
 
 }  // namespace wellspace::server

@@ -44,18 +44,19 @@ class Security {
 
   const Authenticator& authenticator() const { return authenticator_; }
 
-  // Has `builder` listen on `address`; `port` is set to the port in use, 0 when that fails.
+  // Has `builder` take connections that come to `address`, from what is returned.
   //
   // Errors:     FAILED_PRECONDITION: other machines could reach it, in plain text or without having to say who they are, and
   //             nothing says that this is wanted.
-  absl::Status AddListener(const ListenAddress& address, grpc::ServerBuilder& builder, int* port) const;
+  absl::StatusOr<std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor>> AddAcceptor(
+      const ListenAddress& address, grpc::ServerBuilder& builder) const;
 
  private:
   Security(const SecurityOptions& options, std::shared_ptr<spdlog::logger> log);
 
   void Watch();
   absl::StatusOr<TokenTable> ReadTokens() const;
-  absl::Status CheckListener(const ListenAddress& address) const;
+  absl::Status CheckAddress(const ListenAddress& address) const;
   void OnTokensChange();
   void OnTlsChange() const;
 

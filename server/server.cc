@@ -2,11 +2,12 @@
 
 #include <sys/socket.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
+#include <limits>
 
-#include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
 #include "grpc/grpc.h"
 #include "grpcpp/create_channel_posix.h"
@@ -26,6 +27,11 @@ constexpr int kMinClientPingMs = 10'000;
 
 // Aborted calls get this long to send their status, and idle clients to close their connections, before both are cut off.
 constexpr std::chrono::milliseconds kFarewell(500);
+
+// As gRPC takes durations.
+int Milliseconds(absl::Duration duration) {
+  return static_cast<int>(std::min<int64_t>(absl::ToInt64Milliseconds(duration), std::numeric_limits<int>::max()));
+}
 
 // gRPC keeps these settings for the whole process.
 void EnableHealthAndReflection() {
@@ -47,16 +53,21 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
   grpc::ServerBuilder builder;
   builder.SetMaxReceiveMessageSize(kMaxRequestBytes);
   builder.SetMaxSendMessageSize(kMaxSentBytes);
-  builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT, 0);  // two servers on one port would share its calls unseen
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kMinClientPingMs);
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, Milliseconds(options.connections.handshake_timeout));
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_IDLE_MS, Milliseconds(options.connections.max_idle));
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, options.connections.max_streams);
 
   ListenAddress address;
-  int port = 0;
+  std::unique_ptr<Listener> listener;
+  std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor;
   if (!options.listen.empty()) {
     WELLSPACE_ASSIGN_OR_RETURN(address, ParseListenAddress(options.listen));
-    WELLSPACE_RETURN_IF_ERROR(security->AddListener(address, builder, &port));
+    WELLSPACE_ASSIGN_OR_RETURN(acceptor, security->AddAcceptor(address, builder));
+    WELLSPACE_ASSIGN_OR_RETURN(listener, Listener::Open(address, log));
+    address.port = listener->port();
   }
 
   std::unique_ptr<Server> server(new Server(options.service, std::move(security), std::move(log), std::move(mesher),
@@ -68,18 +79,18 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
   }
   server->observability_.Watch(builder);
   server->server_ = builder.BuildAndStart();
-  if (server->server_ == nullptr || (!options.listen.empty() && port == 0)) {
-    return absl::UnavailableError(
-        absl::StrCat("cannot listen on ", options.listen, "; is the port in use, or the address not of this machine?"));
-  }
-  if (!options.listen.empty()) {
-    address.port = static_cast<uint16_t>(port);
-    server->address_ = address.ToString();
+  if (server->server_ == nullptr) {
+    return absl::InternalError("gRPC cannot start a server");
   }
   for (const std::string& service : ServiceNames()) {
     server->server_->GetHealthCheckService()->SetServingStatus(service, true);
   }
   WELLSPACE_RETURN_IF_ERROR(server->observability_.Listen(options.observability));
+  if (listener != nullptr) {
+    server->address_ = address.ToString();
+    server->listener_ = std::move(listener);
+    server->listener_->Start(std::move(acceptor));
+  }
   return server;
 }
 
@@ -123,6 +134,9 @@ void Server::Shutdown(absl::Duration grace) {
     backend_.calls().Close();
     if (!backend_.calls().WaitUntilEmpty(grace)) {
       backend_.calls().AbortAll();
+    }
+    if (listener_ != nullptr) {
+      listener_->Stop();
     }
     server_->Shutdown(std::chrono::system_clock::now() + kFarewell);
     server_->Wait();

@@ -13,6 +13,7 @@
 #include "grpcpp/channel.h"
 #include "grpcpp/server.h"
 #include "server/backend.h"
+#include "server/listener.h"
 #include "server/meshing_service.h"
 #include "server/observability.h"
 #include "server/operation_service.h"
@@ -24,8 +25,16 @@
 
 namespace wellspace::server {
 
+// What a connection may take. Durations are at least a second.
+struct ConnectionOptions {
+  absl::Duration handshake_timeout = absl::Seconds(20);  // from its acceptance to the first settings of HTTP/2
+  absl::Duration max_idle = absl::Minutes(15);           // without any call
+  int max_streams = 1000;                                // calls at once, at least 1
+};
+
 struct ServerOptions {
   std::string listen;  // HOST:PORT, port 0 takes a free one; empty: no listener
+  ConnectionOptions connections;
   ServiceOptions service;
   SecurityOptions security;
   ObservabilityOptions observability;
@@ -38,8 +47,8 @@ class Server {
  public:
   // Starts to serve. Tests put other work in the place of the core's.
   //
-  // Errors:     INVALID_ARGUMENT (listen), those of Security::Load and AddListener, UNAVAILABLE (the address cannot be
-  //             listened on); those of Observability::Listen.
+  // Errors:     INVALID_ARGUMENT (listen), those of Security::Load and AddAcceptor, of Listener::Open and of
+  //             Observability::Listen.
   static absl::StatusOr<std::unique_ptr<Server>> Start(const ServerOptions& options,
                                                        std::shared_ptr<spdlog::logger> log,
                                                        Mesher mesher = core::MeshPoints,
@@ -89,6 +98,7 @@ class Server {
   OperationService operations_{backend_.environment()};
   QueryService queries_{backend_.environment()};
   std::string address_;
+  std::unique_ptr<Listener> listener_;  // null: none
   std::unique_ptr<grpc::Server> server_;
   std::once_flag shut_down_;
 };
