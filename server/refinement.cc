@@ -1,6 +1,8 @@
 #include "server/refinement.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <limits>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -120,6 +122,7 @@ void Run(const CallEnvironment& environment, Session& session, Operation& operat
     environment.observability.work().vertices_made += mesh->chunks.mesh().vertex_count();
     environment.observability.work().simplices_made += mesh->chunks.mesh().simplex_count();
   }
+  job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();  // who is told of the end may use it at once
   LogFields fields;
   fields.Add("event", "refinement").Add("operation", operation.name()).Add("tenant", session.tenant());
   fields.Add("code", absl::StatusCodeToString(static_cast<absl::StatusCode>(status.error_code())));

@@ -13,6 +13,9 @@ namespace {
 
 constexpr size_t kKeptOperations = 100;
 
+// A vertex that is added takes as much memory as this many of those that there are, at most in all but the most uneven clouds.
+constexpr uint64_t kReservedVertices = 2;
+
 }  // namespace
 
 Session::Session(Settings settings, const ServiceOptions& options, MemoryBudget& memory, Clock clock,
@@ -174,6 +177,18 @@ grpc::Status Session::CheckReadyForChange(uint64_t expected_revision) const {
   return CheckRevision(expected_revision);
 }
 
+grpc::Status Session::CheckStructure() const {
+  if (work_.mesher != nullptr) {
+    return grpc::Status::OK;
+  }
+  return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
+                   work_.mesh == nullptr
+                       ? absl::StrCat(name_, " has no mesh yet; start a refinement first")
+                       : absl::StrCat(name_,
+                                      " has no query structure since its last refinement failed; start another, "
+                                      "which numbers the vertices anew"));
+}
+
 grpc::Status Session::TakePoints(uint64_t count) {
   if (point_count_ + count > options_.max_points) {
     return MakeError(v1::ERROR_REASON_TOO_MANY_POINTS,
@@ -285,9 +300,8 @@ grpc::Status Session::Query(uint64_t* version, const std::function<grpc::Status(
     if (grpc::Status status = CheckIdle(); !status.ok()) {
       return status;
     }
-    if (work_.mesher == nullptr) {
-      return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
-                       absl::StrCat(name_, " has no mesh yet; start a refinement first"));
+    if (grpc::Status status = CheckStructure(); !status.ok()) {
+      return status;
     }
     if (*version != 0 && *version != structure_version_) {
       return MakeError(v1::ERROR_REASON_REVISION_MISMATCH,
@@ -309,9 +323,8 @@ grpc::Status Session::AddVertices(std::span<const double> points, std::span<cons
     if (grpc::Status status = CheckReadyForChange(expected_revision); !status.ok()) {
       return status;
     }
-    if (work_.mesher == nullptr) {
-      return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
-                       absl::StrCat(name_, " has no mesh yet; start a refinement first"));
+    if (grpc::Status status = CheckStructure(); !status.ok()) {
+      return status;
     }
     if (points.size() % dimension_ != 0) {
       return MakeError(
@@ -332,30 +345,24 @@ grpc::Status Session::AddVertices(std::span<const double> points, std::span<cons
   }
   WaitForQueries();
   uint64_t uploaded = 0;
+  bool has_returned = false;
   grpc::Status status = RunGuarded([&] {
-    // Points that were uploaded since the last refinement come first: they have lower numbers.
-    const absl::StatusOr<std::vector<double>> waiting = points_.CopyFrom(work_.meshed_points * dimension_, context);
-    if (!waiting.ok()) {
-      return FromCoreStatus(waiting.status());
-    }
-    if (!waiting->empty()) {
-      if (const absl::Status done = work_.mesher->AddPoints(*waiting, context).status(); !done.ok()) {
-        return FromCoreStatus(done);
-      }
-      uploaded = waiting->size() / dimension_;
-    }
-    absl::StatusOr<std::vector<uint32_t>> vertices = work_.mesher->AddPointsNear(points, near, context);
-    if (vertices.ok()) {
-      added->vertices = *std::move(vertices);
-    }
-    return vertices.status().code() == absl::StatusCode::kOutOfRange
-               ? MakeError(v1::ERROR_REASON_VERTEX_OUT_OF_RANGE, std::string(vertices.status().message()), "near")
-               : FromCoreStatus(vertices.status());
+    grpc::Status ended = AddToMesher(points, near, context, &uploaded, &added->vertices);
+    has_returned = true;
+    return ended;
   });
+  if (!has_returned) {  // nobody knows what a mesher is like that an exception went through
+    work_.mesher = nullptr;
+    work_.memory.Release();
+  } else if (memory_.is_limited()) {
+    // What was reserved is more than was needed but for the most uneven points; those are counted by the next refinement.
+    (void)work_.memory.Resize(work_.mesher->memory_bytes());
+  }
   std::lock_guard lock(mutex_);
   busy_ = Busy::kNo;
   last_use_ = clock_();
-  work_.meshed_points += uploaded;
+  work_.meshed_points = has_returned ? work_.meshed_points + uploaded : 0;
+  is_ready_ = is_ready_ && has_returned;
   if (status.ok() && !points.empty()) {
     points_.Append(points);
     work_.meshed_points += points.size() / dimension_;
@@ -364,11 +371,46 @@ grpc::Status Session::AddVertices(std::span<const double> points, std::span<cons
   } else {
     ReturnPoints(points.size() / dimension_);
   }
-  if (uploaded > 0 || status.ok()) {
+  if (uploaded > 0 || status.ok() || !has_returned) {
     ++structure_version_;
   }
   added->revision = revision_;
   return status;
+}
+
+grpc::Status Session::AddToMesher(std::span<const double> points, std::span<const uint32_t> near,
+                                  core::RunContext& context, uint64_t* uploaded, std::vector<uint32_t>* vertices) {
+  if (grpc::Status status = ReserveForVertices(point_count_ - work_.meshed_points); !status.ok()) {
+    return status;
+  }
+  // Points that were uploaded since the last refinement come first: they have lower numbers.
+  const absl::StatusOr<std::vector<double>> waiting = points_.CopyFrom(work_.meshed_points * dimension_, context);
+  if (!waiting.ok()) {
+    return FromCoreStatus(waiting.status());
+  }
+  if (!waiting->empty()) {
+    if (const absl::Status done = work_.mesher->AddPoints(*waiting, context).status(); !done.ok()) {
+      return FromCoreStatus(done);
+    }
+    *uploaded = waiting->size() / dimension_;
+  }
+  absl::StatusOr<std::vector<uint32_t>> added = work_.mesher->AddPointsNear(points, near, context);
+  if (added.ok()) {
+    *vertices = *std::move(added);
+  }
+  return added.status().code() == absl::StatusCode::kOutOfRange
+             ? MakeError(v1::ERROR_REASON_VERTEX_OUT_OF_RANGE, std::string(added.status().message()), "near")
+             : FromCoreStatus(added.status());
+}
+
+grpc::Status Session::ReserveForVertices(uint64_t count) {
+  if (!memory_.is_limited()) {
+    return grpc::Status::OK;
+  }
+  const uint64_t bytes = work_.mesher->memory_bytes();
+  const uint64_t wanted = bytes + kReservedVertices * count * (bytes / work_.mesher->vertex_count());
+  return work_.memory.Resize(wanted) ? grpc::Status::OK
+                                     : FromCoreStatus(memory_.Refusal(wanted, "the vertices of a session"));
 }
 
 grpc::Status Session::StartOperation(const core::MeshParameters& parameters, uint64_t expected_revision,

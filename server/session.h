@@ -130,7 +130,7 @@ class Session {
   // Adds vertices at `points` on this thread, a worker's: all or, on an error, none. `near` has a vertex for each, or is empty.
   //
   // Errors:     MESH_NOT_READY, SESSION_BUSY, INVALID_CHUNK_SHAPE, INVALID_REQUEST (the length of `near`), INVALID_POINTS,
-  //             VERTEX_OUT_OF_RANGE, TOO_MANY_POINTS, QUOTA_EXCEEDED, REVISION_MISMATCH, SESSION_NOT_FOUND; CANCELLED.
+  //             VERTEX_OUT_OF_RANGE, TOO_MANY_POINTS, QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH, SESSION_NOT_FOUND; CANCELLED.
   grpc::Status AddVertices(std::span<const double> points, std::span<const uint32_t> near, uint64_t expected_revision,
                            core::RunContext& context, AddedVertices* added);
 
@@ -168,6 +168,8 @@ class Session {
   grpc::Status CheckIdle() const;
   // All three.
   grpc::Status CheckReadyForChange(uint64_t expected_revision) const;
+  // Whether there is something to query.
+  grpc::Status CheckStructure() const;
   // Takes `count` more points into the account of the session and its tenant, or says why it may not have them.
   grpc::Status TakePoints(uint64_t count);
   // Takes them out again.
@@ -179,6 +181,12 @@ class Session {
 
   // Without it, once nothing can begin a query any more: waits for those that run.
   void WaitForQueries();
+  // Without it, while vertices are being added: the part that is the mesher's. `*uploaded` of the points that waited are in it then, on
+  // an error too.
+  grpc::Status AddToMesher(std::span<const double> points, std::span<const uint32_t> near, core::RunContext& context,
+                           uint64_t* uploaded, std::vector<uint32_t>* vertices);
+  // The same: has room for `count` more vertices in the mesher, or says that there is none.
+  grpc::Status ReserveForVertices(uint64_t count);
 
   const std::string tenant_;
   const std::string name_;

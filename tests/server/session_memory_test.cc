@@ -5,6 +5,7 @@
 #include "gtest/gtest.h"
 #include "tests/server/service_harness.h"
 #include "tests/server/session_calls.h"
+#include "wellspace/v1/queries.grpc.pb.h"
 
 namespace wellspace::server {
 namespace {
@@ -24,6 +25,17 @@ class SessionMemoryTest : public ::testing::Test {
     return watch.operation.value_or(v1::Operation());
   }
 
+  // Creates a session whose points take two thirds of the memory.
+  std::string TakeMostOfTheMemory() {
+    const std::string name = calls_.Create().name();
+    std::vector<v1::UploadPointsRequest> requests;
+    for (uint64_t offset = 0; offset < 45 * kPiece; offset += kPiece) {
+      requests.push_back(UploadRequest(name, offset, std::vector<double>(3 * kPiece, 0.5)));
+    }
+    calls_.Upload(requests);
+    return name;
+  }
+
   void ExpectMemoryLimit(const v1::Operation& operation) {
     EXPECT_EQ(operation.state(), v1::Operation::STATE_FAILED);
     EXPECT_EQ(operation.error().code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
@@ -31,19 +43,23 @@ class SessionMemoryTest : public ::testing::Test {
     EXPECT_EQ(DetailsOf(status).reason, "MEMORY_LIMIT") << operation.error().message();
   }
 
+  v1::AddVerticesResponse AddVertices(const std::string& name, const std::vector<double>& points,
+                                      grpc::Status* status) {
+    v1::AddVerticesRequest request;
+    request.set_name(name);
+    request.mutable_points()->Add(points.begin(), points.end());
+    grpc::ClientContext context;
+    v1::AddVerticesResponse response;
+    *status = v1::QueryService::NewStub(harness_.channel())->AddVertices(&context, request, &response);
+    return response;
+  }
+
   ServiceHarness harness_{core::MeshPoints, {.max_memory_bytes = kMinMemoryBytes}};
   SessionCalls calls_{harness_.channel()};
 };
 
 TEST_F(SessionMemoryTest, ARefinementThatNeedsTooMuchFailsAndLeavesTheSessionAsItWas) {
-  // Another session takes two thirds of the memory: what is left is used up sooner.
-  const std::string other = calls_.Create().name();
-  std::vector<v1::UploadPointsRequest> requests;
-  for (uint64_t offset = 0; offset < 45 * kPiece; offset += kPiece) {
-    requests.push_back(UploadRequest(other, offset, std::vector<double>(3 * kPiece, 0.5)));
-  }
-  calls_.Upload(requests);
-
+  TakeMostOfTheMemory();  // what is left is used up sooner
   const std::string name = calls_.Create().name();
   calls_.Upload(name, 0, UniformPoints(1000, 3, 5));
   ExpectMemoryLimit(Refine(name, 0.001));
@@ -58,8 +74,32 @@ TEST_F(SessionMemoryTest, ARefinementThatNeedsTooMuchFailsAndLeavesTheSessionAsI
   EXPECT_EQ(session.state(), v1::Session::STATE_OPEN);
   EXPECT_EQ(session.committed_points(), 1000u);
   EXPECT_EQ(session.vertex_count(), vertices) << "the last mesh is there still";
+  grpc::Status status;
+  AddVertices(name, {0.5, 0.5, 0.5}, &status);
+  EXPECT_EQ(DetailsOf(status).reason, "MESH_NOT_READY") << "its structure was given up: " << status.error_message();
   EXPECT_EQ(Refine(name, 0).state(), v1::Operation::STATE_SUCCEEDED) << "built anew";
   EXPECT_EQ(calls_.Get(name).vertex_count(), vertices) << "and the same";
+}
+
+TEST_F(SessionMemoryTest, VerticesThatAreAddedAreCounted) {
+  const std::string other = TakeMostOfTheMemory();
+  const std::string name = calls_.Create().name();
+  calls_.Upload(name, 0, UniformPoints(1000, 3, 5));
+  Refine(name, 0);
+  grpc::Status status;
+  uint64_t added = 0;
+  for (uint64_t seed = 0; status.ok(); ++seed) {
+    added += AddVertices(name, UniformPoints(2000, 3, seed), &status).vertices_size();
+  }
+  EXPECT_EQ(DetailsOf(status).reason, "MEMORY_LIMIT") << status.error_message();
+  EXPECT_GT(added, 2000u);
+  EXPECT_LT(added, 400'000u) << "as points alone there would be room for more";
+  EXPECT_EQ(calls_.Get(name).committed_points(), 1000 + added) << "those that were refused are none of the session's";
+  calls_.Delete(other);
+  do {
+    AddVertices(name, UniformPoints(2000, 3, 0), &status);  // the memory is free shortly after
+  } while (status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_TRUE(status.ok()) << status.error_message();
 }
 
 TEST_F(SessionMemoryTest, ADeletedSessionMakesRoomForOthers) {
