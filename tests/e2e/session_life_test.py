@@ -3,12 +3,13 @@ import json
 import os
 import pathlib
 import random
+import re
 import signal
 import subprocess
 import tempfile
 import unittest
 
-from wellspaced import BIN, PATIENCE, Wellspaced
+from wellspaced import BIN, PATIENCE, ROOT, Wellspaced
 
 COAST = pathlib.Path(os.environ["WELLSPACE_EXAMPLES_DIR"]) / "coast-110m.csv"
 
@@ -136,6 +137,22 @@ class SessionLife(unittest.TestCase):
         self.assertEqual(self.run_tool("server", "health", "--service", "wellspace.v1.SessionService"), "serving\n")
         self.run_tool("server", "health", "--service", "no.such.Service", exit_code=2)
         self.assertEqual(self.run_json("server", "info")["server"], self.address)
+
+    def test_the_commands_of_the_readme(self):
+        blocks = re.findall(r"^```\n(.*?)^```", (ROOT / "README.md").read_text(), re.DOTALL | re.MULTILINE)
+        blocks = [block for block in blocks if block.startswith(("wellspace mesh ", "export WELLSPACE_SERVER="))]
+        self.assertEqual(len(blocks), 2)
+        (self.folder / "examples").symlink_to(ROOT / "examples")
+        environment = self.environment | {"PATH": f"{BIN}:{os.environ['PATH']}"}
+        for block in blocks:
+            script = "set -euo pipefail\n" + block.replace("127.0.0.1:7233", self.address)
+            done = subprocess.run(["bash", "-c", script], cwd=self.folder, env=environment, capture_output=True, text=True,
+                                  timeout=PATIENCE, check=False)
+            self.assertEqual(done.returncode, 0, (block, done.stdout, done.stderr))
+        for file in ("spot.vtu", "spot.png", "coast.vtu", "finer.vtu"):
+            self.assertGreater((self.folder / file).stat().st_size, 1000, file)
+        self.run_tool("check", self.folder / "finer.vtu", "--size", 5)
+        self.assertEqual(self.run_json("session", "list", "--label", "project=coast"), [], "deleted by the last command")
 
     def test_the_example_of_the_library(self):
         mesh = self.folder / "example.npz"
