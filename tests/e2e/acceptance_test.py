@@ -14,7 +14,7 @@ import unittest
 import grpc
 import numpy
 
-from remote import Fails, Mesh, Remote, cloud, content, pieces, uniform, unit_box
+from remote import Fails, Mesh, Remote, cloud, content, pieces, smallest_dihedral_angle, uniform, unit_box
 from wellspaced import BIN, PATIENCE, ROOT, Wellspaced, api
 
 SOON = 10  # seconds, for what comes within milliseconds where nothing else runs
@@ -192,6 +192,21 @@ class Acceptance(unittest.TestCase):
         first, *others = (content(chunks) for _, chunks in runs)
         for chunks in others:
             self.assertEqual(chunks, first)
+
+    def test_no_slivers(self):
+        points = numpy.loadtxt(ROOT / "examples" / "spot.csv", delimiter=",", skiprows=1)
+        angles = {}
+        for demanded in (None, 0, 15):  # None: what whoever asks for nothing gets
+            parameters = api().MeshParameters(dimension=3, min_dihedral=demanded)
+            metadata, chunks = self.remote.mesh(parameters, points)
+            mesh = Mesh(metadata, chunks)
+            angles[demanded] = smallest_dihedral_angle(mesh)
+            self.assertAlmostEqual(angles[demanded], metadata.statistics.min_angle_deg, places=6)
+            self.assertEqual(metadata.statistics.slivers.left, 0)
+            numpy.testing.assert_array_equal(mesh.points[mesh.input_vertices], points)
+        self.assertLess(angles[0], 2, "there would be some")
+        self.assertGreaterEqual(angles[None], 12)
+        self.assertGreaterEqual(angles[15], 15)
 
     def test_no_crash_of_three_points_duplicates_or_90000_points(self):
         grid = numpy.stack(numpy.meshgrid(*[numpy.arange(300) / 300 + 1 / 600] * 2), axis=-1).reshape(-1, 2)

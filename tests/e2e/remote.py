@@ -31,7 +31,7 @@ def cloud(request, parameters, points, rows=50_000):
 
 def array_of(chunk):
     """Which array a chunk is of, and its values as they are on the wire."""
-    for name, kind in (("points", "<f8"), ("simplices", "<u4"), ("input_vertices", "<u4")):
+    for name, kind in (("points", "<f8"), ("weights", "<f8"), ("simplices", "<u4"), ("input_vertices", "<u4")):
         values = getattr(chunk, name)
         if values:
             return name, numpy.array(values, kind)
@@ -43,13 +43,14 @@ class Mesh:
 
     def __init__(self, metadata, chunks):
         assert [chunk.index for chunk in chunks] == list(range(metadata.chunk_count))
-        parts = {"points": [], "simplices": [], "input_vertices": []}
+        parts = {"points": [], "weights": [], "simplices": [], "input_vertices": []}
         for chunk in chunks:
             name, values = array_of(chunk)
             assert crc32c(values.tobytes()) == chunk.crc32c, chunk.index
             parts[name].append(values)
         d = metadata.dimension
         self.points = numpy.concatenate(parts["points"]).reshape(metadata.vertex_count, d)
+        self.weights = numpy.concatenate([numpy.zeros(0), *parts["weights"]])
         self.simplices = numpy.concatenate(parts["simplices"]).reshape(metadata.simplex_count, d + 1)
         self.input_vertices = numpy.concatenate([numpy.zeros(0, "<u4"), *parts["input_vertices"]])
 
@@ -59,6 +60,16 @@ class Mesh:
         volumes = numpy.linalg.det(corners[:, 1:] - corners[:, :1]) / (2 if corners.shape[2] == 2 else 6)
         assert volumes.min() > 0
         return volumes.sum()
+
+
+def smallest_dihedral_angle(mesh):
+    """Of a mesh of tetrahedra, in degrees."""
+    corners = mesh.points[mesh.simplices]
+    gradients = numpy.linalg.inv(corners[:, 1:] - corners[:, :1])  # of barycentric coordinates: normals of facets, in columns
+    normals = numpy.concatenate([-gradients.sum(axis=2, keepdims=True), gradients], axis=2)
+    normals /= numpy.linalg.norm(normals, axis=1, keepdims=True)
+    cosines = -numpy.einsum("tki,tkj->tij", normals, normals)[:, *numpy.triu_indices(4, 1)]
+    return numpy.degrees(numpy.arccos(cosines.max()))
 
 
 class Remote:
