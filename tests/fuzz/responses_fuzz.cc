@@ -145,9 +145,16 @@ class SinkCheck final : public client::MeshSink {
     points_ += points.size() / header_.dimension;
     return file_.AddPoints(points);
   }
+  absl::Status AddWeights(std::span<const double> weights) override {
+    Require(header_.has_weights && !weights.empty(), "weights come when they are announced");
+    Require(points_ == header_.vertex_count && simplices_ == 0, "weights come between points and simplices");
+    weights_ += weights.size();
+    return file_.AddWeights(weights);
+  }
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
     Require(!simplices.empty() && simplices.size() % (header_.dimension + 1) == 0, "rows of simplices are whole");
     Require(points_ == header_.vertex_count && input_vertices_ == 0, "simplices come after the points");
+    Require(weights_ == (header_.has_weights ? points_ : 0), "every vertex has a weight, or none");
     RequireVertices(simplices);
     simplices_ += simplices.size() / (header_.dimension + 1);
     return file_.AddSimplices(simplices);
@@ -174,6 +181,7 @@ class SinkCheck final : public client::MeshSink {
   client::MeshFile file_;
   client::MeshHeader header_;
   uint64_t points_ = 0;
+  uint64_t weights_ = 0;
   uint64_t simplices_ = 0;
   uint64_t input_vertices_ = 0;
 };
