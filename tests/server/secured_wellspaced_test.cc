@@ -48,6 +48,12 @@ class SecuredWellspaced : public ::testing::Test {
     return RunWellspace(arguments, {.input = kCloud, .environment = environment});
   }
 
+  // What `openssl s_client` says of the server.
+  std::string SClient(const Daemon& daemon, const std::string& flags) const {
+    return RunShell(absl::StrCat("openssl s_client -connect ", daemon.address(), " -CAfile ", authority_.certificate(),
+                                 " ", flags, " < /dev/null"));
+  }
+
   TemporaryFolder folder_;
   const Authority authority_;
   const CertificateFiles server_;
@@ -102,13 +108,9 @@ TEST_F(SecuredWellspaced, MeshesForThoseWhoHaveACertificate) {
   EXPECT_THAT(run.err, HasSubstr("client certificate"));
 }
 
-// What `openssl s_client` makes of the server.
 TEST_F(SecuredWellspaced, SpeaksModernTlsOnly) {
   Daemon daemon(TlsFlags());
-  const auto connect = [&](const std::string& flags) {
-    return RunShell(absl::StrCat("openssl s_client -brief -connect ", daemon.address(), " -CAfile ",
-                                 authority_.certificate(), " ", flags, " < /dev/null"));
-  };
+  const auto connect = [&](const std::string& flags) { return SClient(daemon, "-brief " + flags); };
   for (const char* flags : {"-tls1_3", "-tls1_2", "-tls1_2 -cipher ECDHE+AESGCM"}) {
     const std::string output = connect(absl::StrCat(flags, " -alpn h2 -verify_return_error"));
     EXPECT_THAT(output, HasSubstr("CONNECTION ESTABLISHED")) << flags;
@@ -126,17 +128,32 @@ TEST_F(SecuredWellspaced, SpeaksModernTlsOnly) {
   }
 }
 
+TEST_F(SecuredWellspaced, AgreesOnHttp2AndNothingElse) {
+  Daemon daemon(TlsFlags());
+  for (const char* version : {"-tls1_2", "-tls1_3"}) {
+    EXPECT_THAT(SClient(daemon, absl::StrCat(version, " -alpn http/1.1,h2")), HasSubstr("ALPN protocol: h2"));
+    const std::string other = SClient(daemon, absl::StrCat(version, " -alpn http/1.1"));
+    EXPECT_THAT(other, Not(HasSubstr("ALPN protocol"))) << version;
+  }
+}
+
 TEST_F(SecuredWellspaced, TheHandshakeDemandsCertificatesIfAsked) {
+  const CertificateFiles alice = authority_.Issue("alice", "alice");
+  const CertificateFiles old = authority_.Issue("old", "alice", -1);
+  const Authority stranger(folder_, "stranger");
+  const CertificateFiles foreign = stranger.Issue("foreign", "alice");
   std::vector<std::string> flags = TlsFlags();
   flags.insert(flags.end(), {"--tls-client-ca", authority_.certificate(), "--tls-require-client-cert"});
-  const CertificateFiles alice = authority_.Issue("alice", "alice");
   Daemon daemon(flags);
   // In TLS 1.2 a client learns during the handshake that it is refused.
-  const std::string connect = absl::StrCat("openssl s_client -brief -tls1_2 -connect ", daemon.address(), " -CAfile ",
-                                           authority_.certificate(), " < /dev/null");
-  EXPECT_THAT(RunShell(connect), Not(HasSubstr("CONNECTION ESTABLISHED")));
-  EXPECT_THAT(RunShell(absl::StrCat(connect, " -cert ", alice.certificate, " -key ", alice.key)),
-              HasSubstr("CONNECTION ESTABLISHED"));
+  const auto connect = [&](const std::string& shown) { return SClient(daemon, "-brief -tls1_2 -alpn h2 " + shown); };
+  const auto show = [](const CertificateFiles& files) {
+    return absl::StrCat("-cert ", files.certificate, " -key ", files.key);
+  };
+  EXPECT_THAT(connect(show(alice)), HasSubstr("CONNECTION ESTABLISHED"));
+  for (const std::string& shown : {std::string(), show(old), show(foreign)}) {
+    EXPECT_THAT(connect(shown), Not(HasSubstr("CONNECTION ESTABLISHED"))) << shown;
+  }
 }
 
 TEST_F(SecuredWellspaced, PlainTextOnTheLoopbackCanWantTokens) {
