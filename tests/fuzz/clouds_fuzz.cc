@@ -8,7 +8,9 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "client/formats/npy_rows.h"
 #include "client/formats/number.h"
 #include "client/formats/read_cloud.h"
 #include "tests/fuzz/fuzz.h"
@@ -52,6 +54,29 @@ void RequireCloud(const PointCloud& cloud, const CloudOptions& options) {
   }
 }
 
+// NpyRows, on the file that ReadCloud read as `cloud`: the same points, or a clear refusal.
+void RequireRows(const std::string& path, const absl::StatusOr<PointCloud>& cloud) {
+  absl::StatusOr<formats::NpyRows> rows = formats::NpyRows::Open(path);
+  if (!rows.ok()) {
+    Require(rows.status().code() == absl::StatusCode::kInvalidArgument,
+            "a bad file is an INVALID_ARGUMENT:", rows.status().ToString());
+    RequireClearMessage({rows.status().message().data(), rows.status().message().size()});
+    return;
+  }
+  std::vector<double> points;
+  std::vector<double> piece(3 * rows->columns());
+  for (uint64_t row = 0; row <= rows->rows(); row += 3) {
+    const absl::StatusOr<uint64_t> read = rows->Read(row, piece);
+    Require(read.ok() && *read == std::min<uint64_t>(3, rows->rows() - row),
+            "rows can be read:", read.status().ToString());
+    points.insert(points.end(), piece.begin(), piece.begin() + *read * rows->columns());
+  }
+  Require(points.size() == rows->rows() * rows->columns(), "every row comes once");
+  if (cloud.ok()) {
+    Require(cloud->points == points && cloud->dimension == rows->columns(), "rows are the points of the cloud");
+  }
+}
+
 std::string ToCsv(const PointCloud& cloud) {
   std::string text;
   for (size_t i = 0; i < cloud.points.size(); ++i) {
@@ -70,7 +95,11 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const fuzz::Choice& choice = fuzz::kChoices[static_cast<uint8_t>(bytes.Next() - '0') % fuzz::kChoices.size()];
   const formats::CloudOptions options = {.format = choice.format, .dimension = choice.dimension};
   const fuzz::ScratchFolder& folder = fuzz::ScratchFolder::Get();
-  const auto cloud = formats::ReadCloud(folder.Write("cloud", bytes.TakeText()), options);
+  const std::string path = folder.Write("cloud", bytes.TakeText());
+  const auto cloud = formats::ReadCloud(path, options);
+  if (options.format == "npy") {
+    fuzz::RequireRows(path, cloud);
+  }
   if (!cloud.ok()) {
     fuzz::Require(cloud.status().code() == absl::StatusCode::kInvalidArgument,
                   "a bad file is an INVALID_ARGUMENT:", cloud.status().ToString());

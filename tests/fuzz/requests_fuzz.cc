@@ -1,13 +1,16 @@
 // What a client may send in one call, through the server's checks and into the mesher.
 //
 // Input: requests, each as its length in two bytes, low one first, and that many bytes of a serialized MeshPointsRequest.
+#include <algorithm>
 #include <cstring>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "google/rpc/error_details.pb.h"
 #include "google/rpc/status.pb.h"
 #include "server/cloud_receiver.h"
+#include "server/wire.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/fuzz/mesh_check.h"
 #include "wellspace/v1/errors.pb.h"
@@ -42,14 +45,24 @@ void RequireInvariants(const server::CloudReceiver& receiver) {
   }
 }
 
+// As the network may bring it.
+grpc::ByteBuffer InSlices(std::string_view message) {
+  constexpr size_t kSliceBytes = 7;
+  std::vector<grpc::Slice> slices;
+  for (; !message.empty(); message.remove_prefix(slices.back().size())) {
+    slices.emplace_back(message.data(), std::min(kSliceBytes, message.size()));
+  }
+  return {slices.data(), slices.size()};
+}
+
 // Feeds the requests to `receiver` and collects the coordinates in `sent`. False when the call ended with an error.
 bool ReceiveAll(ByteReader& bytes, server::CloudReceiver& receiver, std::vector<double>& sent) {
   while (!bytes.empty()) {
-    const size_t low = bytes.Next();
-    const std::span<const uint8_t> message = bytes.Take(low | size_t{bytes.Next()} << 8);
+    grpc::ByteBuffer buffer = InSlices(bytes.TakeBlock());
     v1::MeshPointsRequest request;
-    if (!request.ParseFromArray(message.data(), static_cast<int>(message.size()))) {
-      return false;  // gRPC ends such a call itself
+    if (const grpc::Status status = server::ParseRequest(&buffer, &request); !status.ok()) {
+      RequireError(status);
+      return false;
     }
     sent.insert(sent.end(), request.points().coordinates().begin(), request.points().coordinates().end());
     if (const grpc::Status status = receiver.Accept(&request); !status.ok()) {
