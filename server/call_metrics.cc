@@ -96,6 +96,7 @@ void CallMetrics::AddMethod(const Families& families, const std::string& service
   auto method = std::make_unique<Method>();
   method->service = service;
   method->name = name;
+  method->is_known = name != kUnknown;
   method->started = &families.started.Add(labels);
   method->received = &families.received.Add(labels);
   method->sent = &families.sent.Add(labels);

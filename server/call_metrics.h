@@ -31,6 +31,7 @@ class CallMetrics {
   struct Method {
     std::string service;  // "wellspace.v1.MeshingService"
     std::string name;     // "MeshPoints"
+    bool is_known;        // false: of all methods that nobody serves
     prometheus::Counter* started;
     prometheus::Counter* received;  // messages
     prometheus::Counter* sent;      // messages

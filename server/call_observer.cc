@@ -11,6 +11,7 @@
 #include "absl/strings/str_format.h"
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
+#include "server/errors.h"
 #include "server/log_fields.h"
 
 namespace wellspace::server {
@@ -88,7 +89,9 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
     }
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_STATUS)) {
       methods->GetSendTrailingMetadata()->emplace(kRequestId, request_id_);
-      End(methods->GetSendStatus());
+      const grpc::Status status = ServersStatus(methods->GetSendStatus());
+      methods->ModifySendStatus(status);
+      End(status);
     }
     methods->Proceed();
   }
@@ -99,6 +102,17 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
   }
 
  private:
+  // gRPC ends a call whose only request is no message with UNIMPLEMENTED, without asking its handler, who would have asked who calls.
+  grpc::Status ServersStatus(const grpc::Status& status) const {
+    if (status.error_code() != grpc::StatusCode::UNIMPLEMENTED || !method_.is_known) {
+      return status;
+    }
+    return tenant_.empty()
+               ? MakeError(v1::ERROR_REASON_UNAUTHENTICATED, "this server wants to know who calls")
+               : MakeError(v1::ERROR_REASON_MALFORMED_REQUEST,
+                           absl::StrCat("the request is not one message of ", method_.service, ".", method_.name));
+  }
+
   void End(const grpc::Status& status) {
     const double seconds = absl::ToDoubleSeconds(absl::Now() - start_);
     method_.Handled(status.error_code(), seconds);

@@ -2,20 +2,21 @@
 
 #include <future>
 
-#include "absl/strings/str_cat.h"
 #include "gmock/gmock.h"
 #include "grpcpp/generic/generic_stub.h"
 #include "gtest/gtest.h"
 #include "tests/formats/temporary_folder.h"
+#include "tests/server/raw_call.h"
+#include "tests/server/raw_http2.h"
 #include "tests/server/service_harness.h"
-#include "wellspace/v1/operations.pb.h"
-#include "wellspace/v1/queries.pb.h"
-#include "wellspace/v1/sessions.pb.h"
+#include "tests/server/service_methods.h"
 
 namespace wellspace::server {
 namespace {
 
+using ::testing::Ge;
 using ::testing::HasSubstr;
+using ::testing::SizeIs;
 
 const std::string kToken(40, 'k');
 
@@ -84,22 +85,28 @@ TEST_F(TokensWanted, RefusesEverythingElse) {
 }
 
 TEST_F(TokensWanted, EveryMethodOfEveryServiceAsks) {
-  int methods = 0;
-  for (const google::protobuf::FileDescriptor* file :
-       {v1::MeshPointsRequest::descriptor()->file(), v1::Session::descriptor()->file(),
-        v1::Operation::descriptor()->file(), v1::VoronoiCellsRequest::descriptor()->file()}) {
-    ASSERT_GE(file->service_count(), 1) << file->name();
-    for (int i = 0; i < file->service_count(); ++i) {
-      const google::protobuf::ServiceDescriptor* service = file->service(i);
-      for (int j = 0; j < service->method_count(); ++j) {
-        const std::string path = absl::StrCat("/", service->full_name(), "/", service->method(j)->name());
-        const grpc::Status status = CallEmpty(path);
-        EXPECT_EQ(status.error_code(), grpc::StatusCode::UNAUTHENTICATED) << path << ": " << status.error_message();
-        ++methods;
-      }
-    }
+  ASSERT_THAT(ServiceMethods(), SizeIs(Ge(19)));
+  for (const google::protobuf::MethodDescriptor* method : ServiceMethods()) {
+    const grpc::Status status = CallEmpty(PathOf(*method));
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::UNAUTHENTICATED)
+        << method->full_name() << ": " << status.error_message();
+    EXPECT_EQ(CallUnary(harness_.channel(), PathOf(*method), "no message").status.error_code(),
+              grpc::StatusCode::UNAUTHENTICATED)
+        << method->full_name();
   }
-  EXPECT_GE(methods, 19);
+}
+
+// A client that streams is told before it has sent anything, any other as soon as it has sent its one request.
+TEST_F(TokensWanted, EveryMethodAsksBeforeAnythingElse) {
+  for (const google::protobuf::MethodDescriptor* method : ServiceMethods()) {
+    RawConnection connection(harness_.server().address());
+    connection.Send(ConnectionStart());
+    connection.Send(BeginCall(1, PathOf(*method)));
+    if (!method->client_streaming()) {
+      connection.Send(Frame{.type = Frame::kData, .flags = Frame::kEndStream, .stream = 1, .payload = GrpcMessage("")});
+    }
+    EXPECT_EQ(connection.ReadStatus(1), grpc::StatusCode::UNAUTHENTICATED) << method->full_name();
+  }
 }
 
 TEST_F(TokensWanted, HealthIsForEverybody) { EXPECT_TRUE(CallEmpty("/grpc.health.v1.Health/Check").ok()); }
