@@ -167,8 +167,8 @@ bool LineReader::Next(std::string_view& line) {
 }
 
 bool LineReader::NextContent(std::string_view& line) {
+  comment_.clear();
   while (Next(line)) {
-    comment_ = {};
     if (const size_t comment = line.find('#'); comment != std::string_view::npos) {
       comment_ = TrimBlanks(line.substr(comment + 1));
       line = line.substr(0, comment);

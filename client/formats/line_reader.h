@@ -59,8 +59,8 @@ class LineReader {
   bool Next(std::string_view& line);
   // Like Next, but skips what is blank or a comment, and cuts the comment off; a comment starts at '#'.
   bool NextContent(std::string_view& line);
-  // The comment that was cut off the line that NextContent returned last, without '#' and blanks around it; valid as long.
-  std::string_view comment() const { return comment_; }
+  // The last comment that the last NextContent skipped or cut off, without '#' and blanks around it; empty if there was none.
+  const std::string& comment() const { return comment_; }
 
   const absl::Status& status() const { return status_; }
   const std::string& name() const { return file_.name(); }
@@ -78,7 +78,7 @@ class LineReader {
   size_t end_ = 0;
   bool at_end_ = false;
   uint64_t line_number_ = 0;
-  std::string_view comment_;
+  std::string comment_;
   absl::Status status_;
 };
 

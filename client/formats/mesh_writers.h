@@ -25,7 +25,7 @@ absl::StatusOr<std::unique_ptr<MeshWriter>> CreateNodeAndEle(const std::string& 
 // INTERNAL unless as many rows have come as `shape` says.
 absl::Status CheckComplete(const MeshShape& shape, uint64_t vertices, uint64_t weights, uint64_t simplices);
 
-// The comment that ends the header of a .node whose attribute is the weight of its points.
+// The comment ahead of the header of a .node whose attribute is the weight of its points.
 inline constexpr char kWeightsComment[] = "weights";
 
 // "a/mesh.ele" of "a/mesh.node" and the other way round: `path` with its extension replaced.

@@ -6,8 +6,8 @@
 //   npz   numpy's archive of arrays: `points` of type Float64 or Float32, vertices x dimension; `simplices` of type Int32,
 //         Int64, UInt32 or UInt64, simplices x (dimension + 1); little-endian, in C or Fortran order; weights are `weights`, as
 //         many numbers as there are vertices. Others are ignored.
-//   node  TetGen's and Triangle's pair of .node and .ele, given by either name. Weights are the only attribute of .node if its
-//         header ends in the comment "# weights".
+//   node  TetGen's and Triangle's pair of .node and .ele, given by either name. Weights are the only attribute of .node if the
+//         comment "# weights" stands before its header.
 #ifndef WELLSPACE_CLIENT_FORMATS_READ_MESH_H_
 #define WELLSPACE_CLIENT_FORMATS_READ_MESH_H_
 

@@ -6,7 +6,7 @@
 //   npz   numpy's archive of arrays: `points` of type Float64, vertices x dimension; `simplices` of type UInt32,
 //         simplices x (dimension + 1); `weights` of type Float64, one for each vertex, if there are any; deflated.
 //   node  TetGen's and Triangle's pair of .node and .ele, given by either name; indices start at 0. TetGen itself knows
-//         3-D only, Triangle 2-D. Weights are the only attribute of .node; the comment "# weights" at the end of
+//         3-D only, Triangle 2-D. Weights are the only attribute of .node; the comment "# weights" before
 //         its header says so.
 #ifndef WELLSPACE_CLIENT_FORMATS_WRITE_MESH_H_
 #define WELLSPACE_CLIENT_FORMATS_WRITE_MESH_H_

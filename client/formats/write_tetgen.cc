@@ -18,8 +18,8 @@ class NodeAndEleWriter final : public MeshWriter {
  public:
   NodeAndEleWriter(OutputFile nodes, OutputFile simplices, const MeshShape& shape)
       : shape_(shape), nodes_(std::move(nodes)), simplices_(std::move(simplices)) {
-    nodes_.Write(absl::StrCat(shape.vertex_count, " ", shape.dimension,
-                              shape.has_weights ? absl::StrCat(" 1 0 # ", kWeightsComment) : " 0 0", "\n"));
+    nodes_.Write(absl::StrCat(shape.has_weights ? absl::StrCat("# ", kWeightsComment, "\n") : "", shape.vertex_count,
+                              " ", shape.dimension, shape.has_weights ? " 1 0\n" : " 0 0\n"));
     simplices_.Write(absl::StrCat(shape.simplex_count, " ", shape.dimension + 1, " 0\n"));
   }
 

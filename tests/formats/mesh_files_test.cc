@@ -155,12 +155,12 @@ TEST_F(MeshFilesTest, WeightsOfANode) {
     return ReadMesh(folder_.Write("mesh.node", header + "\n0 0 0 1\n1 1 0 0.25\n2 0 1" + last + "\n"));
   };
   EXPECT_TRUE(read("3 2 1 0", " 2")->weights.empty());
-  EXPECT_TRUE(read("3 2 1 0 # heat", " 2")->weights.empty());
-  EXPECT_THAT(read("3 2 1 0 # weights", " 2")->weights, ElementsAre(1, 0.25, 2));
-  EXPECT_THAT(read("3 2 1 1 # weights", " 2 1")->weights, ElementsAre(1, 0.25, 2));
-  EXPECT_THAT(std::string(read("3 2 1 0 # weights", "").status().message()),
-              HasSubstr("mesh.node:4: expected a weight after the coordinates"));
-  EXPECT_THAT(std::string(read("3 2 1 0 # weights", " nan").status().message()), HasSubstr("mesh.node:4: weight: "));
+  EXPECT_TRUE(read("# weights\n# heat\n3 2 1 0", " 2")->weights.empty());
+  EXPECT_THAT(read("# weights\n3 2 1 0", " 2")->weights, ElementsAre(1, 0.25, 2));
+  EXPECT_THAT(read("# weights\n# of points\n\n# weights \n3 2 1 1", " 2 1")->weights, ElementsAre(1, 0.25, 2));
+  EXPECT_THAT(std::string(read("# weights\n3 2 1 0", "").status().message()),
+              HasSubstr("mesh.node:5: expected a weight after the coordinates"));
+  EXPECT_THAT(std::string(read("# weights\n3 2 1 0", " nan").status().message()), HasSubstr("mesh.node:5: weight: "));
 }
 
 // A mesh of 200 MB goes to disk with a tenth of that in memory.

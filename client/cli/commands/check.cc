@@ -1,5 +1,6 @@
 // wellspace check: is it a mesh, and how good is it?
 #include <algorithm>
+#include <cmath>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -14,6 +15,8 @@
 #include "client/cli/parameter_options.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/remote_command.h"
+#include "client/cli/render/histograms.h"
+#include "client/cli/render/picture_format.h"
 #include "client/formats/read_cloud.h"
 #include "client/formats/read_mesh.h"
 #include "core/simplex/validate.h"
@@ -70,6 +73,50 @@ void PrintReport(const core::QualityReport& report, int dimension) {
   }
 }
 
+// The part of the counts from the first to the last that is not 0, but at least up to `least`.
+void Trim(render::Histogram& histogram, double least) {
+  size_t first = 0;
+  while (first + 1 < histogram.counts.size() && histogram.counts[first] == 0) {
+    ++first;
+  }
+  size_t last = histogram.counts.size();
+  while (last > first + 1 && histogram.counts[last - 1] == 0 &&
+         histogram.low + histogram.width * static_cast<double>(last) > least) {
+    --last;
+  }
+  histogram.counts.resize(last);
+  histogram.counts.erase(histogram.counts.begin(), histogram.counts.begin() + static_cast<ptrdiff_t>(first));
+  histogram.low += histogram.width * static_cast<double>(first);
+}
+
+absl::Status Plot(const core::QualityReport& report, int dimension, const std::string& mesh_path,
+                  render::PictureFormat format, const std::string& path) {
+  const std::string angle = dimension == 2 ? "angle" : "dihedral angle";
+  const std::string unit = "\u00b0";
+  const auto best = static_cast<size_t>(std::ceil(core::LargestSmallestAngle(dimension)));
+  std::vector<render::Histogram> histograms = {
+      {.title = "smallest " + angle,
+       .unit = unit,
+       .counts = {report.min_angles.begin(), report.min_angles.begin() + best}},
+      {.title = "largest " + angle,
+       .unit = unit,
+       .tick = 20,
+       .counts = {report.max_angles.begin(), report.max_angles.end()}},
+      {.title = "radius-edge ratio",
+       .width = core::kRatioWidth,
+       .tick = 0.5,
+       .counts = {report.radius_edge_ratios.begin(), report.radius_edge_ratios.end()}}};
+  Trim(histograms[1], core::kDegrees);
+  Trim(histograms[2], 2);
+  if (report.radius_edge_ratios.back() > 0) {
+    histograms[2].title += absl::StrFormat(" (last bar: above %g)", (core::kRatioBins - 1) * core::kRatioWidth);
+  }
+  const std::string caption = absl::StrFormat(
+      "%s: %s %s, %ss %.4g\u00b0 to %.4g\u00b0, radius-edge at most %.4g", mesh_path, WithThousands(report.simplices),
+      formats::SimplexName(dimension), angle, report.min_angle_deg, report.max_angle_deg, report.max_radius_edge);
+  return render::WriteHistograms(histograms, caption, format, path);
+}
+
 struct CheckCommand {
   std::string mesh_path;
   std::string cloud_path;
@@ -79,6 +126,7 @@ struct CheckCommand {
   double max_circumradius = 0;
   std::vector<std::vector<double>> size_boxes;
   double min_dihedral = 0;
+  std::string plot_path;
   OutputFormat format = OutputFormat::kText;
 
   absl::StatusOr<std::vector<core::SizeBox>> SizeBoxes(int dimension) const;
@@ -98,6 +146,11 @@ absl::StatusOr<std::vector<core::SizeBox>> CheckCommand::SizeBoxes(int dimension
 }
 
 int CheckCommand::Run() const {
+  const absl::StatusOr<render::PictureFormat> plot_format =
+      plot_path.empty() ? render::PictureFormat::kPng : render::PictureFormatOf(plot_path);
+  if (!plot_format.ok()) {
+    return ReportError(plot_format.status(), format);
+  }
   const absl::StatusOr<formats::Mesh> mesh = formats::ReadMesh(mesh_path);
   if (!mesh.ok()) {
     return ReportError(mesh.status(), format);
@@ -132,6 +185,11 @@ int CheckCommand::Run() const {
       json = ReportJson(report, mesh->dimension, !mesh->weights.empty());
     } else {
       PrintReport(report, mesh->dimension);
+    }
+    if (!plot_path.empty()) {
+      if (absl::Status plotted = Plot(report, mesh->dimension, mesh_path, *plot_format, plot_path); !plotted.ok()) {
+        return ReportError(plotted, format);
+      }
     }
     const bool is_well_spaced = criterion == client::Criterion::kWellSpaced;
     status = core::ValidateMesh(
@@ -189,6 +247,8 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
   AddNumber(*check, "--min-dihedral", command->min_dihedral,
             "Bound on the dihedral angles, in 2-D on the angles, in degrees; default: not checked")
       ->check(CLI::PositiveNumber);
+  check->add_option("--plot", command->plot_path, "Draw histograms of angles and radius-edge ratios, .png or .svg")
+      ->type_name("FILE");
   AddOutput(*check, command->format);
   check->callback([command, &exit_code] { exit_code = command->Run(); });
 }

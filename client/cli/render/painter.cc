@@ -1,31 +1,22 @@
 #include "client/cli/render/painter.h"
 
-#include <cairo-svg.h>
 #include <cairo.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "client/cli/render/canvas.h"
 #include "client/cli/render/colour_ramp.h"
 #include "client/formats/output_file.h"
-#include "client/formats/registry.h"
 
 namespace wellspace::render {
 namespace {
 
 using formats::OutputFile;
-
-struct Destroy {
-  void operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
-  void operator()(cairo_t* cairo) const { cairo_destroy(cairo); }
-};
-using Surface = std::unique_ptr<cairo_surface_t, Destroy>;
-using Canvas = std::unique_ptr<cairo_t, Destroy>;
 
 // PNG is painted larger by this and averaged: neighbours then meet without the light seams of antialiased edges.
 constexpr int kSupersampling = 2;
@@ -67,10 +58,6 @@ Layout MakeLayout(const Scene& scene, int width) {
   return layout;
 }
 
-void SetColour(cairo_t* cairo, const Colour& colour, double alpha = 1) {
-  cairo_set_source_rgba(cairo, colour.red, colour.green, colour.blue, alpha);
-}
-
 // Fills the triangles and draws their edges, which fade as the triangles get too small to show them.
 void PaintFacets(cairo_t* cairo, const Scene& scene, const Layout& layout, bool stroke_small) {
   constexpr double kInvisible = 1.2;  // pixels that a triangle is high
@@ -109,14 +96,6 @@ void PaintFacets(cairo_t* cairo, const Scene& scene, const Layout& layout, bool 
     }
     cairo_stroke(cairo);
   }
-}
-
-// Text whose left end is at x, centred vertically at y.
-void PaintText(cairo_t* cairo, double x, double y, const std::string& text) {
-  cairo_font_extents_t extents;
-  cairo_font_extents(cairo, &extents);
-  cairo_move_to(cairo, x, y + (extents.ascent - extents.descent) / 2);
-  cairo_show_text(cairo, text.c_str());
 }
 
 void PaintLegend(cairo_t* cairo, const Scene& scene, const Layout& layout) {
@@ -167,31 +146,6 @@ void PaintLegend(cairo_t* cairo, const Scene& scene, const Layout& layout) {
   }
 }
 
-void PaintBackground(cairo_t* cairo) {
-  cairo_set_source_rgb(cairo, 1, 1, 1);
-  cairo_paint(cairo);
-}
-
-cairo_status_t WriteToFile(void* closure, const unsigned char* data, unsigned int length) {
-  OutputFile& file = *static_cast<OutputFile*>(closure);
-  file.Write({reinterpret_cast<const char*>(data), length});
-  return file.status().ok() ? CAIRO_STATUS_SUCCESS : CAIRO_STATUS_WRITE_ERROR;
-}
-
-absl::Status ToStatus(cairo_status_t status, const OutputFile& file) {
-  if (!file.status().ok()) {
-    return file.status();
-  }
-  switch (status) {
-    case CAIRO_STATUS_SUCCESS:
-      return absl::OkStatus();
-    case CAIRO_STATUS_NO_MEMORY:
-      return absl::ResourceExhaustedError("not enough memory for the picture; expected a smaller width");
-    default:
-      return absl::InternalError(absl::StrCat("Cairo: ", cairo_status_to_string(status)));
-  }
-}
-
 // Averages squares of kSupersampling x kSupersampling pixels. Both images are CAIRO_FORMAT_RGB24.
 void Average(cairo_surface_t* large, cairo_surface_t* small) {
   cairo_surface_flush(large);
@@ -232,40 +186,26 @@ absl::Status WritePng(const Scene& scene, const Layout& layout, OutputFile& file
     PaintFacets(painting.get(), scene, layout, /*stroke_small=*/false);
     for (const cairo_status_t status : {cairo_status(painting.get()), cairo_status(canvas.get())}) {
       if (status != CAIRO_STATUS_SUCCESS) {
-        return ToStatus(status, file);
+        return CairoError(status, file);
       }
     }
     Average(large.get(), picture.get());
   }
   PaintLegend(canvas.get(), scene, layout);
-  return ToStatus(cairo_surface_write_to_png_stream(picture.get(), WriteToFile, &file), file);
+  return WriteAsPng(picture.get(), file);
 }
 
 absl::Status WriteSvg(const Scene& scene, const Layout& layout, OutputFile& file) {
-  const Surface picture(cairo_svg_surface_create_for_stream(WriteToFile, &file, layout.width, layout.height));
-  cairo_svg_surface_set_document_unit(picture.get(), CAIRO_SVG_UNIT_PX);
-  const Canvas canvas(cairo_create(picture.get()));
-  PaintBackground(canvas.get());
-  PaintFacets(canvas.get(), scene, layout, /*stroke_small=*/true);
-  PaintLegend(canvas.get(), scene, layout);
-  const cairo_status_t painted = cairo_status(canvas.get());
-  cairo_surface_finish(picture.get());
-  return ToStatus(painted != CAIRO_STATUS_SUCCESS ? painted : cairo_surface_status(picture.get()), file);
+  return PaintAsSvg(
+      layout.width, layout.height,
+      [&](cairo_t* cairo) {
+        PaintFacets(cairo, scene, layout, /*stroke_small=*/true);
+        PaintLegend(cairo, scene, layout);
+      },
+      file);
 }
 
 }  // namespace
-
-absl::StatusOr<PictureFormat> PictureFormatOf(const std::string& path) {
-  const std::string extension = formats::ExtensionOf(path);
-  if (extension == ".png") {
-    return PictureFormat::kPng;
-  }
-  if (extension == ".svg") {
-    return PictureFormat::kSvg;
-  }
-  return absl::InvalidArgumentError(
-      absl::StrCat(path, ": expected a picture .png or .svg, got the extension ", formats::Quote(extension)));
-}
 
 absl::Status WritePicture(const Scene& scene, int width, PictureFormat format, const std::string& path) {
   absl::StatusOr<OutputFile> file = OutputFile::Create(path);

@@ -5,17 +5,13 @@
 #include <string>
 
 #include "absl/status/status.h"
+#include "client/cli/render/picture_format.h"
 #include "client/cli/render/scene.h"
 
 namespace wellspace::render {
 
 inline constexpr int kMinWidth = 160;
 inline constexpr int kMaxWidth = 8192;
-
-enum class PictureFormat { kPng, kSvg };
-
-// PNG or SVG, by the extension of `path`. Errors: INVALID_ARGUMENT for any other one.
-absl::StatusOr<PictureFormat> PictureFormatOf(const std::string& path);
 
 // Paints `scene`, coloured by angle, with a legend, on white, `width` pixels wide and as high as the scene wants, to
 // twice its width at most. "-" is not a picture's path.
