@@ -111,8 +111,9 @@ absl::Status Mender::Run(RunContext& context) {
   return absl::OkStatus();
 }
 
-bool Mender::IsThere(const Sliver& sliver) const {
-  return triangulation_.IsIn(sliver.simplex) && triangulation_.item(sliver.simplex).vertices == sliver.vertices;
+bool Mender::IsThere(const Sliver& sliver) {
+  return triangulation_.IsIn(sliver.simplex) && triangulation_.item(sliver.simplex).vertices == sliver.vertices &&
+         CosineOf(sliver.simplex) > flat_cosine_;
 }
 
 double Mender::CosineOf(SimplexId s) {

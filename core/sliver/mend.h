@@ -66,7 +66,7 @@ class Mender {
   const MendReport& report() const { return report_; }
 
  private:
-  // A sliver by its number, and its vertices, for numbers are used again.
+  // A sliver by its number, and its vertices, for numbers are used again; and vertices move.
   struct Sliver {
     SimplexId simplex;
     std::array<VertexId, 4> vertices;
@@ -79,7 +79,7 @@ class Mender {
     bool may_insert_poor = false;  // where the new vertex has slivers, though better ones
   };
 
-  bool IsThere(const Sliver& sliver) const;
+  bool IsThere(const Sliver& sliver);
   double CosineOf(SimplexId s);
   bool IsAdmissible(const TetrahedronMeasure& measure, const std::array<VertexId, 4>& vertices, VertexId moved) const;
   bool KeepsNearestNeighbours(const Point<3>& p, VertexId moved);
