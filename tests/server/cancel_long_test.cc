@@ -1,4 +1,4 @@
-// How much is done after a cancel, at any moment of a large run: reading, tree, refinement, simplices, sending. What counts is the time
+// How much is done after a cancel, at any moment of a large run: reading, tree, refinement, simplices, slivers, sending. What counts is the time
 // of the processor, which is that of the clock on a machine that does nothing else.
 #include <time.h>
 
@@ -141,6 +141,18 @@ TEST_F(CancelTest, InRefinementAndSimplicesOfALargeMesh) {
     const core::RunContext* run = run_;
     const std::string phase = run == nullptr ? "done" : core::PhaseName(run->Snapshot().phase);
     Expect(Cancel(call), phase + ", " + std::to_string(fraction));
+  }
+}
+
+// Slivers are mended by the default.
+TEST_F(CancelTest, InMendingOfALargeMesh) {
+  points_ = RandomPoints(60'000, 3);
+  for (const double fraction : {0.0, 0.82, 0.86, 0.9, 0.94, 0.98}) {
+    has_returned_ = false;
+    TestCall call(harness_.stub());
+    Send(call);
+    WaitFor(core::Phase::kSlivers, fraction);
+    Expect(Cancel(call), "slivers, " + std::to_string(fraction));
   }
 }
 
