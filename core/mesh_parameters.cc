@@ -47,7 +47,7 @@ double MinimumRho(int dimension) {
   return kMinimums[dimension];
 }
 
-double DefaultMinDihedral(int) { return 0; }
+double DefaultMinDihedral(int dimension) { return dimension == 3 ? 12 : 0; }
 
 absl::Status ValidateParameters(const MeshParameters& parameters) {
   const int dimension = parameters.dimension;

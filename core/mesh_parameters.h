@@ -57,7 +57,7 @@ double DefaultRho(int dimension);
 double MinimumRho(int dimension);
 
 inline constexpr double kMostMinDihedral = 18;
-// The default of `min_dihedral`.
+// The default of `min_dihedral`: 12 in 3-D, 0 elsewhere.
 double DefaultMinDihedral(int dimension);
 
 // Refuses parameters that no cloud could make valid: dimension, rho, sizes, slivers, domain, margin, threads.

@@ -83,7 +83,7 @@ void ParameterOptions::AddQualityTo(CLI::App& command) {
   AddSizes(command, options_.max_circumradius, size_boxes_);
   AddNumber(command, "--min-dihedral", options_.min_dihedral,
             "3-D: move and add vertices until no dihedral angle is smaller, in degrees, up to 18; 0: leave slivers as "
-            "they are; default: the server's");
+            "they are; default: 12");
   command.add_flag("--pump-weights", options_.pump_weights,
                    "From 3-D on: give vertices weights that make the worst simplices better; the mesh is then their "
                    "regular triangulation, not Delaunay. After --min-dihedral only if that has left slivers");

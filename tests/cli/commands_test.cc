@@ -11,14 +11,17 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <string>
 #include <vector>
 
 #include "client/formats/read_mesh.h"
+#include "client/formats/write_mesh.h"
 #include "tests/cli/process.h"
 #include "tests/formats/temporary_folder.h"
 
@@ -263,6 +266,52 @@ TEST_F(CommandsTest, MeshAndCheckInSpace) {
   EXPECT_TRUE(stats.contains("min_dihedral_deg"));
   EXPECT_EQ(stats["domain_low"], nlohmann::json::parse("[-1.0, -1.0, -1.0]"));
   EXPECT_EQ(stats["domain_high"], nlohmann::json::parse("[2.0, 2.0, 2.0]"));
+}
+
+TEST_F(CommandsTest, SliversAreMendedOrPumpedAway) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> unit(0, 1);
+  std::string cloud;
+  for (int i = 0; i < 150; ++i) {
+    cloud +=
+        std::to_string(unit(random)) + "," + std::to_string(unit(random)) + "," + std::to_string(unit(random)) + "\n";
+  }
+  const auto statistics = [this] { return nlohmann::json::parse(folder_.Read("stats.json")); };
+  Mesh(cloud, "mended.vtu", {"--stats", Path("stats.json")});
+  EXPECT_EQ(statistics()["triangulation"], "delaunay");
+  EXPECT_GT(statistics()["slivers"]["moves"], 0);
+  EXPECT_LT(statistics()["slivers"]["min_angle_before_deg"], 12);
+  EXPECT_GE(statistics()["min_dihedral_deg"], 12);
+  const RunResult mended = RunWellspace(
+      {"check", Path("mended.vtu"), "--rho", "2", "--min-dihedral", "11.999", "--plot", Path("quality.svg")});
+  EXPECT_EQ(mended.exit_code, 0) << mended.out << mended.err;
+  EXPECT_THAT(mended.out, AllOf(HasSubstr("below 12\u00b0                0 (0.0000 %)"), Not(HasSubstr("regular"))));
+  EXPECT_THAT(folder_.Read("quality.svg"), AllOf(testing::StartsWith("<?xml"), HasSubstr("</svg>")));
+  EXPECT_EQ(RunWellspace({"check", Path("mended.vtu"), "--min-dihedral", "40"}).exit_code, 1);
+  const RunResult bad_plot = RunWellspace({"check", Path("mended.vtu"), "--plot", Path("quality.pdf")});
+  EXPECT_EQ(bad_plot.exit_code, 2);
+  EXPECT_THAT(bad_plot.err, HasSubstr("expected a picture .png or .svg"));
+
+  for (const char* name : {"pumped.vtu", "pumped.npz", "pumped.node"}) {
+    Mesh(cloud, name, {"--min-dihedral", "0", "--pump-weights", "--stats", Path("stats.json")});
+    EXPECT_EQ(statistics()["triangulation"], "regular");
+    EXPECT_GT(statistics()["slivers"]["weighted_vertices"], 0);
+    const RunResult pumped = RunWellspace({"check", Path(name), "--min-dihedral", "3"});
+    EXPECT_EQ(pumped.exit_code, 0) << pumped.out << pumped.err;
+    EXPECT_THAT(pumped.out, EndsWith("the regular triangulation of its weights\nvalid\n"));
+    const RunResult rho = RunWellspace({"check", Path(name), "--rho", "2"});
+    EXPECT_EQ(rho.exit_code, 2);
+    EXPECT_THAT(rho.err, HasSubstr("this mesh has weights"));
+  }
+  // Another weight, another triangulation.
+  absl::StatusOr<formats::Mesh> mesh = formats::ReadMesh(Path("pumped.npz"));
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  *std::max_element(mesh->weights.begin(), mesh->weights.end()) = 0;
+  ASSERT_TRUE(formats::WriteMesh(Path("wrong.npz"), "", mesh->View()).ok());
+  EXPECT_THAT(RunWellspace({"check", Path("wrong.npz")}).out, HasSubstr("violation: "));
+  Mesh(cloud, "plain.vtu", {"--min-dihedral", "0", "--stats", Path("stats.json")});
+  EXPECT_TRUE(statistics()["slivers"].is_null());
+  EXPECT_EQ(RunWellspace({"mesh", Path("cloud.csv"), "-o", Path("no.vtu"), "--min-dihedral", "19"}).exit_code, 2);
 }
 
 TEST_F(CommandsTest, EmptyCloudInADomain) {

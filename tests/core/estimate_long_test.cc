@@ -20,8 +20,6 @@
 #include <vector>
 
 #include "core/mesher.h"
-#include "core/refine/estimate.h"
-#include "tests/support/brute_force.h"
 #include "tests/support/clouds.h"
 
 namespace wellspace::core {
@@ -132,7 +130,7 @@ double PeakBytes() {
   return static_cast<double>(usage.ru_maxrss) * 1024;
 }
 
-std::optional<Made> MakeMesh(const Cloud& cloud, double rho) {
+std::optional<Made> MakeMesh(const MeshParameters& parameters, const Cloud& cloud) {
   std::array<int, 2> ends{};
   if (pipe(ends.data()) != 0) {
     return std::nullopt;
@@ -140,11 +138,6 @@ std::optional<Made> MakeMesh(const Cloud& cloud, double rho) {
   malloc_trim(0);  // what this process has freed would serve the child
   const pid_t child = fork();
   if (child == 0) {
-    MeshParameters parameters;
-    parameters.dimension = cloud.dimension;
-    parameters.rho = rho;
-    parameters.domain_low = cloud.low;
-    parameters.domain_high = cloud.high;
     RunContext context;
     const double before = PeakBytes();
     const absl::StatusOr<Mesh> mesh = MeshPoints(parameters, cloud.points, context);
@@ -167,34 +160,29 @@ std::optional<Made> MakeMesh(const Cloud& cloud, double rho) {
   return is_read && status == 0 ? std::optional(made) : std::nullopt;
 }
 
-template <int D>
-SizeEstimate EstimateOf(const Cloud& cloud, double rho) {
-  Box<D> box;
-  std::copy_n(cloud.low.begin(), D, box.low.begin());
-  std::copy_n(cloud.high.begin(), D, box.high.begin());
-  RunContext context;
-  QueryStructure<D> structure;
-  const absl::Status made =
-      structure.Initialize(box, test::MortonSorted<D>(box, test::ToPoints<D>(cloud.points)), 100'000'000, context);
-  EXPECT_TRUE(made.ok()) << made;
-  Demands<D> demands;
-  demands.rho = rho;
-  const absl::StatusOr<SizeEstimate> estimate = EstimateSize<D>(structure, demands, context);
-  EXPECT_TRUE(estimate.ok()) << estimate.status();
-  return estimate.value_or(SizeEstimate());
-}
-
 double Factor(double a, double b) { return std::max(a, b) / std::min(a, b); }
 
-void ExpectGoodEstimate(const Cloud& cloud, double rho, double most) {
+// By the default the mesh is mended, if `min_dihedral` does not say otherwise.
+void ExpectGoodEstimate(const Cloud& cloud, double rho, double most, std::optional<double> min_dihedral = {}) {
   SCOPED_TRACE("rho " + std::to_string(rho));
-  const std::optional<Made> made = MakeMesh(cloud, rho);
+  MeshParameters parameters;
+  parameters.dimension = cloud.dimension;
+  parameters.rho = rho;
+  parameters.min_dihedral = min_dihedral;
+  parameters.domain_low = cloud.low;
+  parameters.domain_high = cloud.high;
+  const std::optional<Made> made = MakeMesh(parameters, cloud);
   ASSERT_TRUE(made.has_value());
-  const SizeEstimate estimate = cloud.dimension == 2 ? EstimateOf<2>(cloud, rho) : EstimateOf<3>(cloud, rho);
-  EXPECT_LE(Factor(estimate.vertices, made->vertices), most) << estimate.vertices << " for " << made->vertices;
-  EXPECT_LE(Factor(estimate.simplices, made->simplices), most) << estimate.simplices << " for " << made->simplices;
+  RunContext context;
+  const absl::StatusOr<MeshEstimate> estimate = EstimateMesh(parameters, cloud.points, context);
+  ASSERT_TRUE(estimate.ok()) << estimate.status();
+  const auto vertices = static_cast<double>(estimate->vertices);
+  const auto simplices = static_cast<double>(estimate->simplices);
+  const auto bytes = static_cast<double>(estimate->memory_bytes);
+  EXPECT_LE(Factor(vertices, made->vertices), most) << vertices << " for " << made->vertices;
+  EXPECT_LE(Factor(simplices, made->simplices), most) << simplices << " for " << made->simplices;
   if (kMeasuresMemory) {
-    EXPECT_LE(Factor(estimate.bytes, made->bytes), most) << estimate.bytes << " for " << made->bytes;
+    EXPECT_LE(Factor(bytes, made->bytes), most) << bytes << " for " << made->bytes;
   }
 }
 
@@ -255,7 +243,7 @@ TEST_P(EstimateAtAnyRhoLongTest, FromTheTightestToNone) {
     if ((dimension == 3 && rho < 1.2) || (is_quadratic && rho > 20)) {
       continue;
     }
-    ExpectGoodEstimate(CloudOf(GetParam()), rho, 2);
+    ExpectGoodEstimate(CloudOf(GetParam()), rho, 2, /*min_dihedral=*/0);
   }
 }
 

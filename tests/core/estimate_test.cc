@@ -93,6 +93,7 @@ TYPED_TEST(EstimateTest, IsNearWhatMeshingMakes) {
       MeshParameters parameters;
       parameters.dimension = D;
       parameters.rho = rho;
+      parameters.min_dihedral = 0;
       parameters.domain_low = test::UnitLow(D);
       parameters.domain_high = test::UnitHigh(D);
       RunContext context;

@@ -42,6 +42,7 @@ void ExpectConstantWork(std::string_view kind, int dimension, std::span<const si
     SCOPED_TRACE(n);
     core::MeshParameters parameters;
     parameters.dimension = dimension;
+    parameters.min_dihedral = 0;  // of the query structure's work none is there
     parameters.domain_low = UnitLow(dimension);
     parameters.domain_high = UnitHigh(dimension);
     core::RunContext context;

@@ -49,7 +49,7 @@ TEST(Memory, IsReservedForTheTreeThenForTheMeshAndTheRunHoldsNoMore) {
   EXPECT_LT(lender.reserved[0], lender.reserved[1]);
   EXPECT_LE(lender.peak, lender.reserved[1]);
   EXPECT_GE(4 * lender.peak, lender.reserved[1]);
-  for (const Phase phase : {Phase::kTree, Phase::kRefinement, Phase::kSimplices}) {
+  for (const Phase phase : {Phase::kTree, Phase::kRefinement, Phase::kSimplices, Phase::kSlivers}) {
     EXPECT_GT(lender.asked[static_cast<int>(phase)], 0) << PhaseName(phase);
   }
 }
@@ -74,7 +74,7 @@ TEST(Memory, ARefusedReservationEndsTheRunWithTheLendersError) {
 }
 
 TEST(Memory, ARunThatOutgrowsItInAnyPhaseEndsWithTheLendersErrorAndCanGoOn) {
-  const MeshParameters parameters{.dimension = 3};
+  const MeshParameters parameters{.dimension = 3, .min_dihedral = 0};
   for (const int threads : {1, 2}) {
     RunContext context;
     Lender lender(context);

@@ -104,7 +104,10 @@ TEST_P(MesherTest, PointsAddedToARefinedMeshBecomeVerticesOfAValidOne) {
       ExpectValid(mesh);
       EXPECT_TRUE(Canonical(mesh) == Canonical(Extract(*mesher))) << "an update is what a new extraction gives";
     }
-    EXPECT_TRUE(std::equal(before.points.begin(), before.points.end(), mesh.points.begin())) << "vertices stay";
+    // In 3-D others than those that were given, and the corners, may move against slivers.
+    const auto stay = d_ == 3 ? static_cast<ptrdiff_t>(cloud.size()) : static_cast<ptrdiff_t>(before.points.size());
+    EXPECT_TRUE(std::equal(before.points.begin(), before.points.begin() + stay, mesh.points.begin()))
+        << "vertices stay";
     EXPECT_EQ(mesh.statistics.vertices, mesh.vertex_count());
     EXPECT_EQ(mesh.statistics.input_points, given.size() / d_);
     const QualityReport quality = MeasureQuality({d_, mesh.points, mesh.simplices});
