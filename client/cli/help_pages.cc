@@ -1,6 +1,5 @@
 #include "client/cli/help_pages.h"
 
-#include <algorithm>
 #include <map>
 #include <vector>
 

@@ -1,15 +1,18 @@
 // wellspace: meshes of point clouds from the command line.
 #include <CLI/CLI.hpp>
 #include <csignal>
+#include <cstdlib>
 #include <iostream>
 #include <new>
 
 #include "client/cli/commands/commands.h"
 #include "client/cli/exit_codes.h"
+#include "client/cli/usage.h"
 
 int main(int argc, char** argv) {
   using namespace wellspace::cli;
-  std::signal(SIGPIPE, SIG_IGN);  // a closed pipe is an error of writing, which is reported
+  std::signal(SIGPIPE, SIG_IGN);                      // a closed pipe is an error of writing, which is reported
+  setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);  // errors of connections are told by the commands
   CLI::App app("Quality simplicial meshes from point clouds", "wellspace");
   app.set_version_flag("--version", std::string("wellspace ") + WELLSPACE_VERSION);
   app.require_subcommand(1);
@@ -17,12 +20,9 @@ int main(int argc, char** argv) {
   int exit_code = kExitOk;
   AddCommands(app, exit_code);
   try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kExitOk : kExitBadInput;
+    return RunCommandLine(app, {argv + 1, argv + argc}, exit_code);
   } catch (const std::bad_alloc&) {
     std::cerr << "wellspace: out of memory\n";
     return kExitExhausted;
   }
-  return exit_code;
 }

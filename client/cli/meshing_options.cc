@@ -1,7 +1,6 @@
 #include "client/cli/meshing_options.h"
 
 #include <iostream>
-#include <utility>
 
 #include "client/formats/line_reader.h"
 #include "client/formats/output_file.h"

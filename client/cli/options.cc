@@ -3,6 +3,7 @@
 #include <cstdlib>
 
 #include "absl/status/status.h"
+#include "absl/strings/str_cat.h"
 #include "client/formats/number.h"
 
 namespace wellspace::cli {
@@ -43,6 +44,35 @@ CLI::Option* AddNumber(CLI::App& command, const std::string& name, double& value
 CLI::Option* AddNumber(CLI::App& command, const std::string& name, std::optional<double>& value,
                        const std::string& description) {
   return AddNumberTo(command, name, value, description);
+}
+
+CLI::Validator AboveZero() {
+  return CLI::Validator(
+      [](std::string& text) {
+        double value = 0;
+        const bool is_number = formats::ParseFinite(formats::TrimBlanks(text), value).ok();
+        return is_number && value > 0 ? "" : absl::StrCat("expected a number above 0, got ", formats::Quote(text));
+      },
+      "");
+}
+
+uint64_t ParseCount(const std::string& name, std::string_view text, uint64_t least, uint64_t most) {
+  uint64_t value = 0;
+  if (!formats::ParseUnsigned(text, most, value) || value < least) {
+    const bool has_limit = most != std::numeric_limits<uint64_t>::max();
+    throw CLI::ValidationError(
+        name, absl::StrCat("expected a whole number of at least ", least,
+                           has_limit ? absl::StrCat(" and at most ", most) : "", ", got ", formats::Quote(text)));
+  }
+  return value;
+}
+
+CLI::Option* AddCount(CLI::App& command, const std::string& name, const std::function<void(uint64_t)>& take,
+                      const std::string& description, uint64_t least, uint64_t most) {
+  return command
+      .add_option_function<std::string>(
+          name, [=](const std::string& text) { take(ParseCount(name, text, least, most)); }, description)
+      ->type_name("COUNT");
 }
 
 CLI::Option* AddNumbers(CLI::App& command, const std::string& name, std::vector<double>& values,

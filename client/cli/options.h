@@ -3,8 +3,12 @@
 #define WELLSPACE_CLIENT_CLI_OPTIONS_H_
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
+#include <functional>
+#include <limits>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "client/cli/server_link.h"
@@ -15,6 +19,17 @@ namespace wellspace::cli {
 CLI::Option* AddNumber(CLI::App& command, const std::string& name, double& value, const std::string& description);
 CLI::Option* AddNumber(CLI::App& command, const std::string& name, std::optional<double>& value,
                        const std::string& description);
+
+// To be checked of a number: it is above 0.
+CLI::Validator AboveZero();
+
+// A whole number of at least `least` and at most `most`; CLI11 takes -1 for the largest there is.
+CLI::Option* AddCount(CLI::App& command, const std::string& name, const std::function<void(uint64_t)>& take,
+                      const std::string& description, uint64_t least = 0,
+                      uint64_t most = std::numeric_limits<uint64_t>::max());
+
+// The whole number of at most `most` in the text of option `name`.
+uint64_t ParseCount(const std::string& name, std::string_view text, uint64_t least, uint64_t most);
 
 // Finite numbers separated by commas.
 CLI::Option* AddNumbers(CLI::App& command, const std::string& name, std::vector<double>& values,

@@ -87,10 +87,12 @@ void ParameterOptions::AddQualityTo(CLI::App& command) {
   command.add_flag("--pump-weights", options_.pump_weights,
                    "From 3-D on: give vertices weights that make the worst simplices better; the mesh is then their "
                    "regular triangulation, not Delaunay. After --min-dihedral only if that has left slivers");
-  command.add_option("--max-vertices", options_.max_vertices,
-                     "Fail before the mesh has more vertices than this; 50 million by default");
-  command.add_option("--threads", options_.threads, "Threads that mesh; default: the server's choice")
-      ->check(CLI::Range(1, 1024));
+  AddCount(
+      command, "--max-vertices", [this](uint64_t count) { options_.max_vertices = count; },
+      "Fail before the mesh has more vertices than this; 50 million by default", 1);
+  AddCount(
+      command, "--threads", [this](uint64_t count) { options_.threads = static_cast<int>(count); },
+      "Threads that mesh; default: 1", 1, 1024);
   for (const char* name : {"--criterion", "--rho", "--size", "--size-box", "--min-dihedral", "--pump-weights",
                            "--max-vertices", "--threads"}) {
     quality_.push_back(command.get_option(name));

@@ -56,7 +56,7 @@ void RemoteCommand::AddTo(CLI::App& command, Needs needs) {
   needs_ = needs;
   AddServer(command, server_);
   AddNumber(command, "--timeout", timeout_seconds_, "Give up after so many seconds; default: never")
-      ->check(CLI::PositiveNumber);
+      ->check(AboveZero());
   AddOutput(command, format_);
   command.add_flag("-q,--quiet", quiet_, "Print errors and results only");
 }

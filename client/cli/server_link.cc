@@ -2,13 +2,14 @@
 
 #include <utility>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "client/connection.h"
 
 namespace wellspace::cli {
 
 absl::StatusOr<std::unique_ptr<ServerLink>> ServerLink::Open(const ServerChoice& choice) {
-  std::unique_ptr<ServerLink> link(new ServerLink(choice.address));
+  std::unique_ptr<ServerLink> link(new ServerLink(choice));
   if (choice.address.empty()) {
     link->server_ = std::make_unique<server::EmbeddedServer>(/*workers=*/1);
     link->client_.emplace(client::MakeConnection(link->server_->Channel()));
@@ -27,10 +28,22 @@ absl::StatusOr<std::unique_ptr<ServerLink>> ServerLink::Open(const ServerChoice&
 }
 
 absl::Status ServerLink::Explain(const absl::Status& status) const {
-  if (address_.empty() || status.code() != absl::StatusCode::kUnavailable) {
+  const client::ConnectOptions& connect = choice_.connect;
+  if (absl::IsUnauthenticated(status) && !client::ReasonOf(status).empty() && connect.token.empty() &&
+      connect.token_file.empty()) {
+    absl::Status explained(status.code(),
+                           absl::StrCat(status.message(), "; give --token-file, or set WELLSPACE_TOKEN"));
+    status.ForEachPayload(
+        [&](absl::string_view type, const absl::Cord& payload) { explained.SetPayload(type, payload); });
+    return explained;
+  }
+  if (choice_.address.empty() || !absl::IsUnavailable(status)) {
     return status;
   }
-  return absl::UnavailableError(absl::StrCat("server ", address_, ": ", status.message()));
+  const bool may_want_tls = !connect.tls && connect.tls_ca.empty() && connect.tls_certificate.empty() &&
+                            absl::StrContains(status.message(), "Socket closed");
+  return absl::UnavailableError(absl::StrCat("server ", choice_.address, ": ", status.message(),
+                                             may_want_tls ? "; if it wants TLS, give --tls or --tls-ca" : ""));
 }
 
 }  // namespace wellspace::cli

@@ -5,7 +5,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <utility>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -27,13 +26,13 @@ class ServerLink {
 
   client::Client& client() { return *client_; }
 
-  // `status`, with the server's address when it is about the connection.
+  // `status`, with the server's address when it is about the connection, and the options that would help.
   absl::Status Explain(const absl::Status& status) const;
 
  private:
-  explicit ServerLink(std::string address) : address_(std::move(address)) {}
+  explicit ServerLink(const ServerChoice& choice) : choice_(choice) {}
 
-  const std::string address_;
+  const ServerChoice choice_;
 
   // In this order, so that the client goes before its server.
   std::unique_ptr<server::EmbeddedServer> server_;

@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "absl/strings/str_cat.h"
+#include "client/cli/options.h"
 #include "client/formats/line_reader.h"
 #include "client/formats/number.h"
 
@@ -80,8 +81,9 @@ CLI::Option* AddLabels(CLI::App& command, client::Labels& labels, const std::str
 }
 
 void AddExpectedRevision(CLI::App& command, uint64_t& revision) {
-  command.add_option("--expected-revision", revision,
-                     "Change nothing unless the session is at this revision; default: any");
+  AddCount(
+      command, "--expected-revision", [&revision](uint64_t value) { revision = value; },
+      "Change nothing unless the session is at this revision; default: any", 1);
 }
 
 absl::StatusOr<std::vector<uint32_t>> ReadVertices(const std::string& path) {

@@ -5,7 +5,6 @@
 
 #include <future>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 #include "client/cli/exit_codes.h"
 #include "client/cli/interrupt.h"

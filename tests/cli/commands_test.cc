@@ -33,6 +33,7 @@ using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
+using ::testing::StartsWith;
 
 constexpr char kPlane[] = "x,y\n0,0\n1,0.1\n0.4,0.9\n0.5,0.45\n0,0\n0.1,0.2\n";
 constexpr char kSpace[] = "0 0 0\n1 0 0.1\n0 1 0\n0.1 0 1\n0.3 0.3 0.35\n0.31 0.3 0.35\n";
@@ -126,6 +127,47 @@ TEST_F(CommandsTest, WrongUsageIsExitCode2) {
     EXPECT_EQ(result.exit_code, 2) << testing::PrintToString(arguments) << result.err;
     EXPECT_THAT(result.err, Not(IsEmpty())) << testing::PrintToString(arguments);
     EXPECT_EQ(folder_.FileCount(), 1) << testing::PrintToString(arguments);
+  }
+}
+
+// What is wrong is said with where to read more, for programs as JSON.
+TEST_F(CommandsTest, WrongUsageIsExplained) {
+  struct Case {
+    std::vector<std::string> arguments;
+    std::string message;
+  };
+  const std::vector<Case> cases = {
+      {{}, "a command is missing; expected one of mesh, estimate, "},
+      {{"meshes"}, "there is no command meshes; expected one of mesh, "},
+      {{"session"},
+       "a command is missing; expected one of create, list, show, update, delete; see wellspace session --help"},
+      {{"session", "make"}, "there is no command make; expected one of create, "},
+      {{"mesh"}, "IN is required; see wellspace mesh --help"},
+      {{"mesh", "a.csv", "-o", "a.vtu", "--bogus", "7", "more"},
+       "not expected: --bogus 7 more; see wellspace mesh --help"},
+      {{"mesh", "a.csv", "-o", "a.vtu", "--timeout", "0"}, "--timeout: expected a number above 0, got \"0\""},
+      {{"mesh", "a.csv", "-o", "a.vtu", "--max-vertices", "-1"},
+       "--max-vertices: expected a whole number of at least 1, got \"-1\""},
+      {{"mesh", "a.csv", "-o", "a.vtu", "--threads", "x"},
+       "--threads: expected a whole number of at least 1 and at most 1024, got \"x\""},
+      {{"upload", "one", "a.csv", "--offset", "-1"}, "--offset: expected a whole number of at least 0, got \"-1\""},
+      {{"session", "list", "--limit", "0"}, "--limit: expected a whole number of at least 1, got \"0\""},
+      {{"cells", "one", "3", "-4"}, "VERTEX: expected a whole number of at least 0 and at most 4294967295, got \"-4\""},
+  };
+  for (const Case& one : cases) {
+    const RunResult text = RunWellspace(one.arguments);
+    EXPECT_EQ(text.exit_code, 2) << one.message;
+    EXPECT_THAT(text.err, AllOf(StartsWith("wellspace: " + one.message), EndsWith("--help [INVALID_ARGUMENT]\n")));
+    std::vector<std::string> as_json = one.arguments;
+    as_json.insert(as_json.end(), {"--output", "json"});
+    if (one.message.find("command") != std::string::npos || one.message.find("not expected") == 0) {
+      continue;  // --output is no option of these, or one of those that are told
+    }
+    const RunResult json = RunWellspace(as_json);
+    EXPECT_EQ(json.exit_code, 2) << one.message;
+    const nlohmann::json error = nlohmann::json::parse(json.err).at("error");
+    EXPECT_EQ(error.at("code"), "INVALID_ARGUMENT");
+    EXPECT_THAT(error.at("message").get<std::string>(), StartsWith(one.message));
   }
 }
 
@@ -441,6 +483,11 @@ TEST_F(CommandsTest, RenderMakesPictures) {
       RunWellspace({"render", Path("space.vtu"), "-o", Path("a.svg"), "--plane", "-1,0.5,0,0", "--up", "y"}).exit_code,
       0);
   EXPECT_NE(folder_.Read("a.svg"), picture);
+  const RunResult as_json =
+      RunWellspace({"render", Path("plane.vtu"), "-o", Path("b.png"), "--width", "300", "--output", "json"});
+  EXPECT_EQ(as_json.exit_code, 0) << as_json.err;
+  EXPECT_EQ(nlohmann::json::parse(as_json.out),
+            (nlohmann::json{{"mesh", Path("plane.vtu")}, {"picture", Path("b.png")}, {"width", 300}}));
   const RunResult nothing = RunWellspace({"render", Path("space.vtu"), "-o", Path("none.png"), "--plane", "1,0,0,-50"});
   EXPECT_EQ(nothing.exit_code, 2);
   EXPECT_THAT(nothing.err, HasSubstr("space.vtu: the plane cuts off all"));

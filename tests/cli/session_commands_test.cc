@@ -174,7 +174,8 @@ TEST_F(SessionCommandsTest, ShowTakesEitherFormOfAName) {
   for (const char* name : {"one", "sessions/one"}) {
     const RunResult result = Run({"session", "show", name});
     ASSERT_EQ(result.exit_code, 0) << result.err;
-    EXPECT_THAT(result.out, AllOf(HasSubstr("sessions/one\n"), HasSubstr("1,234"), HasSubstr("job=7")));
+    EXPECT_THAT(result.out, AllOf(HasSubstr("sessions/one\n"), HasSubstr("1,234"), HasSubstr("job=7"),
+                                  HasSubstr("radius-edge, rho 1.5\n")));
   }
 }
 
@@ -200,6 +201,19 @@ TEST_F(SessionCommandsTest, ListGoesThroughAllPages) {
   ASSERT_EQ(some.exit_code, 0) << some.err;
   EXPECT_EQ(std::count(some.out.begin(), some.out.end(), '\n'), 3);
   EXPECT_THAT(some.out, StartsWith("sessions/one"));
+}
+
+TEST_F(SessionCommandsTest, AListThatFailsPrintsNothingButTheErrorAndWhatWouldHelp) {
+  server_.sessions.list = [](const v1::ListSessionsRequest&, v1::ListSessionsResponse&) {
+    return MakeError(grpc::StatusCode::UNAUTHENTICATED, "a token is wanted", "ERROR_REASON_UNAUTHENTICATED");
+  };
+  const RunResult result = Run({"session", "list"});
+  EXPECT_EQ(result.exit_code, 6);
+  EXPECT_THAT(result.out, IsEmpty());
+  EXPECT_THAT(result.err, HasSubstr("a token is wanted; give --token-file, or set WELLSPACE_TOKEN"));
+  const RunResult as_json = Run({"session", "list", "--output", "json"});
+  EXPECT_THAT(as_json.out, IsEmpty());
+  EXPECT_EQ(json::parse(as_json.err).at("error").at("reason"), "ERROR_REASON_UNAUTHENTICATED");
 }
 
 TEST_F(SessionCommandsTest, UpdateAndDelete) {

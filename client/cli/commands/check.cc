@@ -241,12 +241,12 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
       ->check(CLI::IsMember(formats::CloudFormats()));
   CLI::Option* rho =
       AddNumber(*check, "--rho", command->rho, "Bound that the criterion must obey; default: not checked")
-          ->check(CLI::PositiveNumber);
+          ->check(AboveZero());
   AddCriterion(*check, command->criterion)->needs(rho);
   AddSizes(*check, command->max_circumradius, command->size_boxes);
   AddNumber(*check, "--min-dihedral", command->min_dihedral,
             "Bound on the dihedral angles, in 2-D on the angles, in degrees; default: not checked")
-      ->check(CLI::PositiveNumber);
+      ->check(AboveZero());
   check->add_option("--plot", command->plot_path, "Draw histograms of angles and radius-edge ratios, .png or .svg")
       ->type_name("FILE");
   AddOutput(*check, command->format);

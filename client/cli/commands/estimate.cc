@@ -1,7 +1,6 @@
 // wellspace estimate: how large would the mesh of a cloud be?
 #include <iostream>
 #include <memory>
-#include <string>
 
 #include "absl/strings/str_cat.h"
 #include "client/cli/commands/commands.h"

@@ -107,8 +107,9 @@ int OperationCommand::Refine() const {
           if (interrupt.signal() != 0) {
             return CancelNow(client, started->name);
           }
-          return absl::Status(ended.status().code(),
-                              absl::StrCat(ended.status().message(), "; ", started->name, " goes on"));
+          // A server that cannot be reached may be gone, with all its work.
+          const char* fate = absl::IsUnavailable(ended.status()) ? " may go on" : " goes on";
+          return absl::Status(ended.status().code(), absl::StrCat(ended.status().message(), "; ", started->name, fate));
         }
         PrintEnd(remote, *ended, /*indented=*/true);
         return parameters.Explain(EndOf(*ended));

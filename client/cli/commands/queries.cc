@@ -1,6 +1,7 @@
 // wellspace cells, add: the query structure over the vertices of a session.
 #include <cmath>
 #include <iostream>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -204,7 +205,16 @@ void AddQueryCommands(CLI::App& app, int& exit_code) {
   CLI::App* cells_app = app.add_subcommand("cells", "Print Voronoi cells of vertices of a session");
   cells_app->footer(absl::StrCat(kCellsFooter, "\n", kExitCodesHelp));
   AddSession(*cells_app, cells->session);
-  CLI::Option* vertices = cells_app->add_option("VERTEX", cells->vertices, "Numbers of vertices; default: all");
+  const auto parse_vertices = [cells](const std::vector<std::string>& texts) {
+    for (const std::string& text : texts) {
+      cells->vertices.push_back(
+          static_cast<uint32_t>(ParseCount("VERTEX", text, 0, std::numeric_limits<uint32_t>::max())));
+    }
+  };
+  CLI::Option* vertices =
+      cells_app
+          ->add_option_function<std::vector<std::string>>("VERTEX", parse_vertices, "Numbers of vertices; default: all")
+          ->type_name("COUNT ...");
   cells_app->add_option("--vertices", cells->vertices_path, "File with numbers of vertices, or - for standard input")
       ->type_name("FILE")
       ->excludes(vertices);
@@ -212,7 +222,7 @@ void AddQueryCommands(CLI::App& app, int& exit_code) {
       AddNumber(*cells_app, "--beta", cells->beta,
                 "Clip each cell by a cube of this times the distance to the nearest neighbour; at least "
                 "1; default: whole cells")
-          ->check(CLI::PositiveNumber);
+          ->check(AboveZero());
   cells_app->add_flag("--nearest", cells->nearest, "Print the distance to the nearest neighbour only")->excludes(beta);
   cells_app->add_option("-o,--out", cells->path, "File of the answer, or - for standard output")
       ->capture_default_str()

@@ -7,6 +7,7 @@
 #include "client/cli/commands/commands.h"
 #include "client/cli/exit_codes.h"
 #include "client/cli/options.h"
+#include "client/cli/remote_command.h"
 #include "client/cli/render/painter.h"
 #include "client/cli/render/scene.h"
 #include "client/formats/read_mesh.h"
@@ -20,6 +21,7 @@ struct RenderCommand {
   int width = 1600;
   std::vector<double> plane;  // empty, or normal and offset
   std::string up = "z";
+  OutputFormat format = OutputFormat::kText;
 
   absl::Status Render() const;
 };
@@ -28,9 +30,9 @@ absl::Status RenderCommand::Render() const {
   if (!plane.empty() && plane.size() != 4) {
     return absl::InvalidArgumentError(absl::StrCat("--plane: expected 4 numbers nx,ny,nz,d, got ", plane.size()));
   }
-  const absl::StatusOr<render::PictureFormat> format = render::PictureFormatOf(picture_path);
-  if (!format.ok()) {
-    return format.status();
+  const absl::StatusOr<render::PictureFormat> picture_format = render::PictureFormatOf(picture_path);
+  if (!picture_format.ok()) {
+    return picture_format.status();
   }
   const absl::StatusOr<formats::Mesh> mesh = formats::ReadMesh(mesh_path);
   if (!mesh.ok()) {
@@ -45,7 +47,13 @@ absl::Status RenderCommand::Render() const {
   if (!scene.ok()) {
     return absl::Status(scene.status().code(), absl::StrCat(mesh_path, ": ", scene.status().message()));
   }
-  return render::WritePicture(*scene, width, *format, picture_path);
+  if (absl::Status status = render::WritePicture(*scene, width, *picture_format, picture_path); !status.ok()) {
+    return status;
+  }
+  if (format == OutputFormat::kJson) {
+    PrintJson({{"mesh", mesh_path}, {"picture", picture_path}, {"width", width}});
+  }
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -72,9 +80,10 @@ void AddRenderCommand(CLI::App& app, int& exit_code) {
   render->add_option("--up", command->up, "Axis that points upwards in the picture of a 3-D mesh")
       ->capture_default_str()
       ->check(CLI::IsMember({"x", "y", "z"}));
+  AddOutput(*render, command->format);
   render->callback([command, &exit_code] {
     const absl::Status status = command->Render();
-    exit_code = status.ok() ? kExitOk : ReportError(status);
+    exit_code = status.ok() ? kExitOk : ReportError(status, command->format);
   });
 }
 

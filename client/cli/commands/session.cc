@@ -19,6 +19,24 @@ namespace {
 
 std::string LabelsText(const client::Labels& labels) { return absl::StrJoin(labels, " ", absl::PairFormatter("=")); }
 
+std::string QualityText(const client::MeshOptions& parameters) {
+  const bool is_well_spaced = parameters.criterion == client::Criterion::kWellSpaced;
+  std::string text = absl::StrFormat("%s, rho %g", is_well_spaced ? "well-spaced" : "radius-edge", parameters.rho);
+  if (parameters.max_circumradius != 0) {
+    absl::StrAppendFormat(&text, ", size %g", parameters.max_circumradius);
+  }
+  if (!parameters.size_boxes.empty()) {
+    absl::StrAppend(&text, ", ", parameters.size_boxes.size(), " size boxes");
+  }
+  if (parameters.min_dihedral.value_or(0) > 0) {
+    absl::StrAppendFormat(&text, ", no dihedral angle below %g\u00b0", *parameters.min_dihedral);
+  }
+  if (parameters.pump_weights) {
+    text += ", weights";
+  }
+  return text;
+}
+
 void PrintSession(const client::Session& session, bool json) {
   if (json) {
     PrintJson(SessionJson(session));
@@ -30,6 +48,11 @@ void PrintSession(const client::Session& session, bool json) {
   print("name", session.name);
   print("state", StateName(session.state));
   print("dimension", absl::StrCat(session.parameters.dimension));
+  print("domain", session.parameters.domain_low.empty()
+                      ? absl::StrFormat("of the points, and a margin of %g", session.parameters.margin)
+                      : absl::StrCat(absl::StrJoin(session.parameters.domain_low, ","), " to ",
+                                     absl::StrJoin(session.parameters.domain_high, ",")));
+  print("quality", QualityText(session.parameters));
   print("points", WithThousands(session.committed_points));
   print("vertices", WithThousands(session.vertex_count));
   print("simplices", WithThousands(session.simplex_count));
@@ -39,6 +62,16 @@ void PrintSession(const client::Session& session, bool json) {
   print("ttl", absl::StrFormat("%g s", absl::ToDoubleSeconds(session.ttl)));
   print("created", TimeText(session.create_time));
   print("expires", TimeText(session.expire_time));
+}
+
+// `status` with the option that the server blames under another name.
+absl::Status ExplainSettings(const absl::Status& status) {
+  const std::string field = client::BlamedField(status);
+  const bool is_ttl = field == "ttl" || field == "session.ttl";
+  const bool is_label = field.find("labels") != std::string::npos;
+  return !is_ttl && !is_label
+             ? status
+             : absl::Status(status.code(), absl::StrCat(is_ttl ? "--ttl: " : "--label: ", status.message()));
 }
 
 struct SessionCommand {
@@ -76,7 +109,7 @@ int SessionCommand::Create() {
     const absl::StatusOr<client::Session> created =
         client.CreateSession({.parameters = *options, .labels = labels, .ttl = Ttl()}, call);
     if (!created.ok()) {
-      return parameters.Explain(created.status());
+      return ExplainSettings(parameters.Explain(created.status()));
     }
     if (remote.json()) {
       PrintJson(SessionJson(*created));
@@ -92,16 +125,16 @@ int SessionCommand::List() {
     Json json = Json::array();
     client::PageOptions page;
     uint64_t listed = 0;
-    if (!remote.json() && !remote.quiet()) {
-      std::cout << absl::StrFormat("%-44s %-9s %12s %12s  %-20s  %s\n", "NAME", "STATE", "POINTS", "VERTICES",
-                                   "EXPIRES", "LABELS");
-    }
     do {
       constexpr uint64_t kLargestPage = 1000;
       page.page_size = static_cast<int>(limit == 0 ? 0 : std::min(limit - listed, kLargestPage));
       const absl::StatusOr<client::SessionPage> result = client.ListSessions(labels, page, call);
       if (!result.ok()) {
         return result.status();
+      }
+      if (page.page_token.empty() && !remote.json() && !remote.quiet()) {
+        std::cout << absl::StrFormat("%-44s %-9s %12s %12s  %-20s  %s\n", "NAME", "STATE", "POINTS", "VERTICES",
+                                     "EXPIRES", "LABELS");
       }
       for (const client::Session& one : result->sessions) {
         ++listed;
@@ -148,7 +181,7 @@ int SessionCommand::Update() {
     if (updated.ok() && (remote.json() || !remote.quiet())) {
       PrintSession(*updated, remote.json());
     }
-    return updated.status();
+    return ExplainSettings(updated.status());
   });
 }
 
@@ -179,7 +212,7 @@ CLI::App* Add(CLI::App& session, const char* name, const char* description,
 CLI::Option* AddTtl(CLI::App& app, double& seconds) {
   return AddNumber(app, "--ttl", seconds,
                    "Seconds that the session lives without any use; default: as the server likes it")
-      ->check(CLI::PositiveNumber);
+      ->check(AboveZero());
 }
 
 void AddCreate(CLI::App& session, int& exit_code) {
@@ -198,7 +231,8 @@ void AddList(CLI::App& session, int& exit_code) {
   const auto command = std::make_shared<SessionCommand>();
   CLI::App* app = Add(session, "list", "List sessions, the oldest first", command, &SessionCommand::List, exit_code);
   AddLabels(*app, command->labels, "Only sessions with this label; may be given more than once");
-  app->add_option("--limit", command->limit, "Most sessions to list; default: all")->check(CLI::PositiveNumber);
+  AddCount(
+      *app, "--limit", [command](uint64_t limit) { command->limit = limit; }, "Most sessions to list; default: all", 1);
   command->remote.AddTo(*app, RemoteCommand::Needs::kLastingServer);
 }
 

@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/cli/commands/commands.h"
 #include "client/cli/meshing_options.h"
+#include "client/cli/options.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/remote_command.h"
 #include "client/cli/session_options.h"
@@ -117,8 +118,8 @@ void AddUpload(CLI::App& app, int& exit_code) {
   AddSession(*upload, command->session);
   upload->add_option("IN", command->input, "File of points, or - for standard input")->required()->type_name("FILE");
   AddInputFormat(*upload, command->input_format);
-  upload->add_option(
-      "--offset", command->offset,
+  AddCount(
+      *upload, "--offset", [command](uint64_t offset) { command->offset = offset; },
       "Number of the session's points before the first of IN. What is there from it on is not sent again, so "
       "that an upload that broke off is repeated with the same offset; default: after the session's points");
   AddExpectedRevision(*upload, command->expected_revision);
@@ -135,7 +136,9 @@ void AddDownload(CLI::App& app, int& exit_code) {
   download->footer(absl::StrCat(kMeshesHelp, "\n", kExitCodesHelp));
   AddSession(*download, command->session);
   AddMeshOutput(*download, command->path, command->format);
-  download->add_option("--revision", command->revision, "Fail unless the mesh is of this revision; default: the last");
+  AddCount(
+      *download, "--revision", [command](uint64_t revision) { command->revision = revision; },
+      "Fail unless the mesh is of this revision; default: the last", 1);
   command->remote.AddTo(*download, RemoteCommand::Needs::kLastingServer);
   download->callback([command, &exit_code] {
     if (const absl::Status status = command->Check(); !status.ok()) {
