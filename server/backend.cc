@@ -1,7 +1,6 @@
 #include "server/backend.h"
 
 #include <utility>
-#include <vector>
 
 #include "absl/time/clock.h"
 #include "server/log_fields.h"

@@ -408,7 +408,8 @@ grpc::Status Session::ReserveForVertices(uint64_t count) {
     return grpc::Status::OK;
   }
   const uint64_t bytes = work_.mesher->memory_bytes();
-  const uint64_t wanted = bytes + kReservedVertices * count * (bytes / work_.mesher->vertex_count());
+  const uint64_t wanted =
+      bytes + kReservedVertices * count * (bytes / std::max<uint64_t>(1, work_.mesher->vertex_count()));
   return work_.memory.Resize(wanted) ? grpc::Status::OK
                                      : FromCoreStatus(memory_.Refusal(wanted, "the vertices of a session"));
 }
