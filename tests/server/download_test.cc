@@ -14,7 +14,8 @@
 #include "gtest/gtest.h"
 #include "proto/checksum.h"
 #include "tests/server/raw_call.h"
-#include "tests/server/session_client.h"
+#include "tests/server/scripted_mesher.h"
+#include "tests/server/session_calls.h"
 
 namespace wellspace::server {
 namespace {

@@ -1,5 +1,4 @@
 // The calls of OperationService over a channel, and what operations do to their session.
-#include <functional>
 #include <mutex>
 #include <new>
 #include <string>
@@ -10,6 +9,7 @@
 #include "absl/time/clock.h"
 #include "gtest/gtest.h"
 #include "tests/server/patience.h"
+#include "tests/server/scripted_mesher.h"
 #include "tests/server/service_harness.h"
 #include "tests/server/session_calls.h"
 

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <limits>
 #include <numeric>
-#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -10,7 +9,8 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "server/query_call.h"
-#include "tests/server/session_client.h"
+#include "tests/server/scripted_mesher.h"
+#include "tests/server/session_calls.h"
 
 namespace wellspace::server {
 namespace {

@@ -1,74 +1,15 @@
 #include "tests/server/session_calls.h"
 
-#include <chrono>
+#include <algorithm>
 #include <random>
-#include <span>
-#include <thread>
-#include <utility>
 
 #include "absl/time/clock.h"
-#include "core/base/status_macros.h"
 #include "gtest/gtest.h"
-#include "tests/server/service_harness.h"
 
 namespace wellspace::server {
 namespace {
 
-class FakeSessionMesher final : public core::Mesher {
- public:
-  // `mesh` null: that of MakeFakeMesh.
-  FakeSessionMesher(core::MeshParameters parameters, std::span<const double> points, PhaseScript script,
-                    std::shared_ptr<const core::Mesh> mesh = nullptr)
-      : parameters_(std::move(parameters)),
-        points_(points.begin(), points.end()),
-        script_(std::move(script)),
-        mesh_(std::move(mesh)) {}
-
-  int dimension() const override { return parameters_.dimension; }
-  uint64_t vertex_count() const override {
-    return mesh_ != nullptr ? mesh_->vertex_count() : MakeFakeMesh(parameters_, points_).vertex_count();
-  }
-  uint64_t memory_bytes() const override { return points_.size() * sizeof(double); }
-  absl::Status Refine(const core::MeshParameters&, core::RunContext& context) override {
-    return Enter(core::Phase::kRefinement, context);
-  }
-  absl::StatusOr<std::vector<uint32_t>> AddPointsNear(std::span<const double> points, std::span<const uint32_t>,
-                                                      core::RunContext& context) override {
-    WELLSPACE_RETURN_IF_ERROR(Enter(core::Phase::kTree, context));
-    points_.insert(points_.end(), points.begin(), points.end());
-    return std::vector<uint32_t>(points.size() / dimension());
-  }
-  absl::StatusOr<uint32_t> AddVertex(uint32_t near, std::span<const double>) override { return near; }
-  absl::StatusOr<std::vector<double>> NearestNeighborDistances(std::span<const uint32_t> vertices) const override {
-    return std::vector<double>(vertices.size(), 1.0);
-  }
-  absl::StatusOr<std::vector<core::Cell>> ClippedCells(std::span<const uint32_t> vertices, double) const override {
-    return std::vector<core::Cell>(vertices.size());
-  }
-  absl::StatusOr<core::Mesh> Extract(int, core::RunContext& context) override {
-    WELLSPACE_RETURN_IF_ERROR(Enter(core::Phase::kSimplices, context));
-    context.EnterPhase(core::Phase::kDone);
-    return mesh_ != nullptr ? *mesh_ : MakeFakeMesh(parameters_, points_);
-  }
-  absl::Status Update(core::Mesh& mesh, int threads, core::RunContext& context) override {
-    WELLSPACE_ASSIGN_OR_RETURN(mesh, Extract(threads, context));
-    return absl::OkStatus();
-  }
-  absl::StatusOr<core::MeshEstimate> Estimate(const core::MeshParameters&, const core::RunContext&) const override {
-    return core::MeshEstimate{};
-  }
-
- private:
-  absl::Status Enter(core::Phase phase, core::RunContext& context) {
-    context.EnterPhase(phase);
-    return script_(phase, context);
-  }
-
-  const core::MeshParameters parameters_;
-  std::vector<double> points_;
-  const PhaseScript script_;
-  const std::shared_ptr<const core::Mesh> mesh_;
-};
+constexpr size_t kUploadChunk = 120'000;  // numbers; a multiple of 2, 3, 4, 5 and 6
 
 template <typename Stub, typename Request, typename Response>
 Response Call(Stub& stub, grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
@@ -85,36 +26,6 @@ Response Call(Stub& stub, grpc::Status (Stub::*method)(grpc::ClientContext*, con
 }
 
 }  // namespace
-
-MesherFactory ScriptedMesher(PhaseScript script) {
-  return [script = std::move(script)](const core::MeshParameters& parameters, std::span<const double> points,
-                                      core::RunContext& context) -> absl::StatusOr<std::unique_ptr<core::Mesher>> {
-    context.EnterPhase(core::Phase::kTree);
-    WELLSPACE_RETURN_IF_ERROR(script(core::Phase::kTree, context));
-    return std::make_unique<FakeSessionMesher>(parameters, points, script);
-  };
-}
-
-MesherFactory FixedMesher(core::Mesh mesh) {
-  return [shared = std::make_shared<const core::Mesh>(std::move(mesh))](
-             const core::MeshParameters& parameters, std::span<const double> points, core::RunContext&) {
-    const auto script = [](core::Phase, core::RunContext& context) { return context.Check(); };
-    return absl::StatusOr<std::unique_ptr<core::Mesher>>(
-        std::make_unique<FakeSessionMesher>(parameters, points, script, shared));
-  };
-}
-
-PhaseScript EndlessIn(core::Phase phase, std::function<void()> begun) {
-  return [phase, begun = std::move(begun)](core::Phase entered, core::RunContext& context) {
-    if (entered == phase) {
-      begun();
-      while (!context.IsCancelled()) {
-        std::this_thread::sleep_for(std::chrono::microseconds(100));  // as often as the core looks
-      }
-    }
-    return context.Check();
-  };
-}
 
 Watch::Watch(v1::OperationService::Stub& stub, const std::string& name, std::optional<uint64_t> after,
              std::optional<absl::Duration> timeout) {
@@ -168,7 +79,9 @@ grpc::Status Watch::Finish() {
 }
 
 SessionCalls::SessionCalls(const std::shared_ptr<grpc::Channel>& channel)
-    : sessions_(v1::SessionService::NewStub(channel)), operations_(v1::OperationService::NewStub(channel)) {}
+    : sessions_(v1::SessionService::NewStub(channel)),
+      operations_(v1::OperationService::NewStub(channel)),
+      queries_(v1::QueryService::NewStub(channel)) {}
 
 v1::Session SessionCalls::Create(const v1::CreateSessionRequest& request, grpc::Status* status) {
   return Call(*sessions_, &v1::SessionService::Stub::CreateSession, request, status).session();
@@ -259,6 +172,56 @@ v1::Operation SessionCalls::Refine(const std::string& name) {
   const grpc::Status status = watch.Finish();
   EXPECT_TRUE(status.ok()) << status.error_message();
   return watch.operation.value_or(v1::Operation());
+}
+
+Download SessionCalls::DownloadMesh(const std::string& name, uint64_t revision, uint64_t next_chunk,
+                                    std::optional<size_t> stop_after) {
+  grpc::ClientContext context;
+  v1::DownloadMeshRequest request;
+  request.set_name(name);
+  request.set_revision(revision);
+  request.set_next_chunk(next_chunk);
+  const auto stream = sessions_->DownloadMesh(&context, request);
+  Download download;
+  v1::DownloadMeshResponse response;
+  while ((!stop_after.has_value() || download.chunks.size() < *stop_after) && stream->Read(&response)) {
+    EXPECT_LE(response.ByteSizeLong(), size_t{kMaxResponseBytes});
+    if (response.has_metadata()) {
+      EXPECT_TRUE(download.chunks.empty()) << "metadata after a chunk";
+      download.metadata.push_back(response.metadata());
+    } else {
+      download.chunks.push_back(response.chunk());
+    }
+  }
+  if (stop_after.has_value()) {
+    context.TryCancel();
+  }
+  download.status = stream->Finish();
+  return download;
+}
+
+SessionClient::SessionClient(const std::shared_ptr<grpc::Channel>& channel, const v1::MeshParameters& parameters)
+    : calls_(channel) {
+  v1::CreateSessionRequest request;
+  *request.mutable_parameters() = parameters;
+  name_ = calls_.Create(request).name();
+}
+
+void SessionClient::Upload(const std::vector<double>& coordinates) {
+  const v1::Session session = Get();
+  std::vector<v1::UploadPointsRequest> requests;
+  for (size_t begin = 0; begin < coordinates.size(); begin += kUploadChunk) {
+    const size_t end = std::min(coordinates.size(), begin + kUploadChunk);
+    requests.push_back(UploadRequest(name_, session.committed_points() + begin / session.parameters().dimension(),
+                                     {coordinates.begin() + begin, coordinates.begin() + end}));
+  }
+  calls_.Upload(requests);
+}
+
+v1::Operation SessionClient::Refine() {
+  const v1::Operation operation = calls_.Refine(name_);
+  EXPECT_EQ(operation.state(), v1::Operation::STATE_SUCCEEDED) << operation.ShortDebugString();
+  return operation;
 }
 
 v1::UploadPointsRequest UploadRequest(const std::string& name, uint64_t offset,

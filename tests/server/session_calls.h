@@ -1,34 +1,21 @@
-// The calls of SessionService and OperationService, one line each, and a core::Mesher that does what a test says.
+// The calls of sessions, operations and queries, one line each.
 #ifndef WELLSPACE_TESTS_SERVER_SESSION_CALLS_H_
 #define WELLSPACE_TESTS_SERVER_SESSION_CALLS_H_
 
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "absl/time/time.h"
-#include "core/mesher.h"
 #include "grpcpp/grpcpp.h"
-#include "server/call_environment.h"
+#include "tests/server/service_harness.h"
 #include "wellspace/v1/operations.grpc.pb.h"
+#include "wellspace/v1/queries.grpc.pb.h"
 #include "wellspace/v1/sessions.grpc.pb.h"
 
 namespace wellspace::server {
-
-// What a phase of a ScriptedMesher does; its status ends the run.
-using PhaseScript = std::function<absl::Status(core::Phase, core::RunContext&)>;
-
-// Meshers that enter the phases of the core, run `script` in each, and have a mesh of MakeFakeMesh.
-MesherFactory ScriptedMesher(PhaseScript script);
-
-// Meshers of which every mesh is `mesh`.
-MesherFactory FixedMesher(core::Mesh mesh);
-
-// Works in `phase` until its context is cancelled, and calls `begun` before.
-PhaseScript EndlessIn(core::Phase phase, std::function<void()> begun);
 
 // A call of WatchOperation.
 class Watch {
@@ -54,6 +41,13 @@ class Watch {
   grpc::ClientContext context_;
   std::unique_ptr<grpc::ClientReader<v1::WatchOperationResponse>> stream_;
   bool finished_ = false;
+};
+
+// What a download brought.
+struct Download {
+  grpc::Status status;
+  std::vector<v1::MeshMetadata> metadata;
+  std::vector<v1::MeshChunk> chunks;
 };
 
 class SessionCalls {
@@ -82,12 +76,44 @@ class SessionCalls {
   // Starts a refinement and watches it to its end.
   v1::Operation Refine(const std::string& name);
 
+  // Downloads a mesh from `next_chunk` on. Breaks off when `stop_after` chunks have come.
+  Download DownloadMesh(const std::string& name, uint64_t revision = 0, uint64_t next_chunk = 0,
+                        std::optional<size_t> stop_after = std::nullopt);
+
   v1::SessionService::Stub& sessions() { return *sessions_; }
   v1::OperationService::Stub& operations() { return *operations_; }
+  v1::QueryService::Stub& queries() { return *queries_; }
 
  private:
   const std::unique_ptr<v1::SessionService::Stub> sessions_;
   const std::unique_ptr<v1::OperationService::Stub> operations_;
+  const std::unique_ptr<v1::QueryService::Stub> queries_;
+};
+
+// The same of one session.
+class SessionClient {
+ public:
+  // Creates it.
+  explicit SessionClient(const std::shared_ptr<grpc::Channel>& channel,
+                         const v1::MeshParameters& parameters = UnitCubeParameters());
+
+  const std::string& name() const { return name_; }
+  SessionCalls& calls() { return calls_; }
+  v1::QueryService::Stub& queries() { return calls_.queries(); }
+
+  v1::Session Get() { return calls_.Get(name_); }
+  // Adds points after those that the session has.
+  void Upload(const std::vector<double>& coordinates);
+  // Has the session refined, and waits for the end, which has to be a success.
+  v1::Operation Refine();
+  Download DownloadMesh(uint64_t revision = 0, uint64_t next_chunk = 0,
+                        std::optional<size_t> stop_after = std::nullopt) {
+    return calls_.DownloadMesh(name_, revision, next_chunk, stop_after);
+  }
+
+ private:
+  SessionCalls calls_;
+  std::string name_;
 };
 
 v1::UploadPointsRequest UploadRequest(const std::string& name, uint64_t offset, const std::vector<double>& coordinates);

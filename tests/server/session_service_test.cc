@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "absl/time/clock.h"
 #include "gtest/gtest.h"
+#include "tests/server/scripted_mesher.h"
 #include "tests/server/service_harness.h"
 #include "tests/server/session_calls.h"
 

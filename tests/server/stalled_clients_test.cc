@@ -8,6 +8,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "tests/server/raw_http2.h"
+#include "tests/server/scripted_mesher.h"
 #include "tests/server/service_harness.h"
 #include "tests/server/session_calls.h"
 #include "wellspace/v1/meshing.grpc.pb.h"

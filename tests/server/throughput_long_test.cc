@@ -4,7 +4,6 @@
 #include <functional>
 #include <memory>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "absl/time/clock.h"
@@ -13,7 +12,8 @@
 #include "grpcpp/generic/generic_stub.h"
 #include "gtest/gtest.h"
 #include "proto/checksum.h"
-#include "tests/server/session_client.h"
+#include "tests/server/scripted_mesher.h"
+#include "tests/server/session_calls.h"
 
 namespace wellspace::server {
 namespace {
