@@ -91,7 +91,7 @@ class Service {
     absl::StatusOr<std::unique_ptr<server::Server>> server = server::Server::Start(options, log);
     Require(server.ok(), "a server starts:", server.status().ToString());
     server_ = *std::move(server);
-    channel_ = server_->InProcessChannel();
+    channel_ = server_->InProcessChannel().value();
   }
 
   void Call(const MethodDescriptor& method, std::vector<std::string> messages) {
