@@ -224,18 +224,6 @@ TEST_F(MalformedHttp2, AWindowThatOverflowsEndsTheConnectionOrTheCall) {
   EXPECT_TRUE(Closes(Frame{.type = Frame::kWindowUpdate, .payload = BigEndian(0)}));
 }
 
-TEST_F(MalformedHttp2, MoreDataThanTheWindowHasRoomForEndsTheConnection) {
-  RawConnection connection = Begin();
-  connection.Send(BeginCall(1, kMesh));
-  const Frame data = {.type = Frame::kData, .stream = 1, .payload = std::string(16384, '\0')};
-  // The server does not read a call's messages ahead of their use: 64 MiB are more than it ever offers at once.
-  bool is_open = true;
-  for (int i = 0; is_open && i < 4096; ++i) {
-    is_open = connection.Send(data);
-  }
-  EXPECT_TRUE(!is_open || connection.IsClosedByServer());
-}
-
 TEST_F(MalformedHttp2, CallsThatAreResetAtOnceCostNothingLasting) {
   RawConnection connection = Begin();
   uint32_t stream = 1;
