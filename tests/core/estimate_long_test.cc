@@ -223,7 +223,8 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{"coast-110m", 2, 0}, Case{"coast-50m", 2, 0}, Case{"uniform", 2, 1000000},
                       Case{"uniform", 3, 10000}, Case{"uniform", 3, 100000}, Case{"inner", 3, 10000},
                       Case{"sphere", 3, 10000}, Case{"clusters", 3, 100000}, Case{"annuli", 3, 100000},
-                      Case{"skew", 3, 2000}, Case{"moment", 3, 2000}, Case{"grid", 3, 64000}, Case{"spot", 3, 0}),
+                      Case{"skew", 3, 2000}, Case{"skew", 3, 20000}, Case{"moment", 3, 2000},
+                      Case{"moment", 3, 10000}, Case{"grid", 3, 64000}, Case{"spot", 3, 0}),
     CaseName);
 
 INSTANTIATE_TEST_SUITE_P(Unseen, EstimateLongTest,
