@@ -20,7 +20,7 @@ namespace {
 // All vertices are pumped once; then, as others' weights have changed, again, as long as it helps, but not more often
 // than this, those whose star has an angle below this part of a regular simplex's.
 template <int D>
-constexpr int kRounds = D == 3 ? 4 : 2;
+constexpr int kRounds = D == 3 ? 12 : 2;
 constexpr double kPoorShare = 0.25;
 // Vertices between two reports of progress.
 constexpr uint32_t kReportInterval = 64;
