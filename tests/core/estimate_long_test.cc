@@ -216,16 +216,17 @@ TEST_P(EstimateLongTest, AtTheDefaultRho) {
   ExpectGoodEstimate(CloudOf(GetParam()), DefaultRho(GetParam().dimension), 1.5);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Sizes, EstimateLongTest,
-    ::testing::Values(Case{"uniform", 2, 10000}, Case{"inner", 2, 10000}, Case{"clusters", 2, 100000},
-                      Case{"lines", 2, 100000}, Case{"annuli", 2, 100000}, Case{"grid", 2, 90000},
-                      Case{"coast-110m", 2, 0}, Case{"coast-50m", 2, 0}, Case{"uniform", 2, 1000000},
-                      Case{"uniform", 3, 10000}, Case{"uniform", 3, 100000}, Case{"inner", 3, 10000},
-                      Case{"sphere", 3, 10000}, Case{"clusters", 3, 100000}, Case{"annuli", 3, 100000},
-                      Case{"skew", 3, 2000}, Case{"skew", 3, 20000}, Case{"moment", 3, 2000},
-                      Case{"moment", 3, 10000}, Case{"grid", 3, 64000}, Case{"spot", 3, 0}),
-    CaseName);
+INSTANTIATE_TEST_SUITE_P(Sizes, EstimateLongTest,
+                         ::testing::Values(Case{"uniform", 2, 10000}, Case{"inner", 2, 10000},
+                                           Case{"clusters", 2, 100000}, Case{"lines", 2, 100000},
+                                           Case{"annuli", 2, 100000}, Case{"grid", 2, 90000}, Case{"coast-110m", 2, 0},
+                                           Case{"coast-50m", 2, 0}, Case{"uniform", 2, 1000000},
+                                           Case{"uniform", 3, 10000}, Case{"uniform", 3, 100000},
+                                           Case{"inner", 3, 10000}, Case{"sphere", 3, 10000},
+                                           Case{"clusters", 3, 100000}, Case{"annuli", 3, 100000},
+                                           Case{"skew", 3, 2000}, Case{"skew", 3, 20000}, Case{"moment", 3, 2000},
+                                           Case{"moment", 3, 10000}, Case{"grid", 3, 64000}, Case{"spot", 3, 0}),
+                         CaseName);
 
 INSTANTIATE_TEST_SUITE_P(Unseen, EstimateLongTest,
                          ::testing::Values(Case{"spring", 2, 5000}, Case{"halos", 2, 20000}, Case{"sheet", 2, 5000},
