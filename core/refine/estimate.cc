@@ -522,7 +522,7 @@ double SimplicesOf(double vertices, double on_boundary) {
 constexpr double kFixedBytes = 3.4e6;
 
 // Where the estimate of the memory is wrong, it is rather short than long; this centres it.
-constexpr double kMemoryMargin = 1.06;
+constexpr double kMemoryMargin = 1.16;
 
 // The memory at its peak, when stars are put together. Vectors grow by doubling, but of what they reserve only what they
 // use is ever touched.
