@@ -107,7 +107,8 @@ class Acceptance(unittest.TestCase):
         for figure in ("sequence", "vertices", "simplices", "fraction"):
             figures = [getattr(event, figure) for event in events]
             self.assertEqual(figures, sorted(figures), figure)
-        order = [api().PHASE_WAITING, api().PHASE_TREE, api().PHASE_REFINEMENT, api().PHASE_SIMPLICES, api().PHASE_DONE]
+        order = [api().PHASE_WAITING, api().PHASE_TREE, api().PHASE_REFINEMENT, api().PHASE_SIMPLICES,
+                 api().PHASE_SLIVERS, api().PHASE_DONE]
         phases = [order.index(event.phase) for event in events]
         self.assertEqual(phases, sorted(phases))
         self.assertLessEqual({order.index(api().PHASE_REFINEMENT), order.index(api().PHASE_SIMPLICES)}, set(phases))
