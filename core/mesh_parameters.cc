@@ -1,5 +1,6 @@
 #include "core/mesh_parameters.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -45,6 +46,10 @@ double DefaultRho(int dimension) {
 double MinimumRho(int dimension) {
   constexpr std::array<double, kMaxDimension + 1> kMinimums = {0, 0, 0.9, 1.1, 1.5, 2, 3};
   return kMinimums[dimension];
+}
+
+uint64_t VertexBudget(const MeshParameters& parameters) {
+  return std::min(parameters.max_vertices == 0 ? kDefaultMaxVertices : parameters.max_vertices, kMaxVertices);
 }
 
 double DefaultMinDihedral(int dimension) { return dimension == 3 ? 12 : 0; }

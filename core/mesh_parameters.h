@@ -51,6 +51,9 @@ inline constexpr uint64_t kMaxVertices = 0xffff'fffe;
 // What a machine with 24 GiB of memory can mesh in 3-D.
 inline constexpr uint64_t kDefaultMaxVertices = 50'000'000;
 
+// The number of vertices at which a run ends: max_vertices or its default.
+uint64_t VertexBudget(const MeshParameters& parameters);
+
 // The default of `rho`, for which refinement ends whatever the input: sqrt(2) in 2-D, 2 in 3-D, 2.9, 4.1 and 5.8 in 4-D
 // to 6-D, 2^((D-1)/2) rounded up; and the smallest value that is accepted.
 double DefaultRho(int dimension);

@@ -38,19 +38,12 @@ constexpr uint64_t kTreeBytes = 2 * sizeof(Point<D>) + sizeof(uint64_t) * D + 24
                                     / LeafTree<D>::kLeafCapacity;
 constexpr uint64_t kFixedBytes = uint64_t{4} << 20;
 
-// What is reserved for a mesh, over what it is estimated to take.
-constexpr double kReserve = 1.25;
-
 // Smaller clouds are refined, without sizes, before anybody could want to know how large the mesh will be.
 template <int D>
 constexpr uint64_t kForetoldPoints = D == 2 ? 10'000 : 2'000;
 
 // Cheap steps between two looks at the context.
 constexpr size_t kCheckInterval = size_t{1} << 16;
-
-uint64_t VertexBudget(const MeshParameters& parameters) {
-  return std::min(parameters.max_vertices == 0 ? kDefaultMaxVertices : parameters.max_vertices, kMaxVertices);
-}
 
 template <int D>
 Box<D> BoxOf(const std::vector<double>& low, const std::vector<double>& high) {
@@ -372,10 +365,12 @@ class MesherIn final : public Mesher {
     return demands;
   }
 
-  // Tells the context how many vertices a first refinement will end with, if that takes long enough to be worth an estimate.
+  // Tells the context how many vertices a first refinement will end with, unless it knows, if that takes long enough to be worth
+  // an estimate.
   absl::Status ForetellVertices(const MeshParameters& parameters, RunContext& context) const {
     const bool has_sizes = parameters.max_circumradius != 0 || !parameters.size_boxes.empty();
-    if (structure_.vertex_count() > built_count_ || (!has_sizes && structure_.vertex_count() < kForetoldPoints<D>)) {
+    if (context.estimated_vertices() > 0 || structure_.vertex_count() > built_count_ ||
+        (!has_sizes && structure_.vertex_count() < kForetoldPoints<D>)) {
       return absl::OkStatus();
     }
     WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size, EstimateSize<D>(structure_, DemandsOf(parameters), context));
@@ -591,29 +586,6 @@ absl::StatusOr<std::unique_ptr<Mesher>> Mesher::Create(const MeshParameters& par
     default:
       return absl::InternalError("ValidateParameters lets no other dimension pass");
   }
-}
-
-absl::Status ReserveMemory(const Mesher& mesher, const MeshParameters& parameters, const RunContext& context) {
-  if (!context.HasMemoryLender()) {
-    return absl::OkStatus();
-  }
-  WELLSPACE_ASSIGN_OR_RETURN(const MeshEstimate estimate, mesher.Estimate(parameters, context));
-  const uint64_t vertices = std::max<uint64_t>(1, estimate.vertices);
-  const double share = std::min(1.0, static_cast<double>(VertexBudget(parameters)) / static_cast<double>(vertices));
-  return context.ReserveMemory(static_cast<uint64_t>(static_cast<double>(estimate.memory_bytes) * share * kReserve));
-}
-
-absl::StatusOr<Mesh> MeshPoints(const MeshParameters& parameters, std::span<const double> points, RunContext& context) {
-  WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<Mesher> mesher, Mesher::Create(parameters, points, context));
-  WELLSPACE_RETURN_IF_ERROR(ReserveMemory(*mesher, parameters, context));
-  WELLSPACE_RETURN_IF_ERROR(mesher->Refine(parameters, context));
-  return mesher->Extract(parameters.threads, context);
-}
-
-absl::StatusOr<MeshEstimate> EstimateMesh(const MeshParameters& parameters, std::span<const double> points,
-                                          RunContext& context) {
-  WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<Mesher> mesher, Mesher::Create(parameters, points, context));
-  return mesher->Estimate(parameters, context);
 }
 
 }  // namespace wellspace::core

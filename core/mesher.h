@@ -82,8 +82,8 @@ class Mesher {
   virtual uint64_t memory_bytes() const = 0;
 
   // Adds Steiner vertices until the criterion and the sizes of `parameters` are met, then mends slivers, for which these
-  // vertices move too; with pump_weights, Extract gives weights if slivers are left, or nothing was mended. Of the parameters rho, criterion, sizes, min_dihedral, pump_weights, max_vertices and threads
-  // count; the box is that of Create.
+  // vertices move too; with pump_weights, Extract gives weights if slivers are left, or nothing was mended. Of the
+  // parameters rho, criterion, sizes, min_dihedral, pump_weights, max_vertices and threads count; the box is that of Create.
   //
   // Complexity: O(m) queries the first time and for other demands than the last; else in proportion to what was added
   //             since.
@@ -140,7 +140,8 @@ class Mesher {
   //             criterion holds for each; (3) no circumcentre lies outside the box. With weights they are the regular
   //             triangulation, and (2) and (3) are those of the Delaunay triangulation before.
   // Complexity: O(m) time and memory.
-  // Errors:     FAILED_PRECONDITION unless refined since vertices were last added; RESOURCE_EXHAUSTED (memory of the context); CANCELLED, DEADLINE_EXCEEDED.
+  // Errors:     FAILED_PRECONDITION unless refined since vertices were last added; RESOURCE_EXHAUSTED (memory of the
+  //             context); CANCELLED, DEADLINE_EXCEEDED.
   // Threads:    uses `threads`, at most as many as the machine has cores.
   virtual absl::StatusOr<Mesh> Extract(int threads, RunContext& context) = 0;
 
@@ -160,10 +161,10 @@ class Mesher {
 };
 
 // Reserves what Refine and Extract are estimated to take of the memory that the context lends: as much as the estimate says, and a
-// quarter more, but no more than max_vertices allows. Does nothing without a lender.
+// quarter more, but no more than max_vertices allows; Refine then need not estimate again. Does nothing without a lender.
 //
 // Errors:     those of Estimate; RESOURCE_EXHAUSTED, or another of the lender.
-absl::Status ReserveMemory(const Mesher& mesher, const MeshParameters& parameters, const RunContext& context);
+absl::Status ReserveMemory(const Mesher& mesher, const MeshParameters& parameters, RunContext& context);
 
 // Meshes `points` in their box: Create, ReserveMemory, Refine, Extract.
 //

@@ -75,6 +75,7 @@ class RunContext {
   void EnterPhase(Phase phase);
   void SetVertices(uint64_t vertices) { vertices_.store(vertices, std::memory_order_relaxed); }
   void SetEstimatedVertices(uint64_t vertices) { estimated_vertices_.store(vertices, std::memory_order_relaxed); }
+  uint64_t estimated_vertices() const { return estimated_vertices_.load(std::memory_order_relaxed); }
   void AddSimplices(uint64_t count) { simplices_.fetch_add(count, std::memory_order_relaxed); }
   void SetBucket(int bucket) { bucket_.store(bucket, std::memory_order_relaxed); }
   // `done` in [0, 1] of the current phase.

@@ -54,6 +54,19 @@ TEST(Memory, IsReservedForTheTreeThenForTheMeshAndTheRunHoldsNoMore) {
   }
 }
 
+TEST(Memory, WhatItIsReservedForIsForetold) {
+  const MeshParameters parameters{.dimension = 3};
+  RunContext context;
+  Lender lender(context);
+  const absl::StatusOr<std::unique_ptr<Mesher>> mesher = Mesher::Create(parameters, Cloud(), context);
+  ASSERT_TRUE(mesher.ok()) << mesher.status();
+  const absl::StatusOr<MeshEstimate> estimate = (*mesher)->Estimate(parameters, context);
+  ASSERT_TRUE(estimate.ok()) << estimate.status();
+  EXPECT_EQ(context.estimated_vertices(), 0u);
+  ASSERT_TRUE(ReserveMemory(**mesher, parameters, context).ok());
+  EXPECT_EQ(context.estimated_vertices(), estimate->vertices);
+}
+
 TEST(Memory, AMeshOfFewVerticesReservesForThem) {
   RunContext all_context;
   Lender all(all_context);
