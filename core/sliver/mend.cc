@@ -52,21 +52,7 @@ Mender::Mender(Triangulation<3>& triangulation, std::vector<bool>& is_fixed, con
 
 absl::Status Mender::Run(RunContext& context) {
   if (demands_.demands.criterion == Criterion::kWellSpaced) {
-    nearest_sq_.assign(triangulation_.vertex_count(), std::numeric_limits<double>::infinity());
-    for (uint32_t s = 0; s < triangulation_.simplex_limit(); ++s) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-      if (triangulation_.IsIn(SimplexId{s})) {
-        const auto& vertices = triangulation_.item(SimplexId{s}).vertices;
-        for (const VertexId u : vertices) {
-          for (const VertexId w : vertices) {
-            if (u != w) {
-              nearest_sq_[Index(u)] =
-                  std::min(nearest_sq_[Index(u)], DistanceSq<3>(triangulation_.point(u), triangulation_.point(w)));
-            }
-          }
-        }
-      }
-    }
+    WELLSPACE_ASSIGN_OR_RETURN(nearest_sq_, triangulation_.NearestDistancesSq(context));
   }
   next_.clear();
   for (uint32_t i = 0; i < triangulation_.simplex_limit(); ++i) {

@@ -248,20 +248,7 @@ class Pump {
 template <int D>
 absl::StatusOr<uint64_t> PumpWeights(Triangulation<D>& triangulation, RunContext& context) {
   const uint32_t count = triangulation.vertex_count();
-  std::vector<double> nearest_sq(count, std::numeric_limits<double>::infinity());
-  for (uint32_t s = 0; s < triangulation.simplex_limit(); ++s) {
-    if (!triangulation.IsIn(SimplexId{s})) {
-      continue;
-    }
-    const auto& vertices = triangulation.item(SimplexId{s}).vertices;
-    for (int i = 0; i <= D; ++i) {
-      for (int j = 0; j < i; ++j) {
-        const double edge_sq = DistanceSq<D>(triangulation.point(vertices[i]), triangulation.point(vertices[j]));
-        nearest_sq[Index(vertices[i])] = std::min(nearest_sq[Index(vertices[i])], edge_sq);
-        nearest_sq[Index(vertices[j])] = std::min(nearest_sq[Index(vertices[j])], edge_sq);
-      }
-    }
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> nearest_sq, triangulation.NearestDistancesSq(context));
   Pump<D> pump(triangulation);
   for (int round = 0; round < kRounds<D>; ++round) {
     const double poor =

@@ -162,10 +162,7 @@ absl::Status SliverStage<D>::FollowStructure(const QueryStructure<D>& structure,
   std::vector<SimplexId> created;
   VertexId last{0};
   for (uint32_t i = triangulation_->vertex_count(); i < count; ++i) {
-    const absl::Status status = context.Check();
-    if (!status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(context.Check());
     const Point<D>& p = structure.point(VertexId{i});
     const VertexId nearest = structure.ApproximateNearestNeighbor(VertexId{i}, workspace).vertex;
     const VertexId start = Index(nearest) < i ? nearest : last;

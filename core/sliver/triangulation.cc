@@ -204,6 +204,28 @@ VertexId Triangulation<D>::AddVertex() {
 }
 
 template <int D>
+absl::StatusOr<std::vector<double>> Triangulation<D>::NearestDistancesSq(const RunContext& context) const {
+  std::vector<double> nearest_sq(points_.size(), std::numeric_limits<double>::infinity());
+  for (size_t s = 0; s < items_.size(); ++s) {
+    if (s % kCheckInterval == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
+    if (!IsIn(SimplexId{static_cast<uint32_t>(s)})) {
+      continue;
+    }
+    const auto& vertices = items_[s].vertices;
+    for (int i = 1; i <= D; ++i) {
+      for (int j = 0; j < i; ++j) {
+        const double edge_sq = DistanceSq<D>(point(vertices[i]), point(vertices[j]));
+        nearest_sq[Index(vertices[i])] = std::min(nearest_sq[Index(vertices[i])], edge_sq);
+        nearest_sq[Index(vertices[j])] = std::min(nearest_sq[Index(vertices[j])], edge_sq);
+      }
+    }
+  }
+  return nearest_sq;
+}
+
+template <int D>
 void Triangulation<D>::Star(VertexId v, std::vector<SimplexId>& out) {
   StartSearch();
   out.assign(1, simplex_of_[Index(v)]);

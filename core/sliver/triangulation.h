@@ -106,6 +106,13 @@ class Triangulation {
            simplices * (sizeof(Item) + (D + 2) * sizeof(uint32_t));
   }
 
+  // The squared distance from each vertex to its nearest other, by vertex; infinite where it is in no simplex.
+  //
+  // REQUIRES:   no vertex has a weight.
+  // Complexity: O(simplices).
+  // Errors:     CANCELLED, DEADLINE_EXCEEDED.
+  absl::StatusOr<std::vector<double>> NearestDistancesSq(const RunContext& context) const;
+
   // The simplices of vertex `v`.
   //
   // REQUIRES:   v is in.
