@@ -33,9 +33,10 @@ v1::ProgressEvent ProgressPacer::Final(const core::Progress& progress) {
   return event;
 }
 
-v1::ProgressEvent ProgressPacer::Advance(const core::Progress& progress) const {
+v1::ProgressEvent ProgressPacer::Advance(const core::Progress& progress) {
+  phase_ = std::max(phase_, progress.phase);
   v1::ProgressEvent event;
-  event.set_phase(std::max(PhaseToProto(progress.phase), last_.phase()));
+  event.set_phase(PhaseToProto(phase_));
   event.set_vertices(std::max<uint64_t>(progress.vertices, last_.vertices()));
   event.set_estimated_vertices(progress.estimated_vertices);
   event.set_simplices(std::max<uint64_t>(progress.simplices, last_.simplices()));

@@ -29,10 +29,11 @@ class ProgressPacer {
 
  private:
   // The event for `progress`, never behind the one before.
-  v1::ProgressEvent Advance(const core::Progress& progress) const;
+  v1::ProgressEvent Advance(const core::Progress& progress);
 
   absl::Time last_time_ = absl::InfinitePast();
   uint64_t next_sequence_ = 0;
+  core::Phase phase_ = core::Phase::kWaiting;
   v1::ProgressEvent last_;
 };
 

@@ -22,6 +22,11 @@ def pieces(name, points, offset, rows):
         yield api().UploadPointsRequest(name=name, point_offset=first, points=chunk)
 
 
+def place_of(phase):
+    """The place of a phase in the order in which they come, which is not that of their numbers."""
+    return len(api().Phase.values()) if phase == api().PHASE_DONE else phase
+
+
 def cloud(request, parameters, points, rows=50_000):
     """The requests of MeshPoints or EstimateMesh, which are of type `request`."""
     yield request(parameters=parameters)

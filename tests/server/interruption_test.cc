@@ -74,7 +74,7 @@ TEST_P(Interrupted, CancelInEveryPhaseOfTheCoreFreesTheWorker) {
     do {
       ASSERT_TRUE(call.Read(&response));
       ASSERT_TRUE(response.has_progress());
-    } while (response.progress().phase() < phase);
+    } while (PlaceOf(response.progress().phase()) < PlaceOf(phase));
     call.Cancel();
     EXPECT_LE(harness.TimeUntilIdle(), kIdleWithin) << v1::Phase_Name(phase);
     EXPECT_EQ(call.Finish().error_code(), grpc::StatusCode::CANCELLED);

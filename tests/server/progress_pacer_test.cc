@@ -56,6 +56,15 @@ TEST(ProgressPacer, NeverGoesBack) {
   EXPECT_EQ(event->fraction(), 0.9);
 }
 
+// Phases were not numbered in the order in which they come.
+TEST(ProgressPacer, AfterTheSliversComesTheEnd) {
+  ProgressPacer pacer;
+  ASSERT_TRUE(pacer.Next(ProgressAt(core::Phase::kSlivers, 100, 0.9), absl::UnixEpoch()));
+  const auto event = pacer.Next(ProgressAt(core::Phase::kDone, 100, 1), absl::UnixEpoch() + absl::Seconds(1));
+  ASSERT_TRUE(event);
+  EXPECT_EQ(event->phase(), v1::PHASE_DONE);
+}
+
 TEST(ProgressPacer, FinalEventAlways) {
   ProgressPacer pacer;
   ASSERT_TRUE(pacer.Next(ProgressAt(core::Phase::kTree, 1, 0.1), absl::UnixEpoch()));

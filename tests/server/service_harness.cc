@@ -129,6 +129,8 @@ ErrorDetails DetailsOf(const grpc::Status& status) {
   return details;
 }
 
+int PlaceOf(v1::Phase phase) { return phase == v1::PHASE_DONE ? v1::Phase_ARRAYSIZE : phase; }
+
 v1::MeshParameters UnitCubeParameters(int dimension) {
   v1::MeshParameters parameters;
   parameters.set_dimension(dimension);

@@ -51,6 +51,9 @@ struct ErrorDetails {
 };
 ErrorDetails DetailsOf(const grpc::Status& status);
 
+// The place of a phase in the order in which they come, which is not that of their numbers.
+int PlaceOf(v1::Phase phase);
+
 // Parameters of a call in dimension 3 or another, with the unit cube as domain.
 v1::MeshParameters UnitCubeParameters(int dimension = 3);
 

@@ -63,7 +63,7 @@ bool Watch::Read() {
 }
 
 bool Watch::ReadUntil(v1::Phase phase) {
-  while (events.empty() || events.back().phase() < phase) {
+  while (events.empty() || PlaceOf(events.back().phase()) < PlaceOf(phase)) {
     if (!Read()) {
       return false;
     }
