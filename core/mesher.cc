@@ -98,6 +98,9 @@ class MesherIn final : public Mesher {
     uint32_t next = 0;
     input_vertex_.resize(cloud.sorted_index.size());
     for (uint32_t i = 0; i < cloud.sorted_index.size(); ++i) {
+      if (i % kCheckInterval == 0) {
+        WELLSPACE_RETURN_IF_ERROR(context.Check());
+      }
       const uint32_t sorted = cloud.sorted_index[i];
       if (cloud.first_input[sorted] == i) {
         NoteNegativeZeros(points, i, next);
@@ -108,6 +111,9 @@ class MesherIn final : public Mesher {
     output_index_ = std::move(rank);
     vertex_at_.resize(distinct);
     for (uint32_t i = 0; i < distinct; ++i) {
+      if (i % kCheckInterval == 0) {
+        WELLSPACE_RETURN_IF_ERROR(context.Check());
+      }
       vertex_at_[output_index_[i]] = VertexId{i};
     }
     built_count_ = structure_.vertex_count();

@@ -19,7 +19,8 @@
 namespace wellspace::server {
 namespace {
 
-constexpr size_t kPiece = 100'000;  // coordinates of a message
+constexpr size_t kPiece = 96'000;                       // coordinates of a message, whole points in 2-D and 3-D
+constexpr absl::Duration kPatience = absl::Minutes(4);  // with a run that is expected
 
 absl::Duration ProcessorTime() {
   timespec now{};
@@ -55,14 +56,16 @@ class CancelTest : public ::testing::Test {
     call.Send(UnitCubeParameters(dimension_));
     for (size_t begin = 0; begin < points_.size(); begin += kPiece) {
       const size_t end = std::min(points_.size(), begin + kPiece);
-      call.Send(std::vector<double>(points_.begin() + begin, points_.begin() + end));
+      ASSERT_TRUE(call.Send(std::vector<double>(points_.begin() + begin, points_.begin() + end)));
     }
     call.HalfClose();
   }
 
   // Waits, without work, until the run is in `phase` and has done `fraction` of all, or has ended.
   void WaitFor(core::Phase phase, double fraction) {
+    const absl::Time give_up = absl::Now() + kPatience;
     while (!has_returned_) {
+      ASSERT_LT(absl::Now(), give_up) << "no run came to " << core::PhaseName(phase);
       if (const core::RunContext* run = run_; run != nullptr) {
         const core::Progress progress = run->Snapshot();
         if (progress.phase > phase || (progress.phase == phase && progress.fraction >= fraction)) {
@@ -101,7 +104,7 @@ TEST_F(CancelTest, WhileReadingALargeCloud) {
   TestCall call(harness_.stub());
   call.Send(UnitCubeParameters());
   for (size_t begin = 0; begin + kPiece <= points_.size(); begin += kPiece) {
-    call.Send(std::vector<double>(points_.begin() + begin, points_.begin() + begin + kPiece));
+    ASSERT_TRUE(call.Send(std::vector<double>(points_.begin() + begin, points_.begin() + begin + kPiece)));
   }
   Expect(Cancel(call), "reading");
 }
