@@ -1,5 +1,7 @@
 #include "server/jobs.h"
 
+#include <malloc.h>
+
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
@@ -375,6 +377,9 @@ void JobPool::RunWorker(std::list<std::thread>::iterator self) {
     lock.unlock();
     work(*job);
     work = nullptr;
+    if (memory_.is_limited()) {
+      malloc_trim(0);  // others may have its memory once the system has it
+    }
     job->ReleaseAll();
     lock.lock();
     begun_.erase(job);

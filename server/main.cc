@@ -4,6 +4,7 @@
 // makes a line for --token-file.
 //
 // Exit codes: 0 stopped by a signal, 1 cannot serve, 2 wrong options or no token.
+#include <malloc.h>
 #include <pthread.h>
 #include <signal.h>
 
@@ -17,6 +18,7 @@
 #include "absl/time/time.h"
 #include "server/limit_flags.h"
 #include "server/log.h"
+#include "server/options.h"
 #include "server/server.h"
 #include "server/tokens.h"
 #include "server/version.h"
@@ -27,6 +29,8 @@ namespace {
 
 constexpr int kExitWrongOptions = 2;
 constexpr int kLogQueue = 8192;  // lines
+// Blocks from this size on, larger than messages, go back to the system when they are freed: --max-memory counts what is resident.
+constexpr int kReturnedBytes = 2 * kMaxResponseBytes;
 constexpr absl::Duration kMaxGrace = absl::Hours(24);
 
 struct Flags {
@@ -132,6 +136,7 @@ int Main(int argc, char** argv) {
     return HashToken(flags.hash_for_tenant);
   }
 
+  mallopt(M_MMAP_THRESHOLD, kReturnedBytes);
   StopSignals signals;
   signal(SIGPIPE, SIG_IGN);  // standard output or error may be a pipe whose reader has gone
   const auto writer = std::make_shared<spdlog::details::thread_pool>(kLogQueue, 1);
