@@ -10,8 +10,8 @@
 
 namespace wellspace::bench {
 
-// The coordinates in `path`, doubles as the machine has them, row-major. Ends the process with a message if it cannot be
-// read.
+// The coordinates in `path`, doubles as the machine has them, row-major. Ends the process with a message if it cannot
+// be read.
 std::vector<double> ReadPoints(const std::string& path);
 
 // Time and memory from its construction on.
@@ -20,12 +20,12 @@ class Meter {
   // For work on so many threads.
   explicit Meter(int threads = 1);
 
-  // On one thread the time of the processor, which is the wall clock's unless others have the processor meanwhile; on more,
-  // the wall clock's.
+  // On one thread the time of the processor, which is the wall clock's unless others have the processor meanwhile; on
+  // more, the wall clock's.
   double Seconds() const;
   double WallSeconds() const;
-  // The most that was resident at once, less what was when the meter was made: the input does not count, the output does.
-  // From the process' own high-water mark; that of rusage also knows the process that forked this one.
+  // The most that was resident at once, less what was when the meter was made: the input does not count, the output
+  // does. From the process' own high-water mark; that of rusage also knows the process that forked this one.
   uint64_t PeakBytes() const;
 
  private:

@@ -1,4 +1,4 @@
-// The parts of a mesh, each alone: tree construction against a radix sort, cells, stars, and the stages of the predicate.
+// The parts of a mesh, each alone: tree construction against a radix sort, cells, stars, the stages of the predicate.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
@@ -199,7 +199,8 @@ void BM_Star(benchmark::State& state) {
   });
 }
 
-// A whole cell from its neighbours, which are known: the cuts alone, decided by the filter but for ties. Items are cuts.
+// A whole cell from its neighbours, which are known: the cuts alone, decided by the filter but for ties, which are
+// counted. Items are cuts.
 template <int D>
 void BM_Cut(benchmark::State& state) {
   const core::QueryStructure<D> structure = Structure<D>(state.range(0), true);
