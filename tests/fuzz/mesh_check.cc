@@ -42,8 +42,9 @@ void RequireValid(const core::Mesh& mesh, const core::MeshParameters& parameters
       .max_circumradius = parameters.max_circumradius,
       .size_boxes = parameters.size_boxes,
       .cloud = points};
-  const absl::Status valid =
-      core::ValidateMesh({.dimension = mesh.dimension, .points = mesh.points, .simplices = mesh.simplices}, options);
+  const absl::Status valid = core::ValidateMesh(
+      {.dimension = mesh.dimension, .points = mesh.points, .simplices = mesh.simplices, .weights = mesh.weights},
+      options);
   Require(valid.ok(), "a mesh is valid:", valid.ToString());
 }
 
@@ -98,7 +99,7 @@ void RequireMeshOrRefusal(const core::MeshParameters& parameters, std::span<cons
     RequireRefusal(mesh.status());
     return;
   }
-  Require(other->points == mesh->points && other->simplices == mesh->simplices,
+  Require(other->points == mesh->points && other->simplices == mesh->simplices && other->weights == mesh->weights,
           "the mesh does not depend on the number of threads");
   Require(parameters.max_vertices == 0 || mesh->vertex_count() <= parameters.max_vertices, "max_vertices is kept");
   RequireValid(*mesh, parameters, points);
@@ -140,6 +141,7 @@ void RequireEditOrRefusal(const core::MeshParameters& parameters, std::span<cons
   Require(extracted.ok(), "a refined mesh can be extracted again:", extracted.status().ToString());
   Require(mesh->points == extracted->points, "the vertices of a mesh brought up to date are those of a new one");
   Require(SimplexSets(*mesh) == SimplexSets(*extracted), "so are its simplices");
+  Require(mesh->weights == extracted->weights, "and its weights");
   std::vector<double> all(points.begin(), points.end());
   all.insert(all.end(), added.begin(), added.end());
   Require(std::equal(vertices.begin(), vertices.end(), mesh->input_vertex.end() - vertices.size()),

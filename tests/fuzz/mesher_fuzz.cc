@@ -44,8 +44,8 @@ struct Task {
 };
 
 // Byte 0: bit 0 dimension 2 or 3, bits 1 and 2 the box: grown by a quarter, not grown, the grid's, the grid's but flat; bit 3 two
-// dimensions more; bit 4 well-spaced; bit 5 sizes; bit 6 an edit. Byte 1: the exponent of the tiny step. Byte 2: offset. Byte 3:
-// scale. Byte 4: rho.
+// dimensions more; bit 4 well-spaced; bit 5 sizes; bit 6 an edit. Byte 1: the exponent of the tiny step; from 3-D on bit 6 weights,
+// bit 7 no mending. Byte 2: offset. Byte 3: scale. Byte 4: rho.
 //
 // With sizes a byte more: the lowest two bits the bound everywhere, if any, the next two that of a box, the next three where it is,
 // the last one whether it is a point.
@@ -60,12 +60,19 @@ Task ReadTask(ByteReader& bytes) {
   core::MeshParameters& parameters = task.parameters;
   Placement& placement = task.placement;
   const uint8_t shape = bytes.Next();
-  placement.tiny_step = std::ldexp(1.0, -(bytes.Next() % 64));
+  const uint8_t step = bytes.Next();
+  placement.tiny_step = std::ldexp(1.0, -(step % 64));
   placement.offset = kOffsets[bytes.Next() % kOffsets.size()];
   placement.scale = kScales[bytes.Next() % kScales.size()];
   parameters.dimension = 2 + (shape & 1) + ((shape >> 3 & 1) != 0 ? 2 : 0);
   parameters.rho = kRhoFactors[bytes.Next() % kRhoFactors.size()] * core::MinimumRho(parameters.dimension);
   parameters.max_vertices = kMaxVertices[parameters.dimension - 2];
+  if (parameters.dimension > 2) {
+    parameters.pump_weights = (step >> 6 & 1) != 0;
+    if ((step >> 7) != 0) {
+      parameters.min_dihedral = 0;
+    }
+  }
   if ((shape >> 4 & 1) != 0) {
     parameters.criterion = core::Criterion::kWellSpaced;
   }
