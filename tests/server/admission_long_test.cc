@@ -1,7 +1,4 @@
 // The limit of memory of the real program: 200 clients at once with ten times the work that fits.
-#include <signal.h>
-
-#include <fstream>
 #include <iostream>
 #include <memory>
 #include <random>
@@ -36,18 +33,6 @@ std::vector<double> PointsOfClient(int client) {
     coordinate = uniform(generator);
   }
   return points;
-}
-
-// Most resident memory that a process has had, in bytes.
-uint64_t PeakOf(pid_t pid) {
-  std::ifstream file(absl::StrCat("/proc/", pid, "/status"));
-  const std::string key = "VmHWM:";
-  for (std::string line; std::getline(file, line);) {
-    if (line.substr(0, key.size()) == key) {
-      return std::stoull(line.substr(key.size())) * 1024;
-    }
-  }
-  return 0;
 }
 
 uint64_t EstimateOf(v1::MeshingService::Stub& stub, const std::vector<double>& points) {
@@ -120,13 +105,12 @@ TEST(Admission, TwoHundredClientsWithTenTimesWhatFitsStayUnderTheLimitAndAllGetT
     EXPECT_TRUE(outcome.is_meshed) << outcome.lost;
     refusals += outcome.refusals;
   }
-  const uint64_t peak = PeakOf(daemon.process().pid());
+  const uint64_t peak = daemon.process().PeakMemory();
   std::cout << "peak " << (peak >> 20) << " MB of " << (kMaxMemoryBytes >> 20) << ", " << refusals << " refusals, "
             << (wanted >> 20) << " MB wanted\n";
   EXPECT_GT(peak, kMaxMemoryBytes / 2);  // it has used what it may
   EXPECT_LT(peak, kMaxMemoryBytes);
-  daemon.process().Signal(SIGTERM);
-  EXPECT_EQ(daemon.process().Wait(), 0);
+  daemon.Stop();
 }
 
 }  // namespace

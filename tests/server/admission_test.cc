@@ -87,21 +87,33 @@ TEST(Admission, ACloudThatDoesNotFitIsRefusedWhileItComes) {
   ExpectMemoryLimit(call.Finish(), /*may_retry=*/false);
 }
 
-TEST(Admission, ACloudThatOthersLeaveNoRoomForMayBeSentAgain) {
-  Event reserved;
-  Event go;
-  ServiceHarness harness(MesherOfMegabytes(reserved, go), LittleMemory());
-  TestCall holder(harness.stub());
-  SendPoints(holder, 60);
-  ASSERT_TRUE(reserved.Wait());
-  TestCall refused(harness.stub());
+// A server of little memory, and a job that holds some of it until it is let go.
+class AdmissionBesideAHolder : public ::testing::Test {
+ protected:
+  void Hold(size_t megabytes) {
+    SendPoints(holder_, megabytes);
+    ASSERT_TRUE(reserved_.Wait());
+  }
+  void LetGo() {
+    go_.Set();
+    EXPECT_TRUE(holder_.Finish().ok());
+  }
+
+  Event reserved_;
+  Event go_;
+  ServiceHarness harness_{MesherOfMegabytes(reserved_, go_), LittleMemory()};
+  TestCall holder_{harness_.stub()};
+};
+
+TEST_F(AdmissionBesideAHolder, ACloudThatThereIsNoRoomForMayBeSentAgain) {
+  Hold(60);
+  TestCall refused(harness_.stub());
   SendPoints(refused, 1);
   ExpectMemoryLimit(refused.Finish(), /*may_retry=*/true);
-  go.Set();
-  EXPECT_TRUE(holder.Finish().ok());
+  LetGo();
   grpc::Status again;
   do {  // the memory is free shortly after
-    TestCall retry(harness.stub());
+    TestCall retry(harness_.stub());
     SendPoints(retry, 1);
     again = retry.Finish();
   } while (again.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED);
@@ -212,25 +224,19 @@ TEST(Admission, ATenantHasItsShareOfTheJobs) {
   EXPECT_TRUE(DetailsOf(status).may_retry);
 }
 
-TEST(Admission, CancelWhileWaitingForMemoryGivesAllBack) {
-  Event reserved;
-  Event go;
-  ServiceHarness harness(MesherOfMegabytes(reserved, go), LittleMemory());
-  TestCall holder(harness.stub());
-  SendPoints(holder, 40);
-  ASSERT_TRUE(reserved.Wait());
-  TestCall waiting(harness.stub());
+TEST_F(AdmissionBesideAHolder, CancelWhileWaitingForMemoryGivesAllBack) {
+  Hold(40);
+  TestCall waiting(harness_.stub());
   SendPoints(waiting, 40);
-  while (harness.Info().queued_jobs() == 0) {
+  while (harness_.Info().queued_jobs() == 0) {
     std::this_thread::yield();
   }
   waiting.Cancel();
   EXPECT_EQ(waiting.Finish().error_code(), grpc::StatusCode::CANCELLED);
-  while (harness.Info().queued_jobs() > 0) {
+  while (harness_.Info().queued_jobs() > 0) {
     std::this_thread::yield();
   }
-  go.Set();
-  EXPECT_TRUE(holder.Finish().ok());
+  LetGo();
 }
 
 }  // namespace

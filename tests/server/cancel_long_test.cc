@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <atomic>
 #include <cstdio>
-#include <random>
 #include <string>
 #include <thread>
 #include <vector>
@@ -26,16 +25,6 @@ absl::Duration ProcessorTime() {
   timespec now{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
   return absl::DurationFromTimespec(now);
-}
-
-std::vector<double> RandomPoints(size_t count, int dimension) {
-  std::mt19937_64 generator(11);
-  std::uniform_real_distribution<double> uniform(0.01, 0.99);
-  std::vector<double> points(count * dimension);
-  for (double& coordinate : points) {
-    coordinate = uniform(generator);
-  }
-  return points;
 }
 
 // Cancels runs over one cloud at moments that the test chooses.

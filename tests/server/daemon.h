@@ -2,6 +2,8 @@
 #ifndef WELLSPACE_TESTS_SERVER_DAEMON_H_
 #define WELLSPACE_TESTS_SERVER_DAEMON_H_
 
+#include <signal.h>
+
 #include <algorithm>
 #include <string>
 #include <utility>
@@ -12,6 +14,15 @@
 #include "tests/server/subprocess.h"
 
 namespace wellspace::server {
+
+// Whether the server of `client` meshes: a triangle's corners, within a minute.
+inline absl::Status MeshTriangle(client::Client client) {
+  client::MeshOptions options;
+  options.dimension = 2;
+  options.timeout = absl::Minutes(1);
+  const std::vector<double> points = {0, 0, 1, 0, 0.5, 0.75};
+  return client.MeshPoints(options, points).status();
+}
 
 // A wellspaced on a free port.
 class Daemon {
@@ -29,6 +40,12 @@ class Daemon {
   const std::string& address() const { return address_; }
   client::Client Client(const client::ConnectOptions& options = {}) {
     return client::Connect(address_, options).value();
+  }
+
+  // Ends it as an administrator does.
+  void Stop() {
+    process_.Signal(SIGTERM);
+    EXPECT_EQ(process_.Wait(), 0);
   }
 
  private:

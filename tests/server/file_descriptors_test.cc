@@ -55,8 +55,7 @@ class FileDescriptors : public ::testing::Test {
   }
 
   void Stop() {
-    daemon_->process().Signal(SIGTERM);
-    EXPECT_EQ(daemon_->process().Wait(), 0);
+    daemon_->Stop();
     daemon_.reset();
   }
 
@@ -94,21 +93,13 @@ class FileDescriptors : public ::testing::Test {
         .Wait();
   }
 
-  static absl::Status Mesh(client::Client client) {
-    client::MeshOptions options;
-    options.dimension = 2;
-    options.timeout = absl::Minutes(1);
-    const std::vector<double> points = {0, 0, 1, 0, 0.5, 0.75};
-    return client.MeshPoints(options, points).status();
-  }
-
   TemporaryFolder folder_;
   std::unique_ptr<Daemon> daemon_;
 };
 
 TEST_F(FileDescriptors, UsedUpByConnectionsRefuseFurtherOnesOnly) {
   const client::Client first = daemon_->Client();
-  ASSERT_EQ(Mesh(first), absl::OkStatus());
+  ASSERT_EQ(MeshTriangle(first), absl::OkStatus());
   std::vector<RawConnection> connections;
   for (rlim_t i = 0; i < 2 * kDescriptors; ++i) {
     connections.emplace_back(daemon_->address());
@@ -116,7 +107,7 @@ TEST_F(FileDescriptors, UsedUpByConnectionsRefuseFurtherOnesOnly) {
   // The last ones are closed at once, and some descriptors are left for files.
   EXPECT_TRUE(connections.back().IsClosedByServer());
   EXPECT_LT(OpenDescriptors(), kDescriptors - 10);
-  EXPECT_EQ(Mesh(first), absl::OkStatus());
+  EXPECT_EQ(MeshTriangle(first), absl::OkStatus());
   ExpectNoBusyLoop();
   connections.clear();
   // Until the server has noticed that they are gone, it refuses.
@@ -128,20 +119,20 @@ TEST_F(FileDescriptors, UsedUpByConnectionsRefuseFurtherOnesOnly) {
   }
   EXPECT_TRUE(is_served);
   EXPECT_EQ(MeshFromAnotherProcess(), 0);
-  EXPECT_EQ(Mesh(first), absl::OkStatus());
+  EXPECT_EQ(MeshTriangle(first), absl::OkStatus());
   Stop();
   EXPECT_THAT(folder_.Read("log"), HasSubstr("file descriptors"));
 }
 
 TEST_F(FileDescriptors, NoneAtAllMakeConnectionsWait) {
   const client::Client first = daemon_->Client();
-  ASSERT_EQ(Mesh(first), absl::OkStatus());
+  ASSERT_EQ(MeshTriangle(first), absl::OkStatus());
   rlimit before = {};
   const rlimit none = {.rlim_cur = 3, .rlim_max = kDescriptors};
   ASSERT_EQ(prlimit(pid(), RLIMIT_NOFILE, &none, &before), 0);
   RawConnection waiting(daemon_->address());
   waiting.Send(ConnectionStart());
-  EXPECT_EQ(Mesh(first), absl::OkStatus());
+  EXPECT_EQ(MeshTriangle(first), absl::OkStatus());
   ExpectNoBusyLoop();
   const rlimit some = {.rlim_cur = kDescriptors, .rlim_max = kDescriptors};
   ASSERT_EQ(prlimit(pid(), RLIMIT_NOFILE, &some, nullptr), 0);

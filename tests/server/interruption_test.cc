@@ -13,16 +13,6 @@
 namespace wellspace::server {
 namespace {
 
-std::vector<double> RandomPoints(size_t count) {
-  std::mt19937_64 generator(11);
-  std::uniform_real_distribution<double> uniform(0.01, 0.99);
-  std::vector<double> points(count * 3);
-  for (double& coordinate : points) {
-    coordinate = uniform(generator);
-  }
-  return points;
-}
-
 // A cloud that makes some sixteen chunks.
 void SendLargeCloud(TestCall& call) {
   call.Send(UnitCubeParameters());

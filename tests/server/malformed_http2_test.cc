@@ -22,19 +22,13 @@ class MalformedHttp2 : public ::testing::Test {
  protected:
   static void SetUpTestSuite() { daemon_ = std::make_unique<Daemon>(); }
   static void TearDownTestSuite() {
-    daemon_->process().Signal(SIGTERM);
-    EXPECT_EQ(daemon_->process().Wait(), 0);
+    if (daemon_ != nullptr) {
+      daemon_->Stop();
+    }
     daemon_.reset();
   }
 
-  ~MalformedHttp2() override {
-    client::MeshOptions options;
-    options.dimension = 2;
-    options.timeout = absl::Minutes(1);
-    const std::vector<double> points = {0, 0, 1, 0, 0.5, 0.75};
-    const absl::StatusOr<client::Mesh> mesh = daemon_->Client().MeshPoints(options, points);
-    EXPECT_TRUE(mesh.ok()) << mesh.status();
-  }
+  ~MalformedHttp2() override { EXPECT_EQ(MeshTriangle(daemon_->Client()), absl::OkStatus()); }
 
   static RawConnection Connect() { return RawConnection(daemon_->address()); }
   static RawConnection Begin() {

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <limits>
 #include <new>
-#include <random>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -25,16 +24,6 @@ namespace wellspace::server {
 namespace {
 
 using ::testing::HasSubstr;
-
-std::vector<double> RandomPoints(size_t count, int dimension) {
-  std::mt19937_64 generator(7);
-  std::uniform_real_distribution<double> uniform(0.01, 0.99);
-  std::vector<double> points(count * dimension);
-  for (double& coordinate : points) {
-    coordinate = uniform(generator);
-  }
-  return points;
-}
 
 std::vector<uint64_t> BitsOf(const std::vector<double>& values) {
   std::vector<uint64_t> bits;

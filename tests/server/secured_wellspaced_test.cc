@@ -1,6 +1,4 @@
 // The real programs with TLS, certificates and tokens: what an operator and a user do, and what neither must be able to.
-#include <signal.h>
-
 #include <string>
 #include <vector>
 
@@ -83,8 +81,7 @@ TEST_F(SecuredWellspaced, MeshesForThoseWhoHaveTheToken) {
     run = Mesh(daemon, {"--tls", "--token-file", token});
     EXPECT_EQ(run.exit_code, kExitUnauthenticated);
     EXPECT_THAT(run.err, HasSubstr("certificate"));
-    daemon.process().Signal(SIGTERM);
-    EXPECT_EQ(daemon.process().Wait(), 0);
+    daemon.Stop();
   }
   const std::string lines = folder_.Read("log");
   EXPECT_THAT(lines, HasSubstr("acme"));

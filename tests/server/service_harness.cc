@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <random>
 #include <stdexcept>
 #include <thread>
 #include <utility>
@@ -139,6 +140,16 @@ v1::MeshParameters UnitCubeParameters(int dimension) {
     parameters.mutable_domain()->add_high(1);
   }
   return parameters;
+}
+
+std::vector<double> RandomPoints(size_t count, int dimension) {
+  std::mt19937_64 generator(11);
+  std::uniform_real_distribution<double> uniform(0.01, 0.99);
+  std::vector<double> points(count * dimension);
+  for (double& coordinate : points) {
+    coordinate = uniform(generator);
+  }
+  return points;
 }
 
 TestCall::TestCall(v1::MeshingService::Stub& stub, std::optional<absl::Duration> timeout, const std::string& token) {

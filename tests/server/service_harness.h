@@ -57,6 +57,9 @@ int PlaceOf(v1::Phase phase);
 // Parameters of a call in dimension 3 or another, with the unit cube as domain.
 v1::MeshParameters UnitCubeParameters(int dimension = 3);
 
+// Points within the unit cube; always the same ones.
+std::vector<double> RandomPoints(size_t count, int dimension = 3);
+
 // One call of MeshPoints on the client's side.
 class TestCall {
  public:

@@ -7,7 +7,9 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <fstream>
 #include <stdexcept>
+#include <string>
 
 extern char** environ;
 
@@ -59,6 +61,17 @@ std::string Subprocess::ReadLine() {
     line.push_back(static_cast<char>(c));
   }
   return line;
+}
+
+uint64_t Subprocess::PeakMemory() const {
+  std::ifstream file("/proc/" + std::to_string(pid_) + "/status");
+  const std::string key = "VmHWM:";
+  for (std::string line; std::getline(file, line);) {
+    if (line.substr(0, key.size()) == key) {
+      return std::stoull(line.substr(key.size())) * 1024;
+    }
+  }
+  return 0;
 }
 
 void Subprocess::Signal(int signal) { kill(pid_, signal); }

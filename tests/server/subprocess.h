@@ -4,6 +4,7 @@
 
 #include <sys/types.h>
 
+#include <cstdint>
 #include <cstdio>
 #include <string>
 #include <vector>
@@ -26,6 +27,9 @@ class Subprocess {
   std::string ReadLine();
 
   pid_t pid() const { return pid_; }
+
+  // The most resident memory that it has had, in bytes. 0 when it is no more.
+  uint64_t PeakMemory() const;
 
   void Signal(int signal);
 

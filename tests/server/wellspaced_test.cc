@@ -35,8 +35,7 @@ TEST(Wellspaced, WithoutGraceEndsRunningCallsAtOnce) {
   Daemon daemon({"--grace", "0"});
   Subprocess client("endless_client", {daemon.address()});
   ASSERT_EQ(client.ReadLine(), "running");
-  daemon.process().Signal(SIGTERM);
-  EXPECT_EQ(daemon.process().Wait(), 0);
+  daemon.Stop();
   EXPECT_THAT(client.ReadLine(), HasSubstr("UNAVAILABLE: the server stopped before the answer was delivered"));
   EXPECT_EQ(client.Wait(), 1);
 }
@@ -45,8 +44,7 @@ TEST(Wellspaced, AfterTheGracePeriodEndsRunningCalls) {
   Daemon daemon({"--grace", "0.2"});
   Subprocess client("endless_client", {daemon.address()});
   ASSERT_EQ(client.ReadLine(), "running");
-  daemon.process().Signal(SIGTERM);
-  EXPECT_EQ(daemon.process().Wait(), 0);
+  daemon.Stop();
   EXPECT_THAT(client.ReadLine(), HasSubstr("UNAVAILABLE: the server stopped before the answer was delivered"));
   EXPECT_EQ(client.Wait(), 1);
 }
@@ -77,8 +75,7 @@ TEST(Wellspaced, AKilledClientFreesItsWorker) {
   while (observer.GetServerInfo()->running_jobs != 0 && absl::Now() - killed < absl::Minutes(1)) {
   }
   EXPECT_LE(absl::Now() - killed, kIdleWithin);
-  daemon.process().Signal(SIGTERM);
-  EXPECT_EQ(daemon.process().Wait(), 0);
+  daemon.Stop();
 }
 
 TEST(Wellspaced, AKilledServerIsAClearError) {
