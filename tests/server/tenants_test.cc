@@ -1,23 +1,26 @@
 // Tenants and each other's sessions, over real connections.
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
+#include "absl/time/clock.h"
 #include "client/client.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "tests/formats/temporary_folder.h"
 #include "tests/server/raw_call.h"
 #include "tests/server/service_harness.h"
-#include "wellspace/v1/operations.pb.h"
+#include "wellspace/v1/operations.grpc.pb.h"
 #include "wellspace/v1/queries.pb.h"
-#include "wellspace/v1/sessions.pb.h"
+#include "wellspace/v1/sessions.grpc.pb.h"
 
 namespace wellspace::server {
 namespace {
 
+using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 using ::testing::SizeIs;
@@ -25,11 +28,19 @@ using ::testing::SizeIs;
 const std::string kAcme(40, 'a');
 const std::string kBeta(40, 'b');
 
+// That there are the tenants acme and beta.
+SecurityOptions TwoTenants(TemporaryFolder& folder) {
+  SecurityOptions security;
+  security.token_file =
+      folder.Write("tokens", absl::StrCat(*MakeTokenLine("acme", kAcme), "\n", *MakeTokenLine("beta", kBeta)));
+  return security;
+}
+
 // A server with two tenants, of whom acme has a session with a mesh.
 class TenantsTest : public ::testing::Test {
  protected:
   TenantsTest()
-      : harness_(FakeMesher, {}, Transport::kLoopback, FakeEstimator, core::Mesher::Create, Security()),
+      : harness_(FakeMesher, {}, Transport::kLoopback, FakeEstimator, core::Mesher::Create, TwoTenants(folder_)),
         acme_(ClientWith(kAcme)),
         beta_(ClientWith(kBeta)) {
     session_ = acme_.CreateSession(Options(), First()).value().name;
@@ -53,13 +64,6 @@ class TenantsTest : public ::testing::Test {
     client::CallOptions call;
     call.request_id = "first";
     return call;
-  }
-
-  SecurityOptions Security() {
-    SecurityOptions security;
-    security.token_file =
-        folder_.Write("tokens", absl::StrCat(*MakeTokenLine("acme", kAcme), "\n", *MakeTokenLine("beta", kBeta)));
-    return security;
   }
 
   client::Client ClientWith(const std::string& token) {
@@ -185,6 +189,115 @@ TEST_F(TenantsTest, NamesHaveNothingInCommon) {
     equal += a[i] == b[i] ? 1 : 0;
   }
   EXPECT_LE(equal, static_cast<int>(a.size()) / 2);
+}
+
+// A server whose tenants may have two sessions, five points and one job each.
+class QuotasTest : public ::testing::Test {
+ protected:
+  static ServiceOptions Options() {
+    ServiceOptions options;
+    options.workers = 2;
+    options.max_sessions_per_tenant = 2;
+    options.max_points_per_tenant = 5;
+    options.max_jobs_per_tenant = 1;
+    return options;
+  }
+
+  static std::unique_ptr<grpc::ClientContext> Showing(const std::string& token) {
+    auto context = std::make_unique<grpc::ClientContext>();
+    context->AddMetadata("authorization", "Bearer " + token);
+    return context;
+  }
+
+  grpc::Status Create(const std::string& token, std::string* name) {
+    v1::CreateSessionRequest request;
+    *request.mutable_parameters() = UnitCubeParameters(2);
+    v1::CreateSessionResponse response;
+    const grpc::Status status = sessions_->CreateSession(Showing(token).get(), request, &response);
+    *name = response.session().name();
+    return status;
+  }
+
+  // Three points more.
+  grpc::Status Upload(const std::string& token, const std::string& name) {
+    const std::unique_ptr<grpc::ClientContext> context = Showing(token);
+    v1::UploadPointsResponse response;
+    const auto writer = sessions_->UploadPoints(context.get(), &response);
+    v1::UploadPointsRequest request;
+    request.set_name(name);
+    for (const double x : {0.25, 0.25, 0.75, 0.25, 0.5, 0.75}) {
+      request.mutable_points()->add_coordinates(x);
+    }
+    writer->Write(request);
+    writer->WritesDone();
+    return writer->Finish();
+  }
+
+  grpc::Status Start(const std::string& token, const std::string& name) {
+    v1::StartRefinementRequest request;
+    request.set_name(name);
+    v1::StartRefinementResponse response;
+    return operations_->StartRefinement(Showing(token).get(), request, &response);
+  }
+
+  static void ExpectQuota(const grpc::Status& status, const std::string& figures) {
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+    EXPECT_EQ(DetailsOf(status).reason, "QUOTA_EXCEEDED") << status.error_message();
+    EXPECT_THAT(status.error_message(), HasSubstr(figures));
+  }
+  static void ExpectServed(const grpc::Status& status) { EXPECT_TRUE(status.ok()) << status.error_message(); }
+
+  TemporaryFolder folder_;
+  Event started_;
+  ServiceHarness harness_{EndlessMesher(started_), Options(),          Transport::kLoopback, FakeEstimator,
+                          core::Mesher::Create,    TwoTenants(folder_)};
+  const std::unique_ptr<v1::SessionService::Stub> sessions_ = v1::SessionService::NewStub(harness_.channel());
+  const std::unique_ptr<v1::OperationService::Stub> operations_ = v1::OperationService::NewStub(harness_.channel());
+};
+
+TEST_F(QuotasTest, OfSessionsAreATenantsOwn) {
+  std::string name;
+  ExpectServed(Create(kAcme, &name));
+  ExpectServed(Create(kAcme, &name));
+  ExpectQuota(Create(kAcme, &name), "you have 2 sessions, and may have at most 2");
+  ExpectServed(Create(kBeta, &name));
+}
+
+TEST_F(QuotasTest, OfPointsAreATenantsOwn) {
+  std::string of_acme;
+  std::string other_of_acme;
+  std::string of_beta;
+  ExpectServed(Create(kAcme, &of_acme));
+  ExpectServed(Create(kAcme, &other_of_acme));
+  ExpectServed(Create(kBeta, &of_beta));
+  ExpectServed(Upload(kAcme, of_acme));
+  ExpectQuota(Upload(kAcme, other_of_acme), "would have 6 points together; they may have at most 5");
+  ExpectServed(Upload(kBeta, of_beta));
+}
+
+TEST_F(QuotasTest, OfJobsAreATenantsOwn) {
+  std::string of_acme;
+  std::string of_beta;
+  ExpectServed(Create(kAcme, &of_acme));
+  ExpectServed(Create(kBeta, &of_beta));
+  TestCall running(harness_.stub(), std::nullopt, kAcme);
+  running.Send(UnitCubeParameters());
+  running.HalfClose();
+  ASSERT_TRUE(started_.Wait());
+  ExpectQuota(Start(kAcme, of_acme), "1 jobs of this tenant run or are in line; it may have 1");
+  TestCall another(harness_.stub(), std::nullopt, kAcme);
+  another.Send(UnitCubeParameters());
+  another.HalfClose();
+  ExpectQuota(another.Finish(), "1 jobs of this tenant run or are in line; it may have 1");
+  ExpectServed(Start(kBeta, of_beta));
+  v1::GetSessionRequest request;
+  request.set_name(of_beta);
+  v1::GetSessionResponse response;
+  const absl::Time end = absl::Now() + absl::Minutes(1);
+  do {  // while acme's job runs
+    ExpectServed(sessions_->GetSession(Showing(kBeta).get(), request, &response));
+  } while (response.session().state() != v1::Session::STATE_READY && absl::Now() < end);
+  EXPECT_EQ(response.session().state(), v1::Session::STATE_READY);
 }
 
 }  // namespace
