@@ -218,6 +218,20 @@ TEST_F(MalformedHttp2, AWindowThatOverflowsEndsTheConnectionOrTheCall) {
   EXPECT_TRUE(Closes(Frame{.type = Frame::kWindowUpdate, .payload = BigEndian(0)}));
 }
 
+TEST_F(MalformedHttp2, DataBeyondTheWindowEndTheConnection) {
+  constexpr uint32_t kAnnounced = uint32_t{1} << 30;
+  const std::string piece = Frame{.type = Frame::kData, .stream = 1, .payload = std::string(16384, 'x')}.Serialize();
+  RawConnection connection = Begin();
+  connection.Send(BeginCall(1, kMesh));
+  connection.Send(Frame{.type = Frame::kData, .stream = 1, .payload = GrpcMessage("", kAnnounced)});
+  uint64_t sent = 0;
+  // At once, or, when the end of the call comes between, after a ping that is not answered.
+  while (sent < kAnnounced && connection.Send(piece)) {
+    sent += piece.size();
+  }
+  EXPECT_LT(sent, kAnnounced);
+}
+
 TEST_F(MalformedHttp2, CallsThatAreResetAtOnceCostNothingLasting) {
   RawConnection connection = Begin();
   uint32_t stream = 1;
