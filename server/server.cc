@@ -13,6 +13,7 @@
 #include "grpcpp/create_channel_posix.h"
 #include "grpcpp/ext/proto_server_reflection_plugin.h"
 #include "grpcpp/health_check_service_interface.h"
+#include "grpcpp/resource_quota.h"
 #include "grpcpp/server_builder.h"
 #include "grpcpp/server_posix.h"
 #include "server/listen_address.h"
@@ -27,6 +28,14 @@ constexpr int kMinClientPingMs = 10'000;
 
 // Aborted calls get this long to send their status, and idle clients to close their connections, before both are cut off.
 constexpr std::chrono::milliseconds kFarewell(500);
+
+// Most that gRPC holds of what comes in, all connections together. It looks at the length of a message when all of it has come, of whoever
+// it is; here it ends calls, one of each connection, the oldest first. Half of the limit of memory is as much as all messages that
+// the budget makes room for.
+size_t MostReceived(const ServiceOptions& options) {
+  constexpr uint64_t kWithoutLimit = uint64_t{1} << 30;
+  return options.max_memory_bytes == 0 ? kWithoutLimit : options.max_memory_bytes / 2;
+}
 
 // As gRPC takes durations.
 int Milliseconds(absl::Duration duration) {
@@ -53,6 +62,7 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
   grpc::ServerBuilder builder;
   builder.SetMaxReceiveMessageSize(kMaxRequestBytes);
   builder.SetMaxSendMessageSize(kMaxSentBytes);
+  builder.SetResourceQuota(grpc::ResourceQuota("received").Resize(MostReceived(options.service)));
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
   builder.AddChannelArgument(GRPC_ARG_HTTP2_MIN_RECV_PING_INTERVAL_WITHOUT_DATA_MS, kMinClientPingMs);

@@ -7,6 +7,7 @@
 #include <sys/time.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "absl/strings/numbers.h"
@@ -25,6 +26,20 @@ uint32_t ReadBigEndian(std::string_view bytes) {
     value = value << 8 | static_cast<uint8_t>(byte);
   }
   return value;
+}
+
+// The size that `settings` give to the windows of streams.
+std::optional<uint32_t> InitialWindowOf(const Frame& settings) {
+  constexpr uint32_t kInitialWindowSize = 4;
+  constexpr size_t kSettingBytes = 6;
+  const std::string_view bytes = settings.payload;
+  std::optional<uint32_t> size;
+  for (size_t i = 0; i + kSettingBytes <= bytes.size(); i += kSettingBytes) {
+    if (ReadBigEndian(bytes.substr(i, 2)) == kInitialWindowSize) {
+      size = ReadBigEndian(bytes.substr(i + 2, 4));
+    }
+  }
+  return size;
 }
 
 // A string of HPACK, without Huffman's code: its length with a prefix of seven bits.
@@ -158,6 +173,47 @@ std::optional<Frame> RawConnection::ReadUntil(uint8_t type) {
     frame = Read();
   }
   return frame;
+}
+
+uint64_t RawConnection::SendMessageUntilRefused(std::string_view path, uint32_t length) {
+  constexpr uint32_t kStream = 1;
+  constexpr size_t kPiece = 16384;
+  constexpr uint32_t kInitialWindow = 65535;
+  const std::string start = GrpcMessage("", length);
+  Send(ConnectionStart() + BeginCall(kStream, path).Serialize() +
+       Frame{.type = Frame::kData, .stream = kStream, .payload = start}.Serialize());
+  const std::string piece =
+      Frame{.type = Frame::kData, .stream = kStream, .payload = std::string(kPiece, 'x')}.Serialize();
+  int64_t initial = kInitialWindow;
+  int64_t of_connection = kInitialWindow - static_cast<int64_t>(start.size());
+  int64_t of_stream = of_connection;
+  uint64_t sent = 0;
+  while (sent < length) {
+    if (std::min(of_connection, of_stream) >= static_cast<int64_t>(kPiece)) {
+      if (!Send(piece)) {
+        return sent;
+      }
+      of_connection -= kPiece;
+      of_stream -= kPiece;
+      sent += kPiece;
+      continue;
+    }
+    const std::optional<Frame> frame = Read();
+    if (!frame.has_value() || (frame->stream == kStream && frame->type != Frame::kWindowUpdate)) {
+      return sent;  // closed, or the headers or the reset with which the call ends
+    }
+    if (frame->type == Frame::kWindowUpdate) {
+      (frame->stream == 0 ? of_connection : of_stream) += ReadBigEndian(frame->payload);
+    } else if (frame->type == Frame::kPing && frame->flags != Frame::kAck) {
+      Send(Frame{.type = Frame::kPing, .flags = Frame::kAck, .payload = frame->payload});
+    } else if (frame->type == Frame::kSettings && frame->flags != Frame::kAck) {
+      const int64_t before = initial;
+      initial = InitialWindowOf(*frame).value_or(initial);
+      of_stream += initial - before;
+      Send(Frame{.type = Frame::kSettings, .flags = Frame::kAck});
+    }
+  }
+  return sent;
 }
 
 bool RawConnection::IsClosedByServer() {

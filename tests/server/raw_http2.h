@@ -79,6 +79,10 @@ class RawConnection {
   // The next frame of `type`; those between are left out.
   std::optional<Frame> ReadUntil(uint8_t type);
 
+  // Begins the connection and on it a call of `path`, and sends one message that says it has `length` bytes, as fast as the windows of
+  // HTTP/2 allow. Ends when the server ends the call or the connection, or when all has been sent. Returns how many bytes were sent.
+  uint64_t SendMessageUntilRefused(std::string_view path, uint32_t length);
+
   // Reads until the server closes the connection. False when it sends nothing for a minute instead.
   bool IsClosedByServer();
 

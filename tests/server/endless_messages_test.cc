@@ -1,0 +1,77 @@
+// Messages that announce a gigabyte and come, to the real server, from callers whom it does not know: gRPC would have all of such a
+// message before it looks at its length, and before the server looks at the caller.
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "gtest/gtest.h"
+#include "server/options.h"
+#include "server/tokens.h"
+#include "tests/formats/temporary_folder.h"
+#include "tests/server/daemon.h"
+#include "tests/server/raw_http2.h"
+
+namespace wellspace::server {
+namespace {
+
+constexpr uint64_t kMaxMemoryBytes = kMinMemoryBytes;
+constexpr uint32_t kAnnounced = uint32_t{1} << 30;
+
+class EndlessMessages : public ::testing::Test {
+ protected:
+  EndlessMessages() {
+    const std::string tokens = folder_.Write("tokens", *MakeTokenLine("acme", token_));
+    daemon_ = std::make_unique<Daemon>(
+        std::vector<std::string>{"--token-file", tokens, "--max-memory", absl::StrCat(kMaxMemoryBytes)});
+  }
+
+  ~EndlessMessages() override {
+    EXPECT_EQ(MeshTriangle(daemon_->Client({.token = token_})), absl::OkStatus());
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+    // Nobody works: this is what gRPC holds.
+    EXPECT_LT(daemon_->process().PeakMemory(), kMaxMemoryBytes);
+#endif
+    daemon_->Stop();
+  }
+
+  const std::string token_ = std::string(40, 't');
+  TemporaryFolder folder_;
+  std::unique_ptr<Daemon> daemon_;
+};
+
+TEST_F(EndlessMessages, OfOneCallEndIt) {
+  for (const std::string path :
+       {"/wellspace.v1.SessionService/GetSession", "/wellspace.v1.SessionService/DownloadMesh",
+        "/grpc.health.v1.Health/Check", "/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo"}) {
+    RawConnection connection(daemon_->address());
+    EXPECT_LE(connection.SendMessageUntilRefused(path, kAnnounced), kMaxMemoryBytes) << path;
+  }
+}
+
+TEST_F(EndlessMessages, OfCallsWhoseRequestIsAStreamAreReadForAWindowOnly) {
+  for (const std::string path :
+       {"/wellspace.v1.SessionService/UploadPoints", "/wellspace.v1.MeshingService/MeshPoints"}) {
+    RawConnection connection(daemon_->address());
+    EXPECT_LE(connection.SendMessageUntilRefused(path, kAnnounced), kMaxMemoryBytes / 4) << path;
+  }
+}
+
+TEST_F(EndlessMessages, OfManyConnectionsShareTheLimit) {
+  constexpr int kConnections = 8;
+  std::vector<std::thread> senders;
+  for (int i = 0; i < kConnections; ++i) {
+    senders.emplace_back([&] {
+      RawConnection connection(daemon_->address());
+      EXPECT_LE(connection.SendMessageUntilRefused("/wellspace.v1.SessionService/GetSession", kAnnounced),
+                kMaxMemoryBytes);
+    });
+  }
+  for (std::thread& sender : senders) {
+    sender.join();
+  }
+}
+
+}  // namespace
+}  // namespace wellspace::server
