@@ -10,7 +10,7 @@ set -euo pipefail
 declare -A packages=(
   [build]="g++ cmake ninja-build pkg-config libgrpc++-dev libprotobuf-dev protobuf-compiler protobuf-compiler-grpc
            libabsl-dev libc-ares-dev libspdlog-dev libboost-dev libtbb-dev libcli11-dev nlohmann-json3-dev
-           prometheus-cpp-dev libcairo2-dev zlib1g-dev libminizip-dev python3"
+           prometheus-cpp-dev libcairo2-dev zlib1g-dev libminizip-dev libhdf5-dev python3"
   [test]="libgtest-dev libgmock-dev libcgal-dev python3 python3-grpcio python3-meshio python3-numpy openssl"
   [lint]="git clang-format-14 python3"
   [tidy]="clang-tidy-14"
@@ -20,7 +20,7 @@ declare -A packages=(
   [container]="debootstrap podman buildah"
   [monitoring]="prometheus"
   [runtime]="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libtbb12 libprometheus-cpp-pull1.0 libcairo2 zlib1g
-             libminizip1"
+             libminizip1 libhdf5-103-1"
 )
 packages[dev]="${packages[build]} ${packages[test]} ${packages[lint]} ${packages[tidy]} ${packages[fuzz]}"
 

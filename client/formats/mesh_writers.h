@@ -16,6 +16,8 @@ namespace wellspace::formats {
 
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateVtu(const std::string& path, const MeshShape& shape,
                                                       std::stop_token stop);
+absl::StatusOr<std::unique_ptr<MeshWriter>> CreateVtkHdf(const std::string& path, const MeshShape& shape,
+                                                         std::stop_token stop);
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateNpz(const std::string& path, const MeshShape& shape,
                                                       std::stop_token stop);
 // `path` is that of either file; both are written.

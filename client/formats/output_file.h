@@ -34,6 +34,8 @@ class OutputFile {
   uint64_t size() const { return size_; }
   // Whether Overwrite can be used: not on standard output, a pipe or a device.
   bool IsSeekable() const { return !temporary_.empty(); }
+  // The name that the file has until Commit, for a library that writes it; empty unless IsSeekable().
+  const std::string& temporary_path() const { return temporary_; }
   // Sends what is buffered to the system. Returns the first error so far.
   absl::Status Flush();
   // Flushes and gives the file its name.

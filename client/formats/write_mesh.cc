@@ -26,6 +26,7 @@ struct WriterKind {
 std::span<const Format<WriterKind>> Writers() {
   static const std::vector<Format<WriterKind>> writers = {
       {"vtu", {".vtu"}, {CreateVtu, 3, nullptr}},
+      {"vtkhdf", {".vtkhdf", ".hdf"}, {CreateVtkHdf, 3, "vtkhdf is a file of HDF5, completed from its start"}},
       {"npz", {".npz"}, {CreateNpz, kMaxDimension, "npz is a zip archive, completed from its start"}},
       {"node", {".node", ".ele"}, {CreateNodeAndEle, kMaxDimension, "node is a pair of files"}},
   };

@@ -3,6 +3,7 @@
 // Formats:
 //   vtu   VTK's XML, 2-D and 3-D only: arrays inline in base64, compressed by zlib; points padded to 3-D; point data
 //         "input", 1 for the vertices that are input points, and "weights", if there are any.
+//   vtkhdf  VTK's HDF5, 2-D and 3-D only: as vtu, in chunks compressed by zlib; for VTK 9.1 and later. It is not read back.
 //   npz   numpy's archive of arrays: `points` of type Float64, vertices x dimension; `simplices` of type UInt32,
 //         simplices x (dimension + 1); `weights` of type Float64, one for each vertex, if there are any; deflated.
 //   node  TetGen's and Triangle's pair of .node and .ele, given by either name; indices start at 0. TetGen itself knows
