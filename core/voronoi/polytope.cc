@@ -30,11 +30,12 @@ template <int D>
 Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D <= 3) {
   Placement<D> placed;
   double determinant = 0;
+  double inverse = 0;
   if constexpr (D == 2) {
     const Point<2>& a = planes[0]->normal;
     const Point<2>& b = planes[1]->normal;
     determinant = a[0] * b[1] - a[1] * b[0];
-    const double inverse = 1 / determinant;
+    inverse = 1 / determinant;
     placed.x[0] = (planes[0]->offset * b[1] - planes[1]->offset * a[1]) * inverse;
     placed.x[1] = (planes[1]->offset * a[0] - planes[0]->offset * b[0]) * inverse;
   } else {
@@ -45,7 +46,7 @@ Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D <= 3)
     const Point<3> ca = cross(planes[2]->normal, planes[0]->normal);
     const Point<3> ab = cross(planes[0]->normal, planes[1]->normal);
     determinant = Dot<3>(planes[0]->normal, bc);
-    const double inverse = 1 / determinant;
+    inverse = 1 / determinant;
     for (int i = 0; i < 3; ++i) {
       placed.x[i] = (planes[0]->offset * bc[i] + planes[1]->offset * ca[i] + planes[2]->offset * ab[i]) * inverse;
     }
@@ -54,11 +55,10 @@ Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D <= 3)
   double sum = 0;
   for (const Plane<D>* plane : planes) {
     product *= plane->length;
-    sum += std::abs(plane->offset) / plane->length;
+    sum += plane->distance;
   }
-  determinant = std::abs(determinant);
-  if (determinant > 256 * kUnit * product) {
-    placed.error = 64 * kUnit * product * (sum + std::sqrt(NormSq<D>(placed.x))) / determinant;
+  if (std::abs(determinant) > 256 * kUnit * product) {
+    placed.error = 64 * kUnit * product * (sum + std::sqrt(NormSq<D>(placed.x))) * std::abs(inverse);
   }
   return placed;
 }
@@ -163,8 +163,10 @@ void Polytope<D>::Reset(const Point<D>& site, const Box<D>& bounds, const std::a
     plane.source.axis = axis;
     plane.source.coordinate = bounds.FaceCoordinate(face);
     plane.offset = plane.source.coordinate - site[axis];
+    plane.distance = std::abs(plane.offset);
   }
   nodes_.resize(1 << D);
+  columns_.Resize(nodes_.size());
   for (int corner = 0; corner < (1 << D); ++corner) {
     CellNode<D>& node = nodes_[corner];
     for (int axis = 0; axis < D; ++axis) {
@@ -176,30 +178,40 @@ void Polytope<D>::Reset(const Point<D>& site, const Box<D>& bounds, const std::a
     node.radius_sq = NormSq<D>(node.x);
     node.slack = 16 * kUnit * std::sqrt(node.radius_sq);
     node.reach = std::sqrt(node.radius_sq) + node.slack;
+    columns_.Set(corner, node.x, node.slack, node.reach);
   }
   UpdateReach();
 }
 
 template <int D>
 bool Polytope<D>::Cut(VertexId u, const Point<D>& position) {
-  Plane<D> plane;
-  plane.vertex = u;
-  plane.normal = Difference<D>(position, site_);
-  const double length_sq = NormSq<D>(plane.normal);
+  const Point<D> normal = Difference<D>(position, site_);
+  const double length_sq = NormSq<D>(normal);
   if (length_sq > CutLimitSq()) {
     return false;
   }
-  plane.offset = 0.5 * length_sq;
-  plane.length = std::sqrt(length_sq);
+  // The excess x . w - c of a node x, as computed, differs from the exact one by at most slack |w| + (D + 5) u c: the error
+  // of x is in slack, w has one rounding a coordinate, the product D more, c D + 2, the difference one; 16 u |x| of the
+  // slack pays for those of the product.
+  const double length = std::sqrt(length_sq);
+  const double offset = 0.5 * length_sq;
+  const double offset_error = (D + 5) * kUnit * offset;
+  if (!columns_.ComputeExcesses(normal, offset, length, offset_error)) {
+    return false;
+  }
+  Plane<D> plane;
+  plane.vertex = u;
+  plane.normal = normal;
+  plane.offset = offset;
+  plane.length = length;
+  plane.distance = 0.5 * length;
   plane.source.generator = position;
-
-  excess_.resize(nodes_.size());
-  is_removed_.resize(nodes_.size());
+  is_removed_.assign(nodes_.size(), 0);
   removed_.clear();
   for (size_t i = 0; i < nodes_.size(); ++i) {
-    excess_[i] = Dot<D>(nodes_[i].x, plane.normal) - plane.offset;
-    is_removed_[i] = IsCutOff(nodes_[i], excess_[i], plane) ? 1 : 0;
-    if (is_removed_[i] != 0) {
+    if (columns_.most(i) >= 0 &&
+        IsCutOff(nodes_[i], columns_.excess(i), nodes_[i].slack * length + offset_error, plane)) {
+      is_removed_[i] = 1;
       removed_.push_back(static_cast<Index>(i));
     }
   }
@@ -209,23 +221,17 @@ bool Polytope<D>::Cut(VertexId u, const Point<D>& position) {
   ++cuts_;
   const auto index = static_cast<uint16_t>(planes_.size());
   planes_.push_back(plane);
+  FindCutEdges();
   MakeNewNodes(index);
-  DropRemovedNodes();
   UpdateReach();
   return true;
 }
 
-// The sign of excess = x . w - c, where the computed value differs from the exact one by at most slack |w| + (D + 5) u c: the
-// error of x is in slack, w has one rounding a coordinate, the product D more, c D + 2, the difference one; 16 u |x| of
-// the slack pays for those of the product.
+// Whether a node is cut off whose excess may be above -error.
 template <int D>
-bool Polytope<D>::IsCutOff(const CellNode<D>& node, double excess, const Plane<D>& plane) {
-  const double error = node.slack * plane.length + (D + 5) * kUnit * plane.offset;
+bool Polytope<D>::IsCutOff(const CellNode<D>& node, double excess, double error, const Plane<D>& plane) {
   if (excess > error) {
     return true;
-  }
-  if (excess < -error) {
-    return false;
   }
   std::array<PlaneSource<D>, D> sources;
   for (int k = 0; k < D; ++k) {
@@ -237,34 +243,80 @@ bool Polytope<D>::IsCutOff(const CellNode<D>& node, double excess, const Plane<D
   return decision.sign == Sign::kPositive;
 }
 
-// One new node on each edge between a node that stays and one that goes.
+template <int D>
+void Polytope<D>::FindCutEdges() {
+  cut_edges_.clear();
+  for (const Index removed : removed_) {
+    const CellNode<D>& node = nodes_[removed];
+    for (uint8_t k = 0; k < D; ++k) {
+      const Index kept = node.neighbours[k];
+      if (is_removed_[kept] == 0) {
+        const auto& back = nodes_[kept].neighbours;
+        const auto kept_slot = static_cast<uint8_t>(std::find(back.begin(), back.end(), removed) - back.begin());
+        cut_edges_.push_back({node.planes, k, kept_slot, kept});
+      }
+    }
+  }
+}
+
+// One new node on each cut edge. They take the places of removed nodes, the last one that of the first, and what is left
+// over goes to the end; so the nodes stay without holes.
 template <int D>
 void Polytope<D>::MakeNewNodes(uint16_t plane) {
-  const auto first_new = static_cast<Index>(nodes_.size());
-  for (const Index removed : removed_) {
-    for (int k = 0; k < D; ++k) {
-      const Index kept = nodes_[removed].neighbours[k];
-      if (is_removed_[kept] != 0) {
-        continue;
-      }
-      const auto index = static_cast<Index>(nodes_.size());
-      CellNode<D> node;
-      node.planes = nodes_[removed].planes;
-      node.planes[k] = plane;
-      node.neighbours.fill(kNoNode);
-      node.neighbours[k] = kept;
-      Place(node);
-      for (Index& back : nodes_[kept].neighbours) {
-        if (back == removed) {
-          back = index;
+  const size_t count = cut_edges_.size();
+  const size_t old = nodes_.size();
+  const size_t appended = count - std::min(count, removed_.size());
+  nodes_.resize(old + appended);
+  columns_.Resize(nodes_.size());
+  new_.resize(count);
+  for (size_t j = 0; j < count; ++j) {
+    const CutEdge& edge = cut_edges_[j];
+    const Index index = j < appended ? static_cast<Index>(old + j) : removed_[count - 1 - j];
+    new_[j] = index;
+    CellNode<D>& node = nodes_[index];
+    node.planes = edge.planes;
+    node.planes[edge.slot] = plane;
+    node.neighbours.fill(kNoNode);
+    node.neighbours[edge.slot] = edge.kept;
+    Place(node);
+    columns_.Set(index, node.x, node.slack, node.reach);
+    nodes_[edge.kept].neighbours[edge.kept_slot] = index;
+  }
+  LinkNewNodes(plane);
+  if (count < removed_.size()) {
+    FillHoles(count);
+  }
+}
+
+// Moves nodes from the end into the places of those removed nodes that have not been `filled` by new ones.
+template <int D>
+void Polytope<D>::FillHoles(size_t filled) {
+  for (size_t i = 0; i < filled; ++i) {
+    is_removed_[removed_[i]] = 0;
+  }
+  for (size_t i = filled; i < removed_.size(); ++i) {
+    const Index hole = removed_[i];
+    while (is_removed_[nodes_.size() - 1] != 0) {
+      nodes_.pop_back();
+    }
+    if (hole >= nodes_.size()) {
+      break;
+    }
+    const auto last = static_cast<Index>(nodes_.size() - 1);
+    nodes_[hole] = nodes_[last];
+    is_removed_[hole] = 0;
+    nodes_.pop_back();
+    columns_.Set(hole, nodes_[hole].x, nodes_[hole].slack, nodes_[hole].reach);
+    for (const Index neighbour : nodes_[hole].neighbours) {
+      for (Index& back : nodes_[neighbour].neighbours) {
+        if (back == last) {
+          back = hole;
           break;
         }
       }
-      nodes_.push_back(node);
-      is_removed_.push_back(0);
     }
   }
-  LinkNewNodes(plane, first_new);
+  columns_.Resize(nodes_.size());
 }
 
 // Computes a node's position and its error; exactly where the planes are too nearly dependent for a bound.
@@ -293,14 +345,14 @@ void Polytope<D>::Place(CellNode<D>& node) const {
 // Joins the new nodes along the edges of the new facet: two are joined if they share D - 2 planes beside the new one.
 // Exact decisions leave no edge with one end.
 template <int D>
-void Polytope<D>::LinkNewNodes(uint16_t plane, Index first_new) {
+void Polytope<D>::LinkNewNodes(uint16_t plane) {
   if constexpr (D <= 3) {
     // The other plane numbers the edges; in 2-D there is one edge, which runs along the new plane alone.
     if (open_end_.size() < planes_.size()) {
       open_end_.resize(planes_.size());
     }
     int open = 0;
-    for (auto index = first_new; index < nodes_.size(); ++index) {
+    for (const Index index : new_) {
       for (uint8_t slot = 0; slot < D; ++slot) {
         if (nodes_[index].planes[slot] == plane) {
           continue;
@@ -327,7 +379,7 @@ void Polytope<D>::LinkNewNodes(uint16_t plane, Index first_new) {
     }
   } else {
     ridges_.clear();
-    for (auto index = first_new; index < nodes_.size(); ++index) {
+    for (const Index index : new_) {
       for (uint8_t slot = 0; slot < D; ++slot) {
         if (nodes_[index].planes[slot] == plane) {
           continue;
@@ -367,61 +419,15 @@ void Polytope<D>::Join(End a, End b) {
   nodes_[b.node].neighbours[b.slot] = a.node;
 }
 
-// Moves nodes from the end into the places of removed ones.
-template <int D>
-void Polytope<D>::DropRemovedNodes() {
-  for (const Index hole : removed_) {
-    while (!nodes_.empty() && is_removed_[nodes_.size() - 1] != 0) {
-      nodes_.pop_back();
-    }
-    if (hole >= nodes_.size()) {
-      return;
-    }
-    const auto last = static_cast<Index>(nodes_.size() - 1);
-    nodes_[hole] = nodes_[last];
-    is_removed_[hole] = 0;
-    nodes_.pop_back();
-    for (const Index neighbour : nodes_[hole].neighbours) {
-      for (Index& back : nodes_[neighbour].neighbours) {
-        if (back == last) {
-          back = hole;
-          break;
-        }
-      }
-    }
-  }
-}
-
 template <int D>
 void Polytope<D>::UpdateReach() {
-  double reach = 0;
-  for (const CellNode<D>& node : nodes_) {
-    reach = std::max(reach, node.reach);
-  }
+  const double reach = columns_.LargestReach();
   reach_sq_ = reach * reach;
 }
 
 template <int D>
 bool Polytope<D>::Reaches(const Box<D>& cube) const {
-  Point<D> low;
-  Point<D> high;
-  for (int i = 0; i < D; ++i) {
-    low[i] = cube.low[i] - site_[i];
-    high[i] = cube.high[i] - site_[i];
-  }
-  for (const CellNode<D>& node : nodes_) {
-    double power = 0;
-    for (int i = 0; i < D; ++i) {
-      const double p = std::min(std::max(node.x[i], low[i]), high[i]);
-      power += p * (p - 2 * node.x[i]);
-    }
-    // Where the sum is near zero the p that attains it is within 2 |x| of the site, so an error e of x moves it by at
-    // most 4 |x| e.
-    if (power <= 4 * node.slack * std::sqrt(node.radius_sq)) {
-      return true;
-    }
-  }
-  return false;
+  return columns_.Reaches(Difference<D>(cube.low, site_), Difference<D>(cube.high, site_));
 }
 
 #define WELLSPACE_INSTANTIATE(D) template class Polytope<D>;

@@ -13,6 +13,7 @@
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
 #include "core/geometry/power_predicate.h"
+#include "core/voronoi/node_columns.h"
 
 namespace wellspace::core {
 
@@ -50,6 +51,7 @@ struct Plane {
   Point<D> normal;              // relative to the site: normal . x = offset; for a bisector the vector to its vertex
   double offset = 0;
   double length = 0;      // |normal|
+  double distance = 0;    // of the plane from the site, |offset| / length
   PlaneSource<D> source;  // exact
 };
 
@@ -128,6 +130,13 @@ class Polytope {
   using Index = NodeIndex<D>;
   static constexpr Index kNoNode = std::numeric_limits<Index>::max();
 
+  // An edge between a node that stays and one that goes, where a new node is to be.
+  struct CutEdge {
+    std::array<uint16_t, D> planes;  // of the removed node
+    uint8_t slot = 0;                // the edge leaves planes[slot] of the removed node
+    uint8_t kept_slot = 0;           // and this one of the kept node
+    Index kept = kNoNode;
+  };
   // A new node whose edge that leaves planes[slot] lacks its other end.
   struct End {
     Index node = kNoNode;
@@ -139,12 +148,13 @@ class Polytope {
     End end;
   };
 
-  bool IsCutOff(const CellNode<D>& node, double excess, const Plane<D>& plane);
+  bool IsCutOff(const CellNode<D>& node, double excess, double error, const Plane<D>& plane);
+  void FindCutEdges();
   void MakeNewNodes(uint16_t plane);
   void Place(CellNode<D>& node) const;
-  void LinkNewNodes(uint16_t plane, Index first_new);
+  void LinkNewNodes(uint16_t plane);
   void Join(End a, End b);
-  void DropRemovedNodes();
+  void FillHoles(size_t filled);
   void UpdateReach();
 
   Point<D> site_;
@@ -152,15 +162,17 @@ class Polytope {
   double reach_sq_ = 0;
   std::vector<Plane<D>> planes_;
   std::vector<CellNode<D>> nodes_;
+  NodeColumns<D> columns_;  // of nodes_
   uint64_t cuts_ = 0;
   DecisionCounters counters_;
 
   // Scratch of Cut.
-  std::vector<double> excess_;       // by node
   std::vector<uint8_t> is_removed_;  // by node
-  std::vector<Index> removed_;
-  std::vector<End> open_end_;  // by the plane that an edge runs along; D <= 3
-  std::vector<Ridge> ridges_;  // D > 3
+  std::vector<Index> removed_;       // ascending
+  std::vector<CutEdge> cut_edges_;   // as their removed nodes
+  std::vector<Index> new_;           // the nodes on them
+  std::vector<End> open_end_;        // by the plane that an edge runs along; D <= 3
+  std::vector<Ridge> ridges_;        // D > 3
 };
 
 }  // namespace wellspace::core
