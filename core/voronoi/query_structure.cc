@@ -9,6 +9,42 @@
 
 namespace wellspace::core {
 
+namespace {
+
+// Up to so many, items are sorted by comparing each with each.
+constexpr size_t kMostRanked = 32;
+
+// The first `count` of workspace.near, the nearest first, of those as near by slot, as they are in already.
+template <int D>
+std::span<const typename Workspace<D>::Near> SortByDistance(size_t count, Workspace<D>& workspace) {
+  using Near = typename Workspace<D>::Near;
+  auto& near = workspace.near;
+  auto& sorted = workspace.sorted;
+  if (count <= kMostRanked) {
+    // The place of each is the number of those before it: comparisons without branches, of which half would be
+    // mispredicted.
+    std::array<uint32_t, kMostRanked> place{};
+    for (size_t i = 1; i < count; ++i) {
+      for (size_t j = 0; j < i; ++j) {
+        const uint32_t is_later = near[j].distance_sq <= near[i].distance_sq ? 1 : 0;
+        place[i] += is_later;
+        place[j] += 1 - is_later;
+      }
+    }
+    for (size_t i = 0; i < count; ++i) {
+      sorted[place[i]] = near[i];
+    }
+  } else {
+    std::copy_n(near.begin(), count, sorted.begin());
+    std::sort(sorted.begin(), sorted.begin() + count, [](const Near& a, const Near& b) {
+      return a.distance_sq != b.distance_sq ? a.distance_sq < b.distance_sq : a.slot < b.slot;
+    });
+  }
+  return {sorted.data(), count};
+}
+
+}  // namespace
+
 void QueryCounters::Add(const QueryCounters& other) {
   queries += other.queries;
   leaves += other.leaves;
@@ -194,19 +230,19 @@ void QueryStructure<D>::CutByLeaf(VertexId v, NodeId leaf, Workspace<D>& workspa
     return;
   }
   workspace.counters.vertices += bucket->count;
-  const Point<D>& site = workspace.cell.site();
+  const Point<D> site = workspace.cell.site();
   const double limit_sq = workspace.cell.CutLimitSq();
-  workspace.near.clear();
+  size_t count = 0;
   for (uint32_t i = 0; i < bucket->count; ++i) {
     const double distance_sq = DistanceSq<D>(bucket->positions[i], site);
-    if (distance_sq <= limit_sq && bucket->ids[i] != v) {
-      workspace.near.push_back({distance_sq, i});
-    }
+    workspace.near[count] = {distance_sq, i};
+    // No branch, since none could be foretold.
+    count += static_cast<size_t>(distance_sq <= limit_sq) & static_cast<size_t>(bucket->ids[i] != v);
   }
-  std::sort(workspace.near.begin(), workspace.near.end(), [](const auto& a, const auto& b) {
-    return a.distance_sq != b.distance_sq ? a.distance_sq < b.distance_sq : a.slot < b.slot;
-  });
-  for (const auto& near : workspace.near) {
+  for (const auto& near : SortByDistance<D>(count, workspace)) {
+    if (near.distance_sq > workspace.cell.CutLimitSq()) {
+      break;
+    }
     workspace.cell.Cut(bucket->ids[near.slot], bucket->positions[near.slot]);
   }
 }

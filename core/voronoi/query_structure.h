@@ -2,6 +2,7 @@
 #ifndef WELLSPACE_CORE_VORONOI_QUERY_STRUCTURE_H_
 #define WELLSPACE_CORE_VORONOI_QUERY_STRUCTURE_H_
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -39,6 +40,7 @@ struct Workspace {
     double distance_sq;
     uint32_t slot;
   };
+  using NearInLeaf = std::array<Near, LeafTree<D>::kLeafCapacity>;
 
   Polytope<D> cell;
   QueryCounters counters;
@@ -46,7 +48,8 @@ struct Workspace {
   std::vector<uint32_t> seen;  // by tree node: the query that last met it
   uint32_t query = 0;
   std::vector<Candidate> queue;
-  std::vector<Near> near;
+  NearInLeaf near;    // of a leaf, those that may cut
+  NearInLeaf sorted;  // the same, the nearest first
 };
 
 struct Neighbor {
