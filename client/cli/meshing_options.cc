@@ -11,7 +11,7 @@ namespace wellspace::cli {
 
 const char kCloudsHelp[] =
     "Clouds:  .csv .tsv .txt .dat (columns separated by commas, semicolons or blanks; a header may name x, y, z),\n"
-    "         .xyz, .node, .npy; \"-\" is standard input (csv, or --input-format)\n";
+    "         .xyz, .node, .npy, vertices of .ply, .obj and .off; \"-\" is standard input (csv, or --input-format)\n";
 
 const char kMeshesHelp[] =
     "Meshes:  .vtu (2-D and 3-D), .npz (arrays of numpy), .node and .ele (a pair); \"-\" is standard output (vtu)\n";

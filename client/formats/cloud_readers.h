@@ -15,6 +15,9 @@ namespace wellspace::formats {
 absl::Status ReadCsv(LineReader& reader, int dimension, PointCloud& cloud);
 absl::Status ReadXyz(LineReader& reader, int dimension, PointCloud& cloud);
 absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud);
+absl::Status ReadPly(LineReader& reader, int dimension, PointCloud& cloud);
+absl::Status ReadObj(LineReader& reader, int dimension, PointCloud& cloud);
+absl::Status ReadOff(LineReader& reader, int dimension, PointCloud& cloud);
 absl::Status ReadNpy(InputFile& file, int dimension, PointCloud& cloud);
 
 // ReadNode that also tells the index of the first point, 0 or 1, and the points' weights, if the file has them.

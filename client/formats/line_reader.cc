@@ -121,6 +121,7 @@ bool LineReader::Fill() {
     return false;
   }
   end_ += *got;
+  offset_ += *got;
   at_end_ = *got == 0;
   return !at_end_;
 }
@@ -164,6 +165,17 @@ bool LineReader::Next(std::string_view& line) {
   }
   ++line_number_;
   return true;
+}
+
+size_t LineReader::Take(char* bytes, size_t size) {
+  size_t taken = 0;
+  while (taken < size && status_.ok() && (begin_ < end_ || Fill())) {
+    const size_t part = std::min(size - taken, end_ - begin_);
+    std::memcpy(bytes + taken, buffer_.data() + begin_, part);
+    begin_ += part;
+    taken += part;
+  }
+  return taken;
 }
 
 bool LineReader::NextContent(std::string_view& line) {

@@ -59,6 +59,9 @@ class LineReader {
   bool Next(std::string_view& line);
   // Like Next, but skips what is blank or a comment, and cuts the comment off; a comment starts at '#'.
   bool NextContent(std::string_view& line);
+  // Takes up to `size` bytes that follow the line that was returned last, as they are, and returns how many there were: fewer only at
+  // the end of the file and on an error.
+  size_t Take(char* bytes, size_t size);
   // The last comment that the last NextContent skipped or cut off, without '#' and blanks around it; empty if there was none.
   const std::string& comment() const { return comment_; }
 
@@ -66,6 +69,8 @@ class LineReader {
   const std::string& name() const { return file_.name(); }
   // Of the line that was returned last; the first is 1.
   uint64_t line_number() const { return line_number_; }
+  // Bytes of the file before what Next or Take would return.
+  uint64_t offset() const { return offset_ - (end_ - begin_); }
   // INVALID_ARGUMENT at the line that was returned last; of an empty file, at line 1.
   absl::Status Error(std::string_view message) const;
 
@@ -76,6 +81,7 @@ class LineReader {
   std::string buffer_;
   size_t begin_ = 0;  // of the bytes not yet returned
   size_t end_ = 0;
+  uint64_t offset_ = 0;  // bytes of the file that were read
   bool at_end_ = false;
   uint64_t line_number_ = 0;
   std::string comment_;

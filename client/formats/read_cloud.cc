@@ -27,6 +27,9 @@ std::span<const Format<CloudReader>> Readers() {
       {"csv", {".csv", ".tsv", ".txt", ".dat"}, ReadText<ReadCsv>},
       {"xyz", {".xyz"}, ReadText<ReadXyz>},
       {"node", {".node"}, ReadText<ReadNode>},
+      {"ply", {".ply"}, ReadText<ReadPly>},
+      {"obj", {".obj"}, ReadText<ReadObj>},
+      {"off", {".off"}, ReadText<ReadOff>},
       {"npy", {".npy"}, ReadNpy},
   };
   return readers;

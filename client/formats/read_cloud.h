@@ -10,6 +10,14 @@
 //   node  TetGen's and Triangle's: "points dimension attributes markers", then a line "index x y [z ...] attributes
 //         marker" for each point, counted from 0 or 1.
 //   npy   numpy's: one array, points x dimension, of type Float64 or Float32, little-endian, in C or Fortran order.
+//   ply   Stanford's, in ascii or in binary of either byte order: the properties x, y and, if it is there, z of the
+//         element "vertex", of any scalar type. Other properties and the elements before it are skipped, lists too.
+//   obj   Wavefront's: two or three coordinates in each line "v"; what follows them (a weight, a colour) is skipped, as
+//         are all other lines. A line that ends in a backslash goes on in the next one.
+//   off   Geomview's in ascii: "OFF", the numbers of vertices, faces and edges, then a line for each vertex. ST, C and N
+//         before OFF (texture, colour, normal) announce numbers after the coordinates, which are skipped. 4OFF has four
+//         coordinates, all taken as they are; nOFF says how many before the counts.
+// Of ply and off, what follows the last vertex is not looked at.
 // In those of text '#' starts a comment and blank lines are skipped.
 #ifndef WELLSPACE_CLIENT_FORMATS_READ_CLOUD_H_
 #define WELLSPACE_CLIENT_FORMATS_READ_CLOUD_H_

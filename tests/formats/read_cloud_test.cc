@@ -12,7 +12,7 @@
 
 #include "client/formats/line_reader.h"
 #include "client/formats/number.h"
-#include "tests/formats/temporary_folder.h"
+#include "tests/formats/read_cloud_fixture.h"
 
 namespace wellspace::formats {
 namespace {
@@ -21,30 +21,6 @@ using ::testing::ElementsAre;
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-
-class ReadCloudTest : public testing::Test {
- protected:
-  absl::StatusOr<PointCloud> Read(const std::string& name, std::string_view content, const CloudOptions& options = {}) {
-    return ReadCloud(folder_.Write(name, content), options);
-  }
-
-  PointCloud ReadGood(const std::string& name, std::string_view content, const CloudOptions& options = {}) {
-    const absl::StatusOr<PointCloud> cloud = Read(name, content, options);
-    EXPECT_TRUE(cloud.ok()) << cloud.status();
-    return cloud.ok() ? *cloud : PointCloud{};
-  }
-
-  // The message after the folder's name.
-  std::string ReadBad(const std::string& name, std::string_view content, const CloudOptions& options = {}) {
-    const absl::StatusOr<PointCloud> cloud = Read(name, content, options);
-    EXPECT_EQ(cloud.status().code(), absl::StatusCode::kInvalidArgument);
-    const std::string message(cloud.status().message());
-    const std::string path = folder_.Path("");
-    return message.substr(0, path.size()) == path ? message.substr(path.size()) : message;
-  }
-
-  TemporaryFolder folder_;
-};
 
 TEST_F(ReadCloudTest, CsvSeparators) {
   for (const char* content :
@@ -161,7 +137,7 @@ TEST_F(ReadCloudTest, FormatByNameAndByExtension) {
               HasSubstr("no format is known by the extension \".stl\"; expected one of .csv"));
   EXPECT_THAT(ReadBad("cloud", "1 2\n"), HasSubstr("no format is known by the extension \"\""));
   EXPECT_THAT(ReadBad("cloud.csv", "1 2\n", {.format = "las", .dimension = 0}),
-              HasSubstr("expected one of csv, xyz, node, npy"));
+              HasSubstr("expected one of csv, xyz, node, ply, obj, off, npy"));
 }
 
 TEST_F(ReadCloudTest, FilesThatCannotBeRead) {

@@ -30,7 +30,8 @@ struct Choice {
 constexpr std::array kChoices = {
     Choice{"csv", 0}, Choice{"xyz", 0}, Choice{"node", 0}, Choice{"csv", 2}, Choice{"xyz", 2}, Choice{"node", 2},
     Choice{"csv", 3}, Choice{"xyz", 3}, Choice{"node", 3}, Choice{"npy", 0}, Choice{"npy", 2}, Choice{"npy", 5},
-    Choice{"csv", 4}, Choice{"xyz", 4}, Choice{"node", 4}, Choice{"xyz", 6},
+    Choice{"csv", 4}, Choice{"xyz", 4}, Choice{"node", 4}, Choice{"xyz", 6}, Choice{"ply", 0}, Choice{"obj", 0},
+    Choice{"off", 0}, Choice{"ply", 3}, Choice{"obj", 2},  Choice{"off", 4},
 };
 
 void RequireCloud(const PointCloud& cloud, const CloudOptions& options) {
@@ -44,6 +45,9 @@ void RequireCloud(const PointCloud& cloud, const CloudOptions& options) {
   if (options.format == "npy") {
     Require(cloud.lines.size() == 0, "an array has no lines");
     return;
+  }
+  if (options.format == "ply" && cloud.lines.size() == 0) {
+    return;  // in binary
   }
   Require(cloud.lines.size() == cloud.size(), "every point has a line");
   uint64_t line = 0;

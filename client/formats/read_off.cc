@@ -1,0 +1,149 @@
+// Geomview's OFF: the vertices.
+#include <algorithm>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "client/formats/cloud_readers.h"
+#include "client/formats/number.h"
+
+namespace wellspace::formats {
+namespace {
+
+constexpr uint64_t kMaxCount = std::numeric_limits<uint32_t>::max();
+
+// What the word at the start says.
+struct OffKind {
+  uint64_t coordinates = 3;      // 0: a number says it
+  bool has_more_values = false;  // after the coordinates
+};
+
+// Takes [ST][C][N][4][n]OFF off the start of `line`, if it is there.
+std::optional<OffKind> TakeKind(std::string_view& line) {
+  std::string_view rest = line;
+  const auto take = [&rest](std::string_view word) {
+    const bool starts = rest.substr(0, word.size()) == word;
+    rest.remove_prefix(starts ? word.size() : 0);
+    return starts;
+  };
+  OffKind kind;
+  for (const char* more : {"ST", "C", "N"}) {
+    kind.has_more_values |= take(more);
+  }
+  kind.coordinates = take("4") ? 4 : 3;
+  if (kind.coordinates == 3 && take("n")) {
+    kind.coordinates = 0;
+  }
+  if (!take("OFF")) {
+    return std::nullopt;
+  }
+  line = TrimBlanks(rest);
+  return kind;
+}
+
+class OffReader {
+ public:
+  OffReader(LineReader& reader, PointCloud& cloud) : reader_(reader), cloud_(cloud) {}
+
+  absl::Status Read(int dimension) {
+    if (absl::Status status = ReadHeader(); !status.ok()) {
+      return status;
+    }
+    if (dimension != 0 && kind_.coordinates != static_cast<uint64_t>(dimension)) {
+      return reader_.Error(absl::StrCat("expected ", dimension, " coordinates, got ", kind_.coordinates));
+    }
+    cloud_.dimension = static_cast<int>(kind_.coordinates);
+    for (uint64_t vertex = 0; vertex < vertices_; ++vertex) {
+      if (absl::Status status = ReadVertex(); !status.ok()) {
+        return status;
+      }
+    }
+    return absl::OkStatus();
+  }
+
+ private:
+  // The word, of nOFF the dimension, the counts; on one line or more.
+  absl::Status ReadHeader() {
+    std::string_view line;
+    const bool has_line = reader_.NextContent(line);
+    const std::optional<OffKind> kind = has_line ? TakeKind(line) : std::nullopt;
+    if (!kind) {
+      return reader_.status().ok()
+                 ? reader_.Error("expected OFF, STOFF, COFF, NOFF, CNOFF, 4OFF or nOFF at the start of the file")
+                 : reader_.status();
+    }
+    kind_ = *kind;
+    std::vector<uint64_t> numbers;
+    const bool has_dimension = kind_.coordinates == 0;
+    const size_t needed = has_dimension ? 3 : 2;  // the number of edges may be missing, as it does for many programs
+    while (true) {
+      FieldSplitter fields(line, ' ');
+      for (std::string_view field; fields.Next(field);) {
+        if (numbers.size() == needed + 1 || !ParseUnsigned(field, kMaxCount, numbers.emplace_back())) {
+          return reader_.Error(absl::StrCat("expected ", has_dimension ? "the dimension and " : "",
+                                            "the numbers of vertices, faces and edges, whole numbers below 2^32, got ",
+                                            Quote(field)));
+        }
+      }
+      if (numbers.size() >= needed) {
+        break;
+      }
+      if (!reader_.NextContent(line)) {
+        return reader_.status().ok()
+                   ? reader_.Error("the file ends inside its header; expected the numbers of vertices, faces and edges")
+                   : reader_.status();
+      }
+    }
+    if (has_dimension) {
+      kind_.coordinates = numbers[0];
+      if (kind_.coordinates < kMinDimension || kind_.coordinates > kMaxDimension) {
+        return reader_.Error(absl::StrCat("expected a dimension from ", kMinDimension, " to ", kMaxDimension, ", got ",
+                                          kind_.coordinates));
+      }
+    }
+    vertices_ = numbers[has_dimension ? 1 : 0];
+    return absl::OkStatus();
+  }
+
+  absl::Status ReadVertex() {
+    std::string_view line;
+    if (!reader_.NextContent(line)) {
+      return reader_.status().ok() ? reader_.Error(absl::StrCat("expected ", vertices_,
+                                                                " vertices, as the header says, got ", cloud_.size()))
+                                   : reader_.status();
+    }
+    FieldSplitter fields(line, ' ');
+    std::string_view field;
+    for (uint64_t axis = 0; axis < kind_.coordinates; ++axis) {
+      if (!fields.Next(field)) {
+        return reader_.Error(absl::StrCat("expected ", kind_.coordinates, " coordinates, got ", axis));
+      }
+      double value = 0;
+      if (absl::Status status = ParseFinite(field, value); !status.ok()) {
+        return reader_.Error(absl::StrCat("coordinate ", axis + 1, ": ", status.message()));
+      }
+      cloud_.points.push_back(value);
+    }
+    if (!kind_.has_more_values && fields.Next(field)) {
+      return reader_.Error(absl::StrCat("expected ", kind_.coordinates, " coordinates, got also ", Quote(field),
+                                        " (COFF, NOFF and STOFF have more numbers)"));
+    }
+    cloud_.lines.Add(reader_.line_number());
+    return absl::OkStatus();
+  }
+
+  LineReader& reader_;
+  PointCloud& cloud_;
+  OffKind kind_;
+  uint64_t vertices_ = 0;
+};
+
+}  // namespace
+
+absl::Status ReadOff(LineReader& reader, int dimension, PointCloud& cloud) {
+  return OffReader(reader, cloud).Read(dimension);
+}
+
+}  // namespace wellspace::formats

@@ -1,0 +1,403 @@
+// Stanford's PLY: the vertices.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "client/formats/cloud_readers.h"
+#include "client/formats/number.h"
+#include "client/formats/vtk_array.h"
+
+namespace wellspace::formats {
+namespace {
+
+constexpr uint64_t kMaxCount = std::numeric_limits<uint32_t>::max();
+constexpr int kAxes = 3;
+constexpr std::string_view kAxisNames = "xyz";
+
+enum class Scalar { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat32, kFloat64 };
+
+struct ScalarName {
+  std::string_view name;
+  Scalar type;
+};
+constexpr std::array kScalarNames = {
+    ScalarName{"char", Scalar::kInt8},      ScalarName{"int8", Scalar::kInt8},
+    ScalarName{"uchar", Scalar::kUint8},    ScalarName{"uint8", Scalar::kUint8},
+    ScalarName{"short", Scalar::kInt16},    ScalarName{"int16", Scalar::kInt16},
+    ScalarName{"ushort", Scalar::kUint16},  ScalarName{"uint16", Scalar::kUint16},
+    ScalarName{"int", Scalar::kInt32},      ScalarName{"int32", Scalar::kInt32},
+    ScalarName{"uint", Scalar::kUint32},    ScalarName{"uint32", Scalar::kUint32},
+    ScalarName{"float", Scalar::kFloat32},  ScalarName{"float32", Scalar::kFloat32},
+    ScalarName{"double", Scalar::kFloat64}, ScalarName{"float64", Scalar::kFloat64},
+};
+
+std::optional<Scalar> ScalarOf(std::string_view name) {
+  for (const ScalarName& row : kScalarNames) {
+    if (row.name == name) {
+      return row.type;
+    }
+  }
+  return std::nullopt;
+}
+
+size_t BytesOf(Scalar type) {
+  switch (type) {
+    case Scalar::kInt8:
+    case Scalar::kUint8:
+      return 1;
+    case Scalar::kInt16:
+    case Scalar::kUint16:
+      return 2;
+    case Scalar::kInt32:
+    case Scalar::kUint32:
+    case Scalar::kFloat32:
+      return 4;
+    case Scalar::kFloat64:
+      break;
+  }
+  return 8;
+}
+
+double ValueOf(std::string_view bytes, Scalar type, bool big_endian) {
+  switch (type) {
+    case Scalar::kInt8:
+      return LoadWord<int8_t>(bytes, 0, big_endian);
+    case Scalar::kUint8:
+      return LoadWord<uint8_t>(bytes, 0, big_endian);
+    case Scalar::kInt16:
+      return LoadWord<int16_t>(bytes, 0, big_endian);
+    case Scalar::kUint16:
+      return LoadWord<uint16_t>(bytes, 0, big_endian);
+    case Scalar::kInt32:
+      return LoadWord<int32_t>(bytes, 0, big_endian);
+    case Scalar::kUint32:
+      return LoadWord<uint32_t>(bytes, 0, big_endian);
+    case Scalar::kFloat32:
+      return LoadWord<float>(bytes, 0, big_endian);
+    case Scalar::kFloat64:
+      break;
+  }
+  return LoadWord<double>(bytes, 0, big_endian);
+}
+
+struct Property {
+  std::optional<Scalar> list_count;  // the type of the number of values, if it is a list
+  Scalar type;
+  int axis = -1;  // of the coordinate that it holds, or -1
+};
+
+struct Element {
+  std::string name;
+  uint64_t count = 0;
+  std::vector<Property> properties;
+};
+
+class PlyReader {
+ public:
+  PlyReader(LineReader& reader, PointCloud& cloud) : reader_(reader), cloud_(cloud) {}
+
+  absl::Status Read(int dimension) {
+    if (absl::Status status = ReadHeader(); !status.ok()) {
+      return status;
+    }
+    const Element& vertex = elements_.back();
+    std::array<int, kAxes> seen{};
+    for (const Property& property : vertex.properties) {
+      if (property.axis >= 0) {
+        ++seen[property.axis];
+      }
+    }
+    if (seen[0] != 1 || seen[1] != 1 || seen[2] > 1) {
+      return reader_.Error("expected one property x, one y and at most one z of element \"vertex\"");
+    }
+    cloud_.dimension = 2 + seen[2];
+    if (dimension != 0 && dimension != cloud_.dimension) {
+      return reader_.Error(absl::StrCat("expected ", dimension, " coordinates, got ", cloud_.dimension,
+                                        " as properties of element \"vertex\""));
+    }
+    for (const Element& element : elements_) {
+      const bool is_vertex = &element == &elements_.back();
+      for (uint64_t row = 0; row < element.count; ++row) {
+        absl::Status status = !is_ascii_  ? ReadBinary(element, row, is_vertex)
+                              : is_vertex ? ReadLine(element)
+                                          : SkipLine(element, row);
+        if (!status.ok()) {
+          return status;
+        }
+      }
+    }
+    return absl::OkStatus();
+  }
+
+ private:
+  // The next line of the header as fields. False at the end of the file.
+  bool NextFields(std::vector<std::string_view>& fields) {
+    std::string_view line;
+    if (!reader_.Next(line)) {
+      return false;
+    }
+    fields.clear();
+    FieldSplitter splitter(line, ' ');
+    for (std::string_view field; splitter.Next(field);) {
+      fields.push_back(field);
+    }
+    return true;
+  }
+
+  // Elements after the vertices are not kept.
+  absl::Status ReadHeader() {
+    std::vector<std::string_view> fields;
+    if (!NextFields(fields) || fields.size() != 1 || fields[0] != "ply") {
+      return reader_.status().ok() ? reader_.Error("expected \"ply\"") : reader_.status();
+    }
+    bool has_format = false;
+    bool has_vertices = false;
+    while (NextFields(fields)) {
+      if (fields.empty() || fields[0] == "comment" || fields[0] == "obj_info") {
+        continue;
+      }
+      if (fields[0] == "end_header") {
+        if (!has_format) {
+          return reader_.Error("expected a line \"format\" before the end of the header");
+        }
+        return CheckElements(has_vertices);
+      }
+      absl::Status status;
+      if (fields[0] == "format") {
+        has_format = true;
+        status = ReadFormat(fields);
+      } else if (fields[0] == "element") {
+        status = ReadElement(fields, has_vertices);
+      } else if (fields[0] == "property") {
+        status = ReadProperty(fields);
+      } else {
+        status = reader_.Error(absl::StrCat(
+            "expected \"format\", \"element\", \"property\", \"comment\" or \"end_header\", got ", Quote(fields[0])));
+      }
+      if (!status.ok()) {
+        return status;
+      }
+    }
+    return reader_.status().ok() ? reader_.Error("the file ends inside its header; expected \"end_header\"")
+                                 : reader_.status();
+  }
+
+  // Every row of an element takes bytes: nothing is repeated more often than the file is long.
+  absl::Status CheckElements(bool has_vertices) const {
+    for (const Element& element : elements_) {
+      if (element.properties.empty()) {
+        return reader_.Error(absl::StrCat("expected a property of element ", Quote(element.name), ", got none"));
+      }
+    }
+    return has_vertices ? absl::OkStatus() : reader_.Error("expected an element \"vertex\" in the header");
+  }
+
+  absl::Status ReadFormat(const std::vector<std::string_view>& fields) {
+    const std::string_view format = fields.size() > 1 ? fields[1] : "";
+    if (fields.size() != 3 || fields[2] != "1.0" ||
+        (format != "ascii" && format != "binary_little_endian" && format != "binary_big_endian")) {
+      return reader_.Error(
+          absl::StrCat("expected format ascii, binary_little_endian or binary_big_endian, and version 1.0, got ",
+                       Quote(format), " and ", Quote(fields.size() > 2 ? fields[2] : "")));
+    }
+    is_ascii_ = format == "ascii";
+    is_big_endian_ = format == "binary_big_endian";
+    return absl::OkStatus();
+  }
+
+  absl::Status ReadElement(const std::vector<std::string_view>& fields, bool& has_vertices) {
+    Element element;
+    if (fields.size() != 3 || !ParseUnsigned(fields[2], kMaxCount, element.count)) {
+      return reader_.Error("expected \"element\", a name and a whole number below 2^32");
+    }
+    element.name = fields[1];
+    is_kept_ = !has_vertices;
+    if (is_kept_) {
+      has_vertices = element.name == "vertex";
+      elements_.push_back(std::move(element));
+    } else if (element.name == "vertex") {
+      return reader_.Error("expected one element \"vertex\", got another one");
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status ReadProperty(const std::vector<std::string_view>& fields) {
+    const bool is_list = fields.size() > 1 && fields[1] == "list";
+    const size_t type_at = is_list ? 3 : 1;
+    if (elements_.empty() || fields.size() != type_at + 2) {
+      return reader_.Error(
+          "expected \"property\" with a type and a name, or \"property list\" with two types and a name, of an "
+          "element");
+    }
+    for (size_t i = is_list ? 2 : 1; i <= type_at; ++i) {
+      if (!ScalarOf(fields[i])) {
+        return reader_.Error(absl::StrCat(
+            "expected a type (char, uchar, short, ushort, int, uint, float, double, or int8, uint8, int16, "
+            "uint16, int32, uint32, float32, float64), got ",
+            Quote(fields[i])));
+      }
+    }
+    Property property{.list_count = std::nullopt, .type = *ScalarOf(fields[type_at])};
+    const std::string_view name = fields.back();
+    if (is_list) {
+      property.list_count = ScalarOf(fields[2]);
+      if (*property.list_count == Scalar::kFloat32 || *property.list_count == Scalar::kFloat64) {
+        return reader_.Error(absl::StrCat("expected a whole type for the length of a list, got ", Quote(fields[2])));
+      }
+    } else if (name.size() == 1 && kAxisNames.find(name[0]) != std::string_view::npos) {
+      property.axis = name[0] - 'x';
+    }
+    if (is_kept_) {
+      elements_.back().properties.push_back(property);
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status SkipLine(const Element& element, uint64_t row) {
+    std::string_view line;
+    return reader_.NextContent(line) ? absl::OkStatus() : EndError(element, row);
+  }
+
+  absl::Status ReadLine(const Element& element) {
+    std::string_view line;
+    if (!reader_.NextContent(line)) {
+      return EndError(element, cloud_.size());
+    }
+    std::array<double, kAxes> point{};
+    FieldSplitter fields(line, ' ');
+    std::string_view field;
+    size_t index = 0;
+    const auto next = [&](double& value) {
+      ++index;
+      if (!fields.Next(field)) {
+        return reader_.Error(absl::StrCat("expected more than ", index - 1, " values, as the header says"));
+      }
+      absl::Status status = ParseFinite(field, value);
+      return status.ok() ? status : reader_.Error(absl::StrCat("value ", index, ": ", status.message()));
+    };
+    for (const Property& property : element.properties) {
+      double value = 0;
+      if (property.list_count) {
+        if (absl::Status status = next(value); !status.ok()) {
+          return status;
+        }
+        uint64_t count = 0;
+        if (!ParseUnsigned(field, kMaxCount, count)) {
+          return reader_.Error(
+              absl::StrCat("value ", index, ": expected the length of a list, a whole number, got ", Quote(field)));
+        }
+        for (; count > 0; --count) {
+          if (!fields.Next(field)) {
+            return reader_.Error(
+                absl::StrCat("expected ", count, " more values in the list that value ", index, " announces"));
+          }
+        }
+        continue;
+      }
+      // Only coordinates have to be finite numbers.
+      if (property.axis < 0) {
+        ++index;
+        if (!fields.Next(field)) {
+          return reader_.Error(absl::StrCat("expected more than ", index - 1, " values, as the header says"));
+        }
+      } else if (absl::Status status = next(point[property.axis]); !status.ok()) {
+        return status;
+      }
+    }
+    if (fields.Next(field)) {
+      return reader_.Error(absl::StrCat("expected the end of the line, as the header says, got ", Quote(field)));
+    }
+    cloud_.points.insert(cloud_.points.end(), point.begin(), point.begin() + cloud_.dimension);
+    cloud_.lines.Add(reader_.line_number());
+    return absl::OkStatus();
+  }
+
+  // One scalar. False at the end of the file.
+  bool Take(Scalar type, double& value) {
+    char bytes[sizeof(double)];
+    const size_t size = BytesOf(type);
+    if (reader_.Take(bytes, size) != size) {
+      return false;
+    }
+    value = ValueOf({bytes, size}, type, is_big_endian_);
+    return true;
+  }
+
+  bool Skip(uint64_t bytes) {
+    char block[1 << 12];
+    while (bytes > 0) {
+      const size_t size = std::min<uint64_t>(bytes, sizeof(block));
+      if (reader_.Take(block, size) != size) {
+        return false;
+      }
+      bytes -= size;
+    }
+    return true;
+  }
+
+  absl::Status ReadBinary(const Element& element, uint64_t row, bool is_vertex) {
+    std::array<double, kAxes> point{};
+    for (const Property& property : element.properties) {
+      const uint64_t offset = reader_.offset();
+      double value = 0;
+      if (!Take(property.list_count.value_or(property.type), value)) {
+        return EndError(element, row);
+      }
+      if (property.list_count) {
+        if (value < 0) {
+          return BinaryError(element, row, offset,
+                             absl::StrCat("expected the length of a list, zero or more, got ", value));
+        }
+        if (!Skip(static_cast<uint64_t>(value) * BytesOf(property.type))) {
+          return EndError(element, row);
+        }
+      } else if (property.axis >= 0) {
+        if (is_vertex && !std::isfinite(value)) {
+          return BinaryError(element, row, offset,
+                             absl::StrCat("coordinate ", property.axis + 1, ": expected a finite number, got ", value));
+        }
+        point[property.axis] = value;
+      }
+    }
+    if (is_vertex) {
+      cloud_.points.insert(cloud_.points.end(), point.begin(), point.begin() + cloud_.dimension);
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status BinaryError(const Element& element, uint64_t row, uint64_t offset, const std::string& message) const {
+    return absl::InvalidArgumentError(
+        absl::StrCat(cloud_.name, ": byte ", offset, ": element ", Quote(element.name), " ", row, ": ", message));
+  }
+
+  absl::Status EndError(const Element& element, uint64_t row) const {
+    if (!reader_.status().ok()) {
+      return reader_.status();
+    }
+    const std::string message = absl::StrCat("expected ", element.count, " rows of element ", Quote(element.name),
+                                             ", as the header says; the file ends in row ", row);
+    return is_ascii_ ? reader_.Error(message) : BinaryError(element, row, reader_.offset(), message);
+  }
+
+  LineReader& reader_;
+  PointCloud& cloud_;
+  bool is_ascii_ = true;
+  bool is_big_endian_ = false;
+  std::vector<Element> elements_;  // up to the vertices
+  bool is_kept_ = false;           // the element that the header speaks of
+};
+
+}  // namespace
+
+absl::Status ReadPly(LineReader& reader, int dimension, PointCloud& cloud) {
+  return PlyReader(reader, cloud).Read(dimension);
+}
+
+}  // namespace wellspace::formats
