@@ -11,6 +11,8 @@ namespace wellspace::formats {
 
 absl::StatusOr<Mesh> ReadVtu(const std::string& path);
 absl::StatusOr<Mesh> ReadNpz(const std::string& path);
+absl::StatusOr<Mesh> ReadMsh(const std::string& path);
+absl::StatusOr<Mesh> ReadMedit(const std::string& path);
 // `path` is that of either file.
 absl::StatusOr<Mesh> ReadNodeAndEle(const std::string& path);
 

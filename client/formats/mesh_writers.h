@@ -24,6 +24,14 @@ absl::StatusOr<std::unique_ptr<MeshWriter>> CreateNpz(const std::string& path, c
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateNodeAndEle(const std::string& path, const MeshShape& shape,
                                                              std::stop_token stop);
 
+absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMsh22(const std::string& path, const MeshShape& shape,
+                                                        std::stop_token stop);
+absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMsh41(const std::string& path, const MeshShape& shape,
+                                                        std::stop_token stop);
+// INVALID_ARGUMENT for a shape with weights.
+absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMedit(const std::string& path, const MeshShape& shape,
+                                                        std::stop_token stop);
+
 // INTERNAL unless as many rows have come as `shape` says.
 absl::Status CheckComplete(const MeshShape& shape, uint64_t vertices, uint64_t weights, uint64_t simplices);
 

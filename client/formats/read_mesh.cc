@@ -16,6 +16,8 @@ std::span<const Format<MeshReader>> Readers() {
   static const std::vector<Format<MeshReader>> readers = {
       {"vtu", {".vtu"}, ReadVtu},
       {"npz", {".npz"}, ReadNpz},
+      {"msh", {".msh"}, ReadMsh},
+      {"medit", {".mesh"}, ReadMedit},
       {"node", {".node", ".ele"}, ReadNodeAndEle},
   };
   return readers;

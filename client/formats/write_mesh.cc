@@ -28,6 +28,9 @@ std::span<const Format<WriterKind>> Writers() {
       {"vtu", {".vtu"}, {CreateVtu, 3, nullptr}},
       {"vtkhdf", {".vtkhdf", ".hdf"}, {CreateVtkHdf, 3, "vtkhdf is a file of HDF5, completed from its start"}},
       {"npz", {".npz"}, {CreateNpz, kMaxDimension, "npz is a zip archive, completed from its start"}},
+      {"msh41", {".msh"}, {CreateMsh41, 3, nullptr}},
+      {"msh22", {}, {CreateMsh22, 3, nullptr}},
+      {"medit", {".mesh"}, {CreateMedit, 3, nullptr}},
       {"node", {".node", ".ele"}, {CreateNodeAndEle, kMaxDimension, "node is a pair of files"}},
   };
   return writers;

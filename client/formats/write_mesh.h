@@ -9,6 +9,11 @@
 //   node  TetGen's and Triangle's pair of .node and .ele, given by either name; indices start at 0. TetGen itself knows
 //         3-D only, Triangle 2-D. Weights are the only attribute of .node; the comment "# weights" before
 //         its header says so.
+//   msh41 Gmsh's MSH 4.1 in binary, little-endian, 2-D and 3-D only: one block of nodes, numbered from 1, and one of
+//         triangles or tetrahedra; $NodeData "input", as in vtu, and "weights", if there are any.
+//   msh22 The same in MSH 2.2, in ascii; every simplex is of the physical group 1.
+//   medit INRIA's .mesh of version 2 (double precision) in ascii, 2-D and 3-D only: the reference of a vertex is 1 if it
+//         is an input point, else 0, that of a simplex is 1. There is no place for weights.
 #ifndef WELLSPACE_CLIENT_FORMATS_WRITE_MESH_H_
 #define WELLSPACE_CLIENT_FORMATS_WRITE_MESH_H_
 
@@ -35,7 +40,7 @@ absl::Status CheckMeshOutput(const std::string& path, const std::string& format,
 // Writes a mesh piece by piece, so that it need not fit into memory.
 //
 // Memory: a few blocks for a regular file; for vtu into a pipe or a device the compressed array that is being written; for node
-//         with weights the points.
+//         with weights the points, for msh41 and msh22 with weights these.
 // Thread safety: thread-compatible.
 class MeshWriter {
  public:

@@ -1,4 +1,4 @@
-// convert_mesh IN OUT: reads a mesh in one format and writes it in another.
+// convert_mesh IN OUT [FORMAT]: reads a mesh in one format and writes it in another.
 // convert_mesh --cloud IN OUT: reads a cloud, and writes it as a mesh of no simplices.
 #include <cstring>
 #include <iostream>
@@ -23,14 +23,15 @@ absl::StatusOr<Mesh> ReadCloudAsMesh(const std::string& path) {
 
 int main(int argc, char** argv) {
   const bool is_cloud = argc == 4 && std::strcmp(argv[1], "--cloud") == 0;
-  if (argc != 3 && !is_cloud) {
-    std::cerr << "usage: convert_mesh [--cloud] IN OUT\n";
+  if (argc != 3 && argc != 4) {
+    std::cerr << "usage: convert_mesh IN OUT [FORMAT]\n       convert_mesh --cloud IN OUT\n";
     return 2;
   }
-  const char* input = argv[argc - 2];
+  const char* input = argv[is_cloud ? 2 : 1];
+  const char* output = argv[is_cloud ? 3 : 2];
+  const char* format = argc == 4 && !is_cloud ? argv[3] : "";
   const absl::StatusOr<Mesh> mesh = is_cloud ? ReadCloudAsMesh(input) : wellspace::formats::ReadMesh(input);
-  const absl::Status status =
-      mesh.ok() ? wellspace::formats::WriteMesh(argv[argc - 1], "", mesh->View()) : mesh.status();
+  const absl::Status status = mesh.ok() ? wellspace::formats::WriteMesh(output, format, mesh->View()) : mesh.status();
   if (!status.ok()) {
     std::cerr << status << "\n";
     return 1;

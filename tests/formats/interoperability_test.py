@@ -33,8 +33,9 @@ class Interoperability(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.folder = pathlib.Path(folder.name)
 
-    def convert(self, source, target, *options):
-        subprocess.run([CONVERT_MESH, *options, self.folder / source, self.folder / target], check=True, timeout=60)
+    def convert(self, source, target, *options, format=None):
+        subprocess.run([CONVERT_MESH, *options, self.folder / source, self.folder / target, *([format] if format else [])],
+                       check=True, timeout=60)
 
     def assert_same_bits(self, mesh, points, cells, dimension):
         self.assertEqual(mesh.points.dtype, numpy.float64)
@@ -95,6 +96,32 @@ class Interoperability(unittest.TestCase):
                     self.assertTrue(mesh["points"].flags.c_contiguous and mesh["simplices"].flags.c_contiguous)
                     numpy.testing.assert_array_equal(mesh["points"].view(numpy.uint64), points.view(numpy.uint64))
                     numpy.testing.assert_array_equal(mesh["simplices"], cells)
+
+    def test_meshio_reads_our_msh_and_mesh(self):
+        for dimension in (2, 3):
+            for name, format, theirs in (("a.msh", "msh41", "gmsh"), ("b.msh", "msh22", "gmsh"), ("c.mesh", "medit", "medit")):
+                with self.subTest(dimension=dimension, format=format):
+                    points, cells = random_mesh(dimension)
+                    self.write_pair("mesh", points, cells)
+                    self.convert("mesh.node", name, format=format)
+                    mesh = meshio.read(self.folder / name, file_format=theirs)
+                    self.assert_same_bits(mesh, points if theirs == "medit" else pad(points), cells, dimension)
+                    if theirs == "gmsh":
+                        numpy.testing.assert_array_equal(mesh.point_data["input"].ravel(), numpy.zeros(len(points)))
+
+    def test_we_read_the_msh_and_mesh_of_meshio(self):
+        for dimension in (2, 3):
+            for name, options in (("a.msh", {"file_format": "gmsh", "binary": True}),
+                                  ("b.msh", {"file_format": "gmsh", "binary": False, "float_fmt": ".17e"}),
+                                  ("c.msh", {"file_format": "gmsh22", "binary": False, "float_fmt": ".17e"}),
+                                  ("d.mesh", {"file_format": "medit", "float_fmt": ".17e"})):
+                with self.subTest(dimension=dimension, name=name):
+                    points, cells = random_mesh(dimension)
+                    is_medit = name.endswith(".mesh")
+                    theirs = meshio.Mesh(points if is_medit else pad(points), [(cell_type(dimension), cells)])
+                    theirs.write(self.folder / name, **options)
+                    self.convert(name, "ours.vtu")
+                    self.assert_same_bits(meshio.read(self.folder / "ours.vtu"), pad(points), cells, dimension)
 
     def test_others_read_our_weights(self):
         points, cells = random_mesh(3)

@@ -1,11 +1,13 @@
 // Every reader of meshes, on any text, and the decoder of VTK's binary arrays.
 //
-// Input: a digit from 0 to 4, then
+// Input: a digit from 0 to 6, then
 //   0  a .vtu file;
 //   1  a .node file, '|', the .ele file;
 //   2  a byte whose lowest bits say compressed, big-endian, eight-byte header; the bytes of an array before they were put into base64;
 //   3  a .npz file;
-//   4  two bytes, the length of the first array of a .npz in little-endian order; that array and the second one, each a .npy.
+//   4  two bytes, the length of the first array of a .npz in little-endian order; that array and the second one, each a .npy;
+//   5  a .msh file;
+//   6  a .mesh file.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -81,6 +83,16 @@ void ReadNpz(std::string_view archive) {
   ReadWriteRead(folder.Write("mesh.npz", archive), folder.Path("again.npz"));
 }
 
+void ReadMsh(std::string_view content) {
+  const ScratchFolder& folder = ScratchFolder::Get();
+  ReadWriteRead(folder.Write("mesh.msh", content), folder.Path("again.msh"));
+}
+
+void ReadMedit(std::string_view content) {
+  const ScratchFolder& folder = ScratchFolder::Get();
+  ReadWriteRead(folder.Write("mesh.mesh", content), folder.Path("again.mesh"));
+}
+
 // The checksums of an archive keep the fuzzer out: this makes them.
 void ReadArrays(std::string_view points, std::string_view simplices) {
   const ScratchFolder& folder = ScratchFolder::Get();
@@ -112,7 +124,7 @@ void DecodeArray(uint8_t flags, std::string_view array) {
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   wellspace::fuzz::ByteReader bytes(data, size);
-  switch (static_cast<uint8_t>(bytes.Next() - '0') % 5) {
+  switch (static_cast<uint8_t>(bytes.Next() - '0') % 7) {
     case 0:
       wellspace::fuzz::ReadVtu(bytes.TakeText());
       break;
@@ -126,6 +138,12 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     }
     case 3:
       wellspace::fuzz::ReadNpz(bytes.TakeText());
+      break;
+    case 5:
+      wellspace::fuzz::ReadMsh(bytes.TakeText());
+      break;
+    case 6:
+      wellspace::fuzz::ReadMedit(bytes.TakeText());
       break;
     default: {
       size_t length = bytes.Next();

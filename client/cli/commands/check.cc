@@ -232,7 +232,7 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
   check->footer(kExitCodesHelp);
   check
       ->add_option("MESH", command->mesh_path,
-                   "File of the mesh (.vtu, .npz, or .node with .ele), or - for standard input (vtu)")
+                   "File of the mesh (.vtu, .npz, .msh, .mesh, or .node with .ele), or - for standard input (vtu)")
       ->required()
       ->type_name("FILE");
   check->add_option("--cloud", command->cloud_path, "File of points that must be the first vertices, to the bit")

@@ -66,7 +66,7 @@ void AddRenderCommand(CLI::App& app, int& exit_code) {
   render->footer(kExitCodesHelp);
   render
       ->add_option("MESH", command->mesh_path,
-                   "File of the mesh (.vtu, .npz, or .node with .ele), or - for standard input (vtu)")
+                   "File of the mesh (.vtu, .npz, .msh, .mesh, or .node with .ele), or - for standard input (vtu)")
       ->required()
       ->type_name("FILE");
   render->add_option("-o,--out", command->picture_path, "File of the picture, .png or .svg")

@@ -1,0 +1,54 @@
+#include "client/formats/field_reader.h"
+
+#include <string>
+
+#include "absl/strings/str_cat.h"
+
+namespace wellspace::formats {
+
+bool FieldReader::Next(std::string_view& field) {
+  while (!fields_.Next(field)) {
+    std::string_view line;
+    if (!reader_.NextContent(line)) {
+      return false;
+    }
+    fields_ = FieldSplitter(line, ' ');
+  }
+  return true;
+}
+
+absl::Status FieldReader::NextOf(std::string_view what, std::string_view& field) {
+  if (Next(field)) {
+    return absl::OkStatus();
+  }
+  return reader_.status().ok() ? reader_.Error(absl::StrCat("the file ends; expected ", std::string(what)))
+                               : reader_.status();
+}
+
+absl::Status FieldReader::NextNumber(std::string_view what, double& value) {
+  std::string_view field;
+  if (absl::Status status = NextOf(what, field); !status.ok()) {
+    return status;
+  }
+  const absl::Status status = ParseFinite(field, value);
+  return status.ok() ? status : reader_.Error(absl::StrCat(std::string(what), ": ", status.message()));
+}
+
+absl::Status FieldReader::NextWhole(std::string_view what, uint64_t limit, uint64_t& value) {
+  std::string_view field;
+  if (absl::Status status = NextOf(what, field); !status.ok()) {
+    return status;
+  }
+  if (!ParseUnsigned(field, limit, value)) {
+    return reader_.Error(
+        absl::StrCat("expected ", std::string(what), ", a whole number of at most ", limit, ", got ", Quote(field)));
+  }
+  return absl::OkStatus();
+}
+
+absl::Status FieldReader::Skip(std::string_view what) {
+  std::string_view field;
+  return NextOf(what, field);
+}
+
+}  // namespace wellspace::formats

@@ -1,0 +1,145 @@
+// INRIA's MEDIT, in ascii.
+#include <array>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "absl/strings/ascii.h"
+#include "absl/strings/str_cat.h"
+#include "client/formats/field_reader.h"
+#include "client/formats/mesh_readers.h"
+
+namespace wellspace::formats {
+namespace {
+
+constexpr uint64_t kMaxCount = std::numeric_limits<uint32_t>::max();
+
+class MeditReader {
+ public:
+  explicit MeditReader(LineReader& reader) : reader_(reader), fields_(reader) {}
+
+  absl::StatusOr<Mesh> Read() {
+    uint64_t version = 0;
+    std::string_view word;
+    if (!fields_.Next(word) || word != "MeshVersionFormatted") {
+      return Error("expected \"MeshVersionFormatted\" at the start of the file");
+    }
+    if (absl::Status status = fields_.NextWhole("the version", kMaxCount, version); !status.ok()) {
+      return status;
+    }
+    while (fields_.Next(word)) {
+      if (word == "End") {
+        break;
+      }
+      // What follows a word that is not known is skipped up to the next word.
+      absl::Status status;
+      if (word == "Dimension") {
+        status = ReadDimension();
+      } else if (word == "Vertices") {
+        status = ReadVertices();
+      } else if (mesh_.dimension != 0 && word == (mesh_.dimension == 2 ? "Triangles" : "Tetrahedra")) {
+        status = ReadSimplices();
+      } else if (word == "Quadrilaterals" || word == "Hexahedra" || word == "Prisms" || word == "Pyramids" ||
+                 (mesh_.dimension == 2 && word == "Tetrahedra")) {
+        status = reader_.Error(
+            absl::StrCat("expected Triangles in 2-D or Tetrahedra in 3-D and no other elements, got ", Quote(word)));
+      }
+      if (!status.ok()) {
+        return status;
+      }
+    }
+    if (!reader_.status().ok()) {
+      return reader_.status();
+    }
+    if (!has_vertices_ || !has_simplices_) {
+      return Error(absl::StrCat("the file ends; expected ", has_vertices_ ? "Triangles or Tetrahedra" : "Vertices"));
+    }
+    return std::move(mesh_);
+  }
+
+ private:
+  absl::Status Error(const std::string& message) const {
+    return reader_.status().ok() ? reader_.Error(message) : reader_.status();
+  }
+
+  absl::Status ReadDimension() {
+    uint64_t dimension = 0;
+    if (absl::Status status = fields_.NextWhole("the dimension", 3, dimension); !status.ok()) {
+      return status;
+    }
+    if (dimension < 2 || mesh_.dimension != 0) {
+      return Error("expected one \"Dimension\", 2 or 3");
+    }
+    mesh_.dimension = static_cast<int>(dimension);
+    return absl::OkStatus();
+  }
+
+  absl::Status ReadVertices() {
+    if (mesh_.dimension == 0 || std::exchange(has_vertices_, true)) {
+      return Error("expected \"Dimension\", and then \"Vertices\" once");
+    }
+    if (absl::Status status = fields_.NextWhole("the number of vertices", kMaxCount, vertices_); !status.ok()) {
+      return status;
+    }
+    constexpr std::array kNames = {"x of a vertex", "y of a vertex", "z of a vertex"};
+    for (uint64_t vertex = 0; vertex < vertices_; ++vertex) {
+      for (int axis = 0; axis < mesh_.dimension; ++axis) {
+        double value = 0;
+        if (absl::Status status = fields_.NextNumber(kNames[axis], value); !status.ok()) {
+          return status;
+        }
+        mesh_.points.push_back(value);
+      }
+      if (absl::Status status = fields_.Skip("the reference of a vertex"); !status.ok()) {
+        return status;
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status ReadSimplices() {
+    if (!has_vertices_ || std::exchange(has_simplices_, true)) {
+      return Error("expected \"Vertices\", and then the simplices once");
+    }
+    uint64_t count = 0;
+    if (absl::Status status = fields_.NextWhole("the number of simplices", kMaxCount, count); !status.ok()) {
+      return status;
+    }
+    for (uint64_t simplex = 0; simplex < count; ++simplex) {
+      for (int corner = 0; corner <= mesh_.dimension; ++corner) {
+        uint64_t vertex = 0;
+        if (absl::Status status = fields_.NextWhole("a vertex from 1 on", vertices_, vertex); !status.ok()) {
+          return status;
+        }
+        if (vertex == 0) {
+          return Error("expected a vertex from 1 on, got 0");
+        }
+        mesh_.simplices.push_back(static_cast<uint32_t>(vertex - 1));
+      }
+      if (absl::Status status = fields_.Skip("the reference of a simplex"); !status.ok()) {
+        return status;
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  LineReader& reader_;
+  FieldReader fields_;
+  Mesh mesh_;
+  uint64_t vertices_ = 0;
+  bool has_vertices_ = false;
+  bool has_simplices_ = false;
+};
+
+}  // namespace
+
+absl::StatusOr<Mesh> ReadMedit(const std::string& path) {
+  absl::StatusOr<InputFile> file = InputFile::Open(path);
+  if (!file.ok()) {
+    return file.status();
+  }
+  LineReader reader(*std::move(file));
+  return MeditReader(reader).Read();
+}
+
+}  // namespace wellspace::formats

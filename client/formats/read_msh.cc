@@ -1,0 +1,503 @@
+// Gmsh's MSH: 2.2 in ascii, 4.1 in ascii and in binary.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "client/formats/field_reader.h"
+#include "client/formats/mesh_readers.h"
+#include "client/formats/msh.h"
+
+namespace wellspace::formats {
+namespace {
+
+constexpr uint64_t kMaxCount = std::numeric_limits<uint32_t>::max();
+constexpr uint64_t kAnyNumber = std::numeric_limits<uint64_t>::max();
+
+// How many nodes an element of this type has; 0 if it is none of a simplicial mesh.
+int NodesOf(uint64_t type) {
+  switch (type) {
+    case kMshPoint:
+      return 1;
+    case kMshLine:
+      return 2;
+    case kMshTriangle:
+      return 3;
+    case kMshTetrahedron:
+      return 4;
+    default:
+      return 0;
+  }
+}
+
+class MshReader {
+ public:
+  explicit MshReader(LineReader& reader) : reader_(reader), fields_(reader) {}
+
+  absl::StatusOr<Mesh> Read() {
+    std::string_view line;
+    if (!NextLine(line) || line != "$MeshFormat") {
+      return EndError("expected \"$MeshFormat\" at the start of the file");
+    }
+    absl::Status status = ReadFormat();
+    while (status.ok() && NextLine(line)) {
+      if (line.front() != '$') {
+        status = reader_.Error(absl::StrCat("expected the start of a section, such as \"$Nodes\", got ", Quote(line)));
+      } else if (line == "$Nodes") {
+        status = ReadSection("$EndNodes", &MshReader::ReadNodes);
+      } else if (line == "$Elements") {
+        status = ReadSection("$EndElements", &MshReader::ReadElements);
+      } else if (line == "$NodeData") {
+        status = ReadSection("$EndNodeData", &MshReader::ReadNodeData);
+      } else {
+        status = SkipTo(absl::StrCat("$End", std::string(line.substr(1))));
+      }
+    }
+    if (!status.ok()) {
+      return status;
+    }
+    if (!reader_.status().ok() || !has_nodes_ || !has_elements_) {
+      return EndError(has_nodes_ ? "the file ends; expected \"$Elements\"" : "the file ends; expected \"$Nodes\"");
+    }
+    return MakeMesh();
+  }
+
+ private:
+  using Section = absl::Status (MshReader::*)();
+
+  // The next line that is not blank.
+  bool NextLine(std::string_view& line) {
+    while (reader_.Next(line)) {
+      line = TrimBlanks(line);
+      if (!line.empty()) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  absl::Status EndError(const std::string& message) const {
+    return reader_.status().ok() ? reader_.Error(message) : reader_.status();
+  }
+
+  // At the place that was read last.
+  absl::Status ValueError(const std::string& message) const {
+    return is_binary_ ? absl::InvalidArgumentError(
+                            absl::StrCat(reader_.name(), ": before byte ", reader_.offset(), ": ", message))
+                      : reader_.Error(message);
+  }
+
+  absl::Status ReadFormat() {
+    std::string_view line;
+    if (!NextLine(line)) {
+      return EndError("the file ends; expected the version");
+    }
+    FieldSplitter fields(line, ' ');
+    std::array<std::string_view, 3> words;
+    for (std::string_view& word : words) {
+      fields.Next(word);
+    }
+    is_2_2_ = words[0] == "2.2";
+    is_binary_ = words[1] == "1";
+    if ((!is_2_2_ && words[0] != "4.1") || (words[1] != "0" && words[1] != "1") || words[2] != "8" ||
+        (is_2_2_ && is_binary_)) {
+      return reader_.Error(absl::StrCat(
+          "expected version 2.2 in ascii (0 8), or 4.1 in ascii (0 8) or binary (1 8), got ", Quote(line)));
+    }
+    if (is_binary_) {
+      uint64_t one = 0;
+      if (absl::Status status = TakeWord<int32_t>("the number 1", 0x7fffffff, one); !status.ok()) {
+        return status;
+      }
+      if (one != 1) {
+        return ValueError(absl::StrCat("expected little-endian numbers, a 1 first, got ", one));
+      }
+    }
+    return ExpectLine("$EndMeshFormat");
+  }
+
+  absl::Status ExpectLine(const char* expected) {
+    std::string_view line;
+    if (!NextLine(line)) {
+      return EndError(absl::StrCat("the file ends; expected ", Quote(expected)));
+    }
+    return line == expected ? absl::OkStatus()
+                            : reader_.Error(absl::StrCat("expected ", Quote(expected), ", got ", Quote(line)));
+  }
+
+  absl::Status ReadSection(const char* end, Section read) {
+    fields_.DropLine();
+    if (absl::Status status = (this->*read)(); !status.ok()) {
+      return status;
+    }
+    return ExpectLine(end);
+  }
+
+  absl::Status SkipTo(const std::string& end) {
+    std::string_view line;
+    while (NextLine(line)) {
+      if (line == end) {
+        return absl::OkStatus();
+      }
+    }
+    return EndError(absl::StrCat("the file ends; expected ", Quote(end)));
+  }
+
+  // One number in binary; `limit` is the greatest that is accepted.
+  template <typename Word>
+  absl::Status TakeWord(const char* what, uint64_t limit, uint64_t& value) {
+    Word word{};
+    if (reader_.Take(reinterpret_cast<char*>(&word), sizeof(word)) != sizeof(word)) {
+      return reader_.status().ok() ? ValueError(absl::StrCat("the file ends; expected ", what)) : reader_.status();
+    }
+    if (word < 0 || static_cast<uint64_t>(word) > limit) {
+      return ValueError(absl::StrCat("expected ", what, ", a whole number of at most ", limit, ", got ", word));
+    }
+    value = static_cast<uint64_t>(word);
+    return absl::OkStatus();
+  }
+
+  // Numbers as the file has them: counts and numbers of nodes; dimensions, types and numbers of entities; coordinates.
+  absl::Status Size(const char* what, uint64_t limit, uint64_t& value) {
+    return is_binary_ ? TakeWord<int64_t>(what, limit, value) : fields_.NextWhole(what, limit, value);
+  }
+  absl::Status Int(const char* what, uint64_t limit, uint64_t& value) {
+    return is_binary_ ? TakeWord<int32_t>(what, limit, value) : fields_.NextWhole(what, limit, value);
+  }
+  absl::Status Number(const char* what, double& value) {
+    if (!is_binary_) {
+      return fields_.NextNumber(what, value);
+    }
+    if (reader_.Take(reinterpret_cast<char*>(&value), sizeof(value)) != sizeof(value)) {
+      return reader_.status().ok() ? ValueError(absl::StrCat("the file ends; expected ", what)) : reader_.status();
+    }
+    return std::isfinite(value) ? absl::OkStatus()
+                                : ValueError(absl::StrCat(what, ": expected a finite number, got ", value));
+  }
+
+  absl::Status AddPoint() {
+    for (const char* what : {"x of a node", "y of a node", "z of a node"}) {
+      if (absl::Status status = Number(what, points_.emplace_back()); !status.ok()) {
+        return status;
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status ReadNodes() {
+    if (std::exchange(has_nodes_, true)) {
+      return reader_.Error("expected one section \"$Nodes\", got another one");
+    }
+    if (absl::Status status = is_2_2_ ? ReadNodes22() : ReadNodes41(); !status.ok()) {
+      return status;
+    }
+    return IndexNodes();
+  }
+
+  absl::Status ReadNodes22() {
+    uint64_t count = 0;
+    absl::Status status = Size("the number of nodes", kMaxCount, count);
+    for (uint64_t node = 0; status.ok() && node < count; ++node) {
+      status = Size("the number of a node", kAnyNumber, numbers_.emplace_back());
+      if (status.ok()) {
+        status = AddPoint();
+      }
+    }
+    return status;
+  }
+
+  // The dimension and number of an entity, what the section has third, and the rows of the block.
+  absl::Status ReadBlock(const char* third_name, uint64_t& dimension, uint64_t& third, uint64_t& rows) {
+    uint64_t entity = 0;
+    absl::Status status = Int("the dimension of an entity", 3, dimension);
+    if (status.ok()) {
+      status = Int("the number of an entity", kMaxCount, entity);
+    }
+    if (status.ok()) {
+      status = Int(third_name, 1000, third);
+    }
+    return status.ok() ? Size("the rows of a block", kMaxCount, rows) : status;
+  }
+
+  // The counts at the start of a section, and the smallest and the largest number.
+  absl::Status ReadCounts(uint64_t& blocks, uint64_t& rows) {
+    uint64_t ignored = 0;
+    absl::Status status = Size("the number of blocks", kMaxCount, blocks);
+    if (status.ok()) {
+      status = Size("the number of rows", kMaxCount, rows);
+    }
+    for (const char* what : {"the smallest number", "the largest number"}) {
+      if (status.ok()) {
+        status = Size(what, kAnyNumber, ignored);
+      }
+    }
+    return status;
+  }
+
+  absl::Status ReadNodes41() {
+    uint64_t blocks = 0;
+    uint64_t count = 0;
+    if (absl::Status status = ReadCounts(blocks, count); !status.ok()) {
+      return status;
+    }
+    for (uint64_t block = 0; block < blocks; ++block) {
+      uint64_t dimension = 0;
+      uint64_t parametric = 0;
+      uint64_t rows = 0;
+      absl::Status status = ReadBlock("0 or 1, for parameters", dimension, parametric, rows);
+      for (uint64_t row = 0; status.ok() && row < rows; ++row) {
+        status = Size("the number of a node", kAnyNumber, numbers_.emplace_back());
+      }
+      double parameter = 0;
+      for (uint64_t row = 0; status.ok() && row < rows; ++row) {
+        status = AddPoint();
+        for (uint64_t i = 0; status.ok() && parametric != 0 && i < dimension; ++i) {
+          status = Number("a parameter of a node", parameter);
+        }
+      }
+      if (!status.ok()) {
+        return status;
+      }
+    }
+    return numbers_.size() == count
+               ? absl::OkStatus()
+               : ValueError(absl::StrCat("expected ", count, " nodes, as the section says, got ", numbers_.size()));
+  }
+
+  // Nodes that are numbered from 1 on, in order, are found without a table.
+  absl::Status IndexNodes() {
+    if (numbers_.size() > kMaxCount) {
+      return ValueError(absl::StrCat("expected fewer than 2^32 nodes, got ", numbers_.size()));
+    }
+    bool in_order = true;
+    for (size_t i = 0; i < numbers_.size() && in_order; ++i) {
+      in_order = numbers_[i] == i + 1;
+    }
+    if (in_order) {
+      return absl::OkStatus();
+    }
+    by_number_.resize(numbers_.size());
+    std::iota(by_number_.begin(), by_number_.end(), 0u);
+    std::sort(by_number_.begin(), by_number_.end(),
+              [this](uint32_t a, uint32_t b) { return numbers_[a] < numbers_[b]; });
+    for (size_t i = 1; i < by_number_.size(); ++i) {
+      if (numbers_[by_number_[i]] == numbers_[by_number_[i - 1]]) {
+        return ValueError(absl::StrCat("expected one node of every number, got two of ", numbers_[by_number_[i]]));
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  // The index of the node of this number.
+  absl::Status FindNode(uint64_t number, uint32_t& index) const {
+    if (by_number_.empty()) {
+      if (number == 0 || number > numbers_.size()) {
+        return ValueError(absl::StrCat("expected a node from 1 to ", numbers_.size(), ", got ", number));
+      }
+      index = static_cast<uint32_t>(number - 1);
+      return absl::OkStatus();
+    }
+    const auto found = std::lower_bound(by_number_.begin(), by_number_.end(), number,
+                                        [this](uint32_t node, uint64_t wanted) { return numbers_[node] < wanted; });
+    if (found == by_number_.end() || numbers_[*found] != number) {
+      return ValueError(absl::StrCat("expected the number of a node, got ", number));
+    }
+    index = *found;
+    return absl::OkStatus();
+  }
+
+  absl::Status ReadElements() {
+    if (!has_nodes_ || std::exchange(has_elements_, true)) {
+      return reader_.Error("expected \"$Nodes\" and then one section \"$Elements\"");
+    }
+    return is_2_2_ ? ReadElements22() : ReadElements41();
+  }
+
+  absl::Status ReadElements22() {
+    uint64_t count = 0;
+    absl::Status status = Size("the number of elements", kMaxCount, count);
+    for (uint64_t element = 0; status.ok() && element < count; ++element) {
+      uint64_t type = 0;
+      uint64_t tags = 0;
+      status = fields_.Skip("the number of an element");
+      if (status.ok()) {
+        status = Int("the type of an element", 1000, type);
+      }
+      if (status.ok()) {
+        status = Int("the number of tags", kMaxCount, tags);
+      }
+      for (; status.ok() && tags > 0; --tags) {
+        status = fields_.Skip("a tag");
+      }
+      if (status.ok()) {
+        status = AddElement(type);
+      }
+    }
+    return status;
+  }
+
+  absl::Status ReadElements41() {
+    uint64_t blocks = 0;
+    uint64_t count = 0;
+    uint64_t elements = 0;
+    if (absl::Status status = ReadCounts(blocks, count); !status.ok()) {
+      return status;
+    }
+    for (uint64_t block = 0; block < blocks; ++block) {
+      uint64_t dimension = 0;
+      uint64_t type = 0;
+      uint64_t rows = 0;
+      uint64_t number = 0;
+      absl::Status status = ReadBlock("the type of elements", dimension, type, rows);
+      for (uint64_t row = 0; status.ok() && row < rows; ++row) {
+        status = Size("the number of an element", kAnyNumber, number);
+        if (status.ok()) {
+          status = AddElement(type);
+        }
+      }
+      if (!status.ok()) {
+        return status;
+      }
+      elements += rows;
+    }
+    return elements == count
+               ? absl::OkStatus()
+               : ValueError(absl::StrCat("expected ", count, " elements, as the section says, got ", elements));
+  }
+
+  absl::Status AddElement(uint64_t type) {
+    const int nodes = NodesOf(type);
+    if (nodes == 0) {
+      return ValueError(absl::StrCat(
+          "expected elements of type 15 (point), 1 (line), 2 (triangle) or 4 (tetrahedron), got type ", type));
+    }
+    for (int i = 0; i < nodes; ++i) {
+      uint64_t number = 0;
+      uint32_t index = 0;
+      absl::Status status = Size("the number of a node", kAnyNumber, number);
+      if (status.ok()) {
+        status = FindNode(number, index);
+      }
+      if (!status.ok()) {
+        return status;
+      }
+      if (nodes >= 3) {
+        (nodes == 3 ? triangles_ : tetrahedra_).push_back(index);
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  // Texts (the name first), numbers, whole numbers (step, numbers in a value, values), each after its count and in ascii; then the values.
+  absl::Status ReadNodeData() {
+    constexpr uint64_t kMaxTags = 1000;
+    std::string name;
+    std::array<uint64_t, 3> whole{};
+    for (int kind = 0; kind < 3; ++kind) {
+      std::string_view line;
+      uint64_t tags = 0;
+      if (!NextLine(line) || !ParseUnsigned(line, kMaxTags, tags)) {
+        return EndError(absl::StrCat("expected the number of tags of data, at most ", kMaxTags));
+      }
+      for (uint64_t tag = 0; tag < tags; ++tag) {
+        if (!reader_.Next(line)) {
+          return EndError("the file ends; expected a tag of data");
+        }
+        line = TrimBlanks(line);
+        if (kind == 0 && tag == 0) {
+          name = line;
+        } else if (kind == 2 && tag < whole.size() && !ParseUnsigned(line, kMaxCount, whole[tag])) {
+          return reader_.Error(absl::StrCat("expected a whole number below 2^32, got ", Quote(line)));
+        }
+      }
+    }
+    const auto [step, width, rows] = whole;
+    const bool are_weights = has_nodes_ && width == 1 && name == absl::StrCat("\"", kMshWeights, "\"");
+    if (are_weights && (rows != numbers_.size() || !weights_.empty())) {
+      return ValueError(absl::StrCat("expected ", numbers_.size(), " weights, once, got ", rows));
+    }
+    std::vector<bool> seen(are_weights ? rows : 0);
+    weights_.resize(are_weights ? rows : weights_.size());
+    for (uint64_t row = 0; row < rows; ++row) {
+      uint64_t number = 0;
+      absl::Status status = Int("the number of a node", kMaxCount, number);
+      for (uint64_t i = 0; status.ok() && !are_weights && i < width; ++i) {
+        status = is_binary_ ? SkipNumber() : fields_.Skip("a value");
+      }
+      if (status.ok() && are_weights) {
+        uint32_t index = 0;
+        status = FindNode(number, index);
+        if (status.ok() && seen[index]) {
+          status = ValueError(absl::StrCat("expected one weight of every node, got two of node ", number));
+        }
+        if (status.ok()) {
+          seen[index] = true;
+          status = Number("a weight", weights_[index]);
+        }
+      }
+      if (!status.ok()) {
+        return status;
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status SkipNumber() {
+    char bytes[sizeof(double)];
+    return reader_.Take(bytes, sizeof(bytes)) == sizeof(bytes) ? absl::OkStatus()
+                                                               : EndError("the file ends inside data");
+  }
+
+  absl::StatusOr<Mesh> MakeMesh() {
+    Mesh mesh;
+    mesh.dimension = tetrahedra_.empty() && !triangles_.empty() ? 2 : 3;
+    mesh.simplices = std::move(mesh.dimension == 2 ? triangles_ : tetrahedra_);
+    mesh.weights = std::move(weights_);
+    if (mesh.dimension == 3) {
+      mesh.points = std::move(points_);
+      return mesh;
+    }
+    mesh.points.reserve(points_.size() / 3 * 2);
+    for (size_t i = 0; i < points_.size(); i += 3) {
+      if (points_[i + 2] != 0) {
+        return absl::InvalidArgumentError(absl::StrCat(reader_.name(), ": node ", numbers_[i / 3],
+                                                       ": expected z = 0 in a mesh of triangles, got ",
+                                                       points_[i + 2]));
+      }
+      mesh.points.insert(mesh.points.end(), {points_[i], points_[i + 1]});
+    }
+    return mesh;
+  }
+
+  LineReader& reader_;
+  FieldReader fields_;
+  bool is_2_2_ = false;
+  bool is_binary_ = false;
+  bool has_nodes_ = false;
+  bool has_elements_ = false;
+  std::vector<uint64_t> numbers_;    // of the nodes
+  std::vector<double> points_;       // nodes x 3
+  std::vector<uint32_t> by_number_;  // the nodes, sorted; empty: they are numbered from 1 on
+  std::vector<uint32_t> triangles_;  // indices of nodes
+  std::vector<uint32_t> tetrahedra_;
+  std::vector<double> weights_;
+};
+
+}  // namespace
+
+absl::StatusOr<Mesh> ReadMsh(const std::string& path) {
+  absl::StatusOr<InputFile> file = InputFile::Open(path);
+  if (!file.ok()) {
+    return file.status();
+  }
+  LineReader reader(*std::move(file));
+  return MshReader(reader).Read();
+}
+
+}  // namespace wellspace::formats

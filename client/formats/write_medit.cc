@@ -1,0 +1,99 @@
+// INRIA's MEDIT, in ascii.
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "client/formats/mesh_writers.h"
+#include "client/formats/number.h"
+#include "client/formats/output_file.h"
+
+namespace wellspace::formats {
+namespace {
+
+class MeditWriter final : public MeshWriter {
+ public:
+  MeditWriter(OutputFile output, const MeshShape& shape) : shape_(shape), output_(std::move(output)) {
+    output_.Write(absl::StrCat("MeshVersionFormatted 2\nDimension ", shape_.dimension, "\nVertices\n",
+                               shape_.vertex_count, "\n"));
+  }
+
+  absl::Status AddPoints(std::span<const double> points) override {
+    for (; !points.empty() && output_.status().ok(); points = points.subspan(shape_.dimension)) {
+      line_.clear();
+      for (const double x : points.first(shape_.dimension)) {
+        AppendNumber(x, line_);
+        line_ += ' ';
+      }
+      line_ += vertices_++ < shape_.input_vertices ? "1\n" : "0\n";
+      output_.Write(line_);
+    }
+    return output_.status();
+  }
+
+  absl::Status AddWeights(std::span<const double>) override {
+    return absl::InternalError("a mesh without weights got some");
+  }
+
+  absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
+    BeginSimplices();
+    const size_t corners = shape_.dimension + 1;
+    for (; !simplices.empty() && output_.status().ok(); simplices = simplices.subspan(corners)) {
+      line_.clear();
+      for (const uint32_t corner : simplices.first(corners)) {
+        AppendNumber(uint64_t{corner} + 1, line_);
+        line_ += ' ';
+      }
+      line_ += "1\n";
+      output_.Write(line_);
+      ++simplices_;
+    }
+    return output_.status();
+  }
+
+  absl::Status Commit() override {
+    BeginSimplices();
+    output_.Write("End\n");
+    if (absl::Status status = output_.status(); !status.ok()) {
+      return status;
+    }
+    if (absl::Status status = CheckComplete(shape_, vertices_, 0, simplices_); !status.ok()) {
+      return status;
+    }
+    return output_.Commit();
+  }
+
+ private:
+  void BeginSimplices() {
+    if (!std::exchange(has_simplices_, true)) {
+      output_.Write(absl::StrCat(shape_.dimension == 2 ? "Triangles\n" : "Tetrahedra\n", shape_.simplex_count, "\n"));
+    }
+  }
+
+  const MeshShape shape_;
+  OutputFile output_;
+  bool has_simplices_ = false;  // the section
+  uint64_t vertices_ = 0;
+  uint64_t simplices_ = 0;
+  std::string line_;
+};
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMedit(const std::string& path, const MeshShape& shape,
+                                                        std::stop_token stop) {
+  if (shape.has_weights) {
+    return absl::InvalidArgumentError(absl::StrCat("cannot write ", path,
+                                                   ": medit has no place for the weights of this mesh; expected vtu, "
+                                                   "npz, msh41, msh22 or node"));
+  }
+  absl::StatusOr<OutputFile> output = OutputFile::Create(path, std::move(stop));
+  if (!output.ok()) {
+    return output.status();
+  }
+  return std::make_unique<MeditWriter>(*std::move(output), shape);
+}
+
+}  // namespace wellspace::formats
