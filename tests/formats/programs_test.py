@@ -1,0 +1,104 @@
+"""Gmsh, FreeFEM and VTK read what Wellspace writes: the same counts, the same volume.
+
+Wants python3-vtk9, gmsh and freefem++ (deploy/install-deps.sh interoperability).
+"""
+import os
+import pathlib
+import re
+import subprocess
+import tempfile
+import unittest
+
+import numpy
+
+CONVERT_MESH = os.environ["CONVERT_MESH"]
+SIDE = 4  # of which all coordinates are few digits: Gmsh writes 16 of them
+
+
+def grid(dimension):
+    """A box of SIDE + 1 points along each axis, each cube cut into simplices along its diagonal (Kuhn); its volume."""
+    axes = [numpy.linspace(0, 1 + axis / 4, SIDE + 1) for axis in range(dimension)]
+    points = numpy.stack(numpy.meshgrid(*axes, indexing="ij"), -1).reshape(-1, dimension)
+    index = numpy.arange(len(points)).reshape((SIDE + 1,) * dimension)
+    cells = []
+    orders = ([0, 1], [1, 0]) if dimension == 2 else ([0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0])
+    for corner in numpy.ndindex((SIDE,) * dimension):
+        for order in orders:
+            walk = [numpy.array(corner)]
+            for axis in order:
+                walk.append(walk[-1] + numpy.eye(dimension, dtype=int)[axis])
+            cell = [index[tuple(place)] for place in walk]
+            if numpy.linalg.det(points[cell[1:]] - points[cell[0]]) < 0:
+                cell[-2:] = cell[:-3:-1]
+            cells.append(cell)
+    return points, numpy.array(cells), numpy.prod([axis[-1] for axis in axes])
+
+
+class Programs(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def write(self, dimension, name, format):
+        points, cells, volume = grid(dimension)
+        numpy.savez(self.folder / "mesh.npz", points=points, simplices=cells)
+        subprocess.run([CONVERT_MESH, self.folder / "mesh.npz", self.folder / name, format], check=True, timeout=60)
+        return points, cells, volume
+
+    def run_program(self, *command):
+        result = subprocess.run(command, cwd=self.folder, text=True, timeout=120, stdout=subprocess.PIPE,
+                                stderr=subprocess.STDOUT)
+        self.assertEqual(result.returncode, 0, result.stdout)
+        return result.stdout
+
+    def test_gmsh_reads_our_msh_and_we_read_its(self):
+        for dimension in (2, 3):
+            for format in ("msh41", "msh22"):
+                with self.subTest(dimension=dimension, format=format):
+                    points, cells, _ = self.write(dimension, "mesh.msh", format)
+                    self.run_program("gmsh", "-check", "mesh.msh")
+                    for version, binary in (("2.2", []), ("4.1", []), ("4.1", ["-bin"])):
+                        text = self.run_program("gmsh", "mesh.msh", "-save", "-save_all", "-format", "msh" + version[0] + version[2],
+                                                *binary, "-o", "theirs.msh")
+                        self.assertRegex(text, rf"{len(points)} nodes")
+                        self.assertNotRegex(text, r"Error|Warning")
+                        self.run_program(CONVERT_MESH, "theirs.msh", "back.npz")
+                        with numpy.load(self.folder / "back.npz") as back:
+                            numpy.testing.assert_array_equal(back["points"], points)
+                            numpy.testing.assert_array_equal(back["simplices"], cells)
+
+    def test_freefem_reads_our_mesh(self):
+        for dimension in (2, 3):
+            with self.subTest(dimension=dimension):
+                points, cells, volume = self.write(dimension, "mesh.mesh", "medit")
+                script = ('mesh3 Th = readmesh3("mesh.mesh");\nreal v = int3d(Th)(1.);\n' if dimension == 3 else
+                          'mesh Th = readmesh("mesh.mesh");\nreal v = int2d(Th)(1.);\n')
+                (self.folder / "volume.edp").write_text(
+                    script + 'cout.precision(15);\ncout << "figures " << Th.nv << " " << Th.nt << " " << v << endl;\n')
+                text = self.run_program("FreeFem++", "-nw", "-ne", "volume.edp")
+                figures = re.search(r"^figures (\d+) (\d+) (\S+)$", text, re.MULTILINE)
+                self.assertIsNotNone(figures, text)
+                self.assertEqual((int(figures[1]), int(figures[2])), (len(points), len(cells)))
+                self.assertAlmostEqual(float(figures[3]), volume, places=12)
+
+    def test_vtk_reads_our_vtu(self):
+        import vtk
+        for dimension in (2, 3):
+            with self.subTest(dimension=dimension):
+                points, cells, volume = self.write(dimension, "mesh.vtu", "vtu")
+                reader = vtk.vtkXMLUnstructuredGridReader()
+                reader.SetFileName(str(self.folder / "mesh.vtu"))
+                sizes = vtk.vtkCellSizeFilter()
+                sizes.SetInputConnection(reader.GetOutputPort())
+                sizes.ComputeSumOn()
+                sizes.Update()
+                grid_of_vtk = reader.GetOutput()
+                self.assertEqual((grid_of_vtk.GetNumberOfPoints(), grid_of_vtk.GetNumberOfCells()),
+                                 (len(points), len(cells)))
+                total = sizes.GetOutput().GetFieldData().GetArray("Area" if dimension == 2 else "Volume").GetValue(0)
+                self.assertAlmostEqual(total, volume, places=12)
+
+
+if __name__ == "__main__":
+    unittest.main()
