@@ -177,7 +177,7 @@ TEST_F(MeshFilesTest, StreamsAreWrittenInBoundedMemory) {
     return usage.ru_maxrss;
   };
   const long before = peak_kib();
-  for (const char* name : {"mesh.vtu", "mesh.npz"}) {
+  for (const char* name : {"mesh.vtu", "mesh.npz", "mesh.msh"}) {
     const absl::StatusOr<std::unique_ptr<MeshWriter>> writer =
         CreateMesh(folder_.Path(name), "",
                    {.dimension = 3, .vertex_count = kVertices, .simplex_count = 1 << 14, .input_vertices = 1});
