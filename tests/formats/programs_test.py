@@ -2,6 +2,7 @@
 
 Wants python3-vtk9, gmsh and freefem++ (deploy/install-deps.sh interoperability).
 """
+import itertools
 import os
 import pathlib
 import re
@@ -82,13 +83,13 @@ class Programs(unittest.TestCase):
                 self.assertEqual((int(figures[1]), int(figures[2])), (len(points), len(cells)))
                 self.assertAlmostEqual(float(figures[3]), volume, places=12)
 
-    def test_vtk_reads_our_vtu(self):
+    def test_vtk_reads_our_vtu_and_vtkhdf(self):
         import vtk
-        for dimension in (2, 3):
-            with self.subTest(dimension=dimension):
-                points, cells, volume = self.write(dimension, "mesh.vtu", "vtu")
-                reader = vtk.vtkXMLUnstructuredGridReader()
-                reader.SetFileName(str(self.folder / "mesh.vtu"))
+        for dimension, format in itertools.product((2, 3), ("vtu", "vtkhdf")):
+            with self.subTest(dimension=dimension, format=format):
+                points, cells, volume = self.write(dimension, f"mesh.{format}", format)
+                reader = vtk.vtkXMLUnstructuredGridReader() if format == "vtu" else vtk.vtkHDFReader()
+                reader.SetFileName(str(self.folder / f"mesh.{format}"))
                 sizes = vtk.vtkCellSizeFilter()
                 sizes.SetInputConnection(reader.GetOutputPort())
                 sizes.ComputeSumOn()
