@@ -144,6 +144,9 @@ TEST_F(VtkHdfTest, FailedWriteSaysWhy) {
   EXPECT_FALSE(status.ok());
   EXPECT_THAT(std::string(status.message()), HasSubstr("File too large"));
   EXPECT_TRUE(std::filesystem::is_empty(folder_.Path("")));
+  EXPECT_EQ(WriteMesh(path_, "", {.dimension = 3, .points = points, .simplices = {}}), absl::OkStatus());
+  Open();
+  EXPECT_THAT(Reals("Points"), ElementsAreArray(points));
 }
 
 TEST_F(VtkHdfTest, RefusesWhatItCannotHold) {
