@@ -14,8 +14,8 @@ const char kCloudsHelp[] =
     "         .xyz, .node, .npy, vertices of .ply, .obj and .off; \"-\" is standard input (csv, or --input-format)\n";
 
 const char kMeshesHelp[] =
-    "Meshes:  .vtu, .vtkhdf, .msh (Gmsh 4.1; --format msh22: 2.2) and .mesh (MEDIT), 2-D and 3-D; .npz (arrays of numpy),\n"
-    "         .node and .ele (a pair); \"-\" is standard output (vtu)\n";
+    "Meshes:  .vtu, .vtkhdf, .msh (Gmsh 4.1; --format msh22: 2.2) and .mesh (MEDIT), 2-D and 3-D; .npz (arrays of\n"
+    "         numpy), .node and .ele (a pair); \"-\" is standard output (vtu)\n";
 
 void AddMeshOutput(CLI::App& command, std::string& path, std::string& format) {
   command.add_option("-o,--out", path, "File of the mesh, or - for standard output")->required()->type_name("FILE");

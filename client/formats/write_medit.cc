@@ -84,11 +84,6 @@ class MeditWriter final : public MeshWriter {
 
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMedit(const std::string& path, const MeshShape& shape,
                                                         std::stop_token stop) {
-  if (shape.has_weights) {
-    return absl::InvalidArgumentError(absl::StrCat("cannot write ", path,
-                                                   ": medit has no place for the weights of this mesh; expected vtu, "
-                                                   "npz, msh41, msh22 or node"));
-  }
   absl::StatusOr<OutputFile> output = OutputFile::Create(path, std::move(stop));
   if (!output.ok()) {
     return output.status();

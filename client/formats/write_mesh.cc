@@ -21,6 +21,7 @@ struct WriterKind {
   int max_dimension;
   // Why it cannot go to a pipe or a device; null: it can.
   const char* needs_file;
+  bool has_weights = true;
 };
 
 std::span<const Format<WriterKind>> Writers() {
@@ -30,14 +31,15 @@ std::span<const Format<WriterKind>> Writers() {
       {"npz", {".npz"}, {CreateNpz, kMaxDimension, "npz is a zip archive, completed from its start"}},
       {"msh41", {".msh"}, {CreateMsh41, 3, nullptr}},
       {"msh22", {}, {CreateMsh22, 3, nullptr}},
-      {"medit", {".mesh"}, {CreateMedit, 3, nullptr}},
+      {"medit", {".mesh"}, {CreateMedit, 3, nullptr, false}},
       {"node", {".node", ".ele"}, {CreateNodeAndEle, kMaxDimension, "node is a pair of files"}},
   };
   return writers;
 }
 
 // `dimension` is that of the mesh, or 0 when it is not known.
-absl::StatusOr<WriterKind> FindWriter(const std::string& path, const std::string& format, int dimension) {
+absl::StatusOr<WriterKind> FindWriter(const std::string& path, const std::string& format, int dimension,
+                                      bool has_weights) {
   const bool is_stream = path == kStandardStream;
   const auto row = FindFormat(Writers(), path, format.empty() && is_stream ? "vtu" : format);
   if (!row.ok()) {
@@ -53,6 +55,12 @@ absl::StatusOr<WriterKind> FindWriter(const std::string& path, const std::string
                                                    writer.max_dimension, "-D, and this one is ", dimension,
                                                    "-D; expected npz, a file of numpy"));
   }
+  if (has_weights && !writer.has_weights) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("cannot write ", path, ": ", (*row)->name,
+                     " has no place for the weights of a mesh; expected vtu, vtkhdf, npz, "
+                     "msh41, msh22 or node"));
+  }
   return writer;
 }
 
@@ -60,8 +68,8 @@ absl::StatusOr<WriterKind> FindWriter(const std::string& path, const std::string
 
 std::vector<std::string> MeshFormats() { return FormatNames(Writers()); }
 
-absl::Status CheckMeshOutput(const std::string& path, const std::string& format, int dimension) {
-  const absl::StatusOr<WriterKind> writer = FindWriter(path, format, dimension);
+absl::Status CheckMeshOutput(const std::string& path, const std::string& format, int dimension, bool may_have_weights) {
+  const absl::StatusOr<WriterKind> writer = FindWriter(path, format, dimension, may_have_weights);
   if (!writer.ok()) {
     return writer.status();
   }
@@ -99,7 +107,7 @@ absl::Status CheckComplete(const MeshShape& shape, uint64_t vertices, uint64_t w
 
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMesh(const std::string& path, const std::string& format,
                                                        const MeshShape& shape, std::stop_token stop) {
-  const absl::StatusOr<WriterKind> writer = FindWriter(path, format, shape.dimension);
+  const absl::StatusOr<WriterKind> writer = FindWriter(path, format, shape.dimension, shape.has_weights);
   if (!writer.ok()) {
     return writer.status();
   }

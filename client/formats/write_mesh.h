@@ -33,9 +33,10 @@ namespace wellspace::formats {
 // The names that `format` may take below.
 std::vector<std::string> MeshFormats();
 
-// Tells early whether WriteMesh would refuse `path` and `format` for a mesh of `dimension` (0: not known yet), as far as
-// that can be known without writing.
-absl::Status CheckMeshOutput(const std::string& path, const std::string& format, int dimension = 0);
+// Tells early whether WriteMesh would refuse `path` and `format` for a mesh of `dimension` (0: not known yet) that may have weights,
+// as far as that can be known without writing.
+absl::Status CheckMeshOutput(const std::string& path, const std::string& format, int dimension = 0,
+                             bool may_have_weights = false);
 
 // Writes a mesh piece by piece, so that it need not fit into memory.
 //

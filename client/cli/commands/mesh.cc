@@ -46,7 +46,8 @@ absl::Status MeshCommand::CheckOptions() const {
 absl::Status MeshCommand::Mesh(client::Client& client, const client::MeshOptions& mesh_options,
                                const formats::PointCloud& cloud, const Interrupt& interrupt) const {
   // Now that the dimension is known for sure, and before hours of work.
-  if (absl::Status status = formats::CheckMeshOutput(output, format, cloud.dimension); !status.ok()) {
+  if (absl::Status status = formats::CheckMeshOutput(output, format, cloud.dimension, mesh_options.pump_weights);
+      !status.ok()) {
     return status;
   }
   client::MeshFile file(output, format, interrupt.token());
