@@ -333,6 +333,7 @@ TEST(QueryFails, WithQueueFullBeforeItHasBegun) {
   ServiceHarness harness(EndlessMesher(started), options);
   SessionClient client(harness.channel());
   client.Refine();
+  harness.TimeUntilIdle();  // an operation has ended before its worker is free
   TestCall running(harness.stub());
   running.Send(UnitCubeParameters());
   running.HalfClose();
