@@ -15,7 +15,8 @@ RUN cmake --preset release -DWELLSPACE_TESTS=OFF \
 
 FROM debian:bookworm-slim
 COPY deploy/install-deps.sh /tmp/
-RUN /tmp/install-deps.sh runtime && rm -rf /tmp/install-deps.sh /var/lib/apt/lists/* \
+RUN printf 'path-exclude /usr/share/%s/*\n' doc man locale > /etc/dpkg/dpkg.cfg.d/small \
+ && /tmp/install-deps.sh runtime && rm -rf /tmp/install-deps.sh /var/lib/apt/lists/* \
  && useradd --system --uid 7233 --no-create-home --shell /usr/sbin/nologin wellspace
 COPY LICENSE README.md /usr/share/doc/wellspace/
 COPY --from=build /usr/src/wellspace/build/release/bin/wellspace /usr/src/wellspace/build/release/bin/wellspaced /usr/local/bin/

@@ -21,7 +21,7 @@ declare -A packages=(
   [container]="debootstrap podman buildah"
   [monitoring]="prometheus"
   [runtime]="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libtbb12 libprometheus-cpp-pull1.0 libcairo2 zlib1g
-             libminizip1 libhdf5-103-1"
+             libminizip1 libsz2"
 )
 packages[dev]="${packages[build]} ${packages[test]} ${packages[lint]} ${packages[tidy]} ${packages[fuzz]}"
 

@@ -25,6 +25,9 @@ inline constexpr int kMaxSentBytes = 4 * 1024 * 1024;
 // What the process takes without any work, and room for the allocator: no part of the budget of memory.
 inline constexpr uint64_t kProcessMemoryBytes = uint64_t{64} << 20;
 
+// Of messages that are coming gRPC may hold half of the limit of memory, and at least this.
+inline constexpr uint64_t kLeastReceivedBytes = uint64_t{512} << 20;
+
 // The smallest limit of memory with which work can be done.
 inline constexpr uint64_t kMinMemoryBytes = uint64_t{128} << 20;
 

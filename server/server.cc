@@ -31,10 +31,10 @@ constexpr std::chrono::milliseconds kFarewell(500);
 
 // Most that gRPC holds of what comes in, all connections together. It looks at the length of a message when all of it has come, of whoever
 // it is; here it ends calls, one of each connection, the oldest first. Half of the limit of memory is as much as all messages that
-// the budget makes room for.
+// the budget makes room for, and never so little that hundreds of clients that behave come near it.
 size_t MostReceived(const ServiceOptions& options) {
   constexpr uint64_t kWithoutLimit = uint64_t{1} << 30;
-  return options.max_memory_bytes == 0 ? kWithoutLimit : options.max_memory_bytes / 2;
+  return options.max_memory_bytes == 0 ? kWithoutLimit : std::max(kLeastReceivedBytes, options.max_memory_bytes / 2);
 }
 
 // As gRPC takes durations.
