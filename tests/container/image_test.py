@@ -33,7 +33,8 @@ def size_of(folder):
 
 
 def descendants(pid):
-    children = pathlib.Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    # Programs in Go start processes from any of their threads.
+    children = " ".join(path.read_text() for path in pathlib.Path(f"/proc/{pid}/task").glob("*/children")).split()
     return [int(child) for child in children] + [grandchild for child in children for grandchild in descendants(int(child))]
 
 
