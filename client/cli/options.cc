@@ -67,6 +67,14 @@ uint64_t ParseCount(const std::string& name, std::string_view text, uint64_t lea
   return value;
 }
 
+void AddMeshInput(CLI::App& command, std::string& path) {
+  command
+      .add_option("MESH", path,
+                  "File of the mesh (.vtu, .npz, .msh, .mesh, or .node with .ele), or - for standard input (vtu)")
+      ->required()
+      ->type_name("FILE");
+}
+
 CLI::Option* AddCount(CLI::App& command, const std::string& name, const std::function<void(uint64_t)>& take,
                       const std::string& description, uint64_t least, uint64_t most) {
   return command

@@ -23,6 +23,9 @@ CLI::Option* AddNumber(CLI::App& command, const std::string& name, std::optional
 // To be checked of a number: it is above 0.
 CLI::Validator AboveZero();
 
+// MESH, the file of a mesh that is read.
+void AddMeshInput(CLI::App& command, std::string& path);
+
 // A whole number of at least `least` and at most `most`; CLI11 takes -1 for the largest there is.
 CLI::Option* AddCount(CLI::App& command, const std::string& name, const std::function<void(uint64_t)>& take,
                       const std::string& description, uint64_t least = 0,

@@ -21,8 +21,7 @@ absl::Status FieldReader::NextOf(std::string_view what, std::string_view& field)
   if (Next(field)) {
     return absl::OkStatus();
   }
-  return reader_.status().ok() ? reader_.Error(absl::StrCat("the file ends; expected ", std::string(what)))
-                               : reader_.status();
+  return reader_.EndError(absl::StrCat("the file ends; expected ", std::string(what)));
 }
 
 absl::Status FieldReader::NextNumber(std::string_view what, double& value) {

@@ -73,6 +73,8 @@ class LineReader {
   uint64_t offset() const { return offset_ - (end_ - begin_); }
   // INVALID_ARGUMENT at the line that was returned last; of an empty file, at line 1.
   absl::Status Error(std::string_view message) const;
+  // What it means that Next, NextContent or Take have brought nothing, or too little: status(), or if that is ok Error(message).
+  absl::Status EndError(std::string_view message) const { return status_.ok() ? Error(message) : status_; }
 
  private:
   bool Fill();

@@ -3,12 +3,16 @@
 #define WELLSPACE_CLIENT_FORMATS_NUMBER_H_
 
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <string_view>
 
 #include "absl/status/status.h"
 
 namespace wellspace::formats {
+
+// The largest number of points, vertices or simplices that a file may announce.
+inline constexpr uint64_t kMaxCount = std::numeric_limits<uint32_t>::max();
 
 // `text` in quotes, unprintable bytes escaped, cut off when long.
 std::string Quote(std::string_view text);

@@ -1,6 +1,5 @@
 // INRIA's MEDIT, in ascii.
 #include <array>
-#include <limits>
 #include <string>
 #include <utility>
 
@@ -12,8 +11,6 @@
 namespace wellspace::formats {
 namespace {
 
-constexpr uint64_t kMaxCount = std::numeric_limits<uint32_t>::max();
-
 class MeditReader {
  public:
   explicit MeditReader(LineReader& reader) : reader_(reader), fields_(reader) {}
@@ -22,7 +19,7 @@ class MeditReader {
     uint64_t version = 0;
     std::string_view word;
     if (!fields_.Next(word) || word != "MeshVersionFormatted") {
-      return Error("expected \"MeshVersionFormatted\" at the start of the file");
+      return reader_.EndError("expected \"MeshVersionFormatted\" at the start of the file");
     }
     if (absl::Status status = fields_.NextWhole("the version", kMaxCount, version); !status.ok()) {
       return status;
@@ -52,23 +49,20 @@ class MeditReader {
       return reader_.status();
     }
     if (!has_vertices_ || !has_simplices_) {
-      return Error(absl::StrCat("the file ends; expected ", has_vertices_ ? "Triangles or Tetrahedra" : "Vertices"));
+      return reader_.Error(
+          absl::StrCat("the file ends; expected ", has_vertices_ ? "Triangles or Tetrahedra" : "Vertices"));
     }
     return std::move(mesh_);
   }
 
  private:
-  absl::Status Error(const std::string& message) const {
-    return reader_.status().ok() ? reader_.Error(message) : reader_.status();
-  }
-
   absl::Status ReadDimension() {
     uint64_t dimension = 0;
     if (absl::Status status = fields_.NextWhole("the dimension", 3, dimension); !status.ok()) {
       return status;
     }
     if (dimension < 2 || mesh_.dimension != 0) {
-      return Error("expected one \"Dimension\", 2 or 3");
+      return reader_.Error("expected one \"Dimension\", 2 or 3");
     }
     mesh_.dimension = static_cast<int>(dimension);
     return absl::OkStatus();
@@ -76,7 +70,7 @@ class MeditReader {
 
   absl::Status ReadVertices() {
     if (mesh_.dimension == 0 || std::exchange(has_vertices_, true)) {
-      return Error("expected \"Dimension\", and then \"Vertices\" once");
+      return reader_.Error("expected \"Dimension\", and then \"Vertices\" once");
     }
     if (absl::Status status = fields_.NextWhole("the number of vertices", kMaxCount, vertices_); !status.ok()) {
       return status;
@@ -99,7 +93,7 @@ class MeditReader {
 
   absl::Status ReadSimplices() {
     if (!has_vertices_ || std::exchange(has_simplices_, true)) {
-      return Error("expected \"Vertices\", and then the simplices once");
+      return reader_.Error("expected \"Vertices\", and then the simplices once");
     }
     uint64_t count = 0;
     if (absl::Status status = fields_.NextWhole("the number of simplices", kMaxCount, count); !status.ok()) {
@@ -112,7 +106,7 @@ class MeditReader {
           return status;
         }
         if (vertex == 0) {
-          return Error("expected a vertex from 1 on, got 0");
+          return reader_.Error("expected a vertex from 1 on, got 0");
         }
         mesh_.simplices.push_back(static_cast<uint32_t>(vertex - 1));
       }

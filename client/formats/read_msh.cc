@@ -17,7 +17,6 @@
 namespace wellspace::formats {
 namespace {
 
-constexpr uint64_t kMaxCount = std::numeric_limits<uint32_t>::max();
 constexpr uint64_t kAnyNumber = std::numeric_limits<uint64_t>::max();
 
 // How many nodes an element of this type has; 0 if it is none of a simplicial mesh.
@@ -43,7 +42,7 @@ class MshReader {
   absl::StatusOr<Mesh> Read() {
     std::string_view line;
     if (!NextLine(line) || line != "$MeshFormat") {
-      return EndError("expected \"$MeshFormat\" at the start of the file");
+      return reader_.EndError("expected \"$MeshFormat\" at the start of the file");
     }
     absl::Status status = ReadFormat();
     while (status.ok() && NextLine(line)) {
@@ -63,7 +62,8 @@ class MshReader {
       return status;
     }
     if (!reader_.status().ok() || !has_nodes_ || !has_elements_) {
-      return EndError(has_nodes_ ? "the file ends; expected \"$Elements\"" : "the file ends; expected \"$Nodes\"");
+      return reader_.EndError(has_nodes_ ? "the file ends; expected \"$Elements\""
+                                         : "the file ends; expected \"$Nodes\"");
     }
     return MakeMesh();
   }
@@ -82,10 +82,6 @@ class MshReader {
     return false;
   }
 
-  absl::Status EndError(const std::string& message) const {
-    return reader_.status().ok() ? reader_.Error(message) : reader_.status();
-  }
-
   // At the place that was read last.
   absl::Status ValueError(const std::string& message) const {
     return is_binary_ ? absl::InvalidArgumentError(
@@ -96,7 +92,7 @@ class MshReader {
   absl::Status ReadFormat() {
     std::string_view line;
     if (!NextLine(line)) {
-      return EndError("the file ends; expected the version");
+      return reader_.EndError("the file ends; expected the version");
     }
     FieldSplitter fields(line, ' ');
     std::array<std::string_view, 3> words;
@@ -125,7 +121,7 @@ class MshReader {
   absl::Status ExpectLine(const char* expected) {
     std::string_view line;
     if (!NextLine(line)) {
-      return EndError(absl::StrCat("the file ends; expected ", Quote(expected)));
+      return reader_.EndError(absl::StrCat("the file ends; expected ", Quote(expected)));
     }
     return line == expected ? absl::OkStatus()
                             : reader_.Error(absl::StrCat("expected ", Quote(expected), ", got ", Quote(line)));
@@ -146,15 +142,23 @@ class MshReader {
         return absl::OkStatus();
       }
     }
-    return EndError(absl::StrCat("the file ends; expected ", Quote(end)));
+    return reader_.EndError(absl::StrCat("the file ends; expected ", Quote(end)));
+  }
+
+  template <typename T>
+  absl::Status TakeBytes(const char* what, T& value) {
+    if (reader_.Take(reinterpret_cast<char*>(&value), sizeof(value)) == sizeof(value)) {
+      return absl::OkStatus();
+    }
+    return reader_.status().ok() ? ValueError(absl::StrCat("the file ends; expected ", what)) : reader_.status();
   }
 
   // One number in binary; `limit` is the greatest that is accepted.
   template <typename Word>
   absl::Status TakeWord(const char* what, uint64_t limit, uint64_t& value) {
     Word word{};
-    if (reader_.Take(reinterpret_cast<char*>(&word), sizeof(word)) != sizeof(word)) {
-      return reader_.status().ok() ? ValueError(absl::StrCat("the file ends; expected ", what)) : reader_.status();
+    if (absl::Status status = TakeBytes(what, word); !status.ok()) {
+      return status;
     }
     if (word < 0 || static_cast<uint64_t>(word) > limit) {
       return ValueError(absl::StrCat("expected ", what, ", a whole number of at most ", limit, ", got ", word));
@@ -174,8 +178,8 @@ class MshReader {
     if (!is_binary_) {
       return fields_.NextNumber(what, value);
     }
-    if (reader_.Take(reinterpret_cast<char*>(&value), sizeof(value)) != sizeof(value)) {
-      return reader_.status().ok() ? ValueError(absl::StrCat("the file ends; expected ", what)) : reader_.status();
+    if (absl::Status status = TakeBytes(what, value); !status.ok()) {
+      return status;
     }
     return std::isfinite(value) ? absl::OkStatus()
                                 : ValueError(absl::StrCat(what, ": expected a finite number, got ", value));
@@ -403,11 +407,11 @@ class MshReader {
       std::string_view line;
       uint64_t tags = 0;
       if (!NextLine(line) || !ParseUnsigned(line, kMaxTags, tags)) {
-        return EndError(absl::StrCat("expected the number of tags of data, at most ", kMaxTags));
+        return reader_.EndError(absl::StrCat("expected the number of tags of data, at most ", kMaxTags));
       }
       for (uint64_t tag = 0; tag < tags; ++tag) {
         if (!reader_.Next(line)) {
-          return EndError("the file ends; expected a tag of data");
+          return reader_.EndError("the file ends; expected a tag of data");
         }
         line = TrimBlanks(line);
         if (kind == 0 && tag == 0) {
@@ -451,7 +455,7 @@ class MshReader {
   absl::Status SkipNumber() {
     char bytes[sizeof(double)];
     return reader_.Take(bytes, sizeof(bytes)) == sizeof(bytes) ? absl::OkStatus()
-                                                               : EndError("the file ends inside data");
+                                                               : reader_.EndError("the file ends inside data");
   }
 
   absl::StatusOr<Mesh> MakeMesh() {

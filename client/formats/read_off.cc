@@ -1,6 +1,5 @@
 // Geomview's OFF: the vertices.
 #include <algorithm>
-#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,8 +10,6 @@
 
 namespace wellspace::formats {
 namespace {
-
-constexpr uint64_t kMaxCount = std::numeric_limits<uint32_t>::max();
 
 // What the word at the start says.
 struct OffKind {
@@ -70,9 +67,7 @@ class OffReader {
     const bool has_line = reader_.NextContent(line);
     const std::optional<OffKind> kind = has_line ? TakeKind(line) : std::nullopt;
     if (!kind) {
-      return reader_.status().ok()
-                 ? reader_.Error("expected OFF, STOFF, COFF, NOFF, CNOFF, 4OFF or nOFF at the start of the file")
-                 : reader_.status();
+      return reader_.EndError("expected OFF, STOFF, COFF, NOFF, CNOFF, 4OFF or nOFF at the start of the file");
     }
     kind_ = *kind;
     std::vector<uint64_t> numbers;
@@ -91,9 +86,7 @@ class OffReader {
         break;
       }
       if (!reader_.NextContent(line)) {
-        return reader_.status().ok()
-                   ? reader_.Error("the file ends inside its header; expected the numbers of vertices, faces and edges")
-                   : reader_.status();
+        return reader_.EndError("the file ends inside its header; expected the numbers of vertices, faces and edges");
       }
     }
     if (has_dimension) {
@@ -110,9 +103,8 @@ class OffReader {
   absl::Status ReadVertex() {
     std::string_view line;
     if (!reader_.NextContent(line)) {
-      return reader_.status().ok() ? reader_.Error(absl::StrCat("expected ", vertices_,
-                                                                " vertices, as the header says, got ", cloud_.size()))
-                                   : reader_.status();
+      return reader_.EndError(
+          absl::StrCat("expected ", vertices_, " vertices, as the header says, got ", cloud_.size()));
     }
     FieldSplitter fields(line, ' ');
     std::string_view field;

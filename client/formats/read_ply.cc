@@ -3,7 +3,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -17,7 +16,6 @@
 namespace wellspace::formats {
 namespace {
 
-constexpr uint64_t kMaxCount = std::numeric_limits<uint32_t>::max();
 constexpr int kAxes = 3;
 constexpr std::string_view kAxisNames = "xyz";
 
@@ -155,7 +153,7 @@ class PlyReader {
   absl::Status ReadHeader() {
     std::vector<std::string_view> fields;
     if (!NextFields(fields) || fields.size() != 1 || fields[0] != "ply") {
-      return reader_.status().ok() ? reader_.Error("expected \"ply\"") : reader_.status();
+      return reader_.EndError("expected \"ply\"");
     }
     bool has_format = false;
     bool has_vertices = false;
@@ -185,8 +183,7 @@ class PlyReader {
         return status;
       }
     }
-    return reader_.status().ok() ? reader_.Error("the file ends inside its header; expected \"end_header\"")
-                                 : reader_.status();
+    return reader_.EndError("the file ends inside its header; expected \"end_header\"");
   }
 
   // Every row of an element takes bytes: nothing is repeated more often than the file is long.

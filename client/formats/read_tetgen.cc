@@ -82,7 +82,7 @@ absl::Status ReadEle(LineReader& reader, uint64_t vertices, uint64_t index_base,
   const char* what = SimplexName(mesh.dimension);
   std::string_view line;
   if (!reader.NextContent(line)) {
-    return reader.status().ok() ? reader.Error("expected a header, got an empty file") : reader.status();
+    return reader.EndError("expected a header, got an empty file");
   }
   std::array<uint64_t, 3> header{};
   const std::array names = {"number of simplices", "number of nodes of each", "number of attributes"};
@@ -138,7 +138,7 @@ absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud, uint
                       std::vector<double>& weights) {
   std::string_view line;
   if (!reader.NextContent(line)) {
-    return reader.status().ok() ? reader.Error("expected a header, got an empty file") : reader.status();
+    return reader.EndError("expected a header, got an empty file");
   }
   std::array<uint64_t, 4> header{};
   const std::array names = {"number of points", "dimension", "number of attributes", "number of markers"};

@@ -193,6 +193,14 @@ class HdfFile {
   hsize_t row_ = 0;
 };
 
+// Calls `use` with blocks of as many rows as a chunk, of `width` values each: what is converted takes little memory.
+template <typename T, typename Use>
+void ForEachBlock(std::span<const T> values, uint64_t width, Use use) {
+  for (; !values.empty(); values = values.subspan(std::min<size_t>(values.size(), kRowsPerChunk * width))) {
+    use(values.first(std::min<size_t>(values.size(), kRowsPerChunk * width)));
+  }
+}
+
 class VtkHdfWriter final : public MeshWriter {
  public:
   VtkHdfWriter(OutputFile output, const MeshShape& shape, std::stop_token stop)
@@ -222,20 +230,23 @@ class VtkHdfWriter final : public MeshWriter {
 
   absl::Status AddPoints(std::span<const double> points) override {
     const std::lock_guard lock(Hdf5Mutex());
-    block_.clear();
-    for (; !points.empty(); points = points.subspan(shape_.dimension)) {
-      for (int axis = 0; axis < 3; ++axis) {
-        block_.push_back(axis < shape_.dimension ? points[axis] : 0.0);
+    std::vector<double> padded;
+    ForEachBlock(points, shape_.dimension, [&](std::span<const double> block) {
+      padded.clear();
+      for (; !block.empty(); block = block.subspan(shape_.dimension)) {
+        for (int axis = 0; axis < 3; ++axis) {
+          padded.push_back(axis < shape_.dimension ? block[axis] : 0.0);
+        }
       }
-      ++vertices_;
-    }
-    file_->Add<double>(block_);
+      file_->Add<double>(padded);
+    });
+    vertices_ += points.size() / shape_.dimension;
     return file_->status();
   }
 
   absl::Status AddWeights(std::span<const double> weights) override {
     const std::lock_guard lock(Hdf5Mutex());
-    if (weights_ == 0) {
+    if (!std::exchange(has_weights_, true)) {
       const Handle point_data(H5Gopen2(file_->root(), "PointData", H5P_DEFAULT), H5Gclose);
       file_->BeginArray<double>(point_data, "weights", shape_.vertex_count);
     }
@@ -247,9 +258,13 @@ class VtkHdfWriter final : public MeshWriter {
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
     const std::lock_guard lock(Hdf5Mutex());
     BeginCells();
-    const std::vector<int64_t> indices(simplices.begin(), simplices.end());
-    file_->Add<int64_t>(indices);
-    simplices_ += simplices.size() / (shape_.dimension + 1);
+    const uint64_t corners = shape_.dimension + 1;
+    std::vector<int64_t> indices;
+    ForEachBlock(simplices, corners, [&](std::span<const uint32_t> block) {
+      indices.assign(block.begin(), block.end());
+      file_->Add<int64_t>(indices);
+    });
+    simplices_ += simplices.size() / corners;
     return file_->status();
   }
 
@@ -277,8 +292,8 @@ class VtkHdfWriter final : public MeshWriter {
   const MeshShape shape_;
   OutputFile output_;  // gives the file its name; HDF5 writes it
   std::optional<HdfFile> file_;
-  std::vector<double> block_;
-  bool has_cells_ = false;  // the array
+  bool has_weights_ = false;  // the array
+  bool has_cells_ = false;    // the array
   uint64_t vertices_ = 0;
   uint64_t weights_ = 0;
   uint64_t simplices_ = 0;

@@ -2,14 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <bit>
-#include <cmath>
 #include <cstdint>
-#include <limits>
-#include <random>
 
 #include "client/formats/read_mesh.h"
 #include "client/formats/write_mesh.h"
+#include "tests/formats/random_mesh.h"
 #include "tests/formats/temporary_folder.h"
 
 namespace wellspace::formats {
@@ -17,29 +14,6 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-// Points with the bits of all kinds of doubles, simplices of any of them.
-Mesh RandomMesh(int dimension, uint64_t vertices, uint64_t simplices) {
-  std::mt19937_64 random(7);
-  Mesh mesh{.dimension = dimension, .points = {}, .simplices = {}};
-  mesh.points = {-0.0, 0.1, std::numeric_limits<double>::denorm_min(), std::numeric_limits<double>::max(), 1.0 / 3, 0};
-  while (mesh.points.size() < vertices * dimension) {
-    const double value = std::bit_cast<double>(random());
-    mesh.points.push_back(std::isfinite(value) ? value : 1e-300);
-  }
-  while (mesh.simplices.size() < simplices * (dimension + 1)) {
-    mesh.simplices.push_back(static_cast<uint32_t>(random() % vertices));
-  }
-  return mesh;
-}
-
-std::vector<uint64_t> Bits(const std::vector<double>& values) {
-  std::vector<uint64_t> bits;
-  for (const double value : values) {
-    bits.push_back(std::bit_cast<uint64_t>(value));
-  }
-  return bits;
-}
 
 std::string Replaced(std::string text, const std::string& from, const std::string& to) {
   const size_t at = text.find(from);

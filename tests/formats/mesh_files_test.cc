@@ -6,8 +6,6 @@
 #include <unistd.h>
 
 #include <array>
-#include <bit>
-#include <limits>
 #include <random>
 
 #include "client/formats/npy.h"
@@ -16,6 +14,7 @@
 #include "client/formats/read_mesh.h"
 #include "client/formats/write_mesh.h"
 #include "client/formats/zip_file.h"
+#include "tests/formats/random_mesh.h"
 #include "tests/formats/temporary_folder.h"
 
 namespace wellspace::formats {
@@ -25,30 +24,6 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
-
-// `vertices` points with the bits of all kinds of doubles, and simplices of random vertices.
-Mesh RandomMesh(int dimension, uint64_t vertices, uint64_t simplices) {
-  std::mt19937_64 random(7);
-  Mesh mesh{.dimension = dimension, .points = {}, .simplices = {}};
-  mesh.points = {0.0,    -0.0, 0.1, std::numeric_limits<double>::denorm_min(), std::numeric_limits<double>::max(),
-                 1.0 / 3};
-  while (mesh.points.size() < vertices * dimension) {
-    const double value = std::bit_cast<double>(random());
-    mesh.points.push_back(std::isfinite(value) ? value : 1e-300);
-  }
-  while (mesh.simplices.size() < simplices * (dimension + 1)) {
-    mesh.simplices.push_back(static_cast<uint32_t>(random() % vertices));
-  }
-  return mesh;
-}
-
-std::vector<uint64_t> Bits(const std::vector<double>& values) {
-  std::vector<uint64_t> bits;
-  for (const double value : values) {
-    bits.push_back(std::bit_cast<uint64_t>(value));
-  }
-  return bits;
-}
 
 class MeshFilesTest : public testing::Test {
  protected:

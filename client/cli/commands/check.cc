@@ -230,11 +230,7 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
       "property or, with weights, that of their regular triangulation, "
       "circumcentres, and what the options ask for; print its figures and `valid` or the first violation");
   check->footer(kExitCodesHelp);
-  check
-      ->add_option("MESH", command->mesh_path,
-                   "File of the mesh (.vtu, .npz, .msh, .mesh, or .node with .ele), or - for standard input (vtu)")
-      ->required()
-      ->type_name("FILE");
+  AddMeshInput(*check, command->mesh_path);
   check->add_option("--cloud", command->cloud_path, "File of points that must be the first vertices, to the bit")
       ->type_name("FILE");
   check->add_option("--input-format", command->cloud_format, "Format of the cloud; default: by its extension")

@@ -64,11 +64,7 @@ void AddRenderCommand(CLI::App& app, int& exit_code) {
       "render",
       "Draw a 2-D or 3-D mesh, coloured by the smallest angle of each simplex; 3-D meshes are cut open by a plane");
   render->footer(kExitCodesHelp);
-  render
-      ->add_option("MESH", command->mesh_path,
-                   "File of the mesh (.vtu, .npz, .msh, .mesh, or .node with .ele), or - for standard input (vtu)")
-      ->required()
-      ->type_name("FILE");
+  AddMeshInput(*render, command->mesh_path);
   render->add_option("-o,--out", command->picture_path, "File of the picture, .png or .svg")
       ->required()
       ->type_name("FILE");
