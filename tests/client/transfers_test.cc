@@ -1,7 +1,11 @@
 // Uploads and downloads that break off and go on.
+#include <algorithm>
+#include <atomic>
 #include <cstdint>
+#include <mutex>
 #include <numeric>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "gmock/gmock.h"
@@ -17,46 +21,8 @@ using ::testing::HasSubstr;
 
 constexpr char kSession[] = "sessions/one";
 
-// A session's points, as a server keeps them.
-class FakeCloud {
- public:
-  explicit FakeCloud(FakeServer& server, int dimension = 2) : dimension_(dimension) {
-    server.sessions.get = [this](const v1::GetSessionRequest& request, v1::GetSessionResponse& response) {
-      response.mutable_session()->set_name(request.name());
-      response.mutable_session()->mutable_parameters()->set_dimension(dimension_);
-      response.mutable_session()->set_committed_points(points.size() / dimension_);
-      return grpc::Status::OK;
-    };
-    server.sessions.upload = [this](grpc::ServerContext&, auto& reader, v1::UploadPointsResponse& response) {
-      ++calls;
-      v1::UploadPointsRequest request;
-      for (bool first = true; reader.Read(&request); first = false) {
-        if (first) {
-          names.push_back(request.name());
-          expected_revisions.push_back(request.expected_revision());
-        }
-        largest_request = std::max(largest_request, request.ByteSizeLong());
-        const uint64_t committed = points.size() / dimension_;
-        if (request.point_offset() > committed) {
-          return MakeError(grpc::StatusCode::OUT_OF_RANGE, "a gap", "ERROR_REASON_UPLOAD_GAP");
-        }
-        const auto& coordinates = request.points().coordinates();
-        const uint64_t known = (committed - request.point_offset()) * dimension_;
-        if (known < static_cast<uint64_t>(coordinates.size())) {
-          resent += known;
-          points.insert(points.end(), coordinates.begin() + known, coordinates.end());
-        }
-        if (breaks_left > 0 && request.points().coordinates_size() > 0) {
-          --breaks_left;
-          return Broken();
-        }
-      }
-      response.set_committed_points(points.size() / dimension_ - lost);
-      response.set_revision(7);
-      return grpc::Status::OK;
-    };
-  }
-
+// What a session holds, and what came for it.
+struct Uploads {
   std::vector<double> points;
   int breaks_left = 0;  // after so many messages
   uint64_t lost = 0;    // points that it does not admit
@@ -65,9 +31,71 @@ class FakeCloud {
   size_t largest_request = 0;
   std::vector<std::string> names;
   std::vector<uint64_t> expected_revisions;
+};
+
+// A session's points, as a server keeps them.
+class FakeCloud {
+ public:
+  explicit FakeCloud(FakeServer& server, int dimension = 2, Uploads uploads = {})
+      : dimension_(dimension), uploads_(std::move(uploads)) {
+    server.sessions.get = [this](const v1::GetSessionRequest& request, v1::GetSessionResponse& response) {
+      response.mutable_session()->set_name(request.name());
+      response.mutable_session()->mutable_parameters()->set_dimension(dimension_);
+      response.mutable_session()->set_committed_points(this->uploads().points.size() / dimension_);
+      return grpc::Status::OK;
+    };
+    server.sessions.upload = [this](grpc::ServerContext&, auto& reader, v1::UploadPointsResponse& response) {
+      v1::UploadPointsRequest request;
+      for (bool first = true; reader.Read(&request); first = false) {
+        if (grpc::Status status = Take(request, first); !status.ok()) {
+          return status;
+        }
+      }
+      std::lock_guard lock(mutex_);
+      response.set_committed_points(uploads_.points.size() / dimension_ - uploads_.lost);
+      response.set_revision(7);
+      return grpc::Status::OK;
+    };
+  }
+
+  Uploads uploads() const {
+    std::lock_guard lock(mutex_);
+    return uploads_;
+  }
+  void Lose(uint64_t points) {
+    std::lock_guard lock(mutex_);
+    uploads_.lost = points;
+  }
 
  private:
+  grpc::Status Take(const v1::UploadPointsRequest& request, bool first) {
+    std::lock_guard lock(mutex_);
+    if (first) {
+      ++uploads_.calls;
+      uploads_.names.push_back(request.name());
+      uploads_.expected_revisions.push_back(request.expected_revision());
+    }
+    uploads_.largest_request = std::max(uploads_.largest_request, request.ByteSizeLong());
+    const uint64_t committed = uploads_.points.size() / dimension_;
+    if (request.point_offset() > committed) {
+      return MakeError(grpc::StatusCode::OUT_OF_RANGE, "a gap", "ERROR_REASON_UPLOAD_GAP");
+    }
+    const auto& coordinates = request.points().coordinates();
+    const uint64_t known = (committed - request.point_offset()) * dimension_;
+    if (known < static_cast<uint64_t>(coordinates.size())) {
+      uploads_.resent += known;
+      uploads_.points.insert(uploads_.points.end(), coordinates.begin() + known, coordinates.end());
+    }
+    if (uploads_.breaks_left > 0 && !coordinates.empty()) {
+      --uploads_.breaks_left;
+      return Broken();
+    }
+    return grpc::Status::OK;
+  }
+
   const int dimension_;
+  mutable std::mutex mutex_;
+  Uploads uploads_;  // guarded by mutex_
 };
 
 std::vector<double> Numbers(size_t count) {
@@ -90,41 +118,41 @@ TEST(Upload, SendsAllPointsInSmallRequests) {
   EXPECT_EQ(uploaded->committed_points, 200'001u);
   EXPECT_EQ(uploaded->revision, 7u);
   EXPECT_EQ(told, 200'001u);
-  EXPECT_EQ(cloud.points, points);
-  EXPECT_LE(cloud.largest_request, 1u << 20);
-  EXPECT_THAT(cloud.names, ElementsAre(kSession));
-  EXPECT_THAT(cloud.expected_revisions, ElementsAre(3));
+  EXPECT_EQ(cloud.uploads().points, points);
+  EXPECT_LE(cloud.uploads().largest_request, 1u << 20);
+  EXPECT_THAT(cloud.uploads().names, ElementsAre(kSession));
+  EXPECT_THAT(cloud.uploads().expected_revisions, ElementsAre(3));
 }
 
 TEST(Upload, GoesOnAtTheCommittedPointsHoweverOftenItBreaks) {
   FakeServer server;
-  FakeCloud cloud(server);
-  cloud.points = {-1, -1};  // of an earlier upload
-  cloud.breaks_left = 5;    // more than attempts in a row
+  FakeCloud cloud(server, 2,
+                  {.points = {-1, -1},  // of an earlier upload
+                   .breaks_left = 5});  // more than attempts in a row
   const std::vector<double> points = Numbers(2 * 500'000);
   SpanSource source(2, points);
   CallOptions call;
   call.expected_revision = 3;
   const absl::StatusOr<Uploaded> uploaded = server.Client().UploadPoints(kSession, source, std::nullopt, nullptr, call);
   ASSERT_TRUE(uploaded.ok()) << uploaded.status();
-  EXPECT_EQ(cloud.calls, 6);
-  EXPECT_EQ(cloud.resent, 0u);
-  EXPECT_EQ(cloud.points[0], -1);
-  EXPECT_EQ(std::vector<double>(cloud.points.begin() + 2, cloud.points.end()), points);
-  EXPECT_THAT(cloud.expected_revisions, ElementsAre(3, 0, 0, 0, 0, 0));
+  EXPECT_EQ(cloud.uploads().calls, 6);
+  EXPECT_EQ(cloud.uploads().resent, 0u);
+  const std::vector<double> all = cloud.uploads().points;
+  EXPECT_EQ(all[0], -1);
+  EXPECT_EQ(std::vector<double>(all.begin() + 2, all.end()), points);
+  EXPECT_THAT(cloud.uploads().expected_revisions, ElementsAre(3, 0, 0, 0, 0, 0));
 }
 
 TEST(Upload, ARepetitionWithTheSameOffsetSendsOnlyWhatIsMissing) {
   FakeServer server;
-  FakeCloud cloud(server);
-  cloud.points = {0.5, 1.5, 2.5, 3.5};
+  FakeCloud cloud(server, 2, {.points = {0.5, 1.5, 2.5, 3.5}});
   const std::vector<double> points = Numbers(6);
   SpanSource source(2, points);
   ASSERT_TRUE(server.Client().UploadPoints(kSession, source, 0).ok());
-  EXPECT_EQ(cloud.points, points);
-  EXPECT_EQ(cloud.resent, 0u);
+  EXPECT_EQ(cloud.uploads().points, points);
+  EXPECT_EQ(cloud.uploads().resent, 0u);
   ASSERT_TRUE(server.Client().UploadPoints(kSession, source, 0).ok());
-  EXPECT_EQ(cloud.points, points);
+  EXPECT_EQ(cloud.uploads().points, points);
 }
 
 TEST(Upload, ErrorsOfTheServerAndOfTheSource) {
@@ -147,23 +175,24 @@ TEST(Upload, ErrorsOfTheServerAndOfTheSource) {
     absl::StatusOr<uint64_t> Read(std::span<double>) override { return absl::UnavailableError("disk"); }
   } unreadable;
   EXPECT_EQ(server.Client().UploadPoints(kSession, unreadable).status(), absl::UnavailableError("disk"));
-  EXPECT_EQ(cloud.calls, 2);
+  EXPECT_EQ(cloud.uploads().calls, 2);
 
-  cloud.lost = 1;
+  cloud.Lose(1);
   EXPECT_EQ(server.Client().UploadPoints(kSession, source).status().code(), absl::StatusCode::kDataLoss);
 }
 
 TEST(Upload, GivesUpAfterAttemptsWithoutProgress) {
   FakeServer server;
   FakeCloud cloud(server);
-  server.sessions.upload = [&cloud](grpc::ServerContext&, auto&, auto&) {
-    ++cloud.calls;
+  std::atomic<int> calls = 0;
+  server.sessions.upload = [&calls](grpc::ServerContext&, auto&, auto&) {
+    ++calls;
     return Broken();
   };
   const std::vector<double> points = Numbers(6);
   SpanSource source(2, points);
   EXPECT_EQ(server.Client().UploadPoints(kSession, source).status(), absl::UnavailableError("Socket closed"));
-  EXPECT_EQ(cloud.calls, QuickRetries().max_first_attempts);
+  EXPECT_EQ(calls, QuickRetries().max_first_attempts);
 }
 
 // A session's mesh of one simplex per chunk, as a server keeps it.

@@ -6,12 +6,15 @@
 
 namespace wellspace::server {
 
-// From a cancel to idle workers. Sanitizers slow programs down tenfold.
+// Sanitizers slow programs down tenfold.
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
-inline constexpr absl::Duration kIdleWithin = absl::Seconds(1);
+inline constexpr int kSlowdown = 10;
 #else
-inline constexpr absl::Duration kIdleWithin = absl::Milliseconds(100);
+inline constexpr int kSlowdown = 1;
 #endif
+
+// From a cancel to idle workers.
+inline constexpr absl::Duration kIdleWithin = absl::Milliseconds(100 * kSlowdown);
 
 }  // namespace wellspace::server
 

@@ -7,6 +7,7 @@
 #include "absl/time/clock.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include "tests/server/patience.h"
 #include "tests/server/raw_http2.h"
 #include "tests/server/scripted_mesher.h"
 #include "tests/server/service_harness.h"
@@ -61,11 +62,13 @@ TEST(StalledClients, AWatcherThatDoesNotReadIsDroppedAndTheWorkGoesOn) {
   EXPECT_EQ(reader.operation->state(), v1::Operation::STATE_SUCCEEDED);
 }
 
+const absl::Duration kUploadStallLimit = absl::Milliseconds(200 * kSlowdown);
+
 class StalledUploads : public ::testing::TestWithParam<Transport> {
  protected:
   static ServiceOptions Options() {
     ServiceOptions options;
-    options.upload_stall_limit = absl::Milliseconds(200);
+    options.upload_stall_limit = kUploadStallLimit;
     return options;
   }
 
@@ -80,7 +83,7 @@ INSTANTIATE_TEST_SUITE_P(Transports, StalledUploads, ::testing::Values(Transport
 void ExpectSenderStalled(const grpc::Status& status) {
   EXPECT_EQ(status.error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
   EXPECT_EQ(DetailsOf(status).reason, "SENDER_STALLED");
-  EXPECT_THAT(status.error_message(), HasSubstr("200ms"));
+  EXPECT_THAT(status.error_message(), HasSubstr(absl::FormatDuration(kUploadStallLimit)));
 }
 
 TEST_P(StalledUploads, OfMeshPointsAreDropped) {
@@ -113,7 +116,7 @@ TEST_P(StalledUploads, OfASessionAreDroppedAndKeepWhatCame) {
 }
 
 TEST_P(StalledUploads, AreNoneAsLongAsSomethingComes) {
-  const absl::Time end = absl::Now() + 3 * Options().upload_stall_limit;
+  const absl::Time end = absl::Now() + 2 * Options().upload_stall_limit;
   TestCall call(harness_.stub());
   call.Send(UnitCubeParameters());
   while (absl::Now() < end && call.Send({0.5, 0.5, 0.5})) {
