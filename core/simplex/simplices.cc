@@ -1,9 +1,6 @@
 #include "core/simplex/simplices.h"
 
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/info.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <atomic>
@@ -12,6 +9,7 @@
 
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
+#include "core/base/thread_team.h"
 #include "core/simplex/quality.h"
 
 namespace wellspace::core {
@@ -70,25 +68,23 @@ absl::StatusOr<Simplices> ComputeStars(const QueryStructure<D>& structure, std::
   std::atomic<bool> is_refused{false};
   tbb::enumerable_thread_specific<Workspace<D>> workspaces;
   std::atomic<size_t> blocks_done{0};
-  tbb::task_arena arena(std::min(threads, tbb::info::default_concurrency()));
-  arena.execute([&] {
-    tbb::parallel_for(size_t{0}, blocks.size(), [&](size_t block) {
-      Workspace<D>& workspace = workspaces.local();
-      const size_t end = std::min(order.size(), (block + 1) * kBlockSize);
-      for (size_t i = block * kBlockSize;
-           i < end && !context.IsCancelled() && !is_refused.load(std::memory_order_relaxed); ++i) {
-        structure.Voronoi(order[i], workspace);
-        EmitStar<D>(structure, order[i], output_index, workspace, is_wanted, blocks[block]);
-      }
-      const uint64_t bytes = blocks[block].indices.size() * sizeof(uint32_t);
-      if (absl::Status status = context.AllowMemory(held_bytes + (index_bytes += bytes)); !status.ok()) {
-        std::lock_guard lock(mutex);
-        memory.Update(std::move(status));
-        is_refused = true;
-      }
-      context.AddSimplices(blocks[block].indices.size() / (D + 1));
-      context.SetPhaseFraction(static_cast<double>(++blocks_done) / static_cast<double>(blocks.size()));
-    });
+  ThreadTeam team(threads);
+  team.ForEach(blocks.size(), [&](size_t block) {
+    Workspace<D>& workspace = workspaces.local();
+    const size_t end = std::min(order.size(), (block + 1) * kBlockSize);
+    for (size_t i = block * kBlockSize;
+         i < end && !context.IsCancelled() && !is_refused.load(std::memory_order_relaxed); ++i) {
+      structure.Voronoi(order[i], workspace);
+      EmitStar<D>(structure, order[i], output_index, workspace, is_wanted, blocks[block]);
+    }
+    const uint64_t bytes = blocks[block].indices.size() * sizeof(uint32_t);
+    if (absl::Status status = context.AllowMemory(held_bytes + (index_bytes += bytes)); !status.ok()) {
+      std::lock_guard lock(mutex);
+      memory.Update(std::move(status));
+      is_refused = true;
+    }
+    context.AddSimplices(blocks[block].indices.size() / (D + 1));
+    context.SetPhaseFraction(static_cast<double>(++blocks_done) / static_cast<double>(blocks.size()));
   });
   WELLSPACE_RETURN_IF_ERROR(context.Check());
   WELLSPACE_RETURN_IF_ERROR(memory);
