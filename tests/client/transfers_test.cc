@@ -29,8 +29,8 @@ struct Uploads {
   int calls = 0;
   uint64_t resent = 0;  // numbers that came although they were there
   size_t largest_request = 0;
-  std::vector<std::string> names;
-  std::vector<uint64_t> expected_revisions;
+  std::vector<std::string> names = {};
+  std::vector<uint64_t> expected_revisions = {};
 };
 
 // A session's points, as a server keeps them.
@@ -45,6 +45,7 @@ class FakeCloud {
       return grpc::Status::OK;
     };
     server.sessions.upload = [this](grpc::ServerContext&, auto& reader, v1::UploadPointsResponse& response) {
+      Begin();
       v1::UploadPointsRequest request;
       for (bool first = true; reader.Read(&request); first = false) {
         if (grpc::Status status = Take(request, first); !status.ok()) {
@@ -68,10 +69,13 @@ class FakeCloud {
   }
 
  private:
+  void Begin() {
+    std::lock_guard lock(mutex_);
+    ++uploads_.calls;
+  }
   grpc::Status Take(const v1::UploadPointsRequest& request, bool first) {
     std::lock_guard lock(mutex_);
     if (first) {
-      ++uploads_.calls;
       uploads_.names.push_back(request.name());
       uploads_.expected_revisions.push_back(request.expected_revision());
     }
@@ -175,7 +179,7 @@ TEST(Upload, ErrorsOfTheServerAndOfTheSource) {
     absl::StatusOr<uint64_t> Read(std::span<double>) override { return absl::UnavailableError("disk"); }
   } unreadable;
   EXPECT_EQ(server.Client().UploadPoints(kSession, unreadable).status(), absl::UnavailableError("disk"));
-  EXPECT_EQ(cloud.uploads().calls, 2);
+  EXPECT_LE(cloud.uploads().calls, 2);  // not tried again; what breaks off at once may not have begun
 
   cloud.Lose(1);
   EXPECT_EQ(server.Client().UploadPoints(kSession, source).status().code(), absl::StatusCode::kDataLoss);
