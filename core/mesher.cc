@@ -33,9 +33,10 @@ constexpr uint64_t kLeavesPerVertex = 8;
 // What building the tree takes for each point, at most in all but the most uneven clouds: keys to sort by, the point twice, a place in
 // a leaf that has just been split, some indices.
 template <int D>
-constexpr uint64_t kTreeBytes = 2 * sizeof(Point<D>) + sizeof(uint64_t) * D + 24 +
-                                sizeof(typename LeafTree<D>::Bucket) * LeafTree<D>::kChildren
-                                    / LeafTree<D>::kLeafCapacity;
+constexpr uint64_t kTreeBytes =
+    2 * sizeof(Point<D>) + sizeof(uint64_t) * D + 24 +
+    LeafTree<D>::BucketBytes(LeafTree<D>::kLeafCapacity / LeafTree<D>::kChildren) * LeafTree<D>::kChildren
+        / LeafTree<D>::kLeafCapacity;
 constexpr uint64_t kFixedBytes = uint64_t{4} << 20;
 
 // Smaller clouds are refined, without sizes, before anybody could want to know how large the mesh will be.

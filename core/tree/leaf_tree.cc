@@ -18,6 +18,7 @@ absl::Status LeafTree<D>::Build(const Box<D>& box, std::span<const Point<D>> poi
   points_ = points;
   leaf_count_ = 1;
   leaf_of_.assign(points.size(), kNoNode);
+  buckets_ = {};
   Node root;
   root.low = grid.root_low();
   root.side = grid.root_side();
@@ -62,6 +63,9 @@ absl::Status LeafTree<D>::Build(const Box<D>& box, std::span<const Point<D>> poi
     if (!IsLeaf(NodeId{i})) {
       continue;
     }
+    if (ranges_[i].size() != 0) {
+      At(NodeId{i}).bucket = buckets_.Add(ranges_[i].size());
+    }
     for (uint32_t v = ranges_[i].begin; v < ranges_[i].end; ++v) {
       Append(NodeId{i}, VertexId{v}, points[v]);
     }
@@ -94,8 +98,7 @@ void LeafTree<D>::Insert(VertexId near, VertexId v, const Point<D>& p) {
 template <int D>
 void LeafTree<D>::Move(VertexId v, const Point<D>& p) {
   Bucket& bucket = buckets_[At(leaf_of(v)).bucket];
-  const auto slot =
-      static_cast<size_t>(std::find(bucket.ids.begin(), bucket.ids.begin() + bucket.count, v) - bucket.ids.begin());
+  const auto slot = static_cast<size_t>(std::find(bucket.ids, bucket.ids + bucket.count, v) - bucket.ids);
   if (LeafHolding(v, p) == leaf_of(v)) {
     bucket.positions[slot] = p;
     return;
@@ -110,22 +113,12 @@ template <int D>
 void LeafTree<D>::Append(NodeId leaf, VertexId v, const Point<D>& p) {
   Node& node = At(leaf);
   if (node.bucket == kNoBucket) {
-    if (free_buckets_.empty()) {
-      node.bucket = static_cast<uint32_t>(buckets_.size());
-      buckets_.emplace_back();
-    } else {
-      node.bucket = free_buckets_.back();
-      free_buckets_.pop_back();
-      buckets_[node.bucket].count = 0;
-    }
+    node.bucket = buckets_.Add(1);
   }
-  Bucket& bucket = buckets_[node.bucket];
-  if (bucket.count == kLeafCapacity) {
+  if (buckets_[node.bucket].count == kLeafCapacity) {
     std::abort();  // more vertices in one cube of the grid than callers may put there
   }
-  bucket.ids[bucket.count] = v;
-  bucket.positions[bucket.count] = p;
-  ++bucket.count;
+  buckets_.Append(node.bucket, v, p);
   leaf_of_[Index(v)] = leaf;
 }
 
@@ -280,12 +273,8 @@ void LeafTree<D>::DistributeBucket(NodeId parent) {
     return;
   }
   At(parent).bucket = kNoBucket;
-  const Bucket bucket = buckets_[old];
-  free_buckets_.push_back(old);
-  for (uint32_t i = 0; i < bucket.count; ++i) {
-    const Point<D>& p = bucket.positions[i];
-    Append(Child(At(parent), ChildHolding(At(parent), p)), bucket.ids[i], p);
-  }
+  buckets_.Dissolve(
+      old, [&](VertexId v, const Point<D>& p) { Append(Child(At(parent), ChildHolding(At(parent), p)), v, p); });
 }
 
 // Whether lfs somewhere on the leaf is below side / kCoarseness, up to a factor of two; see HasNearFeatures.

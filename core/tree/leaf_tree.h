@@ -5,7 +5,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <span>
 #include <vector>
 
@@ -15,6 +14,7 @@
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
 #include "core/tree/morton.h"
+#include "core/tree/vertex_buckets.h"
 
 namespace wellspace::core {
 
@@ -44,12 +44,9 @@ class LeafTree {
   // near it.
   static constexpr double kCoarseness = D <= 4 ? 128 : 1024;
 
+  using Buckets = VertexBuckets<D, kLeafCapacity>;
   // The vertices of one leaf, side by side.
-  struct Bucket {
-    uint32_t count = 0;
-    std::array<VertexId, kLeafCapacity> ids;
-    std::array<Point<D>, kLeafCapacity> positions;
-  };
+  using Bucket = typename Buckets::Bucket;
 
   // Builds the tree over `box` for `points`, sorted in Morton order on MortonGrid(box) and distinct as cubes of it;
   // vertex i is points[i].
@@ -90,9 +87,11 @@ class LeafTree {
   uint32_t node_count() const { return static_cast<uint32_t>(nodes_.size()); }
   // What a node takes, but for the vertices in it.
   static constexpr size_t NodeBytes() { return sizeof(Node); }
+  // What the `count` vertices of a leaf take.
+  static constexpr size_t BucketBytes(uint32_t count) { return Buckets::BytesFor(count); }
   // What the tree takes in memory.
   uint64_t MemoryBytes() const {
-    return nodes_.size() * sizeof(Node) + buckets_.size() * sizeof(Bucket) + ranges_.size() * sizeof(Range) +
+    return nodes_.size() * sizeof(Node) + buckets_.MemoryBytes() + ranges_.size() * sizeof(Range) +
            leaf_of_.size() * sizeof(NodeId);
   }
   // Whether `node` is a leaf that covers a part of the box.
@@ -206,8 +205,7 @@ class LeafTree {
   uint8_t max_level_ = 0;
   uint64_t leaf_count_ = 0;
   std::vector<Node> nodes_;
-  std::deque<Bucket> buckets_;  // their addresses stay, so that growing copies none
-  std::vector<uint32_t> free_buckets_;
+  Buckets buckets_;
   std::vector<NodeId> leaf_of_;
 
   // During Build only.

@@ -393,18 +393,17 @@ TYPED_TEST(TreeTest, InsertKeepsTheInvariants) {
 TYPED_TEST(TreeTest, InsertFindsTheLeafFromAnywhere) {
   constexpr int D = TypeParam::kValue;
   const std::vector<Point<D>> points = test::SortedCloud<D>("boundary", 30);
-  const LeafTree<D> built = BuildTree<D>(test::UnitBox<D>(), points);
-  const VertexId v{built.vertex_count()};
+  const VertexId v{static_cast<uint32_t>(points.size())};
   for (int i = 0; i < 40; ++i) {
     Point<D> p;
     for (double& x : p) {
       const uint64_t place = this->random_.Below(4);
       x = place == 0 ? 0 : place == 1 ? 1 : place == 2 ? 0.5 : this->random_.Unit();
     }
-    LeafTree<D> from_root = built;
+    LeafTree<D> from_root = BuildTree<D>(test::UnitBox<D>(), points);
     from_root.Insert(kNoVertex, v, p);
     for (int start = 0; start < 5; ++start) {
-      LeafTree<D> tree = built;
+      LeafTree<D> tree = BuildTree<D>(test::UnitBox<D>(), points);
       tree.Insert(VertexId(this->random_.Below(points.size())), v, p);
       ASSERT_EQ(tree.leaf_of(v), from_root.leaf_of(v)) << ::testing::PrintToString(p);
     }

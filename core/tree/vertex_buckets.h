@@ -1,0 +1,131 @@
+// The vertices of the leaves of a tree, each leaf's side by side, in memory by their number.
+#ifndef WELLSPACE_CORE_TREE_VERTEX_BUCKETS_H_
+#define WELLSPACE_CORE_TREE_VERTEX_BUCKETS_H_
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/base/ids.h"
+#include "core/geometry/point.h"
+
+namespace wellspace::core {
+
+// Buckets of at most `kMost` vertices, by number. A bucket has room for its vertices rounded up to a multiple of
+// kMost / 8; when that is full it moves, and what it leaves serves another.
+//
+// Thread safety: thread-compatible.
+template <int D, int kMost>
+class VertexBuckets {
+ public:
+  struct Bucket {
+    uint32_t count = 0;
+    uint32_t capacity = 0;
+    Point<D>* positions = nullptr;
+    VertexId* ids = nullptr;
+  };
+
+  // Makes an empty bucket with room for `count` and returns its number.
+  uint32_t Add(uint32_t count) {
+    uint32_t number = 0;
+    if (free_numbers_.empty()) {
+      number = static_cast<uint32_t>(buckets_.size());
+      buckets_.emplace_back();
+    } else {
+      number = free_numbers_.back();
+      free_numbers_.pop_back();
+    }
+    buckets_[number] = Take(count);
+    return number;
+  }
+
+  // Appends `v` at `p`.
+  //
+  // REQUIRES:   the bucket holds fewer than kMost.
+  void Append(uint32_t number, VertexId v, const Point<D>& p) {
+    Bucket& bucket = buckets_[number];
+    if (bucket.count == bucket.capacity) {
+      Bucket larger = Take(bucket.count + 1);
+      std::copy_n(bucket.positions, bucket.count, larger.positions);
+      std::copy_n(bucket.ids, bucket.count, larger.ids);
+      larger.count = bucket.count;
+      GiveBack(bucket);
+      bucket = larger;
+    }
+    bucket.positions[bucket.count] = p;
+    bucket.ids[bucket.count] = v;
+    ++bucket.count;
+  }
+
+  // Calls f(VertexId, const Point<D>&) for the vertices of a bucket that is gone then; f may add buckets and append to
+  // others.
+  template <typename F>
+  void Dissolve(uint32_t number, F&& f) {
+    const Bucket bucket = buckets_[number];
+    buckets_[number] = {};
+    free_numbers_.push_back(number);
+    for (uint32_t i = 0; i < bucket.count; ++i) {
+      f(bucket.ids[i], bucket.positions[i]);
+    }
+    GiveBack(bucket);
+  }
+
+  Bucket& operator[](uint32_t number) { return buckets_[number]; }
+  const Bucket& operator[](uint32_t number) const { return buckets_[number]; }
+
+  // What a bucket takes for `count` vertices.
+  static constexpr size_t BytesFor(uint32_t count) {
+    return sizeof(Bucket) + static_cast<size_t>(ClassOf(count) + 1) * kStep * kPlaceBytes;
+  }
+  uint64_t MemoryBytes() const { return taken_bytes_ + buckets_.size() * sizeof(Bucket); }
+
+ private:
+  static constexpr int kClasses = 8;
+  static constexpr uint32_t kStep = kMost / kClasses;
+  static_assert(kStep * kClasses == kMost && kStep % 2 == 0, "positions are to stay aligned");
+  static constexpr size_t kPlaceBytes = sizeof(Point<D>) + sizeof(VertexId);
+  static constexpr size_t kChunkBytes = std::max<size_t>(size_t{1} << 16, 16 * kMost * kPlaceBytes);
+
+  static constexpr uint32_t ClassOf(uint32_t count) { return count == 0 ? 0 : (count - 1) / kStep; }
+
+  Bucket Take(uint32_t count) {
+    const uint32_t size_class = ClassOf(count);
+    Bucket bucket;
+    bucket.capacity = (size_class + 1) * kStep;
+    std::byte* memory = nullptr;
+    if (auto& free = free_[size_class]; !free.empty()) {
+      memory = free.back();
+      free.pop_back();
+    } else {
+      const size_t bytes = bucket.capacity * kPlaceBytes;
+      if (chunks_.empty() || kChunkBytes - used_ < bytes) {
+        chunks_.push_back(std::make_unique_for_overwrite<std::byte[]>(kChunkBytes));
+        used_ = 0;
+      }
+      memory = chunks_.back().get() + used_;
+      used_ += bytes;
+      taken_bytes_ += bytes;
+    }
+    bucket.positions = reinterpret_cast<Point<D>*>(memory);
+    bucket.ids = reinterpret_cast<VertexId*>(memory + bucket.capacity * sizeof(Point<D>));
+    return bucket;
+  }
+
+  void GiveBack(const Bucket& bucket) {
+    free_[ClassOf(bucket.capacity)].push_back(reinterpret_cast<std::byte*>(bucket.positions));
+  }
+
+  std::vector<Bucket> buckets_;
+  std::vector<uint32_t> free_numbers_;
+  std::array<std::vector<std::byte*>, kClasses> free_;
+  std::vector<std::unique_ptr<std::byte[]>> chunks_;
+  size_t used_ = 0;  // of the last chunk
+  uint64_t taken_bytes_ = 0;
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_TREE_VERTEX_BUCKETS_H_
