@@ -1,4 +1,4 @@
-// What every candidate for a cut is tested against: the positions of a cell's nodes, two side by side.
+// What every candidate for a cut is tested against: the positions of a cell's nodes, four side by side.
 #ifndef WELLSPACE_CORE_VORONOI_NODE_COLUMNS_H_
 #define WELLSPACE_CORE_VORONOI_NODE_COLUMNS_H_
 
@@ -8,8 +8,23 @@
 #include <vector>
 
 #include "core/geometry/point.h"
+#include "core/tree/leaf_tree.h"
+#include "core/voronoi/lanes.h"
 
 namespace wellspace::core {
+
+// Vertices of one leaf that may cut a cell, in columns: their vectors from its site.
+template <int D>
+struct alignas(kLanes * sizeof(double)) CandidateColumns {
+  // In one more place a candidate may be written before it is decided whether it counts.
+  static constexpr size_t kCapacity = PaddedCount(LeafTree<D>::kLeafCapacity + 1);
+
+  double w[D][kCapacity];
+  double length_sq[kCapacity];
+  double most[kCapacity];  // of x . w - |w|^2 / 2 + error over the nodes x of the cell, once computed
+  uint32_t slot[kCapacity];
+  size_t count = 0;
+};
 
 // A copy of CellNode::x, slack and reach by index of the node, in groups that one vector instruction takes. Places of
 // the last group beyond the last node hold a node at the site, which no bisector cuts off.
@@ -18,9 +33,20 @@ namespace wellspace::core {
 template <int D>
 class NodeColumns {
  public:
+  struct alignas(kLanes * sizeof(double)) Group {
+    double x[D][kLanes];
+    double slack[kLanes];
+    double reach[kLanes];
+    double excess[kLanes];
+    double most[kLanes];
+  };
+
+  // Works with `unit`, which this processor has; the best there is unless told.
+  explicit NodeColumns(VectorUnit unit = BestVectorUnit()) : unit_(unit) {}
+
   // REQUIRES:   nodes that are new are Set before anything else is asked.
   void Resize(size_t count) {
-    groups_.resize((count + kLanes - 1) / kLanes);
+    groups_.resize(PaddedCount(count) / kLanes);
     for (size_t i = count; i < groups_.size() * kLanes; ++i) {
       Set(i, Point<D>{}, 0, 0);
     }
@@ -38,67 +64,42 @@ class NodeColumns {
 
   // Computes x . normal - offset for all nodes x, and the same plus the bound on its error, slack length + error. Returns
   // whether any of the latter is not negative.
-  bool ComputeExcesses(const Point<D>& normal, double offset, double length, double error) {
-    Mask any{};
-    for (Group& group : groups_) {
-      Lanes excess = group.x[0] * normal[0];
-      for (int axis = 1; axis < D; ++axis) {
-        excess += group.x[axis] * normal[axis];
-      }
-      group.excess = excess - offset;
-      group.most = group.excess + (group.slack * length + error);
-      any |= group.most >= 0;
-    }
-    return IsAny(any);
-  }
+  bool ComputeExcesses(const Point<D>& normal, double offset, double length, double error);
   double excess(size_t i) const { return groups_[i / kLanes].excess[i % kLanes]; }
-  double most(size_t i) const { return groups_[i / kLanes].most[i % kLanes]; }
+
+  // Writes the indices of those nodes for which that sum is not negative, ascending, and returns their number. `out` has
+  // room for kLanes for each group.
+  template <typename Index>
+  size_t FindExceeding(Index* out) const {
+    size_t count = 0;
+    Index i = 0;
+    for (const Group& group : groups_) {
+      for (size_t lane = 0; lane < kLanes; ++lane, ++i) {
+        out[count] = i;  // no branch, since none could be foretold
+        count += group.most[lane] >= 0 ? 1 : 0;
+      }
+    }
+    return count;
+  }
+  size_t padded_count() const { return groups_.size() * kLanes; }
+
+  // Computes `most` of all candidates; `slack` is at least those of the nodes, and a candidate w has the error `slack` |w|
+  // + `relative_error` |w|^2 / 2.
+  void ComputeMost(double slack, double relative_error, CandidateColumns<D>& candidates) const;
 
   // Whether some node x has dist(x, cube) <= |x|, decided generously where the errors of nodes leave a doubt; `low` and
   // `high` are the corners of the cube relative to the site.
-  bool Reaches(const Point<D>& low, const Point<D>& high) const {
-    for (const Group& group : groups_) {
-      Lanes power{};
-      for (int axis = 0; axis < D; ++axis) {
-        const Lanes x = group.x[axis];
-        const Lanes least = low[axis] + Lanes{};
-        const Lanes most = high[axis] + Lanes{};
-        Lanes p = x > least ? x : least;
-        p = p < most ? p : most;
-        power += p * (p - 2 * x);
-      }
-      // Where the sum is near zero the p that attains it is within 2 |x| of the site, so an error e of x moves it by at
-      // most 4 |x| e.
-      if (IsAny(power <= 4 * group.slack * group.reach)) {
-        return true;
-      }
-    }
-    return false;
-  }
+  bool Reaches(const Point<D>& low, const Point<D>& high) const;
 
-  double LargestReach() const {
-    Lanes largest{};
-    for (const Group& group : groups_) {
-      largest = largest > group.reach ? largest : group.reach;
-    }
-    return largest[0] > largest[1] ? largest[0] : largest[1];
-  }
+  // The largest reach, and the largest slack.
+  struct Largest {
+    double reach;
+    double slack;
+  };
+  Largest FindLargest() const;
 
  private:
-  static constexpr size_t kLanes = 2;
-  using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));
-  using Mask = int64_t __attribute__((vector_size(kLanes * sizeof(double))));
-
-  struct Group {
-    Lanes x[D];
-    Lanes slack;
-    Lanes reach;
-    Lanes excess;
-    Lanes most;
-  };
-
-  static bool IsAny(const Mask& mask) { return (mask[0] | mask[1]) != 0; }
-
+  VectorUnit unit_;
   std::vector<Group> groups_;
 };
 

@@ -13,6 +13,10 @@ namespace {
 
 constexpr double kUnit = 0x1p-53;  // relative rounding error
 
+// What |w|^2 / 2 contributes to the error of x . w - |w|^2 / 2, relative to itself; see Polytope::Cut.
+template <int D>
+constexpr double kOffsetError = (D + 5) * kUnit;
+
 // A node in doubles, and a bound on |x - exact x|; infinite where there is none.
 template <int D>
 struct Placement {
@@ -195,7 +199,7 @@ bool Polytope<D>::Cut(VertexId u, const Point<D>& position) {
   // slack pays for those of the product.
   const double length = std::sqrt(length_sq);
   const double offset = 0.5 * length_sq;
-  const double offset_error = (D + 5) * kUnit * offset;
+  const double offset_error = kOffsetError<D> * offset;
   if (!columns_.ComputeExcesses(normal, offset, length, offset_error)) {
     return false;
   }
@@ -206,17 +210,22 @@ bool Polytope<D>::Cut(VertexId u, const Point<D>& position) {
   plane.length = length;
   plane.distance = 0.5 * length;
   plane.source.generator = position;
-  is_removed_.assign(nodes_.size(), 0);
-  removed_.clear();
-  for (size_t i = 0; i < nodes_.size(); ++i) {
-    if (columns_.most(i) >= 0 &&
-        IsCutOff(nodes_[i], columns_.excess(i), nodes_[i].slack * length + offset_error, plane)) {
-      is_removed_[i] = 1;
-      removed_.push_back(static_cast<Index>(i));
+  removed_.resize(columns_.padded_count());
+  const size_t exceeding = columns_.FindExceeding(removed_.data());
+  size_t count = 0;
+  for (size_t j = 0; j < exceeding; ++j) {
+    const Index i = removed_[j];
+    if (IsCutOff(nodes_[i], columns_.excess(i), nodes_[i].slack * length + offset_error, plane)) {
+      removed_[count++] = i;
     }
   }
-  if (removed_.empty()) {
+  removed_.resize(count);
+  if (count == 0) {
     return false;
+  }
+  is_removed_.resize(std::max(is_removed_.size(), nodes_.size()), 0);
+  for (const Index i : removed_) {
+    is_removed_[i] = 1;
   }
   ++cuts_;
   const auto index = static_cast<uint16_t>(planes_.size());
@@ -245,18 +254,23 @@ bool Polytope<D>::IsCutOff(const CellNode<D>& node, double excess, double error,
 
 template <int D>
 void Polytope<D>::FindCutEdges() {
-  cut_edges_.clear();
+  cut_edges_.resize(removed_.size() * D);
+  size_t count = 0;
   for (const Index removed : removed_) {
     const CellNode<D>& node = nodes_[removed];
     for (uint8_t k = 0; k < D; ++k) {
+      // No branch, since none could be foretold: about half of the neighbours are kept.
       const Index kept = node.neighbours[k];
-      if (is_removed_[kept] == 0) {
-        const auto& back = nodes_[kept].neighbours;
-        const auto kept_slot = static_cast<uint8_t>(std::find(back.begin(), back.end(), removed) - back.begin());
-        cut_edges_.push_back({node.planes, k, kept_slot, kept});
+      const auto& back = nodes_[kept].neighbours;
+      uint8_t kept_slot = 0;
+      for (uint8_t i = 1; i < D; ++i) {
+        kept_slot = back[i] == removed ? i : kept_slot;
       }
+      cut_edges_[count] = {node.planes, k, kept_slot, kept};
+      count += is_removed_[kept] == 0 ? 1 : 0;
     }
   }
+  cut_edges_.resize(count);
 }
 
 // One new node on each cut edge. They take the places of removed nodes, the last one that of the first, and what is left
@@ -266,7 +280,9 @@ void Polytope<D>::MakeNewNodes(uint16_t plane) {
   const size_t count = cut_edges_.size();
   const size_t old = nodes_.size();
   const size_t appended = count - std::min(count, removed_.size());
-  nodes_.resize(old + appended);
+  for (size_t j = 0; j < appended; ++j) {
+    nodes_.push_back(nodes_.back());  // any node: resize would be slower
+  }
   columns_.Resize(nodes_.size());
   new_.resize(count);
   for (size_t j = 0; j < count; ++j) {
@@ -285,6 +301,9 @@ void Polytope<D>::MakeNewNodes(uint16_t plane) {
   LinkNewNodes(plane);
   if (count < removed_.size()) {
     FillHoles(count);
+  }
+  for (const Index i : removed_) {
+    is_removed_[i] = 0;
   }
 }
 
@@ -421,8 +440,15 @@ void Polytope<D>::Join(End a, End b) {
 
 template <int D>
 void Polytope<D>::UpdateReach() {
-  const double reach = columns_.LargestReach();
+  const auto [reach, slack] = columns_.FindLargest();
   reach_sq_ = reach * reach;
+  largest_slack_ = slack;
+}
+
+// As in Cut, with the largest slack.
+template <int D>
+void Polytope<D>::Foretell(CandidateColumns<D>& candidates) const {
+  columns_.ComputeMost(largest_slack_, kOffsetError<D>, candidates);
 }
 
 template <int D>

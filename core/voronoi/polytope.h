@@ -95,6 +95,12 @@ class Polytope {
   // Source:     the cell as a simple polytope is usual since Tanemura, Ogawa and Ogita 1983.
   bool Cut(VertexId u, const Point<D>& position);
 
+  // Computes `most` of the candidates, so that those for which it is negative do not cut the cell, now or later.
+  //
+  // Complexity: O(nodes) a candidate.
+  // Errors:     none.
+  void Foretell(CandidateColumns<D>& candidates) const;
+
   // Whether some vertex in `cube` (absolute coordinates) could still cut the cell: whether some node x has dist(x,
   // cube) <= |x - site|, decided generously where rounding leaves a doubt.
   //
@@ -160,6 +166,7 @@ class Polytope {
   Point<D> site_;
   TieRule rule_ = TieRule::kKeep;
   double reach_sq_ = 0;
+  double largest_slack_ = 0;
   std::vector<Plane<D>> planes_;
   std::vector<CellNode<D>> nodes_;
   NodeColumns<D> columns_;  // of nodes_
@@ -167,7 +174,7 @@ class Polytope {
   DecisionCounters counters_;
 
   // Scratch of Cut.
-  std::vector<uint8_t> is_removed_;  // by node
+  std::vector<uint8_t> is_removed_;  // by node; all 0 but in Cut
   std::vector<Index> removed_;       // ascending
   std::vector<CutEdge> cut_edges_;   // as their removed nodes
   std::vector<Index> new_;           // the nodes on them

@@ -11,36 +11,21 @@ namespace wellspace::core {
 
 namespace {
 
-// Up to so many, items are sorted by comparing each with each.
-constexpr size_t kMostRanked = 32;
+// After so many cuts by the vertices of one leaf, those that are left are looked at together.
+constexpr int kCutsBetweenLooks = 4;
 
-// The first `count` of workspace.near, the nearest first, of those as near by slot, as they are in already.
+// Asks for the vertices in a leaf that will soon be looked at: the first lines of a cache hold most of them.
 template <int D>
-std::span<const typename Workspace<D>::Near> SortByDistance(size_t count, Workspace<D>& workspace) {
-  using Near = typename Workspace<D>::Near;
-  auto& near = workspace.near;
-  auto& sorted = workspace.sorted;
-  if (count <= kMostRanked) {
-    // The place of each is the number of those before it: comparisons without branches, of which half would be
-    // mispredicted.
-    std::array<uint32_t, kMostRanked> place{};
-    for (size_t i = 1; i < count; ++i) {
-      for (size_t j = 0; j < i; ++j) {
-        const uint32_t is_later = near[j].distance_sq <= near[i].distance_sq ? 1 : 0;
-        place[i] += is_later;
-        place[j] += 1 - is_later;
-      }
+void Prefetch(const LeafTree<D>& tree, NodeId leaf) {
+  constexpr size_t kLine = 64;
+  constexpr size_t kLines = 4;
+  if (const auto* bucket = tree.BucketOf(leaf); bucket != nullptr) {
+    const char* const positions = reinterpret_cast<const char*>(bucket->positions);
+    for (size_t line = 0; line < kLines; ++line) {
+      __builtin_prefetch(positions + line * kLine);
     }
-    for (size_t i = 0; i < count; ++i) {
-      sorted[place[i]] = near[i];
-    }
-  } else {
-    std::copy_n(near.begin(), count, sorted.begin());
-    std::sort(sorted.begin(), sorted.begin() + count, [](const Near& a, const Near& b) {
-      return a.distance_sq != b.distance_sq ? a.distance_sq < b.distance_sq : a.slot < b.slot;
-    });
+    __builtin_prefetch(bucket->ids);
   }
-  return {sorted.data(), count};
 }
 
 }  // namespace
@@ -101,7 +86,7 @@ void QueryStructure<D>::MoveVertex(VertexId v, const Point<D>& p) {
 template <int D>
 void QueryStructure<D>::BeginQuery(Workspace<D>& workspace) const {
   ++workspace.counters.queries;
-  workspace.queue.clear();
+  workspace.queue.Clear();
   workspace.seen.resize(tree_.node_count(), 0);
   if (++workspace.query == 0) {
     std::fill(workspace.seen.begin(), workspace.seen.end(), 0);
@@ -123,19 +108,13 @@ template <int D>
 template <typename ReachSq, typename Wants, typename Open>
 void QueryStructure<D>::ScanOutward(const Point<D>& site, NodeId own, Workspace<D>& workspace, ReachSq reach_sq,
                                     Wants wants, Open open) const {
-  using Candidate = typename Workspace<D>::Candidate;
-  // A heap with the nearest leaf on top; of two as near, that of the lower number.
-  const auto later = [](const Candidate& a, const Candidate& b) {
-    return a.distance_sq != b.distance_sq ? a.distance_sq > b.distance_sq : Index(a.leaf) > Index(b.leaf);
-  };
+  Prefetch<D>(tree_, own);
   BeginQuery(workspace);
   MarkSeen(own, workspace);
-  workspace.queue.push_back({0, own});
+  workspace.queue.Push(0, own);
   uint64_t leaves = 0;
-  while (!workspace.queue.empty()) {
-    std::pop_heap(workspace.queue.begin(), workspace.queue.end(), later);
-    const Candidate nearest = workspace.queue.back();
-    workspace.queue.pop_back();
+  while (!workspace.queue.IsEmpty()) {
+    const LeafQueue::Entry nearest = workspace.queue.Pop();
     if (nearest.distance_sq > reach_sq()) {
       break;
     }
@@ -151,8 +130,8 @@ void QueryStructure<D>::ScanOutward(const Point<D>& site, NodeId own, Workspace<
       }
       const double distance_sq = DistanceSq<D>(site, tree_.BoxOf(beyond));
       if (distance_sq <= limit_sq) {
-        workspace.queue.push_back({distance_sq, beyond});
-        std::push_heap(workspace.queue.begin(), workspace.queue.end(), later);
+        workspace.queue.Push(distance_sq, beyond);
+        Prefetch<D>(tree_, beyond);
       }
     });
   }
@@ -230,20 +209,51 @@ void QueryStructure<D>::CutByLeaf(VertexId v, NodeId leaf, Workspace<D>& workspa
     return;
   }
   workspace.counters.vertices += bucket->count;
-  const Point<D> site = workspace.cell.site();
-  const double limit_sq = workspace.cell.CutLimitSq();
+  Polytope<D>& cell = workspace.cell;
+  const Point<D> site = cell.site();
+  const double limit_sq = cell.CutLimitSq();
+  auto& near = workspace.near;
   size_t count = 0;
   for (uint32_t i = 0; i < bucket->count; ++i) {
-    const double distance_sq = DistanceSq<D>(bucket->positions[i], site);
-    workspace.near[count] = {distance_sq, i};
+    const Point<D> w = Difference<D>(bucket->positions[i], site);
+    const double length_sq = NormSq<D>(w);
+    for (int axis = 0; axis < D; ++axis) {
+      near.w[axis][count] = w[axis];
+    }
+    near.length_sq[count] = length_sq;
+    near.slot[count] = i;
     // No branch, since none could be foretold.
-    count += static_cast<size_t>(distance_sq <= limit_sq) & static_cast<size_t>(bucket->ids[i] != v);
+    count += static_cast<size_t>(length_sq <= limit_sq) & static_cast<size_t>(bucket->ids[i] != v);
   }
-  for (const auto& near : SortByDistance<D>(count, workspace)) {
-    if (near.distance_sq > workspace.cell.CutLimitSq()) {
+  near.count = count;
+  auto& may_cut = workspace.may_cut;
+  const bool has_looked = cell.cuts() != 0;
+  if (has_looked) {
+    cell.Foretell(near);
+  }
+  size_t left = 0;
+  for (uint32_t i = 0; i < count; ++i) {
+    may_cut.length_sq[left] = near.length_sq[i];
+    may_cut.candidate[left] = i;
+    left += !has_looked || near.most[i] >= 0 ? 1 : 0;
+  }
+  OrderByDistance(may_cut.length_sq, left, may_cut.order);
+  int cuts = 0;
+  bool is_foretold = false;
+  for (size_t j = 0; j < left; ++j) {
+    const uint32_t i = may_cut.candidate[may_cut.order[j]];
+    if (is_foretold && near.most[i] < 0) {
+      continue;
+    }
+    if (near.length_sq[i] > cell.CutLimitSq()) {
       break;
     }
-    workspace.cell.Cut(bucket->ids[near.slot], bucket->positions[near.slot]);
+    const uint32_t slot = near.slot[i];
+    if (cell.Cut(bucket->ids[slot], bucket->positions[slot]) && ++cuts % kCutsBetweenLooks == 0 &&
+        left - j > kCutsBetweenLooks) {
+      cell.Foretell(near);
+      is_foretold = true;
+    }
   }
 }
 

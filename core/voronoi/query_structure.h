@@ -13,6 +13,9 @@
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
 #include "core/tree/leaf_tree.h"
+#include "core/voronoi/lanes.h"
+#include "core/voronoi/nearness.h"
+#include "core/voronoi/node_columns.h"
 #include "core/voronoi/polytope.h"
 
 namespace wellspace::core {
@@ -32,24 +35,19 @@ struct QueryCounters {
 // The scratch space of queries, owned by the caller and reused, with the cell that the last one computed.
 template <int D>
 struct Workspace {
-  struct Candidate {
-    double distance_sq;
-    NodeId leaf;
-  };
-  struct Near {
-    double distance_sq;
-    uint32_t slot;
-  };
-  using NearInLeaf = std::array<Near, LeafTree<D>::kLeafCapacity>;
-
   Polytope<D> cell;
   QueryCounters counters;
   // Private to the queries.
   std::vector<uint32_t> seen;  // by tree node: the query that last met it
   uint32_t query = 0;
-  std::vector<Candidate> queue;
-  NearInLeaf near;    // of a leaf, those that may cut
-  NearInLeaf sorted;  // the same, the nearest first
+  LeafQueue queue;
+  // Of the leaf that is opened.
+  CandidateColumns<D> near;
+  struct alignas(kLanes * sizeof(double)) MayCut {
+    double length_sq[CandidateColumns<D>::kCapacity];
+    uint32_t candidate[CandidateColumns<D>::kCapacity];
+    uint32_t order[CandidateColumns<D>::kCapacity];  // the nearest first
+  } may_cut;
 };
 
 struct Neighbor {
