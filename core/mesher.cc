@@ -380,7 +380,8 @@ class MesherIn final : public Mesher {
         (!has_sizes && structure_.vertex_count() < kForetoldPoints<D>)) {
       return absl::OkStatus();
     }
-    WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size, EstimateSize<D>(structure_, DemandsOf(parameters), context));
+    WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size,
+                               EstimateSize<D>(structure_, DemandsOf(parameters), context, kGlance));
     context.SetEstimatedVertices(static_cast<uint64_t>(size.vertices));
     return absl::OkStatus();
   }

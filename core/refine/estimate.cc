@@ -397,14 +397,6 @@ class Integrator {
 
 // ---- Sampling ----------------------------------------------------------------------------------------------------------
 
-// As many leaves are looked at as it takes for a standard error of this share of the vertices, but at least so many:
-// few would not know their own spread.
-constexpr double kSamplingError = 0.05;
-constexpr size_t kLeastLeaves = 256;
-// Looks at one leaf, and at all where they are few, before cells are sampled too.
-constexpr uint64_t kLooksPerLeaf = 4096;
-constexpr uint64_t kLooks = uint64_t{1} << 17;
-
 // Leaves that refinement leaves behind.
 struct Leaves {
   double all = 0;
@@ -445,12 +437,12 @@ void Add(Share& sum, const Share& share) {
 // Draws leaves without replacement.
 template <int D>
 absl::StatusOr<Sample> SampleLeaves(const QueryStructure<D>& structure, Integrator<D>& integrator,
-                                    const RunContext& context) {
+                                    const EstimateEffort& effort, const RunContext& context) {
   std::vector<NodeId> leaves;
   leaves.reserve(structure.tree().leaf_count());
   structure.tree().ForEachLeaf([&](NodeId leaf) { leaves.push_back(leaf); });
   const size_t count = leaves.size();
-  const uint64_t full_looks = std::max(kLooksPerLeaf, kLooks / count);
+  const uint64_t full_looks = std::max(effort.looks_per_leaf, effort.looks / count);
   Draws draws;
 
   Sample sample;
@@ -473,13 +465,13 @@ absl::StatusOr<Sample> SampleLeaves(const QueryStructure<D>& structure, Integrat
     sum += vertices;
     sum_sq += vertices * vertices;
     ++taken;
-    if (taken >= kLeastLeaves && taken % 64 == 0 && taken < count) {
+    if (taken >= effort.least_leaves && taken % 64 == 0 && taken < count) {
       const double k = static_cast<double>(taken);
       const double mean = sum / k;
       const double variance = std::max(0.0, sum_sq / k - mean * mean) * (1 - k / static_cast<double>(count));
       sample.error = static_cast<double>(count) * std::sqrt(variance / k);
       const double total = structure.vertex_count() + static_cast<double>(count) * mean;
-      if (sample.error <= kSamplingError * total) {
+      if (sample.error <= effort.sampling_error * total) {
         break;
       }
     }
@@ -547,10 +539,10 @@ double BytesOf(const Leaves& leaves, double vertices, double simplices) {
 
 template <int D>
 absl::StatusOr<SizeEstimate> EstimateSize(const QueryStructure<D>& structure, const Demands<D>& demands,
-                                          const RunContext& context) {
+                                          const RunContext& context, const EstimateEffort& effort) {
   Integrator<D> integrator(structure, demands);
   WELLSPACE_RETURN_IF_ERROR(integrator.Prepare(structure, context));
-  WELLSPACE_ASSIGN_OR_RETURN(const Sample sample, SampleLeaves<D>(structure, integrator, context));
+  WELLSPACE_ASSIGN_OR_RETURN(const Sample sample, SampleLeaves<D>(structure, integrator, effort, context));
 
   const Terms added = integrator.VerticesOf(sample.sum.terms);
   // Near a face, every second vertex lies on it; in a flat or long box all do.
@@ -564,8 +556,9 @@ absl::StatusOr<SizeEstimate> EstimateSize(const QueryStructure<D>& structure, co
   return estimate;
 }
 
-#define WELLSPACE_INSTANTIATE(D) \
-  template absl::StatusOr<SizeEstimate> EstimateSize<D>(const QueryStructure<D>&, const Demands<D>&, const RunContext&);
+#define WELLSPACE_INSTANTIATE(D)                                                                     \
+  template absl::StatusOr<SizeEstimate> EstimateSize<D>(const QueryStructure<D>&, const Demands<D>&, \
+                                                        const RunContext&, const EstimateEffort&);
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 

@@ -2,6 +2,9 @@
 #ifndef WELLSPACE_CORE_REFINE_ESTIMATE_H_
 #define WELLSPACE_CORE_REFINE_ESTIMATE_H_
 
+#include <cstddef>
+#include <cstdint>
+
 #include "absl/status/statusor.h"
 #include "core/base/run_context.h"
 #include "core/refine/demands.h"
@@ -18,15 +21,29 @@ struct SizeEstimate {
   double sampling_error = 0;
 };
 
+// How closely an estimate looks.
+struct EstimateEffort {
+  // Leaves are looked at until the standard error of the vertices is below this share of them, but so many at least: few
+  // would not know their own spread.
+  double sampling_error = 0.05;
+  size_t least_leaves = 256;
+  // Places looked at in one leaf, and in all where leaves are few, before cells are sampled too.
+  uint64_t looks_per_leaf = 4096;
+  uint64_t looks = uint64_t{1} << 17;
+};
+
+// Enough for a bar of progress, at less than a hundredth of what meshing costs.
+inline constexpr EstimateEffort kGlance{0.15, 64, 64, uint64_t{1} << 12};
+
 // Predicts what refinement for `demands` will make of `structure`.
 //
 // Shapes:     structure: as QueryStructure::Initialize leaves it; nothing has been refined.
 // Units:      counts and bytes.
 // REQUIRES:   demands.rho at least MinimumRho(D).
-// Guarantees: (1) by the radius-edge criterion without sizes, each figure is right within a factor of 1.5 at rho =
-//             sqrt(2) in 2-D and 2 in 3-D, and of 2 from rho = 1 in 2-D and 1.2 in 3-D, on the clouds and with the
-//             exceptions that docs/design/estimate.md lists; for D > 3 an order of magnitude; (2) deterministic;
-//             (3) vertices are never fewer than the structure has already.
+// Guarantees: (1) with the default effort, by the radius-edge criterion without sizes, each figure is right within a
+//             factor of 1.5 at rho = sqrt(2) in 2-D and 2 in 3-D, and of 2 from rho = 1 in 2-D and 1.2 in 3-D, on the
+//             clouds and with the exceptions that docs/design/estimate.md lists; for D > 3 an order of magnitude;
+//             (2) deterministic; (3) vertices are never fewer than the structure has already.
 // Complexity: O(n + L) for n points in L leaves, with small constants, and a number of looks for nearest points that
 //             depends on the cloud's kind but not on n, of O(log n) each.
 // Errors:     CANCELLED, DEADLINE_EXCEEDED.
@@ -34,7 +51,7 @@ struct SizeEstimate {
 // Source:     Ruppert 1995 (the size of a mesh is the integral of lfs^-D up to constants); docs/design/estimate.md.
 template <int D>
 absl::StatusOr<SizeEstimate> EstimateSize(const QueryStructure<D>& structure, const Demands<D>& demands,
-                                          const RunContext& context);
+                                          const RunContext& context, const EstimateEffort& effort = {});
 
 }  // namespace wellspace::core
 

@@ -181,6 +181,21 @@ TYPED_TEST(EstimateTest, LooksAtEveryLeafOfSmallCloudsAndAtEnoughOfLargeOnes) {
   EXPECT_LE(error, 0.05);
 }
 
+// A glance foretells vertices nearly as well, from fewer leaves.
+TYPED_TEST(EstimateTest, AGlanceIsRoughlyRight) {
+  constexpr int D = TypeParam::kValue;
+  for (const std::string_view kind : test::kReferenceKinds) {
+    SCOPED_TRACE(std::string(kind));
+    const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, 3000));
+    RunContext context;
+    const absl::StatusOr<SizeEstimate> glance =
+        EstimateSize<D>(structure, RadiusEdge<D>(DefaultRho(D)), context, kGlance);
+    ASSERT_TRUE(glance.ok()) << glance.status();
+    EXPECT_LE(glance->sampling_error, kGlance.sampling_error);
+    EXPECT_LE(Factor(glance->vertices, Estimate<D>(structure, RadiusEdge<D>(DefaultRho(D))).vertices), 2);
+  }
+}
+
 TYPED_TEST(EstimateTest, SizesAloneAskForVerticesByVolume) {
   constexpr int D = TypeParam::kValue;
   const QueryStructure<D> structure = MakeStructure<D>({});
