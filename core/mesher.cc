@@ -247,6 +247,11 @@ class MesherIn final : public Mesher {
       const double nearest = std::sqrt(structure_.ApproximateNearestNeighbor(v, workspace).distance_sq);
       const double radius = beta * nearest;
       structure_.ClippedVoronoi(v, std::isinf(radius) ? whole : radius, workspace);
+      if (workspace.cell.IsTooLarge()) {
+        return absl::FailedPreconditionError(absl::StrCat("the cell of vertex ", vertex, " has more than ",
+                                                          Polytope<D>::kMostNodes,
+                                                          " nodes; refine first, or ask with a smaller beta"));
+      }
       cells.push_back(
           DescribeCell<D>(vertex, radius, workspace.cell, domain_, [this](VertexId u) { return OutputIndex(u); }));
     }

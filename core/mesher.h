@@ -130,7 +130,8 @@ class Mesher {
   // whole ones when beta is infinite.
   //
   // Complexity: O(1) each in a refined mesh or bottom-up.
-  // Errors:     OUT_OF_RANGE as above; INVALID_ARGUMENT unless beta is a number of at least 1.
+  // Errors:     OUT_OF_RANGE as above; INVALID_ARGUMENT unless beta is a number of at least 1; FAILED_PRECONDITION, naming the
+  //             first vertex whose cell has more nodes than 2^14, in 5-D and 6-D 2^18, as only an unrefined mesh's can.
   // Source:     [HT08] Figure 3, CLIPPEDVORONOI.
   virtual absl::StatusOr<std::vector<Cell>> ClippedCells(std::span<const uint32_t> vertices, double beta) const = 0;
 

@@ -120,6 +120,8 @@ grpc::Status FromCoreStatus(const absl::Status& status) {
                     *payload == kMayRetry);
       }
       return MakeError(v1::ERROR_REASON_MESH_TOO_LARGE, message);
+    case absl::StatusCode::kFailedPrecondition:
+      return MakeError(v1::ERROR_REASON_MESH_NOT_READY, message);
     case absl::StatusCode::kCancelled:
       return grpc::Status(grpc::StatusCode::CANCELLED, message);
     case absl::StatusCode::kDeadlineExceeded:

@@ -82,12 +82,17 @@ struct DecisionCounters {
 template <int D>
 class Polytope {
  public:
+  // What a cell is cut to at most, so that its parts can be numbered and a cut ends soon. Cells of a refined mesh are far
+  // smaller; a vertex amid unrefined ones can have all of them for neighbours.
+  static constexpr size_t kMostNodes = D <= 4 ? size_t{1} << 14 : size_t{1} << 18;
+  static constexpr size_t kMostPlanes = size_t{1} << 15;
+
   // Begins with the box [low, high], which holds `site` and whose faces are of kind `kinds[FaceIndex]`.
   void Reset(const Point<D>& site, const Box<D>& bounds, const std::array<PlaneKind, 2 * D>& kinds, TieRule rule);
 
   // Cuts the cell by the bisector of its site and `u`, keeping the site's side. Returns whether anything was cut off.
   //
-  // REQUIRES:   u != site, and not cut by before.
+  // REQUIRES:   u != site, and not cut by before; !IsTooLarge().
   // Guarantees: (1) the result is a subset of the cell; (2) exact: the nodes are those of the exact cell under the tie
   //             rule.
   // Complexity: O(nodes); no allocation once warm.
@@ -109,6 +114,9 @@ class Polytope {
   // Source:     [HT08] §6 with the polytope in the place of the ball: |x p|^2 - |x site|^2 is affine in x for fixed p,
   //             so its least value over the cell is at a node.
   bool Reaches(const Box<D>& cube) const;
+
+  // Whether the last cut has made the cell larger than it may be.
+  bool IsTooLarge() const { return nodes_.size() > kMostNodes || planes_.size() > kMostPlanes; }
 
   // The faces of the box that a node of the cell lies on.
   FaceMask FacesOf(const CellNode<D>& node) const {

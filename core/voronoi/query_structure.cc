@@ -193,7 +193,8 @@ void QueryStructure<D>::Voronoi(VertexId v, Workspace<D>& workspace) const {
 template <int D>
 void QueryStructure<D>::Scan(VertexId v, Workspace<D>& workspace) const {
   ScanOutward(
-      point(v), tree_.leaf_of(v), workspace, [&] { return workspace.cell.CutLimitSq(); },
+      point(v), tree_.leaf_of(v), workspace,
+      [&] { return workspace.cell.IsTooLarge() ? -1 : workspace.cell.CutLimitSq(); },
       [&](NodeId leaf) { return workspace.cell.Reaches(tree_.BoxOf(leaf)); },
       [&](NodeId leaf) { CutByLeaf(v, leaf, workspace); });
   workspace.counters.cuts += workspace.cell.cuts();
@@ -245,7 +246,7 @@ void QueryStructure<D>::CutByLeaf(VertexId v, NodeId leaf, Workspace<D>& workspa
     if (is_foretold && near.most[i] < 0) {
       continue;
     }
-    if (near.length_sq[i] > cell.CutLimitSq()) {
+    if (near.length_sq[i] > cell.CutLimitSq() || cell.IsTooLarge()) {
       break;
     }
     const uint32_t slot = near.slot[i];

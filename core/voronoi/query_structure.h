@@ -93,7 +93,7 @@ class QueryStructure {
   // Units:      radius in those of the coordinates; [HT08]'s beta NN(v).
   // REQUIRES:   radius > 0.
   // Guarantees: (1) exact: every node's ball through v is empty of vertices; (2) every node is on bisectors, faces of
-  //             the box, or the clip cube.
+  //             the box, or the clip cube; unless cell.IsTooLarge(), which ends the query: never in a bottom-up run.
   // Complexity: O(1) amortised over a bottom-up run; counted in workspace.counters.
   // Errors:     none.
   // Source:     [HT08] Figure 6; leaves in order of their distance, opened by Polytope::Reaches, through facets of
@@ -105,7 +105,7 @@ class QueryStructure {
   // perturbed.
   //
   // Guarantees: (1) cells of different sites agree: they are those of one regular triangulation, the Delaunay
-  //             triangulation of infinitesimally weighted vertices.
+  //             triangulation of infinitesimally weighted vertices; unless cell.IsTooLarge(): never once refined.
   // Complexity: O(1) once refined.
   // Errors:     none.
   // Source:     [HT08] §1, "the entire Voronoi cell of any vertex".

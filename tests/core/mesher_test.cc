@@ -439,5 +439,23 @@ TEST_P(MesherTest, OnlyTheLastMeshCanBeUpdated) {
   EXPECT_EQ(mesher->Refine(wrong, context_).code(), absl::StatusCode::kInvalidArgument);
 }
 
+TEST(MesherCells, OfTooManyNodesAreRefused) {
+  for (const int d : {2, 3, 4}) {
+    // A point amid others on a sphere has them all for neighbours.
+    std::vector<double> points(d, 0.5);
+    const std::vector<double> sphere = MakeCloud("sphere", d, d == 2 ? 17'000 : d == 3 ? 9'000 : 3'000);
+    points.insert(points.end(), sphere.begin(), sphere.end());
+    MeshParameters parameters = InUnitBox(d);
+    RunContext context;
+    const absl::StatusOr<std::unique_ptr<Mesher>> mesher = Mesher::Create(parameters, points, context);
+    ASSERT_TRUE(mesher.ok()) << mesher.status();
+    const std::vector<uint32_t> vertices = {1, 0};
+    const absl::Status status = (*mesher)->ClippedCells(vertices, std::numeric_limits<double>::infinity()).status();
+    EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition) << d;
+    EXPECT_THAT(std::string(status.message()), AllOf(HasSubstr("vertex 0"), HasSubstr("16384"), HasSubstr("beta")));
+    EXPECT_TRUE((*mesher)->ClippedCells(std::vector<uint32_t>{1}, std::numeric_limits<double>::infinity()).ok()) << d;
+  }
+}
+
 }  // namespace
 }  // namespace wellspace::core

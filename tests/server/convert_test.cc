@@ -376,6 +376,7 @@ TEST(FromCoreStatus, TellsTheKindsApart) {
   EXPECT_TRUE(FromCoreStatus(absl::OkStatus()).ok());
   EXPECT_EQ(DetailsOf(FromCoreStatus(absl::InvalidArgumentError("x"))).reason, "INVALID_POINTS");
   EXPECT_EQ(DetailsOf(FromCoreStatus(absl::ResourceExhaustedError("x"))).reason, "MESH_TOO_LARGE");
+  EXPECT_EQ(DetailsOf(FromCoreStatus(absl::FailedPreconditionError("x"))).reason, "MESH_NOT_READY");
   EXPECT_EQ(DetailsOf(FromCoreStatus(absl::UnknownError("x"))).reason, "INTERNAL");
   EXPECT_EQ(FromCoreStatus(absl::CancelledError("x")).error_code(), grpc::StatusCode::CANCELLED);
   EXPECT_EQ(FromCoreStatus(absl::DeadlineExceededError("x")).error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);

@@ -232,6 +232,8 @@ TEST_F(ManyCells, OfASlowReaderTakeNoWorkerAndABoundedBuffer) {
 
 TEST_F(ManyCells, GoOnWhenTheLineWasFull) {
   ASSERT_NO_FATAL_FAILURE(Begin());
+  // Before, it would work ahead, and stand in the line itself.
+  ASSERT_TRUE(harness_->log().WaitFor("batch=2"));
   harness_->TimeUntilIdle();
   TestCall running(harness_->stub());
   running.Send(UnitCubeParameters());
