@@ -30,12 +30,11 @@ constexpr double kMinEdgeSteps = 4;
 // Leaves that the tree may have for each vertex of the budget; around isolated close pairs balance costs up to about two.
 constexpr uint64_t kLeavesPerVertex = 8;
 
-// What building the tree takes for each point, at most in all but the most uneven clouds: keys to sort by, the point twice, a place in
-// a leaf that has just been split, some indices.
+// What building the tree takes for each point, but for the most uneven clouds: keys, the point twice, a place in a split leaf, indices.
 template <int D>
 constexpr uint64_t kTreeBytes =
     2 * sizeof(Point<D>) + sizeof(uint64_t) * D + 24 +
-    LeafTree<D>::BucketBytes(LeafTree<D>::kLeafCapacity / LeafTree<D>::kChildren) * LeafTree<D>::kChildren
+    LeafTree<D>::Buckets::BytesFor(LeafTree<D>::kLeafCapacity / LeafTree<D>::kChildren) * LeafTree<D>::kChildren
         / LeafTree<D>::kLeafCapacity;
 constexpr uint64_t kFixedBytes = uint64_t{4} << 20;
 
@@ -235,10 +234,7 @@ class MesherIn final : public Mesher {
       return absl::InvalidArgumentError(absl::StrCat("beta: ", beta, " is not allowed; a number of at least 1 is"));
     }
     // A cube of this half side about any point of the box holds the box.
-    double whole = 0;
-    for (int k = 0; k < D; ++k) {
-      whole = std::max(whole, 2 * (structure_.box().high[k] - structure_.box().low[k]));
-    }
+    const double whole = 2 * structure_.box().LongestSide();
     std::vector<Cell> cells;
     cells.reserve(vertices.size());
     Workspace<D> workspace;

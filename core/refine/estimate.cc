@@ -524,15 +524,13 @@ double BytesOf(const Leaves& leaves, double vertices, double simplices) {
   const double nodes = leaves.all * kChildren / (kChildren - 1);
   // Beside the nodes, three marks of the queries' scratch space.
   const double node_bytes = LeafTree<D>::NodeBytes() + 3 * sizeof(uint32_t);
-  // A bucket is half a step larger than its vertices on average.
-  constexpr double place_bytes = sizeof(Point<D>) + sizeof(VertexId);
-  constexpr double bucket_bytes = LeafTree<D>::BucketBytes(1) - 0.0625 * LeafTree<D>::kLeafCapacity * place_bytes;
+  using Buckets = typename LeafTree<D>::Buckets;
   // Coordinates in the tree, in the structure and in the mesh; number in the tree, leaf, faces, radius, place in the schedule, numbers in the output.
-  const double vertex_bytes = place_bytes + 2 * sizeof(Point<D>) + 32;
+  const double vertex_bytes = Buckets::kPlaceBytes + 2 * sizeof(Point<D>) + 32;
   // Indices in blocks and in the mesh.
   const double simplex_bytes = 2.0 * (D + 1) * sizeof(uint32_t);
-  return kMemoryMargin * (kFixedBytes + nodes * node_bytes + leaves.filled * bucket_bytes + vertices * vertex_bytes +
-                          simplices * simplex_bytes);
+  return kMemoryMargin * (kFixedBytes + nodes * node_bytes + leaves.filled * Buckets::OverheadBytes() +
+                          vertices * vertex_bytes + simplices * simplex_bytes);
 }
 
 }  // namespace

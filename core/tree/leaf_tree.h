@@ -87,8 +87,6 @@ class LeafTree {
   uint32_t node_count() const { return static_cast<uint32_t>(nodes_.size()); }
   // What a node takes, but for the vertices in it.
   static constexpr size_t NodeBytes() { return sizeof(Node); }
-  // What the `count` vertices of a leaf take.
-  static constexpr size_t BucketBytes(uint32_t count) { return Buckets::BytesFor(count); }
   // What the tree takes in memory.
   uint64_t MemoryBytes() const {
     return nodes_.size() * sizeof(Node) + buckets_.MemoryBytes() + ranges_.size() * sizeof(Range) +

@@ -21,6 +21,9 @@ namespace wellspace::core {
 template <int D, int kMost>
 class VertexBuckets {
  public:
+  // What a vertex takes.
+  static constexpr size_t kPlaceBytes = sizeof(Point<D>) + sizeof(VertexId);
+
   struct Bucket {
     uint32_t count = 0;
     uint32_t capacity = 0;
@@ -80,13 +83,14 @@ class VertexBuckets {
   static constexpr size_t BytesFor(uint32_t count) {
     return sizeof(Bucket) + static_cast<size_t>(ClassOf(count) + 1) * kStep * kPlaceBytes;
   }
+  // What a bucket takes beside its vertices, on average: half a step is free.
+  static constexpr size_t OverheadBytes() { return sizeof(Bucket) + kStep / 2 * kPlaceBytes; }
   uint64_t MemoryBytes() const { return taken_bytes_ + buckets_.size() * sizeof(Bucket); }
 
  private:
   static constexpr int kClasses = 8;
   static constexpr uint32_t kStep = kMost / kClasses;
   static_assert(kStep * kClasses == kMost && kStep % 2 == 0, "positions are to stay aligned");
-  static constexpr size_t kPlaceBytes = sizeof(Point<D>) + sizeof(VertexId);
   static constexpr size_t kChunkBytes = std::max<size_t>(size_t{1} << 16, 16 * kMost * kPlaceBytes);
 
   static constexpr uint32_t ClassOf(uint32_t count) { return count == 0 ? 0 : (count - 1) / kStep; }

@@ -116,7 +116,7 @@ TEST_P(StalledUploads, OfASessionAreDroppedAndKeepWhatCame) {
 }
 
 TEST_P(StalledUploads, AreNoneAsLongAsSomethingComes) {
-  const absl::Time end = absl::Now() + 2 * Options().upload_stall_limit;
+  const absl::Time end = absl::Now() + 3 * Options().upload_stall_limit;
   TestCall call(harness_.stub());
   call.Send(UnitCubeParameters());
   while (absl::Now() < end && call.Send({0.5, 0.5, 0.5})) {
