@@ -3,87 +3,51 @@
 #include <tbb/enumerable_thread_specific.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <limits>
 #include <mutex>
 #include <utility>
 
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
-#include "core/simplex/quality.h"
+#include "core/simplex/facet_walk.h"
+#include "core/simplex/simplex_list.h"
 
 namespace wellspace::core {
 namespace {
 
-constexpr size_t kBlockSize = 512;
+// Vertices whose cells make a block.
+constexpr size_t kCellsInBlock = 512;
+// Vertices that a walk takes at once: so many that few simplices lie on the border of two blocks, which both find them.
+constexpr size_t kWalkedInBlock = 4096;
 
-// Appends the simplices of the cell in `workspace` whose lowest vertex is its site `v` and whose other vertices are
-// wanted.
-template <int D, typename IsWanted>
-void EmitStar(const QueryStructure<D>& structure, VertexId v, std::span<const uint32_t> output_index,
-              const Workspace<D>& workspace, IsWanted is_wanted, Simplices& out) {
-  for (const CellNode<D>& node : workspace.cell.nodes()) {
-    std::array<std::pair<uint32_t, VertexId>, D + 1> corners;
-    corners[0] = {output_index[Index(v)], v};
-    bool is_ours = true;
-    for (int k = 0; k < D && is_ours; ++k) {
-      const Plane<D>& plane = workspace.cell.plane(node.planes[k]);
-      is_ours = plane.kind == PlaneKind::kBisector;
-      if (is_ours) {
-        corners[k + 1] = {output_index[Index(plane.vertex)], plane.vertex};
-        is_ours = corners[k + 1].first > corners[0].first && is_wanted(plane.vertex);
-      }
-    }
-    if (!is_ours) {
-      continue;
-    }
-    std::sort(corners.begin() + 1, corners.end());
-    Simplex<D> simplex;
-    for (int k = 0; k <= D; ++k) {
-      simplex[k] = structure.point(corners[k].second);
-    }
-    if (Orientation<D>(simplex).sign == Sign::kNegative) {
-      std::swap(corners[D - 1], corners[D]);
-    }
-    for (const auto& [index, vertex] : corners) {
-      out.indices.push_back(index);
-    }
-    out.max_radius_edge = std::max(out.max_radius_edge, RadiusEdgeRatio<D>(simplex));
-    out.min_angle_deg = std::min(out.min_angle_deg, Angles<D>(simplex).min_deg);
-  }
-}
-
-// The simplices of the stars of `order` whose vertices are all wanted, in blocks that threads share out.
-template <int D, typename IsWanted>
-absl::StatusOr<Simplices> ComputeStars(const QueryStructure<D>& structure, std::span<const VertexId> order,
-                                       std::span<const uint32_t> output_index, IsWanted is_wanted, int threads,
-                                       RunContext& context) {
-  std::vector<Simplices> blocks((order.size() + kBlockSize - 1) / kBlockSize);
-  // What is held besides the indices; of the scratch space, the marks by node count.
-  const uint64_t held_bytes = structure.MemoryBytes() + output_index.size_bytes() + order.size_bytes() +
-                              static_cast<uint64_t>(threads) * structure.tree().node_count() * sizeof(uint32_t);
+// The simplices of `blocks` blocks, which threads share out: append(block, scratch, out) appends those of one, with a Scratch of its
+// thread. `held_bytes` is what is held beside.
+template <int D, typename Scratch, typename Append, typename Counters>
+absl::StatusOr<Simplices> JoinBlocks(size_t block_count, uint64_t held_bytes, int threads, RunContext& context,
+                                     Append append, Counters counters_of) {
+  std::vector<SimplexList<D>> blocks(block_count);
   std::atomic<uint64_t> index_bytes{0};
   std::mutex mutex;
   absl::Status memory;  // guarded by mutex: the first refusal
   std::atomic<bool> is_refused{false};
-  tbb::enumerable_thread_specific<Workspace<D>> workspaces;
+  tbb::enumerable_thread_specific<Scratch> scratches;
   std::atomic<size_t> blocks_done{0};
   ThreadTeam team(threads);
   team.ForEach(blocks.size(), [&](size_t block) {
-    Workspace<D>& workspace = workspaces.local();
-    const size_t end = std::min(order.size(), (block + 1) * kBlockSize);
-    for (size_t i = block * kBlockSize;
-         i < end && !context.IsCancelled() && !is_refused.load(std::memory_order_relaxed); ++i) {
-      structure.Voronoi(order[i], workspace);
-      EmitStar<D>(structure, order[i], output_index, workspace, is_wanted, blocks[block]);
+    if (context.IsCancelled() || is_refused.load(std::memory_order_relaxed)) {
+      return;
     }
-    const uint64_t bytes = blocks[block].indices.size() * sizeof(uint32_t);
+    append(block, scratches.local(), blocks[block]);
+    const uint64_t bytes = blocks[block].indices().size() * sizeof(uint32_t);
     if (absl::Status status = context.AllowMemory(held_bytes + (index_bytes += bytes)); !status.ok()) {
       std::lock_guard lock(mutex);
       memory.Update(std::move(status));
       is_refused = true;
     }
-    context.AddSimplices(blocks[block].indices.size() / (D + 1));
+    context.AddSimplices(blocks[block].size());
     context.SetPhaseFraction(static_cast<double>(++blocks_done) / static_cast<double>(blocks.size()));
   });
   WELLSPACE_RETURN_IF_ERROR(context.Check());
@@ -93,17 +57,105 @@ absl::StatusOr<Simplices> ComputeStars(const QueryStructure<D>& structure, std::
 
   Simplices all;
   all.indices.reserve(index_bytes / sizeof(uint32_t));
-  for (Simplices& block : blocks) {
+  for (SimplexList<D>& block : blocks) {
     WELLSPACE_RETURN_IF_ERROR(context.Check());
-    all.indices.insert(all.indices.end(), block.indices.begin(), block.indices.end());
-    all.max_radius_edge = std::max(all.max_radius_edge, block.max_radius_edge);
-    all.min_angle_deg = std::min(all.min_angle_deg, block.min_angle_deg);
-    block.indices = {};
+    all.indices.insert(all.indices.end(), block.indices().begin(), block.indices().end());
+    all.max_radius_edge = std::max(all.max_radius_edge, block.max_radius_edge());
+    all.min_angle_deg = std::min(all.min_angle_deg, block.min_angle_deg());
+    block.FreeIndices();
   }
-  for (const Workspace<D>& workspace : workspaces) {
-    all.counters.Add(workspace.counters);
+  for (const Scratch& scratch : scratches) {
+    all.counters.Add(counters_of(scratch));
   }
   return all;
+}
+
+// What is held besides the simplices; of the scratch space, what every thread has for each node.
+template <int D>
+uint64_t HeldBytes(const QueryStructure<D>& structure, uint64_t array_bytes, int threads) {
+  return structure.MemoryBytes() + array_bytes +
+         static_cast<uint64_t>(threads) * structure.tree().node_count() * 2 * sizeof(uint32_t);
+}
+
+// Appends the simplices of the cell in `workspace` whose lowest vertex is its site `v` and whose other vertices are
+// wanted.
+template <int D, typename IsWanted>
+void AppendCell(const QueryStructure<D>& structure, VertexId v, std::span<const uint32_t> output_index,
+                const Workspace<D>& workspace, IsWanted is_wanted, SimplexList<D>& out) {
+  for (const CellNode<D>& node : workspace.cell.nodes()) {
+    Simplex<D> simplex;
+    std::array<uint32_t, D + 1> indices;
+    simplex[0] = structure.point(v);
+    indices[0] = output_index[Index(v)];
+    bool is_ours = true;
+    for (int k = 0; k < D && is_ours; ++k) {
+      const Plane<D>& plane = workspace.cell.plane(node.planes[k]);
+      is_ours = plane.kind == PlaneKind::kBisector;
+      if (is_ours) {
+        simplex[k + 1] = structure.point(plane.vertex);
+        indices[k + 1] = output_index[Index(plane.vertex)];
+        is_ours = indices[k + 1] > indices[0] && is_wanted(plane.vertex);
+      }
+    }
+    if (is_ours) {
+      if (Orientation<D>(simplex).sign == Sign::kNegative) {
+        std::swap(simplex[D - 1], simplex[D]);
+        std::swap(indices[D - 1], indices[D]);
+      }
+      out.Add(simplex, indices, std::numeric_limits<double>::infinity());
+    }
+  }
+}
+
+// The simplices of the cells of `order` whose vertices are all wanted.
+template <int D, typename IsWanted>
+absl::StatusOr<Simplices> JoinCells(const QueryStructure<D>& structure, std::span<const VertexId> order,
+                                    std::span<const uint32_t> output_index, IsWanted is_wanted, int threads,
+                                    RunContext& context) {
+  const auto append = [&](size_t block, Workspace<D>& workspace, SimplexList<D>& out) {
+    const size_t begin = block * kCellsInBlock;
+    for (const VertexId v : order.subspan(begin, std::min(kCellsInBlock, order.size() - begin))) {
+      if (context.IsCancelled()) {
+        return;
+      }
+      structure.Voronoi(v, workspace);
+      AppendCell<D>(structure, v, output_index, workspace, is_wanted, out);
+    }
+  };
+  return JoinBlocks<D, Workspace<D>>((order.size() + kCellsInBlock - 1) / kCellsInBlock,
+                                     HeldBytes(structure, output_index.size_bytes() + order.size_bytes(), threads),
+                                     threads, context, append,
+                                     [](const Workspace<D>& workspace) { return workspace.counters; });
+}
+
+// The simplices of all vertices by walks from facet to facet.
+template <int D>
+absl::StatusOr<Simplices> JoinWalks(const QueryStructure<D>& structure, std::span<const uint32_t> output_index,
+                                    int threads, RunContext& context) {
+  std::vector<NodeId> leaves;
+  std::vector<size_t> block_begin{0};
+  size_t in_block = 0;
+  structure.tree().ForEachLeaf([&](NodeId leaf) {
+    const auto* bucket = structure.tree().BucketOf(leaf);
+    if (bucket == nullptr || bucket->count == 0 || context.IsCancelled()) {
+      return;
+    }
+    if (in_block >= kWalkedInBlock) {
+      block_begin.push_back(leaves.size());
+      in_block = 0;
+    }
+    leaves.push_back(leaf);
+    in_block += bucket->count;
+  });
+  block_begin.push_back(leaves.size());
+  const auto append = [&](size_t block, FacetWalk<D>& walk, SimplexList<D>& out) {
+    walk.AppendStars(structure,
+                     std::span(leaves).subspan(block_begin[block], block_begin[block + 1] - block_begin[block]),
+                     output_index, context, out);
+  };
+  return JoinBlocks<D, FacetWalk<D>>(
+      block_begin.size() - 1, HeldBytes(structure, output_index.size_bytes() + leaves.size() * sizeof(NodeId), threads),
+      threads, context, append, [](const FacetWalk<D>& walk) { return walk.counters(); });
 }
 
 }  // namespace
@@ -111,16 +163,20 @@ absl::StatusOr<Simplices> ComputeStars(const QueryStructure<D>& structure, std::
 template <int D>
 absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, std::span<const uint32_t> output_index,
                                            int threads, RunContext& context) {
-  std::vector<VertexId> order;
-  order.reserve(structure.vertex_count());
-  structure.tree().ForEachLeaf([&](NodeId leaf) {
-    const auto* bucket = structure.tree().BucketOf(leaf);
-    for (uint32_t i = 0; bucket != nullptr && i < bucket->count && !context.IsCancelled(); ++i) {
-      order.push_back(bucket->ids[i]);
-    }
-  });
-  return ComputeStars<D>(
-      structure, order, output_index, [](VertexId) { return true; }, threads, context);
+  if constexpr (D == 2) {
+    return JoinWalks<D>(structure, output_index, threads, context);
+  } else {
+    std::vector<VertexId> order;
+    order.reserve(structure.vertex_count());
+    structure.tree().ForEachLeaf([&](NodeId leaf) {
+      const auto* bucket = structure.tree().BucketOf(leaf);
+      for (uint32_t i = 0; bucket != nullptr && i < bucket->count && !context.IsCancelled(); ++i) {
+        order.push_back(bucket->ids[i]);
+      }
+    });
+    return JoinCells<D>(
+        structure, order, output_index, [](VertexId) { return true; }, threads, context);
+  }
 }
 
 template <int D>
@@ -153,7 +209,7 @@ absl::StatusOr<Simplices> ComputeSimplicesAmong(const QueryStructure<D>& structu
   for (const VertexId v : vertices) {
     is_among[Index(v)] = true;
   }
-  return ComputeStars<D>(
+  return JoinCells<D>(
       structure, vertices, output_index, [&](VertexId v) { return is_among[Index(v)]; }, threads, context);
 }
 

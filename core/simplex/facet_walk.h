@@ -1,0 +1,94 @@
+// The simplices of a part of the mesh, each found once: from facet to facet.
+#ifndef WELLSPACE_CORE_SIMPLEX_FACET_WALK_H_
+#define WELLSPACE_CORE_SIMPLEX_FACET_WALK_H_
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/base/ids.h"
+#include "core/base/run_context.h"
+#include "core/simplex/facet_pencil.h"
+#include "core/simplex/leaf_columns.h"
+#include "core/simplex/simplex_list.h"
+#include "core/simplex/site_columns.h"
+#include "core/voronoi/query_structure.h"
+
+namespace wellspace::core {
+
+// Computes stars of the Delaunay triangulation that TieRule::kPerturb defines, one after the other. A star is complete when every one of
+// its facets at the vertex has a simplex on both sides, or lies on the box. Beyond a facet that lacks one is the simplex with the vertex
+// whose ball through the facet holds no other.
+//
+// Thread safety: thread-compatible. Reused from block to block.
+// Invariants: (1) open facets have a vertex of the block and one simplex; (2) each is listed at its vertex with the lowest place,
+// which is one of the block, as vertices of the block come first.
+template <int D>
+class FacetWalk {
+  static_assert(D == 2 || D == 3);
+
+ public:
+  // Appends to `out` the simplices whose vertex with the lowest output index is in one of `leaves`. Stops early when the context
+  // is cancelled.
+  //
+  // Shapes:     output_index: by vertex.
+  // REQUIRES:   `structure` refined: no circumcentre outside the box.
+  // Guarantees: (1) the simplices that have a corner in `leaves` are those of the vertices' whole cells (QueryStructure::Voronoi).
+  // Complexity: O(1) for each of their vertices.
+  // Errors:     none.
+  // Source:     gift wrapping (Chand and Kapur 1970) in Delaunay triangulations: McLain 1976; with a stop by cells: Maus 1984.
+  void AppendStars(const QueryStructure<D>& structure, std::span<const NodeId> leaves,
+                   std::span<const uint32_t> output_index, const RunContext& context, SimplexList<D>& out);
+
+  // Queries are stars.
+  const QueryCounters& counters() const { return counters_; }
+
+ private:
+  // The places of a simplex, positively oriented.
+  using Corners = std::array<uint32_t, D + 1>;
+  // A facet at the vertex that it is listed at: its other vertices, and which of its sides lacks a simplex. The same facet from the
+  // other side has another key.
+  using Key = uint64_t;
+  struct OpenFacet {
+    Key key;
+    uint32_t next;  // at the same vertex, or among the unused ones
+  };
+  static constexpr uint32_t kNone = ~uint32_t{0};
+
+  static Key KeyOf(const std::array<uint32_t, D - 1>& others, bool is_flipped);
+  static Key Opposite(Key key);
+  static std::array<uint32_t, D - 1> OthersOf(Key key);
+  static bool IsFlipped(Key key) { return D == 2 && (key & 1) != 0; }
+
+  void Begin(const QueryStructure<D>& structure, std::span<const NodeId> leaves,
+             std::span<const uint32_t> output_index);
+  bool CloseFacets(std::span<const NodeId> leaves, const RunContext& context, SimplexList<D>& out);
+  void CloseFacetsAt(uint32_t place, SimplexList<D>& out);
+  void AddCellOf(uint32_t place, SimplexList<D>& out);
+  void Gather(uint32_t place, double radius);
+  uint32_t FindApex(uint32_t place, const std::array<uint32_t, D - 1>& others, bool is_flipped, FacetBall<D>& ball);
+  size_t FindSomeApex(const FacetPencil<D>& pencil) const;
+  void AddSimplex(const Corners& corners, int known_facet, double radius_sq, SimplexList<D>& out);
+  void ToggleFacet(uint32_t place, Key key);
+  uint32_t OutputIndex(uint32_t place) const { return output_index_[Index(columns_.vertex(place))]; }
+
+  const QueryStructure<D>* structure_ = nullptr;
+  std::span<const uint32_t> output_index_;
+  LeafColumns<D> columns_;
+  SiteColumns<D> near_;                 // to the vertex whose star is being closed
+  double near_radius_ = 0;              // all that are so near, and in the columns' surroundings
+  double needed_radius_ = 0;            // so far for this star
+  uint32_t own_count_ = 0;              // places below are of the block
+  std::vector<uint32_t> first_at_;      // by own place: its open facets
+  std::vector<uint8_t> has_simplices_;  // by own place
+  std::vector<OpenFacet> open_;
+  uint32_t unused_ = kNone;
+  size_t open_count_ = 0;
+  Workspace<D> workspace_;
+  QueryCounters counters_;
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_SIMPLEX_FACET_WALK_H_

@@ -1,0 +1,280 @@
+// The vertices of some leaves in columns, and the leaves around one of them: where the vertices near a site are looked for.
+#ifndef WELLSPACE_CORE_SIMPLEX_LEAF_COLUMNS_H_
+#define WELLSPACE_CORE_SIMPLEX_LEAF_COLUMNS_H_
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "core/base/ids.h"
+#include "core/geometry/box.h"
+#include "core/simplex/site_columns.h"
+#include "core/voronoi/query_structure.h"
+
+namespace wellspace::core {
+
+// Numbers the vertices of the leaves that are asked for from 0, leaf by leaf, with gaps: the place of a vertex. Places that come from
+// gaps hold no vertex.
+//
+// Thread safety: thread-compatible. Reused: no allocation once warm.
+// Invariants: (1) the vertices of a leaf have places side by side, in whole groups, which one vector instruction takes; (2) the
+// surroundings hold every leaf that comes nearer than `margin_` to the home leaf on every axis.
+template <int D>
+class LeafColumns {
+ public:
+  static constexpr uint32_t kNoPlace = ~uint32_t{0};
+
+  // Forgets all leaves.
+  void Reset(const QueryStructure<D>& structure) {
+    structure_ = &structure;
+    if (slot_of_.size() < structure.tree().node_count()) {
+      slot_of_.resize(structure.tree().node_count(), 0);
+      is_met_.resize(structure.tree().node_count(), false);
+    }
+    // Slots count on from block to block, so that what is left of earlier ones is too low to be valid.
+    if (first_slot_ > std::numeric_limits<uint32_t>::max() / 2) {
+      std::fill(slot_of_.begin(), slot_of_.end(), 0);
+      first_slot_ = 1;
+    } else {
+      first_slot_ += static_cast<uint32_t>(slots_.size());
+    }
+    slots_.clear();
+    groups_.clear();
+    ids_.clear();
+    double largest = 0;
+    for (int i = 0; i < D; ++i) {
+      largest = std::max({largest, std::abs(structure.box().low[i]), std::abs(structure.box().high[i])});
+    }
+    rounding_ = 0x1p-49 * largest;
+  }
+
+  // Gives places to the vertices of a leaf that has none yet.
+  void AddLeaf(NodeId leaf) { SlotOf(leaf); }
+
+  // How many places the vertices of a leaf take.
+  static uint32_t PlacesOf(uint32_t vertices) { return (vertices + kLanes - 1) / kLanes * kLanes; }
+  uint32_t place_count() const { return static_cast<uint32_t>(ids_.size()); }
+  VertexId vertex(uint32_t place) const { return ids_[place]; }
+  Point<D> point(uint32_t place) const {
+    const Group& group = groups_[place / kLanes];
+    Point<D> p;
+    for (int i = 0; i < D; ++i) {
+      p[i] = group.x[i][place % kLanes];
+    }
+    return p;
+  }
+  uint32_t PlaceOf(VertexId v) {
+    const Slot slot = slots_[SlotOf(structure_->tree().leaf_of(v))];
+    uint32_t place = slot.begin * kLanes;
+    while (ids_[place] != v) {
+      ++place;
+    }
+    return place;
+  }
+
+  // Makes `leaf` the home leaf, with those around it that come nearer than its side.
+  //
+  // Complexity: O(leaves around it).
+  void SurroundLeaf(NodeId leaf) {
+    home_ = leaf;
+    const Box<D> cube = structure_->tree().BoxOf(leaf);
+    Surround(cube.high[0] - cube.low[0]);
+  }
+
+  // Takes in more leaves. REQUIRES: IsCovered of some ball is false.
+  void Widen() { Surround(2 * margin_); }
+
+  // Whether the surroundings hold all vertices of a ball that is known up to rounding: its radius is at least a part in 2^48 too large.
+  bool IsCovered(const Point<D>& centre, double radius) const {
+    const double reach = radius + rounding_;
+    for (int i = 0; i < D; ++i) {
+      if (!(centre[i] - reach > covered_.low[i] && centre[i] + reach < covered_.high[i])) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  // Puts into `near` the vertices of the surroundings with |w| <= radius but for that at `but`, w the vector from `site` to them; all of
+  // them, as the squares as computed say.
+  //
+  // Returns how many leaves have such vertices, or almost.
+  //
+  // Complexity: O(leaves of the surroundings and their vertices).
+  uint32_t Gather(const Point<D>& site, double radius, uint32_t but, SiteColumns<D>& near) const {
+    const double radius_sq = radius * radius;
+    const double reach_sq = (radius + rounding_) * (radius + rounding_) * (1 + 0x1p-48);
+    near.Clear();
+    uint32_t opened = 0;
+    for (const Pair& leaves : pairs_) {
+      Lanes distance_sq{};
+      for (int i = 0; i < D; ++i) {
+        const Lanes below = leaves.low[i] - site[i];
+        const Lanes above = site[i] - leaves.high[i];
+        Lanes gap = below > above ? below : above;
+        gap = gap > 0 ? gap : Lanes{};
+        distance_sq += gap * gap;
+      }
+      for (size_t lane = 0; lane < kLanes; ++lane) {
+        if (distance_sq[lane] > reach_sq) {
+          continue;
+        }
+        ++opened;
+        near.Reserve((leaves.end[lane] - leaves.begin[lane]) * kLanes);
+        for (uint32_t g = leaves.begin[lane]; g < leaves.end[lane]; ++g) {
+          Lanes w[D + 1];
+          w[D] = Lanes{};
+          for (int i = 0; i < D; ++i) {
+            w[i] = groups_[g].x[i] - site[i];
+            w[D] += w[i] * w[i];
+          }
+          const Mask is_near = w[D] <= radius_sq;
+          if ((is_near[0] | is_near[1]) == 0) {
+            continue;
+          }
+          for (size_t j = 0; j < kLanes; ++j) {
+            const auto place = static_cast<uint32_t>(g * kLanes + j);
+            std::array<double, D + 1> entry;
+            for (int i = 0; i <= D; ++i) {
+              entry[i] = w[i][j];
+            }
+            // No branch, since none could be foretold.
+            near.AppendIf((is_near[j] & 1) != 0 && place != but, place, entry);
+          }
+        }
+      }
+    }
+    near.Finish();
+    return opened;
+  }
+
+ private:
+  static constexpr size_t kLanes = 2;
+  using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));
+  using Mask = int64_t __attribute__((vector_size(kLanes * sizeof(double))));
+
+  struct Group {
+    Lanes x[D];
+  };
+  // Of a leaf, its groups.
+  struct Slot {
+    uint32_t begin;
+    uint32_t end;
+  };
+  struct Pair {
+    Lanes low[D];
+    Lanes high[D];
+    uint32_t begin[kLanes];
+    uint32_t end[kLanes];
+  };
+
+  uint32_t SlotOf(NodeId leaf) {
+    uint32_t& slot = slot_of_[Index(leaf)];
+    if (slot >= first_slot_) {
+      return slot - first_slot_;
+    }
+    slot = first_slot_ + static_cast<uint32_t>(slots_.size());
+    const auto begin = static_cast<uint32_t>(groups_.size());
+    if (const auto* bucket = structure_->tree().BucketOf(leaf); bucket != nullptr) {
+      for (uint32_t first = 0; first < bucket->count; first += kLanes) {
+        Group& group = groups_.emplace_back();
+        for (uint32_t j = 0; j < kLanes; ++j) {
+          const bool is_vertex = first + j < bucket->count;
+          ids_.push_back(is_vertex ? bucket->ids[first + j] : kNoVertex);
+          for (int i = 0; i < D; ++i) {
+            // Nothing is near to what is no number.
+            group.x[i][j] = is_vertex ? bucket->positions[first + j][i] : std::numeric_limits<double>::quiet_NaN();
+          }
+        }
+      }
+    }
+    slots_.push_back({begin, static_cast<uint32_t>(groups_.size())});
+    return slot - first_slot_;
+  }
+
+  void Surround(double margin) {
+    margin_ = margin;
+    const LeafTree<D>& tree = structure_->tree();
+    const Box<D> home = tree.BoxOf(home_);
+    for (int i = 0; i < D; ++i) {
+      constexpr double kInfinity = std::numeric_limits<double>::infinity();
+      covered_.low[i] = home.low[i] - margin;
+      covered_.high[i] = home.high[i] + margin;
+      if (covered_.low[i] <= structure_->box().low[i]) {
+        covered_.low[i] = -kInfinity;
+      }
+      if (covered_.high[i] >= structure_->box().high[i]) {
+        covered_.high[i] = kInfinity;
+      }
+    }
+    met_.clear();
+    pairs_.clear();
+    Meet(home_);
+    size_t lane = 0;
+    for (size_t next = 0; next < met_.size(); ++next) {
+      const NodeId leaf = met_[next];
+      const Box<D> cube = tree.BoxOf(leaf);
+      const Slot slot = slots_[SlotOf(leaf)];
+      if (slot.begin != slot.end) {
+        if (lane == 0) {
+          Pair& pair = pairs_.emplace_back();
+          for (int i = 0; i < D; ++i) {
+            pair.low[i] += std::numeric_limits<double>::infinity();
+            pair.high[i] -= std::numeric_limits<double>::infinity();
+          }
+        }
+        Pair& pair = pairs_.back();
+        for (int i = 0; i < D; ++i) {
+          pair.low[i][lane] = cube.low[i];
+          pair.high[i][lane] = cube.high[i];
+        }
+        pair.begin[lane] = slot.begin;
+        pair.end[lane] = slot.end;
+        lane = (lane + 1) % kLanes;
+      }
+      tree.ForEachFaceNeighbour(leaf, [&](NodeId beyond) {
+        if (IsMet(beyond)) {
+          return;
+        }
+        const Box<D> other = tree.BoxOf(beyond);
+        for (int i = 0; i < D; ++i) {
+          if (other.low[i] >= covered_.high[i] || other.high[i] <= covered_.low[i]) {
+            return;
+          }
+        }
+        Meet(beyond);
+      });
+    }
+    for (const NodeId leaf : met_) {
+      is_met_[Index(leaf)] = false;
+    }
+  }
+  bool IsMet(NodeId leaf) const { return is_met_[Index(leaf)]; }
+  void Meet(NodeId leaf) {
+    is_met_[Index(leaf)] = true;
+    met_.push_back(leaf);
+  }
+
+  const QueryStructure<D>* structure_ = nullptr;
+  double rounding_ = 0;
+  std::vector<uint32_t> slot_of_;  // by node, valid from first_slot_ on
+  uint32_t first_slot_ = 1;
+  std::vector<Slot> slots_;
+  std::vector<Group> groups_;
+  std::vector<VertexId> ids_;  // by place
+
+  NodeId home_ = kNoNode;
+  double margin_ = 0;
+  Box<D> covered_;
+  std::vector<Pair> pairs_;
+  std::vector<NodeId> met_;
+  std::vector<bool> is_met_;  // by node
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_SIMPLEX_LEAF_COLUMNS_H_

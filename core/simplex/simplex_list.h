@@ -1,0 +1,46 @@
+// Simplices one after the other, in the form of the output, with the worst of their shapes.
+#ifndef WELLSPACE_CORE_SIMPLEX_SIMPLEX_LIST_H_
+#define WELLSPACE_CORE_SIMPLEX_SIMPLEX_LIST_H_
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "core/geometry/exact_measure.h"
+
+namespace wellspace::core {
+
+// Thread safety: thread-compatible.
+// Invariants: (1) max_radius_edge and min_angle_deg are the largest RadiusEdgeRatio and the smallest Angles of the simplices, to
+// the bit, whatever their order.
+template <int D>
+class SimplexList {
+ public:
+  // Appends a simplex: the lowest index first, the others ascending but for an exchange of the last two that makes it positive.
+  //
+  // REQUIRES:   `points` positively oriented, `indices` distinct. radius_sq: the squared circumradius up to a relative error of 2^-20, or
+  //             infinite where that is not known.
+  // Complexity: O(1); without the quotients and arc tangents of quality.h for a simplex that is clearly not the worst.
+  // Errors:     none.
+  void Add(const Simplex<D>& points, const std::array<uint32_t, D + 1>& indices, double radius_sq);
+
+  size_t size() const { return indices_.size() / (D + 1); }
+  const std::vector<uint32_t>& indices() const { return indices_; }
+  double max_radius_edge() const { return max_radius_edge_; }
+  double min_angle_deg() const { return min_angle_deg_; }
+  void FreeIndices() { indices_ = {}; }
+
+ private:
+  bool IsClearlyBetter(const Simplex<D>& points, double radius_sq) const;
+
+  std::vector<uint32_t> indices_;
+  double max_radius_edge_ = 0;
+  double min_angle_deg_ = std::numeric_limits<double>::infinity();
+  double better_ratio_sq_ = 0;  // a ratio whose square is below this is clearly smaller than the largest
+  double better_cot_sq_ = 0;    // an angle whose squared cotangent is below this is clearly larger than the smallest
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_SIMPLEX_SIMPLEX_LIST_H_

@@ -1,0 +1,243 @@
+// The simplices of a refined structure: those of the vertices' whole cells, each once.
+#include "core/simplex/simplices.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <numeric>
+#include <string>
+#include <string_view>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "core/refine/refine.h"
+#include "core/simplex/facet_pencil.h"
+#include "core/simplex/quality.h"
+#include "core/simplex/site_columns.h"
+#include "core/simplex/validate.h"
+#include "tests/support/brute_force.h"
+#include "tests/support/clouds.h"
+#include "tests/support/seeded_test.h"
+#include "tests/support/structures.h"
+
+namespace wellspace::core {
+namespace {
+
+using test::MakeStructure;
+
+template <int D>
+using SimplexSet = std::vector<std::array<uint32_t, D + 1>>;
+
+template <int D>
+SimplexSet<D> Sorted(SimplexSet<D> simplices) {
+  for (auto& simplex : simplices) {
+    std::sort(simplex.begin(), simplex.end());
+  }
+  std::sort(simplices.begin(), simplices.end());
+  return simplices;
+}
+
+template <int D>
+SimplexSet<D> SetOf(const Simplices& simplices) {
+  SimplexSet<D> set(simplices.indices.size() / (D + 1));
+  for (size_t i = 0; i < simplices.indices.size(); ++i) {
+    set[i / (D + 1)][i % (D + 1)] = simplices.indices[i];
+  }
+  return Sorted<D>(std::move(set));
+}
+
+// Each simplex as the vertex with the lowest index finds it among the nodes of its cell.
+template <int D>
+SimplexSet<D> SetOfCells(const QueryStructure<D>& structure, const std::vector<uint32_t>& output_index) {
+  SimplexSet<D> set;
+  Workspace<D> workspace;
+  for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
+    structure.Voronoi(VertexId{v}, workspace);
+    for (const CellNode<D>& node : workspace.cell.nodes()) {
+      std::array<uint32_t, D + 1> simplex;
+      simplex[D] = output_index[v];
+      bool is_lowest = true;
+      for (int k = 0; k < D; ++k) {
+        const Plane<D>& plane = workspace.cell.plane(node.planes[k]);
+        simplex[k] = plane.kind == PlaneKind::kBisector ? output_index[Index(plane.vertex)] : 0;
+        is_lowest = is_lowest && plane.kind == PlaneKind::kBisector && simplex[k] > simplex[D];
+      }
+      if (is_lowest) {
+        set.push_back(simplex);
+      }
+    }
+  }
+  return Sorted<D>(std::move(set));
+}
+
+template <int D>
+QueryStructure<D> MakeRefined(std::string_view kind, size_t n) {
+  QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, n));
+  RunContext context;
+  Refinement<D> refinement(structure, 0x1p-48);
+  const absl::Status refined = refinement.Run({.rho = D == 2 ? std::sqrt(2.0) : 2.0}, 1'000'000, context);
+  EXPECT_TRUE(refined.ok()) << refined;
+  return structure;
+}
+
+// Any permutation serves.
+std::vector<uint32_t> MakeOutputIndex(uint32_t count) {
+  std::vector<uint32_t> index(count);
+  std::iota(index.begin(), index.end(), 0u);
+  test::SplitMix64 random(7);
+  for (uint32_t i = count; i > 1; --i) {
+    std::swap(index[i - 1], index[random.Below(i)]);
+  }
+  return index;
+}
+
+template <int D>
+void ExpectSimplicesOfCells(std::string_view kind, size_t n) {
+  const QueryStructure<D> structure = MakeRefined<D>(kind, n);
+  const std::vector<uint32_t> output_index = MakeOutputIndex(structure.vertex_count());
+  RunContext context;
+  const absl::StatusOr<Simplices> simplices = ComputeSimplices<D>(structure, output_index, 1, context);
+  ASSERT_TRUE(simplices.ok()) << simplices.status();
+  const SimplexSet<D> set = SetOf<D>(*simplices);
+  EXPECT_EQ(set, SetOfCells<D>(structure, output_index));
+  EXPECT_EQ(context.Snapshot().simplices, set.size());
+  EXPECT_EQ(simplices->counters.queries, structure.vertex_count());
+
+  // Positive, the lowest vertex first; and the worst of all shapes is the one that is reported, to the bit.
+  std::vector<Point<D>> points(structure.vertex_count());
+  for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
+    points[output_index[v]] = structure.point(VertexId{v});
+  }
+  double max_radius_edge = 0;
+  double min_angle_deg = 180;
+  for (size_t s = 0; s < set.size(); ++s) {
+    Simplex<D> simplex;
+    Simplex<D> ascending;
+    for (int i = 0; i <= D; ++i) {
+      simplex[i] = points[simplices->indices[s * (D + 1) + i]];
+      ascending[i] = points[set[s][i]];
+      EXPECT_LE(simplices->indices[s * (D + 1)], simplices->indices[s * (D + 1) + i]);
+    }
+    ASSERT_EQ(Orientation<D>(simplex).sign, Sign::kPositive);
+    max_radius_edge = std::max(max_radius_edge, RadiusEdgeRatio<D>(ascending));
+    min_angle_deg = std::min(min_angle_deg, Angles<D>(ascending).min_deg);
+  }
+  EXPECT_EQ(simplices->max_radius_edge, max_radius_edge);
+  EXPECT_EQ(simplices->min_angle_deg, min_angle_deg);
+
+  const absl::StatusOr<Simplices> again = ComputeSimplices<D>(structure, output_index, 2, context);
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_EQ(again->indices, simplices->indices);
+  EXPECT_EQ(again->max_radius_edge, simplices->max_radius_edge);
+  EXPECT_EQ(again->min_angle_deg, simplices->min_angle_deg);
+}
+
+using CloudCase = std::tuple<std::string_view, int>;
+
+class SimplicesOfCloud : public ::testing::TestWithParam<CloudCase> {};
+
+INSTANTIATE_TEST_SUITE_P(Clouds, SimplicesOfCloud,
+                         ::testing::Combine(::testing::ValuesIn(test::AllKinds()), ::testing::Values(2, 3)),
+                         [](const auto& param) {
+                           return test::CloudName(std::get<0>(param.param), std::get<1>(param.param));
+                         });
+
+TEST_P(SimplicesOfCloud, AreThoseOfTheCells) {
+  const auto& [kind, dimension] = GetParam();
+  if (dimension == 2) {
+    ExpectSimplicesOfCells<2>(kind, 1000);
+  } else {
+    ExpectSimplicesOfCells<3>(kind, 300);
+  }
+}
+
+// More vertices than one block takes.
+TEST(Simplices, BlocksAgree) {
+  ExpectSimplicesOfCells<2>("uniform", 4'000);
+  ExpectSimplicesOfCells<2>("grid", 5'000);
+  ExpectSimplicesOfCells<3>("grid", 5'000);
+  ExpectSimplicesOfCells<3>("uniform", 2'000);
+}
+
+class FacetPencilTest : public test::SeededTest {
+ protected:
+  FacetPencilTest() : SeededTest(61) {}
+
+  template <int D>
+  Point<D> Draw() {
+    Point<D> p;
+    for (double& x : p) {
+      x = random_.Unit();
+    }
+    return p;
+  }
+
+  // The power of `u` as computed, and the exact side: clear powers have to be right, also where u is close to the sphere or the
+  // simplex nearly flat.
+  template <int D>
+  void ExpectClearPowersAreRight() {
+    SiteColumns<D> near;
+    int clear = 0;
+    int close = 0;
+    for (int i = 0; i < 2000; ++i) {
+      Simplex<D> simplex;
+      for (Point<D>& corner : simplex) {
+        corner = Draw<D>();
+      }
+      if (i % 2 == 1) {
+        // Nearly flat: the apex close to a corner of the facet, but for a trifle.
+        simplex[D] = simplex[1];
+        simplex[D][0] += std::ldexp(1.0, -static_cast<int>(random_.Below(50)) - 2);
+      }
+      std::array<Point<D>, D - 1> others;
+      std::copy_n(simplex.begin() + 1, D - 1, others.begin());
+      const FacetPencil<D> pencil(simplex[0], others, false);
+      const Sign side = Orientation<D>(simplex).sign;
+      ASSERT_EQ(pencil.SideOf(simplex[D]), side);
+      if (side == Sign::kZero) {
+        continue;
+      }
+      const FacetBall<D> ball = pencil.BallThrough(simplex[D]);
+      // On the sphere but for 2^-k of the radius.
+      const Point<D> direction = Difference<D>(Draw<D>(), Draw<D>());
+      const double scale = (1 + std::ldexp(random_.Unit() - 0.5, -static_cast<int>(random_.Below(54)))) * ball.radius /
+                           std::sqrt(NormSq<D>(direction));
+      Point<D> u;
+      for (int k = 0; k < D; ++k) {
+        u[k] = simplex[0][k] + 0.5 * ball.twice_centre[k] + scale * direction[k];
+      }
+      std::array<double, D + 1> entry{};
+      for (int k = 0; k < D; ++k) {
+        entry[k] = u[k] - simplex[0][k];
+        entry[D] += entry[k] * entry[k];
+      }
+      near.Clear();
+      near.Reserve(1);
+      near.AppendIf(true, 0, entry);
+      near.Finish();
+      const double power = near.PowerOf(0, ball);
+      EXPECT_EQ(near.CountInside(ball), power < ball.doubt ? 1u : 0u);
+      const Sign exact = InSphere<D>(simplex, u).sign * side;
+      if (std::abs(power) >= ball.doubt) {
+        ++clear;
+        EXPECT_EQ(exact, power < 0 ? Sign::kPositive : Sign::kNegative);
+      } else {
+        ++close;
+      }
+    }
+    EXPECT_GT(clear, 200);
+    EXPECT_GT(close, 20);
+  }
+};
+
+TEST_F(FacetPencilTest, ClearPowersAreRight) {
+  ExpectClearPowersAreRight<2>();
+  ExpectClearPowersAreRight<3>();
+}
+
+}  // namespace
+}  // namespace wellspace::core
