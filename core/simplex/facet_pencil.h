@@ -2,10 +2,13 @@
 #ifndef WELLSPACE_CORE_SIMPLEX_FACET_PENCIL_H_
 #define WELLSPACE_CORE_SIMPLEX_FACET_PENCIL_H_
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
+#include "core/geometry/box.h"
 #include "core/geometry/exact_measure.h"
 #include "core/geometry/point.h"
 #include "core/geometry/power_predicate.h"
@@ -22,6 +25,12 @@ struct FacetBall {
   // What the power as computed can be wrong by for a vertex of the ball; outside, it is wrong by less than it is positive and
   // this together. So a power below -doubt says inside, and one of at least doubt outside.
   double doubt = 0;
+
+  // The ball of all points, for a pencil that has no apex yet: every power is below its doubt.
+  static FacetBall Everything() {
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    return {.twice_centre = {}, .radius = kInfinity, .error = 0, .doubt = kInfinity};
+  }
 
   // At least the exact distance of any point of the ball from the computed centre.
   double Reach() const { return (radius + 2 * error) * (1 + 0x1p-48); }
@@ -53,6 +62,8 @@ class FacetPencil {
 
   // The side of `u`, exactly.
   Sign SideOf(const Point<D>& u) const;
+  // Whether a point of `box` can be on the positive side or in the hyperplane; coordinates of `box` are off by less than `rounding`.
+  bool MayHold(const Box<D>& box, double rounding) const;
 
   // Whether the ball through `apex`, on the positive side, holds `u`; exactly, ties perturbed as cells perturb them.
   //
@@ -182,6 +193,22 @@ Sign FacetPencil<D>::SideOf(const Point<D>& u) const {
   simplex[D] = u;
   const Sign sign = Orientation<D>(simplex).sign;
   return is_flipped_ ? -sign : sign;
+}
+
+// For a corner's w the determinant is wrong by less than 14 sqrt(D) u P, and by |n| sqrt(D) rounding.
+template <int D>
+bool FacetPencil<D>::MayHold(const Box<D>& box, double rounding) const {
+  double highest = 0;
+  double length = 0;
+  double normal_sum = 0;
+  for (int i = 0; i < D; ++i) {
+    const double low = box.low[i] - site_[i];
+    const double high = box.high[i] - site_[i];
+    highest += std::max(low * normal_[i], high * normal_[i]);
+    length += std::max(std::abs(low), std::abs(high));
+    normal_sum += std::abs(normal_[i]);
+  }
+  return highest + 64 * kUnit * length_product_ * length + 4 * rounding * normal_sum >= 0;
 }
 
 template <int D>

@@ -8,9 +8,9 @@
 namespace wellspace::core {
 namespace {
 
-// Vertices near a site are gathered up to so many times the radius that the last star, or the last search in this one, has needed.
+// Vertices near a site are gathered up to so many times the radius that the star before has needed,
 constexpr double kMargin = 1.05;
-// But at first not farther than so many times the longest edge of a facet: most balls reach less far.
+// but not farther than so many times the longest edge of a facet: leaves are looked at for the balls that reach farther.
 constexpr double kEdges = 2.5;
 // A vertex so little above a facet, by the length of the vector to it, is no first choice.
 constexpr double kLeastHeight = 0x1p-40;
@@ -78,21 +78,18 @@ bool FacetWalk<D>::CloseFacets(std::span<const NodeId> leaves, const RunContext&
     uint32_t first = 0;
     for (const NodeId leaf : leaves) {
       const uint32_t end = first + LeafColumns<D>::PlacesOf(structure_->tree().BucketOf(leaf)->count);
-      bool is_home = false;
+      bool is_first = true;
       // A star may open facets at vertices before it.
       for (uint32_t place = first; place < end;) {
         if (first_at_[place] == kNone) {
           ++place;
           continue;
         }
-        if (!is_home) {
-          if (context.IsCancelled()) {
-            return false;
-          }
-          columns_.SurroundLeaf(leaf);
-          is_home = true;
+        if (is_first && context.IsCancelled()) {
+          return false;
         }
-        CloseFacetsAt(place, out);
+        is_first = false;
+        CloseFacetsAt(leaf, place, out);
         place = first;
       }
       first = end;
@@ -116,16 +113,17 @@ void FacetWalk<D>::Begin(const QueryStructure<D>& structure, std::span<const Nod
   open_.clear();
   unused_ = kNone;
   open_count_ = 0;
+  needed_radius_ = 0;
 }
 
 template <int D>
-void FacetWalk<D>::CloseFacetsAt(uint32_t place, SimplexList<D>& out) {
+void FacetWalk<D>::CloseFacetsAt(NodeId leaf, uint32_t place, SimplexList<D>& out) {
   double edge_sq = 0;
   for (const uint32_t other : OthersOf(open_[first_at_[place]].key)) {
     edge_sq = std::max(edge_sq, DistanceSq<D>(columns_.point(other), columns_.point(place)));
   }
-  const double usual = kEdges * std::sqrt(edge_sq);
-  Gather(place, needed_radius_ > 0 ? std::min(kMargin * needed_radius_, usual) : usual);
+  const double most = kEdges * std::sqrt(edge_sq);
+  Gather(leaf, place, needed_radius_ > 0 ? std::min(kMargin * needed_radius_, most) : most);
   needed_radius_ = 0;
   while (first_at_[place] != kNone) {
     const uint32_t at = first_at_[place];
@@ -134,14 +132,14 @@ void FacetWalk<D>::CloseFacetsAt(uint32_t place, SimplexList<D>& out) {
     open_[at].next = unused_;
     unused_ = at;
     --open_count_;
-    const std::array<uint32_t, D - 1> others = OthersOf(key);
+    const Facet facet{place, OthersOf(key), IsFlipped(key)};
     FacetBall<D> ball;
-    const uint32_t apex = FindApex(place, others, IsFlipped(key), ball);
+    const uint32_t apex = FindApex(leaf, facet, ball);
     Corners corners;
     corners[0] = place;
-    std::copy(others.begin(), others.end(), corners.begin() + 1);
+    std::copy(facet.others.begin(), facet.others.end(), corners.begin() + 1);
     corners[D] = apex;
-    if (IsFlipped(key)) {
+    if (facet.is_flipped) {
       std::swap(corners[0], corners[1]);
     }
     const bool is_precise = ball.error <= 0x1p-24 * ball.radius;
@@ -180,96 +178,115 @@ void FacetWalk<D>::AddCellOf(uint32_t place, SimplexList<D>& out) {
 }
 
 template <int D>
-void FacetWalk<D>::Gather(uint32_t place, double radius) {
+void FacetWalk<D>::Gather(NodeId leaf, uint32_t place, double radius) {
   near_radius_ = radius;
+  columns_.Surround(leaf, radius);
   const uint64_t leaves = columns_.Gather(columns_.point(place), radius, place, near_);
   counters_.leaves += leaves;
   counters_.vertices += near_.size();
   counters_.max_leaves = std::max(counters_.max_leaves, leaves);
 }
 
-// The vertex on the positive side of a facet whose ball holds no other, and that ball.
+// The vertex on the positive side of a facet at a vertex in `leaf` whose ball holds no other, and that ball.
 //
 // A first one is found in doubles. If its ball holds vertices, or may hold some, these are tried one after the other: the ball through the facet
 // and any vertex on the positive side holds the one that is looked for, and so does that through the next vertex found in it; so balls
 // shrink, and what has been left out stays outside. On the negative side a ball holds nothing, since it lies in that of the simplex there.
+// Each vertex is tried once, and each leaf looked at once, whatever rounding does.
 template <int D>
-uint32_t FacetWalk<D>::FindApex(uint32_t place, const std::array<uint32_t, D - 1>& others, bool is_flipped,
-                                FacetBall<D>& ball) {
-  const Point<D> site = columns_.point(place);
+uint32_t FacetWalk<D>::FindApex(NodeId leaf, const Facet& facet, FacetBall<D>& ball) {
   std::array<Point<D>, D - 1> points;
   for (int j = 0; j < D - 1; ++j) {
-    points[j] = columns_.point(others[j]);
+    points[j] = columns_.point(facet.others[j]);
   }
-  const FacetPencil<D> pencil(site, points, is_flipped);
+  const FacetPencil<D> pencil(columns_.point(facet.place), points, facet.is_flipped);
   const double normal_length = std::sqrt(NormSq<D>(pencil.normal()));
-  for (;;) {
-    size_t apex = near_.FindLowest(pencil, kLeastHeight * normal_length * near_radius_);
-    if (apex == near_.kNone || pencil.SideOf(columns_.point(near_.place(apex))) != Sign::kPositive) {
-      apex = FindSomeApex(pencil);
+  const uint32_t first = near_.FindLowest(pencil, kLeastHeight * normal_length * near_radius_);
+  uint32_t apex = kNone;
+  ball = FacetBall<D>::Everything();
+  if (first != near_.kNone && pencil.SideOf(columns_.point(near_.place(first))) == Sign::kPositive) {
+    apex = near_.place(first);
+    ball = pencil.BallThrough(columns_.point(apex));
+  }
+  if (2 * ball.Reach() <= near_radius_) {
+    SearchNear(pencil, facet, apex, ball);
+  } else {
+    SearchLeaves(leaf, pencil, facet, apex, ball);
+  }
+  ++counters_.cuts;
+  needed_radius_ = std::max(needed_radius_, 2 * ball.Reach());
+  return apex;
+}
+
+// Makes the ball that through `u` if it is inside, or if it is on the positive side when there is no apex yet; its power, as computed, is below
+// the doubt.
+template <int D>
+bool FacetWalk<D>::Shrink(const FacetPencil<D>& pencil, const Facet& facet, uint32_t u, double power, uint32_t& apex,
+                          FacetBall<D>& ball) {
+  if (u == apex || u == facet.place || std::find(facet.others.begin(), facet.others.end(), u) != facet.others.end()) {
+    return false;
+  }
+  const Point<D> position = columns_.point(u);
+  if (apex == kNone) {
+    if (pencil.SideOf(position) != Sign::kPositive) {
+      return false;
     }
-    if (apex == near_.kNone) {
-      if (!columns_.IsCovered(site, near_radius_)) {
-        columns_.Widen();
-      } else if (!std::isfinite(near_radius_)) {
-        std::abort();  // the box has a corner beyond any facet that is not on it
+  } else if (power >= -ball.doubt) {
+    const ExactDecision decision = pencil.IsInside(columns_.point(apex), position);
+    ++counters_.decisions.exact;
+    counters_.decisions.perturbed += decision.perturbed ? 1 : 0;
+    if (decision.sign != Sign::kPositive) {
+      return false;
+    }
+  }
+  apex = u;
+  ball = pencil.BallThrough(position);
+  return true;
+}
+
+// Shrinks a ball that lies among the gathered vertices.
+template <int D>
+void FacetWalk<D>::SearchNear(const FacetPencil<D>& pencil, const Facet& facet, uint32_t& apex, FacetBall<D>& ball) {
+  // The other vertices of the facet and the apex are inside, as far as doubles tell.
+  if (near_.CountInside(ball) > D) {
+    for (size_t i = 0; i < near_.size(); ++i) {
+      const double power = near_.PowerOf(i, ball);
+      if (power < ball.doubt) {
+        Shrink(pencil, facet, near_.place(i), power, apex, ball);
       }
-      Gather(place, 2 * near_radius_);
-      continue;
     }
-    Point<D> position = columns_.point(near_.place(apex));
-    ball = pencil.BallThrough(position);
-    const double reach = ball.Reach();
-    Point<D> centre;
-    for (int i = 0; i < D; ++i) {
-      centre[i] = site[i] + 0.5 * ball.twice_centre[i];
-    }
-    if (!columns_.IsCovered(centre, reach)) {
-      columns_.Widen();
-      Gather(place, std::max(near_radius_, 2 * kMargin * reach));
-      continue;
-    }
-    if (2 * reach > near_radius_) {
-      Gather(place, 2 * kMargin * reach);
-      continue;
-    }
-    ++counters_.cuts;
-    // The other vertices of the facet and the apex are among them.
-    if (near_.CountInside(ball) > D) {
-      for (size_t i = 0; i < near_.size(); ++i) {
-        const uint32_t u = near_.place(i);
-        const double power = near_.PowerOf(i, ball);
-        if (power >= ball.doubt || i == apex || std::find(others.begin(), others.end(), u) != others.end()) {
-          continue;
-        }
-        const Point<D> candidate = columns_.point(u);
-        if (power >= -ball.doubt) {
-          const ExactDecision decision = pencil.IsInside(position, candidate);
-          ++counters_.decisions.exact;
-          counters_.decisions.perturbed += decision.perturbed ? 1 : 0;
-          if (decision.sign != Sign::kPositive) {
-            continue;
-          }
-        }
-        apex = i;
-        position = candidate;
-        ball = pencil.BallThrough(position);
-      }
-    }
-    needed_radius_ = std::max(needed_radius_, 2 * ball.Reach());
-    return near_.place(apex);
   }
 }
 
-// Any vertex on the positive side.
+// Shrinks any ball, by the leaves that it comes to on the positive side.
+//
+// That part of the last ball is convex and touches the vertex, so that a path from there leads to each leaf that it comes to, through facets of
+// such leaves alone; and it lies in the same part of every ball before.
 template <int D>
-size_t FacetWalk<D>::FindSomeApex(const FacetPencil<D>& pencil) const {
-  for (size_t i = 0; i < near_.size(); ++i) {
-    if (pencil.SideOf(columns_.point(near_.place(i))) == Sign::kPositive) {
-      return i;
+void FacetWalk<D>::SearchLeaves(NodeId leaf, const FacetPencil<D>& pencil, const Facet& facet, uint32_t& apex,
+                                FacetBall<D>& ball) {
+  const Point<D> site = columns_.point(facet.place);
+  const auto meets = [&](const Box<D>& box) {
+    double distance_sq = 0;
+    for (int i = 0; i < D; ++i) {
+      const double centre = 0.5 * ball.twice_centre[i];
+      const double gap = std::max({box.low[i] - site[i] - centre, centre - (box.high[i] - site[i]), 0.0});
+      distance_sq += gap * gap;
     }
+    const double reach = ball.Reach() + 2 * columns_.rounding();
+    return distance_sq <= reach * reach && pencil.MayHold(box, columns_.rounding());
+  };
+  uint64_t leaves = 0;
+  columns_.LookOutward(leaf, meets, [&](NodeId near) {
+    ++leaves;
+    counters_.vertices += columns_.ForEachInside(
+        near, site, ball, [&](uint32_t u, double power) { return Shrink(pencil, facet, u, power, apex, ball); });
+  });
+  counters_.leaves += leaves;
+  counters_.max_leaves = std::max(counters_.max_leaves, leaves);
+  if (apex == kNone) {
+    std::abort();  // the box has a corner beyond any facet that is not on it
   }
-  return near_.kNone;
 }
 
 // Opens or closes all facets of a simplex but for the `known_facet`, which the walk came across.

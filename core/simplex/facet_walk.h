@@ -41,6 +41,11 @@ class FacetWalk {
   void AppendStars(const QueryStructure<D>& structure, std::span<const NodeId> leaves,
                    std::span<const uint32_t> output_index, const RunContext& context, SimplexList<D>& out);
 
+  // What its scratch takes in memory, but for what it has for each node of the tree.
+  uint64_t MemoryBytes() const {
+    return columns_.MemoryBytes() + near_.MemoryBytes() + first_at_.capacity() * sizeof(uint32_t) +
+           has_simplices_.capacity() + open_.capacity() * sizeof(OpenFacet);
+  }
   // Queries are stars.
   const QueryCounters& counters() const { return counters_; }
 
@@ -54,6 +59,12 @@ class FacetWalk {
     Key key;
     uint32_t next;  // at the same vertex, or among the unused ones
   };
+  // A facet at the vertex that it is listed at, with the side that lacks a simplex.
+  struct Facet {
+    uint32_t place;
+    std::array<uint32_t, D - 1> others;
+    bool is_flipped;
+  };
   static constexpr uint32_t kNone = ~uint32_t{0};
 
   static Key KeyOf(const std::array<uint32_t, D - 1>& others, bool is_flipped);
@@ -64,11 +75,14 @@ class FacetWalk {
   void Begin(const QueryStructure<D>& structure, std::span<const NodeId> leaves,
              std::span<const uint32_t> output_index);
   bool CloseFacets(std::span<const NodeId> leaves, const RunContext& context, SimplexList<D>& out);
-  void CloseFacetsAt(uint32_t place, SimplexList<D>& out);
+  void CloseFacetsAt(NodeId leaf, uint32_t place, SimplexList<D>& out);
   void AddCellOf(uint32_t place, SimplexList<D>& out);
-  void Gather(uint32_t place, double radius);
-  uint32_t FindApex(uint32_t place, const std::array<uint32_t, D - 1>& others, bool is_flipped, FacetBall<D>& ball);
-  size_t FindSomeApex(const FacetPencil<D>& pencil) const;
+  void Gather(NodeId leaf, uint32_t place, double radius);
+  uint32_t FindApex(NodeId leaf, const Facet& facet, FacetBall<D>& ball);
+  bool Shrink(const FacetPencil<D>& pencil, const Facet& facet, uint32_t u, double power, uint32_t& apex,
+              FacetBall<D>& ball);
+  void SearchNear(const FacetPencil<D>& pencil, const Facet& facet, uint32_t& apex, FacetBall<D>& ball);
+  void SearchLeaves(NodeId leaf, const FacetPencil<D>& pencil, const Facet& facet, uint32_t& apex, FacetBall<D>& ball);
   void AddSimplex(const Corners& corners, int known_facet, double radius_sq, SimplexList<D>& out);
   void ToggleFacet(uint32_t place, Key key);
   uint32_t OutputIndex(uint32_t place) const { return output_index_[Index(columns_.vertex(place))]; }
@@ -77,7 +91,7 @@ class FacetWalk {
   std::span<const uint32_t> output_index_;
   LeafColumns<D> columns_;
   SiteColumns<D> near_;                 // to the vertex whose star is being closed
-  double near_radius_ = 0;              // all that are so near, and in the columns' surroundings
+  double near_radius_ = 0;              // all that are so near
   double needed_radius_ = 0;            // so far for this star
   uint32_t own_count_ = 0;              // places below are of the block
   std::vector<uint32_t> first_at_;      // by own place: its open facets

@@ -12,6 +12,7 @@
 
 #include "core/base/ids.h"
 #include "core/geometry/box.h"
+#include "core/simplex/facet_pencil.h"
 #include "core/simplex/site_columns.h"
 #include "core/voronoi/query_structure.h"
 
@@ -22,7 +23,7 @@ namespace wellspace::core {
 //
 // Thread safety: thread-compatible. Reused: no allocation once warm.
 // Invariants: (1) the vertices of a leaf have places side by side, in whole groups, which one vector instruction takes; (2) the
-// surroundings hold every leaf that comes nearer than `margin_` to the home leaf on every axis.
+// surroundings hold every leaf that comes as near as `margin_` to the home leaf on every axis.
 template <int D>
 class LeafColumns {
  public:
@@ -45,6 +46,7 @@ class LeafColumns {
     slots_.clear();
     groups_.clear();
     ids_.clear();
+    home_ = kNoNode;
     double largest = 0;
     for (int i = 0; i < D; ++i) {
       largest = std::max({largest, std::abs(structure.box().low[i]), std::abs(structure.box().high[i])});
@@ -54,6 +56,9 @@ class LeafColumns {
 
   // Gives places to the vertices of a leaf that has none yet.
   void AddLeaf(NodeId leaf) { SlotOf(leaf); }
+
+  // More than a rounded coordinate of a leaf, or the rounded difference of two, can be wrong by.
+  double rounding() const { return rounding_; }
 
   // How many places the vertices of a leaf take.
   static uint32_t PlacesOf(uint32_t vertices) { return (vertices + kLanes - 1) / kLanes * kLanes; }
@@ -76,32 +81,24 @@ class LeafColumns {
     return place;
   }
 
-  // Makes `leaf` the home leaf, with those around it that come nearer than its side.
+  // Makes `leaf` the home leaf, with those around it: at least all that come nearer than `margin` to it on every axis, also by rounded
+  // coordinates.
   //
-  // Complexity: O(leaves around it).
-  void SurroundLeaf(NodeId leaf) {
-    home_ = leaf;
-    const Box<D> cube = structure_->tree().BoxOf(leaf);
-    Surround(cube.high[0] - cube.low[0]);
-  }
-
-  // Takes in more leaves. REQUIRES: IsCovered of some ball is false.
-  void Widen() { Surround(2 * margin_); }
-
-  // Whether the surroundings hold all vertices of a ball that is known up to rounding: its radius is at least a part in 2^48 too large.
-  bool IsCovered(const Point<D>& centre, double radius) const {
-    const double reach = radius + rounding_;
-    for (int i = 0; i < D; ++i) {
-      if (!(centre[i] - reach > covered_.low[i] && centre[i] + reach < covered_.high[i])) {
-        return false;
-      }
+  // Complexity: O(leaves around it); O(1) if it was the home leaf with as large a margin.
+  void Surround(NodeId leaf, double margin) {
+    const double needed = margin + rounding_;
+    if (leaf != home_ || margin_ < needed) {
+      const Box<D> cube = structure_->tree().BoxOf(leaf);
+      home_ = leaf;
+      margin_ = std::max(cube.high[0] - cube.low[0], kSlack * needed);
+      MeetSurroundings();
     }
-    return true;
   }
 
-  // Puts into `near` the vertices of the surroundings with |w| <= radius but for that at `but`, w the vector from `site` to them; all of
-  // them, as the squares as computed say.
+  // Puts into `near` the vertices with |w| <= radius but for that at `but`, w the vector from `site` to them; all of them, as the squares as
+  // computed say.
   //
+  // REQUIRES: `site` in the home leaf, which is surrounded by `radius`.
   // Returns how many leaves have such vertices, or almost.
   //
   // Complexity: O(leaves of the surroundings and their vertices).
@@ -152,7 +149,65 @@ class LeafColumns {
     return opened;
   }
 
+  // Calls look(leaf) outward from `from`, for it and for every leaf that facets join to it through leaves which meets(box of a leaf) accepts;
+  // each once. What meets() accepts may become less with every call of look(): leaves that it no longer accepts are left out.
+  //
+  // Complexity: O(leaves looked at and their neighbours), whatever meets() says.
+  template <typename Meets, typename Look>
+  void LookOutward(NodeId from, Meets meets, Look look) {
+    const LeafTree<D>& tree = structure_->tree();
+    met_.clear();
+    Meet(from);
+    for (size_t next = 0; next < met_.size(); ++next) {
+      const NodeId leaf = met_[next];
+      if (next > 0 && !meets(tree.BoxOf(leaf))) {
+        continue;
+      }
+      look(leaf);
+      tree.ForEachFaceNeighbour(leaf, [&](NodeId beyond) {
+        if (!IsMet(beyond) && meets(tree.BoxOf(beyond))) {
+          Meet(beyond);
+        }
+      });
+    }
+    ForgetMet();
+  }
+
+  // Calls f(place, power) for each vertex of the leaf whose power to the ball about `site`, as computed, is below its doubt; f may change the
+  // ball, for the vertices that follow, and says whether it has.
+  //
+  // Returns the number of vertices in the leaf.
+  template <typename F>
+  uint32_t ForEachInside(NodeId leaf, const Point<D>& site, const FacetBall<D>& ball, F f) {
+    const Slot slot = slots_[SlotOf(leaf)];
+    for (uint32_t g = slot.begin; g < slot.end; ++g) {
+      for (size_t j = 0; j < kLanes;) {
+        Lanes power{};
+        Lanes product{};
+        for (int i = 0; i < D; ++i) {
+          const Lanes w = groups_[g].x[i] - site[i];
+          power += w * w;
+          product += w * ball.twice_centre[i];
+        }
+        power -= product;
+        for (bool is_changed = false; j < kLanes && !is_changed; ++j) {
+          is_changed = power[j] < ball.doubt && f(static_cast<uint32_t>(g * kLanes + j), power[j]);
+        }
+      }
+    }
+    const auto* bucket = structure_->tree().BucketOf(leaf);
+    return bucket == nullptr ? 0 : bucket->count;
+  }
+
+  // What it takes in memory, but for what it has for each node of the tree.
+  uint64_t MemoryBytes() const {
+    return slots_.capacity() * sizeof(Slot) + groups_.capacity() * sizeof(Group) + ids_.capacity() * sizeof(VertexId) +
+           pairs_.capacity() * sizeof(Pair) + met_.capacity() * sizeof(NodeId);
+  }
+
  private:
+  static constexpr double kSlack = 1.2;  // another vertex of the leaf may ask for a little more
+
   static constexpr size_t kLanes = 2;
   using Lanes = double __attribute__((vector_size(kLanes * sizeof(double))));
   using Mask = int64_t __attribute__((vector_size(kLanes * sizeof(double))));
@@ -196,20 +251,12 @@ class LeafColumns {
     return slot - first_slot_;
   }
 
-  void Surround(double margin) {
-    margin_ = margin;
+  void MeetSurroundings() {
     const LeafTree<D>& tree = structure_->tree();
-    const Box<D> home = tree.BoxOf(home_);
+    Box<D> covered = tree.BoxOf(home_);
     for (int i = 0; i < D; ++i) {
-      constexpr double kInfinity = std::numeric_limits<double>::infinity();
-      covered_.low[i] = home.low[i] - margin;
-      covered_.high[i] = home.high[i] + margin;
-      if (covered_.low[i] <= structure_->box().low[i]) {
-        covered_.low[i] = -kInfinity;
-      }
-      if (covered_.high[i] >= structure_->box().high[i]) {
-        covered_.high[i] = kInfinity;
-      }
+      covered.low[i] -= margin_;
+      covered.high[i] += margin_;
     }
     met_.clear();
     pairs_.clear();
@@ -242,21 +289,24 @@ class LeafColumns {
         }
         const Box<D> other = tree.BoxOf(beyond);
         for (int i = 0; i < D; ++i) {
-          if (other.low[i] >= covered_.high[i] || other.high[i] <= covered_.low[i]) {
+          if (other.low[i] > covered.high[i] || other.high[i] < covered.low[i]) {
             return;
           }
         }
         Meet(beyond);
       });
     }
-    for (const NodeId leaf : met_) {
-      is_met_[Index(leaf)] = false;
-    }
+    ForgetMet();
   }
   bool IsMet(NodeId leaf) const { return is_met_[Index(leaf)]; }
   void Meet(NodeId leaf) {
     is_met_[Index(leaf)] = true;
     met_.push_back(leaf);
+  }
+  void ForgetMet() {
+    for (const NodeId leaf : met_) {
+      is_met_[Index(leaf)] = false;
+    }
   }
 
   const QueryStructure<D>* structure_ = nullptr;
@@ -269,7 +319,6 @@ class LeafColumns {
 
   NodeId home_ = kNoNode;
   double margin_ = 0;
-  Box<D> covered_;
   std::vector<Pair> pairs_;
   std::vector<NodeId> met_;
   std::vector<bool> is_met_;  // by node

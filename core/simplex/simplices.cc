@@ -21,28 +21,37 @@ namespace {
 // Vertices whose cells make a block.
 constexpr size_t kCellsInBlock = 512;
 // Vertices that a walk takes at once: so many that few simplices lie on the border of two blocks, which both find them.
-constexpr size_t kWalkedInBlock = 4096;
+template <int D>
+constexpr size_t kWalkedInBlock = D == 2 ? 4096 : 16384;
 
-// The simplices of `blocks` blocks, which threads share out: append(block, scratch, out) appends those of one, with a Scratch of its
-// thread. `held_bytes` is what is held beside.
-template <int D, typename Scratch, typename Append, typename Counters>
+// The simplices of `block_count` blocks, which threads share out: append(block, scratch, out) appends those of one, with a Scratch of its
+// thread, which takes scratch_bytes(scratch) besides what is in `held_bytes`.
+template <int D, typename Scratch, typename Append, typename Bytes, typename Counters>
 absl::StatusOr<Simplices> JoinBlocks(size_t block_count, uint64_t held_bytes, int threads, RunContext& context,
-                                     Append append, Counters counters_of) {
+                                     Append append, Bytes scratch_bytes, Counters counters_of) {
+  struct OfThread {
+    Scratch scratch;
+    uint64_t bytes = 0;
+  };
   std::vector<SimplexList<D>> blocks(block_count);
   std::atomic<uint64_t> index_bytes{0};
   std::mutex mutex;
   absl::Status memory;  // guarded by mutex: the first refusal
   std::atomic<bool> is_refused{false};
-  tbb::enumerable_thread_specific<Scratch> scratches;
+  std::atomic<uint64_t> thread_bytes{0};
+  tbb::enumerable_thread_specific<OfThread> of_threads;
   std::atomic<size_t> blocks_done{0};
   ThreadTeam team(threads);
   team.ForEach(blocks.size(), [&](size_t block) {
     if (context.IsCancelled() || is_refused.load(std::memory_order_relaxed)) {
       return;
     }
-    append(block, scratches.local(), blocks[block]);
-    const uint64_t bytes = blocks[block].indices().size() * sizeof(uint32_t);
-    if (absl::Status status = context.AllowMemory(held_bytes + (index_bytes += bytes)); !status.ok()) {
+    OfThread& own = of_threads.local();
+    append(block, own.scratch, blocks[block]);
+    const uint64_t before = std::exchange(own.bytes, scratch_bytes(own.scratch));
+    const uint64_t bytes =
+        (thread_bytes += own.bytes - before) + (index_bytes += blocks[block].indices().size() * sizeof(uint32_t));
+    if (absl::Status status = context.AllowMemory(held_bytes + bytes); !status.ok()) {
       std::lock_guard lock(mutex);
       memory.Update(std::move(status));
       is_refused = true;
@@ -53,7 +62,7 @@ absl::StatusOr<Simplices> JoinBlocks(size_t block_count, uint64_t held_bytes, in
   WELLSPACE_RETURN_IF_ERROR(context.Check());
   WELLSPACE_RETURN_IF_ERROR(memory);
   // Once more, beside the blocks.
-  WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(held_bytes + 2 * index_bytes));
+  WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(held_bytes + thread_bytes + 2 * index_bytes));
 
   Simplices all;
   all.indices.reserve(index_bytes / sizeof(uint32_t));
@@ -64,8 +73,8 @@ absl::StatusOr<Simplices> JoinBlocks(size_t block_count, uint64_t held_bytes, in
     all.min_angle_deg = std::min(all.min_angle_deg, block.min_angle_deg());
     block.FreeIndices();
   }
-  for (const Scratch& scratch : scratches) {
-    all.counters.Add(counters_of(scratch));
+  for (const OfThread& own : of_threads) {
+    all.counters.Add(counters_of(own.scratch));
   }
   return all;
 }
@@ -124,7 +133,7 @@ absl::StatusOr<Simplices> JoinCells(const QueryStructure<D>& structure, std::spa
   };
   return JoinBlocks<D, Workspace<D>>((order.size() + kCellsInBlock - 1) / kCellsInBlock,
                                      HeldBytes(structure, output_index.size_bytes() + order.size_bytes(), threads),
-                                     threads, context, append,
+                                     threads, context, append, [](const Workspace<D>&) { return uint64_t{0}; },
                                      [](const Workspace<D>& workspace) { return workspace.counters; });
 }
 
@@ -140,7 +149,7 @@ absl::StatusOr<Simplices> JoinWalks(const QueryStructure<D>& structure, std::spa
     if (bucket == nullptr || bucket->count == 0 || context.IsCancelled()) {
       return;
     }
-    if (in_block >= kWalkedInBlock) {
+    if (in_block >= kWalkedInBlock<D>) {
       block_begin.push_back(leaves.size());
       in_block = 0;
     }
@@ -155,7 +164,8 @@ absl::StatusOr<Simplices> JoinWalks(const QueryStructure<D>& structure, std::spa
   };
   return JoinBlocks<D, FacetWalk<D>>(
       block_begin.size() - 1, HeldBytes(structure, output_index.size_bytes() + leaves.size() * sizeof(NodeId), threads),
-      threads, context, append, [](const FacetWalk<D>& walk) { return walk.counters(); });
+      threads, context, append, [](const FacetWalk<D>& walk) { return walk.MemoryBytes(); },
+      [](const FacetWalk<D>& walk) { return walk.counters(); });
 }
 
 }  // namespace

@@ -21,8 +21,9 @@ struct Simplices {
   QueryCounters counters;
 };
 
-// Computes every vertex's whole Voronoi cell; each of its nodes is a simplex, emitted by the vertex with the lowest
-// output index. Vertices are taken along the Z curve of the tree, in blocks that threads share out.
+// Each simplex once, emitted by the block of its vertex with the lowest output index; blocks are stretches of the Z curve of the tree, which
+// threads share out. In 2-D a block is walked through from facet to facet (FacetWalk); from 3-D on every vertex's whole Voronoi cell is
+// computed, each of whose nodes is a simplex.
 //
 // Shapes:     output_index: vertex_count entries, a permutation: the index in the output of each vertex.
 // REQUIRES:   `structure` refined: no circumcentre outside the box.
@@ -31,7 +32,7 @@ struct Simplices {
 // Complexity: O(m) for m vertices.
 // Errors:     RESOURCE_EXHAUSTED of the context's memory; CANCELLED, DEADLINE_EXCEEDED.
 // Threads:    uses `threads`, at most as many as the machine has cores.
-// Source:     [HT08] §1 and §2.
+// Source:     [HT08] §1 and §2; the walk is ours (docs/design/simplex.md).
 template <int D>
 absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, std::span<const uint32_t> output_index,
                                            int threads, RunContext& context);

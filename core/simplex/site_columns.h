@@ -51,6 +51,7 @@ class SiteColumns {
   }
 
   size_t size() const { return count_; }
+  uint64_t MemoryBytes() const { return places_.capacity() * (sizeof(uint32_t) + (D + 1) * sizeof(double)); }
   uint32_t place(size_t i) const { return places_[i]; }
 
   // The first vertex that a ball of the pencil meets when its centre moves from far below the facet upwards, as far as rounding lets one

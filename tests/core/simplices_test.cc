@@ -232,7 +232,45 @@ class FacetPencilTest : public test::SeededTest {
     EXPECT_GT(clear, 200);
     EXPECT_GT(close, 20);
   }
+
+  // No box with a point on the positive side or in the hyperplane is left out, be it a single corner of the facet; and boxes that are far
+  // below are.
+  template <int D>
+  void ExpectBoxesAreKept() {
+    int left_out = 0;
+    for (int i = 0; i < 2000; ++i) {
+      const Point<D> site = Draw<D>();
+      std::array<Point<D>, D - 1> others;
+      for (Point<D>& other : others) {
+        other = Draw<D>();
+      }
+      const FacetPencil<D> pencil(site, others, i % 2 == 1);
+      Box<D> box{Draw<D>(), {}};
+      const double side = std::ldexp(1.0, -static_cast<int>(random_.Below(50)));
+      for (int k = 0; k < D; ++k) {
+        box.high[k] = box.low[k] + side;
+      }
+      bool has_some = false;
+      for (int corner = 0; corner < 1 << D; ++corner) {
+        Point<D> p;
+        for (int k = 0; k < D; ++k) {
+          p[k] = ((corner >> k) & 1) != 0 ? box.high[k] : box.low[k];
+        }
+        has_some = has_some || pencil.SideOf(p) != Sign::kNegative;
+      }
+      EXPECT_LE(has_some, pencil.MayHold(box, 0));
+      left_out += pencil.MayHold(box, 0) ? 0 : 1;
+      EXPECT_TRUE(pencil.MayHold({site, site}, 0));
+      EXPECT_TRUE(pencil.MayHold({others[0], others[0]}, 0));
+    }
+    EXPECT_GT(left_out, 500);
+  }
 };
+
+TEST_F(FacetPencilTest, BoxesOnThePositiveSideAreKept) {
+  ExpectBoxesAreKept<2>();
+  ExpectBoxesAreKept<3>();
+}
 
 TEST_F(FacetPencilTest, ClearPowersAreRight) {
   ExpectClearPowersAreRight<2>();
