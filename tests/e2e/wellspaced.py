@@ -13,7 +13,8 @@ import types
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BIN = pathlib.Path(os.environ["WELLSPACE_BIN_DIR"])
-PATIENCE = 240  # seconds after which something hangs, also on a busy machine and under a sanitizer
+# Seconds after which something hangs, also on a busy machine.
+PATIENCE = 960 if os.environ.get("WELLSPACE_SANITIZE") else 240
 
 
 class Wellspaced:

@@ -1,9 +1,7 @@
 #include "server/authenticator.h"
 
-#include <future>
 
 #include "gmock/gmock.h"
-#include "grpcpp/generic/generic_stub.h"
 #include "gtest/gtest.h"
 #include "tests/formats/temporary_folder.h"
 #include "tests/server/raw_call.h"
@@ -42,17 +40,7 @@ class TokensWanted : public ::testing::Test {
   }
 
   // One empty message to any method, whatever its kind.
-  grpc::Status CallEmpty(const std::string& path) {
-    grpc::GenericStub stub(harness_.channel());
-    grpc::ClientContext context;
-    const grpc::Slice nothing("");
-    const grpc::ByteBuffer request(&nothing, 1);
-    grpc::ByteBuffer response;
-    std::promise<grpc::Status> promise;
-    stub.UnaryCall(&context, path, grpc::StubOptions(), &request, &response,
-                   [&promise](grpc::Status status) { promise.set_value(std::move(status)); });
-    return promise.get_future().get();
-  }
+  grpc::Status CallEmpty(const std::string& path) { return CallUnary(harness_.channel(), path, "").status; }
 
   TemporaryFolder folder_;
   ServiceHarness harness_;
