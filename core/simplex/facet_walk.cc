@@ -12,6 +12,9 @@ namespace {
 constexpr double kMargin = 1.05;
 // but not farther than so many times the longest edge of a facet: leaves are looked at for the balls that reach farther.
 constexpr double kEdges = 2.5;
+// Where more leaves than these lie around one, small leaves about a large star, the cell tells the apexes.
+template <int D>
+constexpr size_t kMostSurroundings = D == 2 ? 64 : 1024;
 // A vertex so little above a facet, by the length of the vector to it, is no first choice.
 constexpr double kLeastHeight = 0x1p-40;
 
@@ -123,8 +126,12 @@ void FacetWalk<D>::CloseFacetsAt(NodeId leaf, uint32_t place, SimplexList<D>& ou
     edge_sq = std::max(edge_sq, DistanceSq<D>(columns_.point(other), columns_.point(place)));
   }
   const double most = kEdges * std::sqrt(edge_sq);
-  Gather(leaf, place, needed_radius_ > 0 ? std::min(kMargin * needed_radius_, most) : most);
-  needed_radius_ = 0;
+  const bool is_gathered = Gather(leaf, place, needed_radius_ > 0 ? std::min(kMargin * needed_radius_, most) : most);
+  if (is_gathered) {
+    needed_radius_ = 0;
+  } else {
+    ComputeCell(place);
+  }
   while (first_at_[place] != kNone) {
     const uint32_t at = first_at_[place];
     const auto [key, next] = open_[at];
@@ -133,8 +140,8 @@ void FacetWalk<D>::CloseFacetsAt(NodeId leaf, uint32_t place, SimplexList<D>& ou
     unused_ = at;
     --open_count_;
     const Facet facet{place, OthersOf(key), IsFlipped(key)};
-    FacetBall<D> ball;
-    const uint32_t apex = FindApex(leaf, facet, ball);
+    FacetBall<D> ball = FacetBall<D>::Everything();
+    const uint32_t apex = is_gathered ? FindApex(leaf, facet, ball) : ApexInCell(facet);
     Corners corners;
     corners[0] = place;
     std::copy(facet.others.begin(), facet.others.end(), corners.begin() + 1);
@@ -147,44 +154,83 @@ void FacetWalk<D>::CloseFacetsAt(NodeId leaf, uint32_t place, SimplexList<D>& ou
   }
 }
 
-// The star of a vertex that no walk has come to.
+// Puts the simplices of a vertex into cell_.
 template <int D>
-void FacetWalk<D>::AddCellOf(uint32_t place, SimplexList<D>& out) {
-  const VertexId v = columns_.vertex(place);
-  structure_->Voronoi(v, workspace_);
-  counters_.decisions.exact += workspace_.cell.counters().exact;
-  counters_.decisions.perturbed += workspace_.cell.counters().perturbed;
+void FacetWalk<D>::ComputeCell(uint32_t place) {
+  structure_->Voronoi(columns_.vertex(place), workspace_);
+  cell_.clear();
   for (const CellNode<D>& node : workspace_.cell.nodes()) {
-    Corners corners;
-    corners[0] = place;
-    Simplex<D> points;
-    points[0] = structure_->point(v);
+    std::array<uint32_t, D> others;
     bool is_simplex = true;
     for (int k = 0; k < D && is_simplex; ++k) {
       const Plane<D>& plane = workspace_.cell.plane(node.planes[k]);
       is_simplex = plane.kind == PlaneKind::kBisector;
       if (is_simplex) {
-        corners[k + 1] = columns_.PlaceOf(plane.vertex);
-        points[k + 1] = structure_->point(plane.vertex);
+        others[k] = columns_.PlaceOf(plane.vertex);
       }
     }
     if (is_simplex) {
-      if (Orientation<D>(points).sign == Sign::kNegative) {
-        std::swap(corners[D - 1], corners[D]);
-      }
-      AddSimplex(corners, -1, std::numeric_limits<double>::infinity(), out);
+      cell_.push_back(others);
     }
   }
 }
 
+// The star of a vertex that no walk has come to.
 template <int D>
-void FacetWalk<D>::Gather(NodeId leaf, uint32_t place, double radius) {
+void FacetWalk<D>::AddCellOf(uint32_t place, SimplexList<D>& out) {
+  ComputeCell(place);
+  for (const std::array<uint32_t, D>& others : cell_) {
+    Corners corners;
+    corners[0] = place;
+    std::copy(others.begin(), others.end(), corners.begin() + 1);
+    Simplex<D> points;
+    for (int i = 0; i <= D; ++i) {
+      points[i] = columns_.point(corners[i]);
+    }
+    if (Orientation<D>(points).sign == Sign::kNegative) {
+      std::swap(corners[D - 1], corners[D]);
+    }
+    AddSimplex(corners, -1, std::numeric_limits<double>::infinity(), out);
+  }
+}
+
+// False, and nothing gathered, when there is too much around the leaf.
+template <int D>
+bool FacetWalk<D>::Gather(NodeId leaf, uint32_t place, double radius) {
+  if (!columns_.Surround(leaf, radius, kMostSurroundings<D>)) {
+    return false;
+  }
   near_radius_ = radius;
-  columns_.Surround(leaf, radius);
   const uint64_t leaves = columns_.Gather(columns_.point(place), radius, place, near_);
   counters_.leaves += leaves;
   counters_.vertices += near_.size();
   counters_.max_leaves = std::max(counters_.max_leaves, leaves);
+  return true;
+}
+
+// The vertex on the positive side of a facet that one of the simplices in cell_, those of the facet's site, has besides the facet's.
+template <int D>
+uint32_t FacetWalk<D>::ApexInCell(const Facet& facet) {
+  std::array<Point<D>, D - 1> points;
+  for (int j = 0; j < D - 1; ++j) {
+    points[j] = columns_.point(facet.others[j]);
+  }
+  const FacetPencil<D> pencil(columns_.point(facet.place), points, facet.is_flipped);
+  for (const std::array<uint32_t, D>& others : cell_) {
+    uint32_t apex = kNone;
+    int common = 0;
+    for (const uint32_t other : others) {
+      if (std::find(facet.others.begin(), facet.others.end(), other) != facet.others.end()) {
+        ++common;
+      } else {
+        apex = other;
+      }
+    }
+    if (common == D - 1 && pencil.SideOf(columns_.point(apex)) == Sign::kPositive) {
+      return apex;
+    }
+  }
+  std::abort();  // a facet that is not on the box has simplices on both sides
 }
 
 // The vertex on the positive side of a facet at a vertex in `leaf` whose ball holds no other, and that ball.
@@ -362,6 +408,14 @@ void FacetWalk<D>::ToggleFacet(uint32_t place, Key key) {
   ++open_count_;
   open_[at] = {key, first_at_[place]};
   first_at_[place] = at;
+}
+
+template <int D>
+QueryCounters FacetWalk<D>::counters() const {
+  QueryCounters all = workspace_.counters;
+  all.queries = 0;
+  all.Add(counters_);
+  return all;
 }
 
 template class FacetWalk<2>;

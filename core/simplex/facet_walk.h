@@ -35,7 +35,7 @@ class FacetWalk {
   // Shapes:     output_index: by vertex.
   // REQUIRES:   `structure` refined: no circumcentre outside the box.
   // Guarantees: (1) the simplices that have a corner in `leaves` are those of the vertices' whole cells (QueryStructure::Voronoi).
-  // Complexity: O(1) for each of their vertices.
+  // Complexity: O(1) for each of their vertices: what a star looks at is bounded by kMostSurroundings, or by its cell.
   // Errors:     none.
   // Source:     gift wrapping (Chand and Kapur 1970) in Delaunay triangulations: McLain 1976; with a stop by cells: Maus 1984.
   void AppendStars(const QueryStructure<D>& structure, std::span<const NodeId> leaves,
@@ -47,7 +47,7 @@ class FacetWalk {
            has_simplices_.capacity() + open_.capacity() * sizeof(OpenFacet);
   }
   // Queries are stars.
-  const QueryCounters& counters() const { return counters_; }
+  QueryCounters counters() const;
 
  private:
   // The places of a simplex, positively oriented.
@@ -76,9 +76,11 @@ class FacetWalk {
              std::span<const uint32_t> output_index);
   bool CloseFacets(std::span<const NodeId> leaves, const RunContext& context, SimplexList<D>& out);
   void CloseFacetsAt(NodeId leaf, uint32_t place, SimplexList<D>& out);
+  void ComputeCell(uint32_t place);
   void AddCellOf(uint32_t place, SimplexList<D>& out);
-  void Gather(NodeId leaf, uint32_t place, double radius);
+  bool Gather(NodeId leaf, uint32_t place, double radius);
   uint32_t FindApex(NodeId leaf, const Facet& facet, FacetBall<D>& ball);
+  uint32_t ApexInCell(const Facet& facet);
   bool Shrink(const FacetPencil<D>& pencil, const Facet& facet, uint32_t u, double power, uint32_t& apex,
               FacetBall<D>& ball);
   void SearchNear(const FacetPencil<D>& pencil, const Facet& facet, uint32_t& apex, FacetBall<D>& ball);
@@ -99,6 +101,8 @@ class FacetWalk {
   std::vector<OpenFacet> open_;
   uint32_t unused_ = kNone;
   size_t open_count_ = 0;
+  // Of each simplex that the last cell has a node for, the places of the vertices but for its site.
+  std::vector<std::array<uint32_t, D>> cell_;
   Workspace<D> workspace_;
   QueryCounters counters_;
 };

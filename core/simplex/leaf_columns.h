@@ -23,7 +23,7 @@ namespace wellspace::core {
 //
 // Thread safety: thread-compatible. Reused: no allocation once warm.
 // Invariants: (1) the vertices of a leaf have places side by side, in whole groups, which one vector instruction takes; (2) the
-// surroundings hold every leaf that comes as near as `margin_` to the home leaf on every axis.
+// surroundings hold every leaf that comes as near as `margin_` to the home leaf on every axis, if that is not negative.
 template <int D>
 class LeafColumns {
  public:
@@ -84,15 +84,28 @@ class LeafColumns {
   // Makes `leaf` the home leaf, with those around it: at least all that come nearer than `margin` to it on every axis, also by rounded
   // coordinates.
   //
-  // Complexity: O(leaves around it); O(1) if it was the home leaf with as large a margin.
-  void Surround(NodeId leaf, double margin) {
+  // Returns false, and nothing is surrounded, if that takes more than `most_leaves`.
+  // Complexity: O(leaves around it, or most_leaves); O(1) if it was the last leaf, with as large a margin, or as small a one in vain.
+  bool Surround(NodeId leaf, double margin, size_t most_leaves) {
     const double needed = margin + rounding_;
-    if (leaf != home_ || margin_ < needed) {
-      const Box<D> cube = structure_->tree().BoxOf(leaf);
-      home_ = leaf;
-      margin_ = std::max(cube.high[0] - cube.low[0], kSlack * needed);
-      MeetSurroundings();
+    if (leaf == home_ && needed <= margin_) {
+      return true;
     }
+    if (leaf != home_) {
+      too_large_ = std::numeric_limits<double>::infinity();
+    }
+    home_ = leaf;
+    margin_ = -1;
+    if (needed < too_large_) {
+      const Box<D> cube = structure_->tree().BoxOf(leaf);
+      const double wanted = std::max(cube.high[0] - cube.low[0], kSlack * needed);
+      if (MeetSurroundings(wanted, most_leaves)) {
+        margin_ = wanted;
+      } else {
+        too_large_ = needed;
+      }
+    }
+    return margin_ >= needed;
   }
 
   // Puts into `near` the vertices with |w| <= radius but for that at `but`, w the vector from `site` to them; all of them, as the squares as
@@ -251,18 +264,19 @@ class LeafColumns {
     return slot - first_slot_;
   }
 
-  void MeetSurroundings() {
+  // False if there are too many.
+  bool MeetSurroundings(double margin, size_t most_leaves) {
     const LeafTree<D>& tree = structure_->tree();
     Box<D> covered = tree.BoxOf(home_);
     for (int i = 0; i < D; ++i) {
-      covered.low[i] -= margin_;
-      covered.high[i] += margin_;
+      covered.low[i] -= margin;
+      covered.high[i] += margin;
     }
     met_.clear();
     pairs_.clear();
     Meet(home_);
     size_t lane = 0;
-    for (size_t next = 0; next < met_.size(); ++next) {
+    for (size_t next = 0; next < met_.size() && met_.size() <= most_leaves; ++next) {
       const NodeId leaf = met_[next];
       const Box<D> cube = tree.BoxOf(leaf);
       const Slot slot = slots_[SlotOf(leaf)];
@@ -297,6 +311,7 @@ class LeafColumns {
       });
     }
     ForgetMet();
+    return met_.size() <= most_leaves;
   }
   bool IsMet(NodeId leaf) const { return is_met_[Index(leaf)]; }
   void Meet(NodeId leaf) {
@@ -318,7 +333,8 @@ class LeafColumns {
   std::vector<VertexId> ids_;  // by place
 
   NodeId home_ = kNoNode;
-  double margin_ = 0;
+  double margin_ = -1;    // of the surroundings
+  double too_large_ = 0;  // margins of home_ from this on have too many leaves
   std::vector<Pair> pairs_;
   std::vector<NodeId> met_;
   std::vector<bool> is_met_;  // by node

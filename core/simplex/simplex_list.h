@@ -11,9 +11,9 @@
 
 namespace wellspace::core {
 
-// Thread safety: thread-compatible.
+// Thread safety: thread-compatible. Reused from block to block.
 // Invariants: (1) max_radius_edge and min_angle_deg are the largest RadiusEdgeRatio and the smallest Angles of the simplices, to
-// the bit, whatever their order.
+// the bit, whatever their order; those before Clear() count, too.
 template <int D>
 class SimplexList {
  public:
@@ -29,7 +29,9 @@ class SimplexList {
   const std::vector<uint32_t>& indices() const { return indices_; }
   double max_radius_edge() const { return max_radius_edge_; }
   double min_angle_deg() const { return min_angle_deg_; }
-  void FreeIndices() { indices_ = {}; }
+  uint64_t MemoryBytes() const { return indices_.capacity() * sizeof(uint32_t); }
+  // Forgets the simplices, but not their shapes.
+  void Clear() { indices_.clear(); }
 
  private:
   bool IsClearlyBetter(const Simplex<D>& points, double radius_sq) const;

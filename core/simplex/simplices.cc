@@ -6,6 +6,7 @@
 #include <array>
 #include <atomic>
 #include <limits>
+#include <map>
 #include <mutex>
 #include <utility>
 
@@ -22,7 +23,82 @@ namespace {
 constexpr size_t kCellsInBlock = 512;
 // Vertices that a walk takes at once: so many that few simplices lie on the border of two blocks, which both find them.
 template <int D>
-constexpr size_t kWalkedInBlock = D == 2 ? 4096 : 16384;
+constexpr size_t kWalkedInBlock = D == 2 ? 4096 : 65536;
+
+// Joins the simplices of blocks, which come in any order, in that of the blocks, and sees to the memory that they take.
+//
+// Thread safety: thread-safe.
+class BlockJoin {
+ public:
+  // `held_bytes`: what is held besides.
+  BlockJoin(size_t block_count, uint64_t held_bytes, RunContext& context)
+      : block_count_(block_count), held_bytes_(held_bytes), context_(context) {}
+
+  // The next block to be made: the one that the others wait for first.
+  size_t NextBlock() { return next_block_++; }
+  // Whether the blocks that are to come are of no use.
+  bool HasEnded() const { return context_.IsCancelled() || is_refused_; }
+
+  // Takes the indices of the simplices of a block. `more_bytes`: what its thread holds more than at its last block.
+  void Take(size_t block, const std::vector<uint32_t>& indices, uint64_t more_bytes) {
+    std::lock_guard lock(mutex_);
+    held_bytes_ += more_bytes;
+    if (block != joined_count_) {
+      waiting_size_ += indices.size();
+      waiting_.emplace(block, indices);
+      Allow(0);
+    } else {
+      Append(indices);
+      for (auto next = waiting_.begin(); next != waiting_.end() && next->first == joined_count_;
+           next = waiting_.erase(next)) {
+        Append(next->second);
+        waiting_size_ -= next->second.size();
+      }
+    }
+    context_.SetPhaseFraction(static_cast<double>(joined_count_ + waiting_.size()) / static_cast<double>(block_count_));
+  }
+
+  // All of them, when the last block has been taken. Errors: that of the context, or RESOURCE_EXHAUSTED.
+  absl::StatusOr<std::vector<uint32_t>> Finish() {
+    WELLSPACE_RETURN_IF_ERROR(context_.Check());
+    WELLSPACE_RETURN_IF_ERROR(memory_);
+    return std::move(joined_);
+  }
+
+ private:
+  void Append(const std::vector<uint32_t>& indices) {
+    ++joined_count_;
+    const size_t size = joined_.size() + indices.size();
+    if (size > joined_.capacity()) {
+      // As many as there will be if the blocks to come are like these, and a few more: what is not used takes no memory.
+      Allow(joined_.size());
+      joined_.reserve(size + size / 16 + size / joined_count_ * (block_count_ - joined_count_) * 17 / 16);
+    }
+    joined_.insert(joined_.end(), indices.begin(), indices.end());
+    Allow(0);
+  }
+
+  // Asks for what is held, and `more` indices.
+  void Allow(size_t more) {
+    const uint64_t bytes = held_bytes_ + (joined_.size() + waiting_size_ + more) * sizeof(uint32_t);
+    if (absl::Status status = context_.AllowMemory(bytes); !status.ok()) {
+      memory_.Update(std::move(status));
+      is_refused_ = true;
+    }
+  }
+
+  const size_t block_count_;
+  uint64_t held_bytes_;  // this and all below but for the atomic ones: guarded by mutex_
+  RunContext& context_;
+  std::mutex mutex_;
+  std::vector<uint32_t> joined_;
+  size_t joined_count_ = 0;
+  std::map<size_t, std::vector<uint32_t>> waiting_;  // by block
+  size_t waiting_size_ = 0;
+  absl::Status memory_;  // the first refusal
+  std::atomic<bool> is_refused_{false};
+  std::atomic<size_t> next_block_{0};
+};
 
 // The simplices of `block_count` blocks, which threads share out: append(block, scratch, out) appends those of one, with a Scratch of its
 // thread, which takes scratch_bytes(scratch) besides what is in `held_bytes`.
@@ -31,49 +107,30 @@ absl::StatusOr<Simplices> JoinBlocks(size_t block_count, uint64_t held_bytes, in
                                      Append append, Bytes scratch_bytes, Counters counters_of) {
   struct OfThread {
     Scratch scratch;
+    SimplexList<D> list;
     uint64_t bytes = 0;
   };
-  std::vector<SimplexList<D>> blocks(block_count);
-  std::atomic<uint64_t> index_bytes{0};
-  std::mutex mutex;
-  absl::Status memory;  // guarded by mutex: the first refusal
-  std::atomic<bool> is_refused{false};
-  std::atomic<uint64_t> thread_bytes{0};
+  BlockJoin join(block_count, held_bytes, context);
   tbb::enumerable_thread_specific<OfThread> of_threads;
-  std::atomic<size_t> blocks_done{0};
   ThreadTeam team(threads);
-  team.ForEach(blocks.size(), [&](size_t block) {
-    if (context.IsCancelled() || is_refused.load(std::memory_order_relaxed)) {
+  team.ForEach(block_count, [&](size_t) {
+    if (join.HasEnded()) {
       return;
     }
+    const size_t block = join.NextBlock();
     OfThread& own = of_threads.local();
-    append(block, own.scratch, blocks[block]);
-    const uint64_t before = std::exchange(own.bytes, scratch_bytes(own.scratch));
-    const uint64_t bytes =
-        (thread_bytes += own.bytes - before) + (index_bytes += blocks[block].indices().size() * sizeof(uint32_t));
-    if (absl::Status status = context.AllowMemory(held_bytes + bytes); !status.ok()) {
-      std::lock_guard lock(mutex);
-      memory.Update(std::move(status));
-      is_refused = true;
-    }
-    context.AddSimplices(blocks[block].size());
-    context.SetPhaseFraction(static_cast<double>(++blocks_done) / static_cast<double>(blocks.size()));
+    own.list.Clear();
+    append(block, own.scratch, own.list);
+    const uint64_t before = std::exchange(own.bytes, scratch_bytes(own.scratch) + own.list.MemoryBytes());
+    join.Take(block, own.list.indices(), own.bytes - before);
+    context.AddSimplices(own.list.size());
   });
-  WELLSPACE_RETURN_IF_ERROR(context.Check());
-  WELLSPACE_RETURN_IF_ERROR(memory);
-  // Once more, beside the blocks.
-  WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(held_bytes + thread_bytes + 2 * index_bytes));
 
   Simplices all;
-  all.indices.reserve(index_bytes / sizeof(uint32_t));
-  for (SimplexList<D>& block : blocks) {
-    WELLSPACE_RETURN_IF_ERROR(context.Check());
-    all.indices.insert(all.indices.end(), block.indices().begin(), block.indices().end());
-    all.max_radius_edge = std::max(all.max_radius_edge, block.max_radius_edge());
-    all.min_angle_deg = std::min(all.min_angle_deg, block.min_angle_deg());
-    block.FreeIndices();
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(all.indices, join.Finish());
   for (const OfThread& own : of_threads) {
+    all.max_radius_edge = std::max(all.max_radius_edge, own.list.max_radius_edge());
+    all.min_angle_deg = std::min(all.min_angle_deg, own.list.min_angle_deg());
     all.counters.Add(counters_of(own.scratch));
   }
   return all;
@@ -143,13 +200,15 @@ absl::StatusOr<Simplices> JoinWalks(const QueryStructure<D>& structure, std::spa
                                     int threads, RunContext& context) {
   std::vector<NodeId> leaves;
   std::vector<size_t> block_begin{0};
+  // Some blocks at least, for as many threads.
+  const size_t most = std::min(kWalkedInBlock<D>, structure.vertex_count() / size_t{4});
   size_t in_block = 0;
   structure.tree().ForEachLeaf([&](NodeId leaf) {
     const auto* bucket = structure.tree().BucketOf(leaf);
     if (bucket == nullptr || bucket->count == 0 || context.IsCancelled()) {
       return;
     }
-    if (in_block >= kWalkedInBlock<D>) {
+    if (in_block >= most && in_block > 0) {
       block_begin.push_back(leaves.size());
       in_block = 0;
     }
@@ -173,7 +232,7 @@ absl::StatusOr<Simplices> JoinWalks(const QueryStructure<D>& structure, std::spa
 template <int D>
 absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, std::span<const uint32_t> output_index,
                                            int threads, RunContext& context) {
-  if constexpr (D == 2) {
+  if constexpr (D <= 3) {
     return JoinWalks<D>(structure, output_index, threads, context);
   } else {
     std::vector<VertexId> order;

@@ -22,8 +22,8 @@ struct Simplices {
 };
 
 // Each simplex once, emitted by the block of its vertex with the lowest output index; blocks are stretches of the Z curve of the tree, which
-// threads share out. In 2-D a block is walked through from facet to facet (FacetWalk); from 3-D on every vertex's whole Voronoi cell is
-// computed, each of whose nodes is a simplex.
+// threads share out. In 2-D and 3-D a block is walked through from facet to facet (FacetWalk); from 4-D on every vertex's whole Voronoi cell
+// is computed, each of whose nodes is a simplex.
 //
 // Shapes:     output_index: vertex_count entries, a permutation: the index in the output of each vertex.
 // REQUIRES:   `structure` refined: no circumcentre outside the box.

@@ -61,6 +61,43 @@ void Emit(const Triangulation<D>& triangulation, SimplexId s, std::span<const ui
   out.insert(out.end(), corners.begin(), corners.end());
 }
 
+// Puts simplices, lowest vertex first, into ascending order: that of the numbers of a triangulation, which decide what is mended first, is then
+// one of the simplices alone.
+//
+// Complexity: O(vertices + simplices) and sorting the simplices of each lowest vertex.
+// Errors:     CANCELLED, DEADLINE_EXCEEDED.
+template <int D>
+absl::Status SortSimplices(uint32_t vertex_count, std::vector<uint32_t>& indices, const RunContext& context) {
+  using Row = std::array<uint32_t, D + 1>;
+  const size_t count = indices.size() / (D + 1);
+  std::vector<size_t> next(size_t{vertex_count} + 1, 0);  // by lowest vertex
+  for (size_t s = 0; s < count; ++s) {
+    ++next[indices[s * (D + 1)] + 1];
+  }
+  std::partial_sum(next.begin(), next.end(), next.begin());
+  std::vector<Row> rows(count);
+  for (size_t s = 0; s < count; ++s) {
+    if (s % kCheckInterval == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
+    const auto from = indices.begin() + static_cast<ptrdiff_t>(s * (D + 1));
+    std::copy(from, from + D + 1, rows[next[*from]++].begin());
+  }
+  // next[v] is where those of v end.
+  size_t begin = 0;
+  auto to = indices.begin();
+  for (uint32_t v = 0; v < vertex_count; ++v) {
+    if (v % kCheckInterval == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
+    std::sort(rows.begin() + static_cast<ptrdiff_t>(begin), rows.begin() + static_cast<ptrdiff_t>(next[v]));
+    for (; begin < next[v]; ++begin) {
+      to = std::copy(rows[begin].begin(), rows[begin].end(), to);
+    }
+  }
+  return absl::OkStatus();
+}
+
 // Whether the simplex may be the worst of all so far in one of the two measures, by a cheaper computation.
 template <int D>
 class WorstCandidates {
@@ -125,7 +162,7 @@ absl::StatusOr<Triangulation<D>> SliverStage<D>::Triangulate(const QueryStructur
   // By the structure's own numbers, which do not depend on the order of the input.
   std::vector<uint32_t> identity(structure.vertex_count());
   std::iota(identity.begin(), identity.end(), uint32_t{0});
-  WELLSPACE_ASSIGN_OR_RETURN(const Simplices simplices, ComputeSimplices<D>(structure, identity, threads, context));
+  WELLSPACE_ASSIGN_OR_RETURN(Simplices simplices, ComputeSimplices<D>(structure, identity, threads, context));
   statistics_.star_queries.Add(simplices.counters);
   if (statistics_.min_angle_deg == 0) {
     statistics_.min_angle_deg = simplices.min_angle_deg;
@@ -133,6 +170,8 @@ absl::StatusOr<Triangulation<D>> SliverStage<D>::Triangulate(const QueryStructur
   WELLSPACE_RETURN_IF_ERROR(
       context.AllowMemory(structure.MemoryBytes() + simplices.indices.size() * sizeof(uint32_t) +
                           Triangulation<D>::BuildBytes(structure.vertex_count(), simplices.indices.size() / (D + 1))));
+  // Sorting takes less than Build.
+  WELLSPACE_RETURN_IF_ERROR(SortSimplices<D>(structure.vertex_count(), simplices.indices, context));
   std::vector<Point<D>> points;
   points.reserve(structure.vertex_count());
   for (uint32_t v = 0; v < structure.vertex_count(); ++v) {

@@ -39,13 +39,13 @@ std::vector<GoldenMesh> GoldenMeshes() {
       {"grid_2", "grid", 2, 1000, {}, 1155, 0x37893ba05a900568},
       {"cospherical_2", "cospherical", 2, 500, {}, 944, 0x1b188bc5a9cc0c17},
       {"uniform_2_sized", "uniform", 2, 100, {.max_circumradius = 0.02}, 1730, 0xf8a034bc23b92ba5},
-      {"uniform_3", "uniform", 3, 1000, {}, 3751, 0xfa30acc6b16812ae},
+      {"uniform_3", "uniform", 3, 1000, {}, 3753, 0x11d054c67d439114},
       {"uniform_3_unmended", "uniform", 3, 1000, {.min_dihedral = 0}, 3731, 0x3c75f2f940db0778},
-      {"uniform_3_well_spaced", "uniform", 3, 300, {.criterion = Criterion::kWellSpaced}, 2262, 0x347d685f09a393ee},
-      {"grid_3", "grid", 3, 1000, {}, 1325, 0xbf6f865efd50c503},
-      {"rounded_3", "rounded", 3, 1000, {}, 3493, 0x8689380b0f7d01a6},
-      {"boundary_3", "boundary", 3, 300, {}, 652, 0xab41e02708f4c25d},
-      {"skew_3", "skew", 3, 300, {}, 1562, 0x16155a24aea6242f},
+      {"uniform_3_well_spaced", "uniform", 3, 300, {.criterion = Criterion::kWellSpaced}, 2262, 0x611074234088acd7},
+      {"grid_3", "grid", 3, 1000, {}, 1325, 0xcf2000125c01fb78},
+      {"rounded_3", "rounded", 3, 1000, {}, 3494, 0x57ebf80e42299b21},
+      {"boundary_3", "boundary", 3, 300, {}, 653, 0x45c48b4fd1d3a171},
+      {"skew_3", "skew", 3, 300, {}, 1562, 0x480712dc7171491},
       {"uniform_4", "uniform", 4, 20, {}, 615, 0x851422d2aeacbff2},
       {"rounded_4_well_spaced", "rounded", 4, 10, {.criterion = Criterion::kWellSpaced}, 596, 0x3df92db4bd32da60},
       {"uniform_5", "uniform", 5, 2, {}, 282, 0x4c70092a58c65738},
@@ -56,7 +56,7 @@ std::vector<GoldenMesh> GoldenMeshes() {
        100,
        {.size_boxes = {{{0.2, 0.2, 0.2}, {0.4, 0.4, 0.4}, 0.03}}},
        1247,
-       0xb59fcc2c2164994b},
+       0x817243ebefdd16b},
   };
 }
 

@@ -155,12 +155,18 @@ TEST_P(SimplicesOfCloud, AreThoseOfTheCells) {
   }
 }
 
-// More vertices than one block takes.
+// More vertices than one block takes, in 2-D.
 TEST(Simplices, BlocksAgree) {
   ExpectSimplicesOfCells<2>("uniform", 4'000);
   ExpectSimplicesOfCells<2>("grid", 5'000);
   ExpectSimplicesOfCells<3>("grid", 5'000);
   ExpectSimplicesOfCells<3>("uniform", 2'000);
+}
+
+// Around large stars there are too many small leaves to be looked at one by one.
+TEST(Simplices, CellsTellTheApexesWhereSizesVary) {
+  ExpectSimplicesOfCells<2>("lines", 2'000);
+  ExpectSimplicesOfCells<3>("skew", 1'000);
 }
 
 class FacetPencilTest : public test::SeededTest {
