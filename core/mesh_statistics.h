@@ -37,13 +37,13 @@ struct MeshStatistics {
   uint64_t vertices_visited = 0;
   uint64_t cuts = 0;
   uint64_t max_leaves_visited = 0;  // by a single one
-  uint64_t stars_computed = 0;      // Voronoi queries of the simplices
+  uint64_t stars_computed = 0;      // of vertices, for the simplices
   uint64_t star_leaves_visited = 0;
   uint64_t star_vertices_visited = 0;
-  uint64_t star_cuts = 0;
-  uint64_t max_star_leaves_visited = 0;
-  uint64_t exact_predicates = 0;      // decisions that the floating-point filter could not take
-  uint64_t perturbed_predicates = 0;  // of these, exact zeros, decided by the perturbation
+  uint64_t star_cuts = 0;                // facets beyond which a vertex was looked for, and bisectors that cut a cell
+  uint64_t max_star_leaves_visited = 0;  // at once
+  uint64_t exact_predicates = 0;         // decisions that the floating-point filter could not take
+  uint64_t perturbed_predicates = 0;     // of these, exact zeros, decided by the perturbation
 };
 
 struct QueryCounters;

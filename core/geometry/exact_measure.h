@@ -1,6 +1,7 @@
 // Exact orientation, in-sphere test, volume and circumcentre of simplices, for those who check a mesh.
 //
-// Independent of power_predicate on purpose: the mesher's decisions and the validators' share no arithmetic.
+// Independent of power_predicate on purpose: which simplices there are is decided by other arithmetic than the validators'. (They share the
+// orientation alone, with which a mesher tells the two sides of a facet.)
 #ifndef WELLSPACE_CORE_GEOMETRY_EXACT_MEASURE_H_
 #define WELLSPACE_CORE_GEOMETRY_EXACT_MEASURE_H_
 

@@ -527,8 +527,8 @@ double BytesOf(const Leaves& leaves, double vertices, double simplices) {
   using Buckets = typename LeafTree<D>::Buckets;
   // Coordinates in the tree, in the structure and in the mesh; number in the tree, leaf, faces, radius, place in the schedule, numbers in the output.
   const double vertex_bytes = Buckets::kPlaceBytes + 2 * sizeof(Point<D>) + 32;
-  // Indices in the mesh and, of some, in the block that is being made.
-  const double simplex_bytes = 1.25 * (D + 1) * sizeof(uint32_t);
+  // Indices in the mesh and, of some, in the blocks that are being made or wait.
+  const double simplex_bytes = 1.5 * (D + 1) * sizeof(uint32_t);
   return kMemoryMargin * (kFixedBytes + nodes * node_bytes + leaves.filled * Buckets::OverheadBytes() +
                           vertices * vertex_bytes + simplices * simplex_bytes);
 }

@@ -12,7 +12,7 @@ namespace {
 constexpr double kMargin = 1.05;
 // but not farther than so many times the longest edge of a facet: leaves are looked at for the balls that reach farther.
 constexpr double kEdges = 2.5;
-// Where more leaves than these lie around one, small leaves about a large star, the cell tells the apexes.
+// Where more leaves than these lie within the radius of a gathering, the cell tells the apexes: small leaves about a large star.
 template <int D>
 constexpr size_t kMostSurroundings = D == 2 ? 64 : 1024;
 // A vertex so little above a facet, by the length of the vector to it, is no first choice.
@@ -125,8 +125,10 @@ void FacetWalk<D>::CloseFacetsAt(NodeId leaf, uint32_t place, SimplexList<D>& ou
   for (const uint32_t other : OthersOf(open_[first_at_[place]].key)) {
     edge_sq = std::max(edge_sq, DistanceSq<D>(columns_.point(other), columns_.point(place)));
   }
-  const double most = kEdges * std::sqrt(edge_sq);
-  const bool is_gathered = Gather(leaf, place, needed_radius_ > 0 ? std::min(kMargin * needed_radius_, most) : most);
+  // A ball through the facet reaches as far as its edge at least.
+  const double edge = std::sqrt(edge_sq);
+  const double radius = needed_radius_ > 0 ? std::clamp(kMargin * needed_radius_, edge, kEdges * edge) : kEdges * edge;
+  const bool is_gathered = Gather(leaf, place, radius);
   if (is_gathered) {
     needed_radius_ = 0;
   } else {

@@ -35,7 +35,7 @@ class FacetWalk {
   // Shapes:     output_index: by vertex.
   // REQUIRES:   `structure` refined: no circumcentre outside the box.
   // Guarantees: (1) the simplices that have a corner in `leaves` are those of the vertices' whole cells (QueryStructure::Voronoi).
-  // Complexity: O(1) for each of their vertices: what a star looks at is bounded by kMostSurroundings, or by its cell.
+  // Complexity: O(1) for each of their vertices.
   // Errors:     none.
   // Source:     gift wrapping (Chand and Kapur 1970) in Delaunay triangulations: McLain 1976; with a stop by cells: Maus 1984.
   void AppendStars(const QueryStructure<D>& structure, std::span<const NodeId> leaves,

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <span>
 #include <vector>
 
 #include "core/base/ids.h"
@@ -27,8 +26,6 @@ namespace wellspace::core {
 template <int D>
 class LeafColumns {
  public:
-  static constexpr uint32_t kNoPlace = ~uint32_t{0};
-
   // Forgets all leaves.
   void Reset(const QueryStructure<D>& structure) {
     structure_ = &structure;
@@ -84,28 +81,26 @@ class LeafColumns {
   // Makes `leaf` the home leaf, with those around it: at least all that come nearer than `margin` to it on every axis, also by rounded
   // coordinates.
   //
-  // Returns false, and nothing is surrounded, if that takes more than `most_leaves`.
+  // Returns false if that takes more than `most_leaves`; nothing may be gathered then.
   // Complexity: O(leaves around it, or most_leaves); O(1) if it was the last leaf, with as large a margin, or as small a one in vain.
   bool Surround(NodeId leaf, double margin, size_t most_leaves) {
     const double needed = margin + rounding_;
-    if (leaf == home_ && needed <= margin_) {
-      return true;
+    if (leaf == home_ && (needed <= margin_ || needed >= too_large_)) {
+      return needed <= margin_;
     }
     if (leaf != home_) {
+      home_ = leaf;
       too_large_ = std::numeric_limits<double>::infinity();
     }
-    home_ = leaf;
-    margin_ = -1;
-    if (needed < too_large_) {
-      const Box<D> cube = structure_->tree().BoxOf(leaf);
-      const double wanted = std::max(cube.high[0] - cube.low[0], kSlack * needed);
-      if (MeetSurroundings(wanted, most_leaves)) {
-        margin_ = wanted;
-      } else {
-        too_large_ = needed;
-      }
+    const Box<D> cube = structure_->tree().BoxOf(leaf);
+    const double wanted = std::max(cube.high[0] - cube.low[0], kSlack * needed);
+    if (MeetSurroundings(wanted, most_leaves)) {
+      margin_ = wanted;
+      return true;
     }
-    return margin_ >= needed;
+    margin_ = -1;
+    too_large_ = needed;
+    return false;
   }
 
   // Puts into `near` the vertices with |w| <= radius but for that at `but`, w the vector from `site` to them; all of them, as the squares as

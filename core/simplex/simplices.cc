@@ -24,6 +24,10 @@ constexpr size_t kCellsInBlock = 512;
 // Vertices that a walk takes at once: so many that few simplices lie on the border of two blocks, which both find them.
 template <int D>
 constexpr size_t kWalkedInBlock = D == 2 ? 4096 : 65536;
+// About as many blocks, or more, are walked through, for as many threads.
+constexpr size_t kLeastBlocks = 8;
+// The array of all simplices has room for at most so many times those in it: the first blocks need not be like the others.
+constexpr size_t kMostGrowth = 8;
 
 // Joins the simplices of blocks, which come in any order, in that of the blocks, and sees to the memory that they take.
 //
@@ -42,6 +46,9 @@ class BlockJoin {
   // Takes the indices of the simplices of a block. `more_bytes`: what its thread holds more than at its last block.
   void Take(size_t block, const std::vector<uint32_t>& indices, uint64_t more_bytes) {
     std::lock_guard lock(mutex_);
+    if (is_refused_) {
+      return;
+    }
     held_bytes_ += more_bytes;
     if (block != joined_count_) {
       waiting_size_ += indices.size();
@@ -72,7 +79,11 @@ class BlockJoin {
     if (size > joined_.capacity()) {
       // As many as there will be if the blocks to come are like these, and a few more: what is not used takes no memory.
       Allow(joined_.size());
-      joined_.reserve(size + size / 16 + size / joined_count_ * (block_count_ - joined_count_) * 17 / 16);
+      if (is_refused_) {
+        return;
+      }
+      const size_t to_come = size / joined_count_ * (block_count_ - joined_count_);
+      joined_.reserve(std::min(kMostGrowth * size, size + to_come + (size + to_come) / 16));
     }
     joined_.insert(joined_.end(), indices.begin(), indices.end());
     Allow(0);
@@ -200,8 +211,7 @@ absl::StatusOr<Simplices> JoinWalks(const QueryStructure<D>& structure, std::spa
                                     int threads, RunContext& context) {
   std::vector<NodeId> leaves;
   std::vector<size_t> block_begin{0};
-  // Some blocks at least, for as many threads.
-  const size_t most = std::min(kWalkedInBlock<D>, structure.vertex_count() / size_t{4});
+  const size_t most = std::min(kWalkedInBlock<D>, structure.vertex_count() / kLeastBlocks);
   size_t in_block = 0;
   structure.tree().ForEachLeaf([&](NodeId leaf) {
     const auto* bucket = structure.tree().BucketOf(leaf);

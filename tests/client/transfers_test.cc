@@ -184,7 +184,7 @@ TEST(Upload, ErrorsOfTheServerAndOfTheSource) {
     absl::StatusOr<uint64_t> Read(std::span<double>) override { return absl::UnavailableError("disk"); }
   } unreadable;
   EXPECT_EQ(server.Client().UploadPoints(kSession, unreadable).status(), absl::UnavailableError("disk"));
-  EXPECT_EQ(cloud.uploads().calls, 2);
+  EXPECT_LE(cloud.uploads().calls, 2);  // not tried again; one that breaks off at once may not have begun
 
   cloud.Lose(1);
   EXPECT_EQ(server.Client().UploadPoints(kSession, source).status().code(), absl::StatusCode::kDataLoss);

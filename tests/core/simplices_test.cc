@@ -155,7 +155,7 @@ TEST_P(SimplicesOfCloud, AreThoseOfTheCells) {
   }
 }
 
-// More vertices than one block takes, in 2-D.
+// More vertices than one block takes.
 TEST(Simplices, BlocksAgree) {
   ExpectSimplicesOfCells<2>("uniform", 4'000);
   ExpectSimplicesOfCells<2>("grid", 5'000);

@@ -1,6 +1,5 @@
 #include "server/authenticator.h"
 
-
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "tests/formats/temporary_folder.h"
