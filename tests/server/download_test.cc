@@ -142,13 +142,13 @@ TEST_P(DownloadOver, BreaksOffAtRandomChunksAndGoesOnWithTheSameBytes) {
 
 TEST_P(DownloadOver, ReadersThatStopReadingAreDroppedAndCostNoMemory) {
   constexpr int kReaders = 8;
-  constexpr uint64_t kBytesPerReader = 8 << 20;  // what gRPC and the client's own message take
+  [[maybe_unused]] constexpr uint64_t kBytesPerReader = 8 << 20;  // what gRPC and the client's own message take
   ServiceOptions options;
   options.stall_limit = absl::Seconds(2);
   const auto harness = Start(MakeLargeMesh(10'000'000), options);
   SessionClient client(harness->channel());
   client.Refine();
-  const uint64_t before = ResidentBytes();
+  [[maybe_unused]] const uint64_t before = ResidentBytes();
   std::vector<std::unique_ptr<grpc::ClientContext>> contexts;
   std::vector<std::unique_ptr<grpc::ClientReader<v1::DownloadMeshResponse>>> streams;
   v1::DownloadMeshRequest request;
@@ -176,7 +176,7 @@ TEST_P(DownloadOver, ReadersThatStopReadingAreDroppedAndCostNoMemory) {
 
 TEST_P(DownloadOver, ASlowReaderGetsItAll) {
   // Of the 200 MB. Both ends are in this process, and gRPC's window, which is filled at either, grows with what is read.
-  constexpr uint64_t kBytesPerReader = 64 << 20;
+  [[maybe_unused]] constexpr uint64_t kBytesPerReader = 64 << 20;
   ServiceOptions options;
   options.stall_limit = absl::Seconds(1);
   const core::Mesh mesh = MakeLargeMesh(10'000'000);
@@ -189,7 +189,7 @@ TEST_P(DownloadOver, ASlowReaderGetsItAll) {
   const auto stream = client.calls().sessions().DownloadMesh(&context, request);
   v1::DownloadMeshResponse response;
   ASSERT_TRUE(stream->Read(&response));
-  const uint64_t before = ResidentBytes();
+  [[maybe_unused]] const uint64_t before = ResidentBytes();
   const absl::Time begin = absl::Now();
   uint64_t simplices = 0;
   while (stream->Read(&response)) {
