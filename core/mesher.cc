@@ -139,7 +139,8 @@ class MesherIn final : public Mesher {
     context.EnterPhase(Phase::kRefinement);
     WELLSPACE_RETURN_IF_ERROR(ForetellVertices(parameters, context));
     is_refined_ = false;
-    absl::Status status = refinement_->Run(DemandsOf(parameters), VertexBudget(parameters), context);
+    absl::Status status =
+        refinement_->Run(DemandsOf(parameters), VertexBudget(parameters), parameters.threads, context);
     refinement_seconds_ += absl::ToDoubleSeconds(context.TimeIn(Phase::kRefinement));
     is_given_.resize(structure_.vertex_count(), false);
     if (status.ok()) {

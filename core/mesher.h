@@ -89,6 +89,7 @@ class Mesher {
   //             since.
   // Errors:     INVALID_ARGUMENT (parameters), RESOURCE_EXHAUSTED (max_vertices, smallest edge, memory of the context), CANCELLED,
   //             DEADLINE_EXCEEDED. Nothing is lost: a later call takes up the work where it was left.
+  // Threads:    uses parameters.threads, at most as many as the machine has cores.
   // Source:     [HT08] Figure 4; docs/design/sliver.md.
   virtual absl::Status Refine(const MeshParameters& parameters, RunContext& context) = 0;
 

@@ -75,7 +75,7 @@ core::QueryStructure<D> Structure(int64_t count, bool is_refined) {
     core::Refinement<D> refinement(structure, domain.grid_step);
     core::Demands<D> demands;
     demands.rho = core::DefaultRho(D);
-    ExitUnless(refinement.Run(demands, core::kMaxVertices, context));
+    ExitUnless(refinement.Run(demands, core::kMaxVertices, 1, context));
   }
   return structure;
 }

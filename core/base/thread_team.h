@@ -19,7 +19,12 @@ namespace wellspace::core {
 class ThreadTeam {
  public:
   // `threads`, but at most as many as the machine has cores; the calling thread is one of them.
-  explicit ThreadTeam(int threads) : arena_(std::min(threads, tbb::info::default_concurrency())) {}
+  explicit ThreadTeam(int threads) : threads_(std::min(threads, tbb::info::default_concurrency())), arena_(threads_) {}
+
+  int threads() const { return threads_; }
+
+  // In a loop, which of its threads this is, from 0 to threads() - 1.
+  static int CurrentThread() { return tbb::this_task_arena::current_thread_index(); }
 
   // Calls f(i) for each i below `count`, in any order, and returns when all calls have. What was written before is seen
   // in them, and what they write after.
@@ -46,6 +51,7 @@ class ThreadTeam {
   static void Release(char* /*mark*/) {}
 #endif
 
+  const int threads_;
   tbb::task_arena arena_;
   char begun_ = 0;
   char ended_ = 0;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "core/base/dimensions.h"
 
@@ -23,12 +24,29 @@ double ShortestEdgeSq(const Polytope<D>& cell) {
   return shortest;
 }
 
+// A node that may be mended, and the nearest of its generators.
+template <int D>
+struct Candidate {
+  double bound_sq = Assessment::kNone;
+  const CellNode<D>* node = nullptr;
+  VertexId generator = kNoVertex;
+
+  // Whether it is to be mended sooner: decided by what the node is, whatever its number.
+  bool IsBefore(const Candidate& other) const {
+    if (bound_sq != other.bound_sq || other.node == nullptr) {
+      return bound_sq < other.bound_sq;
+    }
+    return std::tie(other.node->radius_sq, other.node->x, generator) <
+           std::tie(node->radius_sq, node->x, other.generator);
+  }
+};
+
 }  // namespace
 
 template <int D>
 Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const Demands<D>& demands, double edge_limit_sq) {
   Assessment result;
-  double bad_radius_sq = 0;
+  Candidate<D> first;
   double nearest_face = Assessment::kNone;
   const double rho_sq = demands.rho * demands.rho;
   const bool has_sizes = !demands.sizes.IsUnbounded();
@@ -37,12 +55,14 @@ Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const Demands<D>
     const CellNode<D>& node = cell.nodes()[i];
     double edge_sq = Assessment::kNone;
     int edge_plane = -1;
+    VertexId generator = kNoVertex;
     bool on_face = false;
     bool on_own_face = false;
     for (const uint16_t index : node.planes) {
       const Plane<D>& plane = cell.plane(index);
       if (plane.kind == PlaneKind::kBisector) {
-        if (2 * plane.offset < edge_sq) {
+        if (2 * plane.offset < edge_sq || (2 * plane.offset == edge_sq && plane.vertex < generator)) {
+          generator = plane.vertex;
           edge_sq = 2 * plane.offset;
           edge_plane = index;
         }
@@ -52,8 +72,9 @@ Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const Demands<D>
         on_own_face = true;
       } else {
         on_face = true;
-        if (std::abs(plane.offset) < nearest_face) {
-          nearest_face = std::abs(plane.offset);
+        const double distance = std::abs(plane.offset);
+        if (distance < nearest_face || (distance == nearest_face && plane.face < result.encroached_face)) {
+          nearest_face = distance;
           result.encroached_face = plane.face;
         }
       }
@@ -87,12 +108,12 @@ Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const Demands<D>
     }
     if (bound_sq > rho_sq * edge_limit_sq) {
       result.next_edge_sq = std::min(result.next_edge_sq, bound_sq / rho_sq);
-    } else if (bound_sq < result.bound_sq || (bound_sq == result.bound_sq && node.radius_sq > bad_radius_sq)) {
+    } else if (const Candidate<D> candidate{bound_sq, &node, generator}; candidate.IsBefore(first)) {
+      first = candidate;
       result.bound_sq = bound_sq;
       result.bad_node = static_cast<int>(i);
       result.bad_plane = edge_plane;
       result.is_too_large = is_too_large;
-      bad_radius_sq = node.radius_sq;
     }
   }
   return result;

@@ -5,9 +5,11 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
+#include "core/refine/foreseen_cells.h"
 
 namespace wellspace::core {
 namespace {
@@ -19,6 +21,10 @@ constexpr double kClipRatioFactor = 1.25;
 // The cell of a vertex just added is clipped at this times its empty radius: enough to see that most are good already,
 // and no farther out than the region that bottom-up work has graded.
 constexpr double kNewClipFactor = 1.5;
+double NewClip(double radius_sq) { return kNewClipFactor * std::sqrt(radius_sq); }
+
+// Vertices whose first edges one thread looks for at a time.
+constexpr uint32_t kScheduledTogether = 1024;
 
 // Vertices looked at between two reports of progress.
 constexpr uint64_t kReportInterval = 256;
@@ -51,8 +57,15 @@ Refinement<D>::Refinement(QueryStructure<D>& structure, double min_edge)
     : structure_(structure), min_edge_(min_edge), schedule_(min_edge) {}
 
 template <int D>
-absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices, RunContext& context,
+absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices, int threads, RunContext& context,
                                 const RefinementObserver<D>& observer) {
+  ThreadTeam team(threads);
+  ForeseenCells<D> foreseen(structure_, team);
+  foreseen_ = &foreseen;
+  const absl::Cleanup end = [&] {
+    own_.counters.Add(foreseen.counters());
+    foreseen_ = nullptr;
+  };
   off_center_factor_ = OffCenterFactor<D>(demands.rho);
   clip_factor_ = std::max(kClipFactor, kClipRatioFactor * demands.rho);
   max_vertices_ = max_vertices;
@@ -60,7 +73,7 @@ absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices
   observer_ = &observer;
   if (demands_ != demands) {
     demands_.reset();
-    WELLSPACE_RETURN_IF_ERROR(ScheduleAll(demands));
+    WELLSPACE_RETURN_IF_ERROR(ScheduleAll(demands, team));
     demands_ = demands;
   }
   VertexId v{};
@@ -98,7 +111,8 @@ void Refinement<D>::VertexAdded(VertexId x) {
 template <int D>
 uint64_t Refinement<D>::MemoryBytes() const {
   return schedule_.MemoryBytes() + radius_sq_.size() * sizeof(double) + is_announced_.size() +
-         (own_.seen.size() + new_.seen.size()) * sizeof(uint32_t);
+         (own_.seen.size() + new_.seen.size()) * sizeof(uint32_t) +
+         (foreseen_ == nullptr ? 0 : foreseen_->MemoryBytes());
 }
 
 template <int D>
@@ -120,15 +134,25 @@ QueryCounters Refinement<D>::counters() const {
 }
 
 template <int D>
-absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands) {
+absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& team) {
   radius_sq_.assign(structure_.vertex_count(), Assessment::kNone);
   is_announced_.assign(structure_.vertex_count(), 1);
-  Workspace<D> workspace;
-  for (uint32_t i = 0; i < structure_.vertex_count(); ++i) {
-    WELLSPACE_RETURN_IF_ERROR(context_->Check());
-    const VertexId v{i};
-    const double nearest_sq = structure_.ApproximateNearestNeighbor(v, workspace).distance_sq;
-    schedule_.Add(v, FirstEdgeSq(demands, v, nearest_sq));
+  const uint32_t count = structure_.vertex_count();
+  std::vector<Workspace<D>> workspaces(team.threads());
+  std::vector<double> first_sq(count);
+  team.ForEach((count + kScheduledTogether - 1) / kScheduledTogether, [&](size_t block) {
+    Workspace<D>& workspace = workspaces[ThreadTeam::CurrentThread()];
+    const uint32_t begin = static_cast<uint32_t>(block) * kScheduledTogether;
+    const uint32_t end = std::min(count, begin + kScheduledTogether);
+    for (uint32_t i = begin; i < end && !context_->IsCancelled(); ++i) {
+      const VertexId v{i};
+      const double nearest_sq = structure_.ApproximateNearestNeighbor(v, workspace).distance_sq;
+      first_sq[i] = FirstEdgeSq(demands, v, nearest_sq);
+    }
+  });
+  WELLSPACE_RETURN_IF_ERROR(context_->Check());
+  for (uint32_t i = 0; i < count; ++i) {
+    schedule_.Add(VertexId{i}, first_sq[i]);
   }
   return absl::OkStatus();
 }
@@ -156,12 +180,15 @@ template <int D>
 absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
   const double edge_limit_sq = schedule_.UpperLengthSq(bucket);
   const double clip = clip_factor_ * std::sqrt(edge_limit_sq);
-  structure_.ClippedVoronoi(v, clip, own_);
+  std::optional<Assessment> known;
+  Polytope<D>& cell = LookAt(v, bucket, clip, known);
   if constexpr (kChecks) {
-    CheckOrder(v, bucket);
+    CheckOrder(v, cell, bucket);
   }
   while (true) {
-    const Assessment found = Assess<D>(own_.cell, structure_.faces(v), *demands_, edge_limit_sq);
+    const Assessment found =
+        known.has_value() ? *known : Assess<D>(cell, structure_.faces(v), *demands_, edge_limit_sq);
+    known.reset();
     if (schedule_.HasBelow(bucket)) {
       // What was just added asks for something by a shorter edge than this bucket's: that comes first.
       const double own_sq = found.bad_node >= 0 ? found.bound_sq / (demands_->rho * demands_->rho) : edge_limit_sq;
@@ -169,27 +196,82 @@ absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
       schedule_.AddToBucket(v, std::min(bucket, schedule_.BucketOf(own_sq)));
       return absl::OkStatus();
     }
-    Insertion insertion{.near = v, .edge_limit_sq = edge_limit_sq};
-    SteinerPoint<D> point;
-    if (found.bad_node >= 0) {
-      const double factor = found.is_too_large ? kSizeFactor : off_center_factor_;
-      insertion.reason = found.is_too_large ? Reason::kSize : Reason::kRatio;
-      insertion.edge_sq = found.bound_sq / (demands_->rho * demands_->rho);
-      insertion.other = found.bad_plane >= 0 ? own_.cell.plane(found.bad_plane).vertex : kNoVertex;
-      point = OffCenter<D>(own_.cell, found.bad_node, found.bad_plane, factor * factor * found.bound_sq);
-    } else if (found.encroached_face >= 0) {
-      insertion.reason = Reason::kEncroachment;
-      const double distance = structure_.box().DistanceToFace(structure_.point(v), found.encroached_face);
-      insertion.edge_sq = distance * distance;
-      point = EncroachmentPoint<D>(own_.cell, structure_.faces(v), found.encroached_face);
-    } else {
-      Settle(v, found, clip, bucket + 1, own_.cell);
+    const std::optional<Request> request = NextRequest(v, cell, found, edge_limit_sq);
+    if (!request.has_value()) {
+      Settle(v, found, clip, bucket + 1, cell);
       return absl::OkStatus();
     }
     // In 5-D and 6-D a cell may ask for a dozen points, which take milliseconds each.
     WELLSPACE_RETURN_IF_ERROR(context_->Check());
-    WELLSPACE_RETURN_IF_ERROR(Insert(insertion, point));
+    WELLSPACE_RETURN_IF_ERROR(Insert(*request, cell));
   }
+}
+
+// What `cell`, that of `v`, asks for by edges up to a bucket's limit, by what was found; none if nothing.
+template <int D>
+std::optional<typename Refinement<D>::Request> Refinement<D>::NextRequest(VertexId v, const Polytope<D>& cell,
+                                                                          const Assessment& found,
+                                                                          double edge_limit_sq) const {
+  Request request;
+  Insertion& insertion = request.insertion;
+  insertion.near = v;
+  insertion.edge_limit_sq = edge_limit_sq;
+  if (found.bad_node >= 0) {
+    const double factor = found.is_too_large ? kSizeFactor : off_center_factor_;
+    insertion.reason = found.is_too_large ? Reason::kSize : Reason::kRatio;
+    insertion.edge_sq = found.bound_sq / (demands_->rho * demands_->rho);
+    insertion.other = found.bad_plane >= 0 ? cell.plane(found.bad_plane).vertex : kNoVertex;
+    request.candidate = OffCenter<D>(cell, found.bad_node, found.bad_plane, factor * factor * found.bound_sq);
+  } else if (found.encroached_face >= 0) {
+    insertion.reason = Reason::kEncroachment;
+    const double distance = structure_.box().DistanceToFace(structure_.point(v), found.encroached_face);
+    insertion.edge_sq = distance * distance;
+    request.candidate = EncroachmentPoint<D>(cell, structure_.faces(v), found.encroached_face);
+  } else {
+    return std::nullopt;
+  }
+  request.point = SnapToBoundary<D>(structure_.box(), request.candidate);
+  insertion.empty_radius_sq = request.point.empty_radius_sq;
+  return request;
+}
+
+// The cell of `v`, which was taken from `bucket`, clipped at `clip`; sets `found` to what was found of it, if anything.
+// With several threads the cells of the vertices that are next in the bucket are computed with it, if there are enough.
+template <int D>
+Polytope<D>& Refinement<D>::LookAt(VertexId v, int bucket, double clip, std::optional<Assessment>& found) {
+  if (Polytope<D>* const cell = foreseen_->Take(v, clip, found)) {
+    return *cell;
+  }
+  if (foreseen_->threads() > 1 && !foreseen_->Has(clip)) {
+    next_.assign(1, v);
+    schedule_.ForEachNext(bucket, [this](VertexId u) {
+      if (std::find(next_.begin(), next_.end(), u) == next_.end()) {
+        next_.push_back(u);
+      }
+      return next_.size() < ForeseenCells<D>::kMost;
+    });
+    if (next_.size() >= ForeseenCells<D>::kLeast) {
+      const double edge_limit_sq = schedule_.UpperLengthSq(bucket);
+      const auto judge = [&](size_t i, const Polytope<D>& cell) {
+        const VertexId u = next_[i];
+        typename ForeseenCells<D>::Prospect prospect{Assess<D>(cell, structure_.faces(u), *demands_, edge_limit_sq),
+                                                     {}};
+        const std::optional<Request> request = NextRequest(u, cell, prospect.found, edge_limit_sq);
+        const auto end = next_.begin() + static_cast<ptrdiff_t>(i);
+        if (request.has_value() && IsLongEnough(request->point) &&
+            std::find(next_.begin(), end, request->insertion.other) == end) {
+          prospect.point = {request->point.position, NewClip(request->point.empty_radius_sq)};
+        }
+        return prospect;
+      };
+      foreseen_->Compute(next_, clip, judge, *context_);
+      if (Polytope<D>* const cell = foreseen_->Take(v, clip, found)) {
+        return *cell;
+      }
+    }
+  }
+  structure_.ClippedVoronoi(v, clip, own_, TieRule::kPerturb);
+  return own_.cell;
 }
 
 // Declares a vertex that needs nothing now done, or puts it where it will be looked at again: not before bucket
@@ -215,26 +297,26 @@ void Refinement<D>::Settle(VertexId v, const Assessment& found, double clip, int
 }
 
 template <int D>
-absl::Status Refinement<D>::Insert(Insertion insertion, const SteinerPoint<D>& candidate) {
-  const SteinerPoint<D> point = SnapToBoundary<D>(structure_.box(), candidate);
+absl::Status Refinement<D>::Insert(const Request& request, Polytope<D>& cell) {
+  const SteinerPoint<D>& point = request.point;
   if (structure_.vertex_count() >= max_vertices_) {
     return absl::ResourceExhaustedError(absl::StrCat("the mesh needs more than max_vertices = ", max_vertices_,
                                                      " vertices; raise max_vertices or rho"));
   }
-  if (!(point.empty_radius_sq >= min_edge_ * min_edge_)) {
+  if (!IsLongEnough(point)) {
     return absl::ResourceExhaustedError(absl::StrCat(
         "refinement came to an edge of length ", std::sqrt(std::max(0.0, point.empty_radius_sq)),
         ", below the smallest that double arithmetic serves here, ", min_edge_, "; raise rho = ", demands_->rho));
   }
   if constexpr (kChecks) {
-    CheckInsertion(insertion, candidate, point);
+    CheckInsertion(request);
   }
+  Insertion insertion = request.insertion;
   insertion.vertex = structure_.AddVertex(insertion.near, point.position);
-  insertion.empty_radius_sq = point.empty_radius_sq;
   radius_sq_.push_back(Assessment::kNone);
   is_announced_.push_back(0);
   context_->SetVertices(structure_.vertex_count());
-  own_.cell.Cut(insertion.vertex, point.position);
+  cell.Cut(insertion.vertex, point.position);
   LookAtNew(insertion.vertex, insertion.near, point.empty_radius_sq);
   if (*observer_) {
     (*observer_)(structure_, insertion);
@@ -247,17 +329,21 @@ absl::Status Refinement<D>::Insert(Insertion insertion, const SteinerPoint<D>& c
 template <int D>
 void Refinement<D>::LookAtNew(VertexId x, VertexId near, double radius_sq) {
   const int bucket = schedule_.BucketOf(radius_sq);
-  const double clip = kNewClipFactor * std::sqrt(radius_sq);
-  structure_.ClippedVoronoi(x, clip, new_);
-  const Assessment found = Assess<D>(new_.cell, structure_.faces(x), *demands_, schedule_.UpperLengthSq(bucket));
+  const double clip = NewClip(radius_sq);
+  Polytope<D>* cell = foreseen_ == nullptr ? nullptr : foreseen_->TakeAdded(clip);
+  if (cell == nullptr) {
+    structure_.ClippedVoronoi(x, clip, new_, TieRule::kPerturb);
+    cell = &new_.cell;
+  }
+  const Assessment found = Assess<D>(*cell, structure_.faces(x), *demands_, schedule_.UpperLengthSq(bucket));
   is_announced_[Index(x)] = found.is_clipped ? 0 : 1;
-  WakeNeighbours(new_.cell, [near](VertexId u) { return u != near; });
+  WakeNeighbours(*cell, [near](VertexId u) { return u != near; });
   if (found.bad_node >= 0) {
     schedule_.Add(x, found.bound_sq / (demands_->rho * demands_->rho));
   } else if (found.encroached_face >= 0) {
     schedule_.Add(x, radius_sq);
   } else {
-    Settle(x, found, clip, bucket, new_.cell);
+    Settle(x, found, clip, bucket, *cell);
   }
 }
 
@@ -283,23 +369,28 @@ void Refinement<D>::WakeNeighbours(const Polytope<D>& cell, MayWake may_wake) {
       if (was_cut || is_too_far) {
         const double edge_sq = was_cut ? std::min(-radius_sq, 2 * plane.offset) : 2 * plane.offset;
         radius_sq = Assessment::kNone;
-        schedule_.Add(plane.vertex, edge_sq);
+        woken_.emplace_back(plane.vertex, edge_sq);
       }
     }
   }
+  std::sort(woken_.begin(), woken_.end());  // what comes next is to depend on nothing but the cell
+  for (const auto& [u, edge_sq] : woken_) {
+    schedule_.Add(u, edge_sq);
+  }
+  woken_.clear();
 }
 
 // That nobody waits below `bucket`, from which `v` was taken: the neighbours in the cell each time, all now and then.
 template <int D>
-void Refinement<D>::CheckOrder(VertexId v, int bucket) {
+void Refinement<D>::CheckOrder(VertexId v, const Polytope<D>& cell, int bucket) {
   const auto check = [&](VertexId u) {
     Require(!schedule_.WaitsBelow(u, bucket), "vertex ", Index(v), " is looked at for edges up to ",
             std::sqrt(schedule_.UpperLengthSq(bucket)), " while vertex ", Index(u), " waits for a shorter one");
   };
-  for (const CellNode<D>& node : own_.cell.nodes()) {
+  for (const CellNode<D>& node : cell.nodes()) {
     for (const uint16_t index : node.planes) {
-      if (own_.cell.plane(index).kind == PlaneKind::kBisector) {
-        check(own_.cell.plane(index).vertex);
+      if (cell.plane(index).kind == PlaneKind::kBisector) {
+        check(cell.plane(index).vertex);
       }
     }
   }
@@ -313,8 +404,8 @@ void Refinement<D>::CheckOrder(VertexId v, int bucket) {
 
 // [HT08] Definition 1 at an insertion, before it is made: (1), that the edge is the bucket's, the place, and the empty ball.
 template <int D>
-void Refinement<D>::CheckInsertion(const Insertion& insertion, const SteinerPoint<D>& candidate,
-                                   const SteinerPoint<D>& point) {
+void Refinement<D>::CheckInsertion(const Request& request) {
+  const auto& [insertion, candidate, point] = request;
   const Box<D>& box = structure_.box();
   const double edge = std::sqrt(insertion.edge_sq);
   const double limit = std::sqrt(insertion.edge_limit_sq);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -16,6 +17,10 @@
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {
+
+template <int D>
+class ForeseenCells;
+class ThreadTeam;
 
 // Why a vertex was inserted.
 enum class Reason {
@@ -53,17 +58,20 @@ class Refinement {
   Refinement(QueryStructure<D>& structure, double min_edge);
 
   // Adds vertices until (1) no Delaunay simplex of the box breaks the demands, and (2) no Voronoi cell touches a face of
-  // the box that its vertex does not lie on, so that the Delaunay triangulation decomposes exactly the box.
+  // the box that its vertex does not lie on, so that the Delaunay triangulation decomposes exactly the box. Ties are
+  // perturbed, as they are for the simplices.
   //
   // REQUIRES:   rho at least MinimumRho(D).
   // Guarantees: (1) bottom-up, [HT08] Definition 1: the vertex whose cell is looked at has an edge shorter, up to the
-  //             ratio of a bucket, than all that wait; (2) deterministic.
+  //             ratio of a bucket, than all that wait; (2) deterministic: the same to
+  //             the bit for any number of threads, and however often it was stopped.
   // Complexity: O(m) queries for m vertices in the end; when run again for the same demands, in proportion to what was
   //             added since and to what that makes necessary.
   // Errors:     RESOURCE_EXHAUSTED with the bound that was met, one of the context's memory too; CANCELLED, DEADLINE_EXCEEDED. All stays usable: a later
   //             run takes up the work where it was left.
+  // Threads:    uses `threads`, at most as many as the machine has cores, to compute cells ahead.
   // Source:     [HT08] Figure 4; see docs/design/refine.md.
-  absl::Status Run(const Demands<D>& demands, uint64_t max_vertices, RunContext& context,
+  absl::Status Run(const Demands<D>& demands, uint64_t max_vertices, int threads, RunContext& context,
                    const RefinementObserver<D>& observer = nullptr);
 
   // Tells of the vertex `x`, which somebody else has added to the structure since the last run.
@@ -86,16 +94,27 @@ class Refinement {
   QueryCounters counters() const;
 
  private:
-  absl::Status ScheduleAll(const Demands<D>& demands);
+  // An insertion that a cell asks for, with the point before it was snapped to the boundary.
+  struct Request {
+    Insertion insertion;
+    SteinerPoint<D> candidate;
+    SteinerPoint<D> point;
+  };
+
+  absl::Status ScheduleAll(const Demands<D>& demands, ThreadTeam& team);
   double FirstEdgeSq(const Demands<D>& demands, VertexId v, double nearest_sq) const;
   absl::Status Improve(VertexId v, int bucket);
-  absl::Status Insert(Insertion insertion, const SteinerPoint<D>& candidate);
+  std::optional<Request> NextRequest(VertexId v, const Polytope<D>& cell, const Assessment& found,
+                                     double edge_limit_sq) const;
+  Polytope<D>& LookAt(VertexId v, int bucket, double clip, std::optional<Assessment>& found);
+  absl::Status Insert(const Request& request, Polytope<D>& cell);
+  bool IsLongEnough(const SteinerPoint<D>& point) const { return point.empty_radius_sq >= min_edge_ * min_edge_; }
   void LookAtNew(VertexId x, VertexId near, double radius_sq);
   void Settle(VertexId v, const Assessment& found, double clip, int earliest, const Polytope<D>& cell);
   template <typename MayWake>
   void WakeNeighbours(const Polytope<D>& cell, MayWake may_wake);
-  void CheckOrder(VertexId v, int bucket);
-  void CheckInsertion(const Insertion& insertion, const SteinerPoint<D>& candidate, const SteinerPoint<D>& point);
+  void CheckOrder(VertexId v, const Polytope<D>& cell, int bucket);
+  void CheckInsertion(const Request& request);
 
   QueryStructure<D>& structure_;
   const double min_edge_;
@@ -112,6 +131,9 @@ class Refinement {
   double off_center_factor_ = 0;
   double clip_factor_ = 0;
   uint64_t max_vertices_ = 0;
+  ForeseenCells<D>* foreseen_ = nullptr;            // null between runs
+  std::vector<VertexId> next_;                      // scratch of LookAt
+  std::vector<std::pair<VertexId, double>> woken_;  // scratch of WakeNeighbours
   RunContext* context_ = nullptr;
   const RefinementObserver<D>* observer_ = nullptr;
 

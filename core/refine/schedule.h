@@ -62,6 +62,18 @@ class Schedule {
   // What the schedule takes in memory, but for what has moved on.
   uint64_t MemoryBytes() const { return waits_in_.size() * sizeof(int16_t) + size_ * sizeof(VertexId); }
 
+  // Calls f(VertexId) for vertices that wait in `bucket`, the lowest where any do, in the order in which they will be
+  // taken if none is added, until it returns false. One may be seen twice.
+  template <typename F>
+  void ForEachNext(int bucket, F&& f) const {
+    const std::vector<VertexId>& waiting = buckets_[bucket];
+    for (size_t i = waiting.size(); i-- > 0;) {
+      if (waits_in_[Index(waiting[i])] == bucket && !f(waiting[i])) {
+        return;
+      }
+    }
+  }
+
   // Takes a vertex from the lowest bucket; false when none waits.
   bool Pop(VertexId& v, int& bucket) {
     for (; static_cast<size_t>(lowest_) < buckets_.size(); ++lowest_) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "core/base/dimensions.h"
 
@@ -57,14 +58,17 @@ SteinerPoint<D> OffCenter(const Polytope<D>& cell, int node, int plane, double d
   }
   // `along` is in the bisector, so at right angles to `middle`.
   double t = std::sqrt((distance_sq - 0.25 * edge_sq) / NormSq<D>(along));
-  for (int j = 0; j < cell.plane_count(); ++j) {
-    const Plane<D>& bound = cell.plane(j);
-    const double slope = Dot<D>(bound.normal, along);
-    const double gap = bound.offset - Dot<D>(bound.normal, middle);
-    // A wall's normal points up its axis: turned outward here.
-    const double outward = bound.kind == PlaneKind::kBisector || bound.face % 2 == 1 ? 1 : -1;
-    if (j != plane && outward * gap < 0 && outward * slope < 0) {
-      t = std::max(t, gap / slope);
+  // Planes without a node are left out: the point is to depend on nothing but the cell.
+  for (const CellNode<D>& on : cell.nodes()) {
+    for (const uint16_t j : on.planes) {
+      const Plane<D>& bound = cell.plane(j);
+      const double slope = Dot<D>(bound.normal, along);
+      const double gap = bound.offset - Dot<D>(bound.normal, middle);
+      // A wall's normal points up its axis: turned outward here.
+      const double outward = bound.kind == PlaneKind::kBisector || bound.face % 2 == 1 ? 1 : -1;
+      if (j != plane && outward * gap < 0 && outward * slope < 0) {
+        t = std::max(t, gap / slope);
+      }
     }
   }
   t = std::min(t, 1.0);
@@ -78,24 +82,27 @@ template <int D>
 SteinerPoint<D> EncroachmentPoint(const Polytope<D>& cell, FaceMask site_faces, int face) {
   const unsigned on_face = 1u << face;
   const unsigned opposite = 1u << (face ^ 1);
-  Point<D> sum{};
-  int count = 0;
+  std::vector<Point<D>> nodes;
   const auto add = [&](unsigned wanted) {
     for (const CellNode<D>& node : cell.nodes()) {
       if ((cell.FacesOf(node) & wanted) == wanted) {
-        for (int i = 0; i < D; ++i) {
-          sum[i] += node.x[i];
-        }
-        ++count;
+        nodes.push_back(node.x);
       }
     }
   };
   add(on_face | (site_faces & ~opposite));
-  if (count == 0) {  // ties hide the faces of a node
+  if (nodes.empty()) {  // ties hide the faces of a node
     add(on_face);
   }
+  std::sort(nodes.begin(), nodes.end());  // the sum is to depend on nothing but the cell
+  Point<D> sum{};
+  for (const Point<D>& x : nodes) {
+    for (int i = 0; i < D; ++i) {
+      sum[i] += x[i];
+    }
+  }
   for (double& s : sum) {
-    s /= count;
+    s /= static_cast<double>(nodes.size());
   }
   SteinerPoint<D> point = Relative<D>(cell, sum);
   for (int index = 0; index < 2 * D; ++index) {

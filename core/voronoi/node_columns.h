@@ -81,6 +81,7 @@ class NodeColumns {
     }
     return count;
   }
+  uint64_t MemoryBytes() const { return groups_.capacity() * sizeof(Group); }
   size_t padded_count() const { return groups_.size() * kLanes; }
 
   // Computes `most` of all candidates; `slack` is at least those of the nodes, and a candidate w has the error `slack` |w|

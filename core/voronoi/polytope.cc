@@ -188,6 +188,19 @@ void Polytope<D>::Reset(const Point<D>& site, const Box<D>& bounds, const std::a
 }
 
 template <int D>
+void Polytope<D>::CopyFrom(const Polytope& other) {
+  site_ = other.site_;
+  rule_ = other.rule_;
+  reach_sq_ = other.reach_sq_;
+  largest_slack_ = other.largest_slack_;
+  planes_ = other.planes_;
+  nodes_ = other.nodes_;
+  columns_ = other.columns_;
+  cuts_ = other.cuts_;
+  counters_ = other.counters_;
+}
+
+template <int D>
 bool Polytope<D>::Cut(VertexId u, const Point<D>& position) {
   const Point<D> normal = Difference<D>(position, site_);
   const double length_sq = NormSq<D>(normal);
@@ -290,10 +303,19 @@ void Polytope<D>::MakeNewNodes(uint16_t plane) {
     const Index index = j < appended ? static_cast<Index>(old + j) : removed_[count - 1 - j];
     new_[j] = index;
     CellNode<D>& node = nodes_[index];
-    node.planes = edge.planes;
-    node.planes[edge.slot] = plane;
+    // The new plane takes its place among the others, which are in order.
+    std::array<uint16_t, D - 1> others;
+    size_t slot = 0;
+    for (size_t k = 0; k < D - 1; ++k) {
+      others[k] = edge.planes[k + (k >= edge.slot ? 1 : 0)];
+      slot += planes_[others[k]].vertex < planes_[plane].vertex ? 1 : 0;
+    }
+    node.planes[slot] = plane;
+    for (size_t k = 0; k < D - 1; ++k) {
+      node.planes[k + (k >= slot ? 1 : 0)] = others[k];
+    }
     node.neighbours.fill(kNoNode);
-    node.neighbours[edge.slot] = edge.kept;
+    node.neighbours[slot] = edge.kept;
     Place(node);
     columns_.Set(index, node.x, node.slack, node.reach);
     nodes_[edge.kept].neighbours[edge.kept_slot] = index;

@@ -65,7 +65,7 @@ struct CellNode {
   double radius_sq = 0;                    // |x|^2
   double reach = 0;                        // at least the exact |x|
   double slack = 0;                        // bounds the error of x, and of products with it, per unit of length
-  std::array<uint16_t, D> planes;          // indices of the planes that meet here
+  std::array<uint16_t, D> planes;          // that meet here, by index; bisectors by vertex, then walls by face
   std::array<NodeIndex<D>, D> neighbours;  // neighbours[k]: the node at the other end of the edge that leaves planes[k]
 };
 
@@ -89,6 +89,12 @@ class Polytope {
 
   // Begins with the box [low, high], which holds `site` and whose faces are of kind `kinds[FaceIndex]`.
   void Reset(const Point<D>& site, const Box<D>& bounds, const std::array<PlaneKind, 2 * D>& kinds, TieRule rule);
+
+  // Makes this a copy of `other` without its scratch space.
+  //
+  // Complexity: O(nodes + planes); no allocation once warm.
+  // Errors:     none.
+  void CopyFrom(const Polytope& other);
 
   // Cuts the cell by the bisector of its site and `u`, keeping the site's side. Returns whether anything was cut off.
   //
@@ -139,6 +145,10 @@ class Polytope {
   int plane_count() const { return static_cast<int>(planes_.size()); }
   uint64_t cuts() const { return cuts_; }
   const DecisionCounters& counters() const { return counters_; }
+  // What the cell takes in memory, roughly, but for itself.
+  uint64_t MemoryBytes() const {
+    return planes_.capacity() * sizeof(Plane<D>) + nodes_.capacity() * sizeof(CellNode<D>) + columns_.MemoryBytes();
+  }
 
  private:
   using Index = NodeIndex<D>;

@@ -168,12 +168,24 @@ Neighbor QueryStructure<D>::Nearest(const Point<D>& p, NodeId leaf, VertexId but
 }
 
 template <int D>
-void QueryStructure<D>::ClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace) const {
-  const Point<D>& site = point(v);
+void QueryStructure<D>::ClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace, TieRule rule) const {
+  ClipAndScan(point(v), v, tree_.leaf_of(v), radius, rule, workspace);
+}
+
+template <int D>
+void QueryStructure<D>::ClippedVoronoiAt(const Point<D>& p, VertexId near, double radius, Workspace<D>& workspace,
+                                         TieRule rule) const {
+  ClipAndScan(p, kNoVertex, tree_.LeafHolding(near, p), radius, rule, workspace);
+}
+
+// Computes the clipped cell of `site`, which is vertex `v` or none yet, in leaf `own`.
+template <int D>
+void QueryStructure<D>::ClipAndScan(const Point<D>& site, VertexId v, NodeId own, double radius, TieRule rule,
+                                    Workspace<D>& workspace) const {
   std::array<PlaneKind, 2 * D> kinds;
   const Box<D> bounds = ClippedBox<D>(box_, site, radius, kinds);
-  workspace.cell.Reset(site, bounds, kinds, TieRule::kKeep);
-  Scan(v, workspace);
+  workspace.cell.Reset(site, bounds, kinds, rule);
+  Scan(v, own, workspace);
 }
 
 template <int D>
@@ -187,13 +199,14 @@ void QueryStructure<D>::Voronoi(VertexId v, Workspace<D>& workspace) const {
   std::array<PlaneKind, 2 * D> kinds;
   kinds.fill(PlaneKind::kClip);
   workspace.cell.Reset(point(v), bounds, kinds, TieRule::kPerturb);
-  Scan(v, workspace);
+  Scan(v, tree_.leaf_of(v), workspace);
 }
 
+// Cuts workspace.cell, whose site is vertex `v` or none yet, by the vertices in the leaves from `own` outward.
 template <int D>
-void QueryStructure<D>::Scan(VertexId v, Workspace<D>& workspace) const {
+void QueryStructure<D>::Scan(VertexId v, NodeId own, Workspace<D>& workspace) const {
   ScanOutward(
-      point(v), tree_.leaf_of(v), workspace,
+      workspace.cell.site(), own, workspace,
       [&] { return workspace.cell.IsTooLarge() ? -1 : workspace.cell.CutLimitSq(); },
       [&](NodeId leaf) { return workspace.cell.Reaches(tree_.BoxOf(leaf)); },
       [&](NodeId leaf) { CutByLeaf(v, leaf, workspace); });

@@ -88,7 +88,8 @@ class QueryStructure {
   Neighbor NearestTo(const Point<D>& p, VertexId near, Workspace<D>& workspace) const;
 
   // Computes in workspace.cell the Voronoi cell of `v` in the box, clipped by the cube of half side `radius` about v.
-  // Ties are kept.
+  // Ties are kept, or perturbed: then the cell is the same to the bit, but for the numbers of its nodes and planes,
+  // whatever the order in which the vertices were added.
   //
   // Units:      radius in those of the coordinates; [HT08]'s beta NN(v).
   // REQUIRES:   radius > 0.
@@ -99,7 +100,15 @@ class QueryStructure {
   // Source:     [HT08] Figure 6; leaves in order of their distance, opened by Polytope::Reaches, through facets of
   //             leaves alone: a ball about a node through v is convex, so a generic path in it from v to any leaf it
   //             meets crosses only facets of leaves that it meets.
-  void ClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace) const;
+  void ClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace, TieRule rule = TieRule::kKeep) const;
+
+  // The cell that a vertex at `p` would have, looked for from `near`.
+  //
+  // REQUIRES:   p in the box and different from all vertices; radius > 0.
+  // Complexity: as ClippedVoronoi's when p is in the clipped cell of `near`.
+  // Errors:     none.
+  void ClippedVoronoiAt(const Point<D>& p, VertexId near, double radius, Workspace<D>& workspace,
+                        TieRule rule = TieRule::kKeep) const;
 
   // Computes in workspace.cell the whole Voronoi cell of `v`, inside walls one side of the box beyond it, ties
   // perturbed.
@@ -145,7 +154,9 @@ class QueryStructure {
   void ScanOutward(const Point<D>& site, NodeId own, Workspace<D>& workspace, ReachSq reach_sq, Wants wants,
                    Open open) const;
   Neighbor Nearest(const Point<D>& p, NodeId leaf, VertexId but, Workspace<D>& workspace) const;
-  void Scan(VertexId v, Workspace<D>& workspace) const;
+  void ClipAndScan(const Point<D>& site, VertexId v, NodeId own, double radius, TieRule rule,
+                   Workspace<D>& workspace) const;
+  void Scan(VertexId v, NodeId own, Workspace<D>& workspace) const;
   void CutByLeaf(VertexId v, NodeId leaf, Workspace<D>& workspace) const;
 
   Box<D> box_;

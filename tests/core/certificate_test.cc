@@ -166,8 +166,8 @@ TYPED_TEST(CertificateTest, CellsHaveOneAtEveryStageOfRefinement) {
       }
     };
     Refinement<D> refinement(structure, 0x1p-48);
-    const absl::Status refined =
-        refinement.Run({.rho = ByDimension<D>({std::sqrt(2.0), 2.0, 2.9, 4.1, 5.8})}, kMaxVertices, context, observer);
+    const absl::Status refined = refinement.Run({.rho = ByDimension<D>({std::sqrt(2.0), 2.0, 2.9, 4.1, 5.8})},
+                                                kMaxVertices, 2, context, observer);
     ASSERT_TRUE(refined.ok() || (D >= 5 && structure.vertex_count() == kMaxVertices)) << refined;
     ASSERT_TRUE(certified.ok()) << certified;
     EXPECT_GT(steps, ByDimension<D>({20u, 20u, 20u, 20u, 3u}));

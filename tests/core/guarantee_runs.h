@@ -88,7 +88,7 @@ Outcome RefineInput(const Input<D>& input, const core::Demands<D>& demands, doub
   }
   const double budget = multiple * static_cast<double>(outcome.before + outcome.leaves);
   core::Refinement<D> refinement(structure, LeastSeparation<D>(input.box) / 16);
-  outcome.status = refinement.Run(demands, static_cast<uint64_t>(budget), context, observer);
+  outcome.status = refinement.Run(demands, static_cast<uint64_t>(budget), 2, context, observer);
   outcome.vertices = structure.vertex_count();
   return outcome;
 }

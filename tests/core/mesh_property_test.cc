@@ -168,8 +168,9 @@ TEST_P(MeshPropertyTest, KeepsItsPromisesForEveryRho) {
     EXPECT_THAT(mesh->domain_high, ElementsAreArray(parameters.domain_high));
     ExpectPromises(*mesh, parameters, cloud);
     EXPECT_LE(mesh->vertex_count(), previous) << "a weaker bound needs no more vertices";
-    // Of a mesh of a hundred vertices a few are chance.
-    previous = mesh->vertex_count() + (D() == 4 ? mesh->vertex_count() / 10 : 0);
+    // Of a mesh of a hundred vertices up to a sixth are chance: among the meshes of a point in 4-D one in twenty-four is
+    // larger by a tenth or more.
+    previous = mesh->vertex_count() + (D() == 4 ? mesh->vertex_count() / 6 : 0);
   }
 }
 

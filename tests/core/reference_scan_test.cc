@@ -463,7 +463,7 @@ TYPED_TEST(ReferenceScanTest, AgreesWithTheFastScanAtEveryStageOfRefinement) {
     };
     Refinement<D> refinement(structure, 0x1p-48);
     const absl::Status status =
-        refinement.Run({.rho = ByDimension<D>({std::sqrt(2.0), 2.0, 2.9})}, 100'000, context, observer);
+        refinement.Run({.rho = ByDimension<D>({std::sqrt(2.0), 2.0, 2.9})}, 100'000, 1, context, observer);
     ASSERT_TRUE(status.ok()) << status;
     this->ExpectFewLeaves(test::CloudName(kind, D) + "_during", comparer.totals());
     ScanComparer<D> afterwards;

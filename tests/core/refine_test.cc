@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <optional>
@@ -49,7 +50,7 @@ template <int D>
 absl::Status Refine(const Parameters& parameters, QueryStructure<D>& structure, RunContext& context,
                     const RefinementObserver<D>& observer = nullptr) {
   Refinement<D> refinement(structure, parameters.min_edge);
-  return refinement.Run({.rho = parameters.rho}, parameters.max_vertices, context, observer);
+  return refinement.Run({.rho = parameters.rho}, parameters.max_vertices, 2, context, observer);
 }
 
 template <int D>
@@ -58,10 +59,11 @@ absl::Status RefineQuietly(const Parameters& parameters, QueryStructure<D>& stru
   return Refine<D>(parameters, structure, context);
 }
 
-// What Refine promises of the whole cell of `v`, computed by a look at all vertices.
+// What Refine promises of the whole cell of `v`, computed by a look at all vertices; ties are perturbed, as they are for
+// the simplices.
 template <int D>
 void ExpectRefined(const QueryStructure<D>& structure, VertexId v, double rho, Polytope<D>& cell) {
-  test::CutByAllInBox<D>(structure, v, cell);
+  test::CutByAllInBox<D>(structure, v, cell, TieRule::kPerturb);
   for (const CellNode<D>& node : cell.nodes()) {
     double shortest = std::numeric_limits<double>::infinity();
     bool is_circumcenter = true;
@@ -235,6 +237,32 @@ TYPED_TEST(RefineTest, EndsAtMaxVerticesWithTheStructureUsable) {
   }
   ASSERT_TRUE(RefineQuietly<D>(Defaults<D>(), structure).ok()) << "with a larger budget it goes on";
   ExpectRefined<D>(structure, VertexId{0}, parameters.rho, slow);
+}
+
+TYPED_TEST(RefineTest, WhatWasStoppedEndsAsIfItHadNotBeen) {
+  constexpr int D = TypeParam::kValue;
+  for (const std::string_view kind : {"uniform", "grid", "boundary"}) {
+    SCOPED_TRACE(std::string(kind));
+    const std::vector<Point<D>> cloud = test::SortedCloud<D>(kind, ByDimension<D>({200, 60, 8, 1}));
+    QueryStructure<D> at_once = MakeStructure<D>(cloud);
+    ASSERT_TRUE(RefineQuietly<D>(Defaults<D>(), at_once).ok());
+    QueryStructure<D> stopped = MakeStructure<D>(cloud);
+    Refinement<D> refinement(stopped, Defaults<D>().min_edge);
+    RunContext context;
+    absl::Status status = absl::UnknownError("not begun");
+    int stops = 0;
+    for (; !status.ok() && stops < 10'000; ++stops) {
+      const uint64_t budget = stopped.vertex_count() + this->random_.Below(20);
+      const int threads = 1 + static_cast<int>(this->random_.Below(2));
+      status = refinement.Run({.rho = Defaults<D>().rho}, budget, threads, context);
+    }
+    ASSERT_TRUE(status.ok()) << status;
+    EXPECT_TRUE(stops > 3 || kind == "boundary") << stops;  // a point on a face may need no vertices
+    ASSERT_EQ(stopped.vertex_count(), at_once.vertex_count());
+    for (uint32_t v = 0; v < stopped.vertex_count(); ++v) {
+      ASSERT_EQ(stopped.point(VertexId{v}), at_once.point(VertexId{v})) << "vertex " << v;
+    }
+  }
 }
 
 TYPED_TEST(RefineTest, EndsAtTheShortestEdge) {
@@ -528,6 +556,24 @@ TEST(ScheduleTest, BehavesAsItsModel) {
     const auto next = std::min_element(model.begin(), model.end(), [](const auto& a, const auto& b) {
       return a.second.first != b.second.first ? a.second.first < b.second.first : a.second.second > b.second.second;
     });
+    if (next != model.end()) {
+      std::map<int, uint32_t, std::greater<>> expected;  // by when they came
+      for (const auto& [u, place] : model) {
+        if (place.first == next->second.first) {
+          expected[place.second] = u;
+        }
+      }
+      std::vector<VertexId> seen;
+      schedule.ForEachNext(next->second.first, [&](VertexId u) {
+        if (std::find(seen.begin(), seen.end(), u) == seen.end()) {
+          seen.push_back(u);
+        }
+        return seen.size() < 3;
+      });
+      ASSERT_EQ(seen.size(), std::min<size_t>(3, expected.size()));
+      ASSERT_TRUE(std::equal(seen.begin(), seen.end(), expected.begin(),
+                             [](VertexId u, const auto& each) { return Index(u) == each.second; }));
+    }
     VertexId v{};
     int bucket = -1;
     ASSERT_EQ(schedule.Pop(v, bucket), next != model.end());

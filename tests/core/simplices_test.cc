@@ -79,7 +79,7 @@ QueryStructure<D> MakeRefined(std::string_view kind, size_t n) {
   QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, n));
   RunContext context;
   Refinement<D> refinement(structure, 0x1p-48);
-  const absl::Status refined = refinement.Run({.rho = D == 2 ? std::sqrt(2.0) : 2.0}, 1'000'000, context);
+  const absl::Status refined = refinement.Run({.rho = D == 2 ? std::sqrt(2.0) : 2.0}, 1'000'000, 1, context);
   EXPECT_TRUE(refined.ok()) << refined;
   return structure;
 }

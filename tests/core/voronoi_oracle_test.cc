@@ -217,7 +217,8 @@ TYPED_TEST(VoronoiOracleTest, QueriesAreExactAtEveryStageOfRefinement) {
       }
     };
     Refinement<D> refinement(structure, 1e-9);
-    const absl::Status status = refinement.Run({.rho = ByDimension<D>({2.0, 2.0, 2.9, 4.1})}, 600, context, observer);
+    const absl::Status status =
+        refinement.Run({.rho = ByDimension<D>({2.0, 2.0, 2.9, 4.1})}, 600, 1, context, observer);
     EXPECT_TRUE(status.ok() || status.code() == absl::StatusCode::kResourceExhausted) << status;
     ASSERT_FALSE(this->HasFatalFailure());
   }

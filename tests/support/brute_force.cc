@@ -363,10 +363,10 @@ void CutByAll(const QueryStructure<D>& structure, VertexId v, const Box<D>& boun
 }
 
 template <int D>
-void CutByAllInBox(const QueryStructure<D>& structure, VertexId v, Polytope<D>& cell) {
+void CutByAllInBox(const QueryStructure<D>& structure, VertexId v, Polytope<D>& cell, core::TieRule rule) {
   std::array<PlaneKind, 2 * D> kinds;
   kinds.fill(PlaneKind::kFace);
-  CutByAll<D>(structure, v, structure.box(), kinds, core::TieRule::kKeep, Index(v), cell);
+  CutByAll<D>(structure, v, structure.box(), kinds, rule, Index(v), cell);
 }
 
 template <int D>
@@ -433,7 +433,7 @@ std::vector<Point<D>> SortedCloud(std::string_view kind, size_t n) {
   template ::testing::AssertionResult HasEmptyBalls<D>(const QueryStructure<D>&, VertexId, const Polytope<D>&);     \
   template void CutByAll<D>(const QueryStructure<D>&, VertexId, const Box<D>&, const std::array<PlaneKind, 2 * D>&, \
                             core::TieRule, uint64_t, Polytope<D>&);                                                 \
-  template void CutByAllInBox<D>(const QueryStructure<D>&, VertexId, Polytope<D>&);                                 \
+  template void CutByAllInBox<D>(const QueryStructure<D>&, VertexId, Polytope<D>&, core::TieRule);                  \
   template double NearestDistanceSq<D>(const QueryStructure<D>&, VertexId);                                         \
   template double LocalFeatureSize<D>(const Box<D>&, const std::vector<Point<D>>&, const Point<D>&);                \
   template std::vector<Point<D>> ToPoints<D>(std::span<const double>);                                              \

@@ -90,9 +90,10 @@ void CutByAll(const core::QueryStructure<D>& structure, core::VertexId v, const 
               const std::array<core::PlaneKind, 2 * D>& kinds, core::TieRule rule, uint64_t seed,
               core::Polytope<D>& cell);
 
-// The whole cell of `v` in the box of the structure, ties kept.
+// The whole cell of `v` in the box of the structure.
 template <int D>
-void CutByAllInBox(const core::QueryStructure<D>& structure, core::VertexId v, core::Polytope<D>& cell);
+void CutByAllInBox(const core::QueryStructure<D>& structure, core::VertexId v, core::Polytope<D>& cell,
+                   core::TieRule rule = core::TieRule::kKeep);
 
 // The squared distance from `v` to its nearest vertex, by a look at each.
 template <int D>

@@ -1,0 +1,120 @@
+// Cells that several threads compute together before the refinement, which looks at one after the other, asks for them.
+#ifndef WELLSPACE_CORE_REFINE_FORESEEN_CELLS_H_
+#define WELLSPACE_CORE_REFINE_FORESEEN_CELLS_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/base/ids.h"
+#include "core/base/run_context.h"
+#include "core/base/thread_team.h"
+#include "core/geometry/point.h"
+#include "core/refine/assessment.h"
+#include "core/voronoi/polytope.h"
+#include "core/voronoi/query_structure.h"
+
+namespace wellspace::core {
+
+// Where a vertex would be added, and the half side of the cube that its cell would be clipped by.
+template <int D>
+struct ForeseenPoint {
+  Point<D> position;
+  double clip = 0;
+};
+
+// Clipped cells of vertices that are about to be looked at, and of the vertices that would then be added. They stay of
+// use while vertices are added: a cell that is taken is first cut by those added since it was computed, which makes it
+// the cell of now. So what the refinement does with a cell, one after the other, does not depend on the threads.
+//
+// Thread safety: thread-compatible.
+// Invariants: since the first Compute the structure has only had vertices added.
+template <int D>
+class ForeseenCells {
+ public:
+  // So many vertices are worth the waking of threads, and so many are computed together at most.
+  static constexpr size_t kLeast = 8;
+  static constexpr size_t kMost = D == 2 ? 64 : D == 3 ? 32 : 16;
+
+  // Assesses a cell of the i-th vertex, and says where one would be added for it, if any. Several threads call it at once.
+  struct Prospect {
+    Assessment found;
+    std::optional<ForeseenPoint<D>> point;
+  };
+  using Judge = std::function<Prospect(size_t i, const Polytope<D>& cell)>;
+
+  ForeseenCells(const QueryStructure<D>& structure, ThreadTeam& team) : structure_(structure), team_(team) {}
+
+  int threads() const { return team_.threads(); }
+
+  // Computes the cells of `vertices`, clipped by cubes of half side `clip`, and those of up to kMostAdded points for each:
+  // the second is asked for with the cell as it is once the first is added, and so on.
+  //
+  // REQUIRES:   vertices distinct, at most kMost.
+  // Complexity: that of the cells, shared by the threads.
+  // Errors:     none; once `context` is cancelled the cells that are not yet begun are left out.
+  void Compute(std::span<const VertexId> vertices, double clip, const Judge& judge, const RunContext& context);
+
+  // Whether cells clipped so are left, and not so many vertices were added since that they are sooner computed anew.
+  bool Has(double clip) const;
+
+  // The cell of `v` as it is now, the caller's until the next Compute; null if it is not left. Sets `found` to what was
+  // found of it, if it is still as it was.
+  //
+  // Complexity: O(kMost + vertices added since).
+  // Errors:     none.
+  Polytope<D>* Take(VertexId v, double clip, std::optional<Assessment>& found);
+
+  // The same of the vertex added last, if it is what was foreseen for the vertex that Take was last called for.
+  Polytope<D>* TakeAdded(double clip);
+
+  // What all this takes in memory, roughly.
+  uint64_t MemoryBytes() const;
+  QueryCounters counters() const;
+
+ private:
+  static constexpr uint32_t kMostAdded = 4;
+  // After so many insertions a cell is sooner computed anew.
+  static constexpr uint32_t kMostInsertions = 1024;
+
+  struct Added {
+    ForeseenPoint<D> point;
+    Polytope<D> cell;
+  };
+  struct Foreseen {
+    VertexId vertex = kNoVertex;  // none once taken, or if left out
+    Polytope<D> cell;
+    Assessment found;
+    // Its added ones, in OfThread::added.
+    int thread = 0;
+    size_t first_added = 0;
+    size_t added_count = 0;
+  };
+  struct OfThread {
+    Workspace<D> workspace;
+    Polytope<D> cell;
+    std::vector<Added> added;  // the first added_count of them
+    size_t added_count = 0;
+  };
+
+  void ComputeOne(VertexId v, size_t i, const Judge& judge, const RunContext& context);
+  bool CutByNew(uint32_t end, Polytope<D>& cell) const;
+
+  const QueryStructure<D>& structure_;
+  ThreadTeam& team_;
+  double clip_ = 0;
+  uint32_t vertex_count_ = 0;  // of the structure when the cells were computed
+  // Arrays only grow, so that polytopes are reused.
+  std::vector<Foreseen> cells_;  // the first count_ of them
+  size_t count_ = 0;
+  size_t left_ = 0;
+  Foreseen* taken_ = nullptr;  // by the last Take
+  std::vector<OfThread> of_threads_;
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_REFINE_FORESEEN_CELLS_H_
