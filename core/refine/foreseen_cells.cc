@@ -68,7 +68,10 @@ bool ForeseenCells<D>::Has(double clip) const {
 template <int D>
 Polytope<D>* ForeseenCells<D>::Take(VertexId v, double clip, std::optional<Assessment>& found) {
   taken_ = nullptr;
-  for (size_t i = 0; i < count_ && Has(clip); ++i) {
+  if (!Has(clip)) {
+    return nullptr;
+  }
+  for (size_t i = 0; i < count_; ++i) {
     if (cells_[i].vertex == v) {
       taken_ = &cells_[i];
       taken_->vertex = kNoVertex;
@@ -99,11 +102,8 @@ Polytope<D>* ForeseenCells<D>::TakeAdded(double clip) {
 template <int D>
 bool ForeseenCells<D>::CutByNew(uint32_t end, Polytope<D>& cell) const {
   bool is_cut = false;
-  for (uint32_t u = vertex_count_; u < end; ++u) {
-    const Point<D>& p = structure_.point(VertexId{u});
-    if (DistanceSq<D>(p, cell.site()) <= cell.CutLimitSq() && !cell.IsTooLarge()) {
-      is_cut |= cell.Cut(VertexId{u}, p);
-    }
+  for (uint32_t u = vertex_count_; u < end && !cell.IsTooLarge(); ++u) {
+    is_cut |= cell.Cut(VertexId{u}, structure_.point(VertexId{u}));
   }
   return is_cut;
 }

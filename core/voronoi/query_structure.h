@@ -107,8 +107,7 @@ class QueryStructure {
   // REQUIRES:   p in the box and different from all vertices; radius > 0.
   // Complexity: as ClippedVoronoi's when p is in the clipped cell of `near`.
   // Errors:     none.
-  void ClippedVoronoiAt(const Point<D>& p, VertexId near, double radius, Workspace<D>& workspace,
-                        TieRule rule = TieRule::kKeep) const;
+  void ClippedVoronoiAt(const Point<D>& p, VertexId near, double radius, Workspace<D>& workspace, TieRule rule) const;
 
   // Computes in workspace.cell the whole Voronoi cell of `v`, inside walls one side of the box beyond it, ties
   // perturbed.

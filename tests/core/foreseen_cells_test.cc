@@ -25,6 +25,8 @@ using test::ByDimension;
 using test::MakeStructure;
 
 constexpr double kClip = 0.4;
+// Without ties, and with many.
+constexpr std::string_view kKinds[] = {"uniform", "grid", "cospherical", "boundary", "rounded"};
 
 // All that counts of a node: where it is, to the bit, and what its planes are; in an order of its own.
 template <int D>
@@ -64,7 +66,7 @@ QueryStructure<D> StructureOf(std::string_view kind) {
 
 TYPED_TEST(ForeseenCellsTest, CellsDoNotDependOnTheOrderOfTheCuts) {
   constexpr int D = TypeParam::kValue;
-  for (const std::string_view kind : {"uniform", "grid", "cospherical", "boundary", "rounded"}) {
+  for (const std::string_view kind : kKinds) {
     SCOPED_TRACE(std::string(kind));
     const QueryStructure<D> structure = StructureOf<D>(kind);
     Workspace<D> workspace;
@@ -84,7 +86,7 @@ TYPED_TEST(ForeseenCellsTest, CellsDoNotDependOnTheOrderOfTheCuts) {
 
 TYPED_TEST(ForeseenCellsTest, StayTrueWhileVerticesAreAdded) {
   constexpr int D = TypeParam::kValue;
-  for (const std::string_view kind : {"uniform", "grid", "cospherical", "boundary", "rounded"}) {
+  for (const std::string_view kind : kKinds) {
     SCOPED_TRACE(std::string(kind));
     QueryStructure<D> structure = StructureOf<D>(kind);
     ThreadTeam team(2);
