@@ -67,13 +67,14 @@ WELLSPACE_INLINE const auto& LanesAt(const double* column, size_t from) {
   return *reinterpret_cast<const typename Wide<kWidth>::Lanes*>(column + from);
 }
 
+// The bits that any lane has.
 template <size_t kWidth>
-WELLSPACE_INLINE bool IsAny(const typename Wide<kWidth>::Mask& mask) {
-  int64_t any = 0;
+WELLSPACE_INLINE uint64_t Union(const typename Wide<kWidth>::Mask& mask) {
+  int64_t bits = 0;
   for (size_t lane = 0; lane < kWidth; ++lane) {
-    any |= mask[lane];
+    bits |= mask[lane];
   }
-  return any != 0;
+  return static_cast<uint64_t>(bits);
 }
 
 }  // namespace wellspace::core

@@ -28,19 +28,29 @@ class LeafQueue {
 
   void Clear() { count_ = 0; }
   bool IsEmpty() const { return count_ == 0; }
-  void Push(double distance_sq, NodeId leaf) {
-    if (count_ == leaves_.size()) {
-      Grow();
+  size_t size() const { return count_; }
+  NodeId leaf(size_t i) const { return leaves_[i]; }
+
+  // Makes room for so many more.
+  void Reserve(size_t more) {
+    if (count_ + more > leaves_.size()) {
+      Grow(more);
     }
+  }
+  // Appends a leaf if it `counts`.
+  //
+  // REQUIRES:   room for it.
+  void PushIf(bool counts, double distance_sq, NodeId leaf) {
     groups_[count_ / kLanes].distance_sq[count_ % kLanes] = distance_sq;
-    leaves_[count_++] = leaf;
+    leaves_[count_] = leaf;
+    count_ += counts ? 1 : 0;
   }
 
   struct Entry {
     double distance_sq;
     NodeId leaf;
   };
-  // Takes the nearest; of those as near, that of the lowest number.
+  // Takes the nearest; of those as near, any.
   //
   // REQUIRES:   not empty.
   // Complexity: O(waiting), in vectors: a few dozen wait.
@@ -51,7 +61,7 @@ class LeafQueue {
   struct alignas(kLanes * sizeof(double)) Group {
     double distance_sq[kLanes];
   };
-  void Grow();
+  void Grow(size_t more);
 
   VectorUnit unit_;
   size_t count_ = 0;

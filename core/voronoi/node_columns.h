@@ -2,9 +2,11 @@
 #ifndef WELLSPACE_CORE_VORONOI_NODE_COLUMNS_H_
 #define WELLSPACE_CORE_VORONOI_NODE_COLUMNS_H_
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/geometry/point.h"
@@ -26,8 +28,8 @@ struct alignas(kLanes * sizeof(double)) CandidateColumns {
   size_t count = 0;
 };
 
-// A copy of CellNode::x, slack and reach by index of the node, in groups that one vector instruction takes. Places of
-// the last group beyond the last node hold a node at the site, which no bisector cuts off.
+// Positions of the nodes of a cell and bounds on their errors by index of the node, in groups that one vector instruction
+// takes. Places of the last group beyond the last node hold a node at the site, which no bisector cuts off.
 //
 // Thread safety: thread-compatible.
 template <int D>
@@ -36,73 +38,157 @@ class NodeColumns {
   struct alignas(kLanes * sizeof(double)) Group {
     double x[D][kLanes];
     double slack[kLanes];
-    double reach[kLanes];
     double excess[kLanes];
-    double most[kLanes];
   };
+  // A bit for each node: so many in a word.
+  static constexpr size_t kWordBits = 64;
 
   // Works with `unit`, which this processor has; the best there is unless told.
   explicit NodeColumns(VectorUnit unit = BestVectorUnit()) : unit_(unit) {}
 
+  size_t count() const { return count_; }
+
   // REQUIRES:   nodes that are new are Set before anything else is asked.
   void Resize(size_t count) {
-    groups_.resize(PaddedCount(count) / kLanes);
-    for (size_t i = count; i < groups_.size() * kLanes; ++i) {
-      Set(i, Point<D>{}, 0, 0);
+    for (size_t i = count; i < count_; ++i) {
+      Set(i, Point<D>{}, 0);
+    }
+    count_ = count;
+    if (PaddedCount(count) > groups_.size() * kLanes) {
+      groups_.resize(2 * PaddedCount(count) / kLanes);
+      found_.resize((groups_.size() * kLanes + kWordBits - 1) / kWordBits);
     }
   }
 
-  void Set(size_t i, const Point<D>& x, double slack, double reach) {
+  // Makes this a copy of what `other` tells of its nodes.
+  void CopyFrom(const NodeColumns& other) {
+    const std::span<const Group> groups = other.groups();
+    groups_.assign(groups.begin(), groups.end());
+    found_.resize((groups_.size() * kLanes + kWordBits - 1) / kWordBits);
+    count_ = other.count_;
+  }
+
+  void Set(size_t i, const Point<D>& x, double slack) {
     Group& group = groups_[i / kLanes];
     const size_t lane = i % kLanes;
     for (int axis = 0; axis < D; ++axis) {
       group.x[axis][lane] = x[axis];
     }
     group.slack[lane] = slack;
-    group.reach[lane] = reach;
   }
 
-  // Computes x . normal - offset for all nodes x, and the same plus the bound on its error, slack length + error. Returns
-  // whether any of the latter is not negative.
-  bool ComputeExcesses(const Point<D>& normal, double offset, double length, double error);
+  Point<D> x(size_t i) const {
+    Point<D> x;
+    for (int axis = 0; axis < D; ++axis) {
+      x[axis] = groups_[i / kLanes].x[axis][i % kLanes];
+    }
+    return x;
+  }
+  double slack(size_t i) const { return groups_[i / kLanes].slack[i % kLanes]; }
+
+  // Computes for all nodes x the excess x . normal - offset, which may be wrong by e = slack length + error: finds those
+  // of which excess + e is not negative (doubtful ones and more), and those of which excess - e is positive (surely cut
+  // off). Returns whether there are any of the former.
+  template <size_t kWidth>
+  WELLSPACE_INLINE bool ComputeExcesses(const Point<D>& normal, double offset, double length, double error);
   double excess(size_t i) const { return groups_[i / kLanes].excess[i % kLanes]; }
 
-  // Writes the indices of those nodes for which that sum is not negative, ascending, and returns their number. `out` has
-  // room for kLanes for each group.
-  template <typename Index>
-  size_t FindExceeding(Index* out) const {
-    size_t count = 0;
-    Index i = 0;
-    for (const Group& group : groups_) {
-      for (size_t lane = 0; lane < kLanes; ++lane, ++i) {
-        out[count] = i;  // no branch, since none could be foretold
-        count += group.most[lane] >= 0 ? 1 : 0;
-      }
-    }
-    return count;
-  }
-  uint64_t MemoryBytes() const { return groups_.capacity() * sizeof(Group); }
-  size_t padded_count() const { return groups_.size() * kLanes; }
+  // What the last ComputeExcesses found: bit b of word w stands for node kWordBits w + b.
+  struct Found {
+    uint64_t maybe = 0;
+    uint64_t surely = 0;
+  };
+  std::span<Found> found() { return {found_.data(), (count_ + kWordBits - 1) / kWordBits}; }
+
+  uint64_t MemoryBytes() const { return groups_.capacity() * sizeof(Group) + found_.capacity() * sizeof(Found); }
 
   // Computes `most` of all candidates; `slack` is at least those of the nodes, and a candidate w has the error `slack` |w|
   // + `relative_error` |w|^2 / 2.
   void ComputeMost(double slack, double relative_error, CandidateColumns<D>& candidates) const;
 
-  // Whether some node x has dist(x, cube) <= |x|, decided generously where the errors of nodes leave a doubt; `low` and
-  // `high` are the corners of the cube relative to the site.
-  bool Reaches(const Point<D>& low, const Point<D>& high) const;
+  // Whether some node x has |p x|^2 <= |x|^2 + doubt, for the point p of the cube [low, high] nearest to it; `low` and `high`
+  // are relative to the site.
+  bool Reaches(const Point<D>& low, const Point<D>& high, double doubt) const;
 
-  // The largest reach, and the largest slack.
+  // The largest squared distance of a node from the site, and the largest slack.
   struct Largest {
-    double reach;
+    double radius_sq;
     double slack;
   };
-  Largest FindLargest() const;
+  template <size_t kWidth>
+  WELLSPACE_INLINE Largest FindLargest() const;
 
  private:
+  std::span<const Group> groups() const { return {groups_.data(), PaddedCount(count_) / kLanes}; }
+
   VectorUnit unit_;
-  std::vector<Group> groups_;
+  size_t count_ = 0;
+  std::vector<Group> groups_;  // more than are needed; places beyond the last node are as the class says
+  std::vector<Found> found_;
 };
+
+template <int D>
+template <size_t kWidth>
+WELLSPACE_INLINE bool NodeColumns<D>::ComputeExcesses(const Point<D>& normal, double offset, double length,
+                                                      double error) {
+  using Lanes = typename Wide<kWidth>::Lanes;
+  using Mask = typename Wide<kWidth>::Mask;
+  Group* group = groups_.data();
+  uint64_t any = 0;
+  size_t left = PaddedCount(count_) / kLanes;
+  for (Found* found = found_.data(); left > 0; ++found) {
+    const size_t groups = std::min(left, kWordBits / kLanes);
+    left -= groups;
+    Mask maybe{};
+    Mask surely{};
+    Mask bits;  // of the nodes that are looked at
+    for (size_t lane = 0; lane < kWidth; ++lane) {
+      bits[lane] = int64_t{1} << lane;
+    }
+    for (const Group* const end = group + groups; group < end; ++group) {
+      for (size_t from = 0; from < kLanes; from += kWidth) {
+        Lanes excess = LanesAt<kWidth>(group->x[0], from) * normal[0];
+        for (int axis = 1; axis < D; ++axis) {
+          excess += LanesAt<kWidth>(group->x[axis], from) * normal[axis];
+        }
+        excess -= offset;
+        const Lanes doubt = LanesAt<kWidth>(group->slack, from) * length + error;
+        LanesAt<kWidth>(group->excess, from) = excess;
+        maybe |= (excess + doubt >= 0) & bits;
+        surely |= (excess > doubt) & bits;
+        bits <<= kWidth;
+      }
+    }
+    found->maybe = Union<kWidth>(maybe);
+    found->surely = Union<kWidth>(surely);
+    any |= found->maybe;
+  }
+  return any != 0;
+}
+
+template <int D>
+template <size_t kWidth>
+WELLSPACE_INLINE typename NodeColumns<D>::Largest NodeColumns<D>::FindLargest() const {
+  using Lanes = typename Wide<kWidth>::Lanes;
+  Lanes radius_sq{};
+  Lanes slack{};
+  for (const Group& group : groups()) {
+    for (size_t from = 0; from < kLanes; from += kWidth) {
+      Lanes norm_sq = LanesAt<kWidth>(group.x[0], from) * LanesAt<kWidth>(group.x[0], from);
+      for (int axis = 1; axis < D; ++axis) {
+        norm_sq += LanesAt<kWidth>(group.x[axis], from) * LanesAt<kWidth>(group.x[axis], from);
+      }
+      const Lanes slacks = LanesAt<kWidth>(group.slack, from);
+      radius_sq = radius_sq > norm_sq ? radius_sq : norm_sq;
+      slack = slack > slacks ? slack : slacks;
+    }
+  }
+  Largest largest{radius_sq[0], slack[0]};
+  for (size_t lane = 1; lane < kWidth; ++lane) {
+    largest = {std::max(largest.radius_sq, radius_sq[lane]), std::max(largest.slack, slack[lane])};
+  }
+  return largest;
+}
 
 }  // namespace wellspace::core
 

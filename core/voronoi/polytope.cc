@@ -1,6 +1,7 @@
 #include "core/voronoi/polytope.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
@@ -16,6 +17,9 @@ constexpr double kUnit = 0x1p-53;  // relative rounding error
 // What |w|^2 / 2 contributes to the error of x . w - |w|^2 / 2, relative to itself; see Polytope::Cut.
 template <int D>
 constexpr double kOffsetError = (D + 5) * kUnit;
+
+// A node between two others may be wrong by this share of its distance from the site: few cuts are left in doubt by it.
+constexpr double kGoodPlace = 0x1p-20;
 
 // A node in doubles, and a bound on |x - exact x|; infinite where there is none.
 template <int D>
@@ -169,203 +173,306 @@ void Polytope<D>::Reset(const Point<D>& site, const Box<D>& bounds, const std::a
     plane.offset = plane.source.coordinate - site[axis];
     plane.distance = std::abs(plane.offset);
   }
-  nodes_.resize(1 << D);
-  columns_.Resize(nodes_.size());
+  joints_.resize(std::max<size_t>(joints_.size(), 1 << D));
+  columns_.Resize(1 << D);
   for (int corner = 0; corner < (1 << D); ++corner) {
-    CellNode<D>& node = nodes_[corner];
+    Joint& joint = joints_[corner];
+    Point<D> x;
     for (int axis = 0; axis < D; ++axis) {
       const int face = FaceIndex(axis, ((corner >> axis) & 1) != 0);
-      node.x[axis] = planes_[face].offset;
-      node.planes[axis] = static_cast<uint16_t>(face);
-      node.neighbours[axis] = static_cast<Index>(corner ^ (1 << axis));
+      x[axis] = planes_[face].offset;
+      joint.planes[axis] = static_cast<uint16_t>(face);
+      joint.ends[axis] = EndAt(corner ^ (1 << axis), axis);
     }
-    node.radius_sq = NormSq<D>(node.x);
-    node.slack = 16 * kUnit * std::sqrt(node.radius_sq);
-    node.reach = std::sqrt(node.radius_sq) + node.slack;
-    columns_.Set(corner, node.x, node.slack, node.reach);
+    joint.is_placed = true;
+    columns_.Set(corner, x, 16 * kUnit * std::sqrt(NormSq<D>(x)));
   }
-  UpdateReach();
+  is_placed_ = false;
+  reach_ = std::numeric_limits<double>::infinity();
+  Place();
 }
 
 template <int D>
 void Polytope<D>::CopyFrom(const Polytope& other) {
   site_ = other.site_;
   rule_ = other.rule_;
-  reach_sq_ = other.reach_sq_;
+  reach_ = other.reach_;
   largest_slack_ = other.largest_slack_;
+  is_placed_ = other.is_placed_;
   planes_ = other.planes_;
+  joints_.assign(other.joints_.begin(), other.joints_.begin() + static_cast<std::ptrdiff_t>(other.columns_.count()));
   nodes_ = other.nodes_;
-  columns_ = other.columns_;
+  columns_.CopyFrom(other.columns_);
   cuts_ = other.cuts_;
   counters_ = other.counters_;
 }
 
 template <int D>
-bool Polytope<D>::Cut(VertexId u, const Point<D>& position) {
-  const Point<D> normal = Difference<D>(position, site_);
-  const double length_sq = NormSq<D>(normal);
-  if (length_sq > CutLimitSq()) {
-    return false;
-  }
+bool Polytope<D>::CutOff(VertexId u, const Point<D>& position, const Point<D>& normal, double length_sq) {
+  return BestVectorUnit() == VectorUnit::kAvx2 ? CutOffAvx2(u, position, normal, length_sq)
+                                               : CutOffWith<2>(u, position, normal, length_sq);
+}
+
+template <int D>
+WELLSPACE_AVX2 bool Polytope<D>::CutOffAvx2(VertexId u, const Point<D>& position, const Point<D>& normal,
+                                            double length_sq) {
+  return CutOffWith<4>(u, position, normal, length_sq);
+}
+
+// Cuts by the bisector of the site and `position` = site + normal.
+template <int D>
+template <size_t kWidth>
+WELLSPACE_INLINE bool Polytope<D>::CutOffWith(VertexId u, const Point<D>& position, const Point<D>& normal,
+                                              double length_sq) {
   // The excess x . w - c of a node x, as computed, differs from the exact one by at most slack |w| + (D + 5) u c: the error
   // of x is in slack, w has one rounding a coordinate, the product D more, c D + 2, the difference one; 16 u |x| of the
   // slack pays for those of the product.
   const double length = std::sqrt(length_sq);
   const double offset = 0.5 * length_sq;
-  const double offset_error = kOffsetError<D> * offset;
-  if (!columns_.ComputeExcesses(normal, offset, length, offset_error)) {
+  if (!columns_.template ComputeExcesses<kWidth>(normal, offset, length, kOffsetError<D> * offset)) {
     return false;
   }
-  Plane<D> plane;
+  FindRemoved(position);
+  if (removed_count_ == 0) {
+    return false;
+  }
+  ++cuts_;
+  is_placed_ = false;
+  const auto index = static_cast<uint16_t>(planes_.size());
+  Plane<D>& plane = planes_.emplace_back();
   plane.vertex = u;
   plane.normal = normal;
   plane.offset = offset;
   plane.length = length;
   plane.distance = 0.5 * length;
   plane.source.generator = position;
-  removed_.resize(columns_.padded_count());
-  const size_t exceeding = columns_.FindExceeding(removed_.data());
-  size_t count = 0;
-  for (size_t j = 0; j < exceeding; ++j) {
-    const Index i = removed_[j];
-    if (IsCutOff(nodes_[i], columns_.excess(i), nodes_[i].slack * length + offset_error, plane)) {
-      removed_[count++] = i;
-    }
+  FindCutEdges(index);
+  PlaceCutEdges(plane);
+  MakeNewNodes();
+  LinkNewNodes();
+  if (cut_count_ < removed_count_) {
+    FillHoles(cut_count_);
   }
-  removed_.resize(count);
-  if (count == 0) {
-    return false;
-  }
-  is_removed_.resize(std::max(is_removed_.size(), nodes_.size()), 0);
-  for (const Index i : removed_) {
-    is_removed_[i] = 1;
-  }
-  ++cuts_;
-  const auto index = static_cast<uint16_t>(planes_.size());
-  planes_.push_back(plane);
-  FindCutEdges();
-  MakeNewNodes(index);
-  UpdateReach();
+  SetReach(columns_.template FindLargest<kWidth>());
   return true;
 }
 
-// Whether a node is cut off whose excess may be above -error.
+// Whether the bisector of the site and `generator` cuts off a node, exactly.
 template <int D>
-bool Polytope<D>::IsCutOff(const CellNode<D>& node, double excess, double error, const Plane<D>& plane) {
-  if (excess > error) {
-    return true;
-  }
+bool Polytope<D>::IsCutOff(const Joint& node, const Point<D>& generator) {
   std::array<PlaneSource<D>, D> sources;
   for (int k = 0; k < D; ++k) {
     sources[k] = planes_[node.planes[k]].source;
   }
-  const ExactDecision decision = DecideCut<D>(site_, sources, plane.source.generator, rule_);
+  const ExactDecision decision = DecideCut<D>(site_, sources, generator, rule_);
   ++counters_.exact;
   counters_.perturbed += decision.perturbed ? 1 : 0;
   return decision.sign == Sign::kPositive;
 }
 
+// Decides what the excesses leave in doubt, and lists what is cut off.
 template <int D>
-void Polytope<D>::FindCutEdges() {
-  cut_edges_.resize(removed_.size() * D);
-  size_t count = 0;
-  for (const Index removed : removed_) {
-    const CellNode<D>& node = nodes_[removed];
-    for (uint8_t k = 0; k < D; ++k) {
-      // No branch, since none could be foretold: about half of the neighbours are kept.
-      const Index kept = node.neighbours[k];
-      const auto& back = nodes_[kept].neighbours;
-      uint8_t kept_slot = 0;
-      for (uint8_t i = 1; i < D; ++i) {
-        kept_slot = back[i] == removed ? i : kept_slot;
-      }
-      cut_edges_[count] = {node.planes, k, kept_slot, kept};
-      count += is_removed_[kept] == 0 ? 1 : 0;
-    }
+WELLSPACE_INLINE void Polytope<D>::FindRemoved(const Point<D>& generator) {
+  if (removed_.size() < columns_.count()) {
+    removed_.resize(2 * columns_.count());
   }
-  cut_edges_.resize(count);
+  Index* const begin = removed_.data();
+  Index* end = begin;
+  size_t first = 0;  // node of the word
+  for (auto& found : columns_.found()) {
+    for (uint64_t doubtful = found.maybe & ~found.surely; doubtful != 0; doubtful &= doubtful - 1) {
+      if (IsCutOff(joints_[first + std::countr_zero(doubtful)], generator)) {
+        found.surely |= doubtful & -doubtful;
+      }
+    }
+    for (uint64_t removed = found.surely; removed != 0; removed &= removed - 1) {
+      *end++ = static_cast<Index>(first + std::countr_zero(removed));
+    }
+    first += NodeColumns<D>::kWordBits;
+  }
+  removed_count_ = static_cast<size_t>(end - begin);
 }
 
-// One new node on each cut edge. They take the places of removed nodes, the last one that of the first, and what is left
-// over goes to the end; so the nodes stay without holes.
 template <int D>
-void Polytope<D>::MakeNewNodes(uint16_t plane) {
-  const size_t count = cut_edges_.size();
-  const size_t old = nodes_.size();
-  const size_t appended = count - std::min(count, removed_.size());
-  for (size_t j = 0; j < appended; ++j) {
-    nodes_.push_back(nodes_.back());  // any node: resize would be slower
+WELLSPACE_INLINE void Polytope<D>::FindCutEdges(uint16_t plane) {
+  if (cut_edges_.size() < removed_count_ * D) {
+    cut_edges_.resize(2 * removed_count_ * D);
   }
-  columns_.Resize(nodes_.size());
-  new_.resize(count);
-  for (size_t j = 0; j < count; ++j) {
+  const auto* const found = columns_.found().data();
+  CutEdge* edge = cut_edges_.data();
+  for (size_t j = 0; j < removed_count_; ++j) {
+    const Joint& joint = joints_[removed_[j]];
+    for (int k = 0; k < D; ++k) {
+      // No branch, since none could be foretold: about half of the neighbours are kept.
+      edge->kept = joint.ends[k];
+      edge->removed = removed_[j];
+      for (int i = 0; i < D - 1; ++i) {
+        edge->planes[i] = joint.planes[i + (i >= k ? 1 : 0)];
+      }
+      edge->planes[D - 1] = plane;
+      const size_t node = NodeOf(joint.ends[k]);
+      const uint64_t is_removed =
+          found[node / NodeColumns<D>::kWordBits].surely >> node % NodeColumns<D>::kWordBits & 1;
+      edge += 1 - is_removed;
+    }
+  }
+  cut_count_ = static_cast<size_t>(edge - cut_edges_.data());
+}
+
+// Computes where `plane` meets the cut edges: by how much their ends exceed it, where that is good enough to decide on
+// cuts; else from the planes.
+//
+// With k and r the ends as computed, s their larger slack, d = r - k, e_k < 0 < e_r their excesses as computed and eps
+// the bound on the errors of those, t = e_k / (e_k - e_r) differs from that of the exact ends by |e_r a - e_k b| / (g (g +
+// b - a)), where g = e_r - e_k and |a|, |b| <= eps are the errors: at most eps / (g - 2 eps), since |e_r| + |e_k| = g. The
+// exact node lies between the exact ends, so k + t d is wrong by at most s + eps / (g - 2 eps) (|d| + 2 s) and the
+// rounding: of each coordinate of k + t d, of t and of t d, less than 4 u (|k| + |d|) <= 12 u R where R >= |k|, |r|. The
+// new slack has to hold 16 u |x| <= 16 u R of its own; 4 u R more pays for the roundings of the bound.
+template <int D>
+WELLSPACE_INLINE void Polytope<D>::PlaceCutEdges(const Plane<D>& plane) {
+  const double length = plane.length;
+  const double offset_error = kOffsetError<D> * plane.offset;
+  const double rounding = 32 * kUnit * reach_;
+  const double most = kGoodPlace * reach_;
+  for (size_t j = 0; j < cut_count_; ++j) {
+    CutEdge& edge = cut_edges_[j];
+    const size_t node = NodeOf(edge.kept);
+    const double below = columns_.excess(node);
+    const double gap = columns_.excess(edge.removed) - below;
+    const double slack = std::max(columns_.slack(node), columns_.slack(edge.removed));
+    const double doubt = slack * length + offset_error;
+    const double inverse = 1 / gap;
+    const double t = -below * inverse;
+    const Point<D> kept = columns_.x(node);
+    const Point<D> removed = columns_.x(edge.removed);
+    double distance = 2 * slack;
+    for (int i = 0; i < D; ++i) {
+      const double d = removed[i] - kept[i];
+      edge.x[i] = kept[i] + t * d;
+      distance += std::abs(d);
+    }
+    edge.slack = slack + rounding + 1.01 * doubt * inverse * distance;
+    if (!((t > 0) & (t < 1) & (gap > 256 * doubt) & (edge.slack < most))) {
+      const std::array<uint32_t, D> ranks = RanksOf(edge.planes);
+      std::array<uint16_t, D> planes;
+      for (int k = 0; k < D; ++k) {
+        planes[ranks[k]] = edge.planes[k];
+      }
+      edge.slack = PlaceByPlanes(planes, edge.x);
+    }
+  }
+}
+
+// One new node on each cut edge. They take the places of removed nodes first; what is left over goes to the end, so that
+// the nodes stay without holes.
+template <int D>
+WELLSPACE_INLINE void Polytope<D>::MakeNewNodes() {
+  if (new_.size() < cut_count_) {
+    new_.resize(2 * cut_count_);
+  }
+  const size_t old = columns_.count();
+  const size_t replaced = std::min(cut_count_, removed_count_);
+  for (size_t j = 0; j < replaced; ++j) {
+    new_[j] = removed_[j];
+  }
+  if (cut_count_ > replaced) {
+    columns_.Resize(old + cut_count_ - replaced);
+    if (joints_.size() < columns_.count()) {
+      joints_.resize(2 * columns_.count());
+    }
+    for (size_t j = replaced; j < cut_count_; ++j) {
+      new_[j] = static_cast<Index>(old + j - replaced);
+    }
+  }
+  Joint* const joints = joints_.data();
+  for (size_t j = 0; j < cut_count_; ++j) {
     const CutEdge& edge = cut_edges_[j];
-    const Index index = j < appended ? static_cast<Index>(old + j) : removed_[count - 1 - j];
-    new_[j] = index;
-    CellNode<D>& node = nodes_[index];
-    // The new plane takes its place among the others, which are in order.
-    std::array<uint16_t, D - 1> others;
-    size_t slot = 0;
-    for (size_t k = 0; k < D - 1; ++k) {
-      others[k] = edge.planes[k + (k >= edge.slot ? 1 : 0)];
-      slot += planes_[others[k]].vertex < planes_[plane].vertex ? 1 : 0;
-    }
-    node.planes[slot] = plane;
-    for (size_t k = 0; k < D - 1; ++k) {
-      node.planes[k + (k >= slot ? 1 : 0)] = others[k];
-    }
-    node.neighbours.fill(kNoNode);
-    node.neighbours[slot] = edge.kept;
-    Place(node);
-    columns_.Set(index, node.x, node.slack, node.reach);
-    nodes_[edge.kept].neighbours[edge.kept_slot] = index;
-  }
-  LinkNewNodes(plane);
-  if (count < removed_.size()) {
-    FillHoles(count);
-  }
-  for (const Index i : removed_) {
-    is_removed_[i] = 0;
+    const Index index = new_[j];
+    Joint& joint = joints[index];
+    joint.planes = edge.planes;
+    joint.ends[D - 1] = edge.kept;
+    joint.is_placed = false;
+    joints[NodeOf(edge.kept)].ends[SlotOf(edge.kept)] = EndAt(index, D - 1);
+    columns_.Set(index, edge.x, edge.slack);
   }
 }
 
 // Moves nodes from the end into the places of those removed nodes that have not been `filled` by new ones.
 template <int D>
 void Polytope<D>::FillHoles(size_t filled) {
-  for (size_t i = 0; i < filled; ++i) {
-    is_removed_[removed_[i]] = 0;
-  }
-  for (size_t i = filled; i < removed_.size(); ++i) {
+  // The last hole first: the last node is never one then.
+  size_t count = columns_.count();
+  for (size_t i = removed_count_; i-- > filled;) {
     const Index hole = removed_[i];
-    while (is_removed_[nodes_.size() - 1] != 0) {
-      nodes_.pop_back();
-    }
-    if (hole >= nodes_.size()) {
-      break;
-    }
-    const auto last = static_cast<Index>(nodes_.size() - 1);
-    nodes_[hole] = nodes_[last];
-    is_removed_[hole] = 0;
-    nodes_.pop_back();
-    columns_.Set(hole, nodes_[hole].x, nodes_[hole].slack, nodes_[hole].reach);
-    for (const Index neighbour : nodes_[hole].neighbours) {
-      for (Index& back : nodes_[neighbour].neighbours) {
-        if (back == last) {
-          back = hole;
-          break;
-        }
+    const size_t last = --count;
+    if (hole != last) {
+      const Joint& joint = joints_[hole] = joints_[last];
+      columns_.Set(hole, columns_.x(last), columns_.slack(last));
+      for (uint32_t k = 0; k < D; ++k) {
+        joints_[NodeOf(joint.ends[k])].ends[SlotOf(joint.ends[k])] = EndAt(hole, k);
       }
     }
   }
-  columns_.Resize(nodes_.size());
+  columns_.Resize(count);
 }
 
-// Computes a node's position and its error; exactly where the planes are too nearly dependent for a bound.
 template <int D>
-void Polytope<D>::Place(CellNode<D>& node) const {
+void Polytope<D>::Place() {
+  if (is_placed_) {
+    return;
+  }
+  is_placed_ = true;
+  nodes_.resize(columns_.count());
+  for (size_t i = 0; i < nodes_.size(); ++i) {
+    Joint& joint = joints_[i];
+    if (!joint.is_placed) {
+      joint.is_placed = true;
+      const Joint old = joint;
+      const std::array<uint32_t, D> ranks = RanksOf(old.planes);
+      for (int k = 0; k < D; ++k) {
+        joint.planes[ranks[k]] = old.planes[k];
+        joint.ends[ranks[k]] = old.ends[k];
+        joints_[NodeOf(old.ends[k])].ends[SlotOf(old.ends[k])] = EndAt(i, ranks[k]);
+      }
+      Point<D> x;
+      const double slack = PlaceByPlanes(joint.planes, x);
+      columns_.Set(i, x, slack);
+    }
+    CellNode<D>& node = nodes_[i];
+    node.x = columns_.x(i);
+    node.slack = columns_.slack(i);
+    node.radius_sq = NormSq<D>(node.x);
+    node.reach = std::sqrt(node.radius_sq) + node.slack;
+    node.planes = joint.planes;
+    for (int k = 0; k < D; ++k) {
+      node.neighbours[k] = static_cast<Index>(NodeOf(joint.ends[k]));
+    }
+  }
+  SetReach(columns_.template FindLargest<2>());
+}
+
+// The places of planes in order: bisectors by vertex, then walls by face.
+template <int D>
+WELLSPACE_INLINE std::array<uint32_t, D> Polytope<D>::RanksOf(const std::array<uint16_t, D>& indices) const {
+  std::array<uint64_t, D> keys;
+  for (int k = 0; k < D; ++k) {
+    keys[k] = uint64_t{core::Index(planes_[indices[k]].vertex)} << 16 | indices[k];
+  }
+  std::array<uint32_t, D> ranks{};
+  for (int k = 0; k < D; ++k) {
+    for (int i = 0; i < D; ++i) {
+      ranks[k] += keys[i] < keys[k] ? 1 : 0;
+    }
+  }
+  return ranks;
+}
+
+// Computes where planes, in order, meet, exactly where they are too nearly dependent for a bound, and returns the slack.
+template <int D>
+double Polytope<D>::PlaceByPlanes(const std::array<uint16_t, D>& indices, Point<D>& x) const {
   std::array<const Plane<D>*, D> planes;
   for (int k = 0; k < D; ++k) {
-    planes[k] = &planes_[node.planes[k]];
+    planes[k] = &planes_[indices[k]];
   }
   Placement<D> placed = Meet<D>(planes);
   if (!std::isfinite(placed.error)) {
@@ -376,67 +483,64 @@ void Polytope<D>::Place(CellNode<D>& node) const {
     placed.x = ExactMeetingPoint<D>(site_, sources);
     placed.error = 8 * kUnit * std::sqrt(NormSq<D>(placed.x));
   }
-  node.x = placed.x;
-  node.radius_sq = NormSq<D>(node.x);
-  const double radius = std::sqrt(node.radius_sq);
-  node.slack = placed.error + 16 * kUnit * radius;
-  node.reach = radius + node.slack;
+  x = placed.x;
+  return placed.error + 16 * kUnit * std::sqrt(NormSq<D>(x));
 }
 
-// Joins the new nodes along the edges of the new facet: two are joined if they share D - 2 planes beside the new one.
-// Exact decisions leave no edge with one end.
+// Joins the new nodes along the edges of the new facet: two are joined if they share D - 2 planes beside the new one,
+// which is the last of each. Exact decisions leave no edge with one end.
 template <int D>
-void Polytope<D>::LinkNewNodes(uint16_t plane) {
-  if constexpr (D <= 3) {
-    // The other plane numbers the edges; in 2-D there is one edge, which runs along the new plane alone.
-    if (open_end_.size() < planes_.size()) {
-      open_end_.resize(planes_.size());
+WELLSPACE_INLINE void Polytope<D>::LinkNewNodes() {
+  if constexpr (D == 2) {
+    if (cut_count_ != 2) {
+      std::abort();
     }
-    int open = 0;
-    for (const Index index : new_) {
-      for (uint8_t slot = 0; slot < D; ++slot) {
-        if (nodes_[index].planes[slot] == plane) {
-          continue;
-        }
-        uint16_t along = plane;
-        for (int other = 0; other < D && D == 3; ++other) {
-          if (other != slot && nodes_[index].planes[other] != plane) {
-            along = nodes_[index].planes[other];
-          }
-        }
-        End& end = open_end_[along];
-        if (end.node == kNoNode) {
-          end = {index, slot};
-          ++open;
-        } else {
-          Join({index, slot}, end);
-          end = {};
-          --open;
-        }
-      }
+    Join(EndAt(new_[0], 0), EndAt(new_[1], 0));
+  } else if constexpr (D == 3) {
+    // The edge that leaves planes[slot] runs along the other of planes[0] and planes[1], where its ends meet: each finds
+    // the other in what both leave there. No branch, since none could be foretold.
+    if (ends_.size() < planes_.size()) {
+      ends_.resize(2 * planes_.size(), 0);
     }
-    if (open != 0) {
+    uint32_t* const ends = ends_.data();
+    const auto code = [this](size_t j, uint32_t slot) { return EndAt(new_[j], slot) + 1; };
+    for (size_t j = 0; j < cut_count_; ++j) {
+      const uint16_t first = cut_edges_[j].planes[0];
+      const uint16_t second = cut_edges_[j].planes[1];
+      ends[second] ^= code(j, 0);
+      ends[first] ^= code(j, 1);
+    }
+    bool is_open = false;
+    for (size_t j = 0; j < cut_count_; ++j) {
+      const uint16_t first = cut_edges_[j].planes[0];
+      const uint16_t second = cut_edges_[j].planes[1];
+      const uint32_t at_first = ends[second] ^ code(j, 0);
+      const uint32_t at_second = ends[first] ^ code(j, 1);
+      is_open |= (at_first == 0) | (at_second == 0);
+      joints_[new_[j]].ends[0] = at_first - 1;
+      joints_[new_[j]].ends[1] = at_second - 1;
+    }
+    for (size_t j = 0; j < cut_count_; ++j) {
+      const uint16_t first = cut_edges_[j].planes[0];
+      const uint16_t second = cut_edges_[j].planes[1];
+      ends[first] = ends[second] = 0;
+    }
+    if (is_open) {
       std::abort();
     }
   } else {
+    static_assert(D <= 6);
     ridges_.clear();
-    for (const Index index : new_) {
-      for (uint8_t slot = 0; slot < D; ++slot) {
-        if (nodes_[index].planes[slot] == plane) {
-          continue;
-        }
-        static_assert(D <= 6);
+    for (size_t j = 0; j < cut_count_; ++j) {
+      for (uint32_t slot = 0; slot < D - 1; ++slot) {
         std::array<uint16_t, D - 2> along;
-        int count = 0;
-        for (int other = 0; other < D; ++other) {
-          if (other != slot && nodes_[index].planes[other] != plane) {
-            along[count++] = nodes_[index].planes[other];
-          }
+        for (uint32_t k = 0; k < D - 2; ++k) {
+          along[k] = cut_edges_[j].planes[k + (k >= slot ? 1 : 0)];
         }
         std::sort(along.begin(), along.end());
-        Ridge ridge{0, {index, slot}};
-        for (const uint16_t each : along) {
-          ridge.planes = ridge.planes << 16 | each;
+        Ridge ridge{0, EndAt(new_[j], slot)};
+        for (const uint16_t plane : along) {
+          ridge.planes = ridge.planes << 16 | plane;
         }
         ridges_.push_back(ridge);
       }
@@ -456,15 +560,14 @@ void Polytope<D>::LinkNewNodes(uint16_t plane) {
 
 template <int D>
 void Polytope<D>::Join(End a, End b) {
-  nodes_[a.node].neighbours[a.slot] = b.node;
-  nodes_[b.node].neighbours[b.slot] = a.node;
+  joints_[NodeOf(a)].ends[SlotOf(a)] = b;
+  joints_[NodeOf(b)].ends[SlotOf(b)] = a;
 }
 
 template <int D>
-void Polytope<D>::UpdateReach() {
-  const auto [reach, slack] = columns_.FindLargest();
-  reach_sq_ = reach * reach;
-  largest_slack_ = slack;
+void Polytope<D>::SetReach(const typename NodeColumns<D>::Largest& largest) {
+  reach_ = std::min(reach_, std::sqrt(largest.radius_sq) + largest.slack);  // the cell only shrinks
+  largest_slack_ = largest.slack;
 }
 
 // As in Cut, with the largest slack.
@@ -475,7 +578,9 @@ void Polytope<D>::Foretell(CandidateColumns<D>& candidates) const {
 
 template <int D>
 bool Polytope<D>::Reaches(const Box<D>& cube) const {
-  return columns_.Reaches(Difference<D>(cube.low, site_), Difference<D>(cube.high, site_));
+  // |p x|^2 - |x|^2 = p (p - 2 x). Where that is near zero p is within 2 |x| of the site, so an error e of x moves it by at
+  // most 4 |x| e.
+  return columns_.Reaches(Difference<D>(cube.low, site_), Difference<D>(cube.high, site_), 4 * largest_slack_ * reach_);
 }
 
 #define WELLSPACE_INSTANTIATE(D) template class Polytope<D>;

@@ -104,7 +104,25 @@ class Polytope {
   // Complexity: O(nodes); no allocation once warm.
   // Errors:     none.
   // Source:     the cell as a simple polytope is usual since Tanemura, Ogawa and Ogita 1983.
-  bool Cut(VertexId u, const Point<D>& position);
+  bool Cut(VertexId u, const Point<D>& position) {
+    const bool is_cut = CutBeforePlace(u, position);
+    Place();
+    return is_cut;
+  }
+
+  // The same, where more cuts may follow: until Place() is called nodes() may not be asked for.
+  bool CutBeforePlace(VertexId u, const Point<D>& position) {
+    const Point<D> normal = Difference<D>(position, site_);
+    const double length_sq = NormSq<D>(normal);
+    return length_sq <= CutLimitSq() && CutOff(u, position, normal, length_sq);
+  }
+
+  // Computes what nodes() is to tell of the nodes that have been made since: from their planes alone, so that it does not
+  // depend on the order of the cuts.
+  //
+  // Complexity: O(nodes); no allocation.
+  // Errors:     none.
+  void Place();
 
   // Computes `most` of the candidates, so that those for which it is negative do not cut the cell, now or later.
   //
@@ -122,7 +140,7 @@ class Polytope {
   bool Reaches(const Box<D>& cube) const;
 
   // Whether the last cut has made the cell larger than it may be.
-  bool IsTooLarge() const { return nodes_.size() > kMostNodes || planes_.size() > kMostPlanes; }
+  bool IsTooLarge() const { return columns_.count() > kMostNodes || planes_.size() > kMostPlanes; }
 
   // The faces of the box that a node of the cell lies on.
   FaceMask FacesOf(const CellNode<D>& node) const {
@@ -137,9 +155,10 @@ class Polytope {
 
   const Point<D>& site() const { return site_; }
   // At least the squared distance from the site to the farthest node.
-  double reach_sq() const { return reach_sq_; }
+  double reach_sq() const { return reach_ * reach_; }
   // A vertex whose computed squared distance from the site is larger than this cannot cut the cell.
-  double CutLimitSq() const { return 4 * (1 + 0x1p-49) * reach_sq_; }
+  double CutLimitSq() const { return 4 * (1 + 0x1p-49) * reach_sq(); }
+  // REQUIRES:   the last cut was Cut, or Place has been called since.
   std::span<const CellNode<D>> nodes() const { return nodes_; }
   const Plane<D>& plane(int index) const { return planes_[index]; }
   int plane_count() const { return static_cast<int>(planes_.size()); }
@@ -147,57 +166,78 @@ class Polytope {
   const DecisionCounters& counters() const { return counters_; }
   // What the cell takes in memory, roughly, but for itself.
   uint64_t MemoryBytes() const {
-    return planes_.capacity() * sizeof(Plane<D>) + nodes_.capacity() * sizeof(CellNode<D>) + columns_.MemoryBytes();
+    return planes_.capacity() * sizeof(Plane<D>) + nodes_.capacity() * sizeof(CellNode<D>) +
+           joints_.capacity() * sizeof(Joint) + columns_.MemoryBytes();
   }
 
  private:
   using Index = NodeIndex<D>;
   static constexpr Index kNoNode = std::numeric_limits<Index>::max();
 
-  // An edge between a node that stays and one that goes, where a new node is to be.
+  // One end of an edge: the edge leaves planes[slot] of the node. node << kSlotBits | slot.
+  using End = uint32_t;
+  static constexpr int kSlotBits = 3;
+  static End EndAt(size_t node, uint32_t slot) { return static_cast<End>(node) << kSlotBits | slot; }
+  static size_t NodeOf(End end) { return end >> kSlotBits; }
+  static size_t SlotOf(End end) { return end & ((1u << kSlotBits) - 1); }
+
+  // What a node is, but for where: where its planes meet.
+  struct Joint {
+    std::array<uint16_t, D> planes;  // by index, as in CellNode once placed
+    std::array<End, D> ends;         // ends[k]: the other end of the edge that leaves planes[k]
+    bool is_placed = false;          // the position is the one that the planes alone give
+  };
+  // An edge between a node that stays and one that goes, and the node that is to be on it.
   struct CutEdge {
-    std::array<uint16_t, D> planes;  // of the removed node
-    uint8_t slot = 0;                // the edge leaves planes[slot] of the removed node
-    uint8_t kept_slot = 0;           // and this one of the kept node
-    Index kept = kNoNode;
+    End kept = 0;                    // the end that stays
+    uint32_t removed = 0;            // the other node
+    std::array<uint16_t, D> planes;  // that the edge runs along, and the new one
+    Point<D> x;
+    double slack = 0;
   };
-  // A new node whose edge that leaves planes[slot] lacks its other end.
-  struct End {
-    Index node = kNoNode;
-    uint8_t slot = 0;
-  };
-  // The same, with the D - 2 planes that the edge runs along beside the new one, ascending, 16 bits each.
+  // An end that lacks the other one, with the D - 2 planes that its edge runs along beside the new one, ascending, 16
+  // bits each.
   struct Ridge {
     uint64_t planes;
     End end;
   };
 
-  bool IsCutOff(const CellNode<D>& node, double excess, double error, const Plane<D>& plane);
-  void FindCutEdges();
-  void MakeNewNodes(uint16_t plane);
-  void Place(CellNode<D>& node) const;
-  void LinkNewNodes(uint16_t plane);
+  bool CutOff(VertexId u, const Point<D>& position, const Point<D>& normal, double length_sq);
+  bool CutOffAvx2(VertexId u, const Point<D>& position, const Point<D>& normal, double length_sq);
+  template <size_t kWidth>
+  bool CutOffWith(VertexId u, const Point<D>& position, const Point<D>& normal, double length_sq);
+  bool IsCutOff(const Joint& node, const Point<D>& generator);
+  void FindRemoved(const Point<D>& generator);
+  void FindCutEdges(uint16_t plane);
+  void PlaceCutEdges(const Plane<D>& plane);
+  std::array<uint32_t, D> RanksOf(const std::array<uint16_t, D>& indices) const;
+  double PlaceByPlanes(const std::array<uint16_t, D>& indices, Point<D>& x) const;
+  void MakeNewNodes();
+  void LinkNewNodes();
   void Join(End a, End b);
   void FillHoles(size_t filled);
-  void UpdateReach();
+  void SetReach(const typename NodeColumns<D>::Largest& largest);
 
   Point<D> site_;
   TieRule rule_ = TieRule::kKeep;
-  double reach_sq_ = 0;
+  double reach_ = 0;  // at least the distance from the site to the farthest node
   double largest_slack_ = 0;
+  bool is_placed_ = true;  // all nodes are
   std::vector<Plane<D>> planes_;
-  std::vector<CellNode<D>> nodes_;
-  NodeColumns<D> columns_;  // of nodes_
+  NodeColumns<D> columns_;          // by node
+  std::vector<Joint> joints_;       // by node, and more
+  std::vector<CellNode<D>> nodes_;  // by node, where all are placed
   uint64_t cuts_ = 0;
   DecisionCounters counters_;
 
-  // Scratch of Cut.
-  std::vector<uint8_t> is_removed_;  // by node; all 0 but in Cut
-  std::vector<Index> removed_;       // ascending
-  std::vector<CutEdge> cut_edges_;   // as their removed nodes
-  std::vector<Index> new_;           // the nodes on them
-  std::vector<End> open_end_;        // by the plane that an edge runs along; D <= 3
-  std::vector<Ridge> ridges_;        // D > 3
+  // Scratch of cuts; arrays only grow.
+  std::vector<Index> removed_;  // ascending
+  size_t removed_count_ = 0;
+  std::vector<CutEdge> cut_edges_;
+  size_t cut_count_ = 0;
+  std::vector<Index> new_;      // the nodes on them
+  std::vector<uint32_t> ends_;  // by the plane that an edge runs along, all 0 between cuts; D = 3
+  std::vector<Ridge> ridges_;   // D > 3
 };
 
 }  // namespace wellspace::core

@@ -95,26 +95,19 @@ void QueryStructure<D>::BeginQuery(Workspace<D>& workspace) const {
 }
 
 template <int D>
-bool QueryStructure<D>::MarkSeen(NodeId leaf, Workspace<D>& workspace) const {
-  uint32_t& seen = workspace.seen[Index(leaf)];
-  if (seen == workspace.query) {
-    return false;
-  }
-  seen = workspace.query;
-  return true;
-}
-
-template <int D>
 template <typename ReachSq, typename Wants, typename Open>
 void QueryStructure<D>::ScanOutward(const Point<D>& site, NodeId own, Workspace<D>& workspace, ReachSq reach_sq,
                                     Wants wants, Open open) const {
   Prefetch<D>(tree_, own);
   BeginQuery(workspace);
-  MarkSeen(own, workspace);
-  workspace.queue.Push(0, own);
+  uint32_t* const seen = workspace.seen.data();
+  seen[Index(own)] = workspace.query;
+  LeafQueue& queue = workspace.queue;
+  queue.Reserve(1);
+  queue.PushIf(true, 0, own);
   uint64_t leaves = 0;
-  while (!workspace.queue.IsEmpty()) {
-    const LeafQueue::Entry nearest = workspace.queue.Pop();
+  while (!queue.IsEmpty()) {
+    const LeafQueue::Entry nearest = queue.Pop();
     if (nearest.distance_sq > reach_sq()) {
       break;
     }
@@ -124,16 +117,18 @@ void QueryStructure<D>::ScanOutward(const Point<D>& site, NodeId own, Workspace<
     ++leaves;
     open(nearest.leaf);
     const double limit_sq = reach_sq();
+    queue.Reserve(LeafTree<D>::kMostFaceNeighbours + 1);
+    const size_t waiting = queue.size();
     tree_.ForEachFaceNeighbour(nearest.leaf, [&](NodeId beyond) {
-      if (!MarkSeen(beyond, workspace)) {
-        return;
-      }
+      // No branch, since none could be foretold.
+      const bool is_new = seen[Index(beyond)] != workspace.query;
+      seen[Index(beyond)] = workspace.query;
       const double distance_sq = DistanceSq<D>(site, tree_.BoxOf(beyond));
-      if (distance_sq <= limit_sq) {
-        workspace.queue.Push(distance_sq, beyond);
-        Prefetch<D>(tree_, beyond);
-      }
+      queue.PushIf(is_new & (distance_sq <= limit_sq), distance_sq, beyond);
     });
+    for (size_t i = waiting; i < queue.size(); ++i) {
+      Prefetch<D>(tree_, queue.leaf(i));
+    }
   }
   workspace.counters.leaves += leaves;
   workspace.counters.max_leaves = std::max(workspace.counters.max_leaves, leaves);
@@ -210,6 +205,7 @@ void QueryStructure<D>::Scan(VertexId v, NodeId own, Workspace<D>& workspace) co
       [&] { return workspace.cell.IsTooLarge() ? -1 : workspace.cell.CutLimitSq(); },
       [&](NodeId leaf) { return workspace.cell.Reaches(tree_.BoxOf(leaf)); },
       [&](NodeId leaf) { CutByLeaf(v, leaf, workspace); });
+  workspace.cell.Place();
   workspace.counters.cuts += workspace.cell.cuts();
   workspace.counters.decisions.exact += workspace.cell.counters().exact;
   workspace.counters.decisions.perturbed += workspace.cell.counters().perturbed;
@@ -263,7 +259,7 @@ void QueryStructure<D>::CutByLeaf(VertexId v, NodeId leaf, Workspace<D>& workspa
       break;
     }
     const uint32_t slot = near.slot[i];
-    if (cell.Cut(bucket->ids[slot], bucket->positions[slot]) && ++cuts % kCutsBetweenLooks == 0 &&
+    if (cell.CutBeforePlace(bucket->ids[slot], bucket->positions[slot]) && ++cuts % kCutsBetweenLooks == 0 &&
         left - j > kCutsBetweenLooks) {
       cell.Foretell(near);
       is_foretold = true;

@@ -146,7 +146,6 @@ class QueryStructure {
 
  private:
   void BeginQuery(Workspace<D>& workspace) const;
-  bool MarkSeen(NodeId leaf, Workspace<D>& workspace) const;
   // Calls open(leaf) for leaves outward from `own`, which holds `site`: as long as reach_sq() says for those whose
   // distance allows it, and wants(leaf) agrees.
   template <typename ReachSq, typename Wants, typename Open>

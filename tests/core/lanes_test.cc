@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <limits>
 #include <numeric>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -70,26 +71,42 @@ TEST_F(NearnessTest, OrdersByDistanceAndThenByNumber) {
   }
 }
 
-TEST_F(NearnessTest, TheQueueGivesTheNearestLeafOfTheLowestNumber) {
+TEST_F(NearnessTest, TheQueueGivesANearestLeaf) {
   for (const VectorUnit unit : Units()) {
     LeafQueue queue(unit);
-    std::vector<std::pair<double, uint32_t>> model;
+    std::set<std::pair<double, uint32_t>> model;
     uint32_t next = 0;
     for (int step = 0; step < 5000; ++step) {
       if (random_.Below(9) < 5) {
-        model.emplace_back(static_cast<double>(random_.Below(20)), (next += 7) % 10007);
-        queue.Push(model.back().first, NodeId{model.back().second});
+        const std::pair<double, uint32_t> entry(static_cast<double>(random_.Below(20)), ++next);
+        const bool counts = random_.Below(4) != 0;
+        queue.Reserve(1);
+        queue.PushIf(counts, entry.first, NodeId{entry.second});
+        if (counts) {
+          model.insert(entry);
+        }
       } else if (!model.empty()) {
-        const auto nearest = std::min_element(model.begin(), model.end());
         ASSERT_FALSE(queue.IsEmpty());
+        ASSERT_EQ(queue.size(), model.size());
         const LeafQueue::Entry entry = queue.Pop();
-        ASSERT_EQ(std::pair(entry.distance_sq, Index(entry.leaf)), *nearest);
-        model.erase(nearest);
+        ASSERT_EQ(entry.distance_sq, model.begin()->first);
+        ASSERT_EQ(model.erase({entry.distance_sq, Index(entry.leaf)}), 1u);
       }
     }
     queue.Clear();
     EXPECT_TRUE(queue.IsEmpty());
   }
+}
+
+// What the processor is asked for only where it has it.
+template <int D>
+WELLSPACE_AVX2 typename NodeColumns<D>::Largest FindLargestAvx2(const NodeColumns<D>& columns) {
+  return columns.template FindLargest<4>();
+}
+template <int D>
+WELLSPACE_AVX2 bool ComputeExcessesAvx2(const Point<D>& normal, double offset, double length, double error,
+                                        NodeColumns<D>& columns) {
+  return columns.template ComputeExcesses<4>(normal, offset, length, error);
 }
 
 template <typename T>
@@ -105,26 +122,27 @@ TYPED_TEST(LanesTest, EveryUnitComputesTheSame) {
     GTEST_SKIP() << "this processor has one unit";
   }
   SplitMix64& random = this->random_;
-  for (size_t count = 1; count < 40; ++count) {
+  for (size_t count = 1; count < 150; count += count < 40 ? 1 : 13) {
     NodeColumns<D> baseline(VectorUnit::kBaseline);
     NodeColumns<D> wide(VectorUnit::kAvx2);
     baseline.Resize(count);
     wide.Resize(count);
-    double reach = 0;
+    double radius_sq = 0;
     double slack = 0;
     for (size_t i = 0; i < count; ++i) {
       const Point<D> x = DrawPoint<D>(random);
       const double error = 1e-3 * (1 + Draw(random));
-      const double length = std::sqrt(NormSq<D>(x)) + error;
-      reach = std::max(reach, length);
+      radius_sq = std::max(radius_sq, NormSq<D>(x));
       slack = std::max(slack, error);
-      baseline.Set(i, x, error, length);
-      wide.Set(i, x, error, length);
+      baseline.Set(i, x, error);
+      wide.Set(i, x, error);
     }
-    for (const auto& columns : {baseline, wide}) {
-      EXPECT_EQ(columns.FindLargest().reach, reach);
-      EXPECT_EQ(columns.FindLargest().slack, slack);
-    }
+    const auto narrow_largest = baseline.template FindLargest<2>();
+    const auto wide_largest = FindLargestAvx2<D>(wide);
+    EXPECT_EQ(narrow_largest.radius_sq, radius_sq);
+    EXPECT_EQ(wide_largest.radius_sq, radius_sq);
+    EXPECT_EQ(narrow_largest.slack, slack);
+    EXPECT_EQ(wide_largest.slack, slack);
     CandidateColumns<D> candidates;
     candidates.count = 11;
     for (size_t j = 0; j < candidates.count; ++j) {
@@ -135,22 +153,23 @@ TYPED_TEST(LanesTest, EveryUnitComputesTheSame) {
       candidates.length_sq[j] = NormSq<D>(normal);
       const double length = std::sqrt(NormSq<D>(normal));
       const double offset = 0.5 * NormSq<D>(normal);
-      ASSERT_EQ(baseline.ComputeExcesses(normal, offset, length, 1e-9),
-                wide.ComputeExcesses(normal, offset, length, 1e-9));
+      ASSERT_EQ(baseline.template ComputeExcesses<2>(normal, offset, length, 1e-9),
+                ComputeExcessesAvx2<D>(normal, offset, length, 1e-9, wide));
       for (size_t i = 0; i < count; ++i) {
         ASSERT_EQ(baseline.excess(i), wide.excess(i));
+        const double doubt = baseline.slack(i) * length + 1e-9;
+        for (auto* columns : {&baseline, &wide}) {
+          const auto& found = columns->found()[i / NodeColumns<D>::kWordBits];
+          ASSERT_EQ((found.maybe >> i % NodeColumns<D>::kWordBits) & 1, columns->excess(i) + doubt >= 0 ? 1u : 0u);
+          ASSERT_EQ((found.surely >> i % NodeColumns<D>::kWordBits) & 1, columns->excess(i) > doubt ? 1u : 0u);
+        }
       }
-      std::array<uint16_t, 64> one{};
-      std::array<uint16_t, 64> other{};
-      const size_t exceeding = baseline.FindExceeding(one.data());
-      ASSERT_EQ(exceeding, wide.FindExceeding(other.data()));
-      EXPECT_TRUE(std::equal(one.begin(), one.begin() + static_cast<std::ptrdiff_t>(exceeding), other.begin()));
       Point<D> low = DrawPoint<D>(random);
       Point<D> high = low;
       for (double& x : high) {
         x += 0.25;
       }
-      ASSERT_EQ(baseline.Reaches(low, high), wide.Reaches(low, high));
+      ASSERT_EQ(baseline.Reaches(low, high, 1e-3), wide.Reaches(low, high, 1e-3));
     }
     CandidateColumns<D> same = candidates;
     baseline.ComputeMost(slack, 1e-9, candidates);

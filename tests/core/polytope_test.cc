@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numeric>
 #include <set>
+#include <tuple>
 #include <vector>
 
 #include "tests/support/brute_force.h"
@@ -213,6 +214,38 @@ TYPED_TEST(PolytopeTest, CosphericalVerticesGiveOneCellInAnyOrder) {
 }
 
 // Guarantees (1) and (2), Cut's result and Reaches, after each cut.
+// What is cut by approximate positions alone, and placed at the end, is the cell to the bit.
+TYPED_TEST(PolytopeTest, WhenNodesArePlacedMakesNoDifference) {
+  constexpr int D = TypeParam::kValue;
+  const auto description = [](const Polytope<D>& cell) {
+    std::vector<std::tuple<Point<D>, double, std::array<uint16_t, D>>> nodes;
+    for (const CellNode<D>& node : cell.nodes()) {
+      nodes.emplace_back(node.x, node.slack, node.planes);
+    }
+    std::sort(nodes.begin(), nodes.end());
+    return nodes;
+  };
+  for (int i = 0; i < ByDimension<D>({40, 40, 10, 4, 2}); ++i) {
+    const IntegerCloud<D> cloud =
+        DrawGridCloud<D>(ByDimension<D>({i % 2 == 0 ? 8 : 100000, i % 2 == 0 ? 4 : 100000, 1000}),
+                         ByDimension<D>({50, 50, 40, 20, 12}), this->random_);
+    const Point<D> site = ToPoint<D>(cloud.vertices[0]);
+    Polytope<D> at_once;
+    Polytope<D> at_the_end;
+    for (Polytope<D>* cell : {&at_once, &at_the_end}) {
+      cell->Reset(site, cloud.Bounds(), Faces<D>(), i % 4 < 2 ? TieRule::kKeep : TieRule::kPerturb);
+    }
+    for (const size_t u : DrawOrder<D>(cloud, 0, this->random_)) {
+      const Point<D> position = ToPoint<D>(cloud.vertices[u]);
+      ASSERT_EQ(at_once.Cut(VertexId(u), position), at_the_end.CutBeforePlace(VertexId(u), position));
+    }
+    at_the_end.Place();
+    ASSERT_TRUE(IsSimplePolytope<D>(at_the_end));
+    ASSERT_TRUE(HasNodesWithinSlack<D>(at_the_end));
+    ASSERT_EQ(description(at_the_end), description(at_once));
+  }
+}
+
 TYPED_TEST(PolytopeTest, EachCutOnlyRemoves) {
   constexpr int D = TypeParam::kValue;
   for (int i = 0; i < ByDimension<D>({10, 10, 10, 4}); ++i) {
