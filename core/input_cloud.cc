@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
@@ -80,6 +82,34 @@ absl::Status CheckFaces(const Domain<D>& domain, std::span<const double> points,
   return absl::OkStatus();
 }
 
+// Sorts those among `entries`, which are in the order of their prefixes, that share theirs, by cube and input.
+template <int D, typename Entry, typename CubeOf>
+absl::Status SortAlike(std::vector<Entry>& entries, CubeOf cube_of, const RunContext& context) {
+  std::vector<std::pair<GridPoint<D>, Entry>> alike;
+  for (size_t begin = 0, end = 0; begin < entries.size(); begin = end) {
+    while (end < entries.size() && entries[end].prefix == entries[begin].prefix) {
+      ++end;
+    }
+    if (end - begin == 1) {
+      continue;
+    }
+    alike.clear();
+    for (size_t i = begin; i < end; ++i) {
+      alike.emplace_back(cube_of(entries[i]), entries[i]);
+    }
+    WELLSPACE_RETURN_IF_ERROR(CancellableSort(
+        alike,
+        [](const auto& a, const auto& b) {
+          return a.first != b.first ? MortonLess<D>(a.first, b.first) : a.second.input < b.second.input;
+        },
+        context));
+    for (size_t i = begin; i < end; ++i) {
+      entries[i] = alike[i - begin].second;
+    }
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 template <int D>
@@ -127,10 +157,11 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<cons
   SortedCloud<D> cloud;
   const MortonGrid<D> grid(domain.scaled_box);
   struct Entry {
-    GridPoint<D> cube;
+    uint64_t prefix;
     uint32_t input;
   };
   const auto point_of = [&](const Entry& entry) { return domain.Scaled(PointAt<D>(points, entry.input)); };
+  const auto cube_of = [&](const Entry& entry) { return grid.CubeOf(point_of(entry)); };
   const size_t count = points.size() / D;
   std::vector<Entry> entries(count);
   for (size_t i = 0; i < count; ++i) {
@@ -152,16 +183,13 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<cons
             i, k, p[k], box.LongestSide()));
       }
     }
-    entries[i] = {grid.CubeOf(scaled_p), static_cast<uint32_t>(i)};
+    entries[i] = {MortonPrefix<D>(grid.CubeOf(scaled_p), grid.levels()), static_cast<uint32_t>(i)};
   }
-  // Points of one cube are equal, or too close to be served.
-  WELLSPACE_RETURN_IF_ERROR(CancellableSort(
-      entries,
-      [](const Entry& a, const Entry& b) {
-        return a.cube != b.cube ? MortonLess<D>(a.cube, b.cube) : a.input < b.input;
-      },
-      context));
+  WELLSPACE_RETURN_IF_ERROR(CancellableRadixSort(
+      entries, [](const Entry& entry) { return entry.prefix; }, context));
+  WELLSPACE_RETURN_IF_ERROR(SortAlike<D>(entries, cube_of, context));
 
+  // Points of one cube are equal, or too close to be served.
   cloud.points.reserve(count);
   cloud.sorted_index.assign(count, 0);
   for (size_t i = 0; i < count; ++i) {
@@ -169,7 +197,8 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<cons
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
     const Point<D> p = point_of(entries[i]);
-    if (i == 0 || entries[i].cube != entries[i - 1].cube) {
+    const bool may_be_alike = i > 0 && entries[i].prefix == entries[i - 1].prefix;
+    if (!may_be_alike || cube_of(entries[i]) != cube_of(entries[i - 1])) {
       WELLSPACE_RETURN_IF_ERROR(CheckFaces<D>(domain, points, entries[i].input));
       cloud.points.push_back(p);
       cloud.first_input.push_back(entries[i].input);

@@ -3,7 +3,9 @@
 #define WELLSPACE_CORE_BASE_CANCELLABLE_SORT_H_
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <utility>
 #include <vector>
 
@@ -43,6 +45,46 @@ absl::Status CancellableSort(std::vector<T>& items, Less less, const RunContext&
       }
     }
     std::swap(items, merged);
+  }
+  return absl::OkStatus();
+}
+
+// Sorts `items` by key(item), a uint64_t; those with equal keys stay in order.
+//
+// Complexity: O(n), with space for a second copy of the items.
+// Errors:     as CancellableSort.
+// Source:     radix sort from the lowest byte up; bytes that all keys share are passed over.
+template <typename T, typename Key>
+absl::Status CancellableRadixSort(std::vector<T>& items, Key key, const RunContext& context) {
+  constexpr size_t kInterval = size_t{1} << 16;  // items between two looks at the context
+  constexpr int kBytes = sizeof(uint64_t);
+  const auto byte_of = [&](const T& item, int byte) { return static_cast<uint8_t>(key(item) >> (8 * byte)); };
+  const size_t count = items.size();
+  std::array<std::array<size_t, 256>, kBytes> places{};  // at first the number of items with each value of the byte
+  for (size_t i = 0; i < count; ++i) {
+    if (i % kInterval == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
+    for (int byte = 0; byte < kBytes; ++byte) {
+      ++places[byte][byte_of(items[i], byte)];
+    }
+  }
+  std::vector<T> sorted(count);
+  for (int byte = 0; byte < kBytes; ++byte) {
+    if (count == 0 || places[byte][byte_of(items[0], byte)] == count) {
+      continue;
+    }
+    size_t before = 0;
+    for (size_t& place : places[byte]) {
+      before += std::exchange(place, before);
+    }
+    for (size_t i = 0; i < count; ++i) {
+      if (i % kInterval == 0) {
+        WELLSPACE_RETURN_IF_ERROR(context.Check());
+      }
+      sorted[places[byte][byte_of(items[i], byte)]++] = items[i];
+    }
+    std::swap(items, sorted);
   }
   return absl::OkStatus();
 }

@@ -495,5 +495,23 @@ TYPED_TEST(TreeTest, MortonOrderIsThatOfInterleavedBits) {
   }
 }
 
+TYPED_TEST(TreeTest, MortonPrefixesAreTheFirstInterleavedBits) {
+  constexpr int D = TypeParam::kValue;
+  for (int i = 0; i < 500; ++i) {
+    const int levels = 1 + static_cast<int>(this->random_.Below(52));
+    GridPoint<D> cube;
+    for (uint64_t& x : cube) {
+      x = this->random_.Next() >> (64 - levels);
+    }
+    uint64_t expected = 0;
+    for (int level = 1; level <= 64 / D; ++level) {
+      for (int k = D - 1; k >= 0; --k) {
+        expected = expected << 1 | (level <= levels ? cube[k] >> (levels - level) & 1 : 0);
+      }
+    }
+    EXPECT_EQ(MortonPrefix<D>(cube, levels), expected) << ::testing::PrintToString(cube) << " of " << levels;
+  }
+}
+
 }  // namespace
 }  // namespace wellspace::core
