@@ -25,6 +25,7 @@ constexpr double kGoodPlace = 0x1p-20;
 template <int D>
 struct Placement {
   Point<D> x;
+  double radius = 0;  // |x|
   double error = std::numeric_limits<double>::infinity();
 };
 
@@ -65,8 +66,9 @@ Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D <= 3)
     product *= plane->length;
     sum += plane->distance;
   }
+  placed.radius = std::sqrt(NormSq<D>(placed.x));
   if (std::abs(determinant) > 256 * kUnit * product) {
-    placed.error = 64 * kUnit * product * (sum + std::sqrt(NormSq<D>(placed.x))) * std::abs(inverse);
+    placed.error = 64 * kUnit * product * (sum + placed.radius) * std::abs(inverse);
   }
   return placed;
 }
@@ -144,9 +146,9 @@ Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D > 3) 
     residual_sq += r * r;
   }
   // One more part in a hundred pays for the roundings of the bound itself.
+  placed.radius = std::sqrt(NormSq<D>(placed.x));
   placed.error =
-      2.02 * inverse_norm *
-      (std::sqrt(residual_sq) + (2 * D + 10) * kUnit * root * (std::sqrt(NormSq<D>(placed.x)) + largest_offset));
+      2.02 * inverse_norm * (std::sqrt(residual_sq) + (2 * D + 10) * kUnit * root * (placed.radius + largest_offset));
   return placed;
 }
 
@@ -481,10 +483,11 @@ double Polytope<D>::PlaceByPlanes(const std::array<uint16_t, D>& indices, Point<
       sources[k] = planes[k]->source;
     }
     placed.x = ExactMeetingPoint<D>(site_, sources);
-    placed.error = 8 * kUnit * std::sqrt(NormSq<D>(placed.x));
+    placed.radius = std::sqrt(NormSq<D>(placed.x));
+    placed.error = 8 * kUnit * placed.radius;
   }
   x = placed.x;
-  return placed.error + 16 * kUnit * std::sqrt(NormSq<D>(x));
+  return placed.error + 16 * kUnit * placed.radius;
 }
 
 // Joins the new nodes along the edges of the new facet: two are joined if they share D - 2 planes beside the new one,
