@@ -230,9 +230,9 @@ absl::Status CheckSeparation(const Domain<D>& domain, const SortedCloud<D>& clou
     WELLSPACE_RETURN_IF_ERROR(context.Check());
     const VertexId v{first + i};
     const size_t input = cloud.first_input[i];
-    const auto [nearest, nearest_sq] = structure.ApproximateNearestNeighbor(v, workspace);
+    const auto [nearest, nearest_sq] = structure.NearestWithin(v, least * least, workspace);
     // A distance of 0 is that of a point on a corner, which is one vertex with it in the mesh.
-    if (nearest_sq > 0 && nearest_sq < least * least) {
+    if (nearest != kNoVertex && nearest_sq > 0) {
       const uint32_t other = Index(nearest) - first;  // a corner before them wraps around
       const bool is_input = other < cloud.points.size();
       return TooCloseError<D>(

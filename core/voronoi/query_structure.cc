@@ -136,18 +136,24 @@ void QueryStructure<D>::ScanOutward(const Point<D>& site, NodeId own, Workspace<
 
 template <int D>
 Neighbor QueryStructure<D>::ApproximateNearestNeighbor(VertexId v, Workspace<D>& workspace) const {
-  return Nearest(point(v), tree_.leaf_of(v), v, workspace);
+  return NearestWithin(v, std::numeric_limits<double>::infinity(), workspace);
+}
+
+template <int D>
+Neighbor QueryStructure<D>::NearestWithin(VertexId v, double limit_sq, Workspace<D>& workspace) const {
+  return Nearest(point(v), tree_.leaf_of(v), v, limit_sq, workspace);
 }
 
 template <int D>
 Neighbor QueryStructure<D>::NearestTo(const Point<D>& p, VertexId near, Workspace<D>& workspace) const {
-  return Nearest(p, tree_.LeafHolding(near, p), kNoVertex, workspace);
+  return Nearest(p, tree_.LeafHolding(near, p), kNoVertex, std::numeric_limits<double>::infinity(), workspace);
 }
 
-// The vertex other than `but` that is nearest to `p`, a point of `leaf`.
+// The vertex other than `but` that is nearest to `p`, a point of `leaf`, and nearer than the limit.
 template <int D>
-Neighbor QueryStructure<D>::Nearest(const Point<D>& p, NodeId leaf, VertexId but, Workspace<D>& workspace) const {
-  Neighbor nearest{kNoVertex, std::numeric_limits<double>::infinity()};
+Neighbor QueryStructure<D>::Nearest(const Point<D>& p, NodeId leaf, VertexId but, double limit_sq,
+                                    Workspace<D>& workspace) const {
+  Neighbor nearest{kNoVertex, limit_sq};
   ScanOutward(
       p, leaf, workspace, [&] { return nearest.distance_sq; }, [](NodeId) { return true; },
       [&](NodeId opened) {

@@ -79,6 +79,12 @@ class QueryStructure {
   // Source:     [HT08] Figure 3, APPROXIMATENN.
   Neighbor ApproximateNearestNeighbor(VertexId v, Workspace<D>& workspace) const;
 
+  // The same among the vertices whose squared distance is less than `limit_sq`; kNoVertex and the limit if there is none.
+  //
+  // Complexity: that of looking into the leaves within the limit.
+  // Errors:     none.
+  Neighbor NearestWithin(VertexId v, double limit_sq, Workspace<D>& workspace) const;
+
   // The vertex nearest to the point `p`, which need not be one; looked for outward from `near` (kNoVertex if none is
   // known). If p is a vertex the distance is 0.
   //
@@ -151,7 +157,7 @@ class QueryStructure {
   template <typename ReachSq, typename Wants, typename Open>
   void ScanOutward(const Point<D>& site, NodeId own, Workspace<D>& workspace, ReachSq reach_sq, Wants wants,
                    Open open) const;
-  Neighbor Nearest(const Point<D>& p, NodeId leaf, VertexId but, Workspace<D>& workspace) const;
+  Neighbor Nearest(const Point<D>& p, NodeId leaf, VertexId but, double limit_sq, Workspace<D>& workspace) const;
   void ClipAndScan(const Point<D>& site, VertexId v, NodeId own, double radius, TieRule rule,
                    Workspace<D>& workspace) const;
   void Scan(VertexId v, NodeId own, Workspace<D>& workspace) const;

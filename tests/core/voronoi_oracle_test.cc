@@ -70,6 +70,8 @@ class QueryChecker {
     ASSERT_EQ(found.distance_sq, nearest_sq);
     ASSERT_NE(found.vertex, v);
     ASSERT_EQ(DistanceSq<D>(structure.point(found.vertex), structure.point(v)), nearest_sq);
+    ASSERT_EQ(structure.NearestWithin(v, std::nextafter(nearest_sq, 2 * nearest_sq), fast_).distance_sq, nearest_sq);
+    ASSERT_EQ(structure.NearestWithin(v, nearest_sq, fast_).vertex, kNoVertex);
     for (const double factor : {0.4, 1.0, 4.0, 1e3}) {
       CheckClipped(structure, v, factor * std::sqrt(nearest_sq) * (0.75 + 0.5 * random_.Unit()));
     }
