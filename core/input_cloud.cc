@@ -23,20 +23,17 @@ constexpr int kMaxScaleExponent = 60;
 // Larger ones leave no room for sums and products.
 constexpr double kMaxCoordinate = 0x1p1000;
 
-// Cheap steps between two looks at the context.
-constexpr size_t kCheckInterval = size_t{1} << 16;
-
 std::string FormatCoordinates(std::span<const double> p) {
   return absl::StrCat(
       "(", absl::StrJoin(p, ", ", [](std::string* out, double x) { absl::StrAppendFormat(out, "%.17g", x); }), ")");
 }
 
 template <int D>
-absl::Status CheckFinite(std::span<const double> points) {
-  for (size_t i = 0; i < points.size(); ++i) {
-    if (!std::isfinite(points[i])) {
-      return absl::InvalidArgumentError(absl::StrCat("points[", i / D, "]: coordinate ", i % D, " is ", points[i],
-                                                     "; coordinates must be finite numbers"));
+absl::Status CheckFinite(const Point<D>& p, size_t index) {
+  for (int k = 0; k < D; ++k) {
+    if (!std::isfinite(p[k])) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("points[", index, "]: coordinate ", k, " is ", p[k], "; coordinates must be finite numbers"));
     }
   }
   return absl::OkStatus();
@@ -86,7 +83,11 @@ absl::Status CheckFaces(const Domain<D>& domain, std::span<const double> points,
 template <int D, typename Entry, typename CubeOf>
 absl::Status SortAlike(std::vector<Entry>& entries, CubeOf cube_of, const RunContext& context) {
   std::vector<std::pair<GridPoint<D>, Entry>> alike;
+  size_t groups = 0;
   for (size_t begin = 0, end = 0; begin < entries.size(); begin = end) {
+    if (++groups % kStepsBetweenChecks == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
     while (end < entries.size() && entries[end].prefix == entries[begin].prefix) {
       ++end;
     }
@@ -125,17 +126,23 @@ absl::StatusOr<Domain<D>> Domain<D>::Of(const Box<D>& box) {
 }
 
 template <int D>
-absl::StatusOr<Box<D>> BoxAround(std::span<const double> points, double margin) {
-  WELLSPACE_RETURN_IF_ERROR(CheckFinite<D>(points));
+absl::StatusOr<Box<D>> BoxAround(std::span<const double> points, double margin, const RunContext& context) {
   Box<D> box;
   if (points.empty()) {
     return absl::InvalidArgumentError(
         "points: there are none and no domain is given; give a domain or at least one point");
   }
   box.low = box.high = PointAt<D>(points, 0);
-  for (size_t i = 0; i < points.size(); ++i) {
-    box.low[i % D] = std::min(box.low[i % D], points[i]);
-    box.high[i % D] = std::max(box.high[i % D], points[i]);
+  for (size_t i = 0; i < points.size() / D; ++i) {
+    if (i % kStepsBetweenChecks == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
+    const Point<D> p = PointAt<D>(points, i);
+    WELLSPACE_RETURN_IF_ERROR(CheckFinite<D>(p, i));
+    for (int k = 0; k < D; ++k) {
+      box.low[k] = std::min(box.low[k], p[k]);
+      box.high[k] = std::max(box.high[k], p[k]);
+    }
   }
   double side = box.LongestSide();
   if (side == 0) {
@@ -152,7 +159,6 @@ absl::StatusOr<Box<D>> BoxAround(std::span<const double> points, double margin) 
 template <int D>
 absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<const double> points,
                                          const RunContext& context) {
-  WELLSPACE_RETURN_IF_ERROR(CheckFinite<D>(points));
   const Box<D>& box = domain.box;
   SortedCloud<D> cloud;
   const MortonGrid<D> grid(domain.scaled_box);
@@ -163,12 +169,14 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<cons
   const auto point_of = [&](const Entry& entry) { return domain.Scaled(PointAt<D>(points, entry.input)); };
   const auto cube_of = [&](const Entry& entry) { return grid.CubeOf(point_of(entry)); };
   const size_t count = points.size() / D;
-  std::vector<Entry> entries(count);
+  std::vector<Entry> entries;
+  entries.reserve(count);
   for (size_t i = 0; i < count; ++i) {
-    if (i % kCheckInterval == 0) {
+    if (i % kStepsBetweenChecks == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
     const Point<D> p = PointAt<D>(points, i);
+    WELLSPACE_RETURN_IF_ERROR(CheckFinite<D>(p, i));
     if (!box.Contains(p)) {
       return absl::InvalidArgumentError(absl::StrCat(
           "points[", i, "] = ", FormatCoordinates(p), " lies outside the domain ", FormatCoordinates(box.low), " to ",
@@ -183,17 +191,17 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<cons
             i, k, p[k], box.LongestSide()));
       }
     }
-    entries[i] = {MortonPrefix<D>(grid.CubeOf(scaled_p), grid.levels()), static_cast<uint32_t>(i)};
+    entries.push_back({MortonPrefix<D>(grid.CubeOf(scaled_p), grid.levels()), static_cast<uint32_t>(i)});
   }
   WELLSPACE_RETURN_IF_ERROR(CancellableRadixSort(
       entries, [](const Entry& entry) { return entry.prefix; }, context));
   WELLSPACE_RETURN_IF_ERROR(SortAlike<D>(entries, cube_of, context));
 
   // Points of one cube are equal, or too close to be served.
-  cloud.points.reserve(count);
+  cloud.points.reserve(count + (size_t{1} << D));  // the corners of the box may follow
   cloud.sorted_index.assign(count, 0);
   for (size_t i = 0; i < count; ++i) {
-    if (i % kCheckInterval == 0) {
+    if (i % kStepsBetweenChecks == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
     const Point<D> p = point_of(entries[i]);
@@ -222,22 +230,23 @@ absl::Status TooCloseError(const Domain<D>& domain, std::span<const double> poin
 }
 
 template <int D>
-absl::Status CheckSeparation(const Domain<D>& domain, const SortedCloud<D>& cloud, const QueryStructure<D>& structure,
-                             uint32_t first, std::span<const double> points, const RunContext& context) {
+absl::Status CheckSeparation(const Domain<D>& domain, const QueryStructure<D>& structure, uint32_t first,
+                             std::span<const uint32_t> first_input, std::span<const double> points,
+                             const RunContext& context) {
   const double least = domain.MinSeparation();
   Workspace<D> workspace;
-  for (uint32_t i = 0; i < cloud.points.size(); ++i) {
+  const auto count = static_cast<uint32_t>(first_input.size());
+  for (uint32_t i = 0; i < count; ++i) {
     WELLSPACE_RETURN_IF_ERROR(context.Check());
     const VertexId v{first + i};
-    const size_t input = cloud.first_input[i];
+    const size_t input = first_input[i];
     const auto [nearest, nearest_sq] = structure.NearestWithin(v, least * least, workspace);
     // A distance of 0 is that of a point on a corner, which is one vertex with it in the mesh.
     if (nearest != kNoVertex && nearest_sq > 0) {
       const uint32_t other = Index(nearest) - first;  // a corner before them wraps around
-      const bool is_input = other < cloud.points.size();
-      return TooCloseError<D>(
-          domain, points, input, std::sqrt(nearest_sq),
-          is_input ? absl::StrCat("points[", cloud.first_input[other], "]") : "a corner of the domain");
+      const bool is_input = other < count;
+      return TooCloseError<D>(domain, points, input, std::sqrt(nearest_sq),
+                              is_input ? absl::StrCat("points[", first_input[other], "]") : "a corner of the domain");
     }
   }
   return absl::OkStatus();
@@ -245,11 +254,11 @@ absl::Status CheckSeparation(const Domain<D>& domain, const SortedCloud<D>& clou
 
 #define WELLSPACE_INSTANTIATE(D)                                                                                       \
   template struct Domain<D>;                                                                                           \
-  template absl::StatusOr<Box<D>> BoxAround<D>(std::span<const double>, double);                                       \
+  template absl::StatusOr<Box<D>> BoxAround<D>(std::span<const double>, double, const RunContext&);                    \
   template absl::StatusOr<SortedCloud<D>> SortCloud<D>(const Domain<D>&, std::span<const double>, const RunContext&);  \
   template absl::Status TooCloseError<D>(const Domain<D>&, std::span<const double>, size_t, double, std::string_view); \
-  template absl::Status CheckSeparation<D>(const Domain<D>&, const SortedCloud<D>&, const QueryStructure<D>&,          \
-                                           uint32_t, std::span<const double>, const RunContext&);
+  template absl::Status CheckSeparation<D>(const Domain<D>&, const QueryStructure<D>&, uint32_t,                       \
+                                           std::span<const uint32_t>, std::span<const double>, const RunContext&);
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 

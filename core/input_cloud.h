@@ -48,9 +48,9 @@ struct Domain {
 
 // The bounding box of `points`, grown on every side by `margin` times its longest side.
 //
-// Errors:     INVALID_ARGUMENT when there are none, or one is not finite.
+// Errors:     INVALID_ARGUMENT when there are none, or one is not finite; CANCELLED, DEADLINE_EXCEEDED.
 template <int D>
-absl::StatusOr<Box<D>> BoxAround(std::span<const double> points, double margin);
+absl::StatusOr<Box<D>> BoxAround(std::span<const double> points, double margin, const RunContext& context);
 
 // A cloud without its duplicates, in the order that the query structure wants.
 template <int D>
@@ -72,14 +72,16 @@ template <int D>
 absl::Status TooCloseError(const Domain<D>& domain, std::span<const double> points, size_t index, double distance,
                            std::string_view other);
 
-// Refuses points nearer to each other, or to a corner of the box, than the arithmetic serves. The vertices of `structure` are those of `cloud`, in its order and from number `first` on, and the
-// corners. A point on a corner is no error.
+// Refuses points nearer to each other, or to a corner of the box, than the arithmetic serves. The vertices of
+// `structure` are a sorted cloud's, from number `first` on, whose `first_input` is given, and the corners. A point on a
+// corner is no error.
 //
 // Errors:     INVALID_ARGUMENT, naming the point; CANCELLED, DEADLINE_EXCEEDED.
 // Complexity: O(n) queries.
 template <int D>
-absl::Status CheckSeparation(const Domain<D>& domain, const SortedCloud<D>& cloud, const QueryStructure<D>& structure,
-                             uint32_t first, std::span<const double> points, const RunContext& context);
+absl::Status CheckSeparation(const Domain<D>& domain, const QueryStructure<D>& structure, uint32_t first,
+                             std::span<const uint32_t> first_input, std::span<const double> points,
+                             const RunContext& context);
 
 }  // namespace wellspace::core
 

@@ -42,9 +42,6 @@ constexpr uint64_t kFixedBytes = uint64_t{4} << 20;
 template <int D>
 constexpr uint64_t kForetoldPoints = D == 2 ? 10'000 : 2'000;
 
-// Cheap steps between two looks at the context.
-constexpr size_t kCheckInterval = size_t{1} << 16;
-
 template <int D>
 Box<D> BoxOf(const std::vector<double>& low, const std::vector<double>& high) {
   Box<D> box;
@@ -76,12 +73,12 @@ class MesherIn final : public Mesher {
     WELLSPACE_RETURN_IF_ERROR(context.ReserveMemory(kFixedBytes + points.size() / D * kTreeBytes<D>));
     Box<D> box;
     if (parameters.domain_low.empty()) {
-      WELLSPACE_ASSIGN_OR_RETURN(box, BoxAround<D>(points, parameters.margin));
+      WELLSPACE_ASSIGN_OR_RETURN(box, BoxAround<D>(points, parameters.margin, context));
     } else {
       box = BoxOf<D>(parameters.domain_low, parameters.domain_high);
     }
     WELLSPACE_ASSIGN_OR_RETURN(domain_, Domain<D>::Of(box));
-    WELLSPACE_ASSIGN_OR_RETURN(const SortedCloud<D> cloud, SortCloud<D>(domain_, points, context));
+    WELLSPACE_ASSIGN_OR_RETURN(SortedCloud<D> cloud, SortCloud<D>(domain_, points, context));
     const size_t distinct = cloud.points.size();
     const uint64_t max_vertices = VertexBudget(parameters);
     if (distinct + (size_t{1} << D) > max_vertices) {
@@ -89,16 +86,16 @@ class MesherIn final : public Mesher {
           absl::StrCat("the ", distinct, " distinct points and the domain's corners are more than ",
                        "max_vertices = ", max_vertices, " vertices; raise max_vertices"));
     }
-    WELLSPACE_RETURN_IF_ERROR(
-        structure_.Initialize(domain_.scaled_box, cloud.points, kLeavesPerVertex * max_vertices + (1u << D), context));
-    WELLSPACE_RETURN_IF_ERROR(CheckSeparation<D>(domain_, cloud, structure_, 0, points, context));
+    WELLSPACE_RETURN_IF_ERROR(structure_.Initialize(domain_.scaled_box, std::move(cloud.points),
+                                                    kLeavesPerVertex * max_vertices + (1u << D), context));
+    WELLSPACE_RETURN_IF_ERROR(CheckSeparation<D>(domain_, structure_, 0, cloud.first_input, points, context));
 
     // Vertices are named in the order of the input's first appearances.
     std::vector<uint32_t> rank(distinct);
     uint32_t next = 0;
     input_vertex_.resize(cloud.sorted_index.size());
     for (uint32_t i = 0; i < cloud.sorted_index.size(); ++i) {
-      if (i % kCheckInterval == 0) {
+      if (i % kStepsBetweenChecks == 0) {
         WELLSPACE_RETURN_IF_ERROR(context.Check());
       }
       const uint32_t sorted = cloud.sorted_index[i];
@@ -111,7 +108,7 @@ class MesherIn final : public Mesher {
     output_index_ = std::move(rank);
     vertex_at_.resize(distinct);
     for (uint32_t i = 0; i < distinct; ++i) {
-      if (i % kCheckInterval == 0) {
+      if (i % kStepsBetweenChecks == 0) {
         WELLSPACE_RETURN_IF_ERROR(context.Check());
       }
       vertex_at_[output_index_[i]] = VertexId{i};
@@ -169,7 +166,7 @@ class MesherIn final : public Mesher {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
       apart.AddVertex(kNoVertex, p);
     }
-    WELLSPACE_RETURN_IF_ERROR(CheckSeparation<D>(domain_, cloud, apart, corners, points, context));
+    WELLSPACE_RETURN_IF_ERROR(CheckSeparation<D>(domain_, apart, corners, cloud.first_input, points, context));
     std::vector<VertexId> known(cloud.points.size(), kNoVertex);
     for (size_t i = 0; i < cloud.points.size(); ++i) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
@@ -512,7 +509,7 @@ class MesherIn final : public Mesher {
     const uint64_t count = structure_.vertex_count();
     out.reserve(out.size() + (count - first) * D);
     for (uint64_t i = first; i < count; ++i) {
-      if (i % kCheckInterval == 0) {
+      if (i % kStepsBetweenChecks == 0) {
         WELLSPACE_RETURN_IF_ERROR(context.Check());
       }
       const Point<D> p = domain_.Unscaled(structure_.point(VertexOf(static_cast<uint32_t>(i))));

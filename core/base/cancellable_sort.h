@@ -56,13 +56,12 @@ absl::Status CancellableSort(std::vector<T>& items, Less less, const RunContext&
 // Source:     radix sort from the lowest byte up; bytes that all keys share are passed over.
 template <typename T, typename Key>
 absl::Status CancellableRadixSort(std::vector<T>& items, Key key, const RunContext& context) {
-  constexpr size_t kInterval = size_t{1} << 16;  // items between two looks at the context
   constexpr int kBytes = sizeof(uint64_t);
   const auto byte_of = [&](const T& item, int byte) { return static_cast<uint8_t>(key(item) >> (8 * byte)); };
   const size_t count = items.size();
   std::array<std::array<size_t, 256>, kBytes> places{};  // at first the number of items with each value of the byte
   for (size_t i = 0; i < count; ++i) {
-    if (i % kInterval == 0) {
+    if (i % kStepsBetweenChecks == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
     for (int byte = 0; byte < kBytes; ++byte) {
@@ -79,7 +78,7 @@ absl::Status CancellableRadixSort(std::vector<T>& items, Key key, const RunConte
       before += std::exchange(place, before);
     }
     for (size_t i = 0; i < count; ++i) {
-      if (i % kInterval == 0) {
+      if (i % kStepsBetweenChecks == 0) {
         WELLSPACE_RETURN_IF_ERROR(context.Check());
       }
       sorted[places[byte][byte_of(items[i], byte)]++] = items[i];

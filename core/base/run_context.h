@@ -4,6 +4,7 @@
 
 #include <array>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 
 #include "absl/status/status.h"
@@ -13,6 +14,9 @@ namespace wellspace::core {
 
 enum class Phase : int { kWaiting = 0, kTree, kRefinement, kSimplices, kSlivers, kDone };
 inline constexpr int kPhaseCount = 6;
+
+// Steps of a few nanoseconds between two looks at the context.
+inline constexpr size_t kStepsBetweenChecks = size_t{1} << 16;
 
 // "waiting", "tree", "refinement", "simplices", "slivers", "done".
 const char* PhaseName(Phase phase);
@@ -56,7 +60,8 @@ class RunContext {
 
   bool IsCancelled() const { return state_.load(std::memory_order_relaxed) != State::kRunning; }
 
-  // Ok while the run may go on, else why it may not. Cheap enough for every few microseconds.
+  // Ok while the run may go on, else why it may not. Cheap enough for every few microseconds; loops of shorter steps
+  // call it every kStepsBetweenChecks.
   absl::Status Check() const;
 
   Progress Snapshot() const;

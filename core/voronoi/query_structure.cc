@@ -47,10 +47,13 @@ absl::Status QueryStructure<D>::Initialize(const Box<D>& box, std::vector<Point<
   points_ = std::move(points);
   WELLSPACE_RETURN_IF_ERROR(tree_.Build(box_, points_, max_leaves, context));
   faces_.clear();
-  faces_.reserve(points_.size());
+  faces_.reserve(points_.size() + (size_t{1} << D));
   std::array<bool, 1 << D> has_corner{};
-  for (const Point<D>& p : points_) {
-    const FaceMask faces = box_.FacesOf(p);
+  for (size_t i = 0; i < points_.size(); ++i) {
+    if (i % kStepsBetweenChecks == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
+    const FaceMask faces = box_.FacesOf(points_[i]);
     faces_.push_back(faces);
     for (int corner = 0; corner < (1 << D); ++corner) {
       has_corner[corner] = has_corner[corner] || faces == CornerFaces<D>(corner);
