@@ -306,7 +306,8 @@ void FacetWalk<D>::SearchNear(const FacetPencil<D>& pencil, const Facet& facet, 
   }
 }
 
-// Shrinks any ball, by the leaves that it comes to on the positive side.
+// Shrinks any ball, by the leaves that it comes to on the positive side: those of the surroundings, if they cover it, else
+// by going from leaf to leaf.
 //
 // That part of the last ball is convex and touches the vertex, so that a path from there leads to each leaf that it comes to, through facets of
 // such leaves alone; and it lies in the same part of every ball before.
@@ -314,6 +315,12 @@ template <int D>
 void FacetWalk<D>::SearchLeaves(NodeId leaf, const FacetPencil<D>& pencil, const Facet& facet, uint32_t& apex,
                                 FacetBall<D>& ball) {
   const Point<D> site = columns_.point(facet.place);
+  const auto shrink = [&](uint32_t u, double power) { return Shrink(pencil, facet, u, power, apex, ball); };
+  const auto may_hold = [&](const Box<D>& box) { return pencil.MayHold(box, columns_.rounding()); };
+  if (columns_.Covers(site, ball)) {
+    counters_.leaves += columns_.ForEachInsideSurroundings(site, ball, may_hold, shrink);
+    return;
+  }
   const auto meets = [&](const Box<D>& box) {
     double distance_sq = 0;
     for (int i = 0; i < D; ++i) {
@@ -322,13 +329,12 @@ void FacetWalk<D>::SearchLeaves(NodeId leaf, const FacetPencil<D>& pencil, const
       distance_sq += gap * gap;
     }
     const double reach = ball.Reach() + 2 * columns_.rounding();
-    return distance_sq <= reach * reach && pencil.MayHold(box, columns_.rounding());
+    return distance_sq <= reach * reach && may_hold(box);
   };
   uint64_t leaves = 0;
   columns_.LookOutward(leaf, meets, [&](NodeId near) {
     ++leaves;
-    counters_.vertices += columns_.ForEachInside(
-        near, site, ball, [&](uint32_t u, double power) { return Shrink(pencil, facet, u, power, apex, ball); });
+    counters_.vertices += columns_.ForEachInside(near, site, ball, shrink);
   });
   counters_.leaves += leaves;
   counters_.max_leaves = std::max(counters_.max_leaves, leaves);

@@ -157,6 +157,56 @@ class LeafColumns {
     return opened;
   }
 
+  // Whether all leaves that come to the ball about `site` are among the surroundings; false if nothing is surrounded.
+  bool Covers(const Point<D>& site, const FacetBall<D>& ball) const {
+    const Box<D> home = structure_->tree().BoxOf(home_);
+    const double least = ball.Reach() + 4 * rounding_ - margin_;
+    bool is_covered = margin_ >= 0;
+    for (int i = 0; i < D; ++i) {
+      const double centre = 0.5 * ball.twice_centre[i];
+      is_covered &= (centre - (home.low[i] - site[i]) >= least) & ((home.high[i] - site[i]) - centre >= least);
+    }
+    return is_covered;
+  }
+
+  // Calls f(place, power) as ForEachInside does, for those leaves of the surroundings that come to the ball and that
+  // may_hold(box) accepts. f may shrink the ball: to one that lies, where may_hold() accepts, in what it was.
+  //
+  // REQUIRES:   the surroundings cover the ball as it is at first.
+  // Returns how many leaves were looked at.
+  // Complexity: O(leaves of the surroundings, and vertices of those looked at).
+  template <typename MayHold, typename F>
+  uint32_t ForEachInsideSurroundings(const Point<D>& site, const FacetBall<D>& ball, MayHold may_hold, F f) {
+    uint32_t looked_at = 0;
+    for (const Pair& leaves : pairs_) {
+      Lanes distance_sq{};
+      for (int i = 0; i < D; ++i) {
+        const double centre = 0.5 * ball.twice_centre[i];
+        const Lanes below = leaves.low[i] - site[i] - centre;
+        const Lanes above = centre - (leaves.high[i] - site[i]);
+        Lanes gap = below > above ? below : above;
+        gap = gap > 0 ? gap : Lanes{};
+        distance_sq += gap * gap;
+      }
+      const double reach = ball.Reach() + 2 * rounding_;  // of the same ball as the distances
+      for (size_t lane = 0; lane < kLanes; ++lane) {
+        if (distance_sq[lane] > reach * reach) {
+          continue;
+        }
+        Box<D> box;
+        for (int i = 0; i < D; ++i) {
+          box.low[i] = leaves.low[i][lane];
+          box.high[i] = leaves.high[i][lane];
+        }
+        if (may_hold(box)) {
+          ++looked_at;
+          ForEachInside(Slot{leaves.begin[lane], leaves.end[lane]}, site, ball, f);
+        }
+      }
+    }
+    return looked_at;
+  }
+
   // Calls look(leaf) outward from `from`, for it and for every leaf that facets join to it through leaves which meets(box of a leaf) accepts;
   // each once. What meets() accepts may become less with every call of look(): leaves that it no longer accepts are left out.
   //
@@ -187,22 +237,7 @@ class LeafColumns {
   // Returns the number of vertices in the leaf.
   template <typename F>
   uint32_t ForEachInside(NodeId leaf, const Point<D>& site, const FacetBall<D>& ball, F f) {
-    const Slot slot = slots_[SlotOf(leaf)];
-    for (uint32_t g = slot.begin; g < slot.end; ++g) {
-      for (size_t j = 0; j < kLanes;) {
-        Lanes power{};
-        Lanes product{};
-        for (int i = 0; i < D; ++i) {
-          const Lanes w = groups_[g].x[i] - site[i];
-          power += w * w;
-          product += w * ball.twice_centre[i];
-        }
-        power -= product;
-        for (bool is_changed = false; j < kLanes && !is_changed; ++j) {
-          is_changed = power[j] < ball.doubt && f(static_cast<uint32_t>(g * kLanes + j), power[j]);
-        }
-      }
-    }
+    ForEachInside(slots_[SlotOf(leaf)], site, ball, f);
     const auto* bucket = structure_->tree().BucketOf(leaf);
     return bucket == nullptr ? 0 : bucket->count;
   }
@@ -234,6 +269,25 @@ class LeafColumns {
     uint32_t begin[kLanes];
     uint32_t end[kLanes];
   };
+
+  template <typename F>
+  void ForEachInside(Slot slot, const Point<D>& site, const FacetBall<D>& ball, F f) const {
+    for (uint32_t g = slot.begin; g < slot.end; ++g) {
+      for (size_t j = 0; j < kLanes;) {
+        Lanes power{};
+        Lanes product{};
+        for (int i = 0; i < D; ++i) {
+          const Lanes w = groups_[g].x[i] - site[i];
+          power += w * w;
+          product += w * ball.twice_centre[i];
+        }
+        power -= product;
+        for (bool is_changed = false; j < kLanes && !is_changed; ++j) {
+          is_changed = power[j] < ball.doubt && f(static_cast<uint32_t>(g * kLanes + j), power[j]);
+        }
+      }
+    }
+  }
 
   uint32_t SlotOf(NodeId leaf) {
     uint32_t& slot = slot_of_[Index(leaf)];
