@@ -244,16 +244,17 @@ void Decide(benchmark::State& state, core::Stage stage) {
     std::array<core::PlaneSource<D>, D> planes;
     Point<D> u;
   };
-  const int least = stage == core::Stage::kInteger ? 0 : stage == core::Stage::kWideInteger ? -80 : -200;
+  const int least = stage == core::Stage::kWideInteger ? -80 : stage == core::Stage::kBigInteger ? -200 : 0;
   std::mt19937_64 random(1);
-  const auto draw = [&random](Point<D>& p) {
+  const uint64_t most = stage == core::Stage::kWord ? 256 : 1'000'000'000'000;
+  const auto draw = [&](Point<D>& p) {
     for (double& x : p) {
-      x = static_cast<double>(random() % 1'000'000);
+      x = static_cast<double>(random() % most);
     }
   };
   std::vector<Decision> decisions(kDecisions);
   for (Decision& decision : decisions) {
-    // Dependent planes would have probability 1e-6; the seed is fixed.
+    // Dependent planes would be improbable; the seed is fixed.
     decision.site.fill(0);
     decision.site[0] = std::ldexp(1.0, least);
     draw(decision.u);
@@ -295,9 +296,10 @@ void RegisterAll() {
   add_queries("ClippedCellOfInput", BM_ClippedCellOfInput<D>);
   add_queries("Star", BM_Star<D>);
   add("Cut", BM_Cut<D>)->Arg(10'000)->Unit(benchmark::kMicrosecond);
-  for (const auto& [name, stage] : {std::pair("DecideCut/Integer", core::Stage::kInteger),
-                                    std::pair("DecideCut/WideInteger", core::Stage::kWideInteger),
-                                    std::pair("DecideCut/BigInteger", core::Stage::kBigInteger)}) {
+  for (const auto& [name, stage] :
+       {std::pair("DecideCut/Word", core::Stage::kWord), std::pair("DecideCut/Integer", core::Stage::kInteger),
+        std::pair("DecideCut/WideInteger", core::Stage::kWideInteger),
+        std::pair("DecideCut/BigInteger", core::Stage::kBigInteger)}) {
     benchmark::RegisterBenchmark((name + suffix).c_str(), [stage = stage](benchmark::State& state) {
       Decide<D>(state, stage);
     })->Unit(benchmark::kMicrosecond);

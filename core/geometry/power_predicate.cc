@@ -26,6 +26,9 @@ struct Rows {
   std::array<typename Ring::Offset, D + 1> offsets;
 };
 
+inline Sign SignOf(int64_t value) { return static_cast<Sign>((value > 0) - (value < 0)); }
+inline Sign SignOf(Signed128 value) { return static_cast<Sign>((value > 0) - (value < 0)); }
+
 template <typename Number>
 Sign SignOf(const Number& value) {
   return static_cast<Sign>(value.sign());
@@ -118,6 +121,55 @@ Scaled Decompose(double value) {
   return {mantissa >> zeros, exponent - 53 + zeros};
 }
 
+// ---- Integers of one word
+
+// Differences d of coordinates with |d| < 2^b, b = floor((63 - 2 D) / D) = 29, 19, 13, 10, 8 for D = 2, ..., 6.
+//
+// Nothing overflows, on the way neither. A sum of products in a minor of k rows is at most k! 2^(k b), in the coefficient
+// of the site (D + 1)! 2^(D b): below 2^61, 2^62, 2^59, 2^60, 2^61. An offset is at most D 2^(2 b), with weights twice
+// that, below 2^61. The bordered determinant is a sum of D + 1 products of the two, below 2^127.
+template <int D>
+struct WordRing {
+  static constexpr Stage kStage = Stage::kWord;
+  static constexpr int kDifferenceBits = (63 - 2 * D) / D;
+  using Entry = int64_t;
+  using Offset = int64_t;
+  template <int K>
+  using Minor = int64_t;
+  template <int K>
+  using Bordered = Signed128;
+
+  static int64_t ToMinor(int64_t entry) { return entry; }
+  static void AddProduct(int64_t& sum, int64_t factor, bool negate, int64_t minor) {
+    const int64_t product = factor * minor;
+    sum += negate ? -product : product;
+  }
+  static void AddProduct(Signed128& sum, int64_t factor, bool negate, int64_t minor) {
+    const Signed128 product = Signed128{factor} * minor;
+    sum += negate ? -product : product;
+  }
+  static void Negate(int64_t& value) { value = -value; }
+  static void Add(int64_t& sum, bool negate, int64_t term) { sum += negate ? -term : term; }
+
+  static int64_t FromInteger(int64_t value) { return value; }
+  static bool IsNegative(int64_t entry) { return entry < 0; }
+  static int64_t Twice(int64_t entry) { return 2 * (entry < 0 ? -entry : entry); }
+  static void AddSquare(int64_t& sum, int64_t entry) { sum += entry * entry; }
+  static bool AddWeight(int64_t& sum, double weight, bool negate, int unit) {
+    if (weight == 0) {
+      return true;
+    }
+    const Scaled scaled = Decompose(weight);
+    const int shift = scaled.exponent - 2 * unit;
+    if (shift < 0 || std::ilogb(weight) - 2 * unit > 2 * kDifferenceBits + 1) {
+      return false;
+    }
+    const int64_t term = scaled.mantissa << shift;
+    sum += negate ? -term : term;
+    return true;
+  }
+};
+
 // ---- Integers of fixed width
 
 // Differences d of coordinates with |d| < 2^b, b = 64 B - 2, in B limbs.
@@ -161,6 +213,13 @@ struct FixedRing {
   static void Add(FixedInteger<L>& sum, bool negate, const FixedInteger<L>& term) {
     sum.Add(term, negate);
   }
+
+  static Entry FromInteger(int64_t value) {
+    Entry entry{{}, value < 0};
+    entry.magnitude[0] = static_cast<uint64_t>(value < 0 ? -value : value);
+    return entry;
+  }
+  static bool IsNegative(const Entry& entry) { return entry.is_negative; }
   static void AddSquare(Offset& sum, const Entry& entry) {
     if constexpr (B == 1) {
       const Unsigned128 total = (Unsigned128{sum.magnitude[1]} << 64 | sum.magnitude[0]) +
@@ -251,10 +310,9 @@ struct Differences {
 };
 
 // Calls to_entry(difference, entry) for every difference and completes the rows; false as soon as one call is.
-template <int D, int B, typename ToEntry>
+template <typename Ring, int D, typename ToEntry>
 inline bool FillRows(const Differences<D>& differences, const std::array<PlaneSource<D>, D>& planes,
-                     const DecisionWeights<D>* weights, int unit, ToEntry to_entry, Rows<FixedRing<B>, D>& rows) {
-  using Ring = FixedRing<B>;
+                     const DecisionWeights<D>* weights, int unit, ToEntry to_entry, Rows<Ring, D>& rows) {
   for (int j = 0; j <= D; ++j) {
     if (j < D && planes[j].IsWall()) {
       const int axis = planes[j].axis;
@@ -262,13 +320,12 @@ inline bool FillRows(const Differences<D>& differences, const std::array<PlaneSo
       if (!to_entry(differences.rows[j][axis], offset)) {
         return false;
       }
-      rows.normals[j].fill({{}, false});
-      rows.normals[j][axis].magnitude[0] = 1;
-      rows.normals[j][axis].is_negative = offset.is_negative;
+      rows.normals[j].fill(Ring::FromInteger(0));
+      rows.normals[j][axis] = Ring::FromInteger(Ring::IsNegative(offset) ? -1 : 1);
       rows.offsets[j] = Ring::Twice(offset);
       continue;
     }
-    rows.offsets[j] = {{}, false};
+    rows.offsets[j] = {};
     for (int i = 0; i < D; ++i) {
       if (!to_entry(differences.rows[j][i], rows.normals[j][i])) {
         return false;
@@ -287,11 +344,12 @@ inline bool FillRows(const Differences<D>& differences, const std::array<PlaneSo
 // 2^exponent for -1022 <= exponent <= 1023.
 double PowerOfTwo(int exponent) { return std::bit_cast<double>(static_cast<uint64_t>(exponent + 1023) << 52); }
 
-// The rows in units of 2^(exponent - 61), in which all differences are below 2^62; false where they are no integers.
-template <int D>
+// The rows in the unit in which the largest difference has all bits that the ring takes, at most 62; false where some are
+// no integers.
+template <typename Ring, int D>
 bool ToRows(const Differences<D>& differences, const std::array<PlaneSource<D>, D>& planes,
-            const DecisionWeights<D>* weights, Rows<FixedRing<1>, D>& rows) {
-  const int unit = differences.exponent - (FixedRing<1>::kDifferenceBits - 1);
+            const DecisionWeights<D>* weights, Rows<Ring, D>& rows) {
+  const int unit = differences.exponent - (Ring::kDifferenceBits - 1);
   if (unit < -1022 || differences.exponent > 1023) {
     return false;
   }
@@ -303,9 +361,9 @@ bool ToRows(const Differences<D>& differences, const std::array<PlaneSource<D>, 
     integer = static_cast<int64_t>(x * factor);
     return static_cast<double>(integer) * inverse == x;
   };
-  return FillRows<D, 1>(
+  return FillRows<Ring, D>(
       differences, planes, weights, unit,
-      [&](const ExactDifference& x, SignedMagnitude<1>& entry) {
+      [&](const ExactDifference& x, typename Ring::Entry& entry) {
         int64_t high = 0;
         if (!to_integer(x.high, high)) {
           return false;
@@ -317,8 +375,7 @@ bool ToRows(const Differences<D>& differences, const std::array<PlaneSource<D>, 
           }
           high += low;
         }
-        entry.is_negative = high < 0;
-        entry.magnitude[0] = static_cast<uint64_t>(high < 0 ? -high : high);
+        entry = Ring::FromInteger(high);
         return true;
       },
       rows);
@@ -345,7 +402,7 @@ bool ToRows(const Differences<D>& differences, const std::array<PlaneSource<D>, 
     const Scaled scaled = Decompose(x);
     return scaled.mantissa == 0 ? 0 : Signed128{scaled.mantissa} * (Signed128{1} << (scaled.exponent - unit));
   };
-  return FillRows<D, 2>(
+  return FillRows<FixedRing<2>, D>(
       differences, planes, weights, unit,
       [&](const ExactDifference& x, SignedMagnitude<2>& entry) {
         const Signed128 value = to_integer(x.high) + to_integer(x.low);
@@ -460,7 +517,10 @@ template <int D>
 ExactDecision DecideByStages(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u,
                              const DecisionWeights<D>* weights, TieRule rule) {
   const Differences<D> differences(site, planes, u);
-  if (Rows<FixedRing<1>, D> rows; ToRows<D>(differences, planes, weights, rows)) {
+  if (Rows<WordRing<D>, D> rows; ToRows<WordRing<D>, D>(differences, planes, weights, rows)) {
+    return Decide<WordRing<D>, D>(site, planes, u, rule, rows);
+  }
+  if (Rows<FixedRing<1>, D> rows; ToRows<FixedRing<1>, D>(differences, planes, weights, rows)) {
     return Decide<FixedRing<1>, D>(site, planes, u, rule, rows);
   }
   if (Rows<FixedRing<2>, D> rows; ToRows<D>(differences, planes, weights, rows)) {

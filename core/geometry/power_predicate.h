@@ -33,9 +33,11 @@ enum class TieRule {
 
 // How a sign was found, for tests and statistics: the cheapest stage that serves.
 enum class Stage {
-  kFilter,       // in doubles, certain by a bound on the error
-  kInteger,      // in integers of fixed width: all differences of coordinates are multiples of one power of two, below
-                 // 2^62 times it
+  kFilter,   // in doubles, certain by a bound on the error
+  kWord,     // in integers of one word: all differences of coordinates are multiples of one power of two, below 2^29,
+             // 2^19, 2^13, 2^10, 2^8 times it in 2-D to 6-D
+  kInteger,  // in integers of fixed width: all differences of coordinates are multiples of one power of two, below
+             // 2^62 times it
   kWideInteger,  // the same, 2^126
   kBigInteger,   // in integers of any size
 };
@@ -63,7 +65,8 @@ struct ExactDecision {
 //             translations that are exact do not change the result; (3) with kPerturb the result is never kZero.
 // REQUIRES:   finite coordinates; the planes meet in one point (det A != 0); u different from the site and all
 //             generators.
-// Complexity: O(D 2^D) products; with kInteger, of one word by at most D of them (3-D: 0.16 us, 6-D: 2.7 us).
+// Complexity: O(D 2^D) products; with kWord, of two words (3-D: 0.06 us); with kInteger, of one word by at most D of
+//             them (3-D: 0.16 us, 6-D: 2.7 us).
 // Errors:     none.
 // Source:     ours; the determinant is that of the power test of regular triangulations. docs/design/geometry.md has
 //             the bounds and what was measured.

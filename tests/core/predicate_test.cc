@@ -410,20 +410,23 @@ TYPED_TEST(PredicateTest, PerturbationIsTheSameFromEverySite) {
   }
 }
 
+// The bits of differences that one word serves.
+template <int D>
+constexpr int kWordBits = std::array{29, 19, 13, 10, 8}[D - 2];
+
 TYPED_TEST(PredicateTest, StageIsTheCheapestThatServes) {
   constexpr int D = TypeParam::kValue;
   for (int i = 0; i < 100; ++i) {
     for (const TieRule rule : {TieRule::kKeep, TieRule::kPerturb}) {
-      EXPECT_EQ(Decide<D>(Draw<D>(Inputs::kSmallGrid, this->random_), rule).stage, Stage::kInteger);
-      const Decided<D> grid = Draw<D>(Inputs::kLargeGrid, this->random_);
-      EXPECT_EQ(Decide<D>(grid, rule).stage, Stage::kInteger);
+      const Decided<D> grid = Draw<D>(Inputs::kSmallGrid, this->random_);
+      EXPECT_EQ(Decide<D>(grid, rule).stage, Stage::kWord);
       for (const double scale : {0x1p-900, 0x1p900}) {
-        EXPECT_EQ(Decide<D>(Scaled<D>(grid, scale), rule).stage, Stage::kInteger) << "the span of bits decides";
+        EXPECT_EQ(Decide<D>(Scaled<D>(grid, scale), rule).stage, Stage::kWord) << "the span of bits decides";
       }
       // Far from the origin, where only the differences have few bits.
       Point<D> far;
       far.fill(0x1p40);
-      EXPECT_EQ(Decide<D>(Translated<D>(grid, far), rule).stage, Stage::kInteger);
+      EXPECT_EQ(Decide<D>(Translated<D>(grid, far), rule).stage, Stage::kWord);
       EXPECT_EQ(Decide<D>(Draw<D>(Inputs::kUniform, this->random_), rule).stage, Stage::kInteger);
       EXPECT_NE(Decide<D>(Draw<D>(Inputs::kLogUniform, this->random_), rule).stage, Stage::kInteger);
     }
@@ -438,7 +441,8 @@ TYPED_TEST(PredicateTest, StagesEndAtTheirBits) {
     p[k + 1][k] = 1;
     p[D + 1][k] = 1;
   }
-  for (const auto& [bits, stage] : {std::pair(62, Stage::kInteger), std::pair(63, Stage::kWideInteger),
+  for (const auto& [bits, stage] : {std::pair(kWordBits<D>, Stage::kWord), std::pair(kWordBits<D> + 1, Stage::kInteger),
+                                    std::pair(62, Stage::kInteger), std::pair(63, Stage::kWideInteger),
                                     std::pair(126, Stage::kWideInteger), std::pair(127, Stage::kBigInteger)}) {
     p[0][D - 1] = -std::ldexp(1.0, 1 - bits);
     const ExactDecision decision = Decide<D>(p, TieRule::kKeep);
@@ -452,13 +456,13 @@ TYPED_TEST(PredicateTest, StagesEndAtTheirBits) {
 // all bits set, and with the sign patterns of Hadamard's matrices among them.
 TYPED_TEST(PredicateTest, IntegerStagesDoNotOverflowAtTheirLimits) {
   constexpr int D = TypeParam::kValue;
-  std::array<int, 4> decided = {};
-  for (const int limit : {62, 126}) {
+  std::array<int, 5> decided = {};
+  for (const int limit : {kWordBits<D>, 62, 126}) {
     for (int bits = limit - 4; bits <= limit + 1; ++bits) {
       for (int i = 0; i < 200; ++i) {
-        // Corners +-(2^(bits - 1) - 2^(bits - 54)), the site in one of them plus or minus one: so the differences have
-        // almost all `bits` bits.
-        const double largest = std::ldexp(1 - 0x1p-53, bits - 1);
+        // Corners +-(2^(bits - 1) - 2^(bits - 54)), or -1 if the last is below one, and in one coordinate of the site plus
+        // or minus one: so the differences have almost all `bits` bits.
+        const double largest = std::ldexp(1, bits - 1) - std::max(1.0, std::ldexp(1, bits - 54));
         Decided<D> p;
         do {
           for (Point<D>& point : p) {
@@ -490,6 +494,7 @@ TYPED_TEST(PredicateTest, IntegerStagesDoNotOverflowAtTheirLimits) {
       }
     }
   }
+  EXPECT_GT(decided[static_cast<size_t>(Stage::kWord)], 0);
   EXPECT_GT(decided[static_cast<size_t>(Stage::kInteger)], 0);
   EXPECT_GT(decided[static_cast<size_t>(Stage::kWideInteger)], 0);
   EXPECT_GT(decided[static_cast<size_t>(Stage::kBigInteger)], 0);
@@ -514,7 +519,7 @@ TYPED_TEST(PredicateTest, StagesAgree) {
     for (const TieRule rule : {TieRule::kKeep, TieRule::kPerturb}) {
       const Sign expected = Decide<D>(p, rule).sign;
       for (const auto& [wall, stage] :
-           {std::pair(1.0, Stage::kInteger), std::pair(-0x1p61, Stage::kInteger),
+           {std::pair(1.0, Stage::kWord), std::pair(0x1p40, Stage::kInteger), std::pair(-0x1p61, Stage::kInteger),
             std::pair(0x1p100, Stage::kWideInteger), std::pair(0x1p200, Stage::kBigInteger)}) {
         planes[D - 1] = {.generator = {}, .coordinate = wall, .axis = D - 1};
         const ExactDecision decision = DecideCut<D>(p[0], planes, p[D + 1], rule);
