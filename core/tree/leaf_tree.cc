@@ -1,6 +1,7 @@
 #include "core/tree/leaf_tree.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 
 #include "absl/strings/str_cat.h"
@@ -15,13 +16,16 @@ absl::Status LeafTree<D>::Build(const Box<D>& box, std::span<const Point<D>> poi
   const MortonGrid<D> grid(box);
   box_ = box;
   max_level_ = static_cast<uint8_t>(grid.levels());
+  sides_.clear();
+  for (int level = 0; level <= grid.levels(); ++level) {
+    sides_.push_back(std::ldexp(grid.root_side(), -level));
+  }
   points_ = points;
   leaf_count_ = 1;
   leaf_of_.assign(points.size(), kNoNode);
   buckets_ = {};
   Node root;
   root.low = grid.root_low();
-  root.side = grid.root_side();
   root.neighbour.fill(kNoNode);
   nodes_.assign(1, root);
   ranges_.assign(1, Range{0, static_cast<uint32_t>(points.size())});
@@ -128,7 +132,7 @@ template <int D>
 int LeafTree<D>::ChildHolding(const Node& node, const Point<D>& p) const {
   int child = 0;
   for (int i = 0; i < D; ++i) {
-    const double middle = node.low[i] + 0.5 * node.side;
+    const double middle = node.low[i] + 0.5 * SideOf(node);
     if (p[i] >= middle && middle < box_.high[i]) {
       child |= 1 << i;
     }
@@ -149,7 +153,7 @@ NodeId LeafTree<D>::LeafHolding(VertexId near, const Point<D>& p) const {
     int face = -1;
     double farthest = -1;
     for (int i = 0; i < D; ++i) {
-      const double high = node.low[i] + node.side;
+      const double high = node.low[i] + SideOf(node);
       if (p[i] < node.low[i] && node.low[i] - p[i] > farthest) {
         farthest = node.low[i] - p[i];
         face = FaceIndex(i, false);
@@ -175,10 +179,9 @@ void LeafTree<D>::Split(NodeId leaf) {
   uint32_t inside = 0;
   for (int child = 0; child < kChildren; ++child) {
     Node& node = At(Child(parent, child));
-    node.side = 0.5 * parent.side;
     node.level = static_cast<uint8_t>(parent.level + 1);
     for (int i = 0; i < D; ++i) {
-      node.low[i] = parent.low[i] + ((child >> i) & 1) * node.side;
+      node.low[i] = parent.low[i] + ((child >> i) & 1) * SideOf(node);
       node.outside = node.outside || node.low[i] >= box_.high[i];
     }
     inside += node.outside ? 0 : 1;
@@ -281,7 +284,7 @@ void LeafTree<D>::DistributeBucket(NodeId parent) {
 template <int D>
 bool LeafTree<D>::IsTooCoarse(NodeId leaf) {
   const Box<D> cube = BoxOf(leaf);
-  const double side = At(leaf).side;
+  const double side = SideOf(At(leaf));
   if (side > box_.ShortestSide()) {
     return true;
   }

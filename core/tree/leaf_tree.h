@@ -96,7 +96,13 @@ class LeafTree {
   }
   // Whether `node` is a leaf that covers a part of the box.
   bool IsLeaf(NodeId node) const { return At(node).first_child == kNoNode && !At(node).outside; }
-  Box<D> BoxOf(NodeId node) const { return At(node).Cube(); }
+  Box<D> BoxOf(NodeId node) const {
+    Box<D> cube{At(node).low, At(node).low};
+    for (int i = 0; i < D; ++i) {
+      cube.high[i] += SideOf(At(node));
+    }
+    return cube;
+  }
   int level(NodeId node) const { return At(node).level; }
 
   // The vertices in a leaf, or null for none.
@@ -153,22 +159,14 @@ class LeafTree {
  private:
   static constexpr uint32_t kNoBucket = ~uint32_t{0};
 
-  struct Node {
+  // In 3-D one line of a cache.
+  struct alignas(D == 3 ? 64 : alignof(double)) Node {
     Point<D> low;
-    double side = 0;
     std::array<NodeId, kFaces> neighbour;
     NodeId first_child = kNoNode;
     uint32_t bucket = kNoBucket;
     uint8_t level = 0;
     bool outside = false;  // no part of the box in its interior
-
-    Box<D> Cube() const {
-      Box<D> cube{low, low};
-      for (int i = 0; i < D; ++i) {
-        cube.high[i] += side;
-      }
-      return cube;
-    }
   };
 
   // The points of a node under construction.
@@ -178,6 +176,7 @@ class LeafTree {
     uint32_t size() const { return end - begin; }
   };
 
+  double SideOf(const Node& node) const { return sides_[node.level]; }
   const Node& At(NodeId id) const { return nodes_[Index(id)]; }
   Node& At(NodeId id) { return nodes_[Index(id)]; }
   static NodeId Child(const Node& node, int child) {
@@ -203,6 +202,7 @@ class LeafTree {
 
   Box<D> box_;
   uint8_t max_level_ = 0;
+  std::vector<double> sides_;  // of nodes, by level
   uint64_t leaf_count_ = 0;
   std::vector<Node> nodes_;
   Buckets buckets_;
