@@ -30,6 +30,9 @@ struct Assessment {
   // nothing now, but the site must look again, with that edge, once a new vertex cuts the facet there.
   double own_face_edge_sq = kNone;
 
+  // Found good by KeepsRatio alone: the cell touches no face, and its nodes may not be placed.
+  bool is_plain = false;
+
   bool IsGood() const { return bad_node < 0 && encroached_face < 0 && !is_clipped && next_edge_sq == kNone; }
 
   static constexpr double kNone = std::numeric_limits<double>::infinity();

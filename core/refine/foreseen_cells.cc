@@ -31,9 +31,8 @@ void ForeseenCells<D>::ComputeOne(VertexId v, size_t i, const Judge& judge, cons
   if (context.IsCancelled()) {
     return;
   }
-  structure_.ClippedVoronoi(v, clip_, own.workspace, TieRule::kPerturb);
+  structure_.UnplacedClippedVoronoi(v, clip_, own.workspace);
   foreseen.vertex = v;
-  foreseen.cell.CopyFrom(own.workspace.cell);
   foreseen.thread = thread;
   foreseen.first_added = own.added_count;
   std::swap(own.cell, own.workspace.cell);
@@ -41,6 +40,7 @@ void ForeseenCells<D>::ComputeOne(VertexId v, size_t i, const Judge& judge, cons
     const Prospect prospect = judge(i, own.cell);
     if (k == 0) {
       foreseen.found = prospect.found;
+      foreseen.cell.CopyFrom(own.cell);
     }
     if (!prospect.point.has_value()) {
       break;
@@ -51,10 +51,13 @@ void ForeseenCells<D>::ComputeOne(VertexId v, size_t i, const Judge& judge, cons
     }
     Added& added = own.added[own.added_count++];
     added.point = point;
-    structure_.ClippedVoronoiAt(point.position, v, point.clip, own.workspace, TieRule::kPerturb);
+    structure_.UnplacedClippedVoronoiAt(point.position, v, point.clip, own.workspace);
+    if (!own.workspace.cell.KeepsRatio(ratio_)) {
+      own.workspace.cell.Place();
+    }
     added.cell.CopyFrom(own.workspace.cell);
     if (k + 1 < kMostAdded) {
-      own.cell.Cut(VertexId{vertex_count_ + k}, point.position);
+      own.cell.CutBeforePlace(VertexId{vertex_count_ + k}, point.position);
     }
   }
   foreseen.added_count = own.added_count - foreseen.first_added;
@@ -103,7 +106,7 @@ template <int D>
 bool ForeseenCells<D>::CutByNew(uint32_t end, Polytope<D>& cell) const {
   bool is_cut = false;
   for (uint32_t u = vertex_count_; u < end && !cell.IsTooLarge(); ++u) {
-    is_cut |= cell.Cut(VertexId{u}, structure_.point(VertexId{u}));
+    is_cut |= cell.CutBeforePlace(VertexId{u}, structure_.point(VertexId{u}));
   }
   return is_cut;
 }

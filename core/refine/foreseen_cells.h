@@ -39,14 +39,16 @@ class ForeseenCells {
   static constexpr size_t kLeast = 8;
   static constexpr size_t kMost = D == 2 ? 64 : D == 3 ? 32 : 16;
 
-  // Assesses a cell of the i-th vertex, and says where one would be added for it, if any. Several threads call it at once.
+  // Places a cell of the i-th vertex if need be, assesses it, and says where one would be added for it, if any. Several threads call it at once.
   struct Prospect {
     Assessment found;
     std::optional<ForeseenPoint<D>> point;
   };
-  using Judge = std::function<Prospect(size_t i, const Polytope<D>& cell)>;
+  using Judge = std::function<Prospect(size_t i, Polytope<D>& cell)>;
 
-  ForeseenCells(const QueryStructure<D>& structure, ThreadTeam& team) : structure_(structure), team_(team) {}
+  // Cells that keep `ratio` need not be placed; 0: all are.
+  ForeseenCells(const QueryStructure<D>& structure, ThreadTeam& team, double ratio)
+      : structure_(structure), team_(team), ratio_(ratio) {}
 
   int threads() const { return team_.threads(); }
 
@@ -105,6 +107,7 @@ class ForeseenCells {
 
   const QueryStructure<D>& structure_;
   ThreadTeam& team_;
+  const double ratio_;
   double clip_ = 0;
   uint32_t vertex_count_ = 0;  // of the structure when the cells were computed
   // Arrays only grow, so that polytopes are reused.

@@ -60,7 +60,8 @@ template <int D>
 absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices, int threads, RunContext& context,
                                 const RefinementObserver<D>& observer) {
   ThreadTeam team(threads);
-  ForeseenCells<D> foreseen(structure_, team);
+  plain_ratio_ = demands.criterion == Criterion::kRadiusEdge && demands.sizes.IsUnbounded() ? demands.rho : 0;
+  ForeseenCells<D> foreseen(structure_, team, plain_ratio_);
   foreseen_ = &foreseen;
   const absl::Cleanup end = [&] {
     own_.counters.Add(foreseen.counters());
@@ -183,11 +184,11 @@ absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
   std::optional<Assessment> known;
   Polytope<D>& cell = LookAt(v, bucket, clip, known);
   if constexpr (kChecks) {
+    cell.Place();
     CheckOrder(v, cell, bucket);
   }
   while (true) {
-    const Assessment found =
-        known.has_value() ? *known : Assess<D>(cell, structure_.faces(v), *demands_, edge_limit_sq);
+    const Assessment found = known.has_value() ? *known : AssessCell(cell, structure_.faces(v), edge_limit_sq);
     known.reset();
     if (schedule_.HasBelow(bucket)) {
       // What was just added asks for something by a shorter edge than this bucket's: that comes first.
@@ -252,10 +253,9 @@ Polytope<D>& Refinement<D>::LookAt(VertexId v, int bucket, double clip, std::opt
     });
     if (next_.size() >= ForeseenCells<D>::kLeast) {
       const double edge_limit_sq = schedule_.UpperLengthSq(bucket);
-      const auto judge = [&](size_t i, const Polytope<D>& cell) {
+      const auto judge = [&](size_t i, Polytope<D>& cell) {
         const VertexId u = next_[i];
-        typename ForeseenCells<D>::Prospect prospect{Assess<D>(cell, structure_.faces(u), *demands_, edge_limit_sq),
-                                                     {}};
+        typename ForeseenCells<D>::Prospect prospect{AssessCell(cell, structure_.faces(u), edge_limit_sq), {}};
         const std::optional<Request> request = NextRequest(u, cell, prospect.found, edge_limit_sq);
         const auto end = next_.begin() + static_cast<ptrdiff_t>(i);
         if (request.has_value() && IsLongEnough(request->point) &&
@@ -270,8 +270,20 @@ Polytope<D>& Refinement<D>::LookAt(VertexId v, int bucket, double clip, std::opt
       }
     }
   }
-  structure_.ClippedVoronoi(v, clip, own_, TieRule::kPerturb);
+  structure_.UnplacedClippedVoronoi(v, clip, own_);
   return own_.cell;
+}
+
+// What is wrong with a cell, whose nodes are placed unless it is plainly good.
+template <int D>
+Assessment Refinement<D>::AssessCell(Polytope<D>& cell, FaceMask site_faces, double edge_limit_sq) const {
+  if (cell.KeepsRatio(plain_ratio_)) {
+    Assessment plain;
+    plain.is_plain = true;
+    return plain;
+  }
+  cell.Place();
+  return Assess<D>(cell, site_faces, *demands_, edge_limit_sq);
 }
 
 // Declares a vertex that needs nothing now done, or puts it where it will be looked at again: not before bucket
@@ -284,7 +296,7 @@ void Refinement<D>::Settle(VertexId v, const Assessment& found, double clip, int
   if (found.IsGood()) {
     if (is_announced_[Index(v)] == 0) {
       is_announced_[Index(v)] = 1;
-      WakeNeighbours(cell, [this](VertexId u) { return !schedule_.Waits(u); });
+      WakeNeighbours(cell, found, [this](VertexId u) { return !schedule_.Waits(u); });
     }
     return;
   }
@@ -316,7 +328,7 @@ absl::Status Refinement<D>::Insert(const Request& request, Polytope<D>& cell) {
   radius_sq_.push_back(Assessment::kNone);
   is_announced_.push_back(0);
   context_->SetVertices(structure_.vertex_count());
-  cell.Cut(insertion.vertex, point.position);
+  cell.CutBeforePlace(insertion.vertex, point.position);
   LookAtNew(insertion.vertex, insertion.near, point.empty_radius_sq);
   if (*observer_) {
     (*observer_)(structure_, insertion);
@@ -332,12 +344,12 @@ void Refinement<D>::LookAtNew(VertexId x, VertexId near, double radius_sq) {
   const double clip = NewClip(radius_sq);
   Polytope<D>* cell = foreseen_ == nullptr ? nullptr : foreseen_->TakeAdded(clip);
   if (cell == nullptr) {
-    structure_.ClippedVoronoi(x, clip, new_, TieRule::kPerturb);
+    structure_.UnplacedClippedVoronoi(x, clip, new_);
     cell = &new_.cell;
   }
-  const Assessment found = Assess<D>(*cell, structure_.faces(x), *demands_, schedule_.UpperLengthSq(bucket));
+  const Assessment found = AssessCell(*cell, structure_.faces(x), schedule_.UpperLengthSq(bucket));
   is_announced_[Index(x)] = found.is_clipped ? 0 : 1;
-  WakeNeighbours(*cell, [near](VertexId u) { return u != near; });
+  WakeNeighbours(*cell, found, [near](VertexId u) { return u != near; });
   if (found.bad_node >= 0) {
     schedule_.Add(x, found.bound_sq / (demands_->rho * demands_->rho));
   } else if (found.encroached_face >= 0) {
@@ -353,9 +365,13 @@ void Refinement<D>::LookAtNew(VertexId x, VertexId near, double radius_sq) {
 // - well-spaced: the site may be the nearest neighbour now, so that other nodes are too far;
 // - a node on one of the neighbour's own faces was too far and asked for nothing: it may have become a circumcentre if
 //   this cell touches the face beside it.
+// A plain cell has neither.
 template <int D>
 template <typename MayWake>
-void Refinement<D>::WakeNeighbours(const Polytope<D>& cell, MayWake may_wake) {
+void Refinement<D>::WakeNeighbours(const Polytope<D>& cell, const Assessment& found, MayWake may_wake) {
+  if (found.is_plain) {
+    return;
+  }
   const double rho_sq = demands_->rho * demands_->rho;
   for (const CellNode<D>& node : cell.nodes()) {
     for (const uint16_t index : node.planes) {

@@ -107,12 +107,13 @@ class Refinement {
   std::optional<Request> NextRequest(VertexId v, const Polytope<D>& cell, const Assessment& found,
                                      double edge_limit_sq) const;
   Polytope<D>& LookAt(VertexId v, int bucket, double clip, std::optional<Assessment>& found);
+  Assessment AssessCell(Polytope<D>& cell, FaceMask site_faces, double edge_limit_sq) const;
   absl::Status Insert(const Request& request, Polytope<D>& cell);
   bool IsLongEnough(const SteinerPoint<D>& point) const { return point.empty_radius_sq >= min_edge_ * min_edge_; }
   void LookAtNew(VertexId x, VertexId near, double radius_sq);
   void Settle(VertexId v, const Assessment& found, double clip, int earliest, const Polytope<D>& cell);
   template <typename MayWake>
-  void WakeNeighbours(const Polytope<D>& cell, MayWake may_wake);
+  void WakeNeighbours(const Polytope<D>& cell, const Assessment& found, MayWake may_wake);
   void CheckOrder(VertexId v, const Polytope<D>& cell, int bucket);
   void CheckInsertion(const Request& request);
 
@@ -129,6 +130,7 @@ class Refinement {
 
   // Of the run.
   double off_center_factor_ = 0;
+  double plain_ratio_ = 0;  // cells that keep it need nothing; 0: that does not tell
   double clip_factor_ = 0;
   uint64_t max_vertices_ = 0;
   ForeseenCells<D>* foreseen_ = nullptr;            // null between runs

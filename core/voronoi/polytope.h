@@ -124,6 +124,13 @@ class Polytope {
   // Errors:     none.
   void Place();
 
+  // Whether every node surely lies on bisectors alone, and nearer to the site than `ratio` times the nearest of their
+  // vertices; then it does so as it will be placed, too. For this the nodes need not be placed.
+  //
+  // Complexity: O(nodes).
+  // Errors:     none; false where it is not sure.
+  bool KeepsRatio(double ratio) const;
+
   // Computes `most` of the candidates, so that those for which it is negative do not cut the cell, now or later.
   //
   // Complexity: O(nodes) a candidate.

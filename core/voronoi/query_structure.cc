@@ -174,12 +174,18 @@ Neighbor QueryStructure<D>::Nearest(const Point<D>& p, NodeId leaf, VertexId but
 template <int D>
 void QueryStructure<D>::ClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace, TieRule rule) const {
   ClipAndScan(point(v), v, tree_.leaf_of(v), radius, rule, workspace);
+  workspace.cell.Place();
 }
 
 template <int D>
-void QueryStructure<D>::ClippedVoronoiAt(const Point<D>& p, VertexId near, double radius, Workspace<D>& workspace,
-                                         TieRule rule) const {
-  ClipAndScan(p, kNoVertex, tree_.LeafHolding(near, p), radius, rule, workspace);
+void QueryStructure<D>::UnplacedClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace) const {
+  ClipAndScan(point(v), v, tree_.leaf_of(v), radius, TieRule::kPerturb, workspace);
+}
+
+template <int D>
+void QueryStructure<D>::UnplacedClippedVoronoiAt(const Point<D>& p, VertexId near, double radius,
+                                                 Workspace<D>& workspace) const {
+  ClipAndScan(p, kNoVertex, tree_.LeafHolding(near, p), radius, TieRule::kPerturb, workspace);
 }
 
 // Computes the clipped cell of `site`, which is vertex `v` or none yet, in leaf `own`.
@@ -204,6 +210,7 @@ void QueryStructure<D>::Voronoi(VertexId v, Workspace<D>& workspace) const {
   kinds.fill(PlaneKind::kClip);
   workspace.cell.Reset(point(v), bounds, kinds, TieRule::kPerturb);
   Scan(v, tree_.leaf_of(v), workspace);
+  workspace.cell.Place();
 }
 
 // Cuts workspace.cell, whose site is vertex `v` or none yet, by the vertices in the leaves from `own` outward.
@@ -214,7 +221,6 @@ void QueryStructure<D>::Scan(VertexId v, NodeId own, Workspace<D>& workspace) co
       [&] { return workspace.cell.IsTooLarge() ? -1 : workspace.cell.CutLimitSq(); },
       [&](NodeId leaf) { return workspace.cell.Reaches(tree_.BoxOf(leaf)); },
       [&](NodeId leaf) { CutByLeaf(v, leaf, workspace); });
-  workspace.cell.Place();
   workspace.counters.cuts += workspace.cell.cuts();
   workspace.counters.decisions.exact += workspace.cell.counters().exact;
   workspace.counters.decisions.perturbed += workspace.cell.counters().perturbed;

@@ -108,12 +108,15 @@ class QueryStructure {
   //             meets crosses only facets of leaves that it meets.
   void ClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace, TieRule rule = TieRule::kKeep) const;
 
-  // The cell that a vertex at `p` would have, looked for from `near`.
+  // The same, ties perturbed, for whoever may not need the nodes: they are still to be placed, by cell.Place().
+  void UnplacedClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace) const;
+
+  // The same of the cell that a vertex at `p` would have, looked for from `near`.
   //
   // REQUIRES:   p in the box and different from all vertices; radius > 0.
   // Complexity: as ClippedVoronoi's when p is in the clipped cell of `near`.
   // Errors:     none.
-  void ClippedVoronoiAt(const Point<D>& p, VertexId near, double radius, Workspace<D>& workspace, TieRule rule) const;
+  void UnplacedClippedVoronoiAt(const Point<D>& p, VertexId near, double radius, Workspace<D>& workspace) const;
 
   // Computes in workspace.cell the whole Voronoi cell of `v`, inside walls one side of the box beyond it, ties
   // perturbed.

@@ -25,6 +25,8 @@ using test::ByDimension;
 using test::MakeStructure;
 
 constexpr double kClip = 0.4;
+// Cells that keep it are handed out before their nodes are placed.
+constexpr double kRatio = 3;
 // Without ties, and with many.
 constexpr std::string_view kKinds[] = {"uniform", "grid", "cospherical", "boundary", "rounded"};
 
@@ -50,6 +52,13 @@ template <int D>
 auto CellNow(const QueryStructure<D>& structure, VertexId v, Workspace<D>& workspace) {
   structure.ClippedVoronoi(v, kClip, workspace, TieRule::kPerturb);
   return Description<D>(workspace.cell);
+}
+
+template <int D>
+void PlaceUnlessPlain(Polytope<D>& cell) {
+  if (!cell.KeepsRatio(kRatio)) {
+    cell.Place();
+  }
 }
 
 template <typename T>
@@ -86,11 +95,12 @@ TYPED_TEST(ForeseenCellsTest, CellsDoNotDependOnTheOrderOfTheCuts) {
 
 TYPED_TEST(ForeseenCellsTest, StayTrueWhileVerticesAreAdded) {
   constexpr int D = TypeParam::kValue;
+  int all_plain = 0;
   for (const std::string_view kind : kKinds) {
     SCOPED_TRACE(std::string(kind));
     QueryStructure<D> structure = StructureOf<D>(kind);
     ThreadTeam team(2);
-    ForeseenCells<D> foreseen(structure, team);
+    ForeseenCells<D> foreseen(structure, team, kRatio);
     std::vector<VertexId> vertices;
     for (uint32_t v = 0; v < ForeseenCells<D>::kMost && v < structure.vertex_count(); v += 2) {
       vertices.push_back(VertexId{v});
@@ -108,7 +118,8 @@ TYPED_TEST(ForeseenCellsTest, StayTrueWhileVerticesAreAdded) {
     std::vector<int> judged(vertices.size());
     foreseen.Compute(
         vertices, kClip,
-        [&](size_t i, const Polytope<D>& cell) {
+        [&](size_t i, Polytope<D>& cell) {
+          PlaceUnlessPlain<D>(cell);
           typename ForeseenCells<D>::Prospect prospect;
           prospect.found.radius_sq = cell.reach_sq();
           if (judged[i]++ == 0) {
@@ -121,6 +132,7 @@ TYPED_TEST(ForeseenCellsTest, StayTrueWhileVerticesAreAdded) {
     EXPECT_FALSE(foreseen.Has(2 * kClip));
     Workspace<D> workspace;
     int unchanged = 0;
+    int plain = 0;
     for (size_t i = 0; i < vertices.size(); ++i) {
       ASSERT_TRUE(foreseen.Has(kClip));
       const auto expected = CellNow<D>(structure, vertices[i], workspace);
@@ -128,31 +140,36 @@ TYPED_TEST(ForeseenCellsTest, StayTrueWhileVerticesAreAdded) {
       EXPECT_EQ(foreseen.Take(VertexId{structure.vertex_count() - 1}, kClip, found), nullptr) << "not foreseen";
       Polytope<D>* const cell = foreseen.Take(vertices[i], kClip, found);
       ASSERT_NE(cell, nullptr);
-      ASSERT_EQ(Description<D>(*cell), expected);
       if (found.has_value()) {
         ++unchanged;
         EXPECT_EQ(found->radius_sq, cell->reach_sq());
       }
+      plain += cell->KeepsRatio(kRatio) ? 1 : 0;
+      cell->Place();
+      ASSERT_EQ(Description<D>(*cell), expected);
       const VertexId added = structure.AddVertex(vertices[i], points[i].position);
       const auto expected_added = CellNow<D>(structure, added, workspace);
       Polytope<D>* const added_cell = foreseen.TakeAdded(kClip);
       ASSERT_NE(added_cell, nullptr);
+      added_cell->Place();
       ASSERT_EQ(Description<D>(*added_cell), expected_added);
     }
     EXPECT_FALSE(foreseen.Has(kClip)) << "none is left";
     EXPECT_GE(unchanged, 1);
     EXPECT_LT(unchanged, static_cast<int>(vertices.size())) << "some cells have changed";
+    all_plain += plain;
   }
+  EXPECT_EQ(all_plain > 0, D < 4) << "so few vertices leave no cell in 4-D that is not clipped";
 }
 
 TYPED_TEST(ForeseenCellsTest, WhatIsCancelledIsLeftOut) {
   constexpr int D = TypeParam::kValue;
   const QueryStructure<D> structure = StructureOf<D>("uniform");
   ThreadTeam team(2);
-  ForeseenCells<D> foreseen(structure, team);
+  ForeseenCells<D> foreseen(structure, team, kRatio);
   RunContext context;
   const std::vector<VertexId> vertices = {VertexId{0}, VertexId{1}, VertexId{2}};
-  const auto judge = [&](size_t, const Polytope<D>& cell) {
+  const auto judge = [&](size_t, Polytope<D>& cell) {
     context.Cancel();
     return typename ForeseenCells<D>::Prospect{{.radius_sq = cell.reach_sq()}, {}};
   };

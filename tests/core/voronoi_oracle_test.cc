@@ -91,6 +91,37 @@ class QueryChecker {
     }
     CutByAll<D>(structure, v, cube.bounds, cube.kinds, TieRule::kKeep, random_.Next(), slow_);
     ASSERT_TRUE(HaveSameNodes<D>(fast_.cell, slow_));
+    CheckRatios(structure, v, radius);
+  }
+
+  // What is sure before the nodes are placed holds once they are, and is told of all that keep the ratio with some room.
+  void CheckRatios(const QueryStructure<D>& structure, VertexId v, double radius) {
+    Polytope<D>& cell = fast_.cell;
+    structure.UnplacedClippedVoronoi(v, radius, fast_);
+    constexpr std::array kRatios = {0.75, 1.0, 2.0, 8.0};
+    std::array<bool, kRatios.size()> keeps;
+    std::transform(kRatios.begin(), kRatios.end(), keeps.begin(), [&](double r) { return cell.KeepsRatio(r); });
+    cell.Place();
+    double largest = 0;
+    for (const CellNode<D>& node : cell.nodes()) {
+      double nearest_sq = std::numeric_limits<double>::infinity();
+      for (const uint16_t index : node.planes) {
+        const Plane<D>& plane = cell.plane(index);
+        nearest_sq = plane.kind == PlaneKind::kBisector ? std::min(nearest_sq, NormSq<D>(plane.normal)) : 0;
+        if (nearest_sq == 0) {
+          break;
+        }
+      }
+      largest = std::max(largest, std::sqrt(node.radius_sq / nearest_sq));
+    }
+    for (size_t i = 0; i < kRatios.size(); ++i) {
+      ASSERT_EQ(cell.KeepsRatio(kRatios[i]), keeps[i]);
+      if (keeps[i]) {
+        ASSERT_LE(largest, kRatios[i]);
+      } else {
+        ASSERT_GE(largest, kRatios[i] * (1 - 1e-5));
+      }
+    }
   }
 
   // The perturbation leaves no choice, so the cells agree plane by plane.
