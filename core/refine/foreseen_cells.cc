@@ -36,13 +36,13 @@ void ForeseenCells<D>::ComputeOne(VertexId v, size_t i, const Judge& judge, cons
   foreseen.thread = thread;
   foreseen.first_added = own.added_count;
   std::swap(own.cell, own.workspace.cell);
-  for (uint32_t k = 0; k < kMostAdded && !context.IsCancelled(); ++k) {
+  for (uint32_t k = 0; k < kMostAdded; ++k) {
     const Prospect prospect = judge(i, own.cell);
     if (k == 0) {
       foreseen.found = prospect.found;
       foreseen.cell.CopyFrom(own.cell);
     }
-    if (!prospect.point.has_value()) {
+    if (!prospect.point.has_value() || context.IsCancelled()) {
       break;
     }
     const ForeseenPoint<D>& point = *prospect.point;
