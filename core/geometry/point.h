@@ -10,6 +10,8 @@
 
 namespace wellspace::core {
 
+inline constexpr double kUnit = 0x1p-53;  // relative rounding error of one operation on doubles
+
 template <int D>
 using Point = std::array<double, D>;
 

@@ -140,16 +140,15 @@ struct WordRing {
   using Bordered = Signed128;
 
   static int64_t ToMinor(int64_t entry) { return entry; }
-  static void AddProduct(int64_t& sum, int64_t factor, bool negate, int64_t minor) {
-    const int64_t product = factor * minor;
-    sum += negate ? -product : product;
-  }
-  static void AddProduct(Signed128& sum, int64_t factor, bool negate, int64_t minor) {
-    const Signed128 product = Signed128{factor} * minor;
-    sum += negate ? -product : product;
+  template <typename Sum>
+  static void AddProduct(Sum& sum, int64_t factor, bool negate, int64_t minor) {
+    Add(sum, negate, Sum{factor} * minor);
   }
   static void Negate(int64_t& value) { value = -value; }
-  static void Add(int64_t& sum, bool negate, int64_t term) { sum += negate ? -term : term; }
+  template <typename Sum>
+  static void Add(Sum& sum, bool negate, Sum term) {
+    sum += negate ? -term : term;
+  }
 
   static int64_t FromInteger(int64_t value) { return value; }
   static bool IsNegative(int64_t entry) { return entry < 0; }
@@ -164,8 +163,7 @@ struct WordRing {
     if (shift < 0 || std::ilogb(weight) - 2 * unit > 2 * kDifferenceBits + 1) {
       return false;
     }
-    const int64_t term = scaled.mantissa << shift;
-    sum += negate ? -term : term;
+    Add(sum, negate, scaled.mantissa << shift);
     return true;
   }
 };

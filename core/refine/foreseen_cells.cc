@@ -52,9 +52,7 @@ void ForeseenCells<D>::ComputeOne(VertexId v, size_t i, const Judge& judge, cons
     Added& added = own.added[own.added_count++];
     added.point = point;
     structure_.UnplacedClippedVoronoiAt(point.position, v, point.clip, own.workspace);
-    if (!own.workspace.cell.KeepsRatio(ratio_)) {
-      own.workspace.cell.Place();
-    }
+    own.workspace.cell.PlaceUnlessKeeps(ratio_);
     added.cell.CopyFrom(own.workspace.cell);
     if (k + 1 < kMostAdded) {
       own.cell.CutBeforePlace(VertexId{vertex_count_ + k}, point.position);

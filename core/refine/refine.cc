@@ -277,12 +277,11 @@ Polytope<D>& Refinement<D>::LookAt(VertexId v, int bucket, double clip, std::opt
 // What is wrong with a cell, whose nodes are placed unless it is plainly good.
 template <int D>
 Assessment Refinement<D>::AssessCell(Polytope<D>& cell, FaceMask site_faces, double edge_limit_sq) const {
-  if (cell.KeepsRatio(plain_ratio_)) {
+  if (cell.PlaceUnlessKeeps(plain_ratio_)) {
     Assessment plain;
     plain.is_plain = true;
     return plain;
   }
-  cell.Place();
   return Assess<D>(cell, site_faces, *demands_, edge_limit_sq);
 }
 

@@ -32,6 +32,14 @@ struct FacetBall {
     return {.twice_centre = {}, .radius = kInfinity, .error = 0, .doubt = kInfinity};
   }
 
+  Point<D> Centre() const {
+    Point<D> centre = twice_centre;
+    for (double& x : centre) {
+      x *= 0.5;
+    }
+    return centre;
+  }
+
   // At least the exact distance of any point of the ball from the computed centre.
   double Reach() const { return (radius + 2 * error) * (1 + 0x1p-48); }
 };
@@ -71,8 +79,6 @@ class FacetPencil {
   ExactDecision IsInside(const Point<D>& apex, const Point<D>& u) const;
 
  private:
-  static constexpr double kUnit = 0x1p-53;  // relative rounding error
-
   // The offset of the centre along the facet, by a vector w across it: see BallThrough.
   Point<D> Turned(const Point<D>& w) const;
   static FacetBall<D> BallAbout(const Point<D>& centre, double error);

@@ -322,10 +322,10 @@ void FacetWalk<D>::SearchLeaves(NodeId leaf, const FacetPencil<D>& pencil, const
     return;
   }
   const auto meets = [&](const Box<D>& box) {
+    const Point<D> centre = ball.Centre();
     double distance_sq = 0;
     for (int i = 0; i < D; ++i) {
-      const double centre = 0.5 * ball.twice_centre[i];
-      const double gap = std::max({box.low[i] - site[i] - centre, centre - (box.high[i] - site[i]), 0.0});
+      const double gap = std::max({box.low[i] - site[i] - centre[i], centre[i] - (box.high[i] - site[i]), 0.0});
       distance_sq += gap * gap;
     }
     const double reach = ball.Reach() + 2 * columns_.rounding();

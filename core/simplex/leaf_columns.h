@@ -116,14 +116,7 @@ class LeafColumns {
     near.Clear();
     uint32_t opened = 0;
     for (const Pair& leaves : pairs_) {
-      Lanes distance_sq{};
-      for (int i = 0; i < D; ++i) {
-        const Lanes below = leaves.low[i] - site[i];
-        const Lanes above = site[i] - leaves.high[i];
-        Lanes gap = below > above ? below : above;
-        gap = gap > 0 ? gap : Lanes{};
-        distance_sq += gap * gap;
-      }
+      const Lanes distance_sq = DistancesSq(leaves, site, Point<D>{});
       for (size_t lane = 0; lane < kLanes; ++lane) {
         if (distance_sq[lane] > reach_sq) {
           continue;
@@ -160,11 +153,11 @@ class LeafColumns {
   // Whether all leaves that come to the ball about `site` are among the surroundings; false if nothing is surrounded.
   bool Covers(const Point<D>& site, const FacetBall<D>& ball) const {
     const Box<D> home = structure_->tree().BoxOf(home_);
+    const Point<D> centre = ball.Centre();
     const double least = ball.Reach() + 4 * rounding_ - margin_;
     bool is_covered = margin_ >= 0;
     for (int i = 0; i < D; ++i) {
-      const double centre = 0.5 * ball.twice_centre[i];
-      is_covered &= (centre - (home.low[i] - site[i]) >= least) & ((home.high[i] - site[i]) - centre >= least);
+      is_covered &= (centre[i] - (home.low[i] - site[i]) >= least) & ((home.high[i] - site[i]) - centre[i] >= least);
     }
     return is_covered;
   }
@@ -179,15 +172,7 @@ class LeafColumns {
   uint32_t ForEachInsideSurroundings(const Point<D>& site, const FacetBall<D>& ball, MayHold may_hold, F f) {
     uint32_t looked_at = 0;
     for (const Pair& leaves : pairs_) {
-      Lanes distance_sq{};
-      for (int i = 0; i < D; ++i) {
-        const double centre = 0.5 * ball.twice_centre[i];
-        const Lanes below = leaves.low[i] - site[i] - centre;
-        const Lanes above = centre - (leaves.high[i] - site[i]);
-        Lanes gap = below > above ? below : above;
-        gap = gap > 0 ? gap : Lanes{};
-        distance_sq += gap * gap;
-      }
+      const Lanes distance_sq = DistancesSq(leaves, site, ball.Centre());
       const double reach = ball.Reach() + 2 * rounding_;  // of the same ball as the distances
       for (size_t lane = 0; lane < kLanes; ++lane) {
         if (distance_sq[lane] > reach * reach) {
@@ -269,6 +254,19 @@ class LeafColumns {
     uint32_t begin[kLanes];
     uint32_t end[kLanes];
   };
+
+  // The squared distances of two leaves from `p`, which is relative to `site`.
+  static Lanes DistancesSq(const Pair& leaves, const Point<D>& site, const Point<D>& p) {
+    Lanes distance_sq{};
+    for (int i = 0; i < D; ++i) {
+      const Lanes below = leaves.low[i] - site[i] - p[i];
+      const Lanes above = p[i] - (leaves.high[i] - site[i]);
+      Lanes gap = below > above ? below : above;
+      gap = gap > 0 ? gap : Lanes{};
+      distance_sq += gap * gap;
+    }
+    return distance_sq;
+  }
 
   template <typename F>
   void ForEachInside(Slot slot, const Point<D>& site, const FacetBall<D>& ball, F f) const {

@@ -17,8 +17,6 @@
 namespace wellspace::core {
 namespace {
 
-constexpr double kUnit = 0x1p-53;  // relative rounding error
-
 // 512 bits are kept inside the object: enough for most cells without any allocation.
 using Integer = boost::multiprecision::number<
     boost::multiprecision::cpp_int_backend<512, 0, boost::multiprecision::signed_magnitude,

@@ -13,8 +13,6 @@
 
 namespace wellspace::core {
 
-inline constexpr double kUnit = 0x1p-53;  // relative rounding error
-
 // A node in doubles, and a bound on |x - exact x|; infinite where there is none.
 template <int D>
 struct Placement {

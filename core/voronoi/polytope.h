@@ -131,6 +131,15 @@ class Polytope {
   // Errors:     none; false where it is not sure.
   bool KeepsRatio(double ratio) const;
 
+  // Places the nodes unless KeepsRatio(ratio), and returns whether that holds.
+  bool PlaceUnlessKeeps(double ratio) {
+    const bool keeps = KeepsRatio(ratio);
+    if (!keeps) {
+      Place();
+    }
+    return keeps;
+  }
+
   // Computes `most` of the candidates, so that those for which it is negative do not cut the cell, now or later.
   //
   // Complexity: O(nodes) a candidate.

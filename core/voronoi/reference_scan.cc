@@ -11,7 +11,6 @@
 namespace wellspace::core {
 namespace {
 
-constexpr double kUnit = 0x1p-53;  // relative rounding error
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // A constraint counts as kept when it is broken by no more than this part of the lengths in it.
 constexpr double kFeasibility = 0x1p-42;

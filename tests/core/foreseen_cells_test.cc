@@ -54,13 +54,6 @@ auto CellNow(const QueryStructure<D>& structure, VertexId v, Workspace<D>& works
   return Description<D>(workspace.cell);
 }
 
-template <int D>
-void PlaceUnlessPlain(Polytope<D>& cell) {
-  if (!cell.KeepsRatio(kRatio)) {
-    cell.Place();
-  }
-}
-
 template <typename T>
 class ForeseenCellsTest : public test::SeededTest {
  protected:
@@ -119,7 +112,7 @@ TYPED_TEST(ForeseenCellsTest, StayTrueWhileVerticesAreAdded) {
     foreseen.Compute(
         vertices, kClip,
         [&](size_t i, Polytope<D>& cell) {
-          PlaceUnlessPlain<D>(cell);
+          cell.PlaceUnlessKeeps(kRatio);
           typename ForeseenCells<D>::Prospect prospect;
           prospect.found.radius_sq = cell.reach_sq();
           if (judged[i]++ == 0) {

@@ -418,15 +418,23 @@ TYPED_TEST(PredicateTest, StageIsTheCheapestThatServes) {
   constexpr int D = TypeParam::kValue;
   for (int i = 0; i < 100; ++i) {
     for (const TieRule rule : {TieRule::kKeep, TieRule::kPerturb}) {
-      const Decided<D> grid = Draw<D>(Inputs::kSmallGrid, this->random_);
-      EXPECT_EQ(Decide<D>(grid, rule).stage, Stage::kWord);
-      for (const double scale : {0x1p-900, 0x1p900}) {
-        EXPECT_EQ(Decide<D>(Scaled<D>(grid, scale), rule).stage, Stage::kWord) << "the span of bits decides";
+      EXPECT_EQ(Decide<D>(Draw<D>(Inputs::kSmallGrid, this->random_), rule).stage, Stage::kWord);
+      // A large grid, once as it is and once with a corner so far away that a word is too short.
+      Decided<D> grid = Draw<D>(Inputs::kLargeGrid, this->random_);
+      for (const bool is_wide : {false, true}) {
+        if (is_wide) {
+          grid[D + 1].fill(0x1p32);
+        }
+        const Stage stage = Decide<D>(grid, rule).stage;
+        EXPECT_TRUE(stage == Stage::kInteger || (stage == Stage::kWord && !is_wide));
+        for (const double scale : {0x1p-900, 0x1p900}) {
+          EXPECT_EQ(Decide<D>(Scaled<D>(grid, scale), rule).stage, stage) << "the span of bits decides";
+        }
+        // Far from the origin, where only the differences have few bits.
+        Point<D> far;
+        far.fill(0x1p40);
+        EXPECT_EQ(Decide<D>(Translated<D>(grid, far), rule).stage, stage);
       }
-      // Far from the origin, where only the differences have few bits.
-      Point<D> far;
-      far.fill(0x1p40);
-      EXPECT_EQ(Decide<D>(Translated<D>(grid, far), rule).stage, Stage::kWord);
       EXPECT_EQ(Decide<D>(Draw<D>(Inputs::kUniform, this->random_), rule).stage, Stage::kInteger);
       EXPECT_NE(Decide<D>(Draw<D>(Inputs::kLogUniform, this->random_), rule).stage, Stage::kInteger);
     }
