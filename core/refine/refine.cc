@@ -82,6 +82,9 @@ absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices
   uint64_t improved = 0;
   while (schedule_.Pop(v, bucket)) {
     absl::Status status = context.Check();
+    if (neighbours_.IsFull()) {
+      status = absl::ResourceExhaustedError("the mesh has more edges than can be numbered, 2^32");
+    }
     if (status.ok()) {
       status = Improve(v, bucket);
     }
@@ -111,13 +114,14 @@ void Refinement<D>::VertexAdded(VertexId x) {
 
 template <int D>
 uint64_t Refinement<D>::MemoryBytes() const {
-  return schedule_.MemoryBytes() + radius_sq_.size() * sizeof(double) + is_announced_.size() +
-         (own_.seen.size() + new_.seen.size()) * sizeof(uint32_t) +
+  return schedule_.MemoryBytes() + neighbours_.MemoryBytes() + radius_sq_.size() * sizeof(double) +
+         is_announced_.size() + (own_.seen.size() + new_.seen.size()) * sizeof(uint32_t) +
          (foreseen_ == nullptr ? 0 : foreseen_->MemoryBytes());
 }
 
 template <int D>
-void Refinement<D>::CellChanged(VertexId v, double nearest_sq) {
+void Refinement<D>::CellChanged(VertexId v, double nearest_sq, std::span<const VertexId> neighbours) {
+  neighbours_.Set(v, neighbours);
   radius_sq_.resize(structure_.vertex_count(), Assessment::kNone);
   is_announced_.resize(structure_.vertex_count(), 1);
   const bool is_on_face = structure_.faces(v) != 0;
@@ -136,6 +140,7 @@ QueryCounters Refinement<D>::counters() const {
 
 template <int D>
 absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& team) {
+  neighbours_.Clear();
   radius_sq_.assign(structure_.vertex_count(), Assessment::kNone);
   is_announced_.assign(structure_.vertex_count(), 1);
   const uint32_t count = structure_.vertex_count();
@@ -288,11 +293,13 @@ Assessment Refinement<D>::AssessCell(Polytope<D>& cell, FaceMask site_faces, dou
 // Declares a vertex that needs nothing now done, or puts it where it will be looked at again: not before bucket
 // `earliest`.
 template <int D>
-void Refinement<D>::Settle(VertexId v, const Assessment& found, double clip, int earliest, const Polytope<D>& cell) {
+void Refinement<D>::Settle(VertexId v, const Assessment& found, double clip, int earliest, Polytope<D>& cell) {
   radius_sq_[Index(v)] = found.own_face_edge_sq != Assessment::kNone ? -found.own_face_edge_sq
                          : found.IsGood()                            ? found.radius_sq
                                                                      : Assessment::kNone;
   if (found.IsGood()) {
+    cell.Neighbours(beside_);
+    neighbours_.Set(v, beside_);
     if (is_announced_[Index(v)] == 0) {
       is_announced_[Index(v)] = 1;
       WakeNeighbours(cell, found, [this](VertexId u) { return !schedule_.Waits(u); });

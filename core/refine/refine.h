@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "core/refine/demands.h"
 #include "core/refine/schedule.h"
 #include "core/refine/steiner_point.h"
+#include "core/voronoi/neighbour_lists.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {
@@ -88,7 +90,10 @@ class Refinement {
   //
   // REQUIRES:   the last run was for the end.
   // Complexity: O(1).
-  void CellChanged(VertexId v, double nearest_sq);
+  void CellChanged(VertexId v, double nearest_sq, std::span<const VertexId> neighbours);
+
+  // The neighbours of all vertices, when the last run was for the end.
+  const NeighbourLists& neighbours() const { return neighbours_; }
 
   // What all queries have cost.
   QueryCounters counters() const;
@@ -111,7 +116,7 @@ class Refinement {
   absl::Status Insert(const Request& request, Polytope<D>& cell);
   bool IsLongEnough(const SteinerPoint<D>& point) const { return point.empty_radius_sq >= min_edge_ * min_edge_; }
   void LookAtNew(VertexId x, VertexId near, double radius_sq);
-  void Settle(VertexId v, const Assessment& found, double clip, int earliest, const Polytope<D>& cell);
+  void Settle(VertexId v, const Assessment& found, double clip, int earliest, Polytope<D>& cell);
   template <typename MayWake>
   void WakeNeighbours(const Polytope<D>& cell, const Assessment& found, MayWake may_wake);
   void CheckOrder(VertexId v, const Polytope<D>& cell, int bucket);
@@ -124,6 +129,7 @@ class Refinement {
   // squared length of that edge.
   std::vector<double> radius_sq_;
   std::vector<uint8_t> is_announced_;  // its neighbours have been looked at in view of it
+  NeighbourLists neighbours_;          // of vertices that are done, or have been
   std::optional<Demands<D>> demands_;  // of the last run, once all vertices have been scheduled for them
   Workspace<D> own_;                   // the cell that is improved
   Workspace<D> new_;                   // the cell of the vertex just added
@@ -136,6 +142,7 @@ class Refinement {
   ForeseenCells<D>* foreseen_ = nullptr;            // null between runs
   std::vector<VertexId> next_;                      // scratch of LookAt
   std::vector<std::pair<VertexId, double>> woken_;  // scratch of WakeNeighbours
+  std::vector<VertexId> beside_;                    // scratch of Settle
   RunContext* context_ = nullptr;
   const RefinementObserver<D>* observer_ = nullptr;
 

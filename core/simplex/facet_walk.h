@@ -10,9 +10,9 @@
 #include "core/base/ids.h"
 #include "core/base/run_context.h"
 #include "core/simplex/facet_pencil.h"
-#include "core/simplex/leaf_columns.h"
 #include "core/simplex/simplex_list.h"
 #include "core/simplex/site_columns.h"
+#include "core/voronoi/neighbour_lists.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {
@@ -38,14 +38,16 @@ class FacetWalk {
   // Complexity: O(1) for each of their vertices.
   // Errors:     none.
   // Source:     gift wrapping (Chand and Kapur 1970) in Delaunay triangulations: McLain 1976; with a stop by cells: Maus 1984.
-  void AppendStars(const QueryStructure<D>& structure, std::span<const NodeId> leaves,
+  void AppendStars(const QueryStructure<D>& structure, const NeighbourTable& neighbours, std::span<const NodeId> leaves,
                    std::span<const uint32_t> output_index, const RunContext& context, SimplexList<D>& out);
 
-  // What its scratch takes in memory, but for what it has for each node of the tree.
+  // What its scratch takes in memory, but for what it has for each vertex of the structure.
   uint64_t MemoryBytes() const {
-    return columns_.MemoryBytes() + near_.MemoryBytes() + first_at_.capacity() * sizeof(uint32_t) +
+    return places_.capacity() * sizeof(Place) + near_.MemoryBytes() + first_at_.capacity() * sizeof(uint32_t) +
            has_simplices_.capacity() + open_.capacity() * sizeof(OpenFacet);
   }
+  // What it has for each vertex of the structure.
+  static constexpr size_t kVertexBytes = sizeof(uint32_t);
   // Queries are stars.
   QueryCounters counters() const;
 
@@ -66,43 +68,45 @@ class FacetWalk {
     bool is_flipped;
   };
   static constexpr uint32_t kNone = ~uint32_t{0};
+  // Vertices of the block and near to it, numbered as they are met: the place of a vertex.
+  struct Place {
+    Point<D> point;
+    VertexId vertex;
+  };
 
   static Key KeyOf(const std::array<uint32_t, D - 1>& others, bool is_flipped);
   static Key Opposite(Key key);
   static std::array<uint32_t, D - 1> OthersOf(Key key);
   static bool IsFlipped(Key key) { return D == 2 && (key & 1) != 0; }
 
-  void Begin(const QueryStructure<D>& structure, std::span<const NodeId> leaves,
+  void Begin(const QueryStructure<D>& structure, const NeighbourTable& neighbours, std::span<const NodeId> leaves,
              std::span<const uint32_t> output_index);
   bool CloseFacets(std::span<const NodeId> leaves, const RunContext& context, SimplexList<D>& out);
-  void CloseFacetsAt(NodeId leaf, uint32_t place, SimplexList<D>& out);
-  void ComputeCell(uint32_t place);
+  void CloseFacetsAt(uint32_t place, SimplexList<D>& out);
   void AddCellOf(uint32_t place, SimplexList<D>& out);
-  bool Gather(NodeId leaf, uint32_t place, double radius);
-  uint32_t FindApex(NodeId leaf, const Facet& facet, FacetBall<D>& ball);
-  uint32_t ApexInCell(const Facet& facet);
+  void Gather(uint32_t place);
+  uint32_t FindApex(const Facet& facet, FacetBall<D>& ball);
   bool Shrink(const FacetPencil<D>& pencil, const Facet& facet, uint32_t u, double power, uint32_t& apex,
               FacetBall<D>& ball);
-  void SearchNear(const FacetPencil<D>& pencil, const Facet& facet, uint32_t& apex, FacetBall<D>& ball);
-  void SearchLeaves(NodeId leaf, const FacetPencil<D>& pencil, const Facet& facet, uint32_t& apex, FacetBall<D>& ball);
   void AddSimplex(const Corners& corners, int known_facet, double radius_sq, SimplexList<D>& out);
   void ToggleFacet(uint32_t place, Key key);
-  uint32_t OutputIndex(uint32_t place) const { return output_index_[Index(columns_.vertex(place))]; }
+  uint32_t PlaceOf(VertexId v);
+  const Point<D>& PointAt(uint32_t place) const { return places_[place].point; }
+  uint32_t OutputIndex(uint32_t place) const { return output_index_[Index(places_[place].vertex)]; }
 
   const QueryStructure<D>* structure_ = nullptr;
   std::span<const uint32_t> output_index_;
-  LeafColumns<D> columns_;
-  SiteColumns<D> near_;                 // to the vertex whose star is being closed
-  double near_radius_ = 0;              // all that are so near
-  double needed_radius_ = 0;            // so far for this star
+  const NeighbourTable* neighbours_ = nullptr;
+  std::vector<Place> places_;
+  std::vector<uint32_t> place_of_;      // by vertex; true of those whose place says so
+  SiteColumns<D> near_;                 // the neighbours of the vertex whose star is being closed
+  double near_radius_ = 0;              // no farther than this
   uint32_t own_count_ = 0;              // places below are of the block
   std::vector<uint32_t> first_at_;      // by own place: its open facets
   std::vector<uint8_t> has_simplices_;  // by own place
   std::vector<OpenFacet> open_;
   uint32_t unused_ = kNone;
   size_t open_count_ = 0;
-  // Of each simplex that the last cell has a node for, the places of the vertices but for its site.
-  std::vector<std::array<uint32_t, D>> cell_;
   Workspace<D> workspace_;
   QueryCounters counters_;
 };

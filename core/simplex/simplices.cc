@@ -147,11 +147,11 @@ absl::StatusOr<Simplices> JoinBlocks(size_t block_count, uint64_t held_bytes, in
   return all;
 }
 
-// What is held besides the simplices; of the scratch space, what every thread has for each node.
+// What is held besides the simplices; of the scratch space, what every thread has for each node, or for each vertex.
 template <int D>
-uint64_t HeldBytes(const QueryStructure<D>& structure, uint64_t array_bytes, int threads) {
-  return structure.MemoryBytes() + array_bytes +
-         static_cast<uint64_t>(threads) * structure.tree().node_count() * 2 * sizeof(uint32_t);
+uint64_t HeldBytes(const QueryStructure<D>& structure, std::span<const uint32_t> output_index, int threads) {
+  return structure.MemoryBytes() + output_index.size_bytes() +
+         static_cast<uint64_t>(threads) * (structure.tree().node_count() + structure.vertex_count()) * sizeof(uint32_t);
 }
 
 // Appends the simplices of the cell in `workspace` whose lowest vertex is its site `v` and whose other vertices are
@@ -184,31 +184,31 @@ void AppendCell(const QueryStructure<D>& structure, VertexId v, std::span<const 
   }
 }
 
-// The simplices of the cells of `order` whose vertices are all wanted.
-template <int D, typename IsWanted>
+// The simplices of the cells of `order`, each of which compute(VertexId, Workspace&) computes, whose vertices are all wanted.
+template <int D, typename Compute, typename IsWanted>
 absl::StatusOr<Simplices> JoinCells(const QueryStructure<D>& structure, std::span<const VertexId> order,
-                                    std::span<const uint32_t> output_index, IsWanted is_wanted, int threads,
-                                    RunContext& context) {
+                                    std::span<const uint32_t> output_index, Compute compute, IsWanted is_wanted,
+                                    uint64_t held_bytes, int threads, RunContext& context) {
   const auto append = [&](size_t block, Workspace<D>& workspace, SimplexList<D>& out) {
     const size_t begin = block * kCellsInBlock;
     for (const VertexId v : order.subspan(begin, std::min(kCellsInBlock, order.size() - begin))) {
       if (context.IsCancelled()) {
         return;
       }
-      structure.Voronoi(v, workspace);
+      compute(v, workspace);
       AppendCell<D>(structure, v, output_index, workspace, is_wanted, out);
     }
   };
   return JoinBlocks<D, Workspace<D>>((order.size() + kCellsInBlock - 1) / kCellsInBlock,
-                                     HeldBytes(structure, output_index.size_bytes() + order.size_bytes(), threads),
-                                     threads, context, append, [](const Workspace<D>&) { return uint64_t{0}; },
+                                     held_bytes + order.size_bytes(), threads, context, append,
+                                     [](const Workspace<D>&) { return uint64_t{0}; },
                                      [](const Workspace<D>& workspace) { return workspace.counters; });
 }
 
 // The simplices of all vertices by walks from facet to facet.
 template <int D>
-absl::StatusOr<Simplices> JoinWalks(const QueryStructure<D>& structure, std::span<const uint32_t> output_index,
-                                    int threads, RunContext& context) {
+absl::StatusOr<Simplices> JoinWalks(const QueryStructure<D>& structure, const NeighbourTable& neighbours,
+                                    std::span<const uint32_t> output_index, int threads, RunContext& context) {
   std::vector<NodeId> leaves;
   std::vector<size_t> block_begin{0};
   const size_t most = std::min(kWalkedInBlock<D>, structure.vertex_count() / kLeastBlocks);
@@ -227,12 +227,13 @@ absl::StatusOr<Simplices> JoinWalks(const QueryStructure<D>& structure, std::spa
   });
   block_begin.push_back(leaves.size());
   const auto append = [&](size_t block, FacetWalk<D>& walk, SimplexList<D>& out) {
-    walk.AppendStars(structure,
+    walk.AppendStars(structure, neighbours,
                      std::span(leaves).subspan(block_begin[block], block_begin[block + 1] - block_begin[block]),
                      output_index, context, out);
   };
   return JoinBlocks<D, FacetWalk<D>>(
-      block_begin.size() - 1, HeldBytes(structure, output_index.size_bytes() + leaves.size() * sizeof(NodeId), threads),
+      block_begin.size() - 1,
+      HeldBytes<D>(structure, output_index, threads) + neighbours.MemoryBytes() + leaves.size() * sizeof(NodeId),
       threads, context, append, [](const FacetWalk<D>& walk) { return walk.MemoryBytes(); },
       [](const FacetWalk<D>& walk) { return walk.counters(); });
 }
@@ -240,10 +241,12 @@ absl::StatusOr<Simplices> JoinWalks(const QueryStructure<D>& structure, std::spa
 }  // namespace
 
 template <int D>
-absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, std::span<const uint32_t> output_index,
-                                           int threads, RunContext& context) {
+absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, const NeighbourLists& neighbours,
+                                           std::span<const uint32_t> output_index, int threads, RunContext& context) {
+  WELLSPACE_ASSIGN_OR_RETURN(const NeighbourTable table,
+                             NeighbourTable::Of(neighbours, structure.vertex_count(), context));
   if constexpr (D <= 3) {
-    return JoinWalks<D>(structure, output_index, threads, context);
+    return JoinWalks<D>(structure, table, output_index, threads, context);
   } else {
     std::vector<VertexId> order;
     order.reserve(structure.vertex_count());
@@ -254,7 +257,10 @@ absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, s
       }
     });
     return JoinCells<D>(
-        structure, order, output_index, [](VertexId) { return true; }, threads, context);
+        structure, order, output_index,
+        [&](VertexId v, Workspace<D>& workspace) { structure.VoronoiAmong(v, table, workspace); },
+        [](VertexId) { return true; }, HeldBytes<D>(structure, output_index, threads) + table.MemoryBytes(), threads,
+        context);
   }
 }
 
@@ -289,12 +295,13 @@ absl::StatusOr<Simplices> ComputeSimplicesAmong(const QueryStructure<D>& structu
     is_among[Index(v)] = true;
   }
   return JoinCells<D>(
-      structure, vertices, output_index, [&](VertexId v) { return is_among[Index(v)]; }, threads, context);
+      structure, vertices, output_index, [&](VertexId v, Workspace<D>& workspace) { structure.Voronoi(v, workspace); },
+      [&](VertexId v) { return is_among[Index(v)]; }, HeldBytes<D>(structure, output_index, threads), threads, context);
 }
 
 #define WELLSPACE_INSTANTIATE(D)                                                                                   \
-  template absl::StatusOr<Simplices> ComputeSimplices<D>(const QueryStructure<D>&, std::span<const uint32_t>, int, \
-                                                         RunContext&);                                             \
+  template absl::StatusOr<Simplices> ComputeSimplices<D>(const QueryStructure<D>&, const NeighbourLists&,          \
+                                                         std::span<const uint32_t>, int, RunContext&);             \
   template absl::StatusOr<std::vector<VertexId>> ChangedVertices<D>(const QueryStructure<D>&, VertexId,            \
                                                                     const RunContext&);                            \
   template absl::StatusOr<Simplices> ComputeSimplicesAmong<D>(const QueryStructure<D>&, std::span<const VertexId>, \

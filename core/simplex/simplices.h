@@ -9,6 +9,7 @@
 
 #include "absl/status/statusor.h"
 #include "core/base/run_context.h"
+#include "core/voronoi/neighbour_lists.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {
@@ -34,8 +35,8 @@ struct Simplices {
 // Threads:    uses `threads`, at most as many as the machine has cores.
 // Source:     [HT08] §1 and §2; the walk is ours (docs/design/simplex.md).
 template <int D>
-absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, std::span<const uint32_t> output_index,
-                                           int threads, RunContext& context);
+absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, const NeighbourLists& neighbours,
+                                           std::span<const uint32_t> output_index, int threads, RunContext& context);
 
 // Those vertices whose stars an insertion of the vertices from `first_new` on can have changed: these, and all that now
 // share a simplex with one. (A vertex without a new neighbour has the cell that it had.) Ascending.

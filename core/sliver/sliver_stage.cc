@@ -131,15 +131,19 @@ class Follower final : public MendObserver {
 
   void StarChanged(VertexId v) override {
     triangulation_.Star(v, star_);
+    neighbours_.clear();
     double nearest_sq = std::numeric_limits<double>::infinity();
     for (const SimplexId s : star_) {
       for (const VertexId u : triangulation_.item(s).vertices) {
         if (u != v) {
           nearest_sq = std::min(nearest_sq, DistanceSq<3>(triangulation_.point(u), triangulation_.point(v)));
+          neighbours_.push_back(u);
         }
       }
     }
-    refinement_.CellChanged(v, nearest_sq);
+    std::sort(neighbours_.begin(), neighbours_.end());
+    neighbours_.erase(std::unique(neighbours_.begin(), neighbours_.end()), neighbours_.end());
+    refinement_.CellChanged(v, nearest_sq, neighbours_);
   }
 
   uint64_t MemoryBytes() const override { return structure_.MemoryBytes() + refinement_.MemoryBytes(); }
@@ -149,12 +153,14 @@ class Follower final : public MendObserver {
   QueryStructure<3>& structure_;
   Refinement<3>& refinement_;
   std::vector<SimplexId> star_;
+  std::vector<VertexId> neighbours_;
 };
 
 }  // namespace
 
 template <int D>
-absl::StatusOr<Triangulation<D>> SliverStage<D>::Triangulate(const QueryStructure<D>& structure, int threads,
+absl::StatusOr<Triangulation<D>> SliverStage<D>::Triangulate(const QueryStructure<D>& structure,
+                                                             const NeighbourLists& neighbours, int threads,
                                                              RunContext& context) {
   context.EnterPhase(Phase::kSimplices);
   const double no_time = 0;
@@ -162,7 +168,8 @@ absl::StatusOr<Triangulation<D>> SliverStage<D>::Triangulate(const QueryStructur
   // By the structure's own numbers, which do not depend on the order of the input.
   std::vector<uint32_t> identity(structure.vertex_count());
   std::iota(identity.begin(), identity.end(), uint32_t{0});
-  WELLSPACE_ASSIGN_OR_RETURN(Simplices simplices, ComputeSimplices<D>(structure, identity, threads, context));
+  WELLSPACE_ASSIGN_OR_RETURN(Simplices simplices,
+                             ComputeSimplices<D>(structure, neighbours, identity, threads, context));
   statistics_.star_queries.Add(simplices.counters);
   if (statistics_.min_angle_deg == 0) {
     statistics_.min_angle_deg = simplices.min_angle_deg;
@@ -187,13 +194,14 @@ absl::StatusOr<Triangulation<D>> SliverStage<D>::Triangulate(const QueryStructur
 
 // Adds the structure's new vertices to the triangulation, or makes it.
 template <int D>
-absl::Status SliverStage<D>::FollowStructure(const QueryStructure<D>& structure, int threads, RunContext& context) {
+absl::Status SliverStage<D>::FollowStructure(const QueryStructure<D>& structure, const NeighbourLists& neighbours,
+                                             int threads, RunContext& context) {
   const uint32_t count = structure.vertex_count();
   if (triangulation_.has_value() && (count - triangulation_->vertex_count()) > count / kFewNew) {
     triangulation_.reset();
   }
   if (!triangulation_.has_value()) {
-    WELLSPACE_ASSIGN_OR_RETURN(triangulation_, Triangulate(structure, threads, context));
+    WELLSPACE_ASSIGN_OR_RETURN(triangulation_, Triangulate(structure, neighbours, threads, context));
     return absl::OkStatus();
   }
   Workspace<D> workspace;
@@ -217,7 +225,7 @@ template <int E>
 absl::Status SliverStage<D>::Mend(QueryStructure<E>& structure, Refinement<E>& refinement, std::vector<bool>& is_fixed,
                                   const MendDemands& demands, int threads, RunContext& context) requires(E == 3) {
   const Stopwatch stopwatch(statistics_.seconds, statistics_.star_seconds);
-  WELLSPACE_RETURN_IF_ERROR(FollowStructure(structure, threads, context));
+  WELLSPACE_RETURN_IF_ERROR(FollowStructure(structure, refinement.neighbours(), threads, context));
   context.EnterPhase(Phase::kSlivers);
   Follower follower(*triangulation_, structure, refinement);
   Mender mender(*triangulation_, is_fixed, demands, follower);
@@ -231,6 +239,7 @@ absl::Status SliverStage<D>::Mend(QueryStructure<E>& structure, Refinement<E>& r
 
 template <int D>
 absl::StatusOr<WeightedSimplices> SliverStage<D>::ToSimplices(const QueryStructure<D>& structure,
+                                                              const NeighbourLists& neighbours,
                                                               std::span<const uint32_t> output_index, bool pump,
                                                               int threads, RunContext& context) {
   const Stopwatch stopwatch(statistics_.seconds, statistics_.star_seconds);
@@ -245,7 +254,7 @@ absl::StatusOr<WeightedSimplices> SliverStage<D>::ToSimplices(const QueryStructu
     if (triangulation_.has_value()) {
       pumped = std::exchange(triangulation_, std::nullopt);
     } else {
-      WELLSPACE_ASSIGN_OR_RETURN(pumped, Triangulate(structure, threads, context));
+      WELLSPACE_ASSIGN_OR_RETURN(pumped, Triangulate(structure, neighbours, threads, context));
     }
     context.EnterPhase(Phase::kSlivers);
     WELLSPACE_ASSIGN_OR_RETURN(statistics_.weighted, PumpWeights<D>(*pumped, context));

@@ -466,6 +466,22 @@ bool Polytope<D>::KeepsRatio(double ratio) const {
   return true;
 }
 
+template <int D>
+void Polytope<D>::Neighbours(std::vector<VertexId>& out) {
+  bounds_.assign(planes_.size(), 0);
+  for (size_t i = 0; i < columns_.count(); ++i) {
+    for (const uint16_t index : joints_[i].planes) {
+      bounds_[index] = 1;
+    }
+  }
+  out.clear();
+  for (size_t i = 0; i < planes_.size(); ++i) {
+    if (bounds_[i] != 0 && planes_[i].kind == PlaneKind::kBisector) {
+      out.push_back(planes_[i].vertex);
+    }
+  }
+}
+
 // As in Cut, with the largest slack.
 template <int D>
 void Polytope<D>::Foretell(CandidateColumns<D>& candidates) const {

@@ -158,6 +158,12 @@ class Polytope {
   // Whether the last cut has made the cell larger than it may be.
   bool IsTooLarge() const { return columns_.count() > kMostNodes || planes_.size() > kMostPlanes; }
 
+  // Puts the vertices whose bisectors bound the cell into `out`, in the order of the planes. The nodes need not be placed.
+  //
+  // Complexity: O(nodes + planes); no allocation once warm.
+  // Errors:     none.
+  void Neighbours(std::vector<VertexId>& out);
+
   // The faces of the box that a node of the cell lies on.
   FaceMask FacesOf(const CellNode<D>& node) const {
     FaceMask faces = 0;
@@ -251,9 +257,10 @@ class Polytope {
   size_t removed_count_ = 0;
   std::vector<CutEdge> cut_edges_;
   size_t cut_count_ = 0;
-  std::vector<Index> new_;      // the nodes on them
-  std::vector<uint32_t> ends_;  // by the plane that an edge runs along, all 0 between cuts; D = 3
-  std::vector<Ridge> ridges_;   // D > 3
+  std::vector<Index> new_;       // the nodes on them
+  std::vector<uint32_t> ends_;   // by the plane that an edge runs along, all 0 between cuts; D = 3
+  std::vector<Ridge> ridges_;    // D > 3
+  std::vector<uint8_t> bounds_;  // by plane, in Neighbours
 };
 
 }  // namespace wellspace::core

@@ -198,8 +198,9 @@ void QueryStructure<D>::ClipAndScan(const Point<D>& site, VertexId v, NodeId own
   Scan(v, own, workspace);
 }
 
+// Begins with walls one side of the box beyond it.
 template <int D>
-void QueryStructure<D>::Voronoi(VertexId v, Workspace<D>& workspace) const {
+void QueryStructure<D>::BeginWhole(VertexId v, Workspace<D>& workspace) const {
   const double side = box_.LongestSide();
   Box<D> bounds = box_;
   for (int i = 0; i < D; ++i) {
@@ -209,7 +210,32 @@ void QueryStructure<D>::Voronoi(VertexId v, Workspace<D>& workspace) const {
   std::array<PlaneKind, 2 * D> kinds;
   kinds.fill(PlaneKind::kClip);
   workspace.cell.Reset(point(v), bounds, kinds, TieRule::kPerturb);
+}
+
+template <int D>
+void QueryStructure<D>::Voronoi(VertexId v, Workspace<D>& workspace) const {
+  BeginWhole(v, workspace);
   Scan(v, tree_.leaf_of(v), workspace);
+  workspace.cell.Place();
+}
+
+template <int D>
+void QueryStructure<D>::VoronoiAmong(VertexId v, const NeighbourTable& neighbours, Workspace<D>& workspace) const {
+  BeginWhole(v, workspace);
+  auto& by_distance = workspace.by_distance;
+  by_distance.clear();
+  neighbours.ForEachAt(v, [&](VertexId u) { by_distance.emplace_back(DistanceSq<D>(point(u), point(v)), u); });
+  ++workspace.counters.queries;
+  workspace.counters.vertices += by_distance.size();
+  std::sort(by_distance.begin(), by_distance.end());
+  by_distance.erase(std::unique(by_distance.begin(), by_distance.end()), by_distance.end());
+  for (const auto& [distance_sq, u] : by_distance) {
+    if (workspace.cell.IsTooLarge()) {
+      break;
+    }
+    workspace.cell.CutBeforePlace(u, point(u));
+  }
+  CountCuts(workspace);
   workspace.cell.Place();
 }
 
@@ -221,6 +247,11 @@ void QueryStructure<D>::Scan(VertexId v, NodeId own, Workspace<D>& workspace) co
       [&] { return workspace.cell.IsTooLarge() ? -1 : workspace.cell.CutLimitSq(); },
       [&](NodeId leaf) { return workspace.cell.Reaches(tree_.BoxOf(leaf)); },
       [&](NodeId leaf) { CutByLeaf(v, leaf, workspace); });
+  CountCuts(workspace);
+}
+
+template <int D>
+void QueryStructure<D>::CountCuts(Workspace<D>& workspace) {
   workspace.counters.cuts += workspace.cell.cuts();
   workspace.counters.decisions.exact += workspace.cell.counters().exact;
   workspace.counters.decisions.perturbed += workspace.cell.counters().perturbed;

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -15,6 +16,7 @@
 #include "core/tree/leaf_tree.h"
 #include "core/voronoi/lanes.h"
 #include "core/voronoi/nearness.h"
+#include "core/voronoi/neighbour_lists.h"
 #include "core/voronoi/node_columns.h"
 #include "core/voronoi/polytope.h"
 
@@ -48,6 +50,7 @@ struct Workspace {
     uint32_t candidate[CandidateColumns<D>::kCapacity];
     uint32_t order[CandidateColumns<D>::kCapacity];  // the nearest first
   } may_cut;
+  std::vector<std::pair<double, VertexId>> by_distance;
 };
 
 struct Neighbor {
@@ -128,6 +131,11 @@ class QueryStructure {
   // Source:     [HT08] §1, "the entire Voronoi cell of any vertex".
   void Voronoi(VertexId v, Workspace<D>& workspace) const;
 
+  // The same from a table of all neighbours, without looking for them.
+  //
+  // Complexity: O(entries at v).
+  void VoronoiAmong(VertexId v, const NeighbourTable& neighbours, Workspace<D>& workspace) const;
+
   // Adds a vertex at `p`, near `near`; kNoVertex if none is known.
   //
   // REQUIRES:   p in the box and different from all vertices.
@@ -164,7 +172,9 @@ class QueryStructure {
   void ClipAndScan(const Point<D>& site, VertexId v, NodeId own, double radius, TieRule rule,
                    Workspace<D>& workspace) const;
   void Scan(VertexId v, NodeId own, Workspace<D>& workspace) const;
+  void BeginWhole(VertexId v, Workspace<D>& workspace) const;
   void CutByLeaf(VertexId v, NodeId leaf, Workspace<D>& workspace) const;
+  static void CountCuts(Workspace<D>& workspace);
 
   Box<D> box_;
   LeafTree<D> tree_;

@@ -75,13 +75,12 @@ SimplexSet<D> SetOfCells(const QueryStructure<D>& structure, const std::vector<u
 }
 
 template <int D>
-QueryStructure<D> MakeRefined(std::string_view kind, size_t n) {
-  QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, n));
+NeighbourLists Refine(QueryStructure<D>& structure) {
   RunContext context;
   Refinement<D> refinement(structure, 0x1p-48);
-  const absl::Status refined = refinement.Run({.rho = D == 2 ? std::sqrt(2.0) : 2.0}, 1'000'000, 1, context);
+  const absl::Status refined = refinement.Run({.rho = std::sqrt(1 << (D - 1))}, 1'000'000, 1, context);
   EXPECT_TRUE(refined.ok()) << refined;
-  return structure;
+  return refinement.neighbours();
 }
 
 // Any permutation serves.
@@ -97,10 +96,11 @@ std::vector<uint32_t> MakeOutputIndex(uint32_t count) {
 
 template <int D>
 void ExpectSimplicesOfCells(std::string_view kind, size_t n) {
-  const QueryStructure<D> structure = MakeRefined<D>(kind, n);
+  QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, n));
+  const NeighbourLists neighbours = Refine<D>(structure);
   const std::vector<uint32_t> output_index = MakeOutputIndex(structure.vertex_count());
   RunContext context;
-  const absl::StatusOr<Simplices> simplices = ComputeSimplices<D>(structure, output_index, 1, context);
+  const absl::StatusOr<Simplices> simplices = ComputeSimplices<D>(structure, neighbours, output_index, 1, context);
   ASSERT_TRUE(simplices.ok()) << simplices.status();
   const SimplexSet<D> set = SetOf<D>(*simplices);
   EXPECT_EQ(set, SetOfCells<D>(structure, output_index));
@@ -129,7 +129,7 @@ void ExpectSimplicesOfCells(std::string_view kind, size_t n) {
   EXPECT_EQ(simplices->max_radius_edge, max_radius_edge);
   EXPECT_EQ(simplices->min_angle_deg, min_angle_deg);
 
-  const absl::StatusOr<Simplices> again = ComputeSimplices<D>(structure, output_index, 2, context);
+  const absl::StatusOr<Simplices> again = ComputeSimplices<D>(structure, neighbours, output_index, 2, context);
   ASSERT_TRUE(again.ok()) << again.status();
   EXPECT_EQ(again->indices, simplices->indices);
   EXPECT_EQ(again->max_radius_edge, simplices->max_radius_edge);
@@ -163,10 +163,15 @@ TEST(Simplices, BlocksAgree) {
   ExpectSimplicesOfCells<3>("uniform", 2'000);
 }
 
-// Around large stars there are too many small leaves to be looked at one by one.
-TEST(Simplices, CellsTellTheApexesWhereSizesVary) {
+// Large stars beside small ones.
+TEST(Simplices, StarsAgreeWhereSizesVary) {
   ExpectSimplicesOfCells<2>("lines", 2'000);
   ExpectSimplicesOfCells<3>("skew", 1'000);
+}
+
+TEST(Simplices, CellsByNeighboursAreThoseOfAllVertices) {
+  ExpectSimplicesOfCells<4>("uniform", 60);
+  ExpectSimplicesOfCells<4>("grid", 16);
 }
 
 class FacetPencilTest : public test::SeededTest {
