@@ -8,17 +8,21 @@
 #include <cmath>
 #include <cstdint>
 #include <numeric>
+#include <set>
 #include <string>
 #include <string_view>
 #include <tuple>
 #include <utility>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "core/refine/refine.h"
 #include "core/simplex/facet_pencil.h"
 #include "core/simplex/quality.h"
 #include "core/simplex/site_columns.h"
 #include "core/simplex/validate.h"
+#include "core/sliver/mend.h"
+#include "core/sliver/sliver_stage.h"
 #include "tests/support/brute_force.h"
 #include "tests/support/clouds.h"
 #include "tests/support/seeded_test.h"
@@ -172,6 +176,118 @@ TEST(Simplices, StarsAgreeWhereSizesVary) {
 TEST(Simplices, CellsByNeighboursAreThoseOfAllVertices) {
   ExpectSimplicesOfCells<4>("uniform", 60);
   ExpectSimplicesOfCells<4>("grid", 16);
+}
+
+// Refinements that stop, or are told of vertices, on the way to their end.
+class NeighboursOfRefinementTest : public test::SeededTest {
+ protected:
+  NeighboursOfRefinementTest() : SeededTest(47) {}
+
+  template <int D>
+  static absl::Status Run(Refinement<D>& refinement, RunContext& context,
+                          const RefinementObserver<D>& observer = nullptr) {
+    const int threads = 2;
+    return refinement.Run({.rho = std::sqrt(1 << (D - 1))}, 1'000'000, threads, context, observer);
+  }
+
+  // All neighbours of every whole cell are in the table, and the simplices are those of the cells.
+  template <int D>
+  static void ExpectAllAreListed(const QueryStructure<D>& structure, const NeighbourLists& lists) {
+    RunContext context;
+    const absl::StatusOr<NeighbourTable> table = NeighbourTable::Of(lists, structure.vertex_count(), context);
+    ASSERT_TRUE(table.ok()) << table.status();
+    // The walk wants them all: without, it may not end.
+    Workspace<D> workspace;
+    std::vector<VertexId> neighbours;
+    for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
+      structure.Voronoi(VertexId{v}, workspace);
+      workspace.cell.Neighbours(neighbours);
+      std::set<VertexId> listed;
+      table->ForEachAt(VertexId{v}, [&](VertexId u) { listed.insert(u); });
+      for (const VertexId u : neighbours) {
+        ASSERT_EQ(listed.count(u), 1u) << Index(u) << " at " << v << " of " << structure.vertex_count();
+      }
+    }
+    const std::vector<uint32_t> output_index = MakeOutputIndex(structure.vertex_count());
+    const absl::StatusOr<Simplices> simplices = ComputeSimplices<D>(structure, lists, output_index, 1, context);
+    ASSERT_TRUE(simplices.ok()) << simplices.status();
+    EXPECT_EQ(SetOf<D>(*simplices), SetOfCells<D>(structure, output_index));
+  }
+
+  template <int D>
+  void ExpectAllAreListedAfterVerticesWereAdded(std::string_view kind) {
+    QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, D == 2 ? 200 : 60));
+    Refinement<D> refinement(structure, 0x1p-48);
+    RunContext context;
+    ASSERT_TRUE(Run<D>(refinement, context).ok());
+    for (int round = 0; round < 3; ++round) {
+      // One in the interior after the other, closer and closer to a first.
+      Point<D> p;
+      for (double& x : p) {
+        x = 0.1 + 0.8 * random_.Unit();
+      }
+      for (int i = 0; i < 8; ++i) {
+        refinement.VertexAdded(structure.AddVertex(kNoVertex, p));
+        p[i % D] += std::ldexp(0.1 + random_.Unit(), -4 - i);
+      }
+      ASSERT_TRUE(Run<D>(refinement, context).ok());
+      ExpectAllAreListed<D>(structure, refinement.neighbours());
+    }
+  }
+
+  template <int D>
+  void ExpectAllAreListedAfterStops(std::string_view kind) {
+    QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, D == 2 ? 300 : 80));
+    Refinement<D> refinement(structure, 0x1p-48);
+    absl::Status status = absl::CancelledError();
+    int stops = 0;
+    for (; absl::IsCancelled(status); ++stops) {
+      RunContext context;
+      uint64_t left = 1 + random_.Below(40);
+      status = Run<D>(refinement, context, [&](const QueryStructure<D>&, const Insertion&) {
+        if (--left == 0) {
+          context.Cancel();
+        }
+      });
+    }
+    ASSERT_TRUE(status.ok()) << status;
+    EXPECT_GT(stops, 3);
+    ExpectAllAreListed<D>(structure, refinement.neighbours());
+  }
+};
+
+// Moved vertices have other neighbours than the refinement has seen; vertices that are added afterwards find them listed.
+TEST_F(NeighboursOfRefinementTest, AreListedAfterVerticesWereMoved) {
+  constexpr double kMinEdge = 0x1p-48;
+  QueryStructure<3> structure = MakeStructure<3>(test::SortedCloud<3>("uniform", 100));
+  Refinement<3> refinement(structure, kMinEdge);
+  std::vector<bool> is_fixed(structure.vertex_count(), true);
+  RunContext context;
+  ASSERT_TRUE(Run<3>(refinement, context).ok());
+  is_fixed.resize(structure.vertex_count(), false);
+  SliverStage<3> stage;
+  const MendDemands demands{{.rho = 2}, 15, kMinEdge, 1'000'000};
+  const absl::Status mended = stage.Mend(structure, refinement, is_fixed, demands, 1, context);
+  ASSERT_TRUE(mended.ok()) << mended;
+  EXPECT_GT(stage.statistics().moves, 0u);
+  ExpectAllAreListed<3>(structure, refinement.neighbours());
+  refinement.VertexAdded(structure.AddVertex(kNoVertex, {0.3, 0.4, 0.6}));
+  ASSERT_TRUE(Run<3>(refinement, context).ok());
+  ExpectAllAreListed<3>(structure, refinement.neighbours());
+}
+
+TEST_F(NeighboursOfRefinementTest, AreListedAfterVerticesWereAdded) {
+  for (const std::string_view kind : {"uniform", "grid"}) {
+    ExpectAllAreListedAfterVerticesWereAdded<2>(kind);
+    ExpectAllAreListedAfterVerticesWereAdded<3>(kind);
+  }
+}
+
+TEST_F(NeighboursOfRefinementTest, AreListedAfterStops) {
+  for (const std::string_view kind : {"uniform", "lines"}) {
+    ExpectAllAreListedAfterStops<2>(kind);
+    ExpectAllAreListedAfterStops<3>(kind);
+  }
 }
 
 class FacetPencilTest : public test::SeededTest {

@@ -263,6 +263,32 @@ TEST(SliverSessionTest, AnEditedMeshIsMendedAgain) {
   EXPECT_TRUE(Validate(parameters, *mesh, cloud).ok()) << Validate(parameters, *mesh, cloud);
 }
 
+// Moved vertices have other neighbours than the refinement has seen.
+TEST_P(SliverTest, AMendedMeshIsFoundAgainFromFacetToFacet) {
+  MeshParameters parameters = InUnitBox(3, 15);
+  RunContext context;
+  auto mesher = Mesher::Create(parameters, cloud_, context);
+  ASSERT_TRUE(mesher.ok()) << mesher.status();
+  ASSERT_TRUE((*mesher)->Refine(parameters, context).ok());
+  const absl::StatusOr<Mesh> mended = (*mesher)->Extract(1, context);
+  ASSERT_TRUE(mended.ok()) << mended.status();
+  EXPECT_TRUE(cloud_.size() < 600 || mended->statistics.sliver_moves > 0);
+  // What mending kept goes, and the same demands ask for nothing.
+  parameters.min_dihedral = 0;
+  ASSERT_TRUE((*mesher)->Refine(parameters, context).ok());
+  const absl::StatusOr<Mesh> again = (*mesher)->Extract(1, context);
+  ASSERT_TRUE(again.ok()) << again.status();
+  EXPECT_EQ(test::Canonical(*again), test::Canonical(*mended));
+  EXPECT_TRUE(Validate(parameters, *again, cloud_).ok()) << Validate(parameters, *again, cloud_);
+  EXPECT_GE(again->statistics.stars_computed, mended->statistics.stars_computed + again->vertex_count());
+
+  ASSERT_TRUE((*mesher)->AddPoints(test::MakeCloud("uniform", 3, 40), context).ok());
+  ASSERT_TRUE((*mesher)->Refine(parameters, context).ok());
+  const absl::StatusOr<Mesh> more = (*mesher)->Extract(1, context);
+  ASSERT_TRUE(more.ok()) << more.status();
+  EXPECT_TRUE(Validate(parameters, *more, cloud_).ok()) << Validate(parameters, *more, cloud_);
+}
+
 // Lends memory, but at the n-th time it is asked in the phase of slivers: then it refuses, or cancels the run.
 class LenderWithATurn final : public MemoryLender {
  public:
