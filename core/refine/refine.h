@@ -85,11 +85,11 @@ class Refinement {
   uint64_t MemoryBytes() const;
 
   // Tells that the cell of `v`, which may be new, has changed, but is as the demands of the last run say; `nearest_sq` is
-  // at most the squared distance to its nearest neighbour. What is remembered of the cell is forgotten: an insertion
-  // nearby has v looked at again in any case that could matter.
+  // at most the squared distance to its nearest neighbour, `neighbours` are all that it has now, which are listed. What is
+  // remembered of the cell is forgotten: an insertion nearby has v looked at again in any case that could matter.
   //
-  // REQUIRES:   the last run was for the end.
-  // Complexity: O(1).
+  // REQUIRES:   the last run was for the end; every vertex whose neighbours have changed is told of.
+  // Complexity: O(neighbours), amortised.
   void CellChanged(VertexId v, double nearest_sq, std::span<const VertexId> neighbours);
 
   // The neighbours of all vertices, when the last run was for the end.

@@ -33,9 +33,11 @@ class FacetWalk {
   // is cancelled.
   //
   // Shapes:     output_index: by vertex.
-  // REQUIRES:   `structure` refined: no circumcentre outside the box.
+  // REQUIRES:   `structure` refined: no circumcentre outside the box; `neighbours` made of the lists of the refinement that has refined it. Where one
+  //             is missing the walk may abort or not end.
   // Guarantees: (1) the simplices that have a corner in `leaves` are those of the vertices' whole cells (QueryStructure::Voronoi).
-  // Complexity: O(1) for each of their vertices.
+  // Complexity: O(f e) for each vertex of the block, with f facets and e entries of the table: O(1) in a refined structure. A scan for the first star
+  //             of what hangs together.
   // Errors:     none.
   // Source:     gift wrapping (Chand and Kapur 1970) in Delaunay triangulations: McLain 1976; with a stop by cells: Maus 1984.
   void AppendStars(const QueryStructure<D>& structure, const NeighbourTable& neighbours, std::span<const NodeId> leaves,

@@ -24,13 +24,15 @@ struct Simplices {
 
 // Each simplex once, emitted by the block of its vertex with the lowest output index; blocks are stretches of the Z curve of the tree, which
 // threads share out. In 2-D and 3-D a block is walked through from facet to facet (FacetWalk); from 4-D on every vertex's whole Voronoi cell
-// is computed, each of whose nodes is a simplex.
+// is cut out by its neighbours, and each of its nodes is a simplex.
 //
 // Shapes:     output_index: vertex_count entries, a permutation: the index in the output of each vertex.
-// REQUIRES:   `structure` refined: no circumcentre outside the box.
+// REQUIRES:   `structure` refined: no circumcentre outside the box; `neighbours` those of the refinement that has refined it, which has been told of
+//             all vertices added or moved since.
 // Guarantees: (1) a Delaunay triangulation of the vertices that decomposes the box; (2) the same order for any number
 //             of threads.
-// Complexity: O(m) for m vertices.
+// Complexity: O(m) for m vertices in a refined structure: what is listed, and what the simplices at each vertex take among it; no leaf is looked at
+//             but for the first star of a walk.
 // Errors:     RESOURCE_EXHAUSTED of the context's memory; CANCELLED, DEADLINE_EXCEEDED.
 // Threads:    uses `threads`, at most as many as the machine has cores.
 // Source:     [HT08] §1 and §2; the walk is ours (docs/design/simplex.md).
