@@ -427,63 +427,96 @@ struct Sample {
   double error = 0;
 };
 
-void Add(Share& sum, const Share& share) {
-  for (int k = 0; k < kTerms; ++k) {
-    sum.terms[k] += share.terms[k];
+// Leaves that are alike, of which some are drawn without replacement, and what these tell of all.
+struct Stratum {
+  std::vector<NodeId> leaves;  // the first `taken` have been looked at
+  size_t taken = 0;
+  Share sum;
+  Leaves become;
+  double vertices = 0;
+  double vertices_sq = 0;
+
+  double Factor() const { return taken == 0 ? 0.0 : static_cast<double>(leaves.size()) / static_cast<double>(taken); }
+  // Of the vertices of all; infinite before any has been looked at.
+  double VarianceOfSum() const {
+    const auto count = static_cast<double>(leaves.size());
+    const auto k = static_cast<double>(taken);
+    if (taken == leaves.size()) {
+      return 0;
+    }
+    const double mean = vertices / k;
+    return taken == 0 ? kInfinity : count * count * std::max(0.0, vertices_sq / k - mean * mean) * (1 - k / count) / k;
   }
-  sum.sizes += share.sizes;
+};
+
+void Add(Share& sum, const Share& share, double factor = 1) {
+  for (int k = 0; k < kTerms; ++k) {
+    sum.terms[k] += factor * share.terms[k];
+  }
+  sum.sizes += factor * share.sizes;
 }
 
-// Draws leaves without replacement.
+// Leaves looked at between two looks at the error.
+constexpr size_t kLeavesTogether = 64;
+
+// Draws leaves without replacement: from those with vertices and those without, as there may be few of the former and nearly
+// all new vertices in them.
 template <int D>
 absl::StatusOr<Sample> SampleLeaves(const QueryStructure<D>& structure, Integrator<D>& integrator,
                                     const EstimateEffort& effort, const RunContext& context) {
-  std::vector<NodeId> leaves;
-  leaves.reserve(structure.tree().leaf_count());
-  structure.tree().ForEachLeaf([&](NodeId leaf) { leaves.push_back(leaf); });
-  const size_t count = leaves.size();
-  const uint64_t full_looks = std::max(effort.looks_per_leaf, effort.looks / count);
+  std::array<Stratum, 2> strata;
+  structure.tree().ForEachLeaf([&](NodeId leaf) {
+    const auto* const bucket = structure.tree().BucketOf(leaf);
+    strata[bucket != nullptr && bucket->count > 0 ? 1 : 0].leaves.push_back(leaf);
+  });
+  const uint64_t full_looks =
+      std::max(effort.looks_per_leaf, effort.looks / (strata[0].leaves.size() + strata[1].leaves.size()));
   Draws draws;
-
   Sample sample;
-  double sum = 0;
-  double sum_sq = 0;
-  size_t taken = 0;
-  while (taken < count) {
-    WELLSPACE_RETURN_IF_ERROR(context.Check());
-    const size_t rest = count - taken;
-    std::swap(leaves[taken],
-              leaves[taken + std::min(rest - 1, static_cast<size_t>(draws.Next() * static_cast<double>(rest)))]);
-    const Share share = integrator.IntegrateLeaf(structure.tree().BoxOf(leaves[taken]), full_looks);
-    Add(sample.sum, share);
-    const double vertices = Sum(integrator.VerticesOf(share.terms)) + share.sizes;
-    const auto* const bucket = structure.tree().BucketOf(leaves[taken]);
-    const double at_first = bucket == nullptr ? 0.0 : bucket->count;
-    const Leaves become = LeavesOf<D>(at_first + vertices, at_first);
-    sample.leaves.all += become.all;
-    sample.leaves.filled += become.filled;
-    sum += vertices;
-    sum_sq += vertices * vertices;
-    ++taken;
-    if (taken >= effort.least_leaves && taken % 64 == 0 && taken < count) {
-      const double k = static_cast<double>(taken);
-      const double mean = sum / k;
-      const double variance = std::max(0.0, sum_sq / k - mean * mean) * (1 - k / static_cast<double>(count));
-      sample.error = static_cast<double>(count) * std::sqrt(variance / k);
-      const double total = structure.vertex_count() + static_cast<double>(count) * mean;
-      if (sample.error <= effort.sampling_error * total) {
-        break;
+  while (true) {
+    double variance = 0;
+    double total = structure.vertex_count();
+    Stratum* widest = nullptr;
+    double widest_variance = 0;
+    for (Stratum& stratum : strata) {
+      const bool is_whole = stratum.taken == stratum.leaves.size();
+      const double own = is_whole ? 0 : stratum.taken < effort.least_leaves ? kInfinity : stratum.VarianceOfSum();
+      variance += own;
+      total += stratum.Factor() * stratum.vertices;
+      if (own > widest_variance) {
+        widest = &stratum;
+        widest_variance = own;
       }
     }
+    sample.error = std::sqrt(variance);
+    if (widest == nullptr || sample.error <= effort.sampling_error * total) {
+      break;
+    }
+    const size_t end = std::min(widest->leaves.size(), widest->taken + kLeavesTogether);
+    for (; widest->taken < end; ++widest->taken) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+      const size_t rest = widest->leaves.size() - widest->taken;
+      NodeId& leaf = widest->leaves[widest->taken];
+      std::swap(leaf,
+                widest->leaves[widest->taken +
+                               std::min(rest - 1, static_cast<size_t>(draws.Next() * static_cast<double>(rest)))]);
+      const Share share = integrator.IntegrateLeaf(structure.tree().BoxOf(leaf), full_looks);
+      Add(widest->sum, share);
+      const double vertices = Sum(integrator.VerticesOf(share.terms)) + share.sizes;
+      const auto* const bucket = structure.tree().BucketOf(leaf);
+      const double at_first = bucket == nullptr ? 0.0 : bucket->count;
+      const Leaves become = LeavesOf<D>(at_first + vertices, at_first);
+      widest->become.all += become.all;
+      widest->become.filled += become.filled;
+      widest->vertices += vertices;
+      widest->vertices_sq += vertices * vertices;
+    }
   }
-  const double factor = static_cast<double>(count) / static_cast<double>(taken);
-  for (double& term : sample.sum.terms) {
-    term *= factor;
+  for (const Stratum& stratum : strata) {
+    Add(sample.sum, stratum.sum, stratum.Factor());
+    sample.leaves.all += stratum.Factor() * stratum.become.all;
+    sample.leaves.filled += stratum.Factor() * stratum.become.filled;
   }
-  sample.sum.sizes *= factor;
-  sample.leaves.all *= factor;
-  sample.leaves.filled *= factor;
-  sample.error = taken == count ? 0.0 : sample.error;
   return sample;
 }
 

@@ -82,9 +82,6 @@ absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices
   uint64_t improved = 0;
   while (schedule_.Pop(v, bucket)) {
     absl::Status status = context.Check();
-    if (neighbours_.IsFull()) {
-      status = absl::ResourceExhaustedError("the mesh has more edges than can be numbered, 2^32");
-    }
     if (status.ok()) {
       status = Improve(v, bucket);
     }

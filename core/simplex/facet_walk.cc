@@ -110,6 +110,10 @@ void FacetWalk<D>::Begin(const QueryStructure<D>& structure, const NeighbourTabl
     }
   }
   own_count_ = static_cast<uint32_t>(places_.size());
+  facets_left_ = 0;
+  for (const Place& own : places_) {
+    facets_left_ += D * neighbours.CountAt(own.vertex);
+  }
   first_at_.assign(own_count_, kNone);
   has_simplices_.assign(own_count_, 0);
   open_.clear();
@@ -138,6 +142,9 @@ void FacetWalk<D>::CloseFacetsAt(uint32_t place, SimplexList<D>& out) {
     open_[at].next = unused_;
     unused_ = at;
     --open_count_;
+    if (facets_left_-- == 0) {
+      std::abort();  // a walk among all neighbours ends
+    }
     const Facet facet{place, OthersOf(key), IsFlipped(key)};
     FacetBall<D> ball = FacetBall<D>::Everything();
     const uint32_t apex = FindApex(facet, ball);

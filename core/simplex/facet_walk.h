@@ -34,7 +34,7 @@ class FacetWalk {
   //
   // Shapes:     output_index: by vertex.
   // REQUIRES:   `structure` refined: no circumcentre outside the box; `neighbours` made of the lists of the refinement that has refined it. Where one
-  //             is missing the walk may abort or not end.
+  //             is missing the walk may abort.
   // Guarantees: (1) the simplices that have a corner in `leaves` are those of the vertices' whole cells (QueryStructure::Voronoi).
   // Complexity: O(f e) for each vertex of the block, with f facets and e entries of the table: O(1) in a refined structure. A scan for the first star
   //             of what hangs together.
@@ -109,6 +109,7 @@ class FacetWalk {
   std::vector<OpenFacet> open_;
   uint32_t unused_ = kNone;
   size_t open_count_ = 0;
+  size_t facets_left_ = 0;  // more than the simplices at the block's vertices, less those found beyond a facet
   Workspace<D> workspace_;
   QueryCounters counters_;
 };

@@ -41,7 +41,7 @@ class LeafTree {
   // A leaf beyond a face is one, or 2^(D - 1) half as large.
   static constexpr int kMostFaceNeighbours = D * kChildren;
   // In 5-D and 6-D a vertex has hundreds of neighbours and a node 32 or 64 children: fewer, larger leaves serve better.
-  static constexpr int kLeafCapacity = D <= 3 ? 32 : D == 4 ? 64 : 16 << D;
+  static constexpr int kLeafCapacity = D == 2 ? 48 : D == 3 ? 32 : D == 4 ? 64 : 16 << D;
   // A leaf may be this many times larger than lfs on it. At least 2, so that the neighbours of a leaf hold all that is
   // near it.
   static constexpr double kCoarseness = D <= 4 ? 128 : 1024;

@@ -9,11 +9,14 @@
 namespace wellspace::core {
 
 void NeighbourLists::Set(VertexId v, std::span<const VertexId> neighbours) {
-  const size_t end = ids_.size();
-  if (end + 1 + neighbours.size() >= kNone) {
-    is_full_ = true;
+  if (ids_.size() + 1 + neighbours.size() >= kNone) {
+    DropUnused();
+    is_full_ = is_full_ || ids_.size() + 1 + neighbours.size() >= kNone;
+  }
+  if (is_full_) {
     return;
   }
+  const size_t end = ids_.size();
   if (Index(v) >= begin_.size()) {
     begin_.resize(size_t{Index(v)} + 1, kNone);
   }
@@ -67,6 +70,9 @@ void NeighbourLists::Clear() {
 
 absl::StatusOr<NeighbourTable> NeighbourTable::Of(const NeighbourLists& lists, uint32_t vertex_count,
                                                   const RunContext& context) {
+  if (lists.IsFull()) {
+    return absl::ResourceExhaustedError("the mesh has more edges than can be numbered, 2^32");
+  }
   NeighbourTable table(lists);
   // First how many list each; then, from the last vertex to the first, where those of each begin.
   std::vector<uint32_t>& begin = table.begin_;

@@ -67,7 +67,7 @@ class NeighbourTable {
   //
   // REQUIRES:   all of the `vertex_count` vertices are listed.
   // Complexity: O(entries).
-  // Errors:     CANCELLED, DEADLINE_EXCEEDED.
+  // Errors:     RESOURCE_EXHAUSTED if the lists are full; CANCELLED, DEADLINE_EXCEEDED.
   static absl::StatusOr<NeighbourTable> Of(const NeighbourLists& lists, uint32_t vertex_count,
                                            const RunContext& context);
 
@@ -81,6 +81,9 @@ class NeighbourTable {
       f(listed_by_[i]);
     }
   }
+
+  // For how many it calls f.
+  size_t CountAt(VertexId v) const { return lists_->Of(v).size() + (begin_[Index(v) + 1] - begin_[Index(v)]); }
 
   // Together with the lists.
   uint64_t MemoryBytes() const {
