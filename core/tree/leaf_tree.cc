@@ -79,6 +79,9 @@ absl::Status LeafTree<D>::Build(const Box<D>& box, std::span<const Point<D>> poi
   pending_ = {};
   near_ = {};
   visited_ = {};
+  seen_in_ = {};
+  rims_ = {};
+  rim_points_ = {};
   return absl::OkStatus();
 }
 
@@ -291,25 +294,56 @@ bool LeafTree<D>::IsTooCoarse(NodeId leaf) {
   const double reach = side / kCoarseness;
   near_.clear();
   visited_.assign(1, leaf);
+  seen_in_.resize(nodes_.size(), 0);
+  seen_in_[Index(leaf)] = ++look_;
   for (size_t i = 0; i < visited_.size(); ++i) {
     const NodeId at = visited_[i];
     const Range range = ranges_[Index(at)];
     if (range.size() > kLeafCapacity) {
       return true;  // it is half as large and will be split again, so that balance asks for this leaf to be split
     }
-    for (uint32_t v = range.begin; v < range.end; ++v) {
-      if (DistanceSq<D>(points_[v], cube) <= reach * reach) {
-        near_.push_back(points_[v]);
+    if (at == leaf) {
+      near_.assign(points_.begin() + range.begin, points_.begin() + range.end);
+    } else {
+      for (const Point<D>& p : RimOf(at)) {
+        if (DistanceSq<D>(p, cube) <= reach * reach) {
+          near_.push_back(p);
+        }
       }
     }
     ForEachFaceNeighbour(at, [&](NodeId beyond) {
-      if (DistanceSq<D>(BoxOf(beyond), cube) <= reach * reach &&
-          std::find(visited_.begin(), visited_.end(), beyond) == visited_.end()) {
-        visited_.push_back(beyond);
+      if (seen_in_[Index(beyond)] != look_) {
+        seen_in_[Index(beyond)] = look_;
+        if (DistanceSq<D>(BoxOf(beyond), cube) <= reach * reach) {
+          visited_.push_back(beyond);
+        }
       }
     });
   }
   return HasNearFeatures(cube, reach);
+}
+
+// The points of a leaf that may be within reach of a leaf that touches it, and is twice as large at most.
+template <int D>
+std::span<const Point<D>> LeafTree<D>::RimOf(NodeId leaf) {
+  rims_.resize(nodes_.size());
+  Rim& rim = rims_[Index(leaf)];
+  if (rim.begin == Rim::kUnknown) {
+    const Box<D> cube = BoxOf(leaf);
+    const double width = 2 * (1 + 0x1p-20) * SideOf(At(leaf)) / kCoarseness;
+    rim.begin = rim_points_.size();
+    for (const Point<D>& p : points_.subspan(ranges_[Index(leaf)].begin, ranges_[Index(leaf)].size())) {
+      bool is_in = false;
+      for (int i = 0; i < D; ++i) {
+        is_in |= (p[i] - cube.low[i] <= width) | (cube.high[i] - p[i] <= width);
+      }
+      if (is_in) {
+        rim_points_.push_back(p);
+      }
+    }
+    rim.count = static_cast<uint32_t>(rim_points_.size() - rim.begin);
+  }
+  return {rim_points_.data() + rim.begin, rim.count};
 }
 
 // Whether two features (points of near_, faces of the box that a point does not lie on) are both within `reach` of one

@@ -176,6 +176,13 @@ class LeafTree {
     uint32_t size() const { return end - begin; }
   };
 
+  // Of a leaf under construction: points near its faces, in rim_points_.
+  struct Rim {
+    static constexpr size_t kUnknown = ~size_t{0};
+    size_t begin = kUnknown;
+    uint32_t count = 0;
+  };
+
   double SideOf(const Node& node) const { return sides_[node.level]; }
   const Node& At(NodeId id) const { return nodes_[Index(id)]; }
   Node& At(NodeId id) { return nodes_[Index(id)]; }
@@ -198,6 +205,7 @@ class LeafTree {
 
   // The split rule of Build.
   bool IsTooCoarse(NodeId leaf);
+  std::span<const Point<D>> RimOf(NodeId leaf);
   bool HasNearFeatures(const Box<D>& cube, double reach) const;
 
   Box<D> box_;
@@ -214,6 +222,10 @@ class LeafTree {
   std::vector<std::vector<NodeId>> pending_;  // leaves to be looked at, by level
   std::vector<Point<D>> near_;                // points near the leaf that is looked at
   std::vector<NodeId> visited_;
+  std::vector<uint32_t> seen_in_;  // by node: the last look of IsTooCoarse that came across it
+  uint32_t look_ = 0;
+  std::vector<Rim> rims_;  // by node
+  std::vector<Point<D>> rim_points_;
 };
 
 }  // namespace wellspace::core

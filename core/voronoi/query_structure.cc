@@ -28,6 +28,17 @@ void Prefetch(const LeafTree<D>& tree, NodeId leaf) {
   }
 }
 
+// Whether `p` is farther from the faces of `cube` than a distance, by its square.
+template <int D>
+bool LiesDeeperThan(const Point<D>& p, double distance_sq, const Box<D>& cube) {
+  bool is_deeper = true;
+  for (int i = 0; i < D; ++i) {
+    const double depth = std::min(p[i] - cube.low[i], cube.high[i] - p[i]);
+    is_deeper &= (depth > 0) & (depth * depth > distance_sq);
+  }
+  return is_deeper;
+}
+
 }  // namespace
 
 void QueryCounters::Add(const QueryCounters& other) {
@@ -157,17 +168,21 @@ template <int D>
 Neighbor QueryStructure<D>::Nearest(const Point<D>& p, NodeId leaf, VertexId but, double limit_sq,
                                     Workspace<D>& workspace) const {
   Neighbor nearest{kNoVertex, limit_sq};
-  ScanOutward(
-      p, leaf, workspace, [&] { return nearest.distance_sq; }, [](NodeId) { return true; },
-      [&](NodeId opened) {
-        const auto* bucket = tree_.BucketOf(opened);
-        for (uint32_t i = 0; bucket != nullptr && i < bucket->count; ++i) {
-          const double distance_sq = DistanceSq<D>(bucket->positions[i], p);
-          if (distance_sq < nearest.distance_sq && bucket->ids[i] != but) {
-            nearest = {bucket->ids[i], distance_sq};
-          }
-        }
-      });
+  const auto look_into = [&](NodeId opened) {
+    const auto* bucket = tree_.BucketOf(opened);
+    for (uint32_t i = 0; bucket != nullptr && i < bucket->count; ++i) {
+      const double distance_sq = DistanceSq<D>(bucket->positions[i], p);
+      if (distance_sq < nearest.distance_sq && bucket->ids[i] != but) {
+        nearest = {bucket->ids[i], distance_sq};
+      }
+    }
+  };
+  if (LiesDeeperThan<D>(p, limit_sq, tree_.BoxOf(leaf))) {
+    look_into(leaf);
+  } else {
+    ScanOutward(
+        p, leaf, workspace, [&] { return nearest.distance_sq; }, [](NodeId) { return true; }, look_into);
+  }
   return nearest;
 }
 
