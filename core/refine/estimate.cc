@@ -437,15 +437,12 @@ struct Stratum {
   double vertices_sq = 0;
 
   double Factor() const { return taken == 0 ? 0.0 : static_cast<double>(leaves.size()) / static_cast<double>(taken); }
-  // Of the vertices of all; infinite before any has been looked at.
+  // Of the vertices in all. REQUIRES: some have been looked at.
   double VarianceOfSum() const {
     const auto count = static_cast<double>(leaves.size());
     const auto k = static_cast<double>(taken);
-    if (taken == leaves.size()) {
-      return 0;
-    }
     const double mean = vertices / k;
-    return taken == 0 ? kInfinity : count * count * std::max(0.0, vertices_sq / k - mean * mean) * (1 - k / count) / k;
+    return count * count * std::max(0.0, vertices_sq / k - mean * mean) * (1 - k / count) / k;
   }
 };
 
@@ -471,6 +468,7 @@ absl::StatusOr<Sample> SampleLeaves(const QueryStructure<D>& structure, Integrat
   });
   const uint64_t full_looks =
       std::max(effort.looks_per_leaf, effort.looks / (strata[0].leaves.size() + strata[1].leaves.size()));
+  const size_t least = std::max<size_t>(effort.least_leaves, 1);
   Draws draws;
   Sample sample;
   while (true) {
@@ -480,7 +478,7 @@ absl::StatusOr<Sample> SampleLeaves(const QueryStructure<D>& structure, Integrat
     double widest_variance = 0;
     for (Stratum& stratum : strata) {
       const bool is_whole = stratum.taken == stratum.leaves.size();
-      const double own = is_whole ? 0 : stratum.taken < effort.least_leaves ? kInfinity : stratum.VarianceOfSum();
+      const double own = is_whole ? 0 : stratum.taken < least ? kInfinity : stratum.VarianceOfSum();
       variance += own;
       total += stratum.Factor() * stratum.vertices;
       if (own > widest_variance) {

@@ -23,8 +23,8 @@ struct SizeEstimate {
 
 // How closely an estimate looks.
 struct EstimateEffort {
-  // Leaves are looked at until the standard error of the vertices is below this share of them, but so many at least: few
-  // would not know their own spread.
+  // Leaves are looked at until the standard error of the vertices is below this share of them, but so many at least of
+  // those with vertices and of those without: few would not know their own spread.
   double sampling_error = 0.05;
   size_t least_leaves = 256;
   // Places looked at in one leaf, and in all where leaves are few, before cells are sampled too.

@@ -91,6 +91,9 @@ absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices
     }
     if (++improved % kReportInterval == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(structure_.MemoryBytes() + MemoryBytes()));
+      if (neighbours_.IsFull()) {
+        return NeighbourLists::FullError();
+      }
       context.SetBucket(bucket);
       context.SetPhaseFraction(1 - static_cast<double>(schedule_.size()) / structure_.vertex_count());
     }
@@ -190,6 +193,10 @@ absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
     CheckOrder(v, cell, bucket);
   }
   while (true) {
+    if (cell.IsTooLarge()) {
+      return absl::ResourceExhaustedError(absl::StrCat("the cell of a vertex has more than ", Polytope<D>::kMostNodes,
+                                                       " nodes; lower rho = ", demands_->rho));
+    }
     const Assessment found = known.has_value() ? *known : AssessCell(cell, structure_.faces(v), edge_limit_sq);
     known.reset();
     if (schedule_.HasBelow(bucket)) {
@@ -351,6 +358,10 @@ void Refinement<D>::LookAtNew(VertexId x, VertexId near, double radius_sq) {
     cell = &new_.cell;
   }
   const Assessment found = AssessCell(*cell, structure_.faces(x), schedule_.UpperLengthSq(bucket));
+  if (cell->IsTooLarge()) {
+    schedule_.Add(x, radius_sq);  // the next look tells
+    return;
+  }
   is_announced_[Index(x)] = found.is_clipped ? 0 : 1;
   WakeNeighbours(*cell, found, [near](VertexId u) { return u != near; });
   if (found.bad_node >= 0) {

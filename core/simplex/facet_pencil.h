@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <limits>
 
-#include "core/geometry/box.h"
 #include "core/geometry/exact_measure.h"
 #include "core/geometry/point.h"
 #include "core/geometry/power_predicate.h"
@@ -31,17 +30,6 @@ struct FacetBall {
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     return {.twice_centre = {}, .radius = kInfinity, .error = 0, .doubt = kInfinity};
   }
-
-  Point<D> Centre() const {
-    Point<D> centre = twice_centre;
-    for (double& x : centre) {
-      x *= 0.5;
-    }
-    return centre;
-  }
-
-  // At least the exact distance of any point of the ball from the computed centre.
-  double Reach() const { return (radius + 2 * error) * (1 + 0x1p-48); }
 };
 
 // Two or three vertices of a facet, the first of which is the site, and the side of its hyperplane that is the positive one: where
@@ -70,8 +58,6 @@ class FacetPencil {
 
   // The side of `u`, exactly.
   Sign SideOf(const Point<D>& u) const;
-  // Whether a point of `box` can be on the positive side or in the hyperplane; coordinates of `box` are off by less than `rounding`.
-  bool MayHold(const Box<D>& box, double rounding) const;
 
   // Whether the ball through `apex`, on the positive side, holds `u`; exactly, ties perturbed as cells perturb them.
   //
@@ -199,22 +185,6 @@ Sign FacetPencil<D>::SideOf(const Point<D>& u) const {
   simplex[D] = u;
   const Sign sign = Orientation<D>(simplex).sign;
   return is_flipped_ ? -sign : sign;
-}
-
-// For a corner's w the determinant is wrong by less than 14 sqrt(D) u P, and by |n| sqrt(D) rounding.
-template <int D>
-bool FacetPencil<D>::MayHold(const Box<D>& box, double rounding) const {
-  double highest = 0;
-  double length = 0;
-  double normal_sum = 0;
-  for (int i = 0; i < D; ++i) {
-    const double low = box.low[i] - site_[i];
-    const double high = box.high[i] - site_[i];
-    highest += std::max(low * normal_[i], high * normal_[i]);
-    length += std::max(std::abs(low), std::abs(high));
-    normal_sum += std::abs(normal_[i]);
-  }
-  return highest + 64 * kUnit * length_product_ * length + 4 * rounding * normal_sum >= 0;
 }
 
 template <int D>

@@ -48,9 +48,9 @@ std::array<uint32_t, D - 1> FacetWalk<D>::OthersOf(Key key) {
 
 template <int D>
 void FacetWalk<D>::AppendStars(const QueryStructure<D>& structure, const NeighbourTable& neighbours,
-                               std::span<const NodeId> leaves, std::span<const uint32_t> output_index,
-                               const RunContext& context, SimplexList<D>& out) {
-  Begin(structure, neighbours, leaves, output_index);
+                               std::span<const NodeId> leaves, std::span<const uint32_t> rank,
+                               std::span<const uint32_t> output_index, const RunContext& context, SimplexList<D>& out) {
+  Begin(structure, neighbours, leaves, rank, output_index);
   // A cell begins the walk, which comes to all stars that hang together. Those that are left when it ends, as the leaves may not, begin again.
   uint32_t first = 0;
   for (size_t at_first = 0; at_first < leaves.size(); ++at_first) {
@@ -97,18 +97,21 @@ bool FacetWalk<D>::CloseFacets(std::span<const NodeId> leaves, const RunContext&
 
 template <int D>
 void FacetWalk<D>::Begin(const QueryStructure<D>& structure, const NeighbourTable& neighbours,
-                         std::span<const NodeId> leaves, std::span<const uint32_t> output_index) {
+                         std::span<const NodeId> leaves, std::span<const uint32_t> rank,
+                         std::span<const uint32_t> output_index) {
   structure_ = &structure;
   neighbours_ = &neighbours;
+  rank_ = rank;
   output_index_ = output_index;
   places_.clear();
-  place_of_.resize(structure.vertex_count());
+  foreign_.clear();
   for (const NodeId leaf : leaves) {
     const auto* bucket = structure.tree().BucketOf(leaf);
     for (uint32_t i = 0; i < bucket->count; ++i) {
-      PlaceOf(bucket->ids[i]);
+      places_.push_back({bucket->positions[i], bucket->ids[i]});
     }
   }
+  first_rank_ = rank[Index(places_.front().vertex)];
   own_count_ = static_cast<uint32_t>(places_.size());
   facets_left_ = 0;
   for (const Place& own : places_) {
@@ -124,12 +127,15 @@ void FacetWalk<D>::Begin(const QueryStructure<D>& structure, const NeighbourTabl
 // The place of a vertex, a new one if it has none.
 template <int D>
 uint32_t FacetWalk<D>::PlaceOf(VertexId v) {
-  uint32_t& place = place_of_[Index(v)];
-  if (place >= places_.size() || places_[place].vertex != v) {
-    place = static_cast<uint32_t>(places_.size());
+  const uint32_t own = rank_[Index(v)] - first_rank_;  // wraps around for those before the block
+  if (own < own_count_) {
+    return own;
+  }
+  const auto [at, is_new] = foreign_.try_emplace(Index(v), static_cast<uint32_t>(places_.size()));
+  if (is_new) {
     places_.push_back({structure_->point(v), v});
   }
-  return place;
+  return at->second;
 }
 
 template <int D>
@@ -203,7 +209,7 @@ void FacetWalk<D>::Gather(uint32_t place) {
     entry[D] = NormSq<D>(w);
     radius_sq = std::max(radius_sq, entry[D]);
     near_.Reserve(1);
-    near_.AppendIf(true, u, entry);
+    near_.Append(u, entry);
   });
   near_.Finish();
   near_radius_ = std::sqrt(radius_sq);
@@ -250,27 +256,26 @@ uint32_t FacetWalk<D>::FindApex(const Facet& facet, FacetBall<D>& ball) {
 // Makes the ball that through `u` if it is inside, or if it is on the positive side when there is no apex yet; its power, as computed, is below
 // the doubt.
 template <int D>
-bool FacetWalk<D>::Shrink(const FacetPencil<D>& pencil, const Facet& facet, uint32_t u, double power, uint32_t& apex,
+void FacetWalk<D>::Shrink(const FacetPencil<D>& pencil, const Facet& facet, uint32_t u, double power, uint32_t& apex,
                           FacetBall<D>& ball) {
   if (u == apex || u == facet.place || std::find(facet.others.begin(), facet.others.end(), u) != facet.others.end()) {
-    return false;
+    return;
   }
   const Point<D> position = PointAt(u);
   if (apex == kNone) {
     if (pencil.SideOf(position) != Sign::kPositive) {
-      return false;
+      return;
     }
   } else if (power >= -ball.doubt) {
     const ExactDecision decision = pencil.IsInside(PointAt(apex), position);
     ++counters_.decisions.exact;
     counters_.decisions.perturbed += decision.perturbed ? 1 : 0;
     if (decision.sign != Sign::kPositive) {
-      return false;
+      return;
     }
   }
   apex = u;
   ball = pencil.BallThrough(position);
-  return true;
 }
 
 // Opens or closes all facets of a simplex but for the `known_facet`, which the walk came across.

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "absl/container/flat_hash_map.h"
 #include "core/base/ids.h"
 #include "core/base/run_context.h"
 #include "core/simplex/facet_pencil.h"
@@ -32,7 +33,7 @@ class FacetWalk {
   // Appends to `out` the simplices whose vertex with the lowest output index is in one of `leaves`. Stops early when the context
   // is cancelled.
   //
-  // Shapes:     output_index: by vertex.
+  // Shapes:     rank, output_index: by vertex; rank numbers the vertices of all leaves, and those of `leaves` one after the other.
   // REQUIRES:   `structure` refined: no circumcentre outside the box; `neighbours` made of the lists of the refinement that has refined it. Where one
   //             is missing the walk may abort.
   // Guarantees: (1) the simplices that have a corner in `leaves` are those of the vertices' whole cells (QueryStructure::Voronoi).
@@ -41,15 +42,15 @@ class FacetWalk {
   // Errors:     none.
   // Source:     gift wrapping (Chand and Kapur 1970) in Delaunay triangulations: McLain 1976; with a stop by cells: Maus 1984.
   void AppendStars(const QueryStructure<D>& structure, const NeighbourTable& neighbours, std::span<const NodeId> leaves,
-                   std::span<const uint32_t> output_index, const RunContext& context, SimplexList<D>& out);
+                   std::span<const uint32_t> rank, std::span<const uint32_t> output_index, const RunContext& context,
+                   SimplexList<D>& out);
 
-  // What its scratch takes in memory, but for what it has for each vertex of the structure.
+  // What its scratch takes in memory.
   uint64_t MemoryBytes() const {
     return places_.capacity() * sizeof(Place) + near_.MemoryBytes() + first_at_.capacity() * sizeof(uint32_t) +
-           has_simplices_.capacity() + open_.capacity() * sizeof(OpenFacet);
+           has_simplices_.capacity() + open_.capacity() * sizeof(OpenFacet) +
+           foreign_.capacity() * (2 * sizeof(uint32_t) + 1);
   }
-  // What it has for each vertex of the structure.
-  static constexpr size_t kVertexBytes = sizeof(uint32_t);
   // Queries are stars.
   QueryCounters counters() const;
 
@@ -82,13 +83,13 @@ class FacetWalk {
   static bool IsFlipped(Key key) { return D == 2 && (key & 1) != 0; }
 
   void Begin(const QueryStructure<D>& structure, const NeighbourTable& neighbours, std::span<const NodeId> leaves,
-             std::span<const uint32_t> output_index);
+             std::span<const uint32_t> rank, std::span<const uint32_t> output_index);
   bool CloseFacets(std::span<const NodeId> leaves, const RunContext& context, SimplexList<D>& out);
   void CloseFacetsAt(uint32_t place, SimplexList<D>& out);
   void AddCellOf(uint32_t place, SimplexList<D>& out);
   void Gather(uint32_t place);
   uint32_t FindApex(const Facet& facet, FacetBall<D>& ball);
-  bool Shrink(const FacetPencil<D>& pencil, const Facet& facet, uint32_t u, double power, uint32_t& apex,
+  void Shrink(const FacetPencil<D>& pencil, const Facet& facet, uint32_t u, double power, uint32_t& apex,
               FacetBall<D>& ball);
   void AddSimplex(const Corners& corners, int known_facet, double radius_sq, SimplexList<D>& out);
   void ToggleFacet(uint32_t place, Key key);
@@ -97,15 +98,17 @@ class FacetWalk {
   uint32_t OutputIndex(uint32_t place) const { return output_index_[Index(places_[place].vertex)]; }
 
   const QueryStructure<D>* structure_ = nullptr;
+  std::span<const uint32_t> rank_;
+  uint32_t first_rank_ = 0;
   std::span<const uint32_t> output_index_;
   const NeighbourTable* neighbours_ = nullptr;
   std::vector<Place> places_;
-  std::vector<uint32_t> place_of_;      // by vertex; true of those whose place says so
-  SiteColumns<D> near_;                 // the neighbours of the vertex whose star is being closed
-  double near_radius_ = 0;              // no farther than this
-  uint32_t own_count_ = 0;              // places below are of the block
-  std::vector<uint32_t> first_at_;      // by own place: its open facets
-  std::vector<uint8_t> has_simplices_;  // by own place
+  absl::flat_hash_map<uint32_t, uint32_t> foreign_;  // by vertex, of those that are not of the block: the place
+  SiteColumns<D> near_;                              // the neighbours of the vertex whose star is being closed
+  double near_radius_ = 0;                           // no farther than this
+  uint32_t own_count_ = 0;                           // places below are of the block
+  std::vector<uint32_t> first_at_;                   // by own place: its open facets
+  std::vector<uint8_t> has_simplices_;               // by own place
   std::vector<OpenFacet> open_;
   uint32_t unused_ = kNone;
   size_t open_count_ = 0;

@@ -147,11 +147,11 @@ absl::StatusOr<Simplices> JoinBlocks(size_t block_count, uint64_t held_bytes, in
   return all;
 }
 
-// What is held besides the simplices; of the scratch space, what every thread has for each node, or for each vertex.
+// What is held besides the simplices; of the scratch space, what every thread has for each node.
 template <int D>
 uint64_t HeldBytes(const QueryStructure<D>& structure, std::span<const uint32_t> output_index, int threads) {
   return structure.MemoryBytes() + output_index.size_bytes() +
-         static_cast<uint64_t>(threads) * (structure.tree().node_count() + structure.vertex_count()) * sizeof(uint32_t);
+         static_cast<uint64_t>(ThreadTeam(threads).threads()) * structure.tree().node_count() * sizeof(uint32_t);
 }
 
 // Appends the simplices of the cell in `workspace` whose lowest vertex is its site `v` and whose other vertices are
@@ -213,6 +213,8 @@ absl::StatusOr<Simplices> JoinWalks(const QueryStructure<D>& structure, const Ne
   std::vector<size_t> block_begin{0};
   const size_t most = std::min(kWalkedInBlock<D>, structure.vertex_count() / kLeastBlocks);
   size_t in_block = 0;
+  std::vector<uint32_t> rank(structure.vertex_count());
+  uint32_t ranked = 0;
   structure.tree().ForEachLeaf([&](NodeId leaf) {
     const auto* bucket = structure.tree().BucketOf(leaf);
     if (bucket == nullptr || bucket->count == 0 || context.IsCancelled()) {
@@ -224,16 +226,20 @@ absl::StatusOr<Simplices> JoinWalks(const QueryStructure<D>& structure, const Ne
     }
     leaves.push_back(leaf);
     in_block += bucket->count;
+    for (uint32_t i = 0; i < bucket->count; ++i) {
+      rank[Index(bucket->ids[i])] = ranked++;
+    }
   });
   block_begin.push_back(leaves.size());
   const auto append = [&](size_t block, FacetWalk<D>& walk, SimplexList<D>& out) {
     walk.AppendStars(structure, neighbours,
-                     std::span(leaves).subspan(block_begin[block], block_begin[block + 1] - block_begin[block]),
+                     std::span(leaves).subspan(block_begin[block], block_begin[block + 1] - block_begin[block]), rank,
                      output_index, context, out);
   };
   return JoinBlocks<D, FacetWalk<D>>(
       block_begin.size() - 1,
-      HeldBytes<D>(structure, output_index, threads) + neighbours.MemoryBytes() + leaves.size() * sizeof(NodeId),
+      HeldBytes<D>(structure, output_index, threads) + neighbours.MemoryBytes() + leaves.size() * sizeof(NodeId) +
+          rank.size() * sizeof(uint32_t),
       threads, context, append, [](const FacetWalk<D>& walk) { return walk.MemoryBytes(); },
       [](const FacetWalk<D>& walk) { return walk.counters(); });
 }
@@ -243,6 +249,9 @@ absl::StatusOr<Simplices> JoinWalks(const QueryStructure<D>& structure, const Ne
 template <int D>
 absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, const NeighbourLists& neighbours,
                                            std::span<const uint32_t> output_index, int threads, RunContext& context) {
+  // The table takes less than the lists.
+  WELLSPACE_RETURN_IF_ERROR(
+      context.AllowMemory(HeldBytes<D>(structure, output_index, threads) + 2 * neighbours.MemoryBytes()));
   WELLSPACE_ASSIGN_OR_RETURN(const NeighbourTable table,
                              NeighbourTable::Of(neighbours, structure.vertex_count(), context));
   if constexpr (D <= 3) {

@@ -33,7 +33,7 @@ struct Simplices {
 //             of threads.
 // Complexity: O(m) for m vertices in a refined structure: what is listed, and what the simplices at each vertex take among it; no leaf is looked at
 //             but for the first star of a walk.
-// Errors:     RESOURCE_EXHAUSTED of the context's memory; CANCELLED, DEADLINE_EXCEEDED.
+// Errors:     RESOURCE_EXHAUSTED of the context's memory, or if `neighbours` is full; CANCELLED, DEADLINE_EXCEEDED.
 // Threads:    uses `threads`, at most as many as the machine has cores.
 // Source:     [HT08] §1 and §2; the walk is ours (docs/design/simplex.md).
 template <int D>

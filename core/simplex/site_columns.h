@@ -32,13 +32,13 @@ class SiteColumns {
       places_.resize(2 * (count_ + more + kLanes));
     }
   }
-  // Appends (w, |w|^2), unless it is not `wanted`. REQUIRES: there is room.
-  void AppendIf(bool wanted, uint32_t place, const std::array<double, D + 1>& entry) {
+  // Appends (w, |w|^2). REQUIRES: there is room.
+  void Append(uint32_t place, const std::array<double, D + 1>& entry) {
     for (int i = 0; i <= D; ++i) {
       columns_[i][count_] = entry[i];
     }
     places_[count_] = place;
-    count_ += static_cast<size_t>(wanted);
+    ++count_;
   }
   // To be called after the last one.
   void Finish() {

@@ -174,9 +174,9 @@ absl::StatusOr<Triangulation<D>> SliverStage<D>::Triangulate(const QueryStructur
   if (statistics_.min_angle_deg == 0) {
     statistics_.min_angle_deg = simplices.min_angle_deg;
   }
-  WELLSPACE_RETURN_IF_ERROR(
-      context.AllowMemory(structure.MemoryBytes() + simplices.indices.size() * sizeof(uint32_t) +
-                          Triangulation<D>::BuildBytes(structure.vertex_count(), simplices.indices.size() / (D + 1))));
+  WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(
+      structure.MemoryBytes() + neighbours.MemoryBytes() + simplices.indices.size() * sizeof(uint32_t) +
+      Triangulation<D>::BuildBytes(structure.vertex_count(), simplices.indices.size() / (D + 1))));
   // Sorting takes less than Build.
   WELLSPACE_RETURN_IF_ERROR(SortSimplices<D>(structure.vertex_count(), simplices.indices, context));
   std::vector<Point<D>> points;

@@ -31,6 +31,8 @@ absl::Status LeafTree<D>::Build(const Box<D>& box, std::span<const Point<D>> poi
   ranges_.assign(1, Range{0, static_cast<uint32_t>(points.size())});
   pending_.assign(grid.levels() + 1, {});
   pending_[0].push_back(NodeId{0});
+  rims_ = {};
+  rim_points_ = {};
 
   uint32_t looked_at = 0;
   for (int level = 0; level < max_level_; ++level) {

@@ -92,7 +92,8 @@ class LeafTree {
   // What the tree takes in memory.
   uint64_t MemoryBytes() const {
     return nodes_.size() * sizeof(Node) + buckets_.MemoryBytes() + ranges_.size() * sizeof(Range) +
-           leaf_of_.size() * sizeof(NodeId);
+           leaf_of_.size() * sizeof(NodeId) + seen_in_.size() * sizeof(uint32_t) + rims_.size() * sizeof(Rim) +
+           rim_points_.size() * sizeof(Point<D>);
   }
   // Whether `node` is a leaf that covers a part of the box.
   bool IsLeaf(NodeId node) const { return At(node).first_child == kNoNode && !At(node).outside; }

@@ -7,6 +7,12 @@
 #include "core/base/status_macros.h"
 
 namespace wellspace::core {
+namespace {
+
+// In 6-D a vertex has a hundred entries, each somewhere else in memory.
+constexpr uint32_t kVerticesBetweenChecks = 4096;
+
+}  // namespace
 
 void NeighbourLists::Set(VertexId v, std::span<const VertexId> neighbours) {
   if (ids_.size() + 1 + neighbours.size() >= kNone) {
@@ -71,14 +77,14 @@ void NeighbourLists::Clear() {
 absl::StatusOr<NeighbourTable> NeighbourTable::Of(const NeighbourLists& lists, uint32_t vertex_count,
                                                   const RunContext& context) {
   if (lists.IsFull()) {
-    return absl::ResourceExhaustedError("the mesh has more edges than can be numbered, 2^32");
+    return NeighbourLists::FullError();
   }
   NeighbourTable table(lists);
   // First how many list each; then, from the last vertex to the first, where those of each begin.
   std::vector<uint32_t>& begin = table.begin_;
   begin.resize(size_t{vertex_count} + 1);
   for (uint32_t v = 0; v < vertex_count; ++v) {
-    if (v % kStepsBetweenChecks == 0) {
+    if (v % kVerticesBetweenChecks == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
     for (const VertexId u : lists.Of(VertexId{v})) {
@@ -88,7 +94,7 @@ absl::StatusOr<NeighbourTable> NeighbourTable::Of(const NeighbourLists& lists, u
   std::partial_sum(begin.begin(), begin.end(), begin.begin());
   table.listed_by_.resize(begin.back());
   for (uint32_t v = vertex_count; v-- > 0;) {
-    if (v % kStepsBetweenChecks == 0) {
+    if (v % kVerticesBetweenChecks == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
     for (const VertexId u : lists.Of(VertexId{v})) {

@@ -14,7 +14,7 @@
 
 namespace wellspace::core {
 
-// For each vertex the neighbours that its whole cell had when it was last looked at, of those that had been looked at before. Of two
+// For each vertex the neighbours that its cell in the box had when it was last looked at, of those that had been looked at before. Of two
 // vertices that are neighbours the one that was looked at last lists the other: as long as vertices are only added, cells
 // only shrink, so that they were neighbours then. Some that are listed are none any more. What is listed depends on the cells and on
 // the order in which they were looked at, and not on how they were computed.
@@ -38,8 +38,11 @@ class NeighbourLists {
     return {ids_.data() + begin + 1, Index(ids_[begin])};
   }
 
-  // Whether there has been more to list than can be numbered, 2^32 in all.
+  // Whether there has been more to list than can be numbered: 2^32 neighbours and vertices together.
   bool IsFull() const { return is_full_; }
+  static absl::Status FullError() {
+    return absl::ResourceExhaustedError("the mesh has more neighbours to list than can be numbered, 2^32");
+  }
 
   // Forgets everything.
   void Clear();
@@ -72,6 +75,8 @@ class NeighbourTable {
                                            const RunContext& context);
 
   // Calls f(VertexId) for each neighbour of `v`, and some others; perhaps twice for one.
+  //
+  // REQUIRES:   v is one of the vertices.
   template <typename F>
   void ForEachAt(VertexId v, F f) const {
     for (const VertexId u : lists_->Of(v)) {

@@ -133,7 +133,9 @@ class QueryStructure {
 
   // The same from a table of all neighbours, without looking for them.
   //
-  // Complexity: O(entries at v).
+  // REQUIRES:   no vertex was added or moved since the table was made.
+  // Complexity: O(entries at v) cuts, the nearest first.
+  // Errors:     none.
   void VoronoiAmong(VertexId v, const NeighbourTable& neighbours, Workspace<D>& workspace) const;
 
   // Adds a vertex at `p`, near `near`; kNoVertex if none is known.
