@@ -131,22 +131,25 @@ class Follower final : public MendObserver {
 
   void StarChanged(VertexId v) override {
     triangulation_.Star(v, star_);
+    seen_in_.resize(triangulation_.vertex_count(), 0);
+    ++star_count_;
     neighbours_.clear();
     double nearest_sq = std::numeric_limits<double>::infinity();
     for (const SimplexId s : star_) {
       for (const VertexId u : triangulation_.item(s).vertices) {
-        if (u != v) {
+        if (u != v && seen_in_[Index(u)] != star_count_) {
+          seen_in_[Index(u)] = star_count_;
           nearest_sq = std::min(nearest_sq, DistanceSq<3>(triangulation_.point(u), triangulation_.point(v)));
           neighbours_.push_back(u);
         }
       }
     }
-    std::sort(neighbours_.begin(), neighbours_.end());
-    neighbours_.erase(std::unique(neighbours_.begin(), neighbours_.end()), neighbours_.end());
     refinement_.CellChanged(v, nearest_sq, neighbours_);
   }
 
-  uint64_t MemoryBytes() const override { return structure_.MemoryBytes() + refinement_.MemoryBytes(); }
+  uint64_t MemoryBytes() const override {
+    return structure_.MemoryBytes() + refinement_.MemoryBytes() + seen_in_.size() * sizeof(uint64_t);
+  }
 
  private:
   Triangulation<3>& triangulation_;
@@ -154,6 +157,8 @@ class Follower final : public MendObserver {
   Refinement<3>& refinement_;
   std::vector<SimplexId> star_;
   std::vector<VertexId> neighbours_;
+  std::vector<uint64_t> seen_in_;  // by vertex: the last star that it was found in
+  uint64_t star_count_ = 0;
 };
 
 }  // namespace
