@@ -201,6 +201,7 @@ void FacetWalk<D>::Gather(uint32_t place) {
   const Point<D> site = PointAt(place);
   double radius_sq = 0;
   near_.Clear();
+  near_.Reserve(neighbours_->CountAt(places_[place].vertex));
   neighbours_->ForEachAt(places_[place].vertex, [&](VertexId v) {
     const uint32_t u = PlaceOf(v);
     const Point<D> w = Difference<D>(PointAt(u), site);
@@ -208,7 +209,6 @@ void FacetWalk<D>::Gather(uint32_t place) {
     std::copy(w.begin(), w.end(), entry.begin());
     entry[D] = NormSq<D>(w);
     radius_sq = std::max(radius_sq, entry[D]);
-    near_.Reserve(1);
     near_.Append(u, entry);
   });
   near_.Finish();

@@ -277,18 +277,14 @@ template <int D>
 absl::StatusOr<std::vector<VertexId>> ChangedVertices(const QueryStructure<D>& structure, VertexId first_new,
                                                       const RunContext& context) {
   std::vector<VertexId> changed;
+  std::vector<VertexId> neighbours;
   Workspace<D> workspace;
   for (uint32_t i = Index(first_new); i < structure.vertex_count(); ++i) {
     WELLSPACE_RETURN_IF_ERROR(context.Check());
     changed.push_back(VertexId{i});
     structure.Voronoi(VertexId{i}, workspace);
-    for (const CellNode<D>& node : workspace.cell.nodes()) {
-      for (const uint16_t index : node.planes) {
-        if (workspace.cell.plane(index).kind == PlaneKind::kBisector) {
-          changed.push_back(workspace.cell.plane(index).vertex);
-        }
-      }
-    }
+    workspace.cell.Neighbours(neighbours);
+    changed.insert(changed.end(), neighbours.begin(), neighbours.end());
   }
   std::sort(changed.begin(), changed.end());
   changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
