@@ -15,6 +15,7 @@
 
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
+#include "core/refine/mesh_size.h"
 #include "core/refine/nearest_points.h"
 
 namespace wellspace::core {
@@ -397,12 +398,6 @@ class Integrator {
 
 // ---- Sampling ----------------------------------------------------------------------------------------------------------
 
-// Leaves that refinement leaves behind.
-struct Leaves {
-  double all = 0;
-  double filled = 0;  // those with vertices
-};
-
 // What becomes of a leaf that holds `vertices` in the end, `at_first` before refinement: it is split for as long as its
 // parts are too full. How many there will be is known to about a quarter. Vertices keep apart, so that leaves of less than
 // one hold one at most.
@@ -516,69 +511,6 @@ absl::StatusOr<Sample> SampleLeaves(const QueryStructure<D>& structure, Integrat
     sample.leaves.filled += stratum.Factor() * stratum.become.filled;
   }
   return sample;
-}
-
-// ---- From vertices to simplices and bytes ------------------------------------------------------------------------------
-
-// Simplices per vertex without a boundary. In 2-D by Euler's formula; in 3-D as measured: 5 to 6 around surfaces and
-// curves, 6.6 in uniformly random points; from 4-D on those of random points, 31.8, 187 and 1297, a tenth less.
-template <int D>
-constexpr double kSimplicesPerVertex = D == 2   ? 2.0
-                                       : D == 3 ? 6.1
-                                       : D == 4 ? 29.0
-                                       : D == 5 ? 170.0
-                                                : 1170.0;
-
-template <int D>
-double SimplicesOf(double vertices, double on_boundary) {
-  if constexpr (D == 2) {
-    return 2 * vertices - 2 - on_boundary;
-  } else {
-    // About half of the simplices around a vertex of the interior are around one of the boundary. The empty box has D!.
-    const double corners = 1 << D;
-    return std::tgamma(D + 1) +
-           kSimplicesPerVertex<D> * std::max(0.0, vertices - corners - 0.52 * (on_boundary - corners));
-  }
-}
-
-// Pairs of neighbours that are listed per vertex; in 2-D and 3-D by Euler's formula. From 4-D on as seen: 11 to 14, 21 to 22 and 34, some of
-// which are no neighbours any more.
-template <int D>
-constexpr double kEdgesPerVertex = D == 4   ? 13.0
-                                   : D == 5 ? 22.0
-                                            : 34.0;
-
-template <int D>
-double EdgesOf(double vertices, double simplices) {
-  return D <= 3 ? vertices + simplices : kEdgesPerVertex<D> * vertices;
-}
-
-// What a process touches whatever the mesh, as measured: code, threads, their stacks and scratch space.
-constexpr double kFixedBytes = 3.9e6;
-
-// Where the estimate of the memory is wrong, it is rather short than long: 0.56 to 1.07 without this, which puts the two ends about as far from 1.
-constexpr double kMemoryMargin = 1.25;
-
-// The memory at its peak, when stars are put together. Vectors grow by doubling, but of what they reserve only what they
-// use is ever touched.
-template <int D>
-double BytesOf(const Leaves& leaves, double vertices, double simplices) {
-  constexpr double kChildren = LeafTree<D>::kChildren;
-  const double nodes = leaves.all * kChildren / (kChildren - 1);
-  // Beside the nodes, three marks of the queries' scratch space.
-  const double node_bytes = LeafTree<D>::NodeBytes() + 3 * sizeof(uint32_t);
-  using Buckets = typename LeafTree<D>::Buckets;
-  // Coordinates in the tree and in the structure; number in the tree, leaf, faces, radius, place in the schedule, numbers in the output; where its
-  // neighbours are listed, from either side, and how many; its place in the walk. Coordinates in the mesh come when the other side's lists have
-  // gone, and take no more.
-  const double vertex_bytes = Buckets::kPlaceBytes + sizeof(Point<D>) + 32 + 4 * sizeof(uint32_t);
-  // Of two neighbours, each at the other.
-  const double edge_bytes = 2 * sizeof(VertexId);
-  // Indices in the mesh and, of some, in the blocks that are being made or wait.
-  const double simplex_bytes = 1.5 * (D + 1) * sizeof(uint32_t);
-  return kMemoryMargin *
-         (kFixedBytes + nodes * node_bytes + leaves.filled * Buckets::OverheadBytes() + vertices * vertex_bytes +
-          EdgesOf<D>(vertices, simplices) * edge_bytes + simplices * simplex_bytes);
 }
 
 }  // namespace
