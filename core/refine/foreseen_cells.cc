@@ -15,50 +15,22 @@ void ForeseenCells<D>::Compute(std::span<const VertexId> vertices, double clip, 
   if (cells_.size() < count_) {
     cells_.resize(count_);
   }
-  of_threads_.resize(team_.threads());
-  for (OfThread& own : of_threads_) {
-    own.added_count = 0;
-  }
+  workspaces_.resize(team_.threads());
   team_.ForEach(count_, [&](size_t i) { ComputeOne(vertices[i], i, judge, context); });
 }
 
 template <int D>
 void ForeseenCells<D>::ComputeOne(VertexId v, size_t i, const Judge& judge, const RunContext& context) {
-  const int thread = ThreadTeam::CurrentThread();
-  OfThread& own = of_threads_[thread];
+  Workspace<D>& workspace = workspaces_[ThreadTeam::CurrentThread()];
   Foreseen& foreseen = cells_[i];
   foreseen.vertex = kNoVertex;
   if (context.IsCancelled()) {
     return;
   }
-  structure_.UnplacedClippedVoronoi(v, clip_, own.workspace);
+  structure_.UnplacedClippedVoronoi(v, clip_, workspace);
   foreseen.vertex = v;
-  foreseen.thread = thread;
-  foreseen.first_added = own.added_count;
-  std::swap(own.cell, own.workspace.cell);
-  for (uint32_t k = 0; k < kMostAdded; ++k) {
-    const Prospect prospect = judge(i, own.cell);
-    if (k == 0) {
-      foreseen.found = prospect.found;
-      foreseen.cell.CopyFrom(own.cell);
-    }
-    if (!prospect.point.has_value() || context.IsCancelled()) {
-      break;
-    }
-    const ForeseenPoint<D>& point = *prospect.point;
-    if (own.added_count == own.added.size()) {
-      own.added.emplace_back();
-    }
-    Added& added = own.added[own.added_count++];
-    added.point = point;
-    structure_.UnplacedClippedVoronoiAt(point.position, v, point.clip, own.workspace);
-    own.workspace.cell.PlaceUnlessKeeps(ratio_);
-    added.cell.CopyFrom(own.workspace.cell);
-    if (k + 1 < kMostAdded) {
-      own.cell.CutBeforePlace(VertexId{vertex_count_ + k}, point.position);
-    }
-  }
-  foreseen.added_count = own.added_count - foreseen.first_added;
+  foreseen.found = judge(i, workspace.cell);
+  foreseen.cell.CopyFrom(workspace.cell);
 }
 
 template <int D>
@@ -68,41 +40,28 @@ bool ForeseenCells<D>::Has(double clip) const {
 
 template <int D>
 Polytope<D>* ForeseenCells<D>::Take(VertexId v, double clip, std::optional<Assessment>& found) {
-  taken_ = nullptr;
   if (!Has(clip)) {
     return nullptr;
   }
   for (size_t i = 0; i < count_; ++i) {
     if (cells_[i].vertex == v) {
-      taken_ = &cells_[i];
-      taken_->vertex = kNoVertex;
+      Foreseen& taken = cells_[i];
+      taken.vertex = kNoVertex;
       --left_;
-      if (!CutByNew(structure_.vertex_count(), taken_->cell)) {
-        found = taken_->found;
+      if (!CutByNew(taken.cell)) {
+        found = taken.found;
       }
-      return &taken_->cell;
+      return &taken.cell;
     }
   }
   return nullptr;
 }
 
+// Cuts a cell by the vertices that were added since it was computed; returns whether that changed it.
 template <int D>
-Polytope<D>* ForeseenCells<D>::TakeAdded(double clip) {
-  const uint32_t last = structure_.vertex_count() - 1;
-  for (size_t k = 0; taken_ != nullptr && k < taken_->added_count; ++k) {
-    Added& added = of_threads_[taken_->thread].added[taken_->first_added + k];
-    if (added.point.position == structure_.point(VertexId{last}) && added.point.clip == clip) {
-      CutByNew(last, added.cell);
-      return &added.cell;
-    }
-  }
-  return nullptr;
-}
-
-// Cuts a cell by the vertices up to `end` that were added since it was computed; returns whether that changed it.
-template <int D>
-bool ForeseenCells<D>::CutByNew(uint32_t end, Polytope<D>& cell) const {
+bool ForeseenCells<D>::CutByNew(Polytope<D>& cell) const {
   bool is_cut = false;
+  const uint32_t end = structure_.vertex_count();
   for (uint32_t u = vertex_count_; u < end && !cell.IsTooLarge(); ++u) {
     is_cut |= cell.CutBeforePlace(VertexId{u}, structure_.point(VertexId{u}));
   }
@@ -115,11 +74,8 @@ uint64_t ForeseenCells<D>::MemoryBytes() const {
   for (const Foreseen& foreseen : cells_) {
     bytes += foreseen.cell.MemoryBytes();
   }
-  for (const OfThread& own : of_threads_) {
-    bytes += own.workspace.seen.size() * sizeof(uint32_t) + own.workspace.cell.MemoryBytes() + own.cell.MemoryBytes();
-    for (const Added& added : own.added) {
-      bytes += added.cell.MemoryBytes();
-    }
+  for (const Workspace<D>& workspace : workspaces_) {
+    bytes += workspace.seen.size() * sizeof(uint32_t) + workspace.cell.MemoryBytes();
   }
   return bytes;
 }
@@ -127,8 +83,8 @@ uint64_t ForeseenCells<D>::MemoryBytes() const {
 template <int D>
 QueryCounters ForeseenCells<D>::counters() const {
   QueryCounters counters;
-  for (const OfThread& own : of_threads_) {
-    counters.Add(own.workspace.counters);
+  for (const Workspace<D>& workspace : workspaces_) {
+    counters.Add(workspace.counters);
   }
   return counters;
 }

@@ -19,15 +19,7 @@
 
 namespace wellspace::core {
 
-// Where a vertex would be added, and the half side of the cube that its cell would be clipped by.
-template <int D>
-struct ForeseenPoint {
-  Point<D> position;
-  double clip = 0;
-};
-
-// Clipped cells of vertices that are about to be looked at, and of the vertices that would then be added. They stay of
-// use while vertices are added: a cell that is taken is first cut by those added since it was computed, which makes it
+// Clipped cells of vertices that are about to be looked at. They stay of use while vertices are added: a cell that is taken is first cut by those added since it was computed, which makes it
 // the cell of now. So what the refinement does with a cell, one after the other, does not depend on the threads.
 //
 // Thread safety: thread-compatible.
@@ -39,21 +31,14 @@ class ForeseenCells {
   static constexpr size_t kLeast = 8;
   static constexpr size_t kMost = D == 2 ? 64 : D == 3 ? 32 : 16;
 
-  // Places a cell of the i-th vertex if need be, assesses it, and says where one would be added for it, if any. Several threads call it at once.
-  struct Prospect {
-    Assessment found;
-    std::optional<ForeseenPoint<D>> point;
-  };
-  using Judge = std::function<Prospect(size_t i, Polytope<D>& cell)>;
+  // Assesses the cell of the i-th vertex. Several threads call it at once.
+  using Judge = std::function<Assessment(size_t i, Polytope<D>& cell)>;
 
-  // Cells that keep `ratio` need not be placed; 0: all are.
-  ForeseenCells(const QueryStructure<D>& structure, ThreadTeam& team, double ratio)
-      : structure_(structure), team_(team), ratio_(ratio) {}
+  ForeseenCells(const QueryStructure<D>& structure, ThreadTeam& team) : structure_(structure), team_(team) {}
 
   int threads() const { return team_.threads(); }
 
-  // Computes the cells of `vertices`, clipped by cubes of half side `clip`, and those of up to kMostAdded points for each:
-  // the second is asked for with the cell as it is once the first is added, and so on.
+  // Computes the cells of `vertices`, clipped by cubes of half side `clip`.
   //
   // REQUIRES:   vertices distinct, at most kMost.
   // Complexity: that of the cells, shared by the threads.
@@ -70,52 +55,32 @@ class ForeseenCells {
   // Errors:     none.
   Polytope<D>* Take(VertexId v, double clip, std::optional<Assessment>& found);
 
-  // The same of the vertex added last, if it is what was foreseen for the vertex that Take was last called for.
-  Polytope<D>* TakeAdded(double clip);
-
   // What all this takes in memory, roughly.
   uint64_t MemoryBytes() const;
   QueryCounters counters() const;
 
  private:
-  static constexpr uint32_t kMostAdded = 4;
   // After so many insertions a cell is sooner computed anew.
   static constexpr uint32_t kMostInsertions = 1024;
 
-  struct Added {
-    ForeseenPoint<D> point;
-    Polytope<D> cell;
-  };
   struct Foreseen {
     VertexId vertex = kNoVertex;  // none once taken, or if left out
     Polytope<D> cell;
     Assessment found;
-    // Its added ones, in OfThread::added.
-    int thread = 0;
-    size_t first_added = 0;
-    size_t added_count = 0;
-  };
-  struct OfThread {
-    Workspace<D> workspace;
-    Polytope<D> cell;
-    std::vector<Added> added;  // the first added_count of them
-    size_t added_count = 0;
   };
 
   void ComputeOne(VertexId v, size_t i, const Judge& judge, const RunContext& context);
-  bool CutByNew(uint32_t end, Polytope<D>& cell) const;
+  bool CutByNew(Polytope<D>& cell) const;
 
   const QueryStructure<D>& structure_;
   ThreadTeam& team_;
-  const double ratio_;
   double clip_ = 0;
   uint32_t vertex_count_ = 0;  // of the structure when the cells were computed
   // Arrays only grow, so that polytopes are reused.
   std::vector<Foreseen> cells_;  // the first count_ of them
   size_t count_ = 0;
   size_t left_ = 0;
-  Foreseen* taken_ = nullptr;  // by the last Take
-  std::vector<OfThread> of_threads_;
+  std::vector<Workspace<D>> workspaces_;  // by thread
 };
 
 }  // namespace wellspace::core

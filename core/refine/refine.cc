@@ -18,10 +18,9 @@ namespace {
 // bad node is seen.
 constexpr double kClipFactor = 4;
 constexpr double kClipRatioFactor = 1.25;
-// The cell of a vertex just added is clipped at this times its empty radius: enough to see that most are good already,
-// and no farther out than the region that bottom-up work has graded.
+// The cell of a new vertex on a face is clipped at this times its empty radius to announce it: no farther out than the region
+// that bottom-up work has graded.
 constexpr double kNewClipFactor = 1.5;
-double NewClip(double radius_sq) { return kNewClipFactor * std::sqrt(radius_sq); }
 
 // Vertices whose first edges one thread looks for at a time.
 constexpr uint32_t kScheduledTogether = 1024;
@@ -61,7 +60,7 @@ absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices
                                 const RefinementObserver<D>& observer) {
   ThreadTeam team(threads);
   plain_ratio_ = demands.criterion == Criterion::kRadiusEdge && demands.sizes.IsUnbounded() ? demands.rho : 0;
-  ForeseenCells<D> foreseen(structure_, team, plain_ratio_);
+  ForeseenCells<D> foreseen(structure_, team);
   foreseen_ = &foreseen;
   const absl::Cleanup end = [&] {
     own_.counters.Add(foreseen.counters());
@@ -107,15 +106,14 @@ void Refinement<D>::VertexAdded(VertexId x) {
     return;  // the first run looks at all
   }
   radius_sq_.resize(structure_.vertex_count(), Assessment::kNone);
-  is_announced_.resize(structure_.vertex_count(), 0);
-  const double nearest_sq = structure_.ApproximateNearestNeighbor(x, own_).distance_sq;
-  LookAtNew(x, kNoVertex, FirstEdgeSq(*demands_, x, nearest_sq));
+  announced_.resize(structure_.vertex_count(), Announced::kToNone);
+  ScheduleNew(x, structure_.ApproximateNearestNeighbor(x, own_).distance_sq);
 }
 
 template <int D>
 uint64_t Refinement<D>::MemoryBytes() const {
   return schedule_.MemoryBytes() + neighbours_.MemoryBytes() + radius_sq_.size() * sizeof(double) +
-         is_announced_.size() + (own_.seen.size() + new_.seen.size()) * sizeof(uint32_t) +
+         announced_.size() * sizeof(Announced) + (own_.seen.size() + new_.seen.size()) * sizeof(uint32_t) +
          (foreseen_ == nullptr ? 0 : foreseen_->MemoryBytes());
 }
 
@@ -123,7 +121,7 @@ template <int D>
 void Refinement<D>::CellChanged(VertexId v, double nearest_sq, std::span<const VertexId> neighbours) {
   neighbours_.Set(v, neighbours);
   radius_sq_.resize(structure_.vertex_count(), Assessment::kNone);
-  is_announced_.resize(structure_.vertex_count(), 1);
+  announced_.resize(structure_.vertex_count(), Announced::kToAll);
   const bool is_on_face = structure_.faces(v) != 0;
   radius_sq_[Index(v)] = is_on_face ? -nearest_sq : Assessment::kNone;
   if (is_on_face && demands_->criterion == Criterion::kWellSpaced) {
@@ -142,7 +140,7 @@ template <int D>
 absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& team) {
   neighbours_.Clear();
   radius_sq_.assign(structure_.vertex_count(), Assessment::kNone);
-  is_announced_.assign(structure_.vertex_count(), 1);
+  announced_.assign(structure_.vertex_count(), Announced::kToAll);
   const uint32_t count = structure_.vertex_count();
   std::vector<Workspace<D>> workspaces(team.threads());
   std::vector<double> first_sq(count);
@@ -181,6 +179,19 @@ double Refinement<D>::FirstEdgeSq(const Demands<D>& demands, VertexId v, double 
   return first_sq;
 }
 
+// Schedules the new vertex `x`, whose nearest neighbour is as near as it says. If it lies on a face it is announced at once:
+// a neighbour that remembers a node there may have to look sooner than x.
+template <int D>
+void Refinement<D>::ScheduleNew(VertexId x, double nearest_sq) {
+  if (structure_.faces(x) != 0) {
+    structure_.ClippedVoronoi(x, kNewClipFactor * std::sqrt(nearest_sq), new_, TieRule::kPerturb);
+    if (!new_.cell.IsTooLarge()) {
+      Announce(x, new_.cell, Assess<D>(new_.cell, structure_.faces(x), *demands_, nearest_sq));
+    }
+  }
+  schedule_.Add(x, FirstEdgeSq(*demands_, x, nearest_sq));
+}
+
 // Inserts Steiner points until nothing that bucket `bucket` may ask for is wrong with the cell of `v`.
 template <int D>
 absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
@@ -199,8 +210,11 @@ absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
     }
     const Assessment found = known.has_value() ? *known : AssessCell(cell, structure_.faces(v), edge_limit_sq);
     known.reset();
+    if (announced_[Index(v)] == Announced::kToNone) {
+      Announce(v, cell, found);
+    }
     if (schedule_.HasBelow(bucket)) {
-      // What was just added asks for something by a shorter edge than this bucket's: that comes first.
+      // What was just added, or told of it, may ask for something by a shorter edge than this bucket's: that comes first.
       const double own_sq = found.bad_node >= 0 ? found.bound_sq / (demands_->rho * demands_->rho) : edge_limit_sq;
       radius_sq_[Index(v)] = Assessment::kNone;
       schedule_.AddToBucket(v, std::min(bucket, schedule_.BucketOf(own_sq)));
@@ -263,15 +277,7 @@ Polytope<D>& Refinement<D>::LookAt(VertexId v, int bucket, double clip, std::opt
     if (next_.size() >= ForeseenCells<D>::kLeast) {
       const double edge_limit_sq = schedule_.UpperLengthSq(bucket);
       const auto judge = [&](size_t i, Polytope<D>& cell) {
-        const VertexId u = next_[i];
-        typename ForeseenCells<D>::Prospect prospect{AssessCell(cell, structure_.faces(u), edge_limit_sq), {}};
-        const std::optional<Request> request = NextRequest(u, cell, prospect.found, edge_limit_sq);
-        const auto end = next_.begin() + static_cast<ptrdiff_t>(i);
-        if (request.has_value() && IsLongEnough(request->point) &&
-            std::find(next_.begin(), end, request->insertion.other) == end) {
-          prospect.point = {request->point.position, NewClip(request->point.empty_radius_sq)};
-        }
-        return prospect;
+        return AssessCell(cell, structure_.faces(next_[i]), edge_limit_sq);
       };
       foreseen_->Compute(next_, clip, judge, *context_);
       if (Polytope<D>* const cell = foreseen_->Take(v, clip, found)) {
@@ -304,9 +310,8 @@ void Refinement<D>::Settle(VertexId v, const Assessment& found, double clip, int
   if (found.IsGood()) {
     cell.Neighbours(beside_);
     neighbours_.Set(v, beside_);
-    if (is_announced_[Index(v)] == 0) {
-      is_announced_[Index(v)] = 1;
-      WakeNeighbours(cell, found, [this](VertexId u) { return !schedule_.Waits(u); });
+    if (announced_[Index(v)] != Announced::kToAll) {
+      Announce(v, cell, found);
     }
     return;
   }
@@ -336,53 +341,27 @@ absl::Status Refinement<D>::Insert(const Request& request, Polytope<D>& cell) {
   Insertion insertion = request.insertion;
   insertion.vertex = structure_.AddVertex(insertion.near, point.position);
   radius_sq_.push_back(Assessment::kNone);
-  is_announced_.push_back(0);
+  announced_.push_back(Announced::kToNone);
   context_->SetVertices(structure_.vertex_count());
   cell.CutBeforePlace(insertion.vertex, point.position);
-  LookAtNew(insertion.vertex, insertion.near, point.empty_radius_sq);
+  ScheduleNew(insertion.vertex, point.empty_radius_sq);
   if (*observer_) {
     (*observer_)(structure_, insertion);
   }
   return absl::OkStatus();
 }
 
-// Computes the cell of the new vertex `x`, and schedules it and its neighbours, but for `near`, where there may be
-// something to do. Neighbours beyond the clip learn of it when its cell is whole.
-template <int D>
-void Refinement<D>::LookAtNew(VertexId x, VertexId near, double radius_sq) {
-  const int bucket = schedule_.BucketOf(radius_sq);
-  const double clip = NewClip(radius_sq);
-  Polytope<D>* cell = foreseen_ == nullptr ? nullptr : foreseen_->TakeAdded(clip);
-  if (cell == nullptr) {
-    structure_.UnplacedClippedVoronoi(x, clip, new_);
-    cell = &new_.cell;
-  }
-  const Assessment found = AssessCell(*cell, structure_.faces(x), schedule_.UpperLengthSq(bucket));
-  if (cell->IsTooLarge()) {
-    schedule_.Add(x, radius_sq);  // the next look tells
-    return;
-  }
-  is_announced_[Index(x)] = found.is_clipped ? 0 : 1;
-  WakeNeighbours(*cell, found, [near](VertexId u) { return u != near; });
-  if (found.bad_node >= 0) {
-    schedule_.Add(x, found.bound_sq / (demands_->rho * demands_->rho));
-  } else if (found.encroached_face >= 0) {
-    schedule_.Add(x, radius_sq);
-  } else {
-    Settle(x, found, clip, bucket, *cell);
-  }
-}
-
-// Schedules those neighbours of a cell's site that it may have spoiled, and that `may_wake` allows. A simplex that breaks
-// rho has the site for a corner; its shortest edge is one of the site's, and then the site sees to it, or has belonged to
-// a cell that kept rho, and still does. What is left:
-// - well-spaced: the site may be the nearest neighbour now, so that other nodes are too far;
+// Schedules those neighbours of `v` that it may have spoiled by being added: all, or, once it has been announced to some,
+// those who do not wait. A simplex that breaks rho has v for a corner; its shortest edge is one of v's, and then v sees to it, or has belonged
+// to a cell that kept rho, and still does. What is left:
+// - well-spaced: v may be the nearest neighbour now, so that other nodes are too far;
 // - a node on one of the neighbour's own faces was too far and asked for nothing: it may have become a circumcentre if
 //   this cell touches the face beside it.
 // A plain cell has neither.
 template <int D>
-template <typename MayWake>
-void Refinement<D>::WakeNeighbours(const Polytope<D>& cell, const Assessment& found, MayWake may_wake) {
+void Refinement<D>::Announce(VertexId v, const Polytope<D>& cell, const Assessment& found) {
+  const bool is_first = announced_[Index(v)] == Announced::kToNone;
+  announced_[Index(v)] = found.is_clipped ? Announced::kWithinClip : Announced::kToAll;
   if (found.is_plain) {
     return;
   }
@@ -390,7 +369,7 @@ void Refinement<D>::WakeNeighbours(const Polytope<D>& cell, const Assessment& fo
   for (const CellNode<D>& node : cell.nodes()) {
     for (const uint16_t index : node.planes) {
       const Plane<D>& plane = cell.plane(index);
-      if (plane.kind != PlaneKind::kBisector || !may_wake(plane.vertex)) {
+      if (plane.kind != PlaneKind::kBisector || !(is_first || !schedule_.Waits(plane.vertex))) {
         continue;
       }
       double& radius_sq = radius_sq_[Index(plane.vertex)];

@@ -99,6 +99,13 @@ class Refinement {
   QueryCounters counters() const;
 
  private:
+  // Which neighbours of a vertex have been looked at in view of it.
+  enum class Announced : uint8_t {
+    kToNone,      // it has just been added
+    kWithinClip,  // those in its cell as it was clipped then
+    kToAll,
+  };
+
   // An insertion that a cell asks for, with the point before it was snapped to the boundary.
   struct Request {
     Insertion insertion;
@@ -115,10 +122,9 @@ class Refinement {
   Assessment AssessCell(Polytope<D>& cell, FaceMask site_faces, double edge_limit_sq) const;
   absl::Status Insert(const Request& request, Polytope<D>& cell);
   bool IsLongEnough(const SteinerPoint<D>& point) const { return point.empty_radius_sq >= min_edge_ * min_edge_; }
-  void LookAtNew(VertexId x, VertexId near, double radius_sq);
   void Settle(VertexId v, const Assessment& found, double clip, int earliest, Polytope<D>& cell);
-  template <typename MayWake>
-  void WakeNeighbours(const Polytope<D>& cell, const Assessment& found, MayWake may_wake);
+  void ScheduleNew(VertexId x, double nearest_sq);
+  void Announce(VertexId v, const Polytope<D>& cell, const Assessment& found);
   void CheckOrder(VertexId v, const Polytope<D>& cell, int bucket);
   void CheckInsertion(const Request& request);
 
@@ -128,11 +134,11 @@ class Refinement {
   // R(v)^2 where v is done, else infinite; but where a node on one of v's faces is too far for its edge, minus the
   // squared length of that edge.
   std::vector<double> radius_sq_;
-  std::vector<uint8_t> is_announced_;  // its neighbours have been looked at in view of it
+  std::vector<Announced> announced_;
   NeighbourLists neighbours_;          // of vertices that are done, or have been
   std::optional<Demands<D>> demands_;  // of the last run, once all vertices have been scheduled for them
   Workspace<D> own_;                   // the cell that is improved
-  Workspace<D> new_;                   // the cell of the vertex just added
+  Workspace<D> new_;                   // the cell of a vertex just added on a face
 
   // Of the run.
   double off_center_factor_ = 0;
@@ -141,7 +147,7 @@ class Refinement {
   uint64_t max_vertices_ = 0;
   ForeseenCells<D>* foreseen_ = nullptr;            // null between runs
   std::vector<VertexId> next_;                      // scratch of LookAt
-  std::vector<std::pair<VertexId, double>> woken_;  // scratch of WakeNeighbours
+  std::vector<std::pair<VertexId, double>> woken_;  // scratch of Announce
   std::vector<VertexId> beside_;                    // scratch of Settle
   RunContext* context_ = nullptr;
   const RefinementObserver<D>* observer_ = nullptr;

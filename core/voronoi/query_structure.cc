@@ -188,29 +188,22 @@ Neighbor QueryStructure<D>::Nearest(const Point<D>& p, NodeId leaf, VertexId but
 
 template <int D>
 void QueryStructure<D>::ClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace, TieRule rule) const {
-  ClipAndScan(point(v), v, tree_.leaf_of(v), radius, rule, workspace);
+  ClipAndScan(v, radius, rule, workspace);
   workspace.cell.Place();
 }
 
 template <int D>
 void QueryStructure<D>::UnplacedClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace) const {
-  ClipAndScan(point(v), v, tree_.leaf_of(v), radius, TieRule::kPerturb, workspace);
+  ClipAndScan(v, radius, TieRule::kPerturb, workspace);
 }
 
+// Computes the clipped cell of vertex `v`.
 template <int D>
-void QueryStructure<D>::UnplacedClippedVoronoiAt(const Point<D>& p, VertexId near, double radius,
-                                                 Workspace<D>& workspace) const {
-  ClipAndScan(p, kNoVertex, tree_.LeafHolding(near, p), radius, TieRule::kPerturb, workspace);
-}
-
-// Computes the clipped cell of `site`, which is vertex `v` or none yet, in leaf `own`.
-template <int D>
-void QueryStructure<D>::ClipAndScan(const Point<D>& site, VertexId v, NodeId own, double radius, TieRule rule,
-                                    Workspace<D>& workspace) const {
+void QueryStructure<D>::ClipAndScan(VertexId v, double radius, TieRule rule, Workspace<D>& workspace) const {
   std::array<PlaneKind, 2 * D> kinds;
-  const Box<D> bounds = ClippedBox<D>(box_, site, radius, kinds);
-  workspace.cell.Reset(site, bounds, kinds, rule);
-  Scan(v, own, workspace);
+  const Box<D> bounds = ClippedBox<D>(box_, point(v), radius, kinds);
+  workspace.cell.Reset(point(v), bounds, kinds, rule);
+  Scan(v, tree_.leaf_of(v), workspace);
 }
 
 // Begins with walls one side of the box beyond it.
@@ -254,7 +247,7 @@ void QueryStructure<D>::VoronoiAmong(VertexId v, const NeighbourTable& neighbour
   workspace.cell.Place();
 }
 
-// Cuts workspace.cell, whose site is vertex `v` or none yet, by the vertices in the leaves from `own` outward.
+// Cuts workspace.cell, whose site is vertex `v`, by the vertices in the leaves from `own` outward.
 template <int D>
 void QueryStructure<D>::Scan(VertexId v, NodeId own, Workspace<D>& workspace) const {
   ScanOutward(

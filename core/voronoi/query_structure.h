@@ -114,13 +114,6 @@ class QueryStructure {
   // The same, ties perturbed, for whoever may not need the nodes: they are still to be placed, by cell.Place().
   void UnplacedClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace) const;
 
-  // The same of the cell that a vertex at `p` would have, looked for from `near`.
-  //
-  // REQUIRES:   p in the box and different from all vertices; radius > 0.
-  // Complexity: as ClippedVoronoi's when p is in the clipped cell of `near`.
-  // Errors:     none.
-  void UnplacedClippedVoronoiAt(const Point<D>& p, VertexId near, double radius, Workspace<D>& workspace) const;
-
   // Computes in workspace.cell the whole Voronoi cell of `v`, inside walls one side of the box beyond it, ties
   // perturbed.
   //
@@ -171,8 +164,7 @@ class QueryStructure {
   void ScanOutward(const Point<D>& site, NodeId own, Workspace<D>& workspace, ReachSq reach_sq, Wants wants,
                    Open open) const;
   Neighbor Nearest(const Point<D>& p, NodeId leaf, VertexId but, double limit_sq, Workspace<D>& workspace) const;
-  void ClipAndScan(const Point<D>& site, VertexId v, NodeId own, double radius, TieRule rule,
-                   Workspace<D>& workspace) const;
+  void ClipAndScan(VertexId v, double radius, TieRule rule, Workspace<D>& workspace) const;
   void Scan(VertexId v, NodeId own, Workspace<D>& workspace) const;
   void BeginWhole(VertexId v, Workspace<D>& workspace) const;
   void CutByLeaf(VertexId v, NodeId leaf, Workspace<D>& workspace) const;
