@@ -89,7 +89,10 @@ Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const Demands<D>
       bound_sq = Assessment::kNone;
     }
     if (on_own_face) {
-      result.own_face_edge_sq = std::min(result.own_face_edge_sq, bound_sq / rho_sq);
+      if (bound_sq != Assessment::kNone) {
+        result.own_face_edge_sq = std::min(result.own_face_edge_sq, bound_sq / rho_sq);
+        result.own_face_radius_sq = std::max(result.own_face_radius_sq, node.radius_sq);
+      }
       continue;
     }
     if (has_sizes) {

@@ -22,6 +22,9 @@ constexpr double kClipRatioFactor = 1.25;
 // that bottom-up work has graded.
 constexpr double kNewClipFactor = 1.5;
 
+// A vertex that cuts off a node of a cell is nearer than twice the node's distance; what is more pays for rounding.
+constexpr double kWatched = 2.001;
+
 // Vertices whose first edges one thread looks for at a time.
 constexpr uint32_t kScheduledTogether = 1024;
 
@@ -112,8 +115,9 @@ void Refinement<D>::VertexAdded(VertexId x) {
 
 template <int D>
 uint64_t Refinement<D>::MemoryBytes() const {
-  return schedule_.MemoryBytes() + neighbours_.MemoryBytes() + radius_sq_.size() * sizeof(double) +
-         announced_.size() * sizeof(Announced) + (own_.seen.size() + new_.seen.size()) * sizeof(uint32_t) +
+  return schedule_.MemoryBytes() + neighbours_.MemoryBytes() + watchers_.MemoryBytes() +
+         radius_sq_.size() * sizeof(double) + announced_.size() * sizeof(Announced) +
+         (own_.seen.size() + new_.seen.size()) * sizeof(uint32_t) +
          (foreseen_ == nullptr ? 0 : foreseen_->MemoryBytes());
 }
 
@@ -123,7 +127,7 @@ void Refinement<D>::CellChanged(VertexId v, double nearest_sq, std::span<const V
   radius_sq_.resize(structure_.vertex_count(), Assessment::kNone);
   announced_.resize(structure_.vertex_count(), Announced::kToAll);
   const bool is_on_face = structure_.faces(v) != 0;
-  radius_sq_[Index(v)] = is_on_face ? -nearest_sq : Assessment::kNone;
+  Remember(v, is_on_face ? -nearest_sq : Assessment::kNone, Assessment::kNone);
   if (is_on_face && demands_->criterion == Criterion::kWellSpaced) {
     schedule_.Add(v, nearest_sq);  // what is remembered for the faces leaves no room for the radius
   }
@@ -140,6 +144,7 @@ template <int D>
 absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& team) {
   neighbours_.Clear();
   radius_sq_.assign(structure_.vertex_count(), Assessment::kNone);
+  watchers_.Clear();
   announced_.assign(structure_.vertex_count(), Announced::kToAll);
   const uint32_t count = structure_.vertex_count();
   std::vector<Workspace<D>> workspaces(team.threads());
@@ -179,11 +184,11 @@ double Refinement<D>::FirstEdgeSq(const Demands<D>& demands, VertexId v, double 
   return first_sq;
 }
 
-// Schedules the new vertex `x`, whose nearest neighbour is as near as it says. If it lies on a face it is announced at once:
-// a neighbour that remembers a node there may have to look sooner than x.
+// Schedules the new vertex `x`, whose nearest neighbour is as near as it says. If a vertex on a face of x remembers a node
+// there that x may cut off, x is announced at once: that one may have to look sooner than x.
 template <int D>
 void Refinement<D>::ScheduleNew(VertexId x, double nearest_sq) {
-  if (structure_.faces(x) != 0) {
+  if (structure_.faces(x) != 0 && watchers_.IsWatched(structure_.point(x), structure_.faces(x))) {
     structure_.ClippedVoronoi(x, kNewClipFactor * std::sqrt(nearest_sq), new_, TieRule::kPerturb);
     if (!new_.cell.IsTooLarge()) {
       Announce(x, new_.cell, Assess<D>(new_.cell, structure_.faces(x), *demands_, nearest_sq));
@@ -216,7 +221,7 @@ absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
     if (schedule_.HasBelow(bucket)) {
       // What was just added, or told of it, may ask for something by a shorter edge than this bucket's: that comes first.
       const double own_sq = found.bad_node >= 0 ? found.bound_sq / (demands_->rho * demands_->rho) : edge_limit_sq;
-      radius_sq_[Index(v)] = Assessment::kNone;
+      Remember(v, Assessment::kNone);
       schedule_.AddToBucket(v, std::min(bucket, schedule_.BucketOf(own_sq)));
       return absl::OkStatus();
     }
@@ -300,13 +305,26 @@ Assessment Refinement<D>::AssessCell(Polytope<D>& cell, FaceMask site_faces, dou
   return Assess<D>(cell, site_faces, *demands_, edge_limit_sq);
 }
 
+// Sets radius_sq_; where that stands for an edge, a vertex that cuts off the node too far for it is within `reach`.
+template <int D>
+void Refinement<D>::Remember(VertexId v, double radius_sq, double reach) {
+  if (radius_sq_[Index(v)] < 0) {
+    watchers_.Remove(v);
+  }
+  radius_sq_[Index(v)] = radius_sq;
+  if (radius_sq < 0) {
+    watchers_.Add(v, structure_.point(v), reach);
+  }
+}
+
 // Declares a vertex that needs nothing now done, or puts it where it will be looked at again: not before bucket
 // `earliest`.
 template <int D>
 void Refinement<D>::Settle(VertexId v, const Assessment& found, double clip, int earliest, Polytope<D>& cell) {
-  radius_sq_[Index(v)] = found.own_face_edge_sq != Assessment::kNone ? -found.own_face_edge_sq
-                         : found.IsGood()                            ? found.radius_sq
-                                                                     : Assessment::kNone;
+  const double radius_sq = found.own_face_edge_sq != Assessment::kNone ? -found.own_face_edge_sq
+                           : found.IsGood()                            ? found.radius_sq
+                                                                       : Assessment::kNone;
+  Remember(v, radius_sq, kWatched * std::sqrt(found.own_face_radius_sq));
   if (found.IsGood()) {
     cell.Neighbours(beside_);
     neighbours_.Set(v, beside_);
@@ -372,12 +390,12 @@ void Refinement<D>::Announce(VertexId v, const Polytope<D>& cell, const Assessme
       if (plane.kind != PlaneKind::kBisector || !(is_first || !schedule_.Waits(plane.vertex))) {
         continue;
       }
-      double& radius_sq = radius_sq_[Index(plane.vertex)];
+      const double radius_sq = radius_sq_[Index(plane.vertex)];
       const bool was_cut = radius_sq < 0 && cell.FacesOf(node) != 0;
       const bool is_too_far = demands_->criterion == Criterion::kWellSpaced && radius_sq > rho_sq * 2 * plane.offset;
       if (was_cut || is_too_far) {
         const double edge_sq = was_cut ? std::min(-radius_sq, 2 * plane.offset) : 2 * plane.offset;
-        radius_sq = Assessment::kNone;
+        Remember(plane.vertex, Assessment::kNone);
         woken_.emplace_back(plane.vertex, edge_sq);
       }
     }

@@ -13,6 +13,7 @@
 #include "core/base/run_context.h"
 #include "core/refine/assessment.h"
 #include "core/refine/demands.h"
+#include "core/refine/face_watchers.h"
 #include "core/refine/schedule.h"
 #include "core/refine/steiner_point.h"
 #include "core/voronoi/neighbour_lists.h"
@@ -124,6 +125,7 @@ class Refinement {
   bool IsLongEnough(const SteinerPoint<D>& point) const { return point.empty_radius_sq >= min_edge_ * min_edge_; }
   void Settle(VertexId v, const Assessment& found, double clip, int earliest, Polytope<D>& cell);
   void ScheduleNew(VertexId x, double nearest_sq);
+  void Remember(VertexId v, double radius_sq, double reach = 0);
   void Announce(VertexId v, const Polytope<D>& cell, const Assessment& found);
   void CheckOrder(VertexId v, const Polytope<D>& cell, int bucket);
   void CheckInsertion(const Request& request);
@@ -134,6 +136,7 @@ class Refinement {
   // R(v)^2 where v is done, else infinite; but where a node on one of v's faces is too far for its edge, minus the
   // squared length of that edge.
   std::vector<double> radius_sq_;
+  FaceWatchers<D> watchers_;  // those of whom an edge is remembered
   std::vector<Announced> announced_;
   NeighbourLists neighbours_;          // of vertices that are done, or have been
   std::optional<Demands<D>> demands_;  // of the last run, once all vertices have been scheduled for them
