@@ -30,7 +30,7 @@ void ForeseenCells<D>::ComputeOne(VertexId v, size_t i, const Judge& judge, cons
   structure_.UnplacedClippedVoronoi(v, clip_, workspace);
   foreseen.vertex = v;
   foreseen.found = judge(i, workspace.cell);
-  foreseen.cell.CopyFrom(workspace.cell);
+  std::swap(foreseen.cell, workspace.cell);
 }
 
 template <int D>

@@ -375,12 +375,13 @@ absl::Status Refinement<D>::Insert(const Request& request, Polytope<D>& cell) {
 // - well-spaced: v may be the nearest neighbour now, so that other nodes are too far;
 // - a node on one of the neighbour's own faces was too far and asked for nothing: it may have become a circumcentre if
 //   this cell touches the face beside it.
-// A plain cell has neither.
+// An inner cell under radius-edge has neither.
 template <int D>
 void Refinement<D>::Announce(VertexId v, const Polytope<D>& cell, const Assessment& found) {
   const bool is_first = announced_[Index(v)] == Announced::kToNone;
   announced_[Index(v)] = found.is_clipped ? Announced::kWithinClip : Announced::kToAll;
-  if (found.is_plain) {
+  const bool touches_faces = structure_.faces(v) != 0 || found.encroached_face >= 0;
+  if (demands_->criterion == Criterion::kRadiusEdge && !touches_faces) {
     return;
   }
   const double rho_sq = demands_->rho * demands_->rho;

@@ -60,14 +60,6 @@ class NodeColumns {
     }
   }
 
-  // Makes this a copy of what `other` tells of its nodes.
-  void CopyFrom(const NodeColumns& other) {
-    const std::span<const Group> groups = other.groups();
-    groups_.assign(groups.begin(), groups.end());
-    found_.resize((groups_.size() * kLanes + kWordBits - 1) / kWordBits);
-    count_ = other.count_;
-  }
-
   void Set(size_t i, const Point<D>& x, double slack) {
     Group& group = groups_[i / kLanes];
     const size_t lane = i % kLanes;

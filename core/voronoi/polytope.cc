@@ -67,23 +67,6 @@ void Polytope<D>::Reset(const Point<D>& site, const Box<D>& bounds, const std::a
 }
 
 template <int D>
-void Polytope<D>::CopyFrom(const Polytope& other) {
-  site_ = other.site_;
-  rule_ = other.rule_;
-  reach_ = other.reach_;
-  largest_slack_ = other.largest_slack_;
-  is_placed_ = other.is_placed_;
-  planes_ = other.planes_;
-  joints_.assign(other.joints_.begin(), other.joints_.begin() + static_cast<std::ptrdiff_t>(other.columns_.count()));
-  if (is_placed_) {
-    nodes_ = other.nodes_;
-  }
-  columns_.CopyFrom(other.columns_);
-  cuts_ = other.cuts_;
-  counters_ = other.counters_;
-}
-
-template <int D>
 bool Polytope<D>::CutOff(VertexId u, const Point<D>& position, const Point<D>& normal, double length_sq) {
   return BestVectorUnit() == VectorUnit::kAvx2 ? CutOffAvx2(u, position, normal, length_sq)
                                                : CutOffWith<2>(u, position, normal, length_sq);

@@ -90,12 +90,6 @@ class Polytope {
   // Begins with the box [low, high], which holds `site` and whose faces are of kind `kinds[FaceIndex]`.
   void Reset(const Point<D>& site, const Box<D>& bounds, const std::array<PlaneKind, 2 * D>& kinds, TieRule rule);
 
-  // Makes this a copy of `other` without its scratch space.
-  //
-  // Complexity: O(nodes + planes); no allocation once warm.
-  // Errors:     none.
-  void CopyFrom(const Polytope& other);
-
   // Cuts the cell by the bisector of its site and `u`, keeping the site's side. Returns whether anything was cut off.
   //
   // REQUIRES:   u != site, and not cut by before; !IsTooLarge().
