@@ -18,9 +18,9 @@ namespace {
 // bad node is seen.
 constexpr double kClipFactor = 4;
 constexpr double kClipRatioFactor = 1.25;
-// The cell of a new vertex on a face is clipped at this times its empty radius to announce it: no farther out than the region
-// that bottom-up work has graded.
-constexpr double kNewClipFactor = 1.5;
+// What counts for a new vertex at once is this times its empty radius away: no farther out than the region that bottom-up
+// work has graded. Its cell is clipped so to announce it.
+constexpr double kAround = 1.5;
 
 // A vertex that cuts off a node of a cell is nearer than twice the node's distance; what is more pays for rounding.
 constexpr double kWatched = 2.001;
@@ -156,7 +156,8 @@ absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& t
     for (uint32_t i = begin; i < end && !context_->IsCancelled(); ++i) {
       const VertexId v{i};
       const double nearest_sq = structure_.ApproximateNearestNeighbor(v, workspace).distance_sq;
-      first_sq[i] = FirstEdgeSq(demands, v, nearest_sq);
+      // A node x farther from v than h(x) is farther than h(v) / 2, as h is 1-Lipschitz.
+      first_sq[i] = FirstEdgeSq(demands, v, nearest_sq, demands.sizes.AtSq(structure_.point(v)) / 4);
     }
   });
   WELLSPACE_RETURN_IF_ERROR(context_->Check());
@@ -166,10 +167,10 @@ absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& t
   return absl::OkStatus();
 }
 
-// Nothing shorter than this can ask for something at `v`, whose nearest neighbour is as near as it says: an edge, a face
-// of the box, or a size. (A node x farther from v than h(x) is farther than h(v) / 2, as h is 1-Lipschitz.)
+// Nothing shorter than this can ask for something at `v`: an edge, if the nearest neighbour is as near as it says; a face of
+// the box; or a size, if the least that counts is as it says.
 template <int D>
-double Refinement<D>::FirstEdgeSq(const Demands<D>& demands, VertexId v, double nearest_sq) const {
+double Refinement<D>::FirstEdgeSq(const Demands<D>& demands, VertexId v, double nearest_sq, double size_sq) const {
   double first_sq = nearest_sq;
   for (int face = 0; face < 2 * D; ++face) {
     if (((structure_.faces(v) >> face) & 1) == 0) {
@@ -177,24 +178,22 @@ double Refinement<D>::FirstEdgeSq(const Demands<D>& demands, VertexId v, double 
       first_sq = std::min(first_sq, distance * distance);
     }
   }
-  if (!demands.sizes.IsUnbounded()) {
-    const double size_sq = demands.sizes.AtSq(structure_.point(v));
-    first_sq = std::min(first_sq, size_sq / (4 * demands.rho * demands.rho));
-  }
-  return first_sq;
+  return std::min(first_sq, size_sq / (demands.rho * demands.rho));
 }
 
 // Schedules the new vertex `x`, whose nearest neighbour is as near as it says. If a vertex on a face of x remembers a node
 // there that x may cut off, x is announced at once: that one may have to look sooner than x.
 template <int D>
 void Refinement<D>::ScheduleNew(VertexId x, double nearest_sq) {
-  if (structure_.faces(x) != 0 && watchers_.IsWatched(structure_.point(x), structure_.faces(x))) {
-    structure_.ClippedVoronoi(x, kNewClipFactor * std::sqrt(nearest_sq), new_, TieRule::kPerturb);
+  const Point<D>& p = structure_.point(x);
+  const double around = kAround * std::sqrt(nearest_sq);
+  if (structure_.faces(x) != 0 && watchers_.IsWatched(p, structure_.faces(x))) {
+    structure_.ClippedVoronoi(x, around, new_, TieRule::kPerturb);
     if (!new_.cell.IsTooLarge()) {
       Announce(x, new_.cell, Assess<D>(new_.cell, structure_.faces(x), *demands_, nearest_sq));
     }
   }
-  schedule_.Add(x, FirstEdgeSq(*demands_, x, nearest_sq));
+  schedule_.Add(x, FirstEdgeSq(*demands_, x, nearest_sq, demands_->sizes.LeastAroundSq(p, around)));
 }
 
 // Inserts Steiner points until nothing that bucket `bucket` may ask for is wrong with the cell of `v`.

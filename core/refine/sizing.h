@@ -3,6 +3,7 @@
 #define WELLSPACE_CORE_REFINE_SIZING_H_
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <vector>
 
@@ -36,6 +37,18 @@ struct SizeField {
     for (const Region& region : regions) {
       least =
           std::min(least, std::max(region.max_circumradius * region.max_circumradius, DistanceSq<D>(x, region.box)));
+    }
+    return least;
+  }
+
+  // The least h(y)^2 with |x y| <= reach.
+  //
+  // Complexity: O(regions).
+  double LeastAroundSq(const Point<D>& x, double reach) const {
+    double least = max_circumradius * max_circumradius;
+    for (const Region& region : regions) {
+      const double bound = std::max(region.max_circumradius, std::sqrt(DistanceSq<D>(x, region.box)) - reach);
+      least = std::min(least, bound * bound);
     }
     return least;
   }

@@ -38,7 +38,7 @@ std::vector<GoldenMesh> GoldenMeshes() {
       {"lines_2_tight", "lines", 2, 1000, {.rho = 1}, 8864, 0x2840c9e601269a46},
       {"grid_2", "grid", 2, 1000, {}, 1153, 0x59af2698998911f5},
       {"cospherical_2", "cospherical", 2, 500, {}, 946, 0xb505d016a23dd44b},
-      {"uniform_2_sized", "uniform", 2, 100, {.max_circumradius = 0.02}, 1716, 0x34625157e2613fb3},
+      {"uniform_2_sized", "uniform", 2, 100, {.max_circumradius = 0.02}, 1743, 0x6253ddcb8115c893},
       {"uniform_3", "uniform", 3, 1000, {}, 3697, 0x458ecc4ef05ca7dc},
       {"uniform_3_unmended", "uniform", 3, 1000, {.min_dihedral = 0}, 3679, 0x79006616f584210f},
       {"uniform_3_well_spaced", "uniform", 3, 300, {.criterion = Criterion::kWellSpaced}, 2240, 0x44902be6f4a710b7},
@@ -55,8 +55,8 @@ std::vector<GoldenMesh> GoldenMeshes() {
        3,
        100,
        {.size_boxes = {{{0.2, 0.2, 0.2}, {0.4, 0.4, 0.4}, 0.03}}},
-       1221,
-       0x24cafcffbf0e0db9},
+       1241,
+       0x959660f7dda912c8},
   };
 }
 

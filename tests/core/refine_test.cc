@@ -10,6 +10,7 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -520,6 +521,28 @@ TEST(SteinerPointTest, SnapsByHand) {
   EXPECT_NEAR(snap({0.05, 0.96}, 0.2).empty_radius_sq, 0.04 - 0.0016 - 0.0025, 1e-15);
   EXPECT_EQ(snap({-1e-17, 0.5}, 0.2).position, (Point<2>{0, 0.5})) << "rounded out of the box";
   EXPECT_EQ(snap({0, 0.5}, 0.4).position, (Point<2>{0, 0.5})) << "on a face already";
+}
+
+TEST(SizeFieldTest, LeastAroundAPointIsTheLeastOfItsBall) {
+  constexpr double kFar = 1.7;
+  const SizeField<2> sizes{.max_circumradius = 1.5, .regions = {{{{0, 0}, {1, 1}}, 0.25}, {{{4, 0}, {5, 1}}, 0.5}}};
+  test::SplitMix64 random(test::Seed(2008));
+  for (int repeat = 0; repeat < 50; ++repeat) {
+    const Point<2> x = {8 * random.Unit() - 2, 5 * random.Unit() - 2};
+    const double reach = kFar * random.Unit();
+    double least = sizes.AtSq(x);
+    EXPECT_NEAR(sizes.LeastAroundSq(x, 0), least, 1e-14);
+    constexpr int kSteps = 200;
+    for (int i = 0; i < kSteps; ++i) {
+      for (int j = 0; j <= kSteps; ++j) {
+        const double angle = 2 * std::numbers::pi * i / kSteps;
+        const double radius = reach * j / kSteps;
+        least = std::min(least, sizes.AtSq({x[0] + radius * std::cos(angle), x[1] + radius * std::sin(angle)}));
+      }
+    }
+    EXPECT_LE(sizes.LeastAroundSq(x, reach), least * (1 + 1e-12));
+    EXPECT_NEAR(sizes.LeastAroundSq(x, reach), least, 0.01);
+  }
 }
 
 TEST(ScheduleTest, BucketsDivideSquaredLengthsByTwo) {
