@@ -216,7 +216,8 @@ class Integrator {
 
   Surroundings LookAt(const Point<D>& x) {
     ++looks_;
-    const NearestTwo two = points_.Nearest(x);
+    const NearestTwo two = points_.Nearest(x, last_);
+    last_ = two;
     Surroundings result;
     result.nearest = std::sqrt(two.first_sq);
     result.second_point = std::sqrt(two.second_sq);
@@ -394,6 +395,7 @@ class Integrator {
   uint64_t looks_ = 0;
   uint64_t full_looks_ = 0;
   Share share_;
+  NearestTwo last_;  // of the place looked at last
 };
 
 // ---- Sampling ----------------------------------------------------------------------------------------------------------
@@ -448,7 +450,7 @@ void Add(Share& sum, const Share& share, double factor = 1) {
   sum.sizes += factor * share.sizes;
 }
 
-// Leaves looked at between two looks at the error.
+// Leaves looked at between two looks at the error, at most.
 constexpr size_t kLeavesTogether = 64;
 
 // Draws leaves without replacement: from those with vertices and those without, as there may be few of the former and nearly
@@ -485,7 +487,7 @@ absl::StatusOr<Sample> SampleLeaves(const QueryStructure<D>& structure, Integrat
     if (widest == nullptr || sample.error <= effort.sampling_error * total) {
       break;
     }
-    const size_t end = std::min(widest->leaves.size(), widest->taken + kLeavesTogether);
+    const size_t end = std::min(widest->leaves.size(), widest->taken + std::min(least, kLeavesTogether));
     for (; widest->taken < end; ++widest->taken) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
       const size_t rest = widest->leaves.size() - widest->taken;

@@ -33,7 +33,7 @@ struct EstimateEffort {
 };
 
 // Enough for a bar of progress, at less than a hundredth of what meshing costs.
-inline constexpr EstimateEffort kGlance{0.15, 64, 64, uint64_t{1} << 12};
+inline constexpr EstimateEffort kGlance{0.15, 24, 64, uint64_t{1} << 11};
 
 // Predicts what refinement for `demands` will make of `structure`.
 //

@@ -3,6 +3,7 @@
 #define WELLSPACE_CORE_REFINE_NEAREST_POINTS_H_
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -21,6 +22,7 @@ struct NearestTwo {
   double first_sq = std::numeric_limits<double>::infinity();
   double second_sq = std::numeric_limits<double>::infinity();
   uint32_t first = 0;
+  uint32_t second = 0;
 };
 
 // Finds points near any place: boxes around runs of points in Morton order, and around pairs of boxes. A tree would walk
@@ -74,11 +76,17 @@ class NearestPoints {
   // Complexity: O(log n) for most clouds and places.
   // Errors:     none.
   NearestTwo Nearest(const Point<D>& x, size_t but = ~size_t{0}) const {
-    NearestTwo result;
-    if (!points_.empty()) {
-      Descend(x, but, static_cast<int>(levels_.size()) - 1, 0, 0, result);
+    return NearestWithin(x, std::numeric_limits<double>::infinity(), but);
+  }
+
+  // The same where two points are known, those that were nearest to a place nearby.
+  NearestTwo Nearest(const Point<D>& x, const NearestTwo& nearby) const {
+    double limit_sq = std::numeric_limits<double>::infinity();
+    if (nearby.second_sq < limit_sq) {
+      limit_sq = std::max(DistanceSq<D>(x, points_[nearby.first]), DistanceSq<D>(x, points_[nearby.second]));
+      limit_sq = std::nextafter(limit_sq, std::numeric_limits<double>::infinity());
     }
-    return result;
+    return NearestWithin(x, limit_sq, ~size_t{0});
   }
 
  private:
@@ -91,18 +99,28 @@ class NearestPoints {
     }
   }
 
-  void Descend(const Point<D>& x, size_t but, int level, size_t index, double distance_sq, NearestTwo& result) const {
-    if (distance_sq >= result.second_sq) {
-      return;
+  // REQUIRES:   two points are nearer than the limit, or it is infinite.
+  NearestTwo NearestWithin(const Point<D>& x, double limit_sq, size_t but) const {
+    NearestTwo result;
+    if (!points_.empty()) {
+      Descend(x, but, static_cast<int>(levels_.size()) - 1, 0, limit_sq, result);
     }
+    return result;
+  }
+
+  void Descend(const Point<D>& x, size_t but, int level, size_t index, double limit_sq, NearestTwo& result) const {
     if (level == 0) {
-      for (size_t i = index * kRun; i < std::min(points_.size(), (index + 1) * kRun); ++i) {
-        const double d = i == but ? std::numeric_limits<double>::infinity() : DistanceSq<D>(x, points_[i]);
+      const size_t end = std::min(points_.size(), (index + 1) * kRun);
+      for (size_t i = index * kRun; i < end; ++i) {
+        const double d = DistanceSq<D>(x, points_[i]);
+        if (d >= result.second_sq || i == but) {
+          continue;
+        }
         if (d < result.first_sq) {
-          result.second_sq = std::exchange(result.first_sq, d);
-          result.first = static_cast<uint32_t>(i);
+          result = {d, result.first_sq, static_cast<uint32_t>(i), result.first};
         } else {
-          result.second_sq = std::min(result.second_sq, d);
+          result.second_sq = d;
+          result.second = static_cast<uint32_t>(i);
         }
       }
       return;
@@ -110,18 +128,18 @@ class NearestPoints {
     const std::vector<Box<D>>& below = levels_[level - 1];
     size_t near = 2 * index;
     double near_sq = DistanceSq<D>(x, below[near]);
-    if (near + 1 == below.size()) {
-      Descend(x, but, level - 1, near, near_sq, result);
-      return;
-    }
     size_t far = near + 1;
-    double far_sq = DistanceSq<D>(x, below[far]);
+    double far_sq = far < below.size() ? DistanceSq<D>(x, below[far]) : std::numeric_limits<double>::infinity();
     if (far_sq < near_sq) {
       std::swap(near, far);
       std::swap(near_sq, far_sq);
     }
-    Descend(x, but, level - 1, near, near_sq, result);
-    Descend(x, but, level - 1, far, far_sq, result);
+    if (near_sq < std::min(limit_sq, result.second_sq)) {
+      Descend(x, but, level - 1, near, limit_sq, result);
+    }
+    if (far_sq < std::min(limit_sq, result.second_sq)) {
+      Descend(x, but, level - 1, far, limit_sq, result);
+    }
   }
 
   std::vector<Point<D>> points_;
