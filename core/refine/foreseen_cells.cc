@@ -1,5 +1,6 @@
 #include "core/refine/foreseen_cells.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/base/dimensions.h"
@@ -11,26 +12,40 @@ void ForeseenCells<D>::Compute(std::span<const VertexId> vertices, double clip, 
                                const RunContext& context) {
   clip_ = clip;
   vertex_count_ = structure_.vertex_count();
-  count_ = left_ = vertices.size();
-  if (cells_.size() < count_) {
-    cells_.resize(count_);
+  vertices_.assign(vertices.begin(), vertices.end());
+  foreseen_.resize(vertices.size());
+  left_ = vertices.size();
+  own_.resize(team_.threads());
+  for (Own& own : own_) {
+    own.count = 0;
   }
-  workspaces_.resize(team_.threads());
-  team_.ForEach(count_, [&](size_t i) { ComputeOne(vertices[i], i, judge, context); });
+  team_.ForEach(vertices.size(), [&](size_t i) { foreseen_[i] = ComputeOne(vertices[i], i, judge, context); });
 }
 
 template <int D>
-void ForeseenCells<D>::ComputeOne(VertexId v, size_t i, const Judge& judge, const RunContext& context) {
-  Workspace<D>& workspace = workspaces_[ThreadTeam::CurrentThread()];
-  Foreseen& foreseen = cells_[i];
-  foreseen.vertex = kNoVertex;
+typename ForeseenCells<D>::Foreseen* ForeseenCells<D>::ComputeOne(VertexId v, size_t i, const Judge& judge,
+                                                                  const RunContext& context) {
   if (context.IsCancelled()) {
-    return;
+    return nullptr;
   }
-  structure_.UnplacedClippedVoronoi(v, clip_, workspace);
-  foreseen.vertex = v;
-  foreseen.found = judge(i, workspace.cell);
-  std::swap(foreseen.cell, workspace.cell);
+  Own& own = own_[ThreadTeam::CurrentThread()];
+  Polytope<D>& cell = own.workspace.cell;
+  structure_.UnplacedClippedVoronoi(v, clip_, own.workspace);
+  if (cell.IsTooLarge()) {
+    return nullptr;
+  }
+  if (own.count == own.cells.size()) {
+    own.cells.push_back(std::make_unique<Foreseen>());
+  }
+  Foreseen& foreseen = *own.cells[own.count++];
+  foreseen.found = judge(i, cell);
+  foreseen.neighbours.clear();
+  if (foreseen.found.IsGood()) {
+    cell.Neighbours(foreseen.neighbours);
+  }
+  foreseen.cut_limit_sq = cell.CutLimitSq();
+  std::swap(foreseen.cell, cell);
+  return &foreseen;
 }
 
 template <int D>
@@ -39,31 +54,37 @@ bool ForeseenCells<D>::Has(double clip) const {
 }
 
 template <int D>
-Polytope<D>* ForeseenCells<D>::Take(VertexId v, double clip, std::optional<Assessment>& found) {
+Look<D> ForeseenCells<D>::Take(VertexId v, double clip) {
   if (!Has(clip)) {
-    return nullptr;
+    return {};
   }
-  for (size_t i = 0; i < count_; ++i) {
-    if (cells_[i].vertex == v) {
-      Foreseen& taken = cells_[i];
-      taken.vertex = kNoVertex;
-      --left_;
-      if (!CutByNew(taken.cell)) {
-        found = taken.found;
-      }
-      return &taken.cell;
-    }
+  const auto at = std::find(vertices_.begin(), vertices_.end(), v);
+  if (at == vertices_.end()) {
+    return {};
   }
-  return nullptr;
+  *at = kNoVertex;
+  --left_;
+  Foreseen* const foreseen = foreseen_[at - vertices_.begin()];
+  if (foreseen == nullptr) {
+    return {};
+  }
+  if (CutByNew(v, *foreseen)) {
+    return {&foreseen->cell};
+  }
+  return {&foreseen->cell, &foreseen->found, foreseen->neighbours};
 }
 
-// Cuts a cell by the vertices that were added since it was computed; returns whether that changed it.
+// Cuts the cell of `v` by the vertices that were added since it was computed; returns whether that changed it.
 template <int D>
-bool ForeseenCells<D>::CutByNew(Polytope<D>& cell) const {
+bool ForeseenCells<D>::CutByNew(VertexId v, Foreseen& foreseen) const {
   bool is_cut = false;
+  const Point<D> site = structure_.point(v);
   const uint32_t end = structure_.vertex_count();
-  for (uint32_t u = vertex_count_; u < end && !cell.IsTooLarge(); ++u) {
-    is_cut |= cell.CutBeforePlace(VertexId{u}, structure_.point(VertexId{u}));
+  for (uint32_t u = vertex_count_; u < end; ++u) {
+    const Point<D>& p = structure_.point(VertexId{u});
+    if (NormSq<D>(Difference<D>(p, site)) <= foreseen.cut_limit_sq && !foreseen.cell.IsTooLarge()) {
+      is_cut |= foreseen.cell.CutBeforePlace(VertexId{u}, p);
+    }
   }
   return is_cut;
 }
@@ -71,11 +92,11 @@ bool ForeseenCells<D>::CutByNew(Polytope<D>& cell) const {
 template <int D>
 uint64_t ForeseenCells<D>::MemoryBytes() const {
   uint64_t bytes = 0;
-  for (const Foreseen& foreseen : cells_) {
-    bytes += foreseen.cell.MemoryBytes();
-  }
-  for (const Workspace<D>& workspace : workspaces_) {
-    bytes += workspace.seen.size() * sizeof(uint32_t) + workspace.cell.MemoryBytes();
+  for (const Own& own : own_) {
+    bytes += own.workspace.seen.size() * sizeof(uint32_t) + own.workspace.cell.MemoryBytes();
+    for (const auto& foreseen : own.cells) {
+      bytes += sizeof(Foreseen) + foreseen->cell.MemoryBytes();
+    }
   }
   return bytes;
 }
@@ -83,8 +104,8 @@ uint64_t ForeseenCells<D>::MemoryBytes() const {
 template <int D>
 QueryCounters ForeseenCells<D>::counters() const {
   QueryCounters counters;
-  for (const Workspace<D>& workspace : workspaces_) {
-    counters.Add(workspace.counters);
+  for (const Own& own : own_) {
+    counters.Add(own.workspace.counters);
   }
   return counters;
 }

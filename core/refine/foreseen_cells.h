@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <optional>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -18,6 +18,14 @@
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {
+
+// A clipped cell, and what is known of it.
+template <int D>
+struct Look {
+  Polytope<D>* cell = nullptr;
+  const Assessment* found = nullptr;          // null if that is still to be found
+  std::span<const VertexId> neighbours = {};  // all that the cell has, if it has been found good
+};
 
 // Clipped cells of vertices that are about to be looked at. They stay of use while vertices are added: a cell that is taken is first cut by those added since it was computed, which makes it
 // the cell of now. So what the refinement does with a cell, one after the other, does not depend on the threads.
@@ -48,12 +56,12 @@ class ForeseenCells {
   // Whether cells clipped so are left, and not so many vertices were added since that they are sooner computed anew.
   bool Has(double clip) const;
 
-  // The cell of `v` as it is now, the caller's until the next Compute; null if it is not left. Sets `found` to what was
-  // found of it, if it is still as it was.
+  // The cell of `v` as it is now, the caller's until the next Compute, with what was found of it if it is still as it was;
+  // no cell if it is not left.
   //
   // Complexity: O(kMost + vertices added since).
   // Errors:     none.
-  Polytope<D>* Take(VertexId v, double clip, std::optional<Assessment>& found);
+  Look<D> Take(VertexId v, double clip);
 
   // What all this takes in memory, roughly.
   uint64_t MemoryBytes() const;
@@ -64,23 +72,30 @@ class ForeseenCells {
   static constexpr uint32_t kMostInsertions = 1024;
 
   struct Foreseen {
-    VertexId vertex = kNoVertex;  // none once taken, or if left out
     Polytope<D> cell;
     Assessment found;
+    double cut_limit_sq = 0;           // of the cell, beside what else is read of one that stays as it is
+    std::vector<VertexId> neighbours;  // of a good cell
   };
 
-  void ComputeOne(VertexId v, size_t i, const Judge& judge, const RunContext& context);
-  bool CutByNew(Polytope<D>& cell) const;
+  // What only one thread writes, so that it stays in the caches of its core. Arrays only grow, so that polytopes are reused.
+  struct alignas(64) Own {
+    Workspace<D> workspace;
+    std::vector<std::unique_ptr<Foreseen>> cells;
+    size_t count = 0;  // of cells, since the last Compute
+  };
+
+  Foreseen* ComputeOne(VertexId v, size_t i, const Judge& judge, const RunContext& context);
+  bool CutByNew(VertexId v, Foreseen& foreseen) const;
 
   const QueryStructure<D>& structure_;
   ThreadTeam& team_;
   double clip_ = 0;
-  uint32_t vertex_count_ = 0;  // of the structure when the cells were computed
-  // Arrays only grow, so that polytopes are reused.
-  std::vector<Foreseen> cells_;  // the first count_ of them
-  size_t count_ = 0;
-  size_t left_ = 0;
-  std::vector<Workspace<D>> workspaces_;  // by thread
+  uint32_t vertex_count_ = 0;        // of the structure when the cells were computed
+  std::vector<VertexId> vertices_;   // whose cells; none once taken
+  std::vector<Foreseen*> foreseen_;  // by vertex; null if left out
+  size_t left_ = 0;                  // to be taken
+  std::vector<Own> own_;             // by thread
 };
 
 }  // namespace wellspace::core

@@ -201,19 +201,18 @@ template <int D>
 absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
   const double edge_limit_sq = schedule_.UpperLengthSq(bucket);
   const double clip = clip_factor_ * std::sqrt(edge_limit_sq);
-  std::optional<Assessment> known;
-  Polytope<D>& cell = LookAt(v, bucket, clip, known);
+  Look<D> look = LookAt(v, bucket, clip);
+  Polytope<D>& cell = *look.cell;
   if constexpr (kChecks) {
     cell.Place();
     CheckOrder(v, cell, bucket);
   }
   while (true) {
-    if (cell.IsTooLarge()) {
+    if (look.found == nullptr && cell.IsTooLarge()) {
       return absl::ResourceExhaustedError(absl::StrCat("the cell of a vertex has more than ", Polytope<D>::kMostNodes,
                                                        " nodes; lower rho = ", demands_->rho));
     }
-    const Assessment found = known.has_value() ? *known : AssessCell(cell, structure_.faces(v), edge_limit_sq);
-    known.reset();
+    const Assessment found = look.found != nullptr ? *look.found : AssessCell(cell, structure_.faces(v), edge_limit_sq);
     if (announced_[Index(v)] == Announced::kToNone) {
       Announce(v, cell, found);
     }
@@ -226,12 +225,13 @@ absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
     }
     const std::optional<Request> request = NextRequest(v, cell, found, edge_limit_sq);
     if (!request.has_value()) {
-      Settle(v, found, clip, bucket + 1, cell);
+      Settle(v, found, clip, bucket + 1, look);
       return absl::OkStatus();
     }
     // In 5-D and 6-D a cell may ask for a dozen points, which take milliseconds each.
     WELLSPACE_RETURN_IF_ERROR(context_->Check());
     WELLSPACE_RETURN_IF_ERROR(Insert(*request, cell));
+    look = {&cell};
   }
 }
 
@@ -263,12 +263,12 @@ std::optional<typename Refinement<D>::Request> Refinement<D>::NextRequest(Vertex
   return request;
 }
 
-// The cell of `v`, which was taken from `bucket`, clipped at `clip`; sets `found` to what was found of it, if anything.
+// The cell of `v`, which was taken from `bucket`, clipped at `clip`.
 // With several threads the cells of the vertices that are next in the bucket are computed with it, if there are enough.
 template <int D>
-Polytope<D>& Refinement<D>::LookAt(VertexId v, int bucket, double clip, std::optional<Assessment>& found) {
-  if (Polytope<D>* const cell = foreseen_->Take(v, clip, found)) {
-    return *cell;
+Look<D> Refinement<D>::LookAt(VertexId v, int bucket, double clip) {
+  if (const Look<D> look = foreseen_->Take(v, clip); look.cell != nullptr) {
+    return look;
   }
   if (foreseen_->threads() > 1 && !foreseen_->Has(clip)) {
     next_.assign(1, v);
@@ -284,13 +284,13 @@ Polytope<D>& Refinement<D>::LookAt(VertexId v, int bucket, double clip, std::opt
         return AssessCell(cell, structure_.faces(next_[i]), edge_limit_sq);
       };
       foreseen_->Compute(next_, clip, judge, *context_);
-      if (Polytope<D>* const cell = foreseen_->Take(v, clip, found)) {
-        return *cell;
+      if (const Look<D> look = foreseen_->Take(v, clip); look.cell != nullptr) {
+        return look;
       }
     }
   }
   structure_.UnplacedClippedVoronoi(v, clip, own_);
-  return own_.cell;
+  return {&own_.cell};
 }
 
 // What is wrong with a cell, whose nodes are placed unless it is plainly good.
@@ -319,16 +319,20 @@ void Refinement<D>::Remember(VertexId v, double radius_sq, double reach) {
 // Declares a vertex that needs nothing now done, or puts it where it will be looked at again: not before bucket
 // `earliest`.
 template <int D>
-void Refinement<D>::Settle(VertexId v, const Assessment& found, double clip, int earliest, Polytope<D>& cell) {
+void Refinement<D>::Settle(VertexId v, const Assessment& found, double clip, int earliest, const Look<D>& look) {
   const double radius_sq = found.own_face_edge_sq != Assessment::kNone ? -found.own_face_edge_sq
                            : found.IsGood()                            ? found.radius_sq
                                                                        : Assessment::kNone;
   Remember(v, radius_sq, kWatched * std::sqrt(found.own_face_radius_sq));
   if (found.IsGood()) {
-    cell.Neighbours(beside_);
-    neighbours_.Set(v, beside_);
+    if (look.found != nullptr) {
+      neighbours_.Set(v, look.neighbours);
+    } else {
+      look.cell->Neighbours(beside_);
+      neighbours_.Set(v, beside_);
+    }
     if (announced_[Index(v)] != Announced::kToAll) {
-      Announce(v, cell, found);
+      Announce(v, *look.cell, found);
     }
     return;
   }

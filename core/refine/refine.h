@@ -23,6 +23,8 @@ namespace wellspace::core {
 
 template <int D>
 class ForeseenCells;
+template <int D>
+struct Look;
 class ThreadTeam;
 
 // Why a vertex was inserted.
@@ -119,11 +121,11 @@ class Refinement {
   absl::Status Improve(VertexId v, int bucket);
   std::optional<Request> NextRequest(VertexId v, const Polytope<D>& cell, const Assessment& found,
                                      double edge_limit_sq) const;
-  Polytope<D>& LookAt(VertexId v, int bucket, double clip, std::optional<Assessment>& found);
+  Look<D> LookAt(VertexId v, int bucket, double clip);
   Assessment AssessCell(Polytope<D>& cell, FaceMask site_faces, double edge_limit_sq) const;
   absl::Status Insert(const Request& request, Polytope<D>& cell);
   bool IsLongEnough(const SteinerPoint<D>& point) const { return point.empty_radius_sq >= min_edge_ * min_edge_; }
-  void Settle(VertexId v, const Assessment& found, double clip, int earliest, Polytope<D>& cell);
+  void Settle(VertexId v, const Assessment& found, double clip, int earliest, const Look<D>& look);
   void ScheduleNew(VertexId x, double nearest_sq);
   void Remember(VertexId v, double radius_sq, double reach = 0);
   void Announce(VertexId v, const Polytope<D>& cell, const Assessment& found);

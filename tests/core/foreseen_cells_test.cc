@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <tuple>
@@ -111,25 +110,32 @@ TYPED_TEST(ForeseenCellsTest, StayTrueWhileVerticesAreAdded) {
         vertices, kClip,
         [&](size_t i, Polytope<D>& cell) {
           cell.PlaceUnlessKeeps(kRatio);
-          return Assessment{.bad_node = static_cast<int>(i), .radius_sq = cell.reach_sq()};
+          return Assessment{.bad_node = i % 2 == 0 ? -1 : static_cast<int>(i), .radius_sq = cell.reach_sq()};
         },
         context);
     EXPECT_FALSE(foreseen.Has(2 * kClip));
     Workspace<D> workspace;
     int unchanged = 0;
+    int good = 0;
     int plain = 0;
     for (size_t i = 0; i < vertices.size(); ++i) {
       ASSERT_TRUE(foreseen.Has(kClip));
       const auto expected = CellNow<D>(structure, vertices[i], workspace);
-      std::optional<Assessment> found;
-      EXPECT_EQ(foreseen.Take(VertexId{structure.vertex_count() - 1}, kClip, found), nullptr) << "not foreseen";
-      Polytope<D>* const cell = foreseen.Take(vertices[i], kClip, found);
+      EXPECT_EQ(foreseen.Take(VertexId{structure.vertex_count() - 1}, kClip).cell, nullptr) << "not foreseen";
+      const Look<D> look = foreseen.Take(vertices[i], kClip);
+      Polytope<D>* const cell = look.cell;
       ASSERT_NE(cell, nullptr);
-      if (found.has_value()) {
+      std::vector<VertexId> neighbours;
+      if (look.found != nullptr) {
         ++unchanged;
-        EXPECT_EQ(found->bad_node, static_cast<int>(i));
-        EXPECT_EQ(found->radius_sq, cell->reach_sq());
+        EXPECT_EQ(look.found->bad_node, i % 2 == 0 ? -1 : static_cast<int>(i));
+        EXPECT_EQ(look.found->radius_sq, cell->reach_sq());
+        if (look.found->IsGood()) {
+          ++good;
+          cell->Neighbours(neighbours);
+        }
       }
+      EXPECT_TRUE(std::equal(look.neighbours.begin(), look.neighbours.end(), neighbours.begin(), neighbours.end()));
       plain += cell->KeepsRatio(kRatio) ? 1 : 0;
       cell->Place();
       ASSERT_EQ(Description<D>(*cell), expected);
@@ -137,6 +143,7 @@ TYPED_TEST(ForeseenCellsTest, StayTrueWhileVerticesAreAdded) {
     }
     EXPECT_FALSE(foreseen.Has(kClip)) << "none is left";
     EXPECT_GE(unchanged, 1);
+    EXPECT_GE(good, 1);
     EXPECT_LT(unchanged, static_cast<int>(vertices.size())) << "some cells have changed";
     all_plain += plain;
   }
@@ -156,9 +163,8 @@ TYPED_TEST(ForeseenCellsTest, WhatIsCancelledIsLeftOut) {
   };
   foreseen.Compute(vertices, kClip, judge, context);
   foreseen.Compute(vertices, kClip, judge, context);
-  std::optional<Assessment> found;
   for (const VertexId v : vertices) {
-    EXPECT_EQ(foreseen.Take(v, kClip, found), nullptr);
+    EXPECT_EQ(foreseen.Take(v, kClip).cell, nullptr);
   }
 }
 
