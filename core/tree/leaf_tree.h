@@ -105,6 +105,7 @@ class LeafTree {
     return cube;
   }
   int level(NodeId node) const { return At(node).level; }
+  double SideOf(NodeId node) const { return SideOf(At(node)); }
 
   // The vertices in a leaf, or null for none.
   const Bucket* BucketOf(NodeId leaf) const {

@@ -38,36 +38,8 @@ WELLSPACE_INLINE void Rank(const double* distances, size_t count, uint32_t* orde
   }
 }
 
-// The place of the least.
-template <size_t kWidth>
-WELLSPACE_INLINE size_t PlaceOfLeast(const double* distances, size_t count) {
-  using Lanes = typename Wide<kWidth>::Lanes;
-  using Mask = typename Wide<kWidth>::Mask;
-  Lanes least = LanesAt<kWidth>(distances, 0);
-  Mask here{};
-  Mask place{};  // in the column of each lane
-  for (size_t from = kWidth; from < count; from += kWidth) {
-    here += 1;
-    const Lanes next = LanesAt<kWidth>(distances, from);
-    const Mask is_less = next < least;
-    least = is_less ? next : least;
-    place = is_less ? here : place;
-  }
-  size_t lane = 0;
-  double smallest = least[0];
-  for (size_t i = 1; i < kWidth; ++i) {
-    lane = least[i] < smallest ? i : lane;
-    smallest = least[i] < smallest ? least[i] : smallest;
-  }
-  return static_cast<size_t>(place[lane]) * kWidth + lane;
-}
-
 WELLSPACE_AVX2 void RankAvx2(const double* distances, size_t count, uint32_t* order) {
   Rank<4>(distances, count, order);
-}
-
-WELLSPACE_AVX2 size_t PlaceOfLeastAvx2(const double* distances, size_t count) {
-  return PlaceOfLeast<4>(distances, count);
 }
 
 }  // namespace
@@ -82,25 +54,6 @@ void OrderByDistance(double* distances, size_t count, uint32_t* order, VectorUni
     std::iota(order, order + count, 0);
     std::stable_sort(order, order + count, [&](uint32_t a, uint32_t b) { return distances[a] < distances[b]; });
   }
-}
-
-LeafQueue::Entry LeafQueue::Pop() {
-  double* const distances = groups_[0].distance_sq;
-  for (size_t i = count_; i % kLanes != 0; ++i) {
-    distances[i] = kInfinity;
-  }
-  const size_t at =
-      unit_ == VectorUnit::kAvx2 ? PlaceOfLeastAvx2(distances, count_) : PlaceOfLeast<2>(distances, count_);
-  const Entry least{distances[at], leaves_[at]};
-  --count_;
-  distances[at] = distances[count_];
-  leaves_[at] = leaves_[count_];
-  return least;
-}
-
-void LeafQueue::Grow(size_t more) {
-  groups_.resize(2 * groups_.size() + PaddedCount(more) / kLanes + 8);
-  leaves_.resize(groups_.size() * kLanes);
 }
 
 }  // namespace wellspace::core

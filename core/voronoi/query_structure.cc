@@ -100,7 +100,6 @@ void QueryStructure<D>::MoveVertex(VertexId v, const Point<D>& p) {
 template <int D>
 void QueryStructure<D>::BeginQuery(Workspace<D>& workspace) const {
   ++workspace.counters.queries;
-  workspace.queue.Clear();
   workspace.seen.resize(tree_.node_count(), 0);
   if (++workspace.query == 0) {
     std::fill(workspace.seen.begin(), workspace.seen.end(), 0);
@@ -117,30 +116,28 @@ void QueryStructure<D>::ScanOutward(const Point<D>& site, NodeId own, Workspace<
   uint32_t* const seen = workspace.seen.data();
   seen[Index(own)] = workspace.query;
   LeafQueue& queue = workspace.queue;
+  queue.Begin(tree_.SideOf(own));
   queue.Reserve(1);
   queue.PushIf(true, 0, own);
   uint64_t leaves = 0;
   while (!queue.IsEmpty()) {
-    const LeafQueue::Entry nearest = queue.Pop();
-    if (nearest.distance_sq > reach_sq()) {
-      break;
-    }
-    if (nearest.leaf != own && !wants(nearest.leaf)) {
+    const LeafQueue::Entry next = queue.Pop();
+    if (next.distance_sq > reach_sq() || (next.leaf != own && !wants(next.leaf))) {
       continue;
     }
     ++leaves;
-    open(nearest.leaf);
+    open(next.leaf);
     const double limit_sq = reach_sq();
     queue.Reserve(LeafTree<D>::kMostFaceNeighbours + 1);
-    const size_t waiting = queue.size();
-    tree_.ForEachFaceNeighbour(nearest.leaf, [&](NodeId beyond) {
+    const uint32_t old_end = queue.end();
+    tree_.ForEachFaceNeighbour(next.leaf, [&](NodeId beyond) {
       // No branch, since none could be foretold.
       const bool is_new = seen[Index(beyond)] != workspace.query;
       seen[Index(beyond)] = workspace.query;
       const double distance_sq = DistanceSq<D>(site, tree_.BoxOf(beyond));
       queue.PushIf(is_new & (distance_sq <= limit_sq), distance_sq, beyond);
     });
-    for (size_t i = waiting; i < queue.size(); ++i) {
+    for (uint32_t i = old_end; i < queue.end(); ++i) {
       Prefetch<D>(tree_, queue.leaf(i));
     }
   }

@@ -15,6 +15,7 @@
 #include "core/geometry/point.h"
 #include "core/tree/leaf_tree.h"
 #include "core/voronoi/lanes.h"
+#include "core/voronoi/leaf_queue.h"
 #include "core/voronoi/nearness.h"
 #include "core/voronoi/neighbour_lists.h"
 #include "core/voronoi/node_columns.h"
@@ -106,8 +107,8 @@ class QueryStructure {
   //             the box, or the clip cube; unless cell.IsTooLarge(), which ends the query: never in a bottom-up run.
   // Complexity: O(1) amortised over a bottom-up run; counted in workspace.counters.
   // Errors:     none.
-  // Source:     [HT08] Figure 6; leaves in order of their distance, opened by Polytope::Reaches, through facets of
-  //             leaves alone: a ball about a node through v is convex, so a generic path in it from v to any leaf it
+  // Source:     [HT08] Figure 6; leaves as they are met, opened by Polytope::Reaches, through facets of leaves
+  //             alone: a ball about a node through v is convex, so a generic path in it from v to any leaf it
   //             meets crosses only facets of leaves that it meets.
   void ClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace, TieRule rule = TieRule::kKeep) const;
 

@@ -9,8 +9,6 @@
 #include <cstdint>
 #include <limits>
 #include <numeric>
-#include <set>
-#include <utility>
 #include <vector>
 
 #include "core/voronoi/nearness.h"
@@ -68,33 +66,6 @@ TEST_F(NearnessTest, OrdersByDistanceAndThenByNumber) {
       order.resize(count);
       ASSERT_EQ(order, expected);
     }
-  }
-}
-
-TEST_F(NearnessTest, TheQueueGivesANearestLeaf) {
-  for (const VectorUnit unit : Units()) {
-    LeafQueue queue(unit);
-    std::set<std::pair<double, uint32_t>> model;
-    uint32_t next = 0;
-    for (int step = 0; step < 5000; ++step) {
-      if (random_.Below(9) < 5) {
-        const std::pair<double, uint32_t> entry(static_cast<double>(random_.Below(20)), ++next);
-        const bool counts = random_.Below(4) != 0;
-        queue.Reserve(1);
-        queue.PushIf(counts, entry.first, NodeId{entry.second});
-        if (counts) {
-          model.insert(entry);
-        }
-      } else if (!model.empty()) {
-        ASSERT_FALSE(queue.IsEmpty());
-        ASSERT_EQ(queue.size(), model.size());
-        const LeafQueue::Entry entry = queue.Pop();
-        ASSERT_EQ(entry.distance_sq, model.begin()->first);
-        ASSERT_EQ(model.erase({entry.distance_sq, Index(entry.leaf)}), 1u);
-      }
-    }
-    queue.Clear();
-    EXPECT_TRUE(queue.IsEmpty());
   }
 }
 

@@ -1,0 +1,95 @@
+// Leaves that a scan has met and not yet opened, the near ones first.
+#ifndef WELLSPACE_CORE_VORONOI_LEAF_QUEUE_H_
+#define WELLSPACE_CORE_VORONOI_LEAF_QUEUE_H_
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <vector>
+
+#include "core/base/ids.h"
+
+namespace wellspace::core {
+
+// A leaf waits in a class with those whose distances round to the same power of two: first come, first served there. As many
+// leaves are opened then as in the order of the distances themselves, and none has to be looked for.
+//
+// Thread safety: thread-compatible. Reused from scan to scan: no allocation once warm.
+class LeafQueue {
+ public:
+  struct Entry {
+    double distance_sq;  // from the site
+    NodeId leaf;
+    uint32_t next;  // of the class, among entries_
+  };
+
+  LeafQueue() : entries_(kClasses) {}
+
+  // Begins a scan in a leaf of side `scale`: what is far nearer or far farther than that is in one class.
+  void Begin(double scale) {
+    base_ = Class(scale * scale) - kNearClasses;
+    waiting_ = 0;
+    end_ = kClasses;
+    std::iota(last_.begin(), last_.end(), 0u);
+  }
+  bool IsEmpty() const { return waiting_ == 0; }
+
+  // Makes room for so many more.
+  void Reserve(size_t more) {
+    if (end_ + more > entries_.size()) {
+      entries_.resize(2 * (end_ + more));
+    }
+  }
+
+  // Adds a leaf if it `counts`.
+  //
+  // REQUIRES:   room for it; distance_sq >= 0.
+  // Complexity: O(1), without a branch, since none could be foretold.
+  void PushIf(bool counts, double distance_sq, NodeId leaf) {
+    const auto at = static_cast<size_t>(std::clamp<int64_t>(Class(distance_sq) - base_, 0, kClasses - 1));
+    entries_[end_] = {distance_sq, leaf, 0};
+    entries_[last_[at]].next = end_;
+    last_[at] = counts ? end_ : last_[at];
+    waiting_ |= uint32_t{counts} << at;
+    end_ += counts ? 1 : 0;
+  }
+
+  // Takes the first of the nearest class.
+  //
+  // REQUIRES:   not empty.
+  // Complexity: O(1).
+  Entry Pop() {
+    const auto at = static_cast<uint32_t>(std::countr_zero(waiting_));
+    const uint32_t first = entries_[at].next;
+    const bool was_last = last_[at] == first;
+    entries_[at].next = entries_[first].next;
+    last_[at] = was_last ? at : last_[at];
+    waiting_ ^= uint32_t{was_last} << at;
+    return entries_[first];
+  }
+
+  // Where the next to be pushed will be, and what is there: for whoever looks at what has been pushed since.
+  uint32_t end() const { return end_; }
+  NodeId leaf(uint32_t at) const { return entries_[at].leaf; }
+
+ private:
+  static constexpr int64_t kClasses = 16;
+  static constexpr int64_t kNearClasses = 4;
+
+  // Two powers of two of the square, by its exponent.
+  static int64_t Class(double distance_sq) { return std::bit_cast<int64_t>(distance_sq) >> 53; }
+
+  int64_t base_ = 0;
+  uint32_t waiting_ = 0;                 // by class, a bit for whether any wait
+  std::array<uint32_t, kClasses> last_;  // by class, in entries_
+  uint32_t end_ = 0;                     // of the entries
+  std::vector<Entry> entries_;           // one for each class, before its first, and all leaves of the scan
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_VORONOI_LEAF_QUEUE_H_
