@@ -32,7 +32,7 @@ struct EstimateEffort {
   uint64_t looks = uint64_t{1} << 17;
 };
 
-// Enough for a bar of progress, at less than a hundredth of what meshing costs.
+// Enough for a bar of progress, at about a hundredth of what meshing costs.
 inline constexpr EstimateEffort kGlance{0.15, 24, 64, uint64_t{1} << 11};
 
 // Predicts what refinement for `demands` will make of `structure`.
