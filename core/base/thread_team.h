@@ -5,9 +5,13 @@
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
+#include <tbb/task_group.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
+#include <functional>
+#include <utility>
 
 #ifdef __SANITIZE_THREAD__
 #include <sanitizer/tsan_interface.h>
@@ -15,7 +19,7 @@
 
 namespace wellspace::core {
 
-// Thread safety: thread-compatible; loops of different teams may run at once.
+// Thread safety: thread-compatible; loops of different teams may run at once, but only one of a team.
 class ThreadTeam {
  public:
   // `threads`, but at most as many as the machine has cores; the calling thread is one of them.
@@ -41,7 +45,38 @@ class ThreadTeam {
     Acquire(&ended_);
   }
 
+  // Has the other threads begin such a loop, while the caller goes on. Nothing that f reads may be written until End.
+  void Begin(size_t count, std::function<void(size_t)> f) {
+    f_ = std::move(f);
+    count_ = count;
+    next_ = 0;
+    Release(&begun_);
+    arena_.execute([&] {
+      for (int thread = 1; thread < threads_; ++thread) {
+        group_.run([this] { Work(); });
+      }
+    });
+  }
+
+  // Joins in what has been begun, and returns when all calls have.
+  void End() {
+    arena_.execute([&] {
+      Work();
+      group_.wait();
+    });
+    Acquire(&ended_);
+  }
+
  private:
+  // Takes calls of the loop that has been begun until all are taken.
+  void Work() {
+    Acquire(&begun_);
+    for (size_t i = next_++; i < count_; i = next_++) {
+      f_(i);
+    }
+    Release(&ended_);
+  }
+
   // oneTBB is not compiled for ThreadSanitizer, which has to be told of the order that it keeps.
 #ifdef __SANITIZE_THREAD__
   static void Acquire(char* mark) { __tsan_acquire(mark); }
@@ -53,6 +88,10 @@ class ThreadTeam {
 
   const int threads_;
   tbb::task_arena arena_;
+  tbb::task_group group_;
+  std::function<void(size_t)> f_;
+  size_t count_ = 0;
+  std::atomic<size_t> next_ = 0;
   char begun_ = 0;
   char ended_ = 0;
 };

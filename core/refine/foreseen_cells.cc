@@ -8,37 +8,62 @@
 namespace wellspace::core {
 
 template <int D>
-void ForeseenCells<D>::Compute(std::span<const VertexId> vertices, double clip, const Judge& judge,
-                               const RunContext& context) {
-  clip_ = clip;
-  vertex_count_ = structure_.vertex_count();
-  vertices_.assign(vertices.begin(), vertices.end());
-  foreseen_.resize(vertices.size());
-  left_ = vertices.size();
+void ForeseenCells<D>::Begin(std::span<const VertexId> vertices, double clip, Judge judge, const RunContext& context) {
+  judge_ = std::move(judge);
+  context_ = &context;
+  const size_t number = 1 - ready_;
+  Batch& batch = batches_[number];
+  batch.clip = clip;
+  batch.vertex_count = structure_.vertex_count();
+  batch.vertices.assign(vertices.begin(), vertices.end());
+  batch.foreseen.resize(vertices.size());
+  batch.left = vertices.size();
   own_.resize(team_.threads());
   for (Own& own : own_) {
-    own.count = 0;
+    own.pools[number].count = 0;
   }
-  team_.ForEach(vertices.size(), [&](size_t i) { foreseen_[i] = ComputeOne(vertices[i], i, judge, context); });
+  is_running_ = true;
+  team_.Begin(vertices.size(), [this, number, clip, &batch](size_t i) {
+    batch.foreseen[i] = ComputeOne(batch.vertices[i], clip, number);
+  });
 }
 
 template <int D>
-typename ForeseenCells<D>::Foreseen* ForeseenCells<D>::ComputeOne(VertexId v, size_t i, const Judge& judge,
-                                                                  const RunContext& context) {
-  if (context.IsCancelled()) {
+void ForeseenCells<D>::Finish() {
+  if (!is_running_) {
+    return;
+  }
+  team_.End();
+  is_running_ = false;
+  if (batches_ended_++ % kBatchesBetweenCounts == 0) {
+    CountMemory();
+  }
+}
+
+template <int D>
+void ForeseenCells<D>::Advance() {
+  batches_[ready_].left = 0;
+  batches_[ready_].vertices.clear();
+  ready_ = 1 - ready_;
+}
+
+template <int D>
+typename ForeseenCells<D>::Foreseen* ForeseenCells<D>::ComputeOne(VertexId v, double clip, size_t batch) {
+  if (context_->IsCancelled()) {
     return nullptr;
   }
   Own& own = own_[ThreadTeam::CurrentThread()];
   Polytope<D>& cell = own.workspace.cell;
-  structure_.UnplacedClippedVoronoi(v, clip_, own.workspace);
+  structure_.UnplacedClippedVoronoi(v, clip, own.workspace);
   if (cell.IsTooLarge()) {
     return nullptr;
   }
-  if (own.count == own.cells.size()) {
-    own.cells.push_back(std::make_unique<Foreseen>());
+  auto& pool = own.pools[batch];
+  if (pool.count == pool.cells.size()) {
+    pool.cells.push_back(std::make_unique<Foreseen>());
   }
-  Foreseen& foreseen = *own.cells[own.count++];
-  foreseen.found = judge(i, cell);
+  Foreseen& foreseen = *pool.cells[pool.count++];
+  foreseen.found = judge_(v, cell);
   foreseen.neighbours.clear();
   if (foreseen.found.IsGood()) {
     cell.Neighbours(foreseen.neighbours);
@@ -49,38 +74,39 @@ typename ForeseenCells<D>::Foreseen* ForeseenCells<D>::ComputeOne(VertexId v, si
 }
 
 template <int D>
-bool ForeseenCells<D>::Has(double clip) const {
-  return left_ > 0 && clip == clip_ && structure_.vertex_count() - vertex_count_ <= kMostInsertions;
+bool ForeseenCells<D>::IsFresh(const Batch& batch, double clip) const {
+  return batch.left > 0 && clip == batch.clip && structure_.vertex_count() - batch.vertex_count <= kMostInsertions;
 }
 
 template <int D>
 Look<D> ForeseenCells<D>::Take(VertexId v, double clip) {
-  if (!Has(clip)) {
+  Batch& batch = batches_[ready_];
+  if (!IsFresh(batch, clip)) {
     return {};
   }
-  const auto at = std::find(vertices_.begin(), vertices_.end(), v);
-  if (at == vertices_.end()) {
+  const auto at = std::find(batch.vertices.begin(), batch.vertices.end(), v);
+  if (at == batch.vertices.end()) {
     return {};
   }
   *at = kNoVertex;
-  --left_;
-  Foreseen* const foreseen = foreseen_[at - vertices_.begin()];
+  --batch.left;
+  Foreseen* const foreseen = batch.foreseen[at - batch.vertices.begin()];
   if (foreseen == nullptr) {
     return {};
   }
-  if (CutByNew(v, *foreseen)) {
+  if (CutByNew(v, batch.vertex_count, *foreseen)) {
     return {&foreseen->cell};
   }
   return {&foreseen->cell, &foreseen->found, foreseen->neighbours};
 }
 
-// Cuts the cell of `v` by the vertices that were added since it was computed; returns whether that changed it.
+// Cuts the cell of `v` by the vertices from `first_new` on; returns whether that changed it.
 template <int D>
-bool ForeseenCells<D>::CutByNew(VertexId v, Foreseen& foreseen) const {
+bool ForeseenCells<D>::CutByNew(VertexId v, uint32_t first_new, Foreseen& foreseen) const {
   bool is_cut = false;
   const Point<D> site = structure_.point(v);
   const uint32_t end = structure_.vertex_count();
-  for (uint32_t u = vertex_count_; u < end; ++u) {
+  for (uint32_t u = first_new; u < end; ++u) {
     const Point<D>& p = structure_.point(VertexId{u});
     if (NormSq<D>(Difference<D>(p, site)) <= foreseen.cut_limit_sq && !foreseen.cell.IsTooLarge()) {
       is_cut |= foreseen.cell.CutBeforePlace(VertexId{u}, p);
@@ -90,15 +116,16 @@ bool ForeseenCells<D>::CutByNew(VertexId v, Foreseen& foreseen) const {
 }
 
 template <int D>
-uint64_t ForeseenCells<D>::MemoryBytes() const {
-  uint64_t bytes = 0;
+void ForeseenCells<D>::CountMemory() {
+  memory_bytes_ = 0;
   for (const Own& own : own_) {
-    bytes += own.workspace.seen.size() * sizeof(uint32_t) + own.workspace.cell.MemoryBytes();
-    for (const auto& foreseen : own.cells) {
-      bytes += sizeof(Foreseen) + foreseen->cell.MemoryBytes();
+    memory_bytes_ += own.workspace.seen.size() * sizeof(uint32_t) + own.workspace.cell.MemoryBytes();
+    for (const auto& pool : own.pools) {
+      for (const auto& foreseen : pool.cells) {
+        memory_bytes_ += sizeof(Foreseen) + foreseen->cell.MemoryBytes();
+      }
     }
   }
-  return bytes;
 }
 
 template <int D>

@@ -1,7 +1,9 @@
-// Cells that several threads compute together before the refinement, which looks at one after the other, asks for them.
+// Cells that other threads compute before the refinement, which looks at one after the other, asks for them.
 #ifndef WELLSPACE_CORE_REFINE_FORESEEN_CELLS_H_
 #define WELLSPACE_CORE_REFINE_FORESEEN_CELLS_H_
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -27,11 +29,13 @@ struct Look {
   std::span<const VertexId> neighbours = {};  // all that the cell has, if it has been found good
 };
 
-// Clipped cells of vertices that are about to be looked at. They stay of use while vertices are added: a cell that is taken is first cut by those added since it was computed, which makes it
-// the cell of now. So what the refinement does with a cell, one after the other, does not depend on the threads.
+// Clipped cells of vertices that are about to be looked at: those that are there to be taken, and those that come, which
+// other threads compute meanwhile. They stay of use while vertices are added: a cell that is taken is first cut by those
+// added since it was begun, which makes it the cell of now. So what the refinement does with a cell, one after the other,
+// does not depend on the threads.
 //
 // Thread safety: thread-compatible.
-// Invariants: since the first Compute the structure has only had vertices added.
+// Invariants: (1) since the first Begin the structure has only had vertices added; (2) while IsRunning() they wait.
 template <int D>
 class ForeseenCells {
  public:
@@ -39,37 +43,55 @@ class ForeseenCells {
   static constexpr size_t kLeast = 8;
   static constexpr size_t kMost = D == 2 ? 64 : D == 3 ? 32 : 16;
 
-  // Assesses the cell of the i-th vertex. Several threads call it at once.
-  using Judge = std::function<Assessment(size_t i, Polytope<D>& cell)>;
+  // Assesses a cell. Several threads call it at once.
+  using Judge = std::function<Assessment(VertexId v, Polytope<D>& cell)>;
 
   ForeseenCells(const QueryStructure<D>& structure, ThreadTeam& team) : structure_(structure), team_(team) {}
+  ~ForeseenCells() { Finish(); }
 
   int threads() const { return team_.threads(); }
 
-  // Computes the cells of `vertices`, clipped by cubes of half side `clip`.
+  // Begins to compute the cells of `vertices`, clipped by cubes of half side `clip`, in the place of those that come.
   //
-  // REQUIRES:   vertices distinct, at most kMost.
+  // REQUIRES:   !IsRunning(); no vertex waits; vertices distinct, at most kMost.
   // Complexity: that of the cells, shared by the threads.
   // Errors:     none; once `context` is cancelled the cells that are not yet begun are left out.
-  void Compute(std::span<const VertexId> vertices, double clip, const Judge& judge, const RunContext& context);
+  void Begin(std::span<const VertexId> vertices, double clip, Judge judge, const RunContext& context);
 
-  // Whether cells clipped so are left, and not so many vertices were added since that they are sooner computed anew.
-  bool Has(double clip) const;
+  // Whether other threads may be at work.
+  bool IsRunning() const { return is_running_; }
+  // Helps them, and returns when all that comes has been computed.
+  void Finish();
 
-  // The cell of `v` as it is now, the caller's until the next Compute, with what was found of it if it is still as it was;
-  // no cell if it is not left.
+  // Makes what comes what may be taken, in the place of what is left of that.
+  //
+  // REQUIRES:   !IsRunning().
+  void Advance();
+
+  // Whether the cell of `v` comes, clipped so; whether that of any does or may be taken. Not if so many vertices were added
+  // since that they are sooner computed anew.
+  bool Comes(VertexId v, double clip) const { return IsFresh(coming(), clip) && coming().Holds(v); }
+  bool Has(double clip) const { return IsFresh(ready(), clip) || IsFresh(coming(), clip); }
+
+  // The cell of `v` as it is now, the caller's until the next Advance, with what was found of it if it is still as it was;
+  // no cell if it may not be taken.
   //
   // Complexity: O(kMost + vertices added since).
   // Errors:     none.
   Look<D> Take(VertexId v, double clip);
 
-  // What all this takes in memory, roughly.
-  uint64_t MemoryBytes() const;
+  // What all this takes in memory, roughly, and as of a few batches ago.
+  uint64_t MemoryBytes() const { return memory_bytes_; }
+  // What its queries have cost.
+  //
+  // REQUIRES:   !IsRunning().
   QueryCounters counters() const;
 
  private:
   // After so many insertions a cell is sooner computed anew.
   static constexpr uint32_t kMostInsertions = 1024;
+  // Memory is counted once in so many batches: that reads what other threads have written.
+  static constexpr uint64_t kBatchesBetweenCounts = 8;
 
   struct Foreseen {
     Polytope<D> cell;
@@ -78,24 +100,43 @@ class ForeseenCells {
     std::vector<VertexId> neighbours;  // of a good cell
   };
 
-  // What only one thread writes, so that it stays in the caches of its core. Arrays only grow, so that polytopes are reused.
-  struct alignas(64) Own {
-    Workspace<D> workspace;
-    std::vector<std::unique_ptr<Foreseen>> cells;
-    size_t count = 0;  // of cells, since the last Compute
+  struct Batch {
+    bool Holds(VertexId v) const { return std::find(vertices.begin(), vertices.end(), v) != vertices.end(); }
+
+    double clip = 0;
+    uint32_t vertex_count = 0;        // of the structure when it was begun
+    std::vector<VertexId> vertices;   // whose cells; none once taken
+    std::vector<Foreseen*> foreseen;  // by vertex; null if left out
+    size_t left = 0;                  // to be taken
   };
 
-  Foreseen* ComputeOne(VertexId v, size_t i, const Judge& judge, const RunContext& context);
-  bool CutByNew(VertexId v, Foreseen& foreseen) const;
+  // What only one thread writes, so that it stays in the caches of its core. Arrays only grow, so that polytopes are reused.
+  struct alignas(64) Own {
+    struct Pool {
+      std::vector<std::unique_ptr<Foreseen>> cells;
+      size_t count = 0;  // of cells that are in use
+    };
+    Workspace<D> workspace;
+    std::array<Pool, 2> pools;  // by batch
+  };
+
+  const Batch& ready() const { return batches_[ready_]; }
+  const Batch& coming() const { return batches_[1 - ready_]; }
+  bool IsFresh(const Batch& batch, double clip) const;
+  Foreseen* ComputeOne(VertexId v, double clip, size_t batch);
+  void CountMemory();
+  bool CutByNew(VertexId v, uint32_t first_new, Foreseen& foreseen) const;
 
   const QueryStructure<D>& structure_;
   ThreadTeam& team_;
-  double clip_ = 0;
-  uint32_t vertex_count_ = 0;        // of the structure when the cells were computed
-  std::vector<VertexId> vertices_;   // whose cells; none once taken
-  std::vector<Foreseen*> foreseen_;  // by vertex; null if left out
-  size_t left_ = 0;                  // to be taken
-  std::vector<Own> own_;             // by thread
+  Judge judge_;
+  const RunContext* context_ = nullptr;
+  std::array<Batch, 2> batches_;
+  size_t ready_ = 0;  // which of them
+  bool is_running_ = false;
+  uint64_t batches_ended_ = 0;
+  uint64_t memory_bytes_ = 0;
+  std::vector<Own> own_;  // by thread
 };
 
 }  // namespace wellspace::core

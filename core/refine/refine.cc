@@ -66,6 +66,7 @@ absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices
   ForeseenCells<D> foreseen(structure_, team);
   foreseen_ = &foreseen;
   const absl::Cleanup end = [&] {
+    AdmitWaiting();
     own_.counters.Add(foreseen.counters());
     foreseen_ = nullptr;
   };
@@ -188,7 +189,8 @@ void Refinement<D>::ScheduleNew(VertexId x, double nearest_sq) {
   const Point<D>& p = structure_.point(x);
   const double around = kAround * std::sqrt(nearest_sq);
   if (structure_.faces(x) != 0 && watchers_.IsWatched(p, structure_.faces(x))) {
-    structure_.ClippedVoronoi(x, around, new_, TieRule::kPerturb);
+    ComputeCell(x, around, new_);
+    new_.cell.Place();
     if (!new_.cell.IsTooLarge()) {
       Announce(x, new_.cell, Assess<D>(new_.cell, structure_.faces(x), *demands_, nearest_sq));
     }
@@ -264,33 +266,81 @@ std::optional<typename Refinement<D>::Request> Refinement<D>::NextRequest(Vertex
 }
 
 // The cell of `v`, which was taken from `bucket`, clipped at `clip`.
-// With several threads the cells of the vertices that are next in the bucket are computed with it, if there are enough.
 template <int D>
 Look<D> Refinement<D>::LookAt(VertexId v, int bucket, double clip) {
-  if (const Look<D> look = foreseen_->Take(v, clip); look.cell != nullptr) {
-    return look;
-  }
-  if (foreseen_->threads() > 1 && !foreseen_->Has(clip)) {
-    next_.assign(1, v);
-    schedule_.ForEachNext(bucket, [this](VertexId u) {
-      if (std::find(next_.begin(), next_.end(), u) == next_.end()) {
-        next_.push_back(u);
-      }
-      return next_.size() < ForeseenCells<D>::kMost;
-    });
-    if (next_.size() >= ForeseenCells<D>::kLeast) {
-      const double edge_limit_sq = schedule_.UpperLengthSq(bucket);
-      const auto judge = [&](size_t i, Polytope<D>& cell) {
-        return AssessCell(cell, structure_.faces(next_[i]), edge_limit_sq);
-      };
-      foreseen_->Compute(next_, clip, judge, *context_);
-      if (const Look<D> look = foreseen_->Take(v, clip); look.cell != nullptr) {
-        return look;
-      }
+  if (foreseen_->threads() > 1) {
+    Foresee(v, bucket, clip);
+    if (const Look<D> look = foreseen_->Take(v, clip); look.cell != nullptr) {
+      return look;
     }
   }
-  structure_.UnplacedClippedVoronoi(v, clip, own_);
+  ComputeCell(v, clip, own_);
   return {&own_.cell};
+}
+
+// Sees to it that the cell of `v` may be taken, unless it is not foreseen; then other threads begin with those of the vertices
+// that are next in the bucket, if there are enough.
+template <int D>
+void Refinement<D>::Foresee(VertexId v, int bucket, double clip) {
+  if (foreseen_->Comes(v, clip)) {
+    next_.clear();
+    FindNext(bucket, clip);
+    AdmitWaiting();
+  } else if (!foreseen_->Has(clip)) {
+    next_.assign(1, v);
+    FindNext(bucket, clip);
+    if (next_.size() < ForeseenCells<D>::kLeast) {
+      return;
+    }
+    AdmitWaiting();
+    BeginNext(bucket, clip);
+    next_.clear();
+    FindNext(bucket, clip);
+    foreseen_->Finish();
+  } else {
+    return;  // it has just been added
+  }
+  foreseen_->Advance();
+  if (next_.size() >= ForeseenCells<D>::kLeast) {
+    BeginNext(bucket, clip);
+  }
+}
+
+// Fills next_ with vertices that are next in the bucket and whose cells do not come.
+template <int D>
+void Refinement<D>::FindNext(int bucket, double clip) {
+  schedule_.ForEachNext(bucket, [this, clip](VertexId u) {
+    if (std::find(next_.begin(), next_.end(), u) == next_.end() && !foreseen_->Comes(u, clip)) {
+      next_.push_back(u);
+    }
+    return next_.size() < ForeseenCells<D>::kMost;
+  });
+}
+
+template <int D>
+void Refinement<D>::BeginNext(int bucket, double clip) {
+  const auto judge = [this, edge_limit_sq = schedule_.UpperLengthSq(bucket)](VertexId v, Polytope<D>& cell) {
+    return AssessCell(cell, structure_.faces(v), edge_limit_sq);
+  };
+  foreseen_->Begin(next_, clip, judge, *context_);
+}
+
+// Has queries find all vertices that have been added.
+template <int D>
+void Refinement<D>::AdmitWaiting() {
+  foreseen_->Finish();
+  structure_.AdmitWaiting();
+}
+
+// Computes the cell of `v`, not yet placed, clipped at `clip`.
+template <int D>
+void Refinement<D>::ComputeCell(VertexId v, double clip, Workspace<D>& workspace) {
+  structure_.UnplacedClippedVoronoi(v, clip, workspace);
+  if (workspace.cell.IsTooLarge() && structure_.waiting_count() > 0) {
+    AdmitWaiting();
+    structure_.UnplacedClippedVoronoi(v, clip, workspace);
+  }
+  structure_.CutByWaiting(v, workspace.cell);
 }
 
 // What is wrong with a cell, whose nodes are placed unless it is plainly good.
@@ -357,10 +407,14 @@ absl::Status Refinement<D>::Insert(const Request& request, Polytope<D>& cell) {
         ", below the smallest that double arithmetic serves here, ", min_edge_, "; raise rho = ", demands_->rho));
   }
   if constexpr (kChecks) {
+    AdmitWaiting();
     CheckInsertion(request);
   }
   Insertion insertion = request.insertion;
-  insertion.vertex = structure_.AddVertex(insertion.near, point.position);
+  insertion.vertex = structure_.AddWaiting(insertion.near, point.position);
+  if (!foreseen_->IsRunning() || *observer_ || structure_.waiting_count() == QueryStructure<D>::kMostWaiting) {
+    AdmitWaiting();
+  }
   radius_sq_.push_back(Assessment::kNone);
   announced_.push_back(Announced::kToNone);
   context_->SetVertices(structure_.vertex_count());

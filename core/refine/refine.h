@@ -122,6 +122,11 @@ class Refinement {
   std::optional<Request> NextRequest(VertexId v, const Polytope<D>& cell, const Assessment& found,
                                      double edge_limit_sq) const;
   Look<D> LookAt(VertexId v, int bucket, double clip);
+  void Foresee(VertexId v, int bucket, double clip);
+  void FindNext(int bucket, double clip);
+  void BeginNext(int bucket, double clip);
+  void AdmitWaiting();
+  void ComputeCell(VertexId v, double clip, Workspace<D>& workspace);
   Assessment AssessCell(Polytope<D>& cell, FaceMask site_faces, double edge_limit_sq) const;
   absl::Status Insert(const Request& request, Polytope<D>& cell);
   bool IsLongEnough(const SteinerPoint<D>& point) const { return point.empty_radius_sq >= min_edge_ * min_edge_; }
@@ -151,7 +156,7 @@ class Refinement {
   double clip_factor_ = 0;
   uint64_t max_vertices_ = 0;
   ForeseenCells<D>* foreseen_ = nullptr;            // null between runs
-  std::vector<VertexId> next_;                      // scratch of LookAt
+  std::vector<VertexId> next_;                      // whose cells are foreseen next
   std::vector<std::pair<VertexId, double>> woken_;  // scratch of Announce
   std::vector<VertexId> beside_;                    // scratch of Settle
   RunContext* context_ = nullptr;

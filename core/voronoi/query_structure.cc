@@ -57,15 +57,18 @@ absl::Status QueryStructure<D>::Initialize(const Box<D>& box, std::vector<Point<
   box_ = box;
   points_ = std::move(points);
   WELLSPACE_RETURN_IF_ERROR(tree_.Build(box_, points_, max_leaves, context));
+  vertex_count_ = static_cast<uint32_t>(points_.size());
   faces_.clear();
-  faces_.reserve(points_.size() + (size_t{1} << D));
+  near_.clear();
+  MakeRoom();
   std::array<bool, 1 << D> has_corner{};
-  for (size_t i = 0; i < points_.size(); ++i) {
+  const uint32_t given = vertex_count_;
+  for (uint32_t i = 0; i < given; ++i) {
     if (i % kStepsBetweenChecks == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
     const FaceMask faces = box_.FacesOf(points_[i]);
-    faces_.push_back(faces);
+    faces_[i] = faces;
     for (int corner = 0; corner < (1 << D); ++corner) {
       has_corner[corner] = has_corner[corner] || faces == CornerFaces<D>(corner);
     }
@@ -84,11 +87,63 @@ absl::Status QueryStructure<D>::Initialize(const Box<D>& box, std::vector<Point<
 
 template <int D>
 VertexId QueryStructure<D>::AddVertex(VertexId near, const Point<D>& p) {
-  const VertexId v{vertex_count()};
-  tree_.Insert(near, v, p);
-  points_.push_back(p);
-  faces_.push_back(box_.FacesOf(p));
+  const VertexId v = AddWaiting(near, p);
+  AdmitWaiting();
   return v;
+}
+
+template <int D>
+VertexId QueryStructure<D>::AddWaiting(VertexId near, const Point<D>& p) {
+  const VertexId v{vertex_count_};
+  points_[vertex_count_] = p;
+  faces_[vertex_count_] = box_.FacesOf(p);
+  ++vertex_count_;
+  near_.push_back(near);
+  return v;
+}
+
+template <int D>
+void QueryStructure<D>::AdmitWaiting() {
+  for (const VertexId near : near_) {
+    const VertexId v{tree_.vertex_count()};
+    tree_.Insert(near, v, point(v));
+  }
+  near_.clear();
+  MakeRoom();
+}
+
+template <int D>
+void QueryStructure<D>::MakeRoom() {
+  const size_t needed = vertex_count_ + kMostWaiting;
+  if (points_.size() < needed) {
+    points_.resize(needed + kMostWaiting);
+  }
+  if (faces_.size() < needed) {
+    faces_.resize(needed + kMostWaiting);
+  }
+}
+
+template <int D>
+void QueryStructure<D>::CutByWaiting(VertexId v, Polytope<D>& cell) const {
+  for (uint32_t u = tree_.vertex_count(); u < vertex_count_ && !cell.IsTooLarge(); ++u) {
+    if (VertexId{u} != v) {
+      cell.CutBeforePlace(VertexId{u}, points_[u]);
+    }
+  }
+}
+
+// The leaf that `v` lies in; of one that waits, walked to.
+template <int D>
+NodeId QueryStructure<D>::LeafOf(VertexId v) const {
+  const uint32_t admitted = tree_.vertex_count();
+  if (Index(v) < admitted) {
+    return tree_.leaf_of(v);
+  }
+  VertexId near = v;
+  while (near != kNoVertex && Index(near) >= admitted) {
+    near = near_[Index(near) - admitted];
+  }
+  return tree_.LeafHolding(near, point(v));
 }
 
 template <int D>
@@ -200,7 +255,7 @@ void QueryStructure<D>::ClipAndScan(VertexId v, double radius, TieRule rule, Wor
   std::array<PlaneKind, 2 * D> kinds;
   const Box<D> bounds = ClippedBox<D>(box_, point(v), radius, kinds);
   workspace.cell.Reset(point(v), bounds, kinds, rule);
-  Scan(v, tree_.leaf_of(v), workspace);
+  Scan(v, LeafOf(v), workspace);
 }
 
 // Begins with walls one side of the box beyond it.

@@ -59,12 +59,15 @@ struct Neighbor {
   double distance_sq = 0;
 };
 
-// Thread safety: thread-compatible; queries with different workspaces may run at once, AddVertex alone.
+// Thread safety: thread-compatible; queries with different workspaces may run at once, and AddWaiting beside them; AddVertex
+// and the rest alone.
 // Invariants: (1) vertices are distinct and lie in the box; (2) faces(v) are exactly the faces of the box that v lies
 // on.
 template <int D>
 class QueryStructure {
  public:
+  static constexpr uint32_t kMostWaiting = 256;
+
   // Builds the structure for `points`, then adds the corners of the box that are not among them.
   //
   // REQUIRES:   points distinct as cubes of MortonGrid(box), sorted in its Morton order, in the box.
@@ -140,6 +143,28 @@ class QueryStructure {
   // Source:     [HT08] Figure 3, ADDVERTEX.
   VertexId AddVertex(VertexId near, const Point<D>& p);
 
+  // The same, but the vertex waits: queries find it only once it has been admitted, and meanwhile queries of vertices that do
+  // not wait may run.
+  //
+  // REQUIRES:   fewer than kMostWaiting wait.
+  // Complexity: O(1).
+  // Errors:     none.
+  VertexId AddWaiting(VertexId near, const Point<D>& p);
+
+  // Admits the vertices that wait, in the order in which they were added.
+  //
+  // Complexity: that of AddVertex for each.
+  // Errors:     none.
+  void AdmitWaiting();
+
+  // Cuts the cell of `v` by the vertices that wait.
+  //
+  // Complexity: O(1) for each that waits, and the cuts.
+  // Errors:     none.
+  void CutByWaiting(VertexId v, Polytope<D>& cell) const;
+
+  uint32_t waiting_count() const { return vertex_count_ - tree_.vertex_count(); }
+
   // Puts vertex `v` at `p`.
   //
   // REQUIRES:   p in the box, on the same of its faces as v, and different from all other vertices.
@@ -148,16 +173,17 @@ class QueryStructure {
   void MoveVertex(VertexId v, const Point<D>& p);
 
   const Box<D>& box() const { return box_; }
-  uint32_t vertex_count() const { return static_cast<uint32_t>(points_.size()); }
+  // Those that wait, too.
+  uint32_t vertex_count() const { return vertex_count_; }
   const Point<D>& point(VertexId v) const { return points_[Index(v)]; }
   FaceMask faces(VertexId v) const { return faces_[Index(v)]; }
   const LeafTree<D>& tree() const { return tree_; }
   // What the structure takes in memory.
-  uint64_t MemoryBytes() const {
-    return tree_.MemoryBytes() + points_.size() * sizeof(Point<D>) + faces_.size() * sizeof(FaceMask);
-  }
+  uint64_t MemoryBytes() const { return tree_.MemoryBytes() + vertex_count_ * (sizeof(Point<D>) + sizeof(FaceMask)); }
 
  private:
+  void MakeRoom();
+  NodeId LeafOf(VertexId v) const;
   void BeginQuery(Workspace<D>& workspace) const;
   // Calls open(leaf) for leaves outward from `own`, which holds `site`: as long as reach_sq() says for those whose
   // distance allows it, and wants(leaf) agrees.
@@ -173,8 +199,11 @@ class QueryStructure {
 
   Box<D> box_;
   LeafTree<D> tree_;
+  uint32_t vertex_count_ = 0;
+  // By vertex, with room for those that are to wait, so that nothing moves when one is added.
   std::vector<Point<D>> points_;
   std::vector<FaceMask> faces_;
+  std::vector<VertexId> near_;  // of those that wait: what they were added near to
 };
 
 }  // namespace wellspace::core

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <iterator>
 #include <string>
 #include <string_view>
 #include <tuple>
@@ -88,7 +89,9 @@ TYPED_TEST(ForeseenCellsTest, CellsDoNotDependOnTheOrderOfTheCuts) {
 TYPED_TEST(ForeseenCellsTest, StayTrueWhileVerticesAreAdded) {
   constexpr int D = TypeParam::kValue;
   int all_plain = 0;
-  for (const std::string_view kind : kKinds) {
+  for (size_t run = 0; run < 2 * std::size(kKinds); ++run) {
+    const std::string_view kind = kKinds[run / 2];
+    const bool adds_one_meanwhile = run % 2 != 0;
     SCOPED_TRACE(std::string(kind));
     QueryStructure<D> structure = StructureOf<D>(kind);
     ThreadTeam team(2);
@@ -106,13 +109,27 @@ TYPED_TEST(ForeseenCellsTest, StayTrueWhileVerticesAreAdded) {
       points.push_back(p);
     }
     RunContext context;
-    foreseen.Compute(
+    const auto is_odd = [](VertexId v) { return Index(v) / 2 % 2 != 0; };
+    foreseen.Begin(
         vertices, kClip,
-        [&](size_t i, Polytope<D>& cell) {
+        [&](VertexId v, Polytope<D>& cell) {
           cell.PlaceUnlessKeeps(kRatio);
-          return Assessment{.bad_node = i % 2 == 0 ? -1 : static_cast<int>(i), .radius_sq = cell.reach_sq()};
+          return Assessment{.bad_node = is_odd(v) ? static_cast<int>(Index(v)) : -1, .radius_sq = cell.reach_sq()};
         },
         context);
+    EXPECT_TRUE(foreseen.IsRunning());
+    EXPECT_TRUE(foreseen.Comes(vertices.back(), kClip));
+    EXPECT_FALSE(foreseen.Comes(vertices.back(), 2 * kClip));
+    EXPECT_FALSE(foreseen.Comes(VertexId{1}, kClip));
+    if (adds_one_meanwhile) {
+      structure.AddWaiting(vertices.back(), points.back());
+    }
+    EXPECT_EQ(foreseen.Take(vertices[0], kClip).cell, nullptr) << "it comes";
+    foreseen.Finish();
+    EXPECT_FALSE(foreseen.IsRunning());
+    structure.AdmitWaiting();
+    foreseen.Advance();
+    EXPECT_FALSE(foreseen.Comes(vertices[0], kClip));
     EXPECT_FALSE(foreseen.Has(2 * kClip));
     Workspace<D> workspace;
     int unchanged = 0;
@@ -128,7 +145,7 @@ TYPED_TEST(ForeseenCellsTest, StayTrueWhileVerticesAreAdded) {
       std::vector<VertexId> neighbours;
       if (look.found != nullptr) {
         ++unchanged;
-        EXPECT_EQ(look.found->bad_node, i % 2 == 0 ? -1 : static_cast<int>(i));
+        EXPECT_EQ(look.found->bad_node, is_odd(vertices[i]) ? static_cast<int>(Index(vertices[i])) : -1);
         EXPECT_EQ(look.found->radius_sq, cell->reach_sq());
         if (look.found->IsGood()) {
           ++good;
@@ -139,15 +156,55 @@ TYPED_TEST(ForeseenCellsTest, StayTrueWhileVerticesAreAdded) {
       plain += cell->KeepsRatio(kRatio) ? 1 : 0;
       cell->Place();
       ASSERT_EQ(Description<D>(*cell), expected);
-      structure.AddVertex(vertices[i], points[i]);
+      if (!adds_one_meanwhile || i + 1 < vertices.size()) {
+        structure.AddVertex(vertices[i], points[i]);
+      }
     }
     EXPECT_FALSE(foreseen.Has(kClip)) << "none is left";
-    EXPECT_GE(unchanged, 1);
-    EXPECT_GE(good, 1);
+    EXPECT_TRUE(adds_one_meanwhile || unchanged >= 1);
+    EXPECT_TRUE(adds_one_meanwhile || good >= 1);
     EXPECT_LT(unchanged, static_cast<int>(vertices.size())) << "some cells have changed";
     all_plain += plain;
   }
   EXPECT_EQ(all_plain > 0, D < 4) << "so few vertices leave no cell in 4-D that is not clipped";
+}
+
+TYPED_TEST(ForeseenCellsTest, VerticesThatWaitCountOnceTheyCutOrAreAdmitted) {
+  constexpr int D = TypeParam::kValue;
+  for (const std::string_view kind : kKinds) {
+    SCOPED_TRACE(std::string(kind));
+    QueryStructure<D> structure = StructureOf<D>(kind);
+    const uint32_t before = structure.vertex_count();
+    Workspace<D> workspace;
+    const auto of_others = CellNow<D>(structure, VertexId{0}, workspace);
+    std::vector<Point<D>> points;
+    VertexId near{0};
+    for (int i = 0; i < 5; ++i) {
+      points.push_back(structure.point(near));
+      for (double& x : points.back()) {
+        x += 0.01 * (0.5 + this->random_.Unit()) * (x < 0.5 ? 1 : -1);
+      }
+      near = structure.AddWaiting(near, points.back());  // near to one that waits, from the second on
+      ASSERT_EQ(near, VertexId{before + i});
+      ASSERT_EQ(structure.point(near), points.back());
+    }
+    ASSERT_EQ(structure.vertex_count(), before + points.size());
+    ASSERT_EQ(structure.waiting_count(), points.size());
+    EXPECT_EQ(CellNow<D>(structure, VertexId{0}, workspace), of_others) << "queries do not find them";
+    std::vector<decltype(Description<D>(workspace.cell))> cells;
+    for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
+      structure.UnplacedClippedVoronoi(VertexId{v}, kClip, workspace);
+      structure.CutByWaiting(VertexId{v}, workspace.cell);
+      workspace.cell.Place();
+      cells.push_back(Description<D>(workspace.cell));
+    }
+    structure.AdmitWaiting();
+    EXPECT_EQ(structure.waiting_count(), 0u);
+    for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
+      ASSERT_EQ(CellNow<D>(structure, VertexId{v}, workspace), cells[v]) << "vertex " << v;
+    }
+    EXPECT_NE(cells[0], of_others);
+  }
 }
 
 TYPED_TEST(ForeseenCellsTest, WhatIsCancelledIsLeftOut) {
@@ -157,12 +214,15 @@ TYPED_TEST(ForeseenCellsTest, WhatIsCancelledIsLeftOut) {
   ForeseenCells<D> foreseen(structure, team);
   RunContext context;
   const std::vector<VertexId> vertices = {VertexId{0}, VertexId{1}, VertexId{2}};
-  const auto judge = [&](size_t, Polytope<D>& cell) {
+  const auto judge = [&](VertexId, Polytope<D>& cell) {
     context.Cancel();
     return Assessment{.radius_sq = cell.reach_sq()};
   };
-  foreseen.Compute(vertices, kClip, judge, context);
-  foreseen.Compute(vertices, kClip, judge, context);
+  for (int batch = 0; batch < 2; ++batch) {
+    foreseen.Begin(vertices, kClip, judge, context);
+    foreseen.Finish();
+    foreseen.Advance();
+  }
   for (const VertexId v : vertices) {
     EXPECT_EQ(foreseen.Take(v, kClip).cell, nullptr);
   }

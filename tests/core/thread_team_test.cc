@@ -1,0 +1,62 @@
+// Loops that threads share: each call is made once, and what the calls write is seen after.
+#include "core/base/thread_team.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstddef>
+#include <vector>
+
+namespace wellspace::core {
+namespace {
+
+constexpr size_t kCounts[] = {0, 1, 2, 7, 1000};
+
+TEST(ThreadTeamTest, ForEachCallsOnceForEach) {
+  for (const int threads : {1, 2, 4}) {
+    ThreadTeam team(threads);
+    for (const size_t count : kCounts) {
+      std::vector<int> calls(count);
+      team.ForEach(count, [&](size_t i) { ++calls[i]; });
+      EXPECT_EQ(calls, std::vector<int>(count, 1));
+    }
+  }
+}
+
+TEST(ThreadTeamTest, BeginAndEndCallOnceForEachWhileTheCallerGoesOn) {
+  for (const int threads : {1, 2, 4}) {
+    ThreadTeam team(threads);
+    for (int repeat = 0; repeat < 100; ++repeat) {
+      for (const size_t count : kCounts) {
+        std::vector<int> calls(count);
+        std::vector<int> by_thread(count, -1);
+        team.Begin(count, [&](size_t i) {
+          ++calls[i];
+          by_thread[i] = ThreadTeam::CurrentThread();
+        });
+        const std::vector<int> own(count, 1);
+        team.End();
+        EXPECT_EQ(calls, own);
+        for (const int thread : by_thread) {
+          EXPECT_GE(thread, 0);
+          EXPECT_LT(thread, team.threads());
+        }
+      }
+    }
+  }
+}
+
+TEST(ThreadTeamTest, OtherThreadsBeginBeforeEnd) {
+  ThreadTeam team(2);
+  if (team.threads() < 2) {
+    GTEST_SKIP() << "one core";
+  }
+  std::atomic<bool> has_begun = false;
+  team.Begin(1, [&](size_t) { has_begun = true; });
+  while (!has_begun) {
+  }
+  team.End();
+}
+
+}  // namespace
+}  // namespace wellspace::core
