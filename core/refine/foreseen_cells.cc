@@ -69,7 +69,7 @@ typename ForeseenCells<D>::Foreseen* ForeseenCells<D>::ComputeOne(VertexId v, do
     cell.Neighbours(foreseen.neighbours);
   }
   foreseen.cut_limit_sq = cell.CutLimitSq();
-  std::swap(foreseen.cell, cell);
+  foreseen.cell.Swap(cell);
   return &foreseen;
 }
 

@@ -67,6 +67,21 @@ void Polytope<D>::Reset(const Point<D>& site, const Box<D>& bounds, const std::a
 }
 
 template <int D>
+void Polytope<D>::Swap(Polytope& other) noexcept {
+  std::swap(site_, other.site_);
+  std::swap(rule_, other.rule_);
+  std::swap(reach_, other.reach_);
+  std::swap(largest_slack_, other.largest_slack_);
+  std::swap(is_placed_, other.is_placed_);
+  planes_.swap(other.planes_);
+  std::swap(columns_, other.columns_);
+  joints_.swap(other.joints_);
+  nodes_.swap(other.nodes_);
+  std::swap(cuts_, other.cuts_);
+  std::swap(counters_, other.counters_);
+}
+
+template <int D>
 bool Polytope<D>::CutOff(VertexId u, const Point<D>& position, const Point<D>& normal, double length_sq) {
   return BestVectorUnit() == VectorUnit::kAvx2 ? CutOffAvx2(u, position, normal, length_sq)
                                                : CutOffWith<2>(u, position, normal, length_sq);

@@ -149,6 +149,9 @@ class Polytope {
   //             so its least value over the cell is at a node.
   bool Reaches(const Box<D>& cube) const;
 
+  // Exchanges the two cells. What only serves to cut them stays where it is, in the caches of whoever cuts.
+  void Swap(Polytope& other) noexcept;
+
   // Whether the last cut has made the cell larger than it may be.
   bool IsTooLarge() const { return columns_.count() > kMostNodes || planes_.size() > kMostPlanes; }
 
