@@ -91,7 +91,6 @@ Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const Demands<D>
     if (on_own_face) {
       if (bound_sq != Assessment::kNone) {
         result.own_face_edge_sq = std::min(result.own_face_edge_sq, bound_sq / rho_sq);
-        result.own_face_radius_sq = std::max(result.own_face_radius_sq, node.radius_sq);
       }
       continue;
     }

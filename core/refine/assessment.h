@@ -29,8 +29,6 @@ struct Assessment {
   // The shortest edge with a node on one of the site's own faces that is too far for it: no circumcentre, so it asks for
   // nothing now, but the site must look again, with that edge, once a new vertex cuts the facet there.
   double own_face_edge_sq = kNone;
-  // The farthest of these nodes.
-  double own_face_radius_sq = 0;
 
   // Found good by KeepsRatio alone: the cell touches no face, and its nodes may not be placed.
   bool is_plain = false;

@@ -1,13 +1,14 @@
-// Vertices on faces of the box that must look again once a vertex is added near them, by place.
+// Nodes on faces of the box that vertices there watch: who must look again once a vertex is added that cuts one off.
 #ifndef WELLSPACE_CORE_REFINE_FACE_WATCHERS_H_
 #define WELLSPACE_CORE_REFINE_FACE_WATCHERS_H_
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <map>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -18,107 +19,152 @@
 
 namespace wellspace::core {
 
-// Watchers are hashed by cubes: one that reaches as far as r by its cube of the grid whose sides are the least power of
-// two above r, so that all points within r are in that cube and those beside it.
+// A node of a cell, which lies on faces of the box that its vertex is on, too. A vertex that is added on one of these, no
+// farther from the node than `radius`, cuts it off.
+template <int D>
+struct WatchedNode {
+  Point<D> centre;  // on its faces to the bit
+  double radius = 0;
+  FaceMask faces = 0;
+};
+
+// Nodes are hashed by cubes: each by those that its ball meets of the grid whose sides are more than twice and at most four
+// times the radius, a power of two.
 //
 // Thread safety: thread-compatible.
 template <int D>
 class FaceWatchers {
  public:
-  // Adds `v` at `p`, which watches the points within `reach`, or all if that is infinite.
+  // Has `v` watch these nodes; all there are, known or not, if these are none.
   //
-  // REQUIRES:   v is none yet; reach > 0.
-  // Complexity: O(1), amortised.
-  void Add(VertexId v, const Point<D>& p, double reach) {
-    const int level = std::isinf(reach) ? kEverywhere : std::ilogb(reach) + 1;
-    const Cube cube = CubeOf(p, level);
-    cubes_.emplace(v, cube);
-    if (level != kEverywhere) {
-      watchers_[cube].push_back({v, p, reach * reach});
+  // REQUIRES:   v is no watcher yet; radii above zero.
+  // Complexity: O(2^D) for each node, O(2^(D - 1)) if it lies on one face; amortised.
+  void Add(VertexId v, std::span<const WatchedNode<D>> nodes) {
+    std::vector<uint32_t>& own = nodes_of_[v];
+    watching_all_ += nodes.empty() ? 1 : 0;
+    for (const WatchedNode<D>& node : nodes) {
+      const uint32_t number = NewNumber();
+      watched_[number] = {v, node};
+      own.push_back(number);
+      ++levels_[LevelOf(node)];
+      ForEachCube(node, [&](const Cube& cube) { in_cubes_[cube].push_back(number); });
     }
-    ++levels_[level];
   }
 
-  // Removes `v` if it is one.
+  // Removes `v` if it is a watcher.
   void Remove(VertexId v) {
-    const auto own = cubes_.find(v);
-    if (own == cubes_.end()) {
+    const auto own = nodes_of_.find(v);
+    if (own == nodes_of_.end()) {
       return;
     }
-    if (const auto at = watchers_.find(own->second); at != watchers_.end()) {
-      std::erase_if(at->second, [v](const Watcher& watcher) { return watcher.vertex == v; });
-      if (at->second.empty()) {
-        watchers_.erase(at);
+    watching_all_ -= own->second.empty() ? 1 : 0;
+    for (const uint32_t number : own->second) {
+      const WatchedNode<D>& node = watched_[number].node;
+      ForEachCube(node, [&](const Cube& cube) {
+        const auto at = in_cubes_.find(cube);
+        std::erase(at->second, number);
+        if (at->second.empty()) {
+          in_cubes_.erase(at);
+        }
+      });
+      if (const auto at = levels_.find(LevelOf(node)); --at->second == 0) {
+        levels_.erase(at);
       }
+      free_.push_back(number);
     }
-    if (const auto at = levels_.find(own->second.first); --at->second == 0) {
-      levels_.erase(at);
-    }
-    cubes_.erase(own);
+    nodes_of_.erase(own);
   }
 
   void Clear() { *this = {}; }
 
-  // Whether a vertex that shares a face with `x` watches it; others may count, too. `faces` are those of x.
+  // Whether some vertex watches all nodes.
+  bool SomeWatchAll() const { return watching_all_ > 0; }
+
+  // Calls f(VertexId) for each node that a vertex at `x` cuts off, which is on `faces`; not for who watches all.
   //
-  // Complexity: O(3^D) look-ups for each power of two that some vertex reaches as far as; on one face O(3^(D - 1)).
-  bool IsWatched(const Point<D>& x, FaceMask faces) const {
+  // Complexity: O(1) for each power of two that radii have, and for each node near x.
+  template <typename F>
+  void ForEachCutOff(const Point<D>& x, FaceMask faces, F&& f) const {
     for (const auto& [level, count] : levels_) {
-      if (level == kEverywhere || HasBeside(CubeOf(x, level), 0, x, faces)) {
-        return true;
+      const auto at = in_cubes_.find(CubeOf(x, level));
+      if (at == in_cubes_.end()) {
+        continue;
+      }
+      for (const uint32_t number : at->second) {
+        const auto& [v, node] = watched_[number];
+        if ((node.faces & faces) != 0 && DistanceSq<D>(node.centre, x) <= node.radius * node.radius) {
+          f(v);
+        }
       }
     }
-    return false;
   }
 
   uint64_t MemoryBytes() const {
-    return watchers_.capacity() * sizeof(std::pair<Cube, std::vector<Watcher>>) +
-           cubes_.capacity() * sizeof(std::pair<VertexId, Cube>);
+    return in_cubes_.capacity() * sizeof(std::pair<Cube, std::vector<uint32_t>>) +
+           nodes_of_.capacity() * sizeof(std::pair<VertexId, std::vector<uint32_t>>) +
+           watched_.capacity() * (sizeof(Watched) + 4 * sizeof(uint32_t));
   }
 
- public:
+ private:
   // The binary logarithm of the side, and the place in units of it.
   using Cube = std::pair<int, std::array<double, D>>;
-  struct Watcher {
+  struct Watched {
     VertexId vertex;
-    Point<D> position;
-    double reach_sq;
+    WatchedNode<D> node;
   };
-  static constexpr int kEverywhere = std::numeric_limits<int>::max();
+
+  static int LevelOf(const WatchedNode<D>& node) { return std::ilogb(node.radius) + 2; }
+
+  static double PlaceOf(double x, int level) { return std::floor(std::ldexp(x, -level)); }
 
   static Cube CubeOf(const Point<D>& p, int level) {
     Cube cube{level, {}};
-    for (int i = 0; i < D && level != kEverywhere; ++i) {
-      cube.second[i] = std::floor(std::ldexp(p[i], -level));
+    for (int i = 0; i < D; ++i) {
+      cube.second[i] = PlaceOf(p[i], level);
     }
     return cube;
   }
 
-  // Looks for watchers of `x` in the cubes beside one along `axis` and those after it. Those of a point on one face are all
-  // as far along its axis.
-  bool HasBeside(Cube cube, int axis, const Point<D>& x, FaceMask faces) const {
-    if (axis == D) {
-      const auto at = watchers_.find(cube);
-      return at != watchers_.end() && std::any_of(at->second.begin(), at->second.end(), [&](const Watcher& watcher) {
-               return DistanceSq<D>(watcher.position, x) <= watcher.reach_sq;
-             });
-    }
-    if ((faces & ~(3u << (2 * axis))) == 0) {
-      return HasBeside(cube, axis + 1, x, faces);
-    }
-    const double middle = cube.second[axis];
-    for (const double step : {0.0, -1.0, 1.0}) {
-      cube.second[axis] = middle + step;
-      if (HasBeside(cube, axis + 1, x, faces)) {
-        return true;
+  // Calls f(cube) for all cubes that hold a point which cuts off the node: if it lies on one face alone, that point is as far
+  // along its axis.
+  template <typename F>
+  static void ForEachCube(const WatchedNode<D>& node, F&& f) {
+    Cube cube{LevelOf(node), {}};
+    const auto from_axis = [&](const auto& self, int axis) {
+      if (axis == D) {
+        f(cube);
+        return;
       }
-    }
-    return false;
+      const bool is_exact = (node.faces & ~(3u << (2 * axis))) == 0;
+      const double reach = is_exact ? 0 : node.radius;
+      const double first = PlaceOf(node.centre[axis] - reach, cube.first);
+      const double last = PlaceOf(node.centre[axis] + reach, cube.first);
+      cube.second[axis] = first;
+      self(self, axis + 1);
+      if (last > first) {  // the next one, as the ball is at most as large as a cube
+        cube.second[axis] = last;
+        self(self, axis + 1);
+      }
+    };
+    from_axis(from_axis, 0);
   }
 
-  absl::flat_hash_map<Cube, std::vector<Watcher>> watchers_;  // where there are any
-  absl::flat_hash_map<VertexId, Cube> cubes_;                 // of all
-  std::map<int, uint32_t> levels_;                            // and how many are at each
+  uint32_t NewNumber() {
+    if (free_.empty()) {
+      watched_.emplace_back();
+      return static_cast<uint32_t>(watched_.size() - 1);
+    }
+    const uint32_t number = free_.back();
+    free_.pop_back();
+    return number;
+  }
+
+  std::vector<Watched> watched_;                                   // by number
+  std::vector<uint32_t> free_;                                     // numbers
+  absl::flat_hash_map<Cube, std::vector<uint32_t>> in_cubes_;      // numbers, where there are any
+  absl::flat_hash_map<VertexId, std::vector<uint32_t>> nodes_of_;  // numbers, by watcher
+  std::map<int, uint32_t> levels_;                                 // and how many nodes are at each
+  uint32_t watching_all_ = 0;
 };
 
 }  // namespace wellspace::core

@@ -22,14 +22,18 @@ constexpr double kClipRatioFactor = 1.25;
 // work has graded. Its cell is clipped so to announce it.
 constexpr double kAround = 1.5;
 
-// A vertex that cuts off a node of a cell is nearer than twice the node's distance; what is more pays for rounding.
-constexpr double kWatched = 2.001;
+// A vertex that cuts off a node is nearer to it than the node's radius; what is more pays for rounding.
+constexpr double kWatched = 1.001;
 
 // Vertices whose first edges one thread looks for at a time.
 constexpr uint32_t kScheduledTogether = 1024;
 
 // Vertices looked at between two reports of progress.
 constexpr uint64_t kReportInterval = 256;
+
+// What rounding may do: to lengths, relatively; to coordinates, relative to the largest.
+constexpr double kLengthRounding = 1e-9;
+constexpr double kCoordinateRounding = 0x1p-49;
 
 // The checking build.
 #ifdef WELLSPACE_CHECKS
@@ -39,9 +43,6 @@ constexpr bool kChecks = false;
 #endif
 // All vertices are looked at once for every so many that are taken from the schedule, relative to their number.
 constexpr uint64_t kCheckShare = 16;
-// What rounding may do: to lengths, relatively; to coordinates, relative to the largest.
-constexpr double kLengthRounding = 1e-9;
-constexpr double kCoordinateRounding = 0x1p-49;
 
 // Aborts unless `holds`. The text is put together only then.
 template <typename... Text>
@@ -128,7 +129,7 @@ void Refinement<D>::CellChanged(VertexId v, double nearest_sq, std::span<const V
   radius_sq_.resize(structure_.vertex_count(), Assessment::kNone);
   announced_.resize(structure_.vertex_count(), Announced::kToAll);
   const bool is_on_face = structure_.faces(v) != 0;
-  Remember(v, is_on_face ? -nearest_sq : Assessment::kNone, Assessment::kNone);
+  Remember(v, is_on_face ? -nearest_sq : Assessment::kNone);
   if (is_on_face && demands_->criterion == Criterion::kWellSpaced) {
     schedule_.Add(v, nearest_sq);  // what is remembered for the faces leaves no room for the radius
   }
@@ -182,13 +183,18 @@ double Refinement<D>::FirstEdgeSq(const Demands<D>& demands, VertexId v, double 
   return std::min(first_sq, size_sq / (demands.rho * demands.rho));
 }
 
-// Schedules the new vertex `x`, whose nearest neighbour is as near as it says. If a vertex on a face of x remembers a node
-// there that x may cut off, x is announced at once: that one may have to look sooner than x.
+// Schedules the new vertex `x`, whose nearest neighbour is as near as it says, and at once those on a face of x that remember
+// a node there which x cuts off: they may have to look sooner than x.
 template <int D>
 void Refinement<D>::ScheduleNew(VertexId x, double nearest_sq) {
   const Point<D>& p = structure_.point(x);
   const double around = kAround * std::sqrt(nearest_sq);
-  if (structure_.faces(x) != 0 && watchers_.IsWatched(p, structure_.faces(x))) {
+  if (structure_.faces(x) != 0) {
+    watchers_.ForEachCutOff(p, structure_.faces(x),
+                            [&](VertexId u) { Wake(u, DistanceSq<D>(p, structure_.point(u))); });
+    ScheduleWoken();
+  }
+  if (structure_.faces(x) != 0 && watchers_.SomeWatchAll()) {
     ComputeCell(x, around, new_);
     new_.cell.Place();
     if (!new_.cell.IsTooLarge()) {
@@ -354,16 +360,35 @@ Assessment Refinement<D>::AssessCell(Polytope<D>& cell, FaceMask site_faces, dou
   return Assess<D>(cell, site_faces, *demands_, edge_limit_sq);
 }
 
-// Sets radius_sq_; where that stands for an edge, a vertex that cuts off the node too far for it is within `reach`.
+// Sets radius_sq_; where that stands for an edge, the nodes that are too far for it are `watched`, or are not known.
 template <int D>
-void Refinement<D>::Remember(VertexId v, double radius_sq, double reach) {
+void Refinement<D>::Remember(VertexId v, double radius_sq, std::span<const WatchedNode<D>> watched) {
   if (radius_sq_[Index(v)] < 0) {
     watchers_.Remove(v);
   }
   radius_sq_[Index(v)] = radius_sq;
   if (radius_sq < 0) {
-    watchers_.Add(v, structure_.point(v), reach);
+    watchers_.Add(v, watched);
   }
+}
+
+// The nodes of the cell of `v` on faces of v that are too far for an edge of that squared length, or for a longer one.
+template <int D>
+std::span<const WatchedNode<D>> Refinement<D>::NodesToWatch(VertexId v, const Polytope<D>& cell, double edge_sq) {
+  watched_.clear();
+  const double least_sq = demands_->rho * demands_->rho * edge_sq * (1 - kLengthRounding);
+  for (const CellNode<D>& node : cell.nodes()) {
+    const auto faces = static_cast<FaceMask>(cell.FacesOf(node) & structure_.faces(v));
+    if (faces == 0 || node.radius_sq <= least_sq) {
+      continue;
+    }
+    WatchedNode<D> watched{cell.site(), kWatched * std::sqrt(node.radius_sq), faces};
+    for (int i = 0; i < D; ++i) {
+      watched.centre[i] += (faces >> (2 * i) & 3) == 0 ? node.x[i] : 0;
+    }
+    watched_.push_back(watched);
+  }
+  return watched_;
 }
 
 // Declares a vertex that needs nothing now done, or puts it where it will be looked at again: not before bucket
@@ -373,7 +398,11 @@ void Refinement<D>::Settle(VertexId v, const Assessment& found, double clip, int
   const double radius_sq = found.own_face_edge_sq != Assessment::kNone ? -found.own_face_edge_sq
                            : found.IsGood()                            ? found.radius_sq
                                                                        : Assessment::kNone;
-  Remember(v, radius_sq, kWatched * std::sqrt(found.own_face_radius_sq));
+  if (radius_sq < 0) {
+    Remember(v, radius_sq, NodesToWatch(v, *look.cell, found.own_face_edge_sq));
+  } else {
+    Remember(v, radius_sq);
+  }
   if (found.IsGood()) {
     if (look.found != nullptr) {
       neighbours_.Set(v, look.neighbours);
@@ -452,14 +481,25 @@ void Refinement<D>::Announce(VertexId v, const Polytope<D>& cell, const Assessme
       const bool was_cut = radius_sq < 0 && cell.FacesOf(node) != 0;
       const bool is_too_far = demands_->criterion == Criterion::kWellSpaced && radius_sq > rho_sq * 2 * plane.offset;
       if (was_cut || is_too_far) {
-        const double edge_sq = was_cut ? std::min(-radius_sq, 2 * plane.offset) : 2 * plane.offset;
-        Remember(plane.vertex, Assessment::kNone);
-        woken_.emplace_back(plane.vertex, edge_sq);
+        Wake(plane.vertex, 2 * plane.offset);
       }
     }
   }
+  ScheduleWoken();
+}
+
+// Has ScheduleWoken schedule `u`, for the edge of that squared length that it has got, or for the one that it remembers.
+template <int D>
+void Refinement<D>::Wake(VertexId u, double edge_sq) {
+  const double radius_sq = radius_sq_[Index(u)];
+  woken_.emplace_back(u, radius_sq < 0 ? std::min(-radius_sq, edge_sq) : edge_sq);
+}
+
+template <int D>
+void Refinement<D>::ScheduleWoken() {
   std::sort(woken_.begin(), woken_.end());  // what comes next is to depend on nothing but the cell
   for (const auto& [u, edge_sq] : woken_) {
+    Remember(u, Assessment::kNone);
     schedule_.Add(u, edge_sq);
   }
   woken_.clear();

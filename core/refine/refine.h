@@ -132,8 +132,11 @@ class Refinement {
   bool IsLongEnough(const SteinerPoint<D>& point) const { return point.empty_radius_sq >= min_edge_ * min_edge_; }
   void Settle(VertexId v, const Assessment& found, double clip, int earliest, const Look<D>& look);
   void ScheduleNew(VertexId x, double nearest_sq);
-  void Remember(VertexId v, double radius_sq, double reach = 0);
+  void Remember(VertexId v, double radius_sq, std::span<const WatchedNode<D>> watched = {});
+  std::span<const WatchedNode<D>> NodesToWatch(VertexId v, const Polytope<D>& cell, double edge_sq);
   void Announce(VertexId v, const Polytope<D>& cell, const Assessment& found);
+  void Wake(VertexId u, double edge_sq);
+  void ScheduleWoken();
   void CheckOrder(VertexId v, const Polytope<D>& cell, int bucket);
   void CheckInsertion(const Request& request);
 
@@ -157,8 +160,9 @@ class Refinement {
   uint64_t max_vertices_ = 0;
   ForeseenCells<D>* foreseen_ = nullptr;            // null between runs
   std::vector<VertexId> next_;                      // whose cells are foreseen next
-  std::vector<std::pair<VertexId, double>> woken_;  // scratch of Announce
+  std::vector<std::pair<VertexId, double>> woken_;  // scratch of Wake
   std::vector<VertexId> beside_;                    // scratch of Settle
+  std::vector<WatchedNode<D>> watched_;             // scratch of NodesToWatch
   RunContext* context_ = nullptr;
   const RefinementObserver<D>* observer_ = nullptr;
 

@@ -315,8 +315,8 @@ TEST_P(MesherTest, ForetellsItsVerticesWhereThereAreSizes) {
 }
 
 TEST(LargeMesherTest, ForetellsItsVertices) {
-  ExpectForetold(InUnitBox(2), MakeCloud("uniform", 2, 20'000), 1.5);
-  ExpectForetold(InUnitBox(3), MakeCloud("uniform", 3, 5'000), 1.5);
+  ExpectForetold(InUnitBox(2), MakeCloud("uniform", 2, 60'000), 1.5);
+  ExpectForetold(InUnitBox(3), MakeCloud("uniform", 3, 25'000), 1.5);
 }
 
 TEST_P(MesherTest, CanBeRefinedFurther) {
