@@ -471,15 +471,20 @@ void Refinement<D>::Announce(VertexId v, const Polytope<D>& cell, const Assessme
     return;
   }
   const double rho_sq = demands_->rho * demands_->rho;
+  const bool is_well_spaced = demands_->criterion == Criterion::kWellSpaced;
   for (const CellNode<D>& node : cell.nodes()) {
+    const bool is_on_face = cell.FacesOf(node) != 0;
+    if (!is_on_face && !is_well_spaced) {
+      continue;
+    }
     for (const uint16_t index : node.planes) {
       const Plane<D>& plane = cell.plane(index);
       if (plane.kind != PlaneKind::kBisector || !(is_first || !schedule_.Waits(plane.vertex))) {
         continue;
       }
       const double radius_sq = radius_sq_[Index(plane.vertex)];
-      const bool was_cut = radius_sq < 0 && cell.FacesOf(node) != 0;
-      const bool is_too_far = demands_->criterion == Criterion::kWellSpaced && radius_sq > rho_sq * 2 * plane.offset;
+      const bool was_cut = radius_sq < 0 && is_on_face;
+      const bool is_too_far = is_well_spaced && radius_sq > rho_sq * 2 * plane.offset;
       if (was_cut || is_too_far) {
         Wake(plane.vertex, 2 * plane.offset);
       }

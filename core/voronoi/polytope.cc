@@ -63,7 +63,7 @@ void Polytope<D>::Reset(const Point<D>& site, const Box<D>& bounds, const std::a
   }
   is_placed_ = false;
   reach_ = std::numeric_limits<double>::infinity();
-  Place();
+  SetReach(columns_.template FindLargest<2>());
 }
 
 template <int D>
@@ -292,25 +292,35 @@ void Polytope<D>::FillHoles(size_t filled) {
 
 template <int D>
 void Polytope<D>::Place() {
+  PlaceThose([](size_t) { return true; });
+}
+
+template <int D>
+bool Polytope<D>::PlaceUnlessKeeps(double ratio) {
+  if (KeepsRatio(ratio)) {
+    return true;
+  }
+  PlaceThose([this, ratio](size_t node) { return !SurelyKeeps(node, ratio); });
+  return false;
+}
+
+// Fills nodes_, and places those that wants(node) asks for.
+template <int D>
+template <typename Wants>
+void Polytope<D>::PlaceThose(Wants wants) {
   if (is_placed_) {
     return;
   }
   is_placed_ = true;
   nodes_.resize(columns_.count());
   for (size_t i = 0; i < nodes_.size(); ++i) {
-    Joint& joint = joints_[i];
+    const Joint& joint = joints_[i];
     if (!joint.is_placed) {
-      joint.is_placed = true;
-      const Joint old = joint;
-      const std::array<uint32_t, D> ranks = RanksOf(old.planes);
-      for (int k = 0; k < D; ++k) {
-        joint.planes[ranks[k]] = old.planes[k];
-        joint.ends[ranks[k]] = old.ends[k];
-        joints_[NodeOf(old.ends[k])].ends[SlotOf(old.ends[k])] = EndAt(i, ranks[k]);
+      if (wants(i)) {
+        PlaceNode(i);
+      } else {
+        is_placed_ = false;
       }
-      Point<D> x;
-      const double slack = PlaceByPlanes(joint.planes, x);
-      columns_.Set(i, x, slack);
     }
     CellNode<D>& node = nodes_[i];
     node.x = columns_.x(i);
@@ -323,6 +333,23 @@ void Polytope<D>::Place() {
     }
   }
   SetReach(columns_.template FindLargest<2>());
+}
+
+// Places a node by its planes, in their order.
+template <int D>
+void Polytope<D>::PlaceNode(size_t node) {
+  Joint& joint = joints_[node];
+  joint.is_placed = true;
+  const Joint old = joint;
+  const std::array<uint32_t, D> ranks = RanksOf(old.planes);
+  for (int k = 0; k < D; ++k) {
+    joint.planes[ranks[k]] = old.planes[k];
+    joint.ends[ranks[k]] = old.ends[k];
+    joints_[NodeOf(old.ends[k])].ends[SlotOf(old.ends[k])] = EndAt(node, ranks[k]);
+  }
+  Point<D> x;
+  const double slack = PlaceByPlanes(joint.planes, x);
+  columns_.Set(node, x, slack);
 }
 
 // The places of planes in order: bisectors by vertex, then walls by face.
@@ -447,21 +474,26 @@ void Polytope<D>::SetReach(const typename NodeColumns<D>::Largest& largest) {
 
 template <int D>
 bool Polytope<D>::KeepsRatio(double ratio) const {
-  const double limit = ratio * (1 - 4 * kPlaced);
   for (size_t i = 0; i < columns_.count(); ++i) {
-    double nearest = std::numeric_limits<double>::infinity();
-    for (const uint16_t index : joints_[i].planes) {
-      const Plane<D>& plane = planes_[index];
-      if (plane.kind != PlaneKind::kBisector) {
-        return false;
-      }
-      nearest = std::min(nearest, plane.length);
-    }
-    if (!(std::sqrt(NormSq<D>(columns_.x(i))) + columns_.slack(i) <= limit * nearest)) {
+    if (!SurelyKeeps(i, ratio)) {
       return false;
     }
   }
   return true;
+}
+
+// KeepsRatio, of one node.
+template <int D>
+WELLSPACE_INLINE bool Polytope<D>::SurelyKeeps(size_t node, double ratio) const {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const uint16_t index : joints_[node].planes) {
+    const Plane<D>& plane = planes_[index];
+    if (plane.kind != PlaneKind::kBisector) {
+      return false;
+    }
+    nearest = std::min(nearest, plane.length);
+  }
+  return std::sqrt(NormSq<D>(columns_.x(node))) + columns_.slack(node) <= ratio * (1 - 4 * kPlaced) * nearest;
 }
 
 template <int D>

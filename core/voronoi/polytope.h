@@ -87,7 +87,8 @@ class Polytope {
   static constexpr size_t kMostNodes = D <= 4 ? size_t{1} << 14 : size_t{1} << 18;
   static constexpr size_t kMostPlanes = size_t{1} << 15;
 
-  // Begins with the box [low, high], which holds `site` and whose faces are of kind `kinds[FaceIndex]`.
+  // Begins with the box [low, high], which holds `site` and whose faces are of kind `kinds[FaceIndex]`. Its nodes are still to
+  // be placed, by Place().
   void Reset(const Point<D>& site, const Box<D>& bounds, const std::array<PlaneKind, 2 * D>& kinds, TieRule rule);
 
   // Cuts the cell by the bisector of its site and `u`, keeping the site's side. Returns whether anything was cut off.
@@ -125,14 +126,12 @@ class Polytope {
   // Errors:     none; false where it is not sure.
   bool KeepsRatio(double ratio) const;
 
-  // Places the nodes unless KeepsRatio(ratio), and returns whether that holds.
-  bool PlaceUnlessKeeps(double ratio) {
-    const bool keeps = KeepsRatio(ratio);
-    if (!keeps) {
-      Place();
-    }
-    return keeps;
-  }
+  // Returns KeepsRatio(ratio). Unless that holds nodes() may be asked for: those of which it does not surely hold are placed
+  // then, the others only roughly, though so that it holds of them.
+  //
+  // Complexity: O(nodes).
+  // Errors:     none.
+  bool PlaceUnlessKeeps(double ratio);
 
   // Computes `most` of the candidates, so that those for which it is negative do not cut the cell, now or later.
   //
@@ -177,7 +176,7 @@ class Polytope {
   double reach_sq() const { return reach_ * reach_; }
   // A vertex whose computed squared distance from the site is larger than this cannot cut the cell.
   double CutLimitSq() const { return 4 * (1 + 0x1p-49) * reach_sq(); }
-  // REQUIRES:   the last cut was Cut, or Place has been called since.
+  // REQUIRES:   since Reset and the last CutBeforePlace, Cut or Place has been called, or PlaceUnlessKeeps, which returned false.
   std::span<const CellNode<D>> nodes() const { return nodes_; }
   const Plane<D>& plane(int index) const { return planes_[index]; }
   int plane_count() const { return static_cast<int>(planes_.size()); }
@@ -230,6 +229,10 @@ class Polytope {
   void FindCutEdges(uint16_t plane);
   void PlaceCutEdges(const Plane<D>& plane);
   std::array<uint32_t, D> RanksOf(const std::array<uint16_t, D>& indices) const;
+  bool SurelyKeeps(size_t node, double ratio) const;
+  template <typename Wants>
+  void PlaceThose(Wants wants);
+  void PlaceNode(size_t node);
   double PlaceByPlanes(const std::array<uint16_t, D>& indices, Point<D>& x) const;
   void MakeNewNodes();
   void LinkNewNodes();

@@ -206,6 +206,7 @@ TYPED_TEST(CertificateFaultsTest, RefusesABoxOfAnotherSize) {
   }
   Polytope<D> uncut;
   uncut.Reset(structure.point(VertexId{0}), structure.box(), kinds, TieRule::kKeep);
+  uncut.Place();
   EXPECT_TRUE(IsRefused(CertifyCell<D>(structure, VertexId{0}, 10, uncut), "is in the ball about node"));
 }
 

@@ -149,6 +149,7 @@ TYPED_TEST(PolytopeTest, BeginsAsTheBox) {
   }
   Polytope<D> cell;
   cell.Reset(site, box, Faces<D>(), TieRule::kKeep);
+  cell.Place();
   EXPECT_TRUE(IsSimplePolytope<D>(cell));
   EXPECT_EQ(cell.nodes().size(), size_t{1} << D);
   EXPECT_EQ(cell.plane_count(), 2 * D);

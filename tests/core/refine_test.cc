@@ -387,6 +387,7 @@ TYPED_TEST(RefineTest, EncroachmentPointIsTheMeanOfTheFacetsNodes) {
   site.fill(0.4);
   Polytope<D> cell;
   cell.Reset(site, test::UnitBox<D>(), kinds, TieRule::kKeep);
+  cell.Place();
   for (int face = 0; face < 2 * D; ++face) {
     const auto point = EncroachmentPoint<D>(cell, 0, face);
     double distance_sq = 0;
@@ -415,6 +416,7 @@ TYPED_TEST(RefineTest, EncroachmentPointStaysOnTheSitesFaces) {
   site[0] = 0.4;
   Polytope<D> cell;
   cell.Reset(site, test::UnitBox<D>(), kinds, TieRule::kKeep);
+  cell.Place();
   const FaceMask faces = test::UnitBox<D>().FacesOf(site);
   const auto point = EncroachmentPoint<D>(cell, faces, FaceIndex(0, true));
   EXPECT_EQ(point.position[0], 1);

@@ -63,6 +63,9 @@ class QueryChecker {
  public:
   explicit QueryChecker(SplitMix64& random) : random_(random) {}
 
+  // How many nodes were not placed, as they surely keep a ratio that others do not.
+  uint64_t left_rough() const { return left_rough_; }
+
   void CheckAll(const QueryStructure<D>& structure, VertexId v) {
     SCOPED_TRACE("vertex " + std::to_string(Index(v)) + " of " + std::to_string(structure.vertex_count()));
     const double nearest_sq = test::NearestDistanceSq<D>(structure, v);
@@ -103,6 +106,7 @@ class QueryChecker {
     std::transform(kRatios.begin(), kRatios.end(), keeps.begin(), [&](double r) { return cell.KeepsRatio(r); });
     cell.Place();
     double largest = 0;
+    std::vector<double> ratios;
     for (const CellNode<D>& node : cell.nodes()) {
       double nearest_sq = std::numeric_limits<double>::infinity();
       for (const uint16_t index : node.planes) {
@@ -112,7 +116,8 @@ class QueryChecker {
           break;
         }
       }
-      largest = std::max(largest, std::sqrt(node.radius_sq / nearest_sq));
+      ratios.push_back(std::sqrt(node.radius_sq / nearest_sq));
+      largest = std::max(largest, ratios.back());
     }
     for (size_t i = 0; i < kRatios.size(); ++i) {
       ASSERT_EQ(cell.KeepsRatio(kRatios[i]), keeps[i]);
@@ -120,6 +125,24 @@ class QueryChecker {
         ASSERT_LE(largest, kRatios[i]);
       } else {
         ASSERT_GE(largest, kRatios[i] * (1 - 1e-5));
+      }
+    }
+    const std::vector<CellNode<D>> placed(cell.nodes().begin(), cell.nodes().end());
+    for (const double ratio : kRatios) {
+      structure.UnplacedClippedVoronoi(v, radius, fast_);
+      if (cell.PlaceUnlessKeeps(ratio)) {
+        continue;
+      }
+      ASSERT_EQ(cell.nodes().size(), placed.size());
+      for (size_t i = 0; i < placed.size(); ++i) {
+        const CellNode<D>& node = cell.nodes()[i];
+        if (node.x == placed[i].x) {
+          continue;
+        }
+        ++left_rough_;
+        ASSERT_LE(ratios[i], ratio);
+        ASSERT_LE(std::sqrt(node.radius_sq), ratio * std::sqrt(placed[i].radius_sq) / ratios[i]);
+        ASSERT_LE(std::sqrt(DistanceSq<D>(node.x, placed[i].x)), node.slack + placed[i].slack);
       }
     }
   }
@@ -138,6 +161,7 @@ class QueryChecker {
   SplitMix64& random_;
   Workspace<D> fast_;
   Polytope<D> slow_;
+  uint64_t left_rough_ = 0;
 };
 
 template <typename T>
@@ -171,6 +195,7 @@ TYPED_TEST(VoronoiOracleTest, InitializeAddsTheCornersThatAreMissing) {
 // Before any refinement queries may take long, but are as exact.
 TYPED_TEST(VoronoiOracleTest, QueriesAreExactOnEveryKindOfCloud) {
   constexpr int D = TypeParam::kValue;
+  uint64_t left_rough = 0;
   for (const std::string_view kind : test::SomeKinds(D)) {
     SCOPED_TRACE(std::string(kind));
     const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, ByDimension<D>({60, 30, 16, 4})));
@@ -179,7 +204,9 @@ TYPED_TEST(VoronoiOracleTest, QueriesAreExactOnEveryKindOfCloud) {
       checker.CheckAll(structure, VertexId(this->random_.Below(structure.vertex_count())));
       ASSERT_FALSE(this->HasFatalFailure());
     }
+    left_rough += checker.left_rough();
   }
+  EXPECT_GT(left_rough, 0u);
 }
 
 // From wherever it is looked for; where a vertex is, on faces and between leaves too.
