@@ -45,7 +45,8 @@ class ThreadTeam {
     Acquire(&ended_);
   }
 
-  // Has the other threads begin such a loop, while the caller goes on. Nothing that f reads may be written until End.
+  // Has the other threads begin such a loop, while the caller goes on. Nothing that f reads may be written until End or Drop,
+  // which has to be called before the next loop.
   void Begin(size_t count, std::function<void(size_t)> f) {
     f_ = std::move(f);
     count_ = count;
@@ -58,13 +59,19 @@ class ThreadTeam {
     });
   }
 
-  // Joins in what has been begun, and returns when all calls have.
+  // Joins in what has been begun, and returns when all calls have. If one throws, so does this, and some are not made.
   void End() {
-    arena_.execute([&] {
-      Work();
-      group_.wait();
-    });
+    arena_.execute([&] { group_.run_and_wait([this] { Work(); }); });
     Acquire(&ended_);
+  }
+
+  // Makes no more of the calls, and returns when those that are made have. What they throw is lost.
+  void Drop() noexcept {
+    next_ = count_;
+    try {
+      End();
+    } catch (...) {
+    }
   }
 
  private:
@@ -88,10 +95,10 @@ class ThreadTeam {
 
   const int threads_;
   tbb::task_arena arena_;
-  tbb::task_group group_;
   std::function<void(size_t)> f_;
   size_t count_ = 0;
   std::atomic<size_t> next_ = 0;
+  tbb::task_group group_;
   char begun_ = 0;
   char ended_ = 0;
 };

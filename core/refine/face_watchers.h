@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <span>
 #include <utility>
@@ -137,13 +138,14 @@ class FaceWatchers {
       }
       const bool is_exact = (node.faces & ~(3u << (2 * axis))) == 0;
       const double reach = is_exact ? 0 : node.radius;
-      const double first = PlaceOf(node.centre[axis] - reach, cube.first);
-      const double last = PlaceOf(node.centre[axis] + reach, cube.first);
-      cube.second[axis] = first;
-      self(self, axis + 1);
-      if (last > first) {  // the next one, as the ball is at most as large as a cube
-        cube.second[axis] = last;
-        self(self, axis + 1);
+      // Two at most, but for rounding.
+      double last = std::numeric_limits<double>::quiet_NaN();
+      for (const double x : {node.centre[axis] - reach, node.centre[axis], node.centre[axis] + reach}) {
+        const double place = PlaceOf(x, cube.first);
+        if (place != last) {
+          cube.second[axis] = last = place;
+          self(self, axis + 1);
+        }
       }
     };
     from_axis(from_axis, 0);

@@ -33,17 +33,25 @@ void ForeseenCells<D>::Finish() {
   if (!is_running_) {
     return;
   }
-  team_.End();
   is_running_ = false;
+  team_.End();
   if (batches_ended_++ % kBatchesBetweenCounts == 0) {
     CountMemory();
   }
 }
 
 template <int D>
+void ForeseenCells<D>::Drop() noexcept {
+  if (is_running_) {
+    is_running_ = false;
+    team_.Drop();
+  }
+  batches_[1 - ready_].Clear();
+}
+
+template <int D>
 void ForeseenCells<D>::Advance() {
-  batches_[ready_].left = 0;
-  batches_[ready_].vertices.clear();
+  batches_[ready_].Clear();
   ready_ = 1 - ready_;
 }
 
@@ -94,7 +102,11 @@ Look<D> ForeseenCells<D>::Take(VertexId v, double clip) {
   if (foreseen == nullptr) {
     return {};
   }
-  if (CutByNew(v, batch.vertex_count, *foreseen)) {
+  const bool is_cut = CutByNew(v, batch.vertex_count, *foreseen);
+  if (foreseen->cell.IsTooLarge()) {
+    return {};
+  }
+  if (is_cut) {
     return {&foreseen->cell};
   }
   return {&foreseen->cell, &foreseen->found, foreseen->neighbours};

@@ -47,7 +47,7 @@ class ForeseenCells {
   using Judge = std::function<Assessment(VertexId v, Polytope<D>& cell)>;
 
   ForeseenCells(const QueryStructure<D>& structure, ThreadTeam& team) : structure_(structure), team_(team) {}
-  ~ForeseenCells() { Finish(); }
+  ~ForeseenCells() { Drop(); }
 
   int threads() const { return team_.threads(); }
 
@@ -62,19 +62,23 @@ class ForeseenCells {
   bool IsRunning() const { return is_running_; }
   // Helps them, and returns when all that comes has been computed.
   void Finish();
+  // Has them stop, and nothing come.
+  void Drop() noexcept;
 
   // Makes what comes what may be taken, in the place of what is left of that.
   //
   // REQUIRES:   !IsRunning().
   void Advance();
 
-  // Whether the cell of `v` comes, clipped so; whether that of any does or may be taken. Not if so many vertices were added
-  // since that they are sooner computed anew.
-  bool Comes(VertexId v, double clip) const { return IsFresh(coming(), clip) && coming().Holds(v); }
-  bool Has(double clip) const { return IsFresh(ready(), clip) || IsFresh(coming(), clip); }
+  // Whether the cell of any vertex comes, clipped so; whether that of `v` does. Not if so many vertices were added since that
+  // they are sooner computed anew.
+  bool SomeCome(double clip) const { return IsFresh(coming(), clip); }
+  bool Comes(VertexId v, double clip) const { return SomeCome(clip) && coming().Holds(v); }
+  // Whether the cell of `v` may be taken, clipped so.
+  bool IsReady(VertexId v, double clip) const { return IsFresh(ready(), clip) && ready().Holds(v); }
 
   // The cell of `v` as it is now, the caller's until the next Advance, with what was found of it if it is still as it was;
-  // no cell if it may not be taken.
+  // no cell if it may not be taken, or is too large.
   //
   // Complexity: O(kMost + vertices added since).
   // Errors:     none.
@@ -101,6 +105,10 @@ class ForeseenCells {
   };
 
   struct Batch {
+    void Clear() {
+      vertices.clear();
+      left = 0;
+    }
     bool Holds(VertexId v) const { return std::find(vertices.begin(), vertices.end(), v) != vertices.end(); }
 
     double clip = 0;

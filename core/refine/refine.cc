@@ -22,9 +22,6 @@ constexpr double kClipRatioFactor = 1.25;
 // work has graded. Its cell is clipped so to announce it.
 constexpr double kAround = 1.5;
 
-// A vertex that cuts off a node is nearer to it than the node's radius; what is more pays for rounding.
-constexpr double kWatched = 1.001;
-
 // Vertices whose first edges one thread looks for at a time.
 constexpr uint32_t kScheduledTogether = 1024;
 
@@ -43,6 +40,16 @@ constexpr bool kChecks = false;
 #endif
 // All vertices are looked at once for every so many that are taken from the schedule, relative to their number.
 constexpr uint64_t kCheckShare = 16;
+
+// What rounding may do to a coordinate.
+template <int D>
+double RoundingIn(const Box<D>& box) {
+  double largest = 0;
+  for (int i = 0; i < D; ++i) {
+    largest = std::max({largest, std::abs(box.low[i]), std::abs(box.high[i])});
+  }
+  return kCoordinateRounding * largest;
+}
 
 // Aborts unless `holds`. The text is put together only then.
 template <typename... Text>
@@ -66,11 +73,7 @@ absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices
   plain_ratio_ = demands.criterion == Criterion::kRadiusEdge && demands.sizes.IsUnbounded() ? demands.rho : 0;
   ForeseenCells<D> foreseen(structure_, team);
   foreseen_ = &foreseen;
-  const absl::Cleanup end = [&] {
-    AdmitWaiting();
-    own_.counters.Add(foreseen.counters());
-    foreseen_ = nullptr;
-  };
+  const absl::Cleanup end = [&] { foreseen_ = nullptr; };
   off_center_factor_ = OffCenterFactor<D>(demands.rho);
   clip_factor_ = std::max(kClipFactor, kClipRatioFactor * demands.rho);
   max_vertices_ = max_vertices;
@@ -81,6 +84,16 @@ absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices
     WELLSPACE_RETURN_IF_ERROR(ScheduleAll(demands, team));
     demands_ = demands;
   }
+  const absl::Status status = Loop(context);
+  foreseen.Drop();
+  structure_.AdmitWaiting();
+  own_.counters.Add(foreseen.counters());
+  return status;
+}
+
+// Improves the vertices that wait, one after the other.
+template <int D>
+absl::Status Refinement<D>::Loop(RunContext& context) {
   VertexId v{};
   int bucket = 0;
   uint64_t improved = 0;
@@ -184,7 +197,7 @@ double Refinement<D>::FirstEdgeSq(const Demands<D>& demands, VertexId v, double 
 }
 
 // Schedules the new vertex `x`, whose nearest neighbour is as near as it says, and at once those on a face of x that remember
-// a node there which x cuts off: they may have to look sooner than x.
+// a node there which x cuts off: they may have to look sooner than x. Where nodes are not known x is announced for that.
 template <int D>
 void Refinement<D>::ScheduleNew(VertexId x, double nearest_sq) {
   const Point<D>& p = structure_.point(x);
@@ -284,39 +297,33 @@ Look<D> Refinement<D>::LookAt(VertexId v, int bucket, double clip) {
   return {&own_.cell};
 }
 
-// Sees to it that the cell of `v` may be taken, unless it is not foreseen; then other threads begin with those of the vertices
+// Sees to it that the cell of `v` may be taken if it has been foreseen, and that other threads compute those of the vertices
 // that are next in the bucket, if there are enough.
 template <int D>
 void Refinement<D>::Foresee(VertexId v, int bucket, double clip) {
-  if (foreseen_->Comes(v, clip)) {
-    next_.clear();
-    FindNext(bucket, clip);
-    AdmitWaiting();
-  } else if (!foreseen_->Has(clip)) {
-    next_.assign(1, v);
-    FindNext(bucket, clip);
-    if (next_.size() < ForeseenCells<D>::kLeast) {
-      return;
-    }
-    AdmitWaiting();
-    BeginNext(bucket, clip);
-    next_.clear();
-    FindNext(bucket, clip);
-    foreseen_->Finish();
-  } else {
-    return;  // it has just been added
+  const bool comes = foreseen_->Comes(v, clip);
+  if (!comes && foreseen_->SomeCome(clip)) {
+    return;
   }
-  foreseen_->Advance();
+  FindNext(bucket, clip);
+  if (comes) {
+    AdmitWaiting();
+    foreseen_->Advance();
+  }
   if (next_.size() >= ForeseenCells<D>::kLeast) {
+    foreseen_->Drop();  // what comes for another bucket
+    AdmitWaiting();
     BeginNext(bucket, clip);
   }
 }
 
-// Fills next_ with vertices that are next in the bucket and whose cells do not come.
+// Puts vertices that are next in the bucket and have not been foreseen into next_.
 template <int D>
 void Refinement<D>::FindNext(int bucket, double clip) {
+  next_.clear();
   schedule_.ForEachNext(bucket, [this, clip](VertexId u) {
-    if (std::find(next_.begin(), next_.end(), u) == next_.end() && !foreseen_->Comes(u, clip)) {
+    if (std::find(next_.begin(), next_.end(), u) == next_.end() && !foreseen_->Comes(u, clip) &&
+        !foreseen_->IsReady(u, clip)) {
       next_.push_back(u);
     }
     return next_.size() < ForeseenCells<D>::kMost;
@@ -342,11 +349,11 @@ void Refinement<D>::AdmitWaiting() {
 template <int D>
 void Refinement<D>::ComputeCell(VertexId v, double clip, Workspace<D>& workspace) {
   structure_.UnplacedClippedVoronoi(v, clip, workspace);
+  structure_.CutByWaiting(v, workspace.cell);
   if (workspace.cell.IsTooLarge() && structure_.waiting_count() > 0) {
-    AdmitWaiting();
+    AdmitWaiting();  // with the nearest first it may not be
     structure_.UnplacedClippedVoronoi(v, clip, workspace);
   }
-  structure_.CutByWaiting(v, workspace.cell);
 }
 
 // What is wrong with a cell, whose nodes are placed unless it is plainly good.
@@ -376,13 +383,14 @@ void Refinement<D>::Remember(VertexId v, double radius_sq, std::span<const Watch
 template <int D>
 std::span<const WatchedNode<D>> Refinement<D>::NodesToWatch(VertexId v, const Polytope<D>& cell, double edge_sq) {
   watched_.clear();
+  const double rounding = 4 * std::sqrt(D) * RoundingIn<D>(structure_.box());
   const double least_sq = demands_->rho * demands_->rho * edge_sq * (1 - kLengthRounding);
   for (const CellNode<D>& node : cell.nodes()) {
     const auto faces = static_cast<FaceMask>(cell.FacesOf(node) & structure_.faces(v));
     if (faces == 0 || node.radius_sq <= least_sq) {
       continue;
     }
-    WatchedNode<D> watched{cell.site(), kWatched * std::sqrt(node.radius_sq), faces};
+    WatchedNode<D> watched{cell.site(), (1 + kLengthRounding) * std::sqrt(node.radius_sq) + rounding, faces};
     for (int i = 0; i < D; ++i) {
       watched.centre[i] += (faces >> (2 * i) & 3) == 0 ? node.x[i] : 0;
     }
@@ -547,11 +555,7 @@ void Refinement<D>::CheckInsertion(const Request& request) {
                         ", in the bucket up to ", limit, ", asks for a point at distance ", distance, " and radius ",
                         radius, ": ");
   };
-  double rounding = 0;
-  for (int i = 0; i < D; ++i) {
-    rounding = std::max({rounding, std::abs(box.low[i]), std::abs(box.high[i])});
-  }
-  rounding *= kCoordinateRounding;
+  const double rounding = RoundingIn<D>(box);
   const double least = (encroaches ? 1 : demands_->rho) * edge * (1 - kLengthRounding);
   const double most = std::sqrt(D) * clip_factor_ * limit * (1 + kLengthRounding) + rounding;
   if (!(distance >= least && distance <= most)) {

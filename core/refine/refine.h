@@ -118,6 +118,7 @@ class Refinement {
 
   absl::Status ScheduleAll(const Demands<D>& demands, ThreadTeam& team);
   double FirstEdgeSq(const Demands<D>& demands, VertexId v, double nearest_sq, double size_sq) const;
+  absl::Status Loop(RunContext& context);
   absl::Status Improve(VertexId v, int bucket);
   std::optional<Request> NextRequest(VertexId v, const Polytope<D>& cell, const Assessment& found,
                                      double edge_limit_sq) const;

@@ -61,11 +61,11 @@ using NodeIndex = std::conditional_t<(D <= 4), uint16_t, uint32_t>;
 
 template <int D>
 struct CellNode {
-  Point<D> x;                              // relative to the site
-  double radius_sq = 0;                    // |x|^2
-  double reach = 0;                        // at least the exact |x|
-  double slack = 0;                        // bounds the error of x, and of products with it, per unit of length
-  std::array<uint16_t, D> planes;          // that meet here, by index; bisectors by vertex, then walls by face
+  Point<D> x;                      // relative to the site
+  double radius_sq = 0;            // |x|^2
+  double reach = 0;                // at least the exact |x|
+  double slack = 0;                // bounds the error of x, and of products with it, per unit of length
+  std::array<uint16_t, D> planes;  // that meet here, by index; of a placed one bisectors by vertex, then walls by face
   std::array<NodeIndex<D>, D> neighbours;  // neighbours[k]: the node at the other end of the edge that leaves planes[k]
 };
 
@@ -248,7 +248,7 @@ class Polytope {
   std::vector<Plane<D>> planes_;
   NodeColumns<D> columns_;          // by node
   std::vector<Joint> joints_;       // by node, and more
-  std::vector<CellNode<D>> nodes_;  // by node, where all are placed
+  std::vector<CellNode<D>> nodes_;  // by node, as of the last that placed any
   uint64_t cuts_ = 0;
   DecisionCounters counters_;
 

@@ -132,18 +132,20 @@ void QueryStructure<D>::CutByWaiting(VertexId v, Polytope<D>& cell) const {
   }
 }
 
+// `near`, or what it was added near to if it waits.
+template <int D>
+VertexId QueryStructure<D>::Admitted(VertexId near) const {
+  while (near != kNoVertex && Index(near) >= tree_.vertex_count()) {
+    near = near_[Index(near) - tree_.vertex_count()];
+  }
+  return near;
+}
+
 // The leaf that `v` lies in; of one that waits, walked to.
 template <int D>
 NodeId QueryStructure<D>::LeafOf(VertexId v) const {
-  const uint32_t admitted = tree_.vertex_count();
-  if (Index(v) < admitted) {
-    return tree_.leaf_of(v);
-  }
-  VertexId near = v;
-  while (near != kNoVertex && Index(near) >= admitted) {
-    near = near_[Index(near) - admitted];
-  }
-  return tree_.LeafHolding(near, point(v));
+  const VertexId admitted = Admitted(v);
+  return admitted == v ? tree_.leaf_of(v) : tree_.LeafHolding(admitted, point(v));
 }
 
 template <int D>
@@ -207,12 +209,13 @@ Neighbor QueryStructure<D>::ApproximateNearestNeighbor(VertexId v, Workspace<D>&
 
 template <int D>
 Neighbor QueryStructure<D>::NearestWithin(VertexId v, double limit_sq, Workspace<D>& workspace) const {
-  return Nearest(point(v), tree_.leaf_of(v), v, limit_sq, workspace);
+  return Nearest(point(v), LeafOf(v), v, limit_sq, workspace);
 }
 
 template <int D>
 Neighbor QueryStructure<D>::NearestTo(const Point<D>& p, VertexId near, Workspace<D>& workspace) const {
-  return Nearest(p, tree_.LeafHolding(near, p), kNoVertex, std::numeric_limits<double>::infinity(), workspace);
+  return Nearest(p, tree_.LeafHolding(Admitted(near), p), kNoVertex, std::numeric_limits<double>::infinity(),
+                 workspace);
 }
 
 // The vertex other than `but` that is nearest to `p`, a point of `leaf`, and nearer than the limit.
@@ -275,7 +278,7 @@ void QueryStructure<D>::BeginWhole(VertexId v, Workspace<D>& workspace) const {
 template <int D>
 void QueryStructure<D>::Voronoi(VertexId v, Workspace<D>& workspace) const {
   BeginWhole(v, workspace);
-  Scan(v, tree_.leaf_of(v), workspace);
+  Scan(v, LeafOf(v), workspace);
   workspace.cell.Place();
 }
 

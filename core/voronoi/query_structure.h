@@ -66,7 +66,7 @@ struct Neighbor {
 template <int D>
 class QueryStructure {
  public:
-  static constexpr uint32_t kMostWaiting = 256;
+  static constexpr uint32_t kMostWaiting = 64;
 
   // Builds the structure for `points`, then adds the corners of the box that are not among them.
   //
@@ -143,8 +143,8 @@ class QueryStructure {
   // Source:     [HT08] Figure 3, ADDVERTEX.
   VertexId AddVertex(VertexId near, const Point<D>& p);
 
-  // The same, but the vertex waits: queries find it only once it has been admitted, and meanwhile queries of vertices that do
-  // not wait may run.
+  // The same, but the vertex waits: queries find it only once it has been admitted, be it queries of others that wait, and
+  // meanwhile queries of vertices that do not wait may run.
   //
   // REQUIRES:   fewer than kMostWaiting wait.
   // Complexity: O(1).
@@ -183,6 +183,7 @@ class QueryStructure {
 
  private:
   void MakeRoom();
+  VertexId Admitted(VertexId near) const;
   NodeId LeafOf(VertexId v) const;
   void BeginQuery(Workspace<D>& workspace) const;
   // Calls open(leaf) for leaves outward from `own`, which holds `site`: as long as reach_sq() says for those whose

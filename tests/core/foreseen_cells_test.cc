@@ -130,13 +130,13 @@ TYPED_TEST(ForeseenCellsTest, StayTrueWhileVerticesAreAdded) {
     structure.AdmitWaiting();
     foreseen.Advance();
     EXPECT_FALSE(foreseen.Comes(vertices[0], kClip));
-    EXPECT_FALSE(foreseen.Has(2 * kClip));
+    EXPECT_FALSE(foreseen.SomeCome(kClip));
     Workspace<D> workspace;
     int unchanged = 0;
     int good = 0;
     int plain = 0;
     for (size_t i = 0; i < vertices.size(); ++i) {
-      ASSERT_TRUE(foreseen.Has(kClip));
+      ASSERT_TRUE(foreseen.IsReady(vertices[i], kClip));
       const auto expected = CellNow<D>(structure, vertices[i], workspace);
       EXPECT_EQ(foreseen.Take(VertexId{structure.vertex_count() - 1}, kClip).cell, nullptr) << "not foreseen";
       const Look<D> look = foreseen.Take(vertices[i], kClip);
@@ -160,7 +160,7 @@ TYPED_TEST(ForeseenCellsTest, StayTrueWhileVerticesAreAdded) {
         structure.AddVertex(vertices[i], points[i]);
       }
     }
-    EXPECT_FALSE(foreseen.Has(kClip)) << "none is left";
+    EXPECT_FALSE(foreseen.IsReady(vertices.back(), kClip)) << "none is left";
     EXPECT_TRUE(adds_one_meanwhile || unchanged >= 1);
     EXPECT_TRUE(adds_one_meanwhile || good >= 1);
     EXPECT_LT(unchanged, static_cast<int>(vertices.size())) << "some cells have changed";
@@ -207,13 +207,20 @@ TYPED_TEST(ForeseenCellsTest, VerticesThatWaitCountOnceTheyCutOrAreAdmitted) {
   }
 }
 
-TYPED_TEST(ForeseenCellsTest, WhatIsCancelledIsLeftOut) {
-  constexpr int D = TypeParam::kValue;
+// Three vertices whose cells are to be foreseen.
+template <int D>
+struct Few {
   const QueryStructure<D> structure = StructureOf<D>("uniform");
-  ThreadTeam team(2);
-  ForeseenCells<D> foreseen(structure, team);
+  ThreadTeam team = ThreadTeam(2);
+  ForeseenCells<D> foreseen = ForeseenCells<D>(structure, team);
   RunContext context;
   const std::vector<VertexId> vertices = {VertexId{0}, VertexId{1}, VertexId{2}};
+};
+
+TYPED_TEST(ForeseenCellsTest, WhatIsCancelledIsLeftOut) {
+  constexpr int D = TypeParam::kValue;
+  Few<D> few;
+  auto& [structure, team, foreseen, context, vertices] = few;
   const auto judge = [&](VertexId, Polytope<D>& cell) {
     context.Cancel();
     return Assessment{.radius_sq = cell.reach_sq()};
@@ -225,6 +232,28 @@ TYPED_TEST(ForeseenCellsTest, WhatIsCancelledIsLeftOut) {
   }
   for (const VertexId v : vertices) {
     EXPECT_EQ(foreseen.Take(v, kClip).cell, nullptr);
+  }
+}
+
+TYPED_TEST(ForeseenCellsTest, WhatIsDroppedDoesNotCome) {
+  constexpr int D = TypeParam::kValue;
+  Few<D> few;
+  auto& [structure, team, foreseen, context, vertices] = few;
+  const auto judge = [](VertexId, Polytope<D>& cell) { return Assessment{.radius_sq = cell.reach_sq()}; };
+  foreseen.Drop();  // nothing
+  foreseen.Begin(vertices, kClip, judge, context);
+  foreseen.Drop();
+  EXPECT_FALSE(foreseen.IsRunning());
+  EXPECT_FALSE(foreseen.SomeCome(kClip));
+  foreseen.Begin(vertices, kClip, judge, context);
+  foreseen.Finish();
+  EXPECT_TRUE(foreseen.SomeCome(kClip));
+  foreseen.Advance();
+  EXPECT_FALSE(foreseen.SomeCome(kClip));
+  for (const VertexId v : vertices) {
+    EXPECT_TRUE(foreseen.IsReady(v, kClip));
+    EXPECT_FALSE(foreseen.IsReady(v, 2 * kClip));
+    EXPECT_NE(foreseen.Take(v, kClip).cell, nullptr);
   }
 }
 

@@ -5,6 +5,7 @@
 
 #include <atomic>
 #include <cstddef>
+#include <new>
 #include <vector>
 
 namespace wellspace::core {
@@ -56,6 +57,36 @@ TEST(ThreadTeamTest, OtherThreadsBeginBeforeEnd) {
   while (!has_begun) {
   }
   team.End();
+}
+
+TEST(ThreadTeamTest, WhatACallThrowsComesFromEnd) {
+  ThreadTeam team(2);
+  for (int repeat = 0; repeat < 20; ++repeat) {
+    team.Begin(100, [](size_t i) {
+      if (i % 10 == 7) {
+        throw std::bad_alloc();
+      }
+    });
+    EXPECT_THROW(team.End(), std::bad_alloc);
+    std::atomic<int> calls = 0;
+    team.Begin(100, [&](size_t) { ++calls; });
+    team.End();
+    EXPECT_EQ(calls, 100) << "the next loop is as always";
+  }
+}
+
+TEST(ThreadTeamTest, DropLosesWhatIsThrown) {
+  ThreadTeam team(2);
+  std::atomic<size_t> calls = 0;
+  team.Begin(1'000'000, [&](size_t) {
+    ++calls;
+    throw std::bad_alloc();
+  });
+  team.Drop();
+  EXPECT_LE(calls, static_cast<size_t>(team.threads()));
+  team.Begin(10, [&](size_t) { ++calls; });
+  team.End();
+  EXPECT_GE(calls, 10u);
 }
 
 }  // namespace
