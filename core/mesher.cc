@@ -40,9 +40,7 @@ constexpr uint64_t kFixedBytes = uint64_t{4} << 20;
 
 // Smaller clouds are refined, without sizes, before anybody could want to know how large the mesh will be: in half a second.
 template <int D>
-constexpr uint64_t kForetoldPoints = D == 2   ? 50'000
-                                     : D == 3 ? 20'000
-                                              : 2'000;
+constexpr uint64_t kForetoldPoints = D == 2 ? 50'000 : (D == 3 ? 20'000 : 2'000);
 
 template <int D>
 Box<D> BoxOf(const std::vector<double>& low, const std::vector<double>& high) {

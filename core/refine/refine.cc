@@ -206,12 +206,12 @@ void Refinement<D>::ScheduleNew(VertexId x, double nearest_sq) {
     watchers_.ForEachCutOff(p, structure_.faces(x),
                             [&](VertexId u) { Wake(u, DistanceSq<D>(p, structure_.point(u))); });
     ScheduleWoken();
-  }
-  if (structure_.faces(x) != 0 && watchers_.SomeWatchAll()) {
-    ComputeCell(x, around, new_);
-    new_.cell.Place();
-    if (!new_.cell.IsTooLarge()) {
-      Announce(x, new_.cell, Assess<D>(new_.cell, structure_.faces(x), *demands_, nearest_sq));
+    if (watchers_.SomeWatchAll()) {
+      ComputeCell(x, around, new_);
+      new_.cell.Place();
+      if (!new_.cell.IsTooLarge()) {
+        Announce(x, new_.cell, Assess<D>(new_.cell, structure_.faces(x), *demands_, nearest_sq));
+      }
     }
   }
   schedule_.Add(x, FirstEdgeSq(*demands_, x, nearest_sq, demands_->sizes.LeastAroundSq(p, around)));

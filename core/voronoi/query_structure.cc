@@ -117,8 +117,6 @@ void QueryStructure<D>::MakeRoom() {
   const size_t needed = vertex_count_ + kMostWaiting;
   if (points_.size() < needed) {
     points_.resize(needed + kMostWaiting);
-  }
-  if (faces_.size() < needed) {
     faces_.resize(needed + kMostWaiting);
   }
 }
