@@ -18,6 +18,9 @@ namespace {
 
 constexpr uint64_t kMaxMemoryBytes = kMinMemoryBytes;
 constexpr uint64_t kMostReceived = kLeastReceivedBytes + (64 << 20);  // gRPC looks now and then
+// The thread that ends a call waits for its turn, and on a busy machine the other connections are read meanwhile. Far less than what
+// they announce, or than kMostReceived of each.
+constexpr uint64_t kMostReceivedOfMany = 2 * kLeastReceivedBytes;
 constexpr uint32_t kAnnounced = uint32_t{1} << 30;
 
 class EndlessMessages : public ::testing::Test {
@@ -30,11 +33,14 @@ class EndlessMessages : public ::testing::Test {
 
   ~EndlessMessages() override {
     EXPECT_EQ(MeshTriangle(daemon_->Client({.token = token_})), absl::OkStatus());
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-    // Nobody works: this is what gRPC holds.
-    EXPECT_LT(daemon_->process().PeakMemory(), kMaxMemoryBytes + kMostReceived);
-#endif
     daemon_->Stop();
+  }
+
+  // Nobody works: what the server takes is what gRPC holds.
+  void ExpectReceivedAtMost([[maybe_unused]] uint64_t bytes) const {
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+    EXPECT_LT(daemon_->process().PeakMemory(), kMaxMemoryBytes + bytes);
+#endif
   }
 
   const std::string token_ = std::string(40, 't');
@@ -49,6 +55,7 @@ TEST_F(EndlessMessages, OfOneCallEndIt) {
     RawConnection connection(daemon_->address());
     EXPECT_LE(connection.SendMessageUntilRefused(path, kAnnounced), kMostReceived) << path;
   }
+  ExpectReceivedAtMost(kMostReceived);
 }
 
 TEST_F(EndlessMessages, OfCallsWhoseRequestIsAStreamAreReadForAWindowOnly) {
@@ -57,6 +64,7 @@ TEST_F(EndlessMessages, OfCallsWhoseRequestIsAStreamAreReadForAWindowOnly) {
     RawConnection connection(daemon_->address());
     EXPECT_LE(connection.SendMessageUntilRefused(path, kAnnounced), kMaxMemoryBytes / 4) << path;
   }
+  ExpectReceivedAtMost(kMostReceived);
 }
 
 TEST_F(EndlessMessages, OfManyConnectionsShareTheLimit) {
@@ -72,6 +80,7 @@ TEST_F(EndlessMessages, OfManyConnectionsShareTheLimit) {
   for (std::thread& sender : senders) {
     sender.join();
   }
+  ExpectReceivedAtMost(kMostReceivedOfMany);
 }
 
 }  // namespace
