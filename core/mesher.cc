@@ -430,13 +430,13 @@ class MesherIn final : public Mesher {
   absl::StatusOr<WeightedSimplices> MakeSimplices(int threads, RunContext& context) {
     if constexpr (D >= 3) {
       if (MakesWhole()) {
-        return slivers_.ToSimplices(structure_, refinement_->neighbours(), output_index_, pumps_, threads, context);
+        return slivers_.ToSimplices(structure_, refinement_->stars(), output_index_, pumps_, threads, context);
       }
     }
     context.EnterPhase(Phase::kSimplices);
     WeightedSimplices made;
-    WELLSPACE_ASSIGN_OR_RETURN(
-        made.simplices, ComputeSimplices<D>(structure_, refinement_->neighbours(), output_index_, threads, context));
+    WELLSPACE_ASSIGN_OR_RETURN(made.simplices,
+                               ComputeSimplices<D>(structure_, refinement_->stars(), output_index_, threads, context));
     return made;
   }
 

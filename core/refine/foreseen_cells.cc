@@ -72,9 +72,8 @@ typename ForeseenCells<D>::Foreseen* ForeseenCells<D>::ComputeOne(VertexId v, do
   }
   Foreseen& foreseen = *pool.cells[pool.count++];
   foreseen.found = judge_(v, cell);
-  foreseen.neighbours.clear();
   if (foreseen.found.IsGood()) {
-    cell.Neighbours(foreseen.neighbours);
+    cell.FindStar(foreseen.star);
   }
   foreseen.cut_limit_sq = cell.CutLimitSq();
   foreseen.cell.Swap(cell);
@@ -109,7 +108,7 @@ Look<D> ForeseenCells<D>::Take(VertexId v, double clip) {
   if (is_cut) {
     return {&foreseen->cell};
   }
-  return {&foreseen->cell, &foreseen->found, foreseen->neighbours};
+  return {&foreseen->cell, &foreseen->found, foreseen->found.IsGood() ? &foreseen->star : nullptr};
 }
 
 // Cuts the cell of `v` by the vertices from `first_new` on; returns whether that changed it.

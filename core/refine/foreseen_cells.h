@@ -25,8 +25,8 @@ namespace wellspace::core {
 template <int D>
 struct Look {
   Polytope<D>* cell = nullptr;
-  const Assessment* found = nullptr;          // null if that is still to be found
-  std::span<const VertexId> neighbours = {};  // all that the cell has, if it has been found good
+  const Assessment* found = nullptr;  // null if that is still to be found
+  const Star<D>* star = nullptr;      // if the cell has been found good
 };
 
 // Clipped cells of vertices that are about to be looked at: those that are there to be taken, and those that come, which
@@ -100,8 +100,8 @@ class ForeseenCells {
   struct Foreseen {
     Polytope<D> cell;
     Assessment found;
-    double cut_limit_sq = 0;           // of the cell, beside what else is read of one that stays as it is
-    std::vector<VertexId> neighbours;  // of a good cell
+    double cut_limit_sq = 0;  // of the cell, beside what else is read of one that stays as it is
+    Star<D> star;             // of a good cell
   };
 
   struct Batch {

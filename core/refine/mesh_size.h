@@ -39,25 +39,13 @@ double SimplicesOf(double vertices, double on_boundary) {
   }
 }
 
-// Pairs of neighbours that are listed per vertex; in 2-D and 3-D by Euler's formula. From 4-D on as seen: 11 to 14, 21 to 22 and 34, some of
-// which are no neighbours any more.
-template <int D>
-constexpr double kEdgesPerVertex = D == 4   ? 13.0
-                                   : D == 5 ? 22.0
-                                            : 34.0;
-
-template <int D>
-double EdgesOf(double vertices, double simplices) {
-  return D <= 3 ? vertices + simplices : kEdgesPerVertex<D> * vertices;
-}
-
 // What a process touches whatever the mesh, as measured: code, threads, their stacks and scratch space.
 inline constexpr double kFixedBytes = 3.9e6;
 
 // Where the estimate of the memory is wrong, it is rather short than long: 0.56 to 1.07 without this, which puts the two ends about as far from 1.
 inline constexpr double kMemoryMargin = 1.25;
 
-// The memory at its peak, when stars are put together. Vectors grow by doubling, but of what they reserve only what they
+// The memory at its peak, when the mesh has been put together. Vectors grow by doubling, but of what they reserve only what they
 // use is ever touched.
 template <int D>
 double BytesOf(const Leaves& leaves, double vertices, double simplices) {
@@ -66,17 +54,13 @@ double BytesOf(const Leaves& leaves, double vertices, double simplices) {
   // Beside the nodes, three marks of the queries' scratch space.
   const double node_bytes = LeafTree<D>::NodeBytes() + 3 * sizeof(uint32_t);
   using Buckets = typename LeafTree<D>::Buckets;
-  // Coordinates in the tree and in the structure; number in the tree, leaf, faces, radius, place in the schedule, numbers in the output; where its
-  // neighbours are listed, from either side, and how many; its place in the walk. Coordinates in the mesh come when the other side's lists have
-  // gone, and take no more.
-  const double vertex_bytes = Buckets::kPlaceBytes + sizeof(Point<D>) + 32 + 4 * sizeof(uint32_t);
-  // Of two neighbours, each at the other.
-  const double edge_bytes = 2 * sizeof(VertexId);
-  // Indices in the mesh and, of some, in the blocks that are being made or wait.
-  const double simplex_bytes = 1.5 * (D + 1) * sizeof(uint32_t);
-  return kMemoryMargin *
-         (kFixedBytes + nodes * node_bytes + leaves.filled * Buckets::OverheadBytes() + vertices * vertex_bytes +
-          EdgesOf<D>(vertices, simplices) * edge_bytes + simplices * simplex_bytes);
+  // Coordinates in the tree, in the structure and in the mesh; number in the tree, leaf, faces, radius, place in the schedule, numbers in the
+  // output; where its simplices are listed, how many, and when it was added.
+  const double vertex_bytes = Buckets::kPlaceBytes + 2 * sizeof(Point<D>) + 32 + 3 * sizeof(uint32_t);
+  // Indices in the lists, some of which are no simplices any more, and in the mesh.
+  const double simplex_bytes = 1.05 * D * sizeof(VertexId) + (D + 1) * sizeof(uint32_t);
+  return kMemoryMargin * (kFixedBytes + nodes * node_bytes + leaves.filled * Buckets::OverheadBytes() +
+                          vertices * vertex_bytes + simplices * simplex_bytes);
 }
 
 }  // namespace wellspace::core

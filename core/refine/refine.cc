@@ -108,9 +108,6 @@ absl::Status Refinement<D>::Loop(RunContext& context) {
     }
     if (++improved % kReportInterval == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(structure_.MemoryBytes() + MemoryBytes()));
-      if (neighbours_.IsFull()) {
-        return NeighbourLists::FullError();
-      }
       context.SetBucket(bucket);
       context.SetPhaseFraction(1 - static_cast<double>(schedule_.size()) / structure_.vertex_count());
     }
@@ -130,15 +127,14 @@ void Refinement<D>::VertexAdded(VertexId x) {
 
 template <int D>
 uint64_t Refinement<D>::MemoryBytes() const {
-  return schedule_.MemoryBytes() + neighbours_.MemoryBytes() + watchers_.MemoryBytes() +
-         radius_sq_.size() * sizeof(double) + announced_.size() * sizeof(Announced) +
-         (own_.seen.size() + new_.seen.size()) * sizeof(uint32_t) +
+  return schedule_.MemoryBytes() + stars_.MemoryBytes() + watchers_.MemoryBytes() + radius_sq_.size() * sizeof(double) +
+         announced_.size() * sizeof(Announced) + (own_.seen.size() + new_.seen.size()) * sizeof(uint32_t) +
          (foreseen_ == nullptr ? 0 : foreseen_->MemoryBytes());
 }
 
 template <int D>
-void Refinement<D>::CellChanged(VertexId v, double nearest_sq, std::span<const VertexId> neighbours) {
-  neighbours_.Set(v, neighbours);
+void Refinement<D>::CellChanged(VertexId v, double nearest_sq) {
+  stars_.GiveUp();
   radius_sq_.resize(structure_.vertex_count(), Assessment::kNone);
   announced_.resize(structure_.vertex_count(), Announced::kToAll);
   const bool is_on_face = structure_.faces(v) != 0;
@@ -157,7 +153,7 @@ QueryCounters Refinement<D>::counters() const {
 
 template <int D>
 absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& team) {
-  neighbours_.Clear();
+  stars_.Clear();
   radius_sq_.assign(structure_.vertex_count(), Assessment::kNone);
   watchers_.Clear();
   announced_.assign(structure_.vertex_count(), Announced::kToAll);
@@ -412,12 +408,10 @@ void Refinement<D>::Settle(VertexId v, const Assessment& found, double clip, int
     Remember(v, radius_sq);
   }
   if (found.IsGood()) {
-    if (look.found != nullptr) {
-      neighbours_.Set(v, look.neighbours);
-    } else {
-      look.cell->Neighbours(beside_);
-      neighbours_.Set(v, beside_);
+    if (look.star == nullptr) {
+      look.cell->FindStar(star_);
     }
+    stars_.Set(v, look.star != nullptr ? *look.star : star_, structure_.vertex_count());
     if (announced_[Index(v)] != Announced::kToAll) {
       Announce(v, *look.cell, found);
     }

@@ -16,8 +16,8 @@
 #include "core/refine/face_watchers.h"
 #include "core/refine/schedule.h"
 #include "core/refine/steiner_point.h"
-#include "core/voronoi/neighbour_lists.h"
 #include "core/voronoi/query_structure.h"
+#include "core/voronoi/star_lists.h"
 
 namespace wellspace::core {
 
@@ -88,15 +88,16 @@ class Refinement {
   uint64_t MemoryBytes() const;
 
   // Tells that the cell of `v`, which may be new, has changed, but is as the demands of the last run say; `nearest_sq` is
-  // at most the squared distance to its nearest neighbour, `neighbours` are all that it has now, which are listed. What is
-  // remembered of the cell is forgotten: an insertion nearby has v looked at again in any case that could matter.
+  // at most the squared distance to its nearest neighbour. What is remembered of the cell is forgotten: an insertion
+  // nearby has v looked at again in any case that could matter. Simplices are no longer listed.
   //
   // REQUIRES:   the last run was for the end; every vertex whose neighbours have changed is told of.
-  // Complexity: O(neighbours), amortised.
-  void CellChanged(VertexId v, double nearest_sq, std::span<const VertexId> neighbours);
+  // Complexity: O(1), but for the first after a run for other demands.
+  void CellChanged(VertexId v, double nearest_sq);
 
-  // The neighbours of all vertices, when the last run was for the end.
-  const NeighbourLists& neighbours() const { return neighbours_; }
+  // The simplices at all vertices, when the last run was for the end, unless cells have changed otherwise since the first run for these
+  // demands.
+  const StarLists<D>& stars() const { return stars_; }
 
   // What all queries have cost.
   QueryCounters counters() const;
@@ -149,7 +150,7 @@ class Refinement {
   std::vector<double> radius_sq_;
   FaceWatchers<D> watchers_;  // those of whom an edge is remembered
   std::vector<Announced> announced_;
-  NeighbourLists neighbours_;          // of vertices that are done, or have been
+  StarLists<D> stars_;                 // of vertices that are done, or have been
   std::optional<Demands<D>> demands_;  // of the last run, once all vertices have been scheduled for them
   Workspace<D> own_;                   // the cell that is improved
   Workspace<D> new_;                   // the cell of a vertex just added on a face
@@ -162,7 +163,7 @@ class Refinement {
   ForeseenCells<D>* foreseen_ = nullptr;            // null between runs
   std::vector<VertexId> next_;                      // whose cells are foreseen next
   std::vector<std::pair<VertexId, double>> woken_;  // scratch of Wake
-  std::vector<VertexId> beside_;                    // scratch of Settle
+  Star<D> star_;                                    // scratch of Settle
   std::vector<WatchedNode<D>> watched_;             // scratch of NodesToWatch
   RunContext* context_ = nullptr;
   const RefinementObserver<D>* observer_ = nullptr;

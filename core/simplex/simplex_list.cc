@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 #include "core/base/dimensions.h"
@@ -17,44 +18,72 @@ namespace {
 constexpr double kClearly = 1 - 0x1p-10;
 constexpr double kMostRatioSq = 64 * 64;
 constexpr double kLeastAngleDeg = 0x1p-10;
+// A determinant whose square is above this times that of the product of its vectors' lengths is right to 2^-20, and so is a circumradius
+// by Cramer's rule.
+constexpr double kRightDet = 0x1p-40;
 
 }  // namespace
 
 template <int D>
-void SimplexList<D>::Add(const Simplex<D>& points, const std::array<uint32_t, D + 1>& indices, double radius_sq) {
-  // By insertion; each exchange turns the orientation.
-  Simplex<D> sorted_points = points;
+void SimplexList<D>::Add(const Simplex<D>& points, const std::array<uint32_t, D + 1>& indices) {
+  const Glance glance = LookAt(points);
+  // By exchanges without branches, since none could be foretold; each turns the orientation.
   std::array<uint32_t, D + 1> sorted = indices;
-  bool is_positive = true;
-  for (int i = 1; i <= D; ++i) {
-    for (int j = i; j > 0 && sorted[j - 1] > sorted[j]; --j) {
-      std::swap(sorted[j - 1], sorted[j]);
-      std::swap(sorted_points[j - 1], sorted_points[j]);
-      is_positive = !is_positive;
+  bool is_turned = false;
+  for (int last = D; last > 0; --last) {
+    for (int i = 0; i < last; ++i) {
+      const uint32_t low = std::min(sorted[i], sorted[i + 1]);
+      const uint32_t high = std::max(sorted[i], sorted[i + 1]);
+      is_turned ^= low != sorted[i];
+      sorted[i] = low;
+      sorted[i + 1] = high;
     }
   }
-  if (!is_positive) {
+  const Sign orientation = glance.orientation != Sign::kZero ? glance.orientation : Orientation<D>(points).sign;
+  if (is_turned == (orientation == Sign::kPositive)) {
     std::swap(sorted[D - 1], sorted[D]);
   }
   indices_.insert(indices_.end(), sorted.begin(), sorted.end());
-  if (!IsClearlyBetter(points, radius_sq)) {
-    // Measured in the order of the indices, whichever way the simplex was found.
-    max_radius_edge_ = std::max(max_radius_edge_, RadiusEdgeRatio<D>(sorted_points));
-    better_ratio_sq_ = std::min(kMostRatioSq, kClearly * max_radius_edge_ * max_radius_edge_);
-    min_angle_deg_ = std::min(min_angle_deg_, Angles<D>(sorted_points).min_deg);
-    const double tangent = std::tan(min_angle_deg_ * (std::numbers::pi / 180));
-    better_cot_sq_ = min_angle_deg_ > kLeastAngleDeg ? kClearly / (tangent * tangent) : 0;
+  if (!glance.is_clearly_better) {
+    Measure(points, indices);
   }
 }
 
+// In the order of the indices, whichever way the simplex was found.
 template <int D>
-bool SimplexList<D>::IsClearlyBetter(const Simplex<D>& points, double radius_sq) const {
+void SimplexList<D>::Measure(const Simplex<D>& points, const std::array<uint32_t, D + 1>& indices) {
+  std::array<int, D + 1> order;
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return indices[a] < indices[b]; });
+  Simplex<D> sorted;
+  for (int i = 0; i <= D; ++i) {
+    sorted[i] = points[order[i]];
+  }
+  max_radius_edge_ = std::max(max_radius_edge_, RadiusEdgeRatio<D>(sorted));
+  better_ratio_sq_ = std::min(kMostRatioSq, kClearly * max_radius_edge_ * max_radius_edge_);
+  min_angle_deg_ = std::min(min_angle_deg_, Angles<D>(sorted).min_deg);
+  const double tangent = std::tan(min_angle_deg_ * (std::numbers::pi / 180));
+  better_cot_sq_ = min_angle_deg_ > kLeastAngleDeg ? kClearly / (tangent * tangent) : 0;
+}
+
+template <int D>
+typename SimplexList<D>::Glance SimplexList<D>::LookAt(const Simplex<D>& points) const {
+  Glance glance;
   if constexpr (D == 2) {
-    double shortest_sq = std::numeric_limits<double>::infinity();
-    for (int i = 0; i < 3; ++i) {
-      shortest_sq = std::min(shortest_sq, DistanceSq<2>(points[i], points[(i + 1) % 3]));
+    const Point<2> a = Difference<2>(points[1], points[0]);
+    const Point<2> b = Difference<2>(points[2], points[0]);
+    const double a_sq = NormSq<2>(a);
+    const double b_sq = NormSq<2>(b);
+    const double ab_sq = DistanceSq<2>(points[1], points[2]);
+    const double det = a[0] * b[1] - a[1] * b[0];
+    const double det_sq = det * det;
+    if (!(det_sq > kRightDet * a_sq * b_sq)) {
+      return glance;
     }
-    return radius_sq < better_ratio_sq_ * shortest_sq;
+    glance.orientation = det > 0 ? Sign::kPositive : Sign::kNegative;
+    // The circumradius is the product of the edges over twice the determinant.
+    const double shortest_sq = std::min({a_sq, b_sq, ab_sq});
+    glance.is_clearly_better = a_sq * b_sq * ab_sq < better_ratio_sq_ * shortest_sq * 4 * det_sq;
   } else if constexpr (D == 3) {
     const Point<3> a = Difference<3>(points[1], points[0]);
     const Point<3> b = Difference<3>(points[2], points[0]);
@@ -65,13 +94,6 @@ bool SimplexList<D>::IsClearlyBetter(const Simplex<D>& points, double radius_sq)
     const double a_sq = NormSq<3>(a);
     const double b_sq = NormSq<3>(b);
     const double c_sq = NormSq<3>(c);
-    const double ab_sq = NormSq<3>(ab);
-    const double bc_sq = NormSq<3>(bc);
-    const double ca_sq = NormSq<3>(ca);
-    const double shortest_sq = std::min({a_sq, b_sq, c_sq, ab_sq, bc_sq, ca_sq});
-    if (!(radius_sq < better_ratio_sq_ * shortest_sq)) {
-      return false;
-    }
     const auto cross = [](const Point<3>& x, const Point<3>& y) {
       return Point<3>{x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]};
     };
@@ -80,17 +102,31 @@ bool SimplexList<D>::IsClearlyBetter(const Simplex<D>& points, double radius_sq)
     const Point<3> n_b = cross(c, a);
     const Point<3> n_c = cross(a, b);
     const Point<3> n_0 = cross(bc, ab);
-    const double volume = Dot<3>(a, n_a);
-    const double most_sq = better_cot_sq_ * volume * volume;
+    const double det = Dot<3>(a, n_a);
+    const double det_sq = det * det;
+    if (!(det_sq > kRightDet * a_sq * b_sq * c_sq)) {
+      return glance;
+    }
+    glance.orientation = det > 0 ? Sign::kPositive : Sign::kNegative;
+    // The circumcentre, relative to the first point, times twice the determinant: Cramer's rule.
+    Point<3> centre;
+    for (int i = 0; i < 3; ++i) {
+      centre[i] = a_sq * n_a[i] + b_sq * n_b[i] + c_sq * n_c[i];
+    }
+    const double ab_sq = NormSq<3>(ab);
+    const double bc_sq = NormSq<3>(bc);
+    const double ca_sq = NormSq<3>(ca);
+    const double shortest_sq = std::min({a_sq, b_sq, c_sq, ab_sq, bc_sq, ca_sq});
+    const double most_sq = better_cot_sq_ * det_sq;
     const auto is_better = [most_sq](const Point<3>& n, const Point<3>& m, double edge_sq) {
       const double value = Dot<3>(n, m);
       return value >= 0 || value * value < most_sq * edge_sq;
     };
-    return is_better(n_a, n_b, c_sq) && is_better(n_b, n_c, a_sq) && is_better(n_c, n_a, b_sq) &&
-           is_better(n_0, n_a, bc_sq) && is_better(n_0, n_b, ca_sq) && is_better(n_0, n_c, ab_sq);
-  } else {
-    return false;
+    glance.is_clearly_better = NormSq<3>(centre) < better_ratio_sq_ * shortest_sq * 4 * det_sq &&
+                               is_better(n_a, n_b, c_sq) && is_better(n_b, n_c, a_sq) && is_better(n_c, n_a, b_sq) &&
+                               is_better(n_0, n_a, bc_sq) && is_better(n_0, n_b, ca_sq) && is_better(n_0, n_c, ab_sq);
   }
+  return glance;
 }
 
 #define WELLSPACE_INSTANTIATE(D) template class SimplexList<D>;

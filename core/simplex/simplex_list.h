@@ -19,11 +19,10 @@ class SimplexList {
  public:
   // Appends a simplex: the lowest index first, the others ascending but for an exchange of the last two that makes it positive.
   //
-  // REQUIRES:   `points` positively oriented, `indices` distinct. radius_sq: the squared circumradius up to a relative error of 2^-20, or
-  //             infinite where that is not known.
+  // REQUIRES:   `points` not in one hyperplane, `indices` distinct.
   // Complexity: O(1); without the quotients and arc tangents of quality.h for a simplex that is clearly not the worst.
   // Errors:     none.
-  void Add(const Simplex<D>& points, const std::array<uint32_t, D + 1>& indices, double radius_sq);
+  void Add(const Simplex<D>& points, const std::array<uint32_t, D + 1>& indices);
 
   size_t size() const { return indices_.size() / (D + 1); }
   const std::vector<uint32_t>& indices() const { return indices_; }
@@ -34,7 +33,14 @@ class SimplexList {
   void Clear() { indices_.clear(); }
 
  private:
-  bool IsClearlyBetter(const Simplex<D>& points, double radius_sq) const;
+  // What doubles tell of a simplex.
+  struct Glance {
+    Sign orientation = Sign::kZero;  // kZero where they do not tell
+    bool is_clearly_better = false;
+  };
+
+  Glance LookAt(const Simplex<D>& points) const;
+  void Measure(const Simplex<D>& points, const std::array<uint32_t, D + 1>& indices);
 
   std::vector<uint32_t> indices_;
   double max_radius_edge_ = 0;

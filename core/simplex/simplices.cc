@@ -8,24 +8,19 @@
 #include <limits>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <utility>
 
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
-#include "core/simplex/facet_walk.h"
 #include "core/simplex/simplex_list.h"
 
 namespace wellspace::core {
 namespace {
 
-// Vertices whose cells make a block.
-constexpr size_t kCellsInBlock = 512;
-// Vertices that a walk takes at once: so many that few simplices lie on the border of two blocks, which both find them.
-template <int D>
-constexpr size_t kWalkedInBlock = D == 2 ? 4096 : 65536;
-// About as many blocks, or more, are walked through, for as many threads.
-constexpr size_t kLeastBlocks = 8;
+// Vertices that make a block, or a few more.
+constexpr size_t kVerticesInBlock = 512;
 // The array of all simplices has room for at most so many times those in it: the first blocks need not be like the others.
 constexpr size_t kMostGrowth = 8;
 
@@ -147,11 +142,70 @@ absl::StatusOr<Simplices> JoinBlocks(size_t block_count, uint64_t held_bytes, in
   return all;
 }
 
+// All vertices along the Z curve, in blocks of whole leaves.
+//
+// Thread safety: const functions may run at once.
+template <int D>
+class LeafBlocks {
+ public:
+  // `tree` must not change.
+  explicit LeafBlocks(const LeafTree<D>& tree) : tree_(tree) {
+    size_t in_block = kVerticesInBlock;
+    tree.ForEachLeaf([&](NodeId leaf) {
+      const auto* bucket = tree.BucketOf(leaf);
+      if (bucket == nullptr || bucket->count == 0) {
+        return;
+      }
+      if (in_block >= kVerticesInBlock) {
+        begin_.push_back(leaves_.size());
+        in_block = 0;
+      }
+      leaves_.push_back(leaf);
+      in_block += bucket->count;
+    });
+    begin_.push_back(leaves_.size());
+  }
+
+  size_t count() const { return begin_.size() - 1; }
+  uint64_t MemoryBytes() const { return leaves_.size() * sizeof(NodeId) + begin_.size() * sizeof(size_t); }
+
+  // Calls f(VertexId) for one after the other; stops early when the context is cancelled.
+  template <typename F>
+  void ForEachVertexOf(size_t block, const RunContext& context, F f) const {
+    for (size_t i = begin_[block]; i < begin_[block + 1]; ++i) {
+      const auto* bucket = tree_.BucketOf(leaves_[i]);
+      for (uint32_t k = 0; k < bucket->count && !context.IsCancelled(); ++k) {
+        f(bucket->ids[k]);
+      }
+    }
+  }
+
+ private:
+  const LeafTree<D>& tree_;
+  std::vector<NodeId> leaves_;  // those with vertices
+  std::vector<size_t> begin_;   // by block, in leaves_; one more
+};
+
 // What is held besides the simplices; of the scratch space, what every thread has for each node.
 template <int D>
 uint64_t HeldBytes(const QueryStructure<D>& structure, std::span<const uint32_t> output_index, int threads) {
   return structure.MemoryBytes() + output_index.size_bytes() +
          static_cast<uint64_t>(ThreadTeam(threads).threads()) * structure.tree().node_count() * sizeof(uint32_t);
+}
+
+// Appends the simplex of `v` and `others`.
+template <int D>
+void AppendSimplex(const QueryStructure<D>& structure, VertexId v, const std::array<VertexId, D>& others,
+                   std::span<const uint32_t> output_index, SimplexList<D>& out) {
+  Simplex<D> simplex;
+  std::array<uint32_t, D + 1> indices;
+  simplex[0] = structure.point(v);
+  indices[0] = output_index[Index(v)];
+  for (int k = 0; k < D; ++k) {
+    simplex[k + 1] = structure.point(others[k]);
+    indices[k + 1] = output_index[Index(others[k])];
+  }
+  out.Add(simplex, indices);
 }
 
 // Appends the simplices of the cell in `workspace` whose lowest vertex is its site `v` and whose other vertices are
@@ -160,131 +214,139 @@ template <int D, typename IsWanted>
 void AppendCell(const QueryStructure<D>& structure, VertexId v, std::span<const uint32_t> output_index,
                 const Workspace<D>& workspace, IsWanted is_wanted, SimplexList<D>& out) {
   for (const CellNode<D>& node : workspace.cell.nodes()) {
-    Simplex<D> simplex;
-    std::array<uint32_t, D + 1> indices;
-    simplex[0] = structure.point(v);
-    indices[0] = output_index[Index(v)];
+    std::array<VertexId, D> others;
     bool is_ours = true;
     for (int k = 0; k < D && is_ours; ++k) {
       const Plane<D>& plane = workspace.cell.plane(node.planes[k]);
-      is_ours = plane.kind == PlaneKind::kBisector;
-      if (is_ours) {
-        simplex[k + 1] = structure.point(plane.vertex);
-        indices[k + 1] = output_index[Index(plane.vertex)];
-        is_ours = indices[k + 1] > indices[0] && is_wanted(plane.vertex);
-      }
+      others[k] = plane.vertex;
+      is_ours = plane.kind == PlaneKind::kBisector && output_index[Index(plane.vertex)] > output_index[Index(v)] &&
+                is_wanted(plane.vertex);
     }
     if (is_ours) {
-      if (Orientation<D>(simplex).sign == Sign::kNegative) {
-        std::swap(simplex[D - 1], simplex[D]);
-        std::swap(indices[D - 1], indices[D]);
-      }
-      out.Add(simplex, indices, std::numeric_limits<double>::infinity());
+      AppendSimplex<D>(structure, v, others, output_index, out);
     }
   }
 }
 
-// The simplices of the cells of `order`, each of which compute(VertexId, Workspace&) computes, whose vertices are all wanted.
-template <int D, typename Compute, typename IsWanted>
-absl::StatusOr<Simplices> JoinCells(const QueryStructure<D>& structure, std::span<const VertexId> order,
-                                    std::span<const uint32_t> output_index, Compute compute, IsWanted is_wanted,
-                                    uint64_t held_bytes, int threads, RunContext& context) {
-  const auto append = [&](size_t block, Workspace<D>& workspace, SimplexList<D>& out) {
-    const size_t begin = block * kCellsInBlock;
-    for (const VertexId v : order.subspan(begin, std::min(kCellsInBlock, order.size() - begin))) {
-      if (context.IsCancelled()) {
-        return;
-      }
-      compute(v, workspace);
-      AppendCell<D>(structure, v, output_index, workspace, is_wanted, out);
-    }
-  };
-  return JoinBlocks<D, Workspace<D>>((order.size() + kCellsInBlock - 1) / kCellsInBlock,
-                                     held_bytes + order.size_bytes(), threads, context, append,
-                                     [](const Workspace<D>&) { return uint64_t{0}; },
-                                     [](const Workspace<D>& workspace) { return workspace.counters; });
-}
-
-// The simplices of all vertices by walks from facet to facet.
+// The simplices at one vertex after the other, of those that are listed there the ones that are in the mesh: the vertex is the last
+// of them to have been looked at, and nobody who came later spoils them.
+//
+// Thread safety: thread-compatible.
 template <int D>
-absl::StatusOr<Simplices> JoinWalks(const QueryStructure<D>& structure, const NeighbourTable& neighbours,
-                                    std::span<const uint32_t> output_index, int threads, RunContext& context) {
-  std::vector<NodeId> leaves;
-  std::vector<size_t> block_begin{0};
-  const size_t most = std::min(kWalkedInBlock<D>, structure.vertex_count() / kLeastBlocks);
-  size_t in_block = 0;
-  std::vector<uint32_t> rank(structure.vertex_count());
-  uint32_t ranked = 0;
-  structure.tree().ForEachLeaf([&](NodeId leaf) {
-    const auto* bucket = structure.tree().BucketOf(leaf);
-    if (bucket == nullptr || bucket->count == 0 || context.IsCancelled()) {
-      return;
+class ListedSimplices {
+ public:
+  // All arguments must outlive it.
+  ListedSimplices(const QueryStructure<D>& structure, const StarLists<D>& stars, const LateNeighbours& late,
+                  std::span<const uint32_t> output_index)
+      : structure_(structure), stars_(stars), late_(late), output_index_(output_index) {}
+
+  // Appends those of `v`, in an order that depends on nothing but the mesh.
+  void Append(VertexId v, SimplexList<D>& out) {
+    ++counters_.queries;
+    const auto late = late_.At(v);
+    rows_.clear();
+    for (Row row : stars_.Of(v)) {
+      bool is_last = true;
+      for (const VertexId u : row) {
+        is_last &= stars_.WasLookedAtBefore(u, v);
+      }
+      if (is_last && !IsSpoiled(v, row, late)) {
+        std::sort(row.begin(), row.end());
+        rows_.push_back(row);
+      }
     }
-    if (in_block >= most && in_block > 0) {
-      block_begin.push_back(leaves.size());
-      in_block = 0;
+    std::sort(rows_.begin(), rows_.end());
+    for (const Row& row : rows_) {
+      AppendSimplex<D>(structure_, v, row, output_index_, out);
     }
-    leaves.push_back(leaf);
-    in_block += bucket->count;
-    for (uint32_t i = 0; i < bucket->count; ++i) {
-      rank[Index(bucket->ids[i])] = ranked++;
+  }
+
+  // What its scratch takes in memory.
+  uint64_t MemoryBytes() const { return rows_.capacity() * sizeof(Row); }
+  // Queries are stars.
+  const QueryCounters& counters() const { return counters_; }
+
+ private:
+  using Row = std::array<VertexId, D>;  // the other vertices of a simplex
+
+  // Whether a ball through `v` and `others` holds one of the vertices that are late at v.
+  bool IsSpoiled(VertexId v, const Row& others, std::span<const LateNeighbours::Late> late) {
+    if (late.empty()) {
+      return false;
     }
-  });
-  block_begin.push_back(leaves.size());
-  const auto append = [&](size_t block, FacetWalk<D>& walk, SimplexList<D>& out) {
-    walk.AppendStars(structure, neighbours,
-                     std::span(leaves).subspan(block_begin[block], block_begin[block + 1] - block_begin[block]), rank,
-                     output_index, context, out);
-  };
-  return JoinBlocks<D, FacetWalk<D>>(
-      block_begin.size() - 1,
-      HeldBytes<D>(structure, output_index, threads) + neighbours.MemoryBytes() + leaves.size() * sizeof(NodeId) +
-          rank.size() * sizeof(uint32_t),
-      threads, context, append, [](const FacetWalk<D>& walk) { return walk.MemoryBytes(); },
-      [](const FacetWalk<D>& walk) { return walk.counters(); });
-}
+    std::array<PlaneSource<D>, D> planes;
+    for (int k = 0; k < D; ++k) {
+      planes[k].generator = structure_.point(others[k]);
+    }
+    for (const auto& [at, u] : late) {
+      const ExactDecision decision = DecideCut<D>(structure_.point(v), planes, structure_.point(u), TieRule::kPerturb);
+      ++counters_.decisions.exact;
+      counters_.decisions.perturbed += decision.perturbed ? 1 : 0;
+      if (decision.sign == Sign::kPositive) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+  const QueryStructure<D>& structure_;
+  const StarLists<D>& stars_;
+  const LateNeighbours& late_;
+  const std::span<const uint32_t> output_index_;
+  std::vector<Row> rows_;
+  QueryCounters counters_;
+};
 
 }  // namespace
 
 template <int D>
-absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, const NeighbourLists& neighbours,
+absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, const StarLists<D>& stars,
                                            std::span<const uint32_t> output_index, int threads, RunContext& context) {
-  // The table takes less than the lists.
-  WELLSPACE_RETURN_IF_ERROR(
-      context.AllowMemory(HeldBytes<D>(structure, output_index, threads) + 2 * neighbours.MemoryBytes()));
-  WELLSPACE_ASSIGN_OR_RETURN(const NeighbourTable table,
-                             NeighbourTable::Of(neighbours, structure.vertex_count(), context));
-  if constexpr (D <= 3) {
-    return JoinWalks<D>(structure, table, output_index, threads, context);
-  } else {
-    std::vector<VertexId> order;
-    order.reserve(structure.vertex_count());
-    structure.tree().ForEachLeaf([&](NodeId leaf) {
-      const auto* bucket = structure.tree().BucketOf(leaf);
-      for (uint32_t i = 0; bucket != nullptr && i < bucket->count && !context.IsCancelled(); ++i) {
-        order.push_back(bucket->ids[i]);
-      }
-    });
-    return JoinCells<D>(
-        structure, order, output_index,
-        [&](VertexId v, Workspace<D>& workspace) { structure.VoronoiAmong(v, table, workspace); },
-        [](VertexId) { return true; }, HeldBytes<D>(structure, output_index, threads) + table.MemoryBytes(), threads,
-        context);
+  const LeafBlocks<D> blocks(structure.tree());
+  if (!stars.IsComplete()) {
+    const auto append = [&](size_t block, Workspace<D>& workspace, SimplexList<D>& out) {
+      blocks.ForEachVertexOf(block, context, [&](VertexId v) {
+        structure.Voronoi(v, workspace);
+        AppendCell<D>(
+            structure, v, output_index, workspace, [](VertexId) { return true; }, out);
+      });
+    };
+    return JoinBlocks<D, Workspace<D>>(
+        blocks.count(), HeldBytes<D>(structure, output_index, threads) + blocks.MemoryBytes(), threads, context, append,
+        [](const Workspace<D>&) { return uint64_t{0}; },
+        [](const Workspace<D>& workspace) { return workspace.counters; });
   }
+  WELLSPACE_ASSIGN_OR_RETURN(const LateNeighbours late,
+                             LateNeighbours::Of(stars, structure.vertex_count(), threads, context));
+  using Listed = std::optional<ListedSimplices<D>>;
+  const auto append = [&](size_t block, Listed& listed, SimplexList<D>& out) {
+    if (!listed.has_value()) {
+      listed.emplace(structure, stars, late, output_index);
+    }
+    blocks.ForEachVertexOf(block, context, [&](VertexId v) { listed->Append(v, out); });
+  };
+  return JoinBlocks<D, Listed>(
+      blocks.count(),
+      structure.MemoryBytes() + stars.MemoryBytes() + late.MemoryBytes() + output_index.size_bytes() +
+          blocks.MemoryBytes(),
+      threads, context, append, [](const Listed& listed) { return listed->MemoryBytes(); },
+      [](const Listed& listed) { return listed->counters(); });
 }
 
 template <int D>
 absl::StatusOr<std::vector<VertexId>> ChangedVertices(const QueryStructure<D>& structure, VertexId first_new,
                                                       const RunContext& context) {
   std::vector<VertexId> changed;
-  std::vector<VertexId> neighbours;
+  Star<D> star;
   Workspace<D> workspace;
   for (uint32_t i = Index(first_new); i < structure.vertex_count(); ++i) {
     WELLSPACE_RETURN_IF_ERROR(context.Check());
     changed.push_back(VertexId{i});
     structure.Voronoi(VertexId{i}, workspace);
-    workspace.cell.Neighbours(neighbours);
-    changed.insert(changed.end(), neighbours.begin(), neighbours.end());
+    workspace.cell.FindStar(star);
+    for (const std::array<VertexId, D>& simplex : star) {
+      changed.insert(changed.end(), simplex.begin(), simplex.end());
+    }
   }
   std::sort(changed.begin(), changed.end());
   changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
@@ -299,13 +361,25 @@ absl::StatusOr<Simplices> ComputeSimplicesAmong(const QueryStructure<D>& structu
   for (const VertexId v : vertices) {
     is_among[Index(v)] = true;
   }
-  return JoinCells<D>(
-      structure, vertices, output_index, [&](VertexId v, Workspace<D>& workspace) { structure.Voronoi(v, workspace); },
-      [&](VertexId v) { return is_among[Index(v)]; }, HeldBytes<D>(structure, output_index, threads), threads, context);
+  const auto append = [&](size_t block, Workspace<D>& workspace, SimplexList<D>& out) {
+    const size_t begin = block * kVerticesInBlock;
+    for (const VertexId v : vertices.subspan(begin, std::min(kVerticesInBlock, vertices.size() - begin))) {
+      if (context.IsCancelled()) {
+        return;
+      }
+      structure.Voronoi(v, workspace);
+      AppendCell<D>(
+          structure, v, output_index, workspace, [&](VertexId u) { return is_among[Index(u)]; }, out);
+    }
+  };
+  return JoinBlocks<D, Workspace<D>>((vertices.size() + kVerticesInBlock - 1) / kVerticesInBlock,
+                                     HeldBytes<D>(structure, output_index, threads) + vertices.size_bytes(), threads,
+                                     context, append, [](const Workspace<D>&) { return uint64_t{0}; },
+                                     [](const Workspace<D>& workspace) { return workspace.counters; });
 }
 
 #define WELLSPACE_INSTANTIATE(D)                                                                                   \
-  template absl::StatusOr<Simplices> ComputeSimplices<D>(const QueryStructure<D>&, const NeighbourLists&,          \
+  template absl::StatusOr<Simplices> ComputeSimplices<D>(const QueryStructure<D>&, const StarLists<D>&,            \
                                                          std::span<const uint32_t>, int, RunContext&);             \
   template absl::StatusOr<std::vector<VertexId>> ChangedVertices<D>(const QueryStructure<D>&, VertexId,            \
                                                                     const RunContext&);                            \

@@ -9,8 +9,8 @@
 
 #include "absl/status/statusor.h"
 #include "core/base/run_context.h"
-#include "core/voronoi/neighbour_lists.h"
 #include "core/voronoi/query_structure.h"
+#include "core/voronoi/star_lists.h"
 
 namespace wellspace::core {
 
@@ -22,22 +22,20 @@ struct Simplices {
   QueryCounters counters;
 };
 
-// Each simplex once, emitted by the block of its vertex with the lowest output index; blocks are stretches of the Z curve of the tree, which
-// threads share out. In 2-D and 3-D a block is walked through from facet to facet (FacetWalk); from 4-D on every vertex's whole Voronoi cell
-// is cut out by its neighbours, and each of its nodes is a simplex.
+// Each simplex once, in the order of the vertices along the Z curve of the tree, which threads share out in blocks: those that each
+// vertex lists; or, if `stars` is not complete, the nodes of its whole cell where it has the lowest output index of them.
 //
 // Shapes:     output_index: vertex_count entries, a permutation: the index in the output of each vertex.
-// REQUIRES:   `structure` refined: no circumcentre outside the box; `neighbours` those of the refinement that has refined it, which has been told of
+// REQUIRES:   `structure` refined: no circumcentre outside the box; `stars` those of the refinement that has refined it, which has been told of
 //             all vertices added or moved since.
 // Guarantees: (1) a Delaunay triangulation of the vertices that decomposes the box; (2) the same order for any number
 //             of threads.
-// Complexity: O(m) for m vertices in a refined structure: what is listed, and what the simplices at each vertex take among it; no leaf is looked at
-//             but for the first star of a walk.
-// Errors:     RESOURCE_EXHAUSTED of the context's memory, or if `neighbours` is full; CANCELLED, DEADLINE_EXCEEDED.
+// Complexity: O(m) for m vertices in a refined structure; no leaf is looked at if `stars` is complete.
+// Errors:     RESOURCE_EXHAUSTED of the context's memory; CANCELLED, DEADLINE_EXCEEDED.
 // Threads:    uses `threads`, at most as many as the machine has cores.
-// Source:     [HT08] §1 and §2; the walk is ours (docs/design/simplex.md).
+// Source:     [HT08] §1 and §2; what is listed and what of it counts: docs/design/simplex.md.
 template <int D>
-absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, const NeighbourLists& neighbours,
+absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, const StarLists<D>& stars,
                                            std::span<const uint32_t> output_index, int threads, RunContext& context);
 
 // Those vertices whose stars an insertion of the vertices from `first_new` on can have changed: these, and all that now
@@ -49,7 +47,8 @@ template <int D>
 absl::StatusOr<std::vector<VertexId>> ChangedVertices(const QueryStructure<D>& structure, VertexId first_new,
                                                       const RunContext& context);
 
-// The simplices all of whose vertices are among `vertices`, otherwise as ComputeSimplices.
+// The simplices all of whose vertices are among `vertices`, each emitted by its vertex with the lowest output index, as nodes of that
+// vertex's whole cell; otherwise as ComputeSimplices.
 //
 // REQUIRES:   `vertices` ascending.
 // Complexity: O(vertices), and a bit for each vertex of the structure.

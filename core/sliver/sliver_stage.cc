@@ -131,41 +131,31 @@ class Follower final : public MendObserver {
 
   void StarChanged(VertexId v) override {
     triangulation_.Star(v, star_);
-    seen_in_.resize(triangulation_.vertex_count(), 0);
-    ++star_count_;
-    neighbours_.clear();
     double nearest_sq = std::numeric_limits<double>::infinity();
     for (const SimplexId s : star_) {
       for (const VertexId u : triangulation_.item(s).vertices) {
-        if (u != v && seen_in_[Index(u)] != star_count_) {
-          seen_in_[Index(u)] = star_count_;
+        if (u != v) {
           nearest_sq = std::min(nearest_sq, DistanceSq<3>(triangulation_.point(u), triangulation_.point(v)));
-          neighbours_.push_back(u);
         }
       }
     }
-    refinement_.CellChanged(v, nearest_sq, neighbours_);
+    refinement_.CellChanged(v, nearest_sq);
   }
 
-  uint64_t MemoryBytes() const override {
-    return structure_.MemoryBytes() + refinement_.MemoryBytes() + seen_in_.size() * sizeof(uint64_t);
-  }
+  uint64_t MemoryBytes() const override { return structure_.MemoryBytes() + refinement_.MemoryBytes(); }
 
  private:
   Triangulation<3>& triangulation_;
   QueryStructure<3>& structure_;
   Refinement<3>& refinement_;
   std::vector<SimplexId> star_;
-  std::vector<VertexId> neighbours_;
-  std::vector<uint64_t> seen_in_;  // by vertex: the last star that it was found in
-  uint64_t star_count_ = 0;
 };
 
 }  // namespace
 
 template <int D>
 absl::StatusOr<Triangulation<D>> SliverStage<D>::Triangulate(const QueryStructure<D>& structure,
-                                                             const NeighbourLists& neighbours, int threads,
+                                                             const StarLists<D>& stars, int threads,
                                                              RunContext& context) {
   context.EnterPhase(Phase::kSimplices);
   const double no_time = 0;
@@ -173,15 +163,14 @@ absl::StatusOr<Triangulation<D>> SliverStage<D>::Triangulate(const QueryStructur
   // By the structure's own numbers, which do not depend on the order of the input.
   std::vector<uint32_t> identity(structure.vertex_count());
   std::iota(identity.begin(), identity.end(), uint32_t{0});
-  WELLSPACE_ASSIGN_OR_RETURN(Simplices simplices,
-                             ComputeSimplices<D>(structure, neighbours, identity, threads, context));
+  WELLSPACE_ASSIGN_OR_RETURN(Simplices simplices, ComputeSimplices<D>(structure, stars, identity, threads, context));
   statistics_.star_queries.Add(simplices.counters);
   if (statistics_.min_angle_deg == 0) {
     statistics_.min_angle_deg = simplices.min_angle_deg;
   }
-  WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(
-      structure.MemoryBytes() + neighbours.MemoryBytes() + simplices.indices.size() * sizeof(uint32_t) +
-      Triangulation<D>::BuildBytes(structure.vertex_count(), simplices.indices.size() / (D + 1))));
+  WELLSPACE_RETURN_IF_ERROR(
+      context.AllowMemory(structure.MemoryBytes() + stars.MemoryBytes() + simplices.indices.size() * sizeof(uint32_t) +
+                          Triangulation<D>::BuildBytes(structure.vertex_count(), simplices.indices.size() / (D + 1))));
   // Sorting takes less than Build.
   WELLSPACE_RETURN_IF_ERROR(SortSimplices<D>(structure.vertex_count(), simplices.indices, context));
   std::vector<Point<D>> points;
@@ -199,14 +188,14 @@ absl::StatusOr<Triangulation<D>> SliverStage<D>::Triangulate(const QueryStructur
 
 // Adds the structure's new vertices to the triangulation, or makes it.
 template <int D>
-absl::Status SliverStage<D>::FollowStructure(const QueryStructure<D>& structure, const NeighbourLists& neighbours,
-                                             int threads, RunContext& context) {
+absl::Status SliverStage<D>::FollowStructure(const QueryStructure<D>& structure, const StarLists<D>& stars, int threads,
+                                             RunContext& context) {
   const uint32_t count = structure.vertex_count();
   if (triangulation_.has_value() && (count - triangulation_->vertex_count()) > count / kFewNew) {
     triangulation_.reset();
   }
   if (!triangulation_.has_value()) {
-    WELLSPACE_ASSIGN_OR_RETURN(triangulation_, Triangulate(structure, neighbours, threads, context));
+    WELLSPACE_ASSIGN_OR_RETURN(triangulation_, Triangulate(structure, stars, threads, context));
     return absl::OkStatus();
   }
   Workspace<D> workspace;
@@ -230,7 +219,7 @@ template <int E>
 absl::Status SliverStage<D>::Mend(QueryStructure<E>& structure, Refinement<E>& refinement, std::vector<bool>& is_fixed,
                                   const MendDemands& demands, int threads, RunContext& context) requires(E == 3) {
   const Stopwatch stopwatch(statistics_.seconds, statistics_.star_seconds);
-  WELLSPACE_RETURN_IF_ERROR(FollowStructure(structure, refinement.neighbours(), threads, context));
+  WELLSPACE_RETURN_IF_ERROR(FollowStructure(structure, refinement.stars(), threads, context));
   context.EnterPhase(Phase::kSlivers);
   Follower follower(*triangulation_, structure, refinement);
   Mender mender(*triangulation_, is_fixed, demands, follower);
@@ -244,7 +233,7 @@ absl::Status SliverStage<D>::Mend(QueryStructure<E>& structure, Refinement<E>& r
 
 template <int D>
 absl::StatusOr<WeightedSimplices> SliverStage<D>::ToSimplices(const QueryStructure<D>& structure,
-                                                              const NeighbourLists& neighbours,
+                                                              const StarLists<D>& stars,
                                                               std::span<const uint32_t> output_index, bool pump,
                                                               int threads, RunContext& context) {
   const Stopwatch stopwatch(statistics_.seconds, statistics_.star_seconds);
@@ -259,7 +248,7 @@ absl::StatusOr<WeightedSimplices> SliverStage<D>::ToSimplices(const QueryStructu
     if (triangulation_.has_value()) {
       pumped = std::exchange(triangulation_, std::nullopt);
     } else {
-      WELLSPACE_ASSIGN_OR_RETURN(pumped, Triangulate(structure, neighbours, threads, context));
+      WELLSPACE_ASSIGN_OR_RETURN(pumped, Triangulate(structure, stars, threads, context));
     }
     context.EnterPhase(Phase::kSlivers);
     WELLSPACE_ASSIGN_OR_RETURN(statistics_.weighted, PumpWeights<D>(*pumped, context));

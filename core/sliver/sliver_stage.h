@@ -61,7 +61,7 @@ class SliverStage {
   // REQUIRES:   no vertex has been added since Mend; or `pump`.
   // Complexity: O(m).
   // Errors:     RESOURCE_EXHAUSTED (memory of the context), CANCELLED, DEADLINE_EXCEEDED.
-  absl::StatusOr<WeightedSimplices> ToSimplices(const QueryStructure<D>& structure, const NeighbourLists& neighbours,
+  absl::StatusOr<WeightedSimplices> ToSimplices(const QueryStructure<D>& structure, const StarLists<D>& stars,
                                                 std::span<const uint32_t> output_index, bool pump, int threads,
                                                 RunContext& context);
 
@@ -80,9 +80,9 @@ class SliverStage {
   const SliverStatistics& statistics() const { return statistics_; }
 
  private:
-  absl::Status FollowStructure(const QueryStructure<D>& structure, const NeighbourLists& neighbours, int threads,
+  absl::Status FollowStructure(const QueryStructure<D>& structure, const StarLists<D>& stars, int threads,
                                RunContext& context);
-  absl::StatusOr<Triangulation<D>> Triangulate(const QueryStructure<D>& structure, const NeighbourLists& neighbours,
+  absl::StatusOr<Triangulation<D>> Triangulate(const QueryStructure<D>& structure, const StarLists<D>& stars,
                                                int threads, RunContext& context);
 
   std::optional<Triangulation<D>> triangulation_;

@@ -497,19 +497,21 @@ WELLSPACE_INLINE bool Polytope<D>::SurelyKeeps(size_t node, double ratio) const 
 }
 
 template <int D>
-void Polytope<D>::Neighbours(std::vector<VertexId>& out) {
-  bounds_.assign(planes_.size(), 0);
+void Polytope<D>::FindStar(Star<D>& out) const {
+  out.resize(columns_.count());
+  size_t count = 0;
   for (size_t i = 0; i < columns_.count(); ++i) {
-    for (const uint16_t index : joints_[i].planes) {
-      bounds_[index] = 1;
+    // No branch, since none could be foretold where there are walls.
+    std::array<VertexId, D>& simplex = out[count];
+    uint32_t is_simplex = 1;
+    for (int k = 0; k < D; ++k) {
+      const Plane<D>& plane = planes_[joints_[i].planes[k]];
+      simplex[k] = plane.vertex;
+      is_simplex &= plane.kind == PlaneKind::kBisector ? 1 : 0;
     }
+    count += is_simplex;
   }
-  out.clear();
-  for (size_t i = 0; i < planes_.size(); ++i) {
-    if (bounds_[i] != 0 && planes_[i].kind == PlaneKind::kBisector) {
-      out.push_back(planes_[i].vertex);
-    }
-  }
+  out.resize(count);
 }
 
 // As in Cut, with the largest slack.

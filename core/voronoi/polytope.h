@@ -14,6 +14,7 @@
 #include "core/geometry/point.h"
 #include "core/geometry/power_predicate.h"
 #include "core/voronoi/node_columns.h"
+#include "core/voronoi/star.h"
 
 namespace wellspace::core {
 
@@ -154,11 +155,11 @@ class Polytope {
   // Whether the last cut has made the cell larger than it may be.
   bool IsTooLarge() const { return columns_.count() > kMostNodes || planes_.size() > kMostPlanes; }
 
-  // Puts the vertices whose bisectors bound the cell into `out`, in the order of the planes. The nodes need not be placed.
+  // Puts into `out` a simplex for each node that lies on bisectors alone. The nodes need not be placed.
   //
-  // Complexity: O(nodes + planes); no allocation once warm.
+  // Complexity: O(nodes); no allocation once warm.
   // Errors:     none.
-  void Neighbours(std::vector<VertexId>& out);
+  void FindStar(Star<D>& out) const;
 
   // The faces of the box that a node of the cell lies on.
   FaceMask FacesOf(const CellNode<D>& node) const {
@@ -257,10 +258,9 @@ class Polytope {
   size_t removed_count_ = 0;
   std::vector<CutEdge> cut_edges_;
   size_t cut_count_ = 0;
-  std::vector<Index> new_;       // the nodes on them
-  std::vector<uint32_t> ends_;   // by the plane that an edge runs along, all 0 between cuts; D = 3
-  std::vector<Ridge> ridges_;    // D > 3
-  std::vector<uint8_t> bounds_;  // by plane, in Neighbours
+  std::vector<Index> new_;      // the nodes on them
+  std::vector<uint32_t> ends_;  // by the plane that an edge runs along, all 0 between cuts; D = 3
+  std::vector<Ridge> ridges_;   // D > 3
 };
 
 }  // namespace wellspace::core

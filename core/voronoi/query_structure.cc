@@ -280,26 +280,6 @@ void QueryStructure<D>::Voronoi(VertexId v, Workspace<D>& workspace) const {
   workspace.cell.Place();
 }
 
-template <int D>
-void QueryStructure<D>::VoronoiAmong(VertexId v, const NeighbourTable& neighbours, Workspace<D>& workspace) const {
-  BeginWhole(v, workspace);
-  auto& by_distance = workspace.by_distance;
-  by_distance.clear();
-  neighbours.ForEachAt(v, [&](VertexId u) { by_distance.emplace_back(DistanceSq<D>(point(u), point(v)), u); });
-  ++workspace.counters.queries;
-  workspace.counters.vertices += by_distance.size();
-  std::sort(by_distance.begin(), by_distance.end());
-  by_distance.erase(std::unique(by_distance.begin(), by_distance.end()), by_distance.end());
-  for (const auto& [distance_sq, u] : by_distance) {
-    if (workspace.cell.IsTooLarge()) {
-      break;
-    }
-    workspace.cell.CutBeforePlace(u, point(u));
-  }
-  CountCuts(workspace);
-  workspace.cell.Place();
-}
-
 // Cuts workspace.cell, whose site is vertex `v`, by the vertices in the leaves from `own` outward.
 template <int D>
 void QueryStructure<D>::Scan(VertexId v, NodeId own, Workspace<D>& workspace) const {

@@ -17,7 +17,6 @@
 #include "core/voronoi/lanes.h"
 #include "core/voronoi/leaf_queue.h"
 #include "core/voronoi/nearness.h"
-#include "core/voronoi/neighbour_lists.h"
 #include "core/voronoi/node_columns.h"
 #include "core/voronoi/polytope.h"
 
@@ -127,13 +126,6 @@ class QueryStructure {
   // Errors:     none.
   // Source:     [HT08] §1, "the entire Voronoi cell of any vertex".
   void Voronoi(VertexId v, Workspace<D>& workspace) const;
-
-  // The same from a table of all neighbours, without looking for them.
-  //
-  // REQUIRES:   no vertex was added or moved since the table was made.
-  // Complexity: O(entries at v) cuts, the nearest first.
-  // Errors:     none.
-  void VoronoiAmong(VertexId v, const NeighbourTable& neighbours, Workspace<D>& workspace) const;
 
   // Adds a vertex at `p`, near `near`; kNoVertex if none is known.
   //

@@ -142,17 +142,18 @@ TYPED_TEST(ForeseenCellsTest, StayTrueWhileVerticesAreAdded) {
       const Look<D> look = foreseen.Take(vertices[i], kClip);
       Polytope<D>* const cell = look.cell;
       ASSERT_NE(cell, nullptr);
-      std::vector<VertexId> neighbours;
+      ASSERT_EQ(look.star != nullptr, look.found != nullptr && look.found->IsGood());
       if (look.found != nullptr) {
         ++unchanged;
         EXPECT_EQ(look.found->bad_node, is_odd(vertices[i]) ? static_cast<int>(Index(vertices[i])) : -1);
         EXPECT_EQ(look.found->radius_sq, cell->reach_sq());
-        if (look.found->IsGood()) {
-          ++good;
-          cell->Neighbours(neighbours);
-        }
       }
-      EXPECT_TRUE(std::equal(look.neighbours.begin(), look.neighbours.end(), neighbours.begin(), neighbours.end()));
+      if (look.star != nullptr) {
+        ++good;
+        Star<D> star;
+        cell->FindStar(star);
+        EXPECT_EQ(*look.star, star);
+      }
       plain += cell->KeepsRatio(kRatio) ? 1 : 0;
       cell->Place();
       ASSERT_EQ(Description<D>(*cell), expected);

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstdint>
 #include <numeric>
-#include <set>
 #include <string>
 #include <string_view>
 #include <tuple>
@@ -17,9 +16,7 @@
 
 #include "absl/status/status.h"
 #include "core/refine/refine.h"
-#include "core/simplex/facet_pencil.h"
 #include "core/simplex/quality.h"
-#include "core/simplex/site_columns.h"
 #include "core/simplex/validate.h"
 #include "core/sliver/mend.h"
 #include "core/sliver/sliver_stage.h"
@@ -79,12 +76,12 @@ SimplexSet<D> SetOfCells(const QueryStructure<D>& structure, const std::vector<u
 }
 
 template <int D>
-NeighbourLists Refine(QueryStructure<D>& structure) {
+StarLists<D> Refine(QueryStructure<D>& structure) {
   RunContext context;
   Refinement<D> refinement(structure, 0x1p-48);
   const absl::Status refined = refinement.Run({.rho = std::sqrt(1 << (D - 1))}, 1'000'000, 1, context);
   EXPECT_TRUE(refined.ok()) << refined;
-  return refinement.neighbours();
+  return refinement.stars();
 }
 
 // Any permutation serves.
@@ -101,10 +98,10 @@ std::vector<uint32_t> MakeOutputIndex(uint32_t count) {
 template <int D>
 void ExpectSimplicesOfCells(std::string_view kind, size_t n) {
   QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, n));
-  const NeighbourLists neighbours = Refine<D>(structure);
+  const StarLists<D> stars = Refine<D>(structure);
   const std::vector<uint32_t> output_index = MakeOutputIndex(structure.vertex_count());
   RunContext context;
-  const absl::StatusOr<Simplices> simplices = ComputeSimplices<D>(structure, neighbours, output_index, 1, context);
+  const absl::StatusOr<Simplices> simplices = ComputeSimplices<D>(structure, stars, output_index, 1, context);
   ASSERT_TRUE(simplices.ok()) << simplices.status();
   const SimplexSet<D> set = SetOf<D>(*simplices);
   EXPECT_EQ(set, SetOfCells<D>(structure, output_index));
@@ -133,7 +130,7 @@ void ExpectSimplicesOfCells(std::string_view kind, size_t n) {
   EXPECT_EQ(simplices->max_radius_edge, max_radius_edge);
   EXPECT_EQ(simplices->min_angle_deg, min_angle_deg);
 
-  const absl::StatusOr<Simplices> again = ComputeSimplices<D>(structure, neighbours, output_index, 2, context);
+  const absl::StatusOr<Simplices> again = ComputeSimplices<D>(structure, stars, output_index, 2, context);
   ASSERT_TRUE(again.ok()) << again.status();
   EXPECT_EQ(again->indices, simplices->indices);
   EXPECT_EQ(again->max_radius_edge, simplices->max_radius_edge);
@@ -173,15 +170,15 @@ TEST(Simplices, StarsAgreeWhereSizesVary) {
   ExpectSimplicesOfCells<3>("skew", 1'000);
 }
 
-TEST(Simplices, CellsByNeighboursAreThoseOfAllVertices) {
+TEST(Simplices, InHigherDimensionsToo) {
   ExpectSimplicesOfCells<4>("uniform", 60);
   ExpectSimplicesOfCells<4>("grid", 16);
 }
 
 // Refinements that stop, or are told of vertices, on the way to their end.
-class NeighboursOfRefinementTest : public test::SeededTest {
+class StarsOfRefinementTest : public test::SeededTest {
  protected:
-  NeighboursOfRefinementTest() : SeededTest(47) {}
+  StarsOfRefinementTest() : SeededTest(47) {}
 
   template <int D>
   static absl::Status Run(Refinement<D>& refinement, RunContext& context,
@@ -190,31 +187,18 @@ class NeighboursOfRefinementTest : public test::SeededTest {
     return refinement.Run({.rho = std::sqrt(1 << (D - 1))}, 1'000'000, threads, context, observer);
   }
 
-  // All neighbours of every whole cell are in the table, and the simplices are those of the cells.
+  // The simplices are those of the cells.
   template <int D>
-  static void ExpectAllAreListed(const QueryStructure<D>& structure, const NeighbourLists& lists) {
+  static void ExpectSimplicesOfCells(const QueryStructure<D>& structure, const StarLists<D>& stars) {
     RunContext context;
-    const absl::StatusOr<NeighbourTable> table = NeighbourTable::Of(lists, structure.vertex_count(), context);
-    ASSERT_TRUE(table.ok()) << table.status();
-    Workspace<D> workspace;
-    std::vector<VertexId> neighbours;
-    for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
-      structure.Voronoi(VertexId{v}, workspace);
-      workspace.cell.Neighbours(neighbours);
-      std::set<VertexId> listed;
-      table->ForEachAt(VertexId{v}, [&](VertexId u) { listed.insert(u); });
-      for (const VertexId u : neighbours) {
-        ASSERT_EQ(listed.count(u), 1u) << Index(u) << " at " << v << " of " << structure.vertex_count();
-      }
-    }
     const std::vector<uint32_t> output_index = MakeOutputIndex(structure.vertex_count());
-    const absl::StatusOr<Simplices> simplices = ComputeSimplices<D>(structure, lists, output_index, 1, context);
+    const absl::StatusOr<Simplices> simplices = ComputeSimplices<D>(structure, stars, output_index, 1, context);
     ASSERT_TRUE(simplices.ok()) << simplices.status();
     EXPECT_EQ(SetOf<D>(*simplices), SetOfCells<D>(structure, output_index));
   }
 
   template <int D>
-  void ExpectAllAreListedAfterVerticesWereAdded(std::string_view kind) {
+  void ExpectThoseOfCellsAfterVerticesWereAdded(std::string_view kind) {
     QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, D == 2 ? 200 : D == 3 ? 60 : 8));
     Refinement<D> refinement(structure, 0x1p-48);
     RunContext context;
@@ -230,12 +214,12 @@ class NeighboursOfRefinementTest : public test::SeededTest {
         p[i % D] += std::ldexp(0.1 + random_.Unit(), -4 - i);
       }
       ASSERT_TRUE(Run<D>(refinement, context).ok());
-      ExpectAllAreListed<D>(structure, refinement.neighbours());
+      ExpectSimplicesOfCells<D>(structure, refinement.stars());
     }
   }
 
   template <int D>
-  void ExpectAllAreListedAfterStops(std::string_view kind) {
+  void ExpectThoseOfCellsAfterStops(std::string_view kind) {
     QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, D == 2 ? 300 : 80));
     Refinement<D> refinement(structure, 0x1p-48);
     absl::Status status = absl::CancelledError();
@@ -251,12 +235,12 @@ class NeighboursOfRefinementTest : public test::SeededTest {
     }
     ASSERT_TRUE(status.ok()) << status;
     EXPECT_GT(stops, 3);
-    ExpectAllAreListed<D>(structure, refinement.neighbours());
+    ExpectSimplicesOfCells<D>(structure, refinement.stars());
   }
 };
 
-// Moved vertices have other neighbours than the refinement has seen; vertices that are added afterwards find them listed.
-TEST_F(NeighboursOfRefinementTest, AreListedAfterVerticesWereMoved) {
+// Moved vertices have other simplices than the refinement has seen: nothing is listed then, until all are looked at again.
+TEST_F(StarsOfRefinementTest, GiveTheSimplicesAfterVerticesWereMoved) {
   constexpr double kMinEdge = 0x1p-48;
   QueryStructure<3> structure = MakeStructure<3>(test::SortedCloud<3>("uniform", 100));
   Refinement<3> refinement(structure, kMinEdge);
@@ -269,101 +253,30 @@ TEST_F(NeighboursOfRefinementTest, AreListedAfterVerticesWereMoved) {
   const absl::Status mended = stage.Mend(structure, refinement, is_fixed, demands, 1, context);
   ASSERT_TRUE(mended.ok()) << mended;
   EXPECT_GT(stage.statistics().moves, 0u);
-  ExpectAllAreListed<3>(structure, refinement.neighbours());
+  EXPECT_FALSE(refinement.stars().IsComplete());
+  ExpectSimplicesOfCells<3>(structure, refinement.stars());
   refinement.VertexAdded(structure.AddVertex(kNoVertex, {0.3, 0.4, 0.6}));
   ASSERT_TRUE(Run<3>(refinement, context).ok());
-  ExpectAllAreListed<3>(structure, refinement.neighbours());
+  EXPECT_FALSE(refinement.stars().IsComplete());
+  ExpectSimplicesOfCells<3>(structure, refinement.stars());
+  ASSERT_TRUE(refinement.Run({.rho = 2.5}, 1'000'000, 2, context).ok());
+  EXPECT_TRUE(refinement.stars().IsComplete());
+  ExpectSimplicesOfCells<3>(structure, refinement.stars());
 }
 
-TEST_F(NeighboursOfRefinementTest, AreListedAfterVerticesWereAdded) {
+TEST_F(StarsOfRefinementTest, GiveTheSimplicesAfterVerticesWereAdded) {
   for (const std::string_view kind : {"uniform", "grid"}) {
-    ExpectAllAreListedAfterVerticesWereAdded<2>(kind);
-    ExpectAllAreListedAfterVerticesWereAdded<3>(kind);
+    ExpectThoseOfCellsAfterVerticesWereAdded<2>(kind);
+    ExpectThoseOfCellsAfterVerticesWereAdded<3>(kind);
   }
-  ExpectAllAreListedAfterVerticesWereAdded<4>("uniform");
+  ExpectThoseOfCellsAfterVerticesWereAdded<4>("uniform");
 }
 
-TEST_F(NeighboursOfRefinementTest, AreListedAfterStops) {
+TEST_F(StarsOfRefinementTest, GiveTheSimplicesAfterStops) {
   for (const std::string_view kind : {"uniform", "lines"}) {
-    ExpectAllAreListedAfterStops<2>(kind);
-    ExpectAllAreListedAfterStops<3>(kind);
+    ExpectThoseOfCellsAfterStops<2>(kind);
+    ExpectThoseOfCellsAfterStops<3>(kind);
   }
-}
-
-class FacetPencilTest : public test::SeededTest {
- protected:
-  FacetPencilTest() : SeededTest(61) {}
-
-  template <int D>
-  Point<D> Draw() {
-    Point<D> p;
-    for (double& x : p) {
-      x = random_.Unit();
-    }
-    return p;
-  }
-
-  // The power of `u` as computed, and the exact side: clear powers have to be right, also where u is close to the sphere or the
-  // simplex nearly flat.
-  template <int D>
-  void ExpectClearPowersAreRight() {
-    SiteColumns<D> near;
-    int clear = 0;
-    int close = 0;
-    for (int i = 0; i < 2000; ++i) {
-      Simplex<D> simplex;
-      for (Point<D>& corner : simplex) {
-        corner = Draw<D>();
-      }
-      if (i % 2 == 1) {
-        // Nearly flat: the apex close to a corner of the facet, but for a trifle.
-        simplex[D] = simplex[1];
-        simplex[D][0] += std::ldexp(1.0, -static_cast<int>(random_.Below(50)) - 2);
-      }
-      std::array<Point<D>, D - 1> others;
-      std::copy_n(simplex.begin() + 1, D - 1, others.begin());
-      const FacetPencil<D> pencil(simplex[0], others, false);
-      const Sign side = Orientation<D>(simplex).sign;
-      ASSERT_EQ(pencil.SideOf(simplex[D]), side);
-      if (side == Sign::kZero) {
-        continue;
-      }
-      const FacetBall<D> ball = pencil.BallThrough(simplex[D]);
-      // On the sphere but for 2^-k of the radius.
-      const Point<D> direction = Difference<D>(Draw<D>(), Draw<D>());
-      const double scale = (1 + std::ldexp(random_.Unit() - 0.5, -static_cast<int>(random_.Below(54)))) * ball.radius /
-                           std::sqrt(NormSq<D>(direction));
-      Point<D> u;
-      for (int k = 0; k < D; ++k) {
-        u[k] = simplex[0][k] + 0.5 * ball.twice_centre[k] + scale * direction[k];
-      }
-      std::array<double, D + 1> entry{};
-      for (int k = 0; k < D; ++k) {
-        entry[k] = u[k] - simplex[0][k];
-        entry[D] += entry[k] * entry[k];
-      }
-      near.Clear();
-      near.Reserve(1);
-      near.Append(0, entry);
-      near.Finish();
-      const double power = near.PowerOf(0, ball);
-      EXPECT_EQ(near.CountInside(ball), power < ball.doubt ? 1u : 0u);
-      const Sign exact = InSphere<D>(simplex, u).sign * side;
-      if (std::abs(power) >= ball.doubt) {
-        ++clear;
-        EXPECT_EQ(exact, power < 0 ? Sign::kPositive : Sign::kNegative);
-      } else {
-        ++close;
-      }
-    }
-    EXPECT_GT(clear, 200);
-    EXPECT_GT(close, 20);
-  }
-};
-
-TEST_F(FacetPencilTest, ClearPowersAreRight) {
-  ExpectClearPowersAreRight<2>();
-  ExpectClearPowersAreRight<3>();
 }
 
 }  // namespace

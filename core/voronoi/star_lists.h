@@ -1,0 +1,135 @@
+// The simplices at each vertex, as cells have told that were computed anyway: a mesh without a second scan.
+#ifndef WELLSPACE_CORE_VORONOI_STAR_LISTS_H_
+#define WELLSPACE_CORE_VORONOI_STAR_LISTS_H_
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "core/base/ids.h"
+#include "core/base/run_context.h"
+#include "core/voronoi/star.h"
+
+namespace wellspace::core {
+
+// For each vertex, of the star that it had when it was last looked at, the simplices whose vertices had all been looked at before. As
+// vertices are only added, what is a simplex in the end has been one since the last of its vertices came: so the vertex that
+// was looked at last lists it. What it lists beside is spoiled by a vertex that came later. What is listed depends on the stars and on
+// the order in which they were looked at, and, but for the order within a list, not on how they were computed.
+//
+// Thread safety: thread-compatible; const functions may run at once.
+template <int D>
+class StarLists {
+ public:
+  // Lists the simplices of `star` whose vertices have been looked at, in the place of what is listed for `v`; nothing unless this
+  // IsComplete(). `vertex_count`: of all vertices that there are now.
+  //
+  // REQUIRES:   all simplices of v are in star; v and its neighbours are below vertex_count; vertices are numbered as they are added.
+  // Complexity: O(star), amortised.
+  // Errors:     none; more than 2^32 simplices cannot be numbered, and are as GiveUp().
+  void Set(VertexId v, const Star<D>& star, uint32_t vertex_count);
+
+  // Forgets everything, and lists nothing until Clear(): where vertices move, or go, stars grow.
+  void GiveUp();
+  // Whether all that has been looked at is listed.
+  bool IsComplete() const { return is_complete_; }
+
+  // Forgets everything.
+  void Clear() { *this = StarLists(); }
+
+  // What is listed for `v`; nothing if it has not been looked at. Valid until the next Set.
+  std::span<const std::array<VertexId, D>> Of(VertexId v) const {
+    if (Index(v) >= entries_.size() || !Has(v)) {
+      return {};
+    }
+    const Entry& entry = entries_[Index(v)];
+    return {listed_.data() + entry.begin, entry.count};
+  }
+
+  // Whether `u` was last looked at before `v` was, if anything is listed for v.
+  //
+  // REQUIRES:   both have been looked at, and are not the same.
+  bool WasLookedAtBefore(VertexId u, VertexId v) const { return entries_[Index(u)].begin <= entries_[Index(v)].begin; }
+
+  // Whether `u` was added after `v` was last looked at, if anything is listed for v.
+  //
+  // REQUIRES:   v has been looked at.
+  bool CameAfter(VertexId u, VertexId v) const { return AddedAt(u) > entries_[Index(v)].begin; }
+
+  // Whether CameAfter holds of any two of them.
+  bool SomeCameAfterOthers(const std::array<VertexId, D + 1>& vertices) const {
+    uint32_t first_look = kNone;
+    uint32_t last_added = 0;
+    for (const VertexId v : vertices) {
+      first_look = std::min(first_look, entries_[Index(v)].begin);
+      last_added = std::max(last_added, AddedAt(v));
+    }
+    return last_added > first_look;
+  }
+
+  uint64_t MemoryBytes() const {
+    return entries_.size() * sizeof(Entry) + added_.size() * sizeof(uint32_t) +
+           listed_.size() * sizeof(std::array<VertexId, D>);
+  }
+
+ private:
+  static constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
+
+  struct Entry {
+    uint32_t begin = kNone;  // in listed_; kNone before the first look
+    uint32_t count = 0;
+  };
+
+  bool Has(VertexId v) const { return entries_[Index(v)].begin != kNone; }
+  uint32_t AddedAt(VertexId v) const { return Index(v) < first_count_ ? 0 : added_[Index(v) - first_count_]; }
+  void DropUnused();
+
+  std::vector<Entry> entries_;  // by vertex
+  // In the order of the looks, which is thus that of the places where lists begin.
+  std::vector<std::array<VertexId, D>> listed_;
+  size_t unused_ = 0;         // of listed_
+  uint32_t first_count_ = 0;  // vertices at the first look
+  // Of each vertex from first_count_ on, the size of listed_ at the next look after it was added: lists that were made before
+  // begin below, unless they are empty.
+  std::vector<uint32_t> added_;
+  bool is_complete_ = true;
+};
+
+// Who shares a listed simplex with a vertex and came after it was last looked at: what it lists may be spoiled by these, and by
+// nobody else.
+//
+// Thread safety: thread-compatible; const functions may run at once.
+class LateNeighbours {
+ public:
+  using Late = std::pair<VertexId, VertexId>;  // a vertex, and one that came after
+
+  // REQUIRES:   all of the `vertex_count` vertices are listed.
+  // Complexity: O(simplices), and sorting those who are late.
+  // Errors:     CANCELLED, DEADLINE_EXCEEDED.
+  // Threads:    uses `threads`, at most as many as the machine has cores.
+  template <int D>
+  static absl::StatusOr<LateNeighbours> Of(const StarLists<D>& lists, uint32_t vertex_count, int threads,
+                                           const RunContext& context);
+
+  // Those at `v`, each behind v.
+  //
+  // Complexity: O(1) if there are none, else O(log of all).
+  std::span<const Late> At(VertexId v) const;
+
+  uint64_t MemoryBytes() const { return is_at_.size() / 8 + late_.size() * sizeof(Late); }
+
+ private:
+  std::vector<bool> is_at_;  // by vertex: whether anyone is late there
+  std::vector<Late> late_;   // ascending, each once
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_VORONOI_STAR_LISTS_H_
