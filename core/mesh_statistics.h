@@ -36,11 +36,11 @@ struct MeshStatistics {
   uint64_t leaves_visited = 0;  // by them
   uint64_t vertices_visited = 0;
   uint64_t cuts = 0;
-  uint64_t max_leaves_visited = 0;       // by a single one
-  uint64_t stars_computed = 0;           // of vertices, for the simplices
-  uint64_t star_leaves_visited = 0;      // for the first star of a block, and for stars that have changed
-  uint64_t star_vertices_visited = 0;    // in these leaves, or among the neighbours that were listed
-  uint64_t star_cuts = 0;                // facets beyond which a vertex was looked for, and bisectors that cut a cell
+  uint64_t max_leaves_visited = 0;     // by a single one
+  uint64_t stars_computed = 0;         // of vertices, for the simplices
+  uint64_t star_leaves_visited = 0;    // for those that were not listed by the refinement
+  uint64_t star_vertices_visited = 0;  // in these leaves, or of simplices that were listed
+  uint64_t star_cuts = 0;  // bisectors that cut a cell, and later vertices that a listed simplex was held to
   uint64_t max_star_leaves_visited = 0;  // at once
   uint64_t exact_predicates = 0;         // decisions that the floating-point filter could not take
   uint64_t perturbed_predicates = 0;     // of these, exact zeros, decided by the perturbation

@@ -8,7 +8,7 @@ namespace wellspace::core {
 namespace {
 
 // The share of a run's time that has passed when a phase begins: rough, only for progress bars.
-constexpr std::array<double, kPhaseCount> kPhaseStart = {0.0, 0.0, 0.05, 0.5, 0.8, 1.0};
+constexpr std::array<double, kPhaseCount> kPhaseStart = {0.0, 0.0, 0.05, 0.55, 0.6, 1.0};
 
 }  // namespace
 

@@ -127,8 +127,9 @@ void Refinement<D>::VertexAdded(VertexId x) {
 
 template <int D>
 uint64_t Refinement<D>::MemoryBytes() const {
-  return schedule_.MemoryBytes() + stars_.MemoryBytes() + watchers_.MemoryBytes() + radius_sq_.size() * sizeof(double) +
-         announced_.size() * sizeof(Announced) + (own_.seen.size() + new_.seen.size()) * sizeof(uint32_t) +
+  return schedule_.MemoryBytes() + stars_.MemoryBytes() + star_.capacity() * sizeof(star_[0]) +
+         watchers_.MemoryBytes() + radius_sq_.size() * sizeof(double) + announced_.size() * sizeof(Announced) +
+         (own_.seen.size() + new_.seen.size()) * sizeof(uint32_t) +
          (foreseen_ == nullptr ? 0 : foreseen_->MemoryBytes());
 }
 
@@ -408,7 +409,7 @@ void Refinement<D>::Settle(VertexId v, const Assessment& found, double clip, int
     Remember(v, radius_sq);
   }
   if (found.IsGood()) {
-    if (look.star == nullptr) {
+    if (stars_.IsComplete() && look.star == nullptr) {
       look.cell->FindStar(star_);
     }
     stars_.Set(v, look.star != nullptr ? *look.star : star_, structure_.vertex_count());

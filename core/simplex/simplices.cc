@@ -240,12 +240,14 @@ class ListedSimplices {
                   std::span<const uint32_t> output_index)
       : structure_(structure), stars_(stars), late_(late), output_index_(output_index) {}
 
-  // Appends those of `v`, in an order that depends on nothing but the mesh.
+  // Appends those of `v`, in an order that does not depend on how cells were computed.
   void Append(VertexId v, SimplexList<D>& out) {
+    const auto listed = stars_.Of(v);
     ++counters_.queries;
+    counters_.vertices += D * listed.size();
     const auto late = late_.At(v);
     rows_.clear();
-    for (Row row : stars_.Of(v)) {
+    for (Row row : listed) {
       bool is_last = true;
       for (const VertexId u : row) {
         is_last &= stars_.WasLookedAtBefore(u, v);
@@ -269,24 +271,33 @@ class ListedSimplices {
  private:
   using Row = std::array<VertexId, D>;  // the other vertices of a simplex
 
-  // Whether a ball through `v` and `others` holds one of the vertices that are late at v.
+  // Whether the ball through `v` and `others` holds one of the vertices that are late at v; ties as in cells.
   bool IsSpoiled(VertexId v, const Row& others, std::span<const LateNeighbours::Late> late) {
     if (late.empty()) {
       return false;
     }
+    Simplex<D> simplex;
+    simplex[D] = structure_.point(v);
+    for (int k = 0; k < D; ++k) {
+      simplex[k] = structure_.point(others[k]);
+    }
+    const Sign orientation = Orientation<D>(simplex).sign;
+    return std::any_of(late.begin(), late.end(), [&](const LateNeighbours::Late& pair) {
+      const Point<D>& u = structure_.point(pair.second);
+      ++counters_.cuts;
+      const MeasuredSign inside = InSphere<D>(simplex, u);
+      counters_.decisions.exact += inside.stage == Stage::kFilter ? 0 : 1;
+      return (inside.sign == Sign::kZero ? IsInsideOnTie(simplex, u) : inside.sign * orientation) == Sign::kPositive;
+    });
+  }
+
+  Sign IsInsideOnTie(const Simplex<D>& simplex, const Point<D>& u) {
     std::array<PlaneSource<D>, D> planes;
     for (int k = 0; k < D; ++k) {
-      planes[k].generator = structure_.point(others[k]);
+      planes[k].generator = simplex[k];
     }
-    for (const auto& [at, u] : late) {
-      const ExactDecision decision = DecideCut<D>(structure_.point(v), planes, structure_.point(u), TieRule::kPerturb);
-      ++counters_.decisions.exact;
-      counters_.decisions.perturbed += decision.perturbed ? 1 : 0;
-      if (decision.sign == Sign::kPositive) {
-        return true;
-      }
-    }
-    return false;
+    ++counters_.decisions.perturbed;
+    return DecideCut<D>(simplex[D], planes, u, TieRule::kPerturb).sign;
   }
 
   const QueryStructure<D>& structure_;
@@ -316,6 +327,8 @@ absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, c
         [](const Workspace<D>&) { return uint64_t{0}; },
         [](const Workspace<D>& workspace) { return workspace.counters; });
   }
+  WELLSPACE_RETURN_IF_ERROR(
+      context.AllowMemory(structure.MemoryBytes() + stars.MemoryBytes() + output_index.size_bytes()));
   WELLSPACE_ASSIGN_OR_RETURN(const LateNeighbours late,
                              LateNeighbours::Of(stars, structure.vertex_count(), threads, context));
   using Listed = std::optional<ListedSimplices<D>>;
@@ -336,20 +349,26 @@ absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, c
 template <int D>
 absl::StatusOr<std::vector<VertexId>> ChangedVertices(const QueryStructure<D>& structure, VertexId first_new,
                                                       const RunContext& context) {
-  std::vector<VertexId> changed;
+  std::vector<bool> has_changed(structure.vertex_count());
   Star<D> star;
   Workspace<D> workspace;
   for (uint32_t i = Index(first_new); i < structure.vertex_count(); ++i) {
     WELLSPACE_RETURN_IF_ERROR(context.Check());
-    changed.push_back(VertexId{i});
+    has_changed[i] = true;
     structure.Voronoi(VertexId{i}, workspace);
     workspace.cell.FindStar(star);
     for (const std::array<VertexId, D>& simplex : star) {
-      changed.insert(changed.end(), simplex.begin(), simplex.end());
+      for (const VertexId u : simplex) {
+        has_changed[Index(u)] = true;
+      }
     }
   }
-  std::sort(changed.begin(), changed.end());
-  changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
+  std::vector<VertexId> changed;
+  for (uint32_t i = 0; i < structure.vertex_count(); ++i) {
+    if (has_changed[i]) {
+      changed.push_back(VertexId{i});
+    }
+  }
   return changed;
 }
 

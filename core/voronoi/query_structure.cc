@@ -259,23 +259,17 @@ void QueryStructure<D>::ClipAndScan(VertexId v, double radius, TieRule rule, Wor
   Scan(v, LeafOf(v), workspace);
 }
 
-// Begins with walls one side of the box beyond it.
 template <int D>
-void QueryStructure<D>::BeginWhole(VertexId v, Workspace<D>& workspace) const {
+void QueryStructure<D>::Voronoi(VertexId v, Workspace<D>& workspace) const {
   const double side = box_.LongestSide();
-  Box<D> bounds = box_;
+  Box<D> walls = box_;
   for (int i = 0; i < D; ++i) {
-    bounds.low[i] -= side;
-    bounds.high[i] += side;
+    walls.low[i] -= side;
+    walls.high[i] += side;
   }
   std::array<PlaneKind, 2 * D> kinds;
   kinds.fill(PlaneKind::kClip);
-  workspace.cell.Reset(point(v), bounds, kinds, TieRule::kPerturb);
-}
-
-template <int D>
-void QueryStructure<D>::Voronoi(VertexId v, Workspace<D>& workspace) const {
-  BeginWhole(v, workspace);
+  workspace.cell.Reset(point(v), walls, kinds, TieRule::kPerturb);
   Scan(v, LeafOf(v), workspace);
   workspace.cell.Place();
 }

@@ -50,7 +50,6 @@ struct Workspace {
     uint32_t candidate[CandidateColumns<D>::kCapacity];
     uint32_t order[CandidateColumns<D>::kCapacity];  // the nearest first
   } may_cut;
-  std::vector<std::pair<double, VertexId>> by_distance;
 };
 
 struct Neighbor {
@@ -186,7 +185,6 @@ class QueryStructure {
   Neighbor Nearest(const Point<D>& p, NodeId leaf, VertexId but, double limit_sq, Workspace<D>& workspace) const;
   void ClipAndScan(VertexId v, double radius, TieRule rule, Workspace<D>& workspace) const;
   void Scan(VertexId v, NodeId own, Workspace<D>& workspace) const;
-  void BeginWhole(VertexId v, Workspace<D>& workspace) const;
   void CutByLeaf(VertexId v, NodeId leaf, Workspace<D>& workspace) const;
   static void CountCuts(Workspace<D>& workspace);
 

@@ -10,8 +10,19 @@
 namespace wellspace::core {
 namespace {
 
+// Places are dropped, which takes a look at all vertices, once there are as many as one for so many of these.
+constexpr size_t kLeastShare = 8;
+
 // Whose lists one thread looks through at a time.
 constexpr uint32_t kVerticesTogether = 1024;
+
+// Fewer pairs may be held more than once.
+constexpr size_t kLeastLate = 1 << 14;
+
+void MakeUnique(std::vector<LateNeighbours::Late>& late) {
+  std::sort(late.begin(), late.end());
+  late.erase(std::unique(late.begin(), late.end()), late.end());
+}
 
 }  // namespace
 
@@ -45,7 +56,7 @@ void StarLists<D>::Set(VertexId v, const Star<D>& star, uint32_t vertex_count) {
   }
   listed_.resize(begin + count);
   unused_ += std::exchange(entries_[Index(v)], {begin, count}).count;
-  if (unused_ > listed_.size() / 2) {
+  if (unused_ > listed_.size() / 2 && kLeastShare * unused_ > entries_.size()) {
     DropUnused();
   }
 }
@@ -89,8 +100,10 @@ absl::StatusOr<LateNeighbours> LateNeighbours::Of(const StarLists<D>& lists, uin
                                                   const RunContext& context) {
   ThreadTeam team(threads);
   std::vector<std::vector<Late>> of_threads(team.threads());
+  std::vector<size_t> most_late(team.threads(), kLeastLate);
   team.ForEach((vertex_count + kVerticesTogether - 1) / kVerticesTogether, [&](size_t block) {
-    std::vector<Late>& late = of_threads[ThreadTeam::CurrentThread()];
+    const int thread = ThreadTeam::CurrentThread();
+    std::vector<Late>& late = of_threads[thread];
     const uint32_t begin = static_cast<uint32_t>(block) * kVerticesTogether;
     const uint32_t end = std::min(vertex_count, begin + kVerticesTogether);
     std::array<VertexId, D + 1> corners;
@@ -110,14 +123,19 @@ absl::StatusOr<LateNeighbours> LateNeighbours::Of(const StarLists<D>& lists, uin
         }
       }
     }
+    // Each pair comes with every simplex that has both.
+    if (late.size() > most_late[thread]) {
+      MakeUnique(late);
+      most_late[thread] = std::max(kLeastLate, 2 * late.size());
+    }
   });
-  LateNeighbours found;
-  for (const std::vector<Late>& late : of_threads) {
-    found.late_.insert(found.late_.end(), late.begin(), late.end());
-  }
   WELLSPACE_RETURN_IF_ERROR(context.Check());
-  std::sort(found.late_.begin(), found.late_.end());
-  found.late_.erase(std::unique(found.late_.begin(), found.late_.end()), found.late_.end());
+  LateNeighbours found;
+  for (std::vector<Late>& late : of_threads) {
+    found.late_.insert(found.late_.end(), late.begin(), late.end());
+    late = {};
+  }
+  MakeUnique(found.late_);
   found.is_at_.resize(vertex_count);
   for (const Late& late : found.late_) {
     found.is_at_[Index(late.first)] = true;

@@ -49,6 +49,7 @@ void ExpectConstantWork(std::string_view kind, int dimension, std::span<const si
     const absl::StatusOr<core::Mesh> mesh = core::MeshPoints(parameters, MakeCloud(kind, dimension, n), context);
     ASSERT_TRUE(mesh.ok()) << mesh.status();
     work.push_back(WorkOf(mesh->statistics));
+    EXPECT_GT(work.back().visits_per_star, 0);
     EXPECT_LE(work.back().queries_per_vertex, kMostGrowth * work.front().queries_per_vertex);
     EXPECT_LE(work.back().visits_per_query, kMostGrowth * work.front().visits_per_query);
     EXPECT_LE(work.back().cuts_per_query, kMostGrowth * work.front().cuts_per_query);

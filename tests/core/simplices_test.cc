@@ -17,6 +17,7 @@
 #include "absl/status/status.h"
 #include "core/refine/refine.h"
 #include "core/simplex/quality.h"
+#include "core/simplex/simplex_list.h"
 #include "core/simplex/validate.h"
 #include "core/sliver/mend.h"
 #include "core/sliver/sliver_stage.h"
@@ -237,6 +238,22 @@ class StarsOfRefinementTest : public test::SeededTest {
     EXPECT_GT(stops, 3);
     ExpectSimplicesOfCells<D>(structure, refinement.stars());
   }
+
+  // Without an observer vertices wait to be admitted, on two threads.
+  template <int D>
+  void ExpectThoseOfCellsWithinBudgets(const Demands<D>& demands) {
+    QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", D == 2 ? 400 : 100));
+    Refinement<D> refinement(structure, 0x1p-48);
+    absl::Status status = absl::ResourceExhaustedError("");
+    int stops = 0;
+    for (; absl::IsResourceExhausted(status); ++stops) {
+      RunContext context;
+      status = refinement.Run(demands, structure.vertex_count() + 1 + random_.Below(100), 2, context);
+    }
+    ASSERT_TRUE(status.ok()) << status;
+    EXPECT_GT(stops, 3);
+    ExpectSimplicesOfCells<D>(structure, refinement.stars());
+  }
 };
 
 // Moved vertices have other simplices than the refinement has seen: nothing is listed then, until all are looked at again.
@@ -272,11 +289,82 @@ TEST_F(StarsOfRefinementTest, GiveTheSimplicesAfterVerticesWereAdded) {
   ExpectThoseOfCellsAfterVerticesWereAdded<4>("uniform");
 }
 
+TEST_F(StarsOfRefinementTest, GiveTheSimplicesOfAllDemandsWithinBudgets) {
+  const SizeField<2> sizes_2{.max_circumradius = 0.1, .regions = {{{{0, 0}, {0.5, 0.5}}, 0.02}}};
+  const SizeField<3> sizes_3{.max_circumradius = 0.25, .regions = {{{{0, 0, 0}, {0.5, 0.5, 0.5}}, 0.1}}};
+  for (const Criterion criterion : {Criterion::kRadiusEdge, Criterion::kWellSpaced}) {
+    ExpectThoseOfCellsWithinBudgets<2>({.criterion = criterion, .rho = 2});
+    ExpectThoseOfCellsWithinBudgets<2>({.criterion = criterion, .rho = 2, .sizes = sizes_2});
+    ExpectThoseOfCellsWithinBudgets<3>({.criterion = criterion, .rho = 2.5});
+    ExpectThoseOfCellsWithinBudgets<3>({.criterion = criterion, .rho = 2.5, .sizes = sizes_3});
+  }
+}
+
 TEST_F(StarsOfRefinementTest, GiveTheSimplicesAfterStops) {
   for (const std::string_view kind : {"uniform", "lines"}) {
     ExpectThoseOfCellsAfterStops<2>(kind);
     ExpectThoseOfCellsAfterStops<3>(kind);
   }
+}
+
+class SimplexListTest : public test::SeededTest {
+ protected:
+  SimplexListTest() : SeededTest(61) {}
+
+  // Orientation and worst shapes are the exact ones, flatter and flatter as the apex comes closer to the facet beyond it, or to a corner.
+  template <int D>
+  void ExpectExactlyTheWorst() {
+    for (int bits = 0; bits < 50; ++bits) {
+      SimplexList<D> list;
+      double max_radius_edge = 0;
+      double min_angle_deg = 180;
+      for (int i = 0; i < 50; ++i) {
+        Simplex<D> simplex;
+        for (Point<D>& corner : simplex) {
+          for (double& x : corner) {
+            x = random_.Unit();
+          }
+        }
+        const double share = i % 3 == 0 ? 1 : random_.Unit();
+        for (int k = 0; k < D; ++k) {
+          const double flat = share * simplex[0][k] + (1 - share) * simplex[1][k];
+          simplex[D][k] = flat + std::ldexp(simplex[D][k], -bits);
+        }
+        std::array<uint32_t, D + 1> indices;
+        std::iota(indices.begin(), indices.end(), uint32_t{0});
+        for (int k = D; k > 0; --k) {
+          std::swap(indices[k], indices[random_.Below(k + 1)]);
+        }
+        if (Orientation<D>(simplex).sign == Sign::kZero) {
+          continue;
+        }
+        list.Clear();
+        list.Add(simplex, indices);
+        ASSERT_EQ(list.size(), 1u);
+        EXPECT_EQ(list.indices()[0], 0u);
+        Simplex<D> as_listed;
+        Simplex<D> ascending;
+        for (int k = 0; k <= D; ++k) {
+          const auto at = [&](uint32_t index) {
+            return simplex[std::find(indices.begin(), indices.end(), index) - indices.begin()];
+          };
+          as_listed[k] = at(list.indices()[k]);
+          ascending[k] = at(static_cast<uint32_t>(k));
+        }
+        ASSERT_EQ(Orientation<D>(as_listed).sign, Sign::kPositive) << "flat by 2^-" << bits;
+        max_radius_edge = std::max(max_radius_edge, RadiusEdgeRatio<D>(ascending));
+        min_angle_deg = std::min(min_angle_deg, Angles<D>(ascending).min_deg);
+      }
+      EXPECT_EQ(list.max_radius_edge(), max_radius_edge) << "flat by 2^-" << bits;
+      EXPECT_EQ(list.min_angle_deg(), min_angle_deg) << "flat by 2^-" << bits;
+    }
+  }
+};
+
+TEST_F(SimplexListTest, OrientsAndMeasuresFlatSimplicesExactly) {
+  ExpectExactlyTheWorst<2>();
+  ExpectExactlyTheWorst<3>();
+  ExpectExactlyTheWorst<4>();
 }
 
 }  // namespace
