@@ -133,8 +133,8 @@ void ForeseenCells<D>::CountMemory() {
     memory_bytes_ += own.workspace.seen.size() * sizeof(uint32_t) + own.workspace.cell.MemoryBytes();
     for (const auto& pool : own.pools) {
       for (const auto& foreseen : pool.cells) {
-        memory_bytes_ += sizeof(Foreseen) + foreseen->cell.MemoryBytes() +
-                         foreseen->star.capacity() * sizeof(foreseen->star[0]);
+        memory_bytes_ +=
+            sizeof(Foreseen) + foreseen->cell.MemoryBytes() + foreseen->star.capacity() * sizeof(foreseen->star[0]);
       }
     }
   }
