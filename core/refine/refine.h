@@ -87,8 +87,8 @@ class Refinement {
   // What the refinement takes in memory beside the structure.
   uint64_t MemoryBytes() const;
 
-  // Tells that the cell of `v`, which may be new, has changed, but is as the demands of the last run say; `nearest_sq` is
-  // at most the squared distance to its nearest neighbour. What is remembered of the cell is forgotten: an insertion
+  // Tells that the cell of `v`, which may be new, has changed, but is as the demands of the last run say; if v is on a face
+  // of the box, `nearest_sq` is at most the squared distance to its nearest neighbour. What is remembered of the cell is forgotten: an insertion
   // nearby has v looked at again in any case that could matter. Simplices are no longer listed.
   //
   // REQUIRES:   the last run was for the end; every vertex whose neighbours have changed is told of.

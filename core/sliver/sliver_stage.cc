@@ -130,12 +130,14 @@ class Follower final : public MendObserver {
   void VertexAdded(VertexId v, VertexId near) override { structure_.AddVertex(near, triangulation_.point(v)); }
 
   void StarChanged(VertexId v) override {
-    triangulation_.Star(v, star_);
     double nearest_sq = std::numeric_limits<double>::infinity();
-    for (const SimplexId s : star_) {
-      for (const VertexId u : triangulation_.item(s).vertices) {
-        if (u != v) {
-          nearest_sq = std::min(nearest_sq, DistanceSq<3>(triangulation_.point(u), triangulation_.point(v)));
+    if (structure_.faces(v) != 0) {
+      triangulation_.Star(v, star_);
+      for (const SimplexId s : star_) {
+        for (const VertexId u : triangulation_.item(s).vertices) {
+          if (u != v) {
+            nearest_sq = std::min(nearest_sq, DistanceSq<3>(triangulation_.point(u), triangulation_.point(v)));
+          }
         }
       }
     }

@@ -421,7 +421,7 @@ void Triangulation<D>::Remove(VertexId v, std::vector<SimplexId>& created) {
     const Item& item = items_[Index(s)];
     saved_.push_back({s, item});
     const int slot = item.SlotOf(v);
-    Open open{item.vertices, slot, item.neighbours[slot], 0};
+    Open open{item.vertices, slot, item.neighbours[slot], 0, SumOf(item.vertices, slot)};
     if (open.beyond != kNoSimplex) {
       open.beyond_slot = items_[Index(open.beyond)].SlotOf(s);
     }
@@ -500,8 +500,9 @@ void Triangulation<D>::LinkFacet(SimplexId fresh, int slot) {
     const auto* const found = std::find(item.vertices.begin(), item.vertices.end(), u);
     return found != item.vertices.end() && found - item.vertices.begin() != slot;
   };
+  const uint64_t sum = SumOf(item.vertices, slot);
   for (Open& waiting : open_) {
-    bool is_same = true;
+    bool is_same = waiting.sum == sum;
     for (int i = 0; i <= D && is_same; ++i) {
       is_same = i == waiting.slot || is_of_facet(waiting.vertices[i]);
     }
@@ -517,10 +518,19 @@ void Triangulation<D>::LinkFacet(SimplexId fresh, int slot) {
   }
   if (FacesOf(item.vertices, slot) == 0) {
     // Seen from its other side.
-    Open next{item.vertices, slot, fresh, slot};
+    Open next{item.vertices, slot, fresh, slot, sum};
     std::swap(next.vertices[slot == 0 ? 1 : 0], next.vertices[slot <= 1 ? 2 : 1]);
     open_.push_back(next);
   }
+}
+
+template <int D>
+uint64_t Triangulation<D>::SumOf(const std::array<VertexId, D + 1>& vertices, int opposite) {
+  uint64_t sum = 0;
+  for (int i = 0; i <= D; ++i) {
+    sum += i == opposite ? 0 : Index(vertices[i]);
+  }
+  return sum;
 }
 
 template <int D>

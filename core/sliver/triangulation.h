@@ -175,6 +175,7 @@ class Triangulation {
     int slot = 0;
     SimplexId beyond = kNoSimplex;
     int beyond_slot = 0;
+    uint64_t sum = 0;  // of the numbers of the facet's vertices: other facets seldom have the same
   };
   struct Saved {
     SimplexId simplex;
@@ -185,6 +186,8 @@ class Triangulation {
   void Free(SimplexId s);
   void StartSearch();
   void Grow(const Point<D>& p, double weight, FaceMask faces, Cavity& out);
+  // The sum of the numbers of the facet's vertices.
+  static uint64_t SumOf(const std::array<VertexId, D + 1>& vertices, int opposite);
   // The faces of the box that all vertices of the facet lie on.
   FaceMask FacesOf(const std::array<VertexId, D + 1>& vertices, int opposite) const;
   VertexId Wrap(const Open& open, SimplexId fresh);

@@ -63,8 +63,10 @@ void StarLists<D>::Set(VertexId v, const Star<D>& star, uint32_t vertex_count) {
 
 template <int D>
 void StarLists<D>::GiveUp() {
-  Clear();
-  is_complete_ = false;
+  if (is_complete_) {
+    Clear();
+    is_complete_ = false;
+  }
 }
 
 template <int D>
