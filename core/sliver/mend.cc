@@ -25,7 +25,7 @@ constexpr int kMostSamples = 1536;
 constexpr int kLateSamples = 4096;
 // Slivers are looked at again in so many passes at most, and in each at most so many times as many as it began with:
 // every step makes the flattest it touches better, but nothing says by how much in all.
-constexpr int kPasses = 16;
+constexpr int kPasses = 40;
 constexpr int kEarlyPasses = 4;
 constexpr size_t kGrowth = 8;
 constexpr size_t kLeastGrowth = 1000;

@@ -18,10 +18,11 @@ namespace wellspace::core {
 namespace {
 
 // All vertices are pumped once; then, as others' weights have changed, again, as long as it helps, but not more often
-// than this, those whose star has an angle below this part of a regular simplex's.
+// than this, those whose star has an angle below this part of a regular simplex's; and as often those with one below that part.
 template <int D>
 constexpr int kRounds = D == 3 ? 12 : 2;
 constexpr double kPoorShare = 0.25;
+constexpr double kPoorestShare = 0.075;
 // Vertices between two reports of progress.
 constexpr uint32_t kReportInterval = 64;
 
@@ -250,15 +251,16 @@ absl::StatusOr<uint64_t> PumpWeights(Triangulation<D>& triangulation, RunContext
   const uint32_t count = triangulation.vertex_count();
   WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> nearest_sq, triangulation.NearestDistancesSq(context));
   Pump<D> pump(triangulation);
-  for (int round = 0; round < kRounds<D>; ++round) {
+  for (int round = 0; round < 2 * kRounds<D>; ++round) {
+    const double share = round < kRounds<D> ? kPoorShare : kPoorestShare;
     const double poor =
-        round == 0 ? -std::numeric_limits<double>::infinity() : Flatness<D>(kPoorShare * LargestSmallestAngle(D));
+        round == 0 ? -std::numeric_limits<double>::infinity() : Flatness<D>(share * LargestSmallestAngle(D));
     uint64_t changed = 0;
     for (uint32_t v = 0; v < count; ++v) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
       changed += pump.SetBest(VertexId{v}, kMostWeight * nearest_sq[v], poor) ? 1 : 0;
       if (v % kReportInterval == 0) {
-        context.SetPhaseFraction((round + static_cast<double>(v) / count) / kRounds<D>);
+        context.SetPhaseFraction((round + static_cast<double>(v) / count) / (2 * kRounds<D>));
       }
     }
     if (changed == 0) {
