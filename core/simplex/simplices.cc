@@ -22,7 +22,7 @@ namespace {
 // Vertices that make a block, or a few more.
 constexpr size_t kVerticesInBlock = 512;
 // The array of all simplices has room for at most so many times those in it: the first blocks need not be like the others.
-constexpr size_t kMostGrowth = 8;
+constexpr size_t kMostGrowth = 128;
 
 // Joins the simplices of blocks, which come in any order, in that of the blocks, and sees to the memory that they take.
 //
@@ -72,13 +72,13 @@ class BlockJoin {
     ++joined_count_;
     const size_t size = joined_.size() + indices.size();
     if (size > joined_.capacity()) {
-      // As many as there will be if the blocks to come are like these, and a few more: what is not used takes no memory.
+      // As many as there will be if the blocks to come are like these, and a quarter more: what is not used takes no memory.
       Allow(joined_.size());
       if (is_refused_) {
         return;
       }
       const size_t to_come = size / joined_count_ * (block_count_ - joined_count_);
-      joined_.reserve(std::min(kMostGrowth * size, size + to_come + (size + to_come) / 16));
+      joined_.reserve(std::min(kMostGrowth * size, size + to_come + (size + to_come) / 4));
     }
     joined_.insert(joined_.end(), indices.begin(), indices.end());
     Allow(0);
