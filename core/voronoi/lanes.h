@@ -41,18 +41,20 @@ inline VectorUnit BestVectorUnit() { return Has(VectorUnit::kAvx2) ? VectorUnit:
 #define WELLSPACE_AVX2
 #endif
 
-// Doubles in one vector, and what a comparison of them gives: -1 where it holds, else 0.
+// Doubles in one vector, what a comparison of them gives (-1 where it holds, else 0), and as wide a vector of integers of 32 bits.
 template <size_t kWidth>
 struct Wide;
 template <>
 struct Wide<2> {
   using Lanes = double __attribute__((vector_size(16), may_alias));
   using Mask = int64_t __attribute__((vector_size(16), may_alias));
+  using Halves = int32_t __attribute__((vector_size(16), may_alias));
 };
 template <>
 struct Wide<4> {
   using Lanes = double __attribute__((vector_size(32), may_alias));
   using Mask = int64_t __attribute__((vector_size(32), may_alias));
+  using Halves = int32_t __attribute__((vector_size(32), may_alias));
 };
 
 // The items of `column` from `from` on, as one vector.

@@ -10,9 +10,9 @@ namespace {
 
 template <int D, size_t kWidth>
 WELLSPACE_INLINE void Most(std::span<const typename NodeColumns<D>::Group> groups, double slack, double relative_error,
-                           CandidateColumns<D>& candidates) {
+                           size_t begin, Candidates<D>& candidates) {
   using Lanes = typename Wide<kWidth>::Lanes;
-  for (size_t from = 0; from < candidates.count; from += kWidth) {
+  for (size_t from = begin / kWidth * kWidth; from < candidates.count; from += kWidth) {
     Lanes w[D];
     for (int axis = 0; axis < D; ++axis) {
       w[axis] = LanesAt<kWidth>(candidates.w[axis], from);
@@ -61,8 +61,8 @@ WELLSPACE_INLINE bool IsReached(std::span<const typename NodeColumns<D>::Group> 
 
 template <int D>
 WELLSPACE_AVX2 void MostAvx2(std::span<const typename NodeColumns<D>::Group> groups, double slack,
-                             double relative_error, CandidateColumns<D>& candidates) {
-  Most<D, 4>(groups, slack, relative_error, candidates);
+                             double relative_error, size_t begin, Candidates<D>& candidates) {
+  Most<D, 4>(groups, slack, relative_error, begin, candidates);
 }
 
 template <int D>
@@ -74,11 +74,11 @@ WELLSPACE_AVX2 bool IsReachedAvx2(std::span<const typename NodeColumns<D>::Group
 }  // namespace
 
 template <int D>
-void NodeColumns<D>::ComputeMost(double slack, double relative_error, CandidateColumns<D>& candidates) const {
+void NodeColumns<D>::ComputeMost(double slack, double relative_error, size_t begin, Candidates<D>& candidates) const {
   if (unit_ == VectorUnit::kAvx2) {
-    MostAvx2<D>(groups(), slack, relative_error, candidates);
+    MostAvx2<D>(groups(), slack, relative_error, begin, candidates);
   } else {
-    Most<D, 2>(groups(), slack, relative_error, candidates);
+    Most<D, 2>(groups(), slack, relative_error, begin, candidates);
   }
 }
 

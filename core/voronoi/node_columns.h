@@ -10,23 +10,10 @@
 #include <vector>
 
 #include "core/geometry/point.h"
-#include "core/tree/leaf_tree.h"
+#include "core/voronoi/candidates.h"
 #include "core/voronoi/lanes.h"
 
 namespace wellspace::core {
-
-// Vertices of one leaf that may cut a cell, in columns: their vectors from its site.
-template <int D>
-struct alignas(kLanes * sizeof(double)) CandidateColumns {
-  // In one more place a candidate may be written before it is decided whether it counts.
-  static constexpr size_t kCapacity = PaddedCount(LeafTree<D>::kLeafCapacity + 1);
-
-  double w[D][kCapacity];
-  double length_sq[kCapacity];
-  double most[kCapacity];  // of x . w - |w|^2 / 2 + error over the nodes x of the cell, once computed
-  uint32_t slot[kCapacity];
-  size_t count = 0;
-};
 
 // Positions of the nodes of a cell and bounds on their errors by index of the node, in groups that one vector instruction
 // takes. Places of the last group beyond the last node hold a node at the site, which no bisector cuts off.
@@ -94,9 +81,9 @@ class NodeColumns {
 
   uint64_t MemoryBytes() const { return groups_.capacity() * sizeof(Group) + found_.capacity() * sizeof(Found); }
 
-  // Computes `most` of all candidates; `slack` is at least those of the nodes, and a candidate w has the error `slack` |w|
-  // + `relative_error` |w|^2 / 2.
-  void ComputeMost(double slack, double relative_error, CandidateColumns<D>& candidates) const;
+  // Computes `most` of the candidates from `begin` on; `slack` is at least those of the nodes, and a candidate w has the error
+  // `slack` |w| + `relative_error` |w|^2 / 2.
+  void ComputeMost(double slack, double relative_error, size_t begin, Candidates<D>& candidates) const;
 
   // Whether some node x has |p x|^2 <= |x|^2 + doubt, for the point p of the cube [low, high] nearest to it; `low` and `high`
   // are relative to the site.

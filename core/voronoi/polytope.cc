@@ -516,8 +516,8 @@ void Polytope<D>::FindStar(Star<D>& out) const {
 
 // As in Cut, with the largest slack.
 template <int D>
-void Polytope<D>::Foretell(CandidateColumns<D>& candidates) const {
-  columns_.ComputeMost(largest_slack_, kOffsetError<D>, candidates);
+void Polytope<D>::Foretell(size_t begin, Candidates<D>& candidates) const {
+  columns_.ComputeMost(largest_slack_, kOffsetError<D>, begin, candidates);
 }
 
 template <int D>

@@ -13,6 +13,7 @@
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
 #include "core/geometry/power_predicate.h"
+#include "core/voronoi/candidates.h"
 #include "core/voronoi/node_columns.h"
 #include "core/voronoi/star.h"
 
@@ -109,7 +110,11 @@ class Polytope {
   // The same, where more cuts may follow: until Place() is called nodes() may not be asked for.
   bool CutBeforePlace(VertexId u, const Point<D>& position) {
     const Point<D> normal = Difference<D>(position, site_);
-    const double length_sq = NormSq<D>(normal);
+    return CutBeforePlace(u, position, normal, NormSq<D>(normal));
+  }
+
+  // The same, for normal = Difference<D>(position, site()) and length_sq = NormSq<D>(normal).
+  bool CutBeforePlace(VertexId u, const Point<D>& position, const Point<D>& normal, double length_sq) {
     return length_sq <= CutLimitSq() && CutOff(u, position, normal, length_sq);
   }
 
@@ -134,11 +139,11 @@ class Polytope {
   // Errors:     none.
   bool PlaceUnlessKeeps(double ratio);
 
-  // Computes `most` of the candidates, so that those for which it is negative do not cut the cell, now or later.
+  // Computes `most` of the candidates from `begin` on, so that those for which it is negative do not cut the cell, now or later.
   //
   // Complexity: O(nodes) a candidate.
   // Errors:     none.
-  void Foretell(CandidateColumns<D>& candidates) const;
+  void Foretell(size_t begin, Candidates<D>& candidates) const;
 
   // Whether some vertex in `cube` (absolute coordinates) could still cut the cell: whether some node x has dist(x,
   // cube) <= |x - site|, decided generously where rounding leaves a doubt.

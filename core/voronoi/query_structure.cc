@@ -256,7 +256,7 @@ void QueryStructure<D>::ClipAndScan(VertexId v, double radius, TieRule rule, Wor
   std::array<PlaneKind, 2 * D> kinds;
   const Box<D> bounds = ClippedBox<D>(box_, point(v), radius, kinds);
   workspace.cell.Reset(point(v), bounds, kinds, rule);
-  Scan(v, LeafOf(v), workspace);
+  Scan(LeafOf(v), workspace);
 }
 
 template <int D>
@@ -270,18 +270,18 @@ void QueryStructure<D>::Voronoi(VertexId v, Workspace<D>& workspace) const {
   std::array<PlaneKind, 2 * D> kinds;
   kinds.fill(PlaneKind::kClip);
   workspace.cell.Reset(point(v), walls, kinds, TieRule::kPerturb);
-  Scan(v, LeafOf(v), workspace);
+  Scan(LeafOf(v), workspace);
   workspace.cell.Place();
 }
 
-// Cuts workspace.cell, whose site is vertex `v`, by the vertices in the leaves from `own` outward.
+// Cuts workspace.cell, whose site is a vertex in `own`, by the vertices in the leaves from `own` outward.
 template <int D>
-void QueryStructure<D>::Scan(VertexId v, NodeId own, Workspace<D>& workspace) const {
+void QueryStructure<D>::Scan(NodeId own, Workspace<D>& workspace) const {
   ScanOutward(
       workspace.cell.site(), own, workspace,
       [&] { return workspace.cell.IsTooLarge() ? -1 : workspace.cell.CutLimitSq(); },
       [&](NodeId leaf) { return workspace.cell.Reaches(tree_.BoxOf(leaf)); },
-      [&](NodeId leaf) { CutByLeaf(v, leaf, workspace); });
+      [&](NodeId leaf) { CutByLeaf(leaf, workspace); });
   CountCuts(workspace);
 }
 
@@ -294,56 +294,37 @@ void QueryStructure<D>::CountCuts(Workspace<D>& workspace) {
 
 // Cuts the cell by the vertices of a leaf, the nearest first: far ones then seldom cut.
 template <int D>
-void QueryStructure<D>::CutByLeaf(VertexId v, NodeId leaf, Workspace<D>& workspace) const {
+void QueryStructure<D>::CutByLeaf(NodeId leaf, Workspace<D>& workspace) const {
   const auto* bucket = tree_.BucketOf(leaf);
   if (bucket == nullptr) {
     return;
   }
   workspace.counters.vertices += bucket->count;
   Polytope<D>& cell = workspace.cell;
-  const Point<D> site = cell.site();
-  const double limit_sq = cell.CutLimitSq();
-  auto& near = workspace.near;
-  size_t count = 0;
-  for (uint32_t i = 0; i < bucket->count; ++i) {
-    const Point<D> w = Difference<D>(bucket->positions[i], site);
-    const double length_sq = NormSq<D>(w);
-    for (int axis = 0; axis < D; ++axis) {
-      near.w[axis][count] = w[axis];
-    }
-    near.length_sq[count] = length_sq;
-    near.slot[count] = i;
-    // No branch, since none could be foretold.
-    count += static_cast<size_t>(length_sq <= limit_sq) & static_cast<size_t>(bucket->ids[i] != v);
+  Candidates<D>& near = workspace.near;
+  near.Pick({bucket->positions, bucket->count}, cell.site(), cell.CutLimitSq());
+  if (cell.cuts() != 0) {
+    cell.Foretell(0, near);
+    near.DropThoseThatMiss(0);
   }
-  near.count = count;
-  auto& may_cut = workspace.may_cut;
-  const bool has_looked = cell.cuts() != 0;
-  if (has_looked) {
-    cell.Foretell(near);
+  if (near.count > 1) {
+    workspace.sorted.Sort(near);
   }
-  size_t left = 0;
-  for (uint32_t i = 0; i < count; ++i) {
-    may_cut.length_sq[left] = near.length_sq[i];
-    may_cut.candidate[left] = i;
-    left += !has_looked || near.most[i] >= 0 ? 1 : 0;
-  }
-  OrderByDistance(may_cut.length_sq, left, may_cut.order);
+  Candidates<D>& left = near.count > 1 ? workspace.sorted : near;
   int cuts = 0;
-  bool is_foretold = false;
-  for (size_t j = 0; j < left; ++j) {
-    const uint32_t i = may_cut.candidate[may_cut.order[j]];
-    if (is_foretold && near.most[i] < 0) {
-      continue;
-    }
-    if (near.length_sq[i] > cell.CutLimitSq() || cell.IsTooLarge()) {
+  for (size_t j = 0; j < left.count; ++j) {
+    if (cell.IsTooLarge()) {
       break;
     }
-    const uint32_t slot = near.slot[i];
-    if (cell.CutBeforePlace(bucket->ids[slot], bucket->positions[slot]) && ++cuts % kCutsBetweenLooks == 0 &&
-        left - j > kCutsBetweenLooks) {
-      cell.Foretell(near);
-      is_foretold = true;
+    Point<D> w;
+    for (int axis = 0; axis < D; ++axis) {
+      w[axis] = left.w[axis][j];
+    }
+    const auto slot = left.slot[j];
+    if (cell.CutBeforePlace(bucket->ids[slot], bucket->positions[slot], w, left.length_sq[j]) &&
+        ++cuts % kCutsBetweenLooks == 0 && left.count - j > kCutsBetweenLooks) {
+      cell.Foretell(j + 1, left);
+      left.DropThoseThatMiss(j + 1);
     }
   }
 }

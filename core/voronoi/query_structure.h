@@ -14,10 +14,8 @@
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
 #include "core/tree/leaf_tree.h"
-#include "core/voronoi/lanes.h"
+#include "core/voronoi/candidates.h"
 #include "core/voronoi/leaf_queue.h"
-#include "core/voronoi/nearness.h"
-#include "core/voronoi/node_columns.h"
 #include "core/voronoi/polytope.h"
 
 namespace wellspace::core {
@@ -44,12 +42,8 @@ struct Workspace {
   uint32_t query = 0;
   LeafQueue queue;
   // Of the leaf that is opened.
-  CandidateColumns<D> near;
-  struct alignas(kLanes * sizeof(double)) MayCut {
-    double length_sq[CandidateColumns<D>::kCapacity];
-    uint32_t candidate[CandidateColumns<D>::kCapacity];
-    uint32_t order[CandidateColumns<D>::kCapacity];  // the nearest first
-  } may_cut;
+  Candidates<D> near;
+  Candidates<D> sorted;
 };
 
 struct Neighbor {
@@ -184,8 +178,8 @@ class QueryStructure {
                    Open open) const;
   Neighbor Nearest(const Point<D>& p, NodeId leaf, VertexId but, double limit_sq, Workspace<D>& workspace) const;
   void ClipAndScan(VertexId v, double radius, TieRule rule, Workspace<D>& workspace) const;
-  void Scan(VertexId v, NodeId own, Workspace<D>& workspace) const;
-  void CutByLeaf(VertexId v, NodeId leaf, Workspace<D>& workspace) const;
+  void Scan(NodeId own, Workspace<D>& workspace) const;
+  void CutByLeaf(NodeId leaf, Workspace<D>& workspace) const;
   static void CountCuts(Workspace<D>& workspace);
 
   Box<D> box_;

@@ -8,10 +8,9 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <numeric>
 #include <vector>
 
-#include "core/voronoi/nearness.h"
+#include "core/voronoi/candidates.h"
 #include "core/voronoi/node_columns.h"
 #include "core/voronoi/polytope.h"
 #include "tests/support/clouds.h"
@@ -41,32 +40,6 @@ Point<D> DrawPoint(SplitMix64& random) {
     x = Draw(random);
   }
   return p;
-}
-
-class NearnessTest : public test::SeededTest {
- protected:
-  NearnessTest() : SeededTest(1966) {}
-};
-
-TEST_F(NearnessTest, OrdersByDistanceAndThenByNumber) {
-  alignas(kLanes * sizeof(double)) std::array<double, 204> distances;
-  for (const VectorUnit unit : Units()) {
-    for (size_t count = 0; count <= 200; ++count) {
-      // Few values: many are equal.
-      const uint64_t values = 1 + random_.Below(2 * count + 1);
-      for (double& distance : distances) {
-        distance = static_cast<double>(random_.Below(values));
-      }
-      std::vector<uint32_t> expected(count);
-      std::iota(expected.begin(), expected.end(), 0);
-      std::stable_sort(expected.begin(), expected.end(),
-                       [&](uint32_t a, uint32_t b) { return distances[a] < distances[b]; });
-      std::vector<uint32_t> order(count + 1);
-      OrderByDistance(distances.data(), count, order.data(), unit);
-      order.resize(count);
-      ASSERT_EQ(order, expected);
-    }
-  }
 }
 
 // What the processor is asked for only where it has it.
@@ -114,7 +87,7 @@ TYPED_TEST(LanesTest, EveryUnitComputesTheSame) {
     EXPECT_EQ(wide_largest.radius_sq, radius_sq);
     EXPECT_EQ(narrow_largest.slack, slack);
     EXPECT_EQ(wide_largest.slack, slack);
-    CandidateColumns<D> candidates;
+    Candidates<D> candidates;
     candidates.count = 11;
     for (size_t j = 0; j < candidates.count; ++j) {
       const Point<D> normal = DrawPoint<D>(random);
@@ -142,9 +115,9 @@ TYPED_TEST(LanesTest, EveryUnitComputesTheSame) {
       }
       ASSERT_EQ(baseline.Reaches(low, high, 1e-3), wide.Reaches(low, high, 1e-3));
     }
-    CandidateColumns<D> same = candidates;
-    baseline.ComputeMost(slack, 1e-9, candidates);
-    wide.ComputeMost(slack, 1e-9, same);
+    Candidates<D> same = candidates;
+    baseline.ComputeMost(slack, 1e-9, 0, candidates);
+    wide.ComputeMost(slack, 1e-9, 0, same);
     EXPECT_TRUE(std::equal(candidates.most, candidates.most + candidates.count, same.most));
   }
 }
@@ -159,7 +132,7 @@ TYPED_TEST(LanesTest, WhoIsForetoldNotToCutDoesNot) {
   std::array<PlaneKind, 2 * D> kinds;
   kinds.fill(PlaneKind::kFace);
   Polytope<D> cell;
-  CandidateColumns<D> candidates;
+  Candidates<D> candidates;
   uint32_t next = 0;
   int idle = 0;
   int cutting = 0;
@@ -179,7 +152,7 @@ TYPED_TEST(LanesTest, WhoIsForetoldNotToCutDoesNot) {
       }
       candidates.length_sq[j] = NormSq<D>(w);
     }
-    cell.Foretell(candidates);
+    cell.Foretell(0, candidates);
     for (size_t j = 0; j < candidates.count; ++j) {
       const bool has_cut = cell.Cut(VertexId{next++}, points[j]);
       ASSERT_TRUE(!has_cut || candidates.most[j] >= 0);
@@ -189,6 +162,130 @@ TYPED_TEST(LanesTest, WhoIsForetoldNotToCutDoesNot) {
   }
   EXPECT_GT(idle, 0);
   EXPECT_GT(cutting, 0);
+}
+
+template <typename T>
+class CandidatesTest : public test::SeededTest {
+ protected:
+  CandidatesTest() : SeededTest(1966) {}
+
+  // Candidates for a site, as many as are to be had, at few distances: many are equal.
+  static Candidates<T::kValue> DrawCandidates(size_t count, SplitMix64& random) {
+    Candidates<T::kValue> drawn;
+    drawn.count = count;
+    const uint64_t values = 1 + random.Below(2 * count + 1);
+    for (size_t i = 0; i < count; ++i) {
+      for (auto& column : drawn.w) {
+        column[i] = Draw(random);
+      }
+      drawn.length_sq[i] = static_cast<double>(random.Below(values));
+      drawn.most[i] = Draw(random);
+      drawn.slot[i] = i;
+    }
+    return drawn;
+  }
+
+  // Candidate i of one is candidate j of the other.
+  static bool IsSame(const Candidates<T::kValue>& a, size_t i, const Candidates<T::kValue>& b, size_t j) {
+    bool is_same = a.length_sq[i] == b.length_sq[j] && a.slot[i] == b.slot[j];
+    for (int axis = 0; axis < T::kValue; ++axis) {
+      is_same &= a.w[axis][i] == b.w[axis][j];
+    }
+    return is_same;
+  }
+};
+TYPED_TEST_SUITE(CandidatesTest, test::AllDimensions);
+
+TYPED_TEST(CandidatesTest, ArePickedWithinTheLimitButNotAtTheSite) {
+  constexpr int D = TypeParam::kValue;
+  SplitMix64& random = this->random_;
+  Candidates<D> picked;
+  for (const VectorUnit unit : Units()) {
+    for (size_t count = 0; count <= LeafTree<D>::kLeafCapacity; count += count < 40 ? 1 : 19) {
+      const Point<D> site = DrawPoint<D>(random);
+      std::vector<Point<D>> positions(count);
+      for (Point<D>& p : positions) {
+        p = random.Below(8) == 0 ? site : DrawPoint<D>(random);
+      }
+      // Often the very distance of one.
+      const double limit_sq = count == 0 ? 1 : DistanceSq<D>(positions[random.Below(count)], site);
+      picked.Pick(positions, site, limit_sq, unit);
+      size_t expected = 0;
+      for (size_t i = 0; i < count; ++i) {
+        const Point<D> w = Difference<D>(positions[i], site);
+        if (positions[i] == site || NormSq<D>(w) > limit_sq) {
+          continue;
+        }
+        ASSERT_LT(expected, picked.count);
+        ASSERT_EQ(picked.slot[expected], i);
+        ASSERT_EQ(picked.length_sq[expected], NormSq<D>(w));
+        for (int axis = 0; axis < D; ++axis) {
+          ASSERT_EQ(picked.w[axis][expected], w[axis]);
+        }
+        ++expected;
+      }
+      ASSERT_EQ(picked.count, expected);
+    }
+  }
+}
+
+// A neighbour may be so near that the square of its distance is 0.
+TYPED_TEST(CandidatesTest, ThatAreVeryNearAreNotTheSite) {
+  constexpr int D = TypeParam::kValue;
+  Point<D> near{};
+  near[D - 1] = 1e-200;
+  const std::vector<Point<D>> positions = {Point<D>{}, near};
+  Candidates<D> picked;
+  for (const VectorUnit unit : Units()) {
+    picked.Pick(positions, Point<D>{}, 1, unit);
+    ASSERT_EQ(picked.count, 1u);
+    EXPECT_EQ(picked.slot[0], 1u);
+  }
+}
+
+TYPED_TEST(CandidatesTest, AreDroppedIfTheyMiss) {
+  constexpr int D = TypeParam::kValue;
+  SplitMix64& random = this->random_;
+  for (const VectorUnit unit : Units()) {
+    for (size_t count = 0; count <= LeafTree<D>::kLeafCapacity; count += count < 40 ? 1 : 19) {
+      const Candidates<D> all = this->DrawCandidates(count, random);
+      const size_t begin = random.Below(count + 1);
+      Candidates<D> left = all;
+      left.DropThoseThatMiss(begin, unit);
+      size_t expected = 0;
+      for (size_t i = 0; i < count; ++i) {
+        if (i < begin || all.most[i] >= 0) {
+          ASSERT_LT(expected, left.count);
+          ASSERT_TRUE(this->IsSame(left, expected++, all, i));
+        }
+      }
+      ASSERT_EQ(left.count, expected);
+    }
+  }
+}
+
+TYPED_TEST(CandidatesTest, AreSortedByDistance) {
+  constexpr int D = TypeParam::kValue;
+  SplitMix64& random = this->random_;
+  Candidates<D> sorted;
+  for (const VectorUnit unit : Units()) {
+    for (size_t count = 0; count <= LeafTree<D>::kLeafCapacity; count += count < 70 ? 1 : 19) {
+      const Candidates<D> all = this->DrawCandidates(count, random);
+      sorted.Sort(all, unit);
+      ASSERT_EQ(sorted.count, count);
+      std::vector<bool> has_come(count, false);
+      for (size_t j = 0; j < count; ++j) {
+        const size_t i = sorted.slot[j];
+        ASSERT_LT(i, count);
+        ASSERT_FALSE(has_come[i]);
+        has_come[i] = true;
+        ASSERT_TRUE(this->IsSame(sorted, j, all, i));
+        if (j > 0) {
+          ASSERT_LE(sorted.length_sq[j - 1], sorted.length_sq[j] * (1 + 0x1p-13));
+        }
+      }
+    }
+  }
 }
 
 }  // namespace
