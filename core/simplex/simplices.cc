@@ -186,13 +186,6 @@ class LeafBlocks {
   std::vector<size_t> begin_;   // by block, in leaves_; one more
 };
 
-// What is held besides the simplices; of the scratch space, what every thread has for each node.
-template <int D>
-uint64_t HeldBytes(const QueryStructure<D>& structure, std::span<const uint32_t> output_index, int threads) {
-  return structure.MemoryBytes() + output_index.size_bytes() +
-         static_cast<uint64_t>(ThreadTeam(threads).threads()) * structure.tree().node_count() * sizeof(uint32_t);
-}
-
 // Appends the simplex of `v` and `others`.
 template <int D>
 void AppendSimplex(const QueryStructure<D>& structure, VertexId v, const std::array<VertexId, D>& others,
@@ -226,6 +219,27 @@ void AppendCell(const QueryStructure<D>& structure, VertexId v, std::span<const 
       AppendSimplex<D>(structure, v, others, output_index, out);
     }
   }
+}
+
+// The simplices of the cells of all vertices in `block_count` blocks whose other vertices are wanted: for_each_vertex_of(block, f) calls
+// f(VertexId). `more_bytes`: what is held besides the structure and `output_index`.
+template <int D, typename ForEachVertexOf, typename IsWanted>
+absl::StatusOr<Simplices> JoinCells(const QueryStructure<D>& structure, std::span<const uint32_t> output_index,
+                                    size_t block_count, uint64_t more_bytes, int threads, RunContext& context,
+                                    ForEachVertexOf for_each_vertex_of, IsWanted is_wanted) {
+  const auto append = [&](size_t block, Workspace<D>& workspace, SimplexList<D>& out) {
+    for_each_vertex_of(block, [&](VertexId v) {
+      structure.Voronoi(v, workspace);
+      AppendCell<D>(structure, v, output_index, workspace, is_wanted, out);
+    });
+  };
+  // Of the scratch space, what every thread has for each node.
+  const uint64_t seen_bytes =
+      static_cast<uint64_t>(ThreadTeam(threads).threads()) * structure.tree().node_count() * sizeof(uint32_t);
+  return JoinBlocks<D, Workspace<D>>(
+      block_count, structure.MemoryBytes() + output_index.size_bytes() + seen_bytes + more_bytes, threads, context,
+      append, [](const Workspace<D>&) { return uint64_t{0}; },
+      [](const Workspace<D>& workspace) { return workspace.counters; });
 }
 
 // The simplices at one vertex after the other, of those that are listed there the ones that are in the mesh: the vertex is the last
@@ -315,20 +329,13 @@ absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, c
                                            std::span<const uint32_t> output_index, int threads, RunContext& context) {
   const LeafBlocks<D> blocks(structure.tree());
   if (!stars.IsComplete()) {
-    const auto append = [&](size_t block, Workspace<D>& workspace, SimplexList<D>& out) {
-      blocks.ForEachVertexOf(block, context, [&](VertexId v) {
-        structure.Voronoi(v, workspace);
-        AppendCell<D>(
-            structure, v, output_index, workspace, [](VertexId) { return true; }, out);
-      });
-    };
-    return JoinBlocks<D, Workspace<D>>(
-        blocks.count(), HeldBytes<D>(structure, output_index, threads) + blocks.MemoryBytes(), threads, context, append,
-        [](const Workspace<D>&) { return uint64_t{0}; },
-        [](const Workspace<D>& workspace) { return workspace.counters; });
+    const auto for_each_vertex_of = [&](size_t block, auto f) { blocks.ForEachVertexOf(block, context, f); };
+    return JoinCells<D>(structure, output_index, blocks.count(), blocks.MemoryBytes(), threads, context,
+                        for_each_vertex_of, [](VertexId) { return true; });
   }
-  WELLSPACE_RETURN_IF_ERROR(
-      context.AllowMemory(structure.MemoryBytes() + stars.MemoryBytes() + output_index.size_bytes()));
+  const uint64_t held_bytes =
+      structure.MemoryBytes() + output_index.size_bytes() + stars.MemoryBytes() + blocks.MemoryBytes();
+  WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(held_bytes));
   WELLSPACE_ASSIGN_OR_RETURN(const LateNeighbours late,
                              LateNeighbours::Of(stars, structure.vertex_count(), threads, context));
   using Listed = std::optional<ListedSimplices<D>>;
@@ -339,10 +346,8 @@ absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, c
     blocks.ForEachVertexOf(block, context, [&](VertexId v) { listed->Append(v, out); });
   };
   return JoinBlocks<D, Listed>(
-      blocks.count(),
-      structure.MemoryBytes() + stars.MemoryBytes() + late.MemoryBytes() + output_index.size_bytes() +
-          blocks.MemoryBytes(),
-      threads, context, append, [](const Listed& listed) { return listed->MemoryBytes(); },
+      blocks.count(), held_bytes + late.MemoryBytes(), threads, context, append,
+      [](const Listed& listed) { return listed->MemoryBytes(); },
       [](const Listed& listed) { return listed->counters(); });
 }
 
@@ -380,21 +385,18 @@ absl::StatusOr<Simplices> ComputeSimplicesAmong(const QueryStructure<D>& structu
   for (const VertexId v : vertices) {
     is_among[Index(v)] = true;
   }
-  const auto append = [&](size_t block, Workspace<D>& workspace, SimplexList<D>& out) {
+  const auto for_each_vertex_of = [&](size_t block, auto f) {
     const size_t begin = block * kVerticesInBlock;
     for (const VertexId v : vertices.subspan(begin, std::min(kVerticesInBlock, vertices.size() - begin))) {
       if (context.IsCancelled()) {
         return;
       }
-      structure.Voronoi(v, workspace);
-      AppendCell<D>(
-          structure, v, output_index, workspace, [&](VertexId u) { return is_among[Index(u)]; }, out);
+      f(v);
     }
   };
-  return JoinBlocks<D, Workspace<D>>((vertices.size() + kVerticesInBlock - 1) / kVerticesInBlock,
-                                     HeldBytes<D>(structure, output_index, threads) + vertices.size_bytes(), threads,
-                                     context, append, [](const Workspace<D>&) { return uint64_t{0}; },
-                                     [](const Workspace<D>& workspace) { return workspace.counters; });
+  return JoinCells<D>(structure, output_index, (vertices.size() + kVerticesInBlock - 1) / kVerticesInBlock,
+                      vertices.size_bytes(), threads, context, for_each_vertex_of,
+                      [&](VertexId u) { return is_among[Index(u)]; });
 }
 
 #define WELLSPACE_INSTANTIATE(D)                                                                                   \
