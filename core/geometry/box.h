@@ -75,13 +75,18 @@ struct Box {
   }
 };
 
+// The square of x where that is positive, else 0; no branch, since none could be foretold.
+inline double PositivePartSq(double x) {
+  const double twice = x + std::abs(x);
+  return 0.25 * twice * twice;
+}
+
 // The squared distance between a point and a box.
 template <int D>
 inline double DistanceSq(const Point<D>& p, const Box<D>& box) {
   double sum = 0;
   for (int i = 0; i < D; ++i) {
-    const double gap = std::max({box.low[i] - p[i], 0.0, p[i] - box.high[i]});
-    sum += gap * gap;
+    sum += PositivePartSq(std::max(box.low[i] - p[i], p[i] - box.high[i]));
   }
   return sum;
 }
@@ -91,8 +96,7 @@ template <int D>
 inline double DistanceSq(const Box<D>& a, const Box<D>& b) {
   double sum = 0;
   for (int i = 0; i < D; ++i) {
-    const double gap = std::max({a.low[i] - b.high[i], 0.0, b.low[i] - a.high[i]});
-    sum += gap * gap;
+    sum += PositivePartSq(std::max(a.low[i] - b.high[i], b.low[i] - a.high[i]));
   }
   return sum;
 }

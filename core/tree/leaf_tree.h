@@ -149,9 +149,11 @@ class LeafTree {
       }
       const int axis = face / 2;
       const int facing = face % 2 == 0 ? 1 : 0;
-      for (int child = 0; child < kChildren; ++child) {
-        const NodeId id = Child(other, child);
-        if (((child >> axis) & 1) == facing && !At(id).outside) {
+      for (int i = 0; i < kChildren / 2; ++i) {
+        // The bits of i with that of the axis put in.
+        const int above = i >> axis;
+        const NodeId id = Child(other, i + (above << axis) + (facing << axis));
+        if (!At(id).outside) {
           f(id);
         }
       }

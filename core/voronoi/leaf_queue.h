@@ -51,11 +51,13 @@ class LeafQueue {
   // Complexity: O(1), without a branch, since none could be foretold.
   void PushIf(bool counts, double distance_sq, NodeId leaf) {
     const auto at = static_cast<size_t>(std::clamp<int64_t>(Class(distance_sq) - base_, 0, kClasses - 1));
+    const uint32_t one = counts ? 1 : 0;
+    const uint32_t last = last_[at];
     entries_[end_] = {distance_sq, leaf, 0};
-    entries_[last_[at]].next = end_;
-    last_[at] = counts ? end_ : last_[at];
-    waiting_ |= uint32_t{counts} << at;
-    end_ += counts ? 1 : 0;
+    entries_[last].next = end_;
+    last_[at] = last ^ ((last ^ end_) & -one);
+    waiting_ |= one << at;
+    end_ += one;
   }
 
   // Takes the first of the nearest class.
