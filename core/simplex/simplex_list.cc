@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/base/dimensions.h"
+#include "core/base/sort_few.h"
 #include "core/geometry/point.h"
 #include "core/simplex/quality.h"
 
@@ -27,22 +28,14 @@ constexpr double kRightDet = 0x1p-40;
 template <int D>
 void SimplexList<D>::Add(const Simplex<D>& points, const std::array<uint32_t, D + 1>& indices) {
   const Glance glance = LookAt(points);
-  // By exchanges without branches, since none could be foretold; each turns the orientation.
   std::array<uint32_t, D + 1> sorted = indices;
-  bool is_turned = false;
-  for (int last = D; last > 0; --last) {
-    for (int i = 0; i < last; ++i) {
-      const uint32_t low = std::min(sorted[i], sorted[i + 1]);
-      const uint32_t high = std::max(sorted[i], sorted[i + 1]);
-      is_turned ^= low != sorted[i];
-      sorted[i] = low;
-      sorted[i + 1] = high;
-    }
-  }
+  const bool is_turned = SortFew(sorted);  // each exchange turns the orientation
   const Sign orientation = glance.orientation != Sign::kZero ? glance.orientation : Orientation<D>(points).sign;
-  if (is_turned == (orientation == Sign::kPositive)) {
-    std::swap(sorted[D - 1], sorted[D]);
-  }
+  // No branch, since none could be foretold.
+  const uint32_t exchanged =
+      (sorted[D - 1] ^ sorted[D]) & -static_cast<uint32_t>(is_turned == (orientation == Sign::kPositive));
+  sorted[D - 1] ^= exchanged;
+  sorted[D] ^= exchanged;
   indices_.insert(indices_.end(), sorted.begin(), sorted.end());
   if (!glance.is_clearly_better) {
     Measure(points, indices);

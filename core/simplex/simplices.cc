@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/base/dimensions.h"
+#include "core/base/sort_few.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
 #include "core/simplex/simplex_list.h"
@@ -267,7 +268,7 @@ class ListedSimplices {
         is_last &= stars_.WasLookedAtBefore(u, v);
       }
       if (is_last && !IsSpoiled(v, row, late)) {
-        std::sort(row.begin(), row.end());
+        SortFew(row);
         rows_.push_back(row);
       }
     }

@@ -67,10 +67,11 @@ class LeafQueue {
   Entry Pop() {
     const auto at = static_cast<uint32_t>(std::countr_zero(waiting_));
     const uint32_t first = entries_[at].next;
-    const bool was_last = last_[at] == first;
+    const uint32_t last = last_[at];
+    const uint32_t was_last = last == first ? 1 : 0;
     entries_[at].next = entries_[first].next;
-    last_[at] = was_last ? at : last_[at];
-    waiting_ ^= uint32_t{was_last} << at;
+    last_[at] = last ^ ((last ^ at) & -was_last);
+    waiting_ ^= was_last << at;
     return entries_[first];
   }
 

@@ -33,13 +33,14 @@ void Polytope<D>::Reset(const Point<D>& site, const Box<D>& bounds, const std::a
   rule_ = rule;
   cuts_ = 0;
   counters_ = {};
-  planes_.assign(2 * D, {});
+  planes_.resize(std::max<size_t>(planes_.size(), 2 * D));
+  plane_count_ = 2 * D;
   for (int face = 0; face < 2 * D; ++face) {
     const int axis = face / 2;
     Plane<D>& plane = planes_[face];
+    plane = {};
     plane.kind = kinds[face];
     plane.face = static_cast<uint8_t>(face);
-    plane.normal = {};
     plane.normal[axis] = 1;
     plane.length = 1;
     plane.source.axis = axis;
@@ -74,6 +75,7 @@ void Polytope<D>::Swap(Polytope& other) noexcept {
   std::swap(largest_slack_, other.largest_slack_);
   std::swap(is_placed_, other.is_placed_);
   planes_.swap(other.planes_);
+  std::swap(plane_count_, other.plane_count_);
   std::swap(columns_, other.columns_);
   joints_.swap(other.joints_);
   nodes_.swap(other.nodes_);
@@ -106,24 +108,30 @@ WELLSPACE_INLINE bool Polytope<D>::CutOffWith(VertexId u, const Point<D>& positi
   if (!columns_.template ComputeExcesses<kWidth>(normal, offset, length, kOffsetError<D> * offset)) {
     return false;
   }
-  FindRemoved(position);
-  if (removed_count_ == 0) {
+  if (!DecideDoubtful(position)) {
     return false;
   }
   ++cuts_;
   is_placed_ = false;
-  const auto index = static_cast<uint16_t>(planes_.size());
-  Plane<D>& plane = planes_.emplace_back();
+  const auto index = static_cast<uint16_t>(plane_count_++);
+  if (planes_.size() < plane_count_) {
+    planes_.resize(2 * plane_count_);
+  }
+  Plane<D>& plane = planes_[index];
+  plane.kind = PlaneKind::kBisector;
   plane.vertex = u;
   plane.normal = normal;
   plane.offset = offset;
   plane.length = length;
   plane.distance = 0.5 * length;
   plane.source.generator = position;
+  plane.source.axis = -1;
   FindCutEdges(index);
   PlaceCutEdges(plane);
   MakeNewNodes();
-  LinkNewNodes();
+  if constexpr (D != 3) {
+    LinkNewNodes();
+  }
   if (cut_count_ < removed_count_) {
     FillHoles(cut_count_);
   }
@@ -144,51 +152,58 @@ bool Polytope<D>::IsCutOff(const Joint& node, const Point<D>& generator) {
   return decision.sign == Sign::kPositive;
 }
 
-// Decides what the excesses leave in doubt, and lists what is cut off.
+// Decides what the excesses leave in doubt. Returns whether anything is cut off.
 template <int D>
-WELLSPACE_INLINE void Polytope<D>::FindRemoved(const Point<D>& generator) {
-  if (removed_.size() < columns_.count()) {
-    removed_.resize(2 * columns_.count());
-  }
-  Index* const begin = removed_.data();
-  Index* end = begin;
+WELLSPACE_INLINE bool Polytope<D>::DecideDoubtful(const Point<D>& generator) {
   size_t first = 0;  // node of the word
+  uint64_t any = 0;
   for (auto& found : columns_.found()) {
     for (uint64_t doubtful = found.maybe & ~found.surely; doubtful != 0; doubtful &= doubtful - 1) {
       if (IsCutOff(joints_[first + std::countr_zero(doubtful)], generator)) {
         found.surely |= doubtful & -doubtful;
       }
     }
-    for (uint64_t removed = found.surely; removed != 0; removed &= removed - 1) {
-      *end++ = static_cast<Index>(first + std::countr_zero(removed));
-    }
+    any |= found.surely;
     first += NodeColumns<D>::kWordBits;
   }
-  removed_count_ = static_cast<size_t>(end - begin);
+  return any != 0;
 }
 
+// Lists the nodes that are cut off, and the edges from those to others.
 template <int D>
 WELLSPACE_INLINE void Polytope<D>::FindCutEdges(uint16_t plane) {
+  const auto found = columns_.found();
+  removed_count_ = 0;
+  for (const auto& word : found) {
+    removed_count_ += static_cast<size_t>(std::popcount(word.surely));
+  }
   if (cut_edges_.size() < removed_count_ * D) {
+    removed_.resize(2 * removed_count_ * D);
     cut_edges_.resize(2 * removed_count_ * D);
   }
-  const auto* const found = columns_.found().data();
+  Index* end = removed_.data();
   CutEdge* edge = cut_edges_.data();
-  for (size_t j = 0; j < removed_count_; ++j) {
-    const Joint& joint = joints_[removed_[j]];
-    for (int k = 0; k < D; ++k) {
-      // No branch, since none could be foretold: about half of the neighbours are kept.
-      edge->kept = joint.ends[k];
-      edge->removed = removed_[j];
-      for (int i = 0; i < D - 1; ++i) {
-        edge->planes[i] = joint.planes[i + (i >= k ? 1 : 0)];
+  size_t first = 0;  // node of the word
+  for (const auto& word : found) {
+    for (uint64_t removed = word.surely; removed != 0; removed &= removed - 1) {
+      const auto index = static_cast<Index>(first + std::countr_zero(removed));
+      const Joint& joint = joints_[index];
+      *end++ = index;
+      for (int k = 0; k < D; ++k) {
+        // No branch, since none could be foretold: about half of the neighbours are kept.
+        edge->kept = joint.ends[k];
+        edge->removed = index;
+        for (int i = 0; i < D - 1; ++i) {
+          edge->planes[i] = joint.planes[i + (i >= k ? 1 : 0)];
+        }
+        edge->planes[D - 1] = plane;
+        const size_t node = NodeOf(joint.ends[k]);
+        const uint64_t is_removed =
+            found[node / NodeColumns<D>::kWordBits].surely >> node % NodeColumns<D>::kWordBits & 1;
+        edge += 1 - is_removed;
       }
-      edge->planes[D - 1] = plane;
-      const size_t node = NodeOf(joint.ends[k]);
-      const uint64_t is_removed =
-          found[node / NodeColumns<D>::kWordBits].surely >> node % NodeColumns<D>::kWordBits & 1;
-      edge += 1 - is_removed;
     }
+    first += NodeColumns<D>::kWordBits;
   }
   cut_count_ = static_cast<size_t>(edge - cut_edges_.data());
 }
@@ -245,30 +260,54 @@ WELLSPACE_INLINE void Polytope<D>::MakeNewNodes() {
     new_.resize(2 * cut_count_);
   }
   const size_t old = columns_.count();
-  const size_t replaced = std::min(cut_count_, removed_count_);
-  for (size_t j = 0; j < replaced; ++j) {
-    new_[j] = removed_[j];
-  }
-  if (cut_count_ > replaced) {
-    columns_.Resize(old + cut_count_ - replaced);
+  if (cut_count_ > removed_count_) {
+    columns_.Resize(old + cut_count_ - removed_count_);
     if (joints_.size() < columns_.count()) {
       joints_.resize(2 * columns_.count());
     }
-    for (size_t j = replaced; j < cut_count_; ++j) {
-      new_[j] = static_cast<Index>(old + j - replaced);
-    }
+  }
+  if (D == 3 && ends_.size() < plane_count_) {
+    ends_.resize(2 * plane_count_, 0);
   }
   Joint* const joints = joints_.data();
+  size_t joined = 0;
   for (size_t j = 0; j < cut_count_; ++j) {
     const CutEdge& edge = cut_edges_[j];
-    const Index index = new_[j];
+    // No branch, since none could be foretold.
+    const size_t added = old + j - removed_count_;
+    const size_t index = added ^ ((added ^ removed_[j]) & -static_cast<size_t>(j < removed_count_));
+    new_[j] = static_cast<Index>(index);
     Joint& joint = joints[index];
     joint.planes = edge.planes;
     joint.ends[D - 1] = edge.kept;
     joint.is_placed = false;
     joints[NodeOf(edge.kept)].ends[SlotOf(edge.kept)] = EndAt(index, D - 1);
     columns_.Set(index, edge.x, edge.slack);
+    if constexpr (D == 3) {
+      joined += Link(index, edge.planes);
+    }
   }
+  if (D == 3 && joined != cut_count_) {
+    std::abort();
+  }
+}
+
+// Joins the edges of a new node along the new facet to those that wait for them, and has them wait if none does; returns
+// how many were joined. The edge that leaves planes[slot] runs along the other of planes[0] and planes[1]. No branch,
+// since none could be foretold.
+template <int D>
+WELLSPACE_INLINE size_t Polytope<D>::Link(size_t node, const std::array<uint16_t, D>& planes) {
+  size_t joined = 0;
+  for (uint32_t slot = 0; slot < 2; ++slot) {
+    const End end = EndAt(node, slot);
+    uint32_t& waiting = ends_[planes[1 - slot]];
+    const uint32_t is_joined = waiting != 0 ? 1 : 0;
+    const End other = end ^ ((end ^ (waiting - 1)) & -is_joined);  // itself, if none waits
+    Join(end, other);
+    waiting = (end + 1) & (is_joined - 1);
+    joined += is_joined;
+  }
+  return joined;
 }
 
 // Moves nodes from the end into the places of those removed nodes that have not been `filled` by new ones.
@@ -398,38 +437,6 @@ WELLSPACE_INLINE void Polytope<D>::LinkNewNodes() {
       std::abort();
     }
     Join(EndAt(new_[0], 0), EndAt(new_[1], 0));
-  } else if constexpr (D == 3) {
-    // The edge that leaves planes[slot] runs along the other of planes[0] and planes[1], where its ends meet: each finds
-    // the other in what both leave there. No branch, since none could be foretold.
-    if (ends_.size() < planes_.size()) {
-      ends_.resize(2 * planes_.size(), 0);
-    }
-    uint32_t* const ends = ends_.data();
-    const auto code = [this](size_t j, uint32_t slot) { return EndAt(new_[j], slot) + 1; };
-    for (size_t j = 0; j < cut_count_; ++j) {
-      const uint16_t first = cut_edges_[j].planes[0];
-      const uint16_t second = cut_edges_[j].planes[1];
-      ends[second] ^= code(j, 0);
-      ends[first] ^= code(j, 1);
-    }
-    bool is_open = false;
-    for (size_t j = 0; j < cut_count_; ++j) {
-      const uint16_t first = cut_edges_[j].planes[0];
-      const uint16_t second = cut_edges_[j].planes[1];
-      const uint32_t at_first = ends[second] ^ code(j, 0);
-      const uint32_t at_second = ends[first] ^ code(j, 1);
-      is_open |= (at_first == 0) | (at_second == 0);
-      joints_[new_[j]].ends[0] = at_first - 1;
-      joints_[new_[j]].ends[1] = at_second - 1;
-    }
-    for (size_t j = 0; j < cut_count_; ++j) {
-      const uint16_t first = cut_edges_[j].planes[0];
-      const uint16_t second = cut_edges_[j].planes[1];
-      ends[first] = ends[second] = 0;
-    }
-    if (is_open) {
-      std::abort();
-    }
   } else {
     static_assert(D <= 6);
     ridges_.clear();

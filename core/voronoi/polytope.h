@@ -158,7 +158,7 @@ class Polytope {
   void Swap(Polytope& other) noexcept;
 
   // Whether the last cut has made the cell larger than it may be.
-  bool IsTooLarge() const { return columns_.count() > kMostNodes || planes_.size() > kMostPlanes; }
+  bool IsTooLarge() const { return columns_.count() > kMostNodes || plane_count_ > kMostPlanes; }
 
   // Puts into `out` a simplex for each node that lies on bisectors alone. The nodes need not be placed.
   //
@@ -185,7 +185,7 @@ class Polytope {
   // REQUIRES:   since Reset and the last CutBeforePlace, Cut or Place has been called, or PlaceUnlessKeeps, which returned false.
   std::span<const CellNode<D>> nodes() const { return nodes_; }
   const Plane<D>& plane(int index) const { return planes_[index]; }
-  int plane_count() const { return static_cast<int>(planes_.size()); }
+  int plane_count() const { return static_cast<int>(plane_count_); }
   uint64_t cuts() const { return cuts_; }
   const DecisionCounters& counters() const { return counters_; }
   // What the cell takes in memory, roughly, but for itself.
@@ -231,7 +231,7 @@ class Polytope {
   template <size_t kWidth>
   bool CutOffWith(VertexId u, const Point<D>& position, const Point<D>& normal, double length_sq);
   bool IsCutOff(const Joint& node, const Point<D>& generator);
-  void FindRemoved(const Point<D>& generator);
+  bool DecideDoubtful(const Point<D>& generator);
   void FindCutEdges(uint16_t plane);
   void PlaceCutEdges(const Plane<D>& plane);
   std::array<uint32_t, D> RanksOf(const std::array<uint16_t, D>& indices) const;
@@ -241,6 +241,7 @@ class Polytope {
   void PlaceNode(size_t node);
   double PlaceByPlanes(const std::array<uint16_t, D>& indices, Point<D>& x) const;
   void MakeNewNodes();
+  size_t Link(size_t node, const std::array<uint16_t, D>& planes);
   void LinkNewNodes();
   void Join(End a, End b);
   void FillHoles(size_t filled);
@@ -250,8 +251,9 @@ class Polytope {
   TieRule rule_ = TieRule::kKeep;
   double reach_ = 0;  // at least the distance from the site to the farthest node
   double largest_slack_ = 0;
-  bool is_placed_ = true;  // all nodes are
-  std::vector<Plane<D>> planes_;
+  bool is_placed_ = true;         // all nodes are
+  std::vector<Plane<D>> planes_;  // and more
+  size_t plane_count_ = 0;
   NodeColumns<D> columns_;          // by node
   std::vector<Joint> joints_;       // by node, and more
   std::vector<CellNode<D>> nodes_;  // by node, as of the last that placed any
@@ -263,9 +265,10 @@ class Polytope {
   size_t removed_count_ = 0;
   std::vector<CutEdge> cut_edges_;
   size_t cut_count_ = 0;
-  std::vector<Index> new_;      // the nodes on them
-  std::vector<uint32_t> ends_;  // by the plane that an edge runs along, all 0 between cuts; D = 3
-  std::vector<Ridge> ridges_;   // D > 3
+  std::vector<Index> new_;  // the nodes on them
+  std::vector<uint32_t>
+      ends_;                   // by the plane that an edge runs along, one more than its end; all 0 between cuts; D = 3
+  std::vector<Ridge> ridges_;  // D > 3
 };
 
 }  // namespace wellspace::core
