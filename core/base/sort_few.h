@@ -2,28 +2,31 @@
 #ifndef WELLSPACE_CORE_BASE_SORT_FEW_H_
 #define WELLSPACE_CORE_BASE_SORT_FEW_H_
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 
 namespace wellspace::core {
 
-// Sorts `items`, the least first, and returns whether that takes an odd number of exchanges.
+// Sorts `items`, numbers or identifiers of 32 bits, the least first, and returns whether that takes an odd number of exchanges.
 //
 // Complexity: O(N^2).
 template <typename T, size_t N>
 bool SortFew(std::array<T, N>& items) {
-  bool is_odd = false;
+  uint32_t is_odd = 0;
   for (size_t last = N - 1; last > 0; --last) {
     for (size_t i = 0; i < last; ++i) {
-      const T low = std::min(items[i], items[i + 1]);
-      const T high = std::max(items[i], items[i + 1]);
-      is_odd ^= low != items[i];
-      items[i] = low;
-      items[i + 1] = high;
+      // Compilers make jumps of std::min and std::max here.
+      const auto a = static_cast<uint32_t>(items[i]);
+      const auto b = static_cast<uint32_t>(items[i + 1]);
+      const uint32_t is_exchanged = b < a ? 1 : 0;
+      const uint32_t difference = (a ^ b) & -is_exchanged;
+      items[i] = static_cast<T>(a ^ difference);
+      items[i + 1] = static_cast<T>(b ^ difference);
+      is_odd ^= is_exchanged;
     }
   }
-  return is_odd;
+  return is_odd != 0;
 }
 
 }  // namespace wellspace::core

@@ -24,6 +24,19 @@ double ShortestEdgeSq(const Polytope<D>& cell) {
   return shortest;
 }
 
+// Whether a node is on bisectors alone and near enough for their edges, and for those up to `most_sq`: so are most. No branch,
+// since none could be foretold.
+template <int D>
+bool IsPlainlyGood(const Polytope<D>& cell, const CellNode<D>& node, double rho_sq, double most_sq) {
+  bool is_on_wall = false;
+  for (const uint16_t index : node.planes) {
+    const Plane<D>& plane = cell.plane(index);
+    is_on_wall |= plane.kind != PlaneKind::kBisector;
+    most_sq = std::min(most_sq, 2 * plane.offset);
+  }
+  return !is_on_wall & (node.radius_sq <= rho_sq * most_sq);
+}
+
 // A node that may be mended, and the nearest of its generators.
 template <int D>
 struct Candidate {
@@ -53,6 +66,10 @@ Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const Demands<D>
   const double cell_edge_sq = demands.criterion == Criterion::kWellSpaced ? ShortestEdgeSq(cell) : Assessment::kNone;
   for (size_t i = 0; i < cell.nodes().size(); ++i) {
     const CellNode<D>& node = cell.nodes()[i];
+    result.radius_sq = std::max(result.radius_sq, node.radius_sq);
+    if (!has_sizes && IsPlainlyGood(cell, node, rho_sq, cell_edge_sq)) {
+      continue;
+    }
     double edge_sq = Assessment::kNone;
     int edge_plane = -1;
     VertexId generator = kNoVertex;
@@ -79,7 +96,6 @@ Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const Demands<D>
         }
       }
     }
-    result.radius_sq = std::max(result.radius_sq, node.radius_sq);
     if (on_face) {
       continue;
     }

@@ -111,13 +111,14 @@ typename SimplexList<D>::Glance SimplexList<D>::LookAt(const Simplex<D>& points)
     const double ca_sq = NormSq<3>(ca);
     const double shortest_sq = std::min({a_sq, b_sq, c_sq, ab_sq, bc_sq, ca_sq});
     const double most_sq = better_cot_sq_ * det_sq;
+    // No branch, since none could be foretold.
     const auto is_better = [most_sq](const Point<3>& n, const Point<3>& m, double edge_sq) {
       const double value = Dot<3>(n, m);
-      return value >= 0 || value * value < most_sq * edge_sq;
+      return (value >= 0) | (value * value < most_sq * edge_sq);
     };
-    glance.is_clearly_better = NormSq<3>(centre) < better_ratio_sq_ * shortest_sq * 4 * det_sq &&
-                               is_better(n_a, n_b, c_sq) && is_better(n_b, n_c, a_sq) && is_better(n_c, n_a, b_sq) &&
-                               is_better(n_0, n_a, bc_sq) && is_better(n_0, n_b, ca_sq) && is_better(n_0, n_c, ab_sq);
+    glance.is_clearly_better = (NormSq<3>(centre) < better_ratio_sq_ * shortest_sq * 4 * det_sq) &
+                               is_better(n_a, n_b, c_sq) & is_better(n_b, n_c, a_sq) & is_better(n_c, n_a, b_sq) &
+                               is_better(n_0, n_a, bc_sq) & is_better(n_0, n_b, ca_sq) & is_better(n_0, n_c, ab_sq);
   }
   return glance;
 }

@@ -260,17 +260,23 @@ class ListedSimplices {
     const auto listed = stars_.Of(v);
     ++counters_.queries;
     counters_.vertices += D * listed.size();
-    const auto late = late_.At(v);
-    rows_.clear();
-    for (Row row : listed) {
-      bool is_last = true;
+    rows_.resize(listed.size());
+    size_t count = 0;
+    for (const Row& row : listed) {
+      // No branch, since none could be foretold.
+      rows_[count] = row;
+      uint32_t is_last = 1;
       for (const VertexId u : row) {
-        is_last &= stars_.WasLookedAtBefore(u, v);
+        is_last &= stars_.WasLookedAtBefore(u, v) ? 1 : 0;
       }
-      if (is_last && !IsSpoiled(v, row, late)) {
-        SortFew(row);
-        rows_.push_back(row);
-      }
+      count += is_last;
+    }
+    rows_.resize(count);
+    if (const auto late = late_.At(v); !late.empty()) {
+      std::erase_if(rows_, [&](const Row& row) { return IsSpoiled(v, row, late); });
+    }
+    for (Row& row : rows_) {
+      SortFew(row);
     }
     std::sort(rows_.begin(), rows_.end());
     for (const Row& row : rows_) {
@@ -288,9 +294,6 @@ class ListedSimplices {
 
   // Whether the ball through `v` and `others` holds one of the vertices that are late at v; ties as in cells.
   bool IsSpoiled(VertexId v, const Row& others, std::span<const LateNeighbours::Late> late) {
-    if (late.empty()) {
-      return false;
-    }
     Simplex<D> simplex;
     simplex[D] = structure_.point(v);
     for (int k = 0; k < D; ++k) {

@@ -142,35 +142,56 @@ WELLSPACE_INLINE void DropThose(size_t begin, Candidates<D>& all) {
   all.count = count;
 }
 
-// Moves candidate i to the place `places[i]`.
+// Moves candidate i to the place `places[i]`. By four, since the end of the loop is foretold better then: what is not a candidate has
+// the place after the last.
 template <int D>
 WELLSPACE_INLINE void Scatter(const Candidates<D>& from, const uint32_t* places, Candidates<D>& to) {
-  for (size_t i = 0; i < from.count; ++i) {
-    const size_t place = places[i];
-    for (int axis = 0; axis < D; ++axis) {
-      to.w[axis][place] = from.w[axis][i];
+  for (size_t first = 0; first < from.count; first += kLanes) {
+    for (size_t i = first; i < first + kLanes; ++i) {
+      const size_t place = places[i];
+      for (int axis = 0; axis < D; ++axis) {
+        to.w[axis][place] = from.w[axis][i];
+      }
+      to.length_sq[place] = from.length_sq[i];
+      to.slot[place] = from.slot[i];
     }
-    to.length_sq[place] = from.length_sq[i];
-    to.slot[place] = from.slot[i];
   }
 }
 
-// The place of each is the number of those before it.
+// The place of each is the number of those before it. Loops over whole vectors: their ends are foretold better.
 template <int D, size_t kWidth>
 WELLSPACE_INLINE void SortByRank(const Candidates<D>& from, Candidates<D>& to) {
+  constexpr size_t kItems = 2 * kWidth;
   using Keys = typename Wide<kWidth>::Halves;
+  static_assert(LeafTree<D>::kLeafCapacity % kItems == 0 && std::endian::native == std::endian::little);
   // The upper half of a square, which orders as the whole does, numbered in its last bits: no two are equal.
   alignas(kLanes * sizeof(double)) std::array<int32_t, kMostRanked> keys;
   alignas(kLanes * sizeof(double)) std::array<uint32_t, kMostRanked> places;
-  for (size_t i = 0; i < from.count; ++i) {
-    const auto upper = static_cast<uint32_t>(std::bit_cast<uint64_t>(from.length_sq[i]) >> 32);
-    keys[i] = static_cast<int32_t>(upper >> kNumberBits << kNumberBits | i);
+  Keys number{};
+  for (size_t i = 0; i < kItems; ++i) {
+    number[i] = static_cast<int32_t>(i);
   }
-  for (size_t first = 0; first < from.count; first += 2 * kWidth) {
+  for (size_t first = 0; first < from.count; first += kItems) {
+    const Keys low = *reinterpret_cast<const Keys*>(from.length_sq + first);
+    const Keys high = *reinterpret_cast<const Keys*>(from.length_sq + first + kWidth);
+    Keys own;
+    if constexpr (kWidth == 4) {
+      own = __builtin_shuffle(low, high, Keys{1, 3, 5, 7, 9, 11, 13, 15});
+    } else {
+      own = __builtin_shuffle(low, high, Keys{1, 3, 5, 7});
+    }
+    own = (own >> kNumberBits << kNumberBits) | number;
+    own = number < static_cast<int32_t>(from.count) ? own : Keys{} + std::numeric_limits<int32_t>::max();
+    *reinterpret_cast<Keys*>(&keys[first]) = own;
+    number += static_cast<int32_t>(kItems);
+  }
+  for (size_t first = 0; first < from.count; first += kItems) {
     const Keys own = *reinterpret_cast<const Keys*>(&keys[first]);
     Keys before{};
-    for (size_t i = 0; i < from.count; ++i) {
-      before -= keys[i] < own;
+    for (size_t i = 0; i < from.count; i += kItems) {
+      for (size_t k = i; k < i + kItems; ++k) {
+        before -= keys[k] < own;
+      }
     }
     *reinterpret_cast<Keys*>(&places[first]) = before;
   }
@@ -205,6 +226,7 @@ void SortByComparing(const Candidates<D>& from, Candidates<D>& to) {
   for (uint32_t i = 0; i < from.count; ++i) {
     places[order[i]] = i;
   }
+  std::fill(places.begin() + from.count, places.begin() + PaddedCount(from.count), static_cast<uint32_t>(from.count));
   Scatter<D>(from, places.data(), to);
 }
 

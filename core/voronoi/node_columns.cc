@@ -59,6 +59,34 @@ WELLSPACE_INLINE bool IsReached(std::span<const typename NodeColumns<D>::Group> 
   return Union<kWidth>(any) != 0;
 }
 
+template <int D, size_t kWidth>
+WELLSPACE_INLINE typename NodeColumns<D>::Largest Largest(std::span<const typename NodeColumns<D>::Group> groups) {
+  using Lanes = typename Wide<kWidth>::Lanes;
+  Lanes radius_sq{};
+  Lanes slack{};
+  for (const auto& group : groups) {
+    for (size_t from = 0; from < kLanes; from += kWidth) {
+      Lanes norm_sq = LanesAt<kWidth>(group.x[0], from) * LanesAt<kWidth>(group.x[0], from);
+      for (int axis = 1; axis < D; ++axis) {
+        norm_sq += LanesAt<kWidth>(group.x[axis], from) * LanesAt<kWidth>(group.x[axis], from);
+      }
+      const Lanes slacks = LanesAt<kWidth>(group.slack, from);
+      radius_sq = radius_sq > norm_sq ? radius_sq : norm_sq;
+      slack = slack > slacks ? slack : slacks;
+    }
+  }
+  typename NodeColumns<D>::Largest largest{radius_sq[0], slack[0]};
+  for (size_t lane = 1; lane < kWidth; ++lane) {
+    largest = {std::max(largest.radius_sq, radius_sq[lane]), std::max(largest.slack, slack[lane])};
+  }
+  return largest;
+}
+
+template <int D>
+WELLSPACE_AVX2 typename NodeColumns<D>::Largest LargestAvx2(std::span<const typename NodeColumns<D>::Group> groups) {
+  return Largest<D, 4>(groups);
+}
+
 template <int D>
 WELLSPACE_AVX2 void MostAvx2(std::span<const typename NodeColumns<D>::Group> groups, double slack,
                              double relative_error, size_t begin, Candidates<D>& candidates) {
@@ -86,6 +114,17 @@ template <int D>
 bool NodeColumns<D>::Reaches(const Point<D>& low, const Point<D>& high, double doubt) const {
   return unit_ == VectorUnit::kAvx2 ? IsReachedAvx2<D>(groups(), low, high, doubt)
                                     : IsReached<D, 2>(groups(), low, high, doubt);
+}
+
+template <int D>
+typename NodeColumns<D>::Largest NodeColumns<D>::FindLargest() const {
+  return unit_ == VectorUnit::kAvx2 ? LargestAvx2<D>(groups()) : core::Largest<D, 2>(groups());
+}
+
+template <int D>
+void NodeColumns<D>::MakeRoom() {
+  groups_.resize(2 * PaddedCount(count_) / kLanes);
+  found_.resize((groups_.size() * kLanes + kWordBits - 1) / kWordBits);
 }
 
 #define WELLSPACE_INSTANTIATE(D) template class NodeColumns<D>;

@@ -42,8 +42,7 @@ class NodeColumns {
     }
     count_ = count;
     if (PaddedCount(count) > groups_.size() * kLanes) {
-      groups_.resize(2 * PaddedCount(count) / kLanes);
-      found_.resize((groups_.size() * kLanes + kWordBits - 1) / kWordBits);
+      MakeRoom();
     }
   }
 
@@ -94,10 +93,10 @@ class NodeColumns {
     double radius_sq;
     double slack;
   };
-  template <size_t kWidth>
-  WELLSPACE_INLINE Largest FindLargest() const;
+  Largest FindLargest() const;
 
  private:
+  void MakeRoom();
   std::span<const Group> groups() const { return {groups_.data(), PaddedCount(count_) / kLanes}; }
 
   VectorUnit unit_;
@@ -143,30 +142,6 @@ WELLSPACE_INLINE bool NodeColumns<D>::ComputeExcesses(const Point<D>& normal, do
     any |= found->maybe;
   }
   return any != 0;
-}
-
-template <int D>
-template <size_t kWidth>
-WELLSPACE_INLINE typename NodeColumns<D>::Largest NodeColumns<D>::FindLargest() const {
-  using Lanes = typename Wide<kWidth>::Lanes;
-  Lanes radius_sq{};
-  Lanes slack{};
-  for (const Group& group : groups()) {
-    for (size_t from = 0; from < kLanes; from += kWidth) {
-      Lanes norm_sq = LanesAt<kWidth>(group.x[0], from) * LanesAt<kWidth>(group.x[0], from);
-      for (int axis = 1; axis < D; ++axis) {
-        norm_sq += LanesAt<kWidth>(group.x[axis], from) * LanesAt<kWidth>(group.x[axis], from);
-      }
-      const Lanes slacks = LanesAt<kWidth>(group.slack, from);
-      radius_sq = radius_sq > norm_sq ? radius_sq : norm_sq;
-      slack = slack > slacks ? slack : slacks;
-    }
-  }
-  Largest largest{radius_sq[0], slack[0]};
-  for (size_t lane = 1; lane < kWidth; ++lane) {
-    largest = {std::max(largest.radius_sq, radius_sq[lane]), std::max(largest.slack, slack[lane])};
-  }
-  return largest;
 }
 
 }  // namespace wellspace::core

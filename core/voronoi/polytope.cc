@@ -38,9 +38,10 @@ void Polytope<D>::Reset(const Point<D>& site, const Box<D>& bounds, const std::a
   for (int face = 0; face < 2 * D; ++face) {
     const int axis = face / 2;
     Plane<D>& plane = planes_[face];
-    plane = {};
     plane.kind = kinds[face];
     plane.face = static_cast<uint8_t>(face);
+    plane.vertex = kNoVertex;
+    plane.normal = {};
     plane.normal[axis] = 1;
     plane.length = 1;
     plane.source.axis = axis;
@@ -64,7 +65,7 @@ void Polytope<D>::Reset(const Point<D>& site, const Box<D>& bounds, const std::a
   }
   is_placed_ = false;
   reach_ = std::numeric_limits<double>::infinity();
-  SetReach(columns_.template FindLargest<2>());
+  SetReach(columns_.FindLargest());
 }
 
 template <int D>
@@ -74,6 +75,7 @@ void Polytope<D>::Swap(Polytope& other) noexcept {
   std::swap(reach_, other.reach_);
   std::swap(largest_slack_, other.largest_slack_);
   std::swap(is_placed_, other.is_placed_);
+  std::swap(is_tight_, other.is_tight_);
   planes_.swap(other.planes_);
   std::swap(plane_count_, other.plane_count_);
   std::swap(columns_, other.columns_);
@@ -135,8 +137,15 @@ WELLSPACE_INLINE bool Polytope<D>::CutOffWith(VertexId u, const Point<D>& positi
   if (cut_count_ < removed_count_) {
     FillHoles(cut_count_);
   }
-  SetReach(columns_.template FindLargest<kWidth>());
+  is_tight_ = false;
   return true;
+}
+
+template <int D>
+void Polytope<D>::Tighten() {
+  if (!is_tight_) {
+    SetReach(columns_.FindLargest());
+  }
 }
 
 // Whether the bisector of the site and `generator` cuts off a node, exactly.
@@ -223,6 +232,7 @@ WELLSPACE_INLINE void Polytope<D>::PlaceCutEdges(const Plane<D>& plane) {
   const double offset_error = kOffsetError<D> * plane.offset;
   const double rounding = 32 * kUnit * reach_;
   const double most = kGoodPlace * reach_;
+  double largest_slack = largest_slack_;
   for (size_t j = 0; j < cut_count_; ++j) {
     CutEdge& edge = cut_edges_[j];
     const size_t node = NodeOf(edge.kept);
@@ -249,7 +259,9 @@ WELLSPACE_INLINE void Polytope<D>::PlaceCutEdges(const Plane<D>& plane) {
       }
       edge.slack = PlaceByPlanes(planes, edge.x);
     }
+    largest_slack = std::max(largest_slack, edge.slack);
   }
+  largest_slack_ = largest_slack;
 }
 
 // One new node on each cut edge. They take the places of removed nodes first; what is left over goes to the end, so that
@@ -260,11 +272,9 @@ WELLSPACE_INLINE void Polytope<D>::MakeNewNodes() {
     new_.resize(2 * cut_count_);
   }
   const size_t old = columns_.count();
-  if (cut_count_ > removed_count_) {
-    columns_.Resize(old + cut_count_ - removed_count_);
-    if (joints_.size() < columns_.count()) {
-      joints_.resize(2 * columns_.count());
-    }
+  columns_.Resize(std::max(old, old + cut_count_ - removed_count_));
+  if (joints_.size() < columns_.count()) {
+    joints_.resize(2 * columns_.count());
   }
   if (D == 3 && ends_.size() < plane_count_) {
     ends_.resize(2 * plane_count_, 0);
@@ -371,7 +381,7 @@ void Polytope<D>::PlaceThose(Wants wants) {
       node.neighbours[k] = static_cast<Index>(NodeOf(joint.ends[k]));
     }
   }
-  SetReach(columns_.template FindLargest<2>());
+  SetReach(columns_.FindLargest());
 }
 
 // Places a node by its planes, in their order.
@@ -477,6 +487,7 @@ template <int D>
 void Polytope<D>::SetReach(const typename NodeColumns<D>::Largest& largest) {
   reach_ = std::min(reach_, std::sqrt(largest.radius_sq) + largest.slack);  // the cell only shrinks
   largest_slack_ = largest.slack;
+  is_tight_ = true;
 }
 
 template <int D>
@@ -492,15 +503,16 @@ bool Polytope<D>::KeepsRatio(double ratio) const {
 // KeepsRatio, of one node.
 template <int D>
 WELLSPACE_INLINE bool Polytope<D>::SurelyKeeps(size_t node, double ratio) const {
+  // No branch, since none could be foretold.
   double nearest = std::numeric_limits<double>::infinity();
+  bool is_on_wall = false;
   for (const uint16_t index : joints_[node].planes) {
     const Plane<D>& plane = planes_[index];
-    if (plane.kind != PlaneKind::kBisector) {
-      return false;
-    }
+    is_on_wall |= plane.kind != PlaneKind::kBisector;
     nearest = std::min(nearest, plane.length);
   }
-  return std::sqrt(NormSq<D>(columns_.x(node))) + columns_.slack(node) <= ratio * (1 - 4 * kPlaced) * nearest;
+  const double reach = std::sqrt(NormSq<D>(columns_.x(node))) + columns_.slack(node);
+  return !is_on_wall & (reach <= ratio * (1 - 4 * kPlaced) * nearest);
 }
 
 template <int D>
@@ -523,7 +535,8 @@ void Polytope<D>::FindStar(Star<D>& out) const {
 
 // As in Cut, with the largest slack.
 template <int D>
-void Polytope<D>::Foretell(size_t begin, Candidates<D>& candidates) const {
+void Polytope<D>::Foretell(size_t begin, Candidates<D>& candidates) {
+  Tighten();
   columns_.ComputeMost(largest_slack_, kOffsetError<D>, begin, candidates);
 }
 

@@ -143,7 +143,7 @@ class Polytope {
   //
   // Complexity: O(nodes) a candidate.
   // Errors:     none.
-  void Foretell(size_t begin, Candidates<D>& candidates) const;
+  void Foretell(size_t begin, Candidates<D>& candidates);
 
   // Whether some vertex in `cube` (absolute coordinates) could still cut the cell: whether some node x has dist(x,
   // cube) <= |x - site|, decided generously where rounding leaves a doubt.
@@ -178,7 +178,13 @@ class Polytope {
   }
 
   const Point<D>& site() const { return site_; }
-  // At least the squared distance from the site to the farthest node.
+  // Brings reach_sq() down to what it is since the last cut.
+  //
+  // Complexity: O(nodes).
+  // Errors:     none.
+  void Tighten();
+
+  // At least the squared distance from the site to the farthest node: little more after Tighten() or Place().
   double reach_sq() const { return reach_ * reach_; }
   // A vertex whose computed squared distance from the site is larger than this cannot cut the cell.
   double CutLimitSq() const { return 4 * (1 + 0x1p-49) * reach_sq(); }
@@ -249,8 +255,9 @@ class Polytope {
 
   Point<D> site_;
   TieRule rule_ = TieRule::kKeep;
-  double reach_ = 0;  // at least the distance from the site to the farthest node
-  double largest_slack_ = 0;
+  double reach_ = 0;              // at least the distance from the site to the farthest node
+  double largest_slack_ = 0;      // at least
+  bool is_tight_ = true;          // both are as small as they can be known to be
   bool is_placed_ = true;         // all nodes are
   std::vector<Plane<D>> planes_;  // and more
   size_t plane_count_ = 0;

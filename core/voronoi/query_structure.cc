@@ -321,12 +321,18 @@ void QueryStructure<D>::CutByLeaf(NodeId leaf, Workspace<D>& workspace) const {
       w[axis] = left.w[axis][j];
     }
     const auto slot = left.slot[j];
-    if (cell.CutBeforePlace(bucket->ids[slot], bucket->positions[slot], w, left.length_sq[j]) &&
-        ++cuts % kCutsBetweenLooks == 0 && left.count - j > kCutsBetweenLooks) {
+    if (!cell.CutBeforePlace(bucket->ids[slot], bucket->positions[slot], w, left.length_sq[j])) {
+      continue;
+    }
+    if (D == 2) {
+      cell.Tighten();  // takes less than to cut in vain
+    }
+    if (++cuts % kCutsBetweenLooks == 0 && left.count - j > kCutsBetweenLooks) {
       cell.Foretell(j + 1, left);
       left.DropThoseThatMiss(j + 1);
     }
   }
+  cell.Tighten();
 }
 
 #define WELLSPACE_INSTANTIATE(D) template class QueryStructure<D>;

@@ -42,7 +42,7 @@ void StarLists<D>::Set(VertexId v, const Star<D>& star, uint32_t vertex_count) {
     first_count_ = vertex_count;
   }
   entries_.resize(vertex_count);
-  added_.resize(vertex_count - first_count_, begin);
+  added_.resize(vertex_count - first_count_ + 1, begin);
   listed_.resize(begin + star.size());
   uint32_t count = 0;
   for (const std::array<VertexId, D>& simplex : star) {

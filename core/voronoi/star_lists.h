@@ -88,7 +88,11 @@ class StarLists {
   };
 
   bool Has(VertexId v) const { return entries_[Index(v)].begin != kNone; }
-  uint32_t AddedAt(VertexId v) const { return Index(v) < first_count_ ? 0 : added_[Index(v) - first_count_]; }
+  uint32_t AddedAt(VertexId v) const {
+    // No branch, since none could be foretold.
+    const uint32_t is_new = Index(v) >= first_count_ ? 1 : 0;
+    return added_[(Index(v) - first_count_ + 1) & -is_new];
+  }
   void DropUnused();
 
   std::vector<Entry> entries_;  // by vertex
@@ -96,7 +100,7 @@ class StarLists {
   std::vector<std::array<VertexId, D>> listed_;
   size_t unused_ = 0;         // of listed_
   uint32_t first_count_ = 0;  // vertices at the first look
-  // Of each vertex from first_count_ on, the size of listed_ at the next look after it was added: lists that were made before
+  // First 0, for vertices below first_count_; then of each vertex from there on the size of listed_ at the next look after it was added: lists that were made before
   // begin below, unless they are empty.
   std::vector<uint32_t> added_;
   bool is_complete_ = true;

@@ -44,10 +44,6 @@ Point<D> DrawPoint(SplitMix64& random) {
 
 // What the processor is asked for only where it has it.
 template <int D>
-WELLSPACE_AVX2 typename NodeColumns<D>::Largest FindLargestAvx2(const NodeColumns<D>& columns) {
-  return columns.template FindLargest<4>();
-}
-template <int D>
 WELLSPACE_AVX2 bool ComputeExcessesAvx2(const Point<D>& normal, double offset, double length, double error,
                                         NodeColumns<D>& columns) {
   return columns.template ComputeExcesses<4>(normal, offset, length, error);
@@ -81,8 +77,8 @@ TYPED_TEST(LanesTest, EveryUnitComputesTheSame) {
       baseline.Set(i, x, error);
       wide.Set(i, x, error);
     }
-    const auto narrow_largest = baseline.template FindLargest<2>();
-    const auto wide_largest = FindLargestAvx2<D>(wide);
+    const auto narrow_largest = baseline.FindLargest();
+    const auto wide_largest = wide.FindLargest();
     EXPECT_EQ(narrow_largest.radius_sq, radius_sq);
     EXPECT_EQ(wide_largest.radius_sq, radius_sq);
     EXPECT_EQ(narrow_largest.slack, slack);

@@ -277,6 +277,34 @@ TYPED_TEST(PolytopeTest, EachCutOnlyRemoves) {
   }
 }
 
+// Until it is tightened the reach may be that of before; then it is that of the farthest node, but for its slack.
+TYPED_TEST(PolytopeTest, TightenedReachIsThatOfTheFarthestNode) {
+  constexpr int D = TypeParam::kValue;
+  int looser = 0;
+  for (int i = 0; i < 10; ++i) {
+    const IntegerCloud<D> cloud = DrawGridCloud<D>(1000, ByDimension<D>({20, 20, 20, 12, 8}), this->random_);
+    const Point<D> site = ToPoint<D>(cloud.vertices[0]);
+    Polytope<D> cell;
+    cell.Reset(site, cloud.Bounds(), Faces<D>(), TieRule::kPerturb);
+    for (const size_t u : DrawOrder<D>(cloud, 0, this->random_)) {
+      cell.CutBeforePlace(VertexId(u), ToPoint<D>(cloud.vertices[u]));
+      const double before = cell.reach_sq();
+      cell.Tighten();
+      ASSERT_LE(cell.reach_sq(), before);
+      looser += cell.reach_sq() < before ? 1 : 0;
+    }
+    const double tightened = cell.reach_sq();
+    cell.Place();
+    double farthest_sq = 0;
+    for (const CellNode<D>& node : cell.nodes()) {
+      farthest_sq = std::max(farthest_sq, node.radius_sq);
+    }
+    ASSERT_GE(tightened, farthest_sq * (1 - 1e-12));
+    ASSERT_LE(tightened, farthest_sq * (1 + 1e-5));
+  }
+  EXPECT_GT(looser, 0);
+}
+
 // A vertex that has cut already cuts nothing more: its bisector is a plane of the cell.
 TYPED_TEST(PolytopeTest, CuttingIsIdempotent) {
   constexpr int D = TypeParam::kValue;
