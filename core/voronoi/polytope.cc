@@ -268,7 +268,7 @@ WELLSPACE_INLINE void Polytope<D>::PlaceCutEdges(const Plane<D>& plane) {
 // the nodes stay without holes.
 template <int D>
 WELLSPACE_INLINE void Polytope<D>::MakeNewNodes() {
-  if (new_.size() < cut_count_) {
+  if (D != 3 && new_.size() < cut_count_) {
     new_.resize(2 * cut_count_);
   }
   const size_t old = columns_.count();
@@ -286,7 +286,6 @@ WELLSPACE_INLINE void Polytope<D>::MakeNewNodes() {
     // No branch, since none could be foretold.
     const size_t added = old + j - removed_count_;
     const size_t index = added ^ ((added ^ removed_[j]) & -static_cast<size_t>(j < removed_count_));
-    new_[j] = static_cast<Index>(index);
     Joint& joint = joints[index];
     joint.planes = edge.planes;
     joint.ends[D - 1] = edge.kept;
@@ -295,6 +294,8 @@ WELLSPACE_INLINE void Polytope<D>::MakeNewNodes() {
     columns_.Set(index, edge.x, edge.slack);
     if constexpr (D == 3) {
       joined += Link(index, edge.planes);
+    } else {
+      new_[j] = static_cast<Index>(index);
     }
   }
   if (D == 3 && joined != cut_count_) {

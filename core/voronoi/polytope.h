@@ -272,9 +272,9 @@ class Polytope {
   size_t removed_count_ = 0;
   std::vector<CutEdge> cut_edges_;
   size_t cut_count_ = 0;
-  std::vector<Index> new_;  // the nodes on them
-  std::vector<uint32_t>
-      ends_;                   // by the plane that an edge runs along, one more than its end; all 0 between cuts; D = 3
+  std::vector<Index> new_;  // the nodes on them; D != 3
+  // By the plane that an edge runs along, one more than its end; all 0 between cuts; D = 3.
+  std::vector<uint32_t> ends_;
   std::vector<Ridge> ridges_;  // D > 3
 };
 
