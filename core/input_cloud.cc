@@ -20,6 +20,12 @@ namespace {
 // The longest side of a domain is scaled to about 1 when it is beyond these powers of two.
 constexpr int kMaxScaleExponent = 60;
 
+// A query takes less than a microsecond.
+constexpr uint32_t kQueriesBetweenChecks = 256;
+
+// Points of the cloud are read so many before they are needed: sorted, they come from anywhere.
+constexpr size_t kAhead = 16;
+
 // Larger ones leave no room for sums and products.
 constexpr double kMaxCoordinate = 0x1p1000;
 
@@ -62,10 +68,10 @@ absl::Status CheckBox(const Box<D>& box) {
   return absl::OkStatus();
 }
 
-// Refuses point `index` if it is nearer to a face of the box that it does not lie on than the arithmetic serves.
+// Refuses point `index`, which is `p` on the scale of the computation, if it is nearer to a face of the box that it does not lie on
+// than the arithmetic serves.
 template <int D>
-absl::Status CheckFaces(const Domain<D>& domain, std::span<const double> points, size_t index) {
-  const Point<D> p = domain.Scaled(PointAt<D>(points, index));
+absl::Status CheckFaces(const Domain<D>& domain, const Point<D>& p, std::span<const double> points, size_t index) {
   for (int face = 0; face < 2 * D; ++face) {
     const double distance = domain.scaled_box.DistanceToFace(p, face);
     if (distance > 0 && distance < domain.MinSeparation()) {
@@ -199,15 +205,21 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<cons
 
   // Points of one cube are equal, or too close to be served.
   cloud.points.reserve(count + (size_t{1} << D));  // the corners of the box may follow
+  cloud.first_input.reserve(count);
   cloud.sorted_index.assign(count, 0);
   for (size_t i = 0; i < count; ++i) {
     if (i % kStepsBetweenChecks == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
+    if (i + kAhead < count) {
+      const uint32_t soon = entries[i + kAhead].input;
+      __builtin_prefetch(&points[size_t{soon} * D]);
+      __builtin_prefetch(&cloud.sorted_index[soon], 1);
+    }
     const Point<D> p = point_of(entries[i]);
     const bool may_be_alike = i > 0 && entries[i].prefix == entries[i - 1].prefix;
     if (!may_be_alike || cube_of(entries[i]) != cube_of(entries[i - 1])) {
-      WELLSPACE_RETURN_IF_ERROR(CheckFaces<D>(domain, points, entries[i].input));
+      WELLSPACE_RETURN_IF_ERROR(CheckFaces<D>(domain, p, points, entries[i].input));
       cloud.points.push_back(p);
       cloud.first_input.push_back(entries[i].input);
     } else if (p != cloud.points.back()) {
@@ -237,7 +249,9 @@ absl::Status CheckSeparation(const Domain<D>& domain, const QueryStructure<D>& s
   Workspace<D> workspace;
   const auto count = static_cast<uint32_t>(first_input.size());
   for (uint32_t i = 0; i < count; ++i) {
-    WELLSPACE_RETURN_IF_ERROR(context.Check());
+    if (i % kQueriesBetweenChecks == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
     const VertexId v{first + i};
     const size_t input = first_input[i];
     const auto [nearest, nearest_sq] = structure.NearestWithin(v, least * least, workspace);

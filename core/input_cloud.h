@@ -29,17 +29,19 @@ struct Domain {
   double MinSeparation() const { return 64 * grid_step; }
 
   // No negative zero: equal points have equal bits.
-  Point<D> Scaled(Point<D> p) const {
-    for (double& x : p) {
-      x = x * scale + 0.0;
+  Point<D> Scaled(const Point<D>& p) const {
+    Point<D> scaled;
+    for (int i = 0; i < D; ++i) {
+      scaled[i] = p[i] * scale + 0.0;
     }
-    return p;
+    return scaled;
   }
-  Point<D> Unscaled(Point<D> p) const {
-    for (double& x : p) {
-      x /= scale;
+  Point<D> Unscaled(const Point<D>& p) const {
+    Point<D> unscaled;
+    for (int i = 0; i < D; ++i) {
+      unscaled[i] = p[i] / scale;
     }
-    return p;
+    return unscaled;
   }
 
   // Errors:     INVALID_ARGUMENT for a box that doubles cannot serve.

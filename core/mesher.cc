@@ -30,6 +30,9 @@ constexpr double kMinEdgeSteps = 4;
 // Leaves that the tree may have for each vertex of the budget; around isolated close pairs balance costs up to about two.
 constexpr uint64_t kLeavesPerVertex = 8;
 
+// Vertices are read so many before they are needed: in the order of the input, they come from anywhere.
+constexpr uint64_t kAhead = 16;
+
 // What building the tree takes for each point, but for the most uneven clouds: keys, the point twice, a place in a split leaf, indices.
 template <int D>
 constexpr uint64_t kTreeBytes =
@@ -508,12 +511,18 @@ class MesherIn final : public Mesher {
   // Appends the coordinates of the vertices from number `first` on.
   absl::Status AppendPoints(uint64_t first, std::vector<double>& out, const RunContext& context) const {
     const uint64_t count = structure_.vertex_count();
+    const auto point = [this](uint64_t i) -> const Point<D>& {
+      return structure_.point(VertexOf(static_cast<uint32_t>(i)));
+    };
     out.reserve(out.size() + (count - first) * D);
     for (uint64_t i = first; i < count; ++i) {
       if (i % kStepsBetweenChecks == 0) {
         WELLSPACE_RETURN_IF_ERROR(context.Check());
       }
-      const Point<D> p = domain_.Unscaled(structure_.point(VertexOf(static_cast<uint32_t>(i))));
+      if (i + kAhead < count) {
+        __builtin_prefetch(&point(i + kAhead));
+      }
+      const Point<D> p = domain_.Unscaled(point(i));
       out.insert(out.end(), p.begin(), p.end());
     }
     for (const size_t at : negative_zeros_) {

@@ -3,6 +3,7 @@
 #define WELLSPACE_CORE_TREE_LEAF_TREE_H_
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -136,27 +137,22 @@ class LeafTree {
   // Complexity: O(D 2^D), for most leaves O(D).
   template <typename F>
   void ForEachFaceNeighbour(NodeId leaf, F&& f) const {
-    const Node& node = At(leaf);
     for (int face = 0; face < kFaces; ++face) {
-      const NodeId beyond = node.neighbour[face];
-      if (beyond == kNoNode) {
-        continue;
-      }
-      const Node& other = At(beyond);
-      if (other.first_child == kNoNode) {
-        f(beyond);
-        continue;
-      }
-      const int axis = face / 2;
-      const int facing = face % 2 == 0 ? 1 : 0;
-      for (int i = 0; i < kChildren / 2; ++i) {
-        // The bits of i with that of the axis put in.
-        const int above = i >> axis;
-        const NodeId id = Child(other, i + (above << axis) + (facing << axis));
-        if (!At(id).outside) {
-          f(id);
-        }
-      }
+      ForEachBeyond(leaf, face, f);
+    }
+  }
+
+  // The same, but only for those that a straight line from `from` can come to from `leaf`.
+  template <typename F>
+  void ForEachFaceNeighbourAwayFrom(const Point<D>& from, NodeId leaf, F&& f) const {
+    const Box<D> cube = BoxOf(leaf);
+    uint32_t faces = 0;
+    for (int i = 0; i < D; ++i) {
+      faces |= (cube.low[i] <= from[i] ? 1u : 0u) << FaceIndex(i, false);
+      faces |= (cube.high[i] >= from[i] ? 1u : 0u) << FaceIndex(i, true);
+    }
+    for (; faces != 0; faces &= faces - 1) {
+      ForEachBeyond(leaf, std::countr_zero(faces), f);
     }
   }
 
@@ -192,6 +188,30 @@ class LeafTree {
   Node& At(NodeId id) { return nodes_[Index(id)]; }
   static NodeId Child(const Node& node, int child) {
     return NodeId{Index(node.first_child) + static_cast<uint32_t>(child)};
+  }
+
+  // Calls f(NodeId) for each leaf that shares a part of that facet with `leaf`.
+  template <typename F>
+  void ForEachBeyond(NodeId leaf, int face, F&& f) const {
+    const NodeId beyond = At(leaf).neighbour[face];
+    if (beyond == kNoNode) {
+      return;
+    }
+    const Node& other = At(beyond);
+    if (other.first_child == kNoNode) {
+      f(beyond);
+      return;
+    }
+    const int axis = face / 2;
+    const int facing = face % 2 == 0 ? 1 : 0;
+    for (int i = 0; i < kChildren / 2; ++i) {
+      // The bits of i with that of the axis put in.
+      const int above = i >> axis;
+      const NodeId id = Child(other, i + (above << axis) + (facing << axis));
+      if (!At(id).outside) {
+        f(id);
+      }
+    }
   }
 
   int ChildHolding(const Node& node, const Point<D>& p) const;

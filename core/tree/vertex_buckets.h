@@ -14,8 +14,8 @@
 
 namespace wellspace::core {
 
-// Buckets of at most `kMost` vertices, by number. A bucket has room for its vertices rounded up to a multiple of
-// kMost / 8; when that is full it moves, and what it leaves serves another.
+// Buckets of at most `kMost` vertices, by number. A bucket has room for its vertices rounded up to a multiple of kTogether, and of an
+// eighth of kMost or less; when that is full it moves, and what it leaves serves another.
 //
 // Thread safety: thread-compatible.
 template <int D, int kMost>
@@ -23,6 +23,8 @@ class VertexBuckets {
  public:
   // What a vertex takes.
   static constexpr size_t kPlaceBytes = sizeof(Point<D>) + sizeof(VertexId);
+  // So many positions may be read together, the last perhaps of no vertex.
+  static constexpr uint32_t kTogether = 4;
 
   struct Bucket {
     uint32_t count = 0;
@@ -88,8 +90,8 @@ class VertexBuckets {
   uint64_t MemoryBytes() const { return taken_bytes_ + buckets_.size() * sizeof(Bucket); }
 
  private:
-  static constexpr int kClasses = 8;
-  static constexpr uint32_t kStep = kMost / kClasses;
+  static constexpr uint32_t kStep = kMost / 8 / kTogether * kTogether;
+  static constexpr int kClasses = kMost / kStep;
   static_assert(kStep * kClasses == kMost && kStep % 2 == 0, "positions are to stay aligned");
   static constexpr size_t kChunkBytes = std::max<size_t>(size_t{1} << 16, 16 * kMost * kPlaceBytes);
 

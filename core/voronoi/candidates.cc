@@ -82,6 +82,7 @@ uint32_t BitsOfItems(size_t left) {
 template <int D, size_t kWidth>
 WELLSPACE_INLINE void PickThose(std::span<const Point<D>> positions, const Point<D>& site, double limit_sq,
                                 Candidates<D>& out) {
+  static_assert(LeafTree<D>::Buckets::kTogether % kWidth == 0);
   using Lanes = typename Wide<kWidth>::Lanes;
   using Mask = typename Wide<kWidth>::Mask;
   Mask slot{};
@@ -90,18 +91,15 @@ WELLSPACE_INLINE void PickThose(std::span<const Point<D>> positions, const Point
   }
   size_t count = 0;
   for (size_t from = 0; from < positions.size(); from += kWidth) {
-    std::array<const Point<D>*, kWidth> at;
-    for (size_t lane = 0; lane < kWidth; ++lane) {
-      at[lane] = &positions[std::min(from + lane, positions.size() - 1)];
-    }
     Lanes w[D];
+    const Point<D>* const p = &positions[from];
     Lanes length_sq{};
     Mask is_other{};
     for (int axis = 0; axis < D; ++axis) {
       if constexpr (kWidth == 4) {
-        w[axis] = Lanes{(*at[0])[axis], (*at[1])[axis], (*at[2])[axis], (*at[3])[axis]} - site[axis];
+        w[axis] = Lanes{p[0][axis], p[1][axis], p[2][axis], p[3][axis]} - site[axis];
       } else {
-        w[axis] = Lanes{(*at[0])[axis], (*at[1])[axis]} - site[axis];
+        w[axis] = Lanes{p[0][axis], p[1][axis]} - site[axis];
       }
       length_sq = axis == 0 ? w[axis] * w[axis] : length_sq + w[axis] * w[axis];
       is_other |= w[axis] != 0;

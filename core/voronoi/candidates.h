@@ -29,7 +29,7 @@ struct alignas(kLanes * sizeof(double)) Candidates {
 
   // Becomes those of `positions` within a squared distance of `site`, but not at it, in their order.
   //
-  // REQUIRES:   at most LeafTree<D>::kLeafCapacity positions.
+  // REQUIRES:   at most LeafTree<D>::kLeafCapacity positions; they may be read up to PaddedCount of them.
   // Complexity: O(positions).
   // Errors:     none.
   void Pick(std::span<const Point<D>> positions, const Point<D>& site, double limit_sq,

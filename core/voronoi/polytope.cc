@@ -541,13 +541,6 @@ void Polytope<D>::Foretell(size_t begin, Candidates<D>& candidates) {
   columns_.ComputeMost(largest_slack_, kOffsetError<D>, begin, candidates);
 }
 
-template <int D>
-bool Polytope<D>::Reaches(const Box<D>& cube) const {
-  // |p x|^2 - |x|^2 = p (p - 2 x). Where that is near zero p is within 2 |x| of the site, so an error e of x moves it by at
-  // most 4 |x| e.
-  return columns_.Reaches(Difference<D>(cube.low, site_), Difference<D>(cube.high, site_), 4 * largest_slack_ * reach_);
-}
-
 #define WELLSPACE_INSTANTIATE(D) template class Polytope<D>;
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE

@@ -152,7 +152,12 @@ class Polytope {
   // Errors:     none.
   // Source:     [HT08] §6 with the polytope in the place of the ball: |x p|^2 - |x site|^2 is affine in x for fixed p,
   //             so its least value over the cell is at a node.
-  bool Reaches(const Box<D>& cube) const;
+  bool Reaches(const Box<D>& cube) const {
+    // |p x|^2 - |x|^2 = p (p - 2 x). Where that is near zero p is within 2 |x| of the site, so an error e of x moves it by at
+    // most 4 |x| e.
+    return columns_.Reaches(Difference<D>(cube.low, site_), Difference<D>(cube.high, site_),
+                            4 * largest_slack_ * reach_);
+  }
 
   // Exchanges the two cells. What only serves to cut them stays where it is, in the caches of whoever cuts.
   void Swap(Polytope& other) noexcept;

@@ -185,13 +185,19 @@ void QueryStructure<D>::ScanOutward(const Point<D>& site, NodeId own, Workspace<
     const double limit_sq = reach_sq();
     queue.Reserve(LeafTree<D>::kMostFaceNeighbours + 1);
     const uint32_t old_end = queue.end();
-    tree_.ForEachFaceNeighbour(next.leaf, [&](NodeId beyond) {
+    const auto meet = [&](NodeId beyond) {
       // No branch, since none could be foretold.
       const bool is_new = seen[Index(beyond)] != workspace.query;
       seen[Index(beyond)] = workspace.query;
       const double distance_sq = DistanceSq<D>(site, tree_.BoxOf(beyond));
       queue.PushIf(is_new & (distance_sq <= limit_sq), distance_sq, beyond);
-    });
+    };
+    if constexpr (D == 2) {
+      tree_.ForEachFaceNeighbour(next.leaf, meet);  // few more
+    } else {
+      // Whoever is within reach is so by leaves that are, too: those on the straight line from the site.
+      tree_.ForEachFaceNeighbourAwayFrom(site, next.leaf, meet);
+    }
     for (uint32_t i = old_end; i < queue.end(); ++i) {
       Prefetch<D>(tree_, queue.leaf(i));
     }
@@ -230,11 +236,15 @@ Neighbor QueryStructure<D>::Nearest(const Point<D>& p, NodeId leaf, VertexId but
       }
     }
   };
-  if (LiesDeeperThan<D>(p, limit_sq, tree_.BoxOf(leaf))) {
-    look_into(leaf);
-  } else {
+  look_into(leaf);
+  if (!LiesDeeperThan<D>(p, nearest.distance_sq, tree_.BoxOf(leaf))) {
     ScanOutward(
-        p, leaf, workspace, [&] { return nearest.distance_sq; }, [](NodeId) { return true; }, look_into);
+        p, leaf, workspace, [&] { return nearest.distance_sq; }, [](NodeId) { return true; },
+        [&](NodeId opened) {
+          if (opened != leaf) {
+            look_into(opened);
+          }
+        });
   }
   return nearest;
 }

@@ -199,13 +199,13 @@ TYPED_TEST(CandidatesTest, ArePickedWithinTheLimitButNotAtTheSite) {
   for (const VectorUnit unit : Units()) {
     for (size_t count = 0; count <= LeafTree<D>::kLeafCapacity; count += count < 40 ? 1 : 19) {
       const Point<D> site = DrawPoint<D>(random);
-      std::vector<Point<D>> positions(count);
+      std::vector<Point<D>> positions(PaddedCount(count));
       for (Point<D>& p : positions) {
         p = random.Below(8) == 0 ? site : DrawPoint<D>(random);
       }
       // Often the very distance of one.
       const double limit_sq = count == 0 ? 1 : DistanceSq<D>(positions[random.Below(count)], site);
-      picked.Pick(positions, site, limit_sq, unit);
+      picked.Pick({positions.data(), count}, site, limit_sq, unit);
       size_t expected = 0;
       for (size_t i = 0; i < count; ++i) {
         const Point<D> w = Difference<D>(positions[i], site);
@@ -230,10 +230,10 @@ TYPED_TEST(CandidatesTest, ThatAreVeryNearAreNotTheSite) {
   constexpr int D = TypeParam::kValue;
   Point<D> near{};
   near[D - 1] = 1e-200;
-  const std::vector<Point<D>> positions = {Point<D>{}, near};
+  const std::vector<Point<D>> positions = {Point<D>{}, near, near, near};
   Candidates<D> picked;
   for (const VectorUnit unit : Units()) {
-    picked.Pick(positions, Point<D>{}, 1, unit);
+    picked.Pick({positions.data(), 2}, Point<D>{}, 1, unit);
     ASSERT_EQ(picked.count, 1u);
     EXPECT_EQ(picked.slot[0], 1u);
   }

@@ -132,6 +132,64 @@ void ExpectBalancedPartition(const LeafTree<D>& tree, const Box<D>& box) {
   }
 }
 
+template <int D>
+Point<D> CentreOf(const Box<D>& cube) {
+  Point<D> centre;
+  for (int k = 0; k < D; ++k) {
+    centre[k] = 0.5 * (cube.low[k] + cube.high[k]);
+  }
+  return centre;
+}
+
+// Whether a cube meets the straight line between two points, or comes as near as rounding.
+template <int D>
+bool IsOnLine(const Box<D>& cube, const Point<D>& from, const Point<D>& to) {
+  double first = 0;
+  double last = 1;
+  for (int k = 0; k < D; ++k) {
+    const double margin = 1e-9 * SideOf<D>(cube);
+    const double low = cube.low[k] - margin - from[k];
+    const double high = cube.high[k] + margin - from[k];
+    const double along = to[k] - from[k];
+    if (along == 0) {
+      if (low > 0 || high < 0) {
+        return false;
+      }
+      continue;
+    }
+    first = std::max(first, std::min(low / along, high / along));
+    last = std::min(last, std::max(low / along, high / along));
+  }
+  return first <= last;
+}
+
+// A walk away from a point comes to every leaf, by leaves on the straight line to it alone, and never turns back.
+template <int D>
+void ExpectWalksAway(const LeafTree<D>& tree, const Box<D>& box) {
+  const std::vector<NodeId> leaves = LeavesOf<D>(tree);
+  for (size_t i = 0; i < leaves.size(); ++i) {
+    const NodeId target = leaves[(7 * i + 3) % leaves.size()];
+    const Point<D> from = CentreOf<D>(Clipped<D>(tree.BoxOf(leaves[i]), box));
+    const Point<D> to = CentreOf<D>(Clipped<D>(tree.BoxOf(target), box));
+    std::vector<NodeId> reached = {leaves[i]};
+    std::set<uint32_t> seen = {Index(leaves[i])};
+    for (size_t at = 0; at < reached.size(); ++at) {
+      const Box<D> cube = tree.BoxOf(reached[at]);
+      tree.ForEachFaceNeighbourAwayFrom(from, reached[at], [&](NodeId beyond) {
+        const Box<D> next = tree.BoxOf(beyond);
+        for (int k = 0; k < D; ++k) {
+          ASSERT_FALSE(next.high[k] == cube.low[k] && from[k] < cube.low[k]) << "back along axis " << k;
+          ASSERT_FALSE(next.low[k] == cube.high[k] && from[k] > cube.high[k]) << "back along axis " << k;
+        }
+        if (IsOnLine<D>(next, from, to) && seen.insert(Index(beyond)).second) {
+          reached.push_back(beyond);
+        }
+      });
+    }
+    ASSERT_TRUE(seen.contains(Index(target))) << "from leaf " << Index(leaves[i]) << " to leaf " << Index(target);
+  }
+}
+
 // Invariants (1) and (4); every vertex is where leaf_of says, and nowhere else.
 template <int D>
 void ExpectVerticesInPlace(const LeafTree<D>& tree, const std::vector<Point<D>>& points) {
@@ -238,6 +296,7 @@ void ExpectEverySplitHasAReason(const LeafTree<D>& tree, const Box<D>& box, cons
 template <int D>
 void ExpectInvariants(const LeafTree<D>& tree, const Box<D>& box, const std::vector<Point<D>>& points) {
   ExpectBalancedPartition<D>(tree, box);
+  ExpectWalksAway<D>(tree, box);
   ExpectVerticesInPlace<D>(tree, points);
 }
 
