@@ -23,9 +23,6 @@ constexpr int kMaxScaleExponent = 60;
 // A query takes less than a microsecond.
 constexpr uint32_t kQueriesBetweenChecks = 256;
 
-// Points of the cloud are read so many before they are needed: sorted, they come from anywhere.
-constexpr size_t kAhead = 16;
-
 // Larger ones leave no room for sums and products.
 constexpr double kMaxCoordinate = 0x1p1000;
 

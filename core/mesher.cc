@@ -30,9 +30,6 @@ constexpr double kMinEdgeSteps = 4;
 // Leaves that the tree may have for each vertex of the budget; around isolated close pairs balance costs up to about two.
 constexpr uint64_t kLeavesPerVertex = 8;
 
-// Vertices are read so many before they are needed: in the order of the input, they come from anywhere.
-constexpr uint64_t kAhead = 16;
-
 // What building the tree takes for each point, but for the most uneven clouds: keys, the point twice, a place in a split leaf, indices.
 template <int D>
 constexpr uint64_t kTreeBytes =
@@ -96,6 +93,7 @@ class MesherIn final : public Mesher {
     // Vertices are named in the order of the input's first appearances.
     std::vector<uint32_t> rank(distinct);
     uint32_t next = 0;
+    vertex_at_.resize(distinct);
     input_vertex_.resize(cloud.sorted_index.size());
     for (uint32_t i = 0; i < cloud.sorted_index.size(); ++i) {
       if (i % kStepsBetweenChecks == 0) {
@@ -104,18 +102,12 @@ class MesherIn final : public Mesher {
       const uint32_t sorted = cloud.sorted_index[i];
       if (cloud.first_input[sorted] == i) {
         NoteNegativeZeros(points, i, next);
+        vertex_at_[next] = VertexId{sorted};
         rank[sorted] = next++;
       }
       input_vertex_[i] = rank[sorted];
     }
     output_index_ = std::move(rank);
-    vertex_at_.resize(distinct);
-    for (uint32_t i = 0; i < distinct; ++i) {
-      if (i % kStepsBetweenChecks == 0) {
-        WELLSPACE_RETURN_IF_ERROR(context.Check());
-      }
-      vertex_at_[output_index_[i]] = VertexId{i};
-    }
     built_count_ = structure_.vertex_count();
     distinct_count_ = distinct;
     distinct_input_ = distinct;
@@ -510,19 +502,16 @@ class MesherIn final : public Mesher {
 
   // Appends the coordinates of the vertices from number `first` on.
   absl::Status AppendPoints(uint64_t first, std::vector<double>& out, const RunContext& context) const {
-    const uint64_t count = structure_.vertex_count();
-    const auto point = [this](uint64_t i) -> const Point<D>& {
-      return structure_.point(VertexOf(static_cast<uint32_t>(i)));
-    };
+    const uint32_t count = structure_.vertex_count();
     out.reserve(out.size() + (count - first) * D);
-    for (uint64_t i = first; i < count; ++i) {
+    for (auto i = static_cast<uint32_t>(first); i < count; ++i) {
       if (i % kStepsBetweenChecks == 0) {
         WELLSPACE_RETURN_IF_ERROR(context.Check());
       }
-      if (i + kAhead < count) {
-        __builtin_prefetch(&point(i + kAhead));
+      if (count - i > kAhead) {
+        __builtin_prefetch(&structure_.point(VertexOf(i + kAhead)));
       }
-      const Point<D> p = domain_.Unscaled(point(i));
+      const Point<D> p = domain_.Unscaled(structure_.point(VertexOf(i)));
       out.insert(out.end(), p.begin(), p.end());
     }
     for (const size_t at : negative_zeros_) {
