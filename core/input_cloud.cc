@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "absl/strings/str_join.h"
 #include "core/base/cancellable_sort.h"
 #include "core/base/dimensions.h"
+#include "core/base/huge_pages.h"
 #include "core/base/status_macros.h"
 #include "core/tree/morton.h"
 
@@ -172,22 +174,23 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<cons
   const auto point_of = [&](const Entry& entry) { return domain.Scaled(PointAt<D>(points, entry.input)); };
   const auto cube_of = [&](const Entry& entry) { return grid.CubeOf(point_of(entry)); };
   const size_t count = points.size() / D;
+  const double unscale = 1 / domain.scale;  // a power of two
   std::vector<Entry> entries;
-  entries.reserve(count);
+  ReserveOnHugePages(entries, count);
   for (size_t i = 0; i < count; ++i) {
     if (i % kStepsBetweenChecks == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
     const Point<D> p = PointAt<D>(points, i);
-    WELLSPACE_RETURN_IF_ERROR(CheckFinite<D>(p, i));
     if (!box.Contains(p)) {
+      WELLSPACE_RETURN_IF_ERROR(CheckFinite<D>(p, i));
       return absl::InvalidArgumentError(absl::StrCat(
           "points[", i, "] = ", FormatCoordinates(p), " lies outside the domain ", FormatCoordinates(box.low), " to ",
           FormatCoordinates(box.high), "; enlarge the domain or drop the point"));
     }
     const Point<D> scaled_p = domain.Scaled(p);
     for (int k = 0; k < D; ++k) {
-      if (scaled_p[k] / domain.scale != p[k]) {
+      if (scaled_p[k] * unscale != p[k]) {
         return absl::InvalidArgumentError(absl::StrFormat(
             "points[%d]: coordinate %d is %g, too small for the arithmetic of doubles beside a domain of "
             "side %g; make it 0, or give a smaller domain",
@@ -201,8 +204,9 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<cons
   WELLSPACE_RETURN_IF_ERROR(SortAlike<D>(entries, cube_of, context));
 
   // Points of one cube are equal, or too close to be served.
-  cloud.points.reserve(count + (size_t{1} << D));  // the corners of the box may follow
-  cloud.first_input.reserve(count);
+  ReserveOnHugePages(cloud.points, count + (size_t{1} << D));  // the corners of the box may follow
+  ReserveOnHugePages(cloud.first_input, count);
+  ReserveOnHugePages(cloud.sorted_index, count);
   cloud.sorted_index.assign(count, 0);
   for (size_t i = 0; i < count; ++i) {
     if (i % kStepsBetweenChecks == 0) {
@@ -229,6 +233,35 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<cons
 }
 
 template <int D>
+absl::StatusOr<PointNames> NamePoints(SortedCloud<D> cloud, const RunContext& context) {
+  const size_t inputs = cloud.sorted_index.size();
+  const size_t distinct = cloud.first_input.size();
+  PointNames names;
+  if (distinct == inputs) {  // each is named as it was given: nothing has to be looked up
+    names.of_input.resize(inputs);
+    std::iota(names.of_input.begin(), names.of_input.end(), 0);
+    names.name = std::move(cloud.first_input);
+    names.sorted = std::move(cloud.sorted_index);
+    return names;
+  }
+  names.name.resize(distinct);
+  names.sorted.reserve(distinct);
+  names.of_input.reserve(inputs);
+  for (size_t i = 0; i < inputs; ++i) {
+    if (i % kStepsBetweenChecks == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
+    const uint32_t sorted = cloud.sorted_index[i];
+    if (cloud.first_input[sorted] == i) {
+      names.name[sorted] = static_cast<uint32_t>(names.sorted.size());
+      names.sorted.push_back(sorted);
+    }
+    names.of_input.push_back(names.name[sorted]);
+  }
+  return names;
+}
+
+template <int D>
 absl::Status TooCloseError(const Domain<D>& domain, std::span<const double> points, size_t index, double distance,
                            std::string_view other) {
   return absl::InvalidArgumentError(absl::StrFormat(
@@ -250,6 +283,9 @@ absl::Status CheckSeparation(const Domain<D>& domain, const QueryStructure<D>& s
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
     const VertexId v{first + i};
+    if (structure.LeastSeparation(v) >= least) {
+      continue;
+    }
     const size_t input = first_input[i];
     const auto [nearest, nearest_sq] = structure.NearestWithin(v, least * least, workspace);
     // A distance of 0 is that of a point on a corner, which is one vertex with it in the mesh.
@@ -267,6 +303,7 @@ absl::Status CheckSeparation(const Domain<D>& domain, const QueryStructure<D>& s
   template struct Domain<D>;                                                                                           \
   template absl::StatusOr<Box<D>> BoxAround<D>(std::span<const double>, double, const RunContext&);                    \
   template absl::StatusOr<SortedCloud<D>> SortCloud<D>(const Domain<D>&, std::span<const double>, const RunContext&);  \
+  template absl::StatusOr<PointNames> NamePoints<D>(SortedCloud<D>, const RunContext&);                                \
   template absl::Status TooCloseError<D>(const Domain<D>&, std::span<const double>, size_t, double, std::string_view); \
   template absl::Status CheckSeparation<D>(const Domain<D>&, const QueryStructure<D>&, uint32_t,                       \
                                            std::span<const uint32_t>, std::span<const double>, const RunContext&);

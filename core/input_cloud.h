@@ -72,6 +72,18 @@ template <int D>
 absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<const double> points,
                                          const RunContext& context);
 
+// The numbers that the points of a sorted cloud have in the mesh: in the order in which the input first has them.
+struct PointNames {
+  std::vector<uint32_t> name;      // by sorted point
+  std::vector<uint32_t> sorted;    // the sorted point, by name
+  std::vector<uint32_t> of_input;  // the name, by input
+};
+
+// Errors:     CANCELLED, DEADLINE_EXCEEDED.
+// Complexity: O(n).
+template <int D>
+absl::StatusOr<PointNames> NamePoints(SortedCloud<D> cloud, const RunContext& context);
+
 // The error for point `index` of `points`, which is only `distance`, scaled, from what `other` names.
 template <int D>
 absl::Status TooCloseError(const Domain<D>& domain, std::span<const double> points, size_t index, double distance,

@@ -10,6 +10,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/dimensions.h"
+#include "core/base/huge_pages.h"
 #include "core/base/status_macros.h"
 #include "core/input_cloud.h"
 #include "core/mesh_parts.h"
@@ -90,24 +91,15 @@ class MesherIn final : public Mesher {
                                                     kLeavesPerVertex * max_vertices + (1u << D), context));
     WELLSPACE_RETURN_IF_ERROR(CheckSeparation<D>(domain_, structure_, 0, cloud.first_input, points, context));
 
-    // Vertices are named in the order of the input's first appearances.
-    std::vector<uint32_t> rank(distinct);
-    uint32_t next = 0;
-    vertex_at_.resize(distinct);
-    input_vertex_.resize(cloud.sorted_index.size());
-    for (uint32_t i = 0; i < cloud.sorted_index.size(); ++i) {
-      if (i % kStepsBetweenChecks == 0) {
-        WELLSPACE_RETURN_IF_ERROR(context.Check());
+    WELLSPACE_ASSIGN_OR_RETURN(PointNames names, NamePoints<D>(std::move(cloud), context));
+    output_index_ = std::move(names.name);
+    vertex_at_ = std::move(names.sorted);
+    input_vertex_ = std::move(names.of_input);
+    for (uint32_t i = 0, named = 0; i < input_vertex_.size(); ++i) {
+      if (input_vertex_[i] == named) {  // and no duplicate of an earlier one
+        NoteNegativeZeros(points, i, named++);
       }
-      const uint32_t sorted = cloud.sorted_index[i];
-      if (cloud.first_input[sorted] == i) {
-        NoteNegativeZeros(points, i, next);
-        vertex_at_[next] = VertexId{sorted};
-        rank[sorted] = next++;
-      }
-      input_vertex_[i] = rank[sorted];
     }
-    output_index_ = std::move(rank);
     built_count_ = structure_.vertex_count();
     distinct_count_ = distinct;
     distinct_input_ = distinct;
@@ -457,7 +449,7 @@ class MesherIn final : public Mesher {
   // Vertices beyond the distinct input points have the same number outside as inside.
   uint32_t OutputIndex(VertexId v) const { return Index(v) < distinct_count_ ? output_index_[Index(v)] : Index(v); }
   VertexId VertexOf(uint32_t output_index) const {
-    return output_index < distinct_count_ ? vertex_at_[output_index] : VertexId{output_index};
+    return output_index < distinct_count_ ? VertexId{vertex_at_[output_index]} : VertexId{output_index};
   }
   void ExtendOutputIndex() {
     const auto old = static_cast<std::ptrdiff_t>(output_index_.size());
@@ -503,7 +495,7 @@ class MesherIn final : public Mesher {
   // Appends the coordinates of the vertices from number `first` on.
   absl::Status AppendPoints(uint64_t first, std::vector<double>& out, const RunContext& context) const {
     const uint32_t count = structure_.vertex_count();
-    out.reserve(out.size() + (count - first) * D);
+    ReserveOnHugePages(out, out.size() + (count - first) * D);
     for (auto i = static_cast<uint32_t>(first); i < count; ++i) {
       if (i % kStepsBetweenChecks == 0) {
         WELLSPACE_RETURN_IF_ERROR(context.Check());
@@ -556,7 +548,7 @@ class MesherIn final : public Mesher {
   uint64_t built_count_ = 0;            // vertices after Initialize: input points and corners of the box
   uint64_t distinct_count_ = 0;         // the former
   std::vector<uint32_t> output_index_;  // by vertex; of the first distinct_count_ at least
-  std::vector<VertexId> vertex_at_;     // by output index, of the first distinct_count_
+  std::vector<uint32_t> vertex_at_;     // by output index, of the first distinct_count_
   std::vector<uint32_t> input_vertex_;  // by point given
   uint64_t distinct_input_ = 0;         // different vertices among them
   std::vector<size_t> negative_zeros_;  // places in Mesh::points

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/base/dimensions.h"
+#include "core/base/huge_pages.h"
 #include "core/base/sort_few.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
@@ -79,7 +80,7 @@ class BlockJoin {
         return;
       }
       const size_t to_come = size / joined_count_ * (block_count_ - joined_count_);
-      joined_.reserve(std::min(kMostGrowth * size, size + to_come + (size + to_come) / 4));
+      ReserveOnHugePages(joined_, std::min(kMostGrowth * size, size + to_come + (size + to_come) / 4));
     }
     joined_.insert(joined_.end(), indices.begin(), indices.end());
     Allow(0);

@@ -28,10 +28,9 @@ absl::Status LeafTree<D>::Build(const Box<D>& box, std::span<const Point<D>> poi
   root.low = grid.root_low();
   root.neighbour.fill(kNoNode);
   nodes_.assign(1, root);
-  ranges_.assign(1, Range{0, static_cast<uint32_t>(points.size())});
+  ranges_.assign(1, Range{.end = static_cast<uint32_t>(points.size())});
   pending_.assign(grid.levels() + 1, {});
   pending_[0].push_back(NodeId{0});
-  rims_ = {};
   rim_points_ = {};
 
   uint32_t looked_at = 0;
@@ -80,9 +79,6 @@ absl::Status LeafTree<D>::Build(const Box<D>& box, std::span<const Point<D>> poi
   ranges_ = {};
   pending_ = {};
   near_ = {};
-  visited_ = {};
-  seen_in_ = {};
-  rims_ = {};
   rim_points_ = {};
   return absl::OkStatus();
 }
@@ -266,7 +262,7 @@ void LeafTree<D>::DistributeRange(NodeId parent) {
         std::partition_point(begin, end, [&](const Point<D>& p) { return ChildHolding(node, p) <= child; });
     const uint32_t middle = rest.begin + static_cast<uint32_t>(past - begin);
     const NodeId id = Child(node, child);
-    ranges_[Index(id)] = Range{rest.begin, middle};
+    ranges_[Index(id)] = Range{.begin = rest.begin, .end = middle, .parent = parent};
     rest.begin = middle;
     if (!At(id).outside) {
       pending_[At(id).level].push_back(id);
@@ -289,63 +285,102 @@ void LeafTree<D>::DistributeBucket(NodeId parent) {
 template <int D>
 bool LeafTree<D>::IsTooCoarse(NodeId leaf) {
   const Box<D> cube = BoxOf(leaf);
-  const double side = SideOf(At(leaf));
+  const double side = SideOf(leaf);
   if (side > box_.ShortestSide()) {
     return true;
   }
   const double reach = side / kCoarseness;
-  near_.clear();
-  visited_.assign(1, leaf);
-  seen_in_.resize(nodes_.size(), 0);
-  seen_in_[Index(leaf)] = ++look_;
-  for (size_t i = 0; i < visited_.size(); ++i) {
-    const NodeId at = visited_[i];
-    const Range range = ranges_[Index(at)];
-    if (range.size() > kLeafCapacity) {
-      return true;  // it is half as large and will be split again, so that balance asks for this leaf to be split
+  const Range& own = ranges_[Index(leaf)];
+  near_.assign(points_.begin() + own.begin, points_.begin() + own.end);
+  bool touches_crowded = false;
+  ForEachTouching(leaf, [&](NodeId other) {
+    // One that is crowded is half as large and will be split again, so that balance asks for this leaf to be split.
+    touches_crowded |= ranges_[Index(other)].size() > kLeafCapacity;
+    if (touches_crowded) {
+      return;
     }
-    if (at == leaf) {
-      near_.assign(points_.begin() + range.begin, points_.begin() + range.end);
-    } else {
-      for (const Point<D>& p : RimOf(at)) {
-        if (DistanceSq<D>(p, cube) <= reach * reach) {
-          near_.push_back(p);
-        }
+    for (const Point<D>& p : RimOf(other)) {
+      if (DistanceSq<D>(p, cube) <= reach * reach) {
+        near_.push_back(p);
       }
     }
-    ForEachFaceNeighbour(at, [&](NodeId beyond) {
-      if (seen_in_[Index(beyond)] != look_) {
-        seen_in_[Index(beyond)] = look_;
-        if (DistanceSq<D>(BoxOf(beyond), cube) <= reach * reach) {
-          visited_.push_back(beyond);
-        }
-      }
-    });
+  });
+  return touches_crowded || HasNearFeatures(cube, reach);
+}
+
+// Calls f(NodeId) for each leaf under construction that touches `leaf`, once.
+//
+// Complexity: O(4^D), for most leaves O(3^D).
+template <int D>
+template <typename F>
+void LeafTree<D>::ForEachTouching(NodeId leaf, F&& f) const {
+  const NodeId parent = ranges_[Index(leaf)].parent;
+  if (parent == kNoNode) {
+    return;
   }
-  return HasNearFeatures(cube, reach);
+  const uint32_t own = Index(leaf) - Index(At(parent).first_child);
+  // The nodes of the parent's size that touch the leaf, by the axes along which one goes there from the parent. None is larger, since
+  // the parent has been split.
+  std::array<NodeId, kChildren> around;
+  around[0] = parent;
+  for (uint32_t axes = 0; axes < kChildren; ++axes) {
+    if (axes != 0) {
+      const int axis = std::countr_zero(axes);
+      const NodeId before = around[axes & (axes - 1)];
+      around[axes] = before == kNoNode ? kNoNode : At(before).neighbour[FaceIndex(axis, ((own >> axis) & 1) != 0)];
+    }
+    if (around[axes] == kNoNode) {
+      continue;
+    }
+    const Node& node = At(around[axes]);
+    if (node.first_child == kNoNode) {
+      f(around[axes]);
+      continue;
+    }
+    const uint32_t facing = own ^ axes;
+    for (uint32_t child = 0; child < kChildren; ++child) {
+      const NodeId id = Child(node, child);
+      if (((child ^ facing) & axes) != 0 || id == leaf || At(id).outside) {
+        continue;
+      }
+      if (At(id).first_child == kNoNode) {
+        f(id);
+        continue;
+      }
+      for (uint32_t grandchild = 0; grandchild < kChildren; ++grandchild) {
+        const NodeId smaller = Child(At(id), grandchild);
+        if (((grandchild ^ facing) & (child ^ own)) == 0 && !At(smaller).outside) {
+          f(smaller);
+        }
+      }
+    }
+  }
 }
 
 // The points of a leaf that may be within reach of a leaf that touches it, and is twice as large at most.
 template <int D>
 std::span<const Point<D>> LeafTree<D>::RimOf(NodeId leaf) {
-  rims_.resize(nodes_.size());
-  Rim& rim = rims_[Index(leaf)];
-  if (rim.begin == Rim::kUnknown) {
-    const Box<D> cube = BoxOf(leaf);
-    const double width = 2 * (1 + 0x1p-20) * SideOf(At(leaf)) / kCoarseness;
-    rim.begin = rim_points_.size();
-    for (const Point<D>& p : points_.subspan(ranges_[Index(leaf)].begin, ranges_[Index(leaf)].size())) {
-      bool is_in = false;
+  Range& range = ranges_[Index(leaf)];
+  if (range.rim_size == Range::kUnknown) {
+    const double side = SideOf(leaf);
+    const double inner = 0.5 * side - 2 * (1 + 0x1p-20) * side / kCoarseness;
+    Point<D> centre = At(leaf).low;
+    for (double& x : centre) {
+      x += 0.5 * side;
+    }
+    range.rim_begin = rim_points_.size();
+    for (const Point<D>& p : points_.subspan(range.begin, range.size())) {
+      double farthest = 0;
       for (int i = 0; i < D; ++i) {
-        is_in |= (p[i] - cube.low[i] <= width) | (cube.high[i] - p[i] <= width);
+        farthest = std::max(farthest, std::abs(p[i] - centre[i]));
       }
-      if (is_in) {
+      if (farthest >= inner) {
         rim_points_.push_back(p);
       }
     }
-    rim.count = static_cast<uint32_t>(rim_points_.size() - rim.begin);
+    range.rim_size = static_cast<uint32_t>(rim_points_.size() - range.rim_begin);
   }
-  return {rim_points_.data() + rim.begin, rim.count};
+  return {rim_points_.data() + range.rim_begin, range.rim_size};
 }
 
 // Whether two features (points of near_, faces of the box that a point does not lie on) are both within `reach` of one
@@ -361,17 +396,30 @@ bool LeafTree<D>::HasNearFeatures(const Box<D>& cube, double reach) const {
     }
     return p;
   };
+  FaceMask near_faces = 0;
+  for (int face = 0; face < kFaces; ++face) {
+    if (box_.DistanceToFace(project(face % 2 == 0 ? cube.low : cube.high), face) <= reach) {
+      near_faces |= static_cast<FaceMask>(1u << face);
+    }
+  }
+  const double far_sq =
+      4 * (1 + 0x1p-20) * reach_sq;  // two that are farther from each other are not both within reach of a point
   for (size_t i = 0; i < near_.size(); ++i) {
     const Point<D>& a = near_[i];
-    const Point<D> own = project(a);
-    const FaceMask faces = box_.FacesOf(a);
-    for (int face = 0; face < kFaces; ++face) {
-      if (((faces >> face) & 1) == 0 && box_.DistanceToFace(own, face) <= reach) {
-        return true;
+    if (near_faces != 0) {
+      const Point<D> own = project(a);
+      const int others = near_faces & ~box_.FacesOf(a);
+      for (int face = 0; face < kFaces; ++face) {
+        if (((others >> face) & 1) != 0 && box_.DistanceToFace(own, face) <= reach) {
+          return true;
+        }
       }
     }
     for (size_t j = 0; j < i; ++j) {
       const Point<D>& b = near_[j];
+      if (DistanceSq<D>(a, b) > far_sq) {
+        continue;
+      }
       Point<D> middle;
       for (int k = 0; k < D; ++k) {
         middle[k] = 0.5 * (a[k] + b[k]);

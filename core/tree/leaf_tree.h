@@ -93,8 +93,7 @@ class LeafTree {
   // What the tree takes in memory.
   uint64_t MemoryBytes() const {
     return nodes_.size() * sizeof(Node) + buckets_.MemoryBytes() + ranges_.size() * sizeof(Range) +
-           leaf_of_.size() * sizeof(NodeId) + seen_in_.size() * sizeof(uint32_t) + rims_.size() * sizeof(Rim) +
-           rim_points_.size() * sizeof(Point<D>);
+           leaf_of_.size() * sizeof(NodeId) + rim_points_.size() * sizeof(Point<D>);
   }
   // Whether `node` is a leaf that covers a part of the box.
   bool IsLeaf(NodeId node) const { return At(node).first_child == kNoNode && !At(node).outside; }
@@ -107,6 +106,10 @@ class LeafTree {
   }
   int level(NodeId node) const { return At(node).level; }
   double SideOf(NodeId node) const { return SideOf(At(node)); }
+  // What a point of Build that lies in `leaf` is away from the others, and from the faces of the box that it does not lie on, at least.
+  double SeparationIn(NodeId leaf) const {
+    return At(leaf).level == max_level_ ? 0 : SideOf(At(leaf)) / (2 * kCoarseness);
+  }
 
   // The vertices in a leaf, or null for none.
   const Bucket* BucketOf(NodeId leaf) const {
@@ -169,26 +172,21 @@ class LeafTree {
     bool outside = false;  // no part of the box in its interior
   };
 
-  // The points of a node under construction.
+  // Of a node under construction: its points, and those of a leaf near its faces, in rim_points_.
   struct Range {
+    static constexpr uint32_t kUnknown = ~uint32_t{0};
     uint32_t begin = 0;
     uint32_t end = 0;
+    NodeId parent = kNoNode;
+    uint32_t rim_size = kUnknown;
+    size_t rim_begin = 0;
     uint32_t size() const { return end - begin; }
-  };
-
-  // Of a leaf under construction: points near its faces, in rim_points_.
-  struct Rim {
-    static constexpr size_t kUnknown = ~size_t{0};
-    size_t begin = kUnknown;
-    uint32_t count = 0;
   };
 
   double SideOf(const Node& node) const { return sides_[node.level]; }
   const Node& At(NodeId id) const { return nodes_[Index(id)]; }
   Node& At(NodeId id) { return nodes_[Index(id)]; }
-  static NodeId Child(const Node& node, int child) {
-    return NodeId{Index(node.first_child) + static_cast<uint32_t>(child)};
-  }
+  static NodeId Child(const Node& node, uint32_t child) { return NodeId{Index(node.first_child) + child}; }
 
   // Calls f(NodeId) for each leaf that shares a part of that facet with `leaf`.
   template <typename F>
@@ -229,6 +227,8 @@ class LeafTree {
 
   // The split rule of Build.
   bool IsTooCoarse(NodeId leaf);
+  template <typename F>
+  void ForEachTouching(NodeId leaf, F&& f) const;
   std::span<const Point<D>> RimOf(NodeId leaf);
   bool HasNearFeatures(const Box<D>& cube, double reach) const;
 
@@ -245,10 +245,6 @@ class LeafTree {
   std::vector<Range> ranges_;                 // by node
   std::vector<std::vector<NodeId>> pending_;  // leaves to be looked at, by level
   std::vector<Point<D>> near_;                // points near the leaf that is looked at
-  std::vector<NodeId> visited_;
-  std::vector<uint32_t> seen_in_;  // by node: the last look of IsTooCoarse that came across it
-  uint32_t look_ = 0;
-  std::vector<Rim> rims_;  // by node
   std::vector<Point<D>> rim_points_;
 };
 

@@ -31,13 +31,15 @@ class MortonGrid {
     }
     const int exponent = std::ilogb(magnitude) + 1 - kBits;  // magnitude / quantum < 2^kBits
     quantum_ = std::ldexp(1.0, exponent);
+    per_quantum_ = std::ldexp(1.0, -exponent);
     uint64_t extent = 1;
     for (int i = 0; i < D; ++i) {
       const double first = std::floor(box.low[i] / quantum_);
       root_low_[i] = first * quantum_;
+      first_[i] = static_cast<int64_t>(first);
       // The last cube that the box reaches into: a coordinate on the box's high face belongs to it.
-      last_[i] = static_cast<uint64_t>(std::ceil(box.high[i] / quantum_) - first) - 1;
-      extent = std::max(extent, last_[i] + 1);
+      last_[i] = static_cast<int64_t>(std::ceil(box.high[i] / quantum_)) - first_[i] - 1;
+      extent = std::max(extent, static_cast<uint64_t>(last_[i] + 1));
     }
     while ((uint64_t{1} << levels_) < extent) {
       ++levels_;
@@ -53,8 +55,10 @@ class MortonGrid {
   GridPoint<D> CubeOf(const Point<D>& p) const {
     GridPoint<D> cube;
     for (int i = 0; i < D; ++i) {
-      const double steps = std::floor(p[i] / quantum_) - root_low_[i] / quantum_;
-      cube[i] = std::min(static_cast<uint64_t>(steps), last_[i]);
+      const double steps = p[i] * per_quantum_;
+      const auto whole = static_cast<int64_t>(steps);  // towards zero
+      const int64_t below = steps < static_cast<double>(whole) ? 1 : 0;
+      cube[i] = static_cast<uint64_t>(std::min(whole - below - first_[i], last_[i]));
     }
     return cube;
   }
@@ -63,9 +67,11 @@ class MortonGrid {
   static constexpr int kBits = 51;
 
   double quantum_ = 0;
+  double per_quantum_ = 0;  // 1 / quantum_, a power of two too
   int levels_ = 0;
   Point<D> root_low_;
-  GridPoint<D> last_;
+  std::array<int64_t, D> first_;  // root_low_ in steps of quantum_
+  std::array<int64_t, D> last_;   // and the last cube of the box, from there
 };
 
 // Whether `a` comes before `b` on the Z curve on which axis D - 1 is the most significant of a level.

@@ -62,8 +62,8 @@ absl::Status QueryStructure<D>::Initialize(const Box<D>& box, std::vector<Point<
   near_.clear();
   MakeRoom();
   std::array<bool, 1 << D> has_corner{};
-  const uint32_t given = vertex_count_;
-  for (uint32_t i = 0; i < given; ++i) {
+  given_count_ = vertex_count_;
+  for (uint32_t i = 0; i < given_count_; ++i) {
     if (i % kStepsBetweenChecks == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }

@@ -84,6 +84,15 @@ class QueryStructure {
   // Errors:     none.
   Neighbor NearestWithin(VertexId v, double limit_sq, Workspace<D>& workspace) const;
 
+  // What `v` is away from every other vertex, and from the faces of the box that it does not lie on, at least, as far as the tree tells: 0
+  // unless v was given to Initialize.
+  //
+  // REQUIRES:   no vertex has been added since.
+  // Complexity: O(1).
+  double LeastSeparation(VertexId v) const {
+    return Index(v) < given_count_ ? tree_.SeparationIn(tree_.leaf_of(v)) : 0;
+  }
+
   // The vertex nearest to the point `p`, which need not be one; looked for outward from `near` (kNoVertex if none is
   // known). If p is a vertex the distance is 0.
   //
@@ -185,6 +194,7 @@ class QueryStructure {
   Box<D> box_;
   LeafTree<D> tree_;
   uint32_t vertex_count_ = 0;
+  uint32_t given_count_ = 0;  // to Initialize
   // By vertex, with room for those that are to wait, so that nothing moves when one is added.
   std::vector<Point<D>> points_;
   std::vector<FaceMask> faces_;

@@ -34,7 +34,7 @@ class CancellableSortTest : public test::SeededTest {
   static bool HasSmallerKey(const Item& a, const Item& b) { return a.first < b.first; }
 };
 
-constexpr uint64_t kMasks[] = {0, 1, 0xff, 0xff00, 0xf0f0f0f0f0f0f0f0, ~uint64_t{0}};
+constexpr uint64_t kMasks[] = {0, 1, 0xff, 0xff00, 0xfffffffff, 0xf0f0f0f0f0f0f0f0, ~uint64_t{0}};
 
 TEST_F(CancellableSortTest, ByRadixKeepsTheOrderOfEqualKeys) {
   const RunContext context;

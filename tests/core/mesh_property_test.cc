@@ -371,6 +371,25 @@ TEST_P(MeshErrorTest, PointsTooCloseForTheArithmetic) {
   }
 }
 
+// Two points on either side of faces of leaves of every size, as close as is allowed, and by a step of the grid closer.
+TEST_P(MeshErrorTest, PointsAsCloseAsTheArithmeticServes) {
+  constexpr double kStep = 0x1p-50;
+  for (const double distance : {64 * kStep, 63 * kStep}) {
+    std::vector<double> cloud = Cloud();
+    for (size_t k = 0; k < static_cast<size_t>(D()); ++k) {
+      Coordinate(cloud, 5, k) = k == 0 ? 0.5 - 8 * kStep : 0.375;
+      Coordinate(cloud, 41, k) = k == 0 ? 0.5 - 8 * kStep + distance : 0.375;
+    }
+    RunContext context;
+    const auto mesher = Mesher::Create(InUnitBox(D()), cloud, context);
+    if (distance == 64 * kStep) {
+      EXPECT_TRUE(mesher.ok()) << mesher.status();
+    } else {
+      EXPECT_THAT(mesher, Refuses(AllOf(HasSubstr("points[5]"), HasSubstr("points[41]"), HasSubstr("too close"))));
+    }
+  }
+}
+
 TEST_P(MeshErrorTest, PointTooCloseToAFace) {
   std::vector<double> cloud = Cloud();
   Coordinate(cloud, 8, 1) = std::nextafter(1.0, 0.0);

@@ -248,6 +248,17 @@ void ExpectLeavesNoCoarserThanFeatures(const LeafTree<D>& tree, const Box<D>& bo
   }
 }
 
+// What the tree says of the points' separation is true, and says something unless a leaf is as small as the grid's cubes.
+template <int D>
+void ExpectSeparated(const LeafTree<D>& tree, const Box<D>& box, const std::vector<Point<D>>& points) {
+  for (uint32_t v = 0; v < points.size(); ++v) {
+    const NodeId leaf = tree.leaf_of(VertexId{v});
+    const double separation = tree.SeparationIn(leaf);
+    ASSERT_EQ(separation > 0, tree.level(leaf) < MortonGrid<D>(box).levels());
+    ASSERT_GE(test::LocalFeatureSize<D>(box, points, points[v]), separation) << "of vertex " << v;
+  }
+}
+
 // Whether two features are near enough to the cube and each other for it to be too coarse.
 template <int D>
 bool AreFeaturesNear(const Box<D>& cube, const Box<D>& box, const std::vector<Point<D>>& points) {
@@ -305,6 +316,7 @@ void ExpectBuildInvariants(const Box<D>& box, const std::vector<Point<D>>& point
   const LeafTree<D> tree = BuildTree<D>(box, points);
   ExpectInvariants<D>(tree, box, points);
   ExpectLeavesNoCoarserThanFeatures<D>(tree, box, points, random);
+  ExpectSeparated<D>(tree, box, points);
   ExpectEverySplitHasAReason<D>(tree, box, points);
 }
 
@@ -388,6 +400,51 @@ TYPED_TEST(TreeTest, CrowdedLeavesAreSplit) {
   constexpr int D = TypeParam::kValue;
   ExpectBuildInvariants<D>(test::UnitBox<D>(), test::SortedCloud<D>("grid", ByDimension<D>({400, 125, 256, 1024})),
                            this->random_);
+}
+
+// A leaf beside a crowded cube of its size, which is split before: what lies in the cube near the leaf, in whatever direction, counts. The
+// leaf beyond, half as large, does not find the pair by itself.
+TYPED_TEST(TreeTest, FeaturesInSmallerLeavesBesideCount) {
+  constexpr int D = TypeParam::kValue;
+  constexpr double kSide = 0.25;
+  constexpr double kReach = kSide / LeafTree<D>::kCoarseness;
+  const int per_axis = static_cast<int>(std::ceil(std::pow(LeafTree<D>::kLeafCapacity + 1, 1.0 / D)));
+  const auto crowd = static_cast<int>(std::lround(std::pow(per_axis, D)));
+  const auto directions = static_cast<int>(std::lround(std::pow(3, D)));
+  for (int direction = 0; direction < directions; direction += D <= 4 ? 1 : 29) {
+    std::array<int, D> toward;
+    double length_sq = 0;
+    for (int k = 0, rest = direction; k < D; ++k, rest /= 3) {
+      toward[k] = rest % 3 - 1;
+      length_sq += toward[k] * toward[k];
+    }
+    if (length_sq == 0) {
+      continue;
+    }
+    std::vector<Point<D>> points;
+    for (int i = 0; i < crowd; ++i) {
+      Point<D> p;
+      for (int k = 0, rest = i; k < D; ++k, rest /= per_axis) {
+        p[k] = kSide * (1 + toward[k] + 0.25 + 0.5 * (rest % per_axis + 0.5) / per_axis);
+      }
+      points.push_back(p);
+    }
+    Point<D> within;  // the leaf [kSide, 2 kSide]^D
+    Point<D> beyond;
+    for (int k = 0; k < D; ++k) {
+      const double contact = kSide * (toward[k] == 0 ? 1.4 : toward[k] < 0 ? 1 : 2);
+      within[k] = contact - 0.8 * kReach * toward[k] / std::sqrt(length_sq);
+      beyond[k] = contact + 0.02 * kReach * toward[k] / std::sqrt(length_sq);
+    }
+    points.push_back(within);
+    const auto level_of = [](const std::vector<Point<D>>& cloud, const Point<D>& p) {
+      const LeafTree<D> tree = BuildTree<D>(test::UnitBox<D>(), MortonSorted<D>(test::UnitBox<D>(), cloud));
+      return tree.level(tree.LeafHolding(kNoVertex, p));
+    };
+    ASSERT_EQ(level_of(points, within), 2) << "direction " << direction;
+    points.push_back(beyond);
+    ASSERT_GT(level_of(points, within), 2) << "direction " << direction;
+  }
 }
 
 // Points where leaves meet: in the middle, on faces, edges and corners, the high ones too.
