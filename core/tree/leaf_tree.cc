@@ -310,7 +310,7 @@ bool LeafTree<D>::IsTooCoarse(NodeId leaf) {
 
 // Calls f(NodeId) for each leaf under construction that touches `leaf`, once.
 //
-// Complexity: O(4^D), for most leaves O(3^D).
+// Complexity: O(6^D), for most leaves O(4^D).
 template <int D>
 template <typename F>
 void LeafTree<D>::ForEachTouching(NodeId leaf, F&& f) const {
@@ -402,8 +402,8 @@ bool LeafTree<D>::HasNearFeatures(const Box<D>& cube, double reach) const {
       near_faces |= static_cast<FaceMask>(1u << face);
     }
   }
-  const double far_sq =
-      4 * (1 + 0x1p-20) * reach_sq;  // two that are farther from each other are not both within reach of a point
+  // Two points that are farther from each other are not both within reach of a third.
+  const double far_sq = 4 * (1 + 0x1p-20) * reach_sq;
   for (size_t i = 0; i < near_.size(); ++i) {
     const Point<D>& a = near_[i];
     if (near_faces != 0) {
