@@ -2,7 +2,6 @@
 #ifndef WELLSPACE_CORE_REFINE_FORESEEN_CELLS_H_
 #define WELLSPACE_CORE_REFINE_FORESEEN_CELLS_H_
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -20,6 +19,17 @@
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {
+
+// The place of `v` among a few different vertices, their number if it is none of them: all are compared, in vectors, which takes less time
+// than to stop at the right one.
+inline size_t PlaceAmong(std::span<const VertexId> vertices, VertexId v) {
+  const auto count = static_cast<uint32_t>(vertices.size());
+  uint32_t place_and_one = 0;
+  for (uint32_t i = 0; i < count; ++i) {
+    place_and_one |= vertices[i] == v ? i + 1 : 0;
+  }
+  return place_and_one == 0 ? count : place_and_one - 1;
+}
 
 // A clipped cell, and what is known of it.
 template <int D>
@@ -109,7 +119,7 @@ class ForeseenCells {
       vertices.clear();
       left = 0;
     }
-    bool Holds(VertexId v) const { return std::find(vertices.begin(), vertices.end(), v) != vertices.end(); }
+    bool Holds(VertexId v) const { return PlaceAmong(vertices, v) != vertices.size(); }
 
     double clip = 0;
     uint32_t vertex_count = 0;        // of the structure when it was begun

@@ -319,8 +319,7 @@ template <int D>
 void Refinement<D>::FindNext(int bucket, double clip) {
   next_.clear();
   schedule_.ForEachNext(bucket, [this, clip](VertexId u) {
-    if (std::find(next_.begin(), next_.end(), u) == next_.end() && !foreseen_->Comes(u, clip) &&
-        !foreseen_->IsReady(u, clip)) {
+    if (PlaceAmong(next_, u) == next_.size() && !foreseen_->Comes(u, clip) && !foreseen_->IsReady(u, clip)) {
       next_.push_back(u);
     }
     return next_.size() < ForeseenCells<D>::kMost;
