@@ -14,6 +14,7 @@
 #include "core/geometry/exact_measure.h"
 #include "core/tree/leaf_tree.h"
 #include "core/tree/morton.h"
+#include "tests/core/tree_boxes.h"
 #include "tests/support/brute_force.h"
 #include "tests/support/clouds.h"
 #include "tests/support/seeded_test.h"
@@ -320,17 +321,7 @@ void ExpectBuildInvariants(const Box<D>& box, const std::vector<Point<D>>& point
   ExpectEverySplitHasAReason<D>(tree, box, points);
 }
 
-// A box, and how points of the unit box are brought there: the faces on the faces exactly.
-template <int D>
-Box<D> MakeBox(double low, const Point<D>& sides) {
-  Box<D> box;
-  for (int k = 0; k < D; ++k) {
-    box.low[k] = low;
-    box.high[k] = low + sides[k];
-  }
-  return box;
-}
-
+// How points of the unit box are brought to `box`: the faces on the faces exactly.
 template <int D>
 std::vector<Point<D>> Stretched(std::vector<Point<D>> points, const Box<D>& box) {
   for (Point<D>& p : points) {
@@ -339,26 +330,6 @@ std::vector<Point<D>> Stretched(std::vector<Point<D>> points, const Box<D>& box)
     }
   }
   return points;
-}
-
-template <int D>
-std::vector<Box<D>> Boxes() {
-  Point<D> cube;
-  cube.fill(1);
-  Point<D> odd = cube;
-  odd[0] = 0.7;
-  odd[D - 1] = 1.3;
-  Point<D> elongated;
-  elongated.fill(1e-3);
-  elongated[0] = 1;
-  Point<D> exact = cube;
-  exact[D - 1] = 0x1p-3;
-  std::vector<Box<D>> boxes = {MakeBox<D>(0, cube), MakeBox<D>(-0.3, odd), MakeBox<D>(1e6, cube)};
-  if (D <= 4) {  // cubes as small as the shortest side are too many for looks at all pairs
-    boxes.push_back(MakeBox<D>(12.3, elongated));
-    boxes.push_back(MakeBox<D>(-1, exact));
-  }
-  return boxes;
 }
 
 template <typename T>
@@ -557,76 +528,6 @@ TYPED_TEST(TreeTest, BuildCanBeCancelled) {
   RunContext late;
   late.ExceedDeadline();
   EXPECT_EQ(tree.Build(test::UnitBox<D>(), points, kManyLeaves, late).code(), absl::StatusCode::kDeadlineExceeded);
-}
-
-// Invariants of MortonGrid.
-TYPED_TEST(TreeTest, GridHoldsTheBoxInExactCubes) {
-  constexpr int D = TypeParam::kValue;
-  for (const Box<D>& box : Boxes<D>()) {
-    const MortonGrid<D> grid(box);
-    EXPECT_EQ(grid.root_side(), std::ldexp(grid.quantum(), grid.levels()));
-    for (int k = 0; k < D; ++k) {
-      EXPECT_LE(grid.root_low()[k], box.low[k]);
-      EXPECT_GE(grid.root_low()[k] + grid.root_side(), box.high[k]);
-    }
-    for (int i = 0; i < 200; ++i) {
-      Point<D> p;
-      for (int k = 0; k < D; ++k) {
-        p[k] = std::min(box.low[k] + this->random_.Unit() * (box.high[k] - box.low[k]), box.high[k]);
-      }
-      const GridPoint<D> cube = grid.CubeOf(p);
-      for (int k = 0; k < D; ++k) {
-        const double low = grid.root_low()[k] + static_cast<double>(cube[k]) * grid.quantum();
-        EXPECT_LE(low, p[k]);
-        EXPECT_GE(low + grid.quantum(), p[k]);
-      }
-    }
-    for (const uint64_t last : grid.CubeOf(box.high)) {
-      EXPECT_LT(last, uint64_t{1} << grid.levels());
-    }
-  }
-}
-
-// The Z order by its definition: the bits of all axes interleaved, axis D - 1 first.
-TYPED_TEST(TreeTest, MortonOrderIsThatOfInterleavedBits) {
-  constexpr int D = TypeParam::kValue;
-  const auto interleaved = [](const GridPoint<D>& p) {
-    std::vector<uint64_t> bits;
-    for (int bit = 51; bit >= 0; --bit) {
-      for (int k = D - 1; k >= 0; --k) {
-        bits.push_back(p[k] >> bit & 1);
-      }
-    }
-    return bits;
-  };
-  for (int i = 0; i < 500; ++i) {
-    GridPoint<D> a;
-    GridPoint<D> b;
-    for (int k = 0; k < D; ++k) {
-      a[k] = this->random_.Next() >> (12 + this->random_.Below(52));
-      b[k] = this->random_.Below(2) == 0 ? a[k] : this->random_.Next() >> (12 + this->random_.Below(52));
-    }
-    EXPECT_EQ(MortonLess<D>(a, b), interleaved(a) < interleaved(b))
-        << ::testing::PrintToString(a) << ::testing::PrintToString(b);
-  }
-}
-
-TYPED_TEST(TreeTest, MortonPrefixesAreTheFirstInterleavedBits) {
-  constexpr int D = TypeParam::kValue;
-  for (int i = 0; i < 500; ++i) {
-    const int levels = 1 + static_cast<int>(this->random_.Below(52));
-    GridPoint<D> cube;
-    for (uint64_t& x : cube) {
-      x = this->random_.Next() >> (64 - levels);
-    }
-    uint64_t expected = 0;
-    for (int level = 1; level <= 64 / D; ++level) {
-      for (int k = D - 1; k >= 0; --k) {
-        expected = expected << 1 | (level <= levels ? cube[k] >> (levels - level) & 1 : 0);
-      }
-    }
-    EXPECT_EQ(MortonPrefix<D>(cube, levels), expected) << ::testing::PrintToString(cube) << " of " << levels;
-  }
 }
 
 }  // namespace
