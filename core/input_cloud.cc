@@ -126,7 +126,7 @@ absl::StatusOr<Domain<D>> Domain<D>::Of(const Box<D>& box) {
   const int exponent = std::ilogb(box.LongestSide());
   domain.scale = std::abs(exponent) <= kMaxScaleExponent ? 1.0 : std::ldexp(1.0, -exponent);
   domain.scaled_box = Box<D>{domain.Scaled(box.low), domain.Scaled(box.high)};
-  domain.grid_step = MortonGrid<D>(domain.scaled_box).quantum();
+  domain.grid_step = MortonGrid<D>(domain.scaled_box).step();
   return domain;
 }
 
@@ -165,15 +165,15 @@ template <int D>
 absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<const double> points,
                                          const RunContext& context) {
   const Box<D>& box = domain.box;
-  SortedCloud<D> cloud;
-  const MortonGrid<D> grid(domain.scaled_box);
+  const size_t count = points.size() / D;
+  SortedCloud<D> cloud{MortonGrid<D>(domain.scaled_box, count), {}, {}, {}};
+  const MortonGrid<D>& grid = cloud.grid;
   struct Entry {
     uint64_t prefix;
     uint32_t input;
   };
   const auto point_of = [&](const Entry& entry) { return domain.Scaled(PointAt<D>(points, entry.input)); };
   const auto cube_of = [&](const Entry& entry) { return grid.CubeOf(point_of(entry)); };
-  const size_t count = points.size() / D;
   const double unscale = 1 / domain.scale;  // a power of two
   std::vector<Entry> entries;
   ReserveOnHugePages(entries, count);

@@ -25,7 +25,7 @@ struct Domain {
   Box<D> box;         // as given
   Box<D> scaled_box;  // of the computation
   double scale = 1;
-  double grid_step = 0;  // of the Morton grid, scaled
+  double grid_step = 0;  // of every MortonGrid of the box, scaled
 
   // Vertices nearer than this, scaled, are refused as input: coordinates of Steiner points around them would be too
   // coarse to keep rho.
@@ -60,6 +60,7 @@ absl::StatusOr<Box<D>> BoxAround(std::span<const double> points, double margin, 
 // A cloud without its duplicates, in the order that the query structure wants.
 template <int D>
 struct SortedCloud {
+  MortonGrid<D> grid;
   std::vector<Point<D>> points;        // distinct, in Morton order, scaled
   std::vector<uint32_t> first_input;   // by sorted point: the first input equal to it
   std::vector<uint32_t> sorted_index;  // by input: its sorted point

@@ -87,7 +87,7 @@ class MesherIn final : public Mesher {
           absl::StrCat("the ", distinct, " distinct points and the domain's corners are more than ",
                        "max_vertices = ", max_vertices, " vertices; raise max_vertices"));
     }
-    WELLSPACE_RETURN_IF_ERROR(structure_.Initialize(domain_.scaled_box, std::move(cloud.points),
+    WELLSPACE_RETURN_IF_ERROR(structure_.Initialize(cloud.grid, std::move(cloud.points),
                                                     kLeavesPerVertex * max_vertices + (1u << D), context));
     WELLSPACE_RETURN_IF_ERROR(CheckSeparation<D>(domain_, structure_, 0, cloud.first_input, points, context));
 
@@ -147,7 +147,7 @@ class MesherIn final : public Mesher {
     // The points among themselves, and beside the faces of the box.
     QueryStructure<D> apart;
     WELLSPACE_RETURN_IF_ERROR(
-        apart.Initialize(domain_.scaled_box, {}, kLeavesPerVertex * kDefaultMaxVertices, context));
+        apart.Initialize(cloud.grid, {}, kLeavesPerVertex * kDefaultMaxVertices, context));
     const uint32_t corners = apart.vertex_count();
     for (const Point<D>& p : cloud.points) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());

@@ -67,12 +67,12 @@ core::SortedCloud<D> Sorted(const std::vector<double>& points) {
 // The structure over uniform points, as it is before refinement or after.
 template <int D>
 core::QueryStructure<D> Structure(int64_t count, bool is_refined) {
-  const core::Domain<D> domain = UnitDomain<D>();
   core::RunContext context;
   core::QueryStructure<D> structure;
-  ExitUnless(structure.Initialize(domain.scaled_box, Sorted<D>(UniformPoints(D, count)).points, kMaxLeaves, context));
+  core::SortedCloud<D> cloud = Sorted<D>(UniformPoints(D, count));
+  ExitUnless(structure.Initialize(cloud.grid, std::move(cloud.points), kMaxLeaves, context));
   if (is_refined) {
-    core::Refinement<D> refinement(structure, domain.grid_step);
+    core::Refinement<D> refinement(structure, UnitDomain<D>().grid_step);
     core::Demands<D> demands;
     demands.rho = core::DefaultRho(D);
     ExitUnless(refinement.Run(demands, core::kMaxVertices, 1, context));
@@ -130,11 +130,10 @@ void BM_SortCloud(benchmark::State& state) {
 // The tree of it alone. Items are points.
 template <int D>
 void BM_Tree(benchmark::State& state) {
-  const core::Domain<D> domain = UnitDomain<D>();
-  const std::vector<Point<D>> points = Sorted<D>(UniformPoints(D, state.range(0))).points;
+  const core::SortedCloud<D> cloud = Sorted<D>(UniformPoints(D, state.range(0)));
   for (auto _ : state) {
     core::QueryStructure<D> structure;
-    ExitUnless(structure.Initialize(domain.scaled_box, points, kMaxLeaves, core::RunContext()));
+    ExitUnless(structure.Initialize(cloud.grid, cloud.points, kMaxLeaves, core::RunContext()));
     benchmark::DoNotOptimize(structure.vertex_count());
   }
   SetItems(state, state.range(0));

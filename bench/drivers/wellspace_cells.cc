@@ -58,7 +58,7 @@ int Main(int argc, char** argv) {
   ExitUnless(cloud.status());
   const size_t count = cloud->points.size();
   core::QueryStructure<3> structure;
-  ExitUnless(structure.Initialize(domain->scaled_box, std::move(cloud->points), uint64_t{1} << 32, context));
+  ExitUnless(structure.Initialize(cloud->grid, std::move(cloud->points), uint64_t{1} << 32, context));
   const double loaded = all.Seconds();
 
   core::Workspace<3> workspace;

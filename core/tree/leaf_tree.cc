@@ -11,10 +11,9 @@
 namespace wellspace::core {
 
 template <int D>
-absl::Status LeafTree<D>::Build(const Box<D>& box, std::span<const Point<D>> points, uint64_t max_leaves,
+absl::Status LeafTree<D>::Build(const MortonGrid<D>& grid, std::span<const Point<D>> points, uint64_t max_leaves,
                                 const RunContext& context) {
-  const MortonGrid<D> grid(box);
-  box_ = box;
+  box_ = grid.box();
   max_level_ = static_cast<uint8_t>(grid.levels());
   sides_.clear();
   for (int level = 0; level <= grid.levels(); ++level) {

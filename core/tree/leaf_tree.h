@@ -42,7 +42,7 @@ class LeafTree {
   // A leaf beyond a face is one, or 2^(D - 1) half as large.
   static constexpr int kMostFaceNeighbours = D * kChildren;
   // In 5-D and 6-D a vertex has hundreds of neighbours and a node 32 or 64 children: fewer, larger leaves serve better.
-  static constexpr int kLeafCapacity = D == 2 ? 48 : D == 3 ? 32 : D == 4 ? 64 : 16 << D;
+  static constexpr int kLeafCapacity = D <= 3 ? 48 : D == 4 ? 64 : 16 << D;
   // A leaf may be this many times larger than lfs on it. At least 2, so that the neighbours of a leaf hold all that is
   // near it.
   static constexpr double kCoarseness = D <= 4 ? 128 : 1024;
@@ -51,8 +51,8 @@ class LeafTree {
   // The vertices of one leaf, side by side.
   using Bucket = typename Buckets::Bucket;
 
-  // Builds the tree over `box` for `points`, sorted in Morton order on MortonGrid(box) and distinct as cubes of it;
-  // vertex i is points[i].
+  // Builds the tree over the box of `grid` for `points`, sorted in the grid's Morton order and distinct as cubes of it; vertex i is
+  // points[i].
   //
   // Complexity: O(D 2^D L) for L leaves.
   // Errors:     RESOURCE_EXHAUSTED when it would have more than `max_leaves` leaves, or of the context's memory;
@@ -60,7 +60,7 @@ class LeafTree {
   // Source:     [HT08] §5; levels from the top down over sorted ranges instead of Bern, Eppstein and Teng's merging,
   //             which matters only when leaves are compressed; here every leaf is one that a mesh of optimal size
   //             needs.
-  absl::Status Build(const Box<D>& box, std::span<const Point<D>> points, uint64_t max_leaves,
+  absl::Status Build(const MortonGrid<D>& grid, std::span<const Point<D>> points, uint64_t max_leaves,
                      const RunContext& context);
 
   // Adds vertex `v`, the one after the last, at `p`, walking from the leaf of `near`, or from the root for kNoVertex;

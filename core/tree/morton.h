@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 
 #include "core/geometry/box.h"
@@ -15,63 +16,113 @@ namespace wellspace::core {
 template <int D>
 using GridPoint = std::array<uint64_t, D>;
 
-// A grid of cubes of side `quantum`, a power of two, over a box: so fine that it tells apart all points that the mesher
-// serves, so coarse that every corner of every cube is a double. Hence comparing a coordinate with a side of a tree
-// node is exact.
+// A grid of cubes of side `quantum` over a box: so fine that it tells apart all points that the mesher serves, so coarse
+// that what every cube, and every node of a tree over them, has for a corner in the box is a double. Hence comparing a
+// coordinate with a side of a node is exact.
 //
 // Invariants: (1) the root cube [root_low, root_low + root_side]^D contains the box and root_side = quantum * 2^levels;
-// (2) all corners of cubes are exact doubles, since their multiples of quantum stay below 2^53.
+// (2) quantum is 4 to 7 times a quarter of `step`, a power of two; (3) corners in the box are exact doubles, since they
+// are multiples of step / 4 and at most 2^53 times that.
 template <int D>
 class MortonGrid {
  public:
-  explicit MortonGrid(const Box<D>& box) {
+  // The grid under a tree over `count` points. In 3-D the root is up to twice as large as the box asks for, so that on some level of the
+  // tree a cube has about kEvenly of them if they are spread evenly: under the smallest root, leaves would hold up to 8 times
+  // fewer vertices for one number of points than for another, and queries would look into more leaves, or at more vertices.
+  explicit MortonGrid(const Box<D>& box, size_t count = 0) : box_(box) {
     double magnitude = 0;
     for (int i = 0; i < D; ++i) {
       magnitude = std::max({magnitude, std::abs(box.low[i]), std::abs(box.high[i])});
     }
-    const int exponent = std::ilogb(magnitude) + 1 - kBits;  // magnitude / quantum < 2^kBits
-    quantum_ = std::ldexp(1.0, exponent);
-    per_quantum_ = std::ldexp(1.0, -exponent);
-    uint64_t extent = 1;
+    const int exponent = std::ilogb(magnitude) + 1 - kBits;  // magnitude / step < 2^kBits
+    step_ = std::ldexp(1.0, exponent);
+    per_quarter_ = std::ldexp(1.0, 2 - exponent);
+    std::array<int64_t, D> reach;  // of the box, in quarters of a step
     for (int i = 0; i < D; ++i) {
-      const double first = std::floor(box.low[i] / quantum_);
-      root_low_[i] = first * quantum_;
+      const double first = std::floor(box.low[i] * per_quarter_);
+      root_low_[i] = first / per_quarter_;
       first_[i] = static_cast<int64_t>(first);
-      // The last cube that the box reaches into: a coordinate on the box's high face belongs to it.
-      last_[i] = static_cast<int64_t>(std::ceil(box.high[i] / quantum_)) - first_[i] - 1;
-      extent = std::max(extent, static_cast<uint64_t>(last_[i] + 1));
+      reach[i] = static_cast<int64_t>(std::ceil(box.high[i] * per_quarter_)) - first_[i];
     }
-    while ((uint64_t{1} << levels_) < extent) {
-      ++levels_;
+    ChooseRoot(*std::max_element(reach.begin(), reach.end()), D == 3 ? count : 0);
+    per_side_ = ~uint64_t{0} / static_cast<uint64_t>(side_) + 1;
+    for (int i = 0; i < D; ++i) {
+      // The last cube that the box reaches into: a coordinate on the box's high face belongs to it.
+      last_[i] = static_cast<uint64_t>((reach[i] - 1) / side_);
     }
   }
 
-  double quantum() const { return quantum_; }
+  const Box<D>& box() const { return box_; }
+  double step() const { return step_; }
+  double quantum() const { return static_cast<double>(side_) / per_quarter_; }
   int levels() const { return levels_; }
   const Point<D>& root_low() const { return root_low_; }
-  double root_side() const { return std::ldexp(quantum_, levels_); }
+  double root_side() const { return std::ldexp(quantum(), levels_); }
 
   // The cube of the grid that holds `p`, a point of the box.
   GridPoint<D> CubeOf(const Point<D>& p) const {
     GridPoint<D> cube;
     for (int i = 0; i < D; ++i) {
-      const double steps = p[i] * per_quantum_;
-      const auto whole = static_cast<int64_t>(steps);  // towards zero
-      const int64_t below = steps < static_cast<double>(whole) ? 1 : 0;
-      cube[i] = static_cast<uint64_t>(std::min(whole - below - first_[i], last_[i]));
+      const double quarters = p[i] * per_quarter_;
+      const auto whole = static_cast<int64_t>(quarters);  // towards zero
+      const int64_t below = quarters < static_cast<double>(whole) ? 1 : 0;
+      cube[i] = std::min(BySide(static_cast<uint64_t>(whole - below - first_[i])), last_[i]);
     }
     return cube;
   }
 
  private:
   static constexpr int kBits = 51;
+  // With the Steiner points a leaf then has 12 to 30.
+  static constexpr double kEvenly = 8;
 
-  double quantum_ = 0;
-  double per_quantum_ = 0;  // 1 / quantum_, a power of two too
+  // Sets side_ and levels_ so that the root is at least `extent` quarters of a step long, and less than twice that.
+  void ChooseRoot(int64_t extent, size_t count) {
+    side_ = 4;
+    levels_ = 0;
+    while (side_ << levels_ < extent) {
+      ++levels_;
+    }
+    if (count == 0) {
+      return;
+    }
+    // How far a root is from kEvenly points to a cube of some level, as a logarithm.
+    const auto distance = [&](int64_t side, int levels) {
+      double even = std::log2(static_cast<double>(count) / kEvenly);
+      for (int i = 0; i < D; ++i) {
+        even += std::log2(std::ldexp(static_cast<double>(side), levels) / per_quarter_ / (box_.high[i] - box_.low[i]));
+      }
+      return std::abs(std::remainder(even, D));
+    };
+    const int most = levels_;
+    double least = distance(side_, levels_);
+    for (int levels = std::max(most - 1, 0); levels <= most; ++levels) {
+      for (int64_t side = 4; side <= 7; ++side) {
+        const int64_t root = side << levels;
+        if (root >= extent && root < 2 * extent && distance(side, levels) < least) {
+          least = distance(side, levels);
+          side_ = side;
+          levels_ = levels;
+        }
+      }
+    }
+  }
+
+  // number / side_, for a number of up to 54 bits.
+  uint64_t BySide(uint64_t number) const {
+    __extension__ using Wide = unsigned __int128;
+    return static_cast<uint64_t>(Wide{number} * per_side_ >> 64);
+  }
+
+  Box<D> box_;
+  double step_ = 0;
+  double per_quarter_ = 0;  // 4 / step_, a power of two too
+  int64_t side_ = 4;        // of a cube, in quarters of a step
+  uint64_t per_side_ = 0;   // 2^64 / side_, rounded up
   int levels_ = 0;
   Point<D> root_low_;
-  std::array<int64_t, D> first_;  // root_low_ in steps of quantum_
-  std::array<int64_t, D> last_;   // and the last cube of the box, from there
+  std::array<int64_t, D> first_;  // root_low_ in quarters of a step
+  std::array<uint64_t, D> last_;  // and the last cube of the box, from there
 };
 
 // Whether `a` comes before `b` on the Z curve on which axis D - 1 is the most significant of a level.

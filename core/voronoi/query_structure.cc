@@ -52,11 +52,11 @@ void QueryCounters::Add(const QueryCounters& other) {
 }
 
 template <int D>
-absl::Status QueryStructure<D>::Initialize(const Box<D>& box, std::vector<Point<D>> points, uint64_t max_leaves,
+absl::Status QueryStructure<D>::Initialize(const MortonGrid<D>& grid, std::vector<Point<D>> points, uint64_t max_leaves,
                                            const RunContext& context) {
-  box_ = box;
+  box_ = grid.box();
   points_ = std::move(points);
-  WELLSPACE_RETURN_IF_ERROR(tree_.Build(box_, points_, max_leaves, context));
+  WELLSPACE_RETURN_IF_ERROR(tree_.Build(grid, points_, max_leaves, context));
   vertex_count_ = static_cast<uint32_t>(points_.size());
   faces_.clear();
   near_.clear();

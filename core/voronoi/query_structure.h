@@ -62,11 +62,11 @@ class QueryStructure {
 
   // Builds the structure for `points`, then adds the corners of the box that are not among them.
   //
-  // REQUIRES:   points distinct as cubes of MortonGrid(box), sorted in its Morton order, in the box.
+  // REQUIRES:   points distinct as cubes of the grid, sorted in its Morton order, in its box.
   // Complexity: O(L) for L leaves; O(n log n) has been paid for sorting.
   // Errors:     RESOURCE_EXHAUSTED when more than `max_leaves` leaves would be needed, or of the context's memory; CANCELLED, DEADLINE_EXCEEDED.
   // Source:     [HT08] Figure 3, INITIALIZE.
-  absl::Status Initialize(const Box<D>& box, std::vector<Point<D>> points, uint64_t max_leaves,
+  absl::Status Initialize(const MortonGrid<D>& grid, std::vector<Point<D>> points, uint64_t max_leaves,
                           const RunContext& context);
 
   // The vertex nearest to `v`, and its squared distance. Exact up to rounding, where the paper asks for a constant

@@ -25,9 +25,13 @@ TYPED_TEST_SUITE(MortonTest, test::AllDimensions);
 // Invariants of MortonGrid.
 TYPED_TEST(MortonTest, GridHoldsTheBoxInExactCubes) {
   constexpr int D = TypeParam::kValue;
-  for (const Box<D>& box : Boxes<D>()) {
-    const MortonGrid<D> grid(box);
+  for (const MortonGrid<D>& grid : Grids<D>()) {
+    const Box<D>& box = grid.box();
     EXPECT_EQ(grid.root_side(), std::ldexp(grid.quantum(), grid.levels()));
+    EXPECT_LT(grid.root_side(), 2 * box.LongestSide() + 2 * grid.quantum());
+    EXPECT_EQ(std::remainder(4 * grid.quantum(), grid.step()), 0);
+    EXPECT_GE(grid.quantum(), grid.step());
+    EXPECT_LT(grid.quantum(), 2 * grid.step());
     for (int k = 0; k < D; ++k) {
       EXPECT_LE(grid.root_low()[k], box.low[k]);
       EXPECT_GE(grid.root_low()[k] + grid.root_side(), box.high[k]);
@@ -46,6 +50,37 @@ TYPED_TEST(MortonTest, GridHoldsTheBoxInExactCubes) {
     }
     for (const uint64_t last : grid.CubeOf(box.high)) {
       EXPECT_LT(last, uint64_t{1} << grid.levels());
+    }
+  }
+}
+
+// In 3-D some level has a good number of evenly spread points to a cube, in a box of whatever shape and for whatever number of
+// points; elsewhere the root is as small as can be.
+TYPED_TEST(MortonTest, RootFitsTheNumberOfPoints) {
+  constexpr int D = TypeParam::kValue;
+  for (const Box<D>& box : Boxes<D>()) {
+    double volume = 1;
+    for (int k = 0; k < D; ++k) {
+      volume *= box.high[k] - box.low[k];
+    }
+    const double smallest = MortonGrid<D>(box).root_side();
+    EXPECT_EQ(std::ldexp(1.0, std::ilogb(smallest)), smallest);
+    EXPECT_LE(smallest / 2, box.LongestSide());
+    for (size_t count = 1; count < 100'000'000; count += 1 + count / 7) {
+      const double side = MortonGrid<D>(box, count).root_side();
+      if (D != 3) {
+        ASSERT_EQ(side, smallest);
+        continue;
+      }
+      double in_cube = static_cast<double>(count) * std::pow(side, D) / volume;
+      while (in_cube >= 16) {
+        in_cube /= 8;
+      }
+      while (in_cube < 4) {
+        in_cube *= 8;
+      }
+      ASSERT_GE(in_cube, 8 / 1.45) << count;
+      ASSERT_LE(in_cube, 8 * 1.45) << count;
     }
   }
 }

@@ -1,11 +1,14 @@
-// Boxes for trees: cubes and others, about the origin and far from it.
+// Boxes and grids for trees: cubes and others, about the origin and far from it.
 #ifndef WELLSPACE_TESTS_CORE_TREE_BOXES_H_
 #define WELLSPACE_TESTS_CORE_TREE_BOXES_H_
 
+#include <cstddef>
+#include <set>
 #include <vector>
 
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
+#include "core/tree/morton.h"
 
 namespace wellspace::core {
 
@@ -37,6 +40,22 @@ std::vector<Box<D>> Boxes() {
     boxes.push_back(MakeBox<D>(-1, exact));
   }
   return boxes;
+}
+
+// Grids under these boxes, with all roots that a tree may have over them.
+template <int D>
+std::vector<MortonGrid<D>> Grids() {
+  std::vector<MortonGrid<D>> grids;
+  for (const Box<D>& box : Boxes<D>()) {
+    std::set<double> roots;
+    for (size_t count = 0; count < 64; ++count) {
+      const MortonGrid<D> grid(box, count);
+      if (roots.insert(grid.root_side()).second) {
+        grids.push_back(grid);
+      }
+    }
+  }
+  return grids;
 }
 
 }  // namespace wellspace::core

@@ -30,12 +30,23 @@ using ::testing::HasSubstr;
 constexpr uint64_t kManyLeaves = 1'000'000;
 
 template <int D>
-LeafTree<D> BuildTree(const Box<D>& box, const std::vector<Point<D>>& points) {
+LeafTree<D> BuildTree(const MortonGrid<D>& grid, const std::vector<Point<D>>& points) {
   RunContext context;
   LeafTree<D> tree;
-  const absl::Status built = tree.Build(box, points, kManyLeaves, context);
+  const absl::Status built = tree.Build(grid, points, kManyLeaves, context);
   EXPECT_TRUE(built.ok()) << built;
   return tree;
+}
+
+template <int D>
+MortonGrid<D> UnitGrid() {
+  return MortonGrid<D>(test::UnitBox<D>());
+}
+
+template <int D>
+std::string Description(const MortonGrid<D>& grid) {
+  return ::testing::PrintToString(grid.box().low) + ::testing::PrintToString(grid.box().high) + " in a root of side " +
+         ::testing::PrintToString(grid.root_side());
 }
 
 template <int D>
@@ -90,8 +101,8 @@ Contact ContactOf(const Box<D>& a, const Box<D>& b) {
 
 // The leaves are cubes of the grid; they cover the box and do not overlap; invariants (2) and (5).
 template <int D>
-void ExpectBalancedPartition(const LeafTree<D>& tree, const Box<D>& box) {
-  const MortonGrid<D> grid(box);
+void ExpectBalancedPartition(const LeafTree<D>& tree, const MortonGrid<D>& grid) {
+  const Box<D>& box = grid.box();
   const std::vector<NodeId> leaves = LeavesOf<D>(tree);
   ASSERT_EQ(leaves.size(), tree.leaf_count());
   ASSERT_EQ(leaves.size(), static_cast<size_t>(std::count_if(leaves.begin(), leaves.end(),
@@ -215,13 +226,13 @@ void ExpectVerticesInPlace(const LeafTree<D>& tree, const std::vector<Point<D>>&
 
 // Invariant (3), lower bound: sampled at the corners of a leaf, inside, and where points are nearest to it.
 template <int D>
-void ExpectLeavesNoCoarserThanFeatures(const LeafTree<D>& tree, const Box<D>& box, const std::vector<Point<D>>& points,
-                                       SplitMix64& random) {
-  const int grid_levels = MortonGrid<D>(box).levels();
+void ExpectLeavesNoCoarserThanFeatures(const LeafTree<D>& tree, const MortonGrid<D>& grid,
+                                       const std::vector<Point<D>>& points, SplitMix64& random) {
+  const Box<D>& box = grid.box();
   for (const NodeId leaf : LeavesOf<D>(tree)) {
     const Box<D> cube = Clipped<D>(tree.BoxOf(leaf), box);
     const double least = SideOf<D>(tree.BoxOf(leaf)) / (2 * LeafTree<D>::kCoarseness);
-    if (tree.level(leaf) == grid_levels) {
+    if (tree.level(leaf) == grid.levels()) {
       continue;
     }
     ASSERT_LE(SideOf<D>(tree.BoxOf(leaf)), box.ShortestSide());
@@ -251,12 +262,12 @@ void ExpectLeavesNoCoarserThanFeatures(const LeafTree<D>& tree, const Box<D>& bo
 
 // What the tree says of the points' separation is true, and says something unless a leaf is as small as the grid's cubes.
 template <int D>
-void ExpectSeparated(const LeafTree<D>& tree, const Box<D>& box, const std::vector<Point<D>>& points) {
+void ExpectSeparated(const LeafTree<D>& tree, const MortonGrid<D>& grid, const std::vector<Point<D>>& points) {
   for (uint32_t v = 0; v < points.size(); ++v) {
     const NodeId leaf = tree.leaf_of(VertexId{v});
     const double separation = tree.SeparationIn(leaf);
-    ASSERT_EQ(separation > 0, tree.level(leaf) < MortonGrid<D>(box).levels());
-    ASSERT_GE(test::LocalFeatureSize<D>(box, points, points[v]), separation) << "of vertex " << v;
+    ASSERT_EQ(separation > 0, tree.level(leaf) < grid.levels());
+    ASSERT_GE(test::LocalFeatureSize<D>(grid.box(), points, points[v]), separation) << "of vertex " << v;
   }
 }
 
@@ -306,19 +317,19 @@ void ExpectEverySplitHasAReason(const LeafTree<D>& tree, const Box<D>& box, cons
 }
 
 template <int D>
-void ExpectInvariants(const LeafTree<D>& tree, const Box<D>& box, const std::vector<Point<D>>& points) {
-  ExpectBalancedPartition<D>(tree, box);
-  ExpectWalksAway<D>(tree, box);
+void ExpectInvariants(const LeafTree<D>& tree, const MortonGrid<D>& grid, const std::vector<Point<D>>& points) {
+  ExpectBalancedPartition<D>(tree, grid);
+  ExpectWalksAway<D>(tree, grid.box());
   ExpectVerticesInPlace<D>(tree, points);
 }
 
 template <int D>
-void ExpectBuildInvariants(const Box<D>& box, const std::vector<Point<D>>& points, SplitMix64& random) {
-  const LeafTree<D> tree = BuildTree<D>(box, points);
-  ExpectInvariants<D>(tree, box, points);
-  ExpectLeavesNoCoarserThanFeatures<D>(tree, box, points, random);
-  ExpectSeparated<D>(tree, box, points);
-  ExpectEverySplitHasAReason<D>(tree, box, points);
+void ExpectBuildInvariants(const MortonGrid<D>& grid, const std::vector<Point<D>>& points, SplitMix64& random) {
+  const LeafTree<D> tree = BuildTree<D>(grid, points);
+  ExpectInvariants<D>(tree, grid, points);
+  ExpectLeavesNoCoarserThanFeatures<D>(tree, grid, points, random);
+  ExpectSeparated<D>(tree, grid, points);
+  ExpectEverySplitHasAReason<D>(tree, grid.box(), points);
 }
 
 // How points of the unit box are brought to `box`: the faces on the faces exactly.
@@ -341,9 +352,9 @@ TYPED_TEST_SUITE(TreeTest, test::AllDimensions);
 
 TYPED_TEST(TreeTest, EmptyCloudGivesLeavesNoLongerThanTheBox) {
   constexpr int D = TypeParam::kValue;
-  for (const Box<D>& box : Boxes<D>()) {
-    SCOPED_TRACE(::testing::PrintToString(box.low) + ::testing::PrintToString(box.high));
-    ExpectBuildInvariants<D>(box, {}, this->random_);
+  for (const MortonGrid<D>& grid : Grids<D>()) {
+    SCOPED_TRACE(Description<D>(grid));
+    ExpectBuildInvariants<D>(grid, {}, this->random_);
   }
 }
 
@@ -351,25 +362,24 @@ TYPED_TEST(TreeTest, BuildKeepsTheInvariantsOnEveryKindOfCloud) {
   constexpr int D = TypeParam::kValue;
   for (const std::string_view kind : test::AllKinds()) {
     SCOPED_TRACE(std::string(kind));
-    ExpectBuildInvariants<D>(test::UnitBox<D>(), test::SortedCloud<D>(kind, ByDimension<D>({60, 14, 5, 2})),
-                             this->random_);
+    ExpectBuildInvariants<D>(UnitGrid<D>(), test::SortedCloud<D>(kind, ByDimension<D>({60, 14, 5, 2})), this->random_);
   }
 }
 
 TYPED_TEST(TreeTest, BuildKeepsTheInvariantsInEveryBox) {
   constexpr int D = TypeParam::kValue;
-  for (const Box<D>& box : Boxes<D>()) {
-    SCOPED_TRACE(::testing::PrintToString(box.low) + ::testing::PrintToString(box.high));
+  for (const MortonGrid<D>& grid : Grids<D>()) {
+    SCOPED_TRACE(Description<D>(grid));
     for (const std::string_view kind : {"boundary", "uniform"}) {
       const auto cloud = test::ToPoints<D>(test::MakeCloud(kind, D, ByDimension<D>({40, 10, 4, 2})));
-      ExpectBuildInvariants<D>(box, MortonSorted<D>(box, Stretched<D>(cloud, box)), this->random_);
+      ExpectBuildInvariants<D>(grid, MortonSorted<D>(grid, Stretched<D>(cloud, grid.box())), this->random_);
     }
   }
 }
 
 TYPED_TEST(TreeTest, CrowdedLeavesAreSplit) {
   constexpr int D = TypeParam::kValue;
-  ExpectBuildInvariants<D>(test::UnitBox<D>(), test::SortedCloud<D>("grid", ByDimension<D>({400, 125, 256, 1024})),
+  ExpectBuildInvariants<D>(UnitGrid<D>(), test::SortedCloud<D>("grid", ByDimension<D>({400, 125, 256, 1024})),
                            this->random_);
 }
 
@@ -409,7 +419,7 @@ TYPED_TEST(TreeTest, FeaturesInSmallerLeavesBesideCount) {
     }
     points.push_back(within);
     const auto level_of = [](const std::vector<Point<D>>& cloud, const Point<D>& p) {
-      const LeafTree<D> tree = BuildTree<D>(test::UnitBox<D>(), MortonSorted<D>(test::UnitBox<D>(), cloud));
+      const LeafTree<D> tree = BuildTree<D>(UnitGrid<D>(), MortonSorted<D>(test::UnitBox<D>(), cloud));
       return tree.level(tree.LeafHolding(kNoVertex, p));
     };
     ASSERT_EQ(level_of(points, within), 2) << "direction " << direction;
@@ -431,19 +441,19 @@ TYPED_TEST(TreeTest, PointsBetweenLeavesBelongToOne) {
     }
     points.push_back(p);
   }
-  ExpectBuildInvariants<D>(test::UnitBox<D>(), MortonSorted<D>(test::UnitBox<D>(), points), this->random_);
+  ExpectBuildInvariants<D>(UnitGrid<D>(), MortonSorted<D>(test::UnitBox<D>(), points), this->random_);
 }
 
 // Points draw nearer to one place, so that leaf after leaf is split, and larger ones beside them for balance.
 TYPED_TEST(TreeTest, InsertKeepsTheInvariants) {
   constexpr int D = TypeParam::kValue;
   uint64_t new_leaves = 0;
-  for (const Box<D>& box : Boxes<D>()) {
-    SCOPED_TRACE(::testing::PrintToString(box.low) + ::testing::PrintToString(box.high));
+  for (const MortonGrid<D>& grid : Grids<D>()) {
+    const Box<D>& box = grid.box();
+    SCOPED_TRACE(Description<D>(grid));
     std::vector<Point<D>> points = MortonSorted<D>(
-        box, Stretched<D>(test::ToPoints<D>(test::MakeCloud("boundary", D, ByDimension<D>({30, 8, 4, 2}))), box));
-    LeafTree<D> tree = BuildTree<D>(box, points);
-    const MortonGrid<D> grid(box);
+        grid, Stretched<D>(test::ToPoints<D>(test::MakeCloud("boundary", D, ByDimension<D>({30, 8, 4, 2}))), box));
+    LeafTree<D> tree = BuildTree<D>(grid, points);
     std::set<GridPoint<D>> taken;
     for (const Point<D>& p : points) {
       taken.insert(grid.CubeOf(p));
@@ -471,7 +481,7 @@ TYPED_TEST(TreeTest, InsertKeepsTheInvariants) {
       ASSERT_EQ(tree.vertex_count(), points.size());
     }
     new_leaves += tree.leaf_count() - leaves;
-    ExpectInvariants<D>(tree, box, points);
+    ExpectInvariants<D>(tree, grid, points);
   }
   EXPECT_GT(new_leaves, 20u);
 }
@@ -487,10 +497,10 @@ TYPED_TEST(TreeTest, InsertFindsTheLeafFromAnywhere) {
       const uint64_t place = this->random_.Below(4);
       x = place == 0 ? 0 : place == 1 ? 1 : place == 2 ? 0.5 : this->random_.Unit();
     }
-    LeafTree<D> from_root = BuildTree<D>(test::UnitBox<D>(), points);
+    LeafTree<D> from_root = BuildTree<D>(UnitGrid<D>(), points);
     from_root.Insert(kNoVertex, v, p);
     for (int start = 0; start < 5; ++start) {
-      LeafTree<D> tree = BuildTree<D>(test::UnitBox<D>(), points);
+      LeafTree<D> tree = BuildTree<D>(UnitGrid<D>(), points);
       tree.Insert(VertexId(this->random_.Below(points.size())), v, p);
       ASSERT_EQ(tree.leaf_of(v), from_root.leaf_of(v)) << ::testing::PrintToString(p);
     }
@@ -499,21 +509,21 @@ TYPED_TEST(TreeTest, InsertFindsTheLeafFromAnywhere) {
 
 TYPED_TEST(TreeTest, BuildAnewForgetsTheOldTree) {
   constexpr int D = TypeParam::kValue;
-  LeafTree<D> tree = BuildTree<D>(test::UnitBox<D>(), test::SortedCloud<D>("uniform", 50));
+  LeafTree<D> tree = BuildTree<D>(UnitGrid<D>(), test::SortedCloud<D>("uniform", 50));
   const std::vector<Point<D>> points = test::SortedCloud<D>("boundary", 20);
   RunContext context;
-  ASSERT_TRUE(tree.Build(test::UnitBox<D>(), points, kManyLeaves, context).ok());
-  ExpectInvariants<D>(tree, test::UnitBox<D>(), points);
+  ASSERT_TRUE(tree.Build(UnitGrid<D>(), points, kManyLeaves, context).ok());
+  ExpectInvariants<D>(tree, UnitGrid<D>(), points);
 }
 
 TYPED_TEST(TreeTest, BuildEndsAtItsBudget) {
   constexpr int D = TypeParam::kValue;
   const std::vector<Point<D>> points = test::SortedCloud<D>("uniform", 100);
   RunContext context;
-  const uint64_t needed = BuildTree<D>(test::UnitBox<D>(), points).leaf_count();
+  const uint64_t needed = BuildTree<D>(UnitGrid<D>(), points).leaf_count();
   LeafTree<D> tree;
-  EXPECT_TRUE(tree.Build(test::UnitBox<D>(), points, needed, context).ok());
-  const absl::Status refused = tree.Build(test::UnitBox<D>(), points, needed - 1, context);
+  EXPECT_TRUE(tree.Build(UnitGrid<D>(), points, needed, context).ok());
+  const absl::Status refused = tree.Build(UnitGrid<D>(), points, needed - 1, context);
   EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
   EXPECT_THAT(std::string(refused.message()), HasSubstr("more than " + std::to_string(needed - 1) + " leaves"));
 }
@@ -524,10 +534,10 @@ TYPED_TEST(TreeTest, BuildCanBeCancelled) {
   LeafTree<D> tree;
   RunContext cancelled;
   cancelled.Cancel();
-  EXPECT_EQ(tree.Build(test::UnitBox<D>(), points, kManyLeaves, cancelled).code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(tree.Build(UnitGrid<D>(), points, kManyLeaves, cancelled).code(), absl::StatusCode::kCancelled);
   RunContext late;
   late.ExceedDeadline();
-  EXPECT_EQ(tree.Build(test::UnitBox<D>(), points, kManyLeaves, late).code(), absl::StatusCode::kDeadlineExceeded);
+  EXPECT_EQ(tree.Build(UnitGrid<D>(), points, kManyLeaves, late).code(), absl::StatusCode::kDeadlineExceeded);
 }
 
 }  // namespace

@@ -210,7 +210,7 @@ std::vector<Point<D>> AdversarialCloud(std::string_view kind, size_t n, uint64_t
 
 template <int D>
 double LeastSeparation(const Box<D>& box) {
-  return 64 * core::MortonGrid<D>(box).quantum();
+  return 64 * core::MortonGrid<D>(box).step();
 }
 
 template <int D>

@@ -408,8 +408,7 @@ std::vector<Point<D>> ToPoints(std::span<const double> cloud) {
 }
 
 template <int D>
-std::vector<Point<D>> MortonSorted(const Box<D>& box, std::vector<Point<D>> points) {
-  const core::MortonGrid<D> grid(box);
+std::vector<Point<D>> MortonSorted(const core::MortonGrid<D>& grid, std::vector<Point<D>> points) {
   std::stable_sort(points.begin(), points.end(), [&](const Point<D>& a, const Point<D>& b) {
     return core::MortonLess<D>(grid.CubeOf(a), grid.CubeOf(b));
   });
@@ -417,6 +416,11 @@ std::vector<Point<D>> MortonSorted(const Box<D>& box, std::vector<Point<D>> poin
                            [&](const Point<D>& a, const Point<D>& b) { return grid.CubeOf(a) == grid.CubeOf(b); }),
                points.end());
   return points;
+}
+
+template <int D>
+std::vector<Point<D>> MortonSorted(const Box<D>& box, std::vector<Point<D>> points) {
+  return MortonSorted<D>(core::MortonGrid<D>(box), std::move(points));
 }
 
 template <int D>
@@ -437,6 +441,7 @@ std::vector<Point<D>> SortedCloud(std::string_view kind, size_t n) {
   template double NearestDistanceSq<D>(const QueryStructure<D>&, VertexId);                                         \
   template double LocalFeatureSize<D>(const Box<D>&, const std::vector<Point<D>>&, const Point<D>&);                \
   template std::vector<Point<D>> ToPoints<D>(std::span<const double>);                                              \
+  template std::vector<Point<D>> MortonSorted<D>(const core::MortonGrid<D>&, std::vector<Point<D>>);                \
   template std::vector<Point<D>> MortonSorted<D>(const Box<D>&, std::vector<Point<D>>);                             \
   template std::vector<Point<D>> SortedCloud<D>(std::string_view, size_t);                                          \
   template std::optional<Sign> ExactSide<D>(std::span<const IntegerPoint<D>>, size_t, const std::array<size_t, D>&, \

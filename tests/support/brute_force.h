@@ -15,6 +15,7 @@
 
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
+#include "core/tree/morton.h"
 #include "core/voronoi/polytope.h"
 #include "core/voronoi/query_structure.h"
 #include "tests/support/dimensions.h"
@@ -107,8 +108,12 @@ double LocalFeatureSize(const core::Box<D>& box, const std::vector<core::Point<D
 template <int D>
 std::vector<core::Point<D>> ToPoints(std::span<const double> cloud);
 
-// The points of a cloud as QueryStructure wants them: sorted in Morton order on the grid of `box`, of several in one
-// cube of it the first.
+// The points of a cloud as QueryStructure wants them: sorted in the Morton order of `grid`, of several in one cube of it
+// the first.
+template <int D>
+std::vector<core::Point<D>> MortonSorted(const core::MortonGrid<D>& grid, std::vector<core::Point<D>> points);
+
+// The same on MortonGrid(box).
 template <int D>
 std::vector<core::Point<D>> MortonSorted(const core::Box<D>& box, std::vector<core::Point<D>> points);
 

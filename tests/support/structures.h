@@ -20,7 +20,7 @@ core::QueryStructure<D> MakeStructure(const core::Box<D>& box, std::vector<core:
   constexpr uint64_t kManyLeaves = 10'000'000;
   core::RunContext context;
   core::QueryStructure<D> structure;
-  const absl::Status made = structure.Initialize(box, std::move(points), kManyLeaves, context);
+  const absl::Status made = structure.Initialize(core::MortonGrid<D>(box), std::move(points), kManyLeaves, context);
   EXPECT_TRUE(made.ok()) << made;
   return structure;
 }
