@@ -146,8 +146,7 @@ class MesherIn final : public Mesher {
     WELLSPACE_ASSIGN_OR_RETURN(const SortedCloud<D> cloud, SortCloud<D>(domain_, points, context));
     // The points among themselves, and beside the faces of the box.
     QueryStructure<D> apart;
-    WELLSPACE_RETURN_IF_ERROR(
-        apart.Initialize(cloud.grid, {}, kLeavesPerVertex * kDefaultMaxVertices, context));
+    WELLSPACE_RETURN_IF_ERROR(apart.Initialize(cloud.grid, {}, kLeavesPerVertex * kDefaultMaxVertices, context));
     const uint32_t corners = apart.vertex_count();
     for (const Point<D>& p : cloud.points) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());

@@ -124,6 +124,8 @@ typename NodeColumns<D>::Largest NodeColumns<D>::FindLargest() const {
 template <int D>
 void NodeColumns<D>::MakeRoom() {
   groups_.resize(2 * PaddedCount(count_) / kLanes);
+  rows_.resize(groups_.size() * kLanes);
+  excesses_.resize(groups_.size());
   found_.resize((groups_.size() * kLanes + kWordBits - 1) / kWordBits);
 }
 

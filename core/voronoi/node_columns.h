@@ -15,8 +15,9 @@
 
 namespace wellspace::core {
 
-// Positions of the nodes of a cell and bounds on their errors by index of the node, in groups that one vector instruction
-// takes. Places of the last group beyond the last node hold a node at the site, which no bisector cuts off.
+// Positions of the nodes of a cell and bounds on their errors by index of the node: in groups of which one vector instruction takes a
+// coordinate, to work on many nodes, and in rows, to work on one. Places of the last group beyond the last node hold a node
+// at the site, which no bisector cuts off.
 //
 // Thread safety: thread-compatible.
 template <int D>
@@ -25,7 +26,10 @@ class NodeColumns {
   struct alignas(kLanes * sizeof(double)) Group {
     double x[D][kLanes];
     double slack[kLanes];
-    double excess[kLanes];
+  };
+  // The coordinates of a node, then its slack, then what means nothing.
+  struct alignas(kLanes * sizeof(double)) Row {
+    double values[PaddedCount(D + 1)];
   };
   // A bit for each node: so many in a word.
   static constexpr size_t kWordBits = 64;
@@ -33,6 +37,7 @@ class NodeColumns {
   // Works with `unit`, which this processor has; the best there is unless told.
   explicit NodeColumns(VectorUnit unit = BestVectorUnit()) : unit_(unit) {}
 
+  VectorUnit unit() const { return unit_; }
   size_t count() const { return count_; }
 
   // REQUIRES:   nodes that are new are Set before anything else is asked.
@@ -47,29 +52,30 @@ class NodeColumns {
   }
 
   void Set(size_t i, const Point<D>& x, double slack) {
-    Group& group = groups_[i / kLanes];
-    const size_t lane = i % kLanes;
-    for (int axis = 0; axis < D; ++axis) {
-      group.x[axis][lane] = x[axis];
-    }
-    group.slack[lane] = slack;
+    std::copy(x.begin(), x.end(), rows_[i].values);
+    rows_[i].values[D] = slack;
+    SetColumns(i, x.data(), slack);
+  }
+  void Set(size_t i, const Row& row) {
+    rows_[i] = row;
+    SetColumns(i, row.values, row.values[D]);
   }
 
+  const Row& row(size_t i) const { return rows_[i]; }
+  std::span<const Row> rows() const { return {rows_.data(), count_}; }
   Point<D> x(size_t i) const {
     Point<D> x;
-    for (int axis = 0; axis < D; ++axis) {
-      x[axis] = groups_[i / kLanes].x[axis][i % kLanes];
-    }
+    std::copy_n(rows_[i].values, D, x.begin());
     return x;
   }
-  double slack(size_t i) const { return groups_[i / kLanes].slack[i % kLanes]; }
+  double slack(size_t i) const { return rows_[i].values[D]; }
 
   // Computes for all nodes x the excess x . normal - offset, which may be wrong by e = slack length + error: finds those
   // of which excess + e is not negative (doubtful ones and more), and those of which excess - e is positive (surely cut
   // off). Returns whether there are any of the former.
   template <size_t kWidth>
   WELLSPACE_INLINE bool ComputeExcesses(const Point<D>& normal, double offset, double length, double error);
-  double excess(size_t i) const { return groups_[i / kLanes].excess[i % kLanes]; }
+  std::span<const double> excesses() const { return {excesses_.front().values, count_}; }
 
   // What the last ComputeExcesses found: bit b of word w stands for node kWordBits w + b.
   struct Found {
@@ -78,7 +84,10 @@ class NodeColumns {
   };
   std::span<Found> found() { return {found_.data(), (count_ + kWordBits - 1) / kWordBits}; }
 
-  uint64_t MemoryBytes() const { return groups_.capacity() * sizeof(Group) + found_.capacity() * sizeof(Found); }
+  uint64_t MemoryBytes() const {
+    return groups_.capacity() * sizeof(Group) + rows_.capacity() * sizeof(Row) + excesses_.capacity() * sizeof(Pack) +
+           found_.capacity() * sizeof(Found);
+  }
 
   // Computes `most` of the candidates from `begin` on; `slack` is at least those of the nodes, and a candidate w has the error
   // `slack` |w| + `relative_error` |w|^2 / 2.
@@ -96,12 +105,27 @@ class NodeColumns {
   Largest FindLargest() const;
 
  private:
+  struct alignas(kLanes * sizeof(double)) Pack {
+    double values[kLanes];
+  };
+
+  void SetColumns(size_t i, const double* x, double slack) {
+    Group& group = groups_[i / kLanes];
+    const size_t lane = i % kLanes;
+    for (int axis = 0; axis < D; ++axis) {
+      group.x[axis][lane] = x[axis];
+    }
+    group.slack[lane] = slack;
+  }
   void MakeRoom();
   std::span<const Group> groups() const { return {groups_.data(), PaddedCount(count_) / kLanes}; }
 
   VectorUnit unit_;
   size_t count_ = 0;
-  std::vector<Group> groups_;  // more than are needed; places beyond the last node are as the class says
+  // More than are needed; places beyond the last node are as the class says.
+  std::vector<Group> groups_;
+  std::vector<Row> rows_;
+  std::vector<Pack> excesses_;
   std::vector<Found> found_;
 };
 
@@ -111,7 +135,8 @@ WELLSPACE_INLINE bool NodeColumns<D>::ComputeExcesses(const Point<D>& normal, do
                                                       double error) {
   using Lanes = typename Wide<kWidth>::Lanes;
   using Mask = typename Wide<kWidth>::Mask;
-  Group* group = groups_.data();
+  const Group* group = groups_.data();
+  Pack* excesses = excesses_.data();
   uint64_t any = 0;
   size_t left = PaddedCount(count_) / kLanes;
   for (Found* found = found_.data(); left > 0; ++found) {
@@ -123,7 +148,7 @@ WELLSPACE_INLINE bool NodeColumns<D>::ComputeExcesses(const Point<D>& normal, do
     for (size_t lane = 0; lane < kWidth; ++lane) {
       bits[lane] = int64_t{1} << lane;
     }
-    for (const Group* const end = group + groups; group < end; ++group) {
+    for (const Group* const end = group + groups; group < end; ++group, ++excesses) {
       for (size_t from = 0; from < kLanes; from += kWidth) {
         Lanes excess = LanesAt<kWidth>(group->x[0], from) * normal[0];
         for (int axis = 1; axis < D; ++axis) {
@@ -131,7 +156,7 @@ WELLSPACE_INLINE bool NodeColumns<D>::ComputeExcesses(const Point<D>& normal, do
         }
         excess -= offset;
         const Lanes doubt = LanesAt<kWidth>(group->slack, from) * length + error;
-        LanesAt<kWidth>(group->excess, from) = excess;
+        LanesAt<kWidth>(excesses->values, from) = excess;
         maybe |= (excess + doubt >= 0) & bits;
         surely |= (excess > doubt) & bits;
         bits <<= kWidth;

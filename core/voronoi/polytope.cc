@@ -49,7 +49,7 @@ void Polytope<D>::Reset(const Point<D>& site, const Box<D>& bounds, const std::a
     plane.offset = plane.source.coordinate - site[axis];
     plane.distance = std::abs(plane.offset);
   }
-  joints_.resize(std::max<size_t>(joints_.size(), 1 << D));
+  MakeRoomForNodes(1 << D);
   columns_.Resize(1 << D);
   for (int corner = 0; corner < (1 << D); ++corner) {
     Joint& joint = joints_[corner];
@@ -58,7 +58,7 @@ void Polytope<D>::Reset(const Point<D>& site, const Box<D>& bounds, const std::a
       const int face = FaceIndex(axis, ((corner >> axis) & 1) != 0);
       x[axis] = planes_[face].offset;
       joint.planes[axis] = static_cast<uint16_t>(face);
-      joint.ends[axis] = EndAt(corner ^ (1 << axis), axis);
+      opposite_[EndAt(corner, axis)] = EndAt(corner ^ (1 << axis), axis);
     }
     joint.is_placed = true;
     columns_.Set(corner, x, 16 * kUnit * std::sqrt(NormSq<D>(x)));
@@ -66,6 +66,14 @@ void Polytope<D>::Reset(const Point<D>& site, const Box<D>& bounds, const std::a
   is_placed_ = false;
   reach_ = std::numeric_limits<double>::infinity();
   SetReach(columns_.FindLargest());
+}
+
+template <int D>
+WELLSPACE_INLINE void Polytope<D>::MakeRoomForNodes(size_t count) {
+  if (joints_.size() < count) {
+    joints_.resize(2 * count);
+    opposite_.resize(EndAt(joints_.size(), 0));
+  }
 }
 
 template <int D>
@@ -80,6 +88,7 @@ void Polytope<D>::Swap(Polytope& other) noexcept {
   std::swap(plane_count_, other.plane_count_);
   std::swap(columns_, other.columns_);
   joints_.swap(other.joints_);
+  opposite_.swap(other.opposite_);
   nodes_.swap(other.nodes_);
   std::swap(cuts_, other.cuts_);
   std::swap(counters_, other.counters_);
@@ -87,8 +96,8 @@ void Polytope<D>::Swap(Polytope& other) noexcept {
 
 template <int D>
 bool Polytope<D>::CutOff(VertexId u, const Point<D>& position, const Point<D>& normal, double length_sq) {
-  return BestVectorUnit() == VectorUnit::kAvx2 ? CutOffAvx2(u, position, normal, length_sq)
-                                               : CutOffWith<2>(u, position, normal, length_sq);
+  return columns_.unit() == VectorUnit::kAvx2 ? CutOffAvx2(u, position, normal, length_sq)
+                                              : CutOffWith<2>(u, position, normal, length_sq);
 }
 
 template <int D>
@@ -128,9 +137,9 @@ WELLSPACE_INLINE bool Polytope<D>::CutOffWith(VertexId u, const Point<D>& positi
   plane.distance = 0.5 * length;
   plane.source.generator = position;
   plane.source.axis = -1;
-  FindCutEdges(index);
-  PlaceCutEdges(plane);
-  MakeNewNodes();
+  FindCutEdges();
+  PlaceCutEdges<kWidth>(index);
+  MakeNewNodes(index);
   if constexpr (D != 3) {
     LinkNewNodes();
   }
@@ -180,7 +189,7 @@ WELLSPACE_INLINE bool Polytope<D>::DecideDoubtful(const Point<D>& generator) {
 
 // Lists the nodes that are cut off, and the edges from those to others.
 template <int D>
-WELLSPACE_INLINE void Polytope<D>::FindCutEdges(uint16_t plane) {
+WELLSPACE_INLINE void Polytope<D>::FindCutEdges() {
   const auto found = columns_.found();
   removed_count_ = 0;
   for (const auto& word : found) {
@@ -189,30 +198,31 @@ WELLSPACE_INLINE void Polytope<D>::FindCutEdges(uint16_t plane) {
   if (cut_edges_.size() < removed_count_ * D) {
     removed_.resize(2 * removed_count_ * D);
     cut_edges_.resize(2 * removed_count_ * D);
+    placed_.resize(2 * removed_count_ * D);
   }
+  constexpr size_t kWordBits = NodeColumns<D>::kWordBits;
+  const End* const opposite = opposite_.data();
   Index* end = removed_.data();
   CutEdge* edge = cut_edges_.data();
-  size_t first = 0;  // node of the word
-  for (const auto& word : found) {
-    for (uint64_t removed = word.surely; removed != 0; removed &= removed - 1) {
-      const auto index = static_cast<Index>(first + std::countr_zero(removed));
-      const Joint& joint = joints_[index];
-      *end++ = index;
-      for (int k = 0; k < D; ++k) {
-        // No branch, since none could be foretold: about half of the neighbours are kept.
-        edge->kept = joint.ends[k];
-        edge->removed = index;
-        for (int i = 0; i < D - 1; ++i) {
-          edge->planes[i] = joint.planes[i + (i >= k ? 1 : 0)];
+  const auto list = [&](auto word_of) __attribute__((always_inline)) {
+    for (size_t word = 0; word < found.size(); ++word) {
+      for (uint64_t removed = found[word].surely; removed != 0; removed &= removed - 1) {
+        const auto index = static_cast<Index>(word * kWordBits + std::countr_zero(removed));
+        *end++ = index;
+        for (int k = 0; k < D; ++k) {
+          // No branch, since none could be foretold: about half of the neighbours are kept.
+          const End kept = opposite[EndAt(index, k)];
+          *edge = {kept, index};
+          const uint64_t is_removed = word_of(NodeOf(kept)) >> NodeOf(kept) % kWordBits & 1;
+          edge += 1 - is_removed;
         }
-        edge->planes[D - 1] = plane;
-        const size_t node = NodeOf(joint.ends[k]);
-        const uint64_t is_removed =
-            found[node / NodeColumns<D>::kWordBits].surely >> node % NodeColumns<D>::kWordBits & 1;
-        edge += 1 - is_removed;
       }
     }
-    first += NodeColumns<D>::kWordBits;
+  };
+  if (found.size() == 1) {  // as mostly
+    list([only = found[0].surely](size_t) { return only; });
+  } else {
+    list([found](size_t node) { return found[node / kWordBits].surely; });
   }
   cut_count_ = static_cast<size_t>(edge - cut_edges_.data());
 }
@@ -227,73 +237,106 @@ WELLSPACE_INLINE void Polytope<D>::FindCutEdges(uint16_t plane) {
 // rounding: of each coordinate of k + t d, of t and of t d, less than 4 u (|k| + |d|) <= 12 u R where R >= |k|, |r|. The
 // new slack has to hold 16 u |x| <= 16 u R of its own; 4 u R more pays for the roundings of the bound.
 template <int D>
-WELLSPACE_INLINE void Polytope<D>::PlaceCutEdges(const Plane<D>& plane) {
-  const double length = plane.length;
-  const double offset_error = kOffsetError<D> * plane.offset;
+template <size_t kWidth>
+WELLSPACE_INLINE void Polytope<D>::PlaceCutEdges(uint16_t plane) {
+  using Lanes = typename Wide<kWidth>::Lanes;
+  using Row = typename NodeColumns<D>::Row;
+  constexpr size_t kVectors = PaddedCount(D + 1) / kWidth;
+  const double length = planes_[plane].length;
+  const double offset_error = kOffsetError<D> * planes_[plane].offset;
   const double rounding = 32 * kUnit * reach_;
   const double most = kGoodPlace * reach_;
+  const auto excesses = columns_.excesses();
+  const auto rows = columns_.rows();
+  const CutEdge* const cut_edges = cut_edges_.data();
+  Row* const all_placed = placed_.data();
   double largest_slack = largest_slack_;
   for (size_t j = 0; j < cut_count_; ++j) {
-    CutEdge& edge = cut_edges_[j];
+    const CutEdge edge = cut_edges[j];
     const size_t node = NodeOf(edge.kept);
-    const double below = columns_.excess(node);
-    const double gap = columns_.excess(edge.removed) - below;
-    const double slack = std::max(columns_.slack(node), columns_.slack(edge.removed));
+    const double below = excesses[node];
+    const double gap = excesses[edge.removed] - below;
+    const Row& kept = rows[node];
+    const Row& removed = rows[edge.removed];
+    const double slack = std::max(kept.values[D], removed.values[D]);
     const double doubt = slack * length + offset_error;
     const double inverse = 1 / gap;
     const double t = -below * inverse;
-    const Point<D> kept = columns_.x(node);
-    const Point<D> removed = columns_.x(edge.removed);
+    Lanes along[kVectors];  // the difference of the slacks, too
+    Lanes x[kVectors];
+    for (size_t v = 0; v < kVectors; ++v) {
+      along[v] = LanesAt<kWidth>(removed.values, v * kWidth) - LanesAt<kWidth>(kept.values, v * kWidth);
+      x[v] = LanesAt<kWidth>(kept.values, v * kWidth) + t * along[v];
+    }
     double distance = 2 * slack;
     for (int i = 0; i < D; ++i) {
-      const double d = removed[i] - kept[i];
-      edge.x[i] = kept[i] + t * d;
-      distance += std::abs(d);
+      distance += std::abs(along[i / kWidth][i % kWidth]);
     }
-    edge.slack = slack + rounding + 1.01 * doubt * inverse * distance;
-    if (!((t > 0) & (t < 1) & (gap > 256 * doubt) & (edge.slack < most))) {
-      const std::array<uint32_t, D> ranks = RanksOf(edge.planes);
+    double new_slack = slack + rounding + 1.01 * doubt * inverse * distance;
+    Row& placed = all_placed[j];
+    if ((t > 0) & (t < 1) & (gap > 256 * doubt) & (new_slack < most)) {
+      x[D / kWidth][D % kWidth] = new_slack;
+      for (size_t v = 0; v < kVectors; ++v) {
+        LanesAt<kWidth>(placed.values, v * kWidth) = x[v];
+      }
+    } else {
+      const std::array<uint16_t, D> indices = PlanesOn(edge.kept, plane);
+      const std::array<uint32_t, D> ranks = RanksOf(indices);
       std::array<uint16_t, D> planes;
       for (int k = 0; k < D; ++k) {
-        planes[ranks[k]] = edge.planes[k];
+        planes[ranks[k]] = indices[k];
       }
-      edge.slack = PlaceByPlanes(planes, edge.x);
+      Point<D> exact;
+      new_slack = PlaceByPlanes(planes, exact);
+      std::copy(exact.begin(), exact.end(), placed.values);
+      placed.values[D] = new_slack;
     }
-    largest_slack = std::max(largest_slack, edge.slack);
+    largest_slack = std::max(largest_slack, new_slack);
   }
   largest_slack_ = largest_slack;
+}
+
+// The planes of a new node: those that the edge at an end runs along, then the new one.
+template <int D>
+WELLSPACE_INLINE std::array<uint16_t, D> Polytope<D>::PlanesOn(End kept, uint16_t plane) const {
+  const Joint& joint = joints_[NodeOf(kept)];
+  const size_t slot = SlotOf(kept);
+  std::array<uint16_t, D> planes;
+  for (size_t i = 0; i < D - 1; ++i) {
+    const size_t is_beyond =
+        (slot - 1 - i) >> (std::numeric_limits<size_t>::digits - 1);  // i >= slot, without a branch
+    planes[i] = joint.planes[i + is_beyond];
+  }
+  planes[D - 1] = plane;
+  return planes;
 }
 
 // One new node on each cut edge. They take the places of removed nodes first; what is left over goes to the end, so that
 // the nodes stay without holes.
 template <int D>
-WELLSPACE_INLINE void Polytope<D>::MakeNewNodes() {
+WELLSPACE_INLINE void Polytope<D>::MakeNewNodes(uint16_t plane) {
   if (D != 3 && new_.size() < cut_count_) {
     new_.resize(2 * cut_count_);
   }
   const size_t old = columns_.count();
   columns_.Resize(std::max(old, old + cut_count_ - removed_count_));
-  if (joints_.size() < columns_.count()) {
-    joints_.resize(2 * columns_.count());
+  MakeRoomForNodes(columns_.count());
+  if (D == 3 && waiting_.size() < plane_count_) {
+    waiting_.resize(2 * plane_count_, kNoEnd);
   }
-  if (D == 3 && ends_.size() < plane_count_) {
-    ends_.resize(2 * plane_count_, 0);
-  }
-  Joint* const joints = joints_.data();
   size_t joined = 0;
   for (size_t j = 0; j < cut_count_; ++j) {
-    const CutEdge& edge = cut_edges_[j];
+    const End kept = cut_edges_[j].kept;
     // No branch, since none could be foretold.
     const size_t added = old + j - removed_count_;
     const size_t index = added ^ ((added ^ removed_[j]) & -static_cast<size_t>(j < removed_count_));
-    Joint& joint = joints[index];
-    joint.planes = edge.planes;
-    joint.ends[D - 1] = edge.kept;
+    Joint& joint = joints_[index];
+    joint.planes = PlanesOn(kept, plane);
     joint.is_placed = false;
-    joints[NodeOf(edge.kept)].ends[SlotOf(edge.kept)] = EndAt(index, D - 1);
-    columns_.Set(index, edge.x, edge.slack);
+    Join(EndAt(index, D - 1), kept);
+    columns_.Set(index, placed_[j]);
     if constexpr (D == 3) {
-      joined += Link(index, edge.planes);
+      joined += Link(index, joint.planes);
     } else {
       new_[j] = static_cast<Index>(index);
     }
@@ -308,15 +351,15 @@ WELLSPACE_INLINE void Polytope<D>::MakeNewNodes() {
 // since none could be foretold.
 template <int D>
 WELLSPACE_INLINE size_t Polytope<D>::Link(size_t node, const std::array<uint16_t, D>& planes) {
-  size_t joined = 0;
+  uint32_t joined = 0;
   for (uint32_t slot = 0; slot < 2; ++slot) {
     const End end = EndAt(node, slot);
-    uint32_t& waiting = ends_[planes[1 - slot]];
-    const uint32_t is_joined = waiting != 0 ? 1 : 0;
-    const End other = end ^ ((end ^ (waiting - 1)) & -is_joined);  // itself, if none waits
+    End& waiting = waiting_[planes[1 - slot]];
+    const uint32_t mask = waiting < kNoEnd ? ~0u : 0u;  // whether one waits
+    const End other = end ^ ((end ^ waiting) & mask);   // itself, if none does
+    waiting = end | mask;
     Join(end, other);
-    waiting = (end + 1) & (is_joined - 1);
-    joined += is_joined;
+    joined -= mask;
   }
   return joined;
 }
@@ -330,10 +373,10 @@ void Polytope<D>::FillHoles(size_t filled) {
     const Index hole = removed_[i];
     const size_t last = --count;
     if (hole != last) {
-      const Joint& joint = joints_[hole] = joints_[last];
-      columns_.Set(hole, columns_.x(last), columns_.slack(last));
+      joints_[hole] = joints_[last];
+      columns_.Set(hole, columns_.row(last));
       for (uint32_t k = 0; k < D; ++k) {
-        joints_[NodeOf(joint.ends[k])].ends[SlotOf(joint.ends[k])] = EndAt(hole, k);
+        Join(EndAt(hole, k), opposite_[EndAt(last, k)]);
       }
     }
   }
@@ -379,7 +422,7 @@ void Polytope<D>::PlaceThose(Wants wants) {
     node.reach = std::sqrt(node.radius_sq) + node.slack;
     node.planes = joint.planes;
     for (int k = 0; k < D; ++k) {
-      node.neighbours[k] = static_cast<Index>(NodeOf(joint.ends[k]));
+      node.neighbours[k] = static_cast<Index>(NodeOf(opposite_[EndAt(i, k)]));
     }
   }
   SetReach(columns_.FindLargest());
@@ -390,12 +433,13 @@ template <int D>
 void Polytope<D>::PlaceNode(size_t node) {
   Joint& joint = joints_[node];
   joint.is_placed = true;
-  const Joint old = joint;
-  const std::array<uint32_t, D> ranks = RanksOf(old.planes);
+  const std::array<uint16_t, D> planes = joint.planes;
+  std::array<End, D> ends;
+  std::copy_n(&opposite_[EndAt(node, 0)], D, ends.begin());
+  const std::array<uint32_t, D> ranks = RanksOf(planes);
   for (int k = 0; k < D; ++k) {
-    joint.planes[ranks[k]] = old.planes[k];
-    joint.ends[ranks[k]] = old.ends[k];
-    joints_[NodeOf(old.ends[k])].ends[SlotOf(old.ends[k])] = EndAt(node, ranks[k]);
+    joint.planes[ranks[k]] = planes[k];
+    Join(EndAt(node, ranks[k]), ends[k]);
   }
   Point<D> x;
   const double slack = PlaceByPlanes(joint.planes, x);
@@ -455,7 +499,7 @@ WELLSPACE_INLINE void Polytope<D>::LinkNewNodes() {
       for (uint32_t slot = 0; slot < D - 1; ++slot) {
         std::array<uint16_t, D - 2> along;
         for (uint32_t k = 0; k < D - 2; ++k) {
-          along[k] = cut_edges_[j].planes[k + (k >= slot ? 1 : 0)];
+          along[k] = joints_[new_[j]].planes[k + (k >= slot ? 1 : 0)];
         }
         std::sort(along.begin(), along.end());
         Ridge ridge{0, EndAt(new_[j], slot)};
@@ -479,9 +523,9 @@ WELLSPACE_INLINE void Polytope<D>::LinkNewNodes() {
 }
 
 template <int D>
-void Polytope<D>::Join(End a, End b) {
-  joints_[NodeOf(a)].ends[SlotOf(a)] = b;
-  joints_[NodeOf(b)].ends[SlotOf(b)] = a;
+WELLSPACE_INLINE void Polytope<D>::Join(End a, End b) {
+  opposite_[a] = b;
+  opposite_[b] = a;
 }
 
 template <int D>

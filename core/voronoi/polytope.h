@@ -202,7 +202,7 @@ class Polytope {
   // What the cell takes in memory, roughly, but for itself.
   uint64_t MemoryBytes() const {
     return planes_.capacity() * sizeof(Plane<D>) + nodes_.capacity() * sizeof(CellNode<D>) +
-           joints_.capacity() * sizeof(Joint) + columns_.MemoryBytes();
+           joints_.capacity() * sizeof(Joint) + opposite_.capacity() * sizeof(End) + columns_.MemoryBytes();
   }
 
  private:
@@ -211,24 +211,21 @@ class Polytope {
 
   // One end of an edge: the edge leaves planes[slot] of the node. node << kSlotBits | slot.
   using End = uint32_t;
-  static constexpr int kSlotBits = 3;
+  static constexpr int kSlotBits = D <= 4 ? 2 : 3;
   static End EndAt(size_t node, uint32_t slot) { return static_cast<End>(node) << kSlotBits | slot; }
+  static constexpr End kNoEnd = ~End{0};
   static size_t NodeOf(End end) { return end >> kSlotBits; }
   static size_t SlotOf(End end) { return end & ((1u << kSlotBits) - 1); }
 
-  // What a node is, but for where: where its planes meet.
+  // What a node is, but for where and beside whom: where its planes meet.
   struct Joint {
     std::array<uint16_t, D> planes;  // by index, as in CellNode once placed
-    std::array<End, D> ends;         // ends[k]: the other end of the edge that leaves planes[k]
     bool is_placed = false;          // the position is the one that the planes alone give
   };
-  // An edge between a node that stays and one that goes, and the node that is to be on it.
+  // An edge between a node that stays and one that goes.
   struct CutEdge {
-    End kept = 0;                    // the end that stays
-    uint32_t removed = 0;            // the other node
-    std::array<uint16_t, D> planes;  // that the edge runs along, and the new one
-    Point<D> x;
-    double slack = 0;
+    End kept = 0;          // the end that stays
+    uint32_t removed = 0;  // the other node
   };
   // An end that lacks the other one, with the D - 2 planes that its edge runs along beside the new one, ascending, 16
   // bits each.
@@ -243,17 +240,20 @@ class Polytope {
   bool CutOffWith(VertexId u, const Point<D>& position, const Point<D>& normal, double length_sq);
   bool IsCutOff(const Joint& node, const Point<D>& generator);
   bool DecideDoubtful(const Point<D>& generator);
-  void FindCutEdges(uint16_t plane);
-  void PlaceCutEdges(const Plane<D>& plane);
+  void FindCutEdges();
+  template <size_t kWidth>
+  void PlaceCutEdges(uint16_t plane);
+  std::array<uint16_t, D> PlanesOn(End kept, uint16_t plane) const;
   std::array<uint32_t, D> RanksOf(const std::array<uint16_t, D>& indices) const;
   bool SurelyKeeps(size_t node, double ratio) const;
   template <typename Wants>
   void PlaceThose(Wants wants);
   void PlaceNode(size_t node);
   double PlaceByPlanes(const std::array<uint16_t, D>& indices, Point<D>& x) const;
-  void MakeNewNodes();
+  void MakeNewNodes(uint16_t plane);
   size_t Link(size_t node, const std::array<uint16_t, D>& planes);
   void LinkNewNodes();
+  void MakeRoomForNodes(size_t count);
   void Join(End a, End b);
   void FillHoles(size_t filled);
   void SetReach(const typename NodeColumns<D>::Largest& largest);
@@ -268,6 +268,7 @@ class Polytope {
   size_t plane_count_ = 0;
   NodeColumns<D> columns_;          // by node
   std::vector<Joint> joints_;       // by node, and more
+  std::vector<End> opposite_;       // by end, and more: the other end of its edge
   std::vector<CellNode<D>> nodes_;  // by node, as of the last that placed any
   uint64_t cuts_ = 0;
   DecisionCounters counters_;
@@ -276,10 +277,11 @@ class Polytope {
   std::vector<Index> removed_;  // ascending
   size_t removed_count_ = 0;
   std::vector<CutEdge> cut_edges_;
+  std::vector<typename NodeColumns<D>::Row> placed_;  // by cut edge: the node that is to be on it
   size_t cut_count_ = 0;
   std::vector<Index> new_;  // the nodes on them; D != 3
-  // By the plane that an edge runs along, one more than its end; all 0 between cuts; D = 3.
-  std::vector<uint32_t> ends_;
+  // By the plane that an edge of the new facet runs along beside the new one, an end that lacks the other one; all kNoEnd between cuts; D = 3.
+  std::vector<End> waiting_;
   std::vector<Ridge> ridges_;  // D > 3
 };
 

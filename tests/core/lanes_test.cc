@@ -96,12 +96,12 @@ TYPED_TEST(LanesTest, EveryUnitComputesTheSame) {
       ASSERT_EQ(baseline.template ComputeExcesses<2>(normal, offset, length, 1e-9),
                 ComputeExcessesAvx2<D>(normal, offset, length, 1e-9, wide));
       for (size_t i = 0; i < count; ++i) {
-        ASSERT_EQ(baseline.excess(i), wide.excess(i));
+        ASSERT_EQ(baseline.excesses()[i], wide.excesses()[i]);
         const double doubt = baseline.slack(i) * length + 1e-9;
         for (auto* columns : {&baseline, &wide}) {
           const auto& found = columns->found()[i / NodeColumns<D>::kWordBits];
-          ASSERT_EQ((found.maybe >> i % NodeColumns<D>::kWordBits) & 1, columns->excess(i) + doubt >= 0 ? 1u : 0u);
-          ASSERT_EQ((found.surely >> i % NodeColumns<D>::kWordBits) & 1, columns->excess(i) > doubt ? 1u : 0u);
+          ASSERT_EQ((found.maybe >> i % NodeColumns<D>::kWordBits) & 1, columns->excesses()[i] + doubt >= 0 ? 1u : 0u);
+          ASSERT_EQ((found.surely >> i % NodeColumns<D>::kWordBits) & 1, columns->excesses()[i] > doubt ? 1u : 0u);
         }
       }
       Point<D> low = DrawPoint<D>(random);
