@@ -60,7 +60,7 @@ absl::StatusOr<Box<D>> BoxAround(std::span<const double> points, double margin, 
 // A cloud without its duplicates, in the order that the query structure wants.
 template <int D>
 struct SortedCloud {
-  MortonGrid<D> grid;
+  MortonGrid<D> grid;                  // for so many inputs
   std::vector<Point<D>> points;        // distinct, in Morton order, scaled
   std::vector<uint32_t> first_input;   // by sorted point: the first input equal to it
   std::vector<uint32_t> sorted_index;  // by input: its sorted point

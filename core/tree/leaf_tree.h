@@ -104,6 +104,7 @@ class LeafTree {
     }
     return cube;
   }
+  const Point<D>& LowOf(NodeId node) const { return At(node).low; }
   int level(NodeId node) const { return At(node).level; }
   double SideOf(NodeId node) const { return SideOf(At(node)); }
   // What a point of Build that lies in `leaf` is away from the others, and from the faces of the box that it does not lie on, at least.

@@ -6,6 +6,7 @@
 
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
+#include "core/voronoi/lanes.h"
 
 namespace wellspace::core {
 
@@ -26,6 +27,31 @@ void Prefetch(const LeafTree<D>& tree, NodeId leaf) {
     }
     __builtin_prefetch(bucket->ids);
   }
+}
+
+// DistanceSq of `p` and the cube of a node, two axes at a time.
+template <int D>
+WELLSPACE_INLINE double DistanceSqTo(const LeafTree<D>& tree, NodeId node, const Point<D>& p) {
+  using Pair = Wide<2>::Lanes;
+  const double side = tree.SideOf(node);
+  const Point<D>& low = tree.LowOf(node);
+  double distance_sq = 0;
+  for (int axis = 0; axis < D; axis += 2) {
+    const bool is_pair = axis + 1 < D;
+    const Pair at = {p[axis], is_pair ? p[axis + 1] : 0};
+    const Pair least = {low[axis], is_pair ? low[axis + 1] : 0};
+    const Pair most = least + (is_pair ? Pair{side, side} : Pair{side, 0});
+    const Pair below = least - at;
+    const Pair above = at - most;
+    Pair away = below > above ? below : above;
+    away = away > 0 ? away : Pair{};
+    const Pair away_sq = away * away;
+    distance_sq += away_sq[0];
+    if (is_pair) {
+      distance_sq += away_sq[1];
+    }
+  }
+  return distance_sq;
 }
 
 // Whether `p` is farther from the faces of `cube` than a distance, by its square.
@@ -189,7 +215,7 @@ void QueryStructure<D>::ScanOutward(const Point<D>& site, NodeId own, Workspace<
       // No branch, since none could be foretold.
       const bool is_new = seen[Index(beyond)] != workspace.query;
       seen[Index(beyond)] = workspace.query;
-      const double distance_sq = DistanceSq<D>(site, tree_.BoxOf(beyond));
+      const double distance_sq = DistanceSqTo<D>(tree_, beyond, site);
       queue.PushIf(is_new & (distance_sq <= limit_sq), distance_sq, beyond);
     };
     if constexpr (D == 2) {
