@@ -35,7 +35,6 @@ class MortonGrid {
       magnitude = std::max({magnitude, std::abs(box.low[i]), std::abs(box.high[i])});
     }
     const int exponent = std::ilogb(magnitude) + 1 - kBits;  // magnitude / step < 2^kBits
-    step_ = std::ldexp(1.0, exponent);
     per_quarter_ = std::ldexp(1.0, 2 - exponent);
     std::array<int64_t, D> reach;  // of the box, in quarters of a step
     for (int i = 0; i < D; ++i) {
@@ -53,7 +52,7 @@ class MortonGrid {
   }
 
   const Box<D>& box() const { return box_; }
-  double step() const { return step_; }
+  double step() const { return 4 / per_quarter_; }
   double quantum() const { return static_cast<double>(side_) / per_quarter_; }
   int levels() const { return levels_; }
   const Point<D>& root_low() const { return root_low_; }
@@ -115,8 +114,7 @@ class MortonGrid {
   }
 
   Box<D> box_;
-  double step_ = 0;
-  double per_quarter_ = 0;  // 4 / step_, a power of two too
+  double per_quarter_ = 0;  // of a step: a power of two
   int64_t side_ = 4;        // of a cube, in quarters of a step
   uint64_t per_side_ = 0;   // 2^64 / side_, rounded up
   int levels_ = 0;

@@ -61,7 +61,6 @@ class NodeColumns {
     SetColumns(i, row.values, row.values[D]);
   }
 
-  const Row& row(size_t i) const { return rows_[i]; }
   std::span<const Row> rows() const { return {rows_.data(), count_}; }
   Point<D> x(size_t i) const {
     Point<D> x;

@@ -374,7 +374,7 @@ void Polytope<D>::FillHoles(size_t filled) {
     const size_t last = --count;
     if (hole != last) {
       joints_[hole] = joints_[last];
-      columns_.Set(hole, columns_.row(last));
+      columns_.Set(hole, columns_.rows()[last]);
       for (uint32_t k = 0; k < D; ++k) {
         Join(EndAt(hole, k), opposite_[EndAt(last, k)]);
       }

@@ -12,7 +12,7 @@ namespace {
 
 // Averages over the queries of one run. Visits and cuts are divided by simplices per vertex, a measure of the cells themselves: a cell
 // at the box has fewer nodes, and the share of vertices there falls slowly. (In 3-D, uniform points have 4.6 simplices a vertex for
-// n = 10^3 and 6.1 for 10^6; unbounded meshes have 6.5. The plain visits a query rise likewise, from 68 to 94, and end there.)
+// n = 10^3 and 6.1 for 10^6; unbounded meshes have 6.5. The plain visits a query rise likewise, from 88 to 125, and end there.)
 struct Work {
   double queries_per_vertex;
   double visits_per_query;  // leaves and vertices, since the size of leaves shifts one to the other
@@ -35,7 +35,7 @@ Work WorkOf(const core::MeshStatistics& s) {
 }  // namespace
 
 void ExpectConstantWork(std::string_view kind, int dimension, std::span<const size_t> sizes) {
-  // Measured from 10^3 to 10^6: at most 1.12 (cuts of clusters in 3-D). What grew like log n would double.
+  // Measured from 10^3 to 10^6: at most 1.15 (visits of uniform points in 3-D). What grew like log n would double.
   constexpr double kMostGrowth = 1.25;
   std::vector<Work> work;
   for (const size_t n : sizes) {
