@@ -122,7 +122,8 @@ void Refinement<D>::VertexAdded(VertexId x) {
   }
   radius_sq_.resize(structure_.vertex_count(), Assessment::kNone);
   announced_.resize(structure_.vertex_count(), Announced::kToNone);
-  ScheduleNew(x, structure_.ApproximateNearestNeighbor(x, own_).distance_sq);
+  const Neighbor nearest = structure_.ApproximateNearestNeighbor(x, own_);
+  ScheduleNew(nearest.vertex, x, nearest.distance_sq);
 }
 
 template <int D>
@@ -173,6 +174,7 @@ absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& t
     }
   });
   WELLSPACE_RETURN_IF_ERROR(context_->Check());
+  schedule_.Begin(count);
   for (uint32_t i = 0; i < count; ++i) {
     schedule_.Add(VertexId{i}, first_sq[i]);
   }
@@ -193,10 +195,11 @@ double Refinement<D>::FirstEdgeSq(const Demands<D>& demands, VertexId v, double 
   return std::min(first_sq, size_sq / (demands.rho * demands.rho));
 }
 
-// Schedules the new vertex `x`, whose nearest neighbour is as near as it says, and at once those on a face of x that remember
+// Schedules the new vertex `x`, which is near `near` and whose nearest neighbour is as near as it says, and at once those on a face of x that remember
 // a node there which x cuts off: they may have to look sooner than x. Where nodes are not known x is announced for that.
 template <int D>
-void Refinement<D>::ScheduleNew(VertexId x, double nearest_sq) {
+void Refinement<D>::ScheduleNew(VertexId near, VertexId x, double nearest_sq) {
+  schedule_.PutBeside(near, x);
   const Point<D>& p = structure_.point(x);
   const double around = kAround * std::sqrt(nearest_sq);
   if (structure_.faces(x) != 0) {
@@ -450,7 +453,7 @@ absl::Status Refinement<D>::Insert(const Request& request, Polytope<D>& cell) {
   announced_.push_back(Announced::kToNone);
   context_->SetVertices(structure_.vertex_count());
   cell.CutBeforePlace(insertion.vertex, point.position);
-  ScheduleNew(insertion.vertex, point.empty_radius_sq);
+  ScheduleNew(insertion.near, insertion.vertex, point.empty_radius_sq);
   if (*observer_) {
     (*observer_)(structure_, insertion);
   }

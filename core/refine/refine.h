@@ -133,7 +133,7 @@ class Refinement {
   absl::Status Insert(const Request& request, Polytope<D>& cell);
   bool IsLongEnough(const SteinerPoint<D>& point) const { return point.empty_radius_sq >= min_edge_ * min_edge_; }
   void Settle(VertexId v, const Assessment& found, double clip, int earliest, const Look<D>& look);
-  void ScheduleNew(VertexId x, double nearest_sq);
+  void ScheduleNew(VertexId near, VertexId x, double nearest_sq);
   void Remember(VertexId v, double radius_sq, std::span<const WatchedNode<D>> watched = {});
   std::span<const WatchedNode<D>> NodesToWatch(VertexId v, const Polytope<D>& cell, double edge_sq);
   void Announce(VertexId v, const Polytope<D>& cell, const Assessment& found);

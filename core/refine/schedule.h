@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <numeric>
+#include <utility>
 #include <vector>
 
 #include "core/base/ids.h"
@@ -16,11 +18,17 @@ namespace wellspace::core {
 // Buckets are one power of two of the squared length wide, the square root of 2 in length. (The paper has 2: finer
 // buckets make smaller meshes for more work.) Powers of two need no logarithm, so that all machines sort alike.
 //
+// What waits in a bucket has come there in several passes over the mesh. So that it is served in one, a bucket is put in order by blocks of vertices that
+// are near each other, once, when all buckets below it have been emptied for the first time.
+//
 // Thread safety: thread-compatible.
-// Invariants: (1) a vertex waits in one bucket at most; (2) Pop takes from the lowest bucket that is not empty, the
-// last come first.
+// Invariants: (1) a vertex waits in one bucket at most; (2) Pop takes from the lowest bucket that is not empty, those first that came after it was put
+// in order; then the last block first; the last come first of each.
 class Schedule {
  public:
+  // Vertices in a block, if there are not so many that blocks could not be numbered: what a scan reads of them fits into a cache of the second level.
+  static constexpr uint32_t kBlockSize = 512;
+
   // Lengths below `shortest` fall into the lowest bucket.
   explicit Schedule(double shortest) : first_exponent_(std::ilogb(shortest * shortest)) {}
 
@@ -29,18 +37,32 @@ class Schedule {
   // The squared length at which `bucket` ends.
   double UpperLengthSq(int bucket) const { return std::ldexp(1.0, first_exponent_ + bucket + 1); }
 
+  // Has buckets put in order again. Vertices below `count` that are in no block yet are put into blocks by their numbers.
+  void Begin(uint32_t count) {
+    in_order_ = 0;
+    const uint32_t size = std::max(kBlockSize, count / kMostBlocks + 1);
+    for (auto v = static_cast<uint32_t>(places_.size()); v < count; ++v) {
+      places_.push_back({kNowhere, static_cast<uint16_t>(v / size)});
+    }
+  }
+
+  // Puts `v`, which is new, into the block of `near`.
+  void PutBeside(VertexId near, VertexId v) {
+    MakeRoomFor(std::max(near, v));
+    places_[Index(v)].block = places_[Index(near)].block;
+  }
+
   // Puts `v` in the bucket of a length, unless it waits in that one or a lower one already.
   void Add(VertexId v, double length_sq) { AddToBucket(v, BucketOf(length_sq)); }
 
   void AddToBucket(VertexId v, int bucket) {
-    if (Index(v) >= waits_in_.size()) {
-      waits_in_.resize(Index(v) + 1, kNowhere);
-    }
-    if (waits_in_[Index(v)] <= bucket) {
+    MakeRoomFor(v);
+    int16_t& waits_in = places_[Index(v)].bucket;
+    if (waits_in <= bucket) {
       return;
     }
-    size_ += waits_in_[Index(v)] == kNowhere ? 1 : 0;
-    waits_in_[Index(v)] = static_cast<int16_t>(bucket);
+    size_ += waits_in == kNowhere ? 1 : 0;
+    waits_in = static_cast<int16_t>(bucket);
     if (static_cast<size_t>(bucket) >= buckets_.size()) {
       buckets_.resize(bucket + 1);
     }
@@ -49,18 +71,18 @@ class Schedule {
   }
 
   // Whether `v` waits in a bucket below `bucket`.
-  bool WaitsBelow(VertexId v, int bucket) const { return Index(v) < waits_in_.size() && waits_in_[Index(v)] < bucket; }
+  bool WaitsBelow(VertexId v, int bucket) const { return BucketHolding(v) < bucket; }
 
   // Whether a vertex may wait below `bucket`: never right after Pop took one from there, until one is added.
   bool HasBelow(int bucket) const { return lowest_ < bucket; }
 
-  bool Waits(VertexId v) const { return Index(v) < waits_in_.size() && waits_in_[Index(v)] != kNowhere; }
+  bool Waits(VertexId v) const { return BucketHolding(v) != kNowhere; }
 
   // How many vertices wait.
   size_t size() const { return size_; }
 
   // What the schedule takes in memory, but for what has moved on.
-  uint64_t MemoryBytes() const { return waits_in_.size() * sizeof(int16_t) + size_ * sizeof(VertexId); }
+  uint64_t MemoryBytes() const { return places_.size() * sizeof(Place) + size_ * sizeof(VertexId); }
 
   // Calls f(VertexId) for vertices that wait in `bucket`, the lowest where any do, in the order in which they will be
   // taken if none is added, until it returns false. One may be seen twice.
@@ -68,7 +90,7 @@ class Schedule {
   void ForEachNext(int bucket, F&& f) const {
     const std::vector<VertexId>& waiting = buckets_[bucket];
     for (size_t i = waiting.size(); i-- > 0;) {
-      if (waits_in_[Index(waiting[i])] == bucket && !f(waiting[i])) {
+      if (BucketHolding(waiting[i]) == bucket && !f(waiting[i])) {
         return;
       }
     }
@@ -77,11 +99,15 @@ class Schedule {
   // Takes a vertex from the lowest bucket; false when none waits.
   bool Pop(VertexId& v, int& bucket) {
     for (; static_cast<size_t>(lowest_) < buckets_.size(); ++lowest_) {
+      if (lowest_ >= in_order_) {
+        PutInOrder(buckets_[lowest_]);
+        in_order_ = lowest_ + 1;
+      }
       while (!buckets_[lowest_].empty()) {
         v = buckets_[lowest_].back();
         buckets_[lowest_].pop_back();
-        if (waits_in_[Index(v)] == lowest_) {  // else it has moved to a lower bucket since
-          waits_in_[Index(v)] = kNowhere;
+        if (BucketHolding(v) == lowest_) {  // else it has moved to a lower bucket since
+          places_[Index(v)].bucket = kNowhere;
           --size_;
           bucket = lowest_;
           return true;
@@ -93,12 +119,43 @@ class Schedule {
 
  private:
   static constexpr int16_t kNowhere = std::numeric_limits<int16_t>::max();
+  static constexpr uint32_t kMostBlocks = uint32_t{1} << 16;
+
+  struct Place {
+    int16_t bucket = kNowhere;
+    uint16_t block = 0;
+  };
+
+  int16_t BucketHolding(VertexId v) const { return Index(v) < places_.size() ? places_[Index(v)].bucket : kNowhere; }
+
+  void MakeRoomFor(VertexId v) {
+    if (Index(v) >= places_.size()) {
+      places_.resize(Index(v) + 1);
+    }
+  }
+
+  // Sorts by block, and leaves the order within each as it is: by counting.
+  void PutInOrder(std::vector<VertexId>& bucket) {
+    const auto block_of = [this](VertexId v) -> size_t { return places_[Index(v)].block; };
+    std::vector<uint32_t> begins;  // by block
+    for (const VertexId v : bucket) {
+      begins.resize(std::max(begins.size(), block_of(v) + 1));
+      ++begins[block_of(v)];
+    }
+    std::exclusive_scan(begins.begin(), begins.end(), begins.begin(), uint32_t{0});
+    std::vector<VertexId> sorted(bucket.size());
+    for (const VertexId v : bucket) {
+      sorted[begins[block_of(v)]++] = v;
+    }
+    bucket = std::move(sorted);
+  }
 
   int first_exponent_;
   int lowest_ = 0;
+  int in_order_ = 0;  // buckets below have been put in order
   size_t size_ = 0;
   std::vector<std::vector<VertexId>> buckets_;
-  std::vector<int16_t> waits_in_;
+  std::vector<Place> places_;  // by vertex
 };
 
 }  // namespace wellspace::core

@@ -425,5 +425,88 @@ TEST(ScheduleTest, BehavesAsItsModel) {
   }
 }
 
+// By blocks of numbers, what is new in that of its neighbour; the last come first in each, and before all of them what comes
+// later.
+TEST(ScheduleTest, BucketsArePutInOrderByBlocksOnce) {
+  constexpr uint32_t kBlocks = 5;
+  constexpr uint32_t kCount = kBlocks * Schedule::kBlockSize;
+  constexpr int kBucket = 3;
+  const uint64_t seed = Seed(4712);
+  SCOPED_TRACE("seed " + std::to_string(seed));
+  SplitMix64 random(seed);
+  Schedule schedule(1);
+  std::vector<uint32_t> block_of(kCount);
+  for (uint32_t v = 0; v < kCount; ++v) {
+    block_of[v] = v / Schedule::kBlockSize;
+  }
+  for (int round = 0; round < 2; ++round) {
+    schedule.Begin(kCount);
+    const auto new_vertex = [&](VertexId near) {
+      const VertexId v{static_cast<uint32_t>(block_of.size())};
+      schedule.PutBeside(near, v);
+      block_of.push_back(block_of[Index(near)]);
+      return v;
+    };
+    std::vector<VertexId> come;
+    for (uint32_t v = 0; v < kCount; ++v) {
+      come.push_back(VertexId{v});
+    }
+    for (int i = 0; i < 100; ++i) {
+      come.push_back(new_vertex(VertexId{static_cast<uint32_t>(random.Below(kCount))}));
+    }
+    for (size_t i = come.size(); i-- > 1;) {
+      std::swap(come[i], come[random.Below(i + 1)]);
+    }
+    for (const VertexId v : come) {
+      schedule.AddToBucket(v, kBucket);
+    }
+    const VertexId lowest = new_vertex(VertexId{0});
+    schedule.AddToBucket(lowest, 0);
+    std::stable_sort(come.begin(), come.end(),
+                     [&](VertexId a, VertexId b) { return block_of[Index(a)] < block_of[Index(b)]; });
+    VertexId v{};
+    int bucket = -1;
+    ASSERT_TRUE(schedule.Pop(v, bucket));
+    ASSERT_EQ(v, lowest);
+    while (!come.empty()) {
+      ASSERT_TRUE(schedule.Pop(v, bucket));
+      ASSERT_EQ(bucket, kBucket);
+      ASSERT_EQ(v, come.back());
+      come.pop_back();
+      if (random.Below(100) == 0) {
+        come.push_back(new_vertex(VertexId{static_cast<uint32_t>(random.Below(kCount))}));
+        schedule.AddToBucket(come.back(), kBucket);
+      }
+      if (random.Below(100) == 0) {  // a lower one between does not put this one in order again
+        schedule.AddToBucket(lowest, 1);
+        ASSERT_TRUE(schedule.Pop(v, bucket));
+        ASSERT_EQ(v, lowest);
+      }
+    }
+    ASSERT_FALSE(schedule.Pop(v, bucket));
+  }
+}
+
+// As many vertices as there can be do not need more blocks than can be numbered.
+TEST(ScheduleTest, BlocksGrowWithTheNumberOfVertices) {
+  Schedule schedule(1);
+  constexpr uint32_t kCount = (Schedule::kBlockSize << 16) + 1;
+  schedule.Begin(kCount);
+  std::vector<VertexId> expected;
+  for (const uint32_t v : {uint32_t{0}, kCount / 2, kCount - 1}) {
+    expected.push_back(VertexId{v});
+  }
+  schedule.AddToBucket(expected[1], 0);
+  schedule.AddToBucket(expected[0], 0);
+  schedule.AddToBucket(expected[2], 0);
+  VertexId v{};
+  int bucket = -1;
+  while (!expected.empty()) {
+    ASSERT_TRUE(schedule.Pop(v, bucket));
+    ASSERT_EQ(v, expected.back());
+    expected.pop_back();
+  }
+}
+
 }  // namespace
 }  // namespace wellspace::core
