@@ -12,7 +12,6 @@
 #include "absl/strings/str_join.h"
 #include "core/base/cancellable_sort.h"
 #include "core/base/dimensions.h"
-#include "core/base/huge_pages.h"
 #include "core/base/status_macros.h"
 #include "core/tree/morton.h"
 
@@ -86,7 +85,7 @@ absl::Status CheckFaces(const Domain<D>& domain, const Point<D>& p, std::span<co
 
 // Sorts those among `entries`, which are in the order of their prefixes, that share theirs, by cube and input.
 template <int D, typename Entry, typename CubeOf>
-absl::Status SortAlike(std::vector<Entry>& entries, CubeOf cube_of, const RunContext& context) {
+absl::Status SortAlike(HugeVector<Entry>& entries, CubeOf cube_of, const RunContext& context) {
   std::vector<std::pair<GridPoint<D>, Entry>> alike;
   size_t groups = 0;
   for (size_t begin = 0, end = 0; begin < entries.size(); begin = end) {
@@ -175,8 +174,8 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<cons
   const auto point_of = [&](const Entry& entry) { return domain.Scaled(PointAt<D>(points, entry.input)); };
   const auto cube_of = [&](const Entry& entry) { return grid.CubeOf(point_of(entry)); };
   const double unscale = 1 / domain.scale;  // a power of two
-  std::vector<Entry> entries;
-  ReserveOnHugePages(entries, count);
+  HugeVector<Entry> entries;
+  entries.reserve(count);
   for (size_t i = 0; i < count; ++i) {
     if (i % kStepsBetweenChecks == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
@@ -204,9 +203,8 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<cons
   WELLSPACE_RETURN_IF_ERROR(SortAlike<D>(entries, cube_of, context));
 
   // Points of one cube are equal, or too close to be served.
-  ReserveOnHugePages(cloud.points, count + (size_t{1} << D));  // the corners of the box may follow
-  ReserveOnHugePages(cloud.first_input, count);
-  ReserveOnHugePages(cloud.sorted_index, count);
+  cloud.points.reserve(count + (size_t{1} << D));  // the corners of the box may follow
+  cloud.first_input.reserve(count);
   cloud.sorted_index.assign(count, 0);
   for (size_t i = 0; i < count; ++i) {
     if (i % kStepsBetweenChecks == 0) {

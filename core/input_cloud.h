@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "core/base/huge_pages.h"
 #include "core/base/run_context.h"
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
@@ -60,10 +61,10 @@ absl::StatusOr<Box<D>> BoxAround(std::span<const double> points, double margin, 
 // A cloud without its duplicates, in the order that the query structure wants.
 template <int D>
 struct SortedCloud {
-  MortonGrid<D> grid;                  // for so many inputs
-  std::vector<Point<D>> points;        // distinct, in Morton order, scaled
-  std::vector<uint32_t> first_input;   // by sorted point: the first input equal to it
-  std::vector<uint32_t> sorted_index;  // by input: its sorted point
+  MortonGrid<D> grid;                 // for so many inputs
+  HugeVector<Point<D>> points;        // distinct, in Morton order, scaled
+  HugeVector<uint32_t> first_input;   // by sorted point: the first input equal to it
+  HugeVector<uint32_t> sorted_index;  // by input: its sorted point
 };
 
 // Errors:     INVALID_ARGUMENT, naming the point: not finite, outside the domain, too small for its scale, too close to
@@ -75,9 +76,9 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<cons
 
 // The numbers that the points of a sorted cloud have in the mesh: in the order in which the input first has them.
 struct PointNames {
-  std::vector<uint32_t> name;      // by sorted point
-  std::vector<uint32_t> sorted;    // the sorted point, by name
-  std::vector<uint32_t> of_input;  // the name, by input
+  HugeVector<uint32_t> name;      // by sorted point
+  HugeVector<uint32_t> sorted;    // the sorted point, by name
+  HugeVector<uint32_t> of_input;  // the name, by input
 };
 
 // Errors:     CANCELLED, DEADLINE_EXCEEDED.

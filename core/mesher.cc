@@ -249,7 +249,7 @@ class MesherIn final : public Mesher {
     mesh.domain_high.assign(domain_.box.high.begin(), domain_.box.high.end());
     WELLSPACE_RETURN_IF_ERROR(AppendPoints(0, mesh.points, context));
     mesh.simplices = std::move(simplices.indices);
-    mesh.input_vertex = input_vertex_;
+    mesh.input_vertex.assign(input_vertex_.begin(), input_vertex_.end());
     mesh.weights = std::move(weighted.weights);
     for (double& weight : mesh.weights) {
       weight /= domain_.scale * domain_.scale;
@@ -296,7 +296,7 @@ class MesherIn final : public Mesher {
     const bool worst_has_gone = DropSimplicesAmong<D>(
         has_changed, [this](uint32_t v) -> const Point<D>& { return structure_.point(VertexOf(v)); }, mesh);
     mesh.simplices.insert(mesh.simplices.end(), simplices.indices.begin(), simplices.indices.end());
-    mesh.input_vertex = input_vertex_;
+    mesh.input_vertex.assign(input_vertex_.begin(), input_vertex_.end());
     if (worst_has_gone) {
       const QualityReport report = MeasureQuality({D, mesh.points, mesh.simplices});
       mesh.statistics.max_radius_edge = report.max_radius_edge;
@@ -546,9 +546,9 @@ class MesherIn final : public Mesher {
 
   uint64_t built_count_ = 0;            // vertices after Initialize: input points and corners of the box
   uint64_t distinct_count_ = 0;         // the former
-  std::vector<uint32_t> output_index_;  // by vertex; of the first distinct_count_ at least
-  std::vector<uint32_t> vertex_at_;     // by output index, of the first distinct_count_
-  std::vector<uint32_t> input_vertex_;  // by point given
+  HugeVector<uint32_t> output_index_;   // by vertex; of the first distinct_count_ at least
+  HugeVector<uint32_t> vertex_at_;      // by output index, of the first distinct_count_
+  HugeVector<uint32_t> input_vertex_;   // by point given
   uint64_t distinct_input_ = 0;         // different vertices among them
   std::vector<size_t> negative_zeros_;  // places in Mesh::points
 

@@ -99,16 +99,15 @@ absl::Status RadixSortByBytes(std::span<T> items, std::span<T> scratch, int firs
 // Complexity: O(n), with space for a second copy of the items.
 // Errors:     as CancellableSort.
 // Source:     radix sort by the upper half of the keys, then, among those that share it, by the lower: few do in most clouds.
-template <typename T, typename Key>
-absl::Status CancellableRadixSort(std::vector<T>& items, Key key, const RunContext& context) {
+template <typename Items, typename Key>
+absl::Status CancellableRadixSort(Items& items, Key key, const RunContext& context) {
+  using T = typename Items::value_type;
   constexpr int kBytes = sizeof(uint64_t);
   constexpr size_t kFew = 32;
   if (items.empty()) {
     return absl::OkStatus();
   }
-  std::vector<T> scratch;
-  ReserveOnHugePages(scratch, items.size());
-  scratch.resize(items.size());
+  HugeVector<T> scratch(items.size());
   const std::span<T> all(items);
   const std::span<T> room(scratch);
   WELLSPACE_RETURN_IF_ERROR(RadixSortByBytes(all, room, kBytes / 2, kBytes, key, context));

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "core/base/dimensions.h"
+#include "core/base/huge_pages.h"
 #include "core/base/status_macros.h"
 #include "core/refine/mesh_size.h"
 #include "core/refine/nearest_points.h"
@@ -158,7 +159,7 @@ class Integrator {
       : box_(structure.box()), demands_(demands), vertices_per_term_(VerticesPerTerm<D>(demands)) {}
 
   absl::Status Prepare(const QueryStructure<D>& structure, const RunContext& context) {
-    std::vector<Point<D>> points;
+    HugeVector<Point<D>> points;
     points.reserve(structure.vertex_count());
     for (uint32_t i = 0; i < structure.vertex_count(); ++i) {
       if ((i & 0xfff) == 0) {
@@ -387,8 +388,8 @@ class Integrator {
   const Box<D> box_;
   const Demands<D>& demands_;
   const Terms vertices_per_term_;
-  NearestPoints<D> points_;      // the input but the corners of the box
-  std::vector<double> spacing_;  // by point; negative where not known yet
+  NearestPoints<D> points_;     // the input but the corners of the box
+  HugeVector<double> spacing_;  // by point; negative where not known yet
   std::array<double, 1 << D> corner_spacing_{};
   uint64_t on_boundary_ = 0;  // vertices
   Draws draws_;

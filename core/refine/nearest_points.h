@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "core/base/huge_pages.h"
 #include "core/base/run_context.h"
 #include "core/base/status_macros.h"
 #include "core/geometry/box.h"
@@ -35,12 +36,12 @@ class NearestPoints {
   // REQUIRES:   points in Morton order; in any other Nearest is right, but slow.
   // Complexity: O(n).
   // Errors:     CANCELLED, DEADLINE_EXCEEDED.
-  absl::Status Build(std::vector<Point<D>> points, const RunContext& context) {
+  absl::Status Build(HugeVector<Point<D>> points, const RunContext& context) {
     points_ = std::move(points);
     if (points_.empty()) {
       return absl::OkStatus();
     }
-    std::vector<Box<D>> runs;
+    HugeVector<Box<D>> runs;
     runs.reserve((points_.size() + kRun - 1) / kRun);
     for (size_t i = 0; i < points_.size(); ++i) {
       if (i % kRun == 0) {
@@ -53,8 +54,8 @@ class NearestPoints {
     levels_.push_back(std::move(runs));
     while (levels_.back().size() > 1) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
-      const std::vector<Box<D>>& below = levels_.back();
-      std::vector<Box<D>> boxes;
+      const HugeVector<Box<D>>& below = levels_.back();
+      HugeVector<Box<D>> boxes;
       boxes.reserve((below.size() + 1) / 2);
       for (size_t i = 0; i < below.size(); ++i) {
         if (i % 2 == 0) {
@@ -125,7 +126,7 @@ class NearestPoints {
       }
       return;
     }
-    const std::vector<Box<D>>& below = levels_[level - 1];
+    const HugeVector<Box<D>>& below = levels_[level - 1];
     size_t near = 2 * index;
     double near_sq = DistanceSq<D>(x, below[near]);
     size_t far = near + 1;
@@ -142,8 +143,8 @@ class NearestPoints {
     }
   }
 
-  std::vector<Point<D>> points_;
-  std::vector<std::vector<Box<D>>> levels_;
+  HugeVector<Point<D>> points_;
+  std::vector<HugeVector<Box<D>>> levels_;
 };
 
 }  // namespace wellspace::core

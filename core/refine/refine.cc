@@ -4,10 +4,12 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <limits>
 
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/dimensions.h"
+#include "core/base/huge_pages.h"
 #include "core/base/status_macros.h"
 #include "core/refine/foreseen_cells.h"
 
@@ -40,6 +42,12 @@ constexpr bool kChecks = false;
 #endif
 // All vertices are looked at once for every so many that are taken from the schedule, relative to their number.
 constexpr uint64_t kCheckShare = 16;
+
+// The least float that is not less.
+float RoundedUp(double x) {
+  const auto nearest = static_cast<float>(x);
+  return nearest < x ? std::nextafter(nearest, std::numeric_limits<float>::infinity()) : nearest;
+}
 
 // What rounding may do to a coordinate.
 template <int D>
@@ -129,7 +137,7 @@ void Refinement<D>::VertexAdded(VertexId x) {
 template <int D>
 uint64_t Refinement<D>::MemoryBytes() const {
   return schedule_.MemoryBytes() + stars_.MemoryBytes() + star_.capacity() * sizeof(star_[0]) +
-         watchers_.MemoryBytes() + radius_sq_.size() * sizeof(double) + announced_.size() * sizeof(Announced) +
+         watchers_.MemoryBytes() + radius_sq_.size() * sizeof(radius_sq_[0]) + announced_.size() * sizeof(Announced) +
          (own_.seen.size() + new_.seen.size()) * sizeof(uint32_t) +
          (foreseen_ == nullptr ? 0 : foreseen_->MemoryBytes());
 }
@@ -161,7 +169,7 @@ absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& t
   announced_.assign(structure_.vertex_count(), Announced::kToAll);
   const uint32_t count = structure_.vertex_count();
   std::vector<Workspace<D>> workspaces(team.threads());
-  std::vector<double> first_sq(count);
+  HugeVector<double> first_sq(count);
   team.ForEach((count + kScheduledTogether - 1) / kScheduledTogether, [&](size_t block) {
     Workspace<D>& workspace = workspaces[ThreadTeam::CurrentThread()];
     const uint32_t begin = static_cast<uint32_t>(block) * kScheduledTogether;
@@ -372,7 +380,7 @@ void Refinement<D>::Remember(VertexId v, double radius_sq, std::span<const Watch
   if (radius_sq_[Index(v)] < 0) {
     watchers_.Remove(v);
   }
-  radius_sq_[Index(v)] = radius_sq;
+  radius_sq_[Index(v)] = RoundedUp(radius_sq);
   if (radius_sq < 0) {
     watchers_.Add(v, watched);
   }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "core/base/huge_pages.h"
 #include "core/base/run_context.h"
 #include "core/refine/assessment.h"
 #include "core/refine/demands.h"
@@ -146,10 +147,10 @@ class Refinement {
   const double min_edge_;
   Schedule schedule_;
   // R(v)^2 where v is done, else infinite; but where a node on one of v's faces is too far for its edge, minus the
-  // squared length of that edge.
-  std::vector<double> radius_sq_;
+  // squared length of that edge. Rounded up: a radius may be larger than it is, an edge shorter.
+  HugeVector<float> radius_sq_;
   FaceWatchers<D> watchers_;  // those of whom an edge is remembered
-  std::vector<Announced> announced_;
+  HugeVector<Announced> announced_;
   StarLists<D> stars_;                 // of vertices that are done, or have been
   std::optional<Demands<D>> demands_;  // of the last run, once all vertices have been scheduled for them
   Workspace<D> own_;                   // the cell that is improved

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/huge_pages.h"
 #include "core/base/ids.h"
 
 namespace wellspace::core {
@@ -88,7 +89,7 @@ class Schedule {
   // taken if none is added, until it returns false. One may be seen twice.
   template <typename F>
   void ForEachNext(int bucket, F&& f) const {
-    const std::vector<VertexId>& waiting = buckets_[bucket];
+    const HugeVector<VertexId>& waiting = buckets_[bucket];
     for (size_t i = waiting.size(); i-- > 0;) {
       if (BucketHolding(waiting[i]) == bucket && !f(waiting[i])) {
         return;
@@ -113,6 +114,7 @@ class Schedule {
           return true;
         }
       }
+      buckets_[lowest_] = {};
     }
     return false;
   }
@@ -135,7 +137,7 @@ class Schedule {
   }
 
   // Sorts by block, and leaves the order within each as it is: by counting.
-  void PutInOrder(std::vector<VertexId>& bucket) {
+  void PutInOrder(HugeVector<VertexId>& bucket) {
     const auto block_of = [this](VertexId v) -> size_t { return places_[Index(v)].block; };
     std::vector<uint32_t> begins;  // by block
     for (const VertexId v : bucket) {
@@ -143,7 +145,7 @@ class Schedule {
       ++begins[block_of(v)];
     }
     std::exclusive_scan(begins.begin(), begins.end(), begins.begin(), uint32_t{0});
-    std::vector<VertexId> sorted(bucket.size());
+    HugeVector<VertexId> sorted(bucket.size());
     for (const VertexId v : bucket) {
       sorted[begins[block_of(v)]++] = v;
     }
@@ -154,8 +156,8 @@ class Schedule {
   int lowest_ = 0;
   int in_order_ = 0;  // buckets below have been put in order
   size_t size_ = 0;
-  std::vector<std::vector<VertexId>> buckets_;
-  std::vector<Place> places_;  // by vertex
+  std::vector<HugeVector<VertexId>> buckets_;
+  HugeVector<Place> places_;  // by vertex
 };
 
 }  // namespace wellspace::core

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "core/base/huge_pages.h"
 #include "core/base/ids.h"
 #include "core/base/run_context.h"
 #include "core/geometry/box.h"
@@ -237,13 +238,13 @@ class LeafTree {
   uint8_t max_level_ = 0;
   std::vector<double> sides_;  // of nodes, by level
   uint64_t leaf_count_ = 0;
-  std::vector<Node> nodes_;
+  HugeVector<Node> nodes_;
   Buckets buckets_;
-  std::vector<NodeId> leaf_of_;
+  HugeVector<NodeId> leaf_of_;
 
   // During Build only.
   std::span<const Point<D>> points_;
-  std::vector<Range> ranges_;                 // by node
+  HugeVector<Range> ranges_;                  // by node
   std::vector<std::vector<NodeId>> pending_;  // leaves to be looked at, by level
   std::vector<Point<D>> near_;                // points near the leaf that is looked at
   std::vector<Point<D>> rim_points_;

@@ -6,9 +6,9 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
+#include "core/base/huge_pages.h"
 #include "core/base/ids.h"
 #include "core/geometry/point.h"
 
@@ -93,7 +93,8 @@ class VertexBuckets {
   static constexpr uint32_t kStep = kMost / 8 / kTogether * kTogether;
   static constexpr int kClasses = kMost / kStep;
   static_assert(kStep * kClasses == kMost && kStep % 2 == 0, "positions are to stay aligned");
-  static constexpr size_t kChunkBytes = std::max<size_t>(size_t{1} << 16, 16 * kMost * kPlaceBytes);
+  static constexpr size_t kLeastChunk = std::max<size_t>(size_t{1} << 16, 16 * kMost * kPlaceBytes);
+  static constexpr size_t kMostChunk = std::max(kHugePage, kLeastChunk);
 
   static constexpr uint32_t ClassOf(uint32_t count) { return count == 0 ? 0 : (count - 1) / kStep; }
 
@@ -107,8 +108,10 @@ class VertexBuckets {
       free.pop_back();
     } else {
       const size_t bytes = bucket.capacity * kPlaceBytes;
-      if (chunks_.empty() || kChunkBytes - used_ < bytes) {
-        chunks_.push_back(std::make_unique_for_overwrite<std::byte[]>(kChunkBytes));
+      if (chunk_bytes_ - used_ < bytes) {
+        // As much as there is already: on large pages once that fills one.
+        chunk_bytes_ = std::clamp<size_t>(taken_bytes_, kLeastChunk, kMostChunk);
+        chunks_.push_back(MakeHugePageBytes(chunk_bytes_));
         used_ = 0;
       }
       memory = chunks_.back().get() + used_;
@@ -127,8 +130,9 @@ class VertexBuckets {
   std::vector<Bucket> buckets_;
   std::vector<uint32_t> free_numbers_;
   std::array<std::vector<std::byte*>, kClasses> free_;
-  std::vector<std::unique_ptr<std::byte[]>> chunks_;
-  size_t used_ = 0;  // of the last chunk
+  std::vector<HugePageBytes> chunks_;
+  size_t chunk_bytes_ = 0;  // of the last chunk
+  size_t used_ = 0;         // of these
   uint64_t taken_bytes_ = 0;
 };
 

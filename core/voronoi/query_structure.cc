@@ -78,7 +78,7 @@ void QueryCounters::Add(const QueryCounters& other) {
 }
 
 template <int D>
-absl::Status QueryStructure<D>::Initialize(const MortonGrid<D>& grid, std::vector<Point<D>> points, uint64_t max_leaves,
+absl::Status QueryStructure<D>::Initialize(const MortonGrid<D>& grid, HugeVector<Point<D>> points, uint64_t max_leaves,
                                            const RunContext& context) {
   box_ = grid.box();
   points_ = std::move(points);
@@ -94,7 +94,7 @@ absl::Status QueryStructure<D>::Initialize(const MortonGrid<D>& grid, std::vecto
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
     const FaceMask faces = box_.FacesOf(points_[i]);
-    faces_[i] = faces;
+    faces_[i] = static_cast<StoredFaces>(faces);
     for (int corner = 0; corner < (1 << D); ++corner) {
       has_corner[corner] = has_corner[corner] || faces == CornerFaces<D>(corner);
     }
@@ -122,7 +122,7 @@ template <int D>
 VertexId QueryStructure<D>::AddWaiting(VertexId near, const Point<D>& p) {
   const VertexId v{vertex_count_};
   points_[vertex_count_] = p;
-  faces_[vertex_count_] = box_.FacesOf(p);
+  faces_[vertex_count_] = static_cast<StoredFaces>(box_.FacesOf(p));
   ++vertex_count_;
   near_.push_back(near);
   return v;

@@ -5,10 +5,12 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "core/base/huge_pages.h"
 #include "core/base/ids.h"
 #include "core/base/run_context.h"
 #include "core/geometry/box.h"
@@ -38,7 +40,7 @@ struct Workspace {
   Polytope<D> cell;
   QueryCounters counters;
   // Private to the queries.
-  std::vector<uint32_t> seen;  // by tree node: the query that last met it
+  HugeVector<uint32_t> seen;  // by tree node: the query that last met it
   uint32_t query = 0;
   LeafQueue queue;
   // Of the leaf that is opened.
@@ -66,7 +68,7 @@ class QueryStructure {
   // Complexity: O(L) for L leaves; O(n log n) has been paid for sorting.
   // Errors:     RESOURCE_EXHAUSTED when more than `max_leaves` leaves would be needed, or of the context's memory; CANCELLED, DEADLINE_EXCEEDED.
   // Source:     [HT08] Figure 3, INITIALIZE.
-  absl::Status Initialize(const MortonGrid<D>& grid, std::vector<Point<D>> points, uint64_t max_leaves,
+  absl::Status Initialize(const MortonGrid<D>& grid, HugeVector<Point<D>> points, uint64_t max_leaves,
                           const RunContext& context);
 
   // The vertex nearest to `v`, and its squared distance. Exact up to rounding, where the paper asks for a constant
@@ -173,9 +175,13 @@ class QueryStructure {
   FaceMask faces(VertexId v) const { return faces_[Index(v)]; }
   const LeafTree<D>& tree() const { return tree_; }
   // What the structure takes in memory.
-  uint64_t MemoryBytes() const { return tree_.MemoryBytes() + vertex_count_ * (sizeof(Point<D>) + sizeof(FaceMask)); }
+  uint64_t MemoryBytes() const {
+    return tree_.MemoryBytes() + vertex_count_ * (sizeof(Point<D>) + sizeof(StoredFaces));
+  }
 
  private:
+  using StoredFaces = std::conditional_t<(2 * D <= 8), uint8_t, FaceMask>;
+
   void MakeRoom();
   VertexId Admitted(VertexId near) const;
   NodeId LeafOf(VertexId v) const;
@@ -196,8 +202,8 @@ class QueryStructure {
   uint32_t vertex_count_ = 0;
   uint32_t given_count_ = 0;  // to Initialize
   // By vertex, with room for those that are to wait, so that nothing moves when one is added.
-  std::vector<Point<D>> points_;
-  std::vector<FaceMask> faces_;
+  HugeVector<Point<D>> points_;
+  HugeVector<StoredFaces> faces_;
   std::vector<VertexId> near_;  // of those that wait: what they were added near to
 };
 

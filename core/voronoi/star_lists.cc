@@ -80,7 +80,7 @@ void StarLists<D>::DropUnused() {
   std::sort(in_order.begin(), in_order.end(), [](const Entry* a, const Entry* b) {
     return std::pair(a->begin, a->count) < std::pair(b->begin, b->count);
   });
-  std::vector<std::array<VertexId, D>> listed;
+  HugeVector<std::array<VertexId, D>> listed;
   listed.reserve(listed_.size() - unused_);
   auto added = added_.begin();  // ascending
   for (Entry* const entry : in_order) {

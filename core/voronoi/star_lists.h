@@ -13,6 +13,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "core/base/huge_pages.h"
 #include "core/base/ids.h"
 #include "core/base/run_context.h"
 #include "core/voronoi/star.h"
@@ -95,14 +96,14 @@ class StarLists {
   }
   void DropUnused();
 
-  std::vector<Entry> entries_;  // by vertex
+  HugeVector<Entry> entries_;  // by vertex
   // In the order of the looks, which is thus that of the places where lists begin.
-  std::vector<std::array<VertexId, D>> listed_;
+  HugeVector<std::array<VertexId, D>> listed_;
   size_t unused_ = 0;         // of listed_
   uint32_t first_count_ = 0;  // vertices at the first look
   // First 0, for vertices below first_count_; then of each vertex from there on the size of listed_ at the next look after it was added: lists that were made before
   // begin below, unless they are empty.
-  std::vector<uint32_t> added_;
+  HugeVector<uint32_t> added_;
   bool is_complete_ = true;
 };
 

@@ -55,7 +55,7 @@ TYPED_TEST(NearestPointsTest, AgreesWithALookAtAll) {
     SCOPED_TRACE(std::string(kind));
     const std::vector<Point<D>> points = test::SortedCloud<D>(kind, 100);
     NearestPoints<D> nearest;
-    ASSERT_TRUE(nearest.Build(points, context).ok());
+    ASSERT_TRUE(nearest.Build({points.begin(), points.end()}, context).ok());
     for (int i = 0; i < 50; ++i) {
       Point<D> x;
       for (double& coordinate : x) {

@@ -77,7 +77,8 @@ Outcome RefineInput(const Input<D>& input, const core::Demands<D>& demands, doub
   core::RunContext context;
   core::QueryStructure<D> structure;
   Outcome outcome;
-  outcome.status = structure.Initialize(core::MortonGrid<D>(input.box), input.points, 10'000'000, context);
+  outcome.status = structure.Initialize(core::MortonGrid<D>(input.box), {input.points.begin(), input.points.end()},
+                                        10'000'000, context);
   if (!outcome.status.ok()) {
     return outcome;
   }

@@ -16,11 +16,12 @@ namespace wellspace::test {
 
 // The structure of `points`, sorted as MortonSorted gives them, in `box`; a failure of the test where there is none.
 template <int D>
-core::QueryStructure<D> MakeStructure(const core::Box<D>& box, std::vector<core::Point<D>> points) {
+core::QueryStructure<D> MakeStructure(const core::Box<D>& box, const std::vector<core::Point<D>>& points) {
   constexpr uint64_t kManyLeaves = 10'000'000;
   core::RunContext context;
   core::QueryStructure<D> structure;
-  const absl::Status made = structure.Initialize(core::MortonGrid<D>(box), std::move(points), kManyLeaves, context);
+  const absl::Status made =
+      structure.Initialize(core::MortonGrid<D>(box), {points.begin(), points.end()}, kManyLeaves, context);
   EXPECT_TRUE(made.ok()) << made;
   return structure;
 }

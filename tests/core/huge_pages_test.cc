@@ -1,0 +1,83 @@
+#include "core/base/huge_pages.h"
+
+#include <sys/mman.h>
+
+#include <cerrno>
+#include <cstddef>
+#include <cstdint>
+#include <new>
+#include <numeric>
+#include <vector>
+
+#include "gtest/gtest.h"
+
+namespace wellspace::core {
+namespace {
+
+constexpr size_t kCountOnHugePage = kHugePage / sizeof(uint32_t);
+
+bool IsAligned(const void* memory) { return reinterpret_cast<uintptr_t>(memory) % kHugePage == 0; }
+
+// Whether the system still has pages mapped at `memory`.
+bool IsMapped(void* memory) {
+  unsigned char residency = 0;
+  return mincore(memory, 1, &residency) == 0 || errno != ENOMEM;
+}
+
+TEST(HugePagesTest, AVectorKeepsItsItemsAsItGrows) {
+  HugeVector<uint32_t> items;
+  for (uint32_t i = 0; i < 3 * kCountOnHugePage; ++i) {
+    items.push_back(i);
+  }
+  for (uint32_t i = 0; i < items.size(); ++i) {
+    ASSERT_EQ(items[i], i);
+  }
+  const HugeVector<uint32_t> copy = items;
+  EXPECT_EQ(copy, items);
+}
+
+TEST(HugePagesTest, ArraysOfAWholePageBeginAtOne) {
+  for (const size_t count : {kCountOnHugePage, kCountOnHugePage + 1, 5 * kCountOnHugePage - 1}) {
+    HugeVector<uint32_t> items(count, 7);
+    EXPECT_TRUE(IsAligned(items.data())) << count;
+    EXPECT_EQ(items.back(), 7u);
+  }
+}
+
+TEST(HugePagesTest, WhatIsGivenBackIsTheSystemsAtOnce) {
+  HugeVector<uint32_t> items(2 * kCountOnHugePage, 7);
+  uint32_t* const memory = items.data();
+  EXPECT_TRUE(IsMapped(memory));
+  items = HugeVector<uint32_t>();
+  EXPECT_FALSE(IsMapped(memory));
+  EXPECT_FALSE(IsMapped(memory + 2 * kCountOnHugePage - 1024));
+}
+
+TEST(HugePagesTest, MoreThanThereIsIsRefused) {
+  EXPECT_THROW(HugePageAllocator<uint64_t>().allocate(SIZE_MAX / 4), std::bad_alloc);
+  EXPECT_THROW(HugePageAllocator<uint64_t>().allocate(size_t{1} << 56), std::bad_alloc);
+}
+
+TEST(HugePagesTest, BytesMayBeWrittenToTheLast) {
+  for (const size_t count : {size_t{1000}, kHugePage - 1, kHugePage, kHugePage + 1}) {
+    const HugePageBytes bytes = MakeHugePageBytes(count);
+    bytes[0] = std::byte{1};
+    bytes[count - 1] = std::byte{2};
+    EXPECT_EQ(bytes[count - 1], std::byte{2});
+  }
+}
+
+TEST(HugePagesTest, ReserveKeepsWhatIsThere) {
+  std::vector<uint32_t> items(1000);
+  std::iota(items.begin(), items.end(), 0);
+  const std::vector<uint32_t> expected = items;
+  ReserveOnHugePages(items, 2 * kCountOnHugePage);
+  EXPECT_GE(items.capacity(), 2 * kCountOnHugePage);
+  EXPECT_EQ(items, expected);
+  const uint32_t* const before = items.data();
+  ReserveOnHugePages(items, 10);
+  EXPECT_EQ(items.data(), before);
+}
+
+}  // namespace
+}  // namespace wellspace::core
