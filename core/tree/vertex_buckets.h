@@ -108,10 +108,9 @@ class VertexBuckets {
       free.pop_back();
     } else {
       const size_t bytes = bucket.capacity * kPlaceBytes;
-      if (chunk_bytes_ - used_ < bytes) {
+      if (chunks_.empty() || chunks_.back().get_deleter().count - used_ < bytes) {
         // As much as there is already: on large pages once that fills one.
-        chunk_bytes_ = std::clamp<size_t>(taken_bytes_, kLeastChunk, kMostChunk);
-        chunks_.push_back(MakeHugePageBytes(chunk_bytes_));
+        chunks_.push_back(MakeHugePageBytes(std::clamp<size_t>(taken_bytes_, kLeastChunk, kMostChunk)));
         used_ = 0;
       }
       memory = chunks_.back().get() + used_;
@@ -131,8 +130,7 @@ class VertexBuckets {
   std::vector<uint32_t> free_numbers_;
   std::array<std::vector<std::byte*>, kClasses> free_;
   std::vector<HugePageBytes> chunks_;
-  size_t chunk_bytes_ = 0;  // of the last chunk
-  size_t used_ = 0;         // of these
+  size_t used_ = 0;  // of the last chunk
   uint64_t taken_bytes_ = 0;
 };
 

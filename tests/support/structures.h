@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
-#include <utility>
 #include <vector>
 
 #include "core/base/run_context.h"
@@ -28,8 +27,8 @@ core::QueryStructure<D> MakeStructure(const core::Box<D>& box, const std::vector
 
 // The same in the unit box.
 template <int D>
-core::QueryStructure<D> MakeStructure(std::vector<core::Point<D>> points) {
-  return MakeStructure<D>(UnitBox<D>(), std::move(points));
+core::QueryStructure<D> MakeStructure(const std::vector<core::Point<D>>& points) {
+  return MakeStructure<D>(UnitBox<D>(), points);
 }
 
 }  // namespace wellspace::test
