@@ -46,7 +46,7 @@ inline constexpr double kFixedBytes = 3.9e6;
 inline constexpr double kMemoryMargin = 1.25;
 
 // The memory at its peak, when the mesh has been put together. Vectors grow by doubling, but of what they reserve only what they
-// use is ever touched.
+// use is ever touched; what that leaves free of the last large page of each is within the margin.
 template <int D>
 double BytesOf(const Leaves& leaves, double vertices, double simplices) {
   constexpr double kChildren = LeafTree<D>::kChildren;
