@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "core/base/cache_lines.h"
 #include "core/base/ids.h"
 #include "core/base/run_context.h"
 #include "core/base/thread_team.h"
@@ -129,7 +130,7 @@ class ForeseenCells {
   };
 
   // What only one thread writes, so that it stays in the caches of its core. Arrays only grow, so that polytopes are reused.
-  struct alignas(64) Own {
+  struct alignas(kCacheLines) Own {
     struct Pool {
       std::vector<std::unique_ptr<Foreseen>> cells;
       size_t count = 0;  // of cells that are in use

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <limits>
 
 #include "absl/cleanup/cleanup.h"
@@ -11,6 +9,7 @@
 #include "core/base/dimensions.h"
 #include "core/base/huge_pages.h"
 #include "core/base/status_macros.h"
+#include "core/refine/checks.h"
 #include "core/refine/foreseen_cells.h"
 
 namespace wellspace::core {
@@ -34,12 +33,6 @@ constexpr uint64_t kReportInterval = 256;
 constexpr double kLengthRounding = 1e-9;
 constexpr double kCoordinateRounding = 0x1p-49;
 
-// The checking build.
-#ifdef WELLSPACE_CHECKS
-constexpr bool kChecks = true;
-#else
-constexpr bool kChecks = false;
-#endif
 // All vertices are looked at once for every so many that are taken from the schedule, relative to their number.
 constexpr uint64_t kCheckShare = 16;
 
@@ -57,15 +50,6 @@ double RoundingIn(const Box<D>& box) {
     largest = std::max({largest, std::abs(box.low[i]), std::abs(box.high[i])});
   }
   return kCoordinateRounding * largest;
-}
-
-// Aborts unless `holds`. The text is put together only then.
-template <typename... Text>
-void Require(bool holds, const Text&... text) {
-  if (!holds) {
-    std::fprintf(stderr, "refinement breaks its guarantees: %s\n", absl::StrCat(text...).c_str());
-    std::abort();
-  }
 }
 
 }  // namespace
@@ -92,34 +76,53 @@ absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices
     WELLSPACE_RETURN_IF_ERROR(ScheduleAll(demands, team));
     demands_ = demands;
   }
-  const absl::Status status = Loop(context);
+  const absl::Status status = Loop(team);
   foreseen.Drop();
   structure_.AdmitWaiting();
   own_.counters.Add(foreseen.counters());
+  for (const OwnWorkspace& workspace : slab_workspaces_) {
+    own_.counters.Add(workspace.counters);
+  }
+  slab_workspaces_.clear();
   return status;
 }
 
-// Improves the vertices that wait, one after the other.
+// Improves the vertices that wait: in slabs where a bucket holds many, else one after the other.
 template <int D>
-absl::Status Refinement<D>::Loop(RunContext& context) {
-  VertexId v{};
-  int bucket = 0;
-  uint64_t improved = 0;
-  while (schedule_.Pop(v, bucket)) {
-    absl::Status status = context.Check();
-    if (status.ok()) {
-      status = Improve(v, bucket);
-    }
-    if (!status.ok()) {
-      schedule_.AddToBucket(v, bucket);
-      return status;
-    }
-    if (++improved % kReportInterval == 0) {
-      WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(structure_.MemoryBytes() + MemoryBytes()));
-      context.SetBucket(bucket);
-      context.SetPhaseFraction(1 - static_cast<double>(schedule_.size()) / structure_.vertex_count());
+absl::Status Refinement<D>::Loop(ThreadTeam& team) {
+  WELLSPACE_RETURN_IF_ERROR(ServeSlabs(team));  // those of a run that was stopped
+  for (int lowest = schedule_.Lowest(); lowest >= 0; lowest = schedule_.Lowest()) {
+    VertexId v{};
+    int bucket = 0;
+    if (TakesSlabs(lowest)) {
+      MakeSlabs(lowest);
+      WELLSPACE_RETURN_IF_ERROR(ServeSlabs(team));
+    } else if (schedule_.Pop(v, bucket)) {
+      WELLSPACE_RETURN_IF_ERROR(Serve(v, bucket));
     }
   }
+  return absl::OkStatus();
+}
+
+// Improves `v`, which was taken from `bucket`.
+template <int D>
+absl::Status Refinement<D>::Serve(VertexId v, int bucket) {
+  absl::Status status = context_->Check();
+  if (status.ok()) {
+    status = Improve(v, bucket);
+  }
+  if (!status.ok()) {
+    schedule_.AddToBucket(v, bucket);
+    return status;
+  }
+  return ++served_ % kReportInterval == 0 ? Report(bucket) : absl::OkStatus();
+}
+
+template <int D>
+absl::Status Refinement<D>::Report(int bucket) {
+  WELLSPACE_RETURN_IF_ERROR(context_->AllowMemory(structure_.MemoryBytes() + MemoryBytes()));
+  context_->SetBucket(bucket);
+  context_->SetPhaseFraction(1 - static_cast<double>(schedule_.size()) / structure_.vertex_count());
   return absl::OkStatus();
 }
 
@@ -128,6 +131,7 @@ void Refinement<D>::VertexAdded(VertexId x) {
   if (!demands_.has_value()) {
     return;  // the first run looks at all
   }
+  slabs_are_ahead_ = false;
   radius_sq_.resize(structure_.vertex_count(), Assessment::kNone);
   announced_.resize(structure_.vertex_count(), Announced::kToNone);
   const Neighbor nearest = structure_.ApproximateNearestNeighbor(x, own_);
@@ -138,13 +142,14 @@ template <int D>
 uint64_t Refinement<D>::MemoryBytes() const {
   return schedule_.MemoryBytes() + stars_.MemoryBytes() + star_.capacity() * sizeof(star_[0]) +
          watchers_.MemoryBytes() + radius_sq_.size() * sizeof(radius_sq_[0]) + announced_.size() * sizeof(Announced) +
-         (own_.seen.size() + new_.seen.size()) * sizeof(uint32_t) +
+         (own_.seen.size() + new_.seen.size()) * sizeof(uint32_t) + SlabBytes() +
          (foreseen_ == nullptr ? 0 : foreseen_->MemoryBytes());
 }
 
 template <int D>
 void Refinement<D>::CellChanged(VertexId v, double nearest_sq) {
   stars_.GiveUp();
+  slabs_are_ahead_ = false;
   radius_sq_.resize(structure_.vertex_count(), Assessment::kNone);
   announced_.resize(structure_.vertex_count(), Announced::kToAll);
   const bool is_on_face = structure_.faces(v) != 0;
@@ -163,12 +168,13 @@ QueryCounters Refinement<D>::counters() const {
 
 template <int D>
 absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& team) {
+  DropSlabs();
   stars_.Clear();
   radius_sq_.assign(structure_.vertex_count(), Assessment::kNone);
   watchers_.Clear();
   announced_.assign(structure_.vertex_count(), Announced::kToAll);
   const uint32_t count = structure_.vertex_count();
-  std::vector<Workspace<D>> workspaces(team.threads());
+  std::vector<OwnWorkspace> workspaces(team.threads());
   HugeVector<double> first_sq(count);
   team.ForEach((count + kScheduledTogether - 1) / kScheduledTogether, [&](size_t block) {
     Workspace<D>& workspace = workspaces[ThreadTeam::CurrentThread()];
@@ -178,7 +184,8 @@ absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& t
       const VertexId v{i};
       const double nearest_sq = structure_.ApproximateNearestNeighbor(v, workspace).distance_sq;
       // A node x farther from v than h(x) is farther than h(v) / 2, as h is 1-Lipschitz.
-      first_sq[i] = FirstEdgeSq(demands, v, nearest_sq, demands.sizes.AtSq(structure_.point(v)) / 4);
+      first_sq[i] = FirstEdgeSq(demands, structure_.point(v), structure_.faces(v), nearest_sq,
+                                demands.sizes.AtSq(structure_.point(v)) / 4);
     }
   });
   WELLSPACE_RETURN_IF_ERROR(context_->Check());
@@ -189,18 +196,25 @@ absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& t
   return absl::OkStatus();
 }
 
-// Nothing shorter than this can ask for something at `v`: an edge, if the nearest neighbour is as near as it says; a face of
+// Nothing shorter than this can ask for something at a vertex at `p`: an edge, if the nearest neighbour is as near as it says; a face of
 // the box; or a size, if the least that counts is as it says.
 template <int D>
-double Refinement<D>::FirstEdgeSq(const Demands<D>& demands, VertexId v, double nearest_sq, double size_sq) const {
+double Refinement<D>::FirstEdgeSq(const Demands<D>& demands, const Point<D>& p, FaceMask faces, double nearest_sq,
+                                  double size_sq) const {
   double first_sq = nearest_sq;
   for (int face = 0; face < 2 * D; ++face) {
-    if (((structure_.faces(v) >> face) & 1) == 0) {
-      const double distance = structure_.box().DistanceToFace(structure_.point(v), face);
+    if (((faces >> face) & 1) == 0) {
+      const double distance = structure_.box().DistanceToFace(p, face);
       first_sq = std::min(first_sq, distance * distance);
     }
   }
   return std::min(first_sq, size_sq / (demands.rho * demands.rho));
+}
+
+template <int D>
+double Refinement<D>::FirstEdgeSqOfNew(const Point<D>& p, FaceMask faces, double nearest_sq) const {
+  const double around = kAround * std::sqrt(nearest_sq);
+  return FirstEdgeSq(*demands_, p, faces, nearest_sq, demands_->sizes.LeastAroundSq(p, around));
 }
 
 // Schedules the new vertex `x`, which is near `near` and whose nearest neighbour is as near as it says, and at once those on a face of x that remember
@@ -209,20 +223,19 @@ template <int D>
 void Refinement<D>::ScheduleNew(VertexId near, VertexId x, double nearest_sq) {
   schedule_.PutBeside(near, x);
   const Point<D>& p = structure_.point(x);
-  const double around = kAround * std::sqrt(nearest_sq);
   if (structure_.faces(x) != 0) {
     watchers_.ForEachCutOff(p, structure_.faces(x),
                             [&](VertexId u) { Wake(u, DistanceSq<D>(p, structure_.point(u))); });
     ScheduleWoken();
     if (watchers_.SomeWatchAll()) {
-      ComputeCell(x, around, new_);
+      ComputeCell(x, kAround * std::sqrt(nearest_sq), new_);
       new_.cell.Place();
       if (!new_.cell.IsTooLarge()) {
         Announce(x, new_.cell, Assess<D>(new_.cell, structure_.faces(x), *demands_, nearest_sq));
       }
     }
   }
-  schedule_.Add(x, FirstEdgeSq(*demands_, x, nearest_sq, demands_->sizes.LeastAroundSq(p, around)));
+  schedule_.Add(x, FirstEdgeSqOfNew(p, structure_.faces(x), nearest_sq));
 }
 
 // Inserts Steiner points until nothing that bucket `bucket` may ask for is wrong with the cell of `v`.
@@ -295,7 +308,7 @@ std::optional<typename Refinement<D>::Request> Refinement<D>::NextRequest(Vertex
 // The cell of `v`, which was taken from `bucket`, clipped at `clip`.
 template <int D>
 Look<D> Refinement<D>::LookAt(VertexId v, int bucket, double clip) {
-  if (foreseen_->threads() > 1) {
+  if (foreseen_->threads() > 1 && !HasSlabs()) {
     Foresee(v, bucket, clip);
     if (const Look<D> look = foreseen_->Take(v, clip); look.cell != nullptr) {
       return look;
@@ -428,44 +441,61 @@ void Refinement<D>::Settle(VertexId v, const Assessment& found, double clip, int
     }
     return;
   }
+  schedule_.AddToBucket(v, NextBucket(found, clip, earliest));
+}
+
+// Where a vertex that needs nothing now, but is not done, is to be looked at again: not before bucket `earliest`.
+template <int D>
+int Refinement<D>::NextBucket(const Assessment& found, double clip, int earliest) const {
   double next_sq = found.next_edge_sq;
   if (found.is_clipped) {
     // Beyond the clip only edges longer than this can be bad, or ones that share a node with a shorter edge.
     next_sq = std::min(next_sq, clip * clip / (demands_->rho * demands_->rho));
   }
-  schedule_.AddToBucket(v, std::max(schedule_.BucketOf(next_sq), earliest));
+  return std::max(schedule_.BucketOf(next_sq), earliest);
 }
 
 template <int D>
 absl::Status Refinement<D>::Insert(const Request& request, Polytope<D>& cell) {
   const SteinerPoint<D>& point = request.point;
   if (structure_.vertex_count() >= max_vertices_) {
-    return absl::ResourceExhaustedError(absl::StrCat("the mesh needs more than max_vertices = ", max_vertices_,
-                                                     " vertices; raise max_vertices or rho"));
+    return TooManyVertices();
   }
   if (!IsLongEnough(point)) {
     return absl::ResourceExhaustedError(absl::StrCat(
         "refinement came to an edge of length ", std::sqrt(std::max(0.0, point.empty_radius_sq)),
         ", below the smallest that double arithmetic serves here, ", min_edge_, "; raise rho = ", demands_->rho));
   }
+  cell.CutBeforePlace(Add(request), point.position);
+  return absl::OkStatus();
+}
+
+template <int D>
+absl::Status Refinement<D>::TooManyVertices() const {
+  return absl::ResourceExhaustedError(
+      absl::StrCat("the mesh needs more than max_vertices = ", max_vertices_, " vertices; raise max_vertices or rho"));
+}
+
+// Adds the vertex that is asked for, and has it wait.
+template <int D>
+VertexId Refinement<D>::Add(const Request& request) {
   if constexpr (kChecks) {
     AdmitWaiting();
     CheckInsertion(request);
   }
   Insertion insertion = request.insertion;
-  insertion.vertex = structure_.AddWaiting(insertion.near, point.position);
+  insertion.vertex = structure_.AddWaiting(insertion.near, request.point.position);
   if (!foreseen_->IsRunning() || *observer_ || structure_.waiting_count() == QueryStructure<D>::kMostWaiting) {
     AdmitWaiting();
   }
   radius_sq_.push_back(Assessment::kNone);
   announced_.push_back(Announced::kToNone);
   context_->SetVertices(structure_.vertex_count());
-  cell.CutBeforePlace(insertion.vertex, point.position);
-  ScheduleNew(insertion.near, insertion.vertex, point.empty_radius_sq);
+  ScheduleNew(insertion.near, insertion.vertex, request.point.empty_radius_sq);
   if (*observer_) {
     (*observer_)(structure_, insertion);
   }
-  return absl::OkStatus();
+  return insertion.vertex;
 }
 
 // Schedules those neighbours of `v` that it may have spoiled by being added: all, or, once it has been announced to some,
@@ -526,23 +556,30 @@ void Refinement<D>::ScheduleWoken() {
 // That nobody waits below `bucket`, from which `v` was taken: the neighbours in the cell each time, all now and then.
 template <int D>
 void Refinement<D>::CheckOrder(VertexId v, const Polytope<D>& cell, int bucket) {
-  const auto check = [&](VertexId u) {
-    Require(!schedule_.WaitsBelow(u, bucket), "vertex ", Index(v), " is looked at for edges up to ",
-            std::sqrt(schedule_.UpperLengthSq(bucket)), " while vertex ", Index(u), " waits for a shorter one");
-  };
-  for (const CellNode<D>& node : cell.nodes()) {
-    for (const uint16_t index : node.planes) {
-      if (cell.plane(index).kind == PlaneKind::kBisector) {
-        check(cell.plane(index).vertex);
-      }
-    }
-  }
+  CheckNeighbours(v, cell, bucket);
   if (++unchecked_ * kCheckShare > structure_.vertex_count()) {
     unchecked_ = 0;
     for (uint32_t u = 0; u < structure_.vertex_count(); ++u) {
-      check(VertexId{u});
+      CheckWaits(v, VertexId{u}, bucket);
     }
   }
+}
+
+template <int D>
+void Refinement<D>::CheckNeighbours(VertexId v, const Polytope<D>& cell, int bucket) const {
+  for (const CellNode<D>& node : cell.nodes()) {
+    for (const uint16_t index : node.planes) {
+      if (cell.plane(index).kind == PlaneKind::kBisector) {
+        CheckWaits(v, cell.plane(index).vertex, bucket);
+      }
+    }
+  }
+}
+
+template <int D>
+void Refinement<D>::CheckWaits(VertexId v, VertexId u, int bucket) const {
+  Require(!schedule_.WaitsBelow(u, bucket), "vertex ", Index(v), " is looked at for edges up to ",
+          std::sqrt(schedule_.UpperLengthSq(bucket)), " while vertex ", Index(u), " waits for a shorter one");
 }
 
 // [HT08] Definition 1 at an insertion, before it is made: (1), that the edge is the bucket's, the place, and the empty ball.

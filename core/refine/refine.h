@@ -2,14 +2,18 @@
 #ifndef WELLSPACE_CORE_REFINE_REFINE_H_
 #define WELLSPACE_CORE_REFINE_REFINE_H_
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "core/base/cache_lines.h"
 #include "core/base/huge_pages.h"
 #include "core/base/run_context.h"
 #include "core/refine/assessment.h"
@@ -75,7 +79,7 @@ class Refinement {
   //             added since and to what that makes necessary.
   // Errors:     RESOURCE_EXHAUSTED with the bound that was met, one of the context's memory too; CANCELLED, DEADLINE_EXCEEDED. All stays usable: a later
   //             run takes up the work where it was left.
-  // Threads:    uses `threads`, at most as many as the machine has cores, to compute cells ahead.
+  // Threads:    uses `threads`, at most as many as the machine has cores, for slabs (ADR 21) or to compute cells ahead.
   // Source:     [HT08] Figure 4; see docs/design/refine.md.
   absl::Status Run(const Demands<D>& demands, uint64_t max_vertices, int threads, RunContext& context,
                    const RefinementObserver<D>& observer = nullptr);
@@ -118,9 +122,57 @@ class Refinement {
     SteinerPoint<D> point;
   };
 
+  // What is between two lines across an axis, and the vertices of a bucket in it. A packet of them is looked at as if nobody were looked
+  // at elsewhere meanwhile.
+  struct alignas(kCacheLines) Slab {
+    enum class Kind : uint8_t {
+      kInserted,  // a vertex, as the next of the requests says
+      kLeft,      // for the slabs of another axis, or for Improve
+      kWaits,     // in a bucket
+      kDone,      // with the next of the stars
+    };
+    // What became of a vertex that was looked at, in order.
+    struct Event {
+      VertexId vertex = kNoVertex;
+      Kind kind = Kind::kInserted;
+      Announced announced = Announced::kToNone;
+      int16_t bucket = 0;      // kWaits
+      uint32_t star_size = 0;  // kDone
+      double radius_sq = 0;    // kDone
+    };
+
+    bool HoldsBall(const Point<D>& centre, double radius_sq) const {
+      const double depth = std::min(centre[axis] - low, high - centre[axis]);
+      return depth > 0 && depth * depth > radius_sq;
+    }
+
+    int axis = 0;
+    double low = -std::numeric_limits<double>::infinity();
+    double high = std::numeric_limits<double>::infinity();
+    HugeVector<VertexId> waiting;  // the last is the next
+
+    // Of the packet. What is inserted is numbered from slab_first_new_ on, as if no other slab inserted any.
+    size_t packet = 0;  // how many are looked at
+    std::vector<Event> events;
+    size_t replayed = 0;  // of events
+    size_t end = 0;       // of those that may be replayed now
+    std::vector<Request> requests;
+    size_t added = 0;                // of requests
+    std::vector<Point<D>> inserted;  // with room up to PaddedCount
+    std::vector<Point<D>> below;     // where somebody comes to wait in a lower bucket
+    Star<D> stars;
+    size_t listed = 0;  // of stars
+    Star<D> star;       // scratch
+  };
+  struct alignas(kCacheLines) OwnWorkspace : Workspace<D> {};
+
   absl::Status ScheduleAll(const Demands<D>& demands, ThreadTeam& team);
-  double FirstEdgeSq(const Demands<D>& demands, VertexId v, double nearest_sq, double size_sq) const;
-  absl::Status Loop(RunContext& context);
+  double FirstEdgeSq(const Demands<D>& demands, const Point<D>& p, FaceMask faces, double nearest_sq,
+                     double size_sq) const;
+  double FirstEdgeSqOfNew(const Point<D>& p, FaceMask faces, double nearest_sq) const;
+  absl::Status Loop(ThreadTeam& team);
+  absl::Status Serve(VertexId v, int bucket);
+  absl::Status Report(int bucket);
   absl::Status Improve(VertexId v, int bucket);
   std::optional<Request> NextRequest(VertexId v, const Polytope<D>& cell, const Assessment& found,
                                      double edge_limit_sq) const;
@@ -132,15 +184,33 @@ class Refinement {
   void ComputeCell(VertexId v, double clip, Workspace<D>& workspace);
   Assessment AssessCell(Polytope<D>& cell, FaceMask site_faces, double edge_limit_sq) const;
   absl::Status Insert(const Request& request, Polytope<D>& cell);
+  VertexId Add(const Request& request);
+  absl::Status TooManyVertices() const;
   bool IsLongEnough(const SteinerPoint<D>& point) const { return point.empty_radius_sq >= min_edge_ * min_edge_; }
   void Settle(VertexId v, const Assessment& found, double clip, int earliest, const Look<D>& look);
+  int NextBucket(const Assessment& found, double clip, int earliest) const;
   void ScheduleNew(VertexId near, VertexId x, double nearest_sq);
   void Remember(VertexId v, double radius_sq, std::span<const WatchedNode<D>> watched = {});
   std::span<const WatchedNode<D>> NodesToWatch(VertexId v, const Polytope<D>& cell, double edge_sq);
   void Announce(VertexId v, const Polytope<D>& cell, const Assessment& found);
   void Wake(VertexId u, double edge_sq);
   void ScheduleWoken();
+  // Whether large buckets are served in slabs, and not with cells ahead: ADR 21.
+  bool HasSlabs() const { return D == 2 && demands_->criterion == Criterion::kRadiusEdge; }
+  bool TakesSlabs(int bucket) const;
+  void MakeSlabs(int bucket);
+  void LayLines(std::span<const VertexId> waiting, int axis, double reach);
+  void DropSlabs();
+  uint64_t SlabBytes() const;
+  absl::Status ServeSlabs(ThreadTeam& team);
+  void LookInto(Slab& slab, Workspace<D>& workspace) const;
+  void LookAtIn(Slab& slab, VertexId v, Workspace<D>& workspace) const;
+  bool ReplaySlabs(ThreadTeam& team);
+  void Replay(Slab& slab, uint32_t shift);
+  void ListStars(Slab& slab, uint32_t shift);
   void CheckOrder(VertexId v, const Polytope<D>& cell, int bucket);
+  void CheckNeighbours(VertexId v, const Polytope<D>& cell, int bucket) const;
+  void CheckWaits(VertexId v, VertexId u, int bucket) const;
   void CheckInsertion(const Request& request);
 
   QueryStructure<D>& structure_;
@@ -156,11 +226,20 @@ class Refinement {
   Workspace<D> own_;                   // the cell that is improved
   Workspace<D> new_;                   // the cell of a vertex just added on a face
 
+  // Those of slab_bucket_ who wait in slabs: the highest bucket that ever did. By bits, the axes that slabs have been laid across for it.
+  std::vector<Slab> slabs_;
+  int slab_bucket_ = -1;
+  uint32_t slab_axes_ = 0;
+  bool slabs_are_ahead_ = false;  // some of what packets have put down is still to be replayed
+  uint32_t slab_first_new_ = 0;
+
   // Of the run.
   double off_center_factor_ = 0;
   double plain_ratio_ = 0;  // cells that keep it need nothing; 0: that does not tell
   double clip_factor_ = 0;
   uint64_t max_vertices_ = 0;
+  uint64_t served_ = 0;                             // vertices, one after the other
+  std::vector<OwnWorkspace> slab_workspaces_;       // by thread
   ForeseenCells<D>* foreseen_ = nullptr;            // null between runs
   std::vector<VertexId> next_;                      // whose cells are foreseen next
   std::vector<std::pair<VertexId, double>> woken_;  // scratch of Wake

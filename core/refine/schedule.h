@@ -97,26 +97,72 @@ class Schedule {
     }
   }
 
-  // Takes a vertex from the lowest bucket; false when none waits.
-  bool Pop(VertexId& v, int& bucket) {
-    for (; static_cast<size_t>(lowest_) < buckets_.size(); ++lowest_) {
-      if (lowest_ >= in_order_) {
-        PutInOrder(buckets_[lowest_]);
-        in_order_ = lowest_ + 1;
-      }
-      while (!buckets_[lowest_].empty()) {
-        v = buckets_[lowest_].back();
-        buckets_[lowest_].pop_back();
-        if (BucketHolding(v) == lowest_) {  // else it has moved to a lower bucket since
-          places_[Index(v)].bucket = kNowhere;
-          --size_;
-          bucket = lowest_;
-          return true;
+  // The lowest bucket in which a vertex may wait, -1 if there is none below `end`.
+  int Lowest(int end = std::numeric_limits<int>::max()) {
+    for (end = std::min(end, static_cast<int>(buckets_.size())); lowest_ < end; ++lowest_) {
+      if (!buckets_[lowest_].empty()) {
+        if (lowest_ >= in_order_) {
+          PutInOrder(buckets_[lowest_]);
+          in_order_ = lowest_ + 1;
         }
+        return lowest_;
       }
       buckets_[lowest_] = {};
     }
+    return -1;
+  }
+
+  // At most how many vertices wait in `bucket`: those that have moved on are counted, too.
+  size_t MostIn(int bucket) const { return buckets_[bucket].size(); }
+
+  // Takes a vertex from the lowest bucket, if that is below `end`; false when none waits there.
+  bool Pop(VertexId& v, int& bucket, int end = std::numeric_limits<int>::max()) {
+    for (int lowest = Lowest(end); lowest >= 0; lowest = Lowest(end)) {
+      while (!buckets_[lowest].empty()) {
+        v = buckets_[lowest].back();
+        buckets_[lowest].pop_back();
+        if (WaitsIn(v, lowest)) {  // else it has moved to a lower bucket since
+          Take(v);
+          bucket = lowest;
+          return true;
+        }
+      }
+    }
     return false;
+  }
+
+  // Has everybody who waits in `bucket`, the lowest, wait without a place in its order, until it is taken or put back. Returns them: those
+  // that would be taken last come first.
+  HugeVector<VertexId> Lift(int bucket) {
+    HugeVector<VertexId> lifted = std::exchange(buckets_[bucket], {});
+    // From the last on each once: whoever has been seen waits nowhere meanwhile.
+    size_t first = lifted.size();
+    for (size_t i = lifted.size(); i-- > 0;) {
+      const VertexId v = lifted[i];
+      if (WaitsIn(v, bucket)) {
+        places_[Index(v)].bucket = kNowhere;
+        lifted[--first] = v;
+      }
+    }
+    lifted.erase(lifted.begin(), lifted.begin() + static_cast<std::ptrdiff_t>(first));
+    for (const VertexId v : lifted) {
+      places_[Index(v)].bucket = static_cast<int16_t>(bucket);
+    }
+    return lifted;
+  }
+
+  // Puts a vertex that was lifted from `bucket`, and waits in it still, on top of it.
+  void PutBack(VertexId v, int bucket) {
+    buckets_[bucket].push_back(v);
+    lowest_ = std::min(lowest_, bucket);
+  }
+
+  bool WaitsIn(VertexId v, int bucket) const { return BucketHolding(v) == bucket; }
+
+  // Has a vertex that waits wait no more.
+  void Take(VertexId v) {
+    places_[Index(v)].bucket = kNowhere;
+    --size_;
   }
 
  private:

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/base/ids.h"
+#include "core/voronoi/lanes.h"
 
 namespace wellspace::core {
 
@@ -49,7 +50,7 @@ class LeafQueue {
   //
   // REQUIRES:   room for it; distance_sq >= 0.
   // Complexity: O(1), without a branch, since none could be foretold.
-  void PushIf(bool counts, double distance_sq, NodeId leaf) {
+  WELLSPACE_INLINE void PushIf(bool counts, double distance_sq, NodeId leaf) {
     const auto at = static_cast<size_t>(std::clamp<int64_t>(Class(distance_sq) - base_, 0, kClasses - 1));
     const uint32_t one = counts ? 1 : 0;
     const uint32_t last = last_[at];

@@ -211,7 +211,7 @@ void QueryStructure<D>::ScanOutward(const Point<D>& site, NodeId own, Workspace<
     const double limit_sq = reach_sq();
     queue.Reserve(LeafTree<D>::kMostFaceNeighbours + 1);
     const uint32_t old_end = queue.end();
-    const auto meet = [&](NodeId beyond) {
+    const auto meet = [&](NodeId beyond) __attribute__((always_inline)) {
       // No branch, since none could be foretold.
       const bool is_new = seen[Index(beyond)] != workspace.query;
       seen[Index(beyond)] = workspace.query;
@@ -282,17 +282,19 @@ void QueryStructure<D>::ClippedVoronoi(VertexId v, double radius, Workspace<D>& 
 }
 
 template <int D>
-void QueryStructure<D>::UnplacedClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace) const {
-  ClipAndScan(v, radius, TieRule::kPerturb, workspace);
+void QueryStructure<D>::UnplacedClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace,
+                                               std::span<const Point<D>> others, VertexId first_other) const {
+  ClipAndScan(v, radius, TieRule::kPerturb, workspace, others, first_other);
 }
 
 // Computes the clipped cell of vertex `v`.
 template <int D>
-void QueryStructure<D>::ClipAndScan(VertexId v, double radius, TieRule rule, Workspace<D>& workspace) const {
+void QueryStructure<D>::ClipAndScan(VertexId v, double radius, TieRule rule, Workspace<D>& workspace,
+                                    std::span<const Point<D>> others, VertexId first_other) const {
   std::array<PlaneKind, 2 * D> kinds;
   const Box<D> bounds = ClippedBox<D>(box_, point(v), radius, kinds);
   workspace.cell.Reset(point(v), bounds, kinds, rule);
-  Scan(LeafOf(v), workspace);
+  Scan(LeafOf(v), workspace, others, first_other);
 }
 
 template <int D>
@@ -310,14 +312,20 @@ void QueryStructure<D>::Voronoi(VertexId v, Workspace<D>& workspace) const {
   workspace.cell.Place();
 }
 
-// Cuts workspace.cell, whose site is a vertex in `own`, by the vertices in the leaves from `own` outward.
+// Cuts workspace.cell, whose site is a vertex in `own`, by the vertices in the leaves from `own` outward, and by others once by those in `own`.
 template <int D>
-void QueryStructure<D>::Scan(NodeId own, Workspace<D>& workspace) const {
+void QueryStructure<D>::Scan(NodeId own, Workspace<D>& workspace, std::span<const Point<D>> others,
+                             VertexId first_other) const {
   ScanOutward(
       workspace.cell.site(), own, workspace,
       [&] { return workspace.cell.IsTooLarge() ? -1 : workspace.cell.CutLimitSq(); },
       [&](NodeId leaf) { return workspace.cell.Reaches(tree_.BoxOf(leaf)); },
-      [&](NodeId leaf) { CutByLeaf(leaf, workspace); });
+      [&](NodeId leaf) {
+        CutByLeaf(leaf, workspace);
+        if (leaf == own) {
+          CutByOthers(others, first_other, workspace);
+        }
+      });
   CountCuts(workspace);
 }
 
@@ -328,17 +336,31 @@ void QueryStructure<D>::CountCuts(Workspace<D>& workspace) {
   workspace.counters.decisions.perturbed += workspace.cell.counters().perturbed;
 }
 
-// Cuts the cell by the vertices of a leaf, the nearest first: far ones then seldom cut.
 template <int D>
 void QueryStructure<D>::CutByLeaf(NodeId leaf, Workspace<D>& workspace) const {
-  const auto* bucket = tree_.BucketOf(leaf);
-  if (bucket == nullptr) {
-    return;
+  if (const auto* bucket = tree_.BucketOf(leaf); bucket != nullptr) {
+    CutByEach(
+        {bucket->positions, bucket->count}, [bucket](size_t slot) { return bucket->ids[slot]; }, workspace);
   }
-  workspace.counters.vertices += bucket->count;
+}
+
+template <int D>
+void QueryStructure<D>::CutByOthers(std::span<const Point<D>> others, VertexId first_other, Workspace<D>& workspace) {
+  constexpr size_t kTogether = LeafTree<D>::kLeafCapacity;
+  for (size_t begin = 0; begin < others.size() && !workspace.cell.IsTooLarge(); begin += kTogether) {
+    const auto id_of = [=](size_t slot) { return VertexId{static_cast<uint32_t>(Index(first_other) + begin + slot)}; };
+    CutByEach(others.subspan(begin, std::min(kTogether, others.size() - begin)), id_of, workspace);
+  }
+}
+
+// Cuts the cell by vertices, as many as a leaf holds at most, the nearest first: far ones then seldom cut.
+template <int D>
+template <typename IdOf>
+void QueryStructure<D>::CutByEach(std::span<const Point<D>> positions, IdOf id_of, Workspace<D>& workspace) {
+  workspace.counters.vertices += positions.size();
   Polytope<D>& cell = workspace.cell;
   Candidates<D>& near = workspace.near;
-  near.Pick({bucket->positions, bucket->count}, cell.site(), cell.CutLimitSq());
+  near.Pick(positions, cell.site(), cell.CutLimitSq());
   if (cell.cuts() != 0) {
     cell.Foretell(0, near);
     near.DropThoseThatMiss(0);
@@ -357,7 +379,7 @@ void QueryStructure<D>::CutByLeaf(NodeId leaf, Workspace<D>& workspace) const {
       w[axis] = left.w[axis][j];
     }
     const auto slot = left.slot[j];
-    if (!cell.CutBeforePlace(bucket->ids[slot], bucket->positions[slot], w, left.length_sq[j])) {
+    if (!cell.CutBeforePlace(id_of(slot), positions[slot], w, left.length_sq[j])) {
       continue;
     }
     if (D == 2) {

@@ -118,8 +118,12 @@ class QueryStructure {
   //             meets crosses only facets of leaves that it meets.
   void ClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace, TieRule rule = TieRule::kKeep) const;
 
-  // The same, ties perturbed, for whoever may not need the nodes: they are still to be placed, by cell.Place().
-  void UnplacedClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace) const;
+  // The same, ties perturbed, for whoever may not need the nodes: they are still to be placed, by cell.Place(). The cell is cut by `others`, too, vertices
+  // numbered from `first_other` on that the structure does not hold.
+  //
+  // REQUIRES:   others may be read up to PaddedCount of them.
+  void UnplacedClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace, std::span<const Point<D>> others = {},
+                              VertexId first_other = kNoVertex) const;
 
   // Computes in workspace.cell the whole Voronoi cell of `v`, inside walls one side of the box beyond it, ties
   // perturbed.
@@ -192,9 +196,15 @@ class QueryStructure {
   void ScanOutward(const Point<D>& site, NodeId own, Workspace<D>& workspace, ReachSq reach_sq, Wants wants,
                    Open open) const;
   Neighbor Nearest(const Point<D>& p, NodeId leaf, VertexId but, double limit_sq, Workspace<D>& workspace) const;
-  void ClipAndScan(VertexId v, double radius, TieRule rule, Workspace<D>& workspace) const;
-  void Scan(NodeId own, Workspace<D>& workspace) const;
+  // Others as in UnplacedClippedVoronoi.
+  void ClipAndScan(VertexId v, double radius, TieRule rule, Workspace<D>& workspace,
+                   std::span<const Point<D>> others = {}, VertexId first_other = kNoVertex) const;
+  void Scan(NodeId own, Workspace<D>& workspace, std::span<const Point<D>> others = {},
+            VertexId first_other = kNoVertex) const;
   void CutByLeaf(NodeId leaf, Workspace<D>& workspace) const;
+  static void CutByOthers(std::span<const Point<D>> others, VertexId first_other, Workspace<D>& workspace);
+  template <typename IdOf>
+  static void CutByEach(std::span<const Point<D>> positions, IdOf id_of, Workspace<D>& workspace);
   static void CountCuts(Workspace<D>& workspace);
 
   Box<D> box_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/cache_lines.h"
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
@@ -27,7 +28,7 @@ void MakeUnique(std::vector<LateNeighbours::Late>& late) {
 }  // namespace
 
 template <int D>
-void StarLists<D>::Set(VertexId v, const Star<D>& star, uint32_t vertex_count) {
+void StarLists<D>::Set(VertexId v, std::span<const std::array<VertexId, D>> star, uint32_t vertex_count) {
   if (listed_.size() + star.size() >= kNone) {
     DropUnused();
     if (listed_.size() + star.size() >= kNone) {
@@ -101,11 +102,13 @@ template <int D>
 absl::StatusOr<LateNeighbours> LateNeighbours::Of(const StarLists<D>& lists, uint32_t vertex_count, int threads,
                                                   const RunContext& context) {
   ThreadTeam team(threads);
-  std::vector<std::vector<Late>> of_threads(team.threads());
-  std::vector<size_t> most_late(team.threads(), kLeastLate);
+  struct alignas(kCacheLines) Own {
+    std::vector<Late> late;
+    size_t most_late = kLeastLate;
+  };
+  std::vector<Own> of_threads(team.threads());
   team.ForEach((vertex_count + kVerticesTogether - 1) / kVerticesTogether, [&](size_t block) {
-    const int thread = ThreadTeam::CurrentThread();
-    std::vector<Late>& late = of_threads[thread];
+    auto& [late, most_late] = of_threads[ThreadTeam::CurrentThread()];
     const uint32_t begin = static_cast<uint32_t>(block) * kVerticesTogether;
     const uint32_t end = std::min(vertex_count, begin + kVerticesTogether);
     std::array<VertexId, D + 1> corners;
@@ -126,16 +129,16 @@ absl::StatusOr<LateNeighbours> LateNeighbours::Of(const StarLists<D>& lists, uin
       }
     }
     // Each pair comes with every simplex that has both.
-    if (late.size() > most_late[thread]) {
+    if (late.size() > most_late) {
       MakeUnique(late);
-      most_late[thread] = std::max(kLeastLate, 2 * late.size());
+      most_late = std::max(kLeastLate, 2 * late.size());
     }
   });
   WELLSPACE_RETURN_IF_ERROR(context.Check());
   LateNeighbours found;
-  for (std::vector<Late>& late : of_threads) {
-    found.late_.insert(found.late_.end(), late.begin(), late.end());
-    late = {};
+  for (Own& own : of_threads) {
+    found.late_.insert(found.late_.end(), own.late.begin(), own.late.end());
+    own.late = {};
   }
   MakeUnique(found.late_);
   found.is_at_.resize(vertex_count);

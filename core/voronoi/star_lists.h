@@ -35,7 +35,7 @@ class StarLists {
   // REQUIRES:   all simplices of v are in star; v and its neighbours are below vertex_count; vertices are numbered as they are added.
   // Complexity: O(star), amortised.
   // Errors:     none; more than 2^32 simplices cannot be numbered, and are as GiveUp().
-  void Set(VertexId v, const Star<D>& star, uint32_t vertex_count);
+  void Set(VertexId v, std::span<const std::array<VertexId, D>> star, uint32_t vertex_count);
 
   // Forgets everything, and lists nothing until Clear(): where vertices move, or go, stars grow.
   void GiveUp();

@@ -35,8 +35,8 @@ std::vector<GoldenMesh> GoldenMeshes() {
   return {
       {"uniform_2", "uniform", 2, 2000, {}, 3765, 0x2fed97d37cd9388f},
       {"uniform_2_well_spaced", "uniform", 2, 1000, {.criterion = Criterion::kWellSpaced}, 5039, 0x9da6a5a8fc971e79},
-      {"lines_2_tight", "lines", 2, 1000, {.rho = 1}, 8861, 0x7e6df39b27725ecd},
-      {"grid_2", "grid", 2, 1000, {}, 1154, 0x76b5a4cab231192d},
+      {"lines_2_tight", "lines", 2, 1000, {.rho = 1}, 8803, 0x221de598b19f9c12},
+      {"grid_2", "grid", 2, 1000, {}, 1153, 0x4a9a692fc82fa791},
       {"cospherical_2", "cospherical", 2, 500, {}, 946, 0xb505d016a23dd44b},
       {"uniform_2_sized", "uniform", 2, 100, {.max_circumradius = 0.02}, 1743, 0x6253ddcb8115c893},
       {"uniform_3", "uniform", 3, 1000, {}, 3697, 0x0d82108fbff5ef3a},

@@ -17,6 +17,7 @@
 
 #include "core/refine/assessment.h"
 #include "core/refine/schedule.h"
+#include "tests/core/expect_refined.h"
 #include "tests/support/brute_force.h"
 #include "tests/support/clouds.h"
 #include "tests/support/seeded_test.h"
@@ -26,9 +27,11 @@ namespace wellspace::core {
 namespace {
 
 using test::ByDimension;
+using test::ExpectRefined;
 using test::MakeStructure;
 using test::Seed;
 using test::SplitMix64;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 constexpr uint64_t kMany = 1'000'000;
@@ -55,30 +58,6 @@ template <int D>
 absl::Status RefineQuietly(const Parameters& parameters, QueryStructure<D>& structure) {
   RunContext context;
   return Refine<D>(parameters, structure, context);
-}
-
-// What Refine promises of the whole cell of `v`, computed by a look at all vertices; ties are perturbed, as they are for
-// the simplices.
-template <int D>
-void ExpectRefined(const QueryStructure<D>& structure, VertexId v, double rho, Polytope<D>& cell) {
-  test::CutByAllInBox<D>(structure, v, cell, TieRule::kPerturb);
-  for (const CellNode<D>& node : cell.nodes()) {
-    double shortest = std::numeric_limits<double>::infinity();
-    bool is_circumcenter = true;
-    for (const uint16_t index : node.planes) {
-      const Plane<D>& plane = cell.plane(index);
-      if (plane.kind == PlaneKind::kFace) {
-        is_circumcenter = false;
-        ASSERT_TRUE((structure.faces(v) >> plane.face) & 1)
-            << "the cell of vertex " << Index(v) << " touches face " << int{plane.face};
-      } else {
-        shortest = std::min(shortest, plane.length);
-      }
-    }
-    if (is_circumcenter) {
-      ASSERT_LE(std::sqrt(node.radius_sq), rho * shortest * (1 + 1e-9)) << "at vertex " << Index(v);
-    }
-  }
 }
 
 template <typename T>
@@ -423,6 +402,46 @@ TEST(ScheduleTest, BehavesAsItsModel) {
       model.erase(next);
     }
   }
+}
+
+TEST(ScheduleTest, WhoIsLiftedWaitsUntilItIsTakenOrPutBack) {
+  Schedule schedule(1);
+  for (uint32_t v = 0; v < 6; ++v) {
+    schedule.AddToBucket(VertexId{v}, 3);
+  }
+  schedule.AddToBucket(VertexId{4}, 2);
+  VertexId v{};
+  int bucket = 0;
+  ASSERT_TRUE(schedule.Pop(v, bucket));
+  schedule.AddToBucket(v, 3);  // which it had before: once more in the list, but waiting once
+  EXPECT_EQ(schedule.Lowest(), 3);
+  const HugeVector<VertexId> lifted = schedule.Lift(3);
+  EXPECT_THAT(lifted, ElementsAre(VertexId{0}, VertexId{1}, VertexId{2}, VertexId{3}, VertexId{5}, VertexId{4}));
+  EXPECT_EQ(schedule.size(), 6);
+  EXPECT_FALSE(schedule.HasBelow(3));
+  EXPECT_EQ(schedule.Lowest(), -1) << "who is lifted has no place in the order";
+  for (const VertexId u : lifted) {
+    EXPECT_TRUE(schedule.WaitsIn(u, 3));
+  }
+  schedule.AddToBucket(VertexId{1}, 1);  // moves down
+  EXPECT_FALSE(schedule.WaitsIn(VertexId{1}, 3));
+  EXPECT_TRUE(schedule.HasBelow(3));
+  EXPECT_TRUE(schedule.Pop(v, bucket, 3));
+  EXPECT_EQ(v, VertexId{1});
+  EXPECT_FALSE(schedule.Pop(v, bucket, 3));
+  schedule.Take(VertexId{0});
+  EXPECT_FALSE(schedule.Waits(VertexId{0}));
+  schedule.PutBack(VertexId{5}, 3);
+  schedule.PutBack(VertexId{2}, 3);
+  EXPECT_EQ(schedule.MostIn(3), 2);
+  EXPECT_FALSE(schedule.Pop(v, bucket, 3)) << "below 3";
+  for (const uint32_t expected : {2, 5}) {
+    EXPECT_TRUE(schedule.Pop(v, bucket));
+    EXPECT_EQ(Index(v), expected);
+    EXPECT_EQ(bucket, 3);
+  }
+  EXPECT_FALSE(schedule.Pop(v, bucket));
+  EXPECT_EQ(schedule.size(), 2) << "3 and 4 are lifted still";
 }
 
 // By blocks of numbers, what is new in that of its neighbour; the last come first in each, and before all of them what comes

@@ -1,0 +1,158 @@
+// Refinement of clouds that are large enough for slabs: several threads look at once, and nobody sees it.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/refine/refine.h"
+#include "tests/core/expect_refined.h"
+#include "tests/support/brute_force.h"
+#include "tests/support/clouds.h"
+#include "tests/support/seeded_test.h"
+#include "tests/support/structures.h"
+
+namespace wellspace::core {
+namespace {
+
+using test::ExpectRefined;
+using test::MakeStructure;
+using ::testing::HasSubstr;
+
+constexpr uint64_t kMany = 1'000'000;
+constexpr double kMinEdge = 0x1p-48;
+constexpr size_t kPoints = 4000;
+
+Demands<2> PlainDemands() { return {.rho = std::sqrt(2.0)}; }
+
+struct Refined {
+  explicit Refined(const std::vector<Point<2>>& cloud)
+      : structure(MakeStructure<2>(cloud)), refinement(structure, kMinEdge) {}
+
+  QueryStructure<2> structure;
+  Refinement<2> refinement;
+};
+
+// In order, which stars are not listed in.
+Star<2> ListedAt(const Refined& refined, VertexId v) {
+  const auto listed = refined.refinement.stars().Of(v);
+  Star<2> sorted(listed.begin(), listed.end());
+  for (auto& simplex : sorted) {
+    std::sort(simplex.begin(), simplex.end());
+  }
+  std::sort(sorted.begin(), sorted.end());
+  return sorted;
+}
+
+void ExpectSame(const Refined& actual, const Refined& expected) {
+  ASSERT_EQ(actual.structure.vertex_count(), expected.structure.vertex_count());
+  for (uint32_t i = 0; i < actual.structure.vertex_count(); ++i) {
+    const VertexId v{i};
+    ASSERT_EQ(actual.structure.point(v), expected.structure.point(v)) << "vertex " << i;
+    ASSERT_EQ(ListedAt(actual, v), ListedAt(expected, v)) << "vertex " << i;
+  }
+}
+
+class RefineInSlabsTest : public test::SeededTest, public ::testing::WithParamInterface<std::string_view> {
+ protected:
+  RefineInSlabsTest() : SeededTest(2021), cloud_(test::SortedCloud<2>(GetParam(), kPoints)) {}
+
+  const std::vector<Point<2>> cloud_;
+};
+INSTANTIATE_TEST_SUITE_P(Clouds, RefineInSlabsTest,
+                         ::testing::Values("uniform", "clusters", "lines", "grid", "boundary", "cospherical"),
+                         [](const auto& kind) { return std::string(kind.param); });
+
+TEST_P(RefineInSlabsTest, IsTheSameForAnyNumberOfThreads) {
+  Refined expected(cloud_);
+  RunContext context;
+  ASSERT_TRUE(expected.refinement.Run(PlainDemands(), kMany, 1, context).ok());
+  for (const int threads : {2, 4}) {
+    SCOPED_TRACE(threads);
+    Refined actual(cloud_);
+    ASSERT_TRUE(actual.refinement.Run(PlainDemands(), kMany, threads, context).ok());
+    ExpectSame(actual, expected);
+  }
+}
+
+TEST_P(RefineInSlabsTest, EveryCellIsGoodInTheEnd) {
+  Refined refined(cloud_);
+  RunContext context;
+  uint32_t vertices = refined.structure.vertex_count();
+  const auto observer = [&](const QueryStructure<2>& structure, const Insertion& insertion) {
+    ASSERT_EQ(Index(insertion.vertex), vertices++);
+    ASSERT_EQ(structure.vertex_count(), vertices);
+    ASSERT_LT(Index(insertion.near), Index(insertion.vertex));
+    // The other end of the edge, by numbers that hold now.
+    if (insertion.other != kNoVertex) {
+      const double edge_sq = DistanceSq<2>(structure.point(insertion.near), structure.point(insertion.other));
+      ASSERT_NEAR(edge_sq, insertion.edge_sq, 1e-9 * edge_sq);
+    }
+  };
+  ASSERT_TRUE(refined.refinement.Run(PlainDemands(), kMany, 2, context, observer).ok());
+  ASSERT_EQ(refined.structure.vertex_count(), vertices);
+  Polytope<2> cell;
+  for (uint32_t v = static_cast<uint32_t>(random_.Below(20)); v < vertices; v += 20) {
+    ExpectRefined<2>(refined.structure, VertexId{v}, PlainDemands().rho, cell);
+    ASSERT_FALSE(HasFatalFailure());
+  }
+}
+
+TEST_P(RefineInSlabsTest, WhatWasStoppedEndsAsIfItHadNotBeen) {
+  Refined at_once(cloud_);
+  RunContext context;
+  ASSERT_TRUE(at_once.refinement.Run(PlainDemands(), kMany, 1, context).ok());
+  Refined stopped(cloud_);
+  absl::Status status = absl::UnknownError("not begun");
+  while (!status.ok()) {
+    const uint64_t budget = stopped.structure.vertex_count() + 1 + random_.Below(200);
+    status = stopped.refinement.Run(PlainDemands(), budget, 1 + static_cast<int>(random_.Below(2)), context);
+    if (!status.ok()) {
+      ASSERT_THAT(std::string(status.message()), HasSubstr("max_vertices = " + std::to_string(budget)));
+      ASSERT_EQ(stopped.structure.vertex_count(), budget);
+    }
+  }
+  ExpectSame(stopped, at_once);
+}
+
+TEST_P(RefineInSlabsTest, IsToldOfVerticesThatOthersAddWhileItIsStopped) {
+  Refined refined(cloud_);
+  RunContext context;
+  Workspace<2> workspace;
+  absl::Status status = absl::UnknownError("not begun");
+  while (!status.ok()) {
+    const uint64_t budget = refined.structure.vertex_count() + 1 + random_.Below(1000);
+    status = refined.refinement.Run(PlainDemands(), budget, 2, context);
+    const Point<2> p{0.01 + 0.98 * random_.Unit(), 0.01 + 0.98 * random_.Unit()};
+    const Neighbor nearest = refined.structure.NearestTo(p, kNoVertex, workspace);
+    if (!status.ok() && nearest.distance_sq > 1e-6) {
+      refined.refinement.VertexAdded(refined.structure.AddVertex(nearest.vertex, p));
+    }
+  }
+  Polytope<2> cell;
+  for (uint32_t v = 0; v < refined.structure.vertex_count(); v += 20) {
+    ExpectRefined<2>(refined.structure, VertexId{v}, PlainDemands().rho, cell);
+    ASSERT_FALSE(HasFatalFailure());
+  }
+}
+
+TEST_P(RefineInSlabsTest, OtherDemandsMayFollowWhileItIsStopped) {
+  Refined refined(cloud_);
+  RunContext context;
+  const absl::Status status = refined.refinement.Run(PlainDemands(), refined.structure.vertex_count() + 50, 2, context);
+  EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
+  const Demands<2> tighter{.rho = 1.1};
+  ASSERT_TRUE(refined.refinement.Run(tighter, kMany, 2, context).ok());
+  Polytope<2> cell;
+  for (uint32_t v = 0; v < refined.structure.vertex_count(); v += 20) {
+    ExpectRefined<2>(refined.structure, VertexId{v}, tighter.rho, cell);
+    ASSERT_FALSE(HasFatalFailure());
+  }
+}
+
+}  // namespace
+}  // namespace wellspace::core
