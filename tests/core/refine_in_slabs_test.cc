@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -57,6 +59,26 @@ void ExpectSame(const Refined& actual, const Refined& expected) {
   }
 }
 
+// That the ball about a new vertex was empty.
+void ExpectIsFar(const QueryStructure<2>& structure, const Insertion& insertion, Workspace<2>& workspace) {
+  const double limit_sq = insertion.empty_radius_sq * (1 - 1e-9);
+  const Neighbor nearest = structure.NearestWithin(insertion.vertex, limit_sq, workspace);
+  ASSERT_EQ(nearest.vertex, kNoVertex) << "at a squared distance of " << nearest.distance_sq;
+}
+
+// That each simplex at `v` is listed by one of its vertices.
+void ExpectIsListed(const Refined& refined, VertexId v, const Polytope<2>& cell) {
+  Star<2> star;
+  cell.FindStar(star);
+  for (const auto& [a, b] : star) {
+    const auto lists = [&](VertexId u, VertexId w, VertexId x) {
+      const Star<2> listed = ListedAt(refined, u);
+      return std::find(listed.begin(), listed.end(), std::array{std::min(w, x), std::max(w, x)}) != listed.end();
+    };
+    ASSERT_TRUE(lists(v, a, b) || lists(a, v, b) || lists(b, v, a)) << Index(v) << ' ' << Index(a) << ' ' << Index(b);
+  }
+}
+
 class RefineInSlabsTest : public test::SeededTest, public ::testing::WithParamInterface<std::string_view> {
  protected:
   RefineInSlabsTest() : SeededTest(2021), cloud_(test::SortedCloud<2>(GetParam(), kPoints)) {}
@@ -82,6 +104,7 @@ TEST_P(RefineInSlabsTest, IsTheSameForAnyNumberOfThreads) {
 TEST_P(RefineInSlabsTest, EveryCellIsGoodInTheEnd) {
   Refined refined(cloud_);
   RunContext context;
+  Workspace<2> workspace;
   uint32_t vertices = refined.structure.vertex_count();
   const auto observer = [&](const QueryStructure<2>& structure, const Insertion& insertion) {
     ASSERT_EQ(Index(insertion.vertex), vertices++);
@@ -92,12 +115,15 @@ TEST_P(RefineInSlabsTest, EveryCellIsGoodInTheEnd) {
       const double edge_sq = DistanceSq<2>(structure.point(insertion.near), structure.point(insertion.other));
       ASSERT_NEAR(edge_sq, insertion.edge_sq, 1e-9 * edge_sq);
     }
+    ExpectIsFar(structure, insertion, workspace);
   };
   ASSERT_TRUE(refined.refinement.Run(PlainDemands(), kMany, 2, context, observer).ok());
   ASSERT_EQ(refined.structure.vertex_count(), vertices);
   Polytope<2> cell;
   for (uint32_t v = static_cast<uint32_t>(random_.Below(20)); v < vertices; v += 20) {
     ExpectRefined<2>(refined.structure, VertexId{v}, PlainDemands().rho, cell);
+    ASSERT_FALSE(HasFatalFailure());
+    ExpectIsListed(refined, VertexId{v}, cell);
     ASSERT_FALSE(HasFatalFailure());
   }
 }
@@ -119,17 +145,30 @@ TEST_P(RefineInSlabsTest, WhatWasStoppedEndsAsIfItHadNotBeen) {
   ExpectSame(stopped, at_once);
 }
 
+// Where the refinement is at work, so that what packets have put down does not hold any more.
 TEST_P(RefineInSlabsTest, IsToldOfVerticesThatOthersAddWhileItIsStopped) {
   Refined refined(cloud_);
   RunContext context;
   Workspace<2> workspace;
+  const auto observer = [&](const QueryStructure<2>& structure, const Insertion& insertion) {
+    ExpectIsFar(structure, insertion, workspace);
+  };
   absl::Status status = absl::UnknownError("not begun");
   while (!status.ok()) {
-    const uint64_t budget = refined.structure.vertex_count() + 1 + random_.Below(1000);
-    status = refined.refinement.Run(PlainDemands(), budget, 2, context);
-    const Point<2> p{0.01 + 0.98 * random_.Unit(), 0.01 + 0.98 * random_.Unit()};
-    const Neighbor nearest = refined.structure.NearestTo(p, kNoVertex, workspace);
-    if (!status.ok() && nearest.distance_sq > 1e-6) {
+    const uint64_t budget = refined.structure.vertex_count() + 1 + random_.Below(50);
+    status = refined.refinement.Run(PlainDemands(), budget, 2, context, observer);
+    ASSERT_FALSE(HasFatalFailure());
+    const VertexId last{refined.structure.vertex_count() - 1};
+    const double angle = 2 * std::numbers::pi * random_.Unit();
+    const double radius =
+        1.5 * std::sqrt(refined.structure.ApproximateNearestNeighbor(last, workspace).distance_sq);
+    Point<2> p = refined.structure.point(last);
+    p = {p[0] + radius * std::cos(angle), p[1] + radius * std::sin(angle)};
+    if (status.ok() || refined.structure.vertex_count() > 3 * kPoints || !test::UnitBox<2>().Contains(p)) {
+      continue;
+    }
+    const Neighbor nearest = refined.structure.NearestTo(p, last, workspace);
+    if (nearest.distance_sq > radius * radius / 16) {
       refined.refinement.VertexAdded(refined.structure.AddVertex(nearest.vertex, p));
     }
   }
