@@ -35,11 +35,6 @@ constexpr double kSlack = 0.04;
 // Vertices of a slab that are looked at between two times that all are told of what the others inserted.
 constexpr size_t kPacket = 128;
 
-// A vertex that a slab has numbered from `first_new` on, once so many of the slabs before have come there.
-VertexId Renumbered(VertexId v, uint32_t first_new, uint32_t shift) {
-  return VertexId{Index(v) + (Index(v) >= first_new && v != kNoVertex ? shift : 0)};
-}
-
 }  // namespace
 
 template <int D>
@@ -304,7 +299,9 @@ void Refinement<D>::Replay(Slab& slab, uint32_t shift) {
     const auto& [v, kind, announced, bucket, star_size, radius_sq] = slab.events[i];
     if (kind == Slab::Kind::kInserted) {
       Request& request = slab.requests[slab.added++];
-      request.insertion.other = Renumbered(request.insertion.other, slab_first_new_, shift);
+      if (VertexId& other = request.insertion.other; other != kNoVertex && Index(other) >= slab_first_new_) {
+        other = VertexId{Index(other) + shift};
+      }
       Add(request);
     } else if (kind == Slab::Kind::kLeft) {
       schedule_.PutBack(v, slab_bucket_);
@@ -319,25 +316,20 @@ void Refinement<D>::Replay(Slab& slab, uint32_t shift) {
   }
 }
 
-// Lists the simplices that the packet of a slab has put down. May run beside Replay.
+// Lists the simplices that the packet of a slab has put down; none of those that have a vertex which it has inserted, which has not been looked at, so that
+// their numbers do not matter. May run beside Replay.
 template <int D>
 void Refinement<D>::ListStars(Slab& slab, uint32_t shift) {
   uint32_t vertex_count = slab_first_new_ + shift;
-  const std::span<std::array<VertexId, D>> stars = slab.stars;
+  const std::span<const std::array<VertexId, D>> stars = slab.stars;
   for (size_t i = 0; i < slab.end; ++i) {
     const auto& event = slab.events[i];
     vertex_count += event.kind == Slab::Kind::kInserted ? 1 : 0;
     if (i < slab.replayed || event.kind != Slab::Kind::kDone) {
       continue;
     }
-    const auto star = stars.subspan(slab.listed, event.star_size);
+    stars_.Set(event.vertex, stars.subspan(slab.listed, event.star_size), vertex_count);
     slab.listed += event.star_size;
-    for (std::array<VertexId, D>& simplex : star) {
-      for (VertexId& v : simplex) {
-        v = Renumbered(v, slab_first_new_, shift);
-      }
-    }
-    stars_.Set(event.vertex, star, vertex_count);
   }
 }
 

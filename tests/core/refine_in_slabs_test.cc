@@ -61,8 +61,8 @@ void ExpectSame(const Refined& actual, const Refined& expected) {
 
 // That the ball about a new vertex was empty.
 void ExpectIsFar(const QueryStructure<2>& structure, const Insertion& insertion, Workspace<2>& workspace) {
-  const double limit_sq = insertion.empty_radius_sq * (1 - 1e-9);
-  const Neighbor nearest = structure.NearestWithin(insertion.vertex, limit_sq, workspace);
+  const double limit = std::max(0.0, std::sqrt(insertion.empty_radius_sq) * (1 - 1e-9) - 0x1p-50);
+  const Neighbor nearest = structure.NearestWithin(insertion.vertex, limit * limit, workspace);
   ASSERT_EQ(nearest.vertex, kNoVertex) << "at a squared distance of " << nearest.distance_sq;
 }
 
@@ -160,8 +160,7 @@ TEST_P(RefineInSlabsTest, IsToldOfVerticesThatOthersAddWhileItIsStopped) {
     ASSERT_FALSE(HasFatalFailure());
     const VertexId last{refined.structure.vertex_count() - 1};
     const double angle = 2 * std::numbers::pi * random_.Unit();
-    const double radius =
-        1.5 * std::sqrt(refined.structure.ApproximateNearestNeighbor(last, workspace).distance_sq);
+    const double radius = 1.5 * std::sqrt(refined.structure.ApproximateNearestNeighbor(last, workspace).distance_sq);
     Point<2> p = refined.structure.point(last);
     p = {p[0] + radius * std::cos(angle), p[1] + radius * std::sin(angle)};
     if (status.ok() || refined.structure.vertex_count() > 3 * kPoints || !test::UnitBox<2>().Contains(p)) {
