@@ -101,6 +101,7 @@ absl::Status Refinement<D>::Loop(ThreadTeam& team) {
       WELLSPACE_RETURN_IF_ERROR(Serve(v, bucket));
     }
   }
+  slab_bucket_ = -1;
   return absl::OkStatus();
 }
 

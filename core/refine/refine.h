@@ -226,7 +226,8 @@ class Refinement {
   Workspace<D> own_;                   // the cell that is improved
   Workspace<D> new_;                   // the cell of a vertex just added on a face
 
-  // Those of slab_bucket_ who wait in slabs: the highest bucket that ever did. By bits, the axes that slabs have been laid across for it.
+  // Those of slab_bucket_ who wait in slabs. It is the highest bucket that has had slabs since nobody waited, -1 for none; slab_axes_: by bits, the axes across
+  // which it has.
   std::vector<Slab> slabs_;
   int slab_bucket_ = -1;
   uint32_t slab_axes_ = 0;

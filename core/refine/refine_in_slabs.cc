@@ -43,7 +43,7 @@ bool Refinement<D>::TakesSlabs(int bucket) const {
   return HasSlabs() && has_axis && schedule_.MostIn(bucket) >= kLeastInSlabs;
 }
 
-// Puts those who wait in `bucket` into slabs, across the axis along which they are spread farthest of those that have not been taken.
+// Puts those who wait in `bucket`, if there are enough, into slabs across the axis along which they are spread farthest of those that have not been taken.
 template <int D>
 void Refinement<D>::MakeSlabs(int bucket) {
   if (bucket != slab_bucket_) {
@@ -51,6 +51,13 @@ void Refinement<D>::MakeSlabs(int bucket) {
     slab_axes_ = 0;
   }
   const HugeVector<VertexId> waiting = schedule_.Lift(bucket);
+  if (waiting.size() < kLeastInSlabs) {  // the others have moved on
+    for (const VertexId v : waiting) {
+      schedule_.PutBack(v, bucket);
+    }
+    slab_axes_ = (1u << D) - 1;
+    return;
+  }
   int axis = -1;
   double widest = -1;
   for (int i = 0; i < D; ++i) {

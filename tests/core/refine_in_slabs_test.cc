@@ -90,14 +90,22 @@ INSTANTIATE_TEST_SUITE_P(Clouds, RefineInSlabsTest,
                          [](const auto& kind) { return std::string(kind.param); });
 
 TEST_P(RefineInSlabsTest, IsTheSameForAnyNumberOfThreads) {
-  Refined expected(cloud_);
-  RunContext context;
-  ASSERT_TRUE(expected.refinement.Run(PlainDemands(), kMany, 1, context).ok());
-  for (const int threads : {2, 4}) {
-    SCOPED_TRACE(threads);
-    Refined actual(cloud_);
-    ASSERT_TRUE(actual.refinement.Run(PlainDemands(), kMany, threads, context).ok());
-    ExpectSame(actual, expected);
+  Demands<2> tight = PlainDemands();
+  tight.rho = 1;
+  Demands<2> sized = PlainDemands();
+  sized.sizes = {.max_circumradius = 0.02, .regions = {{{{0.2, 0.3}, {0.4, 0.5}}, 0.004}}};
+  for (const Demands<2>& demands : {PlainDemands(), tight, sized}) {
+    SCOPED_TRACE(demands.rho);
+    SCOPED_TRACE(demands.sizes.max_circumradius);
+    Refined expected(cloud_);
+    RunContext context;
+    ASSERT_TRUE(expected.refinement.Run(demands, kMany, 1, context).ok());
+    for (const int threads : {2, 4}) {
+      SCOPED_TRACE(threads);
+      Refined actual(cloud_);
+      ASSERT_TRUE(actual.refinement.Run(demands, kMany, threads, context).ok());
+      ExpectSame(actual, expected);
+    }
   }
 }
 

@@ -442,6 +442,10 @@ TEST(ScheduleTest, WhoIsLiftedWaitsUntilItIsTakenOrPutBack) {
   }
   EXPECT_FALSE(schedule.Pop(v, bucket));
   EXPECT_EQ(schedule.size(), 2) << "3 and 4 are lifted still";
+  schedule.AddToBucket(VertexId{6}, 3);
+  schedule.AddToBucket(VertexId{6}, 1);
+  EXPECT_EQ(schedule.MostIn(3), 1);
+  EXPECT_TRUE(schedule.Lift(3).empty()) << "6 has moved on";
 }
 
 // By blocks of numbers, what is new in that of its neighbour; the last come first in each, and before all of them what comes
