@@ -1,9 +1,5 @@
 #include "core/voronoi/candidates.h"
 
-#if defined(__x86_64__)
-#include <immintrin.h>
-#endif
-
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -11,6 +7,7 @@
 #include <limits>
 
 #include "core/base/dimensions.h"
+#include "core/voronoi/lane_bits.h"
 
 namespace wellspace::core {
 namespace {
@@ -18,24 +15,6 @@ namespace {
 // Up to so many candidates are ranked by comparing each with each: as many as the lower bits of a key can number.
 constexpr int kNumberBits = 6;
 constexpr size_t kMostRanked = size_t{1} << kNumberBits;
-
-// A bit for each lane in which a comparison holds.
-template <size_t kWidth>
-WELLSPACE_INLINE uint32_t Bits(const typename Wide<kWidth>::Mask& mask) {
-#if defined(__x86_64__)
-  if constexpr (kWidth == 4) {
-    return static_cast<uint32_t>(__builtin_ia32_movmskpd256(reinterpret_cast<const Wide<4>::Lanes&>(mask)));
-  } else {
-    return static_cast<uint32_t>(__builtin_ia32_movmskpd(reinterpret_cast<const Wide<2>::Lanes&>(mask)));
-  }
-#else
-  uint32_t bits = 0;
-  for (size_t lane = 0; lane < kWidth; ++lane) {
-    bits |= static_cast<uint32_t>(mask[lane] & 1) << lane;
-  }
-  return bits;
-#endif
-}
 
 // Which halves of the lanes of a vector are kept, in order.
 struct alignas(kLanes * sizeof(double)) Order {

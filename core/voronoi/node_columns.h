@@ -72,6 +72,8 @@ class NodeColumns {
   // Computes for all nodes x the excess x . normal - offset, which may be wrong by e = slack length + error: finds those
   // of which excess + e is not negative (doubtful ones and more), and those of which excess - e is positive (surely cut
   // off). Returns whether there are any of the former.
+  //
+  // Defined in excesses.h.
   template <size_t kWidth>
   WELLSPACE_INLINE bool ComputeExcesses(const Point<D>& normal, double offset, double length, double error);
   std::span<const double> excesses() const { return {excesses_.front().values, count_}; }
@@ -127,46 +129,6 @@ class NodeColumns {
   std::vector<Pack> excesses_;
   std::vector<Found> found_;
 };
-
-template <int D>
-template <size_t kWidth>
-WELLSPACE_INLINE bool NodeColumns<D>::ComputeExcesses(const Point<D>& normal, double offset, double length,
-                                                      double error) {
-  using Lanes = typename Wide<kWidth>::Lanes;
-  using Mask = typename Wide<kWidth>::Mask;
-  const Group* group = groups_.data();
-  Pack* excesses = excesses_.data();
-  uint64_t any = 0;
-  size_t left = PaddedCount(count_) / kLanes;
-  for (Found* found = found_.data(); left > 0; ++found) {
-    const size_t groups = std::min(left, kWordBits / kLanes);
-    left -= groups;
-    Mask maybe{};
-    Mask surely{};
-    Mask bits;  // of the nodes that are looked at
-    for (size_t lane = 0; lane < kWidth; ++lane) {
-      bits[lane] = int64_t{1} << lane;
-    }
-    for (const Group* const end = group + groups; group < end; ++group, ++excesses) {
-      for (size_t from = 0; from < kLanes; from += kWidth) {
-        Lanes excess = LanesAt<kWidth>(group->x[0], from) * normal[0];
-        for (int axis = 1; axis < D; ++axis) {
-          excess += LanesAt<kWidth>(group->x[axis], from) * normal[axis];
-        }
-        excess -= offset;
-        const Lanes doubt = LanesAt<kWidth>(group->slack, from) * length + error;
-        LanesAt<kWidth>(excesses->values, from) = excess;
-        maybe |= (excess + doubt >= 0) & bits;
-        surely |= (excess > doubt) & bits;
-        bits <<= kWidth;
-      }
-    }
-    found->maybe = Union<kWidth>(maybe);
-    found->surely = Union<kWidth>(surely);
-    any |= found->maybe;
-  }
-  return any != 0;
-}
 
 }  // namespace wellspace::core
 

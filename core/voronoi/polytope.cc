@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/base/dimensions.h"
+#include "core/voronoi/excesses.h"
 #include "core/voronoi/meeting_point.h"
 
 namespace wellspace::core {

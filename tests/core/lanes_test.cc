@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/voronoi/candidates.h"
+#include "core/voronoi/excesses.h"
 #include "core/voronoi/node_columns.h"
 #include "core/voronoi/polytope.h"
 #include "tests/support/clouds.h"

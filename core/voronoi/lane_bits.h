@@ -1,0 +1,36 @@
+// Comparisons of doubles side by side as bits. Apart from lanes.h for the large header that it needs.
+#ifndef WELLSPACE_CORE_VORONOI_LANE_BITS_H_
+#define WELLSPACE_CORE_VORONOI_LANE_BITS_H_
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+#include <cstddef>
+#include <cstdint>
+
+#include "core/voronoi/lanes.h"
+
+namespace wellspace::core {
+
+// A bit for each lane in which a comparison holds.
+template <size_t kWidth>
+WELLSPACE_INLINE uint32_t Bits(const typename Wide<kWidth>::Mask& mask) {
+#if defined(__x86_64__)
+  if constexpr (kWidth == 4) {
+    return static_cast<uint32_t>(__builtin_ia32_movmskpd256(reinterpret_cast<const Wide<4>::Lanes&>(mask)));
+  } else {
+    return static_cast<uint32_t>(__builtin_ia32_movmskpd(reinterpret_cast<const Wide<2>::Lanes&>(mask)));
+  }
+#else
+  uint32_t bits = 0;
+  for (size_t lane = 0; lane < kWidth; ++lane) {
+    bits |= static_cast<uint32_t>(mask[lane] & 1) << lane;
+  }
+  return bits;
+#endif
+}
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_VORONOI_LANE_BITS_H_
