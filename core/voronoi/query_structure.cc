@@ -339,6 +339,7 @@ void QueryStructure<D>::CountCuts(Workspace<D>& workspace) {
 template <int D>
 void QueryStructure<D>::CutByLeaf(NodeId leaf, Workspace<D>& workspace) const {
   if (const auto* bucket = tree_.BucketOf(leaf); bucket != nullptr) {
+    workspace.counters.vertices += bucket->count;
     CutByEach(
         {bucket->positions, bucket->count}, [bucket](size_t slot) { return bucket->ids[slot]; }, workspace);
   }
@@ -349,18 +350,19 @@ void QueryStructure<D>::CutByOthers(std::span<const Point<D>> others, VertexId f
   constexpr size_t kTogether = LeafTree<D>::kLeafCapacity;
   for (size_t begin = 0; begin < others.size() && !workspace.cell.IsTooLarge(); begin += kTogether) {
     const auto id_of = [=](size_t slot) { return VertexId{static_cast<uint32_t>(Index(first_other) + begin + slot)}; };
-    CutByEach(others.subspan(begin, std::min(kTogether, others.size() - begin)), id_of, workspace);
+    workspace.counters.vertices +=
+        CutByEach(others.subspan(begin, std::min(kTogether, others.size() - begin)), id_of, workspace);
   }
 }
 
-// Cuts the cell by vertices, as many as a leaf holds at most, the nearest first: far ones then seldom cut.
+// Cuts the cell by vertices, as many as a leaf holds at most, the nearest first: far ones then seldom cut. Returns how many are within reach.
 template <int D>
 template <typename IdOf>
-void QueryStructure<D>::CutByEach(std::span<const Point<D>> positions, IdOf id_of, Workspace<D>& workspace) {
-  workspace.counters.vertices += positions.size();
+size_t QueryStructure<D>::CutByEach(std::span<const Point<D>> positions, IdOf id_of, Workspace<D>& workspace) {
   Polytope<D>& cell = workspace.cell;
   Candidates<D>& near = workspace.near;
   near.Pick(positions, cell.site(), cell.CutLimitSq());
+  const size_t within_reach = near.count;
   if (cell.cuts() != 0) {
     cell.Foretell(0, near);
     near.DropThoseThatMiss(0);
@@ -391,6 +393,7 @@ void QueryStructure<D>::CutByEach(std::span<const Point<D>> positions, IdOf id_o
     }
   }
   cell.Tighten();
+  return within_reach;
 }
 
 #define WELLSPACE_INSTANTIATE(D) template class QueryStructure<D>;

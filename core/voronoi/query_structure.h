@@ -26,7 +26,7 @@ namespace wellspace::core {
 struct QueryCounters {
   uint64_t queries = 0;
   uint64_t leaves = 0;    // opened
-  uint64_t vertices = 0;  // found in them
+  uint64_t vertices = 0;  // found in them, and others within reach
   uint64_t cuts = 0;      // bisectors that cut something off
   uint64_t max_leaves = 0;
   DecisionCounters decisions;
@@ -204,7 +204,7 @@ class QueryStructure {
   void CutByLeaf(NodeId leaf, Workspace<D>& workspace) const;
   static void CutByOthers(std::span<const Point<D>> others, VertexId first_other, Workspace<D>& workspace);
   template <typename IdOf>
-  static void CutByEach(std::span<const Point<D>> positions, IdOf id_of, Workspace<D>& workspace);
+  static size_t CutByEach(std::span<const Point<D>> positions, IdOf id_of, Workspace<D>& workspace);
   static void CountCuts(Workspace<D>& workspace);
 
   Box<D> box_;
