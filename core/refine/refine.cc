@@ -245,9 +245,8 @@ absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
     }
     if (schedule_.HasBelow(bucket)) {
       // What was just added, or told of it, may ask for something by a shorter edge than this bucket's: that comes first.
-      const double own_sq = found.bad_node >= 0 ? found.bound_sq / (demands_->rho * demands_->rho) : edge_limit_sq;
       Remember(v, Assessment::kNone);
-      schedule_.AddToBucket(v, std::min(bucket, schedule_.BucketOf(own_sq)));
+      schedule_.AddToBucket(v, OwnBucket(found, bucket));
       return absl::OkStatus();
     }
     const std::optional<Request> request = NextRequest(v, cell, found, edge_limit_sq);
@@ -260,6 +259,13 @@ absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
     WELLSPACE_RETURN_IF_ERROR(Insert(*request, cell));
     look = {&cell};
   }
+}
+
+// Where a vertex from `bucket` waits for what was found, which asks for something by an edge up to that bucket's limit if at all.
+template <int D>
+int Refinement<D>::OwnBucket(const Assessment& found, int bucket) const {
+  return found.bad_node >= 0 ? std::min(bucket, schedule_.BucketOf(found.bound_sq / (demands_->rho * demands_->rho)))
+                             : bucket;
 }
 
 // What `cell`, that of `v`, asks for by edges up to a bucket's limit, by what was found; none if nothing.

@@ -188,6 +188,7 @@ class Refinement {
   absl::Status TooManyVertices() const;
   bool IsLongEnough(const SteinerPoint<D>& point) const { return point.empty_radius_sq >= min_edge_ * min_edge_; }
   void Settle(VertexId v, const Assessment& found, double clip, int earliest, const Look<D>& look);
+  int OwnBucket(const Assessment& found, int bucket) const;
   int NextBucket(const Assessment& found, double clip, int earliest) const;
   void ScheduleNew(VertexId near, VertexId x, double nearest_sq);
   void Remember(VertexId v, double radius_sq, std::span<const WatchedNode<D>> watched = {});
@@ -226,7 +227,7 @@ class Refinement {
   Workspace<D> own_;                   // the cell that is improved
   Workspace<D> new_;                   // the cell of a vertex just added on a face
 
-  // Those of slab_bucket_ who wait in slabs. It is the highest bucket that has had slabs since nobody waited, -1 for none; slab_axes_: by bits, the axes across
+  // Those of slab_bucket_ who wait in slabs; none if nobody does. It is the highest bucket that has had slabs since nobody waited, -1 for none; slab_axes_: by bits, the axes across
   // which it has.
   std::vector<Slab> slabs_;
   int slab_bucket_ = -1;

@@ -12,7 +12,6 @@
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
 #include "core/refine/checks.h"
-#include "core/refine/foreseen_cells.h"
 #include "core/refine/refine.h"
 #include "core/voronoi/lanes.h"
 
@@ -151,16 +150,13 @@ absl::Status Refinement<D>::ServeSlabs(ThreadTeam& team) {
       WELLSPACE_RETURN_IF_ERROR(Serve(v, bucket));
     }
     WELLSPACE_RETURN_IF_ERROR(context_->Check());
-    foreseen_->Drop();
-    AdmitWaiting();
     if (!slabs_are_ahead_) {
       size_t most = 0;
       for (const Slab& slab : slabs_) {
         most = std::max(most, slab.waiting.size());
       }
       for (Slab& slab : slabs_) {
-        slab.packet = (slab.waiting.size() * std::min(kPacket, most) + most - 1) /
-                      std::max<size_t>(most, 1);  // so that all end at once
+        slab.packet = (slab.waiting.size() * std::min(kPacket, most) + most - 1) / most;  // so that all end at once
       }
       slab_first_new_ = structure_.vertex_count();
       team.ForEach(slabs_.size(),
@@ -237,8 +233,7 @@ void Refinement<D>::LookAtIn(Slab& slab, VertexId v, Workspace<D>& workspace) co
     typename Slab::Event event{.vertex = v, .kind = Kind::kWaits};
     event.announced = found.is_clipped ? Announced::kWithinClip : Announced::kToAll;
     if (slab.below.size() != first_below) {
-      const double own_sq = found.bad_node >= 0 ? found.bound_sq / (demands_->rho * demands_->rho) : edge_limit_sq;
-      event.bucket = static_cast<int16_t>(std::min(slab_bucket_, schedule_.BucketOf(own_sq)));
+      event.bucket = static_cast<int16_t>(OwnBucket(found, slab_bucket_));
       slab.events.push_back(event);
       slab.below.push_back(site);
       return;

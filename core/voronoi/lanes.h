@@ -69,16 +69,6 @@ WELLSPACE_INLINE const auto& LanesAt(const double* column, size_t from) {
   return *reinterpret_cast<const typename Wide<kWidth>::Lanes*>(column + from);
 }
 
-// The bits that any lane has.
-template <size_t kWidth>
-WELLSPACE_INLINE uint64_t Union(const typename Wide<kWidth>::Mask& mask) {
-  int64_t bits = 0;
-  for (size_t lane = 0; lane < kWidth; ++lane) {
-    bits |= mask[lane];
-  }
-  return static_cast<uint64_t>(bits);
-}
-
 }  // namespace wellspace::core
 
 #endif  // WELLSPACE_CORE_VORONOI_LANES_H_

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "core/base/dimensions.h"
+#include "core/voronoi/lane_bits.h"
 
 namespace wellspace::core {
 namespace {
@@ -56,7 +57,7 @@ WELLSPACE_INLINE bool IsReached(std::span<const typename NodeColumns<D>::Group> 
       any |= power <= doubt;
     }
   }
-  return Union<kWidth>(any) != 0;
+  return Bits<kWidth>(any) != 0;
 }
 
 template <int D, size_t kWidth>
