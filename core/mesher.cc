@@ -286,7 +286,7 @@ class MesherIn final : public Mesher {
         ChangedVertices<D>(structure_, VertexId{static_cast<uint32_t>(extracted_vertices_)}, context));
     WELLSPACE_ASSIGN_OR_RETURN(Simplices simplices,
                                ComputeSimplicesAmong<D>(structure_, changed, output_index_, threads, context));
-    std::vector<double> added;
+    HugeVector<double> added;
     WELLSPACE_RETURN_IF_ERROR(AppendPoints(extracted_vertices_, added, context));
     mesh.points.insert(mesh.points.end(), added.begin(), added.end());
     std::vector<bool> has_changed(structure_.vertex_count(), false);
@@ -492,9 +492,9 @@ class MesherIn final : public Mesher {
   }
 
   // Appends the coordinates of the vertices from number `first` on.
-  absl::Status AppendPoints(uint64_t first, std::vector<double>& out, const RunContext& context) const {
+  absl::Status AppendPoints(uint64_t first, HugeVector<double>& out, const RunContext& context) const {
     const uint32_t count = structure_.vertex_count();
-    ReserveOnHugePages(out, out.size() + (count - first) * D);
+    out.reserve(out.size() + (count - first) * D);
     for (auto i = static_cast<uint32_t>(first); i < count; ++i) {
       if (i % kStepsBetweenChecks == 0) {
         WELLSPACE_RETURN_IF_ERROR(context.Check());

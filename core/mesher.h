@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "core/base/huge_pages.h"
 #include "core/base/run_context.h"
 #include "core/mesh_parameters.h"
 #include "core/mesh_statistics.h"
@@ -21,15 +22,15 @@ struct Mesh {
   // vertex_count x dimension, row-major. The distinct input points come first, in the order of their first appearance
   // and with their bits unchanged; then the corners of the box that are not input points; then the others in the order
   // in which they were inserted: Steiner vertices and points added later.
-  std::vector<double> points;
+  HugeVector<double> points;
   // simplex_count x (dimension + 1) indices of vertices, row-major; each simplex positively oriented, its lowest vertex
   // first.
-  std::vector<uint32_t> simplices;
+  HugeVector<uint32_t> simplices;
   // The vertex that each input point became; then those of the points added later, in the order of adding.
-  std::vector<uint32_t> input_vertex;
+  HugeVector<uint32_t> input_vertex;
   // The weight of each vertex, a squared length; the mesh is their regular triangulation. Empty where all are zero, and
   // the mesh is Delaunay.
-  std::vector<double> weights;
+  HugeVector<double> weights;
   MeshStatistics statistics;
 
   uint64_t vertex_count() const { return dimension == 0 ? 0 : points.size() / dimension; }

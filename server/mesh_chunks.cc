@@ -28,7 +28,7 @@ uint64_t DivideUp(uint64_t dividend, uint64_t divisor) { return (dividend + divi
 
 // Rows [begin, begin + rows) of `values` (rows of `width` numbers), cut at the end.
 template <typename T>
-MeshChunks::Chunk Rows(int field, const std::vector<T>& values, uint64_t width, uint64_t begin, uint64_t rows) {
+MeshChunks::Chunk Rows(int field, const core::HugeVector<T>& values, uint64_t width, uint64_t begin, uint64_t rows) {
   const uint64_t first = begin * width;
   const uint64_t last = std::min<uint64_t>(values.size(), (begin + rows) * width);
   return {.field = field, .data = values.data() + first, .size = (last - first) * sizeof(T)};

@@ -23,8 +23,8 @@ constexpr double kGrown = 1.25;
 constexpr size_t kCopyBlock = size_t{1} << 20;  // numbers copied between two looks at the context
 
 template <typename T>
-absl::StatusOr<std::vector<T>> Copy(const std::vector<T>& values, const core::RunContext& context) {
-  std::vector<T> copy;
+absl::StatusOr<core::HugeVector<T>> Copy(const core::HugeVector<T>& values, const core::RunContext& context) {
+  core::HugeVector<T> copy;
   copy.reserve(values.size());
   for (size_t begin = 0; begin < values.size(); begin += kCopyBlock) {
     WELLSPACE_RETURN_IF_ERROR(context.Check());

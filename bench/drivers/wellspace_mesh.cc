@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <iostream>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -32,7 +33,7 @@ T OrExit(absl::StatusOr<T> result) {
 class Fingerprint {
  public:
   template <typename T>
-  void Add(const std::vector<T>& values) {
+  void Add(std::span<const T> values) {
     for (const T value : values) {
       uint64_t word = 0;
       std::memcpy(&word, &value, sizeof(value));
@@ -78,8 +79,8 @@ int Main(int argc, char** argv) {
   const uint64_t memory = meter.PeakBytes();
 
   Fingerprint fingerprint;
-  fingerprint.Add(mesh.points);
-  fingerprint.Add(mesh.simplices);
+  fingerprint.Add<double>(mesh.points);
+  fingerprint.Add<uint32_t>(mesh.simplices);
   nlohmann::json report = {{"seconds", seconds},
                            {"wall_seconds", wall_seconds},
                            {"create_seconds", created},

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "absl/container/flat_hash_map.h"
+#include "core/base/huge_pages.h"
 #include "core/base/ids.h"
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
@@ -161,7 +162,7 @@ class FaceWatchers {
     return number;
   }
 
-  std::vector<Watched> watched_;                                   // by number
+  HugeVector<Watched> watched_;                                    // by number
   std::vector<uint32_t> free_;                                     // numbers
   absl::flat_hash_map<Cube, std::vector<uint32_t>> in_cubes_;      // numbers, where there are any
   absl::flat_hash_map<VertexId, std::vector<uint32_t>> nodes_of_;  // numbers, by watcher

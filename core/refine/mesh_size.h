@@ -42,6 +42,10 @@ double SimplicesOf(double vertices, double on_boundary) {
 // What a process touches whatever the mesh, as measured: code, threads, their stacks and scratch space.
 inline constexpr double kFixedBytes = 3.9e6;
 
+// What arrays leave free of the large pages that they share (PagePool), as measured: this part of all, up to this size.
+inline constexpr double kLeftFree = 0.3;
+inline constexpr double kMostLeftFree = 3e6;
+
 // Where the estimate of the memory is wrong, it is rather short than long: 0.56 to 1.07 without this, which puts the two ends about as far from 1.
 inline constexpr double kMemoryMargin = 1.25;
 
@@ -59,8 +63,9 @@ double BytesOf(const Leaves& leaves, double vertices, double simplices) {
   const double vertex_bytes = Buckets::kPlaceBytes + 2 * sizeof(Point<D>) + 32 + 3 * sizeof(uint32_t);
   // Indices in the lists, some of which are no simplices any more, and in the mesh.
   const double simplex_bytes = 1.05 * D * sizeof(VertexId) + (D + 1) * sizeof(uint32_t);
-  return kMemoryMargin * (kFixedBytes + nodes * node_bytes + leaves.filled * Buckets::OverheadBytes() +
-                          vertices * vertex_bytes + simplices * simplex_bytes);
+  const double in_use = nodes * node_bytes + leaves.filled * Buckets::OverheadBytes() + vertices * vertex_bytes +
+                        simplices * simplex_bytes;
+  return kMemoryMargin * (kFixedBytes + in_use + std::min(kLeftFree * in_use, kMostLeftFree));
 }
 
 }  // namespace wellspace::core

@@ -5,8 +5,8 @@
 #include <array>
 #include <cstdint>
 #include <limits>
-#include <vector>
 
+#include "core/base/huge_pages.h"
 #include "core/geometry/exact_measure.h"
 
 namespace wellspace::core {
@@ -25,7 +25,7 @@ class SimplexList {
   void Add(const Simplex<D>& points, const std::array<uint32_t, D + 1>& indices);
 
   size_t size() const { return indices_.size() / (D + 1); }
-  const std::vector<uint32_t>& indices() const { return indices_; }
+  const HugeVector<uint32_t>& indices() const { return indices_; }
   double max_radius_edge() const { return max_radius_edge_; }
   double min_angle_deg() const { return min_angle_deg_; }
   uint64_t MemoryBytes() const { return indices_.capacity() * sizeof(uint32_t); }
@@ -42,7 +42,7 @@ class SimplexList {
   Glance LookAt(const Simplex<D>& points) const;
   void Measure(const Simplex<D>& points, const std::array<uint32_t, D + 1>& indices);
 
-  std::vector<uint32_t> indices_;
+  HugeVector<uint32_t> indices_;
   double max_radius_edge_ = 0;
   double min_angle_deg_ = std::numeric_limits<double>::infinity();
   double better_ratio_sq_ = 0;  // a ratio whose square is below this is clearly smaller than the largest

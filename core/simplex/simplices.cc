@@ -41,7 +41,7 @@ class BlockJoin {
   bool HasEnded() const { return context_.IsCancelled() || is_refused_; }
 
   // Takes the indices of the simplices of a block. `more_bytes`: what its thread holds more than at its last block.
-  void Take(size_t block, const std::vector<uint32_t>& indices, uint64_t more_bytes) {
+  void Take(size_t block, const HugeVector<uint32_t>& indices, uint64_t more_bytes) {
     std::lock_guard lock(mutex_);
     if (is_refused_) {
       return;
@@ -63,14 +63,14 @@ class BlockJoin {
   }
 
   // All of them, when the last block has been taken. Errors: that of the context, or RESOURCE_EXHAUSTED.
-  absl::StatusOr<std::vector<uint32_t>> Finish() {
+  absl::StatusOr<HugeVector<uint32_t>> Finish() {
     WELLSPACE_RETURN_IF_ERROR(context_.Check());
     WELLSPACE_RETURN_IF_ERROR(memory_);
     return std::move(joined_);
   }
 
  private:
-  void Append(const std::vector<uint32_t>& indices) {
+  void Append(const HugeVector<uint32_t>& indices) {
     ++joined_count_;
     const size_t size = joined_.size() + indices.size();
     if (size > joined_.capacity()) {
@@ -80,7 +80,7 @@ class BlockJoin {
         return;
       }
       const size_t to_come = size / joined_count_ * (block_count_ - joined_count_);
-      ReserveOnHugePages(joined_, std::min(kMostGrowth * size, size + to_come + (size + to_come) / 4));
+      joined_.reserve(std::min(kMostGrowth * size, size + to_come + (size + to_come) / 4));
     }
     joined_.insert(joined_.end(), indices.begin(), indices.end());
     Allow(0);
@@ -99,9 +99,9 @@ class BlockJoin {
   uint64_t held_bytes_;  // this and all below but for the atomic ones: guarded by mutex_
   RunContext& context_;
   std::mutex mutex_;
-  std::vector<uint32_t> joined_;
+  HugeVector<uint32_t> joined_;
   size_t joined_count_ = 0;
-  std::map<size_t, std::vector<uint32_t>> waiting_;  // by block
+  std::map<size_t, HugeVector<uint32_t>> waiting_;  // by block
   size_t waiting_size_ = 0;
   absl::Status memory_;  // the first refusal
   std::atomic<bool> is_refused_{false};

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "core/base/huge_pages.h"
 #include "core/base/run_context.h"
 #include "core/voronoi/query_structure.h"
 #include "core/voronoi/star_lists.h"
@@ -16,7 +17,7 @@ namespace wellspace::core {
 
 struct Simplices {
   // simplex_count x (D + 1) output indices, row-major; positively oriented, lowest vertex first.
-  std::vector<uint32_t> indices;
+  HugeVector<uint32_t> indices;
   double max_radius_edge = 0;
   double min_angle_deg = std::numeric_limits<double>::infinity();
   QueryCounters counters;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "core/base/huge_pages.h"
 #include "core/base/run_context.h"
 #include "core/refine/demands.h"
 #include "core/sliver/tetrahedron.h"
@@ -98,9 +99,9 @@ class Mender {
   MendObserver& observer_;
   double flat_cosine_ = 0;  // above it an angle is too small
   MendReport report_;
-  std::vector<double> nearest_sq_;  // at most the squared distance to the nearest neighbour; for well-spaced only
-  std::vector<double> cosine_;      // by simplex; kUnknown where it has not been asked for
-  std::vector<Sliver> next_;        // to be looked at
+  HugeVector<double> nearest_sq_;  // at most the squared distance to the nearest neighbour; for well-spaced only
+  HugeVector<double> cosine_;      // by simplex; kUnknown where it has not been asked for
+  HugeVector<Sliver> next_;        // to be looked at
   uint64_t random_ = 0;
 
   // Scratch.

@@ -249,7 +249,7 @@ class Pump {
 template <int D>
 absl::StatusOr<uint64_t> PumpWeights(Triangulation<D>& triangulation, RunContext& context) {
   const uint32_t count = triangulation.vertex_count();
-  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> nearest_sq, triangulation.NearestDistancesSq(context));
+  WELLSPACE_ASSIGN_OR_RETURN(const HugeVector<double> nearest_sq, triangulation.NearestDistancesSq(context));
   Pump<D> pump(triangulation);
   for (int round = 0; round < 2 * kRounds<D>; ++round) {
     const double share = round < kRounds<D> ? kPoorShare : kPoorestShare;

@@ -43,7 +43,7 @@ class Stopwatch {
 // positive.
 template <int D>
 void Emit(const Triangulation<D>& triangulation, SimplexId s, std::span<const uint32_t> output_index,
-          std::vector<uint32_t>& out) {
+          HugeVector<uint32_t>& out) {
   std::array<uint32_t, D + 1> corners;
   bool is_odd = false;
   for (int i = 0; i <= D; ++i) {
@@ -67,15 +67,15 @@ void Emit(const Triangulation<D>& triangulation, SimplexId s, std::span<const ui
 // Complexity: O(vertices + simplices) and sorting the simplices of each lowest vertex.
 // Errors:     CANCELLED, DEADLINE_EXCEEDED.
 template <int D>
-absl::Status SortSimplices(uint32_t vertex_count, std::vector<uint32_t>& indices, const RunContext& context) {
+absl::Status SortSimplices(uint32_t vertex_count, HugeVector<uint32_t>& indices, const RunContext& context) {
   using Row = std::array<uint32_t, D + 1>;
   const size_t count = indices.size() / (D + 1);
-  std::vector<size_t> next(size_t{vertex_count} + 1, 0);  // by lowest vertex
+  HugeVector<size_t> next(size_t{vertex_count} + 1, 0);  // by lowest vertex
   for (size_t s = 0; s < count; ++s) {
     ++next[indices[s * (D + 1)] + 1];
   }
   std::partial_sum(next.begin(), next.end(), next.begin());
-  std::vector<Row> rows(count);
+  HugeVector<Row> rows(count);
   for (size_t s = 0; s < count; ++s) {
     if (s % kCheckInterval == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
@@ -163,7 +163,7 @@ absl::StatusOr<Triangulation<D>> SliverStage<D>::Triangulate(const QueryStructur
   const double no_time = 0;
   const Stopwatch stopwatch(statistics_.star_seconds, no_time);
   // By the structure's own numbers, which do not depend on the order of the input.
-  std::vector<uint32_t> identity(structure.vertex_count());
+  HugeVector<uint32_t> identity(structure.vertex_count());
   std::iota(identity.begin(), identity.end(), uint32_t{0});
   WELLSPACE_ASSIGN_OR_RETURN(Simplices simplices, ComputeSimplices<D>(structure, stars, identity, threads, context));
   statistics_.star_queries.Add(simplices.counters);
@@ -175,7 +175,7 @@ absl::StatusOr<Triangulation<D>> SliverStage<D>::Triangulate(const QueryStructur
                           Triangulation<D>::BuildBytes(structure.vertex_count(), simplices.indices.size() / (D + 1))));
   // Sorting takes less than Build.
   WELLSPACE_RETURN_IF_ERROR(SortSimplices<D>(structure.vertex_count(), simplices.indices, context));
-  std::vector<Point<D>> points;
+  HugeVector<Point<D>> points;
   points.reserve(structure.vertex_count());
   for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
     if (v % kCheckInterval == 0) {

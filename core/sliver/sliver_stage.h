@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "core/base/huge_pages.h"
 #include "core/base/run_context.h"
 #include "core/refine/refine.h"
 #include "core/simplex/simplices.h"
@@ -32,7 +33,7 @@ struct SliverStatistics {
 
 struct WeightedSimplices {
   Simplices simplices;
-  std::vector<double> weights;  // by output index, in the structure's unit; empty where all are zero
+  HugeVector<double> weights;  // by output index, in the structure's unit; empty where all are zero
 };
 
 // Keeps the Delaunay triangulation of a structure while its mesh is mended, and follows what is added to the structure
@@ -65,11 +66,9 @@ class SliverStage {
                                                 std::span<const uint32_t> output_index, bool pump, int threads,
                                                 RunContext& context);
 
-  // What the stage takes at its peak, estimated: of what the simplices take for a while, room that stars have taken before
-  // is not counted again.
+  // What the stage takes at its peak, beside the structure and a mesh.
   static uint64_t EstimateBytes(uint64_t vertices, uint64_t simplices) {
-    return vertices * sizeof(Point<D>) + Triangulation<D>::BuildBytes(vertices, simplices) -
-           simplices * (D + 1) * sizeof(uint32_t);
+    return vertices * sizeof(Point<D>) + Triangulation<D>::BuildBytes(vertices, simplices);
   }
 
   // What the stage takes in memory.

@@ -67,7 +67,7 @@ double LiftedDeterminant(const std::array<std::array<double, D>, D + 1>& e, cons
 }  // namespace
 
 template <int D>
-absl::Status Triangulation<D>::Build(const Box<D>& box, std::vector<Point<D>> points,
+absl::Status Triangulation<D>::Build(const Box<D>& box, HugeVector<Point<D>> points,
                                      std::span<const uint32_t> simplices, const RunContext& context) {
   box_ = box;
   points_ = std::move(points);
@@ -112,7 +112,7 @@ absl::Status Triangulation<D>::Build(const Box<D>& box, std::vector<Point<D>> po
     }
     return lowest;
   };
-  std::vector<uint32_t> begin(points_.size() + 1, 0);
+  HugeVector<uint32_t> begin(points_.size() + 1, 0);
   for (size_t s = 0; s < count; ++s) {
     if (s % kCheckInterval == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
@@ -125,8 +125,8 @@ absl::Status Triangulation<D>::Build(const Box<D>& box, std::vector<Point<D>> po
     begin[v + 1] += begin[v];
   }
   WELLSPACE_RETURN_IF_ERROR(context.Check());
-  std::vector<uint32_t> at(count * (D + 1));
-  std::vector<uint32_t> next(begin.begin(), begin.end() - 1);
+  HugeVector<uint32_t> at(count * (D + 1));
+  HugeVector<uint32_t> next(begin.begin(), begin.end() - 1);
   for (size_t s = 0; s < count; ++s) {
     if (s % kCheckInterval == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
@@ -204,8 +204,8 @@ VertexId Triangulation<D>::AddVertex() {
 }
 
 template <int D>
-absl::StatusOr<std::vector<double>> Triangulation<D>::NearestDistancesSq(const RunContext& context) const {
-  std::vector<double> nearest_sq(points_.size(), std::numeric_limits<double>::infinity());
+absl::StatusOr<HugeVector<double>> Triangulation<D>::NearestDistancesSq(const RunContext& context) const {
+  HugeVector<double> nearest_sq(points_.size(), std::numeric_limits<double>::infinity());
   for (size_t s = 0; s < items_.size(); ++s) {
     if (s % kCheckInterval == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
+#include "core/base/huge_pages.h"
 #include "core/base/ids.h"
 #include "core/base/run_context.h"
 #include "core/geometry/box.h"
@@ -69,7 +70,7 @@ class Triangulation {
   // Shapes:     simplices: count x (D + 1) indices of points, positively oriented.
   // Complexity: O(points + simplices).
   // Errors:     RESOURCE_EXHAUSTED (facets cannot be numbered), CANCELLED, DEADLINE_EXCEEDED.
-  absl::Status Build(const Box<D>& box, std::vector<Point<D>> points, std::span<const uint32_t> simplices,
+  absl::Status Build(const Box<D>& box, HugeVector<Point<D>> points, std::span<const uint32_t> simplices,
                      const RunContext& context);
 
   const Box<D>& box() const { return box_; }
@@ -111,7 +112,7 @@ class Triangulation {
   // REQUIRES:   no vertex has a weight.
   // Complexity: O(simplices).
   // Errors:     CANCELLED, DEADLINE_EXCEEDED.
-  absl::StatusOr<std::vector<double>> NearestDistancesSq(const RunContext& context) const;
+  absl::StatusOr<HugeVector<double>> NearestDistancesSq(const RunContext& context) const;
 
   // The simplices of vertex `v`.
   //
@@ -194,15 +195,15 @@ class Triangulation {
   void LinkFacet(SimplexId fresh, int slot);
 
   Box<D> box_;
-  std::vector<Point<D>> points_;
-  std::vector<FaceMask> faces_;
-  std::vector<double> weights_;
-  std::vector<SimplexId> simplex_of_;  // by vertex: one of its simplices; kNoSimplex where it is in none
-  std::vector<Item> items_;
+  HugeVector<Point<D>> points_;
+  HugeVector<FaceMask> faces_;
+  HugeVector<double> weights_;
+  HugeVector<SimplexId> simplex_of_;  // by vertex: one of its simplices; kNoSimplex where it is in none
+  HugeVector<Item> items_;
   std::vector<SimplexId> free_;
 
   // Scratch.
-  std::vector<uint32_t> mark_;  // by simplex: stamp_ where the search has it, stamp_ + 1 where it has refused it
+  HugeVector<uint32_t> mark_;  // by simplex: stamp_ where the search has it, stamp_ + 1 where it has refused it
   uint32_t stamp_ = 0;
   std::vector<SimplexId> star_;
   std::vector<VertexId> link_;

@@ -247,7 +247,7 @@ class LeafTree {
   HugeVector<Range> ranges_;                  // by node
   std::vector<std::vector<NodeId>> pending_;  // leaves to be looked at, by level
   std::vector<Point<D>> near_;                // points near the leaf that is looked at
-  std::vector<Point<D>> rim_points_;
+  HugeVector<Point<D>> rim_points_;
 };
 
 }  // namespace wellspace::core

@@ -126,7 +126,7 @@ class VertexBuckets {
     free_[ClassOf(bucket.capacity)].push_back(reinterpret_cast<std::byte*>(bucket.positions));
   }
 
-  std::vector<Bucket> buckets_;
+  HugeVector<Bucket> buckets_;
   std::vector<uint32_t> free_numbers_;
   std::array<std::vector<std::byte*>, kClasses> free_;
   std::vector<HugePageBytes> chunks_;

@@ -1,15 +1,11 @@
 #include "core/base/huge_pages.h"
 
-#include <sys/mman.h>
-
-#include <cerrno>
 #include <cstddef>
 #include <cstdint>
 #include <new>
-#include <numeric>
-#include <vector>
 
 #include "gtest/gtest.h"
+#include "tests/core/is_mapped.h"
 
 namespace wellspace::core {
 namespace {
@@ -17,12 +13,6 @@ namespace {
 constexpr size_t kCountOnHugePage = kHugePage / sizeof(uint32_t);
 
 bool IsAligned(const void* memory) { return reinterpret_cast<uintptr_t>(memory) % kHugePage == 0; }
-
-// Whether the system still has pages mapped at `memory`.
-bool IsMapped(void* memory) {
-  unsigned char residency = 0;
-  return mincore(memory, 1, &residency) == 0 || errno != ENOMEM;
-}
 
 TEST(HugePagesTest, AVectorKeepsItsItemsAsItGrows) {
   HugeVector<uint32_t> items;
@@ -36,6 +26,16 @@ TEST(HugePagesTest, AVectorKeepsItsItemsAsItGrows) {
   EXPECT_EQ(copy, items);
 }
 
+TEST(HugePagesTest, SmallerArraysShareAPage) {
+  const HugeVector<uint32_t> first(kCountOnHugePage / 8, 1);
+  const HugeVector<uint32_t> second(kCountOnHugePage / 8, 2);
+  const auto page_of = [](const HugeVector<uint32_t>& items) {
+    return reinterpret_cast<uintptr_t>(items.data()) / kHugePage;
+  };
+  EXPECT_EQ(page_of(first), page_of(second));
+  EXPECT_EQ(first, HugeVector<uint32_t>(first.size(), 1));
+}
+
 TEST(HugePagesTest, ArraysOfAWholePageBeginAtOne) {
   for (const size_t count : {kCountOnHugePage, kCountOnHugePage + 1, 5 * kCountOnHugePage - 1}) {
     HugeVector<uint32_t> items(count, 7);
@@ -47,10 +47,10 @@ TEST(HugePagesTest, ArraysOfAWholePageBeginAtOne) {
 TEST(HugePagesTest, WhatIsGivenBackIsTheSystemsAtOnce) {
   HugeVector<uint32_t> items(2 * kCountOnHugePage, 7);
   uint32_t* const memory = items.data();
-  EXPECT_TRUE(IsMapped(memory));
+  EXPECT_TRUE(test::IsMapped(memory));
   items = HugeVector<uint32_t>();
-  EXPECT_FALSE(IsMapped(memory));
-  EXPECT_FALSE(IsMapped(memory + 2 * kCountOnHugePage - 1024));
+  EXPECT_FALSE(test::IsMapped(memory));
+  EXPECT_FALSE(test::IsMapped(memory + 2 * kCountOnHugePage - 1024));
 }
 
 TEST(HugePagesTest, MoreThanThereIsIsRefused) {
@@ -59,24 +59,12 @@ TEST(HugePagesTest, MoreThanThereIsIsRefused) {
 }
 
 TEST(HugePagesTest, BytesMayBeWrittenToTheLast) {
-  for (const size_t count : {size_t{1000}, kHugePage - 1, kHugePage, kHugePage + 1}) {
+  for (const size_t count : {size_t{1000}, size_t{100'000}, kHugePage - 1, kHugePage, kHugePage + 1}) {
     const HugePageBytes bytes = MakeHugePageBytes(count);
     bytes[0] = std::byte{1};
     bytes[count - 1] = std::byte{2};
     EXPECT_EQ(bytes[count - 1], std::byte{2});
   }
-}
-
-TEST(HugePagesTest, ReserveKeepsWhatIsThere) {
-  std::vector<uint32_t> items(1000);
-  std::iota(items.begin(), items.end(), 0);
-  const std::vector<uint32_t> expected = items;
-  ReserveOnHugePages(items, 2 * kCountOnHugePage);
-  EXPECT_GE(items.capacity(), 2 * kCountOnHugePage);
-  EXPECT_EQ(items, expected);
-  const uint32_t* const before = items.data();
-  ReserveOnHugePages(items, 10);
-  EXPECT_EQ(items.data(), before);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <iterator>
 #include <map>
+#include <span>
 #include <string>
 #include <string_view>
 #include <tuple>
@@ -195,7 +196,7 @@ TEST(WeightedOracleTest, APumpedMeshIsTheRegularTriangulation) {
   const absl::StatusOr<Mesh> mesh = MeshPoints(parameters, MakeCloud("uniform", 3, 500), context);
   ASSERT_TRUE(mesh.ok()) << mesh.status();
   ASSERT_GT(mesh->statistics.weighted_vertices, 50);
-  const auto sorted = [](const std::vector<uint32_t>& simplices) {
+  const auto sorted = [](std::span<const uint32_t> simplices) {
     SimplexSet all;
     for (size_t at = 0; at < simplices.size(); at += 4) {
       std::vector<uint32_t> simplex(simplices.begin() + static_cast<std::ptrdiff_t>(at),

@@ -142,8 +142,8 @@ TEST_P(SliverTest, OrderOfThePointsAndThreadsDoNotMatter) {
     parameters.threads = 3;
     const Mesh other = MeshOf(parameters, test::Shuffled(cloud_, 3, 5));
     EXPECT_EQ(test::Canonical(mesh), test::Canonical(other));
-    std::vector<double> weights = mesh.weights;
-    std::vector<double> other_weights = other.weights;
+    HugeVector<double> weights = mesh.weights;
+    HugeVector<double> other_weights = other.weights;
     std::sort(weights.begin(), weights.end());
     std::sort(other_weights.begin(), other_weights.end());
     EXPECT_EQ(weights, other_weights);

@@ -38,7 +38,7 @@ class TriangulationOf {
     RunContext context;
     const absl::StatusOr<Mesh> mesh = MeshPoints(parameters, test::MakeCloud(kind, D, n), context);
     EXPECT_TRUE(mesh.ok()) << mesh.status();
-    std::vector<Point<D>> points;
+    HugeVector<Point<D>> points;
     for (uint64_t v = 0; v < mesh->vertex_count(); ++v) {
       points.push_back(PointAt<D>(mesh->points, v));
     }

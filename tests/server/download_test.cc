@@ -86,8 +86,8 @@ TEST_P(DownloadOver, BringsMetadataThenChunks) {
   for (size_t i = 0; i < download.chunks.size(); ++i) {
     EXPECT_EQ(download.chunks[i].index(), i);
   }
-  EXPECT_EQ(PointsOf(download.chunks), mesh.points);
-  EXPECT_EQ(SimplicesOf(download.chunks), mesh.simplices);
+  EXPECT_TRUE(std::ranges::equal(PointsOf(download.chunks), mesh.points));
+  EXPECT_TRUE(std::ranges::equal(SimplicesOf(download.chunks), mesh.simplices));
   EXPECT_TRUE(harness->log().WaitFor("method=DownloadMesh"));
 }
 
@@ -114,8 +114,8 @@ TEST_P(DownloadOver, BreaksOffAtRandomChunksAndGoesOnWithTheSameBytes) {
   SessionClient client(harness->channel());
   client.Refine();
   std::mt19937 generator(17);
-  std::vector<double> points;
-  std::vector<uint32_t> simplices;
+  core::HugeVector<double> points;
+  core::HugeVector<uint32_t> simplices;
   uint64_t next = 0;
   uint64_t count = 1;
   uint64_t revision = 0;

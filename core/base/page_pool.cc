@@ -1,0 +1,86 @@
+#include "core/base/page_pool.h"
+
+#include <sys/mman.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <iterator>
+#include <new>
+
+namespace wellspace::core {
+
+void AdviseHugePages(const void* begin, size_t bytes) {
+  const uintptr_t first = reinterpret_cast<uintptr_t>(begin) & ~(kHugePage - 1);
+  const uintptr_t end = WholeHugePages(reinterpret_cast<uintptr_t>(begin) + bytes);
+  madvise(reinterpret_cast<void*>(first), end - first, MADV_HUGEPAGE);  // advice: nothing is lost if it is not taken
+}
+
+void* MapHugePages(size_t bytes) {
+  const size_t mapped = WholeHugePages(bytes) + kHugePage;
+  void* const memory = mmap(nullptr, mapped, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (memory == MAP_FAILED) {
+    throw std::bad_alloc();
+  }
+  auto* const begin = static_cast<std::byte*>(memory);
+  const size_t before = -reinterpret_cast<uintptr_t>(begin) & (kHugePage - 1);
+  if (before != 0) {
+    munmap(begin, before);
+  }
+  munmap(begin + before + WholeHugePages(bytes), kHugePage - before);
+  AdviseHugePages(begin + before, bytes);
+  return begin + before;
+}
+
+void UnmapHugePages(void* memory, size_t bytes) { munmap(memory, WholeHugePages(bytes)); }
+
+PagePool& PagePool::Shared() {
+  static auto* const pool = new PagePool;
+  return *pool;
+}
+
+void* PagePool::Take(size_t bytes) {
+  const size_t count = (bytes + kPage - 1) / kPage;
+  const std::lock_guard lock(mutex_);
+  auto at = std::find_if(large_pages_.begin(), large_pages_.end(),
+                         [&](const auto& entry) { return entry.second.HasFree(count); });
+  if (at == large_pages_.end()) {
+    at = large_pages_.try_emplace(static_cast<std::byte*>(MapHugePages(kHugePage))).first;
+  }
+  return at->first + at->second.Take(count) * kPage;
+}
+
+void PagePool::GiveBack(void* memory, size_t bytes) {
+  auto* const begin = static_cast<std::byte*>(memory);
+  const std::lock_guard lock(mutex_);
+  const auto at = std::prev(large_pages_.upper_bound(begin));
+  at->second.GiveBack((begin - at->first) / kPage, (bytes + kPage - 1) / kPage);
+  if (at->second.AllFree()) {
+    UnmapHugePages(at->first, kHugePage);
+    large_pages_.erase(at);
+  }
+}
+
+size_t PagePool::Pages::Take(size_t count) {
+  size_t first = 0;
+  size_t free = 0;
+  for (size_t page = 0; free < count; ++page) {
+    free = taken_[page] ? 0 : free + 1;
+    first = page + 1 - free;
+  }
+  Mark(first, count, true);
+  return first;
+}
+
+void PagePool::Pages::Mark(size_t first, size_t count, bool taken) {
+  for (size_t page = first; page < first + count; ++page) {
+    taken_[page] = taken;
+  }
+  longest_free_ = 0;
+  size_t free = 0;
+  for (size_t page = 0; page < kCount; ++page) {
+    free = taken_[page] ? 0 : free + 1;
+    longest_free_ = std::max(longest_free_, free);
+  }
+}
+
+}  // namespace wellspace::core

@@ -1,0 +1,74 @@
+// Memory on large pages: mappings of whole ones, and smaller arrays side by side on them.
+#ifndef WELLSPACE_CORE_BASE_PAGE_POOL_H_
+#define WELLSPACE_CORE_BASE_PAGE_POOL_H_
+
+#include <bitset>
+#include <cstddef>
+#include <map>
+#include <mutex>
+
+namespace wellspace::core {
+
+inline constexpr size_t kHugePage = size_t{1} << 21;
+
+constexpr size_t WholeHugePages(size_t bytes) { return (bytes + kHugePage - 1) & ~(kHugePage - 1); }
+
+// Has the system bring what lies at [begin, begin + bytes) in on pages of 2 MiB, if it has any and nothing there has been written yet: one fault
+// brings in such a page, where small ones take 512. What lies beside it on the same pages comes along.
+void AdviseHugePages(const void* begin, size_t bytes);
+
+// Maps so many bytes, in WholeHugePages, to the beginning of a large page. What is given back then is the system's at once, where the heap would keep
+// it: arrays that are moved as they grow leave more than they need behind. Throws std::bad_alloc if the system has none.
+void* MapHugePages(size_t bytes);
+
+// Takes back what MapHugePages(bytes) returned.
+void UnmapHugePages(void* memory, size_t bytes);
+
+// Arrays smaller than a large page, in runs of small ones: the first by address that is free. Large pages are mapped as they are needed; one on which
+// nothing is left is the system's at once.
+//
+// Thread safety: thread-safe.
+class PagePool {
+ public:
+  // The one that all share; it is never destroyed.
+  static PagePool& Shared();
+
+  // Memory that begins at a page. What is in it is not known. Throws std::bad_alloc if the system has none.
+  //
+  // REQUIRES:   0 < bytes <= kHugePage.
+  // Complexity: O(large pages mapped).
+  void* Take(size_t bytes);
+
+  // Takes back what Take(bytes) returned.
+  void GiveBack(void* memory, size_t bytes);
+
+ private:
+  static constexpr size_t kPage = size_t{1} << 12;
+
+  // Which pages of a large one are taken.
+  class Pages {
+   public:
+    bool HasFree(size_t count) const { return longest_free_ >= count; }
+    bool AllFree() const { return taken_.none(); }
+    // Takes the first `count` free ones side by side and returns the number of the first of them.
+    //
+    // REQUIRES:   HasFree(count).
+    size_t Take(size_t count);
+    void GiveBack(size_t first, size_t count) { Mark(first, count, false); }
+
+   private:
+    static constexpr size_t kCount = kHugePage / kPage;
+
+    void Mark(size_t first, size_t count, bool taken);
+
+    std::bitset<kCount> taken_;
+    size_t longest_free_ = kCount;  // side by side
+  };
+
+  std::mutex mutex_;
+  std::map<std::byte*, Pages> large_pages_;
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_BASE_PAGE_POOL_H_
