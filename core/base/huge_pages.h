@@ -51,7 +51,12 @@ struct HugePageAllocator {
   }
 
  private:
+#ifdef __SANITIZE_ADDRESS__
+  static constexpr size_t kLeastShared =
+      kHugePage;  // none: between arrays of the heap it sees what is read beyond their ends
+#else
   static constexpr size_t kLeastShared = size_t{1} << 16;
+#endif
   static constexpr size_t kMost = std::numeric_limits<ptrdiff_t>::max() / sizeof(T);
 };
 
