@@ -51,9 +51,9 @@ struct HugePageAllocator {
   }
 
  private:
+  // Under AddressSanitizer none: between arrays of the heap it sees what is read beyond their ends.
 #ifdef __SANITIZE_ADDRESS__
-  static constexpr size_t kLeastShared =
-      kHugePage;  // none: between arrays of the heap it sees what is read beyond their ends
+  static constexpr size_t kLeastShared = kHugePage;
 #else
   static constexpr size_t kLeastShared = size_t{1} << 16;
 #endif
