@@ -9,15 +9,15 @@
 
 namespace wellspace::core {
 
-void AdviseHugePages(const void* begin, size_t bytes) {
-  const uintptr_t first = reinterpret_cast<uintptr_t>(begin) & ~(kHugePage - 1);
-  const uintptr_t end = WholeHugePages(reinterpret_cast<uintptr_t>(begin) + bytes);
-  madvise(reinterpret_cast<void*>(first), end - first, MADV_HUGEPAGE);  // advice: nothing is lost if it is not taken
-}
+namespace {
+
+constexpr size_t WholeHugePages(size_t bytes) { return (bytes + kHugePage - 1) & ~(kHugePage - 1); }
+
+}  // namespace
 
 void* MapHugePages(size_t bytes) {
-  const size_t mapped = WholeHugePages(bytes) + kHugePage;
-  void* const memory = mmap(nullptr, mapped, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  const size_t whole = WholeHugePages(bytes);
+  void* const memory = mmap(nullptr, whole + kHugePage, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) {
     throw std::bad_alloc();
   }
@@ -26,8 +26,8 @@ void* MapHugePages(size_t bytes) {
   if (before != 0) {
     munmap(begin, before);
   }
-  munmap(begin + before + WholeHugePages(bytes), kHugePage - before);
-  AdviseHugePages(begin + before, bytes);
+  munmap(begin + before + whole, kHugePage - before);
+  madvise(begin + before, whole, MADV_HUGEPAGE);  // advice: nothing is lost if it is not taken
   return begin + before;
 }
 

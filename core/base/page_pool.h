@@ -11,14 +11,9 @@ namespace wellspace::core {
 
 inline constexpr size_t kHugePage = size_t{1} << 21;
 
-constexpr size_t WholeHugePages(size_t bytes) { return (bytes + kHugePage - 1) & ~(kHugePage - 1); }
-
-// Has the system bring what lies at [begin, begin + bytes) in on pages of 2 MiB, if it has any and nothing there has been written yet: one fault
-// brings in such a page, where small ones take 512. What lies beside it on the same pages comes along.
-void AdviseHugePages(const void* begin, size_t bytes);
-
-// Maps so many bytes, in WholeHugePages, to the beginning of a large page. What is given back then is the system's at once, where the heap would keep
-// it: arrays that are moved as they grow leave more than they need behind. Throws std::bad_alloc if the system has none.
+// Maps so many bytes, rounded up to whole pages of 2 MiB, to the beginning of one, and asks for such pages: one fault brings one in, where small ones
+// take 512. What is given back then is the system's at once, where the heap would keep it: arrays that are moved as they grow leave more than they need
+// behind. Throws std::bad_alloc if the system has none.
 void* MapHugePages(size_t bytes);
 
 // Takes back what MapHugePages(bytes) returned.

@@ -46,7 +46,7 @@ inline constexpr double kFixedBytes = 3.9e6;
 inline constexpr double kLeftFree = 0.3;
 inline constexpr double kMostLeftFree = 3e6;
 
-// Where the estimate of the memory is wrong, it is rather short than long: 0.56 to 1.07 without this, which puts the two ends about as far from 1.
+// Where the estimate of the memory is wrong, it is rather short than long: 0.57 to 1.05 without this, which puts the two ends about as far from 1.
 inline constexpr double kMemoryMargin = 1.25;
 
 // The memory at its peak, when the mesh has been put together. Vectors grow by doubling, but of what they reserve only what they

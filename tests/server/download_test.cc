@@ -31,20 +31,20 @@ std::string Serialized(const std::vector<v1::MeshChunk>& chunks) {
 }
 
 template <typename T, typename Field>
-std::vector<T> Concatenate(const std::vector<v1::MeshChunk>& chunks, Field field) {
-  std::vector<T> all;
+core::HugeVector<T> Concatenate(const std::vector<v1::MeshChunk>& chunks, Field field) {
+  core::HugeVector<T> all;
   for (const v1::MeshChunk& chunk : chunks) {
     all.insert(all.end(), field(chunk).begin(), field(chunk).end());
   }
   return all;
 }
 
-std::vector<double> PointsOf(const std::vector<v1::MeshChunk>& chunks) {
+core::HugeVector<double> PointsOf(const std::vector<v1::MeshChunk>& chunks) {
   return Concatenate<double>(
       chunks, [](const v1::MeshChunk& chunk) -> const auto& { return chunk.points(); });
 }
 
-std::vector<uint32_t> SimplicesOf(const std::vector<v1::MeshChunk>& chunks) {
+core::HugeVector<uint32_t> SimplicesOf(const std::vector<v1::MeshChunk>& chunks) {
   return Concatenate<uint32_t>(
       chunks, [](const v1::MeshChunk& chunk) -> const auto& { return chunk.simplices(); });
 }
@@ -86,8 +86,8 @@ TEST_P(DownloadOver, BringsMetadataThenChunks) {
   for (size_t i = 0; i < download.chunks.size(); ++i) {
     EXPECT_EQ(download.chunks[i].index(), i);
   }
-  EXPECT_TRUE(std::ranges::equal(PointsOf(download.chunks), mesh.points));
-  EXPECT_TRUE(std::ranges::equal(SimplicesOf(download.chunks), mesh.simplices));
+  EXPECT_EQ(PointsOf(download.chunks), mesh.points);
+  EXPECT_EQ(SimplicesOf(download.chunks), mesh.simplices);
   EXPECT_TRUE(harness->log().WaitFor("method=DownloadMesh"));
 }
 
