@@ -3,6 +3,8 @@
 #include <malloc.h>
 
 #include <algorithm>
+#include <limits>
+#include <tuple>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
@@ -56,6 +58,11 @@ uint64_t Job::PassingBytes() const {
   return held_.passing_bytes() + memory_.passing_bytes();
 }
 
+uint64_t Job::RunBytes() const {
+  std::lock_guard lock(memory_mutex_);
+  return memory_.bytes();
+}
+
 void Job::ReleaseAll() {
   MemoryReservation held;
   MemoryReservation memory;
@@ -84,7 +91,7 @@ JobPool::~JobPool() {
   dropped.swap(lines_);
   turns_.clear();
   not_begun.swap(started_);
-  for (const std::shared_ptr<Job>& job : begun_) {
+  for (const auto& [sequence, job] : begun_) {
     job->context_.Cancel();
     if (job->state_ == Job::State::kWaiting) {
       Resume(*job);
@@ -186,7 +193,7 @@ absl::Status JobPool::Reserve(Job& job, uint64_t bytes) {
     return memory_.Refusal(bytes, kJob);
   }
   job.wanted_bytes_ = bytes;
-  if (Claimant() == nullptr && TakeWanted(job)) {
+  if (Claimant() == nullptr && TakeWanted(job, RoomForTree())) {
     return absl::OkStatus();
   }
   return WaitInLine(job, lock);
@@ -221,8 +228,9 @@ void JobPool::Dispatch() {
 }
 
 bool JobPool::StartNext() {
+  const uint64_t room_for_tree = RoomForTree();
   if (const std::shared_ptr<Job> claimant = Claimant(); claimant != nullptr) {
-    if (StartFirstOf(claimant->tenant_)) {
+    if (StartFirstOf(claimant->tenant_, room_for_tree)) {
       return true;
     }
     if (running_ > 0) {
@@ -231,10 +239,14 @@ bool JobPool::StartNext() {
     claimant->passed_over_ = 0;  // what it waits for is no job's: others go on
   }
   for (const std::string& tenant : std::list<std::string>(turns_)) {
-    if (StartFirstOf(tenant)) {
+    if (StartFirstOf(tenant, room_for_tree)) {
       CountPassing();
       return true;
     }
+  }
+  if (StartOneWithATree()) {
+    CountPassing();
+    return true;
   }
   const std::shared_ptr<Job> victim = VictimOfDeadlock();
   if (victim == nullptr) {
@@ -245,13 +257,23 @@ bool JobPool::StartNext() {
   return true;
 }
 
-bool JobPool::StartFirstOf(const std::string& tenant) {
+bool JobPool::StartFirstOf(const std::string& tenant, uint64_t room_for_tree) {
   const std::shared_ptr<Job> job = lines_.at(tenant).front();
-  if (job->state_ == Job::State::kWaiting && !TakeWanted(*job)) {
+  if (job->state_ == Job::State::kWaiting && !TakeWanted(*job, room_for_tree)) {
     return false;
   }
   Start(job);
   return true;
+}
+
+bool JobPool::StartOneWithATree() {
+  for (const auto& [sequence, job] : begun_) {
+    if (job->state_ == Job::State::kWaiting && TakeWanted(*job, 0)) {
+      Start(job);
+      return true;
+    }
+  }
+  return false;
 }
 
 void JobPool::Start(const std::shared_ptr<Job>& job) {
@@ -276,9 +298,44 @@ void JobPool::Resume(Job& job) {
   job.wake_.notify_one();
 }
 
-bool JobPool::TakeWanted(Job& job) {
+bool JobPool::TakeWanted(Job& job, uint64_t room_for_tree) {
   std::lock_guard lock(job.memory_mutex_);
-  return job.memory_.Resize(job.wanted_bytes_);
+  const bool begins = job.memory_.bytes() == 0;
+  if ((begins && job.wanted_bytes_ > room_for_tree) || !job.memory_.Resize(job.wanted_bytes_)) {
+    return false;
+  }
+  job.has_all_ = !begins;
+  return true;
+}
+
+uint64_t JobPool::RoomForTree() const {
+  struct Waiting {
+    uint64_t needs;
+    uint64_t frees;
+  };
+  constexpr uint64_t kNoBound = std::numeric_limits<uint64_t>::max();
+  std::vector<Waiting> waiting;
+  uint64_t trees = 0;   // of runs that may want more
+  uint64_t ending = 0;  // what those have that will not
+  for (const auto& [sequence, job] : begun_) {
+    const uint64_t frees = job->PassingBytes();
+    if (job->state_ != Job::State::kWaiting) {
+      (job->has_all_ ? ending : trees) += frees;
+    } else if (const uint64_t has = job->RunBytes(); has > 0) {
+      waiting.push_back({.needs = job->wanted_bytes_ - has, .frees = frees});
+    }
+  }
+  std::ranges::sort(waiting, {}, &Waiting::needs);
+  uint64_t room = memory_.limit() - memory_.reserved() + ending;
+  uint64_t most = kNoBound;
+  for (const Waiting& job : waiting) {
+    if (job.needs > room + trees) {
+      return kNoBound;
+    }
+    most = std::min(most, room - std::min(room, job.needs));
+    room += job.frees;
+  }
+  return most;
 }
 
 void JobPool::CountPassing() {
@@ -308,11 +365,15 @@ std::shared_ptr<Job> JobPool::VictimOfDeadlock() const {
   const uint64_t passing = memory_.passing();
   uint64_t in_line = 0;
   std::shared_ptr<Job> youngest;
+  bool youngest_waits = false;
   for (const auto& [tenant, line] : lines_) {
     for (const std::shared_ptr<Job>& job : line) {
-      in_line += job->PassingBytes();
-      if (youngest == nullptr || job->sequence_ > youngest->sequence_) {
+      const uint64_t frees = job->PassingBytes();
+      in_line += frees;
+      const bool waits = job->state_ == Job::State::kWaiting && frees > 0;
+      if (youngest == nullptr || std::tie(waits, job->sequence_) > std::tie(youngest_waits, youngest->sequence_)) {
         youngest = job;
+        youngest_waits = waits;
       }
     }
   }
@@ -372,7 +433,7 @@ void JobPool::RunWorker(std::list<std::thread>::iterator self) {
     }
     const std::shared_ptr<Job> job = std::move(started_.front());
     started_.pop_front();
-    begun_.insert(job);
+    begun_.emplace(job->sequence_, job);
     Job::Work work = std::exchange(job->work_, nullptr);
     lock.unlock();
     work(*job);
@@ -382,7 +443,7 @@ void JobPool::RunWorker(std::list<std::thread>::iterator self) {
     }
     job->ReleaseAll();
     lock.lock();
-    begun_.erase(job);
+    begun_.erase(job->sequence_);
     --running_;
     EndOf(*job);
     Dispatch();

@@ -12,7 +12,6 @@
 #include <mutex>
 #include <string>
 #include <thread>
-#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -71,6 +70,8 @@ class Job final : private core::MemoryLender, public std::enable_shared_from_thi
 
   // What would be freed if it ended.
   uint64_t PassingBytes() const;
+  // What its run has reserved.
+  uint64_t RunBytes() const;
   void ReleaseAll();
 
   JobPool& pool_;
@@ -88,6 +89,7 @@ class Job final : private core::MemoryLender, public std::enable_shared_from_thi
   uint64_t sequence_ = 0;
   Work work_;                     // empty once taken by a worker or cancelled
   uint64_t wanted_bytes_ = 0;     // while kWaiting
+  bool has_all_ = false;          // its run was given more than its tree: it is expected to end with that
   int passed_over_ = 0;           // jobs that were started while this one, first of its tenant, waited for memory
   bool is_refused_ = false;       // its next Reserve fails
   std::condition_variable wake_;  // of the thread that waits
@@ -96,13 +98,17 @@ class Job final : private core::MemoryLender, public std::enable_shared_from_thi
 // A fixed number of jobs that run at once, and a bounded line of others that wait for it.
 //
 // The line is fair: tenants take turns, and within a tenant who came first is first. A job that waits for memory keeps its place; those
-// of its tenant stay behind it, those of others may pass, but only kMostPassing times. When all jobs wait for memory that others of
-// them have, the youngest is refused.
+// of its tenant stay behind it, those of others may pass, but only kMostPassing times.
+//
+// What a run reserves first is its tree, what it then asks for is expected to be all that it needs. No tree is begun with what those that
+// wait with theirs need; and one whose rest fits goes on, first of its tenant or not. When all wait for the trees of one another all the
+// same, the youngest is refused.
 //
 // Thread safety: thread-safe. Work runs without any lock of the pool held.
 // Invariants: (1) at most `workers` jobs run and at most `max_queued` more are in line, `max_per_tenant` of one tenant; (2) the work of a
 // job runs at most once, and never after Cancel found it in line; (3) the work and all that it holds is freed when it returns or is
-// cancelled, not when its Job is; (4) there are at most as many threads as workers and tenants in line.
+// cancelled, not when its Job is; (4) there are at most `workers` threads and one for
+// each job that waits for memory, which are at most `workers` of a tenant.
 class JobPool {
  public:
   static constexpr int kMostPassing = 16;
@@ -156,18 +162,24 @@ class JobPool {
   // Starts the job whose turn it is, or refuses one where nothing else helps. False when all have to wait.
   bool StartNext();
   // Starts or resumes the first job of `tenant`, unless it waits for memory that is not there.
-  bool StartFirstOf(const std::string& tenant);
+  bool StartFirstOf(const std::string& tenant, uint64_t room_for_tree);
+  // Resumes the oldest that waits with its tree and whose memory is there, first of its tenant or not.
+  bool StartOneWithATree();
   // Takes `job` out of the line and gives it a worker.
   void Start(const std::shared_ptr<Job>& job);
   // Gives its worker back to a job that waited.
   void Resume(Job& job);
   // Sets aside what `job` wants; says whether there was room.
-  bool TakeWanted(Job& job);
+  bool TakeWanted(Job& job, uint64_t room_for_tree);
+  // Most that a tree may take, for good, so that those that wait with theirs can go on one after the other. No bound if they could not
+  // even when all that run had ended. O(b log b) for b jobs that have begun.
+  uint64_t RoomForTree() const;
   // A job was given a worker: those that wait for memory have been passed.
   void CountPassing();
   // The job that has been passed often enough, the oldest of them; null for none.
   std::shared_ptr<Job> Claimant() const;
-  // The youngest job in line if all memory that work could free is that of jobs in line; null otherwise.
+  // If all memory that work could free is that of jobs in line, the youngest of them that waits with memory, or the youngest if none does;
+  // null otherwise.
   std::shared_ptr<Job> VictimOfDeadlock() const;
   void Enter(const std::shared_ptr<Job>& job);
   void Leave(const Job& job);
@@ -188,7 +200,7 @@ class JobPool {
   std::list<std::string> turns_;                    // of lines_, who is next first
   std::map<std::string, int> jobs_of_;              // by tenant, in line or running
   std::deque<std::shared_ptr<Job>> started_;        // wait for their thread to wake
-  std::unordered_set<std::shared_ptr<Job>> begun_;  // have a thread: they run, or wait for memory
+  std::map<uint64_t, std::shared_ptr<Job>> begun_;  // by sequence_; have a thread: they run, or wait for memory
   int running_ = 0;                                 // have a worker: started_, and begun_ that do not wait
   bool stopping_ = false;
   std::list<std::thread> threads_;

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <random>
+#include <span>
 #include <string>
 #include <thread>
 #include <utility>
@@ -349,39 +350,96 @@ TEST(JobPool, WhatSessionsLeaveNoRoomForIsRefusedAtOnceButMayBeRetried) {
   EXPECT_TRUE(DetailsOf(FromCoreStatus(large.status)).may_retry);
 }
 
-TEST(JobPool, WhenAllWaitForOneAnotherTheYoungestIsRefusedAndTheOldestGoesOn) {
-  // Each has a tree, and wants more beside it than the others' trees leave.
-  struct WithTree {
-    absl::Status tree;
-    absl::Status mesh;
-    Event has_tree;
-    Event ended;
-    Job::Work Work(Event& go) {
-      return [this, &go](Job& job) {
-        tree = job.context().ReserveMemory(30 * kMegabyte);
-        has_tree.Set();
-        EXPECT_TRUE(go.Wait());
-        mesh = job.context().ReserveMemory(70 * kMegabyte);
-        ended.Set();
-      };
-    }
-  };
-  Event go;
-  WithTree jobs[3];
+// A job with a tree, which then, once the test lets it, wants memory for its mesh, and ends.
+struct WithTree {
+  WithTree(uint64_t tree, uint64_t mesh) : tree_bytes(tree), mesh_bytes(mesh) {}
+
+  Job::Work Work() {
+    return [this](Job& job) {
+      tree_status = job.context().ReserveMemory(tree_bytes);
+      has_tree.Set();
+      EXPECT_TRUE(may_go_on.Wait());
+      mesh_status = job.context().ReserveMemory(mesh_bytes);
+      ended.Set();
+    };
+  }
+
+  const uint64_t tree_bytes;
+  const uint64_t mesh_bytes;
+  absl::Status tree_status;
+  absl::Status mesh_status;
+  Event has_tree;
+  Event may_go_on;
+  Event ended;
+};
+
+TEST(JobPool, WhenAllWaitForOneAnotherTheYoungestTreeIsRefusedAndTheOldestGoesOn) {
+  // Each wants more beside its tree than the others' trees leave; the last one not even has a tree when the others wait.
+  WithTree jobs[] = {{30 * kMegabyte, 70 * kMegabyte},
+                     {30 * kMegabyte, 70 * kMegabyte},
+                     {30 * kMegabyte, 70 * kMegabyte},
+                     {30 * kMegabyte, 70 * kMegabyte}};
   Pool pool(3, 10, 10, kMaxMemory);
-  for (WithTree& job : jobs) {
-    ASSERT_NE(pool.Submit(job.Work(go), std::to_string(&job - jobs)), nullptr);
+  for (WithTree& job : std::span(jobs).first(3)) {
+    ASSERT_NE(pool.Submit(job.Work(), std::to_string(&job - jobs)), nullptr);
     ASSERT_TRUE(job.has_tree.Wait());
   }
-  go.Set();
+  ASSERT_NE(pool.Submit(jobs[3].Work(), "3"), nullptr);
+  for (WithTree& job : jobs) {
+    job.may_go_on.Set();
+  }
   for (WithTree& job : jobs) {
     ASSERT_TRUE(job.ended.Wait());
-    EXPECT_TRUE(job.tree.ok());
+    EXPECT_TRUE(job.tree_status.ok()) << job.tree_status;
   }
-  EXPECT_TRUE(jobs[0].mesh.ok()) << jobs[0].mesh;
-  EXPECT_TRUE(jobs[1].mesh.ok()) << jobs[1].mesh;
-  EXPECT_EQ(DetailsOf(FromCoreStatus(jobs[2].mesh)).reason, "MEMORY_LIMIT");
-  EXPECT_TRUE(DetailsOf(FromCoreStatus(jobs[2].mesh)).may_retry);
+  EXPECT_TRUE(jobs[0].mesh_status.ok()) << jobs[0].mesh_status;
+  EXPECT_TRUE(jobs[1].mesh_status.ok()) << jobs[1].mesh_status;
+  EXPECT_EQ(DetailsOf(FromCoreStatus(jobs[2].mesh_status)).reason, "MEMORY_LIMIT");
+  EXPECT_TRUE(DetailsOf(FromCoreStatus(jobs[2].mesh_status)).may_retry);
+  EXPECT_TRUE(jobs[3].mesh_status.ok()) << jobs[3].mesh_status;
+}
+
+TEST(JobPool, ATreeWhoseMeshFitsGoesOnBehindALargeOneOfItsTenant) {
+  WithTree large(30 * kMegabyte, 100 * kMegabyte);
+  WithTree small(10 * kMegabyte, 40 * kMegabyte);
+  Pool pool(2, 10, 10, kMaxMemory);
+  absl::StatusOr<MemoryReservation> call = pool.memory.Reserve(40 * kMegabyte, "a call");
+  ASSERT_TRUE(call.ok());
+  for (WithTree* const job : {&large, &small}) {
+    ASSERT_NE(pool.Submit(job->Work()), nullptr);
+    ASSERT_TRUE(job->has_tree.Wait());
+  }
+  large.may_go_on.Set();
+  small.may_go_on.Set();
+  WaitForQueued(pool, 2);
+  call->Release();  // for the small one, whose end makes room for the large one
+  for (WithTree* const job : {&large, &small}) {
+    ASSERT_TRUE(job->ended.Wait());
+    EXPECT_TRUE(job->mesh_status.ok()) << job->mesh_status;
+  }
+}
+
+TEST(JobPool, NoTreeIsBegunWithWhatOneThatWaitsNeeds) {
+  Needy holder(40 * kMegabyte);
+  WithTree waiting(30 * kMegabyte, 80 * kMegabyte);
+  Needy begins(10 * kMegabyte);
+  Pool pool(2, 10, 10, kMaxMemory);
+  ASSERT_NE(pool.Submit(holder.Work(), "a"), nullptr);
+  ASSERT_TRUE(holder.reserved.Wait());
+  ASSERT_NE(pool.Submit(waiting.Work(), "b"), nullptr);
+  waiting.may_go_on.Set();
+  WaitForQueued(pool, 1);
+  ASSERT_NE(pool.Submit(begins.Work(), "c"), nullptr);
+  while (!begins.reserved.IsSet() && pool.GetLoad().queued < 2) {
+    std::this_thread::yield();
+  }
+  EXPECT_FALSE(begins.reserved.IsSet());
+  holder.may_end.Set();
+  ASSERT_TRUE(waiting.ended.Wait());
+  EXPECT_TRUE(waiting.mesh_status.ok()) << waiting.mesh_status;
+  begins.may_end.Set();
+  ASSERT_TRUE(begins.ended.Wait());
+  EXPECT_TRUE(begins.status.ok()) << begins.status;
 }
 
 TEST(JobPool, AJobThatOutgrowsItsReservationTakesWhatIsLeftThenEnds) {
@@ -462,7 +520,7 @@ TEST(JobPool, WhatTheWorkHoldsIsReleasedWithIt) {
   EXPECT_EQ(pool.memory.reserved(), 0u);
 }
 
-TEST(JobPool, ManyTenantsWithTenTimesTheMemoryAllFinish) {
+TEST(JobPool, ManyTenantsWithTenTimesTheMemoryFinish) {
   constexpr int kTenants = 8;
   constexpr int kJobs = 50;
   std::atomic<uint64_t> most = 0;
@@ -498,7 +556,8 @@ TEST(JobPool, ManyTenantsWithTenTimesTheMemoryAllFinish) {
     std::this_thread::yield();
   }
   EXPECT_LE(most, pool.memory.limit());
-  EXPECT_GE(finished, kTenants * kJobs * 9 / 10);  // the others got into a deadlock of trees
+  // Nobody knows what the first trees of all will want; when four begin at once, those may get into a deadlock: 1 in 3000 tests.
+  EXPECT_GE(finished, kTenants * kJobs * 98 / 100);
   while (pool.GetLoad().running > 0) {
     std::this_thread::yield();
   }
