@@ -51,6 +51,7 @@ class ThreadTeam {
     f_ = std::move(f);
     count_ = count;
     next_ = 0;
+    ended_calls_ = 0;
     Release(&begun_);
     arena_.execute([&] {
       for (int thread = 1; thread < threads_; ++thread) {
@@ -58,6 +59,16 @@ class ThreadTeam {
       }
     });
   }
+
+  // Makes one of the calls that have been begun, if one is left.
+  bool Help() {
+    bool has_helped = false;
+    arena_.execute([&] { has_helped = WorkOnce(); });
+    return has_helped;
+  }
+
+  // Whether all calls that have been begun have been made.
+  bool HasEnded() const { return ended_calls_ == count_; }
 
   // Joins in what has been begun, and returns when all calls have. If one throws, so does this, and some are not made.
   void End() {
@@ -78,10 +89,19 @@ class ThreadTeam {
   // Takes calls of the loop that has been begun until all are taken.
   void Work() {
     Acquire(&begun_);
-    for (size_t i = next_++; i < count_; i = next_++) {
-      f_(i);
+    while (WorkOnce()) {
     }
     Release(&ended_);
+  }
+
+  bool WorkOnce() {
+    const size_t i = next_++;
+    if (i >= count_) {
+      return false;
+    }
+    f_(i);
+    ++ended_calls_;
+    return true;
   }
 
   // oneTBB is not compiled for ThreadSanitizer, which has to be told of the order that it keeps.
@@ -98,6 +118,7 @@ class ThreadTeam {
   std::function<void(size_t)> f_;
   size_t count_ = 0;
   std::atomic<size_t> next_ = 0;
+  std::atomic<size_t> ended_calls_ = 0;
   tbb::task_group group_;
   char begun_ = 0;
   char ended_ = 0;

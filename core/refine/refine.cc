@@ -9,8 +9,8 @@
 #include "core/base/dimensions.h"
 #include "core/base/huge_pages.h"
 #include "core/base/status_macros.h"
+#include "core/base/thread_team.h"
 #include "core/refine/checks.h"
-#include "core/refine/foreseen_cells.h"
 #include "core/refine/rounding.h"
 
 namespace wellspace::core {
@@ -47,9 +47,6 @@ absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices
                                 const RefinementObserver<D>& observer) {
   ThreadTeam team(threads);
   plain_ratio_ = demands.criterion == Criterion::kRadiusEdge && demands.sizes.IsUnbounded() ? demands.rho : 0;
-  ForeseenCells<D> foreseen(structure_, team);
-  foreseen_ = &foreseen;
-  const absl::Cleanup end = [&] { foreseen_ = nullptr; };
   off_center_factor_ = OffCenterFactor<D>(demands.rho);
   clip_factor_ = std::max(kClipFactor, kClipRatioFactor * demands.rho);
   max_vertices_ = max_vertices;
@@ -60,32 +57,38 @@ absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices
     WELLSPACE_RETURN_IF_ERROR(ScheduleAll(demands, team));
     demands_ = demands;
   }
-  const absl::Status status = Loop(team);
-  foreseen.Drop();
-  structure_.AdmitWaiting();
-  own_.counters.Add(foreseen.counters());
-  for (const OwnWorkspace& workspace : slab_workspaces_) {
+  team_ = &team;
+  const absl::Cleanup end = [this] {
+    if (is_ahead_) {  // something has been thrown
+      team_->Drop();
+      is_ahead_ = false;
+    }
+    team_ = nullptr;
+  };
+  const absl::Status status = Loop();
+  for (const OwnWorkspace& workspace : round_workspaces_) {
     own_.counters.Add(workspace.counters);
   }
-  slab_workspaces_.clear();
+  round_workspaces_.clear();
   return status;
 }
 
-// Improves the vertices that wait: in slabs where a bucket holds many, else one after the other.
+// Improves the vertices that wait: in rounds where a bucket holds many.
 template <int D>
-absl::Status Refinement<D>::Loop(ThreadTeam& team) {
-  WELLSPACE_RETURN_IF_ERROR(ServeSlabs(team));  // those of a run that was stopped
+absl::Status Refinement<D>::Loop() {
+  WELLSPACE_RETURN_IF_ERROR(ServeRounds());  // those of a run that was stopped
   for (int lowest = schedule_.Lowest(); lowest >= 0; lowest = schedule_.Lowest()) {
     VertexId v{};
     int bucket = 0;
-    if (TakesSlabs(lowest)) {
-      MakeSlabs(lowest);
-      WELLSPACE_RETURN_IF_ERROR(ServeSlabs(team));
+    if (BeginRounds(lowest)) {
+      WELLSPACE_RETURN_IF_ERROR(ServeRounds());
     } else if (schedule_.Pop(v, bucket)) {
       WELLSPACE_RETURN_IF_ERROR(Serve(v, bucket));
     }
   }
-  slab_bucket_ = -1;
+  if constexpr (kChecks) {
+    Require(schedule_.size() == 0, schedule_.size(), " vertices wait still");
+  }
   return absl::OkStatus();
 }
 
@@ -100,6 +103,12 @@ absl::Status Refinement<D>::Serve(VertexId v, int bucket) {
     schedule_.AddToBucket(v, bucket);
     return status;
   }
+  return CountServed(bucket);
+}
+
+// Tells now and then how far the run is.
+template <int D>
+absl::Status Refinement<D>::CountServed(int bucket) {
   return ++served_ % kReportInterval == 0 ? Report(bucket) : absl::OkStatus();
 }
 
@@ -116,7 +125,6 @@ void Refinement<D>::VertexAdded(VertexId x) {
   if (!demands_.has_value()) {
     return;  // the first run looks at all
   }
-  slabs_are_ahead_ = false;
   radius_sq_.resize(structure_.vertex_count(), Assessment::kNone);
   announced_.resize(structure_.vertex_count(), Announced::kToNone);
   const Neighbor nearest = structure_.ApproximateNearestNeighbor(x, own_);
@@ -125,16 +133,14 @@ void Refinement<D>::VertexAdded(VertexId x) {
 
 template <int D>
 uint64_t Refinement<D>::MemoryBytes() const {
-  return schedule_.MemoryBytes() + stars_.MemoryBytes() + star_.capacity() * sizeof(star_[0]) +
-         watchers_.MemoryBytes() + radius_sq_.size() * sizeof(radius_sq_[0]) + announced_.size() * sizeof(Announced) +
-         (own_.seen.size() + new_.seen.size()) * sizeof(uint32_t) + SlabBytes() +
-         (foreseen_ == nullptr ? 0 : foreseen_->MemoryBytes());
+  return schedule_.MemoryBytes() + (is_ahead_ ? bytes_ahead_ : stars_.MemoryBytes() + RoundBytes()) +
+         star_.capacity() * sizeof(star_[0]) + watchers_.MemoryBytes() + radius_sq_.size() * sizeof(radius_sq_[0]) +
+         announced_.size() * sizeof(Announced) + (own_.seen.size() + new_.seen.size()) * sizeof(uint32_t);
 }
 
 template <int D>
 void Refinement<D>::CellChanged(VertexId v, double nearest_sq) {
   stars_.GiveUp();
-  slabs_are_ahead_ = false;
   radius_sq_.resize(structure_.vertex_count(), Assessment::kNone);
   announced_.resize(structure_.vertex_count(), Announced::kToAll);
   const bool is_on_face = structure_.faces(v) != 0;
@@ -153,7 +159,7 @@ QueryCounters Refinement<D>::counters() const {
 
 template <int D>
 absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& team) {
-  DropSlabs();
+  DropRounds();
   stars_.Clear();
   radius_sq_.assign(structure_.vertex_count(), Assessment::kNone);
   watchers_.Clear();
@@ -216,7 +222,8 @@ void Refinement<D>::ScheduleNew(VertexId near, VertexId x, double nearest_sq) {
       ComputeCell(x, kAround * std::sqrt(nearest_sq), new_);
       new_.cell.Place();
       if (!new_.cell.IsTooLarge()) {
-        Announce(x, new_.cell, Assess<D>(new_.cell, structure_.faces(x), *demands_, nearest_sq));
+        const Assessment found = Assess<D>(new_.cell, structure_.faces(x), *demands_, nearest_sq);
+        Announce(x, found, Mentions(new_.cell, structure_.faces(x), found));
       }
     }
   }
@@ -227,38 +234,52 @@ void Refinement<D>::ScheduleNew(VertexId near, VertexId x, double nearest_sq) {
 template <int D>
 absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
   const double edge_limit_sq = schedule_.UpperLengthSq(bucket);
-  const double clip = clip_factor_ * std::sqrt(edge_limit_sq);
-  Look<D> look = LookAt(v, bucket, clip);
-  Polytope<D>& cell = *look.cell;
+  Polytope<D>& cell = own_.cell;
+  ComputeCell(v, ClipOf(bucket), own_);
   if constexpr (kChecks) {
     cell.Place();
     CheckOrder(v, cell, bucket);
   }
   while (true) {
-    if (look.found == nullptr && cell.IsTooLarge()) {
+    if (cell.IsTooLarge()) {
       return absl::ResourceExhaustedError(absl::StrCat("the cell of a vertex has more than ", Polytope<D>::kMostNodes,
                                                        " nodes; lower rho = ", demands_->rho));
     }
-    const Assessment found = look.found != nullptr ? *look.found : AssessCell(cell, structure_.faces(v), edge_limit_sq);
+    const Assessment found = AssessCell(cell, structure_.faces(v), edge_limit_sq);
     if (announced_[Index(v)] == Announced::kToNone) {
-      Announce(v, cell, found);
+      Announce(v, found, Mentions(cell, structure_.faces(v), found));
     }
-    if (schedule_.HasBelow(bucket)) {
-      // What was just added, or told of it, may ask for something by a shorter edge than this bucket's: that comes first.
-      Remember(v, Assessment::kNone);
-      schedule_.AddToBucket(v, OwnBucket(found, bucket));
+    if (GivesWay(v, found, bucket)) {
       return absl::OkStatus();
     }
     const std::optional<Request> request = NextRequest(v, cell, found, edge_limit_sq);
     if (!request.has_value()) {
-      Settle(v, found, clip, bucket + 1, look);
+      watched_.clear();
+      AppendNodesToWatch(v, cell, found, watched_);
+      Star<D>& star = lists_later_ ? later_own_stars_.emplace_back() : star_;
+      if (found.IsGood() && (lists_later_ || stars_.IsComplete())) {
+        cell.FindStar(star);
+      }
+      Settle(v, found, bucket, Mentions(cell, structure_.faces(v), found), watched_, star);
       return absl::OkStatus();
     }
     // In 5-D and 6-D a cell may ask for a dozen points, which take milliseconds each.
     WELLSPACE_RETURN_IF_ERROR(context_->Check());
-    WELLSPACE_RETURN_IF_ERROR(Insert(*request, cell));
-    look = {&cell};
+    WELLSPACE_ASSIGN_OR_RETURN(const VertexId x, Insert(*request));
+    cell.CutBeforePlace(x, request->point.position);
   }
+}
+
+// Whether `v` has to wait since what was just added, or told of it, may ask for something by a shorter edge than those of `bucket`: that comes
+// first.
+template <int D>
+bool Refinement<D>::GivesWay(VertexId v, const Assessment& found, int bucket) {
+  if (!schedule_.HasBelow(bucket)) {
+    return false;
+  }
+  Remember(v, Assessment::kNone);
+  schedule_.AddToBucket(v, OwnBucket(found, bucket));
+  return true;
 }
 
 // Where a vertex from `bucket` waits for what was found, which asks for something by an edge up to that bucket's limit if at all.
@@ -296,66 +317,6 @@ std::optional<typename Refinement<D>::Request> Refinement<D>::NextRequest(Vertex
   return request;
 }
 
-// The cell of `v`, which was taken from `bucket`, clipped at `clip`.
-template <int D>
-Look<D> Refinement<D>::LookAt(VertexId v, int bucket, double clip) {
-  if (foreseen_->threads() > 1 && !HasSlabs()) {
-    Foresee(v, bucket, clip);
-    if (const Look<D> look = foreseen_->Take(v, clip); look.cell != nullptr) {
-      return look;
-    }
-  }
-  ComputeCell(v, clip, own_);
-  return {&own_.cell};
-}
-
-// Sees to it that the cell of `v` may be taken if it has been foreseen, and that other threads compute those of the vertices
-// that are next in the bucket, if there are enough.
-template <int D>
-void Refinement<D>::Foresee(VertexId v, int bucket, double clip) {
-  const bool comes = foreseen_->Comes(v, clip);
-  if (!comes && foreseen_->SomeCome(clip)) {
-    return;
-  }
-  FindNext(bucket, clip);
-  if (comes) {
-    AdmitWaiting();
-    foreseen_->Advance();
-  }
-  if (next_.size() >= ForeseenCells<D>::kLeast) {
-    foreseen_->Drop();  // what comes for another bucket
-    AdmitWaiting();
-    BeginNext(bucket, clip);
-  }
-}
-
-// Puts vertices that are next in the bucket and have not been foreseen into next_.
-template <int D>
-void Refinement<D>::FindNext(int bucket, double clip) {
-  next_.clear();
-  schedule_.ForEachNext(bucket, [this, clip](VertexId u) {
-    if (PlaceAmong(next_, u) == next_.size() && !foreseen_->Comes(u, clip) && !foreseen_->IsReady(u, clip)) {
-      next_.push_back(u);
-    }
-    return next_.size() < ForeseenCells<D>::kMost;
-  });
-}
-
-template <int D>
-void Refinement<D>::BeginNext(int bucket, double clip) {
-  const auto judge = [this, edge_limit_sq = schedule_.UpperLengthSq(bucket)](VertexId v, Polytope<D>& cell) {
-    return AssessCell(cell, structure_.faces(v), edge_limit_sq);
-  };
-  foreseen_->Begin(next_, clip, judge, *context_);
-}
-
-// Has queries find all vertices that have been added.
-template <int D>
-void Refinement<D>::AdmitWaiting() {
-  foreseen_->Finish();
-  structure_.AdmitWaiting();
-}
-
 // Computes the cell of `v`, not yet placed, clipped at `clip`.
 template <int D>
 void Refinement<D>::ComputeCell(VertexId v, double clip, Workspace<D>& workspace) {
@@ -390,81 +351,76 @@ void Refinement<D>::Remember(VertexId v, double radius_sq, std::span<const Watch
   }
 }
 
-// The nodes of the cell of `v` on faces of v that are too far for an edge of that squared length, or for a longer one.
+// Appends the nodes of the cell of `v` on faces of v that are too far for the edge that is to be remembered, if one is, or for a longer one.
 template <int D>
-std::span<const WatchedNode<D>> Refinement<D>::NodesToWatch(VertexId v, const Polytope<D>& cell, double edge_sq) {
-  watched_.clear();
+void Refinement<D>::AppendNodesToWatch(VertexId v, const Polytope<D>& cell, const Assessment& found,
+                                       std::vector<WatchedNode<D>>& watched) const {
+  if (found.own_face_edge_sq == Assessment::kNone) {
+    return;
+  }
   const double rounding = 4 * std::sqrt(D) * RoundingIn<D>(structure_.box());
-  const double least_sq = demands_->rho * demands_->rho * edge_sq * (1 - kLengthRounding);
+  const double least_sq = demands_->rho * demands_->rho * found.own_face_edge_sq * (1 - kLengthRounding);
   for (const CellNode<D>& node : cell.nodes()) {
     const auto faces = static_cast<FaceMask>(cell.FacesOf(node) & structure_.faces(v));
     if (faces == 0 || node.radius_sq <= least_sq) {
       continue;
     }
-    WatchedNode<D> watched{cell.site(), (1 + kLengthRounding) * std::sqrt(node.radius_sq) + rounding, faces};
+    WatchedNode<D> one{cell.site(), (1 + kLengthRounding) * std::sqrt(node.radius_sq) + rounding, faces};
     for (int i = 0; i < D; ++i) {
-      watched.centre[i] += (faces >> (2 * i) & 3) == 0 ? node.x[i] : 0;
+      one.centre[i] += (faces >> (2 * i) & 3) == 0 ? node.x[i] : 0;
     }
-    watched_.push_back(watched);
+    watched.push_back(one);
   }
-  return watched_;
 }
 
-// Declares a vertex that needs nothing now done, or puts it where it will be looked at again: not before bucket
-// `earliest`.
+// Declares a vertex from `bucket` that needs nothing now done, or puts it where it will be looked at again. Of its cell: the neighbours that Announce
+// looks at, the nodes to watch, and the star, if it is good.
 template <int D>
-void Refinement<D>::Settle(VertexId v, const Assessment& found, double clip, int earliest, const Look<D>& look) {
+void Refinement<D>::Settle(VertexId v, const Assessment& found, int bucket, std::span<const Mention> mentions,
+                           std::span<const WatchedNode<D>> watched, std::span<const std::array<VertexId, D>> star) {
   const double radius_sq = found.own_face_edge_sq != Assessment::kNone ? -found.own_face_edge_sq
                            : found.IsGood()                            ? found.radius_sq
                                                                        : Assessment::kNone;
-  if (radius_sq < 0) {
-    Remember(v, radius_sq, NodesToWatch(v, *look.cell, found.own_face_edge_sq));
-  } else {
-    Remember(v, radius_sq);
-  }
-  if (found.IsGood()) {
-    if (stars_.IsComplete() && look.star == nullptr) {
-      look.cell->FindStar(star_);
-    }
-    stars_.Set(v, look.star != nullptr ? *look.star : star_, structure_.vertex_count());
-    if (announced_[Index(v)] != Announced::kToAll) {
-      Announce(v, *look.cell, found);
-    }
+  Remember(v, radius_sq, watched);
+  if (!found.IsGood()) {
+    schedule_.AddToBucket(v, NextBucket(found, bucket));
     return;
   }
-  schedule_.AddToBucket(v, NextBucket(found, clip, earliest));
+  if (lists_later_) {
+    later_listings_.push_back({v, star, structure_.vertex_count()});
+  } else {
+    stars_.Set(v, star, structure_.vertex_count());
+  }
+  if (announced_[Index(v)] != Announced::kToAll) {
+    Announce(v, found, mentions);
+  }
 }
 
-// Where a vertex that needs nothing now, but is not done, is to be looked at again: not before bucket `earliest`.
+// Where a vertex from `bucket` that needs nothing now, but is not done, is to be looked at again.
 template <int D>
-int Refinement<D>::NextBucket(const Assessment& found, double clip, int earliest) const {
+int Refinement<D>::NextBucket(const Assessment& found, int bucket) const {
   double next_sq = found.next_edge_sq;
   if (found.is_clipped) {
     // Beyond the clip only edges longer than this can be bad, or ones that share a node with a shorter edge.
+    const double clip = ClipOf(bucket);
     next_sq = std::min(next_sq, clip * clip / (demands_->rho * demands_->rho));
   }
-  return std::max(schedule_.BucketOf(next_sq), earliest);
+  return std::max(schedule_.BucketOf(next_sq), bucket + 1);
 }
 
 template <int D>
-absl::Status Refinement<D>::Insert(const Request& request, Polytope<D>& cell) {
+absl::StatusOr<VertexId> Refinement<D>::Insert(const Request& request) {
   const SteinerPoint<D>& point = request.point;
   if (structure_.vertex_count() >= max_vertices_) {
-    return TooManyVertices();
+    return absl::ResourceExhaustedError(absl::StrCat("the mesh needs more than max_vertices = ", max_vertices_,
+                                                     " vertices; raise max_vertices or rho"));
   }
   if (!IsLongEnough(point)) {
     return absl::ResourceExhaustedError(absl::StrCat(
         "refinement came to an edge of length ", std::sqrt(std::max(0.0, point.empty_radius_sq)),
         ", below the smallest that double arithmetic serves here, ", min_edge_, "; raise rho = ", demands_->rho));
   }
-  cell.CutBeforePlace(Add(request), point.position);
-  return absl::OkStatus();
-}
-
-template <int D>
-absl::Status Refinement<D>::TooManyVertices() const {
-  return absl::ResourceExhaustedError(
-      absl::StrCat("the mesh needs more than max_vertices = ", max_vertices_, " vertices; raise max_vertices or rho"));
+  return Add(request);
 }
 
 // Adds the vertex that is asked for, and has it wait.
@@ -476,8 +432,11 @@ VertexId Refinement<D>::Add(const Request& request) {
   }
   Insertion insertion = request.insertion;
   insertion.vertex = structure_.AddWaiting(insertion.near, request.point.position);
-  if (!foreseen_->IsRunning() || *observer_ || structure_.waiting_count() == QueryStructure<D>::kMostWaiting) {
+  if (!is_ahead_ || *observer_ || structure_.waiting_count() == QueryStructure<D>::kMostWaiting) {
     AdmitWaiting();
+  }
+  if (!packets_.empty()) {
+    inserted_.push_back(request.point.position);
   }
   radius_sq_.push_back(Assessment::kNone);
   announced_.push_back(Announced::kToNone);
@@ -497,15 +456,33 @@ VertexId Refinement<D>::Add(const Request& request) {
 //   this cell touches the face beside it.
 // An inner cell under radius-edge has neither.
 template <int D>
-void Refinement<D>::Announce(VertexId v, const Polytope<D>& cell, const Assessment& found) {
+void Refinement<D>::Announce(VertexId v, const Assessment& found, std::span<const Mention> mentions) {
   const bool is_first = announced_[Index(v)] == Announced::kToNone;
   announced_[Index(v)] = found.is_clipped ? Announced::kWithinClip : Announced::kToAll;
-  const bool touches_faces = structure_.faces(v) != 0 || found.encroached_face >= 0;
-  if (demands_->criterion == Criterion::kRadiusEdge && !touches_faces) {
-    return;
-  }
   const double rho_sq = demands_->rho * demands_->rho;
   const bool is_well_spaced = demands_->criterion == Criterion::kWellSpaced;
+  for (const auto& [u, edge_sq, is_on_face] : mentions) {
+    if (!is_first && schedule_.Waits(u)) {
+      continue;
+    }
+    const double radius_sq = radius_sq_[Index(u)];
+    const bool was_cut = radius_sq < 0 && is_on_face;
+    const bool is_too_far = is_well_spaced && radius_sq > rho_sq * edge_sq;
+    if (was_cut || is_too_far) {
+      Wake(u, edge_sq);
+    }
+  }
+  ScheduleWoken();
+}
+
+// Appends the neighbours that Announce may have to look at.
+template <int D>
+void Refinement<D>::AppendMentions(const Polytope<D>& cell, FaceMask site_faces, const Assessment& found,
+                                   std::vector<Mention>& mentions) const {
+  const bool is_well_spaced = demands_->criterion == Criterion::kWellSpaced;
+  if (!is_well_spaced && site_faces == 0 && found.encroached_face < 0) {
+    return;
+  }
   for (const CellNode<D>& node : cell.nodes()) {
     const bool is_on_face = cell.FacesOf(node) != 0;
     if (!is_on_face && !is_well_spaced) {
@@ -513,18 +490,19 @@ void Refinement<D>::Announce(VertexId v, const Polytope<D>& cell, const Assessme
     }
     for (const uint16_t index : node.planes) {
       const Plane<D>& plane = cell.plane(index);
-      if (plane.kind != PlaneKind::kBisector || !(is_first || !schedule_.Waits(plane.vertex))) {
-        continue;
-      }
-      const double radius_sq = radius_sq_[Index(plane.vertex)];
-      const bool was_cut = radius_sq < 0 && is_on_face;
-      const bool is_too_far = is_well_spaced && radius_sq > rho_sq * 2 * plane.offset;
-      if (was_cut || is_too_far) {
-        Wake(plane.vertex, 2 * plane.offset);
+      if (plane.kind == PlaneKind::kBisector) {
+        mentions.push_back({plane.vertex, 2 * plane.offset, is_on_face});
       }
     }
   }
-  ScheduleWoken();
+}
+
+template <int D>
+std::span<const Mention> Refinement<D>::Mentions(const Polytope<D>& cell, FaceMask site_faces,
+                                                 const Assessment& found) {
+  mentions_.clear();
+  AppendMentions(cell, site_faces, found, mentions_);
+  return mentions_;
 }
 
 // Has ScheduleWoken schedule `u`, for the edge of that squared length that it has got, or for the one that it remembers.

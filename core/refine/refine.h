@@ -2,11 +2,12 @@
 #ifndef WELLSPACE_CORE_REFINE_REFINE_H_
 #define WELLSPACE_CORE_REFINE_REFINE_H_
 
-#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <functional>
-#include <limits>
 #include <optional>
 #include <span>
 #include <utility>
@@ -19,36 +20,15 @@
 #include "core/refine/assessment.h"
 #include "core/refine/demands.h"
 #include "core/refine/face_watchers.h"
+#include "core/refine/insertion.h"
+#include "core/refine/packet.h"
 #include "core/refine/schedule.h"
-#include "core/refine/steiner_point.h"
 #include "core/voronoi/query_structure.h"
 #include "core/voronoi/star_lists.h"
 
 namespace wellspace::core {
 
-template <int D>
-class ForeseenCells;
-template <int D>
-struct Look;
 class ThreadTeam;
-
-// Why a vertex was inserted.
-enum class Reason {
-  kRatio,         // a node broke rho
-  kSize,          // a node was farther than the sizes allow
-  kEncroachment,  // the cell touched a face of the box that its site does not lie on
-};
-
-// An insertion that has just happened.
-struct Insertion {
-  Reason reason = Reason::kRatio;
-  VertexId near = kNoVertex;   // the vertex whose cell was looked at
-  VertexId other = kNoVertex;  // for kRatio, the other end of the edge
-  VertexId vertex = kNoVertex;
-  double edge_sq = 0;        // the edge that asked for it; the distance between `near` and the face for an encroachment
-  double edge_limit_sq = 0;  // all edges that ask for something are at least 1 / sqrt 2 times as long
-  double empty_radius_sq = 0;  // no older vertex is nearer to it, up to rounding
-};
 
 // Called after each insertion with the structure as it is then; for tests.
 template <int D>
@@ -79,7 +59,7 @@ class Refinement {
   //             added since and to what that makes necessary.
   // Errors:     RESOURCE_EXHAUSTED with the bound that was met, one of the context's memory too; CANCELLED, DEADLINE_EXCEEDED. All stays usable: a later
   //             run takes up the work where it was left.
-  // Threads:    uses `threads`, at most as many as the machine has cores, for slabs (ADR 21) or to compute cells ahead.
+  // Threads:    uses `threads`, at most as many as the machine has cores, to foresee what becomes of vertices (ADR 23).
   // Source:     [HT08] Figure 4; see docs/design/refine.md.
   absl::Status Run(const Demands<D>& demands, uint64_t max_vertices, int threads, RunContext& context,
                    const RefinementObserver<D>& observer = nullptr);
@@ -115,54 +95,13 @@ class Refinement {
     kToAll,
   };
 
-  // An insertion that a cell asks for, with the point before it was snapped to the boundary.
-  struct Request {
-    Insertion insertion;
-    SteinerPoint<D> candidate;
-    SteinerPoint<D> point;
-  };
+  using Request = InsertionRequest<D>;
 
-  // What is between two lines across an axis, and the vertices of a bucket in it. A packet of them is looked at as if nobody were looked
-  // at elsewhere meanwhile.
-  struct alignas(kCacheLines) Slab {
-    enum class Kind : uint8_t {
-      kInserted,  // a vertex, as the next of the requests says
-      kLeft,      // for the slabs of another axis, or for Improve
-      kWaits,     // in a bucket
-      kDone,      // with the next of the stars
-    };
-    // What became of a vertex that was looked at, in order.
-    struct Event {
-      VertexId vertex = kNoVertex;
-      Kind kind = Kind::kInserted;
-      Announced announced = Announced::kToNone;
-      int16_t bucket = 0;      // kWaits
-      uint32_t star_size = 0;  // kDone
-      double radius_sq = 0;    // kDone
-    };
-
-    bool HoldsBall(const Point<D>& centre, double radius_sq) const {
-      const double depth = std::min(centre[axis] - low, high - centre[axis]);
-      return depth > 0 && depth * depth > radius_sq;
-    }
-
-    int axis = 0;
-    double low = -std::numeric_limits<double>::infinity();
-    double high = std::numeric_limits<double>::infinity();
-    HugeVector<VertexId> waiting;  // the last is the next
-
-    // Of the packet. What is inserted is numbered from slab_first_new_ on, as if no other slab inserted any.
-    size_t packet = 0;  // how many are looked at
-    std::vector<Event> events;
-    size_t replayed = 0;  // of events
-    size_t end = 0;       // of those that may be replayed now
-    std::vector<Request> requests;
-    size_t added = 0;                // of requests
-    std::vector<Point<D>> inserted;  // with room up to PaddedCount
-    std::vector<Point<D>> below;     // where somebody comes to wait in a lower bucket
-    Star<D> stars;
-    size_t listed = 0;  // of stars
-    Star<D> star;       // scratch
+  // A vertex that has been found done, whose star is still to be listed.
+  struct Listing {
+    VertexId vertex = kNoVertex;
+    std::span<const std::array<VertexId, D>> star;
+    uint32_t vertex_count = 0;  // of the structure when it was
   };
   struct alignas(kCacheLines) OwnWorkspace : Workspace<D> {};
 
@@ -170,45 +109,53 @@ class Refinement {
   double FirstEdgeSq(const Demands<D>& demands, const Point<D>& p, FaceMask faces, double nearest_sq,
                      double size_sq) const;
   double FirstEdgeSqOfNew(const Point<D>& p, FaceMask faces, double nearest_sq) const;
-  absl::Status Loop(ThreadTeam& team);
+  absl::Status Loop();
   absl::Status Serve(VertexId v, int bucket);
+  absl::Status CountServed(int bucket);
   absl::Status Report(int bucket);
   absl::Status Improve(VertexId v, int bucket);
   std::optional<Request> NextRequest(VertexId v, const Polytope<D>& cell, const Assessment& found,
                                      double edge_limit_sq) const;
-  Look<D> LookAt(VertexId v, int bucket, double clip);
-  void Foresee(VertexId v, int bucket, double clip);
-  void FindNext(int bucket, double clip);
-  void BeginNext(int bucket, double clip);
-  void AdmitWaiting();
+  double ClipOf(int bucket) const { return clip_factor_ * std::sqrt(schedule_.UpperLengthSq(bucket)); }
   void ComputeCell(VertexId v, double clip, Workspace<D>& workspace);
   Assessment AssessCell(Polytope<D>& cell, FaceMask site_faces, double edge_limit_sq) const;
-  absl::Status Insert(const Request& request, Polytope<D>& cell);
+  absl::StatusOr<VertexId> Insert(const Request& request);
+  bool GivesWay(VertexId v, const Assessment& found, int bucket);
   VertexId Add(const Request& request);
-  absl::Status TooManyVertices() const;
   bool IsLongEnough(const SteinerPoint<D>& point) const { return point.empty_radius_sq >= min_edge_ * min_edge_; }
-  void Settle(VertexId v, const Assessment& found, double clip, int earliest, const Look<D>& look);
+  void Settle(VertexId v, const Assessment& found, int bucket, std::span<const Mention> mentions,
+              std::span<const WatchedNode<D>> watched, std::span<const std::array<VertexId, D>> star);
   int OwnBucket(const Assessment& found, int bucket) const;
-  int NextBucket(const Assessment& found, double clip, int earliest) const;
+  int NextBucket(const Assessment& found, int bucket) const;
   void ScheduleNew(VertexId near, VertexId x, double nearest_sq);
   void Remember(VertexId v, double radius_sq, std::span<const WatchedNode<D>> watched = {});
-  std::span<const WatchedNode<D>> NodesToWatch(VertexId v, const Polytope<D>& cell, double edge_sq);
-  void Announce(VertexId v, const Polytope<D>& cell, const Assessment& found);
+  void AppendNodesToWatch(VertexId v, const Polytope<D>& cell, const Assessment& found,
+                          std::vector<WatchedNode<D>>& watched) const;
+  void AppendMentions(const Polytope<D>& cell, FaceMask site_faces, const Assessment& found,
+                      std::vector<Mention>& mentions) const;
+  std::span<const Mention> Mentions(const Polytope<D>& cell, FaceMask site_faces, const Assessment& found);
+  void Announce(VertexId v, const Assessment& found, std::span<const Mention> mentions);
   void Wake(VertexId u, double edge_sq);
   void ScheduleWoken();
-  // Whether large buckets are served in slabs, and not with cells ahead: ADR 21.
-  bool HasSlabs() const { return D == 2 && demands_->criterion == Criterion::kRadiusEdge; }
-  bool TakesSlabs(int bucket) const;
-  void MakeSlabs(int bucket);
-  void LayLines(std::span<const VertexId> waiting, int axis, double reach);
-  void DropSlabs();
-  uint64_t SlabBytes() const;
-  absl::Status ServeSlabs(ThreadTeam& team);
-  void LookInto(Slab& slab, Workspace<D>& workspace) const;
-  void LookAtIn(Slab& slab, VertexId v, Workspace<D>& workspace) const;
-  bool ReplaySlabs(ThreadTeam& team);
-  void Replay(Slab& slab, uint32_t shift);
-  void ListStars(Slab& slab, uint32_t shift);
+  bool BeginRounds(int bucket);
+  void TakeNext(Packet<D>& packet);
+  void DropRounds();
+  uint64_t RoundBytes() const;
+  // The packets whose turn it is.
+  std::span<Packet<D>> HalfOf(size_t turn) {
+    return std::span(packets_).subspan(turn * packets_.size() / 2, packets_.size() / 2);
+  }
+  absl::Status ServeRounds();
+  absl::Status ServeRound();
+  void LookAhead();
+  void AdmitWaiting();
+  void EndRound();
+  void ListStars();
+  void Foresee(Packet<D>& packet, Workspace<D>& workspace) const;
+  void ForeseeOne(Packet<D>& packet, size_t at, Workspace<D>& workspace) const;
+  absl::Status ServePacket(Packet<D>& packet);
+  absl::Status ServeNext(Packet<D>& packet);
+  absl::Status Retrace(Packet<D>& packet, size_t at);
   void CheckOrder(VertexId v, const Polytope<D>& cell, int bucket);
   void CheckNeighbours(VertexId v, const Polytope<D>& cell, int bucket) const;
   void CheckWaits(VertexId v, VertexId u, int bucket) const;
@@ -227,26 +174,33 @@ class Refinement {
   Workspace<D> own_;                   // the cell that is improved
   Workspace<D> new_;                   // the cell of a vertex just added on a face
 
-  // Those of slab_bucket_ who wait in slabs; none if nobody does. It is the highest bucket that has had slabs since nobody waited, -1 for none; slab_axes_: by bits, the axes across
-  // which it has.
-  std::vector<Slab> slabs_;
-  int slab_bucket_ = -1;
-  uint32_t slab_axes_ = 0;
-  bool slabs_are_ahead_ = false;  // some of what packets have put down is still to be replayed
-  uint32_t slab_first_new_ = 0;
+  // Those of a bucket who are served in rounds, but for those who have moved on.
+  int round_bucket_ = -1;
+  HugeVector<VertexId> lifted_;     // the last of each stretch is the next
+  std::vector<Packet<D>> packets_;  // by stretch, the next of each; none if nobody is served so
+  size_t turn_ = 0;                 // whether the packets of the first half are next, or those of the second
+  std::vector<Point<D>> inserted_;  // in these rounds, from inserted_before_ on
+  size_t inserted_before_ = 0;
 
   // Of the run.
   double off_center_factor_ = 0;
   double plain_ratio_ = 0;  // cells that keep it need nothing; 0: that does not tell
   double clip_factor_ = 0;
   uint64_t max_vertices_ = 0;
-  uint64_t served_ = 0;                             // vertices, one after the other
-  std::vector<OwnWorkspace> slab_workspaces_;       // by thread
-  ForeseenCells<D>* foreseen_ = nullptr;            // null between runs
-  std::vector<VertexId> next_;                      // whose cells are foreseen next
+  uint64_t served_ = 0;                         // vertices
+  ThreadTeam* team_ = nullptr;                  // null between runs
+  std::vector<OwnWorkspace> round_workspaces_;  // by thread
+  bool is_ahead_ = false;                       // other threads may be at work: vertices that are added wait
+  uint64_t bytes_ahead_ = 0;                    // of what they write, before
+  std::vector<Listing> listings_;               // what one of them lists
+  std::deque<Star<D>> own_stars_;               // of those of the listings that were not foreseen
+  bool lists_later_ = false;                    // what is found done goes into these:
+  std::vector<Listing> later_listings_;
+  std::deque<Star<D>> later_own_stars_;
   std::vector<std::pair<VertexId, double>> woken_;  // scratch of Wake
-  Star<D> star_;                                    // scratch of Settle
-  std::vector<WatchedNode<D>> watched_;             // scratch of NodesToWatch
+  Star<D> star_;                                    // scratch of Improve
+  std::vector<WatchedNode<D>> watched_;             // the same
+  std::vector<Mention> mentions_;                   // scratch of Mentions
   RunContext* context_ = nullptr;
   const RefinementObserver<D>* observer_ = nullptr;
 

@@ -85,18 +85,6 @@ class Schedule {
   // What the schedule takes in memory, but for what has moved on.
   uint64_t MemoryBytes() const { return places_.size() * sizeof(Place) + size_ * sizeof(VertexId); }
 
-  // Calls f(VertexId) for vertices that wait in `bucket`, the lowest where any do, in the order in which they will be
-  // taken if none is added, until it returns false. One may be seen twice.
-  template <typename F>
-  void ForEachNext(int bucket, F&& f) const {
-    const HugeVector<VertexId>& waiting = buckets_[bucket];
-    for (size_t i = waiting.size(); i-- > 0;) {
-      if (BucketHolding(waiting[i]) == bucket && !f(waiting[i])) {
-        return;
-      }
-    }
-  }
-
   // The lowest bucket in which a vertex may wait, -1 if there is none below `end`.
   int Lowest(int end = std::numeric_limits<int>::max()) {
     for (end = std::min(end, static_cast<int>(buckets_.size())); lowest_ < end; ++lowest_) {
@@ -155,6 +143,12 @@ class Schedule {
   void PutBack(VertexId v, int bucket) {
     buckets_[bucket].push_back(v);
     lowest_ = std::min(lowest_, bucket);
+  }
+
+  // Has a vertex that was lifted from `bucket`, and then taken, wait as it did, unless it waits in a lower one.
+  void LiftAgain(VertexId v, int bucket) {
+    size_ += Waits(v) ? 0 : 1;
+    places_[Index(v)].bucket = static_cast<int16_t>(std::min<int>(BucketHolding(v), bucket));
   }
 
   bool WaitsIn(VertexId v, int bucket) const { return BucketHolding(v) == bucket; }

@@ -78,24 +78,6 @@ WELLSPACE_INLINE void Polytope<D>::MakeRoomForNodes(size_t count) {
 }
 
 template <int D>
-void Polytope<D>::Swap(Polytope& other) noexcept {
-  std::swap(site_, other.site_);
-  std::swap(rule_, other.rule_);
-  std::swap(reach_, other.reach_);
-  std::swap(largest_slack_, other.largest_slack_);
-  std::swap(is_placed_, other.is_placed_);
-  std::swap(is_tight_, other.is_tight_);
-  planes_.swap(other.planes_);
-  std::swap(plane_count_, other.plane_count_);
-  std::swap(columns_, other.columns_);
-  joints_.swap(other.joints_);
-  opposite_.swap(other.opposite_);
-  nodes_.swap(other.nodes_);
-  std::swap(cuts_, other.cuts_);
-  std::swap(counters_, other.counters_);
-}
-
-template <int D>
 bool Polytope<D>::CutOff(VertexId u, const Point<D>& position, const Point<D>& normal, double length_sq) {
   return columns_.unit() == VectorUnit::kAvx2 ? CutOffAvx2(u, position, normal, length_sq)
                                               : CutOffWith<2>(u, position, normal, length_sq);

@@ -159,9 +159,6 @@ class Polytope {
                             4 * largest_slack_ * reach_);
   }
 
-  // Exchanges the two cells. What only serves to cut them stays where it is, in the caches of whoever cuts.
-  void Swap(Polytope& other) noexcept;
-
   // Whether the last cut has made the cell larger than it may be.
   bool IsTooLarge() const { return columns_.count() > kMostNodes || plane_count_ > kMostPlanes; }
 

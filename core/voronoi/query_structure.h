@@ -60,7 +60,7 @@ struct Neighbor {
 template <int D>
 class QueryStructure {
  public:
-  static constexpr uint32_t kMostWaiting = 64;
+  static constexpr uint32_t kMostWaiting = 2048;
 
   // Builds the structure for `points`, then adds the corners of the box that are not among them.
   //

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstddef>
 #include <new>
+#include <thread>
 #include <vector>
 
 namespace wellspace::core {
@@ -57,6 +58,29 @@ TEST(ThreadTeamTest, OtherThreadsBeginBeforeEnd) {
   while (!has_begun) {
   }
   team.End();
+}
+
+TEST(ThreadTeamTest, TheCallerMayHelpWithoutWaiting) {
+  for (const int threads : {1, 2}) {
+    ThreadTeam team(threads);
+    std::vector<int> calls(100);
+    std::atomic<bool> has_helped = false;
+    const std::thread::id caller = std::this_thread::get_id();
+    team.Begin(calls.size(), [&](size_t i) {
+      while (i == 0 && std::this_thread::get_id() != caller && !has_helped) {
+        // so that calls are left
+      }
+      ++calls[i];
+    });
+    EXPECT_TRUE(team.Help());
+    has_helped = true;
+    while (team.Help()) {
+    }
+    EXPECT_FALSE(team.Help());
+    team.End();
+    EXPECT_TRUE(team.HasEnded());
+    EXPECT_EQ(calls, std::vector<int>(calls.size(), 1));
+  }
 }
 
 TEST(ThreadTeamTest, WhatACallThrowsComesFromEnd) {

@@ -1,4 +1,4 @@
-// Refinement of clouds that are large enough for slabs: several threads look at once, and nobody sees it.
+// Refinement of clouds that are large enough for many rounds: several threads look ahead, and nobody sees it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -31,18 +31,21 @@ constexpr size_t kPoints = 4000;
 
 Demands<2> PlainDemands() { return {.rho = std::sqrt(2.0)}; }
 
-struct Refined {
-  explicit Refined(const std::vector<Point<2>>& cloud)
-      : structure(MakeStructure<2>(cloud)), refinement(structure, kMinEdge) {}
+template <int D>
+struct RefinedIn {
+  explicit RefinedIn(const std::vector<Point<D>>& cloud)
+      : structure(MakeStructure<D>(cloud)), refinement(structure, kMinEdge) {}
 
-  QueryStructure<2> structure;
-  Refinement<2> refinement;
+  QueryStructure<D> structure;
+  Refinement<D> refinement;
 };
+using Refined = RefinedIn<2>;
 
 // In order, which stars are not listed in.
-Star<2> ListedAt(const Refined& refined, VertexId v) {
+template <int D>
+Star<D> ListedAt(const RefinedIn<D>& refined, VertexId v) {
   const auto listed = refined.refinement.stars().Of(v);
-  Star<2> sorted(listed.begin(), listed.end());
+  Star<D> sorted(listed.begin(), listed.end());
   for (auto& simplex : sorted) {
     std::sort(simplex.begin(), simplex.end());
   }
@@ -50,7 +53,8 @@ Star<2> ListedAt(const Refined& refined, VertexId v) {
   return sorted;
 }
 
-void ExpectSame(const Refined& actual, const Refined& expected) {
+template <int D>
+void ExpectSame(const RefinedIn<D>& actual, const RefinedIn<D>& expected) {
   ASSERT_EQ(actual.structure.vertex_count(), expected.structure.vertex_count());
   for (uint32_t i = 0; i < actual.structure.vertex_count(); ++i) {
     const VertexId v{i};
@@ -79,37 +83,89 @@ void ExpectIsListed(const Refined& refined, VertexId v, const Polytope<2>& cell)
   }
 }
 
-class RefineInSlabsTest : public test::SeededTest, public ::testing::WithParamInterface<std::string_view> {
+// On several threads, and stopped now and then on one and on two.
+template <int D>
+void ExpectSameHoweverItIsRun(const std::vector<Point<D>>& cloud, const Demands<D>& demands, uint64_t most_at_once,
+                              test::SplitMix64& random) {
+  RefinedIn<D> expected(cloud);
+  RunContext context;
+  ASSERT_TRUE(expected.refinement.Run(demands, kMany, 1, context).ok());
+  for (const int threads : {2, 4}) {
+    SCOPED_TRACE(threads);
+    RefinedIn<D> actual(cloud);
+    ASSERT_TRUE(actual.refinement.Run(demands, kMany, threads, context).ok());
+    ExpectSame<D>(actual, expected);
+  }
+  RefinedIn<D> stopped(cloud);
+  absl::Status status = absl::UnknownError("not begun");
+  while (!status.ok()) {
+    const uint64_t budget = stopped.structure.vertex_count() + 1 + random.Below(most_at_once);
+    status = stopped.refinement.Run(demands, budget, 1 + static_cast<int>(random.Below(2)), context);
+    if (!status.ok()) {
+      ASSERT_THAT(std::string(status.message()), HasSubstr("max_vertices = " + std::to_string(budget)));
+      ASSERT_EQ(stopped.structure.vertex_count(), budget);
+    }
+  }
+  ExpectSame<D>(stopped, expected);
+}
+
+class RefineInRoundsTest : public test::SeededTest, public ::testing::WithParamInterface<std::string_view> {
  protected:
-  RefineInSlabsTest() : SeededTest(2021), cloud_(test::SortedCloud<2>(GetParam(), kPoints)) {}
+  RefineInRoundsTest() : SeededTest(2021), cloud_(test::SortedCloud<2>(GetParam(), kPoints)) {}
 
   const std::vector<Point<2>> cloud_;
 };
-INSTANTIATE_TEST_SUITE_P(Clouds, RefineInSlabsTest,
+INSTANTIATE_TEST_SUITE_P(Clouds, RefineInRoundsTest,
                          ::testing::Values("uniform", "clusters", "lines", "grid", "boundary", "cospherical"),
                          [](const auto& kind) { return std::string(kind.param); });
 
-TEST_P(RefineInSlabsTest, IsTheSameForAnyNumberOfThreads) {
+TEST_P(RefineInRoundsTest, IsTheSameForAnyNumberOfThreadsAndHoweverOftenItIsStopped) {
   Demands<2> tight = PlainDemands();
   tight.rho = 1;
   Demands<2> sized = PlainDemands();
   sized.sizes = {.max_circumradius = 0.02, .regions = {{{{0.2, 0.3}, {0.4, 0.5}}, 0.004}}};
-  for (const Demands<2>& demands : {PlainDemands(), tight, sized}) {
+  Demands<2> well_spaced = PlainDemands();
+  well_spaced.criterion = Criterion::kWellSpaced;
+  for (const Demands<2>& demands : {PlainDemands(), tight, sized, well_spaced}) {
     SCOPED_TRACE(demands.rho);
     SCOPED_TRACE(demands.sizes.max_circumradius);
-    Refined expected(cloud_);
-    RunContext context;
-    ASSERT_TRUE(expected.refinement.Run(demands, kMany, 1, context).ok());
-    for (const int threads : {2, 4}) {
-      SCOPED_TRACE(threads);
-      Refined actual(cloud_);
-      ASSERT_TRUE(actual.refinement.Run(demands, kMany, threads, context).ok());
-      ExpectSame(actual, expected);
-    }
+    ExpectSameHoweverItIsRun<2>(cloud_, demands, 200, random_);
+    ASSERT_FALSE(HasFatalFailure());
   }
 }
 
-TEST_P(RefineInSlabsTest, EveryCellIsGoodInTheEnd) {
+TEST_P(RefineInRoundsTest, IsTheSameIn3d) {
+  const std::vector<Point<3>> cloud = test::SortedCloud<3>(GetParam(), kPoints / 4);
+  Demands<3> well_spaced{.rho = 2};
+  well_spaced.criterion = Criterion::kWellSpaced;
+  for (const Demands<3>& demands : {Demands<3>{.rho = 2}, well_spaced}) {
+    ExpectSameHoweverItIsRun<3>(cloud, demands, 400, random_);
+    ASSERT_FALSE(HasFatalFailure());
+  }
+}
+
+// One stretch is a vertex longer than a number of packets, and ends after all others.
+TEST(RefineInRoundsAloneTest, TheLongestStretchIsServedToItsEnd) {
+  constexpr int kColumns = 41;
+  constexpr int kRows = 25;
+  static_assert(kColumns * kRows == 8 * 128 + 1);
+  std::vector<Point<2>> cloud;
+  for (int i = 0; i < kColumns * kRows; ++i) {
+    cloud.push_back({0.1 + 0.0195 * (i % kColumns), 0.1 + 0.0195 * (i / kColumns)});
+  }
+  cloud = test::MortonSorted<2>(test::UnitBox<2>(), cloud);
+  Refined expected(cloud);
+  RunContext context;
+  ASSERT_TRUE(expected.refinement.Run(PlainDemands(), kMany, 1, context).ok());
+  for (int repeat = 0; repeat < 5; ++repeat) {
+    Refined actual(cloud);
+    ASSERT_TRUE(actual.refinement.Run(PlainDemands(), kMany, 2, context).ok());
+    ExpectSame<2>(actual, expected);
+    ASSERT_FALSE(HasFatalFailure());
+  }
+}
+
+TEST_P(RefineInRoundsTest, EveryCellIsGoodInTheEnd) {
   Refined refined(cloud_);
   RunContext context;
   Workspace<2> workspace;
@@ -136,25 +192,8 @@ TEST_P(RefineInSlabsTest, EveryCellIsGoodInTheEnd) {
   }
 }
 
-TEST_P(RefineInSlabsTest, WhatWasStoppedEndsAsIfItHadNotBeen) {
-  Refined at_once(cloud_);
-  RunContext context;
-  ASSERT_TRUE(at_once.refinement.Run(PlainDemands(), kMany, 1, context).ok());
-  Refined stopped(cloud_);
-  absl::Status status = absl::UnknownError("not begun");
-  while (!status.ok()) {
-    const uint64_t budget = stopped.structure.vertex_count() + 1 + random_.Below(200);
-    status = stopped.refinement.Run(PlainDemands(), budget, 1 + static_cast<int>(random_.Below(2)), context);
-    if (!status.ok()) {
-      ASSERT_THAT(std::string(status.message()), HasSubstr("max_vertices = " + std::to_string(budget)));
-      ASSERT_EQ(stopped.structure.vertex_count(), budget);
-    }
-  }
-  ExpectSame(stopped, at_once);
-}
-
-// Where the refinement is at work, so that what packets have put down does not hold any more.
-TEST_P(RefineInSlabsTest, IsToldOfVerticesThatOthersAddWhileItIsStopped) {
+// Where the refinement is at work, so that what would have been foreseen does not hold any more.
+TEST_P(RefineInRoundsTest, IsToldOfVerticesThatOthersAddWhileItIsStopped) {
   Refined refined(cloud_);
   RunContext context;
   Workspace<2> workspace;
@@ -186,7 +225,7 @@ TEST_P(RefineInSlabsTest, IsToldOfVerticesThatOthersAddWhileItIsStopped) {
   }
 }
 
-TEST_P(RefineInSlabsTest, OtherDemandsMayFollowWhileItIsStopped) {
+TEST_P(RefineInRoundsTest, OtherDemandsMayFollowWhileItIsStopped) {
   Refined refined(cloud_);
   RunContext context;
   const absl::Status status = refined.refinement.Run(PlainDemands(), refined.structure.vertex_count() + 50, 2, context);

@@ -1,0 +1,38 @@
+// Insertions of the refinement: those that have happened, and those that a cell asks for.
+#ifndef WELLSPACE_CORE_REFINE_INSERTION_H_
+#define WELLSPACE_CORE_REFINE_INSERTION_H_
+
+#include "core/base/ids.h"
+#include "core/refine/steiner_point.h"
+
+namespace wellspace::core {
+
+// Why a vertex was inserted.
+enum class Reason {
+  kRatio,         // a node broke rho
+  kSize,          // a node was farther than the sizes allow
+  kEncroachment,  // the cell touched a face of the box that its site does not lie on
+};
+
+// An insertion that has just happened.
+struct Insertion {
+  Reason reason = Reason::kRatio;
+  VertexId near = kNoVertex;   // the vertex whose cell was looked at
+  VertexId other = kNoVertex;  // for kRatio, the other end of the edge
+  VertexId vertex = kNoVertex;
+  double edge_sq = 0;        // the edge that asked for it; the distance between `near` and the face for an encroachment
+  double edge_limit_sq = 0;  // all edges that ask for something are at least 1 / sqrt 2 times as long
+  double empty_radius_sq = 0;  // no older vertex is nearer to it, up to rounding
+};
+
+// An insertion that a cell asks for, with the point before it was snapped to the boundary.
+template <int D>
+struct InsertionRequest {
+  Insertion insertion;
+  SteinerPoint<D> candidate;
+  SteinerPoint<D> point;
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_REFINE_INSERTION_H_

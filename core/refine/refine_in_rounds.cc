@@ -1,0 +1,367 @@
+// The part of Refinement that several threads do at once: ADR 23.
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstddef>
+#include <iterator>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "core/base/dimensions.h"
+#include "core/base/status_macros.h"
+#include "core/base/thread_team.h"
+#include "core/refine/refine.h"
+#include "core/voronoi/lanes.h"
+
+namespace wellspace::core {
+namespace {
+
+// Fewer vertices of a bucket are served as they come.
+constexpr size_t kLeastInRounds = 64;
+// A bucket is cut into so many stretches, of which each half is served by turns, so many vertices of each at a time.
+constexpr size_t kStretches = 8;
+constexpr size_t kPacket = 128;
+
+}  // namespace
+
+// Lifts those who wait in `bucket`, the lowest, to be served in rounds; false if there are too few.
+template <int D>
+bool Refinement<D>::BeginRounds(int bucket) {
+  if (schedule_.MostIn(bucket) < kLeastInRounds) {
+    return false;
+  }
+  lifted_ = schedule_.Lift(bucket);
+  if (lifted_.size() < kLeastInRounds) {  // the others have moved on
+    for (const VertexId v : lifted_) {
+      schedule_.PutBack(v, bucket);
+    }
+    lifted_ = {};
+    return false;
+  }
+  round_bucket_ = bucket;
+  turn_ = 0;
+  inserted_.clear();
+  inserted_before_ = 0;
+  packets_.resize(kStretches);
+  for (size_t i = 0; i < kStretches; ++i) {
+    packets_[i].stretch_begin = i * lifted_.size() / kStretches;
+    packets_[i].stretch_end = (i + 1) * lifted_.size() / kStretches;
+    TakeNext(packets_[i]);
+  }
+  return true;
+}
+
+// Makes the next of a stretch its packet.
+template <int D>
+void Refinement<D>::TakeNext(Packet<D>& packet) {
+  const size_t size = std::min(kPacket, packet.stretch_end - packet.stretch_begin);
+  packet.vertices.assign(lifted_.rend() - static_cast<std::ptrdiff_t>(packet.stretch_end),
+                         lifted_.rend() - static_cast<std::ptrdiff_t>(packet.stretch_end - size));
+  packet.stretch_end -= size;
+  packet.served = 0;
+  packet.is_foreseen = false;
+}
+
+// Has those who were lifted, and have not been served, wait in their bucket alone.
+template <int D>
+void Refinement<D>::DropRounds() {
+  const auto put_back = [this](VertexId v) {
+    if (schedule_.WaitsIn(v, round_bucket_)) {
+      schedule_.PutBack(v, round_bucket_);
+    }
+  };
+  for (const Packet<D>& packet : packets_) {
+    const auto begin = lifted_.begin();
+    std::for_each(begin + static_cast<std::ptrdiff_t>(packet.stretch_begin),
+                  begin + static_cast<std::ptrdiff_t>(packet.stretch_end), put_back);
+    std::for_each(packet.vertices.rbegin(), packet.vertices.rend() - static_cast<std::ptrdiff_t>(packet.served),
+                  put_back);
+  }
+  packets_.clear();
+  lifted_ = {};
+}
+
+template <int D>
+uint64_t Refinement<D>::RoundBytes() const {
+  uint64_t bytes = lifted_.size() * sizeof(VertexId);
+  for (const Packet<D>& packet : packets_) {
+    bytes += packet.MemoryBytes();
+  }
+  for (const OwnWorkspace& workspace : round_workspaces_) {
+    bytes += workspace.seen.size() * sizeof(uint32_t);
+  }
+  return bytes;
+}
+
+// Serves those who were lifted, and before the next of them whoever has come to wait in a lower bucket. Has the packets of one half of the stretches foreseen while it
+// serves those of the other.
+template <int D>
+absl::Status Refinement<D>::ServeRounds() {
+  for (Packet<D>& packet : packets_) {
+    packet.is_foreseen = false;  // of a run that was stopped
+  }
+  while (!packets_.empty()) {
+    if (team_->threads() > 1) {
+      LookAhead();
+    }
+    const absl::Status status = ServeRound();
+    EndRound();
+    if (!status.ok()) {
+      ListStars();
+      return status;
+    }
+    for (Packet<D>& packet : HalfOf(turn_)) {
+      TakeNext(packet);
+    }
+    turn_ = 1 - turn_;
+    if (std::all_of(packets_.begin(), packets_.end(), [](const Packet<D>& packet) { return packet.IsServed(); })) {
+      ListStars();
+      packets_.clear();
+      lifted_ = {};
+    }
+  }
+  return absl::OkStatus();
+}
+
+// Serves the packets whose turn it is; then helps with what has been begun, and, while others are at the last of that, serves what is foreseen of
+// the other half.
+template <int D>
+absl::Status Refinement<D>::ServeRound() {
+  for (Packet<D>& packet : HalfOf(turn_)) {
+    WELLSPACE_RETURN_IF_ERROR(ServePacket(packet));
+  }
+  for (Packet<D>& packet : HalfOf(1 - turn_)) {
+    while (is_ahead_ && team_->Help()) {
+    }
+    if (!is_ahead_ || team_->HasEnded() || !std::atomic_ref(packet.is_foreseen).load(std::memory_order_acquire)) {
+      break;
+    }
+    WELLSPACE_RETURN_IF_ERROR(ServePacket(packet));
+  }
+  return absl::OkStatus();
+}
+
+// Has the packets whose turn it is foreseen, unless they are, and other threads begin with those of the other half. What queries read does not change until AdmitWaiting.
+template <int D>
+void Refinement<D>::LookAhead() {
+  round_workspaces_.resize(team_->threads());
+  const auto prepare = [this](std::span<Packet<D>> packets) {
+    for (Packet<D>& packet : packets) {
+      packet.Prepare(structure_.vertex_count(), inserted_before_ + inserted_.size());
+      for (size_t i = packet.served; i < packet.vertices.size(); ++i) {
+        packet.foreseen[i].is_wanted = schedule_.WaitsIn(packet.vertices[i], round_bucket_);
+      }
+    }
+  };
+  const auto foresee = [this](Packet<D>& packet) { Foresee(packet, round_workspaces_[ThreadTeam::CurrentThread()]); };
+  const std::span<Packet<D>> now = HalfOf(turn_);
+  const std::span<Packet<D>> then = HalfOf(1 - turn_);
+  if (!now.front().is_foreseen) {
+    prepare(now);
+    team_->ForEach(now.size(), [&](size_t i) { foresee(now[i]); });
+  }
+  prepare(then);
+  bytes_ahead_ = stars_.MemoryBytes() + RoundBytes();
+  is_ahead_ = true;
+  lists_later_ = true;
+  team_->Begin(then.size() + 1, [this, then, foresee](size_t i) {
+    if (i == 0) {
+      ListStars();
+    } else {
+      foresee(then[i - 1]);
+    }
+  });
+}
+
+// Has queries find all vertices that have been added, once other threads have done what was begun.
+template <int D>
+void Refinement<D>::AdmitWaiting() {
+  if (is_ahead_) {
+    team_->End();
+    is_ahead_ = false;
+  }
+  structure_.AdmitWaiting();
+}
+
+// Ends what LookAhead has begun.
+template <int D>
+void Refinement<D>::EndRound() {
+  AdmitWaiting();
+  lists_later_ = false;
+  std::swap(listings_, later_listings_);
+  std::swap(own_stars_, later_own_stars_);
+  for (Packet<D>& packet : HalfOf(turn_)) {
+    std::swap(packet.simplices, packet.listed);
+  }
+  // The next packets may not have been foreseen by what has been inserted meanwhile.
+  const Packet<D>& next = HalfOf(1 - turn_).front();
+  const size_t is_known = next.is_foreseen ? next.first_unforeseen - inserted_before_ : inserted_.size();
+  inserted_.erase(inserted_.begin(), inserted_.begin() + static_cast<std::ptrdiff_t>(is_known));
+  inserted_before_ += is_known;
+}
+
+// Lists the stars of vertices that have been found done, in the order in which they were.
+template <int D>
+void Refinement<D>::ListStars() {
+  for (const auto& [v, star, vertex_count] : listings_) {
+    stars_.Set(v, star, vertex_count);
+  }
+  listings_.clear();
+  own_stars_.clear();
+}
+
+// Foresees those of a packet who have not been served. Nothing but the packet and the workspace is written.
+template <int D>
+void Refinement<D>::Foresee(Packet<D>& packet, Workspace<D>& workspace) const {
+  for (size_t i = packet.served; i < packet.vertices.size(); ++i) {
+    packet.foreseen[i].begin = packet.ends();
+    if (packet.foreseen[i].is_wanted && !context_->IsCancelled()) {
+      ForeseeOne(packet, i, workspace);
+      if (!packet.foreseen[i].is_known) {
+        packet.CutTo(packet.foreseen[i].begin);
+      }
+    }
+  }
+  packet.names.assign(packet.inserted.size(), kNoVertex);
+  std::atomic_ref(packet.is_foreseen).store(true, std::memory_order_release);
+}
+
+// As Improve, but what would be done is put down.
+template <int D>
+void Refinement<D>::ForeseeOne(Packet<D>& packet, size_t at, Workspace<D>& workspace) const {
+  const VertexId v = packet.vertices[at];
+  const FaceMask faces = structure_.faces(v);
+  const double edge_limit_sq = schedule_.UpperLengthSq(round_bucket_);
+  Polytope<D>& cell = workspace.cell;
+  structure_.UnplacedClippedVoronoi(v, ClipOf(round_bucket_), workspace, packet.inserted, VertexId{packet.first_new});
+  packet.foreseen[at].reach_sq = cell.CutLimitSq();
+  while (!cell.IsTooLarge() && !context_->IsCancelled()) {
+    const Assessment found = AssessCell(cell, faces, edge_limit_sq);
+    const size_t first_mention = packet.mentions.size();
+    AppendMentions(cell, faces, found, packet.mentions);
+    const std::optional<Request> request = NextRequest(v, cell, found, edge_limit_sq);
+    packet.steps.push_back({found, static_cast<uint32_t>(packet.mentions.size() - first_mention), request.has_value()});
+    if (!request.has_value()) {
+      AppendNodesToWatch(v, cell, found, packet.watched);
+      if (found.IsGood()) {
+        cell.FindStar(packet.star);
+        packet.AppendStar(at);
+      }
+      packet.SetKnown(at, structure_.point(v));
+      return;
+    }
+    if (!IsLongEnough(request->point)) {
+      return;
+    }
+    const VertexId x{packet.first_new + static_cast<uint32_t>(packet.inserted.size())};
+    packet.requests.push_back(*request);
+    packet.inserted.reserve(PaddedCount(packet.inserted.size() + 1));
+    packet.inserted.push_back(request->point.position);
+    cell.CutBeforePlace(x, request->point.position);
+  }
+}
+
+// Serves those of a packet who have not been served.
+template <int D>
+absl::Status Refinement<D>::ServePacket(Packet<D>& packet) {
+  if (packet.is_foreseen) {
+    packet.NoteUnforeseen(std::span(inserted_).subspan(packet.first_unforeseen - inserted_before_));
+  }
+  for (; packet.served < packet.vertices.size(); ++packet.served) {
+    const size_t first = inserted_.size();
+    VertexId below{};
+    int bucket = 0;
+    while (schedule_.HasBelow(round_bucket_) && schedule_.Pop(below, bucket, round_bucket_)) {
+      WELLSPACE_RETURN_IF_ERROR(Serve(below, bucket));
+    }
+    packet.NoteUnforeseen(std::span(inserted_).subspan(first));
+    if (schedule_.WaitsIn(packet.vertices[packet.served], round_bucket_)) {
+      WELLSPACE_RETURN_IF_ERROR(ServeNext(packet));
+    } else {
+      packet.NoteUnforeseen(packet.InsertedFor(packet.served));
+    }
+  }
+  return absl::OkStatus();
+}
+
+// Serves the next vertex of a packet, which waits.
+template <int D>
+absl::Status Refinement<D>::ServeNext(Packet<D>& packet) {
+  const VertexId v = packet.vertices[packet.served];
+  const size_t first = inserted_.size();
+  const uint32_t first_new = structure_.vertex_count();
+  schedule_.Take(v);
+  absl::Status status = context_->Check();
+  if (status.ok()) {
+    status = packet.HoldsFor(packet.served, structure_.point(v)) ? Retrace(packet, packet.served)
+                                                                 : Improve(v, round_bucket_);
+  }
+  if (!status.ok()) {
+    schedule_.LiftAgain(v, round_bucket_);
+    return status;
+  }
+  // What was foreseen after all counts as foreseen.
+  const std::span<const Point<D>> foreseen = packet.InsertedFor(packet.served);
+  const std::span<const Point<D>> inserted = std::span(inserted_).subspan(first);
+  const auto [foreseen_end, inserted_end] =
+      std::mismatch(foreseen.begin(), foreseen.end(), inserted.begin(), inserted.end());
+  for (auto p = inserted.begin(); p != inserted_end; ++p) {
+    const auto i = static_cast<uint32_t>(p - inserted.begin());
+    packet.names[packet.foreseen[packet.served].begin.requests + i] = VertexId{first_new + i};
+  }
+  packet.NoteUnforeseen({foreseen_end, foreseen.end()});
+  packet.NoteUnforeseen({inserted_end, inserted.end()});
+  return CountServed(round_bucket_);
+}
+
+// As Improve, by what is foreseen.
+template <int D>
+absl::Status Refinement<D>::Retrace(Packet<D>& packet, size_t at) {
+  const VertexId v = packet.vertices[at];
+  const auto& [is_wanted, is_known, reach_sq, begin, end, new_simplices] = packet.foreseen[at];
+  std::span<Mention> mentions = std::span(packet.mentions).subspan(begin.mentions);
+  auto request = packet.requests.begin() + begin.requests;
+  auto name = packet.names.begin() + begin.requests;
+  for (auto step = packet.steps.begin() + begin.steps;; ++step) {
+    const std::span<Mention> own = mentions.first(step->mentions);
+    mentions = mentions.subspan(step->mentions);
+    for (Mention& mention : own) {
+      packet.Rename(mention.vertex);
+    }
+    if (announced_[Index(v)] == Announced::kToNone) {
+      Announce(v, step->found, own);
+    }
+    if (GivesWay(v, step->found, round_bucket_)) {
+      return absl::OkStatus();
+    }
+    if (!step->asks) {
+      for (uint32_t i = new_simplices; i < end.simplices; ++i) {
+        for (VertexId& u : packet.simplices[i]) {
+          packet.Rename(u);
+        }
+      }
+      Settle(v, step->found, round_bucket_, own,
+             std::span(packet.watched).subspan(begin.watched, end.watched - begin.watched),
+             std::span(packet.simplices).subspan(begin.simplices, end.simplices - begin.simplices));
+      return absl::OkStatus();
+    }
+    packet.Rename(request->insertion.other);
+    WELLSPACE_RETURN_IF_ERROR(context_->Check());
+    WELLSPACE_ASSIGN_OR_RETURN(*name, Insert(*request));
+    ++request;
+    ++name;
+  }
+}
+
+#define WELLSPACE_INSTANTIATE(D)                       \
+  template bool Refinement<D>::BeginRounds(int);       \
+  template void Refinement<D>::DropRounds();           \
+  template uint64_t Refinement<D>::RoundBytes() const; \
+  template void Refinement<D>::AdmitWaiting();         \
+  template absl::Status Refinement<D>::ServeRounds();
+WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
+#undef WELLSPACE_INSTANTIATE
+
+}  // namespace wellspace::core
