@@ -90,6 +90,12 @@ struct alignas(kCacheLines) Packet {
     first_unforeseen = inserted_now;
   }
 
+  // Begins to put down what is foreseen of vertex `at`.
+  void BeginForeseen(size_t at) {
+    foreseen[at].begin = ends();
+    foreseen[at].new_simplices = foreseen[at].begin.simplices;
+  }
+
   // Puts down the simplices of `star`, that of vertex `at`.
   void AppendStar(size_t at) {
     const auto new_begin = std::partition(star.begin(), star.end(), [this](const std::array<VertexId, D>& simplex) {
@@ -103,7 +109,6 @@ struct alignas(kCacheLines) Packet {
   void SetKnown(size_t at, const Point<D>& site) {
     foreseen[at].is_known = true;
     foreseen[at].end = ends();
-    foreseen[at].new_simplices = std::max(foreseen[at].new_simplices, foreseen[at].begin.simplices);
     const double radius = 1.001 * std::sqrt(foreseen[at].reach_sq);  // whatever is rounded
     for (int i = 0; i < D; ++i) {
       reach.low[i] = std::min(reach.low[i], site[i] - radius);

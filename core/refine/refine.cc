@@ -202,24 +202,19 @@ double Refinement<D>::FirstEdgeSq(const Demands<D>& demands, const Point<D>& p, 
   return std::min(first_sq, size_sq / (demands.rho * demands.rho));
 }
 
-template <int D>
-double Refinement<D>::FirstEdgeSqOfNew(const Point<D>& p, FaceMask faces, double nearest_sq) const {
-  const double around = kAround * std::sqrt(nearest_sq);
-  return FirstEdgeSq(*demands_, p, faces, nearest_sq, demands_->sizes.LeastAroundSq(p, around));
-}
-
 // Schedules the new vertex `x`, which is near `near` and whose nearest neighbour is as near as it says, and at once those on a face of x that remember
 // a node there which x cuts off: they may have to look sooner than x. Where nodes are not known x is announced for that.
 template <int D>
 void Refinement<D>::ScheduleNew(VertexId near, VertexId x, double nearest_sq) {
   schedule_.PutBeside(near, x);
   const Point<D>& p = structure_.point(x);
+  const double around = kAround * std::sqrt(nearest_sq);
   if (structure_.faces(x) != 0) {
     watchers_.ForEachCutOff(p, structure_.faces(x),
                             [&](VertexId u) { Wake(u, DistanceSq<D>(p, structure_.point(u))); });
     ScheduleWoken();
     if (watchers_.SomeWatchAll()) {
-      ComputeCell(x, kAround * std::sqrt(nearest_sq), new_);
+      ComputeCell(x, around, new_);
       new_.cell.Place();
       if (!new_.cell.IsTooLarge()) {
         const Assessment found = Assess<D>(new_.cell, structure_.faces(x), *demands_, nearest_sq);
@@ -227,7 +222,8 @@ void Refinement<D>::ScheduleNew(VertexId near, VertexId x, double nearest_sq) {
       }
     }
   }
-  schedule_.Add(x, FirstEdgeSqOfNew(p, structure_.faces(x), nearest_sq));
+  schedule_.Add(x,
+                FirstEdgeSq(*demands_, p, structure_.faces(x), nearest_sq, demands_->sizes.LeastAroundSq(p, around)));
 }
 
 // Inserts Steiner points until nothing that bucket `bucket` may ask for is wrong with the cell of `v`.
@@ -256,8 +252,8 @@ absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
     if (!request.has_value()) {
       watched_.clear();
       AppendNodesToWatch(v, cell, found, watched_);
-      Star<D>& star = lists_later_ ? later_own_stars_.emplace_back() : star_;
-      if (found.IsGood() && (lists_later_ || stars_.IsComplete())) {
+      Star<D>& star = is_foreseen_ ? later_own_stars_.emplace_back() : star_;
+      if (found.IsGood() && (is_foreseen_ || stars_.IsComplete())) {
         cell.FindStar(star);
       }
       Settle(v, found, bucket, Mentions(cell, structure_.faces(v), found), watched_, star);
@@ -386,7 +382,7 @@ void Refinement<D>::Settle(VertexId v, const Assessment& found, int bucket, std:
     schedule_.AddToBucket(v, NextBucket(found, bucket));
     return;
   }
-  if (lists_later_) {
+  if (is_foreseen_) {
     later_listings_.push_back({v, star, structure_.vertex_count()});
   } else {
     stars_.Set(v, star, structure_.vertex_count());
@@ -435,7 +431,7 @@ VertexId Refinement<D>::Add(const Request& request) {
   if (!is_ahead_ || *observer_ || structure_.waiting_count() == QueryStructure<D>::kMostWaiting) {
     AdmitWaiting();
   }
-  if (!packets_.empty()) {
+  if (is_foreseen_) {
     inserted_.push_back(request.point.position);
   }
   radius_sq_.push_back(Assessment::kNone);

@@ -108,7 +108,6 @@ class Refinement {
   absl::Status ScheduleAll(const Demands<D>& demands, ThreadTeam& team);
   double FirstEdgeSq(const Demands<D>& demands, const Point<D>& p, FaceMask faces, double nearest_sq,
                      double size_sq) const;
-  double FirstEdgeSqOfNew(const Point<D>& p, FaceMask faces, double nearest_sq) const;
   absl::Status Loop();
   absl::Status Serve(VertexId v, int bucket);
   absl::Status CountServed(int bucket);
@@ -157,7 +156,6 @@ class Refinement {
   absl::Status ServeNext(Packet<D>& packet);
   absl::Status Retrace(Packet<D>& packet, size_t at);
   void CheckOrder(VertexId v, const Polytope<D>& cell, int bucket);
-  void CheckNeighbours(VertexId v, const Polytope<D>& cell, int bucket) const;
   void CheckWaits(VertexId v, VertexId u, int bucket) const;
   void CheckInsertion(const Request& request);
 
@@ -179,7 +177,7 @@ class Refinement {
   HugeVector<VertexId> lifted_;     // the last of each stretch is the next
   std::vector<Packet<D>> packets_;  // by stretch, the next of each; none if nobody is served so
   size_t turn_ = 0;                 // whether the packets of the first half are next, or those of the second
-  std::vector<Point<D>> inserted_;  // in these rounds, from inserted_before_ on
+  std::vector<Point<D>> inserted_;  // in these rounds, where they are foreseen, from inserted_before_ on
   size_t inserted_before_ = 0;
 
   // Of the run.
@@ -194,7 +192,7 @@ class Refinement {
   uint64_t bytes_ahead_ = 0;                    // of what they write, before
   std::vector<Listing> listings_;               // what one of them lists
   std::deque<Star<D>> own_stars_;               // of those of the listings that were not foreseen
-  bool lists_later_ = false;                    // what is found done goes into these:
+  bool is_foreseen_ = false;  // the round: insertions are noted, and what is found done goes into these
   std::vector<Listing> later_listings_;
   std::deque<Star<D>> later_own_stars_;
   std::vector<std::pair<VertexId, double>> woken_;  // scratch of Wake

@@ -20,22 +20,17 @@ constexpr uint64_t kCheckShare = 16;
 // That nobody waits below `bucket`, from which `v` was taken: the neighbours in the cell each time, all now and then.
 template <int D>
 void Refinement<D>::CheckOrder(VertexId v, const Polytope<D>& cell, int bucket) {
-  CheckNeighbours(v, cell, bucket);
-  if (++unchecked_ * kCheckShare > structure_.vertex_count()) {
-    unchecked_ = 0;
-    for (uint32_t u = 0; u < structure_.vertex_count(); ++u) {
-      CheckWaits(v, VertexId{u}, bucket);
-    }
-  }
-}
-
-template <int D>
-void Refinement<D>::CheckNeighbours(VertexId v, const Polytope<D>& cell, int bucket) const {
   for (const CellNode<D>& node : cell.nodes()) {
     for (const uint16_t index : node.planes) {
       if (cell.plane(index).kind == PlaneKind::kBisector) {
         CheckWaits(v, cell.plane(index).vertex, bucket);
       }
+    }
+  }
+  if (++unchecked_ * kCheckShare > structure_.vertex_count()) {
+    unchecked_ = 0;
+    for (uint32_t u = 0; u < structure_.vertex_count(); ++u) {
+      CheckWaits(v, VertexId{u}, bucket);
     }
   }
 }
@@ -83,9 +78,8 @@ void Refinement<D>::CheckInsertion(const Request& request) {
   }
 }
 
-#define WELLSPACE_INSTANTIATE(D)                                                         \
-  template void Refinement<D>::CheckOrder(VertexId, const Polytope<D>&, int);            \
-  template void Refinement<D>::CheckNeighbours(VertexId, const Polytope<D>&, int) const; \
+#define WELLSPACE_INSTANTIATE(D)                                              \
+  template void Refinement<D>::CheckOrder(VertexId, const Polytope<D>&, int); \
   template void Refinement<D>::CheckInsertion(const Refinement<D>::Request&);
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE

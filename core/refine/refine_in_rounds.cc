@@ -1,10 +1,8 @@
 // The part of Refinement that several threads do at once: ADR 23.
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstddef>
-#include <iterator>
 #include <optional>
 #include <span>
 #include <utility>
@@ -165,7 +163,7 @@ void Refinement<D>::LookAhead() {
   prepare(then);
   bytes_ahead_ = stars_.MemoryBytes() + RoundBytes();
   is_ahead_ = true;
-  lists_later_ = true;
+  is_foreseen_ = true;
   team_->Begin(then.size() + 1, [this, then, foresee](size_t i) {
     if (i == 0) {
       ListStars();
@@ -189,7 +187,7 @@ void Refinement<D>::AdmitWaiting() {
 template <int D>
 void Refinement<D>::EndRound() {
   AdmitWaiting();
-  lists_later_ = false;
+  is_foreseen_ = false;
   std::swap(listings_, later_listings_);
   std::swap(own_stars_, later_own_stars_);
   for (Packet<D>& packet : HalfOf(turn_)) {
@@ -216,7 +214,7 @@ void Refinement<D>::ListStars() {
 template <int D>
 void Refinement<D>::Foresee(Packet<D>& packet, Workspace<D>& workspace) const {
   for (size_t i = packet.served; i < packet.vertices.size(); ++i) {
-    packet.foreseen[i].begin = packet.ends();
+    packet.BeginForeseen(i);
     if (packet.foreseen[i].is_wanted && !context_->IsCancelled()) {
       ForeseeOne(packet, i, workspace);
       if (!packet.foreseen[i].is_known) {
