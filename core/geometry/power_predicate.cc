@@ -39,7 +39,7 @@ Sign SignOf(const FixedInteger<Limbs>& value) {
   return value.IsNegative() ? Sign::kNegative : value.IsZero() ? Sign::kZero : Sign::kPositive;
 }
 
-// The perturbation's word on an exact zero; see the header. `minors` are those without one row, the last row first.
+// The perturbation's word on an exact zero; see the header. `minors` as for Decide.
 template <typename Ring, int D>
 Sign BreakTie(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u,
               const std::array<typename Ring::template Minor<D>, D + 1>& minors) {
@@ -56,41 +56,30 @@ Sign BreakTie(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes,
       Ring::Add(site_coefficient, negate, minors[D - j]);
     }
   }
-  // The vertices by rank, with the signs of their weights' coefficients.
-  struct Weighted {
-    const Point<D>* vertex;
-    Sign coefficient;
-  };
-  std::array<Weighted, D + 2> ranked;
-  int count = 0;
-  const auto insert = [&](const Point<D>& vertex, Sign coefficient) {
-    int at = count++;
-    for (; at > 0 && *ranked[at - 1].vertex < vertex; --at) {
-      ranked[at] = ranked[at - 1];
+  // Of the vertices whose weights count the first by rank decides. The weight of u always does.
+  const Point<D>* first = &u;
+  Sign sign = Sign::kPositive;
+  const auto rank = [&](const Point<D>& vertex, Sign coefficient) {
+    if (coefficient != Sign::kZero && *first < vertex) {
+      first = &vertex;
+      sign = coefficient;
     }
-    ranked[at] = {&vertex, coefficient};
   };
-  insert(u, Sign::kPositive);
-  insert(site, SignOf(site_coefficient) * a_sign);
+  rank(site, SignOf(site_coefficient) * a_sign);
   for (int j = 0; j < D; ++j) {
     if (!planes[j].IsWall()) {
-      insert(planes[j].generator, -(lambda[j] * a_sign));
+      rank(planes[j].generator, -(lambda[j] * a_sign));
     }
   }
-  for (int k = 0; k < count; ++k) {
-    if (ranked[k].coefficient != Sign::kZero) {
-      return ranked[k].coefficient;
-    }
-  }
-  return Sign::kPositive;  // not reached: that of u is positive
+  return sign;
 }
 
+// `minors` are those of the rows without one, the last row first.
 template <typename Ring, int D>
 ExactDecision Decide(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u, TieRule rule,
-                     const Rows<Ring, D>& rows) {
+                     const Rows<Ring, D>& rows, const std::array<typename Ring::template Minor<D>, D + 1>& minors) {
   ExactDecision decision;
   decision.stage = Ring::kStage;
-  const auto minors = MinorsOf<Ring, D>(rows.normals);
   typename Ring::template Bordered<D> bordered{};
   for (int row = 0; row <= D; ++row) {
     Ring::AddProduct(bordered, rows.offsets[row], (row + D) % 2 == 1, minors[D - row]);
@@ -150,10 +139,7 @@ struct WordRing {
     sum += negate ? -term : term;
   }
 
-  static int64_t FromInteger(int64_t value) { return value; }
-  static bool IsNegative(int64_t entry) { return entry < 0; }
-  static int64_t Twice(int64_t entry) { return 2 * (entry < 0 ? -entry : entry); }
-  static void AddSquare(int64_t& sum, int64_t entry) { sum += entry * entry; }
+  // As that of FixedRing.
   static bool AddWeight(int64_t& sum, double weight, bool negate, int unit) {
     if (weight == 0) {
       return true;
@@ -262,52 +248,65 @@ struct FixedRing {
   }
 };
 
-// A difference of two doubles as the sum of two: the rounded one and its error, exact unless it overflows.
-//
-// Source: D. E. Knuth, The Art of Computer Programming 2, section 4.2.2, Theorem B.
-struct ExactDifference {
-  double high;
-  double low;
+// Two numbers side by side.
+using Pair = double __attribute__((vector_size(16), may_alias));
+using IntegerPair = int64_t __attribute__((vector_size(16), may_alias));
+
+// Numbers by row and axis, and as pairs; the last of an odd row stands beside one that means nothing.
+template <typename Number, int D>
+struct alignas(Pair) Matrix {
+  static constexpr int kPairs = (D + 1) / 2;  // of a row
+
+  Number rows[D + 1][2 * kPairs];
+
+  Pair& pair(int row, int i) { return reinterpret_cast<Pair*>(rows[row])[i]; }
+  const Pair& pair(int row, int i) const { return reinterpret_cast<const Pair*>(rows[row])[i]; }
+  IntegerPair& integer_pair(int row, int i) { return reinterpret_cast<IntegerPair*>(rows[row])[i]; }
 };
 
-inline ExactDifference Subtract(double a, double b) {
-  const double difference = a - b;
-  const double b_virtual = a - difference;
-  const double a_virtual = difference + b_virtual;
-  return {difference, (b_virtual - b) + (a - a_virtual)};
-}
-
-// The differences of a decision: by plane to its generator or, on the axis, to its wall; last, to u.
+// The differences of a decision, each as the sum of two doubles, the rounded one and its error: exact, unless it overflows.
+//
+// Source: D. E. Knuth, The Art of Computer Programming 2, section 4.2.2, Theorem B.
 template <int D>
 struct Differences {
-  std::array<std::array<ExactDifference, D>, D + 1> rows;
+  // A row for each plane, to its generator or, on the axis, to its wall; the last one to u.
+  Matrix<double, D> high;
+  Matrix<double, D> low;
   int exponent;  // all are below 2^(exponent + 1); 1024 if one overflowed
 
   Differences(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u) {
-    // The bits of positive doubles have the order of the numbers.
-    uint64_t largest = 0;
-    const auto set = [&](ExactDifference& to, double a, double b) {
-      to = Subtract(a, b);
-      largest = std::max(largest, std::bit_cast<uint64_t>(to.high) & ~(uint64_t{1} << 63));
+    Pair largest{};
+    const auto pair_of = [](const Point<D>& p, int i) { return Pair{p[2 * i], 2 * i + 1 < D ? p[2 * i + 1] : 0}; };
+    const auto subtract = [&](int row, int i, Pair a, Pair b) {
+      const Pair difference = a - b;
+      const Pair b_virtual = a - difference;
+      const Pair a_virtual = difference + b_virtual;
+      high.pair(row, i) = difference;
+      low.pair(row, i) = (b_virtual - b) + (a - a_virtual);
+      const Pair magnitude = difference > -difference ? difference : -difference;
+      largest = largest > magnitude ? largest : magnitude;
     };
-    for (int j = 0; j < D; ++j) {
-      if (planes[j].IsWall()) {
-        rows[j].fill({0, 0});
-        set(rows[j][planes[j].axis], planes[j].coordinate, site[planes[j].axis]);
-      } else {
-        for (int i = 0; i < D; ++i) {
-          set(rows[j][i], planes[j].generator[i], site[i]);
+    for (int j = 0; j <= D; ++j) {
+      if (j < D && planes[j].IsWall()) {
+        const int axis = planes[j].axis;
+        for (int i = 0; i < Matrix<double, D>::kPairs; ++i) {
+          const Pair place{planes[j].coordinate, planes[j].coordinate};
+          const Pair from = pair_of(site, i);
+          const IntegerPair is_along{axis == 2 * i ? -1 : 0, axis == 2 * i + 1 ? -1 : 0};
+          subtract(j, i, is_along != 0 ? place : from, from);
         }
+        continue;
+      }
+      const Point<D>& end = j == D ? u : planes[j].generator;
+      for (int i = 0; i < Matrix<double, D>::kPairs; ++i) {
+        subtract(j, i, pair_of(end, i), pair_of(site, i));
       }
     }
-    for (int i = 0; i < D; ++i) {
-      set(rows[D][i], u[i], site[i]);
-    }
-    exponent = static_cast<int>(largest >> 52) - 1023;
+    exponent = static_cast<int>(std::bit_cast<uint64_t>(std::max(largest[0], largest[1])) >> 52) - 1023;
   }
 };
 
-// Calls to_entry(difference, entry) for every difference and completes the rows; false as soon as one call is.
+// Calls to_entry(high, low, entry) for every difference and completes the rows; false as soon as one call is.
 template <typename Ring, int D, typename ToEntry>
 inline bool FillRows(const Differences<D>& differences, const std::array<PlaneSource<D>, D>& planes,
                      const DecisionWeights<D>* weights, int unit, ToEntry to_entry, Rows<Ring, D>& rows) {
@@ -315,7 +314,7 @@ inline bool FillRows(const Differences<D>& differences, const std::array<PlaneSo
     if (j < D && planes[j].IsWall()) {
       const int axis = planes[j].axis;
       typename Ring::Entry offset{};
-      if (!to_entry(differences.rows[j][axis], offset)) {
+      if (!to_entry(differences.high.rows[j][axis], differences.low.rows[j][axis], offset)) {
         return false;
       }
       rows.normals[j].fill(Ring::FromInteger(0));
@@ -325,7 +324,7 @@ inline bool FillRows(const Differences<D>& differences, const std::array<PlaneSo
     }
     rows.offsets[j] = {};
     for (int i = 0; i < D; ++i) {
-      if (!to_entry(differences.rows[j][i], rows.normals[j][i])) {
+      if (!to_entry(differences.high.rows[j][i], differences.low.rows[j][i], rows.normals[j][i])) {
         return false;
       }
       Ring::AddSquare(rows.offsets[j], rows.normals[j][i]);
@@ -342,11 +341,12 @@ inline bool FillRows(const Differences<D>& differences, const std::array<PlaneSo
 // 2^exponent for -1022 <= exponent <= 1023.
 double PowerOfTwo(int exponent) { return std::bit_cast<double>(static_cast<uint64_t>(exponent + 1023) << 52); }
 
-// The rows in the unit in which the largest difference has all bits that the ring takes, at most 62; false where some are
+// The rows in the unit in which the largest difference has all bits that the ring takes; false where some are
 // no integers.
-template <typename Ring, int D>
+template <int D>
 bool ToRows(const Differences<D>& differences, const std::array<PlaneSource<D>, D>& planes,
-            const DecisionWeights<D>* weights, Rows<Ring, D>& rows) {
+            const DecisionWeights<D>* weights, Rows<FixedRing<1>, D>& rows) {
+  using Ring = FixedRing<1>;
   const int unit = differences.exponent - (Ring::kDifferenceBits - 1);
   if (unit < -1022 || differences.exponent > 1023) {
     return false;
@@ -361,22 +361,82 @@ bool ToRows(const Differences<D>& differences, const std::array<PlaneSource<D>, 
   };
   return FillRows<Ring, D>(
       differences, planes, weights, unit,
-      [&](const ExactDifference& x, typename Ring::Entry& entry) {
-        int64_t high = 0;
-        if (!to_integer(x.high, high)) {
+      [&](double high, double low, Ring::Entry& entry) {
+        int64_t whole = 0;
+        if (!to_integer(high, whole)) {
           return false;
         }
-        if (x.low != 0) {
-          int64_t low = 0;
-          if (!to_integer(x.low, low)) {
+        if (low != 0) {
+          int64_t rest = 0;
+          if (!to_integer(low, rest)) {
             return false;
           }
-          high += low;
+          whole += rest;
         }
-        entry = Ring::FromInteger(high);
+        entry = Ring::FromInteger(whole);
         return true;
       },
       rows);
+}
+
+// The rows in the unit in which the largest difference has all bits that a word takes; false where some are no integers. But a wall may be at a place
+// that is none: it is left out of `rows` and its bit set in `unfit_walls`.
+template <int D>
+bool ToWordRows(const Differences<D>& differences, const std::array<PlaneSource<D>, D>& planes,
+                const DecisionWeights<D>* weights, Rows<WordRing<D>, D>& rows, uint32_t& unfit_walls) {
+  const int unit = differences.exponent - (WordRing<D>::kDifferenceBits - 1);
+  if (unit < -1022 || differences.exponent > 1023) {
+    return false;
+  }
+  // A double of this size has no bits for fractions: adding it rounds, and leaves the integer in the last bits of the sum.
+  constexpr double kRound = 0x1.8p52;
+  const double factor = PowerOfTwo(-unit);
+  const double inverse = PowerOfTwo(unit);
+  Matrix<int64_t, D> integers;
+  Matrix<int64_t, D> unfit;  // 0 where it is one
+  IntegerPair any{};
+  for (int j = 0; j <= D; ++j) {
+    for (int i = 0; i < Matrix<double, D>::kPairs; ++i) {
+      const Pair x = differences.high.pair(j, i);
+      const Pair rounded = x * factor + kRound;
+      integers.integer_pair(j, i) = std::bit_cast<IntegerPair>(rounded) - std::bit_cast<int64_t>(kRound);
+      unfit.integer_pair(j, i) = ((rounded - kRound) * inverse != x) | (differences.low.pair(j, i) != 0);
+      any |= unfit.integer_pair(j, i);
+    }
+  }
+  unfit_walls = 0;
+  for (int j = 0; (any[0] | any[1]) != 0 && j <= D; ++j) {
+    for (int i = 0; i < D; ++i) {
+      if (unfit.rows[j][i] != 0) {
+        if (j == D || !planes[j].IsWall()) {
+          return false;
+        }
+        unfit_walls |= 1u << j;
+        integers.rows[j][i] = differences.high.rows[j][i] < 0 ? -1 : 1;
+      }
+    }
+  }
+  for (int j = 0; j <= D; ++j) {
+    const int64_t* const row = integers.rows[j];
+    if (j < D && planes[j].IsWall()) {
+      const int axis = planes[j].axis;
+      rows.normals[j].fill(0);
+      rows.normals[j][axis] = row[axis] < 0 ? -1 : 1;
+      rows.offsets[j] = 2 * std::abs(row[axis]);
+      continue;
+    }
+    std::copy_n(row, D, rows.normals[j].begin());
+    rows.offsets[j] = 0;
+    for (int i = 0; i < D; ++i) {
+      rows.offsets[j] += row[i] * row[i];
+    }
+    if (weights != nullptr &&
+        !(WordRing<D>::AddWeight(rows.offsets[j], weights->site, false, unit) &&
+          WordRing<D>::AddWeight(rows.offsets[j], j < D ? weights->generators[j] : weights->u, true, unit))) {
+      return false;
+    }
+  }
+  return true;
 }
 
 // The rows in units of the finest difference, if they fit in 126 bits.
@@ -387,9 +447,10 @@ bool ToRows(const Differences<D>& differences, const std::array<PlaneSource<D>, 
     return false;
   }
   int unit = std::numeric_limits<int>::max();
-  for (const auto& row : differences.rows) {
-    for (const ExactDifference& x : row) {
-      unit = std::min({unit, Decompose(x.high).exponent, Decompose(x.low).exponent});
+  for (int j = 0; j <= D; ++j) {
+    for (int i = 0; i < D; ++i) {
+      unit = std::min(
+          {unit, Decompose(differences.high.rows[j][i]).exponent, Decompose(differences.low.rows[j][i]).exponent});
     }
   }
   // Subnormal numbers have an exponent field of 0.
@@ -402,8 +463,8 @@ bool ToRows(const Differences<D>& differences, const std::array<PlaneSource<D>, 
   };
   return FillRows<FixedRing<2>, D>(
       differences, planes, weights, unit,
-      [&](const ExactDifference& x, SignedMagnitude<2>& entry) {
-        const Signed128 value = to_integer(x.high) + to_integer(x.low);
+      [&](double high, double low, SignedMagnitude<2>& entry) {
+        const Signed128 value = to_integer(high) + to_integer(low);
         const auto magnitude = static_cast<Unsigned128>(value < 0 ? -value : value);
         entry.is_negative = value < 0;
         entry.magnitude = {static_cast<uint64_t>(magnitude), static_cast<uint64_t>(magnitude >> 64)};
@@ -510,21 +571,40 @@ BigRows<D> ToBigRows(const Point<D>& site, const std::array<PlaneSource<D>, D>& 
 
 namespace {
 
+// By all stages but the first, which is not to make room for what these need.
+template <int D>
+[[gnu::noinline]] ExactDecision DecideByLongIntegers(const Differences<D>& differences, const Point<D>& site,
+                                                     const std::array<PlaneSource<D>, D>& planes, const Point<D>& u,
+                                                     const DecisionWeights<D>* weights, TieRule rule) {
+  const auto decide = [&]<typename Ring>(const Rows<Ring, D>& rows) {
+    return Decide<Ring, D>(site, planes, u, rule, rows, MinorsOf<Ring, D>(rows.normals));
+  };
+  if (Rows<FixedRing<1>, D> rows; ToRows<D>(differences, planes, weights, rows)) {
+    return decide(rows);
+  }
+  if (Rows<FixedRing<2>, D> rows; ToRows<D>(differences, planes, weights, rows)) {
+    return decide(rows);
+  }
+  return decide(ToBigRows<D>(site, planes, u, weights).rows);
+}
+
 // `weights` is null where all are zero.
 template <int D>
 ExactDecision DecideByStages(const Point<D>& site, const std::array<PlaneSource<D>, D>& planes, const Point<D>& u,
                              const DecisionWeights<D>* weights, TieRule rule) {
   const Differences<D> differences(site, planes, u);
-  if (Rows<WordRing<D>, D> rows; ToRows<WordRing<D>, D>(differences, planes, weights, rows)) {
-    return Decide<WordRing<D>, D>(site, planes, u, rule, rows);
+  uint32_t unfit_walls = 0;
+  if (Rows<WordRing<D>, D> rows; ToWordRows<D>(differences, planes, weights, rows, unfit_walls)) {
+    const auto minors = MinorsOf<WordRing<D>, D>(rows.normals);
+    bool is_exact = true;
+    for (int j = 0; j < D; ++j) {
+      is_exact &= (unfit_walls >> j & 1) == 0 || minors[D - j] == 0;  // what it is multiplied by
+    }
+    if (is_exact) {
+      return Decide<WordRing<D>, D>(site, planes, u, rule, rows, minors);
+    }
   }
-  if (Rows<FixedRing<1>, D> rows; ToRows<FixedRing<1>, D>(differences, planes, weights, rows)) {
-    return Decide<FixedRing<1>, D>(site, planes, u, rule, rows);
-  }
-  if (Rows<FixedRing<2>, D> rows; ToRows<D>(differences, planes, weights, rows)) {
-    return Decide<FixedRing<2>, D>(site, planes, u, rule, rows);
-  }
-  return Decide<BigRing, D>(site, planes, u, rule, ToBigRows<D>(site, planes, u, weights).rows);
+  return DecideByLongIntegers<D>(differences, site, planes, u, weights, rule);
 }
 
 }  // namespace

@@ -32,16 +32,17 @@ enum class TieRule {
 };
 
 // How a sign was found, for tests and statistics: the cheapest stage that serves.
-enum class Stage {
+enum class Stage : uint8_t {
   kFilter,   // in doubles, certain by a bound on the error
   kWord,     // in integers of one word: all differences of coordinates are multiples of one power of two, below 2^29,
-             // 2^19, 2^13, 2^10, 2^8 times it in 2-D to 6-D
+             // 2^19, 2^13, 2^10, 2^8 times it in 2-D to 6-D; but for walls whose place does not matter
   kInteger,  // in integers of fixed width: all differences of coordinates are multiples of one power of two, below
              // 2^62 times it
   kWideInteger,  // the same, 2^126
   kBigInteger,   // in integers of any size
 };
 
+// Eight bytes, so that it is returned in a register.
 struct ExactDecision {
   Sign sign = Sign::kZero;  // kPositive: cut off
   Stage stage = Stage::kInteger;

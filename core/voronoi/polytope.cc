@@ -210,13 +210,14 @@ WELLSPACE_INLINE void Polytope<D>::FindCutEdges() {
   cut_count_ = static_cast<size_t>(edge - cut_edges_.data());
 }
 
-// Computes where `plane` meets the cut edges: by how much their ends exceed it, where that is good enough to decide on
-// cuts; else from the planes.
+// Computes where `plane` meets the cut edges: by how much their ends exceed it, or, of edges that are short enough, at their ends, where that is good
+// enough to decide on cuts; else from the planes.
 //
-// With k and r the ends as computed, s their larger slack, d = r - k, e_k < 0 < e_r their excesses as computed and eps
+// With k and r the ends as computed, s their larger slack, d = r - k, e_k and e_r their excesses as computed and eps
 // the bound on the errors of those, t = e_k / (e_k - e_r) differs from that of the exact ends by |e_r a - e_k b| / (g (g +
-// b - a)), where g = e_r - e_k and |a|, |b| <= eps are the errors: at most eps / (g - 2 eps), since |e_r| + |e_k| = g. The
-// exact node lies between the exact ends, so k + t d is wrong by at most s + eps / (g - 2 eps) (|d| + 2 s) and the
+// b - a)), where g = e_r - e_k and |a|, |b| <= eps are the errors: since e_k <= eps and e_r >= -eps, |e_r| + |e_k| is g + 2 eps at
+// most, and this eps (g + 2 eps) / (g (g - 2 eps)), less than 1.02 eps / g from g = 256 eps on. The
+// exact node lies between the exact ends, so k + t d is wrong by at most s + 1.02 eps / g (|d| + 2 s), k itself by s + |d| + 2 s, and the
 // rounding: of each coordinate of k + t d, of t and of t d, less than 4 u (|k| + |d|) <= 12 u R where R >= |k|, |r|. The
 // new slack has to hold 16 u |x| <= 16 u R of its own; 4 u R more pays for the roundings of the bound.
 template <int D>
@@ -255,13 +256,17 @@ WELLSPACE_INLINE void Polytope<D>::PlaceCutEdges(uint16_t plane) {
     for (int i = 0; i < D; ++i) {
       distance += std::abs(along[i / kWidth][i % kWidth]);
     }
-    double new_slack = slack + rounding + 1.01 * doubt * inverse * distance;
+    double new_slack = slack + rounding + 1.02 * doubt * inverse * distance;
     Row& placed = all_placed[j];
-    if ((t > 0) & (t < 1) & (gap > 256 * doubt) & (new_slack < most)) {
+    if ((gap > 256 * doubt) & (new_slack < most)) {
       x[D / kWidth][D % kWidth] = new_slack;
       for (size_t v = 0; v < kVectors; ++v) {
         LanesAt<kWidth>(placed.values, v * kWidth) = x[v];
       }
+    } else if (slack + rounding + distance < most) {  // as between nodes that a tie leaves at one place
+      new_slack = slack + rounding + distance;
+      placed = kept;
+      placed.values[D] = new_slack;
     } else {
       const std::array<uint16_t, D> indices = PlanesOn(edge.kept, plane);
       const std::array<uint32_t, D> ranks = RanksOf(indices);

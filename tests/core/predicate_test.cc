@@ -441,6 +441,41 @@ TYPED_TEST(PredicateTest, StageIsTheCheapestThatServes) {
   }
 }
 
+// A wall at a place of many bits, and D - 1 bisectors: it matters unless that of u holds the line along which they meet.
+TYPED_TEST(PredicateTest, AWallWhosePlaceDoesNotMatterNeedsNoBits) {
+  constexpr int D = TypeParam::kValue;
+  const auto unit = [](int axis) {
+    Point<D> p{};
+    p[axis] = 1;
+    return p;
+  };
+  for (const double place : {1 + 0x1p-40, -1 - 0x1p-40, 0x1p-50}) {
+    Planes<D> planes;
+    Decided<D> p{};
+    for (int j = 0; j < D - 1; ++j) {
+      planes[j].generator = p[j + 1] = unit(j);
+    }
+    planes[D - 1] = {.generator = {}, .coordinate = place, .axis = D - 1};
+    p[D][D - 1] = 2 * place;  // the mirror image of the site
+    p[D + 1].fill(1);
+    const ExactDecision other = DecideCut<D>(p[0], planes, p[D + 1], TieRule::kKeep);
+    EXPECT_NE(other.stage, Stage::kWord);
+    EXPECT_EQ(other.sign, SignByInSphere<D>(p));
+    if (D == 2) {
+      continue;  // no bisector holds the line of another
+    }
+    p[D + 1][D - 1] = 0;
+    EXPECT_EQ(SignByInSphere<D>(p), Sign::kZero);
+    for (const TieRule rule : {TieRule::kKeep, TieRule::kPerturb}) {
+      const ExactDecision decision = DecideCut<D>(p[0], planes, p[D + 1], rule);
+      EXPECT_EQ(decision.stage, Stage::kWord);
+      planes[D - 1].coordinate = place < 0 ? -1 : 1;
+      EXPECT_EQ(decision.sign, DecideCut<D>(p[0], planes, p[D + 1], rule).sign);
+      planes[D - 1].coordinate = place;
+    }
+  }
+}
+
 // The corner of a cube, its site moved so that the largest difference is 2^(bits - 1) + 1 times the smallest.
 TYPED_TEST(PredicateTest, StagesEndAtTheirBits) {
   constexpr int D = TypeParam::kValue;
