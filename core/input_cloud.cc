@@ -83,35 +83,51 @@ absl::Status CheckFaces(const Domain<D>& domain, const Point<D>& p, std::span<co
   return absl::OkStatus();
 }
 
-// Sorts those among `entries`, which are in the order of their prefixes, that share theirs, by cube and input.
-template <int D, typename Entry, typename CubeOf>
-absl::Status SortAlike(HugeVector<Entry>& entries, CubeOf cube_of, const RunContext& context) {
-  std::vector<std::pair<GridPoint<D>, Entry>> alike;
-  size_t groups = 0;
+// A point that is sorted: half of its prefix on the Z curve, and its number.
+struct Entry {
+  uint32_t half = 0;
+  uint32_t input = 0;
+};
+
+// Sorts by those halves. `scratch` is as long.
+absl::Status SortByHalves(std::span<Entry> entries, std::span<Entry> scratch, const RunContext& context) {
+  return CancellableRadixSort(
+      entries, scratch, [](const Entry& entry) { return entry.half; }, context);
+}
+
+// Calls f(begin, count) -> absl::Status for each run of entries that share their half and are several.
+template <typename F>
+absl::Status ForEachRun(std::span<const Entry> entries, F f, const RunContext& context) {
+  size_t runs = 0;
   for (size_t begin = 0, end = 0; begin < entries.size(); begin = end) {
-    if (++groups % kStepsBetweenChecks == 0) {
+    if (++runs % kStepsBetweenChecks == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
-    while (end < entries.size() && entries[end].prefix == entries[begin].prefix) {
+    while (end < entries.size() && entries[end].half == entries[begin].half) {
       ++end;
     }
-    if (end - begin == 1) {
-      continue;
-    }
-    alike.clear();
-    for (size_t i = begin; i < end; ++i) {
-      alike.emplace_back(cube_of(entries[i]), entries[i]);
-    }
-    WELLSPACE_RETURN_IF_ERROR(CancellableSort(
-        alike,
-        [](const auto& a, const auto& b) {
-          return a.first != b.first ? MortonLess<D>(a.first, b.first) : a.second.input < b.second.input;
-        },
-        context));
-    for (size_t i = begin; i < end; ++i) {
-      entries[i] = alike[i - begin].second;
+    if (end - begin > 1) {
+      WELLSPACE_RETURN_IF_ERROR(f(begin, end - begin));
     }
   }
+  return absl::OkStatus();
+}
+
+// Sorts entries by cube_of(entry) on the Z curve, those of one cube by number. `with_cubes` is scratch.
+template <int D, typename CubeOf>
+absl::Status SortByCubes(std::span<Entry> entries, CubeOf cube_of,
+                         std::vector<std::pair<GridPoint<D>, Entry>>& with_cubes, const RunContext& context) {
+  with_cubes.clear();
+  for (const Entry& entry : entries) {
+    with_cubes.emplace_back(cube_of(entry), entry);
+  }
+  WELLSPACE_RETURN_IF_ERROR(CancellableSort(
+      with_cubes,
+      [](const auto& a, const auto& b) {
+        return a.first != b.first ? MortonLess<D>(a.first, b.first) : a.second.input < b.second.input;
+      },
+      context));
+  std::transform(with_cubes.begin(), with_cubes.end(), entries.begin(), [](const auto& one) { return one.second; });
   return absl::OkStatus();
 }
 
@@ -167,10 +183,6 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<cons
   const size_t count = points.size() / D;
   SortedCloud<D> cloud{MortonGrid<D>(domain.scaled_box, count), {}, {}, {}};
   const MortonGrid<D>& grid = cloud.grid;
-  struct Entry {
-    uint64_t prefix;
-    uint32_t input;
-  };
   const auto point_of = [&](const Entry& entry) { return domain.Scaled(PointAt<D>(points, entry.input)); };
   const auto cube_of = [&](const Entry& entry) { return grid.CubeOf(point_of(entry)); };
   const double unscale = 1 / domain.scale;  // a power of two
@@ -196,14 +208,32 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<cons
             i, k, p[k], box.LongestSide()));
       }
     }
-    entries.push_back({MortonPrefix<D>(grid.CubeOf(scaled_p), grid.levels()), static_cast<uint32_t>(i)});
+    const uint64_t prefix = MortonPrefix<D>(grid.CubeOf(scaled_p), grid.levels());
+    entries.push_back({static_cast<uint32_t>(prefix >> 32), static_cast<uint32_t>(i)});
   }
-  WELLSPACE_RETURN_IF_ERROR(CancellableRadixSort(
-      entries, [](const Entry& entry) { return entry.prefix; }, context));
-  WELLSPACE_RETURN_IF_ERROR(SortAlike<D>(entries, cube_of, context));
+  // By the upper halves of the prefixes; those that share it, which are few in most clouds, by the lower, and then by what follows.
+  {
+    const std::span<Entry> all(entries);
+    HugeVector<Entry> scratch(count);
+    std::vector<std::pair<GridPoint<D>, Entry>> with_cubes;
+    const auto sort_run = [&](size_t begin, size_t size) {
+      const std::span<Entry> run = all.subspan(begin, size);
+      for (Entry& entry : run) {
+        entry.half = static_cast<uint32_t>(MortonPrefix<D>(cube_of(entry), grid.levels()));
+      }
+      WELLSPACE_RETURN_IF_ERROR(SortByHalves(run, std::span(scratch).subspan(begin, size), context));
+      const auto sort_alike = [&](size_t from, size_t alike) {
+        return SortByCubes<D>(run.subspan(from, alike), cube_of, with_cubes, context);
+      };
+      return ForEachRun(run, sort_alike, context);
+    };
+    WELLSPACE_RETURN_IF_ERROR(SortByHalves(all, scratch, context));
+    WELLSPACE_RETURN_IF_ERROR(ForEachRun(all, sort_run, context));
+  }
 
   // Points of one cube are equal, or too close to be served.
-  cloud.points.reserve(count + (size_t{1} << D));  // the corners of the box may follow
+  cloud.points.reserve(count + count / 8 +
+                       (size_t{1} << D));  // the corners of the box may follow, and room for more vertices
   cloud.first_input.reserve(count);
   cloud.sorted_index.assign(count, 0);
   for (size_t i = 0; i < count; ++i) {
@@ -216,7 +246,7 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<cons
       __builtin_prefetch(&cloud.sorted_index[soon], 1);
     }
     const Point<D> p = point_of(entries[i]);
-    const bool may_be_alike = i > 0 && entries[i].prefix == entries[i - 1].prefix;
+    const bool may_be_alike = i > 0 && entries[i].half == entries[i - 1].half;
     if (!may_be_alike || cube_of(entries[i]) != cube_of(entries[i - 1])) {
       WELLSPACE_RETURN_IF_ERROR(CheckFaces<D>(domain, p, points, entries[i].input));
       cloud.points.push_back(p);

@@ -18,7 +18,7 @@
 namespace wellspace::core {
 
 // Where points are read in another order than they lie in, they are asked for so many before they are needed.
-inline constexpr uint32_t kAhead = 16;
+inline constexpr uint32_t kAhead = 12;
 
 // The box that is meshed, and the power of two that brings it to a scale on which no product of lengths overflows.
 template <int D>

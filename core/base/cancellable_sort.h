@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "core/base/huge_pages.h"
 #include "core/base/run_context.h"
 #include "core/base/status_macros.h"
 
@@ -51,27 +50,36 @@ absl::Status CancellableSort(std::vector<T>& items, Less less, const RunContext&
   return absl::OkStatus();
 }
 
-// Sorts `items` by the bytes of key(item) from number `first` to before `end`, the lowest being 0; `scratch` is as long. Those in which
-// these are equal stay in order.
+// Sorts `items` by key(item), a uint32_t; those with equal keys stay in order. `scratch` is as long.
 //
-// REQUIRES:   there is an item.
-// Source:     radix sort from the lowest byte up; bytes that all keys share are passed over.
+// Complexity: O(n).
+// Errors:     as CancellableSort.
+// Source:     radix sort from the lowest byte up, bytes that all keys share are passed over; a few items by insertion.
 template <typename T, typename Key>
-absl::Status RadixSortByBytes(std::span<T> items, std::span<T> scratch, int first, int end, Key key,
-                              const RunContext& context) {
-  const auto byte_of = [&](const T& item, int byte) { return static_cast<uint8_t>(key(item) >> (8 * byte)); };
+absl::Status CancellableRadixSort(std::span<T> items, std::span<T> scratch, Key key, const RunContext& context) {
+  constexpr int kBytes = sizeof(uint32_t);
+  constexpr size_t kFew = 32;
   const size_t count = items.size();
-  std::array<std::array<size_t, 256>, sizeof(uint64_t)> places{};  // at first the number of items with the byte
+  if (count <= kFew) {
+    for (size_t i = 1; i < count; ++i) {
+      for (size_t j = i; j > 0 && key(items[j]) < key(items[j - 1]); --j) {
+        std::swap(items[j], items[j - 1]);
+      }
+    }
+    return absl::OkStatus();
+  }
+  const auto byte_of = [&](const T& item, int byte) { return static_cast<uint8_t>(key(item) >> (8 * byte)); };
+  std::array<std::array<size_t, 256>, kBytes> places{};  // at first the number of items with the byte
   for (size_t i = 0; i < count; ++i) {
     if (i % kStepsBetweenChecks == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
-    for (int byte = first; byte < end; ++byte) {
+    for (int byte = 0; byte < kBytes; ++byte) {
       ++places[byte][byte_of(items[i], byte)];
     }
   }
   bool is_in_scratch = false;
-  for (int byte = first; byte < end; ++byte) {
+  for (int byte = 0; byte < kBytes; ++byte) {
     if (places[byte][byte_of(items[0], byte)] == count) {
       continue;
     }
@@ -90,48 +98,6 @@ absl::Status RadixSortByBytes(std::span<T> items, std::span<T> scratch, int firs
   }
   if (is_in_scratch) {
     std::copy(items.begin(), items.end(), scratch.begin());
-  }
-  return absl::OkStatus();
-}
-
-// Sorts `items` by key(item), a uint64_t; those with equal keys stay in order.
-//
-// Complexity: O(n), with space for a second copy of the items.
-// Errors:     as CancellableSort.
-// Source:     radix sort by the upper half of the keys, then, among those that share it, by the lower: few do in most clouds.
-template <typename Items, typename Key>
-absl::Status CancellableRadixSort(Items& items, Key key, const RunContext& context) {
-  using T = typename Items::value_type;
-  constexpr int kBytes = sizeof(uint64_t);
-  constexpr size_t kFew = 32;
-  if (items.empty()) {
-    return absl::OkStatus();
-  }
-  HugeVector<T> scratch(items.size());
-  const std::span<T> all(items);
-  const std::span<T> room(scratch);
-  WELLSPACE_RETURN_IF_ERROR(RadixSortByBytes(all, room, kBytes / 2, kBytes, key, context));
-  const auto upper = [&](size_t i) { return key(items[i]) >> (8 * kBytes / 2); };
-  size_t groups = 0;
-  for (size_t begin = 0, end = 0; begin < items.size(); begin = end) {
-    if (++groups % kStepsBetweenChecks == 0) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-    }
-    ++end;
-    while (end < items.size() && upper(end) == upper(begin)) {
-      ++end;
-    }
-    const size_t count = end - begin;
-    if (count > kFew) {
-      WELLSPACE_RETURN_IF_ERROR(
-          RadixSortByBytes(all.subspan(begin, count), room.subspan(begin, count), 0, kBytes / 2, key, context));
-      continue;
-    }
-    for (size_t i = begin + 1; i < end; ++i) {
-      for (size_t j = i; j > begin && key(items[j]) < key(items[j - 1]); --j) {
-        std::swap(items[j], items[j - 1]);
-      }
-    }
   }
   return absl::OkStatus();
 }

@@ -9,6 +9,14 @@
 #include "core/base/status_macros.h"
 
 namespace wellspace::core {
+namespace {
+
+// The next larger number with the same bits in `fixed`.
+constexpr uint32_t NextAlong(uint32_t number, uint32_t fixed) {
+  return (((number | fixed) + 1) & ~fixed) | (number & fixed);
+}
+
+}  // namespace
 
 template <int D>
 absl::Status LeafTree<D>::Build(const MortonGrid<D>& grid, std::span<const Point<D>> points, uint64_t max_leaves,
@@ -292,13 +300,17 @@ bool LeafTree<D>::IsTooCoarse(NodeId leaf) {
   const Range& own = ranges_[Index(leaf)];
   near_.assign(points_.begin() + own.begin, points_.begin() + own.end);
   bool touches_crowded = false;
-  ForEachTouching(leaf, [&](NodeId other) {
+  ForEachTouching(leaf, [&](NodeId other, Sides facing) {
     // One that is crowded is half as large and will be split again, so that balance asks for this leaf to be split.
     touches_crowded |= ranges_[Index(other)].size() > kLeafCapacity;
     if (touches_crowded) {
       return;
     }
-    for (const Point<D>& p : RimOf(other)) {
+    const Range& range = WithRim(other);
+    if ((facing & ~range.rim_sides) != 0) {
+      return;
+    }
+    for (const Point<D>& p : std::span(rim_points_).subspan(range.rim_begin, range.rim_size)) {
       if (DistanceSq<D>(p, cube) <= reach * reach) {
         near_.push_back(p);
       }
@@ -307,7 +319,7 @@ bool LeafTree<D>::IsTooCoarse(NodeId leaf) {
   return touches_crowded || HasNearFeatures(cube, reach);
 }
 
-// Calls f(NodeId) for each leaf under construction that touches `leaf`, once.
+// Calls f(NodeId, Sides) for each leaf under construction that touches `leaf`, once: with its sides that do.
 //
 // Complexity: O(6^D), for most leaves O(4^D).
 template <int D>
@@ -332,33 +344,39 @@ void LeafTree<D>::ForEachTouching(NodeId leaf, F&& f) const {
       continue;
     }
     const Node& node = At(around[axes]);
+    // Along `axes` these nodes are on the side of the parent that the leaf is on: above it, or else below.
+    const uint32_t above = axes & own;
     if (node.first_child == kNoNode) {
-      f(around[axes]);
+      f(around[axes], SidesOf(above, axes ^ above));
       continue;
     }
     const uint32_t facing = own ^ axes;
-    for (uint32_t child = 0; child < kChildren; ++child) {
+    // Those children touch the leaf that face it along `axes`; of the children of one, those that face it along all axes that tell the two apart.
+    for (uint32_t child = facing & axes; child < kChildren; child = NextAlong(child, axes)) {
       const NodeId id = Child(node, child);
-      if (((child ^ facing) & axes) != 0 || id == leaf || At(id).outside) {
+      if (id == leaf || At(id).outside) {
         continue;
       }
+      const uint32_t beside = (child ^ own) & ~axes;
+      const Sides sides = SidesOf(above | (beside & child), (axes ^ above) | (beside & own));
       if (At(id).first_child == kNoNode) {
-        f(id);
+        f(id, sides);
         continue;
       }
-      for (uint32_t grandchild = 0; grandchild < kChildren; ++grandchild) {
+      const uint32_t apart = child ^ own;
+      for (uint32_t grandchild = facing & apart; grandchild < kChildren; grandchild = NextAlong(grandchild, apart)) {
         const NodeId smaller = Child(At(id), grandchild);
-        if (((grandchild ^ facing) & (child ^ own)) == 0 && !At(smaller).outside) {
-          f(smaller);
+        if (!At(smaller).outside) {
+          f(smaller, sides);
         }
       }
     }
   }
 }
 
-// The points of a leaf that may be within reach of a leaf that touches it, and is twice as large at most.
+// The range of a leaf, with the points that may be within reach of a leaf that touches it, and is twice as large at most.
 template <int D>
-std::span<const Point<D>> LeafTree<D>::RimOf(NodeId leaf) {
+const typename LeafTree<D>::Range& LeafTree<D>::WithRim(NodeId leaf) {
   Range& range = ranges_[Index(leaf)];
   if (range.rim_size == Range::kUnknown) {
     const double side = SideOf(leaf);
@@ -367,19 +385,27 @@ std::span<const Point<D>> LeafTree<D>::RimOf(NodeId leaf) {
     for (double& x : centre) {
       x += 0.5 * side;
     }
-    range.rim_begin = rim_points_.size();
+    const size_t begin = rim_points_.size();
+    size_t end = begin;
+    rim_points_.resize(begin + range.size());
     for (const Point<D>& p : points_.subspan(range.begin, range.size())) {
-      double farthest = 0;
+      uint32_t low = 0;
+      uint32_t high = 0;
       for (int i = 0; i < D; ++i) {
-        farthest = std::max(farthest, std::abs(p[i] - centre[i]));
+        const double x = p[i] - centre[i];
+        low |= (x <= -inner ? 1u : 0u) << i;
+        high |= (x >= inner ? 1u : 0u) << i;
       }
-      if (farthest >= inner) {
-        rim_points_.push_back(p);
-      }
+      // No branch, since none could be foretold.
+      rim_points_[end] = p;
+      end += (low | high) != 0 ? 1 : 0;
+      range.rim_sides |= SidesOf(low, high);
     }
-    range.rim_size = static_cast<uint32_t>(rim_points_.size() - range.rim_begin);
+    rim_points_.resize(end);
+    range.rim_begin = begin;
+    range.rim_size = static_cast<uint32_t>(end - begin);
   }
-  return {rim_points_.data() + range.rim_begin, range.rim_size};
+  return range;
 }
 
 // Whether two features (points of near_, faces of the box that a point does not lie on) are both within `reach` of one

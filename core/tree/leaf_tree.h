@@ -174,7 +174,11 @@ class LeafTree {
     bool outside = false;  // no part of the box in its interior
   };
 
-  // Of a node under construction: its points, and those of a leaf near its faces, in rim_points_.
+  // Sides of a cube: a bit for each axis along which it is the low one, and so for high ones.
+  using Sides = uint32_t;
+  static constexpr Sides SidesOf(uint32_t low, uint32_t high) { return low | high << D; }
+
+  // Of a node under construction: its points, and those of a leaf near its sides, in rim_points_.
   struct Range {
     static constexpr uint32_t kUnknown = ~uint32_t{0};
     uint32_t begin = 0;
@@ -182,6 +186,7 @@ class LeafTree {
     NodeId parent = kNoNode;
     uint32_t rim_size = kUnknown;
     size_t rim_begin = 0;
+    Sides rim_sides = 0;  // those that any of them is near
     uint32_t size() const { return end - begin; }
   };
 
@@ -231,7 +236,7 @@ class LeafTree {
   bool IsTooCoarse(NodeId leaf);
   template <typename F>
   void ForEachTouching(NodeId leaf, F&& f) const;
-  std::span<const Point<D>> RimOf(NodeId leaf);
+  const Range& WithRim(NodeId leaf);
   bool HasNearFeatures(const Box<D>& cube, double reach) const;
 
   Box<D> box_;
