@@ -380,7 +380,7 @@ bool ToRows(const Differences<D>& differences, const std::array<PlaneSource<D>, 
 }
 
 // The rows in the unit in which the largest difference has all bits that a word takes; false where some are no integers. But a wall may be at a place
-// that is none: it is left out of `rows` and its bit set in `unfit_walls`.
+// that is none: its bit is set in `unfit_walls` then, and its offset means nothing.
 template <int D>
 bool ToWordRows(const Differences<D>& differences, const std::array<PlaneSource<D>, D>& planes,
                 const DecisionWeights<D>* weights, Rows<WordRing<D>, D>& rows, uint32_t& unfit_walls) {
