@@ -232,8 +232,8 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<cons
   }
 
   // Points of one cube are equal, or too close to be served.
-  cloud.points.reserve(count + count / 8 +
-                       (size_t{1} << D));  // the corners of the box may follow, and room for more vertices
+  // The corners of the box may follow, and the first of the vertices that are added.
+  cloud.points.reserve(count + count / 8 + (size_t{1} << D));
   cloud.first_input.reserve(count);
   cloud.sorted_index.assign(count, 0);
   for (size_t i = 0; i < count; ++i) {

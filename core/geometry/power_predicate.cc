@@ -139,7 +139,10 @@ struct WordRing {
     sum += negate ? -term : term;
   }
 
-  // As that of FixedRing.
+  static int64_t FromInteger(int64_t value) { return value; }
+  static bool IsNegative(int64_t entry) { return entry < 0; }
+  static int64_t Twice(int64_t entry) { return 2 * (entry < 0 ? -entry : entry); }
+  static void AddSquare(int64_t& sum, int64_t entry) { sum += entry * entry; }
   static bool AddWeight(int64_t& sum, double weight, bool negate, int unit) {
     if (weight == 0) {
       return true;
@@ -284,7 +287,7 @@ struct Differences {
       high.pair(row, i) = difference;
       low.pair(row, i) = (b_virtual - b) + (a - a_virtual);
       const Pair magnitude = difference > -difference ? difference : -difference;
-      largest = largest > magnitude ? largest : magnitude;
+      largest = magnitude > largest ? magnitude : largest;
     };
     for (int j = 0; j <= D; ++j) {
       if (j < D && planes[j].IsWall()) {
@@ -306,15 +309,15 @@ struct Differences {
   }
 };
 
-// Calls to_entry(high, low, entry) for every difference and completes the rows; false as soon as one call is.
+// Calls to_entry(row, axis, entry) for every difference and completes the rows; false as soon as one call is.
 template <typename Ring, int D, typename ToEntry>
-inline bool FillRows(const Differences<D>& differences, const std::array<PlaneSource<D>, D>& planes,
-                     const DecisionWeights<D>* weights, int unit, ToEntry to_entry, Rows<Ring, D>& rows) {
+inline bool FillRows(const std::array<PlaneSource<D>, D>& planes, const DecisionWeights<D>* weights, int unit,
+                     ToEntry to_entry, Rows<Ring, D>& rows) {
   for (int j = 0; j <= D; ++j) {
     if (j < D && planes[j].IsWall()) {
       const int axis = planes[j].axis;
       typename Ring::Entry offset{};
-      if (!to_entry(differences.high.rows[j][axis], differences.low.rows[j][axis], offset)) {
+      if (!to_entry(j, axis, offset)) {
         return false;
       }
       rows.normals[j].fill(Ring::FromInteger(0));
@@ -324,7 +327,7 @@ inline bool FillRows(const Differences<D>& differences, const std::array<PlaneSo
     }
     rows.offsets[j] = {};
     for (int i = 0; i < D; ++i) {
-      if (!to_entry(differences.high.rows[j][i], differences.low.rows[j][i], rows.normals[j][i])) {
+      if (!to_entry(j, i, rows.normals[j][i])) {
         return false;
       }
       Ring::AddSquare(rows.offsets[j], rows.normals[j][i]);
@@ -360,13 +363,13 @@ bool ToRows(const Differences<D>& differences, const std::array<PlaneSource<D>, 
     return static_cast<double>(integer) * inverse == x;
   };
   return FillRows<Ring, D>(
-      differences, planes, weights, unit,
-      [&](double high, double low, Ring::Entry& entry) {
+      planes, weights, unit,
+      [&](int row, int axis, Ring::Entry& entry) {
         int64_t whole = 0;
-        if (!to_integer(high, whole)) {
+        if (!to_integer(differences.high.rows[row][axis], whole)) {
           return false;
         }
-        if (low != 0) {
+        if (const double low = differences.low.rows[row][axis]; low != 0) {
           int64_t rest = 0;
           if (!to_integer(low, rest)) {
             return false;
@@ -416,27 +419,13 @@ bool ToWordRows(const Differences<D>& differences, const std::array<PlaneSource<
       }
     }
   }
-  for (int j = 0; j <= D; ++j) {
-    const int64_t* const row = integers.rows[j];
-    if (j < D && planes[j].IsWall()) {
-      const int axis = planes[j].axis;
-      rows.normals[j].fill(0);
-      rows.normals[j][axis] = row[axis] < 0 ? -1 : 1;
-      rows.offsets[j] = 2 * std::abs(row[axis]);
-      continue;
-    }
-    std::copy_n(row, D, rows.normals[j].begin());
-    rows.offsets[j] = 0;
-    for (int i = 0; i < D; ++i) {
-      rows.offsets[j] += row[i] * row[i];
-    }
-    if (weights != nullptr &&
-        !(WordRing<D>::AddWeight(rows.offsets[j], weights->site, false, unit) &&
-          WordRing<D>::AddWeight(rows.offsets[j], j < D ? weights->generators[j] : weights->u, true, unit))) {
-      return false;
-    }
-  }
-  return true;
+  return FillRows<WordRing<D>, D>(
+      planes, weights, unit,
+      [&](int row, int axis, int64_t& entry) {
+        entry = integers.rows[row][axis];
+        return true;
+      },
+      rows);
 }
 
 // The rows in units of the finest difference, if they fit in 126 bits.
@@ -462,9 +451,10 @@ bool ToRows(const Differences<D>& differences, const std::array<PlaneSource<D>, 
     return scaled.mantissa == 0 ? 0 : Signed128{scaled.mantissa} * (Signed128{1} << (scaled.exponent - unit));
   };
   return FillRows<FixedRing<2>, D>(
-      differences, planes, weights, unit,
-      [&](double high, double low, SignedMagnitude<2>& entry) {
-        const Signed128 value = to_integer(high) + to_integer(low);
+      planes, weights, unit,
+      [&](int row, int axis, SignedMagnitude<2>& entry) {
+        const Signed128 value =
+            to_integer(differences.high.rows[row][axis]) + to_integer(differences.low.rows[row][axis]);
         const auto magnitude = static_cast<Unsigned128>(value < 0 ? -value : value);
         entry.is_negative = value < 0;
         entry.magnitude = {static_cast<uint64_t>(magnitude), static_cast<uint64_t>(magnitude >> 64)};

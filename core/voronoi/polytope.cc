@@ -263,8 +263,9 @@ WELLSPACE_INLINE void Polytope<D>::PlaceCutEdges(uint16_t plane) {
       for (size_t v = 0; v < kVectors; ++v) {
         LanesAt<kWidth>(placed.values, v * kWidth) = x[v];
       }
-    } else if (slack + rounding + distance < most) {  // as between nodes that a tie leaves at one place
-      new_slack = slack + rounding + distance;
+    } else if (const double at_end = slack + rounding + distance;
+               at_end < most) {  // as between nodes that a tie leaves at one place
+      new_slack = at_end;
       placed = kept;
       placed.values[D] = new_slack;
     } else {
