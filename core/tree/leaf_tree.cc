@@ -38,7 +38,7 @@ absl::Status LeafTree<D>::Build(const MortonGrid<D>& grid, std::span<const Point
   ranges_.assign(1, Range{.end = static_cast<uint32_t>(points.size())});
   pending_.assign(grid.levels() + 1, {});
   pending_[0].push_back(NodeId{0});
-  rim_points_ = {};
+  around_ = {};
 
   uint32_t looked_at = 0;
   for (int level = 0; level < max_level_; ++level) {
@@ -86,7 +86,7 @@ absl::Status LeafTree<D>::Build(const MortonGrid<D>& grid, std::span<const Point
   ranges_ = {};
   pending_ = {};
   near_ = {};
-  rim_points_ = {};
+  around_ = {};
   return absl::OkStatus();
 }
 
@@ -275,6 +275,15 @@ void LeafTree<D>::DistributeRange(NodeId parent) {
       pending_[At(id).level].push_back(id);
     }
   }
+  HandDown(parent);
+  const bool is_crowded = ranges_[Index(parent)].size() > kLeafCapacity;
+  for (uint32_t child = 0; child < kChildren; ++child) {
+    const NodeId id = Child(At(parent), child);
+    if (ranges_[Index(id)].size() != 0 && ranges_[Index(id)].size() <= kLeafCapacity) {
+      // Whoever is beyond the parent has been told by that, unless it was crowded.
+      TellAround(id, is_crowded ? SidesOf(kChildren - 1, kChildren - 1) : SidesOf(child, kChildren - 1 - child));
+    }
+  }
 }
 
 template <int D>
@@ -291,50 +300,94 @@ void LeafTree<D>::DistributeBucket(NodeId parent) {
 // Whether lfs somewhere on the leaf is below side / kCoarseness, up to a factor of two; see HasNearFeatures.
 template <int D>
 bool LeafTree<D>::IsTooCoarse(NodeId leaf) {
-  const Box<D> cube = BoxOf(leaf);
   const double side = SideOf(leaf);
   if (side > box_.ShortestSide()) {
     return true;
   }
-  const double reach = side / kCoarseness;
   const Range& own = ranges_[Index(leaf)];
   near_.assign(points_.begin() + own.begin, points_.begin() + own.end);
-  bool touches_crowded = false;
-  ForEachTouching(leaf, [&](NodeId other, Sides facing) {
-    // One that is crowded is half as large and will be split again, so that balance asks for this leaf to be split.
-    touches_crowded |= ranges_[Index(other)].size() > kLeafCapacity;
-    if (touches_crowded) {
-      return;
-    }
-    const Range& range = WithRim(other);
-    if ((facing & ~range.rim_sides) != 0) {
-      return;
-    }
-    for (const Point<D>& p : std::span(rim_points_).subspan(range.rim_begin, range.rim_size)) {
-      if (DistanceSq<D>(p, cube) <= reach * reach) {
-        near_.push_back(p);
-      }
-    }
-  });
-  return touches_crowded || HasNearFeatures(cube, reach);
+  for (uint32_t i = own.first_around; i != kNone; i = around_[i].next) {
+    near_.push_back(around_[i].p);
+  }
+  return HasNearFeatures(BoxOf(leaf), ReachOf(leaf));
 }
 
-// Calls f(NodeId, Sides) for each leaf under construction that touches `leaf`, once: with its sides that do.
+// Hands those points around `parent` that are within reach of a child down to it.
+template <int D>
+void LeafTree<D>::HandDown(NodeId parent) {
+  for (uint32_t i = ranges_[Index(parent)].first_around; i != kNone; i = around_[i].next) {
+    const Point<D> p = around_[i].p;
+    for (int child = 0; child < kChildren; ++child) {
+      AddAround(Child(At(parent), child), p);
+    }
+  }
+}
+
+// Puts down that `p`, a point outside the node, is around it, if it is within reach.
+template <int D>
+void LeafTree<D>::AddAround(NodeId node, const Point<D>& p) {
+  const double reach = ReachOf(node);
+  if (!At(node).outside && DistanceSq<D>(p, BoxOf(node)) <= reach * reach) {
+    uint32_t& first = ranges_[Index(node)].first_around;
+    around_.push_back({p, first});
+    first = static_cast<uint32_t>(around_.size() - 1);
+  }
+}
+
+// Tells the leaves that touch `leaf` of its points that are within their reach: of those, only the leaves beyond `sides`.
+template <int D>
+void LeafTree<D>::TellAround(NodeId leaf, Sides sides) {
+  const double side = SideOf(leaf);
+  // A leaf that touches it is twice as large at most.
+  const double inner = 0.5 * side - 2 * (1 + 0x1p-20) * ReachOf(leaf);
+  Point<D> centre = At(leaf).low;
+  for (double& x : centre) {
+    x += 0.5 * side;
+  }
+  const Range& range = ranges_[Index(leaf)];
+  near_.resize(range.size());
+  size_t count = 0;
+  Sides near_sides = 0;
+  for (const Point<D>& p : points_.subspan(range.begin, range.size())) {
+    uint32_t low = 0;
+    uint32_t high = 0;
+    for (int i = 0; i < D; ++i) {
+      const double x = p[i] - centre[i];
+      low |= (x <= -inner ? 1u : 0u) << i;
+      high |= (x >= inner ? 1u : 0u) << i;
+    }
+    // No branch, since none could be foretold.
+    near_[count] = p;
+    count += (low | high) != 0 ? 1 : 0;
+    near_sides |= SidesOf(low, high);
+  }
+  if ((near_sides & sides) != 0) {
+    ForEachTouching(leaf, near_sides & sides, [&](NodeId other) {
+      for (size_t i = 0; i < count; ++i) {
+        AddAround(other, near_[i]);
+      }
+    });
+  }
+}
+
+// Calls f(NodeId) for each leaf under construction that touches `leaf` by no other of its sides than `sides`, once.
 //
 // Complexity: O(6^D), for most leaves O(4^D).
 template <int D>
 template <typename F>
-void LeafTree<D>::ForEachTouching(NodeId leaf, F&& f) const {
+void LeafTree<D>::ForEachTouching(NodeId leaf, Sides sides, F&& f) const {
   const NodeId parent = ranges_[Index(leaf)].parent;
-  if (parent == kNoNode) {
-    return;
-  }
   const uint32_t own = Index(leaf) - Index(At(parent).first_child);
+  const Sides low = sides & (kChildren - 1);
+  const Sides high = sides >> D;
+  // The axes along which the leaf is looked beyond on the parent's side, and on that of its siblings.
+  const uint32_t outward = (low & ~own) | (high & own);
+  const uint32_t inward = (low & own) | (high & ~own);
   // The nodes of the parent's size that touch the leaf, by the axes along which one goes there from the parent. None is larger, since
   // the parent has been split.
   std::array<NodeId, kChildren> around;
   around[0] = parent;
-  for (uint32_t axes = 0; axes < kChildren; ++axes) {
+  for (uint32_t axes = 0; axes < kChildren; axes = NextAlong(axes, kChildren - 1 - outward)) {
     if (axes != 0) {
       const int axis = std::countr_zero(axes);
       const NodeId before = around[axes & (axes - 1)];
@@ -344,68 +397,31 @@ void LeafTree<D>::ForEachTouching(NodeId leaf, F&& f) const {
       continue;
     }
     const Node& node = At(around[axes]);
-    // Along `axes` these nodes are on the side of the parent that the leaf is on: above it, or else below.
-    const uint32_t above = axes & own;
     if (node.first_child == kNoNode) {
-      f(around[axes], SidesOf(above, axes ^ above));
+      f(around[axes]);
       continue;
     }
-    const uint32_t facing = own ^ axes;
     // Those children touch the leaf that face it along `axes`; of the children of one, those that face it along all axes that tell the two apart.
-    for (uint32_t child = facing & axes; child < kChildren; child = NextAlong(child, axes)) {
+    const uint32_t facing = own ^ axes;
+    const uint32_t fixed = kChildren - 1 - (inward & ~axes);
+    for (uint32_t child = facing & fixed; child < kChildren; child = NextAlong(child, fixed)) {
       const NodeId id = Child(node, child);
       if (id == leaf || At(id).outside) {
         continue;
       }
-      const uint32_t beside = (child ^ own) & ~axes;
-      const Sides sides = SidesOf(above | (beside & child), (axes ^ above) | (beside & own));
       if (At(id).first_child == kNoNode) {
-        f(id, sides);
+        f(id);
         continue;
       }
       const uint32_t apart = child ^ own;
       for (uint32_t grandchild = facing & apart; grandchild < kChildren; grandchild = NextAlong(grandchild, apart)) {
         const NodeId smaller = Child(At(id), grandchild);
         if (!At(smaller).outside) {
-          f(smaller, sides);
+          f(smaller);
         }
       }
     }
   }
-}
-
-// The range of a leaf, with the points that may be within reach of a leaf that touches it, and is twice as large at most.
-template <int D>
-const typename LeafTree<D>::Range& LeafTree<D>::WithRim(NodeId leaf) {
-  Range& range = ranges_[Index(leaf)];
-  if (range.rim_size == Range::kUnknown) {
-    const double side = SideOf(leaf);
-    const double inner = 0.5 * side - 2 * (1 + 0x1p-20) * side / kCoarseness;
-    Point<D> centre = At(leaf).low;
-    for (double& x : centre) {
-      x += 0.5 * side;
-    }
-    const size_t begin = rim_points_.size();
-    size_t end = begin;
-    rim_points_.resize(begin + range.size());
-    for (const Point<D>& p : points_.subspan(range.begin, range.size())) {
-      uint32_t low = 0;
-      uint32_t high = 0;
-      for (int i = 0; i < D; ++i) {
-        const double x = p[i] - centre[i];
-        low |= (x <= -inner ? 1u : 0u) << i;
-        high |= (x >= inner ? 1u : 0u) << i;
-      }
-      // No branch, since none could be foretold.
-      rim_points_[end] = p;
-      end += (low | high) != 0 ? 1 : 0;
-      range.rim_sides |= SidesOf(low, high);
-    }
-    rim_points_.resize(end);
-    range.rim_begin = begin;
-    range.rim_size = static_cast<uint32_t>(end - begin);
-  }
-  return range;
 }
 
 // Whether two features (points of near_, faces of the box that a point does not lie on) are both within `reach` of one

@@ -94,7 +94,7 @@ class LeafTree {
   // What the tree takes in memory.
   uint64_t MemoryBytes() const {
     return nodes_.size() * sizeof(Node) + buckets_.MemoryBytes() + ranges_.size() * sizeof(Range) +
-           leaf_of_.size() * sizeof(NodeId) + rim_points_.size() * sizeof(Point<D>);
+           leaf_of_.size() * sizeof(NodeId) + around_.size() * sizeof(Around);
   }
   // Whether `node` is a leaf that covers a part of the box.
   bool IsLeaf(NodeId node) const { return At(node).first_child == kNoNode && !At(node).outside; }
@@ -178,16 +178,22 @@ class LeafTree {
   using Sides = uint32_t;
   static constexpr Sides SidesOf(uint32_t low, uint32_t high) { return low | high << D; }
 
-  // Of a node under construction: its points, and those of a leaf near its sides, in rim_points_.
+  // None in around_.
+  static constexpr uint32_t kNone = ~uint32_t{0};
+
+  // Of a node under construction: its points, and those around it.
   struct Range {
-    static constexpr uint32_t kUnknown = ~uint32_t{0};
     uint32_t begin = 0;
     uint32_t end = 0;
     NodeId parent = kNoNode;
-    uint32_t rim_size = kUnknown;
-    size_t rim_begin = 0;
-    Sides rim_sides = 0;  // those that any of them is near
+    uint32_t first_around = kNone;
     uint32_t size() const { return end - begin; }
+  };
+
+  // A point within reach of a node that it does not lie in.
+  struct Around {
+    Point<D> p;
+    uint32_t next = kNone;  // of the same node
   };
 
   double SideOf(const Node& node) const { return sides_[node.level]; }
@@ -234,9 +240,13 @@ class LeafTree {
 
   // The split rule of Build.
   bool IsTooCoarse(NodeId leaf);
+  // A leaf is split if two features are within this distance of it, and twice that of each other.
+  double ReachOf(NodeId leaf) const { return SideOf(leaf) / kCoarseness; }
+  void HandDown(NodeId parent);
+  void AddAround(NodeId node, const Point<D>& p);
+  void TellAround(NodeId leaf, Sides sides);
   template <typename F>
-  void ForEachTouching(NodeId leaf, F&& f) const;
-  const Range& WithRim(NodeId leaf);
+  void ForEachTouching(NodeId leaf, Sides sides, F&& f) const;
   bool HasNearFeatures(const Box<D>& cube, double reach) const;
 
   Box<D> box_;
@@ -252,7 +262,7 @@ class LeafTree {
   HugeVector<Range> ranges_;                  // by node
   std::vector<std::vector<NodeId>> pending_;  // leaves to be looked at, by level
   std::vector<Point<D>> near_;                // points near the leaf that is looked at
-  HugeVector<Point<D>> rim_points_;
+  HugeVector<Around> around_;
 };
 
 }  // namespace wellspace::core
