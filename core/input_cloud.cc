@@ -208,7 +208,7 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<cons
             i, k, p[k], box.LongestSide()));
       }
     }
-    const uint64_t prefix = MortonPrefix<D>(grid.CubeOf(scaled_p), grid.levels());
+    const uint64_t prefix = MortonPrefix<D, 32>(grid.CubeOf(scaled_p), grid.levels());
     entries.push_back({static_cast<uint32_t>(prefix >> 32), static_cast<uint32_t>(i)});
   }
   // By the upper halves of the prefixes; those that share it, which are few in most clouds, by the lower, and then by what follows.

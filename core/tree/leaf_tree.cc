@@ -75,11 +75,13 @@ absl::Status LeafTree<D>::Build(const MortonGrid<D>& grid, std::span<const Point
     if (!IsLeaf(NodeId{i})) {
       continue;
     }
-    if (ranges_[i].size() != 0) {
-      At(NodeId{i}).bucket = buckets_.Add(ranges_[i].size());
-    }
-    for (uint32_t v = ranges_[i].begin; v < ranges_[i].end; ++v) {
-      Append(NodeId{i}, VertexId{v}, points[v]);
+    const Range& range = ranges_[i];
+    if (range.size() != 0) {
+      if (range.size() > kLeafCapacity) {
+        std::abort();  // points that are not distinct as cubes
+      }
+      At(NodeId{i}).bucket = buckets_.AddFilled(points.subspan(range.begin, range.size()), range.begin);
+      std::fill(leaf_of_.begin() + range.begin, leaf_of_.begin() + range.end, NodeId{i});
     }
   }
   points_ = {};
@@ -257,20 +259,26 @@ void LeafTree<D>::LinkChildren(NodeId parent) {
   }
 }
 
+// Shares out the points of `parent` among its children, which lie along the Z curve as they do.
 template <int D>
 void LeafTree<D>::DistributeRange(NodeId parent) {
   const Node& node = At(parent);
   ranges_.resize(nodes_.size());
-  Range rest = ranges_[Index(parent)];
-  for (int child = 0; child < kChildren; ++child) {
-    const auto begin = points_.begin() + rest.begin;
-    const auto end = points_.begin() + rest.end;
-    const auto past =
-        std::partition_point(begin, end, [&](const Point<D>& p) { return ChildHolding(node, p) <= child; });
-    const uint32_t middle = rest.begin + static_cast<uint32_t>(past - begin);
+  // Where the points of each child begin: halved along the most significant axis first.
+  std::array<uint32_t, kChildren + 1> begins;
+  begins[0] = ranges_[Index(parent)].begin;
+  begins[kChildren] = ranges_[Index(parent)].end;
+  for (int axis = D - 1; axis >= 0; --axis) {
+    const double middle = node.low[axis] + 0.5 * SideOf(node);
+    const uint32_t half = uint32_t{1} << axis;
+    for (uint32_t child = half; child < kChildren; child += 2 * half) {
+      begins[child] = middle < box_.high[axis] ? FirstFrom(begins[child - half], begins[child + half], axis, middle)
+                                               : begins[child + half];
+    }
+  }
+  for (uint32_t child = 0; child < kChildren; ++child) {
     const NodeId id = Child(node, child);
-    ranges_[Index(id)] = Range{.begin = rest.begin, .end = middle, .parent = parent};
-    rest.begin = middle;
+    ranges_[Index(id)] = Range{.begin = begins[child], .end = begins[child + 1], .parent = parent};
     if (!At(id).outside) {
       pending_[At(id).level].push_back(id);
     }
@@ -284,6 +292,14 @@ void LeafTree<D>::DistributeRange(NodeId parent) {
       TellAround(id, is_crowded ? SidesOf(kChildren - 1, kChildren - 1) : SidesOf(child, kChildren - 1 - child));
     }
   }
+}
+
+// The first of the points from `begin` to `end`, or the end, whose coordinate is at least x, as are those of all after it.
+template <int D>
+uint32_t LeafTree<D>::FirstFrom(uint32_t begin, uint32_t end, int axis, double x) const {
+  const auto is_before = [axis, x](const Point<D>& p) { return p[axis] < x; };
+  return static_cast<uint32_t>(std::partition_point(points_.begin() + begin, points_.begin() + end, is_before) -
+                               points_.begin());
 }
 
 template <int D>
@@ -304,12 +320,16 @@ bool LeafTree<D>::IsTooCoarse(NodeId leaf) {
   if (side > box_.ShortestSide()) {
     return true;
   }
-  const Range& own = ranges_[Index(leaf)];
-  near_.assign(points_.begin() + own.begin, points_.begin() + own.end);
-  for (uint32_t i = own.first_around; i != kNone; i = around_[i].next) {
+  const Range& range = ranges_[Index(leaf)];
+  const std::span<const Point<D>> own = points_.subspan(range.begin, range.size());
+  if (range.first_around == kNone) {
+    return HasNearFeatures(own, BoxOf(leaf), ReachOf(leaf));
+  }
+  near_.assign(own.begin(), own.end());
+  for (uint32_t i = range.first_around; i != kNone; i = around_[i].next) {
     near_.push_back(around_[i].p);
   }
-  return HasNearFeatures(BoxOf(leaf), ReachOf(leaf));
+  return HasNearFeatures(near_, BoxOf(leaf), ReachOf(leaf));
 }
 
 // Hands those points around `parent` that are within reach of a child down to it.
@@ -424,12 +444,12 @@ void LeafTree<D>::ForEachTouching(NodeId leaf, Sides sides, F&& f) const {
   }
 }
 
-// Whether two features (points of near_, faces of the box that a point does not lie on) are both within `reach` of one
+// Whether two features (`points`, faces of the box that a point does not lie on) are both within `reach` of one
 // point of `cube`, looked for where it is best for the pair: at the projection of the points' midpoint on the cube, or
 // of the point itself. A pair within reach / 2 of a common point of the cube is always found, as projecting does not
 // expand.
 template <int D>
-bool LeafTree<D>::HasNearFeatures(const Box<D>& cube, double reach) const {
+bool LeafTree<D>::HasNearFeatures(std::span<const Point<D>> points, const Box<D>& cube, double reach) const {
   const double reach_sq = reach * reach;
   const auto project = [&](Point<D> p) {
     for (int i = 0; i < D; ++i) {
@@ -445,8 +465,8 @@ bool LeafTree<D>::HasNearFeatures(const Box<D>& cube, double reach) const {
   }
   // Two points that are farther from each other are not both within reach of a third.
   const double far_sq = 4 * (1 + 0x1p-20) * reach_sq;
-  for (size_t i = 0; i < near_.size(); ++i) {
-    const Point<D>& a = near_[i];
+  for (size_t i = 0; i < points.size(); ++i) {
+    const Point<D>& a = points[i];
     if (near_faces != 0) {
       const Point<D> own = project(a);
       const int others = near_faces & ~box_.FacesOf(a);
@@ -457,7 +477,7 @@ bool LeafTree<D>::HasNearFeatures(const Box<D>& cube, double reach) const {
       }
     }
     for (size_t j = 0; j < i; ++j) {
-      const Point<D>& b = near_[j];
+      const Point<D>& b = points[j];
       if (DistanceSq<D>(a, b) > far_sq) {
         continue;
       }

@@ -234,6 +234,7 @@ class LeafTree {
   void SplitLargerNeighboursFrom(NodeId leaf, NodeId at, int axis);
   void LinkChildren(NodeId parent);
   void DistributeRange(NodeId parent);
+  uint32_t FirstFrom(uint32_t begin, uint32_t end, int axis, double x) const;
   void DistributeBucket(NodeId parent);
   void Append(NodeId leaf, VertexId v, const Point<D>& p);
   NodeId LeafWithRoom(VertexId near, const Point<D>& p);
@@ -247,7 +248,7 @@ class LeafTree {
   void TellAround(NodeId leaf, Sides sides);
   template <typename F>
   void ForEachTouching(NodeId leaf, Sides sides, F&& f) const;
-  bool HasNearFeatures(const Box<D>& cube, double reach) const;
+  bool HasNearFeatures(std::span<const Point<D>> points, const Box<D>& cube, double reach) const;
 
   Box<D> box_;
   uint8_t max_level_ = 0;
@@ -261,7 +262,7 @@ class LeafTree {
   std::span<const Point<D>> points_;
   HugeVector<Range> ranges_;                  // by node
   std::vector<std::vector<NodeId>> pending_;  // leaves to be looked at, by level
-  std::vector<Point<D>> near_;                // points near the leaf that is looked at
+  std::vector<Point<D>> near_;                // scratch
   HugeVector<Around> around_;
 };
 

@@ -142,11 +142,11 @@ inline bool MortonLess(const GridPoint<D>& a, const GridPoint<D>& b) {
 }
 
 // Where `cube` of a grid of so many `levels` lies on the same curve: the first 64 / D levels, in one number. A cube with a
-// smaller one comes before, one with the same before or after.
+// smaller one comes before, one with the same before or after. Of a number only bits from `kFirst` on have to be right.
 //
 // Complexity: O(D).
 // Source:     interleaved bits (Morton 1966), eight at a time.
-template <int D>
+template <int D, int kFirst = 0>
 inline uint64_t MortonPrefix(const GridPoint<D>& cube, int levels) {
   static constexpr std::array<uint64_t, 256> kSpread = [] {
     std::array<uint64_t, 256> spread{};
@@ -162,7 +162,9 @@ inline uint64_t MortonPrefix(const GridPoint<D>& cube, int levels) {
   for (int i = 0; i < D; ++i) {
     const uint64_t first = levels >= kLevels ? cube[i] >> (levels - kLevels) : cube[i] << (kLevels - levels);
     for (int bit = 0; bit < kLevels; bit += 8) {
-      prefix |= kSpread[first >> bit & 0xff] << (bit * D + i);
+      if (bit * D + 8 * D > kFirst) {
+        prefix |= kSpread[first >> bit & 0xff] << (bit * D + i);
+      }
     }
   }
   return prefix;

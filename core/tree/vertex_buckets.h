@@ -6,6 +6,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/base/huge_pages.h"
@@ -44,6 +45,18 @@ class VertexBuckets {
       free_numbers_.pop_back();
     }
     buckets_[number] = Take(count);
+    return number;
+  }
+
+  // Makes a bucket of vertices at `positions`, numbered from `first` on, and returns its number.
+  uint32_t AddFilled(std::span<const Point<D>> positions, uint32_t first) {
+    const uint32_t number = Add(static_cast<uint32_t>(positions.size()));
+    Bucket& bucket = buckets_[number];
+    std::copy(positions.begin(), positions.end(), bucket.positions);
+    for (uint32_t i = 0; i < positions.size(); ++i) {
+      bucket.ids[i] = VertexId{first + i};
+    }
+    bucket.count = static_cast<uint32_t>(positions.size());
     return number;
   }
 
