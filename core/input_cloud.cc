@@ -235,15 +235,12 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<cons
   // The corners of the box may follow, and the first of the vertices that are added.
   cloud.points.reserve(count + count / 8 + (size_t{1} << D));
   cloud.first_input.reserve(count);
-  cloud.sorted_index.assign(count, 0);
   for (size_t i = 0; i < count; ++i) {
     if (i % kStepsBetweenChecks == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
     if (i + kAhead < count) {
-      const uint32_t soon = entries[i + kAhead].input;
-      __builtin_prefetch(&points[size_t{soon} * D]);
-      __builtin_prefetch(&cloud.sorted_index[soon], 1);
+      __builtin_prefetch(&points[size_t{entries[i + kAhead].input} * D]);
     }
     const Point<D> p = point_of(entries[i]);
     const bool may_be_alike = i > 0 && entries[i].half == entries[i - 1].half;
@@ -254,37 +251,46 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<cons
     } else if (p != cloud.points.back()) {
       return TooCloseError<D>(domain, points, entries[i].input, std::sqrt(DistanceSq<D>(p, cloud.points.back())),
                               absl::StrCat("points[", cloud.first_input.back(), "]"));
+    } else {
+      cloud.duplicates.push_back({entries[i].input, static_cast<uint32_t>(cloud.points.size() - 1)});
     }
-    cloud.sorted_index[entries[i].input] = static_cast<uint32_t>(cloud.points.size() - 1);
   }
   return cloud;
 }
 
 template <int D>
+HugeVector<uint32_t> SortedCloud<D>::SortedOfInputs() const {
+  HugeVector<uint32_t> sorted(first_input.size() + duplicates.size());
+  for (uint32_t i = 0; i < first_input.size(); ++i) {
+    sorted[first_input[i]] = i;
+  }
+  for (const Duplicate& duplicate : duplicates) {
+    sorted[duplicate.input] = duplicate.sorted;
+  }
+  return sorted;
+}
+
+template <int D>
 absl::StatusOr<PointNames> NamePoints(SortedCloud<D> cloud, const RunContext& context) {
-  const size_t inputs = cloud.sorted_index.size();
-  const size_t distinct = cloud.first_input.size();
   PointNames names;
-  if (distinct == inputs) {  // each is named as it was given: nothing has to be looked up
-    names.of_input.resize(inputs);
+  if (cloud.duplicates.empty()) {  // each is named as it was given: nothing has to be looked up
+    names.of_input.resize(cloud.first_input.size());
     std::iota(names.of_input.begin(), names.of_input.end(), 0);
-    names.name = std::move(cloud.first_input);
-    names.sorted = std::move(cloud.sorted_index);
+    names.of_sorted = std::move(cloud.first_input);
     return names;
   }
-  names.name.resize(distinct);
-  names.sorted.reserve(distinct);
-  names.of_input.reserve(inputs);
-  for (size_t i = 0; i < inputs; ++i) {
+  names.of_input = cloud.SortedOfInputs();
+  names.of_sorted.resize(cloud.first_input.size());
+  uint32_t named = 0;
+  for (uint32_t i = 0; i < names.of_input.size(); ++i) {
     if (i % kStepsBetweenChecks == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
-    const uint32_t sorted = cloud.sorted_index[i];
+    const uint32_t sorted = names.of_input[i];
     if (cloud.first_input[sorted] == i) {
-      names.name[sorted] = static_cast<uint32_t>(names.sorted.size());
-      names.sorted.push_back(sorted);
+      names.of_sorted[sorted] = named++;
     }
-    names.of_input.push_back(names.name[sorted]);
+    names.of_input[i] = names.of_sorted[sorted];
   }
   return names;
 }
@@ -329,6 +335,7 @@ absl::Status CheckSeparation(const Domain<D>& domain, const QueryStructure<D>& s
 
 #define WELLSPACE_INSTANTIATE(D)                                                                                       \
   template struct Domain<D>;                                                                                           \
+  template struct SortedCloud<D>;                                                                                      \
   template absl::StatusOr<Box<D>> BoxAround<D>(std::span<const double>, double, const RunContext&);                    \
   template absl::StatusOr<SortedCloud<D>> SortCloud<D>(const Domain<D>&, std::span<const double>, const RunContext&);  \
   template absl::StatusOr<PointNames> NamePoints<D>(SortedCloud<D>, const RunContext&);                                \

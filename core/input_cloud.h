@@ -18,7 +18,7 @@
 namespace wellspace::core {
 
 // Where points are read in another order than they lie in, they are asked for so many before they are needed.
-inline constexpr uint32_t kAhead = 12;
+inline constexpr uint32_t kAhead = 28;
 
 // The box that is meshed, and the power of two that brings it to a scale on which no product of lengths overflows.
 template <int D>
@@ -61,10 +61,20 @@ absl::StatusOr<Box<D>> BoxAround(std::span<const double> points, double margin, 
 // A cloud without its duplicates, in the order that the query structure wants.
 template <int D>
 struct SortedCloud {
-  MortonGrid<D> grid;                 // for so many inputs
-  HugeVector<Point<D>> points;        // distinct, in Morton order, scaled
-  HugeVector<uint32_t> first_input;   // by sorted point: the first input equal to it
-  HugeVector<uint32_t> sorted_index;  // by input: its sorted point
+  struct Duplicate {
+    uint32_t input = 0;
+    uint32_t sorted = 0;  // the point that it is equal to
+  };
+
+  // By input: its sorted point.
+  //
+  // Complexity: O(n).
+  HugeVector<uint32_t> SortedOfInputs() const;
+
+  MortonGrid<D> grid;                // for so many inputs
+  HugeVector<Point<D>> points;       // distinct, in Morton order, scaled
+  HugeVector<uint32_t> first_input;  // by sorted point: the first input equal to it
+  HugeVector<Duplicate> duplicates;  // the other inputs
 };
 
 // Errors:     INVALID_ARGUMENT, naming the point: not finite, outside the domain, too small for its scale, too close to
@@ -76,9 +86,8 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<cons
 
 // The numbers that the points of a sorted cloud have in the mesh: in the order in which the input first has them.
 struct PointNames {
-  HugeVector<uint32_t> name;      // by sorted point
-  HugeVector<uint32_t> sorted;    // the sorted point, by name
-  HugeVector<uint32_t> of_input;  // the name, by input
+  HugeVector<uint32_t> of_sorted;  // by sorted point
+  HugeVector<uint32_t> of_input;   // by input
 };
 
 // Errors:     CANCELLED, DEADLINE_EXCEEDED.

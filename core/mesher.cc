@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 #include <numeric>
 #include <optional>
 #include <type_traits>
@@ -92,8 +93,7 @@ class MesherIn final : public Mesher {
     WELLSPACE_RETURN_IF_ERROR(CheckSeparation<D>(domain_, structure_, 0, cloud.first_input, points, context));
 
     WELLSPACE_ASSIGN_OR_RETURN(PointNames names, NamePoints<D>(std::move(cloud), context));
-    output_index_ = std::move(names.name);
-    vertex_at_ = std::move(names.sorted);
+    output_index_ = std::move(names.of_sorted);
     input_vertex_ = std::move(names.of_input);
     for (uint32_t i = 0, named = 0; i < input_vertex_.size(); ++i) {
       if (input_vertex_[i] == named) {  // and no duplicate of an earlier one
@@ -113,8 +113,9 @@ class MesherIn final : public Mesher {
   int dimension() const override { return D; }
   uint64_t vertex_count() const override { return structure_.vertex_count(); }
   uint64_t memory_bytes() const override {
+    // With vertex_at_, whether it has been made or somebody is making it.
     return structure_.MemoryBytes() + refinement_->MemoryBytes() + SliverMemoryBytes() +
-           (output_index_.size() + vertex_at_.size() + input_vertex_.size()) * sizeof(uint32_t) +
+           (output_index_.size() + distinct_count_ + input_vertex_.size()) * sizeof(uint32_t) +
            negative_zeros_.size() * sizeof(size_t);
   }
 
@@ -170,8 +171,7 @@ class MesherIn final : public Mesher {
       is_given_[Index(known[i])] = true;
     }
     std::vector<uint32_t> vertices;
-    vertices.reserve(cloud.sorted_index.size());
-    for (const uint32_t sorted : cloud.sorted_index) {
+    for (const uint32_t sorted : cloud.SortedOfInputs()) {
       vertices.push_back(OutputIndex(known[sorted]));
     }
     input_vertex_.insert(input_vertex_.end(), vertices.begin(), vertices.end());
@@ -247,7 +247,7 @@ class MesherIn final : public Mesher {
     mesh.dimension = D;
     mesh.domain_low.assign(domain_.box.low.begin(), domain_.box.low.end());
     mesh.domain_high.assign(domain_.box.high.begin(), domain_.box.high.end());
-    WELLSPACE_RETURN_IF_ERROR(AppendPoints(0, mesh.points, context));
+    WELLSPACE_ASSIGN_OR_RETURN(mesh.points, PointsFrom(0, context));
     mesh.simplices = std::move(simplices.indices);
     mesh.input_vertex.assign(input_vertex_.begin(), input_vertex_.end());
     mesh.weights = std::move(weighted.weights);
@@ -286,8 +286,7 @@ class MesherIn final : public Mesher {
         ChangedVertices<D>(structure_, VertexId{static_cast<uint32_t>(extracted_vertices_)}, context));
     WELLSPACE_ASSIGN_OR_RETURN(Simplices simplices,
                                ComputeSimplicesAmong<D>(structure_, changed, output_index_, threads, context));
-    HugeVector<double> added;
-    WELLSPACE_RETURN_IF_ERROR(AppendPoints(extracted_vertices_, added, context));
+    WELLSPACE_ASSIGN_OR_RETURN(const HugeVector<double> added, PointsFrom(extracted_vertices_, context));
     mesh.points.insert(mesh.points.end(), added.begin(), added.end());
     std::vector<bool> has_changed(structure_.vertex_count(), false);
     for (const VertexId v : changed) {
@@ -448,7 +447,16 @@ class MesherIn final : public Mesher {
   // Vertices beyond the distinct input points have the same number outside as inside.
   uint32_t OutputIndex(VertexId v) const { return Index(v) < distinct_count_ ? output_index_[Index(v)] : Index(v); }
   VertexId VertexOf(uint32_t output_index) const {
-    return output_index < distinct_count_ ? VertexId{vertex_at_[output_index]} : VertexId{output_index};
+    if (output_index >= distinct_count_) {
+      return VertexId{output_index};
+    }
+    std::call_once(has_vertex_at_, [this] {
+      vertex_at_.resize(distinct_count_);
+      for (uint32_t i = 0; i < distinct_count_; ++i) {
+        vertex_at_[output_index_[i]] = VertexId{i};
+      }
+    });
+    return vertex_at_[output_index];
   }
   void ExtendOutputIndex() {
     const auto old = static_cast<std::ptrdiff_t>(output_index_.size());
@@ -491,26 +499,26 @@ class MesherIn final : public Mesher {
     }
   }
 
-  // Appends the coordinates of the vertices from number `first` on.
-  absl::Status AppendPoints(uint64_t first, HugeVector<double>& out, const RunContext& context) const {
+  // The coordinates of the vertices from number `first` on, by output index: all, or none of the input points.
+  absl::StatusOr<HugeVector<double>> PointsFrom(uint64_t first, const RunContext& context) const {
     const uint32_t count = structure_.vertex_count();
-    out.reserve(out.size() + (count - first) * D);
+    HugeVector<double> out((count - first) * D);
     for (auto i = static_cast<uint32_t>(first); i < count; ++i) {
       if (i % kStepsBetweenChecks == 0) {
         WELLSPACE_RETURN_IF_ERROR(context.Check());
       }
       if (count - i > kAhead) {
-        __builtin_prefetch(&structure_.point(VertexOf(i + kAhead)));
+        __builtin_prefetch(&out[(OutputIndex(VertexId{i + kAhead}) - first) * D], 1);
       }
-      const Point<D> p = domain_.Unscaled(structure_.point(VertexOf(i)));
-      out.insert(out.end(), p.begin(), p.end());
+      const Point<D> p = domain_.Unscaled(structure_.point(VertexId{i}));
+      std::copy(p.begin(), p.end(), out.begin() + static_cast<std::ptrdiff_t>((OutputIndex(VertexId{i}) - first) * D));
     }
     for (const size_t at : negative_zeros_) {
       if (at >= first * D) {
         out[at - first * D] = -0.0;
       }
     }
-    return absl::OkStatus();
+    return out;
   }
 
   // Notes an extracted mesh, and sets its statistics but for those of its simplices' shapes.
@@ -544,10 +552,12 @@ class MesherIn final : public Mesher {
   bool has_moved_ = false;      // a vertex, since the last mesh
   std::vector<bool> is_given_;  // by vertex: an input point, or a corner of the box
 
-  uint64_t built_count_ = 0;            // vertices after Initialize: input points and corners of the box
-  uint64_t distinct_count_ = 0;         // the former
-  HugeVector<uint32_t> output_index_;   // by vertex; of the first distinct_count_ at least
-  HugeVector<uint32_t> vertex_at_;      // by output index, of the first distinct_count_
+  uint64_t built_count_ = 0;           // vertices after Initialize: input points and corners of the box
+  uint64_t distinct_count_ = 0;        // the former
+  HugeVector<uint32_t> output_index_;  // by vertex; of the first distinct_count_ at least
+  // By output index, of the first distinct_count_; once one is asked for.
+  mutable HugeVector<VertexId> vertex_at_;
+  mutable std::once_flag has_vertex_at_;
   HugeVector<uint32_t> input_vertex_;   // by point given
   uint64_t distinct_input_ = 0;         // different vertices among them
   std::vector<size_t> negative_zeros_;  // places in Mesh::points

@@ -69,10 +69,11 @@ TYPED_TEST(SortCloudTest, SortsAlongTheCurveAndNamesTheFirstOfEquals) {
       alike += bits == 0 ? 0 : bits == 32 ? differing >> 32 == 0 : differing == 0;
     }
     EXPECT_GE(alike, bits == 0 ? 0 : kCount / 2) << bits << " bits";
-    ASSERT_EQ(cloud->sorted_index.size(), kCount);
+    const HugeVector<uint32_t> sorted_of_inputs = cloud->SortedOfInputs();
+    ASSERT_EQ(sorted_of_inputs.size(), kCount);
     ASSERT_EQ(cloud->first_input.size(), cloud->points.size());
     for (uint32_t i = 0; i < kCount; ++i) {
-      const uint32_t sorted = cloud->sorted_index[i];
+      const uint32_t sorted = sorted_of_inputs[i];
       ASSERT_LT(sorted, cloud->points.size());
       EXPECT_EQ(cloud->points[sorted], points[i]);
       EXPECT_EQ(cloud->first_input[sorted], std::find(points.begin(), points.end(), points[i]) - points.begin());

@@ -5,12 +5,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <numeric>
 #include <set>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "core/simplex/validate.h"
@@ -361,6 +364,45 @@ TEST_P(MesherTest, NegativeZerosKeepTheirBits) {
       EXPECT_EQ(std::signbit(each.points[i]), std::signbit(cloud[i])) << i;
     }
     EXPECT_TRUE(std::signbit(each.points[size_t{vertices->front()} * d_]));
+  }
+}
+
+// What tells vertices by their numbers is made by whoever asks first.
+TEST_P(MesherTest, QueriesMayRunAtOnce) {
+  const std::vector<double> cloud = MakeCloud("uniform", d_, 200);
+  const auto mesher = Create(cloud);
+  const auto count = static_cast<uint32_t>(cloud.size() / d_);
+  const auto distance_sq = [&](uint32_t u, uint32_t v) {
+    double sum = 0;
+    for (int k = 0; k < d_; ++k) {
+      sum += std::pow(cloud[size_t{u} * d_ + k] - cloud[size_t{v} * d_ + k], 2);
+    }
+    return sum;
+  };
+  std::vector<uint32_t> all(count);
+  std::iota(all.begin(), all.end(), 0);
+  std::array<absl::StatusOr<std::vector<double>>, 4> nearest;
+  std::vector<std::jthread> threads;
+  for (auto& found : nearest) {
+    threads.emplace_back([&] { found = mesher->NearestNeighborDistances(all); });
+  }
+  threads.clear();
+  ASSERT_TRUE(nearest[0].ok()) << nearest[0].status();
+  for (uint32_t v = 0; v < count; ++v) {
+    double corner_sq = 0;  // the corners of the box are vertices, too
+    for (int k = 0; k < d_; ++k) {
+      const double x = cloud[size_t{v} * d_ + k];
+      corner_sq += std::pow(std::min(x, 1 - x), 2);
+    }
+    double least_sq = corner_sq;
+    for (uint32_t u = 0; u < count; ++u) {
+      least_sq = u == v ? least_sq : std::min(least_sq, distance_sq(u, v));
+    }
+    EXPECT_NEAR((*nearest[0])[v], std::sqrt(least_sq), 1e-12) << v;
+  }
+  for (const auto& found : nearest) {
+    ASSERT_TRUE(found.ok()) << found.status();
+    EXPECT_EQ(*found, *nearest[0]);
   }
 }
 
