@@ -502,16 +502,17 @@ class MesherIn final : public Mesher {
   // The coordinates of the vertices from number `first` on, by output index: all, or none of the input points.
   absl::StatusOr<HugeVector<double>> PointsFrom(uint64_t first, const RunContext& context) const {
     const uint32_t count = structure_.vertex_count();
+    const auto place_of = [&](uint32_t v) { return (OutputIndex(VertexId{v}) - first) * D; };
     HugeVector<double> out((count - first) * D);
     for (auto i = static_cast<uint32_t>(first); i < count; ++i) {
       if (i % kStepsBetweenChecks == 0) {
         WELLSPACE_RETURN_IF_ERROR(context.Check());
       }
       if (count - i > kAhead) {
-        __builtin_prefetch(&out[(OutputIndex(VertexId{i + kAhead}) - first) * D], 1);
+        __builtin_prefetch(&out[place_of(i + kAhead)], 1);
       }
       const Point<D> p = domain_.Unscaled(structure_.point(VertexId{i}));
-      std::copy(p.begin(), p.end(), out.begin() + static_cast<std::ptrdiff_t>((OutputIndex(VertexId{i}) - first) * D));
+      std::copy(p.begin(), p.end(), &out[place_of(i)]);
     }
     for (const size_t at : negative_zeros_) {
       if (at >= first * D) {

@@ -63,6 +63,7 @@ struct WordRing {
   static bool IsNegative(int64_t entry) { return entry < 0; }
   static int64_t Twice(int64_t entry) { return 2 * (entry < 0 ? -entry : entry); }
   static void AddSquare(int64_t& sum, int64_t entry) { sum += entry * entry; }
+  // As that of FixedRing.
   static bool AddWeight(int64_t& sum, double weight, bool negate, int unit) {
     if (weight == 0) {
       return true;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/dimensions.h"
@@ -77,9 +76,6 @@ absl::Status LeafTree<D>::Build(const MortonGrid<D>& grid, std::span<const Point
     }
     const Range& range = ranges_[i];
     if (range.size() != 0) {
-      if (range.size() > kLeafCapacity) {
-        std::abort();  // points that are not distinct as cubes
-      }
       At(NodeId{i}).bucket = buckets_.AddFilled(points.subspan(range.begin, range.size()), range.begin);
       std::fill(leaf_of_.begin() + range.begin, leaf_of_.begin() + range.end, NodeId{i});
     }
@@ -128,9 +124,6 @@ void LeafTree<D>::Append(NodeId leaf, VertexId v, const Point<D>& p) {
   Node& node = At(leaf);
   if (node.bucket == kNoBucket) {
     node.bucket = buckets_.Add(1);
-  }
-  if (buckets_[node.bucket].count == kLeafCapacity) {
-    std::abort();  // more vertices in one cube of the grid than callers may put there
   }
   buckets_.Append(node.bucket, v, p);
   leaf_of_[Index(v)] = leaf;

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <span>
 #include <vector>
 
@@ -112,6 +113,9 @@ class VertexBuckets {
   static constexpr uint32_t ClassOf(uint32_t count) { return count == 0 ? 0 : (count - 1) / kStep; }
 
   Bucket Take(uint32_t count) {
+    if (count > kMost) {
+      std::abort();  // in a tree: more vertices in one cube of the grid than callers may put there
+    }
     const uint32_t size_class = ClassOf(count);
     Bucket bucket;
     bucket.capacity = (size_class + 1) * kStep;

@@ -95,7 +95,10 @@ absl::Status QueryStructure<D>::Initialize(const MortonGrid<D>& grid, HugeVector
     }
     const FaceMask faces = box_.FacesOf(points_[i]);
     faces_[i] = static_cast<StoredFaces>(faces);
-    for (int corner = 0; corner < (1 << D) && faces != 0; ++corner) {
+    if (faces == 0) {
+      continue;
+    }
+    for (int corner = 0; corner < (1 << D); ++corner) {
       has_corner[corner] = has_corner[corner] || faces == CornerFaces<D>(corner);
     }
   }

@@ -124,6 +124,8 @@ TYPED_TEST(MortonTest, MortonPrefixesAreTheFirstInterleavedBits) {
       }
     }
     EXPECT_EQ(MortonPrefix<D>(cube, levels), expected) << ::testing::PrintToString(cube) << " of " << levels;
+    const uint64_t upper_half = MortonPrefix<D, 32>(cube, levels) >> 32;
+    EXPECT_EQ(upper_half, expected >> 32) << ::testing::PrintToString(cube) << " of " << levels;
   }
 }
 
