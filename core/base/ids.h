@@ -2,6 +2,7 @@
 #ifndef WELLSPACE_CORE_BASE_IDS_H_
 #define WELLSPACE_CORE_BASE_IDS_H_
 
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 
@@ -17,6 +18,16 @@ inline constexpr NodeId kNoNode{std::numeric_limits<uint32_t>::max()};
 
 constexpr uint32_t Index(VertexId id) { return static_cast<uint32_t>(id); }
 constexpr uint32_t Index(NodeId id) { return static_cast<uint32_t>(id); }
+
+// Vertices side by side: those that are listed, or, if none are, those from `first` on.
+struct VertexNames {
+  const VertexId* listed = nullptr;
+  VertexId first = kNoVertex;
+
+  VertexId operator[](size_t i) const {
+    return listed != nullptr ? listed[i] : VertexId{static_cast<uint32_t>(Index(first) + i)};
+  }
+};
 
 }  // namespace wellspace::core
 

@@ -255,7 +255,7 @@ void Refinement<D>::ForeseeOne(Packet<D>& packet, size_t at, Workspace<D>& works
     }
     const VertexId x{packet.first_new + static_cast<uint32_t>(packet.inserted.size())};
     packet.requests.push_back(*request);
-    packet.inserted.reserve(PaddedCount(packet.inserted.size() + 1));
+    packet.inserted.reserve(PaddedCount(packet.inserted.size() + 1) + LeafTree<D>::Buckets::kReadTogether);
     packet.inserted.push_back(request->point.position);
     cell.CutBeforePlace(x, request->point.position);
   }

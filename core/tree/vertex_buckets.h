@@ -25,8 +25,10 @@ class VertexBuckets {
  public:
   // What a vertex takes.
   static constexpr size_t kPlaceBytes = sizeof(Point<D>) + sizeof(VertexId);
-  // So many positions may be read together, the last perhaps of no vertex.
+  // Positions stay aligned to so many.
   static constexpr uint32_t kTogether = 4;
+  // So many positions or ids may be read together, the last perhaps of no vertex.
+  static constexpr uint32_t kReadTogether = 8;
 
   struct Bucket {
     uint32_t count = 0;
@@ -125,7 +127,7 @@ class VertexBuckets {
       free.pop_back();
     } else {
       const size_t bytes = bucket.capacity * kPlaceBytes;
-      if (chunks_.empty() || chunks_.back().get_deleter().count - used_ < bytes) {
+      if (chunks_.empty() || chunks_.back().get_deleter().count - used_ < bytes + kReadTogether * sizeof(Point<D>)) {
         // As much as there is already: on large pages once that fills one.
         chunks_.push_back(MakeHugePageBytes(std::clamp<size_t>(taken_bytes_, kLeastChunk, kMostChunk)));
         used_ = 0;

@@ -31,6 +31,25 @@ WELLSPACE_INLINE uint32_t Bits(const typename Wide<kWidth>::Mask& mask) {
 #endif
 }
 
+// The same for floats; also of signs.
+template <VectorUnit kUnit>
+WELLSPACE_INLINE uint32_t Bits(const FloatMask& mask) {
+#if defined(__x86_64__)
+  if constexpr (kUnit == VectorUnit::kAvx2) {
+    return static_cast<uint32_t>(__builtin_ia32_movmskps256(reinterpret_cast<const Floats&>(mask)));
+  }
+  using Half = float __attribute__((vector_size(16), may_alias));
+  const auto* halves = reinterpret_cast<const Half*>(&mask);
+  return static_cast<uint32_t>(__builtin_ia32_movmskps(halves[0]) | __builtin_ia32_movmskps(halves[1]) << 4);
+#else
+  uint32_t bits = 0;
+  for (size_t lane = 0; lane < 8; ++lane) {
+    bits |= (mask[lane] < 0 ? 1u : 0u) << lane;
+  }
+  return bits;
+#endif
+}
+
 }  // namespace wellspace::core
 
 #endif  // WELLSPACE_CORE_VORONOI_LANE_BITS_H_

@@ -57,6 +57,10 @@ struct Wide<4> {
   using Halves = int32_t __attribute__((vector_size(32), may_alias));
 };
 
+// Eight floats, and what a comparison of them gives: one vector with AVX2, else two.
+using Floats = float __attribute__((vector_size(32), may_alias));
+using FloatMask = int32_t __attribute__((vector_size(32), may_alias));
+
 // The items of `column` from `from` on, as one vector.
 //
 // REQUIRES:   both aligned to the vector.

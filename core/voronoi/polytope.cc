@@ -14,16 +14,11 @@
 namespace wellspace::core {
 namespace {
 
-// What |w|^2 / 2 contributes to the error of x . w - |w|^2 / 2, relative to itself; see Polytope::Cut.
-template <int D>
-constexpr double kOffsetError = (D + 5) * kUnit;
+// After so many cuts by the vertices of one leaf, those that are left are looked at together.
+constexpr int kCutsBetweenLooks = 4;
 
 // A node between two others may be wrong by this share of its distance from the site: few cuts are left in doubt by it.
 constexpr double kGoodPlace = 0x1p-20;
-
-// A placed node is wrong by at most this share of its distance from the site. What is sure of nodes by twice as much does not
-// depend on how they were placed.
-constexpr double kPlaced = 0x1p-20;
 
 }  // namespace
 
@@ -94,9 +89,6 @@ template <int D>
 template <size_t kWidth>
 WELLSPACE_INLINE bool Polytope<D>::CutOffWith(VertexId u, const Point<D>& position, const Point<D>& normal,
                                               double length_sq) {
-  // The excess x . w - c of a node x, as computed, differs from the exact one by at most slack |w| + (D + 5) u c: the error
-  // of x is in slack, w has one rounding a coordinate, the product D more, c D + 2, the difference one; 16 u |x| of the
-  // slack pays for those of the product.
   const double length = std::sqrt(length_sq);
   const double offset = 0.5 * length_sq;
   if (!columns_.template ComputeExcesses<kWidth>(normal, offset, length, kOffsetError<D> * offset)) {
@@ -123,7 +115,7 @@ WELLSPACE_INLINE bool Polytope<D>::CutOffWith(VertexId u, const Point<D>& positi
   FindCutEdges();
   PlaceCutEdges<kWidth>(index);
   MakeNewNodes(index);
-  if constexpr (D != 3) {
+  if constexpr (D > 3) {
     LinkNewNodes();
   }
   if (cut_count_ < removed_count_) {
@@ -131,6 +123,40 @@ WELLSPACE_INLINE bool Polytope<D>::CutOffWith(VertexId u, const Point<D>& positi
   }
   is_tight_ = false;
   return true;
+}
+
+template <int D>
+size_t Polytope<D>::CutByEach(std::span<const Point<D>> positions, const VertexNames& names, VertexId) {
+  near_.Pick(positions, site_, CutLimitSq());
+  const size_t within_reach = near_.count;
+  if (cuts_ != 0) {
+    Foretell(0, near_);
+    near_.DropThoseThatMiss(0);
+  }
+  if (near_.count > 1) {
+    sorted_.Sort(near_);
+  }
+  Candidates<D>& left = near_.count > 1 ? sorted_ : near_;
+  int cuts = 0;
+  for (size_t j = 0; j < left.count; ++j) {
+    if (IsTooLarge()) {
+      break;
+    }
+    Point<D> w;
+    for (int axis = 0; axis < D; ++axis) {
+      w[axis] = left.w[axis][j];
+    }
+    const auto slot = left.slot[j];
+    if (!CutBeforePlace(names[slot], positions[slot], w, left.length_sq[j])) {
+      continue;
+    }
+    if (++cuts % kCutsBetweenLooks == 0 && left.count - j > kCutsBetweenLooks) {
+      Foretell(j + 1, left);
+      left.DropThoseThatMiss(j + 1);
+    }
+  }
+  Tighten();
+  return within_reach;
 }
 
 template <int D>
@@ -304,7 +330,7 @@ WELLSPACE_INLINE std::array<uint16_t, D> Polytope<D>::PlanesOn(End kept, uint16_
 // the nodes stay without holes.
 template <int D>
 WELLSPACE_INLINE void Polytope<D>::MakeNewNodes(uint16_t plane) {
-  if (D != 3 && new_.size() < cut_count_) {
+  if (D > 3 && new_.size() < cut_count_) {
     new_.resize(2 * cut_count_);
   }
   const size_t old = columns_.count();
@@ -451,63 +477,45 @@ WELLSPACE_INLINE std::array<uint32_t, D> Polytope<D>::RanksOf(const std::array<u
   return ranks;
 }
 
-// Computes where planes, in order, meet, exactly where they are too nearly dependent for doubles, and returns the slack.
+// Computes where planes, in order, meet, and returns the slack.
 template <int D>
 double Polytope<D>::PlaceByPlanes(const std::array<uint16_t, D>& indices, Point<D>& x) const {
   std::array<const Plane<D>*, D> planes;
   for (int k = 0; k < D; ++k) {
     planes[k] = &planes_[indices[k]];
   }
-  Placement<D> placed = Meet<D>(planes);
-  if (!(std::isfinite(placed.error) && placed.error <= kPlaced * placed.radius)) {
-    std::array<PlaneSource<D>, D> sources;
-    for (int k = 0; k < D; ++k) {
-      sources[k] = planes[k]->source;
-    }
-    placed.x = ExactMeetingPoint<D>(site_, sources);
-    placed.radius = std::sqrt(NormSq<D>(placed.x));
-    placed.error = 8 * kUnit * placed.radius;
-  }
-  x = placed.x;
-  return placed.error + 16 * kUnit * placed.radius;
+  return core::PlaceByPlanes<D>(site_, planes, x);
 }
 
 // Joins the new nodes along the edges of the new facet: two are joined if they share D - 2 planes beside the new one,
 // which is the last of each. Exact decisions leave no edge with one end.
 template <int D>
 WELLSPACE_INLINE void Polytope<D>::LinkNewNodes() {
-  if constexpr (D == 2) {
-    if (cut_count_ != 2) {
+  static_assert(D <= 6);
+  ridges_.clear();
+  for (size_t j = 0; j < cut_count_; ++j) {
+    for (uint32_t slot = 0; slot < D - 1; ++slot) {
+      std::array<uint16_t, D - 2> along;
+      for (uint32_t k = 0; k < D - 2; ++k) {
+        along[k] = joints_[new_[j]].planes[k + (k >= slot ? 1 : 0)];
+      }
+      std::sort(along.begin(), along.end());
+      Ridge ridge{0, EndAt(new_[j], slot)};
+      for (const uint16_t plane : along) {
+        ridge.planes = ridge.planes << 16 | plane;
+      }
+      ridges_.push_back(ridge);
+    }
+  }
+  std::sort(ridges_.begin(), ridges_.end(), [](const Ridge& a, const Ridge& b) { return a.planes < b.planes; });
+  if (ridges_.size() % 2 != 0) {
+    std::abort();
+  }
+  for (size_t i = 0; i < ridges_.size(); i += 2) {
+    if (ridges_[i].planes != ridges_[i + 1].planes) {
       std::abort();
     }
-    Join(EndAt(new_[0], 0), EndAt(new_[1], 0));
-  } else {
-    static_assert(D <= 6);
-    ridges_.clear();
-    for (size_t j = 0; j < cut_count_; ++j) {
-      for (uint32_t slot = 0; slot < D - 1; ++slot) {
-        std::array<uint16_t, D - 2> along;
-        for (uint32_t k = 0; k < D - 2; ++k) {
-          along[k] = joints_[new_[j]].planes[k + (k >= slot ? 1 : 0)];
-        }
-        std::sort(along.begin(), along.end());
-        Ridge ridge{0, EndAt(new_[j], slot)};
-        for (const uint16_t plane : along) {
-          ridge.planes = ridge.planes << 16 | plane;
-        }
-        ridges_.push_back(ridge);
-      }
-    }
-    std::sort(ridges_.begin(), ridges_.end(), [](const Ridge& a, const Ridge& b) { return a.planes < b.planes; });
-    if (ridges_.size() % 2 != 0) {
-      std::abort();
-    }
-    for (size_t i = 0; i < ridges_.size(); i += 2) {
-      if (ridges_[i].planes != ridges_[i + 1].planes) {
-        std::abort();
-      }
-      Join(ridges_[i].end, ridges_[i + 1].end);
-    }
+    Join(ridges_[i].end, ridges_[i + 1].end);
   }
 }
 
@@ -575,7 +583,7 @@ void Polytope<D>::Foretell(size_t begin, Candidates<D>& candidates) {
 }
 
 #define WELLSPACE_INSTANTIATE(D) template class Polytope<D>;
-WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
+WELLSPACE_FOR_EACH_DIMENSION_ABOVE_2(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 
 }  // namespace wellspace::core

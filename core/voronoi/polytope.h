@@ -14,68 +14,12 @@
 #include "core/geometry/point.h"
 #include "core/geometry/power_predicate.h"
 #include "core/voronoi/candidates.h"
+#include "core/voronoi/cell_parts.h"
 #include "core/voronoi/node_columns.h"
+#include "core/voronoi/polygon.h"
 #include "core/voronoi/star.h"
 
 namespace wellspace::core {
-
-// What a bounding plane of a cell is.
-enum class PlaneKind : uint8_t {
-  kBisector,
-  kFace,  // of the box
-  kClip,  // of the cube that a clipped cell is computed in, or of the walls far outside the box
-};
-
-// What a cell about `site` begins with: `box`, clipped by the cube of half side `radius` about the site. `kinds` says by
-// FaceIndex what its faces are.
-template <int D>
-Box<D> ClippedBox(const Box<D>& box, const Point<D>& site, double radius, std::array<PlaneKind, 2 * D>& kinds) {
-  Box<D> bounds = box;
-  kinds.fill(PlaneKind::kFace);
-  for (int i = 0; i < D; ++i) {
-    if (site[i] - radius > bounds.low[i]) {
-      bounds.low[i] = site[i] - radius;
-      kinds[FaceIndex(i, false)] = PlaneKind::kClip;
-    }
-    if (site[i] + radius < bounds.high[i]) {
-      bounds.high[i] = site[i] + radius;
-      kinds[FaceIndex(i, true)] = PlaneKind::kClip;
-    }
-  }
-  return bounds;
-}
-
-template <int D>
-struct Plane {
-  PlaneKind kind = PlaneKind::kBisector;
-  uint8_t face = 0;             // FaceIndex, unless a bisector
-  VertexId vertex = kNoVertex;  // of a bisector
-  Point<D> normal;              // relative to the site: normal . x = offset; for a bisector the vector to its vertex
-  double offset = 0;
-  double length = 0;      // |normal|
-  double distance = 0;    // of the plane from the site, |offset| / length
-  PlaneSource<D> source;  // exact
-};
-
-// Numbers the nodes of a cell: a mesh in 6-D has cells of more than 2^16.
-template <int D>
-using NodeIndex = std::conditional_t<(D <= 4), uint16_t, uint32_t>;
-
-template <int D>
-struct CellNode {
-  Point<D> x;                      // relative to the site
-  double radius_sq = 0;            // |x|^2
-  double reach = 0;                // at least the exact |x|
-  double slack = 0;                // bounds the error of x, and of products with it, per unit of length
-  std::array<uint16_t, D> planes;  // that meet here, by index; of a placed one bisectors by vertex, then walls by face
-  std::array<NodeIndex<D>, D> neighbours;  // neighbours[k]: the node at the other end of the edge that leaves planes[k]
-};
-
-// How often the stages after the floating-point filter were needed.
-struct DecisionCounters {
-  uint64_t exact = 0;
-  uint64_t perturbed = 0;
-};
 
 // Thread safety: thread-compatible. Reused from site to site: no allocation once warm.
 // Invariants: (1) the graph of nodes is that of a simple polytope: every node has D planes and D neighbours, an edge
@@ -113,10 +57,13 @@ class Polytope {
     return CutBeforePlace(u, position, normal, NormSq<D>(normal));
   }
 
-  // The same, for normal = Difference<D>(position, site()) and length_sq = NormSq<D>(normal).
-  bool CutBeforePlace(VertexId u, const Point<D>& position, const Point<D>& normal, double length_sq) {
-    return length_sq <= CutLimitSq() && CutOff(u, position, normal, length_sq);
-  }
+  // The same by vertices, as many as a leaf holds at most, the nearest first: far ones then seldom cut. The cell's own, `site`, may be among
+  // them. Returns how many others are within reach.
+  //
+  // REQUIRES:   positions and listed names may be read up to Buckets::kReadTogether of them.
+  // Complexity: O(positions nodes), and the cuts; no allocation once warm.
+  // Errors:     none.
+  size_t CutByEach(std::span<const Point<D>> positions, const VertexNames& names, VertexId site);
 
   // Computes what nodes() is to tell of the nodes that have been made since: from their planes alone, so that it does not
   // depend on the order of the cuts.
@@ -169,15 +116,7 @@ class Polytope {
   void FindStar(Star<D>& out) const;
 
   // The faces of the box that a node of the cell lies on.
-  FaceMask FacesOf(const CellNode<D>& node) const {
-    FaceMask faces = 0;
-    for (const uint16_t index : node.planes) {
-      if (planes_[index].kind == PlaneKind::kFace) {
-        faces = static_cast<FaceMask>(faces | (1u << planes_[index].face));
-      }
-    }
-    return faces;
-  }
+  FaceMask FacesOf(const CellNode<D>& node) const { return core::FacesOf<D>(planes_, node); }
 
   const Point<D>& site() const { return site_; }
   // Brings reach_sq() down to what it is since the last cut.
@@ -231,6 +170,9 @@ class Polytope {
     End end;
   };
 
+  bool CutBeforePlace(VertexId u, const Point<D>& position, const Point<D>& normal, double length_sq) {
+    return length_sq <= CutLimitSq() && CutOff(u, position, normal, length_sq);
+  }
   bool CutOff(VertexId u, const Point<D>& position, const Point<D>& normal, double length_sq);
   bool CutOffAvx2(VertexId u, const Point<D>& position, const Point<D>& normal, double length_sq);
   template <size_t kWidth>
@@ -270,16 +212,25 @@ class Polytope {
   uint64_t cuts_ = 0;
   DecisionCounters counters_;
 
+  // Scratch of CutByEach.
+  Candidates<D> near_;
+  Candidates<D> sorted_;
   // Scratch of cuts; arrays only grow.
   std::vector<Index> removed_;  // ascending
   size_t removed_count_ = 0;
   std::vector<CutEdge> cut_edges_;
   std::vector<typename NodeColumns<D>::Row> placed_;  // by cut edge: the node that is to be on it
   size_t cut_count_ = 0;
-  std::vector<Index> new_;  // the nodes on them; D != 3
+  std::vector<Index> new_;  // the nodes on them; D > 3
   // By the plane that an edge of the new facet runs along beside the new one, an end that lacks the other one; all kNoEnd between cuts; D = 3.
   std::vector<End> waiting_;
   std::vector<Ridge> ridges_;  // D > 3
+};
+
+template <>
+class Polytope<2> : public Polygon {
+ public:
+  using Polygon::Polygon;
 };
 
 }  // namespace wellspace::core

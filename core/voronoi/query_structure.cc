@@ -12,9 +12,6 @@ namespace wellspace::core {
 
 namespace {
 
-// After so many cuts by the vertices of one leaf, those that are left are looked at together.
-constexpr int kCutsBetweenLooks = 4;
-
 // Asks for the vertices in a leaf that will soon be looked at: the first lines of a cache hold most of them.
 template <int D>
 void Prefetch(const LeafTree<D>& tree, NodeId leaf) {
@@ -297,7 +294,7 @@ void QueryStructure<D>::ClipAndScan(VertexId v, double radius, TieRule rule, Wor
   std::array<PlaneKind, 2 * D> kinds;
   const Box<D> bounds = ClippedBox<D>(box_, point(v), radius, kinds);
   workspace.cell.Reset(point(v), bounds, kinds, rule);
-  Scan(LeafOf(v), workspace, others, first_other);
+  Scan(v, workspace, others, first_other);
 }
 
 template <int D>
@@ -311,22 +308,23 @@ void QueryStructure<D>::Voronoi(VertexId v, Workspace<D>& workspace) const {
   std::array<PlaneKind, 2 * D> kinds;
   kinds.fill(PlaneKind::kClip);
   workspace.cell.Reset(point(v), walls, kinds, TieRule::kPerturb);
-  Scan(LeafOf(v), workspace);
+  Scan(v, workspace);
   workspace.cell.Place();
 }
 
-// Cuts workspace.cell, whose site is a vertex in `own`, by the vertices in the leaves from `own` outward, and by others once by those in `own`.
+// Cuts workspace.cell, that of `v`, by the vertices in the leaves from that of v outward, and by others once by those in that one.
 template <int D>
-void QueryStructure<D>::Scan(NodeId own, Workspace<D>& workspace, std::span<const Point<D>> others,
+void QueryStructure<D>::Scan(VertexId v, Workspace<D>& workspace, std::span<const Point<D>> others,
                              VertexId first_other) const {
+  const NodeId own = LeafOf(v);
   ScanOutward(
       workspace.cell.site(), own, workspace,
       [&] { return workspace.cell.IsTooLarge() ? -1 : workspace.cell.CutLimitSq(); },
       [&](NodeId leaf) { return workspace.cell.Reaches(tree_.BoxOf(leaf)); },
       [&](NodeId leaf) {
-        CutByLeaf(leaf, workspace);
+        CutByLeaf(leaf, v, workspace);
         if (leaf == own) {
-          CutByOthers(others, first_other, workspace);
+          CutByOthers(others, first_other, v, workspace);
         }
       });
   CountCuts(workspace);
@@ -340,63 +338,22 @@ void QueryStructure<D>::CountCuts(Workspace<D>& workspace) {
 }
 
 template <int D>
-void QueryStructure<D>::CutByLeaf(NodeId leaf, Workspace<D>& workspace) const {
+void QueryStructure<D>::CutByLeaf(NodeId leaf, VertexId site, Workspace<D>& workspace) const {
   if (const auto* bucket = tree_.BucketOf(leaf); bucket != nullptr) {
     workspace.counters.vertices += bucket->count;
-    CutByEach(
-        {bucket->positions, bucket->count}, [bucket](size_t slot) { return bucket->ids[slot]; }, workspace);
+    workspace.cell.CutByEach({bucket->positions, bucket->count}, {.listed = bucket->ids}, site);
   }
 }
 
 template <int D>
-void QueryStructure<D>::CutByOthers(std::span<const Point<D>> others, VertexId first_other, Workspace<D>& workspace) {
+void QueryStructure<D>::CutByOthers(std::span<const Point<D>> others, VertexId first_other, VertexId site,
+                                    Workspace<D>& workspace) {
   constexpr size_t kTogether = LeafTree<D>::kLeafCapacity;
   for (size_t begin = 0; begin < others.size() && !workspace.cell.IsTooLarge(); begin += kTogether) {
-    const auto id_of = [=](size_t slot) { return VertexId{static_cast<uint32_t>(Index(first_other) + begin + slot)}; };
+    const VertexNames names{.first = VertexId{static_cast<uint32_t>(Index(first_other) + begin)}};
     workspace.counters.vertices +=
-        CutByEach(others.subspan(begin, std::min(kTogether, others.size() - begin)), id_of, workspace);
+        workspace.cell.CutByEach(others.subspan(begin, std::min(kTogether, others.size() - begin)), names, site);
   }
-}
-
-// Cuts the cell by vertices, as many as a leaf holds at most, the nearest first: far ones then seldom cut. Returns how many are within reach.
-template <int D>
-template <typename IdOf>
-size_t QueryStructure<D>::CutByEach(std::span<const Point<D>> positions, IdOf id_of, Workspace<D>& workspace) {
-  Polytope<D>& cell = workspace.cell;
-  Candidates<D>& near = workspace.near;
-  near.Pick(positions, cell.site(), cell.CutLimitSq());
-  const size_t within_reach = near.count;
-  if (cell.cuts() != 0) {
-    cell.Foretell(0, near);
-    near.DropThoseThatMiss(0);
-  }
-  if (near.count > 1) {
-    workspace.sorted.Sort(near);
-  }
-  Candidates<D>& left = near.count > 1 ? workspace.sorted : near;
-  int cuts = 0;
-  for (size_t j = 0; j < left.count; ++j) {
-    if (cell.IsTooLarge()) {
-      break;
-    }
-    Point<D> w;
-    for (int axis = 0; axis < D; ++axis) {
-      w[axis] = left.w[axis][j];
-    }
-    const auto slot = left.slot[j];
-    if (!cell.CutBeforePlace(id_of(slot), positions[slot], w, left.length_sq[j])) {
-      continue;
-    }
-    if (D == 2) {
-      cell.Tighten();  // takes less than to cut in vain
-    }
-    if (++cuts % kCutsBetweenLooks == 0 && left.count - j > kCutsBetweenLooks) {
-      cell.Foretell(j + 1, left);
-      left.DropThoseThatMiss(j + 1);
-    }
-  }
-  cell.Tighten();
-  return within_reach;
 }
 
 #define WELLSPACE_INSTANTIATE(D) template class QueryStructure<D>;

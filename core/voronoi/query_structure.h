@@ -16,7 +16,6 @@
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
 #include "core/tree/leaf_tree.h"
-#include "core/voronoi/candidates.h"
 #include "core/voronoi/leaf_queue.h"
 #include "core/voronoi/polytope.h"
 
@@ -43,9 +42,6 @@ struct Workspace {
   HugeVector<uint32_t> seen;  // by tree node: the query that last met it
   uint32_t query = 0;
   LeafQueue queue;
-  // Of the leaf that is opened.
-  Candidates<D> near;
-  Candidates<D> sorted;
 };
 
 struct Neighbor {
@@ -199,12 +195,11 @@ class QueryStructure {
   // Others as in UnplacedClippedVoronoi.
   void ClipAndScan(VertexId v, double radius, TieRule rule, Workspace<D>& workspace,
                    std::span<const Point<D>> others = {}, VertexId first_other = kNoVertex) const;
-  void Scan(NodeId own, Workspace<D>& workspace, std::span<const Point<D>> others = {},
+  void Scan(VertexId v, Workspace<D>& workspace, std::span<const Point<D>> others = {},
             VertexId first_other = kNoVertex) const;
-  void CutByLeaf(NodeId leaf, Workspace<D>& workspace) const;
-  static void CutByOthers(std::span<const Point<D>> others, VertexId first_other, Workspace<D>& workspace);
-  template <typename IdOf>
-  static size_t CutByEach(std::span<const Point<D>> positions, IdOf id_of, Workspace<D>& workspace);
+  void CutByLeaf(NodeId leaf, VertexId site, Workspace<D>& workspace) const;
+  static void CutByOthers(std::span<const Point<D>> others, VertexId first_other, VertexId site,
+                          Workspace<D>& workspace);
   static void CountCuts(Workspace<D>& workspace);
 
   Box<D> box_;

@@ -206,7 +206,7 @@ TYPED_TEST(VoronoiOracleTest, QueriesAreExactOnEveryKindOfCloud) {
     }
     left_rough += checker.left_rough();
   }
-  EXPECT_GT(left_rough, 0u);
+  EXPECT_TRUE(left_rough > 0 || D == 2) << "in the plane all are placed";
 }
 
 // From wherever it is looked for; where a vertex is, on faces and between leaves too.

@@ -1,0 +1,645 @@
+#include "core/voronoi/polygon.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <limits>
+
+#include "core/voronoi/lane_bits.h"
+#include "core/voronoi/meeting_point.h"
+
+// Vectors that are passed and returned never are: all that does so is compiled into its callers.
+#pragma GCC diagnostic ignored "-Wpsabi"
+
+namespace wellspace::core {
+namespace {
+
+constexpr size_t kLanesOfFloats = Polygon::kTogether;
+
+// With R at least the distance of the nodes and u = 2^-24, an excess x . w - |w|^2 / 2 in floats is wrong by at most u (5.5 R |w| + 6 |w|^2 / 2): a
+// node x by 1.5 u |x|, half of it from where it was computed in doubles, see PlaceEnds; w by u |w|; the products by u |x| |w| together, the
+// two sums by 2 u (|x| |w| + |w|^2 / 2), and |w|^2 / 2 by 4 u of itself. Whoever may cut has |w| <= 2 R, so that all is less than 12 u R |w|.
+constexpr float kExcessError = 0x1p-20f;
+// What squares of distances can lose below the least float, and more: nothing that a cell is made of is as small.
+constexpr float kUnderflow = 0x1p-80f;
+// A distance in floats differs by less than this share of itself from that of the exact node, a square by less than twice as much.
+constexpr float kDistanceError = 0x1p-21f;
+// By how much, in shares of |x|^2, the power p . (p - 2 x) of a point p within 2 |x| may be wrong: 42 u. Farther out it is positive.
+constexpr float kPowerError = 0x1p-18f;
+// A ratio is surely kept, whatever the rounding and whatever that of placed nodes (kPlaced), if it is by this share.
+constexpr double kSurely = 0x1p-17;
+
+WELLSPACE_INLINE Floats Load(const float* items) { return *reinterpret_cast<const Floats*>(items); }
+WELLSPACE_INLINE Floats Splat(float x) { return x + Floats{}; }
+WELLSPACE_INLINE FloatMask Splat(int32_t x) { return x + FloatMask{}; }
+WELLSPACE_INLINE void Store(const Floats& items, float* to) { *reinterpret_cast<Floats*>(to) = items; }
+
+constexpr FloatMask kEachLane = {0, 1, 2, 3, 4, 5, 6, 7};
+
+WELLSPACE_INLINE float Largest(const Floats& items) {
+  Floats largest = items;
+  const auto with = [&](const FloatMask& order) __attribute__((always_inline)) {
+    const Floats other = __builtin_shuffle(largest, order);
+    largest = largest > other ? largest : other;
+  };
+  with(FloatMask{4, 5, 6, 7, 0, 1, 2, 3});
+  with(FloatMask{2, 3, 0, 1, 6, 7, 4, 5});
+  with(FloatMask{1, 0, 3, 2, 5, 4, 7, 6});
+  return largest[0];
+}
+
+// By the bits of the lanes that are kept: which lanes these are, in order.
+constexpr std::array<std::array<uint8_t, kLanesOfFloats>, 256> kOrders = [] {
+  std::array<std::array<uint8_t, kLanesOfFloats>, 256> orders{};
+  for (uint32_t bits = 0; bits < 256; ++bits) {
+    size_t next = 0;
+    for (uint8_t lane = 0; lane < kLanesOfFloats; ++lane) {
+      if ((bits >> lane & 1) != 0) {
+        orders[bits][next++] = lane;
+      }
+    }
+  }
+  return orders;
+}();
+
+template <VectorUnit kUnit>
+WELLSPACE_INLINE FloatMask OrderOf(uint32_t kept) {
+#if defined(__x86_64__)
+  if constexpr (kUnit == VectorUnit::kAvx2) {
+    using Bytes = char __attribute__((vector_size(16)));
+    using Words = int64_t __attribute__((vector_size(16)));
+    int64_t order;
+    std::memcpy(&order, kOrders[kept].data(), sizeof(order));
+    const Words words = {order, 0};
+    return reinterpret_cast<FloatMask>(__builtin_ia32_pmovzxbd256(reinterpret_cast<Bytes>(words)));
+  }
+#endif
+  FloatMask order;
+  for (size_t i = 0; i < kLanesOfFloats; ++i) {
+    order[i] = kOrders[kept][i];
+  }
+  return order;
+}
+
+// The vertices that may cut, in columns; whole vectors are written, the last one perhaps from the last one on.
+struct alignas(sizeof(Floats)) Candidates2 {
+  static constexpr size_t kCapacity = Polygon::kMostPositions + kLanesOfFloats;
+  float x[kCapacity];
+  float y[kCapacity];
+  float offset[kCapacity];  // half the square of the length
+  float low[kCapacity];     // the offset, less by what an excess may be wrong by
+  int32_t slot[kCapacity];
+  size_t count = 0;
+  size_t within_reach = 0;
+};
+
+// The coordinates of eight positions relative to `site`, times `scale`.
+struct Vectors {
+  Floats x;
+  Floats y;
+};
+WELLSPACE_INLINE Vectors VectorsTo(const Point<2>* positions, const Point<2>& site, double scale) {
+  using Four = Wide<4>::Lanes;
+  using FourFloats = float __attribute__((vector_size(16)));
+  const Four from = {site[0], site[1], site[0], site[1]};
+  FourFloats pairs[4];  // x, y, x, y
+  for (size_t k = 0; k < 4; ++k) {
+    Four two;
+    std::memcpy(&two, positions + 2 * k, sizeof(two));
+    pairs[k] = __builtin_convertvector((two - from) * scale, FourFloats);
+  }
+  const auto join = [](const FourFloats& a, const FourFloats& b) __attribute__((always_inline)) {
+    return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
+  };
+  const Floats even = join(pairs[0], pairs[2]);
+  const Floats odd = join(pairs[1], pairs[3]);
+  return {__builtin_shuffle(even, odd, FloatMask{0, 2, 8, 10, 4, 6, 12, 14}),
+          __builtin_shuffle(even, odd, FloatMask{1, 3, 9, 11, 5, 7, 13, 15})};
+}
+
+// The places of each in the order of distances, up to one part in 2^17, by counting those before it.
+WELLSPACE_INLINE void FindOrder(const Candidates2& candidates, uint32_t* order) {
+  constexpr int kNumberBits = 6;
+  static_assert(Polygon::kMostPositions <= size_t{1} << kNumberBits);
+  alignas(sizeof(FloatMask)) int32_t keys[Candidates2::kCapacity];
+  // The bits of a float that is not negative order as it does; numbered in the last ones, no two are equal.
+  const auto count = static_cast<int32_t>(candidates.count);
+  FloatMask number = kEachLane;
+  for (size_t first = 0; first < candidates.count; first += kLanesOfFloats) {
+    FloatMask own = *reinterpret_cast<const FloatMask*>(candidates.offset + first);
+    own = (own >> kNumberBits << kNumberBits) | number;
+    own = number < count ? own : Splat(std::numeric_limits<int32_t>::max());
+    *reinterpret_cast<FloatMask*>(keys + first) = own;
+    number += static_cast<int32_t>(kLanesOfFloats);
+  }
+  for (size_t first = 0; first < candidates.count; first += kLanesOfFloats) {
+    const FloatMask own = *reinterpret_cast<const FloatMask*>(keys + first);
+    FloatMask before{};
+    for (size_t i = 0; i < candidates.count; i += kLanesOfFloats) {
+      for (size_t k = i; k < i + kLanesOfFloats; ++k) {
+        before -= Splat(keys[k]) < own;
+      }
+    }
+    for (size_t lane = 0; lane < kLanesOfFloats; ++lane) {
+      order[before[lane]] = static_cast<uint32_t>(first + lane);  // of what is none: after the last
+    }
+  }
+}
+
+}  // namespace
+
+void Polygon::Reset(const Point<2>& site, const Box<2>& bounds, const std::array<PlaneKind, 4>& kinds, TieRule rule) {
+  site_ = site;
+  rule_ = rule;
+  cuts_ = 0;
+  counters_ = {};
+  planes_.resize(std::max<size_t>(planes_.size(), 16));
+  plane_count_ = 4;
+  double longest = 0;
+  for (int face = 0; face < 4; ++face) {
+    const int axis = face / 2;
+    Plane<2>& plane = planes_[face];
+    plane.kind = kinds[face];
+    plane.face = static_cast<uint8_t>(face);
+    plane.vertex = kNoVertex;
+    plane.normal = {};
+    plane.normal[axis] = 1;
+    plane.length = 1;
+    plane.source.axis = axis;
+    plane.source.coordinate = bounds.FaceCoordinate(face);
+    plane.offset = plane.source.coordinate - site[axis];
+    plane.distance = std::abs(plane.offset);
+    longest = std::max(longest, plane.distance);
+  }
+  // One over the power of two below the longest.
+  constexpr int kMantissaBits = std::numeric_limits<double>::digits - 1;
+  constexpr uint64_t kMostExponent = 2046;
+  const uint64_t exponent =
+      std::clamp<uint64_t>(std::bit_cast<uint64_t>(longest) >> kMantissaBits, 1, kMostExponent - 1);
+  scale_ = std::bit_cast<double>((kMostExponent - exponent) << kMantissaBits);
+  unit_length_ = std::bit_cast<double>(exponent << kMantissaBits);
+  // From the lower left corner on; the edge from there runs along the lower face of axis 1.
+  static constexpr std::array<std::array<uint32_t, 2>, 4> kCorners = {{{0, 2}, {1, 2}, {1, 3}, {0, 3}}};
+  static constexpr std::array<uint32_t, 4> kEdges = {2, 1, 3, 0};
+  Group& group = groups_.front();
+  group = {};
+  count_ = 4;
+  for (size_t i = 0; i < 4; ++i) {
+    group.x[i] = static_cast<float>(planes_[kCorners[i][0]].offset * scale_);
+    group.y[i] = static_cast<float>(planes_[kCorners[i][1]].offset * scale_);
+    group.plane[i] = kEdges[i];
+  }
+  is_placed_ = false;
+  placed_reach_ = std::numeric_limits<double>::infinity();
+  most_radius_ = std::numeric_limits<float>::infinity();
+  SetReach(Largest(Load(group.x) * Load(group.x) + Load(group.y) * Load(group.y)));
+}
+
+// Takes note of the largest squared distance of a node, in floats.
+WELLSPACE_INLINE void Polygon::SetReach(float radius_sq) {
+  most_radius_ = std::min(most_radius_, std::sqrt(radius_sq) * (1 + kDistanceError));  // the cell only shrinks
+}
+
+// Of the nodes `first` + i for the bits i of `doubtful`: a bit for whether it is cut off, by doubles if they tell, else exactly.
+[[gnu::noinline]] uint32_t Polygon::DecideDoubtful(size_t first, uint32_t doubtful, const Point<2>& generator) {
+  const Point<2> normal = Difference<2>(generator, site_);
+  const double length_sq = NormSq<2>(normal);
+  uint32_t removed = 0;
+  for (; doubtful != 0; doubtful &= doubtful - 1) {
+    const size_t node = first + static_cast<size_t>(std::countr_zero(doubtful));
+    const Plane<2>& before = planes_[PlaneFrom(Before(node))];
+    const Plane<2>& after = planes_[PlaneFrom(node)];
+    const Placement<2> placed = Meet<2>({&before, &after});
+    const double excess = Dot<2>(placed.x, normal) - 0.5 * length_sq;
+    const double doubt = SlackOf(placed) * std::sqrt(length_sq) + kOffsetError<2> * 0.5 * length_sq;
+    bool is_cut_off = excess > 0;
+    if (!(std::abs(excess) > doubt)) {
+      const ExactDecision decision = DecideCut<2>(site_, {before.source, after.source}, generator, rule_);
+      ++counters_.exact;
+      counters_.perturbed += decision.perturbed ? 1 : 0;
+      is_cut_off = decision.sign == Sign::kPositive;
+    }
+    removed |= is_cut_off ? doubtful & -doubtful : 0;
+  }
+  return removed;
+}
+
+// Computes where `plane` meets the edges at whose ends the rest ends, in the order of the nodes, and the edges from there.
+//
+// As Meet does, by Cramer's rule in doubles: wrong by at most 64 * 2^-53 P (d + d' + |x|) / |det| with P = |n| |n'|, and the distances d
+// and d' of the two planes are |x| at most. So |det| > 2^-19 P has x wrong by less than half a unit of floats, 2^-26 |x|.
+WELLSPACE_INLINE void Polygon::PlaceEnds(const Rest& rest, uint32_t plane, std::array<Node, 2>& ends) const {
+  using Pair = Wide<2>::Lanes;
+  size_t last = rest.first + rest.count - 1;
+  last = last < count_ ? last : last - count_;
+  const size_t before = Before(rest.first);
+  const std::array<uint32_t, 2> along = {PlaneFrom(last), PlaneFrom(before)};
+  const Plane<2>& cut = planes_[plane];
+  const Plane<2>& a = planes_[along[0]];
+  const Plane<2>& b = planes_[along[1]];
+  const Pair normal_x = {a.normal[0], b.normal[0]};
+  const Pair normal_y = {a.normal[1], b.normal[1]};
+  const Pair offset = {a.offset, b.offset};
+  const Pair product = Pair{a.length, b.length} * cut.length;
+  const Pair determinant = normal_x * cut.normal[1] - normal_y * cut.normal[0];
+  const Pair inverse = scale_ / determinant;
+  Pair x = (offset * cut.normal[1] - cut.offset * normal_y) * inverse;
+  Pair y = (cut.offset * normal_x - offset * cut.normal[0]) * inverse;
+  const Pair size = determinant < 0 ? -determinant : determinant;
+  const auto is_good = size > 0x1p-19 * product;
+  if (Bits<2>(is_good) != 3) [[unlikely]] {
+    for (size_t k = 0; k < 2; ++k) {
+      if (is_good[k] == 0) {
+        const Point<2> exact = ExactMeetingPoint<2>(site_, {planes_[along[k]].source, cut.source});
+        x[k] = exact[0] * scale_;
+        y[k] = exact[1] * scale_;
+      }
+    }
+  }
+  ends[0].x = static_cast<float>(x[0]);
+  ends[0].y = static_cast<float>(y[0]);
+  ends[0].plane = plane;
+  ends[1].x = static_cast<float>(x[1]);
+  ends[1].y = static_cast<float>(y[1]);
+  ends[1].plane = along[1];
+  ends[1].edge_sq = groups_[before / kTogether].edge_sq[before % kTogether];
+}
+
+// Makes the rest and the ends the nodes; both before and after kTogether at most.
+WELLSPACE_INLINE void Polygon::Replace(const Rest& rest, const std::array<Node, 2>& ends) {
+  Group& group = groups_.front();
+  const auto old_count = static_cast<int32_t>(count_);
+  const auto kept = static_cast<int32_t>(rest.count);
+  FloatMask from = kEachLane + static_cast<int32_t>(rest.first);
+  from = from - ((from >= old_count) & old_count);
+  const FloatMask is_first = kEachLane == kept;
+  const FloatMask is_second = kEachLane == kept + 1;
+  const FloatMask is_used = kEachLane < kept + 2;
+  const auto replace = [&](const Floats& old, float first, float second) __attribute__((always_inline)) {
+    Floats items = __builtin_shuffle(old, from);
+    items = is_first ? Splat(first) : items;
+    return is_second ? Splat(second) : items;
+  };
+  const auto used = [&](const Floats& items) __attribute__((always_inline)) {
+    return reinterpret_cast<Floats>(reinterpret_cast<FloatMask>(items) & is_used);
+  };
+  const Floats x = used(replace(Load(group.x), ends[0].x, ends[1].x));
+  const Floats y = used(replace(Load(group.y), ends[0].y, ends[1].y));
+  Store(x, group.x);
+  Store(y, group.y);
+  Store(replace(Load(group.edge_sq), ends[0].edge_sq, ends[1].edge_sq), group.edge_sq);
+  FloatMask plane = __builtin_shuffle(*reinterpret_cast<const FloatMask*>(group.plane), from);
+  plane = is_first ? Splat(static_cast<int32_t>(ends[0].plane)) : plane;
+  plane = is_second ? Splat(static_cast<int32_t>(ends[1].plane)) : plane;
+  *reinterpret_cast<FloatMask*>(group.plane) = plane;
+  count_ = rest.count + 2;
+  SetReach(Largest(x * x + y * y));
+}
+
+[[gnu::noinline]] void Polygon::ReplaceAmongMany(const Rest& rest, const std::array<Node, 2>& ends) {
+  around_.clear();
+  for (size_t j = 0; j < rest.count; ++j) {
+    const size_t i = (rest.first + j) % count_;
+    const Group& group = groups_[i / kTogether];
+    const size_t lane = i % kTogether;
+    around_.push_back({group.x[lane], group.y[lane], group.edge_sq[lane], group.plane[lane]});
+  }
+  around_.insert(around_.end(), ends.begin(), ends.end());
+  count_ = around_.size();
+  const size_t groups = (count_ + kTogether - 1) / kTogether;
+  if (groups_.size() < groups) {
+    groups_.resize(2 * groups);
+  }
+  around_.resize(groups * kTogether);
+  float radius_sq = 0;
+  for (size_t i = 0; i < around_.size(); ++i) {
+    const Node& node = around_[i];
+    Group& group = groups_[i / kTogether];
+    const size_t lane = i % kTogether;
+    group.x[lane] = node.x;
+    group.y[lane] = node.y;
+    group.edge_sq[lane] = node.edge_sq;
+    group.plane[lane] = node.plane;
+    radius_sq = std::max(radius_sq, node.x * node.x + node.y * node.y);
+  }
+  SetReach(radius_sq);
+}
+
+// By how much the nodes, kTogether or fewer, may exceed the bisector at most.
+WELLSPACE_INLINE Floats Polygon::MostExcesses(const Bisector& bisector) const {
+  const Group& group = groups_.front();
+  return Load(group.x) * bisector.w[0] + (Load(group.y) * bisector.w[1] - bisector.low);
+}
+
+// Tells what the bisector leaves of the nodes, kTogether or fewer, of which those of the bits `maybe` may be beyond it; false if all.
+template <VectorUnit kUnit>
+WELLSPACE_INLINE bool Polygon::FindRest(const Bisector& bisector, const Floats& most, uint32_t maybe,
+                                        const Point<2>& position, Rest& rest) {
+  const auto count = static_cast<uint32_t>(count_);
+  uint32_t removed = Bits<kUnit>(most > 2 * (bisector.offset - bisector.low)) & maybe;
+  if (removed != maybe) [[unlikely]] {
+    removed |= DecideDoubtful(0, maybe & ~removed, position);
+    if (removed == 0) {
+      return false;
+    }
+  }
+  const uint32_t is_before = removed << 1 | removed >> (count - 1);  // by node, whether the one before it goes
+  const uint32_t first = is_before & ~removed & ((1u << count) - 1);
+  if (!std::has_single_bit(first)) {
+    std::abort();  // exact decisions take out a run
+  }
+  rest.first = static_cast<uint32_t>(std::countr_zero(first));
+  rest.count = count - static_cast<uint32_t>(std::popcount(removed));
+  return true;
+}
+
+[[gnu::noinline]] bool Polygon::FindRestOfMany(const Bisector& bisector, const Point<2>& position, Rest& rest) {
+  is_removed_.assign(count_, 0);
+  size_t removed_count = 0;
+  for (size_t i = 0; i < count_; ++i) {
+    const Group& group = groups_[i / kTogether];
+    const size_t lane = i % kTogether;
+    const float most = group.x[lane] * bisector.w[0] + (group.y[lane] * bisector.w[1] - bisector.low);
+    if (most >= 0 && (most > 2 * (bisector.offset - bisector.low) || DecideDoubtful(i, 1, position) != 0)) {
+      is_removed_[i] = 1;
+      ++removed_count;
+    }
+  }
+  if (removed_count == 0) {
+    return false;
+  }
+  size_t runs = 0;
+  for (size_t i = 0; i < count_; ++i) {
+    if (is_removed_[i] == 0 && is_removed_[Before(i)] != 0) {
+      rest.first = static_cast<uint32_t>(i);
+      ++runs;
+    }
+  }
+  if (runs != 1) {
+    std::abort();
+  }
+  rest.count = static_cast<uint32_t>(count_ - removed_count);
+  return true;
+}
+
+// Cuts by the bisector of the site and `position`.
+template <VectorUnit kUnit>
+WELLSPACE_INLINE bool Polygon::CutOff(const Bisector& bisector, VertexId u, const Point<2>& position) {
+  Rest rest;
+  if (count_ <= kTogether) {
+    const Floats most = MostExcesses(bisector);
+    const uint32_t maybe = ~Bits<kUnit>(reinterpret_cast<const FloatMask&>(most)) & ((1u << count_) - 1);
+    if (maybe == 0 || !FindRest<kUnit>(bisector, most, maybe, position, rest)) {
+      return false;
+    }
+  } else if (!FindRestOfMany(bisector, position, rest)) {
+    return false;
+  }
+  ++cuts_;
+  is_placed_ = false;
+  const size_t index = plane_count_++;
+  if (planes_.size() < plane_count_) {
+    planes_.resize(2 * plane_count_);
+  }
+  Plane<2>& plane = planes_[index];
+  plane.kind = PlaneKind::kBisector;
+  plane.vertex = u;
+  plane.normal = Difference<2>(position, site_);
+  const double length_sq = NormSq<2>(plane.normal);
+  plane.offset = 0.5 * length_sq;
+  plane.length = std::sqrt(length_sq);
+  plane.distance = 0.5 * plane.length;
+  plane.source.generator = position;
+  plane.source.axis = -1;
+  std::array<Node, 2> ends;
+  PlaceEnds(rest, static_cast<uint32_t>(index), ends);
+  ends[0].edge_sq = 2 * bisector.offset;
+  if (count_ <= kTogether && rest.count + 2 <= kTogether) {
+    Replace(rest, ends);
+  } else {
+    ReplaceAmongMany(rest, ends);
+  }
+  return true;
+}
+
+template <VectorUnit kUnit>
+WELLSPACE_INLINE size_t Polygon::CutByEachWith(std::span<const Point<2>> positions, const VertexNames& names,
+                                               VertexId site) {
+  Candidates2 candidates;
+  // Half the square of the distance within which a vertex may cut, in floats wrong by less than twice kDistanceError.
+  const auto most_offset = [this] { return 2 * (1 + 8 * kDistanceError) * most_radius_ * most_radius_; };
+  const float far = most_offset();
+  const float error = kExcessError * most_radius_;
+  FloatMask slot = kEachLane;
+  for (size_t from = 0; from < positions.size(); from += kTogether) {
+    const Vectors w = VectorsTo(&positions[from], site_, scale_);
+    const Floats length_sq = w.x * w.x + w.y * w.y;
+    Floats length;
+    for (size_t lane = 0; lane < kTogether; ++lane) {
+      length[lane] = __builtin_sqrtf(length_sq[lane]);
+    }
+    const Floats offset = 0.5f * length_sq;
+    const Floats low = offset - (error * length + kUnderflow);
+    FloatMask is_near = (offset <= far) & (slot < static_cast<int32_t>(positions.size()));
+    if (names.listed != nullptr) {
+      FloatMask listed;
+      std::memcpy(&listed, names.listed + from, sizeof(listed));
+      is_near &= listed != static_cast<int32_t>(Index(site));
+    }
+    candidates.within_reach += static_cast<size_t>(std::popcount(Bits<kUnit>(is_near)));
+    if (cuts_ != 0) {
+      // Most of those miss the cell, now and later.
+      Floats most = Splat(-std::numeric_limits<float>::infinity());
+      for (const Group* group = groups_.data(); group < groups_.data() + (count_ + kTogether - 1) / kTogether;
+           ++group) {
+        for (size_t i = 0; i < kTogether; ++i) {
+          const Floats product = w.x * group->x[i] + w.y * group->y[i];
+          most = most > product ? most : product;
+        }
+      }
+      is_near &= most >= low;
+    }
+    const uint32_t kept = Bits<kUnit>(is_near);
+    const FloatMask order = OrderOf<kUnit>(kept);
+    const auto append = [&](const auto& items, auto* column) __attribute__((always_inline)) {
+      const auto chosen = __builtin_shuffle(items, order);
+      std::memcpy(column + candidates.count, &chosen, sizeof(chosen));
+    };
+    append(w.x, candidates.x);
+    append(w.y, candidates.y);
+    append(offset, candidates.offset);
+    append(low, candidates.low);
+    append(slot, candidates.slot);
+    candidates.count += static_cast<size_t>(std::popcount(kept));
+    slot += static_cast<int32_t>(kTogether);
+  }
+  uint32_t order[Candidates2::kCapacity];
+  order[0] = 0;
+  if (candidates.count > 1) {
+    FindOrder(candidates, order);
+  }
+  float left = far;
+  for (size_t j = 0; j < candidates.count; ++j) {
+    const uint32_t i = order[j];
+    const Bisector bisector{{candidates.x[i], candidates.y[i]}, candidates.offset[i], candidates.low[i]};
+    if (bisector.offset > left) {
+      break;
+    }
+    const auto at = static_cast<size_t>(candidates.slot[i]);
+    if (CutOff<kUnit>(bisector, names[at], positions[at])) {
+      if (IsTooLarge()) {
+        break;
+      }
+      left = most_offset() * (1 + 0x1p-16f);  // those that follow may be nearer by as much
+    }
+  }
+  return candidates.within_reach;
+}
+
+bool Polygon::CutBeforePlace(VertexId u, const Point<2>& position) {
+  const Point<2> normal = Difference<2>(position, site_);
+  if (!(NormSq<2>(normal) <= CutLimitSq())) {
+    return false;
+  }
+  Bisector bisector;
+  bisector.w[0] = static_cast<float>(normal[0] * scale_);
+  bisector.w[1] = static_cast<float>(normal[1] * scale_);
+  bisector.offset = 0.5f * (bisector.w[0] * bisector.w[0] + bisector.w[1] * bisector.w[1]);
+  bisector.low = bisector.offset - (kExcessError * most_radius_ * std::sqrt(2 * bisector.offset) + kUnderflow);
+  return unit_ == VectorUnit::kAvx2 ? CutOffAvx2(bisector, u, position)
+                                    : CutOff<VectorUnit::kBaseline>(bisector, u, position);
+}
+
+WELLSPACE_AVX2 bool Polygon::CutOffAvx2(const Bisector& bisector, VertexId u, const Point<2>& position) {
+  return CutOff<VectorUnit::kAvx2>(bisector, u, position);
+}
+
+size_t Polygon::CutByEach(std::span<const Point<2>> positions, const VertexNames& names, VertexId site) {
+  return unit_ == VectorUnit::kAvx2 ? CutByEachAvx2(positions, names, site)
+                                    : CutByEachWith<VectorUnit::kBaseline>(positions, names, site);
+}
+
+WELLSPACE_AVX2 size_t Polygon::CutByEachAvx2(std::span<const Point<2>> positions, const VertexNames& names,
+                                             VertexId site) {
+  return CutByEachWith<VectorUnit::kAvx2>(positions, names, site);
+}
+
+// Places all by their planes, bisectors by vertex, then walls by face: so they do not depend on the order of the cuts.
+void Polygon::Place() {
+  if (is_placed_) {
+    return;
+  }
+  is_placed_ = true;
+  nodes_.resize(count_);
+  double reach = 0;
+  for (size_t i = 0; i < count_; ++i) {
+    CellNode<2>& node = nodes_[i];
+    const size_t before = Before(i);
+    const size_t after = i + 1 < count_ ? i + 1 : 0;
+    const std::array<uint32_t, 2> planes = {PlaneFrom(before), PlaneFrom(i)};
+    const auto key = [this](uint32_t index) { return uint64_t{Index(planes_[index].vertex)} << 32 | index; };
+    const bool swaps = key(planes[1]) < key(planes[0]);
+    node.planes = {static_cast<uint16_t>(planes[swaps ? 1 : 0]), static_cast<uint16_t>(planes[swaps ? 0 : 1])};
+    // The edge that leaves the plane of the edge before runs along the one after, and the other way round.
+    node.neighbours = {static_cast<uint16_t>(swaps ? before : after), static_cast<uint16_t>(swaps ? after : before)};
+    node.slack = PlaceByPlanes<2>(site_, {&planes_[node.planes[0]], &planes_[node.planes[1]]}, node.x);
+    node.radius_sq = NormSq<2>(node.x);
+    node.reach = std::sqrt(node.radius_sq) + node.slack;
+    reach = std::max(reach, node.reach);
+  }
+  placed_reach_ = reach;
+}
+
+bool Polygon::PlaceUnlessKeeps(double ratio) {
+  if (KeepsRatio(ratio)) {
+    return true;
+  }
+  Place();
+  return false;
+}
+
+template <VectorUnit kUnit>
+WELLSPACE_INLINE bool Polygon::KeepsRatioWith(double ratio) const {
+  const double surely = ratio * (1 - kSurely);
+  const auto ratio_sq = static_cast<float>(surely * surely);
+  if (count_ <= kTogether) {
+    const Group& group = groups_.front();
+    FloatMask before = kEachLane - 1;
+    before = before < 0 ? Splat(static_cast<int32_t>(count_ - 1)) : before;
+    const Floats from = Load(group.edge_sq);
+    const Floats to = __builtin_shuffle(from, before);
+    const Floats nearest_sq = from < to ? from : to;
+    const Floats radius_sq = Load(group.x) * Load(group.x) + Load(group.y) * Load(group.y);
+    const uint32_t all = (1u << count_) - 1;
+    return (Bits<kUnit>(radius_sq + kUnderflow <= ratio_sq * nearest_sq) & all) == all;
+  }
+  for (size_t i = 0; i < count_; ++i) {
+    const size_t before = Before(i);
+    const Group& group = groups_[i / kTogether];
+    const size_t lane = i % kTogether;
+    const float nearest_sq = std::min(group.edge_sq[lane], groups_[before / kTogether].edge_sq[before % kTogether]);
+    const float radius_sq = group.x[lane] * group.x[lane] + group.y[lane] * group.y[lane];
+    if (!(radius_sq + kUnderflow <= ratio_sq * nearest_sq)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+bool Polygon::KeepsRatio(double ratio) const {
+  return unit_ == VectorUnit::kAvx2 ? KeepsRatioAvx2(ratio) : KeepsRatioWith<VectorUnit::kBaseline>(ratio);
+}
+
+WELLSPACE_AVX2 bool Polygon::KeepsRatioAvx2(double ratio) const { return KeepsRatioWith<VectorUnit::kAvx2>(ratio); }
+
+template <VectorUnit kUnit>
+WELLSPACE_INLINE bool Polygon::ReachesWith(const Box<2>& cube) const {
+  const auto relative = [this](double x, int axis) __attribute__((always_inline)) {
+    return Splat(static_cast<float>((x - site_[axis]) * scale_));
+  };
+  const Floats low[2] = {relative(cube.low[0], 0), relative(cube.low[1], 1)};
+  const Floats high[2] = {relative(cube.high[0], 0), relative(cube.high[1], 1)};
+  FloatMask any{};
+  for (const Group* group = groups_.data(); group < groups_.data() + (count_ + kTogether - 1) / kTogether; ++group) {
+    Floats power{};
+    Floats radius_sq{};
+    for (int axis = 0; axis < 2; ++axis) {
+      const Floats x = Load(axis == 0 ? group->x : group->y);
+      Floats p = x > low[axis] ? x : low[axis];
+      p = p < high[axis] ? p : high[axis];
+      power += p * (p - 2 * x);
+      radius_sq += x * x;
+    }
+    any |= power <= kPowerError * radius_sq + kUnderflow;
+  }
+  return Bits<kUnit>(any) != 0;
+}
+
+bool Polygon::Reaches(const Box<2>& cube) const {
+  return unit_ == VectorUnit::kAvx2 ? ReachesAvx2(cube) : ReachesWith<VectorUnit::kBaseline>(cube);
+}
+
+WELLSPACE_AVX2 bool Polygon::ReachesAvx2(const Box<2>& cube) const { return ReachesWith<VectorUnit::kAvx2>(cube); }
+
+void Polygon::FindStar(Star<2>& out) const {
+  out.resize(count_);
+  size_t count = 0;
+  const Plane<2>* before = &planes_[PlaneFrom(Before(0))];
+  for (size_t i = 0; i < count_; ++i) {
+    // No branch, since none could be foretold where there are walls.
+    const Plane<2>* const after = &planes_[PlaneFrom(i)];
+    out[count] = {before->vertex, after->vertex};
+    count += before->kind == PlaneKind::kBisector && after->kind == PlaneKind::kBisector ? 1 : 0;
+    before = after;
+  }
+  out.resize(count);
+}
+
+uint64_t Polygon::MemoryBytes() const {
+  return groups_.capacity() * sizeof(Group) + planes_.capacity() * sizeof(Plane<2>) +
+         nodes_.capacity() * sizeof(CellNode<2>) + around_.capacity() * sizeof(Node) + is_removed_.capacity();
+}
+
+}  // namespace wellspace::core

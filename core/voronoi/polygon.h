@@ -1,0 +1,144 @@
+// The Voronoi cell of one vertex in the plane under construction.
+#ifndef WELLSPACE_CORE_VORONOI_POLYGON_H_
+#define WELLSPACE_CORE_VORONOI_POLYGON_H_
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/base/ids.h"
+#include "core/geometry/box.h"
+#include "core/geometry/point.h"
+#include "core/geometry/power_predicate.h"
+#include "core/voronoi/cell_parts.h"
+#include "core/voronoi/lanes.h"
+#include "core/voronoi/star.h"
+
+namespace wellspace::core {
+
+// Polytope<2>, to which its functions that are not told about here belong: a convex polygon, whose nodes are kept in order around the
+// site, so that a cut takes a run of them out and puts two in. While cuts are made nodes are floats, in units of about the reach
+// that the cell began with; what these leave in doubt is decided exactly. Up to eight nodes, as most cells have, are worked on as one vector.
+//
+// Thread safety: thread-compatible. Reused from site to site: no allocation once warm.
+// Invariants: the nodes are those that exact arithmetic and the tie rule give, whatever the rounding.
+class Polygon {
+ public:
+  static constexpr size_t kMostNodes = size_t{1} << 14;
+  static constexpr size_t kMostPlanes = size_t{1} << 15;
+  // Positions that may cut are looked at so many at a time.
+  static constexpr size_t kTogether = 8;
+  static constexpr size_t kMostPositions = 64;
+
+  // Works with `unit`, which this processor has; the best there is unless told.
+  explicit Polygon(VectorUnit unit = BestVectorUnit()) : unit_(unit), groups_(1) {}
+
+  void Reset(const Point<2>& site, const Box<2>& bounds, const std::array<PlaneKind, 4>& kinds, TieRule rule);
+
+  bool Cut(VertexId u, const Point<2>& position) {
+    const bool is_cut = CutBeforePlace(u, position);
+    Place();
+    return is_cut;
+  }
+  bool CutBeforePlace(VertexId u, const Point<2>& position);
+
+  size_t CutByEach(std::span<const Point<2>> positions, const VertexNames& names, VertexId site);
+
+  void Place();
+  bool KeepsRatio(double ratio) const;
+  bool PlaceUnlessKeeps(double ratio);
+  bool Reaches(const Box<2>& cube) const;
+  bool IsTooLarge() const { return count_ > kMostNodes || plane_count_ > kMostPlanes; }
+  void FindStar(Star<2>& out) const;
+  FaceMask FacesOf(const CellNode<2>& node) const { return core::FacesOf<2>(planes_, node); }
+
+  const Point<2>& site() const { return site_; }
+  void Tighten() {}  // it always is
+  double reach_sq() const {
+    const double reach = std::min(most_radius_ * unit_length_, placed_reach_);
+    return reach * reach;
+  }
+  double CutLimitSq() const { return 4 * (1 + 0x1p-49) * reach_sq(); }
+  std::span<const CellNode<2>> nodes() const { return nodes_; }
+  const Plane<2>& plane(int index) const { return planes_[index]; }
+  int plane_count() const { return static_cast<int>(plane_count_); }
+  uint64_t cuts() const { return cuts_; }
+  const DecisionCounters& counters() const { return counters_; }
+  uint64_t MemoryBytes() const;
+
+ private:
+  // Nodes, each with the edge from it to the next one: the square of the length of what its bisector stands for, 0 of a wall, and
+  // its plane, by index. Places beyond the last node are at the site, which no bisector cuts off.
+  struct alignas(kTogether * sizeof(float)) Group {
+    float x[kTogether];
+    float y[kTogether];
+    float edge_sq[kTogether];
+    uint32_t plane[kTogether];
+  };
+  struct Node {
+    float x;
+    float y;
+    float edge_sq;
+    uint32_t plane;
+  };
+  // In the units of the nodes.
+  struct Bisector {
+    float w[2];    // the vector to the vertex
+    float offset;  // |w|^2 / 2
+    float low;     // the offset, less by what an excess over it may be wrong by at most
+  };
+  // What is left of the nodes: so many from there on, around.
+  struct Rest {
+    uint32_t first;
+    uint32_t count;
+  };
+
+  template <VectorUnit kUnit>
+  size_t CutByEachWith(std::span<const Point<2>> positions, const VertexNames& names, VertexId site);
+  size_t CutByEachAvx2(std::span<const Point<2>> positions, const VertexNames& names, VertexId site);
+  template <VectorUnit kUnit>
+  bool CutOff(const Bisector& bisector, VertexId u, const Point<2>& position);
+  bool CutOffAvx2(const Bisector& bisector, VertexId u, const Point<2>& position);
+  Floats MostExcesses(const Bisector& bisector) const;
+  template <VectorUnit kUnit>
+  bool FindRest(const Bisector& bisector, const Floats& most, uint32_t maybe, const Point<2>& position, Rest& rest);
+  bool FindRestOfMany(const Bisector& bisector, const Point<2>& position, Rest& rest);
+  uint32_t DecideDoubtful(size_t first, uint32_t doubtful, const Point<2>& generator);
+  void PlaceEnds(const Rest& rest, uint32_t plane, std::array<Node, 2>& ends) const;
+  void Replace(const Rest& rest, const std::array<Node, 2>& ends);
+  void ReplaceAmongMany(const Rest& rest, const std::array<Node, 2>& ends);
+  template <VectorUnit kUnit>
+  bool KeepsRatioWith(double ratio) const;
+  bool KeepsRatioAvx2(double ratio) const;
+  template <VectorUnit kUnit>
+  bool ReachesWith(const Box<2>& cube) const;
+  bool ReachesAvx2(const Box<2>& cube) const;
+  void SetReach(float radius_sq);
+  uint32_t PlaneFrom(size_t node) const { return groups_[node / kTogether].plane[node % kTogether]; }
+  size_t Before(size_t node) const { return (node == 0 ? count_ : node) - 1; }
+
+  VectorUnit unit_;
+  Point<2> site_;
+  TieRule rule_ = TieRule::kKeep;
+  double scale_ = 1;         // the units of the nodes, so many to one of the coordinates, a power of two
+  double unit_length_ = 1;   // 1 / scale_
+  float most_radius_ = 0;    // at least the distance from the site to the farthest node, in the units of the nodes
+  double placed_reach_ = 0;  // the same of the nodes that were placed last, in those of the coordinates
+  size_t count_ = 0;
+  std::vector<Group> groups_;     // and more
+  std::vector<Plane<2>> planes_;  // and more
+  size_t plane_count_ = 0;
+  bool is_placed_ = false;
+  std::vector<CellNode<2>> nodes_;  // as of the last that placed them
+  uint64_t cuts_ = 0;
+  DecisionCounters counters_;
+  std::vector<Node> around_;         // scratch of ReplaceAmongMany
+  std::vector<uint8_t> is_removed_;  // scratch of FindRestOfMany
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_VORONOI_POLYGON_H_
