@@ -231,7 +231,7 @@ void Candidates<D>::Sort(const Candidates& from, VectorUnit unit) {
 }
 
 #define WELLSPACE_INSTANTIATE(D) template struct Candidates<D>;
-WELLSPACE_FOR_EACH_DIMENSION_ABOVE_2(WELLSPACE_INSTANTIATE)
+WELLSPACE_FOR_EACH_DIMENSION_ABOVE_3(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 
 }  // namespace wellspace::core

@@ -78,6 +78,9 @@ FaceMask FacesOf(std::span<const Plane<D>> planes, const CellNode<D>& node) {
   return faces;
 }
 
+// So many vertices at most cut a cell in one go, in the plane and in space.
+inline constexpr size_t kMostCutTogether = 64;
+
 // How often the stages after the floating-point filter were needed.
 struct DecisionCounters {
   uint64_t exact = 0;

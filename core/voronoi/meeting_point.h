@@ -14,12 +14,6 @@
 
 namespace wellspace::core {
 
-// The excess x . w - c, c = |w|^2 / 2, of a node x over the bisector to a vertex at w, as computed, differs from the exact one by at most slack |w| + (D
-// + 5) u c: the error of x is in its slack, w has one rounding a coordinate, the product D more, c D + 2, the difference one; 16 u |x| of the
-// slack pays for those of the product.
-template <int D>
-inline constexpr double kOffsetError = (D + 5) * kUnit;
-
 // A node in doubles, and a bound on |x - exact x|; infinite where there is none.
 template <int D>
 struct Placement {
@@ -155,17 +149,15 @@ Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D > 3) 
 // depend on how they were placed.
 inline constexpr double kPlaced = 0x1p-20;
 
-template <int D>
-double SlackOf(const Placement<D>& placed) {
-  return placed.error + 16 * kUnit * placed.radius;
-}
-
 // Computes where planes of a cell, in their order, meet, exactly where they are too nearly dependent for doubles, and returns the
 // slack.
 template <int D>
 double PlaceByPlanes(const Point<D>& site, const std::array<const Plane<D>*, D>& planes, Point<D>& x) {
   Placement<D> placed = Meet<D>(planes);
-  if (!(std::isfinite(placed.error) && placed.error <= kPlaced * placed.radius)) {
+  if (std::all_of(planes.begin(), planes.end(),
+                  [](const Plane<D>* plane) { return plane->kind != PlaneKind::kBisector; })) {
+    placed.error = 0;  // walls are at right angles
+  } else if (!(std::isfinite(placed.error) && placed.error <= kPlaced * placed.radius)) {
     std::array<PlaneSource<D>, D> sources;
     for (int k = 0; k < D; ++k) {
       sources[k] = planes[k]->source;
@@ -175,7 +167,7 @@ double PlaceByPlanes(const Point<D>& site, const std::array<const Plane<D>*, D>&
     placed.error = 8 * kUnit * placed.radius;
   }
   x = placed.x;
-  return SlackOf<D>(placed);
+  return placed.error + 16 * kUnit * placed.radius;
 }
 
 }  // namespace wellspace::core

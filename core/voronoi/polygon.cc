@@ -9,146 +9,13 @@
 
 #include "core/voronoi/lane_bits.h"
 #include "core/voronoi/meeting_point.h"
-
-// Vectors that are passed and returned never are: all that does so is compiled into its callers.
-#pragma GCC diagnostic ignored "-Wpsabi"
+#include "core/voronoi/near_vertices.h"
 
 namespace wellspace::core {
-namespace {
-
-constexpr size_t kLanesOfFloats = Polygon::kTogether;
-
-// With R at least the distance of the nodes and u = 2^-24, an excess x . w - |w|^2 / 2 in floats is wrong by at most u (5.5 R |w| + 6 |w|^2 / 2): a
-// node x by 1.5 u |x|, half of it from where it was computed in doubles, see PlaceEnds; w by u |w|; the products by u |x| |w| together, the
-// two sums by 2 u (|x| |w| + |w|^2 / 2), and |w|^2 / 2 by 4 u of itself. Whoever may cut has |w| <= 2 R, so that all is less than 12 u R |w|.
-constexpr float kExcessError = 0x1p-20f;
-// What squares of distances can lose below the least float, and more: nothing that a cell is made of is as small.
-constexpr float kUnderflow = 0x1p-80f;
-// A distance in floats differs by less than this share of itself from that of the exact node, a square by less than twice as much.
-constexpr float kDistanceError = 0x1p-21f;
-// By how much, in shares of |x|^2, the power p . (p - 2 x) of a point p within 2 |x| may be wrong: 42 u. Farther out it is positive.
-constexpr float kPowerError = 0x1p-18f;
-// A ratio is surely kept, whatever the rounding and whatever that of placed nodes (kPlaced), if it is by this share.
-constexpr double kSurely = 0x1p-17;
-
-WELLSPACE_INLINE Floats Load(const float* items) { return *reinterpret_cast<const Floats*>(items); }
-WELLSPACE_INLINE Floats Splat(float x) { return x + Floats{}; }
-WELLSPACE_INLINE FloatMask Splat(int32_t x) { return x + FloatMask{}; }
-WELLSPACE_INLINE void Store(const Floats& items, float* to) { *reinterpret_cast<Floats*>(to) = items; }
-
-constexpr FloatMask kEachLane = {0, 1, 2, 3, 4, 5, 6, 7};
-
-WELLSPACE_INLINE float Largest(const Floats& items) {
-  Floats largest = items;
-  const auto with = [&](const FloatMask& order) __attribute__((always_inline)) {
-    const Floats other = __builtin_shuffle(largest, order);
-    largest = largest > other ? largest : other;
-  };
-  with(FloatMask{4, 5, 6, 7, 0, 1, 2, 3});
-  with(FloatMask{2, 3, 0, 1, 6, 7, 4, 5});
-  with(FloatMask{1, 0, 3, 2, 5, 4, 7, 6});
-  return largest[0];
+// Takes note of the largest squared distance of a node, in floats.
+WELLSPACE_INLINE void Polygon::SetReach(float radius_sq) {
+  most_radius_ = std::min(most_radius_, std::sqrt(radius_sq) * (1 + kDistanceError<2>));  // the cell only shrinks
 }
-
-// By the bits of the lanes that are kept: which lanes these are, in order.
-constexpr std::array<std::array<uint8_t, kLanesOfFloats>, 256> kOrders = [] {
-  std::array<std::array<uint8_t, kLanesOfFloats>, 256> orders{};
-  for (uint32_t bits = 0; bits < 256; ++bits) {
-    size_t next = 0;
-    for (uint8_t lane = 0; lane < kLanesOfFloats; ++lane) {
-      if ((bits >> lane & 1) != 0) {
-        orders[bits][next++] = lane;
-      }
-    }
-  }
-  return orders;
-}();
-
-template <VectorUnit kUnit>
-WELLSPACE_INLINE FloatMask OrderOf(uint32_t kept) {
-#if defined(__x86_64__)
-  if constexpr (kUnit == VectorUnit::kAvx2) {
-    using Bytes = char __attribute__((vector_size(16)));
-    using Words = int64_t __attribute__((vector_size(16)));
-    int64_t order;
-    std::memcpy(&order, kOrders[kept].data(), sizeof(order));
-    const Words words = {order, 0};
-    return reinterpret_cast<FloatMask>(__builtin_ia32_pmovzxbd256(reinterpret_cast<Bytes>(words)));
-  }
-#endif
-  FloatMask order;
-  for (size_t i = 0; i < kLanesOfFloats; ++i) {
-    order[i] = kOrders[kept][i];
-  }
-  return order;
-}
-
-// The vertices that may cut, in columns; whole vectors are written, the last one perhaps from the last one on.
-struct alignas(sizeof(Floats)) Candidates2 {
-  static constexpr size_t kCapacity = Polygon::kMostPositions + kLanesOfFloats;
-  float x[kCapacity];
-  float y[kCapacity];
-  float offset[kCapacity];  // half the square of the length
-  float low[kCapacity];     // the offset, less by what an excess may be wrong by
-  int32_t slot[kCapacity];
-  size_t count = 0;
-  size_t within_reach = 0;
-};
-
-// The coordinates of eight positions relative to `site`, times `scale`.
-struct Vectors {
-  Floats x;
-  Floats y;
-};
-WELLSPACE_INLINE Vectors VectorsTo(const Point<2>* positions, const Point<2>& site, double scale) {
-  using Four = Wide<4>::Lanes;
-  using FourFloats = float __attribute__((vector_size(16)));
-  const Four from = {site[0], site[1], site[0], site[1]};
-  FourFloats pairs[4];  // x, y, x, y
-  for (size_t k = 0; k < 4; ++k) {
-    Four two;
-    std::memcpy(&two, positions + 2 * k, sizeof(two));
-    pairs[k] = __builtin_convertvector((two - from) * scale, FourFloats);
-  }
-  const auto join = [](const FourFloats& a, const FourFloats& b) __attribute__((always_inline)) {
-    return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
-  };
-  const Floats even = join(pairs[0], pairs[2]);
-  const Floats odd = join(pairs[1], pairs[3]);
-  return {__builtin_shuffle(even, odd, FloatMask{0, 2, 8, 10, 4, 6, 12, 14}),
-          __builtin_shuffle(even, odd, FloatMask{1, 3, 9, 11, 5, 7, 13, 15})};
-}
-
-// The places of each in the order of distances, up to one part in 2^17, by counting those before it.
-WELLSPACE_INLINE void FindOrder(const Candidates2& candidates, uint32_t* order) {
-  constexpr int kNumberBits = 6;
-  static_assert(Polygon::kMostPositions <= size_t{1} << kNumberBits);
-  alignas(sizeof(FloatMask)) int32_t keys[Candidates2::kCapacity];
-  // The bits of a float that is not negative order as it does; numbered in the last ones, no two are equal.
-  const auto count = static_cast<int32_t>(candidates.count);
-  FloatMask number = kEachLane;
-  for (size_t first = 0; first < candidates.count; first += kLanesOfFloats) {
-    FloatMask own = *reinterpret_cast<const FloatMask*>(candidates.offset + first);
-    own = (own >> kNumberBits << kNumberBits) | number;
-    own = number < count ? own : Splat(std::numeric_limits<int32_t>::max());
-    *reinterpret_cast<FloatMask*>(keys + first) = own;
-    number += static_cast<int32_t>(kLanesOfFloats);
-  }
-  for (size_t first = 0; first < candidates.count; first += kLanesOfFloats) {
-    const FloatMask own = *reinterpret_cast<const FloatMask*>(keys + first);
-    FloatMask before{};
-    for (size_t i = 0; i < candidates.count; i += kLanesOfFloats) {
-      for (size_t k = i; k < i + kLanesOfFloats; ++k) {
-        before -= Splat(keys[k]) < own;
-      }
-    }
-    for (size_t lane = 0; lane < kLanesOfFloats; ++lane) {
-      order[before[lane]] = static_cast<uint32_t>(first + lane);  // of what is none: after the last
-    }
-  }
-}
-
-}  // namespace
 
 void Polygon::Reset(const Point<2>& site, const Box<2>& bounds, const std::array<PlaneKind, 4>& kinds, TieRule rule) {
   site_ = site;
@@ -173,13 +40,9 @@ void Polygon::Reset(const Point<2>& site, const Box<2>& bounds, const std::array
     plane.distance = std::abs(plane.offset);
     longest = std::max(longest, plane.distance);
   }
-  // One over the power of two below the longest.
-  constexpr int kMantissaBits = std::numeric_limits<double>::digits - 1;
-  constexpr uint64_t kMostExponent = 2046;
-  const uint64_t exponent =
-      std::clamp<uint64_t>(std::bit_cast<uint64_t>(longest) >> kMantissaBits, 1, kMostExponent - 1);
-  scale_ = std::bit_cast<double>((kMostExponent - exponent) << kMantissaBits);
-  unit_length_ = std::bit_cast<double>(exponent << kMantissaBits);
+  const FloatUnit unit = FloatUnitOf(longest);
+  scale_ = unit.scale;
+  unit_length_ = unit.length;
   // From the lower left corner on; the edge from there runs along the lower face of axis 1.
   static constexpr std::array<std::array<uint32_t, 2>, 4> kCorners = {{{0, 2}, {1, 2}, {1, 3}, {0, 3}}};
   static constexpr std::array<uint32_t, 4> kEdges = {2, 1, 3, 0};
@@ -197,26 +60,28 @@ void Polygon::Reset(const Point<2>& site, const Box<2>& bounds, const std::array
   SetReach(Largest(Load(group.x) * Load(group.x) + Load(group.y) * Load(group.y)));
 }
 
-// Takes note of the largest squared distance of a node, in floats.
-WELLSPACE_INLINE void Polygon::SetReach(float radius_sq) {
-  most_radius_ = std::min(most_radius_, std::sqrt(radius_sq) * (1 + kDistanceError));  // the cell only shrinks
+Point<2> Polygon::PositionOf(size_t node) const {
+  const Group& group = groups_[node / kTogether];
+  return {group.x[node % kTogether], group.y[node % kTogether]};
 }
 
-// Of the nodes `first` + i for the bits i of `doubtful`: a bit for whether it is cut off, by doubles if they tell, else exactly.
+Point<2> Polygon::ScaledTo(const Point<2>& p) const { return {(p[0] - site_[0]) * scale_, (p[1] - site_[1]) * scale_}; }
+
+// Of the nodes `first` + i for the bits i of `doubtful`: a bit for whether it is cut off, by its own error if that tells, else exactly.
 [[gnu::noinline]] uint32_t Polygon::DecideDoubtful(size_t first, uint32_t doubtful, const Point<2>& generator) {
-  const Point<2> normal = Difference<2>(generator, site_);
-  const double length_sq = NormSq<2>(normal);
+  const Point<2> w = ScaledTo(generator);
+  const double length_sq = NormSq<2>(w);
   uint32_t removed = 0;
   for (; doubtful != 0; doubtful &= doubtful - 1) {
     const size_t node = first + static_cast<size_t>(std::countr_zero(doubtful));
-    const Plane<2>& before = planes_[PlaneFrom(Before(node))];
-    const Plane<2>& after = planes_[PlaneFrom(node)];
-    const Placement<2> placed = Meet<2>({&before, &after});
-    const double excess = Dot<2>(placed.x, normal) - 0.5 * length_sq;
-    const double doubt = SlackOf(placed) * std::sqrt(length_sq) + kOffsetError<2> * 0.5 * length_sq;
+    const Point<2> x = PositionOf(node);
+    const double excess = Dot<2>(x, w) - 0.5 * length_sq;
+    const double doubt = NodeDoubt<2>(x, length_sq);
     bool is_cut_off = excess > 0;
     if (!(std::abs(excess) > doubt)) {
-      const ExactDecision decision = DecideCut<2>(site_, {before.source, after.source}, generator, rule_);
+      const std::array<PlaneSource<2>, 2> sources = {planes_[PlaneFrom(Before(node))].source,
+                                                     planes_[PlaneFrom(node)].source};
+      const ExactDecision decision = DecideCut<2>(site_, sources, generator, rule_);
       ++counters_.exact;
       counters_.perturbed += decision.perturbed ? 1 : 0;
       is_cut_off = decision.sign == Sign::kPositive;
@@ -328,14 +193,14 @@ WELLSPACE_INLINE void Polygon::Replace(const Rest& rest, const std::array<Node, 
 }
 
 // By how much the nodes, kTogether or fewer, may exceed the bisector at most.
-WELLSPACE_INLINE Floats Polygon::MostExcesses(const Bisector& bisector) const {
+WELLSPACE_INLINE Floats Polygon::MostExcesses(const FloatBisector<2>& bisector) const {
   const Group& group = groups_.front();
   return Load(group.x) * bisector.w[0] + (Load(group.y) * bisector.w[1] - bisector.low);
 }
 
 // Tells what the bisector leaves of the nodes, kTogether or fewer, of which those of the bits `maybe` may be beyond it; false if all.
 template <VectorUnit kUnit>
-WELLSPACE_INLINE bool Polygon::FindRest(const Bisector& bisector, const Floats& most, uint32_t maybe,
+WELLSPACE_INLINE bool Polygon::FindRest(const FloatBisector<2>& bisector, const Floats& most, uint32_t maybe,
                                         const Point<2>& position, Rest& rest) {
   const auto count = static_cast<uint32_t>(count_);
   uint32_t removed = Bits<kUnit>(most > 2 * (bisector.offset - bisector.low)) & maybe;
@@ -355,7 +220,7 @@ WELLSPACE_INLINE bool Polygon::FindRest(const Bisector& bisector, const Floats& 
   return true;
 }
 
-[[gnu::noinline]] bool Polygon::FindRestOfMany(const Bisector& bisector, const Point<2>& position, Rest& rest) {
+[[gnu::noinline]] bool Polygon::FindRestOfMany(const FloatBisector<2>& bisector, const Point<2>& position, Rest& rest) {
   is_removed_.assign(count_, 0);
   size_t removed_count = 0;
   for (size_t i = 0; i < count_; ++i) {
@@ -386,7 +251,7 @@ WELLSPACE_INLINE bool Polygon::FindRest(const Bisector& bisector, const Floats& 
 
 // Cuts by the bisector of the site and `position`.
 template <VectorUnit kUnit>
-WELLSPACE_INLINE bool Polygon::CutOff(const Bisector& bisector, VertexId u, const Point<2>& position) {
+WELLSPACE_INLINE bool Polygon::CutOff(const FloatBisector<2>& bisector, VertexId u, const Point<2>& position) {
   Rest rest;
   if (count_ <= kTogether) {
     const Floats most = MostExcesses(bisector);
@@ -427,75 +292,39 @@ WELLSPACE_INLINE bool Polygon::CutOff(const Bisector& bisector, VertexId u, cons
 template <VectorUnit kUnit>
 WELLSPACE_INLINE size_t Polygon::CutByEachWith(std::span<const Point<2>> positions, const VertexNames& names,
                                                VertexId site) {
-  Candidates2 candidates;
-  // Half the square of the distance within which a vertex may cut, in floats wrong by less than twice kDistanceError.
-  const auto most_offset = [this] { return 2 * (1 + 8 * kDistanceError) * most_radius_ * most_radius_; };
-  const float far = most_offset();
-  const float error = kExcessError * most_radius_;
-  FloatMask slot = kEachLane;
-  for (size_t from = 0; from < positions.size(); from += kTogether) {
-    const Vectors w = VectorsTo(&positions[from], site_, scale_);
-    const Floats length_sq = w.x * w.x + w.y * w.y;
-    Floats length;
-    for (size_t lane = 0; lane < kTogether; ++lane) {
-      length[lane] = __builtin_sqrtf(length_sq[lane]);
-    }
-    const Floats offset = 0.5f * length_sq;
-    const Floats low = offset - (error * length + kUnderflow);
-    FloatMask is_near = (offset <= far) & (slot < static_cast<int32_t>(positions.size()));
-    if (names.listed != nullptr) {
-      FloatMask listed;
-      std::memcpy(&listed, names.listed + from, sizeof(listed));
-      is_near &= listed != static_cast<int32_t>(Index(site));
-    }
-    candidates.within_reach += static_cast<size_t>(std::popcount(Bits<kUnit>(is_near)));
-    if (cuts_ != 0) {
-      // Most of those miss the cell, now and later.
-      Floats most = Splat(-std::numeric_limits<float>::infinity());
-      for (const Group* group = groups_.data(); group < groups_.data() + (count_ + kTogether - 1) / kTogether;
-           ++group) {
-        for (size_t i = 0; i < kTogether; ++i) {
-          const Floats product = w.x * group->x[i] + w.y * group->y[i];
-          most = most > product ? most : product;
+  NearVertices<2> near;
+  near.Pick<kUnit>(
+      positions, names, site, site_, scale_,
+      most_radius_, [this](const Floats* w, const Floats& low, FloatMask& is_near) __attribute__((always_inline)) {
+        if (cuts_ == 0) {
+          return;
         }
-      }
-      is_near &= most >= low;
-    }
-    const uint32_t kept = Bits<kUnit>(is_near);
-    const FloatMask order = OrderOf<kUnit>(kept);
-    const auto append = [&](const auto& items, auto* column) __attribute__((always_inline)) {
-      const auto chosen = __builtin_shuffle(items, order);
-      std::memcpy(column + candidates.count, &chosen, sizeof(chosen));
-    };
-    append(w.x, candidates.x);
-    append(w.y, candidates.y);
-    append(offset, candidates.offset);
-    append(low, candidates.low);
-    append(slot, candidates.slot);
-    candidates.count += static_cast<size_t>(std::popcount(kept));
-    slot += static_cast<int32_t>(kTogether);
-  }
-  uint32_t order[Candidates2::kCapacity];
-  order[0] = 0;
-  if (candidates.count > 1) {
-    FindOrder(candidates, order);
-  }
-  float left = far;
-  for (size_t j = 0; j < candidates.count; ++j) {
-    const uint32_t i = order[j];
-    const Bisector bisector{{candidates.x[i], candidates.y[i]}, candidates.offset[i], candidates.low[i]};
+        // Most of those miss the cell, now and later.
+        Floats most = Splat(-std::numeric_limits<float>::infinity());
+        for (const Group& group : groups()) {
+          for (size_t i = 0; i < kTogether; ++i) {
+            const Floats product = w[0] * group.x[i] + w[1] * group.y[i];
+            most = most > product ? most : product;
+          }
+        }
+        is_near &= most >= low;
+      });
+  float left = std::numeric_limits<float>::infinity();
+  for (size_t j = 0; j < near.count; ++j) {
+    const uint32_t i = near.order[j];
+    const FloatBisector<2> bisector = near.BisectorTo(i);
     if (bisector.offset > left) {
       break;
     }
-    const auto at = static_cast<size_t>(candidates.slot[i]);
+    const auto at = static_cast<size_t>(near.slot[i]);
     if (CutOff<kUnit>(bisector, names[at], positions[at])) {
       if (IsTooLarge()) {
         break;
       }
-      left = most_offset() * (1 + 0x1p-16f);  // those that follow may be nearer by as much
+      left = MostOffset<2>(most_radius_) * (1 + 0x1p-16f);  // those that follow may be nearer by as much
     }
   }
-  return candidates.within_reach;
+  return near.within_reach;
 }
 
 bool Polygon::CutBeforePlace(VertexId u, const Point<2>& position) {
@@ -503,16 +332,12 @@ bool Polygon::CutBeforePlace(VertexId u, const Point<2>& position) {
   if (!(NormSq<2>(normal) <= CutLimitSq())) {
     return false;
   }
-  Bisector bisector;
-  bisector.w[0] = static_cast<float>(normal[0] * scale_);
-  bisector.w[1] = static_cast<float>(normal[1] * scale_);
-  bisector.offset = 0.5f * (bisector.w[0] * bisector.w[0] + bisector.w[1] * bisector.w[1]);
-  bisector.low = bisector.offset - (kExcessError * most_radius_ * std::sqrt(2 * bisector.offset) + kUnderflow);
+  const auto bisector = FloatBisector<2>::Of(normal, scale_, most_radius_);
   return unit_ == VectorUnit::kAvx2 ? CutOffAvx2(bisector, u, position)
                                     : CutOff<VectorUnit::kBaseline>(bisector, u, position);
 }
 
-WELLSPACE_AVX2 bool Polygon::CutOffAvx2(const Bisector& bisector, VertexId u, const Point<2>& position) {
+WELLSPACE_AVX2 bool Polygon::CutOffAvx2(const FloatBisector<2>& bisector, VertexId u, const Point<2>& position) {
   return CutOff<VectorUnit::kAvx2>(bisector, u, position);
 }
 
@@ -602,17 +427,17 @@ WELLSPACE_INLINE bool Polygon::ReachesWith(const Box<2>& cube) const {
   const Floats low[2] = {relative(cube.low[0], 0), relative(cube.low[1], 1)};
   const Floats high[2] = {relative(cube.high[0], 0), relative(cube.high[1], 1)};
   FloatMask any{};
-  for (const Group* group = groups_.data(); group < groups_.data() + (count_ + kTogether - 1) / kTogether; ++group) {
+  for (const Group& group : groups()) {
     Floats power{};
     Floats radius_sq{};
     for (int axis = 0; axis < 2; ++axis) {
-      const Floats x = Load(axis == 0 ? group->x : group->y);
+      const Floats x = Load(axis == 0 ? group.x : group.y);
       Floats p = x > low[axis] ? x : low[axis];
       p = p < high[axis] ? p : high[axis];
       power += p * (p - 2 * x);
       radius_sq += x * x;
     }
-    any |= power <= kPowerError * radius_sq + kUnderflow;
+    any |= power <= kPowerError<2> * radius_sq + kUnderflow;
   }
   return Bits<kUnit>(any) != 0;
 }

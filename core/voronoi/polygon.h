@@ -19,6 +19,9 @@
 
 namespace wellspace::core {
 
+template <int D>
+struct FloatBisector;
+
 // Polytope<2>, to which its functions that are not told about here belong: a convex polygon, whose nodes are kept in order around the
 // site, so that a cut takes a run of them out and puts two in. While cuts are made nodes are floats, in units of about the reach
 // that the cell began with; what these leave in doubt is decided exactly. Up to eight nodes, as most cells have, are worked on as one vector.
@@ -29,9 +32,8 @@ class Polygon {
  public:
   static constexpr size_t kMostNodes = size_t{1} << 14;
   static constexpr size_t kMostPlanes = size_t{1} << 15;
-  // Positions that may cut are looked at so many at a time.
+  // So many nodes are worked on together.
   static constexpr size_t kTogether = 8;
-  static constexpr size_t kMostPositions = 64;
 
   // Works with `unit`, which this processor has; the best there is unless told.
   explicit Polygon(VectorUnit unit = BestVectorUnit()) : unit_(unit), groups_(1) {}
@@ -84,12 +86,6 @@ class Polygon {
     float edge_sq;
     uint32_t plane;
   };
-  // In the units of the nodes.
-  struct Bisector {
-    float w[2];    // the vector to the vertex
-    float offset;  // |w|^2 / 2
-    float low;     // the offset, less by what an excess over it may be wrong by at most
-  };
   // What is left of the nodes: so many from there on, around.
   struct Rest {
     uint32_t first;
@@ -100,12 +96,13 @@ class Polygon {
   size_t CutByEachWith(std::span<const Point<2>> positions, const VertexNames& names, VertexId site);
   size_t CutByEachAvx2(std::span<const Point<2>> positions, const VertexNames& names, VertexId site);
   template <VectorUnit kUnit>
-  bool CutOff(const Bisector& bisector, VertexId u, const Point<2>& position);
-  bool CutOffAvx2(const Bisector& bisector, VertexId u, const Point<2>& position);
-  Floats MostExcesses(const Bisector& bisector) const;
+  bool CutOff(const FloatBisector<2>& bisector, VertexId u, const Point<2>& position);
+  bool CutOffAvx2(const FloatBisector<2>& bisector, VertexId u, const Point<2>& position);
+  Floats MostExcesses(const FloatBisector<2>& bisector) const;
   template <VectorUnit kUnit>
-  bool FindRest(const Bisector& bisector, const Floats& most, uint32_t maybe, const Point<2>& position, Rest& rest);
-  bool FindRestOfMany(const Bisector& bisector, const Point<2>& position, Rest& rest);
+  bool FindRest(const FloatBisector<2>& bisector, const Floats& most, uint32_t maybe, const Point<2>& position,
+                Rest& rest);
+  bool FindRestOfMany(const FloatBisector<2>& bisector, const Point<2>& position, Rest& rest);
   uint32_t DecideDoubtful(size_t first, uint32_t doubtful, const Point<2>& generator);
   void PlaceEnds(const Rest& rest, uint32_t plane, std::array<Node, 2>& ends) const;
   void Replace(const Rest& rest, const std::array<Node, 2>& ends);
@@ -117,6 +114,9 @@ class Polygon {
   bool ReachesWith(const Box<2>& cube) const;
   bool ReachesAvx2(const Box<2>& cube) const;
   void SetReach(float radius_sq);
+  Point<2> PositionOf(size_t node) const;  // in the units of the nodes, as the next
+  Point<2> ScaledTo(const Point<2>& p) const;
+  std::span<const Group> groups() const { return {groups_.data(), (count_ + kTogether - 1) / kTogether}; }
   uint32_t PlaneFrom(size_t node) const { return groups_[node / kTogether].plane[node % kTogether]; }
   size_t Before(size_t node) const { return (node == 0 ? count_ : node) - 1; }
 

@@ -14,6 +14,12 @@
 namespace wellspace::core {
 namespace {
 
+// The excess x . w - c, c = |w|^2 / 2, of a node x over the bisector to a vertex at w, as computed, differs from the exact one by at most slack |w| + (D
+// + 5) u c: the error of x is in its slack, w has one rounding a coordinate, the product D more, c D + 2, the difference one; 16 u |x| of the
+// slack pays for those of the product.
+template <int D>
+constexpr double kOffsetError = (D + 5) * kUnit;
+
 // After so many cuts by the vertices of one leaf, those that are left are looked at together.
 constexpr int kCutsBetweenLooks = 4;
 
@@ -115,9 +121,7 @@ WELLSPACE_INLINE bool Polytope<D>::CutOffWith(VertexId u, const Point<D>& positi
   FindCutEdges();
   PlaceCutEdges<kWidth>(index);
   MakeNewNodes(index);
-  if constexpr (D > 3) {
-    LinkNewNodes();
-  }
+  LinkNewNodes();
   if (cut_count_ < removed_count_) {
     FillHoles(cut_count_);
   }
@@ -330,16 +334,12 @@ WELLSPACE_INLINE std::array<uint16_t, D> Polytope<D>::PlanesOn(End kept, uint16_
 // the nodes stay without holes.
 template <int D>
 WELLSPACE_INLINE void Polytope<D>::MakeNewNodes(uint16_t plane) {
-  if (D > 3 && new_.size() < cut_count_) {
+  if (new_.size() < cut_count_) {
     new_.resize(2 * cut_count_);
   }
   const size_t old = columns_.count();
   columns_.Resize(std::max(old, old + cut_count_ - removed_count_));
   MakeRoomForNodes(columns_.count());
-  if (D == 3 && waiting_.size() < plane_count_) {
-    waiting_.resize(2 * plane_count_, kNoEnd);
-  }
-  size_t joined = 0;
   for (size_t j = 0; j < cut_count_; ++j) {
     const End kept = cut_edges_[j].kept;
     // No branch, since none could be foretold.
@@ -350,33 +350,8 @@ WELLSPACE_INLINE void Polytope<D>::MakeNewNodes(uint16_t plane) {
     joint.is_placed = false;
     Join(EndAt(index, D - 1), kept);
     columns_.Set(index, placed_[j]);
-    if constexpr (D == 3) {
-      joined += Link(index, joint.planes);
-    } else {
-      new_[j] = static_cast<Index>(index);
-    }
+    new_[j] = static_cast<Index>(index);
   }
-  if (D == 3 && joined != cut_count_) {
-    std::abort();
-  }
-}
-
-// Joins the edges of a new node along the new facet to those that wait for them, and has them wait if none does; returns
-// how many were joined. The edge that leaves planes[slot] runs along the other of planes[0] and planes[1]. No branch,
-// since none could be foretold.
-template <int D>
-WELLSPACE_INLINE size_t Polytope<D>::Link(size_t node, const std::array<uint16_t, D>& planes) {
-  uint32_t joined = 0;
-  for (uint32_t slot = 0; slot < 2; ++slot) {
-    const End end = EndAt(node, slot);
-    End& waiting = waiting_[planes[1 - slot]];
-    const uint32_t mask = waiting < kNoEnd ? ~0u : 0u;  // whether one waits
-    const End other = end ^ ((end ^ waiting) & mask);   // itself, if none does
-    waiting = end | mask;
-    Join(end, other);
-    joined -= mask;
-  }
-  return joined;
 }
 
 // Moves nodes from the end into the places of those removed nodes that have not been `filled` by new ones.
@@ -583,7 +558,7 @@ void Polytope<D>::Foretell(size_t begin, Candidates<D>& candidates) {
 }
 
 #define WELLSPACE_INSTANTIATE(D) template class Polytope<D>;
-WELLSPACE_FOR_EACH_DIMENSION_ABOVE_2(WELLSPACE_INSTANTIATE)
+WELLSPACE_FOR_EACH_DIMENSION_ABOVE_3(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 
 }  // namespace wellspace::core

@@ -17,6 +17,7 @@
 #include "core/voronoi/cell_parts.h"
 #include "core/voronoi/node_columns.h"
 #include "core/voronoi/polygon.h"
+#include "core/voronoi/polyhedron.h"
 #include "core/voronoi/star.h"
 
 namespace wellspace::core {
@@ -143,13 +144,11 @@ class Polytope {
 
  private:
   using Index = NodeIndex<D>;
-  static constexpr Index kNoNode = std::numeric_limits<Index>::max();
 
   // One end of an edge: the edge leaves planes[slot] of the node. node << kSlotBits | slot.
   using End = uint32_t;
   static constexpr int kSlotBits = D <= 4 ? 2 : 3;
   static End EndAt(size_t node, uint32_t slot) { return static_cast<End>(node) << kSlotBits | slot; }
-  static constexpr End kNoEnd = ~End{0};
   static size_t NodeOf(End end) { return end >> kSlotBits; }
   static size_t SlotOf(End end) { return end & ((1u << kSlotBits) - 1); }
 
@@ -190,7 +189,6 @@ class Polytope {
   void PlaceNode(size_t node);
   double PlaceByPlanes(const std::array<uint16_t, D>& indices, Point<D>& x) const;
   void MakeNewNodes(uint16_t plane);
-  size_t Link(size_t node, const std::array<uint16_t, D>& planes);
   void LinkNewNodes();
   void MakeRoomForNodes(size_t count);
   void Join(End a, End b);
@@ -221,16 +219,20 @@ class Polytope {
   std::vector<CutEdge> cut_edges_;
   std::vector<typename NodeColumns<D>::Row> placed_;  // by cut edge: the node that is to be on it
   size_t cut_count_ = 0;
-  std::vector<Index> new_;  // the nodes on them; D > 3
-  // By the plane that an edge of the new facet runs along beside the new one, an end that lacks the other one; all kNoEnd between cuts; D = 3.
-  std::vector<End> waiting_;
-  std::vector<Ridge> ridges_;  // D > 3
+  std::vector<Index> new_;  // the nodes on them
+  std::vector<Ridge> ridges_;
 };
 
 template <>
 class Polytope<2> : public Polygon {
  public:
   using Polygon::Polygon;
+};
+
+template <>
+class Polytope<3> : public Polyhedron {
+ public:
+  using Polyhedron::Polyhedron;
 };
 
 }  // namespace wellspace::core

@@ -340,6 +340,7 @@ void QueryStructure<D>::CountCuts(Workspace<D>& workspace) {
 template <int D>
 void QueryStructure<D>::CutByLeaf(NodeId leaf, VertexId site, Workspace<D>& workspace) const {
   if (const auto* bucket = tree_.BucketOf(leaf); bucket != nullptr) {
+    static_assert(D > 3 || LeafTree<D>::kLeafCapacity <= kMostCutTogether);
     workspace.counters.vertices += bucket->count;
     workspace.cell.CutByEach({bucket->positions, bucket->count}, {.listed = bucket->ids}, site);
   }

@@ -55,7 +55,7 @@ class LanesTest : public test::SeededTest {
  protected:
   LanesTest() : SeededTest(1982) {}
 };
-TYPED_TEST_SUITE(LanesTest, test::Above2);
+TYPED_TEST_SUITE(LanesTest, test::Above3);
 
 TYPED_TEST(LanesTest, EveryUnitComputesTheSame) {
   constexpr int D = TypeParam::kValue;
@@ -191,7 +191,7 @@ class CandidatesTest : public test::SeededTest {
     return is_same;
   }
 };
-TYPED_TEST_SUITE(CandidatesTest, test::Above2);
+TYPED_TEST_SUITE(CandidatesTest, test::Above3);
 
 TYPED_TEST(CandidatesTest, ArePickedWithinTheLimitButNotAtTheSite) {
   constexpr int D = TypeParam::kValue;

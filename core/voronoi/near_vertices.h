@@ -1,0 +1,280 @@
+// Eight floats at a time: what cells in the plane and in space are cut by. For polygon.cc and polyhedron.cc alone, into which all is compiled.
+#ifndef WELLSPACE_CORE_VORONOI_NEAR_VERTICES_H_
+#define WELLSPACE_CORE_VORONOI_NEAR_VERTICES_H_
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <span>
+
+#include "core/base/ids.h"
+#include "core/geometry/point.h"
+#include "core/voronoi/cell_parts.h"
+#include "core/voronoi/lane_bits.h"
+#include "core/voronoi/lanes.h"
+
+// Vectors that are passed and returned never are: all that does so is compiled into its callers.
+#pragma GCC diagnostic ignored "-Wpsabi"
+
+namespace wellspace::core {
+
+inline constexpr size_t kFloatLanes = 8;
+
+// In units of u = 2^-24: a node x is wrong by at most kNodeError |x|. In the plane that is its rounding, and half of it from where it was computed in
+// doubles; in space it may lie at the end of an edge as short.
+template <int D>
+inline constexpr float kNodeError = D == 2 ? 1.5f : 16;
+// With R at least the distance of the nodes, an excess x . w - |w|^2 / 2 is wrong by at most u ((kNodeError + D + 2) R |w| + (2 D + 2) |w|^2 / 2): w is by
+// u |w|; the products by u |x| |w| together, the D sums by D u (|x| |w| + |w|^2 / 2), and |w|^2 / 2 by (D + 2) u of itself. Whoever may cut has
+// |w| <= 2 R, so that all is less than 12 u R |w| in 2-D, 29 u R |w| in 3-D; one u more for what is taken off |w|^2 / 2.
+template <int D>
+inline constexpr float kExcessError = D == 2 ? 0x1p-20f : 0x1p-19f;
+// What squares of distances can lose below the least float, and more: nothing that a cell is made of is as small.
+inline constexpr float kUnderflow = 0x1p-80f;
+// A distance differs by less than this share of itself from that of the exact node, a square by less than twice as much.
+template <int D>
+inline constexpr float kDistanceError = D == 2 ? 0x1p-21f : 0x1p-19f;
+// By how much, in shares of |x|^2, the power p . (p - 2 x) of a point p within 2 |x| may be wrong: (44 + 4 kNodeError) u. Farther out it
+// is positive.
+template <int D>
+inline constexpr float kPowerError = D == 2 ? 0x1p-18f : 0x1p-17f;
+// A ratio is surely kept, whatever the rounding and whatever that of placed nodes (kPlaced), if it is by this share.
+inline constexpr double kSurely = 0x1p-17;
+
+WELLSPACE_INLINE Floats Load(const float* items) { return *reinterpret_cast<const Floats*>(items); }
+WELLSPACE_INLINE void Store(const Floats& items, float* to) { *reinterpret_cast<Floats*>(to) = items; }
+WELLSPACE_INLINE Floats Splat(float x) { return x + Floats{}; }
+WELLSPACE_INLINE FloatMask Splat(int32_t x) { return x + FloatMask{}; }
+
+inline constexpr FloatMask kEachLane = {0, 1, 2, 3, 4, 5, 6, 7};
+
+WELLSPACE_INLINE float Largest(const Floats& items) {
+  Floats largest = items;
+  const auto with = [&](const FloatMask& order) __attribute__((always_inline)) {
+    const Floats other = __builtin_shuffle(largest, order);
+    largest = largest > other ? largest : other;
+  };
+  with(FloatMask{4, 5, 6, 7, 0, 1, 2, 3});
+  with(FloatMask{2, 3, 0, 1, 6, 7, 4, 5});
+  with(FloatMask{1, 0, 3, 2, 5, 4, 7, 6});
+  return largest[0];
+}
+
+// One over the power of two below `length`, and that.
+struct FloatUnit {
+  double scale;
+  double length;
+};
+inline FloatUnit FloatUnitOf(double length) {
+  constexpr int kMantissaBits = std::numeric_limits<double>::digits - 1;
+  constexpr uint64_t kMostExponent = 2046;
+  const uint64_t exponent =
+      std::clamp<uint64_t>(std::bit_cast<uint64_t>(length) >> kMantissaBits, 1, kMostExponent - 1);
+  return {std::bit_cast<double>((kMostExponent - exponent) << kMantissaBits),
+          std::bit_cast<double>(exponent << kMantissaBits)};
+}
+
+// By the bits of the lanes that are kept: which lanes these are, in order.
+inline constexpr std::array<std::array<uint8_t, kFloatLanes>, 256> kOrders = [] {
+  std::array<std::array<uint8_t, kFloatLanes>, 256> orders{};
+  for (uint32_t bits = 0; bits < 256; ++bits) {
+    size_t next = 0;
+    for (uint8_t lane = 0; lane < kFloatLanes; ++lane) {
+      if ((bits >> lane & 1) != 0) {
+        orders[bits][next++] = lane;
+      }
+    }
+  }
+  return orders;
+}();
+
+template <VectorUnit kUnit>
+WELLSPACE_INLINE FloatMask OrderOf(uint32_t kept) {
+#if defined(__x86_64__)
+  if constexpr (kUnit == VectorUnit::kAvx2) {
+    using Bytes = char __attribute__((vector_size(16)));
+    using Words = int64_t __attribute__((vector_size(16)));
+    int64_t order;
+    std::memcpy(&order, kOrders[kept].data(), sizeof(order));
+    const Words words = {order, 0};
+    return reinterpret_cast<FloatMask>(__builtin_ia32_pmovzxbd256(reinterpret_cast<Bytes>(words)));
+  }
+#endif
+  FloatMask order;
+  for (size_t i = 0; i < kFloatLanes; ++i) {
+    order[i] = kOrders[kept][i];
+  }
+  return order;
+}
+
+// The bisector to a vertex, in the units of the nodes.
+template <int D>
+struct FloatBisector {
+  float w[D];    // the vector to the vertex
+  float offset;  // |w|^2 / 2
+  float low;     // the offset, less by what an excess over it may be wrong by at most
+
+  WELLSPACE_INLINE static FloatBisector Of(const Point<D>& normal, double scale, float most_radius) {
+    FloatBisector bisector;
+    float length_sq = 0;
+    for (int axis = 0; axis < D; ++axis) {
+      bisector.w[axis] = static_cast<float>(normal[axis] * scale);
+      length_sq += bisector.w[axis] * bisector.w[axis];
+    }
+    bisector.offset = 0.5f * length_sq;
+    bisector.low = bisector.offset - (kExcessError<D> * most_radius * __builtin_sqrtf(length_sq) + kUnderflow);
+    return bisector;
+  }
+};
+
+// By how much the excess of the node x, as computed in doubles, over the bisector to a vertex at that squared distance may be wrong.
+template <int D>
+double NodeDoubt(const Point<D>& x, double length_sq) {
+  return 1.01 * 0x1p-24 * kNodeError<D> * std::sqrt(NormSq<D>(x) * length_sq) + kUnderflow;
+}
+
+// Half the square of the distance from its site within which a vertex may cut a cell of that radius, in floats.
+template <int D>
+WELLSPACE_INLINE float MostOffset(float most_radius) {
+  return 2 * (1 + 8 * kDistanceError<D>)*most_radius * most_radius;
+}
+
+// Vectors from `site` to eight positions, times `scale`.
+WELLSPACE_INLINE void VectorsTo(const Point<2>* positions, const Point<2>& site, double scale, Floats* w) {
+  using Four = Wide<4>::Lanes;
+  using FourFloats = float __attribute__((vector_size(16)));
+  const Four from = {site[0], site[1], site[0], site[1]};
+  FourFloats pairs[4];  // x, y, x, y
+  for (size_t k = 0; k < 4; ++k) {
+    Four two;
+    std::memcpy(&two, positions + 2 * k, sizeof(two));
+    pairs[k] = __builtin_convertvector((two - from) * scale, FourFloats);
+  }
+  const Floats even = __builtin_shufflevector(pairs[0], pairs[2], 0, 1, 2, 3, 4, 5, 6, 7);
+  const Floats odd = __builtin_shufflevector(pairs[1], pairs[3], 0, 1, 2, 3, 4, 5, 6, 7);
+  w[0] = __builtin_shuffle(even, odd, FloatMask{0, 2, 8, 10, 4, 6, 12, 14});
+  w[1] = __builtin_shuffle(even, odd, FloatMask{1, 3, 9, 11, 5, 7, 13, 15});
+}
+WELLSPACE_INLINE void VectorsTo(const Point<3>* p, const Point<3>& site, double scale, Floats* w) {
+  using Four = Wide<4>::Lanes;
+  using FourFloats = float __attribute__((vector_size(16)));
+  for (int axis = 0; axis < 3; ++axis) {
+    const Four low = Four{p[0][axis], p[1][axis], p[2][axis], p[3][axis]} - site[axis];
+    const Four high = Four{p[4][axis], p[5][axis], p[6][axis], p[7][axis]} - site[axis];
+    w[axis] = __builtin_shufflevector(__builtin_convertvector(low * scale, FourFloats),
+                                      __builtin_convertvector(high * scale, FourFloats), 0, 1, 2, 3, 4, 5, 6, 7);
+  }
+}
+
+// The vertices that may cut a cell, in columns; whole vectors are written, the last one perhaps from the last one on.
+template <int D>
+struct alignas(sizeof(Floats)) NearVertices {
+  static constexpr size_t kMost = kMostCutTogether;
+  static constexpr size_t kCapacity = kMost + kFloatLanes;
+
+  float w[D][kCapacity];
+  float offset[kCapacity];
+  float low[kCapacity];
+  int32_t slot[kCapacity];  // among the positions
+  size_t count = 0;
+  uint32_t order[kCapacity];  // from the nearest on, but for distances that agree to one part in 2^17
+  size_t within_reach = 0;    // but for the site
+
+  // Picks those of `positions` but `site_name` that may cut a cell about `site` of that radius, and that `may_cut`: given the vectors of eight
+  // and their lows, it tells which.
+  template <VectorUnit kUnit, typename MayCut>
+  WELLSPACE_INLINE void Pick(std::span<const Point<D>> positions, const VertexNames& names, VertexId site_name,
+                             const Point<D>& site, double scale, float most_radius, MayCut may_cut) {
+    const float far = MostOffset<D>(most_radius);
+    const float error = kExcessError<D> * most_radius;
+    FloatMask slots = kEachLane;
+    for (size_t from = 0; from < positions.size(); from += kFloatLanes) {
+      Floats vectors[D];
+      VectorsTo(&positions[from], site, scale, vectors);
+      Floats length_sq = vectors[0] * vectors[0];
+      for (int axis = 1; axis < D; ++axis) {
+        length_sq += vectors[axis] * vectors[axis];
+      }
+      Floats length;
+      for (size_t lane = 0; lane < kFloatLanes; ++lane) {
+        length[lane] = __builtin_sqrtf(length_sq[lane]);
+      }
+      const Floats offsets = 0.5f * length_sq;
+      const Floats lows = offsets - (error * length + kUnderflow);
+      FloatMask is_near = (offsets <= far) & (slots < static_cast<int32_t>(positions.size()));
+      if (names.listed != nullptr) {
+        FloatMask listed;
+        std::memcpy(&listed, names.listed + from, sizeof(listed));
+        is_near &= listed != static_cast<int32_t>(Index(site_name));
+      }
+      within_reach += static_cast<size_t>(std::popcount(Bits<kUnit>(is_near)));
+      may_cut(vectors, lows, is_near);
+      const uint32_t kept = Bits<kUnit>(is_near);
+      const FloatMask lanes = OrderOf<kUnit>(kept);
+      const auto append = [&](const auto& items, auto* column) __attribute__((always_inline)) {
+        const auto chosen = __builtin_shuffle(items, lanes);
+        std::memcpy(column + count, &chosen, sizeof(chosen));
+      };
+      for (int axis = 0; axis < D; ++axis) {
+        append(vectors[axis], w[axis]);
+      }
+      append(offsets, offset);
+      append(lows, low);
+      append(slots, slot);
+      count += static_cast<size_t>(std::popcount(kept));
+      slots += static_cast<int32_t>(kFloatLanes);
+    }
+    order[0] = 0;
+    if (count > 1) {
+      FindOrder();
+    }
+  }
+
+  FloatBisector<D> BisectorTo(size_t i) const {
+    FloatBisector<D> bisector;
+    for (int axis = 0; axis < D; ++axis) {
+      bisector.w[axis] = w[axis][i];
+    }
+    bisector.offset = offset[i];
+    bisector.low = low[i];
+    return bisector;
+  }
+
+ private:
+  // By counting those before each.
+  WELLSPACE_INLINE void FindOrder() {
+    constexpr int kNumberBits = 6;
+    static_assert(kMost <= size_t{1} << kNumberBits);
+    alignas(sizeof(FloatMask)) int32_t keys[kCapacity];
+    // The bits of a float that is not negative order as it does; numbered in the last ones, no two are equal.
+    FloatMask number = kEachLane;
+    for (size_t first = 0; first < count; first += kFloatLanes) {
+      FloatMask own = *reinterpret_cast<const FloatMask*>(offset + first);
+      own = (own >> kNumberBits << kNumberBits) | number;
+      own = number < static_cast<int32_t>(count) ? own : Splat(std::numeric_limits<int32_t>::max());
+      *reinterpret_cast<FloatMask*>(keys + first) = own;
+      number += static_cast<int32_t>(kFloatLanes);
+    }
+    for (size_t first = 0; first < count; first += kFloatLanes) {
+      const FloatMask own = *reinterpret_cast<const FloatMask*>(keys + first);
+      FloatMask before{};
+      for (size_t i = 0; i < count; i += kFloatLanes) {
+        for (size_t k = i; k < i + kFloatLanes; ++k) {
+          before -= Splat(keys[k]) < own;
+        }
+      }
+      for (size_t lane = 0; lane < kFloatLanes; ++lane) {
+        order[before[lane]] = static_cast<uint32_t>(first + lane);  // of what is none: after the last
+      }
+    }
+  }
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_VORONOI_NEAR_VERTICES_H_

@@ -1,0 +1,162 @@
+// The Voronoi cell of one vertex in space under construction.
+#ifndef WELLSPACE_CORE_VORONOI_POLYHEDRON_H_
+#define WELLSPACE_CORE_VORONOI_POLYHEDRON_H_
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/base/ids.h"
+#include "core/geometry/box.h"
+#include "core/geometry/point.h"
+#include "core/geometry/power_predicate.h"
+#include "core/voronoi/cell_parts.h"
+#include "core/voronoi/lanes.h"
+#include "core/voronoi/star.h"
+
+namespace wellspace::core {
+
+template <int D>
+struct FloatBisector;
+
+// Polytope<3>, to which its functions that are not told about here belong: a simple polyhedron, kept as its dual, a triangulated sphere. A node
+// is a triangle of three planes; a cut takes a disk of triangles out, and joins its rim to the new plane. Which triangle is beside
+// which need not be known for that. While cuts are made nodes are floats, in units of about the reach that the cell began with; what
+// these leave in doubt is decided in doubles, then exactly.
+//
+// Thread safety: thread-compatible. Reused from site to site: no allocation once warm.
+// Invariants: the nodes are those that exact arithmetic and the tie rule give, whatever the rounding.
+class Polyhedron {
+ public:
+  static constexpr size_t kMostNodes = size_t{1} << 14;
+  static constexpr size_t kMostPlanes = size_t{1} << 15;
+  // So many nodes are worked on together.
+  static constexpr size_t kTogether = 8;
+
+  // Works with `unit`, which this processor has; the best there is unless told.
+  explicit Polyhedron(VectorUnit unit = BestVectorUnit()) : unit_(unit) {}
+
+  void Reset(const Point<3>& site, const Box<3>& bounds, const std::array<PlaneKind, 6>& kinds, TieRule rule);
+
+  bool Cut(VertexId u, const Point<3>& position) {
+    const bool is_cut = CutBeforePlace(u, position);
+    Place();
+    return is_cut;
+  }
+  bool CutBeforePlace(VertexId u, const Point<3>& position);
+  size_t CutByEach(std::span<const Point<3>> positions, const VertexNames& names, VertexId site);
+
+  void Place();
+  bool KeepsRatio(double ratio) const;
+  // The nodes that may be asked for then do not tell their neighbours.
+  bool PlaceUnlessKeeps(double ratio);
+  bool Reaches(const Box<3>& cube) const;
+  bool IsTooLarge() const { return count_ > kMostNodes || plane_count_ > kMostPlanes; }
+  void FindStar(Star<3>& out) const;
+  FaceMask FacesOf(const CellNode<3>& node) const { return core::FacesOf<3>(planes_, node); }
+
+  const Point<3>& site() const { return site_; }
+  void Tighten() {}  // it always is
+  double reach_sq() const {
+    const double reach = std::min(most_radius_ * unit_length_, placed_reach_);
+    return reach * reach;
+  }
+  double CutLimitSq() const { return 4 * (1 + 0x1p-49) * reach_sq(); }
+  std::span<const CellNode<3>> nodes() const { return nodes_; }
+  const Plane<3>& plane(int index) const { return planes_[index]; }
+  int plane_count() const { return static_cast<int>(plane_count_); }
+  uint64_t cuts() const { return cuts_; }
+  const DecisionCounters& counters() const { return counters_; }
+  uint64_t MemoryBytes() const;
+
+ private:
+  // Nodes; places beyond the last are at the site, which no bisector cuts off.
+  struct alignas(kTogether * sizeof(float)) Group {
+    float x[3][kTogether];
+    float edge_sq[kTogether];  // the least square of the length of what its bisectors stand for; 0 on a wall
+  };
+  // The planes of a node, in the same sense around the node for all, seen from outside.
+  struct Triangle {
+    std::array<uint16_t, 3> planes;
+    bool is_at_end = false;  // of an edge that was too short to tell the node from it
+  };
+  // Of a plane what nodes are computed from.
+  struct alignas(4 * sizeof(double)) Row {
+    double normal[3];
+    double offset;
+  };
+  // An edge of the rim of what is cut off, as the triangle there that goes had it.
+  struct RimEdge {
+    uint16_t from;
+    uint16_t to;
+    bool is_at_end = false;  // as of the new triangle
+  };
+  static constexpr size_t kWordBits = 64;
+
+  template <VectorUnit kUnit>
+  size_t CutByEachWith(std::span<const Point<3>> positions, const VertexNames& names, VertexId site);
+  size_t CutByEachAvx2(std::span<const Point<3>> positions, const VertexNames& names, VertexId site);
+  template <VectorUnit kUnit>
+  bool CutOff(const FloatBisector<3>& bisector, VertexId u, const Point<3>& position);
+  bool CutOffAvx2(const FloatBisector<3>& bisector, VertexId u, const Point<3>& position);
+  template <VectorUnit kUnit>
+  bool FindRemoved(const FloatBisector<3>& bisector, const Point<3>& position);
+  uint64_t DecideDoubtful(size_t word, uint64_t doubtful, const Point<3>& generator);
+  void FindRim();
+  void FindRimAmongMany();
+  void PlaceOnRim(uint32_t plane);
+  void PlaceOnShortEdge(size_t j, uint32_t plane);
+  void Replace(uint32_t plane);
+  template <typename Wants>
+  void PlaceThose(Wants wants);
+  void FindNeighbours();
+  template <VectorUnit kUnit>
+  bool KeepsRatioWith(float ratio_sq) const;
+  bool KeepsRatioAvx2(float ratio_sq) const;
+  template <VectorUnit kUnit>
+  bool ReachesWith(const Box<3>& cube) const;
+  bool ReachesAvx2(const Box<3>& cube) const;
+  void SetReach();
+  bool IsRemoved(size_t node) const { return (removed_words_[node / kWordBits] >> node % kWordBits & 1) != 0; }
+  Point<3> PositionOf(size_t node) const;  // in the units of the nodes, as the next
+  Point<3> ScaledTo(const Point<3>& p) const;
+  std::span<const Group> groups() const { return {groups_.data(), (count_ + kTogether - 1) / kTogether}; }
+
+  VectorUnit unit_;
+  Point<3> site_;
+  TieRule rule_ = TieRule::kKeep;
+  double scale_ = 1;         // the units of the nodes, so many to one of the coordinates, a power of two
+  double unit_length_ = 1;   // 1 / scale_
+  float most_radius_ = 0;    // at least the distance from the site to the farthest node, in the units of the nodes
+  double placed_reach_ = 0;  // the same of the nodes that were placed last, in those of the coordinates
+  size_t count_ = 0;
+  std::vector<Group> groups_;        // and more
+  std::vector<Triangle> triangles_;  // by node, and more
+  size_t plane_count_ = 0;
+  std::vector<Plane<3>> planes_;    // and more
+  std::vector<Row> rows_;           // by plane, and more
+  std::vector<float> edge_sq_;      // by plane, and more: of a bisector the square of its vertex' distance, else 0
+  bool is_placed_ = false;          // all nodes are, and know their neighbours
+  std::vector<CellNode<3>> nodes_;  // as of the last that placed any
+  uint64_t cuts_ = 0;
+  DecisionCounters counters_;
+
+  // Scratch of cuts; arrays only grow.
+  std::vector<uint64_t> removed_words_;  // by node a bit for whether it is cut off
+  std::vector<uint32_t> removed_;        // ascending
+  size_t removed_count_ = 0;
+  std::vector<RimEdge> rim_;
+  size_t rim_count_ = 0;
+  std::array<std::vector<float>, 3> new_;  // by axis and edge of the rim: the node there
+  // By plane, one of the first kWordBits, a bit for each to which, and from which, an edge of a triangle that goes leads; all 0 between cuts.
+  std::array<uint64_t, kWordBits> leads_to_{};
+  std::array<uint64_t, kWordBits> leads_from_{};
+  std::vector<std::array<uint32_t, 3>> edges_;  // of FindNeighbours and FindRimAmongMany
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_VORONOI_POLYHEDRON_H_
