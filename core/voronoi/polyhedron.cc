@@ -549,23 +549,51 @@ void Polyhedron::PlaceThose(Wants wants) {
 
 // Sets the neighbours of all nodes_.
 void Polyhedron::FindNeighbours() {
-  edges_.clear();
+  if (plane_count_ > kWordBits) {
+    FindNeighboursAmongMany();
+    return;
+  }
+  ends_.resize(kWordBits * kWordBits);
   for (uint32_t i = 0; i < count_; ++i) {
     const std::array<uint16_t, 3>& planes = nodes_[i].planes;
     for (uint32_t k = 0; k < 3; ++k) {
-      // The edge that leaves plane k runs along the other two.
-      const uint32_t a = planes[k == 0 ? 1 : 0];
-      const uint32_t b = planes[k == 2 ? 1 : 2];
-      edges_.push_back({std::min(a, b), std::max(a, b), 3 * i + k});
+      const auto [low, high] = PlanesBut(planes, k);
+      uint32_t& end = ends_[low * kWordBits + high];
+      if (end == 0) {
+        end = 1 + 3 * i + k;
+      } else {
+        JoinNodes(end - 1, 3 * i + k);
+        end = 0;
+      }
+    }
+  }
+}
+
+[[gnu::noinline]] void Polyhedron::FindNeighboursAmongMany() {
+  edges_.clear();
+  for (uint32_t i = 0; i < count_; ++i) {
+    for (uint32_t k = 0; k < 3; ++k) {
+      const auto [low, high] = PlanesBut(nodes_[i].planes, k);
+      edges_.push_back({low, high, 3 * i + k});
     }
   }
   std::sort(edges_.begin(), edges_.end());
   for (size_t e = 0; e + 1 < edges_.size(); e += 2) {
-    const uint32_t a = edges_[e][2];
-    const uint32_t b = edges_[e + 1][2];
-    nodes_[a / 3].neighbours[a % 3] = static_cast<uint16_t>(b / 3);
-    nodes_[b / 3].neighbours[b % 3] = static_cast<uint16_t>(a / 3);
+    JoinNodes(edges_[e][2], edges_[e + 1][2]);
   }
+}
+
+// The edge that leaves plane k runs along the other two.
+std::array<uint32_t, 2> Polyhedron::PlanesBut(const std::array<uint16_t, 3>& planes, uint32_t k) {
+  const uint32_t a = planes[k == 0 ? 1 : 0];
+  const uint32_t b = planes[k == 2 ? 1 : 2];
+  return {std::min(a, b), std::max(a, b)};
+}
+
+// Each is three times a node and the place of the plane that an edge leaves there.
+void Polyhedron::JoinNodes(uint32_t a, uint32_t b) {
+  nodes_[a / 3].neighbours[a % 3] = static_cast<uint16_t>(b / 3);
+  nodes_[b / 3].neighbours[b % 3] = static_cast<uint16_t>(a / 3);
 }
 
 template <VectorUnit kUnit>

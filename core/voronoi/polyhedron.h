@@ -113,6 +113,9 @@ class Polyhedron {
   template <typename Wants>
   void PlaceThose(Wants wants);
   void FindNeighbours();
+  void FindNeighboursAmongMany();
+  static std::array<uint32_t, 2> PlanesBut(const std::array<uint16_t, 3>& planes, uint32_t k);
+  void JoinNodes(uint32_t a, uint32_t b);
   template <VectorUnit kUnit>
   bool KeepsRatioWith(float ratio_sq) const;
   bool KeepsRatioAvx2(float ratio_sq) const;
@@ -154,7 +157,9 @@ class Polyhedron {
   // By plane, one of the first kWordBits, a bit for each to which, and from which, an edge of a triangle that goes leads; all 0 between cuts.
   std::array<uint64_t, kWordBits> leads_to_{};
   std::array<uint64_t, kWordBits> leads_from_{};
-  std::vector<std::array<uint32_t, 3>> edges_;  // of FindNeighbours and FindRimAmongMany
+  std::vector<uint32_t>
+      ends_;  // of FindNeighbours, by two of the first kWordBits planes: an end of the edge along both; all 0 between calls
+  std::vector<std::array<uint32_t, 3>> edges_;  // where there are many
 };
 
 }  // namespace wellspace::core
