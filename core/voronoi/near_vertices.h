@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -132,10 +131,11 @@ struct FloatBisector {
   }
 };
 
-// By how much the excess of the node x, as computed in doubles, over the bisector to a vertex at that squared distance may be wrong.
+// The square of what the excess of the node x, as computed in doubles, over the bisector to a vertex at that squared distance may be wrong by.
 template <int D>
-double NodeDoubt(const Point<D>& x, double length_sq) {
-  return 1.01 * 0x1p-24 * kNodeError<D> * std::sqrt(NormSq<D>(x) * length_sq) + kUnderflow;
+double NodeDoubtSq(const Point<D>& x, double length_sq) {
+  constexpr double kShare = 1.01 * 0x1p-24 * kNodeError<D>;
+  return kShare * kShare * NormSq<D>(x) * length_sq + double{kUnderflow} * kUnderflow;
 }
 
 // Half the square of the distance from its site within which a vertex may cut a cell of that radius, in floats.

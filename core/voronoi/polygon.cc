@@ -76,9 +76,8 @@ Point<2> Polygon::ScaledTo(const Point<2>& p) const { return {(p[0] - site_[0]) 
     const size_t node = first + static_cast<size_t>(std::countr_zero(doubtful));
     const Point<2> x = PositionOf(node);
     const double excess = Dot<2>(x, w) - 0.5 * length_sq;
-    const double doubt = NodeDoubt<2>(x, length_sq);
     bool is_cut_off = excess > 0;
-    if (!(std::abs(excess) > doubt)) {
+    if (!(excess * excess > NodeDoubtSq<2>(x, length_sq))) {
       const std::array<PlaneSource<2>, 2> sources = {planes_[PlaneFrom(Before(node))].source,
                                                      planes_[PlaneFrom(node)].source};
       const ExactDecision decision = DecideCut<2>(site_, sources, generator, rule_);

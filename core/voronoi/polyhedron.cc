@@ -164,9 +164,8 @@ Point<3> Polyhedron::ScaledTo(const Point<3>& p) const {
     const size_t node = word * kWordBits + static_cast<size_t>(std::countr_zero(doubtful));
     const Point<3> x = PositionOf(node);
     const double excess = Dot<3>(x, w) - 0.5 * length_sq;
-    const double doubt = NodeDoubt<3>(x, length_sq);
     bool is_cut_off = excess > 0;
-    if (!(std::abs(excess) > doubt)) {
+    if (!(excess * excess > NodeDoubtSq<3>(x, length_sq))) {
       std::array<PlaneSource<3>, 3> sources;
       for (int k = 0; k < 3; ++k) {
         sources[k] = planes_[triangles_[node].planes[k]].source;
