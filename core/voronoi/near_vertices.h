@@ -14,6 +14,7 @@
 #include "core/base/ids.h"
 #include "core/geometry/point.h"
 #include "core/voronoi/cell_parts.h"
+#include "core/voronoi/float_cell.h"
 #include "core/voronoi/lane_bits.h"
 #include "core/voronoi/lanes.h"
 
@@ -62,20 +63,6 @@ WELLSPACE_INLINE float Largest(const Floats& items) {
   with(FloatMask{2, 3, 0, 1, 6, 7, 4, 5});
   with(FloatMask{1, 0, 3, 2, 5, 4, 7, 6});
   return largest[0];
-}
-
-// One over the power of two below `length`, and that.
-struct FloatUnit {
-  double scale;
-  double length;
-};
-inline FloatUnit FloatUnitOf(double length) {
-  constexpr int kMantissaBits = std::numeric_limits<double>::digits - 1;
-  constexpr uint64_t kMostExponent = 2046;
-  const uint64_t exponent =
-      std::clamp<uint64_t>(std::bit_cast<uint64_t>(length) >> kMantissaBits, 1, kMostExponent - 1);
-  return {std::bit_cast<double>((kMostExponent - exponent) << kMantissaBits),
-          std::bit_cast<double>(exponent << kMantissaBits)};
 }
 
 // By the bits of the lanes that are kept: which lanes these are, in order.
@@ -171,6 +158,51 @@ WELLSPACE_INLINE void VectorsTo(const Point<3>* p, const Point<3>& site, double 
   }
 }
 
+// The largest x . w of nodes in groups, of eight vectors w side by side.
+template <int D, typename Group>
+WELLSPACE_INLINE Floats MostProducts(std::span<const Group> groups, const Floats* w) {
+  Floats most = Splat(-std::numeric_limits<float>::infinity());
+  for (const Group& group : groups) {
+    for (size_t i = 0; i < kFloatLanes; ++i) {
+      Floats product = w[D - 1] * group.x[D - 1][i];
+      for (int axis = D - 2; axis >= 0; --axis) {
+        product = w[axis] * group.x[axis][i] + product;
+      }
+      most = most > product ? most : product;
+    }
+  }
+  return most;
+}
+
+// The squared distances of the nodes of a group.
+template <int D, typename Group>
+WELLSPACE_INLINE Floats RadiiSq(const Group& group) {
+  Floats radius_sq = Load(group.x[0]) * Load(group.x[0]);
+  for (int axis = 1; axis < D; ++axis) {
+    radius_sq += Load(group.x[axis]) * Load(group.x[axis]);
+  }
+  return radius_sq;
+}
+
+// Whether some vertex in the cube from `low` to `high`, relative to the site, could cut off a node, as Polytope::Reaches has it.
+template <VectorUnit kUnit, int D, typename Group>
+WELLSPACE_INLINE bool AreReached(std::span<const Group> groups, const Point<D>& low, const Point<D>& high) {
+  FloatMask any{};
+  for (const Group& group : groups) {
+    Floats power{};
+    for (int axis = 0; axis < D; ++axis) {
+      const Floats x = Load(group.x[axis]);
+      const Floats least = Splat(static_cast<float>(low[axis]));
+      const Floats most = Splat(static_cast<float>(high[axis]));
+      Floats p = x > least ? x : least;
+      p = p < most ? p : most;
+      power += p * (p - 2 * x);
+    }
+    any |= power <= kPowerError<D> * RadiiSq<D>(group) + kUnderflow;
+  }
+  return Bits<kUnit>(any) != 0;
+}
+
 // The vertices that may cut a cell, in columns; whole vectors are written, the last one perhaps from the last one on.
 template <int D>
 struct alignas(sizeof(Floats)) NearVertices {
@@ -235,14 +267,26 @@ struct alignas(sizeof(Floats)) NearVertices {
     }
   }
 
-  FloatBisector<D> BisectorTo(size_t i) const {
-    FloatBisector<D> bisector;
-    for (int axis = 0; axis < D; ++axis) {
-      bisector.w[axis] = w[axis][i];
+  // Calls cut(bisector, slot), which tells whether anything is cut off, from the nearest on, as long as they are within `most_offset`(), which
+  // may have changed then.
+  template <typename Cut, typename Most>
+  WELLSPACE_INLINE void CutInOrder(Cut cut, Most most_offset) const {
+    float left = std::numeric_limits<float>::infinity();
+    for (size_t j = 0; j < count; ++j) {
+      const uint32_t i = order[j];
+      FloatBisector<D> bisector;
+      for (int axis = 0; axis < D; ++axis) {
+        bisector.w[axis] = w[axis][i];
+      }
+      bisector.offset = offset[i];
+      bisector.low = low[i];
+      if (bisector.offset > left) {
+        break;
+      }
+      if (cut(bisector, static_cast<size_t>(slot[i]))) {
+        left = most_offset() * (1 + 0x1p-16f);  // those that follow may be nearer by as much
+      }
     }
-    bisector.offset = offset[i];
-    bisector.low = low[i];
-    return bisector;
   }
 
  private:

@@ -18,31 +18,7 @@ WELLSPACE_INLINE void Polygon::SetReach(float radius_sq) {
 }
 
 void Polygon::Reset(const Point<2>& site, const Box<2>& bounds, const std::array<PlaneKind, 4>& kinds, TieRule rule) {
-  site_ = site;
-  rule_ = rule;
-  cuts_ = 0;
-  counters_ = {};
-  planes_.resize(std::max<size_t>(planes_.size(), 16));
-  plane_count_ = 4;
-  double longest = 0;
-  for (int face = 0; face < 4; ++face) {
-    const int axis = face / 2;
-    Plane<2>& plane = planes_[face];
-    plane.kind = kinds[face];
-    plane.face = static_cast<uint8_t>(face);
-    plane.vertex = kNoVertex;
-    plane.normal = {};
-    plane.normal[axis] = 1;
-    plane.length = 1;
-    plane.source.axis = axis;
-    plane.source.coordinate = bounds.FaceCoordinate(face);
-    plane.offset = plane.source.coordinate - site[axis];
-    plane.distance = std::abs(plane.offset);
-    longest = std::max(longest, plane.distance);
-  }
-  const FloatUnit unit = FloatUnitOf(longest);
-  scale_ = unit.scale;
-  unit_length_ = unit.length;
+  BeginWalls(site, bounds, kinds, rule);
   // From the lower left corner on; the edge from there runs along the lower face of axis 1.
   static constexpr std::array<std::array<uint32_t, 2>, 4> kCorners = {{{0, 2}, {1, 2}, {1, 3}, {0, 3}}};
   static constexpr std::array<uint32_t, 4> kEdges = {2, 1, 3, 0};
@@ -50,22 +26,17 @@ void Polygon::Reset(const Point<2>& site, const Box<2>& bounds, const std::array
   group = {};
   count_ = 4;
   for (size_t i = 0; i < 4; ++i) {
-    group.x[i] = static_cast<float>(planes_[kCorners[i][0]].offset * scale_);
-    group.y[i] = static_cast<float>(planes_[kCorners[i][1]].offset * scale_);
+    group.x[0][i] = static_cast<float>(planes_[kCorners[i][0]].offset * scale_);
+    group.x[1][i] = static_cast<float>(planes_[kCorners[i][1]].offset * scale_);
     group.plane[i] = kEdges[i];
   }
-  is_placed_ = false;
-  placed_reach_ = std::numeric_limits<double>::infinity();
-  most_radius_ = std::numeric_limits<float>::infinity();
-  SetReach(Largest(Load(group.x) * Load(group.x) + Load(group.y) * Load(group.y)));
+  SetReach(Largest(RadiiSq<2>(group)));
 }
 
 Point<2> Polygon::PositionOf(size_t node) const {
   const Group& group = groups_[node / kTogether];
-  return {group.x[node % kTogether], group.y[node % kTogether]};
+  return {group.x[0][node % kTogether], group.x[1][node % kTogether]};
 }
-
-Point<2> Polygon::ScaledTo(const Point<2>& p) const { return {(p[0] - site_[0]) * scale_, (p[1] - site_[1]) * scale_}; }
 
 // Of the nodes `first` + i for the bits i of `doubtful`: a bit for whether it is cut off, by its own error if that tells, else exactly.
 [[gnu::noinline]] uint32_t Polygon::DecideDoubtful(size_t first, uint32_t doubtful, const Point<2>& generator) {
@@ -78,12 +49,7 @@ Point<2> Polygon::ScaledTo(const Point<2>& p) const { return {(p[0] - site_[0]) 
     const double excess = Dot<2>(x, w) - 0.5 * length_sq;
     bool is_cut_off = excess > 0;
     if (!(excess * excess > NodeDoubtSq<2>(x, length_sq))) {
-      const std::array<PlaneSource<2>, 2> sources = {planes_[PlaneFrom(Before(node))].source,
-                                                     planes_[PlaneFrom(node)].source};
-      const ExactDecision decision = DecideCut<2>(site_, sources, generator, rule_);
-      ++counters_.exact;
-      counters_.perturbed += decision.perturbed ? 1 : 0;
-      is_cut_off = decision.sign == Sign::kPositive;
+      is_cut_off = IsCutOff<uint32_t>({PlaneFrom(Before(node)), PlaneFrom(node)}, generator);
     }
     removed |= is_cut_off ? doubtful & -doubtful : 0;
   }
@@ -149,10 +115,10 @@ WELLSPACE_INLINE void Polygon::Replace(const Rest& rest, const std::array<Node, 
   const auto used = [&](const Floats& items) __attribute__((always_inline)) {
     return reinterpret_cast<Floats>(reinterpret_cast<FloatMask>(items) & is_used);
   };
-  const Floats x = used(replace(Load(group.x), ends[0].x, ends[1].x));
-  const Floats y = used(replace(Load(group.y), ends[0].y, ends[1].y));
-  Store(x, group.x);
-  Store(y, group.y);
+  const Floats x = used(replace(Load(group.x[0]), ends[0].x, ends[1].x));
+  const Floats y = used(replace(Load(group.x[1]), ends[0].y, ends[1].y));
+  Store(x, group.x[0]);
+  Store(y, group.x[1]);
   Store(replace(Load(group.edge_sq), ends[0].edge_sq, ends[1].edge_sq), group.edge_sq);
   FloatMask plane = __builtin_shuffle(*reinterpret_cast<const FloatMask*>(group.plane), from);
   plane = is_first ? Splat(static_cast<int32_t>(ends[0].plane)) : plane;
@@ -168,7 +134,7 @@ WELLSPACE_INLINE void Polygon::Replace(const Rest& rest, const std::array<Node, 
     const size_t i = (rest.first + j) % count_;
     const Group& group = groups_[i / kTogether];
     const size_t lane = i % kTogether;
-    around_.push_back({group.x[lane], group.y[lane], group.edge_sq[lane], group.plane[lane]});
+    around_.push_back({group.x[0][lane], group.x[1][lane], group.edge_sq[lane], group.plane[lane]});
   }
   around_.insert(around_.end(), ends.begin(), ends.end());
   count_ = around_.size();
@@ -182,8 +148,8 @@ WELLSPACE_INLINE void Polygon::Replace(const Rest& rest, const std::array<Node, 
     const Node& node = around_[i];
     Group& group = groups_[i / kTogether];
     const size_t lane = i % kTogether;
-    group.x[lane] = node.x;
-    group.y[lane] = node.y;
+    group.x[0][lane] = node.x;
+    group.x[1][lane] = node.y;
     group.edge_sq[lane] = node.edge_sq;
     group.plane[lane] = node.plane;
     radius_sq = std::max(radius_sq, node.x * node.x + node.y * node.y);
@@ -194,7 +160,7 @@ WELLSPACE_INLINE void Polygon::Replace(const Rest& rest, const std::array<Node, 
 // By how much the nodes, kTogether or fewer, may exceed the bisector at most.
 WELLSPACE_INLINE Floats Polygon::MostExcesses(const FloatBisector<2>& bisector) const {
   const Group& group = groups_.front();
-  return Load(group.x) * bisector.w[0] + (Load(group.y) * bisector.w[1] - bisector.low);
+  return Load(group.x[0]) * bisector.w[0] + (Load(group.x[1]) * bisector.w[1] - bisector.low);
 }
 
 // Tells what the bisector leaves of the nodes, kTogether or fewer, of which those of the bits `maybe` may be beyond it; false if all.
@@ -225,7 +191,7 @@ WELLSPACE_INLINE bool Polygon::FindRest(const FloatBisector<2>& bisector, const 
   for (size_t i = 0; i < count_; ++i) {
     const Group& group = groups_[i / kTogether];
     const size_t lane = i % kTogether;
-    const float most = group.x[lane] * bisector.w[0] + (group.y[lane] * bisector.w[1] - bisector.low);
+    const float most = group.x[0][lane] * bisector.w[0] + (group.x[1][lane] * bisector.w[1] - bisector.low);
     if (most >= 0 && (most > 2 * (bisector.offset - bisector.low) || DecideDoubtful(i, 1, position) != 0)) {
       is_removed_[i] = 1;
       ++removed_count;
@@ -261,22 +227,7 @@ WELLSPACE_INLINE bool Polygon::CutOff(const FloatBisector<2>& bisector, VertexId
   } else if (!FindRestOfMany(bisector, position, rest)) {
     return false;
   }
-  ++cuts_;
-  is_placed_ = false;
-  const size_t index = plane_count_++;
-  if (planes_.size() < plane_count_) {
-    planes_.resize(2 * plane_count_);
-  }
-  Plane<2>& plane = planes_[index];
-  plane.kind = PlaneKind::kBisector;
-  plane.vertex = u;
-  plane.normal = Difference<2>(position, site_);
-  const double length_sq = NormSq<2>(plane.normal);
-  plane.offset = 0.5 * length_sq;
-  plane.length = std::sqrt(length_sq);
-  plane.distance = 0.5 * plane.length;
-  plane.source.generator = position;
-  plane.source.axis = -1;
+  const size_t index = AddBisector(u, position);
   std::array<Node, 2> ends;
   PlaceEnds(rest, static_cast<uint32_t>(index), ends);
   ends[0].edge_sq = 2 * bisector.offset;
@@ -295,34 +246,15 @@ WELLSPACE_INLINE size_t Polygon::CutByEachWith(std::span<const Point<2>> positio
   near.Pick<kUnit>(
       positions, names, site, site_, scale_,
       most_radius_, [this](const Floats* w, const Floats& low, FloatMask& is_near) __attribute__((always_inline)) {
-        if (cuts_ == 0) {
-          return;
+        if (cuts_ != 0) {  // most miss the cell, now and later
+          is_near &= MostProducts<2>(groups(), w) >= low;
         }
-        // Most of those miss the cell, now and later.
-        Floats most = Splat(-std::numeric_limits<float>::infinity());
-        for (const Group& group : groups()) {
-          for (size_t i = 0; i < kTogether; ++i) {
-            const Floats product = w[0] * group.x[i] + w[1] * group.y[i];
-            most = most > product ? most : product;
-          }
-        }
-        is_near &= most >= low;
       });
-  float left = std::numeric_limits<float>::infinity();
-  for (size_t j = 0; j < near.count; ++j) {
-    const uint32_t i = near.order[j];
-    const FloatBisector<2> bisector = near.BisectorTo(i);
-    if (bisector.offset > left) {
-      break;
-    }
-    const auto at = static_cast<size_t>(near.slot[i]);
-    if (CutOff<kUnit>(bisector, names[at], positions[at])) {
-      if (IsTooLarge()) {
-        break;
-      }
-      left = MostOffset<2>(most_radius_) * (1 + 0x1p-16f);  // those that follow may be nearer by as much
-    }
-  }
+  near.CutInOrder(
+      [&](const FloatBisector<2>& bisector, size_t slot) __attribute__((always_inline)) {
+        return CutOff<kUnit>(bisector, names[slot], positions[slot]);
+      },
+      [this] { return IsTooLarge() ? -1 : MostOffset<2>(most_radius_); });
   return near.within_reach;
 }
 
@@ -395,7 +327,7 @@ WELLSPACE_INLINE bool Polygon::KeepsRatioWith(double ratio) const {
     const Floats from = Load(group.edge_sq);
     const Floats to = __builtin_shuffle(from, before);
     const Floats nearest_sq = from < to ? from : to;
-    const Floats radius_sq = Load(group.x) * Load(group.x) + Load(group.y) * Load(group.y);
+    const Floats radius_sq = Load(group.x[0]) * Load(group.x[0]) + Load(group.x[1]) * Load(group.x[1]);
     const uint32_t all = (1u << count_) - 1;
     return (Bits<kUnit>(radius_sq + kUnderflow <= ratio_sq * nearest_sq) & all) == all;
   }
@@ -404,7 +336,7 @@ WELLSPACE_INLINE bool Polygon::KeepsRatioWith(double ratio) const {
     const Group& group = groups_[i / kTogether];
     const size_t lane = i % kTogether;
     const float nearest_sq = std::min(group.edge_sq[lane], groups_[before / kTogether].edge_sq[before % kTogether]);
-    const float radius_sq = group.x[lane] * group.x[lane] + group.y[lane] * group.y[lane];
+    const float radius_sq = group.x[0][lane] * group.x[0][lane] + group.x[1][lane] * group.x[1][lane];
     if (!(radius_sq + kUnderflow <= ratio_sq * nearest_sq)) {
       return false;
     }
@@ -420,32 +352,14 @@ WELLSPACE_AVX2 bool Polygon::KeepsRatioAvx2(double ratio) const { return KeepsRa
 
 template <VectorUnit kUnit>
 WELLSPACE_INLINE bool Polygon::ReachesWith(const Box<2>& cube) const {
-  const auto relative = [this](double x, int axis) __attribute__((always_inline)) {
-    return Splat(static_cast<float>((x - site_[axis]) * scale_));
-  };
-  const Floats low[2] = {relative(cube.low[0], 0), relative(cube.low[1], 1)};
-  const Floats high[2] = {relative(cube.high[0], 0), relative(cube.high[1], 1)};
-  FloatMask any{};
-  for (const Group& group : groups()) {
-    Floats power{};
-    Floats radius_sq{};
-    for (int axis = 0; axis < 2; ++axis) {
-      const Floats x = Load(axis == 0 ? group.x : group.y);
-      Floats p = x > low[axis] ? x : low[axis];
-      p = p < high[axis] ? p : high[axis];
-      power += p * (p - 2 * x);
-      radius_sq += x * x;
-    }
-    any |= power <= kPowerError<2> * radius_sq + kUnderflow;
-  }
-  return Bits<kUnit>(any) != 0;
+  return AreReached<kUnit, 2>(groups(), ScaledTo(cube.low), ScaledTo(cube.high));
 }
+
+WELLSPACE_AVX2 bool Polygon::ReachesAvx2(const Box<2>& cube) const { return ReachesWith<VectorUnit::kAvx2>(cube); }
 
 bool Polygon::Reaches(const Box<2>& cube) const {
   return unit_ == VectorUnit::kAvx2 ? ReachesAvx2(cube) : ReachesWith<VectorUnit::kBaseline>(cube);
 }
-
-WELLSPACE_AVX2 bool Polygon::ReachesAvx2(const Box<2>& cube) const { return ReachesWith<VectorUnit::kAvx2>(cube); }
 
 void Polygon::FindStar(Star<2>& out) const {
   out.resize(count_);

@@ -14,29 +14,21 @@
 #include "core/geometry/point.h"
 #include "core/geometry/power_predicate.h"
 #include "core/voronoi/cell_parts.h"
+#include "core/voronoi/float_cell.h"
 #include "core/voronoi/lanes.h"
 #include "core/voronoi/star.h"
 
 namespace wellspace::core {
 
-template <int D>
-struct FloatBisector;
-
 // Polytope<2>, to which its functions that are not told about here belong: a convex polygon, whose nodes are kept in order around the
-// site, so that a cut takes a run of them out and puts two in. While cuts are made nodes are floats, in units of about the reach
-// that the cell began with; what these leave in doubt is decided exactly. Up to eight nodes, as most cells have, are worked on as one vector.
+// site, so that a cut takes a run of them out and puts two in. What floats leave in doubt is decided exactly. Up to eight nodes, as most cells have, are worked on as one vector.
 //
 // Thread safety: thread-compatible. Reused from site to site: no allocation once warm.
 // Invariants: the nodes are those that exact arithmetic and the tie rule give, whatever the rounding.
-class Polygon {
+class Polygon : public FloatCell<2> {
  public:
-  static constexpr size_t kMostNodes = size_t{1} << 14;
-  static constexpr size_t kMostPlanes = size_t{1} << 15;
-  // So many nodes are worked on together.
-  static constexpr size_t kTogether = 8;
-
   // Works with `unit`, which this processor has; the best there is unless told.
-  explicit Polygon(VectorUnit unit = BestVectorUnit()) : unit_(unit), groups_(1) {}
+  explicit Polygon(VectorUnit unit = BestVectorUnit()) : FloatCell(unit), groups_(1) {}
 
   void Reset(const Point<2>& site, const Box<2>& bounds, const std::array<PlaneKind, 4>& kinds, TieRule rule);
 
@@ -53,30 +45,14 @@ class Polygon {
   bool KeepsRatio(double ratio) const;
   bool PlaceUnlessKeeps(double ratio);
   bool Reaches(const Box<2>& cube) const;
-  bool IsTooLarge() const { return count_ > kMostNodes || plane_count_ > kMostPlanes; }
   void FindStar(Star<2>& out) const;
-  FaceMask FacesOf(const CellNode<2>& node) const { return core::FacesOf<2>(planes_, node); }
-
-  const Point<2>& site() const { return site_; }
-  void Tighten() {}  // it always is
-  double reach_sq() const {
-    const double reach = std::min(most_radius_ * unit_length_, placed_reach_);
-    return reach * reach;
-  }
-  double CutLimitSq() const { return 4 * (1 + 0x1p-49) * reach_sq(); }
-  std::span<const CellNode<2>> nodes() const { return nodes_; }
-  const Plane<2>& plane(int index) const { return planes_[index]; }
-  int plane_count() const { return static_cast<int>(plane_count_); }
-  uint64_t cuts() const { return cuts_; }
-  const DecisionCounters& counters() const { return counters_; }
   uint64_t MemoryBytes() const;
 
  private:
   // Nodes, each with the edge from it to the next one: the square of the length of what its bisector stands for, 0 of a wall, and
   // its plane, by index. Places beyond the last node are at the site, which no bisector cuts off.
   struct alignas(kTogether * sizeof(float)) Group {
-    float x[kTogether];
-    float y[kTogether];
+    float x[2][kTogether];
     float edge_sq[kTogether];
     uint32_t plane[kTogether];
   };
@@ -114,27 +90,12 @@ class Polygon {
   bool ReachesWith(const Box<2>& cube) const;
   bool ReachesAvx2(const Box<2>& cube) const;
   void SetReach(float radius_sq);
-  Point<2> PositionOf(size_t node) const;  // in the units of the nodes, as the next
-  Point<2> ScaledTo(const Point<2>& p) const;
+  Point<2> PositionOf(size_t node) const;  // in the units of the nodes
   std::span<const Group> groups() const { return {groups_.data(), (count_ + kTogether - 1) / kTogether}; }
   uint32_t PlaneFrom(size_t node) const { return groups_[node / kTogether].plane[node % kTogether]; }
   size_t Before(size_t node) const { return (node == 0 ? count_ : node) - 1; }
 
-  VectorUnit unit_;
-  Point<2> site_;
-  TieRule rule_ = TieRule::kKeep;
-  double scale_ = 1;         // the units of the nodes, so many to one of the coordinates, a power of two
-  double unit_length_ = 1;   // 1 / scale_
-  float most_radius_ = 0;    // at least the distance from the site to the farthest node, in the units of the nodes
-  double placed_reach_ = 0;  // the same of the nodes that were placed last, in those of the coordinates
-  size_t count_ = 0;
-  std::vector<Group> groups_;     // and more
-  std::vector<Plane<2>> planes_;  // and more
-  size_t plane_count_ = 0;
-  bool is_placed_ = false;
-  std::vector<CellNode<2>> nodes_;  // as of the last that placed them
-  uint64_t cuts_ = 0;
-  DecisionCounters counters_;
+  std::vector<Group> groups_;        // and more
   std::vector<Node> around_;         // scratch of ReplaceAmongMany
   std::vector<uint8_t> is_removed_;  // scratch of FindRestOfMany
 };

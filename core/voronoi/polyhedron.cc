@@ -35,8 +35,7 @@ WELLSPACE_INLINE void Transpose(const Four& a, const Four& b, const Four& c, con
 WELLSPACE_INLINE void Polyhedron::SetReach() {
   Floats most_sq{};
   for (const Group& group : groups()) {
-    const Floats radius_sq =
-        Load(group.x[0]) * Load(group.x[0]) + Load(group.x[1]) * Load(group.x[1]) + Load(group.x[2]) * Load(group.x[2]);
+    const Floats radius_sq = RadiiSq<3>(group);
     most_sq = most_sq > radius_sq ? most_sq : radius_sq;
   }
   most_radius_ =
@@ -45,12 +44,8 @@ WELLSPACE_INLINE void Polyhedron::SetReach() {
 
 void Polyhedron::Reset(const Point<3>& site, const Box<3>& bounds, const std::array<PlaneKind, 6>& kinds,
                        TieRule rule) {
-  site_ = site;
-  rule_ = rule;
-  cuts_ = 0;
-  counters_ = {};
-  if (planes_.size() < kWordBits) {
-    planes_.resize(kWordBits);
+  BeginWalls(site, bounds, kinds, rule);
+  if (rows_.empty()) {
     rows_.resize(kWordBits);
     edge_sq_.resize(kWordBits);
     groups_.resize(kWordBits / kTogether);
@@ -62,28 +57,11 @@ void Polyhedron::Reset(const Point<3>& site, const Box<3>& bounds, const std::ar
       column.resize(kWordBits);
     }
   }
-  plane_count_ = 6;
-  double longest = 0;
   for (int face = 0; face < 6; ++face) {
-    const int axis = face / 2;
-    Plane<3>& plane = planes_[face];
-    plane.kind = kinds[face];
-    plane.face = static_cast<uint8_t>(face);
-    plane.vertex = kNoVertex;
-    plane.normal = {};
-    plane.normal[axis] = 1;
-    plane.length = 1;
-    plane.source.axis = axis;
-    plane.source.coordinate = bounds.FaceCoordinate(face);
-    plane.offset = plane.source.coordinate - site[axis];
-    plane.distance = std::abs(plane.offset);
-    longest = std::max(longest, plane.distance);
+    const Plane<3>& plane = planes_[face];
     rows_[face] = {{plane.normal[0], plane.normal[1], plane.normal[2]}, plane.offset};
     edge_sq_[face] = 0;
   }
-  const FloatUnit unit = FloatUnitOf(longest);
-  scale_ = unit.scale;
-  unit_length_ = unit.length;
   std::fill_n(groups_.begin(), (count_ + kTogether - 1) / kTogether, Group{});
   count_ = 8;
   Group& group = groups_.front();
@@ -98,9 +76,6 @@ void Polyhedron::Reset(const Point<3>& site, const Box<3>& bounds, const std::ar
     }
     triangles_[corner] = {faces};
   }
-  is_placed_ = false;
-  placed_reach_ = std::numeric_limits<double>::infinity();
-  most_radius_ = std::numeric_limits<float>::infinity();
   SetReach();
 }
 
@@ -151,10 +126,6 @@ Point<3> Polyhedron::PositionOf(size_t node) const {
   return {group.x[0][lane], group.x[1][lane], group.x[2][lane]};
 }
 
-Point<3> Polyhedron::ScaledTo(const Point<3>& p) const {
-  return {(p[0] - site_[0]) * scale_, (p[1] - site_[1]) * scale_, (p[2] - site_[2]) * scale_};
-}
-
 // Of the nodes that the bits of `doubtful`, of a word, stand for: those that are cut off, by its own error if that tells, else exactly.
 [[gnu::noinline]] uint64_t Polyhedron::DecideDoubtful(size_t word, uint64_t doubtful, const Point<3>& generator) {
   const Point<3> w = ScaledTo(generator);
@@ -166,14 +137,7 @@ Point<3> Polyhedron::ScaledTo(const Point<3>& p) const {
     const double excess = Dot<3>(x, w) - 0.5 * length_sq;
     bool is_cut_off = excess > 0;
     if (!(excess * excess > NodeDoubtSq<3>(x, length_sq))) {
-      std::array<PlaneSource<3>, 3> sources;
-      for (int k = 0; k < 3; ++k) {
-        sources[k] = planes_[triangles_[node].planes[k]].source;
-      }
-      const ExactDecision decision = DecideCut<3>(site_, sources, generator, rule_);
-      ++counters_.exact;
-      counters_.perturbed += decision.perturbed ? 1 : 0;
-      is_cut_off = decision.sign == Sign::kPositive;
+      is_cut_off = IsCutOff<uint16_t>(triangles_[node].planes, generator);
     }
     removed |= is_cut_off ? doubtful & -doubtful : 0;
   }
@@ -395,24 +359,12 @@ WELLSPACE_INLINE bool Polyhedron::CutOff(const FloatBisector<3>& bisector, Verte
   if (!FindRemoved<kUnit>(bisector, position)) {
     return false;
   }
-  ++cuts_;
-  is_placed_ = false;
-  const size_t index = plane_count_++;
-  if (planes_.size() < plane_count_) {
-    planes_.resize(2 * plane_count_);
+  const size_t index = AddBisector(u, position);
+  if (rows_.size() < plane_count_) {
     rows_.resize(2 * plane_count_);
     edge_sq_.resize(2 * plane_count_);
   }
-  Plane<3>& plane = planes_[index];
-  plane.kind = PlaneKind::kBisector;
-  plane.vertex = u;
-  plane.normal = Difference<3>(position, site_);
-  const double length_sq = NormSq<3>(plane.normal);
-  plane.offset = 0.5 * length_sq;
-  plane.length = std::sqrt(length_sq);
-  plane.distance = 0.5 * plane.length;
-  plane.source.generator = position;
-  plane.source.axis = -1;
+  const Plane<3>& plane = planes_[index];
   rows_[index] = {{plane.normal[0], plane.normal[1], plane.normal[2]}, plane.offset};
   edge_sq_[index] = 2 * bisector.offset;
   FindRim();
@@ -429,34 +381,15 @@ WELLSPACE_INLINE size_t Polyhedron::CutByEachWith(std::span<const Point<3>> posi
   near.Pick<kUnit>(
       positions, names, site, site_, scale_,
       most_radius_, [this](const Floats* w, const Floats& low, FloatMask& is_near) __attribute__((always_inline)) {
-        if (cuts_ == 0 || Bits<kUnit>(is_near) == 0) {
-          return;
+        if (cuts_ != 0 && Bits<kUnit>(is_near) != 0) {  // most miss the cell, now and later
+          is_near &= MostProducts<3>(groups(), w) >= low;
         }
-        // Most of those miss the cell, now and later.
-        Floats most = Splat(-std::numeric_limits<float>::infinity());
-        for (const Group& group : groups()) {
-          for (size_t i = 0; i < kTogether; ++i) {
-            const Floats product = w[0] * group.x[0][i] + (w[1] * group.x[1][i] + w[2] * group.x[2][i]);
-            most = most > product ? most : product;
-          }
-        }
-        is_near &= most >= low;
       });
-  float left = std::numeric_limits<float>::infinity();
-  for (size_t j = 0; j < near.count; ++j) {
-    const uint32_t i = near.order[j];
-    const FloatBisector<3> bisector = near.BisectorTo(i);
-    if (bisector.offset > left) {
-      break;
-    }
-    const auto at = static_cast<size_t>(near.slot[i]);
-    if (CutOff<kUnit>(bisector, names[at], positions[at])) {
-      if (IsTooLarge()) {
-        break;
-      }
-      left = MostOffset<3>(most_radius_) * (1 + 0x1p-16f);  // those that follow may be nearer by as much
-    }
-  }
+  near.CutInOrder(
+      [&](const FloatBisector<3>& bisector, size_t slot) __attribute__((always_inline)) {
+        return CutOff<kUnit>(bisector, names[slot], positions[slot]);
+      },
+      [this] { return IsTooLarge() ? -1 : MostOffset<3>(most_radius_); });
   return near.within_reach;
 }
 
@@ -599,8 +532,7 @@ template <VectorUnit kUnit>
 WELLSPACE_INLINE bool Polyhedron::KeepsRatioWith(float ratio_sq) const {
   size_t left = count_;
   for (const Group& group : groups()) {
-    const Floats radius_sq = Load(group.x[0]) * Load(group.x[0]) +
-                             (Load(group.x[1]) * Load(group.x[1]) + Load(group.x[2]) * Load(group.x[2]));
+    const Floats radius_sq = RadiiSq<3>(group);
     const uint32_t all = left < kTogether ? (1u << left) - 1 : 0xff;
     left -= std::min(left, kTogether);
     if ((Bits<kUnit>(radius_sq + kUnderflow <= ratio_sq * Load(group.edge_sq)) & all) != all) {
@@ -622,26 +554,7 @@ bool Polyhedron::KeepsRatio(double ratio) const {
 
 template <VectorUnit kUnit>
 WELLSPACE_INLINE bool Polyhedron::ReachesWith(const Box<3>& cube) const {
-  Floats low[3];
-  Floats high[3];
-  for (int axis = 0; axis < 3; ++axis) {
-    low[axis] = Splat(static_cast<float>((cube.low[axis] - site_[axis]) * scale_));
-    high[axis] = Splat(static_cast<float>((cube.high[axis] - site_[axis]) * scale_));
-  }
-  FloatMask any{};
-  for (const Group& group : groups()) {
-    Floats power{};
-    Floats radius_sq{};
-    for (int axis = 0; axis < 3; ++axis) {
-      const Floats x = Load(group.x[axis]);
-      Floats p = x > low[axis] ? x : low[axis];
-      p = p < high[axis] ? p : high[axis];
-      power += p * (p - 2 * x);
-      radius_sq += x * x;
-    }
-    any |= power <= kPowerError<3> * radius_sq + kUnderflow;
-  }
-  return Bits<kUnit>(any) != 0;
+  return AreReached<kUnit, 3>(groups(), ScaledTo(cube.low), ScaledTo(cube.high));
 }
 
 WELLSPACE_AVX2 bool Polyhedron::ReachesAvx2(const Box<3>& cube) const { return ReachesWith<VectorUnit::kAvx2>(cube); }

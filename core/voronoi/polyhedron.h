@@ -14,30 +14,22 @@
 #include "core/geometry/point.h"
 #include "core/geometry/power_predicate.h"
 #include "core/voronoi/cell_parts.h"
+#include "core/voronoi/float_cell.h"
 #include "core/voronoi/lanes.h"
 #include "core/voronoi/star.h"
 
 namespace wellspace::core {
 
-template <int D>
-struct FloatBisector;
-
 // Polytope<3>, to which its functions that are not told about here belong: a simple polyhedron, kept as its dual, a triangulated sphere. A node
 // is a triangle of three planes; a cut takes a disk of triangles out, and joins its rim to the new plane. Which triangle is beside
-// which need not be known for that. While cuts are made nodes are floats, in units of about the reach that the cell began with; what
-// these leave in doubt is decided in doubles, then exactly.
+// which need not be known for that. What floats leave in doubt is decided exactly.
 //
 // Thread safety: thread-compatible. Reused from site to site: no allocation once warm.
 // Invariants: the nodes are those that exact arithmetic and the tie rule give, whatever the rounding.
-class Polyhedron {
+class Polyhedron : public FloatCell<3> {
  public:
-  static constexpr size_t kMostNodes = size_t{1} << 14;
-  static constexpr size_t kMostPlanes = size_t{1} << 15;
-  // So many nodes are worked on together.
-  static constexpr size_t kTogether = 8;
-
   // Works with `unit`, which this processor has; the best there is unless told.
-  explicit Polyhedron(VectorUnit unit = BestVectorUnit()) : unit_(unit) {}
+  explicit Polyhedron(VectorUnit unit = BestVectorUnit()) : FloatCell(unit) {}
 
   void Reset(const Point<3>& site, const Box<3>& bounds, const std::array<PlaneKind, 6>& kinds, TieRule rule);
 
@@ -54,22 +46,7 @@ class Polyhedron {
   // The nodes that may be asked for then do not tell their neighbours.
   bool PlaceUnlessKeeps(double ratio);
   bool Reaches(const Box<3>& cube) const;
-  bool IsTooLarge() const { return count_ > kMostNodes || plane_count_ > kMostPlanes; }
   void FindStar(Star<3>& out) const;
-  FaceMask FacesOf(const CellNode<3>& node) const { return core::FacesOf<3>(planes_, node); }
-
-  const Point<3>& site() const { return site_; }
-  void Tighten() {}  // it always is
-  double reach_sq() const {
-    const double reach = std::min(most_radius_ * unit_length_, placed_reach_);
-    return reach * reach;
-  }
-  double CutLimitSq() const { return 4 * (1 + 0x1p-49) * reach_sq(); }
-  std::span<const CellNode<3>> nodes() const { return nodes_; }
-  const Plane<3>& plane(int index) const { return planes_[index]; }
-  int plane_count() const { return static_cast<int>(plane_count_); }
-  uint64_t cuts() const { return cuts_; }
-  const DecisionCounters& counters() const { return counters_; }
   uint64_t MemoryBytes() const;
 
  private:
@@ -124,28 +101,13 @@ class Polyhedron {
   bool ReachesAvx2(const Box<3>& cube) const;
   void SetReach();
   bool IsRemoved(size_t node) const { return (removed_words_[node / kWordBits] >> node % kWordBits & 1) != 0; }
-  Point<3> PositionOf(size_t node) const;  // in the units of the nodes, as the next
-  Point<3> ScaledTo(const Point<3>& p) const;
+  Point<3> PositionOf(size_t node) const;  // in the units of the nodes
   std::span<const Group> groups() const { return {groups_.data(), (count_ + kTogether - 1) / kTogether}; }
 
-  VectorUnit unit_;
-  Point<3> site_;
-  TieRule rule_ = TieRule::kKeep;
-  double scale_ = 1;         // the units of the nodes, so many to one of the coordinates, a power of two
-  double unit_length_ = 1;   // 1 / scale_
-  float most_radius_ = 0;    // at least the distance from the site to the farthest node, in the units of the nodes
-  double placed_reach_ = 0;  // the same of the nodes that were placed last, in those of the coordinates
-  size_t count_ = 0;
   std::vector<Group> groups_;        // and more
   std::vector<Triangle> triangles_;  // by node, and more
-  size_t plane_count_ = 0;
-  std::vector<Plane<3>> planes_;    // and more
-  std::vector<Row> rows_;           // by plane, and more
-  std::vector<float> edge_sq_;      // by plane, and more: of a bisector the square of its vertex' distance, else 0
-  bool is_placed_ = false;          // all nodes are, and know their neighbours
-  std::vector<CellNode<3>> nodes_;  // as of the last that placed any
-  uint64_t cuts_ = 0;
-  DecisionCounters counters_;
+  std::vector<Row> rows_;            // by plane, and more
+  std::vector<float> edge_sq_;       // by plane, and more: of a bisector the square of its vertex' distance, else 0
 
   // Scratch of cuts; arrays only grow.
   std::vector<uint64_t> removed_words_;  // by node a bit for whether it is cut off
@@ -157,8 +119,8 @@ class Polyhedron {
   // By plane, one of the first kWordBits, a bit for each to which, and from which, an edge of a triangle that goes leads; all 0 between cuts.
   std::array<uint64_t, kWordBits> leads_to_{};
   std::array<uint64_t, kWordBits> leads_from_{};
-  std::vector<uint32_t>
-      ends_;  // of FindNeighbours, by two of the first kWordBits planes: an end of the edge along both; all 0 between calls
+  // Of FindNeighbours, by two of the first kWordBits planes: an end of the edge along both; all 0 between calls.
+  std::vector<uint32_t> ends_;
   std::vector<std::array<uint32_t, 3>> edges_;  // where there are many
 };
 
