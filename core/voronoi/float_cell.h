@@ -137,11 +137,11 @@ class FloatCell {
   VectorUnit unit_;
   Point<D> site_;
   TieRule rule_ = TieRule::kKeep;
-  double scale_ = 1;         // the units of the nodes, so many to one of the coordinates, a power of two
-  double unit_length_ = 1;   // 1 / scale_
-  float most_radius_ = 0;    // at least the distance from the site to the farthest node, in the units of the nodes
-  double placed_reach_ = 0;  // the same of the nodes that were placed last, in those of the coordinates
-  size_t count_ = 0;         // of the nodes
+  double scale_ = 1;              // the units of the nodes, so many to one of the coordinates, a power of two
+  double unit_length_ = 1;        // 1 / scale_
+  float most_radius_ = 0;         // at least the distance from the site to the farthest node, in the units of the nodes
+  double placed_reach_ = 0;       // the same of the nodes that were placed last, in those of the coordinates
+  size_t count_ = 0;              // of the nodes
   std::vector<Plane<D>> planes_;  // and more
   size_t plane_count_ = 0;
   bool is_placed_ = false;          // all nodes are

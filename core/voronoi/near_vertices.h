@@ -47,22 +47,123 @@ inline constexpr float kPowerError = D == 2 ? 0x1p-18f : 0x1p-17f;
 inline constexpr double kSurely = 0x1p-17;
 
 WELLSPACE_INLINE Floats Load(const float* items) { return *reinterpret_cast<const Floats*>(items); }
-WELLSPACE_INLINE void Store(const Floats& items, float* to) { *reinterpret_cast<Floats*>(to) = items; }
+WELLSPACE_INLINE Floats& VectorAt(float* items) { return *reinterpret_cast<Floats*>(items); }
+WELLSPACE_INLINE FloatMask& VectorAt(int32_t* items) { return *reinterpret_cast<FloatMask*>(items); }
 WELLSPACE_INLINE Floats Splat(float x) { return x + Floats{}; }
 WELLSPACE_INLINE FloatMask Splat(int32_t x) { return x + FloatMask{}; }
 
 inline constexpr FloatMask kEachLane = {0, 1, 2, 3, 4, 5, 6, 7};
 
+// Comparisons and choices, half a vector at a time where the processor has no whole ones: of these the compiler would make scalars.
+using HalfFloats = float __attribute__((vector_size(16), may_alias));
+using HalfMask = int32_t __attribute__((vector_size(16), may_alias));
+
+template <VectorUnit kUnit, typename Compare>
+WELLSPACE_INLINE FloatMask Compared(const Floats& a, const Floats& b, Compare compare) {
+  if constexpr (kUnit == VectorUnit::kAvx2) {
+    return compare(a, b);
+  } else {
+    FloatMask result;
+    for (size_t half = 0; half < 2; ++half) {
+      reinterpret_cast<HalfMask*>(&result)[half] =
+          compare(reinterpret_cast<const HalfFloats*>(&a)[half], reinterpret_cast<const HalfFloats*>(&b)[half]);
+    }
+    return result;
+  }
+}
+template <VectorUnit kUnit>
+WELLSPACE_INLINE FloatMask IsLess(const Floats& a, const Floats& b) {
+  return Compared<kUnit>(
+      a, b, [](const auto& x, const auto& y) __attribute__((always_inline)) { return x < y; });
+}
+template <VectorUnit kUnit>
+WELLSPACE_INLINE FloatMask IsAtMost(const Floats& a, const Floats& b) {
+  return Compared<kUnit>(
+      a, b, [](const auto& x, const auto& y) __attribute__((always_inline)) { return x <= y; });
+}
+template <VectorUnit kUnit, typename Compare>
+WELLSPACE_INLINE FloatMask Compared(const FloatMask& a, const FloatMask& b, Compare compare) {
+  if constexpr (kUnit == VectorUnit::kAvx2) {
+    return compare(a, b);
+  } else {
+    FloatMask result;
+    for (size_t half = 0; half < 2; ++half) {
+      reinterpret_cast<HalfMask*>(&result)[half] =
+          compare(reinterpret_cast<const HalfMask*>(&a)[half], reinterpret_cast<const HalfMask*>(&b)[half]);
+    }
+    return result;
+  }
+}
+template <VectorUnit kUnit>
+WELLSPACE_INLINE FloatMask IsLess(const FloatMask& a, const FloatMask& b) {
+  return Compared<kUnit>(
+      a, b, [](const auto& x, const auto& y) __attribute__((always_inline)) { return x < y; });
+}
+template <VectorUnit kUnit>
+WELLSPACE_INLINE FloatMask IsEqual(const FloatMask& a, const FloatMask& b) {
+  return Compared<kUnit>(
+      a, b, [](const auto& x, const auto& y) __attribute__((always_inline)) { return x == y; });
+}
+// `a` where the mask is set, else `b`.
+template <VectorUnit kUnit>
+WELLSPACE_INLINE FloatMask Choose(const FloatMask& mask, const FloatMask& a, const FloatMask& b) {
+  if constexpr (kUnit == VectorUnit::kAvx2) {
+    return mask ? a : b;
+  } else {
+    return b ^ ((a ^ b) & mask);
+  }
+}
+template <VectorUnit kUnit>
+WELLSPACE_INLINE Floats Choose(const FloatMask& mask, const Floats& a, const Floats& b) {
+  if constexpr (kUnit == VectorUnit::kAvx2) {
+    return mask ? a : b;
+  } else {
+    return reinterpret_cast<Floats>(
+        Choose<kUnit>(mask, reinterpret_cast<const FloatMask&>(a), reinterpret_cast<const FloatMask&>(b)));
+  }
+}
+template <VectorUnit kUnit>
+WELLSPACE_INLINE Floats Max(const Floats& a, const Floats& b) {
+  if constexpr (kUnit == VectorUnit::kAvx2) {
+    return a > b ? a : b;
+  } else {
+    Floats result;
+    for (size_t half = 0; half < 2; ++half) {
+      const HalfFloats& x = reinterpret_cast<const HalfFloats*>(&a)[half];
+      const HalfFloats& y = reinterpret_cast<const HalfFloats*>(&b)[half];
+      reinterpret_cast<HalfFloats*>(&result)[half] = x > y ? x : y;
+    }
+    return result;
+  }
+}
+template <VectorUnit kUnit>
+WELLSPACE_INLINE Floats Min(const Floats& a, const Floats& b) {
+  if constexpr (kUnit == VectorUnit::kAvx2) {
+    return a < b ? a : b;
+  } else {
+    return -Max<kUnit>(-a, -b);
+  }
+}
+
+template <VectorUnit kUnit>
 WELLSPACE_INLINE float Largest(const Floats& items) {
-  Floats largest = items;
-  const auto with = [&](const FloatMask& order) __attribute__((always_inline)) {
-    const Floats other = __builtin_shuffle(largest, order);
-    largest = largest > other ? largest : other;
-  };
-  with(FloatMask{4, 5, 6, 7, 0, 1, 2, 3});
-  with(FloatMask{2, 3, 0, 1, 6, 7, 4, 5});
-  with(FloatMask{1, 0, 3, 2, 5, 4, 7, 6});
-  return largest[0];
+  if constexpr (kUnit == VectorUnit::kAvx2) {
+    Floats largest = items;
+    const auto with = [&](const FloatMask& order) __attribute__((always_inline)) {
+      const Floats other = __builtin_shuffle(largest, order);
+      largest = largest > other ? largest : other;
+    };
+    with(FloatMask{4, 5, 6, 7, 0, 1, 2, 3});
+    with(FloatMask{2, 3, 0, 1, 6, 7, 4, 5});
+    with(FloatMask{1, 0, 3, 2, 5, 4, 7, 6});
+    return largest[0];
+  } else {
+    float largest = items[0];
+    for (size_t lane = 1; lane < kFloatLanes; ++lane) {
+      largest = std::max(largest, items[lane]);
+    }
+    return largest;
+  }
 }
 
 // By the bits of the lanes that are kept: which lanes these are, in order.
@@ -159,7 +260,7 @@ WELLSPACE_INLINE void VectorsTo(const Point<3>* p, const Point<3>& site, double 
 }
 
 // The largest x . w of nodes in groups, of eight vectors w side by side.
-template <int D, typename Group>
+template <VectorUnit kUnit, int D, typename Group>
 WELLSPACE_INLINE Floats MostProducts(std::span<const Group> groups, const Floats* w) {
   Floats most = Splat(-std::numeric_limits<float>::infinity());
   for (const Group& group : groups) {
@@ -168,7 +269,7 @@ WELLSPACE_INLINE Floats MostProducts(std::span<const Group> groups, const Floats
       for (int axis = D - 2; axis >= 0; --axis) {
         product = w[axis] * group.x[axis][i] + product;
       }
-      most = most > product ? most : product;
+      most = Max<kUnit>(most, product);
     }
   }
   return most;
@@ -194,11 +295,10 @@ WELLSPACE_INLINE bool AreReached(std::span<const Group> groups, const Point<D>& 
       const Floats x = Load(group.x[axis]);
       const Floats least = Splat(static_cast<float>(low[axis]));
       const Floats most = Splat(static_cast<float>(high[axis]));
-      Floats p = x > least ? x : least;
-      p = p < most ? p : most;
+      const Floats p = Min<kUnit>(Max<kUnit>(x, least), most);
       power += p * (p - 2 * x);
     }
-    any |= power <= kPowerError<D> * RadiiSq<D>(group) + kUnderflow;
+    any |= IsAtMost<kUnit>(power, kPowerError<D> * RadiiSq<D>(group) + kUnderflow);
   }
   return Bits<kUnit>(any) != 0;
 }
@@ -222,7 +322,9 @@ struct alignas(sizeof(Floats)) NearVertices {
   template <VectorUnit kUnit, typename MayCut>
   WELLSPACE_INLINE void Pick(std::span<const Point<D>> positions, const VertexNames& names, VertexId site_name,
                              const Point<D>& site, double scale, float most_radius, MayCut may_cut) {
-    const float far = MostOffset<D>(most_radius);
+    const Floats far = Splat(MostOffset<D>(most_radius));
+    const FloatMask end = Splat(static_cast<int32_t>(positions.size()));
+    const FloatMask own = Splat(static_cast<int32_t>(Index(site_name)));
     const float error = kExcessError<D> * most_radius;
     FloatMask slots = kEachLane;
     for (size_t from = 0; from < positions.size(); from += kFloatLanes) {
@@ -238,11 +340,11 @@ struct alignas(sizeof(Floats)) NearVertices {
       }
       const Floats offsets = 0.5f * length_sq;
       const Floats lows = offsets - (error * length + kUnderflow);
-      FloatMask is_near = (offsets <= far) & (slots < static_cast<int32_t>(positions.size()));
+      FloatMask is_near = IsAtMost<kUnit>(offsets, far) & IsLess<kUnit>(slots, end);
       if (names.listed != nullptr) {
         FloatMask listed;
         std::memcpy(&listed, names.listed + from, sizeof(listed));
-        is_near &= listed != static_cast<int32_t>(Index(site_name));
+        is_near &= ~IsEqual<kUnit>(listed, own);
       }
       within_reach += static_cast<size_t>(std::popcount(Bits<kUnit>(is_near)));
       may_cut(vectors, lows, is_near);
@@ -263,7 +365,7 @@ struct alignas(sizeof(Floats)) NearVertices {
     }
     order[0] = 0;
     if (count > 1) {
-      FindOrder();
+      FindOrder<kUnit>();
     }
   }
 
@@ -291,6 +393,7 @@ struct alignas(sizeof(Floats)) NearVertices {
 
  private:
   // By counting those before each.
+  template <VectorUnit kUnit>
   WELLSPACE_INLINE void FindOrder() {
     constexpr int kNumberBits = 6;
     static_assert(kMost <= size_t{1} << kNumberBits);
@@ -300,7 +403,8 @@ struct alignas(sizeof(Floats)) NearVertices {
     for (size_t first = 0; first < count; first += kFloatLanes) {
       FloatMask own = *reinterpret_cast<const FloatMask*>(offset + first);
       own = (own >> kNumberBits << kNumberBits) | number;
-      own = number < static_cast<int32_t>(count) ? own : Splat(std::numeric_limits<int32_t>::max());
+      own = Choose<kUnit>(IsLess<kUnit>(number, Splat(static_cast<int32_t>(count))), own,
+                          Splat(std::numeric_limits<int32_t>::max()));
       *reinterpret_cast<FloatMask*>(keys + first) = own;
       number += static_cast<int32_t>(kFloatLanes);
     }
@@ -309,7 +413,7 @@ struct alignas(sizeof(Floats)) NearVertices {
       FloatMask before{};
       for (size_t i = 0; i < count; i += kFloatLanes) {
         for (size_t k = i; k < i + kFloatLanes; ++k) {
-          before -= Splat(keys[k]) < own;
+          before -= IsLess<kUnit>(Splat(keys[k]), own);
         }
       }
       for (size_t lane = 0; lane < kFloatLanes; ++lane) {

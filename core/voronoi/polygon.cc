@@ -21,7 +21,7 @@ void Polygon::Reset(const Point<2>& site, const Box<2>& bounds, const std::array
   BeginWalls(site, bounds, kinds, rule);
   // From the lower left corner on; the edge from there runs along the lower face of axis 1.
   static constexpr std::array<std::array<uint32_t, 2>, 4> kCorners = {{{0, 2}, {1, 2}, {1, 3}, {0, 3}}};
-  static constexpr std::array<uint32_t, 4> kEdges = {2, 1, 3, 0};
+  static constexpr std::array<int32_t, 4> kEdges = {2, 1, 3, 0};
   Group& group = groups_.front();
   group = {};
   count_ = 4;
@@ -30,7 +30,7 @@ void Polygon::Reset(const Point<2>& site, const Box<2>& bounds, const std::array
     group.x[1][i] = static_cast<float>(planes_[kCorners[i][1]].offset * scale_);
     group.plane[i] = kEdges[i];
   }
-  SetReach(Largest(RadiiSq<2>(group)));
+  SetReach(Largest<VectorUnit::kBaseline>(RadiiSq<2>(group)));
 }
 
 Point<2> Polygon::PositionOf(size_t node) const {
@@ -90,42 +90,37 @@ WELLSPACE_INLINE void Polygon::PlaceEnds(const Rest& rest, uint32_t plane, std::
   }
   ends[0].x = static_cast<float>(x[0]);
   ends[0].y = static_cast<float>(y[0]);
-  ends[0].plane = plane;
+  ends[0].plane = static_cast<int32_t>(plane);
   ends[1].x = static_cast<float>(x[1]);
   ends[1].y = static_cast<float>(y[1]);
-  ends[1].plane = along[1];
+  ends[1].plane = static_cast<int32_t>(along[1]);
   ends[1].edge_sq = groups_[before / kTogether].edge_sq[before % kTogether];
 }
 
 // Makes the rest and the ends the nodes; both before and after kTogether at most.
+template <VectorUnit kUnit>
 WELLSPACE_INLINE void Polygon::Replace(const Rest& rest, const std::array<Node, 2>& ends) {
   Group& group = groups_.front();
   const auto old_count = static_cast<int32_t>(count_);
   const auto kept = static_cast<int32_t>(rest.count);
   FloatMask from = kEachLane + static_cast<int32_t>(rest.first);
-  from = from - ((from >= old_count) & old_count);
-  const FloatMask is_first = kEachLane == kept;
-  const FloatMask is_second = kEachLane == kept + 1;
-  const FloatMask is_used = kEachLane < kept + 2;
-  const auto replace = [&](const Floats& old, float first, float second) __attribute__((always_inline)) {
-    Floats items = __builtin_shuffle(old, from);
-    items = is_first ? Splat(first) : items;
-    return is_second ? Splat(second) : items;
+  from = from - (~IsLess<kUnit>(from, Splat(old_count)) & old_count);
+  const FloatMask is_kept = IsLess<kUnit>(kEachLane, Splat(kept));
+  const FloatMask is_second = ~IsLess<kUnit>(kEachLane, Splat(kept + 1));
+  const FloatMask is_used = IsLess<kUnit>(kEachLane, Splat(kept + 2));
+  const auto replaced = [&](auto* column, auto first, auto second) __attribute__((always_inline)) {
+    return Choose<kUnit>(is_kept, __builtin_shuffle(VectorAt(column), from),
+                         Choose<kUnit>(is_second, Splat(second), Splat(first)));
   };
   const auto used = [&](const Floats& items) __attribute__((always_inline)) {
     return reinterpret_cast<Floats>(reinterpret_cast<FloatMask>(items) & is_used);
   };
-  const Floats x = used(replace(Load(group.x[0]), ends[0].x, ends[1].x));
-  const Floats y = used(replace(Load(group.x[1]), ends[0].y, ends[1].y));
-  Store(x, group.x[0]);
-  Store(y, group.x[1]);
-  Store(replace(Load(group.edge_sq), ends[0].edge_sq, ends[1].edge_sq), group.edge_sq);
-  FloatMask plane = __builtin_shuffle(*reinterpret_cast<const FloatMask*>(group.plane), from);
-  plane = is_first ? Splat(static_cast<int32_t>(ends[0].plane)) : plane;
-  plane = is_second ? Splat(static_cast<int32_t>(ends[1].plane)) : plane;
-  *reinterpret_cast<FloatMask*>(group.plane) = plane;
+  VectorAt(group.x[0]) = used(replaced(group.x[0], ends[0].x, ends[1].x));
+  VectorAt(group.x[1]) = used(replaced(group.x[1], ends[0].y, ends[1].y));
+  VectorAt(group.edge_sq) = replaced(group.edge_sq, ends[0].edge_sq, ends[1].edge_sq);
+  VectorAt(group.plane) = replaced(group.plane, ends[0].plane, ends[1].plane);
   count_ = rest.count + 2;
-  SetReach(Largest(x * x + y * y));
+  SetReach(Largest<kUnit>(RadiiSq<2>(group)));
 }
 
 [[gnu::noinline]] void Polygon::ReplaceAmongMany(const Rest& rest, const std::array<Node, 2>& ends) {
@@ -168,7 +163,7 @@ template <VectorUnit kUnit>
 WELLSPACE_INLINE bool Polygon::FindRest(const FloatBisector<2>& bisector, const Floats& most, uint32_t maybe,
                                         const Point<2>& position, Rest& rest) {
   const auto count = static_cast<uint32_t>(count_);
-  uint32_t removed = Bits<kUnit>(most > 2 * (bisector.offset - bisector.low)) & maybe;
+  uint32_t removed = Bits<kUnit>(IsLess<kUnit>(Splat(2 * (bisector.offset - bisector.low)), most)) & maybe;
   if (removed != maybe) [[unlikely]] {
     removed |= DecideDoubtful(0, maybe & ~removed, position);
     if (removed == 0) {
@@ -232,7 +227,7 @@ WELLSPACE_INLINE bool Polygon::CutOff(const FloatBisector<2>& bisector, VertexId
   PlaceEnds(rest, static_cast<uint32_t>(index), ends);
   ends[0].edge_sq = 2 * bisector.offset;
   if (count_ <= kTogether && rest.count + 2 <= kTogether) {
-    Replace(rest, ends);
+    Replace<kUnit>(rest, ends);
   } else {
     ReplaceAmongMany(rest, ends);
   }
@@ -247,13 +242,12 @@ WELLSPACE_INLINE size_t Polygon::CutByEachWith(std::span<const Point<2>> positio
       positions, names, site, site_, scale_,
       most_radius_, [this](const Floats* w, const Floats& low, FloatMask& is_near) __attribute__((always_inline)) {
         if (cuts_ != 0) {  // most miss the cell, now and later
-          is_near &= MostProducts<2>(groups(), w) >= low;
+          is_near &= IsAtMost<kUnit>(low, MostProducts<kUnit, 2>(groups(), w));
         }
       });
   near.CutInOrder(
-      [&](const FloatBisector<2>& bisector, size_t slot) __attribute__((always_inline)) {
-        return CutOff<kUnit>(bisector, names[slot], positions[slot]);
-      },
+      [&](const FloatBisector<2>& bisector, size_t slot)
+          __attribute__((always_inline)) { return CutOff<kUnit>(bisector, names[slot], positions[slot]); },
       [this] { return IsTooLarge() ? -1 : MostOffset<2>(most_radius_); });
   return near.within_reach;
 }
@@ -326,10 +320,10 @@ WELLSPACE_INLINE bool Polygon::KeepsRatioWith(double ratio) const {
     before = before < 0 ? Splat(static_cast<int32_t>(count_ - 1)) : before;
     const Floats from = Load(group.edge_sq);
     const Floats to = __builtin_shuffle(from, before);
-    const Floats nearest_sq = from < to ? from : to;
+    const Floats nearest_sq = Min<kUnit>(from, to);
     const Floats radius_sq = Load(group.x[0]) * Load(group.x[0]) + Load(group.x[1]) * Load(group.x[1]);
     const uint32_t all = (1u << count_) - 1;
-    return (Bits<kUnit>(radius_sq + kUnderflow <= ratio_sq * nearest_sq) & all) == all;
+    return (Bits<kUnit>(IsAtMost<kUnit>(radius_sq + kUnderflow, ratio_sq * nearest_sq)) & all) == all;
   }
   for (size_t i = 0; i < count_; ++i) {
     const size_t before = Before(i);

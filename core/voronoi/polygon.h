@@ -54,13 +54,13 @@ class Polygon : public FloatCell<2> {
   struct alignas(kTogether * sizeof(float)) Group {
     float x[2][kTogether];
     float edge_sq[kTogether];
-    uint32_t plane[kTogether];
+    int32_t plane[kTogether];
   };
   struct Node {
     float x;
     float y;
     float edge_sq;
-    uint32_t plane;
+    int32_t plane;
   };
   // What is left of the nodes: so many from there on, around.
   struct Rest {
@@ -81,6 +81,7 @@ class Polygon : public FloatCell<2> {
   bool FindRestOfMany(const FloatBisector<2>& bisector, const Point<2>& position, Rest& rest);
   uint32_t DecideDoubtful(size_t first, uint32_t doubtful, const Point<2>& generator);
   void PlaceEnds(const Rest& rest, uint32_t plane, std::array<Node, 2>& ends) const;
+  template <VectorUnit kUnit>
   void Replace(const Rest& rest, const std::array<Node, 2>& ends);
   void ReplaceAmongMany(const Rest& rest, const std::array<Node, 2>& ends);
   template <VectorUnit kUnit>
@@ -92,7 +93,9 @@ class Polygon : public FloatCell<2> {
   void SetReach(float radius_sq);
   Point<2> PositionOf(size_t node) const;  // in the units of the nodes
   std::span<const Group> groups() const { return {groups_.data(), (count_ + kTogether - 1) / kTogether}; }
-  uint32_t PlaneFrom(size_t node) const { return groups_[node / kTogether].plane[node % kTogether]; }
+  uint32_t PlaneFrom(size_t node) const {
+    return static_cast<uint32_t>(groups_[node / kTogether].plane[node % kTogether]);
+  }
   size_t Before(size_t node) const { return (node == 0 ? count_ : node) - 1; }
 
   std::vector<Group> groups_;        // and more

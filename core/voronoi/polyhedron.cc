@@ -32,14 +32,15 @@ WELLSPACE_INLINE void Transpose(const Four& a, const Four& b, const Four& c, con
 }  // namespace
 
 // Brings the reach down to what the nodes tell.
+template <VectorUnit kUnit>
 WELLSPACE_INLINE void Polyhedron::SetReach() {
   Floats most_sq{};
   for (const Group& group : groups()) {
     const Floats radius_sq = RadiiSq<3>(group);
-    most_sq = most_sq > radius_sq ? most_sq : radius_sq;
+    most_sq = Max<kUnit>(most_sq, radius_sq);
   }
   most_radius_ =
-      std::min(most_radius_, std::sqrt(Largest(most_sq)) * (1 + kDistanceError<3>));  // the cell only shrinks
+      std::min(most_radius_, std::sqrt(Largest<kUnit>(most_sq)) * (1 + kDistanceError<3>));  // the cell only shrinks
 }
 
 void Polyhedron::Reset(const Point<3>& site, const Box<3>& bounds, const std::array<PlaneKind, 6>& kinds,
@@ -76,7 +77,7 @@ void Polyhedron::Reset(const Point<3>& site, const Box<3>& bounds, const std::ar
     }
     triangles_[corner] = {faces};
   }
-  SetReach();
+  SetReach<VectorUnit::kBaseline>();
 }
 
 // Finds the nodes that are cut off; whether there are any.
@@ -94,7 +95,7 @@ WELLSPACE_INLINE bool Polyhedron::FindRemoved(const FloatBisector<3>& bisector, 
   if (Bits<kUnit>(are_within) == 0xff) {
     return false;
   }
-  const float surely_from = 2 * (bisector.offset - bisector.low);
+  const Floats surely_from = Splat(2 * (bisector.offset - bisector.low));
   const Group* group = groups_.data();
   uint64_t any = 0;
   size_t left = count_;
@@ -106,7 +107,7 @@ WELLSPACE_INLINE bool Polyhedron::FindRemoved(const FloatBisector<3>& bisector, 
     for (size_t node = 0; node < nodes; node += kTogether, ++group) {
       const Floats most = most_of(*group);
       maybe |= uint64_t{Bits<kUnit>(reinterpret_cast<const FloatMask&>(most)) ^ 0xff} << node;
-      surely |= uint64_t{Bits<kUnit>(most > surely_from)} << node;
+      surely |= uint64_t{Bits<kUnit>(IsLess<kUnit>(surely_from, most))} << node;
     }
     const uint64_t all = ~uint64_t{0} >> (kWordBits - nodes);
     maybe &= all;
@@ -370,7 +371,7 @@ WELLSPACE_INLINE bool Polyhedron::CutOff(const FloatBisector<3>& bisector, Verte
   FindRim();
   PlaceOnRim(static_cast<uint32_t>(index));
   Replace(static_cast<uint32_t>(index));
-  SetReach();
+  SetReach<kUnit>();
   return true;
 }
 
@@ -382,13 +383,12 @@ WELLSPACE_INLINE size_t Polyhedron::CutByEachWith(std::span<const Point<3>> posi
       positions, names, site, site_, scale_,
       most_radius_, [this](const Floats* w, const Floats& low, FloatMask& is_near) __attribute__((always_inline)) {
         if (cuts_ != 0 && Bits<kUnit>(is_near) != 0) {  // most miss the cell, now and later
-          is_near &= MostProducts<3>(groups(), w) >= low;
+          is_near &= IsAtMost<kUnit>(low, MostProducts<kUnit, 3>(groups(), w));
         }
       });
   near.CutInOrder(
-      [&](const FloatBisector<3>& bisector, size_t slot) __attribute__((always_inline)) {
-        return CutOff<kUnit>(bisector, names[slot], positions[slot]);
-      },
+      [&](const FloatBisector<3>& bisector, size_t slot)
+          __attribute__((always_inline)) { return CutOff<kUnit>(bisector, names[slot], positions[slot]); },
       [this] { return IsTooLarge() ? -1 : MostOffset<3>(most_radius_); });
   return near.within_reach;
 }
@@ -535,7 +535,7 @@ WELLSPACE_INLINE bool Polyhedron::KeepsRatioWith(float ratio_sq) const {
     const Floats radius_sq = RadiiSq<3>(group);
     const uint32_t all = left < kTogether ? (1u << left) - 1 : 0xff;
     left -= std::min(left, kTogether);
-    if ((Bits<kUnit>(radius_sq + kUnderflow <= ratio_sq * Load(group.edge_sq)) & all) != all) {
+    if ((Bits<kUnit>(IsAtMost<kUnit>(radius_sq + kUnderflow, ratio_sq * Load(group.edge_sq))) & all) != all) {
       return false;
     }
   }

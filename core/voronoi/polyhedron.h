@@ -99,6 +99,7 @@ class Polyhedron : public FloatCell<3> {
   template <VectorUnit kUnit>
   bool ReachesWith(const Box<3>& cube) const;
   bool ReachesAvx2(const Box<3>& cube) const;
+  template <VectorUnit kUnit>
   void SetReach();
   bool IsRemoved(size_t node) const { return (removed_words_[node / kWordBits] >> node % kWordBits & 1) != 0; }
   Point<3> PositionOf(size_t node) const;  // in the units of the nodes
