@@ -168,7 +168,7 @@ struct alignas(kCacheLines) Packet {
   std::vector<Foreseen> foreseen;  // by vertex
   std::vector<Step> steps;
   std::vector<InsertionRequest<D>> requests;
-  std::vector<Point<D>> inserted;  // by request; with room up to PaddedCount
+  std::vector<Point<D>> inserted;  // by request; with room to be read beyond the last (Buckets::kReadTogether)
   std::vector<Mention> mentions;
   std::vector<WatchedNode<D>> watched;
   Star<D> simplices;  // of the stars of good cells

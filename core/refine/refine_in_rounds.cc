@@ -11,7 +11,6 @@
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
 #include "core/refine/refine.h"
-#include "core/voronoi/lanes.h"
 
 namespace wellspace::core {
 namespace {
@@ -255,7 +254,10 @@ void Refinement<D>::ForeseeOne(Packet<D>& packet, size_t at, Workspace<D>& works
     }
     const VertexId x{packet.first_new + static_cast<uint32_t>(packet.inserted.size())};
     packet.requests.push_back(*request);
-    packet.inserted.reserve(PaddedCount(packet.inserted.size() + 1) + LeafTree<D>::Buckets::kReadTogether);
+    const size_t needed = packet.inserted.size() + LeafTree<D>::Buckets::kReadTogether;
+    if (packet.inserted.capacity() < needed) {
+      packet.inserted.reserve(2 * needed);
+    }
     packet.inserted.push_back(request->point.position);
     cell.CutBeforePlace(x, request->point.position);
   }

@@ -12,6 +12,7 @@
 #include "core/voronoi/near_vertices.h"
 
 namespace wellspace::core {
+
 // Takes note of the largest squared distance of a node, in floats.
 WELLSPACE_INLINE void Polygon::SetReach(float radius_sq) {
   most_radius_ = std::min(most_radius_, std::sqrt(radius_sq) * (1 + kDistanceError<2>));  // the cell only shrinks

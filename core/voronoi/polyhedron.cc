@@ -36,8 +36,7 @@ template <VectorUnit kUnit>
 WELLSPACE_INLINE void Polyhedron::SetReach() {
   Floats most_sq{};
   for (const Group& group : groups()) {
-    const Floats radius_sq = RadiiSq<3>(group);
-    most_sq = Max<kUnit>(most_sq, radius_sq);
+    most_sq = Max<kUnit>(most_sq, RadiiSq<3>(group));
   }
   most_radius_ =
       std::min(most_radius_, std::sqrt(Largest<kUnit>(most_sq)) * (1 + kDistanceError<3>));  // the cell only shrinks
@@ -127,7 +126,7 @@ Point<3> Polyhedron::PositionOf(size_t node) const {
   return {group.x[0][lane], group.x[1][lane], group.x[2][lane]};
 }
 
-// Of the nodes that the bits of `doubtful`, of a word, stand for: those that are cut off, by its own error if that tells, else exactly.
+// Of the nodes that the bits of `doubtful`, of a word, stand for: those that are cut off, by their own errors if those tell, else exactly.
 [[gnu::noinline]] uint64_t Polyhedron::DecideDoubtful(size_t word, uint64_t doubtful, const Point<3>& generator) {
   const Point<3> w = ScaledTo(generator);
   const double length_sq = NormSq<3>(w);
@@ -583,7 +582,7 @@ uint64_t Polyhedron::MemoryBytes() const {
   return groups_.capacity() * sizeof(Group) + triangles_.capacity() * sizeof(Triangle) +
          planes_.capacity() * (sizeof(Plane<3>) + sizeof(Row) + sizeof(float)) +
          nodes_.capacity() * sizeof(CellNode<3>) + rim_.capacity() * (sizeof(RimEdge) + 3 * sizeof(float)) +
-         removed_.capacity() * sizeof(uint32_t) + edges_.capacity() * sizeof(edges_[0]);
+         (removed_.capacity() + ends_.capacity()) * sizeof(uint32_t) + edges_.capacity() * sizeof(edges_[0]);
 }
 
 }  // namespace wellspace::core

@@ -61,7 +61,8 @@ class Polytope {
   // The same by vertices, as many as a leaf holds at most, the nearest first: far ones then seldom cut. The cell's own, `site`, may be among
   // them. Returns how many others are within reach.
   //
-  // REQUIRES:   positions and listed names may be read up to Buckets::kReadTogether of them.
+  // REQUIRES:   positions and listed names may be read so many together, beyond the last perhaps, as those of a leaf
+  //             (Buckets::kReadTogether).
   // Complexity: O(positions nodes), and the cuts; no allocation once warm.
   // Errors:     none.
   size_t CutByEach(std::span<const Point<D>> positions, const VertexNames& names, VertexId site);

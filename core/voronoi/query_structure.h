@@ -117,7 +117,7 @@ class QueryStructure {
   // The same, ties perturbed, for whoever may not need the nodes: they are still to be placed, by cell.Place(). The cell is cut by `others`, too, vertices
   // numbered from `first_other` on that the structure does not hold.
   //
-  // REQUIRES:   others may be read up to PaddedCount of them.
+  // REQUIRES:   others may be read so many together, beyond the last perhaps, as vertices of a leaf (Buckets::kReadTogether).
   void UnplacedClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace, std::span<const Point<D>> others = {},
                               VertexId first_other = kNoVertex) const;
 
