@@ -3,6 +3,8 @@
 #define WELLSPACE_CORE_VORONOI_CELL_PARTS_H_
 
 #include <array>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <type_traits>
@@ -11,6 +13,7 @@
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
 #include "core/geometry/power_predicate.h"
+#include "core/voronoi/lanes.h"
 
 namespace wellspace::core {
 
@@ -51,6 +54,36 @@ struct Plane {
   double distance = 0;    // of the plane from the site, |offset| / length
   PlaneSource<D> source;  // exact
 };
+
+// Makes `plane` the wall on face `face` of `bounds`.
+template <int D>
+void SetWall(const Point<D>& site, const Box<D>& bounds, int face, PlaneKind kind, Plane<D>& plane) {
+  const int axis = face / 2;
+  plane.kind = kind;
+  plane.face = static_cast<uint8_t>(face);
+  plane.vertex = kNoVertex;
+  plane.normal = {};
+  plane.normal[axis] = 1;
+  plane.length = 1;
+  plane.source.axis = axis;
+  plane.source.coordinate = bounds.FaceCoordinate(face);
+  plane.offset = plane.source.coordinate - site[axis];
+  plane.distance = std::abs(plane.offset);
+}
+
+// Makes `plane` the bisector of the site and `u` at `position` = site + normal, for length_sq = NormSq<D>(normal).
+template <int D>
+WELLSPACE_INLINE void SetBisector(VertexId u, const Point<D>& position, const Point<D>& normal, double length_sq,
+                                  Plane<D>& plane) {
+  plane.kind = PlaneKind::kBisector;
+  plane.vertex = u;
+  plane.normal = normal;
+  plane.offset = 0.5 * length_sq;
+  plane.length = std::sqrt(length_sq);
+  plane.distance = 0.5 * plane.length;
+  plane.source.generator = position;
+  plane.source.axis = -1;
+}
 
 // Numbers the nodes of a cell: a mesh in 6-D has cells of more than 2^16.
 template <int D>

@@ -34,7 +34,7 @@ class FloatCell {
   static constexpr size_t kMostNodes = size_t{1} << 14;
   static constexpr size_t kMostPlanes = size_t{1} << 15;
   // So many nodes are worked on together.
-  static constexpr size_t kTogether = 8;
+  static constexpr size_t kTogether = kFloatLanes;
 
   bool IsTooLarge() const { return count_ > kMostNodes || plane_count_ > kMostPlanes; }
   FaceMask FacesOf(const CellNode<D>& node) const { return core::FacesOf<D>(planes_, node); }
@@ -55,6 +55,9 @@ class FloatCell {
  protected:
   explicit FloatCell(VectorUnit unit) : unit_(unit) {}
 
+  // How many groups of kTogether hold `count` nodes.
+  static constexpr size_t GroupsFor(size_t count) { return (count + kTogether - 1) / kTogether; }
+
   // Forgets the cell before, and takes the walls for planes.
   void BeginWalls(const Point<D>& site, const Box<D>& bounds, const std::array<PlaneKind, 2 * D>& kinds, TieRule rule) {
     site_ = site;
@@ -65,19 +68,8 @@ class FloatCell {
     plane_count_ = 2 * D;
     double longest = 0;
     for (int face = 0; face < 2 * D; ++face) {
-      const int axis = face / 2;
-      Plane<D>& plane = planes_[face];
-      plane.kind = kinds[face];
-      plane.face = static_cast<uint8_t>(face);
-      plane.vertex = kNoVertex;
-      plane.normal = {};
-      plane.normal[axis] = 1;
-      plane.length = 1;
-      plane.source.axis = axis;
-      plane.source.coordinate = bounds.FaceCoordinate(face);
-      plane.offset = plane.source.coordinate - site[axis];
-      plane.distance = std::abs(plane.offset);
-      longest = std::max(longest, plane.distance);
+      SetWall<D>(site, bounds, face, kinds[face], planes_[face]);
+      longest = std::max(longest, planes_[face].distance);
     }
     // The power of two below the longest, and one over it.
     constexpr int kMantissaBits = std::numeric_limits<double>::digits - 1;
@@ -99,16 +91,8 @@ class FloatCell {
     if (planes_.size() < plane_count_) {
       planes_.resize(2 * plane_count_);
     }
-    Plane<D>& plane = planes_[index];
-    plane.kind = PlaneKind::kBisector;
-    plane.vertex = u;
-    plane.normal = Difference<D>(position, site_);
-    const double length_sq = NormSq<D>(plane.normal);
-    plane.offset = 0.5 * length_sq;
-    plane.length = std::sqrt(length_sq);
-    plane.distance = 0.5 * plane.length;
-    plane.source.generator = position;
-    plane.source.axis = -1;
+    const Point<D> normal = Difference<D>(position, site_);
+    SetBisector<D>(u, position, normal, NormSq<D>(normal), planes_[index]);
     return index;
   }
 

@@ -38,12 +38,11 @@ WELLSPACE_INLINE uint32_t Bits(const FloatMask& mask) {
   if constexpr (kUnit == VectorUnit::kAvx2) {
     return static_cast<uint32_t>(__builtin_ia32_movmskps256(reinterpret_cast<const Floats&>(mask)));
   }
-  using Half = float __attribute__((vector_size(16), may_alias));
-  const auto* halves = reinterpret_cast<const Half*>(&mask);
+  const auto* halves = reinterpret_cast<const HalfFloats*>(&mask);
   return static_cast<uint32_t>(__builtin_ia32_movmskps(halves[0]) | __builtin_ia32_movmskps(halves[1]) << 4);
 #else
   uint32_t bits = 0;
-  for (size_t lane = 0; lane < 8; ++lane) {
+  for (size_t lane = 0; lane < kFloatLanes; ++lane) {
     bits |= (mask[lane] < 0 ? 1u : 0u) << lane;
   }
   return bits;

@@ -60,6 +60,9 @@ struct Wide<4> {
 // Eight floats, and what a comparison of them gives: one vector with AVX2, else two.
 using Floats = float __attribute__((vector_size(32), may_alias));
 using FloatMask = int32_t __attribute__((vector_size(32), may_alias));
+inline constexpr size_t kFloatLanes = 8;
+using HalfFloats = float __attribute__((vector_size(16), may_alias));
+using HalfMask = int32_t __attribute__((vector_size(16), may_alias));
 
 // The items of `column` from `from` on, as one vector.
 //

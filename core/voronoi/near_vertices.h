@@ -23,8 +23,6 @@
 
 namespace wellspace::core {
 
-inline constexpr size_t kFloatLanes = 8;
-
 // In units of u = 2^-24: a node x is wrong by at most kNodeError |x|. In the plane that is its rounding, and half of it from where it was computed in
 // doubles; in space it may lie at the end of an edge as short.
 template <int D>
@@ -45,6 +43,10 @@ template <int D>
 inline constexpr float kPowerError = D == 2 ? 0x1p-18f : 0x1p-17f;
 // A ratio is surely kept, whatever the rounding and whatever that of placed nodes (kPlaced), if it is by this share.
 inline constexpr double kSurely = 0x1p-17;
+inline float SurelyKeptRatioSq(double ratio) {
+  const double surely = ratio * (1 - kSurely);
+  return static_cast<float>(surely * surely);
+}
 
 WELLSPACE_INLINE Floats Load(const float* items) { return *reinterpret_cast<const Floats*>(items); }
 WELLSPACE_INLINE Floats& VectorAt(float* items) { return *reinterpret_cast<Floats*>(items); }
@@ -55,52 +57,34 @@ WELLSPACE_INLINE FloatMask Splat(int32_t x) { return x + FloatMask{}; }
 inline constexpr FloatMask kEachLane = {0, 1, 2, 3, 4, 5, 6, 7};
 
 // Comparisons and choices, half a vector at a time where the processor has no whole ones: of these the compiler would make scalars.
-using HalfFloats = float __attribute__((vector_size(16), may_alias));
-using HalfMask = int32_t __attribute__((vector_size(16), may_alias));
+WELLSPACE_INLINE const HalfFloats* HalvesOf(const Floats& items) { return reinterpret_cast<const HalfFloats*>(&items); }
+WELLSPACE_INLINE const HalfMask* HalvesOf(const FloatMask& items) { return reinterpret_cast<const HalfMask*>(&items); }
 
-template <VectorUnit kUnit, typename Compare>
-WELLSPACE_INLINE FloatMask Compared(const Floats& a, const Floats& b, Compare compare) {
+template <VectorUnit kUnit, typename Vector, typename Compare>
+WELLSPACE_INLINE FloatMask Compared(const Vector& a, const Vector& b, Compare compare) {
   if constexpr (kUnit == VectorUnit::kAvx2) {
     return compare(a, b);
   } else {
     FloatMask result;
     for (size_t half = 0; half < 2; ++half) {
-      reinterpret_cast<HalfMask*>(&result)[half] =
-          compare(reinterpret_cast<const HalfFloats*>(&a)[half], reinterpret_cast<const HalfFloats*>(&b)[half]);
+      reinterpret_cast<HalfMask*>(&result)[half] = compare(HalvesOf(a)[half], HalvesOf(b)[half]);
     }
     return result;
   }
 }
-template <VectorUnit kUnit>
-WELLSPACE_INLINE FloatMask IsLess(const Floats& a, const Floats& b) {
+// The items of a and b are both floats, or both integers.
+template <VectorUnit kUnit, typename Vector>
+WELLSPACE_INLINE FloatMask IsLess(const Vector& a, const Vector& b) {
   return Compared<kUnit>(
       a, b, [](const auto& x, const auto& y) __attribute__((always_inline)) { return x < y; });
 }
-template <VectorUnit kUnit>
-WELLSPACE_INLINE FloatMask IsAtMost(const Floats& a, const Floats& b) {
+template <VectorUnit kUnit, typename Vector>
+WELLSPACE_INLINE FloatMask IsAtMost(const Vector& a, const Vector& b) {
   return Compared<kUnit>(
       a, b, [](const auto& x, const auto& y) __attribute__((always_inline)) { return x <= y; });
 }
-template <VectorUnit kUnit, typename Compare>
-WELLSPACE_INLINE FloatMask Compared(const FloatMask& a, const FloatMask& b, Compare compare) {
-  if constexpr (kUnit == VectorUnit::kAvx2) {
-    return compare(a, b);
-  } else {
-    FloatMask result;
-    for (size_t half = 0; half < 2; ++half) {
-      reinterpret_cast<HalfMask*>(&result)[half] =
-          compare(reinterpret_cast<const HalfMask*>(&a)[half], reinterpret_cast<const HalfMask*>(&b)[half]);
-    }
-    return result;
-  }
-}
-template <VectorUnit kUnit>
-WELLSPACE_INLINE FloatMask IsLess(const FloatMask& a, const FloatMask& b) {
-  return Compared<kUnit>(
-      a, b, [](const auto& x, const auto& y) __attribute__((always_inline)) { return x < y; });
-}
-template <VectorUnit kUnit>
-WELLSPACE_INLINE FloatMask IsEqual(const FloatMask& a, const FloatMask& b) {
+template <VectorUnit kUnit, typename Vector>
+WELLSPACE_INLINE FloatMask IsEqual(const Vector& a, const Vector& b) {
   return Compared<kUnit>(
       a, b, [](const auto& x, const auto& y) __attribute__((always_inline)) { return x == y; });
 }
@@ -129,8 +113,8 @@ WELLSPACE_INLINE Floats Max(const Floats& a, const Floats& b) {
   } else {
     Floats result;
     for (size_t half = 0; half < 2; ++half) {
-      const HalfFloats& x = reinterpret_cast<const HalfFloats*>(&a)[half];
-      const HalfFloats& y = reinterpret_cast<const HalfFloats*>(&b)[half];
+      const HalfFloats& x = HalvesOf(a)[half];
+      const HalfFloats& y = HalvesOf(b)[half];
       reinterpret_cast<HalfFloats*>(&result)[half] = x > y ? x : y;
     }
     return result;

@@ -134,7 +134,7 @@ WELLSPACE_INLINE void Polygon::Replace(const Rest& rest, const std::array<Node, 
   }
   around_.insert(around_.end(), ends.begin(), ends.end());
   count_ = around_.size();
-  const size_t groups = (count_ + kTogether - 1) / kTogether;
+  const size_t groups = GroupsFor(count_);
   if (groups_.size() < groups) {
     groups_.resize(2 * groups);
   }
@@ -313,16 +313,14 @@ bool Polygon::PlaceUnlessKeeps(double ratio) {
 
 template <VectorUnit kUnit>
 WELLSPACE_INLINE bool Polygon::KeepsRatioWith(double ratio) const {
-  const double surely = ratio * (1 - kSurely);
-  const auto ratio_sq = static_cast<float>(surely * surely);
+  const float ratio_sq = SurelyKeptRatioSq(ratio);
   if (count_ <= kTogether) {
     const Group& group = groups_.front();
-    FloatMask before = kEachLane - 1;
-    before = before < 0 ? Splat(static_cast<int32_t>(count_ - 1)) : before;
+    const FloatMask before = Choose<kUnit>(kEachLane == 0, Splat(static_cast<int32_t>(count_ - 1)), kEachLane - 1);
     const Floats from = Load(group.edge_sq);
     const Floats to = __builtin_shuffle(from, before);
     const Floats nearest_sq = Min<kUnit>(from, to);
-    const Floats radius_sq = Load(group.x[0]) * Load(group.x[0]) + Load(group.x[1]) * Load(group.x[1]);
+    const Floats radius_sq = RadiiSq<2>(group);
     const uint32_t all = (1u << count_) - 1;
     return (Bits<kUnit>(IsAtMost<kUnit>(radius_sq + kUnderflow, ratio_sq * nearest_sq)) & all) == all;
   }

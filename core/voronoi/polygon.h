@@ -92,7 +92,7 @@ class Polygon : public FloatCell<2> {
   bool ReachesAvx2(const Box<2>& cube) const;
   void SetReach(float radius_sq);
   Point<2> PositionOf(size_t node) const;  // in the units of the nodes
-  std::span<const Group> groups() const { return {groups_.data(), (count_ + kTogether - 1) / kTogether}; }
+  std::span<const Group> groups() const { return {groups_.data(), GroupsFor(count_)}; }
   uint32_t PlaneFrom(size_t node) const {
     return static_cast<uint32_t>(groups_[node / kTogether].plane[node % kTogether]);
   }

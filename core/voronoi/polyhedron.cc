@@ -62,7 +62,7 @@ void Polyhedron::Reset(const Point<3>& site, const Box<3>& bounds, const std::ar
     rows_[face] = {{plane.normal[0], plane.normal[1], plane.normal[2]}, plane.offset};
     edge_sq_[face] = 0;
   }
-  std::fill_n(groups_.begin(), (count_ + kTogether - 1) / kTogether, Group{});
+  std::fill_n(groups_.begin(), GroupsFor(count_), Group{});
   count_ = 8;
   Group& group = groups_.front();
   for (uint32_t corner = 0; corner < 8; ++corner) {
@@ -311,7 +311,7 @@ WELLSPACE_INLINE void Polyhedron::Replace(uint32_t plane) {
   const size_t old = count_;
   count_ = std::max(old, old + rim_count_ - removed_count_);
   if (groups_.size() * kTogether < count_) {
-    const size_t groups = 2 * (count_ + kTogether - 1) / kTogether;
+    const size_t groups = 2 * GroupsFor(count_);
     groups_.resize(groups);
     triangles_.resize(groups * kTogether);
     removed_.resize(groups * kTogether);
@@ -428,9 +428,7 @@ bool Polyhedron::PlaceUnlessKeeps(double ratio) {
   if (KeepsRatio(ratio)) {
     return true;
   }
-  const double surely = ratio * (1 - kSurely);
-  const auto ratio_sq = static_cast<float>(surely * surely);
-  PlaceThose([this, ratio_sq](size_t i) {
+  PlaceThose([this, ratio_sq = SurelyKeptRatioSq(ratio)](size_t i) {
     const Group& group = groups_[i / kTogether];
     const size_t lane = i % kTogether;
     const float x = group.x[0][lane];
@@ -458,7 +456,8 @@ void Polyhedron::PlaceThose(Wants wants) {
     const uint64_t most = std::max(keys[0], std::max(keys[1], keys[2]));
     const uint64_t middle = keys[0] ^ keys[1] ^ keys[2] ^ least ^ most;
     node.planes = {static_cast<uint16_t>(least), static_cast<uint16_t>(middle), static_cast<uint16_t>(most)};
-    if (wants(i)) {
+    const bool is_wanted = wants(i);
+    if (is_wanted) {
       node.slack = PlaceByPlanes<3>(
           site_, {&planes_[node.planes[0]], &planes_[node.planes[1]], &planes_[node.planes[2]]}, node.x);
     } else {
@@ -469,7 +468,7 @@ void Polyhedron::PlaceThose(Wants wants) {
     }
     node.radius_sq = NormSq<3>(node.x);
     const double radius = std::sqrt(node.radius_sq);
-    if (!wants(i)) {
+    if (!is_wanted) {
       node.slack = kDistanceError<3> * radius;
     }
     node.reach = radius + node.slack;
@@ -546,8 +545,7 @@ WELLSPACE_AVX2 bool Polyhedron::KeepsRatioAvx2(float ratio_sq) const {
 }
 
 bool Polyhedron::KeepsRatio(double ratio) const {
-  const double surely = ratio * (1 - kSurely);
-  const auto ratio_sq = static_cast<float>(surely * surely);
+  const float ratio_sq = SurelyKeptRatioSq(ratio);
   return unit_ == VectorUnit::kAvx2 ? KeepsRatioAvx2(ratio_sq) : KeepsRatioWith<VectorUnit::kBaseline>(ratio_sq);
 }
 

@@ -103,7 +103,7 @@ class Polyhedron : public FloatCell<3> {
   void SetReach();
   bool IsRemoved(size_t node) const { return (removed_words_[node / kWordBits] >> node % kWordBits & 1) != 0; }
   Point<3> PositionOf(size_t node) const;  // in the units of the nodes
-  std::span<const Group> groups() const { return {groups_.data(), (count_ + kTogether - 1) / kTogether}; }
+  std::span<const Group> groups() const { return {groups_.data(), GroupsFor(count_)}; }
 
   std::vector<Group> groups_;        // and more
   std::vector<Triangle> triangles_;  // by node, and more

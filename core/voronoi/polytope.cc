@@ -38,18 +38,7 @@ void Polytope<D>::Reset(const Point<D>& site, const Box<D>& bounds, const std::a
   planes_.resize(std::max<size_t>(planes_.size(), 2 * D));
   plane_count_ = 2 * D;
   for (int face = 0; face < 2 * D; ++face) {
-    const int axis = face / 2;
-    Plane<D>& plane = planes_[face];
-    plane.kind = kinds[face];
-    plane.face = static_cast<uint8_t>(face);
-    plane.vertex = kNoVertex;
-    plane.normal = {};
-    plane.normal[axis] = 1;
-    plane.length = 1;
-    plane.source.axis = axis;
-    plane.source.coordinate = bounds.FaceCoordinate(face);
-    plane.offset = plane.source.coordinate - site[axis];
-    plane.distance = std::abs(plane.offset);
+    SetWall<D>(site, bounds, face, kinds[face], planes_[face]);
   }
   MakeRoomForNodes(1 << D);
   columns_.Resize(1 << D);
@@ -109,15 +98,7 @@ WELLSPACE_INLINE bool Polytope<D>::CutOffWith(VertexId u, const Point<D>& positi
   if (planes_.size() < plane_count_) {
     planes_.resize(2 * plane_count_);
   }
-  Plane<D>& plane = planes_[index];
-  plane.kind = PlaneKind::kBisector;
-  plane.vertex = u;
-  plane.normal = normal;
-  plane.offset = offset;
-  plane.length = length;
-  plane.distance = 0.5 * length;
-  plane.source.generator = position;
-  plane.source.axis = -1;
+  SetBisector<D>(u, position, normal, length_sq, planes_[index]);
   FindCutEdges();
   PlaceCutEdges<kWidth>(index);
   MakeNewNodes(index);

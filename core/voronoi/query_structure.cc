@@ -340,7 +340,8 @@ void QueryStructure<D>::CountCuts(Workspace<D>& workspace) {
 template <int D>
 void QueryStructure<D>::CutByLeaf(NodeId leaf, VertexId site, Workspace<D>& workspace) const {
   if (const auto* bucket = tree_.BucketOf(leaf); bucket != nullptr) {
-    static_assert(D > 3 || LeafTree<D>::kLeafCapacity <= kMostCutTogether);
+    static_assert(D > 3 || (LeafTree<D>::kLeafCapacity <= kMostCutTogether &&
+                            LeafTree<D>::Buckets::kReadTogether >= kFloatLanes));
     workspace.counters.vertices += bucket->count;
     workspace.cell.CutByEach({bucket->positions, bucket->count}, {.listed = bucket->ids}, site);
   }
