@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "absl/container/flat_hash_map.h"
 #include "core/base/dimensions.h"
-#include "core/base/huge_pages.h"
 #include "core/base/status_macros.h"
 #include "core/refine/mesh_size.h"
 #include "core/refine/nearest_points.h"
@@ -159,21 +159,23 @@ class Integrator {
       : box_(structure.box()), demands_(demands), vertices_per_term_(VerticesPerTerm<D>(demands)) {}
 
   absl::Status Prepare(const QueryStructure<D>& structure, const RunContext& context) {
-    HugeVector<Point<D>> points;
-    points.reserve(structure.vertex_count());
+    // The corners of the box count as its boundary, not as points; those that were not given come last.
+    std::span<const Point<D>> points = structure.points();
+    std::vector<uint32_t> corners;
     for (uint32_t i = 0; i < structure.vertex_count(); ++i) {
       if ((i & 0xfff) == 0) {
         WELLSPACE_RETURN_IF_ERROR(context.Check());
       }
-      const VertexId v{i};
-      const int faces = std::popcount(structure.faces(v));
+      const int faces = std::popcount(structure.faces(VertexId{i}));
       on_boundary_ += faces > 0 ? 1 : 0;
-      if (faces < D) {  // the corners of the box count as its boundary
-        points.push_back(structure.point(v));
+      if (faces == D) {
+        corners.push_back(i);
       }
     }
-    WELLSPACE_RETURN_IF_ERROR(points_.Build(std::move(points), context));
-    spacing_.assign(points_.size(), -1.0);
+    for (; !corners.empty() && corners.back() == points.size() - 1; corners.pop_back()) {
+      points = points.first(points.size() - 1);
+    }
+    WELLSPACE_RETURN_IF_ERROR(points_.Build(points, std::move(corners), context));
     const double shortest_side = box_.ShortestSide();
     for (int corner = 0; corner < (1 << D); ++corner) {
       Point<D> p;
@@ -253,8 +255,9 @@ class Integrator {
 
   // Distance from a point to its nearest feature.
   double SpacingOf(uint32_t point) {
-    double& spacing = spacing_[point];
-    if (spacing < 0) {
+    const auto [known, is_new] = spacing_.try_emplace(point);
+    double& spacing = known->second;
+    if (is_new) {
       const Point<D>& p = points_[point];
       const FaceMask faces = box_.FacesOf(p);
       double corner_sq = 0;
@@ -388,8 +391,8 @@ class Integrator {
   const Box<D> box_;
   const Demands<D>& demands_;
   const Terms vertices_per_term_;
-  NearestPoints<D> points_;     // the input but the corners of the box
-  HugeVector<double> spacing_;  // by point; negative where not known yet
+  NearestPoints<D> points_;                         // the input but the corners of the box
+  absl::flat_hash_map<uint32_t, double> spacing_;  // by point, where it has been asked for
   std::array<double, 1 << D> corner_spacing_{};
   uint64_t on_boundary_ = 0;  // vertices
   Draws draws_;

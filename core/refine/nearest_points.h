@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -33,11 +34,14 @@ struct NearestTwo {
 template <int D>
 class NearestPoints {
  public:
-  // REQUIRES:   points in Morton order; in any other Nearest is right, but slow.
+  // `passed_over`: numbers of points that are not to be found; a few.
+  //
+  // REQUIRES:   `points` outlive this, in Morton order; in any other Nearest is right, but slow.
   // Complexity: O(n).
   // Errors:     CANCELLED, DEADLINE_EXCEEDED.
-  absl::Status Build(HugeVector<Point<D>> points, const RunContext& context) {
-    points_ = std::move(points);
+  absl::Status Build(std::span<const Point<D>> points, std::vector<uint32_t> passed_over, const RunContext& context) {
+    points_ = points;
+    passed_over_ = std::move(passed_over);
     if (points_.empty()) {
       return absl::OkStatus();
     }
@@ -69,7 +73,6 @@ class NearestPoints {
     return absl::OkStatus();
   }
 
-  size_t size() const { return points_.size(); }
   const Point<D>& operator[](size_t i) const { return points_[i]; }
 
   // The two points nearest to `x`, other than point number `but`. Distances are infinite where there are no such points.
@@ -91,7 +94,7 @@ class NearestPoints {
   }
 
  private:
-  static constexpr size_t kRun = 8;
+  static constexpr size_t kRun = 16;
 
   static void Grow(Box<D>& box, const Point<D>& low, const Point<D>& high) {
     for (int i = 0; i < D; ++i) {
@@ -114,7 +117,7 @@ class NearestPoints {
       const size_t end = std::min(points_.size(), (index + 1) * kRun);
       for (size_t i = index * kRun; i < end; ++i) {
         const double d = DistanceSq<D>(x, points_[i]);
-        if (d >= result.second_sq || i == but) {
+        if (d >= result.second_sq || i == but || IsPassedOver(i)) {
           continue;
         }
         if (d < result.first_sq) {
@@ -143,7 +146,12 @@ class NearestPoints {
     }
   }
 
-  HugeVector<Point<D>> points_;
+  bool IsPassedOver(size_t i) const {
+    return std::find(passed_over_.begin(), passed_over_.end(), i) != passed_over_.end();
+  }
+
+  std::span<const Point<D>> points_;
+  std::vector<uint32_t> passed_over_;
   std::vector<HugeVector<Box<D>>> levels_;
 };
 

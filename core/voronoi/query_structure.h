@@ -172,6 +172,8 @@ class QueryStructure {
   // Those that wait, too.
   uint32_t vertex_count() const { return vertex_count_; }
   const Point<D>& point(VertexId v) const { return points_[Index(v)]; }
+  // By vertex; valid until one is added or moved.
+  std::span<const Point<D>> points() const { return {points_.data(), vertex_count_}; }
   FaceMask faces(VertexId v) const { return faces_[Index(v)]; }
   const LeafTree<D>& tree() const { return tree_; }
   // What the structure takes in memory.

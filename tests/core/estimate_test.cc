@@ -55,7 +55,8 @@ TYPED_TEST(NearestPointsTest, AgreesWithALookAtAll) {
     SCOPED_TRACE(std::string(kind));
     const std::vector<Point<D>> points = test::SortedCloud<D>(kind, 100);
     NearestPoints<D> nearest;
-    ASSERT_TRUE(nearest.Build({points.begin(), points.end()}, context).ok());
+    const auto passed_over = static_cast<uint32_t>(random.Below(100));
+    ASSERT_TRUE(nearest.Build(points, {passed_over}, context).ok());
     for (int i = 0; i < 50; ++i) {
       Point<D> x;
       for (double& coordinate : x) {
@@ -66,7 +67,7 @@ TYPED_TEST(NearestPointsTest, AgreesWithALookAtAll) {
       x = is_point ? points[but] : x;
       std::vector<double> distances(2, std::numeric_limits<double>::infinity());
       for (size_t k = 0; k < points.size(); ++k) {
-        distances.push_back(k == but ? distances[0] : DistanceSq<D>(x, points[k]));
+        distances.push_back(k == but || k == passed_over ? distances[0] : DistanceSq<D>(x, points[k]));
       }
       std::sort(distances.begin(), distances.end());
       const NearestTwo two = nearest.Nearest(x, but);
