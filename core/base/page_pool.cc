@@ -3,6 +3,7 @@
 #include <sys/mman.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdint>
 #include <iterator>
 #include <new>
@@ -11,7 +12,43 @@ namespace wellspace::core {
 
 namespace {
 
+constexpr size_t kSmallPage = size_t{1} << 12;
+
 constexpr size_t WholeHugePages(size_t bytes) { return (bytes + kHugePage - 1) & ~(kHugePage - 1); }
+
+// Nanoseconds that writing a byte every `step` takes.
+double TimeToWrite(std::byte* memory, size_t bytes, size_t step) {
+  const auto begin = std::chrono::steady_clock::now();
+  for (size_t at = 0; at < bytes; at += step) {
+    *static_cast<volatile std::byte*>(memory + at) = std::byte{0};
+  }
+  return std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - begin).count();
+}
+
+// Nanoseconds that it takes to bring in a large page's memory by small ones, by some of them.
+double TimeOfSmallPages() {
+  constexpr size_t kMeasured = 16 * kSmallPage;
+  void* const memory = mmap(nullptr, kMeasured, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (memory == MAP_FAILED) {
+    return 0;
+  }
+  const double time = TimeToWrite(static_cast<std::byte*>(memory), kMeasured, kSmallPage);
+  munmap(memory, kMeasured);
+  return time * (kHugePage / kMeasured);
+}
+
+// Asks for the pages that memory which has just been mapped is to be brought in by. Advice: nothing is lost if it is not taken.
+void ChoosePages(std::byte* memory, size_t bytes) {
+  static PageChoice choice;
+  if (!choice.TakesLarge(bytes)) {
+    madvise(memory, bytes, MADV_NOHUGEPAGE);
+    return;
+  }
+  madvise(memory, bytes, MADV_HUGEPAGE);
+  if (choice.IsDear(TimeToWrite(memory, kHugePage, kHugePage), TimeOfSmallPages) && bytes > kHugePage) {
+    madvise(memory + kHugePage, bytes - kHugePage, MADV_NOHUGEPAGE);
+  }
+}
 
 }  // namespace
 
@@ -27,7 +64,7 @@ void* MapHugePages(size_t bytes) {
     munmap(begin, before);
   }
   munmap(begin + before + whole, kHugePage - before);
-  madvise(begin + before, whole, MADV_HUGEPAGE);  // advice: nothing is lost if it is not taken
+  ChoosePages(begin + before, whole);
   return begin + before;
 }
 

@@ -7,12 +7,12 @@
 #include <map>
 #include <mutex>
 
+#include "core/base/page_choice.h"
+
 namespace wellspace::core {
 
-inline constexpr size_t kHugePage = size_t{1} << 21;
-
-// Maps so many bytes, rounded up to whole pages of 2 MiB, to the beginning of one, and asks for such pages: one fault brings one in, where small ones
-// take 512. What is given back then is the system's at once, where the heap would keep it: arrays that are moved as they grow leave more than they need
+// Maps so many bytes, rounded up to whole pages of 2 MiB, to the beginning of one, and, unless they are dear (PageChoice), asks for such pages: one fault brings
+// one in, where small ones take 512. What is given back then is the system's at once, where the heap would keep it: arrays that are moved as they grow leave more than they need
 // behind. Throws std::bad_alloc if the system has none.
 void* MapHugePages(size_t bytes);
 
