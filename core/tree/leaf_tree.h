@@ -142,22 +142,14 @@ class LeafTree {
   // Complexity: O(D 2^D), for most leaves O(D).
   template <typename F>
   void ForEachFaceNeighbour(NodeId leaf, F&& f) const {
-    for (int face = 0; face < kFaces; ++face) {
-      ForEachBeyond(leaf, face, f);
-    }
+    ForEachBeyondFacets(leaf, (1u << kFaces) - 1, f);
   }
 
-  // The same, but only for those that a straight line from `from` can come to from `leaf`.
+  // The same, but only for `facets` of it: a bit for each, by the face of the box that it faces.
   template <typename F>
-  void ForEachFaceNeighbourAwayFrom(const Point<D>& from, NodeId leaf, F&& f) const {
-    const Box<D> cube = BoxOf(leaf);
-    uint32_t faces = 0;
-    for (int i = 0; i < D; ++i) {
-      faces |= (cube.low[i] <= from[i] ? 1u : 0u) << FaceIndex(i, false);
-      faces |= (cube.high[i] >= from[i] ? 1u : 0u) << FaceIndex(i, true);
-    }
-    for (; faces != 0; faces &= faces - 1) {
-      ForEachBeyond(leaf, std::countr_zero(faces), f);
+  void ForEachBeyondFacets(NodeId leaf, uint32_t facets, F&& f) const {
+    for (; facets != 0; facets &= facets - 1) {
+      ForEachBeyond(leaf, std::countr_zero(facets), f);
     }
   }
 

@@ -19,7 +19,7 @@ namespace wellspace::core {
 // A leaf waits in a class with those whose distances round to the same power of two: first come, first served there. As many
 // leaves are opened then as in the order of the distances themselves, and none has to be looked for.
 //
-// Thread safety: thread-compatible. Reused from scan to scan: no allocation once warm.
+// Thread safety: thread-compatible. For one scan; made where it is used, so that what it counts with stays in registers.
 class LeafQueue {
  public:
   struct Entry {
@@ -27,22 +27,21 @@ class LeafQueue {
     NodeId leaf;
     uint32_t next;  // of the class, among entries_
   };
+  // One entry for each class, before its first, and all leaves of a scan. Reused from scan to scan: no allocation once warm.
+  using Memory = std::vector<Entry>;
 
-  LeafQueue() : entries_(kClasses) {}
-
-  // Begins a scan in a leaf of side `scale`: what is far nearer or far farther than that is in one class.
-  void Begin(double scale) {
-    base_ = Class(scale * scale) - kNearClasses;
-    waiting_ = 0;
-    end_ = kClasses;
-    std::iota(last_.begin(), last_.end(), 0u);
+  // For a scan from a leaf of side `scale`: what is far nearer or far farther than that is in one class.
+  WELLSPACE_INLINE LeafQueue(Memory& memory, double scale)
+      : memory_(memory), base_(Class(scale * scale) - kNearClasses), last_(kFirstOfClasses) {
+    Reserve(0);
   }
-  bool IsEmpty() const { return waiting_ == 0; }
+  WELLSPACE_INLINE bool IsEmpty() const { return waiting_ == 0; }
 
   // Makes room for so many more.
-  void Reserve(size_t more) {
-    if (end_ + more > entries_.size()) {
-      entries_.resize(2 * (end_ + more));
+  WELLSPACE_INLINE void Reserve(size_t more) {
+    if (end_ + more > room_) {
+      entries_ = Grow(memory_, end_ + more);
+      room_ = memory_.size();
     }
   }
 
@@ -65,7 +64,7 @@ class LeafQueue {
   //
   // REQUIRES:   not empty.
   // Complexity: O(1).
-  Entry Pop() {
+  WELLSPACE_INLINE Entry Pop() {
     const auto at = static_cast<uint32_t>(std::countr_zero(waiting_));
     const uint32_t first = entries_[at].next;
     const uint32_t last = last_[at];
@@ -77,21 +76,33 @@ class LeafQueue {
   }
 
   // Where the next to be pushed will be, and what is there: for whoever looks at what has been pushed since.
-  uint32_t end() const { return end_; }
-  NodeId leaf(uint32_t at) const { return entries_[at].leaf; }
+  WELLSPACE_INLINE uint32_t end() const { return end_; }
+  WELLSPACE_INLINE NodeId leaf(uint32_t at) const { return entries_[at].leaf; }
 
  private:
-  static constexpr int64_t kClasses = 16;
+  static constexpr uint32_t kClasses = 16;
   static constexpr int64_t kNearClasses = 4;
+  static constexpr std::array<uint32_t, kClasses> kFirstOfClasses = [] {
+    std::array<uint32_t, kClasses> firsts{};
+    std::iota(firsts.begin(), firsts.end(), 0u);
+    return firsts;
+  }();
 
   // Two powers of two of the square, by its exponent.
-  static int64_t Class(double distance_sq) { return std::bit_cast<int64_t>(distance_sq) >> 53; }
+  WELLSPACE_INLINE static int64_t Class(double distance_sq) { return std::bit_cast<int64_t>(distance_sq) >> 53; }
 
-  int64_t base_ = 0;
+  [[gnu::noinline]] static Entry* Grow(Memory& memory, size_t least) {
+    memory.resize(2 * least);
+    return memory.data();
+  }
+
+  Memory& memory_;
+  Entry* entries_ = memory_.data();
+  size_t room_ = memory_.size();
+  const int64_t base_;
   uint32_t waiting_ = 0;                 // by class, a bit for whether any wait
+  uint32_t end_ = kClasses;              // of the entries
   std::array<uint32_t, kClasses> last_;  // by class, in entries_
-  uint32_t end_ = 0;                     // of the entries
-  std::vector<Entry> entries_;           // one for each class, before its first, and all leaves of the scan
 };
 
 }  // namespace wellspace::core

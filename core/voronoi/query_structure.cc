@@ -6,6 +6,7 @@
 
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
+#include "core/voronoi/lane_bits.h"
 #include "core/voronoi/lanes.h"
 
 namespace wellspace::core {
@@ -26,30 +27,83 @@ void Prefetch(const LeafTree<D>& tree, NodeId leaf) {
   }
 }
 
-// DistanceSq of `p` and the cube of a node, two axes at a time.
-template <int D>
-WELLSPACE_INLINE double DistanceSqTo(const LeafTree<D>& tree, NodeId node, const Point<D>& p) {
-  using Pair = Wide<2>::Lanes;
-  const double side = tree.SideOf(node);
-  const Point<D>& low = tree.LowOf(node);
-  double distance_sq = 0;
-  for (int axis = 0; axis < D; axis += 2) {
-    const bool is_pair = axis + 1 < D;
-    const Pair at = {p[axis], is_pair ? p[axis + 1] : 0};
-    const Pair least = {low[axis], is_pair ? low[axis + 1] : 0};
-    const Pair most = least + (is_pair ? Pair{side, side} : Pair{side, 0});
-    const Pair below = least - at;
-    const Pair above = at - most;
-    Pair away = below > above ? below : above;
-    away = away > 0 ? away : Pair{};
-    const Pair away_sq = away * away;
-    distance_sq += away_sq[0];
-    if (is_pair) {
-      distance_sq += away_sq[1];
+// The cube of a node as it is seen from a site.
+template <int D, size_t kWidth>
+class CubeFrom {
+ public:
+  using Lanes = typename Wide<kWidth>::Lanes;
+  static constexpr int kVectors = (D + static_cast<int>(kWidth) - 1) / static_cast<int>(kWidth);
+  // A lane for each axis, and lanes of zeros.
+  struct Axes {
+    Lanes lanes[kVectors] = {};
+    WELLSPACE_INLINE Lanes& operator[](int i) { return lanes[i]; }
+    WELLSPACE_INLINE const Lanes& operator[](int i) const { return lanes[i]; }
+  };
+
+  WELLSPACE_INLINE static void Load(const Point<D>& p, Axes& axes) {
+    const auto at = [&](int axis) { return axis < D ? p[axis] : 0.0; };
+    for (int i = 0; i < kVectors; ++i) {
+      const int axis = i * static_cast<int>(kWidth);
+      if constexpr (kWidth == 2) {
+        axes[i] = Lanes{at(axis), at(axis + 1)};
+      } else {
+        axes[i] = Lanes{at(axis), at(axis + 1), at(axis + 2), at(axis + 3)};
+      }
     }
   }
-  return distance_sq;
-}
+
+  WELLSPACE_INLINE CubeFrom(const Axes& site, const LeafTree<D>& tree, NodeId node) {
+    Axes low;
+    Load(tree.LowOf(node), low);
+    const double side = tree.SideOf(node);
+    for (int i = 0; i < kVectors; ++i) {
+      below_[i] = low[i] - site[i];
+      above_[i] = site[i] - (low[i] + side);
+      const Lanes out = below_[i] > above_[i] ? below_[i] : above_[i];
+      const Lanes away = out > 0 ? out : Lanes{};
+      away_sq_[i] = away * away;
+    }
+  }
+
+  WELLSPACE_INLINE double DistanceSq() const {
+    double sum = 0;
+    for (int axis = 0; axis < D; ++axis) {
+      sum += away_sq_[axis / kWidth][axis % kWidth];
+    }
+    return sum;
+  }
+
+  // The facets that a straight line from the site may leave the cube by within a distance, by its square: a bit for each.
+  WELLSPACE_INLINE uint32_t FacetsWithin(double limit_sq) const {
+    limit_sq *= 1 + 0x1p-40;  // beyond a facet distances are rounded otherwise
+    const double distance_sq = DistanceSq();
+    uint32_t facets = 0;
+    for (int i = 0; i < kVectors; ++i) {
+      const Lanes others_sq = distance_sq - away_sq_[i];
+      const auto within = [&](const Lanes& beyond) __attribute__((always_inline)) {
+        return kSpread[Bits<kWidth>((beyond <= 0) & (others_sq + beyond * beyond <= limit_sq))];
+      };
+      facets |= (within(below_[i]) << FaceIndex(0, false) | within(above_[i]) << FaceIndex(0, true)) << 2 * kWidth * i;
+    }
+    return facets & ((1u << 2 * D) - 1);
+  }
+
+ private:
+  // Bits by axis at the places of low facets.
+  static constexpr std::array<uint32_t, 1 << kWidth> kSpread = [] {
+    std::array<uint32_t, 1 << kWidth> spread{};
+    for (uint32_t bits = 0; bits < spread.size(); ++bits) {
+      for (uint32_t axis = 0; axis < kWidth; ++axis) {
+        spread[bits] |= (bits >> axis & 1) << 2 * axis;
+      }
+    }
+    return spread;
+  }();
+
+  Axes below_;  // the low face, seen from the site
+  Axes above_;  // the site, seen from the high face
+  Axes away_sq_;
+};
 
 // Whether `p` is farther from the faces of `cube` than a distance, by its square.
 template <int D>
@@ -189,47 +243,65 @@ void QueryStructure<D>::BeginQuery(Workspace<D>& workspace) const {
 }
 
 template <int D>
-template <typename ReachSq, typename Wants, typename Open>
-void QueryStructure<D>::ScanOutward(const Point<D>& site, NodeId own, Workspace<D>& workspace, ReachSq reach_sq,
-                                    Wants wants, Open open) const {
+template <size_t kWidth, typename ReachSq, typename Wants, typename Open>
+WELLSPACE_INLINE void QueryStructure<D>::ScanOutwardWith(const Point<D>& site, NodeId own, Workspace<D>& workspace,
+                                                         ReachSq& reach_sq, Wants& wants, Open& open) const {
+  using Cube = CubeFrom<D, kWidth>;
   Prefetch<D>(tree_, own);
   BeginQuery(workspace);
+  typename Cube::Axes from;
+  Cube::Load(site, from);
   uint32_t* const seen = workspace.seen.data();
-  seen[Index(own)] = workspace.query;
-  LeafQueue& queue = workspace.queue;
-  queue.Begin(tree_.SideOf(own));
+  const uint32_t query = workspace.query;
+  seen[Index(own)] = query;
+  LeafQueue queue(workspace.waiting_leaves, tree_.SideOf(own));
   queue.Reserve(1);
   queue.PushIf(true, 0, own);
   uint64_t leaves = 0;
+  double limit_sq = reach_sq();
   while (!queue.IsEmpty()) {
     const LeafQueue::Entry next = queue.Pop();
-    if (next.distance_sq > reach_sq() || (next.leaf != own && !wants(next.leaf))) {
+    if (next.distance_sq > limit_sq || (next.leaf != own && !wants(next.leaf))) {
       continue;
     }
     ++leaves;
     open(next.leaf);
-    const double limit_sq = reach_sq();
+    limit_sq = reach_sq();
     queue.Reserve(LeafTree<D>::kMostFaceNeighbours + 1);
     const uint32_t old_end = queue.end();
-    const auto meet = [&](NodeId beyond) __attribute__((always_inline)) {
+    // Whoever is within reach is so by leaves that are, too: those on the straight line from the site.
+    const uint32_t facets = Cube(from, tree_, next.leaf).FacetsWithin(limit_sq);
+    tree_.ForEachBeyondFacets(next.leaf, facets, [&](NodeId beyond) __attribute__((always_inline)) {
       // No branch, since none could be foretold.
-      const bool is_new = seen[Index(beyond)] != workspace.query;
-      seen[Index(beyond)] = workspace.query;
-      const double distance_sq = DistanceSqTo<D>(tree_, beyond, site);
+      const bool is_new = seen[Index(beyond)] != query;
+      seen[Index(beyond)] = query;
+      const double distance_sq = Cube(from, tree_, beyond).DistanceSq();
       queue.PushIf(is_new & (distance_sq <= limit_sq), distance_sq, beyond);
-    };
-    if constexpr (D == 2) {
-      tree_.ForEachFaceNeighbour(next.leaf, meet);  // few more
-    } else {
-      // Whoever is within reach is so by leaves that are, too: those on the straight line from the site.
-      tree_.ForEachFaceNeighbourAwayFrom(site, next.leaf, meet);
-    }
+    });
     for (uint32_t i = old_end; i < queue.end(); ++i) {
       Prefetch<D>(tree_, queue.leaf(i));
     }
   }
   workspace.counters.leaves += leaves;
   workspace.counters.max_leaves = std::max(workspace.counters.max_leaves, leaves);
+}
+
+template <int D>
+template <typename ReachSq, typename Wants, typename Open>
+WELLSPACE_AVX2 void QueryStructure<D>::ScanOutwardAvx2(const Point<D>& site, NodeId own, Workspace<D>& workspace,
+                                                       ReachSq& reach_sq, Wants& wants, Open& open) const {
+  ScanOutwardWith<D == 3 || D == 4 ? 4 : 2>(site, own, workspace, reach_sq, wants, open);
+}
+
+template <int D>
+template <typename ReachSq, typename Wants, typename Open>
+void QueryStructure<D>::ScanOutward(const Point<D>& site, NodeId own, Workspace<D>& workspace, ReachSq reach_sq,
+                                    Wants wants, Open open) const {
+  if (workspace.unit == VectorUnit::kAvx2) {
+    ScanOutwardAvx2(site, own, workspace, reach_sq, wants, open);
+  } else {
+    ScanOutwardWith<2>(site, own, workspace, reach_sq, wants, open);
+  }
 }
 
 template <int D>

@@ -41,7 +41,8 @@ struct Workspace {
   // Private to the queries.
   HugeVector<uint32_t> seen;  // by tree node: the query that last met it
   uint32_t query = 0;
-  LeafQueue queue;
+  LeafQueue::Memory waiting_leaves;
+  VectorUnit unit = BestVectorUnit();  // leaves are met with
 };
 
 struct Neighbor {
@@ -193,6 +194,12 @@ class QueryStructure {
   template <typename ReachSq, typename Wants, typename Open>
   void ScanOutward(const Point<D>& site, NodeId own, Workspace<D>& workspace, ReachSq reach_sq, Wants wants,
                    Open open) const;
+  template <size_t kWidth, typename ReachSq, typename Wants, typename Open>
+  void ScanOutwardWith(const Point<D>& site, NodeId own, Workspace<D>& workspace, ReachSq& reach_sq, Wants& wants,
+                       Open& open) const;
+  template <typename ReachSq, typename Wants, typename Open>
+  void ScanOutwardAvx2(const Point<D>& site, NodeId own, Workspace<D>& workspace, ReachSq& reach_sq, Wants& wants,
+                       Open& open) const;
   Neighbor Nearest(const Point<D>& p, NodeId leaf, VertexId but, double limit_sq, Workspace<D>& workspace) const;
   // Others as in UnplacedClippedVoronoi.
   void ClipAndScan(VertexId v, double radius, TieRule rule, Workspace<D>& workspace,

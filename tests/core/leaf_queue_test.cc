@@ -24,9 +24,9 @@ TEST_F(LeafQueueTest, ServesNearClassesFirstAndInAClassWhoCameFirst) {
     double distance_sq;
     uint32_t leaf;
   };
-  LeafQueue queue;
+  LeafQueue::Memory memory;
   for (const double scale : {1.0, 3e-140, 3e140}) {
-    queue.Begin(scale);
+    LeafQueue queue(memory, scale);
     // Far from the scale leaves share a class.
     const double least_sq = std::ldexp(scale * scale, -6);
     const double most_sq = std::ldexp(scale * scale, 20);

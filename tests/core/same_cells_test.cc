@@ -80,6 +80,28 @@ TYPED_TEST(SameCellsTest, DoNotDependOnTheOrderOfTheCuts) {
   }
 }
 
+TYPED_TEST(SameCellsTest, ScansAreTheSameByEveryVectorUnit) {
+  constexpr int D = TypeParam::kValue;
+  if (!Has(VectorUnit::kAvx2)) {
+    GTEST_SKIP() << "this processor has one vector unit";
+  }
+  for (const std::string_view kind : kKinds) {
+    SCOPED_TRACE(std::string(kind));
+    const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, 500));
+    Workspace<D> fast;
+    Workspace<D> plain;
+    plain.unit = VectorUnit::kBaseline;
+    ASSERT_EQ(fast.unit, VectorUnit::kAvx2);
+    for (uint32_t v = 0; v < structure.vertex_count(); v += 7) {
+      ASSERT_EQ(CellNow<D>(structure, VertexId{v}, fast), CellNow<D>(structure, VertexId{v}, plain)) << "vertex " << v;
+      const Neighbor nearest = structure.ApproximateNearestNeighbor(VertexId{v}, fast);
+      ASSERT_EQ(nearest.distance_sq, structure.ApproximateNearestNeighbor(VertexId{v}, plain).distance_sq);
+      ASSERT_EQ(fast.counters.leaves, plain.counters.leaves);
+    }
+    EXPECT_GT(fast.counters.leaves, fast.counters.queries);
+  }
+}
+
 TYPED_TEST(SameCellsTest, VerticesThatWaitCountOnceTheyCutOrAreAdmitted) {
   constexpr int D = TypeParam::kValue;
   for (const std::string_view kind : kKinds) {

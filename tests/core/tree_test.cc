@@ -175,7 +175,7 @@ bool IsOnLine(const Box<D>& cube, const Point<D>& from, const Point<D>& to) {
   return first <= last;
 }
 
-// A walk away from a point comes to every leaf, by leaves on the straight line to it alone, and never turns back.
+// A walk from leaf to leaf, through facets that a straight line from a point leaves by, comes to every leaf by leaves on the line to it.
 template <int D>
 void ExpectWalksAway(const LeafTree<D>& tree, const Box<D>& box) {
   const std::vector<NodeId> leaves = LeavesOf<D>(tree);
@@ -187,7 +187,12 @@ void ExpectWalksAway(const LeafTree<D>& tree, const Box<D>& box) {
     std::set<uint32_t> seen = {Index(leaves[i])};
     for (size_t at = 0; at < reached.size(); ++at) {
       const Box<D> cube = tree.BoxOf(reached[at]);
-      tree.ForEachFaceNeighbourAwayFrom(from, reached[at], [&](NodeId beyond) {
+      uint32_t facets = 0;
+      for (int k = 0; k < D; ++k) {
+        facets |= (from[k] >= cube.low[k] ? 1u : 0u) << FaceIndex(k, false);
+        facets |= (from[k] <= cube.high[k] ? 1u : 0u) << FaceIndex(k, true);
+      }
+      tree.ForEachBeyondFacets(reached[at], facets, [&](NodeId beyond) {
         const Box<D> next = tree.BoxOf(beyond);
         for (int k = 0; k < D; ++k) {
           ASSERT_FALSE(next.high[k] == cube.low[k] && from[k] < cube.low[k]) << "back along axis " << k;
