@@ -1,8 +1,10 @@
 #include "core/refine/refine.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
@@ -12,6 +14,7 @@
 #include "core/base/thread_team.h"
 #include "core/refine/checks.h"
 #include "core/refine/rounding.h"
+#include "core/tree/leaf_blocks.h"
 
 namespace wellspace::core {
 namespace {
@@ -25,7 +28,7 @@ constexpr double kClipRatioFactor = 1.25;
 constexpr double kAround = 1.5;
 
 // Vertices whose first edges one thread looks for at a time.
-constexpr uint32_t kScheduledTogether = 1024;
+constexpr size_t kScheduledTogether = 1024;
 
 // Vertices looked at between two reports of progress.
 constexpr uint64_t kReportInterval = 256;
@@ -167,17 +170,22 @@ absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& t
   const uint32_t count = structure_.vertex_count();
   std::vector<OwnWorkspace> workspaces(team.threads());
   HugeVector<double> first_sq(count);
-  team.ForEach((count + kScheduledTogether - 1) / kScheduledTogether, [&](size_t block) {
+  const LeafBlocks<D> blocks(structure_.tree(), kScheduledTogether);
+  team.ForEach(blocks.count(), [&](size_t block) {
     Workspace<D>& workspace = workspaces[ThreadTeam::CurrentThread()];
-    const uint32_t begin = static_cast<uint32_t>(block) * kScheduledTogether;
-    const uint32_t end = std::min(count, begin + kScheduledTogether);
-    for (uint32_t i = begin; i < end && !context_->IsCancelled(); ++i) {
-      const VertexId v{i};
-      const double nearest_sq = structure_.ApproximateNearestNeighbor(v, workspace).distance_sq;
-      // A node x farther from v than h(x) is farther than h(v) / 2, as h is 1-Lipschitz.
-      first_sq[i] = FirstEdgeSq(demands, structure_.point(v), structure_.faces(v), nearest_sq,
-                                demands.sizes.AtSq(structure_.point(v)) / 4);
-    }
+    std::array<double, LeafTree<D>::kLeafCapacity> nearest_sq;
+    blocks.ForEachBucketOf(block, [&](const typename LeafTree<D>::Bucket& bucket, NodeId leaf) {
+      if (context_->IsCancelled()) {
+        return;
+      }
+      structure_.NearestOfEach(leaf, workspace, std::span(nearest_sq).first(bucket.count));
+      for (uint32_t i = 0; i < bucket.count; ++i) {
+        const VertexId v = bucket.ids[i];
+        // A node x farther from v than h(x) is farther than h(v) / 2, as h is 1-Lipschitz.
+        first_sq[Index(v)] = FirstEdgeSq(demands, structure_.point(v), structure_.faces(v), nearest_sq[i],
+                                         demands.sizes.AtSq(structure_.point(v)) / 4);
+      }
+    });
   });
   WELLSPACE_RETURN_IF_ERROR(context_->Check());
   schedule_.Begin(count);

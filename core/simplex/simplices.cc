@@ -17,6 +17,7 @@
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
 #include "core/simplex/simplex_list.h"
+#include "core/tree/leaf_blocks.h"
 
 namespace wellspace::core {
 namespace {
@@ -144,49 +145,15 @@ absl::StatusOr<Simplices> JoinBlocks(size_t block_count, uint64_t held_bytes, in
   return all;
 }
 
-// All vertices along the Z curve, in blocks of whole leaves.
-//
-// Thread safety: const functions may run at once.
-template <int D>
-class LeafBlocks {
- public:
-  // `tree` must not change.
-  explicit LeafBlocks(const LeafTree<D>& tree) : tree_(tree) {
-    size_t in_block = kVerticesInBlock;
-    tree.ForEachLeaf([&](NodeId leaf) {
-      const auto* bucket = tree.BucketOf(leaf);
-      if (bucket == nullptr || bucket->count == 0) {
-        return;
-      }
-      if (in_block >= kVerticesInBlock) {
-        begin_.push_back(leaves_.size());
-        in_block = 0;
-      }
-      leaves_.push_back(leaf);
-      in_block += bucket->count;
-    });
-    begin_.push_back(leaves_.size());
-  }
-
-  size_t count() const { return begin_.size() - 1; }
-  uint64_t MemoryBytes() const { return leaves_.size() * sizeof(NodeId) + begin_.size() * sizeof(size_t); }
-
-  // Calls f(VertexId) for one after the other; stops early when the context is cancelled.
-  template <typename F>
-  void ForEachVertexOf(size_t block, const RunContext& context, F f) const {
-    for (size_t i = begin_[block]; i < begin_[block + 1]; ++i) {
-      const auto* bucket = tree_.BucketOf(leaves_[i]);
-      for (uint32_t k = 0; k < bucket->count && !context.IsCancelled(); ++k) {
-        f(bucket->ids[k]);
-      }
+// Calls f(VertexId) for one after the other of a block; stops early when the context is cancelled.
+template <int D, typename F>
+void ForEachVertexOf(const LeafBlocks<D>& blocks, size_t block, const RunContext& context, F f) {
+  blocks.ForEachBucketOf(block, [&](const typename LeafTree<D>::Bucket& bucket, NodeId) {
+    for (uint32_t k = 0; k < bucket.count && !context.IsCancelled(); ++k) {
+      f(bucket.ids[k]);
     }
-  }
-
- private:
-  const LeafTree<D>& tree_;
-  std::vector<NodeId> leaves_;  // those with vertices
-  std::vector<size_t> begin_;   // by block, in leaves_; one more
-};
+  });
+}
 
 // Appends the simplex of `v` and `others`.
 template <int D>
@@ -332,9 +299,9 @@ class ListedSimplices {
 template <int D>
 absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, const StarLists<D>& stars,
                                            std::span<const uint32_t> output_index, int threads, RunContext& context) {
-  const LeafBlocks<D> blocks(structure.tree());
+  const LeafBlocks<D> blocks(structure.tree(), kVerticesInBlock);
   if (!stars.IsComplete()) {
-    const auto for_each_vertex_of = [&](size_t block, auto f) { blocks.ForEachVertexOf(block, context, f); };
+    const auto for_each_vertex_of = [&](size_t block, auto f) { ForEachVertexOf(blocks, block, context, f); };
     return JoinCells<D>(structure, output_index, blocks.count(), blocks.MemoryBytes(), threads, context,
                         for_each_vertex_of, [](VertexId) { return true; });
   }
@@ -348,7 +315,7 @@ absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, c
     if (!listed.has_value()) {
       listed.emplace(structure, stars, late, output_index);
     }
-    blocks.ForEachVertexOf(block, context, [&](VertexId v) { listed->Append(v, out); });
+    ForEachVertexOf(blocks, block, context, [&](VertexId v) { listed->Append(v, out); });
   };
   return JoinBlocks<D, Listed>(
       blocks.count(), held_bytes + late.MemoryBytes(), threads, context, append,

@@ -105,6 +105,63 @@ class CubeFrom {
   Axes away_sq_;
 };
 
+// Looks in a leaf for a vertex other than `but` that is nearer to `p`.
+template <int D>
+void LookInto(const LeafTree<D>& tree, NodeId leaf, const Point<D>& p, VertexId but, Neighbor& nearest) {
+  const auto* bucket = tree.BucketOf(leaf);
+  for (uint32_t i = 0; bucket != nullptr && i < bucket->count; ++i) {
+    const double distance_sq = DistanceSq<D>(bucket->positions[i], p);
+    if (distance_sq < nearest.distance_sq && bucket->ids[i] != but) {
+      nearest = {bucket->ids[i], distance_sq};
+    }
+  }
+}
+
+// Of each of different points the squared distance to the nearest other one.
+template <int D, size_t kWidth>
+WELLSPACE_INLINE void NearestAmongWith(std::span<const Point<D>> points, std::span<double> nearest_sq) {
+  using Lanes = typename Wide<kWidth>::Lanes;
+  constexpr size_t kMost = PaddedCount(LeafTree<D>::kLeafCapacity);
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  alignas(sizeof(Lanes)) double columns[D][kMost];
+  const size_t padded = PaddedCount(points.size());
+  for (int axis = 0; axis < D; ++axis) {
+    for (size_t i = 0; i < padded; ++i) {
+      columns[axis][i] = i < points.size() ? points[i][axis] : kInfinity;
+    }
+  }
+  for (size_t i = 0; i < points.size(); ++i) {
+    Lanes least = Lanes{} + kInfinity;
+    for (size_t from = 0; from < padded; from += kWidth) {
+      Lanes distance_sq{};
+      for (int axis = 0; axis < D; ++axis) {
+        const Lanes apart = LanesAt<kWidth>(columns[axis], from) - points[i][axis];
+        distance_sq += apart * apart;
+      }
+      distance_sq = distance_sq > 0 ? distance_sq : Lanes{} + kInfinity;  // but for the point itself
+      least = distance_sq < least ? distance_sq : least;
+    }
+    nearest_sq[i] = least[0];
+    for (size_t lane = 1; lane < kWidth; ++lane) {
+      nearest_sq[i] = std::min(nearest_sq[i], least[lane]);
+    }
+  }
+}
+
+template <int D>
+WELLSPACE_AVX2 void NearestAmongAvx2(std::span<const Point<D>> points, std::span<double> nearest_sq) {
+  NearestAmongWith<D, 4>(points, nearest_sq);
+}
+
+template <int D>
+void NearestAmong(std::span<const Point<D>> points, VectorUnit unit, std::span<double> nearest_sq) {
+  if (unit == VectorUnit::kAvx2) {
+    NearestAmongAvx2<D>(points, nearest_sq);
+  } else {
+    NearestAmongWith<D, 2>(points, nearest_sq);
+  }
+}
+
 // Whether `p` is farther from the faces of `cube` than a distance, by its square.
 template <int D>
 bool LiesDeeperThan(const Point<D>& p, double distance_sq, const Box<D>& cube) {
@@ -320,30 +377,39 @@ Neighbor QueryStructure<D>::NearestTo(const Point<D>& p, VertexId near, Workspac
                  workspace);
 }
 
+template <int D>
+void QueryStructure<D>::NearestOfEach(NodeId leaf, Workspace<D>& workspace, std::span<double> nearest_sq) const {
+  const auto* bucket = tree_.BucketOf(leaf);
+  NearestAmong<D>({bucket->positions, bucket->count}, workspace.unit, nearest_sq);
+  const Box<D> cube = tree_.BoxOf(leaf);
+  for (uint32_t i = 0; i < bucket->count; ++i) {
+    const Point<D>& p = bucket->positions[i];
+    if (!LiesDeeperThan<D>(p, nearest_sq[i], cube)) {
+      nearest_sq[i] = FindBeyond(p, leaf, {kNoVertex, nearest_sq[i]}, workspace).distance_sq;
+    }
+  }
+}
+
 // The vertex other than `but` that is nearest to `p`, a point of `leaf`, and nearer than the limit.
 template <int D>
 Neighbor QueryStructure<D>::Nearest(const Point<D>& p, NodeId leaf, VertexId but, double limit_sq,
                                     Workspace<D>& workspace) const {
   Neighbor nearest{kNoVertex, limit_sq};
-  const auto look_into = [&](NodeId opened) {
-    const auto* bucket = tree_.BucketOf(opened);
-    for (uint32_t i = 0; bucket != nullptr && i < bucket->count; ++i) {
-      const double distance_sq = DistanceSq<D>(bucket->positions[i], p);
-      if (distance_sq < nearest.distance_sq && bucket->ids[i] != but) {
-        nearest = {bucket->ids[i], distance_sq};
-      }
-    }
-  };
-  look_into(leaf);
-  if (!LiesDeeperThan<D>(p, nearest.distance_sq, tree_.BoxOf(leaf))) {
-    ScanOutward(
-        p, leaf, workspace, [&] { return nearest.distance_sq; }, [](NodeId) { return true; },
-        [&](NodeId opened) {
-          if (opened != leaf) {
-            look_into(opened);
-          }
-        });
-  }
+  LookInto<D>(tree_, leaf, p, but, nearest);
+  return LiesDeeperThan<D>(p, nearest.distance_sq, tree_.BoxOf(leaf)) ? nearest
+                                                                      : FindBeyond(p, leaf, nearest, workspace);
+}
+
+// The vertex that is nearest to `p`, a point of `leaf`: `nearest`, or one in another leaf that is nearer.
+template <int D>
+Neighbor QueryStructure<D>::FindBeyond(const Point<D>& p, NodeId leaf, Neighbor nearest, Workspace<D>& workspace) const {
+  ScanOutward(
+      p, leaf, workspace, [&] { return nearest.distance_sq; }, [](NodeId) { return true; },
+      [&](NodeId opened) {
+        if (opened != leaf) {
+          LookInto<D>(tree_, opened, p, kNoVertex, nearest);
+        }
+      });
   return nearest;
 }
 

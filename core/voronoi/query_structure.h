@@ -83,6 +83,13 @@ class QueryStructure {
   // Errors:     none.
   Neighbor NearestWithin(VertexId v, double limit_sq, Workspace<D>& workspace) const;
 
+  // Of each vertex of a leaf, in the order of its bucket, the squared distance to the nearest other one.
+  //
+  // REQUIRES:   `nearest_sq` is as long as the bucket; nobody waits.
+  // Complexity: O(1) for each when bottom-up.
+  // Errors:     none.
+  void NearestOfEach(NodeId leaf, Workspace<D>& workspace, std::span<double> nearest_sq) const;
+
   // What `v` is away from every other vertex, and from the faces of the box that it does not lie on, at least, as far as the tree tells: 0
   // unless v was given to Initialize.
   //
@@ -200,6 +207,7 @@ class QueryStructure {
   template <typename ReachSq, typename Wants, typename Open>
   void ScanOutwardAvx2(const Point<D>& site, NodeId own, Workspace<D>& workspace, ReachSq& reach_sq, Wants& wants,
                        Open& open) const;
+  Neighbor FindBeyond(const Point<D>& p, NodeId leaf, Neighbor nearest, Workspace<D>& workspace) const;
   Neighbor Nearest(const Point<D>& p, NodeId leaf, VertexId but, double limit_sq, Workspace<D>& workspace) const;
   // Others as in UnplacedClippedVoronoi.
   void ClipAndScan(VertexId v, double radius, TieRule rule, Workspace<D>& workspace,

@@ -99,6 +99,20 @@ TYPED_TEST(SameCellsTest, ScansAreTheSameByEveryVectorUnit) {
       ASSERT_EQ(fast.counters.leaves, plain.counters.leaves);
     }
     EXPECT_GT(fast.counters.leaves, fast.counters.queries);
+    structure.tree().ForEachLeaf([&](NodeId leaf) {
+      const auto* bucket = structure.tree().BucketOf(leaf);
+      if (bucket == nullptr) {
+        return;
+      }
+      std::vector<double> by_fast(bucket->count);
+      std::vector<double> by_plain(bucket->count);
+      structure.NearestOfEach(leaf, fast, by_fast);
+      structure.NearestOfEach(leaf, plain, by_plain);
+      ASSERT_EQ(by_fast, by_plain);
+      for (uint32_t i = 0; i < bucket->count; ++i) {
+        ASSERT_EQ(by_fast[i], structure.ApproximateNearestNeighbor(bucket->ids[i], fast).distance_sq);
+      }
+    });
   }
 }
 
