@@ -150,6 +150,7 @@ class Refinement {
   void AdmitWaiting();
   void EndRound();
   void ListStars();
+  void PrefetchAfter(const Packet<D>& packet, size_t at) const;
   void Foresee(Packet<D>& packet, Workspace<D>& workspace) const;
   void ForeseeOne(Packet<D>& packet, size_t at, Workspace<D>& workspace) const;
   absl::Status ServePacket(Packet<D>& packet);

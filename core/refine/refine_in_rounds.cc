@@ -1,5 +1,6 @@
 // The part of Refinement that several threads do at once: ADR 23.
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstddef>
@@ -20,6 +21,9 @@ constexpr size_t kLeastInRounds = 64;
 // A bucket is cut into so many stretches, of which each half is served by turns, so many vertices of each at a time.
 constexpr size_t kStretches = 8;
 constexpr size_t kPacket = 128;
+
+// How many vertices before its turn each step of QueryStructure::Prefetch is taken for one.
+constexpr std::array<size_t, 3> kAhead = {8, 4, 2};
 
 }  // namespace
 
@@ -209,11 +213,22 @@ void Refinement<D>::ListStars() {
   own_stars_.clear();
 }
 
+// Asks the memory for what queries about the vertices after the one in that place will read.
+template <int D>
+void Refinement<D>::PrefetchAfter(const Packet<D>& packet, size_t at) const {
+  for (int step = 0; step < static_cast<int>(kAhead.size()); ++step) {
+    if (at + kAhead[step] < packet.vertices.size()) {
+      structure_.Prefetch(packet.vertices[at + kAhead[step]], step);
+    }
+  }
+}
+
 // Foresees those of a packet who have not been served. Nothing but the packet and the workspace is written.
 template <int D>
 void Refinement<D>::Foresee(Packet<D>& packet, Workspace<D>& workspace) const {
   for (size_t i = packet.served; i < packet.vertices.size(); ++i) {
     packet.BeginForeseen(i);
+    PrefetchAfter(packet, i);
     if (packet.foreseen[i].is_wanted && !context_->IsCancelled()) {
       ForeseeOne(packet, i, workspace);
       if (!packet.foreseen[i].is_known) {
@@ -270,6 +285,9 @@ absl::Status Refinement<D>::ServePacket(Packet<D>& packet) {
     packet.NoteUnforeseen(std::span(inserted_).subspan(packet.first_unforeseen - inserted_before_));
   }
   for (; packet.served < packet.vertices.size(); ++packet.served) {
+    if (!packet.is_foreseen) {
+      PrefetchAfter(packet, packet.served);
+    }
     const size_t first = inserted_.size();
     VertexId below{};
     int bucket = 0;

@@ -85,6 +85,8 @@ class LeafTree {
   NodeId LeafHolding(VertexId near, const Point<D>& p) const;
 
   NodeId leaf_of(VertexId v) const { return leaf_of_[Index(v)]; }
+  void PrefetchLeafOf(VertexId v) const { __builtin_prefetch(&leaf_of_[Index(v)]); }
+  void PrefetchNode(NodeId node) const { __builtin_prefetch(&At(node)); }
   uint32_t vertex_count() const { return static_cast<uint32_t>(leaf_of_.size()); }
   uint64_t leaf_count() const { return leaf_count_; }
   // Nodes are numbered from 0; not every one is a leaf.

@@ -284,6 +284,25 @@ NodeId QueryStructure<D>::LeafOf(VertexId v) const {
 }
 
 template <int D>
+void QueryStructure<D>::Prefetch(VertexId v, int step) const {
+  if (Index(v) >= tree_.vertex_count()) {
+    return;  // new, and thus at hand
+  }
+  switch (step) {
+    case 0:
+      __builtin_prefetch(&points_[Index(v)]);
+      __builtin_prefetch(&faces_[Index(v)]);
+      tree_.PrefetchLeafOf(v);
+      break;
+    case 1:
+      tree_.PrefetchNode(tree_.leaf_of(v));
+      break;
+    default:
+      core::Prefetch<D>(tree_, tree_.leaf_of(v));
+  }
+}
+
+template <int D>
 void QueryStructure<D>::MoveVertex(VertexId v, const Point<D>& p) {
   tree_.Move(v, p);
   points_[Index(v)] = p;
@@ -304,7 +323,7 @@ template <size_t kWidth, typename ReachSq, typename Wants, typename Open>
 WELLSPACE_INLINE void QueryStructure<D>::ScanOutwardWith(const Point<D>& site, NodeId own, Workspace<D>& workspace,
                                                          ReachSq& reach_sq, Wants& wants, Open& open) const {
   using Cube = CubeFrom<D, kWidth>;
-  Prefetch<D>(tree_, own);
+  core::Prefetch<D>(tree_, own);
   BeginQuery(workspace);
   typename Cube::Axes from;
   Cube::Load(site, from);
@@ -336,7 +355,7 @@ WELLSPACE_INLINE void QueryStructure<D>::ScanOutwardWith(const Point<D>& site, N
       queue.PushIf(is_new & (distance_sq <= limit_sq), distance_sq, beyond);
     });
     for (uint32_t i = old_end; i < queue.end(); ++i) {
-      Prefetch<D>(tree_, queue.leaf(i));
+      core::Prefetch<D>(tree_, queue.leaf(i));
     }
   }
   workspace.counters.leaves += leaves;

@@ -129,6 +129,13 @@ class QueryStructure {
   void UnplacedClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace, std::span<const Point<D>> others = {},
                               VertexId first_other = kNoVertex) const;
 
+  // Asks the memory for what a query about `v` begins with, which is found in three steps: to be called with each, some other queries apart, for
+  // vertices that will soon be looked at.
+  //
+  // REQUIRES:   as queries.
+  // Complexity: O(1).
+  void Prefetch(VertexId v, int step) const;
+
   // Computes in workspace.cell the whole Voronoi cell of `v`, inside walls one side of the box beyond it, ties
   // perturbed.
   //
