@@ -150,7 +150,8 @@ class Refinement {
   void AdmitWaiting();
   void EndRound();
   void ListStars();
-  void PrefetchAfter(const Packet<D>& packet, size_t at) const;
+  void PrefetchQueries(const Packet<D>& packet, size_t at) const;
+  void PrefetchServed(const Packet<D>& packet, size_t at) const;
   void Foresee(Packet<D>& packet, Workspace<D>& workspace) const;
   void ForeseeOne(Packet<D>& packet, size_t at, Workspace<D>& workspace) const;
   absl::Status ServePacket(Packet<D>& packet);

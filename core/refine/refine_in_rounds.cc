@@ -213,13 +213,28 @@ void Refinement<D>::ListStars() {
   own_stars_.clear();
 }
 
-// Asks the memory for what queries about the vertices after the one in that place will read.
+// Asks the memory for what queries about vertices of the packet after the one in that place begin with.
 template <int D>
-void Refinement<D>::PrefetchAfter(const Packet<D>& packet, size_t at) const {
+void Refinement<D>::PrefetchQueries(const Packet<D>& packet, size_t at) const {
   for (int step = 0; step < static_cast<int>(kAhead.size()); ++step) {
     if (at + kAhead[step] < packet.vertices.size()) {
       structure_.Prefetch(packet.vertices[at + kAhead[step]], step);
     }
+  }
+}
+
+// The same for what serving them reads besides.
+template <int D>
+void Refinement<D>::PrefetchServed(const Packet<D>& packet, size_t at) const {
+  if (at + kAhead[0] >= packet.vertices.size()) {
+    return;
+  }
+  const VertexId v = packet.vertices[at + kAhead[0]];
+  schedule_.Prefetch(v);
+  __builtin_prefetch(&radius_sq_[Index(v)]);
+  __builtin_prefetch(&announced_[Index(v)]);
+  if (!is_foreseen_) {
+    stars_.Prefetch(v, 0);
   }
 }
 
@@ -228,7 +243,7 @@ template <int D>
 void Refinement<D>::Foresee(Packet<D>& packet, Workspace<D>& workspace) const {
   for (size_t i = packet.served; i < packet.vertices.size(); ++i) {
     packet.BeginForeseen(i);
-    PrefetchAfter(packet, i);
+    PrefetchQueries(packet, i);
     if (packet.foreseen[i].is_wanted && !context_->IsCancelled()) {
       ForeseeOne(packet, i, workspace);
       if (!packet.foreseen[i].is_known) {
@@ -285,8 +300,9 @@ absl::Status Refinement<D>::ServePacket(Packet<D>& packet) {
     packet.NoteUnforeseen(std::span(inserted_).subspan(packet.first_unforeseen - inserted_before_));
   }
   for (; packet.served < packet.vertices.size(); ++packet.served) {
+    PrefetchServed(packet, packet.served);
     if (!packet.is_foreseen) {
-      PrefetchAfter(packet, packet.served);
+      PrefetchQueries(packet, packet.served);
     }
     const size_t first = inserted_.size();
     VertexId below{};

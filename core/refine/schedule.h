@@ -153,6 +153,9 @@ class Schedule {
 
   bool WaitsIn(VertexId v, int bucket) const { return BucketHolding(v) == bucket; }
 
+  // Asks the memory for where `v` waits.
+  void Prefetch(VertexId v) const { __builtin_prefetch(&places_[Index(v)]); }
+
   // Has a vertex that waits wait no more.
   void Take(VertexId v) {
     places_[Index(v)].bucket = kNowhere;

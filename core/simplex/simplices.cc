@@ -145,11 +145,19 @@ absl::StatusOr<Simplices> JoinBlocks(size_t block_count, uint64_t held_bytes, in
   return all;
 }
 
-// Calls f(VertexId) for one after the other of a block; stops early when the context is cancelled.
-template <int D, typename F>
-void ForEachVertexOf(const LeafBlocks<D>& blocks, size_t block, const RunContext& context, F f) {
+// How many vertices before its turn each step of a prefetch is taken for one.
+constexpr std::array<uint32_t, 3> kAhead = {6, 4, 2};
+
+// Calls f(VertexId) for one after the other of a block, and before that prefetch(VertexId, step); stops early when the context is cancelled.
+template <int D, typename Prefetch, typename F>
+void ForEachVertexOf(const LeafBlocks<D>& blocks, size_t block, const RunContext& context, Prefetch prefetch, F f) {
   blocks.ForEachBucketOf(block, [&](const typename LeafTree<D>::Bucket& bucket, NodeId) {
     for (uint32_t k = 0; k < bucket.count && !context.IsCancelled(); ++k) {
+      for (int step = 0; step < static_cast<int>(kAhead.size()); ++step) {
+        if (k + kAhead[step] < bucket.count) {
+          prefetch(bucket.ids[k + kAhead[step]], step);
+        }
+      }
       f(bucket.ids[k]);
     }
   });
@@ -301,7 +309,10 @@ absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, c
                                            std::span<const uint32_t> output_index, int threads, RunContext& context) {
   const LeafBlocks<D> blocks(structure.tree(), kVerticesInBlock);
   if (!stars.IsComplete()) {
-    const auto for_each_vertex_of = [&](size_t block, auto f) { ForEachVertexOf(blocks, block, context, f); };
+    const auto for_each_vertex_of = [&](size_t block, auto f) {
+      ForEachVertexOf(
+          blocks, block, context, [&](VertexId v, int step) { structure.Prefetch(v, step); }, f);
+    };
     return JoinCells<D>(structure, output_index, blocks.count(), blocks.MemoryBytes(), threads, context,
                         for_each_vertex_of, [](VertexId) { return true; });
   }
@@ -315,7 +326,9 @@ absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, c
     if (!listed.has_value()) {
       listed.emplace(structure, stars, late, output_index);
     }
-    ForEachVertexOf(blocks, block, context, [&](VertexId v) { listed->Append(v, out); });
+    ForEachVertexOf(
+        blocks, block, context, [&](VertexId v, int step) { stars.Prefetch(v, step); },
+        [&](VertexId v) { listed->Append(v, out); });
   };
   return JoinBlocks<D, Listed>(
       blocks.count(), held_bytes + late.MemoryBytes(), threads, context, append,
