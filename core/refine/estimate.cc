@@ -391,7 +391,7 @@ class Integrator {
   const Box<D> box_;
   const Demands<D>& demands_;
   const Terms vertices_per_term_;
-  NearestPoints<D> points_;                         // the input but the corners of the box
+  NearestPoints<D> points_;                        // the input but the corners of the box
   absl::flat_hash_map<uint32_t, double> spacing_;  // by point, where it has been asked for
   std::array<double, 1 << D> corner_spacing_{};
   uint64_t on_boundary_ = 0;  // vertices

@@ -163,6 +163,7 @@ QueryCounters Refinement<D>::counters() const {
 template <int D>
 absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& team) {
   DropRounds();
+  structure_.AdmitWaiting();  // where something was thrown
   stars_.Clear();
   radius_sq_.assign(structure_.vertex_count(), Assessment::kNone);
   watchers_.Clear();

@@ -347,13 +347,14 @@ WELLSPACE_INLINE void QueryStructure<D>::ScanOutwardWith(const Point<D>& site, N
     const uint32_t old_end = queue.end();
     // Whoever is within reach is so by leaves that are, too: those on the straight line from the site.
     const uint32_t facets = Cube(from, tree_, next.leaf).FacetsWithin(limit_sq);
-    tree_.ForEachBeyondFacets(next.leaf, facets, [&](NodeId beyond) __attribute__((always_inline)) {
-      // No branch, since none could be foretold.
-      const bool is_new = seen[Index(beyond)] != query;
-      seen[Index(beyond)] = query;
-      const double distance_sq = Cube(from, tree_, beyond).DistanceSq();
-      queue.PushIf(is_new & (distance_sq <= limit_sq), distance_sq, beyond);
-    });
+    tree_.ForEachBeyondFacets(
+        next.leaf, facets, [&](NodeId beyond) __attribute__((always_inline)) {
+          // No branch, since none could be foretold.
+          const bool is_new = seen[Index(beyond)] != query;
+          seen[Index(beyond)] = query;
+          const double distance_sq = Cube(from, tree_, beyond).DistanceSq();
+          queue.PushIf(is_new & (distance_sq <= limit_sq), distance_sq, beyond);
+        });
     for (uint32_t i = old_end; i < queue.end(); ++i) {
       core::Prefetch<D>(tree_, queue.leaf(i));
     }
@@ -421,7 +422,8 @@ Neighbor QueryStructure<D>::Nearest(const Point<D>& p, NodeId leaf, VertexId but
 
 // The vertex that is nearest to `p`, a point of `leaf`: `nearest`, or one in another leaf that is nearer.
 template <int D>
-Neighbor QueryStructure<D>::FindBeyond(const Point<D>& p, NodeId leaf, Neighbor nearest, Workspace<D>& workspace) const {
+Neighbor QueryStructure<D>::FindBeyond(const Point<D>& p, NodeId leaf, Neighbor nearest,
+                                       Workspace<D>& workspace) const {
   ScanOutward(
       p, leaf, workspace, [&] { return nearest.distance_sq; }, [](NodeId) { return true; },
       [&](NodeId opened) {
