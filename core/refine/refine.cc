@@ -27,6 +27,9 @@ constexpr double kClipRatioFactor = 1.25;
 // work has graded. Its cell is clipped so to announce it.
 constexpr double kAround = 1.5;
 
+// Room is made for at most so many times the vertices that there are, whatever is foretold.
+constexpr uint64_t kMostReserved = 8;
+
 // Vertices whose first edges one thread looks for at a time.
 constexpr size_t kScheduledTogether = 1024;
 
@@ -169,6 +172,7 @@ absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& t
   watchers_.Clear();
   announced_.assign(structure_.vertex_count(), Announced::kToAll);
   const uint32_t count = structure_.vertex_count();
+  Reserve(static_cast<uint32_t>(std::min({context_->estimated_vertices(), max_vertices_, kMostReserved * count})));
   std::vector<OwnWorkspace> workspaces(team.threads());
   HugeVector<double> first_sq(count);
   const LeafBlocks<D> blocks(structure_.tree(), kScheduledTogether);
@@ -194,6 +198,17 @@ absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& t
     schedule_.Add(VertexId{i}, first_sq[i]);
   }
   return absl::OkStatus();
+}
+
+// Makes room for so many vertices, and some more, so that arrays need not be moved as they grow; what is not used takes no memory.
+template <int D>
+void Refinement<D>::Reserve(uint32_t vertices) {
+  vertices += vertices / 8;
+  structure_.Reserve(vertices);
+  stars_.Reserve(vertices);
+  schedule_.Reserve(vertices);
+  radius_sq_.reserve(vertices);
+  announced_.reserve(vertices);
 }
 
 // Nothing shorter than this can ask for something at a vertex at `p`: an edge, if the nearest neighbour is as near as it says; a face of

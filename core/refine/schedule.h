@@ -47,6 +47,9 @@ class Schedule {
     }
   }
 
+  // Makes room for so many vertices.
+  void Reserve(uint32_t vertices) { places_.reserve(vertices); }
+
   // Puts `v`, which is new, into the block of `near`.
   void PutBeside(VertexId near, VertexId v) {
     MakeRoomFor(std::max(near, v));

@@ -64,6 +64,9 @@ class LeafTree {
   absl::Status Build(const MortonGrid<D>& grid, std::span<const Point<D>> points, uint64_t max_leaves,
                      const RunContext& context);
 
+  // Makes room for so many vertices to be told where they are.
+  void Reserve(uint32_t vertices) { leaf_of_.reserve(vertices); }
+
   // Adds vertex `v`, the one after the last, at `p`, walking from the leaf of `near`, or from the root for kNoVertex;
   // splits a leaf that is full.
   //

@@ -146,6 +146,13 @@ class QueryStructure {
   // Source:     [HT08] §1, "the entire Voronoi cell of any vertex".
   void Voronoi(VertexId v, Workspace<D>& workspace) const;
 
+  // Makes room for so many vertices.
+  void Reserve(uint32_t vertices) {
+    points_.reserve(vertices);
+    faces_.reserve(vertices);
+    tree_.Reserve(vertices);
+  }
+
   // Adds a vertex at `p`, near `near`; kNoVertex if none is known.
   //
   // REQUIRES:   p in the box and different from all vertices.

@@ -17,6 +17,9 @@ constexpr size_t kLeastShare = 8;
 // Whose lists one thread looks through at a time.
 constexpr uint32_t kVerticesTogether = 1024;
 
+// How many vertices before its turn what one lists is asked for.
+constexpr uint32_t kAhead = 6;
+
 // Fewer pairs may be held more than once.
 constexpr size_t kLeastLate = 1 << 14;
 
@@ -114,6 +117,7 @@ absl::StatusOr<LateNeighbours> LateNeighbours::Of(const StarLists<D>& lists, uin
     std::array<VertexId, D + 1> corners;
     for (uint32_t i = begin; i < end && !context.IsCancelled(); ++i) {
       corners[D] = VertexId{i};
+      lists.Prefetch(VertexId{i + kAhead}, 1);
       for (const std::array<VertexId, D>& simplex : lists.Of(corners[D])) {
         std::copy(simplex.begin(), simplex.end(), corners.begin());
         if (!lists.SomeCameAfterOthers(corners)) {

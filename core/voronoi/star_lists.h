@@ -37,6 +37,13 @@ class StarLists {
   // Errors:     none; more than 2^32 simplices cannot be numbered, and are as GiveUp().
   void Set(VertexId v, std::span<const std::array<VertexId, D>> star, uint32_t vertex_count);
 
+  // Makes room for the stars of so many vertices.
+  void Reserve(uint32_t vertices) {
+    entries_.reserve(vertices);
+    added_.reserve(vertices);
+    listed_.reserve(size_t{kListedAtAVertex} * vertices);
+  }
+
   // Forgets everything, and lists nothing until Clear(): where vertices move, or go, stars grow.
   void GiveUp();
   // Whether all that has been looked at is listed.
@@ -89,6 +96,8 @@ class StarLists {
 
  private:
   static constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
+  // Simplices that are listed for each vertex of a mesh, at most, or about so many.
+  static constexpr uint32_t kListedAtAVertex = D == 2 ? 4 : D == 3 ? 14 : 0;
 
   struct Entry {
     uint32_t begin = kNone;  // in listed_; kNone before the first look
