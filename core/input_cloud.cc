@@ -12,6 +12,7 @@
 #include "absl/strings/str_join.h"
 #include "core/base/cancellable_sort.h"
 #include "core/base/dimensions.h"
+#include "core/base/prefetch.h"
 #include "core/base/status_macros.h"
 #include "core/tree/morton.h"
 
@@ -240,7 +241,7 @@ absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<cons
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
     if (i + kAhead < count) {
-      __builtin_prefetch(&points[size_t{entries[i + kAhead].input} * D]);
+      PrefetchLine(&points[size_t{entries[i + kAhead].input} * D]);
     }
     const Point<D> p = point_of(entries[i]);
     const bool may_be_alike = i > 0 && entries[i].half == entries[i - 1].half;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/base/dimensions.h"
+#include "core/base/prefetch.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
 #include "core/refine/refine.h"
@@ -231,8 +232,8 @@ void Refinement<D>::PrefetchServed(const Packet<D>& packet, size_t at) const {
   }
   const VertexId v = packet.vertices[at + kAhead[0]];
   schedule_.Prefetch(v);
-  __builtin_prefetch(&radius_sq_[Index(v)]);
-  __builtin_prefetch(&announced_[Index(v)]);
+  PrefetchLine(&radius_sq_[Index(v)]);
+  PrefetchLine(&announced_[Index(v)]);
   if (!is_foreseen_) {
     stars_.Prefetch(v, 0);
   }

@@ -13,6 +13,7 @@
 
 #include "core/base/huge_pages.h"
 #include "core/base/ids.h"
+#include "core/base/prefetch.h"
 
 namespace wellspace::core {
 
@@ -157,7 +158,7 @@ class Schedule {
   bool WaitsIn(VertexId v, int bucket) const { return BucketHolding(v) == bucket; }
 
   // Asks the memory for where `v` waits.
-  void Prefetch(VertexId v) const { __builtin_prefetch(&places_[Index(v)]); }
+  void Prefetch(VertexId v) const { PrefetchLine(&places_[Index(v)]); }
 
   // Has a vertex that waits wait no more.
   void Take(VertexId v) {

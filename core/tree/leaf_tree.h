@@ -12,6 +12,7 @@
 #include "absl/status/status.h"
 #include "core/base/huge_pages.h"
 #include "core/base/ids.h"
+#include "core/base/prefetch.h"
 #include "core/base/run_context.h"
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
@@ -88,8 +89,8 @@ class LeafTree {
   NodeId LeafHolding(VertexId near, const Point<D>& p) const;
 
   NodeId leaf_of(VertexId v) const { return leaf_of_[Index(v)]; }
-  void PrefetchLeafOf(VertexId v) const { __builtin_prefetch(&leaf_of_[Index(v)]); }
-  void PrefetchNode(NodeId node) const { __builtin_prefetch(&At(node)); }
+  void PrefetchLeafOf(VertexId v) const { PrefetchLine(&leaf_of_[Index(v)]); }
+  void PrefetchNode(NodeId node) const { PrefetchLine(&At(node)); }
   uint32_t vertex_count() const { return static_cast<uint32_t>(leaf_of_.size()); }
   uint64_t leaf_count() const { return leaf_count_; }
   // Nodes are numbered from 0; not every one is a leaf.

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/base/dimensions.h"
+#include "core/base/prefetch.h"
 #include "core/base/status_macros.h"
 #include "core/voronoi/lane_bits.h"
 #include "core/voronoi/lanes.h"
@@ -21,9 +22,9 @@ void Prefetch(const LeafTree<D>& tree, NodeId leaf) {
   if (const auto* bucket = tree.BucketOf(leaf); bucket != nullptr) {
     const char* const positions = reinterpret_cast<const char*>(bucket->positions);
     for (size_t line = 0; line < kLines; ++line) {
-      __builtin_prefetch(positions + line * kLine);
+      PrefetchLine(positions + line * kLine);
     }
-    __builtin_prefetch(bucket->ids);
+    PrefetchLine(bucket->ids);
   }
 }
 
@@ -290,8 +291,8 @@ void QueryStructure<D>::Prefetch(VertexId v, int step) const {
   }
   switch (step) {
     case 0:
-      __builtin_prefetch(&points_[Index(v)]);
-      __builtin_prefetch(&faces_[Index(v)]);
+      PrefetchLine(&points_[Index(v)]);
+      PrefetchLine(&faces_[Index(v)]);
       tree_.PrefetchLeafOf(v);
       break;
     case 1:

@@ -15,6 +15,7 @@
 #include "absl/status/statusor.h"
 #include "core/base/huge_pages.h"
 #include "core/base/ids.h"
+#include "core/base/prefetch.h"
 #include "core/base/run_context.h"
 #include "core/voronoi/star.h"
 
@@ -64,7 +65,7 @@ class StarLists {
   // Asks the memory for what is listed for `v`, which is found in two steps: to be called with each, some other vertices apart.
   void Prefetch(VertexId v, int step) const {
     if (Index(v) < entries_.size()) {
-      step == 0 ? __builtin_prefetch(&entries_[Index(v)]) : __builtin_prefetch(Of(v).data());
+      step == 0 ? PrefetchLine(&entries_[Index(v)]) : PrefetchLine(Of(v).data());
     }
   }
 
