@@ -207,7 +207,13 @@ void Refinement<D>::EndRound() {
 // Lists the stars of vertices that have been found done, in the order in which they were.
 template <int D>
 void Refinement<D>::ListStars() {
-  for (const auto& [v, star, vertex_count] : listings_) {
+  for (size_t i = 0; i < listings_.size(); ++i) {
+    if (i + 1 < listings_.size()) {
+      for (const std::array<VertexId, D>& simplex : listings_[i + 1].star) {
+        stars_.Prefetch(simplex[0], 0);
+      }
+    }
+    const auto& [v, star, vertex_count] = listings_[i];
     stars_.Set(v, star, vertex_count);
   }
   listings_.clear();
