@@ -9,6 +9,7 @@
 namespace wellspace::core {
 
 inline constexpr size_t kHugePage = size_t{1} << 21;
+inline constexpr size_t kSmallPage = size_t{1} << 12;
 
 // Large pages are better to work on, and mostly come sooner. Where the host of a virtual machine takes back what is free, it takes back whole ones,
 // and finds each anew in milliseconds, while the system keeps small ones at hand: there those are taken, and after a while a large one is tried again.

@@ -12,8 +12,6 @@ namespace wellspace::core {
 
 namespace {
 
-constexpr size_t kSmallPage = size_t{1} << 12;
-
 constexpr size_t WholeHugePages(size_t bytes) { return (bytes + kHugePage - 1) & ~(kHugePage - 1); }
 
 // Nanoseconds that writing a byte every `step` takes.
@@ -76,21 +74,21 @@ PagePool& PagePool::Shared() {
 }
 
 void* PagePool::Take(size_t bytes) {
-  const size_t count = (bytes + kPage - 1) / kPage;
+  const size_t count = (bytes + kSmallPage - 1) / kSmallPage;
   const std::lock_guard lock(mutex_);
   auto at = std::find_if(large_pages_.begin(), large_pages_.end(),
                          [&](const auto& entry) { return entry.second.HasFree(count); });
   if (at == large_pages_.end()) {
     at = large_pages_.try_emplace(static_cast<std::byte*>(MapHugePages(kHugePage))).first;
   }
-  return at->first + at->second.Take(count) * kPage;
+  return at->first + at->second.Take(count) * kSmallPage;
 }
 
 void PagePool::GiveBack(void* memory, size_t bytes) {
   auto* const begin = static_cast<std::byte*>(memory);
   const std::lock_guard lock(mutex_);
   const auto at = std::prev(large_pages_.upper_bound(begin));
-  at->second.GiveBack((begin - at->first) / kPage, (bytes + kPage - 1) / kPage);
+  at->second.GiveBack((begin - at->first) / kSmallPage, (bytes + kSmallPage - 1) / kSmallPage);
   if (at->second.AllFree()) {
     UnmapHugePages(at->first, kHugePage);
     large_pages_.erase(at);

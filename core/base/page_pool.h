@@ -38,8 +38,6 @@ class PagePool {
   void GiveBack(void* memory, size_t bytes);
 
  private:
-  static constexpr size_t kPage = size_t{1} << 12;
-
   // Which pages of a large one are taken.
   class Pages {
    public:
@@ -52,7 +50,7 @@ class PagePool {
     void GiveBack(size_t first, size_t count) { Mark(first, count, false); }
 
    private:
-    static constexpr size_t kCount = kHugePage / kPage;
+    static constexpr size_t kCount = kHugePage / kSmallPage;
 
     void Mark(size_t first, size_t count, bool taken);
 

@@ -167,12 +167,12 @@ template <int D>
 absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& team) {
   DropRounds();
   structure_.AdmitWaiting();  // where something was thrown
-  stars_.Clear();
-  radius_sq_.assign(structure_.vertex_count(), Assessment::kNone);
-  watchers_.Clear();
-  announced_.assign(structure_.vertex_count(), Announced::kToAll);
   const uint32_t count = structure_.vertex_count();
+  stars_.Clear();
   Reserve(static_cast<uint32_t>(std::min({context_->estimated_vertices(), max_vertices_, kMostReserved * count})));
+  radius_sq_.assign(count, Assessment::kNone);
+  watchers_.Clear();
+  announced_.assign(count, Announced::kToAll);
   std::vector<OwnWorkspace> workspaces(team.threads());
   HugeVector<double> first_sq(count);
   const LeafBlocks<D> blocks(structure_.tree(), kScheduledTogether);

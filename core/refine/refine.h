@@ -151,8 +151,7 @@ class Refinement {
   void AdmitWaiting();
   void EndRound();
   void ListStars();
-  void PrefetchQueries(const Packet<D>& packet, size_t at) const;
-  void PrefetchServed(const Packet<D>& packet, size_t at) const;
+  void PrefetchServed(VertexId v) const;
   void Foresee(Packet<D>& packet, Workspace<D>& workspace) const;
   void ForeseeOne(Packet<D>& packet, size_t at, Workspace<D>& workspace) const;
   absl::Status ServePacket(Packet<D>& packet);

@@ -23,9 +23,6 @@ constexpr size_t kLeastInRounds = 64;
 constexpr size_t kStretches = 8;
 constexpr size_t kPacket = 128;
 
-// How many vertices before its turn each step of QueryStructure::Prefetch is taken for one.
-constexpr std::array<size_t, 3> kAhead = {8, 4, 2};
-
 }  // namespace
 
 // Lifts those who wait in `bucket`, the lowest, to be served in rounds; false if there are too few.
@@ -220,23 +217,9 @@ void Refinement<D>::ListStars() {
   own_stars_.clear();
 }
 
-// Asks the memory for what queries about vertices of the packet after the one in that place begin with.
+// Asks the memory for what serving `v` reads besides its query.
 template <int D>
-void Refinement<D>::PrefetchQueries(const Packet<D>& packet, size_t at) const {
-  for (int step = 0; step < static_cast<int>(kAhead.size()); ++step) {
-    if (at + kAhead[step] < packet.vertices.size()) {
-      structure_.Prefetch(packet.vertices[at + kAhead[step]], step);
-    }
-  }
-}
-
-// The same for what serving them reads besides.
-template <int D>
-void Refinement<D>::PrefetchServed(const Packet<D>& packet, size_t at) const {
-  if (at + kAhead[0] >= packet.vertices.size()) {
-    return;
-  }
-  const VertexId v = packet.vertices[at + kAhead[0]];
+void Refinement<D>::PrefetchServed(VertexId v) const {
   schedule_.Prefetch(v);
   PrefetchLine(&radius_sq_[Index(v)]);
   PrefetchLine(&announced_[Index(v)]);
@@ -250,7 +233,7 @@ template <int D>
 void Refinement<D>::Foresee(Packet<D>& packet, Workspace<D>& workspace) const {
   for (size_t i = packet.served; i < packet.vertices.size(); ++i) {
     packet.BeginForeseen(i);
-    PrefetchQueries(packet, i);
+    PrefetchAhead(std::span(packet.vertices), i, [this](VertexId v, int step) { structure_.Prefetch(v, step); });
     if (packet.foreseen[i].is_wanted && !context_->IsCancelled()) {
       ForeseeOne(packet, i, workspace);
       if (!packet.foreseen[i].is_known) {
@@ -307,10 +290,14 @@ absl::Status Refinement<D>::ServePacket(Packet<D>& packet) {
     packet.NoteUnforeseen(std::span(inserted_).subspan(packet.first_unforeseen - inserted_before_));
   }
   for (; packet.served < packet.vertices.size(); ++packet.served) {
-    PrefetchServed(packet, packet.served);
-    if (!packet.is_foreseen) {
-      PrefetchQueries(packet, packet.served);
-    }
+    PrefetchAhead(std::span(packet.vertices), packet.served, [&](VertexId v, int step) {
+      if (step == 0) {
+        PrefetchServed(v);
+      }
+      if (!packet.is_foreseen) {
+        structure_.Prefetch(v, step);
+      }
+    });
     const size_t first = inserted_.size();
     VertexId below{};
     int bucket = 0;

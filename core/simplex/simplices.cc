@@ -9,10 +9,12 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "core/base/dimensions.h"
 #include "core/base/huge_pages.h"
+#include "core/base/prefetch.h"
 #include "core/base/sort_few.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
@@ -145,19 +147,12 @@ absl::StatusOr<Simplices> JoinBlocks(size_t block_count, uint64_t held_bytes, in
   return all;
 }
 
-// How many vertices before its turn each step of a prefetch is taken for one.
-constexpr std::array<uint32_t, 3> kAhead = {6, 4, 2};
-
 // Calls f(VertexId) for one after the other of a block, and before that prefetch(VertexId, step); stops early when the context is cancelled.
 template <int D, typename Prefetch, typename F>
 void ForEachVertexOf(const LeafBlocks<D>& blocks, size_t block, const RunContext& context, Prefetch prefetch, F f) {
   blocks.ForEachBucketOf(block, [&](const typename LeafTree<D>::Bucket& bucket, NodeId) {
     for (uint32_t k = 0; k < bucket.count && !context.IsCancelled(); ++k) {
-      for (int step = 0; step < static_cast<int>(kAhead.size()); ++step) {
-        if (k + kAhead[step] < bucket.count) {
-          prefetch(bucket.ids[k + kAhead[step]], step);
-        }
-      }
+      PrefetchAhead(std::span(bucket.ids, bucket.count), k, prefetch);
       f(bucket.ids[k]);
     }
   });

@@ -32,9 +32,7 @@ class LeafQueue {
 
   // For a scan from a leaf of side `scale`: what is far nearer or far farther than that is in one class.
   WELLSPACE_INLINE LeafQueue(Memory& memory, double scale)
-      : memory_(memory), base_(Class(scale * scale) - kNearClasses), last_(kFirstOfClasses) {
-    Reserve(0);
-  }
+      : memory_(memory), base_(Class(scale * scale) - kNearClasses), last_(kFirstOfClasses) {}
   WELLSPACE_INLINE bool IsEmpty() const { return waiting_ == 0; }
 
   // Makes room for so many more.

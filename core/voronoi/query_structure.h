@@ -129,8 +129,7 @@ class QueryStructure {
   void UnplacedClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace, std::span<const Point<D>> others = {},
                               VertexId first_other = kNoVertex) const;
 
-  // Asks the memory for what a query about `v` begins with, which is found in three steps: to be called with each, some other queries apart, for
-  // vertices that will soon be looked at.
+  // Asks the memory for what a query about `v` begins with, which is found in three steps (PrefetchAhead).
   //
   // REQUIRES:   as queries.
   // Complexity: O(1).

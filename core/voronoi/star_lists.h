@@ -62,10 +62,12 @@ class StarLists {
     return {listed_.data() + entry.begin, entry.count};
   }
 
-  // Asks the memory for what is listed for `v`, which is found in two steps: to be called with each, some other vertices apart.
+  // Asks the memory for what is listed for `v`, which is found in two steps (PrefetchAhead).
   void Prefetch(VertexId v, int step) const {
-    if (Index(v) < entries_.size()) {
-      step == 0 ? PrefetchLine(&entries_[Index(v)]) : PrefetchLine(Of(v).data());
+    if (step == 0 && Index(v) < entries_.size()) {
+      PrefetchLine(&entries_[Index(v)]);
+    } else if (step == 1) {
+      PrefetchLine(Of(v).data());
     }
   }
 
