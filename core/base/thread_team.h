@@ -12,6 +12,9 @@
 #include <cstddef>
 #include <functional>
 #include <utility>
+#include <vector>
+
+#include "absl/status/status.h"
 
 #ifdef __SANITIZE_THREAD__
 #include <sanitizer/tsan_interface.h>
@@ -45,6 +48,19 @@ class ThreadTeam {
     Acquire(&ended_);
   }
 
+  // As ForEach, for calls that return an absl::Status: of those that are not ok that of the lowest i is returned. A single call is made by the caller.
+  template <typename F>
+  absl::Status TryForEach(size_t count, const F& f) {
+    if (count == 1) {
+      return f(size_t{0});
+    }
+    std::vector<absl::Status> statuses(count);
+    ForEach(count, [&](size_t i) { statuses[i] = f(i); });
+    const auto failed =
+        std::find_if(statuses.begin(), statuses.end(), [](const absl::Status& status) { return !status.ok(); });
+    return failed == statuses.end() ? absl::OkStatus() : *failed;
+  }
+
   // Has the other threads begin such a loop, while the caller goes on. Nothing that f reads may be written until End or Drop,
   // which has to be called before the next loop.
   void Begin(size_t count, std::function<void(size_t)> f) {
@@ -57,6 +73,20 @@ class ThreadTeam {
       for (int thread = 1; thread < threads_; ++thread) {
         group_.run([this] { Work(); });
       }
+    });
+  }
+
+  // Has another thread call f() once, while the caller goes on, be it with a loop. Nothing that f reads may be written until End or Drop, which
+  // wait for it, too, and have to be called before the next such call.
+  void BeginCall(std::function<void()> f) {
+    call_ = std::move(f);
+    Release(&begun_);
+    arena_.execute([&] {
+      group_.run([this] {
+        Acquire(&begun_);
+        call_();
+        Release(&ended_);
+      });
     });
   }
 
@@ -115,6 +145,7 @@ class ThreadTeam {
 
   const int threads_;
   tbb::task_arena arena_;
+  std::function<void()> call_;
   std::function<void(size_t)> f_;
   size_t count_ = 0;
   std::atomic<size_t> next_ = 0;

@@ -166,9 +166,12 @@ class Integrator {
       if ((i & 0xfff) == 0) {
         WELLSPACE_RETURN_IF_ERROR(context.Check());
       }
-      const int faces = std::popcount(structure.faces(VertexId{i}));
-      on_boundary_ += faces > 0 ? 1 : 0;
-      if (faces == D) {
+      const FaceMask faces = structure.faces(VertexId{i});
+      if (faces == 0) {
+        continue;
+      }
+      ++on_boundary_;
+      if (std::popcount(faces) == D) {
         corners.push_back(i);
       }
     }

@@ -65,13 +65,16 @@ absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices
   }
   team_ = &team;
   const absl::Cleanup end = [this] {
-    if (is_ahead_) {  // something has been thrown
+    if (is_ahead_ || is_listing_) {  // something has been thrown
       team_->Drop();
       is_ahead_ = false;
+      is_listing_ = false;
     }
     team_ = nullptr;
   };
   const absl::Status status = Loop();
+  AwaitOthers();
+  packets_before_ = {};
   for (const OwnWorkspace& workspace : round_workspaces_) {
     own_.counters.Add(workspace.counters);
   }
@@ -88,8 +91,11 @@ absl::Status Refinement<D>::Loop() {
     int bucket = 0;
     if (BeginRounds(lowest)) {
       WELLSPACE_RETURN_IF_ERROR(ServeRounds());
-    } else if (schedule_.Pop(v, bucket)) {
-      WELLSPACE_RETURN_IF_ERROR(Serve(v, bucket));
+    } else {
+      AwaitOthers();
+      if (schedule_.Pop(v, bucket)) {
+        WELLSPACE_RETURN_IF_ERROR(Serve(v, bucket));
+      }
     }
   }
   if constexpr (kChecks) {
@@ -174,7 +180,7 @@ absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& t
   watchers_.Clear();
   announced_.assign(count, Announced::kToAll);
   std::vector<OwnWorkspace> workspaces(team.threads());
-  HugeVector<double> first_sq(count);
+  HugeVector<int16_t> first_bucket(count);
   const LeafBlocks<D> blocks(structure_.tree(), kScheduledTogether);
   team.ForEach(blocks.count(), [&](size_t block) {
     Workspace<D>& workspace = workspaces[ThreadTeam::CurrentThread()];
@@ -187,15 +193,16 @@ absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& t
       for (uint32_t i = 0; i < bucket.count; ++i) {
         const VertexId v = bucket.ids[i];
         // A node x farther from v than h(x) is farther than h(v) / 2, as h is 1-Lipschitz.
-        first_sq[Index(v)] = FirstEdgeSq(demands, structure_.point(v), structure_.faces(v), nearest_sq[i],
-                                         demands.sizes.AtSq(structure_.point(v)) / 4);
+        first_bucket[Index(v)] = static_cast<int16_t>(
+            schedule_.BucketOf(FirstEdgeSq(demands, structure_.point(v), structure_.faces(v), nearest_sq[i],
+                                           demands.sizes.AtSq(structure_.point(v)) / 4)));
       }
     });
   });
   WELLSPACE_RETURN_IF_ERROR(context_->Check());
   schedule_.Begin(count);
   for (uint32_t i = 0; i < count; ++i) {
-    schedule_.Add(VertexId{i}, first_sq[i]);
+    schedule_.AddToBucket(VertexId{i}, first_bucket[i]);
   }
   return absl::OkStatus();
 }

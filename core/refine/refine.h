@@ -148,6 +148,7 @@ class Refinement {
   absl::Status ServeRounds();
   absl::Status ServeRound();
   void LookAhead();
+  void AwaitOthers();
   void AdmitWaiting();
   void EndRound();
   void ListStars();
@@ -176,10 +177,11 @@ class Refinement {
 
   // Those of a bucket who are served in rounds, but for those who have moved on.
   int round_bucket_ = -1;
-  HugeVector<VertexId> lifted_;     // the last of each stretch is the next
-  std::vector<Packet<D>> packets_;  // by stretch, the next of each; none if nobody is served so
-  size_t turn_ = 0;                 // whether the packets of the first half are next, or those of the second
-  std::vector<Point<D>> inserted_;  // in these rounds, where they are foreseen, from inserted_before_ on
+  HugeVector<VertexId> lifted_;            // the last of each stretch is the next
+  std::vector<Packet<D>> packets_;         // by stretch, the next of each; none if nobody is served so
+  std::vector<Packet<D>> packets_before_;  // those of the bucket before, whose stars may be listed still
+  size_t turn_ = 0;                        // whether the packets of the first half are next, or those of the second
+  std::vector<Point<D>> inserted_;         // in these rounds, where they are foreseen, from inserted_before_ on
   size_t inserted_before_ = 0;
 
   // Of the run.
@@ -191,7 +193,9 @@ class Refinement {
   ThreadTeam* team_ = nullptr;                  // null between runs
   std::vector<OwnWorkspace> round_workspaces_;  // by thread
   bool is_ahead_ = false;                       // other threads may be at work: vertices that are added wait
-  uint64_t bytes_ahead_ = 0;                    // of what they write, before
+  bool is_listing_ = false;                     // another thread may list stars
+  uint64_t star_bytes_ = 0;                     // in this round, before they are listed
+  uint64_t bytes_ahead_ = 0;                    // of what others write, before
   std::vector<Listing> listings_;               // what one of them lists
   std::deque<Star<D>> own_stars_;               // of those of the listings that were not foreseen
   bool is_foreseen_ = false;  // the round: insertions are noted, and what is found done goes into these

@@ -85,8 +85,10 @@ void Refinement<D>::DropRounds() {
 template <int D>
 uint64_t Refinement<D>::RoundBytes() const {
   uint64_t bytes = lifted_.size() * sizeof(VertexId);
-  for (const Packet<D>& packet : packets_) {
-    bytes += packet.MemoryBytes();
+  for (const auto* packets : {&packets_, &packets_before_}) {
+    for (const Packet<D>& packet : *packets) {
+      bytes += packet.MemoryBytes();
+    }
   }
   for (const OwnWorkspace& workspace : round_workspaces_) {
     bytes += workspace.seen.size() * sizeof(uint32_t);
@@ -107,16 +109,13 @@ absl::Status Refinement<D>::ServeRounds() {
     }
     const absl::Status status = ServeRound();
     EndRound();
-    if (!status.ok()) {
-      ListStars();
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(status);
     for (Packet<D>& packet : HalfOf(turn_)) {
       TakeNext(packet);
     }
     turn_ = 1 - turn_;
     if (std::all_of(packets_.begin(), packets_.end(), [](const Packet<D>& packet) { return packet.IsServed(); })) {
-      ListStars();
+      packets_before_ = std::move(packets_);
       packets_.clear();
       lifted_ = {};
     }
@@ -162,38 +161,45 @@ void Refinement<D>::LookAhead() {
     team_->ForEach(now.size(), [&](size_t i) { foresee(now[i]); });
   }
   prepare(then);
-  bytes_ahead_ = stars_.MemoryBytes() + RoundBytes();
+  bytes_ahead_ = star_bytes_ + RoundBytes();
   is_ahead_ = true;
   is_foreseen_ = true;
-  team_->Begin(then.size() + 1, [this, then, foresee](size_t i) {
-    if (i == 0) {
-      ListStars();
-    } else {
-      foresee(then[i - 1]);
-    }
-  });
+  team_->Begin(then.size(), [then, foresee](size_t i) { foresee(then[i]); });
+}
+
+// Returns when other threads have done what was begun.
+template <int D>
+void Refinement<D>::AwaitOthers() {
+  if (is_ahead_ || is_listing_) {
+    team_->End();
+    is_ahead_ = false;
+    is_listing_ = false;
+  }
 }
 
 // Has queries find all vertices that have been added, once other threads have done what was begun.
 template <int D>
 void Refinement<D>::AdmitWaiting() {
-  if (is_ahead_) {
-    team_->End();
-    is_ahead_ = false;
-  }
+  AwaitOthers();
   structure_.AdmitWaiting();
 }
 
-// Ends what LookAhead has begun.
+// Ends what LookAhead has begun, and has another thread list stars.
 template <int D>
 void Refinement<D>::EndRound() {
-  AdmitWaiting();
+  AwaitOthers();
   is_foreseen_ = false;
   std::swap(listings_, later_listings_);
   std::swap(own_stars_, later_own_stars_);
   for (Packet<D>& packet : HalfOf(turn_)) {
     std::swap(packet.simplices, packet.listed);
   }
+  star_bytes_ = stars_.MemoryBytes();
+  if (!listings_.empty()) {
+    is_listing_ = true;
+    team_->BeginCall([this] { ListStars(); });
+  }
+  structure_.AdmitWaiting();
   // The next packets may not have been foreseen by what has been inserted meanwhile.
   const Packet<D>& next = HalfOf(1 - turn_).front();
   const size_t is_known = next.is_foreseen ? next.first_unforeseen - inserted_before_ : inserted_.size();
@@ -387,6 +393,7 @@ absl::Status Refinement<D>::Retrace(Packet<D>& packet, size_t at) {
   template bool Refinement<D>::BeginRounds(int);       \
   template void Refinement<D>::DropRounds();           \
   template uint64_t Refinement<D>::RoundBytes() const; \
+  template void Refinement<D>::AwaitOthers();          \
   template void Refinement<D>::AdmitWaiting();         \
   template absl::Status Refinement<D>::ServeRounds();
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)

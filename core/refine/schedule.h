@@ -3,6 +3,7 @@
 #define WELLSPACE_CORE_REFINE_SCHEDULE_H_
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -35,9 +36,14 @@ class Schedule {
   explicit Schedule(double shortest) : first_exponent_(std::ilogb(shortest * shortest)) {}
 
   // REQUIRES:   length_sq is a finite number above zero.
-  int BucketOf(double length_sq) const { return std::max(0, std::ilogb(length_sq) - first_exponent_); }
+  int BucketOf(double length_sq) const {
+    const int exponent = static_cast<int>(std::bit_cast<uint64_t>(length_sq) >> kMantissaBits) - kExponentBias;
+    return std::max(0, exponent - first_exponent_);
+  }
   // The squared length at which `bucket` ends.
-  double UpperLengthSq(int bucket) const { return std::ldexp(1.0, first_exponent_ + bucket + 1); }
+  double UpperLengthSq(int bucket) const {
+    return std::bit_cast<double>(static_cast<uint64_t>(first_exponent_ + bucket + 1 + kExponentBias) << kMantissaBits);
+  }
 
   // Has buckets put in order again. Vertices below `count` that are in no block yet are put into blocks by their numbers.
   void Begin(uint32_t count) {
@@ -167,6 +173,10 @@ class Schedule {
   }
 
  private:
+  // Of a double.
+  static constexpr int kMantissaBits = 52;
+  static constexpr int kExponentBias = 1023;
+
   static constexpr int16_t kNowhere = std::numeric_limits<int16_t>::max();
   static constexpr uint32_t kMostBlocks = uint32_t{1} << 16;
 

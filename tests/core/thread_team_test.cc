@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstddef>
 #include <new>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -44,6 +45,45 @@ TEST(ThreadTeamTest, BeginAndEndCallOnceForEachWhileTheCallerGoesOn) {
           EXPECT_LT(thread, team.threads());
         }
       }
+    }
+  }
+}
+
+TEST(ThreadTeamTest, TryForEachReturnsTheFirstError) {
+  for (const int threads : {1, 2}) {
+    ThreadTeam team(threads);
+    for (const size_t count : kCounts) {
+      std::vector<int> calls(count);
+      EXPECT_TRUE(team.TryForEach(count,
+                                  [&](size_t i) {
+                                    ++calls[i];
+                                    return absl::OkStatus();
+                                  })
+                      .ok());
+      EXPECT_EQ(calls, std::vector<int>(count, 1));
+    }
+    const absl::Status status = team.TryForEach(
+        100, [](size_t i) { return i % 10 == 7 ? absl::InvalidArgumentError(std::to_string(i)) : absl::OkStatus(); });
+    EXPECT_EQ(status, absl::InvalidArgumentError("7"));
+    EXPECT_EQ(team.TryForEach(1, [](size_t) { return absl::CancelledError(); }), absl::CancelledError());
+  }
+}
+
+TEST(ThreadTeamTest, EndWaitsForACallBesideALoop) {
+  for (const int threads : {1, 2}) {
+    ThreadTeam team(threads);
+    for (int repeat = 0; repeat < 100; ++repeat) {
+      int called = 0;
+      team.BeginCall([&] { ++called; });
+      if (repeat % 2 == 0) {
+        std::vector<int> calls(10);
+        team.Begin(calls.size(), [&](size_t i) { ++calls[i]; });
+        team.End();
+        EXPECT_EQ(calls, std::vector<int>(calls.size(), 1));
+      } else {
+        team.End();
+      }
+      EXPECT_EQ(called, 1);
     }
   }
 }
