@@ -1,6 +1,7 @@
 #include "core/input_cloud.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <string>
@@ -14,6 +15,7 @@
 #include "core/base/dimensions.h"
 #include "core/base/prefetch.h"
 #include "core/base/status_macros.h"
+#include "core/base/thread_team.h"
 #include "core/tree/morton.h"
 
 namespace wellspace::core {
@@ -86,9 +88,17 @@ absl::Status CheckFaces(const Domain<D>& domain, const Point<D>& p, std::span<co
 
 // A point that is sorted: half of its prefix on the Z curve, and its number.
 struct Entry {
-  uint32_t half = 0;
-  uint32_t input = 0;
+  uint32_t half;
+  uint32_t input;
 };
+
+// Points that one thread looks at at a time; fewer are sorted by one alone.
+constexpr size_t kBlock = kStepsBetweenChecks;
+
+// Parts into which more are shared out before they are sorted, by the highest bits of their halves.
+constexpr int kPartBits = 8;
+constexpr size_t kParts = size_t{1} << kPartBits;
+size_t PartOf(const Entry& entry) { return entry.half >> (32 - kPartBits); }
 
 // Sorts by those halves. `scratch` is as long.
 absl::Status SortByHalves(std::span<Entry> entries, std::span<Entry> scratch, const RunContext& context) {
@@ -114,23 +124,213 @@ absl::Status ForEachRun(std::span<const Entry> entries, F f, const RunContext& c
   return absl::OkStatus();
 }
 
-// Sorts entries by cube_of(entry) on the Z curve, those of one cube by number. `with_cubes` is scratch.
-template <int D, typename CubeOf>
-absl::Status SortByCubes(std::span<Entry> entries, CubeOf cube_of,
-                         std::vector<std::pair<GridPoint<D>, Entry>>& with_cubes, const RunContext& context) {
-  with_cubes.clear();
-  for (const Entry& entry : entries) {
-    with_cubes.emplace_back(cube_of(entry), entry);
+// Sorts the points of a cloud, by several threads.
+template <int D>
+class CloudSorter {
+ public:
+  CloudSorter(const Domain<D>& domain, std::span<const double> points, int threads, const RunContext& context)
+      : domain_(domain),
+        grid_(domain.scaled_box, points.size() / D),
+        points_(points),
+        count_(points.size() / D),
+        context_(context),
+        team_(threads),
+        memory_(MakeHugePageBytes(count_ * sizeof(Entry))),
+        scratch_memory_(MakeHugePageBytes(count_ * sizeof(Entry))),
+        entries_(reinterpret_cast<Entry*>(memory_.get()), count_),
+        scratch_(reinterpret_cast<Entry*>(scratch_memory_.get()), count_) {}
+
+  absl::StatusOr<SortedCloud<D>> Sort() {
+    counts_.assign((count_ + kBlock - 1) / kBlock, {});
+    const auto make_entries = [this](size_t block) { return MakeEntries(block); };
+    WELLSPACE_RETURN_IF_ERROR(team_.TryForEach(counts_.size(), make_entries));
+    if (counts_.size() > 1) {
+      ShareOut();
+    } else {
+      part_begins_ = {0, count_};
+    }
+    SortedCloud<D> cloud{grid_, {}, {}, {}};
+    // The corners of the box follow, and as many vertices as are added to most clouds; what is not used takes no memory.
+    cloud.points.reserve(2 * count_ + count_ / 4 + (size_t{1} << D));
+    cloud.points.resize(count_);
+    cloud.first_input.resize(count_);
+    parts_.resize(part_begins_.size() - 1);
+    const auto take_part = [&](size_t part) {
+      const absl::Status status = SortPart(part);
+      return status.ok() ? TakePoints(part, cloud) : status;
+    };
+    WELLSPACE_RETURN_IF_ERROR(team_.TryForEach(parts_.size(), take_part));
+    CloseGaps(cloud);
+    return cloud;
   }
-  WELLSPACE_RETURN_IF_ERROR(CancellableSort(
-      with_cubes,
-      [](const auto& a, const auto& b) {
-        return a.first != b.first ? MortonLess<D>(a.first, b.first) : a.second.input < b.second.input;
-      },
-      context));
-  std::transform(with_cubes.begin(), with_cubes.end(), entries.begin(), [](const auto& one) { return one.second; });
-  return absl::OkStatus();
-}
+
+ private:
+  // What is found when the points of a part are taken.
+  struct Part {
+    size_t distinct = 0;
+    std::vector<typename SortedCloud<D>::Duplicate> duplicates;  // `sorted` counts from the begin of the part
+  };
+
+  Point<D> PointOf(const Entry& entry) const { return domain_.Scaled(PointAt<D>(points_, entry.input)); }
+  GridPoint<D> CubeOf(const Entry& entry) const { return grid_.CubeOf(PointOf(entry)); }
+
+  // Makes the entries of a block of points, which are checked.
+  absl::Status MakeEntries(size_t block) {
+    WELLSPACE_RETURN_IF_ERROR(context_.Check());
+    const Box<D>& box = domain_.box;
+    const double unscale = 1 / domain_.scale;  // a power of two
+    std::array<uint32_t, kParts> counts{};
+    for (size_t i = block * kBlock; i < std::min(count_, (block + 1) * kBlock); ++i) {
+      const Point<D> p = PointAt<D>(points_, i);
+      if (!box.Contains(p)) {
+        WELLSPACE_RETURN_IF_ERROR(CheckFinite<D>(p, i));
+        return absl::InvalidArgumentError(absl::StrCat(
+            "points[", i, "] = ", FormatCoordinates(p), " lies outside the domain ", FormatCoordinates(box.low), " to ",
+            FormatCoordinates(box.high), "; enlarge the domain or drop the point"));
+      }
+      const Point<D> scaled_p = domain_.Scaled(p);
+      for (int k = 0; k < D; ++k) {
+        if (scaled_p[k] * unscale != p[k]) {
+          return absl::InvalidArgumentError(absl::StrFormat(
+              "points[%d]: coordinate %d is %g, too small for the arithmetic of doubles beside a domain of "
+              "side %g; make it 0, or give a smaller domain",
+              i, k, p[k], box.LongestSide()));
+        }
+      }
+      const uint64_t prefix = MortonPrefix<D, 32>(grid_.CubeOf(scaled_p), grid_.levels());
+      entries_[i] = {static_cast<uint32_t>(prefix >> 32), static_cast<uint32_t>(i)};
+      ++counts[PartOf(entries_[i])];
+    }
+    counts_[block] = counts;
+    return absl::OkStatus();
+  }
+
+  // Puts the entries of each part side by side.
+  void ShareOut() {
+    size_t place = 0;
+    for (size_t part = 0; part < kParts; ++part) {
+      part_begins_.push_back(place);
+      for (std::array<uint32_t, kParts>& counts : counts_) {
+        place += std::exchange(counts[part], static_cast<uint32_t>(place));
+      }
+    }
+    part_begins_.push_back(place);
+    team_.ForEach(counts_.size(), [this](size_t block) {
+      for (size_t i = block * kBlock; i < std::min(count_, (block + 1) * kBlock); ++i) {
+        scratch_[counts_[block][PartOf(entries_[i])]++] = entries_[i];
+      }
+    });
+    std::swap(entries_, scratch_);
+  }
+
+  std::span<Entry> EntriesOf(size_t part) const {
+    return entries_.subspan(part_begins_[part], part_begins_[part + 1] - part_begins_[part]);
+  }
+
+  // Sorts a part by the upper halves of the prefixes; those that share it, which are few in most clouds, by the lower, and then by what
+  // follows.
+  absl::Status SortPart(size_t part) const {
+    WELLSPACE_RETURN_IF_ERROR(context_.Check());
+    const std::span<Entry> entries = EntriesOf(part);
+    const std::span<Entry> scratch = scratch_.subspan(part_begins_[part], entries.size());
+    WELLSPACE_RETURN_IF_ERROR(SortByHalves(entries, scratch, context_));
+    std::vector<std::pair<GridPoint<D>, Entry>> with_cubes;
+    const auto sort_run = [&](size_t begin, size_t size) {
+      const std::span<Entry> run = entries.subspan(begin, size);
+      for (Entry& entry : run) {
+        entry.half = static_cast<uint32_t>(MortonPrefix<D>(CubeOf(entry), grid_.levels()));
+      }
+      WELLSPACE_RETURN_IF_ERROR(SortByHalves(run, scratch.subspan(begin, size), context_));
+      const auto sort_alike = [&](size_t from, size_t alike) {
+        return SortByCubes(run.subspan(from, alike), with_cubes);
+      };
+      return ForEachRun(run, sort_alike, context_);
+    };
+    return ForEachRun(entries, sort_run, context_);
+  }
+
+  // Sorts entries by their cubes on the Z curve, those of one cube by number. `with_cubes` is scratch.
+  absl::Status SortByCubes(std::span<Entry> entries, std::vector<std::pair<GridPoint<D>, Entry>>& with_cubes) const {
+    with_cubes.clear();
+    for (const Entry& entry : entries) {
+      with_cubes.emplace_back(CubeOf(entry), entry);
+    }
+    WELLSPACE_RETURN_IF_ERROR(CancellableSort(
+        with_cubes,
+        [](const auto& a, const auto& b) {
+          return a.first != b.first ? MortonLess<D>(a.first, b.first) : a.second.input < b.second.input;
+        },
+        context_));
+    std::transform(with_cubes.begin(), with_cubes.end(), entries.begin(), [](const auto& one) { return one.second; });
+    return absl::OkStatus();
+  }
+
+  // Takes the distinct points of a part, which is sorted, to where it begins. Points of one cube are equal, or too close to be served.
+  absl::Status TakePoints(size_t part, SortedCloud<D>& cloud) {
+    const std::span<const Entry> entries = EntriesOf(part);
+    const std::span<Point<D>> points = std::span(cloud.points).subspan(part_begins_[part], entries.size());
+    const std::span<uint32_t> inputs = std::span(cloud.first_input).subspan(part_begins_[part], entries.size());
+    auto& [distinct, duplicates] = parts_[part];
+    size_t count = 0;
+    for (size_t i = 0; i < entries.size(); ++i) {
+      if (i % kStepsBetweenChecks == 0) {
+        WELLSPACE_RETURN_IF_ERROR(context_.Check());
+      }
+      if (i + kAhead < entries.size()) {
+        PrefetchLine(&points_[size_t{entries[i + kAhead].input} * D]);
+      }
+      const Point<D> p = PointOf(entries[i]);
+      const uint32_t input = entries[i].input;
+      const bool may_be_alike = i > 0 && entries[i].half == entries[i - 1].half;
+      if (!may_be_alike || CubeOf(entries[i]) != CubeOf(entries[i - 1])) {
+        WELLSPACE_RETURN_IF_ERROR(CheckFaces<D>(domain_, p, points_, input));
+        points[count] = p;
+        inputs[count] = input;
+        ++count;
+      } else if (p != points[count - 1]) {
+        return TooCloseError<D>(domain_, points_, input, std::sqrt(DistanceSq<D>(p, points[count - 1])),
+                                absl::StrCat("points[", inputs[count - 1], "]"));
+      } else {
+        duplicates.push_back({input, static_cast<uint32_t>(count - 1)});
+      }
+    }
+    distinct = count;
+    return absl::OkStatus();
+  }
+
+  // Brings the distinct points of all parts together.
+  void CloseGaps(SortedCloud<D>& cloud) const {
+    size_t to = 0;
+    for (size_t part = 0; part < parts_.size(); ++part) {
+      const auto& [distinct, duplicates] = parts_[part];
+      const size_t from = part_begins_[part];
+      if (to != from) {
+        std::copy_n(cloud.points.begin() + from, distinct, cloud.points.begin() + to);
+        std::copy_n(cloud.first_input.begin() + from, distinct, cloud.first_input.begin() + to);
+      }
+      for (const auto& [input, sorted] : duplicates) {
+        cloud.duplicates.push_back({input, static_cast<uint32_t>(to + sorted)});
+      }
+      to += distinct;
+    }
+    cloud.points.resize(to);
+    cloud.first_input.resize(to);
+  }
+
+  const Domain<D>& domain_;
+  const MortonGrid<D> grid_;
+  const std::span<const double> points_;
+  const size_t count_;
+  const RunContext& context_;
+  ThreadTeam team_;
+  const HugePageBytes memory_;
+  const HugePageBytes scratch_memory_;
+  std::span<Entry> entries_;
+  std::span<Entry> scratch_;
+  std::vector<std::array<uint32_t, kParts>> counts_;  // by block and part, entries; then where the next is put
+  std::vector<size_t> part_begins_;                   // and the end
+  std::vector<Part> parts_;
+};
 
 }  // namespace
 
@@ -178,85 +378,9 @@ absl::StatusOr<Box<D>> BoxAround(std::span<const double> points, double margin, 
 }
 
 template <int D>
-absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<const double> points,
+absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<const double> points, int threads,
                                          const RunContext& context) {
-  const Box<D>& box = domain.box;
-  const size_t count = points.size() / D;
-  SortedCloud<D> cloud{MortonGrid<D>(domain.scaled_box, count), {}, {}, {}};
-  const MortonGrid<D>& grid = cloud.grid;
-  const auto point_of = [&](const Entry& entry) { return domain.Scaled(PointAt<D>(points, entry.input)); };
-  const auto cube_of = [&](const Entry& entry) { return grid.CubeOf(point_of(entry)); };
-  const double unscale = 1 / domain.scale;  // a power of two
-  HugeVector<Entry> entries;
-  entries.reserve(count);
-  for (size_t i = 0; i < count; ++i) {
-    if (i % kStepsBetweenChecks == 0) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-    }
-    const Point<D> p = PointAt<D>(points, i);
-    if (!box.Contains(p)) {
-      WELLSPACE_RETURN_IF_ERROR(CheckFinite<D>(p, i));
-      return absl::InvalidArgumentError(absl::StrCat(
-          "points[", i, "] = ", FormatCoordinates(p), " lies outside the domain ", FormatCoordinates(box.low), " to ",
-          FormatCoordinates(box.high), "; enlarge the domain or drop the point"));
-    }
-    const Point<D> scaled_p = domain.Scaled(p);
-    for (int k = 0; k < D; ++k) {
-      if (scaled_p[k] * unscale != p[k]) {
-        return absl::InvalidArgumentError(absl::StrFormat(
-            "points[%d]: coordinate %d is %g, too small for the arithmetic of doubles beside a domain of "
-            "side %g; make it 0, or give a smaller domain",
-            i, k, p[k], box.LongestSide()));
-      }
-    }
-    const uint64_t prefix = MortonPrefix<D, 32>(grid.CubeOf(scaled_p), grid.levels());
-    entries.push_back({static_cast<uint32_t>(prefix >> 32), static_cast<uint32_t>(i)});
-  }
-  // By the upper halves of the prefixes; those that share it, which are few in most clouds, by the lower, and then by what follows.
-  {
-    const std::span<Entry> all(entries);
-    HugeVector<Entry> scratch(count);
-    std::vector<std::pair<GridPoint<D>, Entry>> with_cubes;
-    const auto sort_run = [&](size_t begin, size_t size) {
-      const std::span<Entry> run = all.subspan(begin, size);
-      for (Entry& entry : run) {
-        entry.half = static_cast<uint32_t>(MortonPrefix<D>(cube_of(entry), grid.levels()));
-      }
-      WELLSPACE_RETURN_IF_ERROR(SortByHalves(run, std::span(scratch).subspan(begin, size), context));
-      const auto sort_alike = [&](size_t from, size_t alike) {
-        return SortByCubes<D>(run.subspan(from, alike), cube_of, with_cubes, context);
-      };
-      return ForEachRun(run, sort_alike, context);
-    };
-    WELLSPACE_RETURN_IF_ERROR(SortByHalves(all, scratch, context));
-    WELLSPACE_RETURN_IF_ERROR(ForEachRun(all, sort_run, context));
-  }
-
-  // Points of one cube are equal, or too close to be served.
-  // The corners of the box may follow, and the first of the vertices that are added.
-  cloud.points.reserve(count + count / 8 + (size_t{1} << D));
-  cloud.first_input.reserve(count);
-  for (size_t i = 0; i < count; ++i) {
-    if (i % kStepsBetweenChecks == 0) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-    }
-    if (i + kAhead < count) {
-      PrefetchLine(&points[size_t{entries[i + kAhead].input} * D]);
-    }
-    const Point<D> p = point_of(entries[i]);
-    const bool may_be_alike = i > 0 && entries[i].half == entries[i - 1].half;
-    if (!may_be_alike || cube_of(entries[i]) != cube_of(entries[i - 1])) {
-      WELLSPACE_RETURN_IF_ERROR(CheckFaces<D>(domain, p, points, entries[i].input));
-      cloud.points.push_back(p);
-      cloud.first_input.push_back(entries[i].input);
-    } else if (p != cloud.points.back()) {
-      return TooCloseError<D>(domain, points, entries[i].input, std::sqrt(DistanceSq<D>(p, cloud.points.back())),
-                              absl::StrCat("points[", cloud.first_input.back(), "]"));
-    } else {
-      cloud.duplicates.push_back({entries[i].input, static_cast<uint32_t>(cloud.points.size() - 1)});
-    }
-  }
-  return cloud;
+  return CloudSorter<D>(domain, points, threads, context).Sort();
 }
 
 template <int D>
@@ -308,41 +432,47 @@ absl::Status TooCloseError(const Domain<D>& domain, std::span<const double> poin
 
 template <int D>
 absl::Status CheckSeparation(const Domain<D>& domain, const QueryStructure<D>& structure, uint32_t first,
-                             std::span<const uint32_t> first_input, std::span<const double> points,
+                             std::span<const uint32_t> first_input, std::span<const double> points, int threads,
                              const RunContext& context) {
   const double least = domain.MinSeparation();
-  Workspace<D> workspace;
   const auto count = static_cast<uint32_t>(first_input.size());
-  for (uint32_t i = 0; i < count; ++i) {
-    if (i % kQueriesBetweenChecks == 0) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
+  const auto check = [&](size_t block) {
+    Workspace<D> workspace;
+    const auto begin = static_cast<uint32_t>(block * kBlock);
+    for (uint32_t i = begin; i < std::min(count, static_cast<uint32_t>(begin + kBlock)); ++i) {
+      if (i % kQueriesBetweenChecks == 0) {
+        WELLSPACE_RETURN_IF_ERROR(context.Check());
+      }
+      const VertexId v{first + i};
+      if (structure.LeastSeparation(v) >= least) {
+        continue;
+      }
+      const size_t input = first_input[i];
+      const auto [nearest, nearest_sq] = structure.NearestWithin(v, least * least, workspace);
+      // A distance of 0 is that of a point on a corner, which is one vertex with it in the mesh.
+      if (nearest != kNoVertex && nearest_sq > 0) {
+        const uint32_t other = Index(nearest) - first;  // a corner before them wraps around
+        const bool is_input = other < count;
+        return TooCloseError<D>(domain, points, input, std::sqrt(nearest_sq),
+                                is_input ? absl::StrCat("points[", first_input[other], "]") : "a corner of the domain");
+      }
     }
-    const VertexId v{first + i};
-    if (structure.LeastSeparation(v) >= least) {
-      continue;
-    }
-    const size_t input = first_input[i];
-    const auto [nearest, nearest_sq] = structure.NearestWithin(v, least * least, workspace);
-    // A distance of 0 is that of a point on a corner, which is one vertex with it in the mesh.
-    if (nearest != kNoVertex && nearest_sq > 0) {
-      const uint32_t other = Index(nearest) - first;  // a corner before them wraps around
-      const bool is_input = other < count;
-      return TooCloseError<D>(domain, points, input, std::sqrt(nearest_sq),
-                              is_input ? absl::StrCat("points[", first_input[other], "]") : "a corner of the domain");
-    }
-  }
-  return absl::OkStatus();
+    return absl::OkStatus();
+  };
+  return ThreadTeam(threads).TryForEach((count + kBlock - 1) / kBlock, check);
 }
 
 #define WELLSPACE_INSTANTIATE(D)                                                                                       \
   template struct Domain<D>;                                                                                           \
   template struct SortedCloud<D>;                                                                                      \
   template absl::StatusOr<Box<D>> BoxAround<D>(std::span<const double>, double, const RunContext&);                    \
-  template absl::StatusOr<SortedCloud<D>> SortCloud<D>(const Domain<D>&, std::span<const double>, const RunContext&);  \
+  template absl::StatusOr<SortedCloud<D>> SortCloud<D>(const Domain<D>&, std::span<const double>, int,                 \
+                                                       const RunContext&);                                             \
   template absl::StatusOr<PointNames> NamePoints<D>(SortedCloud<D>, const RunContext&);                                \
   template absl::Status TooCloseError<D>(const Domain<D>&, std::span<const double>, size_t, double, std::string_view); \
   template absl::Status CheckSeparation<D>(const Domain<D>&, const QueryStructure<D>&, uint32_t,                       \
-                                           std::span<const uint32_t>, std::span<const double>, const RunContext&);
+                                           std::span<const uint32_t>, std::span<const double>, int,                    \
+                                           const RunContext&);
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 

@@ -79,9 +79,10 @@ struct SortedCloud {
 
 // Errors:     INVALID_ARGUMENT, naming the point: not finite, outside the domain, too small for its scale, too close to
 //             a face of the box that it does not lie on, or, in one cube of the Morton grid, to another one; CANCELLED, DEADLINE_EXCEEDED.
-// Complexity: O(n log n).
+// Complexity: O(n log n); O(n) for all but the most uneven clouds.
+// Threads:    uses `threads`, at most as many as the machine has cores; the result does not depend on them.
 template <int D>
-absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<const double> points,
+absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<const double> points, int threads,
                                          const RunContext& context);
 
 // The numbers that the points of a sorted cloud have in the mesh: in the order in which the input first has them.
@@ -106,9 +107,10 @@ absl::Status TooCloseError(const Domain<D>& domain, std::span<const double> poin
 //
 // Errors:     INVALID_ARGUMENT, naming the point; CANCELLED, DEADLINE_EXCEEDED.
 // Complexity: O(n) queries.
+// Threads:    uses `threads`, at most as many as the machine has cores.
 template <int D>
 absl::Status CheckSeparation(const Domain<D>& domain, const QueryStructure<D>& structure, uint32_t first,
-                             std::span<const uint32_t> first_input, std::span<const double> points,
+                             std::span<const uint32_t> first_input, std::span<const double> points, int threads,
                              const RunContext& context);
 
 }  // namespace wellspace::core

@@ -80,7 +80,7 @@ class MesherIn final : public Mesher {
       box = BoxOf<D>(parameters.domain_low, parameters.domain_high);
     }
     WELLSPACE_ASSIGN_OR_RETURN(domain_, Domain<D>::Of(box));
-    WELLSPACE_ASSIGN_OR_RETURN(SortedCloud<D> cloud, SortCloud<D>(domain_, points, context));
+    WELLSPACE_ASSIGN_OR_RETURN(SortedCloud<D> cloud, SortCloud<D>(domain_, points, parameters.threads, context));
     const size_t distinct = cloud.points.size();
     const uint64_t max_vertices = VertexBudget(parameters);
     if (distinct + (size_t{1} << D) > max_vertices) {
@@ -88,9 +88,10 @@ class MesherIn final : public Mesher {
           absl::StrCat("the ", distinct, " distinct points and the domain's corners are more than ",
                        "max_vertices = ", max_vertices, " vertices; raise max_vertices"));
     }
-    WELLSPACE_RETURN_IF_ERROR(structure_.Initialize(cloud.grid, std::move(cloud.points),
-                                                    kLeavesPerVertex * max_vertices + (1u << D), context));
-    WELLSPACE_RETURN_IF_ERROR(CheckSeparation<D>(domain_, structure_, 0, cloud.first_input, points, context));
+    WELLSPACE_RETURN_IF_ERROR(structure_.Initialize(
+        cloud.grid, std::move(cloud.points), kLeavesPerVertex * max_vertices + (1u << D), parameters.threads, context));
+    WELLSPACE_RETURN_IF_ERROR(
+        CheckSeparation<D>(domain_, structure_, 0, cloud.first_input, points, parameters.threads, context));
 
     WELLSPACE_ASSIGN_OR_RETURN(PointNames names, NamePoints<D>(std::move(cloud), context));
     output_index_ = std::move(names.of_sorted);
@@ -144,16 +145,16 @@ class MesherIn final : public Mesher {
     }
     WELLSPACE_RETURN_IF_ERROR(CheckVertices(near));
     const auto start = [&](size_t input) { return near.empty() ? kNoVertex : VertexOf(near[input]); };
-    WELLSPACE_ASSIGN_OR_RETURN(const SortedCloud<D> cloud, SortCloud<D>(domain_, points, context));
+    WELLSPACE_ASSIGN_OR_RETURN(const SortedCloud<D> cloud, SortCloud<D>(domain_, points, 1, context));
     // The points among themselves, and beside the faces of the box.
     QueryStructure<D> apart;
-    WELLSPACE_RETURN_IF_ERROR(apart.Initialize(cloud.grid, {}, kLeavesPerVertex * kDefaultMaxVertices, context));
+    WELLSPACE_RETURN_IF_ERROR(apart.Initialize(cloud.grid, {}, kLeavesPerVertex * kDefaultMaxVertices, 1, context));
     const uint32_t corners = apart.vertex_count();
     for (const Point<D>& p : cloud.points) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
       apart.AddVertex(kNoVertex, p);
     }
-    WELLSPACE_RETURN_IF_ERROR(CheckSeparation<D>(domain_, apart, corners, cloud.first_input, points, context));
+    WELLSPACE_RETURN_IF_ERROR(CheckSeparation<D>(domain_, apart, corners, cloud.first_input, points, 1, context));
     std::vector<VertexId> known(cloud.points.size(), kNoVertex);
     for (size_t i = 0; i < cloud.points.size(); ++i) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
@@ -189,7 +190,7 @@ class MesherIn final : public Mesher {
       return absl::ResourceExhaustedError(absl::StrCat("no more than ", kMaxVertices, " vertices can be numbered"));
     }
     const RunContext context;
-    WELLSPACE_ASSIGN_OR_RETURN(const SortedCloud<D> cloud, SortCloud<D>(domain_, point, context));
+    WELLSPACE_ASSIGN_OR_RETURN(const SortedCloud<D> cloud, SortCloud<D>(domain_, point, 1, context));
     const VertexId start = VertexOf(near);
     WELLSPACE_ASSIGN_OR_RETURN(VertexId v, Find(cloud.points[0], point, 0, start));
     if (v == kNoVertex) {

@@ -73,6 +73,7 @@ class Mesher {
   // Complexity: O(n log n + L) for L leaves. Reserves memory for them first.
   // Errors:     INVALID_ARGUMENT (parameters; NaN, infinite or outside coordinates; points closer than double
   //             arithmetic can serve), RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED, DEADLINE_EXCEEDED.
+  // Threads:    uses parameters.threads, at most as many as the machine has cores.
   // Source:     [HT08] Figure 3, INITIALIZE.
   static absl::StatusOr<std::unique_ptr<Mesher>> Create(const MeshParameters& parameters,
                                                         std::span<const double> points, RunContext& context);

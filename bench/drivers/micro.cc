@@ -59,7 +59,7 @@ core::Domain<D> UnitDomain() {
 
 template <int D>
 core::SortedCloud<D> Sorted(const std::vector<double>& points) {
-  auto cloud = core::SortCloud<D>(UnitDomain<D>(), points, core::RunContext());
+  auto cloud = core::SortCloud<D>(UnitDomain<D>(), points, 1, core::RunContext());
   ExitUnless(cloud.status());
   return *std::move(cloud);
 }
@@ -70,7 +70,7 @@ core::QueryStructure<D> Structure(int64_t count, bool is_refined) {
   core::RunContext context;
   core::QueryStructure<D> structure;
   core::SortedCloud<D> cloud = Sorted<D>(UniformPoints(D, count));
-  ExitUnless(structure.Initialize(cloud.grid, std::move(cloud.points), kMaxLeaves, context));
+  ExitUnless(structure.Initialize(cloud.grid, std::move(cloud.points), kMaxLeaves, 1, context));
   if (is_refined) {
     core::Refinement<D> refinement(structure, UnitDomain<D>().grid_step);
     core::Demands<D> demands;
@@ -133,7 +133,7 @@ void BM_Tree(benchmark::State& state) {
   const core::SortedCloud<D> cloud = Sorted<D>(UniformPoints(D, state.range(0)));
   for (auto _ : state) {
     core::QueryStructure<D> structure;
-    ExitUnless(structure.Initialize(cloud.grid, cloud.points, kMaxLeaves, core::RunContext()));
+    ExitUnless(structure.Initialize(cloud.grid, cloud.points, kMaxLeaves, 1, core::RunContext()));
     benchmark::DoNotOptimize(structure.vertex_count());
   }
   SetItems(state, state.range(0));

@@ -54,11 +54,11 @@ int Main(int argc, char** argv) {
   const Meter all;
   const auto domain = core::Domain<3>::Of({{0, 0, 0}, {1, 1, 1}});
   ExitUnless(domain.status());
-  auto cloud = core::SortCloud<3>(*domain, points, context);
+  auto cloud = core::SortCloud<3>(*domain, points, 1, context);
   ExitUnless(cloud.status());
   const size_t count = cloud->points.size();
   core::QueryStructure<3> structure;
-  ExitUnless(structure.Initialize(cloud->grid, std::move(cloud->points), uint64_t{1} << 32, context));
+  ExitUnless(structure.Initialize(cloud->grid, std::move(cloud->points), uint64_t{1} << 32, 1, context));
   const double loaded = all.Seconds();
 
   core::Workspace<3> workspace;

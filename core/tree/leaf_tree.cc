@@ -6,9 +6,13 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
+#include "core/base/thread_team.h"
 
 namespace wellspace::core {
 namespace {
+
+// Nodes whose buckets one thread fills at a time.
+constexpr size_t kFilledTogether = 4096;
 
 // The next larger number with the same bits in `fixed`.
 constexpr uint32_t NextAlong(uint32_t number, uint32_t fixed) {
@@ -19,7 +23,7 @@ constexpr uint32_t NextAlong(uint32_t number, uint32_t fixed) {
 
 template <int D>
 absl::Status LeafTree<D>::Build(const MortonGrid<D>& grid, std::span<const Point<D>> points, uint64_t max_leaves,
-                                const RunContext& context) {
+                                int threads, const RunContext& context) {
   box_ = grid.box();
   max_level_ = static_cast<uint8_t>(grid.levels());
   sides_.clear();
@@ -66,26 +70,41 @@ absl::Status LeafTree<D>::Build(const MortonGrid<D>& grid, std::span<const Point
     pending_[level] = {};
   }
 
-  for (uint32_t i = 0; i < node_count(); ++i) {
-    if (i % 4096 == 0) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-      WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(MemoryBytes() + points.size_bytes()));
-    }
-    if (!IsLeaf(NodeId{i})) {
-      continue;
-    }
-    const Range& range = ranges_[i];
-    if (range.size() != 0) {
-      At(NodeId{i}).bucket = buckets_.AddFilled(points.subspan(range.begin, range.size()), range.begin);
-      std::fill(leaf_of_.begin() + range.begin, leaf_of_.begin() + range.end, NodeId{i});
-    }
-  }
+  WELLSPACE_RETURN_IF_ERROR(FillLeaves(threads, context));
   points_ = {};
   ranges_ = {};
   pending_ = {};
   near_ = {};
   around_ = {};
   return absl::OkStatus();
+}
+
+// Puts the points into the buckets of their leaves.
+template <int D>
+absl::Status LeafTree<D>::FillLeaves(int threads, const RunContext& context) {
+  const size_t blocks = (node_count() + kFilledTogether - 1) / kFilledTogether;
+  const auto for_each_leaf_with_points = [this](size_t block, auto f) {
+    const auto end = static_cast<uint32_t>(std::min<size_t>(node_count(), (block + 1) * kFilledTogether));
+    for (auto i = static_cast<uint32_t>(block * kFilledTogether); i < end; ++i) {
+      if (IsLeaf(NodeId{i}) && ranges_[i].size() != 0) {
+        f(NodeId{i}, ranges_[i]);
+      }
+    }
+  };
+  for (size_t block = 0; block < blocks; ++block) {
+    WELLSPACE_RETURN_IF_ERROR(context.Check());
+    WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(MemoryBytes() + points_.size_bytes()));
+    for_each_leaf_with_points(
+        block, [this](NodeId leaf, const Range& range) { At(leaf).bucket = buckets_.Add(range.size()); });
+  }
+  const auto fill = [&](size_t block) {
+    for_each_leaf_with_points(block, [this](NodeId leaf, const Range& range) {
+      buckets_.Fill(At(leaf).bucket, points_.subspan(range.begin, range.size()), range.begin);
+      std::fill(leaf_of_.begin() + range.begin, leaf_of_.begin() + range.end, leaf);
+    });
+    return context.Check();
+  };
+  return ThreadTeam(threads).TryForEach(blocks, fill);
 }
 
 template <int D>

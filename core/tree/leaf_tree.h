@@ -59,10 +59,11 @@ class LeafTree {
   // Complexity: O(D 2^D L) for L leaves.
   // Errors:     RESOURCE_EXHAUSTED when it would have more than `max_leaves` leaves, or of the context's memory;
   //             CANCELLED, DEADLINE_EXCEEDED.
+  // Threads:    uses `threads`, at most as many as the machine has cores, to fill the leaves.
   // Source:     [HT08] §5; levels from the top down over sorted ranges instead of Bern, Eppstein and Teng's merging,
   //             which matters only when leaves are compressed; here every leaf is one that a mesh of optimal size
   //             needs.
-  absl::Status Build(const MortonGrid<D>& grid, std::span<const Point<D>> points, uint64_t max_leaves,
+  absl::Status Build(const MortonGrid<D>& grid, std::span<const Point<D>> points, uint64_t max_leaves, int threads,
                      const RunContext& context);
 
   // Makes room for so many vertices to be told where they are.
@@ -91,6 +92,13 @@ class LeafTree {
   NodeId leaf_of(VertexId v) const { return leaf_of_[Index(v)]; }
   void PrefetchLeafOf(VertexId v) const { PrefetchLine(&leaf_of_[Index(v)]); }
   void PrefetchNode(NodeId node) const { PrefetchLine(&At(node)); }
+  void PrefetchNeighbours(NodeId node) const {
+    for (const NodeId beyond : At(node).neighbour) {
+      if (beyond != kNoNode) {
+        PrefetchNode(beyond);
+      }
+    }
+  }
   uint32_t vertex_count() const { return static_cast<uint32_t>(leaf_of_.size()); }
   uint64_t leaf_count() const { return leaf_count_; }
   // Nodes are numbered from 0; not every one is a leaf.
@@ -236,6 +244,8 @@ class LeafTree {
   void DistributeBucket(NodeId parent);
   void Append(NodeId leaf, VertexId v, const Point<D>& p);
   NodeId LeafWithRoom(VertexId near, const Point<D>& p);
+
+  absl::Status FillLeaves(int threads, const RunContext& context);
 
   // The split rule of Build.
   bool IsTooCoarse(NodeId leaf);

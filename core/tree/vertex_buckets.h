@@ -51,16 +51,16 @@ class VertexBuckets {
     return number;
   }
 
-  // Makes a bucket of vertices at `positions`, numbered from `first` on, and returns its number.
-  uint32_t AddFilled(std::span<const Point<D>> positions, uint32_t first) {
-    const uint32_t number = Add(static_cast<uint32_t>(positions.size()));
+  // Fills an empty bucket, which has room, with vertices at `positions`, numbered from `first` on.
+  //
+  // Threads: different buckets may be filled at once.
+  void Fill(uint32_t number, std::span<const Point<D>> positions, uint32_t first) {
     Bucket& bucket = buckets_[number];
     std::copy(positions.begin(), positions.end(), bucket.positions);
     for (uint32_t i = 0; i < positions.size(); ++i) {
       bucket.ids[i] = VertexId{first + i};
     }
     bucket.count = static_cast<uint32_t>(positions.size());
-    return number;
   }
 
   // Appends `v` at `p`.

@@ -188,12 +188,15 @@ void QueryCounters::Add(const QueryCounters& other) {
 
 template <int D>
 absl::Status QueryStructure<D>::Initialize(const MortonGrid<D>& grid, HugeVector<Point<D>> points, uint64_t max_leaves,
-                                           const RunContext& context) {
+                                           int threads, const RunContext& context) {
   box_ = grid.box();
   points_ = std::move(points);
-  WELLSPACE_RETURN_IF_ERROR(tree_.Build(grid, points_, max_leaves, context));
+  const auto room = static_cast<uint32_t>(points_.capacity());
+  tree_.Reserve(room);
+  WELLSPACE_RETURN_IF_ERROR(tree_.Build(grid, points_, max_leaves, threads, context));
   vertex_count_ = static_cast<uint32_t>(points_.size());
   faces_.clear();
+  faces_.reserve(room);
   near_.clear();
   MakeRoom();
   std::array<bool, 1 << D> has_corner{};
@@ -300,6 +303,7 @@ void QueryStructure<D>::Prefetch(VertexId v, int step) const {
       break;
     default:
       core::Prefetch<D>(tree_, tree_.leaf_of(v));
+      tree_.PrefetchNeighbours(tree_.leaf_of(v));
   }
 }
 

@@ -64,8 +64,9 @@ class QueryStructure {
   // REQUIRES:   points distinct as cubes of the grid, sorted in its Morton order, in its box.
   // Complexity: O(L) for L leaves; O(n log n) has been paid for sorting.
   // Errors:     RESOURCE_EXHAUSTED when more than `max_leaves` leaves would be needed, or of the context's memory; CANCELLED, DEADLINE_EXCEEDED.
+  // Threads:    as LeafTree::Build.
   // Source:     [HT08] Figure 3, INITIALIZE.
-  absl::Status Initialize(const MortonGrid<D>& grid, HugeVector<Point<D>> points, uint64_t max_leaves,
+  absl::Status Initialize(const MortonGrid<D>& grid, HugeVector<Point<D>> points, uint64_t max_leaves, int threads,
                           const RunContext& context);
 
   // The vertex nearest to `v`, and its squared distance. Exact up to rounding, where the paper asks for a constant

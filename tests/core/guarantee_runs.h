@@ -78,7 +78,7 @@ Outcome RefineInput(const Input<D>& input, const core::Demands<D>& demands, doub
   core::QueryStructure<D> structure;
   Outcome outcome;
   outcome.status = structure.Initialize(core::MortonGrid<D>(input.box), {input.points.begin(), input.points.end()},
-                                        10'000'000, context);
+                                        10'000'000, 1, context);
   if (!outcome.status.ok()) {
     return outcome;
   }

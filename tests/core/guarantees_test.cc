@@ -172,7 +172,7 @@ TYPED_TEST(GuaranteesTest, WaitingEdgesAreSeen) {
   points[3][0] += 0.1;
   points = MortonSorted<D>(UnitBox<D>(), points);
   ASSERT_TRUE(
-      structure.Initialize(core::MortonGrid<D>(UnitBox<D>()), {points.begin(), points.end()}, 1000, context).ok());
+      structure.Initialize(core::MortonGrid<D>(UnitBox<D>()), {points.begin(), points.end()}, 1000, 1, context).ok());
   const Demands<D> demands{.rho = 2, .sizes = {}};
   EXPECT_NEAR(ShortestWaiting<D>(structure, demands).inner.length, 1e-3, 1e-12);
   EXPECT_NEAR(ShortestWaiting<D>(structure, {.criterion = Criterion::kWellSpaced, .rho = 2, .sizes = {}}).inner.length,

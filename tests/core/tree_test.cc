@@ -33,7 +33,7 @@ template <int D>
 LeafTree<D> BuildTree(const MortonGrid<D>& grid, const std::vector<Point<D>>& points) {
   RunContext context;
   LeafTree<D> tree;
-  const absl::Status built = tree.Build(grid, points, kManyLeaves, context);
+  const absl::Status built = tree.Build(grid, points, kManyLeaves, 1, context);
   EXPECT_TRUE(built.ok()) << built;
   return tree;
 }
@@ -517,7 +517,7 @@ TYPED_TEST(TreeTest, BuildAnewForgetsTheOldTree) {
   LeafTree<D> tree = BuildTree<D>(UnitGrid<D>(), test::SortedCloud<D>("uniform", 50));
   const std::vector<Point<D>> points = test::SortedCloud<D>("boundary", 20);
   RunContext context;
-  ASSERT_TRUE(tree.Build(UnitGrid<D>(), points, kManyLeaves, context).ok());
+  ASSERT_TRUE(tree.Build(UnitGrid<D>(), points, kManyLeaves, 1, context).ok());
   ExpectInvariants<D>(tree, UnitGrid<D>(), points);
 }
 
@@ -527,8 +527,8 @@ TYPED_TEST(TreeTest, BuildEndsAtItsBudget) {
   RunContext context;
   const uint64_t needed = BuildTree<D>(UnitGrid<D>(), points).leaf_count();
   LeafTree<D> tree;
-  EXPECT_TRUE(tree.Build(UnitGrid<D>(), points, needed, context).ok());
-  const absl::Status refused = tree.Build(UnitGrid<D>(), points, needed - 1, context);
+  EXPECT_TRUE(tree.Build(UnitGrid<D>(), points, needed, 1, context).ok());
+  const absl::Status refused = tree.Build(UnitGrid<D>(), points, needed - 1, 1, context);
   EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
   EXPECT_THAT(std::string(refused.message()), HasSubstr("more than " + std::to_string(needed - 1) + " leaves"));
 }
@@ -539,10 +539,10 @@ TYPED_TEST(TreeTest, BuildCanBeCancelled) {
   LeafTree<D> tree;
   RunContext cancelled;
   cancelled.Cancel();
-  EXPECT_EQ(tree.Build(UnitGrid<D>(), points, kManyLeaves, cancelled).code(), absl::StatusCode::kCancelled);
+  EXPECT_EQ(tree.Build(UnitGrid<D>(), points, kManyLeaves, 1, cancelled).code(), absl::StatusCode::kCancelled);
   RunContext late;
   late.ExceedDeadline();
-  EXPECT_EQ(tree.Build(UnitGrid<D>(), points, kManyLeaves, late).code(), absl::StatusCode::kDeadlineExceeded);
+  EXPECT_EQ(tree.Build(UnitGrid<D>(), points, kManyLeaves, 1, late).code(), absl::StatusCode::kDeadlineExceeded);
 }
 
 }  // namespace

@@ -20,7 +20,7 @@ core::QueryStructure<D> MakeStructure(const core::Box<D>& box, const std::vector
   core::RunContext context;
   core::QueryStructure<D> structure;
   const absl::Status made =
-      structure.Initialize(core::MortonGrid<D>(box), {points.begin(), points.end()}, kManyLeaves, context);
+      structure.Initialize(core::MortonGrid<D>(box), {points.begin(), points.end()}, kManyLeaves, 1, context);
   EXPECT_TRUE(made.ok()) << made;
   return structure;
 }
