@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -23,6 +24,9 @@ template <int D>
 constexpr int kRounds = D == 3 ? 12 : 2;
 constexpr double kPoorShare = 0.25;
 constexpr double kPoorestShare = 0.075;
+// Then, in 3-D, so often two vertices at a time for each simplex below the second part: one gets these shares of its limit.
+constexpr int kPairRounds = 3;
+constexpr std::array<double, 5> kPairShares = {0, 0.25, 0.5, 0.75, 0.999};
 // Vertices between two reports of progress.
 constexpr uint32_t kReportInterval = 64;
 
@@ -86,7 +90,7 @@ class Pump {
   // than before. A corner of the box keeps what it has got once.
   bool SetBest(VertexId v, double limit, double poor) {
     const double old = triangulation_.weight(v);
-    if (old > 0 && std::popcount(triangulation_.faces(v)) == D) {
+    if (old > 0 && IsCorner(v)) {
       return false;
     }
     const double before = FlattestOfStar(v);
@@ -96,14 +100,86 @@ class Pump {
     TakeWeight(v);
     Raise(v, limit);
     if (triangulation_.weight(v) != old && !(FlattestOfStar(v) < before)) {
-      TakeWeight(v);
-      triangulation_.FindCavityOfWeight(v, old, cavity_);
-      triangulation_.Insert(v, triangulation_.point(v), old, cavity_, created_);
+      SetWeight(v, old);
     }
     return triangulation_.weight(v) != old;
   }
 
+  // The vertices of a simplex, ascending.
+  using Vertices = std::array<VertexId, D + 1>;
+
+  // The simplices flatter than `poor`, in an order that does not depend on how they are numbered.
+  std::vector<Vertices> FindPoor(double poor) const {
+    std::vector<Vertices> found;
+    for (uint32_t i = 0; i < triangulation_.simplex_limit(); ++i) {
+      if (triangulation_.IsIn(SimplexId{i}) && IsPoor(SimplexId{i}, poor)) {
+        found.push_back(VerticesOf(SimplexId{i}));
+      }
+    }
+    std::sort(found.begin(), found.end());
+    return found;
+  }
+
+  // Has fewer simplices flatter than `poor` around one that is, unless it has gone: a vertex near it gets another weight, and a corner of it the
+  // best then. `limit_of`(VertexId) is the limit of a weight.
+  template <typename LimitOf>
+  void SetBestOfTwo(const Vertices& flat, LimitOf limit_of, double poor) {
+    triangulation_.Star(flat[0], star_);
+    if (std::none_of(star_.begin(), star_.end(), [&](SimplexId s) { return VerticesOf(s) == flat; })) {
+      return;
+    }
+    for (const VertexId v : flat) {
+      if (IsCorner(v)) {
+        continue;
+      }
+      std::vector<VertexId> around;
+      ListAround(v, around);
+      for (const VertexId u : around) {
+        if (u != v && !IsCorner(u) && SetBestWith(u, v, limit_of, poor)) {
+          return;
+        }
+      }
+    }
+  }
+
  private:
+  Vertices VerticesOf(SimplexId s) const {
+    Vertices vertices = triangulation_.item(s).vertices;
+    std::sort(vertices.begin(), vertices.end());
+    return vertices;
+  }
+  bool IsPoor(SimplexId s, double poor) const { return FlatnessOf<D>(triangulation_.Corners(s)) > poor; }
+  // Of the box.
+  bool IsCorner(VertexId v) const { return std::popcount(triangulation_.faces(v)) == D; }
+
+  // SetBestOfTwo for `u` and `v`: whether it has helped; nothing has changed if not.
+  template <typename LimitOf>
+  bool SetBestWith(VertexId u, VertexId v, LimitOf limit_of, double poor) {
+    const double old_u = triangulation_.weight(u);
+    const double old_v = triangulation_.weight(v);
+    near_.clear();
+    ListAround(u, near_);
+    ListAround(v, near_);
+    const Poverty before = PovertyAround(near_, poor);
+    for (const double share : kPairShares) {
+      const double weight = static_cast<float>(share * limit_of(u));
+      if (weight == triangulation_.weight(u)) {
+        continue;
+      }
+      SetWeight(u, weight);
+      SetBest(v, limit_of(v), poor);
+      if (!(FlattestOfStar(v) > poor)) {
+        const Poverty after = PovertyAround(near_, poor);
+        if (after.simplices < before.simplices && after.flattest <= before.flattest) {
+          return true;
+        }
+      }
+      SetWeight(v, old_v);
+    }
+    SetWeight(u, old_u);
+    return false;
+  }
+
   double FlattestOfStar(VertexId v) {
     triangulation_.Star(v, star_);
     double flattest = -std::numeric_limits<double>::infinity();
@@ -111,6 +187,42 @@ class Pump {
       flattest = std::max(flattest, FlatnessOf<D>(triangulation_.Corners(s)));
     }
     return flattest;
+  }
+
+  // Lists the vertices that share simplices with `v`, and v, beside those of `out`.
+  void ListAround(VertexId v, std::vector<VertexId>& out) {
+    triangulation_.Star(v, star_);
+    for (const SimplexId s : star_) {
+      out.insert(out.end(), triangulation_.item(s).vertices.begin(), triangulation_.item(s).vertices.end());
+    }
+    std::sort(out.begin(), out.end());
+    out.erase(std::unique(out.begin(), out.end()), out.end());
+  }
+
+  // Simplices flatter than a bound.
+  struct Poverty {
+    uint64_t simplices = 0;  // each counted once for each of the vertices that are looked at
+    double flattest = -std::numeric_limits<double>::infinity();
+  };
+  Poverty PovertyAround(std::span<const VertexId> vertices, double poor) {
+    Poverty poverty;
+    for (const VertexId v : vertices) {
+      const double flattest = FlattestOfStar(v);
+      poverty.flattest = std::max(poverty.flattest, flattest);
+      if (flattest > poor) {
+        poverty.simplices += std::count_if(star_.begin(), star_.end(), [&](SimplexId s) { return IsPoor(s, poor); });
+      }
+    }
+    return poverty;
+  }
+
+  // Gives `v` a weight that keeps all vertices in.
+  void SetWeight(VertexId v, double weight) {
+    TakeWeight(v);
+    if (weight > 0) {
+      triangulation_.FindCavityOfWeight(v, weight, cavity_);
+      triangulation_.Insert(v, triangulation_.point(v), weight, cavity_, created_);
+    }
   }
 
   // Puts `v` back with a weight of zero.
@@ -242,6 +354,7 @@ class Pump {
   std::vector<Event> events_;  // a heap, the lowest weight on top
   std::vector<SimplexId> created_;
   std::vector<SimplexId> star_;
+  std::vector<VertexId> near_;
 };
 
 }  // namespace
@@ -265,6 +378,16 @@ absl::StatusOr<uint64_t> PumpWeights(Triangulation<D>& triangulation, RunContext
     }
     if (changed == 0) {
       break;
+    }
+  }
+  if constexpr (D == 3) {
+    const double poor = Flatness<D>(kPoorestShare * LargestSmallestAngle(D));
+    const auto limit_of = [&](VertexId v) { return kMostWeight * nearest_sq[Index(v)]; };
+    for (int round = 0; round < kPairRounds; ++round) {
+      for (const auto& flat : pump.FindPoor(poor)) {
+        WELLSPACE_RETURN_IF_ERROR(context.Check());
+        pump.SetBestOfTwo(flat, limit_of, poor);
+      }
     }
   }
   uint64_t weighted = 0;

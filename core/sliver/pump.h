@@ -16,11 +16,11 @@ inline constexpr double kMostWeight = 0.24;
 
 // Gives each vertex, one after the other, the weight in [0, kMostWeight NN^2] for which the simplex with the smallest
 // angle of its star is best; the others' weights stay. The triangulation of the weights takes the place of the one
-// before.
+// before. Where that leaves slivers in 3-D, two vertices near each other are weighed together.
 //
 // REQUIRES:   a Delaunay triangulation, no weights.
 // Guarantees: (1) the result is exactly the regular triangulation of its weights; (2) a weight changes only its
-//             vertex's star, and the smallest angle of that only for the better; (3) weights have at most 24 bits;
+//             vertex's star, and the smallest angle of that only for the better, or of all the stars around two; (3) weights have at most 24 bits;
 //             (4) points on a face of the box are triangulated as the face alone would be.
 // Returns:    the number of vertices with a weight.
 // Complexity: O(1) for each vertex of a well-spaced mesh.

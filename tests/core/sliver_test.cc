@@ -114,6 +114,18 @@ TEST_P(SliverTest, PumpingMakesTheWorstBetter) {
   EXPECT_EQ(mesh.weights.empty(), mesh.statistics.weighted_vertices == 0);
 }
 
+// Where the weight of one vertex alone leaves slivers, those of two are chosen together.
+TEST(SliverPairsTest, PumpingLeavesNoSliver) {
+  for (const std::string_view kind : {"sphere", "annuli"}) {
+    SCOPED_TRACE(kind);
+    const std::vector<double> cloud = test::MakeCloud(kind, 3, 4000);
+    const MeshParameters parameters = InUnitBox(3, 0, true);
+    const Mesh mesh = MeshOf(parameters, cloud);
+    EXPECT_TRUE(Validate(parameters, mesh, cloud).ok()) << Validate(parameters, mesh, cloud);
+    EXPECT_EQ(MeasureQuality({3, mesh.points, mesh.simplices}).CountBelow(5), 0);
+  }
+}
+
 TEST(SliverValidationTest, WrongWeightsAreFound) {
   const std::vector<double> cloud = test::MakeCloud("uniform", 3, 200);
   const MeshParameters parameters = InUnitBox(3, 0, true);
