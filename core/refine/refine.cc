@@ -92,7 +92,7 @@ absl::Status Refinement<D>::Loop() {
     if (BeginRounds(lowest)) {
       WELLSPACE_RETURN_IF_ERROR(ServeRounds());
     } else {
-      AwaitOthers();
+      AwaitOthers();  // they may still list stars, which Serve does, too
       if (schedule_.Pop(v, bucket)) {
         WELLSPACE_RETURN_IF_ERROR(Serve(v, bucket));
       }
