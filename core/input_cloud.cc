@@ -150,8 +150,10 @@ class CloudSorter {
       part_begins_ = {0, count_};
     }
     SortedCloud<D> cloud{grid_, {}, {}, {}};
-    // The corners of the box follow, and as many vertices as are added to most clouds; what is not used takes no memory.
-    cloud.points.reserve(2 * count_ + count_ / 4 + (size_t{1} << D));
+    // The corners of the box follow, and as many vertices as are added to most clouds. Of large arrays what is not used takes no memory; of small ones,
+    // which share pages, it would.
+    const size_t room = counts_.size() > 1 ? count_ + count_ / 4 : count_ / 8;
+    cloud.points.reserve(count_ + room + (size_t{1} << D));
     cloud.points.resize(count_);
     cloud.first_input.resize(count_);
     parts_.resize(part_begins_.size() - 1);

@@ -191,12 +191,14 @@ absl::Status QueryStructure<D>::Initialize(const MortonGrid<D>& grid, HugeVector
                                            int threads, const RunContext& context) {
   box_ = grid.box();
   points_ = std::move(points);
-  const auto room = static_cast<uint32_t>(points_.capacity());
-  tree_.Reserve(room);
+  faces_.clear();
+  if (points_.capacity() > 2 * points_.size()) {  // room for many more vertices
+    const auto room = static_cast<uint32_t>(points_.capacity());
+    tree_.Reserve(room);
+    faces_.reserve(room);
+  }
   WELLSPACE_RETURN_IF_ERROR(tree_.Build(grid, points_, max_leaves, threads, context));
   vertex_count_ = static_cast<uint32_t>(points_.size());
-  faces_.clear();
-  faces_.reserve(room);
   near_.clear();
   MakeRoom();
   std::array<bool, 1 << D> has_corner{};
