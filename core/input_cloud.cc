@@ -154,8 +154,13 @@ class CloudSorter {
     // which share pages, it would.
     const size_t room = counts_.size() > 1 ? count_ + count_ / 4 : count_ / 8;
     cloud.points.reserve(count_ + room + (size_t{1} << D));
-    cloud.points.resize(count_);
-    cloud.first_input.resize(count_);
+    cloud.first_input.reserve(count_);
+    for (size_t made = 0; made < count_;) {  // block by block, since bringing in their memory takes a while
+      WELLSPACE_RETURN_IF_ERROR(context_.Check());
+      made = std::min(count_, made + kBlock);
+      cloud.points.resize(made);
+      cloud.first_input.resize(made);
+    }
     parts_.resize(part_begins_.size() - 1);
     const auto take_part = [&](size_t part) {
       const absl::Status status = SortPart(part);
@@ -218,6 +223,9 @@ class CloudSorter {
     }
     part_begins_.push_back(place);
     team_.ForEach(counts_.size(), [this](size_t block) {
+      if (context_.IsCancelled()) {
+        return;
+      }
       for (size_t i = block * kBlock; i < std::min(count_, (block + 1) * kBlock); ++i) {
         scratch_[counts_[block][PartOf(entries_[i])]++] = entries_[i];
       }
