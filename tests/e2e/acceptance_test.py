@@ -122,7 +122,7 @@ class Acceptance(unittest.TestCase):
         self.assertLess(abs(numpy.log(estimates[0] / vertices)), numpy.log(1.5))
 
     def test_a_cancel_is_obeyed_in_every_phase(self):
-        points = uniform(1_000_000, 2, seed=3)  # the simplices take longer than the time between two events
+        points = uniform(2_500_000, 2, seed=3)  # tree and simplices take longer than the time between two events
         name = self.remote.create(unit_box(2)).name
         self.remote.upload(name, points)
         for phase in (api().PHASE_TREE, api().PHASE_REFINEMENT, api().PHASE_SIMPLICES):
