@@ -1,5 +1,7 @@
 #include "core/input_cloud.h"
 
+#include <tbb/enumerable_thread_specific.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -446,10 +448,11 @@ absl::Status CheckSeparation(const Domain<D>& domain, const QueryStructure<D>& s
                              const RunContext& context) {
   const double least = domain.MinSeparation();
   const auto count = static_cast<uint32_t>(first_input.size());
+  tbb::enumerable_thread_specific<Workspace<D>> workspaces;
   const auto check = [&](size_t block) {
-    Workspace<D> workspace;
-    const auto begin = static_cast<uint32_t>(block * kBlock);
-    for (uint32_t i = begin; i < std::min(count, static_cast<uint32_t>(begin + kBlock)); ++i) {
+    Workspace<D>& workspace = workspaces.local();
+    const auto end = static_cast<uint32_t>(std::min<size_t>(count, (block + 1) * kBlock));
+    for (auto i = static_cast<uint32_t>(block * kBlock); i < end; ++i) {
       if (i % kQueriesBetweenChecks == 0) {
         WELLSPACE_RETURN_IF_ERROR(context.Check());
       }

@@ -194,7 +194,7 @@ class Refinement {
   std::vector<OwnWorkspace> round_workspaces_;  // by thread
   bool is_ahead_ = false;                       // other threads may be at work: vertices that are added wait
   bool is_listing_ = false;                     // another thread may list stars
-  uint64_t star_bytes_ = 0;                     // in this round, before they are listed
+  uint64_t star_bytes_ = 0;                     // of those that there are, before
   uint64_t bytes_ahead_ = 0;                    // of what others write, before
   std::vector<Listing> listings_;               // what one of them lists
   std::deque<Star<D>> own_stars_;               // of those of the listings that were not foreseen

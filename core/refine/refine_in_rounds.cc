@@ -115,8 +115,7 @@ absl::Status Refinement<D>::ServeRounds() {
     }
     turn_ = 1 - turn_;
     if (std::all_of(packets_.begin(), packets_.end(), [](const Packet<D>& packet) { return packet.IsServed(); })) {
-      packets_before_ = std::move(packets_);
-      packets_.clear();
+      packets_before_ = std::exchange(packets_, {});
       lifted_ = {};
     }
   }
@@ -161,7 +160,7 @@ void Refinement<D>::LookAhead() {
     team_->ForEach(now.size(), [&](size_t i) { foresee(now[i]); });
   }
   prepare(then);
-  bytes_ahead_ = star_bytes_ + RoundBytes();
+  bytes_ahead_ = (is_listing_ ? star_bytes_ : stars_.MemoryBytes()) + RoundBytes();
   is_ahead_ = true;
   is_foreseen_ = true;
   team_->Begin(then.size(), [then, foresee](size_t i) { foresee(then[i]); });
@@ -194,8 +193,8 @@ void Refinement<D>::EndRound() {
   for (Packet<D>& packet : HalfOf(turn_)) {
     std::swap(packet.simplices, packet.listed);
   }
-  star_bytes_ = stars_.MemoryBytes();
   if (!listings_.empty()) {
+    star_bytes_ = stars_.MemoryBytes();
     is_listing_ = true;
     team_->BeginCall([this] { ListStars(); });
   }

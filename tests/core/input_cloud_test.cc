@@ -29,10 +29,7 @@ TYPED_TEST_SUITE(SortCloudTest, test::AllDimensions);
 TYPED_TEST(SortCloudTest, SortsAlongTheCurveAndNamesTheFirstOfEquals) {
   constexpr int D = TypeParam::kValue;
   constexpr uint32_t kCount = 600;
-  Box<D> box;
-  box.low.fill(0);
-  box.high.fill(1);
-  const auto domain = Domain<D>::Of(box);
+  const auto domain = Domain<D>::Of(test::UnitBox<D>());
   ASSERT_TRUE(domain.ok());
   for (const int bits : {0, 32, 64}) {
     const double size = std::ldexp(bits == 0 ? 0.5 : 0.125, -(bits / D));
@@ -90,17 +87,10 @@ class SortManyTest : public test::SeededTest {
   static constexpr int kD = T::kValue;
   static constexpr uint32_t kMany = 3 * kStepsBetweenChecks + 5;
 
-  SortManyTest() : SeededTest(1967), domain_(*Domain<kD>::Of(UnitBox())) {
+  SortManyTest() : SeededTest(1967), domain_(*Domain<kD>::Of(test::UnitBox<kD>())) {
     for (uint32_t i = 0; i < kMany * kD; ++i) {
       coordinates_.push_back(random_.Unit());
     }
-  }
-
-  static Box<kD> UnitBox() {
-    Box<kD> box;
-    box.low.fill(0);
-    box.high.fill(1);
-    return box;
   }
 
   // Gives point `to` the coordinates of point `from`.
