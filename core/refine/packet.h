@@ -86,6 +86,7 @@ struct alignas(kCacheLines) Packet {
     reach.high.fill(-std::numeric_limits<double>::infinity());
     unforeseen.clear();
     is_foreseen = false;
+    parts_foreseen = 0;
     first_new = vertices_now;
     first_unforeseen = inserted_now;
   }
@@ -163,6 +164,7 @@ struct alignas(kCacheLines) Packet {
   size_t served = 0;  // of them
 
   bool is_foreseen = false;
+  size_t parts_foreseen = 0;       // of those that it is foreseen in
   uint32_t first_new = 0;          // of the structure's vertices, then
   size_t first_unforeseen = 0;     // of what is inserted in these rounds
   std::vector<Foreseen> foreseen;  // by vertex

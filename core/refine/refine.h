@@ -153,7 +153,7 @@ class Refinement {
   void EndRound();
   void ListStars();
   void PrefetchServed(VertexId v) const;
-  void Foresee(Packet<D>& packet, Workspace<D>& workspace) const;
+  void Foresee(Packet<D>& packet, size_t part, size_t parts, Workspace<D>& workspace) const;
   void ForeseeOne(Packet<D>& packet, size_t at, Workspace<D>& workspace) const;
   absl::Status ServePacket(Packet<D>& packet);
   absl::Status ServeNext(Packet<D>& packet);

@@ -6,8 +6,10 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <thread>
 #include <utility>
 
+#include "absl/cleanup/cleanup.h"
 #include "core/base/dimensions.h"
 #include "core/base/prefetch.h"
 #include "core/base/status_macros.h"
@@ -22,6 +24,9 @@ constexpr size_t kLeastInRounds = 64;
 // A bucket is cut into so many stretches, of which each half is served by turns, so many vertices of each at a time.
 constexpr size_t kStretches = 8;
 constexpr size_t kPacket = 128;
+// A packet is foreseen in so many parts, by turns with others, so that threads come to the end of a turn together; unless a thread would wait for
+// the part before.
+constexpr size_t kParts = 4;
 
 }  // namespace
 
@@ -152,18 +157,21 @@ void Refinement<D>::LookAhead() {
       }
     }
   };
-  const auto foresee = [this](Packet<D>& packet) { Foresee(packet, round_workspaces_[ThreadTeam::CurrentThread()]); };
+  const auto foresee = [this](Packet<D>& packet, size_t part, size_t parts) {
+    Foresee(packet, part, parts, round_workspaces_[ThreadTeam::CurrentThread()]);
+  };
   const std::span<Packet<D>> now = HalfOf(turn_);
   const std::span<Packet<D>> then = HalfOf(1 - turn_);
   if (!now.front().is_foreseen) {
     prepare(now);
-    team_->ForEach(now.size(), [&](size_t i) { foresee(now[i]); });
+    team_->ForEach(now.size(), [&](size_t i) { foresee(now[i], 0, 1); });
   }
   prepare(then);
   bytes_ahead_ = (is_listing_ ? star_bytes_ : stars_.MemoryBytes()) + RoundBytes();
   is_ahead_ = true;
   is_foreseen_ = true;
-  team_->Begin(then.size(), [then, foresee](size_t i) { foresee(then[i]); });
+  const size_t parts = 2 * static_cast<size_t>(team_->threads()) <= then.size() ? kParts : 1;
+  team_->Begin(parts * then.size(), [=](size_t i) { foresee(then[i % then.size()], i / then.size(), parts); });
 }
 
 // Returns when other threads have done what was begun.
@@ -233,10 +241,18 @@ void Refinement<D>::PrefetchServed(VertexId v) const {
   }
 }
 
-// Foresees those of a packet who have not been served. Nothing but the packet and the workspace is written.
+// Foresees one of equal parts of those of a packet who have not been served, once the parts before it are. Nothing but the packet and the workspace is
+// written.
 template <int D>
-void Refinement<D>::Foresee(Packet<D>& packet, Workspace<D>& workspace) const {
-  for (size_t i = packet.served; i < packet.vertices.size(); ++i) {
+void Refinement<D>::Foresee(Packet<D>& packet, size_t part, size_t parts, Workspace<D>& workspace) const {
+  const std::atomic_ref parts_foreseen(packet.parts_foreseen);
+  while (parts_foreseen.load(std::memory_order_acquire) < part) {
+    std::this_thread::yield();
+  }
+  const absl::Cleanup count = [&] { parts_foreseen.store(part + 1, std::memory_order_release); };  // whatever is thrown
+  const size_t size = packet.vertices.size() - packet.served;
+  const size_t end = packet.served + (part + 1) * size / parts;
+  for (size_t i = packet.served + part * size / parts; i < end; ++i) {
     packet.BeginForeseen(i);
     PrefetchAhead(std::span(packet.vertices), i, [this](VertexId v, int step) { structure_.Prefetch(v, step); });
     if (packet.foreseen[i].is_wanted && !context_->IsCancelled()) {
@@ -246,8 +262,10 @@ void Refinement<D>::Foresee(Packet<D>& packet, Workspace<D>& workspace) const {
       }
     }
   }
-  packet.names.assign(packet.inserted.size(), kNoVertex);
-  std::atomic_ref(packet.is_foreseen).store(true, std::memory_order_release);
+  if (part + 1 == parts) {
+    packet.names.assign(packet.inserted.size(), kNoVertex);
+    std::atomic_ref(packet.is_foreseen).store(true, std::memory_order_release);
+  }
 }
 
 // As Improve, but what would be done is put down.
