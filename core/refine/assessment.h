@@ -17,21 +17,18 @@ struct Assessment {
   int bad_node = -1;
   int bad_plane = -1;
   double bound_sq = kNone;
-  bool is_too_large = false;  // the bound is one of the sizes, not of rho
   // The shortest edge beyond the limit that has a bad node.
   double next_edge_sq = kNone;
-  // A face of the box that the cell touches though its site does not lie on it, the nearest one; -1 for none.
-  int encroached_face = -1;
-  // The cell reaches the cube that it was clipped by.
-  bool is_clipped = false;
   // The farthest node.
   double radius_sq = 0;
   // The shortest edge with a node on one of the site's own faces that is too far for it: no circumcentre, so it asks for
   // nothing now, but the site must look again, with that edge, once a new vertex cuts the facet there.
   double own_face_edge_sq = kNone;
-
-  // Found good by KeepsRatio alone: the cell touches no face, and its nodes may not be placed.
-  bool is_plain = false;
+  // A face of the box that the cell touches though its site does not lie on it, the nearest one; -1 for none.
+  int encroached_face = -1;
+  bool is_too_large = false;  // the bound is one of the sizes, not of rho
+  bool is_clipped = false;    // the cell reaches the cube that it was clipped by
+  bool is_plain = false;  // found good by KeepsRatio alone: the cell touches no face, and its nodes may not be placed
 
   bool IsGood() const { return bad_node < 0 && encroached_face < 0 && !is_clipped && next_edge_sq == kNone; }
 

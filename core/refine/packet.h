@@ -19,6 +19,7 @@
 #include "core/refine/assessment.h"
 #include "core/refine/face_watchers.h"
 #include "core/refine/insertion.h"
+#include "core/voronoi/extra_vertices.h"
 #include "core/voronoi/star.h"
 
 namespace wellspace::core {
@@ -38,7 +39,7 @@ struct Step {
 };
 
 // Foreseen is what serving the vertices would do if nobody else were served meanwhile. It is put down in columns, vertex after vertex. What would be
-// inserted is numbered from first_new on.
+// inserted is numbered from the vertices of the structure on, as many as there were then.
 //
 // Thread safety: thread-compatible.
 template <int D>
@@ -56,9 +57,8 @@ struct alignas(kCacheLines) Packet {
     bool is_wanted = false;  // it waited
     bool is_known = false;   // not what ends with an error
     double reach_sq = 0;     // squared, the distance beyond which nobody cuts the cell
-    Ends begin;
-    Ends end;
     uint32_t new_simplices = 0;  // from there on to the end simplices have vertices that are foreseen to be inserted
+    Ends begin;
   };
 
   Ends ends() const {
@@ -69,7 +69,7 @@ struct alignas(kCacheLines) Packet {
   void CutTo(const Ends& ends) {
     steps.resize(ends.steps);
     requests.resize(ends.requests);
-    inserted.resize(ends.requests);
+    inserted.CutTo(ends.requests);
     mentions.resize(ends.mentions);
     watched.resize(ends.watched);
     simplices.resize(ends.simplices);
@@ -81,13 +81,13 @@ struct alignas(kCacheLines) Packet {
   // Forgets what was foreseen; `vertices_now` are in the structure, and so many have been inserted in these rounds.
   void Prepare(uint32_t vertices_now, size_t inserted_now) {
     CutTo({});
+    inserted.Clear(VertexId{vertices_now});
     foreseen.assign(vertices.size(), {});
     reach.low.fill(std::numeric_limits<double>::infinity());
     reach.high.fill(-std::numeric_limits<double>::infinity());
     unforeseen.clear();
     is_foreseen = false;
     parts_foreseen = 0;
-    first_new = vertices_now;
     first_unforeseen = inserted_now;
   }
 
@@ -100,7 +100,7 @@ struct alignas(kCacheLines) Packet {
   // Puts down the simplices of `star`, that of vertex `at`.
   void AppendStar(size_t at) {
     const auto new_begin = std::partition(star.begin(), star.end(), [this](const std::array<VertexId, D>& simplex) {
-      return std::all_of(simplex.begin(), simplex.end(), [this](VertexId u) { return Index(u) < first_new; });
+      return std::all_of(simplex.begin(), simplex.end(), [this](VertexId u) { return u < inserted.first(); });
     });
     foreseen[at].new_simplices = static_cast<uint32_t>(simplices.size() + (new_begin - star.begin()));
     simplices.insert(simplices.end(), star.begin(), star.end());
@@ -109,7 +109,6 @@ struct alignas(kCacheLines) Packet {
   // Puts down that vertex `at`, at `site`, is foreseen up to here.
   void SetKnown(size_t at, const Point<D>& site) {
     foreseen[at].is_known = true;
-    foreseen[at].end = ends();
     const double radius = 1.001 * std::sqrt(foreseen[at].reach_sq);  // whatever is rounded
     for (int i = 0; i < D; ++i) {
       reach.low[i] = std::min(reach.low[i], site[i] - radius);
@@ -126,13 +125,16 @@ struct alignas(kCacheLines) Packet {
                         [&](const Point<D>& p) { return DistanceSq<D>(p, site) <= foreseen[at].reach_sq; });
   }
 
+  // Where what is foreseen of vertex `at` ends, once all of them are.
+  Ends EndOf(size_t at) const { return at + 1 < foreseen.size() ? foreseen[at + 1].begin : ends(); }
+
   // What is foreseen to be inserted for vertex `at`.
   std::span<const Point<D>> InsertedFor(size_t at) const {
     if (!is_foreseen || !foreseen[at].is_known) {
       return {};
     }
-    const Foreseen& one = foreseen[at];
-    return std::span(inserted).subspan(one.begin.requests, one.end.requests - one.begin.requests);
+    const uint32_t begin = foreseen[at].begin.requests;
+    return inserted.positions().subspan(begin, EndOf(at).requests - begin);
   }
 
   // Takes note of points that were inserted and not foreseen, or foreseen and not inserted.
@@ -145,8 +147,8 @@ struct alignas(kCacheLines) Packet {
 
   // Gives `u` the number that it has got, if it was foreseen to be inserted, and was.
   void Rename(VertexId& u) const {
-    if (u != kNoVertex && Index(u) >= first_new) {
-      u = names[Index(u) - first_new];
+    if (u != kNoVertex && u >= inserted.first()) {
+      u = names[Index(u) - Index(inserted.first())];
     }
   }
 
@@ -165,12 +167,11 @@ struct alignas(kCacheLines) Packet {
 
   bool is_foreseen = false;
   size_t parts_foreseen = 0;       // of those that it is foreseen in
-  uint32_t first_new = 0;          // of the structure's vertices, then
   size_t first_unforeseen = 0;     // of what is inserted in these rounds
   std::vector<Foreseen> foreseen;  // by vertex
   std::vector<Step> steps;
   std::vector<InsertionRequest<D>> requests;
-  std::vector<Point<D>> inserted;  // by request; with room to be read beyond the last (Buckets::kReadTogether)
+  ExtraVertices<D> inserted;  // by request
   std::vector<Mention> mentions;
   std::vector<WatchedNode<D>> watched;
   Star<D> simplices;  // of the stars of good cells

@@ -275,7 +275,7 @@ void Refinement<D>::ForeseeOne(Packet<D>& packet, size_t at, Workspace<D>& works
   const FaceMask faces = structure_.faces(v);
   const double edge_limit_sq = schedule_.UpperLengthSq(round_bucket_);
   Polytope<D>& cell = workspace.cell;
-  structure_.UnplacedClippedVoronoi(v, ClipOf(round_bucket_), workspace, packet.inserted, VertexId{packet.first_new});
+  structure_.UnplacedClippedVoronoi(v, ClipOf(round_bucket_), workspace, packet.inserted);
   packet.foreseen[at].reach_sq = cell.CutLimitSq();
   while (!cell.IsTooLarge() && !context_->IsCancelled()) {
     const Assessment found = AssessCell(cell, faces, edge_limit_sq);
@@ -295,14 +295,8 @@ void Refinement<D>::ForeseeOne(Packet<D>& packet, size_t at, Workspace<D>& works
     if (!IsLongEnough(request->point)) {
       return;
     }
-    const VertexId x{packet.first_new + static_cast<uint32_t>(packet.inserted.size())};
     packet.requests.push_back(*request);
-    const size_t needed = packet.inserted.size() + LeafTree<D>::Buckets::kReadTogether;
-    if (packet.inserted.capacity() < needed) {
-      packet.inserted.reserve(2 * needed);
-    }
-    packet.inserted.push_back(request->point.position);
-    cell.CutBeforePlace(x, request->point.position);
+    cell.CutBeforePlace(packet.inserted.Append(request->point.position), request->point.position);
   }
 }
 
@@ -371,7 +365,8 @@ absl::Status Refinement<D>::ServeNext(Packet<D>& packet) {
 template <int D>
 absl::Status Refinement<D>::Retrace(Packet<D>& packet, size_t at) {
   const VertexId v = packet.vertices[at];
-  const auto& [is_wanted, is_known, reach_sq, begin, end, new_simplices] = packet.foreseen[at];
+  const auto& [is_wanted, is_known, reach_sq, new_simplices, begin] = packet.foreseen[at];
+  const typename Packet<D>::Ends end = packet.EndOf(at);
   std::span<Mention> mentions = std::span(packet.mentions).subspan(begin.mentions);
   auto request = packet.requests.begin() + begin.requests;
   auto name = packet.names.begin() + begin.requests;

@@ -449,18 +449,18 @@ void QueryStructure<D>::ClippedVoronoi(VertexId v, double radius, Workspace<D>& 
 
 template <int D>
 void QueryStructure<D>::UnplacedClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace,
-                                               std::span<const Point<D>> others, VertexId first_other) const {
-  ClipAndScan(v, radius, TieRule::kPerturb, workspace, others, first_other);
+                                               const ExtraVertices<D>& others) const {
+  ClipAndScan(v, radius, TieRule::kPerturb, workspace, others);
 }
 
 // Computes the clipped cell of vertex `v`.
 template <int D>
 void QueryStructure<D>::ClipAndScan(VertexId v, double radius, TieRule rule, Workspace<D>& workspace,
-                                    std::span<const Point<D>> others, VertexId first_other) const {
+                                    const ExtraVertices<D>& others) const {
   std::array<PlaneKind, 2 * D> kinds;
   const Box<D> bounds = ClippedBox<D>(box_, point(v), radius, kinds);
   workspace.cell.Reset(point(v), bounds, kinds, rule);
-  Scan(v, workspace, others, first_other);
+  Scan(v, workspace, others);
 }
 
 template <int D>
@@ -480,8 +480,7 @@ void QueryStructure<D>::Voronoi(VertexId v, Workspace<D>& workspace) const {
 
 // Cuts workspace.cell, that of `v`, by the vertices in the leaves from that of v outward, and by others once by those in that one.
 template <int D>
-void QueryStructure<D>::Scan(VertexId v, Workspace<D>& workspace, std::span<const Point<D>> others,
-                             VertexId first_other) const {
+void QueryStructure<D>::Scan(VertexId v, Workspace<D>& workspace, const ExtraVertices<D>& others) const {
   const NodeId own = LeafOf(v);
   ScanOutward(
       workspace.cell.site(), own, workspace,
@@ -490,7 +489,7 @@ void QueryStructure<D>::Scan(VertexId v, Workspace<D>& workspace, std::span<cons
       [&](NodeId leaf) {
         CutByLeaf(leaf, v, workspace);
         if (leaf == own) {
-          CutByOthers(others, first_other, v, workspace);
+          CutByOthers(others, v, workspace);
         }
       });
   CountCuts(workspace);
@@ -514,14 +513,13 @@ void QueryStructure<D>::CutByLeaf(NodeId leaf, VertexId site, Workspace<D>& work
 }
 
 template <int D>
-void QueryStructure<D>::CutByOthers(std::span<const Point<D>> others, VertexId first_other, VertexId site,
-                                    Workspace<D>& workspace) {
-  constexpr size_t kTogether = LeafTree<D>::kLeafCapacity;
-  for (size_t begin = 0; begin < others.size() && !workspace.cell.IsTooLarge(); begin += kTogether) {
-    const VertexNames names{.first = VertexId{static_cast<uint32_t>(Index(first_other) + begin)}};
-    workspace.counters.vertices +=
-        workspace.cell.CutByEach(others.subspan(begin, std::min(kTogether, others.size() - begin)), names, site);
-  }
+void QueryStructure<D>::CutByOthers(const ExtraVertices<D>& others, VertexId site, Workspace<D>& workspace) {
+  Polytope<D>& cell = workspace.cell;
+  others.ForEachRunNear(cell.site(), cell.CutLimitSq(), [&](std::span<const Point<D>> positions, VertexId first) {
+    if (!cell.IsTooLarge()) {
+      workspace.counters.vertices += cell.CutByEach(positions, {.first = first}, site);
+    }
+  });
 }
 
 #define WELLSPACE_INSTANTIATE(D) template class QueryStructure<D>;

@@ -16,6 +16,7 @@
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
 #include "core/tree/leaf_tree.h"
+#include "core/voronoi/extra_vertices.h"
 #include "core/voronoi/leaf_queue.h"
 #include "core/voronoi/polytope.h"
 
@@ -123,12 +124,9 @@ class QueryStructure {
   //             meets crosses only facets of leaves that it meets.
   void ClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace, TieRule rule = TieRule::kKeep) const;
 
-  // The same, ties perturbed, for whoever may not need the nodes: they are still to be placed, by cell.Place(). The cell is cut by `others`, too, vertices
-  // numbered from `first_other` on that the structure does not hold.
-  //
-  // REQUIRES:   others may be read so many together, beyond the last perhaps, as vertices of a leaf (Buckets::kReadTogether).
-  void UnplacedClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace, std::span<const Point<D>> others = {},
-                              VertexId first_other = kNoVertex) const;
+  // The same, ties perturbed, for whoever may not need the nodes: they are still to be placed, by cell.Place(). The cell is cut by `others`, too.
+  void UnplacedClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace,
+                              const ExtraVertices<D>& others = {}) const;
 
   // Asks the memory for what a query about `v` begins with, which is found in three steps (PrefetchAhead).
   //
@@ -223,14 +221,11 @@ class QueryStructure {
                        Open& open) const;
   Neighbor FindBeyond(const Point<D>& p, NodeId leaf, Neighbor nearest, Workspace<D>& workspace) const;
   Neighbor Nearest(const Point<D>& p, NodeId leaf, VertexId but, double limit_sq, Workspace<D>& workspace) const;
-  // Others as in UnplacedClippedVoronoi.
   void ClipAndScan(VertexId v, double radius, TieRule rule, Workspace<D>& workspace,
-                   std::span<const Point<D>> others = {}, VertexId first_other = kNoVertex) const;
-  void Scan(VertexId v, Workspace<D>& workspace, std::span<const Point<D>> others = {},
-            VertexId first_other = kNoVertex) const;
+                   const ExtraVertices<D>& others = {}) const;
+  void Scan(VertexId v, Workspace<D>& workspace, const ExtraVertices<D>& others = {}) const;
   void CutByLeaf(NodeId leaf, VertexId site, Workspace<D>& workspace) const;
-  static void CutByOthers(std::span<const Point<D>> others, VertexId first_other, VertexId site,
-                          Workspace<D>& workspace);
+  static void CutByOthers(const ExtraVertices<D>& others, VertexId site, Workspace<D>& workspace);
   static void CountCuts(Workspace<D>& workspace);
 
   Box<D> box_;
