@@ -40,10 +40,6 @@ constexpr uint64_t kTreeBytes =
         / LeafTree<D>::kLeafCapacity;
 constexpr uint64_t kFixedBytes = uint64_t{4} << 20;
 
-// Smaller clouds are refined, without sizes, before anybody could want to know how large the mesh will be: in half a second.
-template <int D>
-constexpr uint64_t kForetoldPoints = D == 2 ? 50'000 : (D == 3 ? 20'000 : 2'000);
-
 template <int D>
 Box<D> BoxOf(const std::vector<double>& low, const std::vector<double>& high) {
   Box<D> box;
@@ -101,10 +97,9 @@ class MesherIn final : public Mesher {
         NoteNegativeZeros(points, i, named++);
       }
     }
-    built_count_ = structure_.vertex_count();
     distinct_count_ = distinct;
     distinct_input_ = distinct;
-    is_given_.assign(built_count_, true);
+    is_given_.assign(structure_.built_count(), true);
     refinement_.emplace(structure_, kMinEdgeSteps * domain_.grid_step);
     context.SetVertices(structure_.vertex_count());
     tree_seconds_ = absl::ToDoubleSeconds(context.TimeIn(Phase::kTree));
@@ -123,7 +118,6 @@ class MesherIn final : public Mesher {
   absl::Status Refine(const MeshParameters& parameters, RunContext& context) override {
     WELLSPACE_RETURN_IF_ERROR(CheckParameters(parameters));
     context.EnterPhase(Phase::kRefinement);
-    WELLSPACE_RETURN_IF_ERROR(ForetellVertices(parameters, context));
     is_refined_ = false;
     absl::Status status =
         refinement_->Run(DemandsOf(parameters), VertexBudget(parameters), parameters.threads, context);
@@ -314,7 +308,7 @@ class MesherIn final : public Mesher {
 
   absl::StatusOr<MeshEstimate> Estimate(const MeshParameters& parameters, const RunContext& context) const override {
     WELLSPACE_RETURN_IF_ERROR(CheckParameters(parameters));
-    if (structure_.vertex_count() > built_count_) {
+    if (structure_.vertex_count() > structure_.built_count()) {
       return absl::FailedPreconditionError(
           "vertices have been inserted since the mesher was created; an estimate is made before that");
     }
@@ -355,20 +349,6 @@ class MesherIn final : public Mesher {
           {{domain_.Scaled(box.low), domain_.Scaled(box.high)}, size.max_circumradius * domain_.scale});
     }
     return demands;
-  }
-
-  // Tells the context how many vertices a first refinement will end with, unless it knows, if that takes long enough to be worth
-  // an estimate.
-  absl::Status ForetellVertices(const MeshParameters& parameters, RunContext& context) const {
-    const bool has_sizes = parameters.max_circumradius != 0 || !parameters.size_boxes.empty();
-    if (context.estimated_vertices() > 0 || structure_.vertex_count() > built_count_ ||
-        (!has_sizes && structure_.vertex_count() < kForetoldPoints<D>)) {
-      return absl::OkStatus();
-    }
-    WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size,
-                               EstimateSize<D>(structure_, DemandsOf(parameters), context, kGlance));
-    context.SetEstimatedVertices(static_cast<uint64_t>(size.vertices));
-    return absl::OkStatus();
   }
 
   // Mends slivers if that is asked for; what is kept for that goes if it is not. Decides whether the mesh is pumped: a mesh
@@ -554,7 +534,6 @@ class MesherIn final : public Mesher {
   bool has_moved_ = false;      // a vertex, since the last mesh
   std::vector<bool> is_given_;  // by vertex: an input point, or a corner of the box
 
-  uint64_t built_count_ = 0;           // vertices after Initialize: input points and corners of the box
   uint64_t distinct_count_ = 0;        // the former
   HugeVector<uint32_t> output_index_;  // by vertex; of the first distinct_count_ at least
   // By output index, of the first distinct_count_; once one is asked for.

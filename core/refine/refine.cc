@@ -13,6 +13,7 @@
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
 #include "core/refine/checks.h"
+#include "core/refine/estimate.h"
 #include "core/refine/rounding.h"
 #include "core/tree/leaf_blocks.h"
 
@@ -29,6 +30,10 @@ constexpr double kAround = 1.5;
 
 // Room is made for at most so many times the vertices that there are, whatever is foretold.
 constexpr uint64_t kMostReserved = 8;
+
+// Smaller clouds are refined, without sizes, before anybody could want to know how large the mesh will be: in half a second.
+template <int D>
+constexpr uint64_t kForetoldPoints = D == 2 ? 50'000 : (D == 3 ? 20'000 : 2'000);
 
 // Vertices whose first edges one thread looks for at a time.
 constexpr size_t kScheduledTogether = 1024;
@@ -62,6 +67,8 @@ absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices
     demands_.reset();
     WELLSPACE_RETURN_IF_ERROR(ScheduleAll(demands, team));
     demands_ = demands;
+  } else {
+    WELLSPACE_RETURN_IF_ERROR(Foretell(demands));
   }
   team_ = &team;
   const absl::Cleanup end = [this] {
@@ -169,16 +176,28 @@ QueryCounters Refinement<D>::counters() const {
   return counters;
 }
 
+// Tells the context how many vertices a first refinement will end with, unless it knows, if that takes long enough to be worth
+// an estimate.
+template <int D>
+absl::Status Refinement<D>::Foretell(const Demands<D>& demands) const {
+  if (context_->estimated_vertices() > 0 || structure_.vertex_count() > structure_.built_count() ||
+      (demands.sizes.IsUnbounded() && structure_.vertex_count() < kForetoldPoints<D>)) {
+    return absl::OkStatus();
+  }
+  WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size, EstimateSize<D>(structure_, demands, *context_, kGlance));
+  context_->SetEstimatedVertices(static_cast<uint64_t>(size.vertices));
+  return absl::OkStatus();
+}
+
+// Puts all vertices where they wait first, and foretells meanwhile.
 template <int D>
 absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& team) {
   DropRounds();
   structure_.AdmitWaiting();  // where something was thrown
   const uint32_t count = structure_.vertex_count();
-  stars_.Clear();
-  Reserve(static_cast<uint32_t>(std::min({context_->estimated_vertices(), max_vertices_, kMostReserved * count})));
-  radius_sq_.assign(count, Assessment::kNone);
-  watchers_.Clear();
-  announced_.assign(count, Announced::kToAll);
+  absl::Status foretold;
+  const absl::Cleanup end = [&team] { team.Drop(); };  // of what is begun, where something is thrown
+  team.BeginCall([&] { foretold = Foretell(demands); });
   std::vector<OwnWorkspace> workspaces(team.threads());
   HugeVector<int16_t> first_bucket(count);
   const LeafBlocks<D> blocks(structure_.tree(), kScheduledTogether);
@@ -199,7 +218,14 @@ absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& t
       }
     });
   });
+  team.End();
+  WELLSPACE_RETURN_IF_ERROR(foretold);
   WELLSPACE_RETURN_IF_ERROR(context_->Check());
+  stars_.Clear();
+  Reserve(static_cast<uint32_t>(std::min({context_->estimated_vertices(), max_vertices_, kMostReserved * count})));
+  radius_sq_.assign(count, Assessment::kNone);
+  watchers_.Clear();
+  announced_.assign(count, Announced::kToAll);
   schedule_.Begin(count);
   for (uint32_t i = 0; i < count; ++i) {
     schedule_.AddToBucket(VertexId{i}, first_bucket[i]);

@@ -106,6 +106,7 @@ class Refinement {
   struct alignas(kCacheLines) OwnWorkspace : Workspace<D> {};
 
   absl::Status ScheduleAll(const Demands<D>& demands, ThreadTeam& team);
+  absl::Status Foretell(const Demands<D>& demands) const;
   void Reserve(uint32_t vertices);
   double FirstEdgeSq(const Demands<D>& demands, const Point<D>& p, FaceMask faces, double nearest_sq,
                      double size_sq) const;

@@ -225,6 +225,7 @@ absl::Status QueryStructure<D>::Initialize(const MortonGrid<D>& grid, HugeVector
       AddVertex(kNoVertex, p);
     }
   }
+  built_count_ = vertex_count_;
   return absl::OkStatus();
 }
 

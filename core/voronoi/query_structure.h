@@ -191,6 +191,8 @@ class QueryStructure {
   const Box<D>& box() const { return box_; }
   // Those that wait, too.
   uint32_t vertex_count() const { return vertex_count_; }
+  // How many Initialize has left: the points and the corners of the box.
+  uint32_t built_count() const { return built_count_; }
   const Point<D>& point(VertexId v) const { return points_[Index(v)]; }
   // By vertex; valid until one is added or moved.
   std::span<const Point<D>> points() const { return {points_.data(), vertex_count_}; }
@@ -232,6 +234,7 @@ class QueryStructure {
   LeafTree<D> tree_;
   uint32_t vertex_count_ = 0;
   uint32_t given_count_ = 0;  // to Initialize
+  uint32_t built_count_ = 0;
   // By vertex, with room for those that are to wait, so that nothing moves when one is added.
   HugeVector<Point<D>> points_;
   HugeVector<StoredFaces> faces_;
