@@ -19,6 +19,32 @@ constexpr uint32_t NextAlong(uint32_t number, uint32_t fixed) {
   return (((number | fixed) + 1) & ~fixed) | (number & fixed);
 }
 
+// Tells which points of a cube may be near another: it is cut into columns along its first two axes, of which a bit each says whether a point has been
+// there.
+//
+// Thread safety: thread-compatible.
+class ColumnsWithPoints {
+ public:
+  // Columns are more than side / 64 wide. Points may lie beyond the cube by half as much.
+  explicit ColumnsWithPoints(double side) : scale_(62 / side), before_(side / 128) {}
+
+  // Whether a point within side / 64 may have been added before; `x` and `y` are from the low faces of the cube.
+  bool Add(double x, double y) {
+    const auto row = static_cast<size_t>((x + before_) * scale_) + 1;
+    const auto column = static_cast<size_t>((y + before_) * scale_);
+    const uint64_t own = uint64_t{1} << column;
+    const uint64_t near = own | own << 1 | own >> 1;
+    const bool may_be_near = ((rows_[row - 1] | rows_[row] | rows_[row + 1]) & near) != 0;
+    rows_[row] |= own;
+    return may_be_near;
+  }
+
+ private:
+  const double scale_;
+  const double before_;
+  std::array<uint64_t, 66> rows_{};
+};
+
 }  // namespace
 
 template <int D>
@@ -477,6 +503,7 @@ bool LeafTree<D>::HasNearFeatures(std::span<const Point<D>> points, const Box<D>
   }
   // Two points that are farther from each other are not both within reach of a third.
   const double far_sq = 4 * (1 + 0x1p-20) * reach_sq;
+  ColumnsWithPoints columns(cube.high[0] - cube.low[0]);
   for (size_t i = 0; i < points.size(); ++i) {
     const Point<D>& a = points[i];
     if (near_faces != 0) {
@@ -487,6 +514,9 @@ bool LeafTree<D>::HasNearFeatures(std::span<const Point<D>> points, const Box<D>
           return true;
         }
       }
+    }
+    if (!columns.Add(a[0] - cube.low[0], a[1] - cube.low[1])) {
+      continue;
     }
     for (size_t j = 0; j < i; ++j) {
       const Point<D>& b = points[j];

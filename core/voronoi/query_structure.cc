@@ -410,11 +410,29 @@ void QueryStructure<D>::NearestOfEach(NodeId leaf, Workspace<D>& workspace, std:
   const auto* bucket = tree_.BucketOf(leaf);
   NearestAmong<D>({bucket->positions, bucket->count}, workspace.unit, nearest_sq);
   const Box<D> cube = tree_.BoxOf(leaf);
+  const double half = 0.5 * tree_.SideOf(leaf);
   for (uint32_t i = 0; i < bucket->count; ++i) {
     const Point<D>& p = bucket->positions[i];
-    if (!LiesDeeperThan<D>(p, nearest_sq[i], cube)) {
-      nearest_sq[i] = FindBeyond(p, leaf, {kNoVertex, nearest_sq[i]}, workspace).distance_sq;
+    Neighbor nearest{kNoVertex, nearest_sq[i]};
+    uint32_t facets = 0;  // those within that distance, and the depth of p below the last of them
+    double depth = 0;
+    for (int face = 0; face < 2 * D; ++face) {
+      const double below = cube.DistanceToFace(p, face);
+      if (below * below <= nearest.distance_sq) {
+        facets |= 1u << face;
+        depth = below;
+      }
     }
+    if (facets == 0) {
+      continue;
+    }
+    if (std::has_single_bit(facets) && nearest.distance_sq <= (depth + half) * (depth + half)) {
+      // Whoever is as near lies in the leaves beyond, which are half as large at least.
+      tree_.ForEachBeyondFacets(leaf, facets, [&](NodeId other) { LookInto<D>(tree_, other, p, kNoVertex, nearest); });
+    } else {
+      nearest = FindBeyond(p, leaf, nearest, workspace);
+    }
+    nearest_sq[i] = nearest.distance_sq;
   }
 }
 
