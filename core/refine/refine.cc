@@ -58,7 +58,8 @@ absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices
                                 const RefinementObserver<D>& observer) {
   ThreadTeam team(threads);
   plain_ratio_ = demands.criterion == Criterion::kRadiusEdge && demands.sizes.IsUnbounded() ? demands.rho : 0;
-  off_center_factor_ = OffCenterFactor<D>(demands.rho);
+  off_center_factor_ = OffCenterFactor<D>(demands.rho, false);
+  boundary_factor_ = OffCenterFactor<D>(demands.rho, demands.criterion == Criterion::kRadiusEdge);
   clip_factor_ = std::max(kClipFactor, kClipRatioFactor * demands.rho);
   max_vertices_ = max_vertices;
   context_ = &context;
@@ -352,7 +353,9 @@ std::optional<typename Refinement<D>::Request> Refinement<D>::NextRequest(Vertex
   insertion.near = v;
   insertion.edge_limit_sq = edge_limit_sq;
   if (found.bad_node >= 0) {
-    const double factor = found.is_too_large ? kSizeFactor : off_center_factor_;
+    const double factor = found.is_too_large                         ? kSizeFactor
+                          : IsAtBoundary(v, cell, found.bad_node) ? boundary_factor_
+                                                                  : off_center_factor_;
     insertion.reason = found.is_too_large ? Reason::kSize : Reason::kRatio;
     insertion.edge_sq = found.bound_sq / (demands_->rho * demands_->rho);
     insertion.other = found.bad_plane >= 0 ? cell.plane(found.bad_plane).vertex : kNoVertex;
@@ -368,6 +371,16 @@ std::optional<typename Refinement<D>::Request> Refinement<D>::NextRequest(Vertex
   request.point = SnapToBoundary<D>(structure_.box(), request.candidate);
   insertion.empty_radius_sq = request.point.empty_radius_sq;
   return request;
+}
+
+// Whether `node` of `cell`, that of `v`, is the circumcentre of a simplex with a corner on the boundary of the box.
+template <int D>
+bool Refinement<D>::IsAtBoundary(VertexId v, const Polytope<D>& cell, int node) const {
+  const std::array<uint16_t, D>& planes = cell.nodes()[node].planes;
+  return structure_.faces(v) != 0 || std::any_of(planes.begin(), planes.end(), [&](uint16_t index) {
+           const Plane<D>& plane = cell.plane(index);
+           return plane.kind == PlaneKind::kBisector && structure_.box().FacesOf(plane.source.generator) != 0;
+         });
 }
 
 // Computes the cell of `v`, not yet placed, clipped at `clip`.

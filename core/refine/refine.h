@@ -132,6 +132,7 @@ class Refinement {
   void Remember(VertexId v, double radius_sq, std::span<const WatchedNode<D>> watched = {});
   void AppendNodesToWatch(VertexId v, const Polytope<D>& cell, const Assessment& found,
                           std::vector<WatchedNode<D>>& watched) const;
+  bool IsAtBoundary(VertexId v, const Polytope<D>& cell, int node) const;
   void AppendMentions(const Polytope<D>& cell, FaceMask site_faces, const Assessment& found,
                       std::vector<Mention>& mentions) const;
   std::span<const Mention> Mentions(const Polytope<D>& cell, FaceMask site_faces, const Assessment& found);
@@ -187,6 +188,7 @@ class Refinement {
 
   // Of the run.
   double off_center_factor_ = 0;
+  double boundary_factor_ = 0;  // the same at the boundary
   double plain_ratio_ = 0;  // cells that keep it need nothing; 0: that does not tell
   double clip_factor_ = 0;
   uint64_t max_vertices_ = 0;

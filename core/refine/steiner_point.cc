@@ -26,12 +26,14 @@ SteinerPoint<D> Relative(const Polytope<D>& cell, const Point<D>& x) {
 }  // namespace
 
 template <int D>
-double OffCenterFactor(double rho) {
+double OffCenterFactor(double rho, bool is_at_boundary) {
   if constexpr (D == 2) {
     const double height = rho + std::sqrt(std::max(0.0, rho * rho - 0.25));
-    return 0.996 * std::sqrt(height * height + 0.25) / rho;
+    return (is_at_boundary ? 0.85 : 0.996) * std::sqrt(height * height + 0.25) / rho;
+  } else if (rho < 1.15) {
+    return 1.5;
   } else {
-    return rho >= 1.15 ? 1.1 : 1.5;
+    return D == 3 && is_at_boundary ? 1.25 : 1.1;
   }
 }
 
@@ -138,7 +140,7 @@ SteinerPoint<D> SnapToBoundary(const Box<D>& box, SteinerPoint<D> point) {
 }
 
 #define WELLSPACE_INSTANTIATE(D)                                                    \
-  template double OffCenterFactor<D>(double);                                       \
+  template double OffCenterFactor<D>(double, bool);                                 \
   template SteinerPoint<D> OffCenter<D>(const Polytope<D>&, int, int, double);      \
   template SteinerPoint<D> EncroachmentPoint<D>(const Polytope<D>&, FaceMask, int); \
   template SteinerPoint<D> SnapToBoundary<D>(const Box<D>&, SteinerPoint<D>);

@@ -17,7 +17,7 @@ struct SteinerPoint {
 // How far from the site, relative to rho times the edge, an off-centre lies at most: a hair below Üngör's distance in
 // 2-D, where the new triangle just keeps rho; 1.1 in higher dimensions. Measured, see docs/design/refine.md.
 template <int D>
-double OffCenterFactor(double rho);
+double OffCenterFactor(double rho, bool is_at_boundary);
 
 // The same relative to the largest circumradius that the sizes allow.
 inline constexpr double kSizeFactor = 1.5;

@@ -248,7 +248,7 @@ class StarsOfRefinementTest : public test::SeededTest {
     int stops = 0;
     for (; absl::IsResourceExhausted(status); ++stops) {
       RunContext context;
-      status = refinement.Run(demands, structure.vertex_count() + 1 + random_.Below(100), 2, context);
+      status = refinement.Run(demands, structure.vertex_count() + 1 + random_.Below(50), 2, context);
     }
     ASSERT_TRUE(status.ok()) << status;
     EXPECT_GT(stops, 3);

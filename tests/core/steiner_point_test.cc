@@ -157,7 +157,7 @@ TYPED_TEST(SteinerPointTest, EncroachmentPointStaysOnTheSitesFaces) {
 TEST(SteinerPointByHandTest, OffCenterLiesWhereTheNewTriangleJustKeepsRho) {
   for (const double rho : {1.0, std::sqrt(2.0), 2.0, 3.0}) {
     // The triangle of v = 0, u = (1, 0) and the point of their bisector at distance T has circumradius T^2 / (2 h).
-    const double distance = OffCenterFactor<2>(rho) * rho;
+    const double distance = OffCenterFactor<2>(rho, false) * rho;
     const double radius = distance * distance / (2 * std::sqrt(distance * distance - 0.25));
     EXPECT_LE(radius, rho);
     EXPECT_GE(radius, 0.99 * rho);
