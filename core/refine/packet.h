@@ -54,9 +54,9 @@ struct alignas(kCacheLines) Packet {
   };
   // Of one vertex.
   struct Foreseen {
-    bool is_wanted = false;  // it waited
-    bool is_known = false;   // not what ends with an error
-    double reach_sq = 0;     // squared, the distance beyond which nobody cuts the cell
+    bool is_wanted = false;      // it waited
+    bool is_known = false;       // not what ends with an error
+    double reach_sq = 0;         // squared, the distance beyond which nobody cuts the cell
     uint32_t new_simplices = 0;  // from there on to the end simplices have vertices that are foreseen to be inserted
     Ends begin;
   };

@@ -353,7 +353,7 @@ std::optional<typename Refinement<D>::Request> Refinement<D>::NextRequest(Vertex
   insertion.near = v;
   insertion.edge_limit_sq = edge_limit_sq;
   if (found.bad_node >= 0) {
-    const double factor = found.is_too_large                         ? kSizeFactor
+    const double factor = found.is_too_large                      ? kSizeFactor
                           : IsAtBoundary(v, cell, found.bad_node) ? boundary_factor_
                                                                   : off_center_factor_;
     insertion.reason = found.is_too_large ? Reason::kSize : Reason::kRatio;

@@ -15,7 +15,8 @@ struct SteinerPoint {
 };
 
 // How far from the site, relative to rho times the edge, an off-centre lies at most: a hair below Üngör's distance in
-// 2-D, where the new triangle just keeps rho; 1.1 in higher dimensions. Measured, see docs/design/refine.md.
+// 2-D, where the new triangle just keeps rho; 1.1 in higher dimensions. Nearer in 2-D, farther in 3-D, if the simplex that is to go has a corner on
+// the boundary of the box. Measured, see docs/design/refine.md.
 template <int D>
 double OffCenterFactor(double rho, bool is_at_boundary);
 

@@ -69,8 +69,7 @@ TEST_F(ExtraVerticesTest, WhatIsFarIsPassedOver) {
     }
   }
   size_t told = 0;
-  vertices.ForEachRunNear({20.5, 0.5, 0.5}, 1,
-                          [&](std::span<const Point<3>> run, VertexId) { told += run.size(); });
+  vertices.ForEachRunNear({20.5, 0.5, 0.5}, 1, [&](std::span<const Point<3>> run, VertexId) { told += run.size(); });
   EXPECT_EQ(told, 64u);
 }
 
