@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/status/status.h"
 
 #ifdef __SANITIZE_THREAD__
@@ -38,14 +39,14 @@ class ThreadTeam {
   template <typename F>
   void ForEach(size_t count, const F& f) {
     Release(&begun_);
+    const absl::Cleanup acquire = [this] { Acquire(&ended_); };  // be it that a call throws
     arena_.execute([&] {
       tbb::parallel_for(size_t{0}, count, [&](size_t i) {
         Acquire(&begun_);
+        const absl::Cleanup release = [this] { Release(&ended_); };
         f(i);
-        Release(&ended_);
       });
     });
-    Acquire(&ended_);
   }
 
   // As ForEach, for calls that return an absl::Status: of those that are not ok that of the lowest i is returned. A single call is made by the caller.
@@ -84,8 +85,8 @@ class ThreadTeam {
     arena_.execute([&] {
       group_.run([this] {
         Acquire(&begun_);
+        const absl::Cleanup release = [this] { Release(&ended_); };
         call_();
-        Release(&ended_);
       });
     });
   }
@@ -102,8 +103,8 @@ class ThreadTeam {
 
   // Joins in what has been begun, and returns when all calls have. If one throws, so does this, and some are not made.
   void End() {
+    const absl::Cleanup acquire = [this] { Acquire(&ended_); };
     arena_.execute([&] { group_.run_and_wait([this] { Work(); }); });
-    Acquire(&ended_);
   }
 
   // Makes no more of the calls, and returns when those that are made have. What they throw is lost.
@@ -119,9 +120,9 @@ class ThreadTeam {
   // Takes calls of the loop that has been begun until all are taken.
   void Work() {
     Acquire(&begun_);
+    const absl::Cleanup release = [this] { Release(&ended_); };
     while (WorkOnce()) {
     }
-    Release(&ended_);
   }
 
   bool WorkOnce() {
