@@ -372,10 +372,7 @@ absl::StatusOr<Box<D>> BoxAround(std::span<const double> points, double margin, 
     }
     const Point<D> p = PointAt<D>(points, i);
     WELLSPACE_RETURN_IF_ERROR(CheckFinite<D>(p, i));
-    for (int k = 0; k < D; ++k) {
-      box.low[k] = std::min(box.low[k], p[k]);
-      box.high[k] = std::max(box.high[k], p[k]);
-    }
+    box.Include({p, p});
   }
   double side = box.LongestSide();
   if (side == 0) {

@@ -47,6 +47,14 @@ struct Box {
     return true;
   }
 
+  // Grows until it holds `other`.
+  void Include(const Box& other) {
+    for (int i = 0; i < D; ++i) {
+      low[i] = std::min(low[i], other.low[i]);
+      high[i] = std::max(high[i], other.high[i]);
+    }
+  }
+
   double LongestSide() const {
     double longest = 0;
     for (int i = 0; i < D; ++i) {

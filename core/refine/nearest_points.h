@@ -52,7 +52,7 @@ class NearestPoints {
         WELLSPACE_RETURN_IF_ERROR(context.Check());
         runs.push_back({points_[i], points_[i]});
       } else {
-        Grow(runs.back(), points_[i], points_[i]);
+        runs.back().Include({points_[i], points_[i]});
       }
     }
     levels_.push_back(std::move(runs));
@@ -65,7 +65,7 @@ class NearestPoints {
         if (i % 2 == 0) {
           boxes.push_back(below[i]);
         } else {
-          Grow(boxes.back(), below[i].low, below[i].high);
+          boxes.back().Include(below[i]);
         }
       }
       levels_.push_back(std::move(boxes));
@@ -95,13 +95,6 @@ class NearestPoints {
 
  private:
   static constexpr size_t kRun = 16;
-
-  static void Grow(Box<D>& box, const Point<D>& low, const Point<D>& high) {
-    for (int i = 0; i < D; ++i) {
-      box.low[i] = std::min(box.low[i], low[i]);
-      box.high[i] = std::max(box.high[i], high[i]);
-    }
-  }
 
   // REQUIRES:   two points are nearer than the limit, or it is infinite.
   NearestTwo NearestWithin(const Point<D>& x, double limit_sq, size_t but) const {

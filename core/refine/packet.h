@@ -110,10 +110,12 @@ struct alignas(kCacheLines) Packet {
   void SetKnown(size_t at, const Point<D>& site) {
     foreseen[at].is_known = true;
     const double radius = 1.001 * std::sqrt(foreseen[at].reach_sq);  // whatever is rounded
+    Box<D> around{site, site};
     for (int i = 0; i < D; ++i) {
-      reach.low[i] = std::min(reach.low[i], site[i] - radius);
-      reach.high[i] = std::max(reach.high[i], site[i] + radius);
+      around.low[i] -= radius;
+      around.high[i] += radius;
     }
+    reach.Include(around);
   }
 
   // Whether what is foreseen of vertex `at`, at `site`, is what would be found now.

@@ -188,7 +188,7 @@ class Refinement {
 
   // Of the run.
   double off_center_factor_ = 0;
-  double boundary_factor_ = 0;  // the same at the boundary
+  double boundary_factor_ = 0;  // the same at the boundary, for radius-edge
   double plain_ratio_ = 0;      // cells that keep it need nothing; 0: that does not tell
   double clip_factor_ = 0;
   uint64_t max_vertices_ = 0;

@@ -78,10 +78,7 @@ class Checker {
     box_.low = box_.high = Vertex(0);
     for (size_t v = 1; v < VertexCount(); ++v) {
       const Point<D> p = Vertex(v);
-      for (int k = 0; k < D; ++k) {
-        box_.low[k] = std::min(box_.low[k], p[k]);
-        box_.high[k] = std::max(box_.high[k], p[k]);
-      }
+      box_.Include({p, p});
     }
   }
 

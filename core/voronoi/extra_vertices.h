@@ -22,10 +22,6 @@ namespace wellspace::core {
 template <int D>
 class ExtraVertices {
  public:
-  ExtraVertices() = default;
-  // None, of which the first is to be `first`.
-  explicit ExtraVertices(VertexId first) : first_(first) {}
-
   VertexId first() const { return first_; }
   size_t size() const { return positions_.size(); }
   std::span<const Point<D>> positions() const { return positions_; }
@@ -50,11 +46,7 @@ class ExtraVertices {
     if (positions_.size() % kTogether == 0) {
       boxes_.push_back({position, position});
     }
-    Box<D>& box = boxes_.back();
-    for (int i = 0; i < D; ++i) {
-      box.low[i] = std::min(box.low[i], position[i]);
-      box.high[i] = std::max(box.high[i], position[i]);
-    }
+    boxes_.back().Include({position, position});
     positions_.push_back(position);
     return VertexId{Index(first_) + static_cast<uint32_t>(positions_.size() - 1)};
   }

@@ -48,7 +48,8 @@ class ExtraVerticesTest : public test::SeededTest {
 
 TEST_F(ExtraVerticesTest, RunsHoldAllThatAreNear) {
   for (const size_t count : {0, 1, 7, 8, 9, 63, 200}) {
-    ExtraVertices<3> vertices(kFirst);
+    ExtraVertices<3> vertices;
+    vertices.Clear(kFirst);
     for (size_t i = 0; i < count; ++i) {
       EXPECT_EQ(vertices.Append(Draw()), VertexId{static_cast<uint32_t>(Index(kFirst) + i)});
     }
@@ -60,7 +61,8 @@ TEST_F(ExtraVerticesTest, RunsHoldAllThatAreNear) {
 }
 
 TEST_F(ExtraVerticesTest, WhatIsFarIsPassedOver) {
-  ExtraVertices<3> vertices(kFirst);
+  ExtraVertices<3> vertices;
+  vertices.Clear(kFirst);
   for (int cluster = 0; cluster < 4; ++cluster) {
     for (int i = 0; i < 64; ++i) {
       Point<3> p = Draw();
@@ -74,7 +76,8 @@ TEST_F(ExtraVerticesTest, WhatIsFarIsPassedOver) {
 }
 
 TEST_F(ExtraVerticesTest, OthersTakeThePlaceOfThoseForgotten) {
-  ExtraVertices<3> vertices(kFirst);
+  ExtraVertices<3> vertices;
+  vertices.Clear(kFirst);
   for (int i = 0; i < 100; ++i) {
     vertices.Append(Draw());
   }
