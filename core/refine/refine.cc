@@ -47,6 +47,20 @@ float RoundedUp(double x) {
   return nearest < x ? std::nextafter(nearest, std::numeric_limits<float>::infinity()) : nearest;
 }
 
+// The node of a cell in the plane that lies on the bisectors of `u` and `w`, and the plane of u's.
+std::pair<int, int> NodeBetween(const Polytope<2>& cell, VertexId u, VertexId w) {
+  for (size_t i = 0; i < cell.nodes().size(); ++i) {
+    const auto [first, second] = cell.nodes()[i].planes;
+    if (cell.plane(first).vertex == u && cell.plane(second).vertex == w) {
+      return {static_cast<int>(i), first};
+    }
+    if (cell.plane(first).vertex == w && cell.plane(second).vertex == u) {
+      return {static_cast<int>(i), second};
+    }
+  }
+  return {-1, -1};
+}
+
 }  // namespace
 
 template <int D>
@@ -85,6 +99,7 @@ absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices
   packets_before_ = {};
   for (const OwnWorkspace& workspace : round_workspaces_) {
     own_.counters.Add(workspace.counters);
+    own_.counters.Add(workspace.other.counters);
   }
   round_workspaces_.clear();
   return status;
@@ -155,7 +170,7 @@ template <int D>
 uint64_t Refinement<D>::MemoryBytes() const {
   return schedule_.MemoryBytes() + (is_ahead_ ? bytes_ahead_ : stars_.MemoryBytes() + RoundBytes()) +
          star_.capacity() * sizeof(star_[0]) + watchers_.MemoryBytes() + radius_sq_.size() * sizeof(radius_sq_[0]) +
-         announced_.size() * sizeof(Announced) + (own_.seen.size() + new_.seen.size()) * sizeof(uint32_t);
+         announced_.size() * sizeof(Announced) + (own_.seen.size() + other_.seen.size()) * sizeof(uint32_t);
 }
 
 template <int D>
@@ -173,7 +188,7 @@ void Refinement<D>::CellChanged(VertexId v, double nearest_sq) {
 template <int D>
 QueryCounters Refinement<D>::counters() const {
   QueryCounters counters = own_.counters;
-  counters.Add(new_.counters);
+  counters.Add(other_.counters);
   return counters;
 }
 
@@ -272,11 +287,11 @@ void Refinement<D>::ScheduleNew(VertexId near, VertexId x, double nearest_sq) {
                             [&](VertexId u) { Wake(u, DistanceSq<D>(p, structure_.point(u))); });
     ScheduleWoken();
     if (watchers_.SomeWatchAll()) {
-      ComputeCell(x, around, new_);
-      new_.cell.Place();
-      if (!new_.cell.IsTooLarge()) {
-        const Assessment found = Assess<D>(new_.cell, structure_.faces(x), *demands_, nearest_sq);
-        Announce(x, found, Mentions(new_.cell, structure_.faces(x), found));
+      ComputeCell(x, around, other_);
+      other_.cell.Place();
+      if (!other_.cell.IsTooLarge()) {
+        const Assessment found = Assess<D>(other_.cell, structure_.faces(x), *demands_, nearest_sq);
+        Announce(x, found, Mentions(other_.cell, structure_.faces(x), found));
       }
     }
   }
@@ -306,7 +321,12 @@ absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
     if (GivesWay(v, found, bucket)) {
       return absl::OkStatus();
     }
-    const std::optional<Request> request = NextRequest(v, cell, found, edge_limit_sq);
+    const std::optional<Request> request =
+        NextRequest(v, cell, found, edge_limit_sq, [this](VertexId u, double clip) -> const Polytope<D>* {
+          ComputeCell(u, clip, other_);
+          other_.cell.Place();
+          return other_.cell.IsTooLarge() ? nullptr : &other_.cell;
+        });
     if (!request.has_value()) {
       watched_.clear();
       AppendNodesToWatch(v, cell, found, watched_);
@@ -343,11 +363,11 @@ int Refinement<D>::OwnBucket(const Assessment& found, int bucket) const {
                              : bucket;
 }
 
-// What `cell`, that of `v`, asks for by edges up to a bucket's limit, by what was found; none if nothing.
+// What `cell`, that of `v`, asks for by edges up to a bucket's limit, by what was found; none if nothing. Calls cell_of at most once.
 template <int D>
 std::optional<typename Refinement<D>::Request> Refinement<D>::NextRequest(VertexId v, const Polytope<D>& cell,
-                                                                          const Assessment& found,
-                                                                          double edge_limit_sq) const {
+                                                                          const Assessment& found, double edge_limit_sq,
+                                                                          CellOf cell_of) const {
   Request request;
   Insertion& insertion = request.insertion;
   insertion.near = v;
@@ -359,7 +379,7 @@ std::optional<typename Refinement<D>::Request> Refinement<D>::NextRequest(Vertex
     insertion.reason = found.is_too_large ? Reason::kSize : Reason::kRatio;
     insertion.edge_sq = found.bound_sq / (demands_->rho * demands_->rho);
     insertion.other = found.bad_plane >= 0 ? cell.plane(found.bad_plane).vertex : kNoVertex;
-    request.candidate = OffCenter<D>(cell, found.bad_node, found.bad_plane, factor * factor * found.bound_sq);
+    request.candidate = PointFor(v, cell, found, factor * factor * found.bound_sq, edge_limit_sq, cell_of);
   } else if (found.encroached_face >= 0) {
     insertion.reason = Reason::kEncroachment;
     const double distance = structure_.box().DistanceToFace(structure_.point(v), found.encroached_face);
@@ -371,6 +391,34 @@ std::optional<typename Refinement<D>::Request> Refinement<D>::NextRequest(Vertex
   request.point = SnapToBoundary<D>(structure_.box(), request.candidate);
   insertion.empty_radius_sq = request.point.empty_radius_sq;
   return request;
+}
+
+// The point for the bad node of the cell of `v`: an off-centre at distance_sq, by the square, unless the node is nearer; then that, or for a triangle
+// better still.
+template <int D>
+SteinerPoint<D> Refinement<D>::PointFor(VertexId v, const Polytope<D>& cell, const Assessment& found,
+                                        double distance_sq, double edge_limit_sq, CellOf cell_of) const {
+  const CellNode<D>& node = cell.nodes()[found.bad_node];
+  if constexpr (D == 2) {
+    if (node.radius_sq <= distance_sq && !found.is_too_large && demands_->criterion == Criterion::kRadiusEdge) {
+      const Plane<2>& edge = cell.plane(found.bad_plane);
+      const Plane<2>& third = cell.plane(node.planes[node.planes[0] == found.bad_plane ? 1 : 0]);
+      if (third.kind == PlaneKind::kBisector && Dot<2>(edge.normal, third.normal) < 0) {
+        // The angle at v is obtuse: what is farther than the node is on the boundary of the other cell.
+        const double diameter = 2 * PetalRadius(2 * edge.offset, distance_sq);
+        const Polytope<2>* const other =
+            cell_of(edge.vertex, std::min(diameter, clip_factor_ * std::sqrt(edge_limit_sq)));
+        if (other != nullptr) {
+          const auto [same_node, plane] = NodeBetween(*other, v, third.vertex);
+          if (same_node >= 0) {
+            return PetalPoint(*other, same_node, plane, distance_sq, demands_->rho);
+          }
+        }
+      }
+      return PetalPoint(cell, found.bad_node, found.bad_plane, distance_sq, demands_->rho);
+    }
+  }
+  return OffCenter<D>(cell, found.bad_node, found.bad_plane, distance_sq);
 }
 
 // Whether `node` of `cell`, that of `v`, is the circumcentre of a simplex with a corner on the boundary of the box.

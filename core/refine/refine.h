@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "core/base/cache_lines.h"
 #include "core/base/huge_pages.h"
@@ -96,6 +97,8 @@ class Refinement {
   };
 
   using Request = InsertionRequest<D>;
+  // Computes the cell of a vertex, clipped by the cube of so much half side; null if that cannot be done.
+  using CellOf = absl::FunctionRef<const Polytope<D>*(VertexId, double)>;
 
   // A vertex that has been found done, whose star is still to be listed.
   struct Listing {
@@ -103,7 +106,9 @@ class Refinement {
     std::span<const std::array<VertexId, D>> star;
     uint32_t vertex_count = 0;  // of the structure when it was
   };
-  struct alignas(kCacheLines) OwnWorkspace : Workspace<D> {};
+  struct alignas(kCacheLines) OwnWorkspace : Workspace<D> {
+    Workspace<D> other;
+  };
 
   absl::Status ScheduleAll(const Demands<D>& demands, ThreadTeam& team);
   absl::Status Foretell(const Demands<D>& demands) const;
@@ -115,8 +120,10 @@ class Refinement {
   absl::Status CountServed(int bucket);
   absl::Status Report(int bucket);
   absl::Status Improve(VertexId v, int bucket);
-  std::optional<Request> NextRequest(VertexId v, const Polytope<D>& cell, const Assessment& found,
-                                     double edge_limit_sq) const;
+  std::optional<Request> NextRequest(VertexId v, const Polytope<D>& cell, const Assessment& found, double edge_limit_sq,
+                                     CellOf cell_of) const;
+  SteinerPoint<D> PointFor(VertexId v, const Polytope<D>& cell, const Assessment& found, double distance_sq,
+                           double edge_limit_sq, CellOf cell_of) const;
   double ClipOf(int bucket) const { return clip_factor_ * std::sqrt(schedule_.UpperLengthSq(bucket)); }
   void ComputeCell(VertexId v, double clip, Workspace<D>& workspace);
   Assessment AssessCell(Polytope<D>& cell, FaceMask site_faces, double edge_limit_sq) const;
@@ -155,8 +162,8 @@ class Refinement {
   void EndRound();
   void ListStars();
   void PrefetchServed(VertexId v) const;
-  void Foresee(Packet<D>& packet, size_t part, size_t parts, Workspace<D>& workspace) const;
-  void ForeseeOne(Packet<D>& packet, size_t at, Workspace<D>& workspace) const;
+  void Foresee(Packet<D>& packet, size_t part, size_t parts, OwnWorkspace& workspace) const;
+  void ForeseeOne(Packet<D>& packet, size_t at, OwnWorkspace& workspace) const;
   absl::Status ServePacket(Packet<D>& packet);
   absl::Status ServeNext(Packet<D>& packet);
   absl::Status Retrace(Packet<D>& packet, size_t at);
@@ -175,7 +182,7 @@ class Refinement {
   StarLists<D> stars_;                 // of vertices that are done, or have been
   std::optional<Demands<D>> demands_;  // of the last run, once all vertices have been scheduled for them
   Workspace<D> own_;                   // the cell that is improved
-  Workspace<D> new_;                   // the cell of a vertex just added on a face
+  Workspace<D> other_;                 // that of another vertex meanwhile
 
   // Those of a bucket who are served in rounds, but for those who have moved on.
   int round_bucket_ = -1;

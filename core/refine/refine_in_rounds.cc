@@ -96,7 +96,7 @@ uint64_t Refinement<D>::RoundBytes() const {
     }
   }
   for (const OwnWorkspace& workspace : round_workspaces_) {
-    bytes += workspace.seen.size() * sizeof(uint32_t);
+    bytes += (workspace.seen.size() + workspace.other.seen.size()) * sizeof(uint32_t);
   }
   return bytes;
 }
@@ -244,7 +244,7 @@ void Refinement<D>::PrefetchServed(VertexId v) const {
 // Foresees one of equal parts of those of a packet who have not been served, once the parts before it are. Nothing but the packet and the workspace is
 // written.
 template <int D>
-void Refinement<D>::Foresee(Packet<D>& packet, size_t part, size_t parts, Workspace<D>& workspace) const {
+void Refinement<D>::Foresee(Packet<D>& packet, size_t part, size_t parts, OwnWorkspace& workspace) const {
   const std::atomic_ref parts_foreseen(packet.parts_foreseen);
   while (parts_foreseen.load(std::memory_order_acquire) < part) {
     std::this_thread::yield();
@@ -270,18 +270,33 @@ void Refinement<D>::Foresee(Packet<D>& packet, size_t part, size_t parts, Worksp
 
 // As Improve, but what would be done is put down.
 template <int D>
-void Refinement<D>::ForeseeOne(Packet<D>& packet, size_t at, Workspace<D>& workspace) const {
+void Refinement<D>::ForeseeOne(Packet<D>& packet, size_t at, OwnWorkspace& workspace) const {
   const VertexId v = packet.vertices[at];
   const FaceMask faces = structure_.faces(v);
   const double edge_limit_sq = schedule_.UpperLengthSq(round_bucket_);
   Polytope<D>& cell = workspace.cell;
   structure_.UnplacedClippedVoronoi(v, ClipOf(round_bucket_), workspace, packet.inserted);
   packet.foreseen[at].reach_sq = cell.CutLimitSq();
+  bool is_foreseeable = true;
+  const auto cell_of = [&](VertexId u, double clip) -> const Polytope<D>* {
+    is_foreseeable = u < packet.inserted.first();  // others are in no leaf
+    if (!is_foreseeable) {
+      return nullptr;
+    }
+    Workspace<D>& other = workspace.other;
+    structure_.UnplacedClippedVoronoi(u, clip, other, packet.inserted);
+    const double reach =
+        std::sqrt(other.cell.CutLimitSq()) + std::sqrt(DistanceSq<D>(structure_.point(u), structure_.point(v)));
+    packet.foreseen[at].reach_sq = std::max(packet.foreseen[at].reach_sq, reach * reach);
+    is_foreseeable = !other.cell.IsTooLarge();
+    other.cell.Place();
+    return &other.cell;
+  };
   while (!cell.IsTooLarge() && !context_->IsCancelled()) {
     const Assessment found = AssessCell(cell, faces, edge_limit_sq);
     const size_t first_mention = packet.mentions.size();
     AppendMentions(cell, faces, found, packet.mentions);
-    const std::optional<Request> request = NextRequest(v, cell, found, edge_limit_sq);
+    const std::optional<Request> request = NextRequest(v, cell, found, edge_limit_sq, cell_of);
     packet.steps.push_back({found, static_cast<uint32_t>(packet.mentions.size() - first_mention), request.has_value()});
     if (!request.has_value()) {
       AppendNodesToWatch(v, cell, found, packet.watched);
@@ -292,7 +307,7 @@ void Refinement<D>::ForeseeOne(Packet<D>& packet, size_t at, Workspace<D>& works
       packet.SetKnown(at, structure_.point(v));
       return;
     }
-    if (!IsLongEnough(request->point)) {
+    if (!is_foreseeable || !IsLongEnough(request->point)) {
       return;
     }
     packet.requests.push_back(*request);

@@ -23,6 +23,17 @@ SteinerPoint<D> Relative(const Polytope<D>& cell, const Point<D>& x) {
   return point;
 }
 
+// Where the segment from `inside` to `outside` leaves a disc.
+Point<2> WhereItLeaves(const Point<2>& inside, const Point<2>& outside, const Point<2>& centre, double radius) {
+  const Point<2> along = Difference<2>(outside, inside);
+  const Point<2> from = Difference<2>(inside, centre);
+  const double a = NormSq<2>(along);
+  const double b = Dot<2>(along, from);
+  const double c = NormSq<2>(from) - radius * radius;
+  const double t = std::min(1.0, (std::sqrt(std::max(0.0, b * b - a * c)) - b) / a);
+  return {inside[0] + t * along[0], inside[1] + t * along[1]};
+}
+
 }  // namespace
 
 template <int D>
@@ -78,6 +89,42 @@ SteinerPoint<D> OffCenter(const Polytope<D>& cell, int node, int plane, double d
     middle[i] += t * along[i];
   }
   return Relative<D>(cell, middle);
+}
+
+double PetalRadius(double edge_sq, double top_sq) { return 0.5 * top_sq / std::sqrt(top_sq - 0.25 * edge_sq); }
+
+SteinerPoint<2> PetalPoint(const Polytope<2>& cell, int node, int plane, double top_sq, double rho) {
+  Point<2> x = cell.nodes()[node].x;
+  const Point<2>& u = cell.plane(plane).normal;
+  const double edge_sq = 2 * cell.plane(plane).offset;
+  const double radius = PetalRadius(edge_sq, top_sq);
+  const Point<2> middle = {0.5 * u[0], 0.5 * u[1]};
+  const Point<2> up = Difference<2>(x, middle);
+  const double t = (0.5 * top_sq / radius - radius) / std::sqrt(NormSq<2>(up));
+  const Point<2> centre = {middle[0] + t * up[0], middle[1] + t * up[1]};
+  const auto is_inside = [&](const Point<2>& p) { return DistanceSq<2>(p, centre) <= radius * radius; };
+  const auto is_conforming = [&](const Point<2>& p) {
+    const double distance = std::sqrt(NormSq<2>(p));
+    return (rho - 1) * (std::sqrt(DistanceSq<2>(p, u)) - distance) <= distance - rho * std::sqrt(edge_sq);
+  };
+  Point<2> best = x;
+  int from = plane;
+  while (is_inside(x)) {
+    const CellNode<2>& at = cell.nodes()[node];
+    const int k = at.planes[0] == from ? 0 : 1;
+    from = at.planes[1 - k];
+    node = at.neighbours[k];
+    const Point<2>& next = cell.nodes()[node].x;
+    const Point<2> end = is_inside(next) ? next : WhereItLeaves(x, next, centre, radius);
+    if (cell.plane(from).kind != PlaneKind::kBisector || NormSq<2>(end) < NormSq<2>(x)) {
+      break;
+    }
+    if (NormSq<2>(end) > NormSq<2>(best) && is_conforming(end)) {
+      best = end;
+    }
+    x = next;
+  }
+  return Relative<2>(cell, best);
 }
 
 template <int D>

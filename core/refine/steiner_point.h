@@ -1,4 +1,4 @@
-// Where a new vertex goes: circumcentre or off-centre, and its place on the boundary of the box.
+// Where a new vertex goes: circumcentre, off-centre or farther in a petal, and its place on the boundary of the box.
 #ifndef WELLSPACE_CORE_REFINE_STEINER_POINT_H_
 #define WELLSPACE_CORE_REFINE_STEINER_POINT_H_
 
@@ -35,6 +35,23 @@ inline constexpr double kSizeFactor = 1.5;
 // Source:     [Ung04].
 template <int D>
 SteinerPoint<D> OffCenter(const Polytope<D>& cell, int node, int plane, double distance_sq);
+
+// In the plane, of an edge: the radius of its petal, the disc through both ends and the point that lies sqrt(top_sq) from both, which sees the edge as
+// all points of the circle do on that side, and as those within do at least.
+double PetalRadius(double edge_sq, double top_sq);
+
+// In the plane, a point of the cell for its bad node `node`, on the bisector `plane` of the site v and u, where OffCenter would take the node itself:
+// from the node on along the boundary of the cell, away from u, in the petal of v u, and while that leads away from v. The farthest from v, and so from
+// all vertices, that conforms to sizes as the node does. The way leads away from v if the triangle whose circumcentre the node is has an obtuse angle at
+// u.
+//
+// REQUIRES:   the node at more than rho |u| from the site, and at most sqrt(top_sq).
+// Guarantees: (1) on the boundary of the cell up to rounding, so that its distance to the site is that to its nearest vertex;
+//             (2) not nearer to the site than the node; (3) a point p with (rho - 1) (|up| - |vp|) <= |vp| - rho |u|, or the node.
+// Complexity: O(nodes).
+// Errors:     none.
+// Source:     H. Erten, A. Üngör, Quality triangulations with locally optimal Steiner points, 2009; (3): docs/design/guarantees.md.
+SteinerPoint<2> PetalPoint(const Polytope<2>& cell, int node, int plane, double top_sq, double rho);
 
 // A point of the cell's facet on face `face` of the box: the mean of its nodes that also lie on those of `site_faces`,
 // the faces that the site lies on, that meet `face`. There are such nodes: an empty ball about a point of the cell stays

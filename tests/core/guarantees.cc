@@ -198,6 +198,8 @@ void GuaranteeChecker<D>::CheckPlace(const QueryStructure<D>& structure, const I
   const double edge = std::sqrt(insertion.edge_sq);
   const double radius = std::sqrt(insertion.empty_radius_sq);
   const double from_near = std::sqrt(core::DistanceSq<D>(x, structure.point(insertion.near)));
+  const double from_other =
+      insertion.other != core::kNoVertex ? std::sqrt(core::DistanceSq<D>(x, structure.point(insertion.other))) : kNone;
   const double slack = 1e-9 * from_near + Rounding<D>(structure.box());
   const bool encroaches = insertion.reason == Reason::kEncroachment;
   seen_.on_faces += faces > 0 ? 1 : 0;
@@ -217,7 +219,11 @@ void GuaranteeChecker<D>::CheckPlace(const QueryStructure<D>& structure, const I
   Expect(radius >= std::min(least * std::pow(2.0, -0.5 * projections), thin) - slack, insertion, "its distance ",
          radius, " is too small for ", least, " and ", projections, " projections");
   if (faces == 0) {
-    Expect(std::abs(from_near - nearest) <= slack, insertion, "it is not in the cell, ", from_near, " instead of ",
+    // For a triangle it may be in the cell of the other end of the edge.
+    const bool may_be_of_other =
+        D == 2 && insertion.reason == Reason::kRatio && demands_.criterion == Criterion::kRadiusEdge;
+    const double from_site = may_be_of_other ? std::min(from_near, from_other) : from_near;
+    Expect(std::abs(from_site - nearest) <= slack, insertion, "it is not in the cell, ", from_site, " instead of ",
            nearest, " away");
     Expect(from_near >= least - slack, insertion, "at ", from_near, " it is nearer than ", least);
   }

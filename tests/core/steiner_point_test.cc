@@ -7,6 +7,8 @@
 #include <array>
 #include <cmath>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "core/refine/assessment.h"
 #include "tests/support/brute_force.h"
@@ -99,6 +101,65 @@ TYPED_TEST(SteinerPointTest, OffCentersAreInTheCellAndFarEnough) {
     }
   }
   EXPECT_GT(moved, 20);
+}
+
+class PetalPointTest : public test::SeededTest {
+ protected:
+  PetalPointTest() : SeededTest(2009) {}
+};
+
+// Guarantees of PetalPoint, for the nodes of cells of many shapes whose triangle breaks a rho, but not by far.
+TEST_F(PetalPointTest, IsInTheCellAndThePetalAndNoNearerThanTheNode) {
+  int moved = 0;
+  int stayed = 0;
+  for (const std::string_view kind : {"uniform", "boundary", "clusters", "lines"}) {
+    const QueryStructure<2> structure = MakeStructure<2>(test::SortedCloud<2>(kind, 60));
+    Polytope<2> cell;
+    for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
+      test::CutByAllInBox<2>(structure, VertexId{v}, cell);
+      for (size_t i = 0; i < cell.nodes().size(); ++i) {
+        const CellNode<2>& node = cell.nodes()[i];
+        const Plane<2>* edge = &cell.plane(node.planes[0]);
+        const Plane<2>* third = &cell.plane(node.planes[1]);
+        if (edge->kind != PlaneKind::kBisector || third->kind != PlaneKind::kBisector) {
+          continue;
+        }
+        if (third->length < edge->length) {
+          std::swap(edge, third);
+        }
+        const Point<2>& u = edge->normal;
+        const double node_radius = std::sqrt(node.radius_sq);
+        const double rho = node_radius / edge->length / (1.001 + 0.8 * this->random_.Unit());
+        const double top = OffCenterFactor<2>(rho, false) * rho * edge->length;
+        if (rho < 0.9 || node_radius > top) {
+          continue;
+        }
+        const int plane = node.planes[edge == &cell.plane(node.planes[0]) ? 0 : 1];
+        const SteinerPoint<2> point = PetalPoint(cell, static_cast<int>(i), plane, top * top, rho);
+        const double radius = std::sqrt(point.empty_radius_sq);
+        const double rounding = 1e-9 + std::min(node.slack, 1e-6);
+        ASSERT_GE(radius, node_radius);
+        for (uint32_t w = 0; w < structure.vertex_count(); ++w) {
+          ASSERT_GE(std::sqrt(DistanceSq<2>(point.position, structure.point(VertexId{w}))), radius - rounding);
+        }
+        const Point<2> p = Difference<2>(point.position, cell.site());
+        ASSERT_NEAR(std::sqrt(NormSq<2>(p)), radius, rounding);
+        if (radius < node_radius * (1 + 1e-9)) {
+          ++stayed;
+          continue;
+        }
+        ++moved;
+        const double from_u = std::sqrt(DistanceSq<2>(p, u));
+        const double twice_area = std::abs(u[0] * p[1] - u[1] * p[0]);
+        ASSERT_LE(radius * from_u * edge->length / (2 * twice_area), rho * edge->length)
+            << "the new triangle breaks rho";
+        ASSERT_LE((rho - 1) * (from_u - radius), radius - rho * edge->length + rounding);
+        ASSERT_LT(DistanceSq<2>(p, node.x), node.radius_sq) << "the old triangle stays";
+      }
+    }
+  }
+  EXPECT_GT(moved, 20);
+  EXPECT_GT(stayed, 20);
 }
 
 // A site in the middle of the unit box, its cell not cut by anything: every node is on foreign faces.
@@ -195,6 +256,43 @@ TEST(SteinerPointByHandTest, OffCenterByHand) {
   const auto stopped = off_center({{0, 10}, {0.5, -0.05}}, {0.5, 5}, 2, 1);
   EXPECT_DOUBLE_EQ(stopped.position[0], 0.5);
   EXPECT_NEAR(stopped.position[1], 2.475, 1e-12);
+}
+
+// v = 0, u = (1, 0), w = (2, 2): the node (1/2, 3/2), and beyond it the facet x + y = 2, which leads up and to the left.
+TEST(SteinerPointByHandTest, PetalPointByHand) {
+  const double rho = 1.4;
+  const double top = OffCenterFactor<2>(rho, false) * rho;
+  const double radius = PetalRadius(1, top * top);
+  EXPECT_NEAR(radius, top * top / (2 * std::sqrt(top * top - 0.25)), 1e-15);
+  const Point<2> centre = {0.5, std::sqrt(radius * radius - 0.25)};
+  std::array<PlaneKind, 4> kinds;
+  kinds.fill(PlaneKind::kFace);
+  const auto petal_point = [&](std::vector<Point<2>> others) {
+    Polytope<2> cell;
+    cell.Reset({0, 0}, {{-100, -100}, {100, 100}}, kinds, TieRule::kKeep);
+    cell.Cut(VertexId{0}, {1, 0});
+    cell.Cut(VertexId{1}, {2, 2});
+    for (uint32_t i = 0; i < others.size(); ++i) {
+      cell.Cut(VertexId{i + 2}, others[i]);
+    }
+    for (size_t i = 0; i < cell.nodes().size(); ++i) {
+      if (DistanceSq<2>(cell.nodes()[i].x, Point<2>{0.5, 1.5}) < 1e-12) {
+        return PetalPoint(cell, static_cast<int>(i), 4, top * top, rho);
+      }
+    }
+    ADD_FAILURE() << "no such node";
+    return SteinerPoint<2>{};
+  };
+  const SteinerPoint<2> leaves = petal_point({});
+  EXPECT_NEAR(leaves.position[0] + leaves.position[1], 2, 1e-12);
+  EXPECT_NEAR(DistanceSq<2>(leaves.position, centre), radius * radius, 1e-12);
+  EXPECT_GT(leaves.position[1], 1.5);
+  EXPECT_DOUBLE_EQ(leaves.empty_radius_sq, NormSq<2>(leaves.position));
+
+  // (-2, 2) ends that facet at (0, 2), in the petal, and its own, y - x = 2, leads back towards v.
+  const SteinerPoint<2> stopped = petal_point({{-2, 2}});
+  EXPECT_NEAR(stopped.position[0], 0, 1e-12);
+  EXPECT_NEAR(stopped.position[1], 2, 1e-12);
 }
 
 TEST(SteinerPointByHandTest, SnapsByHand) {
