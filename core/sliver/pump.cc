@@ -24,9 +24,9 @@ template <int D>
 constexpr int kRounds = D == 3 ? 12 : 2;
 constexpr double kPoorShare = 0.25;
 constexpr double kPoorestShare = 0.075;
-// Then, in 3-D, so often two vertices at a time for each simplex below the second part: one gets these shares of its limit.
-constexpr int kPairRounds = 3;
-constexpr std::array<double, 5> kPairShares = {0, 0.25, 0.5, 0.75, 0.999};
+// Then, in 3-D, so often a group of vertices around each simplex below the second part: one gets these shares of its limit.
+constexpr int kGroupRounds = 3;
+constexpr std::array<double, 5> kGroupShares = {0, 0.25, 0.5, 0.75, 0.999};
 // Vertices between two reports of progress.
 constexpr uint32_t kReportInterval = 64;
 
@@ -120,10 +120,10 @@ class Pump {
     return found;
   }
 
-  // Has fewer simplices flatter than `poor` around one that is, unless it has gone: a vertex near it gets another weight, and a corner of it the
-  // best then. `limit_of`(VertexId) is the limit of a weight.
+  // Has fewer simplices flatter than `poor` around one that is, unless it has gone: a vertex near it gets another weight, and those around the best
+  // then. `limit_of`(VertexId) is the limit of a weight.
   template <typename LimitOf>
-  void SetBestOfTwo(const Vertices& flat, LimitOf limit_of, double poor) {
+  void SetBestOfGroup(const Vertices& flat, LimitOf limit_of, double poor) {
     triangulation_.Star(flat[0], star_);
     if (std::none_of(star_.begin(), star_.end(), [&](SimplexId s) { return VerticesOf(s) == flat; })) {
       return;
@@ -135,7 +135,7 @@ class Pump {
       std::vector<VertexId> around;
       ListAround(v, around);
       for (const VertexId u : around) {
-        if (u != v && !IsCorner(u) && SetBestWith(u, v, limit_of, poor)) {
+        if (u != v && !IsCorner(u) && SetBestAround(u, v, limit_of, poor)) {
           return;
         }
       }
@@ -152,31 +152,42 @@ class Pump {
   // Of the box.
   bool IsCorner(VertexId v) const { return std::popcount(triangulation_.faces(v)) == D; }
 
-  // SetBestOfTwo for `u` and `v`: whether it has helped; nothing has changed if not.
+  // Gives `u` one weight after the other, and those around it and `v` that have a poor star then the best, until it helps. Whether it has; nothing has
+  // changed if not.
   template <typename LimitOf>
-  bool SetBestWith(VertexId u, VertexId v, LimitOf limit_of, double poor) {
-    const double old_u = triangulation_.weight(u);
-    const double old_v = triangulation_.weight(v);
+  bool SetBestAround(VertexId u, VertexId v, LimitOf limit_of, double poor) {
     near_.clear();
     ListAround(u, near_);
     ListAround(v, near_);
-    const Poverty before = PovertyAround(near_, poor);
-    for (const double share : kPairShares) {
+    far_.clear();
+    old_.clear();
+    for (const VertexId w : near_) {
+      ListAround(w, far_);
+      old_.push_back(triangulation_.weight(w));
+    }
+    const Poverty before = PovertyAround(far_, poor);
+    const double old_u = triangulation_.weight(u);
+    for (const double share : kGroupShares) {
       const double weight = static_cast<float>(share * limit_of(u));
-      if (weight == triangulation_.weight(u)) {
+      if (weight == old_u) {
         continue;
       }
       SetWeight(u, weight);
-      SetBest(v, limit_of(v), poor);
-      if (!(FlattestOfStar(v) > poor)) {
-        const Poverty after = PovertyAround(near_, poor);
-        if (after.simplices < before.simplices && after.flattest <= before.flattest) {
-          return true;
+      for (const VertexId w : near_) {
+        if (w != u && !IsCorner(w)) {
+          SetBest(w, limit_of(w), poor);
         }
       }
-      SetWeight(v, old_v);
+      const Poverty after = PovertyAround(far_, poor);
+      if (after.simplices < before.simplices && after.flattest <= before.flattest && !(FlattestOfStar(v) > poor)) {
+        return true;
+      }
+      for (size_t i = 0; i < near_.size(); ++i) {
+        if (triangulation_.weight(near_[i]) != old_[i]) {
+          SetWeight(near_[i], old_[i]);
+        }
+      }
     }
-    SetWeight(u, old_u);
     return false;
   }
 
@@ -355,6 +366,8 @@ class Pump {
   std::vector<SimplexId> created_;
   std::vector<SimplexId> star_;
   std::vector<VertexId> near_;
+  std::vector<VertexId> far_;  // those around them
+  std::vector<double> old_;    // weights of those near
 };
 
 }  // namespace
@@ -383,10 +396,10 @@ absl::StatusOr<uint64_t> PumpWeights(Triangulation<D>& triangulation, RunContext
   if constexpr (D == 3) {
     const double poor = Flatness<D>(kPoorestShare * LargestSmallestAngle(D));
     const auto limit_of = [&](VertexId v) { return kMostWeight * nearest_sq[Index(v)]; };
-    for (int round = 0; round < kPairRounds; ++round) {
+    for (int round = 0; round < kGroupRounds; ++round) {
       for (const auto& flat : pump.FindPoor(poor)) {
         WELLSPACE_RETURN_IF_ERROR(context.Check());
-        pump.SetBestOfTwo(flat, limit_of, poor);
+        pump.SetBestOfGroup(flat, limit_of, poor);
       }
     }
   }

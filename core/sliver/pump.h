@@ -16,7 +16,7 @@ inline constexpr double kMostWeight = 0.24;
 
 // Gives each vertex, one after the other, the weight in [0, kMostWeight NN^2] for which the simplex with the smallest
 // angle of its star is best; the others' weights stay. The triangulation of the weights takes the place of the one
-// before. Where that leaves slivers in 3-D, two vertices near each other are weighed together.
+// before. Where that leaves slivers in 3-D, vertices near each other are weighed together.
 //
 // REQUIRES:   a Delaunay triangulation, no weights.
 // Guarantees: (1) the result is exactly the regular triangulation of its weights; (2) a weight changes only its
