@@ -83,6 +83,16 @@ struct Box {
   }
 };
 
+template <int D>
+Box<D> CubeAround(const Point<D>& centre, double half_side) {
+  Box<D> cube{centre, centre};
+  for (int i = 0; i < D; ++i) {
+    cube.low[i] -= half_side;
+    cube.high[i] += half_side;
+  }
+  return cube;
+}
+
 // The square of x where that is positive, else 0; no branch, since none could be foretold.
 inline double PositivePartSq(double x) {
   const double twice = x + std::abs(x);

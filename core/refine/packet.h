@@ -110,12 +110,7 @@ struct alignas(kCacheLines) Packet {
   void SetKnown(size_t at, const Point<D>& site) {
     foreseen[at].is_known = true;
     const double radius = 1.001 * std::sqrt(foreseen[at].reach_sq);  // whatever is rounded
-    Box<D> around{site, site};
-    for (int i = 0; i < D; ++i) {
-      around.low[i] -= radius;
-      around.high[i] += radius;
-    }
-    reach.Include(around);
+    reach.Include(CubeAround<D>(site, radius));
   }
 
   // Whether what is foreseen of vertex `at`, at `site`, is what would be found now.

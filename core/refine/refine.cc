@@ -28,6 +28,9 @@ constexpr double kClipRatioFactor = 1.25;
 // work has graded. Its cell is clipped so to announce it.
 constexpr double kAround = 1.5;
 
+// A cell is clipped by a cube around this times the petal of an edge, so that the petal is surely within.
+constexpr double kPetalShare = 1.01;
+
 // Room is made for at most so many times the vertices that there are, whatever is foretold.
 constexpr uint64_t kMostReserved = 8;
 
@@ -287,7 +290,7 @@ void Refinement<D>::ScheduleNew(VertexId near, VertexId x, double nearest_sq) {
                             [&](VertexId u) { Wake(u, DistanceSq<D>(p, structure_.point(u))); });
     ScheduleWoken();
     if (watchers_.SomeWatchAll()) {
-      ComputeCell(x, around, other_);
+      ComputeCell(x, CubeAround<D>(p, around), other_);
       other_.cell.Place();
       if (!other_.cell.IsTooLarge()) {
         const Assessment found = Assess<D>(other_.cell, structure_.faces(x), *demands_, nearest_sq);
@@ -304,7 +307,7 @@ template <int D>
 absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
   const double edge_limit_sq = schedule_.UpperLengthSq(bucket);
   Polytope<D>& cell = own_.cell;
-  ComputeCell(v, ClipOf(bucket), own_);
+  ComputeCell(v, CubeAround<D>(structure_.point(v), ClipOf(bucket)), own_);
   if constexpr (kChecks) {
     cell.Place();
     CheckOrder(v, cell, bucket);
@@ -322,7 +325,7 @@ absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
       return absl::OkStatus();
     }
     const std::optional<Request> request =
-        NextRequest(v, cell, found, edge_limit_sq, [this](VertexId u, double clip) -> const Polytope<D>* {
+        NextRequest(v, cell, found, edge_limit_sq, [this](VertexId u, const Box<D>& clip) -> const Polytope<D>* {
           ComputeCell(u, clip, other_);
           other_.cell.Place();
           return other_.cell.IsTooLarge() ? nullptr : &other_.cell;
@@ -405,9 +408,14 @@ SteinerPoint<D> Refinement<D>::PointFor(VertexId v, const Polytope<D>& cell, con
       const Plane<2>& third = cell.plane(node.planes[node.planes[0] == found.bad_plane ? 1 : 0]);
       if (third.kind == PlaneKind::kBisector && Dot<2>(edge.normal, third.normal) < 0) {
         // The angle at v is obtuse: what is farther than the node is on the boundary of the other cell.
-        const double diameter = 2 * PetalRadius(2 * edge.offset, distance_sq);
-        const Polytope<2>* const other =
-            cell_of(edge.vertex, std::min(diameter, clip_factor_ * std::sqrt(edge_limit_sq)));
+        const auto [centre, radius] = PetalOf(cell, found.bad_node, found.bad_plane, distance_sq);
+        Box<2> clip = CubeAround<2>(edge.source.generator, clip_factor_ * std::sqrt(edge_limit_sq));
+        for (int i = 0; i < 2; ++i) {
+          const double middle = cell.site()[i] + centre[i];
+          clip.low[i] = std::max(clip.low[i], middle - kPetalShare * radius);
+          clip.high[i] = std::min(clip.high[i], middle + kPetalShare * radius);
+        }
+        const Polytope<2>* const other = cell_of(edge.vertex, clip);
         if (other != nullptr) {
           const auto [same_node, plane] = NodeBetween(*other, v, third.vertex);
           if (same_node >= 0) {
@@ -431,9 +439,9 @@ bool Refinement<D>::IsAtBoundary(VertexId v, const Polytope<D>& cell, int node) 
          });
 }
 
-// Computes the cell of `v`, not yet placed, clipped at `clip`.
+// Computes the cell of `v`, not yet placed, clipped by `clip`.
 template <int D>
-void Refinement<D>::ComputeCell(VertexId v, double clip, Workspace<D>& workspace) {
+void Refinement<D>::ComputeCell(VertexId v, const Box<D>& clip, Workspace<D>& workspace) {
   structure_.UnplacedClippedVoronoi(v, clip, workspace);
   structure_.CutByWaiting(v, workspace.cell);
   if (workspace.cell.IsTooLarge() && structure_.waiting_count() > 0) {

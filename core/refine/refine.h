@@ -97,8 +97,8 @@ class Refinement {
   };
 
   using Request = InsertionRequest<D>;
-  // Computes the cell of a vertex, clipped by the cube of so much half side; null if that cannot be done.
-  using CellOf = absl::FunctionRef<const Polytope<D>*(VertexId, double)>;
+  // Computes the cell of a vertex, clipped by a box; null if that cannot be done.
+  using CellOf = absl::FunctionRef<const Polytope<D>*(VertexId, const Box<D>&)>;
 
   // A vertex that has been found done, whose star is still to be listed.
   struct Listing {
@@ -125,7 +125,7 @@ class Refinement {
   SteinerPoint<D> PointFor(VertexId v, const Polytope<D>& cell, const Assessment& found, double distance_sq,
                            double edge_limit_sq, CellOf cell_of) const;
   double ClipOf(int bucket) const { return clip_factor_ * std::sqrt(schedule_.UpperLengthSq(bucket)); }
-  void ComputeCell(VertexId v, double clip, Workspace<D>& workspace);
+  void ComputeCell(VertexId v, const Box<D>& clip, Workspace<D>& workspace);
   Assessment AssessCell(Polytope<D>& cell, FaceMask site_faces, double edge_limit_sq) const;
   absl::StatusOr<VertexId> Insert(const Request& request);
   bool GivesWay(VertexId v, const Assessment& found, int bucket);

@@ -278,7 +278,7 @@ void Refinement<D>::ForeseeOne(Packet<D>& packet, size_t at, OwnWorkspace& works
   structure_.UnplacedClippedVoronoi(v, ClipOf(round_bucket_), workspace, packet.inserted);
   packet.foreseen[at].reach_sq = cell.CutLimitSq();
   bool is_foreseeable = true;
-  const auto cell_of = [&](VertexId u, double clip) -> const Polytope<D>* {
+  const auto cell_of = [&](VertexId u, const Box<D>& clip) -> const Polytope<D>* {
     is_foreseeable = u < packet.inserted.first();  // others are in no leaf
     if (!is_foreseeable) {
       return nullptr;

@@ -91,21 +91,26 @@ SteinerPoint<D> OffCenter(const Polytope<D>& cell, int node, int plane, double d
   return Relative<D>(cell, middle);
 }
 
-double PetalRadius(double edge_sq, double top_sq) { return 0.5 * top_sq / std::sqrt(top_sq - 0.25 * edge_sq); }
+Petal PetalOf(const Polytope<2>& cell, int node, int plane, double top_sq) {
+  const Point<2>& u = cell.plane(plane).normal;
+  const Point<2> middle = {0.5 * u[0], 0.5 * u[1]};
+  const Point<2> up = Difference<2>(cell.nodes()[node].x, middle);
+  const double height = std::sqrt(top_sq - 0.5 * cell.plane(plane).offset);
+  const double radius = 0.5 * top_sq / height;
+  const double t = (height - radius) / std::sqrt(NormSq<2>(up));
+  return {{middle[0] + t * up[0], middle[1] + t * up[1]}, radius};
+}
 
 SteinerPoint<2> PetalPoint(const Polytope<2>& cell, int node, int plane, double top_sq, double rho) {
   Point<2> x = cell.nodes()[node].x;
   const Point<2>& u = cell.plane(plane).normal;
-  const double edge_sq = 2 * cell.plane(plane).offset;
-  const double radius = PetalRadius(edge_sq, top_sq);
-  const Point<2> middle = {0.5 * u[0], 0.5 * u[1]};
-  const Point<2> up = Difference<2>(x, middle);
-  const double t = (0.5 * top_sq / radius - radius) / std::sqrt(NormSq<2>(up));
-  const Point<2> centre = {middle[0] + t * up[0], middle[1] + t * up[1]};
-  const auto is_inside = [&](const Point<2>& p) { return DistanceSq<2>(p, centre) <= radius * radius; };
+  const auto [centre, radius] = PetalOf(cell, node, plane, top_sq);
+  const auto is_inside = [&, centre = centre, radius = radius](const Point<2>& p) {
+    return DistanceSq<2>(p, centre) <= radius * radius;
+  };
   const auto is_conforming = [&](const Point<2>& p) {
     const double distance = std::sqrt(NormSq<2>(p));
-    return (rho - 1) * (std::sqrt(DistanceSq<2>(p, u)) - distance) <= distance - rho * std::sqrt(edge_sq);
+    return (rho - 1) * (std::sqrt(DistanceSq<2>(p, u)) - distance) <= distance - rho * cell.plane(plane).length;
   };
   Point<2> best = x;
   int from = plane;

@@ -36,9 +36,13 @@ inline constexpr double kSizeFactor = 1.5;
 template <int D>
 SteinerPoint<D> OffCenter(const Polytope<D>& cell, int node, int plane, double distance_sq);
 
-// In the plane, of an edge: the radius of its petal, the disc through both ends and the point that lies sqrt(top_sq) from both, which sees the edge as
-// all points of the circle do on that side, and as those within do at least.
-double PetalRadius(double edge_sq, double top_sq);
+// In the plane, of an edge v u: the disc through both ends and the point that lies sqrt(top_sq) from both, on the side of a node of their bisector.
+// Points of its circle there see the edge at the angle at which that one does, points within at a larger one.
+struct Petal {
+  Point<2> centre;  // relative to the site v
+  double radius = 0;
+};
+Petal PetalOf(const Polytope<2>& cell, int node, int plane, double top_sq);
 
 // In the plane, a point of the cell for its bad node `node`, on the bisector `plane` of the site v and u, where OffCenter would take the node itself:
 // from the node on along the boundary of the cell, away from u, in the petal of v u, and while that leads away from v. The farthest from v, and so from

@@ -24,19 +24,18 @@ enum class PlaneKind : uint8_t {
   kClip,  // of the cube that a clipped cell is computed in, or of the walls far outside the box
 };
 
-// What a cell about `site` begins with: `box`, clipped by the cube of half side `radius` about the site. `kinds` says by
-// FaceIndex what its faces are.
+// What a cell clipped by the box `clip` begins with: what `box` has in common with that. `kinds` says by FaceIndex what its faces are.
 template <int D>
-Box<D> ClippedBox(const Box<D>& box, const Point<D>& site, double radius, std::array<PlaneKind, 2 * D>& kinds) {
+Box<D> ClippedBox(const Box<D>& box, const Box<D>& clip, std::array<PlaneKind, 2 * D>& kinds) {
   Box<D> bounds = box;
   kinds.fill(PlaneKind::kFace);
   for (int i = 0; i < D; ++i) {
-    if (site[i] - radius > bounds.low[i]) {
-      bounds.low[i] = site[i] - radius;
+    if (clip.low[i] > bounds.low[i]) {
+      bounds.low[i] = clip.low[i];
       kinds[FaceIndex(i, false)] = PlaneKind::kClip;
     }
-    if (site[i] + radius < bounds.high[i]) {
-      bounds.high[i] = site[i] + radius;
+    if (clip.high[i] < bounds.high[i]) {
+      bounds.high[i] = clip.high[i];
       kinds[FaceIndex(i, true)] = PlaneKind::kClip;
     }
   }

@@ -462,22 +462,28 @@ Neighbor QueryStructure<D>::FindBeyond(const Point<D>& p, NodeId leaf, Neighbor 
 
 template <int D>
 void QueryStructure<D>::ClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace, TieRule rule) const {
-  ClipAndScan(v, radius, rule, workspace);
+  ClipAndScan(v, CubeAround<D>(point(v), radius), rule, workspace);
   workspace.cell.Place();
 }
 
 template <int D>
 void QueryStructure<D>::UnplacedClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace,
                                                const ExtraVertices<D>& others) const {
-  ClipAndScan(v, radius, TieRule::kPerturb, workspace, others);
+  ClipAndScan(v, CubeAround<D>(point(v), radius), TieRule::kPerturb, workspace, others);
+}
+
+template <int D>
+void QueryStructure<D>::UnplacedClippedVoronoi(VertexId v, const Box<D>& clip, Workspace<D>& workspace,
+                                               const ExtraVertices<D>& others) const {
+  ClipAndScan(v, clip, TieRule::kPerturb, workspace, others);
 }
 
 // Computes the clipped cell of vertex `v`.
 template <int D>
-void QueryStructure<D>::ClipAndScan(VertexId v, double radius, TieRule rule, Workspace<D>& workspace,
+void QueryStructure<D>::ClipAndScan(VertexId v, const Box<D>& clip, TieRule rule, Workspace<D>& workspace,
                                     const ExtraVertices<D>& others) const {
   std::array<PlaneKind, 2 * D> kinds;
-  const Box<D> bounds = ClippedBox<D>(box_, point(v), radius, kinds);
+  const Box<D> bounds = ClippedBox<D>(box_, clip, kinds);
   workspace.cell.Reset(point(v), bounds, kinds, rule);
   Scan(v, workspace, others);
 }

@@ -127,6 +127,9 @@ class QueryStructure {
   // The same, ties perturbed, for whoever may not need the nodes: they are still to be placed, by cell.Place(). The cell is cut by `others`, too.
   void UnplacedClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace,
                               const ExtraVertices<D>& others = {}) const;
+  // Clipped by a box, which holds v up to rounding.
+  void UnplacedClippedVoronoi(VertexId v, const Box<D>& clip, Workspace<D>& workspace,
+                              const ExtraVertices<D>& others = {}) const;
 
   // Asks the memory for what a query about `v` begins with, which is found in three steps (PrefetchAhead).
   //
@@ -223,7 +226,7 @@ class QueryStructure {
                        Open& open) const;
   Neighbor FindBeyond(const Point<D>& p, NodeId leaf, Neighbor nearest, Workspace<D>& workspace) const;
   Neighbor Nearest(const Point<D>& p, NodeId leaf, VertexId but, double limit_sq, Workspace<D>& workspace) const;
-  void ClipAndScan(VertexId v, double radius, TieRule rule, Workspace<D>& workspace,
+  void ClipAndScan(VertexId v, const Box<D>& clip, TieRule rule, Workspace<D>& workspace,
                    const ExtraVertices<D>& others = {}) const;
   void Scan(VertexId v, Workspace<D>& workspace, const ExtraVertices<D>& others = {}) const;
   void CutByLeaf(NodeId leaf, VertexId site, Workspace<D>& workspace) const;

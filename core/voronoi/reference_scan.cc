@@ -360,7 +360,7 @@ ReferenceScan<D> ReferenceClippedVoronoi(const QueryStructure<D>& structure, Ver
   const Point<D>& site = structure.point(v);
   const LeafTree<D>& tree = structure.tree();
   std::array<PlaneKind, 2 * D> kinds;
-  const Box<D> bounds = ClippedBox<D>(structure.box(), site, radius, kinds);
+  const Box<D> bounds = ClippedBox<D>(structure.box(), CubeAround<D>(site, radius), kinds);
   const Box<D> centres{Difference<D>(bounds.low, site), Difference<D>(bounds.high, site)};
 
   ReferenceScan<D> scan;

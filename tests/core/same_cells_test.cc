@@ -70,7 +70,7 @@ TYPED_TEST(SameCellsTest, DoNotDependOnTheOrderOfTheCuts) {
       const auto expected = CellNow<D>(structure, VertexId{v}, workspace);
       std::array<PlaneKind, 2 * D> kinds;
       const Point<D>& site = structure.point(VertexId{v});
-      const Box<D> bounds = ClippedBox<D>(structure.box(), site, kClip, kinds);
+      const Box<D> bounds = ClippedBox<D>(structure.box(), CubeAround<D>(site, kClip), kinds);
       for (int repeat = 0; repeat < 3; ++repeat) {
         Polytope<D> cell;
         test::CutByAll<D>(structure, VertexId{v}, bounds, kinds, TieRule::kPerturb, this->random_.Next(), cell);

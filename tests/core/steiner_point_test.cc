@@ -262,8 +262,7 @@ TEST(SteinerPointByHandTest, OffCenterByHand) {
 TEST(SteinerPointByHandTest, PetalPointByHand) {
   const double rho = 1.4;
   const double top = OffCenterFactor<2>(rho, false) * rho;
-  const double radius = PetalRadius(1, top * top);
-  EXPECT_NEAR(radius, top * top / (2 * std::sqrt(top * top - 0.25)), 1e-15);
+  const double radius = top * top / (2 * std::sqrt(top * top - 0.25));
   const Point<2> centre = {0.5, std::sqrt(radius * radius - 0.25)};
   std::array<PlaneKind, 4> kinds;
   kinds.fill(PlaneKind::kFace);
@@ -277,6 +276,9 @@ TEST(SteinerPointByHandTest, PetalPointByHand) {
     }
     for (size_t i = 0; i < cell.nodes().size(); ++i) {
       if (DistanceSq<2>(cell.nodes()[i].x, Point<2>{0.5, 1.5}) < 1e-12) {
+        const Petal petal = PetalOf(cell, static_cast<int>(i), 4, top * top);
+        EXPECT_NEAR(petal.radius, radius, 1e-12);
+        EXPECT_NEAR(DistanceSq<2>(petal.centre, centre), 0, 1e-24);
         return PetalPoint(cell, static_cast<int>(i), 4, top * top, rho);
       }
     }
