@@ -28,9 +28,6 @@ constexpr double kClipRatioFactor = 1.25;
 // work has graded. Its cell is clipped so to announce it.
 constexpr double kAround = 1.5;
 
-// A cell is clipped by a cube around this times the petal of an edge, so that the petal is surely within.
-constexpr double kPetalShare = 1.01;
-
 // Room is made for at most so many times the vertices that there are, whatever is foretold.
 constexpr uint64_t kMostReserved = 8;
 
@@ -48,20 +45,6 @@ constexpr uint64_t kReportInterval = 256;
 float RoundedUp(double x) {
   const auto nearest = static_cast<float>(x);
   return nearest < x ? std::nextafter(nearest, std::numeric_limits<float>::infinity()) : nearest;
-}
-
-// The node of a cell in the plane that lies on the bisectors of `u` and `w`, and the plane of u's.
-std::pair<int, int> NodeBetween(const Polytope<2>& cell, VertexId u, VertexId w) {
-  for (size_t i = 0; i < cell.nodes().size(); ++i) {
-    const auto [first, second] = cell.nodes()[i].planes;
-    if (cell.plane(first).vertex == u && cell.plane(second).vertex == w) {
-      return {static_cast<int>(i), first};
-    }
-    if (cell.plane(first).vertex == w && cell.plane(second).vertex == u) {
-      return {static_cast<int>(i), second};
-    }
-  }
-  return {-1, -1};
 }
 
 }  // namespace
@@ -307,7 +290,7 @@ template <int D>
 absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
   const double edge_limit_sq = schedule_.UpperLengthSq(bucket);
   Polytope<D>& cell = own_.cell;
-  ComputeCell(v, CubeAround<D>(structure_.point(v), ClipOf(bucket)), own_);
+  ComputeCell(v, ClipAround(v, bucket), own_);
   if constexpr (kChecks) {
     cell.Place();
     CheckOrder(v, cell, bucket);
@@ -364,79 +347,6 @@ template <int D>
 int Refinement<D>::OwnBucket(const Assessment& found, int bucket) const {
   return found.bad_node >= 0 ? std::min(bucket, schedule_.BucketOf(found.bound_sq / (demands_->rho * demands_->rho)))
                              : bucket;
-}
-
-// What `cell`, that of `v`, asks for by edges up to a bucket's limit, by what was found; none if nothing. Calls cell_of at most once.
-template <int D>
-std::optional<typename Refinement<D>::Request> Refinement<D>::NextRequest(VertexId v, const Polytope<D>& cell,
-                                                                          const Assessment& found, double edge_limit_sq,
-                                                                          CellOf cell_of) const {
-  Request request;
-  Insertion& insertion = request.insertion;
-  insertion.near = v;
-  insertion.edge_limit_sq = edge_limit_sq;
-  if (found.bad_node >= 0) {
-    const double factor = found.is_too_large                      ? kSizeFactor
-                          : IsAtBoundary(v, cell, found.bad_node) ? boundary_factor_
-                                                                  : off_center_factor_;
-    insertion.reason = found.is_too_large ? Reason::kSize : Reason::kRatio;
-    insertion.edge_sq = found.bound_sq / (demands_->rho * demands_->rho);
-    insertion.other = found.bad_plane >= 0 ? cell.plane(found.bad_plane).vertex : kNoVertex;
-    request.candidate = PointFor(v, cell, found, factor * factor * found.bound_sq, edge_limit_sq, cell_of);
-  } else if (found.encroached_face >= 0) {
-    insertion.reason = Reason::kEncroachment;
-    const double distance = structure_.box().DistanceToFace(structure_.point(v), found.encroached_face);
-    insertion.edge_sq = distance * distance;
-    request.candidate = EncroachmentPoint<D>(cell, structure_.faces(v), found.encroached_face);
-  } else {
-    return std::nullopt;
-  }
-  request.point = SnapToBoundary<D>(structure_.box(), request.candidate);
-  insertion.empty_radius_sq = request.point.empty_radius_sq;
-  return request;
-}
-
-// The point for the bad node of the cell of `v`: an off-centre at distance_sq, by the square, unless the node is nearer; then that, or for a triangle
-// better still.
-template <int D>
-SteinerPoint<D> Refinement<D>::PointFor(VertexId v, const Polytope<D>& cell, const Assessment& found,
-                                        double distance_sq, double edge_limit_sq, CellOf cell_of) const {
-  const CellNode<D>& node = cell.nodes()[found.bad_node];
-  if constexpr (D == 2) {
-    if (node.radius_sq <= distance_sq && !found.is_too_large && demands_->criterion == Criterion::kRadiusEdge) {
-      const Plane<2>& edge = cell.plane(found.bad_plane);
-      const Plane<2>& third = cell.plane(node.planes[node.planes[0] == found.bad_plane ? 1 : 0]);
-      if (third.kind == PlaneKind::kBisector && Dot<2>(edge.normal, third.normal) < 0) {
-        // The angle at v is obtuse: what is farther than the node is on the boundary of the other cell.
-        const auto [centre, radius] = PetalOf(cell, found.bad_node, found.bad_plane, distance_sq);
-        Box<2> clip = CubeAround<2>(edge.source.generator, clip_factor_ * std::sqrt(edge_limit_sq));
-        for (int i = 0; i < 2; ++i) {
-          const double middle = cell.site()[i] + centre[i];
-          clip.low[i] = std::max(clip.low[i], middle - kPetalShare * radius);
-          clip.high[i] = std::min(clip.high[i], middle + kPetalShare * radius);
-        }
-        const Polytope<2>* const other = cell_of(edge.vertex, clip);
-        if (other != nullptr) {
-          const auto [same_node, plane] = NodeBetween(*other, v, third.vertex);
-          if (same_node >= 0) {
-            return PetalPoint(*other, same_node, plane, distance_sq, demands_->rho);
-          }
-        }
-      }
-      return PetalPoint(cell, found.bad_node, found.bad_plane, distance_sq, demands_->rho);
-    }
-  }
-  return OffCenter<D>(cell, found.bad_node, found.bad_plane, distance_sq);
-}
-
-// Whether `node` of `cell`, that of `v`, is the circumcentre of a simplex with a corner on the boundary of the box.
-template <int D>
-bool Refinement<D>::IsAtBoundary(VertexId v, const Polytope<D>& cell, int node) const {
-  const std::array<uint16_t, D>& planes = cell.nodes()[node].planes;
-  return structure_.faces(v) != 0 || std::any_of(planes.begin(), planes.end(), [&](uint16_t index) {
-           const Plane<D>& plane = cell.plane(index);
-           return plane.kind == PlaneKind::kBisector && structure_.box().FacesOf(plane.source.generator) != 0;
-         });
 }
 
 // Computes the cell of `v`, not yet placed, clipped by `clip`.

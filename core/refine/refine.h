@@ -125,6 +125,7 @@ class Refinement {
   SteinerPoint<D> PointFor(VertexId v, const Polytope<D>& cell, const Assessment& found, double distance_sq,
                            double edge_limit_sq, CellOf cell_of) const;
   double ClipOf(int bucket) const { return clip_factor_ * std::sqrt(schedule_.UpperLengthSq(bucket)); }
+  Box<D> ClipAround(VertexId v, int bucket) const { return CubeAround<D>(structure_.point(v), ClipOf(bucket)); }
   void ComputeCell(VertexId v, const Box<D>& clip, Workspace<D>& workspace);
   Assessment AssessCell(Polytope<D>& cell, FaceMask site_faces, double edge_limit_sq) const;
   absl::StatusOr<VertexId> Insert(const Request& request);

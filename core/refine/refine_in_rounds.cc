@@ -275,7 +275,7 @@ void Refinement<D>::ForeseeOne(Packet<D>& packet, size_t at, OwnWorkspace& works
   const FaceMask faces = structure_.faces(v);
   const double edge_limit_sq = schedule_.UpperLengthSq(round_bucket_);
   Polytope<D>& cell = workspace.cell;
-  structure_.UnplacedClippedVoronoi(v, ClipOf(round_bucket_), workspace, packet.inserted);
+  structure_.UnplacedClippedVoronoi(v, ClipAround(v, round_bucket_), workspace, packet.inserted);
   packet.foreseen[at].reach_sq = cell.CutLimitSq();
   bool is_foreseeable = true;
   const auto cell_of = [&](VertexId u, const Box<D>& clip) -> const Polytope<D>* {

@@ -503,8 +503,8 @@ bool LeafTree<D>::HasNearFeatures(std::span<const Point<D>> points, const Box<D>
   }
   // Two points that are farther from each other are not both within reach of a third.
   const double far_sq = 4 * (1 + 0x1p-20) * reach_sq;
-  static_assert(kCoarseness >=
-                128);  // so that it is at most side / 64, and points lie at most side / 128 beyond the cube
+  // What the columns rely on: it is at most side / 64, and points lie at most side / 128 beyond the cube.
+  static_assert(kCoarseness >= 128);
   ColumnsWithPoints columns(cube.high[0] - cube.low[0]);
   for (size_t i = 0; i < points.size(); ++i) {
     const Point<D>& a = points[i];

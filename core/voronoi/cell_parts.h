@@ -21,7 +21,7 @@ namespace wellspace::core {
 enum class PlaneKind : uint8_t {
   kBisector,
   kFace,  // of the box
-  kClip,  // of the cube that a clipped cell is computed in, or of the walls far outside the box
+  kClip,  // of the box that a clipped cell is computed in, or of the walls far outside the box
 };
 
 // What a cell clipped by the box `clip` begins with: what `box` has in common with that. `kinds` says by FaceIndex what its faces are.

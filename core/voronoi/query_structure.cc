@@ -467,12 +467,6 @@ void QueryStructure<D>::ClippedVoronoi(VertexId v, double radius, Workspace<D>& 
 }
 
 template <int D>
-void QueryStructure<D>::UnplacedClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace,
-                                               const ExtraVertices<D>& others) const {
-  ClipAndScan(v, CubeAround<D>(point(v), radius), TieRule::kPerturb, workspace, others);
-}
-
-template <int D>
 void QueryStructure<D>::UnplacedClippedVoronoi(VertexId v, const Box<D>& clip, Workspace<D>& workspace,
                                                const ExtraVertices<D>& others) const {
   ClipAndScan(v, clip, TieRule::kPerturb, workspace, others);

@@ -124,10 +124,8 @@ class QueryStructure {
   //             meets crosses only facets of leaves that it meets.
   void ClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace, TieRule rule = TieRule::kKeep) const;
 
-  // The same, ties perturbed, for whoever may not need the nodes: they are still to be placed, by cell.Place(). The cell is cut by `others`, too.
-  void UnplacedClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace,
-                              const ExtraVertices<D>& others = {}) const;
-  // Clipped by a box, which holds v up to rounding.
+  // The same clipped by a box, which holds v up to rounding, ties perturbed, for whoever may not need the nodes: they are still to be placed, by
+  // cell.Place(). The cell is cut by `others`, too.
   void UnplacedClippedVoronoi(VertexId v, const Box<D>& clip, Workspace<D>& workspace,
                               const ExtraVertices<D>& others = {}) const;
 

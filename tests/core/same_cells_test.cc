@@ -140,7 +140,7 @@ TYPED_TEST(SameCellsTest, VerticesThatWaitCountOnceTheyCutOrAreAdmitted) {
     EXPECT_EQ(CellNow<D>(structure, VertexId{0}, workspace), of_others) << "queries do not find them";
     std::vector<decltype(Description<D>(workspace.cell))> cells;
     for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
-      structure.UnplacedClippedVoronoi(VertexId{v}, kClip, workspace);
+      structure.UnplacedClippedVoronoi(VertexId{v}, CubeAround<D>(structure.point(VertexId{v}), kClip), workspace);
       structure.CutByWaiting(VertexId{v}, workspace.cell);
       workspace.cell.Place();
       cells.push_back(Description<D>(workspace.cell));

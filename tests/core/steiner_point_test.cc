@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <stdexcept>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -225,24 +226,34 @@ TEST(SteinerPointByHandTest, OffCenterLiesWhereTheNewTriangleJustKeepsRho) {
   }
 }
 
-// v = 0, u = (1, 0): the bisector x = 1/2, its node at height 5 from (0, 10), 2 from (0, 4).
-TEST(SteinerPointByHandTest, OffCenterByHand) {
+// The cell of v = 0 in a large box, cut by u = (1, 0), whose bisector x = 1/2 is this plane, and by others.
+constexpr int kBisectorOfU = 4;
+Polytope<2> CellByHand(const std::vector<Point<2>>& others) {
   std::array<PlaneKind, 4> kinds;
   kinds.fill(PlaneKind::kFace);
-  const auto off_center = [&](std::vector<Point<2>> others, Point<2> at, double rho, double factor) {
-    Polytope<2> cell;
-    cell.Reset({0, 0}, {{-100, -100}, {100, 100}}, kinds, TieRule::kKeep);
-    cell.Cut(VertexId{0}, {1, 0});
-    for (uint32_t i = 0; i < others.size(); ++i) {
-      cell.Cut(VertexId{i + 1}, others[i]);
+  Polytope<2> cell;
+  cell.Reset({0, 0}, {{-100, -100}, {100, 100}}, kinds, TieRule::kKeep);
+  cell.Cut(VertexId{0}, {1, 0});
+  for (uint32_t i = 0; i < others.size(); ++i) {
+    cell.Cut(VertexId{i + 1}, others[i]);
+  }
+  return cell;
+}
+
+int NodeAt(const Polytope<2>& cell, const Point<2>& x) {
+  for (size_t i = 0; i < cell.nodes().size(); ++i) {
+    if (DistanceSq<2>(cell.nodes()[i].x, x) < 1e-12) {
+      return static_cast<int>(i);
     }
-    for (size_t i = 0; i < cell.nodes().size(); ++i) {
-      if (DistanceSq<2>(cell.nodes()[i].x, at) < 1e-12) {
-        return OffCenter<2>(cell, static_cast<int>(i), 4, std::pow(factor * rho, 2));
-      }
-    }
-    ADD_FAILURE() << "no such node";
-    return SteinerPoint<2>{};
+  }
+  throw std::invalid_argument("no such node");
+}
+
+// The node of u is at height 5 from (0, 10), 2 from (0, 4).
+TEST(SteinerPointByHandTest, OffCenterByHand) {
+  const auto off_center = [](const std::vector<Point<2>>& others, const Point<2>& at, double rho, double factor) {
+    const Polytope<2> cell = CellByHand(others);
+    return OffCenter<2>(cell, NodeAt(cell, at), kBisectorOfU, std::pow(factor * rho, 2));
   };
   const auto far = off_center({{0, 10}}, {0.5, 5}, 2, 1.25);
   EXPECT_DOUBLE_EQ(far.position[0], 0.5);
@@ -258,41 +269,28 @@ TEST(SteinerPointByHandTest, OffCenterByHand) {
   EXPECT_NEAR(stopped.position[1], 2.475, 1e-12);
 }
 
-// v = 0, u = (1, 0), w = (2, 2): the node (1/2, 3/2), and beyond it the facet x + y = 2, which leads up and to the left.
+// With w = (2, 2): the node (1/2, 3/2), and beyond it the facet x + y = 2, which leads up and to the left.
 TEST(SteinerPointByHandTest, PetalPointByHand) {
   const double rho = 1.4;
   const double top = OffCenterFactor<2>(rho, false) * rho;
   const double radius = top * top / (2 * std::sqrt(top * top - 0.25));
   const Point<2> centre = {0.5, std::sqrt(radius * radius - 0.25)};
-  std::array<PlaneKind, 4> kinds;
-  kinds.fill(PlaneKind::kFace);
-  const auto petal_point = [&](std::vector<Point<2>> others) {
-    Polytope<2> cell;
-    cell.Reset({0, 0}, {{-100, -100}, {100, 100}}, kinds, TieRule::kKeep);
-    cell.Cut(VertexId{0}, {1, 0});
-    cell.Cut(VertexId{1}, {2, 2});
-    for (uint32_t i = 0; i < others.size(); ++i) {
-      cell.Cut(VertexId{i + 2}, others[i]);
-    }
-    for (size_t i = 0; i < cell.nodes().size(); ++i) {
-      if (DistanceSq<2>(cell.nodes()[i].x, Point<2>{0.5, 1.5}) < 1e-12) {
-        const Petal petal = PetalOf(cell, static_cast<int>(i), 4, top * top);
-        EXPECT_NEAR(petal.radius, radius, 1e-12);
-        EXPECT_NEAR(DistanceSq<2>(petal.centre, centre), 0, 1e-24);
-        return PetalPoint(cell, static_cast<int>(i), 4, top * top, rho);
-      }
-    }
-    ADD_FAILURE() << "no such node";
-    return SteinerPoint<2>{};
+  const auto petal_point = [&](const std::vector<Point<2>>& others) {
+    const Polytope<2> cell = CellByHand(others);
+    const int node = NodeAt(cell, {0.5, 1.5});
+    const Petal petal = PetalOf(cell, node, kBisectorOfU, top * top);
+    EXPECT_NEAR(petal.radius, radius, 1e-12);
+    EXPECT_NEAR(DistanceSq<2>(petal.centre, centre), 0, 1e-24);
+    return PetalPoint(cell, node, kBisectorOfU, top * top, rho);
   };
-  const SteinerPoint<2> leaves = petal_point({});
+  const SteinerPoint<2> leaves = petal_point({{2, 2}});
   EXPECT_NEAR(leaves.position[0] + leaves.position[1], 2, 1e-12);
   EXPECT_NEAR(DistanceSq<2>(leaves.position, centre), radius * radius, 1e-12);
   EXPECT_GT(leaves.position[1], 1.5);
   EXPECT_DOUBLE_EQ(leaves.empty_radius_sq, NormSq<2>(leaves.position));
 
   // (-2, 2) ends that facet at (0, 2), in the petal, and its own, y - x = 2, leads back towards v.
-  const SteinerPoint<2> stopped = petal_point({{-2, 2}});
+  const SteinerPoint<2> stopped = petal_point({{2, 2}, {-2, 2}});
   EXPECT_NEAR(stopped.position[0], 0, 1e-12);
   EXPECT_NEAR(stopped.position[1], 2, 1e-12);
 }

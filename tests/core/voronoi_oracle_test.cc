@@ -100,7 +100,7 @@ class QueryChecker {
   // What is sure before the nodes are placed holds once they are, and is told of all that keep the ratio with some room.
   void CheckRatios(const QueryStructure<D>& structure, VertexId v, double radius) {
     Polytope<D>& cell = fast_.cell;
-    structure.UnplacedClippedVoronoi(v, radius, fast_);
+    structure.UnplacedClippedVoronoi(v, CubeAround<D>(structure.point(v), radius), fast_);
     constexpr std::array kRatios = {0.75, 1.0, 2.0, 8.0};
     std::array<bool, kRatios.size()> keeps;
     std::transform(kRatios.begin(), kRatios.end(), keeps.begin(), [&](double r) { return cell.KeepsRatio(r); });
@@ -129,7 +129,7 @@ class QueryChecker {
     }
     const std::vector<CellNode<D>> placed(cell.nodes().begin(), cell.nodes().end());
     for (const double ratio : kRatios) {
-      structure.UnplacedClippedVoronoi(v, radius, fast_);
+      structure.UnplacedClippedVoronoi(v, CubeAround<D>(structure.point(v), radius), fast_);
       if (cell.PlaceUnlessKeeps(ratio)) {
         continue;
       }

@@ -1,0 +1,124 @@
+// The part of Refinement that says what a cell asks for: where new vertices go.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <utility>
+
+#include "core/base/dimensions.h"
+#include "core/refine/refine.h"
+
+namespace wellspace::core {
+namespace {
+
+// A cell is clipped by the square around this times the petal of an edge, so that the petal is surely within.
+constexpr double kPetalShare = 1.01;
+
+constexpr std::pair<int, int> kNoNode = {-1, -1};
+
+// The node of a cell in the plane that lies on the bisectors of `u` and `w`, and the plane of u's; kNoNode if there is none.
+std::pair<int, int> NodeBetween(const Polytope<2>& cell, VertexId u, VertexId w) {
+  for (size_t i = 0; i < cell.nodes().size(); ++i) {
+    const auto [first, second] = cell.nodes()[i].planes;
+    if (cell.plane(first).vertex == u && cell.plane(second).vertex == w) {
+      return {static_cast<int>(i), first};
+    }
+    if (cell.plane(first).vertex == w && cell.plane(second).vertex == u) {
+      return {static_cast<int>(i), second};
+    }
+  }
+  return kNoNode;
+}
+
+// For the bad node of the cell of `v` in the plane, at most sqrt(top_sq) away: the point that PetalPoint finds in that cell, or in that of the other
+// end of the edge where the way away from all vertices is there. `cell_of` computes it, clipped by what holds the petal and by `clip` around its site.
+template <typename CellOf>
+SteinerPoint<2> PointInPetal(VertexId v, const Polytope<2>& cell, const Assessment& found, double top_sq, double rho,
+                             double clip, CellOf cell_of) {
+  const Plane<2>& edge = cell.plane(found.bad_plane);
+  const std::array<uint16_t, 2>& planes = cell.nodes()[found.bad_node].planes;
+  const Plane<2>& third = cell.plane(planes[planes[0] == found.bad_plane ? 1 : 0]);
+  // If the angle at v is obtuse, what is farther than the node is on the boundary of the other cell.
+  if (third.kind == PlaneKind::kBisector && Dot<2>(edge.normal, third.normal) < 0) {
+    const auto [centre, radius] = PetalOf(cell, found.bad_node, found.bad_plane, top_sq);
+    Box<2> bounds = CubeAround<2>(edge.source.generator, clip);
+    for (int i = 0; i < 2; ++i) {
+      const double middle = cell.site()[i] + centre[i];
+      bounds.low[i] = std::max(bounds.low[i], middle - kPetalShare * radius);
+      bounds.high[i] = std::min(bounds.high[i], middle + kPetalShare * radius);
+    }
+    const Polytope<2>* const other = cell_of(edge.vertex, bounds);
+    const auto [node, plane] = other != nullptr ? NodeBetween(*other, v, third.vertex) : kNoNode;
+    if (node >= 0) {
+      return PetalPoint(*other, node, plane, top_sq, rho);
+    }
+  }
+  return PetalPoint(cell, found.bad_node, found.bad_plane, top_sq, rho);
+}
+
+}  // namespace
+
+// What `cell`, that of `v`, asks for by edges up to a bucket's limit, by what was found; none if nothing. Calls cell_of at most once.
+template <int D>
+std::optional<typename Refinement<D>::Request> Refinement<D>::NextRequest(VertexId v, const Polytope<D>& cell,
+                                                                          const Assessment& found, double edge_limit_sq,
+                                                                          CellOf cell_of) const {
+  Request request;
+  Insertion& insertion = request.insertion;
+  insertion.near = v;
+  insertion.edge_limit_sq = edge_limit_sq;
+  if (found.bad_node >= 0) {
+    const double factor = found.is_too_large                      ? kSizeFactor
+                          : IsAtBoundary(v, cell, found.bad_node) ? boundary_factor_
+                                                                  : off_center_factor_;
+    insertion.reason = found.is_too_large ? Reason::kSize : Reason::kRatio;
+    insertion.edge_sq = found.bound_sq / (demands_->rho * demands_->rho);
+    insertion.other = found.bad_plane >= 0 ? cell.plane(found.bad_plane).vertex : kNoVertex;
+    request.candidate = PointFor(v, cell, found, factor * factor * found.bound_sq, edge_limit_sq, cell_of);
+  } else if (found.encroached_face >= 0) {
+    insertion.reason = Reason::kEncroachment;
+    const double distance = structure_.box().DistanceToFace(structure_.point(v), found.encroached_face);
+    insertion.edge_sq = distance * distance;
+    request.candidate = EncroachmentPoint<D>(cell, structure_.faces(v), found.encroached_face);
+  } else {
+    return std::nullopt;
+  }
+  request.point = SnapToBoundary<D>(structure_.box(), request.candidate);
+  insertion.empty_radius_sq = request.point.empty_radius_sq;
+  return request;
+}
+
+// The point for the bad node of the cell of `v`: an off-centre at distance_sq, by the square, unless the node is nearer; then that, or for a triangle
+// better still.
+template <int D>
+SteinerPoint<D> Refinement<D>::PointFor(VertexId v, const Polytope<D>& cell, const Assessment& found,
+                                        double distance_sq, double edge_limit_sq, CellOf cell_of) const {
+  if constexpr (D == 2) {
+    const bool is_within = cell.nodes()[found.bad_node].radius_sq <= distance_sq;
+    if (is_within && !found.is_too_large && demands_->criterion == Criterion::kRadiusEdge) {
+      const double clip = clip_factor_ * std::sqrt(edge_limit_sq);
+      return PointInPetal(v, cell, found, distance_sq, demands_->rho, clip, cell_of);
+    }
+  }
+  return OffCenter<D>(cell, found.bad_node, found.bad_plane, distance_sq);
+}
+
+// Whether `node` of `cell`, that of `v`, is the circumcentre of a simplex with a corner on the boundary of the box.
+template <int D>
+bool Refinement<D>::IsAtBoundary(VertexId v, const Polytope<D>& cell, int node) const {
+  const std::array<uint16_t, D>& planes = cell.nodes()[node].planes;
+  return structure_.faces(v) != 0 || std::any_of(planes.begin(), planes.end(), [&](uint16_t index) {
+           const Plane<D>& plane = cell.plane(index);
+           return plane.kind == PlaneKind::kBisector && structure_.box().FacesOf(plane.source.generator) != 0;
+         });
+}
+
+#define WELLSPACE_INSTANTIATE(D)                                          \
+  template std::optional<InsertionRequest<D>> Refinement<D>::NextRequest( \
+      VertexId, const Polytope<D>&, const Assessment&, double, Refinement<D>::CellOf) const;
+WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
+#undef WELLSPACE_INSTANTIATE
+
+}  // namespace wellspace::core
