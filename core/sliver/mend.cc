@@ -7,12 +7,12 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
+#include "core/base/thread_team.h"
 
 namespace wellspace::core {
 namespace {
 
-// Cosines: of what has not been measured, and of what may not be.
-constexpr double kUnknown = -2;
+// A cosine of what may not be.
 constexpr double kForbidden = 2;
 
 // A vertex moves by at most this times the distance to its nearest neighbour.
@@ -23,12 +23,18 @@ constexpr double kInside = 0.95;
 constexpr int kSamples = 24;
 constexpr int kMostSamples = 1536;
 constexpr int kLateSamples = 4096;
+// Facets that are kept because places failed by them.
+constexpr size_t kSuspects = 4;
 // Slivers are looked at again in so many passes at most, and in each at most so many times as many as it began with:
 // every step makes the flattest it touches better, but nothing says by how much in all.
 constexpr int kPasses = 40;
 constexpr int kEarlyPasses = 4;
 constexpr size_t kGrowth = 8;
 constexpr size_t kLeastGrowth = 1000;
+// As many vertices whose stars have changed are told of at once, so that those that change again and again are told of seldom.
+constexpr size_t kMostChanged = 1 << 16;
+// Simplices that one thread measures one after the other.
+constexpr size_t kBlock = 1 << 14;
 // A step that leaves a sliver has to make 1 - cosine, nearly half the angle squared, larger by this.
 constexpr double kGain = 1.1;
 
@@ -50,18 +56,22 @@ Mender::Mender(Triangulation<3>& triangulation, std::vector<bool>& is_fixed, con
       observer_(observer),
       flat_cosine_(FlatCosine(demands.min_dihedral)) {}
 
-absl::Status Mender::Run(RunContext& context) {
+absl::Status Mender::Run(int threads, RunContext& context) {
+  try {
+    const absl::Status status = RunPasses(threads, context);
+    ReportStars();
+    return status;
+  } catch (...) {  // no memory
+    ReportStars();
+    throw;
+  }
+}
+
+absl::Status Mender::RunPasses(int threads, RunContext& context) {
   if (demands_.demands.criterion == Criterion::kWellSpaced) {
     WELLSPACE_ASSIGN_OR_RETURN(nearest_sq_, triangulation_.NearestDistancesSq(context));
   }
-  next_.clear();
-  for (uint32_t i = 0; i < triangulation_.simplex_limit(); ++i) {
-    WELLSPACE_RETURN_IF_ERROR(context.Check());
-    const SimplexId s{i};
-    if (triangulation_.IsIn(s) && CosineOf(s) > flat_cosine_) {
-      next_.push_back({s, triangulation_.item(s).vertices});
-    }
-  }
+  WELLSPACE_RETURN_IF_ERROR(FindSlivers(threads, context));
   report_.slivers += next_.size();
   report_.slivers_left = next_.size();
   for (int pass = 0; pass < kPasses && !next_.empty(); ++pass) {
@@ -87,6 +97,9 @@ absl::Status Mender::Run(RunContext& context) {
         }
         left.push_back(sliver);
       }
+      if (changed_.size() > kMostChanged) {
+        ReportStars();
+      }
       context.SetPhaseFraction(1 - static_cast<double>(left.size() + next_.size() - k) /
                                        static_cast<double>(report_.slivers + next_.size()));
     }
@@ -97,20 +110,31 @@ absl::Status Mender::Run(RunContext& context) {
   return absl::OkStatus();
 }
 
-bool Mender::IsThere(const Sliver& sliver) {
-  return triangulation_.IsIn(sliver.simplex) && triangulation_.item(sliver.simplex).vertices == sliver.vertices &&
-         CosineOf(sliver.simplex) > flat_cosine_;
+// Measures all simplices, and lists the slivers among them.
+absl::Status Mender::FindSlivers(int threads, const RunContext& context) {
+  cosine_.resize(triangulation_.simplex_limit());
+  ThreadTeam team(threads);
+  WELLSPACE_RETURN_IF_ERROR(team.TryForEach((cosine_.size() + kBlock - 1) / kBlock, [&](size_t block) {
+    const size_t end = std::min(cosine_.size(), (block + 1) * kBlock);
+    for (size_t i = block * kBlock; i < end; ++i) {
+      const SimplexId s{static_cast<uint32_t>(i)};
+      cosine_[i] = triangulation_.IsIn(s) ? MeasureTetrahedron(triangulation_.Corners(s)).cosine : -1;
+    }
+    return context.Check();
+  }));
+  next_.clear();
+  for (size_t i = 0; i < cosine_.size(); ++i) {
+    if (cosine_[i] > flat_cosine_) {
+      const SimplexId s{static_cast<uint32_t>(i)};
+      next_.push_back({s, triangulation_.item(s).vertices});
+    }
+  }
+  return absl::OkStatus();
 }
 
-double Mender::CosineOf(SimplexId s) {
-  if (Index(s) >= cosine_.size()) {
-    cosine_.resize(triangulation_.simplex_limit(), kUnknown);
-  }
-  double& cosine = cosine_[Index(s)];
-  if (cosine == kUnknown) {
-    cosine = MeasureTetrahedron(triangulation_.Corners(s)).cosine;
-  }
-  return cosine;
+bool Mender::IsThere(const Sliver& sliver) const {
+  return triangulation_.IsIn(sliver.simplex) && triangulation_.item(sliver.simplex).vertices == sliver.vertices &&
+         CosineOf(sliver.simplex) > flat_cosine_;
 }
 
 // Whether the demands allow for a tetrahedron, of which `moved` is the vertex whose nearest neighbour is that of the last
@@ -155,34 +179,72 @@ bool Mender::KeepsNearestNeighbours(const Point<3>& p, VertexId moved) {
   return true;
 }
 
-// The largest cosine in the star of vertex `v` at `p`, for the cavity that was found; kForbidden if one is not below
-// `limit`, or the demands do not allow for it.
-double Mender::TryAt(const Point<3>& p, VertexId v, double limit) {
-  if (!KeepsNearestNeighbours(p, v)) {
+// The largest cosine of the tetrahedron that vertex `v` at `p` makes with a facet; kForbidden if it is not below `limit`, or the
+// demands do not allow for it.
+double Mender::TryFacet(const Cavity::Facet& facet, const Point<3>& p, VertexId v, double limit) const {
+  std::array<VertexId, 4> vertices = triangulation_.item(facet.simplex).vertices;
+  Simplex<3> corners = triangulation_.Corners(facet.simplex);
+  vertices[facet.slot] = v;
+  corners[facet.slot] = p;
+  const TetrahedronMeasure measure = MeasureTetrahedron(corners);
+  return measure.cosine < limit && IsAdmissible(measure, vertices, v) ? measure.cosine : kForbidden;
+}
+
+// The largest cosine in the star of vertex `v` at `p`, which is in conflict with `from`; kForbidden if one is not below `limit`, or the
+// demands do not allow for it. Else the cavity has been found.
+double Mender::TryAt(SimplexId from, const Point<3>& p, VertexId v, double limit) {
+  edge_limit_sq_ = std::numeric_limits<double>::infinity();
+  if (FailsAtSuspect(p, v, limit)) {
     return kForbidden;
   }
   double worst = -1;
-  for (const auto& [s, slot] : cavity_.boundary) {
-    std::array<VertexId, 4> vertices = triangulation_.item(s).vertices;
-    Simplex<3> corners = triangulation_.Corners(s);
-    vertices[slot] = v;
-    corners[slot] = p;
-    const TetrahedronMeasure measure = MeasureTetrahedron(corners);
-    if (!(measure.cosine < limit && IsAdmissible(measure, vertices, v))) {
-      return kForbidden;
+  const bool is_allowed = triangulation_.FindCavityUnless(from, p, cavity_, [&](const Cavity::Facet& facet) {
+    const double cosine = TryFacet(facet, p, v, limit);
+    worst = std::max(worst, cosine);
+    return cosine == kForbidden;
+  });
+  if (!is_allowed) {
+    if (suspects_.size() == kSuspects) {
+      suspects_.pop_back();
     }
-    worst = std::max(worst, measure.cosine);
+    suspects_.insert(suspects_.begin(), cavity_.boundary.back());
+    return kForbidden;
+  }
+  if (demands_.demands.criterion == Criterion::kWellSpaced &&
+      !(KeepsNearestNeighbours(p, v) &&
+        std::all_of(cavity_.boundary.begin(), cavity_.boundary.end(),
+                    [&](const Cavity::Facet& facet) { return TryFacet(facet, p, v, limit) != kForbidden; }))) {
+    return kForbidden;
   }
   return worst;
 }
 
+// Whether the boundary of the cavity of `p` surely has a facet for which TryAt returns kForbidden: one for which it did lately.
+bool Mender::FailsAtSuspect(const Point<3>& p, VertexId v, double limit) {
+  for (auto facet = suspects_.begin(); facet != suspects_.end(); ++facet) {
+    const SimplexId beyond = triangulation_.item(facet->simplex).neighbours[facet->slot];
+    if (beyond != kNoSimplex && triangulation_.IsInConflict(facet->simplex, p) &&
+        !triangulation_.IsInConflict(beyond, p) && TryFacet(*facet, p, v, limit) == kForbidden) {
+      std::rotate(suspects_.begin(), facet, facet + 1);
+      return true;
+    }
+  }
+  return false;
+}
+
 // Measures new tetrahedra; slivers among them will be looked at.
 void Mender::Note(std::span<const SimplexId> created) {
-  cosine_.resize(triangulation_.simplex_limit(), kUnknown);
+  cosine_.resize(triangulation_.simplex_limit());
+  is_changed_.resize(triangulation_.vertex_count());
   for (const SimplexId s : created) {
     const auto& vertices = triangulation_.item(s).vertices;
-    changed_.insert(changed_.end(), vertices.begin(), vertices.end());
-    cosine_[Index(s)] = kUnknown;
+    for (const VertexId v : vertices) {
+      if (!is_changed_[Index(v)]) {
+        is_changed_[Index(v)] = true;
+        changed_.push_back(v);
+      }
+    }
+    cosine_[Index(s)] = MeasureTetrahedron(triangulation_.Corners(s)).cosine;
     if (CosineOf(s) > flat_cosine_) {
       next_.push_back({s, vertices});
     }
@@ -191,9 +253,8 @@ void Mender::Note(std::span<const SimplexId> created) {
 
 // Tells whose stars have changed since the last time.
 void Mender::ReportStars() {
-  std::sort(changed_.begin(), changed_.end());
-  changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
   for (const VertexId v : changed_) {
+    is_changed_[Index(v)] = false;
     observer_.StarChanged(v);
   }
   changed_.clear();
@@ -264,10 +325,15 @@ bool Mender::Move(VertexId v, const Sliver& sliver, int samples) {
     const bool is_admissible = IsAdmissible(measure, triangulation_.item(s).vertices, v);
     hole_cosine_.push_back(is_admissible ? measure.cosine : kForbidden);
   }
-  const auto find_cavity = [&](const Point<3>& p) {
-    for (const SimplexId s : hole_) {
-      if (triangulation_.IsInConflict(s, p)) {
-        triangulation_.FindCavity(s, p, cavity_);
+  suspects_.clear();
+  // One that is in conflict, if there is one.
+  const auto find_first = [&](const Point<3>& p) {
+    return std::find_if(hole_.begin(), hole_.end(), [&](SimplexId s) { return triangulation_.IsInConflict(s, p); });
+  };
+  // Whether something worse than `best` stays in the filling.
+  const auto leaves_worse = [&](const Point<3>& p, double best) {
+    for (size_t i = 0; i < hole_.size(); ++i) {
+      if (hole_cosine_[i] >= best && !triangulation_.IsInConflict(hole_[i], p)) {
         return true;
       }
     }
@@ -288,26 +354,27 @@ bool Mender::Move(VertexId v, const Sliver& sliver, int samples) {
       }
     }
     if (!box.Contains(p) || box.FacesOf(p) != faces || (!is_own && !triangulation_.IsInConflict(sliver.simplex, p)) ||
-        !find_cavity(p)) {
+        leaves_worse(p, best)) {
       continue;
     }
-    double worst = -1;
+    const auto first = find_first(p);
+    double worst = first == hole_.end() ? kForbidden : TryAt(*first, p, v, best);
+    if (worst == kForbidden) {
+      continue;
+    }
     for (size_t i = 0; i < hole_.size(); ++i) {
       worst = triangulation_.IsInCavity(hole_[i]) ? worst : std::max(worst, hole_cosine_[i]);
     }
-    if (worst < best) {
-      worst = std::max(worst, TryAt(p, v, best));
-      if (worst < best && (worst <= flat_cosine_ || IsBetter(worst, old))) {
-        best = worst;
-        to = p;
-      }
+    if (worst < best && (worst <= flat_cosine_ || IsBetter(worst, old))) {
+      best = worst;
+      to = p;
     }
   }
   if (best == old) {
     triangulation_.Restore();
     return false;
   }
-  find_cavity(to);
+  triangulation_.FindCavity(*find_first(to), to, cavity_);
   KeepsNearestNeighbours(to, v);
   if (!nearest_sq_.empty()) {
     nearest_sq_[Index(v)] = edge_limit_sq_;
@@ -318,7 +385,6 @@ bool Mender::Move(VertexId v, const Sliver& sliver, int samples) {
   Note(hole_);
   Note(created_);
   observer_.VertexMoved(v);
-  ReportStars();
   return true;
 }
 
@@ -328,6 +394,7 @@ absl::Status Mender::Insert(const Sliver& sliver, const Effort& effort) {
   const Box<3>& box = triangulation_.box();
   const VertexId v{triangulation_.vertex_count()};
   const double radius = kInside * std::sqrt(measure.radius_sq);
+  suspects_.clear();
   // Not found yet; else the best so far.
   uint64_t most = 0;
   double best = effort.may_insert_poor ? measure.cosine : flat_cosine_;
@@ -341,13 +408,12 @@ absl::Status Mender::Insert(const Sliver& sliver, const Effort& effort) {
     if (!box.Contains(p) || box.FacesOf(p) != 0 || !triangulation_.IsInConflict(sliver.simplex, p)) {
       continue;
     }
-    triangulation_.FindCavity(sliver.simplex, p, cavity_);
-    const auto gone = static_cast<uint64_t>(std::count_if(cavity_.simplices.begin(), cavity_.simplices.end(),
-                                                          [this](SimplexId s) { return CosineOf(s) > flat_cosine_; }));
-    const double worst = TryAt(p, v, limit);
-    if (worst > flat_cosine_ && !IsBetter(worst, measure.cosine)) {
+    const double worst = TryAt(sliver.simplex, p, v, limit);
+    if (worst == kForbidden || (worst > flat_cosine_ && !IsBetter(worst, measure.cosine))) {
       continue;
     }
+    const auto gone = static_cast<uint64_t>(std::count_if(cavity_.simplices.begin(), cavity_.simplices.end(),
+                                                          [this](SimplexId s) { return CosineOf(s) > flat_cosine_; }));
     // Good stars first, then many slivers gone, then the best angle.
     const bool is_good = worst <= flat_cosine_;
     const bool was_good = most > 0 && best <= flat_cosine_;
@@ -377,7 +443,6 @@ absl::Status Mender::Insert(const Sliver& sliver, const Effort& effort) {
   Note(created_);
   const auto& vertices = triangulation_.item(created_.front()).vertices;
   observer_.VertexAdded(v, vertices[vertices[0] == v ? 1 : 0]);
-  ReportStars();
   return absl::OkStatus();
 }
 

@@ -30,14 +30,14 @@ struct MendReport {
   uint64_t added = 0;         // vertices
 };
 
-// Hears of every step, once the triangulation has taken it.
+// Hears of every step, once the triangulation has taken it; of the stars that have changed by then sooner or later, but before Run returns.
 class MendObserver {
  public:
   virtual ~MendObserver() = default;
   virtual void VertexMoved(VertexId v) = 0;
   // `near` is a neighbour of the new vertex.
   virtual void VertexAdded(VertexId v, VertexId near) = 0;
-  // The simplices of `v` are others; after the above.
+  // The simplices of `v` are others than when this was called before.
   virtual void StarChanged(VertexId v) = 0;
   // What is held in memory beside the triangulation.
   virtual uint64_t MemoryBytes() const = 0;
@@ -55,14 +55,14 @@ class Mender {
   Mender(Triangulation<3>& triangulation, std::vector<bool>& is_fixed, const MendDemands& demands,
          MendObserver& observer);
 
-  // Mends what slivers there are, and what new ones that makes.
+  // Mends what slivers there are, and what new ones that makes. Up to `threads` threads look for the first ones; one mends.
   //
-  // Guarantees: (1) deterministic; (2) ends: see docs/design/sliver.md.
+  // Guarantees: (1) deterministic, and the same on any number of threads; (2) ends: see docs/design/sliver.md.
   // Complexity: O(1) expected for each sliver, and a look at every simplex.
   // Errors:     RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED, DEADLINE_EXCEEDED; the invariants hold
   //             all the same.
   // Source:     moves: Tournois, Srinivasan and Alliez 2009, with sampled in the place of followed gradients.
-  absl::Status Run(RunContext& context);
+  absl::Status Run(int threads, RunContext& context);
 
   const MendReport& report() const { return report_; }
 
@@ -80,11 +80,15 @@ class Mender {
     bool may_insert_poor = false;  // where the new vertex has slivers, though better ones
   };
 
-  bool IsThere(const Sliver& sliver);
-  double CosineOf(SimplexId s);
+  absl::Status RunPasses(int threads, RunContext& context);
+  absl::Status FindSlivers(int threads, const RunContext& context);
+  bool IsThere(const Sliver& sliver) const;
+  double CosineOf(SimplexId s) const { return cosine_[Index(s)]; }
   bool IsAdmissible(const TetrahedronMeasure& measure, const std::array<VertexId, 4>& vertices, VertexId moved) const;
   bool KeepsNearestNeighbours(const Point<3>& p, VertexId moved);
-  double TryAt(const Point<3>& p, VertexId v, double limit);
+  double TryFacet(const Cavity::Facet& facet, const Point<3>& p, VertexId v, double limit) const;
+  bool FailsAtSuspect(const Point<3>& p, VertexId v, double limit);
+  double TryAt(SimplexId from, const Point<3>& p, VertexId v, double limit);
   void Note(std::span<const SimplexId> created);
   void ReportStars();
   Point<3> RandomInBall();
@@ -100,17 +104,19 @@ class Mender {
   double flat_cosine_ = 0;  // above it an angle is too small
   MendReport report_;
   HugeVector<double> nearest_sq_;  // at most the squared distance to the nearest neighbour; for well-spaced only
-  HugeVector<double> cosine_;      // by simplex; kUnknown where it has not been asked for
+  HugeVector<double> cosine_;      // by simplex, of its smallest angle
   HugeVector<Sliver> next_;        // to be looked at
   uint64_t random_ = 0;
 
   // Scratch.
   Cavity cavity_;
+  std::vector<Cavity::Facet> suspects_;  // for which TryAt has failed since Move or Insert began, the latest first
   std::vector<SimplexId> star_;
   std::vector<SimplexId> hole_;
   std::vector<double> hole_cosine_;
   std::vector<SimplexId> created_;
-  std::vector<VertexId> changed_;  // vertices of new simplices
+  std::vector<VertexId> changed_;  // vertices of new simplices, that have not been told of
+  std::vector<bool> is_changed_;   // by vertex
   double edge_limit_sq_ = 0;       // of TryAt, under well-spaced
 };
 

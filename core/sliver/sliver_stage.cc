@@ -9,6 +9,7 @@
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
 #include "core/base/status_macros.h"
+#include "core/base/thread_team.h"
 #include "core/simplex/quality.h"
 #include "core/sliver/pump.h"
 #include "core/sliver/tetrahedron.h"
@@ -67,7 +68,8 @@ void Emit(const Triangulation<D>& triangulation, SimplexId s, std::span<const ui
 // Complexity: O(vertices + simplices) and sorting the simplices of each lowest vertex.
 // Errors:     CANCELLED, DEADLINE_EXCEEDED.
 template <int D>
-absl::Status SortSimplices(uint32_t vertex_count, HugeVector<uint32_t>& indices, const RunContext& context) {
+absl::Status SortSimplices(uint32_t vertex_count, HugeVector<uint32_t>& indices, ThreadTeam& team,
+                           const RunContext& context) {
   using Row = std::array<uint32_t, D + 1>;
   const size_t count = indices.size() / (D + 1);
   HugeVector<size_t> next(size_t{vertex_count} + 1, 0);  // by lowest vertex
@@ -84,18 +86,19 @@ absl::Status SortSimplices(uint32_t vertex_count, HugeVector<uint32_t>& indices,
     std::copy(from, from + D + 1, rows[next[*from]++].begin());
   }
   // next[v] is where those of v end.
-  size_t begin = 0;
-  auto to = indices.begin();
-  for (uint32_t v = 0; v < vertex_count; ++v) {
-    if (v % kCheckInterval == 0) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
+  return team.TryForEach((vertex_count + kCheckInterval - 1) / kCheckInterval, [&](size_t block) {
+    const size_t end = std::min<size_t>(vertex_count, (block + 1) * kCheckInterval);
+    for (size_t v = block * kCheckInterval; v < end; ++v) {
+      const auto first = rows.begin() + static_cast<ptrdiff_t>(v == 0 ? 0 : next[v - 1]);
+      const auto last = rows.begin() + static_cast<ptrdiff_t>(next[v]);
+      std::sort(first, last);
+      auto to = indices.begin() + (first - rows.begin()) * (D + 1);
+      for (auto row = first; row < last; ++row) {
+        to = std::copy(row->begin(), row->end(), to);
+      }
     }
-    std::sort(rows.begin() + static_cast<ptrdiff_t>(begin), rows.begin() + static_cast<ptrdiff_t>(next[v]));
-    for (; begin < next[v]; ++begin) {
-      to = std::copy(rows[begin].begin(), rows[begin].end(), to);
-    }
-  }
-  return absl::OkStatus();
+    return context.Check();
+  });
 }
 
 // Whether the simplex may be the worst of all so far in one of the two measures, by a cheaper computation.
@@ -174,7 +177,8 @@ absl::StatusOr<Triangulation<D>> SliverStage<D>::Triangulate(const QueryStructur
       context.AllowMemory(structure.MemoryBytes() + stars.MemoryBytes() + simplices.indices.size() * sizeof(uint32_t) +
                           Triangulation<D>::BuildBytes(structure.vertex_count(), simplices.indices.size() / (D + 1))));
   // Sorting takes less than Build.
-  WELLSPACE_RETURN_IF_ERROR(SortSimplices<D>(structure.vertex_count(), simplices.indices, context));
+  ThreadTeam team(threads);
+  WELLSPACE_RETURN_IF_ERROR(SortSimplices<D>(structure.vertex_count(), simplices.indices, team, context));
   HugeVector<Point<D>> points;
   points.reserve(structure.vertex_count());
   for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
@@ -184,7 +188,8 @@ absl::StatusOr<Triangulation<D>> SliverStage<D>::Triangulate(const QueryStructur
     points.push_back(structure.point(VertexId{v}));
   }
   Triangulation<D> triangulation;
-  WELLSPACE_RETURN_IF_ERROR(triangulation.Build(structure.box(), std::move(points), simplices.indices, context));
+  WELLSPACE_RETURN_IF_ERROR(
+      triangulation.Build(structure.box(), std::move(points), simplices.indices, threads, context));
   return triangulation;
 }
 
@@ -225,7 +230,7 @@ absl::Status SliverStage<D>::Mend(QueryStructure<E>& structure, Refinement<E>& r
   context.EnterPhase(Phase::kSlivers);
   Follower follower(*triangulation_, structure, refinement);
   Mender mender(*triangulation_, is_fixed, demands, follower);
-  const absl::Status status = mender.Run(context);
+  const absl::Status status = mender.Run(threads, context);
   statistics_.slivers += mender.report().slivers;
   statistics_.slivers_left = mender.report().slivers_left;
   statistics_.moves += mender.report().moves;

@@ -1,15 +1,18 @@
 #include "core/sliver/triangulation.h"
 
 #include <algorithm>
-#include <cmath>
+#include <bit>
 #include <cstdlib>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/dimensions.h"
+#include "core/base/sort_few.h"
 #include "core/base/status_macros.h"
-#include "core/geometry/minors.h"
+#include "core/base/thread_team.h"
+#include "core/geometry/power_predicate.h"
 
 namespace wellspace::core {
 namespace {
@@ -19,56 +22,49 @@ constexpr size_t kCheckInterval = 4096;
 // There is room for one more in so many simplices before they have to be moved.
 constexpr size_t kRoomToGrow = 16;
 
-constexpr int Factorial(int n) { return n <= 1 ? 1 : n * Factorial(n - 1); }
-
-// The sign of the in-sphere determinant is certain beyond this times m^(D + 2), m the largest difference of coordinates.
-// Weights are at most a quarter of a squared edge, D (2 m)^2 / 4, so that the terms of a lifted entry add up to 3 D m^2;
-// each of the (D + 1)! products passes through at most 6 (D + 1) roundings.
+// The facets that have one vertex in common, by their others: each is that of two simplices, or on the box.
 template <int D>
-constexpr double kFilterBound = Factorial(D + 1) * 3.0 * D * 6 * (D + 1) * 0x1p-53;
-
-// Doubles for MinorsOf.
-struct DoubleRing {
-  using Entry = double;
-  template <int K>
-  using Minor = double;
-  static double ToMinor(double entry) { return entry; }
-  static void AddProduct(double& sum, double factor, bool negate, double minor) {
-    sum += negate ? -factor * minor : factor * minor;
+class FacetTable {
+ public:
+  // Makes room for that many facets.
+  void Clear(size_t facets) {
+    const size_t size = std::bit_ceil(std::max<size_t>(facets + 1, 2));
+    shift_ = std::countl_zero(size) + 1;
+    entries_.assign(size, {});
   }
+
+  // The simplex and slot that the facet was added with; kNoSimplex if it is added now.
+  std::pair<SimplexId, int> FindOrAdd(const std::array<VertexId, D - 1>& others, SimplexId s, int slot) {
+    uint64_t hash = 0;
+    for (const VertexId u : others) {
+      hash = (hash + Index(u) + 1) * 0x9e3779b97f4a7c15;
+    }
+    size_t at = hash >> shift_;
+    while (entries_[at].simplex != kNoSimplex && entries_[at].others != others) {
+      at = (at + 1) % entries_.size();
+    }
+    if (entries_[at].simplex != kNoSimplex) {
+      return {entries_[at].simplex, entries_[at].slot};
+    }
+    entries_[at] = {others, s, slot};
+    return {kNoSimplex, 0};
+  }
+
+ private:
+  struct Entry {
+    std::array<VertexId, D - 1> others{};  // ascending
+    SimplexId simplex = kNoSimplex;
+    int slot = 0;
+  };
+  std::vector<Entry> entries_;  // a power of two of them; one that is taken is followed by those that found it so
+  int shift_ = 0;
 };
-
-// det(e_i, lift_i): its sign is (-1)^D for the origin inside the sphere of a positively oriented simplex.
-double LiftedDeterminant(const std::array<Point<3>, 4>& e, const std::array<double, 4>& lift) {
-  const auto minor = [&](int i, int j) { return e[i][0] * e[j][1] - e[j][0] * e[i][1]; };
-  const double m01 = minor(0, 1);
-  const double m12 = minor(1, 2);
-  const double m23 = minor(2, 3);
-  const double m30 = minor(3, 0);
-  const double m02 = minor(0, 2);
-  const double m13 = minor(1, 3);
-  const double m012 = e[0][2] * m12 - e[1][2] * m02 + e[2][2] * m01;
-  const double m123 = e[1][2] * m23 - e[2][2] * m13 + e[3][2] * m12;
-  const double m230 = e[2][2] * m30 + e[3][2] * m02 + e[0][2] * m23;
-  const double m301 = e[3][2] * m01 + e[0][2] * m13 + e[1][2] * m30;
-  return (lift[3] * m012 - lift[2] * m301) + (lift[1] * m230 - lift[0] * m123);
-}
-
-template <size_t D>
-double LiftedDeterminant(const std::array<std::array<double, D>, D + 1>& e, const std::array<double, D + 1>& lift) {
-  std::array<std::array<double, D + 1>, D + 1> rows;
-  for (size_t i = 0; i <= D; ++i) {
-    std::copy(e[i].begin(), e[i].end(), rows[i].begin());
-    rows[i][D] = lift[i];
-  }
-  return MinorsOf<DoubleRing, D + 1>(rows)[0];
-}
 
 }  // namespace
 
 template <int D>
 absl::Status Triangulation<D>::Build(const Box<D>& box, HugeVector<Point<D>> points,
-                                     std::span<const uint32_t> simplices, const RunContext& context) {
+                                     std::span<const uint32_t> simplices, int threads, const RunContext& context) {
   box_ = box;
   points_ = std::move(points);
   weights_.assign(points_.size(), 0);
@@ -87,6 +83,7 @@ absl::Status Triangulation<D>::Build(const Box<D>& box, HugeVector<Point<D>> poi
   items_.reserve(count + count / kRoomToGrow);
   items_.assign(count, {});
   free_.clear();
+  planes_.assign(kKnownPlanes, {});
   mark_.assign(count, 0);
   stamp_ = 0;
   for (size_t s = 0; s < count; ++s) {
@@ -100,70 +97,73 @@ absl::Status Triangulation<D>::Build(const Box<D>& box, HugeVector<Point<D>> poi
     }
     items_[s].neighbours.fill(kNoSimplex);
   }
-  // Facets by their lowest vertex: those of one vertex are few, and are matched among themselves.
-  struct Facet {
-    std::array<VertexId, D - 1> others;  // ascending
-    uint32_t at;                         // simplex * (D + 1) + slot
-  };
-  const auto lowest_of = [&](size_t s, int slot) {
-    uint32_t lowest = ~uint32_t{0};
-    for (int i = 0; i <= D; ++i) {
-      lowest = i == slot ? lowest : std::min(lowest, Index(items_[s].vertices[i]));
+  // Facets by their lowest vertex: those of one vertex are few, and are matched among themselves. The lowest vertex of a simplex is that of all
+  // its facets but the one opposite to it, which has the second.
+  const auto lowest_slots = [&](const std::array<VertexId, D + 1>& vertices) {
+    int lowest = 0;
+    int second = 1;
+    for (int i = 1; i <= D; ++i) {
+      const bool is_lowest = vertices[i] < vertices[lowest];
+      second = is_lowest ? lowest : i == 1 || vertices[i] < vertices[second] ? i : second;
+      lowest = is_lowest ? i : lowest;
     }
-    return lowest;
+    return std::pair{lowest, second};
   };
-  HugeVector<uint32_t> begin(points_.size() + 1, 0);
+  HugeVector<uint32_t> next(points_.size() + 1, 0);  // by vertex
   for (size_t s = 0; s < count; ++s) {
     if (s % kCheckInterval == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
-    for (int slot = 0; slot <= D; ++slot) {
-      ++begin[lowest_of(s, slot) + 1];
-    }
+    const auto& vertices = items_[s].vertices;
+    const auto [lowest, second] = lowest_slots(vertices);
+    ++next[Index(vertices[lowest]) + 1];
+    ++next[Index(vertices[second]) + 1];
   }
-  for (size_t v = 0; v < points_.size(); ++v) {
-    begin[v + 1] += begin[v];
-  }
+  std::partial_sum(next.begin(), next.end(), next.begin());
   WELLSPACE_RETURN_IF_ERROR(context.Check());
-  HugeVector<uint32_t> at(count * (D + 1));
-  HugeVector<uint32_t> next(begin.begin(), begin.end() - 1);
+  HugeVector<uint32_t> with_lowest(2 * count);  // twice a simplex, and one where its opposite facet is meant
   for (size_t s = 0; s < count; ++s) {
     if (s % kCheckInterval == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
-    for (int slot = 0; slot <= D; ++slot) {
-      at[next[lowest_of(s, slot)]++] = static_cast<uint32_t>(s * (D + 1)) + static_cast<uint32_t>(slot);
-    }
+    const auto& vertices = items_[s].vertices;
+    const auto [lowest, second] = lowest_slots(vertices);
+    with_lowest[next[Index(vertices[lowest])]++] = static_cast<uint32_t>(2 * s);
+    with_lowest[next[Index(vertices[second])]++] = static_cast<uint32_t>(2 * s + 1);
   }
-  std::vector<Facet> facets;
-  for (uint32_t v = 0; v < points_.size(); ++v) {
-    if (v % kCheckInterval == 0) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-    }
-    facets.clear();
-    for (uint32_t k = begin[v]; k < begin[v + 1]; ++k) {
-      const uint32_t s = at[k] / (D + 1);
-      const auto slot = static_cast<int>(at[k] % (D + 1));
-      Facet facet{{}, at[k]};
-      for (int i = 0, to = 0; i <= D; ++i) {
-        if (i != slot && Index(items_[s].vertices[i]) != v) {
-          facet.others[to++] = items_[s].vertices[i];
+  // next[v] is where those of v end. A facet has one lowest vertex, so nothing is written by two threads.
+  ThreadTeam team(threads);
+  return team.TryForEach((points_.size() + kCheckInterval - 1) / kCheckInterval, [&](size_t block) {
+    FacetTable<D> table;
+    const size_t end = std::min(points_.size(), (block + 1) * kCheckInterval);
+    for (size_t v = block * kCheckInterval; v < end; ++v) {
+      const uint32_t begin = v == 0 ? 0 : next[v - 1];
+      table.Clear(size_t{next[v] - begin} * D);
+      for (uint32_t k = begin; k < next[v]; ++k) {
+        const SimplexId s{with_lowest[k] / 2};
+        const bool is_opposite = with_lowest[k] % 2 != 0;
+        Item& item = items_[Index(s)];
+        const int lowest = lowest_slots(item.vertices).first;
+        for (int slot = 0; slot <= D; ++slot) {
+          if ((slot == lowest) != is_opposite) {
+            continue;
+          }
+          std::array<VertexId, D - 1> others;
+          for (int i = 0, to = 0; i <= D; ++i) {
+            if (i != slot && Index(item.vertices[i]) != v) {
+              others[to++] = item.vertices[i];
+            }
+          }
+          SortFew(others);
+          if (const auto [twin, twin_slot] = table.FindOrAdd(others, s, slot); twin != kNoSimplex) {
+            item.neighbours[slot] = twin;
+            items_[Index(twin)].neighbours[twin_slot] = s;
+          }
         }
       }
-      std::sort(facet.others.begin(), facet.others.end());
-      facets.push_back(facet);
     }
-    std::sort(facets.begin(), facets.end(), [](const Facet& a, const Facet& b) { return a.others < b.others; });
-    for (size_t i = 1; i < facets.size(); ++i) {
-      if (facets[i].others == facets[i - 1].others) {
-        const uint32_t a = facets[i - 1].at;
-        const uint32_t b = facets[i].at;
-        items_[a / (D + 1)].neighbours[a % (D + 1)] = SimplexId{b / (D + 1)};
-        items_[b / (D + 1)].neighbours[b % (D + 1)] = SimplexId{a / (D + 1)};
-      }
-    }
-  }
-  return absl::OkStatus();
+    return context.Check();
+  });
 }
 
 template <int D>
@@ -191,6 +191,9 @@ template <int D>
 void Triangulation<D>::Free(SimplexId s) {
   items_[Index(s)].vertices[0] = kNoVertex;
   mark_[Index(s)] = 0;
+  if (KnownPlane& known = planes_[Index(s) % kKnownPlanes]; known.simplex == s) {
+    known.simplex = kNoSimplex;
+  }
   free_.push_back(s);
 }
 
@@ -232,39 +235,48 @@ void Triangulation<D>::Star(VertexId v, std::vector<SimplexId>& out) {
   mark_[Index(out[0])] = stamp_;
   for (size_t k = 0; k < out.size(); ++k) {
     const Item& item = items_[Index(out[k])];
+    const size_t count = out.size();
+    out.resize(count + D + 1);
+    size_t to = count;
     for (int i = 0; i <= D; ++i) {
       const SimplexId next = item.neighbours[i];
-      if (item.vertices[i] != v && next != kNoSimplex && mark_[Index(next)] != stamp_) {
-        mark_[Index(next)] = stamp_;
-        out.push_back(next);
-      }
+      const bool may_be_new = item.vertices[i] != v && next != kNoSimplex;
+      uint32_t& mark = mark_[may_be_new ? Index(next) : Index(out[0])];
+      out[to] = next;
+      to += mark != stamp_ ? 1 : 0;
+      mark = stamp_;
     }
+    out.resize(to);
   }
 }
 
 template <int D>
-bool Triangulation<D>::IsInConflict(SimplexId s, const Point<D>& p, double weight) const {
-  const std::array<VertexId, D + 1>& vertices = items_[Index(s)].vertices;
-  std::array<Point<D>, D + 1> e;
-  std::array<double, D + 1> lift;
-  double largest = 0;
+LiftedPlane<D> Triangulation<D>::PlaneOf(const std::array<VertexId, D + 1>& vertices) const {
+  Simplex<D> corners;
+  std::array<double, D + 1> weights;
   for (int i = 0; i <= D; ++i) {
-    e[i] = Difference<D>(point(vertices[i]), p);
-    lift[i] = NormSq<D>(e[i]) - this->weight(vertices[i]) + weight;
-    for (const double x : e[i]) {
-      largest = std::max(largest, std::abs(x));
-    }
+    corners[i] = point(vertices[i]);
+    weights[i] = weight(vertices[i]);
   }
-  const double determinant = LiftedDeterminant(e, lift) * (D % 2 == 0 ? 1 : -1);
-  double bound = kFilterBound<D>;
-  for (int i = 0; i < D + 2; ++i) {
-    bound *= largest;
+  return {corners, weights};
+}
+
+template <int D>
+bool Triangulation<D>::IsInConflict(SimplexId s, const Point<D>& p, double weight) {
+  const std::array<VertexId, D + 1>& vertices = items_[Index(s)].vertices;
+  KnownPlane& known = planes_[Index(s) % kKnownPlanes];
+  if (known.simplex != s) {
+    known = {s, PlaneOf(vertices)};
   }
-  if (determinant < -bound) {
-    return false;
-  }
-  if (determinant > bound) {
-    return true;
+  return IsInConflict(vertices, known.plane, p, weight);
+}
+
+// The same for a positively oriented simplex of `vertices`, which has that plane.
+template <int D>
+bool Triangulation<D>::IsInConflict(const std::array<VertexId, D + 1>& vertices, const LiftedPlane<D>& plane,
+                                    const Point<D>& p, double weight) const {
+  if (const int side = plane.SideOf(p, weight); side != 0) {
+    return side > 0;
   }
   std::array<PlaneSource<D>, D> planes;
   DecisionWeights<D> weights{.site = this->weight(vertices[0]), .generators = {}, .u = weight};
@@ -312,50 +324,9 @@ SimplexId Triangulation<D>::Locate(const Point<D>& p, VertexId start) const {
 }
 
 template <int D>
-void Triangulation<D>::FindCavity(SimplexId from, const Point<D>& p, Cavity& out) {
-  StartSearch();
-  out.simplices.assign(1, from);
-  mark_[Index(from)] = stamp_;
-  Grow(p, 0, box_.FacesOf(p), out);
-}
-
-template <int D>
 void Triangulation<D>::FindCavityOfWeight(VertexId v, double weight, Cavity& out) {
   Star(v, out.simplices);
-  Grow(point(v), weight, faces(v), out);
-}
-
-// Adds what is in conflict to the simplices that are there and marked. Refused ones that touch `p` itself are none.
-template <int D>
-void Triangulation<D>::Grow(const Point<D>& p, double weight, FaceMask faces, Cavity& out) {
-  const uint32_t refused = stamp_ + 1;
-  out.boundary.clear();
-  for (size_t k = 0; k < out.simplices.size(); ++k) {
-    const SimplexId s = out.simplices[k];
-    for (int i = 0; i <= D; ++i) {
-      const SimplexId next = items_[Index(s)].neighbours[i];
-      if (next == kNoSimplex) {
-        // Facets on a face of the box that p is on are replaced too.
-        if ((FacesOf(items_[Index(s)].vertices, i) & faces) == 0) {
-          out.boundary.push_back({s, i});
-        }
-        continue;
-      }
-      uint32_t& mark = mark_[Index(next)];
-      if (mark == stamp_) {
-        continue;
-      }
-      if (mark != refused) {
-        if (IsInConflict(next, p, weight)) {
-          mark = stamp_;
-          out.simplices.push_back(next);
-          continue;
-        }
-        mark = refused;
-      }
-      out.boundary.push_back({s, i});
-    }
-  }
+  Grow(point(v), weight, faces(v), out, [](const Cavity::Facet&) { return false; });
 }
 
 template <int D>
@@ -413,27 +384,28 @@ void Triangulation<D>::Insert(VertexId v, const Point<D>& p, double weight, cons
 template <int D>
 void Triangulation<D>::Remove(VertexId v, std::vector<SimplexId>& created) {
   Star(v, star_);
-  link_.clear();
   open_.clear();
+  open_keys_.clear();
   saved_.clear();
   filling_.clear();
+  link_.clear();
+  link_columns_.Clear();
+  link_number_.resize(points_.size());
   for (const SimplexId s : star_) {
     const Item& item = items_[Index(s)];
-    saved_.push_back({s, item});
-    const int slot = item.SlotOf(v);
-    Open open{item.vertices, slot, item.neighbours[slot], 0, SumOf(item.vertices, slot)};
+    Open open{{}, item.SlotOf(v), kNoSimplex, 0, {}};
+    for (int i = 0; i <= D; ++i) {
+      open.vertices[i] = i == open.slot ? 0 : NumberInLink(item.vertices[i], v);
+    }
+    open.beyond = item.neighbours[open.slot];
     if (open.beyond != kNoSimplex) {
       open.beyond_slot = items_[Index(open.beyond)].SlotOf(s);
     }
+    saved_.push_back({s, open.beyond_slot, item});
+    open.facet = FacetOf(open.vertices, open.slot);
     open_.push_back(open);
-    for (const VertexId u : item.vertices) {
-      if (u != v) {
-        link_.push_back(u);
-      }
-    }
+    open_keys_.push_back(KeyOf(open.facet));
   }
-  std::sort(link_.begin(), link_.end());
-  link_.erase(std::unique(link_.begin(), link_.end()), link_.end());
   for (const SimplexId s : star_) {
     Free(s);
   }
@@ -442,51 +414,86 @@ void Triangulation<D>::Remove(VertexId v, std::vector<SimplexId>& created) {
   while (!open_.empty()) {
     const Open open = open_.back();
     open_.pop_back();
+    open_keys_.pop_back();
     const SimplexId fresh = Allocate();
     filling_.push_back(fresh);
+    std::array<uint32_t, D + 1> vertices = open.vertices;
+    vertices[open.slot] = Wrap(open, fresh);
     Item& item = items_[Index(fresh)];
-    item.vertices = open.vertices;
-    item.vertices[open.slot] = Wrap(open, fresh);
+    for (int i = 0; i <= D; ++i) {
+      item.vertices[i] = link_[vertices[i]];
+      simplex_of_[Index(item.vertices[i])] = fresh;
+    }
     item.neighbours.fill(kNoSimplex);
     item.neighbours[open.slot] = open.beyond;
     if (open.beyond != kNoSimplex) {
       items_[Index(open.beyond)].neighbours[open.beyond_slot] = fresh;
     }
-    for (const VertexId u : item.vertices) {
-      simplex_of_[Index(u)] = fresh;
-    }
     for (int slot = 0; slot <= D; ++slot) {
       if (slot != open.slot) {
-        LinkFacet(fresh, slot);
+        LinkFacet(fresh, vertices, slot);
       }
     }
   }
   created = filling_;
 }
 
-// The neighbour of the removed vertex that is to be joined to a facet of the hole; tried in simplex `fresh`.
+// Where `u` is in link_; the last if it was not there.
 template <int D>
-VertexId Triangulation<D>::Wrap(const Open& open, SimplexId fresh) {
-  VertexId best = kNoVertex;
-  for (const VertexId u : link_) {
-    const auto* const found = std::find(open.vertices.begin(), open.vertices.end(), u);
-    if (found != open.vertices.end() && found - open.vertices.begin() != open.slot) {
-      continue;
-    }
-    if (best != kNoVertex && !IsInConflict(fresh, point(u), weight(u))) {
-      continue;
-    }
-    Simplex<D> corners;
-    for (int i = 0; i <= D; ++i) {
-      corners[i] = point(i == open.slot ? u : open.vertices[i]);
-    }
-    if (Orientation<D>(corners).sign == Sign::kPositive) {
-      best = u;
-      items_[Index(fresh)].vertices = open.vertices;
-      items_[Index(fresh)].vertices[open.slot] = u;
+uint32_t Triangulation<D>::NumberInLink(VertexId u, VertexId removed) {
+  uint32_t& number = link_number_[Index(u)];
+  if (number >= link_.size() || link_[number] != u) {
+    number = static_cast<uint32_t>(link_.size());
+    link_.push_back(u);
+    if constexpr (D == 3) {
+      link_columns_.Add(Difference<D>(point(u), point(removed)), weight(u));
     }
   }
-  if (best == kNoVertex) {
+  return number;
+}
+
+// The neighbour of the removed vertex, by its number in link_, that is to be joined to a facet of the hole by simplex `fresh`.
+template <int D>
+uint32_t Triangulation<D>::Wrap(const Open& open, SimplexId fresh) {
+  if constexpr (D == 3) {
+    std::array<uint32_t, 3> facet;
+    for (int i = 0, to = 0; i < 4; ++i) {
+      if (i != open.slot) {
+        facet[to++] = open.vertices[i];
+      }
+    }
+    if (open.slot % 2 == 0) {
+      std::swap(facet[1], facet[2]);
+    }
+    if (const auto wrapped = link_columns_.Wrap(facet[0], facet[1], facet[2]); wrapped.has_value()) {
+      const VertexId origin = link_[facet[0]];
+      planes_[Index(fresh) % kKnownPlanes] = {fresh,
+                                              {point(origin), weight(origin), wrapped->cofactors, wrapped->largest}};
+      return wrapped->apex;
+    }
+  }
+  std::array<VertexId, D + 1> vertices;
+  Simplex<D> corners;
+  for (int i = 0; i <= D; ++i) {
+    vertices[i] = i == open.slot ? kNoVertex : link_[open.vertices[i]];
+    corners[i] = i == open.slot ? Point<D>{} : point(vertices[i]);
+  }
+  uint32_t best = 0;
+  LiftedPlane<D> plane;
+  for (uint32_t number = 0; number < link_.size(); ++number) {
+    const VertexId u = link_[number];
+    if (std::find(vertices.begin(), vertices.end(), u) != vertices.end() ||
+        (vertices[open.slot] != kNoVertex && !IsInConflict(vertices, plane, point(u), weight(u)))) {
+      continue;
+    }
+    corners[open.slot] = point(u);
+    if (Orientation<D>(corners).sign == Sign::kPositive) {
+      best = number;
+      vertices[open.slot] = u;
+      plane = PlaneOf(vertices);
+    }
+  }
+  if (vertices[open.slot] == kNoVertex) {
     std::abort();  // a hole in a box whose corners are vertices has a vertex on the inner side of each facet
   }
   return best;
@@ -494,43 +501,41 @@ VertexId Triangulation<D>::Wrap(const Open& open, SimplexId fresh) {
 
 // Joins a facet of a new simplex of the hole to the one that waits for it, or has it wait, unless it is on the box.
 template <int D>
-void Triangulation<D>::LinkFacet(SimplexId fresh, int slot) {
+void Triangulation<D>::LinkFacet(SimplexId fresh, const std::array<uint32_t, D + 1>& vertices, int slot) {
   Item& item = items_[Index(fresh)];
-  const auto is_of_facet = [&](VertexId u) {
-    const auto* const found = std::find(item.vertices.begin(), item.vertices.end(), u);
-    return found != item.vertices.end() && found - item.vertices.begin() != slot;
-  };
-  const uint64_t sum = SumOf(item.vertices, slot);
-  for (Open& waiting : open_) {
-    bool is_same = waiting.sum == sum;
-    for (int i = 0; i <= D && is_same; ++i) {
-      is_same = i == waiting.slot || is_of_facet(waiting.vertices[i]);
-    }
-    if (is_same) {
+  const std::array<uint32_t, D> facet = FacetOf(vertices, slot);
+  const uint64_t key = KeyOf(facet);
+  for (size_t k = 0; k < open_.size(); ++k) {
+    if (open_keys_[k] == key && open_[k].facet == facet) {
+      Open& waiting = open_[k];
       item.neighbours[slot] = waiting.beyond;
       if (waiting.beyond != kNoSimplex) {
         items_[Index(waiting.beyond)].neighbours[waiting.beyond_slot] = fresh;
       }
       waiting = open_.back();
       open_.pop_back();
+      open_keys_[k] = open_keys_.back();
+      open_keys_.pop_back();
       return;
     }
   }
   if (FacesOf(item.vertices, slot) == 0) {
     // Seen from its other side.
-    Open next{item.vertices, slot, fresh, slot, sum};
+    Open next{vertices, slot, fresh, slot, facet};
     std::swap(next.vertices[slot == 0 ? 1 : 0], next.vertices[slot <= 1 ? 2 : 1]);
     open_.push_back(next);
+    open_keys_.push_back(key);
   }
 }
 
 template <int D>
-uint64_t Triangulation<D>::SumOf(const std::array<VertexId, D + 1>& vertices, int opposite) {
-  uint64_t sum = 0;
-  for (int i = 0; i <= D; ++i) {
-    sum += i == opposite ? 0 : Index(vertices[i]);
+std::array<uint32_t, D> Triangulation<D>::FacetOf(const std::array<uint32_t, D + 1>& vertices, int opposite) {
+  std::array<uint32_t, D> facet;
+  for (int i = 0; i < D; ++i) {
+    facet[i] = vertices[i + (i >= opposite ? 1 : 0)];
   }
-  return sum;
+  SortFew(facet);
+  return facet;
 }
 
 template <int D>
@@ -540,17 +545,11 @@ void Triangulation<D>::Restore() {
     Free(*it);
   }
   free_.resize(free_.size() - saved_.size());
-  for (const auto& [s, item] : saved_) {
+  for (const auto& [s, beyond_slot, item] : saved_) {
     items_[Index(s)] = item;
-    const int slot = item.SlotOf(removed_);
-    if (item.neighbours[slot] != kNoSimplex) {
-      Item& beyond = items_[Index(item.neighbours[slot])];
-      for (int i = 0; i <= D; ++i) {
-        const VertexId u = beyond.vertices[i];
-        if (std::find(item.vertices.begin(), item.vertices.end(), u) == item.vertices.end()) {
-          beyond.neighbours[i] = s;
-        }
-      }
+    const SimplexId beyond = item.neighbours[item.SlotOf(removed_)];
+    if (beyond != kNoSimplex) {
+      items_[Index(beyond)].neighbours[beyond_slot] = s;
     }
     for (const VertexId u : item.vertices) {
       simplex_of_[Index(u)] = s;

@@ -15,6 +15,8 @@
 #include "core/geometry/box.h"
 #include "core/geometry/exact_measure.h"
 #include "core/geometry/point.h"
+#include "core/sliver/lifted_plane.h"
+#include "core/sliver/link_columns.h"
 
 namespace wellspace::core {
 
@@ -49,28 +51,27 @@ class Triangulation {
     std::array<VertexId, D + 1> vertices;
     std::array<SimplexId, D + 1> neighbours;
 
-    int SlotOf(VertexId v) const {
+    // One of them is `v`, or `neighbour`. Without jumps, which could not be foretold.
+    int SlotOf(VertexId v) const { return SlotIn(vertices, v); }
+    int SlotOf(SimplexId neighbour) const { return SlotIn(neighbours, neighbour); }
+
+   private:
+    template <typename Id>
+    static int SlotIn(const std::array<Id, D + 1>& ids, Id id) {
       int slot = 0;
-      while (vertices[slot] != v) {
-        ++slot;
-      }
-      return slot;
-    }
-    int SlotOf(SimplexId neighbour) const {
-      int slot = 0;
-      while (neighbours[slot] != neighbour) {
-        ++slot;
+      for (int i = 1; i <= D; ++i) {
+        slot += ids[i] == id ? i : 0;
       }
       return slot;
     }
   };
 
-  // Takes over a Delaunay triangulation of `points` in `box`.
+  // Takes over a Delaunay triangulation of `points` in `box`, on up to `threads` threads.
   //
   // Shapes:     simplices: count x (D + 1) indices of points, positively oriented.
   // Complexity: O(points + simplices).
   // Errors:     RESOURCE_EXHAUSTED (facets cannot be numbered), CANCELLED, DEADLINE_EXCEEDED.
-  absl::Status Build(const Box<D>& box, HugeVector<Point<D>> points, std::span<const uint32_t> simplices,
+  absl::Status Build(const Box<D>& box, HugeVector<Point<D>> points, std::span<const uint32_t> simplices, int threads,
                      const RunContext& context);
 
   const Box<D>& box() const { return box_; }
@@ -98,13 +99,13 @@ class Triangulation {
   // What it takes in memory, up to scratch.
   uint64_t MemoryBytes() const {
     return points_.size() * (sizeof(Point<D>) + sizeof(FaceMask) + sizeof(double) + sizeof(SimplexId)) +
-           items_.size() * (sizeof(Item) + sizeof(uint32_t));
+           link_number_.size() * sizeof(uint32_t) + items_.size() * (sizeof(Item) + sizeof(uint32_t));
   }
 
   // What Build takes at its peak, its arguments not counted.
   static uint64_t BuildBytes(uint64_t points, uint64_t simplices) {
-    return points * (sizeof(FaceMask) + sizeof(double) + sizeof(SimplexId) + 2 * sizeof(uint32_t)) +
-           simplices * (sizeof(Item) + (D + 2) * sizeof(uint32_t));
+    return points * (sizeof(FaceMask) + sizeof(double) + sizeof(SimplexId) + sizeof(uint32_t)) +
+           simplices * (sizeof(Item) + 3 * sizeof(uint32_t));
   }
 
   // The squared distance from each vertex to its nearest other, by vertex; infinite where it is in no simplex.
@@ -125,7 +126,7 @@ class Triangulation {
   // REQUIRES:   p different from the vertices of s; weights as invariant (3) has them.
   // Complexity: O(1).
   // Errors:     none.
-  bool IsInConflict(SimplexId s, const Point<D>& p, double weight = 0) const;
+  bool IsInConflict(SimplexId s, const Point<D>& p, double weight = 0);
 
   // A simplex that holds `p`, a point of the box, in its closure; walked to from `start`, a vertex that is in.
   //
@@ -139,7 +140,17 @@ class Triangulation {
   // Complexity: O(result).
   // Errors:     none.
   // Source:     Bowyer 1981, Watson 1981.
-  void FindCavity(SimplexId from, const Point<D>& p, Cavity& out);
+  void FindCavity(SimplexId from, const Point<D>& p, Cavity& out) {
+    FindCavityUnless(from, p, out, [](const Cavity::Facet&) { return false; });
+  }
+  // The same, but ends where `is_refused`(Cavity::Facet) of a facet of the boundary. Returns whether there is no such one.
+  template <typename IsRefused>
+  bool FindCavityUnless(SimplexId from, const Point<D>& p, Cavity& out, IsRefused is_refused) {
+    StartSearch();
+    out.simplices.assign(1, from);
+    mark_[Index(from)] = stamp_;
+    return Grow(p, 0, box_.FacesOf(p), out, is_refused);
+  }
   // What `v` would replace, its star included, if its weight rose to `weight`.
   //
   // REQUIRES:   v is in, and its weight is less.
@@ -169,30 +180,49 @@ class Triangulation {
   void Restore();
 
  private:
-  // A facet that waits for a simplex on its inner side: that of `vertices` with another vertex in `slot`, which is then
-  // positively oriented.
+  // A facet that waits for a simplex on its inner side: that of `vertices`, by their numbers in link_, with another vertex in `slot`, which is
+  // then positively oriented.
   struct Open {
-    std::array<VertexId, D + 1> vertices;
+    std::array<uint32_t, D + 1> vertices;
     int slot = 0;
     SimplexId beyond = kNoSimplex;
     int beyond_slot = 0;
-    uint64_t sum = 0;  // of the numbers of the facet's vertices: other facets seldom have the same
+    std::array<uint32_t, D> facet{};  // its vertices, ascending
   };
   struct Saved {
     SimplexId simplex;
+    int beyond_slot;  // of the facet opposite to the removed vertex, seen from beyond
     Item item;
   };
+  struct KnownPlane {
+    SimplexId simplex = kNoSimplex;
+    LiftedPlane<D> plane;
+  };
+  // A power of two; who tries places for a vertex asks for the same few dozen simplices again and again.
+  static constexpr uint32_t kKnownPlanes = 512;
 
+  LiftedPlane<D> PlaneOf(const std::array<VertexId, D + 1>& vertices) const;
+  bool IsInConflict(const std::array<VertexId, D + 1>& vertices, const LiftedPlane<D>& plane, const Point<D>& p,
+                    double weight) const;
   SimplexId Allocate();
   void Free(SimplexId s);
   void StartSearch();
-  void Grow(const Point<D>& p, double weight, FaceMask faces, Cavity& out);
-  // The sum of the numbers of the facet's vertices.
-  static uint64_t SumOf(const std::array<VertexId, D + 1>& vertices, int opposite);
+  template <typename IsRefused>
+  bool Grow(const Point<D>& p, double weight, FaceMask faces, Cavity& out, IsRefused is_refused);
+  static std::array<uint32_t, D> FacetOf(const std::array<uint32_t, D + 1>& vertices, int opposite);
+  // Different facets seldom have the same.
+  static uint64_t KeyOf(const std::array<uint32_t, D>& facet) {
+    uint64_t key = 0;
+    for (const uint32_t u : facet) {
+      key = (key << (64 / D)) + u;
+    }
+    return key;
+  }
   // The faces of the box that all vertices of the facet lie on.
   FaceMask FacesOf(const std::array<VertexId, D + 1>& vertices, int opposite) const;
-  VertexId Wrap(const Open& open, SimplexId fresh);
-  void LinkFacet(SimplexId fresh, int slot);
+  uint32_t NumberInLink(VertexId u, VertexId removed);
+  uint32_t Wrap(const Open& open, SimplexId fresh);
+  void LinkFacet(SimplexId fresh, const std::array<uint32_t, D + 1>& vertices, int slot);
 
   Box<D> box_;
   HugeVector<Point<D>> points_;
@@ -201,17 +231,59 @@ class Triangulation {
   HugeVector<SimplexId> simplex_of_;  // by vertex: one of its simplices; kNoSimplex where it is in none
   HugeVector<Item> items_;
   std::vector<SimplexId> free_;
+  std::vector<KnownPlane> planes_;  // that of s, if it is known, at s modulo kKnownPlanes
 
   // Scratch.
   HugeVector<uint32_t> mark_;  // by simplex: stamp_ where the search has it, stamp_ + 1 where it has refused it
   uint32_t stamp_ = 0;
   std::vector<SimplexId> star_;
-  std::vector<VertexId> link_;
+  std::vector<VertexId> link_;        // the neighbours of removed_
+  HugeVector<uint32_t> link_number_;  // by vertex, where it is in link_ if that has it
+  LinkColumns link_columns_;          // in 3-D
   std::vector<Open> open_;
+  std::vector<uint64_t> open_keys_;  // KeyOf the facet of each
   VertexId removed_ = kNoVertex;
   std::vector<Saved> saved_;        // the star of removed_
   std::vector<SimplexId> filling_;  // what took its place
 };
+
+// Adds what is in conflict to the simplices that are there and marked, up to the first refused facet. Simplices that are not in conflict but touch `p` are none.
+template <int D>
+template <typename IsRefused>
+bool Triangulation<D>::Grow(const Point<D>& p, double weight, FaceMask faces, Cavity& out, IsRefused is_refused) {
+  const uint32_t outside = stamp_ + 1;
+  out.boundary.clear();
+  for (size_t k = 0; k < out.simplices.size(); ++k) {
+    const SimplexId s = out.simplices[k];
+    for (int i = 0; i <= D; ++i) {
+      const SimplexId next = items_[Index(s)].neighbours[i];
+      if (next == kNoSimplex) {
+        // Facets on a face of the box that p is on are replaced too.
+        if ((FacesOf(items_[Index(s)].vertices, i) & faces) != 0) {
+          continue;
+        }
+      } else {
+        uint32_t& mark = mark_[Index(next)];
+        if (mark == stamp_) {
+          continue;
+        }
+        if (mark != outside) {
+          if (IsInConflict(next, p, weight)) {
+            mark = stamp_;
+            out.simplices.push_back(next);
+            continue;
+          }
+          mark = outside;
+        }
+      }
+      out.boundary.push_back({s, i});
+      if (is_refused(out.boundary.back())) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
 
 }  // namespace wellspace::core
 

@@ -45,7 +45,7 @@ class TriangulationOf {
     Box<D> box;
     std::copy_n(mesh->domain_low.begin(), D, box.low.begin());
     std::copy_n(mesh->domain_high.begin(), D, box.high.begin());
-    EXPECT_TRUE(triangulation.Build(box, points, mesh->simplices, context).ok());
+    EXPECT_TRUE(triangulation.Build(box, points, mesh->simplices, 2, context).ok());
   }
 
   SimplexSet<D> Simplices() const {
