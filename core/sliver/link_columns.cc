@@ -8,6 +8,9 @@
 #include "core/sliver/tetrahedron.h"
 #include "core/voronoi/lane_bits.h"
 
+// Vectors that are passed and returned never are: all that does so is compiled into its callers.
+#pragma GCC diagnostic ignored "-Wpsabi"
+
 namespace wellspace::core {
 namespace {
 
@@ -45,8 +48,9 @@ WELLSPACE_INLINE std::optional<LinkColumns::Tetrahedron> LinkColumns::WrapWith(u
   if (count_ > kMostNeighbours) {
     return std::nullopt;
   }
-  const Point<3> origin = {at(a, 0), at(a, 1), at(a, 2)};
-  const double origin_lift = at(a, 3);
+  const std::array<double, 4> lifted_origin = {at(a, 0), at(a, 1), at(a, 2), at(a, 3)};
+  const Point<3> origin = {lifted_origin[0], lifted_origin[1], lifted_origin[2]};
+  const double origin_lift = lifted_origin[3];
   const auto edge_to = [&](uint32_t u) { return Difference<3>({at(u, 0), at(u, 1), at(u, 2)}, origin); };
   const Point<3> edge_b = edge_to(b);
   const Point<3> edge_c = edge_to(c);
@@ -72,10 +76,7 @@ WELLSPACE_INLINE std::optional<LinkColumns::Tetrahedron> LinkColumns::WrapWith(u
   }
   for (const Group& group : groups_) {
     for (size_t from = 0; from < kLanes; from += kWidth) {
-      const Lanes x = LanesAt<kWidth>(group.x[0], from) - origin[0];
-      const Lanes y = LanesAt<kWidth>(group.x[1], from) - origin[1];
-      const Lanes z = LanesAt<kWidth>(group.x[2], from) - origin[2];
-      const Lanes lift = LanesAt<kWidth>(group.x[3], from) - origin_lift;
+      const auto [x, y, z, lift] = group.template RelativeTo<kWidth>(lifted_origin, from);
       const Lanes height = x * normal[0] + y * normal[1] + z * normal[2];
       const Lanes far = (lift - (x * centre[0] + y * centre[1] + z * centre[2])) / height;
       const auto is_nearer = (height > least) & (far < nearest);
@@ -110,10 +111,7 @@ WELLSPACE_INLINE std::optional<LinkColumns::Tetrahedron> LinkColumns::WrapWith(u
   size_t at_bit = 0;
   for (const Group& group : groups_) {
     for (size_t from = 0; from < kLanes; from += kWidth) {
-      const Lanes x = LanesAt<kWidth>(group.x[0], from) - origin[0];
-      const Lanes y = LanesAt<kWidth>(group.x[1], from) - origin[1];
-      const Lanes z = LanesAt<kWidth>(group.x[2], from) - origin[2];
-      const Lanes lift = LanesAt<kWidth>(group.x[3], from) - origin_lift;
+      const auto [x, y, z, lift] = group.template RelativeTo<kWidth>(lifted_origin, from);
       const Lanes value = x * cofactors[0] + y * cofactors[1] + z * cofactors[2] + lift * cofactors[3];
       in_doubt |= uint64_t{Bits<kWidth>(value >= value_bound)} << at_bit;
       at_bit += kWidth;

@@ -43,6 +43,17 @@ class LinkColumns {
   // Neighbours side by side: coordinates, and the squared distance from the vertex less the weight.
   struct Group {
     alignas(kLanes * sizeof(double)) double x[4][kLanes];
+
+    template <size_t kWidth>
+    struct Vectors {
+      typename Wide<kWidth>::Lanes x, y, z, lift;
+    };
+    // A vector of them, from lane `from` on, as seen from `origin`.
+    template <size_t kWidth>
+    WELLSPACE_INLINE Vectors<kWidth> RelativeTo(const std::array<double, 4>& origin, size_t from) const {
+      return {LanesAt<kWidth>(x[0], from) - origin[0], LanesAt<kWidth>(x[1], from) - origin[1],
+              LanesAt<kWidth>(x[2], from) - origin[2], LanesAt<kWidth>(x[3], from) - origin[3]};
+    }
   };
 
   double at(uint32_t neighbour, int column) const { return groups_[neighbour / kLanes].x[column][neighbour % kLanes]; }

@@ -8,6 +8,7 @@
 
 #include "absl/time/clock.h"
 #include "absl/time/time.h"
+#include "core/base/sort_few.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
 #include "core/simplex/quality.h"
@@ -46,17 +47,10 @@ template <int D>
 void Emit(const Triangulation<D>& triangulation, SimplexId s, std::span<const uint32_t> output_index,
           HugeVector<uint32_t>& out) {
   std::array<uint32_t, D + 1> corners;
-  bool is_odd = false;
   for (int i = 0; i <= D; ++i) {
-    const uint32_t index = output_index[Index(triangulation.item(s).vertices[i])];
-    int at = i;
-    for (; at > 0 && corners[at - 1] > index; --at) {
-      corners[at] = corners[at - 1];
-      is_odd = !is_odd;
-    }
-    corners[at] = index;
+    corners[i] = output_index[Index(triangulation.item(s).vertices[i])];
   }
-  if (is_odd) {
+  if (SortFew(corners)) {
     std::swap(corners[D - 1], corners[D]);
   }
   out.insert(out.end(), corners.begin(), corners.end());

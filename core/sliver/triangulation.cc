@@ -22,6 +22,19 @@ constexpr size_t kCheckInterval = 4096;
 // There is room for one more in so many simplices before they have to be moved.
 constexpr size_t kRoomToGrow = 16;
 
+// The slots of the lowest vertex and the second.
+template <int D>
+std::pair<int, int> LowestSlots(const std::array<VertexId, D + 1>& vertices) {
+  int lowest = 0;
+  int second = 1;
+  for (int i = 1; i <= D; ++i) {
+    const bool is_lowest = vertices[i] < vertices[lowest];
+    second = is_lowest ? lowest : i == 1 || vertices[i] < vertices[second] ? i : second;
+    lowest = is_lowest ? i : lowest;
+  }
+  return {lowest, second};
+}
+
 // The facets that have one vertex in common, by their others: each is that of two simplices, or on the box.
 template <int D>
 class FacetTable {
@@ -99,23 +112,13 @@ absl::Status Triangulation<D>::Build(const Box<D>& box, HugeVector<Point<D>> poi
   }
   // Facets by their lowest vertex: those of one vertex are few, and are matched among themselves. The lowest vertex of a simplex is that of all
   // its facets but the one opposite to it, which has the second.
-  const auto lowest_slots = [&](const std::array<VertexId, D + 1>& vertices) {
-    int lowest = 0;
-    int second = 1;
-    for (int i = 1; i <= D; ++i) {
-      const bool is_lowest = vertices[i] < vertices[lowest];
-      second = is_lowest ? lowest : i == 1 || vertices[i] < vertices[second] ? i : second;
-      lowest = is_lowest ? i : lowest;
-    }
-    return std::pair{lowest, second};
-  };
   HugeVector<uint32_t> next(points_.size() + 1, 0);  // by vertex
   for (size_t s = 0; s < count; ++s) {
     if (s % kCheckInterval == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
     const auto& vertices = items_[s].vertices;
-    const auto [lowest, second] = lowest_slots(vertices);
+    const auto [lowest, second] = LowestSlots<D>(vertices);
     ++next[Index(vertices[lowest]) + 1];
     ++next[Index(vertices[second]) + 1];
   }
@@ -127,10 +130,25 @@ absl::Status Triangulation<D>::Build(const Box<D>& box, HugeVector<Point<D>> poi
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
     const auto& vertices = items_[s].vertices;
-    const auto [lowest, second] = lowest_slots(vertices);
+    const auto [lowest, second] = LowestSlots<D>(vertices);
     with_lowest[next[Index(vertices[lowest])]++] = static_cast<uint32_t>(2 * s);
     with_lowest[next[Index(vertices[second])]++] = static_cast<uint32_t>(2 * s + 1);
   }
+  // Joins the facet opposite to `slot`, if its twin has been there.
+  const auto join = [&](FacetTable<D>& table, size_t v, SimplexId s, int slot) {
+    Item& item = items_[Index(s)];
+    std::array<VertexId, D - 1> others;
+    for (int i = 0, to = 0; i <= D; ++i) {
+      if (i != slot && Index(item.vertices[i]) != v) {
+        others[to++] = item.vertices[i];
+      }
+    }
+    SortFew(others);
+    if (const auto [twin, twin_slot] = table.FindOrAdd(others, s, slot); twin != kNoSimplex) {
+      item.neighbours[slot] = twin;
+      items_[Index(twin)].neighbours[twin_slot] = s;
+    }
+  };
   // next[v] is where those of v end. A facet has one lowest vertex, so nothing is written by two threads.
   ThreadTeam team(threads);
   return team.TryForEach((points_.size() + kCheckInterval - 1) / kCheckInterval, [&](size_t block) {
@@ -142,22 +160,10 @@ absl::Status Triangulation<D>::Build(const Box<D>& box, HugeVector<Point<D>> poi
       for (uint32_t k = begin; k < next[v]; ++k) {
         const SimplexId s{with_lowest[k] / 2};
         const bool is_opposite = with_lowest[k] % 2 != 0;
-        Item& item = items_[Index(s)];
-        const int lowest = lowest_slots(item.vertices).first;
+        const int lowest = LowestSlots<D>(items_[Index(s)].vertices).first;
         for (int slot = 0; slot <= D; ++slot) {
-          if ((slot == lowest) != is_opposite) {
-            continue;
-          }
-          std::array<VertexId, D - 1> others;
-          for (int i = 0, to = 0; i <= D; ++i) {
-            if (i != slot && Index(item.vertices[i]) != v) {
-              others[to++] = item.vertices[i];
-            }
-          }
-          SortFew(others);
-          if (const auto [twin, twin_slot] = table.FindOrAdd(others, s, slot); twin != kNoSimplex) {
-            item.neighbours[slot] = twin;
-            items_[Index(twin)].neighbours[twin_slot] = s;
+          if ((slot == lowest) == is_opposite) {
+            join(table, v, s, slot);
           }
         }
       }
@@ -403,8 +409,7 @@ void Triangulation<D>::Remove(VertexId v, std::vector<SimplexId>& created) {
     }
     saved_.push_back({s, open.beyond_slot, item});
     open.facet = FacetOf(open.vertices, open.slot);
-    open_.push_back(open);
-    open_keys_.push_back(KeyOf(open.facet));
+    PushOpen(open);
   }
   for (const SimplexId s : star_) {
     Free(s);
@@ -412,9 +417,7 @@ void Triangulation<D>::Remove(VertexId v, std::vector<SimplexId>& created) {
   simplex_of_[Index(v)] = kNoSimplex;
   removed_ = v;
   while (!open_.empty()) {
-    const Open open = open_.back();
-    open_.pop_back();
-    open_keys_.pop_back();
+    const Open open = TakeOpen(open_.size() - 1);
     const SimplexId fresh = Allocate();
     filling_.push_back(fresh);
     std::array<uint32_t, D + 1> vertices = open.vertices;
@@ -507,15 +510,11 @@ void Triangulation<D>::LinkFacet(SimplexId fresh, const std::array<uint32_t, D +
   const uint64_t key = KeyOf(facet);
   for (size_t k = 0; k < open_.size(); ++k) {
     if (open_keys_[k] == key && open_[k].facet == facet) {
-      Open& waiting = open_[k];
+      const Open waiting = TakeOpen(k);
       item.neighbours[slot] = waiting.beyond;
       if (waiting.beyond != kNoSimplex) {
         items_[Index(waiting.beyond)].neighbours[waiting.beyond_slot] = fresh;
       }
-      waiting = open_.back();
-      open_.pop_back();
-      open_keys_[k] = open_keys_.back();
-      open_keys_.pop_back();
       return;
     }
   }
@@ -523,9 +522,25 @@ void Triangulation<D>::LinkFacet(SimplexId fresh, const std::array<uint32_t, D +
     // Seen from its other side.
     Open next{vertices, slot, fresh, slot, facet};
     std::swap(next.vertices[slot == 0 ? 1 : 0], next.vertices[slot <= 1 ? 2 : 1]);
-    open_.push_back(next);
-    open_keys_.push_back(key);
+    PushOpen(next);
   }
+}
+
+template <int D>
+void Triangulation<D>::PushOpen(const Open& open) {
+  open_.push_back(open);
+  open_keys_.push_back(KeyOf(open.facet));
+}
+
+// Takes one out; the last takes its place.
+template <int D>
+auto Triangulation<D>::TakeOpen(size_t at) -> Open {
+  const Open open = open_[at];
+  open_[at] = open_.back();
+  open_.pop_back();
+  open_keys_[at] = open_keys_.back();
+  open_keys_.pop_back();
+  return open;
 }
 
 template <int D>

@@ -221,6 +221,8 @@ class Triangulation {
   // The faces of the box that all vertices of the facet lie on.
   FaceMask FacesOf(const std::array<VertexId, D + 1>& vertices, int opposite) const;
   uint32_t NumberInLink(VertexId u, VertexId removed);
+  void PushOpen(const Open& open);
+  Open TakeOpen(size_t at);
   uint32_t Wrap(const Open& open, SimplexId fresh);
   void LinkFacet(SimplexId fresh, const std::array<uint32_t, D + 1>& vertices, int slot);
 
