@@ -5,25 +5,27 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 namespace wellspace::core {
 
-// Sorts `items`, numbers or identifiers of 32 bits, the least first, and returns whether that takes an odd number of exchanges.
+// Sorts `items`, numbers or identifiers of at most 64 bits, the least first, and returns whether that takes an odd number of exchanges.
 //
 // Complexity: O(N^2).
 template <typename T, size_t N>
 bool SortFew(std::array<T, N>& items) {
+  using Number = std::conditional_t<sizeof(T) <= sizeof(uint32_t), uint32_t, uint64_t>;
   uint32_t is_odd = 0;
   for (size_t last = N - 1; last > 0; --last) {
     for (size_t i = 0; i < last; ++i) {
       // Compilers make jumps of std::min and std::max here.
-      const auto a = static_cast<uint32_t>(items[i]);
-      const auto b = static_cast<uint32_t>(items[i + 1]);
-      const uint32_t is_exchanged = b < a ? 1 : 0;
-      const uint32_t difference = (a ^ b) & -is_exchanged;
+      const auto a = static_cast<Number>(items[i]);
+      const auto b = static_cast<Number>(items[i + 1]);
+      const Number is_exchanged = b < a ? 1 : 0;
+      const Number difference = (a ^ b) & -is_exchanged;
       items[i] = static_cast<T>(a ^ difference);
       items[i + 1] = static_cast<T>(b ^ difference);
-      is_odd ^= is_exchanged;
+      is_odd ^= static_cast<uint32_t>(is_exchanged);
     }
   }
   return is_odd != 0;

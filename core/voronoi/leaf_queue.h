@@ -73,10 +73,6 @@ class LeafQueue {
     return entries_[first];
   }
 
-  // Where the next to be pushed will be, and what is there: for whoever looks at what has been pushed since.
-  WELLSPACE_INLINE uint32_t end() const { return end_; }
-  WELLSPACE_INLINE NodeId leaf(uint32_t at) const { return entries_[at].leaf; }
-
  private:
   static constexpr uint32_t kClasses = 16;
   static constexpr int64_t kNearClasses = 4;

@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <utility>
 
 #include "core/geometry/point.h"
 #include "core/geometry/power_predicate.h"
 #include "core/voronoi/cell_parts.h"
+#include "core/voronoi/lanes.h"
 
 namespace wellspace::core {
 
@@ -22,48 +24,109 @@ struct Placement {
   double error = std::numeric_limits<double>::infinity();
 };
 
+// A number for a node, or for so many side by side.
+template <size_t kNodes>
+struct PerNode {
+  using Type = typename Wide<kNodes>::Lanes;
+};
+template <>
+struct PerNode<1> {
+  using Type = double;
+};
+
+// The three planes of a node in space, or of each of so many; as of Plane.
+template <size_t kNodes>
+struct SpacePlanes {
+  using T = typename PerNode<kNodes>::Type;
+  T normal[3][3];  // by plane and axis
+  T offset[3];
+  T length[3];
+  T distance[3];
+};
+
+// Placements of so many.
+template <size_t kNodes>
+struct SpacePlacements {
+  using T = typename PerNode<kNodes>::Type;
+  T x[3];
+  T radius_sq;
+  T radius;
+  T error;
+};
+
 // The meeting point of D planes by Cramer's rule, D <= 3.
 //
 // With a_j = |n_j|, P = prod a_j and S = sum_j |c_j| P / a_j, the numerators are sums of products bounded by S, the
 // determinant by sqrt(D) P; each factor carries at most one rounding (n) or D + 3 (c), each product and sum one more: at
 // most 14 u for D <= 3. So, where |det| > 256 u P, a coordinate is wrong by at most 18 u (S + |x| P) / |det|, and x by
 // sqrt(D) < 2 times that; 64 u is used.
-template <int D>
-Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D <= 3) {
-  Placement<D> placed;
-  double determinant = 0;
-  double inverse = 0;
-  if constexpr (D == 2) {
-    const Point<2>& a = planes[0]->normal;
-    const Point<2>& b = planes[1]->normal;
-    determinant = a[0] * b[1] - a[1] * b[0];
-    inverse = 1 / determinant;
-    placed.x[0] = (planes[0]->offset * b[1] - planes[1]->offset * a[1]) * inverse;
-    placed.x[1] = (planes[1]->offset * a[0] - planes[0]->offset * b[0]) * inverse;
+template <size_t kNodes>
+WELLSPACE_INLINE void MeetInSpace(const SpacePlanes<kNodes>& planes, SpacePlacements<kNodes>& placed) {
+  using T = typename PerNode<kNodes>::Type;
+  const auto cross = [](const T(&a)[3], const T(&b)[3], T(&out)[3]) __attribute__((always_inline)) {
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+  };
+  const T(&n)[3][3] = planes.normal;
+  T bc[3];
+  T ca[3];
+  T ab[3];
+  cross(n[1], n[2], bc);
+  cross(n[2], n[0], ca);
+  cross(n[0], n[1], ab);
+  const T determinant = n[0][0] * bc[0] + n[0][1] * bc[1] + n[0][2] * bc[2];
+  const T inverse = 1 / determinant;
+  for (int i = 0; i < 3; ++i) {
+    placed.x[i] = (planes.offset[0] * bc[i] + planes.offset[1] * ca[i] + planes.offset[2] * ab[i]) * inverse;
+  }
+  const T product = planes.length[0] * planes.length[1] * planes.length[2];
+  const T sum = planes.distance[0] + planes.distance[1] + planes.distance[2];
+  placed.radius_sq = placed.x[0] * placed.x[0] + placed.x[1] * placed.x[1] + placed.x[2] * placed.x[2];
+  if constexpr (kNodes == 1) {
+    placed.radius = std::sqrt(placed.radius_sq);
   } else {
-    const auto cross = [](const Point<3>& a, const Point<3>& b) {
-      return Point<3>{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-    };
-    const Point<3> bc = cross(planes[1]->normal, planes[2]->normal);
-    const Point<3> ca = cross(planes[2]->normal, planes[0]->normal);
-    const Point<3> ab = cross(planes[0]->normal, planes[1]->normal);
-    determinant = Dot<3>(planes[0]->normal, bc);
-    inverse = 1 / determinant;
-    for (int i = 0; i < 3; ++i) {
-      placed.x[i] = (planes[0]->offset * bc[i] + planes[1]->offset * ca[i] + planes[2]->offset * ab[i]) * inverse;
+    for (size_t node = 0; node < kNodes; ++node) {
+      placed.radius[node] = std::sqrt(placed.radius_sq[node]);
     }
   }
-  double product = 1;
-  double sum = 0;
-  for (const Plane<D>* plane : planes) {
-    product *= plane->length;
-    sum += plane->distance;
-  }
+  const T size = determinant < 0 ? -determinant : determinant;
+  const T inverse_size = inverse < 0 ? -inverse : inverse;
+  const T error = 64 * kUnit * product * (sum + placed.radius) * inverse_size;
+  const T none = std::numeric_limits<double>::infinity() + T{};
+  placed.error = size > 256 * kUnit * product ? error : none;
+}
+
+template <int D>
+Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D == 2) {
+  Placement<D> placed;
+  const Point<2>& a = planes[0]->normal;
+  const Point<2>& b = planes[1]->normal;
+  const double determinant = a[0] * b[1] - a[1] * b[0];
+  const double inverse = 1 / determinant;
+  placed.x[0] = (planes[0]->offset * b[1] - planes[1]->offset * a[1]) * inverse;
+  placed.x[1] = (planes[1]->offset * a[0] - planes[0]->offset * b[0]) * inverse;
   placed.radius = std::sqrt(NormSq<D>(placed.x));
+  const double product = planes[0]->length * planes[1]->length;
   if (std::abs(determinant) > 256 * kUnit * product) {
+    const double sum = planes[0]->distance + planes[1]->distance;
     placed.error = 64 * kUnit * product * (sum + placed.radius) * std::abs(inverse);
   }
   return placed;
+}
+
+template <int D>
+Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D == 3) {
+  SpacePlanes<1> three;
+  for (int k = 0; k < D; ++k) {
+    std::copy_n(planes[k]->normal.begin(), D, three.normal[k]);
+    three.offset[k] = planes[k]->offset;
+    three.length[k] = planes[k]->length;
+    three.distance[k] = planes[k]->distance;
+  }
+  SpacePlacements<1> at;
+  MeetInSpace<1>(three, at);
+  return {{at.x[0], at.x[1], at.x[2]}, at.radius, at.error};
 }
 
 // The same by an approximate inverse and the residual, D > 3.
@@ -145,6 +208,9 @@ Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D > 3) 
   return placed;
 }
 
+// What a slack is more than the error of a node, in shares of its distance, so that it also bounds those of products with it.
+inline constexpr double kProductError = 16 * kUnit;
+
 // A placed node is wrong by at most this share of its distance from the site. What is sure of nodes by twice as much does not
 // depend on how they were placed.
 inline constexpr double kPlaced = 0x1p-20;
@@ -167,7 +233,7 @@ double PlaceByPlanes(const Point<D>& site, const std::array<const Plane<D>*, D>&
     placed.error = 8 * kUnit * placed.radius;
   }
   x = placed.x;
-  return placed.error + 16 * kUnit * placed.radius;
+  return placed.error + kProductError * placed.radius;
 }
 
 }  // namespace wellspace::core

@@ -269,10 +269,13 @@ WELLSPACE_INLINE Floats RadiiSq(const Group& group) {
   return radius_sq;
 }
 
-// Whether some vertex in the cube from `low` to `high`, relative to the site, could cut off a node, as Polytope::Reaches has it.
+// Whether some vertex in the cube from `low` to `high`, relative to the site, could cut off a node, as Polytope::Reaches has it; nodes are within
+// `most_radius`.
 template <VectorUnit kUnit, int D, typename Group>
-WELLSPACE_INLINE bool AreReached(std::span<const Group> groups, const Point<D>& low, const Point<D>& high) {
+WELLSPACE_INLINE bool AreReached(std::span<const Group> groups, float most_radius, const Point<D>& low,
+                                 const Point<D>& high) {
   FloatMask any{};
+  const Floats doubt = Splat(kPowerError<D> * most_radius * most_radius + kUnderflow);
   for (const Group& group : groups) {
     Floats power{};
     for (int axis = 0; axis < D; ++axis) {
@@ -282,7 +285,7 @@ WELLSPACE_INLINE bool AreReached(std::span<const Group> groups, const Point<D>& 
       const Floats p = Min<kUnit>(Max<kUnit>(x, least), most);
       power += p * (p - 2 * x);
     }
-    any |= IsAtMost<kUnit>(power, kPowerError<D> * RadiiSq<D>(group) + kUnderflow);
+    any |= IsAtMost<kUnit>(power, doubt);
   }
   return Bits<kUnit>(any) != 0;
 }

@@ -345,7 +345,7 @@ WELLSPACE_AVX2 bool Polygon::KeepsRatioAvx2(double ratio) const { return KeepsRa
 
 template <VectorUnit kUnit>
 WELLSPACE_INLINE bool Polygon::ReachesWith(const Box<2>& cube) const {
-  return AreReached<kUnit, 2>(groups(), ScaledTo(cube.low), ScaledTo(cube.high));
+  return AreReached<kUnit, 2>(groups(), most_radius_, ScaledTo(cube.low), ScaledTo(cube.high));
 }
 
 WELLSPACE_AVX2 bool Polygon::ReachesAvx2(const Box<2>& cube) const { return ReachesWith<VectorUnit::kAvx2>(cube); }

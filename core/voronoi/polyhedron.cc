@@ -7,6 +7,7 @@
 #include <cstring>
 #include <limits>
 
+#include "core/base/sort_few.h"
 #include "core/voronoi/meeting_point.h"
 #include "core/voronoi/near_vertices.h"
 
@@ -35,9 +36,8 @@ WELLSPACE_INLINE void Transpose(const Four& a, const Four& b, const Four& c, con
 template <VectorUnit kUnit>
 WELLSPACE_INLINE void Polyhedron::SetReach() {
   Floats most_sq{};
-  for (const Group& group : groups()) {
-    most_sq = Max<kUnit>(most_sq, RadiiSq<3>(group));
-  }
+  ForEachGroup([&](const Group& group)
+                   __attribute__((always_inline)) { most_sq = Max<kUnit>(most_sq, RadiiSq<3>(group)); });
   most_radius_ =
       std::min(most_radius_, std::sqrt(Largest<kUnit>(most_sq)) * (1 + kDistanceError<3>));  // the cell only shrinks
 }
@@ -52,9 +52,9 @@ void Polyhedron::Reset(const Point<3>& site, const Box<3>& bounds, const std::ar
     triangles_.resize(kWordBits);
     removed_words_.resize(1);
     removed_.resize(kWordBits);
-    rim_.resize(kWordBits);
+    rim_.resize(kWordBits + 4);
     for (auto& column : new_) {
-      column.resize(kWordBits);
+      column.resize(rim_.size());
     }
   }
   for (int face = 0; face < 6; ++face) {
@@ -82,42 +82,45 @@ void Polyhedron::Reset(const Point<3>& site, const Box<3>& bounds, const std::ar
 // Finds the nodes that are cut off; whether there are any.
 template <VectorUnit kUnit>
 WELLSPACE_INLINE bool Polyhedron::FindRemoved(const FloatBisector<3>& bisector, const Point<3>& position) {
-  const auto most_of = [&bisector](const Group& group) __attribute__((always_inline)) {
-    return Load(group.x[0]) * bisector.w[0] +
-           (Load(group.x[1]) * bisector.w[1] + (Load(group.x[2]) * bisector.w[2] - bisector.low));
-  };
-  FloatMask are_within = Splat(-1);  // by sign
-  for (const Group& group : groups()) {
-    const Floats most = most_of(group);
-    are_within &= reinterpret_cast<const FloatMask&>(most);
-  }
-  if (Bits<kUnit>(are_within) == 0xff) {
-    return false;
-  }
   const Floats surely_from = Splat(2 * (bisector.offset - bisector.low));
-  const Group* group = groups_.data();
-  uint64_t any = 0;
-  size_t left = count_;
-  for (size_t word = 0; left > 0; ++word) {
-    const size_t nodes = std::min(left, kWordBits);
-    left -= nodes;
-    uint64_t maybe = 0;
-    uint64_t surely = 0;
-    for (size_t node = 0; node < nodes; node += kTogether, ++group) {
-      const Floats most = most_of(*group);
-      maybe |= uint64_t{Bits<kUnit>(reinterpret_cast<const FloatMask&>(most)) ^ 0xff} << node;
-      surely |= uint64_t{Bits<kUnit>(IsLess<kUnit>(surely_from, most))} << node;
-    }
-    const uint64_t all = ~uint64_t{0} >> (kWordBits - nodes);
-    maybe &= all;
-    surely &= maybe;
-    if (maybe != surely) [[unlikely]] {
-      surely |= DecideDoubtful(word, maybe & ~surely, position);
-    }
-    removed_words_[word] = surely;
-    any |= surely;
+  uint64_t maybe = 0;
+  uint64_t surely = 0;
+  size_t node = 0;  // of a word
+  const auto look_at = [&](const Group& group) __attribute__((always_inline)) {
+    const Floats most = Load(group.x[0]) * bisector.w[0] +
+                        (Load(group.x[1]) * bisector.w[1] + (Load(group.x[2]) * bisector.w[2] - bisector.low));
+    maybe |= uint64_t{Bits<kUnit>(reinterpret_cast<const FloatMask&>(most)) ^ 0xff} << node;  // by sign
+    surely |= uint64_t{Bits<kUnit>(IsLess<kUnit>(surely_from, most))} << node;
+    node += kTogether;
+  };
+  if (count_ <= kWordBits) [[likely]] {
+    ForEachGroup(look_at);
+    return SetRemoved(0, maybe, surely, position);
   }
-  return any != 0;
+  bool is_any = false;
+  const Group* const end = groups_.data() + GroupsFor(count_);
+  size_t word = 0;
+  for (const Group* group = groups_.data(); group != end; ++word) {
+    maybe = 0;
+    surely = 0;
+    for (node = 0; node < kWordBits && group != end; ++group) {
+      look_at(*group);
+    }
+    is_any |= SetRemoved(word, maybe, surely, position);
+  }
+  return is_any;
+}
+
+// Sets a word of removed_words_, given which of its nodes the bisector to `generator` may cut off, and which it surely does; whether there are any.
+WELLSPACE_INLINE bool Polyhedron::SetRemoved(size_t word, uint64_t maybe, uint64_t surely, const Point<3>& generator) {
+  const size_t nodes = std::min(count_ - word * kWordBits, kWordBits);
+  maybe &= ~uint64_t{0} >> (kWordBits - nodes);
+  surely &= maybe;
+  if (maybe != surely) [[unlikely]] {
+    surely |= DecideDoubtful(word, maybe & ~surely, generator);
+  }
+  removed_words_[word] = surely;
+  return surely != 0;
 }
 
 Point<3> Polyhedron::PositionOf(size_t node) const {
@@ -232,9 +235,7 @@ WELLSPACE_INLINE void Polyhedron::PlaceOnRim(uint32_t plane) {
   const Row& own = rows_[plane];
   const Point<3> n = {own.normal[0], own.normal[1], own.normal[2]};
   const double n_sq = NormSq<3>(n);
-  for (size_t j = rim_count_; j % 4 != 0; ++j) {
-    rim_[j] = rim_[0];
-  }
+  std::fill_n(&rim_[rim_count_], 3, rim_[0]);  // four are read at a time
   for (size_t first = 0; first < rim_count_; first += 4) {
     const RimEdge* const edges = &rim_[first];
     const auto row = [&](uint32_t index) __attribute__((always_inline))->const Four& {
@@ -418,7 +419,7 @@ bool Polyhedron::CutBeforePlace(VertexId u, const Point<3>& position) {
 
 void Polyhedron::Place() {
   if (!is_placed_) {
-    PlaceThose([](size_t) { return true; });
+    PlaceNodes([](size_t) { return true; });
     FindNeighbours();
     is_placed_ = true;
   }
@@ -428,7 +429,7 @@ bool Polyhedron::PlaceUnlessKeeps(double ratio) {
   if (KeepsRatio(ratio)) {
     return true;
   }
-  PlaceThose([this, ratio_sq = SurelyKeptRatioSq(ratio)](size_t i) {
+  PlaceNodes([this, ratio_sq = SurelyKeptRatioSq(ratio)](size_t i) {
     const Group& group = groups_[i / kTogether];
     const size_t lane = i % kTogether;
     const float x = group.x[0][lane];
@@ -442,59 +443,141 @@ bool Polyhedron::PlaceUnlessKeeps(double ratio) {
 // Fills nodes_, and places those that wants(node) asks for by their planes, bisectors by vertex, then walls by face: so they do not depend on
 // the order of the cuts.
 template <typename Wants>
-void Polyhedron::PlaceThose(Wants wants) {
+WELLSPACE_INLINE void Polyhedron::PlaceThose(Wants wants) {
   nodes_.resize(count_);
-  double reach = 0;
-  for (size_t i = 0; i < count_; ++i) {
-    CellNode<3>& node = nodes_[i];
-    std::array<uint64_t, 3> keys;
-    for (int k = 0; k < 3; ++k) {
-      const uint16_t index = triangles_[i].planes[k];
-      keys[k] = uint64_t{Index(planes_[index].vertex)} << 16 | index;
+  placed_reach_ = 0;
+  for (size_t first = 0; first < count_; first += kPlacedTogether) {
+    // The last node in the place of those that are none.
+    std::array<uint32_t, kPlacedTogether> nodes;
+    bool is_any_wanted = false;
+    for (size_t lane = 0; lane < kPlacedTogether; ++lane) {
+      nodes[lane] = static_cast<uint32_t>(std::min(first + lane, count_ - 1));
+      SortPlanes(nodes[lane]);
+      is_any_wanted |= wants(nodes[lane]);
     }
-    const uint64_t least = std::min(keys[0], std::min(keys[1], keys[2]));
-    const uint64_t most = std::max(keys[0], std::max(keys[1], keys[2]));
-    const uint64_t middle = keys[0] ^ keys[1] ^ keys[2] ^ least ^ most;
-    node.planes = {static_cast<uint16_t>(least), static_cast<uint16_t>(middle), static_cast<uint16_t>(most)};
-    const bool is_wanted = wants(i);
-    if (is_wanted) {
-      node.slack = PlaceByPlanes<3>(
-          site_, {&planes_[node.planes[0]], &planes_[node.planes[1]], &planes_[node.planes[2]]}, node.x);
-    } else {
-      node.x = PositionOf(i);
-      for (double& coordinate : node.x) {
-        coordinate *= unit_length_;
+    uint32_t good = 0;
+    if (is_any_wanted) {
+      good = PlaceTogether(nodes);
+    }
+    for (size_t lane = 0; lane < kPlacedTogether; ++lane) {
+      CellNode<3>& node = nodes_[nodes[lane]];
+      if (!wants(nodes[lane])) {
+        TakeWhereItIs(nodes[lane]);
+      } else if ((good >> lane & 1) == 0) [[unlikely]] {
+        PlaceAlone(node);
       }
+      placed_reach_ = std::max(placed_reach_, node.reach);
     }
-    node.radius_sq = NormSq<3>(node.x);
-    const double radius = std::sqrt(node.radius_sq);
-    if (!is_wanted) {
-      node.slack = kDistanceError<3> * radius;
-    }
-    node.reach = radius + node.slack;
-    reach = std::max(reach, node.reach);
   }
-  placed_reach_ = reach;
 }
 
-// Sets the neighbours of all nodes_.
+template <typename Wants>
+WELLSPACE_AVX2 void Polyhedron::PlaceThoseAvx2(Wants wants) {
+  PlaceThose(wants);
+}
+
+template <typename Wants>
+void Polyhedron::PlaceNodes(Wants wants) {
+  if (unit_ == VectorUnit::kAvx2) {
+    PlaceThoseAvx2(wants);
+  } else {
+    PlaceThose(wants);
+  }
+}
+
+// Names the planes of a node in their order.
+WELLSPACE_INLINE void Polyhedron::SortPlanes(size_t i) {
+  const std::array<uint16_t, 3>& planes = triangles_[i].planes;
+  std::array<uint64_t, 3> keys;
+  for (int k = 0; k < 3; ++k) {
+    keys[k] = uint64_t{Index(planes_[planes[k]].vertex)} << 16 | planes[k];
+  }
+  SortFew(keys);
+  nodes_[i].planes = {static_cast<uint16_t>(keys[0]), static_cast<uint16_t>(keys[1]), static_cast<uint16_t>(keys[2])};
+}
+
+// Places nodes as PlaceByPlanes does, but for those that are on walls alone or need exact arithmetic; a bit for each that is placed.
+WELLSPACE_INLINE uint32_t Polyhedron::PlaceTogether(const std::array<uint32_t, kPlacedTogether>& nodes) {
+  const auto planes = [&](size_t lane, int k) __attribute__((always_inline)) { return nodes_[nodes[lane]].planes[k]; };
+  SpacePlanes<kPlacedTogether> four{};
+  for (int k = 0; k < 3; ++k) {
+    const std::array<uint16_t, 4> at = {planes(0, k), planes(1, k), planes(2, k), planes(3, k)};
+    const auto row = [&](size_t lane) __attribute__((always_inline))->const Four& {
+      return *reinterpret_cast<const Four*>(&rows_[at[lane]]);
+    };
+    Four columns[4];  // normals, offset
+    Transpose(row(0), row(1), row(2), row(3), columns);
+    for (int axis = 0; axis < 3; ++axis) {
+      four.normal[k][axis] = columns[axis];
+    }
+    four.offset[k] = columns[3];
+    for (size_t lane = 0; lane < kPlacedTogether; ++lane) {
+      four.length[k][lane] = planes_[at[lane]].length;
+      four.distance[k][lane] = planes_[at[lane]].distance;
+    }
+  }
+  SpacePlacements<kPlacedTogether> placed;
+  MeetInSpace<kPlacedTogether>(four, placed);
+  const Four slack = placed.error + kProductError * placed.radius;
+  const Four reach = placed.radius + slack;
+  const Four most_error = kPlaced * placed.radius;
+  uint32_t good = 0;
+  for (size_t lane = 0; lane < kPlacedTogether; ++lane) {
+    CellNode<3>& node = nodes_[nodes[lane]];
+    node.x = {placed.x[0][lane], placed.x[1][lane], placed.x[2][lane]};
+    node.radius_sq = placed.radius_sq[lane];
+    node.slack = slack[lane];
+    node.reach = reach[lane];
+    const bool is_good = std::isfinite(placed.error[lane]) & (placed.error[lane] <= most_error[lane]);
+    good |= (is_good & (planes_[node.planes[0]].kind == PlaneKind::kBisector) ? 1u : 0u) << lane;
+  }
+  return good;
+}
+
+void Polyhedron::PlaceAlone(CellNode<3>& node) const {
+  node.slack =
+      PlaceByPlanes<3>(site_, {&planes_[node.planes[0]], &planes_[node.planes[1]], &planes_[node.planes[2]]}, node.x);
+  node.radius_sq = NormSq<3>(node.x);
+  node.reach = std::sqrt(node.radius_sq) + node.slack;
+}
+
+// Leaves a node where it is, in floats.
+WELLSPACE_INLINE void Polyhedron::TakeWhereItIs(size_t i) {
+  CellNode<3>& node = nodes_[i];
+  node.x = PositionOf(i);
+  for (double& coordinate : node.x) {
+    coordinate *= unit_length_;
+  }
+  node.radius_sq = NormSq<3>(node.x);
+  const double radius = std::sqrt(node.radius_sq);
+  node.slack = kDistanceError<3> * radius;
+  node.reach = radius + node.slack;
+}
+
+// Sets the neighbours of all nodes_: of two beside each other one has the edge between them the other way round.
 void Polyhedron::FindNeighbours() {
   if (plane_count_ > kWordBits) {
     FindNeighboursAmongMany();
     return;
   }
-  ends_.resize(kWordBits * kWordBits);
+  having_.resize(kWordBits * kWordBits);
+  const auto having = [this](uint32_t from, uint32_t to) __attribute__((always_inline))->uint16_t& {
+    return having_[from * kWordBits + to];
+  };
   for (uint32_t i = 0; i < count_; ++i) {
-    const std::array<uint16_t, 3>& planes = nodes_[i].planes;
-    for (uint32_t k = 0; k < 3; ++k) {
-      const auto [low, high] = PlanesBut(planes, k);
-      uint32_t& end = ends_[low * kWordBits + high];
-      if (end == 0) {
-        end = 1 + 3 * i + k;
-      } else {
-        JoinNodes(end - 1, 3 * i + k);
-        end = 0;
-      }
+    const std::array<uint16_t, 3>& planes = triangles_[i].planes;
+    for (int k = 0; k < 3; ++k) {
+      having(planes[k], planes[(k + 1) % 3]) = static_cast<uint16_t>(i);
+    }
+  }
+  for (uint32_t i = 0; i < count_; ++i) {
+    const std::array<uint16_t, 3>& planes = triangles_[i].planes;
+    CellNode<3>& node = nodes_[i];
+    for (int k = 0; k < 3; ++k) {
+      // Beyond the edge that leaves planes[k].
+      const uint16_t beyond = having(planes[(k + 2) % 3], planes[(k + 1) % 3]);
+      const int place = (node.planes[1] == planes[k] ? 1 : 0) + (node.planes[2] == planes[k] ? 2 : 0);
+      node.neighbours[place] = beyond;
     }
   }
 }
@@ -551,7 +634,7 @@ bool Polyhedron::KeepsRatio(double ratio) const {
 
 template <VectorUnit kUnit>
 WELLSPACE_INLINE bool Polyhedron::ReachesWith(const Box<3>& cube) const {
-  return AreReached<kUnit, 3>(groups(), ScaledTo(cube.low), ScaledTo(cube.high));
+  return AreReached<kUnit, 3>(groups(), most_radius_, ScaledTo(cube.low), ScaledTo(cube.high));
 }
 
 WELLSPACE_AVX2 bool Polyhedron::ReachesAvx2(const Box<3>& cube) const { return ReachesWith<VectorUnit::kAvx2>(cube); }
@@ -580,7 +663,8 @@ uint64_t Polyhedron::MemoryBytes() const {
   return groups_.capacity() * sizeof(Group) + triangles_.capacity() * sizeof(Triangle) +
          planes_.capacity() * (sizeof(Plane<3>) + sizeof(Row) + sizeof(float)) +
          nodes_.capacity() * sizeof(CellNode<3>) + rim_.capacity() * (sizeof(RimEdge) + 3 * sizeof(float)) +
-         (removed_.capacity() + ends_.capacity()) * sizeof(uint32_t) + edges_.capacity() * sizeof(edges_[0]);
+         removed_.capacity() * sizeof(uint32_t) + having_.capacity() * sizeof(uint16_t) +
+         edges_.capacity() * sizeof(edges_[0]);
 }
 
 }  // namespace wellspace::core

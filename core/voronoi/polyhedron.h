@@ -72,6 +72,8 @@ class Polyhedron : public FloatCell<3> {
     bool is_at_end = false;  // as of the new triangle
   };
   static constexpr size_t kWordBits = 64;
+  // So many nodes are placed together.
+  static constexpr size_t kPlacedTogether = 4;
 
   template <VectorUnit kUnit>
   size_t CutByEachWith(std::span<const Point<3>> positions, const VertexNames& names, VertexId site);
@@ -81,6 +83,7 @@ class Polyhedron : public FloatCell<3> {
   bool CutOffAvx2(const FloatBisector<3>& bisector, VertexId u, const Point<3>& position);
   template <VectorUnit kUnit>
   bool FindRemoved(const FloatBisector<3>& bisector, const Point<3>& position);
+  bool SetRemoved(size_t word, uint64_t maybe, uint64_t surely, const Point<3>& generator);
   uint64_t DecideDoubtful(size_t word, uint64_t doubtful, const Point<3>& generator);
   void FindRim();
   void FindRimAmongMany();
@@ -88,7 +91,15 @@ class Polyhedron : public FloatCell<3> {
   void PlaceOnShortEdge(size_t j, uint32_t plane);
   void Replace(uint32_t plane);
   template <typename Wants>
+  void PlaceNodes(Wants wants);
+  template <typename Wants>
   void PlaceThose(Wants wants);
+  template <typename Wants>
+  void PlaceThoseAvx2(Wants wants);
+  void SortPlanes(size_t i);
+  uint32_t PlaceTogether(const std::array<uint32_t, kPlacedTogether>& nodes);
+  void PlaceAlone(CellNode<3>& node) const;
+  void TakeWhereItIs(size_t i);
   void FindNeighbours();
   void FindNeighboursAmongMany();
   static std::array<uint32_t, 2> PlanesBut(const std::array<uint16_t, 3>& planes, uint32_t k);
@@ -104,8 +115,19 @@ class Polyhedron : public FloatCell<3> {
   bool IsRemoved(size_t node) const { return (removed_words_[node / kWordBits] >> node % kWordBits & 1) != 0; }
   Point<3> PositionOf(size_t node) const;  // in the units of the nodes
   std::span<const Group> groups() const { return {groups_.data(), GroupsFor(count_)}; }
+  // Calls f(group) for all groups, and for the first four even if they have no nodes: how many of those do cannot be foretold.
+  template <typename F>
+  WELLSPACE_INLINE void ForEachGroup(F f) const {
+    f(groups_[0]);
+    f(groups_[1]);
+    f(groups_[2]);
+    f(groups_[3]);
+    for (size_t i = 4; i < GroupsFor(count_); ++i) {
+      f(groups_[i]);
+    }
+  }
 
-  std::vector<Group> groups_;        // and more
+  std::vector<Group> groups_;        // and more, four at least
   std::vector<Triangle> triangles_;  // by node, and more
   std::vector<Row> rows_;            // by plane, and more
   std::vector<float> edge_sq_;       // by plane, and more: of a bisector the square of its vertex' distance, else 0
@@ -120,8 +142,8 @@ class Polyhedron : public FloatCell<3> {
   // By plane, one of the first kWordBits, a bit for each to which, and from which, an edge of a triangle that goes leads; all 0 between cuts.
   std::array<uint64_t, kWordBits> leads_to_{};
   std::array<uint64_t, kWordBits> leads_from_{};
-  // Of FindNeighbours, by two of the first kWordBits planes: an end of the edge along both; all 0 between calls.
-  std::vector<uint32_t> ends_;
+  // Of FindNeighbours, by two of the first kWordBits planes: the node whose triangle leads from the one to the other.
+  std::vector<uint16_t> having_;
   std::vector<std::array<uint32_t, 3>> edges_;  // where there are many
 };
 

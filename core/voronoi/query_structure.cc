@@ -352,7 +352,6 @@ WELLSPACE_INLINE void QueryStructure<D>::ScanOutwardWith(const Point<D>& site, N
     open(next.leaf);
     limit_sq = reach_sq();
     queue.Reserve(LeafTree<D>::kMostFaceNeighbours + 1);
-    const uint32_t old_end = queue.end();
     // Whoever is within reach is so by leaves that are, too: those on the straight line from the site.
     const uint32_t facets = Cube(from, tree_, next.leaf).FacetsWithin(limit_sq);
     tree_.ForEachBeyondFacets(
@@ -362,10 +361,8 @@ WELLSPACE_INLINE void QueryStructure<D>::ScanOutwardWith(const Point<D>& site, N
           seen[Index(beyond)] = query;
           const double distance_sq = Cube(from, tree_, beyond).DistanceSq();
           queue.PushIf(is_new & (distance_sq <= limit_sq), distance_sq, beyond);
+          core::Prefetch<D>(tree_, beyond);
         });
-    for (uint32_t i = old_end; i < queue.end(); ++i) {
-      core::Prefetch<D>(tree_, queue.leaf(i));
-    }
   }
   workspace.counters.leaves += leaves;
   workspace.counters.max_leaves = std::max(workspace.counters.max_leaves, leaves);

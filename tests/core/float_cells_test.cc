@@ -8,6 +8,7 @@
 #include <numbers>
 #include <vector>
 
+#include "core/voronoi/meeting_point.h"
 #include "core/voronoi/polytope.h"
 #include "tests/support/clouds.h"
 #include "tests/support/dimensions.h"
@@ -181,6 +182,52 @@ TYPED_TEST(FloatCellsTest, EveryUnitTellsTheSame) {
 }
 
 // More nodes and planes than one vector or word holds, and a cell that has them no more.
+// Nodes are placed side by side with as many as a vector holds; each is to be where it would be alone.
+TYPED_TEST(FloatCellsTest, NodesArePlacedAsOneByOneAndKnowWhoIsBesideThem) {
+  constexpr int D = TypeParam::kValue;
+  int nearly_dependent = 0;
+  for (int i = 0; i < 200; ++i) {
+    auto points = DrawPoints<D>(3 + this->random_.Below(60), 30, this->random_);
+    if (i % 2 == 0) {  // bisectors that are nearly the same, so that nodes are placed exactly
+      for (size_t u = 2; u < points.size(); u += 2) {
+        points[u] = points[u - 1];
+        points[u][u / 2 % D] += 0x1p-20;
+      }
+    }
+    for (const VectorUnit unit : Units()) {
+      Polytope<D> cell(unit);
+      BeginIn<D>(-1, 0x1p30, points[0], TieRule::kPerturb, cell);
+      CutByAll<D>(points, 48, cell);
+      cell.Place();
+      double reach = 0;
+      for (uint32_t n = 0; n < cell.nodes().size(); ++n) {
+        const CellNode<D>& node = cell.nodes()[n];
+        std::array<const Plane<D>*, D> planes;
+        for (int k = 0; k < D; ++k) {
+          planes[k] = &cell.plane(node.planes[k]);
+          const CellNode<D>& other = cell.nodes()[node.neighbours[k]];
+          EXPECT_NE(std::find(other.neighbours.begin(), other.neighbours.end(), n), other.neighbours.end());
+          for (int j = 0; j < D; ++j) {
+            const bool is_shared =
+                std::find(other.planes.begin(), other.planes.end(), node.planes[j]) != other.planes.end();
+            EXPECT_EQ(is_shared, j != k);
+          }
+        }
+        Point<D> x;
+        const double slack = PlaceByPlanes<D>(cell.site(), planes, x);
+        EXPECT_EQ(node.x, x);
+        EXPECT_EQ(node.slack, slack);
+        EXPECT_EQ(node.radius_sq, NormSq<D>(x));
+        EXPECT_EQ(node.reach, std::sqrt(NormSq<D>(x)) + slack);
+        reach = std::max(reach, node.reach);
+        nearly_dependent += Meet<D>(planes).error > kPlaced * std::sqrt(NormSq<D>(x)) ? 1 : 0;
+      }
+      EXPECT_LE(cell.reach_sq(), reach * reach);
+    }
+  }
+  EXPECT_GT(nearly_dependent, 50);
+}
+
 TYPED_TEST(FloatCellsTest, ManyNodesComeAndGo) {
   constexpr int D = TypeParam::kValue;
   for (const VectorUnit unit : Units()) {

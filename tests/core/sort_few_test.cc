@@ -30,6 +30,12 @@ TEST(SortFewTest, SortsEveryPermutationAndKnowsItsSign) {
   EXPECT_EQ(permutations, 120);
 }
 
+TEST(SortFewTest, TakesAllBitsOfLongItems) {
+  std::array<uint64_t, 3> items = {uint64_t{1} << 63, uint64_t{1} << 32, 5};
+  EXPECT_TRUE(SortFew(items));
+  EXPECT_EQ(items, (std::array<uint64_t, 3>{5, uint64_t{1} << 32, uint64_t{1} << 63}));
+}
+
 TEST(SortFewTest, DoesNotExchangeEqualItems) {
   std::array<uint32_t, 3> items = {4, 4, 2};
   EXPECT_FALSE(SortFew(items));
