@@ -76,6 +76,21 @@ WELLSPACE_INLINE const auto& LanesAt(const double* column, size_t from) {
   return *reinterpret_cast<const typename Wide<kWidth>::Lanes*>(column + from);
 }
 
+// Puts the columns of four rows into `out`.
+WELLSPACE_INLINE void Transpose(const Wide<4>::Lanes& a, const Wide<4>::Lanes& b, const Wide<4>::Lanes& c,
+                                const Wide<4>::Lanes& d, Wide<4>::Lanes* out) {
+  using Lanes = Wide<4>::Lanes;
+  using Order = Wide<4>::Mask;
+  const Lanes even_ab = __builtin_shuffle(a, b, Order{0, 4, 2, 6});
+  const Lanes odd_ab = __builtin_shuffle(a, b, Order{1, 5, 3, 7});
+  const Lanes even_cd = __builtin_shuffle(c, d, Order{0, 4, 2, 6});
+  const Lanes odd_cd = __builtin_shuffle(c, d, Order{1, 5, 3, 7});
+  out[0] = __builtin_shuffle(even_ab, even_cd, Order{0, 1, 4, 5});
+  out[1] = __builtin_shuffle(odd_ab, odd_cd, Order{0, 1, 4, 5});
+  out[2] = __builtin_shuffle(even_ab, even_cd, Order{2, 3, 6, 7});
+  out[3] = __builtin_shuffle(odd_ab, odd_cd, Order{2, 3, 6, 7});
+}
+
 }  // namespace wellspace::core
 
 #endif  // WELLSPACE_CORE_VORONOI_LANES_H_

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <span>
 #include <utility>
 
 #include "core/geometry/point.h"
@@ -234,6 +235,18 @@ double PlaceByPlanes(const Point<D>& site, const std::array<const Plane<D>*, D>&
   }
   x = placed.x;
   return placed.error + kProductError * placed.radius;
+}
+
+// Places `node`, of a cell with these planes, by its own.
+template <int D>
+void PlaceNode(const Point<D>& site, std::span<const Plane<D>> planes, CellNode<D>& node) {
+  std::array<const Plane<D>*, D> own;
+  for (int k = 0; k < D; ++k) {
+    own[k] = &planes[node.planes[k]];
+  }
+  node.slack = PlaceByPlanes<D>(site, own, node.x);
+  node.radius_sq = NormSq<D>(node.x);
+  node.reach = std::sqrt(node.radius_sq) + node.slack;
 }
 
 }  // namespace wellspace::core

@@ -1,4 +1,4 @@
-// Eight floats at a time: what cells in the plane and in space are cut by. For polygon.cc and polyhedron.cc alone, into which all is compiled.
+// Eight floats at a time: what cells in the plane and in space are cut by. For polygon.cc, polyhedron.cc and polyhedron_nodes.cc alone, into which all is compiled.
 #ifndef WELLSPACE_CORE_VORONOI_NEAR_VERTICES_H_
 #define WELLSPACE_CORE_VORONOI_NEAR_VERTICES_H_
 

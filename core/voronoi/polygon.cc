@@ -295,9 +295,7 @@ void Polygon::Place() {
     node.planes = {static_cast<uint16_t>(planes[swaps ? 1 : 0]), static_cast<uint16_t>(planes[swaps ? 0 : 1])};
     // The edge that leaves the plane of the edge before runs along the one after, and the other way round.
     node.neighbours = {static_cast<uint16_t>(swaps ? before : after), static_cast<uint16_t>(swaps ? after : before)};
-    node.slack = PlaceByPlanes<2>(site_, {&planes_[node.planes[0]], &planes_[node.planes[1]]}, node.x);
-    node.radius_sq = NormSq<2>(node.x);
-    node.reach = std::sqrt(node.radius_sq) + node.slack;
+    PlaceNode<2>(site_, planes_, node);
     reach = std::max(reach, node.reach);
   }
   placed_reach_ = reach;

@@ -7,8 +7,6 @@
 #include <cstring>
 #include <limits>
 
-#include "core/base/sort_few.h"
-#include "core/voronoi/meeting_point.h"
 #include "core/voronoi/near_vertices.h"
 
 namespace wellspace::core {
@@ -16,19 +14,6 @@ namespace {
 
 using Four = Wide<4>::Lanes;
 using FourFloats = float __attribute__((vector_size(16)));
-
-// Puts the columns of four rows into `out`.
-WELLSPACE_INLINE void Transpose(const Four& a, const Four& b, const Four& c, const Four& d, Four* out) {
-  using Order = Wide<4>::Mask;
-  const Four even_ab = __builtin_shuffle(a, b, Order{0, 4, 2, 6});
-  const Four odd_ab = __builtin_shuffle(a, b, Order{1, 5, 3, 7});
-  const Four even_cd = __builtin_shuffle(c, d, Order{0, 4, 2, 6});
-  const Four odd_cd = __builtin_shuffle(c, d, Order{1, 5, 3, 7});
-  out[0] = __builtin_shuffle(even_ab, even_cd, Order{0, 1, 4, 5});
-  out[1] = __builtin_shuffle(odd_ab, odd_cd, Order{0, 1, 4, 5});
-  out[2] = __builtin_shuffle(even_ab, even_cd, Order{2, 3, 6, 7});
-  out[3] = __builtin_shuffle(odd_ab, odd_cd, Order{2, 3, 6, 7});
-}
 
 }  // namespace
 
@@ -121,12 +106,6 @@ WELLSPACE_INLINE bool Polyhedron::SetRemoved(size_t word, uint64_t maybe, uint64
   }
   removed_words_[word] = surely;
   return surely != 0;
-}
-
-Point<3> Polyhedron::PositionOf(size_t node) const {
-  const Group& group = groups_[node / kTogether];
-  const size_t lane = node % kTogether;
-  return {group.x[0][lane], group.x[1][lane], group.x[2][lane]};
 }
 
 // Of the nodes that the bits of `doubtful`, of a word, stand for: those that are cut off, by their own errors if those tell, else exactly.
@@ -238,13 +217,10 @@ WELLSPACE_INLINE void Polyhedron::PlaceOnRim(uint32_t plane) {
   std::fill_n(&rim_[rim_count_], 3, rim_[0]);  // four are read at a time
   for (size_t first = 0; first < rim_count_; first += 4) {
     const RimEdge* const edges = &rim_[first];
-    const auto row = [&](uint32_t index) __attribute__((always_inline))->const Four& {
-      return *reinterpret_cast<const Four*>(&rows_[index]);
-    };
-    Four p[4];  // normals, offset
+    Four p[4];
     Four q[4];
-    Transpose(row(edges[0].from), row(edges[1].from), row(edges[2].from), row(edges[3].from), p);
-    Transpose(row(edges[0].to), row(edges[1].to), row(edges[2].to), row(edges[3].to), q);
+    TakeColumns<uint16_t>({edges[0].from, edges[1].from, edges[2].from, edges[3].from}, p);
+    TakeColumns<uint16_t>({edges[0].to, edges[1].to, edges[2].to, edges[3].to}, q);
     const Four q_n[3] = {q[1] * n[2] - q[2] * n[1], q[2] * n[0] - q[0] * n[2], q[0] * n[1] - q[1] * n[0]};
     const Four n_p[3] = {n[1] * p[2] - n[2] * p[1], n[2] * p[0] - n[0] * p[2], n[0] * p[1] - n[1] * p[0]};
     const Four p_q[3] = {p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]};
@@ -415,198 +391,6 @@ bool Polyhedron::CutBeforePlace(VertexId u, const Point<3>& position) {
   const auto bisector = FloatBisector<3>::Of(normal, scale_, most_radius_);
   return unit_ == VectorUnit::kAvx2 ? CutOffAvx2(bisector, u, position)
                                     : CutOff<VectorUnit::kBaseline>(bisector, u, position);
-}
-
-void Polyhedron::Place() {
-  if (!is_placed_) {
-    PlaceNodes([](size_t) { return true; });
-    FindNeighbours();
-    is_placed_ = true;
-  }
-}
-
-bool Polyhedron::PlaceUnlessKeeps(double ratio) {
-  if (KeepsRatio(ratio)) {
-    return true;
-  }
-  PlaceNodes([this, ratio_sq = SurelyKeptRatioSq(ratio)](size_t i) {
-    const Group& group = groups_[i / kTogether];
-    const size_t lane = i % kTogether;
-    const float x = group.x[0][lane];
-    const float y = group.x[1][lane];
-    const float z = group.x[2][lane];
-    return !(x * x + (y * y + z * z) + kUnderflow <= ratio_sq * group.edge_sq[lane]);
-  });
-  return false;
-}
-
-// Fills nodes_, and places those that wants(node) asks for by their planes, bisectors by vertex, then walls by face: so they do not depend on
-// the order of the cuts.
-template <typename Wants>
-WELLSPACE_INLINE void Polyhedron::PlaceThose(Wants wants) {
-  nodes_.resize(count_);
-  placed_reach_ = 0;
-  for (size_t first = 0; first < count_; first += kPlacedTogether) {
-    // The last node in the place of those that are none.
-    std::array<uint32_t, kPlacedTogether> nodes;
-    bool is_any_wanted = false;
-    for (size_t lane = 0; lane < kPlacedTogether; ++lane) {
-      nodes[lane] = static_cast<uint32_t>(std::min(first + lane, count_ - 1));
-      SortPlanes(nodes[lane]);
-      is_any_wanted |= wants(nodes[lane]);
-    }
-    uint32_t good = 0;
-    if (is_any_wanted) {
-      good = PlaceTogether(nodes);
-    }
-    for (size_t lane = 0; lane < kPlacedTogether; ++lane) {
-      CellNode<3>& node = nodes_[nodes[lane]];
-      if (!wants(nodes[lane])) {
-        TakeWhereItIs(nodes[lane]);
-      } else if ((good >> lane & 1) == 0) [[unlikely]] {
-        PlaceAlone(node);
-      }
-      placed_reach_ = std::max(placed_reach_, node.reach);
-    }
-  }
-}
-
-template <typename Wants>
-WELLSPACE_AVX2 void Polyhedron::PlaceThoseAvx2(Wants wants) {
-  PlaceThose(wants);
-}
-
-template <typename Wants>
-void Polyhedron::PlaceNodes(Wants wants) {
-  if (unit_ == VectorUnit::kAvx2) {
-    PlaceThoseAvx2(wants);
-  } else {
-    PlaceThose(wants);
-  }
-}
-
-// Names the planes of a node in their order.
-WELLSPACE_INLINE void Polyhedron::SortPlanes(size_t i) {
-  const std::array<uint16_t, 3>& planes = triangles_[i].planes;
-  std::array<uint64_t, 3> keys;
-  for (int k = 0; k < 3; ++k) {
-    keys[k] = uint64_t{Index(planes_[planes[k]].vertex)} << 16 | planes[k];
-  }
-  SortFew(keys);
-  nodes_[i].planes = {static_cast<uint16_t>(keys[0]), static_cast<uint16_t>(keys[1]), static_cast<uint16_t>(keys[2])};
-}
-
-// Places nodes as PlaceByPlanes does, but for those that are on walls alone or need exact arithmetic; a bit for each that is placed.
-WELLSPACE_INLINE uint32_t Polyhedron::PlaceTogether(const std::array<uint32_t, kPlacedTogether>& nodes) {
-  const auto planes = [&](size_t lane, int k) __attribute__((always_inline)) { return nodes_[nodes[lane]].planes[k]; };
-  SpacePlanes<kPlacedTogether> four{};
-  for (int k = 0; k < 3; ++k) {
-    const std::array<uint16_t, 4> at = {planes(0, k), planes(1, k), planes(2, k), planes(3, k)};
-    const auto row = [&](size_t lane) __attribute__((always_inline))->const Four& {
-      return *reinterpret_cast<const Four*>(&rows_[at[lane]]);
-    };
-    Four columns[4];  // normals, offset
-    Transpose(row(0), row(1), row(2), row(3), columns);
-    for (int axis = 0; axis < 3; ++axis) {
-      four.normal[k][axis] = columns[axis];
-    }
-    four.offset[k] = columns[3];
-    for (size_t lane = 0; lane < kPlacedTogether; ++lane) {
-      four.length[k][lane] = planes_[at[lane]].length;
-      four.distance[k][lane] = planes_[at[lane]].distance;
-    }
-  }
-  SpacePlacements<kPlacedTogether> placed;
-  MeetInSpace<kPlacedTogether>(four, placed);
-  const Four slack = placed.error + kProductError * placed.radius;
-  const Four reach = placed.radius + slack;
-  const Four most_error = kPlaced * placed.radius;
-  uint32_t good = 0;
-  for (size_t lane = 0; lane < kPlacedTogether; ++lane) {
-    CellNode<3>& node = nodes_[nodes[lane]];
-    node.x = {placed.x[0][lane], placed.x[1][lane], placed.x[2][lane]};
-    node.radius_sq = placed.radius_sq[lane];
-    node.slack = slack[lane];
-    node.reach = reach[lane];
-    const bool is_good = std::isfinite(placed.error[lane]) & (placed.error[lane] <= most_error[lane]);
-    good |= (is_good & (planes_[node.planes[0]].kind == PlaneKind::kBisector) ? 1u : 0u) << lane;
-  }
-  return good;
-}
-
-void Polyhedron::PlaceAlone(CellNode<3>& node) const {
-  node.slack =
-      PlaceByPlanes<3>(site_, {&planes_[node.planes[0]], &planes_[node.planes[1]], &planes_[node.planes[2]]}, node.x);
-  node.radius_sq = NormSq<3>(node.x);
-  node.reach = std::sqrt(node.radius_sq) + node.slack;
-}
-
-// Leaves a node where it is, in floats.
-WELLSPACE_INLINE void Polyhedron::TakeWhereItIs(size_t i) {
-  CellNode<3>& node = nodes_[i];
-  node.x = PositionOf(i);
-  for (double& coordinate : node.x) {
-    coordinate *= unit_length_;
-  }
-  node.radius_sq = NormSq<3>(node.x);
-  const double radius = std::sqrt(node.radius_sq);
-  node.slack = kDistanceError<3> * radius;
-  node.reach = radius + node.slack;
-}
-
-// Sets the neighbours of all nodes_: of two beside each other one has the edge between them the other way round.
-void Polyhedron::FindNeighbours() {
-  if (plane_count_ > kWordBits) {
-    FindNeighboursAmongMany();
-    return;
-  }
-  having_.resize(kWordBits * kWordBits);
-  const auto having = [this](uint32_t from, uint32_t to) __attribute__((always_inline))->uint16_t& {
-    return having_[from * kWordBits + to];
-  };
-  for (uint32_t i = 0; i < count_; ++i) {
-    const std::array<uint16_t, 3>& planes = triangles_[i].planes;
-    for (int k = 0; k < 3; ++k) {
-      having(planes[k], planes[(k + 1) % 3]) = static_cast<uint16_t>(i);
-    }
-  }
-  for (uint32_t i = 0; i < count_; ++i) {
-    const std::array<uint16_t, 3>& planes = triangles_[i].planes;
-    CellNode<3>& node = nodes_[i];
-    for (int k = 0; k < 3; ++k) {
-      // Beyond the edge that leaves planes[k].
-      const uint16_t beyond = having(planes[(k + 2) % 3], planes[(k + 1) % 3]);
-      const int place = (node.planes[1] == planes[k] ? 1 : 0) + (node.planes[2] == planes[k] ? 2 : 0);
-      node.neighbours[place] = beyond;
-    }
-  }
-}
-
-[[gnu::noinline]] void Polyhedron::FindNeighboursAmongMany() {
-  edges_.clear();
-  for (uint32_t i = 0; i < count_; ++i) {
-    for (uint32_t k = 0; k < 3; ++k) {
-      const auto [low, high] = PlanesBut(nodes_[i].planes, k);
-      edges_.push_back({low, high, 3 * i + k});
-    }
-  }
-  std::sort(edges_.begin(), edges_.end());
-  for (size_t e = 0; e + 1 < edges_.size(); e += 2) {
-    JoinNodes(edges_[e][2], edges_[e + 1][2]);
-  }
-}
-
-// The edge that leaves plane k runs along the other two.
-std::array<uint32_t, 2> Polyhedron::PlanesBut(const std::array<uint16_t, 3>& planes, uint32_t k) {
-  const uint32_t a = planes[k == 0 ? 1 : 0];
-  const uint32_t b = planes[k == 2 ? 1 : 2];
-  return {std::min(a, b), std::max(a, b)};
-}
-
-// Each is three times a node and the place of the plane that an edge leaves there.
-void Polyhedron::JoinNodes(uint32_t a, uint32_t b) {
-  nodes_[a / 3].neighbours[a % 3] = static_cast<uint16_t>(b / 3);
-  nodes_[b / 3].neighbours[b % 3] = static_cast<uint16_t>(a / 3);
 }
 
 template <VectorUnit kUnit>

@@ -98,7 +98,6 @@ class Polyhedron : public FloatCell<3> {
   void PlaceThoseAvx2(Wants wants);
   void SortPlanes(size_t i);
   uint32_t PlaceTogether(const std::array<uint32_t, kPlacedTogether>& nodes);
-  void PlaceAlone(CellNode<3>& node) const;
   void TakeWhereItIs(size_t i);
   void FindNeighbours();
   void FindNeighboursAmongMany();
@@ -113,7 +112,20 @@ class Polyhedron : public FloatCell<3> {
   template <VectorUnit kUnit>
   void SetReach();
   bool IsRemoved(size_t node) const { return (removed_words_[node / kWordBits] >> node % kWordBits & 1) != 0; }
-  Point<3> PositionOf(size_t node) const;  // in the units of the nodes
+  // In the units of the nodes.
+  Point<3> PositionOf(size_t node) const {
+    const Group& group = groups_[node / kTogether];
+    const size_t lane = node % kTogether;
+    return {group.x[0][lane], group.x[1][lane], group.x[2][lane]};
+  }
+  // The normals of four planes and their offsets, in columns.
+  template <typename PlaneIndex>
+  WELLSPACE_INLINE void TakeColumns(const std::array<PlaneIndex, 4>& planes, Wide<4>::Lanes* columns) const {
+    const auto row = [&](size_t k) __attribute__((always_inline))->const Wide<4>::Lanes& {
+      return *reinterpret_cast<const Wide<4>::Lanes*>(&rows_[planes[k]]);
+    };
+    Transpose(row(0), row(1), row(2), row(3), columns);
+  }
   std::span<const Group> groups() const { return {groups_.data(), GroupsFor(count_)}; }
   // Calls f(group) for all groups, and for the first four even if they have no nodes: how many of those do cannot be foretold.
   template <typename F>
