@@ -118,6 +118,12 @@ def cells(cloud, targets=(), quick=False):
                {1: Run("wellspace_cells", cloud, ("--beta", BETA))}, [Run("voro_cells", cloud, ())], quick)
 
 
+# The same, but each cell is asked for on its own.
+def cells_alone(cloud, quick=False):
+    return Row(f"cell-alone/{cloud}", f"x faster than voro++ a cell; clipped, beta = {BETA}, each on its own", cell_times_faster,
+               ">=", (), {1: Run("wellspace_cells", cloud, ("--beta", BETA, "--alone"))}, [Run("voro_cells", cloud, ())], quick)
+
+
 def whole_cells(cloud, quick=False):
     return Row(f"whole-cell/{cloud}", "x faster than voro++ a cell; whole", cell_times_faster, ">=", (),
                {1: Run("wellspace_cells", cloud, ())}, [Run("voro_cells", cloud, ())], quick)
@@ -170,6 +176,7 @@ ROWS = [
     cells("uniform-3-100000", quick=True),
     whole_cells("uniform-3-100000", quick=True),
     whole_cells("uniform-3-1000000"),
+    cells_alone("uniform-3-1000000"),
 ]
 
 

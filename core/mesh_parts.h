@@ -56,13 +56,14 @@ Cell DescribeCell(uint32_t vertex, double clip_radius, const Polytope<D>& polyto
   Cell cell;
   cell.vertex = vertex;
   cell.clip_radius = clip_radius / domain.scale;
+  std::vector<Point<D>> nodes;
+  nodes.reserve(polytope.nodes().size());
   for (const CellNode<D>& node : polytope.nodes()) {
     Point<D> x = polytope.site();
     for (int k = 0; k < D; ++k) {
       x[k] += node.x[k];
     }
-    x = domain.Unscaled(x);
-    cell.nodes.insert(cell.nodes.end(), x.begin(), x.end());
+    nodes.push_back(domain.Unscaled(x));
     for (const uint16_t index : node.planes) {
       const Plane<D>& plane = polytope.plane(index);
       cell.is_clipped = cell.is_clipped || plane.kind == PlaneKind::kClip;
@@ -70,6 +71,15 @@ Cell DescribeCell(uint32_t vertex, double clip_radius, const Polytope<D>& polyto
         cell.neighbours.push_back(index_of(plane.vertex));
       }
     }
+  }
+  if constexpr (D == 2) {
+    std::rotate(nodes.begin(), std::min_element(nodes.begin(), nodes.end()), nodes.end());
+  } else {
+    std::sort(nodes.begin(), nodes.end());
+  }
+  cell.nodes.reserve(D * nodes.size());
+  for (const Point<D>& x : nodes) {
+    cell.nodes.insert(cell.nodes.end(), x.begin(), x.end());
   }
   std::sort(cell.neighbours.begin(), cell.neighbours.end());
   cell.neighbours.erase(std::unique(cell.neighbours.begin(), cell.neighbours.end()), cell.neighbours.end());

@@ -212,24 +212,35 @@ class MesherIn final : public Mesher {
     if (!(beta >= 1)) {
       return absl::InvalidArgumentError(absl::StrCat("beta: ", beta, " is not allowed; a number of at least 1 is"));
     }
-    // A cube of this half side about any point of the box holds the box.
-    const double whole = 2 * structure_.box().LongestSide();
-    std::vector<Cell> cells;
-    cells.reserve(vertices.size());
-    Workspace<D> workspace;
-    for (const uint32_t vertex : vertices) {
-      const VertexId v = VertexOf(vertex);
-      const double nearest = std::sqrt(structure_.ApproximateNearestNeighbor(v, workspace).distance_sq);
-      const double radius = beta * nearest;
-      structure_.ClippedVoronoi(v, std::isinf(radius) ? whole : radius, workspace);
-      if (workspace.cell.IsTooLarge()) {
-        return absl::FailedPreconditionError(absl::StrCat("the cell of vertex ", vertex, " has more than ",
-                                                          Polytope<D>::kMostNodes,
-                                                          " nodes; refine first, or ask with a smaller beta"));
-      }
-      cells.push_back(
-          DescribeCell<D>(vertex, radius, workspace.cell, domain_, [this](VertexId u) { return OutputIndex(u); }));
+    // Those of one leaf one after the other, since cells of vertices that are near each other take less time.
+    std::vector<std::pair<NodeId, size_t>> order;
+    order.reserve(vertices.size());
+    for (size_t i = 0; i < vertices.size(); ++i) {
+      order.emplace_back(structure_.tree().leaf_of(VertexOf(vertices[i])), i);
     }
+    std::sort(order.begin(), order.end());
+    std::vector<VertexId> sites;
+    sites.reserve(vertices.size());
+    for (const auto& [leaf, i] : order) {
+      sites.push_back(VertexOf(vertices[i]));
+    }
+    std::vector<Cell> cells(vertices.size());
+    auto next = order.begin();
+    absl::Status status;
+    Workspace<D> workspace;
+    structure_.ClippedVoronoiOfEach(sites, beta, workspace, [&](VertexId, double radius) {
+      const size_t i = (next++)->second;
+      if (workspace.cell.IsTooLarge()) {
+        status = absl::FailedPreconditionError(absl::StrCat("the cell of vertex ", vertices[i], " has more than ",
+                                                            Polytope<D>::kMostNodes,
+                                                            " nodes; refine first, or ask with a smaller beta"));
+        return false;
+      }
+      cells[i] =
+          DescribeCell<D>(vertices[i], radius, workspace.cell, domain_, [this](VertexId u) { return OutputIndex(u); });
+      return true;
+    });
+    WELLSPACE_RETURN_IF_ERROR(status);
     return cells;
   }
 

@@ -48,8 +48,9 @@ struct MeshEstimate {
 // A clipped Voronoi cell, as [HT08] Definition 2 has it but with a cube in the place of the ball.
 struct Cell {
   uint32_t vertex = 0;
-  double clip_radius = 0;            // half the side of the cube about the vertex; the cell is also clipped by the box
-  std::vector<double> nodes;         // node_count x dimension, row-major
+  double clip_radius = 0;  // half the side of the cube about the vertex; the cell is also clipped by the box
+  std::vector<double>
+      nodes;  // node_count x dimension, row-major; in 2-D around the cell counterclockwise, above ascending
   std::vector<uint32_t> neighbours;  // the vertices whose bisectors with `vertex` bound the cell, ascending
   bool is_clipped = false;           // it reaches the cube; if not, it is the whole Voronoi cell in the box
 };
@@ -133,8 +134,8 @@ class Mesher {
   // whole ones when beta is infinite.
   //
   // Complexity: O(1) each in a refined mesh or bottom-up.
-  // Errors:     OUT_OF_RANGE as above; INVALID_ARGUMENT unless beta is a number of at least 1; FAILED_PRECONDITION, naming the
-  //             first vertex whose cell has more nodes than 2^14, in 5-D and 6-D 2^18, as only an unrefined mesh's can.
+  // Errors:     OUT_OF_RANGE as above; INVALID_ARGUMENT unless beta is a number of at least 1; FAILED_PRECONDITION, naming a
+  //             vertex whose cell has more nodes than 2^14, in 5-D and 6-D 2^18, as only an unrefined mesh's can.
   // Source:     [HT08] Figure 3, CLIPPEDVORONOI.
   virtual absl::StatusOr<std::vector<Cell>> ClippedCells(std::span<const uint32_t> vertices, double beta) const = 0;
 

@@ -187,6 +187,24 @@ void BM_ClippedCellOfInput(benchmark::State& state) {
   ComputeClippedCells<D>(state, false);
 }
 
+// Those of all random points along the Z curve, by one call. Items are vertices.
+template <int D>
+void BM_ClippedCellsOfInput(benchmark::State& state) {
+  const core::QueryStructure<D> structure = Structure<D>(state.range(0), false);
+  std::vector<VertexId> sites(static_cast<size_t>(state.range(0)));
+  for (uint32_t v = 0; v < sites.size(); ++v) {
+    sites[v] = VertexId{v};
+  }
+  core::Workspace<D> workspace;
+  for (auto _ : state) {
+    structure.ClippedVoronoiOfEach(sites, kBeta, workspace, [&](VertexId, double) {
+      benchmark::DoNotOptimize(workspace.cell.nodes().data());
+      return true;
+    });
+  }
+  SetItems(state, state.range(0));
+}
+
 // The whole cell, ties perturbed: the simplices at a vertex, in a refined mesh.
 template <int D>
 void BM_Star(benchmark::State& state) {
@@ -293,6 +311,7 @@ void RegisterAll() {
   add_queries("NearestNeighbor", BM_NearestNeighbor<D>);
   add_queries("ClippedCell", BM_ClippedCell<D>);
   add_queries("ClippedCellOfInput", BM_ClippedCellOfInput<D>);
+  add("ClippedCellsOfInput", BM_ClippedCellsOfInput<D>)->Arg(100'000)->Unit(benchmark::kMillisecond);
   add_queries("Star", BM_Star<D>);
   add("Cut", BM_Cut<D>)->Arg(10'000)->Unit(benchmark::kMicrosecond);
   for (const auto& [name, stage] :

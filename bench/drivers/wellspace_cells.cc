@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <iostream>
 #include <limits>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -17,9 +18,6 @@
 
 namespace wellspace::bench {
 namespace {
-
-// Half the side of a cube about any point of the unit box that holds the box.
-constexpr double kWhole = 2;
 
 void ExitUnless(const absl::Status& status) {
   if (!status.ok()) {
@@ -46,7 +44,9 @@ int Main(int argc, char** argv) {
   std::string path;
   double beta = std::numeric_limits<double>::infinity();
   app.add_option("points", path, "file of doubles")->required();
+  bool is_alone = false;
   app.add_option("--beta", beta, "clip at this times the distance to the nearest neighbour; default: whole cells");
+  app.add_flag("--alone", is_alone, "ask for each cell on its own, not for all together");
   CLI11_PARSE(app, argc, argv);
   const std::vector<double> points = ReadPoints(path);
 
@@ -62,31 +62,34 @@ int Main(int argc, char** argv) {
   const double loaded = all.Seconds();
 
   core::Workspace<3> workspace;
-  const bool is_whole = std::isinf(beta);
-  const auto compute = [&](core::VertexId v) {
-    const double radius = is_whole ? kWhole * domain->scale
-                                   : beta * std::sqrt(structure.ApproximateNearestNeighbor(v, workspace).distance_sq);
-    structure.ClippedVoronoi(v, radius, workspace);
+  std::vector<core::VertexId> sites(count);  // as they are along the Z curve
+  for (uint32_t v = 0; v < count; ++v) {
+    sites[v] = core::VertexId{v};
+  }
+  // Calls f() with each cell in the workspace.
+  const auto for_each_cell = [&](auto f) {
+    const size_t together = is_alone ? 1 : count;
+    for (size_t at = 0; at < count; at += together) {
+      structure.ClippedVoronoiOfEach(std::span(sites).subspan(at, together), beta, workspace,
+                                     [&](core::VertexId, double) {
+                                       f();
+                                       return true;
+                                     });
+    }
   };
   uint64_t nodes = 0;
   const Meter meter;
-  for (uint32_t v = 0; v < count; ++v) {
-    compute(core::VertexId{v});
-    nodes += workspace.cell.nodes().size();
-  }
+  for_each_cell([&] { nodes += workspace.cell.nodes().size(); });
   const double seconds = meter.Seconds();
   const double wall_seconds = meter.WallSeconds();
   nlohmann::json report = {{"seconds", seconds},     {"wall_seconds", wall_seconds},
                            {"load_seconds", loaded}, {"memory_bytes", all.PeakBytes()},
                            {"cells", count},         {"nodes", nodes}};
-  if (is_whole) {
+  if (std::isinf(beta)) {
     // Not of the measurement: to compare with those of a peer.
     uint64_t facets = 0;
     std::vector<bool> is_facet;
-    for (uint32_t v = 0; v < count; ++v) {
-      compute(core::VertexId{v});
-      facets += FacetCount(workspace.cell, is_facet);
-    }
+    for_each_cell([&] { facets += FacetCount(workspace.cell, is_facet); });
     report["facets"] = facets;
   }
   std::cout << report << '\n';

@@ -119,7 +119,7 @@ class FloatCell {
   }
 
   VectorUnit unit_;
-  Point<D> site_;
+  Point<D> site_{};
   TieRule rule_ = TieRule::kKeep;
   double scale_ = 1;              // the units of the nodes, so many to one of the coordinates, a power of two
   double unit_length_ = 1;        // 1 / scale_

@@ -1,4 +1,4 @@
-// Eight floats at a time: what cells in the plane and in space are cut by. For polygon.cc, polyhedron.cc and polyhedron_nodes.cc alone, into which all is compiled.
+// Eight floats at a time: what cells in the plane and in space are cut by. For gathered_vertices.cc, polygon.cc, polyhedron.cc and polyhedron_nodes.cc alone, into which all is compiled.
 #ifndef WELLSPACE_CORE_VORONOI_NEAR_VERTICES_H_
 #define WELLSPACE_CORE_VORONOI_NEAR_VERTICES_H_
 
@@ -15,6 +15,7 @@
 #include "core/geometry/point.h"
 #include "core/voronoi/cell_parts.h"
 #include "core/voronoi/float_cell.h"
+#include "core/voronoi/gathered_vertices.h"
 #include "core/voronoi/lane_bits.h"
 #include "core/voronoi/lanes.h"
 
@@ -232,14 +233,128 @@ WELLSPACE_INLINE void VectorsTo(const Point<2>* positions, const Point<2>& site,
   w[0] = __builtin_shuffle(even, odd, FloatMask{0, 2, 8, 10, 4, 6, 12, 14});
   w[1] = __builtin_shuffle(even, odd, FloatMask{1, 3, 9, 11, 5, 7, 13, 15});
 }
-WELLSPACE_INLINE void VectorsTo(const Point<3>* p, const Point<3>& site, double scale, Floats* w) {
+// The same to the positions that at(0) to at(7) give.
+template <int D, typename At>
+WELLSPACE_INLINE void VectorsToEach(At at, const Point<D>& site, double scale, Floats* w) {
   using Four = Wide<4>::Lanes;
   using FourFloats = float __attribute__((vector_size(16)));
-  for (int axis = 0; axis < 3; ++axis) {
-    const Four low = Four{p[0][axis], p[1][axis], p[2][axis], p[3][axis]} - site[axis];
-    const Four high = Four{p[4][axis], p[5][axis], p[6][axis], p[7][axis]} - site[axis];
+  const Point<D>* const p[kFloatLanes] = {&at(0), &at(1), &at(2), &at(3), &at(4), &at(5), &at(6), &at(7)};
+  for (int axis = 0; axis < D; ++axis) {
+    const Four low = Four{(*p[0])[axis], (*p[1])[axis], (*p[2])[axis], (*p[3])[axis]} - site[axis];
+    const Four high = Four{(*p[4])[axis], (*p[5])[axis], (*p[6])[axis], (*p[7])[axis]} - site[axis];
     w[axis] = __builtin_shufflevector(__builtin_convertvector(low * scale, FourFloats),
                                       __builtin_convertvector(high * scale, FourFloats), 0, 1, 2, 3, 4, 5, 6, 7);
+  }
+}
+WELLSPACE_INLINE void VectorsTo(const Point<3>* positions, const Point<3>& site, double scale, Floats* w) {
+  VectorsToEach<3>(
+      [positions](size_t i) __attribute__((always_inline))->const Point<3>& { return positions[i]; }, site, scale, w);
+}
+
+// Vertices that lie side by side. May be read as those of a leaf may (Buckets::kReadTogether).
+template <int D>
+struct VerticesTogether {
+  std::span<const Point<D>> positions;
+  const VertexNames& names;
+
+  size_t size() const { return positions.size(); }
+  const Point<D>& position(size_t i) const { return positions[i]; }
+  VertexId name(size_t i) const { return names[i]; }
+  // To eight from the i-th on.
+  WELLSPACE_INLINE void FindVectors(size_t i, const Point<D>& site, double scale, Floats* w) const {
+    VectorsTo(&positions[i], site, scale, w);
+  }
+  // Which of them are called that.
+  template <VectorUnit kUnit>
+  WELLSPACE_INLINE FloatMask AreCalled(VertexId name, size_t i) const {
+    FloatMask listed{};
+    if (names.listed != nullptr) {
+      std::memcpy(&listed, names.listed + i, sizeof(listed));
+      listed = IsEqual<kUnit>(listed, Splat(static_cast<int32_t>(Index(name))));
+    }
+    return listed;
+  }
+};
+
+// Some of those that have been gathered, by number; beyond the last there are seven more numbers of any.
+template <int D>
+struct VerticesChosen {
+  const GatheredVertices<D>& gathered;
+  std::span<const int32_t> numbers;
+
+  size_t size() const { return numbers.size(); }
+  const Point<D>& position(size_t i) const { return gathered.position(static_cast<size_t>(numbers.data()[i])); }
+  VertexId name(size_t i) const { return gathered.name(static_cast<size_t>(numbers.data()[i])); }
+  WELLSPACE_INLINE void FindVectors(size_t i, const Point<D>& site, double scale, Floats* w) const {
+    VectorsToEach<D>(
+        [&](size_t k) __attribute__((always_inline))->const Point<D>& { return position(i + k); }, site, scale, w);
+  }
+  template <VectorUnit kUnit>
+  WELLSPACE_INLINE FloatMask AreCalled(VertexId called, size_t i) const {
+    const auto at = [&](size_t k) __attribute__((always_inline)) { return static_cast<int32_t>(Index(name(i + k))); };
+    const FloatMask names = {at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7)};
+    return IsEqual<kUnit>(names, Splat(static_cast<int32_t>(Index(called))));
+  }
+};
+
+// Calls f(i, distances) for eight gathered vertices at a time, from the i-th on, with their squared distances from `site`, by their columns.
+template <int D, typename F>
+WELLSPACE_INLINE void ForEachDistanceSq(const GatheredVertices<D>& gathered, const Point<D>& site, F f) {
+  Floats from[D];
+  for (int axis = 0; axis < D; ++axis) {
+    from[axis] = Splat(gathered.InColumn(site, axis));
+  }
+  for (size_t i = 0; i < gathered.count(); i += kFloatLanes) {
+    Floats distance_sq{};
+    for (int axis = 0; axis < D; ++axis) {
+      Floats x;
+      std::memcpy(&x, gathered.column(axis) + i, sizeof(x));
+      x -= from[axis];
+      distance_sq += x * x;
+    }
+    f(i, distance_sq);
+  }
+}
+
+// Lists the numbers of the gathered vertices whose squared distance from `site`, by their columns, is more than `more_than_sq` and at most
+// `most_sq`, and returns how many there are. Seven more are written.
+template <VectorUnit kUnit, int D>
+WELLSPACE_INLINE size_t ChooseBetween(const GatheredVertices<D>& gathered, const Point<D>& site, float more_than_sq,
+                                      float most_sq, int32_t* numbers) {
+  const Floats least = Splat(more_than_sq);
+  const Floats most = Splat(most_sq);
+  FloatMask eight = kEachLane;
+  size_t count = 0;
+  ForEachDistanceSq<D>(
+      gathered, site, [&](size_t /*i*/, const Floats& distance_sq) __attribute__((always_inline)) {
+        const uint32_t chosen = Bits<kUnit>(IsLess<kUnit>(least, distance_sq) & IsAtMost<kUnit>(distance_sq, most));
+        const FloatMask in_order = __builtin_shuffle(eight, OrderOf<kUnit>(chosen));
+        std::memcpy(numbers + count, &in_order, sizeof(in_order));
+        count += static_cast<size_t>(std::popcount(chosen));
+        eight += static_cast<int32_t>(kFloatLanes);
+      });
+  return count;
+}
+
+// Cuts a cell by those of the gathered vertices that are within its reach, the near ones first: by cut_by(vertices), which returns how many are,
+// for up to kMostCutTogether at a time. Returns how many are.
+template <VectorUnit kUnit, int D, typename Cell, typename CutBy>
+WELLSPACE_INLINE size_t CutByThoseGathered(const Cell& cell, const GatheredVertices<D>& gathered, CutBy cut_by) {
+  alignas(sizeof(FloatMask)) int32_t numbers[GatheredVertices<D>::kMost + kFloatLanes];
+  size_t within_reach = 0;
+  double limit_sq = std::min(gathered.near_sq(), cell.CutLimitSq());
+  for (float more_than_sq = -1;;) {
+    const float most_sq = gathered.MostSq(limit_sq);
+    const size_t count = ChooseBetween<kUnit, D>(gathered, cell.site(), more_than_sq, most_sq, numbers);
+    std::fill_n(numbers + count, kFloatLanes, 0);
+    for (size_t i = 0; i < count && !cell.IsTooLarge(); i += kMostCutTogether) {
+      within_reach += cut_by(VerticesChosen<D>{gathered, {numbers + i, std::min(count - i, kMostCutTogether)}});
+    }
+    if (cell.IsTooLarge() || cell.CutLimitSq() <= limit_sq) {
+      return within_reach;
+    }
+    limit_sq = cell.CutLimitSq();
+    more_than_sq = most_sq;
   }
 }
 
@@ -304,19 +419,18 @@ struct alignas(sizeof(Floats)) NearVertices {
   uint32_t order[kCapacity];  // from the nearest on, but for distances that agree to one part in 2^17
   size_t within_reach = 0;    // but for the site
 
-  // Picks those of `positions` but `site_name` that may cut a cell about `site` of that radius, and that `may_cut`: given the vectors of eight
+  // Picks those of `vertices` but `site_name` that may cut a cell about `site` of that radius, and that `may_cut`: given the vectors of eight
   // and their lows, it tells which.
-  template <VectorUnit kUnit, typename MayCut>
-  WELLSPACE_INLINE void Pick(std::span<const Point<D>> positions, const VertexNames& names, VertexId site_name,
-                             const Point<D>& site, double scale, float most_radius, MayCut may_cut) {
+  template <VectorUnit kUnit, typename Vertices, typename MayCut>
+  WELLSPACE_INLINE void Pick(const Vertices& vertices, VertexId site_name, const Point<D>& site, double scale,
+                             float most_radius, MayCut may_cut) {
     const Floats far = Splat(MostOffset<D>(most_radius));
-    const FloatMask end = Splat(static_cast<int32_t>(positions.size()));
-    const FloatMask own = Splat(static_cast<int32_t>(Index(site_name)));
+    const FloatMask end = Splat(static_cast<int32_t>(vertices.size()));
     const float error = kExcessError<D> * most_radius;
     FloatMask slots = kEachLane;
-    for (size_t from = 0; from < positions.size(); from += kFloatLanes) {
+    for (size_t from = 0; from < vertices.size(); from += kFloatLanes) {
       Floats vectors[D];
-      VectorsTo(&positions[from], site, scale, vectors);
+      vertices.FindVectors(from, site, scale, vectors);
       Floats length_sq = vectors[0] * vectors[0];
       for (int axis = 1; axis < D; ++axis) {
         length_sq += vectors[axis] * vectors[axis];
@@ -328,11 +442,7 @@ struct alignas(sizeof(Floats)) NearVertices {
       const Floats offsets = 0.5f * length_sq;
       const Floats lows = offsets - (error * length + kUnderflow);
       FloatMask is_near = IsAtMost<kUnit>(offsets, far) & IsLess<kUnit>(slots, end);
-      if (names.listed != nullptr) {
-        FloatMask listed;
-        std::memcpy(&listed, names.listed + from, sizeof(listed));
-        is_near &= ~IsEqual<kUnit>(listed, own);
-      }
+      is_near &= ~vertices.template AreCalled<kUnit>(site_name, from);
       within_reach += static_cast<size_t>(std::popcount(Bits<kUnit>(is_near)));
       may_cut(vectors, lows, is_near);
       const uint32_t kept = Bits<kUnit>(is_near);

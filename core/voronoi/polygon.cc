@@ -235,22 +235,45 @@ WELLSPACE_INLINE bool Polygon::CutOff(const FloatBisector<2>& bisector, VertexId
   return true;
 }
 
-template <VectorUnit kUnit>
-WELLSPACE_INLINE size_t Polygon::CutByEachWith(std::span<const Point<2>> positions, const VertexNames& names,
-                                               VertexId site) {
+template <VectorUnit kUnit, typename Vertices>
+WELLSPACE_INLINE size_t Polygon::CutByThose(const Vertices& vertices, VertexId site) {
   NearVertices<2> near;
   near.Pick<kUnit>(
-      positions, names, site, site_, scale_,
+      vertices, site, site_, scale_,
       most_radius_, [this](const Floats* w, const Floats& low, FloatMask& is_near) __attribute__((always_inline)) {
         if (cuts_ != 0) {  // most miss the cell, now and later
           is_near &= IsAtMost<kUnit>(low, MostProducts<kUnit, 2>(groups(), w));
         }
       });
   near.CutInOrder(
-      [&](const FloatBisector<2>& bisector, size_t slot)
-          __attribute__((always_inline)) { return CutOff<kUnit>(bisector, names[slot], positions[slot]); },
+      [&](const FloatBisector<2>& bisector, size_t slot) __attribute__((always_inline)) {
+        return CutOff<kUnit>(bisector, vertices.name(slot), vertices.position(slot));
+      },
       [this] { return IsTooLarge() ? -1 : MostOffset<2>(most_radius_); });
   return near.within_reach;
+}
+
+template <VectorUnit kUnit>
+WELLSPACE_INLINE size_t Polygon::CutByEachWith(std::span<const Point<2>> positions, const VertexNames& names,
+                                               VertexId site) {
+  return CutByThose<kUnit>(VerticesTogether<2>{positions, names}, site);
+}
+
+template <VectorUnit kUnit>
+WELLSPACE_INLINE size_t Polygon::CutByGatheredWith(const GatheredVertices<2>& gathered, VertexId site) {
+  return CutByThoseGathered<kUnit, 2>(
+      *this, gathered, [&](const VerticesChosen<2>& vertices) __attribute__((always_inline)) {
+        return CutByThose<kUnit>(vertices, site);
+      });
+}
+
+WELLSPACE_AVX2 size_t Polygon::CutByGatheredAvx2(const GatheredVertices<2>& gathered, VertexId site) {
+  return CutByGatheredWith<VectorUnit::kAvx2>(gathered, site);
+}
+
+size_t Polygon::CutByGathered(const GatheredVertices<2>& gathered, VertexId site) {
+  return unit_ == VectorUnit::kAvx2 ? CutByGatheredAvx2(gathered, site)
+                                    : CutByGatheredWith<VectorUnit::kBaseline>(gathered, site);
 }
 
 bool Polygon::CutBeforePlace(VertexId u, const Point<2>& position) {

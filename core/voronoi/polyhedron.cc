@@ -351,22 +351,45 @@ WELLSPACE_INLINE bool Polyhedron::CutOff(const FloatBisector<3>& bisector, Verte
   return true;
 }
 
-template <VectorUnit kUnit>
-WELLSPACE_INLINE size_t Polyhedron::CutByEachWith(std::span<const Point<3>> positions, const VertexNames& names,
-                                                  VertexId site) {
+template <VectorUnit kUnit, typename Vertices>
+WELLSPACE_INLINE size_t Polyhedron::CutByThose(const Vertices& vertices, VertexId site) {
   NearVertices<3> near;
   near.Pick<kUnit>(
-      positions, names, site, site_, scale_,
+      vertices, site, site_, scale_,
       most_radius_, [this](const Floats* w, const Floats& low, FloatMask& is_near) __attribute__((always_inline)) {
         if (cuts_ != 0 && Bits<kUnit>(is_near) != 0) {  // most miss the cell, now and later
           is_near &= IsAtMost<kUnit>(low, MostProducts<kUnit, 3>(groups(), w));
         }
       });
   near.CutInOrder(
-      [&](const FloatBisector<3>& bisector, size_t slot)
-          __attribute__((always_inline)) { return CutOff<kUnit>(bisector, names[slot], positions[slot]); },
+      [&](const FloatBisector<3>& bisector, size_t slot) __attribute__((always_inline)) {
+        return CutOff<kUnit>(bisector, vertices.name(slot), vertices.position(slot));
+      },
       [this] { return IsTooLarge() ? -1 : MostOffset<3>(most_radius_); });
   return near.within_reach;
+}
+
+template <VectorUnit kUnit>
+WELLSPACE_INLINE size_t Polyhedron::CutByEachWith(std::span<const Point<3>> positions, const VertexNames& names,
+                                                  VertexId site) {
+  return CutByThose<kUnit>(VerticesTogether<3>{positions, names}, site);
+}
+
+template <VectorUnit kUnit>
+WELLSPACE_INLINE size_t Polyhedron::CutByGatheredWith(const GatheredVertices<3>& gathered, VertexId site) {
+  return CutByThoseGathered<kUnit, 3>(
+      *this, gathered, [&](const VerticesChosen<3>& vertices) __attribute__((always_inline)) {
+        return CutByThose<kUnit>(vertices, site);
+      });
+}
+
+WELLSPACE_AVX2 size_t Polyhedron::CutByGatheredAvx2(const GatheredVertices<3>& gathered, VertexId site) {
+  return CutByGatheredWith<VectorUnit::kAvx2>(gathered, site);
+}
+
+size_t Polyhedron::CutByGathered(const GatheredVertices<3>& gathered, VertexId site) {
+  return unit_ == VectorUnit::kAvx2 ? CutByGatheredAvx2(gathered, site)
+                                    : CutByGatheredWith<VectorUnit::kBaseline>(gathered, site);
 }
 
 WELLSPACE_AVX2 size_t Polyhedron::CutByEachAvx2(std::span<const Point<3>> positions, const VertexNames& names,

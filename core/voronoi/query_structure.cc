@@ -317,8 +317,7 @@ void QueryStructure<D>::MoveVertex(VertexId v, const Point<D>& p) {
 }
 
 template <int D>
-void QueryStructure<D>::BeginQuery(Workspace<D>& workspace) const {
-  ++workspace.counters.queries;
+void QueryStructure<D>::BeginWalk(Workspace<D>& workspace) const {
   workspace.seen.resize(tree_.node_count(), 0);
   if (++workspace.query == 0) {
     std::fill(workspace.seen.begin(), workspace.seen.end(), 0);
@@ -332,7 +331,8 @@ WELLSPACE_INLINE void QueryStructure<D>::ScanOutwardWith(const Point<D>& site, N
                                                          ReachSq& reach_sq, Wants& wants, Open& open) const {
   using Cube = CubeFrom<D, kWidth>;
   core::Prefetch<D>(tree_, own);
-  BeginQuery(workspace);
+  ++workspace.counters.queries;
+  BeginWalk(workspace);
   typename Cube::Axes from;
   Cube::Load(site, from);
   uint32_t* const seen = workspace.seen.data();
@@ -459,24 +459,77 @@ Neighbor QueryStructure<D>::FindBeyond(const Point<D>& p, NodeId leaf, Neighbor 
 
 template <int D>
 void QueryStructure<D>::ClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace, TieRule rule) const {
-  ClipAndScan(v, CubeAround<D>(point(v), radius), rule, workspace);
+  Clip(v, CubeAround<D>(point(v), radius), rule, workspace);
+  Scan(v, workspace);
   workspace.cell.Place();
 }
 
 template <int D>
 void QueryStructure<D>::UnplacedClippedVoronoi(VertexId v, const Box<D>& clip, Workspace<D>& workspace,
                                                const ExtraVertices<D>& others) const {
-  ClipAndScan(v, clip, TieRule::kPerturb, workspace, others);
+  Clip(v, clip, TieRule::kPerturb, workspace);
+  Scan(v, workspace, others);
 }
 
-// Computes the clipped cell of vertex `v`.
+// Begins the clipped cell of vertex `v`.
 template <int D>
-void QueryStructure<D>::ClipAndScan(VertexId v, const Box<D>& clip, TieRule rule, Workspace<D>& workspace,
-                                    const ExtraVertices<D>& others) const {
+void QueryStructure<D>::Clip(VertexId v, const Box<D>& clip, TieRule rule, Workspace<D>& workspace) const {
   std::array<PlaneKind, 2 * D> kinds;
   const Box<D> bounds = ClippedBox<D>(box_, clip, kinds);
   workspace.cell.Reset(point(v), bounds, kinds, rule);
-  Scan(v, workspace, others);
+}
+
+// Gathers the vertices around the first of `sites`, in 2-D and 3-D: above, the walk is a small part of a cell. Returns how many sites these are.
+template <int D>
+size_t QueryStructure<D>::GatherAround(std::span<const VertexId> sites, Workspace<D>& workspace) const {
+  if constexpr (D <= 3) {
+    BeginWalk(workspace);
+    const size_t count = workspace.gathered.Gather(tree_, points(), sites, workspace.seen, workspace.query);
+    workspace.counters.leaves += workspace.gathered.leaf_count();
+    return count;
+  }
+  return sites.size();
+}
+
+// What `v`, around which vertices may have been gathered, is away from the nearest other one, squared.
+template <int D>
+double QueryStructure<D>::NearestSqOfGathered(VertexId v, Workspace<D>& workspace) const {
+  if constexpr (D <= 3) {
+    const GatheredVertices<D>& gathered = workspace.gathered;
+    if (gathered.Surrounds(point(v))) {
+      const double nearest_sq = gathered.NearestSq(v, point(v), workspace.unit);
+      if (nearest_sq <= gathered.ReachSq(point(v))) {
+        return nearest_sq;
+      }
+    }
+  }
+  return ApproximateNearestNeighbor(v, workspace).distance_sq;
+}
+
+// As ClippedVoronoi, where vertices may have been gathered around `v`.
+template <int D>
+void QueryStructure<D>::ClippedVoronoiByGathered(VertexId v, double radius, TieRule rule,
+                                                 Workspace<D>& workspace) const {
+  if constexpr (D <= 3) {
+    const GatheredVertices<D>& gathered = workspace.gathered;
+    Polytope<D>& cell = workspace.cell;
+    if (gathered.Surrounds(point(v))) {
+      Clip(v, CubeAround<D>(point(v), radius), rule, workspace);
+      workspace.counters.vertices += cell.CutByGathered(gathered, v);
+      if (!cell.IsTooLarge() && cell.CutLimitSq() > gathered.ReachSq(point(v))) {
+        ScanBeyondGathered(v, workspace);
+      } else {
+        ++workspace.counters.queries;
+      }
+      CountCuts(workspace);
+      // With ties that are kept it could depend on the order of the cuts, and thus on what else is asked for.
+      if (rule == TieRule::kPerturb || cell.counters().exact == 0) {
+        cell.Place();
+        return;
+      }
+    }
+  }
+  ClippedVoronoi(v, radius, workspace, rule);
 }
 
 template <int D>
@@ -509,6 +562,24 @@ void QueryStructure<D>::Scan(VertexId v, Workspace<D>& workspace, const ExtraVer
         }
       });
   CountCuts(workspace);
+}
+
+// Cuts workspace.cell by the vertices in the leaves around that of `v` which have not been gathered.
+template <int D>
+void QueryStructure<D>::ScanBeyondGathered(VertexId v, Workspace<D>& workspace) const {
+  Polytope<D>& cell = workspace.cell;
+  ScanOutward(
+      cell.site(), LeafOf(v), workspace, [&] { return cell.IsTooLarge() ? -1 : cell.CutLimitSq(); },
+      [&](NodeId leaf) { return cell.Reaches(tree_.BoxOf(leaf)); },
+      [&](NodeId leaf) {
+        const auto* bucket = tree_.BucketOf(leaf);
+        for (uint32_t i = 0; bucket != nullptr && i < bucket->count && !cell.IsTooLarge(); ++i) {
+          if (!workspace.gathered.Holds(bucket->positions[i])) {
+            ++workspace.counters.vertices;
+            cell.CutBeforePlace(bucket->ids[i], bucket->positions[i]);
+          }
+        }
+      });
 }
 
 template <int D>

@@ -3,6 +3,7 @@
 #define WELLSPACE_CORE_VORONOI_QUERY_STRUCTURE_H_
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <type_traits>
@@ -17,6 +18,7 @@
 #include "core/geometry/point.h"
 #include "core/tree/leaf_tree.h"
 #include "core/voronoi/extra_vertices.h"
+#include "core/voronoi/gathered_vertices.h"
 #include "core/voronoi/leaf_queue.h"
 #include "core/voronoi/polytope.h"
 
@@ -43,6 +45,7 @@ struct Workspace {
   HugeVector<uint32_t> seen;  // by tree node: the query that last met it
   uint32_t query = 0;
   LeafQueue::Memory waiting_leaves;
+  GatheredVertices<D> gathered;        // while cells of several vertices are computed
   VectorUnit unit = BestVectorUnit();  // leaves are met with
 };
 
@@ -123,6 +126,30 @@ class QueryStructure {
   //             alone: a ball about a node through v is convex, so a generic path in it from v to any leaf it
   //             meets crosses only facets of leaves that it meets.
   void ClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace, TieRule rule = TieRule::kKeep) const;
+
+  // The same for one of `sites` after the other, each clipped at `beta` times the distance to its nearest neighbour; by the box alone if that is
+  // infinite. Calls take(v, radius) with the cell in workspace.cell, as long as it returns true.
+  //
+  // In 2-D and 3-D cells take less time than one by one where sites that follow each other are near each other, as in the order of the Z curve or of
+  // leaves: what is around some of them is gathered once (GatheredVertices).
+  //
+  // Guarantees: (1) the cells are those of ClippedVoronoi, but for the numbers of their nodes and planes.
+  // REQUIRES:   beta > 0; no site waits; there is another vertex. take() does not change the structure.
+  template <typename Take>
+  void ClippedVoronoiOfEach(std::span<const VertexId> sites, double beta, Workspace<D>& workspace, Take take,
+                            TieRule rule = TieRule::kKeep) const {
+    while (!sites.empty()) {
+      const size_t count = GatherAround(sites, workspace);
+      for (const VertexId v : sites.first(count)) {
+        const double radius = std::isinf(beta) ? beta : beta * std::sqrt(NearestSqOfGathered(v, workspace));
+        ClippedVoronoiByGathered(v, radius, rule, workspace);
+        if (!take(v, radius)) {
+          return;
+        }
+      }
+      sites = sites.subspan(count);
+    }
+  }
 
   // The same clipped by a box, which holds v up to rounding, ties perturbed, for whoever may not need the nodes: they are still to be placed, by
   // cell.Place(). The cell is cut by `others`, too.
@@ -210,7 +237,7 @@ class QueryStructure {
   void MakeRoom();
   VertexId Admitted(VertexId near) const;
   NodeId LeafOf(VertexId v) const;
-  void BeginQuery(Workspace<D>& workspace) const;
+  void BeginWalk(Workspace<D>& workspace) const;
   // Calls open(leaf) for leaves outward from `own`, which holds `site`: as long as reach_sq() says for those whose
   // distance allows it, and wants(leaf) agrees.
   template <typename ReachSq, typename Wants, typename Open>
@@ -224,9 +251,12 @@ class QueryStructure {
                        Open& open) const;
   Neighbor FindBeyond(const Point<D>& p, NodeId leaf, Neighbor nearest, Workspace<D>& workspace) const;
   Neighbor Nearest(const Point<D>& p, NodeId leaf, VertexId but, double limit_sq, Workspace<D>& workspace) const;
-  void ClipAndScan(VertexId v, const Box<D>& clip, TieRule rule, Workspace<D>& workspace,
-                   const ExtraVertices<D>& others = {}) const;
+  size_t GatherAround(std::span<const VertexId> sites, Workspace<D>& workspace) const;
+  double NearestSqOfGathered(VertexId v, Workspace<D>& workspace) const;
+  void ClippedVoronoiByGathered(VertexId v, double radius, TieRule rule, Workspace<D>& workspace) const;
+  void Clip(VertexId v, const Box<D>& clip, TieRule rule, Workspace<D>& workspace) const;
   void Scan(VertexId v, Workspace<D>& workspace, const ExtraVertices<D>& others = {}) const;
+  void ScanBeyondGathered(VertexId v, Workspace<D>& workspace) const;
   void CutByLeaf(NodeId leaf, VertexId site, Workspace<D>& workspace) const;
   static void CutByOthers(const ExtraVertices<D>& others, VertexId site, Workspace<D>& workspace);
   static void CountCuts(Workspace<D>& workspace);

@@ -406,6 +406,34 @@ TEST_P(MesherTest, QueriesMayRunAtOnce) {
   }
 }
 
+TEST_P(MesherTest, NodesOfCellsAreInOrder) {
+  for (const std::string_view kind : {"uniform", "grid"}) {
+    const auto mesher = Create(MakeCloud(kind, d_, Few(d_, 60)));
+    std::vector<uint32_t> all(mesher->vertex_count());
+    std::iota(all.begin(), all.end(), 0u);
+    const absl::StatusOr<std::vector<Cell>> cells = mesher->ClippedCells(all, 2);
+    ASSERT_TRUE(cells.ok()) << cells.status();
+    for (const Cell& cell : *cells) {
+      std::vector<std::vector<double>> nodes;
+      for (size_t at = 0; at < cell.nodes.size(); at += d_) {
+        nodes.emplace_back(cell.nodes.begin() + at, cell.nodes.begin() + at + d_);
+      }
+      if (d_ > 2) {
+        EXPECT_TRUE(std::is_sorted(nodes.begin(), nodes.end()));
+        continue;
+      }
+      EXPECT_EQ(std::min_element(nodes.begin(), nodes.end()), nodes.begin());
+      for (size_t i = 0; i < nodes.size(); ++i) {  // the cell is to the left of every edge
+        const std::vector<double>& from = nodes[i];
+        const std::vector<double>& to = nodes[(i + 1) % nodes.size()];
+        for (const std::vector<double>& x : nodes) {
+          EXPECT_GE((to[0] - from[0]) * (x[1] - from[1]) - (to[1] - from[1]) * (x[0] - from[0]), -1e-12);
+        }
+      }
+    }
+  }
+}
+
 // The cells of a refined mesh, not clipped, have for neighbours just the vertices that share a simplex, but for ties.
 TEST_P(MesherTest, CellsAreThoseOfTheMesh) {
   const auto mesher = Create(MakeCloud("uniform", d_, Few(d_, 60)));
@@ -453,6 +481,12 @@ TEST_P(MesherTest, CellsAreThoseOfTheMesh) {
     EXPECT_EQ((*whole)[i].neighbours, (*cells)[i].neighbours);
     EXPECT_EQ((*whole)[i].clip_radius, std::numeric_limits<double>::infinity());
     EXPECT_FALSE((*whole)[i].is_clipped);
+  }
+  for (size_t i = 0; i < all.size(); i += 11) {
+    const absl::StatusOr<std::vector<Cell>> alone = mesher->ClippedCells({&all[i], 1}, 1e3);
+    ASSERT_TRUE(alone.ok());
+    EXPECT_EQ((*alone)[0].nodes, (*cells)[i].nodes) << "whatever else is asked for";
+    EXPECT_EQ((*alone)[0].neighbours, (*cells)[i].neighbours);
   }
   const absl::StatusOr<std::vector<Cell>> clipped = mesher->ClippedCells(all, 1);
   ASSERT_TRUE(clipped.ok());

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <tuple>
@@ -152,6 +154,73 @@ TYPED_TEST(SameCellsTest, VerticesThatWaitCountOnceTheyCutOrAreAdmitted) {
     }
     EXPECT_NE(cells[0], of_others);
   }
+}
+
+// All vertices, those of a leaf one after the other.
+template <int D>
+std::vector<VertexId> LeafByLeaf(const QueryStructure<D>& structure) {
+  std::vector<VertexId> vertices;
+  structure.tree().ForEachLeaf([&](NodeId leaf) {
+    if (const auto* bucket = structure.tree().BucketOf(leaf); bucket != nullptr) {
+      vertices.insert(vertices.end(), bucket->ids, bucket->ids + bucket->count);
+    }
+  });
+  return vertices;
+}
+
+TYPED_TEST(SameCellsTest, ThoseOfManySitesAreThoseOfEach) {
+  constexpr int D = TypeParam::kValue;
+  for (const std::string_view kind : {"uniform", "clusters", "lines", "grid", "cospherical", "boundary", "rounded"}) {
+    SCOPED_TRACE(std::string(kind));
+    QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>(kind, ByDimension<D>({900, 900, 40})));
+    for (int i = 0; i < 50; ++i) {  // some leaves are split
+      Point<D> p;
+      for (double& x : p) {
+        x = 0.4 + 0.1 * this->random_.Unit();
+      }
+      structure.AddVertex(kNoVertex, p);
+    }
+    std::vector<VertexId> sites = LeafByLeaf<D>(structure);
+    ASSERT_EQ(sites.size(), structure.vertex_count());
+    sites.push_back(sites.front());  // again, and apart from what is near it
+    for (const double beta : {1.5, 4.0, std::numeric_limits<double>::infinity()}) {
+      SCOPED_TRACE(beta);
+      for (const TieRule rule : {TieRule::kKeep, TieRule::kPerturb}) {
+        const VectorUnit unit = rule == TieRule::kKeep ? BestVectorUnit() : VectorUnit::kBaseline;
+        Workspace<D> alone;
+        Workspace<D> together;
+        together.unit = unit;
+        if constexpr (D <= 3) {
+          together.cell = Polytope<D>(unit);
+        }
+        size_t taken = 0;
+        const auto take = [&](VertexId v, double radius) {
+          EXPECT_EQ(v, sites[taken++]);
+          EXPECT_EQ(radius, beta * std::sqrt(structure.ApproximateNearestNeighbor(v, alone).distance_sq));
+          structure.ClippedVoronoi(v, radius, alone, rule);
+          EXPECT_EQ(Description<D>(together.cell), Description<D>(alone.cell)) << "vertex " << Index(v);
+          return !this->HasFailure();
+        };
+        structure.ClippedVoronoiOfEach(sites, beta, together, take, rule);
+        ASSERT_EQ(taken, sites.size());
+        if (D <= 3 && kind == "uniform" && beta < 5) {
+          EXPECT_LT(2 * together.counters.leaves, alone.counters.leaves);
+        }
+      }
+    }
+  }
+}
+
+TYPED_TEST(SameCellsTest, ManySitesAreLeftOnceTheyAreNotTaken) {
+  constexpr int D = TypeParam::kValue;
+  const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", 100));
+  const std::vector<VertexId> sites = LeafByLeaf<D>(structure);
+  Workspace<D> workspace;
+  size_t taken = 0;
+  structure.ClippedVoronoiOfEach(sites, 2, workspace, [&](VertexId, double) { return ++taken < 17; });
+  EXPECT_EQ(taken, 17u);
+  structure.ClippedVoronoiOfEach({}, 2, workspace, [&](VertexId, double) { return ++taken != 0; });
+  EXPECT_EQ(taken, 17u);
 }
 
 }  // namespace
