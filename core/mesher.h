@@ -49,8 +49,8 @@ struct MeshEstimate {
 struct Cell {
   uint32_t vertex = 0;
   double clip_radius = 0;  // half the side of the cube about the vertex; the cell is also clipped by the box
-  std::vector<double>
-      nodes;  // node_count x dimension, row-major; in 2-D around the cell counterclockwise, above ascending
+  // node_count x dimension, row-major; in 2-D counterclockwise around the cell, above ascending by coordinates.
+  std::vector<double> nodes;
   std::vector<uint32_t> neighbours;  // the vertices whose bisectors with `vertex` bound the cell, ascending
   bool is_clipped = false;           // it reaches the cube; if not, it is the whole Voronoi cell in the box
 };

@@ -1,6 +1,6 @@
 #include "core/voronoi/gathered_vertices.h"
 
-#include <cstring>
+#include <bit>
 
 #include "core/voronoi/near_vertices.h"
 
@@ -11,9 +11,9 @@ namespace {
 constexpr size_t kFewestSites = 8;
 // Vertices in two leaves side by side, along each axis, so that they are worked on together.
 constexpr size_t kMostInTwo = 128;
-// Among vertices that far from each other in the mean, as many times, the vertices are gathered that matter to nearly all cells...
+// In mean distances between vertices that are neighbours. Those within this distance of the sites are gathered, which matter to nearly all cells.
 constexpr double kWithin = 2.8;
-// ... and those that cut most of them are looked at before the others.
+// Those within this distance of a site, which cut most, are looked at before all others.
 constexpr double kNear = 2.1;
 
 }  // namespace

@@ -46,7 +46,7 @@ class GatheredVertices {
   }
 
   // Whether all that is around `p`, which is among the sites then, has been gathered.
-  bool Surrounds(const Point<D>& p) const { return is_whole_ && DistanceSq<D>(p, sites_) == 0; }
+  bool Surrounds(const Point<D>& p) const { return is_whole_ && sites_.Contains(p); }
   // Whether a vertex at `p` has, if anything has been gathered.
   bool Holds(const Point<D>& p) const { return DistanceSq<D>(p, sites_) <= within_ * within_; }
   // Any vertex whose squared distance from `site`, which is surrounded, is at most this has been gathered.
