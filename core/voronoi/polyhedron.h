@@ -41,11 +41,7 @@ class Polyhedron : public FloatCell<3> {
   }
   bool CutBeforePlace(VertexId u, const Point<3>& position);
   size_t CutByEach(std::span<const Point<3>> positions, const VertexNames& names, VertexId site);
-  // Cuts the cell by the vertices that have been gathered around its site. Returns how many others are within reach.
-  //
-  // REQUIRES:   gathered.Surrounds(site()); the cell has not been cut.
-  // Complexity: O(gathered), little for each, and the cuts; no allocation once warm.
-  // Errors:     none.
+  // As Polygon::CutByGathered.
   size_t CutByGathered(const GatheredVertices<3>& gathered, VertexId site);
 
   void Place();

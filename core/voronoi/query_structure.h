@@ -256,6 +256,8 @@ class QueryStructure {
   void ClippedVoronoiByGathered(VertexId v, double radius, TieRule rule, Workspace<D>& workspace) const;
   void Clip(VertexId v, const Box<D>& clip, TieRule rule, Workspace<D>& workspace) const;
   void Scan(VertexId v, Workspace<D>& workspace, const ExtraVertices<D>& others = {}) const;
+  template <typename Cut>
+  void ScanFor(NodeId own, Workspace<D>& workspace, Cut cut) const;
   void ScanBeyondGathered(VertexId v, Workspace<D>& workspace) const;
   void CutByLeaf(NodeId leaf, VertexId site, Workspace<D>& workspace) const;
   static void CutByOthers(const ExtraVertices<D>& others, VertexId site, Workspace<D>& workspace);
