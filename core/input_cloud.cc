@@ -100,7 +100,7 @@ constexpr size_t kBlock = kStepsBetweenChecks;
 // Parts into which more are shared out before they are sorted, by the highest bits of their halves.
 constexpr int kPartBits = 8;
 constexpr size_t kParts = size_t{1} << kPartBits;
-size_t PartOf(const Entry& entry) { return entry.half >> (32 - kPartBits); }
+size_t PartOf(uint32_t half) { return half >> (32 - kPartBits); }
 
 // Sorts by those halves. `scratch` is as long.
 absl::Status SortByHalves(std::span<Entry> entries, std::span<Entry> scratch, const RunContext& context) {
@@ -138,31 +138,22 @@ class CloudSorter {
         context_(context),
         team_(threads),
         memory_(MakeHugePageBytes(count_ * sizeof(Entry))),
-        scratch_memory_(MakeHugePageBytes(count_ * sizeof(Entry))),
-        entries_(reinterpret_cast<Entry*>(memory_.get()), count_),
-        scratch_(reinterpret_cast<Entry*>(scratch_memory_.get()), count_) {}
+        entries_(reinterpret_cast<Entry*>(memory_.get()), count_) {}
 
   absl::StatusOr<SortedCloud<D>> Sort() {
-    counts_.assign((count_ + kBlock - 1) / kBlock, {});
-    const auto make_entries = [this](size_t block) { return MakeEntries(block); };
-    WELLSPACE_RETURN_IF_ERROR(team_.TryForEach(counts_.size(), make_entries));
-    if (counts_.size() > 1) {
-      ShareOut();
-    } else {
-      part_begins_ = {0, count_};
-    }
     SortedCloud<D> cloud{grid_, {}, {}, {}};
+    WELLSPACE_RETURN_IF_ERROR(Resize(cloud.first_input));
+    // Until the points are taken their halves are there.
+    const std::span<uint32_t> halves = cloud.first_input;
+    counts_.assign((count_ + kBlock - 1) / kBlock, {});
+    const auto find_halves = [&](size_t block) { return FindHalves(block, halves); };
+    WELLSPACE_RETURN_IF_ERROR(team_.TryForEach(counts_.size(), find_halves));
+    ShareOut(halves);
     // The corners of the box follow, and as many vertices as are added to most clouds. Of large arrays what is not used takes no memory; of small ones,
     // which share pages, it would.
     const size_t room = counts_.size() > 1 ? count_ + count_ / 4 : count_ / 8;
     cloud.points.reserve(count_ + room + (size_t{1} << D));
-    cloud.first_input.reserve(count_);
-    for (size_t made = 0; made < count_;) {  // block by block, since bringing in their memory takes a while
-      WELLSPACE_RETURN_IF_ERROR(context_.Check());
-      made = std::min(count_, made + kBlock);
-      cloud.points.resize(made);
-      cloud.first_input.resize(made);
-    }
+    WELLSPACE_RETURN_IF_ERROR(Resize(cloud.points));
     parts_.resize(part_begins_.size() - 1);
     const auto take_part = [&](size_t part) {
       const absl::Status status = SortPart(part);
@@ -183,8 +174,19 @@ class CloudSorter {
   Point<D> PointOf(const Entry& entry) const { return domain_.Scaled(PointAt<D>(points_, entry.input)); }
   GridPoint<D> CubeOf(const Entry& entry) const { return grid_.CubeOf(PointOf(entry)); }
 
-  // Makes the entries of a block of points, which are checked.
-  absl::Status MakeEntries(size_t block) {
+  // Makes room for all points, block by block, since bringing in the memory takes a while.
+  template <typename T>
+  absl::Status Resize(HugeVector<T>& items) const {
+    items.reserve(count_);
+    while (items.size() < count_) {
+      WELLSPACE_RETURN_IF_ERROR(context_.Check());
+      items.resize(std::min(count_, items.size() + kBlock));
+    }
+    return absl::OkStatus();
+  }
+
+  // Finds the upper halves of the prefixes of a block of points, which are checked.
+  absl::Status FindHalves(size_t block, std::span<uint32_t> halves) {
     WELLSPACE_RETURN_IF_ERROR(context_.Check());
     const Box<D>& box = domain_.box;
     const double unscale = 1 / domain_.scale;  // a power of two
@@ -206,16 +208,22 @@ class CloudSorter {
               i, k, p[k], box.LongestSide()));
         }
       }
-      const uint64_t prefix = MortonPrefix<D, 32>(grid_.CubeOf(scaled_p), grid_.levels());
-      entries_[i] = {static_cast<uint32_t>(prefix >> 32), static_cast<uint32_t>(i)};
-      ++counts[PartOf(entries_[i])];
+      halves[i] = static_cast<uint32_t>(MortonPrefix<D, 32>(grid_.CubeOf(scaled_p), grid_.levels()) >> 32);
+      ++counts[PartOf(halves[i])];
     }
     counts_[block] = counts;
     return absl::OkStatus();
   }
 
-  // Puts the entries of each part side by side.
-  void ShareOut() {
+  // Makes the entries, those of each part side by side.
+  void ShareOut(std::span<const uint32_t> halves) {
+    if (counts_.size() == 1) {
+      part_begins_ = {0, count_};
+      for (size_t i = 0; i < count_; ++i) {
+        entries_[i] = {halves[i], static_cast<uint32_t>(i)};
+      }
+      return;
+    }
     size_t place = 0;
     for (size_t part = 0; part < kParts; ++part) {
       part_begins_.push_back(place);
@@ -224,15 +232,14 @@ class CloudSorter {
       }
     }
     part_begins_.push_back(place);
-    team_.ForEach(counts_.size(), [this](size_t block) {
+    team_.ForEach(counts_.size(), [this, halves](size_t block) {
       if (context_.IsCancelled()) {
         return;
       }
       for (size_t i = block * kBlock; i < std::min(count_, (block + 1) * kBlock); ++i) {
-        scratch_[counts_[block][PartOf(entries_[i])]++] = entries_[i];
+        entries_[counts_[block][PartOf(halves[i])]++] = {halves[i], static_cast<uint32_t>(i)};
       }
     });
-    std::swap(entries_, scratch_);
   }
 
   std::span<Entry> EntriesOf(size_t part) const {
@@ -244,7 +251,8 @@ class CloudSorter {
   absl::Status SortPart(size_t part) const {
     WELLSPACE_RETURN_IF_ERROR(context_.Check());
     const std::span<Entry> entries = EntriesOf(part);
-    const std::span<Entry> scratch = scratch_.subspan(part_begins_[part], entries.size());
+    HugeVector<Entry> memory(entries.size());
+    const std::span<Entry> scratch = memory;
     WELLSPACE_RETURN_IF_ERROR(SortByHalves(entries, scratch, context_));
     std::vector<std::pair<GridPoint<D>, Entry>> with_cubes;
     const auto sort_run = [&](size_t begin, size_t size) {
@@ -336,9 +344,7 @@ class CloudSorter {
   const RunContext& context_;
   ThreadTeam team_;
   const HugePageBytes memory_;
-  const HugePageBytes scratch_memory_;
-  std::span<Entry> entries_;
-  std::span<Entry> scratch_;
+  const std::span<Entry> entries_;
   std::vector<std::array<uint32_t, kParts>> counts_;  // by block and part, entries; then where the next is put
   std::vector<size_t> part_begins_;                   // and the end
   std::vector<Part> parts_;

@@ -82,6 +82,7 @@ absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices
   };
   const absl::Status status = Loop();
   AwaitOthers();
+  ListLast();
   packets_before_ = {};
   for (const OwnWorkspace& workspace : round_workspaces_) {
     own_.counters.Add(workspace.counters);
@@ -155,8 +156,9 @@ void Refinement<D>::VertexAdded(VertexId x) {
 template <int D>
 uint64_t Refinement<D>::MemoryBytes() const {
   return schedule_.MemoryBytes() + (is_ahead_ ? bytes_ahead_ : stars_.MemoryBytes() + RoundBytes()) +
-         star_.capacity() * sizeof(star_[0]) + watchers_.MemoryBytes() + radius_sq_.size() * sizeof(radius_sq_[0]) +
-         announced_.size() * sizeof(Announced) + (own_.seen.size() + other_.seen.size()) * sizeof(uint32_t);
+         (star_.capacity() + last_star_.capacity()) * sizeof(star_[0]) + watchers_.MemoryBytes() +
+         radius_sq_.size() * sizeof(radius_sq_[0]) + announced_.size() * sizeof(Announced) +
+         (own_.seen.size() + other_.seen.size()) * sizeof(uint32_t);
 }
 
 template <int D>
@@ -223,6 +225,7 @@ absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& t
   team.End();
   WELLSPACE_RETURN_IF_ERROR(foretold);
   WELLSPACE_RETURN_IF_ERROR(context_->Check());
+  last_ = {};
   stars_.Clear();
   Reserve(static_cast<uint32_t>(std::min({context_->estimated_vertices(), max_vertices_, kMostReserved * count})));
   radius_sq_.assign(count, Assessment::kNone);
@@ -421,7 +424,10 @@ void Refinement<D>::Settle(VertexId v, const Assessment& found, int bucket, std:
   if (is_foreseen_) {
     later_listings_.push_back({v, star, structure_.vertex_count()});
   } else {
-    stars_.Set(v, star, structure_.vertex_count());
+    PrefetchListing(star);
+    ListLast();
+    last_star_.assign(star.begin(), star.end());
+    last_ = {v, last_star_, structure_.vertex_count()};
   }
   if (announced_[Index(v)] != Announced::kToAll) {
     Announce(v, found, mentions);

@@ -162,6 +162,8 @@ class Refinement {
   void AdmitWaiting();
   void EndRound();
   void ListStars();
+  void PrefetchListing(std::span<const std::array<VertexId, D>> star) const;
+  void ListLast();
   void PrefetchServed(VertexId v) const;
   void Foresee(Packet<D>& packet, size_t part, size_t parts, OwnWorkspace& workspace) const;
   void ForeseeOne(Packet<D>& packet, size_t at, OwnWorkspace& workspace) const;
@@ -214,8 +216,10 @@ class Refinement {
   std::deque<Star<D>> later_own_stars_;
   std::vector<std::pair<VertexId, double>> woken_;  // scratch of Wake
   Star<D> star_;                                    // scratch of Improve
-  std::vector<WatchedNode<D>> watched_;             // the same
-  std::vector<Mention> mentions_;                   // scratch of Mentions
+  Listing last_;                                    // where the round is not foreseen, the last that was found done
+  Star<D> last_star_;
+  std::vector<WatchedNode<D>> watched_;  // the same
+  std::vector<Mention> mentions_;        // scratch of Mentions
   RunContext* context_ = nullptr;
   const RefinementObserver<D>* observer_ = nullptr;
 

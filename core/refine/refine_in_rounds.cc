@@ -27,6 +27,8 @@ constexpr size_t kPacket = 128;
 // A packet is foreseen in so many parts, by turns with others, so that threads come to the end of a turn together; unless a thread would wait for
 // the part before.
 constexpr size_t kParts = 4;
+// What listing a star reads is asked for so many before its turn.
+constexpr size_t kListedAhead = 4;
 
 }  // namespace
 
@@ -148,6 +150,7 @@ absl::Status Refinement<D>::ServeRound() {
 // Has the packets whose turn it is foreseen, unless they are, and other threads begin with those of the other half. What queries read does not change until AdmitWaiting.
 template <int D>
 void Refinement<D>::LookAhead() {
+  ListLast();
   round_workspaces_.resize(team_->threads());
   const auto prepare = [this](std::span<Packet<D>> packets) {
     for (Packet<D>& packet : packets) {
@@ -218,16 +221,31 @@ void Refinement<D>::EndRound() {
 template <int D>
 void Refinement<D>::ListStars() {
   for (size_t i = 0; i < listings_.size(); ++i) {
-    if (i + 1 < listings_.size()) {
-      for (const std::array<VertexId, D>& simplex : listings_[i + 1].star) {
-        stars_.Prefetch(simplex[0], 0);
-      }
+    if (i + kListedAhead < listings_.size()) {
+      PrefetchListing(listings_[i + kListedAhead].star);
     }
     const auto& [v, star, vertex_count] = listings_[i];
     stars_.Set(v, star, vertex_count);
   }
   listings_.clear();
   own_stars_.clear();
+}
+
+// Asks the memory for what listing a star reads.
+template <int D>
+void Refinement<D>::PrefetchListing(std::span<const std::array<VertexId, D>> star) const {
+  for (const std::array<VertexId, D>& simplex : star) {
+    stars_.Prefetch(simplex[0], 0);  // most neighbours are the first of some
+  }
+}
+
+// Lists the star that has waited while what that reads was asked for.
+template <int D>
+void Refinement<D>::ListLast() {
+  if (last_.vertex != kNoVertex) {
+    stars_.Set(last_.vertex, last_.star, last_.vertex_count);
+    last_.vertex = kNoVertex;
+  }
 }
 
 // Asks the memory for what serving `v` reads besides its query.
@@ -416,12 +434,14 @@ absl::Status Refinement<D>::Retrace(Packet<D>& packet, size_t at) {
   }
 }
 
-#define WELLSPACE_INSTANTIATE(D)                       \
-  template bool Refinement<D>::BeginRounds(int);       \
-  template void Refinement<D>::DropRounds();           \
-  template uint64_t Refinement<D>::RoundBytes() const; \
-  template void Refinement<D>::AwaitOthers();          \
-  template void Refinement<D>::AdmitWaiting();         \
+#define WELLSPACE_INSTANTIATE(D)                                                                \
+  template bool Refinement<D>::BeginRounds(int);                                                \
+  template void Refinement<D>::DropRounds();                                                    \
+  template uint64_t Refinement<D>::RoundBytes() const;                                          \
+  template void Refinement<D>::AwaitOthers();                                                   \
+  template void Refinement<D>::ListLast();                                                      \
+  template void Refinement<D>::PrefetchListing(std::span<const std::array<VertexId, D>>) const; \
+  template void Refinement<D>::AdmitWaiting();                                                  \
   template absl::Status Refinement<D>::ServeRounds();
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE

@@ -150,12 +150,16 @@ absl::StatusOr<Simplices> JoinBlocks(size_t block_count, uint64_t held_bytes, in
 // Calls f(VertexId) for one after the other of a block, and before that prefetch(VertexId, step); stops early when the context is cancelled.
 template <int D, typename Prefetch, typename F>
 void ForEachVertexOf(const LeafBlocks<D>& blocks, size_t block, const RunContext& context, Prefetch prefetch, F f) {
+  std::array<VertexId, kVerticesInBlock + LeafTree<D>::kLeafCapacity> vertices;
+  size_t count = 0;
   blocks.ForEachBucketOf(block, [&](const typename LeafTree<D>::Bucket& bucket, NodeId) {
-    for (uint32_t k = 0; k < bucket.count && !context.IsCancelled(); ++k) {
-      PrefetchAhead(std::span(bucket.ids, bucket.count), k, prefetch);
-      f(bucket.ids[k]);
-    }
+    std::copy_n(bucket.ids, bucket.count, vertices.begin() + count);
+    count += bucket.count;
   });
+  for (size_t k = 0; k < count && !context.IsCancelled(); ++k) {
+    PrefetchAhead(std::span(vertices).first(count), k, prefetch);
+    f(vertices[k]);
+  }
 }
 
 // Appends the simplex of `v` and `others`.
@@ -264,14 +268,14 @@ class ListedSimplices {
   using Row = std::array<VertexId, D>;  // the other vertices of a simplex
 
   // Whether the ball through `v` and `others` holds one of the vertices that are late at v; ties as in cells.
-  bool IsSpoiled(VertexId v, const Row& others, std::span<const LateNeighbours::Late> late) {
+  bool IsSpoiled(VertexId v, const Row& others, std::span<const LatePair> late) {
     Simplex<D> simplex;
     simplex[D] = structure_.point(v);
     for (int k = 0; k < D; ++k) {
       simplex[k] = structure_.point(others[k]);
     }
     const Sign orientation = Orientation<D>(simplex).sign;
-    return std::any_of(late.begin(), late.end(), [&](const LateNeighbours::Late& pair) {
+    return std::any_of(late.begin(), late.end(), [&](const LatePair& pair) {
       const Point<D>& u = structure_.point(pair.second);
       ++counters_.cuts;
       const MeasuredSign inside = InSphere<D>(simplex, u);
@@ -314,15 +318,24 @@ absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, c
   const uint64_t held_bytes =
       structure.MemoryBytes() + output_index.size_bytes() + stars.MemoryBytes() + blocks.MemoryBytes();
   WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(held_bytes));
-  WELLSPACE_ASSIGN_OR_RETURN(const LateNeighbours late,
-                             LateNeighbours::Of(stars, structure.vertex_count(), threads, context));
+  WELLSPACE_ASSIGN_OR_RETURN(const LateNeighbours late, LateNeighbours::Of(stars, structure.vertex_count(), context));
   using Listed = std::optional<ListedSimplices<D>>;
   const auto append = [&](size_t block, Listed& listed, SimplexList<D>& out) {
     if (!listed.has_value()) {
       listed.emplace(structure, stars, late, output_index);
     }
     ForEachVertexOf(
-        blocks, block, context, [&](VertexId v, int step) { stars.Prefetch(v, step); },
+        blocks, block, context,
+        [&](VertexId v, int step) {
+          stars.Prefetch(v, step);
+          if (step == 2) {
+            for (const auto& simplex : stars.Of(v)) {
+              stars.Prefetch(simplex[0], 0);
+              PrefetchLine(&structure.point(simplex[0]));
+              PrefetchLine(&output_index[Index(simplex[0])]);
+            }
+          }
+        },
         [&](VertexId v) { listed->Append(v, out); });
   };
   return JoinBlocks<D, Listed>(

@@ -63,6 +63,11 @@ absl::Status LeafTree<D>::Build(const MortonGrid<D>& grid, std::span<const Point
   Node root;
   root.low = grid.root_low();
   root.neighbour.fill(kNoNode);
+  if (points.size() > kFilledTogether) {
+    // Most clouds need fewer; of large arrays what is not used takes no memory.
+    nodes_.reserve(points.size() / 8);
+    ranges_.reserve(points.size() / 8);
+  }
   nodes_.assign(1, root);
   ranges_.assign(1, Range{.end = static_cast<uint32_t>(points.size())});
   pending_.assign(grid.levels() + 1, {});

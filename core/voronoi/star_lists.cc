@@ -1,12 +1,11 @@
 #include "core/voronoi/star_lists.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
-#include "core/base/cache_lines.h"
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
-#include "core/base/thread_team.h"
 
 namespace wellspace::core {
 namespace {
@@ -14,16 +13,8 @@ namespace {
 // Places are dropped, which takes a look at all vertices, once there are as many as one for so many of these.
 constexpr size_t kLeastShare = 8;
 
-// Whose lists one thread looks through at a time.
-constexpr uint32_t kVerticesTogether = 1024;
-
-// How many vertices before its turn what one lists is asked for.
-constexpr uint32_t kAhead = 6;
-
-// Fewer pairs may be held more than once.
-constexpr size_t kLeastLate = 1 << 14;
-
-void MakeUnique(std::vector<LateNeighbours::Late>& late) {
+template <typename Pairs>
+void MakeUnique(Pairs& late) {
   std::sort(late.begin(), late.end());
   late.erase(std::unique(late.begin(), late.end()), late.end());
 }
@@ -48,20 +39,40 @@ void StarLists<D>::Set(VertexId v, std::span<const std::array<VertexId, D>> star
   entries_.resize(vertex_count);
   added_.resize(vertex_count - first_count_ + 1, begin);
   listed_.resize(begin + star.size());
+  const uint32_t added_at = AddedAt(v);
   uint32_t count = 0;
+  uint32_t is_late = 0;
   for (const std::array<VertexId, D>& simplex : star) {
     // No branch, since none could be foretold.
     listed_[begin + count] = simplex;
     uint32_t has_all = 1;
     for (const VertexId u : simplex) {
       has_all &= Has(u) ? 1 : 0;
+      is_late |= added_at > entries_[Index(u)].begin ? 1 : 0;
     }
     count += has_all;
   }
   listed_.resize(begin + count);
+  if (is_late != 0) {
+    NoteLate(v, star);
+  }
   unused_ += std::exchange(entries_[Index(v)], {begin, count}).count;
   if (unused_ > listed_.size() / 2 && kLeastShare * unused_ > entries_.size()) {
     DropUnused();
+  }
+}
+
+// Puts down at which neighbours `v` is late.
+template <int D>
+void StarLists<D>::NoteLate(VertexId v, std::span<const std::array<VertexId, D>> star) {
+  const size_t begin = late_.size();
+  for (const std::array<VertexId, D>& simplex : star) {
+    for (const VertexId u : simplex) {
+      const LatePair pair{u, v};
+      if (CameAfter(v, u) && std::find(late_.begin() + begin, late_.end(), pair) == late_.end()) {
+        late_.push_back(pair);
+      }
+    }
   }
 }
 
@@ -99,71 +110,39 @@ void StarLists<D>::DropUnused() {
   std::fill(added, added_.end(), static_cast<uint32_t>(listed.size()));
   listed_ = std::move(listed);
   unused_ = 0;
+  std::erase_if(late_, [this](const LatePair& pair) { return !CameAfter(pair.second, pair.first); });
+  MakeUnique(late_);
 }
 
 template <int D>
-absl::StatusOr<LateNeighbours> LateNeighbours::Of(const StarLists<D>& lists, uint32_t vertex_count, int threads,
+absl::StatusOr<LateNeighbours> LateNeighbours::Of(const StarLists<D>& lists, uint32_t vertex_count,
                                                   const RunContext& context) {
-  ThreadTeam team(threads);
-  struct alignas(kCacheLines) Own {
-    std::vector<Late> late;
-    size_t most_late = kLeastLate;
-  };
-  std::vector<Own> of_threads(team.threads());
-  team.ForEach((vertex_count + kVerticesTogether - 1) / kVerticesTogether, [&](size_t block) {
-    auto& [late, most_late] = of_threads[ThreadTeam::CurrentThread()];
-    const uint32_t begin = static_cast<uint32_t>(block) * kVerticesTogether;
-    const uint32_t end = std::min(vertex_count, begin + kVerticesTogether);
-    std::array<VertexId, D + 1> corners;
-    for (uint32_t i = begin; i < end && !context.IsCancelled(); ++i) {
-      corners[D] = VertexId{i};
-      lists.Prefetch(VertexId{i + kAhead}, 1);
-      for (const std::array<VertexId, D>& simplex : lists.Of(corners[D])) {
-        std::copy(simplex.begin(), simplex.end(), corners.begin());
-        if (!lists.SomeCameAfterOthers(corners)) {
-          continue;
-        }
-        for (const VertexId v : corners) {
-          for (const VertexId u : corners) {
-            if (lists.CameAfter(u, v)) {
-              late.emplace_back(v, u);
-            }
-          }
-        }
-      }
-    }
-    // Each pair comes with every simplex that has both.
-    if (late.size() > most_late) {
-      MakeUnique(late);
-      most_late = std::max(kLeastLate, 2 * late.size());
-    }
-  });
   WELLSPACE_RETURN_IF_ERROR(context.Check());
   LateNeighbours found;
-  for (Own& own : of_threads) {
-    found.late_.insert(found.late_.end(), own.late.begin(), own.late.end());
-    own.late = {};
-  }
-  MakeUnique(found.late_);
+  std::vector<LatePair>& late = found.late_;
+  // Who has been looked at again since then knows them.
+  std::copy_if(lists.late().begin(), lists.late().end(), std::back_inserter(late),
+               [&](const LatePair& pair) { return lists.CameAfter(pair.second, pair.first); });
+  MakeUnique(late);
   found.is_at_.resize(vertex_count);
-  for (const Late& late : found.late_) {
-    found.is_at_[Index(late.first)] = true;
+  for (const LatePair& pair : late) {
+    found.is_at_[Index(pair.first)] = true;
   }
   return found;
 }
 
-std::span<const LateNeighbours::Late> LateNeighbours::At(VertexId v) const {
+std::span<const LatePair> LateNeighbours::At(VertexId v) const {
   if (!is_at_[Index(v)]) {
     return {};
   }
-  const auto begin = std::lower_bound(late_.begin(), late_.end(), Late(v, VertexId{0}));
-  const auto end = std::find_if(begin, late_.end(), [v](const Late& late) { return late.first != v; });
+  const auto begin = std::lower_bound(late_.begin(), late_.end(), LatePair(v, VertexId{0}));
+  const auto end = std::find_if(begin, late_.end(), [v](const LatePair& pair) { return pair.first != v; });
   return {begin, end};
 }
 
 #define WELLSPACE_INSTANTIATE(D) \
   template class StarLists<D>;   \
-  template absl::StatusOr<LateNeighbours> LateNeighbours::Of<D>(const StarLists<D>&, uint32_t, int, const RunContext&);
+  template absl::StatusOr<LateNeighbours> LateNeighbours::Of<D>(const StarLists<D>&, uint32_t, const RunContext&);
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 

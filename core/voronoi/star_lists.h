@@ -21,9 +21,13 @@
 
 namespace wellspace::core {
 
+// A vertex, and one that was added after it was last looked at.
+using LatePair = std::pair<VertexId, VertexId>;
+
 // For each vertex, of the star that it had when it was last looked at, the simplices whose vertices had all been looked at before. As
 // vertices are only added, what is a simplex in the end has been one since the last of its vertices came: so the vertex that
-// was looked at last lists it. What it lists beside is spoiled by a vertex that came later. What is listed depends on the stars and on
+// was looked at last lists it. What it lists beside is spoiled by a vertex that came later, which is a neighbour in the end, and so has been one
+// since it came: that is put down when it is looked at. What is listed depends on the stars and on
 // the order in which they were looked at, and, but for the order within a list, not on how they were computed.
 //
 // Thread safety: thread-compatible; const functions may run at once.
@@ -81,20 +85,12 @@ class StarLists {
   // REQUIRES:   v has been looked at.
   bool CameAfter(VertexId u, VertexId v) const { return AddedAt(u) > entries_[Index(v)].begin; }
 
-  // Whether CameAfter holds of any two of them.
-  bool SomeCameAfterOthers(const std::array<VertexId, D + 1>& vertices) const {
-    uint32_t first_look = kNone;
-    uint32_t last_added = 0;
-    for (const VertexId v : vertices) {
-      first_look = std::min(first_look, entries_[Index(v)].begin);
-      last_added = std::max(last_added, AddedAt(v));
-    }
-    return last_added > first_look;
-  }
+  // All pairs of a vertex that lists something and a neighbour that came after its last look, when that was looked at; and others, some of them twice.
+  std::span<const LatePair> late() const { return late_; }
 
   uint64_t MemoryBytes() const {
     return entries_.size() * sizeof(Entry) + added_.size() * sizeof(uint32_t) +
-           listed_.size() * sizeof(std::array<VertexId, D>);
+           listed_.size() * sizeof(std::array<VertexId, D>) + late_.size() * sizeof(LatePair);
   }
 
  private:
@@ -114,6 +110,7 @@ class StarLists {
     return added_[(Index(v) - first_count_ + 1) & -is_new];
   }
   void DropUnused();
+  void NoteLate(VertexId v, std::span<const std::array<VertexId, D>> star);
 
   HugeVector<Entry> entries_;  // by vertex
   // In the order of the looks, which is thus that of the places where lists begin.
@@ -123,35 +120,31 @@ class StarLists {
   // First 0, for vertices below first_count_; then of each vertex from there on the size of listed_ at the next look after it was added: lists that were made before
   // begin below, unless they are empty.
   HugeVector<uint32_t> added_;
+  HugeVector<LatePair> late_;
   bool is_complete_ = true;
 };
 
-// Who shares a listed simplex with a vertex and came after it was last looked at: what it lists may be spoiled by these, and by
-// nobody else.
+// The neighbours of a vertex that came after it was last looked at: what it lists may be spoiled by these, and by nobody else.
 //
 // Thread safety: thread-compatible; const functions may run at once.
 class LateNeighbours {
  public:
-  using Late = std::pair<VertexId, VertexId>;  // a vertex, and one that came after
-
-  // REQUIRES:   all of the `vertex_count` vertices are listed.
-  // Complexity: O(simplices), and sorting those who are late.
+  // REQUIRES:   all of the `vertex_count` vertices have been looked at.
+  // Complexity: O(vertices / 64), and sorting those who are late.
   // Errors:     CANCELLED, DEADLINE_EXCEEDED.
-  // Threads:    uses `threads`, at most as many as the machine has cores.
   template <int D>
-  static absl::StatusOr<LateNeighbours> Of(const StarLists<D>& lists, uint32_t vertex_count, int threads,
-                                           const RunContext& context);
+  static absl::StatusOr<LateNeighbours> Of(const StarLists<D>& lists, uint32_t vertex_count, const RunContext& context);
 
   // Those at `v`, each behind v.
   //
   // Complexity: O(1) if there are none, else O(log of all).
-  std::span<const Late> At(VertexId v) const;
+  std::span<const LatePair> At(VertexId v) const;
 
-  uint64_t MemoryBytes() const { return is_at_.size() / 8 + late_.size() * sizeof(Late); }
+  uint64_t MemoryBytes() const { return is_at_.size() / 8 + late_.size() * sizeof(LatePair); }
 
  private:
-  std::vector<bool> is_at_;  // by vertex: whether anyone is late there
-  std::vector<Late> late_;   // ascending, each once
+  std::vector<bool> is_at_;     // by vertex: whether anyone is late there
+  std::vector<LatePair> late_;  // ascending, each once
 };
 
 }  // namespace wellspace::core
