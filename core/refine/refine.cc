@@ -64,6 +64,7 @@ absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices
   max_vertices_ = max_vertices;
   context_ = &context;
   observer_ = &observer;
+  distrusted_size_ = 0;
   if (demands_ != demands) {
     demands_.reset();
     WELLSPACE_RETURN_IF_ERROR(ScheduleAll(demands, team));

@@ -157,6 +157,7 @@ class Refinement {
   }
   absl::Status ServeRounds();
   absl::Status ServeRound();
+  bool IsForesightTrusted();
   void LookAhead();
   void AwaitOthers();
   void AdmitWaiting();
@@ -195,6 +196,9 @@ class Refinement {
   size_t turn_ = 0;                        // whether the packets of the first half are next, or those of the second
   std::vector<Point<D>> inserted_;         // in these rounds, where they are foreseen, from inserted_before_ on
   size_t inserted_before_ = 0;
+  size_t foreseen_count_ = 0;   // of those who were served, and of these
+  size_t held_count_ = 0;       // those of whom what was foreseen held
+  size_t distrusted_size_ = 0;  // of the last bucket of whose vertices that was not enough; 0 if none
 
   // Of the run.
   double off_center_factor_ = 0;

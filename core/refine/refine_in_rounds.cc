@@ -29,6 +29,9 @@ constexpr size_t kPacket = 128;
 constexpr size_t kParts = 4;
 // What listing a star reads is asked for so many before its turn.
 constexpr size_t kListedAhead = 4;
+// If less than this share of what was foreseen of a bucket held, no more is foreseen of it, nor of others but for those so many times as large.
+constexpr double kLeastShareHeld = 2.0 / 3;
+constexpr size_t kMoreThanDistrusted = 4;
 
 }  // namespace
 
@@ -48,6 +51,8 @@ bool Refinement<D>::BeginRounds(int bucket) {
   }
   round_bucket_ = bucket;
   turn_ = 0;
+  foreseen_count_ = 0;
+  held_count_ = 0;
   inserted_.clear();
   inserted_before_ = 0;
   packets_.resize(kStretches);
@@ -147,9 +152,27 @@ absl::Status Refinement<D>::ServeRound() {
   return absl::OkStatus();
 }
 
-// Has the packets whose turn it is foreseen, unless they are, and other threads begin with those of the other half. What queries read does not change until AdmitWaiting.
+// Whether what is foreseen is likely to hold: in small buckets, and where there are few blocks, packets that are served at about the same time may be near each other.
+template <int D>
+bool Refinement<D>::IsForesightTrusted() {
+  if (foreseen_count_ >= kLeastInRounds && held_count_ < kLeastShareHeld * static_cast<double>(foreseen_count_)) {
+    distrusted_size_ = lifted_.size();
+  }
+  return lifted_.size() > kMoreThanDistrusted * distrusted_size_;
+}
+
+// Has the packets whose turn it is foreseen, unless they are, and other threads begin with those of the other half, if what they foresee is trusted. What queries read does not change until AdmitWaiting.
 template <int D>
 void Refinement<D>::LookAhead() {
+  const std::span<Packet<D>> now = HalfOf(turn_);
+  const std::span<Packet<D>> then = HalfOf(1 - turn_);
+  if (!IsForesightTrusted()) {
+    is_foreseen_ = now.front().is_foreseen;
+    if (!is_foreseen_) {
+      AwaitOthers();  // they may still list stars, which serving does then
+    }
+    return;
+  }
   ListLast();
   round_workspaces_.resize(team_->threads());
   const auto prepare = [this](std::span<Packet<D>> packets) {
@@ -163,8 +186,6 @@ void Refinement<D>::LookAhead() {
   const auto foresee = [this](Packet<D>& packet, size_t part, size_t parts) {
     Foresee(packet, part, parts, round_workspaces_[ThreadTeam::CurrentThread()]);
   };
-  const std::span<Packet<D>> now = HalfOf(turn_);
-  const std::span<Packet<D>> then = HalfOf(1 - turn_);
   if (!now.front().is_foreseen) {
     prepare(now);
     team_->ForEach(now.size(), [&](size_t i) { foresee(now[i], 0, 1); });
@@ -373,8 +394,10 @@ absl::Status Refinement<D>::ServeNext(Packet<D>& packet) {
   schedule_.Take(v);
   absl::Status status = context_->Check();
   if (status.ok()) {
-    status = packet.HoldsFor(packet.served, structure_.point(v)) ? Retrace(packet, packet.served)
-                                                                 : Improve(v, round_bucket_);
+    const bool holds = packet.HoldsFor(packet.served, structure_.point(v));
+    foreseen_count_ += packet.is_foreseen ? 1 : 0;
+    held_count_ += holds ? 1 : 0;
+    status = holds ? Retrace(packet, packet.served) : Improve(v, round_bucket_);
   }
   if (!status.ok()) {
     schedule_.LiftAgain(v, round_bucket_);

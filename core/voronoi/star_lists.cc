@@ -39,22 +39,28 @@ void StarLists<D>::Set(VertexId v, std::span<const std::array<VertexId, D>> star
   entries_.resize(vertex_count);
   added_.resize(vertex_count - first_count_ + 1, begin);
   listed_.resize(begin + star.size());
+  neighbours_.resize(std::max(neighbours_.size(), D * star.size() + 1));
   const uint32_t added_at = AddedAt(v);
+  const Entry* const entries = entries_.data();
+  std::array<VertexId, D>* const listed = listed_.data() + begin;
+  VertexId* const late = neighbours_.data();
+  size_t late_count = 0;
   uint32_t count = 0;
-  uint32_t is_late = 0;
   for (const std::array<VertexId, D>& simplex : star) {
     // No branch, since none could be foretold.
-    listed_[begin + count] = simplex;
-    uint32_t has_all = 1;
+    uint32_t last_look = 0;
     for (const VertexId u : simplex) {
-      has_all &= Has(u) ? 1 : 0;
-      is_late |= added_at > entries_[Index(u)].begin ? 1 : 0;
+      const uint32_t look = entries[Index(u)].begin;
+      last_look = std::max(last_look, look);
+      late[late_count] = u;
+      late_count += added_at > look ? 1 : 0;
     }
-    count += has_all;
+    listed[count] = simplex;
+    count += last_look != kNone ? 1 : 0;
   }
   listed_.resize(begin + count);
-  if (is_late != 0) {
-    NoteLate(v, star);
+  if (late_count != 0) {
+    NoteLate(v, std::span(neighbours_).first(late_count));
   }
   unused_ += std::exchange(entries_[Index(v)], {begin, count}).count;
   if (unused_ > listed_.size() / 2 && kLeastShare * unused_ > entries_.size()) {
@@ -62,16 +68,13 @@ void StarLists<D>::Set(VertexId v, std::span<const std::array<VertexId, D>> star
   }
 }
 
-// Puts down at which neighbours `v` is late.
+// Puts down that `v` is late at neighbours, of whom some are given more than once.
 template <int D>
-void StarLists<D>::NoteLate(VertexId v, std::span<const std::array<VertexId, D>> star) {
-  const size_t begin = late_.size();
-  for (const std::array<VertexId, D>& simplex : star) {
-    for (const VertexId u : simplex) {
-      const LatePair pair{u, v};
-      if (CameAfter(v, u) && std::find(late_.begin() + begin, late_.end(), pair) == late_.end()) {
-        late_.push_back(pair);
-      }
+void StarLists<D>::NoteLate(VertexId v, std::span<const VertexId> neighbours) {
+  const auto begin = static_cast<std::ptrdiff_t>(late_.size());
+  for (const VertexId u : neighbours) {
+    if (std::find(late_.begin() + begin, late_.end(), LatePair(u, v)) == late_.end()) {
+      late_.emplace_back(u, v);
     }
   }
 }

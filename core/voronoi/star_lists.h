@@ -110,7 +110,7 @@ class StarLists {
     return added_[(Index(v) - first_count_ + 1) & -is_new];
   }
   void DropUnused();
-  void NoteLate(VertexId v, std::span<const std::array<VertexId, D>> star);
+  void NoteLate(VertexId v, std::span<const VertexId> neighbours);
 
   HugeVector<Entry> entries_;  // by vertex
   // In the order of the looks, which is thus that of the places where lists begin.
@@ -121,6 +121,7 @@ class StarLists {
   // begin below, unless they are empty.
   HugeVector<uint32_t> added_;
   HugeVector<LatePair> late_;
+  std::vector<VertexId> neighbours_;  // scratch of Set
   bool is_complete_ = true;
 };
 
