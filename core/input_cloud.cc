@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
@@ -146,14 +147,19 @@ class CloudSorter {
     // Until the points are taken their halves are there.
     const std::span<uint32_t> halves = cloud.first_input;
     counts_.assign((count_ + kBlock - 1) / kBlock, {});
-    const auto find_halves = [&](size_t block) { return FindHalves(block, halves); };
-    WELLSPACE_RETURN_IF_ERROR(team_.TryForEach(counts_.size(), find_halves));
-    ShareOut(halves);
     // The corners of the box follow, and as many vertices as are added to most clouds. Of large arrays what is not used takes no memory; of small ones,
     // which share pages, it would.
     const size_t room = counts_.size() > 1 ? count_ + count_ / 4 : count_ / 8;
     cloud.points.reserve(count_ + room + (size_t{1} << D));
-    WELLSPACE_RETURN_IF_ERROR(Resize(cloud.points));
+    absl::Status resized;
+    const auto resize = [&] { resized = Resize(cloud.points); };
+    const absl::Cleanup end = [this] { team_.Drop(); };  // where something is refused
+    counts_.size() > 1 ? team_.BeginCall(resize) : resize();
+    const auto find_halves = [&](size_t block) { return FindHalves(block, halves); };
+    WELLSPACE_RETURN_IF_ERROR(team_.TryForEach(counts_.size(), find_halves));
+    ShareOut(halves);
+    team_.End();
+    WELLSPACE_RETURN_IF_ERROR(resized);
     parts_.resize(part_begins_.size() - 1);
     const auto take_part = [&](size_t part) {
       const absl::Status status = SortPart(part);

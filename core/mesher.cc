@@ -9,10 +9,12 @@
 #include <utility>
 #include <variant>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/dimensions.h"
 #include "core/base/huge_pages.h"
 #include "core/base/status_macros.h"
+#include "core/base/thread_team.h"
 #include "core/input_cloud.h"
 #include "core/mesh_parts.h"
 #include "core/refine/estimate.h"
@@ -247,15 +249,23 @@ class MesherIn final : public Mesher {
   absl::StatusOr<Mesh> Extract(int threads, RunContext& context) override {
     WELLSPACE_RETURN_IF_ERROR(CheckRefined(threads));
     ExtendOutputIndex();
-    WELLSPACE_ASSIGN_OR_RETURN(WeightedSimplices weighted, MakeSimplices(threads, context));
-    Simplices& simplices = weighted.simplices;
     Mesh mesh;
     mesh.dimension = D;
     mesh.domain_low.assign(domain_.box.low.begin(), domain_.box.low.end());
     mesh.domain_high.assign(domain_.box.high.begin(), domain_.box.high.end());
-    WELLSPACE_ASSIGN_OR_RETURN(mesh.points, PointsFrom(0, context));
+    absl::StatusOr<HugeVector<double>> points;
+    // By another thread, meanwhile.
+    ThreadTeam team(threads);
+    const absl::Cleanup end = [&team] { team.Drop(); };  // where something is refused
+    team.BeginCall([&] {
+      points = PointsFrom(0, context);
+      mesh.input_vertex.assign(input_vertex_.begin(), input_vertex_.end());
+    });
+    WELLSPACE_ASSIGN_OR_RETURN(WeightedSimplices weighted, MakeSimplices(threads, context));
+    team.End();
+    WELLSPACE_ASSIGN_OR_RETURN(mesh.points, std::move(points));
+    Simplices& simplices = weighted.simplices;
     mesh.simplices = std::move(simplices.indices);
-    mesh.input_vertex.assign(input_vertex_.begin(), input_vertex_.end());
     mesh.weights = std::move(weighted.weights);
     for (double& weight : mesh.weights) {
       weight /= domain_.scale * domain_.scale;

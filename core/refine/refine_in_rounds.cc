@@ -177,6 +177,9 @@ void Refinement<D>::LookAhead() {
   round_workspaces_.resize(team_->threads());
   const auto prepare = [this](std::span<Packet<D>> packets) {
     for (Packet<D>& packet : packets) {
+      for (const VertexId v : packet.vertices) {
+        schedule_.Prefetch(v);
+      }
       packet.Prepare(structure_.vertex_count(), inserted_before_ + inserted_.size());
       for (size_t i = packet.served; i < packet.vertices.size(); ++i) {
         packet.foreseen[i].is_wanted = schedule_.WaitsIn(packet.vertices[i], round_bucket_);

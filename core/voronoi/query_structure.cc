@@ -170,9 +170,10 @@ VertexId QueryStructure<D>::AddWaiting(VertexId near, const Point<D>& p) {
 
 template <int D>
 void QueryStructure<D>::AdmitWaiting() {
-  for (const VertexId near : near_) {
+  for (size_t i = 0; i < near_.size(); ++i) {
+    PrefetchAhead(std::span(near_), i, [this](VertexId near, int step) { Prefetch(near, step); });
     const VertexId v{tree_.vertex_count()};
-    tree_.Insert(near, v, point(v));
+    tree_.Insert(near_[i], v, point(v));
   }
   near_.clear();
   MakeRoom();
