@@ -69,6 +69,7 @@ class ThreadTeam {
     count_ = count;
     next_ = 0;
     ended_calls_ = 0;
+    has_begun_ = true;
     Release(&begun_);
     arena_.execute([&] {
       for (int thread = 1; thread < threads_; ++thread) {
@@ -81,6 +82,7 @@ class ThreadTeam {
   // wait for it, too, and have to be called before the next such call.
   void BeginCall(std::function<void()> f) {
     call_ = std::move(f);
+    has_begun_ = true;
     Release(&begun_);
     arena_.execute([&] {
       group_.run([this] {
@@ -101,8 +103,11 @@ class ThreadTeam {
   // Whether all calls that have been begun have been made.
   bool HasEnded() const { return ended_calls_ == count_; }
 
-  // Joins in what has been begun, and returns when all calls have. If one throws, so does this, and some are not made.
+  // Joins in what has been begun, if anything has, and returns when all calls have. If one throws, so does this, and some are not made.
   void End() {
+    if (!std::exchange(has_begun_, false)) {
+      return;  // the arena may not even be there
+    }
     const absl::Cleanup acquire = [this] { Acquire(&ended_); };
     arena_.execute([&] { group_.run_and_wait([this] { Work(); }); });
   }
@@ -149,6 +154,7 @@ class ThreadTeam {
   std::function<void()> call_;
   std::function<void(size_t)> f_;
   size_t count_ = 0;
+  bool has_begun_ = false;
   std::atomic<size_t> next_ = 0;
   std::atomic<size_t> ended_calls_ = 0;
   tbb::task_group group_;
