@@ -157,7 +157,6 @@ class Refinement {
   }
   absl::Status ServeRounds();
   absl::Status ServeRound();
-  bool IsForesightTrusted();
   void LookAhead();
   void AwaitOthers();
   void AdmitWaiting();

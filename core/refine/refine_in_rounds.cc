@@ -152,21 +152,13 @@ absl::Status Refinement<D>::ServeRound() {
   return absl::OkStatus();
 }
 
-// Whether what is foreseen is likely to hold: in small buckets, and where there are few blocks, packets that are served at about the same time may be near each other.
-template <int D>
-bool Refinement<D>::IsForesightTrusted() {
-  if (foreseen_count_ >= kLeastInRounds && held_count_ < kLeastShareHeld * static_cast<double>(foreseen_count_)) {
-    distrusted_size_ = lifted_.size();
-  }
-  return lifted_.size() > kMoreThanDistrusted * distrusted_size_;
-}
-
-// Has the packets whose turn it is foreseen, unless they are, and other threads begin with those of the other half, if what they foresee is trusted. What queries read does not change until AdmitWaiting.
+// Has the packets whose turn it is foreseen, unless they are, and other threads begin with those of the other half, if what they foresee is trusted: in small buckets, and where there are few blocks, packets that are served at
+// about the same time may be near each other. What queries read does not change until AdmitWaiting.
 template <int D>
 void Refinement<D>::LookAhead() {
   const std::span<Packet<D>> now = HalfOf(turn_);
   const std::span<Packet<D>> then = HalfOf(1 - turn_);
-  if (!IsForesightTrusted()) {
+  if (lifted_.size() <= kMoreThanDistrusted * distrusted_size_) {
     is_foreseen_ = now.front().is_foreseen;
     if (!is_foreseen_) {
       AwaitOthers();  // they may still list stars, which serving does then
@@ -223,6 +215,9 @@ template <int D>
 void Refinement<D>::EndRound() {
   AwaitOthers();
   is_foreseen_ = false;
+  if (foreseen_count_ >= kLeastInRounds && held_count_ < kLeastShareHeld * static_cast<double>(foreseen_count_)) {
+    distrusted_size_ = lifted_.size();
+  }
   std::swap(listings_, later_listings_);
   std::swap(own_stars_, later_own_stars_);
   for (Packet<D>& packet : HalfOf(turn_)) {

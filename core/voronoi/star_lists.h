@@ -120,7 +120,7 @@ class StarLists {
   // First 0, for vertices below first_count_; then of each vertex from there on the size of listed_ at the next look after it was added: lists that were made before
   // begin below, unless they are empty.
   HugeVector<uint32_t> added_;
-  HugeVector<LatePair> late_;
+  HugeVector<LatePair> late_;         // in the order of the looks, but for those before the last DropUnused
   std::vector<VertexId> neighbours_;  // scratch of Set
   bool is_complete_ = true;
 };
