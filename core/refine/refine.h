@@ -195,9 +195,9 @@ class Refinement {
   size_t turn_ = 0;                        // whether the packets of the first half are next, or those of the second
   std::vector<Point<D>> inserted_;         // in these rounds, where they are foreseen, from inserted_before_ on
   size_t inserted_before_ = 0;
-  size_t foreseen_count_ = 0;   // of those who were served, and of these
-  size_t held_count_ = 0;       // those of whom what was foreseen held
-  size_t distrusted_size_ = 0;  // of the last bucket of whose vertices that was not enough; 0 if none
+  size_t foreseen_count_ = 0;   // of those in the bucket who have been served, how many had been foreseen
+  size_t held_count_ = 0;       // of how many of these that held
+  size_t distrusted_size_ = 0;  // of the last bucket where it held of too few; 0 if none
 
   // Of the run.
   double off_center_factor_ = 0;
