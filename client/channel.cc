@@ -1,8 +1,6 @@
 #include "client/channel.h"
 
 #include <algorithm>
-#include <charconv>
-#include <cstdint>
 #include <fstream>
 #include <optional>
 #include <sstream>
@@ -12,33 +10,13 @@
 #include "absl/status/status.h"
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
+#include "client/address.h"
 #include "grpcpp/create_channel.h"
 #include "grpcpp/security/credentials.h"
 #include "grpcpp/support/client_interceptor.h"
 
 namespace wellspace::client {
 namespace {
-
-// The host of HOST:PORT without brackets; none when `address` is not of that form.
-std::optional<std::string> HostOf(const std::string& address) {
-  const size_t colon = address.rfind(':');
-  if (colon == std::string::npos || colon == 0) {
-    return std::nullopt;
-  }
-  uint16_t port = 0;
-  const char* last = address.data() + address.size();
-  const auto [end, code] = std::from_chars(address.data() + colon + 1, last, port);
-  if (code != std::errc() || end != last || port == 0) {
-    return std::nullopt;
-  }
-  std::string host = address.substr(0, colon);
-  return host.front() == '[' && host.back() == ']' ? host.substr(1, host.size() - 2) : host;
-}
-
-bool IsLoopback(const std::string& host) {
-  const bool ipv4 = host.find_first_not_of("0123456789.") == std::string::npos;
-  return host == "localhost" || host == "::1" || (ipv4 && host.rfind("127.", 0) == 0);
-}
 
 absl::StatusOr<std::string> ReadFile(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
@@ -132,16 +110,24 @@ class TokenSource {
   std::string file_;
 };
 
-// Adds the token to what a call sends; tells servers that cannot be trusted from those that cannot be reached.
+// What a channel knows of its server, for all its calls.
+struct Way {
+  TokenSource token;
+  std::string host;
+  std::optional<Proxy> proxy;
+};
+
+// Adds the token to what a call sends; tells servers that cannot be trusted from those that cannot be reached, and by
+// which proxy that was.
 class CredentialsInterceptor final : public grpc::experimental::Interceptor {
  public:
-  explicit CredentialsInterceptor(const TokenSource& source) : source_(source) {}
+  explicit CredentialsInterceptor(const Way& way) : way_(way) {}
 
   void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
     using grpc::experimental::InterceptionHookPoints;
-    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_INITIAL_METADATA) && source_.exists()) {
+    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_INITIAL_METADATA) && way_.token.exists()) {
       // Without a token that can be read, the server says what it thinks of that.
-      if (const absl::StatusOr<std::string> token = source_.Read(); token.ok()) {
+      if (const absl::StatusOr<std::string> token = way_.token.Read(); token.ok()) {
         methods->GetSendInitialMetadata()->emplace("authorization", absl::StrCat("Bearer ", *token));
       }
     }
@@ -152,39 +138,45 @@ class CredentialsInterceptor final : public grpc::experimental::Interceptor {
   }
 
  private:
-  // gRPC knows only that it could not connect.
-  static void Explain(grpc::Status& status) {
-    if (status.error_code() == grpc::StatusCode::UNAVAILABLE &&
-        status.error_message().find("handshake failed") != std::string::npos) {
-      status = grpc::Status(
-          grpc::StatusCode::UNAUTHENTICATED,
-          absl::StrCat("the server's certificate is not trusted, or it speaks no TLS: ", status.error_message()));
+  // gRPC knows only that it could not connect. What has details is the server's own word.
+  void Explain(grpc::Status& status) const {
+    if (status.error_code() != grpc::StatusCode::UNAVAILABLE || !status.error_details().empty()) {
+      return;
     }
+    const bool is_untrusted = status.error_message().find("handshake failed") != std::string::npos;
+    std::string message = status.error_message();
+    if (is_untrusted) {
+      message = absl::StrCat("the server's certificate is not trusted, or it speaks no TLS: ", message);
+    }
+    if (way_.proxy.has_value()) {
+      absl::StrAppend(&message, "; the way there was by the proxy ", way_.proxy->address, ", as the environment's ",
+                      way_.proxy->variable, " has it; to go without, set no_proxy=", way_.host);
+    }
+    status = grpc::Status(is_untrusted ? grpc::StatusCode::UNAUTHENTICATED : grpc::StatusCode::UNAVAILABLE, message);
   }
 
-  const TokenSource& source_;
+  const Way& way_;
 };
 
 class CredentialsInterceptorFactory final : public grpc::experimental::ClientInterceptorFactoryInterface {
  public:
-  explicit CredentialsInterceptorFactory(TokenSource source) : source_(std::move(source)) {}
+  explicit CredentialsInterceptorFactory(Way way) : way_(std::move(way)) {}
 
   grpc::experimental::Interceptor* CreateClientInterceptor(grpc::experimental::ClientRpcInfo* /*info*/) override {
-    return new CredentialsInterceptor(source_);
+    return new CredentialsInterceptor(way_);
   }
 
  private:
-  const TokenSource source_;
+  const Way way_;
 };
 
 }  // namespace
 
 absl::StatusOr<std::shared_ptr<grpc::Channel>> OpenChannel(const std::string& address, const ConnectOptions& options,
                                                            const grpc::ChannelArguments& arguments) {
-  const std::optional<std::string> host = HostOf(address);
-  if (!host.has_value()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("'", address, "' is no address of a server; expected HOST:PORT with a port from 1 to 65535"));
+  const absl::StatusOr<std::string> host = HostOf(address);
+  if (!host.ok()) {
+    return host.status();
   }
   absl::StatusOr<TokenSource> token = TokenSource::Make(options);
   if (!token.ok()) {
@@ -198,9 +190,16 @@ absl::StatusOr<std::shared_ptr<grpc::Channel>> OpenChannel(const std::string& ad
     return absl::FailedPreconditionError(absl::StrCat("would send the token to ", address,
                                                       " in plain text; use TLS, or allow it with --insecure-remote"));
   }
+  // A proxy's loopback is not this machine's.
+  const bool is_direct = IsLoopback(*host);
+  grpc::ChannelArguments all_arguments = arguments;
+  if (is_direct) {
+    all_arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
+  }
   std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> interceptors;
-  interceptors.push_back(std::make_unique<CredentialsInterceptorFactory>(*std::move(token)));
-  return grpc::experimental::CreateCustomChannelWithInterceptors(address, *credentials, arguments,
+  interceptors.push_back(std::make_unique<CredentialsInterceptorFactory>(
+      Way{*std::move(token), *host, is_direct ? std::nullopt : ProxyFor(*host)}));
+  return grpc::experimental::CreateCustomChannelWithInterceptors(address, *credentials, all_arguments,
                                                                  std::move(interceptors));
 }
 

@@ -12,11 +12,13 @@
 
 namespace wellspace::client {
 
-// A channel to HOST:PORT. Lazy: it connects with the first call. A server whose certificate cannot be trusted ends calls with
-// UNAUTHENTICATED, at once.
+// A channel to HOST:PORT. Lazy: it connects with the first call. A server whose certificate cannot be trusted ends
+// calls with UNAUTHENTICATED, at once. Loopback addresses are reached without a proxy, whatever the environment says;
+// where one is between, the errors of connecting name it.
 //
-// Errors:     INVALID_ARGUMENT: the address; options that contradict each other; a file that has not what it should have.
-//             FAILED_PRECONDITION: the token would leave this machine in plain text. NOT_FOUND: a file cannot be read.
+// Errors:     INVALID_ARGUMENT: the address; options that contradict each other; a file that has not what it should
+//             have. FAILED_PRECONDITION: the token would leave this machine in plain text. NOT_FOUND: a file cannot be
+//             read.
 absl::StatusOr<std::shared_ptr<grpc::Channel>> OpenChannel(const std::string& address, const ConnectOptions& options,
                                                            const grpc::ChannelArguments& arguments);
 
