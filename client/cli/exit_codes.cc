@@ -13,11 +13,12 @@ const char kExitCodesHelp[] =
     "  1    `check` found a violation, or the work failed\n"
     "  2    wrong usage, or a file or a session that is not there or not valid\n"
     "  3    the server cannot be reached, or stopped\n"
-    "  4    a limit of vertices, memory or disk was reached\n"
+    "  4    a limit of vertices, memory or disk was reached, or output could not be written\n"
     "  5    --timeout passed\n"
     "  6    the server wants other credentials, or its certificate is not trusted\n"
     "  7    the session is in another state, or at another revision, than the command needs\n"
-    "  130  interrupted by Ctrl-C (143 by SIGTERM); the work is cancelled, no file is left half written\n";
+    "  130  interrupted by Ctrl-C (143 by SIGTERM, 129 by SIGHUP); the work is cancelled, no file is left half "
+    "written\n";
 
 int ExitCodeOf(const absl::Status& status) {
   switch (status.code()) {

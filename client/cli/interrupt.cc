@@ -10,14 +10,30 @@
 #include <cstdlib>
 
 #include "client/cli/exit_codes.h"
+#include "client/formats/output_file.h"
 
 namespace wellspace::cli {
+namespace {
 
-Interrupt::Interrupt() {
+bool IsIgnored(int signal) {
+  struct sigaction action;
+  return sigaction(signal, nullptr, &action) == 0 && action.sa_handler == SIG_IGN;
+}
+
+// Whether work may end in its own way when the signal comes.
+bool MayStop(int signal) { return signal == SIGINT || signal == SIGTERM || signal == SIGHUP; }
+
+}  // namespace
+
+Interrupt::Interrupt(First first) : first_(first) {
   sigset_t taken;
   sigemptyset(&taken);
-  sigaddset(&taken, SIGINT);
-  sigaddset(&taken, SIGTERM);
+  for (const int signal : {SIGINT, SIGTERM, SIGQUIT, SIGXCPU}) {
+    sigaddset(&taken, signal);
+  }
+  if (!IsIgnored(SIGHUP)) {
+    sigaddset(&taken, SIGHUP);
+  }
   pthread_sigmask(SIG_BLOCK, &taken, &previous_mask_);
   signals_ = signalfd(-1, &taken, SFD_CLOEXEC);
   end_ = eventfd(0, EFD_CLOEXEC);
@@ -47,16 +63,32 @@ void Interrupt::Wait() {
     }
     signalfd_siginfo info;
     if (descriptors[0].revents != 0 && read(signals_, &info, sizeof(info)) == sizeof(info)) {
-      if (signal_.load() != 0) {
-        _exit(kExitSignal + static_cast<int>(info.ssi_signo));
+      const int signal = static_cast<int>(info.ssi_signo);
+      if (first_ == First::kEnd || !MayStop(signal)) {
+        End(signal);
       }
-      signal_.store(static_cast<int>(info.ssi_signo));
+      if (signal_.load() != 0) {
+        formats::RemoveTemporaryFilesForGood();
+        _exit(kExitSignal + signal);
+      }
+      signal_.store(signal);
       stop_.request_stop();
     }
     if (descriptors[1].revents != 0) {
       return;
     }
   }
+}
+
+void Interrupt::End(int signal) {
+  formats::RemoveTemporaryFilesForGood();
+  std::signal(signal, SIG_DFL);
+  sigset_t only;
+  sigemptyset(&only);
+  sigaddset(&only, signal);
+  pthread_sigmask(SIG_UNBLOCK, &only, nullptr);
+  raise(signal);
+  _exit(kExitSignal + signal);
 }
 
 }  // namespace wellspace::cli

@@ -1,4 +1,4 @@
-// Ctrl-C as a stop token.
+// Signals that end the program, without unfinished files left behind.
 #ifndef WELLSPACE_CLIENT_CLI_INTERRUPT_H_
 #define WELLSPACE_CLIENT_CLI_INTERRUPT_H_
 
@@ -9,14 +9,18 @@
 
 namespace wellspace::cli {
 
-// While it lives, the first SIGINT or SIGTERM requests a stop instead of ending the process; the second one ends it at
-// once.
+// While it lives, the first SIGINT, SIGTERM or SIGHUP requests a stop instead of ending the process; the second one
+// ends it, and so does the first SIGQUIT or SIGXCPU. Temporary files (see formats::OutputFile) go before. SIGHUP stays
+// ignored where it is: nohup(1).
 //
 // Signals are blocked and taken from a signalfd, so that no handler runs: threads started after it inherit the mask.
 // REQUIRES:   only the calling thread runs, or the others block these signals too. Thread safety: thread-safe.
 class Interrupt {
  public:
-  Interrupt();
+  // kEnd: the first signal, whichever it is, ends the process: for work that does not look at a stop token.
+  enum class First { kStop, kEnd };
+
+  explicit Interrupt(First first = First::kStop);
   ~Interrupt();
   Interrupt(const Interrupt&) = delete;
   Interrupt& operator=(const Interrupt&) = delete;
@@ -27,7 +31,10 @@ class Interrupt {
 
  private:
   void Wait();
+  // Ends the process as `signal` does by default.
+  [[noreturn]] static void End(int signal);
 
+  const First first_;
   sigset_t previous_mask_;
   int signals_;  // signalfd
   int end_;      // eventfd

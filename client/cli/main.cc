@@ -7,11 +7,17 @@
 
 #include "client/cli/commands/commands.h"
 #include "client/cli/exit_codes.h"
+#include "client/cli/standard_output.h"
 #include "client/cli/usage.h"
+
+// Libraries open descriptors when they are loaded: this runs before them.
+[[gnu::section(".preinit_array"),
+  gnu::used]] static void (*const hold_standard_descriptors)() = wellspace::cli::HoldStandardDescriptors;
 
 int main(int argc, char** argv) {
   using namespace wellspace::cli;
-  std::signal(SIGPIPE, SIG_IGN);                      // a closed pipe is an error of writing, which is reported
+  std::signal(SIGPIPE, SIG_IGN);                      // a closed pipe is an error of writing, which is reported,
+  std::signal(SIGXFSZ, SIG_IGN);                      // and so is the limit of a file's size
   setenv("GRPC_VERBOSITY", "NONE", /*overwrite=*/0);  // errors of connections are told by the commands
   CLI::App app("Quality simplicial meshes from point clouds", "wellspace");
   app.set_version_flag("--version", std::string("wellspace ") + WELLSPACE_VERSION);

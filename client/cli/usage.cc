@@ -4,6 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "client/cli/standard_output.h"
 
 namespace wellspace::cli {
 namespace {
@@ -56,16 +57,19 @@ absl::Status UsageError(const CLI::App& app, const CLI::ParseError& error, const
 }  // namespace
 
 int RunCommandLine(CLI::App& app, std::vector<std::string> arguments, const int& exit_code) {
+  StandardOutput output;
   try {
     std::vector<std::string> reversed(arguments.rbegin(), arguments.rend());
     app.parse(std::move(reversed));
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) {
-      return app.exit(error);  // --help, --version
+    if (error.get_exit_code() != 0) {
+      return ReportError(UsageError(app, error, arguments), FormatAskedFor(arguments));
     }
-    return ReportError(UsageError(app, error, arguments), FormatAskedFor(arguments));
+    app.exit(error);  // --help, --version
   }
-  return exit_code;
+  // What `check` found is lost, too. Other failures were told on standard error.
+  const absl::Status written = output.Flush();
+  return written.ok() || exit_code > kExitFailed ? exit_code : ReportError(written, FormatAskedFor(arguments));
 }
 
 }  // namespace wellspace::cli

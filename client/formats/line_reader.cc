@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "client/formats/file_error.h"
 #include "client/formats/number.h"
 
 namespace wellspace::formats {
@@ -26,12 +27,12 @@ absl::StatusOr<InputFile> InputFile::Open(const std::string& path) {
   }
   const int descriptor = open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (descriptor < 0) {
-    return absl::ErrnoToStatus(errno, absl::StrCat("cannot open ", path));
+    return OpenOrReadError(errno, absl::StrCat("cannot open ", path));
   }
   InputFile file(descriptor, path);
   struct stat attributes;
   if (fstat(descriptor, &attributes) != 0) {
-    return absl::ErrnoToStatus(errno, absl::StrCat("cannot open ", path));
+    return OpenOrReadError(errno, absl::StrCat("cannot open ", path));
   }
   if (S_ISDIR(attributes.st_mode)) {
     return absl::InvalidArgumentError(absl::StrCat("cannot read ", path, ": it is a folder; expected a file"));
@@ -55,7 +56,7 @@ absl::StatusOr<size_t> InputFile::Read(char* buffer, size_t size) {
       return static_cast<size_t>(got);
     }
     if (errno != EINTR) {
-      return absl::ErrnoToStatus(errno, absl::StrCat("cannot read ", name_));
+      return OpenOrReadError(errno, absl::StrCat("cannot read ", name_));
     }
   }
 }
@@ -92,7 +93,7 @@ absl::StatusOr<size_t> InputFile::ReadAt(uint64_t offset, char* buffer, size_t s
       return static_cast<size_t>(got);
     }
     if (errno != EINTR) {
-      return absl::ErrnoToStatus(errno, absl::StrCat("cannot read ", name_));
+      return OpenOrReadError(errno, absl::StrCat("cannot read ", name_));
     }
   }
 }

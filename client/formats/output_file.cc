@@ -1,6 +1,7 @@
 #include "client/formats/output_file.h"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -8,19 +9,68 @@
 #include <climits>
 #include <cstdio>
 #include <cstdlib>
+#include <mutex>
+#include <set>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "client/formats/file_error.h"
 #include "client/formats/line_reader.h"
 
 namespace wellspace::formats {
 namespace {
 
 constexpr size_t kBufferBytes = 1 << 18;
+constexpr int kPollMilliseconds = 100;
 
-absl::Status WriteError(int error, const std::string& path) {
-  return absl::ErrnoToStatus(error, absl::StrCat("cannot write ", path));
-}
+// The temporary files of this process.
+//
+// Thread safety: thread-safe. Never destroyed: a signal may come at the very end.
+class TemporaryFiles {
+ public:
+  static TemporaryFiles& OfProcess() {
+    static TemporaryFiles& files = *new TemporaryFiles;
+    return files;
+  }
+
+  // Opens a new file and notes its name. The system's error is in errno where the descriptor is below 0.
+  int Create(const std::string& name) {
+    const std::lock_guard lock(mutex_);
+    // O_EXCL makes the name ours; the mode leaves the rights to the umask, as for any file.
+    const int descriptor = open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (descriptor >= 0) {
+      names_.insert(name);
+    }
+    return descriptor;
+  }
+
+  // Gives the file its name. False, and errno: it could not.
+  bool Rename(const std::string& name, const std::string& wanted) {
+    const std::lock_guard lock(mutex_);
+    if (std::rename(name.c_str(), wanted.c_str()) != 0) {
+      return false;
+    }
+    names_.erase(name);
+    return true;
+  }
+
+  void Remove(const std::string& name) {
+    const std::lock_guard lock(mutex_);
+    unlink(name.c_str());
+    names_.erase(name);
+  }
+
+  void RemoveAllForGood() {
+    mutex_.lock();  // and never unlocked
+    for (const std::string& name : names_) {
+      unlink(name.c_str());
+    }
+  }
+
+ private:
+  std::mutex mutex_;
+  std::set<std::string> names_;
+};
 
 // The file that `path` leads to, so that a rename replaces the file and not the link to it.
 std::string ResolveLinks(const std::string& path) {
@@ -28,7 +78,13 @@ std::string ResolveLinks(const std::string& path) {
   return realpath(path.c_str(), resolved) != nullptr ? std::string(resolved) : path;
 }
 
+absl::Status CreationError(int error, const std::string& path) {
+  return OpenOrReadError(error, absl::StrCat("cannot write ", path));
+}
+
 }  // namespace
+
+void RemoveTemporaryFilesForGood() { TemporaryFiles::OfProcess().RemoveAllForGood(); }
 
 absl::StatusOr<OutputFile> OutputFile::Create(const std::string& path, std::stop_token stop) {
   if (path == kStandardStream) {
@@ -42,20 +98,19 @@ absl::StatusOr<OutputFile> OutputFile::Create(const std::string& path, std::stop
   if (exists && !S_ISREG(attributes.st_mode)) {
     const int descriptor = open(path.c_str(), O_WRONLY | O_CLOEXEC);
     if (descriptor < 0) {
-      return WriteError(errno, path);
+      return CreationError(errno, path);
     }
     return OutputFile(descriptor, path, "", std::move(stop));
   }
   const std::string target = ResolveLinks(path);
-  // O_EXCL makes the name ours; the mode leaves the rights to the umask, as for any file.
   for (int attempt = 0;; ++attempt) {
     const std::string temporary = absl::StrCat(target, ".", getpid(), "-", attempt, ".tmp");
-    const int descriptor = open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    const int descriptor = TemporaryFiles::OfProcess().Create(temporary);
     if (descriptor >= 0) {
       return OutputFile(descriptor, target, temporary, std::move(stop));
     }
     if (errno != EEXIST) {
-      return WriteError(errno, path);
+      return CreationError(errno, path);
     }
   }
 }
@@ -79,8 +134,12 @@ OutputFile::~OutputFile() {
     close(descriptor_);
   }
   if (!temporary_.empty()) {
-    unlink(temporary_.c_str());
+    TemporaryFiles::OfProcess().Remove(temporary_);
   }
+}
+
+absl::Status OutputFile::CannotWrite(int error) const {
+  return WriteError(error, absl::StrCat("cannot write ", path_));
 }
 
 void OutputFile::Write(std::string_view bytes) {
@@ -105,8 +164,13 @@ void OutputFile::Send(std::string_view bytes) {
     const ssize_t sent = write(descriptor_, bytes.data(), bytes.size());
     if (sent >= 0) {
       bytes.remove_prefix(sent);
+    } else if (errno == EAGAIN) {
+      // Standard output is shared, and another process has made it non-blocking. Now and then a request to stop is
+      // heard.
+      pollfd room = {.fd = descriptor_, .events = POLLOUT, .revents = 0};
+      poll(&room, 1, kPollMilliseconds);
     } else if (errno != EINTR) {
-      status_ = WriteError(errno, path_);
+      status_ = CannotWrite(errno);
     }
   }
 }
@@ -119,7 +183,7 @@ void OutputFile::Overwrite(uint64_t offset, std::string_view bytes) {
       bytes.remove_prefix(sent);
       offset += sent;
     } else if (errno != EINTR) {
-      status_ = WriteError(errno, path_);
+      status_ = CannotWrite(errno);
     }
   }
 }
@@ -136,11 +200,11 @@ absl::Status OutputFile::Commit() {
   }
   // Some file systems report a failed write only here.
   if (descriptor_ > STDERR_FILENO && close(std::exchange(descriptor_, -1)) != 0) {
-    return WriteError(errno, path_);
+    return CannotWrite(errno);
   }
   if (!temporary_.empty()) {
-    if (std::rename(temporary_.c_str(), path_.c_str()) != 0) {
-      return WriteError(errno, path_);
+    if (!TemporaryFiles::OfProcess().Rename(temporary_, path_)) {
+      return CannotWrite(errno);
     }
     temporary_.clear();
   }

@@ -16,7 +16,9 @@ namespace wellspace::formats {
 // and the wanted one stays as it was. "-" is standard output; that, and what is no regular file (a pipe, a device), is
 // written directly.
 //
-// Errors are kept: after the first one, writes do nothing and Commit returns it.
+// Errors are kept: after the first one, writes do nothing and Commit returns it. RESOURCE_EXHAUSTED: it could not be
+// written; see WriteError. Of Create, those of OpenOrReadError. A process that ignores SIGPIPE and SIGXFSZ gets errors
+// in their place.
 //
 // Thread safety: thread-compatible.
 class OutputFile {
@@ -46,6 +48,7 @@ class OutputFile {
  private:
   OutputFile(int descriptor, std::string path, std::string temporary, std::stop_token stop);
   void Send(std::string_view bytes);
+  absl::Status CannotWrite(int error) const;
 
   int descriptor_;
   std::string path_;
@@ -55,6 +58,10 @@ class OutputFile {
   uint64_t size_ = 0;
   absl::Status status_;
 };
+
+// Unlinks the temporary files of this process, and lets none come or get its name any more: who tries waits for ever.
+// To be called before a signal ends the process, by a thread, not by a handler of signals.
+void RemoveTemporaryFilesForGood();
 
 }  // namespace wellspace::formats
 

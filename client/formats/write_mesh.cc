@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/cloud.h"
+#include "client/formats/file_error.h"
 #include "client/formats/line_reader.h"
 #include "client/formats/mesh_writers.h"
 #include "client/formats/registry.h"
@@ -89,7 +90,7 @@ absl::Status CheckMeshOutput(const std::string& path, const std::string& format,
         absl::StrCat("cannot write ", path, ": ", writer->needs_file, "; expected the name of a regular file"));
   }
   if (access(is_device ? path.c_str() : folder.c_str(), W_OK) != 0) {
-    return absl::ErrnoToStatus(errno, absl::StrCat("cannot write ", path));
+    return OpenOrReadError(errno, absl::StrCat("cannot write ", path));
   }
   return absl::OkStatus();
 }

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "client/formats/file_error.h"
 #include "client/formats/mesh_writers.h"
 #include "client/formats/output_file.h"
 
@@ -178,8 +179,8 @@ class HdfFile {
   void Check(bool ok) {
     if (!ok && status_.ok()) {
       const std::string message = absl::StrCat("cannot write ", path_);
-      status_ = errno != 0 ? absl::ErrnoToStatus(errno, message)
-                           : absl::InternalError(absl::StrCat(message, ": HDF5 says no more"));
+      status_ =
+          errno != 0 ? WriteError(errno, message) : absl::InternalError(absl::StrCat(message, ": HDF5 says no more"));
     }
   }
 

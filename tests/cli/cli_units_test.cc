@@ -12,6 +12,8 @@
 #include "client/cli/options.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/statistics.h"
+#include "client/formats/output_file.h"
+#include "tests/formats/temporary_folder.h"
 
 namespace wellspace::cli {
 namespace {
@@ -178,7 +180,7 @@ TEST(InterruptTest, FirstSignalRequestsAStopAndTheOldMaskReturns) {
   sigset_t before;
   sigset_t after;
   pthread_sigmask(SIG_SETMASK, nullptr, &before);
-  for (const int signal : {SIGINT, SIGTERM}) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     Interrupt interrupt;
     EXPECT_EQ(interrupt.signal(), 0);
     EXPECT_FALSE(interrupt.token().stop_requested());
@@ -208,6 +210,31 @@ TEST(InterruptDeathTest, SecondSignalEndsTheProcess) {
         }
       },
       testing::ExitedWithCode(130), "");
+}
+
+// `check` and `render` write pictures, and look at no stop token.
+TEST(InterruptDeathTest, SignalsThatEndTheProcessLeaveNoTemporaryFile) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  TemporaryFolder folder;
+  for (const auto& [signal, first] :
+       {std::pair(SIGINT, Interrupt::First::kEnd), std::pair(SIGTERM, Interrupt::First::kEnd),
+        std::pair(SIGHUP, Interrupt::First::kEnd), std::pair(SIGXCPU, Interrupt::First::kStop)}) {
+    EXPECT_EXIT(
+        {
+          const Interrupt interrupt(first);
+          absl::StatusOr<formats::OutputFile> file = formats::OutputFile::Create(folder.Path("picture.svg"));
+          file->Write("<svg>");
+          if (!file->Flush().ok() || folder.FileCount() != 1) {
+            _exit(1);
+          }
+          kill(getpid(), signal);
+          while (true) {
+            pause();
+          }
+        },
+        testing::KilledBySignal(signal), "");
+    EXPECT_EQ(folder.FileCount(), 0) << signal;
+  }
 }
 
 }  // namespace

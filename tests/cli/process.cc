@@ -35,6 +35,9 @@ std::vector<char*> Pointers(std::vector<std::string>& strings) {
 
 Process::Process(const std::vector<std::string>& arguments, const RunOptions& options) {
   std::vector<std::string> words = {Program()};
+  if (!options.shell.empty()) {
+    words = {"/bin/sh", "-c", options.shell + "; exec \"$0\" \"$@\"", Program()};
+  }
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<std::string> environment = options.environment;
   for (char** variable = environ; *variable != nullptr; ++variable) {
@@ -46,7 +49,11 @@ Process::Process(const std::vector<std::string>& arguments, const RunOptions& op
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, input.c_str(), O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, folder_.Path("out").c_str(), O_WRONLY | O_CREAT, 0600);
+  if (options.output_descriptor >= 0) {
+    posix_spawn_file_actions_adddup2(&actions, options.output_descriptor, STDOUT_FILENO);
+  } else {
+    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, folder_.Path("out").c_str(), O_WRONLY | O_CREAT, 0600);
+  }
   if (options.error_descriptor >= 0) {
     posix_spawn_file_actions_adddup2(&actions, options.error_descriptor, STDERR_FILENO);
   } else {

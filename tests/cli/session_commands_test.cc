@@ -1,7 +1,11 @@
 // The commands about sessions from the outside, with a server of the test's making.
+#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
 #include <signal.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <future>
 #include <nlohmann/json.hpp>
@@ -25,6 +29,7 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 constexpr char kSession[] = "sessions/one";
@@ -53,6 +58,29 @@ v1::Operation MakeOperation(v1::Operation::State state) {
   operation.set_mesh_revision(3);
   return operation;
 }
+
+// A port of the loopback that is bound, and that no process listens to.
+class TcpPort {
+ public:
+  TcpPort() : socket_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_in address = {};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t length = sizeof(address);
+    EXPECT_EQ(bind(socket_, reinterpret_cast<sockaddr*>(&address), length), 0);
+    EXPECT_EQ(getsockname(socket_, reinterpret_cast<sockaddr*>(&address), &length), 0);
+    number_ = ntohs(address.sin_port);
+  }
+  ~TcpPort() { close(socket_); }
+  TcpPort(const TcpPort&) = delete;
+  TcpPort& operator=(const TcpPort&) = delete;
+
+  uint16_t number() const { return number_; }
+
+ private:
+  int socket_;
+  uint16_t number_ = 0;
+};
 
 class SessionCommandsTest : public testing::Test {
  protected:
@@ -518,6 +546,88 @@ TEST_F(SessionCommandsTest, TimeoutIsExitCode5AndLeavesTheOperationAlone) {
     return grpc::Status::CANCELLED;
   };
   EXPECT_EQ(Run({"watch", kOperation, "--timeout", "0.2"}).exit_code, 5);
+}
+
+TEST_F(SessionCommandsTest, ResultsThatCannotBePrintedAreExitCode4) {
+  OperationsEndAs(MakeOperation(v1::Operation::STATE_SUCCEEDED));
+  server_.sessions.list = [](const v1::ListSessionsRequest&, v1::ListSessionsResponse& response) {
+    *response.add_sessions() = MakeSession();
+    return grpc::Status::OK;
+  };
+  server_.queries.add = [](const v1::AddVerticesRequest&, v1::AddVerticesResponse& response) {
+    response.add_vertices(8);
+    return grpc::Status::OK;
+  };
+  server_.queries.nearest = [](grpc::ServerContext&, const auto&, auto& writer) {
+    v1::ApproximateNearestNeighborsResponse response;
+    response.add_distances(0.5);
+    writer.Write(response);
+    return grpc::Status::OK;
+  };
+  const std::vector<std::vector<std::string>> printing = {
+      {"session", "list"},
+      {"session", "list", "--output", "json"},
+      {"session", "show", "one"},
+      {"session", "show", "one", "--output", "json"},
+      {"refine", "one"},
+      {"refine", "one", "--output", "json"},
+      {"refine", "one", "--detach"},
+      {"watch", kOperation},
+      {"watch", kOperation, "--output", "json"},
+      {"add", "one", folder_.Write("points.csv", "1,2\n")},
+      {"cells", "one", "--nearest", "0"},
+  };
+  for (const std::vector<std::string>& arguments : printing) {
+    EXPECT_EQ(Run(arguments).exit_code, 0) << testing::PrintToString(arguments);
+    const RunResult full = RunWellspace(arguments, {.input = "",
+                                                    .environment = {"WELLSPACE_SERVER=" + server_.address()},
+                                                    .error_descriptor = -1,
+                                                    .shell = "exec >/dev/full"});
+    EXPECT_EQ(full.exit_code, 4) << testing::PrintToString(arguments);
+    EXPECT_THAT(full.err, HasSubstr("cannot write <stdout>: No space left")) << testing::PrintToString(arguments);
+  }
+}
+
+// It would go on as long as the operation does.
+TEST_F(SessionCommandsTest, AWatchWhoseEventsCannotBePrintedEnds) {
+  OperationsEndAs({});
+  server_.operations.watch = [](grpc::ServerContext& context, const auto&, auto& writer) {
+    v1::WatchOperationResponse response;
+    response.mutable_progress()->set_phase(v1::PHASE_REFINEMENT);
+    while (!context.IsCancelled() && writer.Write(response)) {
+    }
+    return grpc::Status::CANCELLED;
+  };
+  const RunResult result =
+      RunWellspace({"watch", kOperation, "--output", "json"}, {.input = "",
+                                                               .environment = {"WELLSPACE_SERVER=" + server_.address()},
+                                                               .error_descriptor = -1,
+                                                               .shell = "exec >/dev/full"});
+  EXPECT_EQ(result.exit_code, 4) << result.err;
+}
+
+// Nothing is behind the proxy: who goes there gets nowhere.
+TEST_F(SessionCommandsTest, AProxyOfTheEnvironmentIsNotForTheLoopbackAndIsNamed) {
+  const TcpPort closed;
+  const std::string proxy = "127.0.0.1:" + std::to_string(closed.number());
+  for (const char* variable : {"http_proxy", "https_proxy", "grpc_proxy"}) {
+    const std::vector<std::string> environment = {std::string(variable) + "=http://me:secret@" + proxy,
+                                                  "no_proxy=none"};
+    const RunResult near = RunWellspace({"session", "show", "one", "--server", server_.address()},
+                                        {.input = "", .environment = environment, .error_descriptor = -1});
+    EXPECT_EQ(near.exit_code, 0) << variable << near.err;
+    const RunResult far = RunWellspace({"server", "health", "--server", "mesher.invalid:7233"},
+                                       {.input = "", .environment = environment, .error_descriptor = -1});
+    EXPECT_EQ(far.exit_code, 3) << variable << far.err;
+    EXPECT_THAT(far.err, AllOf(HasSubstr("server mesher.invalid:7233: "), HasSubstr("by the proxy http://" + proxy),
+                               HasSubstr(variable), HasSubstr("no_proxy=mesher.invalid"), Not(HasSubstr("secret"))));
+  }
+}
+
+TEST_F(SessionCommandsTest, AUrlIsNoAddress) {
+  const RunResult result = RunWellspace({"server", "health", "--server", "http://" + server_.address()});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("expected HOST:PORT without http://, " + server_.address()));
 }
 
 }  // namespace

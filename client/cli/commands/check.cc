@@ -11,6 +11,7 @@
 #include "absl/strings/str_format.h"
 #include "client/cli/commands/commands.h"
 #include "client/cli/exit_codes.h"
+#include "client/cli/interrupt.h"
 #include "client/cli/options.h"
 #include "client/cli/parameter_options.h"
 #include "client/cli/progress_bar.h"
@@ -246,7 +247,10 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
   check->add_option("--plot", command->plot_path, "Draw histograms of angles and radius-edge ratios, .png or .svg")
       ->type_name("FILE");
   AddOutput(*check, command->format);
-  check->callback([command, &exit_code] { exit_code = command->Run(); });
+  check->callback([command, &exit_code] {
+    const Interrupt interrupt(Interrupt::First::kEnd);
+    exit_code = command->Run();
+  });
 }
 
 }  // namespace wellspace::cli

@@ -18,8 +18,8 @@ void AddCompletionCommands(CLI::App& app, int& exit_code) {
       "  wellspace completion bash > ~/.local/share/bash-completion/completions/wellspace\n");
   completion->add_option("SHELL", *shell, "The shell")->required()->check(CLI::IsMember({"bash"}));
   completion->callback([&app, shell, &exit_code] {
-    std::cout << BashCompletion(app) << std::flush;
-    exit_code = std::cout ? kExitOk : kExitFailed;
+    std::cout << BashCompletion(app);
+    exit_code = kExitOk;
   });
 
   CLI::App* manual = app.add_subcommand("manual", "Print the manual page wellspace(1)");
@@ -27,8 +27,8 @@ void AddCompletionCommands(CLI::App& app, int& exit_code) {
       "Example:\n"
       "  wellspace manual | man -l -\n");
   manual->callback([&app, &exit_code] {
-    std::cout << ManualPage(app, WELLSPACE_VERSION) << std::flush;
-    exit_code = std::cout ? kExitOk : kExitFailed;
+    std::cout << ManualPage(app, WELLSPACE_VERSION);
+    exit_code = kExitOk;
   });
 }
 

@@ -1,6 +1,7 @@
 // wellspace refine, watch, cancel: the long work on a session.
 #include <iostream>
 #include <memory>
+#include <stop_token>
 #include <string>
 
 #include "absl/strings/str_cat.h"
@@ -25,13 +26,20 @@ absl::Status EndOf(const client::Operation& operation) {
 absl::StatusOr<client::Operation> Follow(client::Client& client, const RemoteCommand& remote, const std::string& name,
                                          const client::CallOptions& call, bool prints_events) {
   ProgressBar bar(!remote.quiet() && !remote.json());
+  std::stop_source stop;
+  const std::stop_callback forward(call.stop, [&stop] { stop.request_stop(); });
   const auto on_progress = [&](const client::Progress& progress) {
     if (prints_events && remote.json()) {
       PrintJson(ProgressJson(progress), /*indented=*/false);
+      if (!std::cout) {
+        stop.request_stop();  // what comes could not be printed either
+      }
     }
     bar.Update(progress);
   };
-  return client.WatchOperation(name, on_progress, std::nullopt, call);
+  client::CallOptions stoppable = call;
+  stoppable.stop = stop.get_token();
+  return client.WatchOperation(name, on_progress, std::nullopt, stoppable);
 }
 
 void PrintEnd(const RemoteCommand& remote, const client::Operation& operation, bool indented) {
@@ -123,6 +131,9 @@ int OperationCommand::Watch() const {
       return operation.status();
     }
     const absl::StatusOr<client::Operation> ended = Follow(client, remote, *operation, call, /*prints_events=*/true);
+    if (!std::cout) {
+      return absl::OkStatus();  // told at the end, see StandardOutput
+    }
     if (!ended.ok()) {
       return ended.status();
     }

@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/cli/commands/commands.h"
 #include "client/cli/exit_codes.h"
+#include "client/cli/interrupt.h"
 #include "client/cli/options.h"
 #include "client/cli/remote_command.h"
 #include "client/cli/render/painter.h"
@@ -78,6 +79,7 @@ void AddRenderCommand(CLI::App& app, int& exit_code) {
       ->check(CLI::IsMember({"x", "y", "z"}));
   AddOutput(*render, command->format);
   render->callback([command, &exit_code] {
+    const Interrupt interrupt(Interrupt::First::kEnd);
     const absl::Status status = command->Render();
     exit_code = status.ok() ? kExitOk : ReportError(status, command->format);
   });
