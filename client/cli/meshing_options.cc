@@ -42,6 +42,15 @@ bool MeshingOptions::has_figures_on_stdout() const { return statistics_ == forma
 
 absl::Status MeshingOptions::Check() const { return parameters_.Check(); }
 
+void MeshingOptions::AddFilesTo(formats::FilePlan& files) const {
+  files.Reads("IN", input_);
+  remote_.AddFilesTo(files);
+  files.Writes("--stats", statistics_);
+  if (remote_.json() && statistics_ != formats::kStandardStream) {
+    files.Writes("--output json", std::string(formats::kStandardStream));
+  }
+}
+
 int MeshingOptions::Run(const Work& work) {
   const absl::StatusOr<formats::PointCloud> cloud =
       formats::ReadCloud(input_, {.format = input_format_, .dimension = dimension()});

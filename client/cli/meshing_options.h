@@ -13,6 +13,7 @@
 #include "client/cli/remote_command.h"
 #include "client/client.h"
 #include "client/formats/cloud.h"
+#include "client/formats/file_plan.h"
 
 namespace wellspace::cli {
 
@@ -42,8 +43,11 @@ class MeshingOptions {
   // Whether figures go to standard output.
   bool has_figures_on_stdout() const;
 
-  // What can be known to be wrong before anything is read.
+  // What can be known to be wrong with the options before anything is read.
   absl::Status Check() const;
+
+  // Adds the files that are read, and those that WriteStatistics writes.
+  void AddFilesTo(formats::FilePlan& files) const;
 
   // What is done with a cloud; an error is explained in terms of its file and of the options.
   using Work = std::function<absl::Status(client::Client&, const client::MeshOptions&, const formats::PointCloud&,

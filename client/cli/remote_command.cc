@@ -65,6 +65,13 @@ absl::Duration RemoteCommand::timeout() const {
   return timeout_seconds_ > 0 ? absl::Seconds(timeout_seconds_) : absl::InfiniteDuration();
 }
 
+void RemoteCommand::AddFilesTo(formats::FilePlan& files) const {
+  files.Reads("--tls-ca", server_.connect.tls_ca);
+  files.Reads("--tls-cert", server_.connect.tls_certificate);
+  files.Reads("--tls-key", server_.connect.tls_key);
+  files.Reads("--token-file", server_.connect.token_file);
+}
+
 absl::Status RemoteCommand::Explain(const absl::Status& status) const {
   if (status.code() == absl::StatusCode::kDeadlineExceeded && timeout_seconds_ > 0) {
     return absl::DeadlineExceededError(absl::StrCat("--timeout: ", timeout_seconds_, " seconds passed"));

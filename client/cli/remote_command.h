@@ -13,6 +13,7 @@
 #include "client/cli/server_link.h"
 #include "client/client.h"
 #include "client/formats/cloud.h"
+#include "client/formats/file_plan.h"
 
 namespace wellspace::cli {
 
@@ -42,6 +43,9 @@ class RemoteCommand {
   bool json() const { return format_ == OutputFormat::kJson; }
   OutputFormat format() const { return format_; }
   absl::Duration timeout() const;
+
+  // Adds the files of credentials.
+  void AddFilesTo(formats::FilePlan& files) const;
 
   using Work = std::function<absl::Status(client::Client&, const client::CallOptions&, const Interrupt&)>;
   // Opens the server and does `work`, whose call options have the deadline and stop at Ctrl-C. Returns the exit code, errors

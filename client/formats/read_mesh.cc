@@ -5,6 +5,7 @@
 
 #include "client/formats/line_reader.h"
 #include "client/formats/mesh_readers.h"
+#include "client/formats/mesh_writers.h"
 #include "client/formats/registry.h"
 
 namespace wellspace::formats {
@@ -31,6 +32,14 @@ absl::StatusOr<Mesh> ReadMesh(const std::string& path) {
     return row.status();
   }
   return (*row)->handler(path);
+}
+
+std::vector<std::string> FilesOfMeshRead(const std::string& path) {
+  const auto row = FindFormat(Readers(), path, path == kStandardStream ? "vtu" : "");
+  if (row.ok() && (*row)->handler == ReadNodeAndEle) {
+    return {WithExtension(path, ".node"), WithExtension(path, ".ele")};
+  }
+  return {path};
 }
 
 }  // namespace wellspace::formats

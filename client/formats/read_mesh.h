@@ -17,6 +17,7 @@
 #define WELLSPACE_CLIENT_FORMATS_READ_MESH_H_
 
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "client/formats/mesh.h"
@@ -29,6 +30,9 @@ namespace wellspace::formats {
 //             is checked: the simplices need not form a mesh.
 // Errors:     of opening and reading; INVALID_ARGUMENT "FILE:LINE: …" for what is not such a mesh.
 absl::StatusOr<Mesh> ReadMesh(const std::string& path);
+
+// The files that ReadMesh reads: `path`, or a pair.
+std::vector<std::string> FilesOfMeshRead(const std::string& path);
 
 }  // namespace wellspace::formats
 

@@ -69,6 +69,14 @@ absl::StatusOr<WriterKind> FindWriter(const std::string& path, const std::string
 
 std::vector<std::string> MeshFormats() { return FormatNames(Writers()); }
 
+std::vector<std::string> FilesOfMeshWritten(const std::string& path, const std::string& format) {
+  const absl::StatusOr<WriterKind> writer = FindWriter(path, format, /*dimension=*/0, /*has_weights=*/false);
+  if (writer.ok() && writer->create == CreateNodeAndEle) {
+    return {WithExtension(path, ".node"), WithExtension(path, ".ele")};
+  }
+  return {path};
+}
+
 absl::Status CheckMeshOutput(const std::string& path, const std::string& format, int dimension, bool may_have_weights) {
   const absl::StatusOr<WriterKind> writer = FindWriter(path, format, dimension, may_have_weights);
   if (!writer.ok()) {

@@ -33,6 +33,9 @@ namespace wellspace::formats {
 // The names that `format` may take below.
 std::vector<std::string> MeshFormats();
 
+// The files that WriteMesh makes of `path` and `format`: that one, or a pair. What cannot be written is taken for one file.
+std::vector<std::string> FilesOfMeshWritten(const std::string& path, const std::string& format);
+
 // Tells early whether WriteMesh would refuse `path` and `format` for a mesh of `dimension` (0: not known yet) that may have weights,
 // as far as that can be known without writing.
 absl::Status CheckMeshOutput(const std::string& path, const std::string& format, int dimension = 0,

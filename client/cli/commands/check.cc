@@ -18,6 +18,8 @@
 #include "client/cli/remote_command.h"
 #include "client/cli/render/histograms.h"
 #include "client/cli/render/picture_format.h"
+#include "client/formats/file_plan.h"
+#include "client/formats/line_reader.h"
 #include "client/formats/read_cloud.h"
 #include "client/formats/read_mesh.h"
 #include "core/simplex/validate.h"
@@ -151,6 +153,14 @@ int CheckCommand::Run() const {
       plot_path.empty() ? render::PictureFormat::kPng : render::PictureFormatOf(plot_path);
   if (!plot_format.ok()) {
     return ReportError(plot_format.status(), format);
+  }
+  formats::FilePlan files;
+  files.ReadsMesh("MESH", mesh_path);
+  files.Reads("--cloud", cloud_path);
+  files.Writes("--plot", plot_path);
+  files.Writes("the figures", std::string(formats::kStandardStream));
+  if (const absl::Status status = files.Check(); !status.ok()) {
+    return ReportError(status, format);
   }
   const absl::StatusOr<formats::Mesh> mesh = formats::ReadMesh(mesh_path);
   if (!mesh.ok()) {

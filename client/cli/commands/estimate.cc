@@ -1,12 +1,15 @@
 // wellspace estimate: how large would the mesh of a cloud be?
 #include <iostream>
 #include <memory>
+#include <string>
 
 #include "absl/strings/str_cat.h"
 #include "client/cli/commands/commands.h"
 #include "client/cli/exit_codes.h"
 #include "client/cli/meshing_options.h"
 #include "client/cli/statistics.h"
+#include "client/formats/file_plan.h"
+#include "client/formats/line_reader.h"
 
 namespace wellspace::cli {
 namespace {
@@ -16,8 +19,20 @@ constexpr char kFooter[] =
     "  wellspace estimate cow.csv --size 0.01\n"
     "  wellspace estimate cow.csv --stats - --server mesher:7233\n";
 
+absl::Status CheckOptions(const MeshingOptions& options) {
+  if (absl::Status status = options.Check(); !status.ok()) {
+    return status;
+  }
+  formats::FilePlan files;
+  options.AddFilesTo(files);
+  if (!options.remote().quiet() && !options.has_figures_on_stdout()) {
+    files.Writes("the estimate", std::string(formats::kStandardStream));
+  }
+  return files.Check();
+}
+
 int RunEstimate(MeshingOptions& options) {
-  if (const absl::Status status = options.Check(); !status.ok()) {
+  if (const absl::Status status = CheckOptions(options); !status.ok()) {
     return ReportError(status, options.remote().format());
   }
   return options.Run([&options](client::Client& client, const client::MeshOptions& mesh_options,

@@ -10,6 +10,7 @@
 #include "client/cli/progress_bar.h"
 #include "client/cli/statistics.h"
 #include "client/files/mesh_file.h"
+#include "client/formats/file_plan.h"
 #include "client/formats/line_reader.h"
 #include "client/formats/write_mesh.h"
 
@@ -40,7 +41,13 @@ absl::Status MeshCommand::CheckOptions() const {
   if (options.has_figures_on_stdout() && output == formats::kStandardStream) {
     return absl::InvalidArgumentError("--stats or --output json, and --out: only one of them can be standard output");
   }
-  return formats::CheckMeshOutput(output, format, options.dimension());
+  if (absl::Status status = formats::CheckMeshOutput(output, format, options.dimension()); !status.ok()) {
+    return status;
+  }
+  formats::FilePlan files;
+  options.AddFilesTo(files);
+  files.WritesMesh("--out", output, format);
+  return files.Check();
 }
 
 absl::Status MeshCommand::Mesh(client::Client& client, const client::MeshOptions& mesh_options,

@@ -13,6 +13,7 @@
 #include "client/cli/options.h"
 #include "client/cli/remote_command.h"
 #include "client/cli/session_options.h"
+#include "client/formats/file_plan.h"
 #include "client/formats/line_reader.h"
 #include "client/formats/number.h"
 #include "client/formats/output_file.h"
@@ -135,6 +136,13 @@ absl::Status CellsCommand::Query(client::Client& client, const client::CallOptio
 }
 
 int CellsCommand::Run() {
+  formats::FilePlan files;
+  remote.AddFilesTo(files);
+  files.Reads("--vertices", vertices_path);
+  files.Writes("--out", path);
+  if (const absl::Status status = files.Check(); !status.ok()) {
+    return ReportError(status, remote.format());
+  }
   if (!vertices_path.empty()) {
     absl::StatusOr<std::vector<uint32_t>> read = ReadVertices(vertices_path);
     if (read.ok() && read->empty()) {
@@ -158,8 +166,18 @@ struct AddCommand {
   std::string near_path;
   uint64_t expected_revision = 0;
 
+  absl::Status CheckFiles() const;
   absl::Status Add(client::Client& client, client::CallOptions call) const;
 };
+
+absl::Status AddCommand::CheckFiles() const {
+  formats::FilePlan files;
+  remote.AddFilesTo(files);
+  files.Reads("IN", input);
+  files.Reads("--near", near_path);
+  files.Writes("the list of vertices", std::string(formats::kStandardStream));
+  return files.Check();
+}
 
 absl::Status AddCommand::Add(client::Client& client, client::CallOptions call) const {
   const absl::StatusOr<client::Session> found = client.GetSession(session, call);
@@ -243,6 +261,10 @@ void AddQueryCommands(CLI::App& app, int& exit_code) {
   AddExpectedRevision(*add_app, add->expected_revision);
   add->remote.AddTo(*add_app, RemoteCommand::Needs::kLastingServer);
   add_app->callback([add, &exit_code] {
+    if (const absl::Status status = add->CheckFiles(); !status.ok()) {
+      exit_code = ReportError(status, add->remote.format());
+      return;
+    }
     exit_code = add->remote.Run([&add](client::Client& client, const client::CallOptions& call, const Interrupt&) {
       return add->Add(client, call);
     });

@@ -11,6 +11,7 @@
 #include "client/cli/remote_command.h"
 #include "client/cli/render/painter.h"
 #include "client/cli/render/scene.h"
+#include "client/formats/file_plan.h"
 #include "client/formats/read_mesh.h"
 
 namespace wellspace::cli {
@@ -34,6 +35,12 @@ absl::Status RenderCommand::Render() const {
   const absl::StatusOr<render::PictureFormat> picture_format = render::PictureFormatOf(picture_path);
   if (!picture_format.ok()) {
     return picture_format.status();
+  }
+  formats::FilePlan files;
+  files.ReadsMesh("MESH", mesh_path);
+  files.Writes("--out", picture_path);
+  if (absl::Status status = files.Check(); !status.ok()) {
+    return status;
   }
   const absl::StatusOr<formats::Mesh> mesh = formats::ReadMesh(mesh_path);
   if (!mesh.ok()) {

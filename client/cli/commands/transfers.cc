@@ -14,6 +14,7 @@
 #include "client/cli/statistics.h"
 #include "client/files/cloud_file.h"
 #include "client/files/mesh_file.h"
+#include "client/formats/file_plan.h"
 #include "client/formats/line_reader.h"
 #include "client/formats/write_mesh.h"
 
@@ -82,7 +83,16 @@ absl::Status DownloadCommand::Check() const {
   if (remote.json() && path == formats::kStandardStream) {
     return absl::InvalidArgumentError("--output json and --out: only one of them can be standard output");
   }
-  return formats::CheckMeshOutput(path, format);
+  if (absl::Status status = formats::CheckMeshOutput(path, format); !status.ok()) {
+    return status;
+  }
+  formats::FilePlan files;
+  remote.AddFilesTo(files);
+  files.WritesMesh("--out", path, format);
+  if (remote.json()) {
+    files.Writes("--output json", std::string(formats::kStandardStream));
+  }
+  return files.Check();
 }
 
 absl::Status DownloadCommand::Download(client::Client& client, const client::CallOptions& call) const {
