@@ -11,14 +11,18 @@ COPY . /usr/src/wellspace
 WORKDIR /usr/src/wellspace
 RUN cmake --preset release -DWELLSPACE_TESTS=OFF \
  && cmake --build --preset release \
+ && scripts/third_party --copy /usr/src/wellspace/third_party \
  && strip build/release/bin/wellspace build/release/bin/wellspaced
 
 FROM debian:bookworm-slim
 COPY deploy/install-deps.sh /tmp/
+# Licences stay: those of shared libraries where Debian has them, those of what is compiled in beside Wellspace's own.
 RUN printf 'path-exclude /usr/share/%s/*\n' doc man locale > /etc/dpkg/dpkg.cfg.d/small \
+ && echo 'path-include /usr/share/doc/*/copyright' >> /etc/dpkg/dpkg.cfg.d/small \
  && /tmp/install-deps.sh runtime && rm -rf /tmp/install-deps.sh /var/lib/apt/lists/* \
  && useradd --system --uid 7233 --no-create-home --shell /usr/sbin/nologin wellspace
-COPY LICENSE README.md /usr/share/doc/wellspace/
+COPY LICENSE README.md THIRD_PARTY.md /usr/share/doc/wellspace/
+COPY --from=build /usr/src/wellspace/third_party /usr/share/doc/wellspace/third_party/
 COPY --from=build /usr/src/wellspace/build/release/bin/wellspace /usr/src/wellspace/build/release/bin/wellspaced /usr/local/bin/
 USER 7233
 EXPOSE 7233 9464

@@ -6,6 +6,7 @@ minutes. No engine has to run: the base is made by debootstrap, and processes ar
 import json
 import os
 import pathlib
+import re
 import shutil
 import signal
 import subprocess
@@ -99,6 +100,17 @@ class Image(unittest.TestCase):
         for name in ["cc", "c++", "gcc", "g++", "cpp", "ld", "as", "clang", "cmake", "ninja", "make", "protoc"]:
             self.assertIsNone(shutil.which(name, path=":".join(str(self.root / path) for path in ["usr/bin", "usr/local/bin"])), name)
         self.assertEqual(list(self.root.glob("usr/lib/gcc*/*/*/cc1*")), [])
+
+    def test_has_the_licences_of_all_that_is_linked(self):
+        documents = self.root / "usr" / "share" / "doc"
+        notices = (documents / "wellspace" / "THIRD_PARTY.md").read_text(encoding="utf-8")
+        compiled_in = {path.name for path in (documents / "wellspace" / "third_party").iterdir()}
+        self.assertIn("libhdf5-dev", compiled_in)
+        rows = [line.strip("|").split("|") for line in notices.splitlines() if line.startswith("|")]
+        packages = [name for cells in rows for name in re.findall(r"`([^`]+)`", cells[1])]
+        self.assertIn("libaec0", packages)
+        for package in packages:
+            self.assertTrue(package in compiled_in or (documents / package / "copyright").is_file(), package)
 
     def test_says_how_it_is_run(self):
         config = json.loads(self.run_tool("buildah", *self.storage, "inspect", "--type", "image", IMAGE))["Docker"]["config"]
