@@ -2,6 +2,7 @@
 
 #include <iostream>
 
+#include "client/cli/helpful_threads.h"
 #include "client/formats/line_reader.h"
 #include "client/formats/output_file.h"
 #include "client/formats/read_cloud.h"
@@ -62,6 +63,9 @@ int MeshingOptions::Run(const Work& work) {
     return ReportError(options.status(), remote_.format());
   }
   options->timeout = remote_.timeout();
+  if (options->threads == 0) {
+    options->threads = HelpfulThreads(*options, cloud->points);
+  }
   return remote_.Run([&](client::Client& client, const client::CallOptions& /*call*/, const Interrupt& interrupt) {
     const absl::Status status = work(client, *options, *cloud, interrupt);
     const absl::Status explained = parameters_.Explain(status);

@@ -92,7 +92,7 @@ void ParameterOptions::AddQualityTo(CLI::App& command) {
       "Fail before the mesh has more vertices than this; 50 million by default", 1);
   AddCount(
       command, "--threads", [this](uint64_t count) { options_.threads = static_cast<int>(count); },
-      "Threads that mesh; default: 1", 1, 1024);
+      "Threads that mesh; default: as many as help, up to all cores; of a session 1", 1, 1024);
   for (const char* name : {"--criterion", "--rho", "--size", "--size-box", "--min-dihedral", "--pump-weights",
                            "--max-vertices", "--threads"}) {
     quality_.push_back(command.get_option(name));

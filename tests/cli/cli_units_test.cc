@@ -5,8 +5,11 @@
 
 #include <future>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
 #include "client/cli/exit_codes.h"
+#include "client/cli/helpful_threads.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/meshing_options.h"
 #include "client/cli/options.h"
@@ -174,6 +177,80 @@ TEST(OptionsTest, NumbersAreCorrectlyRoundedAndMayBeNegative) {
   for (const char* text : {"--number one", "--number nan", "--number 1x", "--numbers 1,,2", "--numbers 1;2"}) {
     EXPECT_THROW(app.parse(text), CLI::ValidationError) << text;
   }
+}
+
+// A cloud along the diagonal of the unit box of `dimension`.
+std::vector<double> Diagonal(int dimension, int count) {
+  std::vector<double> points;
+  for (int i = 0; i < count; ++i) {
+    points.insert(points.end(), dimension, i / (count - 1.0));
+  }
+  return points;
+}
+
+client::MeshOptions OptionsIn(int dimension) {
+  client::MeshOptions options;
+  options.dimension = dimension;
+  return options;
+}
+
+TEST(HelpfulThreadsTest, SmallMeshesAreMadeByOne) {
+  EXPECT_EQ(HelpfulThreads(OptionsIn(2), {}), 1);
+  EXPECT_EQ(HelpfulThreads(OptionsIn(2), Diagonal(2, 5000)), 1);  // as coast-110m
+  EXPECT_EQ(HelpfulThreads(OptionsIn(3), Diagonal(3, 3000)), 1);  // as spot
+  EXPECT_EQ(HelpfulThreads(OptionsIn(2), Diagonal(2, 10'000)), 2);
+  EXPECT_EQ(HelpfulThreads(OptionsIn(3), Diagonal(3, 100'000)), 20);
+  EXPECT_EQ(HelpfulThreads(OptionsIn(5), Diagonal(5, 1000)), 2);
+}
+
+// A size makes many vertices of few points.
+TEST(HelpfulThreadsTest, SizesCount) {
+  const std::vector<double> cloud = Diagonal(2, 100);
+  client::MeshOptions options = OptionsIn(2);
+  int before = 1;
+  for (const double size : {0.1, 0.01, 0.003, 0.001, 1e-6, 1e-150, 1e-320}) {
+    options.max_circumradius = size;
+    const int threads = HelpfulThreads(options, cloud);
+    EXPECT_GE(threads, before) << size;
+    before = threads;
+  }
+  EXPECT_EQ(before, kMostThreads);
+  options.max_circumradius = 0.005;  // the box is 1.5 x 1.5
+  EXPECT_EQ(HelpfulThreads(options, cloud), 9);
+  options.domain_low = {0, 0};
+  options.domain_high = {10, 10};
+  EXPECT_EQ(HelpfulThreads(options, cloud), 400);
+  options = OptionsIn(2);
+  options.size_boxes = {{{0, 0}, {0.5, 0.5}, 0.001}};
+  EXPECT_EQ(HelpfulThreads(options, cloud), 25);
+  options.size_boxes[0].max_circumradius = -1;  // refused later
+  EXPECT_GE(HelpfulThreads(options, cloud), 1);
+}
+
+// What the command asks a server for.
+TEST(HelpfulThreadsTest, AreAskedForUnlessTheUserSays) {
+  const TemporaryFolder folder;
+  std::string text;
+  for (const double x : Diagonal(1, 20'000)) {
+    text += std::to_string(x) + " 0.5\n";
+  }
+  const std::string cloud = folder.Write("cloud.xyz", text);
+  const auto asked = [](const std::vector<std::string>& arguments) {
+    CLI::App app;
+    MeshingOptions options;
+    options.AddTo(app);
+    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
+    int threads = 0;
+    EXPECT_EQ(options.Run([&](client::Client&, const client::MeshOptions& mesh, const auto&, const Interrupt&) {
+      threads = mesh.threads;
+      return absl::OkStatus();
+    }),
+              0);
+    return threads;
+  };
+  EXPECT_EQ(asked({cloud}), 4);
+  EXPECT_EQ(asked({cloud, "--threads", "1"}), 1);
+  EXPECT_EQ(asked({cloud, "--threads", "7"}), 7);
 }
 
 TEST(InterruptTest, FirstSignalRequestsAStopAndTheOldMaskReturns) {
