@@ -136,6 +136,18 @@ TEST_F(LostOutputTest, FilesOnAFullDeviceAreExitCode4) {
   }
 }
 
+TEST_F(LostOutputTest, AFileThatIsAPipeWhoseReaderLeavesIsExitCode4) {
+  const std::string pipe = Path("pipe");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  Process process({"mesh", folder_.Write("grid.csv", Grid(150)), "-o", pipe, "--format", "vtu"});
+  const int reader = open(pipe.c_str(), O_RDONLY | O_CLOEXEC);  // returns once the program opens it for writing
+  ASSERT_GE(reader, 0);
+  close(reader);
+  const RunResult result = process.Wait();
+  EXPECT_EQ(result.exit_code, 4);
+  EXPECT_THAT(result.err, HasSubstr("cannot write " + pipe + ": Broken pipe"));
+}
+
 TEST_F(LostOutputTest, TheLimitOfAFilesSizeLeavesNoFile) {
   const std::string grid = folder_.Write("grid.csv", Grid(40));
   ASSERT_EQ(RunWellspace({"mesh", grid, "-o", Path("grid.npz")}).exit_code, 0);
