@@ -94,6 +94,10 @@ int HashToken(const std::string& tenant) {
     return kExitWrongOptions;
   }
   std::cout << *line << std::endl;
+  if (!std::cout) {
+    std::cerr << "wellspaced: the line could not be written to standard output" << std::endl;
+    return 1;
+  }
   return 0;
 }
 

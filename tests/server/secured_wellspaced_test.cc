@@ -183,6 +183,9 @@ TEST_F(SecuredWellspaced, HashesTokens) {
   EXPECT_THAT(weak, HasSubstr("openssl rand"));
   EXPECT_THAT(weak, ::testing::EndsWith("\n2\n"));
   EXPECT_THAT(weak, Not(HasSubstr("hunter2")));
+  const std::string lost = RunShell(absl::StrCat("echo 0123456789abcdef0123456789abcdef0123456789abcdef | ",
+                                                 BinFolder(), "/wellspaced hash-token acme 2>&1 >/dev/full; echo $?"));
+  EXPECT_EQ(lost, "wellspaced: the line could not be written to standard output\n1\n");
   EXPECT_EQ(Subprocess("wellspaced", {"hash-token"}).Wait(), 2);
 }
 
