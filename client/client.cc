@@ -20,22 +20,22 @@ constexpr int kMaxReconnectMs = 5'000;
 }  // namespace
 
 absl::StatusOr<Mesh> Client::MeshPoints(const MeshOptions& options, std::span<const double> points,
-                                        const OnProgress& on_progress, std::stop_token stop) {
+                                        const OnProgress& on_progress, const CallOptions& call) {
   MeshCollector collector;
-  if (absl::Status status = MeshPoints(options, points, collector, on_progress, std::move(stop)); !status.ok()) {
+  if (absl::Status status = MeshPoints(options, points, collector, on_progress, call); !status.ok()) {
     return status;
   }
   return std::move(collector.mesh());
 }
 
 absl::Status Client::MeshPoints(const MeshOptions& options, std::span<const double> points, MeshSink& sink,
-                                const OnProgress& on_progress, std::stop_token stop) {
-  return connection_->MeshPoints(options, points, sink, on_progress, std::move(stop));
+                                const OnProgress& on_progress, const CallOptions& call) {
+  return connection_->MeshPoints(options, points, sink, on_progress, call);
 }
 
 absl::StatusOr<MeshEstimate> Client::EstimateMesh(const MeshOptions& options, std::span<const double> points,
-                                                  std::stop_token stop) {
-  return connection_->EstimateMesh(options, points, std::move(stop));
+                                                  const CallOptions& call) {
+  return connection_->EstimateMesh(options, points, call);
 }
 
 absl::StatusOr<ServerInfo> Client::GetServerInfo(const CallOptions& call) { return connection_->GetServerInfo(call); }

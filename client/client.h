@@ -9,7 +9,6 @@
 #include <memory>
 #include <optional>
 #include <span>
-#include <stop_token>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,6 +16,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
+#include "client/call_options.h"
 #include "client/connect_options.h"
 #include "client/error_details.h"
 #include "client/mesh.h"
@@ -63,7 +63,7 @@ using OnCells = std::function<absl::Status(const CellBatch&)>;
 //
 // Callbacks may be empty; they are called by the thread that made the call, while it waits.
 //
-// Errors of all calls: the server's, unchanged; CANCELLED when `stop` asks for it; DEADLINE_EXCEEDED when `timeout` has passed; UNAVAILABLE
+// Errors of all calls: the server's, unchanged; CANCELLED when `call.stop` asks for it; DEADLINE_EXCEEDED when `call.timeout` has passed; UNAVAILABLE
 // when the server cannot be reached, after patient attempts; DATA_LOSS when its answer contradicts itself; those of sinks, sources and
 // callbacks. BlamedField and ReasonOf tell more.
 //
@@ -74,14 +74,14 @@ class Client {
 
   // Meshes `points` (n x dimension, row-major).
   absl::StatusOr<Mesh> MeshPoints(const MeshOptions& options, std::span<const double> points,
-                                  const OnProgress& on_progress = nullptr, std::stop_token stop = {});
+                                  const OnProgress& on_progress = nullptr, const CallOptions& call = {});
   // The same into a sink, for meshes that need not fit into memory.
   absl::Status MeshPoints(const MeshOptions& options, std::span<const double> points, MeshSink& sink,
-                          const OnProgress& on_progress = nullptr, std::stop_token stop = {});
+                          const OnProgress& on_progress = nullptr, const CallOptions& call = {});
 
   // Estimates the mesh that MeshPoints would make of the same arguments.
   absl::StatusOr<MeshEstimate> EstimateMesh(const MeshOptions& options, std::span<const double> points,
-                                            std::stop_token stop = {});
+                                            const CallOptions& call = {});
 
   absl::StatusOr<ServerInfo> GetServerInfo(const CallOptions& call = {});
   // `service` empty: of the whole server. NOT_FOUND for a service that the server does not know.

@@ -5,7 +5,6 @@
 #include <memory>
 #include <optional>
 #include <span>
-#include <stop_token>
 #include <string>
 
 #include "absl/status/status.h"
@@ -38,9 +37,9 @@ class Connection {
   Connection& operator=(const Connection&) = delete;
 
   virtual absl::Status MeshPoints(const MeshOptions& options, std::span<const double> points, MeshSink& sink,
-                                  const OnProgress& on_progress, std::stop_token stop) = 0;
+                                  const OnProgress& on_progress, const CallOptions& call) = 0;
   virtual absl::StatusOr<MeshEstimate> EstimateMesh(const MeshOptions& options, std::span<const double> points,
-                                                    std::stop_token stop) = 0;
+                                                    const CallOptions& call) = 0;
   virtual absl::StatusOr<ServerInfo> GetServerInfo(const CallOptions& call) = 0;
   virtual absl::StatusOr<Health> CheckHealth(const std::string& service, const CallOptions& call) = 0;
 

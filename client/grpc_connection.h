@@ -22,9 +22,9 @@ class GrpcConnection final : public Connection {
 
   // grpc_meshing.cc
   absl::Status MeshPoints(const MeshOptions& options, std::span<const double> points, MeshSink& sink,
-                          const OnProgress& on_progress, std::stop_token stop) override;
+                          const OnProgress& on_progress, const CallOptions& call) override;
   absl::StatusOr<MeshEstimate> EstimateMesh(const MeshOptions& options, std::span<const double> points,
-                                            std::stop_token stop) override;
+                                            const CallOptions& call) override;
   absl::StatusOr<ServerInfo> GetServerInfo(const CallOptions& call) override;
   absl::StatusOr<Health> CheckHealth(const std::string& service, const CallOptions& call) override;
 

@@ -37,9 +37,9 @@ void Upload(const MeshOptions& options, std::span<const double> points, Stream& 
 }  // namespace
 
 absl::Status GrpcConnection::MeshPoints(const MeshOptions& options, std::span<const double> points, MeshSink& sink,
-                                        const OnProgress& on_progress, std::stop_token stop) {
+                                        const OnProgress& on_progress, const CallOptions& call) {
   const int dimension = std::max(1, options.dimension);
-  return retrier_.Run(options.timeout, stop, [&](Attempt& attempt) {
+  return retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
     CallContext context(attempt);
     const std::unique_ptr<MeshPointsStream> stream = meshing_->MeshPoints(context.get());
     // Points go up while answers come down: the server may fail the call before it has all.
@@ -75,9 +75,9 @@ absl::Status GrpcConnection::MeshPoints(const MeshOptions& options, std::span<co
 }
 
 absl::StatusOr<MeshEstimate> GrpcConnection::EstimateMesh(const MeshOptions& options, std::span<const double> points,
-                                                          std::stop_token stop) {
+                                                          const CallOptions& call) {
   v1::EstimateMeshResponse response;
-  const absl::Status status = retrier_.Run(options.timeout, stop, [&](Attempt& attempt) {
+  const absl::Status status = retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
     CallContext context(attempt);
     RequestWriter<v1::EstimateMeshRequest> stream([&](grpc::CompletionQueue* queue) {
       return meshing_->PrepareAsyncEstimateMesh(context.get(), &response, queue);

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "absl/time/time.h"
 
 namespace wellspace::client {
 
@@ -38,7 +37,6 @@ struct MeshOptions {
   double margin = 0.25;
   uint64_t max_vertices = 0;
   int threads = 0;
-  absl::Duration timeout = absl::InfiniteDuration();  // of MeshPoints and EstimateMesh: of the whole call
 };
 
 struct Progress {

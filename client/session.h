@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <map>
 #include <optional>
-#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -14,22 +13,6 @@
 #include "client/mesh.h"
 
 namespace wellspace::client {
-
-// What every call on sessions takes besides its arguments.
-struct CallOptions {
-  // Of the whole call, with all its attempts. Work that the call started goes on.
-  absl::Duration timeout = absl::InfiniteDuration();
-
-  // Ends the call with CANCELLED.
-  std::stop_token stop;
-
-  // Of a call that changes something: a repetition with the same id and content does nothing and returns the first answer.
-  // Empty: one is chosen, so that what the library repeats after a lost connection is done once.
-  std::string request_id;
-
-  // Of a call that changes a session: ABORTED unless the session is at this revision. 0: any.
-  uint64_t expected_revision = 0;
-};
 
 using Labels = std::map<std::string, std::string>;
 

@@ -62,12 +62,11 @@ int MeshingOptions::Run(const Work& work) {
   if (!options.ok()) {
     return ReportError(options.status(), remote_.format());
   }
-  options->timeout = remote_.timeout();
   if (options->threads == 0) {
     options->threads = HelpfulThreads(*options, cloud->points);
   }
-  return remote_.Run([&](client::Client& client, const client::CallOptions& /*call*/, const Interrupt& interrupt) {
-    const absl::Status status = work(client, *options, *cloud, interrupt);
+  return remote_.Run([&](client::Client& client, const client::CallOptions& call, const Interrupt& /*interrupt*/) {
+    const absl::Status status = work(client, *options, *cloud, call);
     const absl::Status explained = parameters_.Explain(status);
     return absl::IsInvalidArgument(status) && explained == status ? WithOrigins(status, *cloud) : explained;
   });

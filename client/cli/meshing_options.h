@@ -51,7 +51,7 @@ class MeshingOptions {
 
   // What is done with a cloud; an error is explained in terms of its file and of the options.
   using Work = std::function<absl::Status(client::Client&, const client::MeshOptions&, const formats::PointCloud&,
-                                          const Interrupt&)>;
+                                          const client::CallOptions&)>;
   // Reads the cloud, opens the server and does `work`. Returns the exit code, errors reported.
   int Run(const Work& work);
 

@@ -20,9 +20,10 @@ using ::testing::SizeIs;
 class MockConnection : public Connection {
  public:
   MOCK_METHOD(absl::Status, MeshPoints,
-              (const MeshOptions&, std::span<const double>, MeshSink&, const OnProgress&, std::stop_token), (override));
+              (const MeshOptions&, std::span<const double>, MeshSink&, const OnProgress&, const CallOptions&),
+              (override));
   MOCK_METHOD(absl::StatusOr<MeshEstimate>, EstimateMesh,
-              (const MeshOptions&, std::span<const double>, std::stop_token), (override));
+              (const MeshOptions&, std::span<const double>, const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<ServerInfo>, GetServerInfo, (const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<Health>, CheckHealth, (const std::string&, const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<Session>, CreateSession, (const SessionOptions&, const CallOptions&), (override));
@@ -63,21 +64,24 @@ TEST(Client, PassesMeshingToItsConnection) {
   const std::vector<double> points = {1, 2};
   MeshOptions options;
   options.dimension = 2;
-  EXPECT_CALL(*connection, MeshPoints(Field(&MeshOptions::dimension, 2), SizeIs(2), _, _, _))
+  // What a call is made with reaches each of them.
+  const CallOptions call = {.timeout = absl::Seconds(3), .stop = {}, .request_id = "", .expected_revision = 0};
+  const auto is_call = Field(&CallOptions::timeout, absl::Seconds(3));
+  EXPECT_CALL(*connection, MeshPoints(Field(&MeshOptions::dimension, 2), SizeIs(2), _, _, is_call))
       .WillOnce(Return(E("mesh")))
-      .WillOnce([](const auto&, const auto&, MeshSink& sink, const auto&, auto) {
+      .WillOnce([](const auto&, const auto&, MeshSink& sink, const auto&, const auto&) {
         EXPECT_TRUE(sink.AddInputVertices(std::vector<uint32_t>{7}).ok());
         return sink.Finish();
       });
-  EXPECT_CALL(*connection, EstimateMesh(Field(&MeshOptions::dimension, 2), SizeIs(2), _))
+  EXPECT_CALL(*connection, EstimateMesh(Field(&MeshOptions::dimension, 2), SizeIs(2), is_call))
       .WillOnce(Return(E("estimate")));
-  EXPECT_CALL(*connection, GetServerInfo(_)).WillOnce(Return(E("info")));
-  EXPECT_CALL(*connection, CheckHealth("a", _)).WillOnce(Return(E("health")));
-  EXPECT_EQ(client.MeshPoints(options, points).status(), E("mesh"));
-  EXPECT_EQ(client.MeshPoints(options, points)->input_vertex, std::vector<uint32_t>{7});
-  EXPECT_EQ(client.EstimateMesh(options, points).status(), E("estimate"));
-  EXPECT_EQ(client.GetServerInfo().status(), E("info"));
-  EXPECT_EQ(client.CheckHealth("a").status(), E("health"));
+  EXPECT_CALL(*connection, GetServerInfo(is_call)).WillOnce(Return(E("info")));
+  EXPECT_CALL(*connection, CheckHealth("a", is_call)).WillOnce(Return(E("health")));
+  EXPECT_EQ(client.MeshPoints(options, points, nullptr, call).status(), E("mesh"));
+  EXPECT_EQ(client.MeshPoints(options, points, nullptr, call)->input_vertex, std::vector<uint32_t>{7});
+  EXPECT_EQ(client.EstimateMesh(options, points, call).status(), E("estimate"));
+  EXPECT_EQ(client.GetServerInfo(call).status(), E("info"));
+  EXPECT_EQ(client.CheckHealth("a", call).status(), E("health"));
 }
 
 TEST(Client, PassesSessionsAndOperationsToItsConnection) {

@@ -30,6 +30,12 @@ using ::testing::ElementsAre;
 
 using Stream = grpc::ServerReaderWriter<v1::MeshPointsResponse, v1::MeshPointsRequest>;
 
+CallOptions StoppedBy(const std::stop_source& stop) {
+  CallOptions call;
+  call.stop = stop.get_token();
+  return call;
+}
+
 // Answers MeshPoints as the test says.
 class FakeServer final : public v1::MeshingService::Service {
  public:
@@ -319,7 +325,7 @@ TEST(Connection, StopCancelsTheCall) {
   FakeServer server(WorkForever);
   std::stop_source stop;
   const absl::StatusOr<Mesh> mesh = server.Client().MeshPoints(
-      UnitSquare(), {}, [&stop](const Progress&) { stop.request_stop(); }, stop.get_token());
+      UnitSquare(), {}, [&stop](const Progress&) { stop.request_stop(); }, StoppedBy(stop));
   EXPECT_EQ(mesh.status(), absl::CancelledError("cancelled by the caller"));
 }
 
@@ -327,16 +333,17 @@ TEST(Connection, StopBeforeTheStart) {
   FakeServer server(WorkForever);
   std::stop_source stop;
   stop.request_stop();
-  EXPECT_EQ(server.Client().MeshPoints(UnitSquare(), {}, nullptr, stop.get_token()).status().code(),
+  EXPECT_EQ(server.Client().MeshPoints(UnitSquare(), {}, nullptr, StoppedBy(stop)).status().code(),
             absl::StatusCode::kCancelled);
 }
 
 TEST(Connection, TimeoutEndsTheCall) {
   FakeServer server(WorkForever);
   for (const absl::Duration timeout : {absl::Milliseconds(50), absl::ZeroDuration(), absl::Seconds(-1)}) {
-    MeshOptions options = UnitSquare();
-    options.timeout = timeout;
-    EXPECT_EQ(server.Client().MeshPoints(options, {}).status().code(), absl::StatusCode::kDeadlineExceeded);
+    CallOptions call;
+    call.timeout = timeout;
+    EXPECT_EQ(server.Client().MeshPoints(UnitSquare(), {}, nullptr, call).status().code(),
+              absl::StatusCode::kDeadlineExceeded);
   }
 }
 
@@ -379,11 +386,11 @@ TEST(Connection, EstimateEndsByErrorStopAndTimeout) {
     }
     return grpc::Status::CANCELLED;
   });
-  EXPECT_EQ(endless.Client().EstimateMesh(UnitSquare(), {}, stop.get_token()).status(),
+  EXPECT_EQ(endless.Client().EstimateMesh(UnitSquare(), {}, StoppedBy(stop)).status(),
             absl::CancelledError("cancelled by the caller"));
-  MeshOptions options = UnitSquare();
-  options.timeout = absl::Milliseconds(50);
-  EXPECT_EQ(endless.Client().EstimateMesh(options, {}).status().code(), absl::StatusCode::kDeadlineExceeded);
+  CallOptions call;
+  call.timeout = absl::Milliseconds(50);
+  EXPECT_EQ(endless.Client().EstimateMesh(UnitSquare(), {}, call).status().code(), absl::StatusCode::kDeadlineExceeded);
 }
 
 TEST(Connection, GetServerInfo) {

@@ -214,7 +214,6 @@ constexpr std::array<uint32_t, 3> kVertices = {2, 0, 1};
 client::MeshOptions PlaneOptions() {
   client::MeshOptions options;
   options.dimension = 2;
-  options.timeout = kTimeout;
   return options;
 }
 
@@ -229,9 +228,9 @@ using Call = absl::Status (*)(client::Connection& connection);
 constexpr std::array kCalls = {
     Call{[](client::Connection& c) {
       SinkCheck sink("mesh.vtu");
-      return c.MeshPoints(PlaneOptions(), kPoints, sink, RequirePhase, {});
+      return c.MeshPoints(PlaneOptions(), kPoints, sink, RequirePhase, Patience());
     }},
-    Call{[](client::Connection& c) { return c.EstimateMesh(PlaneOptions(), kPoints, {}).status(); }},
+    Call{[](client::Connection& c) { return c.EstimateMesh(PlaneOptions(), kPoints, Patience()).status(); }},
     Call{[](client::Connection& c) { return c.GetServerInfo(Patience()).status(); }},
     Call{[](client::Connection& c) { return c.CheckHealth("", Patience()).status(); }},
     Call{[](client::Connection& c) {

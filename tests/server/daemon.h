@@ -19,9 +19,10 @@ namespace wellspace::server {
 inline absl::Status MeshTriangle(client::Client client) {
   client::MeshOptions options;
   options.dimension = 2;
-  options.timeout = absl::Minutes(1);
+  client::CallOptions call;
+  call.timeout = absl::Minutes(1);
   const std::vector<double> points = {0, 0, 1, 0, 0.5, 0.75};
-  return client.MeshPoints(options, points).status();
+  return client.MeshPoints(options, points, nullptr, call).status();
 }
 
 // A wellspaced on a free port.

@@ -55,9 +55,9 @@ TEST(Wellspaced, ASecondSignalEndsItAtOnce) {
   ASSERT_EQ(client.ReadLine(), "running");
   daemon.process().Signal(SIGTERM);
   // Refused calls show that the first signal has been taken.
-  client::MeshOptions options;
-  options.timeout = absl::Milliseconds(50);
-  while (daemon.Client().MeshPoints(options, {}).status().code() != absl::StatusCode::kUnavailable) {
+  client::CallOptions call;
+  call.timeout = absl::Milliseconds(50);
+  while (daemon.Client().MeshPoints({}, {}, nullptr, call).status().code() != absl::StatusCode::kUnavailable) {
   }
   daemon.process().Signal(SIGTERM);
   EXPECT_EQ(daemon.process().Wait(), -SIGTERM);

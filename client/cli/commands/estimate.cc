@@ -36,9 +36,8 @@ int RunEstimate(MeshingOptions& options) {
     return ReportError(status, options.remote().format());
   }
   return options.Run([&options](client::Client& client, const client::MeshOptions& mesh_options,
-                                const formats::PointCloud& cloud, const Interrupt& interrupt) {
-    const absl::StatusOr<client::MeshEstimate> estimate =
-        client.EstimateMesh(mesh_options, cloud.points, interrupt.token());
+                                const formats::PointCloud& cloud, const client::CallOptions& call) {
+    const absl::StatusOr<client::MeshEstimate> estimate = client.EstimateMesh(mesh_options, cloud.points, call);
     if (!estimate.ok()) {
       return estimate.status();
     }

@@ -30,7 +30,7 @@ struct MeshCommand {
 
   absl::Status CheckOptions() const;
   absl::Status Mesh(client::Client& client, const client::MeshOptions& mesh_options, const formats::PointCloud& cloud,
-                    const Interrupt& interrupt) const;
+                    const client::CallOptions& call) const;
   int Run();
 };
 
@@ -51,19 +51,18 @@ absl::Status MeshCommand::CheckOptions() const {
 }
 
 absl::Status MeshCommand::Mesh(client::Client& client, const client::MeshOptions& mesh_options,
-                               const formats::PointCloud& cloud, const Interrupt& interrupt) const {
+                               const formats::PointCloud& cloud, const client::CallOptions& call) const {
   // Now that the dimension is known for sure, and before hours of work.
   if (absl::Status status = formats::CheckMeshOutput(output, format, cloud.dimension, mesh_options.pump_weights);
       !status.ok()) {
     return status;
   }
-  client::MeshFile file(output, format, interrupt.token());
+  client::MeshFile file(output, format, call.stop);
   file.KeepInputVertices();
   {
     ProgressBar bar(!options.remote().quiet());
     const absl::Status status = client.MeshPoints(
-        mesh_options, cloud.points, file, [&bar](const client::Progress& progress) { bar.Update(progress); },
-        interrupt.token());
+        mesh_options, cloud.points, file, [&bar](const client::Progress& progress) { bar.Update(progress); }, call);
     if (!status.ok()) {
       return status;
     }
@@ -83,7 +82,7 @@ int MeshCommand::Run() {
   }
   return options.Run([this](client::Client& client, const client::MeshOptions& mesh_options,
                             const formats::PointCloud& cloud,
-                            const Interrupt& interrupt) { return Mesh(client, mesh_options, cloud, interrupt); });
+                            const client::CallOptions& call) { return Mesh(client, mesh_options, cloud, call); });
 }
 
 }  // namespace

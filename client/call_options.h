@@ -1,0 +1,31 @@
+// How a call is made: what all calls of the library have in common.
+#ifndef WELLSPACE_CLIENT_CALL_OPTIONS_H_
+#define WELLSPACE_CLIENT_CALL_OPTIONS_H_
+
+#include <cstdint>
+#include <stop_token>
+#include <string>
+
+#include "absl/time/time.h"
+
+namespace wellspace::client {
+
+// What every call takes besides its arguments.
+struct CallOptions {
+  // Of the whole call, with all its attempts. Work that the call started goes on.
+  absl::Duration timeout = absl::InfiniteDuration();
+
+  // Ends the call with CANCELLED.
+  std::stop_token stop;
+
+  // Of a call that changes something: a repetition with the same id and content does nothing and returns the first answer.
+  // Empty: one is chosen, so that what the library repeats after a lost connection is done once.
+  std::string request_id;
+
+  // Of a call that changes a session: ABORTED unless the session is at this revision. 0: any.
+  uint64_t expected_revision = 0;
+};
+
+}  // namespace wellspace::client
+
+#endif  // WELLSPACE_CLIENT_CALL_OPTIONS_H_
