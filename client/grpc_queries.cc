@@ -3,7 +3,6 @@
 #include <functional>
 
 #include "absl/strings/str_cat.h"
-#include "absl/time/clock.h"
 #include "client/convert.h"
 #include "client/grpc_connection.h"
 
@@ -55,11 +54,11 @@ absl::Status StreamAnswers(
     }
     return absl::OkStatus();
   };
-  const absl::Time deadline = absl::Now() + call.timeout;
+  const absl::Duration deadline = SinceBoot() + call.timeout;
   do {
     const size_t end = std::min(vertices.size(), answered + kVerticesOfARequest);
     if (absl::Status status =
-            retrier.Run(deadline - absl::Now(), call.stop, [&](Attempt& attempt) { return answer_part(end, attempt); });
+            retrier.Run(deadline - SinceBoot(), call.stop, [&](Attempt& attempt) { return answer_part(end, attempt); });
         !status.ok()) {
       return status;
     }

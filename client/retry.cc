@@ -1,5 +1,7 @@
 #include "client/retry.h"
 
+#include <time.h>
+
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -55,17 +57,24 @@ bool IsWorthRepeating(const absl::Status& status) {
          ReasonOf(status) == "ERROR_REASON_READER_STALLED";
 }
 
+absl::Duration SinceBoot() {
+  timespec now{};
+  clock_gettime(CLOCK_BOOTTIME, &now);
+  return absl::DurationFromTimespec(now);
+}
+
 CallContext::CallContext(const Attempt& attempt) : cancel_(attempt.stop(), [this] { context_.TryCancel(); }) {
-  if (attempt.deadline() < absl::InfiniteFuture()) {
-    context_.set_deadline(absl::ToChronoTime(attempt.deadline()));
+  if (attempt.time_left() < absl::InfiniteDuration()) {
+    // gRPC goes by its own clock from here on, which does not jump either.
+    context_.set_deadline(absl::ToChronoTime(absl::Now() + attempt.time_left()));
   }
 }
 
 absl::Status Retrier::Run(absl::Duration timeout, const std::stop_token& stop,
                           const std::function<absl::Status(Attempt&)>& attempt) {
-  const absl::Time deadline = absl::Now() + timeout;
+  const absl::Duration deadline = SinceBoot() + timeout;
   for (int failures = 0;;) {
-    Attempt current(deadline, stop);
+    Attempt current(deadline - SinceBoot(), stop);
     absl::Status status = attempt(current);
     if (current.progressed() || status.code() != absl::StatusCode::kUnavailable) {
       reached_.store(true);
@@ -83,7 +92,7 @@ absl::Status Retrier::Run(absl::Duration timeout, const std::stop_token& stop,
     }
     const absl::Duration delay =
         std::max(Backoff(policy_, failures), RetryDelayOf(status).value_or(absl::ZeroDuration()));
-    if (absl::Now() + delay >= deadline) {
+    if (SinceBoot() + delay >= deadline) {
       return status;
     }
     if (!Wait(delay, stop)) {

@@ -37,14 +37,19 @@ absl::Status FromGrpcStatus(const grpc::Status& status);
 // Whether the same call may succeed later: UNAVAILABLE, a reader that stalled, and what has a google.rpc.RetryInfo.
 bool IsWorthRepeating(const absl::Status& status);
 
+// A clock for timeouts: it does not jump when that on the wall is set. Zero when the machine was started, sleep
+// included.
+absl::Duration SinceBoot();
+
 // One attempt at a call.
 //
 // Thread safety: thread-compatible.
 class Attempt {
  public:
-  Attempt(absl::Time deadline, std::stop_token stop) : deadline_(deadline), stop_(std::move(stop)) {}
+  // `time_left` until the deadline, from now on.
+  Attempt(absl::Duration time_left, std::stop_token stop) : time_left_(time_left), stop_(std::move(stop)) {}
 
-  absl::Time deadline() const { return deadline_; }
+  absl::Duration time_left() const { return time_left_; }
   const std::stop_token& stop() const { return stop_; }
 
   // The server has answered with something that the call keeps.
@@ -59,7 +64,7 @@ class Attempt {
   bool is_final() const { return is_final_; }
 
  private:
-  const absl::Time deadline_;
+  const absl::Duration time_left_;
   const std::stop_token stop_;
   bool progressed_ = false;
   bool is_final_ = false;

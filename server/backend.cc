@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "absl/time/clock.h"
+#include "server/clock.h"
 #include "server/log_fields.h"
 
 namespace wellspace::server {
@@ -20,9 +20,9 @@ Backend::Backend(const ServiceOptions& options, const Authenticator& authenticat
       mesher_(std::move(mesher)),
       estimator_(std::move(estimator)),
       create_mesher_(std::move(create_mesher)),
-      request_ids_(absl::Now),
+      request_ids_(SinceBoot),
       memory_(options_.max_memory_bytes),
-      sessions_(options_, memory_, absl::Now),
+      sessions_(options_, memory_, Clock()),
       environment_{.options = options_,
                    .mesher = mesher_,
                    .estimator = estimator_,

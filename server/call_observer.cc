@@ -9,8 +9,8 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
-#include "absl/time/clock.h"
 #include "absl/time/time.h"
+#include "server/clock.h"
 #include "server/errors.h"
 #include "server/log_fields.h"
 
@@ -65,7 +65,7 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
         method_(observer.metrics_.Of(info.method())),
         path_(info.method()),
         context_(info.server_context()),
-        start_(absl::Now()) {
+        start_(SinceBoot()) {
     // gRPC reads metadata and certificates into the context when they are first asked for, and not thread-safely: here, before
     // anything else knows of the call.
     tenant_ = observer_.tenant_of_(*context_);
@@ -116,7 +116,7 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
   }
 
   void End(const grpc::Status& status) {
-    const double seconds = absl::ToDoubleSeconds(absl::Now() - start_);
+    const double seconds = absl::ToDoubleSeconds(SinceBoot() - start_);
     method_.Handled(status.error_code(), seconds);
     const auto level = IsServerFault(status.error_code()) ? spdlog::level::err : spdlog::level::info;
     if (!observer_.log_.should_log(level)) {
@@ -147,7 +147,7 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
   const CallMetrics::Method& method_;
   const std::string path_;  // "/service/method"
   grpc::ServerContextBase* const context_;
-  const absl::Time start_;
+  const absl::Duration start_;  // since boot
   std::string tenant_;
   std::string request_id_;
   std::string traceparent_;  // empty: none

@@ -40,7 +40,7 @@ grpc::Status MemorySessionStore::Create(NewSession settings, std::shared_ptr<Ses
                      absl::StrCat("this server has ", by_name_.size(), " sessions, as many as it may have"));
   }
   Tenant& tenant = tenants_[settings.tenant];
-  last_create_time_ = std::max(clock_(), last_create_time_ + absl::Microseconds(1));
+  last_create_time_ = std::max(clock_.wall(), last_create_time_ + absl::Microseconds(1));
   *session = std::make_shared<Session>(Session::Settings{.tenant = std::move(settings.tenant),
                                                          .name = UnguessableName(),
                                                          .parameters = std::move(settings.parameters),

@@ -3,7 +3,7 @@
 #include <utility>
 #include <vector>
 
-#include "absl/time/clock.h"
+#include "server/clock.h"
 #include "server/convert.h"
 #include "server/errors.h"
 #include "server/wire.h"
@@ -52,7 +52,7 @@ void MeshPointsCall::Tick() {
   // While a reader is slow, events are skipped, not stored.
   if (!IsWriting()) {
     const core::Progress progress = job() == nullptr ? core::Progress() : job()->context().Snapshot();
-    event_ = pacer_.Next(progress, absl::Now());
+    event_ = pacer_.Next(progress, SinceBoot());
     WriteNext();
   }
   ScheduleTick();

@@ -72,7 +72,7 @@ std::shared_ptr<Job> Operation::job() const {
   return job_;
 }
 
-bool Operation::Tick(absl::Time now) {
+bool Operation::Tick(absl::Duration now) {
   {
     std::lock_guard lock(mutex_);
     if (HasEndedLocked()) {

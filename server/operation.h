@@ -54,8 +54,9 @@ class Operation {
   void SetJob(std::shared_ptr<Job> job);
   std::shared_ptr<Job> job() const;
 
-  // Makes an event of the job's progress if one is due; false once it has ended. To be called every ProgressPacer::kMinInterval.
-  bool Tick(absl::Time now);
+  // Makes an event of the job's progress if one is due; false once it has ended. To be called every
+  // ProgressPacer::kMinInterval; `now` is a time since boot.
+  bool Tick(absl::Duration now);
 
   // For its session, which starts it at most once, and ends it once. Whoever has ended it calls Notify, without any lock.
   void Start(absl::Time now);

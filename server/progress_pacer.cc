@@ -6,7 +6,7 @@
 
 namespace wellspace::server {
 
-std::optional<v1::ProgressEvent> ProgressPacer::Next(const core::Progress& progress, absl::Time now) {
+std::optional<v1::ProgressEvent> ProgressPacer::Next(const core::Progress& progress, absl::Duration now) {
   const absl::Duration age = now - last_time_;
   if (age < kMinInterval) {
     return std::nullopt;

@@ -21,8 +21,8 @@ class ProgressPacer {
   static constexpr absl::Duration kMinInterval = absl::Milliseconds(100);
   static constexpr absl::Duration kHeartbeat = absl::Seconds(1);
 
-  // The event to be sent at `now`, a time that never decreases, if one is due: something changed or the last one is old.
-  std::optional<v1::ProgressEvent> Next(const core::Progress& progress, absl::Time now);
+  // The event to be sent at `now`, a time since boot, if one is due: something changed or the last one is old.
+  std::optional<v1::ProgressEvent> Next(const core::Progress& progress, absl::Duration now);
 
   // The last event of a run that succeeded.
   v1::ProgressEvent Final(const core::Progress& progress);
@@ -31,7 +31,7 @@ class ProgressPacer {
   // The event for `progress`, never behind the one before.
   v1::ProgressEvent Advance(const core::Progress& progress);
 
-  absl::Time last_time_ = absl::InfinitePast();
+  absl::Duration last_time_ = -absl::InfiniteDuration();
   uint64_t next_sequence_ = 0;
   core::Phase phase_ = core::Phase::kWaiting;
   v1::ProgressEvent last_;

@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
-#include "absl/time/clock.h"
 #include "core/base/status_macros.h"
 #include "core/mesher.h"
+#include "server/clock.h"
 #include "server/errors.h"
 #include "server/log_fields.h"
 #include "server/progress_pacer.h"
@@ -84,7 +84,7 @@ absl::StatusOr<core::Mesh> MeshAgain(const Session& session, const core::MeshPar
 
 void Run(const CallEnvironment& environment, Session& session, Operation& operation, Job& job) {
   core::RunContext& context = job.context();
-  const absl::Time start = absl::Now();
+  const absl::Duration start = SinceBoot();
   std::optional<SessionWork> work = session.BeginWork(operation);
   if (!work.has_value()) {
     return;
@@ -126,7 +126,7 @@ void Run(const CallEnvironment& environment, Session& session, Operation& operat
   LogFields fields;
   fields.Add("event", "refinement").Add("operation", operation.name()).Add("tenant", session.tenant());
   fields.Add("code", absl::StatusCodeToString(static_cast<absl::StatusCode>(status.error_code())));
-  fields.Add("seconds", absl::ToDoubleSeconds(absl::Now() - start)).Add("points", work->meshed_points);
+  fields.Add("seconds", absl::ToDoubleSeconds(SinceBoot() - start)).Add("points", work->meshed_points);
   fields.Add("vertices", mesh == nullptr ? 0 : mesh->chunks.mesh().vertex_count());
   if (!status.ok()) {
     fields.Add("message", status.error_message());
@@ -138,7 +138,7 @@ void Run(const CallEnvironment& environment, Session& session, Operation& operat
 
 void Tick(Background& background, const std::weak_ptr<Operation>& weak) {
   const std::shared_ptr<Operation> operation = weak.lock();
-  if (operation != nullptr && operation->Tick(absl::Now())) {
+  if (operation != nullptr && operation->Tick(SinceBoot())) {
     background.PostAfter(ProgressPacer::kMinInterval, [&background, weak] { Tick(background, weak); });
   }
 }

@@ -49,7 +49,7 @@ void RequestIds::Once(const std::string& tenant_name, const std::string& request
     const auto found = tenant.by_id.find(request_id);
     if (found == tenant.by_id.end()) {
       tenant.entries.push_back(
-          Entry{.request_id = request_id, .content = content, .time = clock_(), .answer = {}, .waiting = {}});
+          Entry{.request_id = request_id, .content = content, .time = since_boot_(), .answer = {}, .waiting = {}});
       tenant.entries.back().waiting.push_back(std::move(done));
       tenant.by_id.emplace(request_id, std::prev(tenant.entries.end()));
       tenant.bytes += kEntryBytes + request_id.size();
@@ -101,7 +101,7 @@ void RequestIds::Erase(Tenant& tenant, std::list<Entry>::iterator entry) {
 }
 
 void RequestIds::Trim(Tenant& tenant) {
-  const absl::Time oldest = clock_() - kKeptFor;
+  const absl::Duration oldest = since_boot_() - kKeptFor;
   for (auto entry = tenant.entries.begin(); entry != tenant.entries.end();) {
     const bool is_too_much = tenant.entries.size() > kMaxPerTenant || tenant.bytes > kMaxBytesPerTenant;
     if (entry->time >= oldest && !is_too_much) {

@@ -37,7 +37,7 @@ class RequestIds {
   };
   using Done = std::function<void(const Answer&)>;
 
-  explicit RequestIds(std::function<absl::Time()> clock) : clock_(std::move(clock)) {}
+  explicit RequestIds(std::function<absl::Duration()> since_boot) : since_boot_(std::move(since_boot)) {}
 
   // Has `done` called with the answer to `request`, once. The first time it has `work` call it, now or later, in any way exactly once;
   // a call that repeats another gets that one's answer as soon as it is there. An empty id is none: always the first time.
@@ -49,8 +49,8 @@ class RequestIds {
  private:
   struct Entry {
     std::string request_id;
-    size_t content = 0;  // hash of the request
-    absl::Time time;
+    size_t content = 0;   // hash of the request
+    absl::Duration time;  // since boot
     bool is_answered = false;
     Answer answer;
     std::vector<Done> waiting;  // for the answer
@@ -69,7 +69,7 @@ class RequestIds {
   // Drops what is too old, or too much. Those that are not answered yet stay.
   void Trim(Tenant& tenant);
 
-  const std::function<absl::Time()> clock_;
+  const std::function<absl::Duration()> since_boot_;
   std::mutex mutex_;
   std::map<std::string, Tenant> tenants_;  // guarded by mutex_
 };

@@ -31,7 +31,7 @@ Session::Session(Settings settings, const ServiceOptions& options, MemoryBudget&
       parameters_(std::move(settings.parameters)),
       labels_(std::move(settings.labels)),
       ttl_(settings.ttl),
-      last_use_(settings.create_time),
+      last_use_(clock_.since_boot()),
       point_memory_(memory.ReserveNothing()) {
   point_memory_.MakeLasting();
 }
@@ -58,7 +58,7 @@ v1::Session Session::Describe() const {
   *message.mutable_parameters() = ParametersToProto(parameters_);
   message.mutable_labels()->insert(labels_.begin(), labels_.end());
   *message.mutable_ttl() = DurationToProto(ttl_);
-  *message.mutable_expire_time() = TimeToProto(ExpireTime());
+  *message.mutable_expire_time() = TimeToProto(clock_.wall() + (ExpiresAt() - clock_.since_boot()));
   message.set_revision(revision_);
   message.set_committed_points(points_.coordinate_count() / dimension_);
   if (work_.mesh != nullptr) {
@@ -81,19 +81,21 @@ bool Session::HasLabels(const std::map<std::string, std::string>& labels) const 
 
 bool Session::Renew() {
   std::lock_guard lock(mutex_);
-  if (is_closed_ || ExpireTime() <= clock_()) {
+  if (is_closed_ || ExpiresAt() <= clock_.since_boot()) {
     return false;
   }
-  last_use_ = clock_();
+  last_use_ = clock_.since_boot();
   return true;
 }
 
 bool Session::IsExpired() const {
   std::lock_guard lock(mutex_);
-  return ExpireTime() <= clock_();
+  return ExpiresAt() <= clock_.since_boot();
 }
 
-absl::Time Session::ExpireTime() const { return (uses_ > 0 || busy_ != Busy::kNo ? clock_() : last_use_) + ttl_; }
+absl::Duration Session::ExpiresAt() const {
+  return (uses_ > 0 || busy_ != Busy::kNo ? clock_.since_boot() : last_use_) + ttl_;
+}
 
 grpc::Status Session::Update(std::optional<std::map<std::string, std::string>> labels,
                              std::optional<absl::Duration> ttl, uint64_t expected_revision) {
@@ -128,7 +130,7 @@ grpc::Status Session::Close(uint64_t expected_revision, std::shared_ptr<Operatio
 
 bool Session::CloseIfExpired() {
   std::lock_guard lock(mutex_);
-  const bool is_expired = !is_closed_ && ExpireTime() <= clock_();
+  const bool is_expired = !is_closed_ && ExpiresAt() <= clock_.since_boot();
   if (is_expired) {
     CloseNow();
   }
@@ -360,7 +362,7 @@ grpc::Status Session::AddVertices(std::span<const double> points, std::span<cons
   }
   std::lock_guard lock(mutex_);
   busy_ = Busy::kNo;
-  last_use_ = clock_();
+  last_use_ = clock_.since_boot();
   work_.meshed_points = has_returned ? work_.meshed_points + uploaded : 0;
   is_ready_ = is_ready_ && has_returned;
   if (status.ok() && !points.empty()) {
@@ -422,7 +424,7 @@ grpc::Status Session::StartOperation(const core::MeshParameters& parameters, uin
   if (grpc::Status status = CheckReadyForChange(expected_revision); !status.ok()) {
     return status;
   }
-  const absl::Time now = clock_();
+  const absl::Time now = clock_.wall();
   auto started = std::make_shared<Operation>(absl::StrCat(name_, "/operations/", next_operation_), next_operation_,
                                              parameters, now);
   if (grpc::Status status = submit(started); !status.ok()) {
@@ -446,7 +448,7 @@ std::optional<SessionWork> Session::BeginWork(Operation& operation) {
     if (!operation.IsQueued()) {
       return std::nullopt;
     }
-    operation.Start(clock_());
+    operation.Start(clock_.wall());
   }
   WaitForQueries();
   std::lock_guard lock(mutex_);
@@ -460,7 +462,7 @@ void Session::EndWork(Operation& operation, const grpc::Status& status, SessionW
                       std::shared_ptr<MeshSnapshot> mesh) {
   {
     std::lock_guard lock(mutex_);
-    const absl::Time now = clock_();
+    const absl::Time now = clock_.wall();
     if (status.ok()) {
       mesh->revision = ++revision_;
       work.mesh = std::move(mesh);
@@ -474,7 +476,7 @@ void Session::EndWork(Operation& operation, const grpc::Status& status, SessionW
     std::swap(work_, work);  // what was there is freed without the lock
     ++structure_version_;
     busy_ = Busy::kNo;
-    last_use_ = now;
+    last_use_ = clock_.since_boot();
   }
   operation.Notify();
 }
@@ -487,8 +489,8 @@ bool Session::EndWaiting(Operation& operation) {
     }
     busy_ = Busy::kNo;
     is_ready_ = false;
-    last_use_ = clock_();
-    operation.Fail(last_use_, grpc::Status(grpc::StatusCode::CANCELLED, "the operation was cancelled"));
+    last_use_ = clock_.since_boot();
+    operation.Fail(clock_.wall(), grpc::Status(grpc::StatusCode::CANCELLED, "the operation was cancelled"));
   }
   operation.Notify();
   return true;
@@ -526,7 +528,7 @@ SessionUse::SessionUse(std::shared_ptr<Session> session) : session_(std::move(se
 SessionUse::~SessionUse() {
   std::lock_guard lock(session_->mutex_);
   --session_->uses_;
-  session_->last_use_ = session_->clock_();
+  session_->last_use_ = session_->clock_.since_boot();
 }
 
 }  // namespace wellspace::server

@@ -19,6 +19,7 @@
 #include "absl/time/time.h"
 #include "core/mesher.h"
 #include "grpcpp/support/status.h"
+#include "server/clock.h"
 #include "server/memory_budget.h"
 #include "server/mesh_chunks.h"
 #include "server/operation.h"
@@ -27,9 +28,6 @@
 #include "wellspace/v1/sessions.pb.h"
 
 namespace wellspace::server {
-
-// Says what time it is; never goes back.
-using Clock = std::function<absl::Time()>;
 
 // What a tenant has in all of its sessions.
 struct TenantUsage {
@@ -176,7 +174,7 @@ class Session {
   void ReturnPoints(uint64_t count);
   // Refuses what no mesh of this session could have. `first` is the number of the first point.
   grpc::Status CheckCoordinates(uint64_t first, std::span<const double> coordinates) const;
-  absl::Time ExpireTime() const;
+  absl::Duration ExpiresAt() const;  // since boot
   void CloseNow();
 
   // Without it, once nothing can begin a query any more: waits for those that run.
@@ -203,7 +201,7 @@ class Session {
   core::MeshParameters parameters_;
   std::map<std::string, std::string> labels_;
   absl::Duration ttl_;
-  absl::Time last_use_;
+  absl::Duration last_use_;  // since boot
   int uses_ = 0;
   bool is_closed_ = false;
   Busy busy_ = Busy::kNo;

@@ -30,7 +30,7 @@ class RequestIdsTest : public ::testing::Test {
     return got;
   }
 
-  absl::Time now_ = absl::FromUnixSeconds(1'000'000);
+  absl::Duration now_ = absl::Hours(1);
   RequestIds ids_{[this] { return now_; }};
   int done_ = 0;
 };

@@ -34,7 +34,9 @@ class SessionStoreTest : public ::testing::Test {
       .max_points = 10, .max_points_per_tenant = 15, .max_sessions = 5, .max_sessions_per_tenant = 3};
   absl::Time now_ = absl::FromUnixSeconds(1'000'000);
   MemoryBudget memory_{0};
-  MemorySessionStore store_{options_, memory_, [this] { return now_; }};
+  absl::Duration since_boot_ = absl::Hours(1);
+  MemorySessionStore store_{
+      options_, memory_, {.wall = [this] { return now_; }, .since_boot = [this] { return since_boot_; }}};
   grpc::Status status_;
 };
 
@@ -77,11 +79,11 @@ TEST_F(SessionStoreTest, AnotherTenantsSessionDoesNotExist) {
 
 TEST_F(SessionStoreTest, AnUnusedSessionExpires) {
   const std::shared_ptr<Session> session = Create("a", absl::Seconds(10));
-  now_ += absl::Seconds(9);
+  since_boot_ += absl::Seconds(9);
   EXPECT_TRUE(Finds(*session)) << "and renews the lease";
-  now_ += absl::Seconds(9);
+  since_boot_ += absl::Seconds(9);
   EXPECT_EQ(store_.List("a", absl::InfinitePast(), 10, {}).size(), 1u) << "and renews nothing";
-  now_ += absl::Seconds(1);
+  since_boot_ += absl::Seconds(1);
   EXPECT_TRUE(store_.List("a", absl::InfinitePast(), 10, {}).empty());
   EXPECT_FALSE(Finds(*session)) << "though nobody has swept yet";
   EXPECT_EQ(DetailsOf(status_).reason, "SESSION_NOT_FOUND");
@@ -89,16 +91,32 @@ TEST_F(SessionStoreTest, AnUnusedSessionExpires) {
   EXPECT_TRUE(store_.RemoveExpired().empty());
 }
 
+TEST_F(SessionStoreTest, TheClockOnTheWallMayJump) {
+  const std::shared_ptr<Session> session = Create("a", absl::Seconds(10));
+  const absl::Time created = session->create_time();
+  now_ += absl::Hours(2);
+  EXPECT_TRUE(Finds(*session)) << "no lease runs out by it";
+  EXPECT_TRUE(store_.RemoveExpired().empty());
+  EXPECT_EQ(session->Describe().expire_time().seconds(), absl::ToUnixSeconds(now_ + absl::Seconds(10)))
+      << "what is shown goes by it";
+  now_ -= absl::Hours(5);
+  since_boot_ += absl::Seconds(9);
+  EXPECT_TRUE(Finds(*session));
+  EXPECT_GT(Create("a")->create_time(), created) << "the order of creation stays";
+  since_boot_ += absl::Seconds(10);
+  EXPECT_FALSE(Finds(*session)) << "nor does it last longer";
+}
+
 TEST_F(SessionStoreTest, ASessionInUseDoesNotExpire) {
   const std::shared_ptr<Session> session = Create("a", absl::Seconds(10));
   {
     const SessionUse use(session);
-    now_ += absl::Hours(1);
+    since_boot_ += absl::Hours(1);
     EXPECT_TRUE(store_.RemoveExpired().empty());
   }
-  now_ += absl::Seconds(9);
+  since_boot_ += absl::Seconds(9);
   EXPECT_FALSE(session->IsExpired()) << "the end of a use renews the lease";
-  now_ += absl::Seconds(1);
+  since_boot_ += absl::Seconds(1);
   EXPECT_TRUE(session->IsExpired());
 }
 
@@ -109,10 +127,10 @@ TEST_F(SessionStoreTest, ASessionWithAnOperationDoesNotExpire) {
                   ->StartOperation(
                       {.dimension = 2}, 0, [](const auto&) { return grpc::Status::OK; }, &operation)
                   .ok());
-  now_ += absl::Hours(1);
+  since_boot_ += absl::Hours(1);
   EXPECT_TRUE(store_.RemoveExpired().empty());
   EXPECT_TRUE(session->EndWaiting(*operation));
-  now_ += absl::Seconds(10);
+  since_boot_ += absl::Seconds(10);
   EXPECT_EQ(store_.RemoveExpired().size(), 1u);
 }
 
