@@ -19,12 +19,15 @@ struct Addition {
 };
 
 // On a worker.
-RequestIds::Answer Add(const Addition& addition, core::RunContext& context) {
+RequestIds::Answer Add(const Addition& addition, const MesherFactory& create_mesher, Job& job) {
   v1::AddVerticesResponse response;
   grpc::Status status = RunGuarded([&] {
+    Session& session = addition.use.session();
     AddedVertices added;
-    grpc::Status ended =
-        addition.use.session().AddVertices(addition.points, addition.near, addition.expected_revision, context, &added);
+    grpc::Status ended = session.PrepareStructure(addition.expected_revision, create_mesher, job);
+    if (ended.ok()) {
+      ended = session.AddVertices(addition.points, addition.near, addition.expected_revision, job.context(), &added);
+    }
     if (ended.ok()) {
       response.mutable_vertices()->Add(added.vertices.begin(), added.vertices.end());
       response.set_revision(added.revision);
@@ -63,7 +66,9 @@ void AddVerticesCall::Submit(RequestIds::Done done) {
                    .near = {request_->near().begin(), request_->near().end()},
                    .expected_revision = request_->expected_revision()});
   JobPool::Submission submission = environment().jobs.Submit(
-      {.tenant = caller().tenant, .work = [addition, done](Job& job) { done(Add(*addition, job.context())); }});
+      {.tenant = caller().tenant, .work = [addition, done, &create_mesher = environment().create_mesher](Job& job) {
+         done(Add(*addition, create_mesher, job));
+       }});
   if (submission.job == nullptr) {
     done({std::move(submission.refusal), ""});
     return;
@@ -78,7 +83,7 @@ void AddVerticesCall::Submit(RequestIds::Done done) {
 void AddVerticesCall::OnEnd() {
   // A call with a request_id may be repeated by one that waits for the same answer.
   if (job_ != nullptr && request_->request_id().empty()) {
-    job_->context().Cancel();
+    job_->Cancel();
   }
 }
 

@@ -3,7 +3,6 @@
 #define WELLSPACE_SERVER_CALL_ENVIRONMENT_H_
 
 #include <functional>
-#include <memory>
 #include <span>
 
 #include "absl/status/statusor.h"
@@ -15,6 +14,7 @@
 #include "server/memory_budget.h"
 #include "server/observability.h"
 #include "server/options.h"
+#include "server/replay.h"
 #include "spdlog/logger.h"
 
 namespace wellspace::server {
@@ -28,10 +28,6 @@ using Mesher =
 // What estimates: core::EstimateMesh, or what a test puts in its place.
 using Estimator = std::function<absl::StatusOr<core::MeshEstimate>(const core::MeshParameters&, std::span<const double>,
                                                                    core::RunContext&)>;
-
-// What begins the mesh of a session: core::Mesher::Create, or what a test puts in its place.
-using MesherFactory = std::function<absl::StatusOr<std::unique_ptr<core::Mesher>>(
-    const core::MeshParameters&, std::span<const double>, core::RunContext&)>;
 
 // What all calls share; outlives them.
 struct CallEnvironment {

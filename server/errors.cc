@@ -131,13 +131,6 @@ grpc::Status FromCoreStatus(const absl::Status& status) {
   }
 }
 
-bool IsMemoryLimit(const grpc::Status& status) {
-  google::rpc::ErrorInfo info;
-  const google::rpc::Status message = StatusToProto(status);
-  return message.details_size() > 0 && message.details(0).UnpackTo(&info) &&
-         info.reason() == v1::ErrorReason_Name(v1::ERROR_REASON_MEMORY_LIMIT);
-}
-
 google::rpc::Status StatusToProto(const grpc::Status& status) {
   google::rpc::Status message;
   if (!message.ParseFromString(status.error_details())) {

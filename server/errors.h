@@ -28,9 +28,6 @@ grpc::Status MakeError(grpc::StatusCode code, v1::ErrorReason reason, const std:
 // A RESOURCE_EXHAUSTED that FromCoreStatus makes a MEMORY_LIMIT, with RetryInfo if asking again may help.
 absl::Status MemoryLimitError(const std::string& message, bool may_retry);
 
-// Whether `status` is a MEMORY_LIMIT.
-bool IsMemoryLimit(const grpc::Status& status);
-
 // The status of a run that the core ended with `status`. The parameters were validated before, so that an INVALID_ARGUMENT is about
 // the points.
 grpc::Status FromCoreStatus(const absl::Status& status);

@@ -6,6 +6,7 @@
 #include <limits>
 #include <tuple>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
 #include "server/errors.h"
@@ -23,6 +24,33 @@ Job::Job(JobPool& pool, JobRequest request)
     memory_ = pool_.memory_.ReserveNothing();
     context_.SetMemoryLender(this);
   }
+}
+
+void Job::Cancel() {
+  context_.Cancel();
+  std::lock_guard lock(apart_mutex_);
+  if (apart_ != nullptr) {
+    apart_->Cancel();
+  }
+}
+
+absl::Status Job::RunApart(const std::function<absl::Status(core::RunContext&)>& run) {
+  core::RunContext apart;
+  if (context_.HasMemoryLender()) {
+    apart.SetMemoryLender(this);
+  }
+  {
+    std::lock_guard lock(apart_mutex_);
+    apart_ = &apart;
+    if (context_.IsCancelled()) {
+      apart.Cancel();
+    }
+  }
+  const absl::Cleanup end = [this] {  // after an exception, too
+    std::lock_guard lock(apart_mutex_);
+    apart_ = nullptr;
+  };
+  return run(apart);
 }
 
 void Job::ReleaseHeld() {
@@ -92,7 +120,7 @@ JobPool::~JobPool() {
   turns_.clear();
   not_begun.swap(started_);
   for (const auto& [sequence, job] : begun_) {
-    job->context_.Cancel();
+    job->Cancel();
     if (job->state_ == Job::State::kWaiting) {
       Resume(*job);
     }
@@ -104,7 +132,7 @@ JobPool::~JobPool() {
     thread.join();
   }
   const auto drop = [](const std::shared_ptr<Job>& job) {
-    job->context_.Cancel();
+    job->Cancel();
     job->work_ = nullptr;
     job->ReleaseAll();
   };
@@ -142,7 +170,7 @@ JobPool::Submission JobPool::Submit(JobRequest request) {
 }
 
 void JobPool::Cancel(const std::shared_ptr<Job>& job) {
-  job->context_.Cancel();
+  job->Cancel();
   Job::Work dropped;  // freed without the lock: it may hold much
   {
     std::lock_guard lock(mutex_);

@@ -45,7 +45,14 @@ class Job final : private core::MemoryLender, public std::enable_shared_from_thi
   const core::RunContext& context() const { return context_; }
   const std::string& tenant() const { return tenant_; }
 
+  // Cancels the context, and what runs apart from it. For one in line, JobPool::Cancel does more.
+  void Cancel();
+
   // The following are for the work alone.
+
+  // Runs `run` with a context of its own, which is cancelled with that of the job and has the same lender: what the
+  // work needs first, and whose progress is not the job's.
+  absl::Status RunApart(const std::function<absl::Status(core::RunContext&)>& run);
 
   // Releases what the request brought along, once the work has let go of it.
   void ReleaseHeld();
@@ -77,6 +84,9 @@ class Job final : private core::MemoryLender, public std::enable_shared_from_thi
   JobPool& pool_;
   const std::string tenant_;
   core::RunContext context_;
+
+  std::mutex apart_mutex_;             // after the pool's
+  core::RunContext* apart_ = nullptr;  // guarded by apart_mutex_; of RunApart, while it runs
 
   mutable std::mutex memory_mutex_;  // after the pool's
   MemoryReservation held_;           // guarded by memory_mutex_

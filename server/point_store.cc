@@ -22,13 +22,21 @@ void PointStore::Append(std::span<const double> coordinates) {
   }
 }
 
-absl::StatusOr<std::vector<double>> PointStore::CopyFrom(uint64_t first, const core::RunContext& context) const {
+std::span<const double> PointStore::PieceFrom(uint64_t first, uint64_t end) const {
+  const std::span<const double> block(blocks_[first / kBlockSize]);
+  const uint64_t skip = first % kBlockSize;
+  return block.subspan(skip, std::min<uint64_t>(end - first, block.size() - skip));
+}
+
+absl::StatusOr<std::vector<double>> PointStore::Copy(uint64_t first, uint64_t end,
+                                                     const core::RunContext& context) const {
   std::vector<double> coordinates;
-  coordinates.reserve(coordinate_count_ - first);
-  size_t skip = first % kBlockSize;
-  for (size_t i = first / kBlockSize; i < blocks_.size(); ++i, skip = 0) {
+  coordinates.reserve(end - first);
+  while (first < end) {
     WELLSPACE_RETURN_IF_ERROR(context.Check());
-    coordinates.insert(coordinates.end(), blocks_[i].begin() + static_cast<std::ptrdiff_t>(skip), blocks_[i].end());
+    const std::span<const double> piece = PieceFrom(first, end);
+    coordinates.insert(coordinates.end(), piece.begin(), piece.end());
+    first += piece.size();
   }
   return coordinates;
 }

@@ -23,13 +23,19 @@ class PointStore {
 
   uint64_t coordinate_count() const { return coordinate_count_; }
 
-  // The coordinates from number `first` on.
+  // The coordinates from number `first` on, those from `end` on excepted.
   //
-  // REQUIRES:   first <= coordinate_count().
+  // REQUIRES:   first <= end <= coordinate_count().
   // Errors:     CANCELLED, DEADLINE_EXCEEDED.
-  absl::StatusOr<std::vector<double>> CopyFrom(uint64_t first, const core::RunContext& context) const;
+  absl::StatusOr<std::vector<double>> Copy(uint64_t first, uint64_t end, const core::RunContext& context) const;
+  absl::StatusOr<std::vector<double>> CopyFrom(uint64_t first, const core::RunContext& context) const {
+    return Copy(first, coordinate_count_, context);
+  }
 
  private:
+  // Of the coordinates from number `first` on, those that lie in one block with it, `end` excepted.
+  std::span<const double> PieceFrom(uint64_t first, uint64_t end) const;
+
   static constexpr size_t kBlockSize = size_t{1} << 17;  // coordinates: 1 MiB
 
   std::deque<std::vector<double>> blocks_;  // of kBlockSize coordinates; the last one may have fewer

@@ -19,7 +19,7 @@ namespace {
 // A batch is full when it has as many bytes: what one more look adds leaves it within kMaxResponseBytes, cells in 6-D excepted.
 constexpr uint64_t kFullBatchBytes = kMaxResponseBytes / 4 * 3;
 
-// Before a job that found the line full comes again.
+// Before a job comes again that found the line full, or the structure being built by another.
 constexpr absl::Duration kRetryDelay = absl::Milliseconds(50);
 
 // Vertices of one look at the structure, by dimension: about a millisecond. Cells grow sixfold with each dimension.
@@ -84,8 +84,9 @@ void QueryCall::MakeBatches(Job& job) {
   bool has_room = true;
   while (has_room) {
     grpc::ByteBuffer batch;
+    bool is_at_work = false;
     grpc::Status status = RunGuarded([&] {
-      grpc::Status filled = FillBatch(job.context());
+      grpc::Status filled = FillBatch(job, &is_at_work);
       if (filled.ok() && request_.query->batch_bytes() > 0) {
         batch = request_.query->TakeBatch();
       }
@@ -93,6 +94,12 @@ void QueryCall::MakeBatches(Job& job) {
     });
     std::lock_guard lock(mutex_);
     if (ending()) {
+      return;
+    }
+    if (is_at_work) {  // what was filled stays
+      environment().log.debug("call={} waits for the structure", id());
+      work_ = Work::kRefused;
+      environment().background.PostAfter(kRetryDelay, WeakCall(&QueryCall::TryAgain));
       return;
     }
     if (!status.ok()) {
@@ -110,9 +117,13 @@ void QueryCall::MakeBatches(Job& job) {
   }
 }
 
-grpc::Status QueryCall::FillBatch(const core::RunContext& context) {
+grpc::Status QueryCall::FillBatch(Job& job, bool* is_at_work) {
   do {
-    if (grpc::Status status = FromCoreStatus(context.Check()); !status.ok()) {
+    if (grpc::Status status = FromCoreStatus(job.context().Check()); !status.ok()) {
+      return status;
+    }
+    if (grpc::Status status = use_->session().PrepareStructure(0, environment().create_mesher, job, is_at_work);
+        !status.ok()) {
       return status;
     }
     grpc::Status status = use_->session().Query(&version_, [this](const core::Mesher& mesher) { return Ask(mesher); });

@@ -44,7 +44,7 @@ class QueryCall final : public ResponseStream<Call<grpc::ServerWriteReactor<grpc
   LogFields Figures() const override;
   std::optional<grpc::ByteBuffer> NextResponse() override;
 
-  // On the background thread: the line was full.
+  // On the background thread: the line was full, or the structure being built.
   void TryAgain();
 
   // The following want mutex_ to be held.
@@ -54,8 +54,9 @@ class QueryCall final : public ResponseStream<Call<grpc::ServerWriteReactor<grpc
 
   // On a worker: makes batches.
   void MakeBatches(Job& job);
-  // The same: asks about the next vertices until the batch is full, or there are none.
-  grpc::Status FillBatch(const core::RunContext& context);
+  // The same: asks about the next vertices until the batch is full, or there are none. `*is_at_work`: another job has
+  // the structure built again just now; to be tried again.
+  grpc::Status FillBatch(Job& job, bool* is_at_work);
   grpc::Status Ask(const core::Mesher& mesher);
 
   const VertexQueryParser parse_;

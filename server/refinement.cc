@@ -17,9 +17,6 @@
 namespace wellspace::server {
 namespace {
 
-// A mesher that needs more memory than there is, and this many times what it had before, is given up.
-constexpr double kGrown = 1.25;
-
 constexpr size_t kCopyBlock = size_t{1} << 20;  // numbers copied between two looks at the context
 
 template <typename T>
@@ -48,11 +45,8 @@ absl::StatusOr<core::Mesh> Copy(const core::Mesh& mesh, const core::RunContext& 
 }
 
 absl::StatusOr<core::Mesh> MeshFirst(const CallEnvironment& environment, const Session& session,
-                                     core::MeshParameters parameters, core::RunContext& context, SessionWork& work) {
-  if (work.mesh != nullptr) {  // built anew, in the box that it has had
-    parameters.domain_low = work.mesh->chunks.mesh().domain_low;
-    parameters.domain_high = work.mesh->chunks.mesh().domain_high;
-  }
+                                     const core::MeshParameters& parameters, core::RunContext& context,
+                                     SessionWork& work) {
   std::unique_ptr<core::Mesher> mesher;
   {
     WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> points, session.points().CopyFrom(0, context));
@@ -62,18 +56,32 @@ absl::StatusOr<core::Mesh> MeshFirst(const CallEnvironment& environment, const S
   WELLSPACE_RETURN_IF_ERROR(mesher->Refine(parameters, context));
   WELLSPACE_ASSIGN_OR_RETURN(core::Mesh mesh, mesher->Extract(parameters.threads, context));
   work.mesher = std::move(mesher);
-  work.meshed_points = session.points().coordinate_count() / parameters.dimension;
   return mesh;
 }
 
+// Builds the mesher that was given up, if it was. Those who watch the operation see the progress of what it was started
+// for alone.
+absl::Status BringBack(const CallEnvironment& environment, const Session& session, Job& job, SessionWork& work) {
+  if (work.mesher == nullptr) {
+    job.context().EnterPhase(core::Phase::kTree);
+    WELLSPACE_ASSIGN_OR_RETURN(work.mesher, Replay(session.steps(), session.points(), work.mesh->chunks.mesh(),
+                                                   environment.create_mesher, job));
+  }
+  return absl::OkStatus();
+}
+
+// `*has_changed`: the mesher may be another than before, on an error too.
 absl::StatusOr<core::Mesh> MeshAgain(const Session& session, const core::MeshParameters& parameters,
-                                     core::RunContext& context, SessionWork& work) {
+                                     core::RunContext& context, SessionWork& work, bool* has_changed) {
   context.EnterPhase(core::Phase::kTree);
   {
     WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> points,
                                session.points().CopyFrom(work.meshed_points * parameters.dimension, context));
-    WELLSPACE_RETURN_IF_ERROR(work.mesher->AddPoints(points, context).status());
-    work.meshed_points += points.size() / parameters.dimension;
+    *has_changed = true;
+    if (const absl::Status added = work.mesher->AddPoints(points, context).status(); !added.ok()) {
+      *has_changed = false;  // it takes all or none
+      return added;
+    }
   }
   WELLSPACE_RETURN_IF_ERROR(work.mesher->Refine(parameters, context));
   WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(work.mesher->memory_bytes() + work.mesh->chunks.memory_bytes()));
@@ -82,38 +90,45 @@ absl::StatusOr<core::Mesh> MeshAgain(const Session& session, const core::MeshPar
   return mesh;
 }
 
+// Has the mesh made, by what the session has given for it. What did not succeed leaves nothing behind: a mesher that it
+// has changed is given up, and comes back by Replay.
+grpc::Status Work(const CallEnvironment& environment, const Session& session, const core::MeshParameters& parameters,
+                  Job& job, SessionWork& work, std::shared_ptr<MeshSnapshot>* mesh) {
+  bool has_changed = false;
+  grpc::Status status = RunGuarded([&] {
+    absl::StatusOr<core::Mesh> made;
+    if (work.mesh == nullptr) {
+      made = MeshFirst(environment, session, parameters, job.context(), work);
+    } else if (absl::Status back = BringBack(environment, session, job, work); !back.ok()) {
+      made = std::move(back);
+    } else {
+      made = MeshAgain(session, parameters, job.context(), work, &has_changed);
+    }
+    if (made.ok()) {
+      *mesh = std::make_shared<MeshSnapshot>(*std::move(made));
+    }
+    return FromCoreStatus(made.status());
+  });
+  if (!status.ok() && (has_changed || work.mesh == nullptr)) {
+    work.mesher = nullptr;
+  }
+  return status;
+}
+
 void Run(const CallEnvironment& environment, Session& session, Operation& operation, Job& job) {
-  core::RunContext& context = job.context();
   const absl::Duration start = SinceBoot();
   std::optional<SessionWork> work = session.BeginWork(operation);
   if (!work.has_value()) {
     return;
   }
-  const uint64_t bytes_before = work->mesher == nullptr ? 0 : work->mesher->memory_bytes();
+  const size_t replayed = work->mesher == nullptr ? session.steps().all().size() : 0;
+  const uint64_t points = session.points().coordinate_count() / operation.parameters().dimension;
   job.GiveMemory(std::move(work->memory));
   std::shared_ptr<MeshSnapshot> mesh;
-  bool has_returned = false;
-  const grpc::Status status = RunGuarded([&] {
-    absl::StatusOr<core::Mesh> made = work->mesher == nullptr
-                                          ? MeshFirst(environment, session, operation.parameters(), context, *work)
-                                          : MeshAgain(session, operation.parameters(), context, *work);
-    if (made.ok()) {
-      mesh = std::make_shared<MeshSnapshot>(*std::move(made));
-    }
-    has_returned = true;
-    return FromCoreStatus(made.status());
-  });
+  const grpc::Status status = Work(environment, session, operation.parameters(), job, *work, &mesh);
   if (work->mesher != nullptr) {
-    const bool has_outgrown = IsMemoryLimit(status) && static_cast<double>(work->mesher->memory_bytes()) >
-                                                           kGrown * static_cast<double>(bytes_before);
-    // Nobody knows what a mesher is like that an exception went through.
-    if (!has_returned || has_outgrown) {
-      work->mesher = nullptr;
-      work->meshed_points = 0;
-    } else {
-      work->memory = job.TakeMemory(work->mesher->memory_bytes());
-      work->memory.MakeLasting();
-    }
+    work->memory = job.TakeMemory(work->mesher->memory_bytes());
+    work->memory.MakeLasting();
   }
   if (mesh != nullptr) {
     MemoryReservation memory = job.TakeMemory(mesh->chunks.memory_bytes());
@@ -126,8 +141,11 @@ void Run(const CallEnvironment& environment, Session& session, Operation& operat
   LogFields fields;
   fields.Add("event", "refinement").Add("operation", operation.name()).Add("tenant", session.tenant());
   fields.Add("code", absl::StatusCodeToString(static_cast<absl::StatusCode>(status.error_code())));
-  fields.Add("seconds", absl::ToDoubleSeconds(SinceBoot() - start)).Add("points", work->meshed_points);
+  fields.Add("seconds", absl::ToDoubleSeconds(SinceBoot() - start)).Add("points", points);
   fields.Add("vertices", mesh == nullptr ? 0 : mesh->chunks.mesh().vertex_count());
+  if (replayed > 0) {
+    fields.Add("replayed_steps", replayed);
+  }
   if (!status.ok()) {
     fields.Add("message", status.error_message());
   }

@@ -16,8 +16,8 @@ namespace wellspace::server {
 // Starts an operation that refines `session` with `parameters`, on a worker: from its points the first time, from then on by what has
 // changed.
 //
-// A first refinement that does not succeed leaves nothing behind but the points. A later one leaves what it has added, and the next one
-// goes on from there; one that has grown until memory ran out gives up the structure, and the next one builds it anew.
+// One that does not succeed leaves the session as it was: a mesher that it has changed is given up, and built again by
+// Replay when the structure is next needed.
 //
 // Errors:     QUEUE_FULL, QUOTA_EXCEEDED (jobs); those of Session::StartOperation.
 grpc::Status StartRefinement(const CallEnvironment& environment, const std::shared_ptr<Session>& session,

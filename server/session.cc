@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -164,9 +165,13 @@ grpc::Status Session::CheckIdle() const {
       return MakeError(v1::ERROR_REASON_SESSION_BUSY,
                        absl::StrCat(operations_.back()->name(), " is under way; wait for its end, or cancel it"));
     case Busy::kAddingVertices:
+      return MakeError(v1::ERROR_REASON_SESSION_BUSY, absl::StrCat("vertices are being added to ", name_));
+    case Busy::kReplaying:
       break;
   }
-  return MakeError(v1::ERROR_REASON_SESSION_BUSY, absl::StrCat("vertices are being added to ", name_));
+  return MakeError(v1::ERROR_REASON_SESSION_BUSY,
+                   absl::StrCat("a query or an addition of vertices has the structure of ", name_,
+                                " built again, which an operation without success gave up; try again later"));
 }
 
 grpc::Status Session::CheckReadyForChange(uint64_t expected_revision) const {
@@ -179,16 +184,19 @@ grpc::Status Session::CheckReadyForChange(uint64_t expected_revision) const {
   return CheckRevision(expected_revision);
 }
 
+grpc::Status Session::CheckMesh() const {
+  return work_.mesh != nullptr ? grpc::Status::OK
+                               : MakeError(v1::ERROR_REASON_MESH_NOT_READY,
+                                           absl::StrCat(name_, " has no mesh yet; start a refinement first"));
+}
+
 grpc::Status Session::CheckStructure() const {
-  if (work_.mesher != nullptr) {
-    return grpc::Status::OK;
+  if (grpc::Status status = CheckMesh(); !status.ok() || work_.mesher != nullptr) {
+    return status;
   }
   return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
-                   work_.mesh == nullptr
-                       ? absl::StrCat(name_, " has no mesh yet; start a refinement first")
-                       : absl::StrCat(name_,
-                                      " has no query structure since its last refinement failed; start another, "
-                                      "which numbers the vertices anew"));
+                   absl::StrCat("an operation without success has given up the structure of ", name_,
+                                " in this moment; ask again, and it is built again"));
 }
 
 grpc::Status Session::TakePoints(uint64_t count) {
@@ -316,6 +324,41 @@ grpc::Status Session::Query(uint64_t* version, const std::function<grpc::Status(
   return query(*mesher);
 }
 
+grpc::Status Session::PrepareStructure(uint64_t expected_revision, const MesherFactory& create_mesher, Job& job,
+                                       bool* is_at_work) {
+  {
+    std::lock_guard lock(mutex_);
+    if (is_at_work != nullptr) {
+      *is_at_work = busy_ == Busy::kReplaying && !is_closed_;
+    }
+    if (grpc::Status status = CheckReadyForChange(expected_revision); !status.ok()) {
+      return status;
+    }
+    if (grpc::Status status = CheckMesh(); !status.ok() || work_.mesher != nullptr) {
+      return status;
+    }
+    busy_ = Busy::kReplaying;
+  }
+  const grpc::Status status = RunGuarded([&] { return Rebuild(create_mesher, job); });
+  job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();
+  std::lock_guard lock(mutex_);
+  busy_ = Busy::kNo;
+  last_use_ = clock_.since_boot();
+  return status;
+}
+
+grpc::Status Session::Rebuild(const MesherFactory& create_mesher, Job& job) {
+  absl::StatusOr<std::unique_ptr<core::Mesher>> mesher =
+      Replay(steps_, points_, work_.mesh->chunks.mesh(), create_mesher, job);
+  if (!mesher.ok()) {
+    return FromCoreStatus(mesher.status());
+  }
+  work_.mesher = *std::move(mesher);
+  work_.memory = job.TakeMemory(work_.mesher->memory_bytes());
+  work_.memory.MakeLasting();
+  return grpc::Status::OK;
+}
+
 void Session::WaitForQueries() { std::unique_lock wait(queries_mutex_); }
 
 grpc::Status Session::AddVertices(std::span<const double> points, std::span<const uint32_t> near,
@@ -353,7 +396,9 @@ grpc::Status Session::AddVertices(std::span<const double> points, std::span<cons
     has_returned = true;
     return ended;
   });
-  if (!has_returned) {  // nobody knows what a mesher is like that an exception went through
+  if (!has_returned || (!status.ok() && uploaded > 0)) {
+    // Nobody knows what a mesher is like that an exception went through, and points that waited are in it that would
+    // come with others.
     work_.mesher = nullptr;
     work_.memory.Release();
   } else if (memory_.is_limited()) {
@@ -363,21 +408,37 @@ grpc::Status Session::AddVertices(std::span<const double> points, std::span<cons
   std::lock_guard lock(mutex_);
   busy_ = Busy::kNo;
   last_use_ = clock_.since_boot();
-  work_.meshed_points = has_returned ? work_.meshed_points + uploaded : 0;
-  is_ready_ = is_ready_ && has_returned;
-  if (status.ok() && !points.empty()) {
+  const uint64_t count = points.size() / dimension_;
+  if (!status.ok()) {
+    ReturnPoints(count);
+    return status;
+  }
+  if (uploaded > 0 || count > 0) {
+    const uint64_t uploads_end = work_.meshed_points + uploaded;
+    steps_.NoteAddition(uploads_end, uploads_end + count);
+    work_.meshed_points = steps_.points();
+    ++structure_version_;
+  }
+  if (count > 0) {
     points_.Append(points);
-    work_.meshed_points += points.size() / dimension_;
     is_ready_ = false;
     ++revision_;
-  } else {
-    ReturnPoints(points.size() / dimension_);
-  }
-  if (uploaded > 0 || status.ok() || !has_returned) {
-    ++structure_version_;
   }
   added->revision = revision_;
   return status;
+}
+
+grpc::Status Session::CheckVertices(std::span<const double> points, std::span<const uint32_t> near,
+                                    uint64_t waiting) const {
+  const uint64_t most = work_.mesher->vertex_count() + waiting;
+  const auto missing = std::ranges::find_if(near, [most](uint32_t vertex) { return vertex >= most; });
+  if (missing != near.end()) {
+    return MakeError(v1::ERROR_REASON_VERTEX_OUT_OF_RANGE,
+                     absl::StrCat("near[", missing - near.begin(), "] is ", *missing, ", and no vertex; there are ",
+                                  work_.mesher->vertex_count()),
+                     "near");
+  }
+  return CheckCoordinates(0, points);
 }
 
 grpc::Status Session::AddToMesher(std::span<const double> points, std::span<const uint32_t> near,
@@ -391,6 +452,10 @@ grpc::Status Session::AddToMesher(std::span<const double> points, std::span<cons
     return FromCoreStatus(waiting.status());
   }
   if (!waiting->empty()) {
+    // What is wrong with the vertices shows before the mesher has taken in others, which would cost it.
+    if (grpc::Status status = CheckVertices(points, near, waiting->size() / dimension_); !status.ok()) {
+      return status;
+    }
     if (const absl::Status done = work_.mesher->AddPoints(*waiting, context).status(); !done.ok()) {
       return FromCoreStatus(done);
     }
@@ -432,7 +497,6 @@ grpc::Status Session::StartOperation(const core::MeshParameters& parameters, uin
   }
   ++next_operation_;
   busy_ = Busy::kOperation;
-  parameters_ = parameters;
   operations_.push_back(started);
   if (operations_.size() > kKeptOperations) {
     forgotten = std::move(operations_.front());
@@ -466,15 +530,18 @@ void Session::EndWork(Operation& operation, const grpc::Status& status, SessionW
     if (status.ok()) {
       mesh->revision = ++revision_;
       work.mesh = std::move(mesh);
+      work.meshed_points = points_.coordinate_count() / dimension_;
+      steps_.NoteRefinement(work.meshed_points, operation.parameters());
+      parameters_ = operation.parameters();
       is_ready_ = true;
+      ++structure_version_;
       const core::Mesh& made = work.mesh->chunks.mesh();
       operation.Succeed(now, revision_, made.vertex_count(), made.simplex_count());
     } else {
       operation.Fail(now, status);
-      is_ready_ = false;
+      work.meshed_points = steps_.points();
     }
     std::swap(work_, work);  // what was there is freed without the lock
-    ++structure_version_;
     busy_ = Busy::kNo;
     last_use_ = clock_.since_boot();
   }
@@ -488,7 +555,6 @@ bool Session::EndWaiting(Operation& operation) {
       return false;
     }
     busy_ = Busy::kNo;
-    is_ready_ = false;
     last_use_ = clock_.since_boot();
     operation.Fail(clock_.wall(), grpc::Status(grpc::StatusCode::CANCELLED, "the operation was cancelled"));
   }

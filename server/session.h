@@ -25,6 +25,8 @@
 #include "server/operation.h"
 #include "server/options.h"
 #include "server/point_store.h"
+#include "server/replay.h"
+#include "server/session_steps.h"
 #include "wellspace/v1/sessions.pb.h"
 
 namespace wellspace::server {
@@ -50,16 +52,17 @@ struct AddedVertices {
 
 // What an operation works on. The session has given it away until the operation has ended.
 struct SessionWork {
-  std::unique_ptr<core::Mesher> mesher;      // null: there is none yet
-  uint64_t meshed_points = 0;                // of the session's points, those that `mesher` has
+  std::unique_ptr<core::Mesher> mesher;      // null: there is none yet, or it was given up
+  uint64_t meshed_points = 0;                // of the session's points, those that `mesher` has, or would have
   std::shared_ptr<const MeshSnapshot> mesh;  // the last one; null: there is none yet
   MemoryReservation memory;                  // of `mesher`
 };
 
 // Thread safety: thread-safe.
 // Invariants: (1) revision grows with every change of the points or of the mesh; (2) while an operation is under way, or vertices are
-// being added, points, mesh and mesher are touched by nothing else; (3) a refinement that did not succeed leaves every point in its
-// place; (4) the lock order is this session's mutex, then that of its operations and of the JobPool.
+// being added or the mesher is built again, points, mesh, mesher and steps are touched by nothing else; (3) what did
+// not succeed leaves the session as it was: structure and mesh are what Replay makes of the steps, whether there is a
+// mesher now or not; (4) the lock order is this session's mutex, then that of its operations and of the JobPool.
 class Session {
  public:
   struct Settings {
@@ -117,6 +120,14 @@ class Session {
   // The last mesh; null before the first.
   std::shared_ptr<const MeshSnapshot> mesh() const;
 
+  // Has a structure to be queried, or to be added to, on this thread, a worker's: where a mesher was given up, it is
+  // built again by `job`. `*is_at_work`: another job does that now, and the status is SESSION_BUSY.
+  //
+  // Errors:     MESH_NOT_READY, SESSION_BUSY, SESSION_NOT_FOUND, REVISION_MISMATCH; of building it again: MEMORY_LIMIT,
+  //             OUT_OF_MEMORY, CANCELLED. It can be tried again.
+  grpc::Status PrepareStructure(uint64_t expected_revision, const MesherFactory& create_mesher, Job& job,
+                                bool* is_at_work = nullptr);
+
   // Runs `query` on this thread, a worker's. Any number of queries run at once. An operation that begins waits for those that run:
   // keep each short (some milliseconds) and ask again for the next batch.
   // `version` is that of the structure: 0 for the first batch, which sets it; for later ones as it was set.
@@ -127,6 +138,7 @@ class Session {
 
   // Adds vertices at `points` on this thread, a worker's: all or, on an error, none. `near` has a vertex for each, or is empty.
   //
+  // REQUIRES:   PrepareStructure has succeeded; if the mesher was given up since, the error is MESH_NOT_READY.
   // Errors:     MESH_NOT_READY, SESSION_BUSY, INVALID_CHUNK_SHAPE, INVALID_REQUEST (the length of `near`), INVALID_POINTS,
   //             VERTEX_OUT_OF_RANGE, TOO_MANY_POINTS, QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH, SESSION_NOT_FOUND; CANCELLED.
   grpc::Status AddVertices(std::span<const double> points, std::span<const uint32_t> near, uint64_t expected_revision,
@@ -142,6 +154,8 @@ class Session {
   // On the worker: what to work on; nothing if the operation has ended before it could begin.
   std::optional<SessionWork> BeginWork(Operation& operation);
   // On the worker: takes back what BeginWork gave, and ends the operation with `status`. `mesh` is the new mesh if that is OK.
+  //
+  // REQUIRES:   on an error, work.mesher is as it was, or null.
   void EndWork(Operation& operation, const grpc::Status& status, SessionWork work, std::shared_ptr<MeshSnapshot> mesh);
   // Ends an operation that still waits for a worker as CANCELLED; false when it does not.
   bool EndWaiting(Operation& operation);
@@ -153,12 +167,14 @@ class Session {
 
   // The points. To be called by the operation that is under way.
   const PointStore& points() const { return points_; }
+  // What has made the structure. The same.
+  const SessionSteps& steps() const { return steps_; }
 
  private:
   friend class SessionUse;
 
   // What changes the points or the mesh, and lets nothing else do so.
-  enum class Busy { kNo, kOperation, kAddingVertices };
+  enum class Busy { kNo, kOperation, kAddingVertices, kReplaying };
 
   // The following want mutex_ to be held.
   grpc::Status CheckOpen() const;
@@ -166,7 +182,9 @@ class Session {
   grpc::Status CheckIdle() const;
   // All three.
   grpc::Status CheckReadyForChange(uint64_t expected_revision) const;
-  // Whether there is something to query.
+  // Whether there is something to query, or to build again.
+  grpc::Status CheckMesh() const;
+  // Whether there is something to query now.
   grpc::Status CheckStructure() const;
   // Takes `count` more points into the account of the session and its tenant, or says why it may not have them.
   grpc::Status TakePoints(uint64_t count);
@@ -179,10 +197,14 @@ class Session {
 
   // Without it, once nothing can begin a query any more: waits for those that run.
   void WaitForQueries();
+  // Without it, while the mesher is being built again: what it is built by.
+  grpc::Status Rebuild(const MesherFactory& create_mesher, Job& job);
   // Without it, while vertices are being added: the part that is the mesher's. `*uploaded` of the points that waited are in it then, on
   // an error too.
   grpc::Status AddToMesher(std::span<const double> points, std::span<const uint32_t> near, core::RunContext& context,
                            uint64_t* uploaded, std::vector<uint32_t>* vertices);
+  // The same: what of AddVertices is wrong before anything is done.
+  grpc::Status CheckVertices(std::span<const double> points, std::span<const uint32_t> near, uint64_t waiting) const;
   // The same: has room for `count` more vertices in the mesher, or says that there is none.
   grpc::Status ReserveForVertices(uint64_t count);
 
@@ -198,7 +220,8 @@ class Session {
   mutable std::shared_mutex queries_mutex_;  // after mutex_; held shared by queries
   mutable std::mutex mutex_;
   // Guarded by mutex_.
-  core::MeshParameters parameters_;
+  core::MeshParameters
+      parameters_;  // of the last refinement that succeeded; before it, those of the session's creation
   std::map<std::string, std::string> labels_;
   absl::Duration ttl_;
   absl::Duration last_use_;  // since boot
@@ -211,6 +234,7 @@ class Session {
   PointStore points_;               // see invariant (2)
   MemoryReservation point_memory_;  // of point_count_ points
   SessionWork work_;                // its mesher is away while an operation is under way; see invariant (2)
+  SessionSteps steps_;              // see invariant (2)
   uint64_t structure_version_ = 0;  // of what queries see; 0: nothing yet
   uint64_t next_operation_ = 1;
   std::deque<std::shared_ptr<Operation>> operations_;  // ascending by number

@@ -177,7 +177,7 @@ class Acceptance(unittest.TestCase):
         operation, _ = remote.refine(name, tiny)  # not foretold: it grows until it is stopped
         self.assertEqual(operation.error.code, grpc.StatusCode.RESOURCE_EXHAUSTED.value[0])
         session = remote.get(name)
-        self.assertEqual((session.state, session.committed_points), (api().Session.STATE_OPEN, 1000))
+        self.assertEqual((session.state, session.committed_points), (api().Session.STATE_READY, 1000))
         self.assertEqual(content(remote.download(name)[1]), before)
         operation, _ = remote.refine(name, unit_box(3, max_circumradius=1e-5, max_vertices=5000))
         self.assertEqual(operation.error.code, grpc.StatusCode.RESOURCE_EXHAUSTED.value[0])

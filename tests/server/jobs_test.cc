@@ -564,5 +564,27 @@ TEST(JobPool, ManyTenantsWithTenTimesTheMemoryFinish) {
   EXPECT_EQ(pool.memory.reserved(), 0u);
 }
 
+// What a job runs apart is cancelled with it.
+TEST(JobPool, CancelReachesWhatRunsApart) {
+  Pool pool(1, 10);
+  Event runs;
+  Event ended;
+  absl::Status status;
+  const std::shared_ptr<Job> job = pool.Submit([&](Job& self) {
+    status = self.RunApart([&](core::RunContext& apart) {
+      runs.Set();
+      while (!apart.IsCancelled()) {
+        std::this_thread::yield();
+      }
+      return apart.Check();
+    });
+    ended.Set();
+  });
+  ASSERT_TRUE(runs.Wait());
+  pool.Cancel(job);
+  ASSERT_TRUE(ended.Wait());
+  EXPECT_EQ(status.code(), absl::StatusCode::kCancelled);
+}
+
 }  // namespace
 }  // namespace wellspace::server

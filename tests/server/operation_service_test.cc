@@ -226,12 +226,12 @@ TEST_F(OperationServiceTest, CancelInEveryPhaseLeavesTheSessionOpenWithAllItsPoi
   }
 }
 
-TEST_F(OperationServiceTest, ARefinementThatDoesNotSucceedMakesAReadySessionOpen) {
+TEST_F(OperationServiceTest, ARefinementThatDoesNotSucceedLeavesAReadySessionReady) {
   const std::string name = MakeSession();
   calls_.Refine(name);
   script_.Set([](core::Phase, core::RunContext&) { return absl::ResourceExhaustedError("too large"); });
   EXPECT_EQ(calls_.Refine(name).state(), v1::Operation::STATE_FAILED);
-  EXPECT_EQ(calls_.Get(name).state(), v1::Session::STATE_OPEN);
+  EXPECT_EQ(calls_.Get(name).state(), v1::Session::STATE_READY) << "its mesh is that of all its points";
   EXPECT_EQ(calls_.Get(name).vertex_count(), 7u) << "the last mesh is there still";
 
   script_.Set(nullptr);
@@ -241,7 +241,7 @@ TEST_F(OperationServiceTest, ARefinementThatDoesNotSucceedMakesAReadySessionOpen
   const std::string running = calls_.Start(MakeSession()).name();
   ASSERT_TRUE(begun.Wait());
   calls_.Cancel(calls_.Start(name).name());
-  EXPECT_EQ(calls_.Get(name).state(), v1::Session::STATE_OPEN);
+  EXPECT_EQ(calls_.Get(name).state(), v1::Session::STATE_READY);
   calls_.Cancel(running);
 }
 
