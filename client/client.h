@@ -98,9 +98,10 @@ class Client {
   absl::Status DeleteSession(const std::string& session, const CallOptions& call = {});
 
   // Adds the points of `source` to a session. `offset` is the number of the session's points before the first of them: what is there
-  // from it on is not sent again, so that an upload that broke off is simply repeated with the same offset. Absent: after the
-  // points that are there when the call begins.
-  // `call.expected_revision` is that before the call.
+  // from it on is not sent again, so that an upload that broke off is simply repeated with the same offset. It has to
+  // be of the same source: the server compares a checksum, and FAILED_PRECONDITION (UPLOAD_MISMATCH) ends the call if
+  // it is not. Absent: after the points that are there when the call begins. A session takes one upload at a time:
+  // FAILED_PRECONDITION (SESSION_BUSY). `call.expected_revision` is that before the call.
   absl::StatusOr<Uploaded> UploadPoints(const std::string& session, PointSource& source,
                                         std::optional<uint64_t> offset = std::nullopt,
                                         const OnPoints& on_points = nullptr, const CallOptions& call = {});

@@ -1,13 +1,16 @@
 // Uploads and downloads of sessions, which go on where a connection broke off.
 #include <algorithm>
+#include <span>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "client/convert.h"
+#include "client/error_details.h"
 #include "client/grpc_connection.h"
 #include "client/mesh_receiver.h"
 #include "client/request_writer.h"
+#include "proto/checksum.h"
 
 namespace wellspace::client {
 namespace {
@@ -26,6 +29,8 @@ class Upload {
  private:
   using Stream = RequestWriter<v1::UploadPointsRequest>;
 
+  // Reads the first `count` points of the source, or as many as there are, into a checksum. `*count` becomes how many.
+  absl::StatusOr<uint32_t> ReadChecked(uint64_t* count);
   // Sends what is left of the source and half-closes; an error is the source's. Stops early when the call has ended.
   absl::Status Send(Stream& stream, v1::UploadPointsRequest& request);
 
@@ -34,9 +39,33 @@ class Upload {
   const OnPoints& on_points_;
   uint64_t expected_revision_;
   uint64_t committed_ = 0;  // as far as is known
+  int attempts_ = 0;
   std::vector<double> rows_;
   v1::UploadPointsResponse response_;
 };
+
+absl::StatusOr<uint32_t> Upload::ReadChecked(uint64_t* count) {
+  if (absl::Status status = source_.Seek(0); !status.ok()) {
+    return status;
+  }
+  const int dimension = source_.dimension();
+  const uint64_t wanted = std::exchange(*count, 0);
+  rows_.resize(RowsOfARequest(dimension) * dimension);
+  uint32_t checksum = 0;
+  while (*count < wanted) {
+    const uint64_t most = std::min<uint64_t>(rows_.size(), (wanted - *count) * dimension);
+    const absl::StatusOr<uint64_t> read = source_.Read(std::span(rows_).first(most));
+    if (!read.ok()) {
+      return read.status();
+    }
+    if (*read == 0) {
+      break;
+    }
+    checksum = ExtendCrc32c(checksum, rows_.data(), *read * dimension * sizeof(double));
+    *count += *read;
+  }
+  return checksum;
+}
 
 absl::Status Upload::Send(Stream& stream, v1::UploadPointsRequest& request) {
   // The first message may be without points: it says which session it is.
@@ -79,11 +108,17 @@ absl::Status Upload::Run(v1::SessionService::Stub& stub, const v1::Session& sess
   if (!offset_.has_value()) {
     offset_ = session.committed_points();
   }
-  const uint64_t first = std::max(*offset_, session.committed_points()) - *offset_;
-  if (absl::Status status = source_.Seek(first); !status.ok()) {
-    return attempt.Final(status);
+  // What is there from the offset on has to be of this source: the server compares.
+  uint64_t first = std::max(*offset_, session.committed_points()) - *offset_;
+  const absl::StatusOr<uint32_t> checked = ReadChecked(&first);
+  if (!checked.ok()) {
+    return attempt.Final(checked.status());
   }
   v1::UploadPointsRequest request;
+  if (first > 0) {
+    request.set_checked_from(*offset_);
+    request.set_checked_crc32c(*checked);
+  }
   request.set_name(session.name());
   request.set_point_offset(*offset_ + first);
   // What the attempts before this one committed has changed the revision.
@@ -103,6 +138,10 @@ absl::Status Upload::Run(v1::SessionService::Stub& stub, const v1::Session& sess
     return attempt.Final(
         absl::DataLossError(absl::StrCat("the server has ", response_.committed_points(),
                                          " points after points up to number ", request.point_offset(), " were sent")));
+  }
+  // The server may not have noticed yet that the last attempt broke off.
+  if (attempts_++ > 0 && ReasonOf(status) == "ERROR_REASON_SESSION_BUSY") {
+    attempt.SetWorthRepeating();
   }
   return status;
 }

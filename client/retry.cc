@@ -86,7 +86,7 @@ absl::Status Retrier::Run(absl::Duration timeout, const std::stop_token& stop,
       return CancelledByCaller();
     }
     failures = current.progressed() ? 1 : failures + 1;
-    if (!IsWorthRepeating(status) ||
+    if (!(IsWorthRepeating(status) || current.is_worth_repeating()) ||
         failures >= (reached_.load() ? policy_.max_attempts : policy_.max_first_attempts)) {
       return status;
     }

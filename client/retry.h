@@ -63,11 +63,16 @@ class Attempt {
   }
   bool is_final() const { return is_final_; }
 
+  // The status of this attempt is worth another, though IsWorthRepeating does not say so.
+  void SetWorthRepeating() { is_worth_repeating_ = true; }
+  bool is_worth_repeating() const { return is_worth_repeating_; }
+
  private:
   const absl::Duration time_left_;
   const std::stop_token stop_;
   bool progressed_ = false;
   bool is_final_ = false;
+  bool is_worth_repeating_ = false;
 };
 
 // The context of one call of an attempt, with its deadline; cancelled when a stop is asked for.

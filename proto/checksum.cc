@@ -77,9 +77,9 @@ uint64_t WordAt(const char* bytes) {
 
 // The instruction takes eight bytes, and three cycles until the next can go on from it: three lanes at once keep it busy. A checksum is
 // linear: that of a block is the exclusive or of those of its lanes, each followed by zeros in the place of the lanes behind it.
-__attribute__((target("sse4.2"))) uint32_t Crc32cBySse42(const void* data, size_t size) {
+__attribute__((target("sse4.2"))) uint32_t ExtendBySse42(uint32_t before, const void* data, size_t size) {
   const char* bytes = static_cast<const char*>(data);
-  uint64_t crc = 0xFFFFFFFF;
+  uint64_t crc = ~before;
   for (; size >= 3 * kLaneBytes; bytes += 3 * kLaneBytes, size -= 3 * kLaneBytes) {
     uint64_t second = 0;
     uint64_t third = 0;
@@ -103,20 +103,28 @@ __attribute__((target("sse4.2"))) uint32_t Crc32cBySse42(const void* data, size_
 }  // namespace
 #endif
 
-uint32_t Crc32c(const void* data, size_t size) {
+uint32_t Crc32c(const void* data, size_t size) { return ExtendCrc32c(0, data, size); }
+
+uint32_t ExtendCrc32c(uint32_t crc, const void* data, size_t size) {
 #if defined(__x86_64__)
   static const bool has_sse42 = __builtin_cpu_supports("sse4.2");
   if (has_sse42) {
-    return Crc32cBySse42(data, size);
+    return ExtendBySse42(crc, data, size);
   }
 #endif
-  return PortableCrc32c(data, size);
+  return ExtendPortableCrc32c(crc, data, size);
 }
 
-uint32_t PortableCrc32c(const void* data, size_t size) {
-  boost::crc_optimal<32, 0x1EDC6F41, 0xFFFFFFFF, 0xFFFFFFFF, true, true> crc;
-  crc.process_bytes(data, size);
-  return crc.checksum();
+uint32_t PortableCrc32c(const void* data, size_t size) { return ExtendPortableCrc32c(0, data, size); }
+
+uint32_t ExtendPortableCrc32c(uint32_t crc, const void* data, size_t size) {
+  uint32_t remainder = 0;  // before these bytes, as Boost has it: its lowest bit first
+  for (int bit = 0; bit < 32; ++bit) {
+    remainder |= (~crc >> bit & 1u) << (31 - bit);
+  }
+  boost::crc_optimal<32, 0x1EDC6F41, 0xFFFFFFFF, 0xFFFFFFFF, true, true> sum(remainder);
+  sum.process_bytes(data, size);
+  return sum.checksum();
 }
 
 }  // namespace wellspace

@@ -44,6 +44,7 @@ grpc::StatusCode CodeOf(v1::ErrorReason reason) {
       return grpc::StatusCode::NOT_FOUND;
     case v1::ERROR_REASON_SESSION_BUSY:
     case v1::ERROR_REASON_MESH_NOT_READY:
+    case v1::ERROR_REASON_UPLOAD_MISMATCH:
       return grpc::StatusCode::FAILED_PRECONDITION;
     case v1::ERROR_REASON_REVISION_MISMATCH:
       return grpc::StatusCode::ABORTED;

@@ -1,8 +1,10 @@
 #include "server/point_store.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "core/base/status_macros.h"
+#include "proto/checksum.h"
 
 namespace wellspace::server {
 
@@ -39,6 +41,30 @@ absl::StatusOr<std::vector<double>> PointStore::Copy(uint64_t first, uint64_t en
     first += piece.size();
   }
   return coordinates;
+}
+
+uint64_t PointStore::CountEqual(uint64_t first, std::span<const double> coordinates) const {
+  uint64_t equal = 0;
+  while (equal < coordinates.size()) {
+    const std::span<const double> piece = PieceFrom(first + equal, first + coordinates.size());
+    const std::span<const double> other = coordinates.subspan(equal, piece.size());
+    if (std::memcmp(piece.data(), other.data(), piece.size_bytes()) != 0) {
+      const auto is_same = [](double a, double b) { return std::memcmp(&a, &b, sizeof(a)) == 0; };
+      return equal + (std::mismatch(piece.begin(), piece.end(), other.begin(), is_same).first - piece.begin());
+    }
+    equal += piece.size();
+  }
+  return equal;
+}
+
+uint32_t PointStore::Checksum(uint64_t first, uint64_t end) const {
+  uint32_t checksum = 0;
+  while (first < end) {
+    const std::span<const double> piece = PieceFrom(first, end);
+    checksum = ExtendCrc32c(checksum, piece.data(), piece.size_bytes());
+    first += piece.size();
+  }
+  return checksum;
 }
 
 }  // namespace wellspace::server

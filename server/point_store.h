@@ -21,6 +21,21 @@ class PointStore {
   // Complexity: O(size of `coordinates`).
   void Append(std::span<const double> coordinates);
 
+  // How many of `coordinates` are, to the bit, those from number `first` on: all, or those before the first that is
+  // another.
+  //
+  // REQUIRES:   first + coordinates.size() <= coordinate_count().
+  uint64_t CountEqual(uint64_t first, std::span<const double> coordinates) const;
+
+  // CRC32C of the coordinates from number `first` on, those from `end` on excepted.
+  //
+  // REQUIRES:   first <= end <= coordinate_count().
+  // Complexity: 0.1 ms per MiB, where the processor has an instruction for it.
+  uint32_t Checksum(uint64_t first, uint64_t end) const;
+
+  // The coordinate number `index`.
+  double at(uint64_t index) const { return blocks_[index / kBlockSize][index % kBlockSize]; }
+
   uint64_t coordinate_count() const { return coordinate_count_; }
 
   // The coordinates from number `first` on, those from `end` on excepted.

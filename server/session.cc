@@ -251,6 +251,57 @@ grpc::Status Session::CheckCoordinates(uint64_t first, std::span<const double> c
   return grpc::Status::OK;
 }
 
+bool Session::BeginUpload() {
+  std::lock_guard lock(mutex_);
+  return !std::exchange(is_uploading_, true);
+}
+
+void Session::EndUpload() {
+  std::lock_guard lock(mutex_);
+  is_uploading_ = false;
+}
+
+grpc::Status Session::CheckNoGap(uint64_t offset) const {
+  return offset <= point_count_
+             ? grpc::Status::OK
+             : MakeError(v1::ERROR_REASON_UPLOAD_GAP,
+                         absl::StrCat("point_offset is ", offset, ", but ", name_, " has ", point_count_,
+                                      " points; go on at ", point_count_, " or before"),
+                         "point_offset");
+}
+
+grpc::Status Session::CheckPrefix(const Prefix& prefix) const {
+  std::lock_guard lock(mutex_);
+  if (grpc::Status status = CheckIdle(); !status.ok()) {
+    return status;
+  }
+  if (grpc::Status status = CheckNoGap(prefix.end); !status.ok()) {
+    return status;
+  }
+  const uint32_t checksum = points_.Checksum(prefix.first * dimension_, prefix.end * dimension_);
+  return checksum == prefix.crc32c
+             ? grpc::Status::OK
+             : MakeError(
+                   v1::ERROR_REASON_UPLOAD_MISMATCH,
+                   absl::StrCat(name_, " has other points from number ", prefix.first, " up to ", prefix.end,
+                                " than those that this upload goes on after: their checksum is ", checksum, ", not ",
+                                prefix.crc32c, "; add these points at ", point_count_, ", or to another session"),
+                   "checked_crc32c");
+}
+
+grpc::Status Session::CheckKnown(uint64_t first, std::span<const double> coordinates) const {
+  const uint64_t equal = points_.CountEqual(first * dimension_, coordinates);
+  if (equal == coordinates.size()) {
+    return grpc::Status::OK;
+  }
+  const uint64_t point = first + equal / dimension_;
+  return MakeError(v1::ERROR_REASON_UPLOAD_MISMATCH,
+                   absl::StrCat("points[", point, "]: coordinate ", equal % dimension_, " is ", coordinates[equal],
+                                "; ", name_, " has this point already, with ", points_.at(first * dimension_ + equal),
+                                "; send the same again, or add other points at ", point_count_),
+                   "points.coordinates");
+}
+
 grpc::Status Session::Append(uint64_t offset, std::span<const double> coordinates, uint64_t expected_revision) {
   std::lock_guard lock(mutex_);
   if (grpc::Status status = CheckReadyForChange(expected_revision); !status.ok()) {
@@ -262,14 +313,14 @@ grpc::Status Session::Append(uint64_t offset, std::span<const double> coordinate
                                   " coordinates; expected a multiple of the dimension ", dimension_),
                      "points.coordinates");
   }
-  const uint64_t committed = point_count_;
-  if (offset > committed) {
-    return MakeError(v1::ERROR_REASON_UPLOAD_GAP,
-                     absl::StrCat("point_offset is ", offset, ", but ", name_, " has ", committed, " points; go on at ",
-                                  committed, " or before"),
-                     "point_offset");
+  if (grpc::Status status = CheckNoGap(offset); !status.ok()) {
+    return status;
   }
+  const uint64_t committed = point_count_;
   const uint64_t known = std::min<uint64_t>(committed - offset, coordinates.size() / dimension_);
+  if (grpc::Status status = CheckKnown(offset, coordinates.first(known * dimension_)); !status.ok()) {
+    return status;
+  }
   coordinates = coordinates.subspan(known * dimension_);
   if (coordinates.empty()) {
     return grpc::Status::OK;

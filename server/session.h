@@ -108,11 +108,26 @@ class Session {
   // The same if the lease has run out, so that nothing is under way; says whether it has.
   bool CloseIfExpired();
 
-  // Appends those of `coordinates`, whole points of which the first is number `offset` of the session, that it does not have yet.
-  // `expected_revision` 0: any.
+  // Lets one upload have the session. False: another has it.
+  bool BeginUpload();
+  void EndUpload();
+
+  // What a client believes that the session has.
+  struct Prefix {
+    uint64_t first = 0;  // points
+    uint64_t end = 0;    // points; first <= end
+    uint32_t crc32c = 0;
+  };
+  // Refuses an upload that goes on where another has ended.
   //
-  // Errors:     INVALID_CHUNK_SHAPE, INVALID_POINTS, UPLOAD_GAP, SESSION_BUSY, TOO_MANY_POINTS, QUOTA_EXCEEDED, MEMORY_LIMIT,
-  //             REVISION_MISMATCH, SESSION_NOT_FOUND. Nothing has been appended.
+  // Errors:     UPLOAD_GAP, UPLOAD_MISMATCH.
+  grpc::Status CheckPrefix(const Prefix& prefix) const;
+
+  // Appends those of `coordinates`, whole points of which the first is number `offset` of the session, that it does not
+  // have yet; the others have to be those that it has. `expected_revision` 0: any.
+  //
+  // Errors:     INVALID_CHUNK_SHAPE, INVALID_POINTS, UPLOAD_GAP, UPLOAD_MISMATCH, SESSION_BUSY, TOO_MANY_POINTS,
+  //             QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH, SESSION_NOT_FOUND. Nothing has been appended.
   grpc::Status Append(uint64_t offset, std::span<const double> coordinates, uint64_t expected_revision);
   // Points and revision, as one.
   v1::UploadPointsResponse Committed() const;
@@ -190,6 +205,10 @@ class Session {
   grpc::Status TakePoints(uint64_t count);
   // Takes them out again.
   void ReturnPoints(uint64_t count);
+  // That an upload begins at `offset` with no gap before it.
+  grpc::Status CheckNoGap(uint64_t offset) const;
+  // That `coordinates` are those that the session has from point `first` on.
+  grpc::Status CheckKnown(uint64_t first, std::span<const double> coordinates) const;
   // Refuses what no mesh of this session could have. `first` is the number of the first point.
   grpc::Status CheckCoordinates(uint64_t first, std::span<const double> coordinates) const;
   absl::Duration ExpiresAt() const;  // since boot
@@ -228,6 +247,7 @@ class Session {
   int uses_ = 0;
   bool is_closed_ = false;
   Busy busy_ = Busy::kNo;
+  bool is_uploading_ = false;
   bool is_ready_ = false;  // the last operation succeeded, and no points have come since
   uint64_t revision_ = 1;
   uint64_t point_count_ = 0;        // with those that AddVertices is adding

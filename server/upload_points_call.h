@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "grpcpp/support/byte_buffer.h"
@@ -12,10 +13,12 @@
 #include "server/memory_budget.h"
 #include "server/request_stream.h"
 #include "server/session.h"
+#include "wellspace/v1/sessions.pb.h"
 
 namespace wellspace::server {
 
-// Commits each message before it reads the next.
+// Commits each message before it reads the next. One upload has a session at a time: the first message of another waits
+// for a moment, in which one whose connection broke is noticed.
 //
 // Thread safety and invariants: those of Call.
 class UploadPointsCall final : public RequestStream<Call<grpc::ServerReadReactor<grpc::ByteBuffer>>> {
@@ -28,17 +31,29 @@ class UploadPointsCall final : public RequestStream<Call<grpc::ServerReadReactor
   void OnBegin() override;
   void OnRequest(grpc::ByteBuffer* bytes) override;
   void OnRequestsEnd() override;
-  void OnEnd() override { memory_.Release(); }
+  void OnEnd() override;
   LogFields Figures() const override;
 
+  // On the background thread: another upload had the session.
+  void TryAgain();
+
   // The following want mutex_ to be held.
-  grpc::Status Accept(grpc::ByteBuffer* bytes);
+  // With first_: takes it when the session is free, or comes again, or ends the call.
+  void TryToBegin();
+  // What the first message says that the session has.
+  grpc::Status CheckPrefix(const v1::UploadPointsRequest& first) const;
+  // Takes a message, and reads the next or ends the call.
+  void Take(const v1::UploadPointsRequest& request);
 
   grpc::ByteBuffer* const response_;  // gRPC's from Finish on
   // Guarded by mutex_.
-  std::shared_ptr<Session> session_;  // null before the first message
-  MemoryReservation memory_;          // of the message that comes
-  uint64_t coordinate_count_ = 0;     // received
+  std::optional<SessionUse> session_;  // nothing before the first message
+  bool has_session_ = false;           // the session is this upload's
+  int attempts_ = 0;                   // to have it
+  bool is_first_ = true;               // no message has been taken
+  v1::UploadPointsRequest first_;      // while it waits for the session
+  MemoryReservation memory_;           // of the message that comes
+  uint64_t coordinate_count_ = 0;      // received
 };
 
 }  // namespace wellspace::server

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <mutex>
 #include <numeric>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -26,7 +27,9 @@ struct Uploads {
   std::vector<double> points;
   int breaks_left = 0;  // after so many messages
   uint64_t lost = 0;    // points that it does not admit
+  int busy_left = 0;    // calls that find another upload under way
   int calls = 0;
+  int checks = 0;       // of what is there
   uint64_t resent = 0;  // numbers that came although they were there
   size_t largest_request = 0;
   std::vector<std::string> names = {};
@@ -82,6 +85,17 @@ class FakeCloud {
     if (first) {
       uploads_.names.push_back(request.name());
       uploads_.expected_revisions.push_back(request.expected_revision());
+      if (uploads_.calls > 1 && uploads_.busy_left > 0) {
+        --uploads_.busy_left;
+        return MakeError(grpc::StatusCode::FAILED_PRECONDITION, "busy", "ERROR_REASON_SESSION_BUSY");
+      }
+      if (request.has_checked_crc32c()) {
+        ++uploads_.checks;
+        const size_t size = (request.point_offset() - request.checked_from()) * dimension_ * sizeof(double);
+        if (request.checked_crc32c() != Crc32c(uploads_.points.data() + request.checked_from() * dimension_, size)) {
+          return MakeError(grpc::StatusCode::FAILED_PRECONDITION, "other points", "ERROR_REASON_UPLOAD_MISMATCH");
+        }
+      }
     }
     uploads_.largest_request = std::max(uploads_.largest_request, request.ByteSizeLong());
     const uint64_t committed = uploads_.points.size() / dimension_;
@@ -162,6 +176,55 @@ TEST(Upload, ARepetitionWithTheSameOffsetSendsOnlyWhatIsMissing) {
   EXPECT_EQ(cloud.uploads().resent, 0u);
   ASSERT_TRUE(server.Client().UploadPoints(kSession, source, 0).ok());
   EXPECT_EQ(cloud.uploads().points, points);
+}
+
+TEST(Upload, WhatIsThereHasToBeOfTheSameSource) {
+  FakeServer server;
+  FakeCloud cloud(server, 2, {.points = {9, 9, 0.5, 1.5, 2.5, 3.5}});  // the first of another upload
+  const std::vector<double> points = Numbers(6);
+  SpanSource source(2, points);
+  ASSERT_TRUE(server.Client().UploadPoints(kSession, source, 1).ok());
+  EXPECT_EQ(cloud.uploads().checks, 1);
+  const Uploads uploads = cloud.uploads();
+  EXPECT_EQ(std::vector<double>(uploads.points.begin() + 2, uploads.points.end()), points);
+  const std::vector<double> few = Numbers(4);
+  SpanSource shorter(2, few);
+  EXPECT_TRUE(server.Client().UploadPoints(kSession, shorter, 1).ok()) << "all is there, and more";
+
+  std::vector<double> other = points;
+  other[3] = 7;
+  for (const size_t size : {other.size(), size_t{4}}) {
+    SpanSource another(2, std::span(other).first(size));
+    const absl::Status mismatch = server.Client().UploadPoints(kSession, another, 1).status();
+    EXPECT_EQ(mismatch.code(), absl::StatusCode::kFailedPrecondition);
+    EXPECT_EQ(ReasonOf(mismatch), "ERROR_REASON_UPLOAD_MISMATCH");
+  }
+  EXPECT_EQ(cloud.uploads().points.size(), 8u);
+}
+
+TEST(Upload, GoesOnWhenTheServerHasSeenThatTheLastAttemptBroke) {
+  FakeServer server;
+  FakeCloud cloud(server, 2, {.points = {}, .breaks_left = 1, .busy_left = 1});
+  const std::vector<double> points = Numbers(2 * 200'000);
+  SpanSource source(2, points);
+  ASSERT_TRUE(server.Client().UploadPoints(kSession, source).ok());
+  EXPECT_EQ(cloud.uploads().points, points);
+  EXPECT_EQ(cloud.uploads().calls, 3);
+  EXPECT_EQ(cloud.uploads().checks, 1);
+}
+
+TEST(Upload, BesideAnotherUploadIsRefusedAtOnce) {
+  FakeServer server;
+  std::atomic<int> calls = 0;
+  FakeCloud cloud(server);
+  server.sessions.upload = [&calls](grpc::ServerContext&, auto&, auto&) {
+    ++calls;
+    return MakeError(grpc::StatusCode::FAILED_PRECONDITION, "busy", "ERROR_REASON_SESSION_BUSY");
+  };
+  const std::vector<double> points = Numbers(6);
+  SpanSource source(2, points);
+  EXPECT_EQ(ReasonOf(server.Client().UploadPoints(kSession, source).status()), "ERROR_REASON_SESSION_BUSY");
+  EXPECT_EQ(calls, 1);
 }
 
 TEST(Upload, ErrorsOfTheServerAndOfTheSource) {

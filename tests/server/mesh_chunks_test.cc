@@ -29,6 +29,19 @@ TEST(Crc32c, Rfc3720Examples) {
   }
 }
 
+TEST(Crc32c, OfPartsIsThatOfTheWhole) {
+  std::string bytes(50'000, '\0');
+  for (size_t i = 0; i < bytes.size(); ++i) {
+    bytes[i] = static_cast<char>(i * 7 + i / 251);
+  }
+  for (const auto extend : {&ExtendCrc32c, &ExtendPortableCrc32c}) {
+    for (const size_t cut : {size_t{0}, size_t{1}, size_t{7}, size_t{12'288}, size_t{33'333}, bytes.size()}) {
+      const uint32_t first = extend(0, bytes.data(), cut);
+      EXPECT_EQ(extend(first, bytes.data() + cut, bytes.size() - cut), Crc32c(bytes.data(), bytes.size())) << cut;
+    }
+  }
+}
+
 TEST(Crc32c, IsTheSameOnEveryProcessor) {
   std::mt19937 generator(5);
   std::string bytes(100'000, '\0');

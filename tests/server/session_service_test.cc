@@ -1,4 +1,5 @@
 // The calls of SessionService over a channel.
+#include <cmath>
 #include <limits>
 #include <string>
 #include <thread>
@@ -7,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "gtest/gtest.h"
+#include "proto/checksum.h"
 #include "tests/server/scripted_mesher.h"
 #include "tests/server/service_harness.h"
 #include "tests/server/session_calls.h"
@@ -335,6 +337,97 @@ TEST_F(SessionServiceTest, WhatWasReceivedIsCommittedThoughTheCallBreaksOff) {
     EXPECT_EQ(stream->Finish().error_code(), grpc::StatusCode::CANCELLED);
   }
   EXPECT_EQ(calls_.Upload(session.name(), 1, {0.5, 0.5}).committed_points(), 2u);
+}
+
+// "Two clients upload 20 000 points each to one session at once: both are told OK, and it has some of either".
+TEST_F(SessionServiceTest, TakesOneUploadAtATime) {
+  const v1::Session session = calls_.Create(2);
+  grpc::ClientContext context;
+  v1::UploadPointsResponse response;
+  const auto first = calls_.sessions().UploadPoints(&context, &response);
+  ASSERT_TRUE(first->Write(UploadRequest(session.name(), 0, {0.25, 0.25})));
+  while (calls_.Get(session.name()).committed_points() == 0) {
+  }
+  for (const uint64_t offset : {0, 1}) {
+    calls_.Upload(session.name(), offset, {0.5, 0.5}, &status_);
+    ExpectError(grpc::StatusCode::FAILED_PRECONDITION, "SESSION_BUSY");
+  }
+  EXPECT_EQ(calls_.Get(session.name()).committed_points(), 1u);
+  ASSERT_TRUE(first->Write(UploadRequest("", 1, {0.75, 0.25})));
+  first->WritesDone();
+  EXPECT_TRUE(first->Finish().ok());
+  EXPECT_EQ(response.committed_points(), 2u);
+  EXPECT_EQ(calls_.Upload(session.name(), 2, {0.5, 0.5}).committed_points(), 3u) << "then it is free";
+  calls_.Upload(session.name(), 9, {0.5, 0.5}, &status_);
+  ExpectError(grpc::StatusCode::OUT_OF_RANGE, "UPLOAD_GAP", "point_offset");
+  EXPECT_EQ(calls_.Upload(session.name(), 3, {0.5, 0.25}).committed_points(), 4u) << "after one that failed, too";
+}
+
+TEST_F(SessionServiceTest, AnUploadWaitsForOneThatEnds) {
+  const v1::Session session = calls_.Create(2);
+  grpc::ClientContext context;
+  v1::UploadPointsResponse response;
+  const auto first = calls_.sessions().UploadPoints(&context, &response);
+  ASSERT_TRUE(first->Write(UploadRequest(session.name(), 0, {0.25, 0.25})));
+  while (calls_.Get(session.name()).committed_points() == 0) {
+  }
+  std::thread second([&] { EXPECT_EQ(calls_.Upload(session.name(), 1, {0.5, 0.5}).committed_points(), 2u); });
+  EXPECT_TRUE(harness_.log().WaitFor("waits for another upload"));
+  context.TryCancel();
+  EXPECT_FALSE(first->Finish().ok());
+  second.join();
+}
+
+// "A resumed upload with another file is OK and ignored".
+TEST_F(SessionServiceTest, AnUploadOfOtherPointsIsRefused) {
+  const v1::Session session = calls_.Create(2);
+  const std::vector<double> points = UniformPoints(10, 2, 1);
+  calls_.Upload(session.name(), 0, points);
+  const v1::Session before = calls_.Get(session.name());
+  std::vector<double> other = points;
+  other[2 * 7 + 1] = std::nextafter(other[2 * 7 + 1], 1.0);
+  other.insert(other.end(), {0.5, 0.5});
+  calls_.Upload(session.name(), 0, other, &status_);
+  ExpectError(grpc::StatusCode::FAILED_PRECONDITION, "UPLOAD_MISMATCH", "points.coordinates");
+  EXPECT_NE(status_.error_message().find("points[7]: coordinate 1"), std::string::npos) << status_.error_message();
+  other.erase(other.begin(), other.begin() + 2 * 6);
+  calls_.Upload(session.name(), 6, other, &status_);
+  ExpectError(grpc::StatusCode::FAILED_PRECONDITION, "UPLOAD_MISMATCH", "points.coordinates");
+  EXPECT_EQ(calls_.Get(session.name()).committed_points(), before.committed_points());
+  EXPECT_EQ(calls_.Get(session.name()).revision(), before.revision());
+  calls_.Upload(session.name(), 0, {-0.0, points[1]}, &status_);
+  ExpectError(grpc::StatusCode::FAILED_PRECONDITION, "UPLOAD_MISMATCH", "points.coordinates");
+  calls_.Upload(session.name(), 8, {other.end() - 6, other.end()});
+  EXPECT_EQ(calls_.Get(session.name()).committed_points(), 11u) << "the same ones, and one more";
+}
+
+TEST_F(SessionServiceTest, AnUploadGoesOnAfterThePointsOfItsChecksumAlone) {
+  const v1::Session session = calls_.Create(2);
+  const std::vector<double> points = UniformPoints(100'000, 2, 1);  // more than a block
+  for (const uint64_t begin : {0, 50'000}) {
+    calls_.Upload(session.name(), begin, {points.begin() + 2 * begin, points.begin() + 2 * begin + 100'000});
+  }
+  const auto upload = [&](uint64_t from, uint64_t offset, uint32_t crc32c) {
+    v1::UploadPointsRequest request = UploadRequest(session.name(), offset, {0.5, 0.5});
+    request.set_checked_from(from);
+    request.set_checked_crc32c(crc32c);
+    return calls_.Upload({request}, &status_);
+  };
+  const auto checksum = [&](uint64_t from, uint64_t end) {
+    return Crc32c(points.data() + 2 * from, (end - from) * 2 * sizeof(double));
+  };
+  upload(0, 100'000, checksum(0, 100'000) ^ 1);
+  ExpectError(grpc::StatusCode::FAILED_PRECONDITION, "UPLOAD_MISMATCH", "checked_crc32c");
+  upload(0, 100'000, checksum(0, 99'999));
+  ExpectError(grpc::StatusCode::FAILED_PRECONDITION, "UPLOAD_MISMATCH", "checked_crc32c");
+  upload(0, 100'001, checksum(0, 100'000));
+  ExpectError(grpc::StatusCode::OUT_OF_RANGE, "UPLOAD_GAP", "point_offset");
+  upload(100'001, 100'000, 0);
+  ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_REQUEST", "checked_from");
+  EXPECT_EQ(calls_.Get(session.name()).committed_points(), 100'000u);
+  EXPECT_EQ(upload(12'345, 100'000, checksum(12'345, 100'000)).committed_points(), 100'001u);
+  EXPECT_TRUE(status_.ok()) << status_.error_message();
+  EXPECT_EQ(upload(100'000, 100'000, 0).committed_points(), 100'001u) << "no points have the checksum 0";
 }
 
 TEST_F(SessionServiceTest, AnUploadNeedsANameFirst) {

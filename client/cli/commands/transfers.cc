@@ -130,8 +130,9 @@ void AddUpload(CLI::App& app, int& exit_code) {
   AddInputFormat(*upload, command->input_format);
   AddCount(
       *upload, "--offset", [command](uint64_t offset) { command->offset = offset; },
-      "Number of the session's points before the first of IN. What is there from it on is not sent again, so "
-      "that an upload that broke off is repeated with the same offset; default: after the session's points");
+      "Number of the session's points before the first of IN. What is there from it on has to be the same as in IN, "
+      "and is not sent again, so that an upload that broke off is repeated with the same offset; default: after the "
+      "session's points");
   AddExpectedRevision(*upload, command->expected_revision);
   command->remote.AddTo(*upload, RemoteCommand::Needs::kLastingServer);
   upload->callback([command, &exit_code] {
