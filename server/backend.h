@@ -30,6 +30,7 @@ class Backend {
 
   const CallEnvironment& environment() const { return environment_; }
   CallRegistry& calls() { return calls_; }
+  JobPool& jobs() { return jobs_; }
 
  private:
   void ScheduleExpiry();

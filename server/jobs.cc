@@ -3,6 +3,7 @@
 #include <malloc.h>
 
 #include <algorithm>
+#include <chrono>
 #include <limits>
 #include <tuple>
 
@@ -201,6 +202,12 @@ JobPool::Load JobPool::GetLoad() const {
   return Load{.running = running_, .queued = static_cast<int>(InLine())};
 }
 
+bool JobPool::WaitUntilIdle(absl::Duration timeout) {
+  const auto deadline = std::chrono::steady_clock::now() + absl::ToChronoNanoseconds(timeout);
+  std::unique_lock lock(mutex_);
+  return idle_.wait_until(lock, deadline, [this] { return jobs_of_.empty(); });
+}
+
 absl::Status JobPool::Reserve(Job& job, uint64_t bytes) {
   WELLSPACE_RETURN_IF_ERROR(job.context_.Check());
   const uint64_t lasting = memory_.lasting();
@@ -252,6 +259,9 @@ absl::Status JobPool::WaitInLine(Job& job, std::unique_lock<std::mutex>& lock) {
 
 void JobPool::Dispatch() {
   while (running_ < limits_.workers && !turns_.empty() && StartNext()) {
+  }
+  if (jobs_of_.empty()) {
+    idle_.notify_all();
   }
 }
 

@@ -154,6 +154,9 @@ class JobPool {
 
   Load GetLoad() const;
 
+  // Waits until no job runs or waits, but not longer than `timeout`; says whether none does.
+  bool WaitUntilIdle(absl::Duration timeout);
+
  private:
   friend class Job;
 
@@ -213,6 +216,7 @@ class JobPool {
   std::map<uint64_t, std::shared_ptr<Job>> begun_;  // by sequence_; have a thread: they run, or wait for memory
   int running_ = 0;                                 // have a worker: started_, and begun_ that do not wait
   bool stopping_ = false;
+  std::condition_variable idle_;
   std::list<std::thread> threads_;
   std::list<std::thread> ended_threads_;  // to be joined
   size_t blocked_ = 0;                    // threads whose job waits for memory

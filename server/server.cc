@@ -16,6 +16,7 @@
 #include "grpcpp/resource_quota.h"
 #include "grpcpp/server_builder.h"
 #include "grpcpp/server_posix.h"
+#include "server/clock.h"
 #include "server/listen_address.h"
 
 namespace wellspace::server {
@@ -142,7 +143,9 @@ void Server::Shutdown(absl::Duration grace) {
   std::call_once(shut_down_, [this, grace] {
     server_->GetHealthCheckService()->SetServingStatus(false);
     backend_.calls().Close();
-    if (!backend_.calls().WaitUntilEmpty(grace)) {
+    const absl::Duration end = SinceBoot() + grace;
+    // Work that nobody watches gets to its end, too.
+    if (!backend_.calls().WaitUntilEmpty(grace) || !backend_.jobs().WaitUntilIdle(end - SinceBoot())) {
       backend_.calls().AbortAll();
     }
     if (listener_ != nullptr) {

@@ -123,6 +123,46 @@ class SessionLife(unittest.TestCase):
         session = self.run_json("session", "show", name)
         self.assertEqual((session["state"], session["committed_points"]), ("open", 100))
 
+    def test_an_upload_of_another_file_is_refused(self):
+        name = self.create("--domain", "0,0,1,1")
+        points = uniform(100, 4)
+        self.run_tool("upload", name, "-", text=csv(points[:60]))
+        self.run_tool("upload", name, "-", "--offset", 0, text=csv(points))
+        for other, offset in ((uniform(100, 5), 0), (points[:50] + uniform(80, 6), 0), (points, 50)):
+            errors = self.run_tool("upload", name, "-", "--offset", offset, "--output", "json", exit_code=7, text=csv(other))
+            self.assertIn("has other points", errors)
+        self.assertEqual(self.run_json("session", "show", name)["committed_points"], 100)
+
+    def test_cancels_leave_the_next_mesh_as_it_would_have_been(self):
+        meshes = []
+        for cancels in range(3):
+            name = self.create("--domain", "0,0,0,1,1,1", "--dimension", 3)
+            generator = random.Random(7)
+            points = [tuple(generator.random() for _ in range(3)) for _ in range(1500)]
+            self.run_tool("upload", name, "-", text=csv(points[:1000]))
+            self.run_tool("refine", name, "--quiet")
+            for _ in range(cancels):
+                self.run_tool("refine", name, "--size", 0.01, "--detach")
+                self.run_tool("cancel", name)
+                self.run_tool("watch", name, exit_code=1)
+            self.run_tool("add", name, "-", text=csv(points[1000:1100]))
+            self.run_tool("upload", name, "-", text=csv(points[1100:]))
+            self.run_tool("refine", name, "--size", 0.1, "--quiet")
+            self.run_tool("download", name, "-o", self.folder / "mesh.npz", "--quiet")
+            meshes.append((self.folder / "mesh.npz").read_bytes())
+        self.assertTrue(meshes[0] == meshes[1] == meshes[2])
+
+    def test_a_detached_refinement_gets_to_its_end_when_the_server_is_stopped(self):
+        with tempfile.TemporaryFile("w+") as log:
+            server = Wellspaced("--grace", PATIENCE, log=log)
+            self.addCleanup(server.kill)
+            at = ("--server", server.address)
+            name = self.run_tool("session", "create", "--domain", "0,0,1,1", "--size", 0.003, *at).strip()
+            operation = self.run_tool("refine", name, "--detach", *at).strip()
+            self.assertEqual(server.stop(), 0)
+            log.seek(0)
+            self.assertRegex(log.read(), f"event=refinement operation={operation} tenant=\\S+ code=OK")
+
     def test_errors_name_the_line_and_the_option(self):
         name = self.create("--domain", "0,0,1,1")
         outside = self.run_tool("upload", name, "-", text="0.5,0.5\n\n0.5,7\n", exit_code=2)

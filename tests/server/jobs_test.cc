@@ -564,6 +564,19 @@ TEST(JobPool, ManyTenantsWithTenTimesTheMemoryFinish) {
   EXPECT_EQ(pool.memory.reserved(), 0u);
 }
 
+TEST(JobPool, IsIdleWhenNoJobRunsOrWaits) {
+  Pool pool(1, 10);
+  EXPECT_TRUE(pool.pool.WaitUntilIdle(absl::ZeroDuration()));
+  Event go;
+  ASSERT_NE(pool.Submit([&go](Job&) { EXPECT_TRUE(go.Wait()); }), nullptr);
+  std::atomic<bool> has_ended = false;
+  ASSERT_NE(pool.Submit([&has_ended](Job&) { has_ended = true; }), nullptr);
+  EXPECT_FALSE(pool.pool.WaitUntilIdle(absl::Milliseconds(1)));
+  go.Set();
+  EXPECT_TRUE(pool.pool.WaitUntilIdle(absl::Minutes(1)));
+  EXPECT_TRUE(has_ended);
+}
+
 // What a job runs apart is cancelled with it.
 TEST(JobPool, CancelReachesWhatRunsApart) {
   Pool pool(1, 10);

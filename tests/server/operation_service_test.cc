@@ -1,4 +1,6 @@
 // The calls of OperationService over a channel, and what operations do to their session.
+#include <chrono>
+#include <future>
 #include <mutex>
 #include <new>
 #include <string>
@@ -479,6 +481,48 @@ TEST_F(OperationServiceTest, AStoppingServerEndsWatchesAndWork) {
   harness_.server().Shutdown(absl::ZeroDuration());
   EXPECT_EQ(watch.Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
   EXPECT_EQ(watch_waiting.Finish().error_code(), grpc::StatusCode::UNAVAILABLE);
+}
+
+// "A detached refinement dies with SIGTERM, though running work gets to its end".
+TEST_F(OperationServiceTest, WorkThatNobodyWatchesGetsToItsEndBeforeAServerStops) {
+  Event begun;
+  Event go_on;
+  script_.Set([&](core::Phase phase, core::RunContext& context) {
+    if (phase == core::Phase::kRefinement) {
+      begun.Set();
+      EXPECT_TRUE(go_on.Wait());
+    }
+    return context.Check();
+  });
+  const std::string running = calls_.Start(MakeSession()).name();
+  const std::string waiting = calls_.Start(MakeSession()).name();
+  ASSERT_TRUE(begun.Wait());
+  std::future<void> stopped = std::async(std::launch::async, [this] { harness_.server().Shutdown(absl::Minutes(5)); });
+  v1::GetSessionRequest request;
+  request.set_name("sessions/none");
+  grpc::Status refused;
+  while (refused.error_code() != grpc::StatusCode::UNAVAILABLE) {  // no call is under way any more
+    grpc::ClientContext context;
+    v1::GetSessionResponse response;
+    refused = calls_.sessions().GetSession(&context, request, &response);
+  }
+  EXPECT_EQ(stopped.wait_for(std::chrono::milliseconds(300)), std::future_status::timeout) << "it waits for the work";
+  go_on.Set();
+  stopped.get();
+  for (const std::string& name : {running, waiting}) {
+    EXPECT_EQ(harness_.log().Count(absl::StrCat("event=refinement operation=", name, " tenant=default code=OK")), 1u)
+        << name;
+  }
+}
+
+TEST_F(OperationServiceTest, WorkThatNobodyWatchesEndsWithTheGracePeriod) {
+  Event begun;
+  script_.Set(EndlessIn(core::Phase::kRefinement, [&] { begun.Set(); }));
+  calls_.Start(MakeSession());
+  ASSERT_TRUE(begun.Wait());
+  const absl::Time begin = absl::Now();
+  harness_.server().Shutdown(absl::Milliseconds(20));
+  EXPECT_LT(absl::Now() - begin, absl::Seconds(10));
 }
 
 // The core's own meshers from here on.
