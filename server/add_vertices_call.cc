@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "server/errors.h"
+#include "server/job_size.h"
 #include "server/resource_names.h"
 
 namespace wellspace::server {
@@ -60,15 +61,20 @@ void AddVerticesCall::Submit(RequestIds::Done done) {
     done({std::move(status), ""});
     return;
   }
+  const Session::Size size = session->GetSize(0);
+  const bool is_small =
+      IsSmallAddition(request_->points_size() / session->dimension(), size.vertices, size.replayed_steps);
   const std::shared_ptr<const Addition> addition(
       new Addition{.use = SessionUse(std::move(session)),
                    .points = {request_->points().begin(), request_->points().end()},
                    .near = {request_->near().begin(), request_->near().end()},
                    .expected_revision = request_->expected_revision()});
-  JobPool::Submission submission = environment().jobs.Submit(
-      {.tenant = caller().tenant, .work = [addition, done, &create_mesher = environment().create_mesher](Job& job) {
-         done(Add(*addition, create_mesher, job));
-       }});
+  JobPool::Submission submission =
+      environment().jobs.Submit({.tenant = caller().tenant,
+                                 .is_small = is_small,
+                                 .work = [addition, done, &create_mesher = environment().create_mesher](Job& job) {
+                                   done(Add(*addition, create_mesher, job));
+                                 }});
   if (submission.job == nullptr) {
     done({std::move(submission.refusal), ""});
     return;

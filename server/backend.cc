@@ -38,7 +38,8 @@ Backend::Backend(const ServiceOptions& options, const Authenticator& authenticat
                    .log = *log_},
       jobs_({.workers = options_.workers,
              .max_queued = options_.max_queued_jobs,
-             .max_per_tenant = options_.max_jobs_per_tenant},
+             .max_per_tenant = options_.max_jobs_per_tenant,
+             .small_workers = options_.small_workers},
             memory_) {
   AddMetrics(observability.metrics());
   ScheduleExpiry();
@@ -53,6 +54,15 @@ void Backend::AddMetrics(Metrics& metrics) {
                    [this] { return static_cast<double>(jobs_.GetLoad().queued); });
   metrics.AddGauge("wellspace_jobs_queue_capacity", "Jobs that can wait; more are refused.",
                    [this] { return static_cast<double>(options_.max_queued_jobs); });
+  const auto add_counters = [&](const std::string& kind, const std::string& what,
+                                JobPool::Begun JobPool::Counters::*of) {
+    metrics.AddCounter("wellspace_" + kind + "begun_total", what + " that were begun.",
+                       [this, of] { return static_cast<double>((jobs_.GetCounters().*of).jobs); });
+    metrics.AddCounter("wellspace_" + kind + "wait_seconds_total", what + ": time in line until they were begun.",
+                       [this, of] { return absl::ToDoubleSeconds((jobs_.GetCounters().*of).waited); });
+  };
+  add_counters("small_jobs_", "Small jobs", &JobPool::Counters::small);
+  add_counters("other_jobs_", "Jobs that are not small", &JobPool::Counters::others);
   metrics.AddGauge("wellspace_sessions", "Sessions of all tenants.",
                    [this] { return static_cast<double>(sessions_.Count()); });
   metrics.AddGauge("wellspace_memory_reserved_bytes", "Memory that jobs, sessions and calls have reserved.",

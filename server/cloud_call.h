@@ -35,6 +35,8 @@ class CloudCall : public RequestStream<Call<Reactor>> {
 
   // The following are called with mutex_ held, and want it to be held when they are called.
 
+  // Whether what Work does with `points` takes about a second at most.
+  virtual bool IsSmall(const PointChunks& points) const = 0;
   // The parameters have come.
   virtual void OnParameters() {}
   // Of the mesh, for the log; 0 when there is none.
@@ -115,6 +117,7 @@ void CloudCall<Reactor, Request>::SubmitJob() {
   auto points = std::make_shared<PointChunks>(receiver_.TakePoints());
   JobPool::Submission submission = this->environment().jobs.Submit(
       {.tenant = this->caller().tenant,
+       .is_small = IsSmall(*points),
        .held = std::move(received_),
        .work = [self = this->template SharedAs<CloudCall>(), points](Job& job) { self->Work(*points, job); }});
   job_ = std::move(submission.job);

@@ -14,6 +14,15 @@ void PointChunks::Append(google::protobuf::RepeatedField<double>* coordinates) {
   chunks_.emplace_back().Swap(coordinates);
 }
 
+std::vector<double> PointChunks::Copy() const {
+  std::vector<double> coordinates;
+  coordinates.reserve(coordinate_count_);
+  for (const google::protobuf::RepeatedField<double>& chunk : chunks_) {
+    coordinates.insert(coordinates.end(), chunk.begin(), chunk.end());
+  }
+  return coordinates;
+}
+
 std::vector<double> PointChunks::Flatten(const core::RunContext& context) {
   std::vector<double> coordinates;
   coordinates.reserve(coordinate_count_);

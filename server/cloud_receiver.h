@@ -25,7 +25,9 @@ class PointChunks {
 
   uint64_t coordinate_count() const { return coordinate_count_; }
 
-  // All coordinates in order; the chunks are freed as they are copied. Leaves this empty. Of a cancelled run, not all.
+  // All coordinates in order.
+  std::vector<double> Copy() const;
+  // The same; the chunks are freed as they are copied. Leaves this empty. Of a cancelled run, not all.
   std::vector<double> Flatten(const core::RunContext& context);
 
  private:

@@ -5,6 +5,7 @@
 
 #include "server/convert.h"
 #include "server/errors.h"
+#include "server/job_size.h"
 #include "server/wire.h"
 
 namespace wellspace::server {
@@ -30,6 +31,11 @@ void EstimateMeshCall::Work(PointChunks& points, Job& job) {
   vertices_ = estimate.vertices;
   *response_ = Serialize(EstimateToProto(estimate));
   End(grpc::Status::OK);
+}
+
+bool EstimateMeshCall::IsSmall(const PointChunks& points) const {
+  const int dimension = parameters().dimension;
+  return IsSmallEstimate(dimension, points.coordinate_count() / dimension);
 }
 
 }  // namespace wellspace::server

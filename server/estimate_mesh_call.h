@@ -19,6 +19,7 @@ class EstimateMeshCall final : public CloudCall<grpc::ServerReadReactor<grpc::By
 
  private:
   void Work(PointChunks& points, Job& job) override;
+  bool IsSmall(const PointChunks& points) const override;
   uint64_t VertexCount() const override { return vertices_; }
 
   grpc::ByteBuffer* const response_;  // guarded by mutex_; gRPC's from Finish on

@@ -17,10 +17,16 @@ namespace {
 
 constexpr char kJob[] = "the job";
 
+constexpr uint64_t kNoBound = std::numeric_limits<uint64_t>::max();  // of memory
+
 }  // namespace
 
 Job::Job(JobPool& pool, JobRequest request)
-    : pool_(pool), tenant_(std::move(request.tenant)), held_(std::move(request.held)), work_(std::move(request.work)) {
+    : pool_(pool),
+      tenant_(std::move(request.tenant)),
+      is_small_(request.is_small && pool.limits_.small_workers > 0),
+      held_(std::move(request.held)),
+      work_(std::move(request.work)) {
   if (pool_.memory_.is_limited()) {
     memory_ = pool_.memory_.ReserveNothing();
     context_.SetMemoryLender(this);
@@ -106,7 +112,7 @@ JobPool::JobPool(const Limits& limits, MemoryBudget& memory) : limits_(limits), 
     Dispatch();
   });
   std::lock_guard lock(mutex_);
-  for (int i = 0; i < limits_.workers; ++i) {
+  for (size_t i = 0; i < Workers(); ++i) {
     StartThread();
   }
 }
@@ -148,17 +154,19 @@ JobPool::Submission JobPool::Submit(JobRequest request) {
   grpc::Status refusal;
   {
     std::lock_guard lock(mutex_);
-    const auto of_tenant = jobs_of_.find(job->tenant_);
-    if (stopping_ || InLine() + running_ >= static_cast<size_t>(limits_.workers) + limits_.max_queued) {
+    const auto known = jobs_of_.find(job->tenant_);
+    const int of_tenant = known == jobs_of_.end() ? 0 : PartOf(known->second, *job);
+    if (stopping_ || !HasPlaceFor(*job)) {
       refusal = MakeError(v1::ERROR_REASON_QUEUE_FULL,
-                          absl::StrCat("this server runs ", running_, " jobs and has ", InLine(),
+                          absl::StrCat("this server runs ", running_ + running_small_, " jobs and has ", InLine(),
                                        " more in line, which is all that it takes; try again later"));
-    } else if (of_tenant != jobs_of_.end() && of_tenant->second >= limits_.max_per_tenant) {
+    } else if (of_tenant >= limits_.max_per_tenant) {
       refusal = MakeError(v1::ERROR_REASON_QUOTA_EXCEEDED,
-                          absl::StrCat(of_tenant->second, " jobs of this tenant run or are in line; it may have ",
+                          absl::StrCat(of_tenant, " jobs of this tenant run or are in line; it may have ",
                                        limits_.max_per_tenant, "; try again later"));
     } else {
-      ++jobs_of_[job->tenant_];
+      ++PartOf(jobs_of_[job->tenant_], *job);
+      small_jobs_ += job->is_small_ ? 1 : 0;
       job->sequence_ = next_sequence_++;
       Enter(job);
       Dispatch();
@@ -168,6 +176,13 @@ JobPool::Submission JobPool::Submit(JobRequest request) {
   job->work_ = nullptr;
   job->ReleaseAll();
   return Submission{.job = nullptr, .refusal = std::move(refusal)};
+}
+
+bool JobPool::HasPlaceFor(const Job& job) const {
+  const size_t small = small_jobs_;
+  return job.is_small_
+             ? small < static_cast<size_t>(limits_.small_workers) + limits_.max_queued
+             : InLine() + running_ + running_small_ - small < static_cast<size_t>(limits_.workers) + limits_.max_queued;
 }
 
 void JobPool::Cancel(const std::shared_ptr<Job>& job) {
@@ -199,7 +214,12 @@ void JobPool::Cancel(const std::shared_ptr<Job>& job) {
 
 JobPool::Load JobPool::GetLoad() const {
   std::lock_guard lock(mutex_);
-  return Load{.running = running_, .queued = static_cast<int>(InLine())};
+  return Load{.running = running_ + running_small_, .queued = static_cast<int>(InLine())};
+}
+
+JobPool::Counters JobPool::GetCounters() const {
+  std::lock_guard lock(mutex_);
+  return counters_;
 }
 
 bool JobPool::WaitUntilIdle(absl::Duration timeout) {
@@ -228,7 +248,7 @@ absl::Status JobPool::Reserve(Job& job, uint64_t bytes) {
     return memory_.Refusal(bytes, kJob);
   }
   job.wanted_bytes_ = bytes;
-  if (Claimant() == nullptr && TakeWanted(job, RoomForTree())) {
+  if (job.is_small_ ? TakeWanted(job, kNoBound) : Claimant() == nullptr && TakeWanted(job, RoomForTree())) {
     return absl::OkStatus();
   }
   return WaitInLine(job, lock);
@@ -241,9 +261,9 @@ absl::Status JobPool::WaitInLine(Job& job, std::unique_lock<std::mutex>& lock) {
   job.state_ = Job::State::kWaiting;
   job.passed_over_ = 0;
   Enter(job.shared_from_this());
-  --running_;
+  --RunningLike(job);
   ++blocked_;
-  if (threads_.size() - blocked_ < static_cast<size_t>(limits_.workers)) {
+  if (threads_.size() - blocked_ < Workers()) {
     StartThread();
   }
   Dispatch();
@@ -260,9 +280,23 @@ absl::Status JobPool::WaitInLine(Job& job, std::unique_lock<std::mutex>& lock) {
 void JobPool::Dispatch() {
   while (running_ < limits_.workers && !turns_.empty() && StartNext()) {
   }
+  while (running_small_ < limits_.small_workers && StartSmall()) {
+  }
   if (jobs_of_.empty()) {
     idle_.notify_all();
   }
+}
+
+bool JobPool::StartSmall() {
+  for (const std::string& tenant : turns_) {
+    for (const std::shared_ptr<Job>& job : lines_.at(tenant)) {
+      if (job->is_small_ && (job->state_ == Job::State::kQueued || TakeWanted(*job, kNoBound))) {
+        Start(std::shared_ptr<Job>(job), /*small_worker=*/true);  // the line may go
+        return true;
+      }
+    }
+  }
+  return false;
 }
 
 bool JobPool::StartNext() {
@@ -271,7 +305,7 @@ bool JobPool::StartNext() {
     if (StartFirstOf(claimant->tenant_, room_for_tree)) {
       return true;
     }
-    if (running_ > 0) {
+    if (running_ + running_small_ > 0) {
       return false;
     }
     claimant->passed_over_ = 0;  // what it waits for is no job's: others go on
@@ -314,8 +348,9 @@ bool JobPool::StartOneWithATree() {
   return false;
 }
 
-void JobPool::Start(const std::shared_ptr<Job>& job) {
+void JobPool::Start(const std::shared_ptr<Job>& job, bool small_worker) {
   Leave(*job);
+  job->has_small_worker_ = small_worker;
   if (lines_.contains(job->tenant_)) {  // whose next job comes after those of others
     turns_.remove(job->tenant_);
     turns_.push_back(job->tenant_);
@@ -325,14 +360,19 @@ void JobPool::Start(const std::shared_ptr<Job>& job) {
     return;
   }
   job->state_ = Job::State::kRunning;
-  ++running_;
+  ++RunningLike(*job);
+  const absl::Duration waited = SinceBoot() - job->submitted_;
+  Begun& begun = job->is_small_ ? counters_.small : counters_.others;
+  ++begun.jobs;
+  begun.waited += waited;
+  begun.longest = std::max(begun.longest, waited);
   started_.push_back(job);
   wake_.notify_all();
 }
 
 void JobPool::Resume(Job& job) {
   job.state_ = Job::State::kRunning;
-  ++running_;
+  ++RunningLike(job);
   job.wake_.notify_one();
 }
 
@@ -351,7 +391,6 @@ uint64_t JobPool::RoomForTree() const {
     uint64_t needs;
     uint64_t frees;
   };
-  constexpr uint64_t kNoBound = std::numeric_limits<uint64_t>::max();
   std::vector<Waiting> waiting;
   uint64_t trees = 0;   // of runs that may want more
   uint64_t ending = 0;  // what those have that will not
@@ -397,7 +436,7 @@ std::shared_ptr<Job> JobPool::Claimant() const {
 }
 
 std::shared_ptr<Job> JobPool::VictimOfDeadlock() const {
-  if (running_ > 0) {
+  if (running_ + running_small_ > 0) {
     return nullptr;
   }
   const uint64_t passing = memory_.passing();
@@ -439,8 +478,10 @@ void JobPool::Leave(const Job& job) {
 
 void JobPool::EndOf(Job& job) {
   job.state_ = Job::State::kDone;
+  small_jobs_ -= job.is_small_ ? 1 : 0;
   const auto of_tenant = jobs_of_.find(job.tenant_);
-  if (--of_tenant->second == 0) {
+  --PartOf(of_tenant->second, job);
+  if (of_tenant->second.small + of_tenant->second.others == 0) {
     jobs_of_.erase(of_tenant);
   }
 }
@@ -482,7 +523,7 @@ void JobPool::RunWorker(std::list<std::thread>::iterator self) {
     job->ReleaseAll();
     lock.lock();
     begun_.erase(job->sequence_);
-    --running_;
+    --RunningLike(*job);
     EndOf(*job);
     Dispatch();
   }

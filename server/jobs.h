@@ -15,8 +15,10 @@
 #include <utility>
 #include <vector>
 
+#include "absl/time/time.h"
 #include "core/base/run_context.h"
 #include "grpcpp/support/status.h"
+#include "server/clock.h"
 #include "server/memory_budget.h"
 
 namespace wellspace::server {
@@ -27,6 +29,8 @@ class JobPool;
 // What is to be done, and for whom.
 struct JobRequest {
   std::string tenant{};
+  // Is expected to end within about a second (server/job_size.h): need not wait for those that are not.
+  bool is_small = false;
   // Of what the work brings along, such as its points; released with the work, at the latest.
   MemoryReservation held{};
   // Has to return soon after the context of its job is cancelled, and must not throw.
@@ -83,6 +87,8 @@ class Job final : private core::MemoryLender, public std::enable_shared_from_thi
 
   JobPool& pool_;
   const std::string tenant_;
+  const bool is_small_;
+  const absl::Duration submitted_ = SinceBoot();
   core::RunContext context_;
 
   std::mutex apart_mutex_;             // after the pool's
@@ -96,6 +102,7 @@ class Job final : private core::MemoryLender, public std::enable_shared_from_thi
 
   // Guarded by the pool's mutex.
   State state_ = State::kQueued;
+  bool has_small_worker_ = false;  // while kRunning
   uint64_t sequence_ = 0;
   Work work_;                     // empty once taken by a worker or cancelled
   uint64_t wanted_bytes_ = 0;     // while kWaiting
@@ -107,6 +114,11 @@ class Job final : private core::MemoryLender, public std::enable_shared_from_thi
 
 // A fixed number of jobs that run at once, and a bounded line of others that wait for it.
 //
+// Small jobs wait for no large ones: where all workers are taken, `small_workers` more run them alone. Among small jobs
+// tenants take turns, and within a tenant who came first is first; those that are not small are passed. A small job has
+// a place of its own in the line, whatever else is in it, and asks for memory without waiting for those that were
+// passed.
+//
 // The line is fair: tenants take turns, and within a tenant who came first is first. A job that waits for memory keeps its place; those
 // of its tenant stay behind it, those of others may pass, but only kMostPassing times.
 //
@@ -115,9 +127,10 @@ class Job final : private core::MemoryLender, public std::enable_shared_from_thi
 // same, the youngest is refused.
 //
 // Thread safety: thread-safe. Work runs without any lock of the pool held.
-// Invariants: (1) at most `workers` jobs run and at most `max_queued` more are in line, `max_per_tenant` of one tenant; (2) the work of a
+// Invariants: (1) at most `workers` jobs run and at most `max_queued` more are in line; with small workers as many run
+// besides, and as many small jobs are taken besides; of either kind `max_per_tenant` of one tenant; (2) the work of a
 // job runs at most once, and never after Cancel found it in line; (3) the work and all that it holds is freed when it returns or is
-// cancelled, not when its Job is; (4) there are at most `workers` threads and one for
+// cancelled, not when its Job is; (4) there are at most as many threads as workers of both kinds and one for
 // each job that waits for memory, which are at most `workers` of a tenant.
 class JobPool {
  public:
@@ -127,11 +140,23 @@ class JobPool {
     int workers = 1;         // at least 1
     int max_queued = 0;      // at least 0
     int max_per_tenant = 1;  // at least 1
+    int small_workers = 0;   // at least 0; 0: small jobs are as others
   };
 
   struct Load {
     int running = 0;
     int queued = 0;  // for a worker or for memory
+  };
+
+  // Of all jobs of a kind that were begun.
+  struct Begun {
+    uint64_t jobs = 0;
+    absl::Duration waited = absl::ZeroDuration();  // all together, from Submit on
+    absl::Duration longest = absl::ZeroDuration();
+  };
+  struct Counters {
+    Begun small;
+    Begun others;
   };
 
   struct Submission {
@@ -153,12 +178,20 @@ class JobPool {
   void Cancel(const std::shared_ptr<Job>& job);
 
   Load GetLoad() const;
+  Counters GetCounters() const;
 
   // Waits until no job runs or waits, but not longer than `timeout`; says whether none does.
   bool WaitUntilIdle(absl::Duration timeout);
 
  private:
   friend class Job;
+
+  // How many jobs a tenant has.
+  struct Share {
+    int small = 0;
+    int others = 0;
+  };
+  static int& PartOf(Share& share, const Job& job) { return job.is_small_ ? share.small : share.others; }
 
   // One tenant's jobs in line, in the order of their sequence.
   using Line = std::deque<std::shared_ptr<Job>>;
@@ -174,12 +207,18 @@ class JobPool {
   void Dispatch();
   // Starts the job whose turn it is, or refuses one where nothing else helps. False when all have to wait.
   bool StartNext();
+  // Gives a small worker to the small job whose turn it is, if there is one whose memory is there.
+  bool StartSmall();
   // Starts or resumes the first job of `tenant`, unless it waits for memory that is not there.
   bool StartFirstOf(const std::string& tenant, uint64_t room_for_tree);
   // Resumes the oldest that waits with its tree and whose memory is there, first of its tenant or not.
   bool StartOneWithATree();
-  // Takes `job` out of the line and gives it a worker.
-  void Start(const std::shared_ptr<Job>& job);
+  // Takes `job` out of the line and gives it a worker, a small one or another.
+  void Start(const std::shared_ptr<Job>& job, bool small_worker = false);
+  // How many run on workers of the kind that `job` has.
+  int& RunningLike(const Job& job) { return job.has_small_worker_ ? running_small_ : running_; }
+  // Whether there is a place in the line.
+  bool HasPlaceFor(const Job& job) const;
   // Gives its worker back to a job that waited.
   void Resume(Job& job);
   // Sets aside what `job` wants; says whether there was room.
@@ -198,7 +237,8 @@ class JobPool {
   void Leave(const Job& job);
   void EndOf(Job& job);
   size_t InLine() const;
-  bool HasSurplusThread() const { return threads_.size() - blocked_ > static_cast<size_t>(limits_.workers); }
+  size_t Workers() const { return static_cast<size_t>(limits_.workers) + limits_.small_workers; }
+  bool HasSurplusThread() const { return threads_.size() - blocked_ > Workers(); }
   void StartThread();
 
   void RunWorker(std::list<std::thread>::iterator self);
@@ -211,12 +251,15 @@ class JobPool {
   uint64_t next_sequence_ = 0;
   std::map<std::string, Line> lines_;               // none is empty
   std::list<std::string> turns_;                    // of lines_, who is next first
-  std::map<std::string, int> jobs_of_;              // by tenant, in line or running
+  std::map<std::string, Share> jobs_of_;            // by tenant, in line or running; none is empty
   std::deque<std::shared_ptr<Job>> started_;        // wait for their thread to wake
   std::map<uint64_t, std::shared_ptr<Job>> begun_;  // by sequence_; have a thread: they run, or wait for memory
   int running_ = 0;                                 // have a worker: started_, and begun_ that do not wait
-  bool stopping_ = false;
+  int running_small_ = 0;                           // the same on small workers
+  int small_jobs_ = 0;                              // in line or running
+  Counters counters_;
   std::condition_variable idle_;
+  bool stopping_ = false;
   std::list<std::thread> threads_;
   std::list<std::thread> ended_threads_;  // to be joined
   size_t blocked_ = 0;                    // threads whose job waits for memory

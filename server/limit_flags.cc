@@ -80,6 +80,8 @@ CLI::Option* AddSeconds(CLI::App& app, const std::string& name, absl::Duration& 
 void DeclareLimits(CLI::App& app, ServiceOptions& service) {
   AddCount(app, "--workers", service.workers, 1, 1024, "Jobs that run at once");
   AddCount(app, "--max-threads", service.max_threads, 1, 1024, "Most threads of one job");
+  AddCount(app, "--small-workers", service.small_workers, 0, 1000,
+           "Workers besides, which run small jobs alone; with 0 these wait as others do");
   AddCount(app, "--max-queued", service.max_queued_jobs, 0, 100'000, "Jobs that wait for a worker; more are refused");
   AddCount(app, "--max-jobs-per-tenant", service.max_jobs_per_tenant, 1, 100'000,
            "Jobs of one tenant that run or wait; more are refused");

@@ -128,6 +128,7 @@ int Main(int argc, char** argv) {
   Flags flags;
   flags.server.listen = "127.0.0.1:7233";
   flags.server.service.workers = std::max(1u, std::thread::hardware_concurrency());
+  flags.server.service.small_workers = 1;
   flags.server.service.max_threads = flags.server.service.workers;
   CLI::App app("Makes well-spaced simplicial meshes from clouds of points, as a gRPC service.", "wellspaced");
   Declare(app, flags);

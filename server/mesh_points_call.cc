@@ -6,6 +6,7 @@
 #include "server/clock.h"
 #include "server/convert.h"
 #include "server/errors.h"
+#include "server/job_size.h"
 #include "server/wire.h"
 
 namespace wellspace::server {
@@ -38,6 +39,10 @@ void MeshPointsCall::Work(PointChunks& points, Job& job) {
   progress.simplices = mesh_->mesh().simplex_count();
   event_ = pacer_.Final(progress);
   WriteNext();
+}
+
+bool MeshPointsCall::IsSmall(const PointChunks& points) const {
+  return points.coordinate_count() <= kMostPoints * parameters().dimension && IsSmallMesh(parameters(), points.Copy());
 }
 
 void MeshPointsCall::ScheduleTick() {

@@ -30,6 +30,7 @@ class MeshPointsCall final
 
  private:
   void Work(PointChunks& points, Job& job) override;
+  bool IsSmall(const PointChunks& points) const override;
   void OnParameters() override { ScheduleTick(); }
   uint64_t VertexCount() const override { return mesh_ == nullptr ? 0 : mesh_->mesh().vertex_count(); }
   std::optional<grpc::ByteBuffer> NextResponse() override;

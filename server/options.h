@@ -34,6 +34,7 @@ inline constexpr uint64_t kMinMemoryBytes = uint64_t{128} << 20;
 struct ServiceOptions {
   // Jobs.
   int workers = 1;                // that run at once, at least 1
+  int small_workers = 0;          // that run small jobs besides; 0: these wait as others do
   int max_queued_jobs = 64;       // that wait for a worker
   int max_jobs_per_tenant = 32;   // that run or wait, at least 1
   int max_threads = 1;            // of one job, at least 1

@@ -10,6 +10,7 @@
 #include "absl/time/time.h"
 #include "core/mesh_parameters.h"
 #include "server/errors.h"
+#include "server/job_size.h"
 #include "server/options.h"
 #include "server/resource_names.h"
 
@@ -58,8 +59,11 @@ void QueryCall::WorkAhead() {
   if (work_ != Work::kIdle || ready_.size() > kBatchesAhead / 2) {
     return;
   }
-  JobPool::Submission submission = environment().jobs.Submit(
-      {.tenant = caller().tenant, .work = [self = SharedAs<QueryCall>()](Job& job) { self->MakeBatches(job); }});
+  const Session::Size size = use_->session().GetSize(0);
+  JobPool::Submission submission =
+      environment().jobs.Submit({.tenant = caller().tenant,
+                                 .is_small = IsSmallAddition(0, size.vertices, size.replayed_steps),
+                                 .work = [self = SharedAs<QueryCall>()](Job& job) { self->MakeBatches(job); }});
   if (submission.job != nullptr) {
     work_ = Work::kUnderWay;
     job_ = std::move(submission.job);

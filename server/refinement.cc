@@ -11,6 +11,7 @@
 #include "core/mesher.h"
 #include "server/clock.h"
 #include "server/errors.h"
+#include "server/job_size.h"
 #include "server/log_fields.h"
 #include "server/progress_pacer.h"
 
@@ -166,11 +167,14 @@ void Tick(Background& background, const std::weak_ptr<Operation>& weak) {
 grpc::Status StartRefinement(const CallEnvironment& environment, const std::shared_ptr<Session>& session,
                              const core::MeshParameters& parameters, uint64_t expected_revision,
                              std::shared_ptr<Operation>* operation) {
+  const Session::Size size = session->GetSize(kMostPoints);
+  const bool is_small =
+      size.points <= kMostPoints && IsSmallRefinement(parameters, size.some_points, size.vertices, size.replayed_steps);
   const auto submit = [&](const std::shared_ptr<Operation>& started) {
-    JobPool::Submission submission =
-        environment.jobs.Submit({.tenant = session->tenant(), .work = [&environment, session, started](Job& job) {
-                                   Run(environment, *session, *started, job);
-                                 }});
+    JobPool::Submission submission = environment.jobs.Submit(
+        {.tenant = session->tenant(), .is_small = is_small, .work = [&environment, session, started](Job& job) {
+           Run(environment, *session, *started, job);
+         }});
     if (submission.job == nullptr) {
       return submission.refusal;
     }

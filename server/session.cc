@@ -398,6 +398,22 @@ grpc::Status Session::PrepareStructure(uint64_t expected_revision, const MesherF
   return status;
 }
 
+Session::Size Session::GetSize(uint64_t few) const {
+  std::lock_guard lock(mutex_);
+  Size size;
+  size.points = points_.coordinate_count() / dimension_;
+  if (size.points <= few) {
+    size.some_points = points_.CopyFrom(0, core::RunContext()).value_or(std::vector<double>());
+  }
+  if (work_.mesh != nullptr) {
+    size.vertices = work_.mesh->chunks.mesh().vertex_count();
+    // Of a session that is busy the mesher is not looked at.
+    const bool is_given_up = busy_ == Busy::kReplaying || (busy_ == Busy::kNo && work_.mesher == nullptr);
+    size.replayed_steps = is_given_up ? steps_.all().size() : 0;
+  }
+  return size;
+}
+
 grpc::Status Session::Rebuild(const MesherFactory& create_mesher, Job& job) {
   absl::StatusOr<std::unique_ptr<core::Mesher>> mesher =
       Replay(steps_, points_, work_.mesh->chunks.mesh(), create_mesher, job);

@@ -143,6 +143,15 @@ class Session {
   grpc::Status PrepareStructure(uint64_t expected_revision, const MesherFactory& create_mesher, Job& job,
                                 bool* is_at_work = nullptr);
 
+  // What work on the session would have to do with, now.
+  struct Size {
+    uint64_t points = 0;
+    std::vector<double> some_points;  // all, if they are few
+    uint64_t vertices = 0;            // of the last mesh
+    uint64_t replayed_steps = 0;      // before anything else
+  };
+  Size GetSize(uint64_t few) const;
+
   // Runs `query` on this thread, a worker's. Any number of queries run at once. An operation that begins waits for those that run:
   // keep each short (some milliseconds) and ask again for the next batch.
   // `version` is that of the structure: 0 for the first batch, which sets it; for later ones as it was set.

@@ -10,6 +10,7 @@
 #include "server/tokens.h"
 #include "tests/formats/temporary_folder.h"
 #include "tests/server/service_harness.h"
+#include "tests/server/session_calls.h"
 
 namespace wellspace::server {
 namespace {
@@ -241,6 +242,48 @@ TEST_F(AdmissionBesideAHolder, CancelWhileWaitingForMemoryGivesAllBack) {
     std::this_thread::yield();
   }
   LetGo();
+}
+
+// Every kind of small work, where each worker and each place in the line has a large mesh of another.
+TEST(Admission, SmallWorkWaitsForNoLargeMesh) {
+  Event begun;
+  Event may_end;
+  const auto mesher = [&](const core::MeshParameters& parameters, std::span<const double> points,
+                          core::RunContext& context) {
+    if (points.size() > 3 * 1000) {
+      begun.Set();
+      EXPECT_TRUE(may_end.Wait());
+    }
+    return core::MeshPoints(parameters, points, context);
+  };
+  ServiceHarness harness(mesher, {.workers = 1, .small_workers = 1, .max_queued_jobs = 1, .max_jobs_per_tenant = 2});
+  const auto start = [&harness](size_t points) {
+    auto call = std::make_unique<TestCall>(harness.stub());
+    call->Send(UnitCubeParameters());
+    call->Send(RandomPoints(points));
+    call->HalfClose();
+    return call;
+  };
+  const std::unique_ptr<TestCall> running = start(10'000);
+  ASSERT_TRUE(begun.Wait());
+  const std::unique_ptr<TestCall> waiting = start(10'000);
+  while (harness.Info().queued_jobs() != 1) {
+  }
+  EXPECT_EQ(start(10'000)->Finish().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED) << "the line is full";
+  for (int i = 0; i < 20; ++i) {
+    const grpc::Status status = start(300)->Finish();
+    EXPECT_TRUE(status.ok()) << status.error_message();
+    while (harness.Info().running_jobs() != 1) {  // its worker is free shortly after
+    }
+  }
+  SessionClient session(harness.channel());
+  session.Upload(UniformPoints(300, 3, 1));
+  EXPECT_EQ(session.Refine().state(), v1::Operation::STATE_SUCCEEDED);
+  EXPECT_EQ(harness.Info().queued_jobs(), 1) << "the large one has its place still";
+  EXPECT_FALSE(may_end.IsSet());
+  may_end.Set();
+  EXPECT_TRUE(running->Finish().ok());
+  EXPECT_TRUE(waiting->Finish().ok());
 }
 
 }  // namespace

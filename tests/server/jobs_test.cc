@@ -564,6 +564,115 @@ TEST(JobPool, ManyTenantsWithTenTimesTheMemoryFinish) {
   EXPECT_EQ(pool.memory.reserved(), 0u);
 }
 
+// A pool with workers for small jobs, where large ones of tenant "large" have every worker and every place in the line.
+class BesideLargeJobs : public ::testing::Test {
+ protected:
+  static constexpr int kWorkers = 2;
+  static constexpr int kQueued = 4;
+
+  BesideLargeJobs() {
+    for (int i = 0; i < kWorkers + kQueued; ++i) {
+      EXPECT_NE(Submit("large", false, WorkUntilCancelled).job, nullptr);
+    }
+  }
+
+  JobPool::Submission Submit(const std::string& tenant, bool is_small, Job::Work work) {
+    return pool_.Submit({.tenant = tenant, .is_small = is_small, .work = std::move(work)});
+  }
+  void RunSmall(const std::string& tenant) {
+    Event ran;
+    ASSERT_NE(Submit(tenant, true, [&ran](Job&) { ran.Set(); }).job, nullptr);
+    ASSERT_TRUE(ran.Wait());
+    while (pool_.GetLoad().running > kWorkers) {  // until its worker is free
+      std::this_thread::yield();
+    }
+  }
+
+  MemoryBudget memory_{0};
+  JobPool pool_{{.workers = kWorkers, .max_queued = kQueued, .max_per_tenant = kWorkers + kQueued, .small_workers = 1},
+                memory_};
+};
+
+TEST_F(BesideLargeJobs, SmallOnesWaitForNoneOfThem) {
+  EXPECT_EQ(DetailsOf(Submit("other", false, WorkUntilCancelled).refusal).reason, "QUEUE_FULL");
+  constexpr int kSmall = 100;
+  for (int i = 0; i < kSmall; ++i) {
+    RunSmall(i % 3 == 0 ? "large" : "small");
+  }
+  EXPECT_EQ(pool_.GetLoad().running, kWorkers);
+  EXPECT_EQ(pool_.GetLoad().queued, kQueued);
+  EXPECT_EQ(pool_.GetCounters().small.jobs, kSmall) << "none waited for the turn of a large one:";
+  EXPECT_EQ(pool_.GetCounters().others.jobs, kWorkers)
+      << "no large one was begun meanwhile, on a small worker least of all";
+  EXPECT_GE(pool_.GetCounters().small.waited, pool_.GetCounters().small.longest);
+}
+
+TEST_F(BesideLargeJobs, SmallOnesTakeTurnsAmongThemselves) {
+  Event runs;
+  Event go;
+  ASSERT_NE(Submit("a", true,
+                   [&](Job&) {
+                     runs.Set();
+                     EXPECT_TRUE(go.Wait());
+                   })
+                .job,
+            nullptr);
+  ASSERT_TRUE(runs.Wait());
+  std::vector<std::string> order;
+  Event done;
+  for (const std::string tenant : {"a", "a", "large", "b"}) {
+    ASSERT_NE(Submit(tenant, true,
+                     [&order, &done, tenant](Job&) {
+                       order.push_back(tenant);
+                       if (order.size() == 4) {
+                         done.Set();
+                       }
+                     })
+                  .job,
+              nullptr);
+  }
+  EXPECT_EQ(DetailsOf(Submit("c", true, WorkUntilCancelled).refusal).reason, "QUEUE_FULL") << "their places end, too";
+  go.Set();
+  ASSERT_TRUE(done.Wait());
+  EXPECT_EQ(order, std::vector<std::string>({"large", "a", "b", "a"})) << "the oldest turn is that of \"large\"";
+}
+
+TEST(JobPool, SmallJobsAskForMemoryBesideThoseThatWaitForIt) {
+  MemoryBudget memory(kMaxMemory);
+  JobPool pool({.workers = 2, .max_queued = 10, .max_per_tenant = 100, .small_workers = 1}, memory);
+  Needy holder(60 * kMegabyte);
+  Needy waiting(80 * kMegabyte);
+  ASSERT_NE(pool.Submit({.tenant = "a", .work = holder.Work()}).job, nullptr);
+  ASSERT_TRUE(holder.reserved.Wait());
+  ASSERT_NE(pool.Submit({.tenant = "b", .work = waiting.Work()}).job, nullptr);
+  while (pool.GetLoad().queued != 1) {  // until it waits for memory
+    std::this_thread::yield();
+  }
+  for (int i = 0; i < 3 * JobPool::kMostPassing; ++i) {
+    Needy small(10 * kMegabyte);
+    small.may_end.Set();
+    ASSERT_NE(pool.Submit({.tenant = "c", .is_small = true, .work = small.Work()}).job, nullptr);
+    ASSERT_TRUE(small.ended.Wait());
+    EXPECT_TRUE(small.status.ok()) << small.status;
+    while (pool.GetLoad().running > 1) {  // until it is gone
+      std::this_thread::yield();
+    }
+  }
+  holder.may_end.Set();
+  ASSERT_TRUE(waiting.reserved.Wait());
+  EXPECT_TRUE(waiting.status.ok()) << waiting.status;
+  waiting.may_end.Set();
+  ASSERT_TRUE(waiting.ended.Wait());
+  ASSERT_TRUE(pool.WaitUntilIdle(absl::Minutes(1)));
+}
+
+TEST(JobPool, WithoutSmallWorkersSmallJobsAreAsOthers) {
+  MemoryBudget memory(0);
+  JobPool pool({.workers = 1, .max_queued = 0, .max_per_tenant = 10}, memory);
+  ASSERT_NE(pool.Submit({.tenant = "a", .work = WorkUntilCancelled}).job, nullptr);
+  EXPECT_EQ(pool.Submit({.tenant = "b", .is_small = true, .work = WorkUntilCancelled}).job, nullptr);
+}
+
 TEST(JobPool, IsIdleWhenNoJobRunsOrWaits) {
   Pool pool(1, 10);
   EXPECT_TRUE(pool.pool.WaitUntilIdle(absl::ZeroDuration()));
