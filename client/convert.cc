@@ -101,6 +101,7 @@ MeshStatistics StatisticsFromProto(const v1::MeshStatistics& message) {
   MeshStatistics statistics;
   statistics.input_points = message.input_points();
   statistics.duplicates = message.duplicates();
+  statistics.merged_points = message.merged_points();
   statistics.vertices = message.vertices();
   statistics.simplices = message.simplices();
   statistics.max_radius_edge = message.max_radius_edge();
@@ -153,6 +154,7 @@ void SetParameters(const MeshOptions& options, v1::MeshParameters* parameters) {
     parameters->set_min_dihedral(*options.min_dihedral);
   }
   parameters->set_pump_weights(options.pump_weights);
+  parameters->set_merge_distance(options.merge_distance);
   parameters->set_margin(options.margin);
   parameters->set_max_vertices(options.max_vertices);
   parameters->set_threads(options.threads);
@@ -173,6 +175,7 @@ MeshOptions OptionsFromProto(const v1::MeshParameters& parameters) {
     options.min_dihedral = parameters.min_dihedral();
   }
   options.pump_weights = parameters.pump_weights();
+  options.merge_distance = parameters.merge_distance();
   options.domain_low = VectorOf(parameters.domain().low());
   options.domain_high = VectorOf(parameters.domain().high());
   if (parameters.has_margin()) {

@@ -32,6 +32,7 @@ struct MeshOptions {
   std::vector<SizeBox> size_boxes;
   std::optional<double> min_dihedral;  // degrees; 0: slivers are left as they are
   bool pump_weights = false;
+  double merge_distance = 0;  // points this near to each other become one vertex
   std::vector<double> domain_low;
   std::vector<double> domain_high;
   double margin = 0.25;
@@ -64,6 +65,7 @@ struct SliverStatistics {
 struct MeshStatistics {
   uint64_t input_points = 0;
   uint64_t duplicates = 0;
+  uint64_t merged_points = 0;  // whose vertex has other coordinates
   uint64_t vertices = 0;
   uint64_t simplices = 0;
   double max_radius_edge = 0;

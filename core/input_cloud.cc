@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "absl/cleanup/cleanup.h"
+#include "absl/strings/cord.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "absl/strings/str_join.h"
@@ -32,6 +33,10 @@ constexpr uint32_t kQueriesBetweenChecks = 256;
 
 // Larger ones leave no room for sums and products.
 constexpr double kMaxCoordinate = 0x1p1000;
+// The steps of a grid over smaller ones, squared, would be no normal doubles.
+constexpr double kMinExtent = 0x1p-900;
+
+constexpr char kTooClosePayload[] = "wellspace.core/TOO_CLOSE";
 
 std::string FormatCoordinates(std::span<const double> p) {
   return absl::StrCat(
@@ -61,8 +66,16 @@ absl::Status CheckBox(const Box<D>& box) {
     magnitude = std::max({magnitude, std::abs(box.low[i]), std::abs(box.high[i])});
   }
   for (int i = 0; i < D; ++i) {
+    const double extent = box.high[i] - box.low[i];
+    if (extent > 0 && extent < kMinExtent) {
+      return absl::InvalidArgumentError(
+          absl::StrFormat("domain: its extent along axis %d, from %g to %g, is so small that doubles have too few "
+                          "digits there; it must be "
+                          "at least 2^-900, %.2g; multiply the coordinates, by a power of 2 or 10",
+                          i, box.low[i], box.high[i], kMinExtent));
+    }
     // The negation also catches a margin of zero around points in a plane.
-    if (!(box.high[i] - box.low[i] > 0x1p-40 * magnitude) || box.high[i] - box.low[i] < 0x1p-900) {
+    if (!(extent > 0x1p-40 * magnitude)) {
       return absl::InvalidArgumentError(absl::StrFormat(
           "domain: its extent along axis %d, from %.17g to %.17g, is too small; it must be at least 2^-40 of the "
           "largest coordinate, %g; give a larger domain or margin, or move the points nearer to the origin",
@@ -75,18 +88,48 @@ absl::Status CheckBox(const Box<D>& box) {
 // Refuses point `index`, which is `p` on the scale of the computation, if it is nearer to a face of the box that it does not lie on
 // than the arithmetic serves.
 template <int D>
-absl::Status CheckFaces(const Domain<D>& domain, const Point<D>& p, std::span<const double> points, size_t index) {
+absl::Status CheckFaces(const Domain<D>& domain, const Point<D>& p, size_t index) {
   for (int face = 0; face < 2 * D; ++face) {
     const double distance = domain.scaled_box.DistanceToFace(p, face);
     if (distance > 0 && distance < domain.MinSeparation()) {
       return absl::InvalidArgumentError(absl::StrFormat(
           "points[%d] = %s is only %g from the %s face of axis %d of the domain, too close for the arithmetic of "
           "doubles (on it, or at least %g away, is needed); move the domain's face",
-          index, FormatCoordinates(PointAt<D>(points, index)), distance / domain.scale, face % 2 == 0 ? "low" : "high",
+          index, FormatCoordinates(domain.Unscaled(p)), distance / domain.scale, face % 2 == 0 ? "low" : "high",
           face / 2, domain.MinSeparation() / domain.scale));
     }
   }
   return absl::OkStatus();
+}
+
+// Whether a domain can have point `p`: it contains it, and its scale, of which `unscale` is the inverse, keeps it
+// exactly.
+template <int D>
+bool IsServed(const Box<D>& box, const Point<D>& p, const Point<D>& scaled_p, double unscale) {
+  bool is_exact = true;
+  for (int k = 0; k < D; ++k) {
+    is_exact = is_exact && scaled_p[k] * unscale == p[k];
+  }
+  return is_exact && box.Contains(p);
+}
+
+// What is wrong with point `index`, which is `p` and not served.
+template <int D>
+absl::Status PointError(const Domain<D>& domain, const Point<D>& p, size_t index) {
+  WELLSPACE_RETURN_IF_ERROR(CheckFinite<D>(p, index));
+  if (!domain.box.Contains(p)) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "points[", index, "] = ", FormatCoordinates(p), " lies outside the domain ", FormatCoordinates(domain.box.low),
+        " to ", FormatCoordinates(domain.box.high), "; enlarge the domain or drop the point"));
+  }
+  int k = 0;
+  while (k + 1 < D && domain.Unscaled(domain.Scaled(p))[k] == p[k]) {
+    ++k;
+  }
+  return absl::InvalidArgumentError(
+      absl::StrFormat("points[%d]: coordinate %d is %g, too small for the arithmetic of doubles beside a domain of "
+                      "side %g; make it 0, or give a smaller domain",
+                      index, k, p[k], domain.box.LongestSide()));
 }
 
 // A point that is sorted: half of its prefix on the Z curve, and its number.
@@ -131,10 +174,12 @@ absl::Status ForEachRun(std::span<const Entry> entries, F f, const RunContext& c
 template <int D>
 class CloudSorter {
  public:
-  CloudSorter(const Domain<D>& domain, std::span<const double> points, int threads, const RunContext& context)
+  CloudSorter(const Domain<D>& domain, std::span<const double> points, int threads, const RunContext& context,
+              std::span<const uint32_t> inputs)
       : domain_(domain),
         grid_(domain.scaled_box, points.size() / D),
         points_(points),
+        inputs_(inputs),
         count_(points.size() / D),
         context_(context),
         team_(threads),
@@ -177,6 +222,8 @@ class CloudSorter {
     std::vector<typename SortedCloud<D>::Duplicate> duplicates;  // `sorted` counts from the begin of the part
   };
 
+  // The number by which a point is named.
+  size_t InputOf(size_t point) const { return inputs_.empty() ? point : inputs_[point]; }
   Point<D> PointOf(const Entry& entry) const { return domain_.Scaled(PointAt<D>(points_, entry.input)); }
   GridPoint<D> CubeOf(const Entry& entry) const { return grid_.CubeOf(PointOf(entry)); }
 
@@ -199,20 +246,9 @@ class CloudSorter {
     std::array<uint32_t, kParts> counts{};
     for (size_t i = block * kBlock; i < std::min(count_, (block + 1) * kBlock); ++i) {
       const Point<D> p = PointAt<D>(points_, i);
-      if (!box.Contains(p)) {
-        WELLSPACE_RETURN_IF_ERROR(CheckFinite<D>(p, i));
-        return absl::InvalidArgumentError(absl::StrCat(
-            "points[", i, "] = ", FormatCoordinates(p), " lies outside the domain ", FormatCoordinates(box.low), " to ",
-            FormatCoordinates(box.high), "; enlarge the domain or drop the point"));
-      }
       const Point<D> scaled_p = domain_.Scaled(p);
-      for (int k = 0; k < D; ++k) {
-        if (scaled_p[k] * unscale != p[k]) {
-          return absl::InvalidArgumentError(absl::StrFormat(
-              "points[%d]: coordinate %d is %g, too small for the arithmetic of doubles beside a domain of "
-              "side %g; make it 0, or give a smaller domain",
-              i, k, p[k], box.LongestSide()));
-        }
+      if (!IsServed<D>(box, p, scaled_p, unscale)) {
+        return PointError<D>(domain_, p, InputOf(i));
       }
       halves[i] = static_cast<uint32_t>(MortonPrefix<D, 32>(grid_.CubeOf(scaled_p), grid_.levels()) >> 32);
       ++counts[PartOf(halves[i])];
@@ -309,13 +345,13 @@ class CloudSorter {
       const uint32_t input = entries[i].input;
       const bool may_be_alike = i > 0 && entries[i].half == entries[i - 1].half;
       if (!may_be_alike || CubeOf(entries[i]) != CubeOf(entries[i - 1])) {
-        WELLSPACE_RETURN_IF_ERROR(CheckFaces<D>(domain_, p, points_, input));
+        WELLSPACE_RETURN_IF_ERROR(CheckFaces<D>(domain_, p, InputOf(input)));
         points[count] = p;
         inputs[count] = input;
         ++count;
       } else if (p != points[count - 1]) {
-        return TooCloseError<D>(domain_, points_, input, std::sqrt(DistanceSq<D>(p, points[count - 1])),
-                                absl::StrCat("points[", inputs[count - 1], "]"));
+        return TooCloseError<D>(domain_, p, InputOf(input), std::sqrt(DistanceSq<D>(p, points[count - 1])),
+                                absl::StrCat("points[", InputOf(inputs[count - 1]), "]"));
       } else {
         duplicates.push_back({input, static_cast<uint32_t>(count - 1)});
       }
@@ -346,6 +382,7 @@ class CloudSorter {
   const Domain<D>& domain_;
   const MortonGrid<D> grid_;
   const std::span<const double> points_;
+  const std::span<const uint32_t> inputs_;
   const size_t count_;
   const RunContext& context_;
   ThreadTeam team_;
@@ -390,6 +427,9 @@ absl::StatusOr<Box<D>> BoxAround(std::span<const double> points, double margin, 
   if (side == 0) {
     side = 1;  // one point, once or more often: any size serves
   }
+  if (!std::isfinite(side)) {
+    return box;  // too large as it is, which a domain will be refused for
+  }
   const double grow = margin * side;
   for (int i = 0; i < D; ++i) {
     box.low[i] -= grow;
@@ -399,9 +439,23 @@ absl::StatusOr<Box<D>> BoxAround(std::span<const double> points, double margin, 
 }
 
 template <int D>
+absl::Status CheckPoints(const Domain<D>& domain, std::span<const double> points, const RunContext& context) {
+  for (size_t i = 0; i < points.size() / D; ++i) {
+    if (i % kStepsBetweenChecks == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
+    const Point<D> p = PointAt<D>(points, i);
+    if (!IsServed<D>(domain.box, p, domain.Scaled(p), 1 / domain.scale)) {
+      return PointError<D>(domain, p, i);
+    }
+  }
+  return absl::OkStatus();
+}
+
+template <int D>
 absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<const double> points, int threads,
-                                         const RunContext& context) {
-  return CloudSorter<D>(domain, points, threads, context).Sort();
+                                         const RunContext& context, std::span<const uint32_t> inputs) {
+  return CloudSorter<D>(domain, points, threads, context, inputs).Sort();
 }
 
 template <int D>
@@ -426,35 +480,39 @@ absl::StatusOr<PointNames> NamePoints(SortedCloud<D> cloud, const RunContext& co
     return names;
   }
   names.of_input = cloud.SortedOfInputs();
-  names.of_sorted.resize(cloud.first_input.size());
+  constexpr uint32_t kUnnamed = ~uint32_t{0};
+  names.of_sorted.resize(cloud.first_input.size(), kUnnamed);
   uint32_t named = 0;
   for (uint32_t i = 0; i < names.of_input.size(); ++i) {
     if (i % kStepsBetweenChecks == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
-    const uint32_t sorted = names.of_input[i];
-    if (cloud.first_input[sorted] == i) {
-      names.of_sorted[sorted] = named++;
+    uint32_t& name = names.of_sorted[names.of_input[i]];
+    if (name == kUnnamed) {
+      name = named++;
     }
-    names.of_input[i] = names.of_sorted[sorted];
+    names.of_input[i] = name;
   }
   return names;
 }
 
 template <int D>
-absl::Status TooCloseError(const Domain<D>& domain, std::span<const double> points, size_t index, double distance,
+absl::Status TooCloseError(const Domain<D>& domain, const Point<D>& p, size_t index, double distance,
                            std::string_view other) {
-  return absl::InvalidArgumentError(absl::StrFormat(
+  absl::Status status = absl::InvalidArgumentError(absl::StrFormat(
       "points[%d] = %s is only %g from %s, too close for the arithmetic of doubles in this domain (at least %g is "
       "needed); merge them, or give a smaller domain nearer to the origin",
-      index, FormatCoordinates(PointAt<D>(points, index)), distance / domain.scale, other,
+      index, FormatCoordinates(domain.Unscaled(p)), distance / domain.scale, other,
       domain.MinSeparation() / domain.scale));
+  status.SetPayload(kTooClosePayload, absl::Cord());
+  return status;
 }
+
+bool IsTooClose(const absl::Status& status) { return status.GetPayload(kTooClosePayload).has_value(); }
 
 template <int D>
 absl::Status CheckSeparation(const Domain<D>& domain, const QueryStructure<D>& structure, uint32_t first,
-                             std::span<const uint32_t> first_input, std::span<const double> points, int threads,
-                             const RunContext& context) {
+                             std::span<const uint32_t> first_input, int threads, const RunContext& context) {
   const double least = domain.MinSeparation();
   const auto count = static_cast<uint32_t>(first_input.size());
   tbb::enumerable_thread_specific<Workspace<D>> workspaces;
@@ -475,7 +533,7 @@ absl::Status CheckSeparation(const Domain<D>& domain, const QueryStructure<D>& s
       if (nearest != kNoVertex && nearest_sq > 0) {
         const uint32_t other = Index(nearest) - first;  // a corner before them wraps around
         const bool is_input = other < count;
-        return TooCloseError<D>(domain, points, input, std::sqrt(nearest_sq),
+        return TooCloseError<D>(domain, structure.point(v), input, std::sqrt(nearest_sq),
                                 is_input ? absl::StrCat("points[", first_input[other], "]") : "a corner of the domain");
       }
     }
@@ -484,17 +542,17 @@ absl::Status CheckSeparation(const Domain<D>& domain, const QueryStructure<D>& s
   return ThreadTeam(threads).TryForEach((count + kBlock - 1) / kBlock, check);
 }
 
-#define WELLSPACE_INSTANTIATE(D)                                                                                       \
-  template struct Domain<D>;                                                                                           \
-  template struct SortedCloud<D>;                                                                                      \
-  template absl::StatusOr<Box<D>> BoxAround<D>(std::span<const double>, double, const RunContext&);                    \
-  template absl::StatusOr<SortedCloud<D>> SortCloud<D>(const Domain<D>&, std::span<const double>, int,                 \
-                                                       const RunContext&);                                             \
-  template absl::StatusOr<PointNames> NamePoints<D>(SortedCloud<D>, const RunContext&);                                \
-  template absl::Status TooCloseError<D>(const Domain<D>&, std::span<const double>, size_t, double, std::string_view); \
-  template absl::Status CheckSeparation<D>(const Domain<D>&, const QueryStructure<D>&, uint32_t,                       \
-                                           std::span<const uint32_t>, std::span<const double>, int,                    \
-                                           const RunContext&);
+#define WELLSPACE_INSTANTIATE(D)                                                                               \
+  template struct Domain<D>;                                                                                   \
+  template struct SortedCloud<D>;                                                                              \
+  template absl::StatusOr<Box<D>> BoxAround<D>(std::span<const double>, double, const RunContext&);            \
+  template absl::Status CheckPoints<D>(const Domain<D>&, std::span<const double>, const RunContext&);          \
+  template absl::StatusOr<SortedCloud<D>> SortCloud<D>(const Domain<D>&, std::span<const double>, int,         \
+                                                       const RunContext&, std::span<const uint32_t>);          \
+  template absl::StatusOr<PointNames> NamePoints<D>(SortedCloud<D>, const RunContext&);                        \
+  template absl::Status TooCloseError<D>(const Domain<D>&, const Point<D>&, size_t, double, std::string_view); \
+  template absl::Status CheckSeparation<D>(const Domain<D>&, const QueryStructure<D>&, uint32_t,               \
+                                           std::span<const uint32_t>, int, const RunContext&);
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 

@@ -32,6 +32,9 @@ struct Domain {
   // coarse to keep rho.
   double MinSeparation() const { return 64 * grid_step; }
 
+  // The refinement gives up on shorter edges.
+  double MinEdge() const { return 4 * grid_step; }
+
   // No negative zero: equal points have equal bits.
   Point<D> Scaled(const Point<D>& p) const {
     Point<D> scaled;
@@ -58,12 +61,19 @@ struct Domain {
 template <int D>
 absl::StatusOr<Box<D>> BoxAround(std::span<const double> points, double margin, const RunContext& context);
 
+// Refuses points that `domain` cannot have.
+//
+// Errors:     INVALID_ARGUMENT, naming the point: not finite, outside the domain, too small for its scale; CANCELLED,
+//             DEADLINE_EXCEEDED.
+template <int D>
+absl::Status CheckPoints(const Domain<D>& domain, std::span<const double> points, const RunContext& context);
+
 // A cloud without its duplicates, in the order that the query structure wants.
 template <int D>
 struct SortedCloud {
   struct Duplicate {
     uint32_t input = 0;
-    uint32_t sorted = 0;  // the point that it is equal to
+    uint32_t sorted = 0;  // the point that it became
   };
 
   // By input: its sorted point.
@@ -74,18 +84,20 @@ struct SortedCloud {
   MortonGrid<D> grid;                // for so many inputs
   HugeVector<Point<D>> points;       // distinct, in Morton order, scaled
   HugeVector<uint32_t> first_input;  // by sorted point: the first input equal to it
-  HugeVector<Duplicate> duplicates;  // the other inputs
+  HugeVector<Duplicate> duplicates;  // the other inputs, those that were merged with a point included
 };
 
 // Errors:     INVALID_ARGUMENT, naming the point: not finite, outside the domain, too small for its scale, too close to
 //             a face of the box that it does not lie on, or, in one cube of the Morton grid, to another one; CANCELLED, DEADLINE_EXCEEDED.
 // Complexity: O(n log n); O(n) for all but the most uneven clouds.
 // Threads:    uses `threads`, at most as many as the machine has cores; the result does not depend on them.
+//
+// `inputs` has the numbers by which errors name the points; empty: 0, 1, ….
 template <int D>
 absl::StatusOr<SortedCloud<D>> SortCloud(const Domain<D>& domain, std::span<const double> points, int threads,
-                                         const RunContext& context);
+                                         const RunContext& context, std::span<const uint32_t> inputs = {});
 
-// The numbers that the points of a sorted cloud have in the mesh: in the order in which the input first has them.
+// The numbers that the points of a sorted cloud have in the mesh: in the order in which inputs first become them.
 struct PointNames {
   HugeVector<uint32_t> of_sorted;  // by sorted point
   HugeVector<uint32_t> of_input;   // by input
@@ -96,10 +108,13 @@ struct PointNames {
 template <int D>
 absl::StatusOr<PointNames> NamePoints(SortedCloud<D> cloud, const RunContext& context);
 
-// The error for point `index` of `points`, which is only `distance`, scaled, from what `other` names.
+// The error for point `index`, which is `p`, and only `distance` from what `other` names; both scaled.
 template <int D>
-absl::Status TooCloseError(const Domain<D>& domain, std::span<const double> points, size_t index, double distance,
+absl::Status TooCloseError(const Domain<D>& domain, const Point<D>& p, size_t index, double distance,
                            std::string_view other);
+
+// Whether an error is a TooCloseError, and the cloud may have more such points.
+bool IsTooClose(const absl::Status& status);
 
 // Refuses points nearer to each other, or to a corner of the box, than the arithmetic serves. The vertices of
 // `structure` are a sorted cloud's, from number `first` on, whose `first_input` is given, and the corners. A point on a
@@ -110,8 +125,7 @@ absl::Status TooCloseError(const Domain<D>& domain, std::span<const double> poin
 // Threads:    uses `threads`, at most as many as the machine has cores.
 template <int D>
 absl::Status CheckSeparation(const Domain<D>& domain, const QueryStructure<D>& structure, uint32_t first,
-                             std::span<const uint32_t> first_input, std::span<const double> points, int threads,
-                             const RunContext& context);
+                             std::span<const uint32_t> first_input, int threads, const RunContext& context);
 
 }  // namespace wellspace::core
 

@@ -84,6 +84,10 @@ absl::Status ValidateParameters(const MeshParameters& parameters) {
     return absl::InvalidArgumentError(
         absl::StrCat("margin: ", parameters.margin, " is not allowed; 0 to 1e6 times the longest side is"));
   }
+  if (!(parameters.merge_distance >= 0 && std::isfinite(parameters.merge_distance))) {
+    return absl::InvalidArgumentError(absl::StrCat("merge_distance: ", parameters.merge_distance,
+                                                   " is not allowed; a number above 0 is, or 0 for equal points only"));
+  }
   if (!(parameters.max_circumradius >= 0 && std::isfinite(parameters.max_circumradius))) {
     return absl::InvalidArgumentError(absl::StrCat("max_circumradius: ", parameters.max_circumradius,
                                                    " is not allowed; a number above 0 is, or 0 for no bound"));

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -39,6 +40,10 @@ struct MeshParameters {
   std::vector<double> domain_high{};
   double margin = 0.25;
 
+  // Points no farther than this from another one become that one's vertex; docs/design/mesher.md says which. 0 for none
+  // but equal ones. Unit: that of the points.
+  double merge_distance = 0;
+
   // The run ends with RESOURCE_EXHAUSTED before the mesh has more vertices than this. 0 means kDefaultMaxVertices.
   uint64_t max_vertices = 0;
 
@@ -67,6 +72,9 @@ double DefaultMinDihedral(int dimension);
 //
 // Errors:     INVALID_ARGUMENT, naming the field, its value and what would be accepted.
 absl::Status ValidateParameters(const MeshParameters& parameters);
+
+// The payload that marks the status of demands which no mesh of max_vertices can meet.
+inline constexpr std::string_view kDemandsTooFine = "wellspace.core/DEMANDS_TOO_FINE";
 
 // Refuses numbers of threads that no run could use.
 //

@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "core/base/saturate.h"
 #include "core/base/status_macros.h"
 #include "core/mesher.h"
 
@@ -12,14 +13,17 @@ constexpr double kReserve = 1.25;
 }  // namespace
 
 absl::Status ReserveMemory(const Mesher& mesher, const MeshParameters& parameters, RunContext& context) {
+  WELLSPACE_RETURN_IF_ERROR(mesher.CheckFeasible(parameters));
   if (!context.HasMemoryLender()) {
     return absl::OkStatus();
   }
   WELLSPACE_ASSIGN_OR_RETURN(const MeshEstimate estimate, mesher.Estimate(parameters, context));
   context.SetEstimatedVertices(estimate.vertices);
-  const uint64_t vertices = std::max<uint64_t>(1, estimate.vertices);
-  const double share = std::min(1.0, static_cast<double>(VertexBudget(parameters)) / static_cast<double>(vertices));
-  return context.ReserveMemory(static_cast<uint64_t>(static_cast<double>(estimate.memory_bytes) * share * kReserve));
+  const uint64_t most = VertexBudget(parameters);
+  const auto all = static_cast<double>(estimate.memory_bytes);
+  const double bytes =
+      estimate.vertices > most ? std::min(all, static_cast<double>(most) * estimate.bytes_per_vertex) : all;
+  return context.ReserveMemory(SaturatedCount(bytes * kReserve));
 }
 
 absl::StatusOr<Mesh> MeshPoints(const MeshParameters& parameters, std::span<const double> points, RunContext& context) {

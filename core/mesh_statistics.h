@@ -9,7 +9,8 @@ namespace wellspace::core {
 // What a run did: counts of the paper's operations, by which its O(1) claims are tested, and the figures of the mesh.
 struct MeshStatistics {
   uint64_t input_points = 0;
-  uint64_t duplicates = 0;  // input points equal to an earlier one
+  uint64_t duplicates = 0;     // input points equal to another one that is their vertex
+  uint64_t merged_points = 0;  // input points whose vertex has other coordinates: within merge_distance
   uint64_t vertices = 0;
   uint64_t simplices = 0;
 

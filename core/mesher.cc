@@ -5,6 +5,7 @@
 #include <mutex>
 #include <numeric>
 #include <optional>
+#include <string>
 #include <type_traits>
 #include <utility>
 #include <variant>
@@ -13,10 +14,13 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/dimensions.h"
 #include "core/base/huge_pages.h"
+#include "core/base/saturate.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
+#include "core/feasibility.h"
 #include "core/input_cloud.h"
 #include "core/mesh_parts.h"
+#include "core/near_points.h"
 #include "core/refine/estimate.h"
 #include "core/refine/refine.h"
 #include "core/simplex/quality.h"
@@ -27,9 +31,6 @@
 
 namespace wellspace::core {
 namespace {
-
-// The refinement gives up on edges of fewer steps of the Morton grid.
-constexpr double kMinEdgeSteps = 4;
 
 // Leaves that the tree may have for each vertex of the budget; around isolated close pairs balance costs up to about two.
 constexpr uint64_t kLeavesPerVertex = 8;
@@ -49,6 +50,9 @@ Box<D> BoxOf(const std::vector<double>& low, const std::vector<double>& high) {
   std::copy_n(high.begin(), D, box.high.begin());
   return box;
 }
+
+// Points that an error names.
+constexpr size_t kNamedTooClose = 10;
 
 // Refuses what is no whole number of points.
 absl::Status CheckShape(std::span<const double> points, int dimension) {
@@ -70,7 +74,8 @@ class MesherIn final : public Mesher {
   absl::Status Initialize(const MeshParameters& parameters, std::span<const double> points, RunContext& context) {
     WELLSPACE_RETURN_IF_ERROR(CheckShape(points, D));
     context.EnterPhase(Phase::kTree);
-    WELLSPACE_RETURN_IF_ERROR(context.ReserveMemory(kFixedBytes + points.size() / D * kTreeBytes<D>));
+    WELLSPACE_RETURN_IF_ERROR(context.ReserveMemory(
+        kFixedBytes + points.size() / D * (kTreeBytes<D> + (parameters.merge_distance > 0 ? kMergeBytes<D> : 0))));
     Box<D> box;
     if (parameters.domain_low.empty()) {
       WELLSPACE_ASSIGN_OR_RETURN(box, BoxAround<D>(points, parameters.margin, context));
@@ -78,7 +83,32 @@ class MesherIn final : public Mesher {
       box = BoxOf<D>(parameters.domain_low, parameters.domain_high);
     }
     WELLSPACE_ASSIGN_OR_RETURN(domain_, Domain<D>::Of(box));
-    WELLSPACE_ASSIGN_OR_RETURN(SortedCloud<D> cloud, SortCloud<D>(domain_, points, parameters.threads, context));
+    MergedPoints merged;
+    merge_distance_ = parameters.merge_distance;
+    if (merge_distance_ > 0) {
+      // A point outside the box may become one inside: the box of a session is that of the points that stayed.
+      Domain<D> wide = domain_;
+      const double reach = std::min(merge_distance_, box.LongestSide());
+      wide.box = {CubeAround<D>(box.low, reach).low, CubeAround<D>(box.high, reach).high};
+      WELLSPACE_RETURN_IF_ERROR(CheckPoints<D>(wide, points, context));
+      WELLSPACE_ASSIGN_OR_RETURN(merged, MergeNear<D>(domain_, points, merge_distance_, context));
+      merged_points_ = merged.merged;
+      if (parameters.domain_low.empty()) {
+        WELLSPACE_ASSIGN_OR_RETURN(box, BoxAround<D>(merged.points, parameters.margin, context));
+        WELLSPACE_ASSIGN_OR_RETURN(domain_, Domain<D>::Of(box));
+      }
+    }
+    WELLSPACE_RETURN_IF_ERROR(CheckShapeFeasible<D>(domain_, parameters, points.size() / D));
+    const auto explain = [&](const absl::Status& found) {
+      return !IsTooClose(found) ? found
+                                : TooNearError<D>(domain_, merge_distance_ > 0 ? merged.points : points, merged.inputs,
+                                                  !parameters.domain_low.empty(), parameters.margin, found, context);
+    };
+    absl::StatusOr<SortedCloud<D>> sorted = merge_distance_ > 0
+                                                ? SortMerged<D>(domain_, merged, parameters.threads, context)
+                                                : SortCloud<D>(domain_, points, parameters.threads, context);
+    WELLSPACE_RETURN_IF_ERROR(explain(sorted.status()));
+    SortedCloud<D> cloud = *std::move(sorted);
     const size_t distinct = cloud.points.size();
     const uint64_t max_vertices = VertexBudget(parameters);
     if (distinct + (size_t{1} << D) > max_vertices) {
@@ -89,20 +119,16 @@ class MesherIn final : public Mesher {
     WELLSPACE_RETURN_IF_ERROR(structure_.Initialize(
         cloud.grid, std::move(cloud.points), kLeavesPerVertex * max_vertices + (1u << D), parameters.threads, context));
     WELLSPACE_RETURN_IF_ERROR(
-        CheckSeparation<D>(domain_, structure_, 0, cloud.first_input, points, parameters.threads, context));
+        explain(CheckSeparation<D>(domain_, structure_, 0, cloud.first_input, parameters.threads, context)));
 
     WELLSPACE_ASSIGN_OR_RETURN(PointNames names, NamePoints<D>(std::move(cloud), context));
     output_index_ = std::move(names.of_sorted);
     input_vertex_ = std::move(names.of_input);
-    for (uint32_t i = 0, named = 0; i < input_vertex_.size(); ++i) {
-      if (input_vertex_[i] == named) {  // and no duplicate of an earlier one
-        NoteNegativeZeros(points, i, named++);
-      }
-    }
+    NoteInputZeros(points, merged);
     distinct_count_ = distinct;
     distinct_input_ = distinct;
     is_given_.assign(structure_.built_count(), true);
-    refinement_.emplace(structure_, kMinEdgeSteps * domain_.grid_step);
+    refinement_.emplace(structure_, domain_.MinEdge());
     context.SetVertices(structure_.vertex_count());
     tree_seconds_ = absl::ToDoubleSeconds(context.TimeIn(Phase::kTree));
     return absl::OkStatus();
@@ -117,8 +143,13 @@ class MesherIn final : public Mesher {
            negative_zeros_.size() * sizeof(size_t);
   }
 
-  absl::Status Refine(const MeshParameters& parameters, RunContext& context) override {
+  absl::Status CheckFeasible(const MeshParameters& parameters) const override {
     WELLSPACE_RETURN_IF_ERROR(CheckParameters(parameters));
+    return core::CheckFeasible<D>(domain_, parameters, distinct_input_);
+  }
+
+  absl::Status Refine(const MeshParameters& parameters, RunContext& context) override {
+    WELLSPACE_RETURN_IF_ERROR(CheckFeasible(parameters));
     context.EnterPhase(Phase::kRefinement);
     is_refined_ = false;
     absl::Status status =
@@ -141,22 +172,22 @@ class MesherIn final : public Mesher {
     }
     WELLSPACE_RETURN_IF_ERROR(CheckVertices(near));
     const auto start = [&](size_t input) { return near.empty() ? kNoVertex : VertexOf(near[input]); };
-    WELLSPACE_ASSIGN_OR_RETURN(const SortedCloud<D> cloud, SortCloud<D>(domain_, points, 1, context));
-    // The points among themselves, and beside the faces of the box.
-    QueryStructure<D> apart;
-    WELLSPACE_RETURN_IF_ERROR(apart.Initialize(cloud.grid, {}, kLeavesPerVertex * kDefaultMaxVertices, 1, context));
-    const uint32_t corners = apart.vertex_count();
-    for (const Point<D>& p : cloud.points) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-      apart.AddVertex(kNoVertex, p);
+    WELLSPACE_ASSIGN_OR_RETURN(Added added, MergeAdded(points, start, context));
+    const std::span<const double> others = merge_distance_ > 0 ? added.others.points : points;
+    absl::StatusOr<SortedCloud<D>> sorted = SortCloud<D>(domain_, others, 1, context, added.others.inputs);
+    if (IsTooClose(sorted.status())) {
+      return TooNearError<D>(domain_, others, added.others.inputs, true, 0, sorted.status(), context);
     }
-    WELLSPACE_RETURN_IF_ERROR(CheckSeparation<D>(domain_, apart, corners, cloud.first_input, points, 1, context));
-    std::vector<VertexId> known(cloud.points.size(), kNoVertex);
-    for (size_t i = 0; i < cloud.points.size(); ++i) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-      WELLSPACE_ASSIGN_OR_RETURN(known[i],
-                                 Find(cloud.points[i], points, cloud.first_input[i], start(cloud.first_input[i])));
+    WELLSPACE_RETURN_IF_ERROR(sorted.status());
+    SortedCloud<D> cloud = *std::move(sorted);
+    const HugeVector<uint32_t> sorted_of = cloud.SortedOfInputs();
+    for (uint32_t& input : cloud.first_input) {
+      input = added.others.inputs.empty() ? input : added.others.inputs[input];
     }
+    if (const absl::Status apart = CheckApart(cloud, context); !apart.ok()) {
+      return IsTooClose(apart) ? TooNearError<D>(domain_, others, added.others.inputs, true, 0, apart, context) : apart;
+    }
+    WELLSPACE_ASSIGN_OR_RETURN(std::vector<VertexId> known, FindAll(cloud, start, context));
     if (structure_.vertex_count() + cloud.points.size() > kMaxVertices) {
       return absl::ResourceExhaustedError(absl::StrCat("points: ", cloud.points.size(), " beside ", vertex_count(),
                                                        " vertices are more than can be numbered, ", kMaxVertices));
@@ -165,12 +196,18 @@ class MesherIn final : public Mesher {
       if (known[i] == kNoVertex) {
         known[i] = Add(start(cloud.first_input[i]), cloud.points[i], points, cloud.first_input[i]);
       }
-      is_given_[Index(known[i])] = true;
     }
     std::vector<uint32_t> vertices;
-    for (const uint32_t sorted : cloud.SortedOfInputs()) {
-      vertices.push_back(OutputIndex(known[sorted]));
+    for (size_t i = 0, other = 0; i < points.size() / D; ++i) {
+      VertexId v = merge_distance_ > 0 ? added.vertex_of[i] : kNoVertex;
+      if (v == kNoVertex) {
+        v = known[sorted_of[merge_distance_ > 0 ? added.others.place_of[other] : other]];
+        ++other;
+      }
+      is_given_[Index(v)] = true;
+      vertices.push_back(OutputIndex(v));
     }
+    merged_points_ += added.others.merged;
     input_vertex_.insert(input_vertex_.end(), vertices.begin(), vertices.end());
     context.SetVertices(structure_.vertex_count());
     return vertices;
@@ -186,11 +223,15 @@ class MesherIn final : public Mesher {
       return absl::ResourceExhaustedError(absl::StrCat("no more than ", kMaxVertices, " vertices can be numbered"));
     }
     const RunContext context;
-    WELLSPACE_ASSIGN_OR_RETURN(const SortedCloud<D> cloud, SortCloud<D>(domain_, point, 1, context));
+    WELLSPACE_RETURN_IF_ERROR(CheckPoints<D>(domain_, point, context));
     const VertexId start = VertexOf(near);
-    WELLSPACE_ASSIGN_OR_RETURN(VertexId v, Find(cloud.points[0], point, 0, start));
+    VertexId v = FindMerged(domain_.Scaled(PointAt<D>(point, 0)), start, merged_points_);
     if (v == kNoVertex) {
-      v = Add(start, cloud.points[0], point, 0);
+      WELLSPACE_ASSIGN_OR_RETURN(const SortedCloud<D> cloud, SortCloud<D>(domain_, point, 1, context));
+      WELLSPACE_ASSIGN_OR_RETURN(v, Find(cloud.points[0], 0, start));
+      if (v == kNoVertex) {
+        v = Add(start, cloud.points[0], point, 0);
+      }
     }
     is_given_[Index(v)] = true;
     input_vertex_.push_back(OutputIndex(v));
@@ -335,12 +376,15 @@ class MesherIn final : public Mesher {
     }
     WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size, EstimateSize<D>(structure_, DemandsOf(parameters), context));
     MeshEstimate estimate;
-    estimate.vertices = static_cast<uint64_t>(size.vertices);
-    estimate.simplices = static_cast<uint64_t>(size.simplices);
-    estimate.memory_bytes = static_cast<uint64_t>(size.bytes);
+    estimate.vertices = SaturatedCount(size.vertices);
+    estimate.simplices = SaturatedCount(size.simplices);
+    estimate.memory_bytes = SaturatedCount(size.bytes);
+    estimate.bytes_per_vertex = size.bytes / size.vertices;
     if constexpr (D >= 3) {
       if (MinDihedralOf(parameters) > 0 || parameters.pump_weights) {
-        estimate.memory_bytes += SliverStage<D>::EstimateBytes(estimate.vertices, estimate.simplices);
+        const uint64_t bytes = SliverStage<D>::EstimateBytes(estimate.vertices, estimate.simplices);
+        estimate.memory_bytes = SaturatedCount(static_cast<double>(estimate.memory_bytes) + static_cast<double>(bytes));
+        estimate.bytes_per_vertex += static_cast<double>(bytes) / static_cast<double>(estimate.vertices);
       }
     }
     estimate.tree_leaves = structure_.tree().leaf_count();
@@ -357,28 +401,14 @@ class MesherIn final : public Mesher {
     return absl::OkStatus();
   }
 
-  Demands<D> DemandsOf(const MeshParameters& parameters) const {
-    Demands<D> demands;
-    demands.criterion = parameters.criterion;
-    demands.rho = parameters.rho == 0 ? DefaultRho(D) : parameters.rho;
-    if (parameters.max_circumradius != 0) {
-      demands.sizes.max_circumradius = parameters.max_circumradius * domain_.scale;
-    }
-    for (const SizeBox& size : parameters.size_boxes) {
-      const Box<D> box = BoxOf<D>(size.low, size.high);
-      demands.sizes.regions.push_back(
-          {{domain_.Scaled(box.low), domain_.Scaled(box.high)}, size.max_circumradius * domain_.scale});
-    }
-    return demands;
-  }
+  Demands<D> DemandsOf(const MeshParameters& parameters) const { return DemandsIn<D>(domain_, parameters); }
 
   // Mends slivers if that is asked for; what is kept for that goes if it is not. Decides whether the mesh is pumped: a mesh
   // without slivers stays Delaunay.
   absl::Status MendSlivers(const MeshParameters& parameters, RunContext& context) {
     if constexpr (D == 3) {
       if (const double min_dihedral = MinDihedralOf(parameters); min_dihedral > 0) {
-        const MendDemands demands{DemandsOf(parameters), min_dihedral, kMinEdgeSteps * domain_.grid_step,
-                                  VertexBudget(parameters)};
+        const MendDemands demands{DemandsOf(parameters), min_dihedral, domain_.MinEdge(), VertexBudget(parameters)};
         const uint64_t moves = slivers_.statistics().moves;
         const absl::Status status =
             slivers_.Mend(structure_, *refinement_, is_given_, demands, parameters.threads, context);
@@ -466,16 +496,105 @@ class MesherIn final : public Mesher {
     std::iota(output_index_.begin() + old, output_index_.end(), static_cast<uint32_t>(old));
   }
 
-  // The vertex at `p`, which is input `index` of `points`; kNoVertex if there is none, and none too close.
-  absl::StatusOr<VertexId> Find(const Point<D>& p, std::span<const double> points, size_t index,
-                                VertexId near = kNoVertex) {
+  // The nearest vertex, if points this near are merged: a Steiner vertex too, as it stands where the point is. Counts
+  // it in `merged` unless it is at `p`.
+  VertexId FindMerged(const Point<D>& p, VertexId near, uint64_t& merged) {
+    if (merge_distance_ == 0) {
+      return kNoVertex;
+    }
+    const auto [nearest, distance_sq] = structure_.NearestTo(p, near, workspace_);
+    const double reach = merge_distance_ * domain_.scale;
+    if (distance_sq > reach * reach) {
+      return kNoVertex;
+    }
+    merged += distance_sq > 0 ? 1 : 0;
+    return nearest;
+  }
+
+  // Points that are added, if near ones are merged: those that become vertices that there are, and what is left of the
+  // others.
+  struct Added {
+    std::vector<VertexId> vertex_of;  // by input
+    MergedPoints others;              // `inputs` are numbers among all, `place_of` is by those that are others
+  };
+
+  template <typename Start>
+  absl::StatusOr<Added> MergeAdded(std::span<const double> points, Start start, const RunContext& context) {
+    Added added;
+    if (merge_distance_ == 0) {
+      return added;
+    }
+    WELLSPACE_RETURN_IF_ERROR(CheckPoints<D>(domain_, points, context));
+    uint64_t merged = 0;
+    std::vector<double> others;
+    std::vector<uint32_t> inputs;
+    for (uint32_t i = 0; i < points.size() / D; ++i) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+      const Point<D> p = PointAt<D>(points, i);
+      added.vertex_of.push_back(FindMerged(domain_.Scaled(p), start(i), merged));
+      if (added.vertex_of.back() == kNoVertex) {
+        others.insert(others.end(), p.begin(), p.end());
+        inputs.push_back(i);
+      }
+    }
+    WELLSPACE_ASSIGN_OR_RETURN(added.others, MergeNear<D>(domain_, others, merge_distance_, context));
+    added.others.merged += merged;
+    for (uint32_t& input : added.others.inputs) {
+      input = inputs[input];
+    }
+    return added;
+  }
+
+  // Refuses points that are too near to each other.
+  absl::Status CheckApart(const SortedCloud<D>& cloud, const RunContext& context) const {
+    // The points among themselves, and beside the faces of the box.
+    QueryStructure<D> apart;
+    WELLSPACE_RETURN_IF_ERROR(apart.Initialize(cloud.grid, {}, kLeavesPerVertex * kDefaultMaxVertices, 1, context));
+    const uint32_t corners = apart.vertex_count();
+    for (const Point<D>& p : cloud.points) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+      apart.AddVertex(kNoVertex, p);
+    }
+    return CheckSeparation<D>(domain_, apart, corners, cloud.first_input, 1, context);
+  }
+
+  // Find for each of a cloud; the error counts those that are too close, and names the first.
+  template <typename Start>
+  absl::StatusOr<std::vector<VertexId>> FindAll(const SortedCloud<D>& cloud, Start start, const RunContext& context) {
+    std::vector<VertexId> found(cloud.points.size(), kNoVertex);
+    std::vector<std::pair<uint32_t, absl::Status>> refused;
+    for (size_t i = 0; i < cloud.points.size(); ++i) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+      const uint32_t input = cloud.first_input[i];
+      const absl::StatusOr<VertexId> vertex = Find(cloud.points[i], input, start(input));
+      if (vertex.ok()) {
+        found[i] = *vertex;
+      } else {
+        refused.emplace_back(input, vertex.status());
+      }
+    }
+    if (refused.empty()) {
+      return found;
+    }
+    std::sort(refused.begin(), refused.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+    std::string text(refused.front().second.message());
+    for (size_t i = 1; i < refused.size() && i < kNamedTooClose; ++i) {
+      absl::StrAppend(&text, i == 1 ? "; so are " : ", ", "points[", refused[i].first, "]");
+    }
+    if (refused.size() > 1) {
+      absl::StrAppend(&text, refused.size() > kNamedTooClose ? ", …: " : ": ", refused.size(), " points in all");
+    }
+    return absl::InvalidArgumentError(text);
+  }
+
+  // The vertex at `p`, which is input `index`; kNoVertex if there is none, and none too close.
+  absl::StatusOr<VertexId> Find(const Point<D>& p, size_t index, VertexId near = kNoVertex) {
     const auto [nearest, distance_sq] = structure_.NearestTo(p, near, workspace_);
     if (distance_sq == 0) {
       return nearest;
     }
     if (distance_sq < domain_.MinSeparation() * domain_.MinSeparation()) {
-      return TooCloseError<D>(domain_, points, index, std::sqrt(distance_sq),
-                              absl::StrCat("vertex ", OutputIndex(nearest)));
+      return TooCloseError<D>(domain_, p, index, std::sqrt(distance_sq), absl::StrCat("vertex ", OutputIndex(nearest)));
     }
     return kNoVertex;
   }
@@ -497,6 +616,18 @@ class MesherIn final : public Mesher {
       const double x = points[index * D + k];
       if (x == 0 && std::signbit(x)) {
         negative_zeros_.push_back(size_t{vertex} * D + k);
+      }
+    }
+  }
+
+  // Those of the points that became vertices: the first of equals, or what merging has left.
+  void NoteInputZeros(std::span<const double> points, const MergedPoints& merged) {
+    for (const uint32_t input : merged.inputs) {
+      NoteNegativeZeros(points, input, input_vertex_[input]);
+    }
+    for (uint32_t i = 0, named = 0; merge_distance_ == 0 && i < input_vertex_.size(); ++i) {
+      if (input_vertex_[i] == named) {  // and no duplicate of an earlier one
+        NoteNegativeZeros(points, i, named++);
       }
     }
   }
@@ -530,7 +661,8 @@ class MesherIn final : public Mesher {
     extracted_simplices_ = mesh.simplex_count();
     MeshStatistics& statistics = mesh.statistics;
     statistics.input_points = input_vertex_.size();
-    statistics.duplicates = input_vertex_.size() - distinct_input_;
+    statistics.duplicates = input_vertex_.size() - distinct_input_ - merged_points_;
+    statistics.merged_points = merged_points_;
     statistics.vertices = mesh.vertex_count();
     statistics.simplices = mesh.simplex_count();
     statistics.tree_seconds = tree_seconds_;
@@ -560,8 +692,10 @@ class MesherIn final : public Mesher {
   // By output index, of the first distinct_count_; once one is asked for.
   mutable HugeVector<VertexId> vertex_at_;
   mutable std::once_flag has_vertex_at_;
-  HugeVector<uint32_t> input_vertex_;   // by point given
-  uint64_t distinct_input_ = 0;         // different vertices among them
+  HugeVector<uint32_t> input_vertex_;  // by point given
+  uint64_t distinct_input_ = 0;        // different vertices among them
+  double merge_distance_ = 0;
+  uint64_t merged_points_ = 0;          // became a vertex with other coordinates
   std::vector<size_t> negative_zeros_;  // places in Mesh::points
 
   uint64_t extracted_vertices_ = 0;  // of the last mesh made

@@ -37,12 +37,14 @@ struct Mesh {
   uint64_t simplex_count() const { return dimension == 0 ? 0 : simplices.size() / (dimension + 1); }
 };
 
-// What a mesh would take, foretold from the tree over its points.
+// What a mesh would take, predicted from the tree over its points. A figure of 2^53 stands for that or
+// more.
 struct MeshEstimate {
   uint64_t vertices = 0;
   uint64_t simplices = 0;
   uint64_t memory_bytes = 0;  // peak, of the meshing itself
   uint64_t tree_leaves = 0;
+  double bytes_per_vertex = 0;  // of the peak, whatever the figures above stand for
 };
 
 // A clipped Voronoi cell, as [HT08] Definition 2 has it but with a cube in the place of the ball.
@@ -84,14 +86,20 @@ class Mesher {
   // What it holds in memory, but for a few scratch buffers. Unit: bytes.
   virtual uint64_t memory_bytes() const = 0;
 
+  // Refuses demands for which it is proved that they take more vertices than `parameters` allow.
+  //
+  // Errors:     INVALID_ARGUMENT (parameters); RESOURCE_EXHAUSTED with the predicted number, the limit and what fits.
+  virtual absl::Status CheckFeasible(const MeshParameters& /*parameters*/) const { return absl::OkStatus(); }
+
   // Adds Steiner vertices until the criterion and the sizes of `parameters` are met, then mends slivers, for which these
   // vertices move too; with pump_weights, Extract gives weights if slivers are left, or nothing was mended. Of the
   // parameters rho, criterion, sizes, min_dihedral, pump_weights, max_vertices and threads count; the box is that of Create.
   //
   // Complexity: O(m) queries the first time and for other demands than the last; else in proportion to what was added
   //             since.
-  // Errors:     INVALID_ARGUMENT (parameters), RESOURCE_EXHAUSTED (max_vertices, smallest edge, memory of the context), CANCELLED,
-  //             DEADLINE_EXCEEDED. Resumable: a later call goes on where this was left, and its mesh depends on it.
+  // Errors:     those of CheckFeasible, before anything is done; RESOURCE_EXHAUSTED (max_vertices, smallest edge,
+  //             memory of the context), CANCELLED, DEADLINE_EXCEEDED. Resumable: a later call goes on where this was
+  //             left, and its mesh depends on it.
   // Threads:    uses parameters.threads, at most as many as the machine has cores.
   // Source:     [HT08] Figure 4; docs/design/sliver.md.
   virtual absl::Status Refine(const MeshParameters& parameters, RunContext& context) = 0;
@@ -165,10 +173,11 @@ class Mesher {
   virtual absl::StatusOr<MeshEstimate> Estimate(const MeshParameters& parameters, const RunContext& context) const = 0;
 };
 
-// Reserves what Refine and Extract are estimated to take of the memory that the context lends: as much as the estimate says, and a
-// quarter more, but no more than max_vertices allows; Refine then need not estimate again. Does nothing without a lender.
+// Checks that the demands are feasible, and reserves what Refine and Extract are estimated to take of the memory that
+// the context lends: as much as the estimate says, and a quarter more, but no more than max_vertices allows; Refine
+// then need not estimate again. Reserves nothing without a lender.
 //
-// Errors:     those of Estimate; RESOURCE_EXHAUSTED, or another of the lender.
+// Errors:     those of CheckFeasible and Estimate; RESOURCE_EXHAUSTED, or another of the lender.
 absl::Status ReserveMemory(const Mesher& mesher, const MeshParameters& parameters, RunContext& context);
 
 // Meshes `points` in their box: Create, ReserveMemory, Refine, Extract.

@@ -55,6 +55,7 @@ v1::MeshStatistics StatisticsToProto(const core::MeshStatistics& statistics) {
   v1::MeshStatistics message;
   message.set_input_points(statistics.input_points);
   message.set_duplicates(statistics.duplicates);
+  message.set_merged_points(statistics.merged_points);
   message.set_vertices(statistics.vertices);
   message.set_simplices(statistics.simplices);
   message.set_max_radius_edge(statistics.max_radius_edge);
@@ -159,6 +160,10 @@ grpc::Status ParametersFromProto(const v1::MeshParameters& message, const Servic
   if (grpc::Status status = Validate(*parameters, "pump_weights"); !status.ok()) {
     return status;
   }
+  parameters->merge_distance = message.merge_distance();
+  if (grpc::Status status = Validate(*parameters, "merge_distance"); !status.ok()) {
+    return status;
+  }
   if (message.threads() != 0) {
     parameters->threads = message.threads();
     if (grpc::Status status = Validate(*parameters, "threads"); !status.ok()) {
@@ -203,6 +208,7 @@ v1::MeshParameters ParametersToProto(const core::MeshParameters& parameters) {
   }
   message.set_min_dihedral(parameters.min_dihedral.value_or(core::DefaultMinDihedral(parameters.dimension)));
   message.set_pump_weights(parameters.pump_weights);
+  message.set_merge_distance(parameters.merge_distance);
   message.set_max_vertices(parameters.max_vertices);
   message.set_threads(parameters.threads);
   return message;

@@ -2,10 +2,12 @@
 
 #include <exception>
 #include <new>
+#include <string_view>
 
 #include "absl/strings/cord.h"
 #include "absl/strings/str_cat.h"
 #include "absl/types/optional.h"
+#include "core/mesh_parameters.h"
 #include "google/rpc/error_details.pb.h"
 
 namespace wellspace::server {
@@ -16,6 +18,8 @@ constexpr int kRetrySeconds = 1;
 // Marks the status of a MEMORY_LIMIT; its value is kMayRetry or empty.
 constexpr char kMemoryLimitPayload[] = "wellspace.v1/MEMORY_LIMIT";
 constexpr char kMayRetry[] = "retry";
+
+absl::string_view ToAbsl(std::string_view text) { return {text.data(), text.size()}; }
 
 grpc::StatusCode CodeOf(v1::ErrorReason reason) {
   switch (reason) {
@@ -31,6 +35,7 @@ grpc::StatusCode CodeOf(v1::ErrorReason reason) {
       return grpc::StatusCode::INVALID_ARGUMENT;
     case v1::ERROR_REASON_TOO_MANY_POINTS:
     case v1::ERROR_REASON_MESH_TOO_LARGE:
+    case v1::ERROR_REASON_DEMANDS_TOO_FINE:
     case v1::ERROR_REASON_QUEUE_FULL:
     case v1::ERROR_REASON_OUT_OF_MEMORY:
     case v1::ERROR_REASON_MEMORY_LIMIT:
@@ -119,6 +124,10 @@ grpc::Status FromCoreStatus(const absl::Status& status) {
       if (const absl::optional<absl::Cord> payload = status.GetPayload(kMemoryLimitPayload); payload.has_value()) {
         return Make(CodeOf(v1::ERROR_REASON_MEMORY_LIMIT), v1::ERROR_REASON_MEMORY_LIMIT, message, "",
                     *payload == kMayRetry);
+      }
+      if (status.GetPayload(ToAbsl(core::kDemandsTooFine)).has_value()) {
+        return MakeError(v1::ERROR_REASON_DEMANDS_TOO_FINE, message,
+                         absl::StrCat("parameters.", message.substr(0, message.find(':'))));
       }
       return MakeError(v1::ERROR_REASON_MESH_TOO_LARGE, message);
     case absl::StatusCode::kFailedPrecondition:

@@ -137,6 +137,13 @@ grpc::Status ParametersForSession(const v1::MeshParameters& message, const Servi
                                   ", which cannot change as the domain depends on it; leave it out"),
                      "parameters.margin");
   }
+  if (message.merge_distance() != 0 && parameters->merge_distance != known.merge_distance) {
+    return MakeError(v1::ERROR_REASON_INVALID_PARAMETERS,
+                     absl::StrCat("merge_distance is ", parameters->merge_distance, ", but the session has ",
+                                  known.merge_distance, ", which cannot change; leave it out"),
+                     "parameters.merge_distance");
+  }
+  parameters->merge_distance = known.merge_distance;
   parameters->domain_low = known.domain_low;
   parameters->domain_high = known.domain_high;
   parameters->margin = known.margin;

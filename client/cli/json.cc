@@ -70,6 +70,7 @@ Json ParametersJson(const client::MeshOptions& parameters) {
   json["domain_low"] = has_domain ? Json(parameters.domain_low) : Json(nullptr);
   json["domain_high"] = has_domain ? Json(parameters.domain_high) : Json(nullptr);
   json["margin"] = parameters.margin;
+  json["merge_distance"] = parameters.merge_distance;
   json["max_vertices"] = parameters.max_vertices;
   json["threads"] = parameters.threads;
   return json;

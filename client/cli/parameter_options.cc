@@ -74,6 +74,8 @@ void ParameterOptions::AddSpaceTo(CLI::App& command) {
   AddNumber(command, "--margin", options_.margin,
             "Grow the bounding box of the points on every side by this times its longest side; default: 0.25")
       ->excludes(domain);
+  AddNumber(command, "--merge", options_.merge_distance,
+            "Points no farther than this from another one become that one's vertex; default: equal ones only");
 }
 
 void ParameterOptions::AddQualityTo(CLI::App& command) {
@@ -175,15 +177,17 @@ std::string ParameterOptions::OptionOf(const std::string& field) const {
   if (name == "max_circumradius") {
     return "--size";
   }
+  if (name == "merge_distance") {
+    return "--merge";
+  }
   std::string option = "--" + name;
   std::replace(option.begin(), option.end(), '_', '-');
   return option;
 }
 
 absl::Status ParameterOptions::Explain(const absl::Status& status) const {
-  const std::string option =
-      status.code() == absl::StatusCode::kInvalidArgument ? OptionOf(client::BlamedField(status)) : "";
-  return option.empty() ? status : absl::InvalidArgumentError(absl::StrCat(option, ": ", status.message()));
+  const std::string option = OptionOf(client::BlamedField(status));
+  return option.empty() ? status : absl::Status(status.code(), absl::StrCat(option, ": ", status.message()));
 }
 
 }  // namespace wellspace::cli

@@ -13,7 +13,8 @@ namespace {
 
 nlohmann::ordered_json DuplicateOf(std::span<const uint32_t> input_vertex) {
   nlohmann::ordered_json pairs = nlohmann::ordered_json::array();
-  // Distinct points become vertices 0, 1, ... in the order of their first appearance.
+  // Points become vertices 0, 1, ... in the order in which they are first met, whether equal to the vertex or merged
+  // with it.
   uint32_t distinct = 0;
   for (size_t i = 0; i < input_vertex.size(); ++i) {
     if (input_vertex[i] == distinct) {
@@ -73,6 +74,7 @@ std::string StatisticsJson(const client::MeshHeader& mesh, std::span<const uint3
   json["domain_high"] = mesh.domain_high;
   json["input_points"] = statistics.input_points;
   json["duplicates"] = statistics.duplicates;
+  json["merged_points"] = statistics.merged_points;
   json["vertices"] = statistics.vertices;
   json["simplices"] = statistics.simplices;
   json["max_radius_edge"] = statistics.max_radius_edge;
@@ -92,6 +94,7 @@ std::string Summary(const client::MeshHeader& mesh) {
   return absl::StrCat(
       WithThousands(statistics.input_points), " points",
       statistics.duplicates == 0 ? "" : absl::StrCat(" (", WithThousands(statistics.duplicates), " duplicates)"),
+      statistics.merged_points == 0 ? "" : absl::StrCat(" (", WithThousands(statistics.merged_points), " merged)"),
       " -> ", WithThousands(statistics.vertices), " vertices, ", WithThousands(statistics.simplices), " ",
       formats::SimplexName(mesh.dimension),
       absl::StrFormat("; radius-edge at most %.4f, %s at least %.2f\u00b0", statistics.max_radius_edge,
@@ -111,13 +114,18 @@ std::string EstimateJson(const client::MeshEstimate& estimate, int dimension) {
 }
 
 std::string EstimateText(const client::MeshEstimate& estimate, int dimension) {
+  constexpr uint64_t kSaturated = uint64_t{1} << 53;  // stands for more, too
+  const auto count = [](uint64_t number) {
+    return absl::StrCat(number >= kSaturated ? "at least " : "", WithThousands(number));
+  };
   const auto line = [](const char* name, const std::string& value) {
     return absl::StrFormat("%-14s %s\n", name, value);
   };
-  return absl::StrCat(line("vertices", WithThousands(estimate.vertices)),
-                      line(formats::SimplexName(dimension), WithThousands(estimate.simplices)),
-                      line("memory", WithBinaryUnit(estimate.memory_bytes)),
-                      line("tree leaves", WithThousands(estimate.tree_leaves)));
+  return absl::StrCat(
+      line("vertices", count(estimate.vertices)), line(formats::SimplexName(dimension), count(estimate.simplices)),
+      line("memory",
+           absl::StrCat(estimate.memory_bytes >= kSaturated ? "at least " : "", WithBinaryUnit(estimate.memory_bytes))),
+      line("tree leaves", WithThousands(estimate.tree_leaves)));
 }
 
 std::string WithBinaryUnit(uint64_t bytes) {

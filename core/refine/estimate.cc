@@ -103,9 +103,12 @@ std::span<const Calibration> CalibrationFor(Criterion criterion) {
 template <int D>
 constexpr std::array<double, 2> kRamp = D == 2 ? std::array{-0.5, 1.0} : std::array{-0.05, 1.45};
 
-// Vertices per h^-D where sizes h alone decide.
-template <int D>
-constexpr double kVerticesPerSize = D == 2 ? 0.7 : 0.82;
+// Sizes below this part of the longest side count as this: no coordinates could tell such edges apart, and what is
+// integrated over so few halvings stays finite, whatever is asked for.
+constexpr double kLeastSize = 0x1p-60;
+
+// More vertices than any leaf is predicted to take.
+constexpr double kMostInLeaf = 0x1p400;
 
 // The volume of the unit ball; 1 / it is the number of uniformly random points per unit of the integral of lfs^-D.
 template <int D>
@@ -156,7 +159,9 @@ template <int D>
 class Integrator {
  public:
   Integrator(const QueryStructure<D>& structure, const Demands<D>& demands)
-      : box_(structure.box()), demands_(demands), vertices_per_term_(VerticesPerTerm<D>(demands)) {}
+      : box_(structure.box()),
+        sizes_(ServedSizes(demands.sizes, box_)),
+        vertices_per_term_(VerticesPerTerm<D>(demands)) {}
 
   absl::Status Prepare(const QueryStructure<D>& structure, const RunContext& context) {
     // The corners of the box count as its boundary, not as points; those that were not given come last.
@@ -209,6 +214,11 @@ class Integrator {
   uint64_t on_boundary() const { return on_boundary_; }
 
  private:
+  static SizeField<D> ServedSizes(SizeField<D> sizes, const Box<D>& box) {
+    sizes.RaiseTo(kLeastSize * box.LongestSide());
+    return sizes;
+  }
+
   // The features around a place.
   struct Surroundings {
     double lfs = 0;
@@ -288,12 +298,11 @@ class Integrator {
       center[i] = cell.low[i] + 0.5 * side;
       diagonal_sq += side * side;
     }
-    double least = demands_.sizes.max_circumradius;
-    for (const auto& region : demands_.sizes.regions) {
+    double least = sizes_.max_circumradius;
+    for (const auto& region : sizes_.regions) {
       least = std::min(least, std::max(region.max_circumradius, std::sqrt(DistanceSq<D>(cell, region.box))));
     }
-    return {least, std::min(std::sqrt(demands_.sizes.AtSq(center)) + 0.5 * std::sqrt(diagonal_sq),
-                            demands_.sizes.max_circumradius)};
+    return {least, std::min(std::sqrt(sizes_.AtSq(center)) + 0.5 * std::sqrt(diagonal_sq), sizes_.max_circumradius)};
   }
 
   // Adds `weight` times the integrals over the part of a cube that lies in the box.
@@ -338,7 +347,7 @@ class Integrator {
     if (center.lfs < side) {
       return false;
     }
-    if (demands_.sizes.IsUnbounded()) {
+    if (sizes_.IsUnbounded()) {
       return true;
     }
     const auto [least, largest] = SizesIn(cell);
@@ -355,8 +364,8 @@ class Integrator {
     const double density = std::pow(at.lfs, -D);
     const double graded = density * Grading(at.nearest / at.spacing);
     share_.terms[at.term] += volume * graded;
-    if (!demands_.sizes.IsUnbounded()) {
-      const double wanted = kVerticesPerSize<D> * std::pow(demands_.sizes.AtSq(x), -0.5 * D);
+    if (!sizes_.IsUnbounded()) {
+      const double wanted = kVerticesPerSize<D> * std::pow(sizes_.AtSq(x), -0.5 * D);
       const double there = density / BallVolume<D>() + graded * vertices_per_term_[at.term];
       share_.sizes += volume * std::max(0.0, wanted - there);
     }
@@ -392,7 +401,7 @@ class Integrator {
   }
 
   const Box<D> box_;
-  const Demands<D>& demands_;
+  const SizeField<D> sizes_;
   const Terms vertices_per_term_;
   NearestPoints<D> points_;                        // the input but the corners of the box
   absl::flat_hash_map<uint32_t, double> spacing_;  // by point, where it has been asked for
@@ -414,14 +423,18 @@ template <int D>
 Leaves LeavesOf(double vertices, double at_first) {
   constexpr double kCapacity = LeafTree<D>::kLeafCapacity;
   constexpr double kChildren = LeafTree<D>::kChildren;
-  Leaves result{1.0, at_first > 0 ? 1.0 : std::min(1.0, vertices)};
-  const double split = std::clamp(2 * (vertices / kCapacity - 0.75), 0.0, 1.0);
-  if (split > 0) {
-    const Leaves child = LeavesOf<D>(vertices / kChildren, 0);
-    result.all = std::lerp(result.all, kChildren * child.all, split);
-    result.filled = std::lerp(result.filled, kChildren * child.filled, split);
+  vertices = std::min(vertices, kMostInLeaf);
+  double parts = 1;
+  for (; vertices >= 1.25 * kCapacity; at_first = 0) {
+    vertices /= kChildren;
+    parts *= kChildren;
   }
-  return result;
+  Leaves result{1.0, at_first > 0 ? 1.0 : std::min(1.0, vertices)};
+  if (const double split = 2 * (vertices / kCapacity - 0.75); split > 0) {
+    result.all = std::lerp(result.all, kChildren, split);
+    result.filled = std::lerp(result.filled, kChildren * std::min(1.0, vertices / kChildren), split);
+  }
+  return {parts * result.all, parts * result.filled};
 }
 
 // The sums over all leaves, and the standard error of the vertices.

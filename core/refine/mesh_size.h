@@ -27,6 +27,10 @@ constexpr double kSimplicesPerVertex = D == 2   ? 2.0
                                        : D == 5 ? 170.0
                                                 : 1170.0;
 
+// Vertices per h^-D where sizes h alone decide.
+template <int D>
+constexpr double kVerticesPerSize = D == 2 ? 0.7 : 0.82;
+
 template <int D>
 double SimplicesOf(double vertices, double on_boundary) {
   if constexpr (D == 2) {

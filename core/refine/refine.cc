@@ -10,6 +10,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/dimensions.h"
 #include "core/base/huge_pages.h"
+#include "core/base/saturate.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
 #include "core/refine/checks.h"
@@ -190,7 +191,7 @@ absl::Status Refinement<D>::Foretell(const Demands<D>& demands) const {
     return absl::OkStatus();
   }
   WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size, EstimateSize<D>(structure_, demands, *context_, kGlance));
-  context_->SetEstimatedVertices(static_cast<uint64_t>(size.vertices));
+  context_->SetEstimatedVertices(SaturatedCount(size.vertices));
   return absl::OkStatus();
 }
 
@@ -242,7 +243,7 @@ absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& t
 // Makes room for so many vertices, and some more, so that arrays need not be moved as they grow; what is not used takes no memory.
 template <int D>
 void Refinement<D>::Reserve(uint32_t vertices) {
-  vertices += vertices / 8;
+  vertices += std::min(vertices / 8, std::numeric_limits<uint32_t>::max() - vertices);
   structure_.Reserve(vertices);
   stars_.Reserve(vertices);
   schedule_.Reserve(vertices);

@@ -53,6 +53,14 @@ struct SizeField {
     return least;
   }
 
+  // Has no size be below `least`.
+  void RaiseTo(double least) {
+    max_circumradius = std::max(max_circumradius, least);
+    for (Region& region : regions) {
+      region.max_circumradius = std::max(region.max_circumradius, least);
+    }
+  }
+
   // Nothing is asked for.
   bool IsUnbounded() const { return regions.empty() && max_circumradius == std::numeric_limits<double>::infinity(); }
 };

@@ -310,6 +310,40 @@ TEST_F(CommandsTest, MeshAndCheckInSpace) {
   EXPECT_EQ(stats["domain_high"], nlohmann::json::parse("[2.0, 2.0, 2.0]"));
 }
 
+TEST_F(CommandsTest, NearPointsAreNamedAndMerged) {
+  // The second, third and fifth line are twins of the first and the fourth.
+  constexpr char kTwins[] =
+      "0.25,0.5\n0.25000000000000006,0.5\n0.25,0.5000000000000001\n0.75,0.5\n0.75,0.4999999999999999\n0.1,0.9\n";
+  EXPECT_THAT(MeshFails("twins.csv", kTwins, 2),
+              AllOf(HasSubstr("4 pairs are too close"), HasSubstr("twins.csv:5"), HasSubstr("(--merge) of ")));
+  Mesh(kTwins, "merged.vtu", {"--merge", "1e-12", "--stats", Path("stats.json")});
+  const nlohmann::json stats = nlohmann::json::parse(folder_.Read("stats.json"));
+  EXPECT_EQ(stats["merged_points"], 3);
+  EXPECT_EQ(stats["duplicates"], 0);
+  EXPECT_EQ(stats["duplicate_of"], nlohmann::json::parse("[[1,0],[2,0],[4,1]]"));
+  const RunResult result = RunWellspace({"mesh", Path("cloud.csv"), "--merge", "1e-12", "-o", Path("again.vtu")});
+  EXPECT_THAT(result.err, HasSubstr("6 points (3 merged) -> "));
+  EXPECT_THAT(MeshFails("twins.csv", kTwins, 2, {"--merge", "-1"}),
+              HasSubstr("--merge: merge_distance: -1 is not allowed"));
+}
+
+TEST_F(CommandsTest, DemandsThatCannotBeMetAreRefusedAtOnce) {
+  for (const char* size : {"1e-6", "1e-103", "1e-154", "1e-300"}) {
+    EXPECT_THAT(MeshFails("plane.csv", kPlane, 4, {"--domain", "-1,-1,2,2", "--size", size}),
+                AllOf(HasSubstr("--size: max_circumradius: "), HasSubstr("max_vertices = 50000000"),
+                      HasSubstr("the smallest size that fits is about ")));
+    const RunResult estimate =
+        RunWellspace({"estimate", Path("plane.csv"), "--domain", "-1,-1,2,2", "--size", size, "--output", "json"});
+    EXPECT_EQ(estimate.exit_code, 0) << estimate.err;
+    const nlohmann::json figures = nlohmann::json::parse(estimate.out);
+    EXPECT_GE(figures["vertices"], 1'000'000'000'000) << size;
+    EXPECT_GE(figures["memory_bytes"], 1'000'000'000'000) << size;
+  }
+  EXPECT_THAT(
+      MeshFails("flat.csv", "0,0,0\n1,1,1e-6\n0.5,0.25,5e-7\n", 4, {"--margin", "0"}),
+      AllOf(HasSubstr("only 1e-06 thick along axis 2"), HasSubstr("the smallest thickness that fits is about ")));
+}
+
 TEST_F(CommandsTest, SliversAreMendedOrPumpedAway) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(0, 1);

@@ -1,6 +1,7 @@
 #include "tests/fuzz/mesh_check.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <utility>
@@ -25,8 +26,16 @@ void RequireBox(const core::Mesh& mesh) {
   }
 }
 
-void RequireInputVertices(const core::Mesh& mesh, std::span<const double> points) {
+void RequireInputVertices(const core::Mesh& mesh, double merge_distance, std::span<const double> points) {
   Require(mesh.input_vertex.size() * mesh.dimension == points.size(), "every input point has a vertex");
+  if (merge_distance > 0) {
+    for (size_t i = 0; i < points.size(); ++i) {
+      const size_t vertex = mesh.input_vertex[i / mesh.dimension];
+      Require(std::abs(mesh.points[vertex * mesh.dimension + i % mesh.dimension] - points[i]) <= merge_distance,
+              "an input point is near its vertex");
+    }
+    return;
+  }
   for (size_t i = 0; i < points.size(); ++i) {
     const size_t vertex = mesh.input_vertex[i / mesh.dimension];
     Require(mesh.points[vertex * mesh.dimension + i % mesh.dimension] == points[i], "an input point is its vertex");
@@ -35,7 +44,7 @@ void RequireInputVertices(const core::Mesh& mesh, std::span<const double> points
 
 void RequireValid(const core::Mesh& mesh, const core::MeshParameters& parameters, std::span<const double> points) {
   RequireBox(mesh);
-  RequireInputVertices(mesh, points);
+  RequireInputVertices(mesh, parameters.merge_distance, points);
   const core::ValidationOptions options = {
       .rho = parameters.rho == 0 ? core::DefaultRho(parameters.dimension) : parameters.rho,
       .criterion = parameters.criterion,
@@ -146,7 +155,7 @@ void RequireEditOrRefusal(const core::MeshParameters& parameters, std::span<cons
   all.insert(all.end(), added.begin(), added.end());
   Require(std::equal(vertices.begin(), vertices.end(), mesh->input_vertex.end() - vertices.size()),
           "the vertices of added points come last in the list");
-  RequireInputVertices(*mesh, all);
+  RequireInputVertices(*mesh, parameters.merge_distance, all);
   // Of the first points alone it is said that they are the first vertices.
   core::Mesh of_first = *std::move(mesh);
   of_first.input_vertex.resize(points.size() / of_first.dimension);

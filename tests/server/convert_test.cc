@@ -53,6 +53,7 @@ TEST(ParametersFromProto, FillsInDefaults) {
   EXPECT_TRUE(parameters.size_boxes.empty());
   EXPECT_FALSE(parameters.min_dihedral.has_value());
   EXPECT_FALSE(parameters.pump_weights);
+  EXPECT_EQ(parameters.merge_distance, 0);
 }
 
 TEST(ParametersFromProto, TakesEveryField) {
@@ -67,6 +68,7 @@ TEST(ParametersFromProto, TakesEveryField) {
   AddSizeBox(message, -1, 2, 0.25);
   message.set_min_dihedral(0);
   message.set_pump_weights(true);
+  message.set_merge_distance(1e-9);
   core::MeshParameters parameters;
   ASSERT_TRUE(ParametersFromProto(message, SmallLimits(), &parameters).ok());
   EXPECT_EQ(parameters.rho, 2.5);
@@ -84,6 +86,8 @@ TEST(ParametersFromProto, TakesEveryField) {
   EXPECT_EQ(parameters.size_boxes[1].max_circumradius, 0.25);
   EXPECT_EQ(parameters.min_dihedral, 0.0);
   EXPECT_TRUE(parameters.pump_weights);
+  EXPECT_EQ(parameters.merge_distance, 1e-9);
+  EXPECT_EQ(ParametersToProto(parameters).merge_distance(), 1e-9);
 }
 
 TEST(ParametersFromProto, EveryDimensionHasItsDefaults) {
@@ -157,6 +161,9 @@ INSTANTIATE_TEST_SUITE_P(
                         p = UnitCubeParameters(2);
                         p.set_pump_weights(true);
                       }},
+        BadParameters{"MergeDistanceNegative", "parameters.merge_distance", [](auto& p) { p.set_merge_distance(-1); }},
+        BadParameters{"MergeDistanceNan", "parameters.merge_distance",
+                      [](auto& p) { p.set_merge_distance(std::nan("")); }},
         BadParameters{"MarginNegative", "parameters.margin", [](auto& p) { p.set_margin(-0.5); }},
         BadParameters{"MarginNan", "parameters.margin", [](auto& p) { p.set_margin(std::nan("")); }},
         BadParameters{"MarginInfinite", "parameters.margin", [](auto& p) { p.set_margin(kInfinity); }},

@@ -52,6 +52,9 @@ void PrintSession(const client::Session& session, bool json) {
                       ? absl::StrFormat("of the points, and a margin of %g", session.parameters.margin)
                       : absl::StrCat(absl::StrJoin(session.parameters.domain_low, ","), " to ",
                                      absl::StrJoin(session.parameters.domain_high, ",")));
+  if (session.parameters.merge_distance != 0) {
+    print("merged", absl::StrFormat("points up to %g apart", session.parameters.merge_distance));
+  }
   print("quality", QualityText(session.parameters));
   print("points", WithThousands(session.committed_points));
   print("vertices", WithThousands(session.vertex_count));

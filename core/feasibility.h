@@ -1,0 +1,36 @@
+// What is asked for, on the scale of the computation; and whether any mesh could be that.
+#ifndef WELLSPACE_CORE_FEASIBILITY_H_
+#define WELLSPACE_CORE_FEASIBILITY_H_
+
+#include <cstdint>
+
+#include "absl/status/status.h"
+#include "core/input_cloud.h"
+#include "core/mesh_parameters.h"
+#include "core/refine/demands.h"
+
+namespace wellspace::core {
+
+// The demands of `parameters`, scaled. What is so large or small that doubles could not tell is no larger or smaller in
+// the result than that: nothing of it is 0, infinite or NaN, nor are squares of it.
+//
+// REQUIRES:   ValidateParameters(parameters).ok().
+template <int D>
+Demands<D> DemandsIn(const Domain<D>& domain, const MeshParameters& parameters);
+
+// Refuses demands for which it is proved that every mesh of `domain` has more vertices than `parameters` allow.
+// `vertices` is how many there are before refinement.
+//
+// Guarantees: (1) what can be met is not refused.
+// Errors:     RESOURCE_EXHAUSTED with the payload kDemandsTooFine: the parameter, about how many vertices it takes, the
+//             limit, and the smallest size, or side of the domain, that fits.
+template <int D>
+absl::Status CheckFeasible(const Domain<D>& domain, const MeshParameters& parameters, uint64_t vertices);
+
+// The same for the shape of the domain alone: that of a tree over it is as large.
+template <int D>
+absl::Status CheckShapeFeasible(const Domain<D>& domain, const MeshParameters& parameters, uint64_t vertices);
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_FEASIBILITY_H_

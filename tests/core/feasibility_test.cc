@@ -1,0 +1,181 @@
+// Demands that no mesh of max_vertices can meet are refused at once; those that one can meet are not.
+#include "core/feasibility.h"
+
+#include <cmath>
+#include <memory>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "core/mesher.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+
+namespace wellspace::core {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+MeshParameters Cube(int dimension, double size) {
+  return {.dimension = dimension,
+          .max_circumradius = size,
+          .min_dihedral = 0,
+          .domain_low = std::vector<double>(dimension, 0.0),
+          .domain_high = std::vector<double>(dimension, 1.0)};
+}
+
+absl::Status Meshed(const MeshParameters& parameters, uint64_t* vertices = nullptr) {
+  RunContext context;
+  const absl::StatusOr<Mesh> mesh = MeshPoints(parameters, {}, context);
+  if (mesh.ok() && vertices != nullptr) {
+    *vertices = mesh->vertex_count();
+  }
+  return mesh.status();
+}
+
+// What is said before any refinement.
+absl::Status Feasible(const MeshParameters& parameters) {
+  // The tree, whose leaves max_vertices limit, too, is another matter.
+  MeshParameters of_tree = parameters;
+  of_tree.max_vertices = 0;
+  RunContext context;
+  const absl::StatusOr<std::unique_ptr<Mesher>> mesher = Mesher::Create(of_tree, {}, context);
+  return mesher.ok() ? (*mesher)->CheckFeasible(parameters) : mesher.status();
+}
+
+bool IsTooFine(const absl::Status& status) {
+  return status.code() == absl::StatusCode::kResourceExhausted &&
+         status.GetPayload(absl::string_view(kDemandsTooFine.data(), kDemandsTooFine.size())).has_value();
+}
+
+double NumberAfter(const std::string& text, const std::string& words) {
+  const size_t at = text.find(words);
+  return at == std::string::npos ? 0 : std::stod(text.substr(at + words.size()));
+}
+
+class FeasibilityTest : public ::testing::TestWithParam<int> {};
+
+INSTANTIATE_TEST_SUITE_P(Dimensions, FeasibilityTest, ::testing::Range(2, 7));
+
+TEST_P(FeasibilityTest, SizesFarBelowTheBoxAreRefusedWithWhatFits) {
+  const MeshParameters parameters = Cube(GetParam(), std::pow(1e-12, 1.0 / GetParam()) / 10);
+  RunContext context;
+  const absl::Status status = MeshPoints(parameters, {}, context).status();
+  ASSERT_TRUE(IsTooFine(status)) << status;
+  const std::string text(status.message());
+  EXPECT_THAT(text, AllOf(HasSubstr("max_circumradius: "), HasSubstr("max_vertices = 50000000"),
+                          HasSubstr("the smallest size that fits is about ")));
+  EXPECT_GT(NumberAfter(text, "takes about "), 5e7);
+  EXPECT_EQ(context.Snapshot().vertices, uint64_t{1} << GetParam()) << "before any work";
+}
+
+// Guarantee (1): a mesh of n vertices was possible with n.
+TEST_P(FeasibilityTest, WhatWasMeshedIsNotRefused) {
+  const int dimension = GetParam();
+  if (dimension > 4) {
+    GTEST_SKIP() << "a mesh takes too long";
+  }
+  const std::vector<double> sizes = dimension == 2   ? std::vector{0.5, 0.1, 0.03, 0.01}
+                                    : dimension == 3 ? std::vector{0.6, 0.3, 0.1}
+                                                     : std::vector{0.9, 0.6};
+  for (const double size : sizes) {
+    for (const double thickness : {1.0, 0.2}) {
+      for (const bool with_box : {false, true}) {
+        MeshParameters parameters = Cube(dimension, size);
+        parameters.domain_high.back() = thickness;
+        if (with_box) {
+          parameters.size_boxes = {
+              {std::vector<double>(dimension, -3.0), std::vector<double>(dimension, 0.3), size / 2},
+              {std::vector<double>(dimension, 0.1), std::vector<double>(dimension, 0.2), size / 3}};
+        }
+        uint64_t vertices = 0;
+        ASSERT_TRUE(Meshed(parameters, &vertices).ok());
+        parameters.max_vertices = vertices;
+        EXPECT_TRUE(Feasible(parameters).ok()) << Feasible(parameters) << " but took " << vertices;
+      }
+    }
+  }
+}
+
+// As tight as the header of least_vertices.h says: within a factor of what meshes take.
+TEST(Feasibility, BoundsAreNearWhatMeshesTake) {
+  for (const auto& [dimension, size, factor] : {std::tuple{2, 0.01, 2.5}, std::tuple{3, 0.08, 4.0}}) {
+    MeshParameters parameters = Cube(dimension, size);
+    uint64_t vertices = 0;
+    ASSERT_TRUE(Meshed(parameters, &vertices).ok());
+    parameters.max_vertices = static_cast<uint64_t>(static_cast<double>(vertices) / factor);
+    EXPECT_TRUE(IsTooFine(Feasible(parameters)));
+  }
+}
+
+TEST(Feasibility, WhatIsSaidToFitFits) {
+  for (const int dimension : {2, 3}) {
+    for (const uint64_t most : {200, 2'000, 20'000}) {
+      for (const int boxes : {0, 1}) {
+        MeshParameters parameters = Cube(dimension, boxes == 0 ? 1e-5 : 0);
+        parameters.max_vertices = most;
+        if (boxes == 1) {
+          parameters.size_boxes = {{std::vector<double>(dimension, 0.2), std::vector<double>(dimension, 0.5), 1e-5}};
+        }
+        const absl::Status status = Meshed(parameters);
+        ASSERT_TRUE(IsTooFine(status)) << status;
+        const double size = NumberAfter(std::string(status.message()), "fits is about ");
+        (boxes == 0 ? parameters.max_circumradius : parameters.size_boxes[0].max_circumradius) = size;
+        uint64_t vertices = 0;
+        EXPECT_TRUE(Meshed(parameters, &vertices).ok()) << dimension << "-D, " << most << ": " << size;
+        EXPECT_GE(vertices, most / 8) << dimension << "-D: " << size << " is not the smallest of " << most;
+      }
+    }
+  }
+}
+
+TEST(Feasibility, ThinDomainsAreRefusedWithTheThicknessThatFits) {
+  for (const int dimension : {2, 3}) {
+    for (const Criterion criterion : {Criterion::kRadiusEdge, Criterion::kWellSpaced}) {
+      MeshParameters parameters = Cube(dimension, 0);
+      parameters.criterion = criterion;
+      parameters.domain_high.back() = dimension == 2 ? 1e-9 : 1e-6;
+      const absl::Status status = Meshed(parameters);
+      ASSERT_TRUE(IsTooFine(status)) << status;
+      EXPECT_THAT(std::string(status.message()), AllOf(HasSubstr("domain: "), HasSubstr("thick along axis"),
+                                                       HasSubstr("give a larger domain or margin")));
+      parameters.max_vertices = 20'000;
+      const double side = NumberAfter(std::string(Meshed(parameters).message()), "fits is about ");
+      parameters.domain_high.back() = side;
+      EXPECT_TRUE(Meshed(parameters).ok() || criterion == Criterion::kWellSpaced) << Meshed(parameters);
+    }
+  }
+}
+
+TEST(Feasibility, ThinDomainsThatCanBeMeshedAre) {
+  for (const double thickness : {0.3, 0.1, 0.03}) {
+    for (const double rho : {1.2, 2.0, 10.0}) {
+      MeshParameters parameters = Cube(3, 0);
+      parameters.rho = rho;
+      parameters.domain_high.back() = thickness;
+      uint64_t vertices = 0;
+      ASSERT_TRUE(Meshed(parameters, &vertices).ok());
+      parameters.max_vertices = vertices;
+      EXPECT_TRUE(Feasible(parameters).ok()) << Feasible(parameters);
+    }
+  }
+}
+
+TEST(Feasibility, SizesBelowWhatDoublesServeAreBlamed) {
+  MeshParameters parameters = Cube(2, 0);
+  parameters.size_boxes = {{{2, 2}, {3, 3}, 1e-200}, {{0.5, 0.5}, {0.5, 0.5}, 1e-200}};
+  const absl::Status status = Meshed(parameters);
+  EXPECT_TRUE(IsTooFine(status)) << status;
+  EXPECT_THAT(std::string(status.message()), HasSubstr("size_boxes[1].max_circumradius: 1e-200 is too fine"));
+}
+
+TEST(Feasibility, WithoutADomainPointsSayHowLargeItIs) {
+  const MeshParameters parameters{.dimension = 3, .max_circumradius = 1e-5};
+  RunContext context;
+  EXPECT_TRUE(IsTooFine(MeshPoints(parameters, std::vector<double>{0, 0, 0, 1, 1, 1}, context).status()));
+  EXPECT_TRUE(MeshPoints(parameters, std::vector<double>{0, 0, 0, 1e-4, 1e-4, 1e-4}, context).ok());
+}
+
+}  // namespace
+}  // namespace wellspace::core
