@@ -1,0 +1,131 @@
+// Numbers of every exponent and size in MeshParameters, through the server's checks, into the estimate and the mesher.
+//
+// Input: a byte for the dimension, the criterion and how many points there are; then fields, each a byte that says
+//        which and the
+// eight bytes of its double, low one first, or of its integer.
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <vector>
+
+#include "core/base/saturate.h"
+#include "core/mesher.h"
+#include "server/convert.h"
+#include "tests/fuzz/fuzz.h"
+#include "tests/fuzz/mesh_check.h"
+#include "wellspace/v1/mesh.pb.h"
+
+namespace wellspace::fuzz {
+namespace {
+
+constexpr size_t kMaxFields = 12;
+// Beside the corners of the box, by dimension: under the sanitizers cells of 5-D and 6-D take milliseconds.
+constexpr std::array<uint64_t, 5> kMaxVertices = {400, 200, 40, 12, 8};
+
+uint64_t ReadInteger(ByteReader& bytes) {
+  uint64_t value = 0;
+  for (int i = 0; i < 64; i += 8) {
+    value |= uint64_t{bytes.Next()} << i;
+  }
+  return value;
+}
+double ReadDouble(ByteReader& bytes) { return std::bit_cast<double>(ReadInteger(bytes)); }
+
+// Byte: the lowest four bits which field, the next three the axis of a corner.
+void ReadField(ByteReader& bytes, v1::MeshParameters& parameters) {
+  const uint8_t byte = bytes.Next();
+  const int axis = (byte >> 4 & 7) % parameters.dimension();
+  const auto box = [&]() -> v1::SizeBox& {
+    if (parameters.size_boxes().empty()) {
+      v1::SizeBox* added = parameters.add_size_boxes();
+      for (int i = 0; i < parameters.dimension(); ++i) {
+        added->add_low(0);
+        added->add_high(0.5);
+      }
+      added->set_max_circumradius(1);
+    }
+    return *parameters.mutable_size_boxes(0);
+  };
+  const auto domain = [&]() -> v1::Box& {
+    while (parameters.domain().low_size() < parameters.dimension()) {
+      parameters.mutable_domain()->add_low(0);
+      parameters.mutable_domain()->add_high(1);
+    }
+    return *parameters.mutable_domain();
+  };
+  switch (byte & 15) {
+    case 0:
+      return parameters.set_rho(ReadDouble(bytes));
+    case 1:
+      return parameters.set_margin(ReadDouble(bytes));
+    case 2:
+      return parameters.set_max_circumradius(ReadDouble(bytes));
+    case 3:
+      return box().set_max_circumradius(ReadDouble(bytes));
+    case 4:
+      return box().set_low(axis, ReadDouble(bytes));
+    case 5:
+      return box().set_high(axis, ReadDouble(bytes));
+    case 6:
+      return domain().set_low(axis, ReadDouble(bytes));
+    case 7:
+      return domain().set_high(axis, ReadDouble(bytes));
+    case 8:
+      return parameters.set_merge_distance(ReadDouble(bytes));
+    case 9:
+      return parameters.set_min_dihedral(ReadDouble(bytes));
+    case 10:
+      return parameters.set_max_vertices(ReadInteger(bytes));
+    case 11:
+      return parameters.set_threads(static_cast<int32_t>(ReadInteger(bytes)));
+    case 12:
+      return parameters.set_dimension(static_cast<int32_t>(ReadInteger(bytes)));
+    default:
+      return parameters.set_pump_weights(true);
+  }
+}
+
+void RequireCounts(const core::MeshEstimate& estimate, int dimension) {
+  constexpr auto kMost = static_cast<uint64_t>(core::kMostCounted);
+  Require(estimate.vertices >= (uint64_t{1} << dimension) && estimate.vertices <= kMost,
+          "an estimate counts the corners");
+  Require(estimate.simplices >= 2 && estimate.simplices <= kMost, "a box has simplices");
+  Require(estimate.memory_bytes > 0 && estimate.memory_bytes <= kMost, "a mesh takes memory");
+  Require(std::isfinite(estimate.bytes_per_vertex) && estimate.bytes_per_vertex > 0, "a vertex takes memory");
+}
+
+}  // namespace
+}  // namespace wellspace::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+  using namespace wellspace;
+  fuzz::ByteReader bytes(data, size);
+  const uint8_t shape = bytes.Next();
+  v1::MeshParameters message;
+  message.set_dimension(2 + shape % 5);
+  message.set_criterion((shape >> 3 & 1) != 0 ? v1::CRITERION_WELL_SPACED : v1::CRITERION_RADIUS_EDGE);
+  for (size_t i = 0; i < fuzz::kMaxFields && !bytes.empty() && message.dimension() >= 2 && message.dimension() <= 6;
+       ++i) {
+    fuzz::ReadField(bytes, message);
+  }
+  const server::ServiceOptions options = {.max_threads = 2};
+  core::MeshParameters parameters;
+  if (!server::ParametersFromProto(message, options, &parameters).ok()) {
+    return 0;
+  }
+  parameters.max_vertices = std::min(
+      parameters.max_vertices, (uint64_t{1} << parameters.dimension) + fuzz::kMaxVertices[parameters.dimension - 2]);
+  // In the unit box, or none: of another domain they would be outside.
+  const size_t count = parameters.domain_low.empty() ? 1 + (shape >> 4 & 3) : 0;
+  std::vector<double> points;
+  for (size_t i = 0; i < count * parameters.dimension; ++i) {
+    points.push_back(static_cast<double>((i * i + 3 * i) % 8) / 8);
+  }
+  core::RunContext context;
+  if (const auto estimate = core::EstimateMesh(parameters, points, context); estimate.ok()) {
+    fuzz::RequireCounts(*estimate, parameters.dimension);
+  }
+  fuzz::RequireMeshOrRefusal(parameters, points);
+  return 0;
+}
