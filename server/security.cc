@@ -26,7 +26,9 @@ absl::StatusOr<std::unique_ptr<Security>> Security::Load(const SecurityOptions& 
   std::unique_ptr<Security> security(new Security(options, std::move(log)));
   Authenticator::Demands demands;
   if (options.tls.enabled()) {
-    WELLSPACE_RETURN_IF_ERROR(CheckTlsFiles(options.tls));
+    WELLSPACE_ASSIGN_OR_RETURN(TlsMaterial material, ReadTlsFiles(options.tls));
+    security->tls_source_ = std::make_shared<TlsSource>(std::move(material));
+    security->tls_credentials_ = MakeTlsCredentials(options.tls, security->tls_source_);
     demands.client_certificate = !options.tls.client_ca.empty();
   }
   if (!options.token_file.empty()) {
@@ -67,11 +69,13 @@ void Security::OnTokensChange() {
   log_->info("tokens={} read again from {}", count, options_.token_file);
 }
 
-void Security::OnTlsChange() const {
-  if (const absl::Status status = CheckTlsFiles(options_.tls); !status.ok()) {
-    log_->error("new connections fail until this is put right: {}", std::string(status.message()));
+void Security::OnTlsChange() {
+  absl::StatusOr<TlsMaterial> material = ReadTlsFiles(options_.tls);
+  if (!material.ok()) {
+    log_->error("certificates stay as they were until this is put right: {}", std::string(material.status().message()));
     return;
   }
+  tls_source_->Set(*std::move(material));
   log_->info("certificates read again from {}", options_.tls.certificate);
 }
 
@@ -105,8 +109,7 @@ absl::StatusOr<std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor>> 
   }
   return builder.experimental().AddExternalConnectionAcceptor(
       grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD,
-      options_.tls.enabled() ? MakeTlsCredentials(options_.tls, options_.reload_interval)
-                             : grpc::InsecureServerCredentials());
+      options_.tls.enabled() ? tls_credentials_ : grpc::InsecureServerCredentials());
 }
 
 }  // namespace wellspace::server

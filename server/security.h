@@ -30,15 +30,15 @@ struct SecurityOptions {
 
 // Certificates and tokens, read again when their files change.
 //
-// A file that has become unreadable or wrong is reported in the log: of tokens, those that were known stay known; of TLS, new
-// connections fail until the files are right again.
+// A file that has become unreadable or wrong is reported in the log, and what was read before stays in use: the tokens that were
+// known, or all of certificates, key and authorities.
 //
 // Thread safety: thread-safe.
 class Security {
  public:
   // Reads the files.
   //
-  // Errors:     as of CheckTlsFiles; INVALID_ARGUMENT: the token file has a wrong line; NOT_FOUND and so on: it cannot be read.
+  // Errors:     as of ReadTlsFiles; INVALID_ARGUMENT: the token file has a wrong line; NOT_FOUND and so on: it cannot be read.
   static absl::StatusOr<std::unique_ptr<Security>> Load(const SecurityOptions& options,
                                                         std::shared_ptr<spdlog::logger> log);
 
@@ -58,11 +58,14 @@ class Security {
   absl::StatusOr<TokenTable> ReadTokens() const;
   absl::Status CheckAddress(const ListenAddress& address) const;
   void OnTokensChange();
-  void OnTlsChange() const;
+  void OnTlsChange();
 
   const SecurityOptions options_;
   const std::shared_ptr<spdlog::logger> log_;
   Authenticator authenticator_;
+  // Null: no TLS. gRPC asks the credentials as long as a server runs.
+  std::shared_ptr<TlsSource> tls_source_;
+  std::shared_ptr<grpc::ServerCredentials> tls_credentials_;
   FileWatch tls_watch_;
   FileWatch token_watch_;
 };

@@ -3,11 +3,13 @@
 #define WELLSPACE_SERVER_TLS_H_
 
 #include <memory>
+#include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
-#include "absl/time/time.h"
+#include "absl/status/statusor.h"
 #include "grpcpp/security/server_credentials.h"
 
 namespace wellspace::server {
@@ -25,17 +27,44 @@ struct TlsOptions {
   std::vector<std::string> Files() const;
 };
 
-// Whether connections can be made with these files.
+// What these files have, all of it in PEM.
+struct TlsMaterial {
+  std::string certificate;
+  std::string key;
+  std::string client_ca;  // empty: none
+};
+
+// Reads the files, if connections can be made with them.
 //
-// Errors:     INVALID_ARGUMENT: a file is missing among the options, or has not what it should have: certificates that are valid now, the
-//             key of the first; the message names the file. NOT_FOUND and so on: a file cannot be read.
+// Errors:     INVALID_ARGUMENT: a file is missing among the options, or has not what it should have: certificates that are
+//             valid now, the key of the first; the message names the file. NOT_FOUND and so on: a file cannot be read.
+absl::StatusOr<TlsMaterial> ReadTlsFiles(const TlsOptions& options);
+
+// Whether connections can be made with these files. Errors: those of ReadTlsFiles.
 absl::Status CheckTlsFiles(const TlsOptions& options);
 
-// Credentials of a listener: TLS 1.2 with forward secrecy and authenticated encryption, or TLS 1.3. The files are read again when they
-// have changed, within about `reload_interval` (at least a second); connections that are there stay.
+// What new connections are made with, all of it replaced at once while a server runs.
 //
-// REQUIRES:   CheckTlsFiles(options) is OK.
-std::shared_ptr<grpc::ServerCredentials> MakeTlsCredentials(const TlsOptions& options, absl::Duration reload_interval);
+// Thread safety: thread-safe.
+class TlsSource {
+ public:
+  explicit TlsSource(TlsMaterial material) : material_(std::make_shared<const TlsMaterial>(std::move(material))) {}
+
+  std::shared_ptr<const TlsMaterial> Get() const;
+  void Set(TlsMaterial material);
+
+ private:
+  mutable std::mutex mutex_;
+  std::shared_ptr<const TlsMaterial> material_;  // guarded by mutex_
+};
+
+// Credentials of a listener: TLS 1.2 with forward secrecy and authenticated encryption, or TLS 1.3, with what `source` has at
+// each handshake. Connections that are there stay when it changes. Of `options` only the demand on clients counts.
+//
+// gRPC's own watch of files was rejected: between a new certificate and its key, and as long as a file is wrong, it fails
+// all handshakes.
+std::shared_ptr<grpc::ServerCredentials> MakeTlsCredentials(const TlsOptions& options,
+                                                            std::shared_ptr<const TlsSource> source);
 
 }  // namespace wellspace::server
 

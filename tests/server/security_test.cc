@@ -227,6 +227,50 @@ TEST_F(SecurityTest, AuthoritiesOfClientsAreReadAgain) {
   EXPECT_TRUE(Eventually([&] { return !client->EstimateMesh({}, {}).ok(); }));
 }
 
+// Whatever is wrong with them, and in whatever order they come.
+TEST_F(SecurityTest, BrokenFilesLeaveThePairThatWorksInUse) {
+  const Authority authority(folder_, "authority");
+  const Authority after(folder_, "after");
+  UseTls(authority);
+  security_.tls.client_ca = folder_.Path("clients.pem");
+  Replace(authority.certificate(), security_.tls.client_ca);
+  security_.reload_interval = absl::Milliseconds(1);
+  const CertificateFiles alice = authority.Issue("alice", "alice");
+  const CertificateFiles next = after.Issue("next");
+  const client::ConnectOptions as_alice = {
+      .tls_ca = authority.certificate(), .tls_certificate = alice.certificate, .tls_key = alice.key};
+  Start();
+  size_t count = 0;
+  const auto expect_served = [&](const std::string& what) {
+    ASSERT_TRUE(harness_->log().WaitFor("certificates stay as they were", ++count)) << what;
+    EXPECT_EQ(Call(*harness_, as_alice), absl::OkStatus()) << what;
+  };
+  const std::string certificate = folder_.Read("server.pem");
+  Replace(folder_.Write("empty", ""), security_.tls.certificate);
+  expect_served("no certificate");
+  Replace(folder_.Write("cut", certificate.substr(0, certificate.size() / 2)), security_.tls.certificate);
+  expect_served("half a certificate");
+  Replace(folder_.Write("zero", certificate + std::string(1, '\0') + certificate), security_.tls.certificate);
+  expect_served("a zero byte");
+  Replace(authority.Issue("old", "localhost", -1).certificate, security_.tls.certificate);
+  expect_served("an expired certificate");
+  Replace(next.certificate, security_.tls.certificate);
+  expect_served("the next certificate without its key");
+  Replace(folder_.Write("nonsense", "nonsense"), security_.tls.client_ca);
+  expect_served("no authority");
+  std::filesystem::remove(security_.tls.key);
+  expect_served("no key");
+  Replace(after.certificate(), security_.tls.client_ca);
+  expect_served("still no key");
+  // All of them right: these are in use from now on.
+  Replace(next.key, security_.tls.key);
+  ASSERT_TRUE(harness_->log().WaitFor("certificates read again"));
+  EXPECT_FALSE(Call(*harness_, as_alice).ok());
+  const CertificateFiles bob = after.Issue("bob", "bob");
+  EXPECT_EQ(Call(*harness_, {.tls_ca = after.certificate(), .tls_certificate = bob.certificate, .tls_key = bob.key}),
+            absl::OkStatus());
+}
+
 TEST_F(SecurityTest, SaysInTheLogWhichFilesDoNotFit) {
   const Authority authority(folder_, "authority");
   UseTls(authority);
