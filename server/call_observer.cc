@@ -21,6 +21,7 @@ using grpc::experimental::InterceptionHookPoints;
 
 constexpr char kRequestId[] = "x-request-id";
 constexpr size_t kMaxRequestId = 64;
+constexpr std::string_view kHealth = "/grpc.health.v1.Health/";
 constexpr std::string_view kChannelz = "grpc.channelz.v1.Channelz";
 // https://www.w3.org/TR/trace-context/: version-trace-parent-flags, in lower-case hexadecimal digits.
 constexpr std::string_view kTraceparentShape = "00-00000000000000000000000000000000-0000000000000000-00";
@@ -105,7 +106,12 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
  private:
   // gRPC ends a call whose only request is no message with UNIMPLEMENTED, without asking its handler, who would have asked who calls.
   // So does channelz, where it is not served.
+  //
+  // gRPC's own health service says UNKNOWN, and in no other case, when the client of a Watch is gone.
   grpc::Status ServersStatus(const grpc::Status& status) const {
+    if (status.error_code() == grpc::StatusCode::UNKNOWN && path_.starts_with(kHealth)) {
+      return {grpc::StatusCode::CANCELLED, "the client cancelled the call or is gone"};
+    }
     if (status.error_code() != grpc::StatusCode::UNIMPLEMENTED || !method_.is_known || method_.service == kChannelz) {
       return status;
     }

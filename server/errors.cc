@@ -9,11 +9,15 @@
 #include "absl/types/optional.h"
 #include "core/mesh_parameters.h"
 #include "google/rpc/error_details.pb.h"
+#include "server/log_fields.h"
 
 namespace wellspace::server {
 namespace {
 
 constexpr int kRetrySeconds = 1;
+
+// A message may repeat what the client sent. It goes out three times, as trailing metadata, of which clients take 8 KiB.
+constexpr size_t kMaxErrorMessageBytes = 1024;
 
 // Marks the status of a MEMORY_LIMIT; its value is kMayRetry or empty.
 constexpr char kMemoryLimitPayload[] = "wellspace.v1/MEMORY_LIMIT";
@@ -72,8 +76,9 @@ bool PassesWithTime(v1::ErrorReason reason) {
          reason == v1::ERROR_REASON_QUOTA_EXCEEDED || reason == v1::ERROR_REASON_SERVER_STOPPING;
 }
 
-grpc::Status Make(grpc::StatusCode code, v1::ErrorReason reason, const std::string& message, const std::string& field,
-                  bool may_retry) {
+grpc::Status Make(grpc::StatusCode code, v1::ErrorReason reason, const std::string& whole_message,
+                  const std::string& field, bool may_retry) {
+  const std::string message = CutText(whole_message, kMaxErrorMessageBytes);
   google::rpc::Status details;
   details.set_code(code);
   details.set_message(message);

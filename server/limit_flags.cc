@@ -3,15 +3,34 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <sstream>
+#include <string_view>
 #include <vector>
 
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
 
 namespace wellspace::server {
 namespace {
 
 constexpr uint64_t kMany = std::numeric_limits<int64_t>::max();
+
+// A file that is no text must not pass for a short one: CLI11 reads nothing behind a zero byte, and takes lines that end with
+// a carriage return alone for one line, which is a comment if the first is one.
+void CheckText(std::string_view text) {
+  size_t line = 1;
+  for (size_t i = 0; i < text.size(); ++i) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    const bool ends_line = byte == '\r' && i + 1 < text.size() && text[i + 1] == '\n';
+    if ((byte < ' ' && byte != '\n' && byte != '\t' && !ends_line) || byte == 0x7f) {
+      throw CLI::ConfigError(absl::StrFormat(
+          "--config: line %d has the byte 0x%02x; expected TOML, text in UTF-8 whose lines end with a line feed", line,
+          byte));
+    }
+    line += byte == '\n' ? 1 : 0;
+  }
+}
 
 // CLI11's reader of TOML, with errors that name the key: values are checked after the file is read, where CLI11 knows only the option.
 class TomlFile final : public CLI::ConfigBase {
@@ -19,7 +38,14 @@ class TomlFile final : public CLI::ConfigBase {
   explicit TomlFile(const CLI::App& app) : app_(app) {}
 
   std::vector<CLI::ConfigItem> from_config(std::istream& input) const override {
-    std::vector<CLI::ConfigItem> keys = ConfigBase::from_config(input);
+    std::ostringstream content;
+    content << input.rdbuf();
+    if (input.bad()) {
+      throw CLI::ConfigError("--config: the file cannot be read");
+    }
+    CheckText(content.str());
+    std::istringstream text(content.str());
+    std::vector<CLI::ConfigItem> keys = ConfigBase::from_config(text);
     for (const CLI::ConfigItem& item : keys) {
       const CLI::Option* option = item.parents.empty() ? app_.get_option_no_throw("--" + item.name) : nullptr;
       if (option == nullptr || !option->get_configurable()) {
@@ -87,7 +113,9 @@ void DeclareLimits(CLI::App& app, ServiceOptions& service) {
            "Jobs of one tenant that run or wait; more are refused");
   app.add_option_function<std::string>(
          "--max-memory", [&service](const std::string& text) { service.max_memory_bytes = ParseMemory(text); },
-         "Most resident memory of this process, as 512MB or 12GB; work that needs more is refused; 0: no limit")
+         "Most resident memory of this process, as 512MB or 12GB; work that needs more is refused; 0: no limit; "
+         "default: "
+         "three quarters of what the machine or the control group has")
       ->type_name("SIZE")
       ->default_str(absl::StrCat(service.max_memory_bytes));
   AddCount(app, "--max-points", service.max_points, 1, kMany, "Most points of a call or a session");

@@ -1,12 +1,15 @@
 #include "server/log.h"
 
+#include <algorithm>
+#include <mutex>
 #include <optional>
 #include <string_view>
+#include <utility>
 
 #include "server/log_fields.h"
-#include "spdlog/async_logger.h"
+#include "spdlog/details/log_msg.h"
 #include "spdlog/pattern_formatter.h"
-#include "spdlog/sinks/stdout_sinks.h"
+#include "spdlog/sinks/base_sink.h"
 
 namespace wellspace::server {
 namespace {
@@ -31,6 +34,23 @@ class JsonFormatter final : public spdlog::formatter {
                                   ""};
 };
 
+class WriterSink final : public spdlog::sinks::base_sink<std::mutex> {
+ public:
+  explicit WriterSink(std::shared_ptr<LogWriter> writer) : writer_(std::move(writer)) {}
+
+ private:
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    spdlog::details::log_msg bounded = message;
+    bounded.payload = spdlog::string_view_t(message.payload.data(), std::min(message.payload.size(), kMaxMessageBytes));
+    spdlog::memory_buf_t line;
+    formatter_->format(bounded, line);
+    writer_->Write(std::string(line.data(), line.size()));
+  }
+  void flush_() override { writer_->Flush(); }
+
+  const std::shared_ptr<LogWriter> writer_;
+};
+
 }  // namespace
 
 std::unique_ptr<spdlog::formatter> MakeLogFormatter(LogFormat format) {
@@ -41,11 +61,9 @@ std::unique_ptr<spdlog::formatter> MakeLogFormatter(LogFormat format) {
 }
 
 std::shared_ptr<spdlog::logger> MakeLogger(const std::string& level, LogFormat format,
-                                           const std::shared_ptr<spdlog::details::thread_pool>& writer) {
-  auto log = std::make_shared<spdlog::async_logger>("wellspaced", std::make_shared<spdlog::sinks::stderr_sink_mt>(),
-                                                    writer, spdlog::async_overflow_policy::overrun_oldest);
+                                           std::shared_ptr<LogWriter> writer) {
+  auto log = std::make_shared<spdlog::logger>("wellspaced", std::make_shared<WriterSink>(std::move(writer)));
   log->set_level(spdlog::level::from_str(level));
-  log->flush_on(spdlog::level::info);
   log->set_formatter(MakeLogFormatter(format));
   return log;
 }

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "spdlog/async.h"
+#include "server/log_writer.h"
 #include "spdlog/formatter.h"
 #include "spdlog/logger.h"
 
@@ -19,11 +19,13 @@ enum class LogFormat {
 // One line for each message. As JSON a message of LogFields gives its fields, any other the member "message".
 std::unique_ptr<spdlog::formatter> MakeLogFormatter(LogFormat format);
 
-// A logger that never holds up its caller: `writer` writes to standard error, and when it cannot follow, the oldest lines are lost.
+// A logger that never holds up its caller: `writer` writes, and when it cannot follow, the oldest lines are lost. Of a
+// message of more than kMaxMessageBytes the rest is lost.
 //
-// REQUIRES:   `level` is one of debug, info, warning, error and off; `writer` outlives the logger.
+// REQUIRES:   `level` is one of debug, info, warning, error and off.
+inline constexpr size_t kMaxMessageBytes = 16384;
 std::shared_ptr<spdlog::logger> MakeLogger(const std::string& level, LogFormat format,
-                                           const std::shared_ptr<spdlog::details::thread_pool>& writer);
+                                           std::shared_ptr<LogWriter> writer);
 
 }  // namespace wellspace::server
 

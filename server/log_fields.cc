@@ -61,7 +61,23 @@ size_t JsonStringLength(std::string_view text) {
   return 0;
 }
 
+// The bytes with which a character of UTF-8 goes on.
+bool IsContinuation(char byte) { return (static_cast<unsigned char>(byte) & 0xc0) == 0x80; }
+
 }  // namespace
+
+std::string CutText(std::string_view text, size_t most) {
+  constexpr std::string_view kMark = "\xe2\x80\xa6";  // …
+  constexpr size_t kMaxCharacterBytes = 4;
+  if (text.size() <= most) {
+    return std::string(text);
+  }
+  size_t end = most - kMark.size();
+  for (size_t i = 1; i < kMaxCharacterBytes && end > 0 && IsContinuation(text[end]); ++i) {
+    --end;
+  }
+  return std::string(text.substr(0, end)).append(kMark);
+}
 
 std::string JsonString(std::string_view text) {
   return nlohmann::json(text).dump(-1, ' ', /*ensure_ascii=*/false, nlohmann::json::error_handler_t::replace);
@@ -75,7 +91,8 @@ void LogFields::AddRaw(std::string_view key, std::string_view value) {
 }
 
 LogFields& LogFields::Add(std::string_view key, std::string_view value) {
-  AddRaw(key, IsBare(value) && !IsNumber(value) ? std::string(value) : JsonString(value));
+  const std::string text = CutText(value, kMaxValueBytes);
+  AddRaw(key, IsBare(text) && !IsNumber(text) ? text : JsonString(text));
   return *this;
 }
 

@@ -7,6 +7,7 @@
 #include <malloc.h>
 #include <pthread.h>
 #include <signal.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <iostream>
@@ -16,19 +17,21 @@
 
 #include "CLI/CLI.hpp"
 #include "absl/time/time.h"
+#include "server/grpc_log.h"
 #include "server/limit_flags.h"
 #include "server/log.h"
+#include "server/log_fields.h"
+#include "server/log_writer.h"
 #include "server/options.h"
+#include "server/resources.h"
 #include "server/server.h"
 #include "server/tokens.h"
 #include "server/version.h"
-#include "spdlog/async.h"
 
 namespace wellspace::server {
 namespace {
 
 constexpr int kExitWrongOptions = 2;
-constexpr int kLogQueue = 8192;  // lines
 // Blocks from this size on, larger than messages, go back to the system when they are freed: --max-memory counts what is resident.
 constexpr int kReturnedBytes = 2 * kMaxResponseBytes;
 constexpr absl::Duration kMaxGrace = absl::Hours(24);
@@ -85,6 +88,34 @@ void Declare(CLI::App& app, Flags& flags) {
       ->required();
 }
 
+// What a server is that has just started, and its limits, given or not.
+LogFields StartOf(const Flags& flags, const Server& server) {
+  const ServiceOptions& service = flags.server.service;
+  const ConnectionOptions& connections = flags.server.connections;
+  const SecurityOptions& security = flags.server.security;
+  const auto count = [](auto number) { return static_cast<uint64_t>(number); };
+  LogFields fields;
+  fields.Add("event", "started").Add("version", kVersion).Add("listen", server.address());
+  fields.Add("tls", security.tls.enabled() ? "yes" : "no");
+  fields.Add("client_certificates", security.tls.client_ca.empty() ? "no" : "yes");
+  fields.Add("tokens", security.token_file.empty() ? "no" : "yes");
+  fields.Add("workers", count(service.workers)).Add("max_threads", count(service.max_threads));
+  fields.Add("max_queued", count(service.max_queued_jobs));
+  fields.Add("max_jobs_per_tenant", count(service.max_jobs_per_tenant));
+  fields.Add("max_memory_bytes", service.max_memory_bytes);
+  fields.Add("max_points", service.max_points).Add("max_vertices", service.max_vertices);
+  fields.Add("max_points_per_tenant", service.max_points_per_tenant);
+  fields.Add("max_sessions", service.max_sessions).Add("max_sessions_per_tenant", service.max_sessions_per_tenant);
+  fields.Add("default_ttl_seconds", absl::ToDoubleSeconds(service.default_ttl));
+  fields.Add("max_ttl_seconds", absl::ToDoubleSeconds(service.max_ttl));
+  fields.Add("stall_limit_seconds", absl::ToDoubleSeconds(service.stall_limit));
+  fields.Add("upload_stall_limit_seconds", absl::ToDoubleSeconds(service.upload_stall_limit));
+  fields.Add("handshake_timeout_seconds", absl::ToDoubleSeconds(connections.handshake_timeout));
+  fields.Add("max_connection_idle_seconds", absl::ToDoubleSeconds(connections.max_idle));
+  fields.Add("max_streams", count(connections.max_streams));
+  return fields.Add("grace_seconds", absl::ToDoubleSeconds(flags.grace));
+}
+
 int HashToken(const std::string& tenant) {
   std::string token;
   std::getline(std::cin, token);
@@ -127,9 +158,11 @@ class StopSignals {
 int Main(int argc, char** argv) {
   Flags flags;
   flags.server.listen = "127.0.0.1:7233";
-  flags.server.service.workers = std::max(1u, std::thread::hardware_concurrency());
+  const Resources resources = ReadResources();
+  flags.server.service.workers = resources.processors;
   flags.server.service.small_workers = 1;
-  flags.server.service.max_threads = flags.server.service.workers;
+  flags.server.service.max_threads = resources.processors;
+  flags.server.service.max_memory_bytes = DefaultMaxMemory(resources);
   CLI::App app("Makes well-spaced simplicial meshes from clouds of points, as a gRPC service.", "wellspaced");
   Declare(app, flags);
   try {
@@ -144,14 +177,16 @@ int Main(int argc, char** argv) {
   mallopt(M_MMAP_THRESHOLD, kReturnedBytes);
   StopSignals signals;
   signal(SIGPIPE, SIG_IGN);  // standard output or error may be a pipe whose reader has gone
-  const auto writer = std::make_shared<spdlog::details::thread_pool>(kLogQueue, 1);
   const std::shared_ptr<spdlog::logger> log =
-      MakeLogger(flags.log_level, flags.log_format == "json" ? LogFormat::kJson : LogFormat::kText, writer);
+      MakeLogger(flags.log_level, flags.log_format == "json" ? LogFormat::kJson : LogFormat::kText,
+                 std::make_shared<LogWriter>(STDERR_FILENO));
+  const GrpcLog grpc_log(log);
   absl::StatusOr<std::unique_ptr<Server>> server = Server::Start(flags.server, log);
   if (!server.ok()) {
     std::cerr << "wellspaced: " << server.status().message() << std::endl;
     return 1;
   }
+  log->info("{}", StartOf(flags, **server).text());
   std::cout << "listening on " << (*server)->address() << std::endl;
   const Observability& observability = (*server)->observability();
   if (!observability.metrics_address().empty()) {

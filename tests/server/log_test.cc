@@ -1,20 +1,29 @@
 // Lines of the log: text and JSON of the same fields.
 #include "server/log.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <memory>
 #include <optional>
 #include <random>
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "nlohmann/json.hpp"
 #include "server/log_fields.h"
+#include "server/log_writer.h"
 
 namespace wellspace::server {
 namespace {
 
 using ::testing::ContainsRegex;
+using ::testing::EndsWith;
+using ::testing::SizeIs;
 
 TEST(LogFields, WritesPlainValuesBareAndOthersAsJsonStrings) {
   LogFields fields;
@@ -57,6 +66,25 @@ TEST(LogFields, BytesThatAreNoTextAreReplaced) {
   EXPECT_EQ(LogFields().Add("a", "x\xff").text(), "a=\"x\xef\xbf\xbd\"");
 }
 
+TEST(LogFields, LongValuesAreCut) {
+  const size_t most = LogFields::kMaxValueBytes;
+  EXPECT_EQ(LogFields().Add("a", std::string(most, 'x')).text(), "a=" + std::string(most, 'x'));
+  const std::string cut = LogFields().Add("a", std::string(4'000'000, 'x')).text();
+  EXPECT_EQ(cut, absl::StrCat("a=\"", std::string(most - 3, 'x'), "\xe2\x80\xa6\""));
+  // Characters stay whole.
+  for (size_t before = 0; before < 8; ++before) {
+    std::string value(before, 'x');
+    while (value.size() < 2 * most) {
+      value += "\xf0\x9f\x98\x80";
+    }
+    const std::string text = LogFields().Add("a", value).text();
+    EXPECT_EQ(text.find("\xef\xbf\xbd"), std::string::npos) << text;
+    EXPECT_LE(text.size(), most + std::string("a=\"\"").size());
+  }
+  // Nor is a number cut to another one.
+  EXPECT_THAT(LogFields().Add("a", std::string(300, '1')).text(), EndsWith("\xe2\x80\xa6\""));
+}
+
 TEST(LogFields, OtherLinesAreNotTakenForFields) {
   for (const char* line : {"", "stopped", "a", "=b", "A=b", "a=", "a= b=c", "a=b  c=d", "a=b ", "a=\"b", "a=\"b\"c",
                            "a=b=c", "call=1 chunk=2 made", "a=\\"}) {
@@ -87,6 +115,115 @@ TEST(LogFormat, JsonHasTheFieldsOrTheMessage) {
   const nlohmann::json message = nlohmann::json::parse(Format(LogFormat::kJson, "a \"quoted\"\nmessage"));
   EXPECT_EQ(message["message"], "a \"quoted\"\nmessage");
   EXPECT_EQ(message.size(), 3u);
+}
+
+// A pipe that nothing reads, and that is full.
+class FullPipe {
+ public:
+  FullPipe() {
+    EXPECT_EQ(pipe2(ends_, O_CLOEXEC), 0);
+    const int flags = fcntl(ends_[1], F_GETFL);
+    fcntl(ends_[1], F_SETFL, flags | O_NONBLOCK);
+    const std::string bytes(4096, 'f');
+    while (write(ends_[1], bytes.data(), bytes.size()) > 0) {
+      filled_ += bytes.size();
+    }
+    fcntl(ends_[1], F_SETFL, flags);
+  }
+  ~FullPipe() {
+    close(ends_[0]);
+    // The end for writing stays open, as standard error does: a thread may be left behind that waits for it.
+  }
+
+  int descriptor() const { return ends_[1]; }
+
+  // What comes behind what has filled it, as long as it has fewer than `lines` lines.
+  std::string Read(size_t lines) {
+    std::string text;
+    while (std::count(text.begin(), text.end(), '\n') < static_cast<std::ptrdiff_t>(lines)) {
+      char buffer[4096];
+      const ssize_t got = read(ends_[0], buffer, sizeof(buffer));
+      if (got <= 0) {
+        break;
+      }
+      text.append(buffer, static_cast<size_t>(got));
+      const size_t filler = std::min(filled_, text.size());
+      text.erase(0, filler);
+      filled_ -= filler;
+    }
+    return text;
+  }
+
+ private:
+  int ends_[2] = {-1, -1};
+  size_t filled_ = 0;
+};
+
+TEST(LogWriter, KeepsAsManyBytesAsItMayAndLosesTheOldestLines) {
+  constexpr size_t kMostBytes = 10'000;
+  FullPipe pipe;
+  LogWriter writer(pipe.descriptor(), kMostBytes);
+  constexpr size_t kLines = 1000;
+  for (size_t i = 0; i < kLines; ++i) {
+    writer.Write(absl::StrCat(std::string(100, 'x'), " ", i, "\n"));
+    EXPECT_LE(writer.WaitingBytes(), kMostBytes);
+  }
+  EXPECT_GT(writer.LostLines(), kLines - kMostBytes / 100 - 2);
+  const std::string text = pipe.Read(kLines - writer.LostLines());
+  EXPECT_THAT(text, EndsWith(absl::StrCat(" ", kLines - 1, "\n")));
+}
+
+TEST(LogWriter, ALineAboveTheBoundIsLost) {
+  FullPipe pipe;
+  LogWriter writer(pipe.descriptor(), 100);
+  writer.Write(std::string(1000, 'x'));
+  EXPECT_EQ(writer.WaitingBytes(), 0u);
+  EXPECT_EQ(writer.LostLines(), 1u);
+}
+
+TEST(LogWriter, EndsThoughNothingReads) {
+  FullPipe pipe;
+  const absl::Time begin = absl::Now();
+  {
+    LogWriter writer(pipe.descriptor());
+    for (int i = 0; i < 100; ++i) {
+      writer.Write(std::string(1000, 'x') + "\n");
+    }
+  }
+  EXPECT_LT(absl::Now() - begin, absl::Minutes(1));
+}
+
+TEST(LogWriter, WritesAllThatWaitsBeforeItEnds) {
+  int ends[2];
+  ASSERT_EQ(pipe2(ends, O_CLOEXEC), 0);
+  std::string expected;
+  {
+    LogWriter writer(ends[1]);
+    for (int i = 0; i < 100; ++i) {
+      const std::string line = absl::StrCat("line ", i, "\n");
+      writer.Write(line);
+      expected += line;
+    }
+  }
+  close(ends[1]);
+  std::string text(expected.size() + 1, '\0');
+  text.resize(static_cast<size_t>(read(ends[0], text.data(), text.size())));
+  close(ends[0]);
+  EXPECT_EQ(text, expected);
+}
+
+TEST(Logger, AMessageWithoutEndIsCut) {
+  int ends[2];
+  ASSERT_EQ(pipe2(ends, O_CLOEXEC), 0);
+  {
+    const auto log = MakeLogger("info", LogFormat::kJson, std::make_shared<LogWriter>(ends[1]));
+    log->info("{}", std::string(4'000'000, 'x'));
+  }
+  close(ends[1]);
+  std::string text(2 * kMaxMessageBytes, '\0');
+  text.resize(static_cast<size_t>(read(ends[0], text.data(), text.size())));
+  close(ends[0]);
+  EXPECT_THAT(nlohmann::json::parse(text)["message"].get<std::string>(), SizeIs(kMaxMessageBytes));
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
 #include "gmock/gmock.h"
+#include "grpcpp/generic/generic_stub.h"
 #include "gtest/gtest.h"
 #include "prometheus/text_serializer.h"
 #include "tests/server/raw_call.h"
@@ -106,6 +107,39 @@ TEST(CallMetrics, ACancelledCallIsHandled) {
   metrics = Scrape(harness);
   EXPECT_EQ(ValueOf(metrics, "grpc_server_handled_total" + MeshPointsLabels("Canceled")), 1);
   EXPECT_EQ(ValueOf(metrics, "wellspace_jobs_running"), 0);
+}
+
+// A probe that watches and is stopped: no fault of the server, for whom an alert would ring.
+TEST(CallMetrics, ACancelledWatchOfHealthIsNoFault) {
+  ServiceHarness harness(FakeMesher, {}, Transport::kLoopback);
+  {
+    grpc::GenericStub stub(harness.channel());
+    grpc::ClientContext context;
+    grpc::CompletionQueue queue;
+    void* tag = nullptr;
+    bool ok = false;
+    const auto call = stub.PrepareCall(&context, "/grpc.health.v1.Health/Watch", &queue);
+    call->StartCall(nullptr);
+    ASSERT_TRUE(queue.Next(&tag, &ok) && ok);
+    call->WriteLast(BufferOf(HealthRequest("")), grpc::WriteOptions(), nullptr);
+    ASSERT_TRUE(queue.Next(&tag, &ok) && ok);
+    grpc::ByteBuffer response;
+    call->Read(&response, nullptr);
+    ASSERT_TRUE(queue.Next(&tag, &ok) && ok);
+    context.TryCancel();
+    grpc::Status status;
+    call->Finish(&status, nullptr);
+    ASSERT_TRUE(queue.Next(&tag, &ok));
+    EXPECT_EQ(status.error_code(), grpc::StatusCode::CANCELLED);
+  }
+  EXPECT_TRUE(harness.log().WaitFor("service=grpc.health.v1.Health method=Watch code=CANCELLED"));
+  const std::string metrics = Scrape(harness);
+  const auto handled = [&metrics](const std::string& code) {
+    return ValueOf(metrics,
+                   "grpc_server_handled_total" + Labels("server_stream", "grpc.health.v1.Health", "Watch", code));
+  };
+  EXPECT_EQ(handled("Canceled"), 1);
+  EXPECT_EQ(handled("Unknown"), 0);
 }
 
 TEST(CallMetrics, WhatClientsSendMakesNoSeries) {

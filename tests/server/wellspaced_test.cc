@@ -8,6 +8,7 @@
 #include "client/client.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include "tests/formats/temporary_folder.h"
 #include "tests/server/daemon.h"
 #include "tests/server/patience.h"
 #include "tests/server/subprocess.h"
@@ -97,6 +98,35 @@ TEST(Wellspaced, HonoursItsLimits) {
   EXPECT_EQ(info->max_vertices, 1000u);
   const std::vector<double> points(9);
   EXPECT_EQ(client.MeshPoints({}, points).status().code(), absl::StatusCode::kResourceExhausted);
+}
+
+// A file that is cut short by one of its bytes would start a server without what it says, tokens among it.
+TEST(Wellspaced, RefusesAConfigurationThatIsNoText) {
+  const TemporaryFolder folder;
+  const std::string key = "max-points = 2\n";
+  const std::string comment = "# of wellspaced";
+  for (const std::string& content :
+       {std::string(100, '\0'), std::string(1, '\0') + key, key + std::string(1, '\0') + "\n" + key,
+        comment + std::string(1, '\0') + "\n" + key, std::string("m\0a\0x\0\n\0", 8), comment + "\r" + key,
+        comment + "\r\r\n" + key, comment + "\x1a\n" + key, comment + "\f" + key, comment + "\x7f\n" + key,
+        key + "\r"}) {
+    const std::string path = folder.Write("wellspaced.toml", content);
+    Subprocess daemon("wellspaced", {"--config", path, "--listen", "127.0.0.1:0"}, folder.Path("errors"));
+    EXPECT_EQ(daemon.ReadLine(), "");
+    EXPECT_EQ(daemon.Wait(), 2);
+    EXPECT_THAT(folder.Read("errors"), HasSubstr("expected TOML, text in UTF-8"));
+    EXPECT_THAT(folder.Read("errors"), HasSubstr("--config: line "));
+  }
+  EXPECT_EQ(Subprocess("wellspaced", {"--config", folder.Path(""), "--listen", "127.0.0.1:0"}).Wait(), 2);
+}
+
+TEST(Wellspaced, TakesAConfigurationWithAnyEndsOfLinesAndLetters) {
+  const TemporaryFolder folder;
+  Daemon daemon({"--config", folder.Write("wellspaced.toml",
+                                          "# Gr\xc3\xb6\xc3\x9f"
+                                          "en\r\n\tmax-points = 2\r\n\r\n")});
+  EXPECT_EQ(daemon.Client().GetServerInfo()->max_points, 2u);
+  daemon.Stop();
 }
 
 TEST(Wellspaced, RefusesRemoteListenersAndNonsense) {
