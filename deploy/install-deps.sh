@@ -20,7 +20,7 @@ declare -A packages=(
   [bench]="libtet1.5-dev libcgal-dev voro++-dev libbenchmark-dev python3 python3-matplotlib"
   [container]="debootstrap podman buildah"
   [monitoring]="prometheus"
-  [runtime]="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libtbb12 libprometheus-cpp-pull1.0 libcairo2 zlib1g
+  [runtime]="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libtbb12 libprometheus-cpp-core1.0 libcairo2 zlib1g
              libminizip1 libsz2"
 )
 packages[dev]="${packages[build]} ${packages[test]} ${packages[lint]} ${packages[tidy]} ${packages[fuzz]}"

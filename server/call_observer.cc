@@ -11,6 +11,7 @@
 #include "absl/strings/str_format.h"
 #include "absl/time/time.h"
 #include "server/clock.h"
+#include "server/connections.h"
 #include "server/errors.h"
 #include "server/log_fields.h"
 
@@ -66,7 +67,9 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
         method_(observer.metrics_.Of(info.method())),
         path_(info.method()),
         context_(info.server_context()),
-        start_(SinceBoot()) {
+        start_(SinceBoot()),
+        began_(Connections::Clock::now()) {
+    FindPeer();
     // gRPC reads metadata and certificates into the context when they are first asked for, and not thread-safely: here, before
     // anything else knows of the call.
     tenant_ = observer_.tenant_of_(*context_);
@@ -79,12 +82,27 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
     observer_.Add(context_, this);
   }
 
-  ~Interceptor() override { observer_.Remove(context_); }
+  ~Interceptor() override {
+    if (connection_ != nullptr) {
+      const bool is_short = Connections::Clock::now() - began_ < Connections::kWindow;
+      observer_.connections_.CallEnded(*connection_, is_short && (is_cancelled_ || !has_message_));
+    }
+    observer_.Remove(context_);
+  }
 
   void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
+    if (peer_.empty()) {
+      FindPeer();
+    }
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::POST_RECV_MESSAGE) &&
         methods->GetRecvMessage() != nullptr) {
       method_.received->Increment();
+      has_message_ = true;
+    }
+    // A synchronous call, as reflection's, would wait here.
+    if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::POST_RECV_CLOSE) &&
+        dynamic_cast<grpc::CallbackServerContext*>(context_) != nullptr) {
+      is_cancelled_ = context_->IsCancelled();
     }
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::PRE_SEND_MESSAGE)) {
       method_.sent->Increment();
@@ -121,6 +139,13 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
                            absl::StrCat("the request is not one message of ", method_.service, ".", method_.name));
   }
 
+  // A synchronous call has a peer once its metadata have come, which is the first event that is intercepted; any other from
+  // the beginning.
+  void FindPeer() {
+    peer_ = context_->peer();
+    connection_ = observer_.connections_.CallBegan(peer_);
+  }
+
   void End(const grpc::Status& status) {
     const double seconds = absl::ToDoubleSeconds(SinceBoot() - start_);
     method_.Handled(status.error_code(), seconds);
@@ -132,7 +157,7 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
     const size_t slash = std::min(path.find('/'), path.size());
     LogFields fields;
     fields.Add("event", "call").Add("request_id", request_id_);
-    fields.Add("tenant", tenant_).Add("peer", context_->peer());
+    fields.Add("tenant", tenant_).Add("peer", peer_);
     fields.Add("service", path.substr(0, slash)).Add("method", path.substr(std::min(slash + 1, path.size())));
     fields.Add("code", absl::StatusCodeToString(static_cast<absl::StatusCode>(status.error_code())));
     fields.Add("seconds", seconds);
@@ -154,6 +179,11 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
   const std::string path_;  // "/service/method"
   grpc::ServerContextBase* const context_;
   const absl::Duration start_;  // since boot
+  const Connections::Clock::time_point began_;
+  std::string peer_;
+  std::shared_ptr<Connections::Connection> connection_;  // null: not from the network
+  std::atomic<bool> has_message_ = false;
+  std::atomic<bool> is_cancelled_ = false;
   std::string tenant_;
   std::string request_id_;
   std::string traceparent_;  // empty: none
@@ -173,8 +203,13 @@ class CallObserver::Factory final : public grpc::experimental::ServerInterceptor
   CallObserver& observer_;
 };
 
-CallObserver::CallObserver(spdlog::logger& log, const CallMetrics& metrics, TenantOf tenant_of)
-    : log_(log), metrics_(metrics), tenant_of_(std::move(tenant_of)), request_id_prefix_(RandomHex()) {}
+CallObserver::CallObserver(spdlog::logger& log, const CallMetrics& metrics, Connections& connections,
+                           TenantOf tenant_of)
+    : log_(log),
+      metrics_(metrics),
+      connections_(connections),
+      tenant_of_(std::move(tenant_of)),
+      request_id_prefix_(RandomHex()) {}
 
 CallObserver::~CallObserver() = default;
 

@@ -18,6 +18,8 @@
 
 namespace wellspace::server {
 
+class Connections;
+
 // Watches all calls of a server, whatever the service, from an interceptor.
 //
 // A call's line in the log has event=call, request_id (what the client sent as metadata `x-request-id`, if it is at most 64 letters,
@@ -31,8 +33,8 @@ class CallObserver {
   // Who calls, "" if nobody knows. Neither waits nor does I/O.
   using TenantOf = std::function<std::string(const grpc::ServerContextBase&)>;
 
-  // REQUIRES:   `log` and `metrics` outlive this, and this the server.
-  CallObserver(spdlog::logger& log, const CallMetrics& metrics, TenantOf tenant_of);
+  // `connections` are told of each call. REQUIRES: `log`, `metrics` and `connections` outlive this, and this the server.
+  CallObserver(spdlog::logger& log, const CallMetrics& metrics, Connections& connections, TenantOf tenant_of);
   ~CallObserver();
 
   // To be given to one server.
@@ -54,6 +56,7 @@ class CallObserver {
 
   spdlog::logger& log_;
   const CallMetrics& metrics_;
+  Connections& connections_;
   const TenantOf tenant_of_;
   const std::string request_id_prefix_;
   std::atomic<uint64_t> next_request_{1};

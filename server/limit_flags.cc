@@ -147,7 +147,9 @@ void DeclareConnections(CLI::App& app, ConnectionOptions& connections) {
              "How long a connection may take before it speaks HTTP/2, TLS included");
   AddSeconds(app, "--max-connection-idle", connections.max_idle, absl::Seconds(1), absl::Hours(24 * 14),
              "How long a connection is kept without any call");
-  AddCount(app, "--max-streams", connections.max_streams, 1, 1'000'000, "Calls at once on one connection");
+  AddCount(app, "--max-streams", connections.calls.max_streams, 1, 1'000'000, "Calls at once on one connection");
+  AddCount(app, "--max-calls", connections.calls.max_calls, 1, 10'000'000,
+           "Calls at once on all connections; above it the connection with the most is closed");
 }
 
 void DeclareConfigFile(CLI::App& app) {

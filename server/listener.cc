@@ -1,7 +1,6 @@
 #include "server/listener.h"
 
 #include <errno.h>
-#include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
@@ -12,12 +11,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <limits>
-#include <optional>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "absl/time/clock.h"
+#include "core/base/status_macros.h"
+#include "server/listening_sockets.h"
 
 namespace wellspace::server {
 namespace {
@@ -25,67 +26,15 @@ namespace {
 // Before another attempt at what failed for want of descriptors or memory.
 constexpr int kPauseMs = 100;
 
+// While calls of connections that were shut are worked off, how often it is looked whether they are, and how long nothing is
+// accepted at most.
+constexpr int kWaitMs = 10;
+constexpr std::chrono::milliseconds kMaxWait(500);
+
+// How often connections are looked at whose peers may not read.
+constexpr int kLookMs = 5000;
+
 constexpr absl::Duration kLogInterval = absl::Seconds(10);
-
-struct FreeAddresses {
-  void operator()(addrinfo* list) const { freeaddrinfo(list); }
-};
-using Addresses = std::unique_ptr<addrinfo, FreeAddresses>;
-
-// The addresses of `host`, with `port`.
-absl::StatusOr<Addresses> Resolve(const std::string& host, uint16_t port) {
-  addrinfo hints = {};
-  hints.ai_flags = AI_PASSIVE;
-  hints.ai_socktype = SOCK_STREAM;
-  addrinfo* list = nullptr;
-  if (const int error = getaddrinfo(host.c_str(), std::to_string(port).c_str(), &hints, &list); error != 0) {
-    return absl::UnavailableError(gai_strerror(error));
-  }
-  return Addresses(list);
-}
-
-void SetOption(int socket, int level, int option, int value) {
-  setsockopt(socket, level, option, &value, sizeof(value));
-}
-
-uint16_t PortOf(const sockaddr_storage& address) {
-  return ntohs(address.ss_family == AF_INET6 ? reinterpret_cast<const sockaddr_in6&>(address).sin6_port
-                                             : reinterpret_cast<const sockaddr_in&>(address).sin_port);
-}
-
-void SetPort(sockaddr* address, uint16_t port) {
-  (address->sa_family == AF_INET6 ? reinterpret_cast<sockaddr_in6*>(address)->sin6_port
-                                  : reinterpret_cast<sockaddr_in*>(address)->sin_port) = htons(port);
-}
-
-// A socket that listens at `address`; without, errno says why.
-std::optional<FileDescriptor> ListenAt(const addrinfo& address) {
-  FileDescriptor socket(::socket(address.ai_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, address.ai_protocol));
-  if (socket.get() < 0) {
-    return std::nullopt;
-  }
-  SetOption(socket.get(), SOL_SOCKET, SO_REUSEADDR, 1);
-  if (address.ai_family == AF_INET6) {
-    SetOption(socket.get(), IPPROTO_IPV6, IPV6_V6ONLY, 0);
-  }
-  if (bind(socket.get(), address.ai_addr, address.ai_addrlen) != 0 || listen(socket.get(), SOMAXCONN) != 0) {
-    return std::nullopt;
-  }
-  return socket;
-}
-
-// The port at which a socket listens.
-uint16_t PortOf(const FileDescriptor& socket) {
-  sockaddr_storage address = {};
-  socklen_t size = sizeof(address);
-  getsockname(socket.get(), reinterpret_cast<sockaddr*>(&address), &size);
-  return PortOf(address);
-}
-
-// A machine without IPv6, say, has names for its addresses all the same.
-bool IsOfAnotherMachine(int error) {
-  return error == EADDRNOTAVAIL || error == EAFNOSUPPORT || error == EPROTONOSUPPORT;
-}
 
 // The first descriptor that is not for connections any more.
 int DescriptorLimit() {
@@ -117,46 +66,16 @@ bool IsOfOneConnection(int error) {
 
 }  // namespace
 
-FileDescriptor& FileDescriptor::operator=(FileDescriptor&& other) noexcept {
-  std::swap(fd_, other.fd_);
-  return *this;
-}
-
-FileDescriptor::~FileDescriptor() {
-  if (fd_ >= 0) {
-    close(fd_);
-  }
-}
-
-int FileDescriptor::Release() { return std::exchange(fd_, -1); }
-
 absl::StatusOr<std::unique_ptr<Listener>> Listener::Open(const ListenAddress& address,
                                                          std::shared_ptr<spdlog::logger> log) {
-  const auto error = [&address](const std::string& why) {
-    return absl::UnavailableError(absl::StrCat("cannot listen on ", address.ToString(), ": ", why,
-                                               "; is the port in use, or the address not of this machine?"));
-  };
-  const absl::StatusOr<Addresses> addresses = Resolve(address.host, address.port);
-  if (!addresses.ok()) {
-    return error(std::string(addresses.status().message()));
-  }
-  std::vector<FileDescriptor> sockets;
-  uint16_t port = address.port;
-  for (const addrinfo* one = addresses->get(); one != nullptr; one = one->ai_next) {
-    SetPort(one->ai_addr, port);
-    std::optional<FileDescriptor> socket = ListenAt(*one);
-    if (socket.has_value()) {
-      port = PortOf(*socket);
-      sockets.push_back(*std::move(socket));
-    } else if (!IsOfAnotherMachine(errno) || (one->ai_next == nullptr && sockets.empty())) {
-      return error(strerror(errno));
-    }
-  }
-  return std::unique_ptr<Listener>(new Listener(std::move(sockets), port, std::move(log)));
+  WELLSPACE_ASSIGN_OR_RETURN(ListeningSockets listening, ListenOn(address));
+  return std::unique_ptr<Listener>(new Listener(std::move(listening.sockets), listening.port, std::move(log)));
 }
 
-void Listener::Start(std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor) {
+void Listener::Start(std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor,
+                     Connections& connections) {
   acceptor_ = std::move(acceptor);
+  connections_ = &connections;
   stop_ = FileDescriptor(eventfd(0, EFD_CLOEXEC));
   thread_ = std::thread([this] { Run(); });
 }
@@ -174,13 +93,30 @@ void Listener::Run() {
   for (const FileDescriptor& socket : sockets_) {
     watched.push_back({.fd = socket.get(), .events = POLLIN, .revents = 0});
   }
+  watched.push_back({.fd = connections_->descriptor(), .events = POLLIN, .revents = 0});
   watched.push_back({.fd = stop_.get(), .events = POLLIN, .revents = 0});
+  const pollfd& some_closed = watched[sockets_.size()];
   pollfd& stop = watched.back();
+  Connections::Clock::time_point last_look = Connections::Clock::now();
+  Connections::Clock::time_point last_accept = last_look;
   while (true) {
-    poll(watched.data(), watched.size(), -1);
+    // Connections wait in the system's queue.
+    const bool waits = connections_->IsBusyWithTheShut() && Connections::Clock::now() < last_accept + kMaxWait;
+    for (size_t i = 0; i < sockets_.size(); ++i) {
+      watched[i].events = waits ? 0 : POLLIN;
+    }
+    poll(watched.data(), watched.size(), waits ? kWaitMs : connections_->Count() == 0 ? -1 : kLookMs);
+    if (some_closed.revents != 0) {
+      connections_->Sweep();
+    }
+    if (const auto now = Connections::Clock::now(); now - last_look >= std::chrono::milliseconds(kLookMs)) {
+      connections_->ShutUnread();
+      last_look = now;
+    }
     bool is_well = true;
     for (size_t i = 0; i < sockets_.size(); ++i) {
       if (watched[i].revents != 0) {
+        last_accept = Connections::Clock::now();
         is_well = AcceptAll(watched[i].fd) && is_well;
       }
     }
@@ -195,9 +131,11 @@ void Listener::Run() {
 
 bool Listener::AcceptAll(int socket) {
   while (true) {
-    FileDescriptor connection(accept4(socket, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+    sockaddr_storage peer = {};
+    socklen_t size = sizeof(peer);
+    FileDescriptor connection(accept4(socket, reinterpret_cast<sockaddr*>(&peer), &size, SOCK_NONBLOCK | SOCK_CLOEXEC));
     if (connection.get() >= 0) {
-      HandOver(socket, std::move(connection));
+      HandOver(socket, std::move(connection), peer);
     } else if (errno == EAGAIN || errno == EWOULDBLOCK) {
       return true;
     } else if (!IsOfOneConnection(errno)) {
@@ -207,15 +145,16 @@ bool Listener::AcceptAll(int socket) {
   }
 }
 
-void Listener::HandOver(int socket, FileDescriptor connection) {
+void Listener::HandOver(int socket, FileDescriptor connection, const sockaddr_storage& peer) {
   // Descriptors are given out from the lowest: this one says how many there are at least.
-  if (connection.get() >= DescriptorLimit()) {
+  if (connection.get() >= DescriptorLimit() || !connections_->Add(connection.get(), peer)) {
     LogTrouble(
         "a connection was closed at once: the file descriptors of this process are used up; raise their limit (ulimit "
         "-n)");
     return;
   }
-  SetOption(connection.get(), IPPROTO_TCP, TCP_NODELAY, 1);
+  const int on = 1;
+  setsockopt(connection.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
   grpc::experimental::ExternalConnectionAcceptor::NewConnectionParameters parameters;
   parameters.listener_fd = socket;
   parameters.fd = connection.Release();

@@ -12,32 +12,18 @@
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
 #include "grpcpp/server_builder.h"
+#include "server/connections.h"
+#include "server/file_descriptor.h"
 #include "server/listen_address.h"
 #include "spdlog/logger.h"
 
 namespace wellspace::server {
 
-// A file descriptor, closed with its owner.
-class FileDescriptor {
- public:
-  explicit FileDescriptor(int fd = -1) : fd_(fd) {}
-  FileDescriptor(FileDescriptor&& other) noexcept : fd_(other.Release()) {}
-  FileDescriptor& operator=(FileDescriptor&& other) noexcept;
-  ~FileDescriptor();
-
-  int get() const { return fd_; }
-  // The descriptor, which is the caller's from now on.
-  int Release();
-
- private:
-  int fd_;
-};
-
 // Sockets that listen, and the thread that accepts their connections and hands them to gRPC.
 //
 // gRPC 1.51 would listen itself, and would never do so again after an accept that failed (CVE-2023-4785). Here a connection that comes
 // when there are hardly any file descriptors left is closed at once, so that some of them stay for files; accepting goes on
-// whatever fails.
+// whatever fails. What becomes of a connection is watched by Connections.
 //
 // Thread safety: thread-compatible.
 class Listener {
@@ -57,8 +43,8 @@ class Listener {
   // The port in use.
   uint16_t port() const { return port_; }
 
-  // From now on connections go to `acceptor`, whose server has been started. To be called once.
-  void Start(std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor);
+  // From now on connections go to `acceptor`, whose server has been started. To be called once. `connections` outlives this.
+  void Start(std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor, Connections& connections);
 
   // Listens no more. To be called before the server of the acceptor is shut down.
   void Stop();
@@ -70,7 +56,7 @@ class Listener {
   void Run();
   // Takes all connections that wait at `socket`. False when that failed for a reason that may go away.
   bool AcceptAll(int socket);
-  void HandOver(int socket, FileDescriptor connection);
+  void HandOver(int socket, FileDescriptor connection, const sockaddr_storage& peer);
   // At most one line every kLogInterval; the others are counted.
   void LogTrouble(const std::string& what);
 
@@ -78,7 +64,8 @@ class Listener {
   const uint16_t port_;
   std::vector<FileDescriptor> sockets_;
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor_;
-  FileDescriptor stop_;  // readable when the thread is to end
+  Connections* connections_ = nullptr;  // from Start on
+  FileDescriptor stop_;                 // readable when the thread is to end
   std::thread thread_;
   // The thread's.
   absl::Time last_log_ = absl::InfinitePast();

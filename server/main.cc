@@ -112,7 +112,8 @@ LogFields StartOf(const Flags& flags, const Server& server) {
   fields.Add("upload_stall_limit_seconds", absl::ToDoubleSeconds(service.upload_stall_limit));
   fields.Add("handshake_timeout_seconds", absl::ToDoubleSeconds(connections.handshake_timeout));
   fields.Add("max_connection_idle_seconds", absl::ToDoubleSeconds(connections.max_idle));
-  fields.Add("max_streams", count(connections.max_streams));
+  fields.Add("max_streams", count(connections.calls.max_streams));
+  fields.Add("max_calls", count(connections.calls.max_calls));
   return fields.Add("grace_seconds", absl::ToDoubleSeconds(flags.grace));
 }
 

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
+#include "server/connections.h"
 
 namespace wellspace::server {
 namespace {
@@ -17,12 +18,17 @@ std::vector<std::string> AndThoseOfGrpc(std::vector<std::string> services) {
 }  // namespace
 
 Observability::Observability(const std::vector<std::string>& services, std::shared_ptr<spdlog::logger> log,
-                             CallObserver::TenantOf tenant_of)
+                             Connections& connections, CallObserver::TenantOf tenant_of)
     : log_(std::move(log)),
       call_metrics_(metrics_.registry(), AndThoseOfGrpc(services)),
-      calls_(*log_, call_metrics_, std::move(tenant_of)) {
+      calls_(*log_, call_metrics_, connections, std::move(tenant_of)) {
   metrics_.AddGauge("wellspace_calls_in_flight", "Calls that have begun and not ended.",
                     [this] { return static_cast<double>(calls_.InFlight()); });
+  metrics_.AddGauge("wellspace_connections", "Connections that are open.",
+                    [&connections] { return static_cast<double>(connections.Count()); });
+  metrics_.AddCounter("wellspace_connections_shut_total",
+                      "Connections that were shut for what their peers did with them.",
+                      [&connections] { return static_cast<double>(connections.ShutCount()); });
   const auto add = [this](const char* name, const char* help, const std::atomic<uint64_t>& counter) {
     metrics_.AddCounter(name, help, [&counter] { return static_cast<double>(counter.load()); });
   };

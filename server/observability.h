@@ -18,6 +18,8 @@
 
 namespace wellspace::server {
 
+class Connections;
+
 // Each HOST:PORT, port 0 takes a free one; empty: not served.
 struct ObservabilityOptions {
   std::string metrics_listen;  // HTTP, GET /metrics
@@ -27,8 +29,8 @@ struct ObservabilityOptions {
 // Thread safety: thread-safe.
 class Observability {
  public:
-  // `services` are the full names of those that the server has. REQUIRES: this outlives the server.
-  Observability(const std::vector<std::string>& services, std::shared_ptr<spdlog::logger> log,
+  // `services` are the full names of those that the server has. REQUIRES: `connections` outlives this, and this the server.
+  Observability(const std::vector<std::string>& services, std::shared_ptr<spdlog::logger> log, Connections& connections,
                 CallObserver::TenantOf tenant_of);
 
   CallObserver& calls() { return calls_; }

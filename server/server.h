@@ -13,6 +13,7 @@
 #include "grpcpp/channel.h"
 #include "grpcpp/server.h"
 #include "server/backend.h"
+#include "server/connections.h"
 #include "server/listener.h"
 #include "server/meshing_service.h"
 #include "server/observability.h"
@@ -29,7 +30,7 @@ namespace wellspace::server {
 struct ConnectionOptions {
   absl::Duration handshake_timeout = absl::Seconds(20);  // from its acceptance to the first settings of HTTP/2
   absl::Duration max_idle = absl::Minutes(15);           // without any call
-  int max_streams = 1000;                                // calls at once, at least 1
+  ConnectionLimits calls;                                // at once
 };
 
 struct ServerOptions {
@@ -77,12 +78,13 @@ class Server {
   void Shutdown(absl::Duration grace);
 
  private:
-  Server(const ServiceOptions& options, std::unique_ptr<Security> security, std::shared_ptr<spdlog::logger> log,
+  Server(const ServerOptions& options, std::unique_ptr<Security> security, std::shared_ptr<spdlog::logger> log,
          Mesher mesher, Estimator estimator, MesherFactory create_mesher)
       : security_(std::move(security)),
-        observability_(ServiceNames(), log,
+        connections_(options.connections.calls, log),
+        observability_(ServiceNames(), log, connections_,
                        [this](const grpc::ServerContextBase& context) { return TenantOf(context); }),
-        backend_(options, security_->authenticator(), observability_, std::move(log), std::move(mesher),
+        backend_(options.service, security_->authenticator(), observability_, std::move(log), std::move(mesher),
                  std::move(estimator), std::move(create_mesher)) {}
 
   // Of the services that are ours.
@@ -92,6 +94,7 @@ class Server {
   std::string TenantOf(const grpc::ServerContextBase& context) const;
 
   const std::unique_ptr<const Security> security_;
+  Connections connections_;
   Observability observability_;
   Backend backend_;
   MeshingService meshing_{backend_.environment()};

@@ -1,4 +1,6 @@
 // What a server shows of itself: the line of each call, metrics, channelz.
+#include <unistd.h>
+
 #include <algorithm>
 #include <memory>
 #include <regex>
@@ -12,6 +14,7 @@
 #include "grpcpp/generic/generic_stub.h"
 #include "gtest/gtest.h"
 #include "prometheus/text_serializer.h"
+#include "tests/server/http_get.h"
 #include "tests/server/raw_call.h"
 #include "tests/server/service_harness.h"
 #include "tests/server/session_calls.h"
@@ -20,8 +23,10 @@ namespace wellspace::server {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::Not;
+using ::testing::StartsWith;
 
 constexpr char kSecret[] = "swordfish";
 
@@ -301,6 +306,61 @@ TEST(MetricsEndpoint, SaysWhyItCannotListen) {
   const absl::Status taken = start(address).status();
   EXPECT_EQ(taken.code(), absl::StatusCode::kUnavailable);
   EXPECT_THAT(taken.message(), HasSubstr(address));
+}
+
+// A server whose metrics are served at address().
+class MetricsEndpointTest : public ::testing::Test {
+ protected:
+  MetricsEndpointTest() {
+    ServerOptions options;
+    options.observability.metrics_listen = "127.0.0.1:0";
+    server_ = *Server::Start(options, std::make_shared<spdlog::logger>("none"));
+  }
+
+  std::string address() const { return server_->observability().metrics_address(); }
+
+ private:
+  std::unique_ptr<Server> server_;
+};
+
+TEST_F(MetricsEndpointTest, ServesMetricsAndNothingElse) {
+  const std::string response = HttpGet(address(), "/metrics");
+  EXPECT_THAT(response, StartsWith("HTTP/1.1 200 OK\r\n"));
+  EXPECT_THAT(response, HasSubstr("\r\nContent-Type: text/plain; version=0.0.4"));
+  EXPECT_THAT(response, HasSubstr("\nwellspace_calls_in_flight 0\n"));
+  EXPECT_THAT(HttpGet(address(), "/metrics?name=x"), StartsWith("HTTP/1.1 200 OK\r\n"));
+  EXPECT_THAT(HttpGet(address(), "/"), StartsWith("HTTP/1.1 404 "));
+  EXPECT_THAT(HttpGet(address(), "/metricsx"), StartsWith("HTTP/1.1 404 "));
+  const auto answer_to = [this](const std::string& bytes) {
+    const int socket = SendHttp(address(), bytes);
+    std::string answer = ReadHttp(socket);
+    close(socket);
+    return answer;
+  };
+  EXPECT_THAT(answer_to("POST /metrics HTTP/1.1\r\n\r\n"), StartsWith("HTTP/1.1 405 "));
+  EXPECT_THAT(answer_to("nonsense\r\n\r\n"), StartsWith("HTTP/1.1 400 "));
+  EXPECT_THAT(answer_to("GET /metrics\r\n\r\n"), StartsWith("HTTP/1.1 400 "));
+  EXPECT_THAT(answer_to(std::string(9000, 'x')), StartsWith("HTTP/1.1 431 "));
+  const std::string head = answer_to("HEAD /metrics HTTP/1.1\r\n\r\n");
+  EXPECT_THAT(head, StartsWith("HTTP/1.1 200 OK\r\n"));
+  EXPECT_THAT(head, EndsWith("\r\n\r\n"));
+}
+
+// As many as would have held every thread of a server that has one for each.
+TEST_F(MetricsEndpointTest, IsNotHeldUpByRequestsThatNeverComeWhole) {
+  constexpr int kSlow = 200;
+  std::vector<int> slow;
+  for (int i = 0; i < kSlow; ++i) {
+    slow.push_back(SendHttp(address(), "GET /metrics HTTP/1.1\r\nHost: loc"));
+  }
+  const absl::Time begin = absl::Now();
+  EXPECT_THAT(HttpGet(address(), "/metrics"), StartsWith("HTTP/1.1 200 OK\r\n"));
+  EXPECT_LT(absl::Now() - begin, absl::Seconds(2));
+  // The oldest had to go, the others go when their time is up.
+  for (const int socket : slow) {
+    EXPECT_EQ(ReadHttp(socket), "");
+    close(socket);
+  }
 }
 
 }  // namespace

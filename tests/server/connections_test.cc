@@ -1,0 +1,206 @@
+// What a connection may do until it is shut, with pairs of sockets in the place of connections.
+#include "server/connections.h"
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+
+#include <chrono>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "gtest/gtest.h"
+#include "spdlog/logger.h"
+
+namespace wellspace::server {
+namespace {
+
+sockaddr_storage Ipv4(const std::string& address, uint16_t port) {
+  sockaddr_storage peer = {};
+  auto& ipv4 = reinterpret_cast<sockaddr_in&>(peer);
+  ipv4.sin_family = AF_INET;
+  ipv4.sin_port = htons(port);
+  EXPECT_EQ(inet_pton(AF_INET, address.c_str(), &ipv4.sin_addr), 1);
+  return peer;
+}
+
+sockaddr_storage Ipv6(const std::string& address, uint16_t port) {
+  sockaddr_storage peer = {};
+  auto& ipv6 = reinterpret_cast<sockaddr_in6&>(peer);
+  ipv6.sin6_family = AF_INET6;
+  ipv6.sin6_port = htons(port);
+  EXPECT_EQ(inet_pton(AF_INET6, address.c_str(), &ipv6.sin6_addr), 1);
+  return peer;
+}
+
+TEST(PeerKey, IsTheSameHoweverThePeerIsWritten) {
+  EXPECT_EQ(PeerKey("ipv4:10.0.0.1:1234"), PeerKey(Ipv4("10.0.0.1", 1234)));
+  EXPECT_EQ(PeerKey("ipv4:10.0.0.1:1234"), PeerKey(Ipv6("::ffff:10.0.0.1", 1234)));
+  for (const char* peer : {"ipv6:[fe80::1]:99", "ipv6:%5Bfe80::1%5D:99", "ipv6:%5bfe80::1%25eth0%5d:99"}) {
+    EXPECT_EQ(PeerKey(peer), PeerKey(Ipv6("fe80::1", 99))) << peer;
+  }
+  EXPECT_NE(PeerKey("ipv4:10.0.0.1:1234"), PeerKey("ipv4:10.0.0.1:1235"));
+  EXPECT_NE(PeerKey("ipv4:10.0.0.1:1234"), PeerKey("ipv4:10.0.0.2:1234"));
+  for (const char* peer : {"", "unknown", "unix:", "unix:/tmp/x:1", "ipv4:", "ipv4:1", "ipv4:10.0.0.1:", "ipv6::1",
+                           "ipv4:10.0.0.1:65536", "ipv4:nonsense:1", "ipv6:[nonsense]:1"}) {
+    EXPECT_EQ(PeerKey(std::string_view(peer)), "") << peer;
+  }
+}
+
+// The server's end of a connection, and the peer's.
+class Pair {
+ public:
+  Pair() {
+    int ends[2];
+    EXPECT_EQ(socketpair(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0, ends), 0);
+    server = FileDescriptor(ends[0]);
+    peer = FileDescriptor(ends[1]);
+  }
+
+  bool IsShut() const {
+    char byte = 0;
+    return recv(peer.get(), &byte, 1, MSG_DONTWAIT) == 0;
+  }
+
+  FileDescriptor server;
+  FileDescriptor peer;
+};
+
+class ConnectionsTest : public ::testing::Test {
+ protected:
+  static constexpr int kMaxStreams = 200;
+  static constexpr int kMostCalls = kMaxStreams * 3 / 2 + Connections::kSlack;
+  static constexpr char kPeer[] = "ipv4:10.0.0.1:1";
+
+  // `count` calls that are over at once.
+  void Waste(const char* peer, int count) {
+    for (int i = 0; i < count; ++i) {
+      const auto connection = connections_.CallBegan(peer);
+      if (connection != nullptr) {
+        connections_.CallEnded(*connection, true);
+      }
+    }
+  }
+
+  Connections connections_{{.max_streams = kMaxStreams, .max_calls = 1000}, std::make_shared<spdlog::logger>("none")};
+};
+
+TEST_F(ConnectionsTest, AsManyCallsAsClientsAreToldAndSomeMoreAreServed) {
+  const Pair pair;
+  ASSERT_TRUE(connections_.Add(pair.server.get(), Ipv4("10.0.0.1", 1)));
+  for (int i = 0; i < kMostCalls; ++i) {
+    ASSERT_NE(connections_.CallBegan(kPeer), nullptr);
+  }
+  EXPECT_FALSE(pair.IsShut());
+  connections_.CallBegan(kPeer);
+  EXPECT_TRUE(pair.IsShut());
+  EXPECT_EQ(connections_.ShutCount(), 1u);
+  EXPECT_TRUE(connections_.IsBusyWithTheShut() == (kMostCalls + 1 > Connections::kMostOrphans));
+}
+
+TEST_F(ConnectionsTest, CallsThatHaveEndedDoNotCount) {
+  const Pair pair;
+  ASSERT_TRUE(connections_.Add(pair.server.get(), Ipv4("10.0.0.1", 1)));
+  for (int i = 0; i < 10 * kMostCalls; ++i) {
+    connections_.CallEnded(*connections_.CallBegan(kPeer), false);
+  }
+  EXPECT_FALSE(pair.IsShut());
+}
+
+TEST_F(ConnectionsTest, WasteIsBoundedAndHalvedForAHostThatWasShut) {
+  for (const int allowed : {kMaxStreams, kMaxStreams / 2, kMaxStreams / 4, kMaxStreams / 8, 16, 16}) {
+    const Pair pair;
+    ASSERT_TRUE(connections_.Add(pair.server.get(), Ipv4("10.0.0.1", 1)));
+    Waste(kPeer, allowed < Connections::kLeastWasteOfABadHost ? Connections::kLeastWasteOfABadHost : allowed);
+    EXPECT_FALSE(pair.IsShut()) << allowed;
+    Waste(kPeer, 1);
+    EXPECT_TRUE(pair.IsShut()) << allowed;
+  }
+  // Others have done nothing.
+  const Pair other;
+  ASSERT_TRUE(connections_.Add(other.server.get(), Ipv4("10.0.0.2", 1)));
+  Waste("ipv4:10.0.0.2:1", kMaxStreams);
+  EXPECT_FALSE(other.IsShut());
+}
+
+TEST_F(ConnectionsTest, AllTogetherAreBoundedAtTheCostOfTheBusiest) {
+  std::vector<Pair> pairs(5);
+  for (uint16_t i = 0; i < pairs.size(); ++i) {
+    ASSERT_TRUE(connections_.Add(pairs[i].server.get(), Ipv4("10.0.0.1", i)));
+    const int calls = i == 2 ? 300 : 175;
+    for (int call = 0; call < calls; ++call) {
+      connections_.CallBegan(absl::StrCat("ipv4:10.0.0.1:", i));
+    }
+  }
+  for (size_t i = 0; i < pairs.size(); ++i) {
+    EXPECT_EQ(pairs[i].IsShut(), false) << i;
+  }
+  connections_.CallBegan("ipv4:10.0.0.1:0");
+  for (size_t i = 0; i < pairs.size(); ++i) {
+    EXPECT_EQ(pairs[i].IsShut(), i == 2) << i;
+  }
+}
+
+TEST_F(ConnectionsTest, WhatIsClosedIsForgotten) {
+  Pair pair;
+  ASSERT_TRUE(connections_.Add(pair.server.get(), Ipv4("10.0.0.1", 1)));
+  const auto connection = connections_.CallBegan(kPeer);
+  connections_.Sweep();
+  EXPECT_EQ(connections_.Count(), 1u);
+  shutdown(pair.server.get(), SHUT_RDWR);  // as gRPC does
+  connections_.Sweep();
+  EXPECT_EQ(connections_.Count(), 0u);
+  EXPECT_EQ(connections_.CallBegan(kPeer), nullptr);
+  connections_.CallEnded(*connection, true);
+  EXPECT_EQ(connections_.ShutCount(), 0u);
+}
+
+// A connection over TCP on this machine: the server's end, and the peer's.
+std::pair<FileDescriptor, FileDescriptor> TcpPair() {
+  const FileDescriptor listening(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_storage address = Ipv4("127.0.0.1", 0);
+  socklen_t size = sizeof(sockaddr_in);
+  EXPECT_EQ(bind(listening.get(), reinterpret_cast<sockaddr*>(&address), size), 0);
+  EXPECT_EQ(listen(listening.get(), 1), 0);
+  EXPECT_EQ(getsockname(listening.get(), reinterpret_cast<sockaddr*>(&address), &size), 0);
+  FileDescriptor peer(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  EXPECT_EQ(connect(peer.get(), reinterpret_cast<sockaddr*>(&address), size), 0);
+  FileDescriptor server(accept4(listening.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
+  return {std::move(server), std::move(peer)};
+}
+
+bool HasHungUp(int socket) {
+  pollfd watched = {.fd = socket, .events = 0, .revents = 0};
+  return poll(&watched, 1, 0) == 1 && (watched.revents & POLLHUP) != 0;
+}
+
+TEST(Connections, APeerThatReadsNothingIsShut) {
+  Connections connections({.max_streams = 1, .max_calls = 1, .max_unread = std::chrono::seconds(0)},
+                          std::make_shared<spdlog::logger>("none"));
+  const auto [server, peer] = TcpPair();
+  ASSERT_TRUE(connections.Add(server.get(), Ipv4("127.0.0.1", 1)));
+  // Nothing waits for it.
+  connections.ShutUnread();
+  connections.ShutUnread();
+  EXPECT_FALSE(HasHungUp(server.get()));
+  const std::string bytes(65536, 'x');
+  while (send(server.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL) > 0) {
+  }
+  connections.ShutUnread();  // by now something has been taken, into the buffers of the peer
+  EXPECT_FALSE(HasHungUp(server.get()));
+  connections.ShutUnread();
+  EXPECT_TRUE(HasHungUp(server.get()));
+  EXPECT_EQ(connections.ShutCount(), 1u);
+}
+
+TEST_F(ConnectionsTest, CallsOfNoConnectionAreNotCounted) {
+  EXPECT_EQ(connections_.CallBegan("unix:"), nullptr);
+  EXPECT_EQ(connections_.CallBegan("unknown"), nullptr);
+}
+
+}  // namespace
+}  // namespace wellspace::server
