@@ -31,12 +31,15 @@ constexpr int kMinClientPingMs = 10'000;
 // Aborted calls get this long to send their status, and idle clients to close their connections, before both are cut off.
 constexpr std::chrono::milliseconds kFarewell(500);
 
-// Most that gRPC holds of what comes in, all connections together. It looks at the length of a message when all of it has come, of whoever
-// it is; here it ends calls, one of each connection, the oldest first. Half of the limit of memory is as much as all messages that
-// the budget makes room for, and never so little that hundreds of clients that behave come near it.
+// Most that gRPC holds of what comes in, all connections together. It looks at the length of a message when all of it has
+// come, from any peer; here it ends calls, one of each connection, the oldest first. Half of the limit of memory is as
+// much as all messages that the budget makes room for, never so little that hundreds of clients that behave come near it,
+// and never so much that strangers could take what the limit leaves to others.
 size_t MostReceived(const ServiceOptions& options) {
-  constexpr uint64_t kWithoutLimit = uint64_t{1} << 30;
-  return options.max_memory_bytes == 0 ? kWithoutLimit : std::max(kLeastReceivedBytes, options.max_memory_bytes / 2);
+  constexpr uint64_t kMostReceivedBytes = uint64_t{1} << 30;
+  return options.max_memory_bytes == 0
+             ? kMostReceivedBytes
+             : std::clamp(options.max_memory_bytes / 2, kLeastReceivedBytes, kMostReceivedBytes);
 }
 
 // What is read from a connection before anything is done with it. gRPC would read up to 4 MiB, in which 140 000 calls begin
