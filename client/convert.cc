@@ -97,6 +97,19 @@ Triangulation TriangulationFromProto(v1::Triangulation triangulation) {
   }
 }
 
+SliverReason ReasonFromProto(v1::SliverReason reason) {
+  switch (reason) {
+    case v1::SLIVER_REASON_DEMANDS:
+      return SliverReason::kDemands;
+    case v1::SLIVER_REASON_ANGLE:
+      return SliverReason::kAngle;
+    case v1::SLIVER_REASON_WORK:
+      return SliverReason::kWork;
+    default:
+      return SliverReason::kUnknown;  // of a newer server
+  }
+}
+
 MeshStatistics StatisticsFromProto(const v1::MeshStatistics& message) {
   MeshStatistics statistics;
   statistics.input_points = message.input_points();
@@ -119,7 +132,17 @@ MeshStatistics StatisticsFromProto(const v1::MeshStatistics& message) {
                           .moves = slivers.moves(),
                           .added_vertices = slivers.added_vertices(),
                           .weighted_vertices = slivers.weighted_vertices(),
-                          .min_angle_before_deg = slivers.min_angle_before_deg()};
+                          .min_angle_before_deg = slivers.min_angle_before_deg(),
+                          .operations = slivers.operations(),
+                          .left_by_demands = slivers.left_by_demands(),
+                          .left_by_angle = slivers.left_by_angle(),
+                          .left_by_work = slivers.left_by_work(),
+                          .flattest_left = {}};
+    for (const v1::LeftSliver& left : slivers.flattest_left()) {
+      statistics.slivers->flattest_left.push_back({.vertices = {left.vertices().begin(), left.vertices().end()},
+                                                   .min_dihedral_deg = left.min_dihedral_deg(),
+                                                   .reason = ReasonFromProto(left.reason())});
+    }
   }
   statistics.peak_memory_bytes = message.peak_memory_bytes();
   statistics.counters = CountersByName(message.counters());

@@ -52,6 +52,16 @@ struct Progress {
 // Which triangulation of its vertices a mesh is; see the proto's Triangulation.
 enum class Triangulation { kUnknown, kDelaunay, kRegular };
 
+// Why a sliver is left; see the proto's SliverReason.
+enum class SliverReason { kUnknown, kDemands, kAngle, kWork };
+
+// A sliver that could not be repaired; see the proto's LeftSliver.
+struct LeftSliver {
+  std::vector<uint32_t> vertices;
+  double min_dihedral_deg = 0;
+  SliverReason reason = SliverReason::kUnknown;
+};
+
 // What was done against slivers; see the proto's SliverStatistics.
 struct SliverStatistics {
   uint64_t found = 0;
@@ -60,6 +70,11 @@ struct SliverStatistics {
   uint64_t added_vertices = 0;
   uint64_t weighted_vertices = 0;
   double min_angle_before_deg = 0;
+  uint64_t operations = 0;
+  uint64_t left_by_demands = 0;
+  uint64_t left_by_angle = 0;
+  uint64_t left_by_work = 0;
+  std::vector<LeftSliver> flattest_left;
 };
 
 struct MeshStatistics {

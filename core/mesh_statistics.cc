@@ -23,12 +23,16 @@ void SetQueryFigures(const QueryCounters& cells, const QueryCounters& stars, Mes
 }
 
 void SetSliverFigures(const SliverStatistics& slivers, MeshStatistics& statistics) {
+  statistics.slivers_are_asked_about = slivers.is_asked;
   statistics.slivers = slivers.slivers;
   statistics.slivers_left = slivers.slivers_left;
+  statistics.slivers_left_by = slivers.left_by;
+  statistics.flattest_left = slivers.flattest_left;
+  statistics.sliver_operations = slivers.operations;
   statistics.sliver_moves = slivers.moves;
   statistics.sliver_vertices = slivers.added;
   statistics.weighted_vertices = slivers.weighted;
-  statistics.unmended_min_angle_deg = slivers.min_angle_deg;
+  statistics.unmended_min_angle_deg = slivers.min_angle_deg.value_or(0);
   statistics.simplices_seconds += slivers.star_seconds;
   statistics.sliver_seconds = slivers.seconds;
 }

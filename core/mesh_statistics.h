@@ -2,7 +2,11 @@
 #ifndef WELLSPACE_CORE_MESH_STATISTICS_H_
 #define WELLSPACE_CORE_MESH_STATISTICS_H_
 
+#include <array>
 #include <cstdint>
+#include <vector>
+
+#include "core/sliver/left_sliver.h"
 
 namespace wellspace::core {
 
@@ -18,12 +22,17 @@ struct MeshStatistics {
   double min_angle_deg = 0;  // 2-D: smallest angle of a triangle; 3-D: smallest dihedral angle of a tetrahedron
 
   // Slivers are tetrahedra below min_dihedral. With no weighted vertices the mesh is Delaunay, and keeps the criterion.
-  uint64_t slivers = 0;               // that were found, new ones of later refinements included
-  uint64_t slivers_left = 0;          // that could not be mended
-  uint64_t sliver_moves = 0;          // of vertices
-  uint64_t sliver_vertices = 0;       // added against them
-  uint64_t weighted_vertices = 0;     // by pumping
-  double unmended_min_angle_deg = 0;  // of the mesh before; 0 if nothing was mended or pumped
+  bool slivers_are_asked_about =
+      false;                  // whether they were to be repaired or pumped away; the figures below are then true
+  uint64_t slivers = 0;       // that were found, new ones of later refinements included
+  uint64_t slivers_left = 0;  // that could not be repaired
+  std::array<uint64_t, kSliverReasons> slivers_left_by{};  // by SliverReason; together slivers_left
+  std::vector<LeftSliver> flattest_left;                   // of these at most kMostNamedSlivers, flattest first
+  uint64_t sliver_operations = 0;                          // tetrahedra that the repair measured, or held a vertex to
+  uint64_t sliver_moves = 0;                               // of vertices
+  uint64_t sliver_vertices = 0;                            // added against them
+  uint64_t weighted_vertices = 0;                          // by pumping
+  double unmended_min_angle_deg = 0;                       // of the mesh before; 0 if nothing was mended or pumped
 
   double tree_seconds = 0;
   double refinement_seconds = 0;
@@ -53,7 +62,8 @@ struct SliverStatistics;
 // Sets the counts of queries: those of the refinement, and those of the simplices.
 void SetQueryFigures(const QueryCounters& cells, const QueryCounters& stars, MeshStatistics& statistics);
 
-// Sets what is said of slivers, and adds the time of their stars to that of the simplices.
+// Sets what is said of slivers but the numbers of vertices,
+// which are those of the structure still; and adds the time of their stars to that of the simplices.
 void SetSliverFigures(const SliverStatistics& slivers, MeshStatistics& statistics);
 
 // Sets total_seconds from the other times, and peak_memory_bytes.

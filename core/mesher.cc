@@ -673,6 +673,11 @@ class MesherIn final : public Mesher {
     if constexpr (D >= 3) {
       stars.Add(slivers_.statistics().star_queries);
       SetSliverFigures(slivers_.statistics(), statistics);
+      for (LeftSliver& sliver : statistics.flattest_left) {
+        for (uint32_t& v : sliver.vertices) {
+          v = OutputIndex(VertexId{v});
+        }
+      }
     }
     SetQueryFigures(refinement_->counters(), stars, statistics);
     SetTotals(statistics);

@@ -51,6 +51,34 @@ core::SizeBox SizeBoxFromProto(const v1::SizeBox& message) {
                        .max_circumradius = message.max_circumradius()};
 }
 
+v1::SliverReason ReasonToProto(core::SliverReason reason) {
+  switch (reason) {
+    case core::SliverReason::kDemands:
+      return v1::SLIVER_REASON_DEMANDS;
+    case core::SliverReason::kAngle:
+      return v1::SLIVER_REASON_ANGLE;
+    case core::SliverReason::kWork:
+      return v1::SLIVER_REASON_WORK;
+  }
+  return v1::SLIVER_REASON_UNSPECIFIED;
+}
+
+void SetLeftSlivers(const core::MeshStatistics& statistics, v1::SliverStatistics& message) {
+  const auto left_by = [&](core::SliverReason reason) {
+    return statistics.slivers_left_by[static_cast<size_t>(reason)];
+  };
+  message.set_operations(statistics.sliver_operations);
+  message.set_left_by_demands(left_by(core::SliverReason::kDemands));
+  message.set_left_by_angle(left_by(core::SliverReason::kAngle));
+  message.set_left_by_work(left_by(core::SliverReason::kWork));
+  for (const core::LeftSliver& sliver : statistics.flattest_left) {
+    v1::LeftSliver* left = message.add_flattest_left();
+    left->mutable_vertices()->Add(sliver.vertices.begin(), sliver.vertices.end());
+    left->set_min_dihedral_deg(sliver.min_angle_deg);
+    left->set_reason(ReasonToProto(sliver.reason));
+  }
+}
+
 v1::MeshStatistics StatisticsToProto(const core::MeshStatistics& statistics) {
   v1::MeshStatistics message;
   message.set_input_points(statistics.input_points);
@@ -70,7 +98,7 @@ v1::MeshStatistics StatisticsToProto(const core::MeshStatistics& statistics) {
   seconds->set_slivers(statistics.sliver_seconds);
   seconds->set_total(statistics.total_seconds);
 
-  if (statistics.unmended_min_angle_deg > 0) {
+  if (statistics.slivers_are_asked_about) {
     v1::SliverStatistics* slivers = message.mutable_slivers();
     slivers->set_found(statistics.slivers);
     slivers->set_left(statistics.slivers_left);
@@ -78,6 +106,7 @@ v1::MeshStatistics StatisticsToProto(const core::MeshStatistics& statistics) {
     slivers->set_added_vertices(statistics.sliver_vertices);
     slivers->set_weighted_vertices(statistics.weighted_vertices);
     slivers->set_min_angle_before_deg(statistics.unmended_min_angle_deg);
+    SetLeftSlivers(statistics, *slivers);
   }
 
   v1::OperationCounters* counters = message.mutable_counters();

@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
 #include "client/cli/progress_bar.h"
 #include "client/formats/mesh.h"
 
@@ -39,6 +40,19 @@ const char* TriangulationName(client::Triangulation triangulation) {
   }
 }
 
+const char* ReasonName(client::SliverReason reason) {
+  switch (reason) {
+    case client::SliverReason::kDemands:
+      return "demands";
+    case client::SliverReason::kAngle:
+      return "angle";
+    case client::SliverReason::kWork:
+      return "work";
+    default:
+      return "unknown";  // of another server
+  }
+}
+
 nlohmann::ordered_json SliversJson(const client::SliverStatistics& slivers) {
   nlohmann::ordered_json json;
   json["found"] = slivers.found;
@@ -47,6 +61,16 @@ nlohmann::ordered_json SliversJson(const client::SliverStatistics& slivers) {
   json["added_vertices"] = slivers.added_vertices;
   json["weighted_vertices"] = slivers.weighted_vertices;
   json["min_angle_before_deg"] = slivers.min_angle_before_deg;
+  json["operations"] = slivers.operations;
+  json["left_by"] = {
+      {"demands", slivers.left_by_demands}, {"angle", slivers.left_by_angle}, {"work", slivers.left_by_work}};
+  json["flattest_left"] = nlohmann::ordered_json::array();
+  for (const client::LeftSliver& left : slivers.flattest_left) {
+    nlohmann::ordered_json& item = json["flattest_left"].emplace_back();
+    item["vertices"] = left.vertices;
+    item["min_dihedral_deg"] = left.min_dihedral_deg;
+    item["reason"] = ReasonName(left.reason);
+  }
   return json;
 }
 
@@ -59,7 +83,8 @@ std::string SliversText(const client::SliverStatistics& slivers) {
     absl::StrAppend(&text, ", ", WithThousands(slivers.weighted_vertices), " weights");
   }
   if (slivers.left != 0) {
-    absl::StrAppend(&text, "; ", WithThousands(slivers.left), " slivers could not be mended");
+    absl::StrAppend(&text, "; ", WithThousands(slivers.left), slivers.left == 1 ? " sliver" : " slivers",
+                    " could not be repaired");
   }
   return text;
 }
@@ -101,6 +126,31 @@ std::string Summary(const client::MeshHeader& mesh) {
                       mesh.dimension == 2 ? "angles" : "dihedral angles", statistics.min_angle_deg),
       statistics.slivers.has_value() ? SliversText(*statistics.slivers) : "",
       total == statistics.seconds.end() ? "" : absl::StrFormat("; %.2f s", total->second));
+}
+
+std::string SliverWarning(const client::MeshHeader& mesh) {
+  if (!mesh.statistics.slivers.has_value() || mesh.statistics.slivers->left == 0) {
+    return "";
+  }
+  const client::SliverStatistics& slivers = *mesh.statistics.slivers;
+  std::string text = absl::StrCat("warning: ", WithThousands(slivers.left),
+                                  slivers.left == 1 ? " sliver is" : " slivers are", " left below --min-dihedral");
+  const char* separator = " (";
+  const auto add = [&](uint64_t count, const char* why) {
+    if (count != 0) {
+      absl::StrAppend(&text, separator, WithThousands(count), " ", why);
+      separator = "; ";
+    }
+  };
+  add(slivers.left_by_demands, "where no new vertex keeps --rho and the sizes");
+  add(slivers.left_by_angle, "where a new vertex leaves angles as small");
+  add(slivers.left_by_work, "given up when the bound on work was reached, which a smaller --rho avoids");
+  absl::StrAppend(&text, *separator == ';' ? ")" : "");
+  for (const client::LeftSliver& left : slivers.flattest_left) {
+    absl::StrAppend(&text, "\n  vertices ", absl::StrJoin(left.vertices, " "),
+                    absl::StrFormat(": %.3g\u00b0, by ", left.min_dihedral_deg), ReasonName(left.reason));
+  }
+  return text + "\n";
 }
 
 std::string EstimateJson(const client::MeshEstimate& estimate, int dimension) {

@@ -14,7 +14,9 @@ namespace wellspace::cli {
 //   dimension, domain_low, domain_high
 //   input_points, duplicates, vertices, simplices, max_radius_edge, min_angle_deg (2-D) or min_dihedral_deg (above)
 //   triangulation: "delaunay" or "regular"
-//   slivers:  {found, left, moves, added_vertices, weighted_vertices, min_angle_before_deg}, null if nothing was asked for
+//   slivers:  {found, left, moves, added_vertices, weighted_vertices, min_angle_before_deg, operations,
+//             left_by: {demands, angle, work}, flattest_left: [{vertices, min_dihedral_deg, reason}, ...]}, null if
+//             nothing was asked for
 //   seconds:  {tree, refinement, simplices, ..., total}, without reading and writing files
 //   peak_memory_bytes, counters
 //   duplicate_of: [[i, v], ...]: input point i is equal to an earlier one, and both became vertex v. The other input
@@ -23,6 +25,9 @@ std::string StatisticsJson(const client::MeshHeader& mesh, std::span<const uint3
 
 // "5 points -> 17 vertices, 20 triangles; ...", one line without its end.
 std::string Summary(const client::MeshHeader& mesh);
+
+// "warning: 2 slivers are left below --min-dihedral (...)", and a line for each of the flattest; empty if none is left.
+std::string SliverWarning(const client::MeshHeader& mesh);
 
 // One JSON object: dimension, vertices, simplices, memory_bytes, tree_leaves.
 std::string EstimateJson(const client::MeshEstimate& estimate, int dimension);

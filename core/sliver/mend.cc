@@ -4,10 +4,12 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
+#include "core/simplex/quality.h"
 
 namespace wellspace::core {
 namespace {
@@ -33,6 +35,13 @@ constexpr size_t kGrowth = 8;
 constexpr size_t kLeastGrowth = 1000;
 // As many vertices whose stars have changed are told of at once, so that those that change again and again are told of seldom.
 constexpr size_t kMostChanged = 1 << 16;
+// A vertex of more simplices is not moved: taking it out costs their square, and a place good for all hardly exists.
+constexpr size_t kMostStar = 128;
+// Where that many slivers are left by a pass, and few are gone, the next passes are those that may add poor vertices.
+constexpr size_t kMany = 1000;
+constexpr double kFewGone = 0.125;
+// A determinant below this times the cube of the extent leaves too few bits of the circumcentre.
+constexpr double kExactBelow = 0x1p-24;
 // Simplices that one thread measures one after the other.
 constexpr size_t kBlock = 1 << 14;
 // A step that leaves a sliver has to make 1 - cosine, nearly half the angle squared, larger by this.
@@ -45,6 +54,28 @@ double FlatCosine(double degrees) {
 }
 
 bool IsBetter(double cosine, double than) { return 1 - cosine >= kGain * (1 - than); }
+
+// The cosine by which a tetrahedron is a sliver or not. One without area has no angles in doubles, and is flat.
+double FlatnessOf(const TetrahedronMeasure& measure) { return std::isnan(measure.cosine) ? 1 : measure.cosine; }
+
+// As MeasureTetrahedron, but with the exact circumsphere. Four points of a circle, rounded, span a volume that doubles
+// do not see, and their sphere is one of a pencil; it is empty, and its radius bounded by rho, all the same.
+TetrahedronMeasure MeasureSliver(const Simplex<3>& corners) {
+  TetrahedronMeasure measure = MeasureTetrahedron(corners);
+  double extent_sq = 0;
+  for (int i = 1; i < 4; ++i) {
+    extent_sq = std::max(extent_sq, DistanceSq<3>(corners[0], corners[i]));
+  }
+  if (!(measure.determinant > kExactBelow * extent_sq * std::sqrt(extent_sq))) {
+    const Point<3> offset = CircumcentreOffset<3>(corners);
+    for (int i = 0; i < 3; ++i) {
+      measure.centre[i] = corners[0][i] + offset[i];
+    }
+    measure.radius_sq = NormSq<3>(offset);
+  }
+  measure.cosine = FlatnessOf(measure);
+  return measure;
+}
 
 }  // namespace
 
@@ -74,7 +105,9 @@ absl::Status Mender::RunPasses(int threads, RunContext& context) {
   WELLSPACE_RETURN_IF_ERROR(FindSlivers(threads, context));
   report_.slivers += next_.size();
   report_.slivers_left = next_.size();
-  for (int pass = 0; pass < kPasses && !next_.empty(); ++pass) {
+  int ahead = 0;  // passes that were skipped
+  for (int at = 0; at < kPasses && !next_.empty() && HasWork(); ++at) {
+    const int pass = at + ahead;
     WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(observer_.MemoryBytes() + triangulation_.MemoryBytes() +
                                                   cosine_.size() * sizeof(double) + next_.size() * sizeof(Sliver)));
     Effort effort;
@@ -85,13 +118,15 @@ absl::Status Mender::RunPasses(int threads, RunContext& context) {
     effort.may_move_neighbours = pass >= 1;
     effort.may_insert = pass >= 2;
     effort.may_insert_poor = pass > kEarlyPasses;
-    const size_t limit = kGrowth * next_.size() + kLeastGrowth;
+    const size_t begun = next_.size();
+    const size_t limit = kGrowth * begun + kLeastGrowth;
     std::vector<Sliver> left;
     for (size_t k = 0; k < next_.size(); ++k) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
       const Sliver sliver = next_[k];
-      if (IsThere(sliver) && (k >= limit || !Mend(sliver, effort))) {
-        if (k < limit && effort.may_insert) {
+      const bool is_tried = k < limit && HasWork();
+      if (IsThere(sliver) && (!is_tried || !Mend(sliver, effort))) {
+        if (is_tried && effort.may_insert) {
           WELLSPACE_RETURN_IF_ERROR(Insert(sliver, effort));
           context.SetVertices(triangulation_.vertex_count());
         }
@@ -106,8 +141,61 @@ absl::Status Mender::RunPasses(int threads, RunContext& context) {
     next_.clear();
     std::copy_if(left.begin(), left.end(), std::back_inserter(next_), [this](const Sliver& s) { return IsThere(s); });
     report_.slivers_left = next_.size();
+    if (effort.may_insert && pass <= kEarlyPasses && next_.size() >= kMany &&
+        static_cast<double>(next_.size()) > (1 - kFewGone) * static_cast<double>(begun)) {
+      ahead = kEarlyPasses - at;
+    }
   }
+  ExplainLeft();
   return absl::OkStatus();
+}
+
+// Says why slivers are left, and names the flattest.
+void Mender::ExplainLeft() {
+  const bool has_work = HasWork();
+  std::vector<std::pair<Sliver, SliverReason>> left;
+  for (const Sliver& sliver : next_) {
+    left.emplace_back(sliver, has_work ? ReasonOf(sliver) : SliverReason::kWork);
+    ++report_.left_by[static_cast<size_t>(left.back().second)];
+  }
+  std::sort(left.begin(), left.end(), [this](const auto& a, const auto& b) {
+    const double cosine_a = CosineOf(a.first.simplex);
+    const double cosine_b = CosineOf(b.first.simplex);
+    return cosine_a != cosine_b ? cosine_a > cosine_b : a.first.vertices < b.first.vertices;
+  });
+  left.resize(std::min(left.size(), kMostNamedSlivers));
+  for (const auto& [sliver, reason] : left) {
+    LeftSliver& named = report_.flattest_left.emplace_back();
+    std::transform(sliver.vertices.begin(), sliver.vertices.end(), named.vertices.begin(),
+                   [](VertexId v) { return Index(v); });
+    named.min_angle_deg = Angles<3>(triangulation_.Corners(sliver.simplex)).min_deg;
+    named.reason = reason;
+  }
+}
+
+// Whether a place in the sliver's circumball keeps the demands, whatever the angles there.
+SliverReason Mender::ReasonOf(const Sliver& sliver) {
+  const TetrahedronMeasure measure = MeasureSliver(triangulation_.Corners(sliver.simplex));
+  const VertexId v{triangulation_.vertex_count()};
+  suspects_.clear();
+  for (int k = 0; k < kSamples; ++k) {
+    const Point<3> p = PlaceInBall(measure, k == 0);
+    if (triangulation_.box().Contains(p) && triangulation_.box().FacesOf(p) == 0 &&
+        triangulation_.IsInConflict(sliver.simplex, p) && TryAt(sliver.simplex, p, v, kForbidden) != kForbidden) {
+      return SliverReason::kAngle;
+    }
+  }
+  return SliverReason::kDemands;
+}
+
+// A place in the shrunk circumball, or its centre.
+Point<3> Mender::PlaceInBall(const TetrahedronMeasure& measure, bool is_centre) {
+  const double radius = kInside * std::sqrt(measure.radius_sq);
+  Point<3> p = is_centre ? Point<3>{} : RandomInBall();
+  for (int i = 0; i < 3; ++i) {
+    p[i] = measure.centre[i] + radius * p[i];
+  }
+  return p;
 }
 
 // Measures all simplices, and lists the slivers among them.
@@ -118,7 +206,7 @@ absl::Status Mender::FindSlivers(int threads, const RunContext& context) {
     const size_t end = std::min(cosine_.size(), (block + 1) * kBlock);
     for (size_t i = block * kBlock; i < end; ++i) {
       const SimplexId s{static_cast<uint32_t>(i)};
-      cosine_[i] = triangulation_.IsIn(s) ? MeasureTetrahedron(triangulation_.Corners(s)).cosine : -1;
+      cosine_[i] = triangulation_.IsIn(s) ? FlatnessOf(MeasureTetrahedron(triangulation_.Corners(s))) : -1;
     }
     return context.Check();
   }));
@@ -203,6 +291,7 @@ double Mender::TryAt(SimplexId from, const Point<3>& p, VertexId v, double limit
     worst = std::max(worst, cosine);
     return cosine == kForbidden;
   });
+  report_.operations += cavity_.simplices.size() + cavity_.boundary.size();
   if (!is_allowed) {
     if (suspects_.size() == kSuspects) {
       suspects_.pop_back();
@@ -244,7 +333,7 @@ void Mender::Note(std::span<const SimplexId> created) {
         changed_.push_back(v);
       }
     }
-    cosine_[Index(s)] = MeasureTetrahedron(triangulation_.Corners(s)).cosine;
+    cosine_[Index(s)] = FlatnessOf(MeasureTetrahedron(triangulation_.Corners(s)));
     if (CosineOf(s) > flat_cosine_) {
       next_.push_back({s, vertices});
     }
@@ -304,6 +393,10 @@ bool Mender::Move(VertexId v, const Sliver& sliver, int samples) {
   const Box<3>& box = triangulation_.box();
   const bool is_own = std::find(sliver.vertices.begin(), sliver.vertices.end(), v) != sliver.vertices.end();
   triangulation_.Star(v, star_);
+  report_.operations += star_.size();
+  if (star_.size() > kMostStar) {
+    return false;
+  }
   double old = CosineOf(sliver.simplex);
   double edge_sq = std::numeric_limits<double>::infinity();
   for (const SimplexId s : star_) {
@@ -316,9 +409,10 @@ bool Mender::Move(VertexId v, const Sliver& sliver, int samples) {
   }
   Point<3> way{};
   if (!is_own) {
-    way = Difference<3>(MeasureTetrahedron(triangulation_.Corners(sliver.simplex)).centre, from);
+    way = Difference<3>(MeasureSliver(triangulation_.Corners(sliver.simplex)).centre, from);
   }
   triangulation_.Remove(v, hole_);
+  report_.operations += star_.size() * star_.size();  // each facet of the hole is held to each neighbour
   hole_cosine_.clear();
   for (const SimplexId s : hole_) {
     const TetrahedronMeasure measure = MeasureTetrahedron(triangulation_.Corners(s));
@@ -343,6 +437,7 @@ bool Mender::Move(VertexId v, const Sliver& sliver, int samples) {
   double best = old;
   Point<3> to = from;
   for (int k = 0; k < samples && best > flat_cosine_; ++k) {
+    report_.operations += hole_.size();
     Point<3> p = RandomInBall();
     const double share = is_own ? 0 : 0.5 * (1 + RandomInBall()[0]);
     for (int i = 0; i < 3; ++i) {
@@ -390,10 +485,9 @@ bool Mender::Move(VertexId v, const Sliver& sliver, int samples) {
 
 // Adds a vertex in the sliver's circumball: of the places whose star is good, that which does away with most slivers.
 absl::Status Mender::Insert(const Sliver& sliver, const Effort& effort) {
-  const TetrahedronMeasure measure = MeasureTetrahedron(triangulation_.Corners(sliver.simplex));
+  const TetrahedronMeasure measure = MeasureSliver(triangulation_.Corners(sliver.simplex));
   const Box<3>& box = triangulation_.box();
   const VertexId v{triangulation_.vertex_count()};
-  const double radius = kInside * std::sqrt(measure.radius_sq);
   suspects_.clear();
   // Not found yet; else the best so far.
   uint64_t most = 0;
@@ -401,10 +495,8 @@ absl::Status Mender::Insert(const Sliver& sliver, const Effort& effort) {
   const double limit = best;
   Point<3> to{};
   for (int k = 0; k < effort.samples; ++k) {
-    Point<3> p = k == 0 ? Point<3>{} : RandomInBall();
-    for (int i = 0; i < 3; ++i) {
-      p[i] = measure.centre[i] + radius * p[i];
-    }
+    const Point<3> p = PlaceInBall(measure, k == 0);
+    ++report_.operations;
     if (!box.Contains(p) || box.FacesOf(p) != 0 || !triangulation_.IsInConflict(sliver.simplex, p)) {
       continue;
     }

@@ -11,6 +11,7 @@
 #include "core/base/huge_pages.h"
 #include "core/base/run_context.h"
 #include "core/refine/demands.h"
+#include "core/sliver/left_sliver.h"
 #include "core/sliver/tetrahedron.h"
 #include "core/sliver/triangulation.h"
 
@@ -25,9 +26,13 @@ struct MendDemands {
 
 struct MendReport {
   uint64_t slivers = 0;       // found
-  uint64_t slivers_left = 0;  // that could not be mended
+  uint64_t slivers_left = 0;  // that could not be repaired
   uint64_t moves = 0;         // of vertices; one may move more than once
   uint64_t added = 0;         // vertices
+  uint64_t operations = 0;    // tetrahedra that were measured, or that a vertex was tested against
+  // Once Run has succeeded: slivers_left by SliverReason, and at most kMostNamedSlivers of them, flattest first.
+  std::array<uint64_t, kSliverReasons> left_by{};
+  std::vector<LeftSliver> flattest_left;
 };
 
 // Hears of every step, once the triangulation has taken it; of the stars that have changed by then sooner or later, but before Run returns.
@@ -52,12 +57,18 @@ class MendObserver {
 class Mender {
  public:
   // Shapes:     is_fixed: by vertex; true where it must not move. One entry is added for each vertex added.
+  // The work that is spent, however hard slivers are. Default demands take a twentieth of it.
+  static constexpr uint64_t kMostOperations = 20'000;
+  static constexpr uint64_t kFreeSlivers = 2'000;
+
   Mender(Triangulation<3>& triangulation, std::vector<bool>& is_fixed, const MendDemands& demands,
          MendObserver& observer);
 
   // Mends what slivers there are, and what new ones that makes. Up to `threads` threads look for the first ones; one mends.
   //
-  // Guarantees: (1) deterministic, and the same on any number of threads; (2) ends: see docs/design/sliver.md.
+  // Guarantees: (1) deterministic, and the same on any number of threads; (2) report().operations is at most
+  //             kMostOperations times the slivers found and kFreeSlivers more, and what one sliver takes at most;
+  //             (3) the report says of each sliver that is left why.
   // Complexity: O(1) expected for each sliver, and a look at every simplex.
   // Errors:     RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED, DEADLINE_EXCEEDED; the invariants hold
   //             all the same.
@@ -82,6 +93,10 @@ class Mender {
 
   absl::Status RunPasses(int threads, RunContext& context);
   absl::Status FindSlivers(int threads, const RunContext& context);
+  bool HasWork() const { return report_.operations < kMostOperations * (report_.slivers + kFreeSlivers); }
+  void ExplainLeft();
+  SliverReason ReasonOf(const Sliver& sliver);
+  Point<3> PlaceInBall(const TetrahedronMeasure& measure, bool is_centre);
   bool IsThere(const Sliver& sliver) const;
   double CosineOf(SimplexId s) const { return cosine_[Index(s)]; }
   bool IsAdmissible(const TetrahedronMeasure& measure, const std::array<VertexId, 4>& vertices, VertexId moved) const;

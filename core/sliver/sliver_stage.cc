@@ -164,7 +164,7 @@ absl::StatusOr<Triangulation<D>> SliverStage<D>::Triangulate(const QueryStructur
   std::iota(identity.begin(), identity.end(), uint32_t{0});
   WELLSPACE_ASSIGN_OR_RETURN(Simplices simplices, ComputeSimplices<D>(structure, stars, identity, threads, context));
   statistics_.star_queries.Add(simplices.counters);
-  if (statistics_.min_angle_deg == 0) {
+  if (!statistics_.min_angle_deg.has_value()) {
     statistics_.min_angle_deg = simplices.min_angle_deg;
   }
   WELLSPACE_RETURN_IF_ERROR(
@@ -220,6 +220,7 @@ template <int E>
 absl::Status SliverStage<D>::Mend(QueryStructure<E>& structure, Refinement<E>& refinement, std::vector<bool>& is_fixed,
                                   const MendDemands& demands, int threads, RunContext& context) requires(E == 3) {
   const Stopwatch stopwatch(statistics_.seconds, statistics_.star_seconds);
+  statistics_.is_asked = true;
   WELLSPACE_RETURN_IF_ERROR(FollowStructure(structure, refinement.stars(), threads, context));
   context.EnterPhase(Phase::kSlivers);
   Follower follower(*triangulation_, structure, refinement);
@@ -227,6 +228,9 @@ absl::Status SliverStage<D>::Mend(QueryStructure<E>& structure, Refinement<E>& r
   const absl::Status status = mender.Run(threads, context);
   statistics_.slivers += mender.report().slivers;
   statistics_.slivers_left = mender.report().slivers_left;
+  statistics_.left_by = mender.report().left_by;
+  statistics_.flattest_left = mender.report().flattest_left;
+  statistics_.operations += mender.report().operations;
   statistics_.moves += mender.report().moves;
   statistics_.added += mender.report().added;
   return status;
@@ -240,6 +244,7 @@ absl::StatusOr<WeightedSimplices> SliverStage<D>::ToSimplices(const QueryStructu
   const Stopwatch stopwatch(statistics_.seconds, statistics_.star_seconds);
   WeightedSimplices out;
   statistics_.weighted = 0;
+  statistics_.is_asked = statistics_.is_asked || pump;
   if (!pump) {
     context.EnterPhase(Phase::kSlivers);
   }

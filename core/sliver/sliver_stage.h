@@ -2,6 +2,7 @@
 #ifndef WELLSPACE_CORE_SLIVER_SLIVER_STAGE_H_
 #define WELLSPACE_CORE_SLIVER_SLIVER_STAGE_H_
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -22,13 +23,18 @@ namespace wellspace::core {
 struct SliverStatistics {
   uint64_t slivers = 0;       // that Mend found
   uint64_t slivers_left = 0;  // by the last Mend
+  // Of these: see MendReport.
+  std::array<uint64_t, kSliverReasons> left_by{};
+  std::vector<LeftSliver> flattest_left;
+  uint64_t operations = 0;  // of Mend
+  bool is_asked = false;    // whether a mesh was to be mended or pumped
   uint64_t moves = 0;
   uint64_t added = 0;
-  uint64_t weighted = 0;       // vertices with a weight in the last mesh
-  double min_angle_deg = 0;    // before the first Mend
-  QueryCounters star_queries;  // of the triangulation
-  double star_seconds = 0;     // for them
-  double seconds = 0;          // for all the rest
+  uint64_t weighted = 0;                // vertices with a weight in the last mesh
+  std::optional<double> min_angle_deg;  // before the first Mend; none: there was no triangulation yet
+  QueryCounters star_queries;           // of the triangulation
+  double star_seconds = 0;              // for them
+  double seconds = 0;                   // for all the rest
 };
 
 struct WeightedSimplices {
@@ -74,8 +80,13 @@ class SliverStage {
   // What the stage takes in memory.
   uint64_t MemoryBytes() const { return triangulation_.has_value() ? triangulation_->MemoryBytes() : 0; }
   bool HasTriangulation() const { return triangulation_.has_value(); }
-  // Lets go of the triangulation. To be called when the structure changes and Mend will not.
-  void Forget() { triangulation_.reset(); }
+  // Lets go of the triangulation, and of what is left. To be called when the structure changes and Mend will not.
+  void Forget() {
+    triangulation_.reset();
+    statistics_.slivers_left = 0;
+    statistics_.left_by = {};
+    statistics_.flattest_left.clear();
+  }
   const SliverStatistics& statistics() const { return statistics_; }
 
  private:

@@ -107,6 +107,27 @@ TEST(SummaryTest, NamesTheSimplicesOfTheDimension) {
   EXPECT_THAT(Summary(SmallMesh(4)), HasSubstr(" simplices"));
 }
 
+TEST(SliverWarningTest, SaysWhatIsLeftAndWhy) {
+  client::MeshHeader mesh = SmallMesh(3);
+  EXPECT_EQ(SliverWarning(mesh), "");
+  mesh.statistics.slivers.emplace();
+  EXPECT_EQ(SliverWarning(mesh), "");
+  mesh.statistics.slivers->left = 1200;
+  mesh.statistics.slivers->left_by_demands = 1;
+  mesh.statistics.slivers->left_by_work = 1199;
+  mesh.statistics.slivers->flattest_left = {{{4, 7, 9, 11}, 0, client::SliverReason::kDemands}};
+  EXPECT_EQ(
+      SliverWarning(mesh),
+      "warning: 1,200 slivers are left below --min-dihedral (1 where no new vertex keeps --rho and the sizes; 1,199 "
+      "given up when the bound on work was reached, which a smaller --rho avoids)\n"
+      "  vertices 4 7 9 11: 0\u00b0, by demands\n");
+  EXPECT_THAT(Summary(mesh), HasSubstr("; 1,200 slivers could not be repaired"));
+  const nlohmann::json slivers = nlohmann::json::parse(StatisticsJson(mesh, kInputVertex))["slivers"];
+  EXPECT_EQ(slivers["left_by"], nlohmann::json::parse(R"({"demands": 1, "angle": 0, "work": 1199})"));
+  EXPECT_EQ(slivers["flattest_left"],
+            nlohmann::json::parse(R"([{"vertices": [4, 7, 9, 11], "min_dihedral_deg": 0.0, "reason": "demands"}])"));
+}
+
 constexpr client::MeshEstimate kEstimate = {
     .vertices = 1234567, .simplices = 7654321, .memory_bytes = uint64_t{3} << 29, .tree_leaves = 42};
 

@@ -16,10 +16,12 @@
 #include <cstdint>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "absl/strings/str_format.h"
 #include "client/formats/read_mesh.h"
 #include "client/formats/write_mesh.h"
 #include "tests/cli/process.h"
@@ -389,6 +391,33 @@ TEST_F(CommandsTest, SliversAreMendedOrPumpedAway) {
   Mesh(cloud, "plain.vtu", {"--min-dihedral", "0", "--stats", Path("stats.json")});
   EXPECT_TRUE(statistics()["slivers"].is_null());
   EXPECT_EQ(RunWellspace({"mesh", Path("cloud.csv"), "-o", Path("no.vtu"), "--min-dihedral", "19"}).exit_code, 2);
+}
+
+// Four input points of one circle: none can move, and the angle before is 0.
+TEST_F(CommandsTest, FlatTetrahedraOfATorusAreRepairedAndSpokenOf) {
+  const auto torus = [](int around, int along) {
+    std::string cloud;
+    for (int k = 0; k < around * along; ++k) {
+      const double phi = 2 * std::numbers::pi * (k / along) / around;
+      const double theta = 2 * std::numbers::pi * (k % along) / along;
+      const double radius = 4 + std::cos(phi);
+      absl::StrAppendFormat(&cloud, "%.17g,%.17g,%.17g\n", radius * std::cos(theta), radius * std::sin(theta),
+                            std::sin(phi));
+    }
+    return cloud;
+  };
+  Mesh(torus(10, 20), "torus.vtu", {"--stats", Path("stats.json")});
+  const nlohmann::json statistics = nlohmann::json::parse(folder_.Read("stats.json"));
+  EXPECT_GE(statistics["min_dihedral_deg"], 12);
+  ASSERT_TRUE(statistics["slivers"].is_object());
+  EXPECT_EQ(statistics["slivers"]["left"], 0);
+  EXPECT_GT(statistics["slivers"]["operations"], 0);
+  // What cannot be repaired is told of, though not in the exit code.
+  const RunResult left = RunWellspace({"mesh", folder_.Write("other.csv", torus(12, 24)), "-o", Path("left.vtu"),
+                                       "--criterion", "well-spaced", "--min-dihedral", "18", "--quiet"});
+  EXPECT_EQ(left.exit_code, 0);
+  EXPECT_THAT(left.err, AllOf(testing::StartsWith("warning: "), HasSubstr("left below --min-dihedral"),
+                              HasSubstr("\n  vertices ")));
 }
 
 TEST_F(CommandsTest, EmptyCloudInADomain) {

@@ -336,12 +336,18 @@ TEST(MetadataToProto, CountsAndStatistics) {
 
 TEST(MetadataToProto, SaysWhatWasDoneAgainstSlivers) {
   core::Mesh mesh = MakeFakeMesh(core::MeshParameters(), std::vector<double>{0.25, 0.5, 0.75});
+  // An angle of 0 before is no reason to say nothing.
+  mesh.statistics.slivers_are_asked_about = true;
+  EXPECT_TRUE(MetadataToProto(mesh, 1).statistics().has_slivers());
   mesh.statistics.slivers = 7;
   mesh.statistics.slivers_left = 1;
   mesh.statistics.sliver_moves = 5;
   mesh.statistics.sliver_vertices = 2;
   mesh.statistics.unmended_min_angle_deg = 0.25;
   mesh.statistics.sliver_seconds = 0.125;
+  mesh.statistics.sliver_operations = 12'345;
+  mesh.statistics.slivers_left_by = {1, 2, 3};
+  mesh.statistics.flattest_left = {{{4, 5, 6, 7}, 0.5, core::SliverReason::kWork}};
   v1::MeshStatistics statistics = MetadataToProto(mesh, 1).statistics();
   EXPECT_EQ(statistics.triangulation(), v1::TRIANGULATION_DELAUNAY);
   EXPECT_EQ(statistics.slivers().found(), 7u);
@@ -350,6 +356,14 @@ TEST(MetadataToProto, SaysWhatWasDoneAgainstSlivers) {
   EXPECT_EQ(statistics.slivers().added_vertices(), 2u);
   EXPECT_EQ(statistics.slivers().min_angle_before_deg(), 0.25);
   EXPECT_EQ(statistics.seconds().slivers(), 0.125);
+  EXPECT_EQ(statistics.slivers().operations(), 12'345u);
+  EXPECT_EQ(statistics.slivers().left_by_demands(), 1u);
+  EXPECT_EQ(statistics.slivers().left_by_angle(), 2u);
+  EXPECT_EQ(statistics.slivers().left_by_work(), 3u);
+  ASSERT_EQ(statistics.slivers().flattest_left_size(), 1);
+  EXPECT_THAT(statistics.slivers().flattest_left(0).vertices(), ElementsAre(4, 5, 6, 7));
+  EXPECT_EQ(statistics.slivers().flattest_left(0).min_dihedral_deg(), 0.5);
+  EXPECT_EQ(statistics.slivers().flattest_left(0).reason(), v1::SLIVER_REASON_WORK);
 
   mesh.weights.assign(mesh.vertex_count(), 0.5);
   mesh.statistics.weighted_vertices = mesh.vertex_count();

@@ -73,6 +73,10 @@ absl::Status MeshCommand::Mesh(client::Client& client, const client::MeshOptions
   if (!options.remote().quiet()) {
     std::cerr << Summary(file.header()) << (output == formats::kStandardStream ? "" : " -> " + output) << "\n";
   }
+  // A demand that is not met is told of without --quiet or with it; in JSON the statistics have it.
+  if (!options.remote().json()) {
+    std::cerr << SliverWarning(file.header());
+  }
   return absl::OkStatus();
 }
 

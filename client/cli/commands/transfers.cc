@@ -118,6 +118,9 @@ absl::Status DownloadCommand::Download(client::Client& client, const client::Cal
   } else if (!remote.quiet()) {
     std::cerr << Summary(file.header()) << (path == formats::kStandardStream ? "" : " -> " + path) << "\n";
   }
+  if (!remote.json()) {
+    std::cerr << SliverWarning(file.header());
+  }
   return absl::OkStatus();
 }
 
