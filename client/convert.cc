@@ -178,6 +178,7 @@ void SetParameters(const MeshOptions& options, v1::MeshParameters* parameters) {
   }
   parameters->set_pump_weights(options.pump_weights);
   parameters->set_merge_distance(options.merge_distance);
+  parameters->set_keep_vertices(options.keep_vertices);
   parameters->set_margin(options.margin);
   parameters->set_max_vertices(options.max_vertices);
   parameters->set_threads(options.threads);
@@ -199,6 +200,7 @@ MeshOptions OptionsFromProto(const v1::MeshParameters& parameters) {
   }
   options.pump_weights = parameters.pump_weights();
   options.merge_distance = parameters.merge_distance();
+  options.keep_vertices = parameters.keep_vertices();
   options.domain_low = VectorOf(parameters.domain().low());
   options.domain_high = VectorOf(parameters.domain().high());
   if (parameters.has_margin()) {
@@ -228,6 +230,7 @@ MeshHeader HeaderFromProto(const v1::MeshMetadata& metadata) {
                     .chunk_count = metadata.chunk_count(),
                     .revision = metadata.revision(),
                     .has_weights = metadata.has_weights(),
+                    .moved_vertex_count = metadata.moved_vertex_count(),
                     .statistics = StatisticsFromProto(metadata.statistics())};
 }
 

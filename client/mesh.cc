@@ -15,6 +15,11 @@ absl::Status MeshCollector::AddPoints(std::span<const double> points) {
   return absl::OkStatus();
 }
 
+absl::Status MeshCollector::AddMovedVertices(std::span<const uint32_t> vertices) {
+  mesh_.moved_vertices.insert(mesh_.moved_vertices.end(), vertices.begin(), vertices.end());
+  return absl::OkStatus();
+}
+
 absl::Status MeshCollector::AddWeights(std::span<const double> weights) {
   mesh_.weights.insert(mesh_.weights.end(), weights.begin(), weights.end());
   return absl::OkStatus();

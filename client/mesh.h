@@ -33,6 +33,7 @@ struct MeshOptions {
   std::optional<double> min_dihedral;  // degrees; 0: slivers are left as they are
   bool pump_weights = false;
   double merge_distance = 0;  // points this near to each other become one vertex
+  bool keep_vertices = false;  // of the session's last mesh: where they are
   std::vector<double> domain_low;
   std::vector<double> domain_high;
   double margin = 0.25;
@@ -103,6 +104,7 @@ struct MeshHeader {
   uint64_t chunk_count = 0;
   uint64_t revision = 0;  // of the session's mesh; 0 in the answer of MeshPoints
   bool has_weights = false;
+  uint64_t moved_vertex_count = 0;  // see the proto's MeshChunk.moved_vertices
   MeshStatistics statistics;
 };
 
@@ -114,6 +116,8 @@ struct Mesh {
   std::vector<double> weights;         // vertex_count squared lengths, of a regular triangulation; else empty
   std::vector<uint32_t> simplices;     // simplex_count x (dimension + 1), row-major
   std::vector<uint32_t> input_vertex;  // per input point: the vertex it became
+  // The vertices that the session's mesh before had at another place, ascending.
+  std::vector<uint32_t> moved_vertices;
   MeshStatistics statistics;
 };
 
@@ -133,6 +137,8 @@ class MeshSink {
   virtual absl::Status Begin(const MeshHeader& header) = 0;
   // Rows of `dimension` coordinates.
   virtual absl::Status AddPoints(std::span<const double> points) = 0;
+  // Vertices of the last piece of points that have moved since the session's mesh before. Called only if there are any.
+  virtual absl::Status AddMovedVertices(std::span<const uint32_t> /*vertices*/) { return absl::OkStatus(); }
   // The next vertices' weights, if the header has_weights.
   virtual absl::Status AddWeights(std::span<const double> weights) = 0;
   // Rows of dimension + 1 vertices.
@@ -150,6 +156,7 @@ class MeshCollector final : public MeshSink {
  public:
   absl::Status Begin(const MeshHeader& header) override;
   absl::Status AddPoints(std::span<const double> points) override;
+  absl::Status AddMovedVertices(std::span<const uint32_t> vertices) override;
   absl::Status AddWeights(std::span<const double> weights) override;
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override;
   absl::Status AddInputVertices(std::span<const uint32_t> vertices) override;

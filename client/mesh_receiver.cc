@@ -90,11 +90,11 @@ absl::Status MeshReceiver::SetMetadata(const v1::MeshMetadata& metadata) {
     return status;
   }
   if (has_metadata_) {
-    const bool is_the_same = header.revision == header_.revision && header.dimension == header_.dimension &&
-                             header.vertex_count == header_.vertex_count &&
-                             header.simplex_count == header_.simplex_count &&
-                             header.input_point_count == header_.input_point_count &&
-                             header.chunk_count == header_.chunk_count && header.has_weights == header_.has_weights;
+    const bool is_the_same =
+        header.revision == header_.revision && header.dimension == header_.dimension &&
+        header.vertex_count == header_.vertex_count && header.simplex_count == header_.simplex_count &&
+        header.input_point_count == header_.input_point_count && header.chunk_count == header_.chunk_count &&
+        header.has_weights == header_.has_weights && header.moved_vertex_count == header_.moved_vertex_count;
     return is_the_same ? absl::OkStatus()
                        : Contradiction("a continued download of another mesh: revision ", header.revision, " with ",
                                        header.vertex_count, " vertices after revision ", header_.revision, " with ",
@@ -123,6 +123,23 @@ absl::Status MeshReceiver::CheckOrder(Array array, uint64_t values) const {
   }
   if (received_[array] + values > SizeOf(array)) {
     return Contradiction("more than the announced ", SizeOf(array) / WidthOf(array), " ", kArrayNames[array]);
+  }
+  return absl::OkStatus();
+}
+
+// Vertices that have moved come with their points, from vertex number `first` on.
+absl::Status MeshReceiver::CheckMoved(const v1::MeshChunk& chunk, uint64_t first) const {
+  const uint64_t end = first + chunk.points_size() / header_.dimension;
+  uint64_t least = first;
+  for (const uint32_t vertex : chunk.moved_vertices()) {
+    if (vertex < least || vertex >= end) {
+      return Contradiction("chunk ", chunk.index(), " has the moved vertex ", vertex, ", of vertices ", least, " to ",
+                           end);
+    }
+    least = uint64_t{vertex} + 1;
+  }
+  if (moved_ + chunk.moved_vertices_size() > header_.moved_vertex_count) {
+    return Contradiction("more than the announced ", header_.moved_vertex_count, " moved vertices");
   }
   return absl::OkStatus();
 }
@@ -164,11 +181,19 @@ absl::Status MeshReceiver::AddChunk(const v1::MeshChunk& chunk) {
   if (!status.ok()) {
     return status;
   }
+  if (absl::Status moved = CheckMoved(chunk, array == kPoints ? received_[kPoints] / WidthOf(kPoints) : 0);
+      !moved.ok()) {
+    return moved;
+  }
   ++next_chunk_;
+  moved_ += chunk.moved_vertices_size();
   received_[array] += values;
   switch (array) {
     case kPoints:
-      return sink_.AddPoints(SpanOf(chunk.points()));
+      if (absl::Status added = sink_.AddPoints(SpanOf(chunk.points())); !added.ok() || chunk.moved_vertices().empty()) {
+        return added;
+      }
+      return sink_.AddMovedVertices(SpanOf(chunk.moved_vertices()));
     case kWeights:
       return sink_.AddWeights(SpanOf(chunk.weights()));
     case kSimplices:
@@ -190,6 +215,9 @@ absl::Status MeshReceiver::Finish() {
       return Contradiction(received_[array] / WidthOf(array), " of ", SizeOf(array) / WidthOf(array), " ",
                            kArrayNames[array]);
     }
+  }
+  if (moved_ != header_.moved_vertex_count) {
+    return Contradiction(moved_, " of ", header_.moved_vertex_count, " moved vertices");
   }
   return sink_.Finish();
 }

@@ -53,6 +53,7 @@ class MeshReceiver {
   uint64_t SizeOf(int array) const;  // in numbers
   // Whether `values` may follow what has come of `array`.
   absl::Status CheckOrder(Array array, uint64_t values) const;
+  absl::Status CheckMoved(const v1::MeshChunk& chunk, uint64_t first) const;
 
   MeshSink& sink_;
   const Expectation expectation_;
@@ -61,6 +62,7 @@ class MeshReceiver {
   MeshHeader header_;
   uint64_t next_chunk_ = 0;
   std::array<uint64_t, kArrays> received_ = {};  // numbers
+  uint64_t moved_ = 0;                           // vertices that have moved
 };
 
 }  // namespace wellspace::client

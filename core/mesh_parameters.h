@@ -34,6 +34,10 @@ struct MeshParameters {
   // slivers are left. From 3-D on.
   bool pump_weights = false;
 
+  // Refine does not move vertices of the last mesh that was extracted: the repair of slivers adds vertices, and moves
+  // those that are new since.
+  bool keep_vertices = false;
+
   // Low and high corner of the box to be meshed, `dimension` numbers each. Both empty: the bounding box of the points,
   // grown on every side by `margin` times its longest side.
   std::vector<double> domain_low{};

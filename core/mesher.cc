@@ -140,7 +140,7 @@ class MesherIn final : public Mesher {
     // With vertex_at_, whether it has been made or somebody is making it.
     return structure_.MemoryBytes() + refinement_->MemoryBytes() + SliverMemoryBytes() +
            (output_index_.size() + distinct_count_ + input_vertex_.size()) * sizeof(uint32_t) +
-           negative_zeros_.size() * sizeof(size_t);
+           negative_zeros_.size() * sizeof(size_t) + moved_.size() / 8;
   }
 
   absl::Status CheckFeasible(const MeshParameters& parameters) const override {
@@ -318,7 +318,9 @@ class MesherIn final : public Mesher {
     if (!MakesWhole()) {
       simplices_seconds_ += absl::ToDoubleSeconds(context.TimeIn(Phase::kSimplices));
     }
+    mesh.moved_vertices = MovedVertices();
     has_moved_ = false;
+    moved_.clear();
     FinishMesh(mesh);
     return mesh;
   }
@@ -353,6 +355,7 @@ class MesherIn final : public Mesher {
         has_changed, [this](uint32_t v) -> const Point<D>& { return structure_.point(VertexOf(v)); }, mesh);
     mesh.simplices.insert(mesh.simplices.end(), simplices.indices.begin(), simplices.indices.end());
     mesh.input_vertex.assign(input_vertex_.begin(), input_vertex_.end());
+    mesh.moved_vertices.clear();  // else the mesh is extracted anew
     if (worst_has_gone) {
       const QualityReport report = MeasureQuality({D, mesh.points, mesh.simplices});
       mesh.statistics.max_radius_edge = report.max_radius_edge;
@@ -410,8 +413,15 @@ class MesherIn final : public Mesher {
       if (const double min_dihedral = MinDihedralOf(parameters); min_dihedral > 0) {
         const MendDemands demands{DemandsOf(parameters), min_dihedral, domain_.MinEdge(), VertexBudget(parameters)};
         const uint64_t moves = slivers_.statistics().moves;
-        const absl::Status status =
-            slivers_.Mend(structure_, *refinement_, is_given_, demands, parameters.threads, context);
+        moved_.resize(extracted_vertices_, false);
+        std::vector<bool> kept;
+        if (parameters.keep_vertices) {
+          kept = is_given_;
+          std::fill_n(kept.begin(), extracted_vertices_, true);
+        }
+        const absl::Status status = slivers_.Mend(structure_, *refinement_, parameters.keep_vertices ? kept : is_given_,
+                                                  demands, moved_, parameters.threads, context);
+        is_given_.resize(structure_.vertex_count(), false);
         has_moved_ = has_moved_ || slivers_.statistics().moves > moves;
         context.SetVertices(structure_.vertex_count());
         pumps_ = parameters.pump_weights && slivers_.statistics().slivers_left > 0;
@@ -455,6 +465,17 @@ class MesherIn final : public Mesher {
     WELLSPACE_ASSIGN_OR_RETURN(made.simplices,
                                ComputeSimplices<D>(structure_, refinement_->stars(), output_index_, threads, context));
     return made;
+  }
+
+  // Steiner vertices that have moved since the last mesh; ascending, as they have the same numbers outside as inside.
+  HugeVector<uint32_t> MovedVertices() const {
+    HugeVector<uint32_t> vertices;
+    for (uint32_t v = 0; v < moved_.size(); ++v) {
+      if (moved_[v]) {
+        vertices.push_back(OutputIndex(VertexId{v}));
+      }
+    }
+    return vertices;
   }
 
   // Refuses numbers that are no vertex.
@@ -690,6 +711,7 @@ class MesherIn final : public Mesher {
   [[no_unique_address]] std::conditional_t<(D >= 3), SliverStage<D>, std::monostate> slivers_;
   bool pumps_ = false;
   bool has_moved_ = false;      // a vertex, since the last mesh
+  std::vector<bool> moved_;     // by vertex, since the last mesh, of those that it had
   std::vector<bool> is_given_;  // by vertex: an input point, or a corner of the box
 
   uint64_t distinct_count_ = 0;        // the former

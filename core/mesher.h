@@ -31,6 +31,9 @@ struct Mesh {
   // The weight of each vertex, a squared length; the mesh is their regular triangulation. Empty where all are zero, and
   // the mesh is Delaunay.
   HugeVector<double> weights;
+  // Vertices of the mesh that was extracted before which are elsewhere now, ascending; none in a first mesh. They are
+  // Steiner vertices: neither input points nor corners of the box.
+  HugeVector<uint32_t> moved_vertices;
   MeshStatistics statistics;
 
   uint64_t vertex_count() const { return dimension == 0 ? 0 : points.size() / dimension; }
@@ -60,7 +63,9 @@ struct Cell {
 // A mesh in the making and after: the query structure of [HT08] with its refinement. Vertices can be added to a refined
 // mesh, and it be refined again, at the cost of what has changed.
 //
-// Vertices are named by their index in the mesh, which never changes. The mesh depends neither on the order of the points
+// Vertices are named by their index in the mesh, which never changes. By default, in 3-D, Refine moves Steiner vertices
+// to repair slivers, those of an earlier mesh among them; Mesh::moved_vertices has these, and
+// MeshParameters::keep_vertices keeps them where they are. The mesh depends neither on the order of the points
 // (but for the numbering of vertices), nor on the number of threads, nor on the machine.
 //
 // Thread safety: thread-compatible: const functions may run at once, others alone. A RunContext may be observed and
@@ -91,9 +96,10 @@ class Mesher {
   // Errors:     INVALID_ARGUMENT (parameters); RESOURCE_EXHAUSTED with the predicted number, the limit and what fits.
   virtual absl::Status CheckFeasible(const MeshParameters& /*parameters*/) const { return absl::OkStatus(); }
 
-  // Adds Steiner vertices until the criterion and the sizes of `parameters` are met, then mends slivers, for which these
-  // vertices move too; with pump_weights, Extract gives weights if slivers are left, or nothing was mended. Of the
-  // parameters rho, criterion, sizes, min_dihedral, pump_weights, max_vertices and threads count; the box is that of Create.
+  // Adds Steiner vertices until criterion and sizes of `parameters` are met, then repairs slivers, for which these move
+  // too; those of an earlier mesh unless keep_vertices. With pump_weights, Extract gives weights if slivers are left, or
+  // none were to be repaired. All parameters count but dimension, domain, margin and merge_distance: the box is that of
+  // Create.
   //
   // Complexity: O(m) queries the first time and for other demands than the last; else in proportion to what was added
   //             since.

@@ -186,6 +186,7 @@ grpc::Status ParametersFromProto(const v1::MeshParameters& message, const Servic
     }
   }
   parameters->pump_weights = message.pump_weights();
+  parameters->keep_vertices = message.keep_vertices();
   if (grpc::Status status = Validate(*parameters, "pump_weights"); !status.ok()) {
     return status;
   }
@@ -238,6 +239,7 @@ v1::MeshParameters ParametersToProto(const core::MeshParameters& parameters) {
   message.set_min_dihedral(parameters.min_dihedral.value_or(core::DefaultMinDihedral(parameters.dimension)));
   message.set_pump_weights(parameters.pump_weights);
   message.set_merge_distance(parameters.merge_distance);
+  message.set_keep_vertices(parameters.keep_vertices);
   message.set_max_vertices(parameters.max_vertices);
   message.set_threads(parameters.threads);
   return message;
@@ -261,6 +263,7 @@ v1::MeshMetadata MetadataToProto(const core::Mesh& mesh, uint64_t chunk_count) {
   metadata.set_input_point_count(mesh.input_vertex.size());
   metadata.set_chunk_count(chunk_count);
   metadata.set_has_weights(!mesh.weights.empty());
+  metadata.set_moved_vertex_count(mesh.moved_vertices.size());
   *metadata.mutable_statistics() = StatisticsToProto(mesh.statistics);
   return metadata;
 }

@@ -49,7 +49,9 @@ std::string TagOf(int field, uint64_t size) {
 
 MeshChunks::MeshChunks(core::Mesh mesh, uint64_t max_bytes) : mesh_(std::move(mesh)) {
   const uint64_t bytes = std::max(max_bytes, 2 * kEnvelopeBytes) - kEnvelopeBytes;
-  points_per_chunk_ = bytes / (sizeof(double) * mesh_.dimension);
+  // Beside each point that has moved stands its number.
+  points_per_chunk_ =
+      bytes / (sizeof(double) * mesh_.dimension + (mesh_.moved_vertices.empty() ? 0 : sizeof(uint32_t)));
   simplices_per_chunk_ = bytes / (sizeof(uint32_t) * (mesh_.dimension + 1));
   weights_per_chunk_ = bytes / sizeof(double);
   inputs_per_chunk_ = bytes / sizeof(uint32_t);
@@ -61,13 +63,18 @@ MeshChunks::MeshChunks(core::Mesh mesh, uint64_t max_bytes) : mesh_(std::move(me
 
 uint64_t MeshChunks::memory_bytes() const {
   return kChunksOnTheirWay * kMaxResponseBytes + (mesh_.points.capacity() + mesh_.weights.capacity()) * sizeof(double) +
-         (mesh_.simplices.capacity() + mesh_.input_vertex.capacity()) * sizeof(uint32_t);
+         (mesh_.simplices.capacity() + mesh_.input_vertex.capacity() + mesh_.moved_vertices.capacity()) *
+             sizeof(uint32_t);
 }
 
 MeshChunks::Chunk MeshChunks::Get(uint64_t index) const {
   if (index < point_chunks_) {
-    return Rows(v1::MeshChunk::kPointsFieldNumber, mesh_.points, mesh_.dimension, index * points_per_chunk_,
-                points_per_chunk_);
+    const uint64_t first = index * points_per_chunk_;
+    Chunk chunk = Rows(v1::MeshChunk::kPointsFieldNumber, mesh_.points, mesh_.dimension, first, points_per_chunk_);
+    const auto& moved = mesh_.moved_vertices;
+    const auto begin = std::lower_bound(moved.begin(), moved.end(), first);
+    chunk.moved = {begin, std::lower_bound(begin, moved.end(), first + points_per_chunk_)};
+    return chunk;
   }
   index -= point_chunks_;
   if (index < weight_chunks_) {
@@ -89,6 +96,7 @@ grpc::ByteBuffer SerializeChunk(const std::shared_ptr<const MeshChunks>& mesh, u
   v1::MeshChunk message;
   message.set_index(index);
   message.set_crc32c(Crc32c(chunk.data, chunk.size));
+  message.mutable_moved_vertices()->Add(chunk.moved.begin(), chunk.moved.end());
   const std::string before_values = message.SerializeAsString() + TagOf(chunk.field, chunk.size);
   const std::string head = TagOf(field, before_values.size() + chunk.size) + before_values;
 

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <utility>
 
 #include "core/mesher.h"
@@ -23,7 +24,8 @@ class MeshChunks {
   struct Chunk {
     int field = 0;  // of v1.MeshChunk
     const void* data = nullptr;
-    uint64_t size = 0;  // bytes
+    uint64_t size = 0;                  // bytes
+    std::span<const uint32_t> moved{};  // of the vertices of a chunk of points
   };
 
   explicit MeshChunks(core::Mesh mesh, uint64_t max_bytes = kMaxResponseBytes);

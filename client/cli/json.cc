@@ -66,6 +66,7 @@ Json ParametersJson(const client::MeshOptions& parameters) {
   }
   json["min_dihedral"] = parameters.min_dihedral.has_value() ? Json(*parameters.min_dihedral) : Json(nullptr);
   json["pump_weights"] = parameters.pump_weights;
+  json["keep_vertices"] = parameters.keep_vertices;
   const bool has_domain = !parameters.domain_low.empty();
   json["domain_low"] = has_domain ? Json(parameters.domain_low) : Json(nullptr);
   json["domain_high"] = has_domain ? Json(parameters.domain_high) : Json(nullptr);

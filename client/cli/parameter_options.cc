@@ -89,6 +89,10 @@ void ParameterOptions::AddQualityTo(CLI::App& command) {
   command.add_flag("--pump-weights", options_.pump_weights,
                    "From 3-D on: give vertices weights that make the worst simplices better; the mesh is then their "
                    "regular triangulation, not Delaunay. After --min-dihedral only if that has left slivers");
+  command.add_flag(
+      "--keep-vertices", options_.keep_vertices,
+      "In a session: leave the vertices of its last mesh where they are; the repair of slivers, which is on by "
+      "default in 3-D, then adds vertices, and moves only new ones");
   AddCount(
       command, "--max-vertices", [this](uint64_t count) { options_.max_vertices = count; },
       "Fail before the mesh has more vertices than this; 50 million by default", 1);
@@ -96,7 +100,7 @@ void ParameterOptions::AddQualityTo(CLI::App& command) {
       command, "--threads", [this](uint64_t count) { options_.threads = static_cast<int>(count); },
       "Threads that mesh; default: as many as help, up to all cores; of a session 1", 1, 1024);
   for (const char* name : {"--criterion", "--rho", "--size", "--size-box", "--min-dihedral", "--pump-weights",
-                           "--max-vertices", "--threads"}) {
+                           "--max-vertices", "--threads", "--keep-vertices"}) {
     quality_.push_back(command.get_option(name));
   }
 }
@@ -158,6 +162,7 @@ absl::StatusOr<client::MeshOptions> ParameterOptions::Replace(client::MeshOption
   replace(5, parameters.pump_weights, given->pump_weights);
   replace(6, parameters.max_vertices, given->max_vertices);
   replace(7, parameters.threads, given->threads);
+  replace(8, parameters.keep_vertices, given->keep_vertices);
   return parameters;
 }
 

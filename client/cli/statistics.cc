@@ -2,6 +2,7 @@
 
 #include <array>
 #include <nlohmann/json.hpp>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
@@ -91,7 +92,8 @@ std::string SliversText(const client::SliverStatistics& slivers) {
 
 }  // namespace
 
-std::string StatisticsJson(const client::MeshHeader& mesh, std::span<const uint32_t> input_vertex) {
+std::string StatisticsJson(const client::MeshHeader& mesh, std::span<const uint32_t> input_vertex,
+                           std::span<const uint32_t> moved_vertices) {
   const client::MeshStatistics& statistics = mesh.statistics;
   nlohmann::ordered_json json;
   json["dimension"] = mesh.dimension;
@@ -110,6 +112,7 @@ std::string StatisticsJson(const client::MeshHeader& mesh, std::span<const uint3
   json["peak_memory_bytes"] = statistics.peak_memory_bytes;
   json["counters"] = statistics.counters;
   json["duplicate_of"] = DuplicateOf(input_vertex);
+  json["moved_vertices"] = std::vector<uint32_t>(moved_vertices.begin(), moved_vertices.end());
   return json.dump(2) + "\n";
 }
 
@@ -125,6 +128,9 @@ std::string Summary(const client::MeshHeader& mesh) {
       absl::StrFormat("; radius-edge at most %.4f, %s at least %.2f\u00b0", statistics.max_radius_edge,
                       mesh.dimension == 2 ? "angles" : "dihedral angles", statistics.min_angle_deg),
       statistics.slivers.has_value() ? SliversText(*statistics.slivers) : "",
+      mesh.moved_vertex_count == 0
+          ? ""
+          : absl::StrCat("; ", WithThousands(mesh.moved_vertex_count), " vertices of the mesh before have moved"),
       total == statistics.seconds.end() ? "" : absl::StrFormat("; %.2f s", total->second));
 }
 

@@ -21,7 +21,9 @@ namespace wellspace::cli {
 //   peak_memory_bytes, counters
 //   duplicate_of: [[i, v], ...]: input point i is equal to an earlier one, and both became vertex v. The other input
 //                 points are, in their order, the first vertices. `input_vertex` says which vertex each became.
-std::string StatisticsJson(const client::MeshHeader& mesh, std::span<const uint32_t> input_vertex);
+//   moved_vertices: the vertices that the session's mesh before had at another place
+std::string StatisticsJson(const client::MeshHeader& mesh, std::span<const uint32_t> input_vertex,
+                           std::span<const uint32_t> moved_vertices = {});
 
 // "5 points -> 17 vertices, 20 triangles; ...", one line without its end.
 std::string Summary(const client::MeshHeader& mesh);

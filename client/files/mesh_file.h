@@ -26,6 +26,10 @@ class MeshFile final : public MeshSink {
 
   absl::Status Begin(const MeshHeader& header) override;
   absl::Status AddPoints(std::span<const double> points) override { return writer_->AddPoints(points); }
+  absl::Status AddMovedVertices(std::span<const uint32_t> vertices) override {
+    moved_vertices_.insert(moved_vertices_.end(), vertices.begin(), vertices.end());
+    return absl::OkStatus();
+  }
   absl::Status AddWeights(std::span<const double> weights) override { return writer_->AddWeights(weights); }
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override { return writer_->AddSimplices(simplices); }
   absl::Status AddInputVertices(std::span<const uint32_t> vertices) override;
@@ -37,6 +41,7 @@ class MeshFile final : public MeshSink {
   // What has been told of the mesh, and what was kept.
   const MeshHeader& header() const { return header_; }
   const std::vector<uint32_t>& input_vertex() const { return input_vertex_; }
+  const std::vector<uint32_t>& moved_vertices() const { return moved_vertices_; }
 
  private:
   const std::string path_;
@@ -46,6 +51,7 @@ class MeshFile final : public MeshSink {
   std::unique_ptr<formats::MeshWriter> writer_;
   bool keeps_input_vertices_ = false;
   std::vector<uint32_t> input_vertex_;
+  std::vector<uint32_t> moved_vertices_;
 };
 
 }  // namespace wellspace::client

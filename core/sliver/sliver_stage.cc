@@ -120,10 +120,16 @@ class WorstCandidates {
 // Has structure and refinement follow the triangulation step by step, so that mending may end after any of them.
 class Follower final : public MendObserver {
  public:
-  Follower(Triangulation<3>& triangulation, QueryStructure<3>& structure, Refinement<3>& refinement)
-      : triangulation_(triangulation), structure_(structure), refinement_(refinement) {}
+  Follower(Triangulation<3>& triangulation, QueryStructure<3>& structure, Refinement<3>& refinement,
+           std::vector<bool>& moved)
+      : triangulation_(triangulation), structure_(structure), refinement_(refinement), moved_(moved) {}
 
-  void VertexMoved(VertexId v) override { structure_.MoveVertex(v, triangulation_.point(v)); }
+  void VertexMoved(VertexId v) override {
+    structure_.MoveVertex(v, triangulation_.point(v));
+    if (Index(v) < moved_.size()) {
+      moved_[Index(v)] = true;
+    }
+  }
   void VertexAdded(VertexId v, VertexId near) override { structure_.AddVertex(near, triangulation_.point(v)); }
 
   void StarChanged(VertexId v) override {
@@ -147,6 +153,7 @@ class Follower final : public MendObserver {
   Triangulation<3>& triangulation_;
   QueryStructure<3>& structure_;
   Refinement<3>& refinement_;
+  std::vector<bool>& moved_;
   std::vector<SimplexId> star_;
 };
 
@@ -218,12 +225,13 @@ absl::Status SliverStage<D>::FollowStructure(const QueryStructure<D>& structure,
 template <int D>
 template <int E>
 absl::Status SliverStage<D>::Mend(QueryStructure<E>& structure, Refinement<E>& refinement, std::vector<bool>& is_fixed,
-                                  const MendDemands& demands, int threads, RunContext& context) requires(E == 3) {
+                                  const MendDemands& demands, std::vector<bool>& moved, int threads,
+                                  RunContext& context) requires(E == 3) {
   const Stopwatch stopwatch(statistics_.seconds, statistics_.star_seconds);
   statistics_.is_asked = true;
   WELLSPACE_RETURN_IF_ERROR(FollowStructure(structure, refinement.stars(), threads, context));
   context.EnterPhase(Phase::kSlivers);
-  Follower follower(*triangulation_, structure, refinement);
+  Follower follower(*triangulation_, structure, refinement, moved);
   Mender mender(*triangulation_, is_fixed, demands, follower);
   const absl::Status status = mender.Run(threads, context);
   statistics_.slivers += mender.report().slivers;
@@ -293,6 +301,6 @@ template class SliverStage<4>;
 template class SliverStage<5>;
 template class SliverStage<6>;
 template absl::Status SliverStage<3>::Mend(QueryStructure<3>&, Refinement<3>&, std::vector<bool>&, const MendDemands&,
-                                           int, RunContext&);
+                                           std::vector<bool>&, int, RunContext&);
 
 }  // namespace wellspace::core

@@ -52,6 +52,7 @@ class SliverStage {
  public:
   // Mends the slivers, and tells structure and refinement what has changed, on an error too. 3-D.
   //
+  // Shapes:     moved: vertices below its size that move are set in it.
   // REQUIRES:   the structure is refined for demands.demands; is_fixed has an entry for each of its vertices.
   // Complexity: O(m) the first time; then O(1) for each vertex added since and each sliver, and a look at every simplex.
   // Errors:     RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED, DEADLINE_EXCEEDED; all stays usable.
@@ -59,7 +60,8 @@ class SliverStage {
   // A template, since clang 14 would instantiate it in other dimensions otherwise.
   template <int E = D>
   absl::Status Mend(QueryStructure<E>& structure, Refinement<E>& refinement, std::vector<bool>& is_fixed,
-                    const MendDemands& demands, int threads, RunContext& context) requires(E == 3);
+                    const MendDemands& demands, std::vector<bool>& moved, int threads,
+                    RunContext& context) requires(E == 3);
 
   // The simplices of the mended mesh; with `pump`, of its regular triangulation under pumped weights. Order and form of
   // the simplices are independent of the number of threads.

@@ -128,6 +128,16 @@ TEST(SliverWarningTest, SaysWhatIsLeftAndWhy) {
             nlohmann::json::parse(R"([{"vertices": [4, 7, 9, 11], "min_dihedral_deg": 0.0, "reason": "demands"}])"));
 }
 
+TEST(SummaryTest, SaysHowManyVerticesHaveMoved) {
+  client::MeshHeader mesh = SmallMesh(3);
+  EXPECT_THAT(Summary(mesh), testing::Not(HasSubstr("moved")));
+  mesh.moved_vertex_count = 2;
+  EXPECT_THAT(Summary(mesh), HasSubstr("; 2 vertices of the mesh before have moved"));
+  const std::vector<uint32_t> moved = {5, 8};
+  EXPECT_EQ(nlohmann::json::parse(StatisticsJson(mesh, kInputVertex, moved))["moved_vertices"],
+            nlohmann::json::parse("[5, 8]"));
+}
+
 constexpr client::MeshEstimate kEstimate = {
     .vertices = 1234567, .simplices = 7654321, .memory_bytes = uint64_t{3} << 29, .tree_leaves = 42};
 

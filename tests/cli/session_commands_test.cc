@@ -335,6 +335,16 @@ TEST_F(SessionCommandsTest, RefineWaitsForTheEnd) {
   EXPECT_EQ(detached.out, std::string(kOperation) + "\n");
 }
 
+// The other parameters stay those of the session.
+TEST_F(SessionCommandsTest, RefineKeepsVerticesIfThatIsAsked) {
+  OperationsEndAs(MakeOperation(v1::Operation::STATE_SUCCEEDED));
+  EXPECT_EQ(Run({"refine", "one", "--keep-vertices", "--quiet"}).exit_code, 0);
+  EXPECT_TRUE(started_.parameters().keep_vertices());
+  EXPECT_EQ(started_.parameters().rho(), 1.5);
+  EXPECT_EQ(Run({"refine", "one", "--rho", "2", "--quiet"}).exit_code, 0);
+  EXPECT_FALSE(started_.parameters().keep_vertices());
+}
+
 TEST_F(SessionCommandsTest, AFailedOperationIsTheCommandsError) {
   v1::Operation failed = MakeOperation(v1::Operation::STATE_FAILED);
   failed.mutable_error()->set_code(grpc::StatusCode::RESOURCE_EXHAUSTED);

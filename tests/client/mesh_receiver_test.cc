@@ -124,6 +124,30 @@ TEST(MeshReceiver, AssemblesAMesh) {
   EXPECT_EQ(mesh->statistics.counters.count("tree_leaves"), 1u);
 }
 
+TEST(MeshReceiver, TellsWhichVerticesHaveMoved) {
+  Answer answer = GoodAnswer();
+  answer.metadata.set_moved_vertex_count(3);
+  answer.chunks[0].add_moved_vertices(1);
+  answer.chunks[1].add_moved_vertices(2);
+  answer.chunks[1].add_moved_vertices(3);
+  const absl::StatusOr<Mesh> mesh = Assemble(answer);
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_THAT(mesh->moved_vertices, ElementsAre(1, 2, 3));
+
+  Answer few = answer;
+  few.metadata.set_moved_vertex_count(4);
+  EXPECT_EQ(Assemble(few).status().message(), "the server's answer is damaged: 3 of 4 moved vertices");
+  few.metadata.set_moved_vertex_count(2);
+  EXPECT_EQ(Assemble(few).status().code(), absl::StatusCode::kDataLoss);
+  // Of another chunk, and not ascending.
+  Answer wrong = answer;
+  wrong.chunks[0].set_moved_vertices(0, 2);
+  EXPECT_EQ(Assemble(wrong).status().code(), absl::StatusCode::kDataLoss);
+  wrong = answer;
+  wrong.chunks[1].set_moved_vertices(1, 2);
+  EXPECT_EQ(Assemble(wrong).status().code(), absl::StatusCode::kDataLoss);
+}
+
 TEST(MeshReceiver, AssemblesAMeshWithWeights) {
   const absl::StatusOr<Mesh> mesh = Assemble(WeightedAnswer());
   ASSERT_TRUE(mesh.ok()) << mesh.status();

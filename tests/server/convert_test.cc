@@ -54,6 +54,7 @@ TEST(ParametersFromProto, FillsInDefaults) {
   EXPECT_FALSE(parameters.min_dihedral.has_value());
   EXPECT_FALSE(parameters.pump_weights);
   EXPECT_EQ(parameters.merge_distance, 0);
+  EXPECT_FALSE(parameters.keep_vertices);
 }
 
 TEST(ParametersFromProto, TakesEveryField) {
@@ -69,6 +70,7 @@ TEST(ParametersFromProto, TakesEveryField) {
   message.set_min_dihedral(0);
   message.set_pump_weights(true);
   message.set_merge_distance(1e-9);
+  message.set_keep_vertices(true);
   core::MeshParameters parameters;
   ASSERT_TRUE(ParametersFromProto(message, SmallLimits(), &parameters).ok());
   EXPECT_EQ(parameters.rho, 2.5);
@@ -88,6 +90,7 @@ TEST(ParametersFromProto, TakesEveryField) {
   EXPECT_TRUE(parameters.pump_weights);
   EXPECT_EQ(parameters.merge_distance, 1e-9);
   EXPECT_EQ(ParametersToProto(parameters).merge_distance(), 1e-9);
+  EXPECT_TRUE(parameters.keep_vertices);
 }
 
 TEST(ParametersFromProto, EveryDimensionHasItsDefaults) {
@@ -332,6 +335,13 @@ TEST(MetadataToProto, CountsAndStatistics) {
   EXPECT_FALSE(metadata.has_weights());
   EXPECT_EQ(metadata.statistics().triangulation(), v1::TRIANGULATION_DELAUNAY);
   EXPECT_FALSE(metadata.statistics().has_slivers());
+}
+
+TEST(MetadataToProto, SaysHowManyVerticesHaveMoved) {
+  core::Mesh mesh = MakeFakeMesh(core::MeshParameters(), std::vector<double>{0.25, 0.5, 0.75});
+  EXPECT_EQ(MetadataToProto(mesh, 1).moved_vertex_count(), 0u);
+  mesh.moved_vertices = {7, 8};
+  EXPECT_EQ(MetadataToProto(mesh, 1).moved_vertex_count(), 2u);
 }
 
 TEST(MetadataToProto, SaysWhatWasDoneAgainstSlivers) {

@@ -10,6 +10,7 @@
 #include "gtest/gtest.h"
 #include "proto/checksum.h"
 #include "tests/server/service_harness.h"
+#include "wellspace/v1/sessions.pb.h"
 
 namespace wellspace::server {
 namespace {
@@ -123,6 +124,36 @@ TEST_P(MeshChunksOf, AddUpToTheMesh) {
 INSTANTIATE_TEST_SUITE_P(Sizes, MeshChunksOf,
                          ::testing::Combine(::testing::Values(2, 3), ::testing::Values(0, 1, 2, 3, 100, 1000),
                                             ::testing::Values(128, 200, 1000, kMaxResponseBytes), ::testing::Bool()));
+
+// Vertices that have moved come with their points, in whatever pieces.
+TEST(MeshChunks, HaveTheMovedVerticesBesideTheirPoints) {
+  core::Mesh mesh = MakeFakeMesh(core::MeshParameters(), std::vector<double>(300, 0.5));
+  for (int i = 0; i < 300; ++i) {
+    mesh.points.insert(mesh.points.end(), {0.5, 0.25, i / 300.0});
+  }
+  for (uint32_t v = 5; v < mesh.vertex_count(); v += v < 100 ? 1 : 7) {
+    mesh.moved_vertices.push_back(v);
+  }
+  for (const uint64_t max_bytes : {uint64_t{128}, uint64_t{1000}, uint64_t{kMaxResponseBytes}}) {
+    const auto chunks = std::make_shared<MeshChunks>(mesh, max_bytes);
+    std::vector<uint32_t> moved;
+    uint64_t vertices = 0;
+    for (uint64_t index = 0; index < chunks->count(); ++index) {
+      const std::string bytes = BytesOf(SerializeChunk(chunks, index, v1::DownloadMeshResponse::kChunkFieldNumber));
+      EXPECT_LE(bytes.size(), max_bytes);
+      v1::DownloadMeshResponse response;
+      ASSERT_TRUE(response.ParseFromString(bytes));
+      const uint64_t end = vertices + response.chunk().points_size() / 3;
+      for (const uint32_t v : response.chunk().moved_vertices()) {
+        EXPECT_TRUE(vertices <= v && v < end) << v;
+        moved.push_back(v);
+      }
+      vertices = end;
+    }
+    EXPECT_EQ(vertices, mesh.vertex_count());
+    EXPECT_EQ(moved, std::vector<uint32_t>(mesh.moved_vertices.begin(), mesh.moved_vertices.end()));
+  }
+}
 
 TEST(MeshChunks, LargeMeshFillsItsChunks) {
   const auto chunks = std::make_shared<MeshChunks>(MakeFakeMesh(core::MeshParameters(), std::vector<double>(600'000)));

@@ -34,6 +34,9 @@ std::string QualityText(const client::MeshOptions& parameters) {
   if (parameters.pump_weights) {
     text += ", weights";
   }
+  if (parameters.keep_vertices) {
+    text += ", vertices of the last mesh kept";
+  }
   return text;
 }
 

@@ -114,7 +114,7 @@ absl::Status DownloadCommand::Download(client::Client& client, const client::Cal
     }
   }
   if (remote.json()) {
-    std::cout << StatisticsJson(file.header(), file.input_vertex()) << std::flush;
+    std::cout << StatisticsJson(file.header(), file.input_vertex(), file.moved_vertices()) << std::flush;
   } else if (!remote.quiet()) {
     std::cerr << Summary(file.header()) << (path == formats::kStandardStream ? "" : " -> " + path) << "\n";
   }
