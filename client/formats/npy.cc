@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/number.h"
+#include "client/formats/vtk_array.h"
 
 namespace wellspace::formats {
 namespace {
@@ -232,17 +233,25 @@ absl::Status NpyReader::ReadWords(std::vector<Value>& values, Convert convert) {
     }
     values.reserve(count);
   }
-  std::vector<Word> piece(std::min<uint64_t>(count, kPieceBytes / sizeof(Word)));
+  const bool is_big_endian = header_.type[0] == '>';
+  std::string piece(std::min<uint64_t>(count, kPieceBytes / sizeof(Word)) * sizeof(Word), '\0');
   for (uint64_t index = 0; index < count;) {
-    const size_t words = std::min<uint64_t>(count - index, piece.size());
-    if (absl::Status status = Take(reinterpret_cast<char*>(piece.data()), words * sizeof(Word)); !status.ok()) {
+    const size_t words = std::min<uint64_t>(count - index, piece.size() / sizeof(Word));
+    if (absl::Status status = Take(piece.data(), words * sizeof(Word)); !status.ok()) {
       return status;
     }
     for (size_t i = 0; i < words; ++i, ++index) {
+      const Word word = LoadWord<Word>(piece, i, is_big_endian);
       Value value;
-      if (!convert(piece[i], value)) {
-        return Error(absl::StrCat("expected indices from 0 to below the number of points, got ", piece[i], " at ",
-                                  PlaceOf(index)));
+      if (!convert(word, value)) {
+        // Type by type: a number of one byte is no character.
+        const std::string got = std::is_signed_v<Word> ? absl::StrCat(static_cast<int64_t>(word))
+                                                       : absl::StrCat(static_cast<uint64_t>(word));
+        return Error(
+            std::is_same_v<Value, double>
+                ? absl::StrCat("expected whole numbers that a double can hold, got ", got, " at ", PlaceOf(index))
+                : absl::StrCat("expected indices from 0 to below the number of points, got ", got, " at ",
+                               PlaceOf(index)));
       }
       values.push_back(value);
     }
@@ -257,46 +266,67 @@ absl::Status NpyReader::ReadWords(std::vector<Value>& values, Convert convert) {
   return ExpectEnd();
 }
 
+// Calls `read` with a value of the type that `type` names, and returns what it returns; nothing for other types.
+template <typename Read>
+std::optional<absl::Status> NpyReader::ForWholeType(const Read& read) {
+  const std::string_view type = header_.type;
+  if (type.size() != 3 || std::string_view("<>|=").find(type[0]) == std::string_view::npos ||
+      (type[0] == '|' && type[2] != '1')) {
+    return std::nullopt;
+  }
+  const std::string_view kind = type.substr(1);
+  return kind == "i1"   ? std::make_optional(read(int8_t{}))
+         : kind == "u1" ? std::make_optional(read(uint8_t{}))
+         : kind == "i2" ? std::make_optional(read(int16_t{}))
+         : kind == "u2" ? std::make_optional(read(uint16_t{}))
+         : kind == "i4" ? std::make_optional(read(int32_t{}))
+         : kind == "u4" ? std::make_optional(read(uint32_t{}))
+         : kind == "i8" ? std::make_optional(read(int64_t{}))
+         : kind == "u8" ? std::make_optional(read(uint64_t{}))
+                        : std::nullopt;
+}
+
 absl::Status NpyReader::ReadNumbers(std::vector<double>& values) {
   const auto widen = [](auto word, double& value) {
     value = word;
     return true;
   };
   values.clear();
-  if (header_.type == "<f8") {
+  if (header_.type == "<f8" || header_.type == ">f8") {
     return ReadWords<double>(values, widen);
   }
-  if (header_.type == "<f4") {
+  if (header_.type == "<f4" || header_.type == ">f4") {
     return ReadWords<float>(values, widen);
   }
-  return Error(absl::StrCat("expected numbers of type \"<f8\" or \"<f4\", got ", Quote(header_.type)));
-}
-
-template <typename Word>
-absl::Status NpyReader::ReadIndexWords(uint64_t limit, std::vector<uint32_t>& values) {
-  return ReadWords<Word>(values, [limit](Word word, uint32_t& value) {
-    value = static_cast<uint32_t>(word);
-    // A negative number is huge as an unsigned one.
-    return static_cast<uint64_t>(word) < limit;
+  const std::optional<absl::Status> status = ForWholeType([&](auto type) {
+    using Word = decltype(type);
+    return ReadWords<Word>(values, [](Word word, double& value) {
+      value = static_cast<double>(word);
+      // Beyond 2^53 some are between two doubles; the largest of 64 bits become 2^63 or 2^64, which no Word can hold.
+      constexpr double kLimit = 2.0 * static_cast<double>(uint64_t{1} << (8 * sizeof(Word) - 1));
+      return value < kLimit / (std::is_signed_v<Word> ? 2 : 1) && static_cast<Word>(value) == word;
+    });
   });
+  return status.has_value()
+             ? *status
+             : Error(absl::StrCat("expected numbers of type f4, f8, i1, i2, i4, i8, u1, u2, u4 or u8, got ",
+                                  Quote(header_.type)));
 }
 
 absl::Status NpyReader::ReadIndices(uint64_t limit, std::vector<uint32_t>& values) {
   values.clear();
-  if (header_.type == "<u4") {
-    return ReadIndexWords<uint32_t>(limit, values);
-  }
-  if (header_.type == "<i4") {
-    return ReadIndexWords<int32_t>(limit, values);
-  }
-  if (header_.type == "<u8") {
-    return ReadIndexWords<uint64_t>(limit, values);
-  }
-  if (header_.type == "<i8") {
-    return ReadIndexWords<int64_t>(limit, values);
-  }
-  return Error(
-      absl::StrCat("expected whole numbers of type \"<i4\", \"<i8\", \"<u4\" or \"<u8\", got ", Quote(header_.type)));
+  const std::optional<absl::Status> status = ForWholeType([&](auto type) {
+    using Word = decltype(type);
+    return ReadWords<Word>(values, [limit](Word word, uint32_t& value) {
+      value = static_cast<uint32_t>(word);
+      // A negative number is huge as an unsigned one.
+      return static_cast<uint64_t>(static_cast<int64_t>(word)) < limit;
+    });
+  });
+  return status.has_value()
+             ? *status
+             : Error(absl::StrCat("expected whole numbers of type i1, i2, i4, i8, u1, u2, u4 or u8, got ",
+                                  Quote(header_.type)));
 }
 
 }  // namespace wellspace::formats

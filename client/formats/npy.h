@@ -57,9 +57,10 @@ class NpyReader {
 
   // The values, row by row, whichever order the array is stored in; then expects the end of the source. To be called once.
   //
-  // Errors:     of the source; INVALID_ARGUMENT "NAME: …" for other types than Float32 and Float64.
+  // Errors:     of the source; INVALID_ARGUMENT "NAME: …" for other types than Float32, Float64 and whole numbers of 8
+  //             to 64 bits, signed or not, of either byte order; and for a whole number that no double is equal to.
   absl::Status ReadNumbers(std::vector<double>& values);
-  // The same for whole numbers of 32 or 64 bits, signed or not, from 0 to below `limit`.
+  // The same for whole numbers alone, from 0 to below `limit`.
   absl::Status ReadIndices(uint64_t limit, std::vector<uint32_t>& values);
 
  private:
@@ -76,8 +77,8 @@ class NpyReader {
   // Reads rows() * columns() numbers of type Word; `convert` makes a Value of each, or an error.
   template <typename Word, typename Value, typename Convert>
   absl::Status ReadWords(std::vector<Value>& values, Convert convert);
-  template <typename Word>
-  absl::Status ReadIndexWords(uint64_t limit, std::vector<uint32_t>& values);
+  template <typename Read>
+  std::optional<absl::Status> ForWholeType(const Read& read);
 
   std::string name_;
   ByteSource source_;

@@ -3,9 +3,9 @@
 // Formats:
 //   vtu   VTK's XML, one piece of triangles in the plane z = 0 or of tetrahedra; arrays in ascii, or inline in base64,
 //         compressed by zlib or not; either byte order. Weights are the point data "weights".
-//   npz   numpy's archive of arrays: `points` of type Float64 or Float32, vertices x dimension; `simplices` of type Int32,
-//         Int64, UInt32 or UInt64, simplices x (dimension + 1); little-endian, in C or Fortran order; weights are `weights`, as
-//         many numbers as there are vertices. Others are ignored.
+//   npz   numpy's archive of arrays: `points` of floating-point numbers of 4 or 8 bytes or whole ones, vertices x
+//         dimension; `simplices` of whole numbers, simplices x (dimension + 1); of either byte order, in C or Fortran
+//         order; weights are `weights`, as many numbers as there are vertices. Others are ignored.
 //   node  TetGen's and Triangle's pair of .node and .ele, given by either name. Weights are the only attribute of .node if the
 //         comment "# weights" stands before its header.
 //   msh   Gmsh's, 2.2 in ascii, or 4.1 in ascii or little-endian binary: the tetrahedra or, if there are none, the

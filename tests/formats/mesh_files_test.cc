@@ -385,6 +385,9 @@ TEST_F(NpzTest, TakesWholeNumbersOfEitherSizeAndSign) {
   EXPECT_THAT(read("<i4", BytesOf(std::array<int32_t, 3>{2, 1, 0})), ElementsAre(2, 1, 0));
   EXPECT_THAT(read("<u8", BytesOf(std::array<uint64_t, 3>{1, 0, 2})), ElementsAre(1, 0, 2));
   EXPECT_THAT(read("<i8", BytesOf(std::array<int64_t, 3>{1, 2, 0})), ElementsAre(1, 2, 0));
+  EXPECT_THAT(read("|u1", BytesOf(std::array<uint8_t, 3>{1, 2, 0})), ElementsAre(1, 2, 0));
+  EXPECT_THAT(read(">i2", std::string("\0\2\0\0\0\1", 6)), ElementsAre(2, 0, 1));
+  EXPECT_THAT(read(">u4", std::string("\0\0\0\2\0\0\0\0\0\0\0\1", 12)), ElementsAre(2, 0, 1));
 }
 
 TEST_F(NpzTest, Errors) {
@@ -405,9 +408,9 @@ TEST_F(NpzTest, Errors) {
   EXPECT_EQ(Refusal(points_, indices("<u4", std::array<uint32_t, 4>{0, 1, 2, 0})),
             "mesh.npz: simplices.npy: expected 3 columns for simplices of points with 2 coordinates, got 4");
   EXPECT_THAT(Refusal(points_, indices("<f8", std::array<double, 3>{0, 1, 2})),
-              HasSubstr("simplices.npy: expected whole numbers of type \"<i4\""));
-  EXPECT_THAT(Refusal(NpyText(">f8", 3, 2, std::string(48, '\0')), simplices_),
-              HasSubstr("points.npy: expected numbers of type \"<f8\" or \"<f4\", got \">f8\""));
+              HasSubstr("simplices.npy: expected whole numbers of type i1, i2, i4, i8, u1, u2, u4 or u8"));
+  EXPECT_THAT(Refusal(NpyText(">f2", 3, 2, std::string(12, '\0')), simplices_),
+              HasSubstr("points.npy: expected numbers of type f4, f8, i1, i2, i4, i8, u1, u2, u4 or u8, got \">f2\""));
   EXPECT_THAT(Refusal(NpyText("<f8", 3, 7, std::string(168, '\0')), simplices_),
               HasSubstr("points.npy: expected fewer than 2^32 rows and 2 to 6 columns"));
   EXPECT_THAT(Refusal(points_ + "x", simplices_), HasSubstr("points.npy: expected 48 bytes of values"));

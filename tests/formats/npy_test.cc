@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <limits>
@@ -110,6 +111,61 @@ TEST_F(NpyCloudTest, EitherOrderTypeAndVersion) {
   }
 }
 
+// The values as the file has them, in the byte order that `type` says.
+template <typename T>
+std::string BytesAs(const std::string& type, std::vector<T> values) {
+  std::string bytes(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
+  for (size_t at = 0; type[0] == '>' && at < bytes.size(); at += sizeof(T)) {
+    std::reverse(bytes.begin() + at, bytes.begin() + at + sizeof(T));
+  }
+  return bytes;
+}
+
+TEST_F(NpyCloudTest, EveryTypeInEitherByteOrderAndOrder) {
+  const auto expect = [this](const std::string& type, auto zero) {
+    using T = decltype(zero);
+    for (const bool fortran : {false, true}) {
+      const std::vector<T> values = fortran ? std::vector<T>{1, 3, 5, 2, 4, 120} : std::vector<T>{1, 2, 3, 4, 5, 120};
+      const std::string header =
+          "{'descr': '" + type + "', 'fortran_order': " + (fortran ? "True" : "False") + ", 'shape': (3, 2)}";
+      const absl::StatusOr<PointCloud> cloud = ReadCloud(folder_.Write("a.npy", Npy(header, BytesAs(type, values))));
+      ASSERT_TRUE(cloud.ok()) << cloud.status();
+      EXPECT_THAT(cloud->points, ElementsAre(1, 2, 3, 4, 5, 120)) << header;
+    }
+  };
+  for (const std::string order : {"<", ">"}) {
+    expect(order + "i2", int16_t{});
+    expect(order + "u2", uint16_t{});
+    expect(order + "i4", int32_t{});
+    expect(order + "u4", uint32_t{});
+    expect(order + "i8", int64_t{});
+    expect(order + "u8", uint64_t{});
+    expect(order + "f4", float{});
+    expect(order + "f8", double{});
+  }
+  expect("|i1", int8_t{});
+  expect("|u1", uint8_t{});
+}
+
+TEST_F(NpyCloudTest, WholeNumbersComeExactlyOrNotAtAll) {
+  const auto read = [this](const std::string& type, auto first) {
+    const std::vector<decltype(first)> values = {first, 0};
+    return ReadCloud(folder_.Write(
+        "a.npy", Npy("{'descr': '" + type + "', 'fortran_order': False, 'shape': (1, 2)}", BytesAs(type, values))));
+  };
+  EXPECT_EQ(read("<i8", int64_t{-1} << 63)->points[0], -0x1p63);
+  EXPECT_EQ(read(">i8", (int64_t{1} << 53) - 1)->points[0], 0x1p53 - 1);
+  EXPECT_EQ(read("<u8", uint64_t{1} << 63)->points[0], 0x1p63);
+  EXPECT_EQ(read("|i1", int8_t{-128})->points[0], -128);
+  EXPECT_EQ(read("|u1", uint8_t{255})->points[0], 255);
+  EXPECT_EQ(read(">i2", int16_t{-2})->points[0], -2);
+  EXPECT_EQ(read("<u4", uint32_t{4294967295})->points[0], 4294967295);
+  EXPECT_THAT(std::string(read("<i8", (int64_t{1} << 53) + 1).status().message()),
+              HasSubstr("expected whole numbers that a double can hold, got 9007199254740993 at [0, 0]"));
+  EXPECT_FALSE(read("<i8", std::numeric_limits<int64_t>::max()).ok());
+  EXPECT_FALSE(read("<u8", std::numeric_limits<uint64_t>::max()).ok());
+}
+
 TEST_F(NpyCloudTest, NoPoints) {
   const std::string content = Npy("{'descr': '<f8', 'fortran_order': True, 'shape': (0, 5)}", "");
   const absl::StatusOr<PointCloud> cloud = ReadCloud(folder_.Write("a.npy", content));
@@ -128,8 +184,11 @@ TEST_F(NpyCloudTest, Errors) {
   EXPECT_EQ(ReadBad(Npy(header("<f8", "(1, 2)"), point, 4)),
             "a.npy: expected version 1.0, 2.0 or 3.0 of the format, got 4.0");
   EXPECT_THAT(ReadBad(Npy("{'descr': '<f8'}", point)), HasSubstr("a.npy: expected the header {'descr'"));
-  EXPECT_EQ(ReadBad(Npy(header("<i8", "(1, 2)"), point)),
-            "a.npy: expected numbers of type \"<f8\" or \"<f4\", got \"<i8\"");
+  for (const char* type : {"<c8", "<f2", "|b1", "|O", "<i3", "?i4", "|i4", "i4", "", "<m8", "<f16"}) {
+    EXPECT_EQ(
+        ReadBad(Npy(header(type, "(1, 2)"), point)),
+        std::string("a.npy: expected numbers of type f4, f8, i1, i2, i4, i8, u1, u2, u4 or u8, got \"") + type + "\"");
+  }
   EXPECT_EQ(ReadBad(Npy(header("<f8", "(2,)"), point)),
             "a.npy: expected an array of 2 dimensions, rows and columns, got one of 1");
   EXPECT_EQ(ReadBad(Npy(header("<f8", "(2, 1)"), point)),
