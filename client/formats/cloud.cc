@@ -22,7 +22,10 @@ uint64_t LineIndex::LineOf(uint64_t point) const {
 }
 
 std::string PointCloud::Origin(uint64_t point) const {
-  return lines.size() == 0 ? absl::StrCat(name, "[", point, "]") : absl::StrCat(name, ":", lines.LineOf(point));
+  if (lines.size() > 0) {
+    return absl::StrCat(name, ":", lines.LineOf(point));
+  }
+  return absl::StrCat(name, "[", rows.size() > 0 ? rows.LineOf(point) : point, "]");
 }
 
 }  // namespace wellspace::formats

@@ -37,6 +37,11 @@ struct PointCloud {
   int dimension = 0;
   std::vector<double> points;  // size() x dimension, row-major
   LineIndex lines;             // of every point, or of none when the file has no lines
+  LineIndex rows;              // of every point in a file without lines, if points were skipped; or of none
+  uint64_t skipped = 0;        // points left out since a coordinate is missing or not finite
+  // What a user would want to know of how the file was read, a sentence each: which columns were taken, what was not
+  // used.
+  std::vector<std::string> notes;
 
   uint64_t size() const { return dimension == 0 ? 0 : points.size() / dimension; }
   // Where point `point` was read: "cloud.csv:17" or, in a file without lines, "cloud.npy[16]", counted from 0.

@@ -1,28 +1,57 @@
-// The readers behind ReadCloud, one for each format. Each fills `cloud.dimension` and `points`, those of text `lines`,
-// too; `dimension` is what the file must have, or 0. REQUIRES: cloud.name is set. Private to this folder.
+// The readers behind ReadCloud, one for each format. Each fills `cloud.dimension`, `points`, `skipped` and `notes`,
+// those of text `lines`, too; `options.dimension` is what the file must have, or 0. REQUIRES: cloud.name is set.
+// Private to this folder.
 #ifndef WELLSPACE_CLIENT_FORMATS_CLOUD_READERS_H_
 #define WELLSPACE_CLIENT_FORMATS_CLOUD_READERS_H_
 
+#include <array>
 #include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "client/formats/cloud.h"
 #include "client/formats/line_reader.h"
+#include "client/formats/read_cloud.h"
 
 namespace wellspace::formats {
 
-absl::Status ReadCsv(LineReader& reader, int dimension, PointCloud& cloud);
-absl::Status ReadXyz(LineReader& reader, int dimension, PointCloud& cloud);
-absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud);
-absl::Status ReadPly(LineReader& reader, int dimension, PointCloud& cloud);
-absl::Status ReadObj(LineReader& reader, int dimension, PointCloud& cloud);
-absl::Status ReadOff(LineReader& reader, int dimension, PointCloud& cloud);
-absl::Status ReadNpy(InputFile& file, int dimension, PointCloud& cloud);
+// These obey options.columns themselves.
+absl::Status ReadCsv(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadXyz(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadAsc(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadPts(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadPly(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadNpy(InputFile& file, const CloudOptions& options, PointCloud& cloud);
+
+// These leave options.columns to TakeColumns, which is called with what they return when no dimension was asked for.
+absl::Status ReadNode(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadObj(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadOff(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
+absl::Status TakeColumns(const CloudOptions& options, PointCloud& cloud);
 
 // ReadNode that also tells the index of the first point, 0 or 1, and the points' weights, if the file has them.
-absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud, uint64_t& index_base,
+absl::Status ReadNode(LineReader& reader, const CloudOptions& options, PointCloud& cloud, uint64_t& index_base,
                       std::vector<double>& weights);
+
+// Reads a coordinate that a line must have.
+//
+// Guarantees: `is_invalid` becomes true for a value that is missing or not finite, if those are to be skipped;
+//             otherwise it is as it was.
+// Errors:     a message without a location.
+absl::Status TakeCoordinate(std::string_view text, bool skip_invalid, double& value, bool& is_invalid);
+
+// Adds `point`, read from the last line of `reader`, to the cloud; or counts it as skipped.
+void AddPoint(std::span<const double> point, bool is_invalid, uint64_t line, PointCloud& cloud);
+
+// What to say when a file has other coordinates than the options ask for: "expected 2 coordinates, got 3; --columns 1,2
+// takes two".
+std::string DimensionError(int wanted, uint64_t count);
+
+// Notes that a file has faces.
+void NoteFaces(uint64_t faces, PointCloud& cloud);
 
 }  // namespace wellspace::formats
 

@@ -21,6 +21,14 @@ constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
 }  // namespace
 
+size_t CommentStart(std::string_view line) {
+  size_t comment = line.find('#');
+  while (comment != std::string_view::npos && comment != 0 && line[comment - 1] != ' ' && line[comment - 1] != '\t') {
+    comment = line.find('#', comment + 1);
+  }
+  return comment;
+}
+
 absl::StatusOr<InputFile> InputFile::Open(const std::string& path) {
   if (path == kStandardStream) {
     return InputFile(STDIN_FILENO, "<stdin>");
@@ -41,7 +49,10 @@ absl::StatusOr<InputFile> InputFile::Open(const std::string& path) {
 }
 
 InputFile::InputFile(InputFile&& other) noexcept
-    : descriptor_(std::exchange(other.descriptor_, -1)), name_(std::move(other.name_)) {}
+    : descriptor_(std::exchange(other.descriptor_, -1)),
+      name_(std::move(other.name_)),
+      start_(std::move(other.start_)),
+      inflater_(std::move(other.inflater_)) {}
 
 InputFile::~InputFile() {
   if (descriptor_ > STDERR_FILENO) {
@@ -49,7 +60,45 @@ InputFile::~InputFile() {
   }
 }
 
+absl::Status InputFile::InflateGzip(bool is_expected) {
+  std::string start(kGzipMagic.size(), '\0');
+  size_t taken = 0;
+  while (taken < start.size()) {
+    const absl::StatusOr<size_t> got = ReadDescriptor(start.data() + taken, start.size() - taken);
+    if (!got.ok()) {
+      return got.status();
+    }
+    if (*got == 0) {
+      break;
+    }
+    taken += *got;
+  }
+  start.resize(taken);
+  start_ = start;
+  if (start == kGzipMagic) {
+    inflater_ = std::make_unique<GzipInflater>(name_);
+    return absl::OkStatus();
+  }
+  return is_expected
+             ? absl::InvalidArgumentError(absl::StrCat(name_, ": expected a file of gzip, which starts with ",
+                                                       Quote(kGzipMagic), ", as its name says, got ", Quote(start)))
+             : absl::OkStatus();
+}
+
 absl::StatusOr<size_t> InputFile::Read(char* buffer, size_t size) {
+  const auto read = [this](char* to, size_t bytes) -> absl::StatusOr<size_t> {
+    if (start_.empty()) {
+      return ReadDescriptor(to, bytes);
+    }
+    const size_t part = std::min(bytes, start_.size());
+    std::memcpy(to, start_.data(), part);
+    start_.erase(0, part);
+    return part;
+  };
+  return inflater_ != nullptr ? inflater_->Read(read, buffer, size) : read(buffer, size);
+}
+
+absl::StatusOr<size_t> InputFile::ReadDescriptor(char* buffer, size_t size) {
   while (true) {
     const ssize_t got = read(descriptor_, buffer, size);
     if (got >= 0) {
@@ -80,7 +129,7 @@ absl::StatusOr<std::string> InputFile::ReadAll() {
 
 std::optional<uint64_t> InputFile::size() const {
   struct stat attributes;
-  if (fstat(descriptor_, &attributes) != 0 || !S_ISREG(attributes.st_mode)) {
+  if (is_compressed() || fstat(descriptor_, &attributes) != 0 || !S_ISREG(attributes.st_mode)) {
     return std::nullopt;
   }
   return static_cast<uint64_t>(attributes.st_size);
@@ -124,48 +173,90 @@ bool LineReader::Fill() {
   end_ += *got;
   offset_ += *got;
   at_end_ = *got == 0;
+  has_returns_ = std::memchr(buffer_.data(), '\r', end_) != nullptr;
   return !at_end_;
 }
 
-bool LineReader::Next(std::string_view& line) {
-  if (!status_.ok()) {
-    return false;
-  }
+bool LineReader::FindEnd(size_t& size, size_t& terminator) {
+  const auto find = [this](char end, size_t from, size_t to) -> size_t {
+    const void* found = from == to ? nullptr : std::memchr(buffer_.data() + begin_ + from, end, to - from);
+    return found == nullptr ? std::string::npos : static_cast<const char*>(found) - buffer_.data() - begin_;
+  };
   size_t searched = 0;
-  const char* newline = nullptr;
+  size_t end = std::string::npos;
   while (true) {
-    const size_t size = end_ - begin_;
-    newline = searched == size
-                  ? nullptr
-                  : static_cast<const char*>(std::memchr(buffer_.data() + begin_ + searched, '\n', size - searched));
-    if (newline != nullptr) {
+    const size_t there = end_ - begin_;
+    end = find(usual_end_, searched, there);
+    if (end == std::string::npos) {
+      // Not searched for again and again by lines that all end in the other one.
+      const char other = usual_end_ == '\n' ? '\r' : '\n';
+      end = find(other, searched, there);
+      usual_end_ = end == std::string::npos ? usual_end_ : other;
+    }
+    // LF may follow a CR that is the last byte.
+    const bool is_known = usual_end_ == '\n' || has_lone_returns_ || end + 1 < there || at_end_;
+    if (end != std::string::npos && is_known) {
       break;
     }
-    searched = size;
-    if (size > kMaxLineBytes) {
+    searched = end == std::string::npos ? there : end;
+    if (there > kMaxLineBytes && end == std::string::npos) {
       status_ = LineError(name(), line_number_ + 1,
                           absl::StrCat("the line is longer than ", kMaxLineBytes, " bytes; expected a text file"));
       return false;
     }
-    if (!Fill()) {
-      break;
+    if (!Fill() && end == std::string::npos) {
+      size = end_ - begin_;
+      terminator = 0;
+      return status_.ok() && size > 0;
+    }
+    if (!status_.ok()) {
+      return false;
     }
   }
-  if (!status_.ok() || begin_ == end_) {
+  if (const size_t first = find(usual_end_ == '\n' ? '\r' : '\n', 0, end); first != std::string::npos) {
+    end = first;
+  }
+  size = end;
+  const bool is_return = buffer_[begin_ + end] == '\r';
+  const bool is_pair = is_return && begin_ + end + 1 < end_ && buffer_[begin_ + end + 1] == '\n' && !has_lone_returns_;
+  has_lone_returns_ |= line_number_ == 0 && is_return && !is_pair;
+  terminator = is_pair ? 2 : 1;
+  return true;
+}
+
+bool LineReader::Next(std::string_view& line) {
+  size_t size = 0;
+  size_t terminator = 1;
+  if (!status_.ok()) {
     return false;
   }
   const char* first = buffer_.data() + begin_;
-  const char* last = newline != nullptr ? newline : buffer_.data() + end_;
-  line = std::string_view(first, last - first);
-  begin_ = newline != nullptr ? newline + 1 - buffer_.data() : end_;
-  if (!line.empty() && line.back() == '\r') {
-    line.remove_suffix(1);
+  const void* newline = has_returns_ || begin_ == end_ ? nullptr : std::memchr(first, '\n', end_ - begin_);
+  if (newline != nullptr) {
+    size = static_cast<const char*>(newline) - first;
+  } else if (!FindEnd(size, terminator)) {
+    return false;
   }
-  if (line_number_ == 0 && line.substr(0, kByteOrderMark.size()) == kByteOrderMark) {
-    line.remove_prefix(kByteOrderMark.size());
+  line = std::string_view(buffer_.data() + begin_, size);
+  begin_ += size + terminator;
+  if (line_number_ == 0) {
+    if (line.substr(0, kByteOrderMark.size()) == kByteOrderMark) {
+      line.remove_prefix(kByteOrderMark.size());
+    } else if (line.substr(0, 2) == "\xFF\xFE" || line.substr(0, 2) == "\xFE\xFF") {
+      status_ = LineError(name(), 1, "the file is in UTF-16; expected ASCII or UTF-8");
+      return false;
+    }
   }
   ++line_number_;
   return true;
+}
+
+absl::Status LineReader::Finish() {
+  while (file_.is_compressed() && status_.ok() && !at_end_) {
+    begin_ = end_;
+    Fill();
+  }
+  return status_;
 }
 
 size_t LineReader::Take(char* bytes, size_t size) {
@@ -181,13 +272,17 @@ size_t LineReader::Take(char* bytes, size_t size) {
 
 bool LineReader::NextContent(std::string_view& line) {
   comment_.clear();
+  is_comment_behind_ = false;
   while (Next(line)) {
-    if (const size_t comment = line.find('#'); comment != std::string_view::npos) {
+    const size_t comment = CommentStart(line);
+    if (comment != std::string_view::npos) {
       comment_ = TrimBlanks(line.substr(comment + 1));
       line = line.substr(0, comment);
     }
+    whole_line_ = line;
     line = TrimBlanks(line);
     if (!line.empty()) {
+      is_comment_behind_ = comment != std::string_view::npos;
       return true;
     }
   }

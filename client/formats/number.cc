@@ -11,6 +11,11 @@
 namespace wellspace::formats {
 namespace {
 
+std::string_view WithoutQuotes(std::string_view field) {
+  const bool is_quoted = field.size() >= 2 && field.front() == '"' && field.back() == '"';
+  return is_quoted ? field.substr(1, field.size() - 2) : field;
+}
+
 bool IsBlank(char c) { return c == ' ' || c == '\t'; }
 
 enum class NumberKind { kFinite, kNotFinite, kTooLarge, kNone };
@@ -93,18 +98,38 @@ std::string_view TrimBlanks(std::string_view text) {
 }
 
 FieldSplitter::FieldSplitter(std::string_view line, char separator)
-    : rest_(TrimBlanks(line)), separator_(separator), more_(!rest_.empty()) {}
+    : rest_(separator == '\t' ? line : TrimBlanks(line)), separator_(separator), more_(!rest_.empty()) {}
+
+// Behind the quotes that the field starts with; 0 if it has none, or if they do not end.
+size_t FieldSplitter::EndOfQuotes() const {
+  size_t at = 0;
+  while (at < rest_.size() && IsBlank(rest_[at]) && rest_[at] != separator_) {
+    ++at;
+  }
+  if (at == rest_.size() || rest_[at] != '"') {
+    return 0;
+  }
+  for (++at; at < rest_.size(); ++at) {
+    if (rest_[at] == '"') {
+      if (at + 1 == rest_.size() || rest_[at + 1] != '"') {
+        return at + 1;
+      }
+      ++at;  // two stand for one
+    }
+  }
+  return 0;
+}
 
 bool FieldSplitter::Next(std::string_view& field) {
   if (!more_) {
     return false;
   }
-  size_t end = 0;
+  size_t end = !rest_.empty() && (rest_[0] == '"' || IsBlank(rest_[0])) ? EndOfQuotes() : 0;
   if (separator_ == ' ') {
     while (end < rest_.size() && !IsBlank(rest_[end])) {
       ++end;
     }
-    field = rest_.substr(0, end);
+    field = WithoutQuotes(rest_.substr(0, end));
     while (end < rest_.size() && IsBlank(rest_[end])) {
       ++end;
     }
@@ -115,10 +140,7 @@ bool FieldSplitter::Next(std::string_view& field) {
   while (end < rest_.size() && rest_[end] != separator_) {
     ++end;
   }
-  field = TrimBlanks(rest_.substr(0, end));
-  if (field.size() >= 2 && field.front() == '"' && field.back() == '"') {
-    field = field.substr(1, field.size() - 2);
-  }
+  field = WithoutQuotes(TrimBlanks(rest_.substr(0, end)));
   more_ = end < rest_.size();
   rest_.remove_prefix(more_ ? end + 1 : end);
   return true;

@@ -40,7 +40,8 @@ void AppendNumber(uint64_t value, std::string& text);
 // Splits one line into fields, without copying.
 //
 // With separator ' ' a field ends at any run of blanks and tabs; with another one, a field is what stands between two
-// separators, without the blanks and one pair of double quotes around it, and may be empty.
+// separators, without the blanks around it, and may be empty. One pair of double quotes around it is dropped; between
+// the quotes, separators are characters like others. A tab as separator is no blank.
 class FieldSplitter {
  public:
   FieldSplitter(std::string_view line, char separator);
@@ -48,6 +49,8 @@ class FieldSplitter {
   bool Next(std::string_view& field);
 
  private:
+  size_t EndOfQuotes() const;
+
   std::string_view rest_;
   char separator_;
   bool more_;

@@ -10,30 +10,49 @@
 namespace wellspace::formats {
 namespace {
 
-using CloudReader = absl::Status (*)(InputFile&, int, PointCloud&);
+using CloudReader = absl::Status (*)(InputFile&, const CloudOptions&, PointCloud&);
+using TextReader = absl::Status (*)(LineReader&, const CloudOptions&, PointCloud&);
 
 // A reader of lines as a reader of a file.
-template <absl::Status (*kReader)(LineReader&, int, PointCloud&)>
-absl::Status ReadText(InputFile& file, int dimension, PointCloud& cloud) {
+template <TextReader kReader>
+absl::Status ReadText(InputFile& file, const CloudOptions& options, PointCloud& cloud) {
   LineReader reader(std::move(file));
-  if (absl::Status status = kReader(reader, dimension, cloud); !status.ok()) {
+  if (absl::Status status = kReader(reader, options, cloud); !status.ok()) {
     return status;
   }
-  return reader.status();
+  return reader.Finish();
+}
+
+// The same, of a format that has nothing but coordinates to choose among.
+template <TextReader kReader>
+absl::Status ReadCoordinates(InputFile& file, const CloudOptions& options, PointCloud& cloud) {
+  if (options.columns.empty()) {
+    return ReadText<kReader>(file, options, cloud);
+  }
+  CloudOptions all = options;
+  all.dimension = 0;
+  if (absl::Status status = ReadText<kReader>(file, all, cloud); !status.ok() || cloud.dimension == 0) {
+    return status;
+  }
+  return TakeColumns(options, cloud);
 }
 
 std::span<const Format<CloudReader>> Readers() {
   static const std::vector<Format<CloudReader>> readers = {
       {"csv", {".csv", ".tsv", ".txt", ".dat"}, ReadText<ReadCsv>},
       {"xyz", {".xyz"}, ReadText<ReadXyz>},
-      {"node", {".node"}, ReadText<ReadNode>},
+      {"node", {".node"}, ReadCoordinates<ReadNode>},
       {"ply", {".ply"}, ReadText<ReadPly>},
-      {"obj", {".obj"}, ReadText<ReadObj>},
-      {"off", {".off"}, ReadText<ReadOff>},
+      {"obj", {".obj"}, ReadCoordinates<ReadObj>},
+      {"off", {".off"}, ReadCoordinates<ReadOff>},
       {"npy", {".npy"}, ReadNpy},
+      {"asc", {".asc"}, ReadText<ReadAsc>},
+      {"pts", {".pts"}, ReadText<ReadPts>},
   };
   return readers;
 }
+
+constexpr std::string_view kGzipExtension = ".gz";
 
 }  // namespace
 
@@ -41,18 +60,28 @@ std::vector<std::string> CloudFormats() { return FormatNames(Readers()); }
 
 absl::StatusOr<PointCloud> ReadCloud(const std::string& path, const CloudOptions& options) {
   const std::string format = options.format.empty() && path == kStandardStream ? "csv" : options.format;
-  const auto row = FindFormat(Readers(), path, format);
+  const bool is_gzip = ExtensionOf(path) == kGzipExtension;
+  const auto row = FindFormat(Readers(), path.substr(0, path.size() - (is_gzip ? kGzipExtension.size() : 0)), format);
   if (!row.ok()) {
-    return row.status();
+    return absl::InvalidArgumentError(
+        absl::StrCat(row.status().message(), format.empty() ? "; each also compressed, with .gz after it" : ""));
   }
   absl::StatusOr<InputFile> file = InputFile::Open(path);
   if (!file.ok()) {
     return file.status();
   }
+  if (absl::Status status = file->InflateGzip(is_gzip); !status.ok()) {
+    return status;
+  }
   PointCloud cloud;
   cloud.name = file->name();
-  if (absl::Status status = (*row)->handler(*file, options.dimension, cloud); !status.ok()) {
+  if (absl::Status status = (*row)->handler(*file, options, cloud); !status.ok()) {
     return status;
+  }
+  if (cloud.skipped > 0) {
+    cloud.notes.push_back(absl::StrCat(cloud.name, ": ", cloud.skipped,
+                                       cloud.skipped == 1 ? " point is" : " points are",
+                                       " left out, of which a coordinate is missing or not finite"));
   }
   if (cloud.dimension == 0) {
     if (options.dimension == 0) {

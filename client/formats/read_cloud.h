@@ -1,15 +1,21 @@
 // Clouds of points from files.
 //
 // Formats:
-//   csv   One point a line; fields separated by commas, semicolons, or blanks and tabs, as the first line has them. A
-//         first line without any number is a header; when it names columns x and y (and z), those are read and the
-//         others are skipped, unless CloudOptions::dimension is above 3.
-//   xyz   One point a line, separated by blanks; columns after the third are skipped, or after as many as
-//         CloudOptions::dimension if that is above 3. Or as in chemistry: the number of points, a line of comment, then
-//         that many lines, each of which may start with a symbol.
+//   csv   One point a line; fields separated by commas, semicolons, or blanks and tabs, as the first line has them, and
+//         quoted where they contain separators. A first line of words is a header. When it names coordinates, those are
+//         read: x, y and z; lon, lat and a height; easting, northing and a height; Points:0, Points:1, ...; with
+//         "point", "coord" and the like around them and a unit in brackets, in any case. Otherwise, or when
+//         CloudOptions::dimension is above 3, every column is a coordinate. "//" before the names, as CloudCompare has
+//         it, and names in a comment before the first row are understood, too.
+//   xyz   The same, but without names columns after the third are skipped, or after as many as CloudOptions::dimension
+//         if that is above 3. Or as in chemistry: the number of points, a line of comment, then that many lines, each
+//         of which may start with a symbol.
+//   asc   As xyz, without chemistry.
+//   pts   Leica's: the number of points, then so many lines as in xyz; again and again. The number may be missing.
 //   node  TetGen's and Triangle's: "points dimension attributes markers", then a line "index x y [z ...] attributes
 //         marker" for each point, counted from 0 or 1.
-//   npy   numpy's: one array, points x dimension, of type Float64 or Float32, little-endian, in C or Fortran order.
+//   npy   numpy's: one array, points x dimension, of floating-point numbers of 4 or 8 bytes or whole numbers of 1 to 8,
+//         of either byte order, in C or Fortran order.
 //   ply   Stanford's, in ascii or in binary of either byte order: the properties x, y and, if it is there, z of the
 //         element "vertex", of any scalar type. Other properties and the elements before it are skipped, lists too.
 //   obj   Wavefront's: two or three coordinates in each line "v"; what follows them (a weight, a colour) is skipped, as
@@ -18,7 +24,9 @@
 //         before OFF (texture, colour, normal) announce numbers after the coordinates, which are skipped. 4OFF has four
 //         coordinates, all taken as they are; nOFF says how many before the counts.
 // Of ply and off, what follows the last vertex is not looked at.
-// In those of text '#' starts a comment and blank lines are skipped.
+// In those of text lines end in LF, CRLF or CR, '#' at the start of a line or after a blank starts a comment, and blank
+// lines are skipped. Numbers may have Fortran's exponents: 1.0D+00, 1.0-100. Each may be compressed by gzip, as
+// "cloud.csv.gz" or on standard input.
 #ifndef WELLSPACE_CLIENT_FORMATS_READ_CLOUD_H_
 #define WELLSPACE_CLIENT_FORMATS_READ_CLOUD_H_
 
@@ -33,6 +41,13 @@ namespace wellspace::formats {
 struct CloudOptions {
   std::string format;  // empty: by the file's extension; standard input is csv
   int dimension = 0;   // that the file must have; 0: as many as it has columns
+  // The columns that hold the coordinates, in this order: names, in any case, or numbers counted from 1. Empty: see
+  // above. Columns of ply are the properties of its vertices; those of node, obj, off and npy the coordinates, which
+  // are x, y, z up to 3-D.
+  std::vector<std::string> columns = {};
+  // Leave out points of which a coordinate is missing (an empty field, NA and the like), NaN, infinite or too large for
+  // a double, and count them; otherwise the first one is an error.
+  bool skip_invalid = false;
 };
 
 // The names that CloudOptions::format may take.
@@ -41,6 +56,7 @@ std::vector<std::string> CloudFormats();
 // Reads the points of `path`, in the order of the file; "-" is standard input.
 //
 // Guarantees: coordinates are correctly rounded, to the bit.
+//             Every line of text is a point, a header, a comment, counted in PointCloud::skipped, or an error.
 // Complexity: one pass; memory for the points, and a buffer of at most about a line; twice the points for an array in
 //             Fortran order.
 // Errors:     of opening and reading; INVALID_ARGUMENT "FILE:LINE: …" for what is not a cloud of finite points of one

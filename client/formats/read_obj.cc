@@ -42,7 +42,7 @@ class ObjLines {
     if (!reader_.Next(part)) {
       return false;
     }
-    part = TrimBlanks(part.substr(0, part.find('#')));
+    part = TrimBlanks(part.substr(0, CommentStart(part)));
     is_continued_ = !part.empty() && part.back() == '\\';
     if (is_continued_) {
       part.remove_suffix(1);
@@ -77,10 +77,11 @@ class ObjLines {
 
 }  // namespace
 
-absl::Status ReadObj(LineReader& reader, int dimension, PointCloud& cloud) {
+absl::Status ReadObj(LineReader& reader, const CloudOptions& options, PointCloud& cloud) {
   ObjLines lines(reader);
   std::string_view line;
   uint64_t number = 0;
+  uint64_t faces = 0;
   const auto error = [&](std::string_view message) { return LineError(cloud.name, number, message); };
   while (lines.Next(line, number)) {
     FieldSplitter fields(line, ' ');
@@ -89,26 +90,31 @@ absl::Status ReadObj(LineReader& reader, int dimension, PointCloud& cloud) {
     if (!absl::ascii_isalpha(static_cast<unsigned char>(field[0]))) {
       return error(absl::StrCat("expected a word such as \"v\" or \"f\", got ", Quote(field)));
     }
+    if (field == "V" || field == "vertex") {
+      return error(absl::StrCat("expected \"v\" for a vertex, got ", Quote(field)));
+    }
     if (field != "v") {
+      faces += field == "f" ? 1 : 0;
       continue;
     }
     std::array<double, kAxes> point{};
+    bool is_invalid = false;
     int count = 0;
     while (count < kAxes && fields.Next(field)) {
-      if (absl::Status status = ParseFinite(field, point[count]); !status.ok()) {
+      if (absl::Status status = TakeCoordinate(field, options.skip_invalid, point[count], is_invalid); !status.ok()) {
         return error(absl::StrCat("coordinate ", count + 1, ": ", status.message()));
       }
       ++count;
     }
-    const int expected = cloud.dimension != 0 ? cloud.dimension : dimension;
+    const int expected = cloud.dimension != 0 ? cloud.dimension : options.dimension;
     if (count < kMinDimension || (expected != 0 && count != expected)) {
-      return error(
-          absl::StrCat("expected ", expected != 0 ? absl::StrCat(expected) : "2 or 3", " coordinates, got ", count));
+      return error(expected != 0 ? DimensionError(expected, count)
+                                 : absl::StrCat("expected 2 or 3 coordinates, got ", count));
     }
     cloud.dimension = count;
-    cloud.points.insert(cloud.points.end(), point.begin(), point.begin() + count);
-    cloud.lines.Add(number);
+    AddPoint({point.data(), static_cast<size_t>(count)}, is_invalid, number, cloud);
   }
+  NoteFaces(faces, cloud);
   return lines.status();
 }
 

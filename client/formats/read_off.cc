@@ -1,5 +1,5 @@
 // Geomview's OFF: the vertices.
-#include <algorithm>
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -42,21 +42,23 @@ std::optional<OffKind> TakeKind(std::string_view& line) {
 
 class OffReader {
  public:
-  OffReader(LineReader& reader, PointCloud& cloud) : reader_(reader), cloud_(cloud) {}
+  OffReader(LineReader& reader, const CloudOptions& options, PointCloud& cloud)
+      : reader_(reader), options_(options), cloud_(cloud) {}
 
-  absl::Status Read(int dimension) {
+  absl::Status Read() {
     if (absl::Status status = ReadHeader(); !status.ok()) {
       return status;
     }
-    if (dimension != 0 && kind_.coordinates != static_cast<uint64_t>(dimension)) {
-      return reader_.Error(absl::StrCat("expected ", dimension, " coordinates, got ", kind_.coordinates));
+    if (options_.dimension != 0 && kind_.coordinates != static_cast<uint64_t>(options_.dimension)) {
+      return reader_.Error(DimensionError(options_.dimension, kind_.coordinates));
     }
     cloud_.dimension = static_cast<int>(kind_.coordinates);
     for (uint64_t vertex = 0; vertex < vertices_; ++vertex) {
-      if (absl::Status status = ReadVertex(); !status.ok()) {
+      if (absl::Status status = ReadVertex(vertex); !status.ok()) {
         return status;
       }
     }
+    NoteFaces(faces_, cloud_);
     return absl::OkStatus();
   }
 
@@ -97,45 +99,47 @@ class OffReader {
       }
     }
     vertices_ = numbers[has_dimension ? 1 : 0];
+    faces_ = numbers[has_dimension ? 2 : 1];
     return absl::OkStatus();
   }
 
-  absl::Status ReadVertex() {
+  absl::Status ReadVertex(uint64_t vertex) {
     std::string_view line;
     if (!reader_.NextContent(line)) {
-      return reader_.EndError(
-          absl::StrCat("expected ", vertices_, " vertices, as the header says, got ", cloud_.size()));
+      return reader_.EndError(absl::StrCat("expected ", vertices_, " vertices, as the header says, got ", vertex));
     }
     FieldSplitter fields(line, ' ');
     std::string_view field;
+    std::array<double, kMaxDimension> point;
+    bool is_invalid = false;
     for (uint64_t axis = 0; axis < kind_.coordinates; ++axis) {
       if (!fields.Next(field)) {
         return reader_.Error(absl::StrCat("expected ", kind_.coordinates, " coordinates, got ", axis));
       }
-      double value = 0;
-      if (absl::Status status = ParseFinite(field, value); !status.ok()) {
+      if (absl::Status status = TakeCoordinate(field, options_.skip_invalid, point[axis], is_invalid); !status.ok()) {
         return reader_.Error(absl::StrCat("coordinate ", axis + 1, ": ", status.message()));
       }
-      cloud_.points.push_back(value);
     }
     if (!kind_.has_more_values && fields.Next(field)) {
       return reader_.Error(absl::StrCat("expected ", kind_.coordinates, " coordinates, got also ", Quote(field),
                                         " (COFF, NOFF and STOFF have more numbers)"));
     }
-    cloud_.lines.Add(reader_.line_number());
+    AddPoint({point.data(), kind_.coordinates}, is_invalid, reader_.line_number(), cloud_);
     return absl::OkStatus();
   }
 
   LineReader& reader_;
+  const CloudOptions& options_;
   PointCloud& cloud_;
   OffKind kind_;
   uint64_t vertices_ = 0;
+  uint64_t faces_ = 0;
 };
 
 }  // namespace
 
-absl::Status ReadOff(LineReader& reader, int dimension, PointCloud& cloud) {
-  return OffReader(reader, cloud).Read(dimension);
+absl::Status ReadOff(LineReader& reader, const CloudOptions& options, PointCloud& cloud) {
+  return OffReader(reader, options, cloud).Read();
 }
 
 }  // namespace wellspace::formats

@@ -8,16 +8,18 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "client/formats/cloud_readers.h"
+#include "client/formats/coordinate.h"
 #include "client/formats/number.h"
+#include "client/formats/table_columns.h"
 #include "client/formats/vtk_array.h"
 
 namespace wellspace::formats {
 namespace {
 
-constexpr int kAxes = 3;
-constexpr std::string_view kAxisNames = "xyz";
+constexpr size_t kAxes = 3;
 
 enum class Scalar { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat32, kFloat64 };
 
@@ -88,6 +90,7 @@ double ValueOf(std::string_view bytes, Scalar type, bool big_endian) {
 struct Property {
   std::optional<Scalar> list_count;  // the type of the number of values, if it is a list
   Scalar type;
+  std::string name;
   int axis = -1;  // of the coordinate that it holds, or -1
 };
 
@@ -99,32 +102,22 @@ struct Element {
 
 class PlyReader {
  public:
-  PlyReader(LineReader& reader, PointCloud& cloud) : reader_(reader), cloud_(cloud) {}
+  PlyReader(LineReader& reader, const CloudOptions& options, PointCloud& cloud)
+      : reader_(reader), options_(options), cloud_(cloud) {}
 
-  absl::Status Read(int dimension) {
+  absl::Status Read() {
     if (absl::Status status = ReadHeader(); !status.ok()) {
       return status;
     }
-    const Element& vertex = elements_.back();
-    std::array<int, kAxes> seen{};
-    for (const Property& property : vertex.properties) {
-      if (property.axis >= 0) {
-        ++seen[property.axis];
-      }
+    if (absl::Status status = ChooseProperties(elements_.back().properties); !status.ok()) {
+      return status;
     }
-    if (seen[0] != 1 || seen[1] != 1 || seen[2] > 1) {
-      return reader_.Error("expected one property x, one y and at most one z of element \"vertex\"");
-    }
-    cloud_.dimension = 2 + seen[2];
-    if (dimension != 0 && dimension != cloud_.dimension) {
-      return reader_.Error(absl::StrCat("expected ", dimension, " coordinates, got ", cloud_.dimension,
-                                        " as properties of element \"vertex\""));
-    }
+    NoteFaces(faces_, cloud_);
     for (const Element& element : elements_) {
       const bool is_vertex = &element == &elements_.back();
       for (uint64_t row = 0; row < element.count; ++row) {
         absl::Status status = !is_ascii_  ? ReadBinary(element, row, is_vertex)
-                              : is_vertex ? ReadLine(element)
+                              : is_vertex ? ReadLine(element, row)
                                           : SkipLine(element, row);
         if (!status.ok()) {
           return status;
@@ -135,6 +128,51 @@ class PlyReader {
   }
 
  private:
+  // Decides which properties of the vertices are coordinates.
+  absl::Status ChooseProperties(std::vector<Property>& properties) {
+    if (!options_.columns.empty()) {
+      std::vector<std::string> names;
+      for (const Property& property : properties) {
+        names.push_back(property.name);
+      }
+      const absl::StatusOr<std::vector<size_t>> columns =
+          ResolveColumns(options_.columns, names, names.size(), options_.dimension);
+      if (!columns.ok()) {
+        return reader_.Error(std::string(columns.status().message()));
+      }
+      for (size_t axis = 0; axis < columns->size(); ++axis) {
+        Property& property = properties[(*columns)[axis]];
+        if (property.list_count) {
+          return reader_.Error(
+              absl::StrCat("--columns: expected a number in each vertex, and ", Quote(property.name), " is a list"));
+        }
+        property.axis = static_cast<int>(axis);
+      }
+      cloud_.dimension = static_cast<int>(columns->size());
+      return absl::OkStatus();
+    }
+    std::array<int, kAxes> seen{};
+    for (Property& property : properties) {
+      const char name = property.name.size() == 1 ? absl::ascii_tolower(property.name[0]) : '\0';
+      if (!property.list_count && name >= 'x' && name <= 'z') {
+        property.axis = name - 'x';
+        ++seen[property.axis];
+      }
+    }
+    if (seen[0] != 1 || seen[1] != 1 || seen[2] > 1) {
+      return reader_.Error(
+          "expected one property x, one y and at most one z of element \"vertex\"; --columns takes others");
+    }
+    cloud_.dimension = 2 + seen[2];
+    const int wanted = options_.dimension;
+    if (wanted != 0 && wanted != cloud_.dimension) {
+      return reader_.Error(absl::StrCat("expected ", wanted, " coordinates, got ", cloud_.dimension,
+                                        " as properties of element \"vertex\"",
+                                        wanted < cloud_.dimension ? "; --columns x,y takes 2 of them" : ""));
+    }
+    return absl::OkStatus();
+  }
+
   // The next line of the header as fields. False at the end of the file.
   bool NextFields(std::vector<std::string_view>& fields) {
     std::string_view line;
@@ -215,6 +253,7 @@ class PlyReader {
       return reader_.Error("expected \"element\", a name and a whole number below 2^32");
     }
     element.name = fields[1];
+    faces_ += element.name == "face" || element.name == "tristrips" ? element.count : 0;
     is_kept_ = !has_vertices;
     if (is_kept_) {
       has_vertices = element.name == "vertex";
@@ -241,18 +280,16 @@ class PlyReader {
             Quote(fields[i])));
       }
     }
-    Property property{.list_count = std::nullopt, .type = *ScalarOf(fields[type_at])};
-    const std::string_view name = fields.back();
+    Property property{
+        .list_count = std::nullopt, .type = *ScalarOf(fields[type_at]), .name = std::string(fields.back())};
     if (is_list) {
       property.list_count = ScalarOf(fields[2]);
       if (*property.list_count == Scalar::kFloat32 || *property.list_count == Scalar::kFloat64) {
         return reader_.Error(absl::StrCat("expected a whole type for the length of a list, got ", Quote(fields[2])));
       }
-    } else if (name.size() == 1 && kAxisNames.find(name[0]) != std::string_view::npos) {
-      property.axis = name[0] - 'x';
     }
     if (is_kept_) {
-      elements_.back().properties.push_back(property);
+      elements_.back().properties.push_back(std::move(property));
     }
     return absl::OkStatus();
   }
@@ -262,57 +299,52 @@ class PlyReader {
     return reader_.NextContent(line) ? absl::OkStatus() : EndError(element, row);
   }
 
-  absl::Status ReadLine(const Element& element) {
+  absl::Status ReadLine(const Element& element, uint64_t row) {
     std::string_view line;
     if (!reader_.NextContent(line)) {
-      return EndError(element, cloud_.size());
+      return EndError(element, row);
     }
-    std::array<double, kAxes> point{};
+    std::array<double, kMaxDimension> point;
+    bool is_invalid = false;
     FieldSplitter fields(line, ' ');
     std::string_view field;
     size_t index = 0;
-    const auto next = [&](double& value) {
+    for (const Property& property : element.properties) {
       ++index;
       if (!fields.Next(field)) {
         return reader_.Error(absl::StrCat("expected more than ", index - 1, " values, as the header says"));
       }
-      absl::Status status = ParseFinite(field, value);
-      return status.ok() ? status : reader_.Error(absl::StrCat("value ", index, ": ", status.message()));
-    };
-    for (const Property& property : element.properties) {
-      double value = 0;
       if (property.list_count) {
-        if (absl::Status status = next(value); !status.ok()) {
+        if (absl::Status status = SkipList(fields, field, index); !status.ok()) {
           return status;
         }
-        uint64_t count = 0;
-        if (!ParseUnsigned(field, kMaxCount, count)) {
-          return reader_.Error(
-              absl::StrCat("value ", index, ": expected the length of a list, a whole number, got ", Quote(field)));
+      } else if (property.axis >= 0) {  // only coordinates have to be finite numbers
+        const absl::Status status = TakeCoordinate(field, options_.skip_invalid, point[property.axis], is_invalid);
+        if (!status.ok()) {
+          return reader_.Error(absl::StrCat("value ", index, ": ", status.message()));
         }
-        for (; count > 0; --count) {
-          if (!fields.Next(field)) {
-            return reader_.Error(
-                absl::StrCat("expected ", count, " more values in the list that value ", index, " announces"));
-          }
-        }
-        continue;
-      }
-      // Only coordinates have to be finite numbers.
-      if (property.axis < 0) {
-        ++index;
-        if (!fields.Next(field)) {
-          return reader_.Error(absl::StrCat("expected more than ", index - 1, " values, as the header says"));
-        }
-      } else if (absl::Status status = next(point[property.axis]); !status.ok()) {
-        return status;
       }
     }
     if (fields.Next(field)) {
       return reader_.Error(absl::StrCat("expected the end of the line, as the header says, got ", Quote(field)));
     }
-    cloud_.points.insert(cloud_.points.end(), point.begin(), point.begin() + cloud_.dimension);
-    cloud_.lines.Add(reader_.line_number());
+    AddPoint({point.data(), static_cast<size_t>(cloud_.dimension)}, is_invalid, reader_.line_number(), cloud_);
+    return absl::OkStatus();
+  }
+
+  // Skips the values of a list, whose length is `field`, value number `index`.
+  absl::Status SkipList(FieldSplitter& fields, std::string_view field, size_t index) const {
+    uint64_t count = 0;
+    if (!ParseUnsigned(field, kMaxCount, count)) {
+      return reader_.Error(
+          absl::StrCat("value ", index, ": expected the length of a list, a whole number, got ", Quote(field)));
+    }
+    for (; count > 0; --count) {
+      if (!fields.Next(field)) {
+        return reader_.Error(
+            absl::StrCat("expected ", count, " more values in the list that value ", index, " announces"));
+      }
+    }
     return absl::OkStatus();
   }
 
@@ -340,7 +372,8 @@ class PlyReader {
   }
 
   absl::Status ReadBinary(const Element& element, uint64_t row, bool is_vertex) {
-    std::array<double, kAxes> point{};
+    std::array<double, kMaxDimension> point;
+    bool is_invalid = false;
     for (const Property& property : element.properties) {
       const uint64_t offset = reader_.offset();
       double value = 0;
@@ -356,15 +389,22 @@ class PlyReader {
           return EndError(element, row);
         }
       } else if (property.axis >= 0) {
-        if (is_vertex && !std::isfinite(value)) {
+        if (!std::isfinite(value) && !options_.skip_invalid) {
           return BinaryError(element, row, offset,
-                             absl::StrCat("coordinate ", property.axis + 1, ": expected a finite number, got ", value));
+                             absl::StrCat("coordinate ", property.axis + 1, ": expected a finite number, got ", value,
+                                          std::string(kSkipInvalidHint)));
         }
+        is_invalid |= !std::isfinite(value);
         point[property.axis] = value;
       }
     }
-    if (is_vertex) {
+    if (is_vertex && is_invalid) {
+      ++cloud_.skipped;
+    } else if (is_vertex) {
       cloud_.points.insert(cloud_.points.end(), point.begin(), point.begin() + cloud_.dimension);
+      if (options_.skip_invalid) {
+        cloud_.rows.Add(row);
+      }
     }
     return absl::OkStatus();
   }
@@ -384,7 +424,9 @@ class PlyReader {
   }
 
   LineReader& reader_;
+  const CloudOptions& options_;
   PointCloud& cloud_;
+  uint64_t faces_ = 0;
   bool is_ascii_ = true;
   bool is_big_endian_ = false;
   std::vector<Element> elements_;  // up to the vertices
@@ -393,8 +435,8 @@ class PlyReader {
 
 }  // namespace
 
-absl::Status ReadPly(LineReader& reader, int dimension, PointCloud& cloud) {
-  return PlyReader(reader, cloud).Read(dimension);
+absl::Status ReadPly(LineReader& reader, const CloudOptions& options, PointCloud& cloud) {
+  return PlyReader(reader, options, cloud).Read();
 }
 
 }  // namespace wellspace::formats

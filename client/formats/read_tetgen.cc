@@ -128,13 +128,13 @@ absl::Status ReadEle(LineReader& reader, uint64_t vertices, uint64_t index_base,
 
 }  // namespace
 
-absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud) {
+absl::Status ReadNode(LineReader& reader, const CloudOptions& options, PointCloud& cloud) {
   uint64_t index_base = 0;
   std::vector<double> weights;
-  return ReadNode(reader, dimension, cloud, index_base, weights);
+  return ReadNode(reader, options, cloud, index_base, weights);
 }
 
-absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud, uint64_t& index_base,
+absl::Status ReadNode(LineReader& reader, const CloudOptions& options, PointCloud& cloud, uint64_t& index_base,
                       std::vector<double>& weights) {
   std::string_view line;
   if (!reader.NextContent(line)) {
@@ -150,8 +150,11 @@ absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud, uint
     return reader.Error(
         absl::StrCat("expected a dimension from ", kMinDimension, " to ", kMaxDimension, ", got ", columns));
   }
-  if (dimension != 0 && static_cast<int>(columns) != dimension) {
-    return reader.Error(absl::StrCat("expected dimension ", dimension, ", got ", columns));
+  if (options.dimension != 0 && static_cast<int>(columns) != options.dimension) {
+    return reader.Error(absl::StrCat("expected dimension ", options.dimension, ", got ", columns,
+                                     static_cast<int>(columns) > options.dimension
+                                         ? absl::StrCat(": ", DimensionError(options.dimension, columns))
+                                         : ""));
   }
   const bool has_weights = attributes == 1 && reader.comment() == kWeightsComment;
   cloud.dimension = static_cast<int>(columns);
@@ -165,15 +168,16 @@ absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud, uint
       return status;
     }
     std::string_view field;
+    std::array<double, kMaxDimension> coordinates;
+    bool is_invalid = false;
     for (uint64_t axis = 0; axis < columns; ++axis) {
       if (!fields.Next(field)) {
         return reader.Error(absl::StrCat("expected ", columns, " coordinates, got ", axis));
       }
-      double value = 0;
-      if (absl::Status status = ParseFinite(field, value); !status.ok()) {
+      if (absl::Status status = TakeCoordinate(field, options.skip_invalid, coordinates[axis], is_invalid);
+          !status.ok()) {
         return reader.Error(absl::StrCat("coordinate ", axis + 1, ": ", status.message()));
       }
-      cloud.points.push_back(value);
     }
     // Attributes and markers may be missing, as they may for TetGen, but there must not be more than announced.
     for (uint64_t extra = 0; fields.Next(field); ++extra) {
@@ -192,7 +196,7 @@ absl::Status ReadNode(LineReader& reader, int dimension, PointCloud& cloud, uint
     if (has_weights && weights.size() != point + 1) {
       return reader.Error("expected a weight after the coordinates, as the header says, got none");
     }
-    cloud.lines.Add(reader.line_number());
+    AddPoint({coordinates.data(), columns}, is_invalid, reader.line_number(), cloud);
   }
   return ExpectEnd(reader, count, "points");
 }
@@ -210,7 +214,7 @@ absl::StatusOr<Mesh> ReadNodeAndEle(const std::string& path) {
   uint64_t index_base = 0;
   std::vector<double> weights;
   LineReader nodes(*std::move(node_file));
-  if (absl::Status status = ReadNode(nodes, 0, cloud, index_base, weights); !status.ok()) {
+  if (absl::Status status = ReadNode(nodes, {}, cloud, index_base, weights); !status.ok()) {
     return status;
   }
   Mesh mesh{

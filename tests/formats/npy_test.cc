@@ -166,6 +166,22 @@ TEST_F(NpyCloudTest, WholeNumbersComeExactlyOrNotAtAll) {
   EXPECT_FALSE(read("<u8", std::numeric_limits<uint64_t>::max()).ok());
 }
 
+TEST_F(NpyCloudTest, ColumnsAndInvalidRows) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::string content =
+      Npy("{'descr': '<f8', 'fortran_order': False, 'shape': (3, 8)}",
+          Bytes<double>({0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, nan, 4, 5, 6, 7, 0, 1, 8, 9, 4, 5, 6, nan}));
+  EXPECT_THAT(ReadBad(content), HasSubstr("--columns 1,2,3"));
+  EXPECT_THAT(ReadBad(content, 2), HasSubstr("--columns 1,2"));
+  const std::string path = folder_.Write("a.npy", content);
+  const absl::StatusOr<PointCloud> cloud =
+      ReadCloud(path, {.format = "", .dimension = 0, .columns = {"4", "3"}, .skip_invalid = true});
+  ASSERT_TRUE(cloud.ok()) << cloud.status();
+  EXPECT_THAT(cloud->points, ElementsAre(3, 2, 9, 8));
+  EXPECT_EQ(cloud->skipped, 1u);
+  EXPECT_THAT(cloud->Origin(1), testing::EndsWith("a.npy[2]"));
+}
+
 TEST_F(NpyCloudTest, NoPoints) {
   const std::string content = Npy("{'descr': '<f8', 'fortran_order': True, 'shape': (0, 5)}", "");
   const absl::StatusOr<PointCloud> cloud = ReadCloud(folder_.Write("a.npy", content));
@@ -200,7 +216,7 @@ TEST_F(NpyCloudTest, Errors) {
   EXPECT_THAT(ReadBad(Npy(header("<f8", "(1, 2)"), point + "x")), HasSubstr("a.npy: expected 16 bytes of values"));
   EXPECT_THAT(ReadBad(Npy(header("<f8", "(999999999999999999, 6)"), point)), HasSubstr("a.npy: expected at most"));
   EXPECT_EQ(ReadBad(Npy(header("<f8", "(2, 2)"), Bytes<double>({1, 2, 3, std::numeric_limits<double>::infinity()}))),
-            "a.npy[1]: coordinate 2: expected a finite number, got inf");
+            "a.npy[1]: coordinate 2: expected a finite number, got inf; --skip-invalid leaves such points out");
 }
 
 // A pipe has no size that could refute the header: memory grows with what comes.

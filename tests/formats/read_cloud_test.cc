@@ -59,7 +59,8 @@ TEST_F(ReadCloudTest, UpToSixDimensions) {
   EXPECT_THAT(ReadGood("cloud.csv", "1,2,3,4\n5,6,7,8\n").points, ElementsAre(1, 2, 3, 4, 5, 6, 7, 8));
   EXPECT_EQ(ReadGood("cloud.csv", "a b c d e\n1 2 3 4 5\n").dimension, 5);
   EXPECT_EQ(ReadGood("cloud.node", "1 6 0 0\n0 1 2 3 4 5 6\n").dimension, 6);
-  EXPECT_EQ(ReadBad("cloud.csv", "1 2 3 4 5 6 7\n"), "cloud.csv:1: expected 2 to 6 coordinates, got 7");
+  EXPECT_EQ(ReadBad("cloud.csv", "1 2 3 4 5 6 7\n"),
+            "cloud.csv:1: expected 2 to 6 coordinates, got 7; --columns 1,2,3 takes three of them");
 }
 
 // The names x, y and z choose among columns only where they can name all coordinates that are wanted.
@@ -109,20 +110,24 @@ TEST_F(ReadCloudTest, ErrorsNameFileAndLine) {
   EXPECT_EQ(ReadBad("cloud.csv", "x,y,z\n1,2,3\n4,5\n"), "cloud.csv:3: expected 3 coordinates, got 2");
   EXPECT_EQ(ReadBad("cloud.csv", "1,2\n4,5,6\n"), "cloud.csv:2: expected 2 coordinates, got 3");
   EXPECT_EQ(ReadBad("cloud.csv", "1,2\n3,four\n"), "cloud.csv:2: field 2: expected a number, got \"four\"");
-  EXPECT_EQ(ReadBad("cloud.csv", "1,2\n3,\n"), "cloud.csv:2: field 2: expected a number, got \"\"");
-  EXPECT_EQ(ReadBad("cloud.csv", "1,2\n\n3,NaN\n"), "cloud.csv:3: field 2: expected a finite number, got \"NaN\"");
-  EXPECT_EQ(ReadBad("cloud.csv", "-inf,2\n"), "cloud.csv:1: field 1: expected a finite number, got \"-inf\"");
+  EXPECT_EQ(ReadBad("cloud.csv", "1,2\n3,\n"),
+            "cloud.csv:2: field 2: expected a number, got \"\"; --skip-invalid leaves such points out");
+  EXPECT_EQ(ReadBad("cloud.csv", "1,2\n\n3,NaN\n"),
+            "cloud.csv:3: field 2: expected a finite number, got \"NaN\"; --skip-invalid leaves such points out");
+  EXPECT_EQ(ReadBad("cloud.csv", "-inf,2\n"),
+            "cloud.csv:1: field 1: expected a finite number, got \"-inf\"; --skip-invalid leaves such points out");
   EXPECT_THAT(ReadBad("cloud.csv", "1,1e999\n"),
               HasSubstr("cloud.csv:1: field 2: expected a number of magnitude below"));
   EXPECT_EQ(ReadBad("cloud.csv", "1\n2\n"), "cloud.csv:1: expected 2 to 6 coordinates, got 1");
   EXPECT_EQ(ReadBad("cloud.csv", "1,2,3,4,5,6,7\n"),
-            "cloud.csv:1: expected 2 to 6 coordinates, got 7 (fields are separated by \",\")");
+            "cloud.csv:1: expected 2 to 6 coordinates, got 7 (fields are separated by \",\"); --columns 1,2,3 takes "
+            "three of them");
   EXPECT_THAT(ReadBad("cloud.csv", std::string_view("1,2\n\0\x01,3\n", 10)), HasSubstr("got \"\\x00\\x01\""));
 }
 
 TEST_F(ReadCloudTest, DimensionIsCheckedAndStandsInForAnEmptyFile) {
   EXPECT_EQ(ReadBad("cloud.csv", "1,2,3\n", {.format = "", .dimension = 2}),
-            "cloud.csv:1: expected 2 coordinates, got 3");
+            "cloud.csv:1: expected 2 coordinates, got 3; --columns 1,2 takes 2 of them");
   EXPECT_EQ(ReadBad("a.node", "0 2 0 0\n", {.format = "", .dimension = 3}), "a.node:1: expected dimension 3, got 2");
   EXPECT_THAT(ReadBad("cloud.csv", "x,y\n"), HasSubstr("cloud.csv: no points"));
   const PointCloud empty = ReadGood("cloud.csv", "", {.format = "", .dimension = 2});
@@ -137,7 +142,7 @@ TEST_F(ReadCloudTest, FormatByNameAndByExtension) {
               HasSubstr("no format is known by the extension \".stl\"; expected one of .csv"));
   EXPECT_THAT(ReadBad("cloud", "1 2\n"), HasSubstr("no format is known by the extension \"\""));
   EXPECT_THAT(ReadBad("cloud.csv", "1 2\n", {.format = "las", .dimension = 0}),
-              HasSubstr("expected one of csv, xyz, node, ply, obj, off, npy"));
+              HasSubstr("expected one of csv, xyz, node, ply, obj, off, npy, asc, pts"));
 }
 
 TEST_F(ReadCloudTest, FilesThatCannotBeRead) {

@@ -149,11 +149,12 @@ TEST_F(ReadVerticesTest, PlyErrors) {
   EXPECT_THAT(message("list uchar int tags", "list float int tags"),
               HasSubstr("a.ply:10: expected a whole type for the length of a list, got \"float\""));
   EXPECT_EQ(message("float x", "float y"),
-            "a.ply:15: expected one property x, one y and at most one z of element \"vertex\"");
+            "a.ply:15: expected one property x, one y and at most one z of element \"vertex\"; --columns takes others");
   EXPECT_EQ(ReadBad("a.ply", "ply\nformat ascii 1.0\nelement vertex 1\n"),
             "a.ply:3: the file ends inside its header; expected \"end_header\"");
   EXPECT_EQ(message("255 3 0 1 2", "255 three 0 1 2"), "a.ply:18: value 2: expected a number, got \"three\"");
-  EXPECT_EQ(message("255 3 0 1 2", "255 inf 0 1 2"), "a.ply:18: value 2: expected a finite number, got \"inf\"");
+  EXPECT_EQ(message("255 3 0 1 2", "255 inf 0 1 2"),
+            "a.ply:18: value 2: expected a finite number, got \"inf\"; --skip-invalid leaves such points out");
   EXPECT_EQ(message("255 3 0 1 2", "255 3 -1 1 2"),
             "a.ply:18: value 3: expected the length of a list, a whole number, got \"-1\"");
   EXPECT_EQ(message("255 3 0 1 2", "255 3 4000000000 1 2"),
@@ -163,8 +164,9 @@ TEST_F(ReadVerticesTest, PlyErrors) {
   EXPECT_EQ(message("255 3 0 1 2", "255 3 0 1 2 3"),
             "a.ply:18: expected the end of the line, as the header says, got \"3\"");
   EXPECT_EQ(message("vertex 3", "vertex 4294967295"), "a.ply:22: expected more than 3 values, as the header says");
-  EXPECT_EQ(ReadBad("a.ply", kAscii, {.format = "", .dimension = 2}),
-            "a.ply:15: expected 2 coordinates, got 3 as properties of element \"vertex\"");
+  EXPECT_EQ(
+      ReadBad("a.ply", kAscii, {.format = "", .dimension = 2}),
+      "a.ply:15: expected 2 coordinates, got 3 as properties of element \"vertex\"; --columns x,y takes 2 of them");
 }
 
 TEST_F(ReadVerticesTest, PlyErrorsInBinary) {
@@ -176,7 +178,8 @@ TEST_F(ReadVerticesTest, PlyErrorsInBinary) {
                 "ends in row 2");
   EXPECT_EQ(ReadBad("a.ply", BinaryPly(true, {1, 2, 3, 4, 5, std::numeric_limits<double>::infinity()})),
             "a.ply: byte " + std::to_string(good.size() - 8 - 3) +
-                ": element \"vertex\" 1: coordinate 3: expected a finite number, got inf");
+                ": element \"vertex\" 1: coordinate 3: expected a finite number, got inf; --skip-invalid leaves such "
+                "points out");
   std::string negative =
       "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty list char int a\n"
       "property float x\nproperty float y\nend_header\n";
@@ -214,9 +217,11 @@ TEST_F(ReadVerticesTest, ObjErrors) {
   EXPECT_EQ(ReadBad("a.obj", "v 1 2 3\n1 2 3\n"), "a.obj:2: expected a word such as \"v\" or \"f\", got \"1\"");
   EXPECT_EQ(ReadBad("a.obj", "v 1\n"), "a.obj:1: expected 2 or 3 coordinates, got 1");
   EXPECT_EQ(ReadBad("a.obj", "v 1 2 3\nv 1 \\\n2\n"), "a.obj:2: expected 3 coordinates, got 2");
-  EXPECT_EQ(ReadBad("a.obj", "v 1 2 3\n", {.format = "", .dimension = 2}), "a.obj:1: expected 2 coordinates, got 3");
+  EXPECT_EQ(ReadBad("a.obj", "v 1 2 3\n", {.format = "", .dimension = 2}),
+            "a.obj:1: expected 2 coordinates, got 3; --columns 1,2 takes 2 of them");
   EXPECT_EQ(ReadBad("a.obj", "v 1 two 3\n"), "a.obj:1: coordinate 2: expected a number, got \"two\"");
-  EXPECT_EQ(ReadBad("a.obj", "v 1 2 nan\n"), "a.obj:1: coordinate 3: expected a finite number, got \"nan\"");
+  EXPECT_EQ(ReadBad("a.obj", "v 1 2 nan\n"),
+            "a.obj:1: coordinate 3: expected a finite number, got \"nan\"; --skip-invalid leaves such points out");
   EXPECT_THAT(ReadBad("a.obj", "v 1 2 3\nv " + std::string(3 << 19, '1')),
               StartsWith("a.obj:2: the line is longer than 1048576 bytes"));
   std::string endless = "v 1 2 3\nf";
