@@ -11,8 +11,9 @@
 namespace wellspace::cli {
 
 const char kCloudsHelp[] =
-    "Clouds:  .csv .tsv .txt .dat (columns separated by commas, semicolons or blanks; a header may name x, y, z),\n"
-    "         .xyz, .node, .npy, vertices of .ply, .obj and .off; \"-\" is standard input (csv, or --input-format)\n";
+    "Clouds:  .csv .tsv .txt .dat (columns separated by commas, semicolons or blanks; a header may name x, y, z, or\n"
+    "         lon, lat and the like), .xyz, .asc, .pts, .node, .npy, vertices of .ply, .obj and .off; each may be\n"
+    "         compressed (.csv.gz); \"-\" is standard input (csv, or --input-format)\n";
 
 const char kMeshesHelp[] =
     "Meshes:  .vtu, .vtkhdf, .msh (Gmsh 4.1; --format msh22: 2.2) and .mesh (MEDIT), 2-D and 3-D; .npz (arrays of\n"
@@ -24,11 +25,6 @@ void AddMeshOutput(CLI::App& command, std::string& path, std::string& format) {
       ->check(CLI::IsMember(formats::MeshFormats()));
 }
 
-void AddInputFormat(CLI::App& command, std::string& format) {
-  command.add_option("--input-format", format, "Format of IN; default: by its extension")
-      ->check(CLI::IsMember(formats::CloudFormats()));
-}
-
 void MeshingOptions::AddTo(CLI::App& command) {
   command.add_option("IN", input_, "File of points, or - for standard input")->required()->type_name("FILE");
   parameters_.AddSpaceTo(command);
@@ -36,7 +32,7 @@ void MeshingOptions::AddTo(CLI::App& command) {
   remote_.AddTo(command, RemoteCommand::Needs::kAnyServer);
   command.add_option("--stats", statistics_, "Write figures as JSON to this file, or - for standard output")
       ->type_name("FILE");
-  AddInputFormat(command, input_format_);
+  AddCloudOptions(command, cloud_options_);
 }
 
 bool MeshingOptions::has_figures_on_stdout() const { return statistics_ == formats::kStandardStream || remote_.json(); }
@@ -53,11 +49,13 @@ void MeshingOptions::AddFilesTo(formats::FilePlan& files) const {
 }
 
 int MeshingOptions::Run(const Work& work) {
-  const absl::StatusOr<formats::PointCloud> cloud =
-      formats::ReadCloud(input_, {.format = input_format_, .dimension = dimension()});
+  cloud_options_.dimension = dimension();
+  const absl::StatusOr<formats::PointCloud> cloud = formats::ReadCloud(input_, cloud_options_);
   if (!cloud.ok()) {
     return ReportError(cloud.status(), remote_.format());
   }
+  report_ = ReportOf(cloud_options_, cloud->notes, cloud->skipped);
+  PrintNotes(report_, remote_.format(), remote_.quiet());
   absl::StatusOr<client::MeshOptions> options = parameters_.For(cloud->dimension);
   if (!options.ok()) {
     return ReportError(options.status(), remote_.format());
@@ -72,7 +70,8 @@ int MeshingOptions::Run(const Work& work) {
   });
 }
 
-absl::Status MeshingOptions::WriteStatistics(const std::string& json) const {
+absl::Status MeshingOptions::WriteStatistics(const std::string& statistics) const {
+  const std::string json = WithNotes(report_, statistics);
   if (has_figures_on_stdout()) {
     std::cout << json << std::flush;
   }

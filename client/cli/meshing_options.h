@@ -8,6 +8,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "client/cli/cloud_options.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/parameter_options.h"
 #include "client/cli/remote_command.h"
@@ -25,9 +26,6 @@ extern const char kMeshesHelp[];
 
 // -o,--out and --format, of a mesh.
 void AddMeshOutput(CLI::App& command, std::string& path, std::string& format);
-
-// --input-format.
-void AddInputFormat(CLI::App& command, std::string& format);
 
 // A cloud to be read, the server to use and what it is asked.
 //
@@ -55,12 +53,14 @@ class MeshingOptions {
   // Reads the cloud, opens the server and does `work`. Returns the exit code, errors reported.
   int Run(const Work& work);
 
-  // Writes `json` to where --stats and --output ask for it, if they do.
-  absl::Status WriteStatistics(const std::string& json) const;
+  // Writes `statistics`, an object in JSON, with what was noted of the cloud, to where --stats and --output ask for it,
+  // if they do.
+  absl::Status WriteStatistics(const std::string& statistics) const;
 
  private:
   std::string input_;
-  std::string input_format_;
+  formats::CloudOptions cloud_options_;
+  CloudReport report_;  // of the cloud, once it is read
   std::string statistics_;
   ParameterOptions parameters_;
   RemoteCommand remote_;

@@ -18,6 +18,8 @@ class WholeCloud final : public CloudFile {
   absl::StatusOr<uint64_t> Read(std::span<double> rows) override { return source_.Read(rows); }
   uint64_t size() const override { return cloud_.size(); }
   std::string Origin(uint64_t point) const override { return cloud_.Origin(point); }
+  const std::vector<std::string>& notes() const override { return cloud_.notes; }
+  uint64_t skipped() const override { return cloud_.skipped; }
 
  private:
   const formats::PointCloud cloud_;
@@ -40,17 +42,21 @@ class NpyCloud final : public CloudFile {
   }
   uint64_t size() const override { return rows_.rows(); }
   std::string Origin(uint64_t point) const override { return absl::StrCat(rows_.name(), "[", point, "]"); }
+  const std::vector<std::string>& notes() const override { return notes_; }
+  uint64_t skipped() const override { return 0; }
 
  private:
   formats::NpyRows rows_;
   uint64_t next_ = 0;
+  const std::vector<std::string> notes_;
 };
 
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<CloudFile>> CloudFile::Open(const std::string& path,
                                                            const formats::CloudOptions& options) {
-  if (options.format == "npy" || (options.format.empty() && absl::EndsWithIgnoreCase(path, ".npy"))) {
+  const bool is_npy = options.format == "npy" || (options.format.empty() && absl::EndsWithIgnoreCase(path, ".npy"));
+  if (is_npy && options.columns.empty() && !options.skip_invalid) {
     absl::StatusOr<formats::NpyRows> rows = formats::NpyRows::Open(path);
     if (rows.ok() && (options.dimension == 0 || rows->columns() == options.dimension)) {
       return std::make_unique<NpyCloud>(*std::move(rows));

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "client/formats/read_cloud.h"
@@ -12,7 +13,8 @@
 
 namespace wellspace::client {
 
-// The points of a file. A regular .npy file in C order is read while it is sent, and need not fit into memory; others are read as a whole.
+// The points of a file. A regular .npy file of little-endian floating-point numbers in C order, of which all columns
+// and rows are taken, is read while it is sent, and need not fit into memory; others are read as a whole.
 //
 // Thread safety: thread-compatible.
 class CloudFile : public PointSource {
@@ -23,6 +25,10 @@ class CloudFile : public PointSource {
 
   // Number of points.
   virtual uint64_t size() const = 0;
+
+  // What is worth knowing of how the file was read, and how many points were left out; see formats::PointCloud.
+  virtual const std::vector<std::string>& notes() const = 0;
+  virtual uint64_t skipped() const = 0;
 
   // Where point `point` was read; see formats::PointCloud. REQUIRES: point < size().
   virtual std::string Origin(uint64_t point) const = 0;

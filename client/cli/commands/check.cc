@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "client/cli/cloud_options.h"
 #include "client/cli/commands/commands.h"
 #include "client/cli/exit_codes.h"
 #include "client/cli/interrupt.h"
@@ -123,7 +124,7 @@ absl::Status Plot(const core::QualityReport& report, int dimension, const std::s
 struct CheckCommand {
   std::string mesh_path;
   std::string cloud_path;
-  std::string cloud_format;
+  formats::CloudOptions cloud_options;
   double rho = 0;
   client::Criterion criterion = client::Criterion::kRadiusEdge;
   double max_circumradius = 0;
@@ -178,12 +179,16 @@ int CheckCommand::Run() const {
                        format);
   }
   std::vector<double> cloud;
+  CloudReport cloud_report;
   if (!cloud_path.empty()) {
-    absl::StatusOr<formats::PointCloud> read =
-        formats::ReadCloud(cloud_path, {.format = cloud_format, .dimension = mesh->dimension});
+    formats::CloudOptions options = cloud_options;
+    options.dimension = mesh->dimension;
+    absl::StatusOr<formats::PointCloud> read = formats::ReadCloud(cloud_path, options);
     if (!read.ok()) {
       return ReportError(read.status(), format);
     }
+    cloud_report = ReportOf(options, read->notes, read->skipped);
+    PrintNotes(cloud_report, format, /*quiet=*/false);
     cloud = std::move(read->points);
   }
   const core::MeshView view = {
@@ -215,6 +220,7 @@ int CheckCommand::Run() const {
     return ReportError(status, format);
   }
   if (format == OutputFormat::kJson) {
+    AddNotes(cloud_report, json);
     json["valid"] = status.ok();
     json["violation"] = status.ok() ? Json(nullptr) : Json(std::string(status.message()));
     PrintJson(json);
@@ -244,8 +250,7 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
   AddMeshInput(*check, command->mesh_path);
   check->add_option("--cloud", command->cloud_path, "File of points that must be the first vertices, to the bit")
       ->type_name("FILE");
-  check->add_option("--input-format", command->cloud_format, "Format of the cloud; default: by its extension")
-      ->check(CLI::IsMember(formats::CloudFormats()));
+  AddCloudOptions(*check, command->cloud_options, "the cloud");
   CLI::Option* rho =
       AddNumber(*check, "--rho", command->rho, "Bound that the criterion must obey; default: not checked")
           ->check(AboveZero());

@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "client/cli/cloud_options.h"
 #include "client/cli/commands/commands.h"
 #include "client/cli/meshing_options.h"
 #include "client/cli/options.h"
@@ -162,7 +163,7 @@ struct AddCommand {
   RemoteCommand remote;
   std::string session;
   std::string input;
-  std::string input_format;
+  formats::CloudOptions cloud_options;
   std::string near_path;
   uint64_t expected_revision = 0;
 
@@ -184,11 +185,14 @@ absl::Status AddCommand::Add(client::Client& client, client::CallOptions call) c
   if (!found.ok()) {
     return found.status();
   }
-  const absl::StatusOr<formats::PointCloud> cloud =
-      formats::ReadCloud(input, {.format = input_format, .dimension = found->parameters.dimension});
+  formats::CloudOptions options = cloud_options;
+  options.dimension = found->parameters.dimension;
+  const absl::StatusOr<formats::PointCloud> cloud = formats::ReadCloud(input, options);
   if (!cloud.ok()) {
     return cloud.status();
   }
+  const CloudReport report = ReportOf(options, cloud->notes, cloud->skipped);
+  PrintNotes(report, remote.format(), remote.quiet());
   std::vector<uint32_t> near;
   if (!near_path.empty()) {
     absl::StatusOr<std::vector<uint32_t>> read = ReadVertices(near_path);
@@ -207,7 +211,9 @@ absl::Status AddCommand::Add(client::Client& client, client::CallOptions call) c
     return WithOrigins(added.status(), *cloud);
   }
   if (remote.json()) {
-    PrintJson({{"vertices", added->vertices}, {"revision", added->revision}});
+    Json json = {{"vertices", added->vertices}, {"revision", added->revision}};
+    AddNotes(report, json);
+    PrintJson(json);
     return absl::OkStatus();
   }
   for (const uint32_t vertex : added->vertices) {
@@ -254,7 +260,7 @@ void AddQueryCommands(CLI::App& app, int& exit_code) {
   add_app->footer(absl::StrCat(kCloudsHelp, "\n", kExitCodesHelp));
   AddSession(*add_app, add->session);
   add_app->add_option("IN", add->input, "File of points, or - for standard input")->required()->type_name("FILE");
-  AddInputFormat(*add_app, add->input_format);
+  AddCloudOptions(*add_app, add->cloud_options);
   add_app
       ->add_option("--near", add->near_path, "File with the number of a vertex near each point, which finds it sooner")
       ->type_name("FILE");

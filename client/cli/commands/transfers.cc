@@ -5,6 +5,7 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "client/cli/cloud_options.h"
 #include "client/cli/commands/commands.h"
 #include "client/cli/meshing_options.h"
 #include "client/cli/options.h"
@@ -25,7 +26,7 @@ struct UploadCommand {
   RemoteCommand remote;
   std::string session;
   std::string input;
-  std::string input_format;
+  formats::CloudOptions cloud_options;
   std::optional<uint64_t> offset;
   uint64_t expected_revision = 0;
 
@@ -37,12 +38,15 @@ absl::Status UploadCommand::Upload(client::Client& client, client::CallOptions c
   if (!found.ok()) {
     return found.status();
   }
-  const absl::StatusOr<std::unique_ptr<client::CloudFile>> opened =
-      client::CloudFile::Open(input, {.format = input_format, .dimension = found->parameters.dimension});
+  formats::CloudOptions options = cloud_options;
+  options.dimension = found->parameters.dimension;
+  const absl::StatusOr<std::unique_ptr<client::CloudFile>> opened = client::CloudFile::Open(input, options);
   if (!opened.ok()) {
     return opened.status();
   }
   client::CloudFile& cloud = **opened;
+  const CloudReport report = ReportOf(options, cloud.notes(), cloud.skipped());
+  PrintNotes(report, remote.format(), remote.quiet());
   const uint64_t first = offset.value_or(found->committed_points);
   call.expected_revision = expected_revision;
   absl::StatusOr<client::Uploaded> uploaded = absl::InternalError("no upload");
@@ -59,8 +63,10 @@ absl::Status UploadCommand::Upload(client::Client& client, client::CallOptions c
                        [&cloud](uint64_t point) { return cloud.Origin(point); });
   }
   if (remote.json()) {
-    PrintJson(
-        {{"session", session}, {"committed_points", uploaded->committed_points}, {"revision", uploaded->revision}});
+    Json json = {
+        {"session", session}, {"committed_points", uploaded->committed_points}, {"revision", uploaded->revision}};
+    AddNotes(report, json);
+    PrintJson(json);
   } else if (!remote.quiet()) {
     std::cout << session << ": " << WithThousands(uploaded->committed_points) << " points, revision "
               << uploaded->revision << "\n";
@@ -130,7 +136,7 @@ void AddUpload(CLI::App& app, int& exit_code) {
   upload->footer(absl::StrCat(kCloudsHelp, "\n", kExitCodesHelp));
   AddSession(*upload, command->session);
   upload->add_option("IN", command->input, "File of points, or - for standard input")->required()->type_name("FILE");
-  AddInputFormat(*upload, command->input_format);
+  AddCloudOptions(*upload, command->cloud_options);
   AddCount(
       *upload, "--offset", [command](uint64_t offset) { command->offset = offset; },
       "Number of the session's points before the first of IN. What is there from it on has to be the same as in IN, "

@@ -1,0 +1,40 @@
+// The options that say how a file of points is read, and what is told of how it was.
+#ifndef WELLSPACE_CLIENT_CLI_CLOUD_OPTIONS_H_
+#define WELLSPACE_CLIENT_CLI_CLOUD_OPTIONS_H_
+
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/cli/exit_codes.h"
+#include "client/cli/json.h"
+#include "client/formats/read_cloud.h"
+
+namespace wellspace::cli {
+
+// Adds --input-format, --columns and --skip-invalid, about the file `what`. REQUIRES: `options` outlives `command`.
+void AddCloudOptions(CLI::App& command, formats::CloudOptions& options, const std::string& what = "IN");
+
+// What was found while a cloud was read: which columns were taken, what was not used, how many points were skipped.
+struct CloudReport {
+  std::vector<std::string> notes = {};
+  std::optional<uint64_t> skipped_points = {};  // if they were to be skipped
+};
+
+// Of a formats::PointCloud or a client::CloudFile.
+CloudReport ReportOf(const formats::CloudOptions& options, std::vector<std::string> notes, uint64_t skipped);
+
+// As text, prints the notes on standard error, a line each; with `quiet` only that points were skipped. Figures in JSON
+// have them.
+void PrintNotes(const CloudReport& report, OutputFormat format, bool quiet);
+
+// Adds notes, if there are any, and skipped_points, if they were to be skipped, to an object.
+void AddNotes(const CloudReport& report, Json& json);
+// The same for the text of an object that Json::dump(2) made, without reading it.
+std::string WithNotes(const CloudReport& report, const std::string& object);
+
+}  // namespace wellspace::cli
+
+#endif  // WELLSPACE_CLIENT_CLI_CLOUD_OPTIONS_H_
