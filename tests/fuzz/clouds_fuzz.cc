@@ -22,16 +22,56 @@ namespace {
 using formats::CloudOptions;
 using formats::PointCloud;
 
-// A format, and the dimension that is asked for.
+// A format, the dimension that is asked for, the columns, and whether invalid points are to be skipped.
 struct Choice {
   const char* format;
   int dimension;
+  std::string_view columns = "";  // a character each
+  bool skip_invalid = false;
 };
 constexpr std::array kChoices = {
-    Choice{"csv", 0}, Choice{"xyz", 0}, Choice{"node", 0}, Choice{"csv", 2}, Choice{"xyz", 2}, Choice{"node", 2},
-    Choice{"csv", 3}, Choice{"xyz", 3}, Choice{"node", 3}, Choice{"npy", 0}, Choice{"npy", 2}, Choice{"npy", 5},
-    Choice{"csv", 4}, Choice{"xyz", 4}, Choice{"node", 4}, Choice{"xyz", 6}, Choice{"ply", 0}, Choice{"obj", 0},
-    Choice{"off", 0}, Choice{"ply", 3}, Choice{"obj", 2},  Choice{"off", 4},
+    Choice{"csv", 0},
+    Choice{"xyz", 0},
+    Choice{"node", 0},
+    Choice{"csv", 2},
+    Choice{"xyz", 2},
+    Choice{"node", 2},
+    Choice{"csv", 3},
+    Choice{"xyz", 3},
+    Choice{"node", 3},
+    Choice{"npy", 0},
+    Choice{"npy", 2},
+    Choice{"npy", 5},
+    Choice{"csv", 4},
+    Choice{"xyz", 4},
+    Choice{"node", 4},
+    Choice{"xyz", 6},
+    Choice{"ply", 0},
+    Choice{"obj", 0},
+    Choice{"off", 0},
+    Choice{"ply", 3},
+    Choice{"obj", 2},
+    Choice{"off", 4},
+    // From 'F' on.
+    Choice{"asc", 0},
+    Choice{"pts", 0},
+    Choice{"pts", 3},
+    Choice{"csv", 0, "", true},
+    Choice{"xyz", 3, "", true},
+    Choice{"node", 0, "", true},
+    Choice{"npy", 0, "", true},
+    Choice{"ply", 0, "", true},
+    Choice{"obj", 0, "", true},
+    Choice{"off", 0, "", true},
+    Choice{"csv", 0, "xy"},
+    Choice{"csv", 2, "31"},
+    Choice{"xyz", 0, "432"},
+    Choice{"pts", 0, "21", true},
+    Choice{"node", 2, "xz"},
+    Choice{"npy", 0, "21"},
+    Choice{"ply", 0, "yx", true},
+    Choice{"obj", 2, "13"},
+    Choice{"off", 0, "zyx"},
 };
 
 void RequireCloud(const PointCloud& cloud, const CloudOptions& options) {
@@ -42,12 +82,18 @@ void RequireCloud(const PointCloud& cloud, const CloudOptions& options) {
   for (const double x : cloud.points) {
     Require(std::isfinite(x), "coordinates are finite");
   }
-  if (options.format == "npy") {
-    Require(cloud.lines.size() == 0, "an array has no lines");
-    return;
+  Require(
+      options.columns.empty() || cloud.size() == 0 || options.columns.size() == static_cast<size_t>(cloud.dimension),
+      "the columns are those asked for");
+  Require(cloud.skipped == 0 || options.skip_invalid, "points are skipped only if that was asked for");
+  for (const std::string& note : cloud.notes) {
+    RequireClearMessage(note);
   }
-  if (options.format == "ply" && cloud.lines.size() == 0) {
-    return;  // in binary
+  if (options.format == "npy" || (options.format == "ply" && cloud.lines.size() == 0)) {  // or in binary
+    Require(cloud.lines.size() == 0, "an array has no lines");
+    Require(cloud.rows.size() == (options.skip_invalid ? cloud.size() : 0),
+            "every point has a row if some are skipped");
+    return;
   }
   Require(cloud.lines.size() == cloud.size(), "every point has a line");
   uint64_t line = 0;
@@ -97,11 +143,15 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace wellspace;
   fuzz::ByteReader bytes(data, size);
   const fuzz::Choice& choice = fuzz::kChoices[static_cast<uint8_t>(bytes.Next() - '0') % fuzz::kChoices.size()];
-  const formats::CloudOptions options = {.format = choice.format, .dimension = choice.dimension};
+  formats::CloudOptions options = {.format = choice.format, .dimension = choice.dimension};
+  options.skip_invalid = choice.skip_invalid;
+  for (const char column : choice.columns) {
+    options.columns.emplace_back(1, column);
+  }
   const fuzz::ScratchFolder& folder = fuzz::ScratchFolder::Get();
   const std::string path = folder.Write("cloud", bytes.TakeText());
   const auto cloud = formats::ReadCloud(path, options);
-  if (options.format == "npy") {
+  if (options.format == "npy" && options.columns.empty() && (!cloud.ok() || cloud->skipped == 0)) {
     fuzz::RequireRows(path, cloud);
   }
   if (!cloud.ok()) {
