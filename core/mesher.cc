@@ -35,6 +35,10 @@ namespace {
 // Leaves that the tree may have for each vertex of the budget; around isolated close pairs balance costs up to about two.
 constexpr uint64_t kLeavesPerVertex = 8;
 
+// Smaller clouds are refined in half a second, unless there are sizes: too soon for a prediction to be of use.
+template <int D>
+constexpr uint64_t kLeastPredicted = D == 2 ? 50'000 : (D == 3 ? 20'000 : 2'000);
+
 // What building the tree takes for each point, but for the most uneven clouds: keys, the point twice, a place in a split leaf, indices.
 template <int D>
 constexpr uint64_t kTreeBytes =
@@ -152,8 +156,9 @@ class MesherIn final : public Mesher {
     WELLSPACE_RETURN_IF_ERROR(CheckFeasible(parameters));
     context.EnterPhase(Phase::kRefinement);
     is_refined_ = false;
-    absl::Status status =
-        refinement_->Run(DemandsOf(parameters), VertexBudget(parameters), parameters.threads, context);
+    const Demands<D> demands = DemandsOf(parameters);
+    absl::Status status = refinement_->Run(demands, VertexBudget(parameters), parameters.threads, context, nullptr,
+                                           [&] { return PredictVertices(demands, context); });
     refinement_seconds_ += absl::ToDoubleSeconds(context.TimeIn(Phase::kRefinement));
     is_given_.resize(structure_.vertex_count(), false);
     if (status.ok()) {
@@ -405,6 +410,17 @@ class MesherIn final : public Mesher {
   }
 
   Demands<D> DemandsOf(const MeshParameters& parameters) const { return DemandsIn<D>(domain_, parameters); }
+
+  // How many vertices a first refinement will end with; 0 if the context knows, or it ends too soon to be worth an
+  // estimate.
+  absl::StatusOr<uint64_t> PredictVertices(const Demands<D>& demands, const RunContext& context) const {
+    if (context.estimated_vertices() > 0 || structure_.vertex_count() > structure_.built_count() ||
+        (demands.sizes.IsUnbounded() && structure_.vertex_count() < kLeastPredicted<D>)) {
+      return 0;
+    }
+    WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size, EstimateSize<D>(structure_, demands, context, kGlance));
+    return SaturatedCount(size.vertices);
+  }
 
   // Mends slivers if that is asked for; what is kept for that goes if it is not. Decides whether the mesh is pumped: a mesh
   // without slivers stays Delaunay.

@@ -10,11 +10,9 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/dimensions.h"
 #include "core/base/huge_pages.h"
-#include "core/base/saturate.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
 #include "core/refine/checks.h"
-#include "core/refine/estimate.h"
 #include "core/refine/rounding.h"
 #include "core/tree/leaf_blocks.h"
 
@@ -29,12 +27,8 @@ constexpr double kClipRatioFactor = 1.25;
 // work has graded. Its cell is clipped so to announce it.
 constexpr double kAround = 1.5;
 
-// Room is made for at most so many times the vertices that there are, whatever is foretold.
+// Room is made for at most so many times the vertices that there are, whatever is predicted.
 constexpr uint64_t kMostReserved = 8;
-
-// Smaller clouds are refined, without sizes, before anybody could want to know how large the mesh will be: in half a second.
-template <int D>
-constexpr uint64_t kForetoldPoints = D == 2 ? 50'000 : (D == 3 ? 20'000 : 2'000);
 
 // Vertices whose first edges one thread looks for at a time.
 constexpr size_t kScheduledTogether = 1024;
@@ -56,7 +50,7 @@ Refinement<D>::Refinement(QueryStructure<D>& structure, double min_edge)
 
 template <int D>
 absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices, int threads, RunContext& context,
-                                const RefinementObserver<D>& observer) {
+                                const RefinementObserver<D>& observer, const VertexPredictor& predict) {
   ThreadTeam team(threads);
   plain_ratio_ = demands.criterion == Criterion::kRadiusEdge && demands.sizes.IsUnbounded() ? demands.rho : 0;
   off_center_factor_ = OffCenterFactor<D>(demands.rho, false);
@@ -68,10 +62,10 @@ absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices
   distrusted_size_ = 0;
   if (demands_ != demands) {
     demands_.reset();
-    WELLSPACE_RETURN_IF_ERROR(ScheduleAll(demands, team));
+    WELLSPACE_RETURN_IF_ERROR(ScheduleAll(demands, predict, team));
     demands_ = demands;
   } else {
-    WELLSPACE_RETURN_IF_ERROR(Foretell(demands));
+    WELLSPACE_RETURN_IF_ERROR(Predict(predict));
   }
   team_ = &team;
   const absl::Cleanup end = [this] {
@@ -182,28 +176,28 @@ QueryCounters Refinement<D>::counters() const {
   return counters;
 }
 
-// Tells the context how many vertices a first refinement will end with, unless it knows, if that takes long enough to be worth
-// an estimate.
+// Tells the context how many vertices are predicted.
 template <int D>
-absl::Status Refinement<D>::Foretell(const Demands<D>& demands) const {
-  if (context_->estimated_vertices() > 0 || structure_.vertex_count() > structure_.built_count() ||
-      (demands.sizes.IsUnbounded() && structure_.vertex_count() < kForetoldPoints<D>)) {
+absl::Status Refinement<D>::Predict(const VertexPredictor& predict) {
+  if (predict == nullptr) {
     return absl::OkStatus();
   }
-  WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size, EstimateSize<D>(structure_, demands, *context_, kGlance));
-  context_->SetEstimatedVertices(SaturatedCount(size.vertices));
+  WELLSPACE_ASSIGN_OR_RETURN(const uint64_t vertices, predict());
+  if (vertices > 0) {
+    context_->SetEstimatedVertices(vertices);
+  }
   return absl::OkStatus();
 }
 
-// Puts all vertices where they wait first, and foretells meanwhile.
+// Schedules all vertices, while another thread predicts how many there will be.
 template <int D>
-absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& team) {
+absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, const VertexPredictor& predict, ThreadTeam& team) {
   DropRounds();
   structure_.AdmitWaiting();  // where something was thrown
   const uint32_t count = structure_.vertex_count();
-  absl::Status foretold;
+  absl::Status predicted;
   const absl::Cleanup end = [&team] { team.Drop(); };  // of what is begun, where something is thrown
-  team.BeginCall([&] { foretold = Foretell(demands); });
+  team.BeginCall([&] { predicted = Predict(predict); });
   std::vector<OwnWorkspace> workspaces(team.threads());
   HugeVector<int16_t> first_bucket(count);
   const LeafBlocks<D> blocks(structure_.tree(), kScheduledTogether);
@@ -225,7 +219,7 @@ absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, ThreadTeam& t
     });
   });
   team.End();
-  WELLSPACE_RETURN_IF_ERROR(foretold);
+  WELLSPACE_RETURN_IF_ERROR(predicted);
   WELLSPACE_RETURN_IF_ERROR(context_->Check());
   last_ = {};
   stars_.Clear();

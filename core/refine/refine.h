@@ -15,6 +15,7 @@
 
 #include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "core/base/cache_lines.h"
 #include "core/base/huge_pages.h"
 #include "core/base/run_context.h"
@@ -34,6 +35,10 @@ class ThreadTeam;
 // Called after each insertion with the structure as it is then; for tests.
 template <int D>
 using RefinementObserver = std::function<void(const QueryStructure<D>&, const Insertion&)>;
+
+// Predicts with how many vertices the refinement will end; 0 if that is not worth the time. Called at most once in a run,
+// maybe by another thread, while vertices are only read.
+using VertexPredictor = std::function<absl::StatusOr<uint64_t>()>;
 
 // The refinement of one structure, which may be run again: after an error, after vertices were added, for other demands.
 // Built with WELLSPACE_CHECKS it asserts at each insertion what docs/design/guarantees.md promises of it, as far as that
@@ -58,12 +63,12 @@ class Refinement {
   //             the bit for any number of threads, and however often it was stopped.
   // Complexity: O(m) queries for m vertices in the end; when run again for the same demands, in proportion to what was
   //             added since and to what that makes necessary.
-  // Errors:     RESOURCE_EXHAUSTED with the bound that was met, one of the context's memory too; CANCELLED, DEADLINE_EXCEEDED. All stays usable: a later
-  //             run takes up the work where it was left.
+  // Errors:     RESOURCE_EXHAUSTED with the bound that was met, one of the context's memory too; CANCELLED,
+  //             DEADLINE_EXCEEDED; those of `predict`. All stays usable: a later run takes up the work where it was left.
   // Threads:    uses `threads`, at most as many as the machine has cores, to foresee what becomes of vertices (ADR 23).
   // Source:     [HT08] Figure 4; see docs/design/refine.md.
   absl::Status Run(const Demands<D>& demands, uint64_t max_vertices, int threads, RunContext& context,
-                   const RefinementObserver<D>& observer = nullptr);
+                   const RefinementObserver<D>& observer = nullptr, const VertexPredictor& predict = nullptr);
 
   // Tells of the vertex `x`, which somebody else has added to the structure since the last run.
   //
@@ -110,8 +115,8 @@ class Refinement {
     Workspace<D> other;
   };
 
-  absl::Status ScheduleAll(const Demands<D>& demands, ThreadTeam& team);
-  absl::Status Foretell(const Demands<D>& demands) const;
+  absl::Status ScheduleAll(const Demands<D>& demands, const VertexPredictor& predict, ThreadTeam& team);
+  absl::Status Predict(const VertexPredictor& predict);
   void Reserve(uint32_t vertices);
   double FirstEdgeSq(const Demands<D>& demands, const Point<D>& p, FaceMask faces, double nearest_sq,
                      double size_sq) const;
