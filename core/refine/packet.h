@@ -19,23 +19,17 @@
 #include "core/refine/assessment.h"
 #include "core/refine/face_watchers.h"
 #include "core/refine/insertion.h"
+#include "core/refine/neighbor_notice.h"
 #include "core/voronoi/extra_vertices.h"
 #include "core/voronoi/star.h"
 
 namespace wellspace::core {
 
-// A neighbour in view of a node that it shares with a vertex which is announced.
-struct Mention {
-  VertexId vertex = kNoVertex;
-  double edge_sq = 0;  // between the two
-  bool is_on_face = false;
-};
-
 // What is found of a cell between two insertions for it.
 struct Step {
   Assessment found;
-  uint32_t mentions = 0;  // so many, the next of the packet's
-  bool asks = false;      // for the next of the packet's requests; if not, it is the last step of its vertex
+  uint32_t notices = 0;  // so many, the next of the packet's
+  bool asks = false;     // for the next of the packet's requests; if not, it is the last step of its vertex
 };
 
 // Foreseen is what serving the vertices would do if nobody else were served meanwhile. It is put down in columns, vertex after vertex. What would be
@@ -48,7 +42,7 @@ struct alignas(kCacheLines) Packet {
   struct Ends {
     uint32_t steps = 0;
     uint32_t requests = 0;
-    uint32_t mentions = 0;
+    uint32_t notices = 0;
     uint32_t watched = 0;
     uint32_t simplices = 0;
   };
@@ -63,14 +57,14 @@ struct alignas(kCacheLines) Packet {
 
   Ends ends() const {
     const auto size = [](const auto& column) { return static_cast<uint32_t>(column.size()); };
-    return {size(steps), size(requests), size(mentions), size(watched), size(simplices)};
+    return {size(steps), size(requests), size(notices), size(watched), size(simplices)};
   }
 
   void CutTo(const Ends& ends) {
     steps.resize(ends.steps);
     requests.resize(ends.requests);
     inserted.CutTo(ends.requests);
-    mentions.resize(ends.mentions);
+    notices.resize(ends.notices);
     watched.resize(ends.watched);
     simplices.resize(ends.simplices);
   }
@@ -152,7 +146,7 @@ struct alignas(kCacheLines) Packet {
   // Roughly.
   uint64_t MemoryBytes() const {
     return steps.capacity() * sizeof(steps[0]) + requests.capacity() * sizeof(requests[0]) +
-           mentions.capacity() * sizeof(mentions[0]) + watched.capacity() * sizeof(watched[0]) +
+           notices.capacity() * sizeof(notices[0]) + watched.capacity() * sizeof(watched[0]) +
            (simplices.capacity() + listed.capacity()) * sizeof(simplices[0]);
   }
 
@@ -169,7 +163,7 @@ struct alignas(kCacheLines) Packet {
   std::vector<Step> steps;
   std::vector<InsertionRequest<D>> requests;
   ExtraVertices<D> inserted;  // by request
-  std::vector<Mention> mentions;
+  std::vector<NeighborNotice> notices;
   std::vector<WatchedNode<D>> watched;
   Star<D> simplices;  // of the stars of good cells
   Star<D> listed;     // those of the packet before, which may still be read

@@ -13,7 +13,6 @@
 #include <utility>
 #include <vector>
 
-#include "absl/functional/function_ref.h"
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "core/base/cache_lines.h"
@@ -23,8 +22,10 @@
 #include "core/refine/demands.h"
 #include "core/refine/face_watchers.h"
 #include "core/refine/insertion.h"
+#include "core/refine/neighbor_notice.h"
 #include "core/refine/packet.h"
-#include "core/refine/schedule.h"
+#include "core/refine/pending_vertices.h"
+#include "core/refine/step_rules.h"
 #include "core/voronoi/query_structure.h"
 #include "core/voronoi/star_lists.h"
 
@@ -94,16 +95,7 @@ class Refinement {
   QueryCounters counters() const;
 
  private:
-  // Which neighbours of a vertex have been looked at in view of it.
-  enum class Announced : uint8_t {
-    kToNone,      // it has just been added
-    kWithinClip,  // those in its cell as it was clipped then
-    kToAll,
-  };
-
   using Request = InsertionRequest<D>;
-  // Computes the cell of a vertex, clipped by a box; null if that cannot be done.
-  using CellOf = absl::FunctionRef<const Polytope<D>*(VertexId, const Box<D>&)>;
 
   // A vertex that has been found done, whose star is still to be listed.
   struct Listing {
@@ -118,40 +110,21 @@ class Refinement {
   absl::Status ScheduleAll(const Demands<D>& demands, const VertexPredictor& predict, ThreadTeam& team);
   absl::Status Predict(const VertexPredictor& predict);
   void Reserve(uint32_t vertices);
-  double FirstEdgeSq(const Demands<D>& demands, const Point<D>& p, FaceMask faces, double nearest_sq,
-                     double size_sq) const;
   absl::Status Loop();
   absl::Status Serve(VertexId v, int bucket);
   absl::Status CountServed(int bucket);
   absl::Status Report(int bucket);
   absl::Status Improve(VertexId v, int bucket);
-  std::optional<Request> NextRequest(VertexId v, const Polytope<D>& cell, const Assessment& found, double edge_limit_sq,
-                                     CellOf cell_of) const;
-  SteinerPoint<D> PointFor(VertexId v, const Polytope<D>& cell, const Assessment& found, double distance_sq,
-                           double edge_limit_sq, CellOf cell_of) const;
-  double ClipOf(int bucket) const { return clip_factor_ * std::sqrt(schedule_.UpperLengthSq(bucket)); }
-  Box<D> ClipAround(VertexId v, int bucket) const { return CubeAround<D>(structure_.point(v), ClipOf(bucket)); }
+  Box<D> ClipAround(VertexId v, int bucket) const { return rules_->ClipAround(v, EdgeLimitSq(bucket)); }
+  double EdgeLimitSq(int bucket) const { return pending_.schedule().UpperLengthSq(bucket); }
   void ComputeCell(VertexId v, const Box<D>& clip, Workspace<D>& workspace);
-  Assessment AssessCell(Polytope<D>& cell, FaceMask site_faces, double edge_limit_sq) const;
   absl::StatusOr<VertexId> Insert(const Request& request);
-  bool GivesWay(VertexId v, const Assessment& found, int bucket);
   VertexId Add(const Request& request);
   bool IsLongEnough(const SteinerPoint<D>& point) const { return point.empty_radius_sq >= min_edge_ * min_edge_; }
-  void Settle(VertexId v, const Assessment& found, int bucket, std::span<const Mention> mentions,
+  void Settle(VertexId v, const Assessment& found, int bucket, std::span<const NeighborNotice> notices,
               std::span<const WatchedNode<D>> watched, std::span<const std::array<VertexId, D>> star);
-  int OwnBucket(const Assessment& found, int bucket) const;
-  int NextBucket(const Assessment& found, int bucket) const;
-  void ScheduleNew(VertexId near, VertexId x, double nearest_sq);
-  void Remember(VertexId v, double radius_sq, std::span<const WatchedNode<D>> watched = {});
-  void AppendNodesToWatch(VertexId v, const Polytope<D>& cell, const Assessment& found,
-                          std::vector<WatchedNode<D>>& watched) const;
-  bool IsAtBoundary(VertexId v, const Polytope<D>& cell, int node) const;
-  void AppendMentions(const Polytope<D>& cell, FaceMask site_faces, const Assessment& found,
-                      std::vector<Mention>& mentions) const;
-  std::span<const Mention> Mentions(const Polytope<D>& cell, FaceMask site_faces, const Assessment& found);
-  void Announce(VertexId v, const Assessment& found, std::span<const Mention> mentions);
-  void Wake(VertexId u, double edge_sq);
-  void ScheduleWoken();
+  void AddPending(VertexId near, VertexId x, double nearest_sq);
+  std::span<const NeighborNotice> Notices(const Polytope<D>& cell, FaceMask site_faces, const Assessment& found);
   bool BeginRounds(int bucket);
   void TakeNext(Packet<D>& packet);
   void DropRounds();
@@ -181,20 +154,15 @@ class Refinement {
 
   QueryStructure<D>& structure_;
   const double min_edge_;
-  Schedule schedule_;
-  // R(v)^2 where v is done, else infinite; but where a node on one of v's faces is too far for its edge, minus the
-  // squared length of that edge. Rounded up: a radius may be larger than it is, an edge shorter.
-  HugeVector<float> radius_sq_;
-  FaceWatchers<D> watchers_;  // those of whom an edge is remembered
-  HugeVector<Announced> announced_;
+  PendingVertices<D> pending_;
+  std::optional<StepRules<D>> rules_;  // of the last run
   StarLists<D> stars_;                 // of vertices that are done, or have been
-  std::optional<Demands<D>> demands_;  // of the last run, once all vertices have been scheduled for them
   Workspace<D> own_;                   // the cell that is improved
   Workspace<D> other_;                 // that of another vertex meanwhile
 
   // Those of a bucket who are served in rounds, but for those who have moved on.
   int round_bucket_ = -1;
-  HugeVector<VertexId> lifted_;            // the last of each stretch is the next
+  HugeVector<VertexId> detached_;          // the last of each stretch is the next
   std::vector<Packet<D>> packets_;         // by stretch, the next of each; none if nobody is served so
   std::vector<Packet<D>> packets_before_;  // those of the bucket before, whose stars may be listed still
   size_t turn_ = 0;                        // whether the packets of the first half are next, or those of the second
@@ -205,10 +173,6 @@ class Refinement {
   size_t distrusted_size_ = 0;  // of the last bucket where it held of too few; 0 if none
 
   // Of the run.
-  double off_center_factor_ = 0;
-  double boundary_factor_ = 0;  // the same at the boundary, for radius-edge
-  double plain_ratio_ = 0;      // cells that keep it need nothing; 0: that does not tell
-  double clip_factor_ = 0;
   uint64_t max_vertices_ = 0;
   uint64_t served_ = 0;                         // vertices
   ThreadTeam* team_ = nullptr;                  // null between runs
@@ -222,12 +186,11 @@ class Refinement {
   bool is_foreseen_ = false;  // the round: insertions are noted, and what is found done goes into these
   std::vector<Listing> later_listings_;
   std::deque<Star<D>> later_own_stars_;
-  std::vector<std::pair<VertexId, double>> woken_;  // scratch of Wake
-  Star<D> star_;                                    // scratch of Improve
-  Listing last_;                                    // where the round is not foreseen, the last that was found done
+  Star<D> star_;  // scratch of Improve
+  Listing last_;  // where the round is not foreseen, the last that was found done
   Star<D> last_star_;
   std::vector<WatchedNode<D>> watched_;  // the same
-  std::vector<Mention> mentions_;        // scratch of Mentions
+  std::vector<NeighborNotice> notices_;  // scratch of Notices
   RunContext* context_ = nullptr;
   const RefinementObserver<D>* observer_ = nullptr;
 

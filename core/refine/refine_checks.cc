@@ -37,8 +37,8 @@ void Refinement<D>::CheckOrder(VertexId v, const Polytope<D>& cell, int bucket) 
 
 template <int D>
 void Refinement<D>::CheckWaits(VertexId v, VertexId u, int bucket) const {
-  Require(!schedule_.WaitsBelow(u, bucket), "vertex ", Index(v), " is looked at for edges up to ",
-          std::sqrt(schedule_.UpperLengthSq(bucket)), " while vertex ", Index(u), " waits for a shorter one");
+  Require(!pending_.schedule().IsPendingBelow(u, bucket), "vertex ", Index(v), " is looked at for edges up to ",
+          std::sqrt(pending_.schedule().UpperLengthSq(bucket)), " while vertex ", Index(u), " waits for a shorter one");
 }
 
 // [HT08] Definition 1 at an insertion, before it is made: (1), that the edge is the bucket's, the place, and the empty ball.
@@ -57,8 +57,8 @@ void Refinement<D>::CheckInsertion(const Request& request) {
                         radius, ": ");
   };
   const double rounding = RoundingIn<D>(box);
-  const double least = (encroaches ? 1 : demands_->rho) * edge * (1 - kLengthRounding);
-  const double most = std::sqrt(D) * clip_factor_ * limit * (1 + kLengthRounding) + rounding;
+  const double least = (encroaches ? 1 : rules_->criteria().rho) * edge * (1 - kLengthRounding);
+  const double most = std::sqrt(D) * rules_->clip_factor() * limit * (1 + kLengthRounding) + rounding;
   if (!(distance >= least && distance <= most)) {
     Require(false, which(), "it has to be from ", least, " to ", most);
   }
@@ -80,7 +80,7 @@ void Refinement<D>::CheckInsertion(const Request& request) {
 
 #define WELLSPACE_INSTANTIATE(D)                                              \
   template void Refinement<D>::CheckOrder(VertexId, const Polytope<D>&, int); \
-  template void Refinement<D>::CheckInsertion(const Refinement<D>::Request&);
+  template void Refinement<D>::CheckInsertion(const InsertionRequest<D>&);
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 

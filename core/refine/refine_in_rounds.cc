@@ -38,15 +38,15 @@ constexpr size_t kMoreThanDistrusted = 4;
 // Lifts those who wait in `bucket`, the lowest, to be served in rounds; false if there are too few.
 template <int D>
 bool Refinement<D>::BeginRounds(int bucket) {
-  if (schedule_.MostIn(bucket) < kLeastInRounds) {
+  if (pending_.schedule().MostIn(bucket) < kLeastInRounds) {
     return false;
   }
-  lifted_ = schedule_.Lift(bucket);
-  if (lifted_.size() < kLeastInRounds) {  // the others have moved on
-    for (const VertexId v : lifted_) {
-      schedule_.PutBack(v, bucket);
+  detached_ = pending_.schedule().Detach(bucket);
+  if (detached_.size() < kLeastInRounds) {  // the others have moved on
+    for (const VertexId v : detached_) {
+      pending_.schedule().Reattach(v, bucket);
     }
-    lifted_ = {};
+    detached_ = {};
     return false;
   }
   round_bucket_ = bucket;
@@ -57,8 +57,8 @@ bool Refinement<D>::BeginRounds(int bucket) {
   inserted_before_ = 0;
   packets_.resize(kStretches);
   for (size_t i = 0; i < kStretches; ++i) {
-    packets_[i].stretch_begin = i * lifted_.size() / kStretches;
-    packets_[i].stretch_end = (i + 1) * lifted_.size() / kStretches;
+    packets_[i].stretch_begin = i * detached_.size() / kStretches;
+    packets_[i].stretch_end = (i + 1) * detached_.size() / kStretches;
     TakeNext(packets_[i]);
   }
   return true;
@@ -68,35 +68,35 @@ bool Refinement<D>::BeginRounds(int bucket) {
 template <int D>
 void Refinement<D>::TakeNext(Packet<D>& packet) {
   const size_t size = std::min(kPacket, packet.stretch_end - packet.stretch_begin);
-  packet.vertices.assign(lifted_.rend() - static_cast<std::ptrdiff_t>(packet.stretch_end),
-                         lifted_.rend() - static_cast<std::ptrdiff_t>(packet.stretch_end - size));
+  packet.vertices.assign(detached_.rend() - static_cast<std::ptrdiff_t>(packet.stretch_end),
+                         detached_.rend() - static_cast<std::ptrdiff_t>(packet.stretch_end - size));
   packet.stretch_end -= size;
   packet.served = 0;
   packet.is_foreseen = false;
 }
 
-// Has those who were lifted, and have not been served, wait in their bucket alone.
+// Has those who were detached, and have not been served, wait in their bucket alone.
 template <int D>
 void Refinement<D>::DropRounds() {
   const auto put_back = [this](VertexId v) {
-    if (schedule_.WaitsIn(v, round_bucket_)) {
-      schedule_.PutBack(v, round_bucket_);
+    if (pending_.schedule().IsPendingIn(v, round_bucket_)) {
+      pending_.schedule().Reattach(v, round_bucket_);
     }
   };
   for (const Packet<D>& packet : packets_) {
-    const auto begin = lifted_.begin();
+    const auto begin = detached_.begin();
     std::for_each(begin + static_cast<std::ptrdiff_t>(packet.stretch_begin),
                   begin + static_cast<std::ptrdiff_t>(packet.stretch_end), put_back);
     std::for_each(packet.vertices.rbegin(), packet.vertices.rend() - static_cast<std::ptrdiff_t>(packet.served),
                   put_back);
   }
   packets_.clear();
-  lifted_ = {};
+  detached_ = {};
 }
 
 template <int D>
 uint64_t Refinement<D>::RoundBytes() const {
-  uint64_t bytes = lifted_.size() * sizeof(VertexId);
+  uint64_t bytes = detached_.size() * sizeof(VertexId);
   for (const auto* packets : {&packets_, &packets_before_}) {
     for (const Packet<D>& packet : *packets) {
       bytes += packet.MemoryBytes();
@@ -108,7 +108,7 @@ uint64_t Refinement<D>::RoundBytes() const {
   return bytes;
 }
 
-// Serves those who were lifted, and before the next of them whoever has come to wait in a lower bucket. Has the packets of one half of the stretches foreseen while it
+// Serves those who were detached, and before the next of them whoever has come to wait in a lower bucket. Has the packets of one half of the stretches foreseen while it
 // serves those of the other.
 template <int D>
 absl::Status Refinement<D>::ServeRounds() {
@@ -128,7 +128,7 @@ absl::Status Refinement<D>::ServeRounds() {
     turn_ = 1 - turn_;
     if (std::all_of(packets_.begin(), packets_.end(), [](const Packet<D>& packet) { return packet.IsServed(); })) {
       packets_before_ = std::exchange(packets_, {});
-      lifted_ = {};
+      detached_ = {};
     }
   }
   return absl::OkStatus();
@@ -158,7 +158,7 @@ template <int D>
 void Refinement<D>::LookAhead() {
   const std::span<Packet<D>> now = HalfOf(turn_);
   const std::span<Packet<D>> then = HalfOf(1 - turn_);
-  if (lifted_.size() <= kMoreThanDistrusted * distrusted_size_) {
+  if (detached_.size() <= kMoreThanDistrusted * distrusted_size_) {
     is_foreseen_ = now.front().is_foreseen;
     if (!is_foreseen_) {
       AwaitOthers();  // they may still list stars, which serving does then
@@ -170,11 +170,11 @@ void Refinement<D>::LookAhead() {
   const auto prepare = [this](std::span<Packet<D>> packets) {
     for (Packet<D>& packet : packets) {
       for (const VertexId v : packet.vertices) {
-        schedule_.Prefetch(v);
+        pending_.schedule().Prefetch(v);
       }
       packet.Prepare(structure_.vertex_count(), inserted_before_ + inserted_.size());
       for (size_t i = packet.served; i < packet.vertices.size(); ++i) {
-        packet.foreseen[i].is_wanted = schedule_.WaitsIn(packet.vertices[i], round_bucket_);
+        packet.foreseen[i].is_wanted = pending_.schedule().IsPendingIn(packet.vertices[i], round_bucket_);
       }
     }
   };
@@ -216,7 +216,7 @@ void Refinement<D>::EndRound() {
   AwaitOthers();
   is_foreseen_ = false;
   if (foreseen_count_ >= kLeastInRounds && held_count_ < kLeastShareHeld * static_cast<double>(foreseen_count_)) {
-    distrusted_size_ = lifted_.size();
+    distrusted_size_ = detached_.size();
   }
   std::swap(listings_, later_listings_);
   std::swap(own_stars_, later_own_stars_);
@@ -270,9 +270,7 @@ void Refinement<D>::ListLast() {
 // Asks the memory for what serving `v` reads besides its query.
 template <int D>
 void Refinement<D>::PrefetchServed(VertexId v) const {
-  schedule_.Prefetch(v);
-  PrefetchLine(&radius_sq_[Index(v)]);
-  PrefetchLine(&announced_[Index(v)]);
+  pending_.Prefetch(v);
   if (!is_foreseen_) {
     stars_.Prefetch(v, 0);
   }
@@ -310,7 +308,7 @@ template <int D>
 void Refinement<D>::ForeseeOne(Packet<D>& packet, size_t at, OwnWorkspace& workspace) const {
   const VertexId v = packet.vertices[at];
   const FaceMask faces = structure_.faces(v);
-  const double edge_limit_sq = schedule_.UpperLengthSq(round_bucket_);
+  const double edge_limit_sq = EdgeLimitSq(round_bucket_);
   Polytope<D>& cell = workspace.cell;
   structure_.UnplacedClippedVoronoi(v, ClipAround(v, round_bucket_), workspace, packet.inserted);
   packet.foreseen[at].reach_sq = cell.CutLimitSq();
@@ -330,13 +328,13 @@ void Refinement<D>::ForeseeOne(Packet<D>& packet, size_t at, OwnWorkspace& works
     return &other.cell;
   };
   while (!cell.IsTooLarge() && !context_->IsCancelled()) {
-    const Assessment found = AssessCell(cell, faces, edge_limit_sq);
-    const size_t first_mention = packet.mentions.size();
-    AppendMentions(cell, faces, found, packet.mentions);
-    const std::optional<Request> request = NextRequest(v, cell, found, edge_limit_sq, cell_of);
-    packet.steps.push_back({found, static_cast<uint32_t>(packet.mentions.size() - first_mention), request.has_value()});
+    const Assessment found = rules_->AssessCell(cell, faces, edge_limit_sq);
+    const size_t first_notice = packet.notices.size();
+    rules_->AppendNotices(cell, faces, found, packet.notices);
+    const std::optional<InsertionRequest<D>> request = rules_->NextRequest(v, cell, found, edge_limit_sq, cell_of);
+    packet.steps.push_back({found, static_cast<uint32_t>(packet.notices.size() - first_notice), request.has_value()});
     if (!request.has_value()) {
-      AppendNodesToWatch(v, cell, found, packet.watched);
+      rules_->AppendNodesToWatch(v, cell, found, packet.watched);
       if (found.IsGood()) {
         cell.FindStar(packet.star);
         packet.AppendStar(at);
@@ -370,11 +368,11 @@ absl::Status Refinement<D>::ServePacket(Packet<D>& packet) {
     const size_t first = inserted_.size();
     VertexId below{};
     int bucket = 0;
-    while (schedule_.HasBelow(round_bucket_) && schedule_.Pop(below, bucket, round_bucket_)) {
+    while (pending_.schedule().HasBelow(round_bucket_) && pending_.schedule().Pop(below, bucket, round_bucket_)) {
       WELLSPACE_RETURN_IF_ERROR(Serve(below, bucket));
     }
     packet.NoteUnforeseen(std::span(inserted_).subspan(first));
-    if (schedule_.WaitsIn(packet.vertices[packet.served], round_bucket_)) {
+    if (pending_.schedule().IsPendingIn(packet.vertices[packet.served], round_bucket_)) {
       WELLSPACE_RETURN_IF_ERROR(ServeNext(packet));
     } else {
       packet.NoteUnforeseen(packet.InsertedFor(packet.served));
@@ -389,7 +387,7 @@ absl::Status Refinement<D>::ServeNext(Packet<D>& packet) {
   const VertexId v = packet.vertices[packet.served];
   const size_t first = inserted_.size();
   const uint32_t first_new = structure_.vertex_count();
-  schedule_.Take(v);
+  pending_.schedule().Take(v);
   absl::Status status = context_->Check();
   if (status.ok()) {
     const bool holds = packet.HoldsFor(packet.served, structure_.point(v));
@@ -398,7 +396,7 @@ absl::Status Refinement<D>::ServeNext(Packet<D>& packet) {
     status = holds ? Retrace(packet, packet.served) : Improve(v, round_bucket_);
   }
   if (!status.ok()) {
-    schedule_.LiftAgain(v, round_bucket_);
+    pending_.schedule().DetachAgain(v, round_bucket_);
     return status;
   }
   // What was foreseen after all counts as foreseen.
@@ -421,19 +419,20 @@ absl::Status Refinement<D>::Retrace(Packet<D>& packet, size_t at) {
   const VertexId v = packet.vertices[at];
   const auto& [is_wanted, is_known, reach_sq, new_simplices, begin] = packet.foreseen[at];
   const typename Packet<D>::Ends end = packet.EndOf(at);
-  std::span<Mention> mentions = std::span(packet.mentions).subspan(begin.mentions);
+  std::span<NeighborNotice> notices = std::span(packet.notices).subspan(begin.notices);
   auto request = packet.requests.begin() + begin.requests;
   auto name = packet.names.begin() + begin.requests;
   for (auto step = packet.steps.begin() + begin.steps;; ++step) {
-    const std::span<Mention> own = mentions.first(step->mentions);
-    mentions = mentions.subspan(step->mentions);
-    for (Mention& mention : own) {
-      packet.Rename(mention.vertex);
+    const std::span<NeighborNotice> own = notices.first(step->notices);
+    notices = notices.subspan(step->notices);
+    for (NeighborNotice& notice : own) {
+      packet.Rename(notice.vertex);
     }
-    if (announced_[Index(v)] == Announced::kToNone) {
-      Announce(v, step->found, own);
+    if (pending_.IsNew(v)) {
+      pending_.Notify(v, step->found, own);
     }
-    if (GivesWay(v, step->found, round_bucket_)) {
+    if (pending_.HasShorterThan(round_bucket_)) {
+      pending_.Postpone(v, step->found, round_bucket_);
       return absl::OkStatus();
     }
     if (!step->asks) {

@@ -68,12 +68,12 @@ class Schedule {
 
   void AddToBucket(VertexId v, int bucket) {
     MakeRoomFor(v);
-    int16_t& waits_in = places_[Index(v)].bucket;
-    if (waits_in <= bucket) {
+    int16_t& pending_in = places_[Index(v)].bucket;
+    if (pending_in <= bucket) {
       return;
     }
-    size_ += waits_in == kNowhere ? 1 : 0;
-    waits_in = static_cast<int16_t>(bucket);
+    size_ += pending_in == kNowhere ? 1 : 0;
+    pending_in = static_cast<int16_t>(bucket);
     if (static_cast<size_t>(bucket) >= buckets_.size()) {
       buckets_.resize(bucket + 1);
     }
@@ -82,12 +82,12 @@ class Schedule {
   }
 
   // Whether `v` waits in a bucket below `bucket`.
-  bool WaitsBelow(VertexId v, int bucket) const { return BucketHolding(v) < bucket; }
+  bool IsPendingBelow(VertexId v, int bucket) const { return BucketHolding(v) < bucket; }
 
   // Whether a vertex may wait below `bucket`: never right after Pop took one from there, until one is added.
   bool HasBelow(int bucket) const { return lowest_ < bucket; }
 
-  bool Waits(VertexId v) const { return BucketHolding(v) != kNowhere; }
+  bool IsPending(VertexId v) const { return BucketHolding(v) != kNowhere; }
 
   // How many vertices wait.
   size_t size() const { return size_; }
@@ -119,7 +119,7 @@ class Schedule {
       while (!buckets_[lowest].empty()) {
         v = buckets_[lowest].back();
         buckets_[lowest].pop_back();
-        if (WaitsIn(v, lowest)) {  // else it has moved to a lower bucket since
+        if (IsPendingIn(v, lowest)) {  // else it has moved to a lower bucket since
           Take(v);
           bucket = lowest;
           return true;
@@ -131,37 +131,37 @@ class Schedule {
 
   // Has everybody who waits in `bucket`, the lowest, wait without a place in its order, until it is taken or put back. Returns them: those
   // that would be taken last come first.
-  HugeVector<VertexId> Lift(int bucket) {
-    HugeVector<VertexId> lifted = std::exchange(buckets_[bucket], {});
+  HugeVector<VertexId> Detach(int bucket) {
+    HugeVector<VertexId> detached = std::exchange(buckets_[bucket], {});
     // From the last on each once: whoever has been seen waits nowhere meanwhile.
-    size_t first = lifted.size();
-    for (size_t i = lifted.size(); i-- > 0;) {
-      const VertexId v = lifted[i];
-      if (WaitsIn(v, bucket)) {
+    size_t first = detached.size();
+    for (size_t i = detached.size(); i-- > 0;) {
+      const VertexId v = detached[i];
+      if (IsPendingIn(v, bucket)) {
         places_[Index(v)].bucket = kNowhere;
-        lifted[--first] = v;
+        detached[--first] = v;
       }
     }
-    lifted.erase(lifted.begin(), lifted.begin() + static_cast<std::ptrdiff_t>(first));
-    for (const VertexId v : lifted) {
+    detached.erase(detached.begin(), detached.begin() + static_cast<std::ptrdiff_t>(first));
+    for (const VertexId v : detached) {
       places_[Index(v)].bucket = static_cast<int16_t>(bucket);
     }
-    return lifted;
+    return detached;
   }
 
-  // Puts a vertex that was lifted from `bucket`, and waits in it still, on top of it.
-  void PutBack(VertexId v, int bucket) {
+  // Puts a vertex that was detached from `bucket`, and waits in it still, on top of it.
+  void Reattach(VertexId v, int bucket) {
     buckets_[bucket].push_back(v);
     lowest_ = std::min(lowest_, bucket);
   }
 
-  // Has a vertex that was lifted from `bucket`, and then taken, wait as it did, unless it waits in a lower one.
-  void LiftAgain(VertexId v, int bucket) {
-    size_ += Waits(v) ? 0 : 1;
+  // Has a vertex that was detached from `bucket`, and then taken, wait as it did, unless it waits in a lower one.
+  void DetachAgain(VertexId v, int bucket) {
+    size_ += IsPending(v) ? 0 : 1;
     places_[Index(v)].bucket = static_cast<int16_t>(std::min<int>(BucketHolding(v), bucket));
   }
 
-  bool WaitsIn(VertexId v, int bucket) const { return BucketHolding(v) == bucket; }
+  bool IsPendingIn(VertexId v, int bucket) const { return BucketHolding(v) == bucket; }
 
   // Asks the memory for where `v` waits.
   void Prefetch(VertexId v) const { PrefetchLine(&places_[Index(v)]); }

@@ -397,32 +397,32 @@ TEST(ScheduleTest, WhoIsLiftedWaitsUntilItIsTakenOrPutBack) {
   ASSERT_TRUE(schedule.Pop(v, bucket));
   schedule.AddToBucket(v, 3);  // which it had before: once more in the list, but waiting once
   EXPECT_EQ(schedule.Lowest(), 3);
-  const HugeVector<VertexId> lifted = schedule.Lift(3);
+  const HugeVector<VertexId> lifted = schedule.Detach(3);
   EXPECT_THAT(lifted, ElementsAre(VertexId{0}, VertexId{1}, VertexId{2}, VertexId{3}, VertexId{5}, VertexId{4}));
   EXPECT_EQ(schedule.size(), 6);
   EXPECT_FALSE(schedule.HasBelow(3));
   EXPECT_EQ(schedule.Lowest(), -1) << "who is lifted has no place in the order";
   for (const VertexId u : lifted) {
-    EXPECT_TRUE(schedule.WaitsIn(u, 3));
+    EXPECT_TRUE(schedule.IsPendingIn(u, 3));
   }
   schedule.AddToBucket(VertexId{1}, 1);  // moves down
-  EXPECT_FALSE(schedule.WaitsIn(VertexId{1}, 3));
+  EXPECT_FALSE(schedule.IsPendingIn(VertexId{1}, 3));
   EXPECT_TRUE(schedule.HasBelow(3));
   EXPECT_TRUE(schedule.Pop(v, bucket, 3));
   EXPECT_EQ(v, VertexId{1});
   EXPECT_FALSE(schedule.Pop(v, bucket, 3));
   schedule.Take(VertexId{0});
-  EXPECT_FALSE(schedule.Waits(VertexId{0}));
-  schedule.LiftAgain(VertexId{0}, 3);
-  EXPECT_TRUE(schedule.WaitsIn(VertexId{0}, 3));
+  EXPECT_FALSE(schedule.IsPending(VertexId{0}));
+  schedule.DetachAgain(VertexId{0}, 3);
+  EXPECT_TRUE(schedule.IsPendingIn(VertexId{0}, 3));
   EXPECT_EQ(schedule.size(), 5);
   schedule.Take(VertexId{0});
   schedule.AddToBucket(VertexId{0}, 1);
-  schedule.LiftAgain(VertexId{0}, 3);
+  schedule.DetachAgain(VertexId{0}, 3);
   EXPECT_TRUE(schedule.Pop(v, bucket, 3)) << "it waits below";
   EXPECT_EQ(v, VertexId{0});
-  schedule.PutBack(VertexId{5}, 3);
-  schedule.PutBack(VertexId{2}, 3);
+  schedule.Reattach(VertexId{5}, 3);
+  schedule.Reattach(VertexId{2}, 3);
   EXPECT_EQ(schedule.MostIn(3), 2);
   EXPECT_FALSE(schedule.Pop(v, bucket, 3)) << "below 3";
   for (const uint32_t expected : {2, 5}) {
@@ -435,7 +435,7 @@ TEST(ScheduleTest, WhoIsLiftedWaitsUntilItIsTakenOrPutBack) {
   schedule.AddToBucket(VertexId{6}, 3);
   schedule.AddToBucket(VertexId{6}, 1);
   EXPECT_EQ(schedule.MostIn(3), 1);
-  EXPECT_TRUE(schedule.Lift(3).empty()) << "6 has moved on";
+  EXPECT_TRUE(schedule.Detach(3).empty()) << "6 has moved on";
 }
 
 // By blocks of numbers, what is new in that of its neighbour; the last come first in each, and before all of them what comes

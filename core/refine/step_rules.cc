@@ -1,4 +1,5 @@
-// The part of Refinement that says what a cell asks for: where new vertices go.
+#include "core/refine/step_rules.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,10 +9,16 @@
 #include <utility>
 
 #include "core/base/dimensions.h"
-#include "core/refine/refine.h"
+#include "core/refine/rounding.h"
+#include "core/refine/steiner_point.h"
 
 namespace wellspace::core {
 namespace {
+
+// A cell is clipped at this times the longest edge of its bucket; for a large rho at that and a quarter more, so that a
+// bad node is seen.
+constexpr double kClipFactor = 4;
+constexpr double kClipRatioFactor = 1.25;
 
 // A cell is clipped by the square around this times the petal of an edge, so that the petal is surely within.
 constexpr double kPetalShare = 1.01;
@@ -60,12 +67,30 @@ SteinerPoint<2> PointInPetal(VertexId v, const Polytope<2>& cell, const Assessme
 
 }  // namespace
 
-// What `cell`, that of `v`, asks for by edges up to a bucket's limit, by what was found; none if nothing. Calls cell_of at most once.
 template <int D>
-std::optional<typename Refinement<D>::Request> Refinement<D>::NextRequest(VertexId v, const Polytope<D>& cell,
-                                                                          const Assessment& found, double edge_limit_sq,
-                                                                          CellOf cell_of) const {
-  Request request;
+StepRules<D>::StepRules(const QueryStructure<D>& structure, const Demands<D>& criteria)
+    : structure_(structure),
+      criteria_(criteria),
+      off_center_factor_(OffCenterFactor<D>(criteria.rho, false)),
+      boundary_factor_(OffCenterFactor<D>(criteria.rho, criteria.criterion == Criterion::kRadiusEdge)),
+      plain_ratio_(criteria.criterion == Criterion::kRadiusEdge && criteria.sizes.IsUnbounded() ? criteria.rho : 0),
+      clip_factor_(std::max(kClipFactor, kClipRatioFactor * criteria.rho)) {}
+
+template <int D>
+Assessment StepRules<D>::AssessCell(Polytope<D>& cell, FaceMask site_faces, double edge_limit_sq) const {
+  if (cell.PlaceUnlessKeeps(plain_ratio_)) {
+    Assessment plain;
+    plain.is_plain = true;
+    return plain;
+  }
+  return Assess<D>(cell, site_faces, criteria_, edge_limit_sq);
+}
+
+template <int D>
+std::optional<InsertionRequest<D>> StepRules<D>::NextRequest(VertexId v, const Polytope<D>& cell,
+                                                             const Assessment& found, double edge_limit_sq,
+                                                             CellOf cell_of) const {
+  InsertionRequest<D> request;
   Insertion& insertion = request.insertion;
   insertion.near = v;
   insertion.edge_limit_sq = edge_limit_sq;
@@ -74,7 +99,7 @@ std::optional<typename Refinement<D>::Request> Refinement<D>::NextRequest(Vertex
                           : IsAtBoundary(v, cell, found.bad_node) ? boundary_factor_
                                                                   : off_center_factor_;
     insertion.reason = found.is_too_large ? Reason::kSize : Reason::kRatio;
-    insertion.edge_sq = found.bound_sq / (demands_->rho * demands_->rho);
+    insertion.edge_sq = found.bound_sq / (criteria_.rho * criteria_.rho);
     insertion.other = found.bad_plane >= 0 ? cell.plane(found.bad_plane).vertex : kNoVertex;
     request.candidate = PointFor(v, cell, found, factor * factor * found.bound_sq, edge_limit_sq, cell_of);
   } else if (found.encroached_face >= 0) {
@@ -93,13 +118,13 @@ std::optional<typename Refinement<D>::Request> Refinement<D>::NextRequest(Vertex
 // The point for the bad node of the cell of `v`: an off-centre at distance_sq, by the square, unless the node is nearer; then that, or for a triangle
 // better still.
 template <int D>
-SteinerPoint<D> Refinement<D>::PointFor(VertexId v, const Polytope<D>& cell, const Assessment& found,
-                                        double distance_sq, double edge_limit_sq, CellOf cell_of) const {
+SteinerPoint<D> StepRules<D>::PointFor(VertexId v, const Polytope<D>& cell, const Assessment& found, double distance_sq,
+                                       double edge_limit_sq, CellOf cell_of) const {
   if constexpr (D == 2) {
     const bool is_within = cell.nodes()[found.bad_node].radius_sq <= distance_sq;
-    if (is_within && !found.is_too_large && demands_->criterion == Criterion::kRadiusEdge) {
+    if (is_within && !found.is_too_large && criteria_.criterion == Criterion::kRadiusEdge) {
       const double clip = clip_factor_ * std::sqrt(edge_limit_sq);
-      return PointInPetal(v, cell, found, distance_sq, demands_->rho, clip, cell_of);
+      return PointInPetal(v, cell, found, distance_sq, criteria_.rho, clip, cell_of);
     }
   }
   return OffCenter<D>(cell, found.bad_node, found.bad_plane, distance_sq);
@@ -107,7 +132,7 @@ SteinerPoint<D> Refinement<D>::PointFor(VertexId v, const Polytope<D>& cell, con
 
 // Whether `node` of `cell`, that of `v`, is the circumcentre of a simplex with a corner on the boundary of the box.
 template <int D>
-bool Refinement<D>::IsAtBoundary(VertexId v, const Polytope<D>& cell, int node) const {
+bool StepRules<D>::IsAtBoundary(VertexId v, const Polytope<D>& cell, int node) const {
   const std::array<uint16_t, D>& planes = cell.nodes()[node].planes;
   return structure_.faces(v) != 0 || std::any_of(planes.begin(), planes.end(), [&](uint16_t index) {
            const Plane<D>& plane = cell.plane(index);
@@ -115,9 +140,49 @@ bool Refinement<D>::IsAtBoundary(VertexId v, const Polytope<D>& cell, int node) 
          });
 }
 
-#define WELLSPACE_INSTANTIATE(D)                                          \
-  template std::optional<InsertionRequest<D>> Refinement<D>::NextRequest( \
-      VertexId, const Polytope<D>&, const Assessment&, double, Refinement<D>::CellOf) const;
+template <int D>
+void StepRules<D>::AppendNotices(const Polytope<D>& cell, FaceMask site_faces, const Assessment& found,
+                                 std::vector<NeighborNotice>& notices) const {
+  const bool is_well_spaced = criteria_.criterion == Criterion::kWellSpaced;
+  if (!is_well_spaced && site_faces == 0 && found.encroached_face < 0) {
+    return;
+  }
+  for (const CellNode<D>& node : cell.nodes()) {
+    const bool is_on_face = cell.FacesOf(node) != 0;
+    if (!is_on_face && !is_well_spaced) {
+      continue;
+    }
+    for (const uint16_t index : node.planes) {
+      const Plane<D>& plane = cell.plane(index);
+      if (plane.kind == PlaneKind::kBisector) {
+        notices.push_back({plane.vertex, 2 * plane.offset, is_on_face});
+      }
+    }
+  }
+}
+
+template <int D>
+void StepRules<D>::AppendNodesToWatch(VertexId v, const Polytope<D>& cell, const Assessment& found,
+                                      std::vector<WatchedNode<D>>& watched) const {
+  if (found.own_face_edge_sq == Assessment::kNone) {
+    return;
+  }
+  const double rounding = 4 * std::sqrt(D) * RoundingIn<D>(structure_.box());
+  const double least_sq = criteria_.rho * criteria_.rho * found.own_face_edge_sq * (1 - kLengthRounding);
+  for (const CellNode<D>& node : cell.nodes()) {
+    const auto faces = static_cast<FaceMask>(cell.FacesOf(node) & structure_.faces(v));
+    if (faces == 0 || node.radius_sq <= least_sq) {
+      continue;
+    }
+    WatchedNode<D> one{cell.site(), (1 + kLengthRounding) * std::sqrt(node.radius_sq) + rounding, faces};
+    for (int i = 0; i < D; ++i) {
+      one.centre[i] += (faces >> (2 * i) & 3) == 0 ? node.x[i] : 0;
+    }
+    watched.push_back(one);
+  }
+}
+
+#define WELLSPACE_INSTANTIATE(D) template class StepRules<D>;
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 

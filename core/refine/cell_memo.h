@@ -1,0 +1,49 @@
+// What is remembered of a vertex' cell between two looks at it.
+#ifndef WELLSPACE_CORE_REFINE_CELL_MEMO_H_
+#define WELLSPACE_CORE_REFINE_CELL_MEMO_H_
+
+#include <cmath>
+#include <limits>
+
+namespace wellspace::core {
+
+// One of three: nothing; a radius; or the edge of a face. Four bytes, since there is one for every vertex. What is
+// remembered is rounded to the safe side: a radius up, an edge down.
+class CellMemo {
+ public:
+  // Nothing: the vertex is pending, or its cell has changed since.
+  constexpr CellMemo() = default;
+
+  // The cell is good, and R(v)^2, the squared distance of its farthest node, is at most `radius_sq`. That is 0 where the
+  // cell was found good without a look at its nodes: by the radius-edge criterion, which does not ask for radii.
+  static CellMemo OfRadius(double radius_sq) { return CellMemo(RoundedUp(radius_sq)); }
+
+  // Of the nodes on faces that the vertex lies on, some are too far for an edge of this squared length, the shortest such.
+  // They ask for nothing, as they are no circumcentres, until a new vertex cuts one of them off.
+  static CellMemo OfFaceEdge(double edge_sq) { return CellMemo(RoundedUp(-edge_sq)); }
+
+  bool HasFaceEdge() const { return value_ < 0; }
+
+  // REQUIRES:   HasFaceEdge().
+  double face_edge_sq() const { return -static_cast<double>(value_); }
+
+  // Whether the cell may have a node farther than this, by the square; also where nothing is remembered.
+  //
+  // REQUIRES:   the well-spaced criterion, by which radii are known; not told where a face's edge is remembered.
+  bool MayReachBeyond(double distance_sq) const { return value_ > distance_sq; }
+
+ private:
+  explicit constexpr CellMemo(float value) : value_(value) {}
+
+  // The least float that is not less.
+  static float RoundedUp(double x) {
+    const auto nearest = static_cast<float>(x);
+    return nearest < x ? std::nextafter(nearest, std::numeric_limits<float>::infinity()) : nearest;
+  }
+
+  float value_ = std::numeric_limits<float>::infinity();  // a squared radius, or minus a squared edge
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_REFINE_CELL_MEMO_H_

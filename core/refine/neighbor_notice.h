@@ -1,0 +1,18 @@
+// What a vertex tells its neighbours once it has been added.
+#ifndef WELLSPACE_CORE_REFINE_NEIGHBOR_NOTICE_H_
+#define WELLSPACE_CORE_REFINE_NEIGHBOR_NOTICE_H_
+
+#include "core/base/ids.h"
+
+namespace wellspace::core {
+
+// A neighbour that may have to be looked at again, in view of a node that its cell shares with that of a new vertex.
+struct NeighborNotice {
+  VertexId vertex = kNoVertex;
+  double edge_sq = 0;       // the squared distance between the two
+  bool is_on_face = false;  // the node lies on a face of the box
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_REFINE_NEIGHBOR_NOTICE_H_
