@@ -46,16 +46,16 @@ absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices
   }
   team_ = &team;
   const absl::Cleanup end = [this] {
-    if (is_ahead_ || is_listing_) {  // something has been thrown
+    if (is_ahead_ || stars_.IsWriting()) {  // something has been thrown
       team_->Drop();
       is_ahead_ = false;
-      is_listing_ = false;
+      stars_.EndWriting();
     }
     team_ = nullptr;
   };
   const absl::Status status = Loop();
   AwaitOthers();
-  ListLast();
+  stars_.WriteLast();
   packets_before_ = {};
   for (const OwnWorkspace& workspace : round_workspaces_) {
     own_.counters.Add(workspace.counters);
@@ -126,8 +126,7 @@ void Refinement<D>::VertexAdded(VertexId x) {
 
 template <int D>
 uint64_t Refinement<D>::MemoryBytes() const {
-  return pending_.MemoryBytes() + (is_ahead_ ? bytes_ahead_ : stars_.MemoryBytes() + RoundBytes()) +
-         (star_.capacity() + last_star_.capacity()) * sizeof(star_[0]) +
+  return pending_.MemoryBytes() + stars_.MemoryBytes() + (is_ahead_ ? bytes_ahead_ : RoundBytes()) +
          (own_.seen.size() + other_.seen.size()) * sizeof(uint32_t);
 }
 
@@ -169,7 +168,6 @@ absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, const VertexP
   team.End();
   WELLSPACE_RETURN_IF_ERROR(predicted);
   WELLSPACE_RETURN_IF_ERROR(context_->Check());
-  last_ = {};
   stars_.Clear();
   Reserve(static_cast<uint32_t>(
       std::min({context_->estimated_vertices(), max_vertices_, kMostReserved * structure_.vertex_count()})));
@@ -233,8 +231,8 @@ absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
     if (!request.has_value()) {
       watched_.clear();
       rules_->AppendNodesToWatch(v, cell, found, watched_);
-      Star<D>& star = is_foreseen_ ? later_own_stars_.emplace_back() : star_;
-      if (found.IsGood() && (is_foreseen_ || stars_.IsComplete())) {
+      Star<D>& star = stars_.Room();
+      if (found.IsGood() && stars_.NeedsStars()) {
         cell.FindStar(star);
       }
       Settle(v, found, bucket, Notices(cell, structure_.faces(v), found), watched_, star);
@@ -268,14 +266,7 @@ void Refinement<D>::Settle(VertexId v, const Assessment& found, int bucket, std:
     pending_.ScheduleLater(v, found, bucket, rules_->ClipRadius(EdgeLimitSq(bucket)));
     return;
   }
-  if (is_foreseen_) {
-    later_listings_.push_back({v, star, structure_.vertex_count()});
-  } else {
-    PrefetchListing(star);
-    ListLast();
-    last_star_.assign(star.begin(), star.end());
-    last_ = {v, last_star_, structure_.vertex_count()};
-  }
+  stars_.Write(v, star, structure_.vertex_count());
   if (pending_.HasToNotify(v)) {
     pending_.Notify(v, found, notices);
   }

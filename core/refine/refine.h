@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <optional>
 #include <span>
@@ -25,6 +24,7 @@
 #include "core/refine/neighbor_notice.h"
 #include "core/refine/packet.h"
 #include "core/refine/pending_vertices.h"
+#include "core/refine/speculation/star_writer.h"
 #include "core/refine/step_rules.h"
 #include "core/voronoi/query_structure.h"
 #include "core/voronoi/star_lists.h"
@@ -89,7 +89,7 @@ class Refinement {
 
   // The simplices at all vertices, when the last run was for the end, unless cells have changed otherwise since the first run for these
   // demands.
-  const StarLists<D>& stars() const { return stars_; }
+  const StarLists<D>& stars() const { return stars_.lists(); }
 
   // What all queries have cost.
   QueryCounters counters() const;
@@ -97,12 +97,6 @@ class Refinement {
  private:
   using Request = InsertionRequest<D>;
 
-  // A vertex that has been found done, whose star is still to be listed.
-  struct Listing {
-    VertexId vertex = kNoVertex;
-    std::span<const std::array<VertexId, D>> star;
-    uint32_t vertex_count = 0;  // of the structure when it was
-  };
   struct alignas(kCacheLines) OwnWorkspace : Workspace<D> {
     Workspace<D> other;
   };
@@ -139,9 +133,6 @@ class Refinement {
   void AwaitOthers();
   void AdmitWaiting();
   void EndRound();
-  void ListStars();
-  void PrefetchListing(std::span<const std::array<VertexId, D>> star) const;
-  void ListLast();
   void PrefetchServed(VertexId v) const;
   void Foresee(Packet<D>& packet, size_t part, size_t parts, OwnWorkspace& workspace) const;
   void ForeseeOne(Packet<D>& packet, size_t at, OwnWorkspace& workspace) const;
@@ -156,7 +147,7 @@ class Refinement {
   const double min_edge_;
   PendingVertices<D> pending_;
   std::optional<StepRules<D>> rules_;  // of the last run
-  StarLists<D> stars_;                 // of vertices that are done, or have been
+  StarWriter<D> stars_;                // of vertices that are done, or have been
   Workspace<D> own_;                   // the cell that is improved
   Workspace<D> other_;                 // that of another vertex meanwhile
 
@@ -178,19 +169,10 @@ class Refinement {
   ThreadTeam* team_ = nullptr;                  // null between runs
   std::vector<OwnWorkspace> round_workspaces_;  // by thread
   bool is_ahead_ = false;                       // other threads may be at work: vertices that are added wait
-  bool is_listing_ = false;                     // another thread may list stars
-  uint64_t star_bytes_ = 0;                     // of those that there are, before
   uint64_t bytes_ahead_ = 0;                    // of what others write, before
-  std::vector<Listing> listings_;               // what one of them lists
-  std::deque<Star<D>> own_stars_;               // of those of the listings that were not foreseen
-  bool is_foreseen_ = false;  // the round: insertions are noted, and what is found done goes into these
-  std::vector<Listing> later_listings_;
-  std::deque<Star<D>> later_own_stars_;
-  Star<D> star_;  // scratch of Improve
-  Listing last_;  // where the round is not foreseen, the last that was found done
-  Star<D> last_star_;
-  std::vector<WatchedNode<D>> watched_;  // the same
-  std::vector<NeighborNotice> notices_;  // scratch of Notices
+  bool is_foreseen_ = false;                    // the round: insertions are noted
+  std::vector<WatchedNode<D>> watched_;         // scratch of Improve
+  std::vector<NeighborNotice> notices_;         // scratch of Notices
   RunContext* context_ = nullptr;
   const RefinementObserver<D>* observer_ = nullptr;
 

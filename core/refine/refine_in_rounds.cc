@@ -27,8 +27,6 @@ constexpr size_t kPacket = 128;
 // A packet is foreseen in so many parts, by turns with others, so that threads come to the end of a turn together; unless a thread would wait for
 // the part before.
 constexpr size_t kParts = 4;
-// What listing a star reads is asked for so many before its turn.
-constexpr size_t kListedAhead = 4;
 // If less than this share of what was foreseen of a bucket held, no more is foreseen of it, nor of others but for those so many times as large.
 constexpr double kLeastShareHeld = 2.0 / 3;
 constexpr size_t kMoreThanDistrusted = 4;
@@ -160,12 +158,13 @@ void Refinement<D>::LookAhead() {
   const std::span<Packet<D>> then = HalfOf(1 - turn_);
   if (detached_.size() <= kMoreThanDistrusted * distrusted_size_) {
     is_foreseen_ = now.front().is_foreseen;
+    stars_.SetCollecting(is_foreseen_);
     if (!is_foreseen_) {
       AwaitOthers();  // they may still list stars, which serving does then
     }
     return;
   }
-  ListLast();
+  stars_.BeginCollecting();
   round_workspaces_.resize(team_->threads());
   const auto prepare = [this](std::span<Packet<D>> packets) {
     for (Packet<D>& packet : packets) {
@@ -186,7 +185,7 @@ void Refinement<D>::LookAhead() {
     team_->ForEach(now.size(), [&](size_t i) { foresee(now[i], 0, 1); });
   }
   prepare(then);
-  bytes_ahead_ = (is_listing_ ? star_bytes_ : stars_.MemoryBytes()) + RoundBytes();
+  bytes_ahead_ = RoundBytes();
   is_ahead_ = true;
   is_foreseen_ = true;
   const size_t parts = 2 * static_cast<size_t>(team_->threads()) <= then.size() ? kParts : 1;
@@ -196,10 +195,10 @@ void Refinement<D>::LookAhead() {
 // Returns when other threads have done what was begun.
 template <int D>
 void Refinement<D>::AwaitOthers() {
-  if (is_ahead_ || is_listing_) {
+  if (is_ahead_ || stars_.IsWriting()) {
     team_->End();
     is_ahead_ = false;
-    is_listing_ = false;
+    stars_.EndWriting();
   }
 }
 
@@ -218,16 +217,10 @@ void Refinement<D>::EndRound() {
   if (foreseen_count_ >= kLeastInRounds && held_count_ < kLeastShareHeld * static_cast<double>(foreseen_count_)) {
     distrusted_size_ = detached_.size();
   }
-  std::swap(listings_, later_listings_);
-  std::swap(own_stars_, later_own_stars_);
   for (Packet<D>& packet : HalfOf(turn_)) {
     std::swap(packet.simplices, packet.listed);
   }
-  if (!listings_.empty()) {
-    star_bytes_ = stars_.MemoryBytes();
-    is_listing_ = true;
-    team_->BeginCall([this] { ListStars(); });
-  }
+  stars_.BeginWriting(*team_);
   structure_.AdmitWaiting();
   // The next packets may not have been foreseen by what has been inserted meanwhile.
   const Packet<D>& next = HalfOf(1 - turn_).front();
@@ -236,44 +229,11 @@ void Refinement<D>::EndRound() {
   inserted_before_ += is_known;
 }
 
-// Lists the stars of vertices that have been found done, in the order in which they were.
-template <int D>
-void Refinement<D>::ListStars() {
-  for (size_t i = 0; i < listings_.size(); ++i) {
-    if (i + kListedAhead < listings_.size()) {
-      PrefetchListing(listings_[i + kListedAhead].star);
-    }
-    const auto& [v, star, vertex_count] = listings_[i];
-    stars_.Set(v, star, vertex_count);
-  }
-  listings_.clear();
-  own_stars_.clear();
-}
-
-// Asks the memory for what listing a star reads.
-template <int D>
-void Refinement<D>::PrefetchListing(std::span<const std::array<VertexId, D>> star) const {
-  for (const std::array<VertexId, D>& simplex : star) {
-    stars_.Prefetch(simplex[0], 0);  // most neighbours are the first of some
-  }
-}
-
-// Lists the star that has waited while what that reads was asked for.
-template <int D>
-void Refinement<D>::ListLast() {
-  if (last_.vertex != kNoVertex) {
-    stars_.Set(last_.vertex, last_.star, last_.vertex_count);
-    last_.vertex = kNoVertex;
-  }
-}
-
 // Asks the memory for what serving `v` reads besides its query.
 template <int D>
 void Refinement<D>::PrefetchServed(VertexId v) const {
   pending_.Prefetch(v);
-  if (!is_foreseen_) {
-    stars_.Prefetch(v, 0);
-  }
+  stars_.Prefetch(v);
 }
 
 // Foresees one of equal parts of those of a packet who have not been served, once the parts before it are. Nothing but the packet and the workspace is
@@ -454,14 +414,12 @@ absl::Status Refinement<D>::Retrace(Packet<D>& packet, size_t at) {
   }
 }
 
-#define WELLSPACE_INSTANTIATE(D)                                                                \
-  template bool Refinement<D>::BeginRounds(int);                                                \
-  template void Refinement<D>::DropRounds();                                                    \
-  template uint64_t Refinement<D>::RoundBytes() const;                                          \
-  template void Refinement<D>::AwaitOthers();                                                   \
-  template void Refinement<D>::ListLast();                                                      \
-  template void Refinement<D>::PrefetchListing(std::span<const std::array<VertexId, D>>) const; \
-  template void Refinement<D>::AdmitWaiting();                                                  \
+#define WELLSPACE_INSTANTIATE(D)                       \
+  template bool Refinement<D>::BeginRounds(int);       \
+  template void Refinement<D>::DropRounds();           \
+  template uint64_t Refinement<D>::RoundBytes() const; \
+  template void Refinement<D>::AwaitOthers();          \
+  template void Refinement<D>::AdmitWaiting();         \
   template absl::Status Refinement<D>::ServeRounds();
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
