@@ -24,8 +24,8 @@ double ShortestEdgeSq(const Polytope<D>& cell) {
   return shortest;
 }
 
-// Whether a node is on bisectors alone and near enough for their edges, and for those up to `most_sq`: so are most. No branch,
-// since none could be foretold.
+// Whether a node is on bisectors alone and near enough for their edges, and for edges up to `most_sq`: so are most
+// nodes. Without a branch, which could not be predicted.
 template <int D>
 bool IsPlainlyGood(const Polytope<D>& cell, const CellNode<D>& node, double rho_sq, double most_sq) {
   bool is_on_wall = false;
@@ -37,14 +37,14 @@ bool IsPlainlyGood(const Polytope<D>& cell, const CellNode<D>& node, double rho_
   return !is_on_wall & (node.radius_sq <= rho_sq * most_sq);
 }
 
-// A node that may be mended, and the nearest of its generators.
+// A node that may be repaired, and the nearest of its generators.
 template <int D>
 struct Candidate {
   double bound_sq = Assessment::kNone;
   const CellNode<D>* node = nullptr;
   VertexId generator = kNoVertex;
 
-  // Whether it is to be mended sooner: decided by what the node is, whatever its number.
+  // Whether it is to be repaired sooner: decided by what the node is, whatever its number.
   bool IsBefore(const Candidate& other) const {
     if (bound_sq != other.bound_sq || other.node == nullptr) {
       return bound_sq < other.bound_sq;

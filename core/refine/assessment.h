@@ -12,33 +12,34 @@ namespace wellspace::core {
 
 // Lengths are squared; infinite where there is none.
 struct Assessment {
-  // The node to be mended first: of those whose bound is of the shortest edge the farthest, the plane of the bisector
-  // with its nearest generator (-1 if it is on none), and the distance from the site that it must not exceed.
+  // The node to be repaired first: of the nodes whose bound is of the shortest edge the farthest, the plane of the
+  // bisector with its nearest generator (-1 if it is on none), and the distance from the site that it must not exceed.
   int bad_node = -1;
   int bad_plane = -1;
   double bound_sq = kNone;
   // The shortest edge beyond the limit that has a bad node.
   double next_edge_sq = kNone;
-  // The farthest node.
+  // The farthest node; 0 where is_plain, since it is not looked for.
   double radius_sq = 0;
-  // The shortest edge with a node on one of the site's own faces that is too far for it: no circumcentre, so it asks for
-  // nothing now, but the site must look again, with that edge, once a new vertex cuts the facet there.
+  // The shortest edge with a node on one of the site's own faces that is too far for it: no circumcentre, so it asks
+  // for nothing now, but the site must look again, with that edge, once a new vertex cuts the facet there.
   double own_face_edge_sq = kNone;
   // A face of the box that the cell touches though its site does not lie on it, the nearest one; -1 for none.
   int encroached_face = -1;
   bool is_too_large = false;  // the bound is one of the sizes, not of rho
   bool is_clipped = false;    // the cell reaches the cube that it was clipped by
-  bool is_plain = false;  // found good by KeepsRatio alone: the cell touches no face, and its nodes may not be placed
+  // Found good by Polytope::PlaceUnlessKeeps alone: the cell touches no face, and its nodes may not be placed.
+  bool is_plain = false;
 
   bool IsGood() const { return bad_node < 0 && encroached_face < 0 && !is_clipped && next_edge_sq == kNone; }
 
   static constexpr double kNone = std::numeric_limits<double>::infinity();
 };
 
-// Looks for nodes x of the cell that are too far from its site: |x| > rho |u|, u the nearest generator of x (radius-edge)
-// or of the whole cell (well-spaced), or |x| > h(x). In the interior of the box such an x is the circumcentre of a
-// simplex that has to go. The edge of a bound b is b / rho, for one of the sizes too; only nodes of edges |u|^2 <=
-// edge_limit_sq ask for a Steiner point now.
+// Looks for nodes x of the cell that are too far from its site: |x| > rho |u|, u the nearest generator of x
+// (radius-edge) or of the whole cell (well-spaced), or |x| > h(x). In the interior of the box such an x is the
+// circumcentre of a simplex that has to go. The edge of a bound b is b / rho, for one of the sizes too; only nodes of
+// edges |u|^2 <= edge_limit_sq ask for a Steiner point now.
 //
 // Complexity: O(nodes).
 // Errors:     none.

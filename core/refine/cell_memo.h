@@ -14,12 +14,12 @@ class CellMemo {
   // Nothing: the vertex is pending, or its cell has changed since.
   constexpr CellMemo() = default;
 
-  // The cell is good, and R(v)^2, the squared distance of its farthest node, is at most `radius_sq`. That is 0 where the
-  // cell was found good without a look at its nodes: by the radius-edge criterion, which does not ask for radii.
+  // The cell is good, and R(v)^2, the squared distance of its farthest node, is at most `radius_sq`. That is 0 where
+  // the cell was found good without a look at its nodes: by the radius-edge criterion, which does not ask for radii.
   static CellMemo OfRadius(double radius_sq) { return CellMemo(RoundedUp(radius_sq)); }
 
-  // Of the nodes on faces that the vertex lies on, some are too far for an edge of this squared length, the shortest such.
-  // They ask for nothing, as they are no circumcentres, until a new vertex cuts one of them off.
+  // Of the nodes on faces that the vertex lies on, some are too far for an edge of this squared length, the shortest
+  // such. They ask for nothing, as they are no circumcentres, until a new vertex cuts one of them off.
   static CellMemo OfFaceEdge(double edge_sq) { return CellMemo(RoundedUp(-edge_sq)); }
 
   bool HasFaceEdge() const { return value_ < 0; }
@@ -29,7 +29,9 @@ class CellMemo {
 
   // Whether the cell may have a node farther than this, by the square; also where nothing is remembered.
   //
-  // REQUIRES:   the well-spaced criterion, by which radii are known; not told where a face's edge is remembered.
+  // False where the edge of a face is remembered.
+  //
+  // REQUIRES:   the well-spaced criterion, by which radii are known.
   bool MayReachBeyond(double distance_sq) const { return value_ > distance_sq; }
 
  private:

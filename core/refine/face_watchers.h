@@ -1,4 +1,4 @@
-// Nodes on faces of the box that vertices there watch: who must look again once a vertex is added that cuts one off.
+// Nodes on faces of the box that vertices there watch, to be looked at again once a new vertex cuts one off.
 #ifndef WELLSPACE_CORE_REFINE_FACE_WATCHERS_H_
 #define WELLSPACE_CORE_REFINE_FACE_WATCHERS_H_
 
@@ -21,8 +21,8 @@
 
 namespace wellspace::core {
 
-// A node of a cell, which lies on faces of the box that its vertex is on, too. A vertex that is added on one of these, no
-// farther from the node than `radius`, cuts it off.
+// A node of a cell, which lies on faces of the box that its vertex is on, too. A vertex that is added on one of these,
+// no farther from the node than `radius`, cuts it off.
 template <int D>
 struct WatchedNode {
   Point<D> centre;  // on its faces to the bit
@@ -30,8 +30,8 @@ struct WatchedNode {
   FaceMask faces = 0;
 };
 
-// Nodes are hashed by cubes: each by those that its ball meets of the grid whose sides are more than twice and at most four
-// times the radius, a power of two.
+// Nodes are hashed by cubes: each node by the cubes that its ball meets of the grid whose sides are more than twice and
+// at most four times the radius, a power of two.
 //
 // Thread safety: thread-compatible.
 template <int D>
@@ -82,7 +82,8 @@ class FaceWatchers {
   // Whether some vertex watches all nodes.
   bool SomeWatchAll() const { return watching_all_ > 0; }
 
-  // Calls f(VertexId) for each node that a vertex at `x` cuts off, which is on `faces`; not for who watches all.
+  // Calls f(VertexId) for each node that a vertex at `x` cuts off, which is on `faces`; not for vertices that watch
+  // all.
   //
   // Complexity: O(1) for each power of two that radii have, and for each node near x.
   template <typename F>
@@ -127,8 +128,8 @@ class FaceWatchers {
     return cube;
   }
 
-  // Calls f(cube) for all cubes that hold a point which cuts off the node: if it lies on one face alone, that point is as far
-  // along its axis.
+  // Calls f(cube) for all cubes that hold a point which cuts off the node: if it lies on one face alone, that point is
+  // as far along its axis.
   template <typename F>
   static void ForEachCube(const WatchedNode<D>& node, F&& f) {
     Cube cube{LevelOf(node), {}};
@@ -139,7 +140,7 @@ class FaceWatchers {
       }
       const bool is_exact = (node.faces & ~(3u << (2 * axis))) == 0;
       const double reach = is_exact ? 0 : node.radius;
-      // Two at most, but for rounding.
+      // Two at most, if nothing is rounded.
       double last = std::numeric_limits<double>::quiet_NaN();
       for (const double x : {node.centre[axis] - reach, node.centre[axis], node.centre[axis] + reach}) {
         const double place = PlaceOf(x, cube.first);

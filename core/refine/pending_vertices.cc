@@ -65,8 +65,9 @@ void PendingVertices<D>::Begin(const Demands<D>& criteria, std::span<const int16
   criteria_ = criteria;
 }
 
-// No edge shorter than this can have a bad node in the cell of a vertex at `p`: the distance to the nearest neighbour, or to
-// a face of the box that p is not on; or the edge that stands for a size, if the least size that counts is as it says.
+// No edge shorter than this can have a bad node in the cell of a vertex at `p`: the distance to the nearest neighbour,
+// or to a face of the box that p is not on; or the edge that stands for a size, if the least size that counts is as it
+// says.
 template <int D>
 double PendingVertices<D>::FirstEdgeSq(const Demands<D>& criteria, const Point<D>& p, FaceMask faces, double nearest_sq,
                                        double size_sq) const {

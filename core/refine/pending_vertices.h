@@ -28,16 +28,16 @@ namespace wellspace::core {
 
 class ThreadTeam;
 
-// A vertex is pending while it is in a bucket of the schedule; it is done when its cell needs nothing. Vertices come from
-// three places, and each has its function here:
+// A vertex is pending while it is in a bucket of the schedule; it is done when its cell needs nothing. Vertices come
+// from three places, and each has its function here:
 // - input: Begin schedules all there are;
 // - an insertion, by the refinement or from outside: Add schedules the new vertex, but notifies none of its neighbours
 //   except the watchers of faces. Notify does that when the cell of the new vertex is first looked at: [HT08] line 14;
 // - the repair of slivers moves and adds vertices, and keeps the criteria: CellChanged.
 //
 // Thread safety: thread-compatible; const functions may run at once.
-// Invariants: (1) every vertex is pending, or what is remembered of its cell is right, for as long as no vertex is added
-//             that Add is not told of.
+// Invariants: (1) every vertex is pending, or what is remembered of its cell is right, as long as Add is told of every
+//             vertex that is added.
 template <int D>
 class PendingVertices {
  public:
@@ -66,10 +66,10 @@ class PendingVertices {
   Schedule& schedule() { return schedule_; }
   const Schedule& schedule() const { return schedule_; }
 
-  // Schedules the new vertex `x`, which is near `near` and whose nearest neighbour is as near as it says, and at once the
-  // vertices on a face of x that watch a node there which x cuts off: their edges may be shorter than any of x. Where the
-  // nodes of some watchers are not known, it calls notify_within(radius), which has to Notify the neighbours of x by the
-  // cell that is clipped so.
+  // Schedules the new vertex `x`, which is near `near` and whose nearest neighbour is as near as it says, and at once
+  // the vertices on a face of x that watch a node there which x cuts off: their edges may be shorter than any of x.
+  // Where the nodes of some watchers are not known, it calls notify_within(radius), which has to Notify the neighbours
+  // of x by the cell that is clipped so.
   //
   // REQUIRES:   HasBegun().
   template <typename NotifyWithin>
@@ -77,15 +77,15 @@ class PendingVertices {
 
   // Whether the neighbours of `v`, which has been added, have been told nothing of it yet.
   bool IsNew(VertexId v) const { return notified_[Index(v)] == Notified::kNone; }
-  // Whether some of them have not.
+  // Whether some of them have not been told.
   bool HasToNotify(VertexId v) const { return notified_[Index(v)] != Notified::kAll; }
 
-  // Schedules those neighbours of `v` that it may have spoiled by being added: of all, or, once some have been notified, of
-  // those who are not pending. A simplex that breaks rho has v for a corner; its shortest edge is one of v's, and then v
-  // sees to it, or has belonged to a cell that kept rho, and still does. What is left:
+  // Schedules those neighbours of `v` that it may have spoiled by being added: of all, or, once some have been
+  // notified, of the vertices that are not pending. A simplex that breaks rho has v for a corner; its shortest edge is
+  // one of v's, and then v sees to it, or has belonged to a cell that kept rho, and still does. What is left:
   // - well-spaced: v may be the nearest neighbour now, so that other nodes are too far;
-  // - a node on one of the neighbour's own faces was too far and asked for nothing: it may have become a circumcentre if
-  //   this cell touches the face beside it.
+  // - a node on one of the neighbour's own faces was too far and asked for nothing: it may have become a circumcentre
+  //   if this cell touches the face beside it.
   // An inner cell under radius-edge has neither, and no notices.
   //
   // Complexity: O(notices log notices).
@@ -98,12 +98,12 @@ class PendingVertices {
   // Schedules `v`, which was taken from `bucket`, for what was found, to be looked at anew.
   void Postpone(VertexId v, const Assessment& found, int bucket);
 
-  // Remembers of the cell of `v` what was found; the nodes that are too far for the edge of a face, if there is one, are
-  // `watched`, or are not known.
+  // Remembers of the cell of `v` what was found; the nodes that are too far for the edge of a face, if there is one,
+  // are `watched`, or are not known.
   void Remember(VertexId v, const Assessment& found, std::span<const WatchedNode<D>> watched);
 
-  // Schedules `v`, which was taken from `bucket` and needs nothing there, but is not done: by the shortest edge that has a
-  // bad node, or that may have one beyond the clip, of that radius.
+  // Schedules `v`, which was taken from `bucket` and needs nothing there, but is not done: by the shortest edge that
+  // has a bad node, or that may have one beyond the clip, of that radius.
   void ScheduleLater(VertexId v, const Assessment& found, int bucket, double clip_radius);
 
   // Forgets the cell of `v`, which may be new: it has changed, but keeps the criteria. If v is on a face of the box,
@@ -132,7 +132,7 @@ class PendingVertices {
   // Which neighbours of a vertex have been told that it was added.
   enum class Notified : uint8_t {
     kNone,        // it has just been added
-    kWithinClip,  // those in its cell as it was clipped then
+    kWithinClip,  // the neighbours in its cell as it was clipped then
     kAll,
   };
 

@@ -1,10 +1,7 @@
 #include "core/refine/refine.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <limits>
-#include <span>
 
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
@@ -17,130 +14,60 @@
 namespace wellspace::core {
 namespace {
 
-// Room is made for at most so many times the vertices that there are, whatever is predicted.
+// Room is made for at most so many times the vertices that there are, even if more are predicted.
 constexpr uint64_t kMostReserved = 8;
 
-// Vertices looked at between two reports of progress.
+// Vertices refined between two reports of progress.
 constexpr uint64_t kReportInterval = 256;
 
 }  // namespace
 
 template <int D>
 Refinement<D>::Refinement(QueryStructure<D>& structure, double min_edge)
-    : structure_(structure), min_edge_(min_edge), pending_(structure, min_edge) {}
+    : structure_(structure),
+      min_edge_(min_edge),
+      pending_(structure, min_edge),
+      rounds_(structure, pending_, stars_),
+      checks_(structure) {}
 
 template <int D>
-absl::Status Refinement<D>::Run(const Demands<D>& demands, uint64_t max_vertices, int threads, RunContext& context,
+absl::Status Refinement<D>::Run(const Demands<D>& criteria, uint64_t max_vertices, int threads, RunContext& context,
                                 const RefinementObserver<D>& observer, const VertexPredictor& predict) {
   ThreadTeam team(threads);
-  rules_.emplace(structure_, demands);
+  rules_.emplace(structure_, criteria, min_edge_);
   max_vertices_ = max_vertices;
   context_ = &context;
   observer_ = &observer;
-  distrusted_size_ = 0;
-  if (!pending_.HasBegunFor(demands)) {
-    pending_.End();
-    WELLSPACE_RETURN_IF_ERROR(ScheduleAll(demands, predict, team));
-  } else {
+  if (pending_.HasBegunFor(criteria)) {
     WELLSPACE_RETURN_IF_ERROR(Predict(predict));
+  } else {
+    pending_.End();
+    WELLSPACE_RETURN_IF_ERROR(ScheduleAll(criteria, predict, team));
   }
-  team_ = &team;
-  const absl::Cleanup end = [this] {
-    if (is_ahead_ || stars_.IsWriting()) {  // something has been thrown
-      team_->Drop();
-      is_ahead_ = false;
-      stars_.EndWriting();
-    }
-    team_ = nullptr;
-  };
-  const absl::Status status = Loop();
-  AwaitOthers();
-  stars_.WriteLast();
-  packets_before_ = {};
-  for (const OwnWorkspace& workspace : round_workspaces_) {
-    own_.counters.Add(workspace.counters);
-    own_.counters.Add(workspace.other.counters);
-  }
-  round_workspaces_.clear();
+  rounds_.BeginRun(*rules_, team, context);
+  const absl::Cleanup end = [this] { rounds_.DropRun(); };  // where something is thrown
+  absl::Status status = Loop();
+  rounds_.EndRun(workspace_.own.counters);
   return status;
 }
 
-// Improves the vertices that wait: in rounds where a bucket holds many.
+// Lines 2 to 4 of Figure 4, while another thread predicts how many vertices there will be.
 template <int D>
-absl::Status Refinement<D>::Loop() {
-  WELLSPACE_RETURN_IF_ERROR(ServeRounds());  // those of a run that was stopped
-  for (int lowest = pending_.schedule().Lowest(); lowest >= 0; lowest = pending_.schedule().Lowest()) {
-    VertexId v{};
-    int bucket = 0;
-    if (BeginRounds(lowest)) {
-      WELLSPACE_RETURN_IF_ERROR(ServeRounds());
-    } else {
-      AwaitOthers();  // they may still list stars, which Serve does, too
-      if (pending_.schedule().Pop(v, bucket)) {
-        WELLSPACE_RETURN_IF_ERROR(Serve(v, bucket));
-      }
-    }
-  }
-  if constexpr (kChecks) {
-    Require(pending_.schedule().size() == 0, pending_.schedule().size(), " vertices wait still");
-  }
+absl::Status Refinement<D>::ScheduleAll(const Demands<D>& criteria, const VertexPredictor& predict, ThreadTeam& team) {
+  rounds_.Drop();
+  structure_.AdmitWaiting();  // what was added before something was thrown
+  absl::Status predicted;
+  const absl::Cleanup end = [&team] { team.Drop(); };  // of what is begun, where something is thrown
+  team.BeginCall([&] { predicted = Predict(predict); });
+  const HugeVector<int16_t> first_buckets = pending_.FirstBuckets(criteria, *context_, team);
+  team.End();
+  WELLSPACE_RETURN_IF_ERROR(predicted);
+  WELLSPACE_RETURN_IF_ERROR(context_->Check());
+  stars_.Clear();
+  Reserve(static_cast<uint32_t>(
+      std::min({context_->estimated_vertices(), max_vertices_, kMostReserved * structure_.vertex_count()})));
+  pending_.Begin(criteria, first_buckets);
   return absl::OkStatus();
-}
-
-// Improves `v`, which was taken from `bucket`.
-template <int D>
-absl::Status Refinement<D>::Serve(VertexId v, int bucket) {
-  absl::Status status = context_->Check();
-  if (status.ok()) {
-    status = Improve(v, bucket);
-  }
-  if (!status.ok()) {
-    pending_.schedule().AddToBucket(v, bucket);
-    return status;
-  }
-  return CountServed(bucket);
-}
-
-// Tells now and then how far the run is.
-template <int D>
-absl::Status Refinement<D>::CountServed(int bucket) {
-  return ++served_ % kReportInterval == 0 ? Report(bucket) : absl::OkStatus();
-}
-
-template <int D>
-absl::Status Refinement<D>::Report(int bucket) {
-  WELLSPACE_RETURN_IF_ERROR(context_->AllowMemory(structure_.MemoryBytes() + MemoryBytes()));
-  context_->SetBucket(bucket);
-  context_->SetPhaseFraction(1 - static_cast<double>(pending_.schedule().size()) / structure_.vertex_count());
-  return absl::OkStatus();
-}
-
-template <int D>
-void Refinement<D>::VertexAdded(VertexId x) {
-  if (!pending_.HasBegun()) {
-    return;  // the first run looks at all
-  }
-  const Neighbor nearest = structure_.ApproximateNearestNeighbor(x, own_);
-  AddPending(nearest.vertex, x, nearest.distance_sq);
-}
-
-template <int D>
-uint64_t Refinement<D>::MemoryBytes() const {
-  return pending_.MemoryBytes() + stars_.MemoryBytes() + (is_ahead_ ? bytes_ahead_ : RoundBytes()) +
-         (own_.seen.size() + other_.seen.size()) * sizeof(uint32_t);
-}
-
-template <int D>
-void Refinement<D>::CellChanged(VertexId v, double nearest_sq) {
-  stars_.GiveUp();
-  pending_.CellChanged(v, nearest_sq);
-}
-
-template <int D>
-QueryCounters Refinement<D>::counters() const {
-  QueryCounters counters = own_.counters;
-  counters.Add(other_.counters);
-  return counters;
 }
 
 // Tells the context how many vertices are predicted.
@@ -156,26 +83,8 @@ absl::Status Refinement<D>::Predict(const VertexPredictor& predict) {
   return absl::OkStatus();
 }
 
-// Schedules all vertices, while another thread predicts how many there will be.
-template <int D>
-absl::Status Refinement<D>::ScheduleAll(const Demands<D>& demands, const VertexPredictor& predict, ThreadTeam& team) {
-  DropRounds();
-  structure_.AdmitWaiting();  // where something was thrown
-  absl::Status predicted;
-  const absl::Cleanup end = [&team] { team.Drop(); };  // of what is begun, where something is thrown
-  team.BeginCall([&] { predicted = Predict(predict); });
-  const HugeVector<int16_t> first_buckets = pending_.FirstBuckets(demands, *context_, team);
-  team.End();
-  WELLSPACE_RETURN_IF_ERROR(predicted);
-  WELLSPACE_RETURN_IF_ERROR(context_->Check());
-  stars_.Clear();
-  Reserve(static_cast<uint32_t>(
-      std::min({context_->estimated_vertices(), max_vertices_, kMostReserved * structure_.vertex_count()})));
-  pending_.Begin(demands, first_buckets);
-  return absl::OkStatus();
-}
-
-// Makes room for so many vertices, and some more, so that arrays need not be moved as they grow; what is not used takes no memory.
+// Makes room for so many vertices, and some more, so that arrays need not be moved as they grow; what is not used takes
+// no memory.
 template <int D>
 void Refinement<D>::Reserve(uint32_t vertices) {
   vertices += std::min(vertices / 8, std::numeric_limits<uint32_t>::max() - vertices);
@@ -184,139 +93,273 @@ void Refinement<D>::Reserve(uint32_t vertices) {
   pending_.Reserve(vertices);
 }
 
-// Makes the new vertex `x`, which is near `near` and whose nearest neighbour is as near as it says, pending. Its neighbours are not
-// notified here, but when its cell is first looked at.
+// Line 5: while vertices are pending, those of the lowest bucket are refined, in rounds where there are many.
 template <int D>
-void Refinement<D>::AddPending(VertexId near, VertexId x, double nearest_sq) {
-  pending_.Add(near, x, nearest_sq, [&](double radius) {
-    ComputeCell(x, CubeAround<D>(structure_.point(x), radius), other_);
-    other_.cell.Place();
-    if (!other_.cell.IsTooLarge()) {
-      const FaceMask faces = structure_.faces(x);
-      const Assessment found = Assess<D>(other_.cell, faces, rules_->criteria(), nearest_sq);
-      pending_.Notify(x, found, Notices(other_.cell, faces, found));
+absl::Status Refinement<D>::Loop() {
+  WELLSPACE_RETURN_IF_ERROR(RefineInRounds());  // what a run that was stopped has detached
+  Schedule& schedule = pending_.schedule();
+  for (int lowest = schedule.Lowest(); lowest >= 0; lowest = schedule.Lowest()) {
+    if (rounds_.Begin(lowest)) {
+      WELLSPACE_RETURN_IF_ERROR(RefineInRounds());
+      continue;
     }
-  });
+    rounds_.AwaitOthers();  // they may still write stars, which is done by this thread now
+    VertexId v{};
+    int bucket = 0;
+    if (schedule.Pop(v, bucket)) {
+      WELLSPACE_RETURN_IF_ERROR(RefineTaken(v, bucket));
+    }
+  }
+  if constexpr (kChecks) {
+    Require(schedule.size() == 0, schedule.size(), " vertices are pending still");
+  }
+  return absl::OkStatus();
 }
 
-// Inserts Steiner points until nothing that bucket `bucket` may ask for is wrong with the cell of `v`.
+// Refines what is pending below `bucket`.
 template <int D>
-absl::Status Refinement<D>::Improve(VertexId v, int bucket) {
-  const double edge_limit_sq = EdgeLimitSq(bucket);
-  Polytope<D>& cell = own_.cell;
-  ComputeCell(v, ClipAround(v, bucket), own_);
-  if constexpr (kChecks) {
-    cell.Place();
-    CheckOrder(v, cell, bucket);
+absl::Status Refinement<D>::RefineShorterThan(int bucket) {
+  Schedule& schedule = pending_.schedule();
+  VertexId below{};
+  int its_bucket = 0;
+  while (schedule.HasBelow(bucket) && schedule.Pop(below, its_bucket, bucket)) {
+    WELLSPACE_RETURN_IF_ERROR(RefineTaken(below, its_bucket));
   }
+  return absl::OkStatus();
+}
+
+// Refines the vertices that rounds have detached, and before each the vertices that are pending in lower buckets.
+template <int D>
+absl::Status Refinement<D>::RefineInRounds() {
+  rounds_.ForgetRecords();
+  while (!rounds_.AreDone()) {
+    rounds_.BeginRound();
+    absl::Status status;
+    for (Batch<D>* batch = rounds_.NextBatch(); batch != nullptr; batch = status.ok() ? rounds_.NextBatch() : nullptr) {
+      status = RefineBatch(*batch);
+    }
+    rounds_.EndRound();
+    WELLSPACE_RETURN_IF_ERROR(status);
+    rounds_.GoOn();
+  }
+  return absl::OkStatus();
+}
+
+template <int D>
+absl::Status Refinement<D>::RefineBatch(Batch<D>& batch) {
+  rounds_.BeginBatch(batch);
+  for (; !batch.IsRefined(); ++batch.refined) {
+    rounds_.Prefetch(batch);
+    const size_t first = rounds_.inserted_count();
+    WELLSPACE_RETURN_IF_ERROR(RefineShorterThan(rounds_.bucket()));
+    batch.NoteConflicts(rounds_.InsertedFrom(first));
+    if (pending_.schedule().IsPendingIn(batch.next(), rounds_.bucket())) {
+      WELLSPACE_RETURN_IF_ERROR(RefineNextOf(batch));
+    } else {
+      batch.NoteConflicts(batch.ExpectedOf(batch.refined));
+    }
+  }
+  return absl::OkStatus();
+}
+
+// Refines the next vertex of a batch, which is pending: by its record, if that is still valid, or else by its cell.
+template <int D>
+absl::Status Refinement<D>::RefineNextOf(Batch<D>& batch) {
+  const VertexId v = batch.next();
+  const int bucket = rounds_.bucket();
+  const size_t first = rounds_.inserted_count();
+  const VertexId first_new{structure_.vertex_count()};
+  pending_.schedule().Take(v);
+  absl::Status status = context_->Check();
+  if (status.ok()) {
+    const bool is_valid = batch.IsStillValid(batch.refined, structure_.point(v));
+    rounds_.CountRecord(batch, is_valid);
+    if (is_valid) {
+      RecordedSteps<D> steps(batch);
+      status = RefineVertex(v, bucket, steps);
+    } else {
+      status = RefineByCell(v, bucket);
+    }
+  }
+  if (!status.ok()) {
+    pending_.schedule().DetachAgain(v, bucket);
+    return status;
+  }
+  batch.NoteInserted(rounds_.InsertedFrom(first), first_new);
+  return CountRefined(bucket);
+}
+
+// Refines `v`, which was taken from `bucket`.
+template <int D>
+absl::Status Refinement<D>::RefineTaken(VertexId v, int bucket) {
+  absl::Status status = context_->Check();
+  if (status.ok()) {
+    status = RefineByCell(v, bucket);
+  }
+  if (!status.ok()) {
+    pending_.schedule().AddToBucket(v, bucket);
+    return status;
+  }
+  return CountRefined(bucket);
+}
+
+// Refines `v`, which was taken from `bucket`, by steps that are computed.
+template <int D>
+absl::Status Refinement<D>::RefineByCell(VertexId v, int bucket) {
+  CurrentCells cells{*this};
+  CellSteps<D, CurrentCells> steps(*rules_, v, structure_.faces(v), EdgeLimitSq(bucket), cells, workspace_);
+  if constexpr (kChecks) {
+    steps.cell().Place();
+    checks_.CheckOrder(pending_.schedule(), v, steps.cell(), bucket);
+  }
+  return RefineVertex(v, bucket, steps);
+}
+
+// [HT08] Figure 4 for one vertex, `v`, which was taken from `bucket`: inserts what its steps ask for, until nothing
+// that the bucket may ask for is wrong with its cell, or something shorter comes first.
+template <int D>
+template <typename Steps>
+absl::Status Refinement<D>::RefineVertex(VertexId v, int bucket, Steps& steps) {
   while (true) {
-    if (cell.IsTooLarge()) {
+    const Assessment* const found = steps.Assess();  // lines 7, 8 and 11
+    if (found == nullptr) {
       return absl::ResourceExhaustedError(absl::StrCat("the cell of a vertex has more than ", Polytope<D>::kMostNodes,
                                                        " nodes; lower rho = ", rules_->criteria().rho));
     }
-    const Assessment found = rules_->AssessCell(cell, structure_.faces(v), edge_limit_sq);
     if (pending_.IsNew(v)) {
-      pending_.Notify(v, found, Notices(cell, structure_.faces(v), found));
+      pending_.Notify(v, *found, steps.Notices());  // line 14, put off until v is looked at
     }
     if (pending_.HasShorterThan(bucket)) {
-      pending_.Postpone(v, found, bucket);
+      pending_.Postpone(v, *found, bucket);
       return absl::OkStatus();
     }
-    const std::optional<Request> request = rules_->NextRequest(
-        v, cell, found, edge_limit_sq, [this](VertexId u, const Box<D>& clip) -> const Polytope<D>* {
-          ComputeCell(u, clip, other_);
-          other_.cell.Place();
-          return other_.cell.IsTooLarge() ? nullptr : &other_.cell;
-        });
-    if (!request.has_value()) {
-      watched_.clear();
-      rules_->AppendNodesToWatch(v, cell, found, watched_);
-      Star<D>& star = stars_.Room();
-      if (found.IsGood() && stars_.NeedsStars()) {
-        cell.FindStar(star);
-      }
-      Settle(v, found, bucket, Notices(cell, structure_.faces(v), found), watched_, star);
+    const InsertionRequest<D>* const request = steps.NextRequest();
+    if (request == nullptr) {
+      Finish(v, *found, bucket, steps);
       return absl::OkStatus();
     }
     // In 5-D and 6-D a cell may ask for a dozen points, which take milliseconds each.
     WELLSPACE_RETURN_IF_ERROR(context_->Check());
-    WELLSPACE_ASSIGN_OR_RETURN(const VertexId x, Insert(*request));
-    cell.CutBeforePlace(x, request->point.position);
+    WELLSPACE_ASSIGN_OR_RETURN(const VertexId x, Insert(*request));  // lines 12 and 13
+    steps.Inserted(x);
   }
 }
 
-// Computes the cell of `v`, not yet placed, clipped by `clip`.
+// Line 15: `v`, which was taken from `bucket` and asks for nothing there, is done, or pending in a later bucket.
 template <int D>
-void Refinement<D>::ComputeCell(VertexId v, const Box<D>& clip, Workspace<D>& workspace) {
-  structure_.UnplacedClippedVoronoi(v, clip, workspace);
-  structure_.CutByWaiting(v, workspace.cell);
-  if (workspace.cell.IsTooLarge() && structure_.waiting_count() > 0) {
-    AdmitWaiting();  // with the nearest first it may not be
-    structure_.UnplacedClippedVoronoi(v, clip, workspace);
-  }
-}
-
-// Declares a vertex from `bucket` that needs nothing now done, or puts it where it will be looked at again. Of its cell: the neighbours that it may
-// have to notify, the nodes to watch, and the star, if it is good.
-template <int D>
-void Refinement<D>::Settle(VertexId v, const Assessment& found, int bucket, std::span<const NeighborNotice> notices,
-                           std::span<const WatchedNode<D>> watched, std::span<const std::array<VertexId, D>> star) {
-  pending_.Remember(v, found, watched);
+template <typename Steps>
+void Refinement<D>::Finish(VertexId v, const Assessment& found, int bucket, Steps& steps) {
+  pending_.Remember(v, found, steps.NodesToWatch());
   if (!found.IsGood()) {
     pending_.ScheduleLater(v, found, bucket, rules_->ClipRadius(EdgeLimitSq(bucket)));
     return;
   }
-  stars_.Write(v, star, structure_.vertex_count());
+  stars_.Write(v, steps.FindStar(stars_), structure_.vertex_count());
   if (pending_.HasToNotify(v)) {
-    pending_.Notify(v, found, notices);
+    pending_.Notify(v, found, steps.Notices());
   }
 }
 
+// Inserts the vertex that is asked for, and makes it pending.
 template <int D>
-absl::StatusOr<VertexId> Refinement<D>::Insert(const Request& request) {
+absl::StatusOr<VertexId> Refinement<D>::Insert(const InsertionRequest<D>& request) {
   const SteinerPoint<D>& point = request.point;
   if (structure_.vertex_count() >= max_vertices_) {
     return absl::ResourceExhaustedError(absl::StrCat("the mesh needs more than max_vertices = ", max_vertices_,
                                                      " vertices; raise max_vertices or rho"));
   }
-  if (!IsLongEnough(point)) {
+  if (!rules_->IsLongEnough(point)) {
     return absl::ResourceExhaustedError(absl::StrCat("refinement came to an edge of length ",
                                                      std::sqrt(std::max(0.0, point.empty_radius_sq)),
                                                      ", below the smallest that double arithmetic serves here, ",
                                                      min_edge_, "; raise rho = ", rules_->criteria().rho));
   }
-  return Add(request);
-}
-
-// Adds the vertex that is asked for, and has it wait.
-template <int D>
-VertexId Refinement<D>::Add(const Request& request) {
   if constexpr (kChecks) {
-    AdmitWaiting();
-    CheckInsertion(request);
+    rounds_.CommitAdded();
+    checks_.CheckInsertion(*rules_, request);
   }
   Insertion insertion = request.insertion;
-  insertion.vertex = structure_.AddWaiting(insertion.near, request.point.position);
-  if (!is_ahead_ || *observer_ || structure_.waiting_count() == QueryStructure<D>::kMostWaiting) {
-    AdmitWaiting();
+  insertion.vertex = structure_.AddWaiting(insertion.near, point.position);
+  if (!rounds_.IsAhead() || *observer_ || structure_.waiting_count() == QueryStructure<D>::kMostWaiting) {
+    rounds_.CommitAdded();
   }
-  if (is_foreseen_) {
-    inserted_.push_back(request.point.position);
-  }
+  rounds_.NoteInserted(point.position);
   context_->SetVertices(structure_.vertex_count());
-  AddPending(insertion.near, insertion.vertex, request.point.empty_radius_sq);
+  AddPending(insertion.near, insertion.vertex, point.empty_radius_sq);
   if (*observer_) {
     (*observer_)(structure_, insertion);
   }
   return insertion.vertex;
 }
 
+// Makes the new vertex `x`, which is near `near` and whose nearest neighbour is as near as it says, pending. Its
+// neighbours are not notified here but when x is first looked at, by RefineVertex; except where a vertex watches nodes
+// of a face that are not known.
 template <int D>
-std::span<const NeighborNotice> Refinement<D>::Notices(const Polytope<D>& cell, FaceMask site_faces,
-                                                       const Assessment& found) {
-  notices_.clear();
-  rules_->AppendNotices(cell, site_faces, found, notices_);
-  return notices_;
+void Refinement<D>::AddPending(VertexId near, VertexId x, double nearest_sq) {
+  pending_.Add(near, x, nearest_sq, [&](double radius) {
+    Polytope<D>& cell = workspace_.other.cell;
+    ComputeCell(x, CubeAround<D>(structure_.point(x), radius), workspace_.other);
+    cell.Place();
+    if (cell.IsTooLarge()) {
+      return;
+    }
+    const FaceMask faces = structure_.faces(x);
+    const Assessment found = Assess<D>(cell, faces, rules_->criteria(), nearest_sq);
+    workspace_.notices.clear();
+    rules_->AppendNotices(cell, faces, found, workspace_.notices);
+    pending_.Notify(x, found, workspace_.notices);
+  });
+}
+
+// Computes the cell of `v` among all vertices that have been added, not yet placed, clipped by `clip`.
+template <int D>
+void Refinement<D>::ComputeCell(VertexId v, const Box<D>& clip, Workspace<D>& workspace) {
+  structure_.UnplacedClippedVoronoi(v, clip, workspace);
+  structure_.CutByWaiting(v, workspace.cell);
+  if (workspace.cell.IsTooLarge() && structure_.waiting_count() > 0) {
+    rounds_.CommitAdded();  // with the nearest first it may not be
+    structure_.UnplacedClippedVoronoi(v, clip, workspace);
+  }
+}
+
+// Tells now and then how far the run is, and asks for the memory that it has come to.
+template <int D>
+absl::Status Refinement<D>::CountRefined(int bucket) {
+  if (++refined_ % kReportInterval == 0) {
+    WELLSPACE_RETURN_IF_ERROR(context_->AllowMemory(structure_.MemoryBytes() + MemoryBytes()));
+    context_->SetBucket(bucket);
+    context_->SetPhaseFraction(1 - static_cast<double>(pending_.schedule().size()) / structure_.vertex_count());
+  }
+  return absl::OkStatus();
+}
+
+template <int D>
+void Refinement<D>::VertexAdded(VertexId x) {
+  if (!pending_.HasBegun()) {
+    return;  // the next run schedules all
+  }
+  const Neighbor nearest = structure_.ApproximateNearestNeighbor(x, workspace_.own);
+  AddPending(nearest.vertex, x, nearest.distance_sq);
+}
+
+template <int D>
+void Refinement<D>::CellChanged(VertexId v, double nearest_sq) {
+  stars_.GiveUp();
+  pending_.CellChanged(v, nearest_sq);
+}
+
+template <int D>
+QueryCounters Refinement<D>::counters() const {
+  QueryCounters counters = workspace_.own.counters;
+  counters.Add(workspace_.other.counters);
+  return counters;
+}
+
+template <int D>
+uint64_t Refinement<D>::MemoryBytes() const {
+  return pending_.MemoryBytes() + stars_.MemoryBytes() + rounds_.MemoryBytes() +
+         (workspace_.own.seen.size() + workspace_.other.seen.size()) * sizeof(uint32_t);
 }
 
 #define WELLSPACE_INSTANTIATE(D) template class Refinement<D>;

@@ -21,15 +21,18 @@ namespace wellspace::core {
 // Buckets are one power of two of the squared length wide, the square root of 2 in length. (The paper has 2: finer
 // buckets make smaller meshes for more work.) Powers of two need no logarithm, so that all machines sort alike.
 //
-// What waits in a bucket has come there in several passes over the mesh. So that it is served in one, a bucket is put in order by blocks of vertices that
-// are near each other, once, when all buckets below it have been emptied for the first time.
+// The vertices of a bucket have come there in several passes over the mesh. So that one pass refines them, a bucket is
+// put in order by blocks of vertices that are near each other. That is done once, when all buckets below it have been
+// emptied for the first time.
 //
 // Thread safety: thread-compatible.
-// Invariants: (1) a vertex waits in one bucket at most; (2) Pop takes from the lowest bucket that is not empty, those first that came after it was put
-// in order; then the last block first; the last come first of each.
+// Invariants: (1) a vertex is pending in one bucket at most; (2) Pop takes from the lowest bucket that is not empty. The
+//             vertices that came after it was put in order are first; then the last block is; of each the last come
+//             first.
 class Schedule {
  public:
-  // Vertices in a block, if there are not so many that blocks could not be numbered: what a scan reads of them fits into a cache of the second level.
+  // Vertices in a block, if there are not so many that blocks could not be numbered: what a scan reads of a block fits
+  // into a cache of the second level.
   static constexpr uint32_t kBlockSize = 512;
 
   // Lengths below `shortest` fall into the lowest bucket.
@@ -45,7 +48,8 @@ class Schedule {
     return std::bit_cast<double>(static_cast<uint64_t>(first_exponent_ + bucket + 1 + kExponentBias) << kMantissaBits);
   }
 
-  // Has buckets put in order again. Vertices below `count` that are in no block yet are put into blocks by their numbers.
+  // Has buckets put in order again. Vertices below `count` that are in no block yet are put into blocks by their
+  // numbers.
   void Begin(uint32_t count) {
     in_order_ = 0;
     const uint32_t size = std::max(kBlockSize, count / kMostBlocks + 1);
@@ -63,7 +67,7 @@ class Schedule {
     places_[Index(v)].block = places_[Index(near)].block;
   }
 
-  // Puts `v` in the bucket of a length, unless it waits in that one or a lower one already.
+  // Puts `v` in the bucket of a length, unless it is pending in that one or a lower one already.
   void Add(VertexId v, double length_sq) { AddToBucket(v, BucketOf(length_sq)); }
 
   void AddToBucket(VertexId v, int bucket) {
@@ -81,21 +85,21 @@ class Schedule {
     lowest_ = bucket < lowest_ ? bucket : lowest_;
   }
 
-  // Whether `v` waits in a bucket below `bucket`.
+  // Whether `v` is pending in a bucket below `bucket`.
   bool IsPendingBelow(VertexId v, int bucket) const { return BucketHolding(v) < bucket; }
 
-  // Whether a vertex may wait below `bucket`: never right after Pop took one from there, until one is added.
+  // Whether a vertex may be pending below `bucket`: never right after Pop took one from there, until one is added.
   bool HasBelow(int bucket) const { return lowest_ < bucket; }
 
   bool IsPending(VertexId v) const { return BucketHolding(v) != kNowhere; }
 
-  // How many vertices wait.
+  // How many vertices are pending.
   size_t size() const { return size_; }
 
-  // What the schedule takes in memory, but for what has moved on.
+  // What the schedule takes in memory, without entries of vertices that have moved on.
   uint64_t MemoryBytes() const { return places_.size() * sizeof(Place) + size_ * sizeof(VertexId); }
 
-  // The lowest bucket in which a vertex may wait, -1 if there is none below `end`.
+  // The lowest bucket in which a vertex may be pending, -1 if there is none below `end`.
   int Lowest(int end = std::numeric_limits<int>::max()) {
     for (end = std::min(end, static_cast<int>(buckets_.size())); lowest_ < end; ++lowest_) {
       if (!buckets_[lowest_].empty()) {
@@ -110,10 +114,10 @@ class Schedule {
     return -1;
   }
 
-  // At most how many vertices wait in `bucket`: those that have moved on are counted, too.
+  // At most how many vertices are pending in `bucket`: entries of vertices that have moved on are counted, too.
   size_t MostIn(int bucket) const { return buckets_[bucket].size(); }
 
-  // Takes a vertex from the lowest bucket, if that is below `end`; false when none waits there.
+  // Takes a vertex from the lowest bucket, if that is below `end`; false when none is pending there.
   bool Pop(VertexId& v, int& bucket, int end = std::numeric_limits<int>::max()) {
     for (int lowest = Lowest(end); lowest >= 0; lowest = Lowest(end)) {
       while (!buckets_[lowest].empty()) {
@@ -129,11 +133,11 @@ class Schedule {
     return false;
   }
 
-  // Has everybody who waits in `bucket`, the lowest, wait without a place in its order, until it is taken or put back. Returns them: those
-  // that would be taken last come first.
+  // Detaches the vertices of `bucket`, the lowest: they stay pending in it, but without a place in its order, until
+  // they are taken or reattached. Returns them: the one that would be taken last comes first.
   HugeVector<VertexId> Detach(int bucket) {
     HugeVector<VertexId> detached = std::exchange(buckets_[bucket], {});
-    // From the last on each once: whoever has been seen waits nowhere meanwhile.
+    // From the last on each once: a vertex that has been seen is not pending meanwhile.
     size_t first = detached.size();
     for (size_t i = detached.size(); i-- > 0;) {
       const VertexId v = detached[i];
@@ -149,13 +153,13 @@ class Schedule {
     return detached;
   }
 
-  // Puts a vertex that was detached from `bucket`, and waits in it still, on top of it.
+  // Puts a vertex that was detached from `bucket`, and is still pending in it, on top of it.
   void Reattach(VertexId v, int bucket) {
     buckets_[bucket].push_back(v);
     lowest_ = std::min(lowest_, bucket);
   }
 
-  // Has a vertex that was detached from `bucket`, and then taken, wait as it did, unless it waits in a lower one.
+  // Detaches a vertex again that was detached from `bucket`, and then taken, unless it is pending in a lower one.
   void DetachAgain(VertexId v, int bucket) {
     size_ += IsPending(v) ? 0 : 1;
     places_[Index(v)].bucket = static_cast<int16_t>(std::min<int>(BucketHolding(v), bucket));
@@ -163,10 +167,10 @@ class Schedule {
 
   bool IsPendingIn(VertexId v, int bucket) const { return BucketHolding(v) == bucket; }
 
-  // Asks the memory for where `v` waits.
+  // Asks the memory for the bucket of `v`.
   void Prefetch(VertexId v) const { PrefetchLine(&places_[Index(v)]); }
 
-  // Has a vertex that waits wait no more.
+  // Takes a vertex that is pending from its bucket.
   void Take(VertexId v) {
     places_[Index(v)].bucket = kNowhere;
     --size_;

@@ -15,8 +15,8 @@ struct SteinerPoint {
 };
 
 // How far from the site, relative to rho times the edge, an off-centre lies at most: a hair below Üngör's distance in
-// 2-D, where the new triangle just keeps rho; 1.1 in higher dimensions. Nearer in 2-D, farther in 3-D, if the simplex that is to go has a corner on
-// the boundary of the box. Measured, see docs/design/refine.md.
+// 2-D, where the new triangle just keeps rho; 1.1 in higher dimensions. Nearer in 2-D, farther in 3-D, if the simplex
+// that is to go has a corner on the boundary of the box. Measured, see docs/design/refine.md.
 template <int D>
 double OffCenterFactor(double rho, bool is_at_boundary);
 
@@ -36,31 +36,34 @@ inline constexpr double kSizeFactor = 1.5;
 template <int D>
 SteinerPoint<D> OffCenter(const Polytope<D>& cell, int node, int plane, double distance_sq);
 
-// In the plane, of an edge v u: the disc through both ends and the point that lies sqrt(top_sq) from both, on the side of a node of their bisector.
-// Points of its circle there see the edge at the angle at which that one does, points within at a larger one.
+// In the plane, of an edge v u: the disc through both ends and the point that lies sqrt(top_sq) from both, on the side
+// of a node of their bisector. Points of its circle there see the edge at the angle at which that one does, points
+// within at a larger one.
 struct Petal {
   Point<2> centre;  // relative to the site v
   double radius = 0;
 };
 Petal PetalOf(const Polytope<2>& cell, int node, int plane, double top_sq);
 
-// In the plane, a point of the cell for its bad node `node`, on the bisector `plane` of the site v and u, where OffCenter would take the node itself:
-// from the node on along the boundary of the cell, away from u, in the petal of v u, and while that leads away from v. The farthest from v, and so from
-// all vertices, that conforms to sizes as the node does. The way leads away from v if the triangle whose circumcentre the node is has an obtuse angle at
-// u.
+// In the plane, a point of the cell for its bad node `node`, on the bisector `plane` of the site v and u, where
+// OffCenter would take the node itself: from the node on along the boundary of the cell, away from u, in the petal of v
+// u, and while that leads away from v. The farthest from v, and so from all vertices, that conforms to sizes as the
+// node does. The way leads away from v if the triangle whose circumcentre the node is has an obtuse angle at u.
 //
 // REQUIRES:   the node at more than rho |u| from the site, and at most sqrt(top_sq).
-// Guarantees: (1) on the boundary of the cell up to rounding, so that its distance to the site is that to its nearest vertex;
-//             (2) not nearer to the site than the node; (3) a point p with (rho - 1) (|up| - |vp|) <= |vp| - rho |u|, or the node.
+// Guarantees: (1) on the boundary of the cell up to rounding, so that its distance to the site is that to its nearest
+//             vertex; (2) not nearer to the site than the node; (3) a point p with (rho - 1) (|up| - |vp|) <= |vp| -
+//             rho |u|, or the node.
 // Complexity: O(nodes).
 // Errors:     none.
-// Source:     H. Erten, A. Üngör, Quality triangulations with locally optimal Steiner points, 2009; (3): docs/design/guarantees.md.
+// Source:     H. Erten, A. Üngör, Quality triangulations with locally optimal Steiner points, 2009; (3):
+//             docs/design/guarantees.md.
 SteinerPoint<2> PetalPoint(const Polytope<2>& cell, int node, int plane, double top_sq, double rho);
 
 // A point of the cell's facet on face `face` of the box: the mean of its nodes that also lie on those of `site_faces`,
-// the faces that the site lies on, that meet `face`. There are such nodes: an empty ball about a point of the cell stays
-// empty when it is projected on one of them. So a vertex of a face never makes another face's vertices denser than those
-// of the edge between the two.
+// the faces that the site lies on, that meet `face`. There are such nodes: an empty ball about a point of the cell
+// stays empty when it is projected on one of them. So a vertex of a face never makes another face's vertices denser
+// than those of the edge between the two.
 //
 // Complexity: O(nodes).
 // Errors:     none.

@@ -10,7 +10,6 @@
 
 #include "core/base/dimensions.h"
 #include "core/refine/rounding.h"
-#include "core/refine/steiner_point.h"
 
 namespace wellspace::core {
 namespace {
@@ -25,7 +24,8 @@ constexpr double kPetalShare = 1.01;
 
 constexpr std::pair<int, int> kNoNode = {-1, -1};
 
-// The node of a cell in the plane that lies on the bisectors of `u` and `w`, and the plane of u's; kNoNode if there is none.
+// The node of a cell in the plane that lies on the bisectors of `u` and `w`, and the plane of u's; kNoNode if there is
+// none.
 std::pair<int, int> NodeBetween(const Polytope<2>& cell, VertexId u, VertexId w) {
   for (size_t i = 0; i < cell.nodes().size(); ++i) {
     const auto [first, second] = cell.nodes()[i].planes;
@@ -39,8 +39,9 @@ std::pair<int, int> NodeBetween(const Polytope<2>& cell, VertexId u, VertexId w)
   return kNoNode;
 }
 
-// For the bad node of the cell of `v` in the plane, at most sqrt(top_sq) away: the point that PetalPoint finds in that cell, or in that of the other
-// end of the edge where the way away from all vertices is there. `cell_of` computes it, clipped by what holds the petal and by `clip` around its site.
+// For the bad node of the cell of `v` in the plane, at most sqrt(top_sq) away: the point that PetalPoint finds in that
+// cell, or in that of the other end of the edge where the way away from all vertices is there. `cell_of` computes the
+// other cell, clipped by what holds the petal and by `clip` around its site.
 template <typename CellOf>
 SteinerPoint<2> PointInPetal(VertexId v, const Polytope<2>& cell, const Assessment& found, double top_sq, double rho,
                              double clip, CellOf cell_of) {
@@ -68,9 +69,10 @@ SteinerPoint<2> PointInPetal(VertexId v, const Polytope<2>& cell, const Assessme
 }  // namespace
 
 template <int D>
-StepRules<D>::StepRules(const QueryStructure<D>& structure, const Demands<D>& criteria)
+StepRules<D>::StepRules(const QueryStructure<D>& structure, const Demands<D>& criteria, double min_edge)
     : structure_(structure),
       criteria_(criteria),
+      min_edge_(min_edge),
       off_center_factor_(OffCenterFactor<D>(criteria.rho, false)),
       boundary_factor_(OffCenterFactor<D>(criteria.rho, criteria.criterion == Criterion::kRadiusEdge)),
       plain_ratio_(criteria.criterion == Criterion::kRadiusEdge && criteria.sizes.IsUnbounded() ? criteria.rho : 0),
@@ -115,8 +117,8 @@ std::optional<InsertionRequest<D>> StepRules<D>::NextRequest(VertexId v, const P
   return request;
 }
 
-// The point for the bad node of the cell of `v`: an off-centre at distance_sq, by the square, unless the node is nearer; then that, or for a triangle
-// better still.
+// The point for the bad node of the cell of `v`: an off-centre at distance_sq, by the square, unless the node is
+// nearer; then the node, or for a triangle a better point.
 template <int D>
 SteinerPoint<D> StepRules<D>::PointFor(VertexId v, const Polytope<D>& cell, const Assessment& found, double distance_sq,
                                        double edge_limit_sq, CellOf cell_of) const {

@@ -14,6 +14,7 @@
 #include "core/refine/face_watchers.h"
 #include "core/refine/insertion.h"
 #include "core/refine/neighbor_notice.h"
+#include "core/refine/steiner_point.h"
 #include "core/voronoi/polytope.h"
 #include "core/voronoi/query_structure.h"
 
@@ -28,8 +29,10 @@ class StepRules {
   // Computes the cell of a vertex, clipped by a box; null if that cannot be done.
   using CellOf = absl::FunctionRef<const Polytope<D>*(VertexId, const Box<D>&)>;
 
+  // No vertex is to be added nearer than `min_edge` to another.
+  //
   // REQUIRES:   `structure` outlives this.
-  StepRules(const QueryStructure<D>& structure, const Demands<D>& criteria);
+  StepRules(const QueryStructure<D>& structure, const Demands<D>& criteria, double min_edge);
 
   const Demands<D>& criteria() const { return criteria_; }
 
@@ -49,13 +52,16 @@ class StepRules {
   // Source:     [HT08] Figure 4, lines 8 and 11.
   Assessment AssessCell(Polytope<D>& cell, FaceMask site_faces, double edge_limit_sq) const;
 
-  // The insertion that `cell`, that of `v`, asks for by edges up to a bucket's limit, by what was found; none if there is
-  // none. Calls cell_of at most once.
+  // The insertion that `cell`, that of `v`, asks for by edges up to a bucket's limit, by what was found; none if there
+  // is none. Calls cell_of at most once.
   //
   // Complexity: O(nodes), and the cell.
   // Source:     [HT08] Figure 4, line 11; docs/design/refine.md.
   std::optional<InsertionRequest<D>> NextRequest(VertexId v, const Polytope<D>& cell, const Assessment& found,
                                                  double edge_limit_sq, CellOf cell_of) const;
+
+  // Whether a vertex at `point` is far enough from all others; if not, the run ends with an error.
+  bool IsLongEnough(const SteinerPoint<D>& point) const { return point.empty_radius_sq >= min_edge_ * min_edge_; }
 
   // Appends the neighbours that PendingVertices::Notify may have to schedule.
   //
@@ -63,8 +69,8 @@ class StepRules {
   void AppendNotices(const Polytope<D>& cell, FaceMask site_faces, const Assessment& found,
                      std::vector<NeighborNotice>& notices) const;
 
-  // Appends the nodes of the cell of `v` on faces of v that are too far for the edge that is to be remembered, if one is,
-  // or for a longer one.
+  // Appends the nodes of the cell of `v` on faces of v that are too far for the edge that is to be remembered, if one
+  // is, or for a longer one.
   //
   // Complexity: O(nodes).
   void AppendNodesToWatch(VertexId v, const Polytope<D>& cell, const Assessment& found,
@@ -77,6 +83,7 @@ class StepRules {
 
   const QueryStructure<D>& structure_;
   const Demands<D> criteria_;
+  const double min_edge_;
   const double off_center_factor_;
   const double boundary_factor_;  // in the place of that at the boundary, for radius-edge
   const double plain_ratio_;      // cells that keep it need nothing; 0: that does not tell

@@ -1,0 +1,45 @@
+// What the checking build asserts of the refinement at each step.
+#ifndef WELLSPACE_CORE_REFINE_REFINEMENT_CHECKS_H_
+#define WELLSPACE_CORE_REFINE_REFINEMENT_CHECKS_H_
+
+#include <cstdint>
+
+#include "core/base/ids.h"
+#include "core/refine/insertion.h"
+#include "core/refine/schedule.h"
+#include "core/refine/step_rules.h"
+#include "core/voronoi/polytope.h"
+#include "core/voronoi/query_structure.h"
+
+namespace wellspace::core {
+
+// Aborts with the figures where docs/design/guarantees.md does not hold, as far as that can be seen nearby.
+//
+// Thread safety: thread-compatible.
+template <int D>
+class RefinementChecks {
+ public:
+  // REQUIRES:   `structure` outlives this.
+  explicit RefinementChecks(const QueryStructure<D>& structure) : structure_(structure) {}
+
+  // That no vertex is pending below `bucket`, from which `v` was taken, whose cell is `cell`: the neighbours in the
+  // cell each time, all vertices now and then.
+  //
+  // Complexity: O(nodes), amortised.
+  void CheckOrder(const Schedule& schedule, VertexId v, const Polytope<D>& cell, int bucket);
+
+  // [HT08] Definition 1 at an insertion, before it is made: (1), that the edge is the bucket's, the place, and the
+  // empty ball.
+  //
+  // Complexity: that of a query.
+  void CheckInsertion(const StepRules<D>& rules, const InsertionRequest<D>& request);
+
+ private:
+  const QueryStructure<D>& structure_;
+  uint64_t unchecked_ = 0;  // vertices taken from the schedule since all have been looked at
+  Workspace<D> workspace_;
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_REFINE_REFINEMENT_CHECKS_H_

@@ -1,0 +1,90 @@
+// The steps of one vertex, replayed from what a thread has recorded.
+#ifndef WELLSPACE_CORE_REFINE_SPECULATION_RECORDED_STEPS_H_
+#define WELLSPACE_CORE_REFINE_SPECULATION_RECORDED_STEPS_H_
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "core/base/ids.h"
+#include "core/refine/assessment.h"
+#include "core/refine/face_watchers.h"
+#include "core/refine/insertion.h"
+#include "core/refine/neighbor_notice.h"
+#include "core/refine/speculation/batch.h"
+#include "core/refine/speculation/star_writer.h"
+
+namespace wellspace::core {
+
+// The functions are those of CellSteps. Provisional numbers become those of the structure as steps are replayed, which
+// can be done once.
+//
+// Thread safety: thread-compatible.
+template <int D>
+class RecordedSteps {
+ public:
+  // The steps of the next vertex of `batch`.
+  //
+  // REQUIRES:   its record is still valid; the batch outlives this.
+  explicit RecordedSteps(Batch<D>& batch)
+      : batch_(batch),
+        record_(batch.records[batch.refined]),
+        end_(batch.EndOf(batch.refined)),
+        step_(record_.begin.steps),
+        request_(record_.begin.requests),
+        notices_end_(record_.begin.notices) {}
+
+  const Assessment* Assess() {
+    const RecordedStep& step = batch_.steps[step_];
+    notices_ = std::span(batch_.notices).subspan(notices_end_, step.notices);
+    notices_end_ += step.notices;
+    for (NeighborNotice& notice : notices_) {
+      batch_.Renumber(notice.vertex);
+    }
+    return &step.found;
+  }
+
+  std::span<const NeighborNotice> Notices() const { return notices_; }
+
+  const InsertionRequest<D>* NextRequest() {
+    if (!batch_.steps[step_].asks) {
+      return nullptr;
+    }
+    InsertionRequest<D>& request = batch_.requests[request_];
+    batch_.Renumber(request.insertion.other);
+    return &request;
+  }
+
+  void Inserted(VertexId x) {
+    batch_.numbers[request_] = x;
+    ++request_;
+    ++step_;
+  }
+
+  std::span<const WatchedNode<D>> NodesToWatch() const {
+    return std::span(batch_.watched).subspan(record_.begin.watched, end_.watched - record_.begin.watched);
+  }
+
+  typename StarWriter<D>::Simplices FindStar(StarWriter<D>& /*stars*/) {
+    for (uint32_t i = record_.new_simplices; i < end_.simplices; ++i) {
+      for (VertexId& u : batch_.simplices[i]) {
+        batch_.Renumber(u);
+      }
+    }
+    return std::span(batch_.simplices).subspan(record_.begin.simplices, end_.simplices - record_.begin.simplices);
+  }
+
+ private:
+  Batch<D>& batch_;
+  const typename Batch<D>::Record& record_;
+  const typename Batch<D>::Ends end_;
+  size_t step_;     // of the batch's
+  size_t request_;  // likewise, the next
+  std::span<NeighborNotice> notices_;
+  size_t notices_end_;
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_REFINE_SPECULATION_RECORDED_STEPS_H_

@@ -1,0 +1,386 @@
+#include "core/refine/speculation/rounds.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <iterator>
+#include <thread>
+#include <utility>
+
+#include "absl/cleanup/cleanup.h"
+#include "core/base/dimensions.h"
+#include "core/base/prefetch.h"
+
+namespace wellspace::core {
+namespace {
+
+// Fewer vertices of a bucket are refined as they come.
+constexpr size_t kLeastInRounds = 64;
+// A bucket is cut into so many segments, and so many vertices of each are a batch.
+constexpr size_t kSegments = 8;
+constexpr size_t kBatch = 128;
+// The records of a batch are made in so many parts, in turn with other batches, so that threads come to the end of a
+// round together; unless a thread would wait for the part before.
+constexpr size_t kParts = 4;
+// If less than this share of the records of a bucket were still valid, threads no longer speculate on it, nor on others
+// unless they are so many times as large.
+constexpr double kLeastShareValid = 2.0 / 3;
+constexpr size_t kMoreThanDistrusted = 4;
+
+// Cells of the vertices that were in the structure when speculation began, and of those that the batch expects to be
+// inserted before. Notes in the record how far they reach.
+template <int D>
+class SpeculatedCells {
+ public:
+  SpeculatedCells(const QueryStructure<D>& structure, Batch<D>& batch, size_t at)
+      : structure_(structure), batch_(batch), record_(batch.records[at]), site_(structure.point(batch.vertices[at])) {}
+
+  void ComputeOwn(VertexId v, const Box<D>& clip, Workspace<D>& workspace) {
+    structure_.UnplacedClippedVoronoi(v, clip, workspace, batch_.inserted);
+    record_.reach_sq = workspace.cell.CutLimitSq();
+  }
+
+  const Polytope<D>* ComputeOther(VertexId u, const Box<D>& clip, Workspace<D>& workspace) {
+    is_known_ = u < batch_.inserted.first();  // others are in no leaf
+    if (!is_known_) {
+      return nullptr;
+    }
+    structure_.UnplacedClippedVoronoi(u, clip, workspace, batch_.inserted);
+    const double reach = std::sqrt(workspace.cell.CutLimitSq()) + std::sqrt(DistanceSq<D>(structure_.point(u), site_));
+    record_.reach_sq = std::max(record_.reach_sq, reach * reach);
+    is_known_ = !workspace.cell.IsTooLarge();
+    workspace.cell.Place();
+    return &workspace.cell;
+  }
+
+  // Whether the last cell of another vertex could be computed.
+  bool IsKnown() const { return is_known_; }
+
+ private:
+  const QueryStructure<D>& structure_;
+  Batch<D>& batch_;
+  typename Batch<D>::Record& record_;
+  const Point<D> site_;
+  bool is_known_ = true;
+};
+
+}  // namespace
+
+template <int D>
+void Rounds<D>::BeginRun(const StepRules<D>& rules, ThreadTeam& team, const RunContext& context) {
+  rules_ = &rules;
+  team_ = &team;
+  context_ = &context;
+  distrusted_size_ = 0;
+}
+
+template <int D>
+void Rounds<D>::EndRun(QueryCounters& counters) {
+  AwaitOthers();
+  stars_.WriteLast();
+  finished_ = {};
+  for (const StepWorkspace<D>& workspace : workspaces_) {
+    counters.Add(workspace.own.counters);
+    counters.Add(workspace.other.counters);
+  }
+  workspaces_.clear();
+  team_ = nullptr;
+}
+
+template <int D>
+void Rounds<D>::DropRun() {
+  if (is_ahead_ || stars_.IsWriting()) {
+    team_->Drop();
+    is_ahead_ = false;
+    stars_.EndWriting();
+  }
+  team_ = nullptr;
+}
+
+template <int D>
+bool Rounds<D>::Begin(int bucket) {
+  Schedule& schedule = pending_.schedule();
+  if (schedule.MostIn(bucket) < kLeastInRounds) {
+    return false;
+  }
+  detached_ = schedule.Detach(bucket);
+  if (detached_.size() < kLeastInRounds) {  // the others have moved on
+    for (const VertexId v : detached_) {
+      schedule.Reattach(v, bucket);
+    }
+    detached_ = {};
+    return false;
+  }
+  bucket_ = bucket;
+  half_ = 0;
+  speculated_count_ = 0;
+  valid_count_ = 0;
+  inserted_.clear();
+  inserted_before_ = 0;
+  batches_.resize(kSegments);
+  for (size_t i = 0; i < kSegments; ++i) {
+    batches_[i].segment_begin = i * detached_.size() / kSegments;
+    batches_[i].segment_end = (i + 1) * detached_.size() / kSegments;
+    TakeNext(batches_[i]);
+  }
+  return true;
+}
+
+// Makes the next vertices of a segment its batch.
+template <int D>
+void Rounds<D>::TakeNext(Batch<D>& batch) {
+  const size_t size = std::min(kBatch, batch.segment_end - batch.segment_begin);
+  batch.vertices.assign(detached_.rend() - static_cast<std::ptrdiff_t>(batch.segment_end),
+                        detached_.rend() - static_cast<std::ptrdiff_t>(batch.segment_end - size));
+  batch.segment_end -= size;
+  batch.refined = 0;
+  batch.is_speculated = false;
+}
+
+template <int D>
+void Rounds<D>::Drop() {
+  Schedule& schedule = pending_.schedule();
+  const auto reattach = [&](VertexId v) {
+    if (schedule.IsPendingIn(v, bucket_)) {
+      schedule.Reattach(v, bucket_);
+    }
+  };
+  for (const Batch<D>& batch : batches_) {
+    const auto begin = detached_.begin();
+    std::for_each(begin + static_cast<std::ptrdiff_t>(batch.segment_begin),
+                  begin + static_cast<std::ptrdiff_t>(batch.segment_end), reattach);
+    std::for_each(batch.vertices.rbegin(), batch.vertices.rend() - static_cast<std::ptrdiff_t>(batch.refined),
+                  reattach);
+  }
+  batches_.clear();
+  detached_ = {};
+}
+
+template <int D>
+void Rounds<D>::ForgetRecords() {
+  for (Batch<D>& batch : batches_) {
+    batch.is_speculated = false;
+  }
+}
+
+template <int D>
+void Rounds<D>::BeginRound() {
+  next_batch_ = 0;
+  if (team_->threads() > 1) {
+    Speculate();
+  }
+}
+
+template <int D>
+Batch<D>* Rounds<D>::NextBatch() {
+  const std::span<Batch<D>> now = HalfOf(0);
+  if (next_batch_ < now.size()) {
+    return &now[next_batch_++];
+  }
+  const std::span<Batch<D>> then = HalfOf(1);
+  if (next_batch_ == now.size() + then.size()) {
+    return nullptr;
+  }
+  while (is_ahead_ && team_->Help()) {
+  }
+  Batch<D>& batch = then[next_batch_ - now.size()];
+  if (!is_ahead_ || team_->HasEnded() || !std::atomic_ref(batch.is_speculated).load(std::memory_order_acquire)) {
+    return nullptr;
+  }
+  ++next_batch_;
+  return &batch;
+}
+
+// In small buckets, and where there are few blocks, batches that are refined at about the same time may be near each
+// other, so that many records conflict: there it is not worth while. What queries read does not change until
+// CommitAdded.
+template <int D>
+void Rounds<D>::Speculate() {
+  const std::span<Batch<D>> now = HalfOf(0);
+  const std::span<Batch<D>> then = HalfOf(1);
+  if (detached_.size() <= kMoreThanDistrusted * distrusted_size_) {
+    is_speculated_ = now.front().is_speculated;
+    stars_.SetCollecting(is_speculated_);
+    if (!is_speculated_) {
+      AwaitOthers();  // they may still write stars, which is done by this thread then
+    }
+    return;
+  }
+  stars_.BeginCollecting();
+  workspaces_.resize(team_->threads());
+  const auto record = [this](Batch<D>& batch, size_t part, size_t parts) {
+    RecordPart(batch, part, parts, workspaces_[ThreadTeam::CurrentThread()]);
+  };
+  if (!now.front().is_speculated) {
+    Prepare(now);
+    team_->ForEach(now.size(), [&](size_t i) { record(now[i], 0, 1); });
+  }
+  Prepare(then);
+  bytes_before_ = CountBytes();
+  is_ahead_ = true;
+  is_speculated_ = true;
+  const size_t parts = 2 * static_cast<size_t>(team_->threads()) <= then.size() ? kParts : 1;
+  team_->Begin(parts * then.size(), [=](size_t i) { record(then[i % then.size()], i / then.size(), parts); });
+}
+
+template <int D>
+void Rounds<D>::Prepare(std::span<Batch<D>> batches) {
+  const Schedule& schedule = pending_.schedule();
+  for (Batch<D>& batch : batches) {
+    for (const VertexId v : batch.vertices) {
+      schedule.Prefetch(v);
+    }
+    batch.Prepare(structure_.vertex_count(), inserted_before_ + inserted_.size());
+    for (size_t i = batch.refined; i < batch.vertices.size(); ++i) {
+      batch.records[i].is_wanted = schedule.IsPendingIn(batch.vertices[i], bucket_);
+    }
+  }
+}
+
+// Makes the records of one of equal parts of the vertices of a batch that have not been refined, once the parts before
+// it are done. Nothing but the batch and the workspace is written.
+template <int D>
+void Rounds<D>::RecordPart(Batch<D>& batch, size_t part, size_t parts, StepWorkspace<D>& workspace) const {
+  const std::atomic_ref parts_done(batch.parts_done);
+  while (parts_done.load(std::memory_order_acquire) < part) {
+    std::this_thread::yield();
+  }
+  // Also where something is thrown.
+  const absl::Cleanup count = [&] { parts_done.store(part + 1, std::memory_order_release); };
+  const size_t size = batch.vertices.size() - batch.refined;
+  const size_t end = batch.refined + (part + 1) * size / parts;
+  for (size_t i = batch.refined + part * size / parts; i < end; ++i) {
+    batch.BeginRecord(i);
+    PrefetchAhead(std::span(batch.vertices), i, [this](VertexId v, int step) { structure_.Prefetch(v, step); });
+    if (batch.records[i].is_wanted && !context_->IsCancelled()) {
+      Record(batch, i, workspace);
+      if (!batch.records[i].is_known) {
+        batch.CutTo(batch.records[i].begin);
+      }
+    }
+  }
+  if (part + 1 == parts) {
+    batch.numbers.assign(batch.inserted.size(), kNoVertex);
+    std::atomic_ref(batch.is_speculated).store(true, std::memory_order_release);
+  }
+}
+
+// Records the steps of vertex `at`: the loop of Refinement::RefineVertex, but each step is recorded in the place of
+// being done. Returns before the last step, and the record is not known, where that is an error, or depends on what is.
+template <int D>
+void Rounds<D>::Record(Batch<D>& batch, size_t at, StepWorkspace<D>& workspace) const {
+  const VertexId v = batch.vertices[at];
+  SpeculatedCells<D> cells(structure_, batch, at);
+  CellSteps<D, SpeculatedCells<D>> steps(*rules_, v, structure_.faces(v), pending_.schedule().UpperLengthSq(bucket_),
+                                         cells, workspace);
+  while (!context_->IsCancelled()) {
+    const Assessment* const found = steps.Assess();
+    if (found == nullptr) {
+      return;
+    }
+    const size_t first_notice = batch.notices.size();
+    steps.AppendNotices(batch.notices);
+    const InsertionRequest<D>* const request = steps.NextRequest();
+    batch.steps.push_back({*found, static_cast<uint32_t>(batch.notices.size() - first_notice), request != nullptr});
+    if (request == nullptr) {
+      steps.AppendNodesToWatch(batch.watched);
+      if (found->IsGood()) {
+        steps.FindStar(batch.star);
+        batch.AppendStar(at);
+      }
+      batch.SetKnown(at, structure_.point(v));
+      return;
+    }
+    if (!cells.IsKnown() || !rules_->IsLongEnough(request->point)) {
+      return;
+    }
+    batch.requests.push_back(*request);
+    steps.Inserted(batch.inserted.Append(request->point.position));
+  }
+}
+
+template <int D>
+void Rounds<D>::EndRound() {
+  AwaitOthers();
+  is_speculated_ = false;
+  if (speculated_count_ >= kLeastInRounds && valid_count_ < kLeastShareValid * static_cast<double>(speculated_count_)) {
+    distrusted_size_ = detached_.size();
+  }
+  for (Batch<D>& batch : HalfOf(0)) {
+    std::swap(batch.simplices, batch.written);
+  }
+  stars_.BeginWriting(*team_);
+  structure_.AdmitWaiting();
+  // The records of the next batches may have been made without what has been inserted meanwhile.
+  const Batch<D>& next = HalfOf(1).front();
+  const size_t is_known = next.is_speculated ? next.first_unknown - inserted_before_ : inserted_.size();
+  inserted_.erase(inserted_.begin(), inserted_.begin() + static_cast<std::ptrdiff_t>(is_known));
+  inserted_before_ += is_known;
+}
+
+template <int D>
+void Rounds<D>::GoOn() {
+  for (Batch<D>& batch : HalfOf(0)) {
+    TakeNext(batch);
+  }
+  half_ = 1 - half_;
+  if (std::all_of(batches_.begin(), batches_.end(), [](const Batch<D>& batch) { return batch.IsLast(); })) {
+    finished_ = std::exchange(batches_, {});
+    detached_ = {};
+  }
+}
+
+template <int D>
+void Rounds<D>::BeginBatch(Batch<D>& batch) {
+  if (batch.is_speculated) {
+    batch.NoteConflicts(InsertedFrom(batch.first_unknown - inserted_before_));
+  }
+}
+
+template <int D>
+void Rounds<D>::Prefetch(const Batch<D>& batch) const {
+  PrefetchAhead(std::span(batch.vertices), batch.refined, [&](VertexId v, int step) {
+    if (step == 0) {
+      pending_.Prefetch(v);
+      stars_.Prefetch(v);
+    }
+    if (!batch.is_speculated) {
+      structure_.Prefetch(v, step);
+    }
+  });
+}
+
+template <int D>
+void Rounds<D>::AwaitOthers() {
+  if (is_ahead_ || stars_.IsWriting()) {
+    team_->End();
+    is_ahead_ = false;
+    stars_.EndWriting();
+  }
+}
+
+template <int D>
+void Rounds<D>::CommitAdded() {
+  AwaitOthers();
+  structure_.AdmitWaiting();
+}
+
+template <int D>
+uint64_t Rounds<D>::CountBytes() const {
+  uint64_t bytes = detached_.size() * sizeof(VertexId);
+  for (const auto* batches : {&batches_, &finished_}) {
+    for (const Batch<D>& batch : *batches) {
+      bytes += batch.MemoryBytes();
+    }
+  }
+  for (const StepWorkspace<D>& workspace : workspaces_) {
+    bytes += (workspace.own.seen.size() + workspace.other.seen.size()) * sizeof(uint32_t);
+  }
+  return bytes;
+}
+
+#define WELLSPACE_INSTANTIATE(D) template class Rounds<D>;
+WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
+#undef WELLSPACE_INSTANTIATE
+
+}  // namespace wellspace::core

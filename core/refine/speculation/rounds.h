@@ -1,0 +1,148 @@
+// A bucket's vertices in rounds: while those of one round are refined, threads speculate on those of the next. ADR 23.
+#ifndef WELLSPACE_CORE_REFINE_SPECULATION_ROUNDS_H_
+#define WELLSPACE_CORE_REFINE_SPECULATION_ROUNDS_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/base/huge_pages.h"
+#include "core/base/ids.h"
+#include "core/base/run_context.h"
+#include "core/base/thread_team.h"
+#include "core/geometry/point.h"
+#include "core/refine/cell_steps.h"
+#include "core/refine/pending_vertices.h"
+#include "core/refine/speculation/batch.h"
+#include "core/refine/speculation/star_writer.h"
+#include "core/refine/step_rules.h"
+#include "core/voronoi/query_structure.h"
+
+namespace wellspace::core {
+
+// A bucket with many vertices is detached from the schedule and cut into segments. A round refines a batch of each
+// segment of one half; the next round does so with the other half. To speculate is to record the steps of a batch's
+// vertices on a structure that is not changed meanwhile: vertices that are added stay uncommitted until no thread
+// speculates any more.
+//
+// All decisions are those of the calling thread, so that the mesh does not depend on what other threads do, or when.
+//
+//   if (rounds.Begin(bucket))
+//     while (!rounds.AreDone()) {
+//       rounds.BeginRound();
+//       while (Batch<D>* batch = rounds.NextBatch()) … refine its vertices …
+//       rounds.EndRound();
+//       rounds.GoOn();
+//     }
+//
+// Thread safety: thread-compatible.
+// Invariants: (1) while IsAhead, other threads read the structure, and write nothing but the batches of the next round.
+template <int D>
+class Rounds {
+ public:
+  // REQUIRES:   all of these outlive this.
+  Rounds(QueryStructure<D>& structure, PendingVertices<D>& pending, StarWriter<D>& stars)
+      : structure_(structure), pending_(pending), stars_(stars) {}
+
+  // Begins a run, which speculates with the threads of `team`. EndRun or DropRun has to be called before one of these
+  // goes; DropRun may be called after EndRun, and does nothing then.
+  void BeginRun(const StepRules<D>& rules, ThreadTeam& team, const RunContext& context);
+  // Writes the stars that are left, and adds to `counters` what the queries of other threads have cost.
+  void EndRun(QueryCounters& counters);
+  // Ends a run in which something has been thrown.
+  void DropRun();
+
+  // Detaches the vertices of `bucket`, the lowest; false if there are too few, and they stay where they are.
+  bool Begin(int bucket);
+  // Has the detached vertices that have not been refined be pending in their bucket alone.
+  void Drop();
+  // Whether no vertex is detached any more.
+  bool AreDone() const { return batches_.empty(); }
+  // Of the detached vertices.
+  int bucket() const { return bucket_; }
+
+  // Forgets what was recorded in a run that has been stopped.
+  void ForgetRecords();
+  // Has other threads speculate on the batches of the next round, unless few records were valid of late. The batches of
+  // this round have been speculated on by then.
+  void BeginRound();
+  // The next batch to be refined; null at the end of the round. Where other threads are at the last of the next round,
+  // its first batches come, too.
+  Batch<D>* NextBatch();
+  // Ends the speculation, commits what was added, and has another thread write stars.
+  void EndRound();
+  // Goes on to the next round, with new batches in the place of those that have been refined.
+  void GoOn();
+
+  // Begins to refine `batch`.
+  void BeginBatch(Batch<D>& batch);
+  // Asks the memory for what refining the next vertices of `batch` reads.
+  void Prefetch(const Batch<D>& batch) const;
+  // Notes that a vertex has been added at `p`.
+  void NoteInserted(const Point<D>& p) {
+    if (is_speculated_) {
+      inserted_.push_back(p);
+    }
+  }
+  // How many have been noted, and the places from one of them on.
+  size_t inserted_count() const { return inserted_.size(); }
+  std::span<const Point<D>> InsertedFrom(size_t i) const { return std::span(inserted_).subspan(i); }
+  // Counts the record of a vertex of `batch` that is refined, for the decision whether to go on speculating.
+  void CountRecord(const Batch<D>& batch, bool was_valid) {
+    speculated_count_ += batch.is_speculated ? 1 : 0;
+    valid_count_ += was_valid ? 1 : 0;
+  }
+
+  // Whether other threads may speculate.
+  bool IsAhead() const { return is_ahead_; }
+  // Returns when other threads have done what was begun.
+  void AwaitOthers();
+  // Has queries find all vertices that have been added, once other threads have done what was begun.
+  void CommitAdded();
+
+  // Of what a round needs; roughly.
+  uint64_t MemoryBytes() const { return is_ahead_ ? bytes_before_ : CountBytes(); }
+
+ private:
+  // The batches of the round, for 0, or of the next one.
+  std::span<Batch<D>> HalfOf(size_t next) {
+    return std::span(batches_).subspan((half_ ^ next) * batches_.size() / 2, batches_.size() / 2);
+  }
+  void TakeNext(Batch<D>& batch);
+  void Speculate();
+  void Prepare(std::span<Batch<D>> batches);
+  void RecordPart(Batch<D>& batch, size_t part, size_t parts, StepWorkspace<D>& workspace) const;
+  void Record(Batch<D>& batch, size_t at, StepWorkspace<D>& workspace) const;
+  uint64_t CountBytes() const;
+
+  QueryStructure<D>& structure_;
+  PendingVertices<D>& pending_;
+  StarWriter<D>& stars_;
+
+  // Of the detached vertices.
+  int bucket_ = -1;
+  HugeVector<VertexId> detached_;   // the last of each segment is the next
+  std::vector<Batch<D>> batches_;   // by segment, the next of each; none if no vertex is detached
+  std::vector<Batch<D>> finished_;  // of the bucket before, whose stars may still be written
+  size_t half_ = 0;                 // whether this round is of the first half of the segments, or of the second
+  size_t next_batch_ = 0;           // in this round and the next
+  std::vector<Point<D>> inserted_;  // in these rounds, where they are speculated, from inserted_before_ on
+  size_t inserted_before_ = 0;
+  size_t speculated_count_ = 0;  // of the vertices of the bucket that have been refined, how many had been recorded
+  size_t valid_count_ = 0;       // and how many of these records were still valid
+  size_t distrusted_size_ = 0;   // of the last bucket where too few were; 0 if none
+
+  // Of the run.
+  const StepRules<D>* rules_ = nullptr;
+  ThreadTeam* team_ = nullptr;  // null between runs
+  const RunContext* context_ = nullptr;
+  std::vector<StepWorkspace<D>> workspaces_;  // by thread
+  bool is_ahead_ = false;
+  bool is_speculated_ = false;  // the round: insertions are noted
+  uint64_t bytes_before_ = 0;   // of what other threads write, before they began
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_REFINE_SPECULATION_ROUNDS_H_
