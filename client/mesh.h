@@ -32,7 +32,7 @@ struct MeshOptions {
   std::vector<SizeBox> size_boxes;
   std::optional<double> min_dihedral;  // degrees; 0: slivers are left as they are
   bool pump_weights = false;
-  double merge_distance = 0;  // points this near to each other become one vertex
+  double merge_distance = 0;   // points this near to each other become one vertex
   bool keep_vertices = false;  // of the session's last mesh: where they are
   std::vector<double> domain_low;
   std::vector<double> domain_high;

@@ -96,8 +96,8 @@ absl::Status CheckLeastSize(const Domain<D>& domain, const MeshParameters& param
 }  // namespace
 
 template <int D>
-Demands<D> DemandsIn(const Domain<D>& domain, const MeshParameters& parameters) {
-  Demands<D> demands;
+MeshCriteria<D> DemandsIn(const Domain<D>& domain, const MeshParameters& parameters) {
+  MeshCriteria<D> demands;
   demands.criterion = parameters.criterion;
   demands.rho = parameters.rho == 0 ? DefaultRho(D) : std::min(parameters.rho, kMostRho);
   if (parameters.max_circumradius != 0) {
@@ -151,7 +151,7 @@ absl::Status CheckFeasible(const Domain<D>& domain, const MeshParameters& parame
 }
 
 #define WELLSPACE_INSTANTIATE(D)                                                                  \
-  template Demands<D> DemandsIn<D>(const Domain<D>&, const MeshParameters&);                      \
+  template MeshCriteria<D> DemandsIn<D>(const Domain<D>&, const MeshParameters&);                 \
   template absl::Status CheckShapeFeasible<D>(const Domain<D>&, const MeshParameters&, uint64_t); \
   template absl::Status CheckFeasible<D>(const Domain<D>&, const MeshParameters&, uint64_t);
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)

@@ -7,7 +7,7 @@
 #include "absl/status/status.h"
 #include "core/input_cloud.h"
 #include "core/mesh_parameters.h"
-#include "core/refine/demands.h"
+#include "core/refine/criteria.h"
 
 namespace wellspace::core {
 
@@ -16,7 +16,7 @@ namespace wellspace::core {
 //
 // REQUIRES:   ValidateParameters(parameters).ok().
 template <int D>
-Demands<D> DemandsIn(const Domain<D>& domain, const MeshParameters& parameters);
+MeshCriteria<D> DemandsIn(const Domain<D>& domain, const MeshParameters& parameters);
 
 // Refuses demands for which it is proved that every mesh of `domain` has more vertices than `parameters` allow.
 // `vertices` is how many there are before refinement.

@@ -156,7 +156,7 @@ class MesherIn final : public Mesher {
     WELLSPACE_RETURN_IF_ERROR(CheckFeasible(parameters));
     context.EnterPhase(Phase::kRefinement);
     is_refined_ = false;
-    const Demands<D> demands = DemandsOf(parameters);
+    const MeshCriteria<D> demands = DemandsOf(parameters);
     absl::Status status = refinement_->Run(demands, VertexBudget(parameters), parameters.threads, context, nullptr,
                                            [&] { return PredictVertices(demands, context); });
     refinement_seconds_ += absl::ToDoubleSeconds(context.TimeIn(Phase::kRefinement));
@@ -409,11 +409,11 @@ class MesherIn final : public Mesher {
     return absl::OkStatus();
   }
 
-  Demands<D> DemandsOf(const MeshParameters& parameters) const { return DemandsIn<D>(domain_, parameters); }
+  MeshCriteria<D> DemandsOf(const MeshParameters& parameters) const { return DemandsIn<D>(domain_, parameters); }
 
   // How many vertices a first refinement will end with; 0 if the context knows, or it ends too soon to be worth an
   // estimate.
-  absl::StatusOr<uint64_t> PredictVertices(const Demands<D>& demands, const RunContext& context) const {
+  absl::StatusOr<uint64_t> PredictVertices(const MeshCriteria<D>& demands, const RunContext& context) const {
     if (context.estimated_vertices() > 0 || structure_.vertex_count() > structure_.built_count() ||
         (demands.sizes.IsUnbounded() && structure_.vertex_count() < kLeastPredicted<D>)) {
       return 0;

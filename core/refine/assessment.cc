@@ -57,13 +57,13 @@ struct Candidate {
 }  // namespace
 
 template <int D>
-Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const Demands<D>& demands, double edge_limit_sq) {
+Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const MeshCriteria<D>& criteria, double edge_limit_sq) {
   Assessment result;
   Candidate<D> first;
   double nearest_face = Assessment::kNone;
-  const double rho_sq = demands.rho * demands.rho;
-  const bool has_sizes = !demands.sizes.IsUnbounded();
-  const double cell_edge_sq = demands.criterion == Criterion::kWellSpaced ? ShortestEdgeSq(cell) : Assessment::kNone;
+  const double rho_sq = criteria.rho * criteria.rho;
+  const bool has_sizes = !criteria.sizes.IsUnbounded();
+  const double cell_edge_sq = criteria.criterion == Criterion::kWellSpaced ? ShortestEdgeSq(cell) : Assessment::kNone;
   for (size_t i = 0; i < cell.nodes().size(); ++i) {
     const CellNode<D>& node = cell.nodes()[i];
     result.radius_sq = std::max(result.radius_sq, node.radius_sq);
@@ -115,7 +115,7 @@ Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const Demands<D>
       for (int k = 0; k < D; ++k) {
         x[k] += node.x[k];
       }
-      const double size_sq = demands.sizes.AtSq(x);
+      const double size_sq = criteria.sizes.AtSq(x);
       if (node.radius_sq > size_sq && size_sq < bound_sq) {
         bound_sq = size_sq;
         is_too_large = true;
@@ -137,7 +137,8 @@ Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const Demands<D>
   return result;
 }
 
-#define WELLSPACE_INSTANTIATE(D) template Assessment Assess<D>(const Polytope<D>&, FaceMask, const Demands<D>&, double);
+#define WELLSPACE_INSTANTIATE(D) \
+  template Assessment Assess<D>(const Polytope<D>&, FaceMask, const MeshCriteria<D>&, double);
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 

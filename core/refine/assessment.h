@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "core/geometry/box.h"
-#include "core/refine/demands.h"
+#include "core/refine/criteria.h"
 #include "core/voronoi/polytope.h"
 
 namespace wellspace::core {
@@ -45,7 +45,7 @@ struct Assessment {
 // Errors:     none.
 // Source:     docs/design/refine.md, the loop.
 template <int D>
-Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const Demands<D>& demands, double edge_limit_sq);
+Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const MeshCriteria<D>& criteria, double edge_limit_sq);
 
 }  // namespace wellspace::core
 

@@ -117,7 +117,7 @@ double BallVolume() {
 }
 
 template <int D>
-Terms VerticesPerTerm(const Demands<D>& demands) {
+Terms VerticesPerTerm(const MeshCriteria<D>& demands) {
   // For D > 3 by analogy: the multiple of the least rho for which refinement ends, and balls of the same volume.
   const double rho = D <= 3 ? demands.rho : demands.rho * std::exp2(-0.5 * (D - 3));
   const double scale = D <= 3 ? 1.0 : BallVolume<3>() / BallVolume<D>();
@@ -158,7 +158,7 @@ struct Share {
 template <int D>
 class Integrator {
  public:
-  Integrator(const QueryStructure<D>& structure, const Demands<D>& demands)
+  Integrator(const QueryStructure<D>& structure, const MeshCriteria<D>& demands)
       : box_(structure.box()),
         sizes_(ServedSizes(demands.sizes, box_)),
         vertices_per_term_(VerticesPerTerm<D>(demands)) {}
@@ -538,7 +538,7 @@ absl::StatusOr<Sample> SampleLeaves(const QueryStructure<D>& structure, Integrat
 }  // namespace
 
 template <int D>
-absl::StatusOr<SizeEstimate> EstimateSize(const QueryStructure<D>& structure, const Demands<D>& demands,
+absl::StatusOr<SizeEstimate> EstimateSize(const QueryStructure<D>& structure, const MeshCriteria<D>& demands,
                                           const RunContext& context, const EstimateEffort& effort) {
   Integrator<D> integrator(structure, demands);
   WELLSPACE_RETURN_IF_ERROR(integrator.Prepare(structure, context));
@@ -556,8 +556,8 @@ absl::StatusOr<SizeEstimate> EstimateSize(const QueryStructure<D>& structure, co
   return estimate;
 }
 
-#define WELLSPACE_INSTANTIATE(D)                                                                     \
-  template absl::StatusOr<SizeEstimate> EstimateSize<D>(const QueryStructure<D>&, const Demands<D>&, \
+#define WELLSPACE_INSTANTIATE(D)                                                                          \
+  template absl::StatusOr<SizeEstimate> EstimateSize<D>(const QueryStructure<D>&, const MeshCriteria<D>&, \
                                                         const RunContext&, const EstimateEffort&);
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE

@@ -7,7 +7,7 @@
 
 #include "absl/status/statusor.h"
 #include "core/base/run_context.h"
-#include "core/refine/demands.h"
+#include "core/refine/criteria.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {
@@ -50,7 +50,7 @@ inline constexpr EstimateEffort kGlance{0.15, 24, 64, uint64_t{1} << 11};
 // Threads:    thread-compatible.
 // Source:     Ruppert 1995 (the size of a mesh is the integral of lfs^-D up to constants); docs/design/estimate.md.
 template <int D>
-absl::StatusOr<SizeEstimate> EstimateSize(const QueryStructure<D>& structure, const Demands<D>& demands,
+absl::StatusOr<SizeEstimate> EstimateSize(const QueryStructure<D>& structure, const MeshCriteria<D>& demands,
                                           const RunContext& context, const EstimateEffort& effort = {});
 
 }  // namespace wellspace::core

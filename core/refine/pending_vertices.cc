@@ -20,7 +20,7 @@ struct alignas(kCacheLines) WorkspaceOfThread : Workspace<D> {};
 }  // namespace
 
 template <int D>
-HugeVector<int16_t> PendingVertices<D>::FirstBuckets(const Demands<D>& criteria, const RunContext& context,
+HugeVector<int16_t> PendingVertices<D>::FirstBuckets(const MeshCriteria<D>& criteria, const RunContext& context,
                                                      ThreadTeam& team) const {
   std::vector<WorkspaceOfThread<D>> workspaces(team.threads());
   HugeVector<int16_t> first_buckets(structure_.vertex_count());
@@ -53,7 +53,7 @@ void PendingVertices<D>::Reserve(uint32_t vertices) {
 }
 
 template <int D>
-void PendingVertices<D>::Begin(const Demands<D>& criteria, std::span<const int16_t> first_buckets) {
+void PendingVertices<D>::Begin(const MeshCriteria<D>& criteria, std::span<const int16_t> first_buckets) {
   const auto count = static_cast<uint32_t>(first_buckets.size());
   memos_.assign(count, {});
   watchers_.Clear();
@@ -69,8 +69,8 @@ void PendingVertices<D>::Begin(const Demands<D>& criteria, std::span<const int16
 // or to a face of the box that p is not on; or the edge that stands for a size, if the least size that counts is as it
 // says.
 template <int D>
-double PendingVertices<D>::FirstEdgeSq(const Demands<D>& criteria, const Point<D>& p, FaceMask faces, double nearest_sq,
-                                       double size_sq) const {
+double PendingVertices<D>::FirstEdgeSq(const MeshCriteria<D>& criteria, const Point<D>& p, FaceMask faces,
+                                       double nearest_sq, double size_sq) const {
   double first_sq = nearest_sq;
   for (int face = 0; face < 2 * D; ++face) {
     if (((faces >> face) & 1) == 0) {

@@ -18,7 +18,7 @@
 #include "core/geometry/point.h"
 #include "core/refine/assessment.h"
 #include "core/refine/cell_memo.h"
-#include "core/refine/demands.h"
+#include "core/refine/criteria.h"
 #include "core/refine/face_watchers.h"
 #include "core/refine/neighbor_notice.h"
 #include "core/refine/schedule.h"
@@ -50,18 +50,18 @@ class PendingVertices {
   // Errors:     none; wrong once the context is cancelled.
   // Threads:    uses those of the team.
   // Source:     [HT08] Figure 4, lines 2 to 4.
-  HugeVector<int16_t> FirstBuckets(const Demands<D>& criteria, const RunContext& context, ThreadTeam& team) const;
+  HugeVector<int16_t> FirstBuckets(const MeshCriteria<D>& criteria, const RunContext& context, ThreadTeam& team) const;
 
   // Makes room for so many vertices.
   void Reserve(uint32_t vertices);
 
   // Forgets what is remembered of cells, and schedules all vertices for these criteria.
-  void Begin(const Demands<D>& criteria, std::span<const int16_t> first_buckets);
+  void Begin(const MeshCriteria<D>& criteria, std::span<const int16_t> first_buckets);
   // Forgets the criteria: all vertices have to be scheduled again.
   void End() { criteria_.reset(); }
 
   bool HasBegun() const { return criteria_.has_value(); }
-  bool HasBegunFor(const Demands<D>& criteria) const { return criteria_ == criteria; }
+  bool HasBegunFor(const MeshCriteria<D>& criteria) const { return criteria_ == criteria; }
 
   Schedule& schedule() { return schedule_; }
   const Schedule& schedule() const { return schedule_; }
@@ -136,7 +136,7 @@ class PendingVertices {
     kAll,
   };
 
-  double FirstEdgeSq(const Demands<D>& criteria, const Point<D>& p, FaceMask faces, double nearest_sq,
+  double FirstEdgeSq(const MeshCriteria<D>& criteria, const Point<D>& p, FaceMask faces, double nearest_sq,
                      double size_sq) const;
   double EdgeSqOf(double bound_sq) const { return bound_sq / (criteria_->rho * criteria_->rho); }
   void SetMemo(VertexId v, CellMemo memo, std::span<const WatchedNode<D>> watched = {});
@@ -144,7 +144,7 @@ class PendingVertices {
   void ScheduleCollected();
 
   const QueryStructure<D>& structure_;
-  std::optional<Demands<D>> criteria_;  // that all vertices have been scheduled for; none before, and after End
+  std::optional<MeshCriteria<D>> criteria_;  // that all vertices have been scheduled for; none before, and after End
   Schedule schedule_;
   HugeVector<CellMemo> memos_;     // by vertex
   FaceWatchers<D> watchers_;       // the vertices of whose faces an edge is remembered

@@ -31,8 +31,9 @@ Refinement<D>::Refinement(QueryStructure<D>& structure, double min_edge)
       checks_(structure) {}
 
 template <int D>
-absl::Status Refinement<D>::Run(const Demands<D>& criteria, uint64_t max_vertices, int threads, RunContext& context,
-                                const RefinementObserver<D>& observer, const VertexPredictor& predict) {
+absl::Status Refinement<D>::Run(const MeshCriteria<D>& criteria, uint64_t max_vertices, int threads,
+                                RunContext& context, const RefinementObserver<D>& observer,
+                                const VertexPredictor& predict) {
   ThreadTeam team(threads);
   rules_.emplace(structure_, criteria, min_edge_);
   max_vertices_ = max_vertices;
@@ -53,7 +54,8 @@ absl::Status Refinement<D>::Run(const Demands<D>& criteria, uint64_t max_vertice
 
 // Lines 2 to 4 of Figure 4, while another thread predicts how many vertices there will be.
 template <int D>
-absl::Status Refinement<D>::ScheduleAll(const Demands<D>& criteria, const VertexPredictor& predict, ThreadTeam& team) {
+absl::Status Refinement<D>::ScheduleAll(const MeshCriteria<D>& criteria, const VertexPredictor& predict,
+                                        ThreadTeam& team) {
   rounds_.Drop();
   structure_.AdmitWaiting();  // what was added before something was thrown
   absl::Status predicted;

@@ -10,7 +10,7 @@
 #include "absl/status/statusor.h"
 #include "core/base/run_context.h"
 #include "core/refine/cell_steps.h"
-#include "core/refine/demands.h"
+#include "core/refine/criteria.h"
 #include "core/refine/insertion.h"
 #include "core/refine/pending_vertices.h"
 #include "core/refine/refinement_checks.h"
@@ -66,7 +66,7 @@ class Refinement {
   //             left.
   // Threads:    uses `threads`, at most as many as the machine has cores, to speculate on the next vertices (ADR 23).
   // Source:     [HT08] Figure 4; see docs/design/refine.md.
-  absl::Status Run(const Demands<D>& criteria, uint64_t max_vertices, int threads, RunContext& context,
+  absl::Status Run(const MeshCriteria<D>& criteria, uint64_t max_vertices, int threads, RunContext& context,
                    const RefinementObserver<D>& observer = nullptr, const VertexPredictor& predict = nullptr);
 
   // Tells of the vertex `x`, which has been added to the structure from outside since the last run.
@@ -108,7 +108,7 @@ class Refinement {
     Refinement& refinement;
   };
 
-  absl::Status ScheduleAll(const Demands<D>& criteria, const VertexPredictor& predict, ThreadTeam& team);
+  absl::Status ScheduleAll(const MeshCriteria<D>& criteria, const VertexPredictor& predict, ThreadTeam& team);
   absl::Status Predict(const VertexPredictor& predict);
   void Reserve(uint32_t vertices);
   absl::Status Loop();

@@ -69,7 +69,7 @@ SteinerPoint<2> PointInPetal(VertexId v, const Polytope<2>& cell, const Assessme
 }  // namespace
 
 template <int D>
-StepRules<D>::StepRules(const QueryStructure<D>& structure, const Demands<D>& criteria, double min_edge)
+StepRules<D>::StepRules(const QueryStructure<D>& structure, const MeshCriteria<D>& criteria, double min_edge)
     : structure_(structure),
       criteria_(criteria),
       min_edge_(min_edge),

@@ -10,7 +10,7 @@
 #include "core/base/ids.h"
 #include "core/geometry/box.h"
 #include "core/refine/assessment.h"
-#include "core/refine/demands.h"
+#include "core/refine/criteria.h"
 #include "core/refine/face_watchers.h"
 #include "core/refine/insertion.h"
 #include "core/refine/neighbor_notice.h"
@@ -32,9 +32,9 @@ class StepRules {
   // No vertex is to be added nearer than `min_edge` to another.
   //
   // REQUIRES:   `structure` outlives this.
-  StepRules(const QueryStructure<D>& structure, const Demands<D>& criteria, double min_edge);
+  StepRules(const QueryStructure<D>& structure, const MeshCriteria<D>& criteria, double min_edge);
 
-  const Demands<D>& criteria() const { return criteria_; }
+  const MeshCriteria<D>& criteria() const { return criteria_; }
 
   // A cell is clipped at so many times the longest edge of its bucket.
   double clip_factor() const { return clip_factor_; }
@@ -82,7 +82,7 @@ class StepRules {
   bool IsAtBoundary(VertexId v, const Polytope<D>& cell, int node) const;
 
   const QueryStructure<D>& structure_;
-  const Demands<D> criteria_;
+  const MeshCriteria<D> criteria_;
   const double min_edge_;
   const double off_center_factor_;
   const double boundary_factor_;  // in the place of that at the boundary, for radius-edge

@@ -229,7 +229,7 @@ bool Mender::IsThere(const Sliver& sliver) const {
 // KeepsNearestNeighbours.
 bool Mender::IsAdmissible(const TetrahedronMeasure& measure, const std::array<VertexId, 4>& vertices,
                           VertexId moved) const {
-  const Demands<3>& demands = demands_.demands;
+  const MeshCriteria<3>& demands = demands_.demands;
   const double rho_sq = demands.rho * demands.rho;
   // Comparisons with NaN fail.
   if (!(measure.determinant > 0 && measure.radius_sq <= rho_sq * measure.edge_sq &&

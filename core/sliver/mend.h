@@ -10,7 +10,7 @@
 #include "absl/status/status.h"
 #include "core/base/huge_pages.h"
 #include "core/base/run_context.h"
-#include "core/refine/demands.h"
+#include "core/refine/criteria.h"
 #include "core/sliver/left_sliver.h"
 #include "core/sliver/tetrahedron.h"
 #include "core/sliver/triangulation.h"
@@ -18,7 +18,7 @@
 namespace wellspace::core {
 
 struct MendDemands {
-  Demands<3> demands;       // that the mesh keeps, and has to go on keeping
+  MeshCriteria<3> demands;  // that the mesh keeps, and has to go on keeping
   double min_dihedral = 0;  // degrees: a tetrahedron with a smaller dihedral angle is a sliver
   double min_edge = 0;      // no shorter edge is made
   uint64_t max_vertices = 0;

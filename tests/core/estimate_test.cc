@@ -24,7 +24,7 @@ namespace {
 using test::MakeStructure;
 
 template <int D>
-SizeEstimate Estimate(const QueryStructure<D>& structure, const Demands<D>& demands) {
+SizeEstimate Estimate(const QueryStructure<D>& structure, const MeshCriteria<D>& demands) {
   RunContext context;
   const absl::StatusOr<SizeEstimate> estimate = EstimateSize<D>(structure, demands, context);
   EXPECT_TRUE(estimate.ok()) << estimate.status();
@@ -32,8 +32,8 @@ SizeEstimate Estimate(const QueryStructure<D>& structure, const Demands<D>& dema
 }
 
 template <int D>
-Demands<D> RadiusEdge(double rho) {
-  Demands<D> demands;
+MeshCriteria<D> RadiusEdge(double rho) {
+  MeshCriteria<D> demands;
   demands.rho = rho;
   return demands;
 }
@@ -200,7 +200,7 @@ TYPED_TEST(EstimateTest, AGlanceIsRoughlyRight) {
 TYPED_TEST(EstimateTest, SizesAloneAskForVerticesByVolume) {
   constexpr int D = TypeParam::kValue;
   const QueryStructure<D> structure = MakeStructure<D>({});
-  Demands<D> demands = RadiusEdge<D>(2);
+  MeshCriteria<D> demands = RadiusEdge<D>(2);
   demands.sizes.max_circumradius = 0.04;
   const double coarse = Estimate<D>(structure, demands).vertices;
   demands.sizes.max_circumradius = 0.02;
@@ -220,7 +220,7 @@ TYPED_TEST(EstimateTest, SizesAloneAskForVerticesByVolume) {
 TYPED_TEST(EstimateTest, SizesLargerThanTheMeshHasAnywayChangeNothing) {
   constexpr int D = TypeParam::kValue;
   const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", 500));
-  Demands<D> demands = RadiusEdge<D>(2);
+  MeshCriteria<D> demands = RadiusEdge<D>(2);
   const double without = Estimate<D>(structure, demands).vertices;
   demands.sizes.max_circumradius = 10;
   EXPECT_NEAR(Estimate<D>(structure, demands).vertices, without, 0.02 * without);
@@ -229,7 +229,7 @@ TYPED_TEST(EstimateTest, SizesLargerThanTheMeshHasAnywayChangeNothing) {
 TYPED_TEST(EstimateTest, WellSpacedVerticesAreMore) {
   constexpr int D = TypeParam::kValue;
   const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", 500));
-  Demands<D> demands = RadiusEdge<D>(DefaultRho(D));
+  MeshCriteria<D> demands = RadiusEdge<D>(DefaultRho(D));
   const double radius_edge = Estimate<D>(structure, demands).vertices;
   demands.criterion = Criterion::kWellSpaced;
   EXPECT_GT(Estimate<D>(structure, demands).vertices, 1.5 * radius_edge);

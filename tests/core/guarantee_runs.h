@@ -71,7 +71,7 @@ struct Outcome {
 
 // Refines `input` with at most `multiple` times as many vertices as there are points, corners and leaves of the tree over them.
 template <int D>
-Outcome RefineInput(const Input<D>& input, const core::Demands<D>& demands, double multiple,
+Outcome RefineInput(const Input<D>& input, const core::MeshCriteria<D>& criteria, double multiple,
                     const std::function<void(const core::QueryStructure<D>&)>& begin = nullptr,
                     const core::RefinementObserver<D>& observer = nullptr) {
   core::RunContext context;
@@ -89,7 +89,7 @@ Outcome RefineInput(const Input<D>& input, const core::Demands<D>& demands, doub
   }
   const double budget = multiple * static_cast<double>(outcome.before + outcome.leaves);
   core::Refinement<D> refinement(structure, LeastSeparation<D>(input.box) / 16);
-  outcome.status = refinement.Run(demands, static_cast<uint64_t>(budget), 2, context, observer);
+  outcome.status = refinement.Run(criteria, static_cast<uint64_t>(budget), 2, context, observer);
   outcome.vertices = structure.vertex_count();
   return outcome;
 }
@@ -107,11 +107,12 @@ inline constexpr double kBudget = 25;
 
 // Refines under the eyes of a checker.
 template <int D>
-typename GuaranteeChecker<D>::Seen ExpectGuarantees(const Input<D>& input, const core::Demands<D>& demands,
+typename GuaranteeChecker<D>::Seen ExpectGuarantees(const Input<D>& input, const core::MeshCriteria<D>& criteria,
                                                     int stride) {
   std::optional<GuaranteeChecker<D>> checker;
   const Outcome outcome = RefineInput<D>(
-      input, demands, kBudget, [&](const core::QueryStructure<D>& before) { checker.emplace(before, demands, stride); },
+      input, criteria, kBudget,
+      [&](const core::QueryStructure<D>& before) { checker.emplace(before, criteria, stride); },
       [&](const core::QueryStructure<D>& structure, const core::Insertion& insertion) {
         checker->Observe(structure, insertion);
       });

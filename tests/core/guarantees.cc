@@ -15,9 +15,9 @@ namespace {
 using core::Box;
 using core::CellNode;
 using core::Criterion;
-using core::Demands;
 using core::Index;
 using core::Insertion;
+using core::MeshCriteria;
 using core::Plane;
 using core::PlaneKind;
 using core::Point;
@@ -90,9 +90,9 @@ double FeatureSize(const Box<D>& box, const std::vector<Point<D>>& features, con
 }
 
 template <int D>
-SizeConstants<D> SizeConstants<D>::Of(const Demands<D>& demands) {
-  const double rho = demands.rho;
-  const double own = demands.criterion == Criterion::kWellSpaced ? 1 + 1 / rho : 1;
+SizeConstants<D> SizeConstants<D>::Of(const MeshCriteria<D>& criteria) {
+  const double rho = criteria.rho;
+  const double own = criteria.criterion == Criterion::kWellSpaced ? 1 + 1 / rho : 1;
   SizeConstants constants;
   constants.away = own / (1 - 1 / rho);
   // touched[0] = own + touched[D-1] / rho; touched[k] = sqrt 2 touched[k-1] + 1.
@@ -102,7 +102,7 @@ SizeConstants<D> SizeConstants<D>::Of(const Demands<D>& demands) {
     factor *= std::sqrt(2.0);
     added = std::sqrt(2.0) * added + 1;
   }
-  if (!demands.sizes.IsUnbounded()) {  // these may ask for more than the features do
+  if (!criteria.sizes.IsUnbounded()) {  // these may ask for more than the features do
     constants.away = kNone;
     factor = kNone;
   }
@@ -115,7 +115,7 @@ SizeConstants<D> SizeConstants<D>::Of(const Demands<D>& demands) {
 }
 
 template <int D>
-Waiting ShortestWaiting(const QueryStructure<D>& structure, const Demands<D>& demands) {
+Waiting ShortestWaiting(const QueryStructure<D>& structure, const MeshCriteria<D>& criteria) {
   Waiting waiting;
   Polytope<D> cell;
   std::vector<std::pair<double, uint32_t>> others;
@@ -138,11 +138,11 @@ Waiting ShortestWaiting(const QueryStructure<D>& structure, const Demands<D>& de
           }
         }
       }
-      if (demands.criterion == Criterion::kWellSpaced) {
+      if (criteria.criterion == Criterion::kWellSpaced) {
         edge = nearest;
       }
       Waiting::Edge& shortest = structure.faces(VertexId{v}) == 0 ? waiting.inner : waiting.outer;
-      if (is_circumcenter && std::sqrt(node.radius_sq) > demands.rho * edge * (1 + 1e-9) && edge < shortest.length) {
+      if (is_circumcenter && std::sqrt(node.radius_sq) > criteria.rho * edge * (1 + 1e-9) && edge < shortest.length) {
         shortest = {edge, v};
       }
     }
@@ -151,8 +151,8 @@ Waiting ShortestWaiting(const QueryStructure<D>& structure, const Demands<D>& de
 }
 
 template <int D>
-GuaranteeChecker<D>::GuaranteeChecker(const QueryStructure<D>& before, const Demands<D>& demands, int stride)
-    : demands_(demands), stride_(stride), next_sample_(stride), constants_(SizeConstants<D>::Of(demands)) {
+GuaranteeChecker<D>::GuaranteeChecker(const QueryStructure<D>& before, const MeshCriteria<D>& criteria, int stride)
+    : criteria_(criteria), stride_(stride), next_sample_(stride), constants_(SizeConstants<D>::Of(criteria)) {
   for (uint32_t v = 0; v < before.vertex_count(); ++v) {
     features_.push_back(before.point(VertexId{v}));
   }
@@ -185,7 +185,7 @@ void GuaranteeChecker<D>::Observe(const QueryStructure<D>& structure, const Inse
   has_waiting_ = ++seen_.insertions >= next_sample_;
   if (has_waiting_) {
     next_sample_ = seen_.insertions + std::max(stride_, seen_.insertions / 2);
-    waiting_ = ShortestWaiting<D>(structure, demands_);
+    waiting_ = ShortestWaiting<D>(structure, criteria_);
   }
 }
 
@@ -213,7 +213,7 @@ void GuaranteeChecker<D>::CheckPlace(const QueryStructure<D>& structure, const I
   Expect(nearest >= radius - slack, insertion, "its ball of radius ", radius, " holds a vertex at ", nearest);
 
   // The candidate was at least this far; each face that it was projected on takes a factor sqrt 2, or the box is thin.
-  const double least = encroaches ? edge : demands_.rho * edge;
+  const double least = encroaches ? edge : criteria_.rho * edge;
   const int projections = encroaches ? faces - 1 : faces;
   const double thin = structure.box().ShortestSide() * std::pow(2.0, -0.5 * (D - 2));
   Expect(radius >= std::min(least * std::pow(2.0, -0.5 * projections), thin) - slack, insertion, "its distance ",
@@ -221,16 +221,16 @@ void GuaranteeChecker<D>::CheckPlace(const QueryStructure<D>& structure, const I
   if (faces == 0) {
     // For a triangle it may be in the cell of the other end of the edge.
     const bool may_be_of_other =
-        D == 2 && insertion.reason == Reason::kRatio && demands_.criterion == Criterion::kRadiusEdge;
+        D == 2 && insertion.reason == Reason::kRatio && criteria_.criterion == Criterion::kRadiusEdge;
     const double from_site = may_be_of_other ? std::min(from_near, from_other) : from_near;
     Expect(std::abs(from_site - nearest) <= slack, insertion, "it is not in the cell, ", from_site, " instead of ",
            nearest, " away");
     Expect(from_near >= least - slack, insertion, "at ", from_near, " it is nearer than ", least);
   }
-  const double most = std::sqrt(D) * ClipFactor(demands_.rho) * limit;
+  const double most = std::sqrt(D) * ClipFactor(criteria_.rho) * limit;
   Expect(from_near <= most + std::sqrt(std::max(0.0, most * most - radius * radius)) + slack, insertion, "at ",
          from_near, " it is farther than a node can be, ", most);
-  if (insertion.reason == Reason::kRatio && demands_.criterion == Criterion::kRadiusEdge &&
+  if (insertion.reason == Reason::kRatio && criteria_.criterion == Criterion::kRadiusEdge &&
       structure.faces(insertion.near) == 0) {
     Expect(edge >= kGamma * limit * (1 - 1e-9), insertion, "edge ", edge, " is of an earlier bucket than that of ",
            limit);
@@ -250,7 +250,7 @@ void GuaranteeChecker<D>::CheckSize(const QueryStructure<D>& structure, const In
   if (faces == 0 && insertion.reason == Reason::kRatio) {
     // The other end of the edge that asked: for well-spaced, the nearest vertex.
     VertexId other = insertion.other;
-    if (demands_.criterion == Criterion::kWellSpaced) {
+    if (criteria_.criterion == Criterion::kWellSpaced) {
       double nearest = kNone;
       for (uint32_t w = 0; w < Index(insertion.vertex); ++w) {
         const double distance = core::DistanceSq<D>(structure.point(insertion.near), structure.point(VertexId{w}));
@@ -289,14 +289,14 @@ void GuaranteeChecker<D>::CheckOrder(const Insertion& insertion) {
            waiting.vertex, " waited for ", what, " ", waiting.length);
   };
   expect(waiting_.inner, kGamma, "one of");
-  expect(waiting_.outer, kGammaOuter / ClipFactor(demands_.rho), "one of");
+  expect(waiting_.outer, kGammaOuter / ClipFactor(criteria_.rho), "one of");
   expect(waiting_.face, kGammaFace, "a face at");
 }
 
 #define WELLSPACE_INSTANTIATE(D)                                                                \
   template double FeatureSize<D>(const Box<D>&, const std::vector<Point<D>>&, const Point<D>&); \
   template struct SizeConstants<D>;                                                             \
-  template Waiting ShortestWaiting<D>(const QueryStructure<D>&, const Demands<D>&);             \
+  template Waiting ShortestWaiting<D>(const QueryStructure<D>&, const MeshCriteria<D>&);        \
   template class GuaranteeChecker<D>
 WELLSPACE_INSTANTIATE(2);
 WELLSPACE_INSTANTIATE(3);

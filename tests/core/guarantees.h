@@ -23,7 +23,7 @@ struct SizeConstants {
   double away = 0;
   std::array<double, D> touched{};
 
-  static SizeConstants Of(const core::Demands<D>& demands);
+  static SizeConstants Of(const core::MeshCriteria<D>& criteria);
 };
 
 // What Definition 1 (2) is about: the shortest edge that a vertex asks for something by.
@@ -39,7 +39,7 @@ struct Waiting {
 
 // The least of each over all vertices, from whole cells by brute force.
 template <int D>
-Waiting ShortestWaiting(const core::QueryStructure<D>& structure, const core::Demands<D>& demands);
+Waiting ShortestWaiting(const core::QueryStructure<D>& structure, const core::MeshCriteria<D>& criteria);
 
 // An observer of refinements. The first guarantee that does not hold is kept in violation().
 template <int D>
@@ -56,7 +56,7 @@ class GuaranteeChecker {
   };
 
   // Condition (2) is checked after each `stride` insertions; after half as many as there were so far, if that is more.
-  GuaranteeChecker(const core::QueryStructure<D>& before, const core::Demands<D>& demands, int stride);
+  GuaranteeChecker(const core::QueryStructure<D>& before, const core::MeshCriteria<D>& criteria, int stride);
 
   void Observe(const core::QueryStructure<D>& structure, const core::Insertion& insertion);
 
@@ -75,7 +75,7 @@ class GuaranteeChecker {
   template <typename... Text>
   void Expect(bool holds, const core::Insertion& insertion, const Text&... text);
 
-  const core::Demands<D> demands_;
+  const core::MeshCriteria<D> criteria_;
   const int stride_;
   int next_sample_;
   const SizeConstants<D> constants_;

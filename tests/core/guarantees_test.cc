@@ -20,9 +20,9 @@ namespace wellspace::test {
 namespace {
 
 using core::Criterion;
-using core::Demands;
 using core::Insertion;
 using core::Mesh;
+using core::MeshCriteria;
 using core::MeshParameters;
 using core::Point;
 using core::QueryStructure;
@@ -72,11 +72,11 @@ TYPED_TEST(GuaranteesTest, AtEveryInsertionBelowTheLeastRho) {
   for (const Criterion criterion : kCriteria) {
     for (const std::string_view kind : {"uniform", "boundary", "lines"}) {
       SCOPED_TRACE(std::string(kind) + " " + Name(criterion));
-      const Demands<D> demands{.criterion = criterion, .rho = D == 2 ? 1.05 : 1.4, .sizes = {}};
+      const MeshCriteria<D> criteria{.criterion = criterion, .rho = D == 2 ? 1.05 : 1.4, .sizes = {}};
       std::optional<GuaranteeChecker<D>> checker;
       RefineInput<D>(
-          MakeInput<D>(kind, "unit", 12, this->seed_), demands, 40,
-          [&](const QueryStructure<D>& before) { checker.emplace(before, demands, 41); },
+          MakeInput<D>(kind, "unit", 12, this->seed_), criteria, 40,
+          [&](const QueryStructure<D>& before) { checker.emplace(before, criteria, 41); },
           [&](const QueryStructure<D>& structure, const Insertion& insertion) {
             checker->Observe(structure, insertion);
           });
@@ -93,8 +93,8 @@ TYPED_TEST(GuaranteesTest, AtEveryInsertionBelowTheLeastRho) {
 TYPED_TEST(GuaranteesTest, EdgesOnFacesAreNotServedLate) {
   constexpr int D = TypeParam::kValue;
   double worst = 1;
-  const Demands<D> demands{.rho = LeastRho<D>(), .sizes = {}};
-  const Outcome outcome = RefineInput<D>(MakeInput<D>("near-corners", "unit", 12, 0), demands, kBudget, nullptr,
+  const MeshCriteria<D> criteria{.rho = LeastRho<D>(), .sizes = {}};
+  const Outcome outcome = RefineInput<D>(MakeInput<D>("near-corners", "unit", 12, 0), criteria, kBudget, nullptr,
                                          [&](const QueryStructure<D>&, const Insertion& insertion) {
                                            if (insertion.reason == core::Reason::kRatio) {
                                              worst = std::min(worst, insertion.edge_sq / insertion.edge_limit_sq);
@@ -107,10 +107,10 @@ TYPED_TEST(GuaranteesTest, EdgesOnFacesAreNotServedLate) {
 // The bound away from the boundary is not far off: points along a line come near it.
 TYPED_TEST(GuaranteesTest, TheConstantIsNearlyReached) {
   constexpr int D = TypeParam::kValue;
-  const Demands<D> demands{.rho = LeastRho<D>(), .sizes = {}};
+  const MeshCriteria<D> criteria{.rho = LeastRho<D>(), .sizes = {}};
   double reached = 0;
   for (const std::string_view kind : {"pairs", "clusters", "collinear"}) {
-    const auto seen = ExpectGuarantees<D>(MakeInput<D>(kind, "unit", 20, this->seed_), demands, 1000);
+    const auto seen = ExpectGuarantees<D>(MakeInput<D>(kind, "unit", 20, this->seed_), criteria, 1000);
     reached = std::max(reached, seen.reached);
   }
   EXPECT_GT(reached, 0.5);
@@ -119,7 +119,7 @@ TYPED_TEST(GuaranteesTest, TheConstantIsNearlyReached) {
 // A checker that is told of other insertions than those that were made finds each of them wrong.
 TYPED_TEST(GuaranteesTest, AnInsertionOutOfOrderIsSeen) {
   constexpr int D = TypeParam::kValue;
-  const Demands<D> demands{.rho = LeastRho<D>(), .sizes = {}};
+  const MeshCriteria<D> criteria{.rho = LeastRho<D>(), .sizes = {}};
   struct Mutation {
     std::string_view complaint;
     std::function<void(Insertion&)> apply;
@@ -146,8 +146,8 @@ TYPED_TEST(GuaranteesTest, AnInsertionOutOfOrderIsSeen) {
     for (uint64_t seed = 0; seed < 5; ++seed) {
       std::optional<GuaranteeChecker<D>> checker;
       RefineInput<D>(
-          MakeInput<D>("inner", "unit", 30, seed), demands, kBudget,
-          [&](const QueryStructure<D>& before) { checker.emplace(before, demands, 1000); },
+          MakeInput<D>("inner", "unit", 30, seed), criteria, kBudget,
+          [&](const QueryStructure<D>& before) { checker.emplace(before, criteria, 1000); },
           [&](const QueryStructure<D>& structure, const Insertion& insertion) {
             observe(checker, structure, insertion);
           });
@@ -173,15 +173,15 @@ TYPED_TEST(GuaranteesTest, WaitingEdgesAreSeen) {
   points = MortonSorted<D>(UnitBox<D>(), points);
   ASSERT_TRUE(
       structure.Initialize(core::MortonGrid<D>(UnitBox<D>()), {points.begin(), points.end()}, 1000, 1, context).ok());
-  const Demands<D> demands{.rho = 2, .sizes = {}};
-  EXPECT_NEAR(ShortestWaiting<D>(structure, demands).inner.length, 1e-3, 1e-12);
+  const MeshCriteria<D> criteria{.rho = 2, .sizes = {}};
+  EXPECT_NEAR(ShortestWaiting<D>(structure, criteria).inner.length, 1e-3, 1e-12);
   EXPECT_NEAR(ShortestWaiting<D>(structure, {.criterion = Criterion::kWellSpaced, .rho = 2, .sizes = {}}).inner.length,
               1e-3, 1e-12);
-  EXPECT_NEAR(ShortestWaiting<D>(structure, demands).face.length, 0.2, 1e-12);
+  EXPECT_NEAR(ShortestWaiting<D>(structure, criteria).face.length, 0.2, 1e-12);
   EXPECT_EQ(ShortestWaiting<D>(structure, {.rho = 1e6, .sizes = {}}).inner.length,
             std::numeric_limits<double>::infinity());
 
-  GuaranteeChecker<D> checker(structure, demands, 1);
+  GuaranteeChecker<D> checker(structure, criteria, 1);
   const auto add = [&](uint32_t near, double edge) {
     Point<D> x = structure.point(VertexId{near});
     x[D - 1] -= 2.5 * edge;
@@ -348,15 +348,15 @@ TYPED_TEST(GuaranteesTest, AtEveryInsertionWithSizes) {
   constexpr int D = TypeParam::kValue;
   for (const std::string_view kind : {"none", "uniform", "boundary", "near-faces", "pairs"}) {
     SCOPED_TRACE(std::string(kind));
-    Demands<D> demands{.rho = LeastRho<D>(), .sizes = {}};
-    demands.sizes.max_circumradius = D == 2 ? 0.05 : 0.2;
+    MeshCriteria<D> criteria{.rho = LeastRho<D>(), .sizes = {}};
+    criteria.sizes.max_circumradius = D == 2 ? 0.05 : 0.2;
     core::Box<D> region = UnitBox<D>();
     region.high.fill(0.2);
-    demands.sizes.regions.push_back({region, D == 2 ? 0.01 : 0.08});
+    criteria.sizes.regions.push_back({region, D == 2 ? 0.01 : 0.08});
     std::optional<GuaranteeChecker<D>> checker;
     const Outcome outcome = RefineInput<D>(
-        MakeInput<D>(kind, "unit", 8, this->seed_), demands, 1e6,
-        [&](const QueryStructure<D>& before) { checker.emplace(before, demands, 53); },
+        MakeInput<D>(kind, "unit", 8, this->seed_), criteria, 1e6,
+        [&](const QueryStructure<D>& before) { checker.emplace(before, criteria, 53); },
         [&](const QueryStructure<D>& structure, const Insertion& insertion) {
           checker->Observe(structure, insertion);
         });

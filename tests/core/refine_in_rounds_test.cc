@@ -1,4 +1,4 @@
-// Refinement of clouds that are large enough for many rounds: several threads look ahead, and nobody sees it.
+// Refinement of clouds that are large enough for many rounds: several threads speculate, and the mesh does not tell.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -29,7 +29,7 @@ constexpr uint64_t kMany = 1'000'000;
 constexpr double kMinEdge = 0x1p-48;
 constexpr size_t kPoints = 4000;
 
-Demands<2> PlainDemands() { return {.rho = std::sqrt(2.0)}; }
+MeshCriteria<2> PlainCriteria() { return {.rho = std::sqrt(2.0)}; }
 
 template <int D>
 struct RefinedIn {
@@ -85,22 +85,22 @@ void ExpectIsListed(const Refined& refined, VertexId v, const Polytope<2>& cell)
 
 // On several threads, and stopped now and then on one and on two.
 template <int D>
-void ExpectSameHoweverItIsRun(const std::vector<Point<D>>& cloud, const Demands<D>& demands, uint64_t most_at_once,
-                              test::SplitMix64& random) {
+void ExpectSameHoweverItIsRun(const std::vector<Point<D>>& cloud, const MeshCriteria<D>& criteria,
+                              uint64_t most_at_once, test::SplitMix64& random) {
   RefinedIn<D> expected(cloud);
   RunContext context;
-  ASSERT_TRUE(expected.refinement.Run(demands, kMany, 1, context).ok());
+  ASSERT_TRUE(expected.refinement.Run(criteria, kMany, 1, context).ok());
   for (const int threads : {2, 4}) {
     SCOPED_TRACE(threads);
     RefinedIn<D> actual(cloud);
-    ASSERT_TRUE(actual.refinement.Run(demands, kMany, threads, context).ok());
+    ASSERT_TRUE(actual.refinement.Run(criteria, kMany, threads, context).ok());
     ExpectSame<D>(actual, expected);
   }
   RefinedIn<D> stopped(cloud);
   absl::Status status = absl::UnknownError("not begun");
   while (!status.ok()) {
     const uint64_t budget = stopped.structure.vertex_count() + 1 + random.Below(most_at_once);
-    status = stopped.refinement.Run(demands, budget, 1 + static_cast<int>(random.Below(2)), context);
+    status = stopped.refinement.Run(criteria, budget, 1 + static_cast<int>(random.Below(2)), context);
     if (!status.ok()) {
       ASSERT_THAT(std::string(status.message()), HasSubstr("max_vertices = " + std::to_string(budget)));
       ASSERT_EQ(stopped.structure.vertex_count(), budget);
@@ -120,32 +120,32 @@ INSTANTIATE_TEST_SUITE_P(Clouds, RefineInRoundsTest,
                          [](const auto& kind) { return std::string(kind.param); });
 
 TEST_P(RefineInRoundsTest, IsTheSameForAnyNumberOfThreadsAndHoweverOftenItIsStopped) {
-  Demands<2> tight = PlainDemands();
+  MeshCriteria<2> tight = PlainCriteria();
   tight.rho = 1;
-  Demands<2> sized = PlainDemands();
+  MeshCriteria<2> sized = PlainCriteria();
   sized.sizes = {.max_circumradius = 0.02, .regions = {{{{0.2, 0.3}, {0.4, 0.5}}, 0.004}}};
-  Demands<2> well_spaced = PlainDemands();
+  MeshCriteria<2> well_spaced = PlainCriteria();
   well_spaced.criterion = Criterion::kWellSpaced;
-  for (const Demands<2>& demands : {PlainDemands(), tight, sized, well_spaced}) {
-    SCOPED_TRACE(demands.rho);
-    SCOPED_TRACE(demands.sizes.max_circumradius);
-    ExpectSameHoweverItIsRun<2>(cloud_, demands, 200, random_);
+  for (const MeshCriteria<2>& criteria : {PlainCriteria(), tight, sized, well_spaced}) {
+    SCOPED_TRACE(criteria.rho);
+    SCOPED_TRACE(criteria.sizes.max_circumradius);
+    ExpectSameHoweverItIsRun<2>(cloud_, criteria, 200, random_);
     ASSERT_FALSE(HasFatalFailure());
   }
 }
 
 TEST_P(RefineInRoundsTest, IsTheSameIn3d) {
   const std::vector<Point<3>> cloud = test::SortedCloud<3>(GetParam(), kPoints / 4);
-  Demands<3> well_spaced{.rho = 2};
+  MeshCriteria<3> well_spaced{.rho = 2};
   well_spaced.criterion = Criterion::kWellSpaced;
-  for (const Demands<3>& demands : {Demands<3>{.rho = 2}, well_spaced}) {
-    ExpectSameHoweverItIsRun<3>(cloud, demands, 400, random_);
+  for (const MeshCriteria<3>& criteria : {MeshCriteria<3>{.rho = 2}, well_spaced}) {
+    ExpectSameHoweverItIsRun<3>(cloud, criteria, 400, random_);
     ASSERT_FALSE(HasFatalFailure());
   }
 }
 
-// One stretch is a vertex longer than a number of packets, and ends after all others.
-TEST(RefineInRoundsAloneTest, TheLongestStretchIsServedToItsEnd) {
+// One segment is a vertex longer than a number of batches, and ends after all others.
+TEST(RefineInRoundsAloneTest, TheLongestSegmentIsRefinedToItsEnd) {
   constexpr int kColumns = 41;
   constexpr int kRows = 25;
   static_assert(kColumns * kRows == 8 * 128 + 1);
@@ -156,10 +156,10 @@ TEST(RefineInRoundsAloneTest, TheLongestStretchIsServedToItsEnd) {
   cloud = test::MortonSorted<2>(test::UnitBox<2>(), cloud);
   Refined expected(cloud);
   RunContext context;
-  ASSERT_TRUE(expected.refinement.Run(PlainDemands(), kMany, 1, context).ok());
+  ASSERT_TRUE(expected.refinement.Run(PlainCriteria(), kMany, 1, context).ok());
   for (int repeat = 0; repeat < 5; ++repeat) {
     Refined actual(cloud);
-    ASSERT_TRUE(actual.refinement.Run(PlainDemands(), kMany, 2, context).ok());
+    ASSERT_TRUE(actual.refinement.Run(PlainCriteria(), kMany, 2, context).ok());
     ExpectSame<2>(actual, expected);
     ASSERT_FALSE(HasFatalFailure());
   }
@@ -181,18 +181,18 @@ TEST_P(RefineInRoundsTest, EveryCellIsGoodInTheEnd) {
     }
     ExpectIsFar(structure, insertion, workspace);
   };
-  ASSERT_TRUE(refined.refinement.Run(PlainDemands(), kMany, 2, context, observer).ok());
+  ASSERT_TRUE(refined.refinement.Run(PlainCriteria(), kMany, 2, context, observer).ok());
   ASSERT_EQ(refined.structure.vertex_count(), vertices);
   Polytope<2> cell;
   for (uint32_t v = static_cast<uint32_t>(random_.Below(20)); v < vertices; v += 20) {
-    ExpectRefined<2>(refined.structure, VertexId{v}, PlainDemands().rho, cell);
+    ExpectRefined<2>(refined.structure, VertexId{v}, PlainCriteria().rho, cell);
     ASSERT_FALSE(HasFatalFailure());
     ExpectIsListed(refined, VertexId{v}, cell);
     ASSERT_FALSE(HasFatalFailure());
   }
 }
 
-// Where the refinement is at work, so that what would have been foreseen does not hold any more.
+// Where the refinement is at work, so that records are no longer valid.
 TEST_P(RefineInRoundsTest, IsToldOfVerticesThatOthersAddWhileItIsStopped) {
   Refined refined(cloud_);
   RunContext context;
@@ -203,7 +203,7 @@ TEST_P(RefineInRoundsTest, IsToldOfVerticesThatOthersAddWhileItIsStopped) {
   absl::Status status = absl::UnknownError("not begun");
   while (!status.ok()) {
     const uint64_t budget = refined.structure.vertex_count() + 1 + random_.Below(50);
-    status = refined.refinement.Run(PlainDemands(), budget, 2, context, observer);
+    status = refined.refinement.Run(PlainCriteria(), budget, 2, context, observer);
     ASSERT_FALSE(HasFatalFailure());
     const VertexId last{refined.structure.vertex_count() - 1};
     const double angle = 2 * std::numbers::pi * random_.Unit();
@@ -220,17 +220,18 @@ TEST_P(RefineInRoundsTest, IsToldOfVerticesThatOthersAddWhileItIsStopped) {
   }
   Polytope<2> cell;
   for (uint32_t v = 0; v < refined.structure.vertex_count(); v += 20) {
-    ExpectRefined<2>(refined.structure, VertexId{v}, PlainDemands().rho, cell);
+    ExpectRefined<2>(refined.structure, VertexId{v}, PlainCriteria().rho, cell);
     ASSERT_FALSE(HasFatalFailure());
   }
 }
 
-TEST_P(RefineInRoundsTest, OtherDemandsMayFollowWhileItIsStopped) {
+TEST_P(RefineInRoundsTest, OtherCriteriaMayFollowWhileItIsStopped) {
   Refined refined(cloud_);
   RunContext context;
-  const absl::Status status = refined.refinement.Run(PlainDemands(), refined.structure.vertex_count() + 50, 2, context);
+  const absl::Status status =
+      refined.refinement.Run(PlainCriteria(), refined.structure.vertex_count() + 50, 2, context);
   EXPECT_EQ(status.code(), absl::StatusCode::kResourceExhausted);
-  const Demands<2> tighter{.rho = 1.1};
+  const MeshCriteria<2> tighter{.rho = 1.1};
   ASSERT_TRUE(refined.refinement.Run(tighter, kMany, 2, context).ok());
   Polytope<2> cell;
   for (uint32_t v = 0; v < refined.structure.vertex_count(); v += 20) {

@@ -386,7 +386,7 @@ TEST(ScheduleTest, BehavesAsItsModel) {
   }
 }
 
-TEST(ScheduleTest, WhoIsLiftedWaitsUntilItIsTakenOrPutBack) {
+TEST(ScheduleTest, WhatIsDetachedIsPendingUntilItIsTakenOrReattached) {
   Schedule schedule(1);
   for (uint32_t v = 0; v < 6; ++v) {
     schedule.AddToBucket(VertexId{v}, 3);
@@ -395,14 +395,14 @@ TEST(ScheduleTest, WhoIsLiftedWaitsUntilItIsTakenOrPutBack) {
   VertexId v{};
   int bucket = 0;
   ASSERT_TRUE(schedule.Pop(v, bucket));
-  schedule.AddToBucket(v, 3);  // which it had before: once more in the list, but waiting once
+  schedule.AddToBucket(v, 3);  // which it had before: once more in the list, but pending once
   EXPECT_EQ(schedule.Lowest(), 3);
-  const HugeVector<VertexId> lifted = schedule.Detach(3);
-  EXPECT_THAT(lifted, ElementsAre(VertexId{0}, VertexId{1}, VertexId{2}, VertexId{3}, VertexId{5}, VertexId{4}));
+  const HugeVector<VertexId> detached = schedule.Detach(3);
+  EXPECT_THAT(detached, ElementsAre(VertexId{0}, VertexId{1}, VertexId{2}, VertexId{3}, VertexId{5}, VertexId{4}));
   EXPECT_EQ(schedule.size(), 6);
   EXPECT_FALSE(schedule.HasBelow(3));
-  EXPECT_EQ(schedule.Lowest(), -1) << "who is lifted has no place in the order";
-  for (const VertexId u : lifted) {
+  EXPECT_EQ(schedule.Lowest(), -1) << "what is detached has no place in the order";
+  for (const VertexId u : detached) {
     EXPECT_TRUE(schedule.IsPendingIn(u, 3));
   }
   schedule.AddToBucket(VertexId{1}, 1);  // moves down
@@ -419,7 +419,7 @@ TEST(ScheduleTest, WhoIsLiftedWaitsUntilItIsTakenOrPutBack) {
   schedule.Take(VertexId{0});
   schedule.AddToBucket(VertexId{0}, 1);
   schedule.DetachAgain(VertexId{0}, 3);
-  EXPECT_TRUE(schedule.Pop(v, bucket, 3)) << "it waits below";
+  EXPECT_TRUE(schedule.Pop(v, bucket, 3)) << "it is pending below";
   EXPECT_EQ(v, VertexId{0});
   schedule.Reattach(VertexId{5}, 3);
   schedule.Reattach(VertexId{2}, 3);
@@ -431,7 +431,7 @@ TEST(ScheduleTest, WhoIsLiftedWaitsUntilItIsTakenOrPutBack) {
     EXPECT_EQ(bucket, 3);
   }
   EXPECT_FALSE(schedule.Pop(v, bucket));
-  EXPECT_EQ(schedule.size(), 2) << "3 and 4 are lifted still";
+  EXPECT_EQ(schedule.size(), 2) << "3 and 4 are detached still";
   schedule.AddToBucket(VertexId{6}, 3);
   schedule.AddToBucket(VertexId{6}, 1);
   EXPECT_EQ(schedule.MostIn(3), 1);

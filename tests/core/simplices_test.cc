@@ -241,7 +241,7 @@ class StarsOfRefinementTest : public test::SeededTest {
 
   // Without an observer vertices wait to be admitted, on two threads.
   template <int D>
-  void ExpectThoseOfCellsWithinBudgets(const Demands<D>& demands) {
+  void ExpectThoseOfCellsWithinBudgets(const MeshCriteria<D>& demands) {
     QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", D == 2 ? 400 : 100));
     Refinement<D> refinement(structure, 0x1p-48);
     absl::Status status = absl::ResourceExhaustedError("");
