@@ -2,7 +2,6 @@
 #ifndef WELLSPACE_SERVER_CALL_ENVIRONMENT_H_
 #define WELLSPACE_SERVER_CALL_ENVIRONMENT_H_
 
-#include <functional>
 #include <span>
 
 #include "absl/status/statusor.h"
@@ -12,22 +11,15 @@
 #include "server/call_registry.h"
 #include "server/jobs.h"
 #include "server/memory_budget.h"
+#include "server/mesh_functions.h"
 #include "server/observability.h"
 #include "server/options.h"
-#include "server/replay.h"
 #include "spdlog/logger.h"
 
 namespace wellspace::server {
 
 class RequestIds;
 class SessionStore;
-
-// What meshes: core::MeshPoints, or what a test puts in its place.
-using Mesher =
-    std::function<absl::StatusOr<core::Mesh>(const core::MeshParameters&, std::span<const double>, core::RunContext&)>;
-// What estimates: core::EstimateMesh, or what a test puts in its place.
-using Estimator = std::function<absl::StatusOr<core::MeshEstimate>(const core::MeshParameters&, std::span<const double>,
-                                                                   core::RunContext&)>;
 
 // What all calls share; outlives them.
 struct CallEnvironment {

@@ -2,7 +2,6 @@
 #ifndef WELLSPACE_SERVER_REPLAY_H_
 #define WELLSPACE_SERVER_REPLAY_H_
 
-#include <functional>
 #include <memory>
 #include <span>
 
@@ -11,14 +10,11 @@
 #include "core/mesh_parameters.h"
 #include "core/mesher.h"
 #include "server/jobs.h"
+#include "server/mesh_functions.h"
 #include "server/point_store.h"
 #include "server/session_steps.h"
 
 namespace wellspace::server {
-
-// What begins the mesh of a session: core::Mesher::Create, or what a test puts in its place.
-using MesherFactory = std::function<absl::StatusOr<std::unique_ptr<core::Mesher>>(
-    const core::MeshParameters&, std::span<const double>, core::RunContext&)>;
 
 // Takes `steps` again, from the first on, in the work of `job` but apart from its context. `last_mesh` is the mesh of
 // the last refinement among them.
