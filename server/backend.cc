@@ -2,8 +2,8 @@
 
 #include <utility>
 
-#include "server/clock.h"
-#include "server/log_fields.h"
+#include "server/base/clock.h"
+#include "server/log/log_fields.h"
 
 namespace wellspace::server {
 namespace {

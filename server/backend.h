@@ -4,16 +4,16 @@
 
 #include <memory>
 
-#include "server/authenticator.h"
-#include "server/background.h"
-#include "server/call_environment.h"
-#include "server/call_registry.h"
-#include "server/jobs.h"
-#include "server/memory_budget.h"
-#include "server/memory_session_store.h"
-#include "server/observability.h"
-#include "server/options.h"
-#include "server/request_ids.h"
+#include "server/base/options.h"
+#include "server/calls/call_environment.h"
+#include "server/calls/call_registry.h"
+#include "server/calls/request_ids.h"
+#include "server/jobs/background.h"
+#include "server/jobs/jobs.h"
+#include "server/jobs/memory_budget.h"
+#include "server/observability/observability.h"
+#include "server/security/authenticator.h"
+#include "server/sessions/memory_session_store.h"
 #include "spdlog/logger.h"
 
 namespace wellspace::server {

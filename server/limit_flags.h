@@ -6,7 +6,7 @@
 
 #include "CLI/CLI.hpp"
 #include "absl/time/time.h"
-#include "server/options.h"
+#include "server/base/options.h"
 #include "server/server.h"
 
 namespace wellspace::server {

@@ -17,16 +17,16 @@
 
 #include "CLI/CLI.hpp"
 #include "absl/time/time.h"
-#include "server/grpc_log.h"
+#include "server/base/options.h"
+#include "server/base/resources.h"
+#include "server/base/version.h"
 #include "server/limit_flags.h"
-#include "server/log.h"
-#include "server/log_fields.h"
-#include "server/log_writer.h"
-#include "server/options.h"
-#include "server/resources.h"
+#include "server/log/grpc_log.h"
+#include "server/log/log.h"
+#include "server/log/log_fields.h"
+#include "server/log/log_writer.h"
+#include "server/security/tokens.h"
 #include "server/server.h"
-#include "server/tokens.h"
-#include "server/version.h"
 
 namespace wellspace::server {
 namespace {

@@ -16,9 +16,9 @@
 #include "grpcpp/resource_quota.h"
 #include "grpcpp/server_builder.h"
 #include "grpcpp/server_posix.h"
-#include "server/clock.h"
-#include "server/compression.h"
-#include "server/listen_address.h"
+#include "server/base/clock.h"
+#include "server/network/compression.h"
+#include "server/network/listen_address.h"
 
 namespace wellspace::server {
 namespace {

@@ -18,7 +18,7 @@
 #include "grpcpp/generic/generic_stub.h"
 #include "grpcpp/grpcpp.h"
 #include "nlohmann/json.hpp"
-#include "server/log_fields.h"
+#include "server/log/log_fields.h"
 #include "server/server.h"
 #include "spdlog/sinks/base_sink.h"
 #include "tests/fuzz/fuzz.h"

@@ -17,9 +17,9 @@
 #include "absl/strings/str_split.h"
 #include "absl/time/time.h"
 #include "server/limit_flags.h"
-#include "server/listen_address.h"
-#include "server/tls.h"
-#include "server/tokens.h"
+#include "server/network/listen_address.h"
+#include "server/security/tls.h"
+#include "server/security/tokens.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/fuzz/scratch_folder.h"
 

@@ -11,7 +11,7 @@
 
 #include "core/base/saturate.h"
 #include "core/mesher.h"
-#include "server/convert.h"
+#include "server/wire/convert.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/fuzz/mesh_check.h"
 #include "wellspace/v1/mesh.pb.h"

@@ -9,8 +9,8 @@
 
 #include "google/rpc/error_details.pb.h"
 #include "google/rpc/status.pb.h"
-#include "server/cloud_receiver.h"
-#include "server/wire.h"
+#include "server/calls/wire.h"
+#include "server/services/meshing/cloud_receiver.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/fuzz/mesh_check.h"
 #include "wellspace/v1/errors.pb.h"

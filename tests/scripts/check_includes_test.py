@@ -15,7 +15,7 @@ SOUND = {
     "core/simplex/star.h": '#include "core/simplex/validate.h"\n',
     "core/mesher.h": '#include "core/simplex/star.h"\n',
     "server/embedded_server.h": "#include <memory>\n",
-    "server/convert.cc": '#include "core/mesher.h"\n#include "wellspace/v1/mesh.pb.h"\n#include <grpcpp/grpcpp.h>\n',
+    "server/wire/convert.cc": '#include "core/mesher.h"\n#include "wellspace/v1/mesh.pb.h"\n#include <grpcpp/grpcpp.h>\n',
     "client/client.h": '#include "absl/time/time.h"\n',
     "client/connection.cc": '#include "client/client.h"\n#include "wellspace/v1/meshing.grpc.pb.h"\n',
     "client/formats/vtu.cc": '#include "client/formats/vtu.h"\n#include <zlib.h>\n',
@@ -80,13 +80,13 @@ class CheckIncludesTest(unittest.TestCase):
         self.assert_found("client/cli/main.cc", '#include "core/mesher.h"', "client/cli may include only")
 
     def test_server_includes_client(self):
-        self.assert_found("server/convert.cc", '#include "client/client.h"', "server may include only")
+        self.assert_found("server/wire/convert.cc", '#include "client/client.h"', "server may include only")
 
     def test_product_includes_tests(self):
-        self.assert_found("server/convert.cc", '#include "tests/core/mesher_test.cc"', "server may include only")
+        self.assert_found("server/wire/convert.cc", '#include "tests/core/mesher_test.cc"', "server may include only")
 
     def test_own_header_in_angle_brackets(self):
-        self.assert_found("server/convert.cc", "#include <core/mesher.h>", "with quotes")
+        self.assert_found("server/wire/convert.cc", "#include <core/mesher.h>", "with quotes")
 
     def test_relative_include(self):
         self.assert_found("core/mesher.h", '#include "../server/embedded_server.h"', "from the root")

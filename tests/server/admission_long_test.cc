@@ -10,7 +10,7 @@
 #include "absl/time/clock.h"
 #include "grpcpp/grpcpp.h"
 #include "gtest/gtest.h"
-#include "server/options.h"
+#include "server/base/options.h"
 #include "tests/server/daemon.h"
 #include "tests/server/service_harness.h"
 #include "wellspace/v1/meshing.grpc.pb.h"

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "gtest/gtest.h"
-#include "server/tokens.h"
+#include "server/security/tokens.h"
 #include "tests/formats/temporary_folder.h"
 #include "tests/server/service_harness.h"
 #include "tests/server/session_calls.h"

@@ -1,4 +1,4 @@
-#include "server/authenticator.h"
+#include "server/security/authenticator.h"
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"

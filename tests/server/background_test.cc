@@ -1,4 +1,4 @@
-#include "server/background.h"
+#include "server/jobs/background.h"
 
 #include <algorithm>
 #include <memory>

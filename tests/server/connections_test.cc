@@ -1,5 +1,5 @@
 // What a connection may do until it is shut, with pairs of sockets in the place of connections.
-#include "server/connections.h"
+#include "server/network/connections.h"
 
 #include <arpa/inet.h>
 #include <netinet/in.h>

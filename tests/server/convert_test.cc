@@ -1,4 +1,4 @@
-#include "server/convert.h"
+#include "server/wire/convert.h"
 
 #include <cmath>
 #include <functional>
@@ -8,8 +8,8 @@
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
-#include "server/cloud_receiver.h"
-#include "server/errors.h"
+#include "server/services/meshing/cloud_receiver.h"
+#include "server/wire/errors.h"
 #include "tests/server/service_harness.h"
 
 namespace wellspace::server {

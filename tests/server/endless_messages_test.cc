@@ -7,8 +7,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "gtest/gtest.h"
-#include "server/options.h"
-#include "server/tokens.h"
+#include "server/base/options.h"
+#include "server/security/tokens.h"
 #include "tests/formats/temporary_folder.h"
 #include "tests/server/daemon.h"
 #include "tests/server/raw_http2.h"

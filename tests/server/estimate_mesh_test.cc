@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "gtest/gtest.h"
-#include "server/errors.h"
+#include "server/wire/errors.h"
 #include "tests/server/patience.h"
 #include "tests/server/service_harness.h"
 

@@ -6,7 +6,7 @@
 #include "absl/time/time.h"
 #include "core/mesher.h"
 #include "gtest/gtest.h"
-#include "server/errors.h"
+#include "server/wire/errors.h"
 #include "tests/server/service_harness.h"
 #include "tests/server/session_calls.h"
 

@@ -1,5 +1,5 @@
 // Which jobs are small.
-#include "server/job_size.h"
+#include "server/jobs/job_size.h"
 
 #include <cmath>
 #include <limits>

@@ -1,4 +1,4 @@
-#include "server/jobs.h"
+#include "server/jobs/jobs.h"
 
 #include <atomic>
 #include <memory>
@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "gtest/gtest.h"
-#include "server/errors.h"
-#include "server/options.h"
+#include "server/base/options.h"
+#include "server/wire/errors.h"
 #include "tests/server/service_harness.h"
 
 namespace wellspace::server {

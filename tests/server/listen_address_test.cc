@@ -1,4 +1,4 @@
-#include "server/listen_address.h"
+#include "server/network/listen_address.h"
 
 #include <string>
 

@@ -1,5 +1,5 @@
 // Lines of the log: text and JSON of the same fields.
-#include "server/log.h"
+#include "server/log/log.h"
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -15,8 +15,8 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "nlohmann/json.hpp"
-#include "server/log_fields.h"
-#include "server/log_writer.h"
+#include "server/log/log_fields.h"
+#include "server/log/log_writer.h"
 
 namespace wellspace::server {
 namespace {

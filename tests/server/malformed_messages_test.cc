@@ -9,7 +9,7 @@
 #include "google/protobuf/io/coded_stream.h"
 #include "google/protobuf/io/zero_copy_stream_impl_lite.h"
 #include "gtest/gtest.h"
-#include "server/options.h"
+#include "server/base/options.h"
 #include "tests/server/daemon.h"
 #include "tests/server/raw_call.h"
 #include "tests/server/raw_http2.h"

@@ -1,4 +1,4 @@
-#include "server/mesh_chunks.h"
+#include "server/sessions/mesh_chunks.h"
 
 #include <memory>
 #include <optional>

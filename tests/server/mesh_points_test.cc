@@ -17,7 +17,7 @@
 #include "grpcpp/generic/generic_stub.h"
 #include "gtest/gtest.h"
 #include "proto/checksum.h"
-#include "server/errors.h"
+#include "server/wire/errors.h"
 #include "tests/server/service_harness.h"
 
 namespace wellspace::server {

@@ -1,4 +1,4 @@
-#include "server/point_store.h"
+#include "server/sessions/point_store.h"
 
 #include <numeric>
 #include <vector>

@@ -1,4 +1,4 @@
-#include "server/progress_pacer.h"
+#include "server/sessions/progress_pacer.h"
 
 #include "gtest/gtest.h"
 

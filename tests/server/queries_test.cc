@@ -8,7 +8,7 @@
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
-#include "server/query_call.h"
+#include "server/services/queries/query_call.h"
 #include "tests/server/scripted_mesher.h"
 #include "tests/server/session_calls.h"
 

@@ -1,4 +1,4 @@
-#include "server/request_ids.h"
+#include "server/calls/request_ids.h"
 
 #include <string>
 #include <vector>

@@ -1,5 +1,5 @@
 // Limits of control groups and of the machine, from files as Linux writes them.
-#include "server/resources.h"
+#include "server/base/resources.h"
 
 #include <algorithm>
 #include <filesystem>
@@ -8,7 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "gtest/gtest.h"
-#include "server/options.h"
+#include "server/base/options.h"
 #include "tests/formats/temporary_folder.h"
 
 namespace wellspace::server {

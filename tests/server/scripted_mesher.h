@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "core/mesher.h"
-#include "server/call_environment.h"
+#include "server/calls/call_environment.h"
 
 namespace wellspace::server {
 

@@ -1,5 +1,5 @@
 // Who gets in, over real connections, and what happens when files change under a running server.
-#include "server/security.h"
+#include "server/security/security.h"
 
 #include <functional>
 #include <utility>

@@ -8,7 +8,7 @@
 
 #include "absl/strings/escaping.h"
 #include "gtest/gtest.h"
-#include "server/memory_session_store.h"
+#include "server/sessions/memory_session_store.h"
 #include "tests/server/service_harness.h"
 
 namespace wellspace::server {

@@ -1,4 +1,4 @@
-#include "server/tls.h"
+#include "server/security/tls.h"
 
 #include "absl/strings/str_cat.h"
 #include "gmock/gmock.h"

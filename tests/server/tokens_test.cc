@@ -1,4 +1,4 @@
-#include "server/tokens.h"
+#include "server/security/tokens.h"
 
 #include "absl/strings/str_cat.h"
 #include "gmock/gmock.h"

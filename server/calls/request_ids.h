@@ -1,0 +1,79 @@
+// Answers of calls that carried a request_id, for those that repeat them.
+#ifndef WELLSPACE_SERVER_CALLS_REQUEST_IDS_H_
+#define WELLSPACE_SERVER_CALLS_REQUEST_IDS_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <list>
+#include <map>
+#include <mutex>
+#include <string>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "absl/time/time.h"
+#include "google/protobuf/message.h"
+#include "grpcpp/support/status.h"
+
+namespace wellspace::server {
+
+// Has calls that carry the same request_id done once. An answer is kept for kKeptFor; of a tenant with more than kMaxPerTenant of
+// them, or more than kMaxBytesPerTenant in them, the oldest go earlier. Errors are not kept: what failed may be tried again.
+//
+// Thread safety: thread-safe. Functions that it is given run without any lock held.
+class RequestIds {
+ public:
+  static constexpr absl::Duration kKeptFor = absl::Minutes(10);
+  static constexpr size_t kMaxPerTenant = 10'000;
+  static constexpr size_t kMaxBytesPerTenant = size_t{16} << 20;
+  static constexpr size_t kMaxLength = 128;  // of a request_id
+
+  // How a call ended; `response` is what it answered, serialized, if it succeeded.
+  struct Answer {
+    grpc::Status status;
+    std::string response;
+  };
+  using Done = std::function<void(const Answer&)>;
+
+  explicit RequestIds(std::function<absl::Duration()> since_boot) : since_boot_(std::move(since_boot)) {}
+
+  // Has `done` called with the answer to `request`, once. The first time it has `work` call it, now or later, in any way exactly once;
+  // a call that repeats another gets that one's answer as soon as it is there. An empty id is none: always the first time.
+  //
+  // Errors, as answers: INVALID_REQUEST (the id is too long), REQUEST_ID_REUSED.
+  void Once(const std::string& tenant, const std::string& request_id, const google::protobuf::Message& request,
+            const std::function<void(Done)>& work, Done done);
+
+ private:
+  struct Entry {
+    std::string request_id;
+    size_t content = 0;   // hash of the request
+    absl::Duration time;  // since boot
+    bool is_answered = false;
+    Answer answer;
+    std::vector<Done> waiting;  // for the answer
+  };
+  // The entries of one tenant, the oldest first.
+  struct Tenant {
+    std::list<Entry> entries;
+    std::unordered_map<std::string, std::list<Entry>::iterator> by_id;
+    size_t bytes = 0;  // of answers
+  };
+
+  void Finish(const std::string& tenant, const std::string& request_id, const Answer& answer);
+
+  // The following want mutex_ to be held.
+  void Erase(Tenant& tenant, std::list<Entry>::iterator entry);
+  // Drops what is too old, or too much. Those that are not answered yet stay.
+  void Trim(Tenant& tenant);
+
+  const std::function<absl::Duration()> since_boot_;
+  std::mutex mutex_;
+  std::map<std::string, Tenant> tenants_;  // guarded by mutex_
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_CALLS_REQUEST_IDS_H_

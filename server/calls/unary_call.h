@@ -1,0 +1,76 @@
+// Calls of one request and one response.
+#ifndef WELLSPACE_SERVER_CALLS_UNARY_CALL_H_
+#define WELLSPACE_SERVER_CALLS_UNARY_CALL_H_
+
+#include <memory>
+#include <mutex>
+#include <utility>
+
+#include "google/protobuf/message.h"
+#include "grpcpp/support/server_callback.h"
+#include "server/calls/call.h"
+#include "server/calls/request_ids.h"
+
+namespace wellspace::server {
+
+// Thread safety and invariants: those of Call.
+class UnaryCall final : public Call<grpc::ServerUnaryReactor> {
+ public:
+  UnaryCall(const CallEnvironment& environment, grpc::CallbackServerContext* context) : Call(environment, context) {}
+
+  // Serves a call that `handler` answers at once: grpc::Status handler(const Caller&, Response&).
+  template <typename Response, typename Handler>
+  static grpc::ServerUnaryReactor* Serve(const CallEnvironment& environment, grpc::CallbackServerContext* context,
+                                         Response* response, const Handler& handler) {
+    const auto call = std::make_shared<UnaryCall>(environment, context);
+    Begin(call);
+    if (call->is_admitted_) {
+      call->EndWith(RunGuarded([&] { return handler(call->caller(), *response); }));
+    }
+    return call.get();
+  }
+
+  // The same for a request with a request_id: `handler` is asked once, however often the call is repeated.
+  template <typename Request, typename Response, typename Handler>
+  static grpc::ServerUnaryReactor* ServeOnce(const CallEnvironment& environment, grpc::CallbackServerContext* context,
+                                             const Request* request, Response* response, const Handler& handler) {
+    const auto call = std::make_shared<UnaryCall>(environment, context);
+    Begin(call);
+    if (call->is_admitted_) {
+      const auto work = [&](const RequestIds::Done& done) {
+        Response answer;
+        const grpc::Status status = RunGuarded([&] { return handler(call->caller(), answer); });
+        done({status, answer.SerializeAsString()});
+      };
+      environment.request_ids.Once(
+          call->caller().tenant, request->request_id(), *request, work,
+          [call, response](const RequestIds::Answer& answer) { call->EndWith(answer, *response); });
+    }
+    return call.get();
+  }
+
+ private:
+  void OnBegin() override { is_admitted_ = true; }
+
+  void EndWith(grpc::Status status) {
+    std::lock_guard lock(mutex_);
+    End(std::move(status));
+  }
+
+  void EndWith(const RequestIds::Answer& answer, google::protobuf::Message& response) {
+    std::lock_guard lock(mutex_);
+    if (ending()) {
+      return;  // the response is gRPC's already
+    }
+    if (answer.status.ok()) {
+      response.ParseFromString(answer.response);
+    }
+    End(answer.status);
+  }
+
+  bool is_admitted_ = false;  // set before the call is known to others
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_CALLS_UNARY_CALL_H_

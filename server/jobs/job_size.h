@@ -1,0 +1,31 @@
+// Which jobs are small, as far as can be known before they begin.
+#ifndef WELLSPACE_SERVER_JOBS_JOB_SIZE_H_
+#define WELLSPACE_SERVER_JOBS_JOB_SIZE_H_
+
+#include <cstdint>
+#include <span>
+
+#include "core/mesh_parameters.h"
+
+namespace wellspace::server {
+
+// Whether a mesh is expected within about a second: by the number of points, and by the sizes that are wanted in the
+// box. Above kMostPoints it never is, and the points need not be given.
+//
+// Shapes:     points: n x parameters.dimension, row-major.
+// Guarantees: from above for even clouds; points that come ever closer to each other may take ten times as long.
+// Complexity: O(n), and not much for those that may be small.
+bool IsSmallMesh(const core::MeshParameters& parameters, std::span<const double> points);
+inline constexpr uint64_t kMostPoints = 40'000;
+
+// The same of a refinement of a mesh that is there, which may have to be built first, by so many steps.
+bool IsSmallRefinement(const core::MeshParameters& parameters, std::span<const double> points, uint64_t vertices,
+                       uint64_t steps);
+
+// The same of an estimate, which needs the tree alone, and of vertices that are added.
+bool IsSmallEstimate(int dimension, uint64_t points);
+bool IsSmallAddition(uint64_t points, uint64_t vertices, uint64_t steps);
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_JOBS_JOB_SIZE_H_

@@ -1,0 +1,123 @@
+// The connections of a server, and what their peers do with them.
+#ifndef WELLSPACE_SERVER_NETWORK_CONNECTIONS_H_
+#define WELLSPACE_SERVER_NETWORK_CONNECTIONS_H_
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+
+#include "server/base/file_descriptor.h"
+#include "spdlog/logger.h"
+
+struct sockaddr_storage;
+
+namespace wellspace::server {
+
+// What a connection may take. Its calls are those that gRPC has handed to us and that have not ended. Those that a peer
+// has reset are among them, while gRPC 1.51 no longer counts them, and takes more.
+struct ConnectionLimits {
+  int max_streams = 1000;  // calls at once of a connection, as the peer is told; at least 1
+  int max_calls = 10'000;  // of all connections together; at least 1
+  // How long a peer may read nothing. Longer than any stream waits for its client, unless --stall-limit is raised.
+  std::chrono::seconds max_unread{120};
+};
+
+// Shuts connections whose peers begin calls only to give them up ("rapid reset", CVE-2023-44487), and those that do not
+// read what they are sent.
+//
+// A call is wasted if it ends within a second, and its client has cancelled it or has not sent any message. A
+// connection is shut
+//   - when it has more than one and a half times `max_streams` calls, and kSlack, that have begun and not ended; half of
+//     it for each connection of its host that was shut lately, and never fewer than kSlack;
+//   - when all have more than `max_calls`, and it has the most;
+//   - when it has wasted more calls within a second than its host may: `max_streams` or kLeastWaste, whichever is more;
+//     half of it for each connection of the host that was shut lately, and never fewer than kLeastWasteOfABadHost;
+//   - when the peer has read nothing for `max_unread` although something waits for it.
+// What the peer has sent to a connection that is shut, and gRPC has not read, is thrown away. What gRPC has read it
+// works off: as long as there are more than kMostOrphans such calls, no connection should be accepted.
+//
+// Each connection costs a second file descriptor.
+//
+// Thread safety: thread-safe; Add, Sweep and descriptor() are one thread's.
+class Connections {
+ public:
+  class Connection;
+  using Clock = std::chrono::steady_clock;
+
+  static constexpr int kSlack = 100;
+  static constexpr int kLeastWaste = 100;
+  static constexpr int kLeastWasteOfABadHost = 16;
+  static constexpr int kMostOrphans = 500;
+  static constexpr std::chrono::seconds kWindow{1};
+  static constexpr std::chrono::seconds kForgivenAfter{10};  // one connection that was shut
+
+  Connections(const ConnectionLimits& limits, std::shared_ptr<spdlog::logger> log);
+  ~Connections();
+  Connections(const Connections&) = delete;
+  Connections& operator=(const Connections&) = delete;
+
+  // Takes note of a connection that was accepted from `peer` and is about to be handed to gRPC. False when there is no
+  // descriptor left.
+  bool Add(int socket, const sockaddr_storage& peer);
+
+  // Readable when Sweep has something to do.
+  int descriptor() const { return epoll_.get(); }
+  // Forgets connections that are closed.
+  void Sweep();
+  // Shuts those whose peers do not read. To be called every few seconds.
+  void ShutUnread();
+
+  // A call has begun on the connection from `peer`, as gRPC writes it: "ipv4:127.0.0.1:1234". Null when there is no
+  // such connection.
+  std::shared_ptr<Connection> CallBegan(std::string_view peer);
+  // It has ended.
+  void CallEnded(Connection& connection, bool is_wasted);
+
+  // So many calls of connections that were shut or closed go on that more connections had better wait.
+  bool IsBusyWithTheShut() const;
+
+  // Connections that are open.
+  size_t Count() const;
+  // Connections that were shut.
+  uint64_t ShutCount() const;
+
+ private:
+  struct Host;
+
+  // The following want mutex_ to be held.
+  void Orphan(Connection& connection);
+  void Shut(Connection& connection, std::string_view reason);
+  void ShutTheBusiest();
+  // How many connections of `host` were shut, less those that were forgiven.
+  int StrikesOf(const std::string& host) const;
+  // How many calls a connection of `host` may have, and waste within a second.
+  int AllowedCalls(const std::string& host) const;
+  int AllowedWaste(const std::string& host) const;
+  void Strike(const std::string& host);
+
+  const ConnectionLimits limits_;
+  const std::shared_ptr<spdlog::logger> log_;
+  const FileDescriptor epoll_;
+  mutable std::mutex mutex_;
+  // Guarded by mutex_.
+  std::unordered_map<std::string, std::shared_ptr<Connection>> by_peer_;
+  std::unordered_map<uint64_t, std::shared_ptr<Connection>> by_id_;
+  std::unordered_map<std::string, Host> hosts_;  // of which connections were shut lately
+  uint64_t next_id_ = 1;
+  int64_t calls_ = 0;    // of connections that were not shut
+  int64_t orphans_ = 0;  // of those that were
+  uint64_t shut_count_ = 0;
+};
+
+// The address and port of a peer, whatever the way it is written: 18 bytes. Empty if it has none.
+std::string PeerKey(const sockaddr_storage& peer);
+std::string PeerKey(std::string_view peer);
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_NETWORK_CONNECTIONS_H_

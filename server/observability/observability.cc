@@ -1,0 +1,64 @@
+#include "server/observability/observability.h"
+
+#include <atomic>
+#include <utility>
+
+#include "core/base/status_macros.h"
+#include "server/network/connections.h"
+
+namespace wellspace::server {
+namespace {
+
+// Those of the server, and those that gRPC adds.
+std::vector<std::string> AndThoseOfGrpc(std::vector<std::string> services) {
+  services.insert(services.end(), {"grpc.reflection.v1alpha.ServerReflection", "grpc.channelz.v1.Channelz"});
+  return services;
+}
+
+}  // namespace
+
+Observability::Observability(const std::vector<std::string>& services, std::shared_ptr<spdlog::logger> log,
+                             Connections& connections, CallObserver::TenantOf tenant_of)
+    : log_(std::move(log)),
+      call_metrics_(metrics_.registry(), AndThoseOfGrpc(services)),
+      calls_(*log_, call_metrics_, connections, std::move(tenant_of)) {
+  metrics_.AddGauge("wellspace_calls_in_flight", "Calls that have begun and not ended.",
+                    [this] { return static_cast<double>(calls_.InFlight()); });
+  metrics_.AddGauge("wellspace_connections", "Connections that are open.",
+                    [&connections] { return static_cast<double>(connections.Count()); });
+  metrics_.AddCounter("wellspace_connections_shut_total",
+                      "Connections that were shut for what their peers did with them.",
+                      [&connections] { return static_cast<double>(connections.ShutCount()); });
+  const auto add = [this](const char* name, const char* help, const std::atomic<uint64_t>& counter) {
+    metrics_.AddCounter(name, help, [&counter] { return static_cast<double>(counter.load()); });
+  };
+  add("wellspace_points_received_total", "Points that clients have sent.", work_.points_received);
+  add("wellspace_vertices_made_total", "Vertices of finished meshes.", work_.vertices_made);
+  add("wellspace_simplices_made_total", "Simplices of finished meshes.", work_.simplices_made);
+  add("wellspace_cells_served_total", "Vertices that queries, for cells or neighbours, were answered for.",
+      work_.cells_served);
+}
+
+void Observability::Watch(grpc::ServerBuilder& builder) {
+  std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> interceptors;
+  interceptors.push_back(calls_.MakeInterceptors());
+  builder.experimental().SetInterceptorCreators(std::move(interceptors));
+  LeaveOutChannelz(builder);
+}
+
+absl::Status Observability::Listen(const ObservabilityOptions& options) {
+  if (!options.metrics_listen.empty()) {
+    WELLSPACE_ASSIGN_OR_RETURN(endpoint_, MetricsEndpoint::Start(options.metrics_listen, metrics_));
+  }
+  if (!options.admin_listen.empty()) {
+    WELLSPACE_ASSIGN_OR_RETURN(admin_, AdminServer::Start(options.admin_listen, calls_));
+  }
+  return absl::OkStatus();
+}
+
+void Observability::Stop() {
+  endpoint_.reset();
+  admin_.reset();
+}
+
+}  // namespace wellspace::server

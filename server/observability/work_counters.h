@@ -1,0 +1,20 @@
+// How much the service has done since it started.
+#ifndef WELLSPACE_SERVER_OBSERVABILITY_WORK_COUNTERS_H_
+#define WELLSPACE_SERVER_OBSERVABILITY_WORK_COUNTERS_H_
+
+#include <atomic>
+#include <cstdint>
+
+namespace wellspace::server {
+
+// Thread safety: thread-safe.
+struct WorkCounters {
+  std::atomic<uint64_t> points_received{0};
+  std::atomic<uint64_t> vertices_made{0};   // of meshes that were finished
+  std::atomic<uint64_t> simplices_made{0};  // of meshes that were finished
+  std::atomic<uint64_t> cells_served{0};    // vertices that queries were answered for
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_OBSERVABILITY_WORK_COUNTERS_H_

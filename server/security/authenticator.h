@@ -1,0 +1,55 @@
+// Who calls: every handler asks before it does anything else.
+#ifndef WELLSPACE_SERVER_SECURITY_AUTHENTICATOR_H_
+#define WELLSPACE_SERVER_SECURITY_AUTHENTICATOR_H_
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+
+#include "grpcpp/server_context.h"
+#include "grpcpp/support/status.h"
+#include "server/security/tokens.h"
+
+namespace wellspace::server {
+
+struct Caller {
+  std::string tenant = "default";  // a name as IsTenantName wants it
+};
+
+// Knows callers by their bearer token (metadata `authorization: Bearer TOKEN`), by their client certificate, or takes all of them
+// for the tenant "default".
+//
+// Thread safety: thread-safe.
+class Authenticator {
+ public:
+  // What a caller has to show. With both, the certificate only has to be there and the token names the tenant.
+  struct Demands {
+    std::shared_ptr<const TokenTable> tokens;  // null: no token
+    bool client_certificate = false;           // the tenant is the common name of its subject
+  };
+
+  // Takes all callers.
+  Authenticator() = default;
+  explicit Authenticator(Demands demands) : demands_(std::move(demands)) {}
+
+  // OK, and who calls in `caller`; or the UNAUTHENTICATED with which the call is to be ended at once, without a look at what it asks
+  // for. Neither waits nor does I/O.
+  //
+  // Guarantees: the message has nothing of what the caller showed.
+  grpc::Status Authenticate(const grpc::ServerContextBase& context, Caller* caller) const;
+
+  // These are for calls that come from now on.
+  void SetDemands(Demands demands);
+  void SetTokens(std::shared_ptr<const TokenTable> tokens);
+
+ private:
+  Demands GetDemands() const;
+
+  mutable std::mutex mutex_;
+  Demands demands_;  // guarded by mutex_
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_SECURITY_AUTHENTICATOR_H_

@@ -1,0 +1,141 @@
+// What the calls that take a cloud have in common, whatever they do with it.
+#ifndef WELLSPACE_SERVER_SERVICES_MESHING_CLOUD_CALL_H_
+#define WELLSPACE_SERVER_SERVICES_MESHING_CLOUD_CALL_H_
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+
+#include "grpcpp/support/byte_buffer.h"
+#include "server/calls/call.h"
+#include "server/calls/request_stream.h"
+#include "server/calls/wire.h"
+#include "server/jobs/jobs.h"
+#include "server/jobs/memory_budget.h"
+#include "server/services/meshing/cloud_receiver.h"
+#include "server/wire/errors.h"
+#include "wellspace/v1/meshing.pb.h"
+
+namespace wellspace::server {
+
+// A Call whose requests go to a CloudReceiver; at their end a job is queued; what becomes of its result is up to the class that derives
+// from this. `Reactor` is gRPC's, for the kind of stream that answers; it reads bytes, which are `Request`s.
+//
+// Thread safety and invariants: those of RequestStream.
+template <typename Reactor, typename Request>
+class CloudCall : public RequestStream<Call<Reactor>> {
+ protected:
+  CloudCall(const CallEnvironment& environment, grpc::CallbackServerContext* context)
+      : RequestStream<Call<Reactor>>(environment, context), receiver_(environment.options) {}
+
+  // On a worker: works, and hands over what came of it.
+  virtual void Work(PointChunks& points, Job& job) = 0;
+
+  // The following are called with mutex_ held, and want it to be held when they are called.
+
+  // Whether what Work does with `points` takes about a second at most.
+  virtual bool IsSmall(const PointChunks& points) const = 0;
+  // The parameters have come.
+  virtual void OnParameters() {}
+  // Of the mesh, for the log; 0 when there is none.
+  virtual uint64_t VertexCount() const = 0;
+
+  void OnBegin() final;
+  void OnRequest(grpc::ByteBuffer* bytes) final;
+  void OnRequestsEnd() final { SubmitJob(); }
+  void OnEnd() override;
+  LogFields Figures() const final {
+    return LogFields().Add("points", receiver_.point_count()).Add("vertices", VertexCount());
+  }
+  // Null before it is queued.
+  const std::shared_ptr<Job>& job() const { return job_; }
+  // Constant once there is a job.
+  const core::MeshParameters& parameters() const { return receiver_.parameters(); }
+
+ private:
+  void SubmitJob();
+  // Sets memory aside for the points so far, and for the next message.
+  //
+  // Errors:     MEMORY_LIMIT.
+  grpc::Status ReserveForNext();
+
+  // Guarded by mutex_.
+  CloudReceiver receiver_;
+  MemoryReservation received_;
+  std::shared_ptr<Job> job_;
+};
+
+template <typename Reactor, typename Request>
+void CloudCall<Reactor, Request>::OnBegin() {
+  received_ = this->environment().memory.ReserveNothing();
+  if (grpc::Status status = ReserveForNext(); !status.ok()) {
+    this->End(std::move(status));
+    return;
+  }
+  this->ReadNext();
+}
+
+template <typename Reactor, typename Request>
+grpc::Status CloudCall<Reactor, Request>::ReserveForNext() {
+  const uint64_t bytes = receiver_.point_bytes() + kMessageBytes;
+  return received_.Resize(bytes)
+             ? grpc::Status::OK
+             : FromCoreStatus(this->environment().memory.Refusal(bytes, "the next part of the cloud"));
+}
+
+template <typename Reactor, typename Request>
+void CloudCall<Reactor, Request>::OnRequest(grpc::ByteBuffer* bytes) {
+  const bool had_parameters = receiver_.has_parameters();
+  Request request;
+  grpc::Status status = ParseRequest(bytes, &request);
+  if (status.ok()) {
+    status = receiver_.Accept(&request);
+  }
+  if (status.ok()) {
+    status = ReserveForNext();
+  }
+  if (!status.ok()) {
+    this->End(std::move(status));
+    return;
+  }
+  if (!had_parameters) {
+    OnParameters();
+  }
+  this->ReadNext();
+}
+
+template <typename Reactor, typename Request>
+void CloudCall<Reactor, Request>::SubmitJob() {
+  if (grpc::Status status = receiver_.AcceptEnd(); !status.ok()) {
+    this->End(std::move(status));
+    return;
+  }
+  (void)received_.Resize(receiver_.point_bytes());  // no more than it was
+  // std::function wants to be copied, points do not.
+  auto points = std::make_shared<PointChunks>(receiver_.TakePoints());
+  JobPool::Submission submission = this->environment().jobs.Submit(
+      {.tenant = this->caller().tenant,
+       .is_small = IsSmall(*points),
+       .held = std::move(received_),
+       .work = [self = this->template SharedAs<CloudCall>(), points](Job& job) { self->Work(*points, job); }});
+  job_ = std::move(submission.job);
+  if (job_ == nullptr) {
+    this->End(std::move(submission.refusal));
+  }
+}
+
+template <typename Reactor, typename Request>
+void CloudCall<Reactor, Request>::OnEnd() {
+  this->environment().observability.work().points_received += receiver_.point_count();
+  receiver_.TakePoints();
+  received_.Release();
+  if (job_ != nullptr) {
+    this->environment().jobs.Cancel(job_);
+  }
+}
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_SERVICES_MESHING_CLOUD_CALL_H_

@@ -1,0 +1,94 @@
+#include "server/services/meshing/cloud_receiver.h"
+
+#include "absl/strings/str_cat.h"
+#include "server/wire/convert.h"
+#include "server/wire/errors.h"
+
+namespace wellspace::server {
+
+void PointChunks::Append(google::protobuf::RepeatedField<double>* coordinates) {
+  if (coordinates->empty()) {
+    return;  // endless empty chunks must not cost memory
+  }
+  coordinate_count_ += coordinates->size();
+  chunks_.emplace_back().Swap(coordinates);
+}
+
+std::vector<double> PointChunks::Copy() const {
+  std::vector<double> coordinates;
+  coordinates.reserve(coordinate_count_);
+  for (const google::protobuf::RepeatedField<double>& chunk : chunks_) {
+    coordinates.insert(coordinates.end(), chunk.begin(), chunk.end());
+  }
+  return coordinates;
+}
+
+std::vector<double> PointChunks::Flatten(const core::RunContext& context) {
+  std::vector<double> coordinates;
+  coordinates.reserve(coordinate_count_);
+  while (!chunks_.empty() && !context.IsCancelled()) {
+    coordinates.insert(coordinates.end(), chunks_.front().begin(), chunks_.front().end());
+    chunks_.pop_front();
+  }
+  coordinate_count_ = 0;
+  return coordinates;
+}
+
+template <typename Request>
+grpc::Status CloudReceiver::Accept(Request* request) {
+  switch (request->request_case()) {
+    case Request::kParameters:
+      return AcceptParameters(request->parameters());
+    case Request::kPoints:
+      return AcceptPoints(request->mutable_points());
+    case Request::REQUEST_NOT_SET:
+      break;
+  }
+  return MakeError(v1::ERROR_REASON_EMPTY_REQUEST, "a request has neither parameters nor points; set one of them",
+                   "request");
+}
+
+template grpc::Status CloudReceiver::Accept(v1::MeshPointsRequest*);
+template grpc::Status CloudReceiver::Accept(v1::EstimateMeshRequest*);
+
+grpc::Status CloudReceiver::AcceptEnd() const {
+  if (!has_parameters_) {
+    return MakeError(v1::ERROR_REASON_PARAMETERS_MISSING,
+                     "the stream ended before any request; send the parameters first", "parameters");
+  }
+  return grpc::Status::OK;
+}
+
+grpc::Status CloudReceiver::AcceptParameters(const v1::MeshParameters& message) {
+  if (has_parameters_) {
+    return MakeError(v1::ERROR_REASON_PARAMETERS_REPEATED,
+                     "the parameters came a second time; send them once, in the first request", "parameters");
+  }
+  grpc::Status status = ParametersFromProto(message, options_, &parameters_);
+  has_parameters_ = status.ok();
+  return status;
+}
+
+grpc::Status CloudReceiver::AcceptPoints(v1::PointChunk* chunk) {
+  if (!has_parameters_) {
+    return MakeError(v1::ERROR_REASON_PARAMETERS_MISSING,
+                     "points came before the parameters; send the parameters first", "parameters");
+  }
+  const int count = chunk->coordinates_size();
+  if (count % parameters_.dimension != 0) {
+    return MakeError(v1::ERROR_REASON_INVALID_CHUNK_SHAPE,
+                     absl::StrCat("the chunk after point ", point_count_, " has ", count,
+                                  " coordinates; expected a multiple of the dimension ", parameters_.dimension),
+                     "points.coordinates");
+  }
+  const uint64_t total = point_count_ + count / parameters_.dimension;
+  if (total > options_.max_points) {
+    return MakeError(v1::ERROR_REASON_TOO_MANY_POINTS,
+                     absl::StrCat("at least ", total, " points; this server accepts at most ", options_.max_points));
+  }
+  points_.Append(chunk->mutable_coordinates());
+  point_count_ = total;
+  return grpc::Status::OK;
+}
+
+}  // namespace wellspace::server

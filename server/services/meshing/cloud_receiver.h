@@ -1,0 +1,82 @@
+// What a client sends in one call of MeshPoints or EstimateMesh: parameters, then points.
+#ifndef WELLSPACE_SERVER_SERVICES_MESHING_CLOUD_RECEIVER_H_
+#define WELLSPACE_SERVER_SERVICES_MESHING_CLOUD_RECEIVER_H_
+
+#include <cstdint>
+#include <deque>
+#include <utility>
+#include <vector>
+
+#include "core/mesher.h"
+#include "google/protobuf/repeated_field.h"
+#include "grpcpp/support/status.h"
+#include "server/base/options.h"
+#include "wellspace/v1/meshing.pb.h"
+
+namespace wellspace::server {
+
+// Points as they came, chunk by chunk. Movable.
+//
+// Thread safety: thread-compatible.
+class PointChunks {
+ public:
+  // Takes over what is in `coordinates`, without copying.
+  void Append(google::protobuf::RepeatedField<double>* coordinates);
+
+  uint64_t coordinate_count() const { return coordinate_count_; }
+
+  // All coordinates in order.
+  std::vector<double> Copy() const;
+  // The same; the chunks are freed as they are copied. Leaves this empty. Of a cancelled run, not all.
+  std::vector<double> Flatten(const core::RunContext& context);
+
+ private:
+  std::deque<google::protobuf::RepeatedField<double>> chunks_;
+  uint64_t coordinate_count_ = 0;
+};
+
+// Checks the order and the contents of the requests of one call and keeps the points. Fast enough for a reaction: no coordinate is
+// looked at or copied.
+//
+// Thread safety: thread-compatible.
+// Invariants: never holds more than options.max_points points.
+class CloudReceiver {
+ public:
+  // REQUIRES:   `options` outlives this.
+  explicit CloudReceiver(const ServiceOptions& options) : options_(options) {}
+
+  // Takes over the contents of the next request.
+  //
+  // Errors:     EMPTY_REQUEST, PARAMETERS_MISSING, PARAMETERS_REPEATED, INVALID_PARAMETERS, INVALID_CHUNK_SHAPE,
+  //             TOO_MANY_POINTS; the call is to be ended.
+  template <typename Request>
+  grpc::Status Accept(Request* request);
+
+  // To be called when the client has ended its stream.
+  //
+  // Errors:     PARAMETERS_MISSING.
+  grpc::Status AcceptEnd() const;
+
+  bool has_parameters() const { return has_parameters_; }
+  const core::MeshParameters& parameters() const { return parameters_; }
+  uint64_t point_count() const { return point_count_; }
+  // Of the points that it holds.
+  uint64_t point_bytes() const { return points_.coordinate_count() * sizeof(double); }
+
+  // Hands over the points.
+  PointChunks TakePoints() { return std::exchange(points_, PointChunks()); }
+
+ private:
+  grpc::Status AcceptParameters(const v1::MeshParameters& message);
+  grpc::Status AcceptPoints(v1::PointChunk* chunk);
+
+  const ServiceOptions& options_;
+  bool has_parameters_ = false;
+  core::MeshParameters parameters_;
+  uint64_t point_count_ = 0;
+  PointChunks points_;
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_SERVICES_MESHING_CLOUD_RECEIVER_H_

@@ -1,0 +1,85 @@
+#include "server/services/meshing/mesh_points_call.h"
+
+#include <utility>
+#include <vector>
+
+#include "server/base/clock.h"
+#include "server/calls/wire.h"
+#include "server/jobs/job_size.h"
+#include "server/wire/convert.h"
+#include "server/wire/errors.h"
+
+namespace wellspace::server {
+
+void MeshPointsCall::Work(PointChunks& points, Job& job) {
+  std::shared_ptr<MeshChunks> mesh;
+  grpc::Status status = RunGuarded([&] {
+    const std::vector<double> coordinates = points.Flatten(job.context());
+    absl::StatusOr<core::Mesh> made = environment().mesher(parameters(), coordinates, job.context());
+    if (!made.ok()) {
+      return FromCoreStatus(made.status());
+    }
+    mesh = std::make_shared<MeshChunks>(*std::move(made));
+    mesh->KeepMemory(job.TakeMemory(mesh->memory_bytes()));
+    environment().observability.work().vertices_made += mesh->mesh().vertex_count();
+    environment().observability.work().simplices_made += mesh->mesh().simplex_count();
+    return grpc::Status::OK;
+  });
+  std::lock_guard lock(mutex_);
+  if (ending()) {
+    return;
+  }
+  if (!status.ok()) {
+    End(std::move(status));
+    return;
+  }
+  mesh_ = std::move(mesh);
+  core::Progress progress = job.context().Snapshot();
+  progress.vertices = mesh_->mesh().vertex_count();
+  progress.simplices = mesh_->mesh().simplex_count();
+  event_ = pacer_.Final(progress);
+  WriteNext();
+}
+
+bool MeshPointsCall::IsSmall(const PointChunks& points) const {
+  return points.coordinate_count() <= kMostPoints * parameters().dimension && IsSmallMesh(parameters(), points.Copy());
+}
+
+void MeshPointsCall::ScheduleTick() {
+  environment().background.PostAfter(ProgressPacer::kMinInterval, WeakCall(&MeshPointsCall::Tick));
+}
+
+void MeshPointsCall::Tick() {
+  std::lock_guard lock(mutex_);
+  if (ending() || mesh_ != nullptr) {
+    return;
+  }
+  // While a reader is slow, events are skipped, not stored.
+  if (!IsWriting()) {
+    const core::Progress progress = job() == nullptr ? core::Progress() : job()->context().Snapshot();
+    event_ = pacer_.Next(progress, SinceBoot());
+    WriteNext();
+  }
+  ScheduleTick();
+}
+
+std::optional<grpc::ByteBuffer> MeshPointsCall::NextResponse() {
+  v1::MeshPointsResponse response;
+  if (event_.has_value()) {
+    *response.mutable_progress() = *std::exchange(event_, std::nullopt);
+  } else if (mesh_ == nullptr) {
+    return std::nullopt;
+  } else if (!metadata_sent_) {
+    metadata_sent_ = true;
+    *response.mutable_metadata() = MetadataToProto(mesh_->mesh(), mesh_->count());
+  } else if (next_chunk_ < mesh_->count()) {
+    environment().log.debug("call={} chunk={}", id(), next_chunk_);
+    return SerializeChunk(mesh_, next_chunk_++, v1::MeshPointsResponse::kChunkFieldNumber);
+  } else {
+    End(grpc::Status::OK);
+    return std::nullopt;
+  }
+  return Serialize(response);
+}
+
+}  // namespace wellspace::server

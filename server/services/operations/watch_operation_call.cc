@@ -1,0 +1,52 @@
+#include "server/services/operations/watch_operation_call.h"
+
+#include <utility>
+
+#include "server/services/resource_names.h"
+
+namespace wellspace::server {
+
+WatchOperationCall::~WatchOperationCall() {
+  if (operation_ != nullptr) {
+    operation_->Unwatch(watch_);
+  }
+}
+
+void WatchOperationCall::OnBegin() {
+  FoundOperation found;
+  if (grpc::Status status = FindOperation(environment(), caller(), name_, &found); !status.ok()) {
+    End(std::move(status));
+    return;
+  }
+  use_.emplace(std::move(found.session));
+  operation_ = std::move(found.operation);
+  watch_ = operation_->Watch(WeakCall(&WatchOperationCall::Wake));
+  WriteNext();
+}
+
+void WatchOperationCall::Wake() {
+  std::lock_guard lock(mutex_);
+  WriteNext();
+}
+
+std::optional<v1::WatchOperationResponse> WatchOperationCall::NextResponse() {
+  if (is_end_sent_) {
+    End(grpc::Status::OK);
+    return std::nullopt;
+  }
+  // First whether it has ended: after that there are no more events.
+  const bool has_ended = operation_->HasEnded();
+  v1::WatchOperationResponse response;
+  if (std::optional<v1::ProgressEvent> event = operation_->EventAfter(after_)) {
+    after_ = event->sequence();
+    *response.mutable_progress() = *std::move(event);
+  } else if (has_ended) {
+    *response.mutable_operation() = operation_->Describe();
+    is_end_sent_ = true;
+  } else {
+    return std::nullopt;
+  }
+  return response;
+}
+
+}  // namespace wellspace::server

@@ -1,0 +1,115 @@
+#include "server/services/queries/add_vertices_call.h"
+
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "server/jobs/job_size.h"
+#include "server/services/resource_names.h"
+#include "server/wire/errors.h"
+
+namespace wellspace::server {
+namespace {
+
+// What one request asks for; outlives its call, for those that repeat it.
+struct Addition {
+  SessionUse use;
+  std::vector<double> points;
+  std::vector<uint32_t> near;
+  uint64_t expected_revision = 0;
+};
+
+// On a worker.
+RequestIds::Answer Add(const Addition& addition, const MesherFactory& create_mesher, Job& job) {
+  v1::AddVerticesResponse response;
+  grpc::Status status = RunGuarded([&] {
+    Session& session = addition.use.session();
+    AddedVertices added;
+    grpc::Status ended = session.PrepareStructure(addition.expected_revision, create_mesher, job);
+    if (ended.ok()) {
+      ended = session.AddVertices(addition.points, addition.near, addition.expected_revision, job.context(), &added);
+    }
+    if (ended.ok()) {
+      response.mutable_vertices()->Add(added.vertices.begin(), added.vertices.end());
+      response.set_revision(added.revision);
+    }
+    return ended;
+  });
+  return {std::move(status), response.SerializeAsString()};
+}
+
+}  // namespace
+
+grpc::ServerUnaryReactor* AddVerticesCall::Serve(const CallEnvironment& environment,
+                                                 grpc::CallbackServerContext* context,
+                                                 const v1::AddVerticesRequest* request,
+                                                 v1::AddVerticesResponse* response) {
+  const auto call = std::make_shared<AddVerticesCall>(environment, context, request, response);
+  Begin(call);
+  if (call->is_admitted_) {
+    environment.request_ids.Once(
+        call->caller().tenant, request->request_id(), *request,
+        [&call](RequestIds::Done done) { call->Submit(std::move(done)); },
+        [call](const RequestIds::Answer& answer) { call->EndWith(answer); });
+  }
+  return call.get();
+}
+
+void AddVerticesCall::Submit(RequestIds::Done done) {
+  std::shared_ptr<Session> session;
+  if (grpc::Status status = FindSession(environment(), caller(), request_->name(), &session); !status.ok()) {
+    done({std::move(status), ""});
+    return;
+  }
+  const Session::Size size = session->GetSize(0);
+  const bool is_small =
+      IsSmallAddition(request_->points_size() / session->dimension(), size.vertices, size.replayed_steps);
+  const std::shared_ptr<const Addition> addition(
+      new Addition{.use = SessionUse(std::move(session)),
+                   .points = {request_->points().begin(), request_->points().end()},
+                   .near = {request_->near().begin(), request_->near().end()},
+                   .expected_revision = request_->expected_revision()});
+  JobPool::Submission submission =
+      environment().jobs.Submit({.tenant = caller().tenant,
+                                 .is_small = is_small,
+                                 .work = [addition, done, &create_mesher = environment().create_mesher](Job& job) {
+                                   done(Add(*addition, create_mesher, job));
+                                 }});
+  if (submission.job == nullptr) {
+    done({std::move(submission.refusal), ""});
+    return;
+  }
+  std::lock_guard lock(mutex_);
+  job_ = std::move(submission.job);
+  if (ending()) {
+    OnEnd();
+  }
+}
+
+void AddVerticesCall::OnEnd() {
+  // A call with a request_id may be repeated by one that waits for the same answer.
+  if (job_ != nullptr && request_->request_id().empty()) {
+    job_->Cancel();
+  }
+}
+
+void AddVerticesCall::EndWith(const RequestIds::Answer& answer) {
+  std::lock_guard lock(mutex_);
+  if (ending()) {
+    return;  // the response is gRPC's already
+  }
+  if (answer.status.ok()) {
+    response_->ParseFromString(answer.response);
+    added_ = response_->vertices_size();
+    environment().observability.work().points_received += added_;
+  }
+  End(answer.status);
+}
+
+LogFields AddVerticesCall::Figures() const {
+  LogFields figures;
+  figures.Add("session", request_->name()).Add("points", added_);
+  return figures;
+}
+
+}  // namespace wellspace::server

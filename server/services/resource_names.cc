@@ -1,0 +1,60 @@
+#include "server/services/resource_names.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "absl/strings/escaping.h"
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
+#include "server/sessions/session_store.h"
+#include "server/wire/errors.h"
+
+namespace wellspace::server {
+namespace {
+
+// Longer than any name that was ever given; errors repeat names.
+constexpr size_t kMaxLength = 256;
+
+// The parts of `name` between slashes; none if one of them is empty or all are too long.
+std::vector<std::string> Parts(const std::string& name) {
+  std::vector<std::string> parts;
+  if (name.size() <= kMaxLength) {
+    parts = absl::StrSplit(name, '/');
+  }
+  const bool has_empty = std::any_of(parts.begin(), parts.end(), [](const std::string& part) { return part.empty(); });
+  return has_empty ? std::vector<std::string>() : parts;
+}
+
+grpc::Status InvalidName(const std::string& name, const std::string& field, const char* accepted) {
+  return MakeError(v1::ERROR_REASON_INVALID_REQUEST,
+                   absl::StrCat(field, ": \"", absl::Utf8SafeCHexEscape(name.substr(0, kMaxLength)),
+                                "\" is not accepted; expected ", accepted),
+                   field);
+}
+
+}  // namespace
+
+grpc::Status FindSession(const CallEnvironment& environment, const Caller& caller, const std::string& name,
+                         std::shared_ptr<Session>* session, const std::string& field) {
+  const std::vector<std::string> parts = Parts(name);
+  if (parts.size() != 2 || parts[0] != "sessions") {
+    return InvalidName(name, field, "sessions/{session}");
+  }
+  return environment.sessions.Find(caller.tenant, name, session);
+}
+
+grpc::Status FindOperation(const CallEnvironment& environment, const Caller& caller, const std::string& name,
+                           FoundOperation* found) {
+  const std::vector<std::string> parts = Parts(name);
+  if (parts.size() != 4 || parts[0] != "sessions" || parts[2] != "operations") {
+    return InvalidName(name, "name", "sessions/{session}/operations/{operation}");
+  }
+  if (grpc::Status status =
+          environment.sessions.Find(caller.tenant, absl::StrCat("sessions/", parts[1]), &found->session);
+      !status.ok()) {
+    return status;
+  }
+  return found->session->FindOperation(name, &found->operation);
+}
+
+}  // namespace wellspace::server

@@ -1,0 +1,35 @@
+// From the names of sessions and operations in requests to what they name.
+#ifndef WELLSPACE_SERVER_SERVICES_RESOURCE_NAMES_H_
+#define WELLSPACE_SERVER_SERVICES_RESOURCE_NAMES_H_
+
+#include <memory>
+#include <string>
+
+#include "grpcpp/support/status.h"
+#include "server/calls/call_environment.h"
+#include "server/security/authenticator.h"
+#include "server/sessions/operation.h"
+#include "server/sessions/session.h"
+
+namespace wellspace::server {
+
+// The session `name` of the caller's tenant, its lease renewed. `field` is where the request has the name.
+//
+// Errors:     INVALID_REQUEST, SESSION_NOT_FOUND.
+grpc::Status FindSession(const CallEnvironment& environment, const Caller& caller, const std::string& name,
+                         std::shared_ptr<Session>* session, const std::string& field = "name");
+
+struct FoundOperation {
+  std::shared_ptr<Session> session;
+  std::shared_ptr<Operation> operation;
+};
+
+// The same for an operation, of which the request has the name in `name`.
+//
+// Errors:     INVALID_REQUEST, SESSION_NOT_FOUND, OPERATION_NOT_FOUND.
+grpc::Status FindOperation(const CallEnvironment& environment, const Caller& caller, const std::string& name,
+                           FoundOperation* found);
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_SERVICES_RESOURCE_NAMES_H_

@@ -1,0 +1,81 @@
+#include "server/services/sessions/download_mesh_call.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "server/calls/wire.h"
+#include "server/services/resource_names.h"
+#include "server/sessions/mesh_chunks.h"
+#include "server/wire/convert.h"
+#include "server/wire/errors.h"
+
+namespace wellspace::server {
+
+void DownloadMeshCall::OnBegin() {
+  if (grpc::Status status = Find(); !status.ok()) {
+    End(std::move(status));
+    return;
+  }
+  WriteNext();
+}
+
+grpc::Status DownloadMeshCall::Find() {
+  if (grpc::Status status = ParseRequest(&bytes_, &request_); !status.ok()) {
+    return status;
+  }
+  std::shared_ptr<Session> session;
+  if (grpc::Status status = FindSession(environment(), caller(), request_.name(), &session); !status.ok()) {
+    return status;
+  }
+  std::shared_ptr<const MeshSnapshot> mesh = session->mesh();
+  if (mesh == nullptr) {
+    return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
+                     absl::StrCat(session->name(), " has no mesh yet; refine it first"));
+  }
+  if (request_.revision() != 0 && request_.revision() != mesh->revision) {
+    return MakeError(grpc::StatusCode::FAILED_PRECONDITION, v1::ERROR_REASON_REVISION_MISMATCH,
+                     absl::StrCat("the mesh of ", session->name(), " is of revision ", mesh->revision, ", not ",
+                                  request_.revision(), " as asked for; download it from its first chunk"),
+                     "revision");
+  }
+  if (request_.next_chunk() > mesh->chunks.count()) {
+    return MakeError(v1::ERROR_REASON_CHUNK_OUT_OF_RANGE,
+                     absl::StrCat("next_chunk is ", request_.next_chunk(), "; the mesh has ", mesh->chunks.count(),
+                                  " chunks, numbered from 0"),
+                     "next_chunk");
+  }
+  use_.emplace(std::move(session));
+  mesh_ = std::move(mesh);
+  next_chunk_ = request_.next_chunk();
+  return grpc::Status::OK;
+}
+
+std::optional<grpc::ByteBuffer> DownloadMeshCall::NextResponse() {
+  const MeshChunks& chunks = mesh_->chunks;
+  if (!metadata_sent_) {
+    metadata_sent_ = true;
+    v1::DownloadMeshResponse response;
+    *response.mutable_metadata() = MetadataToProto(chunks.mesh(), chunks.count());
+    response.mutable_metadata()->set_revision(mesh_->revision);
+    return Serialize(response);
+  }
+  if (next_chunk_ == chunks.count()) {
+    End(grpc::Status::OK);
+    return std::nullopt;
+  }
+  environment().log.debug("call={} chunk={}", id(), next_chunk_);
+  return SerializeChunk(std::shared_ptr<const MeshChunks>(mesh_, &chunks), next_chunk_++,
+                        v1::DownloadMeshResponse::kChunkFieldNumber);
+}
+
+LogFields DownloadMeshCall::Figures() const {
+  LogFields figures;
+  if (mesh_ != nullptr) {
+    figures.Add("session", request_.name())
+        .Add("vertices", mesh_->chunks.mesh().vertex_count())
+        .Add("chunks", next_chunk_ - request_.next_chunk());
+  }
+  return figures;
+}
+
+}  // namespace wellspace::server

@@ -1,0 +1,136 @@
+#include "server/services/sessions/upload_points_call.h"
+
+#include <mutex>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/time/time.h"
+#include "server/calls/wire.h"
+#include "server/services/resource_names.h"
+#include "server/wire/errors.h"
+
+namespace wellspace::server {
+namespace {
+
+// How often, and how many times, an upload looks whether the session is free: for a second.
+constexpr absl::Duration kRetryDelay = absl::Milliseconds(50);
+constexpr int kAttempts = 20;
+
+}  // namespace
+
+void UploadPointsCall::OnBegin() {
+  absl::StatusOr<MemoryReservation> memory = environment().memory.Reserve(kMessageBytes, "an upload");
+  if (!memory.ok()) {
+    End(FromCoreStatus(memory.status()));
+    return;
+  }
+  memory_ = *std::move(memory);
+  ReadNext();
+}
+
+void UploadPointsCall::OnRequest(grpc::ByteBuffer* bytes) {
+  v1::UploadPointsRequest request;
+  grpc::Status status = ParseRequest(bytes, &request);
+  if (status.ok() && !session_.has_value()) {
+    std::shared_ptr<Session> session;
+    status = FindSession(environment(), caller(), request.name(), &session);
+    if (status.ok()) {
+      session_.emplace(std::move(session));
+    }
+  }
+  if (!status.ok()) {
+    End(std::move(status));
+  } else if (has_session_) {
+    Take(request);
+  } else {
+    first_ = std::move(request);
+    TryToBegin();
+  }
+}
+
+void UploadPointsCall::TryToBegin() {
+  has_session_ = session_->session().BeginUpload();
+  if (has_session_) {
+    const v1::UploadPointsRequest first = std::exchange(first_, v1::UploadPointsRequest());
+    if (grpc::Status status = CheckPrefix(first); !status.ok()) {
+      End(std::move(status));
+    } else {
+      Take(first);
+    }
+  } else if (++attempts_ < kAttempts) {
+    environment().log.debug("call={} waits for another upload", id());
+    environment().background.PostAfter(kRetryDelay, WeakCall(&UploadPointsCall::TryAgain));
+  } else {
+    End(MakeError(v1::ERROR_REASON_SESSION_BUSY,
+                  absl::StrCat("another upload to ", session_->session().name(),
+                               " is under way; wait for its end, and then go on after its points")));
+  }
+}
+
+void UploadPointsCall::TryAgain() {
+  std::lock_guard lock(mutex_);
+  if (!ending()) {
+    TryToBegin();
+  }
+}
+
+grpc::Status UploadPointsCall::CheckPrefix(const v1::UploadPointsRequest& first) const {
+  if (!first.has_checked_crc32c()) {
+    return grpc::Status::OK;
+  }
+  if (first.checked_from() > first.point_offset()) {
+    return MakeError(v1::ERROR_REASON_INVALID_REQUEST,
+                     absl::StrCat("checked_from is ", first.checked_from(), "; at most point_offset, which is ",
+                                  first.point_offset(), ", is accepted"),
+                     "checked_from");
+  }
+  return session_->session().CheckPrefix(
+      {.first = first.checked_from(), .end = first.point_offset(), .crc32c = first.checked_crc32c()});
+}
+
+void UploadPointsCall::Take(const v1::UploadPointsRequest& request) {
+  // What the call has committed has changed the revision.
+  const uint64_t expected_revision = std::exchange(is_first_, false) ? request.expected_revision() : 0;
+  const google::protobuf::RepeatedField<double>& coordinates = request.points().coordinates();
+  Session& session = session_->session();
+  coordinate_count_ += coordinates.size();
+  environment().observability.work().points_received += coordinates.size() / session.dimension();
+  grpc::Status status = RunGuarded([&] {
+    return session.Append(request.point_offset(), {coordinates.data(), static_cast<size_t>(coordinates.size())},
+                          expected_revision);
+  });
+  if (!status.ok()) {
+    End(std::move(status));
+  } else {
+    ReadNext();
+  }
+}
+
+void UploadPointsCall::OnRequestsEnd() {
+  if (!session_.has_value()) {
+    End(MakeError(v1::ERROR_REASON_EMPTY_REQUEST,
+                  "the stream ended before any request; send the name of the session first", "name"));
+  } else {
+    *response_ = Serialize(session_->session().Committed());
+    End(grpc::Status::OK);
+  }
+}
+
+void UploadPointsCall::OnEnd() {
+  if (std::exchange(has_session_, false)) {
+    session_->session().EndUpload();
+  }
+  first_.Clear();
+  memory_.Release();
+}
+
+LogFields UploadPointsCall::Figures() const {
+  LogFields figures;
+  if (session_.has_value()) {
+    const Session& session = session_->session();
+    figures.Add("session", session.name()).Add("points", coordinate_count_ / session.dimension());
+  }
+  return figures;
+}
+
+}  // namespace wellspace::server

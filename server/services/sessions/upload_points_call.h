@@ -1,0 +1,61 @@
+// One call of UploadPoints.
+#ifndef WELLSPACE_SERVER_SERVICES_SESSIONS_UPLOAD_POINTS_CALL_H_
+#define WELLSPACE_SERVER_SERVICES_SESSIONS_UPLOAD_POINTS_CALL_H_
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "grpcpp/support/byte_buffer.h"
+#include "grpcpp/support/server_callback.h"
+#include "server/calls/call.h"
+#include "server/calls/request_stream.h"
+#include "server/jobs/memory_budget.h"
+#include "server/sessions/session.h"
+#include "wellspace/v1/sessions.pb.h"
+
+namespace wellspace::server {
+
+// Commits each message before it reads the next. One upload has a session at a time: the first message of another waits
+// for a moment, in which one whose connection broke is noticed.
+//
+// Thread safety and invariants: those of Call.
+class UploadPointsCall final : public RequestStream<Call<grpc::ServerReadReactor<grpc::ByteBuffer>>> {
+ public:
+  // REQUIRES:   `response` is valid until the end of the call.
+  UploadPointsCall(const CallEnvironment& environment, grpc::CallbackServerContext* context, grpc::ByteBuffer* response)
+      : RequestStream(environment, context), response_(response) {}
+
+ private:
+  void OnBegin() override;
+  void OnRequest(grpc::ByteBuffer* bytes) override;
+  void OnRequestsEnd() override;
+  void OnEnd() override;
+  LogFields Figures() const override;
+
+  // On the background thread: another upload had the session.
+  void TryAgain();
+
+  // The following want mutex_ to be held.
+  // With first_: takes it when the session is free, or comes again, or ends the call.
+  void TryToBegin();
+  // What the first message says that the session has.
+  grpc::Status CheckPrefix(const v1::UploadPointsRequest& first) const;
+  // Takes a message, and reads the next or ends the call.
+  void Take(const v1::UploadPointsRequest& request);
+
+  grpc::ByteBuffer* const response_;  // gRPC's from Finish on
+  // Guarded by mutex_.
+  std::optional<SessionUse> session_;  // nothing before the first message
+  bool has_session_ = false;           // the session is this upload's
+  int attempts_ = 0;                   // to have it
+  bool is_first_ = true;               // no message has been taken
+  v1::UploadPointsRequest first_;      // while it waits for the session
+  MemoryReservation memory_;           // of the message that comes
+  uint64_t coordinate_count_ = 0;      // received
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_SERVICES_SESSIONS_UPLOAD_POINTS_CALL_H_

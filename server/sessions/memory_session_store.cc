@@ -1,0 +1,120 @@
+#include "server/sessions/memory_session_store.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <utility>
+
+#include "absl/strings/escaping.h"
+#include "absl/strings/str_cat.h"
+#include "server/wire/errors.h"
+
+namespace wellspace::server {
+namespace {
+
+// 128 bits of the generator that the kernel has for keys; std::random_device does not promise as much.
+std::string UnguessableName() {
+  std::string bits(16, '\0');
+  if (getentropy(bits.data(), bits.size()) != 0) {
+    std::abort();  // no kernel that this runs on is without
+  }
+  return absl::StrCat("sessions/", absl::BytesToHexString(bits));
+}
+
+}  // namespace
+
+MemorySessionStore::MemorySessionStore(const ServiceOptions& options, MemoryBudget& memory, Clock clock)
+    : options_(options), memory_(memory), clock_(std::move(clock)) {}
+
+grpc::Status MemorySessionStore::Create(NewSession settings, std::shared_ptr<Session>* session) {
+  std::lock_guard lock(mutex_);
+  const auto known = tenants_.find(settings.tenant);
+  if (known != tenants_.end() && known->second.sessions.size() >= options_.max_sessions_per_tenant) {
+    return MakeError(v1::ERROR_REASON_QUOTA_EXCEEDED,
+                     absl::StrCat("you have ", known->second.sessions.size(), " sessions, and may have at most ",
+                                  options_.max_sessions_per_tenant, "; delete one"));
+  }
+  if (by_name_.size() >= options_.max_sessions) {
+    return MakeError(v1::ERROR_REASON_TOO_MANY_SESSIONS,
+                     absl::StrCat("this server has ", by_name_.size(), " sessions, as many as it may have"));
+  }
+  Tenant& tenant = tenants_[settings.tenant];
+  last_create_time_ = std::max(clock_.wall(), last_create_time_ + absl::Microseconds(1));
+  *session = std::make_shared<Session>(Session::Settings{.tenant = std::move(settings.tenant),
+                                                         .name = UnguessableName(),
+                                                         .parameters = std::move(settings.parameters),
+                                                         .labels = std::move(settings.labels),
+                                                         .ttl = settings.ttl,
+                                                         .create_time = last_create_time_},
+                                       options_, memory_, clock_, tenant.usage);
+  tenant.sessions.emplace(last_create_time_, *session);
+  by_name_.emplace((*session)->name(), *session);
+  return grpc::Status::OK;
+}
+
+grpc::Status MemorySessionStore::Find(const std::string& tenant, const std::string& name,
+                                      std::shared_ptr<Session>* session) {
+  std::lock_guard lock(mutex_);
+  const auto found = by_name_.find(name);
+  if (found == by_name_.end() || found->second->tenant() != tenant || !found->second->Renew()) {
+    return MakeError(v1::ERROR_REASON_SESSION_NOT_FOUND,
+                     absl::StrCat("there is no ", name, "; it may have been deleted, or have expired"));
+  }
+  *session = found->second;
+  return grpc::Status::OK;
+}
+
+std::vector<std::shared_ptr<Session>> MemorySessionStore::List(const std::string& tenant, absl::Time after,
+                                                               size_t count,
+                                                               const std::map<std::string, std::string>& labels) {
+  std::vector<std::shared_ptr<Session>> listed;
+  std::lock_guard lock(mutex_);
+  const auto known = tenants_.find(tenant);
+  if (known == tenants_.end()) {
+    return listed;
+  }
+  const auto& sessions = known->second.sessions;
+  for (auto at = sessions.upper_bound(after); at != sessions.end() && listed.size() < count; ++at) {
+    if (at->second->HasLabels(labels) && !at->second->IsExpired()) {
+      listed.push_back(at->second);
+    }
+  }
+  return listed;
+}
+
+bool MemorySessionStore::Remove(const Session& session) {
+  std::lock_guard lock(mutex_);
+  const auto tenant = tenants_.find(session.tenant());
+  if (by_name_.erase(session.name()) == 0) {
+    return false;
+  }
+  tenant->second.sessions.erase(session.create_time());
+  if (tenant->second.sessions.empty()) {
+    tenants_.erase(tenant);
+  }
+  return true;
+}
+
+size_t MemorySessionStore::Count() const {
+  std::lock_guard lock(mutex_);
+  return by_name_.size();
+}
+
+std::vector<std::shared_ptr<Session>> MemorySessionStore::RemoveExpired() {
+  std::vector<std::shared_ptr<Session>> expired;
+  {
+    std::lock_guard lock(mutex_);
+    for (const auto& [name, session] : by_name_) {
+      if (session->CloseIfExpired()) {
+        expired.push_back(session);
+      }
+    }
+  }
+  for (const std::shared_ptr<Session>& session : expired) {
+    Remove(*session);
+  }
+  return expired;
+}
+
+}  // namespace wellspace::server

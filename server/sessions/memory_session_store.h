@@ -1,0 +1,52 @@
+// Sessions that live as long as the process.
+#ifndef WELLSPACE_SERVER_SESSIONS_MEMORY_SESSION_STORE_H_
+#define WELLSPACE_SERVER_SESSIONS_MEMORY_SESSION_STORE_H_
+
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "server/base/options.h"
+#include "server/jobs/memory_budget.h"
+#include "server/sessions/session_store.h"
+
+namespace wellspace::server {
+
+// Thread safety: thread-safe.
+// Invariants: those of SessionStore. Locks of sessions are taken with that of the store held, never the other way round.
+class MemorySessionStore final : public SessionStore {
+ public:
+  // REQUIRES:   `options` and `memory` outlive this and all sessions.
+  MemorySessionStore(const ServiceOptions& options, MemoryBudget& memory, Clock clock);
+
+  grpc::Status Create(NewSession settings, std::shared_ptr<Session>* session) override;
+  grpc::Status Find(const std::string& tenant, const std::string& name, std::shared_ptr<Session>* session) override;
+  std::vector<std::shared_ptr<Session>> List(const std::string& tenant, absl::Time after, size_t count,
+                                             const std::map<std::string, std::string>& labels) override;
+  bool Remove(const Session& session) override;
+  size_t Count() const override;
+  std::vector<std::shared_ptr<Session>> RemoveExpired() override;
+
+ private:
+  struct Tenant {
+    std::shared_ptr<TenantUsage> usage = std::make_shared<TenantUsage>();
+    std::map<absl::Time, std::shared_ptr<Session>> sessions;  // by time of creation
+  };
+
+  const ServiceOptions& options_;
+  MemoryBudget& memory_;
+  const Clock clock_;
+  mutable std::mutex mutex_;
+  // Guarded by mutex_.
+  std::unordered_map<std::string, std::shared_ptr<Session>> by_name_;
+  std::map<std::string, Tenant> tenants_;  // those that have sessions
+  absl::Time last_create_time_ = absl::InfinitePast();
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_SESSIONS_MEMORY_SESSION_STORE_H_

@@ -1,0 +1,97 @@
+// An operation: long work on a session, as those see it who ask for it.
+#ifndef WELLSPACE_SERVER_SESSIONS_OPERATION_H_
+#define WELLSPACE_SERVER_SESSIONS_OPERATION_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "absl/time/time.h"
+#include "core/mesh_parameters.h"
+#include "grpcpp/support/status.h"
+#include "server/jobs/jobs.h"
+#include "server/sessions/progress_pacer.h"
+#include "wellspace/v1/operations.pb.h"
+
+namespace wellspace::server {
+
+// State, events and end of one operation.
+//
+// Thread safety: thread-safe. Functions given to Watch run without any lock of this held, on the thread that made the change.
+// Invariants: (1) events are those of a ProgressPacer; (2) the last kKeptEvents are kept, once it has ended the last kEventsOfEnded; (3)
+// of an operation that succeeded the last one is PHASE_DONE; (4) it ends once, and then nothing changes any more.
+class Operation {
+ public:
+  static constexpr size_t kKeptEvents = 32;
+  static constexpr size_t kEventsOfEnded = 8;
+
+  // `name` is "sessions/{session}/operations/{number}".
+  Operation(std::string name, uint64_t number, core::MeshParameters parameters, absl::Time create_time)
+      : name_(std::move(name)), number_(number), parameters_(std::move(parameters)), create_time_(create_time) {}
+
+  const std::string& name() const { return name_; }
+  uint64_t number() const { return number_; }
+  const core::MeshParameters& parameters() const { return parameters_; }
+  v1::Operation Describe() const;
+  bool IsQueued() const;
+  bool HasEnded() const;
+
+  // The first kept event that is later than number `after`; nothing: there is none.
+  std::optional<v1::ProgressEvent> EventAfter(std::optional<uint64_t> after) const;
+
+  // Calls `on_change` after every event and after the end, until Unwatch; a call may still be on its way then.
+  uint64_t Watch(std::function<void()> on_change);
+  void Unwatch(uint64_t watch);
+
+  // The job that does the work; null before it is queued.
+  void SetJob(std::shared_ptr<Job> job);
+  std::shared_ptr<Job> job() const;
+
+  // Makes an event of the job's progress if one is due; false once it has ended. To be called every
+  // ProgressPacer::kMinInterval; `now` is a time since boot.
+  bool Tick(absl::Duration now);
+
+  // For its session, which starts it at most once, and ends it once. Whoever has ended it calls Notify, without any lock.
+  void Start(absl::Time now);
+  // The figures are those of the new mesh.
+  void Succeed(absl::Time now, uint64_t mesh_revision, uint64_t vertices, uint64_t simplices);
+  // CANCELLED if that is the code of `status`, else FAILED.
+  void Fail(absl::Time now, const grpc::Status& status);
+  void Notify() const;
+
+ private:
+  // The following want mutex_ to be held.
+  core::Progress Snapshot() const;
+  void Keep(v1::ProgressEvent event);
+  void End(v1::Operation::State state, absl::Time now);
+  bool HasEndedLocked() const { return end_time_ != absl::InfiniteFuture(); }
+
+  const std::string name_;
+  const uint64_t number_;
+  const core::MeshParameters parameters_;
+  const absl::Time create_time_;
+
+  mutable std::mutex mutex_;
+  // Guarded by mutex_.
+  v1::Operation::State state_ = v1::Operation::STATE_QUEUED;
+  absl::Time start_time_ = absl::InfiniteFuture();
+  absl::Time end_time_ = absl::InfiniteFuture();
+  uint64_t mesh_revision_ = 0;
+  google::rpc::Status error_;
+  std::shared_ptr<Job> job_;
+  ProgressPacer pacer_;
+  std::deque<v1::ProgressEvent> events_;
+  uint64_t next_watch_ = 1;
+  std::map<uint64_t, std::function<void()>> watches_;
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_SESSIONS_OPERATION_H_

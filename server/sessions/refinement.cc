@@ -1,0 +1,200 @@
+#include "server/sessions/refinement.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/base/status_macros.h"
+#include "core/mesher.h"
+#include "server/base/clock.h"
+#include "server/jobs/job_size.h"
+#include "server/log/log_fields.h"
+#include "server/sessions/progress_pacer.h"
+#include "server/wire/errors.h"
+
+namespace wellspace::server {
+namespace {
+
+constexpr size_t kCopyBlock = size_t{1} << 20;  // numbers copied between two looks at the context
+
+template <typename T>
+absl::StatusOr<core::HugeVector<T>> Copy(const core::HugeVector<T>& values, const core::RunContext& context) {
+  core::HugeVector<T> copy;
+  copy.reserve(values.size());
+  for (size_t begin = 0; begin < values.size(); begin += kCopyBlock) {
+    WELLSPACE_RETURN_IF_ERROR(context.Check());
+    const T* first = values.data() + begin;
+    copy.insert(copy.end(), first, first + std::min(kCopyBlock, values.size() - begin));
+  }
+  return copy;
+}
+
+// Downloads may still read the last mesh: the next one is made of a copy.
+absl::StatusOr<core::Mesh> Copy(const core::Mesh& mesh, const core::RunContext& context) {
+  core::Mesh copy;
+  copy.dimension = mesh.dimension;
+  copy.domain_low = mesh.domain_low;
+  copy.domain_high = mesh.domain_high;
+  copy.statistics = mesh.statistics;
+  WELLSPACE_ASSIGN_OR_RETURN(copy.points, Copy(mesh.points, context));
+  WELLSPACE_ASSIGN_OR_RETURN(copy.weights, Copy(mesh.weights, context));
+  WELLSPACE_ASSIGN_OR_RETURN(copy.simplices, Copy(mesh.simplices, context));
+  return copy;  // Update makes input_vertex anew
+}
+
+absl::StatusOr<core::Mesh> MeshFirst(const CallEnvironment& environment, const Session& session,
+                                     const core::MeshParameters& parameters, core::RunContext& context,
+                                     SessionWork& work) {
+  std::unique_ptr<core::Mesher> mesher;
+  {
+    WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> points, session.points().CopyFrom(0, context));
+    WELLSPACE_ASSIGN_OR_RETURN(mesher, environment.create_mesher(parameters, points, context));
+  }
+  WELLSPACE_RETURN_IF_ERROR(core::ReserveMemory(*mesher, parameters, context));
+  WELLSPACE_RETURN_IF_ERROR(mesher->Refine(parameters, context));
+  WELLSPACE_ASSIGN_OR_RETURN(core::Mesh mesh, mesher->Extract(parameters.threads, context));
+  work.mesher = std::move(mesher);
+  return mesh;
+}
+
+// Builds the mesher that was given up, if it was. Those who watch the operation see the progress of what it was started
+// for alone.
+absl::Status BringBack(const CallEnvironment& environment, const Session& session, Job& job, SessionWork& work) {
+  if (work.mesher == nullptr) {
+    job.context().EnterPhase(core::Phase::kTree);
+    WELLSPACE_ASSIGN_OR_RETURN(work.mesher, Replay(session.steps(), session.points(), work.mesh->chunks.mesh(),
+                                                   environment.create_mesher, job));
+  }
+  return absl::OkStatus();
+}
+
+// `*has_changed`: the mesher may be another than before, on an error too.
+absl::StatusOr<core::Mesh> MeshAgain(const Session& session, const core::MeshParameters& parameters,
+                                     core::RunContext& context, SessionWork& work, bool* has_changed) {
+  context.EnterPhase(core::Phase::kTree);
+  {
+    WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> points,
+                               session.points().CopyFrom(work.meshed_points * parameters.dimension, context));
+    *has_changed = true;
+    if (const absl::Status added = work.mesher->AddPoints(points, context).status(); !added.ok()) {
+      *has_changed = false;  // it takes all or none
+      return added;
+    }
+  }
+  WELLSPACE_RETURN_IF_ERROR(work.mesher->Refine(parameters, context));
+  WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(work.mesher->memory_bytes() + work.mesh->chunks.memory_bytes()));
+  WELLSPACE_ASSIGN_OR_RETURN(core::Mesh mesh, Copy(work.mesh->chunks.mesh(), context));
+  WELLSPACE_RETURN_IF_ERROR(work.mesher->Update(mesh, parameters.threads, context));
+  return mesh;
+}
+
+// Has the mesh made, by what the session has given for it. What did not succeed leaves nothing behind: a mesher that it
+// has changed is given up, and comes back by Replay.
+grpc::Status Work(const CallEnvironment& environment, const Session& session, const core::MeshParameters& parameters,
+                  Job& job, SessionWork& work, std::shared_ptr<MeshSnapshot>* mesh) {
+  bool has_changed = false;
+  grpc::Status status = RunGuarded([&] {
+    absl::StatusOr<core::Mesh> made;
+    if (work.mesh == nullptr) {
+      made = MeshFirst(environment, session, parameters, job.context(), work);
+    } else if (absl::Status back = BringBack(environment, session, job, work); !back.ok()) {
+      made = std::move(back);
+    } else {
+      made = MeshAgain(session, parameters, job.context(), work, &has_changed);
+    }
+    if (made.ok()) {
+      *mesh = std::make_shared<MeshSnapshot>(*std::move(made));
+    }
+    return FromCoreStatus(made.status());
+  });
+  if (!status.ok() && (has_changed || work.mesh == nullptr)) {
+    work.mesher = nullptr;
+  }
+  return status;
+}
+
+void Run(const CallEnvironment& environment, Session& session, Operation& operation, Job& job) {
+  const absl::Duration start = SinceBoot();
+  std::optional<SessionWork> work = session.BeginWork(operation);
+  if (!work.has_value()) {
+    return;
+  }
+  const size_t replayed = work->mesher == nullptr ? session.steps().all().size() : 0;
+  const uint64_t points = session.points().coordinate_count() / operation.parameters().dimension;
+  job.GiveMemory(std::move(work->memory));
+  std::shared_ptr<MeshSnapshot> mesh;
+  const grpc::Status status = Work(environment, session, operation.parameters(), job, *work, &mesh);
+  if (work->mesher != nullptr) {
+    work->memory = job.TakeMemory(work->mesher->memory_bytes());
+    work->memory.MakeLasting();
+  }
+  if (mesh != nullptr) {
+    MemoryReservation memory = job.TakeMemory(mesh->chunks.memory_bytes());
+    memory.MakeLasting();
+    mesh->chunks.KeepMemory(std::move(memory));
+    environment.observability.work().vertices_made += mesh->chunks.mesh().vertex_count();
+    environment.observability.work().simplices_made += mesh->chunks.mesh().simplex_count();
+  }
+  job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();  // who is told of the end may use it at once
+  LogFields fields;
+  fields.Add("event", "refinement").Add("operation", operation.name()).Add("tenant", session.tenant());
+  fields.Add("code", absl::StatusCodeToString(static_cast<absl::StatusCode>(status.error_code())));
+  fields.Add("seconds", absl::ToDoubleSeconds(SinceBoot() - start)).Add("points", points);
+  fields.Add("vertices", mesh == nullptr ? 0 : mesh->chunks.mesh().vertex_count());
+  if (replayed > 0) {
+    fields.Add("replayed_steps", replayed);
+  }
+  if (!status.ok()) {
+    fields.Add("message", status.error_message());
+  }
+  environment.log.log(status.error_code() == grpc::StatusCode::INTERNAL ? spdlog::level::err : spdlog::level::info,
+                      "{}", fields.text());
+  session.EndWork(operation, status, *std::move(work), std::move(mesh));
+}
+
+void Tick(Background& background, const std::weak_ptr<Operation>& weak) {
+  const std::shared_ptr<Operation> operation = weak.lock();
+  if (operation != nullptr && operation->Tick(SinceBoot())) {
+    background.PostAfter(ProgressPacer::kMinInterval, [&background, weak] { Tick(background, weak); });
+  }
+}
+
+}  // namespace
+
+grpc::Status StartRefinement(const CallEnvironment& environment, const std::shared_ptr<Session>& session,
+                             const core::MeshParameters& parameters, uint64_t expected_revision,
+                             std::shared_ptr<Operation>* operation) {
+  const Session::Size size = session->GetSize(kMostPoints);
+  const bool is_small =
+      size.points <= kMostPoints && IsSmallRefinement(parameters, size.some_points, size.vertices, size.replayed_steps);
+  const auto submit = [&](const std::shared_ptr<Operation>& started) {
+    JobPool::Submission submission = environment.jobs.Submit(
+        {.tenant = session->tenant(), .is_small = is_small, .work = [&environment, session, started](Job& job) {
+           Run(environment, *session, *started, job);
+         }});
+    if (submission.job == nullptr) {
+      return submission.refusal;
+    }
+    started->SetJob(std::move(submission.job));
+    return grpc::Status::OK;
+  };
+  if (grpc::Status status = session->StartOperation(parameters, expected_revision, submit, operation); !status.ok()) {
+    return status;
+  }
+  environment.background.Post(
+      [&background = environment.background, weak = std::weak_ptr(*operation)] { Tick(background, weak); });
+  return grpc::Status::OK;
+}
+
+void CancelOperation(const CallEnvironment& environment, Session& session, Operation& operation) {
+  const std::shared_ptr<Job> job = operation.job();  // null once it has ended
+  session.EndWaiting(operation);
+  if (job != nullptr) {
+    environment.jobs.Cancel(job);
+  }
+}
+
+}  // namespace wellspace::server

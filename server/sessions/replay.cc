@@ -1,0 +1,85 @@
+#include "server/sessions/replay.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "core/base/status_macros.h"
+
+namespace wellspace::server {
+namespace {
+
+// The structure as far as the steps have made it.
+class Structure {
+ public:
+  Structure(const PointStore& points, const MesherFactory& create_mesher)
+      : points_(points), create_mesher_(create_mesher) {}
+
+  absl::Status Take(const SessionStep& step, core::RunContext& context) {
+    if (mesher_ == nullptr) {
+      return Begin(step, context);
+    }
+    WELLSPACE_RETURN_IF_ERROR(AddPointsUntil(step.uploads_end, context));
+    if (step.refined_with == nullptr) {
+      return AddPointsUntil(step.end, context);
+    }
+    WELLSPACE_RETURN_IF_ERROR(mesher_->Refine(*step.refined_with, context));
+    WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(mesher_->memory_bytes() + mesh_.points.size() * sizeof(double) +
+                                                  mesh_.simplices.size() * sizeof(uint32_t)));
+    return mesher_->Update(mesh_, step.refined_with->threads, context);
+  }
+
+  const core::Mesh& mesh() const { return mesh_; }
+  std::unique_ptr<core::Mesher> TakeMesher() { return std::move(mesher_); }
+
+ private:
+  absl::Status Begin(const SessionStep& step, core::RunContext& context) {
+    const core::MeshParameters& parameters = *step.refined_with;
+    {
+      WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> points, Copy(parameters.dimension, step.end, context));
+      WELLSPACE_ASSIGN_OR_RETURN(mesher_, create_mesher_(parameters, points, context));
+    }
+    WELLSPACE_RETURN_IF_ERROR(core::ReserveMemory(*mesher_, parameters, context));
+    WELLSPACE_RETURN_IF_ERROR(mesher_->Refine(parameters, context));
+    WELLSPACE_ASSIGN_OR_RETURN(mesh_, mesher_->Extract(parameters.threads, context));
+    return absl::OkStatus();
+  }
+
+  absl::Status AddPointsUntil(uint64_t end, core::RunContext& context) {
+    WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> points, Copy(mesher_->dimension(), end, context));
+    return points.empty() ? absl::OkStatus() : mesher_->AddPoints(points, context).status();
+  }
+
+  absl::StatusOr<std::vector<double>> Copy(int dimension, uint64_t end, const core::RunContext& context) {
+    return points_.Copy(std::exchange(taken_, end) * dimension, end * dimension, context);
+  }
+
+  const PointStore& points_;
+  const MesherFactory& create_mesher_;
+  std::unique_ptr<core::Mesher> mesher_;
+  core::Mesh mesh_;
+  uint64_t taken_ = 0;  // of the points
+};
+
+bool IsSame(const core::Mesh& a, const core::Mesh& b) {
+  return std::ranges::equal(a.points, b.points) && std::ranges::equal(a.simplices, b.simplices) &&
+         std::ranges::equal(a.weights, b.weights);
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<core::Mesher>> Replay(const SessionSteps& steps, const PointStore& points,
+                                                     const core::Mesh& last_mesh, const MesherFactory& create_mesher,
+                                                     Job& job) {
+  Structure structure(points, create_mesher);
+  for (const SessionStep& step : steps.all()) {
+    WELLSPACE_RETURN_IF_ERROR(job.RunApart([&](core::RunContext& context) { return structure.Take(step, context); }));
+  }
+  if (!IsSame(structure.mesh(), last_mesh)) {
+    return absl::InternalError("the steps of the session make another mesh than they made before");
+  }
+  return structure.TakeMesher();
+}
+
+}  // namespace wellspace::server

@@ -1,0 +1,34 @@
+// The structure of a session, computed from its steps.
+#ifndef WELLSPACE_SERVER_SESSIONS_REPLAY_H_
+#define WELLSPACE_SERVER_SESSIONS_REPLAY_H_
+
+#include <memory>
+#include <span>
+
+#include "absl/status/statusor.h"
+#include "core/base/run_context.h"
+#include "core/mesh_parameters.h"
+#include "core/mesher.h"
+#include "server/base/mesh_functions.h"
+#include "server/jobs/jobs.h"
+#include "server/sessions/point_store.h"
+#include "server/sessions/session_steps.h"
+
+namespace wellspace::server {
+
+// Takes `steps` again, from the first on, in the work of `job` but apart from its context. `last_mesh` is the mesh of
+// the last refinement among them.
+//
+// REQUIRES:   `steps` is not empty; its points are in `points`, which nothing changes meanwhile.
+// Guarantees: what is made of the mesher from now on is, to the bit, what would have been made of the one that the
+//             steps made.
+// Complexity: that of the steps. Reserves memory as the first refinement did.
+// Errors:     those of the steps: RESOURCE_EXHAUSTED, CANCELLED, DEADLINE_EXCEEDED; INTERNAL: the mesh is not
+//             `last_mesh`.
+absl::StatusOr<std::unique_ptr<core::Mesher>> Replay(const SessionSteps& steps, const PointStore& points,
+                                                     const core::Mesh& last_mesh, const MesherFactory& create_mesher,
+                                                     Job& job);
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_SESSIONS_REPLAY_H_

@@ -1,0 +1,667 @@
+#include "server/sessions/session.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "server/wire/convert.h"
+#include "server/wire/errors.h"
+
+namespace wellspace::server {
+namespace {
+
+constexpr size_t kKeptOperations = 100;
+
+// A vertex that is added takes as much memory as this many of those that there are, at most in all but the most uneven clouds.
+constexpr uint64_t kReservedVertices = 2;
+
+}  // namespace
+
+Session::Session(Settings settings, const ServiceOptions& options, MemoryBudget& memory, Clock clock,
+                 std::shared_ptr<TenantUsage> usage)
+    : tenant_(std::move(settings.tenant)),
+      name_(std::move(settings.name)),
+      dimension_(settings.parameters.dimension),
+      create_time_(settings.create_time),
+      options_(options),
+      memory_(memory),
+      clock_(std::move(clock)),
+      usage_(std::move(usage)),
+      parameters_(std::move(settings.parameters)),
+      labels_(std::move(settings.labels)),
+      ttl_(settings.ttl),
+      last_use_(clock_.since_boot()),
+      point_memory_(memory.ReserveNothing()) {
+  point_memory_.MakeLasting();
+}
+
+Session::~Session() {
+  if (!is_closed_) {
+    usage_->points -= point_count_;
+  }
+}
+
+core::MeshParameters Session::parameters() const {
+  std::lock_guard lock(mutex_);
+  return parameters_;
+}
+
+v1::Session Session::Describe() const {
+  v1::Session message;
+  message.set_name(name_);
+  *message.mutable_create_time() = TimeToProto(create_time_);
+  std::lock_guard lock(mutex_);
+  message.set_state(busy_ == Busy::kOperation ? v1::Session::STATE_REFINING
+                    : is_ready_               ? v1::Session::STATE_READY
+                                              : v1::Session::STATE_OPEN);
+  *message.mutable_parameters() = ParametersToProto(parameters_);
+  message.mutable_labels()->insert(labels_.begin(), labels_.end());
+  *message.mutable_ttl() = DurationToProto(ttl_);
+  *message.mutable_expire_time() = TimeToProto(clock_.wall() + (ExpiresAt() - clock_.since_boot()));
+  message.set_revision(revision_);
+  message.set_committed_points(points_.coordinate_count() / dimension_);
+  if (work_.mesh != nullptr) {
+    message.set_vertex_count(work_.mesh->chunks.mesh().vertex_count());
+    message.set_simplex_count(work_.mesh->chunks.mesh().simplex_count());
+  }
+  if (!operations_.empty()) {
+    message.set_last_operation(operations_.back()->name());
+  }
+  return message;
+}
+
+bool Session::HasLabels(const std::map<std::string, std::string>& labels) const {
+  std::lock_guard lock(mutex_);
+  return std::all_of(labels.begin(), labels.end(), [this](const auto& label) {
+    const auto found = labels_.find(label.first);
+    return found != labels_.end() && found->second == label.second;
+  });
+}
+
+bool Session::Renew() {
+  std::lock_guard lock(mutex_);
+  if (is_closed_ || ExpiresAt() <= clock_.since_boot()) {
+    return false;
+  }
+  last_use_ = clock_.since_boot();
+  return true;
+}
+
+bool Session::IsExpired() const {
+  std::lock_guard lock(mutex_);
+  return ExpiresAt() <= clock_.since_boot();
+}
+
+absl::Duration Session::ExpiresAt() const {
+  return (uses_ > 0 || busy_ != Busy::kNo ? clock_.since_boot() : last_use_) + ttl_;
+}
+
+grpc::Status Session::Update(std::optional<std::map<std::string, std::string>> labels,
+                             std::optional<absl::Duration> ttl, uint64_t expected_revision) {
+  std::lock_guard lock(mutex_);
+  if (grpc::Status status = CheckOpen(); !status.ok()) {
+    return status;
+  }
+  if (grpc::Status status = CheckRevision(expected_revision); !status.ok()) {
+    return status;
+  }
+  if (labels.has_value()) {
+    labels_ = *std::move(labels);
+  }
+  if (ttl.has_value()) {
+    ttl_ = *ttl;
+  }
+  return grpc::Status::OK;
+}
+
+grpc::Status Session::Close(uint64_t expected_revision, std::shared_ptr<Operation>* under_way) {
+  std::lock_guard lock(mutex_);
+  if (grpc::Status status = CheckOpen(); !status.ok()) {
+    return status;
+  }
+  if (grpc::Status status = CheckRevision(expected_revision); !status.ok()) {
+    return status;
+  }
+  CloseNow();
+  *under_way = busy_ == Busy::kOperation ? operations_.back() : nullptr;
+  return grpc::Status::OK;
+}
+
+bool Session::CloseIfExpired() {
+  std::lock_guard lock(mutex_);
+  const bool is_expired = !is_closed_ && ExpiresAt() <= clock_.since_boot();
+  if (is_expired) {
+    CloseNow();
+  }
+  return is_expired;
+}
+
+void Session::CloseNow() {
+  is_closed_ = true;
+  usage_->points -= point_count_;
+}
+
+grpc::Status Session::CheckOpen() const {
+  return is_closed_ ? MakeError(v1::ERROR_REASON_SESSION_NOT_FOUND,
+                                absl::StrCat(name_, " does not exist any more: it was deleted, or has expired"))
+                    : grpc::Status::OK;
+}
+
+grpc::Status Session::CheckRevision(uint64_t expected_revision) const {
+  return expected_revision == 0 || expected_revision == revision_
+             ? grpc::Status::OK
+             : MakeError(v1::ERROR_REASON_REVISION_MISMATCH,
+                         absl::StrCat("expected_revision is ", expected_revision, ", but ", name_, " is at revision ",
+                                      revision_));
+}
+
+grpc::Status Session::CheckIdle() const {
+  switch (busy_) {
+    case Busy::kNo:
+      return grpc::Status::OK;
+    case Busy::kOperation:
+      return MakeError(v1::ERROR_REASON_SESSION_BUSY,
+                       absl::StrCat(operations_.back()->name(), " is under way; wait for its end, or cancel it"));
+    case Busy::kAddingVertices:
+      return MakeError(v1::ERROR_REASON_SESSION_BUSY, absl::StrCat("vertices are being added to ", name_));
+    case Busy::kReplaying:
+      break;
+  }
+  return MakeError(v1::ERROR_REASON_SESSION_BUSY,
+                   absl::StrCat("a query or an addition of vertices has the structure of ", name_,
+                                " built again, which an operation without success gave up; try again later"));
+}
+
+grpc::Status Session::CheckReadyForChange(uint64_t expected_revision) const {
+  if (grpc::Status status = CheckOpen(); !status.ok()) {
+    return status;
+  }
+  if (grpc::Status status = CheckIdle(); !status.ok()) {
+    return status;
+  }
+  return CheckRevision(expected_revision);
+}
+
+grpc::Status Session::CheckMesh() const {
+  return work_.mesh != nullptr ? grpc::Status::OK
+                               : MakeError(v1::ERROR_REASON_MESH_NOT_READY,
+                                           absl::StrCat(name_, " has no mesh yet; start a refinement first"));
+}
+
+grpc::Status Session::CheckStructure() const {
+  if (grpc::Status status = CheckMesh(); !status.ok() || work_.mesher != nullptr) {
+    return status;
+  }
+  return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
+                   absl::StrCat("an operation without success has given up the structure of ", name_,
+                                " in this moment; ask again, and it is built again"));
+}
+
+grpc::Status Session::TakePoints(uint64_t count) {
+  if (point_count_ + count > options_.max_points) {
+    return MakeError(v1::ERROR_REASON_TOO_MANY_POINTS,
+                     absl::StrCat(name_, " would have ", point_count_ + count,
+                                  " points; a session of this server has at most ", options_.max_points));
+  }
+  if (const uint64_t all = usage_->points += count; all > options_.max_points_per_tenant) {
+    usage_->points -= count;
+    return MakeError(v1::ERROR_REASON_QUOTA_EXCEEDED,
+                     absl::StrCat("your sessions would have ", all, " points together; they may have at most ",
+                                  options_.max_points_per_tenant));
+  }
+  if (const uint64_t bytes = (point_count_ + count) * dimension_ * sizeof(double); !point_memory_.Resize(bytes)) {
+    usage_->points -= count;
+    return FromCoreStatus(memory_.Refusal(bytes, "the points of a session"));
+  }
+  point_count_ += count;
+  return grpc::Status::OK;
+}
+
+void Session::ReturnPoints(uint64_t count) {
+  point_count_ -= count;
+  (void)point_memory_.Resize(point_count_ * dimension_ * sizeof(double));  // shrinking never fails
+  if (!is_closed_) {
+    usage_->points -= count;
+  }
+}
+
+grpc::Status Session::CheckCoordinates(uint64_t first, std::span<const double> coordinates) const {
+  // Before there is a mesh, a domain that was not given grows with the points.
+  const std::vector<double>* low = &parameters_.domain_low;
+  const std::vector<double>* high = &parameters_.domain_high;
+  if (work_.mesh != nullptr) {
+    low = &work_.mesh->chunks.mesh().domain_low;
+    high = &work_.mesh->chunks.mesh().domain_high;
+  }
+  int axis = 0;
+  for (size_t i = 0; i < coordinates.size(); ++i) {
+    const double x = coordinates[i];
+    if (low->empty() ? !std::isfinite(x) : !(x >= (*low)[axis] && x <= (*high)[axis])) {
+      return MakeError(
+          v1::ERROR_REASON_INVALID_POINTS,
+          absl::StrCat("points[", first + i / dimension_, "]: coordinate ", axis, " is ", x, "; ",
+                       low->empty() ? "a finite number is needed"
+                                    : absl::StrCat("in the domain it is from ", (*low)[axis], " to ", (*high)[axis])),
+          "points.coordinates");
+    }
+    axis = axis + 1 == dimension_ ? 0 : axis + 1;
+  }
+  return grpc::Status::OK;
+}
+
+bool Session::BeginUpload() {
+  std::lock_guard lock(mutex_);
+  return !std::exchange(is_uploading_, true);
+}
+
+void Session::EndUpload() {
+  std::lock_guard lock(mutex_);
+  is_uploading_ = false;
+}
+
+grpc::Status Session::CheckNoGap(uint64_t offset) const {
+  return offset <= point_count_
+             ? grpc::Status::OK
+             : MakeError(v1::ERROR_REASON_UPLOAD_GAP,
+                         absl::StrCat("point_offset is ", offset, ", but ", name_, " has ", point_count_,
+                                      " points; go on at ", point_count_, " or before"),
+                         "point_offset");
+}
+
+grpc::Status Session::CheckPrefix(const Prefix& prefix) const {
+  std::lock_guard lock(mutex_);
+  if (grpc::Status status = CheckIdle(); !status.ok()) {
+    return status;
+  }
+  if (grpc::Status status = CheckNoGap(prefix.end); !status.ok()) {
+    return status;
+  }
+  const uint32_t checksum = points_.Checksum(prefix.first * dimension_, prefix.end * dimension_);
+  return checksum == prefix.crc32c
+             ? grpc::Status::OK
+             : MakeError(
+                   v1::ERROR_REASON_UPLOAD_MISMATCH,
+                   absl::StrCat(name_, " has other points from number ", prefix.first, " up to ", prefix.end,
+                                " than those that this upload goes on after: their checksum is ", checksum, ", not ",
+                                prefix.crc32c, "; add these points at ", point_count_, ", or to another session"),
+                   "checked_crc32c");
+}
+
+grpc::Status Session::CheckKnown(uint64_t first, std::span<const double> coordinates) const {
+  const uint64_t equal = points_.CountEqual(first * dimension_, coordinates);
+  if (equal == coordinates.size()) {
+    return grpc::Status::OK;
+  }
+  const uint64_t point = first + equal / dimension_;
+  return MakeError(v1::ERROR_REASON_UPLOAD_MISMATCH,
+                   absl::StrCat("points[", point, "]: coordinate ", equal % dimension_, " is ", coordinates[equal],
+                                "; ", name_, " has this point already, with ", points_.at(first * dimension_ + equal),
+                                "; send the same again, or add other points at ", point_count_),
+                   "points.coordinates");
+}
+
+grpc::Status Session::Append(uint64_t offset, std::span<const double> coordinates, uint64_t expected_revision) {
+  std::lock_guard lock(mutex_);
+  if (grpc::Status status = CheckReadyForChange(expected_revision); !status.ok()) {
+    return status;
+  }
+  if (coordinates.size() % dimension_ != 0) {
+    return MakeError(v1::ERROR_REASON_INVALID_CHUNK_SHAPE,
+                     absl::StrCat("the chunk at point ", offset, " has ", coordinates.size(),
+                                  " coordinates; expected a multiple of the dimension ", dimension_),
+                     "points.coordinates");
+  }
+  if (grpc::Status status = CheckNoGap(offset); !status.ok()) {
+    return status;
+  }
+  const uint64_t committed = point_count_;
+  const uint64_t known = std::min<uint64_t>(committed - offset, coordinates.size() / dimension_);
+  if (grpc::Status status = CheckKnown(offset, coordinates.first(known * dimension_)); !status.ok()) {
+    return status;
+  }
+  coordinates = coordinates.subspan(known * dimension_);
+  if (coordinates.empty()) {
+    return grpc::Status::OK;
+  }
+  if (grpc::Status status = CheckCoordinates(committed, coordinates); !status.ok()) {
+    return status;
+  }
+  if (grpc::Status status = TakePoints(coordinates.size() / dimension_); !status.ok()) {
+    return status;
+  }
+  points_.Append(coordinates);
+  is_ready_ = false;
+  ++revision_;
+  return grpc::Status::OK;
+}
+
+v1::UploadPointsResponse Session::Committed() const {
+  v1::UploadPointsResponse message;
+  std::lock_guard lock(mutex_);
+  message.set_committed_points(points_.coordinate_count() / dimension_);
+  message.set_revision(revision_);
+  return message;
+}
+
+std::shared_ptr<const MeshSnapshot> Session::mesh() const {
+  std::lock_guard lock(mutex_);
+  return work_.mesh;
+}
+
+grpc::Status Session::Query(uint64_t* version, const std::function<grpc::Status(const core::Mesher&)>& query) const {
+  std::shared_lock running(queries_mutex_, std::defer_lock);
+  const core::Mesher* mesher = nullptr;
+  {
+    std::lock_guard lock(mutex_);
+    if (grpc::Status status = CheckOpen(); !status.ok()) {
+      return status;
+    }
+    if (grpc::Status status = CheckIdle(); !status.ok()) {
+      return status;
+    }
+    if (grpc::Status status = CheckStructure(); !status.ok()) {
+      return status;
+    }
+    if (*version != 0 && *version != structure_version_) {
+      return MakeError(v1::ERROR_REASON_REVISION_MISMATCH,
+                       absl::StrCat(name_, " has changed since the first batch of this call"));
+    }
+    *version = structure_version_;
+    mesher = work_.mesher.get();
+    running.lock();  // at once: whoever waits for queries has made the session busy before
+  }
+  return query(*mesher);
+}
+
+grpc::Status Session::PrepareStructure(uint64_t expected_revision, const MesherFactory& create_mesher, Job& job,
+                                       bool* is_at_work) {
+  {
+    std::lock_guard lock(mutex_);
+    if (is_at_work != nullptr) {
+      *is_at_work = busy_ == Busy::kReplaying && !is_closed_;
+    }
+    if (grpc::Status status = CheckReadyForChange(expected_revision); !status.ok()) {
+      return status;
+    }
+    if (grpc::Status status = CheckMesh(); !status.ok() || work_.mesher != nullptr) {
+      return status;
+    }
+    busy_ = Busy::kReplaying;
+  }
+  const grpc::Status status = RunGuarded([&] { return Rebuild(create_mesher, job); });
+  job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();
+  std::lock_guard lock(mutex_);
+  busy_ = Busy::kNo;
+  last_use_ = clock_.since_boot();
+  return status;
+}
+
+Session::Size Session::GetSize(uint64_t few) const {
+  std::lock_guard lock(mutex_);
+  Size size;
+  size.points = points_.coordinate_count() / dimension_;
+  if (size.points <= few) {
+    size.some_points = points_.CopyFrom(0, core::RunContext()).value_or(std::vector<double>());
+  }
+  if (work_.mesh != nullptr) {
+    size.vertices = work_.mesh->chunks.mesh().vertex_count();
+    // Of a session that is busy the mesher is not looked at.
+    const bool is_given_up = busy_ == Busy::kReplaying || (busy_ == Busy::kNo && work_.mesher == nullptr);
+    size.replayed_steps = is_given_up ? steps_.all().size() : 0;
+  }
+  return size;
+}
+
+grpc::Status Session::Rebuild(const MesherFactory& create_mesher, Job& job) {
+  absl::StatusOr<std::unique_ptr<core::Mesher>> mesher =
+      Replay(steps_, points_, work_.mesh->chunks.mesh(), create_mesher, job);
+  if (!mesher.ok()) {
+    return FromCoreStatus(mesher.status());
+  }
+  work_.mesher = *std::move(mesher);
+  work_.memory = job.TakeMemory(work_.mesher->memory_bytes());
+  work_.memory.MakeLasting();
+  return grpc::Status::OK;
+}
+
+void Session::WaitForQueries() { std::unique_lock wait(queries_mutex_); }
+
+grpc::Status Session::AddVertices(std::span<const double> points, std::span<const uint32_t> near,
+                                  uint64_t expected_revision, core::RunContext& context, AddedVertices* added) {
+  {
+    std::lock_guard lock(mutex_);
+    if (grpc::Status status = CheckReadyForChange(expected_revision); !status.ok()) {
+      return status;
+    }
+    if (grpc::Status status = CheckStructure(); !status.ok()) {
+      return status;
+    }
+    if (points.size() % dimension_ != 0) {
+      return MakeError(
+          v1::ERROR_REASON_INVALID_CHUNK_SHAPE,
+          absl::StrCat("there are ", points.size(), " coordinates; expected a multiple of the dimension ", dimension_),
+          "points");
+    }
+    if (!near.empty() && near.size() != points.size() / dimension_) {
+      return MakeError(v1::ERROR_REASON_INVALID_REQUEST,
+                       absl::StrCat("near has ", near.size(), " vertices for ", points.size() / dimension_,
+                                    " points; expected as many, or none"),
+                       "near");
+    }
+    if (grpc::Status status = TakePoints(points.size() / dimension_); !status.ok()) {
+      return status;
+    }
+    busy_ = Busy::kAddingVertices;
+  }
+  WaitForQueries();
+  uint64_t uploaded = 0;
+  bool has_returned = false;
+  grpc::Status status = RunGuarded([&] {
+    grpc::Status ended = AddToMesher(points, near, context, &uploaded, &added->vertices);
+    has_returned = true;
+    return ended;
+  });
+  if (!has_returned || (!status.ok() && uploaded > 0)) {
+    // Nobody knows what a mesher is like that an exception went through, and points that waited are in it that would
+    // come with others.
+    work_.mesher = nullptr;
+    work_.memory.Release();
+  } else if (memory_.is_limited()) {
+    // What was reserved is more than was needed but for the most uneven points; those are counted by the next refinement.
+    (void)work_.memory.Resize(work_.mesher->memory_bytes());
+  }
+  std::lock_guard lock(mutex_);
+  busy_ = Busy::kNo;
+  last_use_ = clock_.since_boot();
+  const uint64_t count = points.size() / dimension_;
+  if (!status.ok()) {
+    ReturnPoints(count);
+    return status;
+  }
+  if (uploaded > 0 || count > 0) {
+    const uint64_t uploads_end = work_.meshed_points + uploaded;
+    steps_.NoteAddition(uploads_end, uploads_end + count);
+    work_.meshed_points = steps_.points();
+    ++structure_version_;
+  }
+  if (count > 0) {
+    points_.Append(points);
+    is_ready_ = false;
+    ++revision_;
+  }
+  added->revision = revision_;
+  return status;
+}
+
+grpc::Status Session::CheckVertices(std::span<const double> points, std::span<const uint32_t> near,
+                                    uint64_t waiting) const {
+  const uint64_t most = work_.mesher->vertex_count() + waiting;
+  const auto missing = std::ranges::find_if(near, [most](uint32_t vertex) { return vertex >= most; });
+  if (missing != near.end()) {
+    return MakeError(v1::ERROR_REASON_VERTEX_OUT_OF_RANGE,
+                     absl::StrCat("near[", missing - near.begin(), "] is ", *missing, ", and no vertex; there are ",
+                                  work_.mesher->vertex_count()),
+                     "near");
+  }
+  return CheckCoordinates(0, points);
+}
+
+grpc::Status Session::AddToMesher(std::span<const double> points, std::span<const uint32_t> near,
+                                  core::RunContext& context, uint64_t* uploaded, std::vector<uint32_t>* vertices) {
+  if (grpc::Status status = ReserveForVertices(point_count_ - work_.meshed_points); !status.ok()) {
+    return status;
+  }
+  // Points that were uploaded since the last refinement come first: they have lower numbers.
+  const absl::StatusOr<std::vector<double>> waiting = points_.CopyFrom(work_.meshed_points * dimension_, context);
+  if (!waiting.ok()) {
+    return FromCoreStatus(waiting.status());
+  }
+  if (!waiting->empty()) {
+    // What is wrong with the vertices shows before the mesher has taken in others, which would cost it.
+    if (grpc::Status status = CheckVertices(points, near, waiting->size() / dimension_); !status.ok()) {
+      return status;
+    }
+    if (const absl::Status done = work_.mesher->AddPoints(*waiting, context).status(); !done.ok()) {
+      return FromCoreStatus(done);
+    }
+    *uploaded = waiting->size() / dimension_;
+  }
+  absl::StatusOr<std::vector<uint32_t>> added = work_.mesher->AddPointsNear(points, near, context);
+  if (added.ok()) {
+    *vertices = *std::move(added);
+  }
+  return added.status().code() == absl::StatusCode::kOutOfRange
+             ? MakeError(v1::ERROR_REASON_VERTEX_OUT_OF_RANGE, std::string(added.status().message()), "near")
+             : FromCoreStatus(added.status());
+}
+
+grpc::Status Session::ReserveForVertices(uint64_t count) {
+  if (!memory_.is_limited()) {
+    return grpc::Status::OK;
+  }
+  const uint64_t bytes = work_.mesher->memory_bytes();
+  const uint64_t wanted =
+      bytes + kReservedVertices * count * (bytes / std::max<uint64_t>(1, work_.mesher->vertex_count()));
+  return work_.memory.Resize(wanted) ? grpc::Status::OK
+                                     : FromCoreStatus(memory_.Refusal(wanted, "the vertices of a session"));
+}
+
+grpc::Status Session::StartOperation(const core::MeshParameters& parameters, uint64_t expected_revision,
+                                     const std::function<grpc::Status(const std::shared_ptr<Operation>&)>& submit,
+                                     std::shared_ptr<Operation>* operation) {
+  std::shared_ptr<Operation> forgotten;  // freed without the lock
+  std::lock_guard lock(mutex_);
+  if (grpc::Status status = CheckReadyForChange(expected_revision); !status.ok()) {
+    return status;
+  }
+  const absl::Time now = clock_.wall();
+  auto started = std::make_shared<Operation>(absl::StrCat(name_, "/operations/", next_operation_), next_operation_,
+                                             parameters, now);
+  if (grpc::Status status = submit(started); !status.ok()) {
+    return status;
+  }
+  ++next_operation_;
+  busy_ = Busy::kOperation;
+  operations_.push_back(started);
+  if (operations_.size() > kKeptOperations) {
+    forgotten = std::move(operations_.front());
+    operations_.pop_front();
+  }
+  *operation = std::move(started);
+  return grpc::Status::OK;
+}
+
+std::optional<SessionWork> Session::BeginWork(Operation& operation) {
+  {
+    std::lock_guard lock(mutex_);
+    if (!operation.IsQueued()) {
+      return std::nullopt;
+    }
+    operation.Start(clock_.wall());
+  }
+  WaitForQueries();
+  std::lock_guard lock(mutex_);
+  return SessionWork{.mesher = std::move(work_.mesher),
+                     .meshed_points = work_.meshed_points,
+                     .mesh = work_.mesh,
+                     .memory = std::move(work_.memory)};
+}
+
+void Session::EndWork(Operation& operation, const grpc::Status& status, SessionWork work,
+                      std::shared_ptr<MeshSnapshot> mesh) {
+  {
+    std::lock_guard lock(mutex_);
+    const absl::Time now = clock_.wall();
+    if (status.ok()) {
+      mesh->revision = ++revision_;
+      work.mesh = std::move(mesh);
+      work.meshed_points = points_.coordinate_count() / dimension_;
+      steps_.NoteRefinement(work.meshed_points, operation.parameters());
+      parameters_ = operation.parameters();
+      is_ready_ = true;
+      ++structure_version_;
+      const core::Mesh& made = work.mesh->chunks.mesh();
+      operation.Succeed(now, revision_, made.vertex_count(), made.simplex_count());
+    } else {
+      operation.Fail(now, status);
+      work.meshed_points = steps_.points();
+    }
+    std::swap(work_, work);  // what was there is freed without the lock
+    busy_ = Busy::kNo;
+    last_use_ = clock_.since_boot();
+  }
+  operation.Notify();
+}
+
+bool Session::EndWaiting(Operation& operation) {
+  {
+    std::lock_guard lock(mutex_);
+    if (!operation.IsQueued()) {
+      return false;
+    }
+    busy_ = Busy::kNo;
+    last_use_ = clock_.since_boot();
+    operation.Fail(clock_.wall(), grpc::Status(grpc::StatusCode::CANCELLED, "the operation was cancelled"));
+  }
+  operation.Notify();
+  return true;
+}
+
+grpc::Status Session::FindOperation(const std::string& operation_name, std::shared_ptr<Operation>* operation) const {
+  std::lock_guard lock(mutex_);
+  const auto found = std::find_if(operations_.begin(), operations_.end(), [&](const std::shared_ptr<Operation>& kept) {
+    return kept->name() == operation_name;
+  });
+  if (found == operations_.end()) {
+    return MakeError(v1::ERROR_REASON_OPERATION_NOT_FOUND,
+                     absl::StrCat("there is no ", operation_name, "; the last ", kKeptOperations, " are kept"), "name");
+  }
+  *operation = *found;
+  return grpc::Status::OK;
+}
+
+std::vector<std::shared_ptr<Operation>> Session::ListOperations(uint64_t after, size_t count) const {
+  std::vector<std::shared_ptr<Operation>> listed;
+  std::lock_guard lock(mutex_);
+  for (const std::shared_ptr<Operation>& operation : operations_) {
+    if (operation->number() > after && listed.size() < count) {
+      listed.push_back(operation);
+    }
+  }
+  return listed;
+}
+
+SessionUse::SessionUse(std::shared_ptr<Session> session) : session_(std::move(session)) {
+  std::lock_guard lock(session_->mutex_);
+  ++session_->uses_;
+}
+
+SessionUse::~SessionUse() {
+  std::lock_guard lock(session_->mutex_);
+  --session_->uses_;
+  session_->last_use_ = session_->clock_.since_boot();
+}
+
+}  // namespace wellspace::server

@@ -1,0 +1,305 @@
+#include "server/wire/convert.h"
+
+#include <algorithm>
+#include <string>
+
+#include "absl/strings/str_cat.h"
+#include "server/wire/errors.h"
+
+namespace wellspace::server {
+namespace {
+
+grpc::Status InvalidParameter(const std::string& message, const std::string& field) {
+  return MakeError(v1::ERROR_REASON_INVALID_PARAMETERS, message, absl::StrCat("parameters.", field));
+}
+
+// The path that the core's `message` begins with, up to its colon, if it leads deeper into `field`; otherwise `field`.
+std::string DeepestField(const std::string& message, const std::string& field) {
+  const std::string path = message.substr(0, message.find(':'));
+  const bool is_deeper = path.size() > field.size() && path.compare(0, field.size(), field) == 0 &&
+                         (path[field.size()] == '[' || path[field.size()] == '.');
+  return is_deeper ? path : field;
+}
+
+// Validates what is set in `parameters` so far, blaming `field`, or a part of it, as the one that was set last.
+grpc::Status Validate(const core::MeshParameters& parameters, const std::string& field) {
+  const absl::Status status = core::ValidateParameters(parameters);
+  if (status.ok()) {
+    return grpc::Status::OK;
+  }
+  const std::string message(status.message());
+  return InvalidParameter(message, DeepestField(message, field));
+}
+
+bool CriterionFromProto(v1::Criterion criterion, core::Criterion* result) {
+  switch (criterion) {
+    case v1::CRITERION_UNSPECIFIED:
+    case v1::CRITERION_RADIUS_EDGE:
+      *result = core::Criterion::kRadiusEdge;
+      return true;
+    case v1::CRITERION_WELL_SPACED:
+      *result = core::Criterion::kWellSpaced;
+      return true;
+    default:
+      return false;  // of a newer client
+  }
+}
+
+core::SizeBox SizeBoxFromProto(const v1::SizeBox& message) {
+  return core::SizeBox{.low = {message.low().begin(), message.low().end()},
+                       .high = {message.high().begin(), message.high().end()},
+                       .max_circumradius = message.max_circumradius()};
+}
+
+v1::SliverReason ReasonToProto(core::SliverReason reason) {
+  switch (reason) {
+    case core::SliverReason::kDemands:
+      return v1::SLIVER_REASON_DEMANDS;
+    case core::SliverReason::kAngle:
+      return v1::SLIVER_REASON_ANGLE;
+    case core::SliverReason::kWork:
+      return v1::SLIVER_REASON_WORK;
+  }
+  return v1::SLIVER_REASON_UNSPECIFIED;
+}
+
+void SetLeftSlivers(const core::MeshStatistics& statistics, v1::SliverStatistics& message) {
+  const auto left_by = [&](core::SliverReason reason) {
+    return statistics.slivers_left_by[static_cast<size_t>(reason)];
+  };
+  message.set_operations(statistics.sliver_operations);
+  message.set_left_by_demands(left_by(core::SliverReason::kDemands));
+  message.set_left_by_angle(left_by(core::SliverReason::kAngle));
+  message.set_left_by_work(left_by(core::SliverReason::kWork));
+  for (const core::LeftSliver& sliver : statistics.flattest_left) {
+    v1::LeftSliver* left = message.add_flattest_left();
+    left->mutable_vertices()->Add(sliver.vertices.begin(), sliver.vertices.end());
+    left->set_min_dihedral_deg(sliver.min_angle_deg);
+    left->set_reason(ReasonToProto(sliver.reason));
+  }
+}
+
+v1::MeshStatistics StatisticsToProto(const core::MeshStatistics& statistics) {
+  v1::MeshStatistics message;
+  message.set_input_points(statistics.input_points);
+  message.set_duplicates(statistics.duplicates);
+  message.set_merged_points(statistics.merged_points);
+  message.set_vertices(statistics.vertices);
+  message.set_simplices(statistics.simplices);
+  message.set_max_radius_edge(statistics.max_radius_edge);
+  message.set_min_angle_deg(statistics.min_angle_deg);
+  message.set_peak_memory_bytes(statistics.peak_memory_bytes);
+  message.set_triangulation(statistics.weighted_vertices > 0 ? v1::TRIANGULATION_REGULAR : v1::TRIANGULATION_DELAUNAY);
+
+  v1::PhaseSeconds* seconds = message.mutable_seconds();
+  seconds->set_tree(statistics.tree_seconds);
+  seconds->set_refinement(statistics.refinement_seconds);
+  seconds->set_simplices(statistics.simplices_seconds);
+  seconds->set_slivers(statistics.sliver_seconds);
+  seconds->set_total(statistics.total_seconds);
+
+  if (statistics.slivers_are_asked_about) {
+    v1::SliverStatistics* slivers = message.mutable_slivers();
+    slivers->set_found(statistics.slivers);
+    slivers->set_left(statistics.slivers_left);
+    slivers->set_moves(statistics.sliver_moves);
+    slivers->set_added_vertices(statistics.sliver_vertices);
+    slivers->set_weighted_vertices(statistics.weighted_vertices);
+    slivers->set_min_angle_before_deg(statistics.unmended_min_angle_deg);
+    SetLeftSlivers(statistics, *slivers);
+  }
+
+  v1::OperationCounters* counters = message.mutable_counters();
+  counters->set_tree_leaves(statistics.tree_leaves);
+  counters->set_cells_computed(statistics.cells_computed);
+  counters->set_leaves_visited(statistics.leaves_visited);
+  counters->set_vertices_visited(statistics.vertices_visited);
+  counters->set_cuts(statistics.cuts);
+  counters->set_max_leaves_visited(statistics.max_leaves_visited);
+  counters->set_stars_computed(statistics.stars_computed);
+  counters->set_star_leaves_visited(statistics.star_leaves_visited);
+  counters->set_star_vertices_visited(statistics.star_vertices_visited);
+  counters->set_star_cuts(statistics.star_cuts);
+  counters->set_max_star_leaves_visited(statistics.max_star_leaves_visited);
+  counters->set_exact_predicates(statistics.exact_predicates);
+  counters->set_perturbed_predicates(statistics.perturbed_predicates);
+  return message;
+}
+
+}  // namespace
+
+grpc::Status ParametersFromProto(const v1::MeshParameters& message, const ServiceOptions& options,
+                                 core::MeshParameters* parameters) {
+  // The fields are set one by one, the others still at their defaults, so that the core's validation, the only one there is, shows
+  // which of them it refuses.
+  *parameters = core::MeshParameters();
+  parameters->dimension = message.dimension();
+  if (grpc::Status status = Validate(*parameters, "dimension"); !status.ok()) {
+    return status;
+  }
+  if (!CriterionFromProto(message.criterion(), &parameters->criterion)) {
+    return InvalidParameter(
+        absl::StrCat("criterion: ", static_cast<int>(message.criterion()), " is not known; ",
+                     static_cast<int>(v1::CRITERION_RADIUS_EDGE), " (radius-edge) and ",
+                     static_cast<int>(v1::CRITERION_WELL_SPACED), " (well-spaced) are, and 0 for the default"),
+        "criterion");
+  }
+  parameters->rho = message.rho();
+  if (grpc::Status status = Validate(*parameters, "rho"); !status.ok()) {
+    return status;
+  }
+  if (message.has_margin()) {
+    parameters->margin = message.margin();
+    if (grpc::Status status = Validate(*parameters, "margin"); !status.ok()) {
+      return status;
+    }
+  }
+  if (message.has_domain()) {
+    // An empty domain would pass for an absent one in the core.
+    if (message.domain().low().empty() || message.domain().high().empty()) {
+      return InvalidParameter(
+          absl::StrCat("the domain has ", message.domain().low_size(), " low and ", message.domain().high_size(),
+                       " high coordinates; expected ", message.dimension(), " of each, or no domain"),
+          "domain");
+    }
+    parameters->domain_low.assign(message.domain().low().begin(), message.domain().low().end());
+    parameters->domain_high.assign(message.domain().high().begin(), message.domain().high().end());
+    if (grpc::Status status = Validate(*parameters, "domain"); !status.ok()) {
+      return status;
+    }
+  }
+  parameters->max_circumradius = message.max_circumradius();
+  if (grpc::Status status = Validate(*parameters, "max_circumradius"); !status.ok()) {
+    return status;
+  }
+  // At once: one by one would look at many boxes many times.
+  for (const v1::SizeBox& box : message.size_boxes()) {
+    parameters->size_boxes.push_back(SizeBoxFromProto(box));
+  }
+  if (grpc::Status status = Validate(*parameters, "size_boxes"); !status.ok()) {
+    return status;
+  }
+  if (message.has_min_dihedral()) {
+    parameters->min_dihedral = message.min_dihedral();
+    if (grpc::Status status = Validate(*parameters, "min_dihedral"); !status.ok()) {
+      return status;
+    }
+  }
+  parameters->pump_weights = message.pump_weights();
+  parameters->keep_vertices = message.keep_vertices();
+  if (grpc::Status status = Validate(*parameters, "pump_weights"); !status.ok()) {
+    return status;
+  }
+  parameters->merge_distance = message.merge_distance();
+  if (grpc::Status status = Validate(*parameters, "merge_distance"); !status.ok()) {
+    return status;
+  }
+  if (message.threads() != 0) {
+    parameters->threads = message.threads();
+    if (grpc::Status status = Validate(*parameters, "threads"); !status.ok()) {
+      return status;
+    }
+  }
+  parameters->threads = std::min(parameters->threads, options.max_threads);
+  if (message.max_vertices() > options.max_vertices) {
+    return InvalidParameter(absl::StrCat("max_vertices is ", message.max_vertices(), "; this server accepts at most ",
+                                         options.max_vertices, ", or 0 for the default"),
+                            "max_vertices");
+  }
+  parameters->max_vertices =
+      message.max_vertices() == 0 ? std::min(options.max_vertices, core::kDefaultMaxVertices) : message.max_vertices();
+  return Validate(*parameters, "max_vertices");
+}
+
+v1::MeshParameters ParametersToProto(const core::MeshParameters& parameters) {
+  v1::MeshParameters message;
+  message.set_dimension(parameters.dimension);
+  message.set_rho(parameters.rho == 0 ? core::DefaultRho(parameters.dimension) : parameters.rho);
+  switch (parameters.criterion) {
+    case core::Criterion::kRadiusEdge:
+      message.set_criterion(v1::CRITERION_RADIUS_EDGE);
+      break;
+    case core::Criterion::kWellSpaced:
+      message.set_criterion(v1::CRITERION_WELL_SPACED);
+      break;
+  }
+  if (parameters.domain_low.empty()) {
+    message.set_margin(parameters.margin);
+  } else {
+    message.mutable_domain()->mutable_low()->Assign(parameters.domain_low.begin(), parameters.domain_low.end());
+    message.mutable_domain()->mutable_high()->Assign(parameters.domain_high.begin(), parameters.domain_high.end());
+  }
+  message.set_max_circumradius(parameters.max_circumradius);
+  for (const core::SizeBox& box : parameters.size_boxes) {
+    v1::SizeBox* size_box = message.add_size_boxes();
+    size_box->mutable_low()->Assign(box.low.begin(), box.low.end());
+    size_box->mutable_high()->Assign(box.high.begin(), box.high.end());
+    size_box->set_max_circumradius(box.max_circumradius);
+  }
+  message.set_min_dihedral(parameters.min_dihedral.value_or(core::DefaultMinDihedral(parameters.dimension)));
+  message.set_pump_weights(parameters.pump_weights);
+  message.set_merge_distance(parameters.merge_distance);
+  message.set_keep_vertices(parameters.keep_vertices);
+  message.set_max_vertices(parameters.max_vertices);
+  message.set_threads(parameters.threads);
+  return message;
+}
+
+google::protobuf::Timestamp TimeToProto(absl::Time time) {
+  google::protobuf::Timestamp message;
+  const int64_t seconds = absl::ToUnixSeconds(time);
+  message.set_seconds(seconds);
+  message.set_nanos(static_cast<int32_t>(absl::ToInt64Nanoseconds(time - absl::FromUnixSeconds(seconds))));
+  return message;
+}
+
+v1::MeshMetadata MetadataToProto(const core::Mesh& mesh, uint64_t chunk_count) {
+  v1::MeshMetadata metadata;
+  metadata.set_dimension(mesh.dimension);
+  metadata.mutable_domain()->mutable_low()->Assign(mesh.domain_low.begin(), mesh.domain_low.end());
+  metadata.mutable_domain()->mutable_high()->Assign(mesh.domain_high.begin(), mesh.domain_high.end());
+  metadata.set_vertex_count(mesh.vertex_count());
+  metadata.set_simplex_count(mesh.simplex_count());
+  metadata.set_input_point_count(mesh.input_vertex.size());
+  metadata.set_chunk_count(chunk_count);
+  metadata.set_has_weights(!mesh.weights.empty());
+  metadata.set_moved_vertex_count(mesh.moved_vertices.size());
+  *metadata.mutable_statistics() = StatisticsToProto(mesh.statistics);
+  return metadata;
+}
+
+v1::EstimateMeshResponse EstimateToProto(const core::MeshEstimate& estimate) {
+  v1::EstimateMeshResponse message;
+  message.set_vertices(estimate.vertices);
+  message.set_simplices(estimate.simplices);
+  message.set_memory_bytes(estimate.memory_bytes);
+  message.set_tree_leaves(estimate.tree_leaves);
+  return message;
+}
+
+google::protobuf::Duration DurationToProto(absl::Duration duration) {
+  google::protobuf::Duration message;
+  message.set_seconds(absl::IDivDuration(duration, absl::Seconds(1), &duration));
+  message.set_nanos(static_cast<int32_t>(absl::ToInt64Nanoseconds(duration)));
+  return message;
+}
+
+v1::Phase PhaseToProto(core::Phase phase) {
+  switch (phase) {
+    case core::Phase::kWaiting:
+      return v1::PHASE_WAITING;
+    case core::Phase::kTree:
+      return v1::PHASE_TREE;
+    case core::Phase::kRefinement:
+      return v1::PHASE_REFINEMENT;
+    case core::Phase::kSimplices:
+      return v1::PHASE_SIMPLICES;
+    case core::Phase::kSlivers:
+      return v1::PHASE_SLIVERS;
+    case core::Phase::kDone:
+      return v1::PHASE_DONE;
+  }
+  return v1::PHASE_UNSPECIFIED;
+}
+
+}  // namespace wellspace::server
