@@ -9,8 +9,8 @@
 #include "absl/strings/str_format.h"
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
-#include "core/refine/least_vertices.h"
-#include "core/refine/mesh_size.h"
+#include "core/estimate/least_vertices.h"
+#include "core/estimate/mesh_size.h"
 
 namespace wellspace::core {
 namespace {

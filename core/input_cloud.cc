@@ -17,7 +17,7 @@
 #include "absl/strings/str_join.h"
 #include "core/base/cancellable_sort.h"
 #include "core/base/dimensions.h"
-#include "core/base/prefetch.h"
+#include "core/base/memory/prefetch.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
 #include "core/tree/morton.h"

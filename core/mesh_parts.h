@@ -6,10 +6,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/cell/polytope.h"
 #include "core/input_cloud.h"
 #include "core/mesher.h"
 #include "core/simplex/quality.h"
-#include "core/voronoi/polytope.h"
 
 namespace wellspace::core {
 

@@ -8,7 +8,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "core/base/huge_pages.h"
+#include "core/base/memory/huge_pages.h"
 #include "core/base/run_context.h"
 #include "core/geometry/point.h"
 #include "core/input_cloud.h"

@@ -4,9 +4,9 @@
 
 #include <limits>
 
+#include "core/cell/polytope.h"
 #include "core/geometry/box.h"
 #include "core/refine/criteria.h"
-#include "core/voronoi/polytope.h"
 
 namespace wellspace::core {
 

@@ -6,8 +6,10 @@
 #include <span>
 #include <vector>
 
-#include "core/base/cache_lines.h"
 #include "core/base/ids.h"
+#include "core/base/memory/cache_lines.h"
+#include "core/cell/polytope.h"
+#include "core/cell/star.h"
 #include "core/geometry/box.h"
 #include "core/refine/assessment.h"
 #include "core/refine/face_watchers.h"
@@ -15,9 +17,7 @@
 #include "core/refine/neighbor_notice.h"
 #include "core/refine/speculation/star_writer.h"
 #include "core/refine/step_rules.h"
-#include "core/voronoi/polytope.h"
 #include "core/voronoi/query_structure.h"
-#include "core/voronoi/star.h"
 
 namespace wellspace::core {
 

@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "absl/container/flat_hash_map.h"
-#include "core/base/huge_pages.h"
 #include "core/base/ids.h"
+#include "core/base/memory/huge_pages.h"
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
 

@@ -3,8 +3,8 @@
 #include <array>
 #include <cstddef>
 
-#include "core/base/cache_lines.h"
 #include "core/base/dimensions.h"
+#include "core/base/memory/cache_lines.h"
 #include "core/base/thread_team.h"
 #include "core/tree/leaf_blocks.h"
 

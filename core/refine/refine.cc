@@ -6,7 +6,7 @@
 #include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/dimensions.h"
-#include "core/base/huge_pages.h"
+#include "core/base/memory/huge_pages.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
 #include "core/refine/checks.h"

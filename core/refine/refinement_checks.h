@@ -5,10 +5,10 @@
 #include <cstdint>
 
 #include "core/base/ids.h"
+#include "core/cell/polytope.h"
 #include "core/refine/insertion.h"
 #include "core/refine/schedule.h"
 #include "core/refine/step_rules.h"
-#include "core/voronoi/polytope.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {

@@ -12,9 +12,9 @@
 #include <utility>
 #include <vector>
 
-#include "core/base/huge_pages.h"
 #include "core/base/ids.h"
-#include "core/base/prefetch.h"
+#include "core/base/memory/huge_pages.h"
+#include "core/base/memory/prefetch.h"
 
 namespace wellspace::core {
 

@@ -2,9 +2,9 @@
 #ifndef WELLSPACE_CORE_REFINE_STEINER_POINT_H_
 #define WELLSPACE_CORE_REFINE_STEINER_POINT_H_
 
+#include "core/cell/polytope.h"
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
-#include "core/voronoi/polytope.h"
 
 namespace wellspace::core {
 

@@ -8,6 +8,7 @@
 
 #include "absl/functional/function_ref.h"
 #include "core/base/ids.h"
+#include "core/cell/polytope.h"
 #include "core/geometry/box.h"
 #include "core/refine/assessment.h"
 #include "core/refine/criteria.h"
@@ -15,7 +16,6 @@
 #include "core/refine/insertion.h"
 #include "core/refine/neighbor_notice.h"
 #include "core/refine/steiner_point.h"
-#include "core/voronoi/polytope.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {

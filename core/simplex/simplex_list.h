@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "core/base/huge_pages.h"
+#include "core/base/memory/huge_pages.h"
 #include "core/geometry/exact_measure.h"
 
 namespace wellspace::core {

@@ -13,8 +13,8 @@
 #include <utility>
 
 #include "core/base/dimensions.h"
-#include "core/base/huge_pages.h"
-#include "core/base/prefetch.h"
+#include "core/base/memory/huge_pages.h"
+#include "core/base/memory/prefetch.h"
 #include "core/base/sort_few.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"

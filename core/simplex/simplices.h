@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "core/base/huge_pages.h"
+#include "core/base/memory/huge_pages.h"
 #include "core/base/run_context.h"
 #include "core/voronoi/query_structure.h"
 #include "core/voronoi/star_lists.h"

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/simd/lane_bits.h"
 #include "core/sliver/lifted_plane.h"
 #include "core/sliver/tetrahedron.h"
-#include "core/voronoi/lane_bits.h"
 
 // Vectors that are passed and returned never are: all that does so is compiled into its callers.
 #pragma GCC diagnostic ignored "-Wpsabi"

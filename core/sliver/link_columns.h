@@ -8,8 +8,8 @@
 #include <optional>
 #include <vector>
 
+#include "core/base/simd/lanes.h"
 #include "core/geometry/point.h"
-#include "core/voronoi/lanes.h"
 
 namespace wellspace::core {
 

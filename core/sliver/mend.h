@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "core/base/huge_pages.h"
+#include "core/base/memory/huge_pages.h"
 #include "core/base/run_context.h"
 #include "core/refine/criteria.h"
 #include "core/sliver/left_sliver.h"

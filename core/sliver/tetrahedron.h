@@ -2,9 +2,9 @@
 #ifndef WELLSPACE_CORE_SLIVER_TETRAHEDRON_H_
 #define WELLSPACE_CORE_SLIVER_TETRAHEDRON_H_
 
+#include "core/base/simd/lanes.h"
 #include "core/geometry/exact_measure.h"
 #include "core/geometry/point.h"
-#include "core/voronoi/lanes.h"
 
 namespace wellspace::core {
 

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "core/base/huge_pages.h"
 #include "core/base/ids.h"
-#include "core/base/prefetch.h"
+#include "core/base/memory/huge_pages.h"
+#include "core/base/memory/prefetch.h"
 #include "core/base/run_context.h"
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"

@@ -10,8 +10,8 @@
 #include <span>
 #include <vector>
 
-#include "core/base/huge_pages.h"
 #include "core/base/ids.h"
+#include "core/base/memory/huge_pages.h"
 #include "core/geometry/point.h"
 
 namespace wellspace::core {

@@ -6,8 +6,8 @@
 
 #include "absl/status/status.h"
 #include "core/base/ids.h"
+#include "core/cell/polytope.h"
 #include "core/geometry/point.h"
-#include "core/voronoi/polytope.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {

@@ -7,11 +7,11 @@
 #include <cstdint>
 
 #include "core/base/ids.h"
+#include "core/base/simd/lane_bits.h"
+#include "core/base/simd/lanes.h"
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
 #include "core/tree/leaf_tree.h"
-#include "core/voronoi/lane_bits.h"
-#include "core/voronoi/lanes.h"
 
 namespace wellspace::core {
 

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/base/ids.h"
-#include "core/voronoi/lanes.h"
+#include "core/base/simd/lanes.h"
 
 namespace wellspace::core {
 

@@ -5,10 +5,10 @@
 #include <utility>
 
 #include "core/base/dimensions.h"
-#include "core/base/prefetch.h"
+#include "core/base/memory/prefetch.h"
+#include "core/base/simd/lanes.h"
 #include "core/base/status_macros.h"
 #include "core/voronoi/cube_from.h"
-#include "core/voronoi/lanes.h"
 
 namespace wellspace::core {
 

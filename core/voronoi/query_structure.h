@@ -11,16 +11,16 @@
 #include <vector>
 
 #include "absl/status/status.h"
-#include "core/base/huge_pages.h"
 #include "core/base/ids.h"
+#include "core/base/memory/huge_pages.h"
 #include "core/base/run_context.h"
+#include "core/cell/gathered_vertices.h"
+#include "core/cell/polytope.h"
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
 #include "core/tree/leaf_tree.h"
 #include "core/voronoi/extra_vertices.h"
-#include "core/voronoi/gathered_vertices.h"
 #include "core/voronoi/leaf_queue.h"
-#include "core/voronoi/polytope.h"
 
 namespace wellspace::core {
 

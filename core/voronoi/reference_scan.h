@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "core/base/ids.h"
+#include "core/cell/polytope.h"
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
-#include "core/voronoi/polytope.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {

@@ -13,11 +13,11 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "core/base/huge_pages.h"
 #include "core/base/ids.h"
-#include "core/base/prefetch.h"
+#include "core/base/memory/huge_pages.h"
+#include "core/base/memory/prefetch.h"
 #include "core/base/run_context.h"
-#include "core/voronoi/star.h"
+#include "core/cell/star.h"
 
 namespace wellspace::core {
 

@@ -1,5 +1,5 @@
 // Laws of EstimateSize, and its accuracy on small clouds; estimate_long_test.cc has the large ones.
-#include "core/refine/estimate.h"
+#include "core/estimate/estimate.h"
 
 #include <gtest/gtest.h>
 
@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/estimate/nearest_points.h"
 #include "core/mesher.h"
-#include "core/refine/nearest_points.h"
 #include "tests/support/brute_force.h"
 #include "tests/support/clouds.h"
 #include "tests/support/structures.h"

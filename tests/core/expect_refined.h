@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "core/voronoi/polytope.h"
+#include "core/cell/polytope.h"
 #include "core/voronoi/query_structure.h"
 #include "tests/support/brute_force.h"
 

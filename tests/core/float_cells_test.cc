@@ -8,8 +8,8 @@
 #include <numbers>
 #include <vector>
 
-#include "core/voronoi/meeting_point.h"
-#include "core/voronoi/polytope.h"
+#include "core/cell/meeting_point.h"
+#include "core/cell/polytope.h"
 #include "tests/support/clouds.h"
 #include "tests/support/dimensions.h"
 #include "tests/support/seeded_test.h"

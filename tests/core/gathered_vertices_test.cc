@@ -1,5 +1,5 @@
 // What is gathered around sites, against all vertices.
-#include "core/voronoi/gathered_vertices.h"
+#include "core/cell/gathered_vertices.h"
 
 #include <gtest/gtest.h>
 

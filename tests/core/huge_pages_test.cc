@@ -1,4 +1,4 @@
-#include "core/base/huge_pages.h"
+#include "core/base/memory/huge_pages.h"
 
 #include <cstddef>
 #include <cstdint>

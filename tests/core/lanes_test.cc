@@ -1,5 +1,5 @@
 // What is computed side by side, against plain loops, and with each of the processor's units to the bit the same.
-#include "core/voronoi/lanes.h"
+#include "core/base/simd/lanes.h"
 
 #include <gtest/gtest.h>
 
@@ -10,10 +10,10 @@
 #include <limits>
 #include <vector>
 
-#include "core/voronoi/candidates.h"
-#include "core/voronoi/excesses.h"
-#include "core/voronoi/node_columns.h"
-#include "core/voronoi/polytope.h"
+#include "core/cell/candidates.h"
+#include "core/cell/excesses.h"
+#include "core/cell/node_columns.h"
+#include "core/cell/polytope.h"
 #include "tests/support/clouds.h"
 #include "tests/support/dimensions.h"
 #include "tests/support/seeded_test.h"

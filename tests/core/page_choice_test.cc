@@ -1,4 +1,4 @@
-#include "core/base/page_choice.h"
+#include "core/base/memory/page_choice.h"
 
 #include <cstddef>
 

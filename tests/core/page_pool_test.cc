@@ -1,4 +1,4 @@
-#include "core/base/page_pool.h"
+#include "core/base/memory/page_pool.h"
 
 #include <algorithm>
 #include <cstddef>

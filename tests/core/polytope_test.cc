@@ -1,5 +1,5 @@
 // Cells under construction, against half-space intersection by all D-subsets of planes in integers.
-#include "core/voronoi/polytope.h"
+#include "core/cell/polytope.h"
 
 #include <gtest/gtest.h>
 

@@ -13,10 +13,10 @@
 #include <utility>
 #include <vector>
 
+#include "core/cell/polytope.h"
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
 #include "core/tree/morton.h"
-#include "core/voronoi/polytope.h"
 #include "core/voronoi/query_structure.h"
 #include "tests/support/dimensions.h"
 

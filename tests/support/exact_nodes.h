@@ -6,9 +6,9 @@
 
 #include <array>
 
+#include "core/cell/polytope.h"
 #include "core/geometry/point.h"
 #include "core/geometry/power_predicate.h"
-#include "core/voronoi/polytope.h"
 
 namespace wellspace::test {
 

@@ -12,8 +12,9 @@
 #include <span>
 #include <vector>
 
-#include "core/base/cache_lines.h"
 #include "core/base/ids.h"
+#include "core/base/memory/cache_lines.h"
+#include "core/cell/star.h"
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
 #include "core/refine/assessment.h"
@@ -21,7 +22,6 @@
 #include "core/refine/insertion.h"
 #include "core/refine/neighbor_notice.h"
 #include "core/voronoi/extra_vertices.h"
-#include "core/voronoi/star.h"
 
 namespace wellspace::core {
 

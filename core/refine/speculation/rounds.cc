@@ -9,7 +9,7 @@
 
 #include "absl/cleanup/cleanup.h"
 #include "core/base/dimensions.h"
-#include "core/base/prefetch.h"
+#include "core/base/memory/prefetch.h"
 
 namespace wellspace::core {
 namespace {

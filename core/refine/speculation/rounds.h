@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "core/base/huge_pages.h"
 #include "core/base/ids.h"
+#include "core/base/memory/huge_pages.h"
 #include "core/base/run_context.h"
 #include "core/base/thread_team.h"
 #include "core/geometry/point.h"

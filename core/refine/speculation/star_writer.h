@@ -12,7 +12,7 @@
 
 #include "core/base/ids.h"
 #include "core/base/thread_team.h"
-#include "core/voronoi/star.h"
+#include "core/cell/star.h"
 #include "core/voronoi/star_lists.h"
 
 namespace wellspace::core {

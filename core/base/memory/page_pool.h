@@ -1,0 +1,67 @@
+// Memory on large pages: mappings of whole ones, and smaller arrays side by side on them.
+#ifndef WELLSPACE_CORE_BASE_MEMORY_PAGE_POOL_H_
+#define WELLSPACE_CORE_BASE_MEMORY_PAGE_POOL_H_
+
+#include <bitset>
+#include <cstddef>
+#include <map>
+#include <mutex>
+
+#include "core/base/memory/page_choice.h"
+
+namespace wellspace::core {
+
+// Maps so many bytes, rounded up to whole pages of 2 MiB, to the beginning of one, and, unless they are dear (PageChoice), asks for such pages: one fault brings
+// one in, where small ones take 512. What is given back then is the system's at once, where the heap would keep it: arrays that are moved as they grow leave more than they need
+// behind. Throws std::bad_alloc if the system has none.
+void* MapHugePages(size_t bytes);
+
+// Takes back what MapHugePages(bytes) returned.
+void UnmapHugePages(void* memory, size_t bytes);
+
+// Arrays smaller than a large page, in runs of small ones: the first by address that is free. Large pages are mapped as they are needed; one on which
+// nothing is left is the system's at once.
+//
+// Thread safety: thread-safe.
+class PagePool {
+ public:
+  // The one that all share; it is never destroyed.
+  static PagePool& Shared();
+
+  // Memory that begins at a page. What is in it is not known. Throws std::bad_alloc if the system has none.
+  //
+  // REQUIRES:   0 < bytes <= kHugePage.
+  // Complexity: O(large pages mapped).
+  void* Take(size_t bytes);
+
+  // Takes back what Take(bytes) returned.
+  void GiveBack(void* memory, size_t bytes);
+
+ private:
+  // Which pages of a large one are taken.
+  class Pages {
+   public:
+    bool HasFree(size_t count) const { return longest_free_ >= count; }
+    bool AllFree() const { return taken_.none(); }
+    // Takes the first `count` free ones side by side and returns the number of the first of them.
+    //
+    // REQUIRES:   HasFree(count).
+    size_t Take(size_t count);
+    void GiveBack(size_t first, size_t count) { Mark(first, count, false); }
+
+   private:
+    static constexpr size_t kCount = kHugePage / kSmallPage;
+
+    void Mark(size_t first, size_t count, bool taken);
+
+    std::bitset<kCount> taken_;
+    size_t longest_free_ = kCount;  // side by side
+  };
+
+  std::mutex mutex_;
+  std::map<std::byte*, Pages> large_pages_;
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_BASE_MEMORY_PAGE_POOL_H_

@@ -1,0 +1,96 @@
+// Doubles that are worked on side by side, with what the processor has.
+#ifndef WELLSPACE_CORE_BASE_SIMD_LANES_H_
+#define WELLSPACE_CORE_BASE_SIMD_LANES_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+
+namespace wellspace::core {
+
+// Items that are looked at together; columns are as long as a multiple of it.
+inline constexpr size_t kLanes = 4;
+
+// How many items a column has for `count`.
+constexpr size_t PaddedCount(size_t count) { return (count + kLanes - 1) / kLanes * kLanes; }
+
+// The instructions that columns are worked on with; the results are the same to the bit.
+enum class VectorUnit {
+  kBaseline,  // what every processor of the architecture has
+  kAvx2,
+};
+
+// Whether this processor has it.
+inline bool Has(VectorUnit unit) {
+#if defined(__x86_64__)
+  static const bool has_avx2 = __builtin_cpu_supports("avx2") != 0;
+  return unit == VectorUnit::kBaseline || has_avx2;
+#else
+  return unit == VectorUnit::kBaseline;
+#endif
+}
+
+// The best that this processor has.
+inline VectorUnit BestVectorUnit() { return Has(VectorUnit::kAvx2) ? VectorUnit::kAvx2 : VectorUnit::kBaseline; }
+
+// A function for each unit holds the same inlined body, with vectors as wide as the unit's.
+#define WELLSPACE_INLINE [[gnu::always_inline]] inline
+#if defined(__x86_64__)
+#define WELLSPACE_AVX2 [[gnu::target("avx2")]]
+#else
+#define WELLSPACE_AVX2
+#endif
+
+// Doubles in one vector, what a comparison of them gives (-1 where it holds, else 0), and as wide a vector of integers of 32 bits.
+template <size_t kWidth>
+struct Wide;
+template <>
+struct Wide<2> {
+  using Lanes = double __attribute__((vector_size(16), may_alias));
+  using Mask = int64_t __attribute__((vector_size(16), may_alias));
+  using Halves = int32_t __attribute__((vector_size(16), may_alias));
+};
+template <>
+struct Wide<4> {
+  using Lanes = double __attribute__((vector_size(32), may_alias));
+  using Mask = int64_t __attribute__((vector_size(32), may_alias));
+  using Halves = int32_t __attribute__((vector_size(32), may_alias));
+};
+
+// Eight floats, and what a comparison of them gives: one vector with AVX2, else two.
+using Floats = float __attribute__((vector_size(32), may_alias));
+using FloatMask = int32_t __attribute__((vector_size(32), may_alias));
+inline constexpr size_t kFloatLanes = 8;
+using HalfFloats = float __attribute__((vector_size(16), may_alias));
+using HalfMask = int32_t __attribute__((vector_size(16), may_alias));
+
+// The items of `column` from `from` on, as one vector.
+//
+// REQUIRES:   both aligned to the vector.
+template <size_t kWidth>
+WELLSPACE_INLINE auto& LanesAt(double* column, size_t from) {
+  return *reinterpret_cast<typename Wide<kWidth>::Lanes*>(column + from);
+}
+template <size_t kWidth>
+WELLSPACE_INLINE const auto& LanesAt(const double* column, size_t from) {
+  return *reinterpret_cast<const typename Wide<kWidth>::Lanes*>(column + from);
+}
+
+// Puts the columns of four rows into `out`.
+WELLSPACE_INLINE void Transpose(const Wide<4>::Lanes& a, const Wide<4>::Lanes& b, const Wide<4>::Lanes& c,
+                                const Wide<4>::Lanes& d, Wide<4>::Lanes* out) {
+  using Lanes = Wide<4>::Lanes;
+  using Order = Wide<4>::Mask;
+  const Lanes even_ab = __builtin_shuffle(a, b, Order{0, 4, 2, 6});
+  const Lanes odd_ab = __builtin_shuffle(a, b, Order{1, 5, 3, 7});
+  const Lanes even_cd = __builtin_shuffle(c, d, Order{0, 4, 2, 6});
+  const Lanes odd_cd = __builtin_shuffle(c, d, Order{1, 5, 3, 7});
+  out[0] = __builtin_shuffle(even_ab, even_cd, Order{0, 1, 4, 5});
+  out[1] = __builtin_shuffle(odd_ab, odd_cd, Order{0, 1, 4, 5});
+  out[2] = __builtin_shuffle(even_ab, even_cd, Order{2, 3, 6, 7});
+  out[3] = __builtin_shuffle(odd_ab, odd_cd, Order{2, 3, 6, 7});
+}
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_BASE_SIMD_LANES_H_

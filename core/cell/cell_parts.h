@@ -1,0 +1,124 @@
+// What the Voronoi cell of one vertex is made of.
+#ifndef WELLSPACE_CORE_CELL_CELL_PARTS_H_
+#define WELLSPACE_CORE_CELL_CELL_PARTS_H_
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <type_traits>
+
+#include "core/base/ids.h"
+#include "core/base/simd/lanes.h"
+#include "core/geometry/box.h"
+#include "core/geometry/point.h"
+#include "core/geometry/power_predicate.h"
+
+namespace wellspace::core {
+
+// What a bounding plane of a cell is.
+enum class PlaneKind : uint8_t {
+  kBisector,
+  kFace,  // of the box
+  kClip,  // of the box that a clipped cell is computed in, or of the walls far outside the box
+};
+
+// What a cell clipped by the box `clip` begins with: what `box` has in common with that. `kinds` says by FaceIndex what its faces are.
+template <int D>
+Box<D> ClippedBox(const Box<D>& box, const Box<D>& clip, std::array<PlaneKind, 2 * D>& kinds) {
+  Box<D> bounds = box;
+  kinds.fill(PlaneKind::kFace);
+  for (int i = 0; i < D; ++i) {
+    if (clip.low[i] > bounds.low[i]) {
+      bounds.low[i] = clip.low[i];
+      kinds[FaceIndex(i, false)] = PlaneKind::kClip;
+    }
+    if (clip.high[i] < bounds.high[i]) {
+      bounds.high[i] = clip.high[i];
+      kinds[FaceIndex(i, true)] = PlaneKind::kClip;
+    }
+  }
+  return bounds;
+}
+
+template <int D>
+struct Plane {
+  PlaneKind kind = PlaneKind::kBisector;
+  uint8_t face = 0;             // FaceIndex, unless a bisector
+  VertexId vertex = kNoVertex;  // of a bisector
+  Point<D> normal;              // relative to the site: normal . x = offset; for a bisector the vector to its vertex
+  double offset = 0;
+  double length = 0;      // |normal|
+  double distance = 0;    // of the plane from the site, |offset| / length
+  PlaneSource<D> source;  // exact
+};
+
+// Makes `plane` the wall on face `face` of `bounds`.
+template <int D>
+void SetWall(const Point<D>& site, const Box<D>& bounds, int face, PlaneKind kind, Plane<D>& plane) {
+  const int axis = face / 2;
+  plane.kind = kind;
+  plane.face = static_cast<uint8_t>(face);
+  plane.vertex = kNoVertex;
+  plane.normal = {};
+  plane.normal[axis] = 1;
+  plane.length = 1;
+  plane.source.axis = axis;
+  plane.source.coordinate = bounds.FaceCoordinate(face);
+  plane.offset = plane.source.coordinate - site[axis];
+  plane.distance = std::abs(plane.offset);
+}
+
+// Makes `plane` the bisector of the site and `u` at `position` = site + normal, for length_sq = NormSq<D>(normal).
+template <int D>
+WELLSPACE_INLINE void SetBisector(VertexId u, const Point<D>& position, const Point<D>& normal, double length_sq,
+                                  Plane<D>& plane) {
+  plane.kind = PlaneKind::kBisector;
+  plane.vertex = u;
+  plane.normal = normal;
+  plane.offset = 0.5 * length_sq;
+  plane.length = std::sqrt(length_sq);
+  plane.distance = 0.5 * plane.length;
+  plane.source.generator = position;
+  plane.source.axis = -1;
+}
+
+// Numbers the nodes of a cell: a mesh in 6-D has cells of more than 2^16.
+template <int D>
+using NodeIndex = std::conditional_t<(D <= 4), uint16_t, uint32_t>;
+
+template <int D>
+struct CellNode {
+  Point<D> x;                      // relative to the site
+  double radius_sq = 0;            // |x|^2
+  double reach = 0;                // at least the exact |x|
+  double slack = 0;                // bounds the error of x, and of products with it, per unit of length
+  std::array<uint16_t, D> planes;  // that meet here, by index; of a placed one bisectors by vertex, then walls by face
+  std::array<NodeIndex<D>, D> neighbours;  // neighbours[k]: the node at the other end of the edge that leaves planes[k]
+};
+
+// The faces of the box that a node of a cell with these planes lies on.
+template <int D>
+FaceMask FacesOf(std::span<const Plane<D>> planes, const CellNode<D>& node) {
+  FaceMask faces = 0;
+  for (const uint16_t index : node.planes) {
+    if (planes[index].kind == PlaneKind::kFace) {
+      faces = static_cast<FaceMask>(faces | (1u << planes[index].face));
+    }
+  }
+  return faces;
+}
+
+// So many vertices at most cut a cell in one go, in the plane and in space.
+inline constexpr size_t kMostCutTogether = 64;
+
+// How often the stages after the floating-point filter were needed.
+struct DecisionCounters {
+  uint64_t exact = 0;
+  uint64_t perturbed = 0;
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_CELL_CELL_PARTS_H_

@@ -1,0 +1,525 @@
+// Eight floats at a time: what cells in the plane and in space are cut by. For gathered_vertices.cc, polygon.cc, polyhedron.cc and polyhedron_nodes.cc alone, into which all is compiled.
+#ifndef WELLSPACE_CORE_CELL_NEAR_VERTICES_H_
+#define WELLSPACE_CORE_CELL_NEAR_VERTICES_H_
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <span>
+
+#include "core/base/ids.h"
+#include "core/base/simd/lane_bits.h"
+#include "core/base/simd/lanes.h"
+#include "core/cell/cell_parts.h"
+#include "core/cell/float_cell.h"
+#include "core/cell/gathered_vertices.h"
+#include "core/geometry/point.h"
+
+// Vectors that are passed and returned never are: all that does so is compiled into its callers.
+#pragma GCC diagnostic ignored "-Wpsabi"
+
+namespace wellspace::core {
+
+// In units of u = 2^-24: a node x is wrong by at most kNodeError |x|. In the plane that is its rounding, and half of it from where it was computed in
+// doubles; in space it may lie at the end of an edge as short.
+template <int D>
+inline constexpr float kNodeError = D == 2 ? 1.5f : 16;
+// With R at least the distance of the nodes, an excess x . w - |w|^2 / 2 is wrong by at most u ((kNodeError + D + 2) R |w| + (2 D + 2) |w|^2 / 2): w is by
+// u |w|; the products by u |x| |w| together, the D sums by D u (|x| |w| + |w|^2 / 2), and |w|^2 / 2 by (D + 2) u of itself. Whoever may cut has
+// |w| <= 2 R, so that all is less than 12 u R |w| in 2-D, 29 u R |w| in 3-D; one u more for what is taken off |w|^2 / 2.
+template <int D>
+inline constexpr float kExcessError = D == 2 ? 0x1p-20f : 0x1p-19f;
+// What squares of distances can lose below the least float, and more: nothing that a cell is made of is as small.
+inline constexpr float kUnderflow = 0x1p-80f;
+// A distance differs by less than this share of itself from that of the exact node, a square by less than twice as much.
+template <int D>
+inline constexpr float kDistanceError = D == 2 ? 0x1p-21f : 0x1p-19f;
+// By how much, in shares of |x|^2, the power p . (p - 2 x) of a point p within 2 |x| may be wrong: (44 + 4 kNodeError) u. Farther out it
+// is positive.
+template <int D>
+inline constexpr float kPowerError = D == 2 ? 0x1p-18f : 0x1p-17f;
+// A ratio is surely kept, whatever the rounding and whatever that of placed nodes (kPlaced), if it is by this share.
+inline constexpr double kSurely = 0x1p-17;
+inline float SurelyKeptRatioSq(double ratio) {
+  const double surely = ratio * (1 - kSurely);
+  return static_cast<float>(surely * surely);
+}
+
+WELLSPACE_INLINE Floats Load(const float* items) { return *reinterpret_cast<const Floats*>(items); }
+WELLSPACE_INLINE Floats& VectorAt(float* items) { return *reinterpret_cast<Floats*>(items); }
+WELLSPACE_INLINE FloatMask& VectorAt(int32_t* items) { return *reinterpret_cast<FloatMask*>(items); }
+WELLSPACE_INLINE Floats Splat(float x) { return x + Floats{}; }
+WELLSPACE_INLINE FloatMask Splat(int32_t x) { return x + FloatMask{}; }
+
+inline constexpr FloatMask kEachLane = {0, 1, 2, 3, 4, 5, 6, 7};
+
+// Comparisons and choices, half a vector at a time where the processor has no whole ones: of these the compiler would make scalars.
+WELLSPACE_INLINE const HalfFloats* HalvesOf(const Floats& items) { return reinterpret_cast<const HalfFloats*>(&items); }
+WELLSPACE_INLINE const HalfMask* HalvesOf(const FloatMask& items) { return reinterpret_cast<const HalfMask*>(&items); }
+
+template <VectorUnit kUnit, typename Vector, typename Compare>
+WELLSPACE_INLINE FloatMask Compared(const Vector& a, const Vector& b, Compare compare) {
+  if constexpr (kUnit == VectorUnit::kAvx2) {
+    return compare(a, b);
+  } else {
+    FloatMask result;
+    for (size_t half = 0; half < 2; ++half) {
+      reinterpret_cast<HalfMask*>(&result)[half] = compare(HalvesOf(a)[half], HalvesOf(b)[half]);
+    }
+    return result;
+  }
+}
+// The items of a and b are both floats, or both integers.
+template <VectorUnit kUnit, typename Vector>
+WELLSPACE_INLINE FloatMask IsLess(const Vector& a, const Vector& b) {
+  return Compared<kUnit>(
+      a, b, [](const auto& x, const auto& y) __attribute__((always_inline)) { return x < y; });
+}
+template <VectorUnit kUnit, typename Vector>
+WELLSPACE_INLINE FloatMask IsAtMost(const Vector& a, const Vector& b) {
+  return Compared<kUnit>(
+      a, b, [](const auto& x, const auto& y) __attribute__((always_inline)) { return x <= y; });
+}
+template <VectorUnit kUnit, typename Vector>
+WELLSPACE_INLINE FloatMask IsEqual(const Vector& a, const Vector& b) {
+  return Compared<kUnit>(
+      a, b, [](const auto& x, const auto& y) __attribute__((always_inline)) { return x == y; });
+}
+// `a` where the mask is set, else `b`.
+template <VectorUnit kUnit>
+WELLSPACE_INLINE FloatMask Choose(const FloatMask& mask, const FloatMask& a, const FloatMask& b) {
+  if constexpr (kUnit == VectorUnit::kAvx2) {
+    return mask ? a : b;
+  } else {
+    return b ^ ((a ^ b) & mask);
+  }
+}
+template <VectorUnit kUnit>
+WELLSPACE_INLINE Floats Choose(const FloatMask& mask, const Floats& a, const Floats& b) {
+  if constexpr (kUnit == VectorUnit::kAvx2) {
+    return mask ? a : b;
+  } else {
+    return reinterpret_cast<Floats>(
+        Choose<kUnit>(mask, reinterpret_cast<const FloatMask&>(a), reinterpret_cast<const FloatMask&>(b)));
+  }
+}
+template <VectorUnit kUnit>
+WELLSPACE_INLINE Floats Max(const Floats& a, const Floats& b) {
+  if constexpr (kUnit == VectorUnit::kAvx2) {
+    return a > b ? a : b;
+  } else {
+    Floats result;
+    for (size_t half = 0; half < 2; ++half) {
+      const HalfFloats& x = HalvesOf(a)[half];
+      const HalfFloats& y = HalvesOf(b)[half];
+      reinterpret_cast<HalfFloats*>(&result)[half] = x > y ? x : y;
+    }
+    return result;
+  }
+}
+template <VectorUnit kUnit>
+WELLSPACE_INLINE Floats Min(const Floats& a, const Floats& b) {
+  if constexpr (kUnit == VectorUnit::kAvx2) {
+    return a < b ? a : b;
+  } else {
+    return -Max<kUnit>(-a, -b);
+  }
+}
+
+template <VectorUnit kUnit>
+WELLSPACE_INLINE float Largest(const Floats& items) {
+  if constexpr (kUnit == VectorUnit::kAvx2) {
+    Floats largest = items;
+    const auto with = [&](const FloatMask& order) __attribute__((always_inline)) {
+      const Floats other = __builtin_shuffle(largest, order);
+      largest = largest > other ? largest : other;
+    };
+    with(FloatMask{4, 5, 6, 7, 0, 1, 2, 3});
+    with(FloatMask{2, 3, 0, 1, 6, 7, 4, 5});
+    with(FloatMask{1, 0, 3, 2, 5, 4, 7, 6});
+    return largest[0];
+  } else {
+    float largest = items[0];
+    for (size_t lane = 1; lane < kFloatLanes; ++lane) {
+      largest = std::max(largest, items[lane]);
+    }
+    return largest;
+  }
+}
+
+// By the bits of the lanes that are kept: which lanes these are, in order.
+inline constexpr std::array<std::array<uint8_t, kFloatLanes>, 256> kOrders = [] {
+  std::array<std::array<uint8_t, kFloatLanes>, 256> orders{};
+  for (uint32_t bits = 0; bits < 256; ++bits) {
+    size_t next = 0;
+    for (uint8_t lane = 0; lane < kFloatLanes; ++lane) {
+      if ((bits >> lane & 1) != 0) {
+        orders[bits][next++] = lane;
+      }
+    }
+  }
+  return orders;
+}();
+
+template <VectorUnit kUnit>
+WELLSPACE_INLINE FloatMask OrderOf(uint32_t kept) {
+#if defined(__x86_64__)
+  if constexpr (kUnit == VectorUnit::kAvx2) {
+    using Bytes = char __attribute__((vector_size(16)));
+    using Words = int64_t __attribute__((vector_size(16)));
+    int64_t order;
+    std::memcpy(&order, kOrders[kept].data(), sizeof(order));
+    const Words words = {order, 0};
+    return reinterpret_cast<FloatMask>(__builtin_ia32_pmovzxbd256(reinterpret_cast<Bytes>(words)));
+  }
+#endif
+  FloatMask order;
+  for (size_t i = 0; i < kFloatLanes; ++i) {
+    order[i] = kOrders[kept][i];
+  }
+  return order;
+}
+
+// The bisector to a vertex, in the units of the nodes.
+template <int D>
+struct FloatBisector {
+  float w[D];    // the vector to the vertex
+  float offset;  // |w|^2 / 2
+  float low;     // the offset, less by what an excess over it may be wrong by at most
+
+  WELLSPACE_INLINE static FloatBisector Of(const Point<D>& normal, double scale, float most_radius) {
+    FloatBisector bisector;
+    float length_sq = 0;
+    for (int axis = 0; axis < D; ++axis) {
+      bisector.w[axis] = static_cast<float>(normal[axis] * scale);
+      length_sq += bisector.w[axis] * bisector.w[axis];
+    }
+    bisector.offset = 0.5f * length_sq;
+    bisector.low = bisector.offset - (kExcessError<D> * most_radius * __builtin_sqrtf(length_sq) + kUnderflow);
+    return bisector;
+  }
+};
+
+// The square of what the excess of the node x, as computed in doubles, over the bisector to a vertex at that squared distance may be wrong by.
+template <int D>
+double NodeDoubtSq(const Point<D>& x, double length_sq) {
+  constexpr double kShare = 1.01 * 0x1p-24 * kNodeError<D>;
+  return kShare * kShare * NormSq<D>(x) * length_sq + double{kUnderflow} * kUnderflow;
+}
+
+// Half the square of the distance from its site within which a vertex may cut a cell of that radius, in floats.
+template <int D>
+WELLSPACE_INLINE float MostOffset(float most_radius) {
+  return 2 * (1 + 8 * kDistanceError<D>)*most_radius * most_radius;
+}
+
+// Vectors from `site` to eight positions, times `scale`.
+WELLSPACE_INLINE void VectorsTo(const Point<2>* positions, const Point<2>& site, double scale, Floats* w) {
+  using Four = Wide<4>::Lanes;
+  using FourFloats = float __attribute__((vector_size(16)));
+  const Four from = {site[0], site[1], site[0], site[1]};
+  FourFloats pairs[4];  // x, y, x, y
+  for (size_t k = 0; k < 4; ++k) {
+    Four two;
+    std::memcpy(&two, positions + 2 * k, sizeof(two));
+    pairs[k] = __builtin_convertvector((two - from) * scale, FourFloats);
+  }
+  const Floats even = __builtin_shufflevector(pairs[0], pairs[2], 0, 1, 2, 3, 4, 5, 6, 7);
+  const Floats odd = __builtin_shufflevector(pairs[1], pairs[3], 0, 1, 2, 3, 4, 5, 6, 7);
+  w[0] = __builtin_shuffle(even, odd, FloatMask{0, 2, 8, 10, 4, 6, 12, 14});
+  w[1] = __builtin_shuffle(even, odd, FloatMask{1, 3, 9, 11, 5, 7, 13, 15});
+}
+// The same to the positions that at(0) to at(7) give.
+template <int D, typename At>
+WELLSPACE_INLINE void VectorsToEach(At at, const Point<D>& site, double scale, Floats* w) {
+  using Four = Wide<4>::Lanes;
+  using FourFloats = float __attribute__((vector_size(16)));
+  const Point<D>* const p[kFloatLanes] = {&at(0), &at(1), &at(2), &at(3), &at(4), &at(5), &at(6), &at(7)};
+  for (int axis = 0; axis < D; ++axis) {
+    const Four low = Four{(*p[0])[axis], (*p[1])[axis], (*p[2])[axis], (*p[3])[axis]} - site[axis];
+    const Four high = Four{(*p[4])[axis], (*p[5])[axis], (*p[6])[axis], (*p[7])[axis]} - site[axis];
+    w[axis] = __builtin_shufflevector(__builtin_convertvector(low * scale, FourFloats),
+                                      __builtin_convertvector(high * scale, FourFloats), 0, 1, 2, 3, 4, 5, 6, 7);
+  }
+}
+WELLSPACE_INLINE void VectorsTo(const Point<3>* positions, const Point<3>& site, double scale, Floats* w) {
+  VectorsToEach<3>(
+      [positions](size_t i) __attribute__((always_inline))->const Point<3>& { return positions[i]; }, site, scale, w);
+}
+
+// Vertices that lie side by side. May be read as those of a leaf may (Buckets::kReadTogether).
+template <int D>
+struct VerticesTogether {
+  std::span<const Point<D>> positions;
+  const VertexNames& names;
+
+  size_t size() const { return positions.size(); }
+  const Point<D>& position(size_t i) const { return positions[i]; }
+  VertexId name(size_t i) const { return names[i]; }
+  // To eight from the i-th on.
+  WELLSPACE_INLINE void FindVectors(size_t i, const Point<D>& site, double scale, Floats* w) const {
+    VectorsTo(&positions[i], site, scale, w);
+  }
+  // Which of them are called that.
+  template <VectorUnit kUnit>
+  WELLSPACE_INLINE FloatMask AreCalled(VertexId name, size_t i) const {
+    FloatMask listed{};
+    if (names.listed != nullptr) {
+      std::memcpy(&listed, names.listed + i, sizeof(listed));
+      listed = IsEqual<kUnit>(listed, Splat(static_cast<int32_t>(Index(name))));
+    }
+    return listed;
+  }
+};
+
+// Some of those that have been gathered, by number; beyond the last there are seven more numbers of any.
+template <int D>
+struct VerticesChosen {
+  const GatheredVertices<D>& gathered;
+  std::span<const int32_t> numbers;
+
+  size_t size() const { return numbers.size(); }
+  const Point<D>& position(size_t i) const { return gathered.position(static_cast<size_t>(numbers.data()[i])); }
+  VertexId name(size_t i) const { return gathered.name(static_cast<size_t>(numbers.data()[i])); }
+  WELLSPACE_INLINE void FindVectors(size_t i, const Point<D>& site, double scale, Floats* w) const {
+    VectorsToEach<D>(
+        [&](size_t k) __attribute__((always_inline))->const Point<D>& { return position(i + k); }, site, scale, w);
+  }
+  template <VectorUnit kUnit>
+  WELLSPACE_INLINE FloatMask AreCalled(VertexId called, size_t i) const {
+    const auto at = [&](size_t k) __attribute__((always_inline)) { return static_cast<int32_t>(Index(name(i + k))); };
+    const FloatMask names = {at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7)};
+    return IsEqual<kUnit>(names, Splat(static_cast<int32_t>(Index(called))));
+  }
+};
+
+// Calls f(i, distances) for eight gathered vertices at a time, from the i-th on, with their squared distances from `site`, by their columns.
+template <int D, typename F>
+WELLSPACE_INLINE void ForEachDistanceSq(const GatheredVertices<D>& gathered, const Point<D>& site, F f) {
+  Floats from[D];
+  for (int axis = 0; axis < D; ++axis) {
+    from[axis] = Splat(gathered.InColumn(site, axis));
+  }
+  for (size_t i = 0; i < gathered.count(); i += kFloatLanes) {
+    Floats distance_sq{};
+    for (int axis = 0; axis < D; ++axis) {
+      Floats x;
+      std::memcpy(&x, gathered.column(axis) + i, sizeof(x));
+      x -= from[axis];
+      distance_sq += x * x;
+    }
+    f(i, distance_sq);
+  }
+}
+
+// Lists the numbers of the gathered vertices whose squared distance from `site`, by their columns, is more than `more_than_sq` and at most
+// `most_sq`, and returns how many there are. Seven more are written.
+template <VectorUnit kUnit, int D>
+WELLSPACE_INLINE size_t ChooseBetween(const GatheredVertices<D>& gathered, const Point<D>& site, float more_than_sq,
+                                      float most_sq, int32_t* numbers) {
+  const Floats least = Splat(more_than_sq);
+  const Floats most = Splat(most_sq);
+  FloatMask eight = kEachLane;
+  size_t count = 0;
+  ForEachDistanceSq<D>(
+      gathered, site, [&](size_t /*i*/, const Floats& distance_sq) __attribute__((always_inline)) {
+        const uint32_t chosen = Bits<kUnit>(IsLess<kUnit>(least, distance_sq) & IsAtMost<kUnit>(distance_sq, most));
+        const FloatMask in_order = __builtin_shuffle(eight, OrderOf<kUnit>(chosen));
+        std::memcpy(numbers + count, &in_order, sizeof(in_order));
+        count += static_cast<size_t>(std::popcount(chosen));
+        eight += static_cast<int32_t>(kFloatLanes);
+      });
+  return count;
+}
+
+// Cuts a cell by those of the gathered vertices that are within its reach, the near ones first: by cut_by(vertices), which returns how many are,
+// for up to kMostCutTogether at a time. Returns how many are.
+template <VectorUnit kUnit, int D, typename Cell, typename CutBy>
+WELLSPACE_INLINE size_t CutByThoseGathered(const Cell& cell, const GatheredVertices<D>& gathered, CutBy cut_by) {
+  alignas(sizeof(FloatMask)) int32_t numbers[GatheredVertices<D>::kMost + kFloatLanes];
+  size_t within_reach = 0;
+  double limit_sq = std::min(gathered.near_sq(), cell.CutLimitSq());
+  for (float more_than_sq = -1;;) {
+    const float most_sq = gathered.MostSq(limit_sq);
+    const size_t count = ChooseBetween<kUnit, D>(gathered, cell.site(), more_than_sq, most_sq, numbers);
+    std::fill_n(numbers + count, kFloatLanes, 0);
+    for (size_t i = 0; i < count && !cell.IsTooLarge(); i += kMostCutTogether) {
+      within_reach += cut_by(VerticesChosen<D>{gathered, {numbers + i, std::min(count - i, kMostCutTogether)}});
+    }
+    if (cell.IsTooLarge() || cell.CutLimitSq() <= limit_sq) {
+      return within_reach;
+    }
+    limit_sq = cell.CutLimitSq();
+    more_than_sq = most_sq;
+  }
+}
+
+// The largest x . w of nodes in groups, of eight vectors w side by side.
+template <VectorUnit kUnit, int D, typename Group>
+WELLSPACE_INLINE Floats MostProducts(std::span<const Group> groups, const Floats* w) {
+  Floats most = Splat(-std::numeric_limits<float>::infinity());
+  for (const Group& group : groups) {
+    for (size_t i = 0; i < kFloatLanes; ++i) {
+      Floats product = w[D - 1] * group.x[D - 1][i];
+      for (int axis = D - 2; axis >= 0; --axis) {
+        product = w[axis] * group.x[axis][i] + product;
+      }
+      most = Max<kUnit>(most, product);
+    }
+  }
+  return most;
+}
+
+// The squared distances of the nodes of a group.
+template <int D, typename Group>
+WELLSPACE_INLINE Floats RadiiSq(const Group& group) {
+  Floats radius_sq = Load(group.x[0]) * Load(group.x[0]);
+  for (int axis = 1; axis < D; ++axis) {
+    radius_sq += Load(group.x[axis]) * Load(group.x[axis]);
+  }
+  return radius_sq;
+}
+
+// Whether some vertex in the cube from `low` to `high`, relative to the site, could cut off a node, as Polytope::Reaches has it; nodes are within
+// `most_radius`.
+template <VectorUnit kUnit, int D, typename Group>
+WELLSPACE_INLINE bool AreReached(std::span<const Group> groups, float most_radius, const Point<D>& low,
+                                 const Point<D>& high) {
+  FloatMask any{};
+  const Floats doubt = Splat(kPowerError<D> * most_radius * most_radius + kUnderflow);
+  for (const Group& group : groups) {
+    Floats power{};
+    for (int axis = 0; axis < D; ++axis) {
+      const Floats x = Load(group.x[axis]);
+      const Floats least = Splat(static_cast<float>(low[axis]));
+      const Floats most = Splat(static_cast<float>(high[axis]));
+      const Floats p = Min<kUnit>(Max<kUnit>(x, least), most);
+      power += p * (p - 2 * x);
+    }
+    any |= IsAtMost<kUnit>(power, doubt);
+  }
+  return Bits<kUnit>(any) != 0;
+}
+
+// The vertices that may cut a cell, in columns; whole vectors are written, the last one perhaps from the last one on.
+template <int D>
+struct alignas(sizeof(Floats)) NearVertices {
+  static constexpr size_t kMost = kMostCutTogether;
+  static constexpr size_t kCapacity = kMost + kFloatLanes;
+
+  float w[D][kCapacity];
+  float offset[kCapacity];
+  float low[kCapacity];
+  int32_t slot[kCapacity];  // among the positions
+  size_t count = 0;
+  uint32_t order[kCapacity];  // from the nearest on, but for distances that agree to one part in 2^17
+  size_t within_reach = 0;    // but for the site
+
+  // Picks those of `vertices` but `site_name` that may cut a cell about `site` of that radius, and that `may_cut`: given the vectors of eight
+  // and their lows, it tells which.
+  template <VectorUnit kUnit, typename Vertices, typename MayCut>
+  WELLSPACE_INLINE void Pick(const Vertices& vertices, VertexId site_name, const Point<D>& site, double scale,
+                             float most_radius, MayCut may_cut) {
+    const Floats far = Splat(MostOffset<D>(most_radius));
+    const FloatMask end = Splat(static_cast<int32_t>(vertices.size()));
+    const float error = kExcessError<D> * most_radius;
+    FloatMask slots = kEachLane;
+    for (size_t from = 0; from < vertices.size(); from += kFloatLanes) {
+      Floats vectors[D];
+      vertices.FindVectors(from, site, scale, vectors);
+      Floats length_sq = vectors[0] * vectors[0];
+      for (int axis = 1; axis < D; ++axis) {
+        length_sq += vectors[axis] * vectors[axis];
+      }
+      Floats length;
+      for (size_t lane = 0; lane < kFloatLanes; ++lane) {
+        length[lane] = __builtin_sqrtf(length_sq[lane]);
+      }
+      const Floats offsets = 0.5f * length_sq;
+      const Floats lows = offsets - (error * length + kUnderflow);
+      FloatMask is_near = IsAtMost<kUnit>(offsets, far) & IsLess<kUnit>(slots, end);
+      is_near &= ~vertices.template AreCalled<kUnit>(site_name, from);
+      within_reach += static_cast<size_t>(std::popcount(Bits<kUnit>(is_near)));
+      may_cut(vectors, lows, is_near);
+      const uint32_t kept = Bits<kUnit>(is_near);
+      const FloatMask lanes = OrderOf<kUnit>(kept);
+      const auto append = [&](const auto& items, auto* column) __attribute__((always_inline)) {
+        const auto chosen = __builtin_shuffle(items, lanes);
+        std::memcpy(column + count, &chosen, sizeof(chosen));
+      };
+      for (int axis = 0; axis < D; ++axis) {
+        append(vectors[axis], w[axis]);
+      }
+      append(offsets, offset);
+      append(lows, low);
+      append(slots, slot);
+      count += static_cast<size_t>(std::popcount(kept));
+      slots += static_cast<int32_t>(kFloatLanes);
+    }
+    order[0] = 0;
+    if (count > 1) {
+      FindOrder<kUnit>();
+    }
+  }
+
+  // Calls cut(bisector, slot), which tells whether anything is cut off, from the nearest on, as long as they are within `most_offset`(), which
+  // may have changed then.
+  template <typename Cut, typename Most>
+  WELLSPACE_INLINE void CutInOrder(Cut cut, Most most_offset) const {
+    float left = std::numeric_limits<float>::infinity();
+    for (size_t j = 0; j < count; ++j) {
+      const uint32_t i = order[j];
+      FloatBisector<D> bisector;
+      for (int axis = 0; axis < D; ++axis) {
+        bisector.w[axis] = w[axis][i];
+      }
+      bisector.offset = offset[i];
+      bisector.low = low[i];
+      if (bisector.offset > left) {
+        break;
+      }
+      if (cut(bisector, static_cast<size_t>(slot[i]))) {
+        left = most_offset() * (1 + 0x1p-16f);  // those that follow may be nearer by as much
+      }
+    }
+  }
+
+ private:
+  // By counting those before each.
+  template <VectorUnit kUnit>
+  WELLSPACE_INLINE void FindOrder() {
+    constexpr int kNumberBits = 6;
+    static_assert(kMost <= size_t{1} << kNumberBits);
+    alignas(sizeof(FloatMask)) int32_t keys[kCapacity];
+    // The bits of a float that is not negative order as it does; numbered in the last ones, no two are equal.
+    FloatMask number = kEachLane;
+    for (size_t first = 0; first < count; first += kFloatLanes) {
+      FloatMask own = *reinterpret_cast<const FloatMask*>(offset + first);
+      own = (own >> kNumberBits << kNumberBits) | number;
+      own = Choose<kUnit>(IsLess<kUnit>(number, Splat(static_cast<int32_t>(count))), own,
+                          Splat(std::numeric_limits<int32_t>::max()));
+      *reinterpret_cast<FloatMask*>(keys + first) = own;
+      number += static_cast<int32_t>(kFloatLanes);
+    }
+    for (size_t first = 0; first < count; first += kFloatLanes) {
+      const FloatMask own = *reinterpret_cast<const FloatMask*>(keys + first);
+      FloatMask before{};
+      for (size_t i = 0; i < count; i += kFloatLanes) {
+        for (size_t k = i; k < i + kFloatLanes; ++k) {
+          before -= IsLess<kUnit>(Splat(keys[k]), own);
+        }
+      }
+      for (size_t lane = 0; lane < kFloatLanes; ++lane) {
+        order[before[lane]] = static_cast<uint32_t>(first + lane);  // of what is none: after the last
+      }
+    }
+  }
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_CELL_NEAR_VERTICES_H_

@@ -1,0 +1,397 @@
+#include "core/cell/polygon.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <limits>
+
+#include "core/base/simd/lane_bits.h"
+#include "core/cell/meeting_point.h"
+#include "core/cell/near_vertices.h"
+
+namespace wellspace::core {
+
+// Takes note of the largest squared distance of a node, in floats.
+WELLSPACE_INLINE void Polygon::SetReach(float radius_sq) {
+  most_radius_ = std::min(most_radius_, std::sqrt(radius_sq) * (1 + kDistanceError<2>));  // the cell only shrinks
+}
+
+void Polygon::Reset(const Point<2>& site, const Box<2>& bounds, const std::array<PlaneKind, 4>& kinds, TieRule rule) {
+  BeginWalls(site, bounds, kinds, rule);
+  // From the lower left corner on; the edge from there runs along the lower face of axis 1.
+  static constexpr std::array<std::array<uint32_t, 2>, 4> kCorners = {{{0, 2}, {1, 2}, {1, 3}, {0, 3}}};
+  static constexpr std::array<int32_t, 4> kEdges = {2, 1, 3, 0};
+  Group& group = groups_.front();
+  group = {};
+  count_ = 4;
+  for (size_t i = 0; i < 4; ++i) {
+    group.x[0][i] = static_cast<float>(planes_[kCorners[i][0]].offset * scale_);
+    group.x[1][i] = static_cast<float>(planes_[kCorners[i][1]].offset * scale_);
+    group.plane[i] = kEdges[i];
+  }
+  SetReach(Largest<VectorUnit::kBaseline>(RadiiSq<2>(group)));
+}
+
+Point<2> Polygon::PositionOf(size_t node) const {
+  const Group& group = groups_[node / kTogether];
+  return {group.x[0][node % kTogether], group.x[1][node % kTogether]};
+}
+
+// Of the nodes `first` + i for the bits i of `doubtful`: a bit for whether it is cut off, by its own error if that tells, else exactly.
+[[gnu::noinline]] uint32_t Polygon::DecideDoubtful(size_t first, uint32_t doubtful, const Point<2>& generator) {
+  const Point<2> w = ScaledTo(generator);
+  const double length_sq = NormSq<2>(w);
+  uint32_t removed = 0;
+  for (; doubtful != 0; doubtful &= doubtful - 1) {
+    const size_t node = first + static_cast<size_t>(std::countr_zero(doubtful));
+    const Point<2> x = PositionOf(node);
+    const double excess = Dot<2>(x, w) - 0.5 * length_sq;
+    bool is_cut_off = excess > 0;
+    if (!(excess * excess > NodeDoubtSq<2>(x, length_sq))) {
+      is_cut_off = IsCutOff<uint32_t>({PlaneFrom(Before(node)), PlaneFrom(node)}, generator);
+    }
+    removed |= is_cut_off ? doubtful & -doubtful : 0;
+  }
+  return removed;
+}
+
+// Computes where `plane` meets the edges at whose ends the rest ends, in the order of the nodes, and the edges from there.
+//
+// As Meet does, by Cramer's rule in doubles: wrong by at most 64 * 2^-53 P (d + d' + |x|) / |det| with P = |n| |n'|, and the distances d
+// and d' of the two planes are |x| at most. So |det| > 2^-19 P has x wrong by less than half a unit of floats, 2^-26 |x|.
+WELLSPACE_INLINE void Polygon::PlaceEnds(const Rest& rest, uint32_t plane, std::array<Node, 2>& ends) const {
+  using Pair = Wide<2>::Lanes;
+  size_t last = rest.first + rest.count - 1;
+  last = last < count_ ? last : last - count_;
+  const size_t before = Before(rest.first);
+  const std::array<uint32_t, 2> along = {PlaneFrom(last), PlaneFrom(before)};
+  const Plane<2>& cut = planes_[plane];
+  const Plane<2>& a = planes_[along[0]];
+  const Plane<2>& b = planes_[along[1]];
+  const Pair normal_x = {a.normal[0], b.normal[0]};
+  const Pair normal_y = {a.normal[1], b.normal[1]};
+  const Pair offset = {a.offset, b.offset};
+  const Pair product = Pair{a.length, b.length} * cut.length;
+  const Pair determinant = normal_x * cut.normal[1] - normal_y * cut.normal[0];
+  const Pair inverse = scale_ / determinant;
+  Pair x = (offset * cut.normal[1] - cut.offset * normal_y) * inverse;
+  Pair y = (cut.offset * normal_x - offset * cut.normal[0]) * inverse;
+  const Pair size = determinant < 0 ? -determinant : determinant;
+  const auto is_good = size > 0x1p-19 * product;
+  if (Bits<2>(is_good) != 3) [[unlikely]] {
+    for (size_t k = 0; k < 2; ++k) {
+      if (is_good[k] == 0) {
+        const Point<2> exact = ExactMeetingPoint<2>(site_, {planes_[along[k]].source, cut.source});
+        x[k] = exact[0] * scale_;
+        y[k] = exact[1] * scale_;
+      }
+    }
+  }
+  ends[0].x = static_cast<float>(x[0]);
+  ends[0].y = static_cast<float>(y[0]);
+  ends[0].plane = static_cast<int32_t>(plane);
+  ends[1].x = static_cast<float>(x[1]);
+  ends[1].y = static_cast<float>(y[1]);
+  ends[1].plane = static_cast<int32_t>(along[1]);
+  ends[1].edge_sq = groups_[before / kTogether].edge_sq[before % kTogether];
+}
+
+// Makes the rest and the ends the nodes; both before and after kTogether at most.
+template <VectorUnit kUnit>
+WELLSPACE_INLINE void Polygon::Replace(const Rest& rest, const std::array<Node, 2>& ends) {
+  Group& group = groups_.front();
+  const auto old_count = static_cast<int32_t>(count_);
+  const auto kept = static_cast<int32_t>(rest.count);
+  FloatMask from = kEachLane + static_cast<int32_t>(rest.first);
+  from = from - (~IsLess<kUnit>(from, Splat(old_count)) & old_count);
+  const FloatMask is_kept = IsLess<kUnit>(kEachLane, Splat(kept));
+  const FloatMask is_second = ~IsLess<kUnit>(kEachLane, Splat(kept + 1));
+  const FloatMask is_used = IsLess<kUnit>(kEachLane, Splat(kept + 2));
+  const auto replaced = [&](auto* column, auto first, auto second) __attribute__((always_inline)) {
+    return Choose<kUnit>(is_kept, __builtin_shuffle(VectorAt(column), from),
+                         Choose<kUnit>(is_second, Splat(second), Splat(first)));
+  };
+  const auto used = [&](const Floats& items) __attribute__((always_inline)) {
+    return reinterpret_cast<Floats>(reinterpret_cast<FloatMask>(items) & is_used);
+  };
+  VectorAt(group.x[0]) = used(replaced(group.x[0], ends[0].x, ends[1].x));
+  VectorAt(group.x[1]) = used(replaced(group.x[1], ends[0].y, ends[1].y));
+  VectorAt(group.edge_sq) = replaced(group.edge_sq, ends[0].edge_sq, ends[1].edge_sq);
+  VectorAt(group.plane) = replaced(group.plane, ends[0].plane, ends[1].plane);
+  count_ = rest.count + 2;
+  SetReach(Largest<kUnit>(RadiiSq<2>(group)));
+}
+
+[[gnu::noinline]] void Polygon::ReplaceAmongMany(const Rest& rest, const std::array<Node, 2>& ends) {
+  around_.clear();
+  for (size_t j = 0; j < rest.count; ++j) {
+    const size_t i = (rest.first + j) % count_;
+    const Group& group = groups_[i / kTogether];
+    const size_t lane = i % kTogether;
+    around_.push_back({group.x[0][lane], group.x[1][lane], group.edge_sq[lane], group.plane[lane]});
+  }
+  around_.insert(around_.end(), ends.begin(), ends.end());
+  count_ = around_.size();
+  const size_t groups = GroupsFor(count_);
+  if (groups_.size() < groups) {
+    groups_.resize(2 * groups);
+  }
+  around_.resize(groups * kTogether);
+  float radius_sq = 0;
+  for (size_t i = 0; i < around_.size(); ++i) {
+    const Node& node = around_[i];
+    Group& group = groups_[i / kTogether];
+    const size_t lane = i % kTogether;
+    group.x[0][lane] = node.x;
+    group.x[1][lane] = node.y;
+    group.edge_sq[lane] = node.edge_sq;
+    group.plane[lane] = node.plane;
+    radius_sq = std::max(radius_sq, node.x * node.x + node.y * node.y);
+  }
+  SetReach(radius_sq);
+}
+
+// By how much the nodes, kTogether or fewer, may exceed the bisector at most.
+WELLSPACE_INLINE Floats Polygon::MostExcesses(const FloatBisector<2>& bisector) const {
+  const Group& group = groups_.front();
+  return Load(group.x[0]) * bisector.w[0] + (Load(group.x[1]) * bisector.w[1] - bisector.low);
+}
+
+// Tells what the bisector leaves of the nodes, kTogether or fewer, of which those of the bits `maybe` may be beyond it; false if all.
+template <VectorUnit kUnit>
+WELLSPACE_INLINE bool Polygon::FindRest(const FloatBisector<2>& bisector, const Floats& most, uint32_t maybe,
+                                        const Point<2>& position, Rest& rest) {
+  const auto count = static_cast<uint32_t>(count_);
+  uint32_t removed = Bits<kUnit>(IsLess<kUnit>(Splat(2 * (bisector.offset - bisector.low)), most)) & maybe;
+  if (removed != maybe) [[unlikely]] {
+    removed |= DecideDoubtful(0, maybe & ~removed, position);
+    if (removed == 0) {
+      return false;
+    }
+  }
+  const uint32_t is_before = removed << 1 | removed >> (count - 1);  // by node, whether the one before it goes
+  const uint32_t first = is_before & ~removed & ((1u << count) - 1);
+  if (!std::has_single_bit(first)) {
+    std::abort();  // exact decisions take out a run
+  }
+  rest.first = static_cast<uint32_t>(std::countr_zero(first));
+  rest.count = count - static_cast<uint32_t>(std::popcount(removed));
+  return true;
+}
+
+[[gnu::noinline]] bool Polygon::FindRestOfMany(const FloatBisector<2>& bisector, const Point<2>& position, Rest& rest) {
+  is_removed_.assign(count_, 0);
+  size_t removed_count = 0;
+  for (size_t i = 0; i < count_; ++i) {
+    const Group& group = groups_[i / kTogether];
+    const size_t lane = i % kTogether;
+    const float most = group.x[0][lane] * bisector.w[0] + (group.x[1][lane] * bisector.w[1] - bisector.low);
+    if (most >= 0 && (most > 2 * (bisector.offset - bisector.low) || DecideDoubtful(i, 1, position) != 0)) {
+      is_removed_[i] = 1;
+      ++removed_count;
+    }
+  }
+  if (removed_count == 0) {
+    return false;
+  }
+  size_t runs = 0;
+  for (size_t i = 0; i < count_; ++i) {
+    if (is_removed_[i] == 0 && is_removed_[Before(i)] != 0) {
+      rest.first = static_cast<uint32_t>(i);
+      ++runs;
+    }
+  }
+  if (runs != 1) {
+    std::abort();
+  }
+  rest.count = static_cast<uint32_t>(count_ - removed_count);
+  return true;
+}
+
+// Cuts by the bisector of the site and `position`.
+template <VectorUnit kUnit>
+WELLSPACE_INLINE bool Polygon::CutOff(const FloatBisector<2>& bisector, VertexId u, const Point<2>& position) {
+  Rest rest;
+  if (count_ <= kTogether) {
+    const Floats most = MostExcesses(bisector);
+    const uint32_t maybe = ~Bits<kUnit>(reinterpret_cast<const FloatMask&>(most)) & ((1u << count_) - 1);
+    if (maybe == 0 || !FindRest<kUnit>(bisector, most, maybe, position, rest)) {
+      return false;
+    }
+  } else if (!FindRestOfMany(bisector, position, rest)) {
+    return false;
+  }
+  const size_t index = AddBisector(u, position);
+  std::array<Node, 2> ends;
+  PlaceEnds(rest, static_cast<uint32_t>(index), ends);
+  ends[0].edge_sq = 2 * bisector.offset;
+  if (count_ <= kTogether && rest.count + 2 <= kTogether) {
+    Replace<kUnit>(rest, ends);
+  } else {
+    ReplaceAmongMany(rest, ends);
+  }
+  return true;
+}
+
+template <VectorUnit kUnit, typename Vertices>
+WELLSPACE_INLINE size_t Polygon::CutByThose(const Vertices& vertices, VertexId site) {
+  NearVertices<2> near;
+  near.Pick<kUnit>(
+      vertices, site, site_, scale_,
+      most_radius_, [this](const Floats* w, const Floats& low, FloatMask& is_near) __attribute__((always_inline)) {
+        if (cuts_ != 0) {  // most miss the cell, now and later
+          is_near &= IsAtMost<kUnit>(low, MostProducts<kUnit, 2>(groups(), w));
+        }
+      });
+  near.CutInOrder(
+      [&](const FloatBisector<2>& bisector, size_t slot) __attribute__((always_inline)) {
+        return CutOff<kUnit>(bisector, vertices.name(slot), vertices.position(slot));
+      },
+      [this] { return IsTooLarge() ? -1 : MostOffset<2>(most_radius_); });
+  return near.within_reach;
+}
+
+template <VectorUnit kUnit>
+WELLSPACE_INLINE size_t Polygon::CutByEachWith(std::span<const Point<2>> positions, const VertexNames& names,
+                                               VertexId site) {
+  return CutByThose<kUnit>(VerticesTogether<2>{positions, names}, site);
+}
+
+template <VectorUnit kUnit>
+WELLSPACE_INLINE size_t Polygon::CutByGatheredWith(const GatheredVertices<2>& gathered, VertexId site) {
+  return CutByThoseGathered<kUnit, 2>(
+      *this, gathered, [&](const VerticesChosen<2>& vertices) __attribute__((always_inline)) {
+        return CutByThose<kUnit>(vertices, site);
+      });
+}
+
+WELLSPACE_AVX2 size_t Polygon::CutByGatheredAvx2(const GatheredVertices<2>& gathered, VertexId site) {
+  return CutByGatheredWith<VectorUnit::kAvx2>(gathered, site);
+}
+
+size_t Polygon::CutByGathered(const GatheredVertices<2>& gathered, VertexId site) {
+  return unit_ == VectorUnit::kAvx2 ? CutByGatheredAvx2(gathered, site)
+                                    : CutByGatheredWith<VectorUnit::kBaseline>(gathered, site);
+}
+
+bool Polygon::CutBeforePlace(VertexId u, const Point<2>& position) {
+  const Point<2> normal = Difference<2>(position, site_);
+  if (!(NormSq<2>(normal) <= CutLimitSq())) {
+    return false;
+  }
+  const auto bisector = FloatBisector<2>::Of(normal, scale_, most_radius_);
+  return unit_ == VectorUnit::kAvx2 ? CutOffAvx2(bisector, u, position)
+                                    : CutOff<VectorUnit::kBaseline>(bisector, u, position);
+}
+
+WELLSPACE_AVX2 bool Polygon::CutOffAvx2(const FloatBisector<2>& bisector, VertexId u, const Point<2>& position) {
+  return CutOff<VectorUnit::kAvx2>(bisector, u, position);
+}
+
+size_t Polygon::CutByEach(std::span<const Point<2>> positions, const VertexNames& names, VertexId site) {
+  return unit_ == VectorUnit::kAvx2 ? CutByEachAvx2(positions, names, site)
+                                    : CutByEachWith<VectorUnit::kBaseline>(positions, names, site);
+}
+
+WELLSPACE_AVX2 size_t Polygon::CutByEachAvx2(std::span<const Point<2>> positions, const VertexNames& names,
+                                             VertexId site) {
+  return CutByEachWith<VectorUnit::kAvx2>(positions, names, site);
+}
+
+// Places all by their planes, bisectors by vertex, then walls by face: so they do not depend on the order of the cuts.
+void Polygon::Place() {
+  if (is_placed_) {
+    return;
+  }
+  is_placed_ = true;
+  nodes_.resize(count_);
+  double reach = 0;
+  for (size_t i = 0; i < count_; ++i) {
+    CellNode<2>& node = nodes_[i];
+    const size_t before = Before(i);
+    const size_t after = i + 1 < count_ ? i + 1 : 0;
+    const std::array<uint32_t, 2> planes = {PlaneFrom(before), PlaneFrom(i)};
+    const auto key = [this](uint32_t index) { return uint64_t{Index(planes_[index].vertex)} << 32 | index; };
+    const bool swaps = key(planes[1]) < key(planes[0]);
+    node.planes = {static_cast<uint16_t>(planes[swaps ? 1 : 0]), static_cast<uint16_t>(planes[swaps ? 0 : 1])};
+    // The edge that leaves the plane of the edge before runs along the one after, and the other way round.
+    node.neighbours = {static_cast<uint16_t>(swaps ? before : after), static_cast<uint16_t>(swaps ? after : before)};
+    PlaceNode<2>(site_, planes_, node);
+    reach = std::max(reach, node.reach);
+  }
+  placed_reach_ = reach;
+}
+
+bool Polygon::PlaceUnlessKeeps(double ratio) {
+  if (KeepsRatio(ratio)) {
+    return true;
+  }
+  Place();
+  return false;
+}
+
+template <VectorUnit kUnit>
+WELLSPACE_INLINE bool Polygon::KeepsRatioWith(double ratio) const {
+  const float ratio_sq = SurelyKeptRatioSq(ratio);
+  if (count_ <= kTogether) {
+    const Group& group = groups_.front();
+    const FloatMask before = Choose<kUnit>(kEachLane == 0, Splat(static_cast<int32_t>(count_ - 1)), kEachLane - 1);
+    const Floats from = Load(group.edge_sq);
+    const Floats to = __builtin_shuffle(from, before);
+    const Floats nearest_sq = Min<kUnit>(from, to);
+    const Floats radius_sq = RadiiSq<2>(group);
+    const uint32_t all = (1u << count_) - 1;
+    return (Bits<kUnit>(IsAtMost<kUnit>(radius_sq + kUnderflow, ratio_sq * nearest_sq)) & all) == all;
+  }
+  for (size_t i = 0; i < count_; ++i) {
+    const size_t before = Before(i);
+    const Group& group = groups_[i / kTogether];
+    const size_t lane = i % kTogether;
+    const float nearest_sq = std::min(group.edge_sq[lane], groups_[before / kTogether].edge_sq[before % kTogether]);
+    const float radius_sq = group.x[0][lane] * group.x[0][lane] + group.x[1][lane] * group.x[1][lane];
+    if (!(radius_sq + kUnderflow <= ratio_sq * nearest_sq)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+bool Polygon::KeepsRatio(double ratio) const {
+  return unit_ == VectorUnit::kAvx2 ? KeepsRatioAvx2(ratio) : KeepsRatioWith<VectorUnit::kBaseline>(ratio);
+}
+
+WELLSPACE_AVX2 bool Polygon::KeepsRatioAvx2(double ratio) const { return KeepsRatioWith<VectorUnit::kAvx2>(ratio); }
+
+template <VectorUnit kUnit>
+WELLSPACE_INLINE bool Polygon::ReachesWith(const Box<2>& cube) const {
+  return AreReached<kUnit, 2>(groups(), most_radius_, ScaledTo(cube.low), ScaledTo(cube.high));
+}
+
+WELLSPACE_AVX2 bool Polygon::ReachesAvx2(const Box<2>& cube) const { return ReachesWith<VectorUnit::kAvx2>(cube); }
+
+bool Polygon::Reaches(const Box<2>& cube) const {
+  return unit_ == VectorUnit::kAvx2 ? ReachesAvx2(cube) : ReachesWith<VectorUnit::kBaseline>(cube);
+}
+
+void Polygon::FindStar(Star<2>& out) const {
+  out.resize(count_);
+  size_t count = 0;
+  const Plane<2>* before = &planes_[PlaneFrom(Before(0))];
+  for (size_t i = 0; i < count_; ++i) {
+    // No branch, since none could be foretold where there are walls.
+    const Plane<2>* const after = &planes_[PlaneFrom(i)];
+    out[count] = {before->vertex, after->vertex};
+    count += before->kind == PlaneKind::kBisector && after->kind == PlaneKind::kBisector ? 1 : 0;
+    before = after;
+  }
+  out.resize(count);
+}
+
+uint64_t Polygon::MemoryBytes() const {
+  return groups_.capacity() * sizeof(Group) + planes_.capacity() * sizeof(Plane<2>) +
+         nodes_.capacity() * sizeof(CellNode<2>) + around_.capacity() * sizeof(Node) + is_removed_.capacity();
+}
+
+}  // namespace wellspace::core

@@ -1,0 +1,477 @@
+#include "core/cell/polyhedron.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <limits>
+
+#include "core/cell/near_vertices.h"
+
+namespace wellspace::core {
+namespace {
+
+using Four = Wide<4>::Lanes;
+using FourFloats = float __attribute__((vector_size(16)));
+
+}  // namespace
+
+// Brings the reach down to what the nodes tell.
+template <VectorUnit kUnit>
+WELLSPACE_INLINE void Polyhedron::SetReach() {
+  Floats most_sq{};
+  ForEachGroup([&](const Group& group)
+                   __attribute__((always_inline)) { most_sq = Max<kUnit>(most_sq, RadiiSq<3>(group)); });
+  most_radius_ =
+      std::min(most_radius_, std::sqrt(Largest<kUnit>(most_sq)) * (1 + kDistanceError<3>));  // the cell only shrinks
+}
+
+void Polyhedron::Reset(const Point<3>& site, const Box<3>& bounds, const std::array<PlaneKind, 6>& kinds,
+                       TieRule rule) {
+  BeginWalls(site, bounds, kinds, rule);
+  if (rows_.empty()) {
+    rows_.resize(kWordBits);
+    edge_sq_.resize(kWordBits);
+    groups_.resize(kWordBits / kTogether);
+    triangles_.resize(kWordBits);
+    removed_words_.resize(1);
+    removed_.resize(kWordBits);
+    rim_.resize(kWordBits + 4);
+    for (auto& column : new_) {
+      column.resize(rim_.size());
+    }
+  }
+  for (int face = 0; face < 6; ++face) {
+    const Plane<3>& plane = planes_[face];
+    rows_[face] = {{plane.normal[0], plane.normal[1], plane.normal[2]}, plane.offset};
+    edge_sq_[face] = 0;
+  }
+  std::fill_n(groups_.begin(), GroupsFor(count_), Group{});
+  count_ = 8;
+  Group& group = groups_.front();
+  for (uint32_t corner = 0; corner < 8; ++corner) {
+    std::array<uint16_t, 3> faces;
+    for (int axis = 0; axis < 3; ++axis) {
+      faces[axis] = static_cast<uint16_t>(FaceIndex(axis, (corner >> axis & 1) != 0));
+      group.x[axis][corner] = static_cast<float>(planes_[faces[axis]].offset * scale_);
+    }
+    if (std::popcount(corner) % 2 == 0) {  // seen from outside its faces follow each other the other way round
+      std::swap(faces[1], faces[2]);
+    }
+    triangles_[corner] = {faces};
+  }
+  SetReach<VectorUnit::kBaseline>();
+}
+
+// Finds the nodes that are cut off; whether there are any.
+template <VectorUnit kUnit>
+WELLSPACE_INLINE bool Polyhedron::FindRemoved(const FloatBisector<3>& bisector, const Point<3>& position) {
+  const Floats surely_from = Splat(2 * (bisector.offset - bisector.low));
+  uint64_t maybe = 0;
+  uint64_t surely = 0;
+  size_t node = 0;  // of a word
+  const auto look_at = [&](const Group& group) __attribute__((always_inline)) {
+    const Floats most = Load(group.x[0]) * bisector.w[0] +
+                        (Load(group.x[1]) * bisector.w[1] + (Load(group.x[2]) * bisector.w[2] - bisector.low));
+    maybe |= uint64_t{Bits<kUnit>(reinterpret_cast<const FloatMask&>(most)) ^ 0xff} << node;  // by sign
+    surely |= uint64_t{Bits<kUnit>(IsLess<kUnit>(surely_from, most))} << node;
+    node += kTogether;
+  };
+  if (count_ <= kWordBits) [[likely]] {
+    ForEachGroup(look_at);
+    return SetRemoved(0, maybe, surely, position);
+  }
+  bool is_any = false;
+  const Group* const end = groups_.data() + GroupsFor(count_);
+  size_t word = 0;
+  for (const Group* group = groups_.data(); group != end; ++word) {
+    maybe = 0;
+    surely = 0;
+    for (node = 0; node < kWordBits && group != end; ++group) {
+      look_at(*group);
+    }
+    is_any |= SetRemoved(word, maybe, surely, position);
+  }
+  return is_any;
+}
+
+// Sets a word of removed_words_, given which of its nodes the bisector to `generator` may cut off, and which it surely does; whether there are any.
+WELLSPACE_INLINE bool Polyhedron::SetRemoved(size_t word, uint64_t maybe, uint64_t surely, const Point<3>& generator) {
+  const size_t nodes = std::min(count_ - word * kWordBits, kWordBits);
+  maybe &= ~uint64_t{0} >> (kWordBits - nodes);
+  surely &= maybe;
+  if (maybe != surely) [[unlikely]] {
+    surely |= DecideDoubtful(word, maybe & ~surely, generator);
+  }
+  removed_words_[word] = surely;
+  return surely != 0;
+}
+
+// Of the nodes that the bits of `doubtful`, of a word, stand for: those that are cut off, by their own errors if those tell, else exactly.
+[[gnu::noinline]] uint64_t Polyhedron::DecideDoubtful(size_t word, uint64_t doubtful, const Point<3>& generator) {
+  const Point<3> w = ScaledTo(generator);
+  const double length_sq = NormSq<3>(w);
+  uint64_t removed = 0;
+  for (; doubtful != 0; doubtful &= doubtful - 1) {
+    const size_t node = word * kWordBits + static_cast<size_t>(std::countr_zero(doubtful));
+    const Point<3> x = PositionOf(node);
+    const double excess = Dot<3>(x, w) - 0.5 * length_sq;
+    bool is_cut_off = excess > 0;
+    if (!(excess * excess > NodeDoubtSq<3>(x, length_sq))) {
+      is_cut_off = IsCutOff<uint16_t>(triangles_[node].planes, generator);
+    }
+    removed |= is_cut_off ? doubtful & -doubtful : 0;
+  }
+  return removed;
+}
+
+// Lists the nodes that are cut off, and the edges of the rim around them: those of their triangles that no other of them has the other way round.
+WELLSPACE_INLINE void Polyhedron::FindRim() {
+  removed_count_ = 0;
+  rim_count_ = 0;
+  if (plane_count_ > kWordBits || count_ > kWordBits) {
+    FindRimAmongMany();
+    return;
+  }
+  const Triangle* const triangles = triangles_.data();
+  uint32_t* removed_end = removed_.data();
+  uint64_t touched = 0;
+  for (uint64_t removed = removed_words_[0]; removed != 0; removed &= removed - 1) {
+    const auto node = static_cast<uint32_t>(std::countr_zero(removed));
+    *removed_end++ = node;
+    const std::array<uint16_t, 3> planes = triangles[node].planes;
+    const std::array<uint64_t, 3> bits = {uint64_t{1} << planes[0], uint64_t{1} << planes[1], uint64_t{1} << planes[2]};
+    leads_to_[planes[0]] |= bits[1];
+    leads_to_[planes[1]] |= bits[2];
+    leads_to_[planes[2]] |= bits[0];
+    leads_from_[planes[0]] |= bits[2];
+    leads_from_[planes[1]] |= bits[0];
+    leads_from_[planes[2]] |= bits[1];
+    touched |= bits[0] | bits[1] | bits[2];
+  }
+  removed_count_ = static_cast<size_t>(removed_end - removed_.data());
+  const auto touched_count = static_cast<size_t>(std::popcount(touched));
+  RimEdge* const rim = rim_.data();
+  size_t rim_count = 0;
+  uint64_t doubled = 0;
+  for (; touched != 0; touched &= touched - 1) {
+    const auto from = static_cast<uint32_t>(std::countr_zero(touched));
+    const uint64_t to = leads_to_[from] & ~leads_from_[from];
+    leads_to_[from] = 0;
+    leads_from_[from] = 0;
+    // No branch, since none could be foretold.
+    rim[rim_count] = {static_cast<uint16_t>(from), static_cast<uint16_t>(std::countr_zero(to | uint64_t{1} << 63))};
+    doubled |= to & (to - 1) & -static_cast<uint64_t>(to != 0);
+    rim_count += to != 0 ? 1 : 0;
+  }
+  rim_count_ = rim_count;
+  // Exact decisions take a disk out. Euler's formula of one whose inner vertices are the planes that are gone then.
+  if (doubled != 0 || rim_count_ + 2 * (touched_count - rim_count_) != removed_count_ + 2) {
+    std::abort();
+  }
+}
+
+[[gnu::noinline]] void Polyhedron::FindRimAmongMany() {
+  edges_.clear();
+  for (uint32_t node = 0; node < count_; ++node) {
+    if (!IsRemoved(node)) {
+      continue;
+    }
+    removed_[removed_count_++] = node;
+    const std::array<uint16_t, 3>& planes = triangles_[node].planes;
+    for (int k = 0; k < 3; ++k) {
+      const uint32_t from = planes[k];
+      const uint32_t to = planes[(k + 1) % 3];
+      edges_.push_back({std::min(from, to), std::max(from, to), from});
+    }
+  }
+  std::sort(edges_.begin(), edges_.end());
+  if (rim_.size() < edges_.size() + 4) {
+    rim_.resize(2 * edges_.size() + 4);
+    for (auto& column : new_) {
+      column.resize(rim_.size());
+    }
+  }
+  for (size_t i = 0; i < edges_.size(); ++i) {
+    const auto& [low, high, from] = edges_[i];
+    if (i + 1 < edges_.size() && edges_[i + 1][0] == low && edges_[i + 1][1] == high) {
+      ++i;
+      continue;
+    }
+    rim_[rim_count_++] = {static_cast<uint16_t>(from), static_cast<uint16_t>(from == low ? high : low)};
+  }
+  if (rim_count_ < 3) {
+    std::abort();
+  }
+}
+
+// Computes the nodes where `plane` meets the edges that lead out of what is cut off, which lie on the planes of the edges of the rim.
+//
+// As Meet does, by Cramer's rule in doubles: wrong by at most 64 * 2^-53 P (d + d' + d'' + |x|) / |det|, where P is the product of the
+// lengths of the normals, and the distances of the planes are |x| at most. So |det| > 2^-19 P has x wrong by less than 2^-26 |x|.
+WELLSPACE_INLINE void Polyhedron::PlaceOnRim(uint32_t plane) {
+  const Row& own = rows_[plane];
+  const Point<3> n = {own.normal[0], own.normal[1], own.normal[2]};
+  const double n_sq = NormSq<3>(n);
+  std::fill_n(&rim_[rim_count_], 3, rim_[0]);  // four are read at a time
+  for (size_t first = 0; first < rim_count_; first += 4) {
+    const RimEdge* const edges = &rim_[first];
+    Four p[4];
+    Four q[4];
+    TakeColumns<uint16_t>({edges[0].from, edges[1].from, edges[2].from, edges[3].from}, p);
+    TakeColumns<uint16_t>({edges[0].to, edges[1].to, edges[2].to, edges[3].to}, q);
+    const Four q_n[3] = {q[1] * n[2] - q[2] * n[1], q[2] * n[0] - q[0] * n[2], q[0] * n[1] - q[1] * n[0]};
+    const Four n_p[3] = {n[1] * p[2] - n[2] * p[1], n[2] * p[0] - n[0] * p[2], n[0] * p[1] - n[1] * p[0]};
+    const Four p_q[3] = {p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]};
+    const Four determinant = p[0] * q_n[0] + p[1] * q_n[1] + p[2] * q_n[2];
+    const Four product_sq =
+        (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2]) * n_sq;
+    const auto is_good = determinant * determinant > 0x1p-38 * product_sq;
+    const Four inverse = scale_ / determinant;
+    FourFloats x[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      x[axis] =
+          __builtin_convertvector((p[3] * q_n[axis] + q[3] * n_p[axis] + own.offset * p_q[axis]) * inverse, FourFloats);
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      std::memcpy(&new_[axis][first], &x[axis], sizeof(x[axis]));
+    }
+    const uint32_t good = Bits<2>(reinterpret_cast<const Wide<2>::Mask*>(&is_good)[0]) |
+                          Bits<2>(reinterpret_cast<const Wide<2>::Mask*>(&is_good)[1]) << 2;
+    if (good != 15) [[unlikely]] {
+      for (size_t lane = 0; lane < 4; ++lane) {
+        if ((good >> lane & 1) == 0) {
+          PlaceOnShortEdge(first + lane, plane);
+        }
+      }
+    }
+  }
+}
+
+// Places a node whose planes are nearly dependent, as where slivers have nodes close to each other: at the end of its edge that stays, if that is short enough.
+[[gnu::noinline]] void Polyhedron::PlaceOnShortEdge(size_t j, uint32_t plane) {
+  const RimEdge edge = rim_[j];
+  const auto has = [](const Triangle& triangle, uint32_t from, uint32_t to) {
+    const std::array<uint16_t, 3>& planes = triangle.planes;
+    return (planes[0] == from && planes[1] == to) || (planes[1] == from && planes[2] == to) ||
+           (planes[2] == from && planes[0] == to);
+  };
+  size_t kept = 0;
+  while (!has(triangles_[kept], edge.to, edge.from)) {
+    ++kept;
+  }
+  size_t removed = 0;
+  while (!has(triangles_[removed], edge.from, edge.to)) {
+    ++removed;
+  }
+  const Point<3> x = PositionOf(kept);
+  const double length = std::sqrt(DistanceSq<3>(x, PositionOf(removed)));
+  // Each end is wrong by 1.5 u |x| at most, so the node by the length and 5 u |x|, in the place of 16.
+  if (!triangles_[kept].is_at_end && !triangles_[removed].is_at_end && length < 8 * 0x1p-24 * std::sqrt(NormSq<3>(x))) {
+    for (int axis = 0; axis < 3; ++axis) {
+      new_[axis][j] = static_cast<float>(x[axis]);
+    }
+    rim_[j].is_at_end = true;
+    return;
+  }
+  const Point<3> exact =
+      ExactMeetingPoint<3>(site_, {planes_[edge.from].source, planes_[edge.to].source, planes_[plane].source});
+  for (int axis = 0; axis < 3; ++axis) {
+    new_[axis][j] = static_cast<float>(exact[axis] * scale_);
+  }
+}
+
+// Puts the new nodes in the place of those cut off. They take their places first; what is left over goes to the end, and of places that are
+// left those at the end are filled.
+WELLSPACE_INLINE void Polyhedron::Replace(uint32_t plane) {
+  const size_t old = count_;
+  count_ = std::max(old, old + rim_count_ - removed_count_);
+  if (groups_.size() * kTogether < count_) {
+    const size_t groups = 2 * GroupsFor(count_);
+    groups_.resize(groups);
+    triangles_.resize(groups * kTogether);
+    removed_.resize(groups * kTogether);
+    removed_words_.resize((groups * kTogether + kWordBits - 1) / kWordBits);
+  }
+  Group* const groups = groups_.data();
+  Triangle* const triangles = triangles_.data();
+  const RimEdge* const rim = rim_.data();
+  const uint32_t* const removed = removed_.data();
+  const float* const edge_sq = edge_sq_.data();
+  const std::array<const float*, 3> x = {new_[0].data(), new_[1].data(), new_[2].data()};
+  const size_t rim_count = rim_count_;
+  const size_t removed_count = removed_count_;
+  const float own_sq = edge_sq[plane];
+  for (size_t j = 0; j < rim_count; ++j) {
+    // No branch, since none could be foretold.
+    const size_t added = old + j - removed_count;
+    const size_t index = added ^ ((added ^ removed[j]) & -static_cast<size_t>(j < removed_count));
+    const RimEdge edge = rim[j];
+    Group& group = groups[index / kTogether];
+    const size_t lane = index % kTogether;
+    group.x[0][lane] = x[0][j];
+    group.x[1][lane] = x[1][j];
+    group.x[2][lane] = x[2][j];
+    group.edge_sq[lane] = std::min(std::min(edge_sq[edge.from], edge_sq[edge.to]), own_sq);
+    triangles[index] = {{edge.from, edge.to, static_cast<uint16_t>(plane)}, edge.is_at_end};
+  }
+  for (size_t i = removed_count_; i-- > rim_count_;) {
+    const size_t hole = removed_[i];
+    const size_t last = --count_;
+    Group& from = groups_[last / kTogether];
+    Group& to = groups_[hole / kTogether];
+    for (int axis = 0; axis < 3; ++axis) {
+      to.x[axis][hole % kTogether] = from.x[axis][last % kTogether];
+      from.x[axis][last % kTogether] = 0;
+    }
+    to.edge_sq[hole % kTogether] = from.edge_sq[last % kTogether];
+    triangles_[hole] = triangles_[last];
+  }
+}
+
+// Cuts by the bisector of the site and `position`.
+template <VectorUnit kUnit>
+WELLSPACE_INLINE bool Polyhedron::CutOff(const FloatBisector<3>& bisector, VertexId u, const Point<3>& position) {
+  if (!FindRemoved<kUnit>(bisector, position)) {
+    return false;
+  }
+  const size_t index = AddBisector(u, position);
+  if (rows_.size() < plane_count_) {
+    rows_.resize(2 * plane_count_);
+    edge_sq_.resize(2 * plane_count_);
+  }
+  const Plane<3>& plane = planes_[index];
+  rows_[index] = {{plane.normal[0], plane.normal[1], plane.normal[2]}, plane.offset};
+  edge_sq_[index] = 2 * bisector.offset;
+  FindRim();
+  PlaceOnRim(static_cast<uint32_t>(index));
+  Replace(static_cast<uint32_t>(index));
+  SetReach<kUnit>();
+  return true;
+}
+
+template <VectorUnit kUnit, typename Vertices>
+WELLSPACE_INLINE size_t Polyhedron::CutByThose(const Vertices& vertices, VertexId site) {
+  NearVertices<3> near;
+  near.Pick<kUnit>(
+      vertices, site, site_, scale_,
+      most_radius_, [this](const Floats* w, const Floats& low, FloatMask& is_near) __attribute__((always_inline)) {
+        if (cuts_ != 0 && Bits<kUnit>(is_near) != 0) {  // most miss the cell, now and later
+          is_near &= IsAtMost<kUnit>(low, MostProducts<kUnit, 3>(groups(), w));
+        }
+      });
+  near.CutInOrder(
+      [&](const FloatBisector<3>& bisector, size_t slot) __attribute__((always_inline)) {
+        return CutOff<kUnit>(bisector, vertices.name(slot), vertices.position(slot));
+      },
+      [this] { return IsTooLarge() ? -1 : MostOffset<3>(most_radius_); });
+  return near.within_reach;
+}
+
+template <VectorUnit kUnit>
+WELLSPACE_INLINE size_t Polyhedron::CutByEachWith(std::span<const Point<3>> positions, const VertexNames& names,
+                                                  VertexId site) {
+  return CutByThose<kUnit>(VerticesTogether<3>{positions, names}, site);
+}
+
+template <VectorUnit kUnit>
+WELLSPACE_INLINE size_t Polyhedron::CutByGatheredWith(const GatheredVertices<3>& gathered, VertexId site) {
+  return CutByThoseGathered<kUnit, 3>(
+      *this, gathered, [&](const VerticesChosen<3>& vertices) __attribute__((always_inline)) {
+        return CutByThose<kUnit>(vertices, site);
+      });
+}
+
+WELLSPACE_AVX2 size_t Polyhedron::CutByGatheredAvx2(const GatheredVertices<3>& gathered, VertexId site) {
+  return CutByGatheredWith<VectorUnit::kAvx2>(gathered, site);
+}
+
+size_t Polyhedron::CutByGathered(const GatheredVertices<3>& gathered, VertexId site) {
+  return unit_ == VectorUnit::kAvx2 ? CutByGatheredAvx2(gathered, site)
+                                    : CutByGatheredWith<VectorUnit::kBaseline>(gathered, site);
+}
+
+WELLSPACE_AVX2 size_t Polyhedron::CutByEachAvx2(std::span<const Point<3>> positions, const VertexNames& names,
+                                                VertexId site) {
+  return CutByEachWith<VectorUnit::kAvx2>(positions, names, site);
+}
+
+size_t Polyhedron::CutByEach(std::span<const Point<3>> positions, const VertexNames& names, VertexId site) {
+  return unit_ == VectorUnit::kAvx2 ? CutByEachAvx2(positions, names, site)
+                                    : CutByEachWith<VectorUnit::kBaseline>(positions, names, site);
+}
+
+WELLSPACE_AVX2 bool Polyhedron::CutOffAvx2(const FloatBisector<3>& bisector, VertexId u, const Point<3>& position) {
+  return CutOff<VectorUnit::kAvx2>(bisector, u, position);
+}
+
+bool Polyhedron::CutBeforePlace(VertexId u, const Point<3>& position) {
+  const Point<3> normal = Difference<3>(position, site_);
+  if (!(NormSq<3>(normal) <= CutLimitSq())) {
+    return false;
+  }
+  const auto bisector = FloatBisector<3>::Of(normal, scale_, most_radius_);
+  return unit_ == VectorUnit::kAvx2 ? CutOffAvx2(bisector, u, position)
+                                    : CutOff<VectorUnit::kBaseline>(bisector, u, position);
+}
+
+template <VectorUnit kUnit>
+WELLSPACE_INLINE bool Polyhedron::KeepsRatioWith(float ratio_sq) const {
+  size_t left = count_;
+  for (const Group& group : groups()) {
+    const Floats radius_sq = RadiiSq<3>(group);
+    const uint32_t all = left < kTogether ? (1u << left) - 1 : 0xff;
+    left -= std::min(left, kTogether);
+    if ((Bits<kUnit>(IsAtMost<kUnit>(radius_sq + kUnderflow, ratio_sq * Load(group.edge_sq))) & all) != all) {
+      return false;
+    }
+  }
+  return true;
+}
+
+WELLSPACE_AVX2 bool Polyhedron::KeepsRatioAvx2(float ratio_sq) const {
+  return KeepsRatioWith<VectorUnit::kAvx2>(ratio_sq);
+}
+
+bool Polyhedron::KeepsRatio(double ratio) const {
+  const float ratio_sq = SurelyKeptRatioSq(ratio);
+  return unit_ == VectorUnit::kAvx2 ? KeepsRatioAvx2(ratio_sq) : KeepsRatioWith<VectorUnit::kBaseline>(ratio_sq);
+}
+
+template <VectorUnit kUnit>
+WELLSPACE_INLINE bool Polyhedron::ReachesWith(const Box<3>& cube) const {
+  return AreReached<kUnit, 3>(groups(), most_radius_, ScaledTo(cube.low), ScaledTo(cube.high));
+}
+
+WELLSPACE_AVX2 bool Polyhedron::ReachesAvx2(const Box<3>& cube) const { return ReachesWith<VectorUnit::kAvx2>(cube); }
+
+bool Polyhedron::Reaches(const Box<3>& cube) const {
+  return unit_ == VectorUnit::kAvx2 ? ReachesAvx2(cube) : ReachesWith<VectorUnit::kBaseline>(cube);
+}
+
+void Polyhedron::FindStar(Star<3>& out) const {
+  out.resize(count_);
+  size_t count = 0;
+  for (size_t i = 0; i < count_; ++i) {
+    // No branch, since none could be foretold where there are walls.
+    uint32_t is_simplex = 1;
+    for (int k = 0; k < 3; ++k) {
+      const Plane<3>& plane = planes_[triangles_[i].planes[k]];
+      out[count][k] = plane.vertex;
+      is_simplex &= plane.kind == PlaneKind::kBisector ? 1 : 0;
+    }
+    count += is_simplex;
+  }
+  out.resize(count);
+}
+
+uint64_t Polyhedron::MemoryBytes() const {
+  return groups_.capacity() * sizeof(Group) + triangles_.capacity() * sizeof(Triangle) +
+         planes_.capacity() * (sizeof(Plane<3>) + sizeof(Row) + sizeof(float)) +
+         nodes_.capacity() * sizeof(CellNode<3>) + rim_.capacity() * (sizeof(RimEdge) + 3 * sizeof(float)) +
+         removed_.capacity() * sizeof(uint32_t) + having_.capacity() * sizeof(uint16_t) +
+         edges_.capacity() * sizeof(edges_[0]);
+}
+
+}  // namespace wellspace::core

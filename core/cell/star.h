@@ -1,0 +1,18 @@
+// The simplices of one vertex.
+#ifndef WELLSPACE_CORE_CELL_STAR_H_
+#define WELLSPACE_CORE_CELL_STAR_H_
+
+#include <array>
+#include <vector>
+
+#include "core/base/ids.h"
+
+namespace wellspace::core {
+
+// Of each simplex the D vertices beside the one whose star it is.
+template <int D>
+using Star = std::vector<std::array<VertexId, D>>;
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_CELL_STAR_H_

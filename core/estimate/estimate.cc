@@ -1,0 +1,565 @@
+#include "core/estimate/estimate.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <numeric>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "absl/container/flat_hash_map.h"
+#include "core/base/dimensions.h"
+#include "core/base/status_macros.h"
+#include "core/estimate/mesh_size.h"
+#include "core/estimate/nearest_points.h"
+
+namespace wellspace::core {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// ---- The model; docs/design/estimate.md says how it was found ----------------------------------------------------------
+
+// The integrals that vertices are counted by. Those over the box are of lfs^-D times Grading, those over its faces of
+// (distance to the second nearest point)^-(D-1).
+enum Term {
+  kPoints,      // where two points decide about lfs
+  kNearFace,    // where a point and a face of the box do
+  kOpposite,    // where two opposite faces do: long or flat boxes
+  kEncroached,  // of the faces, where the nearest vertex does not lie on the face
+  kOnFace,      // of the faces, where it does
+  kTerms,
+};
+
+using Terms = std::array<double, kTerms>;
+
+double Sum(const Terms& terms) { return std::accumulate(terms.begin(), terms.end(), 0.0); }
+
+// Vertices that refinement adds per unit of each integral, at one rho and by one criterion.
+struct Calibration {
+  double rho;
+  Terms vertices;
+};
+
+// clang-format off
+constexpr Calibration kRadiusEdge2[] = {
+    {1.0,    {2.03, 2.54, 0.54, 0.00, 0.00}},
+    {1.2,    {1.22, 1.73, 0.57, 0.00, 0.04}},
+    {1.4142, {0.80, 1.48, 0.52, 0.00, 0.12}},
+    {2.0,    {0.54, 1.00, 0.44, 0.12, 0.02}},
+    {3.0,    {0.32, 0.46, 0.57, 0.02, 0.00}},
+    {5.0,    {0.19, 0.29, 0.55, 0.33, 0.02}},
+    {10.0,   {0.10, 0.20, 0.06, 0.52, 0.06}},
+    {30.0,   {0.06, 0.08, 0.00, 0.85, 0.05}},
+    {1000.0, {0.02, 0.00, 0.00, 0.85, 0.04}},
+};
+constexpr Calibration kRadiusEdge3[] = {
+    {1.2,    {6.56, 10.96, 0.55, 1.09, 6.82}},
+    {1.5,    {2.21,  2.97, 0.47, 0.29, 0.84}},
+    {2.0,    {1.05,  1.23, 0.47, 0.53, 0.22}},
+    {3.0,    {0.54,  0.49, 0.47, 0.77, 0.08}},
+    {5.0,    {0.29,  0.34, 0.48, 0.73, 0.05}},
+    {10.0,   {0.16,  0.20, 0.47, 0.77, 0.05}},
+    {30.0,   {0.065, 0.08, 0.10, 0.98, 0.03}},
+    {1000.0, {0.025, 0.00, 0.00, 0.95, 0.04}},
+};
+constexpr Calibration kWellSpaced2[] = {
+    {1.2,    {9.35, 9.28, 0.70, 0.00, 13.1}},
+    {1.4142, {3.48, 5.29, 0.60, 1.23, 6.10}},
+    {2.0,    {1.71, 2.41, 0.47, 0.00, 0.79}},
+    {3.0,    {0.84, 1.34, 0.56, 0.00, 0.41}},
+    {5.0,    {0.43, 0.75, 0.64, 0.00, 0.00}},
+    {10.0,   {0.23, 0.62, 0.64, 0.00, 0.13}},
+    {100.0,  {0.07, 0.30, 0.00, 0.65, 0.04}},
+    {1000.0, {0.02, 0.00, 0.00, 0.85, 0.04}},
+};
+constexpr Calibration kWellSpaced3[] = {
+    {2.0,    {2.13, 3.00, 0.46, 0.00, 0.91}},
+    {3.0,    {0.89, 1.51, 0.47, 0.16, 0.35}},
+    {5.0,    {0.43, 0.85, 0.43, 0.43, 0.18}},
+    {10.0,   {0.19, 0.48, 0.38, 0.57, 0.07}},
+    {100.0,  {0.036, 0.12, 0.00, 1.08, 0.05}},
+    {1000.0, {0.025, 0.00, 0.00, 0.95, 0.04}},
+};
+// clang-format on
+
+template <int D>
+std::span<const Calibration> CalibrationFor(Criterion criterion) {
+  if (criterion == Criterion::kWellSpaced) {
+    return D == 2 ? std::span<const Calibration>(kWellSpaced2) : std::span<const Calibration>(kWellSpaced3);
+  }
+  return D == 2 ? std::span<const Calibration>(kRadiusEdge2) : std::span<const Calibration>(kRadiusEdge3);
+}
+
+// How much of lfs^-D counts, by q, the distance to the nearest vertex over the distance from that vertex to its own
+// nearest feature: nothing as close to a vertex as its neighbours are, everything from a few times as far on. The ends
+// of the ramp as log2 q.
+template <int D>
+constexpr std::array<double, 2> kRamp = D == 2 ? std::array{-0.5, 1.0} : std::array{-0.05, 1.45};
+
+// Sizes below this part of the longest side count as this: no coordinates could tell such edges apart, and what is
+// integrated over so few halvings stays finite, whatever is asked for.
+constexpr double kLeastSize = 0x1p-60;
+
+// More vertices than any leaf is predicted to take.
+constexpr double kMostInLeaf = 0x1p400;
+
+// The volume of the unit ball; 1 / it is the number of uniformly random points per unit of the integral of lfs^-D.
+template <int D>
+double BallVolume() {
+  return std::pow(std::numbers::pi, 0.5 * D) / std::tgamma(0.5 * D + 1);
+}
+
+template <int D>
+Terms VerticesPerTerm(const MeshCriteria<D>& demands) {
+  // For D > 3 by analogy: the multiple of the least rho for which refinement ends, and balls of the same volume.
+  const double rho = D <= 3 ? demands.rho : demands.rho * std::exp2(-0.5 * (D - 3));
+  const double scale = D <= 3 ? 1.0 : BallVolume<3>() / BallVolume<D>();
+  const std::span<const Calibration> table = CalibrationFor<D>(demands.criterion);
+  size_t i = 1;
+  while (i + 1 < table.size() && table[i].rho < rho) {
+    ++i;
+  }
+  // Linear in log rho; below the table, where refinement may not end, by the first segment, above it the last entry.
+  const double t = std::min(1.0, std::log(rho / table[i - 1].rho) / std::log(table[i].rho / table[i - 1].rho));
+  Terms result;
+  for (int k = 0; k < kTerms; ++k) {
+    result[k] = scale * std::max(0.0, std::lerp(table[i - 1].vertices[k], table[i].vertices[k], t));
+  }
+  return result;
+}
+
+// Numbers in [0, 1) that depend on nothing but how many were drawn; a linear congruence of Knuth.
+class Draws {
+ public:
+  double Next() {
+    state_ = state_ * 6364136223846793005u + 1442695040888963407u;
+    return static_cast<double>(state_ >> 11) * 0x1p-53;
+  }
+
+ private:
+  uint64_t state_ = 1;
+};
+
+// ---- The integrals over leaves -----------------------------------------------------------------------------------------
+
+// What a leaf adds to the mesh.
+struct Share {
+  Terms terms{};
+  double sizes = 0;  // vertices for the sake of sizes, over those of the terms
+};
+
+template <int D>
+class Integrator {
+ public:
+  Integrator(const QueryStructure<D>& structure, const MeshCriteria<D>& demands)
+      : box_(structure.box()),
+        sizes_(ServedSizes(demands.sizes, box_)),
+        vertices_per_term_(VerticesPerTerm<D>(demands)) {}
+
+  absl::Status Prepare(const QueryStructure<D>& structure, const RunContext& context) {
+    // The corners of the box count as its boundary, not as points; those that were not given come last.
+    std::span<const Point<D>> points = structure.points();
+    std::vector<uint32_t> corners;
+    for (uint32_t i = 0; i < structure.vertex_count(); ++i) {
+      if ((i & 0xfff) == 0) {
+        WELLSPACE_RETURN_IF_ERROR(context.Check());
+      }
+      const FaceMask faces = structure.faces(VertexId{i});
+      if (faces == 0) {
+        continue;
+      }
+      ++on_boundary_;
+      if (std::popcount(faces) == D) {
+        corners.push_back(i);
+      }
+    }
+    for (; !corners.empty() && corners.back() == points.size() - 1; corners.pop_back()) {
+      points = points.first(points.size() - 1);
+    }
+    WELLSPACE_RETURN_IF_ERROR(points_.Build(points, std::move(corners), context));
+    const double shortest_side = box_.ShortestSide();
+    for (int corner = 0; corner < (1 << D); ++corner) {
+      Point<D> p;
+      for (int i = 0; i < D; ++i) {
+        p[i] = box_.FaceCoordinate(FaceIndex(i, ((corner >> i) & 1) != 0));
+      }
+      corner_spacing_[corner] = std::min(shortest_side, std::sqrt(points_.Nearest(p).first_sq));
+    }
+    return absl::OkStatus();
+  }
+
+  // After `full_looks` looks, one child of each cell stands for all of them: few leaves need so many, but sizes much
+  // smaller than a leaf may ask for any number.
+  Share IntegrateLeaf(const Box<D>& leaf, uint64_t full_looks) {
+    looks_ = 0;
+    full_looks_ = full_looks;
+    share_ = {};
+    Integrate(leaf.low, leaf.high[0] - leaf.low[0], 1.0);
+    return share_;
+  }
+
+  // The vertices that the terms stand for.
+  Terms VerticesOf(const Terms& terms) const {
+    Terms result;
+    std::transform(terms.begin(), terms.end(), vertices_per_term_.begin(), result.begin(), std::multiplies<>());
+    return result;
+  }
+  uint64_t on_boundary() const { return on_boundary_; }
+
+ private:
+  static SizeField<D> ServedSizes(SizeField<D> sizes, const Box<D>& box) {
+    sizes.RaiseTo(kLeastSize * box.LongestSide());
+    return sizes;
+  }
+
+  // The features around a place.
+  struct Surroundings {
+    double lfs = 0;
+    double opposite = 0;      // distance to the farther of the two nearest opposite faces
+    double nearest = 0;       // distance to the nearest vertex, a point or a corner of the box
+    double spacing = 0;       // of that vertex: to its nearest feature
+    FaceMask faces = 0;       // of that vertex
+    double second_point = 0;  // distance to the second nearest point
+    Term term = kPoints;      // what decides about lfs
+  };
+
+  Surroundings LookAt(const Point<D>& x) {
+    ++looks_;
+    const NearestTwo two = points_.Nearest(x, last_);
+    last_ = two;
+    Surroundings result;
+    result.nearest = std::sqrt(two.first_sq);
+    result.second_point = std::sqrt(two.second_sq);
+    const bool has_point = two.first_sq < kInfinity;
+    result.faces = has_point ? box_.FacesOf(points_[two.first]) : FaceMask{0};
+    double face = kInfinity;
+    double corner_sq = 0;
+    int corner = 0;
+    result.opposite = kInfinity;
+    for (int i = 0; i < D; ++i) {
+      const double low = x[i] - box_.low[i];
+      const double high = box_.high[i] - x[i];
+      // A face is no second feature to a point that lies on it.
+      face = std::min(face, ((result.faces >> FaceIndex(i, false)) & 1) != 0 ? kInfinity : low);
+      face = std::min(face, ((result.faces >> FaceIndex(i, true)) & 1) != 0 ? kInfinity : high);
+      result.opposite = std::min(result.opposite, std::max(low, high));
+      corner_sq += std::min(low, high) * std::min(low, high);
+      corner |= high < low ? 1 << i : 0;
+    }
+    const double with_face = std::max(result.nearest, face);
+    result.lfs = std::min({result.second_point, with_face, result.opposite});
+    result.term = result.lfs == result.opposite ? kOpposite : result.lfs < result.second_point ? kNearFace : kPoints;
+    if (corner_sq < two.first_sq) {
+      result.nearest = std::sqrt(corner_sq);
+      result.spacing = corner_spacing_[corner];
+      result.faces = CornerFaces<D>(corner);
+    } else {
+      result.spacing = SpacingOf(two.first);
+    }
+    return result;
+  }
+
+  // Distance from a point to its nearest feature.
+  double SpacingOf(uint32_t point) {
+    const auto [known, is_new] = spacing_.try_emplace(point);
+    double& spacing = known->second;
+    if (is_new) {
+      const Point<D>& p = points_[point];
+      const FaceMask faces = box_.FacesOf(p);
+      double corner_sq = 0;
+      spacing = std::sqrt(points_.Nearest(p, point).first_sq);
+      for (int face = 0; face < 2 * D; ++face) {
+        if (((faces >> face) & 1) == 0) {
+          spacing = std::min(spacing, box_.DistanceToFace(p, face));
+        }
+      }
+      for (int i = 0; i < D; ++i) {
+        const double nearer = std::min(p[i] - box_.low[i], box_.high[i] - p[i]);
+        corner_sq += nearer * nearer;
+      }
+      spacing = std::min(spacing, std::sqrt(corner_sq));
+    }
+    return spacing;
+  }
+
+  // The bounds of h over a cell.
+  std::pair<double, double> SizesIn(const Box<D>& cell) const {
+    double diagonal_sq = 0;
+    Point<D> center;
+    for (int i = 0; i < D; ++i) {
+      const double side = cell.high[i] - cell.low[i];
+      center[i] = cell.low[i] + 0.5 * side;
+      diagonal_sq += side * side;
+    }
+    double least = sizes_.max_circumradius;
+    for (const auto& region : sizes_.regions) {
+      least = std::min(least, std::max(region.max_circumradius, std::sqrt(DistanceSq<D>(cell, region.box))));
+    }
+    return {least, std::min(std::sqrt(sizes_.AtSq(center)) + 0.5 * std::sqrt(diagonal_sq), sizes_.max_circumradius)};
+  }
+
+  // Adds `weight` times the integrals over the part of a cube that lies in the box.
+  void Integrate(const Point<D>& low, double side, double weight) {
+    Box<D> cell;
+    Point<D> center;
+    double volume = weight;
+    for (int i = 0; i < D; ++i) {
+      cell.low[i] = std::max(low[i], box_.low[i]);
+      cell.high[i] = std::min(low[i] + side, box_.high[i]);
+      if (cell.low[i] >= cell.high[i]) {
+        return;
+      }
+      center[i] = 0.5 * (cell.low[i] + cell.high[i]);
+      volume *= cell.high[i] - cell.low[i];
+    }
+    if (IsSimple(cell, LookAt(center), side)) {
+      AddCell(cell, volume);
+      return;
+    }
+    const double half = 0.5 * side;
+    const auto child_low = [&](int child) {
+      Point<D> result = low;
+      for (int i = 0; i < D; ++i) {
+        result[i] += ((child >> i) & 1) != 0 ? half : 0.0;
+      }
+      return result;
+    };
+    if (looks_ < full_looks_) {
+      for (int child = 0; child < (1 << D); ++child) {
+        Integrate(child_low(child), half, weight);
+      }
+    } else {
+      const int child = std::min(static_cast<int>(draws_.Next() * (1 << D)), (1 << D) - 1);
+      Integrate(child_low(child), half, weight * (1 << D));
+    }
+  }
+
+  // Whether one place in the cell tells enough of all of it. lfs is 1-Lipschitz, so it is known up to a factor where it
+  // is not below the side.
+  bool IsSimple(const Box<D>& cell, const Surroundings& center, double side) const {
+    if (center.lfs < side) {
+      return false;
+    }
+    if (sizes_.IsUnbounded()) {
+      return true;
+    }
+    const auto [least, largest] = SizesIn(cell);
+    return largest <= 2 * least || least >= 2 * center.lfs;
+  }
+
+  // A place drawn from the cell, rather than its centre, makes the sum unbiased, on grids too.
+  void AddCell(const Box<D>& cell, double volume) {
+    Point<D> x;
+    for (int i = 0; i < D; ++i) {
+      x[i] = cell.low[i] + draws_.Next() * (cell.high[i] - cell.low[i]);
+    }
+    const Surroundings at = LookAt(x);
+    const double density = std::pow(at.lfs, -D);
+    const double graded = density * Grading(at.nearest / at.spacing);
+    share_.terms[at.term] += volume * graded;
+    if (!sizes_.IsUnbounded()) {
+      const double wanted = kVerticesPerSize<D> * std::pow(sizes_.AtSq(x), -0.5 * D);
+      const double there = density / BallVolume<D>() + graded * vertices_per_term_[at.term];
+      share_.sizes += volume * std::max(0.0, wanted - there);
+    }
+    for (int face = 0; face < 2 * D; ++face) {
+      const int i = face / 2;
+      const double coordinate = box_.FaceCoordinate(face);
+      if (coordinate == (face % 2 == 0 ? cell.low[i] : cell.high[i])) {
+        Point<D> y = x;
+        y[i] = coordinate;
+        AddFace(y, face, volume / (cell.high[i] - cell.low[i]), at.lfs);
+      }
+    }
+  }
+
+  void AddFace(const Point<D>& y, int face, double area, double lfs_near) {
+    const Surroundings at = LookAt(y);
+    double opposite = kInfinity;
+    for (int i = 0; i < D; ++i) {
+      if (i != face / 2) {
+        opposite = std::min(opposite, std::max(y[i] - box_.low[i], box_.high[i] - y[i]));
+      }
+    }
+    const bool is_encroached = ((at.faces >> face) & 1) == 0;
+    if (is_encroached || at.second_point < opposite) {
+      // Two points near the face and each other may be much nearer than the cell is large.
+      const double distance = std::min(std::max(at.second_point, 0.25 * lfs_near), opposite);
+      share_.terms[is_encroached ? kEncroached : kOnFace] += area * std::pow(distance, -(D - 1));
+    }
+  }
+
+  static double Grading(double q) {
+    return q > 0 ? std::clamp((std::log2(q) - kRamp<D>[0]) / (kRamp<D>[1] - kRamp<D>[0]), 0.0, 1.0) : 0.0;
+  }
+
+  const Box<D> box_;
+  const SizeField<D> sizes_;
+  const Terms vertices_per_term_;
+  NearestPoints<D> points_;                        // the input but the corners of the box
+  absl::flat_hash_map<uint32_t, double> spacing_;  // by point, where it has been asked for
+  std::array<double, 1 << D> corner_spacing_{};
+  uint64_t on_boundary_ = 0;  // vertices
+  Draws draws_;
+  uint64_t looks_ = 0;
+  uint64_t full_looks_ = 0;
+  Share share_;
+  NearestTwo last_;  // of the place looked at last
+};
+
+// ---- Sampling ----------------------------------------------------------------------------------------------------------
+
+// What becomes of a leaf that holds `vertices` in the end, `at_first` before refinement: it is split for as long as its
+// parts are too full. How many there will be is known to about a quarter. Vertices keep apart, so that leaves of less than
+// one hold one at most.
+template <int D>
+Leaves LeavesOf(double vertices, double at_first) {
+  constexpr double kCapacity = LeafTree<D>::kLeafCapacity;
+  constexpr double kChildren = LeafTree<D>::kChildren;
+  vertices = std::min(vertices, kMostInLeaf);
+  double parts = 1;
+  for (; vertices >= 1.25 * kCapacity; at_first = 0) {
+    vertices /= kChildren;
+    parts *= kChildren;
+  }
+  Leaves result{1.0, at_first > 0 ? 1.0 : std::min(1.0, vertices)};
+  if (const double split = 2 * (vertices / kCapacity - 0.75); split > 0) {
+    result.all = std::lerp(result.all, kChildren, split);
+    result.filled = std::lerp(result.filled, kChildren * std::min(1.0, vertices / kChildren), split);
+  }
+  return {parts * result.all, parts * result.filled};
+}
+
+// The sums over all leaves, and the standard error of the vertices.
+struct Sample {
+  Share sum;
+  Leaves leaves;
+  double error = 0;
+};
+
+// Leaves that are alike, of which some are drawn without replacement, and what these tell of all.
+struct Stratum {
+  std::vector<NodeId> leaves;  // the first `taken` have been looked at
+  size_t taken = 0;
+  Share sum;
+  Leaves become;
+  double vertices = 0;
+  double vertices_sq = 0;
+
+  double Factor() const { return taken == 0 ? 0.0 : static_cast<double>(leaves.size()) / static_cast<double>(taken); }
+  // Of the vertices in all. REQUIRES: some have been looked at.
+  double VarianceOfSum() const {
+    const auto count = static_cast<double>(leaves.size());
+    const auto k = static_cast<double>(taken);
+    const double mean = vertices / k;
+    return count * count * std::max(0.0, vertices_sq / k - mean * mean) * (1 - k / count) / k;
+  }
+};
+
+void Add(Share& sum, const Share& share, double factor = 1) {
+  for (int k = 0; k < kTerms; ++k) {
+    sum.terms[k] += factor * share.terms[k];
+  }
+  sum.sizes += factor * share.sizes;
+}
+
+// Leaves looked at between two looks at the error, at most.
+constexpr size_t kLeavesTogether = 64;
+
+// Draws leaves without replacement: from those with vertices and those without, as there may be few of the former and nearly
+// all new vertices in them.
+template <int D>
+absl::StatusOr<Sample> SampleLeaves(const QueryStructure<D>& structure, Integrator<D>& integrator,
+                                    const EstimateEffort& effort, const RunContext& context) {
+  std::array<Stratum, 2> strata;
+  structure.tree().ForEachLeaf([&](NodeId leaf) {
+    const auto* const bucket = structure.tree().BucketOf(leaf);
+    strata[bucket != nullptr && bucket->count > 0 ? 1 : 0].leaves.push_back(leaf);
+  });
+  const uint64_t full_looks =
+      std::max(effort.looks_per_leaf, effort.looks / (strata[0].leaves.size() + strata[1].leaves.size()));
+  const size_t least = std::max<size_t>(effort.least_leaves, 1);
+  Draws draws;
+  Sample sample;
+  while (true) {
+    double variance = 0;
+    double total = structure.vertex_count();
+    Stratum* widest = nullptr;
+    double widest_variance = 0;
+    for (Stratum& stratum : strata) {
+      const bool is_whole = stratum.taken == stratum.leaves.size();
+      const double own = is_whole ? 0 : stratum.taken < least ? kInfinity : stratum.VarianceOfSum();
+      variance += own;
+      total += stratum.Factor() * stratum.vertices;
+      if (own > widest_variance) {
+        widest = &stratum;
+        widest_variance = own;
+      }
+    }
+    sample.error = std::sqrt(variance);
+    if (widest == nullptr || sample.error <= effort.sampling_error * total) {
+      break;
+    }
+    const size_t end = std::min(widest->leaves.size(), widest->taken + std::min(least, kLeavesTogether));
+    for (; widest->taken < end; ++widest->taken) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+      const size_t rest = widest->leaves.size() - widest->taken;
+      NodeId& leaf = widest->leaves[widest->taken];
+      std::swap(leaf,
+                widest->leaves[widest->taken +
+                               std::min(rest - 1, static_cast<size_t>(draws.Next() * static_cast<double>(rest)))]);
+      const Share share = integrator.IntegrateLeaf(structure.tree().BoxOf(leaf), full_looks);
+      Add(widest->sum, share);
+      const double vertices = Sum(integrator.VerticesOf(share.terms)) + share.sizes;
+      const auto* const bucket = structure.tree().BucketOf(leaf);
+      const double at_first = bucket == nullptr ? 0.0 : bucket->count;
+      const Leaves become = LeavesOf<D>(at_first + vertices, at_first);
+      widest->become.all += become.all;
+      widest->become.filled += become.filled;
+      widest->vertices += vertices;
+      widest->vertices_sq += vertices * vertices;
+    }
+  }
+  for (const Stratum& stratum : strata) {
+    Add(sample.sum, stratum.sum, stratum.Factor());
+    sample.leaves.all += stratum.Factor() * stratum.become.all;
+    sample.leaves.filled += stratum.Factor() * stratum.become.filled;
+  }
+  return sample;
+}
+
+}  // namespace
+
+template <int D>
+absl::StatusOr<SizeEstimate> EstimateSize(const QueryStructure<D>& structure, const MeshCriteria<D>& demands,
+                                          const RunContext& context, const EstimateEffort& effort) {
+  Integrator<D> integrator(structure, demands);
+  WELLSPACE_RETURN_IF_ERROR(integrator.Prepare(structure, context));
+  WELLSPACE_ASSIGN_OR_RETURN(const Sample sample, SampleLeaves<D>(structure, integrator, effort, context));
+
+  const Terms added = integrator.VerticesOf(sample.sum.terms);
+  // Near a face, every second vertex lies on it; in a flat or long box all do.
+  const double on_boundary = static_cast<double>(integrator.on_boundary()) + 0.5 * added[kNearFace] + added[kOpposite] +
+                             added[kEncroached] + added[kOnFace];
+  SizeEstimate estimate;
+  estimate.vertices = structure.vertex_count() + Sum(added) + sample.sum.sizes;
+  estimate.simplices = SimplicesOf<D>(estimate.vertices, on_boundary);
+  estimate.bytes = BytesOf<D>(sample.leaves, estimate.vertices, estimate.simplices);
+  estimate.sampling_error = sample.error / estimate.vertices;
+  return estimate;
+}
+
+#define WELLSPACE_INSTANTIATE(D)                                                                          \
+  template absl::StatusOr<SizeEstimate> EstimateSize<D>(const QueryStructure<D>&, const MeshCriteria<D>&, \
+                                                        const RunContext&, const EstimateEffort&);
+WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
+#undef WELLSPACE_INSTANTIATE
+
+}  // namespace wellspace::core

@@ -1,0 +1,220 @@
+#include "core/estimate/least_vertices.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <vector>
+
+#include "core/base/dimensions.h"
+#include "core/estimate/mesh_size.h"
+
+namespace wellspace::core {
+namespace {
+
+// What sizes and circumcentres may be off by rounding is far below this.
+constexpr double kRounding = 0.99;
+
+// Across, no place of a box is farther than this times rho times its shortest side from a vertex: 3 sqrt(3 / 2),
+// rounded up.
+constexpr double kThinReach = 3.6743;
+
+// Boxes of sizes that are held against each other, the finest.
+constexpr size_t kMostRegions = 1000;
+
+// Sizes between those of a box and those far from it are taken in steps of this ratio.
+constexpr double kShellRatio = 1.25;
+
+double BallVolume(int dimension) {
+  return std::pow(std::numbers::pi, 0.5 * dimension) / std::tgamma(0.5 * dimension + 1);
+}
+
+// (length / size)^power without overflow of the size alone.
+double CountOf(double length, double size, int power) { return std::pow(length / size, power); }
+
+template <int D>
+std::array<double, D> SidesOf(const Box<D>& box) {
+  std::array<double, D> sides;
+  for (int i = 0; i < D; ++i) {
+    sides[i] = box.high[i] - box.low[i];
+  }
+  return sides;
+}
+
+// The volume of what two boxes share, in units of `unit`^D.
+template <int D>
+double SharedVolume(const Box<D>& a, const Box<D>& b, double unit) {
+  double volume = 1;
+  for (int i = 0; i < D; ++i) {
+    volume *= std::max(0.0, std::min(a.high[i], b.high[i]) - std::max(a.low[i], b.low[i])) / unit;
+  }
+  return volume;
+}
+
+template <int D>
+Box<D> Grown(const Box<D>& box, double by) {
+  Box<D> grown = box;
+  for (int i = 0; i < D; ++i) {
+    grown.low[i] -= by;
+    grown.high[i] += by;
+  }
+  return grown;
+}
+
+// Vertices that cover a box if each covers what is within `reach`: the most that any projection to some axes wants.
+template <int D>
+double LeastToCover(const Box<D>& box, double reach) {
+  std::array<double, D> sides = SidesOf<D>(box);
+  std::sort(sides.begin(), sides.end(), std::greater<>());
+  double least = 0;
+  double count = 1;
+  for (int k = 1; k <= D; ++k) {
+    count *= sides[k - 1] / reach;
+    least = std::max(least, count / BallVolume(k));
+  }
+  return least;
+}
+
+// Vertices per h^-D that there are at least, wherever h holds; and where it holds everywhere.
+template <int D>
+double LeastPerSize() {
+  return D == 2 ? 2 / (3 * std::numbers::sqrt3) : 1 / BallVolume(D);
+}
+template <int D>
+double LeastPerSizeEverywhere() {
+  // The part of four balls about the corners of a regular tetrahedron that lies in it, over its volume.
+  constexpr double kCovering3 = 1.43;
+  return D == 3 ? kCovering3 / BallVolume(D) : LeastPerSize<D>();
+}
+
+// The least x in [least, most] with fits(x), if it fits at all from some x on; `most` if none below does.
+template <typename F>
+double LeastThat(double least, double most, F fits) {
+  if (fits(least)) {
+    return least;
+  }
+  for (int i = 0; i < 40; ++i) {
+    const double middle = std::sqrt(least) * std::sqrt(most);
+    (fits(middle) ? most : least) = middle;
+  }
+  return most;
+}
+
+}  // namespace
+
+template <int D>
+double LeastVerticesForSizes(const Box<D>& box, const SizeField<D>& sizes) {
+  if (sizes.IsUnbounded()) {
+    return 0;
+  }
+  const double unit = box.LongestSide();
+  const double everywhere = sizes.max_circumradius;
+  const double whole =
+      std::max(LeastToCover<D>(box, everywhere),
+               LeastPerSizeEverywhere<D>() * SharedVolume<D>(box, box, unit) * CountOf(unit, everywhere, D));
+  // The smallest sizes first, of each box what no smaller size has been counted in.
+  std::vector<typename SizeField<D>::Region> regions = sizes.regions;
+  std::sort(regions.begin(), regions.end(),
+            [](const auto& a, const auto& b) { return a.max_circumradius < b.max_circumradius; });
+  double rest = SharedVolume<D>(box, box, unit);
+  double sum = 0;
+  double most = 0;
+  for (size_t i = 0; i < std::min(regions.size(), kMostRegions) && regions[i].max_circumradius < everywhere; ++i) {
+    Box<D> inside = regions[i].box;
+    bool meets = true;
+    for (int k = 0; k < D; ++k) {
+      inside.low[k] = std::max(inside.low[k], box.low[k]);
+      inside.high[k] = std::min(inside.high[k], box.high[k]);
+      meets = meets && inside.low[k] <= inside.high[k];
+    }
+    if (!meets) {
+      continue;
+    }
+    double own = SharedVolume<D>(inside, inside, unit);
+    rest -= own;
+    for (size_t j = 0; j < i; ++j) {
+      own -= SharedVolume<D>(inside, regions[j].box, unit);
+    }
+    sum += std::max(0.0, own) * CountOf(unit, regions[i].max_circumradius, D);
+    most = std::max(most, LeastToCover<D>(inside, regions[i].max_circumradius));
+  }
+  sum += std::max(0.0, rest) * CountOf(unit, everywhere, D);
+  return kRounding * std::max({whole, most, LeastPerSize<D>() * sum});
+}
+
+template <int D>
+double LeastVerticesForShape(const Box<D>& box, double rho) {
+  return kRounding * LeastToCover<D>(box, kThinReach * rho * box.ShortestSide());
+}
+
+template <int D>
+double TypicalVerticesForSizes(const Box<D>& box, const SizeField<D>& sizes) {
+  const double unit = box.LongestSide();
+  const double everywhere = std::min(sizes.max_circumradius, unit);
+  // With half a layer more at each face.
+  double sum = 1;
+  for (const double side : SidesOf<D>(box)) {
+    sum *= side / everywhere + 1;
+  }
+  for (const auto& region : sizes.regions) {
+    double size = region.max_circumradius;
+    double before = 0;
+    // What is nearer to the box than its size, and then shells about that, in which sizes are as large as the shell is
+    // far.
+    for (double reach = size; size < everywhere; size = reach, reach *= kShellRatio) {
+      const double within = SharedVolume<D>(Grown<D>(region.box, reach), box, unit);
+      sum += (within - before) * CountOf(unit, size, D);
+      before = within;
+    }
+  }
+  return kVerticesPerSize<D> * sum;
+}
+
+template <int D>
+double TypicalVerticesForShape(const Box<D>& box) {
+  // The integral of (distance to the farther of two opposite faces)^-D across the thin axis, and half a vertex for
+  // each.
+  double count = (std::exp2(D - 1) - 1) / (D - 1);
+  for (const double side : SidesOf<D>(box)) {
+    count *= side / box.ShortestSide();
+  }
+  return count;
+}
+
+template <int D>
+double SmallestSizeFor(const Box<D>& box, const SizeField<D>& sizes, double vertices) {
+  double least = sizes.max_circumradius;
+  for (const auto& region : sizes.regions) {
+    least = std::min(least, region.max_circumradius);
+  }
+  const double most = box.LongestSide();
+  return LeastThat(std::min(least, most), most, [&](double size) {
+    SizeField<D> raised = sizes;
+    raised.RaiseTo(size);
+    return TypicalVerticesForSizes<D>(box, raised) <= vertices;
+  });
+}
+
+template <int D>
+double SmallestSideFor(const Box<D>& box, double vertices) {
+  return LeastThat(box.ShortestSide(), box.LongestSide(), [&](double side) {
+    Box<D> thick = box;
+    for (int i = 0; i < D; ++i) {
+      thick.high[i] = std::max(thick.high[i], thick.low[i] + side);
+    }
+    return TypicalVerticesForShape<D>(thick) <= vertices;
+  });
+}
+
+#define WELLSPACE_INSTANTIATE(D)                                                  \
+  template double LeastVerticesForSizes<D>(const Box<D>&, const SizeField<D>&);   \
+  template double LeastVerticesForShape<D>(const Box<D>&, double);                \
+  template double TypicalVerticesForSizes<D>(const Box<D>&, const SizeField<D>&); \
+  template double TypicalVerticesForShape<D>(const Box<D>&);                      \
+  template double SmallestSizeFor<D>(const Box<D>&, const SizeField<D>&, double); \
+  template double SmallestSideFor<D>(const Box<D>&, double);
+WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
+#undef WELLSPACE_INSTANTIATE
+
+}  // namespace wellspace::core
