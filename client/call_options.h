@@ -18,8 +18,8 @@ struct CallOptions {
   // Ends the call with CANCELLED.
   std::stop_token stop;
 
-  // Of a call that changes something: a repetition with the same id and content does nothing and returns the first answer.
-  // Empty: one is chosen, so that what the library repeats after a lost connection is done once.
+  // Of a call that changes something: a repetition with the same id and content does nothing and returns the first
+  // answer. Empty: one is chosen, so that what the library repeats after a lost connection is done once.
   std::string request_id;
 
   // Of a call that changes a session: ABORTED unless the session is at this revision. 0: any.

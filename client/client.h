@@ -58,14 +58,14 @@ using OnPoints = std::function<void(uint64_t points)>;
 using OnDistances = std::function<absl::Status(std::span<const double>)>;
 using OnCells = std::function<absl::Status(const CellBatch&)>;
 
-// A thin face over a Connection, which has the deadlines, repeats what a broken connection interrupted, and goes on with uploads, watches
-// and downloads where they were.
+// A thin face over a Connection, which has the deadlines, repeats what a broken connection interrupted, and goes on
+// with uploads, watches and downloads where they were.
 //
 // Callbacks may be empty; they are called by the thread that made the call, while it waits.
 //
-// Errors of all calls: the server's, unchanged; CANCELLED when `call.stop` asks for it; DEADLINE_EXCEEDED when `call.timeout` has passed; UNAVAILABLE
-// when the server cannot be reached, after patient attempts; DATA_LOSS when its answer contradicts itself; those of sinks, sources and
-// callbacks. BlamedField and ReasonOf tell more.
+// Errors of all calls: the server's, unchanged; CANCELLED when `call.stop` asks for it; DEADLINE_EXCEEDED when
+// `call.timeout` has passed; UNAVAILABLE when the server cannot be reached, after patient attempts; DATA_LOSS when its
+// answer contradicts itself; those of sinks, sources and callbacks. BlamedField and ReasonOf tell more.
 //
 // Thread safety: thread-safe.
 class Client {
@@ -97,16 +97,17 @@ class Client {
                                         const CallOptions& call = {});
   absl::Status DeleteSession(const std::string& session, const CallOptions& call = {});
 
-  // Adds the points of `source` to a session. `offset` is the number of the session's points before the first of them: what is there
-  // from it on is not sent again, so that an upload that broke off is simply repeated with the same offset. It has to
-  // be of the same source: the server compares a checksum, and FAILED_PRECONDITION (UPLOAD_MISMATCH) ends the call if
-  // it is not. Absent: after the points that are there when the call begins. A session takes one upload at a time:
-  // FAILED_PRECONDITION (SESSION_BUSY). `call.expected_revision` is that before the call.
+  // Adds the points of `source` to a session. `offset` is the number of the session's points before the first of them:
+  // what is there from it on is not sent again, so that an upload that broke off is simply repeated with the same
+  // offset. It has to be of the same source: the server compares a checksum, and FAILED_PRECONDITION (UPLOAD_MISMATCH)
+  // ends the call if it is not. Absent: after the points that are there when the call begins. A session takes one
+  // upload at a time: FAILED_PRECONDITION (SESSION_BUSY). `call.expected_revision` is that before the call.
   absl::StatusOr<Uploaded> UploadPoints(const std::string& session, PointSource& source,
                                         std::optional<uint64_t> offset = std::nullopt,
                                         const OnPoints& on_points = nullptr, const CallOptions& call = {});
 
-  // Streams the mesh of a session into `sink`: that of `revision`, 0: the last one. A broken connection costs nothing but time.
+  // Streams the mesh of a session into `sink`: that of `revision`, 0: the last one. A broken connection costs nothing
+  // but time.
   absl::Status DownloadMesh(const std::string& session, MeshSink& sink, uint64_t revision = 0,
                             const OnChunks& on_chunks = nullptr, const CallOptions& call = {});
 
@@ -119,8 +120,8 @@ class Client {
   absl::StatusOr<OperationPage> ListOperations(const std::string& session, const PageOptions& page = {},
                                                const CallOptions& call = {});
   absl::StatusOr<Operation> CancelOperation(const std::string& operation, const CallOptions& call = {});
-  // Waits until an operation ends, and returns it: its error is in it, not in the call's status. Events up to `after_sequence` are not
-  // told again. Giving up the watch leaves the operation alone.
+  // Waits until an operation ends, and returns it: its error is in it, not in the call's status. Events up to
+  // `after_sequence` are not told again. Giving up the watch leaves the operation alone.
   absl::StatusOr<Operation> WatchOperation(const std::string& operation, const OnProgress& on_progress = nullptr,
                                            std::optional<uint64_t> after_sequence = std::nullopt,
                                            const CallOptions& call = {});
@@ -142,8 +143,9 @@ class Client {
 
 // Connects to HOST:PORT. Lazy: errors of the connection show in the first call.
 //
-// Errors:     INVALID_ARGUMENT: the address; options that contradict each other; a file that has not what it should have.
-//             FAILED_PRECONDITION: the token would leave this machine in plain text. NOT_FOUND: a file cannot be read.
+// Errors:     INVALID_ARGUMENT: the address; options that contradict each other; a file that has not what it should
+//             have. FAILED_PRECONDITION: the token would leave this machine in plain text. NOT_FOUND: a file cannot be
+//             read.
 absl::StatusOr<Client> Connect(const std::string& address, const ConnectOptions& options = {});
 
 }  // namespace wellspace::client

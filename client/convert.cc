@@ -74,8 +74,8 @@ std::vector<T> VectorOf(const google::protobuf::RepeatedField<T>& values) {
   return std::vector<T>(values.begin(), values.end());
 }
 
-// The values of a message whose fields are all numbers of type T, by the names of the fields: a client shows counters that it does
-// not know by name.
+// The values of a message whose fields are all numbers of type T, by the names of the fields: a client shows counters
+// that it does not know by name.
 std::map<std::string, uint64_t> CountersByName(const v1::OperationCounters& counters) {
   std::map<std::string, uint64_t> by_name;
   const google::protobuf::Descriptor* descriptor = counters.GetDescriptor();

@@ -14,11 +14,12 @@ class Status;
 
 namespace wellspace::client {
 
-// The path of the field that the server blames for an error, from the request on, such as "parameters.rho"; empty when it
-// blames none.
+// The path of the field that the server blames for an error, from the request on, such as "parameters.rho"; empty when
+// it blames none.
 std::string BlamedField(const absl::Status& status);
 
-// The name of the server's ErrorReason, such as "ERROR_REASON_SESSION_NOT_FOUND"; empty for errors that are not the server's.
+// The name of the server's ErrorReason, such as "ERROR_REASON_SESSION_NOT_FOUND"; empty for errors that are not the
+// server's.
 std::string ReasonOf(const absl::Status& status);
 
 // How long the server wants a client to wait before it tries again; absent: it does not say that this would help.

@@ -12,10 +12,11 @@ namespace {
 // Of one request, which then has half a MiB.
 constexpr size_t kVerticesOfARequest = 1 << 17;
 
-// Makes as many calls as the vertices take, and goes on after the last answered vertex when a connection breaks off. Answers of a call
-// about all vertices are not counted beforehand: it is repeated only as long as nothing has come.
+// Makes as many calls as the vertices take, and goes on after the last answered vertex when a connection breaks off.
+// Answers of a call about all vertices are not counted beforehand: it is repeated only as long as nothing has come.
 //
-// `open` starts a call with a request of these vertices; `take` hands a response on, and says how many vertices it was about.
+// `open` starts a call with a request of these vertices; `take` hands a response on, and says how many vertices it was
+// about.
 template <typename Request, typename Response>
 absl::Status StreamAnswers(
     Retrier& retrier, Request request, std::span<const uint32_t> vertices, const CallOptions& call,

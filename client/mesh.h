@@ -123,10 +123,10 @@ struct Mesh {
 
 // Takes a mesh piece by piece, so that it need not fit into memory.
 //
-// Calls come in the order of the functions below, from one thread, those for the arrays as often as there are pieces of them.
-// Pieces are whole rows; those of one array follow one another, and add up to what the header says; every number of a vertex is
-// below vertex_count. Each piece comes once, however often the connection broke meanwhile. After an error no further call comes,
-// and the error is what the client's call returns.
+// Calls come in the order of the functions below, from one thread, those for the arrays as often as there are pieces of
+// them. Pieces are whole rows; those of one array follow one another, and add up to what the header says; every number
+// of a vertex is below vertex_count. Each piece comes once, however often the connection broke meanwhile. After an
+// error no further call comes, and the error is what the client's call returns.
 class MeshSink {
  public:
   MeshSink() = default;

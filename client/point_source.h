@@ -9,7 +9,8 @@
 
 namespace wellspace::client {
 
-// A cloud that is read piece by piece, and again from any point on when a connection broke. It need not fit into memory.
+// A cloud that is read piece by piece, and again from any point on when a connection broke. It need not fit into
+// memory.
 //
 // Thread safety: called from one thread at a time.
 class PointSource {

@@ -14,8 +14,8 @@
 
 namespace wellspace::client {
 
-// How patient a connection is. An attempt that brought something (a chunk, an event, committed points) is not counted: those after it
-// begin anew.
+// How patient a connection is. An attempt that brought something (a chunk, an event, committed points) is not counted:
+// those after it begin anew.
 struct RetryPolicy {
   // Attempts in a row that may fail, with a server that has answered before; at least 1.
   int max_attempts = 8;
@@ -23,15 +23,16 @@ struct RetryPolicy {
   // The same with a server that has never answered: its address may be wrong.
   int max_first_attempts = 3;
 
-  // Waiting time before the second attempt; grows by `multiplier` for each further one, up to `max_backoff`. A random half of it is
-  // left out, so that clients of a server that comes back do not come all at once. What the server asks for (google.rpc.RetryInfo)
-  // is waited for in full.
+  // Waiting time before the second attempt; grows by `multiplier` for each further one, up to `max_backoff`. A random
+  // half of it is left out, so that clients of a server that comes back do not come all at once. What the server asks
+  // for (google.rpc.RetryInfo) is waited for in full.
   absl::Duration initial_backoff = absl::Milliseconds(200);
   double multiplier = 2;
   absl::Duration max_backoff = absl::Seconds(10);
 };
 
-// The status of a call as the library returns it: code, message, and the google.rpc details as payloads under their type URLs.
+// The status of a call as the library returns it: code, message, and the google.rpc details as payloads under their
+// type URLs.
 absl::Status FromGrpcStatus(const grpc::Status& status);
 
 // Whether the same call may succeed later: UNAVAILABLE, a reader that stalled, and what has a google.rpc.RetryInfo.
@@ -95,7 +96,8 @@ class Retrier {
  public:
   explicit Retrier(const RetryPolicy& policy) : policy_(policy) {}
 
-  // Calls `attempt` until it is final, succeeds, fails with what is not worth repeating, or too often; or until `timeout` has passed.
+  // Calls `attempt` until it is final, succeeds, fails with what is not worth repeating, or too often; or until
+  // `timeout` has passed.
   // Errors:     the last attempt's; CANCELLED "cancelled by the caller" when `stop` asked for it.
   absl::Status Run(absl::Duration timeout, const std::stop_token& stop,
                    const std::function<absl::Status(Attempt&)>& attempt);

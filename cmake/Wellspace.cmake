@@ -22,7 +22,8 @@ if(WELLSPACE_FUZZ)
   add_link_options(-fsanitize=fuzzer-no-link)
 endif()
 
-# wellspace_library(NAME SOURCES… [PUBLIC libs…] [PRIVATE libs…]) makes target wellspace_NAME with alias wellspace::NAME.
+# wellspace_library(NAME SOURCES… [PUBLIC libs…] [PRIVATE libs…]) makes target wellspace_NAME with alias
+# wellspace::NAME.
 function(wellspace_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;PUBLIC;PRIVATE" ${ARGN})
   add_library(wellspace_${name} STATIC ${ARG_SOURCES})

@@ -85,8 +85,8 @@ absl::Status CheckBox(const Box<D>& box) {
   return absl::OkStatus();
 }
 
-// Refuses point `index`, which is `p` on the scale of the computation, if it is nearer to a face of the box that it does not lie on
-// than the arithmetic serves.
+// Refuses point `index`, which is `p` on the scale of the computation, if it is nearer to a face of the box that it
+// does not lie on than the arithmetic serves.
 template <int D>
 absl::Status CheckFaces(const Domain<D>& domain, const Point<D>& p, size_t index) {
   for (int face = 0; face < 2 * D; ++face) {
@@ -192,8 +192,8 @@ class CloudSorter {
     // Until the points are taken their halves are there.
     const std::span<uint32_t> halves = cloud.first_input;
     counts_.assign((count_ + kBlock - 1) / kBlock, {});
-    // The corners of the box follow, and as many vertices as are added to most clouds. Of large arrays what is not used takes no memory; of small ones,
-    // which share pages, it would.
+    // The corners of the box follow, and as many vertices as are added to most clouds. Of large arrays what is not used
+    // takes no memory; of small ones, which share pages, it would.
     const size_t room = counts_.size() > 1 ? count_ + count_ / 4 : count_ / 8;
     cloud.points.reserve(count_ + room + (size_t{1} << D));
     absl::Status resized;
@@ -288,8 +288,8 @@ class CloudSorter {
     return entries_.subspan(part_begins_[part], part_begins_[part + 1] - part_begins_[part]);
   }
 
-  // Sorts a part by the upper halves of the prefixes; those that share it, which are few in most clouds, by the lower, and then by what
-  // follows.
+  // Sorts a part by the upper halves of the prefixes; those that share it, which are few in most clouds, by the lower,
+  // and then by what follows.
   absl::Status SortPart(size_t part) const {
     WELLSPACE_RETURN_IF_ERROR(context_.Check());
     const std::span<Entry> entries = EntriesOf(part);
@@ -327,7 +327,8 @@ class CloudSorter {
     return absl::OkStatus();
   }
 
-  // Takes the distinct points of a part, which is sorted, to where it begins. Points of one cube are equal, or too close to be served.
+  // Takes the distinct points of a part, which is sorted, to where it begins. Points of one cube are equal, or too
+  // close to be served.
   absl::Status TakePoints(size_t part, SortedCloud<D>& cloud) {
     const std::span<const Entry> entries = EntriesOf(part);
     const std::span<Point<D>> points = std::span(cloud.points).subspan(part_begins_[part], entries.size());

@@ -88,7 +88,8 @@ struct SortedCloud {
 };
 
 // Errors:     INVALID_ARGUMENT, naming the point: not finite, outside the domain, too small for its scale, too close to
-//             a face of the box that it does not lie on, or, in one cube of the Morton grid, to another one; CANCELLED, DEADLINE_EXCEEDED.
+//             a face of the box that it does not lie on, or, in one cube of the Morton grid, to another one; CANCELLED,
+//             DEADLINE_EXCEEDED.
 // Complexity: O(n log n); O(n) for all but the most uneven clouds.
 // Threads:    uses `threads`, at most as many as the machine has cores; the result does not depend on them.
 //

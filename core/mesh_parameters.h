@@ -25,13 +25,13 @@ struct MeshParameters {
   // Boxes in which it is smaller still. Away from a box, sizes grow no faster than the distance from it.
   std::vector<SizeBox> size_boxes{};
 
-  // Refine moves vertices, all but those that were given, and adds some, until no dihedral angle is smaller, in degrees;
-  // what cannot be mended is counted in the statistics. 0 for none of that; none means DefaultMinDihedral(dimension).
-  // Allowed in 3-D, up to kMostMinDihedral.
+  // Refine moves vertices, all but those that were given, and adds some, until no dihedral angle is smaller, in
+  // degrees; what cannot be mended is counted in the statistics. 0 for none of that; none means
+  // DefaultMinDihedral(dimension). Allowed in 3-D, up to kMostMinDihedral.
   std::optional<double> min_dihedral{};
 
-  // Extract gives vertices weights, under which the regular triangulation has better simplices; with min_dihedral only if
-  // slivers are left. From 3-D on.
+  // Extract gives vertices weights, under which the regular triangulation has better simplices; with min_dihedral only
+  // if slivers are left. From 3-D on.
   bool pump_weights = false;
 
   // Refine does not move vertices of the last mesh that was extracted: the repair of slivers adds vertices, and moves

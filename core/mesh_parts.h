@@ -16,8 +16,8 @@ namespace wellspace::core {
 // Two ways to compute the quality of a simplex differ by less.
 inline constexpr double kWorstTolerance = 1e-9;
 
-// Removes from `mesh` the simplices all of whose vertices are among those of `is_among`; point_of(index) are its vertices as
-// they were computed. Returns whether one of them may have been the worst.
+// Removes from `mesh` the simplices all of whose vertices are among those of `is_among`; point_of(index) are its
+// vertices as they were computed. Returns whether one of them may have been the worst.
 //
 // Complexity: one pass over the simplices.
 // Errors:     none.
@@ -45,8 +45,8 @@ bool DropSimplicesAmong(const std::vector<bool>& is_among, PointOf point_of, Mes
   return worst_has_gone;
 }
 
-// The cell of vertex `vertex`, clipped at `clip_radius`, both as the computation has them; index_of(VertexId) are the numbers
-// of the mesh's owner.
+// The cell of vertex `vertex`, clipped at `clip_radius`, both as the computation has them; index_of(VertexId) are the
+// numbers of the mesh's owner.
 //
 // Complexity: O(nodes), and a sort of the neighbours.
 // Errors:     none.

@@ -32,14 +32,16 @@
 namespace wellspace::core {
 namespace {
 
-// Leaves that the tree may have for each vertex of the budget; around isolated close pairs balance costs up to about two.
+// Leaves that the tree may have for each vertex of the budget; around isolated close pairs balance costs up to about
+// two.
 constexpr uint64_t kLeavesPerVertex = 8;
 
 // Smaller clouds are refined in half a second, unless there are sizes: too soon for a prediction to be of use.
 template <int D>
 constexpr uint64_t kLeastPredicted = D == 2 ? 50'000 : (D == 3 ? 20'000 : 2'000);
 
-// What building the tree takes for each point, but for the most uneven clouds: keys, the point twice, a place in a split leaf, indices.
+// What building the tree takes for each point, but for the most uneven clouds: keys, the point twice, a place in a
+// split leaf, indices.
 template <int D>
 constexpr uint64_t kTreeBytes =
     2 * sizeof(Point<D>) + sizeof(uint64_t) * D + 24 +
@@ -422,8 +424,8 @@ class MesherIn final : public Mesher {
     return SaturatedCount(size.vertices);
   }
 
-  // Mends slivers if that is asked for; what is kept for that goes if it is not. Decides whether the mesh is pumped: a mesh
-  // without slivers stays Delaunay.
+  // Mends slivers if that is asked for; what is kept for that goes if it is not. Decides whether the mesh is pumped: a
+  // mesh without slivers stays Delaunay.
   absl::Status MendSlivers(const MeshParameters& parameters, RunContext& context) {
     if constexpr (D == 3) {
       if (const double min_dihedral = MinDihedralOf(parameters); min_dihedral > 0) {

@@ -80,7 +80,8 @@ class Mesher {
   // Units:      any length, the same on every axis.
   // Complexity: O(n log n + L) for L leaves. Reserves memory for them first.
   // Errors:     INVALID_ARGUMENT (parameters; NaN, infinite or outside coordinates; points closer than double
-  //             arithmetic can serve), RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED, DEADLINE_EXCEEDED.
+  //             arithmetic can serve), RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED,
+  //             DEADLINE_EXCEEDED.
   // Threads:    uses parameters.threads, at most as many as the machine has cores.
   // Source:     [HT08] Figure 3, INITIALIZE.
   static absl::StatusOr<std::unique_ptr<Mesher>> Create(const MeshParameters& parameters,
@@ -97,9 +98,9 @@ class Mesher {
   virtual absl::Status CheckFeasible(const MeshParameters& /*parameters*/) const { return absl::OkStatus(); }
 
   // Adds Steiner vertices until criterion and sizes of `parameters` are met, then repairs slivers, for which these move
-  // too; those of an earlier mesh unless keep_vertices. With pump_weights, Extract gives weights if slivers are left, or
-  // none were to be repaired. All parameters count but dimension, domain, margin and merge_distance: the box is that of
-  // Create.
+  // too; those of an earlier mesh unless keep_vertices. With pump_weights, Extract gives weights if slivers are left,
+  // or none were to be repaired. All parameters count but dimension, domain, margin and merge_distance: the box is that
+  // of Create.
   //
   // Complexity: O(m) queries the first time and for other demands than the last; else in proportion to what was added
   //             since.
@@ -120,12 +121,12 @@ class Mesher {
     return AddPointsNear(points, {}, context);
   }
 
-  // The same for points of which each is in the cell of its vertex of `near`, or not far: found by a walk from leaf to leaf. `near`
-  // has n vertices, or none.
+  // The same for points of which each is in the cell of its vertex of `near`, or not far: found by a walk from leaf to
+  // leaf. `near` has n vertices, or none.
   //
   // Complexity: O(1) a point there, besides sorting.
-  // Errors:     as AddPoints; OUT_OF_RANGE, naming the first vertex that does not exist; INVALID_ARGUMENT for another number of
-  //             vertices than points.
+  // Errors:     as AddPoints; OUT_OF_RANGE, naming the first vertex that does not exist; INVALID_ARGUMENT for another
+  //             number of vertices than points.
   // Source:     [HT08] Figure 3, ADDVERTEX.
   virtual absl::StatusOr<std::vector<uint32_t>> AddPointsNear(std::span<const double> points,
                                                               std::span<const uint32_t> near, RunContext& context) = 0;
@@ -137,19 +138,21 @@ class Mesher {
   // Source:     [HT08] Figure 3, ADDVERTEX.
   virtual absl::StatusOr<uint32_t> AddVertex(uint32_t near, std::span<const double> point) = 0;
 
-  // The distance from each of `vertices` to its nearest other vertex; exact, where the paper asks for a constant factor.
+  // The distance from each of `vertices` to its nearest other vertex; exact, where the paper asks for a constant
+  // factor.
   //
   // Complexity: O(1) each in a refined mesh or bottom-up.
   // Errors:     OUT_OF_RANGE, naming the first vertex that does not exist.
   // Source:     [HT08] Figure 3, APPROXIMATENN.
   virtual absl::StatusOr<std::vector<double>> NearestNeighborDistances(std::span<const uint32_t> vertices) const = 0;
 
-  // The Voronoi cells of `vertices` in the box, each clipped at beta times the distance to the vertex' nearest neighbour;
-  // whole ones when beta is infinite.
+  // The Voronoi cells of `vertices` in the box, each clipped at beta times the distance to the vertex' nearest
+  // neighbour; whole ones when beta is infinite.
   //
   // Complexity: O(1) each in a refined mesh or bottom-up.
-  // Errors:     OUT_OF_RANGE as above; INVALID_ARGUMENT unless beta is a number of at least 1; FAILED_PRECONDITION, naming a
-  //             vertex whose cell has more nodes than 2^14, in 5-D and 6-D 2^18, as only an unrefined mesh's can.
+  // Errors:     OUT_OF_RANGE as above; INVALID_ARGUMENT unless beta is a number of at least 1; FAILED_PRECONDITION,
+  //             naming a vertex whose cell has more nodes than 2^14, in 5-D and 6-D 2^18, as only an unrefined mesh's
+  //             can.
   // Source:     [HT08] Figure 3, CLIPPEDVORONOI.
   virtual absl::StatusOr<std::vector<Cell>> ClippedCells(std::span<const uint32_t> vertices, double beta) const = 0;
 

@@ -2,9 +2,9 @@
 //
 //   session_example HOST:PORT CLOUD MESH
 //
-// CLOUD is a file that `wellspace mesh` reads, MESH one that it writes. Neither the mesh nor a cloud of numpy (.npy) is ever in memory as a
-// whole: they come from disk while they are sent, and go there while they arrive. A connection that breaks is made anew, and nothing is
-// sent twice.
+// CLOUD is a file that `wellspace mesh` reads, MESH one that it writes. Neither the mesh nor a cloud of numpy (.npy) is
+// ever in memory as a whole: they come from disk while they are sent, and go there while they arrive. A connection that
+// breaks is made anew, and nothing is sent twice.
 #include <iostream>
 #include <memory>
 #include <string>
@@ -33,7 +33,8 @@ absl::Status MeshRemotely(const std::string& address, const std::string& cloud_p
   const absl::StatusOr<client::Session> session = client->CreateSession(options);
   if (!session.ok()) return session.status();
 
-  // Points, in any number of uploads, from a file, from memory (client::SpanSource) or from a client::PointSource of your own.
+  // Points, in any number of uploads, from a file, from memory (client::SpanSource) or from a client::PointSource of
+  // your own.
   const absl::StatusOr<client::Uploaded> uploaded = client->UploadPoints(session->name, **cloud);
   if (!uploaded.ok()) return uploaded.status();
 

@@ -75,8 +75,9 @@ uint64_t WordAt(const char* bytes) {
   return word;
 }
 
-// The instruction takes eight bytes, and three cycles until the next can go on from it: three lanes at once keep it busy. A checksum is
-// linear: that of a block is the exclusive or of those of its lanes, each followed by zeros in the place of the lanes behind it.
+// The instruction takes eight bytes, and three cycles until the next can go on from it: three lanes at once keep it
+// busy. A checksum is linear: that of a block is the exclusive or of those of its lanes, each followed by zeros in the
+// place of the lanes behind it.
 __attribute__((target("sse4.2"))) uint32_t ExtendBySse42(uint32_t before, const void* data, size_t size) {
   const char* bytes = static_cast<const char*>(data);
   uint64_t crc = ~before;

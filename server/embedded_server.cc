@@ -11,7 +11,8 @@
 namespace wellspace::server {
 namespace {
 
-// Without a listener nothing can fail but for want of memory, threads or file descriptors, for which there is no remedy.
+// Without a listener nothing can fail but for want of memory, threads or file descriptors, for which there is no
+// remedy.
 template <typename T>
 T ValueOrAbort(absl::StatusOr<T> value) {
   if (!value.ok()) {

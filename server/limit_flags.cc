@@ -16,8 +16,8 @@ namespace {
 
 constexpr uint64_t kMany = std::numeric_limits<int64_t>::max();
 
-// A file that is no text must not pass for a short one: CLI11 reads nothing behind a zero byte, and takes lines that end with
-// a carriage return alone for one line, which is a comment if the first is one.
+// A file that is no text must not pass for a short one: CLI11 reads nothing behind a zero byte, and takes lines that
+// end with a carriage return alone for one line, which is a comment if the first is one.
 void CheckText(std::string_view text) {
   size_t line = 1;
   for (size_t i = 0; i < text.size(); ++i) {
@@ -32,7 +32,8 @@ void CheckText(std::string_view text) {
   }
 }
 
-// CLI11's reader of TOML, with errors that name the key: values are checked after the file is read, where CLI11 knows only the option.
+// CLI11's reader of TOML, with errors that name the key: values are checked after the file is read, where CLI11 knows
+// only the option.
 class TomlFile final : public CLI::ConfigBase {
  public:
   explicit TomlFile(const CLI::App& app) : app_(app) {}

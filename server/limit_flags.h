@@ -17,8 +17,8 @@ void DeclareLimits(CLI::App& app, ServiceOptions& service);
 // Declares those of `connections` likewise.
 void DeclareConnections(CLI::App& app, ConnectionOptions& connections);
 
-// --config FILE: every option of `app`, without its dashes, is a key of a TOML file; the command line wins. Keys that are no option and
-// values that an option does not take are refused, naming the key.
+// --config FILE: every option of `app`, without its dashes, is a key of a TOML file; the command line wins. Keys that
+// are no option and values that an option does not take are refused, naming the key.
 void DeclareConfigFile(CLI::App& app);
 
 // An option that takes seconds, `least` to `most`, fractions too.

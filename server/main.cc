@@ -32,7 +32,8 @@ namespace wellspace::server {
 namespace {
 
 constexpr int kExitWrongOptions = 2;
-// Blocks from this size on, larger than messages, go back to the system when they are freed: --max-memory counts what is resident.
+// Blocks from this size on, larger than messages, go back to the system when they are freed: --max-memory counts what
+// is resident.
 constexpr int kReturnedBytes = 2 * kMaxResponseBytes;
 constexpr absl::Duration kMaxGrace = absl::Hours(24);
 

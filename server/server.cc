@@ -28,13 +28,14 @@ constexpr int kKeepaliveMs = 30'000;
 constexpr int kKeepaliveTimeoutMs = 10'000;
 constexpr int kMinClientPingMs = 10'000;
 
-// Aborted calls get this long to send their status, and idle clients to close their connections, before both are cut off.
+// Aborted calls get this long to send their status, and idle clients to close their connections, before both are cut
+// off.
 constexpr std::chrono::milliseconds kFarewell(500);
 
-// Most that gRPC holds of what comes in, all connections together. It looks at the length of a message when all of it has
-// come, from any peer; here it ends calls, one of each connection, the oldest first. Half of the limit of memory is as
-// much as all messages that the budget makes room for, never so little that hundreds of clients that behave come near it,
-// and never so much that strangers could take what the limit leaves to others.
+// Most that gRPC holds of what comes in, all connections together. It looks at the length of a message when all of it
+// has come, from any peer; here it ends calls, one of each connection, the oldest first. Half of the limit of memory is
+// as much as all messages that the budget makes room for, never so little that hundreds of clients that behave come
+// near it, and never so much that strangers could take what the limit leaves to others.
 size_t MostReceived(const ServiceOptions& options) {
   constexpr uint64_t kMostReceivedBytes = uint64_t{1} << 30;
   return options.max_memory_bytes == 0
@@ -42,8 +43,8 @@ size_t MostReceived(const ServiceOptions& options) {
              : std::clamp(options.max_memory_bytes / 2, kLeastReceivedBytes, kMostReceivedBytes);
 }
 
-// What is read from a connection before anything is done with it. gRPC would read up to 4 MiB, in which 140 000 calls begin
-// and are given up, before Connections hears of the first.
+// What is read from a connection before anything is done with it. gRPC would read up to 4 MiB, in which 140 000 calls
+// begin and are given up, before Connections hears of the first.
 constexpr int kMostReadAtOnce = 16 * 1024;
 
 // As gRPC takes durations.
@@ -55,7 +56,8 @@ int Milliseconds(absl::Duration duration) {
 void EnableHealthAndReflection() {
   static std::once_flag once;
   std::call_once(once, [] {
-    // The last one to leave gRPC would wait up to 10 seconds for its poller of writes that did not go out at once: nobody is the last.
+    // The last one to leave gRPC would wait up to 10 seconds for its poller of writes that did not go out at once:
+    // nobody is the last.
     grpc_init();
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();
@@ -131,8 +133,8 @@ std::string Server::TenantOf(const grpc::ServerContextBase& context) const {
 }
 
 absl::StatusOr<std::shared_ptr<grpc::Channel>> Server::InProcessChannel() {
-  // A pair of sockets rather than gRPC's own in-process transport, where a client's write can wait for ever when the server has
-  // ended the call early.
+  // A pair of sockets rather than gRPC's own in-process transport, where a client's write can wait for ever when the
+  // server has ended the call early.
   int ends[2];
   if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends) != 0) {
     return absl::ErrnoToStatus(errno, "cannot connect to the server in this process");
@@ -140,7 +142,8 @@ absl::StatusOr<std::shared_ptr<grpc::Channel>> Server::InProcessChannel() {
   grpc::AddInsecureChannelFromFd(server_.get(), ends[0]);
   grpc::ChannelArguments arguments;
   arguments.SetMaxReceiveMessageSize(kMaxRequestBytes);
-  // A window of one message; gRPC's grows with what is read, to many times as much as a client without a network has use for.
+  // A window of one message; gRPC's grows with what is read, to many times as much as a client without a network has
+  // use for.
   arguments.SetInt(GRPC_ARG_HTTP2_BDP_PROBE, 0);
   arguments.SetInt(GRPC_ARG_HTTP2_STREAM_LOOKAHEAD_BYTES, kMaxResponseBytes);
   return grpc::CreateCustomInsecureChannelFromFd("in-process", ends[1], arguments);

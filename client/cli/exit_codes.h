@@ -24,8 +24,8 @@ int ExitCodeOf(const absl::Status& status);
 // How results and errors are printed.
 enum class OutputFormat { kText, kJson };
 
-// Prints an error on standard error and returns its exit code. As JSON: {"error": {"code", "reason", "field", "message"}} in one line,
-// without the reason and the field where the server gave none.
+// Prints an error on standard error and returns its exit code. As JSON: {"error": {"code", "reason", "field",
+// "message"}} in one line, without the reason and the field where the server gave none.
 int ReportError(const absl::Status& status, OutputFormat format = OutputFormat::kText);
 
 }  // namespace wellspace::cli

@@ -43,7 +43,8 @@ class ParameterOptions {
   bool has_quality() const;
   absl::StatusOr<client::MeshOptions> Replace(client::MeshOptions parameters) const;
 
-  // `status`, with the option that the server blames: "--rho: …" for "parameters.rho". As it is when it blames none of these.
+  // `status`, with the option that the server blames: "--rho: …" for "parameters.rho". As it is when it blames none of
+  // these.
   absl::Status Explain(const absl::Status& status) const;
 
  private:

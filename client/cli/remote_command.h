@@ -23,8 +23,8 @@ void AddOutput(CLI::App& command, OutputFormat& format);
 // Prints `json` on standard output, in one line or indented.
 void PrintJson(const Json& json, bool indented = true);
 
-// `status`, with the file and the line of each point that the server names by its index; those of the file are `count` from
-// `first_index` on, and `origin` tells where each was read.
+// `status`, with the file and the line of each point that the server names by its index; those of the file are `count`
+// from `first_index` on, and `origin` tells where each was read.
 absl::Status WithOrigins(const absl::Status& status, uint64_t first_index, uint64_t count,
                          const std::function<std::string(uint64_t)>& origin);
 absl::Status WithOrigins(const absl::Status& status, const formats::PointCloud& cloud);
@@ -48,8 +48,8 @@ class RemoteCommand {
   void AddFilesTo(formats::FilePlan& files) const;
 
   using Work = std::function<absl::Status(client::Client&, const client::CallOptions&, const Interrupt&)>;
-  // Opens the server and does `work`, whose call options have the deadline and stop at Ctrl-C. Returns the exit code, errors
-  // reported.
+  // Opens the server and does `work`, whose call options have the deadline and stop at Ctrl-C. Returns the exit code,
+  // errors reported.
   int Run(const Work& work) const;
 
  private:

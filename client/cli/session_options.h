@@ -32,7 +32,8 @@ CLI::Option* AddLabels(CLI::App& command, client::Labels& labels, const std::str
 // --expected-revision.
 void AddExpectedRevision(CLI::App& command, uint64_t& revision);
 
-// The numbers of vertices in a file, separated by blanks, commas or ends of lines; "-" is standard input; '#' starts a comment.
+// The numbers of vertices in a file, separated by blanks, commas or ends of lines; "-" is standard input; '#' starts a
+// comment.
 // Errors:     of opening and reading; INVALID_ARGUMENT "FILE:LINE: …".
 absl::StatusOr<std::vector<uint32_t>> ReadVertices(const std::string& path);
 

@@ -19,7 +19,8 @@ namespace wellspace::client {
 // Thread safety: thread-compatible.
 class CloudFile : public PointSource {
  public:
-  // Errors:     as of formats::ReadCloud. Coordinates of a .npy file that is read while it is sent are left to the server to check.
+  // Errors:     as of formats::ReadCloud. Coordinates of a .npy file that is read while it is sent are left to the
+  //             server to check.
   static absl::StatusOr<std::unique_ptr<CloudFile>> Open(const std::string& path,
                                                          const formats::CloudOptions& options = {});
 

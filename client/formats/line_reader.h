@@ -81,10 +81,11 @@ class LineReader {
   bool NextContent(std::string_view& line);
   // The line that NextContent returned last, with the blanks around it.
   std::string_view whole_line() const { return whole_line_; }
-  // Takes up to `size` bytes that follow the line that was returned last, as they are, and returns how many there were: fewer only at
-  // the end of the file and on an error.
+  // Takes up to `size` bytes that follow the line that was returned last, as they are, and returns how many there were:
+  // fewer only at the end of the file and on an error.
   size_t Take(char* bytes, size_t size);
-  // The last comment that the last NextContent skipped or cut off, without '#' and blanks around it; empty if there was none.
+  // The last comment that the last NextContent skipped or cut off, without '#' and blanks around it; empty if there was
+  // none.
   const std::string& comment() const { return comment_; }
   // Whether comment() stands behind the line that was returned last.
   bool is_comment_behind() const { return is_comment_behind_; }
@@ -99,7 +100,8 @@ class LineReader {
   uint64_t offset() const { return offset_ - (end_ - begin_); }
   // INVALID_ARGUMENT at the line that was returned last; of an empty file, at line 1.
   absl::Status Error(std::string_view message) const;
-  // What it means that Next, NextContent or Take have brought nothing, or too little: status(), or if that is ok Error(message).
+  // What it means that Next, NextContent or Take have brought nothing, or too little: status(), or if that is ok
+  // Error(message).
   absl::Status EndError(std::string_view message) const { return status_.ok() ? Error(message) : status_; }
 
  private:

@@ -1,7 +1,8 @@
 // Arrays as numpy stores them: the .npy format, versions 1.0 to 3.0.
 //
-// "\x93NUMPY", two bytes of version, the length of the header (two bytes little-endian, four from version 2.0 on), the header, the
-// values. The header is the text of a Python dict: {'descr': '<f8', 'fortran_order': False, 'shape': (3, 2), }.
+// "\x93NUMPY", two bytes of version, the length of the header (two bytes little-endian, four from version 2.0 on), the
+// header, the values. The header is the text of a Python dict: {'descr': '<f8', 'fortran_order': False, 'shape': (3,
+// 2), }.
 #ifndef WELLSPACE_CLIENT_FORMATS_NPY_H_
 #define WELLSPACE_CLIENT_FORMATS_NPY_H_
 
@@ -32,8 +33,8 @@ struct NpyHeader {
 // Errors:     INVALID_ARGUMENT, a message without a location.
 absl::StatusOr<NpyHeader> ParseNpyHeader(std::string_view text);
 
-// What stands before the values of an array in C order, in version 1.0, padded as numpy does; without columns it has one
-// dimension.
+// What stands before the values of an array in C order, in version 1.0, padded as numpy does; without columns it has
+// one dimension.
 std::string NpyPreamble(const std::string& type, uint64_t rows, std::optional<uint64_t> columns);
 
 // Reads one array of rows and columns, or of rows alone, from a source, in bounded memory besides the array.
@@ -41,8 +42,8 @@ std::string NpyPreamble(const std::string& type, uint64_t rows, std::optional<ui
 // Thread safety: thread-compatible.
 class NpyReader {
  public:
-  // Reads magic and header. `name` is that of the array, for messages. The source has `size` bytes, if that is known: what the
-  // header says is not believed beyond it.
+  // Reads magic and header. `name` is that of the array, for messages. The source has `size` bytes, if that is known:
+  // what the header says is not believed beyond it.
   //
   // REQUIRES:   dimensions is 1 or 2.
   // Errors:     of the source; INVALID_ARGUMENT "NAME: …" for what is not an array of so many dimensions.
@@ -55,7 +56,8 @@ class NpyReader {
   // Where in the source the values begin. REQUIRES: none has been read.
   uint64_t values_offset() const { return taken_; }
 
-  // The values, row by row, whichever order the array is stored in; then expects the end of the source. To be called once.
+  // The values, row by row, whichever order the array is stored in; then expects the end of the source. To be called
+  // once.
   //
   // Errors:     of the source; INVALID_ARGUMENT "NAME: …" for other types than Float32, Float64 and whole numbers of 8
   //             to 64 bits, signed or not, of either byte order; and for a whole number that no double is equal to.

@@ -18,15 +18,17 @@ class NpyRows {
  public:
   // Reads the header of the array of points in `path`.
   //
-  // Errors:     of opening and reading; INVALID_ARGUMENT "FILE: …" unless it is a regular file with one array in C order, of 2 to 6
-  //             columns of type Float64 or Float32. What is an array otherwise may still be read by ReadCloud, as a whole.
+  // Errors:     of opening and reading; INVALID_ARGUMENT "FILE: …" unless it is a regular file with one array in C
+  //             order, of 2 to 6 columns of type Float64 or Float32. What is an array otherwise may still be read by
+  //             ReadCloud, as a whole.
   static absl::StatusOr<NpyRows> Open(const std::string& path);
 
   uint64_t rows() const { return rows_; }
   int columns() const { return columns_; }
   const std::string& name() const { return file_.name(); }
 
-  // Fills `values` with whole rows from row `first` on, as many as there are, and returns how many. Memory: a piece of the file.
+  // Fills `values` with whole rows from row `first` on, as many as there are, and returns how many. Memory: a piece of
+  // the file.
   //
   // REQUIRES:   values.size() is a multiple of columns().
   // Errors:     of reading; INVALID_ARGUMENT when the file has become shorter.

@@ -1,4 +1,5 @@
-// The members of a .npz that holds a mesh: a zip archive of .npy arrays, as numpy.savez writes it. Private to this folder.
+// The members of a .npz that holds a mesh: a zip archive of .npy arrays, as numpy.savez writes it. Private to this
+// folder.
 #ifndef WELLSPACE_CLIENT_FORMATS_NPZ_H_
 #define WELLSPACE_CLIENT_FORMATS_NPZ_H_
 

@@ -6,12 +6,13 @@
 //   npz   numpy's archive of arrays: `points` of floating-point numbers of 4 or 8 bytes or whole ones, vertices x
 //         dimension; `simplices` of whole numbers, simplices x (dimension + 1); of either byte order, in C or Fortran
 //         order; weights are `weights`, as many numbers as there are vertices. Others are ignored.
-//   node  TetGen's and Triangle's pair of .node and .ele, given by either name. Weights are the only attribute of .node if the
+//   node  TetGen's and Triangle's pair of .node and .ele, given by either name. Weights are the only attribute of .node
+//   if the
 //         comment "# weights" stands before its header.
 //   msh   Gmsh's, 2.2 in ascii, or 4.1 in ascii or little-endian binary: the tetrahedra or, if there are none, the
 //         triangles in the plane z = 0; vertices are all nodes, in the order of the file. Points and lines, and the
-//         triangles beside tetrahedra, are skipped; other elements, also those of higher order, are refused. Weights are
-//         the $NodeData "weights".
+//         triangles beside tetrahedra, are skipped; other elements, also those of higher order, are refused. Weights
+//         are the $NodeData "weights".
 //   medit INRIA's .mesh in ascii, of dimension 2 with triangles or 3 with tetrahedra; all else in it is skipped.
 #ifndef WELLSPACE_CLIENT_FORMATS_READ_MESH_H_
 #define WELLSPACE_CLIENT_FORMATS_READ_MESH_H_

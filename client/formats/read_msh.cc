@@ -398,7 +398,8 @@ class MshReader {
     return absl::OkStatus();
   }
 
-  // Texts (the name first), numbers, whole numbers (step, numbers in a value, values), each after its count and in ascii; then the values.
+  // Texts (the name first), numbers, whole numbers (step, numbers in a value, values), each after its count and in
+  // ascii; then the values.
   absl::Status ReadNodeData() {
     constexpr uint64_t kMaxTags = 1000;
     std::string name;

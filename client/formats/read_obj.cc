@@ -18,7 +18,8 @@ class ObjLines {
  public:
   explicit ObjLines(LineReader& reader) : reader_(reader) {}
 
-  // The next line that is not blank, and where it starts. False at the end of the file and on an error, which status() tells apart.
+  // The next line that is not blank, and where it starts. False at the end of the file and on an error, which status()
+  // tells apart.
   bool Next(std::string_view& line, uint64_t& number) {
     while (NextPart(line)) {
       number = reader_.line_number();

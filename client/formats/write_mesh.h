@@ -3,8 +3,8 @@
 // Formats:
 //   vtu   VTK's XML, 2-D and 3-D only: arrays inline in base64, compressed by zlib; points padded to 3-D; point data
 //         "input", 1 for the vertices that are input points, and "weights", if there are any.
-//   vtkhdf  VTK's HDF5, 2-D and 3-D only: as vtu, in chunks compressed by zlib; for VTK 9.1 and later. It is not read back.
-//   npz   numpy's archive of arrays: `points` of type Float64, vertices x dimension; `simplices` of type UInt32,
+//   vtkhdf  VTK's HDF5, 2-D and 3-D only: as vtu, in chunks compressed by zlib; for VTK 9.1 and later. It is not read
+//   back. npz   numpy's archive of arrays: `points` of type Float64, vertices x dimension; `simplices` of type UInt32,
 //         simplices x (dimension + 1); `weights` of type Float64, one for each vertex, if there are any; deflated.
 //   node  TetGen's and Triangle's pair of .node and .ele, given by either name; indices start at 0. TetGen itself knows
 //         3-D only, Triangle 2-D. Weights are the only attribute of .node; the comment "# weights" before
@@ -12,7 +12,8 @@
 //   msh41 Gmsh's MSH 4.1 in binary, little-endian, 2-D and 3-D only: one block of nodes, numbered from 1, and one of
 //         triangles or tetrahedra; $NodeData "input", as in vtu, and "weights", if there are any.
 //   msh22 The same in MSH 2.2, in ascii; every simplex is of the physical group 1.
-//   medit INRIA's .mesh of version 2 (double precision) in ascii, 2-D and 3-D only: the reference of a vertex is 1 if it
+//   medit INRIA's .mesh of version 2 (double precision) in ascii, 2-D and 3-D only: the reference of a vertex is 1 if
+//   it
 //         is an input point, else 0, that of a simplex is 1. There is no place for weights.
 #ifndef WELLSPACE_CLIENT_FORMATS_WRITE_MESH_H_
 #define WELLSPACE_CLIENT_FORMATS_WRITE_MESH_H_
@@ -33,17 +34,19 @@ namespace wellspace::formats {
 // The names that `format` may take below.
 std::vector<std::string> MeshFormats();
 
-// The files that WriteMesh makes of `path` and `format`: that one, or a pair. What cannot be written is taken for one file.
+// The files that WriteMesh makes of `path` and `format`: that one, or a pair. What cannot be written is taken for one
+// file.
 std::vector<std::string> FilesOfMeshWritten(const std::string& path, const std::string& format);
 
-// Tells early whether WriteMesh would refuse `path` and `format` for a mesh of `dimension` (0: not known yet) that may have weights,
-// as far as that can be known without writing.
+// Tells early whether WriteMesh would refuse `path` and `format` for a mesh of `dimension` (0: not known yet) that may
+// have weights, as far as that can be known without writing.
 absl::Status CheckMeshOutput(const std::string& path, const std::string& format, int dimension = 0,
                              bool may_have_weights = false);
 
 // Writes a mesh piece by piece, so that it need not fit into memory.
 //
-// Memory: a few blocks for a regular file; for vtu into a pipe or a device the compressed array that is being written; for node
+// Memory: a few blocks for a regular file; for vtu into a pipe or a device the compressed array that is being written;
+// for node
 //         with weights the points, for msh41 and msh22 with weights these.
 // Thread safety: thread-compatible.
 class MeshWriter {
@@ -52,8 +55,8 @@ class MeshWriter {
   MeshWriter(const MeshWriter&) = delete;
   MeshWriter& operator=(const MeshWriter&) = delete;
 
-  // The next rows of the arrays: all points, then all weights if the shape has them, then all simplices. Returns the first
-  // error of all so far.
+  // The next rows of the arrays: all points, then all weights if the shape has them, then all simplices. Returns the
+  // first error of all so far.
   // REQUIRES:   whole rows, no more than the shape says, nothing of an array before another that goes first.
   virtual absl::Status AddPoints(std::span<const double> points) = 0;
   virtual absl::Status AddWeights(std::span<const double> weights) = 0;
@@ -67,8 +70,8 @@ class MeshWriter {
   MeshWriter() = default;
 };
 
-// A writer to `path`; "-" is standard output. `format` empty: by the extension; standard output is vtu. Ends with CANCELLED once `stop`
-// asks for it.
+// A writer to `path`; "-" is standard output. `format` empty: by the extension; standard output is vtu. Ends with
+// CANCELLED once `stop` asks for it.
 //
 // Errors:     as of WriteMesh.
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMesh(const std::string& path, const std::string& format,

@@ -164,7 +164,8 @@ class Msh41Writer final : public MshWriter {
   Msh41Writer(OutputFile output, const MeshShape& shape) : MshWriter(std::move(output), shape, true) {}
 
  private:
-  // One block of one entity; all numbers of nodes, then all coordinates. Words are of the machine's order, as the integer 1 tells.
+  // One block of one entity; all numbers of nodes, then all coordinates. Words are of the machine's order, as the
+  // integer 1 tells.
   void WriteNodesHeader() override {
     std::string text = "$MeshFormat\n4.1 1 8\n";
     AppendBytes<int32_t>(1, text);

@@ -1,4 +1,5 @@
-// VTK's HDF5 for unstructured grids: https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html, "VTKHDF", version 1.0.
+// VTK's HDF5 for unstructured grids: https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html, "VTKHDF",
+// version 1.0.
 #include <hdf5.h>
 
 #include <algorithm>
@@ -24,8 +25,9 @@ constexpr uint8_t kTetrahedron = 10;
 constexpr hsize_t kRowsPerChunk = 1 << 15;
 constexpr unsigned kDeflateLevel = 4;
 
-// Libraries of HDF5 need not be thread-safe, and keep state for all files of a process. What could not be written because the disk was
-// full stays in that state, and a try to write it at the end of the process would crash, so there is to be none: all files are closed.
+// Libraries of HDF5 need not be thread-safe, and keep state for all files of a process. What could not be written
+// because the disk was full stays in that state, and a try to write it at the end of the process would crash, so there
+// is to be none: all files are closed.
 std::mutex& Hdf5Mutex() {
   static std::mutex mutex;
   [[maybe_unused]] static const herr_t no_atexit = H5dont_atexit();

@@ -21,8 +21,8 @@ constexpr int kCompressionLevel = 1;
 // zlib never makes more than about 1032 bytes of one.
 constexpr uint64_t kMaxExpansion = 1040;
 
-// Members of this size or more, compressed or not, want the fields of zip64. Deflate lengthens what it cannot compress by far less
-// than the difference to 2^32.
+// Members of this size or more, compressed or not, want the fields of zip64. Deflate lengthens what it cannot compress
+// by far less than the difference to 2^32.
 constexpr uint64_t kZip64Bytes = 0xff00'0000;
 
 constexpr uLong kEncrypted = 1;  // flag
@@ -156,7 +156,8 @@ struct ZipReader::Archive {
   std::vector<char> block;
   uint64_t block_begin = 0;
 
-  // The bytes at `position` that are in the block, after reading it anew if there are none; empty at the end and on errors.
+  // The bytes at `position` that are in the block, after reading it anew if there are none; empty at the end and on
+  // errors.
   std::string_view BytesAtPosition() {
     constexpr size_t kBlockBytes = 1 << 16;
     if (position < block_begin || position - block_begin >= block.size()) {

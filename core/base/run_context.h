@@ -37,7 +37,8 @@ class MemoryLender {
  public:
   virtual ~MemoryLender() = default;
 
-  // Asked before work that is estimated to hold `bytes` at its peak. May wait until they can be had; an error ends the run.
+  // Asked before work that is estimated to hold `bytes` at its peak. May wait until they can be had; an error ends the
+  // run.
   virtual absl::Status Reserve(uint64_t bytes) = 0;
 
   // Asked now and then while a run works, with what it holds or is about to. Does not wait; an error ends the run.

@@ -9,7 +9,8 @@
 
 namespace wellspace::core {
 
-// Sorts `items`, numbers or identifiers of at most 64 bits, the least first, and returns whether that takes an odd number of exchanges.
+// Sorts `items`, numbers or identifiers of at most 64 bits, the least first, and returns whether that takes an odd
+// number of exchanges.
 //
 // Complexity: O(N^2).
 template <typename T, size_t N>

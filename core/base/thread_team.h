@@ -49,7 +49,8 @@ class ThreadTeam {
     });
   }
 
-  // As ForEach, for calls that return an absl::Status: of those that are not ok that of the lowest i is returned. A single call is made by the caller.
+  // As ForEach, for calls that return an absl::Status: of those that are not ok that of the lowest i is returned. A
+  // single call is made by the caller.
   template <typename F>
   absl::Status TryForEach(size_t count, const F& f) {
     if (count == 1) {
@@ -62,8 +63,8 @@ class ThreadTeam {
     return failed == statuses.end() ? absl::OkStatus() : *failed;
   }
 
-  // Has the other threads begin such a loop, while the caller goes on. Nothing that f reads may be written until End or Drop,
-  // which has to be called before the next loop.
+  // Has the other threads begin such a loop, while the caller goes on. Nothing that f reads may be written until End or
+  // Drop, which has to be called before the next loop.
   void Begin(size_t count, std::function<void(size_t)> f) {
     f_ = std::move(f);
     count_ = count;
@@ -78,8 +79,8 @@ class ThreadTeam {
     });
   }
 
-  // Has another thread call f() once, while the caller goes on, be it with a loop. Nothing that f reads may be written until End or Drop, which
-  // wait for it, too, and have to be called before the next such call.
+  // Has another thread call f() once, while the caller goes on, be it with a loop. Nothing that f reads may be written
+  // until End or Drop, which wait for it, too, and have to be called before the next such call.
   void BeginCall(std::function<void()> f) {
     call_ = std::move(f);
     has_begun_ = true;
@@ -103,7 +104,8 @@ class ThreadTeam {
   // Whether all calls that have been begun have been made.
   bool HasEnded() const { return ended_calls_ == count_; }
 
-  // Joins in what has been begun, if anything has, and returns when all calls have. If one throws, so does this, and some are not made.
+  // Joins in what has been begun, if anything has, and returns when all calls have. If one throws, so does this, and
+  // some are not made.
   void End() {
     if (!std::exchange(has_begun_, false)) {
       return;  // the arena may not even be there

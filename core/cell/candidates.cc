@@ -36,7 +36,8 @@ constexpr std::array<Order, 16> kOrders = [] {
   return orders;
 }();
 
-// Writes the lanes of `wide` whose bit in `kept` is set to `column`, from `at` on, in order. What follows there is lost.
+// Writes the lanes of `wide` whose bit in `kept` is set to `column`, from `at` on, in order. What follows there is
+// lost.
 template <size_t kWidth>
 WELLSPACE_INLINE void Compress(const typename Wide<kWidth>::Mask& wide, uint32_t kept, void* column, size_t at) {
   auto* const to = static_cast<int64_t*>(column) + at;
@@ -119,8 +120,8 @@ WELLSPACE_INLINE void DropThose(size_t begin, Candidates<D>& all) {
   all.count = count;
 }
 
-// Moves candidate i to the place `places[i]`. By four, since the end of the loop is foretold better then: what is not a candidate has
-// the place after the last.
+// Moves candidate i to the place `places[i]`. By four, since the end of the loop is foretold better then: what is not a
+// candidate has the place after the last.
 template <int D>
 WELLSPACE_INLINE void Scatter(const Candidates<D>& from, const uint32_t* places, Candidates<D>& to) {
   for (size_t first = 0; first < from.count; first += kLanes) {

@@ -1,5 +1,5 @@
-// The vertices of a leaf that may cut a cell: picked, sorted and dropped side by side, without branches that the data decide, since
-// half of those would be mispredicted.
+// The vertices of a leaf that may cut a cell: picked, sorted and dropped side by side, without branches that the data
+// decide, since half of those would be mispredicted.
 #ifndef WELLSPACE_CORE_CELL_CANDIDATES_H_
 #define WELLSPACE_CORE_CELL_CANDIDATES_H_
 
@@ -41,7 +41,8 @@ struct alignas(kLanes * sizeof(double)) Candidates {
   // Errors:     none.
   void DropThoseThatMiss(size_t begin, VectorUnit unit = BestVectorUnit());
 
-  // Puts those of `from` in order, the nearest first, but for squares that agree to one part in 2^13; `most` is as good as unknown then.
+  // Puts those of `from` in order, the nearest first, but for squares that agree to one part in 2^13; `most` is as good
+  // as unknown then.
   //
   // Complexity: O(count^2) up to 64, in vectors; else O(count log count).
   // Errors:     none.

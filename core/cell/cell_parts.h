@@ -24,7 +24,8 @@ enum class PlaneKind : uint8_t {
   kClip,  // of the box that a clipped cell is computed in, or of the walls far outside the box
 };
 
-// What a cell clipped by the box `clip` begins with: what `box` has in common with that. `kinds` says by FaceIndex what its faces are.
+// What a cell clipped by the box `clip` begins with: what `box` has in common with that. `kinds` says by FaceIndex what
+// its faces are.
 template <int D>
 Box<D> ClippedBox(const Box<D>& box, const Box<D>& clip, std::array<PlaneKind, 2 * D>& kinds) {
   Box<D> bounds = box;

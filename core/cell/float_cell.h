@@ -24,8 +24,8 @@ namespace wellspace::core {
 template <int D>
 struct FloatBisector;
 
-// The part of Polygon and Polyhedron that does not depend on how nodes are joined. While cuts are made nodes are floats, in units of about the
-// reach that the cell began with.
+// The part of Polygon and Polyhedron that does not depend on how nodes are joined. While cuts are made nodes are
+// floats, in units of about the reach that the cell began with.
 //
 // Thread safety: thread-compatible.
 template <int D>

@@ -11,7 +11,8 @@ namespace {
 constexpr size_t kFewestSites = 8;
 // Vertices in two leaves side by side, along each axis, so that they are worked on together.
 constexpr size_t kMostInTwo = 128;
-// In mean distances between vertices that are neighbours. Those within this distance of the sites are gathered, which matter to nearly all cells.
+// In mean distances between vertices that are neighbours. Those within this distance of the sites are gathered, which
+// matter to nearly all cells.
 constexpr double kWithin = 2.8;
 // Those within this distance of a site, which cut most, are looked at before all others.
 constexpr double kNear = 2.1;

@@ -19,7 +19,8 @@
 
 namespace wellspace::core {
 
-// All vertices within a distance of a box around the sites: as they are, and in columns of floats that tell which may be near.
+// All vertices within a distance of a box around the sites: as they are, and in columns of floats that tell which may
+// be near.
 //
 // Thread safety: thread-compatible. Reused from one to the next: no allocation once warm.
 template <int D>
@@ -28,9 +29,10 @@ class GatheredVertices {
   // Columns of more would not stay in the first cache.
   static constexpr size_t kMost = 1024;
 
-  // Gathers the vertices around the first of `sites`, and returns how many sites these are: those as near each other as in a leaf, or in two side by side.
-  // None are gathered if it would not pay: for few sites, and for those amid more than kMost. `points` are by vertex, in the leaves of
-  // `tree`; `seen`, by node of the tree, is set to `mark`, which nobody has there, where a leaf has been met.
+  // Gathers the vertices around the first of `sites`, and returns how many sites these are: those as near each other as
+  // in a leaf, or in two side by side. None are gathered if it would not pay: for few sites, and for those amid more
+  // than kMost. `points` are by vertex, in the leaves of `tree`; `seen`, by node of the tree, is set to `mark`, which
+  // nobody has there, where a leaf has been met.
   //
   // REQUIRES:   there are sites.
   // Complexity: O(sites), and O(1) for each leaf and vertex around them.
@@ -81,8 +83,8 @@ class GatheredVertices {
   double near_sq() const { return near_sq_; }
 
  private:
-  // What a distance computed from columns may be wrong by: each of the coordinates, below 2, by 2^-24; their difference by three times that; so the length, below
-  // 4, in up to three dimensions by (3 sqrt(3) + 7) 2^-24.
+  // What a distance computed from columns may be wrong by: each of the coordinates, below 2, by 2^-24; their difference
+  // by three times that; so the length, below 4, in up to three dimensions by (3 sqrt(3) + 7) 2^-24.
   static constexpr double kColumnError = 0x1p-20;
 
   void Begin(const Box<D>& sites, double spacing);

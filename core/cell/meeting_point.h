@@ -58,9 +58,9 @@ struct SpacePlacements {
 // The meeting point of D planes by Cramer's rule, D <= 3.
 //
 // With a_j = |n_j|, P = prod a_j and S = sum_j |c_j| P / a_j, the numerators are sums of products bounded by S, the
-// determinant by sqrt(D) P; each factor carries at most one rounding (n) or D + 3 (c), each product and sum one more: at
-// most 14 u for D <= 3. So, where |det| > 256 u P, a coordinate is wrong by at most 18 u (S + |x| P) / |det|, and x by
-// sqrt(D) < 2 times that; 64 u is used.
+// determinant by sqrt(D) P; each factor carries at most one rounding (n) or D + 3 (c), each product and sum one more:
+// at most 14 u for D <= 3. So, where |det| > 256 u P, a coordinate is wrong by at most 18 u (S + |x| P) / |det|, and x
+// by sqrt(D) < 2 times that; 64 u is used.
 template <size_t kNodes>
 WELLSPACE_INLINE void MeetInSpace(const SpacePlanes<kNodes>& planes, SpacePlacements<kNodes>& placed) {
   using T = typename PerNode<kNodes>::Type;
@@ -132,13 +132,13 @@ Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D == 3)
 
 // The same by an approximate inverse and the residual, D > 3.
 //
-// Divide each plane by the length of its normal as computed, which is as good a scale as the exact one: A x = c, and let
-// A*, c*, x* be the exact ones. The rows of A carry at most 3 u each (difference, quotient; with lengths a few u off 1),
-// c at most (D + 6) u |c|, in norm. Let Y be any matrix and F = |Y A - I| in the Frobenius norm, computed with an error
-// below (D + 1) u (|Y| |A| + sqrt(D)) < (2 D + 4) u |Y| |A|, |A| = sqrt(D), since sqrt(D) <= |Y| |A| + F; that of A* adds
-// 3 u |Y| sqrt(D). If F* <= 1/2 then |A*^-1| <= 2 |Y|. The residual r = A x - c, computed with an error below (D + 2) u
-// (|a_j| |x| + |c_j|) in each component, differs from A* x - c* by 3 u |x| + (D + 6) u |c_j| more; so |x - x*| <= 2 |Y|
-// (|r| + (2 D + 10) u sqrt(D) (|x| + max |c|)).
+// Divide each plane by the length of its normal as computed, which is as good a scale as the exact one: A x = c, and
+// let A*, c*, x* be the exact ones. The rows of A carry at most 3 u each (difference, quotient; with lengths a few u
+// off 1), c at most (D + 6) u |c|, in norm. Let Y be any matrix and F = |Y A - I| in the Frobenius norm, computed with
+// an error below (D + 1) u (|Y| |A| + sqrt(D)) < (2 D + 4) u |Y| |A|, |A| = sqrt(D), since sqrt(D) <= |Y| |A| + F; that
+// of A* adds 3 u |Y| sqrt(D). If F* <= 1/2 then |A*^-1| <= 2 |Y|. The residual r = A x - c, computed with an error
+// below (D + 2) u (|a_j| |x| + |c_j|) in each component, differs from A* x - c* by 3 u |x| + (D + 6) u |c_j| more; so
+// |x - x*| <= 2 |Y| (|r| + (2 D + 10) u sqrt(D) (|x| + max |c|)).
 template <int D>
 Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D > 3) {
   std::array<Point<D>, D> a;
@@ -209,15 +209,16 @@ Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D > 3) 
   return placed;
 }
 
-// What a slack is more than the error of a node, in shares of its distance, so that it also bounds those of products with it.
+// What a slack is more than the error of a node, in shares of its distance, so that it also bounds those of products
+// with it.
 inline constexpr double kProductError = 16 * kUnit;
 
-// A placed node is wrong by at most this share of its distance from the site. What is sure of nodes by twice as much does not
-// depend on how they were placed.
+// A placed node is wrong by at most this share of its distance from the site. What is sure of nodes by twice as much
+// does not depend on how they were placed.
 inline constexpr double kPlaced = 0x1p-20;
 
-// Computes where planes of a cell, in their order, meet, exactly where they are too nearly dependent for doubles, and returns the
-// slack.
+// Computes where planes of a cell, in their order, meet, exactly where they are too nearly dependent for doubles, and
+// returns the slack.
 template <int D>
 double PlaceByPlanes(const Point<D>& site, const std::array<const Plane<D>*, D>& planes, Point<D>& x) {
   Placement<D> placed = Meet<D>(planes);

@@ -1,4 +1,5 @@
-// Eight floats at a time: what cells in the plane and in space are cut by. For gathered_vertices.cc, polygon.cc, polyhedron.cc and polyhedron_nodes.cc alone, into which all is compiled.
+// Eight floats at a time: what cells in the plane and in space are cut by. For gathered_vertices.cc, polygon.cc,
+// polyhedron.cc and polyhedron_nodes.cc alone, into which all is compiled.
 #ifndef WELLSPACE_CORE_CELL_NEAR_VERTICES_H_
 #define WELLSPACE_CORE_CELL_NEAR_VERTICES_H_
 
@@ -24,22 +25,25 @@
 
 namespace wellspace::core {
 
-// In units of u = 2^-24: a node x is wrong by at most kNodeError |x|. In the plane that is its rounding, and half of it from where it was computed in
-// doubles; in space it may lie at the end of an edge as short.
+// In units of u = 2^-24: a node x is wrong by at most kNodeError |x|. In the plane that is its rounding, and half of it
+// from where it was computed in doubles; in space it may lie at the end of an edge as short.
 template <int D>
 inline constexpr float kNodeError = D == 2 ? 1.5f : 16;
-// With R at least the distance of the nodes, an excess x . w - |w|^2 / 2 is wrong by at most u ((kNodeError + D + 2) R |w| + (2 D + 2) |w|^2 / 2): w is by
-// u |w|; the products by u |x| |w| together, the D sums by D u (|x| |w| + |w|^2 / 2), and |w|^2 / 2 by (D + 2) u of itself. Whoever may cut has
-// |w| <= 2 R, so that all is less than 12 u R |w| in 2-D, 29 u R |w| in 3-D; one u more for what is taken off |w|^2 / 2.
+// With R at least the distance of the nodes, an excess x . w - |w|^2 / 2 is wrong by at most u ((kNodeError + D + 2) R
+// |w| + (2 D + 2) |w|^2 / 2): w is by u |w|; the products by u |x| |w| together, the D sums by D u (|x| |w| + |w|^2 /
+// 2), and |w|^2 / 2 by (D + 2) u of itself. Whoever may cut has
+// |w| <= 2 R, so that all is less than 12 u R |w| in 2-D, 29 u R |w| in 3-D; one u more for what is taken off |w|^2 /
+// 2.
 template <int D>
 inline constexpr float kExcessError = D == 2 ? 0x1p-20f : 0x1p-19f;
 // What squares of distances can lose below the least float, and more: nothing that a cell is made of is as small.
 inline constexpr float kUnderflow = 0x1p-80f;
-// A distance differs by less than this share of itself from that of the exact node, a square by less than twice as much.
+// A distance differs by less than this share of itself from that of the exact node, a square by less than twice as
+// much.
 template <int D>
 inline constexpr float kDistanceError = D == 2 ? 0x1p-21f : 0x1p-19f;
-// By how much, in shares of |x|^2, the power p . (p - 2 x) of a point p within 2 |x| may be wrong: (44 + 4 kNodeError) u. Farther out it
-// is positive.
+// By how much, in shares of |x|^2, the power p . (p - 2 x) of a point p within 2 |x| may be wrong: (44 + 4 kNodeError)
+// u. Farther out it is positive.
 template <int D>
 inline constexpr float kPowerError = D == 2 ? 0x1p-18f : 0x1p-17f;
 // A ratio is surely kept, whatever the rounding and whatever that of placed nodes (kPlaced), if it is by this share.
@@ -57,7 +61,8 @@ WELLSPACE_INLINE FloatMask Splat(int32_t x) { return x + FloatMask{}; }
 
 inline constexpr FloatMask kEachLane = {0, 1, 2, 3, 4, 5, 6, 7};
 
-// Comparisons and choices, half a vector at a time where the processor has no whole ones: of these the compiler would make scalars.
+// Comparisons and choices, half a vector at a time where the processor has no whole ones: of these the compiler would
+// make scalars.
 WELLSPACE_INLINE const HalfFloats* HalvesOf(const Floats& items) { return reinterpret_cast<const HalfFloats*>(&items); }
 WELLSPACE_INLINE const HalfMask* HalvesOf(const FloatMask& items) { return reinterpret_cast<const HalfMask*>(&items); }
 
@@ -204,7 +209,8 @@ struct FloatBisector {
   }
 };
 
-// The square of what the excess of the node x, as computed in doubles, over the bisector to a vertex at that squared distance may be wrong by.
+// The square of what the excess of the node x, as computed in doubles, over the bisector to a vertex at that squared
+// distance may be wrong by.
 template <int D>
 double NodeDoubtSq(const Point<D>& x, double length_sq) {
   constexpr double kShare = 1.01 * 0x1p-24 * kNodeError<D>;
@@ -297,7 +303,8 @@ struct VerticesChosen {
   }
 };
 
-// Calls f(i, distances) for eight gathered vertices at a time, from the i-th on, with their squared distances from `site`, by their columns.
+// Calls f(i, distances) for eight gathered vertices at a time, from the i-th on, with their squared distances from
+// `site`, by their columns.
 template <int D, typename F>
 WELLSPACE_INLINE void ForEachDistanceSq(const GatheredVertices<D>& gathered, const Point<D>& site, F f) {
   Floats from[D];
@@ -316,8 +323,8 @@ WELLSPACE_INLINE void ForEachDistanceSq(const GatheredVertices<D>& gathered, con
   }
 }
 
-// Lists the numbers of the gathered vertices whose squared distance from `site`, by their columns, is more than `more_than_sq` and at most
-// `most_sq`, and returns how many there are. Seven more are written.
+// Lists the numbers of the gathered vertices whose squared distance from `site`, by their columns, is more than
+// `more_than_sq` and at most `most_sq`, and returns how many there are. Seven more are written.
 template <VectorUnit kUnit, int D>
 WELLSPACE_INLINE size_t ChooseBetween(const GatheredVertices<D>& gathered, const Point<D>& site, float more_than_sq,
                                       float most_sq, int32_t* numbers) {
@@ -336,8 +343,8 @@ WELLSPACE_INLINE size_t ChooseBetween(const GatheredVertices<D>& gathered, const
   return count;
 }
 
-// Cuts a cell by those of the gathered vertices that are within its reach, the near ones first: by cut_by(vertices), which returns how many are,
-// for up to kMostCutTogether at a time. Returns how many are.
+// Cuts a cell by those of the gathered vertices that are within its reach, the near ones first: by cut_by(vertices),
+// which returns how many are, for up to kMostCutTogether at a time. Returns how many are.
 template <VectorUnit kUnit, int D, typename Cell, typename CutBy>
 WELLSPACE_INLINE size_t CutByThoseGathered(const Cell& cell, const GatheredVertices<D>& gathered, CutBy cut_by) {
   alignas(sizeof(FloatMask)) int32_t numbers[GatheredVertices<D>::kMost + kFloatLanes];
@@ -384,8 +391,8 @@ WELLSPACE_INLINE Floats RadiiSq(const Group& group) {
   return radius_sq;
 }
 
-// Whether some vertex in the cube from `low` to `high`, relative to the site, could cut off a node, as Polytope::Reaches has it; nodes are within
-// `most_radius`.
+// Whether some vertex in the cube from `low` to `high`, relative to the site, could cut off a node, as
+// Polytope::Reaches has it; nodes are within `most_radius`.
 template <VectorUnit kUnit, int D, typename Group>
 WELLSPACE_INLINE bool AreReached(std::span<const Group> groups, float most_radius, const Point<D>& low,
                                  const Point<D>& high) {
@@ -419,8 +426,8 @@ struct alignas(sizeof(Floats)) NearVertices {
   uint32_t order[kCapacity];  // from the nearest on, but for distances that agree to one part in 2^17
   size_t within_reach = 0;    // but for the site
 
-  // Picks those of `vertices` but `site_name` that may cut a cell about `site` of that radius, and that `may_cut`: given the vectors of eight
-  // and their lows, it tells which.
+  // Picks those of `vertices` but `site_name` that may cut a cell about `site` of that radius, and that `may_cut`:
+  // given the vectors of eight and their lows, it tells which.
   template <VectorUnit kUnit, typename Vertices, typename MayCut>
   WELLSPACE_INLINE void Pick(const Vertices& vertices, VertexId site_name, const Point<D>& site, double scale,
                              float most_radius, MayCut may_cut) {
@@ -466,8 +473,8 @@ struct alignas(sizeof(Floats)) NearVertices {
     }
   }
 
-  // Calls cut(bisector, slot), which tells whether anything is cut off, from the nearest on, as long as they are within `most_offset`(), which
-  // may have changed then.
+  // Calls cut(bisector, slot), which tells whether anything is cut off, from the nearest on, as long as they are within
+  // `most_offset`(), which may have changed then.
   template <typename Cut, typename Most>
   WELLSPACE_INLINE void CutInOrder(Cut cut, Most most_offset) const {
     float left = std::numeric_limits<float>::infinity();

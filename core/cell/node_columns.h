@@ -15,9 +15,9 @@
 
 namespace wellspace::core {
 
-// Positions of the nodes of a cell and bounds on their errors by index of the node: in groups of which one vector instruction takes a
-// coordinate, to work on many nodes, and in rows, to work on one. Places of the last group beyond the last node hold a node
-// at the site, which no bisector cuts off.
+// Positions of the nodes of a cell and bounds on their errors by index of the node: in groups of which one vector
+// instruction takes a coordinate, to work on many nodes, and in rows, to work on one. Places of the last group beyond
+// the last node hold a node at the site, which no bisector cuts off.
 //
 // Thread safety: thread-compatible.
 template <int D>
@@ -69,9 +69,9 @@ class NodeColumns {
   }
   double slack(size_t i) const { return rows_[i].values[D]; }
 
-  // Computes for all nodes x the excess x . normal - offset, which may be wrong by e = slack length + error: finds those
-  // of which excess + e is not negative (doubtful ones and more), and those of which excess - e is positive (surely cut
-  // off). Returns whether there are any of the former.
+  // Computes for all nodes x the excess x . normal - offset, which may be wrong by e = slack length + error: finds
+  // those of which excess + e is not negative (doubtful ones and more), and those of which excess - e is positive
+  // (surely cut off). Returns whether there are any of the former.
   //
   // Defined in excesses.h.
   template <size_t kWidth>
@@ -90,12 +90,12 @@ class NodeColumns {
            found_.capacity() * sizeof(Found);
   }
 
-  // Computes `most` of the candidates from `begin` on; `slack` is at least those of the nodes, and a candidate w has the error
-  // `slack` |w| + `relative_error` |w|^2 / 2.
+  // Computes `most` of the candidates from `begin` on; `slack` is at least those of the nodes, and a candidate w has
+  // the error `slack` |w| + `relative_error` |w|^2 / 2.
   void ComputeMost(double slack, double relative_error, size_t begin, Candidates<D>& candidates) const;
 
-  // Whether some node x has |p x|^2 <= |x|^2 + doubt, for the point p of the cube [low, high] nearest to it; `low` and `high`
-  // are relative to the site.
+  // Whether some node x has |p x|^2 <= |x|^2 + doubt, for the point p of the cube [low, high] nearest to it; `low` and
+  // `high` are relative to the site.
   bool Reaches(const Point<D>& low, const Point<D>& high, double doubt) const;
 
   // The largest squared distance of a node from the site, and the largest slack.

@@ -39,7 +39,8 @@ Point<2> Polygon::PositionOf(size_t node) const {
   return {group.x[0][node % kTogether], group.x[1][node % kTogether]};
 }
 
-// Of the nodes `first` + i for the bits i of `doubtful`: a bit for whether it is cut off, by its own error if that tells, else exactly.
+// Of the nodes `first` + i for the bits i of `doubtful`: a bit for whether it is cut off, by its own error if that
+// tells, else exactly.
 [[gnu::noinline]] uint32_t Polygon::DecideDoubtful(size_t first, uint32_t doubtful, const Point<2>& generator) {
   const Point<2> w = ScaledTo(generator);
   const double length_sq = NormSq<2>(w);
@@ -57,10 +58,12 @@ Point<2> Polygon::PositionOf(size_t node) const {
   return removed;
 }
 
-// Computes where `plane` meets the edges at whose ends the rest ends, in the order of the nodes, and the edges from there.
+// Computes where `plane` meets the edges at whose ends the rest ends, in the order of the nodes, and the edges from
+// there.
 //
-// As Meet does, by Cramer's rule in doubles: wrong by at most 64 * 2^-53 P (d + d' + |x|) / |det| with P = |n| |n'|, and the distances d
-// and d' of the two planes are |x| at most. So |det| > 2^-19 P has x wrong by less than half a unit of floats, 2^-26 |x|.
+// As Meet does, by Cramer's rule in doubles: wrong by at most 64 * 2^-53 P (d + d' + |x|) / |det| with P = |n| |n'|,
+// and the distances d and d' of the two planes are |x| at most. So |det| > 2^-19 P has x wrong by less than half a unit
+// of floats, 2^-26 |x|.
 WELLSPACE_INLINE void Polygon::PlaceEnds(const Rest& rest, uint32_t plane, std::array<Node, 2>& ends) const {
   using Pair = Wide<2>::Lanes;
   size_t last = rest.first + rest.count - 1;
@@ -159,7 +162,8 @@ WELLSPACE_INLINE Floats Polygon::MostExcesses(const FloatBisector<2>& bisector) 
   return Load(group.x[0]) * bisector.w[0] + (Load(group.x[1]) * bisector.w[1] - bisector.low);
 }
 
-// Tells what the bisector leaves of the nodes, kTogether or fewer, of which those of the bits `maybe` may be beyond it; false if all.
+// Tells what the bisector leaves of the nodes, kTogether or fewer, of which those of the bits `maybe` may be beyond it;
+// false if all.
 template <VectorUnit kUnit>
 WELLSPACE_INLINE bool Polygon::FindRest(const FloatBisector<2>& bisector, const Floats& most, uint32_t maybe,
                                         const Point<2>& position, Rest& rest) {

@@ -21,8 +21,9 @@
 
 namespace wellspace::core {
 
-// Polytope<2>, to which its functions that are not told about here belong: a convex polygon, whose nodes are kept in order around the
-// site, so that a cut takes a run of them out and puts two in. What floats leave in doubt is decided exactly. Up to eight nodes, as most cells have, are worked on as one vector.
+// Polytope<2>, to which its functions that are not told about here belong: a convex polygon, whose nodes are kept in
+// order around the site, so that a cut takes a run of them out and puts two in. What floats leave in doubt is decided
+// exactly. Up to eight nodes, as most cells have, are worked on as one vector.
 //
 // Thread safety: thread-compatible. Reused from site to site: no allocation once warm.
 // Invariants: the nodes are those that exact arithmetic and the tie rule give, whatever the rounding.
@@ -56,8 +57,8 @@ class Polygon : public FloatCell<2> {
   uint64_t MemoryBytes() const;
 
  private:
-  // Nodes, each with the edge from it to the next one: the square of the length of what its bisector stands for, 0 of a wall, and
-  // its plane, by index. Places beyond the last node are at the site, which no bisector cuts off.
+  // Nodes, each with the edge from it to the next one: the square of the length of what its bisector stands for, 0 of a
+  // wall, and its plane, by index. Places beyond the last node are at the site, which no bisector cuts off.
   struct alignas(kTogether * sizeof(float)) Group {
     float x[2][kTogether];
     float edge_sq[kTogether];

@@ -96,7 +96,8 @@ WELLSPACE_INLINE bool Polyhedron::FindRemoved(const FloatBisector<3>& bisector, 
   return is_any;
 }
 
-// Sets a word of removed_words_, given which of its nodes the bisector to `generator` may cut off, and which it surely does; whether there are any.
+// Sets a word of removed_words_, given which of its nodes the bisector to `generator` may cut off, and which it surely
+// does; whether there are any.
 WELLSPACE_INLINE bool Polyhedron::SetRemoved(size_t word, uint64_t maybe, uint64_t surely, const Point<3>& generator) {
   const size_t nodes = std::min(count_ - word * kWordBits, kWordBits);
   maybe &= ~uint64_t{0} >> (kWordBits - nodes);
@@ -108,7 +109,8 @@ WELLSPACE_INLINE bool Polyhedron::SetRemoved(size_t word, uint64_t maybe, uint64
   return surely != 0;
 }
 
-// Of the nodes that the bits of `doubtful`, of a word, stand for: those that are cut off, by their own errors if those tell, else exactly.
+// Of the nodes that the bits of `doubtful`, of a word, stand for: those that are cut off, by their own errors if those
+// tell, else exactly.
 [[gnu::noinline]] uint64_t Polyhedron::DecideDoubtful(size_t word, uint64_t doubtful, const Point<3>& generator) {
   const Point<3> w = ScaledTo(generator);
   const double length_sq = NormSq<3>(w);
@@ -126,7 +128,8 @@ WELLSPACE_INLINE bool Polyhedron::SetRemoved(size_t word, uint64_t maybe, uint64
   return removed;
 }
 
-// Lists the nodes that are cut off, and the edges of the rim around them: those of their triangles that no other of them has the other way round.
+// Lists the nodes that are cut off, and the edges of the rim around them: those of their triangles that no other of
+// them has the other way round.
 WELLSPACE_INLINE void Polyhedron::FindRim() {
   removed_count_ = 0;
   rim_count_ = 0;
@@ -206,10 +209,12 @@ WELLSPACE_INLINE void Polyhedron::FindRim() {
   }
 }
 
-// Computes the nodes where `plane` meets the edges that lead out of what is cut off, which lie on the planes of the edges of the rim.
+// Computes the nodes where `plane` meets the edges that lead out of what is cut off, which lie on the planes of the
+// edges of the rim.
 //
-// As Meet does, by Cramer's rule in doubles: wrong by at most 64 * 2^-53 P (d + d' + d'' + |x|) / |det|, where P is the product of the
-// lengths of the normals, and the distances of the planes are |x| at most. So |det| > 2^-19 P has x wrong by less than 2^-26 |x|.
+// As Meet does, by Cramer's rule in doubles: wrong by at most 64 * 2^-53 P (d + d' + d'' + |x|) / |det|, where P is the
+// product of the lengths of the normals, and the distances of the planes are |x| at most. So |det| > 2^-19 P has x
+// wrong by less than 2^-26 |x|.
 WELLSPACE_INLINE void Polyhedron::PlaceOnRim(uint32_t plane) {
   const Row& own = rows_[plane];
   const Point<3> n = {own.normal[0], own.normal[1], own.normal[2]};
@@ -249,7 +254,8 @@ WELLSPACE_INLINE void Polyhedron::PlaceOnRim(uint32_t plane) {
   }
 }
 
-// Places a node whose planes are nearly dependent, as where slivers have nodes close to each other: at the end of its edge that stays, if that is short enough.
+// Places a node whose planes are nearly dependent, as where slivers have nodes close to each other: at the end of its
+// edge that stays, if that is short enough.
 [[gnu::noinline]] void Polyhedron::PlaceOnShortEdge(size_t j, uint32_t plane) {
   const RimEdge edge = rim_[j];
   const auto has = [](const Triangle& triangle, uint32_t from, uint32_t to) {
@@ -282,8 +288,8 @@ WELLSPACE_INLINE void Polyhedron::PlaceOnRim(uint32_t plane) {
   }
 }
 
-// Puts the new nodes in the place of those cut off. They take their places first; what is left over goes to the end, and of places that are
-// left those at the end are filled.
+// Puts the new nodes in the place of those cut off. They take their places first; what is left over goes to the end,
+// and of places that are left those at the end are filled.
 WELLSPACE_INLINE void Polyhedron::Replace(uint32_t plane) {
   const size_t old = count_;
   count_ = std::max(old, old + rim_count_ - removed_count_);

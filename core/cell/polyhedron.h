@@ -21,9 +21,10 @@
 
 namespace wellspace::core {
 
-// Polytope<3>, to which its functions that are not told about here belong: a simple polyhedron, kept as its dual, a triangulated sphere. A node
-// is a triangle of three planes; a cut takes a disk of triangles out, and joins its rim to the new plane. Which triangle is beside
-// which need not be known for that. What floats leave in doubt is decided exactly.
+// Polytope<3>, to which its functions that are not told about here belong: a simple polyhedron, kept as its dual, a
+// triangulated sphere. A node is a triangle of three planes; a cut takes a disk of triangles out, and joins its rim to
+// the new plane. Which triangle is beside which need not be known for that. What floats leave in doubt is decided
+// exactly.
 //
 // Thread safety: thread-compatible. Reused from site to site: no allocation once warm.
 // Invariants: the nodes are those that exact arithmetic and the tie rule give, whatever the rounding.
@@ -135,7 +136,8 @@ class Polyhedron : public FloatCell<3> {
     Transpose(row(0), row(1), row(2), row(3), columns);
   }
   std::span<const Group> groups() const { return {groups_.data(), GroupsFor(count_)}; }
-  // Calls f(group) for all groups, and for the first four even if they have no nodes: how many of those do cannot be foretold.
+  // Calls f(group) for all groups, and for the first four even if they have no nodes: how many of those do cannot be
+  // foretold.
   template <typename F>
   WELLSPACE_INLINE void ForEachGroup(F f) const {
     f(groups_[0]);
@@ -159,7 +161,8 @@ class Polyhedron : public FloatCell<3> {
   std::vector<RimEdge> rim_;
   size_t rim_count_ = 0;
   std::array<std::vector<float>, 3> new_;  // by axis and edge of the rim: the node there
-  // By plane, one of the first kWordBits, a bit for each to which, and from which, an edge of a triangle that goes leads; all 0 between cuts.
+  // By plane, one of the first kWordBits, a bit for each to which, and from which, an edge of a triangle that goes
+  // leads; all 0 between cuts.
   std::array<uint64_t, kWordBits> leads_to_{};
   std::array<uint64_t, kWordBits> leads_from_{};
   // Of FindNeighbours, by two of the first kWordBits planes: the node whose triangle leads from the one to the other.

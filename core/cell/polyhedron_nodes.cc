@@ -35,8 +35,8 @@ bool Polyhedron::PlaceUnlessKeeps(double ratio) {
   return false;
 }
 
-// Fills nodes_, and places those that wants(node) asks for by their planes, bisectors by vertex, then walls by face: so they do not depend on
-// the order of the cuts.
+// Fills nodes_, and places those that wants(node) asks for by their planes, bisectors by vertex, then walls by face: so
+// they do not depend on the order of the cuts.
 template <typename Wants>
 WELLSPACE_INLINE void Polyhedron::PlaceThose(Wants wants) {
   nodes_.resize(count_);
@@ -91,7 +91,8 @@ WELLSPACE_INLINE void Polyhedron::SortPlanes(size_t i) {
   nodes_[i].planes = {static_cast<uint16_t>(keys[0]), static_cast<uint16_t>(keys[1]), static_cast<uint16_t>(keys[2])};
 }
 
-// Places nodes as PlaceByPlanes does, but for those that are on walls alone or need exact arithmetic; a bit for each that is placed.
+// Places nodes as PlaceByPlanes does, but for those that are on walls alone or need exact arithmetic; a bit for each
+// that is placed.
 WELLSPACE_INLINE uint32_t Polyhedron::PlaceTogether(const std::array<uint32_t, kPlacedTogether>& nodes) {
   using Four = Wide<kPlacedTogether>::Lanes;
   SpacePlanes<kPlacedTogether> four{};

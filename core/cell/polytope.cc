@@ -14,9 +14,9 @@
 namespace wellspace::core {
 namespace {
 
-// The excess x . w - c, c = |w|^2 / 2, of a node x over the bisector to a vertex at w, as computed, differs from the exact one by at most slack |w| + (D
-// + 5) u c: the error of x is in its slack, w has one rounding a coordinate, the product D more, c D + 2, the difference one; 16 u |x| of the
-// slack pays for those of the product.
+// The excess x . w - c, c = |w|^2 / 2, of a node x over the bisector to a vertex at w, as computed, differs from the
+// exact one by at most slack |w| + (D + 5) u c: the error of x is in its slack, w has one rounding a coordinate, the
+// product D more, c D + 2, the difference one; 16 u |x| of the slack pays for those of the product.
 template <int D>
 constexpr double kOffsetError = (D + 5) * kUnit;
 
@@ -221,16 +221,17 @@ WELLSPACE_INLINE void Polytope<D>::FindCutEdges() {
   cut_count_ = static_cast<size_t>(edge - cut_edges_.data());
 }
 
-// Computes where `plane` meets the cut edges: by how much their ends exceed it, or, of edges that are short enough, at their ends, where that is good
-// enough to decide on cuts; else from the planes.
+// Computes where `plane` meets the cut edges: by how much their ends exceed it, or, of edges that are short enough, at
+// their ends, where that is good enough to decide on cuts; else from the planes.
 //
 // With k and r the ends as computed, s their larger slack, d = r - k, e_k and e_r their excesses as computed and eps
-// the bound on the errors of those, t = e_k / (e_k - e_r) differs from that of the exact ends by |e_r a - e_k b| / (g (g +
-// b - a)), where g = e_r - e_k and |a|, |b| <= eps are the errors: since e_k <= eps and e_r >= -eps, |e_r| + |e_k| is g + 2 eps at
-// most, and this eps (g + 2 eps) / (g (g - 2 eps)), less than 1.02 eps / g from g = 256 eps on. The
-// exact node lies between the exact ends, so k + t d is wrong by at most s + 1.02 eps / g (|d| + 2 s), k itself by s + |d| + 2 s, and the
-// rounding: of each coordinate of k + t d, of t and of t d, less than 4 u (|k| + |d|) <= 12 u R where R >= |k|, |r|. The
-// new slack has to hold 16 u |x| <= 16 u R of its own; 4 u R more pays for the roundings of the bound.
+// the bound on the errors of those, t = e_k / (e_k - e_r) differs from that of the exact ends by |e_r a - e_k b| / (g
+// (g + b - a)), where g = e_r - e_k and |a|, |b| <= eps are the errors: since e_k <= eps and e_r >= -eps, |e_r| + |e_k|
+// is g + 2 eps at most, and this eps (g + 2 eps) / (g (g - 2 eps)), less than 1.02 eps / g from g = 256 eps on. The
+// exact node lies between the exact ends, so k + t d is wrong by at most s + 1.02 eps / g (|d| + 2 s), k itself by s +
+// |d| + 2 s, and the rounding: of each coordinate of k + t d, of t and of t d, less than 4 u (|k| + |d|) <= 12 u R
+// where R >= |k|, |r|. The new slack has to hold 16 u |x| <= 16 u R of its own; 4 u R more pays for the roundings of
+// the bound.
 template <int D>
 template <size_t kWidth>
 WELLSPACE_INLINE void Polytope<D>::PlaceCutEdges(uint16_t plane) {
@@ -311,8 +312,8 @@ WELLSPACE_INLINE std::array<uint16_t, D> Polytope<D>::PlanesOn(End kept, uint16_
   return planes;
 }
 
-// One new node on each cut edge. They take the places of removed nodes first; what is left over goes to the end, so that
-// the nodes stay without holes.
+// One new node on each cut edge. They take the places of removed nodes first; what is left over goes to the end, so
+// that the nodes stay without holes.
 template <int D>
 WELLSPACE_INLINE void Polytope<D>::MakeNewNodes(uint16_t plane) {
   if (new_.size() < cut_count_) {

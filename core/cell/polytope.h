@@ -29,13 +29,13 @@ namespace wellspace::core {
 template <int D>
 class Polytope {
  public:
-  // What a cell is cut to at most, so that its parts can be numbered and a cut ends soon. Cells of a refined mesh are far
-  // smaller; a vertex amid unrefined ones can have all of them for neighbours.
+  // What a cell is cut to at most, so that its parts can be numbered and a cut ends soon. Cells of a refined mesh are
+  // far smaller; a vertex amid unrefined ones can have all of them for neighbours.
   static constexpr size_t kMostNodes = D <= 4 ? size_t{1} << 14 : size_t{1} << 18;
   static constexpr size_t kMostPlanes = size_t{1} << 15;
 
-  // Begins with the box [low, high], which holds `site` and whose faces are of kind `kinds[FaceIndex]`. Its nodes are still to
-  // be placed, by Place().
+  // Begins with the box [low, high], which holds `site` and whose faces are of kind `kinds[FaceIndex]`. Its nodes are
+  // still to be placed, by Place().
   void Reset(const Point<D>& site, const Box<D>& bounds, const std::array<PlaneKind, 2 * D>& kinds, TieRule rule);
 
   // Cuts the cell by the bisector of its site and `u`, keeping the site's side. Returns whether anything was cut off.
@@ -58,8 +58,8 @@ class Polytope {
     return CutBeforePlace(u, position, normal, NormSq<D>(normal));
   }
 
-  // The same by vertices, as many as a leaf holds at most, the nearest first: far ones then seldom cut. The cell's own, `site`, may be among
-  // them. Returns how many others are within reach.
+  // The same by vertices, as many as a leaf holds at most, the nearest first: far ones then seldom cut. The cell's own,
+  // `site`, may be among them. Returns how many others are within reach.
   //
   // REQUIRES:   positions and listed names may be read so many together, beyond the last perhaps, as those of a leaf
   //             (Buckets::kReadTogether).
@@ -67,8 +67,8 @@ class Polytope {
   // Errors:     none.
   size_t CutByEach(std::span<const Point<D>> positions, const VertexNames& names, VertexId site);
 
-  // Computes what nodes() is to tell of the nodes that have been made since: from their planes alone, so that it does not
-  // depend on the order of the cuts.
+  // Computes what nodes() is to tell of the nodes that have been made since: from their planes alone, so that it does
+  // not depend on the order of the cuts.
   //
   // Complexity: O(nodes); no allocation.
   // Errors:     none.
@@ -81,14 +81,15 @@ class Polytope {
   // Errors:     none; false where it is not sure.
   bool KeepsRatio(double ratio) const;
 
-  // Returns KeepsRatio(ratio). Unless that holds nodes() may be asked for: those of which it does not surely hold are placed
-  // then, the others only roughly, though so that it holds of them.
+  // Returns KeepsRatio(ratio). Unless that holds nodes() may be asked for: those of which it does not surely hold are
+  // placed then, the others only roughly, though so that it holds of them.
   //
   // Complexity: O(nodes).
   // Errors:     none.
   bool PlaceUnlessKeeps(double ratio);
 
-  // Computes `most` of the candidates from `begin` on, so that those for which it is negative do not cut the cell, now or later.
+  // Computes `most` of the candidates from `begin` on, so that those for which it is negative do not cut the cell, now
+  // or later.
   //
   // Complexity: O(nodes) a candidate.
   // Errors:     none.
@@ -102,8 +103,8 @@ class Polytope {
   // Source:     [HT08] §6 with the polytope in the place of the ball: |x p|^2 - |x site|^2 is affine in x for fixed p,
   //             so its least value over the cell is at a node.
   bool Reaches(const Box<D>& cube) const {
-    // |p x|^2 - |x|^2 = p (p - 2 x). Where that is near zero p is within 2 |x| of the site, so an error e of x moves it by at
-    // most 4 |x| e.
+    // |p x|^2 - |x|^2 = p (p - 2 x). Where that is near zero p is within 2 |x| of the site, so an error e of x moves it
+    // by at most 4 |x| e.
     return columns_.Reaches(Difference<D>(cube.low, site_), Difference<D>(cube.high, site_),
                             4 * largest_slack_ * reach_);
   }
@@ -131,7 +132,8 @@ class Polytope {
   double reach_sq() const { return reach_ * reach_; }
   // A vertex whose computed squared distance from the site is larger than this cannot cut the cell.
   double CutLimitSq() const { return 4 * (1 + 0x1p-49) * reach_sq(); }
-  // REQUIRES:   since Reset and the last CutBeforePlace, Cut or Place has been called, or PlaceUnlessKeeps, which returned false.
+  // REQUIRES:   since Reset and the last CutBeforePlace, Cut or Place has been called, or PlaceUnlessKeeps, which
+  //             returned false.
   std::span<const CellNode<D>> nodes() const { return nodes_; }
   const Plane<D>& plane(int index) const { return planes_[index]; }
   int plane_count() const { return static_cast<int>(plane_count_); }

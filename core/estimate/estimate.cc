@@ -24,7 +24,8 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// ---- The model; docs/design/estimate.md says how it was found ----------------------------------------------------------
+// ---- The model; docs/design/estimate.md says how it was found
+// ----------------------------------------------------------
 
 // The integrals that vertices are counted by. Those over the box are of lfs^-D times Grading, those over its faces of
 // (distance to the second nearest point)^-(D-1).
@@ -147,7 +148,8 @@ class Draws {
   uint64_t state_ = 1;
 };
 
-// ---- The integrals over leaves -----------------------------------------------------------------------------------------
+// ---- The integrals over leaves
+// -----------------------------------------------------------------------------------------
 
 // What a leaf adds to the mesh.
 struct Share {
@@ -414,11 +416,12 @@ class Integrator {
   NearestTwo last_;  // of the place looked at last
 };
 
-// ---- Sampling ----------------------------------------------------------------------------------------------------------
+// ---- Sampling
+// ----------------------------------------------------------------------------------------------------------
 
 // What becomes of a leaf that holds `vertices` in the end, `at_first` before refinement: it is split for as long as its
-// parts are too full. How many there will be is known to about a quarter. Vertices keep apart, so that leaves of less than
-// one hold one at most.
+// parts are too full. How many there will be is known to about a quarter. Vertices keep apart, so that leaves of less
+// than one hold one at most.
 template <int D>
 Leaves LeavesOf(double vertices, double at_first) {
   constexpr double kCapacity = LeafTree<D>::kLeafCapacity;
@@ -473,8 +476,8 @@ void Add(Share& sum, const Share& share, double factor = 1) {
 // Leaves looked at between two looks at the error, at most.
 constexpr size_t kLeavesTogether = 64;
 
-// Draws leaves without replacement: from those with vertices and those without, as there may be few of the former and nearly
-// all new vertices in them.
+// Draws leaves without replacement: from those with vertices and those without, as there may be few of the former and
+// nearly all new vertices in them.
 template <int D>
 absl::StatusOr<Sample> SampleLeaves(const QueryStructure<D>& structure, Integrator<D>& integrator,
                                     const EstimateEffort& effort, const RunContext& context) {

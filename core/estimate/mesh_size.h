@@ -50,11 +50,12 @@ inline constexpr double kFixedBytes = 3.9e6;
 inline constexpr double kLeftFree = 0.3;
 inline constexpr double kMostLeftFree = 3e6;
 
-// Where the estimate of the memory is wrong, it is rather short than long: 0.57 to 1.05 without this, which puts the two ends about as far from 1.
+// Where the estimate of the memory is wrong, it is rather short than long: 0.57 to 1.05 without this, which puts the
+// two ends about as far from 1.
 inline constexpr double kMemoryMargin = 1.25;
 
-// The memory at its peak, when the mesh has been put together. Vectors grow by doubling, but of what they reserve only what they
-// use is ever touched; what that leaves free of the last large page of each is within the margin.
+// The memory at its peak, when the mesh has been put together. Vectors grow by doubling, but of what they reserve only
+// what they use is ever touched; what that leaves free of the last large page of each is within the margin.
 template <int D>
 double BytesOf(const Leaves& leaves, double vertices, double simplices) {
   constexpr double kChildren = LeafTree<D>::kChildren;
@@ -62,8 +63,8 @@ double BytesOf(const Leaves& leaves, double vertices, double simplices) {
   // Beside the nodes, three marks of the queries' scratch space.
   const double node_bytes = LeafTree<D>::NodeBytes() + 3 * sizeof(uint32_t);
   using Buckets = typename LeafTree<D>::Buckets;
-  // Coordinates in the tree, in the structure and in the mesh; number in the tree, leaf, faces, radius, place in the schedule, numbers in the
-  // output; where its simplices are listed, how many, and when it was added.
+  // Coordinates in the tree, in the structure and in the mesh; number in the tree, leaf, faces, radius, place in the
+  // schedule, numbers in the output; where its simplices are listed, how many, and when it was added.
   const double vertex_bytes = Buckets::kPlaceBytes + 2 * sizeof(Point<D>) + 32 + 3 * sizeof(uint32_t);
   // Indices in the lists, some of which are no simplices any more, and in the mesh.
   const double simplex_bytes = 1.05 * D * sizeof(VertexId) + (D + 1) * sizeof(uint32_t);

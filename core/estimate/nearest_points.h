@@ -27,8 +27,8 @@ struct NearestTwo {
   uint32_t second = 0;
 };
 
-// Finds points near any place: boxes around runs of points in Morton order, and around pairs of boxes. A tree would walk
-// through its empty leaves, of which there may be many between far points.
+// Finds points near any place: boxes around runs of points in Morton order, and around pairs of boxes. A tree would
+// walk through its empty leaves, of which there may be many between far points.
 //
 // Thread safety: thread-compatible.
 template <int D>
@@ -75,7 +75,8 @@ class NearestPoints {
 
   const Point<D>& operator[](size_t i) const { return points_[i]; }
 
-  // The two points nearest to `x`, other than point number `but`. Distances are infinite where there are no such points.
+  // The two points nearest to `x`, other than point number `but`. Distances are infinite where there are no such
+  // points.
   //
   // Complexity: O(log n) for most clouds and places.
   // Errors:     none.

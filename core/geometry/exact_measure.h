@@ -1,7 +1,7 @@
 // Exact orientation, in-sphere test, volume and circumcentre of simplices, for those who check a mesh.
 //
-// Independent of power_predicate on purpose: which simplices there are is decided by other arithmetic than the validators'. (They share the
-// orientation alone, with which a mesher tells the two sides of a facet.)
+// Independent of power_predicate on purpose: which simplices there are is decided by other arithmetic than the
+// validators'. (They share the orientation alone, with which a mesher tells the two sides of a facet.)
 #ifndef WELLSPACE_CORE_GEOMETRY_EXACT_MEASURE_H_
 #define WELLSPACE_CORE_GEOMETRY_EXACT_MEASURE_H_
 
@@ -46,8 +46,8 @@ MeasuredSign Orientation(const Simplex<D>& simplex);
 template <int D>
 MeasuredSign InSphere(const Simplex<D>& simplex, const Point<D>& q);
 
-// The same for weighted vertices: whether the power of `q`, |q - c|^2 - r^2 - W_q, to the sphere (c, r) that is orthogonal
-// to the corners is negative (kPositive: q has to be joined to them), zero or positive.
+// The same for weighted vertices: whether the power of `q`, |q - c|^2 - r^2 - W_q, to the sphere (c, r) that is
+// orthogonal to the corners is negative (kPositive: q has to be joined to them), zero or positive.
 //
 // Laws:       as InSphere, which it is when all weights are equal.
 // REQUIRES:   finite coordinates and weights.

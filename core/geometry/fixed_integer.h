@@ -14,8 +14,8 @@ namespace wellspace::core {
 __extension__ using Unsigned128 = unsigned __int128;
 __extension__ using Signed128 = __int128;
 
-// a + b + carry; carry is 0 or 1 before and after. The intrinsic is there because g++ 12 makes no chain of adc out of the
-// other half: that costs exact decisions 15 % more time in 3-D, 50 % in 5-D.
+// a + b + carry; carry is 0 or 1 before and after. The intrinsic is there because g++ 12 makes no chain of adc out of
+// the other half: that costs exact decisions 15 % more time in 3-D, 50 % in 5-D.
 inline uint64_t AddWithCarry(uint64_t a, uint64_t b, unsigned char& carry) {
 #if defined(__x86_64__)
   unsigned long long sum = 0;

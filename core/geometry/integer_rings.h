@@ -34,9 +34,9 @@ inline Scaled Decompose(double value) {
 
 // Differences d of coordinates with |d| < 2^b, b = floor((63 - 2 D) / D) = 29, 19, 13, 10, 8 for D = 2, ..., 6.
 //
-// Nothing overflows, on the way neither. A sum of products in a minor of k rows is at most k! 2^(k b), in the coefficient
-// of the site (D + 1)! 2^(D b): below 2^61, 2^62, 2^59, 2^60, 2^61. An offset is at most D 2^(2 b), with weights twice
-// that, below 2^61. The bordered determinant is a sum of D + 1 products of the two, below 2^127.
+// Nothing overflows, on the way neither. A sum of products in a minor of k rows is at most k! 2^(k b), in the
+// coefficient of the site (D + 1)! 2^(D b): below 2^61, 2^62, 2^59, 2^60, 2^61. An offset is at most D 2^(2 b), with
+// weights twice that, below 2^61. The bordered determinant is a sum of D + 1 products of the two, below 2^127.
 template <int D>
 struct WordRing {
   static constexpr Stage kStage = Stage::kWord;
@@ -85,10 +85,10 @@ struct WordRing {
 // All results fit. A minor of k rows is at most k^(k/2) 2^(k b) (Hadamard), and k/2 log2 k <= 0, 1, 3, 4, 6, 8 for k =
 // 1, ..., 6: with its sign k b + 9 bits at most for k = 6, and 64 B k = k b + 2 k are there (k = 2: 2 b + 2 of 2 b + 4;
 // 3: + 4 of 6; 4: + 5 of 8; 5: + 7 of 10; 6: + 9 of 12). An offset is a sum of D squares, with a weight at most twice
-// that, below 2^(2 b + 4), or twice a difference, in 2 B limbs of 2 b + 4 bits. The bordered determinant is a sum of D +
-// 1 products of the two: below 2^((D + 2) b) times 2 D (D + 1) D^(D/2), with its sign (D + 2) b + 6, 9, 11, 13, 16 bits
-// for D = 2, ..., 6, and there are (D + 2) b + 2 (D + 2) = ... + 8, 10, 12, 14, 16. The coefficient of the site is a sum
-// of D + 1 minors of D rows: D b + 4, 6, 8, 10, 12 bits, and exactly so many are there. Sums on the way may wrap:
+// that, below 2^(2 b + 4), or twice a difference, in 2 B limbs of 2 b + 4 bits. The bordered determinant is a sum of D
+// + 1 products of the two: below 2^((D + 2) b) times 2 D (D + 1) D^(D/2), with its sign (D + 2) b + 6, 9, 11, 13, 16
+// bits for D = 2, ..., 6, and there are (D + 2) b + 2 (D + 2) = ... + 8, 10, 12, 14, 16. The coefficient of the site is
+// a sum of D + 1 minors of D rows: D b + 4, 6, 8, 10, 12 bits, and exactly so many are there. Sums on the way may wrap:
 // arithmetic is modulo a power of two.
 template <int B>
 struct FixedRing {

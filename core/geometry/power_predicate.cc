@@ -111,7 +111,8 @@ struct alignas(Pair) Matrix {
   IntegerPair& integer_pair(int row, int i) { return reinterpret_cast<IntegerPair*>(rows[row])[i]; }
 };
 
-// The differences of a decision, each as the sum of two doubles, the rounded one and its error: exact, unless it overflows.
+// The differences of a decision, each as the sum of two doubles, the rounded one and its error: exact, unless it
+// overflows.
 //
 // Source: D. E. Knuth, The Art of Computer Programming 2, section 4.2.2, Theorem B.
 template <int D>
@@ -226,8 +227,9 @@ bool ToRows(const Differences<D>& differences, const std::array<PlaneSource<D>, 
       rows);
 }
 
-// The rows in the unit in which the largest difference has all bits that a word takes; false where some are no integers. But a wall may be at a place
-// that is none: its bit is set in `unfit_walls` then, and its offset means nothing.
+// The rows in the unit in which the largest difference has all bits that a word takes; false where some are no
+// integers. But a wall may be at a place that is none: its bit is set in `unfit_walls` then, and its offset means
+// nothing.
 template <int D>
 bool ToWordRows(const Differences<D>& differences, const std::array<PlaneSource<D>, D>& planes,
                 const DecisionWeights<D>* weights, Rows<WordRing<D>, D>& rows, uint32_t& unfit_walls) {
@@ -235,7 +237,8 @@ bool ToWordRows(const Differences<D>& differences, const std::array<PlaneSource<
   if (unit < -1022 || differences.exponent > 1023) {
     return false;
   }
-  // A double of this size has no bits for fractions: adding it rounds, and leaves the integer in the last bits of the sum.
+  // A double of this size has no bits for fractions: adding it rounds, and leaves the integer in the last bits of the
+  // sum.
   constexpr double kRound = 0x1.8p52;
   const double factor = PowerOfTwo(-unit);
   const double inverse = PowerOfTwo(unit);

@@ -26,8 +26,8 @@ namespace wellspace::core {
 // emptied for the first time.
 //
 // Thread safety: thread-compatible.
-// Invariants: (1) a vertex is pending in one bucket at most; (2) Pop takes from the lowest bucket that is not empty. The
-//             vertices that came after it was put in order are first; then the last block is; of each the last come
+// Invariants: (1) a vertex is pending in one bucket at most; (2) Pop takes from the lowest bucket that is not empty.
+//             The vertices that came after it was put in order are first; then the last block is; of each the last come
 //             first.
 class Schedule {
  public:

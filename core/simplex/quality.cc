@@ -60,18 +60,18 @@ struct EstimateRing {
   }
 };
 
-// The roundings that a product passes through on the way into a minor of `k` rows: k - 1 products, and up to 1, ..., k -
-// 1 sums.
+// The roundings that a product passes through on the way into a minor of `k` rows: k - 1 products, and up to 1, ..., k
+// - 1 sums.
 constexpr int MinorRoundings(int k) { return (k - 1) + k * (k - 1) / 2; }
 
 // N / (2 det), the circumcentre relative to p_0, of edges w and their squared lengths; false where rounding could be
 // more than 1e-10 of its length.
 //
 // N_k is the determinant whose column k is |w_i|^2. Each product carries one rounding of each of its D entries (of a
-// squared length D + 2 in the place of one) and MinorRoundings(D); so N_k and det differ from the exact values by at most K u times their
-// permanents, u = 2^-53, where K = 2 D + 1 + MinorRoundings(D) + 2 has two to spare for second order and for the permanents'
-// own roundings. Underflow is below 2^-900. Hence |N| and det have relative errors of at most 2^-36 if those bounds are
-// that small beside them, and the quotient one of 2^-35 + 3 u < 1e-10.
+// squared length D + 2 in the place of one) and MinorRoundings(D); so N_k and det differ from the exact values by at
+// most K u times their permanents, u = 2^-53, where K = 2 D + 1 + MinorRoundings(D) + 2 has two to spare for second
+// order and for the permanents' own roundings. Underflow is below 2^-900. Hence |N| and det have relative errors of at
+// most 2^-36 if those bounds are that small beside them, and the quotient one of 2^-35 + 3 u < 1e-10.
 template <int D>
 bool CircumcentreByMinors(const std::array<Point<D>, D>& w, const std::array<double, D>& lifted, Point<D>& centre) {
   constexpr double kUnits = (2 * D + 1 + MinorRoundings(D) + 2) * 0x1p-53;
@@ -242,10 +242,10 @@ bool Normalise(Point<D>& vector) {
 // barycentric coordinates, 180 degrees less. Multiplied by the determinant, these are normals n_i of the facets.
 //
 // A component of n_i is a minor of D - 1 rows, wrong by at most K u times its permanent, K = D - 1 + MinorRoundings(D -
-// 1) + 2 <= 21 (D = 6); a permanent of n = D - 1 rows is at most n! / n^(n/2) <= 2.2 times the product of their lengths (Carlen, Lieb and
-// Loss 2006). So the direction of n_i is wrong by at most sqrt(6) * 21 * 2.2 u / s_i < 114 u / s_i, s_i = |n_i| over
-// that product; and an angle by twice that and by the roundings of its sine and cosine, together below 300 u / s < 2e-12 / s
-// degrees, s the least of all s_i.
+// 1) + 2 <= 21 (D = 6); a permanent of n = D - 1 rows is at most n! / n^(n/2) <= 2.2 times the product of their lengths
+// (Carlen, Lieb and Loss 2006). So the direction of n_i is wrong by at most sqrt(6) * 21 * 2.2 u / s_i < 114 u / s_i,
+// s_i = |n_i| over that product; and an angle by twice that and by the roundings of its sine and cosine, together below
+// 300 u / s < 2e-12 / s degrees, s the least of all s_i.
 template <int D>
 AngleRange AnglesBetweenFacets(const Simplex<D>& p) {
   const double scale = ScaleOf<D>(p);

@@ -14,13 +14,13 @@
 namespace wellspace::core {
 namespace {
 
-// A square less than this part of another is clearly smaller: roundings are far below 2^-10 of either, as long as no angle of a triangle
-// is tiny (ratio at most 64, so sines of at least 2^-7).
+// A square less than this part of another is clearly smaller: roundings are far below 2^-10 of either, as long as no
+// angle of a triangle is tiny (ratio at most 64, so sines of at least 2^-7).
 constexpr double kClearly = 1 - 0x1p-10;
 constexpr double kMostRatioSq = 64 * 64;
 constexpr double kLeastAngleDeg = 0x1p-10;
-// A determinant whose square is above this times that of the product of its vectors' lengths is right to 2^-20, and so is a circumradius
-// by Cramer's rule.
+// A determinant whose square is above this times that of the product of its vectors' lengths is right to 2^-20, and so
+// is a circumradius by Cramer's rule.
 constexpr double kRightDet = 0x1p-40;
 
 }  // namespace

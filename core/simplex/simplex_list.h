@@ -12,12 +12,13 @@
 namespace wellspace::core {
 
 // Thread safety: thread-compatible. Reused from block to block.
-// Invariants: (1) max_radius_edge and min_angle_deg are the largest RadiusEdgeRatio and the smallest Angles of the simplices, to
-// the bit, whatever their order; those before Clear() count, too.
+// Invariants: (1) max_radius_edge and min_angle_deg are the largest RadiusEdgeRatio and the smallest Angles of the
+// simplices, to the bit, whatever their order; those before Clear() count, too.
 template <int D>
 class SimplexList {
  public:
-  // Appends a simplex: the lowest index first, the others ascending but for an exchange of the last two that makes it positive.
+  // Appends a simplex: the lowest index first, the others ascending but for an exchange of the last two that makes it
+  // positive.
   //
   // REQUIRES:   `points` not in one hyperplane, `indices` distinct.
   // Complexity: O(1); without the quotients and arc tangents of quality.h for a simplex that is clearly not the worst.

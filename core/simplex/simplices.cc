@@ -26,7 +26,8 @@ namespace {
 
 // Vertices that make a block, or a few more.
 constexpr size_t kVerticesInBlock = 512;
-// The array of all simplices has room for at most so many times those in it: the first blocks need not be like the others.
+// The array of all simplices has room for at most so many times those in it: the first blocks need not be like the
+// others.
 constexpr size_t kMostGrowth = 128;
 
 // Joins the simplices of blocks, which come in any order, in that of the blocks, and sees to the memory that they take.
@@ -77,7 +78,8 @@ class BlockJoin {
     ++joined_count_;
     const size_t size = joined_.size() + indices.size();
     if (size > joined_.capacity()) {
-      // As many as there will be if the blocks to come are like these, and a quarter more: what is not used takes no memory.
+      // As many as there will be if the blocks to come are like these, and a quarter more: what is not used takes no
+      // memory.
       Allow(joined_.size());
       if (is_refused_) {
         return;
@@ -111,8 +113,8 @@ class BlockJoin {
   std::atomic<size_t> next_block_{0};
 };
 
-// The simplices of `block_count` blocks, which threads share out: append(block, scratch, out) appends those of one, with a Scratch of its
-// thread, which takes scratch_bytes(scratch) besides what is in `held_bytes`.
+// The simplices of `block_count` blocks, which threads share out: append(block, scratch, out) appends those of one,
+// with a Scratch of its thread, which takes scratch_bytes(scratch) besides what is in `held_bytes`.
 template <int D, typename Scratch, typename Append, typename Bytes, typename Counters>
 absl::StatusOr<Simplices> JoinBlocks(size_t block_count, uint64_t held_bytes, int threads, RunContext& context,
                                      Append append, Bytes scratch_bytes, Counters counters_of) {
@@ -147,7 +149,8 @@ absl::StatusOr<Simplices> JoinBlocks(size_t block_count, uint64_t held_bytes, in
   return all;
 }
 
-// Calls f(VertexId) for one after the other of a block, and before that prefetch(VertexId, step); stops early when the context is cancelled.
+// Calls f(VertexId) for one after the other of a block, and before that prefetch(VertexId, step); stops early when the
+// context is cancelled.
 template <int D, typename Prefetch, typename F>
 void ForEachVertexOf(const LeafBlocks<D>& blocks, size_t block, const RunContext& context, Prefetch prefetch, F f) {
   std::array<VertexId, kVerticesInBlock + LeafTree<D>::kLeafCapacity> vertices;
@@ -197,8 +200,8 @@ void AppendCell(const QueryStructure<D>& structure, VertexId v, std::span<const 
   }
 }
 
-// The simplices of the cells of all vertices in `block_count` blocks whose other vertices are wanted: for_each_vertex_of(block, f) calls
-// f(VertexId). `more_bytes`: what is held besides the structure and `output_index`.
+// The simplices of the cells of all vertices in `block_count` blocks whose other vertices are wanted:
+// for_each_vertex_of(block, f) calls f(VertexId). `more_bytes`: what is held besides the structure and `output_index`.
 template <int D, typename ForEachVertexOf, typename IsWanted>
 absl::StatusOr<Simplices> JoinCells(const QueryStructure<D>& structure, std::span<const uint32_t> output_index,
                                     size_t block_count, uint64_t more_bytes, int threads, RunContext& context,
@@ -218,8 +221,8 @@ absl::StatusOr<Simplices> JoinCells(const QueryStructure<D>& structure, std::spa
       [](const Workspace<D>& workspace) { return workspace.counters; });
 }
 
-// The simplices at one vertex after the other, of those that are listed there the ones that are in the mesh: the vertex is the last
-// of them to have been looked at, and nobody who came later spoils them.
+// The simplices at one vertex after the other, of those that are listed there the ones that are in the mesh: the vertex
+// is the last of them to have been looked at, and nobody who came later spoils them.
 //
 // Thread safety: thread-compatible.
 template <int D>

@@ -23,12 +23,13 @@ struct Simplices {
   QueryCounters counters;
 };
 
-// Each simplex once, in the order of the vertices along the Z curve of the tree, which threads share out in blocks: those that each
-// vertex lists; or, if `stars` is not complete, the nodes of its whole cell where it has the lowest output index of them.
+// Each simplex once, in the order of the vertices along the Z curve of the tree, which threads share out in blocks:
+// those that each vertex lists; or, if `stars` is not complete, the nodes of its whole cell where it has the lowest
+// output index of them.
 //
 // Shapes:     output_index: vertex_count entries, a permutation: the index in the output of each vertex.
-// REQUIRES:   `structure` refined: no circumcentre outside the box; `stars` those of the refinement that has refined it, which has been told of
-//             all vertices added or moved since.
+// REQUIRES:   `structure` refined: no circumcentre outside the box; `stars` those of the refinement that has refined
+//             it, which has been told of all vertices added or moved since.
 // Guarantees: (1) a Delaunay triangulation of the vertices that decomposes the box; (2) the same order for any number
 //             of threads.
 // Complexity: O(m) for m vertices in a refined structure; no leaf is looked at if `stars` is complete.
@@ -48,8 +49,8 @@ template <int D>
 absl::StatusOr<std::vector<VertexId>> ChangedVertices(const QueryStructure<D>& structure, VertexId first_new,
                                                       const RunContext& context);
 
-// The simplices all of whose vertices are among `vertices`, each emitted by its vertex with the lowest output index, as nodes of that
-// vertex's whole cell; otherwise as ComputeSimplices.
+// The simplices all of whose vertices are among `vertices`, each emitted by its vertex with the lowest output index, as
+// nodes of that vertex's whole cell; otherwise as ComputeSimplices.
 //
 // REQUIRES:   `vertices` ascending.
 // Complexity: O(vertices), and a bit for each vertex of the structure.

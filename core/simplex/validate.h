@@ -49,7 +49,8 @@ struct QualityReport {
   }
 };
 
-// The smallest angle of a regular simplex in degrees, which no simplex exceeds: acos(1 / dimension). 60 in 2-D, 70.53 in 3-D.
+// The smallest angle of a regular simplex in degrees, which no simplex exceeds: acos(1 / dimension). 60 in 2-D, 70.53
+// in 3-D.
 double LargestSmallestAngle(int dimension);
 
 // Measures every simplex.
@@ -90,10 +91,11 @@ absl::Status ValidateRadiusEdge(const MeshView& mesh, double rho);
 // Every vertex v has circumradius <= rho * (its shortest edge) * (1 + 1e-9) for each of its simplices. INVALID_ARGUMENT
 // unless rho is positive and finite.
 //
-// That is R(v) <= rho NN(v), R(v) the distance from v to the farthest node of its Voronoi cell in the box: in a Delaunay
-// triangulation the nearest neighbour is at the end of an edge. When all circumcentres lie in the box, a node of the
-// cell is either one of them, or lies on faces of the box, where the dual of a boundary facet (or of an edge, triangle,
-// ... of several) leaves it: at the circumcentre of that facet, whose circumradius is at most that of the simplex.
+// That is R(v) <= rho NN(v), R(v) the distance from v to the farthest node of its Voronoi cell in the box: in a
+// Delaunay triangulation the nearest neighbour is at the end of an edge. When all circumcentres lie in the box, a node
+// of the cell is either one of them, or lies on faces of the box, where the dual of a boundary facet (or of an edge,
+// triangle, ... of several) leaves it: at the circumcentre of that facet, whose circumradius is at most that of the
+// simplex.
 //
 // REQUIRES:   ValidateDelaunay and ValidateCircumcentres are OK.
 absl::Status ValidateWellSpaced(const MeshView& mesh, double rho);
@@ -101,8 +103,8 @@ absl::Status ValidateWellSpaced(const MeshView& mesh, double rho);
 // for each of `boxes`, H its bound: no circumball that meets the box is larger. Each times 1 + 1e-9. INVALID_ARGUMENT
 // for bounds that are negative or not finite, of a box also 0, and for boxes that are none.
 absl::Status ValidateSizing(const MeshView& mesh, double max_circumradius, std::span<const SizeBox> boxes);
-// No angle between two facets of a simplex (in 2-D, of a triangle) is below min_angle_deg * (1 - 1e-9). INVALID_ARGUMENT
-// unless that is from 0 to LargestSmallestAngle.
+// No angle between two facets of a simplex (in 2-D, of a triangle) is below min_angle_deg * (1 - 1e-9).
+// INVALID_ARGUMENT unless that is from 0 to LargestSmallestAngle.
 absl::Status ValidateAngles(const MeshView& mesh, double min_angle_deg);
 // Every circumcentre lies in the box, up to 1e-9 times its longest side.
 absl::Status ValidateCircumcentres(const MeshView& mesh);
@@ -119,9 +121,9 @@ struct ValidationOptions {
   double min_angle_deg = 0;               // 0: not checked
 };
 
-// All of the above, in the order Indices, Orientation, Topology, Volume, Delaunay, RadiusEdge or WellSpaced, Circumcentres,
-// Sizing, Angles, Cloud. Of a mesh with weights RadiusEdge, WellSpaced, Circumcentres and Sizing are not checked: they are
-// promises about Delaunay simplices.
+// All of the above, in the order Indices, Orientation, Topology, Volume, Delaunay, RadiusEdge or WellSpaced,
+// Circumcentres, Sizing, Angles, Cloud. Of a mesh with weights RadiusEdge, WellSpaced, Circumcentres and Sizing are not
+// checked: they are promises about Delaunay simplices.
 absl::Status ValidateMesh(const MeshView& mesh, const ValidationOptions& options);
 
 }  // namespace wellspace::core

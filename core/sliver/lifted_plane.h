@@ -44,7 +44,8 @@ class LiftedPlane {
     bound_ = BoundOf(largest);
   }
 
-  // That of the simplex with `origin` and its weight, whose cofactors have been computed; `largest`: no coordinate of an edge is larger.
+  // That of the simplex with `origin` and its weight, whose cofactors have been computed; `largest`: no coordinate of
+  // an edge is larger.
   LiftedPlane(const Point<D>& origin, double origin_weight, const std::array<double, D + 1>& cofactors, double largest)
       : origin_(origin),
         cofactors_(cofactors),
@@ -61,7 +62,8 @@ class LiftedPlane {
     return bound;
   }
 
-  // Positive if a vertex at `p` is certainly in conflict with the simplex, negative if it is certainly not, zero in doubt.
+  // Positive if a vertex at `p` is certainly in conflict with the simplex, negative if it is certainly not, zero in
+  // doubt.
   //
   // REQUIRES:   weight at most a quarter of the squared distance to the corners.
   // Complexity: O(D).
@@ -91,10 +93,10 @@ class LiftedPlane {
 
   static constexpr int Factorial(int n) { return n <= 1 ? 1 : n * Factorial(n - 1); }
 
-  // The sign of the determinant is certain beyond this times m^D n^2, m the largest coordinate of an edge from the first
-  // corner, and n that or the largest of q. Weights are at most D m^2 and D n^2, so that the terms of a lifted entry add
-  // up to three times as much; each of the (D + 1)! products passes through at most 7 (D + 1) roundings: D of them
-  // expand the minors' rows by one product and D - 1 sums, D + 4 make a lifted entry, one any other.
+  // The sign of the determinant is certain beyond this times m^D n^2, m the largest coordinate of an edge from the
+  // first corner, and n that or the largest of q. Weights are at most D m^2 and D n^2, so that the terms of a lifted
+  // entry add up to three times as much; each of the (D + 1)! products passes through at most 7 (D + 1) roundings: D of
+  // them expand the minors' rows by one product and D - 1 sums, D + 4 make a lifted entry, one any other.
   static constexpr double kFilterBound = Factorial(D + 1) * 3.0 * D * 7 * (D + 1) * 0x1p-53;
 
   Point<D> origin_{};

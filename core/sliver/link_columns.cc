@@ -91,8 +91,8 @@ WELLSPACE_INLINE std::optional<LinkColumns::Tetrahedron> LinkColumns::WrapWith(u
   }
   const auto apex = static_cast<uint32_t>(nearest_at[best]);
 
-  // Whether all others are surely outside. Edges here have two roundings, and lifts one more than LiftedPlane counts with, but no term of a lift is
-  // more than half as large as there; so its bound holds.
+  // Whether all others are surely outside. Edges here have two roundings, and lifts one more than LiftedPlane counts
+  // with, but no term of a lift is more than half as large as there; so its bound holds.
   const Point<3> edge_apex = edge_to(apex);
   const double lift_apex = at(apex, 3) - origin_lift;
   const Point<3> by_apex_c = Cross(edge_c, edge_apex);

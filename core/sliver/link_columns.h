@@ -18,7 +18,8 @@ namespace wellspace::core {
 // Thread safety: thread-compatible.
 class LinkColumns {
  public:
-  // The tetrahedron of a facet and neighbour `apex`: the function of LiftedPlane, for points relative to the facet's first vertex.
+  // The tetrahedron of a facet and neighbour `apex`: the function of LiftedPlane, for points relative to the facet's
+  // first vertex.
   struct Tetrahedron {
     uint32_t apex = 0;
     std::array<double, 4> cofactors{};
@@ -29,8 +30,8 @@ class LinkColumns {
   // `e`: the neighbour from the vertex, the vertex not being the neighbour.
   void Add(const Point<3>& e, double weight);
 
-  // The neighbour beyond facet (a, b, c), counter-clockwise seen from there, in whose sphere through the facet there is no other one; nothing
-  // if doubles leave that in doubt.
+  // The neighbour beyond facet (a, b, c), counter-clockwise seen from there, in whose sphere through the facet there is
+  // no other one; nothing if doubles leave that in doubt.
   //
   // Complexity: O(neighbours).
   // Errors:     none.

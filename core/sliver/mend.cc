@@ -33,7 +33,8 @@ constexpr int kPasses = 40;
 constexpr int kEarlyPasses = 4;
 constexpr size_t kGrowth = 8;
 constexpr size_t kLeastGrowth = 1000;
-// As many vertices whose stars have changed are told of at once, so that those that change again and again are told of seldom.
+// As many vertices whose stars have changed are told of at once, so that those that change again and again are told of
+// seldom.
 constexpr size_t kMostChanged = 1 << 16;
 // A vertex of more simplices is not moved: taking it out costs their square, and a place good for all hardly exists.
 constexpr size_t kMostStar = 128;
@@ -225,8 +226,8 @@ bool Mender::IsThere(const Sliver& sliver) const {
          CosineOf(sliver.simplex) > flat_cosine_;
 }
 
-// Whether the demands allow for a tetrahedron, of which `moved` is the vertex whose nearest neighbour is that of the last
-// KeepsNearestNeighbours.
+// Whether the demands allow for a tetrahedron, of which `moved` is the vertex whose nearest neighbour is that of the
+// last KeepsNearestNeighbours.
 bool Mender::IsAdmissible(const TetrahedronMeasure& measure, const std::array<VertexId, 4>& vertices,
                           VertexId moved) const {
   const MeshCriteria<3>& demands = demands_.demands;
@@ -267,8 +268,8 @@ bool Mender::KeepsNearestNeighbours(const Point<3>& p, VertexId moved) {
   return true;
 }
 
-// The largest cosine of the tetrahedron that vertex `v` at `p` makes with a facet; kForbidden if it is not below `limit`, or the
-// demands do not allow for it.
+// The largest cosine of the tetrahedron that vertex `v` at `p` makes with a facet; kForbidden if it is not below
+// `limit`, or the demands do not allow for it.
 double Mender::TryFacet(const Cavity::Facet& facet, const Point<3>& p, VertexId v, double limit) const {
   std::array<VertexId, 4> vertices = triangulation_.item(facet.simplex).vertices;
   Simplex<3> corners = triangulation_.Corners(facet.simplex);
@@ -278,8 +279,8 @@ double Mender::TryFacet(const Cavity::Facet& facet, const Point<3>& p, VertexId 
   return measure.cosine < limit && IsAdmissible(measure, vertices, v) ? measure.cosine : kForbidden;
 }
 
-// The largest cosine in the star of vertex `v` at `p`, which is in conflict with `from`; kForbidden if one is not below `limit`, or the
-// demands do not allow for it. Else the cavity has been found.
+// The largest cosine in the star of vertex `v` at `p`, which is in conflict with `from`; kForbidden if one is not below
+// `limit`, or the demands do not allow for it. Else the cavity has been found.
 double Mender::TryAt(SimplexId from, const Point<3>& p, VertexId v, double limit) {
   edge_limit_sq_ = std::numeric_limits<double>::infinity();
   if (FailsAtSuspect(p, v, limit)) {
@@ -308,7 +309,8 @@ double Mender::TryAt(SimplexId from, const Point<3>& p, VertexId v, double limit
   return worst;
 }
 
-// Whether the boundary of the cavity of `p` surely has a facet for which TryAt returns kForbidden: one for which it did lately.
+// Whether the boundary of the cavity of `p` surely has a facet for which TryAt returns kForbidden: one for which it did
+// lately.
 bool Mender::FailsAtSuspect(const Point<3>& p, VertexId v, double limit) {
   for (auto facet = suspects_.begin(); facet != suspects_.end(); ++facet) {
     const SimplexId beyond = triangulation_.item(facet->simplex).neighbours[facet->slot];

@@ -35,7 +35,8 @@ struct MendReport {
   std::vector<LeftSliver> flattest_left;
 };
 
-// Hears of every step, once the triangulation has taken it; of the stars that have changed by then sooner or later, but before Run returns.
+// Hears of every step, once the triangulation has taken it; of the stars that have changed by then sooner or later, but
+// before Run returns.
 class MendObserver {
  public:
   virtual ~MendObserver() = default;
@@ -64,14 +65,15 @@ class Mender {
   Mender(Triangulation<3>& triangulation, std::vector<bool>& is_fixed, const MendDemands& demands,
          MendObserver& observer);
 
-  // Mends what slivers there are, and what new ones that makes. Up to `threads` threads look for the first ones; one mends.
+  // Mends what slivers there are, and what new ones that makes. Up to `threads` threads look for the first ones; one
+  // mends.
   //
   // Guarantees: (1) deterministic, and the same on any number of threads; (2) report().operations is at most
   //             kMostOperations times the slivers found and kFreeSlivers more, and what one sliver takes at most;
   //             (3) the report says of each sliver that is left why.
   // Complexity: O(1) expected for each sliver, and a look at every simplex.
-  // Errors:     RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED, DEADLINE_EXCEEDED; the invariants hold
-  //             all the same.
+  // Errors:     RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED, DEADLINE_EXCEEDED; the invariants
+  //             hold all the same.
   // Source:     moves: Tournois, Srinivasan and Alliez 2009, with sampled in the place of followed gradients.
   absl::Status Run(int threads, RunContext& context);
 

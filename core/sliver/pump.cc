@@ -19,12 +19,14 @@ namespace wellspace::core {
 namespace {
 
 // All vertices are pumped once; then, as others' weights have changed, again, as long as it helps, but not more often
-// than this, those whose star has an angle below this part of a regular simplex's; and as often those with one below that part.
+// than this, those whose star has an angle below this part of a regular simplex's; and as often those with one below
+// that part.
 template <int D>
 constexpr int kRounds = D == 3 ? 12 : 2;
 constexpr double kPoorShare = 0.25;
 constexpr double kPoorestShare = 0.075;
-// Then, in 3-D, so often a group of vertices around each simplex below the second part: one gets these shares of its limit.
+// Then, in 3-D, so often a group of vertices around each simplex below the second part: one gets these shares of its
+// limit.
 constexpr int kGroupRounds = 3;
 constexpr std::array<double, 5> kGroupShares = {0, 0.25, 0.5, 0.75, 0.999};
 // Vertices between two reports of progress.
@@ -86,8 +88,8 @@ class Pump {
  public:
   explicit Pump(Triangulation<D>& triangulation) : triangulation_(triangulation) {}
 
-  // Gives `v` the best weight in [0, limit], if its star has a simplex flatter than `poor`. Returns whether it is another
-  // than before. A corner of the box keeps what it has got once.
+  // Gives `v` the best weight in [0, limit], if its star has a simplex flatter than `poor`. Returns whether it is
+  // another than before. A corner of the box keeps what it has got once.
   bool SetBest(VertexId v, double limit, double poor) {
     const double old = triangulation_.weight(v);
     if (old > 0 && IsCorner(v)) {
@@ -120,8 +122,8 @@ class Pump {
     return found;
   }
 
-  // Has fewer simplices flatter than `poor` around one that is, unless it has gone: a vertex near it gets another weight, and those around the best
-  // then. `limit_of`(VertexId) is the limit of a weight.
+  // Has fewer simplices flatter than `poor` around one that is, unless it has gone: a vertex near it gets another
+  // weight, and those around the best then. `limit_of`(VertexId) is the limit of a weight.
   template <typename LimitOf>
   void SetBestOfGroup(const Vertices& flat, LimitOf limit_of, double poor) {
     triangulation_.Star(flat[0], star_);
@@ -152,8 +154,8 @@ class Pump {
   // Of the box.
   bool IsCorner(VertexId v) const { return std::popcount(triangulation_.faces(v)) == D; }
 
-  // Gives `u` one weight after the other, and those around it and `v` that have a poor star then the best, until it helps. Whether it has; nothing has
-  // changed if not.
+  // Gives `u` one weight after the other, and those around it and `v` that have a poor star then the best, until it
+  // helps. Whether it has; nothing has changed if not.
   template <typename LimitOf>
   bool SetBestAround(VertexId u, VertexId v, LimitOf limit_of, double poor) {
     near_.clear();

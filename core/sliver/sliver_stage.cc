@@ -41,8 +41,8 @@ class Stopwatch {
   const absl::Time start_;
 };
 
-// Appends simplex `s`, lowest output index first, the others ascending but for an exchange of the last two that keeps it
-// positive.
+// Appends simplex `s`, lowest output index first, the others ascending but for an exchange of the last two that keeps
+// it positive.
 template <int D>
 void Emit(const Triangulation<D>& triangulation, SimplexId s, std::span<const uint32_t> output_index,
           HugeVector<uint32_t>& out) {
@@ -56,8 +56,8 @@ void Emit(const Triangulation<D>& triangulation, SimplexId s, std::span<const ui
   out.insert(out.end(), corners.begin(), corners.end());
 }
 
-// Puts simplices, lowest vertex first, into ascending order: that of the numbers of a triangulation, which decide what is mended first, is then
-// one of the simplices alone.
+// Puts simplices, lowest vertex first, into ascending order: that of the numbers of a triangulation, which decide what
+// is mended first, is then one of the simplices alone.
 //
 // Complexity: O(vertices + simplices) and sorting the simplices of each lowest vertex.
 // Errors:     CANCELLED, DEADLINE_EXCEEDED.

@@ -54,8 +54,10 @@ class SliverStage {
   //
   // Shapes:     moved: vertices below its size that move are set in it.
   // REQUIRES:   the structure is refined for demands.demands; is_fixed has an entry for each of its vertices.
-  // Complexity: O(m) the first time; then O(1) for each vertex added since and each sliver, and a look at every simplex.
-  // Errors:     RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED, DEADLINE_EXCEEDED; all stays usable.
+  // Complexity: O(m) the first time; then O(1) for each vertex added since and each sliver, and a look at every
+  //             simplex.
+  // Errors:     RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED, DEADLINE_EXCEEDED; all stays
+  //             usable.
   // Threads:    uses `threads` for the stars that the triangulation is made of.
   // A template, since clang 14 would instantiate it in other dimensions otherwise.
   template <int E = D>

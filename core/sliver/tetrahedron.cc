@@ -32,7 +32,8 @@ WELLSPACE_INLINE TetrahedronMeasure Measure(const Simplex<3>& corners) {
   const Vectors ends = {{b[0], c[0], a[0], 0}, {b[1], c[1], a[1], 0}, {b[2], c[2], a[2], 0}};
   const Vectors edges = {ends.x - origin[0], ends.y - origin[1], ends.z - origin[2]};
   const Vectors others = Shuffle(edges, next);
-  // The areas of the facets that meet in the first corner point inward; that of the fourth is their sum, and points outward.
+  // The areas of the facets that meet in the first corner point inward; that of the fourth is their sum, and points
+  // outward.
   Vectors areas = {edges.y * others.z - edges.z * others.y, edges.z * others.x - edges.x * others.z,
                    edges.x * others.y - edges.y * others.x};
   areas.x[3] = areas.x[0] + areas.x[1] + areas.x[2];

@@ -23,8 +23,8 @@ inline Point<3> Cross(const Point<3>& a, const Point<3>& b) {
 // Measures a tetrahedron in doubles.
 //
 // Shapes:     corners: positively oriented.
-// Guarantees: (1) for one whose angles are above a degree relative errors are below 1e-12; a flat one may have NaN, which
-//             passes for no bound; (2) the same to the bit with every vector unit.
+// Guarantees: (1) for one whose angles are above a degree relative errors are below 1e-12; a flat one may have NaN,
+//             which passes for no bound; (2) the same to the bit with every vector unit.
 // Complexity: O(1), a square root and a division of four doubles at once.
 // Errors:     none.
 TetrahedronMeasure MeasureTetrahedron(const Simplex<3>& corners);

@@ -110,8 +110,8 @@ absl::Status Triangulation<D>::Build(const Box<D>& box, HugeVector<Point<D>> poi
     }
     items_[s].neighbours.fill(kNoSimplex);
   }
-  // Facets by their lowest vertex: those of one vertex are few, and are matched among themselves. The lowest vertex of a simplex is that of all
-  // its facets but the one opposite to it, which has the second.
+  // Facets by their lowest vertex: those of one vertex are few, and are matched among themselves. The lowest vertex of
+  // a simplex is that of all its facets but the one opposite to it, which has the second.
   HugeVector<uint32_t> next(points_.size() + 1, 0);  // by vertex
   for (size_t s = 0; s < count; ++s) {
     if (s % kCheckInterval == 0) {
@@ -361,8 +361,8 @@ void Triangulation<D>::Insert(VertexId v, const Point<D>& p, double weight, cons
       simplex_of_[Index(u)] = fresh;
     }
   }
-  // The neighbour across the facet without vertex j: turn about the ridge of the old facet without j, inside the cavity,
-  // until its boundary.
+  // The neighbour across the facet without vertex j: turn about the ridge of the old facet without j, inside the
+  // cavity, until its boundary.
   for (size_t k = 0; k < created.size(); ++k) {
     const auto [s, slot] = cavity.boundary[k];
     for (int j = 0; j <= D; ++j) {
@@ -455,7 +455,8 @@ uint32_t Triangulation<D>::NumberInLink(VertexId u, VertexId removed) {
   return number;
 }
 
-// The neighbour of the removed vertex, by its number in link_, that is to be joined to a facet of the hole by simplex `fresh`.
+// The neighbour of the removed vertex, by its number in link_, that is to be joined to a facet of the hole by simplex
+// `fresh`.
 template <int D>
 uint32_t Triangulation<D>::Wrap(const Open& open, SimplexId fresh) {
   if constexpr (D == 3) {

@@ -143,7 +143,8 @@ class Triangulation {
   void FindCavity(SimplexId from, const Point<D>& p, Cavity& out) {
     FindCavityUnless(from, p, out, [](const Cavity::Facet&) { return false; });
   }
-  // The same, but ends where `is_refused`(Cavity::Facet) of a facet of the boundary. Returns whether there is no such one.
+  // The same, but ends where `is_refused`(Cavity::Facet) of a facet of the boundary. Returns whether there is no such
+  // one.
   template <typename IsRefused>
   bool FindCavityUnless(SimplexId from, const Point<D>& p, Cavity& out, IsRefused is_refused) {
     StartSearch();
@@ -180,8 +181,8 @@ class Triangulation {
   void Restore();
 
  private:
-  // A facet that waits for a simplex on its inner side: that of `vertices`, by their numbers in link_, with another vertex in `slot`, which is
-  // then positively oriented.
+  // A facet that waits for a simplex on its inner side: that of `vertices`, by their numbers in link_, with another
+  // vertex in `slot`, which is then positively oriented.
   struct Open {
     std::array<uint32_t, D + 1> vertices;
     int slot = 0;
@@ -249,7 +250,8 @@ class Triangulation {
   std::vector<SimplexId> filling_;  // what took its place
 };
 
-// Adds what is in conflict to the simplices that are there and marked, up to the first refused facet. Simplices that are not in conflict but touch `p` are none.
+// Adds what is in conflict to the simplices that are there and marked, up to the first refused facet. Simplices that
+// are not in conflict but touch `p` are none.
 template <int D>
 template <typename IsRefused>
 bool Triangulation<D>::Grow(const Point<D>& p, double weight, FaceMask faces, Cavity& out, IsRefused is_refused) {

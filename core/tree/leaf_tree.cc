@@ -19,8 +19,8 @@ constexpr uint32_t NextAlong(uint32_t number, uint32_t fixed) {
   return (((number | fixed) + 1) & ~fixed) | (number & fixed);
 }
 
-// Tells which points of a cube may be near another: it is cut into columns along its first two axes, of which a bit each says whether a point has been
-// there.
+// Tells which points of a cube may be near another: it is cut into columns along its first two axes, of which a bit
+// each says whether a point has been there.
 //
 // Thread safety: thread-compatible.
 class ColumnsWithPoints {
@@ -337,7 +337,8 @@ void LeafTree<D>::DistributeRange(NodeId parent) {
   }
 }
 
-// The first of the points from `begin` to `end`, or the end, whose coordinate is at least x, as are those of all after it.
+// The first of the points from `begin` to `end`, or the end, whose coordinate is at least x, as are those of all after
+// it.
 template <int D>
 uint32_t LeafTree<D>::FirstFrom(uint32_t begin, uint32_t end, int axis, double x) const {
   const auto is_before = [axis, x](const Point<D>& p) { return p[axis] < x; };
@@ -397,7 +398,8 @@ void LeafTree<D>::AddAround(NodeId node, const Point<D>& p) {
   }
 }
 
-// Tells the leaves that touch `leaf` of its points that are within their reach: of those, only the leaves beyond `sides`.
+// Tells the leaves that touch `leaf` of its points that are within their reach: of those, only the leaves beyond
+// `sides`.
 template <int D>
 void LeafTree<D>::TellAround(NodeId leaf, Sides sides) {
   const double side = SideOf(leaf);
@@ -446,8 +448,8 @@ void LeafTree<D>::ForEachTouching(NodeId leaf, Sides sides, F&& f) const {
   // The axes along which the leaf is looked beyond on the parent's side, and on that of its siblings.
   const uint32_t outward = (low & ~own) | (high & own);
   const uint32_t inward = (low & own) | (high & ~own);
-  // The nodes of the parent's size that touch the leaf, by the axes along which one goes there from the parent. None is larger, since
-  // the parent has been split.
+  // The nodes of the parent's size that touch the leaf, by the axes along which one goes there from the parent. None is
+  // larger, since the parent has been split.
   std::array<NodeId, kChildren> around;
   around[0] = parent;
   for (uint32_t axes = 0; axes < kChildren; axes = NextAlong(axes, kChildren - 1 - outward)) {
@@ -464,7 +466,8 @@ void LeafTree<D>::ForEachTouching(NodeId leaf, Sides sides, F&& f) const {
       f(around[axes]);
       continue;
     }
-    // Those children touch the leaf that face it along `axes`; of the children of one, those that face it along all axes that tell the two apart.
+    // Those children touch the leaf that face it along `axes`; of the children of one, those that face it along all
+    // axes that tell the two apart.
     const uint32_t facing = own ^ axes;
     const uint32_t fixed = kChildren - 1 - (inward & ~axes);
     for (uint32_t child = facing & fixed; child < kChildren; child = NextAlong(child, fixed)) {

@@ -53,8 +53,8 @@ class LeafTree {
   // The vertices of one leaf, side by side.
   using Bucket = typename Buckets::Bucket;
 
-  // Builds the tree over the box of `grid` for `points`, sorted in the grid's Morton order and distinct as cubes of it; vertex i is
-  // points[i].
+  // Builds the tree over the box of `grid` for `points`, sorted in the grid's Morton order and distinct as cubes of it;
+  // vertex i is points[i].
   //
   // Complexity: O(D 2^D L) for L leaves.
   // Errors:     RESOURCE_EXHAUSTED when it would have more than `max_leaves` leaves, or of the context's memory;
@@ -122,7 +122,8 @@ class LeafTree {
   const Point<D>& LowOf(NodeId node) const { return At(node).low; }
   int level(NodeId node) const { return At(node).level; }
   double SideOf(NodeId node) const { return SideOf(At(node)); }
-  // What a point of Build that lies in `leaf` is away from the others, and from the faces of the box that it does not lie on, at least.
+  // What a point of Build that lies in `leaf` is away from the others, and from the faces of the box that it does not
+  // lie on, at least.
   double SeparationIn(NodeId leaf) const {
     return At(leaf).level == max_level_ ? 0 : SideOf(At(leaf)) / (2 * kCoarseness);
   }

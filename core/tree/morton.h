@@ -16,9 +16,9 @@ namespace wellspace::core {
 template <int D>
 using GridPoint = std::array<uint64_t, D>;
 
-// A grid of cubes of side `quantum` over a box: so fine that it tells apart all points that the mesher serves, so coarse
-// that what every cube, and every node of a tree over them, has for a corner in the box is a double. Hence comparing a
-// coordinate with a side of a node is exact.
+// A grid of cubes of side `quantum` over a box: so fine that it tells apart all points that the mesher serves, so
+// coarse that what every cube, and every node of a tree over them, has for a corner in the box is a double. Hence
+// comparing a coordinate with a side of a node is exact.
 //
 // Invariants: (1) the root cube [root_low, root_low + root_side]^D contains the box and root_side = quantum * 2^levels;
 // (2) quantum is 4 to 7 times a quarter of `step`, a power of two; (3) corners in the box are exact doubles, since they
@@ -26,9 +26,10 @@ using GridPoint = std::array<uint64_t, D>;
 template <int D>
 class MortonGrid {
  public:
-  // The grid under a tree over `count` points. In 3-D the root is up to twice as large as the box asks for, so that on some level of the
-  // tree a cube has about kEvenly of them if they are spread evenly: under the smallest root, leaves would hold up to 8 times
-  // fewer vertices for one number of points than for another, and queries would look into more leaves, or at more vertices.
+  // The grid under a tree over `count` points. In 3-D the root is up to twice as large as the box asks for, so that on
+  // some level of the tree a cube has about kEvenly of them if they are spread evenly: under the smallest root, leaves
+  // would hold up to 8 times fewer vertices for one number of points than for another, and queries would look into more
+  // leaves, or at more vertices.
   explicit MortonGrid(const Box<D>& box, size_t count = 0) : box_(box) {
     double magnitude = 0;
     for (int i = 0; i < D; ++i) {
@@ -141,8 +142,9 @@ inline bool MortonLess(const GridPoint<D>& a, const GridPoint<D>& b) {
   return a[axis] < b[axis];
 }
 
-// Where `cube` of a grid of so many `levels` lies on the same curve: the first 64 / D levels, in one number. A cube with a
-// smaller one comes before, one with the same before or after. Of a number only bits from `kFirst` on have to be right.
+// Where `cube` of a grid of so many `levels` lies on the same curve: the first 64 / D levels, in one number. A cube
+// with a smaller one comes before, one with the same before or after. Of a number only bits from `kFirst` on have to be
+// right.
 //
 // Complexity: O(D).
 // Source:     interleaved bits (Morton 1966), eight at a time.

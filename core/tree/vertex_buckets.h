@@ -16,8 +16,8 @@
 
 namespace wellspace::core {
 
-// Buckets of at most `kMost` vertices, by number. A bucket has room for its vertices rounded up to a multiple of kTogether, and of an
-// eighth of kMost or less; when that is full it moves, and what it leaves serves another.
+// Buckets of at most `kMost` vertices, by number. A bucket has room for its vertices rounded up to a multiple of
+// kTogether, and of an eighth of kMost or less; when that is full it moves, and what it leaves serves another.
 //
 // Thread safety: thread-compatible.
 template <int D, int kMost>

@@ -94,8 +94,8 @@ struct ExactNode {
   double reach;
 };
 
-// Gauss and Jordan without fractions (Bareiss 1968): [A b I] becomes [d I, d A^-1 b, d A^-1], d = +-det A; every division
-// is exact. Whether det A != 0.
+// Gauss and Jordan without fractions (Bareiss 1968): [A b I] becomes [d I, d A^-1 b, d A^-1], d = +-det A; every
+// division is exact. Whether det A != 0.
 template <int D>
 bool Meet(const std::array<const ExactPlane<D>*, D>& planes, ExactNode<D>& node) {
   std::array<std::array<Integer, 2 * D + 1>, D> m;
@@ -388,8 +388,8 @@ class Certifier {
     return absl::OkStatus();
   }
 
-  // Whether w . x > |w|^2 / 2 for the exact w and x. In doubles x has relative errors of 8 units a coordinate, w of one;
-  // products and sums add D each: below 2^-48 (|w| |x| + |w|^2) for D <= 6. Underflow adds less than 2^-1000.
+  // Whether w . x > |w|^2 / 2 for the exact w and x. In doubles x has relative errors of 8 units a coordinate, w of
+  // one; products and sums add D each: below 2^-48 (|w| |x| + |w|^2) for D <= 6. Underflow adds less than 2^-1000.
   bool IsInBall(const ExactNode<D>& node, const Point<D>& position, const Point<D>& w, double length_sq) const {
     const double excess = Dot<D>(w, node.x) - 0.5 * length_sq;
     const double error = 0x1p-48 * (std::sqrt(length_sq) * node.reach + length_sq) + 0x1p-1000;

@@ -61,7 +61,8 @@ class CubeFrom {
     return sum;
   }
 
-  // The facets that a straight line from the site may leave the cube by within a distance, by its square: a bit for each.
+  // The facets that a straight line from the site may leave the cube by within a distance, by its square: a bit for
+  // each.
   WELLSPACE_INLINE uint32_t FacetsWithin(double limit_sq) const {
     limit_sq *= 1 + 0x1p-40;  // beyond a facet distances are rounded otherwise
     const double distance_sq = DistanceSq();

@@ -15,8 +15,8 @@
 
 namespace wellspace::core {
 
-// They are numbered in the order in which they come. Those that come one after the other tend to be near each other: a box around every few tells which
-// may matter.
+// They are numbered in the order in which they come. Those that come one after the other tend to be near each other: a
+// box around every few tells which may matter.
 //
 // Thread safety: thread-compatible.
 template <int D>
@@ -51,8 +51,9 @@ class ExtraVertices {
     return VertexId{Index(first_) + static_cast<uint32_t>(positions_.size() - 1)};
   }
 
-  // Calls f(std::span<const Point<D>>, VertexId) for runs of vertices and the first of each, in order: with all that are no farther from `p`, by the
-  // square. No run is longer than what a leaf holds, and all may be read as vertices of one may (Buckets::kReadTogether).
+  // Calls f(std::span<const Point<D>>, VertexId) for runs of vertices and the first of each, in order: with all that
+  // are no farther from `p`, by the square. No run is longer than what a leaf holds, and all may be read as vertices of
+  // one may (Buckets::kReadTogether).
   //
   // Complexity: O(size / kTogether), and the runs.
   template <typename F>

@@ -16,10 +16,11 @@
 
 namespace wellspace::core {
 
-// A leaf waits in a class with those whose distances round to the same power of two: first come, first served there. As many
-// leaves are opened then as in the order of the distances themselves, and none has to be looked for.
+// A leaf waits in a class with those whose distances round to the same power of two: first come, first served there. As
+// many leaves are opened then as in the order of the distances themselves, and none has to be looked for.
 //
-// Thread safety: thread-compatible. For one scan; made where it is used, so that what it counts with stays in registers.
+// Thread safety: thread-compatible. For one scan; made where it is used, so that what it counts with stays in
+//                registers.
 class LeafQueue {
  public:
   struct Entry {
@@ -27,7 +28,8 @@ class LeafQueue {
     NodeId leaf;
     uint32_t next;  // of the class, among entries_
   };
-  // One entry for each class, before its first, and all leaves of a scan. Reused from scan to scan: no allocation once warm.
+  // One entry for each class, before its first, and all leaves of a scan. Reused from scan to scan: no allocation once
+  // warm.
   using Memory = std::vector<Entry>;
 
   // For a scan from a leaf of side `scale`: what is far nearer or far farther than that is in one class.

@@ -402,7 +402,8 @@ void QueryStructure<D>::Clip(VertexId v, const Box<D>& clip, TieRule rule, Works
   workspace.cell.Reset(point(v), bounds, kinds, rule);
 }
 
-// Gathers the vertices around the first of `sites`, in 2-D and 3-D: above, the walk is a small part of a cell. Returns how many sites these are.
+// Gathers the vertices around the first of `sites`, in 2-D and 3-D: above, the walk is a small part of a cell. Returns
+// how many sites these are.
 template <int D>
 size_t QueryStructure<D>::GatherAround(std::span<const VertexId> sites, Workspace<D>& workspace) const {
   if constexpr (D <= 3) {
@@ -480,7 +481,8 @@ void QueryStructure<D>::ScanFor(NodeId own, Workspace<D>& workspace, Cut cut) co
       [&](NodeId leaf) { return cell.Reaches(tree_.BoxOf(leaf)); }, cut);
 }
 
-// Cuts workspace.cell, that of `v`, by the vertices in the leaves from that of v outward, and by others once by those in that one.
+// Cuts workspace.cell, that of `v`, by the vertices in the leaves from that of v outward, and by others once by those
+// in that one.
 template <int D>
 void QueryStructure<D>::Scan(VertexId v, Workspace<D>& workspace, const ExtraVertices<D>& others) const {
   const NodeId own = LeafOf(v);

@@ -54,8 +54,8 @@ struct Neighbor {
   double distance_sq = 0;
 };
 
-// Thread safety: thread-compatible; queries with different workspaces may run at once, and AddWaiting beside them; AddVertex
-// and the rest alone.
+// Thread safety: thread-compatible; queries with different workspaces may run at once, and AddWaiting beside them;
+// AddVertex and the rest alone.
 // Invariants: (1) vertices are distinct and lie in the box; (2) faces(v) are exactly the faces of the box that v lies
 // on.
 template <int D>
@@ -67,7 +67,8 @@ class QueryStructure {
   //
   // REQUIRES:   points distinct as cubes of the grid, sorted in its Morton order, in its box.
   // Complexity: O(L) for L leaves; O(n log n) has been paid for sorting.
-  // Errors:     RESOURCE_EXHAUSTED when more than `max_leaves` leaves would be needed, or of the context's memory; CANCELLED, DEADLINE_EXCEEDED.
+  // Errors:     RESOURCE_EXHAUSTED when more than `max_leaves` leaves would be needed, or of the context's memory;
+  //             CANCELLED, DEADLINE_EXCEEDED.
   // Threads:    as LeafTree::Build.
   // Source:     [HT08] Figure 3, INITIALIZE.
   absl::Status Initialize(const MortonGrid<D>& grid, HugeVector<Point<D>> points, uint64_t max_leaves, int threads,
@@ -82,7 +83,8 @@ class QueryStructure {
   // Source:     [HT08] Figure 3, APPROXIMATENN.
   Neighbor ApproximateNearestNeighbor(VertexId v, Workspace<D>& workspace) const;
 
-  // The same among the vertices whose squared distance is less than `limit_sq`; kNoVertex and the limit if there is none.
+  // The same among the vertices whose squared distance is less than `limit_sq`; kNoVertex and the limit if there is
+  // none.
   //
   // Complexity: that of looking into the leaves within the limit.
   // Errors:     none.
@@ -95,8 +97,8 @@ class QueryStructure {
   // Errors:     none.
   void NearestOfEach(NodeId leaf, Workspace<D>& workspace, std::span<double> nearest_sq) const;
 
-  // What `v` is away from every other vertex, and from the faces of the box that it does not lie on, at least, as far as the tree tells: 0
-  // unless v was given to Initialize.
+  // What `v` is away from every other vertex, and from the faces of the box that it does not lie on, at least, as far
+  // as the tree tells: 0 unless v was given to Initialize.
   //
   // REQUIRES:   no vertex has been added since.
   // Complexity: O(1).
@@ -127,11 +129,12 @@ class QueryStructure {
   //             meets crosses only facets of leaves that it meets.
   void ClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace, TieRule rule = TieRule::kKeep) const;
 
-  // The same for one of `sites` after the other, each clipped at `beta` times the distance to its nearest neighbour; by the box alone if that is
-  // infinite. Calls take(v, radius) with the cell in workspace.cell, as long as it returns true.
+  // The same for one of `sites` after the other, each clipped at `beta` times the distance to its nearest neighbour; by
+  // the box alone if that is infinite. Calls take(v, radius) with the cell in workspace.cell, as long as it returns
+  // true.
   //
-  // In 2-D and 3-D cells take less time than one by one where sites that follow each other are near each other, as in the order of the Z curve or of
-  // leaves: what is around some of them is gathered once (GatheredVertices).
+  // In 2-D and 3-D cells take less time than one by one where sites that follow each other are near each other, as in
+  // the order of the Z curve or of leaves: what is around some of them is gathered once (GatheredVertices).
   //
   // Guarantees: (1) the cells are those of ClippedVoronoi, but for the numbers of their nodes and planes.
   // REQUIRES:   beta > 0; no site waits; there is another vertex. take() does not change the structure.
@@ -151,8 +154,8 @@ class QueryStructure {
     }
   }
 
-  // The same clipped by a box, which holds v up to rounding, ties perturbed, for whoever may not need the nodes: they are still to be placed, by
-  // cell.Place(). The cell is cut by `others`, too.
+  // The same clipped by a box, which holds v up to rounding, ties perturbed, for whoever may not need the nodes: they
+  // are still to be placed, by cell.Place(). The cell is cut by `others`, too.
   void UnplacedClippedVoronoi(VertexId v, const Box<D>& clip, Workspace<D>& workspace,
                               const ExtraVertices<D>& others = {}) const;
 
@@ -187,8 +190,8 @@ class QueryStructure {
   // Source:     [HT08] Figure 3, ADDVERTEX.
   VertexId AddVertex(VertexId near, const Point<D>& p);
 
-  // The same, but the vertex waits: queries find it only once it has been admitted, be it queries of others that wait, and
-  // meanwhile queries of vertices that do not wait may run.
+  // The same, but the vertex waits: queries find it only once it has been admitted, be it queries of others that wait,
+  // and meanwhile queries of vertices that do not wait may run.
   //
   // REQUIRES:   fewer than kMostWaiting wait.
   // Complexity: O(1).

@@ -45,8 +45,8 @@ double LeastPower(double c, double low, double high) {
   return p * (p - 2 * c);
 }
 
-// The mean of Clamp(t, low, high) over t in [x, y]. As phi' = -2 Clamp, the chord of phi over [x, y] has -2 times it for
-// slope.
+// The mean of Clamp(t, low, high) over t in [x, y]. As phi' = -2 Clamp, the chord of phi over [x, y] has -2 times it
+// for slope.
 double MeanClamp(double x, double y, double low, double high) {
   if (!(y > x)) {
     return Clamp(x, low, high);
@@ -58,8 +58,8 @@ double MeanClamp(double x, double y, double low, double high) {
   return (below * low + (last - first) * (0.5 * (first + last)) + above * high) / (below + (last - first) + above);
 }
 
-// The part of `normal` outside the span of the active ones, and its coordinates in them: normal = sum_i along[i] active_i
-// + outside. Gram and Schmidt twice is as good as reflections.
+// The part of `normal` outside the span of the active ones, and its coordinates in them: normal = sum_i along[i]
+// active_i + outside. Gram and Schmidt twice is as good as reflections.
 template <int D>
 struct Split {
   std::array<double, D> along{};
@@ -246,8 +246,8 @@ double EmptyBallProgram<D>::DiameterTo(const Point<D>& p) const {
   return length_sq == 0 ? 0 : 2 * Solve(centres_, Normalised(p, 0.5 * length_sq)).radius;
 }
 
-// The program with the chords over `centres` in the place of the phi_i: sum_i phi_i(x_i) - 2 m_i (c_i - x_i) <= 0 with m_i
-// the mean of Clamp.
+// The program with the chords over `centres` in the place of the phi_i: sum_i phi_i(x_i) - 2 m_i (c_i - x_i) <= 0 with
+// m_i the mean of Clamp.
 template <int D>
 typename EmptyBallProgram<D>::Optimum EmptyBallProgram<D>::Relax(const Box<D>& centres, const Box<D>& q) const {
   Point<D> mean;

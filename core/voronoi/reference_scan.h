@@ -14,8 +14,8 @@
 
 namespace wellspace::core {
 
-// The distance d_v^U of [HT08] §6: the diameter of the smallest ball through the site v and a point p that holds none of
-// the vertices U in its interior. With the site at the origin,
+// The distance d_v^U of [HT08] §6: the diameter of the smallest ball through the site v and a point p that holds none
+// of the vertices U in its interior. With the site at the origin,
 //
 //   minimise |c|  over c in the box of centres with  c . u <= |u|^2 / 2 for all u in U,  c . p >= |p|^2 / 2.
 //
@@ -54,9 +54,9 @@ class EmptyBallProgram {
 
   // The diameter of the smallest ball that some point of `q` lies in; infinite if there is none.
   //
-  // Guarantees: (1) as above; (2) no smaller than 1 - 2^-16 times the exact value, or the smallest diameter of balls that
-  //             miss q by |x - p|^2 - |x|^2 <= 2^-24 |p| (|p| + 2 |x|), x their centre and p the point of q nearest to
-  //             it; where 4000 pieces do not suffice, which happens in 5 and 6 dimensions, what they prove.
+  // Guarantees: (1) as above; (2) no smaller than 1 - 2^-16 times the exact value, or the smallest diameter of balls
+  //             that miss q by |x - p|^2 - |x|^2 <= 2^-24 |p| (|p| + 2 |x|), x their centre and p the point of q
+  //             nearest to it; where 4000 pieces do not suffice, which happens in 5 and 6 dimensions, what they prove.
   // Complexity: two programs of the kind above a piece; a few pieces up to D = 3, up to thousands in 6 dimensions.
   // Errors:     none.
   // Source:     [HT08] §6, where this is "a quadratic program rather than a convex one". What is asked of c, sum_i
@@ -111,8 +111,8 @@ struct ReferenceScan {
 };
 
 // The Voronoi cell of `v` in the box, clipped by the cube of half side `radius` about v, like
-// QueryStructure::ClippedVoronoi, by the paper's scan: leaves and vertices wait in one queue and are taken in the order of
-// d_v^U, U the vertices taken so far.
+// QueryStructure::ClippedVoronoi, by the paper's scan: leaves and vertices wait in one queue and are taken in the order
+// of d_v^U, U the vertices taken so far.
 //
 // The paper clips by the ball of radius t about v and knows no box. Here the centres of balls are confined to the box
 // and the cube, so that d_v^U is finite for just the balls about points x of the clipped cell; the scan ends when no
@@ -124,11 +124,12 @@ struct ReferenceScan {
 // Guarantees: (1) the cell is that of ClippedVoronoi, up to the order of planes and nodes; (2) a leaf is opened only if
 //             a ball about a point of the cell through v, empty of all vertices, reaches it ([HT08] Lemma 5), up to the
 //             tolerance of EmptyBallProgram; (3) diameters of visits ascend, up to the same.
-// Complexity: O(k log k) queue operations for k leaves and vertices met, a program or more each; measured, 30 to 130 times
-//             the time of ClippedVoronoi for D = 2 and 3. For tests.
+// Complexity: O(k log k) queue operations for k leaves and vertices met, a program or more each; measured, 30 to 130
+//             times the time of ClippedVoronoi for D = 2 and 3. For tests.
 // Errors:     none.
 // Source:     [HT08] Figure 6. A distance that waits was computed with an earlier U, so it can only have grown; it is
-//             brought up to date when it comes first. Squares are neighbours through facets alone, as in ClippedVoronoi.
+//             brought up to date when it comes first. Squares are neighbours through facets alone, as in
+//             ClippedVoronoi.
 template <int D>
 ReferenceScan<D> ReferenceClippedVoronoi(const QueryStructure<D>& structure, VertexId v, double radius);
 

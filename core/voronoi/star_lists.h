@@ -24,20 +24,22 @@ namespace wellspace::core {
 // A vertex, and one that was added after it was last looked at.
 using LatePair = std::pair<VertexId, VertexId>;
 
-// For each vertex, of the star that it had when it was last looked at, the simplices whose vertices had all been looked at before. As
-// vertices are only added, what is a simplex in the end has been one since the last of its vertices came: so the vertex that
-// was looked at last lists it. What it lists beside is spoiled by a vertex that came later, which is a neighbour in the end, and so has been one
-// since it came: that is put down when it is looked at. What is listed depends on the stars and on
-// the order in which they were looked at, and, but for the order within a list, not on how they were computed.
+// For each vertex, of the star that it had when it was last looked at, the simplices whose vertices had all been looked
+// at before. As vertices are only added, what is a simplex in the end has been one since the last of its vertices came:
+// so the vertex that was looked at last lists it. What it lists beside is spoiled by a vertex that came later, which is
+// a neighbour in the end, and so has been one since it came: that is put down when it is looked at. What is listed
+// depends on the stars and on the order in which they were looked at, and, but for the order within a list, not on how
+// they were computed.
 //
 // Thread safety: thread-compatible; const functions may run at once.
 template <int D>
 class StarLists {
  public:
-  // Lists the simplices of `star` whose vertices have been looked at, in the place of what is listed for `v`; nothing unless this
-  // IsComplete(). `vertex_count`: of all vertices that there are now.
+  // Lists the simplices of `star` whose vertices have been looked at, in the place of what is listed for `v`; nothing
+  // unless this IsComplete(). `vertex_count`: of all vertices that there are now.
   //
-  // REQUIRES:   all simplices of v are in star; v and its neighbours are below vertex_count; vertices are numbered as they are added.
+  // REQUIRES:   all simplices of v are in star; v and its neighbours are below vertex_count; vertices are numbered as
+  //             they are added.
   // Complexity: O(star), amortised.
   // Errors:     none; more than 2^32 simplices cannot be numbered, and are as GiveUp().
   void Set(VertexId v, std::span<const std::array<VertexId, D>> star, uint32_t vertex_count);
@@ -85,7 +87,8 @@ class StarLists {
   // REQUIRES:   v has been looked at.
   bool CameAfter(VertexId u, VertexId v) const { return AddedAt(u) > entries_[Index(v)].begin; }
 
-  // All pairs of a vertex that lists something and a neighbour that came after its last look, when that was looked at; and others, some of them twice.
+  // All pairs of a vertex that lists something and a neighbour that came after its last look, when that was looked at;
+  // and others, some of them twice.
   std::span<const LatePair> late() const { return late_; }
 
   uint64_t MemoryBytes() const {
@@ -117,15 +120,16 @@ class StarLists {
   HugeVector<std::array<VertexId, D>> listed_;
   size_t unused_ = 0;         // of listed_
   uint32_t first_count_ = 0;  // vertices at the first look
-  // First 0, for vertices below first_count_; then of each vertex from there on the size of listed_ at the next look after it was added: lists that were made before
-  // begin below, unless they are empty.
+  // First 0, for vertices below first_count_; then of each vertex from there on the size of listed_ at the next look
+  // after it was added: lists that were made before begin below, unless they are empty.
   HugeVector<uint32_t> added_;
   HugeVector<LatePair> late_;         // in the order of the looks, but for those before the last DropUnused
   std::vector<VertexId> neighbours_;  // scratch of Set
   bool is_complete_ = true;
 };
 
-// The neighbours of a vertex that came after it was last looked at: what it lists may be spoiled by these, and by nobody else.
+// The neighbours of a vertex that came after it was last looked at: what it lists may be spoiled by these, and by
+// nobody else.
 //
 // Thread safety: thread-compatible; const functions may run at once.
 class LateNeighbours {

@@ -18,8 +18,8 @@ inline constexpr uint64_t kMessageBytes = 2 * kMaxRequestBytes;
 // Most bytes of a serialized response message with a chunk.
 inline constexpr int kMaxResponseBytes = 1024 * 1024;
 
-// Most bytes of any response: what clients of gRPC take by default. Only a Voronoi cell that is larger than kMaxResponseBytes by itself
-// comes near it.
+// Most bytes of any response: what clients of gRPC take by default. Only a Voronoi cell that is larger than
+// kMaxResponseBytes by itself comes near it.
 inline constexpr int kMaxSentBytes = 4 * 1024 * 1024;
 
 // What the process takes without any work, and room for the allocator: no part of the budget of memory.

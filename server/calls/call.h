@@ -20,10 +20,11 @@ namespace wellspace::server {
 
 // The reactor of one call. `Reactor` is gRPC's, for the kind of call.
 //
-// Lifetime: held by itself until OnDone, and by whatever else may still call it: its job and tasks of the background thread.
+// Lifetime: held by itself until OnDone, and by whatever else may still call it: its job and tasks of the background
+// thread.
 // Thread safety: thread-safe: reactions, workers, the background thread and Abort may come at the same time.
-// Invariants: (1) Finish is called once, not while IsWriting(); (2) once ending() is true, no read, write, job or task is started any
-// more; (3) the lock order is this call's mutex, then those of what it uses.
+// Invariants: (1) Finish is called once, not while IsWriting(); (2) once ending() is true, no read, write, job or task
+// is started any more; (3) the lock order is this call's mutex, then those of what it uses.
 template <typename Reactor>
 class Call : public Reactor, public std::enable_shared_from_this<Call<Reactor>> {
  public:
@@ -81,8 +82,8 @@ class Call : public Reactor, public std::enable_shared_from_this<Call<Reactor>> 
   std::mutex mutex_;
 
  private:
-  // A client whose deadline passes cancels its call a moment before the same deadline, counted from the arrival of the request, passes
-  // here. Only the log tells the two apart.
+  // A client whose deadline passes cancels its call a moment before the same deadline, counted from the arrival of the
+  // request, passes here. Only the log tells the two apart.
   static constexpr absl::Duration kDeadlineSlack = absl::Milliseconds(100);
 
   const CallEnvironment& environment_;

@@ -19,8 +19,9 @@
 
 namespace wellspace::server {
 
-// Has calls that carry the same request_id done once. An answer is kept for kKeptFor; of a tenant with more than kMaxPerTenant of
-// them, or more than kMaxBytesPerTenant in them, the oldest go earlier. Errors are not kept: what failed may be tried again.
+// Has calls that carry the same request_id done once. An answer is kept for kKeptFor; of a tenant with more than
+// kMaxPerTenant of them, or more than kMaxBytesPerTenant in them, the oldest go earlier. Errors are not kept: what
+// failed may be tried again.
 //
 // Thread safety: thread-safe. Functions that it is given run without any lock held.
 class RequestIds {
@@ -39,8 +40,9 @@ class RequestIds {
 
   explicit RequestIds(std::function<absl::Duration()> since_boot) : since_boot_(std::move(since_boot)) {}
 
-  // Has `done` called with the answer to `request`, once. The first time it has `work` call it, now or later, in any way exactly once;
-  // a call that repeats another gets that one's answer as soon as it is there. An empty id is none: always the first time.
+  // Has `done` called with the answer to `request`, once. The first time it has `work` call it, now or later, in any
+  // way exactly once; a call that repeats another gets that one's answer as soon as it is there. An empty id is none:
+  // always the first time.
   //
   // Errors, as answers: INVALID_REQUEST (the id is too long), REQUEST_ID_REUSED.
   void Once(const std::string& tenant, const std::string& request_id, const google::protobuf::Message& request,

@@ -13,8 +13,8 @@
 namespace wellspace::server {
 
 // Makes of `Base`, a Call whose reactor reads bytes, one that is handed the requests. A client that takes longer than
-// options.upload_stall_limit over one of them is dropped with DEADLINE_EXCEEDED: the memory that is set aside for what it may send is
-// wanted by others.
+// options.upload_stall_limit over one of them is dropped with DEADLINE_EXCEEDED: the memory that is set aside for what
+// it may send is wanted by others.
 //
 // Thread safety: thread-safe, as Call.
 // Invariants: those of Call, and one read is in flight at most.

@@ -15,9 +15,9 @@
 
 namespace wellspace::server {
 
-// Makes of `Base`, a Call whose reactor writes `Response`s, one that sends what NextResponse gives: each when the one before is on its
-// way. Nothing is made for a client that does not read; one that takes longer than options.stall_limit over one response is dropped
-// with DEADLINE_EXCEEDED.
+// Makes of `Base`, a Call whose reactor writes `Response`s, one that sends what NextResponse gives: each when the one
+// before is on its way. Nothing is made for a client that does not read; one that takes longer than options.stall_limit
+// over one response is dropped with DEADLINE_EXCEEDED.
 //
 // Thread safety: thread-safe, as Call.
 // Invariants: those of Call, and one write is in flight at most.

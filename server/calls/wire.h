@@ -8,8 +8,8 @@
 
 namespace wellspace::server {
 
-// Reads `message` from `bytes`, which is left empty. gRPC, were it to do this for a stream, would take bytes that are no message for the
-// end of the stream.
+// Reads `message` from `bytes`, which is left empty. gRPC, were it to do this for a stream, would take bytes that are
+// no message for the end of the stream.
 //
 // Errors:     MALFORMED_REQUEST.
 grpc::Status ParseRequest(grpc::ByteBuffer* bytes, google::protobuf::Message* message);

@@ -37,8 +37,8 @@ struct JobRequest {
   std::function<void(Job&)> work{};
 };
 
-// A piece of work for a JobPool, and the context by which it is watched and cancelled. The context's memory is lent by the job: a run
-// that reserves memory which is not there gives its worker to another job and waits in line for it.
+// A piece of work for a JobPool, and the context by which it is watched and cancelled. The context's memory is lent by
+// the job: a run that reserves memory which is not there gives its worker to another job and waits in line for it.
 //
 // Thread safety: thread-safe.
 class Job final : private core::MemoryLender, public std::enable_shared_from_this<Job> {
@@ -74,8 +74,9 @@ class Job final : private core::MemoryLender, public std::enable_shared_from_thi
 
   Job(JobPool& pool, JobRequest request);
 
-  // As MemoryLender has them. Errors: CANCELLED; those of MemoryBudget::Reserve, when the bytes are more than all of the budget, more
-  // than sessions leave of it, or, for Allow, more than can be had now; and when all jobs wait for what others of them have.
+  // As MemoryLender has them. Errors: CANCELLED; those of MemoryBudget::Reserve, when the bytes are more than all of
+  // the budget, more than sessions leave of it, or, for Allow, more than can be had now; and when all jobs wait for
+  // what others of them have.
   absl::Status Reserve(uint64_t bytes) override;
   absl::Status Allow(uint64_t bytes) override;
 
@@ -119,19 +120,19 @@ class Job final : private core::MemoryLender, public std::enable_shared_from_thi
 // a place of its own in the line, whatever else is in it, and asks for memory without waiting for those that were
 // passed.
 //
-// The line is fair: tenants take turns, and within a tenant who came first is first. A job that waits for memory keeps its place; those
-// of its tenant stay behind it, those of others may pass, but only kMostPassing times.
+// The line is fair: tenants take turns, and within a tenant who came first is first. A job that waits for memory keeps
+// its place; those of its tenant stay behind it, those of others may pass, but only kMostPassing times.
 //
-// What a run reserves first is its tree, what it then asks for is expected to be all that it needs. No tree is begun with what those that
-// wait with theirs need; and one whose rest fits goes on, first of its tenant or not. When all wait for the trees of one another all the
-// same, the youngest is refused.
+// What a run reserves first is its tree, what it then asks for is expected to be all that it needs. No tree is begun
+// with what those that wait with theirs need; and one whose rest fits goes on, first of its tenant or not. When all
+// wait for the trees of one another all the same, the youngest is refused.
 //
 // Thread safety: thread-safe. Work runs without any lock of the pool held.
 // Invariants: (1) at most `workers` jobs run and at most `max_queued` more are in line; with small workers as many run
 // besides, and as many small jobs are taken besides; of either kind `max_per_tenant` of one tenant; (2) the work of a
-// job runs at most once, and never after Cancel found it in line; (3) the work and all that it holds is freed when it returns or is
-// cancelled, not when its Job is; (4) there are at most as many threads as workers of both kinds and one for
-// each job that waits for memory, which are at most `workers` of a tenant.
+// job runs at most once, and never after Cancel found it in line; (3) the work and all that it holds is freed when it
+// returns or is cancelled, not when its Job is; (4) there are at most as many threads as workers of both kinds and one
+// for each job that waits for memory, which are at most `workers` of a tenant.
 class JobPool {
  public:
   static constexpr int kMostPassing = 16;
@@ -223,15 +224,15 @@ class JobPool {
   void Resume(Job& job);
   // Sets aside what `job` wants; says whether there was room.
   bool TakeWanted(Job& job, uint64_t room_for_tree);
-  // Most that a tree may take, for good, so that those that wait with theirs can go on one after the other. No bound if they could not
-  // even when all that run had ended. O(b log b) for b jobs that have begun.
+  // Most that a tree may take, for good, so that those that wait with theirs can go on one after the other. No bound if
+  // they could not even when all that run had ended. O(b log b) for b jobs that have begun.
   uint64_t RoomForTree() const;
   // A job was given a worker: those that wait for memory have been passed.
   void CountPassing();
   // The job that has been passed often enough, the oldest of them; null for none.
   std::shared_ptr<Job> Claimant() const;
-  // If all memory that work could free is that of jobs in line, the youngest of them that waits with memory, or the youngest if none does;
-  // null otherwise.
+  // If all memory that work could free is that of jobs in line, the youngest of them that waits with memory, or the
+  // youngest if none does; null otherwise.
   std::shared_ptr<Job> VictimOfDeadlock() const;
   void Enter(const std::shared_ptr<Job>& job);
   void Leave(const Job& job);

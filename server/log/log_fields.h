@@ -16,9 +16,9 @@ std::string CutText(std::string_view text, size_t most);
 // `text` as a JSON string, with its quotes. Bytes that are no UTF-8 become U+FFFD.
 std::string JsonString(std::string_view text);
 
-// A line `key=value key=value …`. A value that is empty, has blanks, quotes, control characters or bytes above ASCII, or that would pass
-// for a number, stands as a JSON string; so no value can end the line or forge a field. Of a value of more than
-// kMaxValueBytes the rest is lost, and it ends with "…": what a stranger sends may be long.
+// A line `key=value key=value …`. A value that is empty, has blanks, quotes, control characters or bytes above ASCII,
+// or that would pass for a number, stands as a JSON string; so no value can end the line or forge a field. Of a value
+// of more than kMaxValueBytes the rest is lost, and it ends with "…": what a stranger sends may be long.
 //
 // Thread safety: thread-compatible.
 class LogFields {
@@ -42,7 +42,8 @@ class LogFields {
   std::string text_;
 };
 
-// The members of a JSON object, without its braces, that say the same as `line`; nothing if `line` is not as LogFields writes it.
+// The members of a JSON object, without its braces, that say the same as `line`; nothing if `line` is not as LogFields
+// writes it.
 std::optional<std::string> ToJsonMembers(std::string_view line);
 
 }  // namespace wellspace::server

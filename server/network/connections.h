@@ -32,8 +32,8 @@ struct ConnectionLimits {
 //
 // A call is wasted if it ends within a second, and its client has cancelled it or has not sent any message. A
 // connection is shut
-//   - when it has more than one and a half times `max_streams` calls, and kSlack, that have begun and not ended; half of
-//     it for each connection of its host that was shut lately, and never fewer than kSlack;
+//   - when it has more than one and a half times `max_streams` calls, and kSlack, that have begun and not ended; half
+//     of it for each connection of its host that was shut lately, and never fewer than kSlack;
 //   - when all have more than `max_calls`, and it has the most;
 //   - when it has wasted more calls within a second than its host may: `max_streams` or kLeastWaste, whichever is more;
 //     half of it for each connection of the host that was shut lately, and never fewer than kLeastWasteOfABadHost;

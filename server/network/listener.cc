@@ -26,8 +26,8 @@ namespace {
 // Before another attempt at what failed for want of descriptors or memory.
 constexpr int kPauseMs = 100;
 
-// While calls of connections that were shut are worked off, how often it is looked whether they are, and how long nothing is
-// accepted at most.
+// While calls of connections that were shut are worked off, how often it is looked whether they are, and how long
+// nothing is accepted at most.
 constexpr int kWaitMs = 10;
 constexpr std::chrono::milliseconds kMaxWait(500);
 

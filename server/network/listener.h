@@ -21,9 +21,9 @@ namespace wellspace::server {
 
 // Sockets that listen, and the thread that accepts their connections and hands them to gRPC.
 //
-// gRPC 1.51 would listen itself, and would never do so again after an accept that failed (CVE-2023-4785). Here a connection that comes
-// when there are hardly any file descriptors left is closed at once, so that some of them stay for files; accepting goes on
-// whatever fails. What becomes of a connection is watched by Connections.
+// gRPC 1.51 would listen itself, and would never do so again after an accept that failed (CVE-2023-4785). Here a
+// connection that comes when there are hardly any file descriptors left is closed at once, so that some of them stay
+// for files; accepting goes on whatever fails. What becomes of a connection is watched by Connections.
 //
 // Thread safety: thread-compatible.
 class Listener {
@@ -31,7 +31,8 @@ class Listener {
   // Descriptors that no connection takes, or a quarter of all if that is less.
   static constexpr int kSpareDescriptors = 24;
 
-  // Listens at `address`; a name is listened on at all of its addresses that this machine has. A connection waits until Start.
+  // Listens at `address`; a name is listened on at all of its addresses that this machine has. A connection waits until
+  // Start.
   //
   // Errors:     UNAVAILABLE: the address is not of this machine, or its port is in use.
   static absl::StatusOr<std::unique_ptr<Listener>> Open(const ListenAddress& address,
@@ -43,7 +44,8 @@ class Listener {
   // The port in use.
   uint16_t port() const { return port_; }
 
-  // From now on connections go to `acceptor`, whose server has been started. To be called once. `connections` outlives this.
+  // From now on connections go to `acceptor`, whose server has been started. To be called once. `connections` outlives
+  // this.
   void Start(std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor, Connections& connections);
 
   // Listens no more. To be called before the server of the acceptor is shut down.

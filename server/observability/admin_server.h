@@ -13,17 +13,18 @@
 
 namespace wellspace::server {
 
-// Channelz shows the addresses and certificates of all peers: it has a listener of its own, on the loopback. gRPC adds channelz to every
-// server of the process, so those of users are to be built without it.
+// Channelz shows the addresses and certificates of all peers: it has a listener of its own, on the loopback. gRPC adds
+// channelz to every server of the process, so those of users are to be built without it.
 void LeaveOutChannelz(grpc::ServerBuilder& builder);
 
-// Serves grpc.channelz.v1 for all gRPC servers and channels of the process, health and reflection, in plain text and to whoever can
-// connect, until it is destroyed.
+// Serves grpc.channelz.v1 for all gRPC servers and channels of the process, health and reflection, in plain text and to
+// whoever can connect, until it is destroyed.
 class AdminServer {
  public:
   // Listens on `listen`, HOST:PORT on the loopback; port 0 takes a free one. REQUIRES: `observer` outlives this.
   //
-  // Errors:     INVALID_ARGUMENT (listen), FAILED_PRECONDITION (not the loopback), UNAVAILABLE (the address cannot be listened on).
+  // Errors:     INVALID_ARGUMENT (listen), FAILED_PRECONDITION (not the loopback), UNAVAILABLE (the address cannot be
+  //             listened on).
   static absl::StatusOr<std::unique_ptr<AdminServer>> Start(const std::string& listen, CallObserver& observer);
 
   ~AdminServer();

@@ -23,8 +23,8 @@ std::string_view CodeLabel(grpc::StatusCode code);
 // grpc_server_handling_seconds by grpc_type, grpc_service, grpc_method and, of those handled, grpc_code.
 //
 // Thread safety: thread-safe.
-// Invariants: the series are all there from the start, at 0; calls of methods that nobody serves are counted under "unknown", so what
-// clients send cannot make more.
+// Invariants: the series are all there from the start, at 0; calls of methods that nobody serves are counted under
+// "unknown", so what clients send cannot make more.
 class CallMetrics {
  public:
   // The series of one method.
@@ -41,7 +41,8 @@ class CallMetrics {
     void Handled(grpc::StatusCode code, double duration_seconds) const;
   };
 
-  // `services` are full names, with descriptors in the generated pool of protobuf; grpc.health.v1.Health is counted, too.
+  // `services` are full names, with descriptors in the generated pool of protobuf; grpc.health.v1.Health is counted,
+  // too.
   //
   // REQUIRES:   `registry` outlives this.
   CallMetrics(prometheus::Registry& registry, const std::vector<std::string>& services);

@@ -70,8 +70,8 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
         start_(SinceBoot()),
         began_(Connections::Clock::now()) {
     FindPeer();
-    // gRPC reads metadata and certificates into the context when they are first asked for, and not thread-safely: here, before
-    // anything else knows of the call.
+    // gRPC reads metadata and certificates into the context when they are first asked for, and not thread-safely: here,
+    // before anything else knows of the call.
     tenant_ = observer_.tenant_of_(*context_);
     const std::string_view request_id = Metadata(*context_, kRequestId);
     request_id_ = IsRequestId(request_id) ? std::string(request_id) : observer_.MakeRequestId();
@@ -122,8 +122,8 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
   }
 
  private:
-  // gRPC ends a call whose only request is no message with UNIMPLEMENTED, without asking its handler, who would have asked who calls.
-  // So does channelz, where it is not served.
+  // gRPC ends a call whose only request is no message with UNIMPLEMENTED, without asking its handler, who would have
+  // asked who calls. So does channelz, where it is not served.
   //
   // gRPC's own health service says UNKNOWN, and in no other case, when the client of a Watch is gone.
   grpc::Status ServersStatus(const grpc::Status& status) const {
@@ -139,8 +139,8 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
                            absl::StrCat("the request is not one message of ", method_.service, ".", method_.name));
   }
 
-  // A synchronous call has a peer once its metadata have come, which is the first event that is intercepted; any other from
-  // the beginning.
+  // A synchronous call has a peer once its metadata have come, which is the first event that is intercepted; any other
+  // from the beginning.
   void FindPeer() {
     peer_ = context_->peer();
     connection_ = observer_.connections_.CallBegan(peer_);

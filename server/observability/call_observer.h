@@ -22,10 +22,11 @@ class Connections;
 
 // Watches all calls of a server, whatever the service, from an interceptor.
 //
-// A call's line in the log has event=call, request_id (what the client sent as metadata `x-request-id`, if it is at most 64 letters,
-// digits and ".-_", else one made here), tenant, peer, service, method, code, seconds, what its handler notes, traceparent (of W3C Trace
-// Context, if the client sent one) and the message of its error. No other metadata and nothing of the messages is logged. The request id
-// goes back to the client as trailing metadata `x-request-id`.
+// A call's line in the log has event=call, request_id (what the client sent as metadata `x-request-id`, if it is at
+// most 64 letters, digits and ".-_", else one made here), tenant, peer, service, method, code, seconds, what its
+// handler notes, traceparent (of W3C Trace Context, if the client sent one) and the message of its error. No other
+// metadata and nothing of the messages is logged. The request id goes back to the client as trailing metadata
+// `x-request-id`.
 //
 // Thread safety: thread-safe.
 class CallObserver {
@@ -33,7 +34,8 @@ class CallObserver {
   // Who calls, "" if nobody knows. Neither waits nor does I/O.
   using TenantOf = std::function<std::string(const grpc::ServerContextBase&)>;
 
-  // `connections` are told of each call. REQUIRES: `log`, `metrics` and `connections` outlive this, and this the server.
+  // `connections` are told of each call. REQUIRES: `log`, `metrics` and `connections` outlive this, and this the
+  // server.
   CallObserver(spdlog::logger& log, const CallMetrics& metrics, Connections& connections, TenantOf tenant_of);
   ~CallObserver();
 

@@ -26,8 +26,8 @@ class Metrics {
   // For families that are counted.
   prometheus::Registry& registry() { return *registry_; }
 
-  // A number that is read at every scrape, by a thread of its own; a counter never falls. REQUIRES: `read` can be called as long as
-  // an endpoint serves this.
+  // A number that is read at every scrape, by a thread of its own; a counter never falls. REQUIRES: `read` can be
+  // called as long as an endpoint serves this.
   void AddGauge(std::string name, std::string help, Read read);
   void AddCounter(std::string name, std::string help, Read read);
 

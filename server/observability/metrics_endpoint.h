@@ -19,15 +19,17 @@ namespace wellspace::server {
 
 // Serves `GET /metrics` over HTTP, on a thread of its own, until it is destroyed; other paths are not found.
 //
-// No client waits for another: all connections are served at once, each for kTimeout at most, and when there are kMostClients
-// the oldest goes. An HTTP server with a thread for each client was rejected: a few requests that never come whole hold all.
+// No client waits for another: all connections are served at once, each for kTimeout at most, and when there are
+// kMostClients the oldest goes. An HTTP server with a thread for each client was rejected: a few requests that never
+// come whole hold all.
 class MetricsEndpoint {
  public:
   static constexpr size_t kMostClients = 64;
   static constexpr size_t kMostRequestBytes = 8192;
   static constexpr std::chrono::seconds kTimeout{5};
 
-  // Listens on `listen`, HOST:PORT with an address or "localhost"; port 0 takes a free one. REQUIRES: `metrics` outlives this.
+  // Listens on `listen`, HOST:PORT with an address or "localhost"; port 0 takes a free one. REQUIRES: `metrics`
+  // outlives this.
   //
   // Errors:     INVALID_ARGUMENT (listen), UNAVAILABLE (the address cannot be listened on).
   static absl::StatusOr<std::unique_ptr<MetricsEndpoint>> Start(const std::string& listen, const Metrics& metrics);

@@ -29,7 +29,8 @@ struct ObservabilityOptions {
 // Thread safety: thread-safe.
 class Observability {
  public:
-  // `services` are the full names of those that the server has. REQUIRES: `connections` outlives this, and this the server.
+  // `services` are the full names of those that the server has. REQUIRES: `connections` outlives this, and this the
+  // server.
   Observability(const std::vector<std::string>& services, std::shared_ptr<spdlog::logger> log, Connections& connections,
                 CallObserver::TenantOf tenant_of);
 
@@ -50,7 +51,8 @@ class Observability {
   std::string metrics_address() const { return endpoint_ == nullptr ? "" : endpoint_->address(); }
   std::string admin_address() const { return admin_ == nullptr ? "" : admin_->address(); }
 
-  // Nothing is read from now on. To be called, not from several threads at once, before what metrics() reads is destroyed.
+  // Nothing is read from now on. To be called, not from several threads at once, before what metrics() reads is
+  // destroyed.
   void Stop();
 
  private:

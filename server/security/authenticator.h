@@ -17,8 +17,8 @@ struct Caller {
   std::string tenant = "default";  // a name as IsTenantName wants it
 };
 
-// Knows callers by their bearer token (metadata `authorization: Bearer TOKEN`), by their client certificate, or takes all of them
-// for the tenant "default".
+// Knows callers by their bearer token (metadata `authorization: Bearer TOKEN`), by their client certificate, or takes
+// all of them for the tenant "default".
 //
 // Thread safety: thread-safe.
 class Authenticator {
@@ -33,8 +33,8 @@ class Authenticator {
   Authenticator() = default;
   explicit Authenticator(Demands demands) : demands_(std::move(demands)) {}
 
-  // OK, and who calls in `caller`; or the UNAUTHENTICATED with which the call is to be ended at once, without a look at what it asks
-  // for. Neither waits nor does I/O.
+  // OK, and who calls in `caller`; or the UNAUTHENTICATED with which the call is to be ended at once, without a look at
+  // what it asks for. Neither waits nor does I/O.
   //
   // Guarantees: the message has nothing of what the caller showed.
   grpc::Status Authenticate(const grpc::ServerContextBase& context, Caller* caller) const;

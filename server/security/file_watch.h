@@ -17,11 +17,12 @@ namespace wellspace::server {
 
 // The content of a file of at most 16 MiB.
 //
-// Errors:     NOT_FOUND, PERMISSION_DENIED and so on by errno; INVALID_ARGUMENT: it is no regular file, or too large. All name the path.
+// Errors:     NOT_FOUND, PERMISSION_DENIED and so on by errno; INVALID_ARGUMENT: it is no regular file, or too large.
+//             All name the path.
 absl::StatusOr<std::string> ReadFile(const std::string& path);
 
-// Notices when files change: another inode behind the path, another size, or another time of modification. Symbolic links are
-// followed, so that swapping the link to a folder is noticed, too.
+// Notices when files change: another inode behind the path, another size, or another time of modification. Symbolic
+// links are followed, so that swapping the link to a folder is noticed, too.
 //
 // Thread safety: thread-compatible. `on_change` runs on a thread of its own.
 class FileWatch {
@@ -33,7 +34,8 @@ class FileWatch {
   FileWatch(const FileWatch&) = delete;
   FileWatch& operator=(const FileWatch&) = delete;
 
-  // From now on looks at the files every `interval`, and calls `on_change` when one or several have changed. To be called once.
+  // From now on looks at the files every `interval`, and calls `on_change` when one or several have changed. To be
+  // called once.
   void Start(absl::Duration interval, std::function<void()> on_change);
 
  private:

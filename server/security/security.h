@@ -23,22 +23,23 @@ struct SecurityOptions {
   bool insecure_remote = false;  // allows remote listeners without TLS, or without any demand on callers
   absl::Duration reload_interval = absl::Seconds(1);  // how often files are looked at
 
-  // Clients with certificates are asked to connect anew after so long, so that those that have expired or lost their authority get no
-  // further. Calls under way are not disturbed.
+  // Clients with certificates are asked to connect anew after so long, so that those that have expired or lost their
+  // authority get no further. Calls under way are not disturbed.
   absl::Duration max_connection_age = absl::Hours(1);
 };
 
 // Certificates and tokens, read again when their files change.
 //
-// A file that has become unreadable or wrong is reported in the log, and what was read before stays in use: the tokens that were
-// known, or all of certificates, key and authorities.
+// A file that has become unreadable or wrong is reported in the log, and what was read before stays in use: the tokens
+// that were known, or all of certificates, key and authorities.
 //
 // Thread safety: thread-safe.
 class Security {
  public:
   // Reads the files.
   //
-  // Errors:     as of ReadTlsFiles; INVALID_ARGUMENT: the token file has a wrong line; NOT_FOUND and so on: it cannot be read.
+  // Errors:     as of ReadTlsFiles; INVALID_ARGUMENT: the token file has a wrong line; NOT_FOUND and so on: it cannot
+  //             be read.
   static absl::StatusOr<std::unique_ptr<Security>> Load(const SecurityOptions& options,
                                                         std::shared_ptr<spdlog::logger> log);
 
@@ -46,8 +47,8 @@ class Security {
 
   // Has `builder` take connections that come to `address`, from what is returned.
   //
-  // Errors:     FAILED_PRECONDITION: other machines could reach it, in plain text or without having to say who they are, and
-  //             nothing says that this is wanted.
+  // Errors:     FAILED_PRECONDITION: other machines could reach it, in plain text or without having to say who they
+  //             are, and nothing says that this is wanted.
   absl::StatusOr<std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor>> AddAcceptor(
       const ListenAddress& address, grpc::ServerBuilder& builder) const;
 

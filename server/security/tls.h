@@ -19,8 +19,8 @@ struct TlsOptions {
   std::string certificate;  // the server's own, then those between it and its authority; empty: plain text
   std::string key;          // of the server's certificate, not encrypted
   std::string client_ca;    // authorities whose client certificates are taken; empty: clients are not asked for any
-  // A client without a certificate does not get through the handshake. Otherwise it gets as far as its first call, which is told what is
-  // missing.
+  // A client without a certificate does not get through the handshake. Otherwise it gets as far as its first call,
+  // which is told what is missing.
   bool require_client_certificate = false;
 
   bool enabled() const { return !certificate.empty() || !key.empty() || !client_ca.empty(); }
@@ -36,8 +36,9 @@ struct TlsMaterial {
 
 // Reads the files, if connections can be made with them.
 //
-// Errors:     INVALID_ARGUMENT: a file is missing among the options, or has not what it should have: certificates that are
-//             valid now, the key of the first; the message names the file. NOT_FOUND and so on: a file cannot be read.
+// Errors:     INVALID_ARGUMENT: a file is missing among the options, or has not what it should have: certificates that
+//             are valid now, the key of the first; the message names the file. NOT_FOUND and so on: a file cannot be
+//             read.
 absl::StatusOr<TlsMaterial> ReadTlsFiles(const TlsOptions& options);
 
 // Whether connections can be made with these files. Errors: those of ReadTlsFiles.
@@ -58,11 +59,12 @@ class TlsSource {
   std::shared_ptr<const TlsMaterial> material_;  // guarded by mutex_
 };
 
-// Credentials of a listener: TLS 1.2 with forward secrecy and authenticated encryption, or TLS 1.3, with what `source` has at
-// each handshake. Connections that are there stay when it changes. Of `options` only the demand on clients counts.
+// Credentials of a listener: TLS 1.2 with forward secrecy and authenticated encryption, or TLS 1.3, with what `source`
+// has at each handshake. Connections that are there stay when it changes. Of `options` only the demand on clients
+// counts.
 //
-// gRPC's own watch of files was rejected: between a new certificate and its key, and as long as a file is wrong, it fails
-// all handshakes.
+// gRPC's own watch of files was rejected: between a new certificate and its key, and as long as a file is wrong, it
+// fails all handshakes.
 std::shared_ptr<grpc::ServerCredentials> MakeTlsCredentials(const TlsOptions& options,
                                                             std::shared_ptr<const TlsSource> source);
 

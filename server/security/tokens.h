@@ -11,14 +11,14 @@
 
 namespace wellspace::server {
 
-// Whether `name` can name a tenant: 1 to 64 letters, digits, '.', '_', '@' and '-' of ASCII, the first a letter or a digit. Such a
-// name forges nothing in a log.
+// Whether `name` can name a tenant: 1 to 64 letters, digits, '.', '_', '@' and '-' of ASCII, the first a letter or a
+// digit. Such a name forges nothing in a log.
 bool IsTenantName(std::string_view name);
 
 // Which tenant a token belongs to.
 //
-// Tokens are looked up by their SHA-256, without salt: they are random and at least kMinTokenLength long, so that no list of
-// likely tokens exists, and a call costs one hash however many tokens there are.
+// Tokens are looked up by their SHA-256, without salt: they are random and at least kMinTokenLength long, so that no
+// list of likely tokens exists, and a call costs one hash however many tokens there are.
 //
 // Thread safety: immutable.
 class TokenTable {
@@ -28,8 +28,8 @@ class TokenTable {
 
   // Reads lines "TENANT sha256:HEX". Empty lines and what follows a '#' are ignored; a tenant may have several tokens.
   //
-  // Errors:     INVALID_ARGUMENT, with the number of the line and what would be accepted, when a line is none of these, a token comes
-  //             twice, or there is none at all.
+  // Errors:     INVALID_ARGUMENT, with the number of the line and what would be accepted, when a line is none of these,
+  //             a token comes twice, or there is none at all.
   static absl::StatusOr<TokenTable> Parse(std::string_view text);
 
   // The tenant of `token`, or none when the token is unknown.
@@ -43,8 +43,9 @@ class TokenTable {
 
 // The line of TokenTable for `token`, without an end of line.
 //
-// Errors:     INVALID_ARGUMENT: `tenant` is no name of one; `token` has characters other than the visible ones of ASCII, or fewer than
-//             kMinTokenLength or more than kMaxTokenLength of them. The message does not have the token.
+// Errors:     INVALID_ARGUMENT: `tenant` is no name of one; `token` has characters other than the visible ones of
+//             ASCII, or fewer than kMinTokenLength or more than kMaxTokenLength of them. The message does not have the
+//             token.
 absl::StatusOr<std::string> MakeTokenLine(std::string_view tenant, std::string_view token);
 
 }  // namespace wellspace::server

@@ -17,7 +17,8 @@
 namespace wellspace::server {
 
 // Thread safety: thread-safe.
-// Invariants: those of SessionStore. Locks of sessions are taken with that of the store held, never the other way round.
+// Invariants: those of SessionStore. Locks of sessions are taken with that of the store held, never the other way
+//             round.
 class MemorySessionStore final : public SessionStore {
  public:
   // REQUIRES:   `options` and `memory` outlive this and all sessions.

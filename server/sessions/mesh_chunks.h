@@ -54,8 +54,9 @@ class MeshChunks {
   uint64_t input_chunks_ = 0;
 };
 
-// A response that has nothing but the chunk number `index` of `mesh`, with its checksum, in field `field`: serialized as protocol
-// buffers would, but without a copy of the values. They are those of the mesh, which lives as long as the answer.
+// A response that has nothing but the chunk number `index` of `mesh`, with its checksum, in field `field`: serialized
+// as protocol buffers would, but without a copy of the values. They are those of the mesh, which lives as long as the
+// answer.
 //
 // REQUIRES:   index < mesh->count().
 // Guarantees: the same bytes whenever it is asked.

@@ -24,9 +24,11 @@ namespace wellspace::server {
 
 // State, events and end of one operation.
 //
-// Thread safety: thread-safe. Functions given to Watch run without any lock of this held, on the thread that made the change.
-// Invariants: (1) events are those of a ProgressPacer; (2) the last kKeptEvents are kept, once it has ended the last kEventsOfEnded; (3)
-// of an operation that succeeded the last one is PHASE_DONE; (4) it ends once, and then nothing changes any more.
+// Thread safety: thread-safe. Functions given to Watch run without any lock of this held, on the thread that made the
+//                change.
+// Invariants: (1) events are those of a ProgressPacer; (2) the last kKeptEvents are kept, once it has ended the last
+// kEventsOfEnded; (3) of an operation that succeeded the last one is PHASE_DONE; (4) it ends once, and then nothing
+// changes any more.
 class Operation {
  public:
   static constexpr size_t kKeptEvents = 32;
@@ -58,7 +60,8 @@ class Operation {
   // ProgressPacer::kMinInterval; `now` is a time since boot.
   bool Tick(absl::Duration now);
 
-  // For its session, which starts it at most once, and ends it once. Whoever has ended it calls Notify, without any lock.
+  // For its session, which starts it at most once, and ends it once. Whoever has ended it calls Notify, without any
+  // lock.
   void Start(absl::Time now);
   // The figures are those of the new mesh.
   void Succeed(absl::Time now, uint64_t mesh_revision, uint64_t vertices, uint64_t simplices);

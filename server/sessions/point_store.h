@@ -13,7 +13,8 @@
 
 namespace wellspace::server {
 
-// Coordinates that grow at the end. They lie in blocks, so that growing never copies much, however small the pieces are.
+// Coordinates that grow at the end. They lie in blocks, so that growing never copies much, however small the pieces
+// are.
 //
 // Thread safety: thread-compatible.
 class PointStore {

@@ -13,9 +13,9 @@ namespace wellspace::server {
 // Turns the snapshots of one run into its progress events.
 //
 // Thread safety: thread-compatible.
-// Invariants: (1) events are at least kMinInterval apart, the final one excepted; (2) asked at least every kMinInterval, it lets no
-// more than kHeartbeat + kMinInterval pass without one; (3) phase, vertices, simplices and fraction never decrease; (4) sequence
-// numbers count from 0.
+// Invariants: (1) events are at least kMinInterval apart, the final one excepted; (2) asked at least every
+// kMinInterval, it lets no more than kHeartbeat + kMinInterval pass without one; (3) phase, vertices, simplices and
+// fraction never decrease; (4) sequence numbers count from 0.
 class ProgressPacer {
  public:
   static constexpr absl::Duration kMinInterval = absl::Milliseconds(100);

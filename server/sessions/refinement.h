@@ -13,8 +13,8 @@
 
 namespace wellspace::server {
 
-// Starts an operation that refines `session` with `parameters`, on a worker: from its points the first time, from then on by what has
-// changed.
+// Starts an operation that refines `session` with `parameters`, on a worker: from its points the first time, from then
+// on by what has changed.
 //
 // One that does not succeed leaves the session as it was: a mesher that it has changed is given up, and built again by
 // Replay when the structure is next needed.

@@ -14,7 +14,8 @@ namespace {
 
 constexpr size_t kKeptOperations = 100;
 
-// A vertex that is added takes as much memory as this many of those that there are, at most in all but the most uneven clouds.
+// A vertex that is added takes as much memory as this many of those that there are, at most in all but the most uneven
+// clouds.
 constexpr uint64_t kReservedVertices = 2;
 
 }  // namespace
@@ -469,7 +470,8 @@ grpc::Status Session::AddVertices(std::span<const double> points, std::span<cons
     work_.mesher = nullptr;
     work_.memory.Release();
   } else if (memory_.is_limited()) {
-    // What was reserved is more than was needed but for the most uneven points; those are counted by the next refinement.
+    // What was reserved is more than was needed but for the most uneven points; those are counted by the next
+    // refinement.
     (void)work_.memory.Resize(work_.mesher->memory_bytes());
   }
   std::lock_guard lock(mutex_);

@@ -59,10 +59,11 @@ struct SessionWork {
 };
 
 // Thread safety: thread-safe.
-// Invariants: (1) revision grows with every change of the points or of the mesh; (2) while an operation is under way, or vertices are
-// being added or the mesher is built again, points, mesh, mesher and steps are touched by nothing else; (3) what did
-// not succeed leaves the session as it was: structure and mesh are what Replay makes of the steps, whether there is a
-// mesher now or not; (4) the lock order is this session's mutex, then that of its operations and of the JobPool.
+// Invariants: (1) revision grows with every change of the points or of the mesh; (2) while an operation is under way,
+// or vertices are being added or the mesher is built again, points, mesh, mesher and steps are touched by nothing else;
+// (3) what did not succeed leaves the session as it was: structure and mesh are what Replay makes of the steps, whether
+// there is a mesher now or not; (4) the lock order is this session's mutex, then that of its operations and of the
+// JobPool.
 class Session {
  public:
   struct Settings {
@@ -100,8 +101,8 @@ class Session {
   grpc::Status Update(std::optional<std::map<std::string, std::string>> labels, std::optional<absl::Duration> ttl,
                       uint64_t expected_revision);
 
-  // From now on all that changes or asks for points and mesh ends with SESSION_NOT_FOUND. For a session that leaves its store; returns
-  // the operation that is under way, if there is one, which is to be cancelled.
+  // From now on all that changes or asks for points and mesh ends with SESSION_NOT_FOUND. For a session that leaves its
+  // store; returns the operation that is under way, if there is one, which is to be cancelled.
   //
   // Errors:     REVISION_MISMATCH, SESSION_NOT_FOUND (it was closed before): nothing has been done.
   grpc::Status Close(uint64_t expected_revision, std::shared_ptr<Operation>* under_way);
@@ -152,24 +153,26 @@ class Session {
   };
   Size GetSize(uint64_t few) const;
 
-  // Runs `query` on this thread, a worker's. Any number of queries run at once. An operation that begins waits for those that run:
-  // keep each short (some milliseconds) and ask again for the next batch.
+  // Runs `query` on this thread, a worker's. Any number of queries run at once. An operation that begins waits for
+  // those that run: keep each short (some milliseconds) and ask again for the next batch.
   // `version` is that of the structure: 0 for the first batch, which sets it; for later ones as it was set.
   //
-  // Errors:     MESH_NOT_READY, SESSION_BUSY, SESSION_NOT_FOUND; REVISION_MISMATCH when the structure is no longer at `version`;
-  //             those of `query`.
+  // Errors:     MESH_NOT_READY, SESSION_BUSY, SESSION_NOT_FOUND; REVISION_MISMATCH when the structure is no longer at
+  //             `version`; those of `query`.
   grpc::Status Query(uint64_t* version, const std::function<grpc::Status(const core::Mesher&)>& query) const;
 
-  // Adds vertices at `points` on this thread, a worker's: all or, on an error, none. `near` has a vertex for each, or is empty.
+  // Adds vertices at `points` on this thread, a worker's: all or, on an error, none. `near` has a vertex for each, or
+  // is empty.
   //
   // REQUIRES:   PrepareStructure has succeeded; if the mesher was given up since, the error is MESH_NOT_READY.
-  // Errors:     MESH_NOT_READY, SESSION_BUSY, INVALID_CHUNK_SHAPE, INVALID_REQUEST (the length of `near`), INVALID_POINTS,
-  //             VERTEX_OUT_OF_RANGE, TOO_MANY_POINTS, QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH, SESSION_NOT_FOUND; CANCELLED.
+  // Errors:     MESH_NOT_READY, SESSION_BUSY, INVALID_CHUNK_SHAPE, INVALID_REQUEST (the length of `near`),
+  //             INVALID_POINTS, VERTEX_OUT_OF_RANGE, TOO_MANY_POINTS, QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH,
+  //             SESSION_NOT_FOUND; CANCELLED.
   grpc::Status AddVertices(std::span<const double> points, std::span<const uint32_t> near, uint64_t expected_revision,
                            core::RunContext& context, AddedVertices* added);
 
-  // Begins an operation, of which `submit` queues the work, or says why it cannot be. It is called with the session's lock held, and
-  // the work may begin at once.
+  // Begins an operation, of which `submit` queues the work, or says why it cannot be. It is called with the session's
+  // lock held, and the work may begin at once.
   //
   // Errors:     SESSION_BUSY, REVISION_MISMATCH, SESSION_NOT_FOUND; those of `submit`.
   grpc::Status StartOperation(const core::MeshParameters& parameters, uint64_t expected_revision,
@@ -177,7 +180,8 @@ class Session {
                               std::shared_ptr<Operation>* operation);
   // On the worker: what to work on; nothing if the operation has ended before it could begin.
   std::optional<SessionWork> BeginWork(Operation& operation);
-  // On the worker: takes back what BeginWork gave, and ends the operation with `status`. `mesh` is the new mesh if that is OK.
+  // On the worker: takes back what BeginWork gave, and ends the operation with `status`. `mesh` is the new mesh if that
+  // is OK.
   //
   // REQUIRES:   on an error, work.mesher is as it was, or null.
   void EndWork(Operation& operation, const grpc::Status& status, SessionWork work, std::shared_ptr<MeshSnapshot> mesh);
@@ -227,8 +231,8 @@ class Session {
   void WaitForQueries();
   // Without it, while the mesher is being built again: what it is built by.
   grpc::Status Rebuild(const MesherFactory& create_mesher, Job& job);
-  // Without it, while vertices are being added: the part that is the mesher's. `*uploaded` of the points that waited are in it then, on
-  // an error too.
+  // Without it, while vertices are being added: the part that is the mesher's. `*uploaded` of the points that waited
+  // are in it then, on an error too.
   grpc::Status AddToMesher(std::span<const double> points, std::span<const uint32_t> near, core::RunContext& context,
                            uint64_t* uploaded, std::vector<uint32_t>* vertices);
   // The same: what of AddVertices is wrong before anything is done.

@@ -27,7 +27,8 @@ struct NewSession {
 // The sessions of all tenants. No tenant sees those of another.
 //
 // Thread safety: thread-safe.
-// Invariants: (1) never more sessions than the limits of the server allow; (2) names are never used again, and cannot be guessed.
+// Invariants: (1) never more sessions than the limits of the server allow; (2) names are never used again, and cannot
+//             be guessed.
 class SessionStore {
  public:
   virtual ~SessionStore() = default;
@@ -42,8 +43,8 @@ class SessionStore {
   // Errors:     SESSION_NOT_FOUND: there is none, it has expired, or it is another tenant's.
   virtual grpc::Status Find(const std::string& tenant, const std::string& name, std::shared_ptr<Session>* session) = 0;
 
-  // Of the sessions of `tenant` that were created after `after`, in the order of their creation, the first `count` that have all
-  // of `labels`. No two sessions of a store were created at the same time.
+  // Of the sessions of `tenant` that were created after `after`, in the order of their creation, the first `count` that
+  // have all of `labels`. No two sessions of a store were created at the same time.
   virtual std::vector<std::shared_ptr<Session>> List(const std::string& tenant, absl::Time after, size_t count,
                                                      const std::map<std::string, std::string>& labels) = 0;
 

@@ -130,8 +130,8 @@ v1::MeshStatistics StatisticsToProto(const core::MeshStatistics& statistics) {
 
 grpc::Status ParametersFromProto(const v1::MeshParameters& message, const ServiceOptions& options,
                                  core::MeshParameters* parameters) {
-  // The fields are set one by one, the others still at their defaults, so that the core's validation, the only one there is, shows
-  // which of them it refuses.
+  // The fields are set one by one, the others still at their defaults, so that the core's validation, the only one
+  // there is, shows which of them it refuses.
   *parameters = core::MeshParameters();
   parameters->dimension = message.dimension();
   if (grpc::Status status = Validate(*parameters, "dimension"); !status.ok()) {

@@ -16,7 +16,8 @@ namespace {
 
 constexpr int kRetrySeconds = 1;
 
-// A message may repeat what the client sent. It goes out three times, as trailing metadata, of which clients take 8 KiB.
+// A message may repeat what the client sent. It goes out three times, as trailing metadata, of which clients take 8
+// KiB.
 constexpr size_t kMaxErrorMessageBytes = 1024;
 
 // Marks the status of a MEMORY_LIMIT; its value is kMayRetry or empty.

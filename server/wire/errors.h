@@ -15,8 +15,8 @@ namespace wellspace::server {
 // The `domain` of the ErrorInfo of every error.
 inline constexpr char kErrorDomain[] = "wellspace.v1";
 
-// Makes the error that errors.proto describes: code and ErrorInfo by `reason`, a BadRequest when `field` (the path of the field from
-// the request message on) is given, a RetryInfo for reasons that pass with time.
+// Makes the error that errors.proto describes: code and ErrorInfo by `reason`, a BadRequest when `field` (the path of
+// the field from the request message on) is given, a RetryInfo for reasons that pass with time.
 //
 // REQUIRES:   reason != ERROR_REASON_UNSPECIFIED.
 // Threads:    thread-safe.
@@ -28,8 +28,8 @@ grpc::Status MakeError(grpc::StatusCode code, v1::ErrorReason reason, const std:
 // A RESOURCE_EXHAUSTED that FromCoreStatus makes a MEMORY_LIMIT, with RetryInfo if asking again may help.
 absl::Status MemoryLimitError(const std::string& message, bool may_retry);
 
-// The status of a run that the core ended with `status`. The parameters were validated before, so that an INVALID_ARGUMENT is about
-// the points.
+// The status of a run that the core ended with `status`. The parameters were validated before, so that an
+// INVALID_ARGUMENT is about the points.
 grpc::Status FromCoreStatus(const absl::Status& status);
 
 // `status` as a message, as it would reach a client.

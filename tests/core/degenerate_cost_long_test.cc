@@ -1,4 +1,5 @@
-// Degenerate clouds, which the exact stage of the predicates decides, cost no more than three times as many random points.
+// Degenerate clouds, which the exact stage of the predicates decides, cost no more than three times as many random
+// points.
 //
 // Times are compared within one run, the best of three each: machines are noisy, and this is no benchmark.
 #include <gtest/gtest.h>

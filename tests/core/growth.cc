@@ -10,9 +10,10 @@
 namespace wellspace::test {
 namespace {
 
-// Averages over the queries of one run. Visits and cuts are divided by simplices per vertex, a measure of the cells themselves: a cell
-// at the box has fewer nodes, and the share of vertices there falls slowly. (In 3-D, uniform points have 4.6 simplices a vertex for
-// n = 10^3 and 6.1 for 10^6; unbounded meshes have 6.5. The plain visits a query rise likewise, from 88 to 125, and end there.)
+// Averages over the queries of one run. Visits and cuts are divided by simplices per vertex, a measure of the cells
+// themselves: a cell at the box has fewer nodes, and the share of vertices there falls slowly. (In 3-D, uniform points
+// have 4.6 simplices a vertex for n = 10^3 and 6.1 for 10^6; unbounded meshes have 6.5. The plain visits a query rise
+// likewise, from 88 to 125, and end there.)
 struct Work {
   double queries_per_vertex;
   double visits_per_query;  // leaves and vertices, since the size of leaves shifts one to the other

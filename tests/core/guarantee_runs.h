@@ -21,8 +21,8 @@
 
 namespace wellspace::test {
 
-// The box of a cloud. unit: the unit box; touching: the cloud's bounding box; margin: that with a quarter around; long: the cloud
-// stretched by 100 along its last axis; flat: by 10 along all the others.
+// The box of a cloud. unit: the unit box; touching: the cloud's bounding box; margin: that with a quarter around; long:
+// the cloud stretched by 100 along its last axis; flat: by 10 along all the others.
 inline constexpr std::array<std::string_view, 5> kShapes = {"unit", "touching", "margin", "long", "flat"};
 
 template <int D>
@@ -69,7 +69,8 @@ struct Outcome {
   uint64_t vertices = 0;
 };
 
-// Refines `input` with at most `multiple` times as many vertices as there are points, corners and leaves of the tree over them.
+// Refines `input` with at most `multiple` times as many vertices as there are points, corners and leaves of the tree
+// over them.
 template <int D>
 Outcome RefineInput(const Input<D>& input, const core::MeshCriteria<D>& criteria, double multiple,
                     const std::function<void(const core::QueryStructure<D>&)>& begin = nullptr,
@@ -101,8 +102,8 @@ inline std::string Name(core::Criterion criterion) {
   return criterion == core::Criterion::kRadiusEdge ? "radius-edge" : "well-spaced";
 }
 
-// No mesh of these clouds takes more vertices for each point, corner of the box and leaf of the tree over them. Measured,
-// at LeastRho: at most 4 radius-edge, 12.2 well-spaced, both of a handful of points.
+// No mesh of these clouds takes more vertices for each point, corner of the box and leaf of the tree over them.
+// Measured, at LeastRho: at most 4 radius-edge, 12.2 well-spaced, both of a handful of points.
 inline constexpr double kBudget = 25;
 
 // Refines under the eyes of a checker.

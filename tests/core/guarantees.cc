@@ -31,8 +31,8 @@ constexpr double kNone = std::numeric_limits<double>::infinity();
 // The clip of a cell relative to the longest edge of its bucket.
 double ClipFactor(double rho) { return std::max(4.0, 1.25 * rho); }
 
-// Definition 1 (2): nothing waits whose edge is shorter than this times the one that asks. At vertices of faces, which may learn of a
-// new vertex late, it is less, and in proportion to the reach of a cell.
+// Definition 1 (2): nothing waits whose edge is shorter than this times the one that asks. At vertices of faces, which
+// may learn of a new vertex late, it is less, and in proportion to the reach of a cell.
 constexpr double kGamma = 1 / std::numbers::sqrt2;
 constexpr double kGammaOuter = 0.25 / std::numbers::sqrt2;
 constexpr double kGammaFace = 0.5 / std::numbers::sqrt2;
@@ -50,7 +50,8 @@ double Rounding(const Box<D>& box) {
 // The nearest vertices that are sorted before the others are looked at.
 constexpr std::ptrdiff_t kFirst = 48;
 
-// The cell of `v` in the box: all vertices, from near to far, as long as they can cut it. Returns the distance to the nearest.
+// The cell of `v` in the box: all vertices, from near to far, as long as they can cut it. Returns the distance to the
+// nearest.
 template <int D>
 double WholeCell(const QueryStructure<D>& structure, VertexId v, std::vector<std::pair<double, uint32_t>>& others,
                  Polytope<D>& cell) {

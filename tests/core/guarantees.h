@@ -12,8 +12,8 @@
 
 namespace wellspace::test {
 
-// lfs of docs/design/guarantees.md: the least r such that two features that do not meet are within r of x. Features are the points
-// that refinement began with, among them the corners, and the faces of the box.
+// lfs of docs/design/guarantees.md: the least r such that two features that do not meet are within r of x. Features are
+// the points that refinement began with, among them the corners, and the faces of the box.
 template <int D>
 double FeatureSize(const core::Box<D>& box, const std::vector<core::Point<D>>& features, const core::Point<D>& x);
 

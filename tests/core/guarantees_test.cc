@@ -330,7 +330,8 @@ TYPED_TEST(GuaranteesTest, EverySimplexKeepsItsSize) {
       parameters.max_circumradius = D == 2 ? 0.04 : 0.15;
       ExpectSizes<D>(parameters, kind, 6);
 
-      // One in the interior, one flat and across the boundary, one that is a point; the second inside the reach of the first.
+      // One in the interior, one flat and across the boundary, one that is a point; the second inside the reach of the
+      // first.
       SizeBox inner{std::vector<double>(D, 0.6), std::vector<double>(D, 0.7), D == 2 ? 0.01 : 0.06};
       SizeBox flat{std::vector<double>(D, -1.0), std::vector<double>(D, 0.3), D == 2 ? 0.02 : 0.09};
       flat.low[0] = flat.high[0] = 0.25;

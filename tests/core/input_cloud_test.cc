@@ -25,7 +25,8 @@ class SortCloudTest : public test::SeededTest {
 };
 TYPED_TEST_SUITE(SortCloudTest, test::AllDimensions);
 
-// Points in groups so small that many share the first 32 bits of their places on the Z curve, or the first 64; some are given twice.
+// Points in groups so small that many share the first 32 bits of their places on the Z curve, or the first 64; some are
+// given twice.
 TYPED_TEST(SortCloudTest, SortsAlongTheCurveAndNamesTheFirstOfEquals) {
   constexpr int D = TypeParam::kValue;
   constexpr uint32_t kCount = 600;

@@ -71,7 +71,8 @@ void ExpectSameMesh(const Mesh& a, const Mesh& b) {
   EXPECT_EQ(a.input_vertex, b.input_vertex);
 }
 
-// Guarantees (1) to (3) of Mesher::Extract, the sizes asked for, and the order of vertices and simplices that Mesh describes.
+// Guarantees (1) to (3) of Mesher::Extract, the sizes asked for, and the order of vertices and simplices that Mesh
+// describes.
 void ExpectPromises(const Mesh& mesh, const MeshParameters& parameters, std::span<const double> cloud) {
   const int d = mesh.dimension;
   const double rho = parameters.rho == 0 ? DefaultRho(d) : parameters.rho;
@@ -168,8 +169,8 @@ TEST_P(MeshPropertyTest, KeepsItsPromisesForEveryRho) {
     EXPECT_THAT(mesh->domain_high, ElementsAreArray(parameters.domain_high));
     ExpectPromises(*mesh, parameters, cloud);
     EXPECT_LE(mesh->vertex_count(), previous) << "a weaker bound needs no more vertices";
-    // Of a mesh of a hundred vertices up to a sixth are chance: among the meshes of a point in 4-D one in twenty-four is
-    // larger by a tenth or more.
+    // Of a mesh of a hundred vertices up to a sixth are chance: among the meshes of a point in 4-D one in twenty-four
+    // is larger by a tenth or more.
     previous = mesh->vertex_count() + (D() == 4 ? mesh->vertex_count() / 6 : 0);
   }
 }

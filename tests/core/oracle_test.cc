@@ -184,8 +184,8 @@ TYPED_TEST(PredicateOracleTest, SignsAgreeNearDegeneracy) {
   EXPECT_GT(exact, 100);
 }
 
-// The pumped mesh is CGAL's regular triangulation of its weights, where no tie leaves a choice: the points are in general
-// position but for those on the faces of the box, and there the facets' simplices need not be the same.
+// The pumped mesh is CGAL's regular triangulation of its weights, where no tie leaves a choice: the points are in
+// general position but for those on the faces of the box, and there the facets' simplices need not be the same.
 TEST(WeightedOracleTest, APumpedMeshIsTheRegularTriangulation) {
   MeshParameters parameters{.dimension = 3};
   parameters.domain_low = test::UnitLow(3);

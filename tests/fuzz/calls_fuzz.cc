@@ -1,8 +1,9 @@
 // Every method of the service, with any bytes for requests, against a server that works with the real mesher.
 //
-// Input: calls; each is a letter that chooses the method ('a' the first of MeshingService, then those of SessionService, OperationService
-// and QueryService in the order of their files), the number of its messages (modulo 4), and the messages: the length in two bytes, low one
-// first, and that many bytes. In a message that is one of the method, names that begin with "sessions/0" are of the session made last.
+// Input: calls; each is a letter that chooses the method ('a' the first of MeshingService, then those of
+// SessionService, OperationService and QueryService in the order of their files), the number of its messages (modulo
+// 4), and the messages: the length in two bytes, low one first, and that many bytes. In a message that is one of the
+// method, names that begin with "sessions/0" are of the session made last.
 #include <memory>
 #include <mutex>
 #include <optional>

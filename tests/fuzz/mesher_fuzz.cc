@@ -1,7 +1,8 @@
-// The mesher on small degenerate clouds: coordinates of a coarse grid, some a few tiny steps off, on the faces of the box or near them.
+// The mesher on small degenerate clouds: coordinates of a coarse grid, some a few tiny steps off, on the faces of the
+// box or near them.
 //
-// Input: five bytes of parameters and what the first of them asks for besides (see ReadTask), then a byte for each coordinate
-// (see ReadCoordinate).
+// Input: five bytes of parameters and what the first of them asks for besides (see ReadTask), then a byte for each
+// coordinate (see ReadCoordinate).
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -43,15 +44,15 @@ struct Task {
   core::MeshParameters then;
 };
 
-// Byte 0: bit 0 dimension 2 or 3, bits 1 and 2 the box: grown by a quarter, not grown, the grid's, the grid's but flat; bit 3 two
-// dimensions more; bit 4 well-spaced; bit 5 sizes; bit 6 an edit. Byte 1: the exponent of the tiny step; from 3-D on bit 6 weights,
-// bit 7 no mending. Byte 2: offset. Byte 3: scale. Byte 4: rho.
+// Byte 0: bit 0 dimension 2 or 3, bits 1 and 2 the box: grown by a quarter, not grown, the grid's, the grid's but flat;
+// bit 3 two dimensions more; bit 4 well-spaced; bit 5 sizes; bit 6 an edit. Byte 1: the exponent of the tiny step; from
+// 3-D on bit 6 weights, bit 7 no mending. Byte 2: offset. Byte 3: scale. Byte 4: rho.
 //
-// With sizes a byte more: the lowest two bits the bound everywhere, if any, the next two that of a box, the next three where it is,
-// the last one whether it is a point.
+// With sizes a byte more: the lowest two bits the bound everywhere, if any, the next two that of a box, the next three
+// where it is, the last one whether it is a point.
 //
-// With an edit a byte more: the lowest three bits how many points come later, the next one whether one by one, the next two rho
-// then, the next one the other criterion, the last one no sizes any more.
+// With an edit a byte more: the lowest three bits how many points come later, the next one whether one by one, the next
+// two rho then, the next one the other criterion, the last one no sizes any more.
 Task ReadTask(ByteReader& bytes) {
   constexpr std::array kOffsets = {0.0, -0.5, 1.0, 0x1p20, -0x1p35};
   constexpr std::array kScales = {1.0, 3.0, 0x1p-40, 0x1p100, 0x1p-700, 0x1p900};
@@ -118,8 +119,8 @@ Task ReadTask(ByteReader& bytes) {
   return task;
 }
 
-// The lowest three bits: the grid line. The next three: how many tiny steps off. The highest two: at once much nearer to the first
-// line.
+// The lowest three bits: the grid line. The next three: how many tiny steps off. The highest two: at once much nearer
+// to the first line.
 double ReadCoordinate(ByteReader& bytes, const Placement& placement) {
   constexpr std::array kSteps = {0, 0, 0, 0, 1, -1, 2, -3};
   constexpr std::array kShrink = {1.0, 1.0, 0x1p-4, 0x1p-16};

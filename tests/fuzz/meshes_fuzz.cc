@@ -3,10 +3,10 @@
 // Input: a digit from 0 to 6, then
 //   0  a .vtu file;
 //   1  a .node file, '|', the .ele file;
-//   2  a byte whose lowest bits say compressed, big-endian, eight-byte header; the bytes of an array before they were put into base64;
-//   3  a .npz file;
-//   4  two bytes, the length of the first array of a .npz in little-endian order; that array and the second one, each a .npy;
-//   5  a .msh file;
+//   2  a byte whose lowest bits say compressed, big-endian, eight-byte header; the bytes of an array before they were
+//   put into base64; 3  a .npz file;
+//   4  two bytes, the length of the first array of a .npz in little-endian order; that array and the second one, each a
+//   .npy; 5  a .msh file;
 //   6  a .mesh file.
 #include <algorithm>
 #include <cmath>

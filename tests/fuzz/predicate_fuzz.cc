@@ -1,7 +1,8 @@
 // The laws of DecideCut between bisectors, and its agreement with InSphere, which shares no arithmetic with it.
 //
-// Input: a byte (bits 0 to 2: dimension; bit 3: coordinates of eight bytes, the bits of a double; else of one, a grid line and tiny
-// steps; the others: a quarter of the exponent of the tiny step), then the coordinates of a site, D generators and u.
+// Input: a byte (bits 0 to 2: dimension; bit 3: coordinates of eight bytes, the bits of a double; else of one, a grid
+// line and tiny steps; the others: a quarter of the exponent of the tiny step), then the coordinates of a site, D
+// generators and u.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -80,7 +81,8 @@ void RequireAgreementWithInSphere(const Decided<D>& p) {
   Require(perturbed.perturbed || perturbed.sign == kept.sign, "both rules agree where there is no tie");
 }
 
-// Other orders of D + 1 corners: all of them, but from 5-D on, where they take a minute under the sanitizers, the exchanges of two.
+// Other orders of D + 1 corners: all of them, but from 5-D on, where they take a minute under the sanitizers, the
+// exchanges of two.
 template <int D>
 std::vector<std::array<int, D + 1>> Orders() {
   std::vector<std::array<int, D + 1>> orders;

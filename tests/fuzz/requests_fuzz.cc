@@ -1,6 +1,7 @@
 // What a client may send in one call, through the server's checks and into the mesher.
 //
-// Input: requests, each as its length in two bytes, low one first, and that many bytes of a serialized MeshPointsRequest.
+// Input: requests, each as its length in two bytes, low one first, and that many bytes of a serialized
+// MeshPointsRequest.
 #include <algorithm>
 #include <cstring>
 #include <string>

@@ -1,9 +1,10 @@
 // Every call of the client library, answered by a server that sends any bytes.
 //
-// Input: a letter that chooses the call ('a' MeshPoints, then as in kCalls); then what the server does, in blocks of a letter, a length in
-// two bytes, low one first, and that many bytes: 'e' ends the call with the status whose code is the first of the bytes, the others being a
-// serialized google.rpc.Status; any other letter sends the bytes. A call that is repeated goes on with the rest; at the end of the input
-// calls end with OK. A checksum of 0 in a chunk of a mesh is set right.
+// Input: a letter that chooses the call ('a' MeshPoints, then as in kCalls); then what the server does, in blocks of a
+// letter, a length in two bytes, low one first, and that many bytes: 'e' ends the call with the status whose code is
+// the first of the bytes, the others being a serialized google.rpc.Status; any other letter sends the bytes. A call
+// that is repeated goes on with the rest; at the end of the input calls end with OK. A checksum of 0 in a chunk of a
+// mesh is set right.
 #include <algorithm>
 #include <array>
 #include <cmath>

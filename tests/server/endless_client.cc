@@ -1,5 +1,5 @@
-// endless_client HOST:PORT: has a large cloud meshed, prints "running" with the first progress of the refinement, and reads on. A client to
-// be killed.
+// endless_client HOST:PORT: has a large cloud meshed, prints "running" with the first progress of the refinement, and
+// reads on. A client to be killed.
 #include <iostream>
 #include <random>
 #include <vector>

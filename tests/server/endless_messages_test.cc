@@ -1,5 +1,5 @@
-// Messages that announce a gigabyte and come, to the real server, from callers whom it does not know: gRPC would have all of such a
-// message before it looks at its length, and before the server looks at the caller.
+// Messages that announce a gigabyte and come, to the real server, from callers whom it does not know: gRPC would have
+// all of such a message before it looks at its length, and before the server looks at the caller.
 #include <memory>
 #include <string>
 #include <thread>
@@ -18,8 +18,9 @@ namespace {
 
 constexpr uint64_t kMaxMemoryBytes = kMinMemoryBytes;
 constexpr uint64_t kMostReceived = kLeastReceivedBytes + (64 << 20);  // gRPC looks now and then
-// The thread that ends a call waits for its turn, and on a busy machine the other connections are read meanwhile; and what a call held
-// is given back while the next one is read. Far less than what they announce, or than kMostReceived of each.
+// The thread that ends a call waits for its turn, and on a busy machine the other connections are read meanwhile; and
+// what a call held is given back while the next one is read. Far less than what they announce, or than kMostReceived of
+// each.
 constexpr uint64_t kMostReceivedOfMany = 2 * kLeastReceivedBytes;
 constexpr uint32_t kAnnounced = uint32_t{1} << 30;
 

@@ -1,4 +1,5 @@
-// The real server without file descriptors: what it has goes on, what comes is refused, and later it is as if nothing had been.
+// The real server without file descriptors: what it has goes on, what comes is refused, and later it is as if nothing
+// had been.
 #include <dirent.h>
 #include <signal.h>
 #include <sys/resource.h>

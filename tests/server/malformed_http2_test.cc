@@ -1,4 +1,5 @@
-// The real server among clients that speak HTTP/2 badly on purpose: it closes what cannot go on, and serves everybody else.
+// The real server among clients that speak HTTP/2 badly on purpose: it closes what cannot go on, and serves everybody
+// else.
 #include <algorithm>
 #include <string>
 #include <vector>

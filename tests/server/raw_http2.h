@@ -70,8 +70,8 @@ class RawConnection {
   bool Send(std::string_view bytes);
   bool Send(const Frame& frame) { return Send(frame.Serialize()); }
 
-  // Begins as HTTP/2 has it: preface, settings, and the server's settings acknowledged, without which gRPC takes none of its limits for
-  // agreed upon. False when the server has closed the connection.
+  // Begins as HTTP/2 has it: preface, settings, and the server's settings acknowledged, without which gRPC takes none
+  // of its limits for agreed upon. False when the server has closed the connection.
   bool Begin();
 
   // The next frame. None when the server has closed the connection, or sends nothing for a minute: the test has failed.
@@ -79,8 +79,9 @@ class RawConnection {
   // The next frame of `type`; those between are left out.
   std::optional<Frame> ReadUntil(uint8_t type);
 
-  // Begins the connection and on it a call of `path`, and sends one message that says it has `length` bytes, as fast as the windows of
-  // HTTP/2 allow. Ends when the server ends the call or the connection, or when all has been sent. Returns how many bytes were sent.
+  // Begins the connection and on it a call of `path`, and sends one message that says it has `length` bytes, as fast as
+  // the windows of HTTP/2 allow. Ends when the server ends the call or the connection, or when all has been sent.
+  // Returns how many bytes were sent.
   uint64_t SendMessageUntilRefused(std::string_view path, uint32_t length);
 
   // Reads until the server closes the connection. False when it sends nothing for a minute instead.
@@ -89,7 +90,8 @@ class RawConnection {
   // Whether the server answers a ping on this connection. REQUIRES: it has been begun.
   bool IsAlive();
 
-  // Reads to the end of the call on `stream`. Its status, -1 when the server gave up the call or the connection without one.
+  // Reads to the end of the call on `stream`. Its status, -1 when the server gave up the call or the connection without
+  // one.
   // REQUIRES: it is the first of the connection to have one, so that its trailers stand there literally.
   int ReadStatus(uint32_t stream);
 

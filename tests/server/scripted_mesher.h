@@ -22,8 +22,8 @@ MesherFactory FixedMesher(core::Mesh mesh);
 // Works in `phase` until its context is cancelled, and calls `begun` before.
 PhaseScript EndlessIn(core::Phase phase, std::function<void()> begun);
 
-// A mesh of `simplex_count` simplices in 3-D, which no geometry would allow: the arrays are as long as they would be, and have something
-// else in every row.
+// A mesh of `simplex_count` simplices in 3-D, which no geometry would allow: the arrays are as long as they would be,
+// and have something else in every row.
 core::Mesh MakeLargeMesh(uint64_t simplex_count);
 
 }  // namespace wellspace::server

@@ -125,7 +125,8 @@ TEST(Server, WatchersOfHealthAreToldThatItStops) {
   EXPECT_FALSE(one.Finish().ok());
 }
 
-// Asks for all services by reflection. Its messages are not packaged either, but the server's library has them compiled in.
+// Asks for all services by reflection. Its messages are not packaged either, but the server's library has them compiled
+// in.
 class ListServices final : public grpc::ClientBidiReactor<grpc::ByteBuffer, grpc::ByteBuffer> {
  public:
   explicit ListServices(const std::shared_ptr<grpc::Channel>& channel) : stub_(channel) {

@@ -1,4 +1,5 @@
-// A server in the test's process with a mesher of the test's choice, and a client that speaks the protocol message by message.
+// A server in the test's process with a mesher of the test's choice, and a client that speaks the protocol message by
+// message.
 #ifndef WELLSPACE_TESTS_SERVER_SERVICE_HARNESS_H_
 #define WELLSPACE_TESTS_SERVER_SERVICE_HARNESS_H_
 
@@ -31,7 +32,8 @@ class Event {
   bool set_ = false;
 };
 
-// No mesh, but the arrays of one: the points, then the corners of the box; a simplex per vertex; every input point its own vertex.
+// No mesh, but the arrays of one: the points, then the corners of the box; a simplex per vertex; every input point its
+// own vertex.
 core::Mesh MakeFakeMesh(const core::MeshParameters& parameters, std::span<const double> points);
 absl::StatusOr<core::Mesh> FakeMesher(const core::MeshParameters& parameters, std::span<const double> points,
                                       core::RunContext& context);

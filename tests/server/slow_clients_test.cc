@@ -1,4 +1,5 @@
-// The real server among many clients that begin and never finish ("slow loris"): it serves the others meanwhile, and lets go in the end.
+// The real server among many clients that begin and never finish ("slow loris"): it serves the others meanwhile, and
+// lets go in the end.
 #include <memory>
 #include <string>
 #include <vector>

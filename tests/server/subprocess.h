@@ -16,8 +16,8 @@ namespace wellspace::server {
 // Thread safety: thread-compatible.
 class Subprocess {
  public:
-  // Starts WELLSPACE_BIN_DIR/`name`. Its standard output is read here, its standard error is the test's, or goes to the file
-  // `error_path`.
+  // Starts WELLSPACE_BIN_DIR/`name`. Its standard output is read here, its standard error is the test's, or goes to the
+  // file `error_path`.
   Subprocess(const std::string& name, std::vector<std::string> arguments, const std::string& error_path = "");
   ~Subprocess();
   Subprocess(const Subprocess&) = delete;

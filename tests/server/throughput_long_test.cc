@@ -1,4 +1,5 @@
-// What the service costs on top of what it uses: of gRPC to carry bytes, of the core to make a mesh. Ratios of one run, never seconds.
+// What the service costs on top of what it uses: of gRPC to carry bytes, of the core to make a mesh. Ratios of one run,
+// never seconds.
 #include <algorithm>
 #include <cstdio>
 #include <functional>
@@ -166,8 +167,8 @@ TEST(Throughput, OfADownloadIsAtLeastSixtyPercentOfABareStream) {
   EXPECT_GE(ratio, 0.6);
 }
 
-// The core alone, and the same cloud through a session: uploaded, refined, downloaded. In 2-D, where a mesh of that size takes the core
-// least time.
+// The core alone, and the same cloud through a session: uploaded, refined, downloaded. In 2-D, where a mesh of that
+// size takes the core least time.
 TEST(Throughput, OfARemoteMeshIsThatOfTheCoreButFifteenPercent) {
   constexpr uint64_t kVertices = 1'000'000;
   const std::vector<double> points = UniformPoints(50'000, 2, 8);

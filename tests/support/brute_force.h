@@ -71,7 +71,8 @@ std::optional<core::Sign> ExactSide(std::span<const IntegerPoint<D>> vertices, s
 template <int D>
 std::set<NodeName<D>> NamesOf(const core::Polytope<D>& cell);
 
-// Invariant (1) of Polytope: a graph of a simple polytope, connected, whose faces obey the formula of Euler and Poincare.
+// Invariant (1) of Polytope: a graph of a simple polytope, connected, whose faces obey the formula of Euler and
+// Poincare.
 template <int D>
 ::testing::AssertionResult IsSimplePolytope(const core::Polytope<D>& cell);
 
@@ -100,7 +101,8 @@ void CutByAllInBox(const core::QueryStructure<D>& structure, core::VertexId v, c
 template <int D>
 double NearestDistanceSq(const core::QueryStructure<D>& structure, core::VertexId v);
 
-// The least r such that two features are within r of x: two points, or a point and a face of the box that it does not lie on.
+// The least r such that two features are within r of x: two points, or a point and a face of the box that it does not
+// lie on.
 template <int D>
 double LocalFeatureSize(const core::Box<D>& box, const std::vector<core::Point<D>>& points, const core::Point<D>& x);
 
@@ -108,8 +110,8 @@ double LocalFeatureSize(const core::Box<D>& box, const std::vector<core::Point<D
 template <int D>
 std::vector<core::Point<D>> ToPoints(std::span<const double> cloud);
 
-// The points of a cloud as QueryStructure wants them: sorted in the Morton order of `grid`, of several in one cube of it
-// the first.
+// The points of a cloud as QueryStructure wants them: sorted in the Morton order of `grid`, of several in one cube of
+// it the first.
 template <int D>
 std::vector<core::Point<D>> MortonSorted(const core::MortonGrid<D>& grid, std::vector<core::Point<D>> points);
 

@@ -16,8 +16,8 @@ namespace wellspace::test {
 template <int D>
 bool DoMeet(const core::Point<D>& site, const std::array<core::PlaneSource<D>, D>& planes);
 
-// Whether each coordinate of `x` is within a relative error of 2^-bits of that of the point, relative to `site`, where the
-// planes meet.
+// Whether each coordinate of `x` is within a relative error of 2^-bits of that of the point, relative to `site`, where
+// the planes meet.
 template <int D>
 ::testing::AssertionResult IsMeetingPointTo(int bits, const core::Point<D>& site,
                                             const std::array<core::PlaneSource<D>, D>& planes, const core::Point<D>& x);

@@ -44,9 +44,9 @@ BothTriangulations Quadrilateral(const std::vector<double>& abcd);
 // Bipyramid with triangle a b c and apexes d above and e below: two tetrahedra at a b c, three around d e.
 BothTriangulations Bipyramid(const std::vector<double>& abcde);
 
-// In any dimension: D corners of a facet and an apex at a distance of `height` on either side of it; two simplices at the
-// facet, D around the line between the apexes. The facet's corners are at a distance of 1 to its middle, so the first is
-// Delaunay for height > 1 only, the second for height < 1 only.
+// In any dimension: D corners of a facet and an apex at a distance of `height` on either side of it; two simplices at
+// the facet, D around the line between the apexes. The facet's corners are at a distance of 1 to its middle, so the
+// first is Delaunay for height > 1 only, the second for height < 1 only.
 BothTriangulations TwoApexes(int dimension, double height);
 
 }  // namespace wellspace::test

@@ -1,4 +1,5 @@
-// The commands of the tool. Each function adds one to `app`, or a few that belong together; when one is run, it sets `exit_code`.
+// The commands of the tool. Each function adds one to `app`, or a few that belong together; when one is run, it sets
+// `exit_code`.
 #ifndef WELLSPACE_CLIENT_CLI_COMMANDS_COMMANDS_H_
 #define WELLSPACE_CLIENT_CLI_COMMANDS_COMMANDS_H_
 

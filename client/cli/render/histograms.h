@@ -21,7 +21,8 @@ struct Histogram {
   std::vector<uint64_t> counts{};
 };
 
-// Paints the histograms one beside the other under `caption`, counts on a logarithmic scale, so that a single simplex shows.
+// Paints the histograms one beside the other under `caption`, counts on a logarithmic scale, so that a single simplex
+// shows.
 //
 // Errors:     of writing; nothing is left half written.
 absl::Status WriteHistograms(const std::vector<Histogram>& histograms, const std::string& caption, PictureFormat format,

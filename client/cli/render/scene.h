@@ -45,8 +45,8 @@ struct View {
 // triangulation, whose circumcentres follow each other along any line.
 //
 // Complexity: O(m + f log f) for m simplices and f visible facets.
-// Errors:     INVALID_ARGUMENT for a mesh of more than three dimensions, one with nothing to draw, a plane of a 2-D mesh, a normal of no direction, or
-//             coordinates whose extent is beyond the range of double.
+// Errors:     INVALID_ARGUMENT for a mesh of more than three dimensions, one with nothing to draw, a plane of a 2-D
+//             mesh, a normal of no direction, or coordinates whose extent is beyond the range of double.
 // Source:     Edelsbrunner, "An acyclicity theorem for cell complexes in d dimensions", 1990; Max, Hanrahan, Crawfis,
 //             "Area and volume coherence for efficient visualization of 3D scalar functions", 1990.
 absl::StatusOr<Scene> MakeScene(const formats::MeshView& mesh, const View& view);

@@ -6,7 +6,8 @@
 
 namespace wellspace::core {
 
-// Two lines of a cache, which are fetched together: what one thread writes is then not taken from another that is near it in memory.
+// Two lines of a cache, which are fetched together: what one thread writes is then not taken from another that is near
+// it in memory.
 inline constexpr size_t kCacheLines = 128;
 
 }  // namespace wellspace::core

@@ -13,8 +13,8 @@
 
 namespace wellspace::core {
 
-// For arrays that are filled as they grow: those of at least one large page have a mapping of their own, smaller ones share large pages, and small ones
-// lie on the heap.
+// For arrays that are filled as they grow: those of at least one large page have a mapping of their own, smaller ones
+// share large pages, and small ones lie on the heap.
 template <typename T>
 struct HugePageAllocator {
   using value_type = T;

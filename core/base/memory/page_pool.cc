@@ -35,7 +35,8 @@ double TimeOfSmallPages() {
   return time * (kHugePage / kMeasured);
 }
 
-// Asks for the pages that memory which has just been mapped is to be brought in by. Advice: nothing is lost if it is not taken.
+// Asks for the pages that memory which has just been mapped is to be brought in by. Advice: nothing is lost if it is
+// not taken.
 void ChoosePages(std::byte* memory, size_t bytes) {
   static PageChoice choice;
   if (!choice.TakesLarge(bytes)) {

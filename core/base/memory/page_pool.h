@@ -11,16 +11,17 @@
 
 namespace wellspace::core {
 
-// Maps so many bytes, rounded up to whole pages of 2 MiB, to the beginning of one, and, unless they are dear (PageChoice), asks for such pages: one fault brings
-// one in, where small ones take 512. What is given back then is the system's at once, where the heap would keep it: arrays that are moved as they grow leave more than they need
-// behind. Throws std::bad_alloc if the system has none.
+// Maps so many bytes, rounded up to whole pages of 2 MiB, to the beginning of one, and, unless they are dear
+// (PageChoice), asks for such pages: one fault brings one in, where small ones take 512. What is given back then is the
+// system's at once, where the heap would keep it: arrays that are moved as they grow leave more than they need behind.
+// Throws std::bad_alloc if the system has none.
 void* MapHugePages(size_t bytes);
 
 // Takes back what MapHugePages(bytes) returned.
 void UnmapHugePages(void* memory, size_t bytes);
 
-// Arrays smaller than a large page, in runs of small ones: the first by address that is free. Large pages are mapped as they are needed; one on which
-// nothing is left is the system's at once.
+// Arrays smaller than a large page, in runs of small ones: the first by address that is free. Large pages are mapped as
+// they are needed; one on which nothing is left is the system's at once.
 //
 // Thread safety: thread-safe.
 class PagePool {

@@ -14,8 +14,8 @@ inline void PrefetchLine(const void* address) {
   asm volatile("");  // a function that did nothing else would have no effect for g++, which drops calls of such
 }
 
-// For items that are worked on one after the other, where what the work begins with is found in steps: calls prefetch(item, step) for those that
-// come some places after the one in place `at`, the first step the farthest ahead.
+// For items that are worked on one after the other, where what the work begins with is found in steps: calls
+// prefetch(item, step) for those that come some places after the one in place `at`, the first step the farthest ahead.
 template <typename T, typename Prefetch>
 void PrefetchAhead(std::span<T> items, size_t at, Prefetch prefetch) {
   constexpr std::array<size_t, 3> kAhead = {8, 4, 2};

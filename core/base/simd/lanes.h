@@ -41,7 +41,8 @@ inline VectorUnit BestVectorUnit() { return Has(VectorUnit::kAvx2) ? VectorUnit:
 #define WELLSPACE_AVX2
 #endif
 
-// Doubles in one vector, what a comparison of them gives (-1 where it holds, else 0), and as wide a vector of integers of 32 bits.
+// Doubles in one vector, what a comparison of them gives (-1 where it holds, else 0), and as wide a vector of integers
+// of 32 bits.
 template <size_t kWidth>
 struct Wide;
 template <>

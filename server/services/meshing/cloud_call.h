@@ -20,8 +20,9 @@
 
 namespace wellspace::server {
 
-// A Call whose requests go to a CloudReceiver; at their end a job is queued; what becomes of its result is up to the class that derives
-// from this. `Reactor` is gRPC's, for the kind of stream that answers; it reads bytes, which are `Request`s.
+// A Call whose requests go to a CloudReceiver; at their end a job is queued; what becomes of its result is up to the
+// class that derives from this. `Reactor` is gRPC's, for the kind of stream that answers; it reads bytes, which are
+// `Request`s.
 //
 // Thread safety and invariants: those of RequestStream.
 template <typename Reactor, typename Request>

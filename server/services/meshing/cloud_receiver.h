@@ -35,8 +35,8 @@ class PointChunks {
   uint64_t coordinate_count_ = 0;
 };
 
-// Checks the order and the contents of the requests of one call and keeps the points. Fast enough for a reaction: no coordinate is
-// looked at or copied.
+// Checks the order and the contents of the requests of one call and keeps the points. Fast enough for a reaction: no
+// coordinate is looked at or copied.
 //
 // Thread safety: thread-compatible.
 // Invariants: never holds more than options.max_points points.

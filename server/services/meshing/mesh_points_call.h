@@ -16,8 +16,8 @@
 
 namespace wellspace::server {
 
-// A CloudCall whose job meshes. A tick of the background thread looks at the job's progress; the finished mesh is sent chunk by chunk,
-// each made when it can be written.
+// A CloudCall whose job meshes. A tick of the background thread looks at the job's progress; the finished mesh is sent
+// chunk by chunk, each made when it can be written.
 //
 // Thread safety and invariants: those of ResponseStream.
 class MeshPointsCall final

@@ -17,7 +17,8 @@
 namespace wellspace::server {
 namespace {
 
-// A batch is full when it has as many bytes: what one more look adds leaves it within kMaxResponseBytes, cells in 6-D excepted.
+// A batch is full when it has as many bytes: what one more look adds leaves it within kMaxResponseBytes, cells in 6-D
+// excepted.
 constexpr uint64_t kFullBatchBytes = kMaxResponseBytes / 4 * 3;
 
 // Before a job comes again that found the line full, or the structure being built by another.

@@ -19,11 +19,12 @@
 
 namespace wellspace::server {
 
-// Answers in batches of about kMaxResponseBytes, made by jobs. A job makes batches until kBatchesAhead wait to be written, and another
-// goes on when half of them are: a client that reads slowly takes no worker's time, and no more memory than that. A job that finds the
-// line full comes again, unless it is the first: what was begun is not refused.
+// Answers in batches of about kMaxResponseBytes, made by jobs. A job makes batches until kBatchesAhead wait to be
+// written, and another goes on when half of them are: a client that reads slowly takes no worker's time, and no more
+// memory than that. A job that finds the line full comes again, unless it is the first: what was begun is not refused.
 //
-// All batches of an answer are of the same structure: once it changes the call ends with SESSION_BUSY or REVISION_MISMATCH.
+// All batches of an answer are of the same structure: once it changes the call ends with SESSION_BUSY or
+// REVISION_MISMATCH.
 //
 // Thread safety: thread-safe.
 // Invariants: those of ResponseStream; at most one job is under way.
