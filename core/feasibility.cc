@@ -56,12 +56,18 @@ absl::Status WithPayload(absl::Status status) {
   return status;
 }
 
+// A number for a message, which may be past what doubles have.
+std::string AboutText(double number) {
+  return std::isfinite(number) ? absl::StrFormat("%.2g", number) : "1e308 or more";
+}
+
 template <int D>
 absl::Status TooFine(std::string_view what, double typical, double least, uint64_t most, std::string_view what_fits) {
+  const double predicted = std::max(typical, least);
   return WithPayload(absl::ResourceExhaustedError(absl::StrFormat(
-      "%s takes about %.2g vertices and %.2g MB, and at least %.2g vertices, more than max_vertices = %d; "
+      "%s takes about %s vertices and %s MB, and at least %s vertices, more than max_vertices = %d; "
       "%s, or raise max_vertices",
-      what, std::max(typical, least), MegabytesFor<D>(std::max(typical, least)), least, most, what_fits)));
+      what, AboutText(predicted), AboutText(MegabytesFor<D>(predicted)), AboutText(least), most, what_fits)));
 }
 
 // The size that asks for most.

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstdlib>
 #include <iostream>
-#include <thread>
 
+#include "server/base/resources.h"
 #include "server/server.h"
 #include "spdlog/sinks/null_sink.h"
 
@@ -25,7 +25,7 @@ T ValueOrAbort(absl::StatusOr<T> value) {
 std::unique_ptr<Server> StartWithoutListener(int workers) {
   ServerOptions options;
   options.service.workers = std::max(1, workers);
-  options.service.max_threads = std::max(1u, std::thread::hardware_concurrency());
+  options.service.max_threads = ReadResources().processors;
   // The process's own machine is the limit: nobody else is to be protected.
   options.service.max_points = core::kMaxVertices;
   options.service.max_vertices = core::kMaxVertices;

@@ -157,7 +157,7 @@ void Server::Shutdown(absl::Duration grace) {
     server_->GetHealthCheckService()->SetServingStatus(false);
     backend_.calls().Close();
     const absl::Duration end = SinceBoot() + grace;
-    // Work that nobody watches gets to its end, too.
+    // Unwatched work gets to its end, too.
     if (!backend_.calls().WaitUntilEmpty(grace) || !backend_.jobs().WaitUntilIdle(end - SinceBoot())) {
       backend_.calls().AbortAll();
     }

@@ -71,8 +71,8 @@ class Server {
   absl::StatusOr<std::shared_ptr<grpc::Channel>> InProcessChannel();
 
   // Not serving from now on: health says so, new calls end with UNAVAILABLE. Calls and jobs that are under way,
-  // operations that nobody watches among them, may go on for `grace`; calls then end with UNAVAILABLE, and jobs with
-  // the server. Returns when all have ended, shortly after `grace` at the latest. Further calls return at once.
+  // unwatched operations among them, may go on for `grace`; calls then end with UNAVAILABLE, and jobs with the server.
+  // Returns when all have ended, shortly after `grace` at the latest. Further calls return at once.
   //
   // REQUIRES:   grace is finite.
   void Shutdown(absl::Duration grace);

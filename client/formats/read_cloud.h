@@ -41,7 +41,7 @@ namespace wellspace::formats {
 
 struct CloudOptions {
   std::string format;  // empty: by the file's extension; standard input is csv
-  int dimension = 0;   // that the file must have; 0: as many as it has columns
+  int dimension = 0;   // that the file must have; 0: as many as it has columns, of a table without names at most three
   // The columns that hold the coordinates, in this order: names, in any case, or numbers counted from 1. Empty: see
   // above. Columns of ply are the properties of its vertices; those of node, obj, off and npy the coordinates, which
   // are x, y, z up to 3-D.

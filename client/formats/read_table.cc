@@ -198,7 +198,8 @@ absl::Status TableReader::Choose(std::string_view line, size_t fields, std::vect
           absl::StrCat(named.problem, "; expected names such as x and y, or --columns with names or numbers"));
     }
   }
-  if (columns.empty()) {
+  const bool are_named = !columns.empty();
+  if (!are_named) {
     const size_t count = unnamed_ == Unnamed::kFirstThree ? std::max(kNamedAxes, wanted) : fields;
     columns.resize(std::min(count, fields));
     std::iota(columns.begin(), columns.end(), size_t{0});
@@ -207,6 +208,12 @@ absl::Status TableReader::Choose(std::string_view line, size_t fields, std::vect
     // What is no number at all is the better reason.
     const absl::Status row = names_.empty() ? CheckNumbers(line, columns) : absl::OkStatus();
     return row.ok() ? status : row;
+  }
+  // A fourth column is an intensity or a colour more often than a coordinate, and a mesh in 4-D of it would be no help.
+  if (!are_named && wanted == 0 && columns.size() > kNamedAxes) {
+    return reader_.Error(absl::StrCat(columns.size(), " columns without names of coordinates: expected ",
+                                      ColumnsOption(columns, 2), " or ", ColumnsOption(columns, kNamedAxes),
+                                      " or others that are, or --dimension ", columns.size(), " if all are"));
   }
   NoteColumns(columns, fields);
   return absl::OkStatus();

@@ -16,8 +16,8 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "absl/time/clock.h"
 #include "core/base/status_macros.h"
+#include "server/base/clock.h"
 #include "server/network/listening_sockets.h"
 
 namespace wellspace::server {
@@ -162,7 +162,7 @@ void Listener::HandOver(int socket, FileDescriptor connection, const sockaddr_st
 }
 
 void Listener::LogTrouble(const std::string& what) {
-  const absl::Time now = absl::Now();
+  const absl::Duration now = SinceBoot();
   if (now - last_log_ < kLogInterval) {
     ++unlogged_;
     return;

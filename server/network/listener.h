@@ -70,7 +70,7 @@ class Listener {
   FileDescriptor stop_;                 // readable when the thread is to end
   std::thread thread_;
   // The thread's.
-  absl::Time last_log_ = absl::InfinitePast();
+  absl::Duration last_log_ = -absl::InfiniteDuration();  // since boot
   uint64_t unlogged_ = 0;
 };
 

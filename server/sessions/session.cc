@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -13,10 +12,6 @@ namespace wellspace::server {
 namespace {
 
 constexpr size_t kKeptOperations = 100;
-
-// A vertex that is added takes as much memory as this many of those that there are, at most in all but the most uneven
-// clouds.
-constexpr uint64_t kReservedVertices = 2;
 
 }  // namespace
 
@@ -374,180 +369,6 @@ grpc::Status Session::Query(uint64_t* version, const std::function<grpc::Status(
     running.lock();  // at once: whoever waits for queries has made the session busy before
   }
   return query(*mesher);
-}
-
-grpc::Status Session::PrepareStructure(uint64_t expected_revision, const MesherFactory& create_mesher, Job& job,
-                                       bool* is_at_work) {
-  {
-    std::lock_guard lock(mutex_);
-    if (is_at_work != nullptr) {
-      *is_at_work = busy_ == Busy::kReplaying && !is_closed_;
-    }
-    if (grpc::Status status = CheckReadyForChange(expected_revision); !status.ok()) {
-      return status;
-    }
-    if (grpc::Status status = CheckMesh(); !status.ok() || work_.mesher != nullptr) {
-      return status;
-    }
-    busy_ = Busy::kReplaying;
-  }
-  const grpc::Status status = RunGuarded([&] { return Rebuild(create_mesher, job); });
-  job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();
-  std::lock_guard lock(mutex_);
-  busy_ = Busy::kNo;
-  last_use_ = clock_.since_boot();
-  return status;
-}
-
-Session::Size Session::GetSize(uint64_t few) const {
-  std::lock_guard lock(mutex_);
-  Size size;
-  size.points = points_.coordinate_count() / dimension_;
-  if (size.points <= few) {
-    size.some_points = points_.CopyFrom(0, core::RunContext()).value_or(std::vector<double>());
-  }
-  if (work_.mesh != nullptr) {
-    size.vertices = work_.mesh->chunks.mesh().vertex_count();
-    // Of a session that is busy the mesher is not looked at.
-    const bool is_given_up = busy_ == Busy::kReplaying || (busy_ == Busy::kNo && work_.mesher == nullptr);
-    size.replayed_steps = is_given_up ? steps_.all().size() : 0;
-  }
-  return size;
-}
-
-grpc::Status Session::Rebuild(const MesherFactory& create_mesher, Job& job) {
-  absl::StatusOr<std::unique_ptr<core::Mesher>> mesher =
-      Replay(steps_, points_, work_.mesh->chunks.mesh(), create_mesher, job);
-  if (!mesher.ok()) {
-    return FromCoreStatus(mesher.status());
-  }
-  work_.mesher = *std::move(mesher);
-  work_.memory = job.TakeMemory(work_.mesher->memory_bytes());
-  work_.memory.MakeLasting();
-  return grpc::Status::OK;
-}
-
-void Session::WaitForQueries() { std::unique_lock wait(queries_mutex_); }
-
-grpc::Status Session::AddVertices(std::span<const double> points, std::span<const uint32_t> near,
-                                  uint64_t expected_revision, core::RunContext& context, AddedVertices* added) {
-  {
-    std::lock_guard lock(mutex_);
-    if (grpc::Status status = CheckReadyForChange(expected_revision); !status.ok()) {
-      return status;
-    }
-    if (grpc::Status status = CheckStructure(); !status.ok()) {
-      return status;
-    }
-    if (points.size() % dimension_ != 0) {
-      return MakeError(
-          v1::ERROR_REASON_INVALID_CHUNK_SHAPE,
-          absl::StrCat("there are ", points.size(), " coordinates; expected a multiple of the dimension ", dimension_),
-          "points");
-    }
-    if (!near.empty() && near.size() != points.size() / dimension_) {
-      return MakeError(v1::ERROR_REASON_INVALID_REQUEST,
-                       absl::StrCat("near has ", near.size(), " vertices for ", points.size() / dimension_,
-                                    " points; expected as many, or none"),
-                       "near");
-    }
-    if (grpc::Status status = TakePoints(points.size() / dimension_); !status.ok()) {
-      return status;
-    }
-    busy_ = Busy::kAddingVertices;
-  }
-  WaitForQueries();
-  uint64_t uploaded = 0;
-  bool has_returned = false;
-  grpc::Status status = RunGuarded([&] {
-    grpc::Status ended = AddToMesher(points, near, context, &uploaded, &added->vertices);
-    has_returned = true;
-    return ended;
-  });
-  if (!has_returned || (!status.ok() && uploaded > 0)) {
-    // Nobody knows what a mesher is like that an exception went through, and points that waited are in it that would
-    // come with others.
-    work_.mesher = nullptr;
-    work_.memory.Release();
-  } else if (memory_.is_limited()) {
-    // What was reserved is more than was needed but for the most uneven points; those are counted by the next
-    // refinement.
-    (void)work_.memory.Resize(work_.mesher->memory_bytes());
-  }
-  std::lock_guard lock(mutex_);
-  busy_ = Busy::kNo;
-  last_use_ = clock_.since_boot();
-  const uint64_t count = points.size() / dimension_;
-  if (!status.ok()) {
-    ReturnPoints(count);
-    return status;
-  }
-  if (uploaded > 0 || count > 0) {
-    const uint64_t uploads_end = work_.meshed_points + uploaded;
-    steps_.NoteAddition(uploads_end, uploads_end + count);
-    work_.meshed_points = steps_.points();
-    ++structure_version_;
-  }
-  if (count > 0) {
-    points_.Append(points);
-    is_ready_ = false;
-    ++revision_;
-  }
-  added->revision = revision_;
-  return status;
-}
-
-grpc::Status Session::CheckVertices(std::span<const double> points, std::span<const uint32_t> near,
-                                    uint64_t waiting) const {
-  const uint64_t most = work_.mesher->vertex_count() + waiting;
-  const auto missing = std::ranges::find_if(near, [most](uint32_t vertex) { return vertex >= most; });
-  if (missing != near.end()) {
-    return MakeError(v1::ERROR_REASON_VERTEX_OUT_OF_RANGE,
-                     absl::StrCat("near[", missing - near.begin(), "] is ", *missing, ", and no vertex; there are ",
-                                  work_.mesher->vertex_count()),
-                     "near");
-  }
-  return CheckCoordinates(0, points);
-}
-
-grpc::Status Session::AddToMesher(std::span<const double> points, std::span<const uint32_t> near,
-                                  core::RunContext& context, uint64_t* uploaded, std::vector<uint32_t>* vertices) {
-  if (grpc::Status status = ReserveForVertices(point_count_ - work_.meshed_points); !status.ok()) {
-    return status;
-  }
-  // Points that were uploaded since the last refinement come first: they have lower numbers.
-  const absl::StatusOr<std::vector<double>> waiting = points_.CopyFrom(work_.meshed_points * dimension_, context);
-  if (!waiting.ok()) {
-    return FromCoreStatus(waiting.status());
-  }
-  if (!waiting->empty()) {
-    // What is wrong with the vertices shows before the mesher has taken in others, which would cost it.
-    if (grpc::Status status = CheckVertices(points, near, waiting->size() / dimension_); !status.ok()) {
-      return status;
-    }
-    if (const absl::Status done = work_.mesher->AddPoints(*waiting, context).status(); !done.ok()) {
-      return FromCoreStatus(done);
-    }
-    *uploaded = waiting->size() / dimension_;
-  }
-  absl::StatusOr<std::vector<uint32_t>> added = work_.mesher->AddPointsNear(points, near, context);
-  if (added.ok()) {
-    *vertices = *std::move(added);
-  }
-  return added.status().code() == absl::StatusCode::kOutOfRange
-             ? MakeError(v1::ERROR_REASON_VERTEX_OUT_OF_RANGE, std::string(added.status().message()), "near")
-             : FromCoreStatus(added.status());
-}
-
-grpc::Status Session::ReserveForVertices(uint64_t count) {
-  if (!memory_.is_limited()) {
-    return grpc::Status::OK;
-  }
-  const uint64_t bytes = work_.mesher->memory_bytes();
-  const uint64_t wanted =
-      bytes + kReservedVertices * count * (bytes / std::max<uint64_t>(1, work_.mesher->vertex_count()));
-  return work_.memory.Resize(wanted) ? grpc::Status::OK
-                                     : FromCoreStatus(memory_.Refusal(wanted, "the vertices of a session"));
 }
 
 grpc::Status Session::StartOperation(const core::MeshParameters& parameters, uint64_t expected_revision,

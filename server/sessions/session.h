@@ -20,12 +20,13 @@
 #include "core/mesher.h"
 #include "grpcpp/support/status.h"
 #include "server/base/clock.h"
+#include "server/base/mesh_functions.h"
 #include "server/base/options.h"
+#include "server/jobs/jobs.h"
 #include "server/jobs/memory_budget.h"
 #include "server/sessions/mesh_chunks.h"
 #include "server/sessions/operation.h"
 #include "server/sessions/point_store.h"
-#include "server/sessions/replay.h"
 #include "server/sessions/session_steps.h"
 #include "wellspace/v1/sessions.pb.h"
 
@@ -231,6 +232,9 @@ class Session {
   void WaitForQueries();
   // Without it, while the mesher is being built again: what it is built by.
   grpc::Status Rebuild(const MesherFactory& create_mesher, Job& job);
+  // Without it: what AddVertices does before the mesher is touched; keeps others from the session then.
+  grpc::Status BeginAddition(std::span<const double> points, std::span<const uint32_t> near,
+                             uint64_t expected_revision);
   // Without it, while vertices are being added: the part that is the mesher's. `*uploaded` of the points that waited
   // are in it then, on an error too.
   grpc::Status AddToMesher(std::span<const double> points, std::span<const uint32_t> near, core::RunContext& context,

@@ -142,7 +142,6 @@ TEST_F(ReadTableTest, SaysWhichColumnsWereTaken) {
             "others");
   EXPECT_EQ(note("a.xyz", "1 2 3 4 5\n"),
             "a.xyz: columns 1, 2, 3 are taken as coordinates, and columns 4, 5 are not; --columns takes others");
-  EXPECT_EQ(note("a.csv", "1,2,3,4\n"), "a.csv: columns 1, 2, 3, 4 are taken as coordinates; --columns takes others");
   EXPECT_EQ(note("a.csv", "lat,lon\n1,2\n"),
             "a.csv: columns 2 \"lon\", 1 \"lat\" are taken as coordinates; --columns takes others");
   EXPECT_EQ(note("a.csv", "1,2,3\n"), "");
@@ -192,6 +191,10 @@ TEST_F(ReadTableTest, MoreColumnsThanDimensionsNameTheOption) {
       "a.csv:2: expected 2 coordinates, got 3 (columns 1 \"x\", 2 \"y\", 3 \"z\"); --columns 1,2 takes 2 of them");
   EXPECT_THAT(ReadBad("a.csv", "1,2,3,4\n", {.format = "", .dimension = 3}), HasSubstr("--columns 1,2,3 takes 3"));
   EXPECT_THAT(ReadBad("a.csv", "1,2,3,4,5,6,7,8,9,10\n"), HasSubstr("--columns 1,2,3 takes three"));
+  EXPECT_EQ(ReadBad("a.csv", "1,2,3,4\n"),
+            "a.csv:1: 4 columns without names of coordinates: expected --columns 1,2 or --columns 1,2,3 or others that "
+            "are, or --dimension 4 if all are");
+  EXPECT_THAT(ReadBad("a.csv", "a b c d e f\n1 2 3 4 5 6\n"), HasSubstr("or --dimension 6 if all are"));
   EXPECT_THAT(ReadBad("a.xyz", "1 2 3\n", plane), HasSubstr("--columns 1,2"));
   EXPECT_THAT(ReadBad("a.node", "1 3 0 0\n1 1 2 3\n", plane), HasSubstr("--columns 1,2"));
   EXPECT_THAT(ReadBad("a.obj", "v 1 2 3\n", plane), HasSubstr("--columns 1,2"));

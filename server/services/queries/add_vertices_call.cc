@@ -89,7 +89,7 @@ void AddVerticesCall::Submit(RequestIds::Done done) {
 void AddVerticesCall::OnEnd() {
   // A call with a request_id may be repeated by one that waits for the same answer.
   if (job_ != nullptr && request_->request_id().empty()) {
-    job_->Cancel();
+    environment().jobs.Cancel(job_);  // it may wait for memory, to have the structure built
   }
 }
 

@@ -484,7 +484,7 @@ TEST_F(OperationServiceTest, AStoppingServerEndsWatchesAndWork) {
 }
 
 // "A detached refinement dies with SIGTERM, though running work gets to its end".
-TEST_F(OperationServiceTest, WorkThatNobodyWatchesGetsToItsEndBeforeAServerStops) {
+TEST_F(OperationServiceTest, UnwatchedWorkGetsToItsEndBeforeAServerStops) {
   Event begun;
   Event go_on;
   script_.Set([&](core::Phase phase, core::RunContext& context) {
@@ -515,7 +515,7 @@ TEST_F(OperationServiceTest, WorkThatNobodyWatchesGetsToItsEndBeforeAServerStops
   }
 }
 
-TEST_F(OperationServiceTest, WorkThatNobodyWatchesEndsWithTheGracePeriod) {
+TEST_F(OperationServiceTest, UnwatchedWorkEndsWithTheGracePeriod) {
   Event begun;
   script_.Set(EndlessIn(core::Phase::kRefinement, [&] { begun.Set(); }));
   calls_.Start(MakeSession());
