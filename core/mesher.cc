@@ -155,7 +155,7 @@ class MesherIn final : public Mesher {
   }
 
   absl::Status Refine(const MeshParameters& parameters, RunContext& context) override {
-    WELLSPACE_RETURN_IF_ERROR(CheckFeasible(parameters));
+    WELLSPACE_RETURN_IF_ERROR(CheckParameters(parameters));
     context.EnterPhase(Phase::kRefinement);
     is_refined_ = false;
     const MeshCriteria<D> demands = DemandsOf(parameters);

@@ -104,9 +104,9 @@ class Mesher {
   //
   // Complexity: O(m) queries the first time and for other demands than the last; else in proportion to what was added
   //             since.
-  // Errors:     those of CheckFeasible, before anything is done; RESOURCE_EXHAUSTED (max_vertices, smallest edge,
-  //             memory of the context), CANCELLED, DEADLINE_EXCEEDED. Resumable: a later call goes on where this was
-  //             left, and its mesh depends on it.
+  // Errors:     INVALID_ARGUMENT (parameters), RESOURCE_EXHAUSTED (max_vertices, smallest edge, memory of the
+  //             context), CANCELLED, DEADLINE_EXCEEDED. Resumable: a later call goes on where this was left, and its
+  //             mesh depends on it.
   // Threads:    uses parameters.threads, at most as many as the machine has cores.
   // Source:     [HT08] Figure 4; docs/design/sliver.md.
   virtual absl::Status Refine(const MeshParameters& parameters, RunContext& context) = 0;

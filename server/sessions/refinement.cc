@@ -75,6 +75,7 @@ absl::Status BringBack(const CallEnvironment& environment, const Session& sessio
 absl::StatusOr<core::Mesh> MeshAgain(const Session& session, const core::MeshParameters& parameters,
                                      core::RunContext& context, SessionWork& work, bool* has_changed) {
   context.EnterPhase(core::Phase::kTree);
+  WELLSPACE_RETURN_IF_ERROR(work.mesher->CheckFeasible(parameters));
   {
     WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> points,
                                session.points().CopyFrom(work.meshed_points * parameters.dimension, context));

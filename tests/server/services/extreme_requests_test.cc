@@ -105,8 +105,8 @@ TEST(Refinement, OfDemandsThatAreTooFineEndsAtOnce) {
   ServiceHarness harness(core::MeshPoints);
   SessionCalls calls(harness.channel());
   v1::CreateSessionRequest create;
-  create.mutable_session()->mutable_parameters()->set_dimension(2);
-  create.mutable_session()->mutable_parameters()->set_max_circumradius(1e-6);
+  create.mutable_parameters()->set_dimension(2);
+  create.mutable_parameters()->set_max_circumradius(1e-6);
   const std::string name = calls.Create(create).name();
   calls.Upload(name, 0, {0, 0, 1, 1});
   const v1::Operation operation = calls.Refine(name);
@@ -119,8 +119,8 @@ TEST(MergeDistance, HoldsForASession) {
   ServiceHarness harness(core::MeshPoints);
   SessionCalls calls(harness.channel());
   v1::CreateSessionRequest create;
-  create.mutable_session()->mutable_parameters()->set_dimension(2);
-  create.mutable_session()->mutable_parameters()->set_merge_distance(1e-6);
+  create.mutable_parameters()->set_dimension(2);
+  create.mutable_parameters()->set_merge_distance(1e-6);
   const v1::Session session = calls.Create(create);
   EXPECT_EQ(session.parameters().merge_distance(), 1e-6);
   const std::string& name = session.name();
