@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "core/base/status_macros.h"
 #include "core/geometry/box.h"
 #include "core/geometry/exact_measure.h"
+#include "core/simplex/merged_cloud.h"
 #include "core/simplex/quality.h"
 
 namespace wellspace::core {
@@ -279,7 +281,11 @@ class Checker {
     return absl::OkStatus();
   }
 
-  absl::Status Cloud(std::span<const double> cloud) const {
+  absl::Status Cloud(std::span<const double> cloud, double merge_distance) const {
+    if (!(merge_distance >= 0) || !std::isfinite(merge_distance)) {
+      return absl::InvalidArgumentError(
+          absl::StrFormat("merge_distance is %g; a finite number of at least 0 is expected", merge_distance));
+    }
     if (cloud.size() % D != 0) {
       return absl::InvalidArgumentError(
           absl::StrFormat("%d coordinates of the cloud are no multiple of the dimension %d", cloud.size(), D));
@@ -289,6 +295,12 @@ class Checker {
         return absl::InvalidArgumentError(
             absl::StrFormat("point %d of the cloud: coordinate %d is %g; it has to be finite", i / D, i % D, cloud[i]));
       }
+    }
+    if (merge_distance > 0) {
+      const std::optional<size_t> missing = FirstMissingOfMerged<D>(cloud, points_, merge_distance);
+      return missing.has_value() ? Violation("point %d of the cloud, %s, is no vertex, and none is within %g of it",
+                                             *missing, Text(PointAt<D>(cloud, *missing)), merge_distance)
+                                 : absl::OkStatus();
     }
     const std::vector<size_t> order = LexicographicOrder(cloud);
     std::vector<bool> is_first(order.size(), true);
@@ -552,8 +564,8 @@ absl::Status ValidateCircumcentres(const MeshView& mesh) {
   return RunCheck(mesh, [](const auto& checker) { return checker.Circumcentres(); });
 }
 
-absl::Status ValidateCloud(const MeshView& mesh, std::span<const double> cloud) {
-  return RunCheck(mesh, [cloud](const auto& checker) { return checker.Cloud(cloud); });
+absl::Status ValidateCloud(const MeshView& mesh, std::span<const double> cloud, double merge_distance) {
+  return RunCheck(mesh, [=](const auto& checker) { return checker.Cloud(cloud, merge_distance); });
 }
 
 absl::Status ValidateMesh(const MeshView& mesh, const ValidationOptions& options) {
@@ -578,7 +590,7 @@ absl::Status ValidateMesh(const MeshView& mesh, const ValidationOptions& options
       WELLSPACE_RETURN_IF_ERROR(checker.MinAngle(options.min_angle_deg));
     }
     if (!options.cloud.empty()) {
-      WELLSPACE_RETURN_IF_ERROR(checker.Cloud(options.cloud));
+      WELLSPACE_RETURN_IF_ERROR(checker.Cloud(options.cloud, options.merge_distance));
     }
     return absl::OkStatus();
   });

@@ -109,8 +109,10 @@ absl::Status ValidateAngles(const MeshView& mesh, double min_angle_deg);
 // Every circumcentre lies in the box, up to 1e-9 times its longest side.
 absl::Status ValidateCircumcentres(const MeshView& mesh);
 // The distinct points of `cloud` (n x dimension), in order of first appearance, are the first vertices of the mesh, to
-// the bit. INVALID_ARGUMENT for a cloud that does not hold whole rows of finite numbers.
-absl::Status ValidateCloud(const MeshView& mesh, std::span<const double> cloud);
+// the bit; with a merge_distance above 0 some of them are, and the others no farther than that from one of these, times
+// 1 + 1e-9. INVALID_ARGUMENT for a cloud that does not hold whole rows of finite numbers, and for a distance that is
+// negative or not finite.
+absl::Status ValidateCloud(const MeshView& mesh, std::span<const double> cloud, double merge_distance = 0);
 
 struct ValidationOptions {
   double rho = 0;  // bound of the criterion; 0: not checked
@@ -118,6 +120,7 @@ struct ValidationOptions {
   double max_circumradius = 0;            // 0: not checked
   std::span<const SizeBox> size_boxes{};  // empty: not checked
   std::span<const double> cloud{};        // empty: not checked
+  double merge_distance = 0;              // of the points of the cloud
   double min_angle_deg = 0;               // 0: not checked
 };
 

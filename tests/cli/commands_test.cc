@@ -236,7 +236,7 @@ std::string PointsOf4D() {
 }
 
 TEST_F(CommandsTest, MeshAndCheckIn4D) {
-  Mesh(PointsOf4D(), "mesh.npz", {"--stats", Path("stats.json")});
+  Mesh(PointsOf4D(), "mesh.npz", {"--dimension", "4", "--stats", Path("stats.json")});
   const RunResult check = RunWellspace({"check", Path("mesh.npz"), "--cloud", Path("cloud.csv"), "--rho", "2.9000001"});
   EXPECT_EQ(check.exit_code, 0) << check.out << check.err;
   EXPECT_THAT(check.out, AllOf(HasSubstr("simplices"), EndsWith("valid\n")));
@@ -250,7 +250,7 @@ TEST_F(CommandsTest, MeshAndCheckIn4D) {
 
 // Before anything is meshed.
 TEST_F(CommandsTest, VtuIsRefusedAbove3D) {
-  EXPECT_THAT(MeshFails("cloud.csv", PointsOf4D(), 2), HasSubstr("expected npz"));
+  EXPECT_THAT(MeshFails("cloud.csv", PointsOf4D(), 2, {"--dimension", "4"}), HasSubstr("expected npz"));
   const RunResult stream = RunWellspace({"mesh", "-", "-o", "-", "--dimension", "5"});
   EXPECT_EQ(stream.exit_code, 2);
   EXPECT_THAT(stream.err, HasSubstr("vtu holds meshes up to 3-D, and this one is 5-D; expected npz"));
@@ -325,6 +325,8 @@ TEST_F(CommandsTest, NearPointsAreNamedAndMerged) {
   EXPECT_EQ(stats["duplicate_of"], nlohmann::json::parse("[[1,0],[2,0],[4,1]]"));
   const RunResult result = RunWellspace({"mesh", Path("cloud.csv"), "--merge", "1e-12", "-o", Path("again.vtu")});
   EXPECT_THAT(result.err, HasSubstr("6 points (3 merged) -> "));
+  EXPECT_EQ(RunWellspace({"check", Path("again.vtu"), "--cloud", Path("cloud.csv"), "--merge", "1e-12"}).exit_code, 0);
+  EXPECT_EQ(RunWellspace({"check", Path("again.vtu"), "--cloud", Path("cloud.csv"), "--merge", "1e-17"}).exit_code, 1);
   EXPECT_THAT(MeshFails("twins.csv", kTwins, 2, {"--merge", "-1"}),
               HasSubstr("--merge: merge_distance: -1 is not allowed"));
 }

@@ -124,6 +124,7 @@ absl::Status Plot(const core::QualityReport& report, int dimension, const std::s
 struct CheckCommand {
   std::string mesh_path;
   std::string cloud_path;
+  double merge_distance = 0;
   formats::CloudOptions cloud_options;
   double rho = 0;
   client::Criterion criterion = client::Criterion::kRadiusEdge;
@@ -214,6 +215,7 @@ int CheckCommand::Run() const {
                .max_circumradius = max_circumradius,
                .size_boxes = *boxes,
                .cloud = cloud,
+               .merge_distance = merge_distance,
                .min_angle_deg = min_dihedral});
   }
   if (absl::IsInvalidArgument(status)) {  // what was asked for cannot be
@@ -250,6 +252,9 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
   AddMeshInput(*check, command->mesh_path);
   check->add_option("--cloud", command->cloud_path, "File of points that must be the first vertices, to the bit")
       ->type_name("FILE");
+  AddNumber(*check, "--merge", command->merge_distance,
+            "Points of --cloud no farther than this from a vertex that is one of them need not be vertices")
+      ->needs("--cloud");
   AddCloudOptions(*check, command->cloud_options, "the cloud");
   CLI::Option* rho =
       AddNumber(*check, "--rho", command->rho, "Bound that the criterion must obey; default: not checked")

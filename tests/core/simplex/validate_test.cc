@@ -451,6 +451,25 @@ TEST_P(ValidateTest, CloudIsFoundInItsOrder) {
   EXPECT_THAT(ValidateCloud(mesh.View(), larger), Violates(HasSubstr("but that is missing")));
 }
 
+// The corners of the grid are kept; others may be near them, and nowhere else.
+TEST_P(ValidateTest, CloudWithPointsMerged) {
+  const TestMesh mesh = Grid();
+  const size_t d = static_cast<size_t>(D());
+  std::vector<double> cloud(mesh.points.begin(), mesh.points.begin() + static_cast<std::ptrdiff_t>(5 * d));
+  std::vector<double> near(cloud.begin(), cloud.begin() + D());
+  near[0] -= 1e-6;
+  cloud.insert(cloud.begin(), near.begin(), near.end());
+  EXPECT_THAT(ValidateCloud(mesh.View(), cloud), Violates(HasSubstr("point 0 of the cloud")));
+  EXPECT_TRUE(ValidateCloud(mesh.View(), cloud, 1e-6).ok()) << ValidateCloud(mesh.View(), cloud, 1e-6);
+  EXPECT_TRUE(ValidateMesh(mesh.View(), {.cloud = cloud, .merge_distance = 1e-6}).ok());
+  EXPECT_THAT(ValidateCloud(mesh.View(), cloud, 0.99e-6), Violates(HasSubstr("none is within 9.9e-07 of it")));
+  // A vertex that no point of the cloud is does not count.
+  std::vector<double> last(mesh.points.end() - D(), mesh.points.end());
+  EXPECT_THAT(ValidateCloud(mesh.View(), last, 1e-6), Violates(HasSubstr("point 0 of the cloud")));
+  EXPECT_THAT(ValidateCloud(mesh.View(), cloud, -1), Refuses("merge_distance is -1"));
+  EXPECT_THAT(ValidateCloud(mesh.View(), cloud, kNaN), Refuses("merge_distance is nan"));
+}
+
 TEST_P(ValidateTest, CloudThatIsNone) {
   const TestMesh mesh = Grid();
   std::vector<double> cloud = mesh.points;
