@@ -198,8 +198,7 @@ absl::Status TableReader::Choose(std::string_view line, size_t fields, std::vect
           absl::StrCat(named.problem, "; expected names such as x and y, or --columns with names or numbers"));
     }
   }
-  const bool are_named = !columns.empty();
-  if (!are_named) {
+  if (columns.empty()) {
     const size_t count = unnamed_ == Unnamed::kFirstThree ? std::max(kNamedAxes, wanted) : fields;
     columns.resize(std::min(count, fields));
     std::iota(columns.begin(), columns.end(), size_t{0});
@@ -210,10 +209,13 @@ absl::Status TableReader::Choose(std::string_view line, size_t fields, std::vect
     return row.ok() ? status : row;
   }
   // A fourth column is an intensity or a colour more often than a coordinate, and a mesh in 4-D of it would be no help.
-  if (!are_named && wanted == 0 && columns.size() > kNamedAxes) {
-    return reader_.Error(absl::StrCat(columns.size(), " columns without names of coordinates: expected ",
-                                      ColumnsOption(columns, 2), " or ", ColumnsOption(columns, kNamedAxes),
-                                      " or others that are, or --dimension ", columns.size(), " if all are"));
+  if (names_.empty() && wanted == 0 && columns.size() > kNamedAxes) {
+    const absl::Status row = CheckNumbers(line, columns);
+    return !row.ok()
+               ? row
+               : reader_.Error(absl::StrCat(columns.size(), " columns without names of coordinates: expected ",
+                                            ColumnsOption(columns, 2), " or ", ColumnsOption(columns, kNamedAxes),
+                                            " or others that are, or --dimension ", columns.size(), " if all are"));
   }
   NoteColumns(columns, fields);
   return absl::OkStatus();

@@ -13,6 +13,7 @@
 #include "server/jobs/job_size.h"
 #include "server/log/log_fields.h"
 #include "server/sessions/progress_pacer.h"
+#include "server/sessions/replay.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {

@@ -272,11 +272,12 @@ TEST(HelpfulThreadsTest, AreAskedForUnlessTheUserSays) {
     options.AddTo(app);
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
     int threads = 0;
-    EXPECT_EQ(options.Run([&](client::Client&, const client::MeshOptions& mesh, const auto&, const Interrupt&) {
-      threads = mesh.threads;
-      return absl::OkStatus();
-    }),
-              0);
+    EXPECT_EQ(
+        options.Run([&](client::Client&, const client::MeshOptions& mesh, const auto&, const client::CallOptions&) {
+          threads = mesh.threads;
+          return absl::OkStatus();
+        }),
+        0);
     return threads;
   };
   EXPECT_EQ(asked({cloud}), 4);

@@ -58,7 +58,7 @@ TEST_F(ReadCloudTest, XyzPlainSkipsColumnsAfterThird) {
 TEST_F(ReadCloudTest, UpToSixDimensions) {
   const CloudOptions four = {.format = "", .dimension = 4};
   EXPECT_THAT(ReadGood("cloud.csv", "1,2,3,4\n5,6,7,8\n", four).points, ElementsAre(1, 2, 3, 4, 5, 6, 7, 8));
-  EXPECT_EQ(ReadGood("cloud.csv", "a b c d e\n1 2 3 4 5\n", {.format = "", .dimension = 5}).dimension, 5);
+  EXPECT_EQ(ReadGood("cloud.csv", "a b c d e\n1 2 3 4 5\n").dimension, 5);
   EXPECT_EQ(ReadGood("cloud.node", "1 6 0 0\n0 1 2 3 4 5 6\n").dimension, 6);
   EXPECT_EQ(ReadBad("cloud.csv", "1 2 3 4 5 6 7\n"),
             "cloud.csv:1: expected 2 to 6 coordinates, got 7; --columns 1,2,3 takes three of them");

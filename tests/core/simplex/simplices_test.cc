@@ -268,7 +268,8 @@ TEST_F(StarsOfRefinementTest, GiveTheSimplicesAfterVerticesWereMoved) {
   is_fixed.resize(structure.vertex_count(), false);
   SliverStage<3> stage;
   const MendDemands demands{{.rho = 2}, 15, kMinEdge, 1'000'000};
-  const absl::Status mended = stage.Mend(structure, refinement, is_fixed, demands, 1, context);
+  std::vector<bool> moved;
+  const absl::Status mended = stage.Mend(structure, refinement, is_fixed, demands, moved, 1, context);
   ASSERT_TRUE(mended.ok()) << mended;
   EXPECT_GT(stage.statistics().moves, 0u);
   EXPECT_FALSE(refinement.stars().IsComplete());
