@@ -100,7 +100,8 @@ LogFields StartOf(const Flags& flags, const Server& server) {
   fields.Add("tls", security.tls.enabled() ? "yes" : "no");
   fields.Add("client_certificates", security.tls.client_ca.empty() ? "no" : "yes");
   fields.Add("tokens", security.token_file.empty() ? "no" : "yes");
-  fields.Add("workers", count(service.workers)).Add("max_threads", count(service.max_threads));
+  fields.Add("workers", count(service.workers)).Add("small_workers", count(service.small_workers));
+  fields.Add("max_threads", count(service.max_threads));
   fields.Add("max_queued", count(service.max_queued_jobs));
   fields.Add("max_jobs_per_tenant", count(service.max_jobs_per_tenant));
   fields.Add("max_memory_bytes", service.max_memory_bytes);
@@ -118,6 +119,16 @@ LogFields StartOf(const Flags& flags, const Server& server) {
   return fields.Add("grace_seconds", absl::ToDoubleSeconds(flags.grace));
 }
 
+// The exit code for what has been printed to standard output: not 0 if it got lost.
+int ExitOfPrinted(const std::string& what) {
+  std::cout << std::flush;
+  if (!std::cout) {
+    std::cerr << "wellspaced: " << what << " could not be written to standard output" << std::endl;
+    return 1;
+  }
+  return 0;
+}
+
 int HashToken(const std::string& tenant) {
   std::string token;
   std::getline(std::cin, token);
@@ -126,12 +137,8 @@ int HashToken(const std::string& tenant) {
     std::cerr << "wellspaced: " << line.status().message() << std::endl;
     return kExitWrongOptions;
   }
-  std::cout << *line << std::endl;
-  if (!std::cout) {
-    std::cerr << "wellspaced: the line could not be written to standard output" << std::endl;
-    return 1;
-  }
-  return 0;
+  std::cout << *line << "\n";
+  return ExitOfPrinted("the line");
 }
 
 // SIGTERM and SIGINT, blocked in this thread and all that it starts later, to be waited for.
@@ -170,7 +177,7 @@ int Main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : kExitWrongOptions;
+    return app.exit(error) == 0 ? ExitOfPrinted("the text") : kExitWrongOptions;
   }
   if (!flags.hash_for_tenant.empty()) {
     return HashToken(flags.hash_for_tenant);

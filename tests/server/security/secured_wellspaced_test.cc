@@ -190,6 +190,13 @@ TEST_F(SecuredWellspaced, HashesTokens) {
   EXPECT_EQ(Subprocess("wellspaced", {"hash-token"}).Wait(), 2);
 }
 
+TEST_F(SecuredWellspaced, FailsWhenWhatItPrintsGetsLost) {
+  for (const char* option : {"--help", "--version"}) {
+    EXPECT_EQ(RunShell(absl::StrCat(BinFolder(), "/wellspaced ", option, " 2>&1 >/dev/full; echo $?")),
+              "wellspaced: the text could not be written to standard output\n1\n");
+  }
+}
+
 TEST_F(SecuredWellspaced, DoesNotStartWithFilesThatDoNotFit) {
   const CertificateFiles other = authority_.Issue("other");
   EXPECT_EQ(Subprocess("wellspaced", {"--tls-cert", server_.certificate, "--tls-key", other.key}).Wait(), 1);
