@@ -44,7 +44,7 @@ WELLSPACE_INLINE void Compress(const typename Wide<kWidth>::Mask& wide, uint32_t
   if constexpr (kWidth == 4) {
     using Halves = Wide<4>::Halves;
     const auto order = *reinterpret_cast<const Halves*>(kOrders[kept].halves);
-    const Halves compressed = __builtin_shuffle(reinterpret_cast<const Halves&>(wide), order);
+    const Halves compressed = WELLSPACE_SHUFFLE(reinterpret_cast<const Halves&>(wide), order);
     std::memcpy(to, &compressed, sizeof(compressed));
   } else {
     const int64_t second = wide[1];
@@ -154,9 +154,9 @@ WELLSPACE_INLINE void SortByRank(const Candidates<D>& from, Candidates<D>& to) {
     const Keys high = *reinterpret_cast<const Keys*>(from.length_sq + first + kWidth);
     Keys own;
     if constexpr (kWidth == 4) {
-      own = __builtin_shuffle(low, high, Keys{1, 3, 5, 7, 9, 11, 13, 15});
+      own = WELLSPACE_SHUFFLE(low, high, Keys{1, 3, 5, 7, 9, 11, 13, 15});
     } else {
-      own = __builtin_shuffle(low, high, Keys{1, 3, 5, 7});
+      own = WELLSPACE_SHUFFLE(low, high, Keys{1, 3, 5, 7});
     }
     own = (own >> kNumberBits << kNumberBits) | number;
     own = number < static_cast<int32_t>(from.count) ? own : Keys{} + std::numeric_limits<int32_t>::max();

@@ -140,7 +140,7 @@ WELLSPACE_INLINE float Largest(const Floats& items) {
   if constexpr (kUnit == VectorUnit::kAvx2) {
     Floats largest = items;
     const auto with = [&](const FloatMask& order) __attribute__((always_inline)) {
-      const Floats other = __builtin_shuffle(largest, order);
+      const Floats other = WELLSPACE_SHUFFLE(largest, order);
       largest = largest > other ? largest : other;
     };
     with(FloatMask{4, 5, 6, 7, 0, 1, 2, 3});
@@ -172,7 +172,7 @@ inline constexpr std::array<std::array<uint8_t, kFloatLanes>, 256> kOrders = [] 
 
 template <VectorUnit kUnit>
 WELLSPACE_INLINE FloatMask OrderOf(uint32_t kept) {
-#if defined(__x86_64__)
+#if defined(WELLSPACE_X86_BUILTINS)
   if constexpr (kUnit == VectorUnit::kAvx2) {
     using Bytes = char __attribute__((vector_size(16)));
     using Words = int64_t __attribute__((vector_size(16)));
@@ -236,8 +236,8 @@ WELLSPACE_INLINE void VectorsTo(const Point<2>* positions, const Point<2>& site,
   }
   const Floats even = __builtin_shufflevector(pairs[0], pairs[2], 0, 1, 2, 3, 4, 5, 6, 7);
   const Floats odd = __builtin_shufflevector(pairs[1], pairs[3], 0, 1, 2, 3, 4, 5, 6, 7);
-  w[0] = __builtin_shuffle(even, odd, FloatMask{0, 2, 8, 10, 4, 6, 12, 14});
-  w[1] = __builtin_shuffle(even, odd, FloatMask{1, 3, 9, 11, 5, 7, 13, 15});
+  w[0] = WELLSPACE_SHUFFLE(even, odd, FloatMask{0, 2, 8, 10, 4, 6, 12, 14});
+  w[1] = WELLSPACE_SHUFFLE(even, odd, FloatMask{1, 3, 9, 11, 5, 7, 13, 15});
 }
 // The same to the positions that at(0) to at(7) give.
 template <int D, typename At>
@@ -335,7 +335,7 @@ WELLSPACE_INLINE size_t ChooseBetween(const GatheredVertices<D>& gathered, const
   ForEachDistanceSq<D>(
       gathered, site, [&](size_t /*i*/, const Floats& distance_sq) __attribute__((always_inline)) {
         const uint32_t chosen = Bits<kUnit>(IsLess<kUnit>(least, distance_sq) & IsAtMost<kUnit>(distance_sq, most));
-        const FloatMask in_order = __builtin_shuffle(eight, OrderOf<kUnit>(chosen));
+        const FloatMask in_order = WELLSPACE_SHUFFLE(eight, OrderOf<kUnit>(chosen));
         std::memcpy(numbers + count, &in_order, sizeof(in_order));
         count += static_cast<size_t>(std::popcount(chosen));
         eight += static_cast<int32_t>(kFloatLanes);
@@ -455,7 +455,7 @@ struct alignas(sizeof(Floats)) NearVertices {
       const uint32_t kept = Bits<kUnit>(is_near);
       const FloatMask lanes = OrderOf<kUnit>(kept);
       const auto append = [&](const auto& items, auto* column) __attribute__((always_inline)) {
-        const auto chosen = __builtin_shuffle(items, lanes);
+        const auto chosen = WELLSPACE_SHUFFLE(items, lanes);
         std::memcpy(column + count, &chosen, sizeof(chosen));
       };
       for (int axis = 0; axis < D; ++axis) {

@@ -113,7 +113,7 @@ WELLSPACE_INLINE void Polygon::Replace(const Rest& rest, const std::array<Node, 
   const FloatMask is_second = ~IsLess<kUnit>(kEachLane, Splat(kept + 1));
   const FloatMask is_used = IsLess<kUnit>(kEachLane, Splat(kept + 2));
   const auto replaced = [&](auto* column, auto first, auto second) __attribute__((always_inline)) {
-    return Choose<kUnit>(is_kept, __builtin_shuffle(VectorAt(column), from),
+    return Choose<kUnit>(is_kept, WELLSPACE_SHUFFLE(VectorAt(column), from),
                          Choose<kUnit>(is_second, Splat(second), Splat(first)));
   };
   const auto used = [&](const Floats& items) __attribute__((always_inline)) {
@@ -343,7 +343,7 @@ WELLSPACE_INLINE bool Polygon::KeepsRatioWith(double ratio) const {
     const Group& group = groups_.front();
     const FloatMask before = Choose<kUnit>(kEachLane == 0, Splat(static_cast<int32_t>(count_ - 1)), kEachLane - 1);
     const Floats from = Load(group.edge_sq);
-    const Floats to = __builtin_shuffle(from, before);
+    const Floats to = WELLSPACE_SHUFFLE(from, before);
     const Floats nearest_sq = Min<kUnit>(from, to);
     const Floats radius_sq = RadiiSq<2>(group);
     const uint32_t all = (1u << count_) - 1;

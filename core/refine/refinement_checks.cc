@@ -48,8 +48,8 @@ void RefinementChecks<D>::CheckInsertion(const StepRules<D>& rules, const Insert
   const double distance = std::sqrt(candidate.empty_radius_sq);
   const double radius = std::sqrt(point.empty_radius_sq);
   const bool encroaches = insertion.reason == Reason::kEncroachment;
-  const auto which = [&] {
-    return absl::StrCat(encroaches ? "the face" : "the edge", " of length ", edge, " at vertex ", Index(insertion.near),
+  const auto which = [&, near = insertion.near] {
+    return absl::StrCat(encroaches ? "the face" : "the edge", " of length ", edge, " at vertex ", Index(near),
                         ", in the bucket up to ", limit, ", asks for a point at distance ", distance, " and radius ",
                         radius, ": ");
   };

@@ -18,7 +18,7 @@ struct Vectors {
 };
 
 WELLSPACE_INLINE Vectors Shuffle(const Vectors& v, const Mask& lanes) {
-  return {__builtin_shuffle(v.x, lanes), __builtin_shuffle(v.y, lanes), __builtin_shuffle(v.z, lanes)};
+  return {WELLSPACE_SHUFFLE(v.x, lanes), WELLSPACE_SHUFFLE(v.y, lanes), WELLSPACE_SHUFFLE(v.z, lanes)};
 }
 WELLSPACE_INLINE Lanes Dots(const Vectors& a, const Vectors& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 WELLSPACE_INLINE Lanes SquareRoots(const Lanes& x) {
@@ -42,17 +42,17 @@ WELLSPACE_INLINE TetrahedronMeasure Measure(const Simplex<3>& corners) {
   const Lanes inverse = 1 / SquareRoots(Dots(areas, areas));
   // Facets 0 and 1, 1 and 2, 2 and 0, 3 and 0; then 3 and 1, 3 and 2.
   const Mask seconds = {1, 2, 0, 0};
-  const Lanes inner = Dots(areas, Shuffle(areas, seconds)) * inverse * __builtin_shuffle(inverse, seconds);
+  const Lanes inner = Dots(areas, Shuffle(areas, seconds)) * inverse * WELLSPACE_SHUFFLE(inverse, seconds);
   const Mask outer = {3, 3, kAny, kAny};
   const Mask outer_seconds = {1, 2, kAny, kAny};
-  const Lanes rest = Dots(Shuffle(areas, outer), Shuffle(areas, outer_seconds)) * __builtin_shuffle(inverse, outer) *
-                     __builtin_shuffle(inverse, outer_seconds);
+  const Lanes rest = Dots(Shuffle(areas, outer), Shuffle(areas, outer_seconds)) * WELLSPACE_SHUFFLE(inverse, outer) *
+                     WELLSPACE_SHUFFLE(inverse, outer_seconds);
 
   TetrahedronMeasure measure;
   measure.cosine = std::max({-inner[0], -inner[1], -inner[2], inner[3], rest[0], rest[1]});
   measure.determinant = edges.x[2] * areas.x[0] + edges.y[2] * areas.y[0] + edges.z[2] * areas.z[0];
   const Lanes lengths_sq = Dots(edges, edges);
-  const Lanes opposite_sq = __builtin_shuffle(lengths_sq, Mask{2, 0, 1, kAny});
+  const Lanes opposite_sq = WELLSPACE_SHUFFLE(lengths_sq, Mask{2, 0, 1, kAny});
   const double half = 0.5 / measure.determinant;
   const Vectors terms = {opposite_sq * areas.x, opposite_sq * areas.y, opposite_sq * areas.z};
   const Point<3> offset = {half * (terms.x[0] + terms.x[1] + terms.x[2]), half * (terms.y[0] + terms.y[1] + terms.y[2]),

@@ -2,7 +2,7 @@
 #ifndef WELLSPACE_CORE_BASE_SIMD_LANE_BITS_H_
 #define WELLSPACE_CORE_BASE_SIMD_LANE_BITS_H_
 
-#if defined(__x86_64__)
+#if defined(WELLSPACE_X86_BUILTINS)
 #include <immintrin.h>
 #endif
 
@@ -16,7 +16,7 @@ namespace wellspace::core {
 // A bit for each lane in which a comparison holds.
 template <size_t kWidth>
 WELLSPACE_INLINE uint32_t Bits(const typename Wide<kWidth>::Mask& mask) {
-#if defined(__x86_64__)
+#if defined(WELLSPACE_X86_BUILTINS)
   if constexpr (kWidth == 4) {
     return static_cast<uint32_t>(__builtin_ia32_movmskpd256(reinterpret_cast<const Wide<4>::Lanes&>(mask)));
   } else {
@@ -34,7 +34,7 @@ WELLSPACE_INLINE uint32_t Bits(const typename Wide<kWidth>::Mask& mask) {
 // The same for floats; also of signs.
 template <VectorUnit kUnit>
 WELLSPACE_INLINE uint32_t Bits(const FloatMask& mask) {
-#if defined(__x86_64__)
+#if defined(WELLSPACE_X86_BUILTINS)
   if constexpr (kUnit == VectorUnit::kAvx2) {
     return static_cast<uint32_t>(__builtin_ia32_movmskps256(reinterpret_cast<const Floats&>(mask)));
   }

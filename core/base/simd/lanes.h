@@ -37,8 +37,38 @@ inline VectorUnit BestVectorUnit() { return Has(VectorUnit::kAvx2) ? VectorUnit:
 #define WELLSPACE_INLINE [[gnu::always_inline]] inline
 #if defined(__x86_64__)
 #define WELLSPACE_AVX2 [[gnu::target("avx2")]]
+#if !defined(__clang__)  // which has others, and none where a function is inlined into one for a unit
+#define WELLSPACE_X86_BUILTINS
+#endif
 #else
 #define WELLSPACE_AVX2
+#endif
+
+// The lanes of one vector, or of two in a row, in the order that the last argument has: __builtin_shuffle of g++, which
+// clang, the compiler of the fuzzers, does not have. A macro, so that g++ sees an order that is constant.
+#if defined(__clang__)
+template <typename Vector, typename Order>
+WELLSPACE_INLINE Vector Shuffled(const Vector& a, const Vector& b, const Order& order) {
+  constexpr size_t kCount = sizeof(Vector) / sizeof(a[0]);
+  Vector result = a;
+  for (size_t i = 0; i < kCount; ++i) {
+    const size_t from = static_cast<size_t>(order[i]) % (2 * kCount);
+    result[i] = from < kCount ? a[from] : b[from - kCount];
+  }
+  return result;
+}
+template <typename Vector, typename Order>
+WELLSPACE_INLINE Vector Shuffled(const Vector& a, const Order& order) {
+  constexpr size_t kCount = sizeof(Vector) / sizeof(a[0]);
+  Vector result = a;
+  for (size_t i = 0; i < kCount; ++i) {
+    result[i] = a[static_cast<size_t>(order[i]) % kCount];
+  }
+  return result;
+}
+#define WELLSPACE_SHUFFLE(...) Shuffled(__VA_ARGS__)
+#else
+#define WELLSPACE_SHUFFLE(...) __builtin_shuffle(__VA_ARGS__)
 #endif
 
 // Doubles in one vector, what a comparison of them gives (-1 where it holds, else 0), and as wide a vector of integers
@@ -82,14 +112,14 @@ WELLSPACE_INLINE void Transpose(const Wide<4>::Lanes& a, const Wide<4>::Lanes& b
                                 const Wide<4>::Lanes& d, Wide<4>::Lanes* out) {
   using Lanes = Wide<4>::Lanes;
   using Order = Wide<4>::Mask;
-  const Lanes even_ab = __builtin_shuffle(a, b, Order{0, 4, 2, 6});
-  const Lanes odd_ab = __builtin_shuffle(a, b, Order{1, 5, 3, 7});
-  const Lanes even_cd = __builtin_shuffle(c, d, Order{0, 4, 2, 6});
-  const Lanes odd_cd = __builtin_shuffle(c, d, Order{1, 5, 3, 7});
-  out[0] = __builtin_shuffle(even_ab, even_cd, Order{0, 1, 4, 5});
-  out[1] = __builtin_shuffle(odd_ab, odd_cd, Order{0, 1, 4, 5});
-  out[2] = __builtin_shuffle(even_ab, even_cd, Order{2, 3, 6, 7});
-  out[3] = __builtin_shuffle(odd_ab, odd_cd, Order{2, 3, 6, 7});
+  const Lanes even_ab = WELLSPACE_SHUFFLE(a, b, Order{0, 4, 2, 6});
+  const Lanes odd_ab = WELLSPACE_SHUFFLE(a, b, Order{1, 5, 3, 7});
+  const Lanes even_cd = WELLSPACE_SHUFFLE(c, d, Order{0, 4, 2, 6});
+  const Lanes odd_cd = WELLSPACE_SHUFFLE(c, d, Order{1, 5, 3, 7});
+  out[0] = WELLSPACE_SHUFFLE(even_ab, even_cd, Order{0, 1, 4, 5});
+  out[1] = WELLSPACE_SHUFFLE(odd_ab, odd_cd, Order{0, 1, 4, 5});
+  out[2] = WELLSPACE_SHUFFLE(even_ab, even_cd, Order{2, 3, 6, 7});
+  out[3] = WELLSPACE_SHUFFLE(odd_ab, odd_cd, Order{2, 3, 6, 7});
 }
 
 }  // namespace wellspace::core
