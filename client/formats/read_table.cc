@@ -257,7 +257,7 @@ absl::Status TableReader::CheckDimension(const std::vector<size_t>& columns) con
   if (count < kMinDimension || count > kMaxDimension) {
     return reader_.Error(absl::StrCat(
         "expected ", kMinDimension, " to ", kMaxDimension, " coordinates, got ", count,
-        separator_ == ' ' ? "" : absl::StrCat(" (fields are separated by \"", std::string(1, separator_), "\")"),
+        separator_ == ' ' ? "" : absl::StrCat(" (fields are separated by ", Quote(std::string(1, separator_)), ")"),
         count > kMaxDimension ? absl::StrCat("; ", ColumnsOption(columns, 3), " takes three of them") : ""));
   }
   return absl::OkStatus();

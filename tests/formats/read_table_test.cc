@@ -190,6 +190,8 @@ TEST_F(ReadTableTest, MoreColumnsThanDimensionsNameTheOption) {
       "a.csv:2: expected 2 coordinates, got 3 (columns 1 \"x\", 2 \"y\", 3 \"z\"); --columns 1,2 takes 2 of them");
   EXPECT_THAT(ReadBad("a.csv", "1,2,3,4\n", {.format = "", .dimension = 3}), HasSubstr("--columns 1,2,3 takes 3"));
   EXPECT_THAT(ReadBad("a.csv", "1,2,3,4,5,6,7,8,9,10\n"), HasSubstr("--columns 1,2,3 takes three"));
+  EXPECT_THAT(ReadBad("a.csv", "a\tb\tc\td\te\tf\tg\n1\t2\t3\t4\t5\t6\t7\n"),
+              HasSubstr("(fields are separated by \"\\t\")"));
   EXPECT_EQ(ReadBad("a.csv", "1,2,3,4\n"),
             "a.csv:1: 4 columns without names of coordinates: expected --columns 1,2 or --columns 1,2,3 or others that "
             "are, or --dimension 4 if all are");
