@@ -27,8 +27,10 @@ class CheckDocsTest(unittest.TestCase):
             return result.returncode, result.stdout.splitlines()
 
     def test_accepts_what_is_there(self):
-        for line in ("`core/tree.h`, `core/tree` and `core/*.h`", "[tree](../core/tree.h) and [web](https://example.org)",
-                     "`LeafTree::Build` and `LeafTree`", "`LeafTreeTest.SplitsLeaves`, `LeafTreeTest.*`, `LeafTreeTest.Splits*`",
+        for line in ("`core/tree.h`, `core/tree` and `core/*.h`",
+                     "[tree](../core/tree.h) and [web](https://example.org)",
+                     "`LeafTree::Build` and `LeafTree`",
+                     "`LeafTreeTest.SplitsLeaves`, `LeafTreeTest.*`, `LeafTreeTest.Splits*`",
                      "tree_test: `SplitsLeaves` and `Splits…`", "`std::vector`, `--option`, `x + y`"):
             with self.subTest(line):
                 self.assertEqual(self.run_with(line)[0], 0, self.run_with(line))

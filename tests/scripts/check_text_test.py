@@ -40,6 +40,10 @@ class CheckTextTest(unittest.TestCase):
     def test_wide_comment(self):
         self.assert_found({"core/a.h": "int x;\n// " + "x" * 118 + "\n"}, "core/a.h:2: ", "121 columns")
 
+    def test_wide_comment_with_a_quote(self):
+        self.assert_found({"core/a.h": '// "' + "x" * 117 + "\n"}, "core/a.h:1: ", "121 columns")
+        self.assertEqual(self.run_with({"core/a.cc": 'f("' + "x" * 117 + '");\n'})[0], 0)
+
     def test_wide_line_of_a_proto(self):
         self.assert_found({"proto/a.proto": "// " + "x" * 118 + "\n"}, "proto/a.proto:1: ", "121 columns")
 
@@ -63,7 +67,8 @@ class CheckTextTest(unittest.TestCase):
 
     def test_subjects(self):
         script = SCRIPT.read_text(encoding="utf-8")
-        for subject, message in (("core: " + "x" * 67, "73 characters"), ("Mend it", "no area"), ("core: " + "x" * 66, "")):
+        cases = (("core: " + "x" * 67, "73 characters"), ("Mend it", "no area"), ("core: " + "x" * 66, ""))
+        for subject, message in cases:
             with self.subTest(subject), tempfile.TemporaryDirectory() as folder:
                 git = ["git", "-C", folder, "-c", "user.name=a", "-c", "user.email=a@b.example"]
                 subprocess.run([*git, "init", "--quiet"], check=True)
