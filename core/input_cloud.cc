@@ -20,6 +20,7 @@
 #include "core/base/memory/prefetch.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
+#include "core/mesh_parameters.h"
 #include "core/tree/morton.h"
 
 namespace wellspace::core {
@@ -396,6 +397,19 @@ class CloudSorter {
 
 }  // namespace
 
+absl::Status CheckShape(std::span<const double> points, int dimension) {
+  if (points.size() % dimension != 0) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("points: ", points.size(), " coordinates are not a multiple of the dimension, ", dimension));
+  }
+  if (points.size() / dimension > kMaxVertices) {
+    return absl::InvalidArgumentError(absl::StrCat("points: ", points.size() / dimension,
+                                                   " are more than vertices can be numbered; at most ", kMaxVertices,
+                                                   " are accepted"));
+  }
+  return absl::OkStatus();
+}
+
 template <int D>
 absl::StatusOr<Domain<D>> Domain<D>::Of(const Box<D>& box) {
   WELLSPACE_RETURN_IF_ERROR(CheckBox<D>(box));
@@ -543,6 +557,18 @@ absl::Status CheckSeparation(const Domain<D>& domain, const QueryStructure<D>& s
   return ThreadTeam(threads).TryForEach((count + kBlock - 1) / kBlock, check);
 }
 
+template <int D>
+absl::Status CheckApart(const Domain<D>& domain, const SortedCloud<D>& cloud, const RunContext& context) {
+  QueryStructure<D> apart;
+  WELLSPACE_RETURN_IF_ERROR(apart.Initialize(cloud.grid, {}, kLeavesPerVertex * kDefaultMaxVertices, 1, context));
+  const uint32_t corners = apart.vertex_count();
+  for (const Point<D>& p : cloud.points) {
+    WELLSPACE_RETURN_IF_ERROR(context.Check());
+    apart.AddVertex(kNoVertex, p);
+  }
+  return CheckSeparation<D>(domain, apart, corners, cloud.first_input, 1, context);
+}
+
 #define WELLSPACE_INSTANTIATE(D)                                                                               \
   template struct Domain<D>;                                                                                   \
   template struct SortedCloud<D>;                                                                              \
@@ -553,7 +579,8 @@ absl::Status CheckSeparation(const Domain<D>& domain, const QueryStructure<D>& s
   template absl::StatusOr<PointNames> NamePoints<D>(SortedCloud<D>, const RunContext&);                        \
   template absl::Status TooCloseError<D>(const Domain<D>&, const Point<D>&, size_t, double, std::string_view); \
   template absl::Status CheckSeparation<D>(const Domain<D>&, const QueryStructure<D>&, uint32_t,               \
-                                           std::span<const uint32_t>, int, const RunContext&);
+                                           std::span<const uint32_t>, int, const RunContext&);                 \
+  template absl::Status CheckApart<D>(const Domain<D>&, const SortedCloud<D>&, const RunContext&);
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 

@@ -55,6 +55,15 @@ struct Domain {
   static absl::StatusOr<Domain> Of(const Box<D>& box);
 };
 
+// Leaves that the tree may have for each vertex of the budget; around isolated close pairs balance costs up to about
+// two.
+inline constexpr uint64_t kLeavesPerVertex = 8;
+
+// Refuses what is no whole number of points, or more of them than vertices can be numbered.
+//
+// Errors:     INVALID_ARGUMENT with the figures.
+absl::Status CheckShape(std::span<const double> points, int dimension);
+
 // The bounding box of `points`, grown on every side by `margin` times its longest side.
 //
 // Errors:     INVALID_ARGUMENT when there are none, or one is not finite; CANCELLED, DEADLINE_EXCEEDED.
@@ -127,6 +136,11 @@ bool IsTooClose(const absl::Status& status);
 template <int D>
 absl::Status CheckSeparation(const Domain<D>& domain, const QueryStructure<D>& structure, uint32_t first,
                              std::span<const uint32_t> first_input, int threads, const RunContext& context);
+
+// CheckSeparation for a cloud that is in no structure: the points among themselves, and beside the corners and faces of
+// the box.
+template <int D>
+absl::Status CheckApart(const Domain<D>& domain, const SortedCloud<D>& cloud, const RunContext& context);
 
 }  // namespace wellspace::core
 

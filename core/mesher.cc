@@ -2,10 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <mutex>
-#include <numeric>
 #include <optional>
-#include <string>
 #include <type_traits>
 #include <utility>
 #include <variant>
@@ -22,19 +19,17 @@
 #include "core/input_cloud.h"
 #include "core/mesh_parts.h"
 #include "core/near_points.h"
+#include "core/point_adder.h"
 #include "core/refine/refine.h"
 #include "core/simplex/quality.h"
 #include "core/simplex/simplices.h"
 #include "core/simplex/validate.h"
 #include "core/sliver/sliver_stage.h"
+#include "core/vertex_numbering.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {
 namespace {
-
-// Leaves that the tree may have for each vertex of the budget; around isolated close pairs balance costs up to about
-// two.
-constexpr uint64_t kLeavesPerVertex = 8;
 
 // Smaller clouds are refined in half a second, unless there are sizes: too soon for a prediction to be of use.
 template <int D>
@@ -57,23 +52,6 @@ Box<D> BoxOf(const std::vector<double>& low, const std::vector<double>& high) {
   return box;
 }
 
-// Points that an error names.
-constexpr size_t kNamedTooClose = 10;
-
-// Refuses what is no whole number of points.
-absl::Status CheckShape(std::span<const double> points, int dimension) {
-  if (points.size() % dimension != 0) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("points: ", points.size(), " coordinates are not a multiple of the dimension, ", dimension));
-  }
-  if (points.size() / dimension > kMaxVertices) {
-    return absl::InvalidArgumentError(absl::StrCat("points: ", points.size() / dimension,
-                                                   " are more than vertices can be numbered; at most ", kMaxVertices,
-                                                   " are accepted"));
-  }
-  return absl::OkStatus();
-}
-
 template <int D>
 class MesherIn final : public Mesher {
  public:
@@ -82,59 +60,21 @@ class MesherIn final : public Mesher {
     context.EnterPhase(Phase::kTree);
     WELLSPACE_RETURN_IF_ERROR(context.ReserveMemory(
         kFixedBytes + points.size() / D * (kTreeBytes<D> + (parameters.merge_distance > 0 ? kMergeBytes<D> : 0))));
-    Box<D> box;
-    if (parameters.domain_low.empty()) {
-      WELLSPACE_ASSIGN_OR_RETURN(box, BoxAround<D>(points, parameters.margin, context));
-    } else {
-      box = BoxOf<D>(parameters.domain_low, parameters.domain_high);
-    }
-    WELLSPACE_ASSIGN_OR_RETURN(domain_, Domain<D>::Of(box));
-    MergedPoints merged;
     merge_distance_ = parameters.merge_distance;
-    if (merge_distance_ > 0) {
-      // A point outside the box may become one inside: the box of a session is that of the points that stayed.
-      Domain<D> wide = domain_;
-      const double reach = std::min(merge_distance_, box.LongestSide());
-      wide.box = {CubeAround<D>(box.low, reach).low, CubeAround<D>(box.high, reach).high};
-      WELLSPACE_RETURN_IF_ERROR(CheckPoints<D>(wide, points, context));
-      WELLSPACE_ASSIGN_OR_RETURN(merged, MergeNear<D>(domain_, points, merge_distance_, context));
-      merged_points_ = merged.merged;
-      if (parameters.domain_low.empty()) {
-        WELLSPACE_ASSIGN_OR_RETURN(box, BoxAround<D>(merged.points, parameters.margin, context));
-        WELLSPACE_ASSIGN_OR_RETURN(domain_, Domain<D>::Of(box));
-      }
-    }
+    WELLSPACE_ASSIGN_OR_RETURN(const MergedPoints merged, SetDomain(parameters, points, context));
     WELLSPACE_RETURN_IF_ERROR(CheckShapeFeasible<D>(domain_, parameters, points.size() / D));
-    const auto explain = [&](const absl::Status& found) {
-      return !IsTooClose(found) ? found
-                                : TooNearError<D>(domain_, merge_distance_ > 0 ? merged.points : points, merged.inputs,
-                                                  !parameters.domain_low.empty(), parameters.margin, found, context);
-    };
-    absl::StatusOr<SortedCloud<D>> sorted = merge_distance_ > 0
-                                                ? SortMerged<D>(domain_, merged, parameters.threads, context)
-                                                : SortCloud<D>(domain_, points, parameters.threads, context);
-    WELLSPACE_RETURN_IF_ERROR(explain(sorted.status()));
-    SortedCloud<D> cloud = *std::move(sorted);
-    const size_t distinct = cloud.points.size();
-    const uint64_t max_vertices = VertexBudget(parameters);
-    if (distinct + (size_t{1} << D) > max_vertices) {
-      return absl::ResourceExhaustedError(
-          absl::StrCat("the ", distinct, " distinct points and the domain's corners are more than ",
-                       "max_vertices = ", max_vertices, " vertices; raise max_vertices"));
+    absl::StatusOr<SortedCloud<D>> cloud = BuildTree(parameters, points, merged, context);
+    if (IsTooClose(cloud.status())) {
+      return TooNearError<D>(domain_, merge_distance_ > 0 ? merged.points : points, merged.inputs,
+                             !parameters.domain_low.empty(), parameters.margin, cloud.status(), context);
     }
-    WELLSPACE_RETURN_IF_ERROR(structure_.Initialize(
-        cloud.grid, std::move(cloud.points), kLeavesPerVertex * max_vertices + (1u << D), parameters.threads, context));
-    WELLSPACE_RETURN_IF_ERROR(
-        explain(CheckSeparation<D>(domain_, structure_, 0, cloud.first_input, parameters.threads, context)));
-
-    WELLSPACE_ASSIGN_OR_RETURN(PointNames names, NamePoints<D>(std::move(cloud), context));
-    output_index_ = std::move(names.of_sorted);
-    input_vertex_ = std::move(names.of_input);
-    NoteInputZeros(points, merged);
-    distinct_count_ = distinct;
-    distinct_input_ = distinct;
+    WELLSPACE_RETURN_IF_ERROR(cloud.status());
+    WELLSPACE_ASSIGN_OR_RETURN(PointNames names, NamePoints<D>(*std::move(cloud), context));
+    numbering_.Begin(std::move(names), points, merged.inputs);
+    numbering_.CountMerged(merged.merged);
     is_given_.assign(structure_.built_count(), true);
     refinement_.emplace(structure_, domain_.MinEdge());
+    adder_.emplace(domain_, merge_distance_, structure_, *refinement_, numbering_, is_given_);
     context.SetVertices(structure_.vertex_count());
     tree_seconds_ = absl::ToDoubleSeconds(context.TimeIn(Phase::kTree));
     return absl::OkStatus();
@@ -143,15 +83,13 @@ class MesherIn final : public Mesher {
   int dimension() const override { return D; }
   uint64_t vertex_count() const override { return structure_.vertex_count(); }
   uint64_t memory_bytes() const override {
-    // With vertex_at_, whether it has been made or somebody is making it.
-    return structure_.MemoryBytes() + refinement_->MemoryBytes() + SliverMemoryBytes() +
-           (output_index_.size() + distinct_count_ + input_vertex_.size()) * sizeof(uint32_t) +
-           negative_zeros_.size() * sizeof(size_t) + moved_.size() / 8;
+    return structure_.MemoryBytes() + refinement_->MemoryBytes() + SliverMemoryBytes() + numbering_.MemoryBytes() +
+           moved_.size() / 8;
   }
 
   absl::Status CheckFeasible(const MeshParameters& parameters) const override {
     WELLSPACE_RETURN_IF_ERROR(CheckParameters(parameters));
-    return core::CheckFeasible<D>(domain_, parameters, distinct_input_);
+    return core::CheckFeasible<D>(domain_, parameters, numbering_.distinct_inputs());
   }
 
   absl::Status Refine(const MeshParameters& parameters, RunContext& context) override {
@@ -172,93 +110,37 @@ class MesherIn final : public Mesher {
 
   absl::StatusOr<std::vector<uint32_t>> AddPointsNear(std::span<const double> points, std::span<const uint32_t> near,
                                                       RunContext& context) override {
-    WELLSPACE_RETURN_IF_ERROR(CheckShape(points, D));
-    if (!near.empty() && near.size() != points.size() / D) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("near: it has ", near.size(), " vertices for ", points.size() / D, " points"));
+    const uint32_t count = structure_.vertex_count();
+    absl::StatusOr<std::vector<uint32_t>> vertices = adder_->AddPoints(points, near, context);
+    is_refined_ = is_refined_ && structure_.vertex_count() == count;
+    if (vertices.ok()) {
+      context.SetVertices(structure_.vertex_count());
     }
-    WELLSPACE_RETURN_IF_ERROR(CheckVertices(near));
-    const auto start = [&](size_t input) { return near.empty() ? kNoVertex : VertexOf(near[input]); };
-    WELLSPACE_ASSIGN_OR_RETURN(Added added, MergeAdded(points, start, context));
-    const std::span<const double> others = merge_distance_ > 0 ? added.others.points : points;
-    absl::StatusOr<SortedCloud<D>> sorted = SortCloud<D>(domain_, others, 1, context, added.others.inputs);
-    if (IsTooClose(sorted.status())) {
-      return TooNearError<D>(domain_, others, added.others.inputs, true, 0, sorted.status(), context);
-    }
-    WELLSPACE_RETURN_IF_ERROR(sorted.status());
-    SortedCloud<D> cloud = *std::move(sorted);
-    const HugeVector<uint32_t> sorted_of = cloud.SortedOfInputs();
-    for (uint32_t& input : cloud.first_input) {
-      input = added.others.inputs.empty() ? input : added.others.inputs[input];
-    }
-    if (const absl::Status apart = CheckApart(cloud, context); !apart.ok()) {
-      return IsTooClose(apart) ? TooNearError<D>(domain_, others, added.others.inputs, true, 0, apart, context) : apart;
-    }
-    WELLSPACE_ASSIGN_OR_RETURN(std::vector<VertexId> known, FindAll(cloud, start, context));
-    if (structure_.vertex_count() + cloud.points.size() > kMaxVertices) {
-      return absl::ResourceExhaustedError(absl::StrCat("points: ", cloud.points.size(), " beside ", vertex_count(),
-                                                       " vertices are more than can be numbered, ", kMaxVertices));
-    }
-    for (size_t i = 0; i < cloud.points.size(); ++i) {
-      if (known[i] == kNoVertex) {
-        known[i] = Add(start(cloud.first_input[i]), cloud.points[i], points, cloud.first_input[i]);
-      }
-    }
-    std::vector<uint32_t> vertices;
-    for (size_t i = 0, other = 0; i < points.size() / D; ++i) {
-      VertexId v = merge_distance_ > 0 ? added.vertex_of[i] : kNoVertex;
-      if (v == kNoVertex) {
-        v = known[sorted_of[merge_distance_ > 0 ? added.others.place_of[other] : other]];
-        ++other;
-      }
-      is_given_[Index(v)] = true;
-      vertices.push_back(OutputIndex(v));
-    }
-    merged_points_ += added.others.merged;
-    input_vertex_.insert(input_vertex_.end(), vertices.begin(), vertices.end());
-    context.SetVertices(structure_.vertex_count());
     return vertices;
   }
 
   absl::StatusOr<uint32_t> AddVertex(uint32_t near, std::span<const double> point) override {
-    WELLSPACE_RETURN_IF_ERROR(CheckVertices({&near, 1}));
-    if (point.size() != D) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("point: it has ", point.size(), " coordinates; ", D, " are needed"));
-    }
-    if (structure_.vertex_count() >= kMaxVertices) {
-      return absl::ResourceExhaustedError(absl::StrCat("no more than ", kMaxVertices, " vertices can be numbered"));
-    }
-    const RunContext context;
-    WELLSPACE_RETURN_IF_ERROR(CheckPoints<D>(domain_, point, context));
-    const VertexId start = VertexOf(near);
-    VertexId v = FindMerged(domain_.Scaled(PointAt<D>(point, 0)), start, merged_points_);
-    if (v == kNoVertex) {
-      WELLSPACE_ASSIGN_OR_RETURN(const SortedCloud<D> cloud, SortCloud<D>(domain_, point, 1, context));
-      WELLSPACE_ASSIGN_OR_RETURN(v, Find(cloud.points[0], 0, start));
-      if (v == kNoVertex) {
-        v = Add(start, cloud.points[0], point, 0);
-      }
-    }
-    is_given_[Index(v)] = true;
-    input_vertex_.push_back(OutputIndex(v));
-    return OutputIndex(v);
+    const uint32_t count = structure_.vertex_count();
+    absl::StatusOr<uint32_t> vertex = adder_->AddVertex(near, point);
+    is_refined_ = is_refined_ && structure_.vertex_count() == count;
+    return vertex;
   }
 
   absl::StatusOr<std::vector<double>> NearestNeighborDistances(std::span<const uint32_t> vertices) const override {
-    WELLSPACE_RETURN_IF_ERROR(CheckVertices(vertices));
+    WELLSPACE_RETURN_IF_ERROR(CheckVertices(vertices, structure_.vertex_count()));
     std::vector<double> distances;
     distances.reserve(vertices.size());
     Workspace<D> workspace;
     for (const uint32_t vertex : vertices) {
-      const double distance_sq = structure_.ApproximateNearestNeighbor(VertexOf(vertex), workspace).distance_sq;
+      const double distance_sq =
+          structure_.ApproximateNearestNeighbor(numbering_.VertexOf(vertex), workspace).distance_sq;
       distances.push_back(std::sqrt(distance_sq) / domain_.scale);
     }
     return distances;
   }
 
   absl::StatusOr<std::vector<Cell>> ClippedCells(std::span<const uint32_t> vertices, double beta) const override {
-    WELLSPACE_RETURN_IF_ERROR(CheckVertices(vertices));
+    WELLSPACE_RETURN_IF_ERROR(CheckVertices(vertices, structure_.vertex_count()));
     if (!(beta >= 1)) {
       return absl::InvalidArgumentError(absl::StrCat("beta: ", beta, " is not allowed; a number of at least 1 is"));
     }
@@ -266,13 +148,13 @@ class MesherIn final : public Mesher {
     std::vector<std::pair<NodeId, size_t>> order;
     order.reserve(vertices.size());
     for (size_t i = 0; i < vertices.size(); ++i) {
-      order.emplace_back(structure_.tree().leaf_of(VertexOf(vertices[i])), i);
+      order.emplace_back(structure_.tree().leaf_of(numbering_.VertexOf(vertices[i])), i);
     }
     std::sort(order.begin(), order.end());
     std::vector<VertexId> sites;
     sites.reserve(vertices.size());
     for (const auto& [leaf, i] : order) {
-      sites.push_back(VertexOf(vertices[i]));
+      sites.push_back(numbering_.VertexOf(vertices[i]));
     }
     std::vector<Cell> cells(vertices.size());
     auto next = order.begin();
@@ -286,8 +168,8 @@ class MesherIn final : public Mesher {
                                                             " nodes; refine first, or ask with a smaller beta"));
         return false;
       }
-      cells[i] =
-          DescribeCell<D>(vertices[i], radius, workspace.cell, domain_, [this](VertexId u) { return OutputIndex(u); });
+      cells[i] = DescribeCell<D>(vertices[i], radius, workspace.cell, domain_,
+                                 [this](VertexId u) { return numbering_.OutputIndex(u); });
       return true;
     });
     WELLSPACE_RETURN_IF_ERROR(status);
@@ -296,7 +178,7 @@ class MesherIn final : public Mesher {
 
   absl::StatusOr<Mesh> Extract(int threads, RunContext& context) override {
     WELLSPACE_RETURN_IF_ERROR(CheckRefined(threads));
-    ExtendOutputIndex();
+    numbering_.Extend(structure_.vertex_count());
     Mesh mesh;
     mesh.dimension = D;
     mesh.domain_low.assign(domain_.box.low.begin(), domain_.box.low.end());
@@ -306,8 +188,8 @@ class MesherIn final : public Mesher {
     ThreadTeam team(threads);
     const absl::Cleanup end = [&team] { team.Drop(); };  // where something is refused
     team.BeginCall([&] {
-      points = PointsFrom(0, context);
-      mesh.input_vertex.assign(input_vertex_.begin(), input_vertex_.end());
+      points = numbering_.PointsFrom(structure_, domain_, 0, context);
+      mesh.input_vertex = numbering_.input_vertex();
     });
     WELLSPACE_ASSIGN_OR_RETURN(WeightedSimplices weighted, MakeSimplices(threads, context));
     team.End();
@@ -346,22 +228,24 @@ class MesherIn final : public Mesher {
       return absl::OkStatus();
     }
     context.EnterPhase(Phase::kSimplices);
-    ExtendOutputIndex();
+    numbering_.Extend(structure_.vertex_count());
     WELLSPACE_ASSIGN_OR_RETURN(
         const std::vector<VertexId> changed,
         ChangedVertices<D>(structure_, VertexId{static_cast<uint32_t>(extracted_vertices_)}, context));
-    WELLSPACE_ASSIGN_OR_RETURN(Simplices simplices,
-                               ComputeSimplicesAmong<D>(structure_, changed, output_index_, threads, context));
-    WELLSPACE_ASSIGN_OR_RETURN(const HugeVector<double> added, PointsFrom(extracted_vertices_, context));
+    WELLSPACE_ASSIGN_OR_RETURN(
+        Simplices simplices,
+        ComputeSimplicesAmong<D>(structure_, changed, numbering_.output_index(), threads, context));
+    WELLSPACE_ASSIGN_OR_RETURN(const HugeVector<double> added,
+                               numbering_.PointsFrom(structure_, domain_, extracted_vertices_, context));
     mesh.points.insert(mesh.points.end(), added.begin(), added.end());
     std::vector<bool> has_changed(structure_.vertex_count(), false);
     for (const VertexId v : changed) {
-      has_changed[OutputIndex(v)] = true;
+      has_changed[numbering_.OutputIndex(v)] = true;
     }
     const bool worst_has_gone = DropSimplicesAmong<D>(
-        has_changed, [this](uint32_t v) -> const Point<D>& { return structure_.point(VertexOf(v)); }, mesh);
+        has_changed, [this](uint32_t v) -> const Point<D>& { return structure_.point(numbering_.VertexOf(v)); }, mesh);
     mesh.simplices.insert(mesh.simplices.end(), simplices.indices.begin(), simplices.indices.end());
-    mesh.input_vertex.assign(input_vertex_.begin(), input_vertex_.end());
+    mesh.input_vertex = numbering_.input_vertex();
     mesh.moved_vertices.clear();  // else the mesh is extracted anew
     if (worst_has_gone) {
       const QualityReport report = MeasureQuality({D, mesh.points, mesh.simplices});
@@ -402,6 +286,55 @@ class MesherIn final : public Mesher {
   }
 
  private:
+  // Sets the domain, and merges the points that are near each other if that is asked for.
+  absl::StatusOr<MergedPoints> SetDomain(const MeshParameters& parameters, std::span<const double> points,
+                                         const RunContext& context) {
+    const bool is_given = !parameters.domain_low.empty();
+    Box<D> box;
+    if (is_given) {
+      box = BoxOf<D>(parameters.domain_low, parameters.domain_high);
+    } else {
+      WELLSPACE_ASSIGN_OR_RETURN(box, BoxAround<D>(points, parameters.margin, context));
+    }
+    WELLSPACE_ASSIGN_OR_RETURN(domain_, Domain<D>::Of(box));
+    MergedPoints merged;
+    if (merge_distance_ == 0) {
+      return merged;
+    }
+    // A point outside the box may become one inside: the box of a session is that of the points that stayed.
+    Domain<D> wide = domain_;
+    const double reach = std::min(merge_distance_, box.LongestSide());
+    wide.box = {CubeAround<D>(box.low, reach).low, CubeAround<D>(box.high, reach).high};
+    WELLSPACE_RETURN_IF_ERROR(CheckPoints<D>(wide, points, context));
+    WELLSPACE_ASSIGN_OR_RETURN(merged, MergeNear<D>(domain_, points, merge_distance_, context));
+    if (!is_given) {
+      WELLSPACE_ASSIGN_OR_RETURN(box, BoxAround<D>(merged.points, parameters.margin, context));
+      WELLSPACE_ASSIGN_OR_RETURN(domain_, Domain<D>::Of(box));
+    }
+    return merged;
+  }
+
+  // Sorts the points, of which `merged` has what merging has left, and builds the tree. Returns the cloud without its
+  // points, which the structure has then.
+  absl::StatusOr<SortedCloud<D>> BuildTree(const MeshParameters& parameters, std::span<const double> points,
+                                           const MergedPoints& merged, const RunContext& context) {
+    WELLSPACE_ASSIGN_OR_RETURN(SortedCloud<D> cloud, merge_distance_ > 0
+                                                         ? SortMerged<D>(domain_, merged, parameters.threads, context)
+                                                         : SortCloud<D>(domain_, points, parameters.threads, context));
+    const size_t distinct = cloud.points.size();
+    const uint64_t max_vertices = VertexBudget(parameters);
+    if (distinct + (size_t{1} << D) > max_vertices) {
+      return absl::ResourceExhaustedError(
+          absl::StrCat("the ", distinct, " distinct points and the domain's corners are more than ",
+                       "max_vertices = ", max_vertices, " vertices; raise max_vertices"));
+    }
+    WELLSPACE_RETURN_IF_ERROR(structure_.Initialize(
+        cloud.grid, std::move(cloud.points), kLeavesPerVertex * max_vertices + (1u << D), parameters.threads, context));
+    WELLSPACE_RETURN_IF_ERROR(
+        CheckSeparation<D>(domain_, structure_, 0, cloud.first_input, parameters.threads, context));
+    return cloud;
+  }
+
   static absl::Status CheckParameters(const MeshParameters& parameters) {
     WELLSPACE_RETURN_IF_ERROR(ValidateParameters(parameters));
     if (parameters.dimension != D) {
@@ -475,13 +408,14 @@ class MesherIn final : public Mesher {
   absl::StatusOr<WeightedSimplices> MakeSimplices(int threads, RunContext& context) {
     if constexpr (D >= 3) {
       if (MakesWhole()) {
-        return slivers_.ToSimplices(structure_, refinement_->stars(), output_index_, pumps_, threads, context);
+        return slivers_.ToSimplices(structure_, refinement_->stars(), numbering_.output_index(), pumps_, threads,
+                                    context);
       }
     }
     context.EnterPhase(Phase::kSimplices);
     WeightedSimplices made;
-    WELLSPACE_ASSIGN_OR_RETURN(made.simplices,
-                               ComputeSimplices<D>(structure_, refinement_->stars(), output_index_, threads, context));
+    WELLSPACE_ASSIGN_OR_RETURN(made.simplices, ComputeSimplices<D>(structure_, refinement_->stars(),
+                                                                   numbering_.output_index(), threads, context));
     return made;
   }
 
@@ -490,21 +424,10 @@ class MesherIn final : public Mesher {
     HugeVector<uint32_t> vertices;
     for (uint32_t v = 0; v < moved_.size(); ++v) {
       if (moved_[v]) {
-        vertices.push_back(OutputIndex(VertexId{v}));
+        vertices.push_back(numbering_.OutputIndex(VertexId{v}));
       }
     }
     return vertices;
-  }
-
-  // Refuses numbers that are no vertex.
-  absl::Status CheckVertices(std::span<const uint32_t> vertices) const {
-    for (size_t i = 0; i < vertices.size(); ++i) {
-      if (vertices[i] >= structure_.vertex_count()) {
-        return absl::OutOfRangeError(
-            absl::StrCat("vertices[", i, "]: ", vertices[i], " is no vertex; there are ", structure_.vertex_count()));
-      }
-    }
-    return absl::OkStatus();
   }
 
   absl::Status CheckRefined(int threads) const {
@@ -515,193 +438,14 @@ class MesherIn final : public Mesher {
     return CheckThreads(threads);
   }
 
-  // Vertices beyond the distinct input points have the same number outside as inside.
-  uint32_t OutputIndex(VertexId v) const { return Index(v) < distinct_count_ ? output_index_[Index(v)] : Index(v); }
-  VertexId VertexOf(uint32_t output_index) const {
-    if (output_index >= distinct_count_) {
-      return VertexId{output_index};
-    }
-    std::call_once(has_vertex_at_, [this] {
-      vertex_at_.resize(distinct_count_);
-      for (uint32_t i = 0; i < distinct_count_; ++i) {
-        vertex_at_[output_index_[i]] = VertexId{i};
-      }
-    });
-    return vertex_at_[output_index];
-  }
-  void ExtendOutputIndex() {
-    const auto old = static_cast<std::ptrdiff_t>(output_index_.size());
-    output_index_.resize(structure_.vertex_count());
-    std::iota(output_index_.begin() + old, output_index_.end(), static_cast<uint32_t>(old));
-  }
-
-  // The nearest vertex, if points this near are merged: a Steiner vertex too, as it stands where the point is. Counts
-  // it in `merged` unless it is at `p`.
-  VertexId FindMerged(const Point<D>& p, VertexId near, uint64_t& merged) {
-    if (merge_distance_ == 0) {
-      return kNoVertex;
-    }
-    const auto [nearest, distance_sq] = structure_.NearestTo(p, near, workspace_);
-    const double reach = merge_distance_ * domain_.scale;
-    if (distance_sq > reach * reach) {
-      return kNoVertex;
-    }
-    merged += distance_sq > 0 ? 1 : 0;
-    return nearest;
-  }
-
-  // Points that are added, if near ones are merged: those that become vertices that there are, and what is left of the
-  // others.
-  struct Added {
-    std::vector<VertexId> vertex_of;  // by input
-    MergedPoints others;              // `inputs` are numbers among all, `place_of` is by those that are others
-  };
-
-  template <typename Start>
-  absl::StatusOr<Added> MergeAdded(std::span<const double> points, Start start, const RunContext& context) {
-    Added added;
-    if (merge_distance_ == 0) {
-      return added;
-    }
-    WELLSPACE_RETURN_IF_ERROR(CheckPoints<D>(domain_, points, context));
-    uint64_t merged = 0;
-    std::vector<double> others;
-    std::vector<uint32_t> inputs;
-    for (uint32_t i = 0; i < points.size() / D; ++i) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-      const Point<D> p = PointAt<D>(points, i);
-      added.vertex_of.push_back(FindMerged(domain_.Scaled(p), start(i), merged));
-      if (added.vertex_of.back() == kNoVertex) {
-        others.insert(others.end(), p.begin(), p.end());
-        inputs.push_back(i);
-      }
-    }
-    WELLSPACE_ASSIGN_OR_RETURN(added.others, MergeNear<D>(domain_, others, merge_distance_, context));
-    added.others.merged += merged;
-    for (uint32_t& input : added.others.inputs) {
-      input = inputs[input];
-    }
-    return added;
-  }
-
-  // Refuses points that are too near to each other.
-  absl::Status CheckApart(const SortedCloud<D>& cloud, const RunContext& context) const {
-    // The points among themselves, and beside the faces of the box.
-    QueryStructure<D> apart;
-    WELLSPACE_RETURN_IF_ERROR(apart.Initialize(cloud.grid, {}, kLeavesPerVertex * kDefaultMaxVertices, 1, context));
-    const uint32_t corners = apart.vertex_count();
-    for (const Point<D>& p : cloud.points) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-      apart.AddVertex(kNoVertex, p);
-    }
-    return CheckSeparation<D>(domain_, apart, corners, cloud.first_input, 1, context);
-  }
-
-  // Find for each of a cloud; the error counts those that are too close, and names the first.
-  template <typename Start>
-  absl::StatusOr<std::vector<VertexId>> FindAll(const SortedCloud<D>& cloud, Start start, const RunContext& context) {
-    std::vector<VertexId> found(cloud.points.size(), kNoVertex);
-    std::vector<std::pair<uint32_t, absl::Status>> refused;
-    for (size_t i = 0; i < cloud.points.size(); ++i) {
-      WELLSPACE_RETURN_IF_ERROR(context.Check());
-      const uint32_t input = cloud.first_input[i];
-      const absl::StatusOr<VertexId> vertex = Find(cloud.points[i], input, start(input));
-      if (vertex.ok()) {
-        found[i] = *vertex;
-      } else {
-        refused.emplace_back(input, vertex.status());
-      }
-    }
-    if (refused.empty()) {
-      return found;
-    }
-    std::sort(refused.begin(), refused.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-    std::string text(refused.front().second.message());
-    for (size_t i = 1; i < refused.size() && i < kNamedTooClose; ++i) {
-      absl::StrAppend(&text, i == 1 ? "; so are " : ", ", "points[", refused[i].first, "]");
-    }
-    if (refused.size() > 1) {
-      absl::StrAppend(&text, refused.size() > kNamedTooClose ? ", …: " : ": ", refused.size(), " points in all");
-    }
-    return absl::InvalidArgumentError(text);
-  }
-
-  // The vertex at `p`, which is input `index`; kNoVertex if there is none, and none too close.
-  absl::StatusOr<VertexId> Find(const Point<D>& p, size_t index, VertexId near = kNoVertex) {
-    const auto [nearest, distance_sq] = structure_.NearestTo(p, near, workspace_);
-    if (distance_sq == 0) {
-      return nearest;
-    }
-    if (distance_sq < domain_.MinSeparation() * domain_.MinSeparation()) {
-      return TooCloseError<D>(domain_, p, index, std::sqrt(distance_sq), absl::StrCat("vertex ", OutputIndex(nearest)));
-    }
-    return kNoVertex;
-  }
-
-  // Adds a vertex at `p`, which is input `index` of `points`.
-  VertexId Add(VertexId near, const Point<D>& p, std::span<const double> points, size_t index) {
-    const VertexId v = structure_.AddVertex(near, p);
-    is_given_.resize(structure_.vertex_count(), true);
-    refinement_->VertexAdded(v);
-    is_refined_ = false;
-    ++distinct_input_;
-    NoteNegativeZeros(points, index, OutputIndex(v));
-    return v;
-  }
-
-  // The computation has no negative zeros, the mesh those of its points.
-  void NoteNegativeZeros(std::span<const double> points, size_t index, uint32_t vertex) {
-    for (int k = 0; k < D; ++k) {
-      const double x = points[index * D + k];
-      if (x == 0 && std::signbit(x)) {
-        negative_zeros_.push_back(size_t{vertex} * D + k);
-      }
-    }
-  }
-
-  // Those of the points that became vertices: the first of equals, or what merging has left.
-  void NoteInputZeros(std::span<const double> points, const MergedPoints& merged) {
-    for (const uint32_t input : merged.inputs) {
-      NoteNegativeZeros(points, input, input_vertex_[input]);
-    }
-    for (uint32_t i = 0, named = 0; merge_distance_ == 0 && i < input_vertex_.size(); ++i) {
-      if (input_vertex_[i] == named) {  // and no duplicate of an earlier one
-        NoteNegativeZeros(points, i, named++);
-      }
-    }
-  }
-
-  // The coordinates of the vertices from number `first` on, by output index: all, or none of the input points.
-  absl::StatusOr<HugeVector<double>> PointsFrom(uint64_t first, const RunContext& context) const {
-    const uint32_t count = structure_.vertex_count();
-    const auto place_of = [&](uint32_t v) { return (OutputIndex(VertexId{v}) - first) * D; };
-    HugeVector<double> out((count - first) * D);
-    for (auto i = static_cast<uint32_t>(first); i < count; ++i) {
-      if (i % kStepsBetweenChecks == 0) {
-        WELLSPACE_RETURN_IF_ERROR(context.Check());
-      }
-      if (count - i > kAhead) {
-        __builtin_prefetch(&out[place_of(i + kAhead)], 1);
-      }
-      const Point<D> p = domain_.Unscaled(structure_.point(VertexId{i}));
-      std::copy(p.begin(), p.end(), &out[place_of(i)]);
-    }
-    for (const size_t at : negative_zeros_) {
-      if (at >= first * D) {
-        out[at - first * D] = -0.0;
-      }
-    }
-    return out;
-  }
-
   // Notes an extracted mesh, and sets its statistics but for those of its simplices' shapes.
   void FinishMesh(Mesh& mesh) {
     extracted_vertices_ = structure_.vertex_count();
     extracted_simplices_ = mesh.simplex_count();
     MeshStatistics& statistics = mesh.statistics;
-    statistics.input_points = input_vertex_.size();
-    statistics.duplicates = input_vertex_.size() - distinct_input_ - merged_points_;
-    statistics.merged_points = merged_points_;
+    statistics.input_points = numbering_.input_vertex().size();
+    statistics.merged_points = numbering_.merged_inputs();
+    statistics.duplicates = statistics.input_points - numbering_.distinct_inputs() - statistics.merged_points;
     statistics.vertices = mesh.vertex_count();
     statistics.simplices = mesh.simplex_count();
     statistics.tree_seconds = tree_seconds_;
@@ -714,7 +458,7 @@ class MesherIn final : public Mesher {
       SetSliverFigures(slivers_.statistics(), statistics);
       for (LeftSliver& sliver : statistics.flattest_left) {
         for (uint32_t& v : sliver.vertices) {
-          v = OutputIndex(VertexId{v});
+          v = numbering_.OutputIndex(VertexId{v});
         }
       }
     }
@@ -732,16 +476,9 @@ class MesherIn final : public Mesher {
   std::vector<bool> moved_;     // by vertex, since the last mesh, of those that it had
   std::vector<bool> is_given_;  // by vertex: an input point, or a corner of the box
 
-  uint64_t distinct_count_ = 0;        // the former
-  HugeVector<uint32_t> output_index_;  // by vertex; of the first distinct_count_ at least
-  // By output index, of the first distinct_count_; once one is asked for.
-  mutable HugeVector<VertexId> vertex_at_;
-  mutable std::once_flag has_vertex_at_;
-  HugeVector<uint32_t> input_vertex_;  // by point given
-  uint64_t distinct_input_ = 0;        // different vertices among them
+  VertexNumbering<D> numbering_;
   double merge_distance_ = 0;
-  uint64_t merged_points_ = 0;          // became a vertex with other coordinates
-  std::vector<size_t> negative_zeros_;  // places in Mesh::points
+  std::optional<PointAdder<D>> adder_;
 
   uint64_t extracted_vertices_ = 0;  // of the last mesh made
   uint64_t extracted_simplices_ = 0;
@@ -749,7 +486,6 @@ class MesherIn final : public Mesher {
   double tree_seconds_ = 0;
   double refinement_seconds_ = 0;
   double simplices_seconds_ = 0;
-  Workspace<D> workspace_;
 };
 
 template <int D>

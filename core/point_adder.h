@@ -1,0 +1,79 @@
+// Points that are added to a mesh that has been made: which vertices they become.
+#ifndef WELLSPACE_CORE_POINT_ADDER_H_
+#define WELLSPACE_CORE_POINT_ADDER_H_
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "core/base/ids.h"
+#include "core/base/run_context.h"
+#include "core/geometry/point.h"
+#include "core/input_cloud.h"
+#include "core/near_points.h"
+#include "core/refine/refine.h"
+#include "core/vertex_numbering.h"
+#include "core/voronoi/query_structure.h"
+
+namespace wellspace::core {
+
+// Adds vertices at points, unless there is a vertex already, or one so near that the two are merged.
+//
+// Thread safety: thread-compatible.
+template <int D>
+class PointAdder {
+ public:
+  // Points no farther than `merge_distance` from a vertex become that one. `is_given` has an entry for each vertex, and
+  // is set for those that points become.
+  //
+  // REQUIRES:   all that is handed in outlives this.
+  PointAdder(const Domain<D>& domain, double merge_distance, QueryStructure<D>& structure, Refinement<D>& refinement,
+             VertexNumbering<D>& numbering, std::vector<bool>& is_given)
+      : domain_(domain),
+        merge_distance_(merge_distance),
+        structure_(structure),
+        refinement_(refinement),
+        numbering_(numbering),
+        is_given_(is_given) {}
+
+  // Mesher::AddPointsNear.
+  absl::StatusOr<std::vector<uint32_t>> AddPoints(std::span<const double> points, std::span<const uint32_t> near,
+                                                  const RunContext& context);
+
+  // Mesher::AddVertex.
+  absl::StatusOr<uint32_t> AddVertex(uint32_t near, std::span<const double> point);
+
+ private:
+  // What merging leaves of points that are added.
+  struct Merged {
+    std::vector<VertexId> vertex_of;  // by input: the vertex that it becomes, kNoVertex for the others
+    MergedPoints others;              // `inputs` are numbers among all, `place_of` is by those that are others
+  };
+
+  // Where the search for input `index` begins.
+  VertexId Start(std::span<const uint32_t> near, size_t index) const {
+    return near.empty() ? kNoVertex : numbering_.VertexOf(near[index]);
+  }
+
+  absl::StatusOr<Merged> Merge(std::span<const double> points, std::span<const uint32_t> near,
+                               const RunContext& context);
+  VertexId FindMerged(const Point<D>& p, VertexId near, uint64_t& merged);
+  absl::StatusOr<std::vector<VertexId>> FindAll(const SortedCloud<D>& cloud, std::span<const uint32_t> near,
+                                                const RunContext& context);
+  absl::StatusOr<VertexId> Find(const Point<D>& p, size_t index, VertexId near);
+  VertexId Add(VertexId near, const Point<D>& p, std::span<const double> points, size_t index);
+
+  const Domain<D>& domain_;
+  const double merge_distance_;
+  QueryStructure<D>& structure_;
+  Refinement<D>& refinement_;
+  VertexNumbering<D>& numbering_;
+  std::vector<bool>& is_given_;
+  Workspace<D> workspace_;
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_POINT_ADDER_H_
