@@ -1,5 +1,5 @@
-// Eight floats, or 32-bit integers, at a time: comparisons, choices, the order of some lanes. For files that are compiled
-// for several vector units: all is compiled into its callers.
+// Eight floats, or 32-bit integers, at a time: comparisons, choices, the order of some lanes. For files that are
+// compiled for several vector units: all is compiled into its callers.
 #ifndef WELLSPACE_CORE_BASE_SIMD_FLOAT_LANES_H_
 #define WELLSPACE_CORE_BASE_SIMD_FLOAT_LANES_H_
 
@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <cstring>
 
+#include "core/base/simd/lane_bits.h"
 #include "core/base/simd/lanes.h"
 
 // Vectors that are passed and returned never are: all that does so is compiled into its callers.
