@@ -8,7 +8,7 @@
 
 #include "core/cell/polytope.h"
 #include "core/input_cloud.h"
-#include "core/mesher.h"
+#include "core/mesh.h"
 #include "core/simplex/quality.h"
 
 namespace wellspace::core {
