@@ -7,8 +7,14 @@
 
 #include "core/base/memory/huge_pages.h"
 #include "core/mesh_statistics.h"
+#include "core/simplex/boundary.h"
 
 namespace wellspace::core {
+
+// Where a vertex comes from, if it is no input point.
+inline constexpr uint32_t kSteinerOrigin = 0xffff'ffff;  // the refinement
+inline constexpr uint32_t kRepairOrigin = 0xffff'fffe;   // the repair of slivers
+inline constexpr uint32_t kCornerOrigin = 0xffff'fffd;   // it is a corner of the box
 
 struct Mesh {
   int dimension = 0;
@@ -29,8 +35,21 @@ struct Mesh {
   // Vertices of the mesh that was extracted before which are elsewhere now, ascending; none in a first mesh. They are
   // Steiner vertices: neither input points nor corners of the box.
   HugeVector<uint32_t> moved_vertices;
+  // For each vertex the number of the first input point that became it, in the order of input_vertex; else one of the
+  // origins above.
+  HugeVector<uint32_t> vertex_origins;
+  // For each vertex the least tag of a part of the boundary that it is on, or kNoTag.
+  HugeVector<int32_t> vertex_tags;
+  // The boundary: facet_count x dimension indices of vertices, row-major, part after part as `boundary` has them;
+  // oriented and ordered as FindBoxBoundary says.
+  HugeVector<uint32_t> facets;
+  std::vector<BoundaryPart> boundary;
+  // The region of each simplex, as an id of `regions`. Empty: all are of the only region.
+  HugeVector<int32_t> simplex_regions;
+  std::vector<Region> regions;
   MeshStatistics statistics;
 
+  uint64_t facet_count() const { return dimension == 0 ? 0 : facets.size() / dimension; }
   uint64_t vertex_count() const { return dimension == 0 ? 0 : points.size() / dimension; }
   uint64_t simplex_count() const { return dimension == 0 ? 0 : simplices.size() / (dimension + 1); }
 };

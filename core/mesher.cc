@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <optional>
 #include <type_traits>
 #include <utility>
@@ -21,6 +22,7 @@
 #include "core/near_points.h"
 #include "core/point_adder.h"
 #include "core/refine/refine.h"
+#include "core/simplex/boundary.h"
 #include "core/simplex/quality.h"
 #include "core/simplex/simplices.h"
 #include "core/simplex/validate.h"
@@ -200,6 +202,7 @@ class MesherIn final : public Mesher {
     for (double& weight : mesh.weights) {
       weight /= domain_.scale * domain_.scale;
     }
+    WELLSPACE_RETURN_IF_ERROR(DescribeBoundary(mesh, context));
     mesh.statistics.max_radius_edge = simplices.max_radius_edge;
     mesh.statistics.min_angle_deg = simplices.min_angle_deg;
     stars_.Add(simplices.counters);
@@ -247,6 +250,9 @@ class MesherIn final : public Mesher {
     mesh.simplices.insert(mesh.simplices.end(), simplices.indices.begin(), simplices.indices.end());
     mesh.input_vertex = numbering_.input_vertex();
     mesh.moved_vertices.clear();  // else the mesh is extracted anew
+    if (const absl::Status described = DescribeBoundary(mesh, RunContext()); !described.ok()) {
+      std::abort();  // nobody can have cancelled that context
+    }
     if (worst_has_gone) {
       const QualityReport report = MeasureQuality({D, mesh.points, mesh.simplices});
       mesh.statistics.max_radius_edge = report.max_radius_edge;
@@ -364,6 +370,7 @@ class MesherIn final : public Mesher {
       if (const double min_dihedral = MinDihedralOf(parameters); min_dihedral > 0) {
         const MendDemands demands{DemandsOf(parameters), min_dihedral, domain_.MinEdge(), VertexBudget(parameters)};
         const uint64_t moves = slivers_.statistics().moves;
+        const uint32_t refined = structure_.vertex_count();
         moved_.resize(extracted_vertices_, false);
         std::vector<bool> kept;
         if (parameters.keep_vertices) {
@@ -373,6 +380,7 @@ class MesherIn final : public Mesher {
         const absl::Status status = slivers_.Mend(structure_, *refinement_, parameters.keep_vertices ? kept : is_given_,
                                                   demands, moved_, parameters.threads, context);
         is_given_.resize(structure_.vertex_count(), false);
+        repairs_.emplace_back(refined, structure_.vertex_count());
         has_moved_ = has_moved_ || slivers_.statistics().moves > moves;
         context.SetVertices(structure_.vertex_count());
         pumps_ = parameters.pump_weights && slivers_.statistics().slivers_left > 0;
@@ -438,6 +446,28 @@ class MesherIn final : public Mesher {
     return CheckThreads(threads);
   }
 
+  // Sets what is said of the boundary, of regions and of origins.
+  absl::Status DescribeBoundary(Mesh& mesh, const RunContext& context) const {
+    WELLSPACE_ASSIGN_OR_RETURN(
+        BoxBoundary boundary,
+        FindBoxBoundary({mesh.domain_low, mesh.domain_high, mesh.points, mesh.simplices}, context));
+    mesh.vertex_tags = std::move(boundary.vertex_tags);
+    mesh.facets = std::move(boundary.facets);
+    mesh.boundary = std::move(boundary.parts);
+    mesh.regions = {WholeBox()};
+    mesh.vertex_origins.assign(structure_.vertex_count(), kSteinerOrigin);
+    const auto origins = mesh.vertex_origins.begin();
+    std::fill(origins, origins + structure_.built_count(), kCornerOrigin);
+    for (const auto& [first, end] : repairs_) {
+      std::fill(origins + first, origins + end, kRepairOrigin);
+    }
+    const auto& input_vertex = numbering_.input_vertex();
+    for (size_t i = input_vertex.size(); i > 0; --i) {
+      origins[input_vertex[i - 1]] = static_cast<uint32_t>(i - 1);
+    }
+    return absl::OkStatus();
+  }
+
   // Notes an extracted mesh, and sets its statistics but for those of its simplices' shapes.
   void FinishMesh(Mesh& mesh) {
     extracted_vertices_ = structure_.vertex_count();
@@ -472,9 +502,10 @@ class MesherIn final : public Mesher {
   bool is_refined_ = false;
   [[no_unique_address]] std::conditional_t<(D >= 3), SliverStage<D>, std::monostate> slivers_;
   bool pumps_ = false;
-  bool has_moved_ = false;      // a vertex, since the last mesh
-  std::vector<bool> moved_;     // by vertex, since the last mesh, of those that it had
-  std::vector<bool> is_given_;  // by vertex: an input point, or a corner of the box
+  bool has_moved_ = false;                              // a vertex, since the last mesh
+  std::vector<bool> moved_;                             // by vertex, since the last mesh, of those that it had
+  std::vector<bool> is_given_;                          // by vertex: an input point, or a corner of the box
+  std::vector<std::pair<uint32_t, uint32_t>> repairs_;  // vertices that one of them has added: first, and end
 
   VertexNumbering<D> numbering_;
   double merge_distance_ = 0;
