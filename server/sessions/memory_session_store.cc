@@ -47,7 +47,7 @@ grpc::Status MemorySessionStore::Create(NewSession settings, std::shared_ptr<Ses
                                                          .labels = std::move(settings.labels),
                                                          .ttl = settings.ttl,
                                                          .create_time = last_create_time_},
-                                       options_, memory_, clock_, tenant.usage);
+                                       options_, memory_, clock_, tenant.points);
   tenant.sessions.emplace(last_create_time_, *session);
   by_name_.emplace((*session)->name(), *session);
   return grpc::Status::OK;

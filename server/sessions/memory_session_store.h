@@ -34,7 +34,7 @@ class MemorySessionStore final : public SessionStore {
 
  private:
   struct Tenant {
-    std::shared_ptr<TenantUsage> usage = std::make_shared<TenantUsage>();
+    std::shared_ptr<TenantPoints> points = std::make_shared<TenantPoints>();
     std::map<absl::Time, std::shared_ptr<Session>> sessions;  // by time of creation
   };
 

@@ -16,28 +16,17 @@ constexpr size_t kKeptOperations = 100;
 }  // namespace
 
 Session::Session(Settings settings, const ServiceOptions& options, MemoryBudget& memory, Clock clock,
-                 std::shared_ptr<TenantUsage> usage)
+                 std::shared_ptr<TenantPoints> tenant_points)
     : tenant_(std::move(settings.tenant)),
       name_(std::move(settings.name)),
       dimension_(settings.parameters.dimension),
       create_time_(settings.create_time),
-      options_(options),
       memory_(memory),
       clock_(std::move(clock)),
-      usage_(std::move(usage)),
       parameters_(std::move(settings.parameters)),
       labels_(std::move(settings.labels)),
-      ttl_(settings.ttl),
-      last_use_(clock_.since_boot()),
-      point_memory_(memory.ReserveNothing()) {
-  point_memory_.MakeLasting();
-}
-
-Session::~Session() {
-  if (!is_closed_) {
-    usage_->points -= point_count_;
-  }
-}
+      lease_(settings.ttl, clock_.since_boot()),
+      point_account_(name_, dimension_, options, memory, std::move(tenant_points)) {}
 
 core::MeshParameters Session::parameters() const {
   std::lock_guard lock(mutex_);
@@ -54,8 +43,9 @@ v1::Session Session::Describe() const {
                                               : v1::Session::STATE_OPEN);
   *message.mutable_parameters() = ParametersToProto(parameters_);
   message.mutable_labels()->insert(labels_.begin(), labels_.end());
-  *message.mutable_ttl() = DurationToProto(ttl_);
-  *message.mutable_expire_time() = TimeToProto(clock_.wall() + (ExpiresAt() - clock_.since_boot()));
+  *message.mutable_ttl() = DurationToProto(lease_.ttl());
+  const absl::Duration since_boot = clock_.since_boot();
+  *message.mutable_expire_time() = TimeToProto(clock_.wall() + (lease_.ExpiresAt(since_boot) - since_boot));
   message.set_revision(revision_);
   message.set_committed_points(points_.coordinate_count() / dimension_);
   if (work_.mesh != nullptr) {
@@ -78,20 +68,12 @@ bool Session::HasLabels(const std::map<std::string, std::string>& labels) const 
 
 bool Session::Renew() {
   std::lock_guard lock(mutex_);
-  if (is_closed_ || ExpiresAt() <= clock_.since_boot()) {
-    return false;
-  }
-  last_use_ = clock_.since_boot();
-  return true;
+  return !is_closed_ && lease_.Renew(clock_.since_boot());
 }
 
 bool Session::IsExpired() const {
   std::lock_guard lock(mutex_);
-  return ExpiresAt() <= clock_.since_boot();
-}
-
-absl::Duration Session::ExpiresAt() const {
-  return (uses_ > 0 || busy_ != Busy::kNo ? clock_.since_boot() : last_use_) + ttl_;
+  return lease_.HasExpired(clock_.since_boot());
 }
 
 grpc::Status Session::Update(std::optional<std::map<std::string, std::string>> labels,
@@ -107,7 +89,7 @@ grpc::Status Session::Update(std::optional<std::map<std::string, std::string>> l
     labels_ = *std::move(labels);
   }
   if (ttl.has_value()) {
-    ttl_ = *ttl;
+    lease_.SetTtl(*ttl);
   }
   return grpc::Status::OK;
 }
@@ -127,7 +109,7 @@ grpc::Status Session::Close(uint64_t expected_revision, std::shared_ptr<Operatio
 
 bool Session::CloseIfExpired() {
   std::lock_guard lock(mutex_);
-  const bool is_expired = !is_closed_ && ExpiresAt() <= clock_.since_boot();
+  const bool is_expired = !is_closed_ && lease_.HasExpired(clock_.since_boot());
   if (is_expired) {
     CloseNow();
   }
@@ -136,7 +118,17 @@ bool Session::CloseIfExpired() {
 
 void Session::CloseNow() {
   is_closed_ = true;
-  usage_->points -= point_count_;
+  point_account_.Close();
+}
+
+void Session::BeginBusy(Busy busy) {
+  busy_ = busy;
+  lease_.BeginUse();
+}
+
+void Session::EndBusy() {
+  busy_ = Busy::kNo;
+  lease_.EndUse(clock_.since_boot());
 }
 
 grpc::Status Session::CheckOpen() const {
@@ -195,34 +187,6 @@ grpc::Status Session::CheckStructure() const {
                                 " in this moment; ask again, and it is built again"));
 }
 
-grpc::Status Session::TakePoints(uint64_t count) {
-  if (point_count_ + count > options_.max_points) {
-    return MakeError(v1::ERROR_REASON_TOO_MANY_POINTS,
-                     absl::StrCat(name_, " would have ", point_count_ + count,
-                                  " points; a session of this server has at most ", options_.max_points));
-  }
-  if (const uint64_t all = usage_->points += count; all > options_.max_points_per_tenant) {
-    usage_->points -= count;
-    return MakeError(v1::ERROR_REASON_QUOTA_EXCEEDED,
-                     absl::StrCat("your sessions would have ", all, " points together; they may have at most ",
-                                  options_.max_points_per_tenant));
-  }
-  if (const uint64_t bytes = (point_count_ + count) * dimension_ * sizeof(double); !point_memory_.Resize(bytes)) {
-    usage_->points -= count;
-    return FromCoreStatus(memory_.Refusal(bytes, "the points of a session"));
-  }
-  point_count_ += count;
-  return grpc::Status::OK;
-}
-
-void Session::ReturnPoints(uint64_t count) {
-  point_count_ -= count;
-  (void)point_memory_.Resize(point_count_ * dimension_ * sizeof(double));  // shrinking never fails
-  if (!is_closed_) {
-    usage_->points -= count;
-  }
-}
-
 grpc::Status Session::CheckCoordinates(uint64_t first, std::span<const double> coordinates) const {
   // Before there is a mesh, a domain that was not given grows with the points.
   const std::vector<double>* low = &parameters_.domain_low;
@@ -258,11 +222,11 @@ void Session::EndUpload() {
 }
 
 grpc::Status Session::CheckNoGap(uint64_t offset) const {
-  return offset <= point_count_
+  return offset <= point_account_.points()
              ? grpc::Status::OK
              : MakeError(v1::ERROR_REASON_UPLOAD_GAP,
-                         absl::StrCat("point_offset is ", offset, ", but ", name_, " has ", point_count_,
-                                      " points; go on at ", point_count_, " or before"),
+                         absl::StrCat("point_offset is ", offset, ", but ", name_, " has ", point_account_.points(),
+                                      " points; go on at ", point_account_.points(), " or before"),
                          "point_offset");
 }
 
@@ -277,12 +241,12 @@ grpc::Status Session::CheckPrefix(const Prefix& prefix) const {
   const uint32_t checksum = points_.Checksum(prefix.first * dimension_, prefix.end * dimension_);
   return checksum == prefix.crc32c
              ? grpc::Status::OK
-             : MakeError(
-                   v1::ERROR_REASON_UPLOAD_MISMATCH,
-                   absl::StrCat(name_, " has other points from number ", prefix.first, " up to ", prefix.end,
-                                " than those that this upload goes on after: their checksum is ", checksum, ", not ",
-                                prefix.crc32c, "; add these points at ", point_count_, ", or to another session"),
-                   "checked_crc32c");
+             : MakeError(v1::ERROR_REASON_UPLOAD_MISMATCH,
+                         absl::StrCat(name_, " has other points from number ", prefix.first, " up to ", prefix.end,
+                                      " than those that this upload goes on after: their checksum is ", checksum,
+                                      ", not ", prefix.crc32c, "; add these points at ", point_account_.points(),
+                                      ", or to another session"),
+                         "checked_crc32c");
 }
 
 grpc::Status Session::CheckKnown(uint64_t first, std::span<const double> coordinates) const {
@@ -294,7 +258,7 @@ grpc::Status Session::CheckKnown(uint64_t first, std::span<const double> coordin
   return MakeError(v1::ERROR_REASON_UPLOAD_MISMATCH,
                    absl::StrCat("points[", point, "]: coordinate ", equal % dimension_, " is ", coordinates[equal],
                                 "; ", name_, " has this point already, with ", points_.at(first * dimension_ + equal),
-                                "; send the same again, or add other points at ", point_count_),
+                                "; send the same again, or add other points at ", point_account_.points()),
                    "points.coordinates");
 }
 
@@ -312,7 +276,7 @@ grpc::Status Session::Append(uint64_t offset, std::span<const double> coordinate
   if (grpc::Status status = CheckNoGap(offset); !status.ok()) {
     return status;
   }
-  const uint64_t committed = point_count_;
+  const uint64_t committed = point_account_.points();
   const uint64_t known = std::min<uint64_t>(committed - offset, coordinates.size() / dimension_);
   if (grpc::Status status = CheckKnown(offset, coordinates.first(known * dimension_)); !status.ok()) {
     return status;
@@ -324,7 +288,7 @@ grpc::Status Session::Append(uint64_t offset, std::span<const double> coordinate
   if (grpc::Status status = CheckCoordinates(committed, coordinates); !status.ok()) {
     return status;
   }
-  if (grpc::Status status = TakePoints(coordinates.size() / dimension_); !status.ok()) {
+  if (grpc::Status status = point_account_.Take(coordinates.size() / dimension_); !status.ok()) {
     return status;
   }
   points_.Append(coordinates);
@@ -386,7 +350,7 @@ grpc::Status Session::StartOperation(const core::MeshParameters& parameters, uin
     return status;
   }
   ++next_operation_;
-  busy_ = Busy::kOperation;
+  BeginBusy(Busy::kOperation);
   operations_.push_back(started);
   if (operations_.size() > kKeptOperations) {
     forgotten = std::move(operations_.front());
@@ -432,8 +396,7 @@ void Session::EndWork(Operation& operation, const grpc::Status& status, SessionW
       work.meshed_points = steps_.points();
     }
     std::swap(work_, work);  // what was there is freed without the lock
-    busy_ = Busy::kNo;
-    last_use_ = clock_.since_boot();
+    EndBusy();
   }
   operation.Notify();
 }
@@ -444,8 +407,7 @@ bool Session::EndWaiting(Operation& operation) {
     if (!operation.IsQueued()) {
       return false;
     }
-    busy_ = Busy::kNo;
-    last_use_ = clock_.since_boot();
+    EndBusy();
     operation.Fail(clock_.wall(), grpc::Status(grpc::StatusCode::CANCELLED, "the operation was cancelled"));
   }
   operation.Notify();
@@ -478,13 +440,12 @@ std::vector<std::shared_ptr<Operation>> Session::ListOperations(uint64_t after, 
 
 SessionUse::SessionUse(std::shared_ptr<Session> session) : session_(std::move(session)) {
   std::lock_guard lock(session_->mutex_);
-  ++session_->uses_;
+  session_->lease_.BeginUse();
 }
 
 SessionUse::~SessionUse() {
   std::lock_guard lock(session_->mutex_);
-  --session_->uses_;
-  session_->last_use_ = session_->clock_.since_boot();
+  session_->lease_.EndUse(session_->clock_.since_boot());
 }
 
 }  // namespace wellspace::server

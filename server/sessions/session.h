@@ -2,7 +2,6 @@
 #ifndef WELLSPACE_SERVER_SESSIONS_SESSION_H_
 #define WELLSPACE_SERVER_SESSIONS_SESSION_H_
 
-#include <atomic>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -24,18 +23,15 @@
 #include "server/base/options.h"
 #include "server/jobs/jobs.h"
 #include "server/jobs/memory_budget.h"
+#include "server/sessions/lease.h"
 #include "server/sessions/mesh_chunks.h"
 #include "server/sessions/operation.h"
+#include "server/sessions/point_account.h"
 #include "server/sessions/point_store.h"
 #include "server/sessions/session_steps.h"
 #include "wellspace/v1/sessions.pb.h"
 
 namespace wellspace::server {
-
-// What a tenant has in all of its sessions.
-struct TenantUsage {
-  std::atomic<uint64_t> points{0};
-};
 
 // The mesh of a session as it was at one revision. Immutable: a download holds it for as long as it wants.
 struct MeshSnapshot {
@@ -78,8 +74,7 @@ class Session {
 
   // REQUIRES:   `options` and `memory` outlive this.
   Session(Settings settings, const ServiceOptions& options, MemoryBudget& memory, Clock clock,
-          std::shared_ptr<TenantUsage> usage);
-  ~Session();
+          std::shared_ptr<TenantPoints> tenant_points);
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
@@ -215,18 +210,16 @@ class Session {
   grpc::Status CheckMesh() const;
   // Whether there is something to query now.
   grpc::Status CheckStructure() const;
-  // Takes `count` more points into the account of the session and its tenant, or says why it may not have them.
-  grpc::Status TakePoints(uint64_t count);
-  // Takes them out again.
-  void ReturnPoints(uint64_t count);
   // That an upload begins at `offset` with no gap before it.
   grpc::Status CheckNoGap(uint64_t offset) const;
   // That `coordinates` are those that the session has from point `first` on.
   grpc::Status CheckKnown(uint64_t first, std::span<const double> coordinates) const;
   // Refuses what no mesh of this session could have. `first` is the number of the first point.
   grpc::Status CheckCoordinates(uint64_t first, std::span<const double> coordinates) const;
-  absl::Duration ExpiresAt() const;  // since boot
   void CloseNow();
+  // The session is the caller's alone until EndBusy, and does not expire.
+  void BeginBusy(Busy busy);
+  void EndBusy();
 
   // Without it, once nothing can begin a query any more: waits for those that run.
   void WaitForQueries();
@@ -248,28 +241,22 @@ class Session {
   const std::string name_;
   const int dimension_;
   const absl::Time create_time_;
-  const ServiceOptions& options_;
   MemoryBudget& memory_;
   const Clock clock_;
-  const std::shared_ptr<TenantUsage> usage_;
 
   mutable std::shared_mutex queries_mutex_;  // after mutex_; held shared by queries
   mutable std::mutex mutex_;
   // Guarded by mutex_.
-  core::MeshParameters
-      parameters_;  // of the last refinement that succeeded; before it, those of the session's creation
+  core::MeshParameters parameters_;  // of the last refinement that succeeded; before it, those of the creation
   std::map<std::string, std::string> labels_;
-  absl::Duration ttl_;
-  absl::Duration last_use_;  // since boot
-  int uses_ = 0;
+  Lease lease_;
   bool is_closed_ = false;
   Busy busy_ = Busy::kNo;
   bool is_uploading_ = false;
   bool is_ready_ = false;  // the last operation succeeded, and no points have come since
   uint64_t revision_ = 1;
-  uint64_t point_count_ = 0;        // with those that AddVertices is adding
+  PointAccount point_account_;      // with the points that AddVertices is adding
   PointStore points_;               // see invariant (2)
-  MemoryReservation point_memory_;  // of point_count_ points
   SessionWork work_;                // its mesher is away while an operation is under way; see invariant (2)
   SessionSteps steps_;              // see invariant (2)
   uint64_t structure_version_ = 0;  // of what queries see; 0: nothing yet

@@ -30,13 +30,12 @@ grpc::Status Session::PrepareStructure(uint64_t expected_revision, const MesherF
     if (grpc::Status status = CheckMesh(); !status.ok() || work_.mesher != nullptr) {
       return status;
     }
-    busy_ = Busy::kReplaying;
+    BeginBusy(Busy::kReplaying);
   }
   const grpc::Status status = RunGuarded([&] { return Rebuild(create_mesher, job); });
   job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();
   std::lock_guard lock(mutex_);
-  busy_ = Busy::kNo;
-  last_use_ = clock_.since_boot();
+  EndBusy();
   return status;
 }
 
@@ -91,10 +90,10 @@ grpc::Status Session::BeginAddition(std::span<const double> points, std::span<co
                                   " points; expected as many, or none"),
                      "near");
   }
-  if (grpc::Status status = TakePoints(points.size() / dimension_); !status.ok()) {
+  if (grpc::Status status = point_account_.Take(points.size() / dimension_); !status.ok()) {
     return status;
   }
-  busy_ = Busy::kAddingVertices;
+  BeginBusy(Busy::kAddingVertices);
   return grpc::Status::OK;
 }
 
@@ -122,11 +121,10 @@ grpc::Status Session::AddVertices(std::span<const double> points, std::span<cons
     (void)work_.memory.Resize(work_.mesher->memory_bytes());
   }
   std::lock_guard lock(mutex_);
-  busy_ = Busy::kNo;
-  last_use_ = clock_.since_boot();
+  EndBusy();
   const uint64_t count = points.size() / dimension_;
   if (!status.ok()) {
-    ReturnPoints(count);
+    point_account_.Return(count);
     return status;
   }
   if (uploaded > 0 || count > 0) {
@@ -159,7 +157,7 @@ grpc::Status Session::CheckVertices(std::span<const double> points, std::span<co
 
 grpc::Status Session::AddToMesher(std::span<const double> points, std::span<const uint32_t> near,
                                   core::RunContext& context, uint64_t* uploaded, std::vector<uint32_t>* vertices) {
-  if (grpc::Status status = ReserveForVertices(point_count_ - work_.meshed_points); !status.ok()) {
+  if (grpc::Status status = ReserveForVertices(point_account_.points() - work_.meshed_points); !status.ok()) {
     return status;
   }
   // Points that were uploaded since the last refinement come first: they have lower numbers.

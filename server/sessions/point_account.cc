@@ -1,0 +1,81 @@
+#include "server/sessions/point_account.h"
+
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "server/wire/errors.h"
+
+namespace wellspace::server {
+
+uint64_t TenantPoints::points() const {
+  std::lock_guard lock(mutex_);
+  return points_;
+}
+
+TenantPoints::Taken TenantPoints::Take(uint64_t count, uint64_t limit, const std::function<bool()>& reserve) {
+  std::lock_guard lock(mutex_);
+  const uint64_t all = points_ + count;
+  if (all > limit) {
+    return {.outcome = Outcome::kAboveLimit, .points = all};
+  }
+  if (!reserve()) {
+    return {.outcome = Outcome::kNoRoom, .points = all};
+  }
+  points_ = all;
+  return {.outcome = Outcome::kTaken, .points = all};
+}
+
+void TenantPoints::Return(uint64_t count) {
+  std::lock_guard lock(mutex_);
+  points_ -= count;
+}
+
+PointAccount::PointAccount(std::string session, int dimension, const ServiceOptions& options, MemoryBudget& memory,
+                           std::shared_ptr<TenantPoints> tenant)
+    : session_(std::move(session)),
+      dimension_(dimension),
+      options_(options),
+      memory_(memory),
+      tenant_(std::move(tenant)),
+      reserved_(memory.ReserveNothing()) {
+  reserved_.MakeLasting();
+}
+
+grpc::Status PointAccount::Take(uint64_t count) {
+  const uint64_t points = points_ + count;
+  if (points > options_.max_points) {
+    return MakeError(v1::ERROR_REASON_TOO_MANY_POINTS,
+                     absl::StrCat(session_, " would have ", points, " points; a session of this server has at most ",
+                                  options_.max_points));
+  }
+  const auto reserve = [&] { return reserved_.Resize(BytesOf(points)); };
+  const TenantPoints::Taken taken = tenant_->Take(count, options_.max_points_per_tenant, reserve);
+  switch (taken.outcome) {
+    case TenantPoints::Outcome::kTaken:
+      points_ = points;
+      return grpc::Status::OK;
+    case TenantPoints::Outcome::kAboveLimit:
+      return MakeError(v1::ERROR_REASON_QUOTA_EXCEEDED,
+                       absl::StrCat("your sessions would have ", taken.points,
+                                    " points together; they may have at most ", options_.max_points_per_tenant));
+    case TenantPoints::Outcome::kNoRoom:
+      break;
+  }
+  return FromCoreStatus(memory_.Refusal(BytesOf(points), "the points of a session"));
+}
+
+void PointAccount::Return(uint64_t count) {
+  points_ -= count;
+  (void)reserved_.Resize(BytesOf(points_));  // shrinking never fails
+  if (!is_closed_) {
+    tenant_->Return(count);
+  }
+}
+
+void PointAccount::Close() {
+  if (!std::exchange(is_closed_, true)) {
+    tenant_->Return(points_);
+  }
+}
+
+}  // namespace wellspace::server

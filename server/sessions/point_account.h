@@ -1,0 +1,94 @@
+// How many points a session has, and may have.
+#ifndef WELLSPACE_SERVER_SESSIONS_POINT_ACCOUNT_H_
+#define WELLSPACE_SERVER_SESSIONS_POINT_ACCOUNT_H_
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "grpcpp/support/status.h"
+#include "server/base/options.h"
+#include "server/jobs/memory_budget.h"
+
+namespace wellspace::server {
+
+// The points of all sessions of one tenant.
+//
+// Thread safety: thread-safe.
+// Invariants: points() is at most the limit that Take was called with.
+class TenantPoints {
+ public:
+  enum class Outcome { kTaken, kAboveLimit, kNoRoom };
+  struct Taken {
+    Outcome outcome;
+    uint64_t points;  // those that there are, or would be
+  };
+
+  uint64_t points() const;
+
+  // Takes `count` more points if there are then at most `limit`, and if `reserve` says that there is room for them. It
+  // is called with the lock of this held, and may take the lock of a MemoryBudget.
+  //
+  // Guarantees: (1) what is not kTaken changes nothing; (2) in no moment do other calls see points that are not taken
+  //             in the end.
+  Taken Take(uint64_t count, uint64_t limit, const std::function<bool()>& reserve);
+  // REQUIRES:   count <= points().
+  void Return(uint64_t count);
+
+ private:
+  mutable std::mutex mutex_;
+  uint64_t points_ = 0;  // guarded by mutex_
+};
+
+// The points of one session, counted against three limits: that of a session, that of its tenant and the memory of the
+// server.
+//
+// Thread safety: thread-compatible; accounts of one tenant may be used on different threads.
+// Invariants: the tenant's points include those of this account until Close.
+class PointAccount {
+ public:
+  // `session` is the name that errors have.
+  //
+  // REQUIRES:   `options` and `memory` outlive this.
+  PointAccount(std::string session, int dimension, const ServiceOptions& options, MemoryBudget& memory,
+               std::shared_ptr<TenantPoints> tenant);
+  ~PointAccount() { Close(); }
+  PointAccount(const PointAccount&) = delete;
+  PointAccount& operator=(const PointAccount&) = delete;
+
+  uint64_t points() const { return points_; }
+
+  // Takes `count` more points into the account.
+  //
+  // REQUIRES:   Close was not called.
+  // Guarantees: on an error nothing has changed; an error is due to points that some account has, never to points that
+  //             are being refused on another thread.
+  // Errors:     TOO_MANY_POINTS, QUOTA_EXCEEDED, MEMORY_LIMIT.
+  grpc::Status Take(uint64_t count);
+
+  // Takes the last `count` points out again.
+  //
+  // REQUIRES:   count <= points().
+  void Return(uint64_t count);
+
+  // From now on the points do not count as the tenant's. They keep their memory as long as this lives.
+  void Close();
+
+ private:
+  uint64_t BytesOf(uint64_t points) const { return points * dimension_ * sizeof(double); }
+
+  const std::string session_;
+  const int dimension_;
+  const ServiceOptions& options_;
+  MemoryBudget& memory_;
+  const std::shared_ptr<TenantPoints> tenant_;
+  bool is_closed_ = false;
+  uint64_t points_ = 0;
+  MemoryReservation reserved_;  // of points_ points
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_SESSIONS_POINT_ACCOUNT_H_

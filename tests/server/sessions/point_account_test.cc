@@ -1,0 +1,140 @@
+#include "server/sessions/point_account.h"
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "gtest/gtest.h"
+#include "tests/server/service_harness.h"
+
+namespace wellspace::server {
+namespace {
+
+constexpr int kDimension = 2;
+constexpr uint64_t kPointBytes = kDimension * sizeof(double);
+
+class PointAccountTest : public ::testing::Test {
+ protected:
+  std::unique_ptr<PointAccount> Open(MemoryBudget& memory) {
+    return std::make_unique<PointAccount>("sessions/1", kDimension, options_, memory, tenant_);
+  }
+
+  // Tries to take points that never fit, `bulk` at once, on several threads beside others that take and return one
+  // point of the rest. Returns how often one of the latter was refused.
+  int CountRefusals(uint64_t bulk, MemoryBudget& memory) {
+    constexpr int kPairs = 3;
+    constexpr int kTimes = 20'000;
+    std::atomic<int> refusals = 0;
+    std::atomic<int> at_work = kPairs;
+    std::vector<std::thread> threads;
+    for (int i = 0; i < kPairs; ++i) {
+      threads.emplace_back([&] {
+        const std::unique_ptr<PointAccount> account = Open(memory);
+        while (at_work > 0) {
+          EXPECT_FALSE(account->Take(bulk).ok());
+        }
+      });
+      threads.emplace_back([&] {
+        const std::unique_ptr<PointAccount> account = Open(memory);
+        for (int k = 0; k < kTimes; ++k) {
+          if (account->Take(1).ok()) {
+            account->Return(1);
+          } else {
+            ++refusals;
+          }
+        }
+        --at_work;
+      });
+    }
+    for (std::thread& thread : threads) {
+      thread.join();
+    }
+    return refusals;
+  }
+
+  ServiceOptions options_{.max_points = 1000, .max_points_per_tenant = 1500};
+  std::shared_ptr<TenantPoints> tenant_ = std::make_shared<TenantPoints>();
+  MemoryBudget unlimited_{0};
+};
+
+TEST_F(PointAccountTest, TakesAsManyAsASessionMayHave) {
+  const std::unique_ptr<PointAccount> account = Open(unlimited_);
+  EXPECT_TRUE(account->Take(400).ok());
+  EXPECT_TRUE(account->Take(600).ok());
+  const grpc::Status refused = account->Take(1);
+  EXPECT_EQ(DetailsOf(refused).reason, "TOO_MANY_POINTS");
+  EXPECT_EQ(refused.error_message(), "sessions/1 would have 1001 points; a session of this server has at most 1000");
+  EXPECT_EQ(account->points(), 1000u);
+  EXPECT_EQ(tenant_->points(), 1000u);
+  EXPECT_EQ(unlimited_.lasting(), 1000 * kPointBytes);
+  account->Return(1);
+  EXPECT_TRUE(account->Take(1).ok());
+}
+
+TEST_F(PointAccountTest, TakesAsManyAsATenantMayHaveInAll) {
+  const std::unique_ptr<PointAccount> first = Open(unlimited_);
+  const std::unique_ptr<PointAccount> second = Open(unlimited_);
+  EXPECT_TRUE(first->Take(900).ok());
+  EXPECT_TRUE(second->Take(600).ok());
+  const grpc::Status refused = second->Take(2);
+  EXPECT_EQ(DetailsOf(refused).reason, "QUOTA_EXCEEDED");
+  EXPECT_EQ(refused.error_message(), "your sessions would have 1502 points together; they may have at most 1500");
+  EXPECT_EQ(second->points(), 600u);
+  EXPECT_EQ(tenant_->points(), 1500u);
+  EXPECT_EQ(unlimited_.lasting(), 1500 * kPointBytes);
+  first->Return(2);
+  EXPECT_TRUE(second->Take(2).ok());
+}
+
+TEST_F(PointAccountTest, TakesAsManyAsTheMemoryHolds) {
+  MemoryBudget memory(kProcessMemoryBytes + 100 * kPointBytes);
+  const std::unique_ptr<PointAccount> account = Open(memory);
+  EXPECT_TRUE(account->Take(100).ok());
+  EXPECT_EQ(DetailsOf(account->Take(1)).reason, "MEMORY_LIMIT");
+  EXPECT_EQ(account->points(), 100u);
+  EXPECT_EQ(tenant_->points(), 100u);
+  account->Return(40);
+  EXPECT_EQ(memory.reserved(), 60 * kPointBytes);
+  EXPECT_TRUE(account->Take(40).ok());
+}
+
+TEST_F(PointAccountTest, AClosedAccountHasNoneOfTheTenantsPointsButKeepsItsMemory) {
+  std::unique_ptr<PointAccount> account = Open(unlimited_);
+  EXPECT_TRUE(account->Take(500).ok());
+  account->Close();
+  account->Close();
+  EXPECT_EQ(tenant_->points(), 0u);
+  EXPECT_EQ(unlimited_.lasting(), 500 * kPointBytes);
+  account->Return(100);
+  EXPECT_EQ(tenant_->points(), 0u);
+  EXPECT_EQ(unlimited_.lasting(), 400 * kPointBytes);
+  account.reset();
+  EXPECT_EQ(tenant_->points(), 0u);
+  EXPECT_EQ(unlimited_.reserved(), 0u);
+}
+
+TEST_F(PointAccountTest, AnAccountThatEndsReturnsItsPoints) {
+  { EXPECT_TRUE(Open(unlimited_)->Take(500).ok()); }
+  EXPECT_EQ(tenant_->points(), 0u);
+}
+
+TEST_F(PointAccountTest, ABulkThatATenantMayNotHaveRefusesNoOther) {
+  const std::unique_ptr<PointAccount> account = Open(unlimited_);
+  ASSERT_TRUE(account->Take(1000).ok());
+  EXPECT_EQ(CountRefusals(501, unlimited_), 0);
+  EXPECT_EQ(tenant_->points(), 1000u);
+}
+
+TEST_F(PointAccountTest, ABulkThatTheMemoryDoesNotHoldRefusesNoOther) {
+  MemoryBudget memory(kProcessMemoryBytes + 500 * kPointBytes);
+  const std::unique_ptr<PointAccount> account = Open(unlimited_);
+  ASSERT_TRUE(account->Take(800).ok());
+  EXPECT_EQ(CountRefusals(700, memory), 0) << "points that were refused for their memory counted as the tenant's";
+  EXPECT_EQ(tenant_->points(), 800u);
+  EXPECT_EQ(memory.reserved(), 0u);
+}
+
+}  // namespace
+}  // namespace wellspace::server
