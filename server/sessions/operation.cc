@@ -62,9 +62,13 @@ void Operation::Unwatch(uint64_t watch) {
   watches_.erase(watch);
 }
 
-void Operation::SetJob(std::shared_ptr<Job> job) {
+bool Operation::SetJob(std::shared_ptr<Job> job) {
   std::lock_guard lock(mutex_);
+  if (HasEndedLocked()) {
+    return false;
+  }
   job_ = std::move(job);
+  return true;
 }
 
 std::shared_ptr<Job> Operation::job() const {

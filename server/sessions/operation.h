@@ -52,15 +52,16 @@ class Operation {
   uint64_t Watch(std::function<void()> on_change);
   void Unwatch(uint64_t watch);
 
-  // The job that does the work; null before it is queued.
-  void SetJob(std::shared_ptr<Job> job);
+  // The job that does the work, or will. False, and nothing is changed, if the operation has ended already.
+  bool SetJob(std::shared_ptr<Job> job);
+  // Null before it is known, and again once the operation has ended. One that runs has a job.
   std::shared_ptr<Job> job() const;
 
   // Makes an event of the job's progress if one is due; false once it has ended. To be called every
   // ProgressPacer::kMinInterval; `now` is a time since boot.
   bool Tick(absl::Duration now);
 
-  // For its session, which starts it at most once, and ends it once. Whoever has ended it calls Notify, without any
+  // For its session, which starts it at most once, and ends it once. After its end Notify is to be called, without any
   // lock.
   void Start(absl::Time now);
   // The figures are those of the new mesh.

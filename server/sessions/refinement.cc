@@ -120,6 +120,7 @@ grpc::Status Work(const CallEnvironment& environment, const Session& session, co
 
 void Run(const CallEnvironment& environment, Session& session, Operation& operation, Job& job) {
   const absl::Duration start = SinceBoot();
+  operation.SetJob(job.shared_from_this());  // this may come before StartRefinement knows the job
   std::optional<SessionWork> work = session.BeginWork(operation);
   if (!work.has_value()) {
     return;
@@ -172,19 +173,21 @@ grpc::Status StartRefinement(const CallEnvironment& environment, const std::shar
   const Session::Size size = session->GetSize(kMostPoints);
   const bool is_small =
       size.points <= kMostPoints && IsSmallRefinement(parameters, size.some_points, size.vertices, size.replayed_steps);
-  const auto submit = [&](const std::shared_ptr<Operation>& started) {
-    JobPool::Submission submission = environment.jobs.Submit(
-        {.tenant = session->tenant(), .is_small = is_small, .work = [&environment, session, started](Job& job) {
-           Run(environment, *session, *started, job);
-         }});
-    if (submission.job == nullptr) {
-      return submission.refusal;
-    }
-    started->SetJob(std::move(submission.job));
-    return grpc::Status::OK;
-  };
-  if (grpc::Status status = session->StartOperation(parameters, expected_revision, submit, operation); !status.ok()) {
+  if (grpc::Status status = session->StartOperation(parameters, expected_revision, operation); !status.ok()) {
     return status;
+  }
+  JobPool::Submission submission =
+      environment.jobs.Submit({.tenant = session->tenant(),
+                               .is_small = is_small,
+                               .work = [&environment, session, operation = *operation](Job& job) {
+                                 Run(environment, *session, *operation, job);
+                               }});
+  if (submission.job == nullptr) {
+    session->Withdraw(**operation, submission.refusal);
+    return submission.refusal;
+  }
+  if (!(*operation)->SetJob(submission.job)) {
+    environment.jobs.Cancel(submission.job);  // the operation was cancelled before it had a job, or has ended
   }
   environment.background.Post(
       [&background = environment.background, weak = std::weak_ptr(*operation)] { Tick(background, weak); });
@@ -192,8 +195,10 @@ grpc::Status StartRefinement(const CallEnvironment& environment, const std::shar
 }
 
 void CancelOperation(const CallEnvironment& environment, Session& session, Operation& operation) {
-  const std::shared_ptr<Job> job = operation.job();  // null once it has ended
-  session.EndWaiting(operation);
+  std::shared_ptr<Job> job = operation.job();  // null once it has ended
+  if (!session.EndWaiting(operation)) {
+    job = operation.job();  // it may have begun meanwhile, before StartRefinement knew its job
+  }
   if (job != nullptr) {
     environment.jobs.Cancel(job);
   }

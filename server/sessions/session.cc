@@ -336,37 +336,51 @@ grpc::Status Session::Query(uint64_t* version, const std::function<grpc::Status(
 }
 
 grpc::Status Session::StartOperation(const core::MeshParameters& parameters, uint64_t expected_revision,
-                                     const std::function<grpc::Status(const std::shared_ptr<Operation>&)>& submit,
                                      std::shared_ptr<Operation>* operation) {
-  std::shared_ptr<Operation> forgotten;  // freed without the lock
   std::lock_guard lock(mutex_);
   if (grpc::Status status = CheckReadyForChange(expected_revision); !status.ok()) {
     return status;
   }
-  const absl::Time now = clock_.wall();
-  auto started = std::make_shared<Operation>(absl::StrCat(name_, "/operations/", next_operation_), next_operation_,
-                                             parameters, now);
-  if (grpc::Status status = submit(started); !status.ok()) {
-    return status;
-  }
+  *operation = std::make_shared<Operation>(absl::StrCat(name_, "/operations/", next_operation_), next_operation_,
+                                           parameters, clock_.wall());
   ++next_operation_;
   BeginBusy(Busy::kOperation);
-  operations_.push_back(started);
+  operations_.push_back(*operation);
   if (operations_.size() > kKeptOperations) {
-    forgotten = std::move(operations_.front());
+    displaced_ = std::move(operations_.front());
     operations_.pop_front();
   }
-  *operation = std::move(started);
   return grpc::Status::OK;
 }
 
+void Session::Withdraw(Operation& operation, const grpc::Status& status) {
+  std::shared_ptr<Operation> withdrawn;  // freed without the lock
+  {
+    std::lock_guard lock(mutex_);
+    if (!operation.IsQueued()) {
+      return;
+    }
+    operation.Fail(clock_.wall(), status);
+    withdrawn = std::move(operations_.back());
+    operations_.pop_back();
+    --next_operation_;
+    if (displaced_ != nullptr) {
+      operations_.push_front(std::move(displaced_));
+    }
+    EndBusy();
+  }
+  operation.Notify();  // others may have found and watched it
+}
+
 std::optional<SessionWork> Session::BeginWork(Operation& operation) {
+  std::shared_ptr<Operation> displaced;  // freed without the lock
   {
     std::lock_guard lock(mutex_);
     if (!operation.IsQueued()) {
       return std::nullopt;
     }
     operation.Start(clock_.wall());
+    displaced = std::move(displaced_);
   }
   WaitForQueries();
   std::lock_guard lock(mutex_);
@@ -402,11 +416,13 @@ void Session::EndWork(Operation& operation, const grpc::Status& status, SessionW
 }
 
 bool Session::EndWaiting(Operation& operation) {
+  std::shared_ptr<Operation> displaced;  // freed without the lock
   {
     std::lock_guard lock(mutex_);
     if (!operation.IsQueued()) {
       return false;
     }
+    displaced = std::move(displaced_);
     EndBusy();
     operation.Fail(clock_.wall(), grpc::Status(grpc::StatusCode::CANCELLED, "the operation was cancelled"));
   }

@@ -59,8 +59,8 @@ struct SessionWork {
 // Invariants: (1) revision grows with every change of the points or of the mesh; (2) while an operation is under way,
 // or vertices are being added or the mesher is built again, points, mesh, mesher and steps are touched by nothing else;
 // (3) what did not succeed leaves the session as it was: structure and mesh are what Replay makes of the steps, whether
-// there is a mesher now or not; (4) the lock order is this session's mutex, then that of its operations and of the
-// JobPool.
+// there is a mesher now or not; (4) the lock order is this session's mutex, then that of its operations, of TenantPoints
+// or, where memory is released, of the JobPool.
 class Session {
  public:
   struct Settings {
@@ -167,14 +167,19 @@ class Session {
   grpc::Status AddVertices(std::span<const double> points, std::span<const uint32_t> near, uint64_t expected_revision,
                            core::RunContext& context, AddedVertices* added);
 
-  // Begins an operation, of which `submit` queues the work, or says why it cannot be. It is called with the session's
-  // lock held, and the work may begin at once.
+  // Begins an operation, whose work the caller is to submit: the session is busy until the operation has ended. If the
+  // work cannot be submitted, the caller calls Withdraw.
   //
-  // Errors:     SESSION_BUSY, REVISION_MISMATCH, SESSION_NOT_FOUND; those of `submit`.
+  // Errors:     SESSION_BUSY, REVISION_MISMATCH, SESSION_NOT_FOUND.
   grpc::Status StartOperation(const core::MeshParameters& parameters, uint64_t expected_revision,
-                              const std::function<grpc::Status(const std::shared_ptr<Operation>&)>& submit,
                               std::shared_ptr<Operation>* operation);
-  // On the worker: what to work on; nothing if the operation has ended before it could begin.
+  // Ends the operation that was started last, whose work was refused with `status`: the session is as it was before,
+  // and has no such operation. One that was cancelled in between stays, as cancelled.
+  //
+  // REQUIRES:   no job works on it.
+  void Withdraw(Operation& operation, const grpc::Status& status);
+  // On the worker, whose job the operation has: what to work on; nothing if the operation has ended before it could
+  // begin.
   std::optional<SessionWork> BeginWork(Operation& operation);
   // On the worker: takes back what BeginWork gave, and ends the operation with `status`. `mesh` is the new mesh if that
   // is OK.
@@ -262,6 +267,7 @@ class Session {
   uint64_t structure_version_ = 0;  // of what queries see; 0: nothing yet
   uint64_t next_operation_ = 1;
   std::deque<std::shared_ptr<Operation>> operations_;  // ascending by number
+  std::shared_ptr<Operation> displaced_;  // the one that the last of these has displaced, until its work has begun
 };
 
 // Keeps a session from expiring, and renews its lease at the end.

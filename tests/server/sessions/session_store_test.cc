@@ -123,10 +123,7 @@ TEST_F(SessionStoreTest, ASessionInUseDoesNotExpire) {
 TEST_F(SessionStoreTest, ASessionWithAnOperationDoesNotExpire) {
   const std::shared_ptr<Session> session = Create("a", absl::Seconds(10));
   std::shared_ptr<Operation> operation;
-  ASSERT_TRUE(session
-                  ->StartOperation(
-                      {.dimension = 2}, 0, [](const auto&) { return grpc::Status::OK; }, &operation)
-                  .ok());
+  ASSERT_TRUE(session->StartOperation({.dimension = 2}, 0, &operation).ok());
   since_boot_ += absl::Hours(1);
   EXPECT_TRUE(store_.RemoveExpired().empty());
   EXPECT_TRUE(session->EndWaiting(*operation));
@@ -190,10 +187,7 @@ TEST_F(SessionStoreTest, KeepsTheLastHundredOperations) {
   const std::shared_ptr<Session> session = Create();
   for (int i = 0; i < 103; ++i) {
     std::shared_ptr<Operation> operation;
-    ASSERT_TRUE(session
-                    ->StartOperation(
-                        {.dimension = 2}, 0, [](const auto&) { return grpc::Status::OK; }, &operation)
-                    .ok());
+    ASSERT_TRUE(session->StartOperation({.dimension = 2}, 0, &operation).ok());
     session->EndWaiting(*operation);
   }
   const auto kept = session->ListOperations(0, 1000);

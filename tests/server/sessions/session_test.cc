@@ -1,0 +1,125 @@
+// The operations of a session, without a worker.
+#include "server/sessions/session.h"
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gtest/gtest.h"
+#include "server/sessions/memory_session_store.h"
+#include "server/wire/errors.h"
+#include "tests/server/service_harness.h"
+
+namespace wellspace::server {
+namespace {
+
+class SessionTest : public ::testing::Test {
+ protected:
+  SessionTest() {
+    EXPECT_TRUE(
+        store_.Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = {}}, &session_).ok());
+  }
+
+  std::shared_ptr<Operation> Start() {
+    std::shared_ptr<Operation> operation;
+    EXPECT_TRUE(session_->StartOperation({.dimension = 2}, 0, &operation).ok());
+    return operation;
+  }
+
+  // What a client sees of the session, its time of expiry excepted.
+  std::string Seen() const {
+    v1::Session message = session_->Describe();
+    message.clear_expire_time();
+    return message.DebugString();
+  }
+
+  std::vector<std::string> Operations() const {
+    std::vector<std::string> names;
+    for (const std::shared_ptr<Operation>& operation : session_->ListOperations(0, 1000)) {
+      names.push_back(operation->name());
+    }
+    return names;
+  }
+
+  const grpc::Status refusal_ = MakeError(v1::ERROR_REASON_QUEUE_FULL, "full");
+  ServiceOptions options_;
+  MemoryBudget memory_{0};
+  MemorySessionStore store_{options_, memory_, {}};
+  std::shared_ptr<Session> session_;
+};
+
+TEST_F(SessionTest, AnOperationHasTheSessionToItself) {
+  const std::shared_ptr<Operation> operation = Start();
+  std::shared_ptr<Operation> second;
+  EXPECT_EQ(DetailsOf(session_->StartOperation({.dimension = 2}, 0, &second)).reason, "SESSION_BUSY");
+  EXPECT_EQ(DetailsOf(session_->Append(0, std::vector<double>{0.5, 0.5}, 0)).reason, "SESSION_BUSY");
+  EXPECT_TRUE(session_->EndWaiting(*operation));
+  EXPECT_FALSE(session_->EndWaiting(*operation));
+  EXPECT_EQ(operation->Describe().state(), v1::Operation::STATE_CANCELLED);
+  EXPECT_NE(Start(), nullptr);
+}
+
+TEST_F(SessionTest, AWithdrawnOperationLeavesTheSessionAsItWas) {
+  EXPECT_TRUE(session_->EndWaiting(*Start()));
+  const std::string seen = Seen();
+  const std::vector<std::string> operations = Operations();
+  const std::shared_ptr<Operation> operation = Start();
+  session_->Withdraw(*operation, refusal_);
+  EXPECT_EQ(Seen(), seen);
+  EXPECT_EQ(Operations(), operations);
+  EXPECT_TRUE(session_->Append(0, std::vector<double>{0.5, 0.5}, 0).ok());
+  EXPECT_EQ(Start()->name(), operation->name()) << "its number is given again";
+}
+
+TEST_F(SessionTest, AWithdrawnOperationDisplacesNoOther) {
+  for (int i = 0; i < 100; ++i) {
+    EXPECT_TRUE(session_->EndWaiting(*Start()));
+  }
+  const std::vector<std::string> operations = Operations();
+  session_->Withdraw(*Start(), refusal_);
+  EXPECT_EQ(Operations(), operations);
+  EXPECT_TRUE(session_->EndWaiting(*Start()));
+  session_->Withdraw(*Start(), refusal_);
+  EXPECT_EQ(Operations().size(), 100u);
+  EXPECT_EQ(Operations().front(), operations[1]);
+}
+
+TEST_F(SessionTest, WatchersOfAWithdrawnOperationSeeItsEnd) {
+  const std::shared_ptr<Operation> operation = Start();
+  int changes = 0;
+  operation->Watch([&changes] { ++changes; });
+  session_->Withdraw(*operation, refusal_);
+  EXPECT_EQ(changes, 1);
+  EXPECT_TRUE(operation->HasEnded());
+  EXPECT_EQ(operation->Describe().state(), v1::Operation::STATE_FAILED);
+  EXPECT_EQ(operation->Describe().error().message(), "full");
+}
+
+TEST_F(SessionTest, AnOperationThatWasCancelledBeforeItIsWithdrawnStays) {
+  const std::shared_ptr<Operation> operation = Start();
+  EXPECT_TRUE(session_->EndWaiting(*operation));
+  const std::shared_ptr<Operation> next = Start();
+  session_->Withdraw(*operation, refusal_);
+  EXPECT_EQ(operation->Describe().state(), v1::Operation::STATE_CANCELLED);
+  EXPECT_EQ(Operations(), std::vector<std::string>({operation->name(), next->name()}));
+  EXPECT_TRUE(next->IsQueued());
+}
+
+TEST_F(SessionTest, AnOperationThatHasEndedTakesNoJob) {
+  MemoryBudget memory(0);
+  JobPool pool({.workers = 1, .max_queued = 1, .max_per_tenant = 2}, memory);
+  const std::shared_ptr<Job> job = pool.Submit({.tenant = "a", .work = [](Job&) {}}).job;
+  const std::shared_ptr<Operation> operation = Start();
+  EXPECT_TRUE(operation->SetJob(job));
+  EXPECT_EQ(operation->job(), job);
+  EXPECT_TRUE(session_->EndWaiting(*operation));
+  EXPECT_EQ(operation->job(), nullptr);
+  EXPECT_FALSE(operation->SetJob(job)) << "the caller has to cancel it";
+  EXPECT_EQ(operation->job(), nullptr);
+  EXPECT_FALSE(session_->BeginWork(*operation).has_value());
+}
+
+}  // namespace
+}  // namespace wellspace::server
