@@ -102,12 +102,12 @@ absl::Status CheckLeastSize(const Domain<D>& domain, const MeshParameters& param
 }  // namespace
 
 template <int D>
-MeshCriteria<D> DemandsIn(const Domain<D>& domain, const MeshParameters& parameters) {
-  MeshCriteria<D> demands;
-  demands.criterion = parameters.criterion;
-  demands.rho = parameters.rho == 0 ? DefaultRho(D) : std::min(parameters.rho, kMostRho);
+MeshCriteria<D> CriteriaIn(const Domain<D>& domain, const MeshParameters& parameters) {
+  MeshCriteria<D> criteria;
+  criteria.criterion = parameters.criterion;
+  criteria.rho = parameters.rho == 0 ? DefaultRho(D) : std::min(parameters.rho, kMostRho);
   if (parameters.max_circumradius != 0) {
-    demands.sizes.max_circumradius = ScaledSize(parameters.max_circumradius, domain.scale);
+    criteria.sizes.max_circumradius = ScaledSize(parameters.max_circumradius, domain.scale);
   }
   for (const SizeBox& size : parameters.size_boxes) {
     Box<D> box;
@@ -115,16 +115,16 @@ MeshCriteria<D> DemandsIn(const Domain<D>& domain, const MeshParameters& paramet
       box.low[i] = std::clamp(size.low[i] * domain.scale + 0.0, -kFarBeyond, kFarBeyond);
       box.high[i] = std::clamp(size.high[i] * domain.scale + 0.0, -kFarBeyond, kFarBeyond);
     }
-    demands.sizes.regions.push_back({box, ScaledSize(size.max_circumradius, domain.scale)});
+    criteria.sizes.regions.push_back({box, ScaledSize(size.max_circumradius, domain.scale)});
   }
-  return demands;
+  return criteria;
 }
 
 template <int D>
 absl::Status CheckShapeFeasible(const Domain<D>& domain, const MeshParameters& parameters, uint64_t vertices) {
   const Box<D>& box = domain.scaled_box;
   const uint64_t most = VertexBudget(parameters);
-  const double least = LeastVerticesForShape<D>(box, DemandsIn<D>(domain, parameters).rho);
+  const double least = LeastVerticesForShape<D>(box, CriteriaIn<D>(domain, parameters).rho);
   if (least <= static_cast<double>(most)) {
     return absl::OkStatus();
   }
@@ -145,7 +145,7 @@ absl::Status CheckFeasible(const Domain<D>& domain, const MeshParameters& parame
   WELLSPACE_RETURN_IF_ERROR(CheckShapeFeasible<D>(domain, parameters, vertices));
   const Box<D>& box = domain.scaled_box;
   const uint64_t most = VertexBudget(parameters);
-  const SizeField<D> sizes = DemandsIn<D>(domain, parameters).sizes;
+  const SizeField<D> sizes = CriteriaIn<D>(domain, parameters).sizes;
   WELLSPACE_RETURN_IF_ERROR(CheckLeastSize<D>(domain, parameters, sizes));
   const double least = LeastVerticesForSizes<D>(box, sizes);
   if (least <= static_cast<double>(most)) {
@@ -157,7 +157,7 @@ absl::Status CheckFeasible(const Domain<D>& domain, const MeshParameters& parame
 }
 
 #define WELLSPACE_INSTANTIATE(D)                                                                  \
-  template MeshCriteria<D> DemandsIn<D>(const Domain<D>&, const MeshParameters&);                 \
+  template MeshCriteria<D> CriteriaIn<D>(const Domain<D>&, const MeshParameters&);                \
   template absl::Status CheckShapeFeasible<D>(const Domain<D>&, const MeshParameters&, uint64_t); \
   template absl::Status CheckFeasible<D>(const Domain<D>&, const MeshParameters&, uint64_t);
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)

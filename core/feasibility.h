@@ -11,12 +11,12 @@
 
 namespace wellspace::core {
 
-// The demands of `parameters`, scaled. What is so large or small that doubles could not tell is no larger or smaller in
-// the result than that: nothing of it is 0, infinite or NaN, nor are squares of it.
+// The criteria that `parameters` ask for, scaled. What is so large or small that doubles could not tell is no larger or
+// smaller in the result than that: nothing of it is 0, infinite or NaN, nor are squares of it.
 //
 // REQUIRES:   ValidateParameters(parameters).ok().
 template <int D>
-MeshCriteria<D> DemandsIn(const Domain<D>& domain, const MeshParameters& parameters);
+MeshCriteria<D> CriteriaIn(const Domain<D>& domain, const MeshParameters& parameters);
 
 // Refuses demands for which it is proved that every mesh of `domain` has more vertices than `parameters` allow.
 // `vertices` is how many there are before refinement.

@@ -26,7 +26,7 @@ struct MeshParameters {
   std::vector<SizeBox> size_boxes{};
 
   // Refine moves vertices, all but those that were given, and adds some, until no dihedral angle is smaller, in
-  // degrees; what cannot be mended is counted in the statistics. 0 for none of that; none means
+  // degrees; what cannot be repaired is counted in the statistics. 0 for none of that; none means
   // DefaultMinDihedral(dimension). Allowed in 3-D, up to kMostMinDihedral.
   std::optional<double> min_dihedral{};
 

@@ -32,7 +32,7 @@ void SetSliverFigures(const SliverStatistics& slivers, MeshStatistics& statistic
   statistics.sliver_moves = slivers.moves;
   statistics.sliver_vertices = slivers.added;
   statistics.weighted_vertices = slivers.weighted;
-  statistics.unmended_min_angle_deg = slivers.min_angle_deg.value_or(0);
+  statistics.min_angle_before_deg = slivers.min_angle_deg.value_or(0);
   statistics.simplices_seconds += slivers.star_seconds;
   statistics.sliver_seconds = slivers.seconds;
 }

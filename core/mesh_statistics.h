@@ -32,7 +32,7 @@ struct MeshStatistics {
   uint64_t sliver_moves = 0;                               // of vertices
   uint64_t sliver_vertices = 0;                            // added against them
   uint64_t weighted_vertices = 0;                          // by pumping
-  double unmended_min_angle_deg = 0;                       // of the mesh before; 0 if nothing was mended or pumped
+  double min_angle_before_deg = 0;                         // of the mesh before; 0 if nothing was repaired or pumped
 
   double tree_seconds = 0;
   double refinement_seconds = 0;

@@ -98,13 +98,13 @@ class MesherIn final : public Mesher {
     WELLSPACE_RETURN_IF_ERROR(CheckParameters(parameters));
     context.EnterPhase(Phase::kRefinement);
     is_refined_ = false;
-    const MeshCriteria<D> demands = DemandsOf(parameters);
-    absl::Status status = refinement_->Run(demands, VertexBudget(parameters), parameters.threads, context, nullptr,
-                                           [&] { return PredictVertices(demands, context); });
+    const MeshCriteria<D> criteria = CriteriaOf(parameters);
+    absl::Status status = refinement_->Run(criteria, VertexBudget(parameters), parameters.threads, context, nullptr,
+                                           [&] { return PredictVertices(criteria, context); });
     refinement_seconds_ += absl::ToDoubleSeconds(context.TimeIn(Phase::kRefinement));
     is_given_.resize(structure_.vertex_count(), false);
     if (status.ok()) {
-      status = MendSlivers(parameters, context);
+      status = RepairSlivers(parameters, context);
     }
     is_refined_ = status.ok();
     return status;
@@ -274,7 +274,7 @@ class MesherIn final : public Mesher {
       return absl::FailedPreconditionError(
           "vertices have been inserted since the mesher was created; an estimate is made before that");
     }
-    WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size, EstimateSize<D>(structure_, DemandsOf(parameters), context));
+    WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size, EstimateSize<D>(structure_, CriteriaOf(parameters), context));
     MeshEstimate estimate;
     estimate.vertices = SaturatedCount(size.vertices);
     estimate.simplices = SaturatedCount(size.simplices);
@@ -350,25 +350,26 @@ class MesherIn final : public Mesher {
     return absl::OkStatus();
   }
 
-  MeshCriteria<D> DemandsOf(const MeshParameters& parameters) const { return DemandsIn<D>(domain_, parameters); }
+  MeshCriteria<D> CriteriaOf(const MeshParameters& parameters) const { return CriteriaIn<D>(domain_, parameters); }
 
   // How many vertices a first refinement will end with; 0 if the context knows, or it ends too soon to be worth an
   // estimate.
-  absl::StatusOr<uint64_t> PredictVertices(const MeshCriteria<D>& demands, const RunContext& context) const {
+  absl::StatusOr<uint64_t> PredictVertices(const MeshCriteria<D>& criteria, const RunContext& context) const {
     if (context.estimated_vertices() > 0 || structure_.vertex_count() > structure_.built_count() ||
-        (demands.sizes.IsUnbounded() && structure_.vertex_count() < kLeastPredicted<D>)) {
+        (criteria.sizes.IsUnbounded() && structure_.vertex_count() < kLeastPredicted<D>)) {
       return 0;
     }
-    WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size, EstimateSize<D>(structure_, demands, context, kGlance));
+    WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size, EstimateSize<D>(structure_, criteria, context, kGlance));
     return SaturatedCount(size.vertices);
   }
 
-  // Mends slivers if that is asked for; what is kept for that goes if it is not. Decides whether the mesh is pumped: a
-  // mesh without slivers stays Delaunay.
-  absl::Status MendSlivers(const MeshParameters& parameters, RunContext& context) {
+  // Repairs slivers if that is asked for; what is kept for that goes if it is not. Decides whether the mesh is pumped:
+  // a mesh without slivers stays Delaunay.
+  absl::Status RepairSlivers(const MeshParameters& parameters, RunContext& context) {
     if constexpr (D == 3) {
       if (const double min_dihedral = MinDihedralOf(parameters); min_dihedral > 0) {
-        const MendDemands demands{DemandsOf(parameters), min_dihedral, domain_.MinEdge(), VertexBudget(parameters)};
+        const RepairCriteria criteria{CriteriaOf(parameters), min_dihedral, domain_.MinEdge(),
+                                      VertexBudget(parameters)};
         const uint64_t moves = slivers_.statistics().moves;
         const uint32_t refined = structure_.vertex_count();
         moved_.resize(extracted_vertices_, false);
@@ -377,8 +378,9 @@ class MesherIn final : public Mesher {
           kept = is_given_;
           std::fill_n(kept.begin(), extracted_vertices_, true);
         }
-        const absl::Status status = slivers_.Mend(structure_, *refinement_, parameters.keep_vertices ? kept : is_given_,
-                                                  demands, moved_, parameters.threads, context);
+        const absl::Status status =
+            slivers_.Repair(structure_, *refinement_, parameters.keep_vertices ? kept : is_given_, criteria, moved_,
+                            parameters.threads, context);
         is_given_.resize(structure_.vertex_count(), false);
         repairs_.emplace_back(refined, structure_.vertex_count());
         has_moved_ = has_moved_ || slivers_.statistics().moves > moves;

@@ -1,4 +1,4 @@
-// A sort of few items without branches, since none could be foretold.
+// A sort of few items without branches, since they could not be predicted.
 #ifndef WELLSPACE_CORE_BASE_SORT_FEW_H_
 #define WELLSPACE_CORE_BASE_SORT_FEW_H_
 

@@ -120,8 +120,8 @@ WELLSPACE_INLINE void DropThose(size_t begin, Candidates<D>& all) {
   all.count = count;
 }
 
-// Moves candidate i to the place `places[i]`. By four, since the end of the loop is foretold better then: what is not a
-// candidate has the place after the last.
+// Moves candidate i to the place `places[i]`. By four, since the end of the loop is predicted better then: what is not
+// a candidate has the place after the last.
 template <int D>
 WELLSPACE_INLINE void Scatter(const Candidates<D>& from, const uint32_t* places, Candidates<D>& to) {
   for (size_t first = 0; first < from.count; first += kLanes) {
@@ -136,7 +136,7 @@ WELLSPACE_INLINE void Scatter(const Candidates<D>& from, const uint32_t* places,
   }
 }
 
-// The place of each is the number of those before it. Loops over whole vectors: their ends are foretold better.
+// The place of each is the number of those before it. Loops over whole vectors: their ends are predicted better.
 template <int D, size_t kWidth>
 WELLSPACE_INLINE void SortByRank(const Candidates<D>& from, Candidates<D>& to) {
   constexpr size_t kItems = 2 * kWidth;

@@ -23,8 +23,9 @@ struct alignas(kLanes * sizeof(double)) Candidates {
 
   double w[D][kCapacity];       // the vector from the site
   double length_sq[kCapacity];  // |w|^2
-  double most[kCapacity];       // of x . w - |w|^2 / 2 + error over the nodes x of the cell, once foretold
-  uint64_t slot[kCapacity];     // where in its leaf
+  double
+      most[kCapacity];  // of x . w - |w|^2 / 2 + error over the nodes x of the cell, once BoundExcesses has computed it
+  uint64_t slot[kCapacity];  // where in its leaf
   size_t count = 0;
 
   // Becomes those of `positions` within a squared distance of `site`, but not at it, in their order.

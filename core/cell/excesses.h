@@ -1,4 +1,4 @@
-// How far the nodes of a cell are beyond a bisector: NodeColumns::ComputeExcesses, for whoever calls it.
+// How far the nodes of a cell are beyond a bisector: NodeColumns::ComputeExcesses, for its callers.
 #ifndef WELLSPACE_CORE_CELL_EXCESSES_H_
 #define WELLSPACE_CORE_CELL_EXCESSES_H_
 

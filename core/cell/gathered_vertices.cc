@@ -94,7 +94,7 @@ template <int D>
 bool GatheredVertices<D>::Add(std::span<const Point<D>> positions, const VertexId* names) {
   for (size_t i = 0; i < positions.size(); ++i) {
     const Point<D>& p = positions[i];
-    // No branch, since none could be foretold.
+    // No branch, since it could not be predicted.
     positions_[count_] = p;
     names_[count_] = names[i];
     for (int axis = 0; axis < D; ++axis) {
@@ -117,7 +117,7 @@ WELLSPACE_INLINE double GatheredVertices<D>::NearestSqWith(VertexId v, const Poi
   ForEachDistanceSq<D>(
       *this, site, [&](size_t i, const Floats& distance_sq) __attribute__((always_inline)) {
         *reinterpret_cast<Floats*>(distances_sq + i) = distance_sq;
-        const FloatMask counts = IsLess<kUnit>(Floats{}, distance_sq);  // but for v, and who is too near to tell
+        const FloatMask counts = IsLess<kUnit>(Floats{}, distance_sq);  // but for v, and what is too near to tell
         least = Min<kUnit>(least, Choose<kUnit>(counts, distance_sq, Splat(kInfinity)));
       });
   const double nearest = std::sqrt(double{-Largest<kUnit>(-least)}) + 2 * kColumnError;

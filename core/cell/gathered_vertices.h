@@ -32,7 +32,7 @@ class GatheredVertices {
   // Gathers the vertices around the first of `sites`, and returns how many sites these are: those as near each other as
   // in a leaf, or in two side by side. None are gathered if it would not pay: for few sites, and for those amid more
   // than kMost. `points` are by vertex, in the leaves of `tree`; `seen`, by node of the tree, is set to `mark`, which
-  // nobody has there, where a leaf has been met.
+  // it has nowhere before, where a leaf has been met.
   //
   // REQUIRES:   there are sites.
   // Complexity: O(sites), and O(1) for each leaf and vertex around them.
@@ -79,7 +79,7 @@ class GatheredVertices {
     const double most = std::sqrt(distance_sq) * scale_ + kColumnError;
     return static_cast<float>(most * most);
   }
-  // The squared distance from a site of those who are looked at before all others.
+  // The squared distance from a site of the vertices that are looked at before all others.
   double near_sq() const { return near_sq_; }
 
  private:

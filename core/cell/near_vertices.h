@@ -28,7 +28,7 @@ template <int D>
 inline constexpr float kNodeError = D == 2 ? 1.5f : 16;
 // With R at least the distance of the nodes, an excess x . w - |w|^2 / 2 is wrong by at most u ((kNodeError + D + 2) R
 // |w| + (2 D + 2) |w|^2 / 2): w is by u |w|; the products by u |x| |w| together, the D sums by D u (|x| |w| + |w|^2 /
-// 2), and |w|^2 / 2 by (D + 2) u of itself. Whoever may cut has
+// 2), and |w|^2 / 2 by (D + 2) u of itself. A vertex that may cut has
 // |w| <= 2 R, so that all is less than 12 u R |w| in 2-D, 29 u R |w| in 3-D; one u more for what is taken off |w|^2 /
 // 2.
 template <int D>

@@ -384,7 +384,7 @@ void Polygon::FindStar(Star<2>& out) const {
   size_t count = 0;
   const Plane<2>* before = &planes_[PlaneFrom(Before(0))];
   for (size_t i = 0; i < count_; ++i) {
-    // No branch, since none could be foretold where there are walls.
+    // No branch, since it could not be predicted where there are walls.
     const Plane<2>* const after = &planes_[PlaneFrom(i)];
     out[count] = {before->vertex, after->vertex};
     count += before->kind == PlaneKind::kBisector && after->kind == PlaneKind::kBisector ? 1 : 0;

@@ -163,7 +163,7 @@ WELLSPACE_INLINE void Polyhedron::FindRim() {
     const uint64_t to = leads_to_[from] & ~leads_from_[from];
     leads_to_[from] = 0;
     leads_from_[from] = 0;
-    // No branch, since none could be foretold.
+    // No branch, since it could not be predicted.
     rim[rim_count] = {static_cast<uint16_t>(from), static_cast<uint16_t>(std::countr_zero(to | uint64_t{1} << 63))};
     doubled |= to & (to - 1) & -static_cast<uint64_t>(to != 0);
     rim_count += to != 0 ? 1 : 0;
@@ -310,7 +310,7 @@ WELLSPACE_INLINE void Polyhedron::Replace(uint32_t plane) {
   const size_t removed_count = removed_count_;
   const float own_sq = edge_sq[plane];
   for (size_t j = 0; j < rim_count; ++j) {
-    // No branch, since none could be foretold.
+    // No branch, since it could not be predicted.
     const size_t added = old + j - removed_count;
     const size_t index = added ^ ((added ^ removed[j]) & -static_cast<size_t>(j < removed_count));
     const RimEdge edge = rim[j];
@@ -460,7 +460,7 @@ void Polyhedron::FindStar(Star<3>& out) const {
   out.resize(count_);
   size_t count = 0;
   for (size_t i = 0; i < count_; ++i) {
-    // No branch, since none could be foretold where there are walls.
+    // No branch, since it could not be predicted where there are walls.
     uint32_t is_simplex = 1;
     for (int k = 0; k < 3; ++k) {
       const Plane<3>& plane = planes_[triangles_[i].planes[k]];

@@ -137,7 +137,7 @@ class Polyhedron : public FloatCell<3> {
   }
   std::span<const Group> groups() const { return {groups_.data(), GroupsFor(count_)}; }
   // Calls f(group) for all groups, and for the first four even if they have no nodes: how many of those do cannot be
-  // foretold.
+  // predicted.
   template <typename F>
   WELLSPACE_INLINE void ForEachGroup(F f) const {
     f(groups_[0]);

@@ -1,4 +1,4 @@
-// The nodes of a cell in space once it has been cut: where they are in doubles, and who is beside whom.
+// The nodes of a cell in space once it has been cut: where they are in doubles, and which is beside which.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -115,7 +115,7 @@ size_t Polytope<D>::CutByEach(std::span<const Point<D>> positions, const VertexN
   near_.Pick(positions, site_, CutLimitSq());
   const size_t within_reach = near_.count;
   if (cuts_ != 0) {
-    Foretell(0, near_);
+    BoundExcesses(0, near_);
     near_.DropThoseThatMiss(0);
   }
   if (near_.count > 1) {
@@ -136,7 +136,7 @@ size_t Polytope<D>::CutByEach(std::span<const Point<D>> positions, const VertexN
       continue;
     }
     if (++cuts % kCutsBetweenLooks == 0 && left.count - j > kCutsBetweenLooks) {
-      Foretell(j + 1, left);
+      BoundExcesses(j + 1, left);
       left.DropThoseThatMiss(j + 1);
     }
   }
@@ -204,7 +204,7 @@ WELLSPACE_INLINE void Polytope<D>::FindCutEdges() {
         const auto index = static_cast<Index>(word * kWordBits + std::countr_zero(removed));
         *end++ = index;
         for (int k = 0; k < D; ++k) {
-          // No branch, since none could be foretold: about half of the neighbours are kept.
+          // No branch, since it could not be predicted: about half of the neighbours are kept.
           const End kept = opposite[EndAt(index, k)];
           *edge = {kept, index};
           const uint64_t is_removed = word_of(NodeOf(kept)) >> NodeOf(kept) % kWordBits & 1;
@@ -324,7 +324,7 @@ WELLSPACE_INLINE void Polytope<D>::MakeNewNodes(uint16_t plane) {
   MakeRoomForNodes(columns_.count());
   for (size_t j = 0; j < cut_count_; ++j) {
     const End kept = cut_edges_[j].kept;
-    // No branch, since none could be foretold.
+    // No branch, since it could not be predicted.
     const size_t added = old + j - removed_count_;
     const size_t index = added ^ ((added ^ removed_[j]) & -static_cast<size_t>(j < removed_count_));
     Joint& joint = joints_[index];
@@ -502,7 +502,7 @@ bool Polytope<D>::KeepsRatio(double ratio) const {
 // KeepsRatio, of one node.
 template <int D>
 WELLSPACE_INLINE bool Polytope<D>::SurelyKeeps(size_t node, double ratio) const {
-  // No branch, since none could be foretold.
+  // No branch, since it could not be predicted.
   double nearest = std::numeric_limits<double>::infinity();
   bool is_on_wall = false;
   for (const uint16_t index : joints_[node].planes) {
@@ -519,7 +519,7 @@ void Polytope<D>::FindStar(Star<D>& out) const {
   out.resize(columns_.count());
   size_t count = 0;
   for (size_t i = 0; i < columns_.count(); ++i) {
-    // No branch, since none could be foretold where there are walls.
+    // No branch, since it could not be predicted where there are walls.
     std::array<VertexId, D>& simplex = out[count];
     uint32_t is_simplex = 1;
     for (int k = 0; k < D; ++k) {
@@ -534,7 +534,7 @@ void Polytope<D>::FindStar(Star<D>& out) const {
 
 // As in Cut, with the largest slack.
 template <int D>
-void Polytope<D>::Foretell(size_t begin, Candidates<D>& candidates) {
+void Polytope<D>::BoundExcesses(size_t begin, Candidates<D>& candidates) {
   Tighten();
   columns_.ComputeMost(largest_slack_, kOffsetError<D>, begin, candidates);
 }

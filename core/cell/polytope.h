@@ -93,7 +93,7 @@ class Polytope {
   //
   // Complexity: O(nodes) a candidate.
   // Errors:     none.
-  void Foretell(size_t begin, Candidates<D>& candidates);
+  void BoundExcesses(size_t begin, Candidates<D>& candidates);
 
   // Whether some vertex in `cube` (absolute coordinates) could still cut the cell: whether some node x has dist(x,
   // cube) <= |x - site|, decided generously where rounding leaves a doubt.
@@ -155,7 +155,7 @@ class Polytope {
   static size_t NodeOf(End end) { return end >> kSlotBits; }
   static size_t SlotOf(End end) { return end & ((1u << kSlotBits) - 1); }
 
-  // What a node is, but for where and beside whom: where its planes meet.
+  // What a node is, but for its place and its neighbours: where its planes meet.
   struct Joint {
     std::array<uint16_t, D> planes;  // by index, as in CellNode once placed
     bool is_placed = false;          // the position is the one that the planes alone give

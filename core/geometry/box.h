@@ -93,7 +93,7 @@ Box<D> CubeAround(const Point<D>& centre, double half_side) {
   return cube;
 }
 
-// The square of x where that is positive, else 0; no branch, since none could be foretold.
+// The square of x where that is positive, else 0; no branch, since it could not be predicted.
 inline double PositivePartSq(double x) {
   const double twice = x + std::abs(x);
   return 0.25 * twice * twice;

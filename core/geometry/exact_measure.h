@@ -1,4 +1,4 @@
-// Exact orientation, in-sphere test, volume and circumcentre of simplices, for those who check a mesh.
+// Exact orientation, in-sphere test, volume and circumcentre of simplices, for the validators of a mesh.
 //
 // Independent of power_predicate on purpose: which simplices there are is decided by other arithmetic than the
 // validators'. (They share the orientation alone, with which a mesher tells the two sides of a facet.)

@@ -54,7 +54,7 @@ struct ExactDecision {
 //
 // With n_j . x = c_j the planes relative to the site (bisector of w = p_j - site: n = w, c = |w|^2 / 2; wall: n =
 // e_axis) and the node x = A^-1 c, the value is g = w_u . x - |w_u|^2 / 2 = - det [A c; w_u c_u] / det A, evaluated in
-// integers: all differences are multiples of one power of two. Never kFilter: who calls has filtered already.
+// integers: all differences are multiples of one power of two. Never kFilter: the caller has filtered already.
 //
 // The perturbation gives vertex k the weight W_k = eps^(rank), rank by coordinates, lexicographically greatest first,
 // so that c_j becomes (|w_j|^2 + W_site - W_j) / 2. g is linear in the weights: with w_u = sum_j lambda_j n_j, 2 g

@@ -57,7 +57,7 @@ template <int D>
 absl::Status Refinement<D>::ScheduleAll(const MeshCriteria<D>& criteria, const VertexPredictor& predict,
                                         ThreadTeam& team) {
   rounds_.Drop();
-  structure_.AdmitWaiting();  // what was added before something was thrown
+  structure_.CommitAll();  // what was added before something was thrown
   absl::Status predicted;
   const absl::Cleanup end = [&team] { team.Drop(); };  // of what is begun, where something is thrown
   team.BeginCall([&] { predicted = Predict(predict); });
@@ -281,8 +281,8 @@ absl::StatusOr<VertexId> Refinement<D>::Insert(const InsertionRequest<D>& reques
     checks_.CheckInsertion(*rules_, request);
   }
   Insertion insertion = request.insertion;
-  insertion.vertex = structure_.AddWaiting(insertion.near, point.position);
-  if (!rounds_.IsAhead() || *observer_ || structure_.waiting_count() == QueryStructure<D>::kMostWaiting) {
+  insertion.vertex = structure_.AddUncommitted(insertion.near, point.position);
+  if (!rounds_.IsAhead() || *observer_ || structure_.uncommitted_count() == QueryStructure<D>::kMostUncommitted) {
     rounds_.CommitAdded();
   }
   rounds_.NoteInserted(point.position);
@@ -318,8 +318,8 @@ void Refinement<D>::AddPending(VertexId near, VertexId x, double nearest_sq) {
 template <int D>
 void Refinement<D>::ComputeCell(VertexId v, const Box<D>& clip, Workspace<D>& workspace) {
   structure_.UnplacedClippedVoronoi(v, clip, workspace);
-  structure_.CutByWaiting(v, workspace.cell);
-  if (workspace.cell.IsTooLarge() && structure_.waiting_count() > 0) {
+  structure_.CutByUncommitted(v, workspace.cell);
+  if (workspace.cell.IsTooLarge() && structure_.uncommitted_count() > 0) {
     rounds_.CommitAdded();  // with the nearest first it may not be
     structure_.UnplacedClippedVoronoi(v, clip, workspace);
   }

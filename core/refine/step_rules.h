@@ -22,7 +22,7 @@ namespace wellspace::core {
 
 // For the criteria of one run. What the functions return depends on the cell and on the places of vertices alone.
 //
-// Thread safety: thread-compatible; const functions may run at once, and beside QueryStructure::AddWaiting.
+// Thread safety: thread-compatible; const functions may run at once, and beside QueryStructure::AddUncommitted.
 template <int D>
 class StepRules {
  public:

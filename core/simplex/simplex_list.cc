@@ -31,7 +31,7 @@ void SimplexList<D>::Add(const Simplex<D>& points, const std::array<uint32_t, D 
   std::array<uint32_t, D + 1> sorted = indices;
   const bool is_turned = SortFew(sorted);  // each exchange turns the orientation
   const Sign orientation = glance.orientation != Sign::kZero ? glance.orientation : Orientation<D>(points).sign;
-  // No branch, since none could be foretold.
+  // No branch, since it could not be predicted.
   const uint32_t exchanged =
       (sorted[D - 1] ^ sorted[D]) & -static_cast<uint32_t>(is_turned == (orientation == Sign::kPositive));
   sorted[D - 1] ^= exchanged;
@@ -111,7 +111,7 @@ typename SimplexList<D>::Glance SimplexList<D>::LookAt(const Simplex<D>& points)
     const double ca_sq = NormSq<3>(ca);
     const double shortest_sq = std::min({a_sq, b_sq, c_sq, ab_sq, bc_sq, ca_sq});
     const double most_sq = better_cot_sq_ * det_sq;
-    // No branch, since none could be foretold.
+    // No branch, since it could not be predicted.
     const auto is_better = [most_sq](const Point<3>& n, const Point<3>& m, double edge_sq) {
       const double value = Dot<3>(n, m);
       return (value >= 0) | (value * value < most_sq * edge_sq);

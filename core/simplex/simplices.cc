@@ -52,18 +52,19 @@ class BlockJoin {
     }
     held_bytes_ += more_bytes;
     if (block != joined_count_) {
-      waiting_size_ += indices.size();
-      waiting_.emplace(block, indices);
+      unjoined_size_ += indices.size();
+      unjoined_.emplace(block, indices);
       Allow(0);
     } else {
       Append(indices);
-      for (auto next = waiting_.begin(); next != waiting_.end() && next->first == joined_count_;
-           next = waiting_.erase(next)) {
+      for (auto next = unjoined_.begin(); next != unjoined_.end() && next->first == joined_count_;
+           next = unjoined_.erase(next)) {
         Append(next->second);
-        waiting_size_ -= next->second.size();
+        unjoined_size_ -= next->second.size();
       }
     }
-    context_.SetPhaseFraction(static_cast<double>(joined_count_ + waiting_.size()) / static_cast<double>(block_count_));
+    context_.SetPhaseFraction(static_cast<double>(joined_count_ + unjoined_.size()) /
+                              static_cast<double>(block_count_));
   }
 
   // All of them, when the last block has been taken. Errors: that of the context, or RESOURCE_EXHAUSTED.
@@ -93,7 +94,7 @@ class BlockJoin {
 
   // Asks for what is held, and `more` indices.
   void Allow(size_t more) {
-    const uint64_t bytes = held_bytes_ + (joined_.size() + waiting_size_ + more) * sizeof(uint32_t);
+    const uint64_t bytes = held_bytes_ + (joined_.size() + unjoined_size_ + more) * sizeof(uint32_t);
     if (absl::Status status = context_.AllowMemory(bytes); !status.ok()) {
       memory_.Update(std::move(status));
       is_refused_ = true;
@@ -106,8 +107,8 @@ class BlockJoin {
   std::mutex mutex_;
   HugeVector<uint32_t> joined_;
   size_t joined_count_ = 0;
-  std::map<size_t, HugeVector<uint32_t>> waiting_;  // by block
-  size_t waiting_size_ = 0;
+  std::map<size_t, HugeVector<uint32_t>> unjoined_;  // by block
+  size_t unjoined_size_ = 0;
   absl::Status memory_;  // the first refusal
   std::atomic<bool> is_refused_{false};
   std::atomic<size_t> next_block_{0};
@@ -222,16 +223,16 @@ absl::StatusOr<Simplices> JoinCells(const QueryStructure<D>& structure, std::spa
 }
 
 // The simplices at one vertex after the other, of those that are listed there the ones that are in the mesh: the vertex
-// is the last of them to have been looked at, and nobody who came later spoils them.
+// is the last of them to have been looked at, and no vertex that came later spoils them.
 //
 // Thread safety: thread-compatible.
 template <int D>
 class ListedSimplices {
  public:
   // All arguments must outlive it.
-  ListedSimplices(const QueryStructure<D>& structure, const StarLists<D>& stars, const LateNeighbours& late,
+  ListedSimplices(const QueryStructure<D>& structure, const StarLists<D>& stars, const StaleStars& stale,
                   std::span<const uint32_t> output_index)
-      : structure_(structure), stars_(stars), late_(late), output_index_(output_index) {}
+      : structure_(structure), stars_(stars), stale_(stale), output_index_(output_index) {}
 
   // Appends those of `v`, in an order that does not depend on how cells were computed.
   void Append(VertexId v, SimplexList<D>& out) {
@@ -241,7 +242,7 @@ class ListedSimplices {
     rows_.resize(listed.size());
     size_t count = 0;
     for (const Row& row : listed) {
-      // No branch, since none could be foretold.
+      // No branch, since it could not be predicted.
       rows_[count] = row;
       uint32_t is_last = 1;
       for (const VertexId u : row) {
@@ -250,8 +251,8 @@ class ListedSimplices {
       count += is_last;
     }
     rows_.resize(count);
-    if (const auto late = late_.At(v); !late.empty()) {
-      std::erase_if(rows_, [&](const Row& row) { return IsSpoiled(v, row, late); });
+    if (const auto stale = stale_.At(v); !stale.empty()) {
+      std::erase_if(rows_, [&](const Row& row) { return IsSpoiled(v, row, stale); });
     }
     for (Row& row : rows_) {
       SortFew(row);
@@ -270,15 +271,16 @@ class ListedSimplices {
  private:
   using Row = std::array<VertexId, D>;  // the other vertices of a simplex
 
-  // Whether the ball through `v` and `others` holds one of the vertices that are late at v; ties as in cells.
-  bool IsSpoiled(VertexId v, const Row& others, std::span<const LatePair> late) {
+  // Whether the ball through `v` and `others` holds one of the vertices that make the list of v stale; ties as in
+  // cells.
+  bool IsSpoiled(VertexId v, const Row& others, std::span<const StalePair> stale) {
     Simplex<D> simplex;
     simplex[D] = structure_.point(v);
     for (int k = 0; k < D; ++k) {
       simplex[k] = structure_.point(others[k]);
     }
     const Sign orientation = Orientation<D>(simplex).sign;
-    return std::any_of(late.begin(), late.end(), [&](const LatePair& pair) {
+    return std::any_of(stale.begin(), stale.end(), [&](const StalePair& pair) {
       const Point<D>& u = structure_.point(pair.second);
       ++counters_.cuts;
       const MeasuredSign inside = InSphere<D>(simplex, u);
@@ -298,7 +300,7 @@ class ListedSimplices {
 
   const QueryStructure<D>& structure_;
   const StarLists<D>& stars_;
-  const LateNeighbours& late_;
+  const StaleStars& stale_;
   const std::span<const uint32_t> output_index_;
   std::vector<Row> rows_;
   QueryCounters counters_;
@@ -321,11 +323,11 @@ absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, c
   const uint64_t held_bytes =
       structure.MemoryBytes() + output_index.size_bytes() + stars.MemoryBytes() + blocks.MemoryBytes();
   WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(held_bytes));
-  WELLSPACE_ASSIGN_OR_RETURN(const LateNeighbours late, LateNeighbours::Of(stars, structure.vertex_count(), context));
+  WELLSPACE_ASSIGN_OR_RETURN(const StaleStars stale, StaleStars::Of(stars, structure.vertex_count(), context));
   using Listed = std::optional<ListedSimplices<D>>;
   const auto append = [&](size_t block, Listed& listed, SimplexList<D>& out) {
     if (!listed.has_value()) {
-      listed.emplace(structure, stars, late, output_index);
+      listed.emplace(structure, stars, stale, output_index);
     }
     ForEachVertexOf(
         blocks, block, context,
@@ -342,7 +344,7 @@ absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, c
         [&](VertexId v) { listed->Append(v, out); });
   };
   return JoinBlocks<D, Listed>(
-      blocks.count(), held_bytes + late.MemoryBytes(), threads, context, append,
+      blocks.count(), held_bytes + stale.MemoryBytes(), threads, context, append,
       [](const Listed& listed) { return listed->MemoryBytes(); },
       [](const Listed& listed) { return listed->counters(); });
 }

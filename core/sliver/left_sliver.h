@@ -10,7 +10,7 @@ namespace wellspace::core {
 
 enum class SliverReason {
   kDemands,  // each place tried for a new vertex in its circumball breaks the criterion, a size or the smallest edge
-  kAngle,    // a new vertex could keep the demands, but each place tried for it leaves an angle that is too small
+  kAngle,    // a new vertex could keep the criteria, but each place tried for it leaves an angle that is too small
   kWork,     // the bound on operations was reached first
 };
 inline constexpr size_t kSliverReasons = 3;

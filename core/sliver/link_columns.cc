@@ -16,7 +16,7 @@ namespace {
 
 // Neighbours are told apart by the bits of a word.
 constexpr uint32_t kMostNeighbours = 64;
-// A neighbour that is less far beyond a facet, by the size of all, is left to who decides in doubt.
+// A neighbour that is less far beyond a facet, by the size of all, is left to the exact decision.
 constexpr double kLeastHeight = 1e-10;
 
 }  // namespace

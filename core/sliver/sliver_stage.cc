@@ -57,7 +57,7 @@ void Emit(const Triangulation<D>& triangulation, SimplexId s, std::span<const ui
 }
 
 // Puts simplices, lowest vertex first, into ascending order: that of the numbers of a triangulation, which decide what
-// is mended first, is then one of the simplices alone.
+// is repaired first, is then one of the simplices alone.
 //
 // Complexity: O(vertices + simplices) and sorting the simplices of each lowest vertex.
 // Errors:     CANCELLED, DEADLINE_EXCEEDED.
@@ -117,8 +117,8 @@ class WorstCandidates {
   double ratio_sq_ = 0;
 };
 
-// Has structure and refinement follow the triangulation step by step, so that mending may end after any of them.
-class Follower final : public MendObserver {
+// Has structure and refinement follow the triangulation step by step, so that repair may end after any of them.
+class Follower final : public RepairObserver {
  public:
   Follower(Triangulation<3>& triangulation, QueryStructure<3>& structure, Refinement<3>& refinement,
            std::vector<bool>& moved)
@@ -224,23 +224,23 @@ absl::Status SliverStage<D>::FollowStructure(const QueryStructure<D>& structure,
 
 template <int D>
 template <int E>
-absl::Status SliverStage<D>::Mend(QueryStructure<E>& structure, Refinement<E>& refinement, std::vector<bool>& is_fixed,
-                                  const MendDemands& demands, std::vector<bool>& moved, int threads,
-                                  RunContext& context) requires(E == 3) {
+absl::Status SliverStage<D>::Repair(QueryStructure<E>& structure, Refinement<E>& refinement,
+                                    std::vector<bool>& is_fixed, const RepairCriteria& criteria,
+                                    std::vector<bool>& moved, int threads, RunContext& context) requires(E == 3) {
   const Stopwatch stopwatch(statistics_.seconds, statistics_.star_seconds);
   statistics_.is_asked = true;
   WELLSPACE_RETURN_IF_ERROR(FollowStructure(structure, refinement.stars(), threads, context));
   context.EnterPhase(Phase::kSlivers);
   Follower follower(*triangulation_, structure, refinement, moved);
-  Mender mender(*triangulation_, is_fixed, demands, follower);
-  const absl::Status status = mender.Run(threads, context);
-  statistics_.slivers += mender.report().slivers;
-  statistics_.slivers_left = mender.report().slivers_left;
-  statistics_.left_by = mender.report().left_by;
-  statistics_.flattest_left = mender.report().flattest_left;
-  statistics_.operations += mender.report().operations;
-  statistics_.moves += mender.report().moves;
-  statistics_.added += mender.report().added;
+  Repairer repairer(*triangulation_, is_fixed, criteria, follower);
+  const absl::Status status = repairer.Run(threads, context);
+  statistics_.slivers += repairer.report().slivers;
+  statistics_.slivers_left = repairer.report().slivers_left;
+  statistics_.left_by = repairer.report().left_by;
+  statistics_.flattest_left = repairer.report().flattest_left;
+  statistics_.operations += repairer.report().operations;
+  statistics_.moves += repairer.report().moves;
+  statistics_.added += repairer.report().added;
   return status;
 }
 
@@ -258,7 +258,7 @@ absl::StatusOr<WeightedSimplices> SliverStage<D>::ToSimplices(const QueryStructu
   }
   std::optional<Triangulation<D>> pumped;
   if (pump) {
-    // What is mended later has no weights, and is triangulated anew.
+    // What is repaired later has no weights, and is triangulated anew.
     if (triangulation_.has_value()) {
       pumped = std::exchange(triangulation_, std::nullopt);
     } else {
@@ -300,7 +300,7 @@ template class SliverStage<3>;
 template class SliverStage<4>;
 template class SliverStage<5>;
 template class SliverStage<6>;
-template absl::Status SliverStage<3>::Mend(QueryStructure<3>&, Refinement<3>&, std::vector<bool>&, const MendDemands&,
-                                           std::vector<bool>&, int, RunContext&);
+template absl::Status SliverStage<3>::Repair(QueryStructure<3>&, Refinement<3>&, std::vector<bool>&,
+                                             const RepairCriteria&, std::vector<bool>&, int, RunContext&);
 
 }  // namespace wellspace::core

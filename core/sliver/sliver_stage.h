@@ -1,4 +1,4 @@
-// The slivers of a refined mesh, between refinement and output: mended by moves and new vertices, or pumped away.
+// The slivers of a refined mesh, between refinement and output: repaired by moves and new vertices, or pumped away.
 #ifndef WELLSPACE_CORE_SLIVER_SLIVER_STAGE_H_
 #define WELLSPACE_CORE_SLIVER_SLIVER_STAGE_H_
 
@@ -13,7 +13,7 @@
 #include "core/base/run_context.h"
 #include "core/refine/refine.h"
 #include "core/simplex/simplices.h"
-#include "core/sliver/mend.h"
+#include "core/sliver/repair.h"
 #include "core/sliver/triangulation.h"
 #include "core/voronoi/query_structure.h"
 
@@ -21,17 +21,17 @@ namespace wellspace::core {
 
 // Over the life of a stage.
 struct SliverStatistics {
-  uint64_t slivers = 0;       // that Mend found
-  uint64_t slivers_left = 0;  // by the last Mend
-  // Of these: see MendReport.
+  uint64_t slivers = 0;       // that Repair found
+  uint64_t slivers_left = 0;  // by the last Repair
+  // Of these: see RepairReport.
   std::array<uint64_t, kSliverReasons> left_by{};
   std::vector<LeftSliver> flattest_left;
-  uint64_t operations = 0;  // of Mend
-  bool is_asked = false;    // whether a mesh was to be mended or pumped
+  uint64_t operations = 0;  // of Repair
+  bool is_asked = false;    // whether a mesh was to be repaired or pumped
   uint64_t moves = 0;
   uint64_t added = 0;
   uint64_t weighted = 0;                // vertices with a weight in the last mesh
-  std::optional<double> min_angle_deg;  // before the first Mend; none: there was no triangulation yet
+  std::optional<double> min_angle_deg;  // before the first Repair; none: there was no triangulation yet
   QueryCounters star_queries;           // of the triangulation
   double star_seconds = 0;              // for them
   double seconds = 0;                   // for all the rest
@@ -42,18 +42,18 @@ struct WeightedSimplices {
   HugeVector<double> weights;  // by output index, in the structure's unit; empty where all are zero
 };
 
-// Keeps the Delaunay triangulation of a structure while its mesh is mended, and follows what is added to the structure
-// in between. D >= 3.
+// Keeps the Delaunay triangulation of a structure while its mesh is repaired, and follows what is added to the
+// structure in between. D >= 3.
 //
 // Thread safety: thread-compatible.
 // Invariants: the triangulation, if there is one, is that of the structure's first vertices, where they are.
 template <int D>
 class SliverStage {
  public:
-  // Mends the slivers, and tells structure and refinement what has changed, on an error too. 3-D.
+  // Repairs the slivers, and tells structure and refinement what has changed, on an error too. 3-D.
   //
   // Shapes:     moved: vertices below its size that move are set in it.
-  // REQUIRES:   the structure is refined for demands.demands; is_fixed has an entry for each of its vertices.
+  // REQUIRES:   the structure is refined for criteria.criteria; is_fixed has an entry for each of its vertices.
   // Complexity: O(m) the first time; then O(1) for each vertex added since and each sliver, and a look at every
   //             simplex.
   // Errors:     RESOURCE_EXHAUSTED (max_vertices, memory of the context), CANCELLED, DEADLINE_EXCEEDED; all stays
@@ -61,15 +61,15 @@ class SliverStage {
   // Threads:    uses `threads` for the stars that the triangulation is made of.
   // A template, since clang 14 would instantiate it in other dimensions otherwise.
   template <int E = D>
-  absl::Status Mend(QueryStructure<E>& structure, Refinement<E>& refinement, std::vector<bool>& is_fixed,
-                    const MendDemands& demands, std::vector<bool>& moved, int threads,
-                    RunContext& context) requires(E == 3);
+  absl::Status Repair(QueryStructure<E>& structure, Refinement<E>& refinement, std::vector<bool>& is_fixed,
+                      const RepairCriteria& criteria, std::vector<bool>& moved, int threads,
+                      RunContext& context) requires(E == 3);
 
-  // The simplices of the mended mesh; with `pump`, of its regular triangulation under pumped weights. Order and form of
-  // the simplices are independent of the number of threads.
+  // The simplices of the repaired mesh; with `pump`, of its regular triangulation under pumped weights. Order and form
+  // of the simplices are independent of the number of threads.
   //
   // Shapes:     output_index: as for ComputeSimplices.
-  // REQUIRES:   no vertex has been added since Mend; or `pump`.
+  // REQUIRES:   no vertex has been added since Repair; or `pump`.
   // Complexity: O(m).
   // Errors:     RESOURCE_EXHAUSTED (memory of the context), CANCELLED, DEADLINE_EXCEEDED.
   absl::StatusOr<WeightedSimplices> ToSimplices(const QueryStructure<D>& structure, const StarLists<D>& stars,
@@ -84,7 +84,7 @@ class SliverStage {
   // What the stage takes in memory.
   uint64_t MemoryBytes() const { return triangulation_.has_value() ? triangulation_->MemoryBytes() : 0; }
   bool HasTriangulation() const { return triangulation_.has_value(); }
-  // Lets go of the triangulation, and of what is left. To be called when the structure changes and Mend will not.
+  // Lets go of the triangulation, and of what is left. To be called when the structure changes and Repair will not.
   void Forget() {
     triangulation_.reset();
     statistics_.slivers_left = 0;

@@ -89,7 +89,7 @@ absl::Status Triangulation<D>::Build(const Box<D>& box, HugeVector<Point<D>> poi
   simplex_of_.assign(points_.size(), kNoSimplex);
   if (simplices.size() > std::numeric_limits<uint32_t>::max()) {
     return absl::ResourceExhaustedError(absl::StrCat("a mesh of ", simplices.size() / (D + 1),
-                                                     " simplices is too large to be mended or pumped; at most ",
+                                                     " simplices is too large to be repaired or pumped; at most ",
                                                      std::numeric_limits<uint32_t>::max() / (D + 1), " are accepted"));
   }
   const size_t count = simplices.size() / (D + 1);
@@ -355,7 +355,7 @@ void Triangulation<D>::Insert(VertexId v, const Point<D>& p, double weight, cons
       Item& other = items_[Index(beyond)];
       other.neighbours[other.SlotOf(s)] = fresh;
     }
-    // So that who turns about a ridge inside the cavity comes upon it.
+    // So that a turn about a ridge inside the cavity comes upon it.
     items_[Index(s)].neighbours[slot] = fresh;
     for (const VertexId u : item.vertices) {
       simplex_of_[Index(u)] = fresh;
@@ -503,7 +503,7 @@ uint32_t Triangulation<D>::Wrap(const Open& open, SimplexId fresh) {
   return best;
 }
 
-// Joins a facet of a new simplex of the hole to the one that waits for it, or has it wait, unless it is on the box.
+// Joins a facet of a new simplex of the hole to the open facet that it closes, or opens it, unless it is on the box.
 template <int D>
 void Triangulation<D>::LinkFacet(SimplexId fresh, const std::array<uint32_t, D + 1>& vertices, int slot) {
   Item& item = items_[Index(fresh)];
@@ -511,10 +511,10 @@ void Triangulation<D>::LinkFacet(SimplexId fresh, const std::array<uint32_t, D +
   const uint64_t key = KeyOf(facet);
   for (size_t k = 0; k < open_.size(); ++k) {
     if (open_keys_[k] == key && open_[k].facet == facet) {
-      const Open waiting = TakeOpen(k);
-      item.neighbours[slot] = waiting.beyond;
-      if (waiting.beyond != kNoSimplex) {
-        items_[Index(waiting.beyond)].neighbours[waiting.beyond_slot] = fresh;
+      const Open open = TakeOpen(k);
+      item.neighbours[slot] = open.beyond;
+      if (open.beyond != kNoSimplex) {
+        items_[Index(open.beyond)].neighbours[open.beyond_slot] = fresh;
       }
       return;
     }

@@ -51,7 +51,7 @@ class Triangulation {
     std::array<VertexId, D + 1> vertices;
     std::array<SimplexId, D + 1> neighbours;
 
-    // One of them is `v`, or `neighbour`. Without jumps, which could not be foretold.
+    // One of them is `v`, or `neighbour`. Without jumps, which could not be predicted.
     int SlotOf(VertexId v) const { return SlotIn(vertices, v); }
     int SlotOf(SimplexId neighbour) const { return SlotIn(neighbours, neighbour); }
 
@@ -181,7 +181,7 @@ class Triangulation {
   void Restore();
 
  private:
-  // A facet that waits for a simplex on its inner side: that of `vertices`, by their numbers in link_, with another
+  // A facet that still lacks the simplex on its inner side: that of `vertices`, by their numbers in link_, with another
   // vertex in `slot`, which is then positively oriented.
   struct Open {
     std::array<uint32_t, D + 1> vertices;
@@ -199,7 +199,7 @@ class Triangulation {
     SimplexId simplex = kNoSimplex;
     LiftedPlane<D> plane;
   };
-  // A power of two; who tries places for a vertex asks for the same few dozen simplices again and again.
+  // A power of two; a search of places for a vertex asks for the same few dozen simplices again and again.
   static constexpr uint32_t kKnownPlanes = 512;
 
   LiftedPlane<D> PlaneOf(const std::array<VertexId, D + 1>& vertices) const;

@@ -331,7 +331,7 @@ void LeafTree<D>::DistributeRange(NodeId parent) {
   for (uint32_t child = 0; child < kChildren; ++child) {
     const NodeId id = Child(At(parent), child);
     if (ranges_[Index(id)].size() != 0 && ranges_[Index(id)].size() <= kLeafCapacity) {
-      // Whoever is beyond the parent has been told by that, unless it was crowded.
+      // Leaves beyond the parent have been told by that, unless it was crowded.
       TellAround(id, is_crowded ? SidesOf(kChildren - 1, kChildren - 1) : SidesOf(child, kChildren - 1 - child));
     }
   }
@@ -421,7 +421,7 @@ void LeafTree<D>::TellAround(NodeId leaf, Sides sides) {
       low |= (x <= -inner ? 1u : 0u) << i;
       high |= (x >= inner ? 1u : 0u) << i;
     }
-    // No branch, since none could be foretold.
+    // No branch, since it could not be predicted.
     near_[count] = p;
     count += (low | high) != 0 ? 1 : 0;
     near_sides |= SidesOf(low, high);

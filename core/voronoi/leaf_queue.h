@@ -16,8 +16,8 @@
 
 namespace wellspace::core {
 
-// A leaf waits in a class with those whose distances round to the same power of two: first come, first served there. As
-// many leaves are opened then as in the order of the distances themselves, and none has to be looked for.
+// A leaf is queued in a class with those whose distances round to the same power of two: first come, first served
+// there. As many leaves are opened then as in the order of the distances themselves, and none has to be looked for.
 //
 // Thread safety: thread-compatible. For one scan; made where it is used, so that what it counts with stays in
 //                registers.
@@ -35,7 +35,7 @@ class LeafQueue {
   // For a scan from a leaf of side `scale`: what is far nearer or far farther than that is in one class.
   WELLSPACE_INLINE LeafQueue(Memory& memory, double scale)
       : memory_(memory), base_(Class(scale * scale) - kNearClasses), last_(kFirstOfClasses) {}
-  WELLSPACE_INLINE bool IsEmpty() const { return waiting_ == 0; }
+  WELLSPACE_INLINE bool IsEmpty() const { return occupied_ == 0; }
 
   // Makes room for so many more.
   WELLSPACE_INLINE void Reserve(size_t more) {
@@ -48,7 +48,7 @@ class LeafQueue {
   // Adds a leaf if it `counts`.
   //
   // REQUIRES:   room for it; distance_sq >= 0.
-  // Complexity: O(1), without a branch, since none could be foretold.
+  // Complexity: O(1), without a branch, since it could not be predicted.
   WELLSPACE_INLINE void PushIf(bool counts, double distance_sq, NodeId leaf) {
     const auto at = static_cast<size_t>(std::clamp<int64_t>(Class(distance_sq) - base_, 0, kClasses - 1));
     const uint32_t one = counts ? 1 : 0;
@@ -56,7 +56,7 @@ class LeafQueue {
     entries_[end_] = {distance_sq, leaf, 0};
     entries_[last].next = end_;
     last_[at] = last ^ ((last ^ end_) & -one);
-    waiting_ |= one << at;
+    occupied_ |= one << at;
     end_ += one;
   }
 
@@ -65,13 +65,13 @@ class LeafQueue {
   // REQUIRES:   not empty.
   // Complexity: O(1).
   WELLSPACE_INLINE Entry Pop() {
-    const auto at = static_cast<uint32_t>(std::countr_zero(waiting_));
+    const auto at = static_cast<uint32_t>(std::countr_zero(occupied_));
     const uint32_t first = entries_[at].next;
     const uint32_t last = last_[at];
     const uint32_t was_last = last == first ? 1 : 0;
     entries_[at].next = entries_[first].next;
     last_[at] = last ^ ((last ^ at) & -was_last);
-    waiting_ ^= was_last << at;
+    occupied_ ^= was_last << at;
     return entries_[first];
   }
 
@@ -96,7 +96,7 @@ class LeafQueue {
   Entry* entries_ = memory_.data();
   size_t room_ = memory_.size();
   const int64_t base_;
-  uint32_t waiting_ = 0;                 // by class, a bit for whether any wait
+  uint32_t occupied_ = 0;                // by class, a bit for whether any leaf is queued
   uint32_t end_ = kClasses;              // of the entries
   std::array<uint32_t, kClasses> last_;  // by class, in entries_
 };

@@ -153,13 +153,13 @@ absl::Status QueryStructure<D>::Initialize(const MortonGrid<D>& grid, HugeVector
 
 template <int D>
 VertexId QueryStructure<D>::AddVertex(VertexId near, const Point<D>& p) {
-  const VertexId v = AddWaiting(near, p);
-  AdmitWaiting();
+  const VertexId v = AddUncommitted(near, p);
+  CommitAll();
   return v;
 }
 
 template <int D>
-VertexId QueryStructure<D>::AddWaiting(VertexId near, const Point<D>& p) {
+VertexId QueryStructure<D>::AddUncommitted(VertexId near, const Point<D>& p) {
   const VertexId v{vertex_count_};
   points_[vertex_count_] = p;
   faces_[vertex_count_] = static_cast<StoredFaces>(box_.FacesOf(p));
@@ -169,7 +169,7 @@ VertexId QueryStructure<D>::AddWaiting(VertexId near, const Point<D>& p) {
 }
 
 template <int D>
-void QueryStructure<D>::AdmitWaiting() {
+void QueryStructure<D>::CommitAll() {
   for (size_t i = 0; i < near_.size(); ++i) {
     PrefetchAhead(std::span(near_), i, [this](VertexId near, int step) { Prefetch(near, step); });
     const VertexId v{tree_.vertex_count()};
@@ -181,15 +181,15 @@ void QueryStructure<D>::AdmitWaiting() {
 
 template <int D>
 void QueryStructure<D>::MakeRoom() {
-  const size_t needed = vertex_count_ + kMostWaiting;
+  const size_t needed = vertex_count_ + kMostUncommitted;
   if (points_.size() < needed) {
-    points_.resize(needed + kMostWaiting);
-    faces_.resize(needed + kMostWaiting);
+    points_.resize(needed + kMostUncommitted);
+    faces_.resize(needed + kMostUncommitted);
   }
 }
 
 template <int D>
-void QueryStructure<D>::CutByWaiting(VertexId v, Polytope<D>& cell) const {
+void QueryStructure<D>::CutByUncommitted(VertexId v, Polytope<D>& cell) const {
   for (uint32_t u = tree_.vertex_count(); u < vertex_count_ && !cell.IsTooLarge(); ++u) {
     if (VertexId{u} != v) {
       cell.CutBeforePlace(VertexId{u}, points_[u]);
@@ -197,20 +197,20 @@ void QueryStructure<D>::CutByWaiting(VertexId v, Polytope<D>& cell) const {
   }
 }
 
-// `near`, or what it was added near to if it waits.
+// `near`, or what it was added near to if it is uncommitted.
 template <int D>
-VertexId QueryStructure<D>::Admitted(VertexId near) const {
+VertexId QueryStructure<D>::CommittedNear(VertexId near) const {
   while (near != kNoVertex && Index(near) >= tree_.vertex_count()) {
     near = near_[Index(near) - tree_.vertex_count()];
   }
   return near;
 }
 
-// The leaf that `v` lies in; of one that waits, walked to.
+// The leaf that `v` lies in; of an uncommitted one, walked to.
 template <int D>
 NodeId QueryStructure<D>::LeafOf(VertexId v) const {
-  const VertexId admitted = Admitted(v);
-  return admitted == v ? tree_.leaf_of(v) : tree_.LeafHolding(admitted, point(v));
+  const VertexId committed = CommittedNear(v);
+  return committed == v ? tree_.leaf_of(v) : tree_.LeafHolding(committed, point(v));
 }
 
 template <int D>
@@ -261,7 +261,7 @@ WELLSPACE_INLINE void QueryStructure<D>::ScanOutwardWith(const Point<D>& site, N
   uint32_t* const seen = workspace.seen.data();
   const uint32_t query = workspace.query;
   seen[Index(own)] = query;
-  LeafQueue queue(workspace.waiting_leaves, tree_.SideOf(own));
+  LeafQueue queue(workspace.queued_leaves, tree_.SideOf(own));
   queue.Reserve(1);
   queue.PushIf(true, 0, own);
   uint64_t leaves = 0;
@@ -275,11 +275,11 @@ WELLSPACE_INLINE void QueryStructure<D>::ScanOutwardWith(const Point<D>& site, N
     open(next.leaf);
     limit_sq = reach_sq();
     queue.Reserve(LeafTree<D>::kMostFaceNeighbours + 1);
-    // Whoever is within reach is so by leaves that are, too: those on the straight line from the site.
+    // A leaf within reach is reached by leaves that are, too: those on the straight line from the site.
     const uint32_t facets = Cube(from, tree_, next.leaf).FacetsWithin(limit_sq);
     tree_.ForEachBeyondFacets(
         next.leaf, facets, [&](NodeId beyond) __attribute__((always_inline)) {
-          // No branch, since none could be foretold.
+          // No branch, since it could not be predicted.
           const bool is_new = seen[Index(beyond)] != query;
           seen[Index(beyond)] = query;
           const double distance_sq = Cube(from, tree_, beyond).DistanceSq();
@@ -321,7 +321,7 @@ Neighbor QueryStructure<D>::NearestWithin(VertexId v, double limit_sq, Workspace
 
 template <int D>
 Neighbor QueryStructure<D>::NearestTo(const Point<D>& p, VertexId near, Workspace<D>& workspace) const {
-  return Nearest(p, tree_.LeafHolding(Admitted(near), p), kNoVertex, std::numeric_limits<double>::infinity(),
+  return Nearest(p, tree_.LeafHolding(CommittedNear(near), p), kNoVertex, std::numeric_limits<double>::infinity(),
                  workspace);
 }
 
@@ -347,7 +347,7 @@ void QueryStructure<D>::NearestOfEach(NodeId leaf, Workspace<D>& workspace, std:
       continue;
     }
     if (std::has_single_bit(facets) && nearest.distance_sq <= (depth + half) * (depth + half)) {
-      // Whoever is as near lies in the leaves beyond, which are half as large at least.
+      // A vertex that is as near lies in the leaves beyond, which are half as large at least.
       tree_.ForEachBeyondFacets(leaf, facets, [&](NodeId other) { LookInto<D>(tree_, other, p, kNoVertex, nearest); });
     } else {
       nearest = FindBeyond(p, leaf, nearest, workspace);

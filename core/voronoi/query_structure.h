@@ -44,7 +44,7 @@ struct Workspace {
   // Private to the queries.
   HugeVector<uint32_t> seen;  // by tree node: the query that last met it
   uint32_t query = 0;
-  LeafQueue::Memory waiting_leaves;
+  LeafQueue::Memory queued_leaves;
   GatheredVertices<D> gathered;        // while cells of several vertices are computed
   VectorUnit unit = BestVectorUnit();  // leaves are met with
 };
@@ -54,14 +54,14 @@ struct Neighbor {
   double distance_sq = 0;
 };
 
-// Thread safety: thread-compatible; queries with different workspaces may run at once, and AddWaiting beside them;
+// Thread safety: thread-compatible; queries with different workspaces may run at once, and AddUncommitted beside them;
 // AddVertex and the rest alone.
 // Invariants: (1) vertices are distinct and lie in the box; (2) faces(v) are exactly the faces of the box that v lies
 // on.
 template <int D>
 class QueryStructure {
  public:
-  static constexpr uint32_t kMostWaiting = 2048;
+  static constexpr uint32_t kMostUncommitted = 2048;
 
   // Builds the structure for `points`, then adds the corners of the box that are not among them.
   //
@@ -92,7 +92,7 @@ class QueryStructure {
 
   // Of each vertex of a leaf, in the order of its bucket, the squared distance to the nearest other one.
   //
-  // REQUIRES:   `nearest_sq` is as long as the bucket; nobody waits.
+  // REQUIRES:   `nearest_sq` is as long as the bucket; no vertex is uncommitted.
   // Complexity: O(1) for each when bottom-up.
   // Errors:     none.
   void NearestOfEach(NodeId leaf, Workspace<D>& workspace, std::span<double> nearest_sq) const;
@@ -137,7 +137,7 @@ class QueryStructure {
   // the order of the Z curve or of leaves: what is around some of them is gathered once (GatheredVertices).
   //
   // Guarantees: (1) the cells are those of ClippedVoronoi, but for the numbers of their nodes and planes.
-  // REQUIRES:   beta > 0; no site waits; there is another vertex. take() does not change the structure.
+  // REQUIRES:   beta > 0; no site is uncommitted; there is another vertex. take() does not change the structure.
   template <typename Take>
   void ClippedVoronoiOfEach(std::span<const VertexId> sites, double beta, Workspace<D>& workspace, Take take,
                             TieRule rule = TieRule::kKeep) const {
@@ -154,8 +154,8 @@ class QueryStructure {
     }
   }
 
-  // The same clipped by a box, which holds v up to rounding, ties perturbed, for whoever may not need the nodes: they
-  // are still to be placed, by cell.Place(). The cell is cut by `others`, too.
+  // The same clipped by a box, which holds v up to rounding, ties perturbed, for callers that may not need the nodes:
+  // they are still to be placed, by cell.Place(). The cell is cut by `others`, too.
   void UnplacedClippedVoronoi(VertexId v, const Box<D>& clip, Workspace<D>& workspace,
                               const ExtraVertices<D>& others = {}) const;
 
@@ -190,27 +190,27 @@ class QueryStructure {
   // Source:     [HT08] Figure 3, ADDVERTEX.
   VertexId AddVertex(VertexId near, const Point<D>& p);
 
-  // The same, but the vertex waits: queries find it only once it has been admitted, be it queries of others that wait,
-  // and meanwhile queries of vertices that do not wait may run.
+  // The same, but the vertex is uncommitted: no query finds it before CommitAll, be it that of another uncommitted one,
+  // and meanwhile queries of vertices that are committed may run.
   //
-  // REQUIRES:   fewer than kMostWaiting wait.
+  // REQUIRES:   fewer than kMostUncommitted vertices are uncommitted.
   // Complexity: O(1).
   // Errors:     none.
-  VertexId AddWaiting(VertexId near, const Point<D>& p);
+  VertexId AddUncommitted(VertexId near, const Point<D>& p);
 
-  // Admits the vertices that wait, in the order in which they were added.
+  // Commits the uncommitted vertices, in the order in which they were added.
   //
   // Complexity: that of AddVertex for each.
   // Errors:     none.
-  void AdmitWaiting();
+  void CommitAll();
 
-  // Cuts the cell of `v` by the vertices that wait.
+  // Cuts the cell of `v` by the uncommitted vertices.
   //
-  // Complexity: O(1) for each that waits, and the cuts.
+  // Complexity: O(1) for each of these, and the cuts.
   // Errors:     none.
-  void CutByWaiting(VertexId v, Polytope<D>& cell) const;
+  void CutByUncommitted(VertexId v, Polytope<D>& cell) const;
 
-  uint32_t waiting_count() const { return vertex_count_ - tree_.vertex_count(); }
+  uint32_t uncommitted_count() const { return vertex_count_ - tree_.vertex_count(); }
 
   // Puts vertex `v` at `p`.
   //
@@ -220,7 +220,7 @@ class QueryStructure {
   void MoveVertex(VertexId v, const Point<D>& p);
 
   const Box<D>& box() const { return box_; }
-  // Those that wait, too.
+  // Uncommitted ones, too.
   uint32_t vertex_count() const { return vertex_count_; }
   // How many Initialize has left: the points and the corners of the box.
   uint32_t built_count() const { return built_count_; }
@@ -238,7 +238,7 @@ class QueryStructure {
   using StoredFaces = std::conditional_t<(2 * D <= 8), uint8_t, FaceMask>;
 
   void MakeRoom();
-  VertexId Admitted(VertexId near) const;
+  VertexId CommittedNear(VertexId near) const;
   NodeId LeafOf(VertexId v) const;
   void BeginWalk(Workspace<D>& workspace) const;
   // Calls open(leaf) for leaves outward from `own`, which holds `site`: as long as reach_sq() says for those whose
@@ -271,10 +271,10 @@ class QueryStructure {
   uint32_t vertex_count_ = 0;
   uint32_t given_count_ = 0;  // to Initialize
   uint32_t built_count_ = 0;
-  // By vertex, with room for those that are to wait, so that nothing moves when one is added.
+  // By vertex, with room for those that will be uncommitted, so that nothing moves when one is added.
   HugeVector<Point<D>> points_;
   HugeVector<StoredFaces> faces_;
-  std::vector<VertexId> near_;  // of those that wait: what they were added near to
+  std::vector<VertexId> near_;  // of the uncommitted vertices: what they were added near to
 };
 
 }  // namespace wellspace::core

@@ -111,14 +111,15 @@ struct ReferenceScan {
 };
 
 // The Voronoi cell of `v` in the box, clipped by the cube of half side `radius` about v, like
-// QueryStructure::ClippedVoronoi, by the paper's scan: leaves and vertices wait in one queue and are taken in the order
-// of d_v^U, U the vertices taken so far.
+// QueryStructure::ClippedVoronoi, by the paper's scan: leaves and vertices are put into one queue and are taken in the
+// order of d_v^U, U the vertices taken so far.
 //
 // The paper clips by the ball of radius t about v and knows no box. Here the centres of balls are confined to the box
 // and the cube, so that d_v^U is finite for just the balls about points x of the clipped cell; the scan ends when no
-// finite distance waits. Since the cube holds the ball of its half side, what the paper's scan opens up to a clipping
-// distance t <= radius are the visits with diameter < 2 t: a beginning of this scan. (The paper compares diameters
-// with t_max = beta NN(v); for centres up to beta NN(v) away, as its Definition 2 has them, it must be twice that.)
+// finite distance is queued. Since the cube holds the ball of its half side, what the paper's scan opens up to a
+// clipping distance t <= radius are the visits with diameter < 2 t: a beginning of this scan. (The paper compares
+// diameters with t_max = beta NN(v); for centres up to beta NN(v) away, as its Definition 2 has them, it must be twice
+// that.)
 //
 // REQUIRES:   radius > 0.
 // Guarantees: (1) the cell is that of ClippedVoronoi, up to the order of planes and nodes; (2) a leaf is opened only if
@@ -127,7 +128,7 @@ struct ReferenceScan {
 // Complexity: O(k log k) queue operations for k leaves and vertices met, a program or more each; measured, 30 to 130
 //             times the time of ClippedVoronoi for D = 2 and 3. For tests.
 // Errors:     none.
-// Source:     [HT08] Figure 6. A distance that waits was computed with an earlier U, so it can only have grown; it is
+// Source:     [HT08] Figure 6. A distance in the queue was computed with an earlier U, so it can only have grown; it is
 //             brought up to date when it comes first. Squares are neighbours through facets alone, as in
 //             ClippedVoronoi.
 template <int D>

@@ -14,9 +14,9 @@ namespace {
 constexpr size_t kLeastShare = 8;
 
 template <typename Pairs>
-void MakeUnique(Pairs& late) {
-  std::sort(late.begin(), late.end());
-  late.erase(std::unique(late.begin(), late.end()), late.end());
+void MakeUnique(Pairs& stale) {
+  std::sort(stale.begin(), stale.end());
+  stale.erase(std::unique(stale.begin(), stale.end()), stale.end());
 }
 
 }  // namespace
@@ -43,24 +43,24 @@ void StarLists<D>::Set(VertexId v, std::span<const std::array<VertexId, D>> star
   const uint32_t added_at = AddedAt(v);
   const Entry* const entries = entries_.data();
   std::array<VertexId, D>* const listed = listed_.data() + begin;
-  VertexId* const late = neighbours_.data();
-  size_t late_count = 0;
+  VertexId* const stale = neighbours_.data();
+  size_t stale_count = 0;
   uint32_t count = 0;
   for (const std::array<VertexId, D>& simplex : star) {
-    // No branch, since none could be foretold.
+    // No branch, since it could not be predicted.
     uint32_t last_look = 0;
     for (const VertexId u : simplex) {
       const uint32_t look = entries[Index(u)].begin;
       last_look = std::max(last_look, look);
-      late[late_count] = u;
-      late_count += added_at > look ? 1 : 0;
+      stale[stale_count] = u;
+      stale_count += added_at > look ? 1 : 0;
     }
     listed[count] = simplex;
     count += last_look != kNone ? 1 : 0;
   }
   listed_.resize(begin + count);
-  if (late_count != 0) {
-    NoteLate(v, std::span(neighbours_).first(late_count));
+  if (stale_count != 0) {
+    NoteStale(v, std::span(neighbours_).first(stale_count));
   }
   unused_ += std::exchange(entries_[Index(v)], {begin, count}).count;
   if (unused_ > listed_.size() / 2 && kLeastShare * unused_ > entries_.size()) {
@@ -68,13 +68,13 @@ void StarLists<D>::Set(VertexId v, std::span<const std::array<VertexId, D>> star
   }
 }
 
-// Puts down that `v` is late at neighbours, of whom some are given more than once.
+// Notes that the lists of neighbours are stale since `v` came; some neighbours are given more than once.
 template <int D>
-void StarLists<D>::NoteLate(VertexId v, std::span<const VertexId> neighbours) {
-  const auto begin = static_cast<std::ptrdiff_t>(late_.size());
+void StarLists<D>::NoteStale(VertexId v, std::span<const VertexId> neighbours) {
+  const auto begin = static_cast<std::ptrdiff_t>(stale_.size());
   for (const VertexId u : neighbours) {
-    if (std::find(late_.begin() + begin, late_.end(), LatePair(u, v)) == late_.end()) {
-      late_.emplace_back(u, v);
+    if (std::find(stale_.begin() + begin, stale_.end(), StalePair(u, v)) == stale_.end()) {
+      stale_.emplace_back(u, v);
     }
   }
 }
@@ -113,39 +113,38 @@ void StarLists<D>::DropUnused() {
   std::fill(added, added_.end(), static_cast<uint32_t>(listed.size()));
   listed_ = std::move(listed);
   unused_ = 0;
-  std::erase_if(late_, [this](const LatePair& pair) { return !CameAfter(pair.second, pair.first); });
-  MakeUnique(late_);
+  std::erase_if(stale_, [this](const StalePair& pair) { return !CameAfter(pair.second, pair.first); });
+  MakeUnique(stale_);
 }
 
 template <int D>
-absl::StatusOr<LateNeighbours> LateNeighbours::Of(const StarLists<D>& lists, uint32_t vertex_count,
-                                                  const RunContext& context) {
+absl::StatusOr<StaleStars> StaleStars::Of(const StarLists<D>& lists, uint32_t vertex_count, const RunContext& context) {
   WELLSPACE_RETURN_IF_ERROR(context.Check());
-  LateNeighbours found;
-  std::vector<LatePair>& late = found.late_;
-  // Who has been looked at again since then knows them.
-  std::copy_if(lists.late().begin(), lists.late().end(), std::back_inserter(late),
-               [&](const LatePair& pair) { return lists.CameAfter(pair.second, pair.first); });
-  MakeUnique(late);
+  StaleStars found;
+  std::vector<StalePair>& stale = found.stale_;
+  // A vertex that has been looked at again since then is stale no longer.
+  std::copy_if(lists.stale().begin(), lists.stale().end(), std::back_inserter(stale),
+               [&](const StalePair& pair) { return lists.CameAfter(pair.second, pair.first); });
+  MakeUnique(stale);
   found.is_at_.resize(vertex_count);
-  for (const LatePair& pair : late) {
+  for (const StalePair& pair : stale) {
     found.is_at_[Index(pair.first)] = true;
   }
   return found;
 }
 
-std::span<const LatePair> LateNeighbours::At(VertexId v) const {
+std::span<const StalePair> StaleStars::At(VertexId v) const {
   if (!is_at_[Index(v)]) {
     return {};
   }
-  const auto begin = std::lower_bound(late_.begin(), late_.end(), LatePair(v, VertexId{0}));
-  const auto end = std::find_if(begin, late_.end(), [v](const LatePair& pair) { return pair.first != v; });
+  const auto begin = std::lower_bound(stale_.begin(), stale_.end(), StalePair(v, VertexId{0}));
+  const auto end = std::find_if(begin, stale_.end(), [v](const StalePair& pair) { return pair.first != v; });
   return {begin, end};
 }
 
 #define WELLSPACE_INSTANTIATE(D) \
   template class StarLists<D>;   \
-  template absl::StatusOr<LateNeighbours> LateNeighbours::Of<D>(const StarLists<D>&, uint32_t, const RunContext&);
+  template absl::StatusOr<StaleStars> StaleStars::Of<D>(const StarLists<D>&, uint32_t, const RunContext&);
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 

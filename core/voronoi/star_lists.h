@@ -21,15 +21,15 @@
 
 namespace wellspace::core {
 
-// A vertex, and one that was added after it was last looked at.
-using LatePair = std::pair<VertexId, VertexId>;
+// A vertex whose list is stale, and the neighbour that makes it so: that was added after the vertex was last looked at.
+using StalePair = std::pair<VertexId, VertexId>;
 
 // For each vertex, of the star that it had when it was last looked at, the simplices whose vertices had all been looked
 // at before. As vertices are only added, what is a simplex in the end has been one since the last of its vertices came:
 // so the vertex that was looked at last lists it. What it lists beside is spoiled by a vertex that came later, which is
-// a neighbour in the end, and so has been one since it came: that is put down when it is looked at. What is listed
-// depends on the stars and on the order in which they were looked at, and, but for the order within a list, not on how
-// they were computed.
+// a neighbour in the end, and so has been one since it came: when that is looked at, the list is noted as stale. What
+// is listed depends on the stars and on the order in which they were looked at, and, but for the order within a list,
+// not on how they were computed.
 //
 // Thread safety: thread-compatible; const functions may run at once.
 template <int D>
@@ -89,11 +89,11 @@ class StarLists {
 
   // All pairs of a vertex that lists something and a neighbour that came after its last look, when that was looked at;
   // and others, some of them twice.
-  std::span<const LatePair> late() const { return late_; }
+  std::span<const StalePair> stale() const { return stale_; }
 
   uint64_t MemoryBytes() const {
     return entries_.size() * sizeof(Entry) + added_.size() * sizeof(uint32_t) +
-           listed_.size() * sizeof(std::array<VertexId, D>) + late_.size() * sizeof(LatePair);
+           listed_.size() * sizeof(std::array<VertexId, D>) + stale_.size() * sizeof(StalePair);
   }
 
  private:
@@ -108,12 +108,12 @@ class StarLists {
 
   bool Has(VertexId v) const { return entries_[Index(v)].begin != kNone; }
   uint32_t AddedAt(VertexId v) const {
-    // No branch, since none could be foretold.
+    // No branch, since it could not be predicted.
     const uint32_t is_new = Index(v) >= first_count_ ? 1 : 0;
     return added_[(Index(v) - first_count_ + 1) & -is_new];
   }
   void DropUnused();
-  void NoteLate(VertexId v, std::span<const VertexId> neighbours);
+  void NoteStale(VertexId v, std::span<const VertexId> neighbours);
 
   HugeVector<Entry> entries_;  // by vertex
   // In the order of the looks, which is thus that of the places where lists begin.
@@ -123,33 +123,33 @@ class StarLists {
   // First 0, for vertices below first_count_; then of each vertex from there on the size of listed_ at the next look
   // after it was added: lists that were made before begin below, unless they are empty.
   HugeVector<uint32_t> added_;
-  HugeVector<LatePair> late_;         // in the order of the looks, but for those before the last DropUnused
+  HugeVector<StalePair> stale_;       // in the order of the looks, but for those before the last DropUnused
   std::vector<VertexId> neighbours_;  // scratch of Set
   bool is_complete_ = true;
 };
 
-// The neighbours of a vertex that came after it was last looked at: what it lists may be spoiled by these, and by
-// nobody else.
+// Which lists are stale in the end: the neighbours of a vertex that came after it was last looked at. What it lists may
+// be spoiled by these, and by no other vertex.
 //
 // Thread safety: thread-compatible; const functions may run at once.
-class LateNeighbours {
+class StaleStars {
  public:
   // REQUIRES:   all of the `vertex_count` vertices have been looked at.
-  // Complexity: O(vertices / 64), and sorting those who are late.
+  // Complexity: O(vertices / 64), and sorting the pairs.
   // Errors:     CANCELLED, DEADLINE_EXCEEDED.
   template <int D>
-  static absl::StatusOr<LateNeighbours> Of(const StarLists<D>& lists, uint32_t vertex_count, const RunContext& context);
+  static absl::StatusOr<StaleStars> Of(const StarLists<D>& lists, uint32_t vertex_count, const RunContext& context);
 
-  // Those at `v`, each behind v.
+  // The pairs of `v`, each v and a neighbour that came later.
   //
   // Complexity: O(1) if there are none, else O(log of all).
-  std::span<const LatePair> At(VertexId v) const;
+  std::span<const StalePair> At(VertexId v) const;
 
-  uint64_t MemoryBytes() const { return is_at_.size() / 8 + late_.size() * sizeof(LatePair); }
+  uint64_t MemoryBytes() const { return is_at_.size() / 8 + stale_.size() * sizeof(StalePair); }
 
  private:
-  std::vector<bool> is_at_;     // by vertex: whether anyone is late there
-  std::vector<LatePair> late_;  // ascending, each once
+  std::vector<bool> is_at_;       // by vertex: whether its list is stale
+  std::vector<StalePair> stale_;  // ascending, each once
 };
 
 }  // namespace wellspace::core

@@ -105,7 +105,7 @@ v1::MeshStatistics StatisticsToProto(const core::MeshStatistics& statistics) {
     slivers->set_moves(statistics.sliver_moves);
     slivers->set_added_vertices(statistics.sliver_vertices);
     slivers->set_weighted_vertices(statistics.weighted_vertices);
-    slivers->set_min_angle_before_deg(statistics.unmended_min_angle_deg);
+    slivers->set_min_angle_before_deg(statistics.min_angle_before_deg);
     SetLeftSlivers(statistics, *slivers);
   }
 

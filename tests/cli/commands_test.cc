@@ -348,7 +348,7 @@ TEST_F(CommandsTest, DemandsThatCannotBeMetAreRefusedAtOnce) {
       AllOf(HasSubstr("only 1e-06 thick along axis 2"), HasSubstr("the smallest thickness that fits is about ")));
 }
 
-TEST_F(CommandsTest, SliversAreMendedOrPumpedAway) {
+TEST_F(CommandsTest, SliversAreRepairedOrPumpedAway) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(0, 1);
   std::string cloud;
@@ -357,18 +357,18 @@ TEST_F(CommandsTest, SliversAreMendedOrPumpedAway) {
         std::to_string(unit(random)) + "," + std::to_string(unit(random)) + "," + std::to_string(unit(random)) + "\n";
   }
   const auto statistics = [this] { return nlohmann::json::parse(folder_.Read("stats.json")); };
-  Mesh(cloud, "mended.vtu", {"--stats", Path("stats.json")});
+  Mesh(cloud, "repaired.vtu", {"--stats", Path("stats.json")});
   EXPECT_EQ(statistics()["triangulation"], "delaunay");
   EXPECT_GT(statistics()["slivers"]["moves"], 0);
   EXPECT_LT(statistics()["slivers"]["min_angle_before_deg"], 12);
   EXPECT_GE(statistics()["min_dihedral_deg"], 12);
-  const RunResult mended = RunWellspace(
-      {"check", Path("mended.vtu"), "--rho", "2", "--min-dihedral", "11.999", "--plot", Path("quality.svg")});
-  EXPECT_EQ(mended.exit_code, 0) << mended.out << mended.err;
-  EXPECT_THAT(mended.out, AllOf(HasSubstr("below 12\u00b0                0 (0.0000 %)"), Not(HasSubstr("regular"))));
+  const RunResult repaired = RunWellspace(
+      {"check", Path("repaired.vtu"), "--rho", "2", "--min-dihedral", "11.999", "--plot", Path("quality.svg")});
+  EXPECT_EQ(repaired.exit_code, 0) << repaired.out << repaired.err;
+  EXPECT_THAT(repaired.out, AllOf(HasSubstr("below 12\u00b0                0 (0.0000 %)"), Not(HasSubstr("regular"))));
   EXPECT_THAT(folder_.Read("quality.svg"), AllOf(testing::StartsWith("<?xml"), HasSubstr("</svg>")));
-  EXPECT_EQ(RunWellspace({"check", Path("mended.vtu"), "--min-dihedral", "40"}).exit_code, 1);
-  const RunResult bad_plot = RunWellspace({"check", Path("mended.vtu"), "--plot", Path("quality.pdf")});
+  EXPECT_EQ(RunWellspace({"check", Path("repaired.vtu"), "--min-dihedral", "40"}).exit_code, 1);
+  const RunResult bad_plot = RunWellspace({"check", Path("repaired.vtu"), "--plot", Path("quality.pdf")});
   EXPECT_EQ(bad_plot.exit_code, 2);
   EXPECT_THAT(bad_plot.err, HasSubstr("expected a picture .png or .svg"));
 

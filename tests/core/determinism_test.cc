@@ -40,7 +40,7 @@ std::vector<GoldenMesh> GoldenMeshes() {
       {"cospherical_2", "cospherical", 2, 500, {}, 893, 0x68acc49762387a78},
       {"uniform_2_sized", "uniform", 2, 100, {.max_circumradius = 0.02}, 1719, 0x5561938b0a9105b9},
       {"uniform_3", "uniform", 3, 1000, {}, 3676, 0x2b758241cb8466d1},
-      {"uniform_3_unmended", "uniform", 3, 1000, {.min_dihedral = 0}, 3655, 0x92639b398bd61187},
+      {"uniform_3_unrepaired", "uniform", 3, 1000, {.min_dihedral = 0}, 3655, 0x92639b398bd61187},
       {"uniform_3_well_spaced", "uniform", 3, 300, {.criterion = Criterion::kWellSpaced}, 2245, 0x498a2f6183bfe5ba},
       {"grid_3", "grid", 3, 1000, {}, 1306, 0x1b258c979a281c81},
       {"rounded_3", "rounded", 3, 1000, {}, 3438, 0x73f60d80f631045d},

@@ -31,8 +31,8 @@ constexpr double kNone = std::numeric_limits<double>::infinity();
 // The clip of a cell relative to the longest edge of its bucket.
 double ClipFactor(double rho) { return std::max(4.0, 1.25 * rho); }
 
-// Definition 1 (2): nothing waits whose edge is shorter than this times the one that asks. At vertices of faces, which
-// may learn of a new vertex late, it is less, and in proportion to the reach of a cell.
+// Definition 1 (2): nothing is pending whose edge is shorter than this times the one that asks. At vertices of faces,
+// which may learn of a new vertex late, it is less, and in proportion to the reach of a cell.
 constexpr double kGamma = 1 / std::numbers::sqrt2;
 constexpr double kGammaOuter = 0.25 / std::numbers::sqrt2;
 constexpr double kGammaFace = 0.5 / std::numbers::sqrt2;
@@ -116,8 +116,8 @@ SizeConstants<D> SizeConstants<D>::Of(const MeshCriteria<D>& criteria) {
 }
 
 template <int D>
-Waiting ShortestWaiting(const QueryStructure<D>& structure, const MeshCriteria<D>& criteria) {
-  Waiting waiting;
+PendingEdges ShortestPending(const QueryStructure<D>& structure, const MeshCriteria<D>& criteria) {
+  PendingEdges pending;
   Polytope<D> cell;
   std::vector<std::pair<double, uint32_t>> others;
   for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
@@ -134,21 +134,21 @@ Waiting ShortestWaiting(const QueryStructure<D>& structure, const MeshCriteria<D
         is_circumcenter = false;
         if (((structure.faces(VertexId{v}) >> plane.face) & 1) == 0) {
           const double distance = structure.box().DistanceToFace(structure.point(VertexId{v}), plane.face);
-          if (distance < waiting.face.length) {
-            waiting.face = {distance, v};
+          if (distance < pending.face.length) {
+            pending.face = {distance, v};
           }
         }
       }
       if (criteria.criterion == Criterion::kWellSpaced) {
         edge = nearest;
       }
-      Waiting::Edge& shortest = structure.faces(VertexId{v}) == 0 ? waiting.inner : waiting.outer;
+      PendingEdges::Edge& shortest = structure.faces(VertexId{v}) == 0 ? pending.inner : pending.outer;
       if (is_circumcenter && std::sqrt(node.radius_sq) > criteria.rho * edge * (1 + 1e-9) && edge < shortest.length) {
         shortest = {edge, v};
       }
     }
   }
-  return waiting;
+  return pending;
 }
 
 template <int D>
@@ -180,13 +180,13 @@ void GuaranteeChecker<D>::Observe(const QueryStructure<D>& structure, const Inse
   }
   CheckSize(structure, insertion);
   CheckPlace(structure, insertion);
-  if (has_waiting_) {
+  if (has_pending_) {
     CheckOrder(insertion);
   }
-  has_waiting_ = ++seen_.insertions >= next_sample_;
-  if (has_waiting_) {
+  has_pending_ = ++seen_.insertions >= next_sample_;
+  if (has_pending_) {
     next_sample_ = seen_.insertions + std::max(stride_, seen_.insertions / 2);
-    waiting_ = ShortestWaiting<D>(structure, criteria_);
+    pending_ = ShortestPending<D>(structure, criteria_);
   }
 }
 
@@ -285,19 +285,19 @@ template <int D>
 void GuaranteeChecker<D>::CheckOrder(const Insertion& insertion) {
   const double edge = std::min(std::sqrt(insertion.edge_sq), std::sqrt(insertion.edge_limit_sq));
   ++seen_.orders;
-  const auto expect = [&](const Waiting::Edge& waiting, double gamma, const char* what) {
-    Expect(waiting.length >= gamma * edge * (1 - 1e-9), insertion, "an edge of ", edge, " asked, while vertex ",
-           waiting.vertex, " waited for ", what, " ", waiting.length);
+  const auto expect = [&](const PendingEdges::Edge& pending, double gamma, const char* what) {
+    Expect(pending.length >= gamma * edge * (1 - 1e-9), insertion, "an edge of ", edge, " asked, while vertex ",
+           pending.vertex, " was pending for ", what, " ", pending.length);
   };
-  expect(waiting_.inner, kGamma, "one of");
-  expect(waiting_.outer, kGammaOuter / ClipFactor(criteria_.rho), "one of");
-  expect(waiting_.face, kGammaFace, "a face at");
+  expect(pending_.inner, kGamma, "one of");
+  expect(pending_.outer, kGammaOuter / ClipFactor(criteria_.rho), "one of");
+  expect(pending_.face, kGammaFace, "a face at");
 }
 
 #define WELLSPACE_INSTANTIATE(D)                                                                \
   template double FeatureSize<D>(const Box<D>&, const std::vector<Point<D>>&, const Point<D>&); \
   template struct SizeConstants<D>;                                                             \
-  template Waiting ShortestWaiting<D>(const QueryStructure<D>&, const MeshCriteria<D>&);        \
+  template PendingEdges ShortestPending<D>(const QueryStructure<D>&, const MeshCriteria<D>&);   \
   template class GuaranteeChecker<D>
 WELLSPACE_INSTANTIATE(2);
 WELLSPACE_INSTANTIATE(3);

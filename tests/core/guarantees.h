@@ -27,7 +27,7 @@ struct SizeConstants {
 };
 
 // What Definition 1 (2) is about: the shortest edge that a vertex asks for something by.
-struct Waiting {
+struct PendingEdges {
   struct Edge {
     double length = std::numeric_limits<double>::infinity();
     uint32_t vertex = 0;
@@ -39,7 +39,7 @@ struct Waiting {
 
 // The least of each over all vertices, from whole cells by brute force.
 template <int D>
-Waiting ShortestWaiting(const core::QueryStructure<D>& structure, const core::MeshCriteria<D>& criteria);
+PendingEdges ShortestPending(const core::QueryStructure<D>& structure, const core::MeshCriteria<D>& criteria);
 
 // An observer of refinements. The first guarantee that does not hold is kept in violation().
 template <int D>
@@ -81,8 +81,8 @@ class GuaranteeChecker {
   const SizeConstants<D> constants_;
   std::vector<core::Point<D>> features_;
   std::vector<Origin> origins_;
-  Waiting waiting_;
-  bool has_waiting_ = false;
+  PendingEdges pending_;
+  bool has_pending_ = false;
   std::string violation_;
   Seen seen_;
 };

@@ -90,7 +90,7 @@ TYPED_TEST(GuaranteesTest, AtEveryInsertionBelowTheLeastRho) {
 // Vertices of faces have nodes there that ask for nothing until a new vertex comes near; then their short edges are
 // served soon: in the lower half of the next bucket at the latest. (Without the memory of these edges the worst was
 // 0.26, with it 0.69.)
-TYPED_TEST(GuaranteesTest, EdgesOnFacesAreNotServedLate) {
+TYPED_TEST(GuaranteesTest, EdgesOnFacesAreNotRefinedLate) {
   constexpr int D = TypeParam::kValue;
   double worst = 1;
   const MeshCriteria<D> criteria{.rho = LeastRho<D>(), .sizes = {}};
@@ -156,12 +156,12 @@ TYPED_TEST(GuaranteesTest, AnInsertionOutOfOrderIsSeen) {
   }
 }
 
-// A longer edge is served while a shorter one waits.
-TYPED_TEST(GuaranteesTest, WaitingEdgesAreSeen) {
+// A longer edge is refined while a shorter one is pending.
+TYPED_TEST(GuaranteesTest, PendingEdgesAreSeen) {
   constexpr int D = TypeParam::kValue;
   QueryStructure<D> structure;
   RunContext context;
-  // Two points at distance 1e-3, two at 0.1: by brute force the short edge is the one that waits.
+  // Two points at distance 1e-3, two at 0.1: by brute force the short edge is the one that is pending.
   std::vector<Point<D>> points(4);
   for (Point<D>& p : points) {
     p.fill(0.3);
@@ -174,11 +174,11 @@ TYPED_TEST(GuaranteesTest, WaitingEdgesAreSeen) {
   ASSERT_TRUE(
       structure.Initialize(core::MortonGrid<D>(UnitBox<D>()), {points.begin(), points.end()}, 1000, 1, context).ok());
   const MeshCriteria<D> criteria{.rho = 2, .sizes = {}};
-  EXPECT_NEAR(ShortestWaiting<D>(structure, criteria).inner.length, 1e-3, 1e-12);
-  EXPECT_NEAR(ShortestWaiting<D>(structure, {.criterion = Criterion::kWellSpaced, .rho = 2, .sizes = {}}).inner.length,
+  EXPECT_NEAR(ShortestPending<D>(structure, criteria).inner.length, 1e-3, 1e-12);
+  EXPECT_NEAR(ShortestPending<D>(structure, {.criterion = Criterion::kWellSpaced, .rho = 2, .sizes = {}}).inner.length,
               1e-3, 1e-12);
-  EXPECT_NEAR(ShortestWaiting<D>(structure, criteria).face.length, 0.2, 1e-12);
-  EXPECT_EQ(ShortestWaiting<D>(structure, {.rho = 1e6, .sizes = {}}).inner.length,
+  EXPECT_NEAR(ShortestPending<D>(structure, criteria).face.length, 0.2, 1e-12);
+  EXPECT_EQ(ShortestPending<D>(structure, {.rho = 1e6, .sizes = {}}).inner.length,
             std::numeric_limits<double>::infinity());
 
   GuaranteeChecker<D> checker(structure, criteria, 1);

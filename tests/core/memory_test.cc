@@ -1,4 +1,4 @@
-// What a run asks of the one who lends it memory.
+// What a run asks of its memory lender.
 #include <atomic>
 #include <memory>
 #include <vector>
@@ -54,7 +54,7 @@ TEST(Memory, IsReservedForTheTreeThenForTheMeshAndTheRunHoldsNoMore) {
   }
 }
 
-TEST(Memory, WhatItIsReservedForIsForetold) {
+TEST(Memory, WhatItIsReservedForIsPredicted) {
   const MeshParameters parameters{.dimension = 3};
   RunContext context;
   Lender lender(context);

@@ -472,7 +472,7 @@ TEST_P(MeshErrorTest, ProgressNeverDecreases) {
   EXPECT_EQ(last.phase, Phase::kDone);
   EXPECT_EQ(last.fraction, 1);
   EXPECT_EQ(last.vertices, mesh->vertex_count());
-  if (mesh->statistics.slivers == 0) {  // mending comes after they were counted
+  if (mesh->statistics.slivers == 0) {  // repair comes after they were counted
     EXPECT_EQ(last.simplices, mesh->simplex_count());
   }
 }

@@ -298,18 +298,18 @@ TEST_P(MesherTest, GoesOnAfterABudgetThatWasTooSmall) {
   ExpectValid(Extract(*mesher));
 }
 
-// What a refinement that is stopped at its first vertex foretells against what it makes when it is not.
+// What a refinement that is stopped at its first vertex predicts against what it makes when it is not.
 void ExpectForetold(const MeshParameters& parameters, std::span<const double> cloud, double factor) {
   RunContext context;
   const auto mesher = *Mesher::Create(parameters, cloud, context);
   MeshParameters budget = parameters;
   budget.max_vertices = mesher->vertex_count() + 1;
   EXPECT_EQ(mesher->Refine(budget, context).code(), absl::StatusCode::kResourceExhausted);
-  const auto foretold = static_cast<double>(context.Snapshot().estimated_vertices);
+  const auto predicted = static_cast<double>(context.Snapshot().estimated_vertices);
   RunContext again;
   EXPECT_EQ(mesher->Refine(parameters, again), absl::OkStatus());
-  EXPECT_LT(foretold, factor * static_cast<double>(mesher->vertex_count()));
-  EXPECT_GT(factor * foretold, static_cast<double>(mesher->vertex_count()));
+  EXPECT_LT(predicted, factor * static_cast<double>(mesher->vertex_count()));
+  EXPECT_GT(factor * predicted, static_cast<double>(mesher->vertex_count()));
   EXPECT_EQ(again.Snapshot().estimated_vertices, 0u) << "unknown";
 }
 
@@ -367,7 +367,7 @@ TEST_P(MesherTest, NegativeZerosKeepTheirBits) {
   }
 }
 
-// What tells vertices by their numbers is made by whoever asks first.
+// The table of vertices by their numbers is made by the call that asks first.
 TEST_P(MesherTest, QueriesMayRunAtOnce) {
   const std::vector<double> cloud = MakeCloud("uniform", d_, 200);
   const auto mesher = Create(cloud);

@@ -46,7 +46,7 @@ struct Task {
 
 // Byte 0: bit 0 dimension 2 or 3, bits 1 and 2 the box: grown by a quarter, not grown, the grid's, the grid's but flat;
 // bit 3 two dimensions more; bit 4 well-spaced; bit 5 sizes; bit 6 an edit. Byte 1: the exponent of the tiny step; from
-// 3-D on bit 6 weights, bit 7 no mending. Byte 2: offset. Byte 3: scale. Byte 4: rho.
+// 3-D on bit 6 weights, bit 7 no repair. Byte 2: offset. Byte 3: scale. Byte 4: rho.
 //
 // With sizes a byte more: the lowest two bits the bound everywhere, if any, the next two that of a box, the next three
 // where it is, the last one whether it is a point.

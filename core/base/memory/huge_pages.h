@@ -63,7 +63,7 @@ struct HugePageAllocator {
 template <typename T>
 using HugeVector = std::vector<T, HugePageAllocator<T>>;
 
-// Bytes, of which nobody knows what is in them, where HugePageAllocator puts them.
+// Bytes that are not set, where HugePageAllocator puts them.
 struct HugePageDeleter {
   size_t count;
   void operator()(std::byte* memory) const { HugePageAllocator<std::byte>().deallocate(memory, count); }

@@ -310,7 +310,7 @@ void Rounds<D>::EndRound() {
     std::swap(batch.simplices, batch.written);
   }
   stars_.BeginWriting(*team_);
-  structure_.AdmitWaiting();
+  structure_.CommitAll();
   // The records of the next batches may have been made without what has been inserted meanwhile.
   const Batch<D>& next = HalfOf(1).front();
   const size_t is_known = next.is_speculated ? next.first_unknown - inserted_before_ : inserted_.size();
@@ -362,7 +362,7 @@ void Rounds<D>::AwaitOthers() {
 template <int D>
 void Rounds<D>::CommitAdded() {
   AwaitOthers();
-  structure_.AdmitWaiting();
+  structure_.CommitAll();
 }
 
 template <int D>

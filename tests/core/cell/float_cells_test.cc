@@ -183,7 +183,7 @@ TYPED_TEST(FloatCellsTest, EveryUnitTellsTheSame) {
 
 // More nodes and planes than one vector or word holds, and a cell that has them no more.
 // Nodes are placed side by side with as many as a vector holds; each is to be where it would be alone.
-TYPED_TEST(FloatCellsTest, NodesArePlacedAsOneByOneAndKnowWhoIsBesideThem) {
+TYPED_TEST(FloatCellsTest, NodesArePlacedAsOneByOneAndKnowTheirNeighbours) {
   constexpr int D = TypeParam::kValue;
   int nearly_dependent = 0;
   for (int i = 0; i < 200; ++i) {

@@ -118,7 +118,7 @@ TYPED_TEST(SameCellsTest, ScansAreTheSameByEveryVectorUnit) {
   }
 }
 
-TYPED_TEST(SameCellsTest, VerticesThatWaitCountOnceTheyCutOrAreAdmitted) {
+TYPED_TEST(SameCellsTest, UncommittedVerticesCountOnceTheyCutOrAreCommitted) {
   constexpr int D = TypeParam::kValue;
   for (const std::string_view kind : kKinds) {
     SCOPED_TRACE(std::string(kind));
@@ -133,22 +133,22 @@ TYPED_TEST(SameCellsTest, VerticesThatWaitCountOnceTheyCutOrAreAdmitted) {
       for (double& x : points.back()) {
         x += 0.01 * (0.5 + this->random_.Unit()) * (x < 0.5 ? 1 : -1);
       }
-      near = structure.AddWaiting(near, points.back());  // near to one that waits, from the second on
+      near = structure.AddUncommitted(near, points.back());  // near to an uncommitted one, from the second on
       ASSERT_EQ(near, VertexId{before + i});
       ASSERT_EQ(structure.point(near), points.back());
     }
     ASSERT_EQ(structure.vertex_count(), before + points.size());
-    ASSERT_EQ(structure.waiting_count(), points.size());
+    ASSERT_EQ(structure.uncommitted_count(), points.size());
     EXPECT_EQ(CellNow<D>(structure, VertexId{0}, workspace), of_others) << "queries do not find them";
     std::vector<decltype(Description<D>(workspace.cell))> cells;
     for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
       structure.UnplacedClippedVoronoi(VertexId{v}, CubeAround<D>(structure.point(VertexId{v}), kClip), workspace);
-      structure.CutByWaiting(VertexId{v}, workspace.cell);
+      structure.CutByUncommitted(VertexId{v}, workspace.cell);
       workspace.cell.Place();
       cells.push_back(Description<D>(workspace.cell));
     }
-    structure.AdmitWaiting();
-    EXPECT_EQ(structure.waiting_count(), 0u);
+    structure.CommitAll();
+    EXPECT_EQ(structure.uncommitted_count(), 0u);
     for (uint32_t v = 0; v < structure.vertex_count(); ++v) {
       ASSERT_EQ(CellNow<D>(structure, VertexId{v}, workspace), cells[v]) << "vertex " << v;
     }

@@ -162,7 +162,7 @@ std::optional<Made> MakeMesh(const MeshParameters& parameters, const Cloud& clou
 
 double Factor(double a, double b) { return std::max(a, b) / std::min(a, b); }
 
-// By the default the mesh is mended, if `min_dihedral` does not say otherwise.
+// By the default the mesh is repaired, if `min_dihedral` does not say otherwise.
 void ExpectGoodEstimate(const Cloud& cloud, double rho, double most, std::optional<double> min_dihedral = {}) {
   SCOPED_TRACE("rho " + std::to_string(rho));
   MeshParameters parameters;

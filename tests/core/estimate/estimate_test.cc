@@ -182,7 +182,7 @@ TYPED_TEST(EstimateTest, LooksAtEveryLeafOfSmallCloudsAndAtEnoughOfLargeOnes) {
   EXPECT_LE(error, 0.05);
 }
 
-// A glance foretells vertices nearly as well, from fewer leaves.
+// A glance predicts vertices nearly as well, from fewer leaves.
 TYPED_TEST(EstimateTest, AGlanceIsRoughlyRight) {
   constexpr int D = TypeParam::kValue;
   for (const std::string_view kind : test::kReferenceKinds) {

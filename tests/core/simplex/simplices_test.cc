@@ -19,7 +19,7 @@
 #include "core/simplex/quality.h"
 #include "core/simplex/simplex_list.h"
 #include "core/simplex/validate.h"
-#include "core/sliver/mend.h"
+#include "core/sliver/repair.h"
 #include "core/sliver/sliver_stage.h"
 #include "tests/support/brute_force.h"
 #include "tests/support/clouds.h"
@@ -239,16 +239,16 @@ class StarsOfRefinementTest : public test::SeededTest {
     ExpectSimplicesOfCells<D>(structure, refinement.stars());
   }
 
-  // Without an observer vertices wait to be admitted, on two threads.
+  // Without an observer vertices are uncommitted for a while, on two threads.
   template <int D>
-  void ExpectThoseOfCellsWithinBudgets(const MeshCriteria<D>& demands) {
+  void ExpectThoseOfCellsWithinBudgets(const MeshCriteria<D>& criteria) {
     QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", D == 2 ? 400 : 100));
     Refinement<D> refinement(structure, 0x1p-48);
     absl::Status status = absl::ResourceExhaustedError("");
     int stops = 0;
     for (; absl::IsResourceExhausted(status); ++stops) {
       RunContext context;
-      status = refinement.Run(demands, structure.vertex_count() + 1 + random_.Below(50), 2, context);
+      status = refinement.Run(criteria, structure.vertex_count() + 1 + random_.Below(50), 2, context);
     }
     ASSERT_TRUE(status.ok()) << status;
     EXPECT_GT(stops, 3);
@@ -267,10 +267,10 @@ TEST_F(StarsOfRefinementTest, GiveTheSimplicesAfterVerticesWereMoved) {
   ASSERT_TRUE(Run<3>(refinement, context).ok());
   is_fixed.resize(structure.vertex_count(), false);
   SliverStage<3> stage;
-  const MendDemands demands{{.rho = 2}, 15, kMinEdge, 1'000'000};
+  const RepairCriteria criteria{{.rho = 2}, 15, kMinEdge, 1'000'000};
   std::vector<bool> moved;
-  const absl::Status mended = stage.Mend(structure, refinement, is_fixed, demands, moved, 1, context);
-  ASSERT_TRUE(mended.ok()) << mended;
+  const absl::Status repaired = stage.Repair(structure, refinement, is_fixed, criteria, moved, 1, context);
+  ASSERT_TRUE(repaired.ok()) << repaired;
   EXPECT_GT(stage.statistics().moves, 0u);
   EXPECT_FALSE(refinement.stars().IsComplete());
   ExpectSimplicesOfCells<3>(structure, refinement.stars());

@@ -14,7 +14,7 @@
 #include "core/mesher.h"
 #include "core/simplex/quality.h"
 #include "core/simplex/validate.h"
-#include "core/sliver/mend.h"
+#include "core/sliver/repair.h"
 
 namespace wellspace::core {
 namespace {
@@ -183,7 +183,7 @@ TEST(SliverWorkTest, IsBoundedWhateverRho) {
       parameters.rho = rho;
       const Mesh mesh = MeshOf(parameters, cloud);
       const MeshStatistics& statistics = mesh.statistics;
-      const uint64_t most = Mender::kMostOperations * (statistics.slivers + Mender::kFreeSlivers);
+      const uint64_t most = Repairer::kMostOperations * (statistics.slivers + Repairer::kFreeSlivers);
       EXPECT_LT(statistics.sliver_operations, most + most / 100);
       // Those of the default are far from the bound.
       EXPECT_LT(statistics.sliver_operations, rho == 2 ? 10'000 * statistics.slivers : most + most / 100);

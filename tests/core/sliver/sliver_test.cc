@@ -1,4 +1,4 @@
-// No slivers: what mending and pumping promise of whole meshes.
+// No slivers: what repair and pumping promise of whole meshes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -79,7 +79,7 @@ TEST_P(SliverTest, EveryAngleIsReachedByADelaunayMesh) {
     EXPECT_GE(statistics.min_angle_deg, angle);
     EXPECT_NEAR(statistics.min_angle_deg, MeasureQuality({3, mesh.points, mesh.simplices}).min_angle_deg, 1e-9);
     EXPECT_NEAR(statistics.max_radius_edge, MeasureQuality({3, mesh.points, mesh.simplices}).max_radius_edge, 1e-9);
-    EXPECT_NEAR(statistics.unmended_min_angle_deg, plain.statistics.min_angle_deg, 1e-9);
+    EXPECT_NEAR(statistics.min_angle_before_deg, plain.statistics.min_angle_deg, 1e-9);
     EXPECT_EQ(mesh.vertex_count(), plain.vertex_count() + statistics.sliver_vertices);
     EXPECT_LE(static_cast<double>(mesh.vertex_count()), (angle == 12   ? 1.04
                                                          : angle == 15 ? 1.08
@@ -172,7 +172,7 @@ TEST(SliverDemandsTest, SizesAndTighterBoundsAreKept) {
     const Mesh mesh = MeshOf(parameters, cloud);
     EXPECT_TRUE(Validate(parameters, mesh, cloud).ok()) << Validate(parameters, mesh, cloud);
   }
-  // Where mending cannot reach the angle it still keeps the criterion, and says how many are left.
+  // Where repair cannot reach the angle it still keeps the criterion, and says how many are left.
   MeshParameters well_spaced = InUnitBox(3, 12);
   well_spaced.criterion = Criterion::kWellSpaced;
   const Mesh mesh = MeshOf(well_spaced, cloud);
@@ -225,7 +225,7 @@ TEST(SliverSessionTest, GoesOnAfterABudgetThatWasTooSmall) {
   EXPECT_TRUE(Validate(parameters, *mesh, cloud).ok()) << Validate(parameters, *mesh, cloud);
 }
 
-TEST(SliverSessionTest, AnEditedMeshIsMendedAgain) {
+TEST(SliverSessionTest, AnEditedMeshIsRepairedAgain) {
   std::vector<double> cloud = test::MakeCloud("uniform", 3, 400);
   const std::vector<double> more = test::MakeCloud("cospherical", 3, 6);
   MeshParameters parameters = InUnitBox(3, 15);
@@ -267,7 +267,7 @@ TEST(SliverSessionTest, AnEditedMeshIsMendedAgain) {
   for (size_t v = 0; v < all.size(); ++v) {
     ASSERT_NEAR((*nearest)[v], expected[v], 1e-12) << v;
   }
-  // Without mending, and for another bound, refinement goes on from there.
+  // Without repair, and for another bound, refinement goes on from there.
   parameters.min_dihedral = 0;
   parameters.rho = 1.6;
   ASSERT_TRUE((*mesher)->Refine(parameters, context).ok());
@@ -276,23 +276,23 @@ TEST(SliverSessionTest, AnEditedMeshIsMendedAgain) {
 }
 
 // Moved vertices have other neighbours than the refinement has seen.
-TEST_P(SliverTest, AMendedMeshIsFoundAgainFromFacetToFacet) {
+TEST_P(SliverTest, ARepairedMeshIsFoundAgainFromFacetToFacet) {
   MeshParameters parameters = InUnitBox(3, 15);
   RunContext context;
   auto mesher = Mesher::Create(parameters, cloud_, context);
   ASSERT_TRUE(mesher.ok()) << mesher.status();
   ASSERT_TRUE((*mesher)->Refine(parameters, context).ok());
-  const absl::StatusOr<Mesh> mended = (*mesher)->Extract(1, context);
-  ASSERT_TRUE(mended.ok()) << mended.status();
-  EXPECT_TRUE(cloud_.size() < 600 || mended->statistics.sliver_moves > 0);
-  // What mending kept goes, and the same demands ask for nothing.
+  const absl::StatusOr<Mesh> repaired = (*mesher)->Extract(1, context);
+  ASSERT_TRUE(repaired.ok()) << repaired.status();
+  EXPECT_TRUE(cloud_.size() < 600 || repaired->statistics.sliver_moves > 0);
+  // What repair kept goes, and the same demands ask for nothing.
   parameters.min_dihedral = 0;
   ASSERT_TRUE((*mesher)->Refine(parameters, context).ok());
   const absl::StatusOr<Mesh> again = (*mesher)->Extract(1, context);
   ASSERT_TRUE(again.ok()) << again.status();
-  EXPECT_EQ(test::Canonical(*again), test::Canonical(*mended));
+  EXPECT_EQ(test::Canonical(*again), test::Canonical(*repaired));
   EXPECT_TRUE(Validate(parameters, *again, cloud_).ok()) << Validate(parameters, *again, cloud_);
-  EXPECT_GE(again->statistics.stars_computed, mended->statistics.stars_computed + again->vertex_count());
+  EXPECT_GE(again->statistics.stars_computed, repaired->statistics.stars_computed + again->vertex_count());
 
   ASSERT_TRUE((*mesher)->AddPoints(test::MakeCloud("uniform", 3, 40), context).ok());
   ASSERT_TRUE((*mesher)->Refine(parameters, context).ok());
@@ -327,7 +327,7 @@ class LenderWithATurn final : public MemoryLender {
   int asked_ = 0;
 };
 
-// Between any two passes mending can be stopped; what it has done is valid, and a later run goes on from there.
+// Between any two passes repair can be stopped; what it has done is valid, and a later run goes on from there.
 TEST(SliverSessionTest, StoppedAfterAnyPassItGoesOn) {
   const std::vector<double> cloud = test::MakeCloud("uniform", 3, 300);
   const MeshParameters parameters = InUnitBox(3, 18);

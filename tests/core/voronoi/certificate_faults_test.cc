@@ -143,7 +143,7 @@ TYPED_TEST(CertificateFaultsTest, RefusesACellThatIsCutByAFalseBisector) {
   ASSERT_TRUE(cell.Cut(bisector.vertex, nearer));
   EXPECT_TRUE(IsRefused(this->Certify(KeptCell<D>(cell)),
                         "is not the bisector of vertex " + std::to_string(Index(bisector.vertex))));
-  // Not better when it says that it is of nobody, of itself or a vertex to come.
+  // Not better when it says that it is of no vertex, of itself or a vertex to come.
   for (const uint32_t name : {Index(kNoVertex), Index(this->v_), this->structure_.vertex_count()}) {
     KeptCell<D> renamed(cell);
     renamed.planes.back().vertex = VertexId{name};

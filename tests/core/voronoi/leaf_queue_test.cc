@@ -20,7 +20,7 @@ class LeafQueueTest : public test::SeededTest {
 };
 
 TEST_F(LeafQueueTest, ServesNearClassesFirstAndInAClassWhoCameFirst) {
-  struct Waiting {
+  struct Queued {
     double distance_sq;
     uint32_t leaf;
   };
@@ -30,7 +30,7 @@ TEST_F(LeafQueueTest, ServesNearClassesFirstAndInAClassWhoCameFirst) {
     // Far from the scale leaves share a class.
     const double least_sq = std::ldexp(scale * scale, -6);
     const double most_sq = std::ldexp(scale * scale, 20);
-    std::vector<Waiting> model;
+    std::vector<Queued> model;
     for (uint32_t step = 0; step < 20000; ++step) {
       if (random_.Below(9) < (step % 400 < 200 ? 7 : 3)) {
         const bool counts = random_.Below(4) != 0;
@@ -46,7 +46,7 @@ TEST_F(LeafQueueTest, ServesNearClassesFirstAndInAClassWhoCameFirst) {
         ASSERT_FALSE(queue.IsEmpty());
         const LeafQueue::Entry entry = queue.Pop();
         const auto at = std::find_if(model.begin(), model.end(),
-                                     [&](const Waiting& waiting) { return NodeId{waiting.leaf} == entry.leaf; });
+                                     [&](const Queued& queued) { return NodeId{queued.leaf} == entry.leaf; });
         ASSERT_NE(at, model.end());
         ASSERT_EQ(at->distance_sq, entry.distance_sq);
         for (auto other = model.begin(); other != model.end(); ++other) {

@@ -1,4 +1,4 @@
-// Lists of simplices, and who spoils them, against a model.
+// Lists of simplices, and which vertices spoil them, against a model.
 #include "core/voronoi/star_lists.h"
 
 #include <gmock/gmock.h>
@@ -93,16 +93,16 @@ TEST(StarListsTest, KnowWhoWasLookedAtAndWhoCameAfter) {
   EXPECT_FALSE(lists.CameAfter(VertexId{2}, VertexId{1}));
 
   const RunContext context;
-  const absl::StatusOr<LateNeighbours> late = LateNeighbours::Of(lists, 5, context);
-  ASSERT_TRUE(late.ok()) << late.status();
-  EXPECT_THAT(late->At(VertexId{1}), ElementsAre(Pair(VertexId{1}, VertexId{4})));
-  EXPECT_THAT(late->At(VertexId{2}), IsEmpty());
-  EXPECT_THAT(late->At(VertexId{4}), IsEmpty());
+  const absl::StatusOr<StaleStars> stale = StaleStars::Of(lists, 5, context);
+  ASSERT_TRUE(stale.ok()) << stale.status();
+  EXPECT_THAT(stale->At(VertexId{1}), ElementsAre(Pair(VertexId{1}, VertexId{4})));
+  EXPECT_THAT(stale->At(VertexId{2}), IsEmpty());
+  EXPECT_THAT(stale->At(VertexId{4}), IsEmpty());
 
   lists.Set(VertexId{1}, StarOf({{0, 3}, {4, 2}}), 5);
   EXPECT_TRUE(lists.WasLookedAtBefore(VertexId{4}, VertexId{1}));
   EXPECT_FALSE(lists.CameAfter(VertexId{4}, VertexId{1}));
-  const absl::StatusOr<LateNeighbours> none = LateNeighbours::Of(lists, 5, context);
+  const absl::StatusOr<StaleStars> none = StaleStars::Of(lists, 5, context);
   ASSERT_TRUE(none.ok()) << none.status();
   EXPECT_THAT(none->At(VertexId{1}), IsEmpty()) << "it has been looked at since";
 }
@@ -130,7 +130,7 @@ TEST(StarListsTest, PlacesThatAreNotUsedAreDropped) {
   EXPECT_TRUE(lists.IsComplete());
 }
 
-// A vertex that is looked at again and again is late at its neighbours each time.
+// A vertex that is looked at again and again makes the lists of its neighbours stale each time.
 TEST(StarListsTest, PairsThatAreLateTwiceAreDropped) {
   StarLists<2> lists;
   for (uint32_t v = 0; v < 3; ++v) {
@@ -138,11 +138,11 @@ TEST(StarListsTest, PairsThatAreLateTwiceAreDropped) {
   }
   for (int round = 0; round < 100; ++round) {
     lists.Set(VertexId{3}, StarOf({{0, 1}, {1, 2}, {2, 0}}), 4);
-    ASSERT_THAT(lists.late(), SizeIs(AllOf(Ge(3u), Le(12u))));
+    ASSERT_THAT(lists.stale(), SizeIs(AllOf(Ge(3u), Le(12u))));
   }
-  const absl::StatusOr<LateNeighbours> late = LateNeighbours::Of(lists, 4, RunContext());
-  ASSERT_TRUE(late.ok()) << late.status();
-  EXPECT_THAT(late->At(VertexId{2}), ElementsAre(Pair(VertexId{2}, VertexId{3})));
+  const absl::StatusOr<StaleStars> stale = StaleStars::Of(lists, 4, RunContext());
+  ASSERT_TRUE(stale.ok()) << stale.status();
+  EXPECT_THAT(stale->At(VertexId{2}), ElementsAre(Pair(VertexId{2}, VertexId{3})));
 }
 
 TEST(StarListsTest, ListNothingOnceTheyHaveGivenUp) {
@@ -176,7 +176,7 @@ TEST(LateNeighboursTest, AreCancelled) {
   for (const bool deadline : {false, true}) {
     RunContext context;
     deadline ? context.ExceedDeadline() : context.Cancel();
-    EXPECT_EQ(LateNeighbours::Of(lists, 1, context).status().code(),
+    EXPECT_EQ(StaleStars::Of(lists, 1, context).status().code(),
               deadline ? absl::StatusCode::kDeadlineExceeded : absl::StatusCode::kCancelled);
   }
 }
@@ -187,7 +187,7 @@ struct ModelEntry {
   int look = -1;
   int added = -1;
   // Those that came after that look, and had the vertex in their star when they were looked at.
-  std::set<VertexId> late;
+  std::set<VertexId> stale;
 };
 
 class StarListsPropertyTest : public test::SeededTest {
@@ -202,7 +202,7 @@ TEST_F(StarListsPropertyTest, HoldWhatAModelHolds) {
   const RunContext context;
   StarLists<3> lists;
   std::vector<ModelEntry> model(10);
-  size_t late_count = 0;
+  size_t stale_count = 0;
   for (int step = 0; step < 6'000; ++step) {
     if (random_.Below(2000) == 0) {
       lists.Clear();
@@ -228,25 +228,25 @@ TEST_F(StarListsPropertyTest, HoldWhatAModelHolds) {
     for (const auto& simplex : star) {
       for (const VertexId u : simplex) {
         if (model[Index(u)].look >= 0 && model[Index(v)].added > model[Index(u)].look) {
-          model[Index(u)].late.insert(v);
+          model[Index(u)].stale.insert(v);
         }
       }
     }
     model[Index(v)].listed = listed;
     model[Index(v)].look = step;
-    model[Index(v)].late.clear();
+    model[Index(v)].stale.clear();
 
     size_t simplices = 0;
-    size_t late_now = 0;
+    size_t stale_now = 0;
     for (uint32_t u = 0; u < model.size(); ++u) {
-      late_now += model[u].late.size();
+      stale_now += model[u].stale.size();
       const auto actual = lists.Of(VertexId{u});
       ASSERT_EQ(Star<3>(actual.begin(), actual.end()), model[u].listed) << "of " << u << " after step " << step;
       simplices += actual.size();
     }
     const size_t most_listed = 2 * simplices + 1 + model.size() / 8;
-    ASSERT_LE(lists.MemoryBytes() - lists.late().size_bytes(), 12 * model.size() + 12 * most_listed);
-    ASSERT_LE(lists.late().size(), late_now + 3 * most_listed);
+    ASSERT_LE(lists.MemoryBytes() - lists.stale().size_bytes(), 12 * model.size() + 12 * most_listed);
+    ASSERT_LE(lists.stale().size(), stale_now + 3 * most_listed);
     if (step % 20 != 0) {
       continue;
     }
@@ -258,22 +258,22 @@ TEST_F(StarListsPropertyTest, HoldWhatAModelHolds) {
         }
       }
     }
-    const absl::StatusOr<LateNeighbours> late = LateNeighbours::Of(lists, static_cast<uint32_t>(model.size()), context);
-    ASSERT_TRUE(late.ok()) << late.status();
+    const absl::StatusOr<StaleStars> stale = StaleStars::Of(lists, static_cast<uint32_t>(model.size()), context);
+    ASSERT_TRUE(stale.ok()) << stale.status();
     for (uint32_t u = 0; u < model.size(); ++u) {
       if (model[u].listed.empty()) {
         continue;  // nothing to be spoiled
       }
-      late_count += model[u].late.size();
-      std::vector<LatePair> expected;
-      for (const VertexId x : model[u].late) {
+      stale_count += model[u].stale.size();
+      std::vector<StalePair> expected;
+      for (const VertexId x : model[u].stale) {
         expected.emplace_back(VertexId{u}, x);
       }
-      const auto actual = late->At(VertexId{u});
-      ASSERT_EQ(std::vector<LatePair>(actual.begin(), actual.end()), expected) << "at " << u << " after step " << step;
+      const auto actual = stale->At(VertexId{u});
+      ASSERT_EQ(std::vector<StalePair>(actual.begin(), actual.end()), expected) << "at " << u << " after step " << step;
     }
   }
-  EXPECT_GT(late_count, 100u);
+  EXPECT_GT(stale_count, 100u);
 }
 
 }  // namespace

@@ -205,7 +205,7 @@ class Replayed : public ::testing::Test {
 
   v1::MeshParameters Parameters() const {
     v1::MeshParameters parameters = UnitCubeParameters();
-    if (!mends_slivers_) {
+    if (!repairs_slivers_) {
       parameters.set_min_dihedral(0);
     }
     return parameters;
@@ -309,7 +309,7 @@ class Replayed : public ::testing::Test {
     EXPECT_EQ(after.DebugString(), before.DebugString());
   }
 
-  bool mends_slivers_ = true;
+  bool repairs_slivers_ = true;
   Script script_;
   ServiceHarness harness_{
       core::MeshPoints, {.workers = 2}, Transport::kInProcess, FakeEstimator, BreakableMeshers(script_)};
@@ -342,9 +342,9 @@ TEST_F(Replayed, ARefinementThatIsBrokenOffAnywhereLeavesTheNextMeshAsItWouldHav
   }
 }
 
-// Where no slivers are mended, the last mesh is brought up to date in part.
-TEST_F(Replayed, SoWithoutMendingOfSlivers) {
-  mends_slivers_ = false;
+// Where no slivers are repaired, the last mesh is brought up to date in part.
+TEST_F(Replayed, SoWithoutRepairOfSlivers) {
+  repairs_slivers_ = false;
   const Arrays expected = End(Begin());
   for (const Break& at : std::vector<Break>{{Call::kRefine, core::Phase::kRefinement, 3, Way::kCancel},
                                             {Call::kRefine, core::Phase::kDone, 1, Way::kFail},

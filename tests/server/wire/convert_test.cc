@@ -353,7 +353,7 @@ TEST(MetadataToProto, SaysWhatWasDoneAgainstSlivers) {
   mesh.statistics.slivers_left = 1;
   mesh.statistics.sliver_moves = 5;
   mesh.statistics.sliver_vertices = 2;
-  mesh.statistics.unmended_min_angle_deg = 0.25;
+  mesh.statistics.min_angle_before_deg = 0.25;
   mesh.statistics.sliver_seconds = 0.125;
   mesh.statistics.sliver_operations = 12'345;
   mesh.statistics.slivers_left_by = {1, 2, 3};

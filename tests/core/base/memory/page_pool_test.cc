@@ -71,7 +71,7 @@ TEST(PagePoolTest, ALargePageGoesWithTheLastOnIt) {
   EXPECT_FALSE(test::IsMapped(third));
 }
 
-// Takes and gives back at random; whoever took a run finds in it what it has written.
+// Takes and gives back at random; a run that was taken holds what was written to it.
 void TakeAtRandom(PagePool& pool, unsigned seed) {
   std::mt19937 generator(seed);
   std::vector<Run> runs;

@@ -120,7 +120,7 @@ TYPED_TEST(LanesTest, EveryUnitComputesTheSame) {
 }
 
 // Nor later: the cell only shrinks.
-TYPED_TEST(LanesTest, WhoIsForetoldNotToCutDoesNot) {
+TYPED_TEST(LanesTest, CandidatesBoundedNotToCutDoNot) {
   constexpr int D = TypeParam::kValue;
   SplitMix64& random = this->random_;
   Box<D> box;
@@ -149,7 +149,7 @@ TYPED_TEST(LanesTest, WhoIsForetoldNotToCutDoesNot) {
       }
       candidates.length_sq[j] = NormSq<D>(w);
     }
-    cell.Foretell(0, candidates);
+    cell.BoundExcesses(0, candidates);
     for (size_t j = 0; j < candidates.count; ++j) {
       const bool has_cut = cell.Cut(VertexId{next++}, points[j]);
       ASSERT_TRUE(!has_cut || candidates.most[j] >= 0);

@@ -1,6 +1,7 @@
-// Tetrahedra that are too flat are mended: vertices move a little, and where that is not enough some are added.
-#ifndef WELLSPACE_CORE_SLIVER_MEND_H_
-#define WELLSPACE_CORE_SLIVER_MEND_H_
+// The repair of slivers, tetrahedra that are too flat: vertices move a little, and where that is not enough some are
+// added.
+#ifndef WELLSPACE_CORE_SLIVER_REPAIR_H_
+#define WELLSPACE_CORE_SLIVER_REPAIR_H_
 
 #include <array>
 #include <cstdint>
@@ -17,14 +18,14 @@
 
 namespace wellspace::core {
 
-struct MendDemands {
-  MeshCriteria<3> demands;  // that the mesh keeps, and has to go on keeping
-  double min_dihedral = 0;  // degrees: a tetrahedron with a smaller dihedral angle is a sliver
-  double min_edge = 0;      // no shorter edge is made
+struct RepairCriteria {
+  MeshCriteria<3> criteria;  // that the mesh keeps, and has to go on keeping
+  double min_dihedral = 0;   // degrees: a tetrahedron with a smaller dihedral angle is a sliver
+  double min_edge = 0;       // no shorter edge is made
   uint64_t max_vertices = 0;
 };
 
-struct MendReport {
+struct RepairReport {
   uint64_t slivers = 0;       // found
   uint64_t slivers_left = 0;  // that could not be repaired
   uint64_t moves = 0;         // of vertices; one may move more than once
@@ -35,11 +36,11 @@ struct MendReport {
   std::vector<LeftSliver> flattest_left;
 };
 
-// Hears of every step, once the triangulation has taken it; of the stars that have changed by then sooner or later, but
-// before Run returns.
-class MendObserver {
+// Is told of every step, once the triangulation has taken it; of a star that has changed at some later time, but before
+// Run returns.
+class RepairObserver {
  public:
-  virtual ~MendObserver() = default;
+  virtual ~RepairObserver() = default;
   virtual void VertexMoved(VertexId v) = 0;
   // `near` is a neighbour of the new vertex.
   virtual void VertexAdded(VertexId v, VertexId near) = 0;
@@ -49,24 +50,24 @@ class MendObserver {
   virtual uint64_t MemoryBytes() const = 0;
 };
 
-// Mends the slivers of a Delaunay triangulation that keeps `demands`.
+// Repairs the slivers of a Delaunay triangulation that keeps `criteria`.
 //
 // Thread safety: thread-compatible.
-// Invariants: after every step (1) the triangulation is that of Delaunay and keeps the demands; (2) vertices that are
+// Invariants: after every step (1) the triangulation is that of Delaunay and keeps the criteria; (2) vertices that are
 // fixed are where they were, those on faces of the box on the same faces; (3) of the simplices that a step replaces and
 // makes, the flattest is made better.
-class Mender {
+class Repairer {
  public:
-  // Shapes:     is_fixed: by vertex; true where it must not move. One entry is added for each vertex added.
-  // The work that is spent, however hard slivers are. Default demands take a twentieth of it.
+  // The work that is spent, however hard slivers are. Default parameters take a twentieth of it.
   static constexpr uint64_t kMostOperations = 20'000;
   static constexpr uint64_t kFreeSlivers = 2'000;
 
-  Mender(Triangulation<3>& triangulation, std::vector<bool>& is_fixed, const MendDemands& demands,
-         MendObserver& observer);
+  // Shapes:     is_fixed: by vertex; true where it must not move. One entry is added for each vertex added.
+  Repairer(Triangulation<3>& triangulation, std::vector<bool>& is_fixed, const RepairCriteria& criteria,
+           RepairObserver& observer);
 
-  // Mends what slivers there are, and what new ones that makes. Up to `threads` threads look for the first ones; one
-  // mends.
+  // Repairs what slivers there are, and what new ones that makes. Up to `threads` threads look for the first ones; one
+  // thread repairs.
   //
   // Guarantees: (1) deterministic, and the same on any number of threads; (2) report().operations is at most
   //             kMostOperations times the slivers found and kFreeSlivers more, and what one sliver takes at most;
@@ -77,7 +78,7 @@ class Mender {
   // Source:     moves: Tournois, Srinivasan and Alliez 2009, with sampled in the place of followed gradients.
   absl::Status Run(int threads, RunContext& context);
 
-  const MendReport& report() const { return report_; }
+  const RepairReport& report() const { return report_; }
 
  private:
   // A sliver by its number, and its vertices, for numbers are used again; and vertices move.
@@ -110,16 +111,16 @@ class Mender {
   void ReportStars();
   Point<3> RandomInBall();
 
-  bool Mend(const Sliver& sliver, const Effort& effort);
+  bool MoveVertices(const Sliver& sliver, const Effort& effort);
   bool Move(VertexId v, const Sliver& sliver, int samples);
   absl::Status Insert(const Sliver& sliver, const Effort& effort);
 
   Triangulation<3>& triangulation_;
   std::vector<bool>& is_fixed_;
-  const MendDemands demands_;
-  MendObserver& observer_;
+  const RepairCriteria criteria_;
+  RepairObserver& observer_;
   double flat_cosine_ = 0;  // above it an angle is too small
-  MendReport report_;
+  RepairReport report_;
   HugeVector<double> nearest_sq_;  // at most the squared distance to the nearest neighbour; for well-spaced only
   HugeVector<double> cosine_;      // by simplex, of its smallest angle
   HugeVector<Sliver> next_;        // to be looked at
@@ -139,4 +140,4 @@ class Mender {
 
 }  // namespace wellspace::core
 
-#endif  // WELLSPACE_CORE_SLIVER_MEND_H_
+#endif  // WELLSPACE_CORE_SLIVER_REPAIR_H_

@@ -1,4 +1,4 @@
-#include "core/sliver/mend.h"
+#include "core/sliver/repair.h"
 
 #include <algorithm>
 #include <cmath>
@@ -80,15 +80,15 @@ TetrahedronMeasure MeasureSliver(const Simplex<3>& corners) {
 
 }  // namespace
 
-Mender::Mender(Triangulation<3>& triangulation, std::vector<bool>& is_fixed, const MendDemands& demands,
-               MendObserver& observer)
+Repairer::Repairer(Triangulation<3>& triangulation, std::vector<bool>& is_fixed, const RepairCriteria& criteria,
+                   RepairObserver& observer)
     : triangulation_(triangulation),
       is_fixed_(is_fixed),
-      demands_(demands),
+      criteria_(criteria),
       observer_(observer),
-      flat_cosine_(FlatCosine(demands.min_dihedral)) {}
+      flat_cosine_(FlatCosine(criteria.min_dihedral)) {}
 
-absl::Status Mender::Run(int threads, RunContext& context) {
+absl::Status Repairer::Run(int threads, RunContext& context) {
   try {
     const absl::Status status = RunPasses(threads, context);
     ReportStars();
@@ -99,8 +99,8 @@ absl::Status Mender::Run(int threads, RunContext& context) {
   }
 }
 
-absl::Status Mender::RunPasses(int threads, RunContext& context) {
-  if (demands_.demands.criterion == Criterion::kWellSpaced) {
+absl::Status Repairer::RunPasses(int threads, RunContext& context) {
+  if (criteria_.criteria.criterion == Criterion::kWellSpaced) {
     WELLSPACE_ASSIGN_OR_RETURN(nearest_sq_, triangulation_.NearestDistancesSq(context));
   }
   WELLSPACE_RETURN_IF_ERROR(FindSlivers(threads, context));
@@ -126,7 +126,7 @@ absl::Status Mender::RunPasses(int threads, RunContext& context) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
       const Sliver sliver = next_[k];
       const bool is_tried = k < limit && HasWork();
-      if (IsThere(sliver) && (!is_tried || !Mend(sliver, effort))) {
+      if (IsThere(sliver) && (!is_tried || !MoveVertices(sliver, effort))) {
         if (is_tried && effort.may_insert) {
           WELLSPACE_RETURN_IF_ERROR(Insert(sliver, effort));
           context.SetVertices(triangulation_.vertex_count());
@@ -152,7 +152,7 @@ absl::Status Mender::RunPasses(int threads, RunContext& context) {
 }
 
 // Says why slivers are left, and names the flattest.
-void Mender::ExplainLeft() {
+void Repairer::ExplainLeft() {
   const bool has_work = HasWork();
   std::vector<std::pair<Sliver, SliverReason>> left;
   for (const Sliver& sliver : next_) {
@@ -174,8 +174,8 @@ void Mender::ExplainLeft() {
   }
 }
 
-// Whether a place in the sliver's circumball keeps the demands, whatever the angles there.
-SliverReason Mender::ReasonOf(const Sliver& sliver) {
+// Whether a place in the sliver's circumball keeps the criteria, whatever the angles there.
+SliverReason Repairer::ReasonOf(const Sliver& sliver) {
   const TetrahedronMeasure measure = MeasureSliver(triangulation_.Corners(sliver.simplex));
   const VertexId v{triangulation_.vertex_count()};
   suspects_.clear();
@@ -190,7 +190,7 @@ SliverReason Mender::ReasonOf(const Sliver& sliver) {
 }
 
 // A place in the shrunk circumball, or its centre.
-Point<3> Mender::PlaceInBall(const TetrahedronMeasure& measure, bool is_centre) {
+Point<3> Repairer::PlaceInBall(const TetrahedronMeasure& measure, bool is_centre) {
   const double radius = kInside * std::sqrt(measure.radius_sq);
   Point<3> p = is_centre ? Point<3>{} : RandomInBall();
   for (int i = 0; i < 3; ++i) {
@@ -200,7 +200,7 @@ Point<3> Mender::PlaceInBall(const TetrahedronMeasure& measure, bool is_centre) 
 }
 
 // Measures all simplices, and lists the slivers among them.
-absl::Status Mender::FindSlivers(int threads, const RunContext& context) {
+absl::Status Repairer::FindSlivers(int threads, const RunContext& context) {
   cosine_.resize(triangulation_.simplex_limit());
   ThreadTeam team(threads);
   WELLSPACE_RETURN_IF_ERROR(team.TryForEach((cosine_.size() + kBlock - 1) / kBlock, [&](size_t block) {
@@ -221,35 +221,36 @@ absl::Status Mender::FindSlivers(int threads, const RunContext& context) {
   return absl::OkStatus();
 }
 
-bool Mender::IsThere(const Sliver& sliver) const {
+bool Repairer::IsThere(const Sliver& sliver) const {
   return triangulation_.IsIn(sliver.simplex) && triangulation_.item(sliver.simplex).vertices == sliver.vertices &&
          CosineOf(sliver.simplex) > flat_cosine_;
 }
 
-// Whether the demands allow for a tetrahedron, of which `moved` is the vertex whose nearest neighbour is that of the
+// Whether the criteria allow for a tetrahedron, of which `moved` is the vertex whose nearest neighbour is that of the
 // last KeepsNearestNeighbours.
-bool Mender::IsAdmissible(const TetrahedronMeasure& measure, const std::array<VertexId, 4>& vertices,
-                          VertexId moved) const {
-  const MeshCriteria<3>& demands = demands_.demands;
-  const double rho_sq = demands.rho * demands.rho;
+bool Repairer::IsAdmissible(const TetrahedronMeasure& measure, const std::array<VertexId, 4>& vertices,
+                            VertexId moved) const {
+  const MeshCriteria<3>& criteria = criteria_.criteria;
+  const double rho_sq = criteria.rho * criteria.rho;
   // Comparisons with NaN fail.
   if (!(measure.determinant > 0 && measure.radius_sq <= rho_sq * measure.edge_sq &&
-        measure.edge_sq >= demands_.min_edge * demands_.min_edge && triangulation_.box().Contains(measure.centre))) {
+        measure.edge_sq >= criteria_.min_edge * criteria_.min_edge && triangulation_.box().Contains(measure.centre))) {
     return false;
   }
-  if (demands.criterion == Criterion::kWellSpaced) {
+  if (criteria.criterion == Criterion::kWellSpaced) {
     for (const VertexId u : vertices) {
       if (!(measure.radius_sq <= rho_sq * (u == moved ? edge_limit_sq_ : nearest_sq_[Index(u)]))) {
         return false;
       }
     }
   }
-  return demands.sizes.IsUnbounded() || measure.radius_sq <= demands.sizes.AtSq(measure.centre);
+  return criteria.sizes.IsUnbounded() || measure.radius_sq <= criteria.sizes.AtSq(measure.centre);
 }
 
-// Under well-spaced: whether a vertex at `p`, which would replace the cavity, is nobody's new nearest neighbour.
-bool Mender::KeepsNearestNeighbours(const Point<3>& p, VertexId moved) {
-  if (demands_.demands.criterion != Criterion::kWellSpaced) {
+// Under well-spaced: whether a vertex at `p`, which would replace the cavity, becomes the nearest neighbour of no
+// vertex.
+bool Repairer::KeepsNearestNeighbours(const Point<3>& p, VertexId moved) {
+  if (criteria_.criteria.criterion != Criterion::kWellSpaced) {
     return true;
   }
   edge_limit_sq_ = std::numeric_limits<double>::infinity();
@@ -269,8 +270,8 @@ bool Mender::KeepsNearestNeighbours(const Point<3>& p, VertexId moved) {
 }
 
 // The largest cosine of the tetrahedron that vertex `v` at `p` makes with a facet; kForbidden if it is not below
-// `limit`, or the demands do not allow for it.
-double Mender::TryFacet(const Cavity::Facet& facet, const Point<3>& p, VertexId v, double limit) const {
+// `limit`, or the criteria do not allow for it.
+double Repairer::TryFacet(const Cavity::Facet& facet, const Point<3>& p, VertexId v, double limit) const {
   std::array<VertexId, 4> vertices = triangulation_.item(facet.simplex).vertices;
   Simplex<3> corners = triangulation_.Corners(facet.simplex);
   vertices[facet.slot] = v;
@@ -280,8 +281,8 @@ double Mender::TryFacet(const Cavity::Facet& facet, const Point<3>& p, VertexId 
 }
 
 // The largest cosine in the star of vertex `v` at `p`, which is in conflict with `from`; kForbidden if one is not below
-// `limit`, or the demands do not allow for it. Else the cavity has been found.
-double Mender::TryAt(SimplexId from, const Point<3>& p, VertexId v, double limit) {
+// `limit`, or the criteria do not allow for it. Else the cavity has been found.
+double Repairer::TryAt(SimplexId from, const Point<3>& p, VertexId v, double limit) {
   edge_limit_sq_ = std::numeric_limits<double>::infinity();
   if (FailsAtSuspect(p, v, limit)) {
     return kForbidden;
@@ -300,7 +301,7 @@ double Mender::TryAt(SimplexId from, const Point<3>& p, VertexId v, double limit
     suspects_.insert(suspects_.begin(), cavity_.boundary.back());
     return kForbidden;
   }
-  if (demands_.demands.criterion == Criterion::kWellSpaced &&
+  if (criteria_.criteria.criterion == Criterion::kWellSpaced &&
       !(KeepsNearestNeighbours(p, v) &&
         std::all_of(cavity_.boundary.begin(), cavity_.boundary.end(),
                     [&](const Cavity::Facet& facet) { return TryFacet(facet, p, v, limit) != kForbidden; }))) {
@@ -311,7 +312,7 @@ double Mender::TryAt(SimplexId from, const Point<3>& p, VertexId v, double limit
 
 // Whether the boundary of the cavity of `p` surely has a facet for which TryAt returns kForbidden: one for which it did
 // lately.
-bool Mender::FailsAtSuspect(const Point<3>& p, VertexId v, double limit) {
+bool Repairer::FailsAtSuspect(const Point<3>& p, VertexId v, double limit) {
   for (auto facet = suspects_.begin(); facet != suspects_.end(); ++facet) {
     const SimplexId beyond = triangulation_.item(facet->simplex).neighbours[facet->slot];
     if (beyond != kNoSimplex && triangulation_.IsInConflict(facet->simplex, p) &&
@@ -324,7 +325,7 @@ bool Mender::FailsAtSuspect(const Point<3>& p, VertexId v, double limit) {
 }
 
 // Measures new tetrahedra; slivers among them will be looked at.
-void Mender::Note(std::span<const SimplexId> created) {
+void Repairer::Note(std::span<const SimplexId> created) {
   cosine_.resize(triangulation_.simplex_limit());
   is_changed_.resize(triangulation_.vertex_count());
   for (const SimplexId s : created) {
@@ -343,7 +344,7 @@ void Mender::Note(std::span<const SimplexId> created) {
 }
 
 // Tells whose stars have changed since the last time.
-void Mender::ReportStars() {
+void Repairer::ReportStars() {
   for (const VertexId v : changed_) {
     is_changed_[Index(v)] = false;
     observer_.StarChanged(v);
@@ -352,7 +353,7 @@ void Mender::ReportStars() {
 }
 
 // SplitMix64: Steele, Lea and Flood 2014.
-Point<3> Mender::RandomInBall() {
+Point<3> Repairer::RandomInBall() {
   Point<3> p;
   do {
     for (double& x : p) {
@@ -367,7 +368,7 @@ Point<3> Mender::RandomInBall() {
 }
 
 // Moves vertices of the sliver, or next to it. Returns whether the sliver has gone.
-bool Mender::Mend(const Sliver& sliver, const Effort& effort) {
+bool Repairer::MoveVertices(const Sliver& sliver, const Effort& effort) {
   for (const VertexId v : sliver.vertices) {
     if (!is_fixed_[Index(v)] && Move(v, sliver, effort.samples)) {
       return true;
@@ -389,7 +390,7 @@ bool Mender::Mend(const Sliver& sliver, const Effort& effort) {
 // Looks for a better place of `v` nearby or, if it is no vertex of the sliver, on the way to the sliver's circumcentre,
 // such that the sliver goes and all that replaces what the move destroys is better than the flattest of that. Returns
 // whether it has moved.
-bool Mender::Move(VertexId v, const Sliver& sliver, int samples) {
+bool Repairer::Move(VertexId v, const Sliver& sliver, int samples) {
   const Point<3> from = triangulation_.point(v);
   const FaceMask faces = triangulation_.faces(v);
   const Box<3>& box = triangulation_.box();
@@ -486,7 +487,7 @@ bool Mender::Move(VertexId v, const Sliver& sliver, int samples) {
 }
 
 // Adds a vertex in the sliver's circumball: of the places whose star is good, that which does away with most slivers.
-absl::Status Mender::Insert(const Sliver& sliver, const Effort& effort) {
+absl::Status Repairer::Insert(const Sliver& sliver, const Effort& effort) {
   const TetrahedronMeasure measure = MeasureSliver(triangulation_.Corners(sliver.simplex));
   const Box<3>& box = triangulation_.box();
   const VertexId v{triangulation_.vertex_count()};
@@ -520,9 +521,9 @@ absl::Status Mender::Insert(const Sliver& sliver, const Effort& effort) {
   if (most == 0) {
     return absl::OkStatus();
   }
-  if (triangulation_.vertex_count() >= demands_.max_vertices) {
-    return absl::ResourceExhaustedError(absl::StrCat("min_dihedral = ", demands_.min_dihedral,
-                                                     " needs more than max_vertices = ", demands_.max_vertices,
+  if (triangulation_.vertex_count() >= criteria_.max_vertices) {
+    return absl::ResourceExhaustedError(absl::StrCat("min_dihedral = ", criteria_.min_dihedral,
+                                                     " needs more than max_vertices = ", criteria_.max_vertices,
                                                      " vertices; raise max_vertices or lower min_dihedral"));
   }
   triangulation_.FindCavity(sliver.simplex, to, cavity_);
