@@ -221,7 +221,7 @@ Progress ProgressFromProto(const v1::ProgressEvent& event) {
 }
 
 MeshHeader HeaderFromProto(const v1::MeshMetadata& metadata) {
-  return MeshHeader{.dimension = metadata.dimension(),
+  MeshHeader header{.dimension = metadata.dimension(),
                     .domain_low = VectorOf(metadata.domain().low()),
                     .domain_high = VectorOf(metadata.domain().high()),
                     .vertex_count = metadata.vertex_count(),
@@ -231,7 +231,19 @@ MeshHeader HeaderFromProto(const v1::MeshMetadata& metadata) {
                     .revision = metadata.revision(),
                     .has_weights = metadata.has_weights(),
                     .moved_vertex_count = metadata.moved_vertex_count(),
+                    .boundary = {},
+                    .facet_count = metadata.facet_count(),
+                    .regions = {},
+                    .has_simplex_regions = metadata.has_simplex_regions(),
+                    .has_vertex_marks = metadata.has_vertex_marks(),
                     .statistics = StatisticsFromProto(metadata.statistics())};
+  for (const v1::BoundaryPart& part : metadata.boundary()) {
+    header.boundary.push_back({part.tag(), part.name(), part.facet_count()});
+  }
+  for (const v1::Region& region : metadata.regions()) {
+    header.regions.push_back({region.id(), region.name()});
+  }
+  return header;
 }
 
 ServerInfo InfoFromProto(const v1::GetServerInfoResponse& response) {

@@ -14,9 +14,9 @@ namespace {
 using MeshPointsStream = grpc::ClientReaderWriter<v1::MeshPointsRequest, v1::MeshPointsResponse>;
 
 // Sends everything and half-closes. Stops early when the call has ended; its status says why.
+// `request` is the first message, but for the parameters.
 template <typename Request, typename Stream>
-void Upload(const MeshOptions& options, std::span<const double> points, Stream& stream) {
-  Request request;
+void Upload(const MeshOptions& options, std::span<const double> points, Request request, Stream& stream) {
   SetParameters(options, request.mutable_parameters());
   if (!stream.Write(request)) {
     return;
@@ -43,7 +43,9 @@ absl::Status GrpcConnection::MeshPoints(const MeshOptions& options, std::span<co
     CallContext context(attempt);
     const std::unique_ptr<MeshPointsStream> stream = meshing_->MeshPoints(context.get());
     // Points go up while answers come down: the server may fail the call before it has all.
-    std::jthread uploader([&] { Upload<v1::MeshPointsRequest>(options, points, *stream); });
+    v1::MeshPointsRequest first;
+    first.set_with_boundary(sink.WantsBoundary());
+    std::jthread uploader([&] { Upload(options, points, first, *stream); });
     MeshReceiver receiver(sink, {.dimension = dimension, .input_points = points.size() / dimension});
     absl::Status damage;
     bool has_begun = false;  // the work: it is not done twice
@@ -82,7 +84,7 @@ absl::StatusOr<MeshEstimate> GrpcConnection::EstimateMesh(const MeshOptions& opt
     RequestWriter<v1::EstimateMeshRequest> stream([&](grpc::CompletionQueue* queue) {
       return meshing_->PrepareAsyncEstimateMesh(context.get(), &response, queue);
     });
-    Upload<v1::EstimateMeshRequest>(options, points, stream);
+    Upload(options, points, v1::EstimateMeshRequest(), stream);
     return FromGrpcStatus(stream.Finish());
   });
   if (!status.ok()) {

@@ -170,6 +170,7 @@ absl::Status GrpcConnection::DownloadMesh(const std::string& session, MeshSink& 
     request.set_name(session);
     request.set_revision(receiver.has_metadata() ? receiver.header().revision : revision);
     request.set_next_chunk(receiver.next_chunk());
+    request.set_with_boundary(sink.WantsBoundary());
     receiver.Continue();
     CallContext context(attempt);
     const std::unique_ptr<grpc::ClientReader<v1::DownloadMeshResponse>> stream =

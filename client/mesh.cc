@@ -6,6 +6,8 @@ absl::Status MeshCollector::Begin(const MeshHeader& header) {
   mesh_.dimension = header.dimension;
   mesh_.domain_low = header.domain_low;
   mesh_.domain_high = header.domain_high;
+  mesh_.boundary = header.boundary;
+  mesh_.regions = header.regions;
   mesh_.statistics = header.statistics;
   return absl::OkStatus();
 }
@@ -32,6 +34,26 @@ absl::Status MeshCollector::AddSimplices(std::span<const uint32_t> simplices) {
 
 absl::Status MeshCollector::AddInputVertices(std::span<const uint32_t> vertices) {
   mesh_.input_vertex.insert(mesh_.input_vertex.end(), vertices.begin(), vertices.end());
+  return absl::OkStatus();
+}
+
+absl::Status MeshCollector::AddVertexOrigins(std::span<const uint32_t> origins) {
+  mesh_.vertex_origins.insert(mesh_.vertex_origins.end(), origins.begin(), origins.end());
+  return absl::OkStatus();
+}
+
+absl::Status MeshCollector::AddVertexTags(std::span<const int32_t> tags) {
+  mesh_.vertex_tags.insert(mesh_.vertex_tags.end(), tags.begin(), tags.end());
+  return absl::OkStatus();
+}
+
+absl::Status MeshCollector::AddSimplexRegions(std::span<const int32_t> regions) {
+  mesh_.simplex_regions.insert(mesh_.simplex_regions.end(), regions.begin(), regions.end());
+  return absl::OkStatus();
+}
+
+absl::Status MeshCollector::AddFacets(std::span<const uint32_t> facets) {
+  mesh_.facets.insert(mesh_.facets.end(), facets.begin(), facets.end());
   return absl::OkStatus();
 }
 

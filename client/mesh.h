@@ -93,6 +93,28 @@ struct MeshStatistics {
   std::map<std::string, uint64_t> counters;
 };
 
+// Where a vertex comes from, if it is no input point; see the proto's MeshChunk.vertex_origins.
+inline constexpr uint32_t kSteinerOrigin = 0xffff'ffff;  // the refinement
+inline constexpr uint32_t kRepairOrigin = 0xffff'fffe;   // the repair of slivers
+inline constexpr uint32_t kCornerOrigin = 0xffff'fffd;   // it is a corner of the box
+
+// Facets of the boundary with a tag in common; see the proto's BoundaryPart.
+struct BoundaryPart {
+  int32_t tag = 0;
+  std::string name;
+  uint64_t facet_count = 0;
+
+  bool operator==(const BoundaryPart&) const = default;
+};
+
+// Simplices of one material; see the proto's Region.
+struct Region {
+  int32_t id = 0;
+  std::string name;
+
+  bool operator==(const Region&) const = default;
+};
+
 // What is known of a mesh before its arrays.
 struct MeshHeader {
   int dimension = 0;
@@ -105,6 +127,12 @@ struct MeshHeader {
   uint64_t revision = 0;  // of the session's mesh; 0 in the answer of MeshPoints
   bool has_weights = false;
   uint64_t moved_vertex_count = 0;  // see the proto's MeshChunk.moved_vertices
+  // Nothing of the following where the sink does not want the boundary, or the server is too old to know of it.
+  std::vector<BoundaryPart> boundary;
+  uint64_t facet_count = 0;  // of all parts
+  std::vector<Region> regions;
+  bool has_simplex_regions = false;  // if not, all are of the only region
+  bool has_vertex_marks = false;
   MeshStatistics statistics;
 };
 
@@ -118,6 +146,13 @@ struct Mesh {
   std::vector<uint32_t> input_vertex;  // per input point: the vertex it became
   // The vertices that the session's mesh before had at another place, ascending.
   std::vector<uint32_t> moved_vertices;
+  // As the proto's MeshChunk and MeshMetadata have them; empty where the server is too old for them.
+  std::vector<uint32_t> vertex_origins;  // the number of an input point, or an origin as above
+  std::vector<int32_t> vertex_tags;      // 0: inside
+  std::vector<uint32_t> facets;          // facet_count x dimension, part after part
+  std::vector<BoundaryPart> boundary;
+  std::vector<int32_t> simplex_regions;  // empty: all are of the only region
+  std::vector<Region> regions;
   MeshStatistics statistics;
 };
 
@@ -134,6 +169,9 @@ class MeshSink {
   MeshSink(const MeshSink&) = delete;
   MeshSink& operator=(const MeshSink&) = delete;
 
+  // Whether the server is asked for the boundary, the regions and the origins of vertices, too.
+  virtual bool WantsBoundary() const { return false; }
+
   virtual absl::Status Begin(const MeshHeader& header) = 0;
   // Rows of `dimension` coordinates.
   virtual absl::Status AddPoints(std::span<const double> points) = 0;
@@ -141,10 +179,17 @@ class MeshSink {
   virtual absl::Status AddMovedVertices(std::span<const uint32_t> /*vertices*/) { return absl::OkStatus(); }
   // The next vertices' weights, if the header has_weights.
   virtual absl::Status AddWeights(std::span<const double> weights) = 0;
+  // The next vertices' origins, then the next vertices' tags, if the header has_vertex_marks.
+  virtual absl::Status AddVertexOrigins(std::span<const uint32_t> /*origins*/) { return absl::OkStatus(); }
+  virtual absl::Status AddVertexTags(std::span<const int32_t> /*tags*/) { return absl::OkStatus(); }
+  // The next simplices' regions, if the header has_simplex_regions.
+  virtual absl::Status AddSimplexRegions(std::span<const int32_t> /*regions*/) { return absl::OkStatus(); }
   // Rows of dimension + 1 vertices.
   virtual absl::Status AddSimplices(std::span<const uint32_t> simplices) = 0;
   // For the next input points the vertices that they became.
   virtual absl::Status AddInputVertices(std::span<const uint32_t> vertices) = 0;
+  // Rows of `dimension` vertices: the facets of the header's first part of the boundary, then those of its second, …
+  virtual absl::Status AddFacets(std::span<const uint32_t> /*facets*/) { return absl::OkStatus(); }
   // The mesh is complete.
   virtual absl::Status Finish() = 0;
 };
@@ -154,12 +199,17 @@ class MeshSink {
 // Thread safety: thread-compatible.
 class MeshCollector final : public MeshSink {
  public:
+  bool WantsBoundary() const override { return true; }
   absl::Status Begin(const MeshHeader& header) override;
   absl::Status AddPoints(std::span<const double> points) override;
   absl::Status AddMovedVertices(std::span<const uint32_t> vertices) override;
   absl::Status AddWeights(std::span<const double> weights) override;
+  absl::Status AddVertexOrigins(std::span<const uint32_t> origins) override;
+  absl::Status AddVertexTags(std::span<const int32_t> tags) override;
+  absl::Status AddSimplexRegions(std::span<const int32_t> regions) override;
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override;
   absl::Status AddInputVertices(std::span<const uint32_t> vertices) override;
+  absl::Status AddFacets(std::span<const uint32_t> facets) override;
   absl::Status Finish() override { return absl::OkStatus(); }
 
   // What has been collected; to be moved from when the mesh is complete.

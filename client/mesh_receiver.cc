@@ -1,6 +1,8 @@
 #include "client/mesh_receiver.h"
 
+#include <algorithm>
 #include <limits>
+#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -23,7 +25,8 @@ constexpr uint64_t kMaxSimplices = uint64_t{1} << 40;
 constexpr uint64_t kMaxInputPoints = uint64_t{1} << 40;
 constexpr int kMaxDimension = 64;
 
-constexpr const char* kArrayNames[] = {"points", "weights", "simplices", "input vertices"};
+constexpr const char* kArrayNames[] = {"points",          "weights",   "vertex origins", "vertex tags",
+                                       "simplex regions", "simplices", "input vertices", "facets"};
 
 template <typename T>
 std::span<const T> SpanOf(const google::protobuf::RepeatedField<T>& values) {
@@ -45,18 +48,54 @@ absl::Status CheckVertices(const google::protobuf::RepeatedField<uint32_t>& vert
   return absl::OkStatus();
 }
 
+// Calls visit(values) with what the chunk has of the array number `array`, in the order of MeshReceiver::Array.
+template <typename Visit>
+auto VisitArray(const v1::MeshChunk& chunk, int array, Visit visit) {
+  switch (array) {
+    case 0:
+      return visit(chunk.points());
+    case 1:
+      return visit(chunk.weights());
+    case 2:
+      return visit(chunk.vertex_origins());
+    case 3:
+      return visit(chunk.vertex_tags());
+    case 4:
+      return visit(chunk.simplex_regions());
+    case 5:
+      return visit(chunk.simplices());
+    case 6:
+      return visit(chunk.input_vertices());
+    default:
+      return visit(chunk.facets());
+  }
+}
+
+bool IsTheSame(const MeshHeader& a, const MeshHeader& b) {
+  return a.revision == b.revision && a.dimension == b.dimension && a.vertex_count == b.vertex_count &&
+         a.simplex_count == b.simplex_count && a.input_point_count == b.input_point_count &&
+         a.chunk_count == b.chunk_count && a.has_weights == b.has_weights &&
+         a.moved_vertex_count == b.moved_vertex_count && a.boundary == b.boundary && a.regions == b.regions &&
+         a.has_simplex_regions == b.has_simplex_regions && a.has_vertex_marks == b.has_vertex_marks;
+}
+
 }  // namespace
 
 uint64_t MeshReceiver::WidthOf(int array) const {
-  return array == kPoints ? header_.dimension : array == kSimplices ? header_.dimension + 1 : 1;
+  return array == kPoints || array == kFacets ? header_.dimension : array == kSimplices ? header_.dimension + 1 : 1;
 }
 
 uint64_t MeshReceiver::SizeOf(int array) const {
-  const uint64_t rows = array == kPoints      ? header_.vertex_count
-                        : array == kWeights   ? (header_.has_weights ? header_.vertex_count : 0)
-                        : array == kSimplices ? header_.simplex_count
-                                              : header_.input_point_count;
-  return rows * WidthOf(array);
+  const auto if_any = [](bool are_there, uint64_t rows) { return are_there ? rows : 0; };
+  const std::array<uint64_t, kArrays> rows = {header_.vertex_count,
+                                              if_any(header_.has_weights, header_.vertex_count),
+                                              if_any(header_.has_vertex_marks, header_.vertex_count),
+                                              if_any(header_.has_vertex_marks, header_.vertex_count),
+                                              if_any(header_.has_simplex_regions, header_.simplex_count),
+                                              header_.simplex_count,
+                                              header_.input_point_count,
+                                              header_.facet_count};
+  return rows[array] * WidthOf(array);
 }
 
 absl::Status MeshReceiver::CheckMetadata(const MeshHeader& header) const {
@@ -77,6 +116,28 @@ absl::Status MeshReceiver::CheckMetadata(const MeshHeader& header) const {
   if (expectation_.input_points.has_value() && header.input_point_count != *expectation_.input_points) {
     return Contradiction("a mesh of ", header.input_point_count, " points; ", *expectation_.input_points, " were sent");
   }
+  return CheckBoundary(header);
+}
+
+absl::Status MeshReceiver::CheckBoundary(const MeshHeader& header) const {
+  uint64_t facets = 0;
+  std::set<int32_t> tags;
+  for (const BoundaryPart& part : header.boundary) {
+    facets += std::min(part.facet_count, kMaxSimplices);
+    if (part.tag <= 0 || !tags.insert(part.tag).second || part.facet_count > kMaxSimplices) {
+      return Contradiction("a part of the boundary with the tag ", part.tag, " and ", part.facet_count,
+                           " facets; tags are above 0, each once");
+    }
+  }
+  if (facets != header.facet_count || header.facet_count > kMaxSimplices) {
+    return Contradiction("parts of the boundary with ", facets, " facets, ", header.facet_count, " in all");
+  }
+  std::set<int32_t> regions;
+  for (const Region& region : header.regions) {
+    if (region.id <= 0 || !regions.insert(region.id).second) {
+      return Contradiction("a region with the id ", region.id, "; ids are above 0, each once");
+    }
+  }
   return absl::OkStatus();
 }
 
@@ -90,15 +151,11 @@ absl::Status MeshReceiver::SetMetadata(const v1::MeshMetadata& metadata) {
     return status;
   }
   if (has_metadata_) {
-    const bool is_the_same =
-        header.revision == header_.revision && header.dimension == header_.dimension &&
-        header.vertex_count == header_.vertex_count && header.simplex_count == header_.simplex_count &&
-        header.input_point_count == header_.input_point_count && header.chunk_count == header_.chunk_count &&
-        header.has_weights == header_.has_weights && header.moved_vertex_count == header_.moved_vertex_count;
-    return is_the_same ? absl::OkStatus()
-                       : Contradiction("a continued download of another mesh: revision ", header.revision, " with ",
-                                       header.vertex_count, " vertices after revision ", header_.revision, " with ",
-                                       header_.vertex_count);
+    return IsTheSame(header, header_)
+               ? absl::OkStatus()
+               : Contradiction("a continued download of another mesh: revision ", header.revision, " with ",
+                               header.vertex_count, " vertices after revision ", header_.revision, " with ",
+                               header_.vertex_count);
   }
   has_metadata_ = true;
   header_ = std::move(header);
@@ -152,33 +209,28 @@ absl::Status MeshReceiver::AddChunk(const v1::MeshChunk& chunk) {
     return Contradiction("chunk ", chunk.index(), " where chunk ", next_chunk_, " of ", header_.chunk_count,
                          " was expected");
   }
-  const int arrays =
-      !chunk.points().empty() + !chunk.weights().empty() + !chunk.simplices().empty() + !chunk.input_vertices().empty();
+  int arrays = 0;
+  Array array = kPoints;
+  for (int candidate = 0; candidate < kArrays; ++candidate) {
+    if (VisitArray(chunk, candidate, [](const auto& values) { return !values.empty(); })) {
+      array = static_cast<Array>(candidate);
+      ++arrays;
+    }
+  }
   if (arrays != 1) {
     return Contradiction("chunk ", chunk.index(), " has ", arrays, " arrays; expected one");
   }
-  const Array array = !chunk.points().empty()      ? kPoints
-                      : !chunk.weights().empty()   ? kWeights
-                      : !chunk.simplices().empty() ? kSimplices
-                                                   : kInputVertices;
-  const uint32_t checksum = array == kPoints      ? ChecksumOf(chunk.points())
-                            : array == kWeights   ? ChecksumOf(chunk.weights())
-                            : array == kSimplices ? ChecksumOf(chunk.simplices())
-                                                  : ChecksumOf(chunk.input_vertices());
+  const uint32_t checksum = VisitArray(chunk, array, [](const auto& values) { return ChecksumOf(values); });
   if (checksum != chunk.crc32c()) {
     return Contradiction("chunk ", chunk.index(), " has the CRC32C ", absl::Hex(checksum, absl::kZeroPad8), ", not ",
                          absl::Hex(chunk.crc32c(), absl::kZeroPad8), " as sent");
   }
-  const uint64_t values = array == kPoints      ? chunk.points_size()
-                          : array == kWeights   ? chunk.weights_size()
-                          : array == kSimplices ? chunk.simplices_size()
-                                                : chunk.input_vertices_size();
-  absl::Status status = CheckOrder(array, values);
-  if (status.ok() && (array == kSimplices || array == kInputVertices)) {
-    status = CheckVertices(array == kSimplices ? chunk.simplices() : chunk.input_vertices(), header_.vertex_count,
-                           kArrayNames[array]);
+  const uint64_t values =
+      VisitArray(chunk, array, [](const auto& array_values) -> uint64_t { return array_values.size(); });
+  if (absl::Status status = CheckOrder(array, values); !status.ok()) {
+    return status;
   }
-  if (!status.ok()) {
+  if (absl::Status status = CheckValues(array, chunk); !status.ok()) {
     return status;
   }
   if (absl::Status moved = CheckMoved(chunk, array == kPoints ? received_[kPoints] / WidthOf(kPoints) : 0);
@@ -188,6 +240,46 @@ absl::Status MeshReceiver::AddChunk(const v1::MeshChunk& chunk) {
   ++next_chunk_;
   moved_ += chunk.moved_vertices_size();
   received_[array] += values;
+  return Pass(array, chunk);
+}
+
+absl::Status MeshReceiver::CheckValues(Array array, const v1::MeshChunk& chunk) const {
+  switch (array) {
+    case kSimplices:
+      return CheckVertices(chunk.simplices(), header_.vertex_count, kArrayNames[array]);
+    case kInputVertices:
+      return CheckVertices(chunk.input_vertices(), header_.vertex_count, kArrayNames[array]);
+    case kFacets:
+      return CheckVertices(chunk.facets(), header_.vertex_count, kArrayNames[array]);
+    case kVertexOrigins:
+      for (const uint32_t origin : chunk.vertex_origins()) {
+        if (origin >= header_.input_point_count && origin < kCornerOrigin) {
+          return Contradiction(kArrayNames[array], " name input point ", origin, " of ", header_.input_point_count);
+        }
+      }
+      return absl::OkStatus();
+    case kVertexTags:
+      for (const int32_t tag : chunk.vertex_tags()) {
+        const auto has_tag = [tag](const BoundaryPart& part) { return part.tag == tag; };
+        if (tag != 0 && std::none_of(header_.boundary.begin(), header_.boundary.end(), has_tag)) {
+          return Contradiction(kArrayNames[array], " name the tag ", tag, ", which no part of the boundary has");
+        }
+      }
+      return absl::OkStatus();
+    case kSimplexRegions:
+      for (const int32_t id : chunk.simplex_regions()) {
+        const auto has_id = [id](const Region& region) { return region.id == id; };
+        if (std::none_of(header_.regions.begin(), header_.regions.end(), has_id)) {
+          return Contradiction(kArrayNames[array], " name the region ", id, ", which there is not");
+        }
+      }
+      return absl::OkStatus();
+    default:
+      return absl::OkStatus();
+  }
+}
+
+absl::Status MeshReceiver::Pass(Array array, const v1::MeshChunk& chunk) {
   switch (array) {
     case kPoints:
       if (absl::Status added = sink_.AddPoints(SpanOf(chunk.points())); !added.ok() || chunk.moved_vertices().empty()) {
@@ -196,10 +288,18 @@ absl::Status MeshReceiver::AddChunk(const v1::MeshChunk& chunk) {
       return sink_.AddMovedVertices(SpanOf(chunk.moved_vertices()));
     case kWeights:
       return sink_.AddWeights(SpanOf(chunk.weights()));
+    case kVertexOrigins:
+      return sink_.AddVertexOrigins(SpanOf(chunk.vertex_origins()));
+    case kVertexTags:
+      return sink_.AddVertexTags(SpanOf(chunk.vertex_tags()));
+    case kSimplexRegions:
+      return sink_.AddSimplexRegions(SpanOf(chunk.simplex_regions()));
     case kSimplices:
       return sink_.AddSimplices(SpanOf(chunk.simplices()));
-    default:
+    case kInputVertices:
       return sink_.AddInputVertices(SpanOf(chunk.input_vertices()));
+    default:
+      return sink_.AddFacets(SpanOf(chunk.facets()));
   }
 }
 

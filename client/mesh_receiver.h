@@ -46,14 +46,29 @@ class MeshReceiver {
 
  private:
   // The arrays, in their order.
-  enum Array { kPoints, kWeights, kSimplices, kInputVertices, kArrays };
+  enum Array {
+    kPoints,
+    kWeights,
+    kVertexOrigins,
+    kVertexTags,
+    kSimplexRegions,
+    kSimplices,
+    kInputVertices,
+    kFacets,
+    kArrays
+  };
 
   absl::Status CheckMetadata(const MeshHeader& header) const;
+  absl::Status CheckBoundary(const MeshHeader& header) const;
   uint64_t WidthOf(int array) const;
   uint64_t SizeOf(int array) const;  // in numbers
   // Whether `values` may follow what has come of `array`.
   absl::Status CheckOrder(Array array, uint64_t values) const;
   absl::Status CheckMoved(const v1::MeshChunk& chunk, uint64_t first) const;
+  // Whether the values can be those of the array: vertices that there are, tags and regions that were announced.
+  absl::Status CheckValues(Array array, const v1::MeshChunk& chunk) const;
+  // Hands what is right to the sink.
+  absl::Status Pass(Array array, const v1::MeshChunk& chunk);
 
   MeshSink& sink_;
   const Expectation expectation_;

@@ -24,16 +24,6 @@ constexpr uint64_t kEnvelopeBytes = 64;
 // Chunks that a stream holds a copy of: one that is written, one in the buffers of the connection.
 constexpr uint64_t kChunksOnTheirWay = 2;
 
-uint64_t DivideUp(uint64_t dividend, uint64_t divisor) { return (dividend + divisor - 1) / divisor; }
-
-// Rows [begin, begin + rows) of `values` (rows of `width` numbers), cut at the end.
-template <typename T>
-MeshChunks::Chunk Rows(int field, const core::HugeVector<T>& values, uint64_t width, uint64_t begin, uint64_t rows) {
-  const uint64_t first = begin * width;
-  const uint64_t last = std::min<uint64_t>(values.size(), (begin + rows) * width);
-  return {.field = field, .data = values.data() + first, .size = (last - first) * sizeof(T)};
-}
-
 // What a field of `size` bytes begins with.
 std::string TagOf(int field, uint64_t size) {
   std::string tag;
@@ -49,50 +39,67 @@ std::string TagOf(int field, uint64_t size) {
 
 MeshChunks::MeshChunks(core::Mesh mesh, uint64_t max_bytes) : mesh_(std::move(mesh)) {
   const uint64_t bytes = std::max(max_bytes, 2 * kEnvelopeBytes) - kEnvelopeBytes;
+  const auto add = [&](int field, const auto& values, uint64_t width, bool is_of_boundary, uint64_t bytes_beside = 0) {
+    const uint64_t row_bytes = sizeof(values[0]) * width;
+    arrays_.push_back({.field = field,
+                       .is_of_boundary = is_of_boundary,
+                       .data = values.data(),
+                       .row_bytes = row_bytes,
+                       .rows = values.size() / width,
+                       .rows_per_chunk = bytes / (row_bytes + bytes_beside)});
+  };
+  const uint64_t dimension = mesh_.dimension;
   // Beside each point that has moved stands its number.
-  points_per_chunk_ =
-      bytes / (sizeof(double) * mesh_.dimension + (mesh_.moved_vertices.empty() ? 0 : sizeof(uint32_t)));
-  simplices_per_chunk_ = bytes / (sizeof(uint32_t) * (mesh_.dimension + 1));
-  weights_per_chunk_ = bytes / sizeof(double);
-  inputs_per_chunk_ = bytes / sizeof(uint32_t);
-  point_chunks_ = DivideUp(mesh_.vertex_count(), points_per_chunk_);
-  weight_chunks_ = DivideUp(mesh_.weights.size(), weights_per_chunk_);
-  simplex_chunks_ = DivideUp(mesh_.simplex_count(), simplices_per_chunk_);
-  input_chunks_ = DivideUp(mesh_.input_vertex.size(), inputs_per_chunk_);
+  add(v1::MeshChunk::kPointsFieldNumber, mesh_.points, dimension, false,
+      mesh_.moved_vertices.empty() ? 0 : sizeof(uint32_t));
+  add(v1::MeshChunk::kWeightsFieldNumber, mesh_.weights, 1, false);
+  add(v1::MeshChunk::kVertexOriginsFieldNumber, mesh_.vertex_origins, 1, true);
+  add(v1::MeshChunk::kVertexTagsFieldNumber, mesh_.vertex_tags, 1, true);
+  add(v1::MeshChunk::kSimplexRegionsFieldNumber, mesh_.simplex_regions, 1, true);
+  add(v1::MeshChunk::kSimplicesFieldNumber, mesh_.simplices, dimension + 1, false);
+  add(v1::MeshChunk::kInputVerticesFieldNumber, mesh_.input_vertex, 1, false);
+  add(v1::MeshChunk::kFacetsFieldNumber, mesh_.facets, dimension, true);
 }
 
 uint64_t MeshChunks::memory_bytes() const {
+  const uint64_t indices = mesh_.simplices.capacity() + mesh_.input_vertex.capacity() +
+                           mesh_.moved_vertices.capacity() + mesh_.vertex_origins.capacity() + mesh_.facets.capacity();
   return kChunksOnTheirWay * kMaxResponseBytes + (mesh_.points.capacity() + mesh_.weights.capacity()) * sizeof(double) +
-         (mesh_.simplices.capacity() + mesh_.input_vertex.capacity() + mesh_.moved_vertices.capacity()) *
-             sizeof(uint32_t);
+         indices * sizeof(uint32_t) +
+         (mesh_.vertex_tags.capacity() + mesh_.simplex_regions.capacity()) * sizeof(int32_t);
 }
 
-MeshChunks::Chunk MeshChunks::Get(uint64_t index) const {
-  if (index < point_chunks_) {
-    const uint64_t first = index * points_per_chunk_;
-    Chunk chunk = Rows(v1::MeshChunk::kPointsFieldNumber, mesh_.points, mesh_.dimension, first, points_per_chunk_);
+uint64_t MeshChunks::count(bool with_boundary) const {
+  uint64_t count = 0;
+  for (const Array& array : arrays_) {
+    count += with_boundary || !array.is_of_boundary ? array.chunks() : 0;
+  }
+  return count;
+}
+
+MeshChunks::Chunk MeshChunks::Get(uint64_t index, bool with_boundary) const {
+  auto array = arrays_.begin();
+  while ((array->is_of_boundary && !with_boundary) || index >= array->chunks()) {
+    index -= array->is_of_boundary && !with_boundary ? 0 : array->chunks();
+    ++array;
+  }
+  const uint64_t first = index * array->rows_per_chunk;
+  const uint64_t last = std::min(array->rows, first + array->rows_per_chunk);
+  Chunk chunk{.field = array->field,
+              .data = static_cast<const char*>(array->data) + first * array->row_bytes,
+              .size = (last - first) * array->row_bytes};
+  if (array->field == v1::MeshChunk::kPointsFieldNumber) {
     const auto& moved = mesh_.moved_vertices;
     const auto begin = std::lower_bound(moved.begin(), moved.end(), first);
-    chunk.moved = {begin, std::lower_bound(begin, moved.end(), first + points_per_chunk_)};
-    return chunk;
+    chunk.moved = {begin, std::lower_bound(begin, moved.end(), last)};
   }
-  index -= point_chunks_;
-  if (index < weight_chunks_) {
-    return Rows(v1::MeshChunk::kWeightsFieldNumber, mesh_.weights, 1, index * weights_per_chunk_, weights_per_chunk_);
-  }
-  index -= weight_chunks_;
-  if (index < simplex_chunks_) {
-    return Rows(v1::MeshChunk::kSimplicesFieldNumber, mesh_.simplices, mesh_.dimension + 1,
-                index * simplices_per_chunk_, simplices_per_chunk_);
-  }
-  index -= simplex_chunks_;
-  return Rows(v1::MeshChunk::kInputVerticesFieldNumber, mesh_.input_vertex, 1, index * inputs_per_chunk_,
-              inputs_per_chunk_);
+  return chunk;
 }
 
 // The arrays are the last fields of a chunk: what stands before them is small, and they follow as they are.
-grpc::ByteBuffer SerializeChunk(const std::shared_ptr<const MeshChunks>& mesh, uint64_t index, int field) {
-  const MeshChunks::Chunk chunk = mesh->Get(index);
+grpc::ByteBuffer SerializeChunk(const std::shared_ptr<const MeshChunks>& mesh, uint64_t index, int field,
+                                bool with_boundary) {
+  const MeshChunks::Chunk chunk = mesh->Get(index, with_boundary);
   v1::MeshChunk message;
   message.set_index(index);
   message.set_crc32c(Crc32c(chunk.data, chunk.size));

@@ -6,6 +6,7 @@
 #include <memory>
 #include <span>
 #include <utility>
+#include <vector>
 
 #include "core/mesher.h"
 #include "grpcpp/support/byte_buffer.h"
@@ -17,7 +18,8 @@ namespace wellspace::server {
 // How a mesh is cut.
 //
 // Thread safety: const functions are thread-safe.
-// Invariants: the same mesh is always cut alike; each chunk fits into a response of kMaxResponseBytes.
+// Invariants: the same mesh is always cut alike; each chunk fits into a response of kMaxResponseBytes. Who asks for the
+//             boundary gets other chunks than who does not.
 class MeshChunks {
  public:
   // Some values of one array of the mesh, as they lie in memory and on the wire.
@@ -36,32 +38,38 @@ class MeshChunks {
   void KeepMemory(MemoryReservation memory) { memory_ = std::move(memory); }
 
   const core::Mesh& mesh() const { return mesh_; }
-  uint64_t count() const { return point_chunks_ + weight_chunks_ + simplex_chunks_ + input_chunks_; }
+  uint64_t count(bool with_boundary = false) const;
 
-  // REQUIRES:   index < count().
-  Chunk Get(uint64_t index) const;
+  // REQUIRES:   index < count(with_boundary).
+  Chunk Get(uint64_t index, bool with_boundary = false) const;
 
  private:
+  // An array of the mesh, cut into chunks of as many rows, but for the last.
+  struct Array {
+    int field = 0;  // of v1.MeshChunk
+    bool is_of_boundary = false;
+    const void* data = nullptr;
+    uint64_t row_bytes = 0;
+    uint64_t rows = 0;
+    uint64_t rows_per_chunk = 0;
+
+    uint64_t chunks() const { return (rows + rows_per_chunk - 1) / rows_per_chunk; }
+  };
+
   MemoryReservation memory_;
   core::Mesh mesh_;
-  uint64_t points_per_chunk_ = 0;     // rows
-  uint64_t simplices_per_chunk_ = 0;  // rows
-  uint64_t weights_per_chunk_ = 0;
-  uint64_t inputs_per_chunk_ = 0;
-  uint64_t point_chunks_ = 0;
-  uint64_t weight_chunks_ = 0;
-  uint64_t simplex_chunks_ = 0;
-  uint64_t input_chunks_ = 0;
+  std::vector<Array> arrays_;  // in the order in which they are sent
 };
 
 // A response that has nothing but the chunk number `index` of `mesh`, with its checksum, in field `field`: serialized
 // as protocol buffers would, but without a copy of the values. They are those of the mesh, which lives as long as the
 // answer.
 //
-// REQUIRES:   index < mesh->count().
+// REQUIRES:   index < mesh->count(with_boundary).
 // Guarantees: the same bytes whenever it is asked.
 // Complexity: one pass over the values, for the checksum.
-grpc::ByteBuffer SerializeChunk(const std::shared_ptr<const MeshChunks>& mesh, uint64_t index, int field);
+grpc::ByteBuffer SerializeChunk(const std::shared_ptr<const MeshChunks>& mesh, uint64_t index, int field,
+                                bool with_boundary = false);
 
 }  // namespace wellspace::server
 

@@ -253,7 +253,7 @@ google::protobuf::Timestamp TimeToProto(absl::Time time) {
   return message;
 }
 
-v1::MeshMetadata MetadataToProto(const core::Mesh& mesh, uint64_t chunk_count) {
+v1::MeshMetadata MetadataToProto(const core::Mesh& mesh, uint64_t chunk_count, bool with_boundary) {
   v1::MeshMetadata metadata;
   metadata.set_dimension(mesh.dimension);
   metadata.mutable_domain()->mutable_low()->Assign(mesh.domain_low.begin(), mesh.domain_low.end());
@@ -265,6 +265,23 @@ v1::MeshMetadata MetadataToProto(const core::Mesh& mesh, uint64_t chunk_count) {
   metadata.set_has_weights(!mesh.weights.empty());
   metadata.set_moved_vertex_count(mesh.moved_vertices.size());
   *metadata.mutable_statistics() = StatisticsToProto(mesh.statistics);
+  if (!with_boundary) {
+    return metadata;
+  }
+  for (const core::BoundaryPart& part : mesh.boundary) {
+    v1::BoundaryPart& message = *metadata.add_boundary();
+    message.set_tag(part.tag);
+    message.set_name(part.name);
+    message.set_facet_count(part.facets);
+  }
+  metadata.set_facet_count(mesh.facet_count());
+  for (const core::Region& region : mesh.regions) {
+    v1::Region& message = *metadata.add_regions();
+    message.set_id(region.id);
+    message.set_name(region.name);
+  }
+  metadata.set_has_simplex_regions(!mesh.simplex_regions.empty());
+  metadata.set_has_vertex_marks(!mesh.vertex_tags.empty());
   return metadata;
 }
 

@@ -28,8 +28,8 @@ v1::MeshParameters ParametersToProto(const core::MeshParameters& parameters);
 
 google::protobuf::Timestamp TimeToProto(absl::Time time);
 
-// The metadata of `mesh`, to be followed by `chunk_count` chunks.
-v1::MeshMetadata MetadataToProto(const core::Mesh& mesh, uint64_t chunk_count);
+// The metadata of `mesh`, to be followed by `chunk_count` chunks. `with_boundary`: as the request says.
+v1::MeshMetadata MetadataToProto(const core::Mesh& mesh, uint64_t chunk_count, bool with_boundary = false);
 
 v1::EstimateMeshResponse EstimateToProto(const core::MeshEstimate& estimate);
 

@@ -87,6 +87,51 @@ Answer WeightedAnswer() {
   return answer;
 }
 
+// The same with its boundary: two parts and an empty one, the second of two regions for the second triangle.
+Answer AnswerWithBoundary() {
+  Answer answer = GoodAnswer();
+  v1::MeshMetadata& metadata = answer.metadata;
+  const auto add_part = [&metadata](int32_t tag, const char* name, uint64_t facets) {
+    v1::BoundaryPart& part = *metadata.add_boundary();
+    part.set_tag(tag);
+    part.set_name(name);
+    part.set_facet_count(facets);
+  };
+  add_part(1, "xmin", 1);
+  add_part(2, "none", 0);
+  add_part(7, "rest", 3);
+  for (const int32_t id : {1, 4}) {
+    metadata.add_regions()->set_id(id);
+  }
+  metadata.set_facet_count(4);
+  metadata.set_has_simplex_regions(true);
+  metadata.set_has_vertex_marks(true);
+  metadata.set_chunk_count(8);
+  std::vector<v1::MeshChunk> chunks(4);
+  for (const uint32_t origin : {0u, kCornerOrigin, kSteinerOrigin, kRepairOrigin}) {
+    chunks[0].add_vertex_origins(origin);
+  }
+  chunks[0].set_crc32c(Crc32c(chunks[0].vertex_origins().data(), 4 * sizeof(uint32_t)));
+  for (const int32_t tag : {1, 7, 0, 7}) {
+    chunks[1].add_vertex_tags(tag);
+  }
+  chunks[1].set_crc32c(Crc32c(chunks[1].vertex_tags().data(), 4 * sizeof(int32_t)));
+  for (const int32_t id : {1, 4}) {
+    chunks[2].add_simplex_regions(id);
+  }
+  chunks[2].set_crc32c(Crc32c(chunks[2].simplex_regions().data(), 2 * sizeof(int32_t)));
+  for (const uint32_t vertex : {2, 0, 0, 1, 1, 3, 3, 2}) {
+    chunks[3].add_facets(vertex);
+  }
+  chunks[3].set_crc32c(Crc32c(chunks[3].facets().data(), 8 * sizeof(uint32_t)));
+  answer.chunks.insert(answer.chunks.begin() + 2, chunks.begin(), chunks.begin() + 3);
+  answer.chunks.push_back(chunks[3]);
+  for (uint64_t i = 0; i < answer.chunks.size(); ++i) {
+    answer.chunks[i].set_index(i);
+  }
+  return answer;
+}
+
 constexpr MeshReceiver::Expectation kOnePointIn2D = {.dimension = 2, .input_points = 1};
 
 absl::StatusOr<Mesh> Assemble(const Answer& answer) {
@@ -162,6 +207,66 @@ struct Damage {
   std::string message;  // a part of it
   std::function<void(Answer&)> spoil;
 };
+
+TEST(MeshReceiver, AssemblesTheBoundary) {
+  const absl::StatusOr<Mesh> mesh = Assemble(AnswerWithBoundary());
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_THAT(mesh->vertex_origins, ElementsAre(0, kCornerOrigin, kSteinerOrigin, kRepairOrigin));
+  EXPECT_THAT(mesh->vertex_tags, ElementsAre(1, 7, 0, 7));
+  EXPECT_THAT(mesh->simplex_regions, ElementsAre(1, 4));
+  EXPECT_THAT(mesh->facets, ElementsAre(2, 0, 0, 1, 1, 3, 3, 2));
+  EXPECT_THAT(mesh->boundary,
+              ElementsAre(BoundaryPart{1, "xmin", 1}, BoundaryPart{2, "none", 0}, BoundaryPart{7, "rest", 3}));
+  EXPECT_EQ(mesh->regions.size(), 2u);
+}
+
+// A server that knows of no boundary, as it was before there was one.
+TEST(MeshReceiver, NeedsNoBoundary) {
+  const absl::StatusOr<Mesh> mesh = Assemble(GoodAnswer());
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_TRUE(mesh->boundary.empty() && mesh->facets.empty() && mesh->vertex_tags.empty() && mesh->regions.empty());
+}
+
+// A fault in an answer with a boundary.
+TEST(MeshReceiver, RefusesADamagedBoundary) {
+  const auto message_of = [](const std::function<void(Answer&)>& damage) {
+    Answer answer = AnswerWithBoundary();
+    damage(answer);
+    const absl::Status status = Assemble(answer).status();
+    EXPECT_EQ(status.code(), absl::StatusCode::kDataLoss);
+    return std::string(status.message());
+  };
+  EXPECT_THAT(message_of([](Answer& a) { a.metadata.mutable_boundary(2)->set_tag(1); }), HasSubstr("with the tag 1"));
+  EXPECT_THAT(message_of([](Answer& a) { a.metadata.mutable_boundary(2)->set_tag(0); }), HasSubstr("with the tag 0"));
+  EXPECT_THAT(message_of([](Answer& a) { a.metadata.set_facet_count(5); }), HasSubstr("4 facets, 5 in all"));
+  EXPECT_THAT(message_of([](Answer& a) { a.metadata.mutable_regions(1)->set_id(1); }), HasSubstr("with the id 1"));
+  EXPECT_THAT(message_of([](Answer& a) { a.chunks[2].set_vertex_origins(0, kSteinerOrigin); }), HasSubstr("CRC32C"));
+  EXPECT_THAT(message_of([](Answer& a) {
+                a.chunks[2].set_vertex_origins(0, 1);
+                a.chunks[2].set_crc32c(Crc32c(a.chunks[2].vertex_origins().data(), 16));
+              }),
+              HasSubstr("name input point 1 of 1"));
+  EXPECT_THAT(message_of([](Answer& a) {
+                a.chunks[3].set_vertex_tags(0, 3);
+                a.chunks[3].set_crc32c(Crc32c(a.chunks[3].vertex_tags().data(), 16));
+              }),
+              HasSubstr("name the tag 3"));
+  EXPECT_THAT(message_of([](Answer& a) {
+                a.chunks[4].set_simplex_regions(0, 3);
+                a.chunks[4].set_crc32c(Crc32c(a.chunks[4].simplex_regions().data(), 8));
+              }),
+              HasSubstr("name the region 3"));
+  EXPECT_THAT(message_of([](Answer& a) {
+                a.chunks[7].set_facets(0, 4);
+                a.chunks[7].set_crc32c(Crc32c(a.chunks[7].facets().data(), 32));
+              }),
+              HasSubstr("facets name vertex 4 of 4"));
+  EXPECT_THAT(message_of([](Answer& a) {
+                a.chunks.pop_back();
+                a.metadata.set_chunk_count(7);
+              }),
+              HasSubstr("0 of 4 facets"));
+}
 
 class MeshReceiverRefuses : public ::testing::TestWithParam<Damage> {};
 

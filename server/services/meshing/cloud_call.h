@@ -38,8 +38,8 @@ class CloudCall : public RequestStream<Call<Reactor>> {
 
   // Whether what Work does with `points` takes about a second at most.
   virtual bool IsSmall(const PointChunks& points) const = 0;
-  // The parameters have come.
-  virtual void OnParameters() {}
+  // The parameters have come, with `request`.
+  virtual void OnParameters(const Request& /*request*/) {}
   // Of the mesh, for the log; 0 when there is none.
   virtual uint64_t VertexCount() const = 0;
 
@@ -102,7 +102,7 @@ void CloudCall<Reactor, Request>::OnRequest(grpc::ByteBuffer* bytes) {
     return;
   }
   if (!had_parameters) {
-    OnParameters();
+    OnParameters(request);
   }
   this->ReadNext();
 }

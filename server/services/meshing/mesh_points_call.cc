@@ -71,10 +71,10 @@ std::optional<grpc::ByteBuffer> MeshPointsCall::NextResponse() {
     return std::nullopt;
   } else if (!metadata_sent_) {
     metadata_sent_ = true;
-    *response.mutable_metadata() = MetadataToProto(mesh_->mesh(), mesh_->count());
-  } else if (next_chunk_ < mesh_->count()) {
+    *response.mutable_metadata() = MetadataToProto(mesh_->mesh(), mesh_->count(with_boundary_), with_boundary_);
+  } else if (next_chunk_ < mesh_->count(with_boundary_)) {
     environment().log.debug("call={} chunk={}", id(), next_chunk_);
-    return SerializeChunk(mesh_, next_chunk_++, v1::MeshPointsResponse::kChunkFieldNumber);
+    return SerializeChunk(mesh_, next_chunk_++, v1::MeshPointsResponse::kChunkFieldNumber, with_boundary_);
   } else {
     End(grpc::Status::OK);
     return std::nullopt;

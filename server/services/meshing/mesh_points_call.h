@@ -31,7 +31,10 @@ class MeshPointsCall final
  private:
   void Work(PointChunks& points, Job& job) override;
   bool IsSmall(const PointChunks& points) const override;
-  void OnParameters() override { ScheduleTick(); }
+  void OnParameters(const v1::MeshPointsRequest& request) override {
+    with_boundary_ = request.with_boundary();
+    ScheduleTick();
+  }
   uint64_t VertexCount() const override { return mesh_ == nullptr ? 0 : mesh_->mesh().vertex_count(); }
   std::optional<grpc::ByteBuffer> NextResponse() override;
 
@@ -44,6 +47,7 @@ class MeshPointsCall final
   ProgressPacer pacer_;
   std::optional<v1::ProgressEvent> event_;  // that waits to be written
   std::shared_ptr<const MeshChunks> mesh_;
+  bool with_boundary_ = false;  // as was asked for
   bool metadata_sent_ = false;
   uint64_t next_chunk_ = 0;
 };

@@ -38,11 +38,12 @@ grpc::Status DownloadMeshCall::Find() {
                                   request_.revision(), " as asked for; download it from its first chunk"),
                      "revision");
   }
-  if (request_.next_chunk() > mesh->chunks.count()) {
-    return MakeError(v1::ERROR_REASON_CHUNK_OUT_OF_RANGE,
-                     absl::StrCat("next_chunk is ", request_.next_chunk(), "; the mesh has ", mesh->chunks.count(),
-                                  " chunks, numbered from 0"),
-                     "next_chunk");
+  const uint64_t chunks = mesh->chunks.count(request_.with_boundary());
+  if (request_.next_chunk() > chunks) {
+    return MakeError(
+        v1::ERROR_REASON_CHUNK_OUT_OF_RANGE,
+        absl::StrCat("next_chunk is ", request_.next_chunk(), "; the mesh has ", chunks, " chunks, numbered from 0"),
+        "next_chunk");
   }
   use_.emplace(std::move(session));
   mesh_ = std::move(mesh);
@@ -52,20 +53,21 @@ grpc::Status DownloadMeshCall::Find() {
 
 std::optional<grpc::ByteBuffer> DownloadMeshCall::NextResponse() {
   const MeshChunks& chunks = mesh_->chunks;
+  const bool with_boundary = request_.with_boundary();
   if (!metadata_sent_) {
     metadata_sent_ = true;
     v1::DownloadMeshResponse response;
-    *response.mutable_metadata() = MetadataToProto(chunks.mesh(), chunks.count());
+    *response.mutable_metadata() = MetadataToProto(chunks.mesh(), chunks.count(with_boundary), with_boundary);
     response.mutable_metadata()->set_revision(mesh_->revision);
     return Serialize(response);
   }
-  if (next_chunk_ == chunks.count()) {
+  if (next_chunk_ == chunks.count(with_boundary)) {
     End(grpc::Status::OK);
     return std::nullopt;
   }
   environment().log.debug("call={} chunk={}", id(), next_chunk_);
   return SerializeChunk(std::shared_ptr<const MeshChunks>(mesh_, &chunks), next_chunk_++,
-                        v1::DownloadMeshResponse::kChunkFieldNumber);
+                        v1::DownloadMeshResponse::kChunkFieldNumber, with_boundary);
 }
 
 LogFields DownloadMeshCall::Figures() const {

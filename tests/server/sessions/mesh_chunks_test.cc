@@ -1,5 +1,6 @@
 #include "server/sessions/mesh_chunks.h"
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <random>
@@ -124,6 +125,62 @@ TEST_P(MeshChunksOf, AddUpToTheMesh) {
 INSTANTIATE_TEST_SUITE_P(Sizes, MeshChunksOf,
                          ::testing::Combine(::testing::Values(2, 3), ::testing::Values(0, 1, 2, 3, 100, 1000),
                                             ::testing::Values(128, 200, 1000, kMaxResponseBytes), ::testing::Bool()));
+
+// Who asks for the boundary gets its arrays, too; who does not, the bytes that there always were.
+TEST(MeshChunks, BringTheBoundaryToThoseThatAskForIt) {
+  core::Mesh mesh = MakeFakeMesh(core::MeshParameters(), std::vector<double>(300, 0.5));
+  core::Mesh plain = mesh;
+  for (uint32_t v = 0; v < mesh.vertex_count(); ++v) {
+    mesh.vertex_origins.push_back(v % 2 == 0 ? v / 2 : core::kSteinerOrigin);
+    mesh.vertex_tags.push_back(static_cast<int32_t>(v % 3));
+    mesh.facets.insert(mesh.facets.end(), {v, 0, 1});
+  }
+  for (uint64_t simplex = 0; simplex < mesh.simplex_count(); ++simplex) {
+    mesh.simplex_regions.push_back(static_cast<int32_t>(simplex % 5 + 1));
+  }
+  for (const uint64_t max_bytes : {uint64_t{128}, uint64_t{1000}, uint64_t{kMaxResponseBytes}}) {
+    const auto chunks = std::make_shared<MeshChunks>(mesh, max_bytes);
+    const auto plain_chunks = std::make_shared<MeshChunks>(plain, max_bytes);
+    ASSERT_EQ(chunks->count(), plain_chunks->count());
+    for (uint64_t index = 0; index < chunks->count(); ++index) {
+      EXPECT_EQ(BytesOf(SerializeChunk(chunks, index, 2)), BytesOf(SerializeChunk(plain_chunks, index, 2)));
+    }
+    core::Mesh sum;
+    std::vector<int> order;  // of the arrays
+    for (uint64_t index = 0; index < chunks->count(/*with_boundary=*/true); ++index) {
+      const std::string bytes =
+          BytesOf(SerializeChunk(chunks, index, v1::DownloadMeshResponse::kChunkFieldNumber, true));
+      EXPECT_LE(bytes.size(), max_bytes);
+      v1::DownloadMeshResponse response;
+      ASSERT_TRUE(response.ParseFromString(bytes));
+      const v1::MeshChunk& chunk = response.chunk();
+      EXPECT_EQ(chunk.index(), index);
+      const auto take = [&](int field, const auto& values, auto& into) {
+        if (!values.empty()) {
+          order.push_back(field);
+          into.insert(into.end(), values.begin(), values.end());
+          EXPECT_EQ(chunk.crc32c(), Crc32c(values.data(), values.size() * sizeof(values[0])));
+        }
+      };
+      take(1, chunk.points(), sum.points);
+      take(2, chunk.vertex_origins(), sum.vertex_origins);
+      take(3, chunk.vertex_tags(), sum.vertex_tags);
+      take(4, chunk.simplex_regions(), sum.simplex_regions);
+      take(5, chunk.simplices(), sum.simplices);
+      take(6, chunk.input_vertices(), sum.input_vertex);
+      take(7, chunk.facets(), sum.facets);
+      EXPECT_EQ(order.size(), index + 1) << "one array a chunk";
+    }
+    EXPECT_TRUE(std::is_sorted(order.begin(), order.end()));
+    EXPECT_EQ(sum.points, mesh.points);
+    EXPECT_EQ(sum.vertex_origins, mesh.vertex_origins);
+    EXPECT_EQ(sum.vertex_tags, mesh.vertex_tags);
+    EXPECT_EQ(sum.simplex_regions, mesh.simplex_regions);
+    EXPECT_EQ(sum.simplices, mesh.simplices);
+    EXPECT_EQ(sum.input_vertex, mesh.input_vertex);
+    EXPECT_EQ(sum.facets, mesh.facets);
+  }
+}
 
 // Vertices that have moved come with their points, in whatever pieces.
 TEST(MeshChunks, HaveTheMovedVerticesBesideTheirPoints) {
