@@ -9,7 +9,7 @@
 #include "server/calls/call_registry.h"
 #include "server/calls/request_ids.h"
 #include "server/jobs/background.h"
-#include "server/jobs/jobs.h"
+#include "server/jobs/job_pool.h"
 #include "server/jobs/memory_budget.h"
 #include "server/observability/observability.h"
 #include "server/security/authenticator.h"

@@ -10,7 +10,7 @@
 #include "server/base/options.h"
 #include "server/calls/call_registry.h"
 #include "server/jobs/background.h"
-#include "server/jobs/jobs.h"
+#include "server/jobs/job_pool.h"
 #include "server/jobs/memory_budget.h"
 #include "server/observability/observability.h"
 #include "server/security/authenticator.h"

@@ -16,7 +16,7 @@
 #include "absl/time/time.h"
 #include "core/mesh_parameters.h"
 #include "grpcpp/support/status.h"
-#include "server/jobs/jobs.h"
+#include "server/jobs/job.h"
 #include "server/sessions/progress_pacer.h"
 #include "wellspace/v1/operations.pb.h"
 

@@ -10,7 +10,7 @@
 #include "core/mesh_parameters.h"
 #include "core/mesher.h"
 #include "server/base/mesh_functions.h"
-#include "server/jobs/jobs.h"
+#include "server/jobs/job.h"
 #include "server/sessions/point_store.h"
 #include "server/sessions/session_steps.h"
 

@@ -21,7 +21,7 @@
 #include "server/base/clock.h"
 #include "server/base/mesh_functions.h"
 #include "server/base/options.h"
-#include "server/jobs/jobs.h"
+#include "server/jobs/job.h"
 #include "server/jobs/memory_budget.h"
 #include "server/sessions/lease.h"
 #include "server/sessions/mesh_chunks.h"
@@ -59,8 +59,8 @@ struct SessionWork {
 // Invariants: (1) revision grows with every change of the points or of the mesh; (2) while an operation is under way,
 // or vertices are being added or the mesher is built again, points, mesh, mesher and steps are touched by nothing else;
 // (3) what did not succeed leaves the session as it was: structure and mesh are what Replay makes of the steps, whether
-// there is a mesher now or not; (4) the lock order is this session's mutex, then that of its operations, of TenantPoints
-// or, where memory is released, of the JobPool.
+// there is a mesher now or not; (4) the lock order is this session's mutex, then that of an operation, of
+// TenantPoints or, where memory is released, of the JobPool.
 class Session {
  public:
   struct Settings {

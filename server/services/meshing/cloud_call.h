@@ -12,7 +12,7 @@
 #include "server/calls/call.h"
 #include "server/calls/request_stream.h"
 #include "server/calls/wire.h"
-#include "server/jobs/jobs.h"
+#include "server/jobs/job_pool.h"
 #include "server/jobs/memory_budget.h"
 #include "server/services/meshing/cloud_receiver.h"
 #include "server/wire/errors.h"

@@ -8,7 +8,7 @@
 #include "grpcpp/support/server_callback.h"
 #include "server/calls/call.h"
 #include "server/calls/request_ids.h"
-#include "server/jobs/jobs.h"
+#include "server/jobs/job.h"
 #include "server/log/log_fields.h"
 #include "server/sessions/session.h"
 #include "wellspace/v1/queries.pb.h"

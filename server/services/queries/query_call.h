@@ -11,7 +11,7 @@
 #include "grpcpp/support/server_callback.h"
 #include "server/calls/call.h"
 #include "server/calls/response_stream.h"
-#include "server/jobs/jobs.h"
+#include "server/jobs/job.h"
 #include "server/jobs/memory_budget.h"
 #include "server/log/log_fields.h"
 #include "server/services/queries/vertex_query.h"

@@ -201,7 +201,7 @@ TEST(Admission, SmallJobsOfATenantFinishWhileLargeOnesOfAnotherWait) {
       std::this_thread::yield();
     }
   }
-  for (int i = 0; i < JobPool::kMostPassing / 2; ++i) {
+  for (int i = 0; i < FairQueue::kMaxSkips / 2; ++i) {
     TestCall small(harness.stub(), std::nullopt, small_token);
     SendPoints(small, 1);
     const grpc::Status status = small.Finish();

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "gtest/gtest.h"
+#include "server/jobs/job_pool.h"
 #include "server/sessions/memory_session_store.h"
 #include "server/wire/errors.h"
 #include "tests/server/service_harness.h"

@@ -1,0 +1,171 @@
+// The workers that run jobs, and the queue before them.
+#ifndef WELLSPACE_SERVER_JOBS_JOB_POOL_H_
+#define WELLSPACE_SERVER_JOBS_JOB_POOL_H_
+
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <list>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "absl/status/status.h"
+#include "absl/time/time.h"
+#include "grpcpp/support/status.h"
+#include "server/jobs/fair_queue.h"
+#include "server/jobs/job.h"
+#include "server/jobs/memory_budget.h"
+
+namespace wellspace::server {
+
+// A fixed number of jobs that run at once, and a bounded queue of others that wait for it.
+//
+// The queue is a FairQueue: tenants take turns. A job that waits for memory is skipped FairQueue::kMaxSkips times; then
+// it is starved, and none but small jobs are started before it.
+//
+// Small jobs wait for no large ones: where all workers are taken, `small_workers` more run them alone. A small job has
+// a place of its own in the queue, whatever else is in it, and asks for memory without waiting for a starved job.
+//
+// What a run reserves first is its tree, what it then asks for is expected to be all that it needs. No tree is begun
+// with what those that wait with theirs need (RoomForTree in server/jobs/memory_admission.h); and one whose rest fits
+// goes on, first of its tenant or not. When all wait for the trees of one another all the same, one is refused
+// (VictimOfDeadlock).
+//
+// Thread safety: thread-safe. Work runs without any lock of the pool held.
+// Invariants: (1) at most `workers` jobs run and at most `max_queued` more are in the queue; with small workers as many
+// run besides, and as many small jobs are taken besides; of either kind `max_per_tenant` of one tenant; (2) the work of
+// a job runs at most once, and never after Cancel found it in the queue; (3) the work and all that it holds is freed
+// when it returns or is cancelled, not when its Job is; (4) there are at most as many threads as workers of both kinds
+// and one for each job that waits for memory, which are at most `workers` of a tenant.
+class JobPool {
+ public:
+  struct Limits {
+    int workers = 1;         // at least 1
+    int max_queued = 0;      // at least 0
+    int max_per_tenant = 1;  // at least 1
+    int small_workers = 0;   // at least 0; 0: small jobs are as others
+  };
+
+  struct Load {
+    int running = 0;
+    int queued = 0;  // for a worker or for memory
+  };
+
+  // Of all jobs of a kind that were begun.
+  struct Begun {
+    uint64_t jobs = 0;
+    absl::Duration waited = absl::ZeroDuration();  // all together, from Submit on
+    absl::Duration longest = absl::ZeroDuration();
+  };
+  struct Counters {
+    Begun small;
+    Begun others;
+  };
+
+  struct Submission {
+    std::shared_ptr<Job> job;  // null if refused
+    grpc::Status refusal;      // QUEUE_FULL, or QUOTA_EXCEEDED when the tenant has as many jobs as it may have
+  };
+
+  // REQUIRES:   `memory` outlives this.
+  JobPool(const Limits& limits, MemoryBudget& memory);
+  // Cancels all jobs and waits for those that run.
+  ~JobPool();
+  JobPool(const JobPool&) = delete;
+  JobPool& operator=(const JobPool&) = delete;
+
+  // Takes a job into the queue. Its work may begin, and end, before this returns.
+  Submission Submit(JobRequest request);
+
+  // Cancels the context of `job`; one in the queue that has not begun leaves it at once. Does not wait for one that
+  // runs.
+  void Cancel(const std::shared_ptr<Job>& job);
+
+  Load GetLoad() const;
+  Counters GetCounters() const;
+
+  // Waits until no job runs or waits, but not longer than `timeout`; says whether none does.
+  bool WaitUntilIdle(absl::Duration timeout);
+
+ private:
+  friend class Job;
+
+  // How many jobs a tenant has.
+  struct Share {
+    int small = 0;
+    int others = 0;
+  };
+  static int& PartOf(Share& share, const Job& job) { return job.is_small_ ? share.small : share.others; }
+
+  // What Job::Reserve does.
+  absl::Status Reserve(Job& job, uint64_t bytes);
+  absl::Status MemoryRefusal(uint64_t bytes) const;
+  // Lets the thread of `job`, which cannot have its memory now, wait in the queue for it.
+  absl::Status WaitInQueue(Job& job, std::unique_lock<std::mutex>& lock);
+
+  // The following want mutex_ to be held.
+
+  // Why `job` cannot be taken; OK if it can.
+  grpc::Status CheckPlaceFor(const Job& job) const;
+  // Starts jobs as long as there are workers for them. To be called when anything has changed.
+  void Dispatch();
+  // Starts the job whose turn it is, or refuses one where nothing else helps. False when all have to wait.
+  bool StartNext();
+  // Starts the starved job, if there is one and its memory is there. `*is_held_up`: no other may start before it.
+  bool StartStarved(uint64_t room_for_tree, bool* is_held_up);
+  // Gives a small worker to the small job whose turn it is, if there is one whose memory is there.
+  bool StartSmall();
+  // Resumes the oldest that waits with its tree and whose memory is there, first of its tenant or not.
+  bool StartOneWithATree();
+  // Refuses the victim of a deadlock, if there is one.
+  bool RefuseVictim();
+  // Whether `queued` needs nothing but a worker; where it waits for memory that is there, it has it then.
+  bool CanStart(const QueuedJob& queued, uint64_t room_for_tree);
+  // Takes `job` out of the queue and gives it a worker, a small one or another.
+  void Start(Job& job, bool small_worker = false);
+  // How many run on workers of the kind that `job` has.
+  int& RunningLike(const Job& job) { return job.has_small_worker_ ? running_small_ : running_; }
+  // Gives its worker back to a job that waited.
+  void Resume(Job& job);
+  // See memory_admission.h.
+  uint64_t GetRoomForTree() const;
+  void AddToQueue(const std::shared_ptr<Job>& job);
+  // Takes a job out of the queue that is not started.
+  void RemoveFromQueue(const Job& job);
+  void EndOf(Job& job);
+  size_t Workers() const { return static_cast<size_t>(limits_.workers) + limits_.small_workers; }
+  bool HasSurplusThread() const { return threads_.size() - blocked_ > Workers(); }
+  void StartThread();
+
+  void RunWorker(std::list<std::thread>::iterator self);
+
+  const Limits limits_;
+  MemoryBudget& memory_;
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  // Guarded by mutex_. Jobs are by their sequence.
+  uint64_t next_sequence_ = 0;
+  FairQueue queue_;
+  std::map<uint64_t, std::shared_ptr<Job>> queued_;  // those in queue_
+  std::map<std::string, Share> jobs_of_;             // by tenant, in the queue or running; none is empty
+  std::deque<std::shared_ptr<Job>> started_;         // wait for their thread to wake
+  std::map<uint64_t, std::shared_ptr<Job>> begun_;   // have a thread: they run, or wait for memory
+  int running_ = 0;                                  // have a worker: started_, and begun_ that do not wait
+  int running_small_ = 0;                            // the same on small workers
+  int small_jobs_ = 0;                               // in the queue or running
+  Counters counters_;
+  std::condition_variable idle_;
+  bool stopping_ = false;
+  std::list<std::thread> threads_;
+  std::list<std::thread> ended_threads_;  // to be joined
+  size_t blocked_ = 0;                    // threads whose job waits for memory
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_JOBS_JOB_POOL_H_
