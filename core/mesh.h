@@ -16,6 +16,9 @@ inline constexpr uint32_t kSteinerOrigin = 0xffff'ffff;  // the refinement
 inline constexpr uint32_t kRepairOrigin = 0xffff'fffe;   // the repair of slivers
 inline constexpr uint32_t kCornerOrigin = 0xffff'fffd;   // it is a corner of the box
 
+// The vertex of an input point that is not meshed: it lies in a hole, or outside of all that segments enclose.
+inline constexpr uint32_t kNoOutput = 0xffff'ffff;
+
 struct Mesh {
   int dimension = 0;
   std::vector<double> domain_low;   // dimension

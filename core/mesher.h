@@ -9,6 +9,7 @@
 
 #include "absl/status/statusor.h"
 #include "core/base/run_context.h"
+#include "core/features/features.h"
 #include "core/mesh.h"
 #include "core/mesh_parameters.h"
 
@@ -40,6 +41,16 @@ class Mesher {
   // Source:     [HT08] Figure 3, INITIALIZE.
   static absl::StatusOr<std::unique_ptr<Mesher>> Create(const MeshParameters& parameters,
                                                         std::span<const double> points, RunContext& context);
+
+  // The same in the plane for the domain that `features` make of `points`; docs/design/features.md says how. Only what
+  // is meshed is in the mesh: points that touch none of it have no vertex. The tree tells of no size, and no point can
+  // be added later.
+  //
+  // Errors:     as above; INVALID_ARGUMENT of MakePlanarGraph and FindFaces, and for parameters that a domain does not
+  //             have: another dimension or criterion, a merge_distance, a box beside another rule than kBox.
+  static absl::StatusOr<std::unique_ptr<Mesher>> Create(const MeshParameters& parameters,
+                                                        std::span<const double> points, const Features& features,
+                                                        RunContext& context);
 
   virtual int dimension() const = 0;
   virtual uint64_t vertex_count() const = 0;
@@ -148,6 +159,10 @@ absl::Status ReserveMemory(const Mesher& mesher, const MeshParameters& parameter
 // Complexity: O(n log n + m) time for m output vertices, O(m) memory.
 // Errors:     those of its parts.
 absl::StatusOr<Mesh> MeshPoints(const MeshParameters& parameters, std::span<const double> points, RunContext& context);
+
+// The same for a domain in the plane.
+absl::StatusOr<Mesh> MeshFeatures(const MeshParameters& parameters, std::span<const double> points,
+                                  const Features& features, RunContext& context);
 
 // Estimates the mesh that MeshPoints would make, without making it.
 //

@@ -2,7 +2,10 @@
 #ifndef WELLSPACE_CORE_REFINE_INSERTION_H_
 #define WELLSPACE_CORE_REFINE_INSERTION_H_
 
+#include <type_traits>
+
 #include "core/base/ids.h"
+#include "core/refine/domain/segment_point.h"
 #include "core/refine/steiner_point.h"
 
 namespace wellspace::core {
@@ -11,7 +14,7 @@ namespace wellspace::core {
 enum class Reason {
   kRatio,         // a node broke rho
   kSize,          // a node was farther than the sizes allow
-  kEncroachment,  // the cell touched a face of the box that its site does not lie on
+  kEncroachment,  // the cell touched a face of the box, or a segment, that its site does not lie on
 };
 
 // An insertion that has just happened.
@@ -28,9 +31,13 @@ struct Insertion {
 // An insertion that a cell asks for, with the point before it was snapped to the boundary.
 template <int D>
 struct InsertionRequest {
+  struct Nowhere {};
+
   Insertion insertion;
   SteinerPoint<D> candidate;
   SteinerPoint<D> point;
+  // Where the point is in a domain of the plane, if there is one.
+  [[no_unique_address]] std::conditional_t<D == 2, PlaceInDomain, Nowhere> place;
 };
 
 }  // namespace wellspace::core

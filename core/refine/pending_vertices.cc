@@ -21,7 +21,7 @@ struct alignas(kCacheLines) WorkspaceOfThread : Workspace<D> {};
 
 template <int D>
 HugeVector<int16_t> PendingVertices<D>::FirstBuckets(const MeshCriteria<D>& criteria, const RunContext& context,
-                                                     ThreadTeam& team) const {
+                                                     ThreadTeam& team, const FeatureDistance<D>& feature_sq) const {
   std::vector<WorkspaceOfThread<D>> workspaces(team.threads());
   HugeVector<int16_t> first_buckets(structure_.vertex_count());
   const LeafBlocks<D> blocks(structure_.tree(), kScheduledTogether);
@@ -35,6 +35,9 @@ HugeVector<int16_t> PendingVertices<D>::FirstBuckets(const MeshCriteria<D>& crit
       structure_.NearestOfEach(leaf, workspace, std::span(nearest_sq).first(bucket.count));
       for (uint32_t i = 0; i < bucket.count; ++i) {
         const VertexId v = bucket.ids[i];
+        if (feature_sq) {
+          nearest_sq[i] = feature_sq(v, nearest_sq[i], workspace);
+        }
         // A node x farther from v than h(x) is farther than h(v) / 2, as h is 1-Lipschitz.
         first_buckets[Index(v)] = static_cast<int16_t>(
             schedule_.BucketOf(FirstEdgeSq(criteria, structure_.point(v), structure_.faces(v), nearest_sq[i],

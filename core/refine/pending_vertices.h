@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <utility>
@@ -28,6 +29,10 @@ namespace wellspace::core {
 
 class ThreadTeam;
 
+// How far a vertex is from the nearest segment that it is not on, squared, if that is less than a limit; else that.
+template <int D>
+using FeatureDistance = std::function<double(VertexId, double limit_sq, Workspace<D>&)>;
+
 // A vertex is pending while it is in a bucket of the schedule; it is done when its cell needs nothing. Vertices come
 // from three places, and each has its function here:
 // - input: Begin schedules all there are;
@@ -44,13 +49,14 @@ class PendingVertices {
   // REQUIRES:   `structure` outlives this. Edges shorter than `min_edge` are as long as that to the schedule.
   PendingVertices(const QueryStructure<D>& structure, double min_edge) : structure_(structure), schedule_(min_edge) {}
 
-  // By vertex, the bucket that it has to be looked at in first.
+  // By vertex, the bucket that it has to be looked at in first; by `feature_sq`, too, if there is one.
   //
   // Complexity: O(1) each when bottom-up.
   // Errors:     none; wrong once the context is cancelled.
   // Threads:    uses those of the team.
   // Source:     [HT08] Figure 4, lines 2 to 4.
-  HugeVector<int16_t> FirstBuckets(const MeshCriteria<D>& criteria, const RunContext& context, ThreadTeam& team) const;
+  HugeVector<int16_t> FirstBuckets(const MeshCriteria<D>& criteria, const RunContext& context, ThreadTeam& team,
+                                   const FeatureDistance<D>& feature_sq = nullptr) const;
 
   // Makes room for so many vertices.
   void Reserve(uint32_t vertices);

@@ -10,6 +10,7 @@
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
 #include "core/refine/checks.h"
+#include "core/refine/domain/domain_steps.h"
 
 namespace wellspace::core {
 namespace {
@@ -23,9 +24,10 @@ constexpr uint64_t kReportInterval = 256;
 }  // namespace
 
 template <int D>
-Refinement<D>::Refinement(QueryStructure<D>& structure, double min_edge)
+Refinement<D>::Refinement(QueryStructure<D>& structure, double min_edge, PlanarDomain* domain)
     : structure_(structure),
       min_edge_(min_edge),
+      domain_(domain),
       pending_(structure, min_edge),
       rounds_(structure, pending_, stars_),
       checks_(structure) {}
@@ -36,6 +38,11 @@ absl::Status Refinement<D>::Run(const MeshCriteria<D>& criteria, uint64_t max_ve
                                 const VertexPredictor& predict) {
   ThreadTeam team(threads);
   rules_.emplace(structure_, criteria, min_edge_);
+  if constexpr (D == 2) {
+    if (domain_ != nullptr) {
+      domain_rules_.emplace(structure_, *domain_, *rules_);
+    }
+  }
   max_vertices_ = max_vertices;
   context_ = &context;
   observer_ = &observer;
@@ -61,7 +68,15 @@ absl::Status Refinement<D>::ScheduleAll(const MeshCriteria<D>& criteria, const V
   absl::Status predicted;
   const absl::Cleanup end = [&team] { team.Drop(); };  // of what is begun, where something is thrown
   team.BeginCall([&] { predicted = Predict(predict); });
-  const HugeVector<int16_t> first_buckets = pending_.FirstBuckets(criteria, *context_, team);
+  FeatureDistance<D> feature_sq;
+  if constexpr (D == 2) {
+    if (domain_ != nullptr) {
+      feature_sq = [this](VertexId v, double limit_sq, Workspace<2>& workspace) {
+        return domain_rules_->NearestSegmentSq(v, limit_sq, workspace);
+      };
+    }
+  }
+  const HugeVector<int16_t> first_buckets = pending_.FirstBuckets(criteria, *context_, team, feature_sq);
   team.End();
   WELLSPACE_RETURN_IF_ERROR(predicted);
   WELLSPACE_RETURN_IF_ERROR(context_->Check());
@@ -101,7 +116,7 @@ absl::Status Refinement<D>::Loop() {
   WELLSPACE_RETURN_IF_ERROR(RefineInRounds());  // what a run that was stopped has detached
   Schedule& schedule = pending_.schedule();
   for (int lowest = schedule.Lowest(); lowest >= 0; lowest = schedule.Lowest()) {
-    if (rounds_.Begin(lowest)) {
+    if (domain_ == nullptr && rounds_.Begin(lowest)) {
       WELLSPACE_RETURN_IF_ERROR(RefineInRounds());
       continue;
     }
@@ -208,6 +223,9 @@ absl::Status Refinement<D>::RefineTaken(VertexId v, int bucket) {
 // Refines `v`, which was taken from `bucket`, by steps that are computed.
 template <int D>
 absl::Status Refinement<D>::RefineByCell(VertexId v, int bucket) {
+  if (domain_ != nullptr) {
+    return RefineInDomain(v, bucket);
+  }
   CurrentCells cells{*this};
   CellSteps<D, CurrentCells> steps(*rules_, v, structure_.faces(v), EdgeLimitSq(bucket), cells, workspace_);
   if constexpr (kChecks) {
@@ -215,6 +233,17 @@ absl::Status Refinement<D>::RefineByCell(VertexId v, int bucket) {
     checks_.CheckOrder(pending_.schedule(), v, steps.cell(), bucket);
   }
   return RefineVertex(v, bucket, steps);
+}
+
+// The same in a domain of the plane.
+template <int D>
+absl::Status Refinement<D>::RefineInDomain(VertexId v, int bucket) {
+  if constexpr (D == 2) {
+    CurrentCells cells{*this};
+    DomainSteps<CurrentCells> steps(*domain_rules_, *rules_, v, EdgeLimitSq(bucket), cells, workspace_);
+    return RefineVertex(v, bucket, steps);
+  }
+  return absl::OkStatus();
 }
 
 // [HT08] Figure 4 for one vertex, `v`, which was taken from `bucket`: inserts what its steps ask for, until nothing
@@ -256,7 +285,9 @@ void Refinement<D>::Finish(VertexId v, const Assessment& found, int bucket, Step
     pending_.ScheduleLater(v, found, bucket, rules_->ClipRadius(EdgeLimitSq(bucket)));
     return;
   }
-  stars_.Write(v, steps.FindStar(stars_), structure_.vertex_count());
+  if (domain_ == nullptr) {
+    stars_.Write(v, steps.FindStar(stars_), structure_.vertex_count());
+  }
   if (pending_.HasToNotify(v)) {
     pending_.Notify(v, found, steps.Notices());
   }
@@ -284,6 +315,11 @@ absl::StatusOr<VertexId> Refinement<D>::Insert(const InsertionRequest<D>& reques
   insertion.vertex = structure_.AddUncommitted(insertion.near, point.position);
   if (!rounds_.IsAhead() || *observer_ || structure_.uncommitted_count() == QueryStructure<D>::kMostUncommitted) {
     rounds_.CommitAdded();
+  }
+  if constexpr (D == 2) {
+    if (domain_ != nullptr) {
+      domain_->AddVertex(request.place.on, request.place.face);
+    }
   }
   rounds_.NoteInserted(point.position);
   context_->SetVertices(structure_.vertex_count());

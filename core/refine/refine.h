@@ -11,6 +11,8 @@
 #include "core/base/run_context.h"
 #include "core/refine/cell_steps.h"
 #include "core/refine/criteria.h"
+#include "core/refine/domain/domain_rules.h"
+#include "core/refine/domain/planar_domain.h"
 #include "core/refine/insertion.h"
 #include "core/refine/pending_vertices.h"
 #include "core/refine/refinement_checks.h"
@@ -46,8 +48,11 @@ using VertexPredictor = std::function<absl::StatusOr<uint64_t>()>;
 template <int D>
 class Refinement {
  public:
-  // No vertex is added nearer than `min_edge` to another.
-  Refinement(QueryStructure<D>& structure, double min_edge);
+  // No vertex is added nearer than `min_edge` to another. In the plane `domain` may be what the points and segments of
+  // `structure` bound: then what is meshed of it takes the place of the box.
+  //
+  // REQUIRES:   structure and domain outlive this; the points of the domain are the vertices of the structure.
+  Refinement(QueryStructure<D>& structure, double min_edge, PlanarDomain* domain = nullptr);
   Refinement(const Refinement&) = delete;
   Refinement& operator=(const Refinement&) = delete;
 
@@ -118,6 +123,7 @@ class Refinement {
   absl::Status RefineNextOf(Batch<D>& batch);
   absl::Status RefineTaken(VertexId v, int bucket);
   absl::Status RefineByCell(VertexId v, int bucket);
+  absl::Status RefineInDomain(VertexId v, int bucket);
   template <typename Steps>
   absl::Status RefineVertex(VertexId v, int bucket, Steps& steps);
   template <typename Steps>
@@ -130,6 +136,7 @@ class Refinement {
 
   QueryStructure<D>& structure_;
   const double min_edge_;
+  PlanarDomain* const domain_;  // null: the box
   PendingVertices<D> pending_;
   StarWriter<D> stars_;  // of vertices that are done, or have been
   Rounds<D> rounds_;
@@ -137,6 +144,7 @@ class Refinement {
 
   // Of the last run.
   std::optional<StepRules<D>> rules_;
+  std::optional<DomainRules> domain_rules_;  // where there is a domain
   uint64_t max_vertices_ = 0;
   uint64_t refined_ = 0;           // how often a vertex has been refined, in all runs
   RunContext* context_ = nullptr;  // valid until the run ends, as is the next

@@ -41,7 +41,7 @@ void RefinementChecks<D>::CheckOrder(const Schedule& schedule, VertexId v, const
 
 template <int D>
 void RefinementChecks<D>::CheckInsertion(const StepRules<D>& rules, const InsertionRequest<D>& request) {
-  const auto& [insertion, candidate, point] = request;
+  const auto& [insertion, candidate, point, place] = request;
   const Box<D>& box = structure_.box();
   const double edge = std::sqrt(insertion.edge_sq);
   const double limit = std::sqrt(insertion.edge_limit_sq);

@@ -97,13 +97,10 @@ std::optional<InsertionRequest<D>> StepRules<D>::NextRequest(VertexId v, const P
   insertion.near = v;
   insertion.edge_limit_sq = edge_limit_sq;
   if (found.bad_node >= 0) {
-    const double factor = found.is_too_large                      ? kSizeFactor
-                          : IsAtBoundary(v, cell, found.bad_node) ? boundary_factor_
-                                                                  : off_center_factor_;
     insertion.reason = found.is_too_large ? Reason::kSize : Reason::kRatio;
     insertion.edge_sq = found.bound_sq / (criteria_.rho * criteria_.rho);
     insertion.other = found.bad_plane >= 0 ? cell.plane(found.bad_plane).vertex : kNoVertex;
-    request.candidate = PointFor(v, cell, found, factor * factor * found.bound_sq, edge_limit_sq, cell_of);
+    request.candidate = CandidateFor(v, cell, found, IsAtBoundary(v, cell, found.bad_node), edge_limit_sq, cell_of);
   } else if (found.encroached_face >= 0) {
     insertion.reason = Reason::kEncroachment;
     const double distance = structure_.box().DistanceToFace(structure_.point(v), found.encroached_face);
@@ -117,19 +114,32 @@ std::optional<InsertionRequest<D>> StepRules<D>::NextRequest(VertexId v, const P
   return request;
 }
 
-// The point for the bad node of the cell of `v`: an off-centre at distance_sq, by the square, unless the node is
-// nearer; then the node, or for a triangle a better point.
+// How far from the site an off-centre for the bad node lies at most, squared.
 template <int D>
-SteinerPoint<D> StepRules<D>::PointFor(VertexId v, const Polytope<D>& cell, const Assessment& found, double distance_sq,
-                                       double edge_limit_sq, CellOf cell_of) const {
+double StepRules<D>::DistanceSqFor(const Assessment& found, bool is_at_boundary) const {
+  const double factor = found.is_too_large ? kSizeFactor : is_at_boundary ? boundary_factor_ : off_center_factor_;
+  return factor * factor * found.bound_sq;
+}
+
+// An off-centre, unless the node is nearer; then the node, or for a triangle a better point.
+template <int D>
+SteinerPoint<D> StepRules<D>::CandidateFor(VertexId v, const Polytope<D>& cell, const Assessment& found,
+                                           bool is_at_boundary, double edge_limit_sq, CellOf cell_of) const {
   if constexpr (D == 2) {
+    const double distance_sq = DistanceSqFor(found, is_at_boundary);
     const bool is_within = cell.nodes()[found.bad_node].radius_sq <= distance_sq;
     if (is_within && !found.is_too_large && criteria_.criterion == Criterion::kRadiusEdge) {
       const double clip = clip_factor_ * std::sqrt(edge_limit_sq);
       return PointInPetal(v, cell, found, distance_sq, criteria_.rho, clip, cell_of);
     }
   }
-  return OffCenter<D>(cell, found.bad_node, found.bad_plane, distance_sq);
+  return OffCenterFor(cell, found, is_at_boundary);
+}
+
+template <int D>
+SteinerPoint<D> StepRules<D>::OffCenterFor(const Polytope<D>& cell, const Assessment& found,
+                                           bool is_at_boundary) const {
+  return OffCenter<D>(cell, found.bad_node, found.bad_plane, DistanceSqFor(found, is_at_boundary));
 }
 
 // Whether `node` of `cell`, that of `v`, is the circumcentre of a simplex with a corner on the boundary of the box.

@@ -60,6 +60,14 @@ class StepRules {
   std::optional<InsertionRequest<D>> NextRequest(VertexId v, const Polytope<D>& cell, const Assessment& found,
                                                  double edge_limit_sq, CellOf cell_of) const;
 
+  // The point for the bad node of `cell`, that of `v`, before anything takes its place; and, in that cell for sure, the
+  // one that an off-centre is. `is_at_boundary`: the node is the circumcentre of a simplex with a corner there.
+  //
+  // Complexity: as NextRequest.
+  SteinerPoint<D> CandidateFor(VertexId v, const Polytope<D>& cell, const Assessment& found, bool is_at_boundary,
+                               double edge_limit_sq, CellOf cell_of) const;
+  SteinerPoint<D> OffCenterFor(const Polytope<D>& cell, const Assessment& found, bool is_at_boundary) const;
+
   // Whether a vertex at `point` is far enough from all others; if not, the run ends with an error.
   bool IsLongEnough(const SteinerPoint<D>& point) const { return point.empty_radius_sq >= min_edge_ * min_edge_; }
 
@@ -77,8 +85,7 @@ class StepRules {
                           std::vector<WatchedNode<D>>& watched) const;
 
  private:
-  SteinerPoint<D> PointFor(VertexId v, const Polytope<D>& cell, const Assessment& found, double distance_sq,
-                           double edge_limit_sq, CellOf cell_of) const;
+  double DistanceSqFor(const Assessment& found, bool is_at_boundary) const;
   bool IsAtBoundary(VertexId v, const Polytope<D>& cell, int node) const;
 
   const QueryStructure<D>& structure_;

@@ -84,7 +84,8 @@ absl::Status LeafTree<D>::Build(const MortonGrid<D>& grid, std::span<const Point
         if (At(leaf).first_child != kNoNode) {
           continue;
         }
-        if (ranges_[Index(leaf)].size() > kLeafCapacity || (!only_crowded && IsTooCoarse(leaf))) {
+        if (ranges_[Index(leaf)].size() > kLeafCapacity || segments_.IsCrowded(leaf) ||
+            (!only_crowded && IsTooCoarse(leaf))) {
           Split(leaf);
         }
         if (leaf_count_ > max_leaves) {
@@ -241,6 +242,13 @@ void LeafTree<D>::Split(NodeId leaf) {
   }
   leaf_count_ += inside - 1;
   LinkChildren(leaf);
+  if constexpr (D == 2) {
+    if (!segments_.IsEmpty()) {
+      const std::array<Box<2>, 4> cubes = {BoxOf(Child(At(leaf), 0)), BoxOf(Child(At(leaf), 1)),
+                                           BoxOf(Child(At(leaf), 2)), BoxOf(Child(At(leaf), 3))};
+      segments_.HandDown(leaf, first, cubes);
+    }
+  }
   if (!pending_.empty()) {
     DistributeRange(leaf);
   } else {

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -17,6 +18,7 @@
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
 #include "core/tree/morton.h"
+#include "core/tree/segment_lists.h"
 #include "core/tree/vertex_buckets.h"
 
 namespace wellspace::core {
@@ -66,6 +68,11 @@ class LeafTree {
   absl::Status Build(const MortonGrid<D>& grid, std::span<const Point<D>> points, uint64_t max_leaves, int threads,
                      const RunContext& context);
 
+  // Has the tree that is built next list `segments` of its box at the leaves that they meet, and split leaves which too
+  // many of them meet. In the plane alone.
+  void SetSegments(std::vector<SegmentLists::Ends> segments) { segments_.Begin(std::move(segments)); }
+  const SegmentLists& segments() const { return segments_; }
+
   // Makes room for so many vertices to be told where they are.
   void Reserve(uint32_t vertices) { leaf_of_.reserve(vertices); }
 
@@ -108,7 +115,7 @@ class LeafTree {
   // What the tree takes in memory.
   uint64_t MemoryBytes() const {
     return nodes_.size() * sizeof(Node) + buckets_.MemoryBytes() + ranges_.size() * sizeof(Range) +
-           leaf_of_.size() * sizeof(NodeId) + around_.size() * sizeof(Around);
+           leaf_of_.size() * sizeof(NodeId) + around_.size() * sizeof(Around) + segments_.MemoryBytes();
   }
   // Whether `node` is a leaf that covers a part of the box.
   bool IsLeaf(NodeId node) const { return At(node).first_child == kNoNode && !At(node).outside; }
@@ -266,6 +273,7 @@ class LeafTree {
   HugeVector<Node> nodes_;
   Buckets buckets_;
   HugeVector<NodeId> leaf_of_;
+  SegmentLists segments_;  // none unless D is 2
 
   // During Build only.
   std::span<const Point<D>> points_;

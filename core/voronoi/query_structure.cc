@@ -138,7 +138,7 @@ absl::Status QueryStructure<D>::Initialize(const MortonGrid<D>& grid, HugeVector
       has_corner[corner] = has_corner[corner] || faces == CornerFaces<D>(corner);
     }
   }
-  for (int corner = 0; corner < (1 << D); ++corner) {
+  for (int corner = 0; corner < (1 << D) && tree_.segments().IsEmpty(); ++corner) {
     if (!has_corner[corner]) {
       Point<D> p;
       for (int i = 0; i < D; ++i) {
@@ -381,6 +381,19 @@ Neighbor QueryStructure<D>::FindBeyond(const Point<D>& p, NodeId leaf, Neighbor 
 }
 
 template <int D>
+void QueryStructure<D>::SegmentsWithin(const Point<D>& p, double reach, VertexId near, Workspace<D>& workspace) const {
+  const SegmentLists& segments = tree_.segments();
+  workspace.segments.clear();
+  ScanOutward(
+      p, tree_.LeafHolding(CommittedNear(near), p), workspace, [&] { return reach * reach; },
+      [](NodeId) { return true; },
+      [&](NodeId leaf) {
+        const std::span<const uint32_t> listed = segments.Of(leaf);
+        workspace.segments.insert(workspace.segments.end(), listed.begin(), listed.end());
+      });
+}
+
+template <int D>
 void QueryStructure<D>::ClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace, TieRule rule) const {
   Clip(v, CubeAround<D>(point(v), radius), rule, workspace);
   Scan(v, workspace);
@@ -486,8 +499,13 @@ void QueryStructure<D>::ScanFor(NodeId own, Workspace<D>& workspace, Cut cut) co
 template <int D>
 void QueryStructure<D>::Scan(VertexId v, Workspace<D>& workspace, const ExtraVertices<D>& others) const {
   const NodeId own = LeafOf(v);
+  workspace.segments.clear();
   ScanFor(own, workspace, [&](NodeId leaf) {
     CutByLeaf(leaf, v, workspace);
+    if constexpr (D == 2) {
+      const std::span<const uint32_t> segments = tree_.segments().Of(leaf);
+      workspace.segments.insert(workspace.segments.end(), segments.begin(), segments.end());
+    }
     if (leaf == own) {
       CutByOthers(others, v, workspace);
     }

@@ -41,6 +41,9 @@ template <int D>
 struct Workspace {
   Polytope<D> cell;
   QueryCounters counters;
+  // The segments that meet the leaves which were opened for the cell, or, of SegmentsWithin, those that are in reach;
+  // an item may be there more than once. Only where the tree lists segments.
+  std::vector<uint32_t> segments;
   // Private to the queries.
   HugeVector<uint32_t> seen;  // by tree node: the query that last met it
   uint32_t query = 0;
@@ -62,6 +65,10 @@ template <int D>
 class QueryStructure {
  public:
   static constexpr uint32_t kMostUncommitted = 2048;
+
+  // Has the structure that is initialized next list `segments`, by which its points are bounded: the corners of the box
+  // are no vertices then. In the plane alone.
+  void SetSegments(std::vector<SegmentLists::Ends> segments) { tree_.SetSegments(std::move(segments)); }
 
   // Builds the structure for `points`, then adds the corners of the box that are not among them.
   //
@@ -113,6 +120,14 @@ class QueryStructure {
   // Complexity: O(1) when bottom-up and near; O(depth of the tree) more when no vertex is known.
   // Errors:     none.
   Neighbor NearestTo(const Point<D>& p, VertexId near, Workspace<D>& workspace) const;
+
+  // Puts into workspace.segments all segments of the tree within `reach` of `p`, some of them more than once, and maybe
+  // others; looked for outward from `near`.
+  //
+  // REQUIRES:   p in the box.
+  // Complexity: that of looking into the leaves within reach.
+  // Errors:     none.
+  void SegmentsWithin(const Point<D>& p, double reach, VertexId near, Workspace<D>& workspace) const;
 
   // Computes in workspace.cell the Voronoi cell of `v` in the box, clipped by the cube of half side `radius` about v.
   // Ties are kept, or perturbed: then the cell is the same to the bit, but for the numbers of its nodes and planes,

@@ -1,0 +1,39 @@
+// A cloud with segments, on its way into the query structure.
+#ifndef WELLSPACE_CORE_DOMAIN_CLOUD_H_
+#define WELLSPACE_CORE_DOMAIN_CLOUD_H_
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "core/base/run_context.h"
+#include "core/features/features.h"
+#include "core/geometry/box.h"
+#include "core/input_cloud.h"
+#include "core/refine/domain/planar_domain.h"
+
+namespace wellspace::core {
+
+// Points and segments in the order of the query structure, without what touches no face that is meshed.
+struct DomainCloud {
+  Domain<2> domain;      // its box holds the segments with room around them, and bounds nothing
+  SortedCloud<2> cloud;  // of the points of the graph
+  std::unique_ptr<PlanarDomain> planar;
+  std::vector<double> points;   // of the cloud, unscaled, with the bits that were given
+  uint64_t dropped_points = 0;  // given ones that touch no face which is meshed
+};
+
+// Cleans points and segments, finds faces, and sorts what is meshed. With FaceRule::kBox the sides of `box` bound the
+// domain; with the others it is not used.
+//
+// Shapes:     points: n x 2, row-major.
+// Complexity: O((n + m) log (n + m)) for most inputs.
+// Errors:     those of CheckPoints, MakePlanarGraph, FindFaces and SortCloud.
+absl::StatusOr<DomainCloud> MakeDomainCloud(std::span<const double> points, const Features& features, const Box<2>& box,
+                                            int threads, const RunContext& context);
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_DOMAIN_CLOUD_H_

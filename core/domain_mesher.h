@@ -1,0 +1,84 @@
+// The mesher of a domain in the plane: points, segments and faces.
+#ifndef WELLSPACE_CORE_DOMAIN_MESHER_H_
+#define WELLSPACE_CORE_DOMAIN_MESHER_H_
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "core/base/memory/huge_pages.h"
+#include "core/base/run_context.h"
+#include "core/domain_cloud.h"
+#include "core/features/features.h"
+#include "core/mesher.h"
+#include "core/refine/domain/planar_domain.h"
+#include "core/refine/refine.h"
+#include "core/simplex/domain_simplices.h"
+#include "core/voronoi/query_structure.h"
+
+namespace wellspace::core {
+
+// Mesher::Create for features. Points of the graph have the numbers in the mesh that they have there, among those that
+// are meshed; vertices that are inserted have the same number inside as outside.
+//
+// Thread safety: as Mesher.
+class DomainMesher final : public Mesher {
+ public:
+  // What Mesher::Create does for features.
+  absl::Status Initialize(const MeshParameters& parameters, std::span<const double> points, const Features& features,
+                          RunContext& context);
+
+  int dimension() const override { return 2; }
+  uint64_t vertex_count() const override { return structure_.vertex_count(); }
+  uint64_t memory_bytes() const override;
+  absl::Status Refine(const MeshParameters& parameters, RunContext& context) override;
+  absl::StatusOr<std::vector<uint32_t>> AddPointsNear(std::span<const double> points, std::span<const uint32_t> near,
+                                                      RunContext& context) override;
+  absl::StatusOr<uint32_t> AddVertex(uint32_t near, std::span<const double> point) override;
+  absl::StatusOr<std::vector<double>> NearestNeighborDistances(std::span<const uint32_t> vertices) const override;
+  absl::StatusOr<std::vector<Cell>> ClippedCells(std::span<const uint32_t> vertices, double beta) const override;
+  absl::StatusOr<Mesh> Extract(int threads, RunContext& context) override;
+  absl::Status Update(Mesh& mesh, int threads, RunContext& context) override;
+  absl::StatusOr<MeshEstimate> Estimate(const MeshParameters& parameters, const RunContext& context) const override;
+
+ private:
+  // A subsegment: the part of a segment between two vertices that follow each other on it.
+  struct Subsegment {
+    uint32_t segment;
+    VertexId from;
+    VertexId to;
+  };
+
+  std::vector<Subsegment> EncroachedSubsegments(const PlanarDomain::Chains& chains);
+  absl::Status Split(std::span<const Subsegment> subsegments, const MeshParameters& parameters);
+  absl::Status MakeConforming(const MeshParameters& parameters, RunContext& context);
+  uint32_t OutputIndex(VertexId v) const {
+    return Index(v) < output_index_.size() ? output_index_[Index(v)] : Index(v);
+  }
+  void SetPoints(Mesh& mesh) const;
+  void SetBoundary(const PlanarDomain::Chains& chains, Mesh& mesh) const;
+  void SetRegions(std::span<const uint32_t> faces, Mesh& mesh) const;
+  void SetStatistics(Mesh& mesh) const;
+
+  Domain<2> domain_;
+  std::vector<double> mesh_low_;  // of what is meshed
+  std::vector<double> mesh_high_;
+  QueryStructure<2> structure_;
+  std::unique_ptr<PlanarDomain> planar_;
+  std::optional<Refinement<2>> refinement_;
+  Workspace<2> workspace_;
+  std::vector<double> points_;         // of the graph, as given
+  HugeVector<uint32_t> output_index_;  // by point of the graph
+  uint64_t dropped_points_ = 0;
+  std::optional<DomainSimplices> made_;  // since the last refinement
+  double tree_seconds_ = 0;
+  double refinement_seconds_ = 0;
+  double simplices_seconds_ = 0;
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_DOMAIN_MESHER_H_

@@ -1,0 +1,50 @@
+// What a domain in the plane is bounded by and made of, as it is given: segments, holes and regions.
+#ifndef WELLSPACE_CORE_FEATURES_FEATURES_H_
+#define WELLSPACE_CORE_FEATURES_FEATURES_H_
+
+#include <cstdint>
+#include <limits>
+#include <span>
+
+#include "core/geometry/point.h"
+
+namespace wellspace::core {
+
+// Which faces of the planar graph of the segments are meshed.
+enum class FaceRule : uint8_t {
+  kBox,      // all faces in the box
+  kHoles,    // all bounded faces; the box bounds nothing
+  kEvenOdd,  // those that an odd number of ring segments separates from infinity
+};
+
+// What becomes of segments that cross, and of vertices that are too near to a segment.
+enum class CrossingRule : uint8_t {
+  kRefuse,  // an error names them
+  kSplit,   // a crossing, rounded, becomes a vertex; a segment is led through a vertex that is too near to it
+};
+
+// A point that names the face which it lies in.
+struct FaceSeed {
+  Point<2> at{};
+  bool is_hole = false;                                       // the face is not meshed
+  int32_t region = 0;                                         // of the simplices in the face, unless a hole
+  double max_area = std::numeric_limits<double>::infinity();  // of a simplex there; a squared length
+};
+
+// Segments and seeds beside n given points. The spans have to outlive this.
+struct Features {
+  std::span<const uint32_t> ends;    // m x 2, row-major: indices of points
+  std::span<const int32_t> markers;  // m, or none: then all are 0
+  std::span<const uint8_t>
+      is_open;  // m, or none: 1 for a segment that is no part of a ring, so that kEvenOdd ignores it
+  std::span<const FaceSeed> seeds;
+  FaceRule faces = FaceRule::kBox;
+  CrossingRule crossings = CrossingRule::kRefuse;
+
+  size_t segment_count() const { return ends.size() / 2; }
+  bool IsEmpty() const { return ends.empty() && seeds.empty(); }
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_FEATURES_FEATURES_H_

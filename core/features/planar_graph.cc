@@ -1,0 +1,425 @@
+#include "core/features/planar_graph.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "core/base/status_macros.h"
+#include "core/features/segment_pairs.h"
+#include "core/geometry/exact_measure.h"
+
+namespace wellspace::core {
+namespace {
+
+// Faults that an error names; and so many at most are looked for.
+constexpr size_t kNamed = 10;
+constexpr size_t kMostFaults = 1000;
+// Rounds of splitting, each of which may bend segments over others, before it is given up.
+constexpr int kMostRounds = 64;
+
+constexpr uint32_t kNone = PlanarGraph::kNoInput;
+
+std::string Place(const Point<2>& p) { return absl::StrFormat("(%.17g, %.17g)", p[0], p[1]); }
+
+Sign SideOf(const Point<2>& a, const Point<2>& b, const Point<2>& p) { return Orientation<2>({a, b, p}).sign; }
+
+// Whether `p`, a point of the line through `a` and `b`, lies strictly between them.
+bool IsBetween(const Point<2>& a, const Point<2>& b, const Point<2>& p) { return (a < p && p < b) || (b < p && p < a); }
+
+// How far along the segment from `a` to `b` a point is, in its lengths.
+double Along(const Point<2>& a, const Point<2>& b, const Point<2>& p) {
+  const Point<2> along = Difference<2>(b, a);
+  return Dot<2>(Difference<2>(p, a), along) / NormSq<2>(along);
+}
+
+double DistanceToSegment(const Point<2>& a, const Point<2>& b, const Point<2>& p) {
+  const double t = std::clamp(Along(a, b, p), 0.0, 1.0);
+  const Point<2> foot = t < 0.5 ? Point<2>{a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])}
+                                : Point<2>{b[0] + (1 - t) * (a[0] - b[0]), b[1] + (1 - t) * (a[1] - b[1])};
+  return Distance<2>(foot, p);
+}
+
+// Where two segments that cross do so, rounded.
+Point<2> CrossingOf(const Point<2>& a, const Point<2>& b, const Point<2>& c, const Point<2>& d) {
+  const Point<2> along = Difference<2>(b, a);
+  const Point<2> other = Difference<2>(d, c);
+  const Point<2> from = Difference<2>(c, a);
+  const double determinant = along[0] * other[1] - along[1] * other[0];
+  const double t = determinant == 0 ? 0.5 : (from[0] * other[1] - from[1] * other[0]) / determinant;
+  const double at = std::clamp(t, 0.0, 1.0);
+  return {a[0] + at * along[0], a[1] + at * along[1]};
+}
+
+// What is wrong between a segment and a point, or another segment.
+struct Fault {
+  enum class Kind : uint8_t { kOn, kNear, kCrossing };
+
+  Kind kind = Kind::kOn;
+  uint32_t segment = 0;  // of a crossing the lower of the two
+  uint32_t other = 0;    // a point; of a crossing a segment
+
+  auto operator<=>(const Fault&) const = default;
+};
+
+// Makes the graph, step after step.
+class GraphMaker {
+ public:
+  GraphMaker(const Features& features, double least_separation, const RunContext& context)
+      : features_(features), least_separation_(least_separation), context_(context) {}
+
+  absl::StatusOr<PlanarGraph> Make(std::span<const double> points, const Box<2>* box) {
+    MergeEqualPoints(points);
+    WELLSPACE_RETURN_IF_ERROR(TakeSegments());
+    if (box != nullptr) {
+      AddBox(*box);
+    }
+    WELLSPACE_RETURN_IF_ERROR(DropDuplicates());
+    for (int round = 0;; ++round) {
+      WELLSPACE_ASSIGN_OR_RETURN(const std::vector<Fault> faults, FindFaults());
+      if (faults.empty()) {
+        break;
+      }
+      WELLSPACE_RETURN_IF_ERROR(CheckAllowed(faults));
+      if (round == kMostRounds) {
+        return absl::ResourceExhaustedError(
+            absl::StrCat("segments: splitting them where they cross does not end after ", kMostRounds, " rounds; ",
+                         Describe(faults[0]), "; move these apart, or round the coordinates to fewer digits"));
+      }
+      SplitAt(faults);
+      WELLSPACE_RETURN_IF_ERROR(DropDuplicates());
+    }
+    return std::move(graph_);
+  }
+
+ private:
+  const Point<2>& At(uint32_t point) const { return graph_.points[point]; }
+
+  void MergeEqualPoints(std::span<const double> points) {
+    const auto count = static_cast<uint32_t>(points.size() / 2);
+    std::vector<uint32_t> order(count);
+    std::iota(order.begin(), order.end(), 0);
+    const auto at = [&](uint32_t i) { return PointAt<2>(points, i); };
+    std::sort(order.begin(), order.end(),
+              [&](uint32_t i, uint32_t j) { return std::pair(at(i), i) < std::pair(at(j), j); });
+    std::vector<uint32_t> first(count);
+    for (uint32_t k = 0; k < count; ++k) {
+      first[order[k]] = k > 0 && at(order[k]) == at(order[k - 1]) ? first[order[k - 1]] : order[k];
+    }
+    graph_.point_of_input.resize(count);
+    for (uint32_t i = 0; i < count; ++i) {
+      if (first[i] == i) {
+        graph_.point_of_input[i] = static_cast<uint32_t>(graph_.points.size());
+        graph_.points.push_back(at(i));
+        graph_.input_of_point.push_back(i);
+      } else {
+        graph_.point_of_input[i] = graph_.point_of_input[first[i]];
+        ++graph_.counts.equal_points;
+      }
+    }
+  }
+
+  absl::Status TakeSegments() {
+    const size_t inputs = graph_.point_of_input.size();
+    for (size_t s = 0; s < features_.segment_count(); ++s) {
+      GraphSegment segment;
+      for (const size_t end : {size_t{0}, size_t{1}}) {
+        const uint32_t input = features_.ends[2 * s + end];
+        if (input >= inputs) {
+          return absl::InvalidArgumentError(
+              absl::StrCat("segments[", s, "]: its end ", input, " is not a point; ",
+                           inputs == 0 ? "there are no points" : absl::StrCat("points are 0 to ", inputs - 1)));
+        }
+        (end == 0 ? segment.a : segment.b) = graph_.point_of_input[input];
+      }
+      segment.marker = features_.markers.empty() ? 0 : features_.markers[s];
+      segment.source = static_cast<uint32_t>(s);
+      segment.rings = features_.is_open.empty() || features_.is_open[s] == 0 ? 1 : 0;
+      if (segment.a == segment.b) {
+        ++graph_.counts.empty_segments;
+      } else {
+        graph_.segments.push_back(segment);
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  uint32_t AddPoint(const Point<2>& p) {
+    graph_.points.push_back(p);
+    graph_.input_of_point.push_back(kNone);
+    return static_cast<uint32_t>(graph_.points.size() - 1);
+  }
+
+  // Makes the corners and sides of the box a part of the graph.
+  void AddBox(const Box<2>& box) {
+    std::array<uint32_t, 4> corner;
+    for (uint32_t i = 0; i < 4; ++i) {
+      const Point<2> p = {(i & 1) == 0 ? box.low[0] : box.high[0], (i & 2) == 0 ? box.low[1] : box.high[1]};
+      const auto at = std::find(graph_.points.begin(), graph_.points.end(), p);
+      corner[i] = at == graph_.points.end() ? AddPoint(p) : static_cast<uint32_t>(at - graph_.points.begin());
+    }
+    constexpr std::array<SegmentEnds, 4> kSides = {{{0, 2}, {1, 3}, {0, 1}, {2, 3}}};  // by FaceIndex
+    for (uint32_t face = 0; face < 4; ++face) {
+      graph_.segments.push_back(
+          {corner[kSides[face][0]], corner[kSides[face][1]], 0, GraphSegment::kBoxSide + face, 1});
+    }
+  }
+
+  // Has segments run from their lower end to the higher one, and leaves one of each.
+  absl::Status DropDuplicates() {
+    std::vector<GraphSegment>& segments = graph_.segments;
+    for (GraphSegment& segment : segments) {
+      if (At(segment.b) < At(segment.a)) {
+        std::swap(segment.a, segment.b);
+      }
+    }
+    std::vector<uint32_t> order(segments.size());
+    std::iota(order.begin(), order.end(), 0);
+    std::sort(order.begin(), order.end(), [&](uint32_t i, uint32_t j) {
+      const GraphSegment& s = segments[i];
+      const GraphSegment& t = segments[j];
+      return std::tie(s.a, s.b, s.source) < std::tie(t.a, t.b, t.source);
+    });
+    std::vector<bool> is_dropped(segments.size());
+    for (size_t k = 1; k < order.size(); ++k) {
+      GraphSegment& first = segments[order[k - 1]];
+      const GraphSegment& next = segments[order[k]];
+      if (first.a != next.a || first.b != next.b) {
+        continue;
+      }
+      if (first.marker != next.marker && !next.IsBoxSide()) {
+        return absl::InvalidArgumentError(absl::StrCat("segments[", first.source, "] and segments[", next.source,
+                                                       "] lie on each other from ", Place(At(first.a)), " to ",
+                                                       Place(At(first.b)), ", and have the markers ", first.marker,
+                                                       " and ", next.marker, "; give both the same, or leave one out"));
+      }
+      // A side of the box keeps the marker of a segment along it.
+      graph_.counts.duplicate_segments += next.IsBoxSide() ? 0 : 1;
+      first.rings += next.rings;
+      is_dropped[order[k]] = true;
+      std::swap(order[k - 1], order[k]);  // the next is compared with what stays
+    }
+    size_t kept = 0;
+    for (size_t i = 0; i < segments.size(); ++i) {
+      if (!is_dropped[i]) {
+        segments[kept++] = segments[i];
+      }
+    }
+    segments.resize(kept);
+    return absl::OkStatus();
+  }
+
+  // Of all vertices that lie on segments or too near to them, and all segments that cross; ascending, each once. Stops
+  // early where there are more than an error tells of.
+  absl::StatusOr<std::vector<Fault>> FindFaults() const {
+    std::vector<Fault> faults;
+    if (graph_.segments.empty()) {
+      return faults;
+    }
+    std::vector<SegmentEnds> ends;
+    ends.reserve(graph_.segments.size());
+    for (const GraphSegment& segment : graph_.segments) {
+      ends.push_back({segment.a, segment.b});
+    }
+    const size_t most = features_.crossings == CrossingRule::kSplit ? std::numeric_limits<size_t>::max() : kMostFaults;
+    size_t unwanted = 0;
+    SegmentPairs(graph_.points, ends, least_separation_)
+        .ForEachGroup([&](std::span<const uint32_t> segments, std::span<const uint32_t> points) {
+          for (const uint32_t s : segments) {
+            for (const uint32_t p : points) {
+              if (const auto kind = PointFault(s, p)) {
+                faults.push_back({*kind, s, p});
+                unwanted += *kind == Fault::Kind::kNear ? 1 : 0;
+              }
+            }
+            for (const uint32_t t : segments) {
+              if (s < t && Cross(s, t)) {
+                faults.push_back({Fault::Kind::kCrossing, s, t});
+                ++unwanted;
+              }
+            }
+          }
+          return unwanted <= most && !context_.IsCancelled();
+        });
+    WELLSPACE_RETURN_IF_ERROR(context_.Check());
+    std::sort(faults.begin(), faults.end());
+    faults.erase(std::unique(faults.begin(), faults.end()), faults.end());
+    return faults;
+  }
+
+  std::optional<Fault::Kind> PointFault(uint32_t segment, uint32_t point) const {
+    const GraphSegment& s = graph_.segments[segment];
+    if (s.a == point || s.b == point) {
+      return std::nullopt;
+    }
+    const Point<2>& a = At(s.a);
+    const Point<2>& b = At(s.b);
+    const Point<2>& p = At(point);
+    const Box<2> box = BoxOfEnds(a, b);
+    if (DistanceSq<2>(p, box) > 4 * least_separation_ * least_separation_) {
+      return std::nullopt;
+    }
+    if (SideOf(a, b, p) == Sign::kZero) {
+      return IsBetween(a, b, p) ? std::optional(Fault::Kind::kOn) : std::nullopt;
+    }
+    // Beyond an end, two points are too near to each other, which is told elsewhere.
+    const double t = Along(a, b, p);
+    return t > 0 && t < 1 && DistanceToSegment(a, b, p) < least_separation_ ? std::optional(Fault::Kind::kNear)
+                                                                            : std::nullopt;
+  }
+
+  bool Cross(uint32_t s, uint32_t t) const {
+    const GraphSegment& one = graph_.segments[s];
+    const GraphSegment& two = graph_.segments[t];
+    if (one.a == two.a || one.a == two.b || one.b == two.a || one.b == two.b) {
+      return false;
+    }
+    const auto apart = [&](const GraphSegment& line, const GraphSegment& other) {
+      return SideOf(At(line.a), At(line.b), At(other.a)) * SideOf(At(line.a), At(line.b), At(other.b)) ==
+             Sign::kNegative;
+    };
+    return apart(one, two) && apart(two, one);
+  }
+
+  std::string NameOf(uint32_t segment) const {
+    const GraphSegment& s = graph_.segments[segment];
+    if (s.IsBoxSide()) {
+      return absl::StrCat("a side of the box from ", Place(At(s.a)), " to ", Place(At(s.b)));
+    }
+    return absl::StrCat("segments[", s.source, "]");
+  }
+  std::string NameOfPoint(uint32_t point) const {
+    return graph_.input_of_point[point] == kNone
+               ? absl::StrCat("the vertex at ", Place(At(point)))
+               : absl::StrCat("points[", graph_.input_of_point[point], "] at ", Place(At(point)));
+  }
+
+  std::string Describe(const Fault& fault) const {
+    const GraphSegment& s = graph_.segments[fault.segment];
+    if (fault.kind == Fault::Kind::kCrossing) {
+      const GraphSegment& t = graph_.segments[fault.other];
+      return absl::StrCat(NameOf(fault.segment), " and ", NameOf(fault.other), " cross at ",
+                          Place(CrossingOf(At(s.a), At(s.b), At(t.a), At(t.b))));
+    }
+    return absl::StrCat(NameOfPoint(fault.other), " is ",
+                        absl::StrFormat("%.3g", DistanceToSegment(At(s.a), At(s.b), At(fault.other))), " from ",
+                        NameOf(fault.segment), " and not on it");
+  }
+
+  // Refuses faults that are not to be split at.
+  absl::Status CheckAllowed(const std::vector<Fault>& faults) const {
+    if (features_.crossings == CrossingRule::kSplit) {
+      return absl::OkStatus();
+    }
+    for (const auto kind : {Fault::Kind::kCrossing, Fault::Kind::kNear}) {
+      std::string names;
+      size_t count = 0;
+      for (const Fault& fault : faults) {
+        if (fault.kind == kind && count++ < kNamed) {
+          absl::StrAppend(&names, count == 1 ? "" : "; ", Describe(fault));
+        }
+      }
+      if (count == 0) {
+        continue;
+      }
+      const std::string more =
+          count > kNamed ? absl::StrCat("; and ", count - kNamed, " more", count >= kMostFaults ? " at least" : "")
+                         : "";
+      return absl::InvalidArgumentError(
+          kind == Fault::Kind::kCrossing
+              ? absl::StrCat("segments: ", names, more, "; segments may meet in common ends alone, or be split there")
+              : absl::StrCat("points: ", names, more, "; at least ", absl::StrFormat("%.3g", least_separation_),
+                             " is needed, or the segment may be led through the point"));
+    }
+    return absl::OkStatus();
+  }
+
+  // The vertex within the least separation of `p`, or a new one: where several segments cross in one place, their
+  // crossings are rounded to places beside each other.
+  //
+  // Complexity: O(log n); O(n log n) the first time.
+  uint32_t VertexNear(const Point<2>& p) {
+    const auto cell_of = [this](const Point<2>& q) {
+      return Point<2>{std::floor(q[0] / least_separation_), std::floor(q[1] / least_separation_)};
+    };
+    for (; in_cells_ < graph_.points.size(); ++in_cells_) {
+      by_cell_.emplace(cell_of(At(in_cells_)), in_cells_);
+    }
+    const Point<2> cell = cell_of(p);
+    uint32_t nearest = kNone;
+    for (const double x : {cell[0] - 1, cell[0], cell[0] + 1}) {
+      for (const double y : {cell[1] - 1, cell[1], cell[1] + 1}) {
+        const auto [begin, end] = by_cell_.equal_range({x, y});
+        for (auto at = begin; at != end; ++at) {
+          const double distance = Distance<2>(At(at->second), p);
+          if (distance < least_separation_ && (nearest == kNone || distance < Distance<2>(At(nearest), p))) {
+            nearest = at->second;
+          }
+        }
+      }
+    }
+    return nearest != kNone ? nearest : AddPoint(p);
+  }
+
+  // Splits segments at what lies on them or crosses them.
+  void SplitAt(const std::vector<Fault>& faults) {
+    std::vector<std::pair<uint32_t, uint32_t>> splits;  // segment, point
+    for (const Fault& fault : faults) {
+      if (fault.kind != Fault::Kind::kCrossing) {
+        splits.emplace_back(fault.segment, fault.other);
+        ++(fault.kind == Fault::Kind::kOn ? graph_.counts.touching_vertices : graph_.counts.near_vertices);
+        continue;
+      }
+      const GraphSegment& s = graph_.segments[fault.segment];
+      const GraphSegment& t = graph_.segments[fault.other];
+      const uint32_t point = VertexNear(CrossingOf(At(s.a), At(s.b), At(t.a), At(t.b)));
+      for (const uint32_t segment : {fault.segment, fault.other}) {
+        splits.emplace_back(segment, point);
+      }
+      ++graph_.counts.crossings;
+    }
+    std::sort(splits.begin(), splits.end(), [this](const auto& x, const auto& y) {
+      const GraphSegment& s = graph_.segments[x.first];
+      return x.first != y.first ? x.first < y.first
+                                : std::pair(Along(At(s.a), At(s.b), At(x.second)), x.second) <
+                                      std::pair(Along(At(s.a), At(s.b), At(y.second)), y.second);
+    });
+    std::vector<GraphSegment> split;
+    auto next = splits.begin();
+    for (uint32_t s = 0; s < graph_.segments.size(); ++s) {
+      GraphSegment part = graph_.segments[s];
+      const uint32_t end = part.b;
+      for (; next != splits.end() && next->first == s; ++next) {
+        part.b = next->second;
+        if (part.a != part.b && part.b != end) {
+          split.push_back(part);
+          part.a = part.b;
+        }
+      }
+      part.b = end;
+      split.push_back(part);
+    }
+    graph_.segments = std::move(split);
+  }
+
+  const Features& features_;
+  const double least_separation_;
+  const RunContext& context_;
+  PlanarGraph graph_;
+  std::multimap<Point<2>, uint32_t> by_cell_;  // points by cells as large as the least separation, of which so many:
+  uint32_t in_cells_ = 0;
+};
+
+}  // namespace
+
+absl::StatusOr<PlanarGraph> MakePlanarGraph(std::span<const double> points, const Features& features, const Box<2>* box,
+                                            double least_separation, const RunContext& context) {
+  return GraphMaker(features, least_separation, context).Make(points, box);
+}
+
+}  // namespace wellspace::core

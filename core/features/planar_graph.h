@@ -1,0 +1,70 @@
+// A planar straight-line graph: the segments of a domain once they meet in common ends alone.
+#ifndef WELLSPACE_CORE_FEATURES_PLANAR_GRAPH_H_
+#define WELLSPACE_CORE_FEATURES_PLANAR_GRAPH_H_
+
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "core/base/run_context.h"
+#include "core/features/features.h"
+#include "core/geometry/box.h"
+#include "core/geometry/point.h"
+
+namespace wellspace::core {
+
+// A segment of a planar graph.
+struct GraphSegment {
+  static constexpr uint32_t kBoxSide = std::numeric_limits<uint32_t>::max() - 3;  // + FaceIndex
+
+  uint32_t a = 0;  // points
+  uint32_t b = 0;
+  int32_t marker = 0;
+  uint32_t source = 0;  // the first given segment that it is a part of, or a side of the box
+  uint32_t rings = 1;   // so many ring segments lie on it
+
+  bool IsBoxSide() const { return source >= kBoxSide; }
+};
+
+// What has been changed on the way from the segments that are given to a graph.
+struct CleaningCounts {
+  uint64_t equal_points = 0;        // beyond the first at each place
+  uint64_t empty_segments = 0;      // of no length
+  uint64_t duplicate_segments = 0;  // beyond the first
+  uint64_t touching_vertices = 0;   // that lay on a segment, which was split there
+  uint64_t crossings = 0;           // of two segments, which were split there
+  uint64_t near_vertices = 0;       // that lay too near to a segment, which was led through them
+};
+
+// Invariants: (1) points are distinct; (2) two segments have at most one point in common, and then an end of both; (3)
+// a point on a segment is an end of it; (4) a point is at least the least separation from every segment that it is no
+// end of.
+struct PlanarGraph {
+  std::vector<Point<2>> points;          // those that are given in the order of their first appearance, then others
+  std::vector<uint32_t> point_of_input;  // by given point
+  std::vector<uint32_t> input_of_point;  // the first given point there; kNoInput for those made here
+  std::vector<GraphSegment> segments;    // by source, then along it from its lower end to its higher one
+  CleaningCounts counts;
+
+  static constexpr uint32_t kNoInput = std::numeric_limits<uint32_t>::max();
+};
+
+// Makes a planar graph of the segments of `features` over `points`, n x 2; by exact signs alone, but for
+// `least_separation`, the distance that has to be between a vertex and a segment that it is not on. With `box` its
+// corners and sides belong to the graph, too.
+//
+// Guarantees: (1) where nothing crosses and nothing is too near, no coordinate is computed: a segment is split only at
+//             points that lie on it exactly.
+// Complexity: O((n + m) log (n + m)) for most inputs, and what is found.
+// Errors:     INVALID_ARGUMENT, naming segments, points and places: an end that does not exist; markers that differ on
+//             one segment; and, unless they are to be split, segments that cross and vertices that are too near;
+//             RESOURCE_EXHAUSTED when splitting does not end; CANCELLED, DEADLINE_EXCEEDED.
+// Source:     docs/design/features.md.
+absl::StatusOr<PlanarGraph> MakePlanarGraph(std::span<const double> points, const Features& features, const Box<2>* box,
+                                            double least_separation, const RunContext& context);
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_FEATURES_PLANAR_GRAPH_H_

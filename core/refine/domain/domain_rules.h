@@ -1,0 +1,102 @@
+// How a step follows from a cell in a domain of the plane: which segment is to be split, and where a new vertex goes.
+#ifndef WELLSPACE_CORE_REFINE_DOMAIN_DOMAIN_RULES_H_
+#define WELLSPACE_CORE_REFINE_DOMAIN_DOMAIN_RULES_H_
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/base/ids.h"
+#include "core/cell/polytope.h"
+#include "core/geometry/point.h"
+#include "core/refine/assessment.h"
+#include "core/refine/domain/planar_domain.h"
+#include "core/refine/insertion.h"
+#include "core/refine/step_rules.h"
+#include "core/voronoi/query_structure.h"
+
+namespace wellspace::core {
+
+// The part of a segment that a cell meets: from one distance from its end `a` to another.
+struct MetPart {
+  uint32_t segment = SegmentPoint::kNone;
+  double from = 0;
+  double to = 0;
+  double distance = 0;  // from the site of the cell to the nearest point of the part
+
+  bool IsThere() const { return segment != SegmentPoint::kNone; }
+};
+
+// What is found of a cell in a domain, beside an Assessment. There a segment that the cell meets counts as an
+// encroached face; what a cell is beyond its vertex' segments, on sides that are not meshed, does not count.
+struct DomainFinding {
+  MetPart met;  // the nearest segment that the cell meets, and the vertex is not on
+};
+
+// A node by the vertices that it is equidistant from beside the site.
+using NodeName = std::pair<VertexId, VertexId>;
+
+// For the criteria of one run. What the functions return depends on the cell, on the places of vertices and on the
+// domain alone.
+//
+// Thread safety: thread-compatible; const functions may run at once.
+class DomainRules {
+ public:
+  // REQUIRES:   all references outlive this.
+  DomainRules(const QueryStructure<2>& structure, const PlanarDomain& domain, const StepRules<2>& rules);
+
+  // What is wrong with the cell of `v`, whose nodes are placed; `segments` has all that meet it. Nodes in `refused` ask
+  // for nothing.
+  //
+  // Complexity: O(nodes segments).
+  Assessment AssessCell(VertexId v, Polytope<2>& cell, std::span<const uint32_t> segments, double edge_limit_sq,
+                        std::span<const NodeName> refused, DomainFinding& finding) const;
+
+  // The insertion that `cell`, that of `v`, asks for by what was found. `refused` is the node that asks for nothing
+  // more, if one is; none of both if nothing is asked for.
+  struct Answer {
+    std::optional<InsertionRequest<2>> request;
+    std::optional<NodeName> refused;
+  };
+  Answer NextRequest(VertexId v, const Polytope<2>& cell, const Assessment& found, const DomainFinding& finding,
+                     double edge_limit_sq, StepRules<2>::CellOf cell_of, Workspace<2>& workspace) const;
+
+  // How far `v` is from the nearest segment that it is not on, squared, if that is less than `limit_sq`; else that.
+  double NearestSegmentSq(VertexId v, double limit_sq, Workspace<2>& workspace) const;
+
+ private:
+  struct NodeView;
+  struct Bound {
+    double sq = 0;
+    bool is_size = false;  // a size or an area, not rho
+  };
+
+  MetPart MeetSegment(const Polytope<2>& cell, uint32_t segment) const;
+  MetPart NearestMet(VertexId v, const Polytope<2>& cell, std::span<const uint32_t> segments) const;
+  bool IsAcross(VertexId v, VertexId u, const Point<2>& toward) const;
+  SegmentPoint SplitPlace(VertexId v, const MetPart& met) const;
+  SegmentPoint KeepWithin(SegmentPoint place, double room) const;
+  InsertionRequest<2> RequestAt(VertexId v, const SegmentPoint& place, double edge_limit_sq,
+                                Workspace<2>& workspace) const;
+  bool IsAtSegment(VertexId v, const Polytope<2>& cell, int node) const;
+  bool IsCrossed(VertexId v, const NodeView& node) const;
+  Bound BoundOf(const Polytope<2>& cell, const CellNode<2>& node, const NodeView& view, uint32_t face) const;
+  // Whether the way from `v` to `p` begins in a sector.
+  bool LeadsInto(VertexId v, size_t sector, const Point<2>& p) const {
+    return domain_.SectorToward(v, Difference<2>(p, structure_.point(v))) == sector;
+  }
+  SteinerPoint<2> CandidateIn(size_t sector, VertexId v, const Polytope<2>& cell, const Assessment& found,
+                              double edge_limit_sq, StepRules<2>::CellOf cell_of, Workspace<2>& workspace) const;
+  SegmentPoint FootOf(const SteinerPoint<2>& candidate, VertexId v, bool is_in_sector,
+                      std::span<const uint32_t> segments, double& distance_sq) const;
+
+  const QueryStructure<2>& structure_;
+  const PlanarDomain& domain_;
+  const StepRules<2>& rules_;
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_REFINE_DOMAIN_DOMAIN_RULES_H_

@@ -1,0 +1,93 @@
+// The steps of one vertex in a domain of the plane, computed from its cell.
+#ifndef WELLSPACE_CORE_REFINE_DOMAIN_DOMAIN_STEPS_H_
+#define WELLSPACE_CORE_REFINE_DOMAIN_DOMAIN_STEPS_H_
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/base/ids.h"
+#include "core/cell/polytope.h"
+#include "core/refine/assessment.h"
+#include "core/refine/cell_steps.h"
+#include "core/refine/domain/domain_rules.h"
+#include "core/refine/face_watchers.h"
+#include "core/refine/insertion.h"
+#include "core/refine/neighbor_notice.h"
+#include "core/refine/speculation/star_writer.h"
+
+namespace wellspace::core {
+
+// As CellSteps, whose functions it has; segments take the place of faces of the box.
+//
+// Thread safety: as CellSteps.
+template <typename Cells>
+class DomainSteps {
+ public:
+  // REQUIRES:   all references outlive this.
+  DomainSteps(const DomainRules& rules, const StepRules<2>& step_rules, VertexId v, double edge_limit_sq, Cells& cells,
+              StepWorkspace<2>& workspace)
+      : rules_(rules), cells_(cells), workspace_(workspace), v_(v), edge_limit_sq_(edge_limit_sq) {
+    cells_.ComputeOwn(v, step_rules.ClipAround(v, edge_limit_sq), workspace.own);
+  }
+
+  Polytope<2>& cell() { return workspace_.own.cell; }
+
+  const Assessment* Assess() {
+    if (cell().IsTooLarge()) {
+      return nullptr;
+    }
+    found_ = rules_.AssessCell(v_, cell(), workspace_.own.segments, edge_limit_sq_, refused_, finding_);
+    return &found_;
+  }
+
+  // All neighbours: a node that asked for nothing, since a segment was in its way, may be one of a triangle now.
+  std::span<const NeighborNotice> Notices() {
+    workspace_.notices.clear();
+    for (const CellNode<2>& node : cell().nodes()) {
+      for (const uint16_t index : node.planes) {
+        if (const Plane<2>& plane = cell().plane(index); plane.kind == PlaneKind::kBisector) {
+          workspace_.notices.push_back({plane.vertex, 2 * plane.offset, true});
+        }
+      }
+    }
+    return workspace_.notices;
+  }
+
+  const InsertionRequest<2>* NextRequest() {
+    const auto cell_of = [this](VertexId u, const Box<2>& clip) {
+      return cells_.ComputeOther(u, clip, workspace_.other);
+    };
+    while (true) {
+      DomainRules::Answer answer =
+          rules_.NextRequest(v_, cell(), found_, finding_, edge_limit_sq_, cell_of, workspace_.other);
+      request_ = answer.request;
+      if (!answer.refused.has_value()) {
+        return request_.has_value() ? &*request_ : nullptr;
+      }
+      refused_.push_back(*answer.refused);
+      Assess();
+    }
+  }
+
+  void Inserted(VertexId x) { cell().CutBeforePlace(x, request_->point.position); }
+
+  std::span<const WatchedNode<2>> NodesToWatch() { return {}; }
+
+  typename StarWriter<2>::Simplices FindStar(StarWriter<2>& /*stars*/) { return {}; }
+
+ private:
+  const DomainRules& rules_;
+  Cells& cells_;
+  StepWorkspace<2>& workspace_;
+  const VertexId v_;
+  const double edge_limit_sq_;
+  Assessment found_;
+  DomainFinding finding_;
+  std::vector<NodeName> refused_;
+  std::optional<InsertionRequest<2>> request_;
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_REFINE_DOMAIN_DOMAIN_STEPS_H_

@@ -1,0 +1,145 @@
+#include "core/refine/domain/planar_domain.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace wellspace::core {
+namespace {
+
+// Grows with the angle of `d` from the first axis, from 0 to 4.
+double PseudoAngle(const Point<2>& d) {
+  const double size = std::abs(d[0]) + std::abs(d[1]);
+  const double t = d[1] / size;
+  if (d[0] < 0) {
+    return 2 - t;
+  }
+  return d[1] < 0 ? 4 + t : t;
+}
+
+// The same from the direction of pseudo-angle `from` on.
+double PseudoAngleFrom(double from, const Point<2>& d) {
+  const double angle = PseudoAngle(d) - from;
+  return angle < 0 ? angle + 4 : angle;
+}
+
+}  // namespace
+
+PlanarDomain::PlanarDomain(PlanarGraph graph, PlanarFaces faces)
+    : graph_(std::move(graph)),
+      faces_(std::move(faces)),
+      is_acute_(2 * graph_.segments.size()),
+      splits_(graph_.segments.size()) {
+  for (uint32_t s = 0; s < segment_count(); ++s) {
+    lengths_.push_back(Distance<2>(EndOf(s, false), EndOf(s, true)));
+    ways_.push_back(HalfEdgeOf(s, false));
+    ways_.push_back(HalfEdgeOf(s, true));
+  }
+  for (uint32_t p = 0; p < point_count(); ++p) {
+    const std::span<const HalfEdge> ways = faces_.Around(p);
+    for (size_t i = 0; i < ways.size() && ways.size() > 1; ++i) {
+      const HalfEdge h = ways[i];
+      const HalfEdge next = ways[(i + 1) % ways.size()];
+      const double cosine =
+          Dot<2>(DirectionOf(h), DirectionOf(next)) / lengths_[SegmentOf(h)] / lengths_[SegmentOf(next)];
+      if (cosine > 0.5 * (1 + 1e-12)) {
+        is_acute_[h] = is_acute_[next] = true;
+      }
+    }
+  }
+}
+
+std::vector<SegmentLists::Ends> PlanarDomain::Ends() const {
+  std::vector<SegmentLists::Ends> ends;
+  ends.reserve(segment_count());
+  for (uint32_t s = 0; s < segment_count(); ++s) {
+    ends.push_back({EndOf(s, false), EndOf(s, true)});
+  }
+  return ends;
+}
+
+void PlanarDomain::AddVertex(const SegmentPoint& place, uint32_t face) {
+  places_.push_back({place, face});
+  if (place.IsOnSegment()) {
+    ++splits_[place.segment];
+  }
+}
+
+std::span<const HalfEdge> PlanarDomain::WaysFrom(VertexId v) const {
+  if (IsPoint(v)) {
+    return faces_.Around(Index(v));
+  }
+  const SegmentPoint place = PlaceOf(v);
+  return place.IsOnSegment() ? std::span<const HalfEdge>(ways_).subspan(2 * size_t{place.segment}, 2)
+                             : std::span<const HalfEdge>();
+}
+
+size_t PlanarDomain::SectorToward(VertexId v, const Point<2>& d) const {
+  const std::span<const HalfEdge> ways = WaysFrom(v);
+  if (ways.size() < 2) {
+    return 0;
+  }
+  const double first = PseudoAngle(DirectionOf(ways[0]));
+  const double angle = PseudoAngleFrom(first, d);
+  size_t low = 0;  // the last way whose angle is at most that of d
+  size_t high = ways.size();
+  while (high - low > 1) {
+    const size_t middle = (low + high) / 2;
+    (PseudoAngleFrom(first, DirectionOf(ways[middle])) <= angle ? low : high) = middle;
+  }
+  return low;
+}
+
+bool PlanarDomain::IsOn(VertexId v, uint32_t segment) const {
+  return IsPoint(v) ? EndVertex(segment, false) == v || EndVertex(segment, true) == v : PlaceOf(v).segment == segment;
+}
+
+double PlanarDomain::DistanceFromEnd(VertexId v, uint32_t segment, bool is_b) const {
+  if (IsPoint(v)) {
+    return EndVertex(segment, is_b) == v ? 0 : LengthOf(segment);
+  }
+  const SegmentPoint place = PlaceOf(v);
+  return place.is_from_b == is_b ? place.distance : LengthOf(segment) - place.distance;
+}
+
+Point<2> PlanarDomain::PositionOf(const SegmentPoint& place) const {
+  const double length = LengthOf(place.segment);
+  const bool is_nearer = place.distance <= 0.5 * length;
+  const bool is_from_b = is_nearer ? place.is_from_b : !place.is_from_b;
+  const double t = (is_nearer ? place.distance : length - place.distance) / length;
+  const Point<2>& from = EndOf(place.segment, is_from_b);
+  const Point<2>& to = EndOf(place.segment, !is_from_b);
+  return {from[0] + t * (to[0] - from[0]), from[1] + t * (to[1] - from[1])};
+}
+
+PlanarDomain::Chains PlanarDomain::FindChains() const {
+  Chains chains;
+  chains.first.assign(segment_count() + 1, 0);
+  for (uint32_t s = 0; s < segment_count(); ++s) {
+    chains.first[s + 1] = chains.first[s] + 2 + splits_[s];
+  }
+  chains.vertices.resize(chains.first.back());
+  std::vector<uint32_t> next(chains.first.begin(), chains.first.end() - 1);
+  for (uint32_t s = 0; s < segment_count(); ++s) {
+    chains.vertices[next[s]++] = EndVertex(s, false);
+    chains.vertices[chains.first[s + 1] - 1] = EndVertex(s, true);
+  }
+  for (uint32_t v = point_count(); v < vertex_count(); ++v) {
+    if (const SegmentPoint place = PlaceOf(VertexId{v}); place.IsOnSegment()) {
+      chains.vertices[next[place.segment]++] = VertexId{v};
+    }
+  }
+  for (uint32_t s = 0; s < segment_count(); ++s) {
+    std::sort(chains.vertices.begin() + chains.first[s] + 1, chains.vertices.begin() + chains.first[s + 1] - 1,
+              [&](VertexId u, VertexId w) { return DistanceFromEnd(u, s, false) < DistanceFromEnd(w, s, false); });
+  }
+  return chains;
+}
+
+uint64_t PlanarDomain::MemoryBytes() const {
+  return graph_.points.size() * (sizeof(Point<2>) + 4 * sizeof(uint32_t)) +
+         segment_count() * (sizeof(GraphSegment) + sizeof(double) + 7 * sizeof(uint32_t)) +
+         places_.size() * sizeof(InsertedPlace);
+}
+
+}  // namespace wellspace::core

@@ -1,0 +1,132 @@
+// A domain in the plane while it is refined: its segments and faces, and where each vertex is on them.
+#ifndef WELLSPACE_CORE_REFINE_DOMAIN_PLANAR_DOMAIN_H_
+#define WELLSPACE_CORE_REFINE_DOMAIN_PLANAR_DOMAIN_H_
+
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/base/ids.h"
+#include "core/base/memory/huge_pages.h"
+#include "core/features/planar_faces.h"
+#include "core/features/planar_graph.h"
+#include "core/geometry/point.h"
+#include "core/refine/domain/segment_point.h"
+#include "core/tree/segment_lists.h"
+
+namespace wellspace::core {
+
+// Segments are named by number, faces as in PlanarFaces. The first vertices are the points of the graph, in its order;
+// the others have been inserted: on a segment, or inside a face. That a vertex is on a segment is never computed.
+//
+// Thread safety: thread-compatible; const functions may run at once.
+// Invariants: (1) a vertex that is on no segment lies inside a face that is meshed.
+class PlanarDomain {
+ public:
+  // REQUIRES:   every point of the graph is an end of a segment, or lies in a face that is meshed.
+  PlanarDomain(PlanarGraph graph, PlanarFaces faces);
+
+  const PlanarGraph& graph() const { return graph_; }
+  const PlanarFaces& faces() const { return faces_; }
+  uint32_t segment_count() const { return static_cast<uint32_t>(graph_.segments.size()); }
+  uint32_t point_count() const { return static_cast<uint32_t>(graph_.points.size()); }
+  uint32_t vertex_count() const { return point_count() + static_cast<uint32_t>(places_.size()); }
+
+  const Point<2>& EndOf(uint32_t segment, bool is_b) const { return graph_.points[Index(EndVertex(segment, is_b))]; }
+  VertexId EndVertex(uint32_t segment, bool is_b) const {
+    return VertexId{is_b ? graph_.segments[segment].b : graph_.segments[segment].a};
+  }
+  double LengthOf(uint32_t segment) const { return lengths_[segment]; }
+  // From the first end of a half-edge to the other, not normalized.
+  Point<2> DirectionOf(HalfEdge h) const {
+    return Difference<2>(EndOf(SegmentOf(h), !IsFromB(h)), EndOf(SegmentOf(h), IsFromB(h)));
+  }
+  // The ends of all segments, by segment.
+  std::vector<SegmentLists::Ends> Ends() const;
+
+  // Adds the vertex after the last: on a segment, or inside `face`.
+  void AddVertex(const SegmentPoint& place, uint32_t face);
+
+  bool IsPoint(VertexId v) const { return Index(v) < point_count(); }
+  // Where `v` is on a segment; on none if it is an end of segments, or inside a face.
+  SegmentPoint PlaceOf(VertexId v) const {
+    return IsPoint(v) ? SegmentPoint() : places_[Index(v) - point_count()].place;
+  }
+  // Whether it is inside a face.
+  bool IsFree(VertexId v) const {
+    return IsPoint(v) ? faces_.point_face[Index(v)] != PlanarFaces::kOnSegments
+                      : !places_[Index(v) - point_count()].place.IsOnSegment();
+  }
+  // REQUIRES:   IsFree(v).
+  uint32_t FaceOf(VertexId v) const {
+    return IsPoint(v) ? faces_.point_face[Index(v)] : places_[Index(v) - point_count()].face;
+  }
+
+  // The ways that lead from `v` along segments, counterclockwise: none from a vertex inside a face. Between two that
+  // follow each other lies a sector, of the face left of the first.
+  std::span<const HalfEdge> WaysFrom(VertexId v) const;
+  // The number of the sector at `v` that the direction `d` leads into, as of the way before it; one of the two, where
+  // it leads along a segment. 0 for a vertex inside a face.
+  size_t SectorToward(VertexId v, const Point<2>& d) const;
+  uint32_t FaceOfSector(VertexId v, size_t sector) const {
+    const std::span<const HalfEdge> ways = WaysFrom(v);
+    return ways.empty() ? FaceOf(v) : faces_.left_face[ways[sector]];
+  }
+
+  // Whether `v` is on `segment`, or an end of it.
+  bool IsOn(VertexId v, uint32_t segment) const;
+  // How far `v`, which is on `segment` or an end of it, is from one of its ends.
+  double DistanceFromEnd(VertexId v, uint32_t segment, bool is_b) const;
+
+  // Where a point of a segment is: computed from the nearer end, each coordinate rounded once or twice.
+  Point<2> PositionOf(const SegmentPoint& place) const;
+
+  // The place on `segment` halfway between two vertices on it, or at its ends.
+  SegmentPoint MiddleOf(uint32_t segment, VertexId u, VertexId w) const {
+    return FromNearerEnd(segment, 0.5 * (DistanceFromEnd(u, segment, false) + DistanceFromEnd(w, segment, false)));
+  }
+  // The place at a distance from end a, as the distance from the nearer end.
+  SegmentPoint FromNearerEnd(uint32_t segment, double from_a) const {
+    const double length = LengthOf(segment);
+    return from_a <= 0.5 * length ? SegmentPoint{segment, false, from_a} : SegmentPoint{segment, true, length - from_a};
+  }
+
+  // Whether two ways that lead from the first end of `h` make an angle of less than 60 degrees, of which h is one.
+  bool IsAcute(HalfEdge h) const { return is_acute_[h]; }
+  // How many vertices have been inserted on a segment.
+  uint32_t SplitsOf(uint32_t segment) const { return splits_[segment]; }
+
+  // The vertices on each segment in their order, with both of its ends: those of segment s are
+  // vertices[first[s]] to vertices[first[s + 1]].
+  struct Chains {
+    std::vector<uint32_t> first;
+    std::vector<VertexId> vertices;
+
+    std::span<const VertexId> Of(uint32_t segment) const {
+      return {vertices.data() + first[segment], first[segment + 1] - first[segment]};
+    }
+  };
+  // Complexity: O(vertices log vertices).
+  Chains FindChains() const;
+
+  uint64_t MemoryBytes() const;
+
+ private:
+  struct InsertedPlace {
+    SegmentPoint place;
+    uint32_t face = 0;
+  };
+
+  PlanarGraph graph_;
+  PlanarFaces faces_;
+  std::vector<double> lengths_;
+  std::vector<HalfEdge> ways_;    // 2 of each segment: those from a vertex on it, toward b and a
+  std::vector<bool> is_acute_;    // by half-edge
+  std::vector<uint32_t> splits_;  // by segment
+  HugeVector<InsertedPlace> places_;
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_REFINE_DOMAIN_PLANAR_DOMAIN_H_

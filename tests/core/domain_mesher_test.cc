@@ -1,0 +1,322 @@
+// Domains in the plane: what is meshed, what is kept, and what is said of it; seen from outside, by other means.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <numbers>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/geometry/exact_measure.h"
+#include "core/mesher.h"
+#include "core/simplex/quality.h"
+#include "tests/support/seeded_test.h"
+
+namespace wellspace::core {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+struct Input {
+  std::vector<double> points;
+  std::vector<uint32_t> ends;
+  std::vector<int32_t> markers{};
+  std::vector<FaceSeed> seeds{};
+  FaceRule faces = FaceRule::kHoles;
+  CrossingRule crossings = CrossingRule::kRefuse;
+  MeshParameters parameters{.dimension = 2};
+
+  Input& Ring(const std::vector<Point<2>>& corners, int32_t marker = 0) {
+    const auto first = static_cast<uint32_t>(points.size() / 2);
+    const auto count = static_cast<uint32_t>(corners.size());
+    for (uint32_t i = 0; i < count; ++i) {
+      points.insert(points.end(), corners[i].begin(), corners[i].end());
+      ends.insert(ends.end(), {first + i, first + (i + 1) % count});
+      markers.push_back(marker);
+    }
+    return *this;
+  }
+  Input& Circle(const Point<2>& centre, double radius, int count, int32_t marker = 0) {
+    std::vector<Point<2>> corners;
+    for (int i = 0; i < count; ++i) {
+      const double angle = 2 * std::numbers::pi * i / count;
+      corners.push_back({centre[0] + radius * std::cos(angle), centre[1] + radius * std::sin(angle)});
+    }
+    return Ring(corners, marker);
+  }
+
+  absl::StatusOr<Mesh> Make() const {
+    Features features;
+    features.ends = ends;
+    features.markers = markers;
+    features.seeds = seeds;
+    features.faces = faces;
+    features.crossings = crossings;
+    RunContext context;
+    return MeshFeatures(parameters, points, features, context);
+  }
+};
+
+Point<2> At(const Mesh& mesh, uint32_t v) { return PointAt<2>(mesh.points, v); }
+
+double AreaOf(const Mesh& mesh) {
+  double area = 0;
+  for (size_t t = 0; t < mesh.simplex_count(); ++t) {
+    const Point<2> a = At(mesh, mesh.simplices[3 * t]);
+    const Point<2> b = Difference<2>(At(mesh, mesh.simplices[3 * t + 1]), a);
+    const Point<2> c = Difference<2>(At(mesh, mesh.simplices[3 * t + 2]), a);
+    area += 0.5 * (b[0] * c[1] - b[1] * c[0]);
+  }
+  return area;
+}
+
+// Checks, by a look at all pairs, that the mesh is conforming: its triangles are Delaunay among all vertices, every
+// edge has one triangle or two, and those with one are facets, as are all of the subsegments that facets tell of.
+void ExpectConforming(const Mesh& mesh) {
+  std::map<std::pair<uint32_t, uint32_t>, int> triangles_at;
+  for (size_t t = 0; t < mesh.simplex_count(); ++t) {
+    Simplex<2> corners;
+    for (int k = 0; k < 3; ++k) {
+      const uint32_t v = mesh.simplices[3 * t + k];
+      const uint32_t w = mesh.simplices[3 * t + (k + 1) % 3];
+      corners[k] = At(mesh, v);
+      ++triangles_at[std::minmax(v, w)];
+    }
+    ASSERT_EQ(Orientation<2>(corners).sign, Sign::kPositive);
+    for (uint32_t v = 0; v < mesh.vertex_count(); ++v) {
+      ASSERT_NE(InSphere<2>(corners, At(mesh, v)).sign, Sign::kPositive) << "triangle " << t << ", vertex " << v;
+    }
+  }
+  std::set<std::pair<uint32_t, uint32_t>> facets;
+  for (size_t f = 0; f < mesh.facet_count(); ++f) {
+    facets.insert(std::minmax(mesh.facets[2 * f], mesh.facets[2 * f + 1]));
+  }
+  EXPECT_EQ(facets.size(), mesh.facet_count());
+  for (const auto& facet : facets) {
+    EXPECT_TRUE(triangles_at.contains(facet)) << facet.first << " " << facet.second;
+  }
+  for (const auto& [edge, count] : triangles_at) {
+    EXPECT_LE(count, 2);
+    EXPECT_TRUE(count == 2 || facets.contains(edge)) << edge.first << " " << edge.second;
+  }
+}
+
+// Checks that each vertex but those of the graph is near to the segment that its facets say it is on.
+void ExpectPointsKept(const Input& input, const Mesh& mesh) {
+  ASSERT_EQ(mesh.input_vertex.size(), input.points.size() / 2);
+  for (size_t i = 0; i < mesh.input_vertex.size(); ++i) {
+    if (mesh.input_vertex[i] != kNoOutput) {
+      EXPECT_EQ(At(mesh, mesh.input_vertex[i]), (Point<2>{input.points[2 * i], input.points[2 * i + 1]}));
+    }
+  }
+}
+
+TEST(DomainMesherTest, ASquareIsTwoTriangles) {
+  const auto mesh = Input().Ring({{0, 0}, {1, 0}, {1, 1}, {0, 1}}).Make();
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_EQ(mesh->vertex_count(), 4u);
+  EXPECT_EQ(mesh->simplex_count(), 2u);
+  EXPECT_EQ(mesh->facet_count(), 4u);
+  EXPECT_THAT(mesh->domain_high, ElementsAre(1, 1));
+  ExpectConforming(*mesh);
+}
+
+TEST(DomainMesherTest, AHoleStaysEmptyAndItsEdgeHasAMarker) {
+  Input input = Input().Circle({0, 0}, 2, 30, 5).Circle({0.5, 0}, 1, 20, 7);
+  input.seeds = {{.at = {0.5, 0}, .is_hole = true}};
+  const auto mesh = input.Make();
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  ExpectConforming(*mesh);
+  ExpectPointsKept(input, *mesh);
+  const double outer = 0.5 * 30 * 4 * std::sin(2 * std::numbers::pi / 30);
+  const double inner = 0.5 * 20 * std::sin(2 * std::numbers::pi / 20);
+  EXPECT_NEAR(AreaOf(*mesh), outer - inner, 1e-12);
+  ASSERT_EQ(mesh->boundary.size(), 2u);
+  EXPECT_EQ(mesh->boundary[0].tag, 5);
+  EXPECT_EQ(mesh->boundary[1].name, "marker 7");
+  EXPECT_EQ(mesh->boundary[0].facets + mesh->boundary[1].facets, mesh->facet_count());
+  EXPECT_LE(mesh->statistics.max_radius_edge, std::numbers::sqrt2 * (1 + 1e-9));
+  // The domain is on the left of every facet, whose triangle there has both ends.
+  for (size_t f = 0; f < mesh->facet_count(); ++f) {
+    bool is_left = false;
+    for (size_t t = 0; t < mesh->simplex_count() && !is_left; ++t) {
+      for (int k = 0; k < 3; ++k) {
+        is_left = is_left || (mesh->simplices[3 * t + k] == mesh->facets[2 * f] &&
+                              mesh->simplices[3 * t + (k + 1) % 3] == mesh->facets[2 * f + 1]);
+      }
+    }
+    EXPECT_TRUE(is_left) << f;
+  }
+}
+
+TEST(DomainMesherTest, RegionsHaveTheirIdsAndAreas) {
+  Input input = Input().Ring({{0, 0}, {2, 0}, {2, 1}, {0, 1}});
+  input.points.insert(input.points.end(), {1, 0, 1, 1});
+  input.ends.insert(input.ends.end(), {4, 5});
+  input.markers.push_back(3);
+  input.seeds = {{.at = {0.5, 0.5}, .region = 10, .max_area = 0.005}, {.at = {1.5, 0.5}, .region = 20}};
+  const auto mesh = input.Make();
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  ExpectConforming(*mesh);
+  ASSERT_EQ(mesh->regions.size(), 2u);
+  EXPECT_EQ(mesh->regions[0].id, 10);
+  ASSERT_EQ(mesh->simplex_regions.size(), mesh->simplex_count());
+  for (size_t t = 0; t < mesh->simplex_count(); ++t) {
+    double x = 0;
+    for (int k = 0; k < 3; ++k) {
+      x += At(*mesh, mesh->simplices[3 * t + k])[0] / 3;
+    }
+    EXPECT_EQ(mesh->simplex_regions[t], x < 1 ? 10 : 20);
+    if (x < 1) {
+      Mesh one = *mesh;
+      one.simplices.assign(mesh->simplices.begin() + 3 * t, mesh->simplices.begin() + 3 * t + 3);
+      EXPECT_LE(AreaOf(one), 0.005 * (1 + 1e-9));
+    }
+  }
+}
+
+TEST(DomainMesherTest, SegmentsInTheBox) {
+  Input input;
+  input.faces = FaceRule::kBox;
+  input.points = {0.2, 0.2, 0.8, 0.7, 0.2, 0.8, 0, 0.5};
+  input.ends = {0, 1, 2, 3};
+  input.parameters.domain_low = {0, 0};
+  input.parameters.domain_high = {1, 1};
+  const auto mesh = input.Make();
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  ExpectConforming(*mesh);
+  EXPECT_NEAR(AreaOf(*mesh), 1, 1e-14);
+  std::vector<std::string> names;
+  for (const BoundaryPart& part : mesh->boundary) {
+    names.push_back(part.name);
+  }
+  EXPECT_THAT(names, ElementsAre("xmin", "xmax", "ymin", "ymax", "unmarked"));
+}
+
+TEST(DomainMesherTest, PointsOutsideHaveNoVertex) {
+  Input input = Input().Ring({{0, 0}, {1, 0}, {1, 1}, {0, 1}});
+  input.points.insert(input.points.end(), {0.5, 0.5, 3, 3});
+  const auto mesh = input.Make();
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  ASSERT_EQ(mesh->input_vertex.size(), 6u);
+  EXPECT_NE(mesh->input_vertex[4], kNoOutput);
+  EXPECT_EQ(mesh->input_vertex[5], kNoOutput);
+  ExpectConforming(*mesh);
+}
+
+TEST(DomainMesherTest, SmallAnglesEndAndKeepTheBound) {
+  for (const double degrees : {50.0, 30.0, 10.0, 2.0, 0.3, 0.01}) {
+    const double angle = degrees * std::numbers::pi / 180;
+    const auto mesh = Input().Ring({{0, 0}, {3, 0}, {2 * std::cos(angle), 2 * std::sin(angle)}}).Make();
+    ASSERT_TRUE(mesh.ok()) << degrees << ": " << mesh.status();
+    ExpectConforming(*mesh);
+    const double theta = std::min(angle, std::asin(1 / (2 * std::numbers::sqrt2)));
+    const double bound = std::atan2(std::sin(theta), 2 - std::cos(theta));
+    EXPECT_GE(mesh->statistics.min_angle_deg, (1 - 1e-6) * bound * 180 / std::numbers::pi) << degrees;
+    EXPECT_LT(mesh->vertex_count(), 200u) << degrees;
+  }
+}
+
+TEST(DomainMesherTest, TheMeshDoesNotDependOnTheOrderOfTheInput) {
+  Input input = Input().Circle({0, 0}, 1, 17, 1).Ring({{-0.2, -0.1}, {0.3, 0}, {0, 0.25}}, 2);
+  const auto one = input.Make();
+  ASSERT_TRUE(one.ok()) << one.status();
+  Input turned = input;
+  const size_t count = input.points.size() / 2;
+  for (size_t i = 0; i < count; ++i) {
+    turned.points[2 * i] = input.points[2 * (count - 1 - i)];
+    turned.points[2 * i + 1] = input.points[2 * (count - 1 - i) + 1];
+  }
+  for (size_t s = 0; s < input.markers.size(); ++s) {
+    const size_t from = input.markers.size() - 1 - s;
+    turned.ends[2 * s] = static_cast<uint32_t>(count - 1) - input.ends[2 * from + 1];
+    turned.ends[2 * s + 1] = static_cast<uint32_t>(count - 1) - input.ends[2 * from];
+    turned.markers[s] = input.markers[from];
+  }
+  const auto two = turned.Make();
+  ASSERT_TRUE(two.ok()) << two.status();
+  const auto places = [](const Mesh& mesh) {
+    std::set<Point<2>> all;
+    for (uint32_t v = 0; v < mesh.vertex_count(); ++v) {
+      all.insert(At(mesh, v));
+    }
+    return all;
+  };
+  EXPECT_EQ(places(*one), places(*two));
+  EXPECT_EQ(one->simplex_count(), two->simplex_count());
+}
+
+TEST(DomainMesherTest, ParametersThatADomainDoesNotHaveAreRefused) {
+  const Input square = Input().Ring({{0, 0}, {1, 0}, {1, 1}, {0, 1}});
+  Input input = square;
+  input.parameters.dimension = 3;
+  EXPECT_THAT(input.Make().status().message(), HasSubstr("dimension"));
+  input = square;
+  input.parameters.criterion = Criterion::kWellSpaced;
+  EXPECT_THAT(input.Make().status().message(), HasSubstr("criterion"));
+  input = square;
+  input.parameters.merge_distance = 0.1;
+  EXPECT_THAT(input.Make().status().message(), HasSubstr("merge_distance"));
+  input = square;
+  input.parameters.domain_low = {0, 0};
+  input.parameters.domain_high = {1, 1};
+  EXPECT_THAT(input.Make().status().message(), AllOf(HasSubstr("domain"), HasSubstr("box")));
+  input = square;
+  input.markers.pop_back();
+  EXPECT_THAT(input.Make().status().message(), HasSubstr("3 markers"));
+  input = square;
+  input.parameters.max_vertices = 3;
+  EXPECT_EQ(input.Make().status().code(), absl::StatusCode::kResourceExhausted);
+}
+
+TEST(DomainMesherTest, ACancelledRunSaysSo) {
+  Input input = Input().Circle({0, 0}, 1, 1000);
+  Features features;
+  features.ends = input.ends;
+  features.faces = FaceRule::kHoles;
+  RunContext context;
+  context.Cancel();
+  EXPECT_EQ(MeshFeatures(input.parameters, input.points, features, context).status().code(),
+            absl::StatusCode::kCancelled);
+}
+
+class DomainMesherPropertyTest : public test::SeededTest {
+ protected:
+  DomainMesherPropertyTest() : SeededTest(0xd0) {}
+};
+
+TEST_F(DomainMesherPropertyTest, RandomSegmentsOnASmallGridAreMeshed) {
+  for (int run = 0; run < 60; ++run) {
+    Input input;
+    input.faces = FaceRule::kBox;
+    input.crossings = CrossingRule::kSplit;
+    const uint64_t size = 2 + random_.Below(7);
+    const size_t count = 1 + random_.Below(8);
+    for (size_t i = 0; i < 2 * count; ++i) {
+      input.points.push_back(static_cast<double>(random_.Below(size)));
+      input.points.push_back(static_cast<double>(random_.Below(size)));
+      input.ends.push_back(static_cast<uint32_t>(i));
+    }
+    input.parameters.domain_low = {-1, -1};
+    input.parameters.domain_high = {9, 9};
+    input.parameters.rho = run % 2 == 0 ? 0 : 1;
+    const auto mesh = input.Make();
+    ASSERT_TRUE(mesh.ok()) << run << ": " << mesh.status();
+    ExpectPointsKept(input, *mesh);
+    EXPECT_NEAR(AreaOf(*mesh), 100, 1e-10);
+    if (mesh->vertex_count() < 1000) {
+      ExpectConforming(*mesh);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace wellspace::core

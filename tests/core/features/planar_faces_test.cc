@@ -1,0 +1,220 @@
+// Faces of planar graphs: holes, nesting, seeds, rules, and what is refused.
+#include "core/features/planar_faces.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/features/planar_graph.h"
+#include "tests/support/seeded_test.h"
+
+namespace wellspace::core {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+// Rings and open lines, and the faces between them.
+struct Drawing {
+  std::vector<double> points;
+  std::vector<uint32_t> ends;
+  std::vector<uint8_t> is_open;
+  std::vector<FaceSeed> seeds;
+  FaceRule rule = FaceRule::kHoles;
+  PlanarGraph graph;
+
+  Drawing& Ring(const std::vector<Point<2>>& corners) { return Add(corners, true); }
+  Drawing& Line(const std::vector<Point<2>>& corners) { return Add(corners, false); }
+  Drawing& Square(double low, double high) { return Ring({{low, low}, {high, low}, {high, high}, {low, high}}); }
+
+  Drawing& Add(const std::vector<Point<2>>& corners, bool is_closed) {
+    const auto first = static_cast<uint32_t>(points.size() / 2);
+    const auto count = static_cast<uint32_t>(corners.size());
+    for (uint32_t i = 0; i < count; ++i) {
+      points.insert(points.end(), corners[i].begin(), corners[i].end());
+      if (i + 1 < count || is_closed) {
+        ends.insert(ends.end(), {first + i, first + (i + 1) % count});
+        is_open.push_back(is_closed ? 0 : 1);
+      }
+    }
+    return *this;
+  }
+
+  absl::StatusOr<PlanarFaces> Find() {
+    Features features;
+    features.ends = ends;
+    features.is_open = is_open;
+    features.crossings = CrossingRule::kSplit;
+    graph = *MakePlanarGraph(points, features, nullptr, 1e-12, RunContext());
+    return FindFaces(graph, rule, seeds, RunContext());
+  }
+};
+
+size_t MeshedCount(const PlanarFaces& faces) {
+  return static_cast<size_t>(
+      std::count_if(faces.faces.begin(), faces.faces.end(), [](const Face& face) { return face.is_meshed; }));
+}
+
+// The face that a point lies in, as a seed there tells.
+uint32_t FaceAt(Drawing drawing, const Point<2>& p) {
+  drawing.seeds = {{.at = p, .region = 99}};
+  const auto faces = drawing.Find();
+  for (uint32_t face = 0; faces.ok() && face < faces->faces.size(); ++face) {
+    if (faces->faces[face].region == 99) {
+      return face;
+    }
+  }
+  return PlanarFaces::kOnSegments;
+}
+
+TEST(PlanarFacesTest, ARingHasAnInsideAndAnOutside) {
+  Drawing drawing = Drawing().Square(0, 1);
+  const auto faces = drawing.Find();
+  ASSERT_TRUE(faces.ok()) << faces.status();
+  ASSERT_EQ(faces->faces.size(), 2u);
+  EXPECT_FALSE(faces->faces[0].is_meshed);
+  EXPECT_TRUE(faces->faces[1].is_meshed);
+  for (uint32_t s = 0; s < 4; ++s) {
+    EXPECT_NE(faces->left_face[HalfEdgeOf(s, false)], faces->left_face[HalfEdgeOf(s, true)]);
+  }
+}
+
+TEST(PlanarFacesTest, ASeedMakesAHole) {
+  Drawing drawing = Drawing().Square(0, 3).Square(1, 2);
+  drawing.seeds = {{.at = {1.5, 1.5}, .is_hole = true}};
+  const auto faces = drawing.Find();
+  ASSERT_TRUE(faces.ok()) << faces.status();
+  EXPECT_EQ(faces->faces.size(), 3u);
+  EXPECT_EQ(MeshedCount(*faces), 1u);
+}
+
+TEST(PlanarFacesTest, IslandsInLakesInIslandsByEvenAndOdd) {
+  Drawing drawing = Drawing().Square(0, 9).Square(1, 8).Square(2, 7).Square(3, 6);
+  drawing.rule = FaceRule::kEvenOdd;
+  const auto faces = drawing.Find();
+  ASSERT_TRUE(faces.ok()) << faces.status();
+  EXPECT_EQ(faces->faces.size(), 5u);
+  EXPECT_TRUE(faces->faces[FaceAt(drawing, {0.5, 5})].is_meshed);
+  EXPECT_FALSE(faces->faces[FaceAt(drawing, {1.5, 5})].is_meshed);
+  EXPECT_TRUE(faces->faces[FaceAt(drawing, {2.5, 5})].is_meshed);
+  EXPECT_FALSE(faces->faces[FaceAt(drawing, {4, 5})].is_meshed);
+}
+
+TEST(PlanarFacesTest, ALineInsideARingDoesNotChangeSides) {
+  Drawing drawing = Drawing().Square(0, 4).Line({{1, 1}, {2, 2}, {3, 1}});
+  drawing.rule = FaceRule::kEvenOdd;
+  const auto faces = drawing.Find();
+  ASSERT_TRUE(faces.ok()) << faces.status();
+  EXPECT_EQ(faces->faces.size(), 2u);
+  EXPECT_EQ(MeshedCount(*faces), 1u);
+}
+
+TEST(PlanarFacesTest, PolygonsThatShareASideAreBothInside) {
+  Drawing drawing = Drawing().Ring({{0, 0}, {1, 0}, {1, 1}, {0, 1}}).Ring({{1, 0}, {2, 0}, {2, 1}, {1, 1}});
+  drawing.rule = FaceRule::kEvenOdd;
+  const auto faces = drawing.Find();
+  ASSERT_TRUE(faces.ok()) << faces.status();
+  EXPECT_EQ(MeshedCount(*faces), 2u);
+}
+
+TEST(PlanarFacesTest, PointsKnowTheirFace) {
+  Drawing drawing = Drawing().Square(0, 3).Square(1, 2);
+  drawing.points.insert(drawing.points.end(), {0.5, 1.5, 1.5, 1.5, 7, 7, 1, 2.5});
+  const auto faces = drawing.Find();
+  ASSERT_TRUE(faces.ok()) << faces.status();
+  const uint32_t between = faces->point_face[8];
+  const uint32_t inner = faces->point_face[9];
+  EXPECT_NE(between, inner);
+  EXPECT_EQ(faces->point_face[10], 0u);
+  EXPECT_EQ(faces->point_face[11], between);  // above a corner
+  EXPECT_EQ(faces->point_face[0], PlanarFaces::kOnSegments);
+}
+
+TEST(PlanarFacesTest, ASeedOnASegmentIsRefused) {
+  for (const Point<2>& at : {Point<2>{0.5, 0}, Point<2>{0, 0.5}, Point<2>{0, 0}, Point<2>{1, 1}, Point<2>{1, 0.25}}) {
+    Drawing drawing = Drawing().Square(0, 1);
+    drawing.seeds = {{.at = at, .is_hole = true}};
+    EXPECT_THAT(drawing.Find().status().message(), AllOf(HasSubstr("seeds[0]"), HasSubstr("lies on")));
+  }
+}
+
+TEST(PlanarFacesTest, TwoSeedsThatDifferInOneFaceAreRefused) {
+  Drawing drawing = Drawing().Square(0, 1);
+  drawing.seeds = {{.at = {0.2, 0.2}, .region = 1}, {.at = {0.8, 0.8}, .region = 2}};
+  EXPECT_THAT(drawing.Find().status().message(),
+              AllOf(HasSubstr("seeds[0]"), HasSubstr("seeds[1]"), HasSubstr("differ")));
+}
+
+TEST(PlanarFacesTest, WhatEnclosesNothingIsRefused) {
+  Drawing drawing = Drawing().Line({{0, 0}, {1, 0}, {1, 1}});
+  EXPECT_THAT(drawing.Find().status().message(), HasSubstr("enclose nothing"));
+  Drawing all_holes = Drawing().Square(0, 1);
+  all_holes.seeds = {{.at = {0.5, 0.5}, .is_hole = true}};
+  EXPECT_THAT(all_holes.Find().status().message(), HasSubstr("no face is left"));
+}
+
+TEST(PlanarFacesTest, RingsThatAreNotClosedAreRefusedByEvenAndOdd) {
+  // A ring that lacks its last side, closed by a line.
+  Drawing drawing;
+  drawing.Add({{0, 0}, {1, 0}, {1, 1}, {0, 1}}, false).Line({{0, 1}, {0, 0}});
+  drawing.is_open = {0, 0, 0, 1};
+  drawing.rule = FaceRule::kEvenOdd;
+  EXPECT_THAT(drawing.Find().status().message(), HasSubstr("not closed"));
+}
+
+// How many ring segments a ray to the left crosses: an independent count.
+int CrossingsLeftOf(const PlanarGraph& graph, const Point<2>& p) {
+  int crossings = 0;
+  for (const GraphSegment& segment : graph.segments) {
+    const Point<2>& a = graph.points[segment.a];
+    const Point<2>& b = graph.points[segment.b];
+    if ((a[1] > p[1]) != (b[1] > p[1])) {
+      const double x = a[0] + (p[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0]);
+      crossings += x < p[0] ? static_cast<int>(segment.rings) : 0;
+    }
+  }
+  return crossings;
+}
+
+class PlanarFacesPropertyTest : public test::SeededTest {
+ protected:
+  PlanarFacesPropertyTest() : SeededTest(0xface) {}
+};
+
+TEST_F(PlanarFacesPropertyTest, EvenAndOddIsWhatARayCounts) {
+  for (int run = 0; run < 100; ++run) {
+    Drawing drawing;
+    drawing.rule = FaceRule::kEvenOdd;
+    const size_t rings = 1 + random_.Below(5);
+    for (size_t i = 0; i < rings; ++i) {
+      std::vector<Point<2>> corners(3 + random_.Below(6));
+      for (Point<2>& corner : corners) {
+        corner = {static_cast<double>(random_.Below(9)), static_cast<double>(random_.Below(9))};
+      }
+      drawing.Ring(corners);
+    }
+    // Places that are on no segment of the grid, but for a chance too small to matter.
+    std::vector<Point<2>> places;
+    for (int i = 0; i < 20; ++i) {
+      places.push_back({9 * random_.Unit(), 9 * random_.Unit()});
+      drawing.points.insert(drawing.points.end(), places.back().begin(), places.back().end());
+    }
+    const size_t first = drawing.points.size() / 2 - places.size();
+    const auto faces = drawing.Find();
+    if (!faces.ok()) {  // all rings were flat
+      EXPECT_THAT(faces.status().message(), HasSubstr("face"));
+      continue;
+    }
+    for (size_t i = 0; i < places.size(); ++i) {
+      const uint32_t point = drawing.graph.point_of_input[first + i];
+      EXPECT_EQ(faces->IsMeshed(faces->point_face[point]), CrossingsLeftOf(drawing.graph, places[i]) % 2 == 1);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace wellspace::core

@@ -1,0 +1,204 @@
+// Segments become a planar graph: what is dropped, what is split, what is refused, and in which words.
+#include "core/features/planar_graph.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/geometry/exact_measure.h"
+#include "tests/support/seeded_test.h"
+
+namespace wellspace::core {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+constexpr double kSeparation = 1e-9;
+
+struct Input {
+  std::vector<double> points;
+  std::vector<uint32_t> ends;
+  std::vector<int32_t> markers{};
+  CrossingRule crossings = CrossingRule::kRefuse;
+
+  absl::StatusOr<PlanarGraph> Make(const Box<2>* box = nullptr) const {
+    Features features;
+    features.ends = ends;
+    features.markers = markers;
+    features.crossings = crossings;
+    return MakePlanarGraph(points, features, box, kSeparation, RunContext());
+  }
+};
+
+std::set<std::pair<uint32_t, uint32_t>> PairsOf(const PlanarGraph& graph) {
+  std::set<std::pair<uint32_t, uint32_t>> pairs;
+  for (const GraphSegment& segment : graph.segments) {
+    pairs.insert(std::minmax(segment.a, segment.b));
+  }
+  return pairs;
+}
+
+TEST(PlanarGraphTest, WhatIsAGraphStaysAsItIs) {
+  const auto graph = Input{.points = {0, 0, 1, 0, 0, 1, 5, 5}, .ends = {0, 1, 1, 2, 2, 0}, .markers = {7, 8, 9}}.Make();
+  ASSERT_TRUE(graph.ok()) << graph.status();
+  EXPECT_EQ(graph->points.size(), 4u);
+  ASSERT_EQ(graph->segments.size(), 3u);
+  EXPECT_EQ(PairsOf(*graph), (std::set<std::pair<uint32_t, uint32_t>>{{0, 1}, {1, 2}, {0, 2}}));
+  EXPECT_EQ(graph->segments[1].marker, 8);
+  EXPECT_EQ(graph->counts.crossings + graph->counts.touching_vertices + graph->counts.duplicate_segments, 0u);
+}
+
+TEST(PlanarGraphTest, EqualPointsAreOneAndSegmentsFollow) {
+  const auto graph = Input{.points = {0, 0, 1, 0, 0, 0, 1, 1}, .ends = {0, 1, 2, 3, 0, 2}}.Make();
+  ASSERT_TRUE(graph.ok()) << graph.status();
+  EXPECT_EQ(graph->points.size(), 3u);
+  EXPECT_EQ(graph->point_of_input, (std::vector<uint32_t>{0, 1, 0, 2}));
+  EXPECT_EQ(graph->counts.equal_points, 1u);
+  EXPECT_EQ(graph->counts.empty_segments, 1u);
+  EXPECT_EQ(PairsOf(*graph), (std::set<std::pair<uint32_t, uint32_t>>{{0, 1}, {0, 2}}));
+}
+
+TEST(PlanarGraphTest, TheSameSegmentTwiceIsOne) {
+  const auto graph = Input{.points = {0, 0, 1, 0}, .ends = {0, 1, 1, 0}}.Make();
+  ASSERT_TRUE(graph.ok()) << graph.status();
+  ASSERT_EQ(graph->segments.size(), 1u);
+  EXPECT_EQ(graph->segments[0].rings, 2u);
+  EXPECT_EQ(graph->counts.duplicate_segments, 1u);
+}
+
+TEST(PlanarGraphTest, TwoMarkersOnOneSegmentAreRefused) {
+  const auto graph = Input{.points = {0, 0, 1, 0, 3, 0}, .ends = {0, 2, 1, 2}, .markers = {4, 5}}.Make();
+  EXPECT_EQ(graph.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(graph.status().message(),
+              AllOf(HasSubstr("segments[0] and segments[1]"), HasSubstr("markers 4 and 5"), HasSubstr("(1, 0)")));
+}
+
+TEST(PlanarGraphTest, AnEndThatIsNoPointIsRefused) {
+  const auto graph = Input{.points = {0, 0, 1, 0}, .ends = {0, 1, 1, 2}}.Make();
+  EXPECT_THAT(graph.status().message(), AllOf(HasSubstr("segments[1]"), HasSubstr("its end 2"), HasSubstr("0 to 1")));
+}
+
+TEST(PlanarGraphTest, AVertexOnASegmentSplitsIt) {
+  const auto graph = Input{.points = {0, 0, 4, 0, 1, 0, 1, 3}, .ends = {0, 1, 2, 3}}.Make();
+  ASSERT_TRUE(graph.ok()) << graph.status();
+  EXPECT_EQ(PairsOf(*graph), (std::set<std::pair<uint32_t, uint32_t>>{{0, 2}, {1, 2}, {2, 3}}));
+  EXPECT_EQ(graph->counts.touching_vertices, 1u);
+  EXPECT_EQ(graph->points.size(), 4u);
+}
+
+TEST(PlanarGraphTest, SegmentsThatOverlapShareWhatTheyHaveInCommon) {
+  const auto graph = Input{.points = {0, 0, 3, 0, 1, 0, 5, 0}, .ends = {0, 1, 2, 3}}.Make();
+  ASSERT_TRUE(graph.ok()) << graph.status();
+  EXPECT_EQ(PairsOf(*graph), (std::set<std::pair<uint32_t, uint32_t>>{{0, 2}, {1, 2}, {1, 3}}));
+}
+
+TEST(PlanarGraphTest, ACrossingIsRefusedWithBothSegmentsAndThePlace) {
+  const auto graph = Input{.points = {0, 0, 2, 2, 0, 2, 2, 0}, .ends = {0, 1, 2, 3}}.Make();
+  EXPECT_EQ(graph.status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_THAT(graph.status().message(),
+              AllOf(HasSubstr("segments[0] and segments[1] cross at (1, 1)"), HasSubstr("split there")));
+}
+
+TEST(PlanarGraphTest, ManyCrossingsAreCountedAndTenNamed) {
+  Input input;
+  for (int i = 0; i < 5; ++i) {
+    for (const double end : {0.0, 6.0}) {
+      input.points.insert(input.points.end(), {end, 1.0 + i});
+      input.points.insert(input.points.end(), {1.0 + i, end});
+    }
+    const auto first = static_cast<uint32_t>(4 * i);
+    input.ends.insert(input.ends.end(), {first, first + 2, first + 1, first + 3});
+  }
+  const auto graph = input.Make();
+  EXPECT_THAT(graph.status().message(), HasSubstr("and 15 more"));
+}
+
+TEST(PlanarGraphTest, ACrossingBecomesAVertexIfThatIsAskedFor) {
+  const auto graph =
+      Input{.points = {0, 0, 2, 2, 0, 2, 2, 0}, .ends = {0, 1, 2, 3}, .crossings = CrossingRule::kSplit}.Make();
+  ASSERT_TRUE(graph.ok()) << graph.status();
+  ASSERT_EQ(graph->points.size(), 5u);
+  EXPECT_EQ(graph->points[4], (Point<2>{1, 1}));
+  EXPECT_EQ(graph->input_of_point[4], PlanarGraph::kNoInput);
+  EXPECT_EQ(graph->segments.size(), 4u);
+  EXPECT_EQ(graph->counts.crossings, 1u);
+}
+
+TEST(PlanarGraphTest, AVertexTooNearToASegmentIsRefusedOrLedThrough) {
+  Input input{.points = {0, 0, 2, 0, 1, 1e-12, 1, 1}, .ends = {0, 1, 2, 3}};
+  const auto refused = input.Make();
+  EXPECT_THAT(refused.status().message(),
+              AllOf(HasSubstr("points[2] at (1, "), HasSubstr("1e-12 from segments[0]"), HasSubstr("1e-09")));
+  input.crossings = CrossingRule::kSplit;
+  const auto graph = input.Make();
+  ASSERT_TRUE(graph.ok()) << graph.status();
+  EXPECT_EQ(PairsOf(*graph), (std::set<std::pair<uint32_t, uint32_t>>{{0, 2}, {1, 2}, {2, 3}}));
+  EXPECT_EQ(graph->counts.near_vertices, 1u);
+}
+
+TEST(PlanarGraphTest, TheBoxBelongsToTheGraph) {
+  const Box<2> box{{0, 0}, {2, 1}};
+  const auto graph = Input{.points = {0.5, 0, 1, 0.5, 0, 0}, .ends = {0, 1}}.Make(&box);
+  ASSERT_TRUE(graph.ok()) << graph.status();
+  EXPECT_EQ(graph->points.size(), 6u);  // three corners are new
+  EXPECT_EQ(graph->segments.size(), 6u);
+  int sides = 0;
+  for (const GraphSegment& segment : graph->segments) {
+    sides += segment.IsBoxSide() ? 1 : 0;
+  }
+  EXPECT_EQ(sides, 5);
+}
+
+// No two segments cross, and no point is on one, by a look at all pairs.
+void ExpectPlanar(const PlanarGraph& graph) {
+  const auto side = [&](uint32_t a, uint32_t b, uint32_t p) {
+    return Orientation<2>({graph.points[a], graph.points[b], graph.points[p]}).sign;
+  };
+  for (const GraphSegment& s : graph.segments) {
+    for (uint32_t p = 0; p < graph.points.size(); ++p) {
+      if (p != s.a && p != s.b && side(s.a, s.b, p) == Sign::kZero) {
+        const auto [low, high] = std::minmax(graph.points[s.a], graph.points[s.b]);
+        EXPECT_FALSE(low < graph.points[p] && graph.points[p] < high);
+      }
+    }
+    for (const GraphSegment& t : graph.segments) {
+      const bool share = s.a == t.a || s.a == t.b || s.b == t.a || s.b == t.b;
+      EXPECT_FALSE(!share && side(s.a, s.b, t.a) * side(s.a, s.b, t.b) == Sign::kNegative &&
+                   side(t.a, t.b, s.a) * side(t.a, t.b, s.b) == Sign::kNegative);
+    }
+  }
+}
+
+class PlanarGraphPropertyTest : public test::SeededTest {
+ protected:
+  PlanarGraphPropertyTest() : SeededTest(0x5e6) {}
+};
+
+TEST_F(PlanarGraphPropertyTest, RandomSegmentsOnASmallGridBecomeAGraph) {
+  for (int run = 0; run < 200; ++run) {
+    Input input;
+    input.crossings = CrossingRule::kSplit;
+    const uint64_t size = 2 + random_.Next() % 8;
+    const size_t count = 1 + random_.Next() % 40;
+    for (size_t i = 0; i < 2 * count; ++i) {
+      input.points.push_back(static_cast<double>(random_.Next() % size));
+      input.points.push_back(static_cast<double>(random_.Next() % size));
+      input.ends.push_back(static_cast<uint32_t>(i));
+    }
+    const auto graph = input.Make();
+    ASSERT_TRUE(graph.ok()) << graph.status();
+    ExpectPlanar(*graph);
+    for (size_t i = 0; i < 2 * count; ++i) {
+      EXPECT_EQ(graph->points[graph->point_of_input[i]], (Point<2>{input.points[2 * i], input.points[2 * i + 1]}));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace wellspace::core
