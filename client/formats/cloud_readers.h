@@ -32,9 +32,15 @@ absl::Status ReadObj(LineReader& reader, const CloudOptions& options, PointCloud
 absl::Status ReadOff(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
 absl::Status TakeColumns(const CloudOptions& options, PointCloud& cloud);
 
-// ReadNode that also tells the index of the first point, 0 or 1, and the points' weights, if the file has them.
-absl::Status ReadNode(LineReader& reader, const CloudOptions& options, PointCloud& cloud, uint64_t& index_base,
-                      std::vector<double>& weights);
+// What a .node has beside its points.
+struct NodeExtras {
+  uint64_t index_base = 0;        // the index of the first point, 0 or 1
+  std::vector<double> weights{};  // of the points, if the file has them
+  bool has_markers = false;       // whether its header says that points have markers
+};
+
+// ReadNode that tells these, too.
+absl::Status ReadNode(LineReader& reader, const CloudOptions& options, PointCloud& cloud, NodeExtras& extras);
 
 // Reads a coordinate that a line must have.
 //

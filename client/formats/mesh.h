@@ -2,8 +2,10 @@
 #ifndef WELLSPACE_CLIENT_FORMATS_MESH_H_
 #define WELLSPACE_CLIENT_FORMATS_MESH_H_
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 namespace wellspace::formats {
@@ -13,6 +15,42 @@ inline const char* SimplexName(int dimension) {
   return dimension == 2 ? "triangles" : dimension == 3 ? "tetrahedra" : "simplices";
 }
 
+// Where a vertex comes from, if it is no input point.
+inline constexpr uint32_t kSteinerOrigin = 0xffff'ffff;  // the refinement
+inline constexpr uint32_t kRepairOrigin = 0xffff'fffe;   // the repair of slivers
+inline constexpr uint32_t kCornerOrigin = 0xffff'fffd;   // it is a corner of the box
+
+// An origin as files have it: -1, -2 and -3 in the place of these three.
+constexpr int64_t SignedOrigin(uint32_t origin) {
+  return origin >= kCornerOrigin ? int64_t{origin} - (int64_t{1} << 32) : int64_t{origin};
+}
+
+// Facets of the boundary with a tag in common.
+struct BoundaryPart {
+  int32_t tag = 0;
+  std::string name;  // empty: not known
+  uint64_t facets = 0;
+
+  bool operator==(const BoundaryPart&) const = default;
+};
+
+// Simplices of one material.
+struct Region {
+  int32_t id = 0;
+  std::string name;
+
+  bool operator==(const Region&) const = default;
+};
+
+// How many facets the parts have.
+inline uint64_t CountFacets(std::span<const BoundaryPart> parts) {
+  uint64_t count = 0;
+  for (const BoundaryPart& part : parts) {
+    count += part.facets;
+  }
+  return count;
+}
+
 // How large the arrays of a mesh are.
 struct MeshShape {
   int dimension = 0;
@@ -20,6 +58,13 @@ struct MeshShape {
   uint64_t simplex_count = 0;
   uint64_t input_vertices = 0;  // so many of the first vertices are input points; the others were added
   bool has_weights = false;
+  bool has_vertex_marks = false;         // each vertex has an origin and a tag
+  std::vector<BoundaryPart> boundary{};  // in the order of their facets; empty: nothing is told of the boundary
+  std::vector<Region> regions{};         // all simplices are of the only one; empty: nothing is told of regions
+  std::vector<double> low{};             // of the mesh's box; may be missing where there is no boundary
+  std::vector<double> high{};
+
+  uint64_t facet_count() const { return CountFacets(boundary); }
 };
 
 // Simplices: triangles in 2-D, tetrahedra in 3-D.
@@ -29,15 +74,34 @@ struct MeshView {
   std::span<const uint32_t> simplices;  // simplex_count x (dimension + 1), row-major
   uint64_t input_vertices = 0;          // see MeshShape
   std::span<const double> weights{};    // vertex_count squared lengths of a regular triangulation, or empty
+  // The following are known together, or not.
+  std::span<const uint32_t> vertex_origins{};  // vertex_count numbers of input points, or origins as above
+  std::span<const int32_t> vertex_tags{};      // vertex_count; 0: inside
+  std::span<const uint32_t> facets{};          // facet_count x dimension, part after part
+  std::span<const BoundaryPart> boundary{};
+  std::span<const Region> regions{};
 
   uint64_t vertex_count() const { return dimension == 0 ? 0 : points.size() / dimension; }
   uint64_t simplex_count() const { return dimension == 0 ? 0 : simplices.size() / (dimension + 1); }
   MeshShape Shape() const {
-    return {.dimension = dimension,
-            .vertex_count = vertex_count(),
-            .simplex_count = simplex_count(),
-            .input_vertices = input_vertices,
-            .has_weights = !weights.empty()};
+    MeshShape shape{.dimension = dimension,
+                    .vertex_count = vertex_count(),
+                    .simplex_count = simplex_count(),
+                    .input_vertices = input_vertices,
+                    .has_weights = !weights.empty(),
+                    .has_vertex_marks = !vertex_tags.empty(),
+                    .boundary = {boundary.begin(), boundary.end()},
+                    .regions = {regions.begin(), regions.end()}};
+    for (size_t i = 0; i < points.size() && !boundary.empty(); ++i) {
+      const size_t axis = i % dimension;
+      if (i < static_cast<size_t>(dimension)) {
+        shape.low.push_back(points[i]);
+        shape.high.push_back(points[i]);
+      }
+      shape.low[axis] = std::min(shape.low[axis], points[i]);
+      shape.high[axis] = std::max(shape.high[axis], points[i]);
+    }
+    return shape;
   }
 };
 
@@ -45,10 +109,23 @@ struct Mesh {
   int dimension = 0;
   std::vector<double> points;
   std::vector<uint32_t> simplices;
-  std::vector<double> weights{};  // see MeshView
+  std::vector<double> weights{};  // see MeshView; also for the following
+  std::vector<uint32_t> vertex_origins{};
+  std::vector<int32_t> vertex_tags{};
+  std::vector<uint32_t> facets{};
+  std::vector<BoundaryPart> boundary{};
+  std::vector<Region> regions{};
 
   MeshView View() const {
-    return {.dimension = dimension, .points = points, .simplices = simplices, .weights = weights};
+    return {.dimension = dimension,
+            .points = points,
+            .simplices = simplices,
+            .weights = weights,
+            .vertex_origins = vertex_origins,
+            .vertex_tags = vertex_tags,
+            .facets = facets,
+            .boundary = boundary,
+            .regions = regions};
   }
 };
 

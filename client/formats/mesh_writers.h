@@ -6,6 +6,7 @@
 #include <memory>
 #include <stop_token>
 #include <string>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
@@ -20,7 +21,7 @@ absl::StatusOr<std::unique_ptr<MeshWriter>> CreateVtkHdf(const std::string& path
                                                          std::stop_token stop);
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateNpz(const std::string& path, const MeshShape& shape,
                                                       std::stop_token stop);
-// `path` is that of either file; both are written.
+// `path` is that of either file; both are written, and for a boundary BoundaryFilesOf.
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateNodeAndEle(const std::string& path, const MeshShape& shape,
                                                              std::stop_token stop);
 
@@ -33,10 +34,20 @@ absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMedit(const std::string& path,
                                                         std::stop_token stop);
 
 // INTERNAL unless as many rows have come as `shape` says.
-absl::Status CheckComplete(const MeshShape& shape, uint64_t vertices, uint64_t weights, uint64_t simplices);
+absl::Status CheckComplete(const MeshShape& shape, uint64_t vertices, uint64_t weights, uint64_t simplices,
+                           uint64_t facets);
 
 // The comment ahead of the header of a .node whose attribute is the weight of its points.
 inline constexpr char kWeightsComment[] = "weights";
+
+// What the comment ahead of the header of a .edge, .face or .poly begins with; then come tags, each with its name.
+inline constexpr char kBoundaryComment[] = "boundary:";
+
+// The files beside .node and .ele that have the boundary: .edge or .face, and up to 3-D .poly.
+std::vector<std::string> BoundaryFilesOf(const std::string& path, int dimension);
+
+// All files that a mesh in .node and .ele may have, whatever its dimension.
+std::vector<std::string> TetgenFilesOf(const std::string& path);
 
 // "a/mesh.ele" of "a/mesh.node" and the other way round: `path` with its extension replaced.
 std::string WithExtension(const std::string& path, const std::string& extension);

@@ -329,4 +329,27 @@ absl::Status NpyReader::ReadIndices(uint64_t limit, std::vector<uint32_t>& value
                                   Quote(header_.type)));
 }
 
+absl::Status NpyReader::ReadTexts(std::vector<std::string>& values) {
+  constexpr uint64_t kMostCharacters = 1024;
+  const std::string_view type = header_.type;
+  uint64_t characters = 0;
+  if (type.substr(0, 2) != "<U" || !ParseUnsigned(type.substr(2), kMostCharacters, characters) || characters == 0) {
+    return Error(absl::StrCat("expected texts of type <U1 to <U", kMostCharacters, ", got ", Quote(type)));
+  }
+  values.clear();
+  std::u32string text(characters, U'\0');
+  for (uint64_t row = 0; row < rows(); ++row) {
+    if (absl::Status status = Take(reinterpret_cast<char*>(text.data()), characters * sizeof(char32_t)); !status.ok()) {
+      return status;
+    }
+    std::string& value = values.emplace_back();
+    for (const char32_t letter : text) {
+      if (letter != U'\0') {
+        value += letter < 0x80 ? static_cast<char>(letter) : '?';
+      }
+    }
+  }
+  return ExpectEnd();
+}
+
 }  // namespace wellspace::formats

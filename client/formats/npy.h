@@ -64,6 +64,8 @@ class NpyReader {
   absl::Status ReadNumbers(std::vector<double>& values);
   // The same for whole numbers alone, from 0 to below `limit`.
   absl::Status ReadIndices(uint64_t limit, std::vector<uint32_t>& values);
+  // The same for texts of type "<U1" and longer, of one dimension. What is not ASCII becomes a question mark.
+  absl::Status ReadTexts(std::vector<std::string>& values);
 
  private:
   NpyReader(std::string name, ByteSource source, std::optional<uint64_t> size)

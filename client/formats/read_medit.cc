@@ -2,9 +2,12 @@
 #include <array>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/ascii.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "client/formats/boundary.h"
 #include "client/formats/field_reader.h"
 #include "client/formats/mesh_readers.h"
 
@@ -36,6 +39,8 @@ class MeditReader {
         status = ReadVertices();
       } else if (mesh_.dimension != 0 && word == (mesh_.dimension == 2 ? "Triangles" : "Tetrahedra")) {
         status = ReadSimplices();
+      } else if (mesh_.dimension != 0 && word == (mesh_.dimension == 2 ? "Edges" : "Triangles")) {
+        status = ReadFacets();
       } else if (word == "Quadrilaterals" || word == "Hexahedra" || word == "Prisms" || word == "Pyramids" ||
                  (mesh_.dimension == 2 && word == "Tetrahedra")) {
         status = reader_.Error(
@@ -52,6 +57,7 @@ class MeditReader {
       return reader_.Error(
           absl::StrCat("the file ends; expected ", has_vertices_ ? "Triangles or Tetrahedra" : "Vertices"));
     }
+    facets_.MoveTo(mesh_);
     return std::move(mesh_);
   }
 
@@ -100,15 +106,8 @@ class MeditReader {
       return status;
     }
     for (uint64_t simplex = 0; simplex < count; ++simplex) {
-      for (int corner = 0; corner <= mesh_.dimension; ++corner) {
-        uint64_t vertex = 0;
-        if (absl::Status status = fields_.NextWhole("a vertex from 1 on", vertices_, vertex); !status.ok()) {
-          return status;
-        }
-        if (vertex == 0) {
-          return reader_.Error("expected a vertex from 1 on, got 0");
-        }
-        mesh_.simplices.push_back(static_cast<uint32_t>(vertex - 1));
+      if (absl::Status status = ReadCorners(mesh_.dimension + 1, mesh_.simplices); !status.ok()) {
+        return status;
       }
       if (absl::Status status = fields_.Skip("the reference of a simplex"); !status.ok()) {
         return status;
@@ -117,9 +116,49 @@ class MeditReader {
     return absl::OkStatus();
   }
 
+  // Those with another reference than 0 are the boundary.
+  absl::Status ReadFacets() {
+    uint64_t count = 0;
+    if (!has_vertices_) {
+      return reader_.Error("expected \"Vertices\", and then the facets");
+    }
+    if (absl::Status status = fields_.NextWhole("the number of facets", kMaxCount, count); !status.ok()) {
+      return status;
+    }
+    std::vector<uint32_t> corners;
+    for (uint64_t facet = 0; facet < count; ++facet) {
+      corners.clear();
+      if (absl::Status status = ReadCorners(mesh_.dimension, corners); !status.ok()) {
+        return status;
+      }
+      std::string_view field;
+      int32_t tag = 0;
+      if (!fields_.Next(field) || !absl::SimpleAtoi(absl::string_view(field.data(), field.size()), &tag)) {
+        return reader_.EndError(absl::StrCat("expected the reference of a facet, a whole number, got ", Quote(field)));
+      }
+      facets_.Add(corners, tag);
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status ReadCorners(int count, std::vector<uint32_t>& corners) {
+    for (int corner = 0; corner < count; ++corner) {
+      uint64_t vertex = 0;
+      if (absl::Status status = fields_.NextWhole("a vertex from 1 on", vertices_, vertex); !status.ok()) {
+        return status;
+      }
+      if (vertex == 0) {
+        return reader_.Error("expected a vertex from 1 on, got 0");
+      }
+      corners.push_back(static_cast<uint32_t>(vertex - 1));
+    }
+    return absl::OkStatus();
+  }
+
   LineReader& reader_;
   FieldReader fields_;
   Mesh mesh_;
+  FacetSorter facets_;
   uint64_t vertices_ = 0;
   bool has_vertices_ = false;
   bool has_simplices_ = false;

@@ -37,7 +37,7 @@ absl::StatusOr<Mesh> ReadMesh(const std::string& path) {
 std::vector<std::string> FilesOfMeshRead(const std::string& path) {
   const auto row = FindFormat(Readers(), path, path == kStandardStream ? "vtu" : "");
   if (row.ok() && (*row)->handler == ReadNodeAndEle) {
-    return {WithExtension(path, ".node"), WithExtension(path, ".ele")};
+    return TetgenFilesOf(path);
   }
   return {path};
 }

@@ -4,12 +4,16 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <numeric>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "client/formats/boundary.h"
 #include "client/formats/field_reader.h"
 #include "client/formats/mesh_readers.h"
 #include "client/formats/msh.h"
@@ -48,6 +52,10 @@ class MshReader {
     while (status.ok() && NextLine(line)) {
       if (line.front() != '$') {
         status = reader_.Error(absl::StrCat("expected the start of a section, such as \"$Nodes\", got ", Quote(line)));
+      } else if (line == "$PhysicalNames") {
+        status = ReadSection("$EndPhysicalNames", &MshReader::ReadPhysicalNames);
+      } else if (line == "$Entities" && !is_2_2_) {
+        status = ReadSection("$EndEntities", &MshReader::ReadEntities);
       } else if (line == "$Nodes") {
         status = ReadSection("$EndNodes", &MshReader::ReadNodes);
       } else if (line == "$Elements") {
@@ -185,6 +193,89 @@ class MshReader {
                                 : ValueError(absl::StrCat(what, ": expected a finite number, got ", value));
   }
 
+  // Rows of a dimension, the number of a group and its name in quotes.
+  absl::Status ReadPhysicalNames() {
+    std::string_view line;
+    uint64_t rows = 0;
+    if (!NextLine(line) || !ParseUnsigned(line, kMaxCount, rows)) {
+      return reader_.EndError("expected the number of physical names");
+    }
+    for (uint64_t row = 0; row < rows; ++row) {
+      if (!NextLine(line)) {
+        return reader_.EndError("the file ends; expected a physical name");
+      }
+      FieldSplitter fields(line, ' ');
+      std::string_view dimension;
+      std::string_view number;
+      int32_t group = 0;
+      const size_t open = line.find('"');
+      if (!fields.Next(dimension) || !fields.Next(number) ||
+          !absl::SimpleAtoi(absl::string_view(number.data(), number.size()), &group) ||
+          open == std::string_view::npos || line.back() != '"' || open + 1 == line.size()) {
+        return reader_.Error(
+            absl::StrCat("expected a dimension, the number of a group and its name in quotes, got ", Quote(line)));
+      }
+      if (dimension == "1" || dimension == "2") {
+        names_[dimension == "1" ? 1 : 2][group] = std::string(line.substr(open + 1, line.size() - open - 2));
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  // Of points, curves, surfaces and volumes: numbers, bounding boxes, groups, and what bounds them.
+  absl::Status ReadEntities() {
+    std::array<uint64_t, 4> counts{};
+    for (uint64_t& count : counts) {
+      if (absl::Status status = Size("the number of entities", kMaxCount, count); !status.ok()) {
+        return status;
+      }
+    }
+    for (int dimension = 0; dimension < 4; ++dimension) {
+      for (uint64_t entity = 0; entity < counts[dimension]; ++entity) {
+        if (absl::Status status = ReadEntity(dimension); !status.ok()) {
+          return status;
+        }
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  absl::Status ReadEntity(int dimension) {
+    uint64_t number = 0;
+    absl::Status status = Int("the number of an entity", kMaxCount, number);
+    double bound = 0;
+    for (int i = 0; status.ok() && i < (dimension == 0 ? 3 : 6); ++i) {
+      status = Number("a bound of an entity", bound);
+    }
+    int32_t group = 0;
+    uint64_t count = 0;
+    for (const bool are_groups : {true, false}) {
+      if (!status.ok() || (dimension == 0 && !are_groups)) {
+        break;
+      }
+      status = Size("a number of groups or entities", kMaxCount, count);
+      for (uint64_t i = 0; status.ok() && i < count; ++i) {
+        int32_t signed_number = 0;
+        status = SignedInt("the number of a group or an entity", signed_number);
+        group = are_groups && i == 0 ? signed_number : group;
+      }
+    }
+    if (status.ok() && group != 0 && (dimension == 1 || dimension == 2)) {
+      groups_[dimension][number] = group;
+    }
+    return status;
+  }
+
+  absl::Status SignedInt(const char* what, int32_t& value) {
+    if (is_binary_) {
+      return TakeBytes(what, value);
+    }
+    std::string_view field;
+    return fields_.Next(field) && absl::SimpleAtoi(absl::string_view(field.data(), field.size()), &value)
+               ? absl::OkStatus()
+               : reader_.EndError(absl::StrCat("expected ", what, ", got ", Quote(field)));
+  }
+
   absl::Status AddPoint() {
     for (const char* what : {"x of a node", "y of a node", "z of a node"}) {
       if (absl::Status status = Number(what, points_.emplace_back()); !status.ok()) {
@@ -217,8 +308,8 @@ class MshReader {
   }
 
   // The dimension and number of an entity, what the section has third, and the rows of the block.
-  absl::Status ReadBlock(const char* third_name, uint64_t& dimension, uint64_t& third, uint64_t& rows) {
-    uint64_t entity = 0;
+  absl::Status ReadBlock(const char* third_name, uint64_t& dimension, uint64_t& entity, uint64_t& third,
+                         uint64_t& rows) {
     absl::Status status = Int("the dimension of an entity", 3, dimension);
     if (status.ok()) {
       status = Int("the number of an entity", kMaxCount, entity);
@@ -252,9 +343,10 @@ class MshReader {
     }
     for (uint64_t block = 0; block < blocks; ++block) {
       uint64_t dimension = 0;
+      uint64_t entity = 0;
       uint64_t parametric = 0;
       uint64_t rows = 0;
-      absl::Status status = ReadBlock("0 or 1, for parameters", dimension, parametric, rows);
+      absl::Status status = ReadBlock("0 or 1, for parameters", dimension, entity, parametric, rows);
       for (uint64_t row = 0; status.ok() && row < rows; ++row) {
         status = Size("the number of a node", kAnyNumber, numbers_.emplace_back());
       }
@@ -336,11 +428,12 @@ class MshReader {
       if (status.ok()) {
         status = Int("the number of tags", kMaxCount, tags);
       }
-      for (; status.ok() && tags > 0; --tags) {
-        status = fields_.Skip("a tag");
+      int32_t group = 0;  // the first tag
+      for (uint64_t tag = 0; status.ok() && tag < tags; ++tag) {
+        status = tag == 0 ? SignedInt("a tag", group) : fields_.Skip("a tag");
       }
       if (status.ok()) {
-        status = AddElement(type);
+        status = AddElement(type, group);
       }
     }
     return status;
@@ -355,14 +448,18 @@ class MshReader {
     }
     for (uint64_t block = 0; block < blocks; ++block) {
       uint64_t dimension = 0;
+      uint64_t entity = 0;
       uint64_t type = 0;
       uint64_t rows = 0;
       uint64_t number = 0;
-      absl::Status status = ReadBlock("the type of elements", dimension, type, rows);
+      absl::Status status = ReadBlock("the type of elements", dimension, entity, type, rows);
+      const auto& groups = groups_[std::min<uint64_t>(dimension, 3)];
+      const auto found = groups.find(entity);
+      const int32_t group = found == groups.end() ? 0 : found->second;
       for (uint64_t row = 0; status.ok() && row < rows; ++row) {
         status = Size("the number of an element", kAnyNumber, number);
         if (status.ok()) {
-          status = AddElement(type);
+          status = AddElement(type, group);
         }
       }
       if (!status.ok()) {
@@ -375,11 +472,14 @@ class MshReader {
                : ValueError(absl::StrCat("expected ", count, " elements, as the section says, got ", elements));
   }
 
-  absl::Status AddElement(uint64_t type) {
+  absl::Status AddElement(uint64_t type, int32_t group) {
     const int nodes = NodesOf(type);
     if (nodes == 0) {
       return ValueError(absl::StrCat(
           "expected elements of type 15 (point), 1 (line), 2 (triangle) or 4 (tetrahedron), got type ", type));
+    }
+    if (nodes == 2 || nodes == 3) {
+      (nodes == 2 ? line_groups_ : triangle_groups_).push_back(group);
     }
     for (int i = 0; i < nodes; ++i) {
       uint64_t number = 0;
@@ -391,8 +491,8 @@ class MshReader {
       if (!status.ok()) {
         return status;
       }
-      if (nodes >= 3) {
-        (nodes == 3 ? triangles_ : tetrahedra_).push_back(index);
+      if (nodes >= 2) {
+        (nodes == 2 ? lines_ : nodes == 3 ? triangles_ : tetrahedra_).push_back(index);
       }
     }
     return absl::OkStatus();
@@ -462,6 +562,7 @@ class MshReader {
   absl::StatusOr<Mesh> MakeMesh() {
     Mesh mesh;
     mesh.dimension = tetrahedra_.empty() && !triangles_.empty() ? 2 : 3;
+    SortFacets(mesh);
     mesh.simplices = std::move(mesh.dimension == 2 ? triangles_ : tetrahedra_);
     mesh.weights = std::move(weights_);
     if (mesh.dimension == 3) {
@@ -480,6 +581,20 @@ class MshReader {
     return mesh;
   }
 
+  // Lines beside triangles, or triangles beside tetrahedra, that are of a group.
+  void SortFacets(Mesh& mesh) {
+    FacetSorter sorter;
+    const std::vector<uint32_t>& facets = mesh.dimension == 2 ? lines_ : triangles_;
+    const std::vector<int32_t>& groups = mesh.dimension == 2 ? line_groups_ : triangle_groups_;
+    for (size_t i = 0; i < groups.size(); ++i) {
+      sorter.Add(std::span(facets).subspan(i * mesh.dimension, mesh.dimension), groups[i]);
+    }
+    for (const auto& [group, name] : names_[mesh.dimension - 1]) {
+      sorter.Name(group, name);
+    }
+    sorter.MoveTo(mesh);
+  }
+
   LineReader& reader_;
   FieldReader fields_;
   bool is_2_2_ = false;
@@ -489,7 +604,13 @@ class MshReader {
   std::vector<uint64_t> numbers_;    // of the nodes
   std::vector<double> points_;       // nodes x 3
   std::vector<uint32_t> by_number_;  // the nodes, sorted; empty: they are numbered from 1 on
-  std::vector<uint32_t> triangles_;  // indices of nodes
+  // The first physical group of an entity and the name of a group, each by dimension and number.
+  std::array<std::map<uint64_t, int32_t>, 4> groups_;
+  std::array<std::map<int32_t, std::string>, 3> names_;
+  std::vector<uint32_t> lines_;  // indices of nodes
+  std::vector<int32_t> line_groups_;
+  std::vector<int32_t> triangle_groups_;
+  std::vector<uint32_t> triangles_;
   std::vector<uint32_t> tetrahedra_;
   std::vector<double> weights_;
 };

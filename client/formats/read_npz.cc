@@ -1,11 +1,15 @@
-// numpy's .npz: a mesh as two arrays, or three with weights.
+// numpy's .npz: a mesh as arrays.
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "client/formats/boundary.h"
 #include "client/formats/cloud.h"
 #include "client/formats/line_reader.h"
 #include "client/formats/mesh_readers.h"
@@ -25,6 +29,82 @@ absl::StatusOr<NpyReader> OpenArray(ZipReader& archive, const std::string& file,
   return NpyReader::Open(
       absl::StrCat(file, ": ", member), [&archive](char* buffer, size_t bytes) { return archive.Read(buffer, bytes); },
       *size, dimensions);
+}
+
+// Whole numbers of 32 bits, a row each.
+absl::Status ReadTags(ZipReader& archive, const std::string& file, const std::string& member,
+                      std::vector<int32_t>& tags) {
+  absl::StatusOr<NpyReader> array = OpenArray(archive, file, member, 1);
+  if (!array.ok()) {
+    return array.status();
+  }
+  std::vector<double> values;
+  if (absl::Status status = array->ReadNumbers(values); !status.ok()) {
+    return status;
+  }
+  for (size_t i = 0; i < values.size(); ++i) {
+    if (!(std::abs(values[i]) <= std::numeric_limits<int32_t>::max()) || values[i] != std::trunc(values[i])) {
+      return absl::InvalidArgumentError(
+          absl::StrCat(file, ": ", member, ": row ", i, ": expected a whole number of 32 bits, got ", values[i]));
+    }
+    tags.push_back(static_cast<int32_t>(values[i]));
+  }
+  return absl::OkStatus();
+}
+
+// Texts of UTF-32, a row each, as FacetSorter wants them: what is not ASCII becomes a question mark.
+absl::Status ReadNames(ZipReader& archive, const std::string& file, std::vector<std::string>& names) {
+  const absl::StatusOr<uint64_t> size = archive.Begin(kNpzFacetNames);
+  if (!size.ok()) {
+    return size.status();
+  }
+  const auto source = [&archive](char* buffer, size_t bytes) { return archive.Read(buffer, bytes); };
+  absl::StatusOr<NpyReader> array = NpyReader::Open(absl::StrCat(file, ": ", kNpzFacetNames), source, *size, 1);
+  return array.ok() ? array->ReadTexts(names) : array.status();
+}
+
+absl::Status ReadBoundary(ZipReader& archive, const std::string& file, Mesh& mesh) {
+  absl::StatusOr<NpyReader> facets = OpenArray(archive, file, kNpzFacets);
+  if (!facets.ok()) {
+    return facets.status();
+  }
+  const uint64_t rows = facets->rows();
+  if (facets->columns() != static_cast<uint64_t>(mesh.dimension)) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(file, ": ", kNpzFacets, ": expected ", mesh.dimension, " columns, got ", facets->columns()));
+  }
+  std::vector<uint32_t> corners;
+  if (absl::Status status = facets->ReadIndices(mesh.View().vertex_count(), corners); !status.ok()) {
+    return status;
+  }
+  std::vector<int32_t> tags;
+  if (absl::Status status = ReadTags(archive, file, kNpzFacetTags, tags); !status.ok()) {
+    return status;
+  }
+  if (tags.size() != rows) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(file, ": ", kNpzFacetTags, ": expected ", rows, " tags, one for each facet, got ", tags.size()));
+  }
+  FacetSorter sorter;
+  for (uint64_t row = 0; row < rows; ++row) {
+    sorter.Add(std::span(corners).subspan(row * mesh.dimension, mesh.dimension), tags[row]);
+  }
+  if (archive.Has(kNpzFacetNames) && archive.Has(kNpzFacetNameTags)) {
+    std::vector<std::string> names;
+    std::vector<int32_t> named;
+    absl::Status status = ReadNames(archive, file, names);
+    if (status.ok()) {
+      status = ReadTags(archive, file, kNpzFacetNameTags, named);
+    }
+    if (!status.ok()) {
+      return status;
+    }
+    for (size_t i = 0; i < std::min(names.size(), named.size()); ++i) {
+      sorter.Name(named[i], names[i]);
+    }
+  }
+  sorter.MoveTo(mesh);
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -78,6 +158,11 @@ absl::StatusOr<Mesh> ReadNpz(const std::string& path) {
   }
   if (absl::Status status = simplices->ReadIndices(vertices, mesh.simplices); !status.ok()) {
     return status;
+  }
+  if ((*archive)->Has(kNpzFacets)) {
+    if (absl::Status status = ReadBoundary(**archive, name, mesh); !status.ok()) {
+      return status;
+    }
   }
   return mesh;
 }

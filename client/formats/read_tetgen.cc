@@ -6,7 +6,9 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "client/formats/boundary.h"
 #include "client/formats/cloud_readers.h"
 #include "client/formats/mesh_readers.h"
 #include "client/formats/mesh_writers.h"
@@ -77,6 +79,77 @@ absl::Status ExpectEnd(LineReader& reader, uint64_t count, const char* what) {
   return reader.status();
 }
 
+// A node at the start of `fields`, as an index from 0 on.
+absl::Status TakeNode(LineReader& reader, FieldSplitter& fields, uint64_t vertices, uint64_t index_base,
+                      std::vector<uint32_t>& corners) {
+  std::string_view field;
+  fields.Next(field);
+  uint64_t node = 0;
+  if (!ParseUnsigned(field, std::numeric_limits<uint32_t>::max(), node) || node < index_base ||
+      node - index_base >= vertices) {
+    return reader.Error(
+        absl::StrCat("expected a node from ", index_base, " to below ", vertices + index_base, ", got ", Quote(field)));
+  }
+  corners.push_back(static_cast<uint32_t>(node - index_base));
+  return absl::OkStatus();
+}
+
+// "boundary: 1 xmin 2 xmax": the names of tags.
+void TakeNames(std::string_view comment, FacetSorter& sorter) {
+  FieldSplitter fields(comment, ' ');
+  std::string_view tag;
+  std::string_view name;
+  if (!fields.Next(tag) || tag != kBoundaryComment) {
+    return;
+  }
+  int32_t number = 0;
+  while (fields.Next(tag) && fields.Next(name) &&
+         absl::SimpleAtoi(absl::string_view(tag.data(), tag.size()), &number)) {
+    sorter.Name(number, std::string(name));
+  }
+}
+
+// .edge or .face; facets without a marker, and those with 0, are no boundary.
+absl::Status ReadFacets(LineReader& reader, uint64_t vertices, uint64_t index_base, Mesh& mesh) {
+  std::string_view line;
+  if (!reader.NextContent(line)) {
+    return reader.EndError("expected a header, got an empty file");
+  }
+  std::array<uint64_t, 2> header{};
+  const std::array names = {"number of facets", "number of markers"};
+  if (absl::Status status = ReadHeader<2>(reader, line, 1, names, header); !status.ok()) {
+    return status;
+  }
+  FacetSorter sorter;
+  TakeNames(reader.comment(), sorter);
+  const auto [count, markers] = header;
+  uint64_t facet_base = 0;
+  std::vector<uint32_t> corners;
+  for (uint64_t facet = 0; facet < count; ++facet) {
+    if (!reader.NextContent(line)) {
+      return CountError(reader, count, "facets", facet);
+    }
+    FieldSplitter fields(line, ' ');
+    if (absl::Status status = ReadIndex(reader, fields, facet, facet_base); !status.ok()) {
+      return status;
+    }
+    corners.clear();
+    for (int corner = 0; corner < mesh.dimension; ++corner) {
+      if (absl::Status status = TakeNode(reader, fields, vertices, index_base, corners); !status.ok()) {
+        return status;
+      }
+    }
+    std::string_view field;
+    int32_t tag = 0;
+    if (markers > 0 && fields.Next(field) && !absl::SimpleAtoi(absl::string_view(field.data(), field.size()), &tag)) {
+      return reader.Error(absl::StrCat("expected a marker, a whole number, got ", Quote(field)));
+    }
+    sorter.Add(corners, tag);
+  }
+  sorter.MoveTo(mesh);
+  return ExpectEnd(reader, count, "facets");
+}
+
 absl::Status ReadEle(LineReader& reader, uint64_t vertices, uint64_t index_base, Mesh& mesh) {
   const uint64_t corners = mesh.dimension + 1;
   const char* what = SimplexName(mesh.dimension);
@@ -129,13 +202,12 @@ absl::Status ReadEle(LineReader& reader, uint64_t vertices, uint64_t index_base,
 }  // namespace
 
 absl::Status ReadNode(LineReader& reader, const CloudOptions& options, PointCloud& cloud) {
-  uint64_t index_base = 0;
-  std::vector<double> weights;
-  return ReadNode(reader, options, cloud, index_base, weights);
+  NodeExtras extras;
+  return ReadNode(reader, options, cloud, extras);
 }
 
-absl::Status ReadNode(LineReader& reader, const CloudOptions& options, PointCloud& cloud, uint64_t& index_base,
-                      std::vector<double>& weights) {
+absl::Status ReadNode(LineReader& reader, const CloudOptions& options, PointCloud& cloud, NodeExtras& extras) {
+  auto& [index_base, weights, has_markers] = extras;
   std::string_view line;
   if (!reader.NextContent(line)) {
     return reader.EndError("expected a header, got an empty file");
@@ -157,6 +229,7 @@ absl::Status ReadNode(LineReader& reader, const CloudOptions& options, PointClou
                                          : ""));
   }
   const bool has_weights = attributes == 1 && reader.comment() == kWeightsComment;
+  has_markers = markers > 0;
   cloud.dimension = static_cast<int>(columns);
   cloud.points.reserve(std::min(count, kMaxReserved) * columns);
   for (uint64_t point = 0; point < count; ++point) {
@@ -211,17 +284,28 @@ absl::StatusOr<Mesh> ReadNodeAndEle(const std::string& path) {
     return ele_file.status();
   }
   PointCloud cloud;
-  uint64_t index_base = 0;
-  std::vector<double> weights;
+  NodeExtras extras;
   LineReader nodes(*std::move(node_file));
-  if (absl::Status status = ReadNode(nodes, {}, cloud, index_base, weights); !status.ok()) {
+  if (absl::Status status = ReadNode(nodes, {}, cloud, extras); !status.ok()) {
     return status;
   }
-  Mesh mesh{
-      .dimension = cloud.dimension, .points = std::move(cloud.points), .simplices = {}, .weights = std::move(weights)};
+  Mesh mesh{.dimension = cloud.dimension,
+            .points = std::move(cloud.points),
+            .simplices = {},
+            .weights = std::move(extras.weights)};
   LineReader simplices(*std::move(ele_file));
-  if (absl::Status status = ReadEle(simplices, mesh.View().vertex_count(), index_base, mesh); !status.ok()) {
+  if (absl::Status status = ReadEle(simplices, mesh.View().vertex_count(), extras.index_base, mesh); !status.ok()) {
     return status;
+  }
+  // Without markers in .node, a file of facets that lies there may be another mesh's.
+  if (absl::StatusOr<InputFile> facet_file = InputFile::Open(BoundaryFilesOf(path, mesh.dimension).front());
+      extras.has_markers && facet_file.ok()) {
+    LineReader facets(*std::move(facet_file));
+    if (absl::Status status = ReadFacets(facets, mesh.View().vertex_count(), extras.index_base, mesh); !status.ok()) {
+      return status;
+    }
+  } else if (extras.has_markers && !absl::IsNotFound(facet_file.status())) {
+    return facet_file.status();
   }
   return mesh;
 }

@@ -7,10 +7,12 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "client/formats/boundary.h"
 #include "client/formats/line_reader.h"
 #include "client/formats/mesh_readers.h"
 #include "client/formats/number.h"
 #include "client/formats/vtk_array.h"
+#include "client/formats/vtk_cells.h"
 #include "client/formats/xml_scanner.h"
 
 namespace wellspace::formats {
@@ -103,6 +105,10 @@ class VtuReader {
     if (parent == "PointData" && xml_.Attribute("Name") == "weights") {
       has_weights_ = true;
       return ReadArray<double>(weights_);
+    }
+    if (parent == "CellData" && xml_.Attribute("Name") == kVtkBoundary) {
+      has_tags_ = true;
+      return ReadArray<int64_t>(tags_);
     }
     return parent == "Cells" ? ReadCellArray() : absl::OkStatus();
   }
@@ -246,37 +252,64 @@ class VtuReader {
     if (has_weights_ && weights_.size() != point_count_) {
       return FileError(absl::StrCat("expected a weight for each of ", point_count_, " points, got ", weights_.size()));
     }
-    constexpr int64_t kTriangle = 5;
-    constexpr int64_t kTetrahedron = 10;
+    if (has_tags_ && tags_.size() != cell_count_) {
+      return FileError(absl::StrCat("expected a tag for each of ", cell_count_, " cells, got ", tags_.size()));
+    }
     Mesh mesh;
     mesh.weights = weights_;
-    mesh.dimension = !types_.empty() && types_[0] == kTriangle ? 2 : 3;
-    const int64_t expected_type = mesh.dimension == 2 ? kTriangle : kTetrahedron;
-    const size_t corners = mesh.dimension + 1;
-    if (connectivity_.size() != corners * cell_count_) {
-      return FileError(absl::StrCat("expected ", corners * cell_count_, " vertices for ", cell_count_,
+    mesh.dimension = !types_.empty() && types_[0] == kVtkTriangle ? 2 : 3;
+    if (absl::Status status = TakeCells(mesh); !status.ok()) {
+      return status;
+    }
+    return TakePoints(std::move(mesh));
+  }
+
+  // The first cell is a simplex. Where cells have tags, there may be facets among them.
+  absl::Status TakeCells(Mesh& mesh) const {
+    const int64_t expected_type = mesh.dimension == 2 ? kVtkTriangle : kVtkTetrahedron;
+    const int64_t facet_type = mesh.dimension == 2 ? kVtkLine : kVtkTriangle;
+    const auto is_facet_at = [&](size_t cell) { return has_tags_ && types_[cell] == facet_type; };
+    size_t needed = 0;
+    for (size_t cell = 0; cell < cell_count_; ++cell) {
+      needed += mesh.dimension + (is_facet_at(cell) ? 0 : 1);
+    }
+    if (connectivity_.size() != needed) {
+      return FileError(absl::StrCat("expected ", needed, " vertices for ", cell_count_,
                                     mesh.dimension == 2 ? " triangles" : " tetrahedra", ", got ",
                                     connectivity_.size()));
     }
+    FacetSorter facets;
+    std::vector<uint32_t> vertices;
+    size_t first = 0;  // in connectivity_
     for (size_t cell = 0; cell < cell_count_; ++cell) {
-      if (types_[cell] != expected_type) {
+      const bool is_facet = is_facet_at(cell);
+      if (types_[cell] != expected_type && !is_facet) {
         return FileError(absl::StrCat("cell ", cell, ": expected only triangles (5) or only tetrahedra (10), got type ",
                                       types_[cell]));
       }
-      if (offsets_[cell] != static_cast<int64_t>(corners * (cell + 1))) {
-        return FileError(
-            absl::StrCat("cell ", cell, ": expected offset ", corners * (cell + 1), ", got ", offsets_[cell]));
+      const size_t end = first + mesh.dimension + (is_facet ? 0 : 1);
+      if (offsets_[cell] != static_cast<int64_t>(end)) {
+        return FileError(absl::StrCat("cell ", cell, ": expected offset ", end, ", got ", offsets_[cell]));
+      }
+      vertices.clear();
+      for (; first < end; ++first) {
+        if (connectivity_[first] < 0 || static_cast<uint64_t>(connectivity_[first]) >= point_count_) {
+          return FileError(absl::StrCat("cell ", cell, ": expected vertices from 0 to below ", point_count_, ", got ",
+                                        connectivity_[first]));
+        }
+        vertices.push_back(static_cast<uint32_t>(connectivity_[first]));
+      }
+      if (!is_facet) {
+        mesh.simplices.insert(mesh.simplices.end(), vertices.begin(), vertices.end());
+      } else if (tags_[cell] < std::numeric_limits<int32_t>::min() ||
+                 tags_[cell] > std::numeric_limits<int32_t>::max()) {
+        return FileError(absl::StrCat("cell ", cell, ": expected a tag of at most 32 bits, got ", tags_[cell]));
+      } else {
+        facets.Add(vertices, static_cast<int32_t>(tags_[cell]));
       }
     }
-    mesh.simplices.reserve(connectivity_.size());
-    for (size_t i = 0; i < connectivity_.size(); ++i) {
-      if (connectivity_[i] < 0 || static_cast<uint64_t>(connectivity_[i]) >= point_count_) {
-        return FileError(absl::StrCat("cell ", i / corners, ": expected vertices from 0 to below ", point_count_,
-                                      ", got ", connectivity_[i]));
-      }
-      mesh.simplices.push_back(static_cast<uint32_t>(connectivity_[i]));
-    }
-    return TakePoints(std::move(mesh));
+    facets.MoveTo(mesh);
+    return absl::OkStatus();
   }
 
   absl::StatusOr<Mesh> TakePoints(Mesh mesh) const {
@@ -306,6 +339,8 @@ class VtuReader {
   std::vector<int64_t> connectivity_;
   std::vector<int64_t> offsets_;
   std::vector<int64_t> types_;
+  bool has_tags_ = false;
+  std::vector<int64_t> tags_;  // of cells
 };
 
 }  // namespace

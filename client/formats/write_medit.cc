@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "client/formats/boundary.h"
 #include "client/formats/mesh_writers.h"
 #include "client/formats/number.h"
 #include "client/formats/output_file.h"
@@ -46,20 +47,38 @@ class MeditWriter final : public MeshWriter {
         AppendNumber(uint64_t{corner} + 1, line_);
         line_ += ' ';
       }
-      line_ += "1\n";
+      absl::StrAppend(&line_, shape_.regions.empty() ? 1 : shape_.regions[0].id, "\n");
       output_.Write(line_);
       ++simplices_;
     }
     return output_.status();
   }
 
+  absl::Status AddFacets(std::span<const uint32_t> facets) override {
+    BeginFacets();
+    for (; !facets.empty() && output_.status().ok(); facets = facets.subspan(shape_.dimension)) {
+      line_.clear();
+      for (const uint32_t corner : facets.first(shape_.dimension)) {
+        AppendNumber(uint64_t{corner} + 1, line_);
+        line_ += ' ';
+      }
+      absl::StrAppend(&line_, walk_.Next().tag, "\n");
+      output_.Write(line_);
+      ++facets_;
+    }
+    return output_.status();
+  }
+
   absl::Status Commit() override {
     BeginSimplices();
+    if (!shape_.boundary.empty()) {
+      BeginFacets();
+    }
     output_.Write("End\n");
     if (absl::Status status = output_.status(); !status.ok()) {
       return status;
     }
-    if (absl::Status status = CheckComplete(shape_, vertices_, 0, simplices_); !status.ok()) {
+    if (absl::Status status = CheckComplete(shape_, vertices_, 0, simplices_, facets_); !status.ok()) {
       return status;
     }
     return output_.Commit();
@@ -72,11 +91,20 @@ class MeditWriter final : public MeshWriter {
     }
   }
 
+  void BeginFacets() {
+    if (!std::exchange(has_facets_, true)) {
+      output_.Write(absl::StrCat(shape_.dimension == 2 ? "Edges\n" : "Triangles\n", shape_.facet_count(), "\n"));
+    }
+  }
+
   const MeshShape shape_;
   OutputFile output_;
+  PartWalk walk_{shape_.boundary};
   bool has_simplices_ = false;  // the section
+  bool has_facets_ = false;     // the section
   uint64_t vertices_ = 0;
   uint64_t simplices_ = 0;
+  uint64_t facets_ = 0;
   std::string line_;
 };
 

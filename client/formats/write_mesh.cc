@@ -72,7 +72,7 @@ std::vector<std::string> MeshFormats() { return FormatNames(Writers()); }
 std::vector<std::string> FilesOfMeshWritten(const std::string& path, const std::string& format) {
   const absl::StatusOr<WriterKind> writer = FindWriter(path, format, /*dimension=*/0, /*has_weights=*/false);
   if (writer.ok() && writer->create == CreateNodeAndEle) {
-    return {WithExtension(path, ".node"), WithExtension(path, ".ele")};
+    return TetgenFilesOf(path);
   }
   return {path};
 }
@@ -103,13 +103,17 @@ absl::Status CheckMeshOutput(const std::string& path, const std::string& format,
   return absl::OkStatus();
 }
 
-absl::Status CheckComplete(const MeshShape& shape, uint64_t vertices, uint64_t weights, uint64_t simplices) {
+absl::Status CheckComplete(const MeshShape& shape, uint64_t vertices, uint64_t weights, uint64_t simplices,
+                           uint64_t facets) {
   if (vertices != shape.vertex_count || simplices != shape.simplex_count) {
     return absl::InternalError(absl::StrCat("a mesh of ", shape.vertex_count, " vertices and ", shape.simplex_count,
                                             " simplices got ", vertices, " and ", simplices));
   }
   if (const uint64_t expected = shape.has_weights ? shape.vertex_count : 0; weights != expected) {
     return absl::InternalError(absl::StrCat("a mesh of ", expected, " weights got ", weights));
+  }
+  if (facets != shape.facet_count()) {
+    return absl::InternalError(absl::StrCat("a mesh of ", shape.facet_count(), " boundary facets got ", facets));
   }
   return absl::OkStatus();
 }
@@ -128,17 +132,25 @@ absl::Status WriteMesh(const std::string& path, const std::string& format, const
   if (!writer.ok()) {
     return writer.status();
   }
-  if (absl::Status status = (*writer)->AddPoints(mesh.points); !status.ok()) {
-    return status;
+  MeshWriter& rows = **writer;
+  const bool has_marks = !mesh.vertex_tags.empty();
+  absl::Status status = rows.AddPoints(mesh.points);
+  if (status.ok() && !mesh.weights.empty()) {
+    status = rows.AddWeights(mesh.weights);
   }
-  if (absl::Status status = mesh.weights.empty() ? absl::OkStatus() : (*writer)->AddWeights(mesh.weights);
-      !status.ok()) {
-    return status;
+  if (status.ok() && has_marks) {
+    status = rows.AddVertexOrigins(mesh.vertex_origins);
   }
-  if (absl::Status status = (*writer)->AddSimplices(mesh.simplices); !status.ok()) {
-    return status;
+  if (status.ok() && has_marks) {
+    status = rows.AddVertexTags(mesh.vertex_tags);
   }
-  return (*writer)->Commit();
+  if (status.ok()) {
+    status = rows.AddSimplices(mesh.simplices);
+  }
+  if (status.ok() && !mesh.facets.empty()) {
+    status = rows.AddFacets(mesh.facets);
+  }
+  return status.ok() ? rows.Commit() : status;
 }
 
 }  // namespace wellspace::formats

@@ -4,7 +4,8 @@
 //   vtu   VTK's XML, 2-D and 3-D only: arrays inline in base64, compressed by zlib; points padded to 3-D; point data
 //         "input", 1 for the vertices that are input points, and "weights", if there are any.
 //   vtkhdf  VTK's HDF5, 2-D and 3-D only: as vtu, in chunks compressed by zlib; for VTK 9.1 and later. It is not read
-//   back. npz   numpy's archive of arrays: `points` of type Float64, vertices x dimension; `simplices` of type UInt32,
+//         back.
+//   npz   numpy's archive of arrays: `points` of type Float64, vertices x dimension; `simplices` of type UInt32,
 //         simplices x (dimension + 1); `weights` of type Float64, one for each vertex, if there are any; deflated.
 //   node  TetGen's and Triangle's pair of .node and .ele, given by either name; indices start at 0. TetGen itself knows
 //         3-D only, Triangle 2-D. Weights are the only attribute of .node; the comment "# weights" before
@@ -13,8 +14,17 @@
 //         triangles or tetrahedra; $NodeData "input", as in vtu, and "weights", if there are any.
 //   msh22 The same in MSH 2.2, in ascii; every simplex is of the physical group 1.
 //   medit INRIA's .mesh of version 2 (double precision) in ascii, 2-D and 3-D only: the reference of a vertex is 1 if
-//   it
-//         is an input point, else 0, that of a simplex is 1. There is no place for weights.
+//         it is an input point, else 0, that of a simplex is 1. There is no place for weights.
+//
+// With a boundary there are, beside that:
+//   vtu, vtkhdf  its facets as cells after the simplices; cell data "region" and "boundary" (the tag), 0 where there is
+//         none; point data "origin", below 0 for what is no input point (SignedOrigin), and "boundary".
+//   npz   `facets`, `facet_tags`, `facet_names` with their tags in `facet_name_tags`, `regions`, `vertex_origins`,
+//         `vertex_tags`.
+//   node  .edge in 2-D, .face above, with markers; .poly up to 3-D; tags of vertices as markers of .node; the region as
+//         attribute of .ele.
+//   msh41, msh22  physical groups with names: one of each part, with its tag as number, and one of the simplices.
+//   medit Edges in 2-D, Triangles in 3-D, with their tags as references.
 #ifndef WELLSPACE_CLIENT_FORMATS_WRITE_MESH_H_
 #define WELLSPACE_CLIENT_FORMATS_WRITE_MESH_H_
 
@@ -46,8 +56,7 @@ absl::Status CheckMeshOutput(const std::string& path, const std::string& format,
 // Writes a mesh piece by piece, so that it need not fit into memory.
 //
 // Memory: a few blocks for a regular file; for vtu into a pipe or a device the compressed array that is being written;
-// for node
-//         with weights the points, for msh41 and msh22 with weights these.
+//         for node with weights or tags of vertices the points, for msh41 and msh22 with weights these.
 // Thread safety: thread-compatible.
 class MeshWriter {
  public:
@@ -55,12 +64,16 @@ class MeshWriter {
   MeshWriter(const MeshWriter&) = delete;
   MeshWriter& operator=(const MeshWriter&) = delete;
 
-  // The next rows of the arrays: all points, then all weights if the shape has them, then all simplices. Returns the
-  // first error of all so far.
+  // The next rows of the arrays: all points, then all weights if the shape has them, then all origins and all tags of
+  // vertices if it has marks, then all simplices, then all facets of its boundary. Returns the first error of all so
+  // far.
   // REQUIRES:   whole rows, no more than the shape says, nothing of an array before another that goes first.
   virtual absl::Status AddPoints(std::span<const double> points) = 0;
   virtual absl::Status AddWeights(std::span<const double> weights) = 0;
+  virtual absl::Status AddVertexOrigins(std::span<const uint32_t> /*origins*/) { return absl::OkStatus(); }
+  virtual absl::Status AddVertexTags(std::span<const int32_t> /*tags*/) { return absl::OkStatus(); }
   virtual absl::Status AddSimplices(std::span<const uint32_t> simplices) = 0;
+  virtual absl::Status AddFacets(std::span<const uint32_t> facets) = 0;
 
   // Gives the file its name. Without it, no file is left or changed.
   // Errors:     the first of all so far; INTERNAL when rows are missing.

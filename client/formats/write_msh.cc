@@ -2,12 +2,14 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <set>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "client/formats/boundary.h"
 #include "client/formats/mesh_writers.h"
 #include "client/formats/msh.h"
 #include "client/formats/number.h"
@@ -51,13 +53,27 @@ class MshWriter : public MeshWriter {
     return output_.status();
   }
 
+  absl::Status AddFacets(std::span<const uint32_t> facets) final {
+    BeginElements();
+    for (; !facets.empty() && output_.status().ok(); facets = facets.subspan(shape_.dimension)) {
+      row_.clear();
+      const BoundaryPart& part = walk_.Next();
+      if (walk_.is_first()) {
+        AppendBlock(part, row_);
+      }
+      AppendFacet(facets.first(shape_.dimension), part.tag, simplices_ + ++facets_, row_);
+      output_.Write(row_);
+    }
+    return output_.status();
+  }
+
   absl::Status Commit() final {
     BeginElements();
     output_.Write(is_binary_ ? "\n$EndElements\n" : "$EndElements\n");
     if (absl::Status status = output_.status(); !status.ok()) {
       return status;
     }
-    if (absl::Status status = CheckComplete(shape_, vertices_, weights_.size(), simplices_); !status.ok()) {
+    if (absl::Status status = CheckComplete(shape_, vertices_, weights_.size(), simplices_, facets_); !status.ok()) {
       return status;
     }
     WriteNodeData("input", [this](uint64_t vertex) { return vertex < shape_.input_vertices ? 1.0 : 0.0; });
@@ -72,8 +88,39 @@ class MshWriter : public MeshWriter {
       : shape_(shape), output_(std::move(output)), is_binary_(is_binary) {}
 
   int type() const { return shape_.dimension == 2 ? kMshTriangle : kMshTetrahedron; }
+  int facet_type() const { return shape_.dimension == 2 ? kMshLine : kMshTriangle; }
+  uint64_t element_count() const { return shape_.simplex_count + shape_.facet_count(); }
+
+  // The physical group of the simplices. There are readers that tell groups by their numbers alone, whatever their
+  // dimensions: it is none of the boundary's.
+  int32_t Group() const {
+    std::set<int32_t> taken;
+    for (const BoundaryPart& part : shape_.boundary) {
+      taken.insert(part.tag);
+    }
+    int32_t group = 1;
+    while (taken.contains(group)) {
+      ++group;
+    }
+    return group;
+  }
+
+  // The section with the names of groups, if there are any.
+  std::string PhysicalNames() const {
+    if (shape_.boundary.empty()) {
+      return "";
+    }
+    std::string text = absl::StrCat("$PhysicalNames\n", shape_.boundary.size() + 1, "\n");
+    for (const BoundaryPart& part : shape_.boundary) {
+      absl::StrAppend(&text, shape_.dimension - 1, " ", part.tag, " \"", part.name, "\"\n");
+    }
+    absl::StrAppend(&text, shape_.dimension, " ", group_, " \"",
+                    shape_.regions.empty() ? "domain" : shape_.regions[0].name, "\"\n$EndPhysicalNames\n");
+    return text;
+  }
 
   const MeshShape shape_;
+  const int32_t group_ = Group();  // of the simplices
   OutputFile output_;
 
  private:
@@ -82,6 +129,9 @@ class MshWriter : public MeshWriter {
   virtual void AppendNode(std::span<const double> point, uint64_t number, std::string& row) const = 0;
   virtual std::string ElementsHeader() const = 0;
   virtual void AppendElement(std::span<const uint32_t> corners, uint64_t number, std::string& row) const = 0;
+  // What goes before the facets of a part.
+  virtual void AppendBlock(const BoundaryPart& /*part*/, std::string& /*row*/) const {}
+  virtual void AppendFacet(std::span<const uint32_t> corners, int32_t tag, uint64_t number, std::string& row) const = 0;
   virtual void AppendData(uint64_t node, double value, std::string& row) const = 0;
 
   void BeginNodes() {
@@ -116,6 +166,8 @@ class MshWriter : public MeshWriter {
   bool has_elements_ = false;  // the section
   uint64_t vertices_ = 0;
   uint64_t simplices_ = 0;
+  uint64_t facets_ = 0;
+  PartWalk walk_{shape_.boundary};
   std::vector<double> weights_;
   std::string row_;
 };
@@ -126,7 +178,8 @@ class Msh22Writer final : public MshWriter {
 
  private:
   void WriteNodesHeader() override {
-    output_.Write(absl::StrCat("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n", shape_.vertex_count, "\n"));
+    output_.Write(
+        absl::StrCat("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n", PhysicalNames(), "$Nodes\n", shape_.vertex_count, "\n"));
   }
 
   void AppendNode(std::span<const double> point, uint64_t number, std::string& row) const override {
@@ -138,12 +191,20 @@ class Msh22Writer final : public MshWriter {
     row += point.size() == 2 ? " 0\n" : "\n";
   }
 
-  std::string ElementsHeader() const override { return absl::StrCat("$Elements\n", shape_.simplex_count, "\n"); }
+  std::string ElementsHeader() const override { return absl::StrCat("$Elements\n", element_count(), "\n"); }
 
-  // Two tags: the physical group and the geometric entity, both 1.
   void AppendElement(std::span<const uint32_t> corners, uint64_t number, std::string& row) const override {
-    AppendNumber(number, row);
-    row += shape_.dimension == 2 ? " 2 2 1 1" : " 4 2 1 1";
+    AppendRow(type(), corners, group_, kMshEntity, number, row);
+  }
+
+  void AppendFacet(std::span<const uint32_t> corners, int32_t tag, uint64_t number, std::string& row) const override {
+    AppendRow(facet_type(), corners, tag, tag, number, row);
+  }
+
+  // Two tags: the physical group and the geometric entity.
+  static void AppendRow(int type, std::span<const uint32_t> corners, int32_t group, int32_t entity, uint64_t number,
+                        std::string& row) {
+    absl::StrAppend(&row, number, " ", type, " 2 ", group, " ", entity);
     for (const uint32_t corner : corners) {
       row += ' ';
       AppendNumber(uint64_t{corner} + 1, row);
@@ -169,10 +230,12 @@ class Msh41Writer final : public MshWriter {
   void WriteNodesHeader() override {
     std::string text = "$MeshFormat\n4.1 1 8\n";
     AppendBytes<int32_t>(1, text);
-    text += "\n$EndMeshFormat\n$Nodes\n";
-    AppendCounts(shape_.vertex_count, text);
+    absl::StrAppend(&text, "\n$EndMeshFormat\n", PhysicalNames());
+    AppendEntities(text);
+    text += "$Nodes\n";
+    AppendCounts(shape_.vertex_count > 0 ? 1 : 0, shape_.vertex_count, text);
     if (shape_.vertex_count > 0) {
-      AppendEntity(0, text);
+      AppendBlockOf(0, text);
       AppendBytes<uint64_t>(shape_.vertex_count, text);
     }
     output_.Write(text);
@@ -194,9 +257,13 @@ class Msh41Writer final : public MshWriter {
 
   std::string ElementsHeader() const override {
     std::string text = "$Elements\n";
-    AppendCounts(shape_.simplex_count, text);
+    uint64_t blocks = shape_.simplex_count > 0 ? 1 : 0;
+    for (const BoundaryPart& part : shape_.boundary) {
+      blocks += part.facets > 0 ? 1 : 0;
+    }
+    AppendCounts(blocks, element_count(), text);
     if (shape_.simplex_count > 0) {
-      AppendEntity(type(), text);
+      AppendBlockOf(type(), text);
       AppendBytes<uint64_t>(shape_.simplex_count, text);
     }
     return text;
@@ -215,16 +282,62 @@ class Msh41Writer final : public MshWriter {
   }
 
   // Of blocks, of rows, the first and the last number.
-  static void AppendCounts(uint64_t count, std::string& text) {
-    const uint64_t any = count > 0 ? 1 : 0;
-    for (const uint64_t value : {any, count, any, count}) {
+  static void AppendCounts(uint64_t blocks, uint64_t rows, std::string& text) {
+    for (const uint64_t value : {blocks, rows, rows > 0 ? uint64_t{1} : uint64_t{0}, rows}) {
       AppendBytes(value, text);
     }
   }
 
+  void AppendBlock(const BoundaryPart& part, std::string& row) const override {
+    for (const int32_t value : {static_cast<int32_t>(shape_.dimension - 1), part.tag, facet_type()}) {
+      AppendBytes(value, row);
+    }
+    AppendBytes<uint64_t>(part.facets, row);
+  }
+
+  void AppendFacet(std::span<const uint32_t> corners, int32_t, uint64_t number, std::string& row) const override {
+    AppendElement(corners, number, row);
+  }
+
+  // Points, curves, surfaces, volumes: of each its number, its bounding box, its groups, and what bounds it. Every part
+  // of the boundary is an entity with its number; the bounding box of all is that of the mesh.
+  void AppendEntities(std::string& text) const {
+    if (shape_.boundary.empty()) {
+      return;
+    }
+    text += "$Entities\n";
+    for (int dimension = 0; dimension <= 3; ++dimension) {
+      AppendBytes<uint64_t>(dimension == shape_.dimension       ? 1
+                            : dimension == shape_.dimension - 1 ? shape_.boundary.size()
+                                                                : 0,
+                            text);
+    }
+    for (const BoundaryPart& part : shape_.boundary) {
+      AppendEntity(part.tag, part.tag, text);
+      AppendBytes<uint64_t>(0, text);
+    }
+    AppendEntity(kMshEntity, group_, text);
+    AppendBytes<uint64_t>(shape_.boundary.size(), text);
+    for (const BoundaryPart& part : shape_.boundary) {
+      AppendBytes(part.tag, text);
+    }
+    text += "\n$EndEntities\n";
+  }
+
+  void AppendEntity(int32_t number, int32_t group, std::string& text) const {
+    AppendBytes(number, text);
+    for (const std::vector<double>* corner : {&shape_.low, &shape_.high}) {
+      for (size_t axis = 0; axis < 3; ++axis) {
+        AppendBytes(axis < corner->size() ? (*corner)[axis] : 0.0, text);
+      }
+    }
+    AppendBytes<uint64_t>(1, text);
+    AppendBytes(group, text);
+  }
+
   // The entity's dimension and number; then what the section has third.
-  void AppendEntity(int32_t third, std::string& text) const {
-    for (const int32_t value : {static_cast<int32_t>(shape_.dimension), int32_t{1}, third}) {
+  void AppendBlockOf(int32_t third, std::string& text) const {
+    for (const int32_t value : {static_cast<int32_t>(shape_.dimension), kMshEntity, third}) {
       AppendBytes(value, text);
     }
   }

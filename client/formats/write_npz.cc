@@ -1,8 +1,10 @@
-// numpy's .npz: a mesh as two arrays, or three with weights.
+// numpy's .npz: a mesh as arrays.
+#include <algorithm>
 #include <optional>
 #include <span>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/mesh_writers.h"
@@ -33,6 +35,34 @@ class NpzWriter final : public MeshWriter {
     return archive_.status();
   }
 
+  absl::Status AddVertexOrigins(std::span<const uint32_t> origins) override {
+    if (!std::exchange(has_origins_, true)) {
+      Begin(kNpzOrigins, "<i8", shape_.vertex_count, std::nullopt, sizeof(int64_t));
+    }
+    std::vector<int64_t> values;
+    for (const uint32_t origin : origins) {
+      values.push_back(SignedOrigin(origin));
+    }
+    Write(std::span<const int64_t>(values));
+    return archive_.status();
+  }
+
+  absl::Status AddVertexTags(std::span<const int32_t> tags) override {
+    if (!std::exchange(has_vertex_tags_, true)) {
+      Begin(kNpzVertexTags, "<i4", shape_.vertex_count, std::nullopt, sizeof(int32_t));
+    }
+    Write(tags);
+    return archive_.status();
+  }
+
+  absl::Status AddFacets(std::span<const uint32_t> facets) override {
+    BeginSimplices();
+    BeginFacets();
+    Write(facets);
+    facets_ += facets.size() / shape_.dimension;
+    return archive_.status();
+  }
+
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
     BeginSimplices();
     Write(simplices);
@@ -42,10 +72,14 @@ class NpzWriter final : public MeshWriter {
 
   absl::Status Commit() override {
     BeginSimplices();
+    if (!shape_.boundary.empty()) {
+      BeginFacets();
+      WriteTags();
+    }
     if (absl::Status status = archive_.Finish(); !status.ok()) {
       return status;
     }
-    if (absl::Status status = CheckComplete(shape_, vertices_, weights_, simplices_); !status.ok()) {
+    if (absl::Status status = CheckComplete(shape_, vertices_, weights_, simplices_, facets_); !status.ok()) {
       return status;
     }
     return output_.Commit();
@@ -70,6 +104,47 @@ class NpzWriter final : public MeshWriter {
     }
   }
 
+  void BeginFacets() {
+    if (!std::exchange(has_facets_, true)) {
+      Begin(kNpzFacets, "<u4", shape_.facet_count(), shape_.dimension, sizeof(uint32_t));
+    }
+  }
+
+  // What is known of facets and regions beside the indices.
+  void WriteTags() {
+    std::vector<int32_t> tags;
+    size_t longest = 1;
+    Begin(kNpzFacetTags, "<i4", shape_.facet_count(), std::nullopt, sizeof(int32_t));
+    for (const BoundaryPart& part : shape_.boundary) {
+      WriteRepeated(part.tag, part.facets);
+      tags.push_back(part.tag);
+      longest = std::max(longest, part.name.size());
+    }
+    Begin(kNpzFacetNames, absl::StrCat("<U", longest).c_str(), tags.size(), std::nullopt, longest * sizeof(char32_t));
+    for (const BoundaryPart& part : shape_.boundary) {
+      std::u32string name;
+      for (const char letter : part.name) {
+        name += static_cast<unsigned char>(letter);
+      }
+      name.resize(longest, U'\0');
+      Write(std::span<const char32_t>(name));
+    }
+    Begin(kNpzFacetNameTags, "<i4", tags.size(), std::nullopt, sizeof(int32_t));
+    Write(std::span<const int32_t>(tags));
+    if (!shape_.regions.empty()) {
+      Begin(kNpzRegions, "<i4", shape_.simplex_count, std::nullopt, sizeof(int32_t));
+      WriteRepeated(shape_.regions[0].id, shape_.simplex_count);
+    }
+  }
+
+  void WriteRepeated(int32_t value, uint64_t count) {
+    constexpr uint64_t kBlock = 1 << 14;
+    const std::vector<int32_t> block(std::min(count, kBlock), value);
+    for (uint64_t done = 0; done < count && archive_.status().ok(); done += kBlock) {
+      Write(std::span<const int32_t>(block).first(std::min(count - done, kBlock)));
+    }
+  }
+
   template <typename T>
   void Write(std::span<const T> values) {
     archive_.Write({reinterpret_cast<const char*>(values.data()), values.size_bytes()});
@@ -83,6 +158,10 @@ class NpzWriter final : public MeshWriter {
   uint64_t vertices_ = 0;
   uint64_t weights_ = 0;
   uint64_t simplices_ = 0;
+  bool has_origins_ = false;  // the member; also the following
+  bool has_vertex_tags_ = false;
+  bool has_facets_ = false;
+  uint64_t facets_ = 0;
 };
 
 }  // namespace

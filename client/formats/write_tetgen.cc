@@ -1,11 +1,12 @@
-// TetGen's and Triangle's .node and .ele.
+// TetGen's and Triangle's .node and .ele, and for the boundary .edge or .face, and .poly.
+#include <optional>
 #include <span>
 #include <string>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "client/formats/boundary.h"
 #include "client/formats/mesh_writers.h"
 #include "client/formats/number.h"
 #include "client/formats/output_file.h"
@@ -14,77 +15,165 @@
 namespace wellspace::formats {
 namespace {
 
+// The files of a mesh. Those of the boundary are there if the mesh has one; the last one for 2-D and 3-D only.
+struct TetgenFiles {
+  OutputFile nodes;
+  OutputFile simplices;
+  std::optional<OutputFile> facets{};  // .edge or .face
+  std::optional<OutputFile> poly{};
+};
+
 class NodeAndEleWriter final : public MeshWriter {
  public:
-  NodeAndEleWriter(OutputFile nodes, OutputFile simplices, const MeshShape& shape)
-      : shape_(shape), nodes_(std::move(nodes)), simplices_(std::move(simplices)) {
-    nodes_.Write(absl::StrCat(shape.has_weights ? absl::StrCat("# ", kWeightsComment, "\n") : "", shape.vertex_count,
-                              " ", shape.dimension, shape.has_weights ? " 1 0\n" : " 0 0\n"));
-    simplices_.Write(absl::StrCat(shape.simplex_count, " ", shape.dimension + 1, " 0\n"));
+  NodeAndEleWriter(TetgenFiles files, const MeshShape& shape) : shape_(shape), files_(std::move(files)) {
+    files_.nodes.Write(absl::StrCat(shape.has_weights ? absl::StrCat("# ", kWeightsComment, "\n") : "",
+                                    shape.vertex_count, " ", shape.dimension, shape.has_weights ? " 1" : " 0",
+                                    shape.has_vertex_marks ? " 1\n" : " 0\n"));
+    files_.simplices.Write(
+        absl::StrCat(shape.simplex_count, " ", shape.dimension + 1, shape.regions.empty() ? " 0\n" : " 1\n"));
+    if (!shape.regions.empty()) {
+      region_ = absl::StrCat(" ", shape.regions[0].id);
+    }
+    if (files_.facets.has_value()) {
+      files_.facets->Write(absl::StrCat("# ", kBoundaryComment, Names(), "\n", shape.facet_count(), " 1\n"));
+    }
+    if (files_.poly.has_value()) {
+      files_.poly->Write(absl::StrCat("# ", kBoundaryComment, Names(), "\n0 ", shape.dimension, " 0 1\n",
+                                      shape.facet_count(), " 1\n"));
+    }
   }
 
-  // A weight is on the line of its point: points are kept until their weights come.
+  // Weight and tag are on the line of their point: points are kept until these have come.
   absl::Status AddPoints(std::span<const double> points) override {
-    if (!shape_.has_weights) {
-      return WriteRows(points, {}, shape_.dimension, vertices_written_, nodes_);
+    if (!shape_.has_weights && !shape_.has_vertex_marks) {
+      return WriteVertices(points, {}, {});
     }
     points_.insert(points_.end(), points.begin(), points.end());
-    return nodes_.status();
+    return files_.nodes.status();
   }
 
   absl::Status AddWeights(std::span<const double> weights) override {
-    const uint64_t first = vertices_written_ * shape_.dimension;
-    const uint64_t count = weights.size() * shape_.dimension;
-    if (first + count > points_.size()) {
-      return absl::InternalError(absl::StrCat("a mesh got ", vertices_written_ + weights.size(), " weights and ",
-                                              points_.size() / shape_.dimension, " points"));
-    }
-    return WriteRows(std::span<const double>(points_).subspan(first, count), weights, shape_.dimension,
-                     vertices_written_, nodes_);
+    weights_.insert(weights_.end(), weights.begin(), weights.end());
+    return shape_.has_vertex_marks ? files_.nodes.status() : WriteKept(weights.size(), {});
   }
 
+  absl::Status AddVertexTags(std::span<const int32_t> tags) override { return WriteKept(tags.size(), tags); }
+
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
-    return WriteRows(simplices, {}, shape_.dimension + 1, simplices_written_, simplices_);
+    const size_t corners = shape_.dimension + 1;
+    OutputFile& output = files_.simplices;
+    for (; !simplices.empty() && output.status().ok(); simplices = simplices.subspan(corners)) {
+      line_.clear();
+      AppendNumber(simplices_written_++, line_);
+      AppendCorners(simplices.first(corners), line_);
+      absl::StrAppend(&line_, region_, "\n");
+      output.Write(line_);
+    }
+    return output.status();
+  }
+
+  absl::Status AddFacets(std::span<const uint32_t> facets) override {
+    if (!files_.facets.has_value()) {
+      return absl::InternalError("a mesh without a boundary got facets");
+    }
+    for (; !facets.empty() && files_.facets->status().ok(); facets = facets.subspan(shape_.dimension)) {
+      line_.clear();
+      AppendNumber(facets_written_++, line_);
+      AppendCorners(facets.first(shape_.dimension), line_);
+      const int32_t tag = walk_.Next().tag;
+      absl::StrAppend(&line_, " ", tag, "\n");
+      files_.facets->Write(line_);
+      if (shape_.dimension == 3) {  // there, a facet is a list of polygons
+        line_ = absl::StrCat("1 0 ", tag, "\n3");
+        AppendCorners(facets.first(shape_.dimension), line_);
+        line_ += '\n';
+      }
+      if (files_.poly.has_value()) {
+        files_.poly->Write(line_);
+      }
+    }
+    return files_.facets->status();
   }
 
   absl::Status Commit() override {
-    if (absl::Status status =
-            CheckComplete(shape_, vertices_written_, shape_.has_weights ? vertices_written_ : 0, simplices_written_);
+    if (absl::Status status = CheckComplete(shape_, vertices_written_, shape_.has_weights ? vertices_written_ : 0,
+                                            simplices_written_, facets_written_);
         !status.ok()) {
       return status;
     }
-    // Neither file appears before both are written.
-    for (OutputFile* output : {&nodes_, &simplices_}) {
+    std::vector<OutputFile*> outputs = {&files_.nodes, &files_.simplices};
+    if (files_.facets.has_value()) {
+      outputs.push_back(&*files_.facets);
+    }
+    if (files_.poly.has_value()) {
+      files_.poly->Write("0\n");  // holes
+      outputs.push_back(&*files_.poly);
+    }
+    // No file appears before all are written.
+    for (OutputFile* output : outputs) {
       if (absl::Status status = output->Flush(); !status.ok()) {
         return status;
       }
     }
-    if (absl::Status status = nodes_.Commit(); !status.ok()) {
-      return status;
+    for (OutputFile* output : outputs) {
+      if (absl::Status status = output->Commit(); !status.ok()) {
+        return status;
+      }
     }
-    return simplices_.Commit();
+    return absl::OkStatus();
   }
 
  private:
-  // Rows with their numbers, from `written` on, each followed by one of `weights`, unless there are none.
-  template <typename T>
-  absl::Status WriteRows(std::span<const T> values, std::span<const double> weights, int width, uint64_t& written,
-                         OutputFile& output) {
-    for (; !values.empty() && output.status().ok(); values = values.subspan(width)) {
+  // " 1 xmin 2 xmax", for those that read the file.
+  std::string Names() const {
+    std::string names;
+    for (const BoundaryPart& part : shape_.boundary) {
+      if (!part.name.empty()) {
+        absl::StrAppend(&names, " ", part.tag, " ", part.name);
+      }
+    }
+    return names;
+  }
+
+  static void AppendCorners(std::span<const uint32_t> corners, std::string& line) {
+    for (const uint32_t corner : corners) {
+      line += ' ';
+      AppendNumber(uint64_t{corner}, line);
+    }
+  }
+
+  // The next `count` of the vertices that are kept.
+  absl::Status WriteKept(uint64_t count, std::span<const int32_t> tags) {
+    const uint64_t first = vertices_written_ * shape_.dimension;
+    if (first + count * shape_.dimension > points_.size() ||
+        (shape_.has_weights && vertices_written_ + count > weights_.size())) {
+      return absl::InternalError(absl::StrCat("a mesh got ", vertices_written_ + count, " weights or tags, ",
+                                              weights_.size(), " weights and ", points_.size() / shape_.dimension,
+                                              " points"));
+    }
+    return WriteVertices(
+        std::span<const double>(points_).subspan(first, count * shape_.dimension),
+        shape_.has_weights ? std::span<const double>(weights_).subspan(vertices_written_, count) : std::span<double>(),
+        tags);
+  }
+
+  // The next vertices, each with its weight and its tag unless there are none.
+  absl::Status WriteVertices(std::span<const double> points, std::span<const double> weights,
+                             std::span<const int32_t> tags) {
+    OutputFile& output = files_.nodes;
+    for (size_t i = 0; i * shape_.dimension < points.size() && output.status().ok(); ++i) {
       line_.clear();
-      AppendNumber(written++, line_);
-      for (const T value : values.first(width)) {
+      AppendNumber(vertices_written_++, line_);
+      for (const double x : points.subspan(i * shape_.dimension, shape_.dimension)) {
         line_ += ' ';
-        if constexpr (std::is_same_v<T, double>) {
-          AppendNumber(value, line_);
-        } else {
-          AppendNumber(uint64_t{value}, line_);
-        }
+        AppendNumber(x, line_);
       }
       if (!weights.empty()) {
         line_ += ' ';
-        AppendNumber(weights.front(), line_);
-        weights = weights.subspan(1);
+        AppendNumber(weights[i], line_);
+      }
+      if (!tags.empty()) {
+        absl::StrAppend(&line_, " ", tags[i]);
       }
       line_ += '\n';
       output.Write(line_);
@@ -93,11 +182,14 @@ class NodeAndEleWriter final : public MeshWriter {
   }
 
   const MeshShape shape_;
-  OutputFile nodes_;
-  OutputFile simplices_;
+  TetgenFiles files_;
+  std::string region_;  // what ends the line of a simplex
+  PartWalk walk_{shape_.boundary};
   uint64_t vertices_written_ = 0;
   uint64_t simplices_written_ = 0;
-  std::vector<double> points_;  // with weights: all
+  uint64_t facets_written_ = 0;
+  std::vector<double> points_;   // with weights or tags: all
+  std::vector<double> weights_;  // all
   std::string line_;
 };
 
@@ -107,17 +199,45 @@ std::string WithExtension(const std::string& path, const std::string& extension)
   return path.substr(0, path.size() - ExtensionOf(path).size()) + extension;
 }
 
+std::vector<std::string> BoundaryFilesOf(const std::string& path, int dimension) {
+  std::vector<std::string> files = {WithExtension(path, dimension == 2 ? ".edge" : ".face")};
+  if (dimension <= 3) {
+    files.push_back(WithExtension(path, ".poly"));
+  }
+  return files;
+}
+
+std::vector<std::string> TetgenFilesOf(const std::string& path) {
+  std::vector<std::string> files;
+  for (const char* extension : {".node", ".ele", ".edge", ".face", ".poly"}) {
+    files.push_back(WithExtension(path, extension));
+  }
+  return files;
+}
+
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateNodeAndEle(const std::string& path, const MeshShape& shape,
                                                              std::stop_token stop) {
-  absl::StatusOr<OutputFile> nodes = OutputFile::Create(WithExtension(path, ".node"), stop);
-  if (!nodes.ok()) {
-    return nodes.status();
+  std::vector<std::string> names = {WithExtension(path, ".node"), WithExtension(path, ".ele")};
+  if (!shape.boundary.empty()) {
+    const std::vector<std::string> of_boundary = BoundaryFilesOf(path, shape.dimension);
+    names.insert(names.end(), of_boundary.begin(), of_boundary.end());
   }
-  absl::StatusOr<OutputFile> simplices = OutputFile::Create(WithExtension(path, ".ele"), stop);
-  if (!simplices.ok()) {
-    return simplices.status();
+  std::vector<OutputFile> outputs;
+  for (const std::string& name : names) {
+    absl::StatusOr<OutputFile> output = OutputFile::Create(name, stop);
+    if (!output.ok()) {
+      return output.status();
+    }
+    outputs.push_back(*std::move(output));
   }
-  return std::make_unique<NodeAndEleWriter>(*std::move(nodes), *std::move(simplices), shape);
+  TetgenFiles files{.nodes = std::move(outputs[0]), .simplices = std::move(outputs[1])};
+  if (outputs.size() > 2) {
+    files.facets.emplace(std::move(outputs[2]));
+  }
+  if (outputs.size() > 3) {
+    files.poly.emplace(std::move(outputs[3]));
+  }
+  return std::make_unique<NodeAndEleWriter>(std::move(files), shape);
 }
 
 }  // namespace wellspace::formats

@@ -13,15 +13,15 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "client/formats/boundary.h"
 #include "client/formats/file_error.h"
 #include "client/formats/mesh_writers.h"
 #include "client/formats/output_file.h"
+#include "client/formats/vtk_cells.h"
 
 namespace wellspace::formats {
 namespace {
 
-constexpr uint8_t kTriangle = 5;
-constexpr uint8_t kTetrahedron = 10;
 constexpr hsize_t kRowsPerChunk = 1 << 15;
 constexpr unsigned kDeflateLevel = 4;
 
@@ -65,6 +65,10 @@ hid_t TypeOf<double>() {
 template <>
 hid_t TypeOf<int64_t>() {
   return H5T_STD_I64LE;
+}
+template <>
+hid_t TypeOf<int32_t>() {
+  return H5T_STD_I32LE;
 }
 template <>
 hid_t TypeOf<uint8_t>() {
@@ -210,16 +214,17 @@ class VtkHdfWriter final : public MeshWriter {
       : shape_(shape), output_(std::move(output)) {
     const std::lock_guard lock(Hdf5Mutex());
     file_.emplace(output_.temporary_path(), std::move(stop));
-    const uint64_t corners = shape_.dimension + 1;
+    const uint64_t cells = VtkCellCount(shape_);
     for (const auto& [name, count] :
-         {std::pair("NumberOfPoints", shape_.vertex_count), std::pair("NumberOfCells", shape_.simplex_count),
-          std::pair("NumberOfConnectivityIds", shape_.simplex_count * corners)}) {
+         {std::pair("NumberOfPoints", shape_.vertex_count), std::pair("NumberOfCells", cells),
+          std::pair("NumberOfConnectivityIds", VtkOffset(shape_, cells))}) {
       file_->AddArray<int64_t>(file_->root(), name, 1, [count = count](uint64_t) { return count; });
     }
-    file_->AddArray<int64_t>(file_->root(), "Offsets", shape_.simplex_count + 1,
-                             [corners](uint64_t simplex) { return simplex * corners; });
-    file_->AddArray<uint8_t>(file_->root(), "Types", shape_.simplex_count,
-                             [this](uint64_t) { return shape_.dimension == 2 ? kTriangle : kTetrahedron; });
+    file_->AddArray<int64_t>(file_->root(), "Offsets", cells + 1,
+                             [this](uint64_t cell) { return VtkOffset(shape_, cell); });
+    file_->AddArray<uint8_t>(file_->root(), "Types", cells,
+                             [this](uint64_t cell) { return VtkCellType(shape_, cell); });
+    AddCellData();
     Handle point_data = file_->AddGroup(file_->root(), "PointData");
     file_->AddArray<uint8_t>(point_data, "input", shape_.vertex_count,
                              [this](uint64_t vertex) { return vertex < shape_.input_vertices ? 1 : 0; });
@@ -250,25 +255,46 @@ class VtkHdfWriter final : public MeshWriter {
   absl::Status AddWeights(std::span<const double> weights) override {
     const std::lock_guard lock(Hdf5Mutex());
     if (!std::exchange(has_weights_, true)) {
-      const Handle point_data(H5Gopen2(file_->root(), "PointData", H5P_DEFAULT), H5Gclose);
-      file_->BeginArray<double>(point_data, "weights", shape_.vertex_count);
+      BeginPointData<double>("weights");
     }
     file_->Add<double>(weights);
     weights_ += weights.size();
     return file_->status();
   }
 
-  absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
+  absl::Status AddVertexOrigins(std::span<const uint32_t> origins) override {
     const std::lock_guard lock(Hdf5Mutex());
-    BeginCells();
-    const uint64_t corners = shape_.dimension + 1;
-    std::vector<int64_t> indices;
-    ForEachBlock(simplices, corners, [&](std::span<const uint32_t> block) {
-      indices.assign(block.begin(), block.end());
-      file_->Add<int64_t>(indices);
+    if (!std::exchange(has_origins_, true)) {
+      BeginPointData<int64_t>(kVtkOrigin);
+    }
+    std::vector<int64_t> values;
+    ForEachBlock(origins, 1, [&](std::span<const uint32_t> block) {
+      values.clear();
+      for (const uint32_t origin : block) {
+        values.push_back(SignedOrigin(origin));
+      }
+      file_->Add<int64_t>(values);
     });
-    simplices_ += simplices.size() / corners;
     return file_->status();
+  }
+
+  absl::Status AddVertexTags(std::span<const int32_t> tags) override {
+    const std::lock_guard lock(Hdf5Mutex());
+    if (!std::exchange(has_vertex_tags_, true)) {
+      BeginPointData<int32_t>(kVtkBoundary);
+    }
+    file_->Add<int32_t>(tags);
+    return file_->status();
+  }
+
+  absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
+    simplices_ += simplices.size() / (shape_.dimension + 1);
+    return AddCells(simplices);
+  }
+
+  absl::Status AddFacets(std::span<const uint32_t> facets) override {
+    facets_ += facets.size() / shape_.dimension;
+    return AddCells(facets);
   }
 
   absl::Status Commit() override {
@@ -279,7 +305,7 @@ class VtkHdfWriter final : public MeshWriter {
         return status;
       }
     }
-    if (absl::Status status = CheckComplete(shape_, vertices_, weights_, simplices_); !status.ok()) {
+    if (absl::Status status = CheckComplete(shape_, vertices_, weights_, simplices_, facets_); !status.ok()) {
       return status;
     }
     return output_.Commit();
@@ -288,18 +314,54 @@ class VtkHdfWriter final : public MeshWriter {
  private:
   void BeginCells() {
     if (!std::exchange(has_cells_, true)) {
-      file_->BeginArray<int64_t>(file_->root(), "Connectivity", shape_.simplex_count * (shape_.dimension + 1));
+      file_->BeginArray<int64_t>(file_->root(), "Connectivity", VtkOffset(shape_, VtkCellCount(shape_)));
     }
+  }
+
+  // Vertices of cells, rows of any width.
+  absl::Status AddCells(std::span<const uint32_t> vertices) {
+    const std::lock_guard lock(Hdf5Mutex());
+    BeginCells();
+    std::vector<int64_t> indices;
+    ForEachBlock(vertices, 1, [&](std::span<const uint32_t> block) {
+      indices.assign(block.begin(), block.end());
+      file_->Add<int64_t>(indices);
+    });
+    return file_->status();
+  }
+
+  template <typename T>
+  void BeginPointData(const char* name) {
+    const Handle point_data(H5Gopen2(file_->root(), "PointData", H5P_DEFAULT), H5Gclose);
+    file_->BeginArray<T>(point_data, name, shape_.vertex_count);
+  }
+
+  // Region and tag of every cell.
+  void AddCellData() {
+    if (shape_.boundary.empty()) {
+      return;
+    }
+    const uint64_t cells = VtkCellCount(shape_);
+    const Handle cell_data = file_->AddGroup(file_->root(), "CellData");
+    const int32_t region = shape_.regions.empty() ? 0 : shape_.regions[0].id;
+    file_->AddArray<int32_t>(cell_data, kVtkRegion, cells,
+                             [&](uint64_t cell) { return cell < shape_.simplex_count ? region : 0; });
+    PartWalk walk(shape_.boundary);
+    file_->AddArray<int32_t>(cell_data, kVtkBoundary, cells,
+                             [&](uint64_t cell) { return cell < shape_.simplex_count ? 0 : walk.Next().tag; });
   }
 
   const MeshShape shape_;
   OutputFile output_;  // gives the file its name; HDF5 writes it
   std::optional<HdfFile> file_;
-  bool has_weights_ = false;  // the array
-  bool has_cells_ = false;    // the array
+  bool has_weights_ = false;      // the array
+  bool has_cells_ = false;        // the array
+  bool has_origins_ = false;      // the array
+  bool has_vertex_tags_ = false;  // the array
   uint64_t vertices_ = 0;
   uint64_t weights_ = 0;
   uint64_t simplices_ = 0;
+  uint64_t facets_ = 0;
 };
 
 }  // namespace

@@ -8,12 +8,10 @@
 #include "client/formats/mesh_writers.h"
 #include "client/formats/output_file.h"
 #include "client/formats/vtk_array.h"
+#include "client/formats/vtk_cells.h"
 
 namespace wellspace::formats {
 namespace {
-
-constexpr uint8_t kTriangle = 5;
-constexpr uint8_t kTetrahedron = 10;
 
 class VtuWriter final : public MeshWriter {
  public:
@@ -24,7 +22,7 @@ class VtuWriter final : public MeshWriter {
         "compressor=\"vtkZLibDataCompressor\">\n"
         "  <UnstructuredGrid>\n");
     output_.Write(absl::StrCat("    <Piece NumberOfPoints=\"", shape_.vertex_count, "\" NumberOfCells=\"",
-                               shape_.simplex_count, "\">\n      <Points>\n"));
+                               VtkCellCount(shape_), "\">\n      <Points>\n"));
     BeginArray("type=\"Float64\" Name=\"Points\" NumberOfComponents=\"3\"", shape_.vertex_count * 3 * sizeof(double));
   }
 
@@ -47,6 +45,35 @@ class VtuWriter final : public MeshWriter {
     return Status();
   }
 
+  absl::Status AddVertexOrigins(std::span<const uint32_t> origins) override {
+    if (!std::exchange(has_origins_, true)) {
+      NextOfPointData("Int64", kVtkOrigin, sizeof(int64_t));
+    }
+    for (size_t i = 0; i < origins.size() && Status().ok(); ++i) {
+      array_->Add<int64_t>(SignedOrigin(origins[i]));
+    }
+    return Status();
+  }
+
+  absl::Status AddVertexTags(std::span<const int32_t> tags) override {
+    if (!std::exchange(has_vertex_tags_, true)) {
+      NextOfPointData("Int32", kVtkBoundary, sizeof(int32_t));
+    }
+    for (size_t i = 0; i < tags.size() && Status().ok(); ++i) {
+      array_->Add<int32_t>(tags[i]);
+    }
+    return Status();
+  }
+
+  absl::Status AddFacets(std::span<const uint32_t> facets) override {
+    BeginCells();
+    for (size_t i = 0; i < facets.size() && Status().ok(); ++i) {
+      array_->Add<int64_t>(facets[i]);
+    }
+    facets_ += facets.size() / shape_.dimension;
+    return Status();
+  }
+
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
     BeginCells();
     for (size_t i = 0; i < simplices.size() && Status().ok(); ++i) {
@@ -59,22 +86,22 @@ class VtuWriter final : public MeshWriter {
   absl::Status Commit() override {
     BeginCells();
     EndArray();
-    const int64_t corners = shape_.dimension + 1;
-    BeginArray("type=\"Int64\" Name=\"offsets\"", shape_.simplex_count * sizeof(int64_t));
-    for (uint64_t simplex = 0; simplex < shape_.simplex_count; ++simplex) {
-      array_->Add<int64_t>((static_cast<int64_t>(simplex) + 1) * corners);
+    const uint64_t cells = VtkCellCount(shape_);
+    BeginArray("type=\"Int64\" Name=\"offsets\"", cells * sizeof(int64_t));
+    for (uint64_t cell = 0; cell < cells; ++cell) {
+      array_->Add<int64_t>(static_cast<int64_t>(VtkOffset(shape_, cell + 1)));
     }
     EndArray();
-    BeginArray("type=\"UInt8\" Name=\"types\"", shape_.simplex_count);
-    for (uint64_t simplex = 0; simplex < shape_.simplex_count; ++simplex) {
-      array_->Add<uint8_t>(shape_.dimension == 2 ? kTriangle : kTetrahedron);
+    BeginArray("type=\"UInt8\" Name=\"types\"", cells);
+    for (uint64_t cell = 0; cell < cells; ++cell) {
+      array_->Add<uint8_t>(VtkCellType(shape_, cell));
     }
     EndArray();
     output_.Write("      </Cells>\n    </Piece>\n  </UnstructuredGrid>\n</VTKFile>\n");
     if (absl::Status status = Status(); !status.ok()) {
       return status;
     }
-    if (absl::Status status = CheckComplete(shape_, vertices_, weights_, simplices_); !status.ok()) {
+    if (absl::Status status = CheckComplete(shape_, vertices_, weights_, simplices_, facets_); !status.ok()) {
       return status;
     }
     return output_.Commit();
@@ -106,8 +133,38 @@ class VtuWriter final : public MeshWriter {
       array_->Add<uint8_t>(vertex < shape_.input_vertices ? 1 : 0);
     }
     if (shape_.has_weights) {
-      EndArray();
-      BeginArray("type=\"Float64\" Name=\"weights\"", shape_.vertex_count * sizeof(double));
+      NextOfPointData("Float64", "weights", sizeof(double));
+    }
+  }
+
+  void NextOfPointData(const char* type, const char* name, uint64_t value_bytes) {
+    BeginPointData();
+    EndArray();
+    BeginArray(absl::StrCat("type=\"", type, "\" Name=\"", name, "\""), shape_.vertex_count * value_bytes);
+  }
+
+  // Region and tag of every cell.
+  void WriteCellData() {
+    if (shape_.boundary.empty()) {
+      return;
+    }
+    output_.Write("      <CellData>\n");
+    BeginArray(absl::StrCat("type=\"Int32\" Name=\"", kVtkRegion, "\""), VtkCellCount(shape_) * sizeof(int32_t));
+    AddRepeated(shape_.regions.empty() ? 0 : shape_.regions[0].id, shape_.simplex_count);
+    AddRepeated(0, shape_.facet_count());
+    EndArray();
+    BeginArray(absl::StrCat("type=\"Int32\" Name=\"", kVtkBoundary, "\""), VtkCellCount(shape_) * sizeof(int32_t));
+    AddRepeated(0, shape_.simplex_count);
+    for (const BoundaryPart& part : shape_.boundary) {
+      AddRepeated(part.tag, part.facets);
+    }
+    EndArray();
+    output_.Write("      </CellData>\n");
+  }
+
+  void AddRepeated(int32_t value, uint64_t count) {
+    for (; count > 0 && Status().ok(); --count) {
+      array_->Add<int32_t>(value);
     }
   }
 
@@ -115,9 +172,10 @@ class VtuWriter final : public MeshWriter {
     if (!std::exchange(has_cells_, true)) {
       BeginPointData();
       EndArray();
-      output_.Write("      </PointData>\n      <Cells>\n");
-      BeginArray("type=\"Int64\" Name=\"connectivity\"",
-                 shape_.simplex_count * (shape_.dimension + 1) * sizeof(int64_t));
+      output_.Write("      </PointData>\n");
+      WriteCellData();
+      output_.Write("      <Cells>\n");
+      BeginArray("type=\"Int64\" Name=\"connectivity\"", VtkOffset(shape_, VtkCellCount(shape_)) * sizeof(int64_t));
     }
   }
 
@@ -126,9 +184,12 @@ class VtuWriter final : public MeshWriter {
   std::optional<VtkArrayWriter> array_;  // the one that is being written
   bool has_point_data_ = false;          // the element
   bool has_cells_ = false;               // the element
+  bool has_origins_ = false;             // the array
+  bool has_vertex_tags_ = false;         // the array
   uint64_t vertices_ = 0;
   uint64_t weights_ = 0;
   uint64_t simplices_ = 0;
+  uint64_t facets_ = 0;
   absl::Status status_;
 };
 

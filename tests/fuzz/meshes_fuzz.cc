@@ -46,6 +46,10 @@ void RequireMesh(const Mesh& mesh) {
   for (const uint32_t vertex : mesh.simplices) {
     Require(vertex < mesh.View().vertex_count(), "a simplex has vertices of the mesh");
   }
+  Require(mesh.facets.size() == mesh.View().Shape().facet_count() * mesh.dimension, "every facet is of a part");
+  for (const uint32_t vertex : mesh.facets) {
+    Require(vertex < mesh.View().vertex_count(), "a facet has vertices of the mesh");
+  }
 }
 
 // Reads the mesh of `path`, writes it as `copy` and reads that.

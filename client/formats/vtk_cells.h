@@ -1,0 +1,36 @@
+// The cells of a mesh as VTK has them: first the simplices, then the facets of the boundary. Private to this folder.
+#ifndef WELLSPACE_CLIENT_FORMATS_VTK_CELLS_H_
+#define WELLSPACE_CLIENT_FORMATS_VTK_CELLS_H_
+
+#include <cstdint>
+
+#include "client/formats/mesh.h"
+
+namespace wellspace::formats {
+
+// VTK's numbers of types.
+inline constexpr uint8_t kVtkLine = 3;
+inline constexpr uint8_t kVtkTriangle = 5;
+inline constexpr uint8_t kVtkTetrahedron = 10;
+
+inline uint64_t VtkCellCount(const MeshShape& shape) { return shape.simplex_count + shape.facet_count(); }
+
+// Vertices of all cells before number `cell`.
+inline uint64_t VtkOffset(const MeshShape& shape, uint64_t cell) {
+  const uint64_t simplices = cell < shape.simplex_count ? cell : shape.simplex_count;
+  return cell * shape.dimension + simplices;
+}
+
+inline uint8_t VtkCellType(const MeshShape& shape, uint64_t cell) {
+  const int corners = shape.dimension + (cell < shape.simplex_count ? 1 : 0);
+  return corners == 2 ? kVtkLine : corners == 3 ? kVtkTriangle : kVtkTetrahedron;
+}
+
+// Names of data: of points the origin and the tag, of cells the region and the tag, which are 0 where there is none.
+inline constexpr char kVtkOrigin[] = "origin";
+inline constexpr char kVtkBoundary[] = "boundary";
+inline constexpr char kVtkRegion[] = "region";
+
+}  // namespace wellspace::formats
+
+#endif  // WELLSPACE_CLIENT_FORMATS_VTK_CELLS_H_
