@@ -71,6 +71,16 @@ auto VisitArray(const v1::MeshChunk& chunk, int array, Visit visit) {
   }
 }
 
+// Names go to files of text, where they stand in quotes or between blanks.
+absl::Status CheckName(const std::string& name) {
+  constexpr size_t kMostLetters = 256;
+  const bool is_visible = std::all_of(name.begin(), name.end(), [](char c) { return c > ' ' && c < 0x7f && c != '"'; });
+  return name.empty() || name.size() > kMostLetters || !is_visible
+             ? Contradiction("a part of the mesh with a name of ", name.size(),
+                             " bytes that cannot be; names are of visible ASCII letters")
+             : absl::OkStatus();
+}
+
 bool IsTheSame(const MeshHeader& a, const MeshHeader& b) {
   return a.revision == b.revision && a.dimension == b.dimension && a.vertex_count == b.vertex_count &&
          a.simplex_count == b.simplex_count && a.input_point_count == b.input_point_count &&
@@ -128,6 +138,9 @@ absl::Status MeshReceiver::CheckBoundary(const MeshHeader& header) const {
       return Contradiction("a part of the boundary with the tag ", part.tag, " and ", part.facet_count,
                            " facets; tags are above 0, each once");
     }
+    if (absl::Status status = CheckName(part.name); !status.ok()) {
+      return status;
+    }
   }
   if (facets != header.facet_count || header.facet_count > kMaxSimplices) {
     return Contradiction("parts of the boundary with ", facets, " facets, ", header.facet_count, " in all");
@@ -136,6 +149,9 @@ absl::Status MeshReceiver::CheckBoundary(const MeshHeader& header) const {
   for (const Region& region : header.regions) {
     if (region.id <= 0 || !regions.insert(region.id).second) {
       return Contradiction("a region with the id ", region.id, "; ids are above 0, each once");
+    }
+    if (absl::Status status = CheckName(region.name); !status.ok()) {
+      return status;
     }
   }
   return absl::OkStatus();

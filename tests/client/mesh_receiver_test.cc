@@ -101,7 +101,9 @@ Answer AnswerWithBoundary() {
   add_part(2, "none", 0);
   add_part(7, "rest", 3);
   for (const int32_t id : {1, 4}) {
-    metadata.add_regions()->set_id(id);
+    v1::Region& region = *metadata.add_regions();
+    region.set_id(id);
+    region.set_name("region");
   }
   metadata.set_facet_count(4);
   metadata.set_has_simplex_regions(true);
@@ -238,6 +240,11 @@ TEST(MeshReceiver, RefusesADamagedBoundary) {
   };
   EXPECT_THAT(message_of([](Answer& a) { a.metadata.mutable_boundary(2)->set_tag(1); }), HasSubstr("with the tag 1"));
   EXPECT_THAT(message_of([](Answer& a) { a.metadata.mutable_boundary(2)->set_tag(0); }), HasSubstr("with the tag 0"));
+  for (const char* name : {"", "two words", "a\nb", "a\"b", "\xc3\xa4"}) {
+    const auto message = HasSubstr("names are of visible ASCII letters");
+    EXPECT_THAT(message_of([&](Answer& a) { a.metadata.mutable_boundary(0)->set_name(name); }), message) << name;
+    EXPECT_THAT(message_of([&](Answer& a) { a.metadata.mutable_regions(0)->set_name(name); }), message) << name;
+  }
   EXPECT_THAT(message_of([](Answer& a) { a.metadata.set_facet_count(5); }), HasSubstr("4 facets, 5 in all"));
   EXPECT_THAT(message_of([](Answer& a) { a.metadata.mutable_regions(1)->set_id(1); }), HasSubstr("with the id 1"));
   EXPECT_THAT(message_of([](Answer& a) { a.chunks[2].set_vertex_origins(0, kSteinerOrigin); }), HasSubstr("CRC32C"));
