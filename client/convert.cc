@@ -115,6 +115,18 @@ MeshStatistics StatisticsFromProto(const v1::MeshStatistics& message) {
   statistics.input_points = message.input_points();
   statistics.duplicates = message.duplicates();
   statistics.merged_points = message.merged_points();
+  if (message.has_domain()) {
+    const v1::DomainStatistics& domain = message.domain();
+    statistics.domain = {.unmeshed_points = domain.unmeshed_points(),
+                         .segments = domain.segments(),
+                         .subsegments = domain.subsegments(),
+                         .dropped_segments = domain.dropped_segments(),
+                         .touching_points = domain.touching_points(),
+                         .crossings = domain.crossings(),
+                         .near_points = domain.near_points(),
+                         .exempt_simplices = domain.exempt_simplices(),
+                         .min_input_angle_deg = domain.min_input_angle_deg()};
+  }
   statistics.vertices = message.vertices();
   statistics.simplices = message.simplices();
   statistics.max_radius_edge = message.max_radius_edge();

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -24,6 +25,28 @@ struct SizeBox {
 };
 
 // What to mesh and how. Zero or empty means the server's default, as the comments of the proto's MeshParameters say.
+// Which faces, into which segments cut the plane, are meshed; see the proto's FaceRule.
+enum class FaceRule { kBox, kHoles, kEvenOdd };
+
+// See the proto's FaceSeed.
+struct FaceSeed {
+  double x = 0;
+  double y = 0;
+  bool is_hole = false;
+  int32_t region = 0;
+  double max_area = 0;  // 0: no bound
+};
+
+// Segments between points in 2-D, and the faces that they bound; see the proto's SegmentChunk and FaceOptions.
+struct Features {
+  std::vector<uint32_t> ends;    // m x 2, row-major: indices of points
+  std::vector<int32_t> markers;  // m, or none: then all are 0
+  std::vector<uint8_t> is_open;  // m, or none: 1 for a segment that is part of no ring
+  std::vector<FaceSeed> seeds;
+  FaceRule faces = FaceRule::kBox;
+  bool split_crossings = false;
+};
+
 struct MeshOptions {
   int dimension = 3;
   double rho = 0;
@@ -39,7 +62,11 @@ struct MeshOptions {
   double margin = 0.25;
   uint64_t max_vertices = 0;
   int threads = 0;
+  std::shared_ptr<const Features> features;  // of MeshPoints and EstimateMesh, in 2-D; null: none
 };
+
+// The vertex of an input point that lies in no face which is meshed.
+inline constexpr uint32_t kNoVertex = 0xffff'ffff;
 
 struct Progress {
   std::string phase;
@@ -63,6 +90,19 @@ struct LeftSliver {
   SliverReason reason = SliverReason::kUnknown;
 };
 
+// What became of the points and segments of a domain; see the proto's DomainStatistics.
+struct DomainStatistics {
+  uint64_t unmeshed_points = 0;
+  uint64_t segments = 0;
+  uint64_t subsegments = 0;
+  uint64_t dropped_segments = 0;
+  uint64_t touching_points = 0;
+  uint64_t crossings = 0;
+  uint64_t near_points = 0;
+  uint64_t exempt_simplices = 0;
+  double min_input_angle_deg = 0;
+};
+
 // What was done against slivers; see the proto's SliverStatistics.
 struct SliverStatistics {
   uint64_t found = 0;
@@ -81,7 +121,8 @@ struct SliverStatistics {
 struct MeshStatistics {
   uint64_t input_points = 0;
   uint64_t duplicates = 0;
-  uint64_t merged_points = 0;  // whose vertex has other coordinates
+  std::optional<DomainStatistics> domain;  // of a domain with segments
+  uint64_t merged_points = 0;              // whose vertex has other coordinates
   uint64_t vertices = 0;
   uint64_t simplices = 0;
   double max_radius_edge = 0;

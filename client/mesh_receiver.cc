@@ -264,7 +264,12 @@ absl::Status MeshReceiver::CheckValues(Array array, const v1::MeshChunk& chunk) 
     case kSimplices:
       return CheckVertices(chunk.simplices(), header_.vertex_count, kArrayNames[array]);
     case kInputVertices:
-      return CheckVertices(chunk.input_vertices(), header_.vertex_count, kArrayNames[array]);
+      for (const uint32_t vertex : chunk.input_vertices()) {
+        if (vertex >= header_.vertex_count && vertex != kNoVertex) {
+          return Contradiction(kArrayNames[array], " name vertex ", vertex, " of ", header_.vertex_count);
+        }
+      }
+      return absl::OkStatus();
     case kFacets:
       return CheckVertices(chunk.facets(), header_.vertex_count, kArrayNames[array]);
     case kVertexOrigins:

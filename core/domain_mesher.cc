@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <numeric>
 #include <set>
 #include <string>
@@ -14,6 +15,7 @@
 #include "core/estimate/estimate.h"
 #include "core/feasibility.h"
 #include "core/simplex/boundary.h"
+#include "core/simplex/quality.h"
 
 namespace wellspace::core {
 namespace {
@@ -21,6 +23,9 @@ namespace {
 // A vertex is in the diametral disc of a subsegment only if it is nearer to its centre by more than this, relatively: a
 // foot makes a right angle, as far as doubles go.
 constexpr double kDiscTolerance = 1e-9;
+
+// A ratio that exceeds rho by less, relatively, is what was rounded.
+constexpr double kRatioTolerance = 1e-9;
 
 // Refuses parameters that a domain in the plane does not have.
 absl::Status CheckDomainParameters(const MeshParameters& parameters, const Features& features) {
@@ -162,6 +167,7 @@ absl::Status DomainMesher::Refine(const MeshParameters& parameters, RunContext& 
 // Refines, and splits subsegments, until every one is an edge of the triangulation, with nothing in its diametral disc.
 absl::Status DomainMesher::MakeConforming(const MeshParameters& parameters, RunContext& context) {
   const MeshCriteria<2> criteria = CriteriaIn<2>(domain_, parameters);
+  rho_ = criteria.rho;
   while (true) {
     WELLSPACE_RETURN_IF_ERROR(
         refinement_->Run(criteria, VertexBudget(parameters), parameters.threads, context, nullptr, nullptr));
@@ -364,10 +370,33 @@ void DomainMesher::SetRegions(std::span<const uint32_t> faces, Mesh& mesh) const
   }
 }
 
+// How many triangles break rho.
+uint64_t DomainMesher::CountExempt(const Mesh& mesh) const {
+  uint64_t count = 0;
+  for (size_t t = 0; t < mesh.simplices.size(); t += 3) {
+    const Simplex<2> corners = {PointAt<2>(mesh.points, mesh.simplices[t]),
+                                PointAt<2>(mesh.points, mesh.simplices[t + 1]),
+                                PointAt<2>(mesh.points, mesh.simplices[t + 2])};
+    count += RadiusEdgeRatio<2>(corners) > rho_ * (1 + kRatioTolerance) ? 1 : 0;
+  }
+  return count;
+}
+
 void DomainMesher::SetStatistics(Mesh& mesh) const {
   MeshStatistics& statistics = mesh.statistics;
   statistics.input_points = mesh.input_vertex.size();
   statistics.duplicates = planar_->graph().counts.equal_points;
+  const CleaningCounts& counts = planar_->graph().counts;
+  DomainStatistics& domain = statistics.domain.emplace();
+  domain.unmeshed_points = dropped_points_;
+  domain.segments = planar_->segment_count();
+  domain.subsegments = mesh.facet_count();
+  domain.dropped_segments = counts.empty_segments + counts.duplicate_segments;
+  domain.touching_points = counts.touching_vertices;
+  domain.crossings = counts.crossings;
+  domain.near_points = counts.near_vertices;
+  domain.exempt_simplices = CountExempt(mesh);
+  domain.min_input_angle_deg = planar_->MinAngle() * 180 / std::numbers::pi;
   statistics.vertices = mesh.vertex_count();
   statistics.simplices = mesh.simplex_count();
   statistics.tree_seconds = tree_seconds_;
@@ -391,8 +420,9 @@ absl::StatusOr<MeshEstimate> DomainMesher::Estimate(const MeshParameters& parame
   return estimate;
 }
 
-absl::StatusOr<std::unique_ptr<Mesher>> Mesher::Create(const MeshParameters& parameters, std::span<const double> points,
-                                                       const Features& features, RunContext& context) {
+absl::StatusOr<std::unique_ptr<Mesher>> Mesher::CreateInDomain(const MeshParameters& parameters,
+                                                               std::span<const double> points, const Features& features,
+                                                               RunContext& context) {
   auto mesher = std::make_unique<DomainMesher>();
   WELLSPACE_RETURN_IF_ERROR(mesher->Initialize(parameters, points, features, context));
   return mesher;

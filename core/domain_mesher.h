@@ -61,6 +61,7 @@ class DomainMesher final : public Mesher {
   void SetPoints(Mesh& mesh) const;
   void SetBoundary(const PlanarDomain::Chains& chains, Mesh& mesh) const;
   void SetRegions(std::span<const uint32_t> faces, Mesh& mesh) const;
+  uint64_t CountExempt(const Mesh& mesh) const;
   void SetStatistics(Mesh& mesh) const;
 
   Domain<2> domain_;
@@ -74,6 +75,7 @@ class DomainMesher final : public Mesher {
   HugeVector<uint32_t> output_index_;  // by point of the graph
   uint64_t dropped_points_ = 0;
   std::optional<DomainSimplices> made_;  // since the last refinement
+  double rho_ = 0;                       // of the last refinement
   double tree_seconds_ = 0;
   double refinement_seconds_ = 0;
   double simplices_seconds_ = 0;

@@ -4,11 +4,25 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/sliver/left_sliver.h"
 
 namespace wellspace::core {
+
+// What became of the points and segments of a domain in the plane.
+struct DomainStatistics {
+  uint64_t unmeshed_points = 0;    // input points that touch no face which is meshed
+  uint64_t segments = 0;           // of the planar graph that bound a face which is meshed; of the box, too
+  uint64_t subsegments = 0;        // edges of the mesh on them
+  uint64_t dropped_segments = 0;   // of no length, or there before
+  uint64_t touching_points = 0;    // that lay on a segment, which was split there
+  uint64_t crossings = 0;          // of segments, which were split there
+  uint64_t near_points = 0;        // that a segment was led through
+  uint64_t exempt_simplices = 0;   // that break rho, at small angles of the input
+  double min_input_angle_deg = 0;  // between two segments with a common end; 180 where there are no two
+};
 
 // What a run did: counts of the paper's operations, by which its O(1) claims are tested, and the figures of the mesh.
 struct MeshStatistics {
@@ -17,6 +31,8 @@ struct MeshStatistics {
   uint64_t merged_points = 0;  // input points whose vertex has other coordinates: within merge_distance
   uint64_t vertices = 0;
   uint64_t simplices = 0;
+
+  std::optional<DomainStatistics> domain{};  // of a domain in the plane
 
   double max_radius_edge = 0;
   double min_angle_deg = 0;  // 2-D: smallest angle of a triangle; 3-D: smallest dihedral angle of a tetrahedron

@@ -48,9 +48,9 @@ class Mesher {
   //
   // Errors:     as above; INVALID_ARGUMENT of MakePlanarGraph and FindFaces, and for parameters that a domain does not
   //             have: another dimension or criterion, a merge_distance, a box beside another rule than kBox.
-  static absl::StatusOr<std::unique_ptr<Mesher>> Create(const MeshParameters& parameters,
-                                                        std::span<const double> points, const Features& features,
-                                                        RunContext& context);
+  static absl::StatusOr<std::unique_ptr<Mesher>> CreateInDomain(const MeshParameters& parameters,
+                                                                std::span<const double> points,
+                                                                const Features& features, RunContext& context);
 
   virtual int dimension() const = 0;
   virtual uint64_t vertex_count() const = 0;
@@ -163,6 +163,11 @@ absl::StatusOr<Mesh> MeshPoints(const MeshParameters& parameters, std::span<cons
 // The same for a domain in the plane.
 absl::StatusOr<Mesh> MeshFeatures(const MeshParameters& parameters, std::span<const double> points,
                                   const Features& features, RunContext& context);
+
+// Estimates the mesh that MeshFeatures would make, without making it: as far as its points and the leaves that its
+// segments split tell, which may be a part of it.
+absl::StatusOr<MeshEstimate> EstimateFeatures(const MeshParameters& parameters, std::span<const double> points,
+                                              const Features& features, RunContext& context);
 
 // Estimates the mesh that MeshPoints would make, without making it.
 //

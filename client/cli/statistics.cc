@@ -21,11 +21,39 @@ nlohmann::ordered_json DuplicateOf(std::span<const uint32_t> input_vertex) {
   for (size_t i = 0; i < input_vertex.size(); ++i) {
     if (input_vertex[i] == distinct) {
       ++distinct;
-    } else {
+    } else if (input_vertex[i] != client::kNoVertex) {
       pairs.push_back({i, input_vertex[i]});
     }
   }
   return pairs;
+}
+
+nlohmann::ordered_json DomainJson(const client::DomainStatistics& domain) {
+  return {{"unmeshed_points", domain.unmeshed_points},
+          {"segments", domain.segments},
+          {"subsegments", domain.subsegments},
+          {"dropped_segments", domain.dropped_segments},
+          {"touching_points", domain.touching_points},
+          {"crossings", domain.crossings},
+          {"near_points", domain.near_points},
+          {"exempt_simplices", domain.exempt_simplices},
+          {"min_input_angle_deg", domain.min_input_angle_deg}};
+}
+
+// What was changed of a domain, and what is not meshed of it.
+std::string DomainText(const client::DomainStatistics& domain) {
+  std::string text = absl::StrCat(", ", WithThousands(domain.segments), " segments");
+  const auto add = [&](uint64_t count, const char* what) {
+    if (count > 0) {
+      absl::StrAppend(&text, ", ", WithThousands(count), " ", what);
+    }
+  };
+  add(domain.crossings, "crossings split");
+  add(domain.touching_points, "points on segments");
+  add(domain.near_points, "points that segments were led through");
+  add(domain.dropped_segments, "segments dropped");
+  add(domain.unmeshed_points, "points outside");
+  return text;
 }
 
 const char* AngleName(int dimension) { return dimension == 2 ? "min_angle_deg" : "min_dihedral_deg"; }
@@ -107,6 +135,9 @@ std::string StatisticsJson(const client::MeshHeader& mesh, std::span<const uint3
   json["max_radius_edge"] = statistics.max_radius_edge;
   json[AngleName(mesh.dimension)] = statistics.min_angle_deg;
   json["triangulation"] = TriangulationName(statistics.triangulation);
+  if (statistics.domain.has_value()) {
+    json["domain"] = DomainJson(*statistics.domain);
+  }
   json["slivers"] = statistics.slivers.has_value() ? SliversJson(*statistics.slivers) : nlohmann::ordered_json();
   json["seconds"] = statistics.seconds;
   json["peak_memory_bytes"] = statistics.peak_memory_bytes;
@@ -123,8 +154,8 @@ std::string Summary(const client::MeshHeader& mesh) {
       WithThousands(statistics.input_points), " points",
       statistics.duplicates == 0 ? "" : absl::StrCat(" (", WithThousands(statistics.duplicates), " duplicates)"),
       statistics.merged_points == 0 ? "" : absl::StrCat(" (", WithThousands(statistics.merged_points), " merged)"),
-      " -> ", WithThousands(statistics.vertices), " vertices, ", WithThousands(statistics.simplices), " ",
-      formats::SimplexName(mesh.dimension),
+      statistics.domain.has_value() ? DomainText(*statistics.domain) : "", " -> ", WithThousands(statistics.vertices),
+      " vertices, ", WithThousands(statistics.simplices), " ", formats::SimplexName(mesh.dimension),
       absl::StrFormat("; radius-edge at most %.4f, %s at least %.2f\u00b0", statistics.max_radius_edge,
                       mesh.dimension == 2 ? "angles" : "dihedral angles", statistics.min_angle_deg),
       statistics.slivers.has_value() ? SliversText(*statistics.slivers) : "",

@@ -1,6 +1,15 @@
 #include "client/files/mesh_file.h"
 
 namespace wellspace::client {
+namespace {
+
+// How many vertices, the first of a mesh, are input points.
+uint64_t InputVerticesOf(const MeshStatistics& statistics) {
+  const uint64_t unmeshed = statistics.domain.has_value() ? statistics.domain->unmeshed_points : 0;
+  return statistics.input_points - statistics.duplicates - statistics.merged_points - unmeshed;
+}
+
+}  // namespace
 
 absl::Status MeshFile::Begin(const MeshHeader& header) {
   header_ = header;
@@ -8,7 +17,7 @@ absl::Status MeshFile::Begin(const MeshHeader& header) {
       .dimension = header.dimension,
       .vertex_count = header.vertex_count,
       .simplex_count = header.simplex_count,
-      .input_vertices = header.statistics.input_points - header.statistics.duplicates,
+      .input_vertices = InputVerticesOf(header.statistics),
       .has_weights = header.has_weights,
   };
   absl::StatusOr<std::unique_ptr<formats::MeshWriter>> writer = formats::CreateMesh(path_, format_, shape, stop_);

@@ -79,11 +79,26 @@ void SetLeftSlivers(const core::MeshStatistics& statistics, v1::SliverStatistics
   }
 }
 
+void SetDomain(const core::DomainStatistics& domain, v1::DomainStatistics& message) {
+  message.set_unmeshed_points(domain.unmeshed_points);
+  message.set_segments(domain.segments);
+  message.set_subsegments(domain.subsegments);
+  message.set_dropped_segments(domain.dropped_segments);
+  message.set_touching_points(domain.touching_points);
+  message.set_crossings(domain.crossings);
+  message.set_near_points(domain.near_points);
+  message.set_exempt_simplices(domain.exempt_simplices);
+  message.set_min_input_angle_deg(domain.min_input_angle_deg);
+}
+
 v1::MeshStatistics StatisticsToProto(const core::MeshStatistics& statistics) {
   v1::MeshStatistics message;
   message.set_input_points(statistics.input_points);
   message.set_duplicates(statistics.duplicates);
   message.set_merged_points(statistics.merged_points);
+  if (statistics.domain.has_value()) {
+    SetDomain(*statistics.domain, *message.mutable_domain());
+  }
   message.set_vertices(statistics.vertices);
   message.set_simplices(statistics.simplices);
   message.set_max_radius_edge(statistics.max_radius_edge);

@@ -34,6 +34,7 @@ grpc::StatusCode CodeOf(v1::ErrorReason reason) {
     case v1::ERROR_REASON_INVALID_PARAMETERS:
     case v1::ERROR_REASON_INVALID_CHUNK_SHAPE:
     case v1::ERROR_REASON_INVALID_POINTS:
+    case v1::ERROR_REASON_INVALID_SEGMENTS:
     case v1::ERROR_REASON_MALFORMED_REQUEST:
     case v1::ERROR_REASON_REQUEST_ID_REUSED:
     case v1::ERROR_REASON_INVALID_REQUEST:
@@ -125,6 +126,12 @@ grpc::Status FromCoreStatus(const absl::Status& status) {
     case absl::StatusCode::kOk:
       return grpc::Status::OK;
     case absl::StatusCode::kInvalidArgument:
+      for (const auto& [what, field] :
+           {std::pair("segments", "segments.ends"), {"seeds[", "faces.seeds"}, {"faces:", "faces.faces"}}) {
+        if (message.rfind(what, 0) == 0) {
+          return MakeError(v1::ERROR_REASON_INVALID_SEGMENTS, message, field);
+        }
+      }
       return MakeError(v1::ERROR_REASON_INVALID_POINTS, message, "points.coordinates");
     case absl::StatusCode::kResourceExhausted:
       if (const absl::optional<absl::Cord> payload = status.GetPayload(kMemoryLimitPayload); payload.has_value()) {

@@ -40,6 +40,9 @@ PlanarDomain::PlanarDomain(PlanarGraph graph, PlanarFaces faces)
     for (size_t i = 0; i < ways.size() && ways.size() > 1; ++i) {
       const HalfEdge h = ways[i];
       const HalfEdge next = ways[(i + 1) % ways.size()];
+      const Point<2> d = DirectionOf(h);
+      const Point<2> e = DirectionOf(next);
+      min_angle_ = std::min(min_angle_, std::atan2(std::abs(d[0] * e[1] - d[1] * e[0]), Dot<2>(d, e)));
       const double cosine =
           Dot<2>(DirectionOf(h), DirectionOf(next)) / lengths_[SegmentOf(h)] / lengths_[SegmentOf(next)];
       if (cosine > 0.5 * (1 + 1e-12)) {

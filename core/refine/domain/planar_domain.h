@@ -3,6 +3,7 @@
 #define WELLSPACE_CORE_REFINE_DOMAIN_PLANAR_DOMAIN_H_
 
 #include <cstdint>
+#include <numbers>
 #include <span>
 #include <utility>
 #include <vector>
@@ -94,6 +95,8 @@ class PlanarDomain {
 
   // Whether two ways that lead from the first end of `h` make an angle of less than 60 degrees, of which h is one.
   bool IsAcute(HalfEdge h) const { return is_acute_[h]; }
+  // The smallest angle between two segments with a common end. Unit: radians; pi where there are no two.
+  double MinAngle() const { return min_angle_; }
   // How many vertices have been inserted on a segment.
   uint32_t SplitsOf(uint32_t segment) const { return splits_[segment]; }
 
@@ -121,7 +124,8 @@ class PlanarDomain {
   PlanarGraph graph_;
   PlanarFaces faces_;
   std::vector<double> lengths_;
-  std::vector<HalfEdge> ways_;    // 2 of each segment: those from a vertex on it, toward b and a
+  std::vector<HalfEdge> ways_;  // 2 of each segment: those from a vertex on it, toward b and a
+  double min_angle_ = std::numbers::pi;
   std::vector<bool> is_acute_;    // by half-edge
   std::vector<uint32_t> splits_;  // by segment
   HugeVector<InsertedPlace> places_;

@@ -54,6 +54,7 @@ class CloudCall : public RequestStream<Call<Reactor>> {
   const std::shared_ptr<Job>& job() const { return job_; }
   // Constant once there is a job.
   const core::MeshParameters& parameters() const { return receiver_.parameters(); }
+  const ReceivedFeatures& features() const { return receiver_.features(); }
 
  private:
   void SubmitJob();
@@ -80,7 +81,7 @@ void CloudCall<Reactor, Request>::OnBegin() {
 
 template <typename Reactor, typename Request>
 grpc::Status CloudCall<Reactor, Request>::ReserveForNext() {
-  const uint64_t bytes = receiver_.point_bytes() + kMessageBytes;
+  const uint64_t bytes = receiver_.held_bytes() + kMessageBytes;
   return received_.Resize(bytes)
              ? grpc::Status::OK
              : FromCoreStatus(this->environment().memory.Refusal(bytes, "the next part of the cloud"));
@@ -113,7 +114,7 @@ void CloudCall<Reactor, Request>::SubmitJob() {
     this->End(std::move(status));
     return;
   }
-  (void)received_.Resize(receiver_.point_bytes());  // no more than it was
+  (void)received_.Resize(receiver_.held_bytes());  // no more than it was
   // std::function wants to be copied, points do not.
   auto points = std::make_shared<PointChunks>(receiver_.TakePoints());
   JobPool::Submission submission = this->environment().jobs.Submit(

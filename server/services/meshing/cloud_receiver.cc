@@ -41,11 +41,15 @@ grpc::Status CloudReceiver::Accept(Request* request) {
       return AcceptParameters(request->parameters());
     case Request::kPoints:
       return AcceptPoints(request->mutable_points());
+    case Request::kSegments:
+      return AcceptFeatures(request->segments(), "segments");
+    case Request::kFaces:
+      return AcceptFeatures(request->faces(), "faces");
     case Request::REQUEST_NOT_SET:
       break;
   }
-  return MakeError(v1::ERROR_REASON_EMPTY_REQUEST, "a request has neither parameters nor points; set one of them",
-                   "request");
+  return MakeError(v1::ERROR_REASON_EMPTY_REQUEST,
+                   "a request has neither parameters, points, segments nor faces; set one of them", "request");
 }
 
 template grpc::Status CloudReceiver::Accept(v1::MeshPointsRequest*);
@@ -67,6 +71,20 @@ grpc::Status CloudReceiver::AcceptParameters(const v1::MeshParameters& message) 
   grpc::Status status = ParametersFromProto(message, options_, &parameters_);
   has_parameters_ = status.ok();
   return status;
+}
+
+template <typename Part>
+grpc::Status CloudReceiver::AcceptFeatures(const Part& part, const char* field) {
+  if (!has_parameters_) {
+    return MakeError(v1::ERROR_REASON_PARAMETERS_MISSING,
+                     absl::StrCat(field, " came before the parameters; send the parameters first"), "parameters");
+  }
+  if (parameters_.dimension != 2) {
+    return MakeError(
+        v1::ERROR_REASON_INVALID_SEGMENTS,
+        absl::StrCat(field, " bound domains in 2-D alone, and parameters.dimension is ", parameters_.dimension), field);
+  }
+  return features_.Accept(part);
 }
 
 grpc::Status CloudReceiver::AcceptPoints(v1::PointChunk* chunk) {

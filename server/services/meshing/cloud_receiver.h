@@ -1,4 +1,4 @@
-// What a client sends in one call of MeshPoints or EstimateMesh: parameters, then points.
+// What a client sends in one call of MeshPoints or EstimateMesh: parameters, then points, segments and faces.
 #ifndef WELLSPACE_SERVER_SERVICES_MESHING_CLOUD_RECEIVER_H_
 #define WELLSPACE_SERVER_SERVICES_MESHING_CLOUD_RECEIVER_H_
 
@@ -11,6 +11,7 @@
 #include "google/protobuf/repeated_field.h"
 #include "grpcpp/support/status.h"
 #include "server/base/options.h"
+#include "server/services/meshing/received_features.h"
 #include "wellspace/v1/meshing.pb.h"
 
 namespace wellspace::server {
@@ -43,12 +44,12 @@ class PointChunks {
 class CloudReceiver {
  public:
   // REQUIRES:   `options` outlives this.
-  explicit CloudReceiver(const ServiceOptions& options) : options_(options) {}
+  explicit CloudReceiver(const ServiceOptions& options) : options_(options), features_(options.max_points) {}
 
   // Takes over the contents of the next request.
   //
   // Errors:     EMPTY_REQUEST, PARAMETERS_MISSING, PARAMETERS_REPEATED, INVALID_PARAMETERS, INVALID_CHUNK_SHAPE,
-  //             TOO_MANY_POINTS; the call is to be ended.
+  //             TOO_MANY_POINTS, INVALID_SEGMENTS; the call is to be ended.
   template <typename Request>
   grpc::Status Accept(Request* request);
 
@@ -60,8 +61,10 @@ class CloudReceiver {
   bool has_parameters() const { return has_parameters_; }
   const core::MeshParameters& parameters() const { return parameters_; }
   uint64_t point_count() const { return point_count_; }
-  // Of the points that it holds.
-  uint64_t point_bytes() const { return points_.coordinate_count() * sizeof(double); }
+  // Of what it holds.
+  uint64_t held_bytes() const { return points_.coordinate_count() * sizeof(double) + features_.bytes(); }
+  // Constant once the client has ended its stream.
+  const ReceivedFeatures& features() const { return features_; }
 
   // Hands over the points.
   PointChunks TakePoints() { return std::exchange(points_, PointChunks()); }
@@ -69,12 +72,15 @@ class CloudReceiver {
  private:
   grpc::Status AcceptParameters(const v1::MeshParameters& message);
   grpc::Status AcceptPoints(v1::PointChunk* chunk);
+  template <typename Part>
+  grpc::Status AcceptFeatures(const Part& part, const char* field);
 
   const ServiceOptions& options_;
   bool has_parameters_ = false;
   core::MeshParameters parameters_;
   uint64_t point_count_ = 0;
   PointChunks points_;
+  ReceivedFeatures features_;
 };
 
 }  // namespace wellspace::server

@@ -14,7 +14,9 @@ void EstimateMeshCall::Work(PointChunks& points, Job& job) {
   core::MeshEstimate estimate{};
   grpc::Status status = RunGuarded([&] {
     const std::vector<double> coordinates = points.Flatten(job.context());
-    const absl::StatusOr<core::MeshEstimate> made = environment().estimator(parameters(), coordinates, job.context());
+    const absl::StatusOr<core::MeshEstimate> made =
+        features().IsEmpty() ? environment().estimator(parameters(), coordinates, job.context())
+                             : core::EstimateFeatures(parameters(), coordinates, features().View(), job.context());
     if (made.ok()) {
       estimate = *made;
     }

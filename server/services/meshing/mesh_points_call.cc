@@ -15,7 +15,9 @@ void MeshPointsCall::Work(PointChunks& points, Job& job) {
   std::shared_ptr<MeshChunks> mesh;
   grpc::Status status = RunGuarded([&] {
     const std::vector<double> coordinates = points.Flatten(job.context());
-    absl::StatusOr<core::Mesh> made = environment().mesher(parameters(), coordinates, job.context());
+    absl::StatusOr<core::Mesh> made =
+        features().IsEmpty() ? environment().mesher(parameters(), coordinates, job.context())
+                             : core::MeshFeatures(parameters(), coordinates, features().View(), job.context());
     if (!made.ok()) {
       return FromCoreStatus(made.status());
     }
