@@ -42,7 +42,7 @@ constexpr uint64_t kLeastPredicted = D == 2 ? 50'000 : (D == 3 ? 20'000 : 2'000)
 template <int D>
 constexpr uint64_t kTreeBytes =
     2 * sizeof(Point<D>) + sizeof(uint64_t) * D + 24 +
-    LeafTree<D>::Buckets::BytesFor(LeafTree<D>::kLeafCapacity / LeafTree<D>::kChildren) * LeafTree<D>::kChildren
+    LeafTree<D>::VertexPool::BytesFor(LeafTree<D>::kLeafCapacity / LeafTree<D>::kChildren) * LeafTree<D>::kChildren
         / LeafTree<D>::kLeafCapacity;
 constexpr uint64_t kFixedBytes = uint64_t{4} << 20;
 

@@ -195,7 +195,8 @@ absl::StatusOr<VertexId> PointAdder<D>::Find(const Point<D>& p, size_t index, Ve
   return kNoVertex;
 }
 
-// Adds a vertex at `p`, which is input `index` of `points`.
+// Adds a vertex at `p`, which is input `index` of `points`. No neighbour is notified here: the next Refine does
+// that when it first looks at the cell of the vertex, as with every vertex that is inserted (PendingVertices::Notify).
 template <int D>
 VertexId PointAdder<D>::Add(VertexId near, const Point<D>& p, std::span<const double> points, size_t index) {
   const VertexId v = structure_.AddVertex(near, p);

@@ -30,7 +30,7 @@ struct Progress {
   double fraction = 0;              // of the whole run, in [0, 1], never decreasing
 };
 
-// Whoever lends runs their memory. Both calls count what a run holds in all, its input excepted.
+// Lends runs their memory. Both calls count what a run holds in all, its input excepted.
 //
 // Thread safety: thread-safe.
 class MemoryLender {

@@ -62,7 +62,7 @@ uint32_t BitsOfItems(size_t left) {
 template <int D, size_t kWidth>
 WELLSPACE_INLINE void PickThose(std::span<const Point<D>> positions, const Point<D>& site, double limit_sq,
                                 Candidates<D>& out) {
-  static_assert(LeafTree<D>::Buckets::kTogether % kWidth == 0);
+  static_assert(LeafTree<D>::VertexPool::kTogether % kWidth == 0);
   using Lanes = typename Wide<kWidth>::Lanes;
   using Mask = typename Wide<kWidth>::Mask;
   Mask slot{};

@@ -25,7 +25,7 @@ size_t GatheredVertices<D>::Gather(const LeafTree<D>& tree, std::span<const Poin
   Clear();
   const auto point = [&](VertexId v) -> const Point<D>& { return points[Index(v)]; };
   const NodeId first = tree.leaf_of(sites[0]);
-  const size_t in_two = size_t{tree.BucketOf(first)->count} << D;
+  const size_t in_two = size_t{tree.VerticesIn(first)->count} << D;
   const double longest = tree.SideOf(first) * (in_two <= kMostInTwo ? 2 : 1);
   Box<D> box{point(sites[0]), point(sites[0])};
   NodeId leaf = kNoNode;
@@ -43,7 +43,7 @@ size_t GatheredVertices<D>::Gather(const LeafTree<D>& tree, std::span<const Poin
     if (tree.leaf_of(v) != leaf) {
       leaf = tree.leaf_of(v);
       volume += std::pow(tree.SideOf(leaf), D);
-      vertices += tree.BucketOf(leaf)->count;
+      vertices += tree.VerticesIn(leaf)->count;
     }
   }
   if (taken < kFewestSites) {
@@ -59,8 +59,8 @@ size_t GatheredVertices<D>::Gather(const LeafTree<D>& tree, std::span<const Poin
   };
   meet(first);
   for (size_t i = 0; i < leaves_.size(); ++i) {
-    const auto* bucket = tree.BucketOf(leaves_[i]);
-    if (bucket != nullptr && !Add({bucket->positions, bucket->count}, bucket->ids)) {
+    const auto* inside = tree.VerticesIn(leaves_[i]);
+    if (inside != nullptr && !Add({inside->positions, inside->count}, inside->ids)) {
       Clear();
       return taken;
     }

@@ -118,7 +118,7 @@ WELLSPACE_INLINE void VectorsTo(const Point<3>* positions, const Point<3>& site,
       [positions](size_t i) __attribute__((always_inline))->const Point<3>& { return positions[i]; }, site, scale, w);
 }
 
-// Vertices that lie side by side. May be read as those of a leaf may (Buckets::kReadTogether).
+// Vertices that lie side by side. May be read as those of a leaf may (VertexPool::kReadTogether).
 template <int D>
 struct VerticesTogether {
   std::span<const Point<D>> positions;

@@ -43,15 +43,15 @@ void Polytope<D>::Reset(const Point<D>& site, const Box<D>& bounds, const std::a
   MakeRoomForNodes(1 << D);
   columns_.Resize(1 << D);
   for (int corner = 0; corner < (1 << D); ++corner) {
-    Joint& joint = joints_[corner];
+    NodeTopology& topology = topologies_[corner];
     Point<D> x;
     for (int axis = 0; axis < D; ++axis) {
       const int face = FaceIndex(axis, ((corner >> axis) & 1) != 0);
       x[axis] = planes_[face].offset;
-      joint.planes[axis] = static_cast<uint16_t>(face);
+      topology.planes[axis] = static_cast<uint16_t>(face);
       opposite_[EndAt(corner, axis)] = EndAt(corner ^ (1 << axis), axis);
     }
-    joint.is_placed = true;
+    topology.is_placed = true;
     columns_.Set(corner, x, 16 * kUnit * std::sqrt(NormSq<D>(x)));
   }
   is_placed_ = false;
@@ -61,9 +61,9 @@ void Polytope<D>::Reset(const Point<D>& site, const Box<D>& bounds, const std::a
 
 template <int D>
 WELLSPACE_INLINE void Polytope<D>::MakeRoomForNodes(size_t count) {
-  if (joints_.size() < count) {
-    joints_.resize(2 * count);
-    opposite_.resize(EndAt(joints_.size(), 0));
+  if (topologies_.size() < count) {
+    topologies_.resize(2 * count);
+    opposite_.resize(EndAt(topologies_.size(), 0));
   }
 }
 
@@ -153,7 +153,7 @@ void Polytope<D>::Tighten() {
 
 // Whether the bisector of the site and `generator` cuts off a node, exactly.
 template <int D>
-bool Polytope<D>::IsCutOff(const Joint& node, const Point<D>& generator) {
+bool Polytope<D>::IsCutOff(const NodeTopology& node, const Point<D>& generator) {
   std::array<PlaneSource<D>, D> sources;
   for (int k = 0; k < D; ++k) {
     sources[k] = planes_[node.planes[k]].source;
@@ -171,7 +171,7 @@ WELLSPACE_INLINE bool Polytope<D>::DecideDoubtful(const Point<D>& generator) {
   uint64_t any = 0;
   for (auto& found : columns_.found()) {
     for (uint64_t doubtful = found.maybe & ~found.surely; doubtful != 0; doubtful &= doubtful - 1) {
-      if (IsCutOff(joints_[first + std::countr_zero(doubtful)], generator)) {
+      if (IsCutOff(topologies_[first + std::countr_zero(doubtful)], generator)) {
         found.surely |= doubtful & -doubtful;
       }
     }
@@ -300,13 +300,13 @@ WELLSPACE_INLINE void Polytope<D>::PlaceCutEdges(uint16_t plane) {
 // The planes of a new node: those that the edge at an end runs along, then the new one.
 template <int D>
 WELLSPACE_INLINE std::array<uint16_t, D> Polytope<D>::PlanesOn(End kept, uint16_t plane) const {
-  const Joint& joint = joints_[NodeOf(kept)];
+  const NodeTopology& topology = topologies_[NodeOf(kept)];
   const size_t slot = SlotOf(kept);
   std::array<uint16_t, D> planes;
   for (size_t i = 0; i < D - 1; ++i) {
     const size_t is_beyond =
         (slot - 1 - i) >> (std::numeric_limits<size_t>::digits - 1);  // i >= slot, without a branch
-    planes[i] = joint.planes[i + is_beyond];
+    planes[i] = topology.planes[i + is_beyond];
   }
   planes[D - 1] = plane;
   return planes;
@@ -327,9 +327,9 @@ WELLSPACE_INLINE void Polytope<D>::MakeNewNodes(uint16_t plane) {
     // No branch, since it could not be predicted.
     const size_t added = old + j - removed_count_;
     const size_t index = added ^ ((added ^ removed_[j]) & -static_cast<size_t>(j < removed_count_));
-    Joint& joint = joints_[index];
-    joint.planes = PlanesOn(kept, plane);
-    joint.is_placed = false;
+    NodeTopology& topology = topologies_[index];
+    topology.planes = PlanesOn(kept, plane);
+    topology.is_placed = false;
     Join(EndAt(index, D - 1), kept);
     columns_.Set(index, placed_[j]);
     new_[j] = static_cast<Index>(index);
@@ -345,7 +345,7 @@ void Polytope<D>::FillHoles(size_t filled) {
     const Index hole = removed_[i];
     const size_t last = --count;
     if (hole != last) {
-      joints_[hole] = joints_[last];
+      topologies_[hole] = topologies_[last];
       columns_.Set(hole, columns_.rows()[last]);
       for (uint32_t k = 0; k < D; ++k) {
         Join(EndAt(hole, k), opposite_[EndAt(last, k)]);
@@ -379,8 +379,8 @@ void Polytope<D>::PlaceThose(Wants wants) {
   is_placed_ = true;
   nodes_.resize(columns_.count());
   for (size_t i = 0; i < nodes_.size(); ++i) {
-    const Joint& joint = joints_[i];
-    if (!joint.is_placed) {
+    const NodeTopology& topology = topologies_[i];
+    if (!topology.is_placed) {
       if (wants(i)) {
         PlaceNode(i);
       } else {
@@ -392,7 +392,7 @@ void Polytope<D>::PlaceThose(Wants wants) {
     node.slack = columns_.slack(i);
     node.radius_sq = NormSq<D>(node.x);
     node.reach = std::sqrt(node.radius_sq) + node.slack;
-    node.planes = joint.planes;
+    node.planes = topology.planes;
     for (int k = 0; k < D; ++k) {
       node.neighbours[k] = static_cast<Index>(NodeOf(opposite_[EndAt(i, k)]));
     }
@@ -403,18 +403,18 @@ void Polytope<D>::PlaceThose(Wants wants) {
 // Places a node by its planes, in their order.
 template <int D>
 void Polytope<D>::PlaceNode(size_t node) {
-  Joint& joint = joints_[node];
-  joint.is_placed = true;
-  const std::array<uint16_t, D> planes = joint.planes;
+  NodeTopology& topology = topologies_[node];
+  topology.is_placed = true;
+  const std::array<uint16_t, D> planes = topology.planes;
   std::array<End, D> ends;
   std::copy_n(&opposite_[EndAt(node, 0)], D, ends.begin());
   const std::array<uint32_t, D> ranks = RanksOf(planes);
   for (int k = 0; k < D; ++k) {
-    joint.planes[ranks[k]] = planes[k];
+    topology.planes[ranks[k]] = planes[k];
     Join(EndAt(node, ranks[k]), ends[k]);
   }
   Point<D> x;
-  const double slack = PlaceByPlanes(joint.planes, x);
+  const double slack = PlaceByPlanes(topology.planes, x);
   columns_.Set(node, x, slack);
 }
 
@@ -454,7 +454,7 @@ WELLSPACE_INLINE void Polytope<D>::LinkNewNodes() {
     for (uint32_t slot = 0; slot < D - 1; ++slot) {
       std::array<uint16_t, D - 2> along;
       for (uint32_t k = 0; k < D - 2; ++k) {
-        along[k] = joints_[new_[j]].planes[k + (k >= slot ? 1 : 0)];
+        along[k] = topologies_[new_[j]].planes[k + (k >= slot ? 1 : 0)];
       }
       std::sort(along.begin(), along.end());
       Ridge ridge{0, EndAt(new_[j], slot)};
@@ -505,7 +505,7 @@ WELLSPACE_INLINE bool Polytope<D>::SurelyKeeps(size_t node, double ratio) const 
   // No branch, since it could not be predicted.
   double nearest = std::numeric_limits<double>::infinity();
   bool is_on_wall = false;
-  for (const uint16_t index : joints_[node].planes) {
+  for (const uint16_t index : topologies_[node].planes) {
     const Plane<D>& plane = planes_[index];
     is_on_wall |= plane.kind != PlaneKind::kBisector;
     nearest = std::min(nearest, plane.length);
@@ -523,7 +523,7 @@ void Polytope<D>::FindStar(Star<D>& out) const {
     std::array<VertexId, D>& simplex = out[count];
     uint32_t is_simplex = 1;
     for (int k = 0; k < D; ++k) {
-      const Plane<D>& plane = planes_[joints_[i].planes[k]];
+      const Plane<D>& plane = planes_[topologies_[i].planes[k]];
       simplex[k] = plane.vertex;
       is_simplex &= plane.kind == PlaneKind::kBisector ? 1 : 0;
     }

@@ -62,7 +62,7 @@ class Polytope {
   // `site`, may be among them. Returns how many others are within reach.
   //
   // REQUIRES:   positions and listed names may be read so many together, beyond the last perhaps, as those of a leaf
-  //             (Buckets::kReadTogether).
+  //             (VertexPool::kReadTogether).
   // Complexity: O(positions nodes), and the cuts; no allocation once warm.
   // Errors:     none.
   size_t CutByEach(std::span<const Point<D>> positions, const VertexNames& names, VertexId site);
@@ -142,7 +142,7 @@ class Polytope {
   // What the cell takes in memory, roughly, but for itself.
   uint64_t MemoryBytes() const {
     return planes_.capacity() * sizeof(Plane<D>) + nodes_.capacity() * sizeof(CellNode<D>) +
-           joints_.capacity() * sizeof(Joint) + opposite_.capacity() * sizeof(End) + columns_.MemoryBytes();
+           topologies_.capacity() * sizeof(NodeTopology) + opposite_.capacity() * sizeof(End) + columns_.MemoryBytes();
   }
 
  private:
@@ -156,7 +156,7 @@ class Polytope {
   static size_t SlotOf(End end) { return end & ((1u << kSlotBits) - 1); }
 
   // What a node is, but for its place and its neighbours: where its planes meet.
-  struct Joint {
+  struct NodeTopology {
     std::array<uint16_t, D> planes;  // by index, as in CellNode once placed
     bool is_placed = false;          // the position is the one that the planes alone give
   };
@@ -179,7 +179,7 @@ class Polytope {
   bool CutOffAvx2(VertexId u, const Point<D>& position, const Point<D>& normal, double length_sq);
   template <size_t kWidth>
   bool CutOffWith(VertexId u, const Point<D>& position, const Point<D>& normal, double length_sq);
-  bool IsCutOff(const Joint& node, const Point<D>& generator);
+  bool IsCutOff(const NodeTopology& node, const Point<D>& generator);
   bool DecideDoubtful(const Point<D>& generator);
   void FindCutEdges();
   template <size_t kWidth>
@@ -206,10 +206,10 @@ class Polytope {
   bool is_placed_ = true;         // all nodes are
   std::vector<Plane<D>> planes_;  // and more
   size_t plane_count_ = 0;
-  NodeColumns<D> columns_;          // by node
-  std::vector<Joint> joints_;       // by node, and more
-  std::vector<End> opposite_;       // by end, and more: the other end of its edge
-  std::vector<CellNode<D>> nodes_;  // by node, as of the last that placed any
+  NodeColumns<D> columns_;                // by node
+  std::vector<NodeTopology> topologies_;  // by node, and more
+  std::vector<End> opposite_;             // by end, and more: the other end of its edge
+  std::vector<CellNode<D>> nodes_;        // by node, as of the last that placed any
   uint64_t cuts_ = 0;
   DecisionCounters counters_;
 

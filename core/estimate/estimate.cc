@@ -483,8 +483,8 @@ absl::StatusOr<Sample> SampleLeaves(const QueryStructure<D>& structure, Integrat
                                     const EstimateEffort& effort, const RunContext& context) {
   std::array<Stratum, 2> strata;
   structure.tree().ForEachLeaf([&](NodeId leaf) {
-    const auto* const bucket = structure.tree().BucketOf(leaf);
-    strata[bucket != nullptr && bucket->count > 0 ? 1 : 0].leaves.push_back(leaf);
+    const auto* const inside = structure.tree().VerticesIn(leaf);
+    strata[inside != nullptr && inside->count > 0 ? 1 : 0].leaves.push_back(leaf);
   });
   const uint64_t full_looks =
       std::max(effort.looks_per_leaf, effort.looks / (strata[0].leaves.size() + strata[1].leaves.size()));
@@ -521,8 +521,8 @@ absl::StatusOr<Sample> SampleLeaves(const QueryStructure<D>& structure, Integrat
       const Share share = integrator.IntegrateLeaf(structure.tree().BoxOf(leaf), full_looks);
       Add(widest->sum, share);
       const double vertices = Sum(integrator.VerticesOf(share.terms)) + share.sizes;
-      const auto* const bucket = structure.tree().BucketOf(leaf);
-      const double at_first = bucket == nullptr ? 0.0 : bucket->count;
+      const auto* const inside = structure.tree().VerticesIn(leaf);
+      const double at_first = inside == nullptr ? 0.0 : inside->count;
       const Leaves become = LeavesOf<D>(at_first + vertices, at_first);
       widest->become.all += become.all;
       widest->become.filled += become.filled;

@@ -62,14 +62,14 @@ double BytesOf(const Leaves& leaves, double vertices, double simplices) {
   const double nodes = leaves.all * kChildren / (kChildren - 1);
   // Beside the nodes, three marks of the queries' scratch space.
   const double node_bytes = LeafTree<D>::NodeBytes() + 3 * sizeof(uint32_t);
-  using Buckets = typename LeafTree<D>::Buckets;
+  using VertexPool = typename LeafTree<D>::VertexPool;
   // Coordinates in the tree, in the structure and in the mesh; number in the tree, leaf, faces, radius, place in the
   // schedule, numbers in the output; where its simplices are listed, how many, and when it was added; in the mesh its
   // origin and its tag.
-  const double vertex_bytes = Buckets::kPlaceBytes + 2 * sizeof(Point<D>) + 32 + 5 * sizeof(uint32_t);
+  const double vertex_bytes = VertexPool::kPlaceBytes + 2 * sizeof(Point<D>) + 32 + 5 * sizeof(uint32_t);
   // Indices in the lists, some of which are no simplices any more, and in the mesh.
   const double simplex_bytes = 1.05 * D * sizeof(VertexId) + (D + 1) * sizeof(uint32_t);
-  const double in_use = nodes * node_bytes + leaves.filled * Buckets::OverheadBytes() + vertices * vertex_bytes +
+  const double in_use = nodes * node_bytes + leaves.filled * VertexPool::OverheadBytes() + vertices * vertex_bytes +
                         simplices * simplex_bytes;
   return kMemoryMargin * (kFixedBytes + in_use + std::min(kLeftFree * in_use, kMostLeftFree));
 }

@@ -28,13 +28,13 @@ HugeVector<int16_t> PendingVertices<D>::FirstBuckets(const MeshCriteria<D>& crit
   team.ForEach(blocks.count(), [&](size_t block) {
     Workspace<D>& workspace = workspaces[ThreadTeam::CurrentThread()];
     std::array<double, LeafTree<D>::kLeafCapacity> nearest_sq;
-    blocks.ForEachBucketOf(block, [&](const typename LeafTree<D>::Bucket& bucket, NodeId leaf) {
+    blocks.ForEachLeafOf(block, [&](const typename LeafTree<D>::LeafVertices& inside, NodeId leaf) {
       if (context.IsCancelled()) {
         return;
       }
-      structure_.NearestOfEach(leaf, workspace, std::span(nearest_sq).first(bucket.count));
-      for (uint32_t i = 0; i < bucket.count; ++i) {
-        const VertexId v = bucket.ids[i];
+      structure_.NearestOfEach(leaf, workspace, std::span(nearest_sq).first(inside.count));
+      for (uint32_t i = 0; i < inside.count; ++i) {
+        const VertexId v = inside.ids[i];
         if (feature_sq) {
           nearest_sq[i] = feature_sq(v, nearest_sq[i], workspace);
         }

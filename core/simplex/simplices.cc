@@ -156,9 +156,9 @@ template <int D, typename Prefetch, typename F>
 void ForEachVertexOf(const LeafBlocks<D>& blocks, size_t block, const RunContext& context, Prefetch prefetch, F f) {
   std::array<VertexId, kVerticesInBlock + LeafTree<D>::kLeafCapacity> vertices;
   size_t count = 0;
-  blocks.ForEachBucketOf(block, [&](const typename LeafTree<D>::Bucket& bucket, NodeId) {
-    std::copy_n(bucket.ids, bucket.count, vertices.begin() + count);
-    count += bucket.count;
+  blocks.ForEachLeafOf(block, [&](const typename LeafTree<D>::LeafVertices& inside, NodeId) {
+    std::copy_n(inside.ids, inside.count, vertices.begin() + count);
+    count += inside.count;
   });
   for (size_t k = 0; k < count && !context.IsCancelled(); ++k) {
     PrefetchAhead(std::span(vertices).first(count), k, prefetch);

@@ -97,7 +97,7 @@ absl::Status SortSimplices(uint32_t vertex_count, HugeVector<uint32_t>& indices,
 
 // Whether the simplex may be the worst of all so far in one of the two measures, by a cheaper computation.
 template <int D>
-class WorstCandidates {
+class WorstSoFar {
  public:
   bool MayBeWorst(const Simplex<D>& corners) {
     if constexpr (D == 3) {
@@ -277,7 +277,7 @@ absl::StatusOr<WeightedSimplices> SliverStage<D>::ToSimplices(const QueryStructu
   const Triangulation<D>& triangulation = pumped.has_value() ? *pumped : *triangulation_;
   Simplices& simplices = out.simplices;
   simplices.indices.reserve(size_t{triangulation.simplex_limit()} * (D + 1));
-  WorstCandidates<D> candidates;
+  WorstSoFar<D> worst;
   for (uint32_t i = 0; i < triangulation.simplex_limit(); ++i) {
     if (i % kCheckInterval == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
@@ -288,7 +288,7 @@ absl::StatusOr<WeightedSimplices> SliverStage<D>::ToSimplices(const QueryStructu
     }
     Emit<D>(triangulation, s, output_index, simplices.indices);
     const Simplex<D> corners = triangulation.Corners(s);
-    if (candidates.MayBeWorst(corners)) {
+    if (worst.MayBeWorst(corners)) {
       simplices.max_radius_edge = std::max(simplices.max_radius_edge, RadiusEdgeRatio<D>(corners));
       simplices.min_angle_deg = std::min(simplices.min_angle_deg, Angles<D>(corners).min_deg);
     }

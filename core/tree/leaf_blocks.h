@@ -21,8 +21,8 @@ class LeafBlocks {
   LeafBlocks(const LeafTree<D>& tree, size_t vertices_in_block) : tree_(tree) {
     size_t in_block = vertices_in_block;
     tree.ForEachLeaf([&](NodeId leaf) {
-      const auto* bucket = tree.BucketOf(leaf);
-      if (bucket == nullptr || bucket->count == 0) {
+      const auto* inside = tree.VerticesIn(leaf);
+      if (inside == nullptr || inside->count == 0) {
         return;
       }
       if (in_block >= vertices_in_block) {
@@ -30,7 +30,7 @@ class LeafBlocks {
         in_block = 0;
       }
       leaves_.push_back(leaf);
-      in_block += bucket->count;
+      in_block += inside->count;
     });
     begin_.push_back(leaves_.size());
   }
@@ -38,11 +38,11 @@ class LeafBlocks {
   size_t count() const { return begin_.size() - 1; }
   uint64_t MemoryBytes() const { return leaves_.size() * sizeof(NodeId) + begin_.size() * sizeof(size_t); }
 
-  // Calls f(const LeafTree<D>::Bucket&, NodeId) for the leaves of a block.
+  // Calls f(const LeafTree<D>::LeafVertices&, NodeId) for the leaves of a block.
   template <typename F>
-  void ForEachBucketOf(size_t block, F f) const {
+  void ForEachLeafOf(size_t block, F f) const {
     for (size_t i = begin_[block]; i < begin_[block + 1]; ++i) {
-      f(*tree_.BucketOf(leaves_[i]), leaves_[i]);
+      f(*tree_.VerticesIn(leaves_[i]), leaves_[i]);
     }
   }
 

@@ -11,7 +11,7 @@
 namespace wellspace::core {
 namespace {
 
-// Nodes whose buckets one thread fills at a time.
+// Leaves that one thread fills at a time.
 constexpr size_t kFilledTogether = 4096;
 
 // The next larger number with the same bits in `fixed`.
@@ -28,18 +28,21 @@ class ColumnsWithPoints {
   // Columns are more than side / 64 wide. Points may lie beyond the cube by half as much.
   explicit ColumnsWithPoints(double side) : scale_(62 / side), before_(side / 128) {}
 
-  // Whether a point within side / 64 may have been added before; `x` and `y` are from the low faces of the cube.
-  bool Add(double x, double y) {
-    const auto row = static_cast<size_t>((x + before_) * scale_) + 1;
-    const auto column = static_cast<size_t>((y + before_) * scale_);
-    const uint64_t own = uint64_t{1} << column;
+  // Notes a point; `x` and `y` are from the low faces of the cube.
+  void Add(double x, double y) { rows_[RowOf(x)] |= BitOf(y); }
+
+  // Whether a point may have been added that is within side / 64 of one there.
+  bool MayHaveNear(double x, double y) const {
+    const size_t row = RowOf(x);
+    const uint64_t own = BitOf(y);
     const uint64_t near = own | own << 1 | own >> 1;
-    const bool may_be_near = ((rows_[row - 1] | rows_[row] | rows_[row + 1]) & near) != 0;
-    rows_[row] |= own;
-    return may_be_near;
+    return ((rows_[row - 1] | rows_[row] | rows_[row + 1]) & near) != 0;
   }
 
  private:
+  size_t RowOf(double x) const { return static_cast<size_t>((x + before_) * scale_) + 1; }
+  uint64_t BitOf(double y) const { return uint64_t{1} << static_cast<size_t>((y + before_) * scale_); }
+
   const double scale_;
   const double before_;
   std::array<uint64_t, 66> rows_{};
@@ -59,7 +62,7 @@ absl::Status LeafTree<D>::Build(const MortonGrid<D>& grid, std::span<const Point
   points_ = points;
   leaf_count_ = 1;
   leaf_of_.assign(points.size(), kNoNode);
-  buckets_ = {};
+  pool_ = {};
   Node root;
   root.low = grid.root_low();
   root.neighbour.fill(kNoNode);
@@ -111,7 +114,7 @@ absl::Status LeafTree<D>::Build(const MortonGrid<D>& grid, std::span<const Point
   return absl::OkStatus();
 }
 
-// Puts the points into the buckets of their leaves.
+// Puts the points into their leaves.
 template <int D>
 absl::Status LeafTree<D>::FillLeaves(int threads, const RunContext& context) {
   const size_t blocks = (node_count() + kFilledTogether - 1) / kFilledTogether;
@@ -126,12 +129,12 @@ absl::Status LeafTree<D>::FillLeaves(int threads, const RunContext& context) {
   for (size_t block = 0; block < blocks; ++block) {
     WELLSPACE_RETURN_IF_ERROR(context.Check());
     WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(MemoryBytes() + points_.size_bytes()));
-    for_each_leaf_with_points(
-        block, [this](NodeId leaf, const Range& range) { At(leaf).bucket = buckets_.Add(range.size()); });
+    for_each_leaf_with_points(block,
+                              [this](NodeId leaf, const Range& range) { At(leaf).vertices = pool_.Add(range.size()); });
   }
   const auto fill = [&](size_t block) {
     for_each_leaf_with_points(block, [this](NodeId leaf, const Range& range) {
-      buckets_.Fill(At(leaf).bucket, points_.subspan(range.begin, range.size()), range.begin);
+      pool_.Fill(At(leaf).vertices, points_.subspan(range.begin, range.size()), range.begin);
       std::fill(leaf_of_.begin() + range.begin, leaf_of_.begin() + range.end, leaf);
     });
     return context.Check();
@@ -142,7 +145,7 @@ absl::Status LeafTree<D>::FillLeaves(int threads, const RunContext& context) {
 template <int D>
 NodeId LeafTree<D>::LeafWithRoom(VertexId near, const Point<D>& p) {
   NodeId leaf = LeafHolding(near, p);
-  while (At(leaf).bucket != kNoBucket && buckets_[At(leaf).bucket].count == kLeafCapacity && CanSplit(leaf)) {
+  while (At(leaf).vertices != kNoVertices && pool_[At(leaf).vertices].count == kLeafCapacity && CanSplit(leaf)) {
     Split(leaf);
     leaf = Child(At(leaf), ChildHolding(At(leaf), p));
   }
@@ -158,25 +161,25 @@ void LeafTree<D>::Insert(VertexId near, VertexId v, const Point<D>& p) {
 
 template <int D>
 void LeafTree<D>::Move(VertexId v, const Point<D>& p) {
-  Bucket& bucket = buckets_[At(leaf_of(v)).bucket];
-  const auto slot = static_cast<size_t>(std::find(bucket.ids, bucket.ids + bucket.count, v) - bucket.ids);
+  LeafVertices& inside = pool_[At(leaf_of(v)).vertices];
+  const auto slot = static_cast<size_t>(std::find(inside.ids, inside.ids + inside.count, v) - inside.ids);
   if (LeafHolding(v, p) == leaf_of(v)) {
-    bucket.positions[slot] = p;
+    inside.positions[slot] = p;
     return;
   }
-  --bucket.count;
-  bucket.ids[slot] = bucket.ids[bucket.count];
-  bucket.positions[slot] = bucket.positions[bucket.count];
+  --inside.count;
+  inside.ids[slot] = inside.ids[inside.count];
+  inside.positions[slot] = inside.positions[inside.count];
   Append(LeafWithRoom(v, p), v, p);
 }
 
 template <int D>
 void LeafTree<D>::Append(NodeId leaf, VertexId v, const Point<D>& p) {
   Node& node = At(leaf);
-  if (node.bucket == kNoBucket) {
-    node.bucket = buckets_.Add(1);
+  if (node.vertices == kNoVertices) {
+    node.vertices = pool_.Add(1);
   }
-  buckets_.Append(node.bucket, v, p);
+  pool_.Append(node.vertices, v, p);
   leaf_of_[Index(v)] = leaf;
 }
 
@@ -252,7 +255,7 @@ void LeafTree<D>::Split(NodeId leaf) {
   if (!pending_.empty()) {
     DistributeRange(leaf);
   } else {
-    DistributeBucket(leaf);
+    DistributeVertices(leaf);
   }
 }
 
@@ -355,14 +358,14 @@ uint32_t LeafTree<D>::FirstFrom(uint32_t begin, uint32_t end, int axis, double x
 }
 
 template <int D>
-void LeafTree<D>::DistributeBucket(NodeId parent) {
-  const uint32_t old = At(parent).bucket;
-  if (old == kNoBucket) {
+void LeafTree<D>::DistributeVertices(NodeId parent) {
+  const uint32_t old = At(parent).vertices;
+  if (old == kNoVertices) {
     return;
   }
-  At(parent).bucket = kNoBucket;
-  buckets_.Dissolve(
-      old, [&](VertexId v, const Point<D>& p) { Append(Child(At(parent), ChildHolding(At(parent), p)), v, p); });
+  At(parent).vertices = kNoVertices;
+  pool_.Dissolve(old,
+                 [&](VertexId v, const Point<D>& p) { Append(Child(At(parent), ChildHolding(At(parent), p)), v, p); });
 }
 
 // Whether lfs somewhere on the leaf is below side / kCoarseness, up to a factor of two; see HasNearFeatures.
@@ -533,7 +536,10 @@ bool LeafTree<D>::HasNearFeatures(std::span<const Point<D>> points, const Box<D>
         }
       }
     }
-    if (!columns.Add(a[0] - cube.low[0], a[1] - cube.low[1])) {
+    const double from_low[] = {a[0] - cube.low[0], a[1] - cube.low[1]};
+    const bool may_be_near = columns.MayHaveNear(from_low[0], from_low[1]);
+    columns.Add(from_low[0], from_low[1]);
+    if (!may_be_near) {
       continue;
     }
     for (size_t j = 0; j < i; ++j) {

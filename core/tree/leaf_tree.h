@@ -1,4 +1,5 @@
-// The balanced 2^D-tree whose leaves hold the vertices: where a vertex lies, and what lies around it.
+// The balanced orthtree (2^D-tree: quadtree, octree, …) whose leaves hold the vertices: where a vertex lies, and what
+// lies around it.
 #ifndef WELLSPACE_CORE_TREE_LEAF_TREE_H_
 #define WELLSPACE_CORE_TREE_LEAF_TREE_H_
 
@@ -17,9 +18,9 @@
 #include "core/base/run_context.h"
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
+#include "core/tree/leaf_vertices.h"
 #include "core/tree/morton.h"
 #include "core/tree/segment_lists.h"
-#include "core/tree/vertex_buckets.h"
 
 namespace wellspace::core {
 
@@ -51,9 +52,9 @@ class LeafTree {
   // near it.
   static constexpr double kCoarseness = D <= 4 ? 128 : 1024;
 
-  using Buckets = VertexBuckets<D, kLeafCapacity>;
+  using VertexPool = LeafVertexPool<D, kLeafCapacity>;
   // The vertices of one leaf, side by side.
-  using Bucket = typename Buckets::Bucket;
+  using LeafVertices = typename VertexPool::LeafVertices;
 
   // Builds the tree over the box of `grid` for `points`, sorted in the grid's Morton order and distinct as cubes of it;
   // vertex i is points[i].
@@ -114,7 +115,7 @@ class LeafTree {
   static constexpr size_t NodeBytes() { return sizeof(Node); }
   // What the tree takes in memory.
   uint64_t MemoryBytes() const {
-    return nodes_.size() * sizeof(Node) + buckets_.MemoryBytes() + ranges_.size() * sizeof(Range) +
+    return nodes_.size() * sizeof(Node) + pool_.MemoryBytes() + ranges_.size() * sizeof(Range) +
            leaf_of_.size() * sizeof(NodeId) + around_.size() * sizeof(Around) + segments_.MemoryBytes();
   }
   // Whether `node` is a leaf that covers a part of the box.
@@ -136,9 +137,9 @@ class LeafTree {
   }
 
   // The vertices in a leaf, or null for none.
-  const Bucket* BucketOf(NodeId leaf) const {
-    const uint32_t bucket = At(leaf).bucket;
-    return bucket == kNoBucket ? nullptr : &buckets_[bucket];
+  const LeafVertices* VerticesIn(NodeId leaf) const {
+    const uint32_t number = At(leaf).vertices;
+    return number == kNoVertices ? nullptr : &pool_[number];
   }
 
   // Calls f(NodeId) for every leaf, along the Z curve.
@@ -176,14 +177,14 @@ class LeafTree {
   }
 
  private:
-  static constexpr uint32_t kNoBucket = ~uint32_t{0};
+  static constexpr uint32_t kNoVertices = ~uint32_t{0};
 
   // In 3-D one line of a cache.
   struct alignas(D == 3 ? 64 : alignof(double)) Node {
     Point<D> low;
     std::array<NodeId, kFaces> neighbour;
     NodeId first_child = kNoNode;
-    uint32_t bucket = kNoBucket;
+    uint32_t vertices = kNoVertices;  // a number in the pool
     uint8_t level = 0;
     bool outside = false;  // no part of the box in its interior
   };
@@ -249,7 +250,7 @@ class LeafTree {
   void LinkChildren(NodeId parent);
   void DistributeRange(NodeId parent);
   uint32_t FirstFrom(uint32_t begin, uint32_t end, int axis, double x) const;
-  void DistributeBucket(NodeId parent);
+  void DistributeVertices(NodeId parent);
   void Append(NodeId leaf, VertexId v, const Point<D>& p);
   NodeId LeafWithRoom(VertexId near, const Point<D>& p);
 
@@ -271,7 +272,7 @@ class LeafTree {
   std::vector<double> sides_;  // of nodes, by level
   uint64_t leaf_count_ = 0;
   HugeVector<Node> nodes_;
-  Buckets buckets_;
+  VertexPool pool_;
   HugeVector<NodeId> leaf_of_;
   SegmentLists segments_;  // none unless D is 2
 

@@ -39,7 +39,7 @@ class ExtraVertices {
   }
 
   VertexId Append(const Point<D>& position) {
-    const size_t needed = positions_.size() + LeafTree<D>::Buckets::kReadTogether;
+    const size_t needed = positions_.size() + LeafTree<D>::VertexPool::kReadTogether;
     if (positions_.capacity() < needed) {
       positions_.reserve(2 * needed);
     }
@@ -53,7 +53,7 @@ class ExtraVertices {
 
   // Calls f(std::span<const Point<D>>, VertexId) for runs of vertices and the first of each, in order: with all that
   // are no farther from `p`, by the square. No run is longer than what a leaf holds, and all may be read as vertices of
-  // one may (Buckets::kReadTogether).
+  // one may (VertexPool::kReadTogether).
   //
   // Complexity: O(size / kTogether), and the runs.
   template <typename F>

@@ -19,23 +19,23 @@ template <int D>
 void Prefetch(const LeafTree<D>& tree, NodeId leaf) {
   constexpr size_t kLine = 64;
   constexpr size_t kLines = 4;
-  if (const auto* bucket = tree.BucketOf(leaf); bucket != nullptr) {
-    const char* const positions = reinterpret_cast<const char*>(bucket->positions);
+  if (const auto* inside = tree.VerticesIn(leaf); inside != nullptr) {
+    const char* const positions = reinterpret_cast<const char*>(inside->positions);
     for (size_t line = 0; line < kLines; ++line) {
       PrefetchLine(positions + line * kLine);
     }
-    PrefetchLine(bucket->ids);
+    PrefetchLine(inside->ids);
   }
 }
 
 // Looks in a leaf for a vertex other than `but` that is nearer to `p`.
 template <int D>
 void LookInto(const LeafTree<D>& tree, NodeId leaf, const Point<D>& p, VertexId but, Neighbor& nearest) {
-  const auto* bucket = tree.BucketOf(leaf);
-  for (uint32_t i = 0; bucket != nullptr && i < bucket->count; ++i) {
-    const double distance_sq = DistanceSq<D>(bucket->positions[i], p);
-    if (distance_sq < nearest.distance_sq && bucket->ids[i] != but) {
-      nearest = {bucket->ids[i], distance_sq};
+  const auto* inside = tree.VerticesIn(leaf);
+  for (uint32_t i = 0; inside != nullptr && i < inside->count; ++i) {
+    const double distance_sq = DistanceSq<D>(inside->positions[i], p);
+    if (distance_sq < nearest.distance_sq && inside->ids[i] != but) {
+      nearest = {inside->ids[i], distance_sq};
     }
   }
 }
@@ -327,12 +327,12 @@ Neighbor QueryStructure<D>::NearestTo(const Point<D>& p, VertexId near, Workspac
 
 template <int D>
 void QueryStructure<D>::NearestOfEach(NodeId leaf, Workspace<D>& workspace, std::span<double> nearest_sq) const {
-  const auto* bucket = tree_.BucketOf(leaf);
-  NearestAmong<D>({bucket->positions, bucket->count}, workspace.unit, nearest_sq);
+  const auto* inside = tree_.VerticesIn(leaf);
+  NearestAmong<D>({inside->positions, inside->count}, workspace.unit, nearest_sq);
   const Box<D> cube = tree_.BoxOf(leaf);
   const double half = 0.5 * tree_.SideOf(leaf);
-  for (uint32_t i = 0; i < bucket->count; ++i) {
-    const Point<D>& p = bucket->positions[i];
+  for (uint32_t i = 0; i < inside->count; ++i) {
+    const Point<D>& p = inside->positions[i];
     Neighbor nearest{kNoVertex, nearest_sq[i]};
     uint32_t facets = 0;  // those within that distance, and the depth of p below the last of them
     double depth = 0;
@@ -518,11 +518,11 @@ template <int D>
 void QueryStructure<D>::ScanBeyondGathered(VertexId v, Workspace<D>& workspace) const {
   Polytope<D>& cell = workspace.cell;
   ScanFor(LeafOf(v), workspace, [&](NodeId leaf) {
-    const auto* bucket = tree_.BucketOf(leaf);
-    for (uint32_t i = 0; bucket != nullptr && i < bucket->count && !cell.IsTooLarge(); ++i) {
-      if (!workspace.gathered.Holds(bucket->positions[i])) {
+    const auto* inside = tree_.VerticesIn(leaf);
+    for (uint32_t i = 0; inside != nullptr && i < inside->count && !cell.IsTooLarge(); ++i) {
+      if (!workspace.gathered.Holds(inside->positions[i])) {
         ++workspace.counters.vertices;
-        cell.CutBeforePlace(bucket->ids[i], bucket->positions[i]);
+        cell.CutBeforePlace(inside->ids[i], inside->positions[i]);
       }
     }
   });
@@ -537,11 +537,11 @@ void QueryStructure<D>::CountCuts(Workspace<D>& workspace) {
 
 template <int D>
 void QueryStructure<D>::CutByLeaf(NodeId leaf, VertexId site, Workspace<D>& workspace) const {
-  if (const auto* bucket = tree_.BucketOf(leaf); bucket != nullptr) {
+  if (const auto* inside = tree_.VerticesIn(leaf); inside != nullptr) {
     static_assert(D > 3 || (LeafTree<D>::kLeafCapacity <= kMostCutTogether &&
-                            LeafTree<D>::Buckets::kReadTogether >= kFloatLanes));
-    workspace.counters.vertices += bucket->count;
-    workspace.cell.CutByEach({bucket->positions, bucket->count}, {.listed = bucket->ids}, site);
+                            LeafTree<D>::VertexPool::kReadTogether >= kFloatLanes));
+    workspace.counters.vertices += inside->count;
+    workspace.cell.CutByEach({inside->positions, inside->count}, {.listed = inside->ids}, site);
   }
 }
 

@@ -97,9 +97,9 @@ class QueryStructure {
   // Errors:     none.
   Neighbor NearestWithin(VertexId v, double limit_sq, Workspace<D>& workspace) const;
 
-  // Of each vertex of a leaf, in the order of its bucket, the squared distance to the nearest other one.
+  // Of each vertex of a leaf, in the order of `VerticesIn`, the squared distance to the nearest other one.
   //
-  // REQUIRES:   `nearest_sq` is as long as the bucket; no vertex is uncommitted.
+  // REQUIRES:   `nearest_sq` is as long as the leaf has vertices; no vertex is uncommitted.
   // Complexity: O(1) for each when bottom-up.
   // Errors:     none.
   void NearestOfEach(NodeId leaf, Workspace<D>& workspace, std::span<double> nearest_sq) const;
@@ -197,7 +197,9 @@ class QueryStructure {
     tree_.Reserve(vertices);
   }
 
-  // Adds a vertex at `p`, near `near`; kNoVertex if none is known.
+  // Adds a vertex at `p`, near `near`; kNoVertex if none is known. Which neighbours it may have spoiled is not looked
+  // at: that follows from its cell, which the refinement computes when it comes to the vertex
+  // (PendingVertices::Notify).
   //
   // REQUIRES:   p in the box and different from all vertices.
   // Complexity: O(1) when p is in the clipped cell of `near` in a bottom-up run.

@@ -401,10 +401,10 @@ ReferenceScan<D> ReferenceClippedVoronoi(const QueryStructure<D>& structure, Ver
     }
     const NodeId leaf{event.id};
     scan.leaves.push_back({leaf, event.diameter});
-    if (const auto* bucket = tree.BucketOf(leaf); bucket != nullptr) {
-      for (uint32_t i = 0; i < bucket->count; ++i) {
-        if (bucket->ids[i] != v) {
-          push(false, Index(bucket->ids[i]), 0);
+    if (const auto* inside = tree.VerticesIn(leaf); inside != nullptr) {
+      for (uint32_t i = 0; i < inside->count; ++i) {
+        if (inside->ids[i] != v) {
+          push(false, Index(inside->ids[i]), 0);
         }
       }
     }

@@ -112,8 +112,8 @@ TYPED_TEST(GatheredVerticesTest, AreNoneForFewSites) {
   constexpr int D = TypeParam::kValue;
   const QueryStructure<D> structure = StructureOf<D>("uniform", 500);
   Gathering<D> gathering(structure);
-  const auto* bucket = structure.tree().BucketOf(structure.tree().leaf_of(VertexId{200}));
-  const std::vector<VertexId> sites(7, bucket->ids[0]);
+  const auto* inside = structure.tree().VerticesIn(structure.tree().leaf_of(VertexId{200}));
+  const std::vector<VertexId> sites(7, inside->ids[0]);
   EXPECT_EQ(gathering.Around(sites), 7u);
   EXPECT_EQ(gathering.gathered().count(), 0u);
   EXPECT_FALSE(gathering.gathered().Surrounds(structure.point(sites[0])));

@@ -102,17 +102,17 @@ TYPED_TEST(SameCellsTest, ScansAreTheSameByEveryVectorUnit) {
     }
     EXPECT_GT(fast.counters.leaves, fast.counters.queries);
     structure.tree().ForEachLeaf([&](NodeId leaf) {
-      const auto* bucket = structure.tree().BucketOf(leaf);
-      if (bucket == nullptr) {
+      const auto* inside = structure.tree().VerticesIn(leaf);
+      if (inside == nullptr) {
         return;
       }
-      std::vector<double> by_fast(bucket->count);
-      std::vector<double> by_plain(bucket->count);
+      std::vector<double> by_fast(inside->count);
+      std::vector<double> by_plain(inside->count);
       structure.NearestOfEach(leaf, fast, by_fast);
       structure.NearestOfEach(leaf, plain, by_plain);
       ASSERT_EQ(by_fast, by_plain);
-      for (uint32_t i = 0; i < bucket->count; ++i) {
-        ASSERT_EQ(by_fast[i], structure.ApproximateNearestNeighbor(bucket->ids[i], fast).distance_sq);
+      for (uint32_t i = 0; i < inside->count; ++i) {
+        ASSERT_EQ(by_fast[i], structure.ApproximateNearestNeighbor(inside->ids[i], fast).distance_sq);
       }
     });
   }
@@ -161,8 +161,8 @@ template <int D>
 std::vector<VertexId> LeafByLeaf(const QueryStructure<D>& structure) {
   std::vector<VertexId> vertices;
   structure.tree().ForEachLeaf([&](NodeId leaf) {
-    if (const auto* bucket = structure.tree().BucketOf(leaf); bucket != nullptr) {
-      vertices.insert(vertices.end(), bucket->ids, bucket->ids + bucket->count);
+    if (const auto* inside = structure.tree().VerticesIn(leaf); inside != nullptr) {
+      vertices.insert(vertices.end(), inside->ids, inside->ids + inside->count);
     }
   });
   return vertices;

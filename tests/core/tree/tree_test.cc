@@ -214,17 +214,17 @@ void ExpectVerticesInPlace(const LeafTree<D>& tree, const std::vector<Point<D>>&
   ASSERT_EQ(tree.vertex_count(), points.size());
   size_t held = 0;
   for (const NodeId leaf : LeavesOf<D>(tree)) {
-    const auto* bucket = tree.BucketOf(leaf);
-    if (bucket == nullptr) {
+    const auto* inside = tree.VerticesIn(leaf);
+    if (inside == nullptr) {
       continue;
     }
-    ASSERT_LE(bucket->count, static_cast<uint32_t>(LeafTree<D>::kLeafCapacity));
-    held += bucket->count;
-    for (uint32_t i = 0; i < bucket->count; ++i) {
-      ASSERT_LT(Index(bucket->ids[i]), points.size());
-      ASSERT_EQ(tree.leaf_of(bucket->ids[i]), leaf);
-      ASSERT_EQ(bucket->positions[i], points[Index(bucket->ids[i])]);
-      ASSERT_TRUE(tree.BoxOf(leaf).Contains(bucket->positions[i]));
+    ASSERT_LE(inside->count, static_cast<uint32_t>(LeafTree<D>::kLeafCapacity));
+    held += inside->count;
+    for (uint32_t i = 0; i < inside->count; ++i) {
+      ASSERT_LT(Index(inside->ids[i]), points.size());
+      ASSERT_EQ(tree.leaf_of(inside->ids[i]), leaf);
+      ASSERT_EQ(inside->positions[i], points[Index(inside->ids[i])]);
+      ASSERT_TRUE(tree.BoxOf(leaf).Contains(inside->positions[i]));
     }
   }
   EXPECT_EQ(held, points.size());

@@ -1,6 +1,6 @@
 // The vertices of the leaves of a tree, each leaf's side by side, in memory by their number.
-#ifndef WELLSPACE_CORE_TREE_VERTEX_BUCKETS_H_
-#define WELLSPACE_CORE_TREE_VERTEX_BUCKETS_H_
+#ifndef WELLSPACE_CORE_TREE_LEAF_VERTICES_H_
+#define WELLSPACE_CORE_TREE_LEAF_VERTICES_H_
 
 #include <algorithm>
 #include <array>
@@ -16,12 +16,12 @@
 
 namespace wellspace::core {
 
-// Buckets of at most `kMost` vertices, by number. A bucket has room for its vertices rounded up to a multiple of
+// The vertices of leaves, at most `kMost` each, by number. A leaf has room for its vertices rounded up to a multiple of
 // kTogether, and of an eighth of kMost or less; when that is full it moves, and what it leaves serves another.
 //
 // Thread safety: thread-compatible.
 template <int D, int kMost>
-class VertexBuckets {
+class LeafVertexPool {
  public:
   // What a vertex takes.
   static constexpr size_t kPlaceBytes = sizeof(Point<D>) + sizeof(VertexId);
@@ -30,80 +30,80 @@ class VertexBuckets {
   // So many positions or ids may be read together, the last perhaps of no vertex.
   static constexpr uint32_t kReadTogether = 8;
 
-  struct Bucket {
+  struct LeafVertices {
     uint32_t count = 0;
     uint32_t capacity = 0;
     Point<D>* positions = nullptr;
     VertexId* ids = nullptr;
   };
 
-  // Makes an empty bucket with room for `count` and returns its number.
+  // Makes an empty leaf with room for `count` and returns its number.
   uint32_t Add(uint32_t count) {
     uint32_t number = 0;
     if (free_numbers_.empty()) {
-      number = static_cast<uint32_t>(buckets_.size());
-      buckets_.emplace_back();
+      number = static_cast<uint32_t>(leaves_.size());
+      leaves_.emplace_back();
     } else {
       number = free_numbers_.back();
       free_numbers_.pop_back();
     }
-    buckets_[number] = Take(count);
+    leaves_[number] = Take(count);
     return number;
   }
 
-  // Fills an empty bucket, which has room, with vertices at `positions`, numbered from `first` on.
+  // Fills an empty leaf, which has room, with vertices at `positions`, numbered from `first` on.
   //
-  // Threads: different buckets may be filled at once.
+  // Threads: different leaves may be filled at once.
   void Fill(uint32_t number, std::span<const Point<D>> positions, uint32_t first) {
-    Bucket& bucket = buckets_[number];
-    std::copy(positions.begin(), positions.end(), bucket.positions);
+    LeafVertices& leaf = leaves_[number];
+    std::copy(positions.begin(), positions.end(), leaf.positions);
     for (uint32_t i = 0; i < positions.size(); ++i) {
-      bucket.ids[i] = VertexId{first + i};
+      leaf.ids[i] = VertexId{first + i};
     }
-    bucket.count = static_cast<uint32_t>(positions.size());
+    leaf.count = static_cast<uint32_t>(positions.size());
   }
 
   // Appends `v` at `p`.
   //
-  // REQUIRES:   the bucket holds fewer than kMost.
+  // REQUIRES:   the leaf holds fewer than kMost.
   void Append(uint32_t number, VertexId v, const Point<D>& p) {
-    Bucket& bucket = buckets_[number];
-    if (bucket.count == bucket.capacity) {
-      Bucket larger = Take(bucket.count + 1);
-      std::copy_n(bucket.positions, bucket.count, larger.positions);
-      std::copy_n(bucket.ids, bucket.count, larger.ids);
-      larger.count = bucket.count;
-      GiveBack(bucket);
-      bucket = larger;
+    LeafVertices& leaf = leaves_[number];
+    if (leaf.count == leaf.capacity) {
+      LeafVertices larger = Take(leaf.count + 1);
+      std::copy_n(leaf.positions, leaf.count, larger.positions);
+      std::copy_n(leaf.ids, leaf.count, larger.ids);
+      larger.count = leaf.count;
+      GiveBack(leaf);
+      leaf = larger;
     }
-    bucket.positions[bucket.count] = p;
-    bucket.ids[bucket.count] = v;
-    ++bucket.count;
+    leaf.positions[leaf.count] = p;
+    leaf.ids[leaf.count] = v;
+    ++leaf.count;
   }
 
-  // Calls f(VertexId, const Point<D>&) for the vertices of a bucket that is gone then; f may add buckets and append to
+  // Calls f(VertexId, const Point<D>&) for the vertices of a leaf that is gone then; f may add leaves and append to
   // others.
   template <typename F>
   void Dissolve(uint32_t number, F&& f) {
-    const Bucket bucket = buckets_[number];
-    buckets_[number] = {};
+    const LeafVertices leaf = leaves_[number];
+    leaves_[number] = {};
     free_numbers_.push_back(number);
-    for (uint32_t i = 0; i < bucket.count; ++i) {
-      f(bucket.ids[i], bucket.positions[i]);
+    for (uint32_t i = 0; i < leaf.count; ++i) {
+      f(leaf.ids[i], leaf.positions[i]);
     }
-    GiveBack(bucket);
+    GiveBack(leaf);
   }
 
-  Bucket& operator[](uint32_t number) { return buckets_[number]; }
-  const Bucket& operator[](uint32_t number) const { return buckets_[number]; }
+  LeafVertices& operator[](uint32_t number) { return leaves_[number]; }
+  const LeafVertices& operator[](uint32_t number) const { return leaves_[number]; }
 
-  // What a bucket takes for `count` vertices.
+  // What a leaf takes for `count` vertices.
   static constexpr size_t BytesFor(uint32_t count) {
-    return sizeof(Bucket) + static_cast<size_t>(ClassOf(count) + 1) * kStep * kPlaceBytes;
+    return sizeof(LeafVertices) + static_cast<size_t>(ClassOf(count) + 1) * kStep * kPlaceBytes;
   }
-  // What a bucket takes beside its vertices, on average: half a step is free.
-  static constexpr size_t OverheadBytes() { return sizeof(Bucket) + kStep / 2 * kPlaceBytes; }
-  uint64_t MemoryBytes() const { return taken_bytes_ + buckets_.size() * sizeof(Bucket); }
+  // What a leaf takes beside its vertices, on average: half a step is free.
+  static constexpr size_t OverheadBytes() { return sizeof(LeafVertices) + kStep / 2 * kPlaceBytes; }
+  uint64_t MemoryBytes() const { return taken_bytes_ + leaves_.size() * sizeof(LeafVertices); }
 
  private:
   static constexpr uint32_t kStep = kMost / 8 / kTogether * kTogether;
@@ -114,19 +114,19 @@ class VertexBuckets {
 
   static constexpr uint32_t ClassOf(uint32_t count) { return count == 0 ? 0 : (count - 1) / kStep; }
 
-  Bucket Take(uint32_t count) {
+  LeafVertices Take(uint32_t count) {
     if (count > kMost) {
       std::abort();  // in a tree: more vertices in one cube of the grid than callers may put there
     }
     const uint32_t size_class = ClassOf(count);
-    Bucket bucket;
-    bucket.capacity = (size_class + 1) * kStep;
+    LeafVertices leaf;
+    leaf.capacity = (size_class + 1) * kStep;
     std::byte* memory = nullptr;
     if (auto& free = free_[size_class]; !free.empty()) {
       memory = free.back();
       free.pop_back();
     } else {
-      const size_t bytes = bucket.capacity * kPlaceBytes;
+      const size_t bytes = leaf.capacity * kPlaceBytes;
       if (chunks_.empty() || chunks_.back().get_deleter().count - used_ < bytes + kReadTogether * sizeof(Point<D>)) {
         // As much as there is already: on large pages once that fills one.
         chunks_.push_back(MakeHugePageBytes(std::clamp<size_t>(taken_bytes_, kLeastChunk, kMostChunk)));
@@ -136,16 +136,16 @@ class VertexBuckets {
       used_ += bytes;
       taken_bytes_ += bytes;
     }
-    bucket.positions = reinterpret_cast<Point<D>*>(memory);
-    bucket.ids = reinterpret_cast<VertexId*>(memory + bucket.capacity * sizeof(Point<D>));
-    return bucket;
+    leaf.positions = reinterpret_cast<Point<D>*>(memory);
+    leaf.ids = reinterpret_cast<VertexId*>(memory + leaf.capacity * sizeof(Point<D>));
+    return leaf;
   }
 
-  void GiveBack(const Bucket& bucket) {
-    free_[ClassOf(bucket.capacity)].push_back(reinterpret_cast<std::byte*>(bucket.positions));
+  void GiveBack(const LeafVertices& leaf) {
+    free_[ClassOf(leaf.capacity)].push_back(reinterpret_cast<std::byte*>(leaf.positions));
   }
 
-  HugeVector<Bucket> buckets_;
+  HugeVector<LeafVertices> leaves_;
   std::vector<uint32_t> free_numbers_;
   std::array<std::vector<std::byte*>, kClasses> free_;
   std::vector<HugePageBytes> chunks_;
@@ -155,4 +155,4 @@ class VertexBuckets {
 
 }  // namespace wellspace::core
 
-#endif  // WELLSPACE_CORE_TREE_VERTEX_BUCKETS_H_
+#endif  // WELLSPACE_CORE_TREE_LEAF_VERTICES_H_
