@@ -226,8 +226,8 @@ bool Repairer::IsThere(const Sliver& sliver) const {
          CosineOf(sliver.simplex) > flat_cosine_;
 }
 
-// Whether the criteria allow for a tetrahedron, of which `moved` is the vertex whose nearest neighbour is that of the
-// last KeepsNearestNeighbours.
+// Whether the criteria allow for a tetrahedron, of which `moved` is the vertex whose nearest neighbour is as far
+// as edge_limit_sq_ says.
 bool Repairer::IsAdmissible(const TetrahedronMeasure& measure, const std::array<VertexId, 4>& vertices,
                             VertexId moved) const {
   const MeshCriteria<3>& criteria = criteria_.criteria;
@@ -247,26 +247,23 @@ bool Repairer::IsAdmissible(const TetrahedronMeasure& measure, const std::array<
   return criteria.sizes.IsUnbounded() || measure.radius_sq <= criteria.sizes.AtSq(measure.centre);
 }
 
-// Under well-spaced: whether a vertex at `p`, which would replace the cavity, becomes the nearest neighbour of no
-// vertex.
-bool Repairer::KeepsNearestNeighbours(const Point<3>& p, VertexId moved) {
-  if (criteria_.criteria.criterion != Criterion::kWellSpaced) {
-    return true;
-  }
-  edge_limit_sq_ = std::numeric_limits<double>::infinity();
+// The squared distance of a vertex at `p`, which would replace the cavity, to its nearest neighbour; none if it would
+// become the nearest neighbour of another vertex.
+std::optional<double> Repairer::NewNearestSq(const Point<3>& p, VertexId moved) const {
+  double new_nearest_sq = std::numeric_limits<double>::infinity();
   for (const auto& [s, slot] : cavity_.boundary) {
     const auto& vertices = triangulation_.item(s).vertices;
     for (int i = 0; i < 4; ++i) {
       if (i != slot && vertices[i] != moved) {
         const double distance_sq = DistanceSq<3>(triangulation_.point(vertices[i]), p);
         if (distance_sq < nearest_sq_[Index(vertices[i])]) {
-          return false;
+          return std::nullopt;
         }
-        edge_limit_sq_ = std::min(edge_limit_sq_, distance_sq);
+        new_nearest_sq = std::min(new_nearest_sq, distance_sq);
       }
     }
   }
-  return true;
+  return new_nearest_sq;
 }
 
 // The largest cosine of the tetrahedron that vertex `v` at `p` makes with a facet; kForbidden if it is not below
@@ -301,11 +298,16 @@ double Repairer::TryAt(SimplexId from, const Point<3>& p, VertexId v, double lim
     suspects_.insert(suspects_.begin(), cavity_.boundary.back());
     return kForbidden;
   }
-  if (criteria_.criteria.criterion == Criterion::kWellSpaced &&
-      !(KeepsNearestNeighbours(p, v) &&
-        std::all_of(cavity_.boundary.begin(), cavity_.boundary.end(),
-                    [&](const Cavity::Facet& facet) { return TryFacet(facet, p, v, limit) != kForbidden; }))) {
-    return kForbidden;
+  if (criteria_.criteria.criterion == Criterion::kWellSpaced) {
+    const std::optional<double> new_nearest_sq = NewNearestSq(p, v);
+    if (!new_nearest_sq.has_value()) {
+      return kForbidden;
+    }
+    edge_limit_sq_ = *new_nearest_sq;
+    if (!std::all_of(cavity_.boundary.begin(), cavity_.boundary.end(),
+                     [&](const Cavity::Facet& facet) { return TryFacet(facet, p, v, limit) != kForbidden; })) {
+      return kForbidden;
+    }
   }
   return worst;
 }
@@ -473,9 +475,8 @@ bool Repairer::Move(VertexId v, const Sliver& sliver, int samples) {
     return false;
   }
   triangulation_.FindCavity(*find_first(to), to, cavity_);
-  KeepsNearestNeighbours(to, v);
   if (!nearest_sq_.empty()) {
-    nearest_sq_[Index(v)] = edge_limit_sq_;
+    nearest_sq_[Index(v)] = NewNearestSq(to, v).value();  // TryAt has found that there is one
   }
   std::erase_if(hole_, [this](SimplexId s) { return triangulation_.IsInCavity(s); });
   triangulation_.Insert(v, to, 0, cavity_, created_);
@@ -527,12 +528,11 @@ absl::Status Repairer::Insert(const Sliver& sliver, const Effort& effort) {
                                                      " vertices; raise max_vertices or lower min_dihedral"));
   }
   triangulation_.FindCavity(sliver.simplex, to, cavity_);
-  KeepsNearestNeighbours(to, v);
+  if (!nearest_sq_.empty()) {
+    nearest_sq_.push_back(NewNearestSq(to, v).value());  // TryAt has found that there is one
+  }
   triangulation_.AddVertex();
   is_fixed_.push_back(false);
-  if (!nearest_sq_.empty()) {
-    nearest_sq_.push_back(edge_limit_sq_);
-  }
   triangulation_.Insert(v, to, 0, cavity_, created_);
   ++report_.added;
   Note(created_);

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -103,7 +104,7 @@ class Repairer {
   bool IsThere(const Sliver& sliver) const;
   double CosineOf(SimplexId s) const { return cosine_[Index(s)]; }
   bool IsAdmissible(const TetrahedronMeasure& measure, const std::array<VertexId, 4>& vertices, VertexId moved) const;
-  bool KeepsNearestNeighbours(const Point<3>& p, VertexId moved);
+  std::optional<double> NewNearestSq(const Point<3>& p, VertexId moved) const;
   double TryFacet(const Cavity::Facet& facet, const Point<3>& p, VertexId v, double limit) const;
   bool FailsAtSuspect(const Point<3>& p, VertexId v, double limit);
   double TryAt(SimplexId from, const Point<3>& p, VertexId v, double limit);
@@ -135,7 +136,7 @@ class Repairer {
   std::vector<SimplexId> created_;
   std::vector<VertexId> changed_;  // vertices of new simplices, that have not been told of
   std::vector<bool> is_changed_;   // by vertex
-  double edge_limit_sq_ = 0;       // of TryAt, under well-spaced
+  double edge_limit_sq_ = 0;       // of TryAt, under well-spaced: NewNearestSq once that is known, before no limit
 };
 
 }  // namespace wellspace::core
