@@ -556,10 +556,6 @@ absl::Status ValidateSizing(const MeshView& mesh, double max_circumradius, std::
   return RunCheck(mesh, [&](const auto& checker) { return checker.Sizing(max_circumradius, boxes); });
 }
 
-absl::Status ValidateAngles(const MeshView& mesh, double min_angle_deg) {
-  return RunCheck(mesh, [min_angle_deg](const auto& checker) { return checker.MinAngle(min_angle_deg); });
-}
-
 absl::Status ValidateCircumcentres(const MeshView& mesh) {
   return RunCheck(mesh, [](const auto& checker) { return checker.Circumcentres(); });
 }

@@ -103,9 +103,6 @@ absl::Status ValidateWellSpaced(const MeshView& mesh, double rho);
 // for each of `boxes`, H its bound: no circumball that meets the box is larger. Each times 1 + 1e-9. INVALID_ARGUMENT
 // for bounds that are negative or not finite, of a box also 0, and for boxes that are none.
 absl::Status ValidateSizing(const MeshView& mesh, double max_circumradius, std::span<const SizeBox> boxes);
-// No angle between two facets of a simplex (in 2-D, of a triangle) is below min_angle_deg * (1 - 1e-9).
-// INVALID_ARGUMENT unless that is from 0 to LargestSmallestAngle.
-absl::Status ValidateAngles(const MeshView& mesh, double min_angle_deg);
 // Every circumcentre lies in the box, up to 1e-9 times its longest side.
 absl::Status ValidateCircumcentres(const MeshView& mesh);
 // The distinct points of `cloud` (n x dimension), in order of first appearance, are the first vertices of the mesh, to
@@ -121,7 +118,9 @@ struct ValidationOptions {
   std::span<const SizeBox> size_boxes{};  // empty: not checked
   std::span<const double> cloud{};        // empty: not checked
   double merge_distance = 0;              // of the points of the cloud
-  double min_angle_deg = 0;               // 0: not checked
+  // No angle between two facets of a simplex (in 2-D, of a triangle) is below min_angle_deg * (1 - 1e-9).
+  // INVALID_ARGUMENT unless that is from 0 to LargestSmallestAngle; 0: not checked.
+  double min_angle_deg = 0;
 };
 
 // All of the above, in the order Indices, Orientation, Topology, Volume, Delaunay, RadiusEdge or WellSpaced,
