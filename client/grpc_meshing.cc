@@ -69,7 +69,7 @@ bool UploadFeatures(const Features& features, Request& request, Stream& stream) 
 // Sends everything and half-closes. Stops early when the call has ended; its status says why.
 // `request` is the first message, but for the parameters.
 template <typename Request, typename Stream>
-void Upload(const MeshOptions& options, std::span<const double> points, Request request, Stream& stream) {
+void SendCloud(const MeshOptions& options, std::span<const double> points, Request request, Stream& stream) {
   SetParameters(options, request.mutable_parameters());
   if (!stream.Write(request)) {
     return;
@@ -101,7 +101,7 @@ absl::Status GrpcConnection::MeshPoints(const MeshOptions& options, std::span<co
     // Points go up while answers come down: the server may fail the call before it has all.
     v1::MeshPointsRequest first;
     first.set_with_boundary(sink.WantsBoundary());
-    std::jthread uploader([&] { Upload(options, points, first, *stream); });
+    std::jthread uploader([&] { SendCloud(options, points, first, *stream); });
     MeshReceiver receiver(sink, {.dimension = dimension, .input_points = points.size() / dimension});
     absl::Status damage;
     bool has_begun = false;  // the work: it is not done twice
@@ -140,7 +140,7 @@ absl::StatusOr<MeshEstimate> GrpcConnection::EstimateMesh(const MeshOptions& opt
     RequestWriter<v1::EstimateMeshRequest> stream([&](grpc::CompletionQueue* queue) {
       return meshing_->PrepareAsyncEstimateMesh(context.get(), &response, queue);
     });
-    Upload(options, points, v1::EstimateMeshRequest(), stream);
+    SendCloud(options, points, v1::EstimateMeshRequest(), stream);
     return FromGrpcStatus(stream.Finish());
   });
   if (!status.ok()) {

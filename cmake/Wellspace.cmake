@@ -22,6 +22,15 @@ if(WELLSPACE_FUZZ)
   add_link_options(-fsanitize=fuzzer-no-link)
 endif()
 
+# wellspace_together(TARGET [APART files…]) compiles files of the target several at a time, with WELLSPACE_TOGETHER: the
+# headers of gRPC, CLI11 and abseil take most of the time of a build, and are read once for each lot. Files APART are
+# compiled one by one. Names in unnamed namespaces must differ within a target.
+function(wellspace_together target)
+  cmake_parse_arguments(ARG "" "" "APART" ${ARGN})
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ${WELLSPACE_TOGETHER} UNITY_BUILD_BATCH_SIZE 10)
+  set_source_files_properties(${ARG_APART} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+endfunction()
+
 # wellspace_library(NAME SOURCES… [PUBLIC libs…] [PRIVATE libs…]) makes target wellspace_NAME with alias
 # wellspace::NAME.
 function(wellspace_library name)

@@ -14,7 +14,7 @@
 namespace wellspace::formats {
 namespace {
 
-constexpr size_t kPieceBytes = 1 << 16;
+constexpr size_t kInputBytes = 1 << 16;
 
 // No cloud of distinct points is written in so few bits: beyond this the file is meant to fill the memory, or damaged.
 constexpr uint64_t kMaxRatio = 500;
@@ -27,7 +27,7 @@ constexpr int kWindowBits = 15 + 16;
 
 struct GzipInflater::Stream {
   z_stream z{};
-  std::vector<char> input = std::vector<char>(kPieceBytes);
+  std::vector<char> input = std::vector<char>(kInputBytes);
   bool in_member = true;
   bool is_first = true;  // the member
   bool at_end = false;   // of the source

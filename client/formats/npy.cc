@@ -21,7 +21,7 @@ constexpr std::string_view kMagic = "\x93NUMPY";
 constexpr size_t kMaxHeaderBytes = 1 << 16;
 
 // Values are read and converted this many bytes at a time.
-constexpr size_t kPieceBytes = 1 << 18;
+constexpr size_t kWordsPieceBytes = 1 << 18;
 
 // Reads the literals of a header.
 class HeaderScanner {
@@ -234,7 +234,7 @@ absl::Status NpyReader::ReadWords(std::vector<Value>& values, Convert convert) {
     values.reserve(count);
   }
   const bool is_big_endian = header_.type[0] == '>';
-  std::string piece(std::min<uint64_t>(count, kPieceBytes / sizeof(Word)) * sizeof(Word), '\0');
+  std::string piece(std::min<uint64_t>(count, kWordsPieceBytes / sizeof(Word)) * sizeof(Word), '\0');
   for (uint64_t index = 0; index < count;) {
     const size_t words = std::min<uint64_t>(count - index, piece.size() / sizeof(Word));
     if (absl::Status status = Take(piece.data(), words * sizeof(Word)); !status.ok()) {

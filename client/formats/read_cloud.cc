@@ -37,7 +37,7 @@ absl::Status ReadCoordinates(InputFile& file, const CloudOptions& options, Point
   return TakeColumns(options, cloud);
 }
 
-std::span<const Format<CloudReader>> Readers() {
+std::span<const Format<CloudReader>> CloudReaders() {
   static const std::vector<Format<CloudReader>> readers = {
       {"csv", {".csv", ".tsv", ".txt", ".dat"}, ReadText<ReadCsv>},
       {"xyz", {".xyz"}, ReadText<ReadXyz>},
@@ -56,12 +56,13 @@ constexpr std::string_view kGzipExtension = ".gz";
 
 }  // namespace
 
-std::vector<std::string> CloudFormats() { return FormatNames(Readers()); }
+std::vector<std::string> CloudFormats() { return FormatNames(CloudReaders()); }
 
 absl::StatusOr<PointCloud> ReadCloud(const std::string& path, const CloudOptions& options) {
   const std::string format = options.format.empty() && path == kStandardStream ? "csv" : options.format;
   const bool is_gzip = ExtensionOf(path) == kGzipExtension;
-  const auto row = FindFormat(Readers(), path.substr(0, path.size() - (is_gzip ? kGzipExtension.size() : 0)), format);
+  const auto row =
+      FindFormat(CloudReaders(), path.substr(0, path.size() - (is_gzip ? kGzipExtension.size() : 0)), format);
   if (!row.ok()) {
     return absl::InvalidArgumentError(
         absl::StrCat(row.status().message(), format.empty() ? "; each also compressed, with .gz after it" : ""));

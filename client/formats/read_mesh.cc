@@ -13,7 +13,7 @@ namespace {
 
 using MeshReader = absl::StatusOr<Mesh> (*)(const std::string&);
 
-std::span<const Format<MeshReader>> Readers() {
+std::span<const Format<MeshReader>> MeshReaders() {
   static const std::vector<Format<MeshReader>> readers = {
       {"vtu", {".vtu"}, ReadVtu},
       {"npz", {".npz"}, ReadNpz},
@@ -27,7 +27,7 @@ std::span<const Format<MeshReader>> Readers() {
 }  // namespace
 
 absl::StatusOr<Mesh> ReadMesh(const std::string& path) {
-  const auto row = FindFormat(Readers(), path, path == kStandardStream ? "vtu" : "");
+  const auto row = FindFormat(MeshReaders(), path, path == kStandardStream ? "vtu" : "");
   if (!row.ok()) {
     return row.status();
   }
@@ -35,7 +35,7 @@ absl::StatusOr<Mesh> ReadMesh(const std::string& path) {
 }
 
 std::vector<std::string> FilesOfMeshRead(const std::string& path) {
-  const auto row = FindFormat(Readers(), path, path == kStandardStream ? "vtu" : "");
+  const auto row = FindFormat(MeshReaders(), path, path == kStandardStream ? "vtu" : "");
   if (row.ok() && (*row)->handler == ReadNodeAndEle) {
     return TetgenFilesOf(path);
   }

@@ -11,7 +11,7 @@
 namespace wellspace::formats {
 namespace {
 
-constexpr int kAxes = 3;
+constexpr int kObjAxes = 3;
 
 // Lines without their comments; those that end in a backslash with the next ones.
 class ObjLines {
@@ -98,10 +98,10 @@ absl::Status ReadObj(LineReader& reader, const CloudOptions& options, PointCloud
       faces += field == "f" ? 1 : 0;
       continue;
     }
-    std::array<double, kAxes> point{};
+    std::array<double, kObjAxes> point{};
     bool is_invalid = false;
     int count = 0;
-    while (count < kAxes && fields.Next(field)) {
+    while (count < kObjAxes && fields.Next(field)) {
       if (absl::Status status = TakeCoordinate(field, options.skip_invalid, point[count], is_invalid); !status.ok()) {
         return error(absl::StrCat("coordinate ", count + 1, ": ", status.message()));
       }

@@ -19,7 +19,7 @@
 namespace wellspace::formats {
 namespace {
 
-constexpr size_t kAxes = 3;
+constexpr size_t kPlyAxes = 3;
 
 enum class Scalar { kInt8, kUint8, kInt16, kUint16, kInt32, kUint32, kFloat32, kFloat64 };
 
@@ -151,7 +151,7 @@ class PlyReader {
       cloud_.dimension = static_cast<int>(columns->size());
       return absl::OkStatus();
     }
-    std::array<int, kAxes> seen{};
+    std::array<int, kPlyAxes> seen{};
     for (Property& property : properties) {
       const char name = property.name.size() == 1 ? absl::ascii_tolower(property.name[0]) : '\0';
       if (!property.list_count && name >= 'x' && name <= 'z') {

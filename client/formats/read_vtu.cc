@@ -18,7 +18,6 @@
 namespace wellspace::formats {
 namespace {
 
-constexpr std::string_view kSpace = " \t\r\n";
 constexpr size_t kMaxDepth = 64;
 
 // Collects the arrays of the only piece, then makes the mesh of them.
@@ -188,8 +187,8 @@ class VtuReader {
     values.clear();
     const std::string_view text = xml_.value();
     size_t begin = 0;
-    while ((begin = text.find_first_not_of(kSpace, begin)) != std::string_view::npos) {
-      const size_t end = std::min(text.find_first_of(kSpace, begin), text.size());
+    while ((begin = text.find_first_not_of(kXmlSpace, begin)) != std::string_view::npos) {
+      const size_t end = std::min(text.find_first_of(kXmlSpace, begin), text.size());
       const std::string_view word = text.substr(begin, end - begin);
       begin = end;
       if constexpr (std::is_same_v<Value, double>) {

@@ -12,7 +12,7 @@
 namespace wellspace::formats {
 namespace {
 
-constexpr size_t kAxes = 3;
+constexpr size_t kNamedAxes = 3;
 constexpr size_t kNone = static_cast<size_t>(-1);
 
 // Names that go together; the first that has both x and y is taken.
@@ -120,7 +120,7 @@ std::string NameOr(const std::vector<std::string>& names, size_t column) {
 }  // namespace
 
 NamedColumns FindCoordinates(const std::vector<std::string>& names) {
-  std::array<std::array<size_t, kAxes>, kFamilies> found;
+  std::array<std::array<size_t, kNamedAxes>, kFamilies> found;
   for (auto& axes : found) {
     axes.fill(kNone);
   }
@@ -142,7 +142,7 @@ NamedColumns FindCoordinates(const std::vector<std::string>& names) {
   }
   NamedColumns named;
   for (int family = 0; family < kFamilies; ++family) {
-    std::array<size_t, kAxes>& axes = found[family];
+    std::array<size_t, kNamedAxes>& axes = found[family];
     if (axes[0] == kNone || axes[1] == kNone) {
       continue;
     }

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "absl/strings/str_cat.h"
+#include "client/formats/compression.h"
 #include "client/formats/number.h"
 
 namespace wellspace::formats {
@@ -15,12 +16,6 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little,
               "files are written, and words loaded, for little-endian machines");
-
-// Fast, and within a few percent of the smallest on coordinates, which hardly compress.
-constexpr int kCompressionLevel = 1;
-
-// zlib never makes more than about 1032 bytes of one.
-constexpr uint64_t kMaxExpansion = 1040;
 
 constexpr std::string_view kAlphabet = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 

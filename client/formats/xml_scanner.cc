@@ -8,12 +8,10 @@
 namespace wellspace::formats {
 namespace {
 
-constexpr std::string_view kSpace = " \t\r\n";
-
 bool StartsWith(std::string_view text, std::string_view prefix) { return text.substr(0, prefix.size()) == prefix; }
 
 std::string_view SkipSpace(std::string_view text) {
-  text.remove_prefix(std::min(text.find_first_not_of(kSpace), text.size()));
+  text.remove_prefix(std::min(text.find_first_not_of(kXmlSpace), text.size()));
   return text;
 }
 
@@ -84,14 +82,14 @@ XmlScanner::Piece XmlScanner::ReadTag() {
   position_ += end + 2;
   if (StartsWith(tag, "/")) {
     tag.remove_prefix(1);
-    value_ = tag.substr(0, tag.find_first_of(kSpace));
+    value_ = tag.substr(0, tag.find_first_of(kXmlSpace));
     return Piece::kEndTag;
   }
   if (!tag.empty() && tag.back() == '/') {
     pending_end_tag_ = true;
     tag.remove_suffix(1);
   }
-  value_ = tag.substr(0, tag.find_first_of(kSpace));
+  value_ = tag.substr(0, tag.find_first_of(kXmlSpace));
   if (value_.empty() || !ReadAttributes(tag.substr(value_.size()))) {
     return Fail(absl::StrCat("expected <name attribute=\"value\" ...>, got ", Quote(tag)));
   }
@@ -106,7 +104,7 @@ bool XmlScanner::ReadAttributes(std::string_view text) {
       return false;
     }
     std::string_view key = text.substr(0, equals);
-    key = key.substr(0, key.find_first_of(kSpace));
+    key = key.substr(0, key.find_first_of(kXmlSpace));
     text = SkipSpace(text.substr(equals + 1));
     if (text.empty() || (text[0] != '"' && text[0] != '\'')) {
       return false;

@@ -12,6 +12,9 @@
 
 namespace wellspace::formats {
 
+// What separates attributes, and numbers of a list.
+inline constexpr std::string_view kXmlSpace = " \t\r\n";
+
 // Reads a document piece by piece; comments, declarations and instructions are skipped, entities are left as they are.
 //
 // Thread safety: thread-compatible.

@@ -10,16 +10,11 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "client/formats/compression.h"
 #include "client/formats/number.h"
 
 namespace wellspace::formats {
 namespace {
-
-// Fast, and within a few percent of the smallest on coordinates, which hardly compress.
-constexpr int kCompressionLevel = 1;
-
-// zlib never makes more than about 1032 bytes of one.
-constexpr uint64_t kMaxExpansion = 1040;
 
 // Members of this size or more, compressed or not, want the fields of zip64. Deflate lengthens what it cannot compress
 // by far less than the difference to 2^32.

@@ -17,7 +17,7 @@ namespace wellspace::server {
 namespace {
 
 // How often a thread that waits for a reader looks whether it is still wanted.
-constexpr int kLookMs = 100;
+constexpr int kWantedLookMs = 100;
 
 }  // namespace
 
@@ -70,7 +70,7 @@ void LogWriter::State::Run() {
 void LogWriter::State::WriteAll(std::string_view rest) {
   while (!rest.empty()) {
     pollfd poll_descriptor = {.fd = descriptor, .events = POLLOUT, .revents = 0};
-    const int is_ready = poll(&poll_descriptor, 1, kLookMs);
+    const int is_ready = poll(&poll_descriptor, 1, kWantedLookMs);
     if (IsAbandoned()) {
       return;
     }

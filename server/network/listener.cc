@@ -32,7 +32,7 @@ constexpr int kWaitMs = 10;
 constexpr std::chrono::milliseconds kMaxWait(500);
 
 // How often connections are looked at whose peers may not read.
-constexpr int kLookMs = 5000;
+constexpr int kPeerLookMs = 5000;
 
 constexpr absl::Duration kLogInterval = absl::Seconds(10);
 
@@ -105,11 +105,11 @@ void Listener::Run() {
     for (size_t i = 0; i < sockets_.size(); ++i) {
       watched[i].events = waits ? 0 : POLLIN;
     }
-    poll(watched.data(), watched.size(), waits ? kWaitMs : connections_->Count() == 0 ? -1 : kLookMs);
+    poll(watched.data(), watched.size(), waits ? kWaitMs : connections_->Count() == 0 ? -1 : kPeerLookMs);
     if (some_closed.revents != 0) {
       connections_->Sweep();
     }
-    if (const auto now = Connections::Clock::now(); now - last_look >= std::chrono::milliseconds(kLookMs)) {
+    if (const auto now = Connections::Clock::now(); now - last_look >= std::chrono::milliseconds(kPeerLookMs)) {
       connections_->ShutUnread();
       last_look = now;
     }

@@ -18,17 +18,15 @@
 namespace wellspace::server {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 // How often clients that take too long are looked for.
-constexpr int kLookMs = 500;
+constexpr int kClientLookMs = 500;
 
 std::string Response(std::string_view status, std::string_view type, std::string_view body) {
   return absl::StrCat("HTTP/1.1 ", std::string(status), "\r\nContent-Type: ", std::string(type),
                       "\r\nContent-Length: ", body.size(), "\r\nConnection: close\r\n\r\n", std::string(body));
 }
 
-std::string Refusal(std::string_view status) {
+std::string RefusalResponse(std::string_view status) {
   return Response(status, "text/plain", absl::StrCat(std::string(status), "\n"));
 }
 
@@ -36,7 +34,7 @@ std::string Refusal(std::string_view status) {
 
 struct MetricsEndpoint::Client {
   FileDescriptor socket;
-  Clock::time_point end;  // of our patience
+  std::chrono::steady_clock::time_point end;  // of our patience
   std::string request;
   std::string answer;  // what is not sent yet; empty: the request is not whole
 };
@@ -75,13 +73,13 @@ void MetricsEndpoint::Run() {
       const short events = client.answer.empty() ? POLLIN : POLLOUT;
       watched.push_back({.fd = client.socket.get(), .events = events, .revents = 0});
     }
-    poll(watched.data(), watched.size(), clients_.empty() ? -1 : kLookMs);
+    poll(watched.data(), watched.size(), clients_.empty() ? -1 : kClientLookMs);
     if (watched.front().revents != 0) {
       return;
     }
     // Those that were watched come before those that are accepted now.
     size_t place = 1 + sockets_.size();
-    const Clock::time_point now = Clock::now();
+    const std::chrono::steady_clock::time_point now = std::chrono::steady_clock::now();
     std::erase_if(clients_, [&](Client& client) {
       const bool is_ready = watched[place++].revents != 0;
       return now >= client.end || (is_ready && !Serve(client));
@@ -98,14 +96,17 @@ void MetricsEndpoint::Accept(int socket) {
   FileDescriptor connection(accept4(socket, nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC));
   if (connection.get() < 0) {
     if (errno == EMFILE || errno == ENFILE || errno == ENOMEM || errno == ENOBUFS) {
-      poll(nullptr, 0, kLookMs / 5);  // it waits still, and would be reported again at once
+      poll(nullptr, 0, kClientLookMs / 5);  // it waits still, and would be reported again at once
     }
     return;
   }
   if (clients_.size() >= kMostClients) {
     clients_.pop_front();
   }
-  clients_.push_back({.socket = std::move(connection), .end = Clock::now() + kTimeout, .request = "", .answer = ""});
+  clients_.push_back({.socket = std::move(connection),
+                      .end = std::chrono::steady_clock::now() + kTimeout,
+                      .request = "",
+                      .answer = ""});
   if (!Serve(clients_.back())) {
     clients_.pop_back();
   }
@@ -123,7 +124,7 @@ bool MetricsEndpoint::Serve(Client& client) const {
     if (end != std::string::npos) {
       client.answer = AnswerTo(client.request);
     } else if (client.request.size() > kMostRequestBytes) {
-      client.answer = Refusal("431 Request Header Fields Too Large");
+      client.answer = RefusalResponse("431 Request Header Fields Too Large");
     }
   }
   while (!client.answer.empty()) {
@@ -142,14 +143,14 @@ std::string MetricsEndpoint::AnswerTo(const std::string& request) const {
   const size_t path_end = line.find_first_of(" ?", method_end + 1);
   if (method_end == std::string_view::npos || path_end == std::string_view::npos ||
       line.find(" HTTP/1.", method_end) == std::string_view::npos) {
-    return Refusal("400 Bad Request");
+    return RefusalResponse("400 Bad Request");
   }
   if (line.substr(method_end + 1, path_end - method_end - 1) != "/metrics") {
-    return Refusal("404 Not Found");
+    return RefusalResponse("404 Not Found");
   }
   const std::string_view method = line.substr(0, method_end);
   if (method != "GET" && method != "HEAD") {
-    return Refusal("405 Method Not Allowed");
+    return RefusalResponse("405 Method Not Allowed");
   }
   std::vector<prometheus::MetricFamily> families;
   for (const std::shared_ptr<prometheus::Collectable>& collectable : metrics_.Collectables()) {

@@ -15,16 +15,18 @@ namespace {
 constexpr char kMetadataKey[] = "authorization";
 constexpr std::string_view kScheme = "bearer ";
 
-grpc::Status Refusal(const std::string& message) { return MakeError(v1::ERROR_REASON_UNAUTHENTICATED, message); }
+grpc::Status Unauthenticated(const std::string& message) {
+  return MakeError(v1::ERROR_REASON_UNAUTHENTICATED, message);
+}
 
 grpc::Status CheckCertificate(const grpc::AuthContext& peer, Caller* caller) {
   if (!peer.IsPeerAuthenticated()) {
-    return Refusal("this server wants a client certificate, and the connection has none");
+    return Unauthenticated("this server wants a client certificate, and the connection has none");
   }
   const std::vector<grpc::string_ref> names = peer.FindPropertyValues(GRPC_X509_CN_PROPERTY_NAME);
   const std::string name = names.size() == 1 ? std::string(names[0].data(), names[0].size()) : "";
   if (!IsTenantName(name)) {
-    return Refusal(
+    return Unauthenticated(
         "the client certificate names no tenant: the common name of its subject must be 1 to 64 letters, digits, '.', "
         "'_', '@' "
         "and '-', the first a letter or a digit");
@@ -36,15 +38,15 @@ grpc::Status CheckCertificate(const grpc::AuthContext& peer, Caller* caller) {
 grpc::Status CheckToken(const TokenTable& tokens, const grpc::ServerContextBase& context, Caller* caller) {
   const auto [first, last] = context.client_metadata().equal_range(kMetadataKey);
   if (first == last) {
-    return Refusal("this server wants a token, in the metadata `authorization: Bearer TOKEN`");
+    return Unauthenticated("this server wants a token, in the metadata `authorization: Bearer TOKEN`");
   }
   const std::string_view value(first->second.data(), first->second.size());
   if (std::next(first) != last || !absl::StartsWithIgnoreCase({value.data(), value.size()}, kScheme.data())) {
-    return Refusal("the metadata `authorization` is not one `Bearer TOKEN`");
+    return Unauthenticated("the metadata `authorization` is not one `Bearer TOKEN`");
   }
   std::optional<std::string> tenant = tokens.TenantOf(value.substr(kScheme.size()));
   if (!tenant.has_value()) {
-    return Refusal("this server does not know the token");
+    return Unauthenticated("this server does not know the token");
   }
   caller->tenant = *std::move(tenant);
   return grpc::Status::OK;

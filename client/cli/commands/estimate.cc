@@ -14,7 +14,7 @@
 namespace wellspace::cli {
 namespace {
 
-constexpr char kFooter[] =
+constexpr char kEstimateExamples[] =
     "Examples:\n"
     "  wellspace estimate cow.csv --size 0.01\n"
     "  wellspace estimate cow.csv --stats - --server mesher:7233\n";
@@ -54,7 +54,7 @@ void AddEstimateCommand(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<MeshingOptions>();
   CLI::App* estimate = app.add_subcommand(
       "estimate", "Estimate how large the mesh of a point cloud would be, and the memory that meshing it would take");
-  estimate->footer(absl::StrCat(kCloudsHelp, kFooter, "\n", kExitCodesHelp));
+  estimate->footer(absl::StrCat(kCloudsHelp, kEstimateExamples, "\n", kExitCodesHelp));
   options->AddTo(*estimate);
   estimate->callback([options, &exit_code] { exit_code = RunEstimate(*options); });
 }

@@ -17,7 +17,7 @@
 namespace wellspace::cli {
 namespace {
 
-constexpr char kFooter[] =
+constexpr char kMeshExamples[] =
     "Examples:\n"
     "  wellspace mesh coast.csv -o coast.vtu --rho 1.5 --stats -\n"
     "  wellspace mesh cow.csv -o cow.node --domain -1,-1,-1,1,1,1 --server mesher:7233\n"
@@ -94,7 +94,7 @@ int MeshCommand::Run() {
 void AddMeshCommand(CLI::App& app, int& exit_code) {
   const auto command = std::make_shared<MeshCommand>();
   CLI::App* mesh = app.add_subcommand("mesh", "Mesh a point cloud");
-  mesh->footer(absl::StrCat(kCloudsHelp, kMeshesHelp, kFooter, "\n", kExitCodesHelp));
+  mesh->footer(absl::StrCat(kCloudsHelp, kMeshesHelp, kMeshExamples, "\n", kExitCodesHelp));
   command->options.AddTo(*mesh);
   AddMeshOutput(*mesh, command->output, command->format);
   mesh->callback([command, &exit_code] { exit_code = command->Run(); });

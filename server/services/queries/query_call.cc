@@ -22,7 +22,7 @@ namespace {
 constexpr uint64_t kFullBatchBytes = kMaxResponseBytes / 4 * 3;
 
 // Before a job comes again that found the line full, or the structure being built by another.
-constexpr absl::Duration kRetryDelay = absl::Milliseconds(50);
+constexpr absl::Duration kQueryRetryDelay = absl::Milliseconds(50);
 
 // Vertices of one look at the structure, by dimension: about a millisecond. Cells grow sixfold with each dimension.
 constexpr std::array<uint64_t, core::kMaxDimension + 1> kVerticesPerLook = {0, 0, 512, 128, 16, 2, 1};
@@ -73,7 +73,7 @@ void QueryCall::WorkAhead() {
   } else {
     environment().log.debug("call={} the line is full", id());
     work_ = Work::kRefused;
-    environment().background.PostAfter(kRetryDelay, WeakCall(&QueryCall::TryAgain));
+    environment().background.PostAfter(kQueryRetryDelay, WeakCall(&QueryCall::TryAgain));
   }
 }
 
@@ -104,7 +104,7 @@ void QueryCall::MakeBatches(Job& job) {
     if (is_at_work) {  // what was filled stays
       environment().log.debug("call={} waits for the structure", id());
       work_ = Work::kRefused;
-      environment().background.PostAfter(kRetryDelay, WeakCall(&QueryCall::TryAgain));
+      environment().background.PostAfter(kQueryRetryDelay, WeakCall(&QueryCall::TryAgain));
       return;
     }
     if (!status.ok()) {

@@ -13,7 +13,7 @@ namespace wellspace::server {
 namespace {
 
 // How often, and how many times, an upload looks whether the session is free: for a second.
-constexpr absl::Duration kRetryDelay = absl::Milliseconds(50);
+constexpr absl::Duration kUploadRetryDelay = absl::Milliseconds(50);
 constexpr int kAttempts = 20;
 
 }  // namespace
@@ -59,7 +59,7 @@ void UploadPointsCall::TryToBegin() {
     }
   } else if (++attempts_ < kAttempts) {
     environment().log.debug("call={} waits for another upload", id());
-    environment().background.PostAfter(kRetryDelay, WeakCall(&UploadPointsCall::TryAgain));
+    environment().background.PostAfter(kUploadRetryDelay, WeakCall(&UploadPointsCall::TryAgain));
   } else {
     End(MakeError(v1::ERROR_REASON_SESSION_BUSY,
                   absl::StrCat("another upload to ", session_->session().name(),
