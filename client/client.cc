@@ -1,23 +1,8 @@
 #include "client/client.h"
 
-#include "client/channel.h"
 #include "client/connection.h"
 
 namespace wellspace::client {
-namespace {
-
-// Above what the server sends (chunks of at most 1 MiB).
-constexpr int kMaxResponseBytes = 4 * 1024 * 1024;
-
-// A server whose machine has vanished is noticed by pings.
-constexpr int kKeepaliveMs = 20'000;
-constexpr int kKeepaliveTimeoutMs = 10'000;
-
-// How soon after a lost connection a new one is tried, and how much later each time.
-constexpr int kInitialReconnectMs = 200;
-constexpr int kMaxReconnectMs = 5'000;
-
-}  // namespace
 
 absl::StatusOr<Mesh> Client::MeshPoints(const MeshOptions& options, std::span<const double> points,
                                         const OnProgress& on_progress, const CallOptions& call) {
@@ -119,20 +104,6 @@ absl::Status Client::VoronoiCells(const std::string& session, std::span<const ui
 absl::StatusOr<AddedVertices> Client::AddVertices(const std::string& session, std::span<const double> points,
                                                   std::span<const uint32_t> near, const CallOptions& call) {
   return connection_->AddVertices(session, points, near, call);
-}
-
-absl::StatusOr<Client> Connect(const std::string& address, const ConnectOptions& options) {
-  grpc::ChannelArguments arguments;
-  arguments.SetMaxReceiveMessageSize(kMaxResponseBytes);
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
-  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
-  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kInitialReconnectMs);
-  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kMaxReconnectMs);
-  absl::StatusOr<std::shared_ptr<grpc::Channel>> channel = OpenChannel(address, options, arguments);
-  if (!channel.ok()) {
-    return channel.status();
-  }
-  return Client(MakeConnection(*std::move(channel)));
 }
 
 }  // namespace wellspace::client

@@ -11,43 +11,19 @@
 #include <span>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "absl/time/time.h"
 #include "client/call_options.h"
 #include "client/connect_options.h"
 #include "client/error_details.h"
-#include "client/mesh.h"
+#include "client/mesh_sink.h"
 #include "client/point_source.h"
-#include "client/session.h"
+#include "client/types.h"
 
 namespace wellspace::client {
 
 class Connection;
-
-// See the proto's GetServerInfoResponse.
-struct ServerInfo {
-  std::string version;
-  std::vector<int> dimensions;
-  uint64_t max_points = 0;
-  uint64_t max_vertices = 0;
-  uint64_t max_request_bytes = 0;
-  int workers = 0;
-  int max_queued_jobs = 0;
-  int running_jobs = 0;
-  int queued_jobs = 0;
-  uint64_t max_sessions = 0;
-  uint64_t max_sessions_per_tenant = 0;
-  absl::Duration default_ttl;
-  absl::Duration max_ttl;
-  absl::Duration stall_limit;
-  uint64_t max_memory_bytes = 0;  // 0: no limit
-};
-
-// What a server says of its health, or of that of one of its services.
-enum class Health { kUnknown, kServing, kNotServing };
 
 using OnProgress = std::function<void(const Progress&)>;
 // `done` of `total` chunks of a download have arrived.

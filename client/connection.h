@@ -10,7 +10,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "client/client.h"
-#include "client/retry.h"
+#include "client/retry_policy.h"
 
 namespace grpc {
 class Channel;

@@ -8,7 +8,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "client/mesh.h"
+#include "client/types.h"
 
 namespace wellspace::cli {
 

@@ -10,7 +10,7 @@
 
 #include "absl/status/status.h"
 #include "client/formats/write_mesh.h"
-#include "client/mesh.h"
+#include "client/mesh_sink.h"
 
 namespace wellspace::client {
 

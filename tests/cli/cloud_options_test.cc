@@ -9,7 +9,7 @@
 
 #include "client/formats/read_mesh.h"
 #include "tests/cli/process.h"
-#include "tests/client/fake_server.h"
+#include "tests/client/grpc/fake_server.h"
 #include "tests/formats/temporary_folder.h"
 
 namespace wellspace {

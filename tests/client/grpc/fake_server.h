@@ -1,6 +1,6 @@
 // A server of the generated services that answers as a test says.
-#ifndef WELLSPACE_TESTS_CLIENT_FAKE_SERVER_H_
-#define WELLSPACE_TESTS_CLIENT_FAKE_SERVER_H_
+#ifndef WELLSPACE_TESTS_CLIENT_GRPC_FAKE_SERVER_H_
+#define WELLSPACE_TESTS_CLIENT_GRPC_FAKE_SERVER_H_
 
 #include <chrono>
 #include <functional>
@@ -183,4 +183,4 @@ class FakeServer {
 
 }  // namespace wellspace::client
 
-#endif  // WELLSPACE_TESTS_CLIENT_FAKE_SERVER_H_
+#endif  // WELLSPACE_TESTS_CLIENT_GRPC_FAKE_SERVER_H_

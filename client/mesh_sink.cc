@@ -1,4 +1,4 @@
-#include "client/mesh.h"
+#include "client/mesh_sink.h"
 
 namespace wellspace::client {
 

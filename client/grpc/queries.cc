@@ -3,8 +3,8 @@
 #include <functional>
 
 #include "absl/strings/str_cat.h"
-#include "client/convert.h"
-#include "client/grpc_connection.h"
+#include "client/grpc/convert.h"
+#include "client/grpc/grpc_connection.h"
 
 namespace wellspace::client {
 namespace {

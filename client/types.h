@@ -1,16 +1,16 @@
-// Meshes as the client library has them, and where they go while they arrive.
-#ifndef WELLSPACE_CLIENT_MESH_H_
-#define WELLSPACE_CLIENT_MESH_H_
+// What calls of the client library take and return: meshes, sessions, operations, answers of the query structure.
+#ifndef WELLSPACE_CLIENT_TYPES_H_
+#define WELLSPACE_CLIENT_TYPES_H_
 
 #include <cstdint>
 #include <map>
 #include <memory>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/time/time.h"
 
 namespace wellspace::client {
 
@@ -197,69 +197,6 @@ struct Mesh {
   MeshStatistics statistics;
 };
 
-// Takes a mesh piece by piece, so that it need not fit into memory.
-//
-// Calls come in the order of the functions below, from one thread, those for the arrays as often as there are pieces of
-// them. Pieces are whole rows; those of one array follow one another, and add up to what the header says; every number
-// of a vertex is below vertex_count. Each piece comes once, however often the connection broke meanwhile. After an
-// error no further call comes, and the error is what the client's call returns.
-class MeshSink {
- public:
-  MeshSink() = default;
-  virtual ~MeshSink() = default;
-  MeshSink(const MeshSink&) = delete;
-  MeshSink& operator=(const MeshSink&) = delete;
-
-  // Whether the server is asked for the boundary, the regions and the origins of vertices, too.
-  virtual bool WantsBoundary() const { return false; }
-
-  virtual absl::Status Begin(const MeshHeader& header) = 0;
-  // Rows of `dimension` coordinates.
-  virtual absl::Status AddPoints(std::span<const double> points) = 0;
-  // Vertices of the last piece of points that have moved since the session's mesh before. Called only if there are any.
-  virtual absl::Status AddMovedVertices(std::span<const uint32_t> /*vertices*/) { return absl::OkStatus(); }
-  // The next vertices' weights, if the header has_weights.
-  virtual absl::Status AddWeights(std::span<const double> weights) = 0;
-  // The next vertices' origins, then the next vertices' tags, if the header has_vertex_marks.
-  virtual absl::Status AddVertexOrigins(std::span<const uint32_t> /*origins*/) { return absl::OkStatus(); }
-  virtual absl::Status AddVertexTags(std::span<const int32_t> /*tags*/) { return absl::OkStatus(); }
-  // The next simplices' regions, if the header has_simplex_regions.
-  virtual absl::Status AddSimplexRegions(std::span<const int32_t> /*regions*/) { return absl::OkStatus(); }
-  // Rows of dimension + 1 vertices.
-  virtual absl::Status AddSimplices(std::span<const uint32_t> simplices) = 0;
-  // For the next input points the vertices that they became.
-  virtual absl::Status AddInputVertices(std::span<const uint32_t> vertices) = 0;
-  // Rows of `dimension` vertices: the facets of the header's first part of the boundary, then those of its second, …
-  virtual absl::Status AddFacets(std::span<const uint32_t> /*facets*/) { return absl::OkStatus(); }
-  // The mesh is complete.
-  virtual absl::Status Finish() = 0;
-};
-
-// Keeps the whole mesh in memory, which grows with what arrives, not with what was announced.
-//
-// Thread safety: thread-compatible.
-class MeshCollector final : public MeshSink {
- public:
-  bool WantsBoundary() const override { return true; }
-  absl::Status Begin(const MeshHeader& header) override;
-  absl::Status AddPoints(std::span<const double> points) override;
-  absl::Status AddMovedVertices(std::span<const uint32_t> vertices) override;
-  absl::Status AddWeights(std::span<const double> weights) override;
-  absl::Status AddVertexOrigins(std::span<const uint32_t> origins) override;
-  absl::Status AddVertexTags(std::span<const int32_t> tags) override;
-  absl::Status AddSimplexRegions(std::span<const int32_t> regions) override;
-  absl::Status AddSimplices(std::span<const uint32_t> simplices) override;
-  absl::Status AddInputVertices(std::span<const uint32_t> vertices) override;
-  absl::Status AddFacets(std::span<const uint32_t> facets) override;
-  absl::Status Finish() override { return absl::OkStatus(); }
-
-  // What has been collected; to be moved from when the mesh is complete.
-  Mesh& mesh() { return mesh_; }
-
- private:
-  Mesh mesh_;
-};
-
 // How large a mesh would be.
 struct MeshEstimate {
   uint64_t vertices = 0;
@@ -268,6 +205,115 @@ struct MeshEstimate {
   uint64_t tree_leaves = 0;
 };
 
+using Labels = std::map<std::string, std::string>;
+
+// What a session is created with. See the proto's CreateSessionRequest.
+struct SessionOptions {
+  MeshOptions parameters;
+  Labels labels;
+  std::optional<absl::Duration> ttl;  // absent: the server's default
+};
+
+// What is changed of a session.
+struct SessionChange {
+  std::optional<Labels> labels;
+  std::optional<absl::Duration> ttl;
+};
+
+enum class SessionState { kUnknown, kOpen, kRefining, kReady };
+
+// See the proto's Session.
+struct Session {
+  std::string name;
+  SessionState state = SessionState::kUnknown;
+  MeshOptions parameters;
+  Labels labels;
+  absl::Duration ttl;
+  absl::Time create_time;
+  absl::Time expire_time;
+  uint64_t revision = 0;
+  uint64_t committed_points = 0;
+  uint64_t vertex_count = 0;
+  uint64_t simplex_count = 0;
+  std::string last_operation;  // empty before the first
+};
+
+// Which part of a list.
+struct PageOptions {
+  int page_size = 0;       // 0: as many as the server likes
+  std::string page_token;  // `next_page_token` of the page before; empty: the first
+};
+
+struct SessionPage {
+  std::vector<Session> sessions;
+  std::string next_page_token;  // empty: this was the last
+};
+
+enum class OperationState { kUnknown, kQueued, kRunning, kSucceeded, kFailed, kCancelled };
+
+// See the proto's Operation.
+struct Operation {
+  std::string name;
+  OperationState state = OperationState::kUnknown;
+  MeshOptions parameters;
+  Progress progress;
+  absl::Status error;  // OK unless kFailed or kCancelled
+  absl::Time create_time;
+  std::optional<absl::Time> start_time;
+  std::optional<absl::Time> end_time;
+  uint64_t mesh_revision = 0;
+};
+
+struct OperationPage {
+  std::vector<Operation> operations;
+  std::string next_page_token;  // empty: this was the last
+};
+
+// Points and revision of a session after an upload.
+struct Uploaded {
+  uint64_t committed_points = 0;
+  uint64_t revision = 0;
+};
+
+struct AddedVertices {
+  std::vector<uint32_t> vertices;  // that each point became, or was already
+  uint64_t revision = 0;
+};
+
+// Voronoi cells of c vertices; see the proto's VoronoiCellBatch. The counts add up to the lengths of the arrays.
+struct CellBatch {
+  int dimension = 0;
+  std::vector<uint32_t> vertices;          // c
+  std::vector<double> clip_radii;          // c; infinity: not clipped
+  std::vector<bool> is_clipped;            // c
+  std::vector<uint32_t> node_counts;       // c
+  std::vector<double> nodes;               // sum(node_counts) x dimension, row-major
+  std::vector<uint32_t> neighbour_counts;  // c
+  std::vector<uint32_t> neighbours;        // sum(neighbour_counts)
+};
+
+// See the proto's GetServerInfoResponse.
+struct ServerInfo {
+  std::string version;
+  std::vector<int> dimensions;
+  uint64_t max_points = 0;
+  uint64_t max_vertices = 0;
+  uint64_t max_request_bytes = 0;
+  int workers = 0;
+  int max_queued_jobs = 0;
+  int running_jobs = 0;
+  int queued_jobs = 0;
+  uint64_t max_sessions = 0;
+  uint64_t max_sessions_per_tenant = 0;
+  absl::Duration default_ttl;
+  absl::Duration max_ttl;
+  absl::Duration stall_limit;
+  uint64_t max_memory_bytes = 0;  // 0: no limit
+};
+
+// What a server says of its health, or of that of one of its services.
+enum class Health { kUnknown, kServing, kNotServing };
+
 }  // namespace wellspace::client
 
-#endif  // WELLSPACE_CLIENT_MESH_H_
+#endif  // WELLSPACE_CLIENT_TYPES_H_

@@ -1,6 +1,6 @@
 // OperationService on the client's side.
-#include "client/convert.h"
-#include "client/grpc_connection.h"
+#include "client/grpc/convert.h"
+#include "client/grpc/grpc_connection.h"
 
 namespace wellspace::client {
 

@@ -1,11 +1,9 @@
 // Messages of the service from and to the types of the library. Private to this folder.
-#ifndef WELLSPACE_CLIENT_CONVERT_H_
-#define WELLSPACE_CLIENT_CONVERT_H_
+#ifndef WELLSPACE_CLIENT_GRPC_CONVERT_H_
+#define WELLSPACE_CLIENT_GRPC_CONVERT_H_
 
 #include "absl/status/statusor.h"
-#include "client/client.h"
-#include "client/mesh.h"
-#include "client/session.h"
+#include "client/types.h"
 #include "wellspace/v1/mesh.pb.h"
 #include "wellspace/v1/meshing.pb.h"
 #include "wellspace/v1/operations.pb.h"
@@ -30,4 +28,4 @@ absl::StatusOr<CellBatch> CellsFromProto(const v1::VoronoiCellBatch& message);
 
 }  // namespace wellspace::client
 
-#endif  // WELLSPACE_CLIENT_CONVERT_H_
+#endif  // WELLSPACE_CLIENT_GRPC_CONVERT_H_

@@ -1,6 +1,6 @@
 // The client's side of a call that streams requests and has one answer. Private to this folder.
-#ifndef WELLSPACE_CLIENT_REQUEST_WRITER_H_
-#define WELLSPACE_CLIENT_REQUEST_WRITER_H_
+#ifndef WELLSPACE_CLIENT_GRPC_REQUEST_WRITER_H_
+#define WELLSPACE_CLIENT_GRPC_REQUEST_WRITER_H_
 
 #include <functional>
 #include <memory>
@@ -67,4 +67,4 @@ class RequestWriter {
 
 }  // namespace wellspace::client
 
-#endif  // WELLSPACE_CLIENT_REQUEST_WRITER_H_
+#endif  // WELLSPACE_CLIENT_GRPC_REQUEST_WRITER_H_

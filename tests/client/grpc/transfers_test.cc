@@ -12,7 +12,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "proto/checksum.h"
-#include "tests/client/fake_server.h"
+#include "tests/client/grpc/fake_server.h"
 
 namespace wellspace::client {
 namespace {

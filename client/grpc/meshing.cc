@@ -3,10 +3,10 @@
 #include <thread>
 #include <utility>
 
-#include "client/convert.h"
-#include "client/grpc_connection.h"
-#include "client/mesh_receiver.h"
-#include "client/request_writer.h"
+#include "client/grpc/convert.h"
+#include "client/grpc/grpc_connection.h"
+#include "client/grpc/mesh_receiver.h"
+#include "client/grpc/request_writer.h"
 
 namespace wellspace::client {
 namespace {

@@ -1,4 +1,4 @@
-#include "client/convert.h"
+#include "client/grpc/convert.h"
 
 #include <map>
 #include <numeric>

@@ -1,20 +1,17 @@
-#include "client/retry.h"
+#include "client/grpc/retry.h"
 
 #include <time.h>
 
-#include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <condition_variable>
 #include <mutex>
+#include <optional>
 #include <random>
 #include <string>
 #include <utility>
 
-#include "absl/strings/cord.h"
 #include "absl/time/clock.h"
 #include "client/error_details.h"
-#include "google/rpc/error_details.pb.h"
 #include "google/rpc/status.pb.h"
 
 namespace wellspace::client {
@@ -36,11 +33,6 @@ double RandomHalfToOne() {
   return std::uniform_real_distribution<double>(0.5, 1)(generator);
 }
 
-absl::Duration Backoff(const RetryPolicy& policy, int failures) {
-  const double growth = std::pow(policy.multiplier, failures - 1);
-  return std::min(policy.initial_backoff * growth, policy.max_backoff) * RandomHalfToOne();
-}
-
 }  // namespace
 
 absl::Status FromGrpcStatus(const grpc::Status& status) {
@@ -50,11 +42,6 @@ absl::Status FromGrpcStatus(const grpc::Status& status) {
     AddDetails(details, result);
   }
   return result;
-}
-
-bool IsWorthRepeating(const absl::Status& status) {
-  return status.code() == absl::StatusCode::kUnavailable || RetryDelayOf(status).has_value() ||
-         ReasonOf(status) == "ERROR_REASON_READER_STALLED";
 }
 
 absl::Duration SinceBoot() {
@@ -86,16 +73,17 @@ absl::Status Retrier::Run(absl::Duration timeout, const std::stop_token& stop,
       return CancelledByCaller();
     }
     failures = current.progressed() ? 1 : failures + 1;
-    if (!(IsWorthRepeating(status) || current.is_worth_repeating()) ||
-        failures >= (reached_.load() ? policy_.max_attempts : policy_.max_first_attempts)) {
+    const std::optional<absl::Duration> delay = DelayBeforeRetry(policy_,
+                                                                 {.status = status,
+                                                                  .failures = failures,
+                                                                  .is_server_known = reached_.load(),
+                                                                  .is_worth_repeating = current.is_worth_repeating(),
+                                                                  .time_left = deadline - SinceBoot()},
+                                                                 RandomHalfToOne());
+    if (!delay.has_value()) {
       return status;
     }
-    const absl::Duration delay =
-        std::max(Backoff(policy_, failures), RetryDelayOf(status).value_or(absl::ZeroDuration()));
-    if (SinceBoot() + delay >= deadline) {
-      return status;
-    }
-    if (!Wait(delay, stop)) {
+    if (!Wait(*delay, stop)) {
       return CancelledByCaller();
     }
   }

@@ -1,4 +1,4 @@
-#include "client/grpc_connection.h"
+#include "client/grpc/grpc_connection.h"
 
 #include <algorithm>
 #include <random>

@@ -1,13 +1,13 @@
 // The Connection over gRPC. Private to this folder.
-#ifndef WELLSPACE_CLIENT_GRPC_CONNECTION_H_
-#define WELLSPACE_CLIENT_GRPC_CONNECTION_H_
+#ifndef WELLSPACE_CLIENT_GRPC_GRPC_CONNECTION_H_
+#define WELLSPACE_CLIENT_GRPC_GRPC_CONNECTION_H_
 
 #include <functional>
 #include <memory>
 #include <string>
 
 #include "client/connection.h"
-#include "client/retry.h"
+#include "client/grpc/retry.h"
 #include "grpc/health/v1/health.grpc.pb.h"
 #include "wellspace/v1/meshing.grpc.pb.h"
 #include "wellspace/v1/operations.grpc.pb.h"
@@ -20,7 +20,7 @@ class GrpcConnection final : public Connection {
  public:
   GrpcConnection(const std::shared_ptr<grpc::Channel>& channel, const RetryPolicy& policy);
 
-  // grpc_meshing.cc
+  // meshing.cc
   absl::Status MeshPoints(const MeshOptions& options, std::span<const double> points, MeshSink& sink,
                           const OnProgress& on_progress, const CallOptions& call) override;
   absl::StatusOr<MeshEstimate> EstimateMesh(const MeshOptions& options, std::span<const double> points,
@@ -28,7 +28,7 @@ class GrpcConnection final : public Connection {
   absl::StatusOr<ServerInfo> GetServerInfo(const CallOptions& call) override;
   absl::StatusOr<Health> CheckHealth(const std::string& service, const CallOptions& call) override;
 
-  // grpc_sessions.cc
+  // sessions.cc
   absl::StatusOr<Session> CreateSession(const SessionOptions& options, const CallOptions& call) override;
   absl::StatusOr<Session> GetSession(const std::string& session, const CallOptions& call) override;
   absl::StatusOr<SessionPage> ListSessions(const Labels& labels, const PageOptions& page,
@@ -37,13 +37,13 @@ class GrpcConnection final : public Connection {
                                         const CallOptions& call) override;
   absl::Status DeleteSession(const std::string& session, const CallOptions& call) override;
 
-  // grpc_transfers.cc
+  // transfers.cc
   absl::StatusOr<Uploaded> UploadPoints(const std::string& session, PointSource& source, std::optional<uint64_t> offset,
                                         const OnPoints& on_points, const CallOptions& call) override;
   absl::Status DownloadMesh(const std::string& session, MeshSink& sink, uint64_t revision, const OnChunks& on_chunks,
                             const CallOptions& call) override;
 
-  // grpc_operations.cc
+  // operations.cc
   absl::StatusOr<Operation> StartRefinement(const std::string& session, const std::optional<MeshOptions>& parameters,
                                             const CallOptions& call) override;
   absl::StatusOr<Operation> GetOperation(const std::string& operation, const CallOptions& call) override;
@@ -53,7 +53,7 @@ class GrpcConnection final : public Connection {
   absl::StatusOr<Operation> WatchOperation(const std::string& operation, const OnProgress& on_progress,
                                            std::optional<uint64_t> after_sequence, const CallOptions& call) override;
 
-  // grpc_queries.cc
+  // queries.cc
   absl::Status ApproximateNearestNeighbors(const std::string& session, std::span<const uint32_t> vertices,
                                            const OnDistances& on_distances, const CallOptions& call) override;
   absl::Status ClippedVoronoiCells(const std::string& session, std::span<const uint32_t> vertices, double beta,
@@ -93,4 +93,4 @@ std::string RequestIdOf(const CallOptions& call);
 
 }  // namespace wellspace::client
 
-#endif  // WELLSPACE_CLIENT_GRPC_CONNECTION_H_
+#endif  // WELLSPACE_CLIENT_GRPC_GRPC_CONNECTION_H_

@@ -1,6 +1,6 @@
 // SessionService on the client's side, but for the streams.
-#include "client/convert.h"
-#include "client/grpc_connection.h"
+#include "client/grpc/convert.h"
+#include "client/grpc/grpc_connection.h"
 
 namespace wellspace::client {
 

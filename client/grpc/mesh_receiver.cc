@@ -1,4 +1,4 @@
-#include "client/mesh_receiver.h"
+#include "client/grpc/mesh_receiver.h"
 
 #include <algorithm>
 #include <limits>
@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "client/convert.h"
+#include "client/grpc/convert.h"
 #include "proto/checksum.h"
 
 namespace wellspace::client {

@@ -5,11 +5,11 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
-#include "client/convert.h"
 #include "client/error_details.h"
-#include "client/grpc_connection.h"
-#include "client/mesh_receiver.h"
-#include "client/request_writer.h"
+#include "client/grpc/convert.h"
+#include "client/grpc/grpc_connection.h"
+#include "client/grpc/mesh_receiver.h"
+#include "client/grpc/request_writer.h"
 #include "proto/checksum.h"
 
 namespace wellspace::client {

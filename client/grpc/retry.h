@@ -1,6 +1,6 @@
-// When a call is made again.
-#ifndef WELLSPACE_CLIENT_RETRY_H_
-#define WELLSPACE_CLIENT_RETRY_H_
+// Calls that are made again, as a RetryPolicy says.
+#ifndef WELLSPACE_CLIENT_GRPC_RETRY_H_
+#define WELLSPACE_CLIENT_GRPC_RETRY_H_
 
 #include <atomic>
 #include <functional>
@@ -9,34 +9,15 @@
 
 #include "absl/status/status.h"
 #include "absl/time/time.h"
+#include "client/retry_policy.h"
 #include "grpcpp/client_context.h"
 #include "grpcpp/support/status.h"
 
 namespace wellspace::client {
 
-// How patient a connection is. An attempt that brought something (a chunk, an event, committed points) is not counted:
-// those after it begin anew.
-struct RetryPolicy {
-  // Attempts in a row that may fail, with a server that has answered before; at least 1.
-  int max_attempts = 8;
-
-  // The same with a server that has never answered: its address may be wrong.
-  int max_first_attempts = 3;
-
-  // Waiting time before the second attempt; grows by `multiplier` for each further one, up to `max_backoff`. A random
-  // half of it is left out, so that clients of a server that comes back do not come all at once. What the server asks
-  // for (google.rpc.RetryInfo) is waited for in full.
-  absl::Duration initial_backoff = absl::Milliseconds(200);
-  double multiplier = 2;
-  absl::Duration max_backoff = absl::Seconds(10);
-};
-
 // The status of a call as the library returns it: code, message, and the google.rpc details as payloads under their
 // type URLs.
 absl::Status FromGrpcStatus(const grpc::Status& status);
-
-// Whether the same call may succeed later: UNAVAILABLE, a reader that stalled, and what has a google.rpc.RetryInfo.
-bool IsWorthRepeating(const absl::Status& status);
 
 // A clock for timeouts: it does not jump when that on the wall is set. Zero when the machine was started, sleep
 // included.
@@ -109,4 +90,4 @@ class Retrier {
 
 }  // namespace wellspace::client
 
-#endif  // WELLSPACE_CLIENT_RETRY_H_
+#endif  // WELLSPACE_CLIENT_GRPC_RETRY_H_

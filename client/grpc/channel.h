@@ -1,6 +1,6 @@
 // The way to a server: plain text or TLS, with or without credentials.
-#ifndef WELLSPACE_CLIENT_CHANNEL_H_
-#define WELLSPACE_CLIENT_CHANNEL_H_
+#ifndef WELLSPACE_CLIENT_GRPC_CHANNEL_H_
+#define WELLSPACE_CLIENT_GRPC_CHANNEL_H_
 
 #include <memory>
 #include <string>
@@ -24,4 +24,4 @@ absl::StatusOr<std::shared_ptr<grpc::Channel>> OpenChannel(const std::string& ad
 
 }  // namespace wellspace::client
 
-#endif  // WELLSPACE_CLIENT_CHANNEL_H_
+#endif  // WELLSPACE_CLIENT_GRPC_CHANNEL_H_

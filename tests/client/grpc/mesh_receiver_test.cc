@@ -1,4 +1,4 @@
-#include "client/mesh_receiver.h"
+#include "client/grpc/mesh_receiver.h"
 
 #include <cstdint>
 #include <functional>

@@ -1,13 +1,13 @@
 // A mesh from the chunks of a stream, with nothing that the server says believed unchecked.
-#ifndef WELLSPACE_CLIENT_MESH_RECEIVER_H_
-#define WELLSPACE_CLIENT_MESH_RECEIVER_H_
+#ifndef WELLSPACE_CLIENT_GRPC_MESH_RECEIVER_H_
+#define WELLSPACE_CLIENT_GRPC_MESH_RECEIVER_H_
 
 #include <array>
 #include <cstdint>
 #include <optional>
 
 #include "absl/status/status.h"
-#include "client/mesh.h"
+#include "client/mesh_sink.h"
 #include "wellspace/v1/mesh.pb.h"
 
 namespace wellspace::client {
@@ -82,4 +82,4 @@ class MeshReceiver {
 
 }  // namespace wellspace::client
 
-#endif  // WELLSPACE_CLIENT_MESH_RECEIVER_H_
+#endif  // WELLSPACE_CLIENT_GRPC_MESH_RECEIVER_H_

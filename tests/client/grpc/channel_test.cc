@@ -1,4 +1,4 @@
-#include "client/channel.h"
+#include "client/grpc/channel.h"
 
 #include <cstdlib>
 #include <map>

@@ -1,0 +1,40 @@
+// A Client over a channel of gRPC.
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "client/client.h"
+#include "client/connection.h"
+#include "client/grpc/channel.h"
+
+namespace wellspace::client {
+namespace {
+
+// Above what the server sends (chunks of at most 1 MiB).
+constexpr int kMaxResponseBytes = 4 * 1024 * 1024;
+
+// A server whose machine has vanished is noticed by pings.
+constexpr int kKeepaliveMs = 20'000;
+constexpr int kKeepaliveTimeoutMs = 10'000;
+
+// How soon after a lost connection a new one is tried, and how much later each time.
+constexpr int kInitialReconnectMs = 200;
+constexpr int kMaxReconnectMs = 5'000;
+
+}  // namespace
+
+absl::StatusOr<Client> Connect(const std::string& address, const ConnectOptions& options) {
+  grpc::ChannelArguments arguments;
+  arguments.SetMaxReceiveMessageSize(kMaxResponseBytes);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, kKeepaliveMs);
+  arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
+  arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kInitialReconnectMs);
+  arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kMaxReconnectMs);
+  absl::StatusOr<std::shared_ptr<grpc::Channel>> channel = OpenChannel(address, options, arguments);
+  if (!channel.ok()) {
+    return channel.status();
+  }
+  return Client(MakeConnection(*std::move(channel)));
+}
+
+}  // namespace wellspace::client
