@@ -128,8 +128,8 @@ std::vector<std::string> Server::ServiceNames() {
 }
 
 std::string Server::TenantOf(const grpc::ServerContextBase& context) const {
-  Caller caller;
-  return security_->authenticator().Authenticate(context, &caller).ok() ? caller.tenant : "";
+  const absl::StatusOr<Caller> caller = security_->authenticator().Authenticate(context);
+  return caller.ok() ? caller->tenant : "";
 }
 
 absl::StatusOr<std::shared_ptr<grpc::Channel>> Server::InProcessChannel() {

@@ -52,8 +52,9 @@ class Call : public Reactor, public std::enable_shared_from_this<Call<Reactor>> 
   // What the log says of the call besides its end.
   virtual LogFields Figures() const { return {}; }
 
-  // Ends the call with `status`: now, or when the write in flight is done. Only the first call counts.
-  void End(grpc::Status status);
+  // Ends the call with `status`: now, or when the write in flight is done. Only the first call counts. Clients see it
+  // as ToGrpcStatus makes it.
+  void End(absl::Status status);
   void FinishNow();
   bool ending() const { return ending_; }
 
@@ -94,7 +95,7 @@ class Call : public Reactor, public std::enable_shared_from_this<Call<Reactor>> 
   // Guarded by mutex_.
   std::shared_ptr<Call> self_;
   bool ending_ = false;
-  grpc::Status final_status_;
+  absl::Status final_status_;
 };
 
 template <typename Reactor>
@@ -103,13 +104,16 @@ Reactor* Call<Reactor>::Begin(std::shared_ptr<Call> call) {
   call->self_ = call;
   const CallRegistry::Admission admission = call->environment_.calls.Add(call->WeakCall(&Call::Abort));
   call->id_ = admission.id;
-  if (grpc::Status status = call->environment_.authenticator.Authenticate(*call->context_, &call->caller_);
-      !status.ok()) {
-    call->End(std::move(status));
-  } else if (!admission.admitted) {
-    call->End(MakeError(v1::ERROR_REASON_SERVER_STOPPING, "the server is stopping and takes no new calls"));
-  } else {
+  absl::StatusOr<Caller> caller = call->environment_.authenticator.Authenticate(*call->context_);
+  if (!caller.ok()) {
+    call->End(std::move(caller).status());
+    return call.get();
+  }
+  call->caller_ = *std::move(caller);
+  if (admission.admitted) {
     call->OnBegin();
+  } else {
+    call->End(MakeError(v1::ERROR_REASON_SERVER_STOPPING, "the server is stopping and takes no new calls"));
   }
   return call.get();
 }
@@ -124,12 +128,12 @@ template <typename Reactor>
 void Call<Reactor>::OnCancel() {
   std::lock_guard lock(mutex_);
   const bool late = absl::FromChrono(context_->deadline()) <= absl::Now() + kDeadlineSlack;
-  End(late ? grpc::Status(grpc::StatusCode::DEADLINE_EXCEEDED, "the deadline of the call passed")
-           : grpc::Status(grpc::StatusCode::CANCELLED, "the client cancelled the call or is gone"));
+  End(late ? absl::DeadlineExceededError("the deadline of the call passed")
+           : absl::CancelledError("the client cancelled the call or is gone"));
 }
 
 template <typename Reactor>
-void Call<Reactor>::End(grpc::Status status) {
+void Call<Reactor>::End(absl::Status status) {
   if (ending_) {
     return;
   }
@@ -144,7 +148,7 @@ void Call<Reactor>::End(grpc::Status status) {
 template <typename Reactor>
 void Call<Reactor>::FinishNow() {
   environment_.observability.calls().Note(context_, Figures());
-  this->Finish(final_status_);
+  this->Finish(ToGrpcStatus(final_status_));
 }
 
 template <typename Reactor>

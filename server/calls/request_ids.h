@@ -13,9 +13,9 @@
 #include <utility>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "absl/time/time.h"
 #include "google/protobuf/message.h"
-#include "grpcpp/support/status.h"
 
 namespace wellspace::server {
 
@@ -33,7 +33,7 @@ class RequestIds {
 
   // How a call ended; `response` is what it answered, serialized, if it succeeded.
   struct Answer {
-    grpc::Status status;
+    absl::Status status;
     std::string response;
   };
   using Done = std::function<void(const Answer&)>;

@@ -71,7 +71,7 @@ void ResponseStream<Base, Response>::OnWriteDone(bool ok) {
   if (this->ending()) {
     this->FinishNow();
   } else if (!ok) {
-    this->End(grpc::Status(grpc::StatusCode::CANCELLED, "the client is gone"));
+    this->End(absl::CancelledError("the client is gone"));
   } else {
     WriteNext();
   }
@@ -83,11 +83,11 @@ void ResponseStream<Base, Response>::CheckStall() {
   if (this->ending() || !stall_.IsStalled(this->WeakCall(&ResponseStream::CheckStall))) {
     return;
   }
-  grpc::Status status =
+  absl::Status status =
       MakeError(v1::ERROR_REASON_READER_STALLED,
                 absl::StrCat("READER_STALLED: the client has not taken a message of the answer within ",
                              absl::FormatDuration(stall_.limit()), "; read it faster, or go on where it ended"));
-  const std::string message = status.error_message();
+  const std::string message = ToGrpcStatus(status).error_message();
   this->End(std::move(status));
   // Finish would wait behind the write. This sends code and message ahead of it, and ends the write.
   grpc_call_cancel_with_status(this->context()->c_call(), GRPC_STATUS_DEADLINE_EXCEEDED, message.c_str(), nullptr);

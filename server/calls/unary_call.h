@@ -18,7 +18,7 @@ class UnaryCall final : public Call<grpc::ServerUnaryReactor> {
  public:
   UnaryCall(const CallEnvironment& environment, grpc::CallbackServerContext* context) : Call(environment, context) {}
 
-  // Serves a call that `handler` answers at once: grpc::Status handler(const Caller&, Response&).
+  // Serves a call that `handler` answers at once: absl::Status handler(const Caller&, Response&).
   template <typename Response, typename Handler>
   static grpc::ServerUnaryReactor* Serve(const CallEnvironment& environment, grpc::CallbackServerContext* context,
                                          Response* response, const Handler& handler) {
@@ -39,7 +39,7 @@ class UnaryCall final : public Call<grpc::ServerUnaryReactor> {
     if (call->is_admitted_) {
       const auto work = [&](const RequestIds::Done& done) {
         Response answer;
-        const grpc::Status status = RunGuarded([&] { return handler(call->caller(), answer); });
+        const absl::Status status = RunGuarded([&] { return handler(call->caller(), answer); });
         done({status, answer.SerializeAsString()});
       };
       environment.request_ids.Once(
@@ -52,7 +52,7 @@ class UnaryCall final : public Call<grpc::ServerUnaryReactor> {
  private:
   void OnBegin() override { is_admitted_ = true; }
 
-  void EndWith(grpc::Status status) {
+  void EndWith(absl::Status status) {
     std::lock_guard lock(mutex_);
     End(std::move(status));
   }

@@ -7,14 +7,14 @@
 
 namespace wellspace::server {
 
-grpc::Status ParseRequest(grpc::ByteBuffer* bytes, google::protobuf::Message* message) {
+absl::Status ParseRequest(grpc::ByteBuffer* bytes, google::protobuf::Message* message) {
   bool is_parsed = false;
   {
     grpc::ProtoBufferReader reader(bytes);
     is_parsed = reader.status().ok() && message->ParseFromZeroCopyStream(&reader);
   }
   bytes->Clear();
-  return is_parsed ? grpc::Status::OK
+  return is_parsed ? absl::OkStatus()
                    : MakeError(v1::ERROR_REASON_MALFORMED_REQUEST,
                                absl::StrCat("a request is not a serialized ", message->GetTypeName()));
 }

@@ -2,9 +2,9 @@
 #ifndef WELLSPACE_SERVER_CALLS_WIRE_H_
 #define WELLSPACE_SERVER_CALLS_WIRE_H_
 
+#include "absl/status/status.h"
 #include "google/protobuf/message.h"
 #include "grpcpp/support/byte_buffer.h"
-#include "grpcpp/support/status.h"
 
 namespace wellspace::server {
 
@@ -12,7 +12,7 @@ namespace wellspace::server {
 // no message for the end of the stream.
 //
 // Errors:     MALFORMED_REQUEST.
-grpc::Status ParseRequest(grpc::ByteBuffer* bytes, google::protobuf::Message* message);
+absl::Status ParseRequest(grpc::ByteBuffer* bytes, google::protobuf::Message* message);
 
 grpc::ByteBuffer Serialize(const google::protobuf::Message& message);
 

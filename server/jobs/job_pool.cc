@@ -59,9 +59,9 @@ JobPool::~JobPool() {
   }
 }
 
-JobPool::Submission JobPool::Submit(JobRequest request) {
+absl::StatusOr<std::shared_ptr<Job>> JobPool::Submit(JobRequest request) {
   const std::shared_ptr<Job> job(new Job(*this, std::move(request)));
-  grpc::Status refusal;
+  absl::Status refusal;
   {
     std::lock_guard lock(mutex_);
     refusal = CheckPlaceFor(*job);
@@ -71,15 +71,15 @@ JobPool::Submission JobPool::Submit(JobRequest request) {
       job->sequence_ = next_sequence_++;
       AddToQueue(job);
       Dispatch();
-      return Submission{.job = job, .refusal = grpc::Status::OK};
+      return job;
     }
   }
   job->work_ = nullptr;
   job->ReleaseAll();
-  return Submission{.job = nullptr, .refusal = std::move(refusal)};
+  return refusal;
 }
 
-grpc::Status JobPool::CheckPlaceFor(const Job& job) const {
+absl::Status JobPool::CheckPlaceFor(const Job& job) const {
   const size_t small = small_jobs_;
   const size_t all = queue_.size() + running_ + running_small_;
   const bool has_place = job.is_small_ ? small < static_cast<size_t>(limits_.small_workers) + limits_.max_queued
@@ -96,7 +96,7 @@ grpc::Status JobPool::CheckPlaceFor(const Job& job) const {
                      absl::StrCat(of_tenant, " jobs of this tenant run or are in line; it may have ",
                                   limits_.max_per_tenant, "; try again later"));
   }
-  return grpc::Status::OK;
+  return absl::OkStatus();
 }
 
 void JobPool::Cancel(const std::shared_ptr<Job>& job) {

@@ -15,8 +15,8 @@
 #include <thread>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "absl/time/time.h"
-#include "grpcpp/support/status.h"
 #include "server/jobs/fair_queue.h"
 #include "server/jobs/job.h"
 #include "server/jobs/memory_budget.h"
@@ -67,11 +67,6 @@ class JobPool {
     Begun others;
   };
 
-  struct Submission {
-    std::shared_ptr<Job> job;  // null if refused
-    grpc::Status refusal;      // QUEUE_FULL, or QUOTA_EXCEEDED when the tenant has as many jobs as it may have
-  };
-
   // REQUIRES:   `memory` outlives this.
   JobPool(const Limits& limits, MemoryBudget& memory);
   // Cancels all jobs and waits for those that run.
@@ -80,7 +75,9 @@ class JobPool {
   JobPool& operator=(const JobPool&) = delete;
 
   // Takes a job into the queue. Its work may begin, and end, before this returns.
-  Submission Submit(JobRequest request);
+  //
+  // Errors:     QUEUE_FULL; QUOTA_EXCEEDED when the tenant has as many jobs as it may have.
+  absl::StatusOr<std::shared_ptr<Job>> Submit(JobRequest request);
 
   // Cancels the context of `job`; one in the queue that has not begun leaves it at once. Does not wait for one that
   // runs.
@@ -111,7 +108,7 @@ class JobPool {
   // The following want mutex_ to be held.
 
   // Why `job` cannot be taken; OK if it can.
-  grpc::Status CheckPlaceFor(const Job& job) const;
+  absl::Status CheckPlaceFor(const Job& job) const;
   // Starts jobs as long as there are workers for them. To be called when anything has changed.
   void Dispatch();
   // Starts the job whose turn it is, or refuses one where nothing else helps. False when all have to wait.

@@ -36,8 +36,8 @@ class MemoryBudget {
 
   // Sets `bytes` aside for `what`, which the error names: "a call", "the points of a session", …
   //
-  // Errors:     RESOURCE_EXHAUSTED with the figures, which FromCoreStatus (server/wire/errors.h) makes a MEMORY_LIMIT:
-  //             with RetryInfo when the bytes could be had were other reservations released.
+  // Errors:     MEMORY_LIMIT with the figures, and with RetryInfo when the bytes could be had were other reservations
+  //             released.
   absl::StatusOr<MemoryReservation> Reserve(uint64_t bytes, const std::string& what);
 
   // A reservation of no bytes, to be resized.

@@ -133,10 +133,11 @@ class CallObserver::Interceptor final : public grpc::experimental::Interceptor {
     if (status.error_code() != grpc::StatusCode::UNIMPLEMENTED || !method_.is_known || method_.service == kChannelz) {
       return status;
     }
-    return tenant_.empty()
-               ? MakeError(v1::ERROR_REASON_UNAUTHENTICATED, "this server wants to know who calls")
-               : MakeError(v1::ERROR_REASON_MALFORMED_REQUEST,
-                           absl::StrCat("the request is not one message of ", method_.service, ".", method_.name));
+    return ToGrpcStatus(
+        tenant_.empty()
+            ? MakeError(v1::ERROR_REASON_UNAUTHENTICATED, "this server wants to know who calls")
+            : MakeError(v1::ERROR_REASON_MALFORMED_REQUEST,
+                        absl::StrCat("the request is not one message of ", method_.service, ".", method_.name)));
   }
 
   // A synchronous call has a peer once its metadata have come, which is the first event that is intercepted; any other

@@ -3,9 +3,11 @@
 #include <iterator>
 #include <optional>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "absl/strings/match.h"
+#include "core/base/status_macros.h"
 #include "grpc/grpc_security_constants.h"
 #include "server/wire/errors.h"
 
@@ -15,27 +17,26 @@ namespace {
 constexpr char kMetadataKey[] = "authorization";
 constexpr std::string_view kScheme = "bearer ";
 
-grpc::Status Unauthenticated(const std::string& message) {
+absl::Status Unauthenticated(const std::string& message) {
   return MakeError(v1::ERROR_REASON_UNAUTHENTICATED, message);
 }
 
-grpc::Status CheckCertificate(const grpc::AuthContext& peer, Caller* caller) {
+absl::StatusOr<Caller> CallerByCertificate(const grpc::AuthContext& peer) {
   if (!peer.IsPeerAuthenticated()) {
     return Unauthenticated("this server wants a client certificate, and the connection has none");
   }
   const std::vector<grpc::string_ref> names = peer.FindPropertyValues(GRPC_X509_CN_PROPERTY_NAME);
-  const std::string name = names.size() == 1 ? std::string(names[0].data(), names[0].size()) : "";
+  std::string name = names.size() == 1 ? std::string(names[0].data(), names[0].size()) : "";
   if (!IsTenantName(name)) {
     return Unauthenticated(
         "the client certificate names no tenant: the common name of its subject must be 1 to 64 letters, digits, '.', "
         "'_', '@' "
         "and '-', the first a letter or a digit");
   }
-  caller->tenant = name;
-  return grpc::Status::OK;
+  return Caller{.tenant = std::move(name)};
 }
 
-grpc::Status CheckToken(const TokenTable& tokens, const grpc::ServerContextBase& context, Caller* caller) {
+absl::StatusOr<Caller> CallerByToken(const TokenTable& tokens, const grpc::ServerContextBase& context) {
   const auto [first, last] = context.client_metadata().equal_range(kMetadataKey);
   if (first == last) {
     return Unauthenticated("this server wants a token, in the metadata `authorization: Bearer TOKEN`");
@@ -48,27 +49,21 @@ grpc::Status CheckToken(const TokenTable& tokens, const grpc::ServerContextBase&
   if (!tenant.has_value()) {
     return Unauthenticated("this server does not know the token");
   }
-  caller->tenant = *std::move(tenant);
-  return grpc::Status::OK;
+  return Caller{.tenant = *std::move(tenant)};
 }
 
 }  // namespace
 
-grpc::Status Authenticator::Authenticate(const grpc::ServerContextBase& context, Caller* caller) const {
+absl::StatusOr<Caller> Authenticator::Authenticate(const grpc::ServerContextBase& context) const {
   const Demands demands = GetDemands();
-  Caller found;
+  Caller caller;
   if (demands.client_certificate) {
-    if (grpc::Status status = CheckCertificate(*context.auth_context(), &found); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_ASSIGN_OR_RETURN(caller, CallerByCertificate(*context.auth_context()));
   }
   if (demands.tokens != nullptr) {
-    if (grpc::Status status = CheckToken(*demands.tokens, context, &found); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_ASSIGN_OR_RETURN(caller, CallerByToken(*demands.tokens, context));
   }
-  *caller = std::move(found);
-  return grpc::Status::OK;
+  return caller;
 }
 
 void Authenticator::SetDemands(Demands demands) {

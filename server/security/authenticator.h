@@ -7,8 +7,8 @@
 #include <string>
 #include <utility>
 
+#include "absl/status/statusor.h"
 #include "grpcpp/server_context.h"
-#include "grpcpp/support/status.h"
 #include "server/security/tokens.h"
 
 namespace wellspace::server {
@@ -33,11 +33,11 @@ class Authenticator {
   Authenticator() = default;
   explicit Authenticator(Demands demands) : demands_(std::move(demands)) {}
 
-  // OK, and who calls in `caller`; or the UNAUTHENTICATED with which the call is to be ended at once, without a look at
-  // what it asks for. Neither waits nor does I/O.
+  // The caller of the call that has `context`. Neither waits nor does I/O.
   //
-  // Guarantees: the message has nothing of what the caller showed.
-  grpc::Status Authenticate(const grpc::ServerContextBase& context, Caller* caller) const;
+  // Guarantees: the message of an error has nothing of what the caller showed.
+  // Errors:     UNAUTHENTICATED: the call is to be ended at once, without a look at what it asks for.
+  absl::StatusOr<Caller> Authenticate(const grpc::ServerContextBase& context) const;
 
   // These are for calls that come from now on.
   void SetDemands(Demands demands);

@@ -6,6 +6,7 @@
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
+#include "core/base/status_macros.h"
 #include "server/sessions/session_store.h"
 #include "server/wire/errors.h"
 
@@ -25,7 +26,7 @@ std::vector<std::string> Parts(const std::string& name) {
   return has_empty ? std::vector<std::string>() : parts;
 }
 
-grpc::Status InvalidName(const std::string& name, const std::string& field, const char* accepted) {
+absl::Status InvalidName(const std::string& name, const std::string& field, const char* accepted) {
   return MakeError(v1::ERROR_REASON_INVALID_REQUEST,
                    absl::StrCat(field, ": \"", absl::Utf8SafeCHexEscape(name.substr(0, kMaxLength)),
                                 "\" is not accepted; expected ", accepted),
@@ -34,27 +35,26 @@ grpc::Status InvalidName(const std::string& name, const std::string& field, cons
 
 }  // namespace
 
-grpc::Status FindSession(const CallEnvironment& environment, const Caller& caller, const std::string& name,
-                         std::shared_ptr<Session>* session, const std::string& field) {
+absl::StatusOr<std::shared_ptr<Session>> FindSession(const CallEnvironment& environment, const Caller& caller,
+                                                     const std::string& name, const std::string& field) {
   const std::vector<std::string> parts = Parts(name);
   if (parts.size() != 2 || parts[0] != "sessions") {
     return InvalidName(name, field, "sessions/{session}");
   }
-  return environment.sessions.Find(caller.tenant, name, session);
+  return environment.sessions.Find(caller.tenant, name);
 }
 
-grpc::Status FindOperation(const CallEnvironment& environment, const Caller& caller, const std::string& name,
-                           FoundOperation* found) {
+absl::StatusOr<FoundOperation> FindOperation(const CallEnvironment& environment, const Caller& caller,
+                                             const std::string& name) {
   const std::vector<std::string> parts = Parts(name);
   if (parts.size() != 4 || parts[0] != "sessions" || parts[2] != "operations") {
     return InvalidName(name, "name", "sessions/{session}/operations/{operation}");
   }
-  if (grpc::Status status =
-          environment.sessions.Find(caller.tenant, absl::StrCat("sessions/", parts[1]), &found->session);
-      !status.ok()) {
-    return status;
-  }
-  return found->session->FindOperation(name, &found->operation);
+  FoundOperation found;
+  WELLSPACE_ASSIGN_OR_RETURN(found.session,
+                             environment.sessions.Find(caller.tenant, absl::StrCat("sessions/", parts[1])));
+  WELLSPACE_ASSIGN_OR_RETURN(found.operation, found.session->FindOperation(name));
+  return found;
 }
 
 }  // namespace wellspace::server

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "grpcpp/support/status.h"
+#include "absl/status/statusor.h"
 #include "server/calls/call_environment.h"
 #include "server/security/authenticator.h"
 #include "server/sessions/operation.h"
@@ -16,8 +16,8 @@ namespace wellspace::server {
 // The session `name` of the caller's tenant, its lease renewed. `field` is where the request has the name.
 //
 // Errors:     INVALID_REQUEST, SESSION_NOT_FOUND.
-grpc::Status FindSession(const CallEnvironment& environment, const Caller& caller, const std::string& name,
-                         std::shared_ptr<Session>* session, const std::string& field = "name");
+absl::StatusOr<std::shared_ptr<Session>> FindSession(const CallEnvironment& environment, const Caller& caller,
+                                                     const std::string& name, const std::string& field = "name");
 
 struct FoundOperation {
   std::shared_ptr<Session> session;
@@ -27,8 +27,8 @@ struct FoundOperation {
 // The same for an operation, of which the request has the name in `name`.
 //
 // Errors:     INVALID_REQUEST, SESSION_NOT_FOUND, OPERATION_NOT_FOUND.
-grpc::Status FindOperation(const CallEnvironment& environment, const Caller& caller, const std::string& name,
-                           FoundOperation* found);
+absl::StatusOr<FoundOperation> FindOperation(const CallEnvironment& environment, const Caller& caller,
+                                             const std::string& name);
 
 }  // namespace wellspace::server
 

@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
+#include "core/base/status_macros.h"
 #include "server/services/page_token.h"
 #include "server/wire/convert.h"
 #include "server/wire/errors.h"
@@ -25,7 +26,7 @@ size_t CharactersOf(std::string_view text) {
   return std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xc0) != 0x80; });
 }
 
-grpc::Status Invalid(const std::string& message, const std::string& field) {
+absl::Status Invalid(const std::string& message, const std::string& field) {
   return MakeError(v1::ERROR_REASON_INVALID_REQUEST, message, field);
 }
 
@@ -36,8 +37,8 @@ std::string BoxToString(const std::vector<double>& low, const std::vector<double
 
 }  // namespace
 
-grpc::Status LabelsFromProto(const google::protobuf::Map<std::string, std::string>& message, const std::string& field,
-                             Labels* labels) {
+absl::StatusOr<Labels> LabelsFromProto(const google::protobuf::Map<std::string, std::string>& message,
+                                       const std::string& field) {
   if (message.size() > kMaxLabels) {
     return Invalid(absl::StrCat("there are ", message.size(), " labels; at most ", kMaxLabels, " are accepted"), field);
   }
@@ -53,101 +54,91 @@ grpc::Status LabelsFromProto(const google::protobuf::Map<std::string, std::strin
                      field);
     }
   }
-  labels->clear();
-  labels->insert(message.begin(), message.end());
-  return grpc::Status::OK;
+  return Labels(message.begin(), message.end());
 }
 
-grpc::Status TtlFromProto(const google::protobuf::Duration* message, const std::string& field,
-                          const ServiceOptions& options, absl::Duration* ttl) {
+absl::StatusOr<absl::Duration> TtlFromProto(const google::protobuf::Duration* message, const std::string& field,
+                                            const ServiceOptions& options) {
   if (message == nullptr) {
-    *ttl = options.default_ttl;
-    return grpc::Status::OK;
+    return options.default_ttl;
   }
-  *ttl = absl::Seconds(message->seconds()) + absl::Nanoseconds(message->nanos());
+  const absl::Duration ttl = absl::Seconds(message->seconds()) + absl::Nanoseconds(message->nanos());
   const bool is_duration = std::abs(message->nanos()) < kNanosPerSecond;
-  if (!is_duration || *ttl < kMinTtl || *ttl > options.max_ttl) {
+  if (!is_duration || ttl < kMinTtl || ttl > options.max_ttl) {
     return Invalid(
         absl::StrCat(field, " is ", message->seconds(), " s and ", message->nanos(), " ns; ",
                      absl::FormatDuration(kMinTtl), " to ", absl::FormatDuration(options.max_ttl), " are accepted"),
         field);
   }
-  return grpc::Status::OK;
+  return ttl;
 }
 
-grpc::Status PageSizeFromProto(int32_t page_size, size_t* count) {
+absl::StatusOr<size_t> PageSizeFromProto(int32_t page_size) {
   if (page_size < 0) {
     return Invalid(absl::StrCat("page_size is ", page_size, "; 0 or more is accepted"), "page_size");
   }
-  *count = page_size == 0 ? kMaxPageSize : std::min(page_size, kMaxPageSize);
-  return grpc::Status::OK;
+  return page_size == 0 ? kMaxPageSize : std::min(page_size, kMaxPageSize);
 }
 
-grpc::Status PositionFromProto(const std::string& token, const std::string& list, uint64_t begin, uint64_t* position) {
+absl::StatusOr<uint64_t> PositionFromProto(const std::string& token, const std::string& list, uint64_t begin) {
   if (token.empty()) {
-    *position = begin;
-    return grpc::Status::OK;
+    return begin;
   }
   const std::optional<uint64_t> read = ReadPageToken(list, token);
   if (!read.has_value()) {
     return Invalid("page_token was not given for this list; expected next_page_token of the page before, or none",
                    "page_token");
   }
-  *position = *read;
-  return grpc::Status::OK;
+  return *read;
 }
 
-grpc::Status CheckParametersSize(const core::MeshParameters& parameters) {
+absl::Status CheckParametersSize(const core::MeshParameters& parameters) {
   const size_t bytes = ParametersToProto(parameters).ByteSizeLong();
   return bytes <= kMaxParametersBytes
-             ? grpc::Status::OK
+             ? absl::OkStatus()
              : MakeError(v1::ERROR_REASON_INVALID_PARAMETERS,
                          absl::StrCat("size_boxes has ", parameters.size_boxes.size(), " boxes, and the parameters ",
                                       bytes, " bytes; a session's may have at most ", kMaxParametersBytes),
                          "parameters.size_boxes");
 }
 
-grpc::Status ParametersForSession(const v1::MeshParameters& message, const ServiceOptions& options,
-                                  const Session& session, core::MeshParameters* parameters) {
-  if (grpc::Status status = ParametersFromProto(message, options, parameters); !status.ok()) {
-    return status;
-  }
-  if (grpc::Status status = CheckParametersSize(*parameters); !status.ok()) {
-    return status;
-  }
+absl::StatusOr<core::MeshParameters> ParametersForSession(const v1::MeshParameters& message,
+                                                          const ServiceOptions& options, const Session& session) {
+  WELLSPACE_ASSIGN_OR_RETURN(core::MeshParameters parameters, ParametersFromProto(message, options));
+  WELLSPACE_RETURN_IF_ERROR(CheckParametersSize(parameters));
   const core::MeshParameters known = session.parameters();
-  if (parameters->dimension != known.dimension) {
+  if (parameters.dimension != known.dimension) {
     return MakeError(v1::ERROR_REASON_INVALID_PARAMETERS,
-                     absl::StrCat("dimension is ", parameters->dimension, ", but that of the session is ",
+                     absl::StrCat("dimension is ", parameters.dimension, ", but that of the session is ",
                                   known.dimension, " and cannot change"),
                      "parameters.dimension");
   }
   if (message.has_domain() &&
-      (parameters->domain_low != known.domain_low || parameters->domain_high != known.domain_high)) {
-    return MakeError(v1::ERROR_REASON_INVALID_PARAMETERS,
-                     absl::StrCat("domain is ", BoxToString(parameters->domain_low, parameters->domain_high),
-                                  ", but the session has ", BoxToString(known.domain_low, known.domain_high),
-                                  ", which cannot change; leave it out"),
-                     "parameters.domain");
+      (parameters.domain_low != known.domain_low || parameters.domain_high != known.domain_high)) {
+    return MakeError(
+        v1::ERROR_REASON_INVALID_PARAMETERS,
+        absl::StrCat("domain is ", BoxToString(parameters.domain_low, parameters.domain_high), ", but the session has ",
+                     BoxToString(known.domain_low, known.domain_high), ", which cannot change; leave it out"),
+        "parameters.domain");
   }
   const bool sets_margin = message.has_margin() && known.domain_low.empty();
-  if (sets_margin && parameters->margin != known.margin) {
+  if (sets_margin && parameters.margin != known.margin) {
     return MakeError(v1::ERROR_REASON_INVALID_PARAMETERS,
-                     absl::StrCat("margin is ", parameters->margin, ", but the session has ", known.margin,
+                     absl::StrCat("margin is ", parameters.margin, ", but the session has ", known.margin,
                                   ", which cannot change as the domain depends on it; leave it out"),
                      "parameters.margin");
   }
-  if (message.merge_distance() != 0 && parameters->merge_distance != known.merge_distance) {
+  if (message.merge_distance() != 0 && parameters.merge_distance != known.merge_distance) {
     return MakeError(v1::ERROR_REASON_INVALID_PARAMETERS,
-                     absl::StrCat("merge_distance is ", parameters->merge_distance, ", but the session has ",
+                     absl::StrCat("merge_distance is ", parameters.merge_distance, ", but the session has ",
                                   known.merge_distance, ", which cannot change; leave it out"),
                      "parameters.merge_distance");
   }
-  parameters->merge_distance = known.merge_distance;
-  parameters->domain_low = known.domain_low;
-  parameters->domain_high = known.domain_high;
-  parameters->margin = known.margin;
-  return grpc::Status::OK;
+  parameters.merge_distance = known.merge_distance;
+  parameters.domain_low = known.domain_low;
+  parameters.domain_high = known.domain_high;
+  parameters.margin = known.margin;
+  return parameters;
 }
 
 }  // namespace wellspace::server

@@ -7,11 +7,12 @@
 #include <optional>
 #include <string>
 
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "absl/time/time.h"
 #include "core/mesh_parameters.h"
 #include "google/protobuf/duration.pb.h"
 #include "google/protobuf/map.h"
-#include "grpcpp/support/status.h"
 #include "server/base/options.h"
 #include "server/sessions/session.h"
 #include "wellspace/v1/mesh.pb.h"
@@ -23,35 +24,35 @@ using Labels = std::map<std::string, std::string>;
 // `field` is the path of the labels in their request.
 //
 // Errors:     INVALID_REQUEST.
-grpc::Status LabelsFromProto(const google::protobuf::Map<std::string, std::string>& message, const std::string& field,
-                             Labels* labels);
+absl::StatusOr<Labels> LabelsFromProto(const google::protobuf::Map<std::string, std::string>& message,
+                                       const std::string& field);
 
 // `message` null: the default of the server.
 //
 // Errors:     INVALID_REQUEST.
-grpc::Status TtlFromProto(const google::protobuf::Duration* message, const std::string& field,
-                          const ServiceOptions& options, absl::Duration* ttl);
+absl::StatusOr<absl::Duration> TtlFromProto(const google::protobuf::Duration* message, const std::string& field,
+                                            const ServiceOptions& options);
 
 // How many to list for a request of `page_size`.
 //
 // Errors:     INVALID_REQUEST.
-grpc::Status PageSizeFromProto(int32_t page_size, size_t* count);
+absl::StatusOr<size_t> PageSizeFromProto(int32_t page_size);
 
 // The position of `token` in `list`; `begin` if it is empty.
 //
 // Errors:     INVALID_REQUEST.
-grpc::Status PositionFromProto(const std::string& token, const std::string& list, uint64_t begin, uint64_t* position);
+absl::StatusOr<uint64_t> PositionFromProto(const std::string& token, const std::string& list, uint64_t begin);
 
 // Refuses parameters that are too large to be sent with every answer about their session.
 //
 // Errors:     INVALID_PARAMETERS.
-grpc::Status CheckParametersSize(const core::MeshParameters& parameters);
+absl::Status CheckParametersSize(const core::MeshParameters& parameters);
 
 // The parameters of a refinement of `session` that is asked for with `message`.
 //
 // Errors:     INVALID_PARAMETERS, also for another dimension or domain than the session's.
-grpc::Status ParametersForSession(const v1::MeshParameters& message, const ServiceOptions& options,
-                                  const Session& session, core::MeshParameters* parameters);
+absl::StatusOr<core::MeshParameters> ParametersForSession(const v1::MeshParameters& message,
+                                                          const ServiceOptions& options, const Session& session);
 
 }  // namespace wellspace::server
 

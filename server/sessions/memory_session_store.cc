@@ -27,7 +27,7 @@ std::string UnguessableName() {
 MemorySessionStore::MemorySessionStore(const ServiceOptions& options, MemoryBudget& memory, Clock clock)
     : options_(options), memory_(memory), clock_(std::move(clock)) {}
 
-grpc::Status MemorySessionStore::Create(NewSession settings, std::shared_ptr<Session>* session) {
+absl::StatusOr<std::shared_ptr<Session>> MemorySessionStore::Create(NewSession settings) {
   std::lock_guard lock(mutex_);
   const auto known = tenants_.find(settings.tenant);
   if (known != tenants_.end() && known->second.sessions.size() >= options_.max_sessions_per_tenant) {
@@ -41,28 +41,26 @@ grpc::Status MemorySessionStore::Create(NewSession settings, std::shared_ptr<Ses
   }
   Tenant& tenant = tenants_[settings.tenant];
   last_create_time_ = std::max(clock_.wall(), last_create_time_ + absl::Microseconds(1));
-  *session = std::make_shared<Session>(Session::Settings{.tenant = std::move(settings.tenant),
-                                                         .name = UnguessableName(),
-                                                         .parameters = std::move(settings.parameters),
-                                                         .labels = std::move(settings.labels),
-                                                         .ttl = settings.ttl,
-                                                         .create_time = last_create_time_},
-                                       options_, memory_, clock_, tenant.points);
-  tenant.sessions.emplace(last_create_time_, *session);
-  by_name_.emplace((*session)->name(), *session);
-  return grpc::Status::OK;
+  auto session = std::make_shared<Session>(Session::Settings{.tenant = std::move(settings.tenant),
+                                                             .name = UnguessableName(),
+                                                             .parameters = std::move(settings.parameters),
+                                                             .labels = std::move(settings.labels),
+                                                             .ttl = settings.ttl,
+                                                             .create_time = last_create_time_},
+                                           options_, memory_, clock_, tenant.points);
+  tenant.sessions.emplace(last_create_time_, session);
+  by_name_.emplace(session->name(), session);
+  return session;
 }
 
-grpc::Status MemorySessionStore::Find(const std::string& tenant, const std::string& name,
-                                      std::shared_ptr<Session>* session) {
+absl::StatusOr<std::shared_ptr<Session>> MemorySessionStore::Find(const std::string& tenant, const std::string& name) {
   std::lock_guard lock(mutex_);
   const auto found = by_name_.find(name);
   if (found == by_name_.end() || found->second->tenant() != tenant || !found->second->Renew()) {
     return MakeError(v1::ERROR_REASON_SESSION_NOT_FOUND,
                      absl::StrCat("there is no ", name, "; it may have been deleted, or have expired"));
   }
-  *session = found->second;
-  return grpc::Status::OK;
+  return found->second;
 }
 
 std::vector<std::shared_ptr<Session>> MemorySessionStore::List(const std::string& tenant, absl::Time after,

@@ -24,8 +24,8 @@ class MemorySessionStore final : public SessionStore {
   // REQUIRES:   `options` and `memory` outlive this and all sessions.
   MemorySessionStore(const ServiceOptions& options, MemoryBudget& memory, Clock clock);
 
-  grpc::Status Create(NewSession settings, std::shared_ptr<Session>* session) override;
-  grpc::Status Find(const std::string& tenant, const std::string& name, std::shared_ptr<Session>* session) override;
+  absl::StatusOr<std::shared_ptr<Session>> Create(NewSession settings) override;
+  absl::StatusOr<std::shared_ptr<Session>> Find(const std::string& tenant, const std::string& name) override;
   std::vector<std::shared_ptr<Session>> List(const std::string& tenant, absl::Time after, size_t count,
                                              const std::map<std::string, std::string>& labels) override;
   bool Remove(const Session& session) override;

@@ -108,11 +108,10 @@ void Operation::Succeed(absl::Time now, uint64_t mesh_revision, uint64_t vertice
   End(v1::Operation::STATE_SUCCEEDED, now);
 }
 
-void Operation::Fail(absl::Time now, const grpc::Status& status) {
+void Operation::Fail(absl::Time now, const absl::Status& status) {
   std::lock_guard lock(mutex_);
   error_ = StatusToProto(status);
-  End(status.error_code() == grpc::StatusCode::CANCELLED ? v1::Operation::STATE_CANCELLED : v1::Operation::STATE_FAILED,
-      now);
+  End(absl::IsCancelled(status) ? v1::Operation::STATE_CANCELLED : v1::Operation::STATE_FAILED, now);
 }
 
 core::Progress Operation::Snapshot() const {

@@ -13,9 +13,9 @@
 #include <string>
 #include <utility>
 
+#include "absl/status/status.h"
 #include "absl/time/time.h"
 #include "core/mesh_parameters.h"
-#include "grpcpp/support/status.h"
 #include "server/jobs/job.h"
 #include "server/sessions/progress_pacer.h"
 #include "wellspace/v1/operations.pb.h"
@@ -67,7 +67,7 @@ class Operation {
   // The figures are those of the new mesh.
   void Succeed(absl::Time now, uint64_t mesh_revision, uint64_t vertices, uint64_t simplices);
   // CANCELLED if that is the code of `status`, else FAILED.
-  void Fail(absl::Time now, const grpc::Status& status);
+  void Fail(absl::Time now, const absl::Status& status);
   void Notify() const;
 
  private:

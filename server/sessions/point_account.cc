@@ -41,7 +41,7 @@ PointAccount::PointAccount(std::string session, int dimension, const ServiceOpti
   reserved_.MakeLasting();
 }
 
-grpc::Status PointAccount::Take(uint64_t count) {
+absl::Status PointAccount::Take(uint64_t count) {
   const uint64_t points = points_ + count;
   if (points > options_.max_points) {
     return MakeError(v1::ERROR_REASON_TOO_MANY_POINTS,
@@ -53,7 +53,7 @@ grpc::Status PointAccount::Take(uint64_t count) {
   switch (taken.outcome) {
     case TenantPoints::Outcome::kTaken:
       points_ = points;
-      return grpc::Status::OK;
+      return absl::OkStatus();
     case TenantPoints::Outcome::kAboveLimit:
       return MakeError(v1::ERROR_REASON_QUOTA_EXCEEDED,
                        absl::StrCat("your sessions would have ", taken.points,
@@ -61,7 +61,7 @@ grpc::Status PointAccount::Take(uint64_t count) {
     case TenantPoints::Outcome::kNoRoom:
       break;
   }
-  return FromCoreStatus(memory_.Refusal(BytesOf(points), "the points of a session"));
+  return memory_.Refusal(BytesOf(points), "the points of a session");
 }
 
 void PointAccount::Return(uint64_t count) {

@@ -8,7 +8,7 @@
 #include <mutex>
 #include <string>
 
-#include "grpcpp/support/status.h"
+#include "absl/status/status.h"
 #include "server/base/options.h"
 #include "server/jobs/memory_budget.h"
 
@@ -66,7 +66,7 @@ class PointAccount {
   // Guarantees: on an error nothing has changed; an error is due to points that some account has, never to points that
   //             are being refused on another thread.
   // Errors:     TOO_MANY_POINTS, QUOTA_EXCEEDED, MEMORY_LIMIT.
-  grpc::Status Take(uint64_t count);
+  absl::Status Take(uint64_t count);
 
   // Takes the last `count` points out again.
   //

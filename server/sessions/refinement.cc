@@ -95,22 +95,20 @@ absl::StatusOr<core::Mesh> MeshAgain(const Session& session, const core::MeshPar
 
 // Has the mesh made, by what the session has given for it. What did not succeed leaves nothing behind: a mesher that it
 // has changed is given up, and comes back by Replay.
-grpc::Status Work(const CallEnvironment& environment, const Session& session, const core::MeshParameters& parameters,
+absl::Status Work(const CallEnvironment& environment, const Session& session, const core::MeshParameters& parameters,
                   Job& job, SessionWork& work, std::shared_ptr<MeshSnapshot>* mesh) {
   bool has_changed = false;
-  grpc::Status status = RunGuarded([&] {
-    absl::StatusOr<core::Mesh> made;
+  const auto make = [&]() -> absl::StatusOr<core::Mesh> {
     if (work.mesh == nullptr) {
-      made = MeshFirst(environment, session, parameters, job.context(), work);
-    } else if (absl::Status back = BringBack(environment, session, job, work); !back.ok()) {
-      made = std::move(back);
-    } else {
-      made = MeshAgain(session, parameters, job.context(), work, &has_changed);
+      return MeshFirst(environment, session, parameters, job.context(), work);
     }
-    if (made.ok()) {
-      *mesh = std::make_shared<MeshSnapshot>(*std::move(made));
-    }
-    return FromCoreStatus(made.status());
+    WELLSPACE_RETURN_IF_ERROR(BringBack(environment, session, job, work));
+    return MeshAgain(session, parameters, job.context(), work, &has_changed);
+  };
+  absl::Status status = RunGuarded([&] {
+    WELLSPACE_ASSIGN_OR_RETURN(core::Mesh made, make());
+    *mesh = std::make_shared<MeshSnapshot>(std::move(made));
+    return absl::OkStatus();
   });
   if (!status.ok() && (has_changed || work.mesh == nullptr)) {
     work.mesher = nullptr;
@@ -129,7 +127,7 @@ void Run(const CallEnvironment& environment, Session& session, Operation& operat
   const uint64_t points = session.points().coordinate_count() / operation.parameters().dimension;
   job.GiveMemory(std::move(work->memory));
   std::shared_ptr<MeshSnapshot> mesh;
-  const grpc::Status status = Work(environment, session, operation.parameters(), job, *work, &mesh);
+  const absl::Status status = Work(environment, session, operation.parameters(), job, *work, &mesh);
   if (work->mesher != nullptr) {
     work->memory = job.TakeMemory(work->mesher->memory_bytes());
     work->memory.MakeLasting();
@@ -144,17 +142,19 @@ void Run(const CallEnvironment& environment, Session& session, Operation& operat
   job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();  // who is told of the end may use it at once
   LogFields fields;
   fields.Add("event", "refinement").Add("operation", operation.name()).Add("tenant", session.tenant());
-  fields.Add("code", absl::StatusCodeToString(static_cast<absl::StatusCode>(status.error_code())));
+  const google::rpc::Status shown = StatusToProto(status);
+  fields.Add("code", absl::StatusCodeToString(static_cast<absl::StatusCode>(shown.code())));
   fields.Add("seconds", absl::ToDoubleSeconds(SinceBoot() - start)).Add("points", points);
   fields.Add("vertices", mesh == nullptr ? 0 : mesh->chunks.mesh().vertex_count());
   if (replayed > 0) {
     fields.Add("replayed_steps", replayed);
   }
   if (!status.ok()) {
-    fields.Add("message", status.error_message());
+    fields.Add("message", shown.message());
   }
-  environment.log.log(status.error_code() == grpc::StatusCode::INTERNAL ? spdlog::level::err : spdlog::level::info,
-                      "{}", fields.text());
+  environment.log.log(
+      shown.code() == static_cast<int>(absl::StatusCode::kInternal) ? spdlog::level::err : spdlog::level::info, "{}",
+      fields.text());
   session.EndWork(operation, status, *std::move(work), std::move(mesh));
 }
 
@@ -167,31 +167,29 @@ void Tick(Background& background, const std::weak_ptr<Operation>& weak) {
 
 }  // namespace
 
-grpc::Status StartRefinement(const CallEnvironment& environment, const std::shared_ptr<Session>& session,
-                             const core::MeshParameters& parameters, uint64_t expected_revision,
-                             std::shared_ptr<Operation>* operation) {
+absl::StatusOr<std::shared_ptr<Operation>> StartRefinement(const CallEnvironment& environment,
+                                                           const std::shared_ptr<Session>& session,
+                                                           const core::MeshParameters& parameters,
+                                                           uint64_t expected_revision) {
   const Session::Size size = session->GetSize(kMostPoints);
   const bool is_small =
       size.points <= kMostPoints && IsSmallRefinement(parameters, size.some_points, size.vertices, size.replayed_steps);
-  if (grpc::Status status = session->StartOperation(parameters, expected_revision, operation); !status.ok()) {
-    return status;
+  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<Operation> operation,
+                             session->StartOperation(parameters, expected_revision));
+  const absl::StatusOr<std::shared_ptr<Job>> job = environment.jobs.Submit(
+      {.tenant = session->tenant(), .is_small = is_small, .work = [&environment, session, operation](Job& self) {
+         Run(environment, *session, *operation, self);
+       }});
+  if (!job.ok()) {
+    session->Withdraw(*operation, job.status());
+    return job.status();
   }
-  JobPool::Submission submission =
-      environment.jobs.Submit({.tenant = session->tenant(),
-                               .is_small = is_small,
-                               .work = [&environment, session, operation = *operation](Job& job) {
-                                 Run(environment, *session, *operation, job);
-                               }});
-  if (submission.job == nullptr) {
-    session->Withdraw(**operation, submission.refusal);
-    return submission.refusal;
-  }
-  if (!(*operation)->SetJob(submission.job)) {
-    environment.jobs.Cancel(submission.job);  // the operation was cancelled before it had a job, or has ended
+  if (!operation->SetJob(*job)) {
+    environment.jobs.Cancel(*job);  // the operation was cancelled before it had a job, or has ended
   }
   environment.background.Post(
-      [&background = environment.background, weak = std::weak_ptr(*operation)] { Tick(background, weak); });
-  return grpc::Status::OK;
+      [&background = environment.background, weak = std::weak_ptr(operation)] { Tick(background, weak); });
+  return operation;
 }
 
 void CancelOperation(const CallEnvironment& environment, Session& session, Operation& operation) {

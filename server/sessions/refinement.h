@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <memory>
 
+#include "absl/status/statusor.h"
 #include "core/mesh_parameters.h"
-#include "grpcpp/support/status.h"
 #include "server/calls/call_environment.h"
 #include "server/sessions/operation.h"
 #include "server/sessions/session.h"
@@ -20,9 +20,10 @@ namespace wellspace::server {
 // Replay when the structure is next needed.
 //
 // Errors:     QUEUE_FULL, QUOTA_EXCEEDED (jobs); those of Session::StartOperation.
-grpc::Status StartRefinement(const CallEnvironment& environment, const std::shared_ptr<Session>& session,
-                             const core::MeshParameters& parameters, uint64_t expected_revision,
-                             std::shared_ptr<Operation>* operation);
+absl::StatusOr<std::shared_ptr<Operation>> StartRefinement(const CallEnvironment& environment,
+                                                           const std::shared_ptr<Session>& session,
+                                                           const core::MeshParameters& parameters,
+                                                           uint64_t expected_revision);
 
 // Ends an operation that waits; has one that runs end soon.
 void CancelOperation(const CallEnvironment& environment, Session& session, Operation& operation);

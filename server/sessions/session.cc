@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 #include "server/wire/convert.h"
 #include "server/wire/errors.h"
 
@@ -76,35 +77,26 @@ bool Session::IsExpired() const {
   return lease_.HasExpired(clock_.since_boot());
 }
 
-grpc::Status Session::Update(std::optional<std::map<std::string, std::string>> labels,
+absl::Status Session::Update(std::optional<std::map<std::string, std::string>> labels,
                              std::optional<absl::Duration> ttl, uint64_t expected_revision) {
   std::lock_guard lock(mutex_);
-  if (grpc::Status status = CheckOpen(); !status.ok()) {
-    return status;
-  }
-  if (grpc::Status status = CheckRevision(expected_revision); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(CheckOpen());
+  WELLSPACE_RETURN_IF_ERROR(CheckRevision(expected_revision));
   if (labels.has_value()) {
     labels_ = *std::move(labels);
   }
   if (ttl.has_value()) {
     lease_.SetTtl(*ttl);
   }
-  return grpc::Status::OK;
+  return absl::OkStatus();
 }
 
-grpc::Status Session::Close(uint64_t expected_revision, std::shared_ptr<Operation>* under_way) {
+absl::StatusOr<std::shared_ptr<Operation>> Session::Close(uint64_t expected_revision) {
   std::lock_guard lock(mutex_);
-  if (grpc::Status status = CheckOpen(); !status.ok()) {
-    return status;
-  }
-  if (grpc::Status status = CheckRevision(expected_revision); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(CheckOpen());
+  WELLSPACE_RETURN_IF_ERROR(CheckRevision(expected_revision));
   CloseNow();
-  *under_way = busy_ == Busy::kOperation ? operations_.back() : nullptr;
-  return grpc::Status::OK;
+  return busy_ == Busy::kOperation ? operations_.back() : nullptr;
 }
 
 bool Session::CloseIfExpired() {
@@ -131,24 +123,24 @@ void Session::EndBusy() {
   lease_.EndUse(clock_.since_boot());
 }
 
-grpc::Status Session::CheckOpen() const {
+absl::Status Session::CheckOpen() const {
   return is_closed_ ? MakeError(v1::ERROR_REASON_SESSION_NOT_FOUND,
                                 absl::StrCat(name_, " does not exist any more: it was deleted, or has expired"))
-                    : grpc::Status::OK;
+                    : absl::OkStatus();
 }
 
-grpc::Status Session::CheckRevision(uint64_t expected_revision) const {
+absl::Status Session::CheckRevision(uint64_t expected_revision) const {
   return expected_revision == 0 || expected_revision == revision_
-             ? grpc::Status::OK
+             ? absl::OkStatus()
              : MakeError(v1::ERROR_REASON_REVISION_MISMATCH,
                          absl::StrCat("expected_revision is ", expected_revision, ", but ", name_, " is at revision ",
                                       revision_));
 }
 
-grpc::Status Session::CheckIdle() const {
+absl::Status Session::CheckIdle() const {
   switch (busy_) {
     case Busy::kNo:
-      return grpc::Status::OK;
+      return absl::OkStatus();
     case Busy::kOperation:
       return MakeError(v1::ERROR_REASON_SESSION_BUSY,
                        absl::StrCat(operations_.back()->name(), " is under way; wait for its end, or cancel it"));
@@ -162,32 +154,29 @@ grpc::Status Session::CheckIdle() const {
                                 " built again, which an operation without success gave up; try again later"));
 }
 
-grpc::Status Session::CheckReadyForChange(uint64_t expected_revision) const {
-  if (grpc::Status status = CheckOpen(); !status.ok()) {
-    return status;
-  }
-  if (grpc::Status status = CheckIdle(); !status.ok()) {
-    return status;
-  }
+absl::Status Session::CheckReadyForChange(uint64_t expected_revision) const {
+  WELLSPACE_RETURN_IF_ERROR(CheckOpen());
+  WELLSPACE_RETURN_IF_ERROR(CheckIdle());
   return CheckRevision(expected_revision);
 }
 
-grpc::Status Session::CheckMesh() const {
-  return work_.mesh != nullptr ? grpc::Status::OK
+absl::Status Session::CheckMesh() const {
+  return work_.mesh != nullptr ? absl::OkStatus()
                                : MakeError(v1::ERROR_REASON_MESH_NOT_READY,
                                            absl::StrCat(name_, " has no mesh yet; start a refinement first"));
 }
 
-grpc::Status Session::CheckStructure() const {
-  if (grpc::Status status = CheckMesh(); !status.ok() || work_.mesher != nullptr) {
-    return status;
+absl::Status Session::CheckStructure() const {
+  WELLSPACE_RETURN_IF_ERROR(CheckMesh());
+  if (work_.mesher != nullptr) {
+    return absl::OkStatus();
   }
   return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
                    absl::StrCat("an operation without success has given up the structure of ", name_,
                                 " in this moment; ask again, and it is built again"));
 }
 
-grpc::Status Session::CheckCoordinates(uint64_t first, std::span<const double> coordinates) const {
+absl::Status Session::CheckCoordinates(uint64_t first, std::span<const double> coordinates) const {
   // Before there is a mesh, a domain that was not given grows with the points.
   const std::vector<double>* low = &parameters_.domain_low;
   const std::vector<double>* high = &parameters_.domain_high;
@@ -208,7 +197,7 @@ grpc::Status Session::CheckCoordinates(uint64_t first, std::span<const double> c
     }
     axis = axis + 1 == dimension_ ? 0 : axis + 1;
   }
-  return grpc::Status::OK;
+  return absl::OkStatus();
 }
 
 bool Session::BeginUpload() {
@@ -221,26 +210,22 @@ void Session::EndUpload() {
   is_uploading_ = false;
 }
 
-grpc::Status Session::CheckNoGap(uint64_t offset) const {
+absl::Status Session::CheckNoGap(uint64_t offset) const {
   return offset <= point_account_.points()
-             ? grpc::Status::OK
+             ? absl::OkStatus()
              : MakeError(v1::ERROR_REASON_UPLOAD_GAP,
                          absl::StrCat("point_offset is ", offset, ", but ", name_, " has ", point_account_.points(),
                                       " points; go on at ", point_account_.points(), " or before"),
                          "point_offset");
 }
 
-grpc::Status Session::CheckPrefix(const Prefix& prefix) const {
+absl::Status Session::CheckPrefix(const Prefix& prefix) const {
   std::lock_guard lock(mutex_);
-  if (grpc::Status status = CheckIdle(); !status.ok()) {
-    return status;
-  }
-  if (grpc::Status status = CheckNoGap(prefix.end); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(CheckIdle());
+  WELLSPACE_RETURN_IF_ERROR(CheckNoGap(prefix.end));
   const uint32_t checksum = points_.Checksum(prefix.first * dimension_, prefix.end * dimension_);
   return checksum == prefix.crc32c
-             ? grpc::Status::OK
+             ? absl::OkStatus()
              : MakeError(v1::ERROR_REASON_UPLOAD_MISMATCH,
                          absl::StrCat(name_, " has other points from number ", prefix.first, " up to ", prefix.end,
                                       " than those that this upload goes on after: their checksum is ", checksum,
@@ -249,10 +234,10 @@ grpc::Status Session::CheckPrefix(const Prefix& prefix) const {
                          "checked_crc32c");
 }
 
-grpc::Status Session::CheckKnown(uint64_t first, std::span<const double> coordinates) const {
+absl::Status Session::CheckKnown(uint64_t first, std::span<const double> coordinates) const {
   const uint64_t equal = points_.CountEqual(first * dimension_, coordinates);
   if (equal == coordinates.size()) {
-    return grpc::Status::OK;
+    return absl::OkStatus();
   }
   const uint64_t point = first + equal / dimension_;
   return MakeError(v1::ERROR_REASON_UPLOAD_MISMATCH,
@@ -262,39 +247,29 @@ grpc::Status Session::CheckKnown(uint64_t first, std::span<const double> coordin
                    "points.coordinates");
 }
 
-grpc::Status Session::Append(uint64_t offset, std::span<const double> coordinates, uint64_t expected_revision) {
+absl::Status Session::Append(uint64_t offset, std::span<const double> coordinates, uint64_t expected_revision) {
   std::lock_guard lock(mutex_);
-  if (grpc::Status status = CheckReadyForChange(expected_revision); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(CheckReadyForChange(expected_revision));
   if (coordinates.size() % dimension_ != 0) {
     return MakeError(v1::ERROR_REASON_INVALID_CHUNK_SHAPE,
                      absl::StrCat("the chunk at point ", offset, " has ", coordinates.size(),
                                   " coordinates; expected a multiple of the dimension ", dimension_),
                      "points.coordinates");
   }
-  if (grpc::Status status = CheckNoGap(offset); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(CheckNoGap(offset));
   const uint64_t committed = point_account_.points();
   const uint64_t known = std::min<uint64_t>(committed - offset, coordinates.size() / dimension_);
-  if (grpc::Status status = CheckKnown(offset, coordinates.first(known * dimension_)); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(CheckKnown(offset, coordinates.first(known * dimension_)));
   coordinates = coordinates.subspan(known * dimension_);
   if (coordinates.empty()) {
-    return grpc::Status::OK;
+    return absl::OkStatus();
   }
-  if (grpc::Status status = CheckCoordinates(committed, coordinates); !status.ok()) {
-    return status;
-  }
-  if (grpc::Status status = point_account_.Take(coordinates.size() / dimension_); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(CheckCoordinates(committed, coordinates));
+  WELLSPACE_RETURN_IF_ERROR(point_account_.Take(coordinates.size() / dimension_));
   points_.Append(coordinates);
   is_ready_ = false;
   ++revision_;
-  return grpc::Status::OK;
+  return absl::OkStatus();
 }
 
 v1::UploadPointsResponse Session::Committed() const {
@@ -310,20 +285,14 @@ std::shared_ptr<const MeshSnapshot> Session::mesh() const {
   return work_.mesh;
 }
 
-grpc::Status Session::Query(uint64_t* version, const std::function<grpc::Status(const core::Mesher&)>& query) const {
+absl::Status Session::Query(uint64_t* version, const std::function<absl::Status(const core::Mesher&)>& query) const {
   std::shared_lock running(queries_mutex_, std::defer_lock);
   const core::Mesher* mesher = nullptr;
   {
     std::lock_guard lock(mutex_);
-    if (grpc::Status status = CheckOpen(); !status.ok()) {
-      return status;
-    }
-    if (grpc::Status status = CheckIdle(); !status.ok()) {
-      return status;
-    }
-    if (grpc::Status status = CheckStructure(); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(CheckOpen());
+    WELLSPACE_RETURN_IF_ERROR(CheckIdle());
+    WELLSPACE_RETURN_IF_ERROR(CheckStructure());
     if (*version != 0 && *version != structure_version_) {
       return MakeError(v1::ERROR_REASON_REVISION_MISMATCH,
                        absl::StrCat(name_, " has changed since the first batch of this call"));
@@ -335,25 +304,23 @@ grpc::Status Session::Query(uint64_t* version, const std::function<grpc::Status(
   return query(*mesher);
 }
 
-grpc::Status Session::StartOperation(const core::MeshParameters& parameters, uint64_t expected_revision,
-                                     std::shared_ptr<Operation>* operation) {
+absl::StatusOr<std::shared_ptr<Operation>> Session::StartOperation(const core::MeshParameters& parameters,
+                                                                   uint64_t expected_revision) {
   std::lock_guard lock(mutex_);
-  if (grpc::Status status = CheckReadyForChange(expected_revision); !status.ok()) {
-    return status;
-  }
-  *operation = std::make_shared<Operation>(absl::StrCat(name_, "/operations/", next_operation_), next_operation_,
-                                           parameters, clock_.wall());
+  WELLSPACE_RETURN_IF_ERROR(CheckReadyForChange(expected_revision));
+  auto operation = std::make_shared<Operation>(absl::StrCat(name_, "/operations/", next_operation_), next_operation_,
+                                               parameters, clock_.wall());
   ++next_operation_;
   BeginBusy(Busy::kOperation);
-  operations_.push_back(*operation);
+  operations_.push_back(operation);
   if (operations_.size() > kKeptOperations) {
     displaced_ = std::move(operations_.front());
     operations_.pop_front();
   }
-  return grpc::Status::OK;
+  return operation;
 }
 
-void Session::Withdraw(Operation& operation, const grpc::Status& status) {
+void Session::Withdraw(Operation& operation, const absl::Status& status) {
   std::shared_ptr<Operation> withdrawn;  // freed without the lock
   {
     std::lock_guard lock(mutex_);
@@ -390,7 +357,7 @@ std::optional<SessionWork> Session::BeginWork(Operation& operation) {
                      .memory = std::move(work_.memory)};
 }
 
-void Session::EndWork(Operation& operation, const grpc::Status& status, SessionWork work,
+void Session::EndWork(Operation& operation, const absl::Status& status, SessionWork work,
                       std::shared_ptr<MeshSnapshot> mesh) {
   {
     std::lock_guard lock(mutex_);
@@ -424,13 +391,13 @@ bool Session::EndWaiting(Operation& operation) {
     }
     displaced = std::move(displaced_);
     EndBusy();
-    operation.Fail(clock_.wall(), grpc::Status(grpc::StatusCode::CANCELLED, "the operation was cancelled"));
+    operation.Fail(clock_.wall(), absl::CancelledError("the operation was cancelled"));
   }
   operation.Notify();
   return true;
 }
 
-grpc::Status Session::FindOperation(const std::string& operation_name, std::shared_ptr<Operation>* operation) const {
+absl::StatusOr<std::shared_ptr<Operation>> Session::FindOperation(const std::string& operation_name) const {
   std::lock_guard lock(mutex_);
   const auto found = std::find_if(operations_.begin(), operations_.end(), [&](const std::shared_ptr<Operation>& kept) {
     return kept->name() == operation_name;
@@ -439,8 +406,7 @@ grpc::Status Session::FindOperation(const std::string& operation_name, std::shar
     return MakeError(v1::ERROR_REASON_OPERATION_NOT_FOUND,
                      absl::StrCat("there is no ", operation_name, "; the last ", kKeptOperations, " are kept"), "name");
   }
-  *operation = *found;
-  return grpc::Status::OK;
+  return *found;
 }
 
 std::vector<std::shared_ptr<Operation>> Session::ListOperations(uint64_t after, size_t count) const {

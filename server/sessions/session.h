@@ -15,9 +15,10 @@
 #include <utility>
 #include <vector>
 
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "absl/time/time.h"
 #include "core/mesher.h"
-#include "grpcpp/support/status.h"
 #include "server/base/clock.h"
 #include "server/base/mesh_functions.h"
 #include "server/base/options.h"
@@ -94,14 +95,14 @@ class Session {
   // Changes what is given.
   //
   // Errors:     REVISION_MISMATCH.
-  grpc::Status Update(std::optional<std::map<std::string, std::string>> labels, std::optional<absl::Duration> ttl,
+  absl::Status Update(std::optional<std::map<std::string, std::string>> labels, std::optional<absl::Duration> ttl,
                       uint64_t expected_revision);
 
   // From now on all that changes or asks for points and mesh ends with SESSION_NOT_FOUND. For a session that leaves its
-  // store; returns the operation that is under way, if there is one, which is to be cancelled.
+  // store; returns the operation that is under way, which is to be cancelled, or null.
   //
   // Errors:     REVISION_MISMATCH, SESSION_NOT_FOUND (it was closed before): nothing has been done.
-  grpc::Status Close(uint64_t expected_revision, std::shared_ptr<Operation>* under_way);
+  absl::StatusOr<std::shared_ptr<Operation>> Close(uint64_t expected_revision);
   // The same if the lease has run out, so that nothing is under way; says whether it has.
   bool CloseIfExpired();
 
@@ -118,14 +119,14 @@ class Session {
   // Refuses an upload that goes on where another has ended.
   //
   // Errors:     UPLOAD_GAP, UPLOAD_MISMATCH.
-  grpc::Status CheckPrefix(const Prefix& prefix) const;
+  absl::Status CheckPrefix(const Prefix& prefix) const;
 
   // Appends those of `coordinates`, whole points of which the first is number `offset` of the session, that it does not
   // have yet; the others have to be those that it has. `expected_revision` 0: any.
   //
   // Errors:     INVALID_CHUNK_SHAPE, INVALID_POINTS, UPLOAD_GAP, UPLOAD_MISMATCH, SESSION_BUSY, TOO_MANY_POINTS,
   //             QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH, SESSION_NOT_FOUND. Nothing has been appended.
-  grpc::Status Append(uint64_t offset, std::span<const double> coordinates, uint64_t expected_revision);
+  absl::Status Append(uint64_t offset, std::span<const double> coordinates, uint64_t expected_revision);
   // Points and revision, as one.
   v1::UploadPointsResponse Committed() const;
 
@@ -137,7 +138,7 @@ class Session {
   //
   // Errors:     MESH_NOT_READY, SESSION_BUSY, SESSION_NOT_FOUND, REVISION_MISMATCH; of building it again: MEMORY_LIMIT,
   //             OUT_OF_MEMORY, CANCELLED. It can be tried again.
-  grpc::Status PrepareStructure(uint64_t expected_revision, const MesherFactory& create_mesher, Job& job,
+  absl::Status PrepareStructure(uint64_t expected_revision, const MesherFactory& create_mesher, Job& job,
                                 bool* is_at_work = nullptr);
 
   // What work on the session would have to do with, now.
@@ -155,7 +156,7 @@ class Session {
   //
   // Errors:     MESH_NOT_READY, SESSION_BUSY, SESSION_NOT_FOUND; REVISION_MISMATCH when the structure is no longer at
   //             `version`; those of `query`.
-  grpc::Status Query(uint64_t* version, const std::function<grpc::Status(const core::Mesher&)>& query) const;
+  absl::Status Query(uint64_t* version, const std::function<absl::Status(const core::Mesher&)>& query) const;
 
   // Adds vertices at `points` on this thread, a worker's: all or, on an error, none. `near` has a vertex for each, or
   // is empty.
@@ -164,20 +165,20 @@ class Session {
   // Errors:     MESH_NOT_READY, SESSION_BUSY, INVALID_CHUNK_SHAPE, INVALID_REQUEST (the length of `near`),
   //             INVALID_POINTS, VERTEX_OUT_OF_RANGE, TOO_MANY_POINTS, QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH,
   //             SESSION_NOT_FOUND; CANCELLED.
-  grpc::Status AddVertices(std::span<const double> points, std::span<const uint32_t> near, uint64_t expected_revision,
-                           core::RunContext& context, AddedVertices* added);
+  absl::StatusOr<AddedVertices> AddVertices(std::span<const double> points, std::span<const uint32_t> near,
+                                            uint64_t expected_revision, core::RunContext& context);
 
   // Begins an operation, whose work the caller is to submit: the session is busy until the operation has ended. If the
   // work cannot be submitted, the caller calls Withdraw.
   //
   // Errors:     SESSION_BUSY, REVISION_MISMATCH, SESSION_NOT_FOUND.
-  grpc::Status StartOperation(const core::MeshParameters& parameters, uint64_t expected_revision,
-                              std::shared_ptr<Operation>* operation);
+  absl::StatusOr<std::shared_ptr<Operation>> StartOperation(const core::MeshParameters& parameters,
+                                                            uint64_t expected_revision);
   // Ends the operation that was started last, whose work was refused with `status`: the session is as it was before,
   // and has no such operation. One that was cancelled in between stays, as cancelled.
   //
   // REQUIRES:   no job works on it.
-  void Withdraw(Operation& operation, const grpc::Status& status);
+  void Withdraw(Operation& operation, const absl::Status& status);
   // On the worker, whose job the operation has: what to work on; nothing if the operation has ended before it could
   // begin.
   std::optional<SessionWork> BeginWork(Operation& operation);
@@ -185,12 +186,12 @@ class Session {
   // is OK.
   //
   // REQUIRES:   on an error, work.mesher is as it was, or null.
-  void EndWork(Operation& operation, const grpc::Status& status, SessionWork work, std::shared_ptr<MeshSnapshot> mesh);
+  void EndWork(Operation& operation, const absl::Status& status, SessionWork work, std::shared_ptr<MeshSnapshot> mesh);
   // Ends an operation that still waits for a worker as CANCELLED; false when it does not.
   bool EndWaiting(Operation& operation);
 
   // Errors:     OPERATION_NOT_FOUND.
-  grpc::Status FindOperation(const std::string& operation_name, std::shared_ptr<Operation>* operation) const;
+  absl::StatusOr<std::shared_ptr<Operation>> FindOperation(const std::string& operation_name) const;
   // Those after number `after`, the oldest first, at most `count`.
   std::vector<std::shared_ptr<Operation>> ListOperations(uint64_t after, size_t count) const;
 
@@ -206,21 +207,21 @@ class Session {
   enum class Busy { kNo, kOperation, kAddingVertices, kReplaying };
 
   // The following want mutex_ to be held.
-  grpc::Status CheckOpen() const;
-  grpc::Status CheckRevision(uint64_t expected_revision) const;
-  grpc::Status CheckIdle() const;
+  absl::Status CheckOpen() const;
+  absl::Status CheckRevision(uint64_t expected_revision) const;
+  absl::Status CheckIdle() const;
   // All three.
-  grpc::Status CheckReadyForChange(uint64_t expected_revision) const;
+  absl::Status CheckReadyForChange(uint64_t expected_revision) const;
   // Whether there is something to query, or to build again.
-  grpc::Status CheckMesh() const;
+  absl::Status CheckMesh() const;
   // Whether there is something to query now.
-  grpc::Status CheckStructure() const;
+  absl::Status CheckStructure() const;
   // That an upload begins at `offset` with no gap before it.
-  grpc::Status CheckNoGap(uint64_t offset) const;
+  absl::Status CheckNoGap(uint64_t offset) const;
   // That `coordinates` are those that the session has from point `first` on.
-  grpc::Status CheckKnown(uint64_t first, std::span<const double> coordinates) const;
+  absl::Status CheckKnown(uint64_t first, std::span<const double> coordinates) const;
   // Refuses what no mesh of this session could have. `first` is the number of the first point.
-  grpc::Status CheckCoordinates(uint64_t first, std::span<const double> coordinates) const;
+  absl::Status CheckCoordinates(uint64_t first, std::span<const double> coordinates) const;
   void CloseNow();
   // The session is the caller's alone until EndBusy, and does not expire.
   void BeginBusy(Busy busy);
@@ -229,18 +230,18 @@ class Session {
   // Without it, once nothing can begin a query any more: waits for those that run.
   void WaitForQueries();
   // Without it, while the mesher is being built again: what it is built by.
-  grpc::Status Rebuild(const MesherFactory& create_mesher, Job& job);
+  absl::Status Rebuild(const MesherFactory& create_mesher, Job& job);
   // Without it: what AddVertices does before the mesher is touched; keeps others from the session then.
-  grpc::Status BeginAddition(std::span<const double> points, std::span<const uint32_t> near,
+  absl::Status BeginAddition(std::span<const double> points, std::span<const uint32_t> near,
                              uint64_t expected_revision);
   // Without it, while vertices are being added: the part that is the mesher's. `*uploaded` of the points that waited
   // are in it then, on an error too.
-  grpc::Status AddToMesher(std::span<const double> points, std::span<const uint32_t> near, core::RunContext& context,
-                           uint64_t* uploaded, std::vector<uint32_t>* vertices);
+  absl::StatusOr<std::vector<uint32_t>> AddToMesher(std::span<const double> points, std::span<const uint32_t> near,
+                                                    core::RunContext& context, uint64_t* uploaded);
   // The same: what of AddVertices is wrong before anything is done.
-  grpc::Status CheckVertices(std::span<const double> points, std::span<const uint32_t> near, uint64_t waiting) const;
+  absl::Status CheckVertices(std::span<const double> points, std::span<const uint32_t> near, uint64_t waiting) const;
   // The same: has room for `count` more vertices in the mesher, or says that there is none.
-  grpc::Status ReserveForVertices(uint64_t count);
+  absl::Status ReserveForVertices(uint64_t count);
 
   const std::string tenant_;
   const std::string name_;

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "absl/status/statusor.h"
 #include "absl/time/time.h"
 #include "core/mesh_parameters.h"
-#include "grpcpp/support/status.h"
 #include "server/sessions/session.h"
 
 namespace wellspace::server {
@@ -36,12 +36,12 @@ class SessionStore {
   // Makes a session without points.
   //
   // Errors:     QUOTA_EXCEEDED (the tenant's sessions), TOO_MANY_SESSIONS (the server's).
-  virtual grpc::Status Create(NewSession settings, std::shared_ptr<Session>* session) = 0;
+  virtual absl::StatusOr<std::shared_ptr<Session>> Create(NewSession settings) = 0;
 
   // The session `name` of `tenant`, its lease renewed.
   //
   // Errors:     SESSION_NOT_FOUND: there is none, it has expired, or it is another tenant's.
-  virtual grpc::Status Find(const std::string& tenant, const std::string& name, std::shared_ptr<Session>* session) = 0;
+  virtual absl::StatusOr<std::shared_ptr<Session>> Find(const std::string& tenant, const std::string& name) = 0;
 
   // Of the sessions of `tenant` that were created after `after`, in the order of their creation, the first `count` that
   // have all of `labels`. No two sessions of a store were created at the same time.

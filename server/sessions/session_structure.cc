@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 #include "server/sessions/replay.h"
 #include "server/sessions/session.h"
 #include "server/wire/errors.h"
@@ -17,22 +18,21 @@ constexpr uint64_t kReservedVertices = 2;
 
 }  // namespace
 
-grpc::Status Session::PrepareStructure(uint64_t expected_revision, const MesherFactory& create_mesher, Job& job,
+absl::Status Session::PrepareStructure(uint64_t expected_revision, const MesherFactory& create_mesher, Job& job,
                                        bool* is_at_work) {
   {
     std::lock_guard lock(mutex_);
     if (is_at_work != nullptr) {
       *is_at_work = busy_ == Busy::kReplaying && !is_closed_;
     }
-    if (grpc::Status status = CheckReadyForChange(expected_revision); !status.ok()) {
-      return status;
-    }
-    if (grpc::Status status = CheckMesh(); !status.ok() || work_.mesher != nullptr) {
-      return status;
+    WELLSPACE_RETURN_IF_ERROR(CheckReadyForChange(expected_revision));
+    WELLSPACE_RETURN_IF_ERROR(CheckMesh());
+    if (work_.mesher != nullptr) {
+      return absl::OkStatus();
     }
     BeginBusy(Busy::kReplaying);
   }
-  const grpc::Status status = RunGuarded([&] { return Rebuild(create_mesher, job); });
+  const absl::Status status = RunGuarded([&] { return Rebuild(create_mesher, job); });
   job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();
   std::lock_guard lock(mutex_);
   EndBusy();
@@ -55,29 +55,20 @@ Session::Size Session::GetSize(uint64_t few) const {
   return size;
 }
 
-grpc::Status Session::Rebuild(const MesherFactory& create_mesher, Job& job) {
-  absl::StatusOr<std::unique_ptr<core::Mesher>> mesher =
-      Replay(steps_, points_, work_.mesh->chunks.mesh(), create_mesher, job);
-  if (!mesher.ok()) {
-    return FromCoreStatus(mesher.status());
-  }
-  work_.mesher = *std::move(mesher);
+absl::Status Session::Rebuild(const MesherFactory& create_mesher, Job& job) {
+  WELLSPACE_ASSIGN_OR_RETURN(work_.mesher, Replay(steps_, points_, work_.mesh->chunks.mesh(), create_mesher, job));
   work_.memory = job.TakeMemory(work_.mesher->memory_bytes());
   work_.memory.MakeLasting();
-  return grpc::Status::OK;
+  return absl::OkStatus();
 }
 
 void Session::WaitForQueries() { std::unique_lock wait(queries_mutex_); }
 
-grpc::Status Session::BeginAddition(std::span<const double> points, std::span<const uint32_t> near,
+absl::Status Session::BeginAddition(std::span<const double> points, std::span<const uint32_t> near,
                                     uint64_t expected_revision) {
   std::lock_guard lock(mutex_);
-  if (grpc::Status status = CheckReadyForChange(expected_revision); !status.ok()) {
-    return status;
-  }
-  if (grpc::Status status = CheckStructure(); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(CheckReadyForChange(expected_revision));
+  WELLSPACE_RETURN_IF_ERROR(CheckStructure());
   if (points.size() % dimension_ != 0) {
     return MakeError(
         v1::ERROR_REASON_INVALID_CHUNK_SHAPE,
@@ -90,25 +81,23 @@ grpc::Status Session::BeginAddition(std::span<const double> points, std::span<co
                                   " points; expected as many, or none"),
                      "near");
   }
-  if (grpc::Status status = point_account_.Take(points.size() / dimension_); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(point_account_.Take(points.size() / dimension_));
   BeginBusy(Busy::kAddingVertices);
-  return grpc::Status::OK;
+  return absl::OkStatus();
 }
 
-grpc::Status Session::AddVertices(std::span<const double> points, std::span<const uint32_t> near,
-                                  uint64_t expected_revision, core::RunContext& context, AddedVertices* added) {
-  if (grpc::Status status = BeginAddition(points, near, expected_revision); !status.ok()) {
-    return status;
-  }
+absl::StatusOr<AddedVertices> Session::AddVertices(std::span<const double> points, std::span<const uint32_t> near,
+                                                   uint64_t expected_revision, core::RunContext& context) {
+  WELLSPACE_RETURN_IF_ERROR(BeginAddition(points, near, expected_revision));
   WaitForQueries();
   uint64_t uploaded = 0;
   bool has_returned = false;
-  grpc::Status status = RunGuarded([&] {
-    grpc::Status ended = AddToMesher(points, near, context, &uploaded, &added->vertices);
+  AddedVertices added;
+  const absl::Status status = RunGuarded([&] {
+    absl::StatusOr<std::vector<uint32_t>> vertices = AddToMesher(points, near, context, &uploaded);
     has_returned = true;
-    return ended;
+    WELLSPACE_ASSIGN_OR_RETURN(added.vertices, std::move(vertices));
+    return absl::OkStatus();
   });
   if (!has_returned || (!status.ok() && uploaded > 0)) {
     // An exception leaves a mesher in an unknown state; else points that waited are in it, which would come with
@@ -138,11 +127,11 @@ grpc::Status Session::AddVertices(std::span<const double> points, std::span<cons
     is_ready_ = false;
     ++revision_;
   }
-  added->revision = revision_;
-  return status;
+  added.revision = revision_;
+  return added;
 }
 
-grpc::Status Session::CheckVertices(std::span<const double> points, std::span<const uint32_t> near,
+absl::Status Session::CheckVertices(std::span<const double> points, std::span<const uint32_t> near,
                                     uint64_t waiting) const {
   const uint64_t most = work_.mesher->vertex_count() + waiting;
   const auto missing = std::ranges::find_if(near, [most](uint32_t vertex) { return vertex >= most; });
@@ -155,44 +144,34 @@ grpc::Status Session::CheckVertices(std::span<const double> points, std::span<co
   return CheckCoordinates(0, points);
 }
 
-grpc::Status Session::AddToMesher(std::span<const double> points, std::span<const uint32_t> near,
-                                  core::RunContext& context, uint64_t* uploaded, std::vector<uint32_t>* vertices) {
-  if (grpc::Status status = ReserveForVertices(point_account_.points() - work_.meshed_points); !status.ok()) {
-    return status;
-  }
+absl::StatusOr<std::vector<uint32_t>> Session::AddToMesher(std::span<const double> points,
+                                                           std::span<const uint32_t> near, core::RunContext& context,
+                                                           uint64_t* uploaded) {
+  WELLSPACE_RETURN_IF_ERROR(ReserveForVertices(point_account_.points() - work_.meshed_points));
   // Points that were uploaded since the last refinement come first: they have lower numbers.
-  const absl::StatusOr<std::vector<double>> waiting = points_.CopyFrom(work_.meshed_points * dimension_, context);
-  if (!waiting.ok()) {
-    return FromCoreStatus(waiting.status());
-  }
-  if (!waiting->empty()) {
+  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> waiting,
+                             points_.CopyFrom(work_.meshed_points * dimension_, context));
+  if (!waiting.empty()) {
     // What is wrong with the vertices shows before the mesher has taken in others, which would cost it.
-    if (grpc::Status status = CheckVertices(points, near, waiting->size() / dimension_); !status.ok()) {
-      return status;
-    }
-    if (const absl::Status done = work_.mesher->AddPoints(*waiting, context).status(); !done.ok()) {
-      return FromCoreStatus(done);
-    }
-    *uploaded = waiting->size() / dimension_;
+    WELLSPACE_RETURN_IF_ERROR(CheckVertices(points, near, waiting.size() / dimension_));
+    WELLSPACE_RETURN_IF_ERROR(work_.mesher->AddPoints(waiting, context).status());
+    *uploaded = waiting.size() / dimension_;
   }
   absl::StatusOr<std::vector<uint32_t>> added = work_.mesher->AddPointsNear(points, near, context);
-  if (added.ok()) {
-    *vertices = *std::move(added);
+  if (added.status().code() == absl::StatusCode::kOutOfRange) {
+    return MakeError(v1::ERROR_REASON_VERTEX_OUT_OF_RANGE, std::string(added.status().message()), "near");
   }
-  return added.status().code() == absl::StatusCode::kOutOfRange
-             ? MakeError(v1::ERROR_REASON_VERTEX_OUT_OF_RANGE, std::string(added.status().message()), "near")
-             : FromCoreStatus(added.status());
+  return added;
 }
 
-grpc::Status Session::ReserveForVertices(uint64_t count) {
+absl::Status Session::ReserveForVertices(uint64_t count) {
   if (!memory_.is_limited()) {
-    return grpc::Status::OK;
+    return absl::OkStatus();
   }
   const uint64_t bytes = work_.mesher->memory_bytes();
   const uint64_t wanted =
       bytes + kReservedVertices * count * (bytes / std::max<uint64_t>(1, work_.mesher->vertex_count()));
-  return work_.memory.Resize(wanted) ? grpc::Status::OK
-                                     : FromCoreStatus(memory_.Refusal(wanted, "the vertices of a session"));
+  return work_.memory.Resize(wanted) ? absl::OkStatus() : memory_.Refusal(wanted, "the vertices of a session");
 }
 
 }  // namespace wellspace::server

@@ -1,15 +1,17 @@
 #include "server/wire/convert.h"
 
 #include <algorithm>
+#include <optional>
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
 namespace {
 
-grpc::Status InvalidParameter(const std::string& message, const std::string& field) {
+absl::Status InvalidParameter(const std::string& message, const std::string& field) {
   return MakeError(v1::ERROR_REASON_INVALID_PARAMETERS, message, absl::StrCat("parameters.", field));
 }
 
@@ -22,26 +24,25 @@ std::string DeepestField(const std::string& message, const std::string& field) {
 }
 
 // Validates what is set in `parameters` so far, blaming `field`, or a part of it, as the one that was set last.
-grpc::Status Validate(const core::MeshParameters& parameters, const std::string& field) {
+absl::Status Validate(const core::MeshParameters& parameters, const std::string& field) {
   const absl::Status status = core::ValidateParameters(parameters);
   if (status.ok()) {
-    return grpc::Status::OK;
+    return absl::OkStatus();
   }
   const std::string message(status.message());
   return InvalidParameter(message, DeepestField(message, field));
 }
 
-bool CriterionFromProto(v1::Criterion criterion, core::Criterion* result) {
+// Nothing for one of a newer client.
+std::optional<core::Criterion> CriterionFromProto(v1::Criterion criterion) {
   switch (criterion) {
     case v1::CRITERION_UNSPECIFIED:
     case v1::CRITERION_RADIUS_EDGE:
-      *result = core::Criterion::kRadiusEdge;
-      return true;
+      return core::Criterion::kRadiusEdge;
     case v1::CRITERION_WELL_SPACED:
-      *result = core::Criterion::kWellSpaced;
-      return true;
+      return core::Criterion::kWellSpaced;
     default:
-      return false;  // of a newer client
+      return std::nullopt;
   }
 }
 
@@ -143,31 +144,27 @@ v1::MeshStatistics StatisticsToProto(const core::MeshStatistics& statistics) {
 
 }  // namespace
 
-grpc::Status ParametersFromProto(const v1::MeshParameters& message, const ServiceOptions& options,
-                                 core::MeshParameters* parameters) {
+absl::StatusOr<core::MeshParameters> ParametersFromProto(const v1::MeshParameters& message,
+                                                         const ServiceOptions& options) {
   // The fields are set one by one, the others still at their defaults, so that the core's validation, the only one
   // there is, shows which of them it refuses.
-  *parameters = core::MeshParameters();
-  parameters->dimension = message.dimension();
-  if (grpc::Status status = Validate(*parameters, "dimension"); !status.ok()) {
-    return status;
-  }
-  if (!CriterionFromProto(message.criterion(), &parameters->criterion)) {
+  core::MeshParameters parameters;
+  parameters.dimension = message.dimension();
+  WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "dimension"));
+  const std::optional<core::Criterion> criterion = CriterionFromProto(message.criterion());
+  if (!criterion.has_value()) {
     return InvalidParameter(
         absl::StrCat("criterion: ", static_cast<int>(message.criterion()), " is not known; ",
                      static_cast<int>(v1::CRITERION_RADIUS_EDGE), " (radius-edge) and ",
                      static_cast<int>(v1::CRITERION_WELL_SPACED), " (well-spaced) are, and 0 for the default"),
         "criterion");
   }
-  parameters->rho = message.rho();
-  if (grpc::Status status = Validate(*parameters, "rho"); !status.ok()) {
-    return status;
-  }
+  parameters.criterion = *criterion;
+  parameters.rho = message.rho();
+  WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "rho"));
   if (message.has_margin()) {
-    parameters->margin = message.margin();
-    if (grpc::Status status = Validate(*parameters, "margin"); !status.ok()) {
-      return status;
-    }
+    parameters.margin = message.margin();
+    WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "margin"));
   }
   if (message.has_domain()) {
     // An empty domain would pass for an absent one in the core.
@@ -177,53 +174,40 @@ grpc::Status ParametersFromProto(const v1::MeshParameters& message, const Servic
                        " high coordinates; expected ", message.dimension(), " of each, or no domain"),
           "domain");
     }
-    parameters->domain_low.assign(message.domain().low().begin(), message.domain().low().end());
-    parameters->domain_high.assign(message.domain().high().begin(), message.domain().high().end());
-    if (grpc::Status status = Validate(*parameters, "domain"); !status.ok()) {
-      return status;
-    }
+    parameters.domain_low.assign(message.domain().low().begin(), message.domain().low().end());
+    parameters.domain_high.assign(message.domain().high().begin(), message.domain().high().end());
+    WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "domain"));
   }
-  parameters->max_circumradius = message.max_circumradius();
-  if (grpc::Status status = Validate(*parameters, "max_circumradius"); !status.ok()) {
-    return status;
-  }
+  parameters.max_circumradius = message.max_circumradius();
+  WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "max_circumradius"));
   // At once: one by one would look at many boxes many times.
   for (const v1::SizeBox& box : message.size_boxes()) {
-    parameters->size_boxes.push_back(SizeBoxFromProto(box));
+    parameters.size_boxes.push_back(SizeBoxFromProto(box));
   }
-  if (grpc::Status status = Validate(*parameters, "size_boxes"); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "size_boxes"));
   if (message.has_min_dihedral()) {
-    parameters->min_dihedral = message.min_dihedral();
-    if (grpc::Status status = Validate(*parameters, "min_dihedral"); !status.ok()) {
-      return status;
-    }
+    parameters.min_dihedral = message.min_dihedral();
+    WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "min_dihedral"));
   }
-  parameters->pump_weights = message.pump_weights();
-  parameters->keep_vertices = message.keep_vertices();
-  if (grpc::Status status = Validate(*parameters, "pump_weights"); !status.ok()) {
-    return status;
-  }
-  parameters->merge_distance = message.merge_distance();
-  if (grpc::Status status = Validate(*parameters, "merge_distance"); !status.ok()) {
-    return status;
-  }
+  parameters.pump_weights = message.pump_weights();
+  parameters.keep_vertices = message.keep_vertices();
+  WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "pump_weights"));
+  parameters.merge_distance = message.merge_distance();
+  WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "merge_distance"));
   if (message.threads() != 0) {
-    parameters->threads = message.threads();
-    if (grpc::Status status = Validate(*parameters, "threads"); !status.ok()) {
-      return status;
-    }
+    parameters.threads = message.threads();
+    WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "threads"));
   }
-  parameters->threads = std::min(parameters->threads, options.max_threads);
+  parameters.threads = std::min(parameters.threads, options.max_threads);
   if (message.max_vertices() > options.max_vertices) {
     return InvalidParameter(absl::StrCat("max_vertices is ", message.max_vertices(), "; this server accepts at most ",
                                          options.max_vertices, ", or 0 for the default"),
                             "max_vertices");
   }
-  parameters->max_vertices =
+  parameters.max_vertices =
       message.max_vertices() == 0 ? std::min(options.max_vertices, core::kDefaultMaxVertices) : message.max_vertices();
-  return Validate(*parameters, "max_vertices");
+  WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "max_vertices"));
+  return parameters;
 }
 
 v1::MeshParameters ParametersToProto(const core::MeshParameters& parameters) {

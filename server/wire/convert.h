@@ -4,11 +4,11 @@
 
 #include <cstdint>
 
+#include "absl/status/statusor.h"
 #include "absl/time/time.h"
 #include "core/mesher.h"
 #include "google/protobuf/duration.pb.h"
 #include "google/protobuf/timestamp.pb.h"
-#include "grpcpp/support/status.h"
 #include "server/base/options.h"
 #include "wellspace/v1/mesh.pb.h"
 #include "wellspace/v1/meshing.pb.h"
@@ -17,11 +17,11 @@ namespace wellspace::server {
 
 // Translates and validates the parameters of a call; defaults and limits of the server are filled in.
 //
-// Guarantees: on success core::ValidateParameters(*parameters) is ok, and 1 <= threads <= options.max_threads, 1 <=
+// Guarantees: core::ValidateParameters of the result is ok, and 1 <= threads <= options.max_threads, 1 <=
 //             max_vertices <= options.max_vertices.
 // Errors:     INVALID_PARAMETERS with the path of the first wrong field.
-grpc::Status ParametersFromProto(const v1::MeshParameters& message, const ServiceOptions& options,
-                                 core::MeshParameters* parameters);
+absl::StatusOr<core::MeshParameters> ParametersFromProto(const v1::MeshParameters& message,
+                                                         const ServiceOptions& options);
 
 // The parameters with every default that does not depend on points filled in.
 v1::MeshParameters ParametersToProto(const core::MeshParameters& parameters);

@@ -2,6 +2,7 @@
 
 #include <exception>
 #include <new>
+#include <string>
 #include <string_view>
 
 #include "absl/strings/cord.h"
@@ -20,13 +21,14 @@ constexpr int kRetrySeconds = 1;
 // KiB.
 constexpr size_t kMaxErrorMessageBytes = 1024;
 
-// Marks the status of a MEMORY_LIMIT; its value is kMayRetry or empty.
-constexpr char kMemoryLimitPayload[] = "wellspace.v1/MEMORY_LIMIT";
-constexpr char kMayRetry[] = "retry";
+// Payloads of a status: the name of its ErrorReason, the path of the field to blame, and that the call may be repeated.
+constexpr char kReason[] = "wellspace.v1/reason";
+constexpr char kField[] = "wellspace.v1/field";
+constexpr char kMayRetry[] = "wellspace.v1/may_retry";
 
 absl::string_view ToAbsl(std::string_view text) { return {text.data(), text.size()}; }
 
-grpc::StatusCode CodeOf(v1::ErrorReason reason) {
+absl::StatusCode CodeOf(v1::ErrorReason reason) {
   switch (reason) {
     case v1::ERROR_REASON_EMPTY_REQUEST:
     case v1::ERROR_REASON_PARAMETERS_MISSING:
@@ -38,7 +40,7 @@ grpc::StatusCode CodeOf(v1::ErrorReason reason) {
     case v1::ERROR_REASON_MALFORMED_REQUEST:
     case v1::ERROR_REASON_REQUEST_ID_REUSED:
     case v1::ERROR_REASON_INVALID_REQUEST:
-      return grpc::StatusCode::INVALID_ARGUMENT;
+      return absl::StatusCode::kInvalidArgument;
     case v1::ERROR_REASON_TOO_MANY_POINTS:
     case v1::ERROR_REASON_MESH_TOO_LARGE:
     case v1::ERROR_REASON_DEMANDS_TOO_FINE:
@@ -47,29 +49,29 @@ grpc::StatusCode CodeOf(v1::ErrorReason reason) {
     case v1::ERROR_REASON_MEMORY_LIMIT:
     case v1::ERROR_REASON_QUOTA_EXCEEDED:
     case v1::ERROR_REASON_TOO_MANY_SESSIONS:
-      return grpc::StatusCode::RESOURCE_EXHAUSTED;
+      return absl::StatusCode::kResourceExhausted;
     case v1::ERROR_REASON_SERVER_STOPPING:
-      return grpc::StatusCode::UNAVAILABLE;
+      return absl::StatusCode::kUnavailable;
     case v1::ERROR_REASON_SESSION_NOT_FOUND:
     case v1::ERROR_REASON_OPERATION_NOT_FOUND:
-      return grpc::StatusCode::NOT_FOUND;
+      return absl::StatusCode::kNotFound;
     case v1::ERROR_REASON_SESSION_BUSY:
     case v1::ERROR_REASON_MESH_NOT_READY:
     case v1::ERROR_REASON_UPLOAD_MISMATCH:
-      return grpc::StatusCode::FAILED_PRECONDITION;
+      return absl::StatusCode::kFailedPrecondition;
     case v1::ERROR_REASON_REVISION_MISMATCH:
-      return grpc::StatusCode::ABORTED;
+      return absl::StatusCode::kAborted;
     case v1::ERROR_REASON_UPLOAD_GAP:
     case v1::ERROR_REASON_CHUNK_OUT_OF_RANGE:
     case v1::ERROR_REASON_VERTEX_OUT_OF_RANGE:
-      return grpc::StatusCode::OUT_OF_RANGE;
+      return absl::StatusCode::kOutOfRange;
     case v1::ERROR_REASON_UNAUTHENTICATED:
-      return grpc::StatusCode::UNAUTHENTICATED;
+      return absl::StatusCode::kUnauthenticated;
     case v1::ERROR_REASON_READER_STALLED:
     case v1::ERROR_REASON_SENDER_STALLED:
-      return grpc::StatusCode::DEADLINE_EXCEEDED;
+      return absl::StatusCode::kDeadlineExceeded;
     default:
-      return grpc::StatusCode::INTERNAL;
+      return absl::StatusCode::kInternal;
   }
 }
 
@@ -78,53 +80,23 @@ bool PassesWithTime(v1::ErrorReason reason) {
          reason == v1::ERROR_REASON_QUOTA_EXCEEDED || reason == v1::ERROR_REASON_SERVER_STOPPING;
 }
 
-grpc::Status Make(grpc::StatusCode code, v1::ErrorReason reason, const std::string& whole_message,
-                  const std::string& field, bool may_retry) {
-  const std::string message = CutText(whole_message, kMaxErrorMessageBytes);
-  google::rpc::Status details;
-  details.set_code(code);
-  details.set_message(message);
-  google::rpc::ErrorInfo info;
-  info.set_reason(v1::ErrorReason_Name(reason));
-  info.set_domain(kErrorDomain);
-  details.add_details()->PackFrom(info);
+absl::Status Make(absl::StatusCode code, v1::ErrorReason reason, std::string_view message, std::string_view field,
+                  bool may_retry) {
+  absl::Status status(code, ToAbsl(message));
+  status.SetPayload(kReason, absl::Cord(v1::ErrorReason_Name(reason)));
   if (!field.empty()) {
-    google::rpc::BadRequest bad_request;
-    google::rpc::BadRequest::FieldViolation* violation = bad_request.add_field_violations();
-    violation->set_field(field);
-    violation->set_description(message);
-    details.add_details()->PackFrom(bad_request);
+    status.SetPayload(kField, absl::Cord(ToAbsl(field)));
   }
   if (may_retry) {
-    google::rpc::RetryInfo retry;
-    retry.mutable_retry_delay()->set_seconds(kRetrySeconds);
-    details.add_details()->PackFrom(retry);
+    status.SetPayload(kMayRetry, absl::Cord());
   }
-  return grpc::Status(code, message, details.SerializeAsString());
-}
-
-}  // namespace
-
-grpc::Status MakeError(v1::ErrorReason reason, const std::string& message, const std::string& field) {
-  return MakeError(CodeOf(reason), reason, message, field);
-}
-
-grpc::Status MakeError(grpc::StatusCode code, v1::ErrorReason reason, const std::string& message,
-                       const std::string& field) {
-  return Make(code, reason, message, field, PassesWithTime(reason));
-}
-
-absl::Status MemoryLimitError(const std::string& message, bool may_retry) {
-  absl::Status status = absl::ResourceExhaustedError(message);
-  status.SetPayload(kMemoryLimitPayload, absl::Cord(may_retry ? kMayRetry : ""));
   return status;
 }
 
-grpc::Status FromCoreStatus(const absl::Status& status) {
+// An error of the core, with the reason that it has for clients; CANCELLED and DEADLINE_EXCEEDED have none.
+absl::Status FromCore(const absl::Status& status) {
   const std::string message(status.message());
   switch (status.code()) {
-    case absl::StatusCode::kOk:
-      return grpc::Status::OK;
     case absl::StatusCode::kInvalidArgument:
       for (const auto& [what, field] :
            {std::pair("segments", "segments.ends"), {"seeds[", "faces.seeds"}, {"faces:", "faces.faces"}}) {
@@ -134,10 +106,6 @@ grpc::Status FromCoreStatus(const absl::Status& status) {
       }
       return MakeError(v1::ERROR_REASON_INVALID_POINTS, message, "points.coordinates");
     case absl::StatusCode::kResourceExhausted:
-      if (const absl::optional<absl::Cord> payload = status.GetPayload(kMemoryLimitPayload); payload.has_value()) {
-        return Make(CodeOf(v1::ERROR_REASON_MEMORY_LIMIT), v1::ERROR_REASON_MEMORY_LIMIT, message, "",
-                    *payload == kMayRetry);
-      }
       if (status.GetPayload(ToAbsl(core::kDemandsTooFine)).has_value()) {
         return MakeError(v1::ERROR_REASON_DEMANDS_TOO_FINE, message,
                          absl::StrCat("parameters.", message.substr(0, message.find(':'))));
@@ -146,25 +114,78 @@ grpc::Status FromCoreStatus(const absl::Status& status) {
     case absl::StatusCode::kFailedPrecondition:
       return MakeError(v1::ERROR_REASON_MESH_NOT_READY, message);
     case absl::StatusCode::kCancelled:
-      return grpc::Status(grpc::StatusCode::CANCELLED, message);
     case absl::StatusCode::kDeadlineExceeded:
-      return grpc::Status(grpc::StatusCode::DEADLINE_EXCEEDED, message);
+      return status;
     default:
       return MakeError(v1::ERROR_REASON_INTERNAL, absl::StrCat("internal error: ", message));
   }
 }
 
-google::rpc::Status StatusToProto(const grpc::Status& status) {
+// The details of an error with `reason`, for clients.
+google::rpc::Status DetailsOf(const absl::Status& status, const std::string& reason) {
+  google::rpc::Status details;
+  details.set_code(static_cast<int>(status.code()));
+  details.set_message(CutText(std::string(status.message()), kMaxErrorMessageBytes));
+  google::rpc::ErrorInfo info;
+  info.set_reason(reason);
+  info.set_domain(kErrorDomain);
+  details.add_details()->PackFrom(info);
+  if (const absl::optional<absl::Cord> field = status.GetPayload(kField); field.has_value()) {
+    google::rpc::BadRequest bad_request;
+    google::rpc::BadRequest::FieldViolation* violation = bad_request.add_field_violations();
+    violation->set_field(std::string(*field));
+    violation->set_description(details.message());
+    details.add_details()->PackFrom(bad_request);
+  }
+  if (status.GetPayload(kMayRetry).has_value()) {
+    google::rpc::RetryInfo retry;
+    retry.mutable_retry_delay()->set_seconds(kRetrySeconds);
+    details.add_details()->PackFrom(retry);
+  }
+  return details;
+}
+
+}  // namespace
+
+absl::Status MakeError(v1::ErrorReason reason, std::string_view message, std::string_view field) {
+  return MakeError(CodeOf(reason), reason, message, field);
+}
+
+absl::Status MakeError(absl::StatusCode code, v1::ErrorReason reason, std::string_view message,
+                       std::string_view field) {
+  return Make(code, reason, message, field, PassesWithTime(reason));
+}
+
+absl::Status MemoryLimitError(std::string_view message, bool may_retry) {
+  return Make(CodeOf(v1::ERROR_REASON_MEMORY_LIMIT), v1::ERROR_REASON_MEMORY_LIMIT, message, "", may_retry);
+}
+
+grpc::Status ToGrpcStatus(const absl::Status& status) {
+  if (status.ok()) {
+    return grpc::Status::OK;
+  }
+  const absl::Status named = status.GetPayload(kReason).has_value() ? status : FromCore(status);
+  const absl::optional<absl::Cord> reason = named.GetPayload(kReason);
+  const auto code = static_cast<grpc::StatusCode>(named.code());  // the numbers are the same
+  if (!reason.has_value()) {
+    return grpc::Status(code, std::string(named.message()));
+  }
+  const google::rpc::Status details = DetailsOf(named, std::string(*reason));
+  return grpc::Status(code, details.message(), details.SerializeAsString());
+}
+
+google::rpc::Status StatusToProto(const absl::Status& status) {
+  const grpc::Status outside = ToGrpcStatus(status);
   google::rpc::Status message;
-  if (!message.ParseFromString(status.error_details())) {
+  if (!message.ParseFromString(outside.error_details())) {
     message.Clear();
   }
-  message.set_code(status.error_code());
-  message.set_message(status.error_message());
+  message.set_code(outside.error_code());
+  message.set_message(outside.error_message());
   return message;
 }
 
-grpc::Status RunGuarded(const std::function<grpc::Status()>& work) {
+absl::Status RunGuarded(const std::function<absl::Status()>& work) {
   try {
     return work();
   } catch (const std::bad_alloc&) {

@@ -1,9 +1,9 @@
-// The one place where errors become the status of a call.
+// Errors: what a status says besides its code, and the one place where it becomes the status of a call.
 #ifndef WELLSPACE_SERVER_WIRE_ERRORS_H_
 #define WELLSPACE_SERVER_WIRE_ERRORS_H_
 
 #include <functional>
-#include <string>
+#include <string_view>
 
 #include "absl/status/status.h"
 #include "google/rpc/status.pb.h"
@@ -15,28 +15,30 @@ namespace wellspace::server {
 // The `domain` of the ErrorInfo of every error.
 inline constexpr char kErrorDomain[] = "wellspace.v1";
 
-// Makes the error that errors.proto describes: code and ErrorInfo by `reason`, a BadRequest when `field` (the path of
-// the field from the request message on) is given, a RetryInfo for reasons that pass with time.
+// Makes the error that errors.proto describes. The status carries its reason, its field (the path of the field from the
+// request message on, if one is to blame) and, for reasons that pass with time, that the call may be repeated.
 //
 // REQUIRES:   reason != ERROR_REASON_UNSPECIFIED.
+// Guarantees: the code is the one of the reason.
 // Threads:    thread-safe.
-grpc::Status MakeError(v1::ErrorReason reason, const std::string& message, const std::string& field = "");
+absl::Status MakeError(v1::ErrorReason reason, std::string_view message, std::string_view field = "");
 // The same for a reason that comes with more than one code.
-grpc::Status MakeError(grpc::StatusCode code, v1::ErrorReason reason, const std::string& message,
-                       const std::string& field);
+absl::Status MakeError(absl::StatusCode code, v1::ErrorReason reason, std::string_view message, std::string_view field);
+// A MEMORY_LIMIT, which passes with time or does not.
+absl::Status MemoryLimitError(std::string_view message, bool may_retry);
 
-// A RESOURCE_EXHAUSTED that FromCoreStatus makes a MEMORY_LIMIT, with RetryInfo if asking again may help.
-absl::Status MemoryLimitError(const std::string& message, bool may_retry);
-
-// The status of a run that the core ended with `status`. The parameters were validated before, so that an
-// INVALID_ARGUMENT is about the points.
-grpc::Status FromCoreStatus(const absl::Status& status);
+// The status of a call that ended with `status`: with ErrorInfo, BadRequest where there is a field, and RetryInfo where
+// the call may be repeated. To be called where a status leaves the server, nowhere else.
+//
+// A status without a reason is the core's. The parameters were validated before, so that its INVALID_ARGUMENT is about
+// the points. CANCELLED and DEADLINE_EXCEEDED have no reason.
+grpc::Status ToGrpcStatus(const absl::Status& status);
 
 // `status` as a message, as it would reach a client.
-google::rpc::Status StatusToProto(const grpc::Status& status);
+google::rpc::Status StatusToProto(const absl::Status& status);
 
 // Runs `work` and returns its status; an exception that escapes it becomes OUT_OF_MEMORY or INTERNAL.
-grpc::Status RunGuarded(const std::function<grpc::Status()>& work);
+absl::Status RunGuarded(const std::function<absl::Status()>& work);
 
 }  // namespace wellspace::server
 

@@ -110,10 +110,11 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     fuzz::ReadField(bytes, message);
   }
   const server::ServiceOptions options = {.max_threads = 2};
-  core::MeshParameters parameters;
-  if (!server::ParametersFromProto(message, options, &parameters).ok()) {
+  absl::StatusOr<core::MeshParameters> accepted = server::ParametersFromProto(message, options);
+  if (!accepted.ok()) {
     return 0;
   }
+  core::MeshParameters parameters = *std::move(accepted);
   parameters.max_vertices = std::min(
       parameters.max_vertices, (uint64_t{1} << parameters.dimension) + fuzz::kMaxVertices[parameters.dimension - 2]);
   // In the unit box, or none: of another domain they would be outside.

@@ -12,6 +12,7 @@
 #include "google/rpc/status.pb.h"
 #include "server/calls/wire.h"
 #include "server/services/meshing/cloud_receiver.h"
+#include "server/wire/errors.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/fuzz/mesh_check.h"
 #include "wellspace/v1/errors.pb.h"
@@ -23,7 +24,8 @@ namespace {
 // Small, so that short inputs reach the limits.
 constexpr server::ServiceOptions kOptions = {.max_threads = 2, .max_points = 16, .max_vertices = 500};
 
-void RequireError(const grpc::Status& status) {
+void RequireError(const absl::Status& refusal) {
+  const grpc::Status status = server::ToGrpcStatus(refusal);
   Require(status.error_code() == grpc::StatusCode::INVALID_ARGUMENT ||
               status.error_code() == grpc::StatusCode::RESOURCE_EXHAUSTED,
           "a refusal is an INVALID_ARGUMENT or a RESOURCE_EXHAUSTED:", status.error_message());
@@ -61,18 +63,18 @@ bool ReceiveAll(ByteReader& bytes, server::CloudReceiver& receiver, std::vector<
   while (!bytes.empty()) {
     grpc::ByteBuffer buffer = InSlices(bytes.TakeBlock());
     v1::MeshPointsRequest request;
-    if (const grpc::Status status = server::ParseRequest(&buffer, &request); !status.ok()) {
+    if (const absl::Status status = server::ParseRequest(&buffer, &request); !status.ok()) {
       RequireError(status);
       return false;
     }
     sent.insert(sent.end(), request.points().coordinates().begin(), request.points().coordinates().end());
-    if (const grpc::Status status = receiver.Accept(&request); !status.ok()) {
+    if (const absl::Status status = receiver.Accept(&request); !status.ok()) {
       RequireError(status);
       return false;
     }
     RequireInvariants(receiver);
   }
-  if (const grpc::Status status = receiver.AcceptEnd(); !status.ok()) {
+  if (const absl::Status status = receiver.AcceptEnd(); !status.ok()) {
     RequireError(status);
     return false;
   }

@@ -10,6 +10,7 @@ SCRIPT = pathlib.Path(__file__).resolve().parents[2] / "scripts" / "check_includ
 # A small project in order; each test plants one line in it.
 SOUND = {
     "core/base/ids.h": "#include <cstdint>\n",
+    "core/base/status_macros.h": '#include "absl/status/status.h"\n',
     "core/geometry/point.h": '#include "core/base/ids.h"\n',
     "core/simplex/validate.h": '#include "absl/status/status.h"\n#include "core/geometry/point.h"\n',
     "core/simplex/star.h": '#include "core/simplex/validate.h"\n',
@@ -22,7 +23,7 @@ SOUND = {
     "server/wire/convert.cc": '#include "core/mesher.h"\n#include "wellspace/v1/mesh.pb.h"\n#include <grpcpp/grpcpp.h>\n',
     "client/client.h": '#include "absl/time/time.h"\n',
     "client/connection.cc": '#include "client/client.h"\n#include "wellspace/v1/meshing.grpc.pb.h"\n',
-    "client/formats/vtu.cc": '#include "client/formats/vtu.h"\n#include <zlib.h>\n',
+    "client/formats/vtu.cc": '#include "client/formats/vtu.h"\n#include "core/base/status_macros.h"\n#include <zlib.h>\n',
     "client/cli/main.cc": '#include "client/formats/vtu.h"\n#include "server/embedded_server.h"\n#include "core/simplex/validate.h"\n',
     "client/formats/vtu.h": "#include <string>\n",
     "tests/core/mesher_test.cc": '#include "core/mesher.h"\n#include "gtest/gtest.h"\n',

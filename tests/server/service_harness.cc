@@ -11,6 +11,7 @@
 #include "google/rpc/error_details.pb.h"
 #include "google/rpc/status.pb.h"
 #include "gtest/gtest.h"
+#include "server/wire/errors.h"
 #include "spdlog/sinks/base_sink.h"
 
 namespace wellspace::server {
@@ -129,6 +130,8 @@ ErrorDetails DetailsOf(const grpc::Status& status) {
   }
   return details;
 }
+
+ErrorDetails DetailsOf(const absl::Status& status) { return DetailsOf(ToGrpcStatus(status)); }
 
 int PlaceOf(v1::Phase phase) { return phase == v1::PHASE_DONE ? v1::Phase_ARRAYSIZE : phase; }
 

@@ -52,6 +52,8 @@ struct ErrorDetails {
   bool may_retry = false;
 };
 ErrorDetails DetailsOf(const grpc::Status& status);
+// Of what clients would see of it.
+ErrorDetails DetailsOf(const absl::Status& status);
 
 // The place of a phase in the order in which they come, which is not that of their numbers.
 int PlaceOf(v1::Phase phase);

@@ -61,7 +61,7 @@ class CloudCall : public RequestStream<Call<Reactor>> {
   // Sets memory aside for the points so far, and for the next message.
   //
   // Errors:     MEMORY_LIMIT.
-  grpc::Status ReserveForNext();
+  absl::Status ReserveForNext();
 
   // Guarded by mutex_.
   CloudReceiver receiver_;
@@ -72,7 +72,7 @@ class CloudCall : public RequestStream<Call<Reactor>> {
 template <typename Reactor, typename Request>
 void CloudCall<Reactor, Request>::OnBegin() {
   received_ = this->environment().memory.ReserveNothing();
-  if (grpc::Status status = ReserveForNext(); !status.ok()) {
+  if (absl::Status status = ReserveForNext(); !status.ok()) {
     this->End(std::move(status));
     return;
   }
@@ -80,18 +80,17 @@ void CloudCall<Reactor, Request>::OnBegin() {
 }
 
 template <typename Reactor, typename Request>
-grpc::Status CloudCall<Reactor, Request>::ReserveForNext() {
+absl::Status CloudCall<Reactor, Request>::ReserveForNext() {
   const uint64_t bytes = receiver_.held_bytes() + kMessageBytes;
-  return received_.Resize(bytes)
-             ? grpc::Status::OK
-             : FromCoreStatus(this->environment().memory.Refusal(bytes, "the next part of the cloud"));
+  return received_.Resize(bytes) ? absl::OkStatus()
+                                 : this->environment().memory.Refusal(bytes, "the next part of the cloud");
 }
 
 template <typename Reactor, typename Request>
 void CloudCall<Reactor, Request>::OnRequest(grpc::ByteBuffer* bytes) {
   const bool had_parameters = receiver_.has_parameters();
   Request request;
-  grpc::Status status = ParseRequest(bytes, &request);
+  absl::Status status = ParseRequest(bytes, &request);
   if (status.ok()) {
     status = receiver_.Accept(&request);
   }
@@ -110,22 +109,23 @@ void CloudCall<Reactor, Request>::OnRequest(grpc::ByteBuffer* bytes) {
 
 template <typename Reactor, typename Request>
 void CloudCall<Reactor, Request>::SubmitJob() {
-  if (grpc::Status status = receiver_.AcceptEnd(); !status.ok()) {
+  if (absl::Status status = receiver_.AcceptEnd(); !status.ok()) {
     this->End(std::move(status));
     return;
   }
   (void)received_.Resize(receiver_.held_bytes());  // no more than it was
   // std::function wants to be copied, points do not.
   auto points = std::make_shared<PointChunks>(receiver_.TakePoints());
-  JobPool::Submission submission = this->environment().jobs.Submit(
+  absl::StatusOr<std::shared_ptr<Job>> job = this->environment().jobs.Submit(
       {.tenant = this->caller().tenant,
        .is_small = IsSmall(*points),
        .held = std::move(received_),
-       .work = [self = this->template SharedAs<CloudCall>(), points](Job& job) { self->Work(*points, job); }});
-  job_ = std::move(submission.job);
-  if (job_ == nullptr) {
-    this->End(std::move(submission.refusal));
+       .work = [self = this->template SharedAs<CloudCall>(), points](Job& running) { self->Work(*points, running); }});
+  if (!job.ok()) {
+    this->End(std::move(job).status());
+    return;
   }
+  job_ = *std::move(job);
 }
 
 template <typename Reactor, typename Request>

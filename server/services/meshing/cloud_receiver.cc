@@ -1,6 +1,7 @@
 #include "server/services/meshing/cloud_receiver.h"
 
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 #include "server/wire/convert.h"
 #include "server/wire/errors.h"
 
@@ -35,7 +36,7 @@ std::vector<double> PointChunks::Flatten(const core::RunContext& context) {
 }
 
 template <typename Request>
-grpc::Status CloudReceiver::Accept(Request* request) {
+absl::Status CloudReceiver::Accept(Request* request) {
   switch (request->request_case()) {
     case Request::kParameters:
       return AcceptParameters(request->parameters());
@@ -52,29 +53,29 @@ grpc::Status CloudReceiver::Accept(Request* request) {
                    "a request has neither parameters, points, segments nor faces; set one of them", "request");
 }
 
-template grpc::Status CloudReceiver::Accept(v1::MeshPointsRequest*);
-template grpc::Status CloudReceiver::Accept(v1::EstimateMeshRequest*);
+template absl::Status CloudReceiver::Accept(v1::MeshPointsRequest*);
+template absl::Status CloudReceiver::Accept(v1::EstimateMeshRequest*);
 
-grpc::Status CloudReceiver::AcceptEnd() const {
+absl::Status CloudReceiver::AcceptEnd() const {
   if (!has_parameters_) {
     return MakeError(v1::ERROR_REASON_PARAMETERS_MISSING,
                      "the stream ended before any request; send the parameters first", "parameters");
   }
-  return grpc::Status::OK;
+  return absl::OkStatus();
 }
 
-grpc::Status CloudReceiver::AcceptParameters(const v1::MeshParameters& message) {
+absl::Status CloudReceiver::AcceptParameters(const v1::MeshParameters& message) {
   if (has_parameters_) {
     return MakeError(v1::ERROR_REASON_PARAMETERS_REPEATED,
                      "the parameters came a second time; send them once, in the first request", "parameters");
   }
-  grpc::Status status = ParametersFromProto(message, options_, &parameters_);
-  has_parameters_ = status.ok();
-  return status;
+  WELLSPACE_ASSIGN_OR_RETURN(parameters_, ParametersFromProto(message, options_));
+  has_parameters_ = true;
+  return absl::OkStatus();
 }
 
 template <typename Part>
-grpc::Status CloudReceiver::AcceptFeatures(const Part& part, const char* field) {
+absl::Status CloudReceiver::AcceptFeatures(const Part& part, const char* field) {
   if (!has_parameters_) {
     return MakeError(v1::ERROR_REASON_PARAMETERS_MISSING,
                      absl::StrCat(field, " came before the parameters; send the parameters first"), "parameters");
@@ -87,7 +88,7 @@ grpc::Status CloudReceiver::AcceptFeatures(const Part& part, const char* field) 
   return features_.Accept(part);
 }
 
-grpc::Status CloudReceiver::AcceptPoints(v1::PointChunk* chunk) {
+absl::Status CloudReceiver::AcceptPoints(v1::PointChunk* chunk) {
   if (!has_parameters_) {
     return MakeError(v1::ERROR_REASON_PARAMETERS_MISSING,
                      "points came before the parameters; send the parameters first", "parameters");
@@ -106,7 +107,7 @@ grpc::Status CloudReceiver::AcceptPoints(v1::PointChunk* chunk) {
   }
   points_.Append(chunk->mutable_coordinates());
   point_count_ = total;
-  return grpc::Status::OK;
+  return absl::OkStatus();
 }
 
 }  // namespace wellspace::server

@@ -7,9 +7,9 @@
 #include <utility>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "core/mesher.h"
 #include "google/protobuf/repeated_field.h"
-#include "grpcpp/support/status.h"
 #include "server/base/options.h"
 #include "server/services/meshing/received_features.h"
 #include "wellspace/v1/meshing.pb.h"
@@ -51,12 +51,12 @@ class CloudReceiver {
   // Errors:     EMPTY_REQUEST, PARAMETERS_MISSING, PARAMETERS_REPEATED, INVALID_PARAMETERS, INVALID_CHUNK_SHAPE,
   //             TOO_MANY_POINTS, INVALID_SEGMENTS; the call is to be ended.
   template <typename Request>
-  grpc::Status Accept(Request* request);
+  absl::Status Accept(Request* request);
 
   // To be called when the client has ended its stream.
   //
   // Errors:     PARAMETERS_MISSING.
-  grpc::Status AcceptEnd() const;
+  absl::Status AcceptEnd() const;
 
   bool has_parameters() const { return has_parameters_; }
   const core::MeshParameters& parameters() const { return parameters_; }
@@ -70,10 +70,10 @@ class CloudReceiver {
   PointChunks TakePoints() { return std::exchange(points_, PointChunks()); }
 
  private:
-  grpc::Status AcceptParameters(const v1::MeshParameters& message);
-  grpc::Status AcceptPoints(v1::PointChunk* chunk);
+  absl::Status AcceptParameters(const v1::MeshParameters& message);
+  absl::Status AcceptPoints(v1::PointChunk* chunk);
   template <typename Part>
-  grpc::Status AcceptFeatures(const Part& part, const char* field);
+  absl::Status AcceptFeatures(const Part& part, const char* field);
 
   const ServiceOptions& options_;
   bool has_parameters_ = false;

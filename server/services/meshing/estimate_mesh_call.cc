@@ -3,6 +3,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/status_macros.h"
 #include "server/calls/wire.h"
 #include "server/jobs/job_size.h"
 #include "server/wire/convert.h"
@@ -12,15 +13,13 @@ namespace wellspace::server {
 
 void EstimateMeshCall::Work(PointChunks& points, Job& job) {
   core::MeshEstimate estimate{};
-  grpc::Status status = RunGuarded([&] {
+  absl::Status status = RunGuarded([&] {
     const std::vector<double> coordinates = points.Flatten(job.context());
-    const absl::StatusOr<core::MeshEstimate> made =
-        features().IsEmpty() ? environment().estimator(parameters(), coordinates, job.context())
-                             : core::EstimateFeatures(parameters(), coordinates, features().View(), job.context());
-    if (made.ok()) {
-      estimate = *made;
-    }
-    return FromCoreStatus(made.status());
+    WELLSPACE_ASSIGN_OR_RETURN(
+        estimate, features().IsEmpty()
+                      ? environment().estimator(parameters(), coordinates, job.context())
+                      : core::EstimateFeatures(parameters(), coordinates, features().View(), job.context()));
+    return absl::OkStatus();
   });
   std::lock_guard lock(mutex_);
   if (ending()) {
@@ -32,7 +31,7 @@ void EstimateMeshCall::Work(PointChunks& points, Job& job) {
   }
   vertices_ = estimate.vertices;
   *response_ = Serialize(EstimateToProto(estimate));
-  End(grpc::Status::OK);
+  End(absl::OkStatus());
 }
 
 bool EstimateMeshCall::IsSmall(const PointChunks& points) const {

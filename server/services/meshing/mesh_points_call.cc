@@ -3,6 +3,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/status_macros.h"
 #include "server/base/clock.h"
 #include "server/calls/wire.h"
 #include "server/jobs/job_size.h"
@@ -13,19 +14,17 @@ namespace wellspace::server {
 
 void MeshPointsCall::Work(PointChunks& points, Job& job) {
   std::shared_ptr<MeshChunks> mesh;
-  grpc::Status status = RunGuarded([&] {
+  absl::Status status = RunGuarded([&] {
     const std::vector<double> coordinates = points.Flatten(job.context());
-    absl::StatusOr<core::Mesh> made =
-        features().IsEmpty() ? environment().mesher(parameters(), coordinates, job.context())
-                             : core::MeshFeatures(parameters(), coordinates, features().View(), job.context());
-    if (!made.ok()) {
-      return FromCoreStatus(made.status());
-    }
-    mesh = std::make_shared<MeshChunks>(*std::move(made));
+    WELLSPACE_ASSIGN_OR_RETURN(
+        core::Mesh made, features().IsEmpty()
+                             ? environment().mesher(parameters(), coordinates, job.context())
+                             : core::MeshFeatures(parameters(), coordinates, features().View(), job.context()));
+    mesh = std::make_shared<MeshChunks>(std::move(made));
     mesh->KeepMemory(job.TakeMemory(mesh->memory_bytes()));
     environment().observability.work().vertices_made += mesh->mesh().vertex_count();
     environment().observability.work().simplices_made += mesh->mesh().simplex_count();
-    return grpc::Status::OK;
+    return absl::OkStatus();
   });
   std::lock_guard lock(mutex_);
   if (ending()) {
@@ -78,7 +77,7 @@ std::optional<grpc::ByteBuffer> MeshPointsCall::NextResponse() {
     environment().log.debug("call={} chunk={}", id(), next_chunk_);
     return SerializeChunk(mesh_, next_chunk_++, v1::MeshPointsResponse::kChunkFieldNumber, with_boundary_);
   } else {
-    End(grpc::Status::OK);
+    End(absl::OkStatus());
     return std::nullopt;
   }
   return Serialize(response);

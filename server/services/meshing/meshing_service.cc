@@ -8,6 +8,7 @@
 #include "server/services/meshing/estimate_mesh_call.h"
 #include "server/services/meshing/mesh_points_call.h"
 #include "server/wire/convert.h"
+#include "server/wire/errors.h"
 
 namespace wellspace::server {
 
@@ -25,9 +26,8 @@ grpc::ServerUnaryReactor* MeshingService::GetServerInfo(grpc::CallbackServerCont
                                                         const v1::GetServerInfoRequest* /*request*/,
                                                         v1::GetServerInfoResponse* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  Caller caller;
-  if (const grpc::Status status = environment_.authenticator.Authenticate(*context, &caller); !status.ok()) {
-    reactor->Finish(status);
+  if (const absl::StatusOr<Caller> caller = environment_.authenticator.Authenticate(*context); !caller.ok()) {
+    reactor->Finish(ToGrpcStatus(caller.status()));
     return reactor;
   }
   response->set_version(kVersion);

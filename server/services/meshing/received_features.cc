@@ -28,7 +28,7 @@ bool RuleFromProto(v1::FaceRule rule, core::FaceRule* out) {
 
 }  // namespace
 
-grpc::Status ReceivedFeatures::Accept(const v1::SegmentChunk& chunk) {
+absl::Status ReceivedFeatures::Accept(const v1::SegmentChunk& chunk) {
   const uint64_t before = ends_.size() / 2;
   if (chunk.ends_size() % 2 != 0) {
     return MakeError(
@@ -53,10 +53,10 @@ grpc::Status ReceivedFeatures::Accept(const v1::SegmentChunk& chunk) {
   markers_.insert(markers_.end(), chunk.markers().begin(), chunk.markers().end());
   markers_.resize(before + count, 0);
   is_open_.resize(before + count, chunk.open() ? 1 : 0);
-  return grpc::Status::OK;
+  return absl::OkStatus();
 }
 
-grpc::Status ReceivedFeatures::Accept(const v1::FaceOptions& options) {
+absl::Status ReceivedFeatures::Accept(const v1::FaceOptions& options) {
   if (!RuleFromProto(options.faces(), &faces_)) {
     return MakeError(v1::ERROR_REASON_INVALID_SEGMENTS,
                      absl::StrCat("faces: ", static_cast<int>(options.faces()),
@@ -88,7 +88,7 @@ grpc::Status ReceivedFeatures::Accept(const v1::FaceOptions& options) {
                       .max_area = seed.max_area() > 0 ? seed.max_area() : std::numeric_limits<double>::infinity()});
   }
   has_any_ = true;
-  return grpc::Status::OK;
+  return absl::OkStatus();
 }
 
 core::Features ReceivedFeatures::View() const {

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "absl/status/status.h"
 #include "core/features/features.h"
-#include "grpcpp/support/status.h"
 #include "wellspace/v1/mesh.pb.h"
 
 namespace wellspace::server {
@@ -18,9 +18,9 @@ class ReceivedFeatures {
   explicit ReceivedFeatures(uint64_t max_segments) : max_segments_(max_segments) {}
 
   // Errors:     INVALID_CHUNK_SHAPE, TOO_MANY_POINTS; the call is to be ended.
-  grpc::Status Accept(const v1::SegmentChunk& chunk);
+  absl::Status Accept(const v1::SegmentChunk& chunk);
   // Errors:     INVALID_SEGMENTS (rules that are not known, areas), TOO_MANY_POINTS.
-  grpc::Status Accept(const v1::FaceOptions& options);
+  absl::Status Accept(const v1::FaceOptions& options);
 
   // Whether nothing has come: the points are meshed in their box.
   bool IsEmpty() const { return !has_any_; }

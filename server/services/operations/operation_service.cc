@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 #include "server/calls/unary_call.h"
 #include "server/services/operations/watch_operation_call.h"
 #include "server/services/page_token.h"
@@ -15,49 +16,47 @@
 namespace wellspace::server {
 namespace {
 
-grpc::Status Start(const CallEnvironment& environment, const Caller& caller, const v1::StartRefinementRequest& request,
+absl::Status Start(const CallEnvironment& environment, const Caller& caller, const v1::StartRefinementRequest& request,
                    v1::Operation* started) {
-  std::shared_ptr<Session> session;
-  if (grpc::Status status = FindSession(environment, caller, request.name(), &session); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<Session> session, FindSession(environment, caller, request.name()));
   core::MeshParameters parameters = session->parameters();
   if (request.has_parameters()) {
-    if (grpc::Status status = ParametersForSession(request.parameters(), environment.options, *session, &parameters);
-        !status.ok()) {
-      return status;
-    }
+    WELLSPACE_ASSIGN_OR_RETURN(parameters, ParametersForSession(request.parameters(), environment.options, *session));
   }
-  std::shared_ptr<Operation> operation;
-  if (grpc::Status status = StartRefinement(environment, session, parameters, request.expected_revision(), &operation);
-      !status.ok()) {
-    return status;
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<Operation> operation,
+                             StartRefinement(environment, session, parameters, request.expected_revision()));
   *started = operation->Describe();
-  return grpc::Status::OK;
+  return absl::OkStatus();
 }
 
-grpc::Status List(const CallEnvironment& environment, const Caller& caller, const v1::ListOperationsRequest& request,
+absl::Status Get(const CallEnvironment& environment, const Caller& caller, const v1::GetOperationRequest& request,
+                 v1::Operation* operation) {
+  WELLSPACE_ASSIGN_OR_RETURN(const FoundOperation found, FindOperation(environment, caller, request.name()));
+  *operation = found.operation->Describe();
+  return absl::OkStatus();
+}
+
+absl::Status Cancel(const CallEnvironment& environment, const Caller& caller, const v1::CancelOperationRequest& request,
+                    v1::Operation* cancelled) {
+  WELLSPACE_ASSIGN_OR_RETURN(const FoundOperation found, FindOperation(environment, caller, request.name()));
+  CancelOperation(environment, *found.session, *found.operation);
+  *cancelled = found.operation->Describe();
+  return absl::OkStatus();
+}
+
+absl::Status List(const CallEnvironment& environment, const Caller& caller, const v1::ListOperationsRequest& request,
                   v1::ListOperationsResponse& response) {
-  std::shared_ptr<Session> session;
-  if (grpc::Status status = FindSession(environment, caller, request.parent(), &session, "parent"); !status.ok()) {
-    return status;
-  }
-  size_t count = 0;
-  if (grpc::Status status = PageSizeFromProto(request.page_size(), &count); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<Session> session,
+                             FindSession(environment, caller, request.parent(), "parent"));
+  WELLSPACE_ASSIGN_OR_RETURN(const size_t count, PageSizeFromProto(request.page_size()));
   const std::string list = absl::StrCat("operations of ", session->name());
-  uint64_t after = 0;
-  if (grpc::Status status = PositionFromProto(request.page_token(), list, 0, &after); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(const uint64_t after, PositionFromProto(request.page_token(), list, 0));
   const std::vector<std::shared_ptr<Operation>> operations = session->ListOperations(after, count + 1);
   const size_t listed = FillPage(operations, count, response.mutable_operations());
   if (listed < operations.size()) {
     response.set_next_page_token(MakePageToken(list, operations[listed - 1]->number()));
   }
-  return grpc::Status::OK;
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -76,12 +75,7 @@ grpc::ServerUnaryReactor* OperationService::GetOperation(grpc::CallbackServerCon
                                                          v1::GetOperationResponse* response) {
   return UnaryCall::Serve(environment_, context, response,
                           [this, request](const Caller& caller, v1::GetOperationResponse& answer) {
-                            FoundOperation found;
-                            grpc::Status status = FindOperation(environment_, caller, request->name(), &found);
-                            if (status.ok()) {
-                              *answer.mutable_operation() = found.operation->Describe();
-                            }
-                            return status;
+                            return Get(environment_, caller, *request, answer.mutable_operation());
                           });
 }
 
@@ -99,13 +93,7 @@ grpc::ServerUnaryReactor* OperationService::CancelOperation(grpc::CallbackServer
                                                             v1::CancelOperationResponse* response) {
   return UnaryCall::Serve(environment_, context, response,
                           [this, request](const Caller& caller, v1::CancelOperationResponse& answer) {
-                            FoundOperation found;
-                            grpc::Status status = FindOperation(environment_, caller, request->name(), &found);
-                            if (status.ok()) {
-                              server::CancelOperation(environment_, *found.session, *found.operation);
-                              *answer.mutable_operation() = found.operation->Describe();
-                            }
-                            return status;
+                            return Cancel(environment_, caller, *request, answer.mutable_operation());
                           });
 }
 

@@ -13,13 +13,13 @@ WatchOperationCall::~WatchOperationCall() {
 }
 
 void WatchOperationCall::OnBegin() {
-  FoundOperation found;
-  if (grpc::Status status = FindOperation(environment(), caller(), name_, &found); !status.ok()) {
-    End(std::move(status));
+  absl::StatusOr<FoundOperation> found = FindOperation(environment(), caller(), name_);
+  if (!found.ok()) {
+    End(std::move(found).status());
     return;
   }
-  use_.emplace(std::move(found.session));
-  operation_ = std::move(found.operation);
+  use_.emplace(std::move(found->session));
+  operation_ = std::move(found->operation);
   watch_ = operation_->Watch(WeakCall(&WatchOperationCall::Wake));
   WriteNext();
 }
@@ -31,7 +31,7 @@ void WatchOperationCall::Wake() {
 
 std::optional<v1::WatchOperationResponse> WatchOperationCall::NextResponse() {
   if (is_end_sent_) {
-    End(grpc::Status::OK);
+    End(absl::OkStatus());
     return std::nullopt;
   }
   // First whether it has ended: after that there are no more events.

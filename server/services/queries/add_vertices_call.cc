@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/status_macros.h"
 #include "server/jobs/job_size.h"
 #include "server/services/resource_names.h"
 #include "server/wire/errors.h"
@@ -22,18 +23,15 @@ struct Addition {
 // On a worker.
 RequestIds::Answer Add(const Addition& addition, const MesherFactory& create_mesher, Job& job) {
   v1::AddVerticesResponse response;
-  grpc::Status status = RunGuarded([&] {
+  absl::Status status = RunGuarded([&] {
     Session& session = addition.use.session();
-    AddedVertices added;
-    grpc::Status ended = session.PrepareStructure(addition.expected_revision, create_mesher, job);
-    if (ended.ok()) {
-      ended = session.AddVertices(addition.points, addition.near, addition.expected_revision, job.context(), &added);
-    }
-    if (ended.ok()) {
-      response.mutable_vertices()->Add(added.vertices.begin(), added.vertices.end());
-      response.set_revision(added.revision);
-    }
-    return ended;
+    WELLSPACE_RETURN_IF_ERROR(session.PrepareStructure(addition.expected_revision, create_mesher, job));
+    WELLSPACE_ASSIGN_OR_RETURN(
+        const AddedVertices added,
+        session.AddVertices(addition.points, addition.near, addition.expected_revision, job.context()));
+    response.mutable_vertices()->Add(added.vertices.begin(), added.vertices.end());
+    response.set_revision(added.revision);
+    return absl::OkStatus();
   });
   return {std::move(status), response.SerializeAsString()};
 }
@@ -56,31 +54,31 @@ grpc::ServerUnaryReactor* AddVerticesCall::Serve(const CallEnvironment& environm
 }
 
 void AddVerticesCall::Submit(RequestIds::Done done) {
-  std::shared_ptr<Session> session;
-  if (grpc::Status status = FindSession(environment(), caller(), request_->name(), &session); !status.ok()) {
-    done({std::move(status), ""});
+  absl::StatusOr<std::shared_ptr<Session>> session = FindSession(environment(), caller(), request_->name());
+  if (!session.ok()) {
+    done({std::move(session).status(), ""});
     return;
   }
-  const Session::Size size = session->GetSize(0);
+  const Session::Size size = (*session)->GetSize(0);
   const bool is_small =
-      IsSmallAddition(request_->points_size() / session->dimension(), size.vertices, size.replayed_steps);
+      IsSmallAddition(request_->points_size() / (*session)->dimension(), size.vertices, size.replayed_steps);
   const std::shared_ptr<const Addition> addition(
-      new Addition{.use = SessionUse(std::move(session)),
+      new Addition{.use = SessionUse(*std::move(session)),
                    .points = {request_->points().begin(), request_->points().end()},
                    .near = {request_->near().begin(), request_->near().end()},
                    .expected_revision = request_->expected_revision()});
-  JobPool::Submission submission =
+  absl::StatusOr<std::shared_ptr<Job>> job =
       environment().jobs.Submit({.tenant = caller().tenant,
                                  .is_small = is_small,
-                                 .work = [addition, done, &create_mesher = environment().create_mesher](Job& job) {
-                                   done(Add(*addition, create_mesher, job));
+                                 .work = [addition, done, &create_mesher = environment().create_mesher](Job& running) {
+                                   done(Add(*addition, create_mesher, running));
                                  }});
-  if (submission.job == nullptr) {
-    done({std::move(submission.refusal), ""});
+  if (!job.ok()) {
+    done({std::move(job).status(), ""});
     return;
   }
   std::lock_guard lock(mutex_);
-  job_ = std::move(submission.job);
+  job_ = *std::move(job);
   if (ending()) {
     OnEnd();
   }

@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/time/time.h"
+#include "core/base/status_macros.h"
 #include "core/mesh_parameters.h"
 #include "server/base/options.h"
 #include "server/jobs/job_size.h"
@@ -21,7 +22,7 @@ namespace {
 // excepted.
 constexpr uint64_t kFullBatchBytes = kMaxResponseBytes / 4 * 3;
 
-// Before a job comes again that found the line full, or the structure being built by another.
+// Before a job comes again that found the queue full, or the structure being built by another.
 constexpr absl::Duration kQueryRetryDelay = absl::Milliseconds(50);
 
 // Vertices of one look at the structure, by dimension: about a millisecond. Cells grow sixfold with each dimension.
@@ -30,30 +31,21 @@ constexpr std::array<uint64_t, core::kMaxDimension + 1> kVerticesPerLook = {0, 0
 }  // namespace
 
 void QueryCall::OnBegin() {
-  if (grpc::Status status = Find(); !status.ok()) {
+  if (absl::Status status = Find(); !status.ok()) {
     End(std::move(status));
     return;
   }
   WorkAhead();
 }
 
-grpc::Status QueryCall::Find() {
+absl::Status QueryCall::Find() {
   // The request as bytes and as numbers; batches that wait, one that is made, and one that is written.
   const uint64_t bytes = 2 * bytes_.Length() + (kBatchesAhead + 3) * kMaxResponseBytes;
-  absl::StatusOr<MemoryReservation> memory = environment().memory.Reserve(bytes, "the batches of a query");
-  if (!memory.ok()) {
-    return FromCoreStatus(memory.status());
-  }
-  memory_ = *std::move(memory);
-  if (grpc::Status status = parse_(&bytes_, &request_); !status.ok()) {
-    return status;
-  }
-  std::shared_ptr<Session> session;
-  if (grpc::Status status = FindSession(environment(), caller(), request_.session, &session); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(memory_, environment().memory.Reserve(bytes, "the batches of a query"));
+  WELLSPACE_ASSIGN_OR_RETURN(request_, parse_(&bytes_));
+  WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, FindSession(environment(), caller(), request_.session));
   use_.emplace(std::move(session));
-  return grpc::Status::OK;
+  return absl::OkStatus();
 }
 
 void QueryCall::WorkAhead() {
@@ -61,17 +53,17 @@ void QueryCall::WorkAhead() {
     return;
   }
   const Session::Size size = use_->session().GetSize(0);
-  JobPool::Submission submission =
+  absl::StatusOr<std::shared_ptr<Job>> job =
       environment().jobs.Submit({.tenant = caller().tenant,
                                  .is_small = IsSmallAddition(0, size.vertices, size.replayed_steps),
-                                 .work = [self = SharedAs<QueryCall>()](Job& job) { self->MakeBatches(job); }});
-  if (submission.job != nullptr) {
+                                 .work = [self = SharedAs<QueryCall>()](Job& running) { self->MakeBatches(running); }});
+  if (job.ok()) {
     work_ = Work::kUnderWay;
-    job_ = std::move(submission.job);
+    job_ = *std::move(job);
   } else if (job_ == nullptr) {
-    End(std::move(submission.refusal));
+    End(std::move(job).status());
   } else {
-    environment().log.debug("call={} the line is full", id());
+    environment().log.debug("call={} the queue is full", id());
     work_ = Work::kRefused;
     environment().background.PostAfter(kQueryRetryDelay, WeakCall(&QueryCall::TryAgain));
   }
@@ -90,8 +82,8 @@ void QueryCall::MakeBatches(Job& job) {
   while (has_room) {
     grpc::ByteBuffer batch;
     bool is_at_work = false;
-    grpc::Status status = RunGuarded([&] {
-      grpc::Status filled = FillBatch(job, &is_at_work);
+    absl::Status status = RunGuarded([&] {
+      absl::Status filled = FillBatch(job, &is_at_work);
       if (filled.ok() && request_.query->batch_bytes() > 0) {
         batch = request_.query->TakeBatch();
       }
@@ -122,24 +114,17 @@ void QueryCall::MakeBatches(Job& job) {
   }
 }
 
-grpc::Status QueryCall::FillBatch(Job& job, bool* is_at_work) {
+absl::Status QueryCall::FillBatch(Job& job, bool* is_at_work) {
+  Session& session = use_->session();
   do {
-    if (grpc::Status status = FromCoreStatus(job.context().Check()); !status.ok()) {
-      return status;
-    }
-    if (grpc::Status status = use_->session().PrepareStructure(0, environment().create_mesher, job, is_at_work);
-        !status.ok()) {
-      return status;
-    }
-    grpc::Status status = use_->session().Query(&version_, [this](const core::Mesher& mesher) { return Ask(mesher); });
-    if (!status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(job.context().Check());
+    WELLSPACE_RETURN_IF_ERROR(session.PrepareStructure(0, environment().create_mesher, job, is_at_work));
+    WELLSPACE_RETURN_IF_ERROR(session.Query(&version_, [this](const core::Mesher& mesher) { return Ask(mesher); }));
   } while (next_ < *count_ && request_.query->batch_bytes() < kFullBatchBytes);
-  return grpc::Status::OK;
+  return absl::OkStatus();
 }
 
-grpc::Status QueryCall::Ask(const core::Mesher& mesher) {
+absl::Status QueryCall::Ask(const core::Mesher& mesher) {
   const std::vector<uint32_t>& vertices = request_.vertices;
   if (!count_.has_value()) {
     const uint64_t vertex_count = mesher.vertex_count();
@@ -161,18 +146,16 @@ grpc::Status QueryCall::Ask(const core::Mesher& mesher) {
   } else {
     std::copy_n(vertices.begin() + static_cast<std::ptrdiff_t>(next_), size, some.begin());
   }
-  const absl::Status asked = request_.query->Ask(mesher, some);
+  WELLSPACE_RETURN_IF_ERROR(request_.query->Ask(mesher, some));
   next_ += size;
-  if (asked.ok()) {
-    environment().observability.work().cells_served += size;
-  }
-  return FromCoreStatus(asked);
+  environment().observability.work().cells_served += size;
+  return absl::OkStatus();
 }
 
 std::optional<grpc::ByteBuffer> QueryCall::NextResponse() {
   if (ready_.empty()) {
     if (work_ == Work::kDone) {
-      End(grpc::Status::OK);
+      End(absl::OkStatus());
     }
     return std::nullopt;
   }

@@ -49,7 +49,7 @@ class QueryCall final : public ResponseStream<Call<grpc::ServerWriteReactor<grpc
   void TryAgain();
 
   // The following want mutex_ to be held.
-  grpc::Status Find();
+  absl::Status Find();
   // Submits a job if one is wanted and none is under way.
   void WorkAhead();
 
@@ -57,8 +57,8 @@ class QueryCall final : public ResponseStream<Call<grpc::ServerWriteReactor<grpc
   void MakeBatches(Job& job);
   // The same: asks about the next vertices until the batch is full, or there are none. `*is_at_work`: another job has
   // the structure built again just now; to be tried again.
-  grpc::Status FillBatch(Job& job, bool* is_at_work);
-  grpc::Status Ask(const core::Mesher& mesher);
+  absl::Status FillBatch(Job& job, bool* is_at_work);
+  absl::Status Ask(const core::Mesher& mesher);
 
   const VertexQueryParser parse_;
 

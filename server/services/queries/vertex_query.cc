@@ -71,41 +71,40 @@ class CellQuery final : public VertexQuery {
   Response batch_;
 };
 
+// Reads `message`, and the part of the request that all queries have.
 template <typename Request>
-grpc::Status Parse(grpc::ByteBuffer* bytes, Request* message, VertexQueryRequest* request) {
-  if (grpc::Status status = ParseRequest(bytes, message); !status.ok()) {
-    return status;
-  }
-  request->session = message->name();
-  request->vertices.assign(message->vertices().begin(), message->vertices().end());
-  return grpc::Status::OK;
+absl::StatusOr<VertexQueryRequest> Parse(grpc::ByteBuffer* bytes, Request* message) {
+  WELLSPACE_RETURN_IF_ERROR(ParseRequest(bytes, message));
+  return VertexQueryRequest{.session = message->name(),
+                            .vertices = {message->vertices().begin(), message->vertices().end()},
+                            .query = nullptr};
 }
 
 }  // namespace
 
-grpc::Status ParseNearestNeighbors(grpc::ByteBuffer* bytes, VertexQueryRequest* request) {
+absl::StatusOr<VertexQueryRequest> ParseNearestNeighbors(grpc::ByteBuffer* bytes) {
   v1::ApproximateNearestNeighborsRequest message;
-  request->query = std::make_unique<NearestNeighborQuery>();
-  return Parse(bytes, &message, request);
+  WELLSPACE_ASSIGN_OR_RETURN(VertexQueryRequest request, Parse(bytes, &message));
+  request.query = std::make_unique<NearestNeighborQuery>();
+  return request;
 }
 
-grpc::Status ParseClippedCells(grpc::ByteBuffer* bytes, VertexQueryRequest* request) {
+absl::StatusOr<VertexQueryRequest> ParseClippedCells(grpc::ByteBuffer* bytes) {
   v1::ClippedVoronoiCellsRequest message;
-  if (grpc::Status status = Parse(bytes, &message, request); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(VertexQueryRequest request, Parse(bytes, &message));
   if (!(message.beta() >= 1 && std::isfinite(message.beta()))) {
     return MakeError(v1::ERROR_REASON_INVALID_REQUEST,
                      absl::StrCat("beta is ", message.beta(), "; a finite number of at least 1 is accepted"), "beta");
   }
-  request->query = std::make_unique<CellQuery<v1::ClippedVoronoiCellsResponse>>(message.beta());
-  return grpc::Status::OK;
+  request.query = std::make_unique<CellQuery<v1::ClippedVoronoiCellsResponse>>(message.beta());
+  return request;
 }
 
-grpc::Status ParseCells(grpc::ByteBuffer* bytes, VertexQueryRequest* request) {
+absl::StatusOr<VertexQueryRequest> ParseCells(grpc::ByteBuffer* bytes) {
   v1::VoronoiCellsRequest message;
-  request->query = std::make_unique<CellQuery<v1::VoronoiCellsResponse>>(std::numeric_limits<double>::infinity());
-  return Parse(bytes, &message, request);
+  WELLSPACE_ASSIGN_OR_RETURN(VertexQueryRequest request, Parse(bytes, &message));
+  request.query = std::make_unique<CellQuery<v1::VoronoiCellsResponse>>(std::numeric_limits<double>::infinity());
+  return request;
 }
 
 }  // namespace wellspace::server

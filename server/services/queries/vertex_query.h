@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "absl/status/status.h"
+#include "absl/status/statusor.h"
 #include "core/mesher.h"
 #include "grpcpp/support/byte_buffer.h"
-#include "grpcpp/support/status.h"
 
 namespace wellspace::server {
 
@@ -45,10 +45,10 @@ struct VertexQueryRequest {
 // Reads the serialized request of one of the calls.
 //
 // Errors:     MALFORMED_REQUEST; INVALID_REQUEST (beta).
-using VertexQueryParser = grpc::Status (*)(grpc::ByteBuffer* bytes, VertexQueryRequest* request);
-grpc::Status ParseNearestNeighbors(grpc::ByteBuffer* bytes, VertexQueryRequest* request);
-grpc::Status ParseClippedCells(grpc::ByteBuffer* bytes, VertexQueryRequest* request);
-grpc::Status ParseCells(grpc::ByteBuffer* bytes, VertexQueryRequest* request);
+using VertexQueryParser = absl::StatusOr<VertexQueryRequest> (*)(grpc::ByteBuffer* bytes);
+absl::StatusOr<VertexQueryRequest> ParseNearestNeighbors(grpc::ByteBuffer* bytes);
+absl::StatusOr<VertexQueryRequest> ParseClippedCells(grpc::ByteBuffer* bytes);
+absl::StatusOr<VertexQueryRequest> ParseCells(grpc::ByteBuffer* bytes);
 
 }  // namespace wellspace::server
 

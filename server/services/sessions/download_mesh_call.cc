@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 #include "server/calls/wire.h"
 #include "server/services/resource_names.h"
 #include "server/sessions/mesh_chunks.h"
@@ -12,28 +13,23 @@
 namespace wellspace::server {
 
 void DownloadMeshCall::OnBegin() {
-  if (grpc::Status status = Find(); !status.ok()) {
+  if (absl::Status status = Find(); !status.ok()) {
     End(std::move(status));
     return;
   }
   WriteNext();
 }
 
-grpc::Status DownloadMeshCall::Find() {
-  if (grpc::Status status = ParseRequest(&bytes_, &request_); !status.ok()) {
-    return status;
-  }
-  std::shared_ptr<Session> session;
-  if (grpc::Status status = FindSession(environment(), caller(), request_.name(), &session); !status.ok()) {
-    return status;
-  }
+absl::Status DownloadMeshCall::Find() {
+  WELLSPACE_RETURN_IF_ERROR(ParseRequest(&bytes_, &request_));
+  WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, FindSession(environment(), caller(), request_.name()));
   std::shared_ptr<const MeshSnapshot> mesh = session->mesh();
   if (mesh == nullptr) {
     return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
                      absl::StrCat(session->name(), " has no mesh yet; refine it first"));
   }
   if (request_.revision() != 0 && request_.revision() != mesh->revision) {
-    return MakeError(grpc::StatusCode::FAILED_PRECONDITION, v1::ERROR_REASON_REVISION_MISMATCH,
+    return MakeError(absl::StatusCode::kFailedPrecondition, v1::ERROR_REASON_REVISION_MISMATCH,
                      absl::StrCat("the mesh of ", session->name(), " is of revision ", mesh->revision, ", not ",
                                   request_.revision(), " as asked for; download it from its first chunk"),
                      "revision");
@@ -48,7 +44,7 @@ grpc::Status DownloadMeshCall::Find() {
   use_.emplace(std::move(session));
   mesh_ = std::move(mesh);
   next_chunk_ = request_.next_chunk();
-  return grpc::Status::OK;
+  return absl::OkStatus();
 }
 
 std::optional<grpc::ByteBuffer> DownloadMeshCall::NextResponse() {
@@ -62,7 +58,7 @@ std::optional<grpc::ByteBuffer> DownloadMeshCall::NextResponse() {
     return Serialize(response);
   }
   if (next_chunk_ == chunks.count(with_boundary)) {
-    End(grpc::Status::OK);
+    End(absl::OkStatus());
     return std::nullopt;
   }
   environment().log.debug("call={} chunk={}", id(), next_chunk_);

@@ -33,7 +33,7 @@ class DownloadMeshCall final
   std::optional<grpc::ByteBuffer> NextResponse() override;
 
   // Wants mutex_ to be held: finds the mesh.
-  grpc::Status Find();
+  absl::Status Find();
 
   // Guarded by mutex_.
   grpc::ByteBuffer bytes_;

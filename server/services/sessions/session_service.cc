@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/time/time.h"
+#include "core/base/status_macros.h"
 #include "server/calls/unary_call.h"
 #include "server/services/page_token.h"
 #include "server/services/resource_names.h"
@@ -22,30 +23,17 @@
 namespace wellspace::server {
 namespace {
 
-grpc::Status Create(const CallEnvironment& environment, const Caller& caller, const v1::CreateSessionRequest& request,
+absl::Status Create(const CallEnvironment& environment, const Caller& caller, const v1::CreateSessionRequest& request,
                     v1::Session* created) {
   NewSession settings{.tenant = caller.tenant, .parameters = {}, .labels = {}, .ttl = {}};
-  if (grpc::Status status = ParametersFromProto(request.parameters(), environment.options, &settings.parameters);
-      !status.ok()) {
-    return status;
-  }
-  if (grpc::Status status = CheckParametersSize(settings.parameters); !status.ok()) {
-    return status;
-  }
-  if (grpc::Status status = LabelsFromProto(request.labels(), "labels", &settings.labels); !status.ok()) {
-    return status;
-  }
-  if (grpc::Status status =
-          TtlFromProto(request.has_ttl() ? &request.ttl() : nullptr, "ttl", environment.options, &settings.ttl);
-      !status.ok()) {
-    return status;
-  }
-  std::shared_ptr<Session> session;
-  if (grpc::Status status = environment.sessions.Create(std::move(settings), &session); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(settings.parameters, ParametersFromProto(request.parameters(), environment.options));
+  WELLSPACE_RETURN_IF_ERROR(CheckParametersSize(settings.parameters));
+  WELLSPACE_ASSIGN_OR_RETURN(settings.labels, LabelsFromProto(request.labels(), "labels"));
+  WELLSPACE_ASSIGN_OR_RETURN(settings.ttl,
+                             TtlFromProto(request.has_ttl() ? &request.ttl() : nullptr, "ttl", environment.options));
+  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<Session> session, environment.sessions.Create(std::move(settings)));
   *created = session->Describe();
-  return grpc::Status::OK;
+  return absl::OkStatus();
 }
 
 // What the page tokens of a list of sessions depend on.
@@ -57,21 +45,12 @@ std::string ListOf(const Caller& caller, const Labels& labels) {
   return list;
 }
 
-grpc::Status List(const CallEnvironment& environment, const Caller& caller, const v1::ListSessionsRequest& request,
+absl::Status List(const CallEnvironment& environment, const Caller& caller, const v1::ListSessionsRequest& request,
                   v1::ListSessionsResponse& response) {
-  size_t count = 0;
-  if (grpc::Status status = PageSizeFromProto(request.page_size(), &count); !status.ok()) {
-    return status;
-  }
-  Labels labels;
-  if (grpc::Status status = LabelsFromProto(request.labels(), "labels", &labels); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(const size_t count, PageSizeFromProto(request.page_size()));
+  WELLSPACE_ASSIGN_OR_RETURN(const Labels labels, LabelsFromProto(request.labels(), "labels"));
   const std::string list = ListOf(caller, labels);
-  uint64_t after = 0;
-  if (grpc::Status status = PositionFromProto(request.page_token(), list, 0, &after); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(const uint64_t after, PositionFromProto(request.page_token(), list, 0));
   const std::vector<std::shared_ptr<Session>> sessions =
       environment.sessions.List(caller.tenant, absl::FromUnixNanos(static_cast<int64_t>(after)), count + 1, labels);
   const size_t listed = FillPage(sessions, count, response.mutable_sessions());
@@ -79,16 +58,13 @@ grpc::Status List(const CallEnvironment& environment, const Caller& caller, cons
     response.set_next_page_token(
         MakePageToken(list, static_cast<uint64_t>(absl::ToUnixNanos(sessions[listed - 1]->create_time()))));
   }
-  return grpc::Status::OK;
+  return absl::OkStatus();
 }
 
-grpc::Status Update(const CallEnvironment& environment, const Caller& caller, const v1::UpdateSessionRequest& request,
+absl::Status Update(const CallEnvironment& environment, const Caller& caller, const v1::UpdateSessionRequest& request,
                     v1::Session* updated) {
-  std::shared_ptr<Session> session;
-  if (grpc::Status status = FindSession(environment, caller, request.session().name(), &session, "session.name");
-      !status.ok()) {
-    return status;
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<Session> session,
+                             FindSession(environment, caller, request.session().name(), "session.name"));
   bool sets_labels = !request.has_update_mask();
   bool sets_ttl = sets_labels;
   for (const std::string& path : request.update_mask().paths()) {
@@ -100,42 +76,35 @@ grpc::Status Update(const CallEnvironment& environment, const Caller& caller, co
   }
   std::optional<Labels> labels;
   if (sets_labels) {
-    if (grpc::Status status = LabelsFromProto(request.session().labels(), "session.labels", &labels.emplace());
-        !status.ok()) {
-      return status;
-    }
+    WELLSPACE_ASSIGN_OR_RETURN(labels, LabelsFromProto(request.session().labels(), "session.labels"));
   }
   std::optional<absl::Duration> ttl;
   if (sets_ttl) {
-    if (grpc::Status status = TtlFromProto(request.session().has_ttl() ? &request.session().ttl() : nullptr,
-                                           "session.ttl", environment.options, &ttl.emplace());
-        !status.ok()) {
-      return status;
-    }
+    const google::protobuf::Duration* given = request.session().has_ttl() ? &request.session().ttl() : nullptr;
+    WELLSPACE_ASSIGN_OR_RETURN(ttl, TtlFromProto(given, "session.ttl", environment.options));
   }
-  if (grpc::Status status = session->Update(std::move(labels), ttl, request.expected_revision()); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(session->Update(std::move(labels), ttl, request.expected_revision()));
   *updated = session->Describe();
-  return grpc::Status::OK;
+  return absl::OkStatus();
 }
 
-grpc::Status Delete(const CallEnvironment& environment, const Caller& caller, const v1::DeleteSessionRequest& request) {
-  std::shared_ptr<Session> session;
-  if (grpc::Status status = FindSession(environment, caller, request.name(), &session); !status.ok()) {
-    return status;
-  }
-  std::shared_ptr<Operation> under_way;
-  if (grpc::Status status = session->Close(request.expected_revision(), &under_way); !status.ok()) {
-    return status;
-  }
+absl::Status Delete(const CallEnvironment& environment, const Caller& caller, const v1::DeleteSessionRequest& request) {
+  WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, FindSession(environment, caller, request.name()));
+  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<Operation> under_way, session->Close(request.expected_revision()));
   environment.sessions.Remove(*session);
   if (under_way != nullptr) {
     CancelOperation(environment, *session, *under_way);
   }
   // To free much memory takes long.
   environment.background.Post([session = std::move(session)] {});
-  return grpc::Status::OK;
+  return absl::OkStatus();
+}
+
+absl::Status Get(const CallEnvironment& environment, const Caller& caller, const v1::GetSessionRequest& request,
+                 v1::Session* found) {
+  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<Session> session, FindSession(environment, caller, request.name()));
+  *found = session->Describe();
+  return absl::OkStatus();
 }
 
 }  // namespace
@@ -154,12 +123,7 @@ grpc::ServerUnaryReactor* SessionService::GetSession(grpc::CallbackServerContext
                                                      v1::GetSessionResponse* response) {
   return UnaryCall::Serve(environment_, context, response,
                           [this, request](const Caller& caller, v1::GetSessionResponse& answer) {
-                            std::shared_ptr<Session> session;
-                            grpc::Status status = FindSession(environment_, caller, request->name(), &session);
-                            if (status.ok()) {
-                              *answer.mutable_session() = session->Describe();
-                            }
-                            return status;
+                            return Get(environment_, caller, *request, answer.mutable_session());
                           });
 }
 

@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/time/time.h"
+#include "core/base/status_macros.h"
 #include "server/calls/wire.h"
 #include "server/services/resource_names.h"
 #include "server/wire/errors.h"
@@ -21,7 +22,7 @@ constexpr int kAttempts = 20;
 void UploadPointsCall::OnBegin() {
   absl::StatusOr<MemoryReservation> memory = environment().memory.Reserve(kMessageBytes, "an upload");
   if (!memory.ok()) {
-    End(FromCoreStatus(memory.status()));
+    End(std::move(memory).status());
     return;
   }
   memory_ = *std::move(memory);
@@ -30,15 +31,7 @@ void UploadPointsCall::OnBegin() {
 
 void UploadPointsCall::OnRequest(grpc::ByteBuffer* bytes) {
   v1::UploadPointsRequest request;
-  grpc::Status status = ParseRequest(bytes, &request);
-  if (status.ok() && !session_.has_value()) {
-    std::shared_ptr<Session> session;
-    status = FindSession(environment(), caller(), request.name(), &session);
-    if (status.ok()) {
-      session_.emplace(std::move(session));
-    }
-  }
-  if (!status.ok()) {
+  if (absl::Status status = Parse(bytes, &request); !status.ok()) {
     End(std::move(status));
   } else if (has_session_) {
     Take(request);
@@ -48,11 +41,20 @@ void UploadPointsCall::OnRequest(grpc::ByteBuffer* bytes) {
   }
 }
 
+absl::Status UploadPointsCall::Parse(grpc::ByteBuffer* bytes, v1::UploadPointsRequest* request) {
+  WELLSPACE_RETURN_IF_ERROR(ParseRequest(bytes, request));
+  if (!session_.has_value()) {
+    WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, FindSession(environment(), caller(), request->name()));
+    session_.emplace(std::move(session));
+  }
+  return absl::OkStatus();
+}
+
 void UploadPointsCall::TryToBegin() {
   has_session_ = session_->session().BeginUpload();
   if (has_session_) {
     const v1::UploadPointsRequest first = std::exchange(first_, v1::UploadPointsRequest());
-    if (grpc::Status status = CheckPrefix(first); !status.ok()) {
+    if (absl::Status status = CheckPrefix(first); !status.ok()) {
       End(std::move(status));
     } else {
       Take(first);
@@ -74,9 +76,9 @@ void UploadPointsCall::TryAgain() {
   }
 }
 
-grpc::Status UploadPointsCall::CheckPrefix(const v1::UploadPointsRequest& first) const {
+absl::Status UploadPointsCall::CheckPrefix(const v1::UploadPointsRequest& first) const {
   if (!first.has_checked_crc32c()) {
-    return grpc::Status::OK;
+    return absl::OkStatus();
   }
   if (first.checked_from() > first.point_offset()) {
     return MakeError(v1::ERROR_REASON_INVALID_REQUEST,
@@ -95,7 +97,7 @@ void UploadPointsCall::Take(const v1::UploadPointsRequest& request) {
   Session& session = session_->session();
   coordinate_count_ += coordinates.size();
   environment().observability.work().points_received += coordinates.size() / session.dimension();
-  grpc::Status status = RunGuarded([&] {
+  absl::Status status = RunGuarded([&] {
     return session.Append(request.point_offset(), {coordinates.data(), static_cast<size_t>(coordinates.size())},
                           expected_revision);
   });
@@ -112,7 +114,7 @@ void UploadPointsCall::OnRequestsEnd() {
                   "the stream ended before any request; send the name of the session first", "name"));
   } else {
     *response_ = Serialize(session_->session().Committed());
-    End(grpc::Status::OK);
+    End(absl::OkStatus());
   }
 }
 

@@ -38,10 +38,12 @@ class UploadPointsCall final : public RequestStream<Call<grpc::ServerReadReactor
   void TryAgain();
 
   // The following want mutex_ to be held.
+  // Reads `request` from `bytes`. The first one says which session it is for.
+  absl::Status Parse(grpc::ByteBuffer* bytes, v1::UploadPointsRequest* request);
   // With first_: takes it when the session is free, or comes again, or ends the call.
   void TryToBegin();
   // What the first message says that the session has.
-  grpc::Status CheckPrefix(const v1::UploadPointsRequest& first) const;
+  absl::Status CheckPrefix(const v1::UploadPointsRequest& first) const;
   // Takes a message, and reads the next or ends the call.
   void Take(const v1::UploadPointsRequest& request);
 

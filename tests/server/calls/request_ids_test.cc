@@ -35,7 +35,7 @@ class RequestIdsTest : public ::testing::Test {
   int done_ = 0;
 };
 
-RequestIds::Answer Ok(const std::string& response) { return {grpc::Status::OK, response}; }
+RequestIds::Answer Ok(const std::string& response) { return {absl::OkStatus(), response}; }
 
 TEST_F(RequestIdsTest, ARepeatedCallGetsTheFirstAnswer) {
   EXPECT_EQ(Ask("1", "x", Ok("first")).response, "first");
@@ -52,8 +52,8 @@ TEST_F(RequestIdsTest, NoIdIsNeverARepetition) {
 
 TEST_F(RequestIdsTest, AnotherRequestWithTheSameIdIsRefused) {
   Ask("1", "x", Ok("first"));
-  const grpc::Status status = Ask("1", "y", Ok("second")).status;
-  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  const absl::Status status = Ask("1", "y", Ok("second")).status;
+  EXPECT_EQ(status.code(), absl::StatusCode::kInvalidArgument);
   EXPECT_EQ(DetailsOf(status).reason, "REQUEST_ID_REUSED");
   EXPECT_EQ(DetailsOf(status).field, "request_id");
   EXPECT_EQ(done_, 1);
@@ -76,7 +76,7 @@ TEST_F(RequestIdsTest, TheOrderOfLabelsIsNoOtherRequest) {
 }
 
 TEST_F(RequestIdsTest, WhatFailedMayBeTriedAgain) {
-  EXPECT_FALSE(Ask("1", "x", {grpc::Status(grpc::StatusCode::ABORTED, ""), ""}).status.ok());
+  EXPECT_FALSE(Ask("1", "x", {absl::AbortedError(""), ""}).status.ok());
   EXPECT_EQ(Ask("1", "x", Ok("second")).response, "second");
 }
 
@@ -109,7 +109,7 @@ TEST_F(RequestIdsTest, AnswersTakeBoundedMemory) {
 
 TEST_F(RequestIdsTest, TheLengthOfAnIdIsLimited) {
   EXPECT_TRUE(Ask(std::string(RequestIds::kMaxLength, 'x'), "x", Ok("")).status.ok());
-  const grpc::Status status = Ask(std::string(RequestIds::kMaxLength + 1, 'x'), "x", Ok("")).status;
+  const absl::Status status = Ask(std::string(RequestIds::kMaxLength + 1, 'x'), "x", Ok("")).status;
   EXPECT_EQ(DetailsOf(status).reason, "INVALID_REQUEST");
   EXPECT_EQ(DetailsOf(status).field, "request_id");
 }

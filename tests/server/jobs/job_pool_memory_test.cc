@@ -84,7 +84,7 @@ TEST(JobPool, WhatNeverFitsIsRefusedAtOnceWithFiguresAndNoRetry) {
   Pool pool(1, 1, 1, kMaxMemory);
   pool.Submit(huge.Work());
   ASSERT_TRUE(huge.ended.Wait());
-  const grpc::Status status = FromCoreStatus(huge.status);
+  const grpc::Status status = ToGrpcStatus(huge.status);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
   EXPECT_EQ(DetailsOf(status).reason, "MEMORY_LIMIT");
   EXPECT_FALSE(DetailsOf(status).may_retry);
@@ -100,8 +100,8 @@ TEST(JobPool, WhatSessionsLeaveNoRoomForIsRefusedAtOnceButMayBeRetried) {
   session->MakeLasting();
   pool.Submit(large.Work());
   ASSERT_TRUE(large.ended.Wait());
-  EXPECT_EQ(DetailsOf(FromCoreStatus(large.status)).reason, "MEMORY_LIMIT");
-  EXPECT_TRUE(DetailsOf(FromCoreStatus(large.status)).may_retry);
+  EXPECT_EQ(DetailsOf(large.status).reason, "MEMORY_LIMIT");
+  EXPECT_TRUE(DetailsOf(large.status).may_retry);
 }
 
 TEST(JobPool, WhenAllWaitForOneAnotherTheYoungestTreeIsRefusedAndTheOldestGoesOn) {
@@ -126,8 +126,8 @@ TEST(JobPool, WhenAllWaitForOneAnotherTheYoungestTreeIsRefusedAndTheOldestGoesOn
   }
   EXPECT_TRUE(jobs[0].mesh_status.ok()) << jobs[0].mesh_status;
   EXPECT_TRUE(jobs[1].mesh_status.ok()) << jobs[1].mesh_status;
-  EXPECT_EQ(DetailsOf(FromCoreStatus(jobs[2].mesh_status)).reason, "MEMORY_LIMIT");
-  EXPECT_TRUE(DetailsOf(FromCoreStatus(jobs[2].mesh_status)).may_retry);
+  EXPECT_EQ(DetailsOf(jobs[2].mesh_status).reason, "MEMORY_LIMIT");
+  EXPECT_TRUE(DetailsOf(jobs[2].mesh_status).may_retry);
   EXPECT_TRUE(jobs[3].mesh_status.ok()) << jobs[3].mesh_status;
 }
 
@@ -260,16 +260,16 @@ TEST(JobPool, SmallJobsAskForMemoryBesideThoseThatWaitForIt) {
   JobPool pool({.workers = 2, .max_queued = 10, .max_per_tenant = 100, .small_workers = 1}, memory);
   Needy holder(60 * kMegabyte);
   Needy waiting(80 * kMegabyte);
-  ASSERT_NE(pool.Submit({.tenant = "a", .work = holder.Work()}).job, nullptr);
+  ASSERT_TRUE(pool.Submit({.tenant = "a", .work = holder.Work()}).ok());
   ASSERT_TRUE(holder.reserved.Wait());
-  ASSERT_NE(pool.Submit({.tenant = "b", .work = waiting.Work()}).job, nullptr);
+  ASSERT_TRUE(pool.Submit({.tenant = "b", .work = waiting.Work()}).ok());
   while (pool.GetLoad().queued != 1) {  // until it waits for memory
     std::this_thread::yield();
   }
   for (int i = 0; i < 3 * FairQueue::kMaxSkips; ++i) {
     Needy small(10 * kMegabyte);
     small.may_end.Set();
-    ASSERT_NE(pool.Submit({.tenant = "c", .is_small = true, .work = small.Work()}).job, nullptr);
+    ASSERT_TRUE(pool.Submit({.tenant = "c", .is_small = true, .work = small.Work()}).ok());
     ASSERT_TRUE(small.ended.Wait());
     EXPECT_TRUE(small.status.ok()) << small.status;
     while (pool.GetLoad().running > 1) {  // until it is gone

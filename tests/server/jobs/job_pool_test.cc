@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "absl/strings/match.h"
 #include "gtest/gtest.h"
 #include "tests/server/jobs/test_jobs.h"
 #include "tests/server/service_harness.h"
@@ -185,11 +186,10 @@ TEST(JobPool, RefusesWhatIsAboveATenantsShareAndTakesThoseOfOthers) {
   ASSERT_NE(pool.Submit(WorkUntilCancelled, "a"), nullptr);
   const std::shared_ptr<Job> second = pool.Submit(WorkUntilCancelled, "a");
   ASSERT_NE(second, nullptr);
-  const JobPool::Submission refused = pool.pool.Submit({.tenant = "a", .work = WorkUntilCancelled});
-  EXPECT_EQ(refused.job, nullptr);
-  EXPECT_EQ(refused.refusal.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
-  EXPECT_EQ(DetailsOf(refused.refusal).reason, "QUOTA_EXCEEDED");
-  EXPECT_TRUE(DetailsOf(refused.refusal).may_retry);
+  const absl::Status refused = pool.pool.Submit({.tenant = "a", .work = WorkUntilCancelled}).status();
+  EXPECT_EQ(refused.code(), absl::StatusCode::kResourceExhausted);
+  EXPECT_EQ(DetailsOf(refused).reason, "QUOTA_EXCEEDED");
+  EXPECT_TRUE(DetailsOf(refused).may_retry);
   EXPECT_NE(pool.Submit(WorkUntilCancelled, "b"), nullptr);
   pool.Cancel(second);
   EXPECT_NE(pool.Submit(WorkUntilCancelled, "a"), nullptr);
@@ -198,9 +198,9 @@ TEST(JobPool, RefusesWhatIsAboveATenantsShareAndTakesThoseOfOthers) {
 TEST(JobPool, AFullQueueSaysHowFull) {
   Pool pool(1, 0);
   ASSERT_NE(pool.Submit(WorkUntilCancelled), nullptr);
-  const JobPool::Submission refused = pool.pool.Submit({.tenant = "a", .work = WorkUntilCancelled});
-  EXPECT_EQ(DetailsOf(refused.refusal).reason, "QUEUE_FULL");
-  EXPECT_NE(refused.refusal.error_message().find("runs 1 jobs and has 0 more in line"), std::string::npos);
+  const absl::Status refused = pool.pool.Submit({.tenant = "a", .work = WorkUntilCancelled}).status();
+  EXPECT_EQ(DetailsOf(refused).reason, "QUEUE_FULL");
+  EXPECT_TRUE(absl::StrContains(refused.message(), "runs 1 jobs and has 0 more in line")) << refused;
 }
 
 TEST(JobPool, IsIdleWhenNoJobRunsOrWaits) {
@@ -219,8 +219,8 @@ TEST(JobPool, IsIdleWhenNoJobRunsOrWaits) {
 TEST(JobPool, WithoutSmallWorkersSmallJobsAreAsOthers) {
   MemoryBudget memory(0);
   JobPool pool({.workers = 1, .max_queued = 0, .max_per_tenant = 10}, memory);
-  ASSERT_NE(pool.Submit({.tenant = "a", .work = WorkUntilCancelled}).job, nullptr);
-  EXPECT_EQ(pool.Submit({.tenant = "b", .is_small = true, .work = WorkUntilCancelled}).job, nullptr);
+  ASSERT_TRUE(pool.Submit({.tenant = "a", .work = WorkUntilCancelled}).ok());
+  EXPECT_FALSE(pool.Submit({.tenant = "b", .is_small = true, .work = WorkUntilCancelled}).ok());
 }
 
 // A pool with workers for small jobs, where large ones of tenant "large" have all workers and all places in the queue.
@@ -231,16 +231,16 @@ class BesideLargeJobs : public ::testing::Test {
 
   BesideLargeJobs() {
     for (int i = 0; i < kWorkers + kQueued; ++i) {
-      EXPECT_NE(Submit("large", false, WorkUntilCancelled).job, nullptr);
+      EXPECT_TRUE(Submit("large", false, WorkUntilCancelled).ok());
     }
   }
 
-  JobPool::Submission Submit(const std::string& tenant, bool is_small, Job::Work work) {
+  absl::StatusOr<std::shared_ptr<Job>> Submit(const std::string& tenant, bool is_small, Job::Work work) {
     return pool_.Submit({.tenant = tenant, .is_small = is_small, .work = std::move(work)});
   }
   void RunSmall(const std::string& tenant) {
     Event ran;
-    ASSERT_NE(Submit(tenant, true, [&ran](Job&) { ran.Set(); }).job, nullptr);
+    ASSERT_TRUE(Submit(tenant, true, [&ran](Job&) { ran.Set(); }).ok());
     ASSERT_TRUE(ran.Wait());
     while (pool_.GetLoad().running > kWorkers) {  // until its worker is free
       std::this_thread::yield();
@@ -253,7 +253,7 @@ class BesideLargeJobs : public ::testing::Test {
 };
 
 TEST_F(BesideLargeJobs, SmallOnesWaitForNoneOfThem) {
-  EXPECT_EQ(DetailsOf(Submit("other", false, WorkUntilCancelled).refusal).reason, "QUEUE_FULL");
+  EXPECT_EQ(DetailsOf(Submit("other", false, WorkUntilCancelled).status()).reason, "QUEUE_FULL");
   constexpr int kSmall = 100;
   for (int i = 0; i < kSmall; ++i) {
     RunSmall(i % 3 == 0 ? "large" : "small");
@@ -269,28 +269,22 @@ TEST_F(BesideLargeJobs, SmallOnesWaitForNoneOfThem) {
 TEST_F(BesideLargeJobs, SmallOnesTakeTurnsAmongThemselves) {
   Event runs;
   Event go;
-  ASSERT_NE(Submit("a", true,
-                   [&](Job&) {
-                     runs.Set();
-                     EXPECT_TRUE(go.Wait());
-                   })
-                .job,
-            nullptr);
+  ASSERT_TRUE(Submit("a", true, [&](Job&) {
+                runs.Set();
+                EXPECT_TRUE(go.Wait());
+              }).ok());
   ASSERT_TRUE(runs.Wait());
   std::vector<std::string> order;
   Event done;
   for (const std::string tenant : {"a", "a", "large", "b"}) {
-    ASSERT_NE(Submit(tenant, true,
-                     [&order, &done, tenant](Job&) {
-                       order.push_back(tenant);
-                       if (order.size() == 4) {
-                         done.Set();
-                       }
-                     })
-                  .job,
-              nullptr);
+    ASSERT_TRUE(Submit(tenant, true, [&order, &done, tenant](Job&) {
+                  order.push_back(tenant);
+                  if (order.size() == 4) {
+                    done.Set();
+                  }
+                }).ok());
   }
-  EXPECT_EQ(DetailsOf(Submit("c", true, WorkUntilCancelled).refusal).reason, "QUEUE_FULL") << "their places end, too";
+  EXPECT_EQ(DetailsOf(Submit("c", true, WorkUntilCancelled).status()).reason, "QUEUE_FULL") << "their places end, too";
   go.Set();
   ASSERT_TRUE(done.Wait());
   EXPECT_EQ(order, std::vector<std::string>({"large", "a", "b", "a"})) << "the oldest turn is that of \"large\"";

@@ -6,7 +6,6 @@
 
 #include "gtest/gtest.h"
 #include "server/jobs/job_pool.h"
-#include "server/wire/errors.h"
 #include "tests/server/jobs/test_jobs.h"
 #include "tests/server/service_harness.h"
 
@@ -29,7 +28,7 @@ TEST(Job, AJobThatOutgrowsItsReservationTakesWhatIsLeftThenEnds) {
   ASSERT_TRUE(ended.Wait());
   EXPECT_TRUE(less.ok()) << less;
   EXPECT_TRUE(more.ok()) << more;
-  EXPECT_EQ(DetailsOf(FromCoreStatus(all)).reason, "MEMORY_LIMIT");
+  EXPECT_EQ(DetailsOf(all).reason, "MEMORY_LIMIT");
 }
 
 TEST(Job, WhatTheWorkHoldsIsReleasedWithIt) {

@@ -30,7 +30,7 @@ class Pool {
         pool({.workers = workers, .max_queued = max_queued, .max_per_tenant = max_per_tenant}, memory) {}
 
   std::shared_ptr<Job> Submit(Job::Work work, const std::string& tenant = "default") {
-    return pool.Submit({.tenant = tenant, .work = std::move(work)}).job;
+    return pool.Submit({.tenant = tenant, .work = std::move(work)}).value_or(nullptr);
   }
   void Cancel(const std::shared_ptr<Job>& job) { pool.Cancel(job); }
   JobPool::Load GetLoad() const { return pool.GetLoad(); }

@@ -246,7 +246,7 @@ TEST_F(ManyCells, GoOnWhenTheLineWasFull) {
     std::this_thread::yield();
   }
   std::thread canceller([&] {
-    EXPECT_TRUE(harness_->log().WaitFor("the line is full"));
+    EXPECT_TRUE(harness_->log().WaitFor("the queue is full"));
     running.Cancel();
     waiting.Cancel();
   });

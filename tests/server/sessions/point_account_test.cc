@@ -63,9 +63,9 @@ TEST_F(PointAccountTest, TakesAsManyAsASessionMayHave) {
   const std::unique_ptr<PointAccount> account = Open(unlimited_);
   EXPECT_TRUE(account->Take(400).ok());
   EXPECT_TRUE(account->Take(600).ok());
-  const grpc::Status refused = account->Take(1);
+  const absl::Status refused = account->Take(1);
   EXPECT_EQ(DetailsOf(refused).reason, "TOO_MANY_POINTS");
-  EXPECT_EQ(refused.error_message(), "sessions/1 would have 1001 points; a session of this server has at most 1000");
+  EXPECT_EQ(refused.message(), "sessions/1 would have 1001 points; a session of this server has at most 1000");
   EXPECT_EQ(account->points(), 1000u);
   EXPECT_EQ(tenant_->points(), 1000u);
   EXPECT_EQ(unlimited_.lasting(), 1000 * kPointBytes);
@@ -78,9 +78,9 @@ TEST_F(PointAccountTest, TakesAsManyAsATenantMayHaveInAll) {
   const std::unique_ptr<PointAccount> second = Open(unlimited_);
   EXPECT_TRUE(first->Take(900).ok());
   EXPECT_TRUE(second->Take(600).ok());
-  const grpc::Status refused = second->Take(2);
+  const absl::Status refused = second->Take(2);
   EXPECT_EQ(DetailsOf(refused).reason, "QUOTA_EXCEEDED");
-  EXPECT_EQ(refused.error_message(), "your sessions would have 1502 points together; they may have at most 1500");
+  EXPECT_EQ(refused.message(), "your sessions would have 1502 points together; they may have at most 1500");
   EXPECT_EQ(second->points(), 600u);
   EXPECT_EQ(tenant_->points(), 1500u);
   EXPECT_EQ(unlimited_.lasting(), 1500 * kPointBytes);

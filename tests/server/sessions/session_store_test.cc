@@ -9,6 +9,7 @@
 #include "absl/strings/escaping.h"
 #include "gtest/gtest.h"
 #include "server/sessions/memory_session_store.h"
+#include "server/wire/errors.h"
 #include "tests/server/service_harness.h"
 
 namespace wellspace::server {
@@ -18,15 +19,14 @@ class SessionStoreTest : public ::testing::Test {
  protected:
   std::shared_ptr<Session> Create(const std::string& tenant = "a", absl::Duration ttl = absl::Minutes(1),
                                   std::map<std::string, std::string> labels = {}) {
-    std::shared_ptr<Session> session;
-    status_ = store_.Create({.tenant = tenant, .parameters = {.dimension = 2}, .labels = std::move(labels), .ttl = ttl},
-                            &session);
-    return session;
+    absl::StatusOr<std::shared_ptr<Session>> session =
+        store_.Create({.tenant = tenant, .parameters = {.dimension = 2}, .labels = std::move(labels), .ttl = ttl});
+    status_ = session.status();
+    return session.value_or(nullptr);
   }
 
   bool Finds(const Session& session, const std::string& tenant = "a") {
-    std::shared_ptr<Session> found;
-    status_ = store_.Find(tenant, session.name(), &found);
+    status_ = store_.Find(tenant, session.name()).status();
     return status_.ok();
   }
 
@@ -37,7 +37,7 @@ class SessionStoreTest : public ::testing::Test {
   absl::Duration since_boot_ = absl::Hours(1);
   MemorySessionStore store_{
       options_, memory_, {.wall = [this] { return now_; }, .since_boot = [this] { return since_boot_; }}};
-  grpc::Status status_;
+  absl::Status status_;
 };
 
 TEST_F(SessionStoreTest, NamesCannotBeGuessed) {
@@ -68,11 +68,11 @@ TEST_F(SessionStoreTest, AnotherTenantsSessionDoesNotExist) {
   const std::shared_ptr<Session> session = Create("a");
   EXPECT_TRUE(Finds(*session, "a"));
   EXPECT_FALSE(Finds(*session, "b"));
-  const grpc::Status of_other = status_;
+  const absl::Status of_other = status_;
   store_.Remove(*session);
   EXPECT_FALSE(Finds(*session, "a"));
-  EXPECT_EQ(status_.error_message(), of_other.error_message()) << "whether a session exists can be told";
-  EXPECT_EQ(status_.error_details(), of_other.error_details());
+  EXPECT_EQ(status_.message(), of_other.message()) << "whether a session exists can be told";
+  EXPECT_EQ(ToGrpcStatus(status_).error_details(), ToGrpcStatus(of_other).error_details());
   EXPECT_EQ(DetailsOf(of_other).reason, "SESSION_NOT_FOUND");
   EXPECT_TRUE(store_.List("b", absl::InfinitePast(), 10, {}).empty());
 }
@@ -122,11 +122,11 @@ TEST_F(SessionStoreTest, ASessionInUseDoesNotExpire) {
 
 TEST_F(SessionStoreTest, ASessionWithAnOperationDoesNotExpire) {
   const std::shared_ptr<Session> session = Create("a", absl::Seconds(10));
-  std::shared_ptr<Operation> operation;
-  ASSERT_TRUE(session->StartOperation({.dimension = 2}, 0, &operation).ok());
+  const absl::StatusOr<std::shared_ptr<Operation>> operation = session->StartOperation({.dimension = 2}, 0);
+  ASSERT_TRUE(operation.ok());
   since_boot_ += absl::Hours(1);
   EXPECT_TRUE(store_.RemoveExpired().empty());
-  EXPECT_TRUE(session->EndWaiting(*operation));
+  EXPECT_TRUE(session->EndWaiting(**operation));
   since_boot_ += absl::Seconds(10);
   EXPECT_EQ(store_.RemoveExpired().size(), 1u);
 }
@@ -138,7 +138,7 @@ TEST_F(SessionStoreTest, SessionsAreLimitedByTenantAndInAll) {
     ASSERT_NE(sessions.back(), nullptr);
   }
   EXPECT_EQ(Create("a"), nullptr);
-  EXPECT_EQ(status_.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  EXPECT_EQ(status_.code(), absl::StatusCode::kResourceExhausted);
   EXPECT_EQ(DetailsOf(status_).reason, "QUOTA_EXCEEDED");
   ASSERT_NE(Create("b"), nullptr);
   ASSERT_NE(Create("b"), nullptr);
@@ -170,15 +170,15 @@ TEST_F(SessionStoreTest, PointsAreLimitedBySessionAndByTenant) {
   const std::shared_ptr<Session> first = Create();
   const std::shared_ptr<Session> second = Create();
   EXPECT_TRUE(first->Append(0, std::vector<double>(20, 0.5), 0).ok());
-  const grpc::Status too_many = first->Append(10, std::vector<double>(2, 0.5), 0);
+  const absl::Status too_many = first->Append(10, std::vector<double>(2, 0.5), 0);
   EXPECT_EQ(DetailsOf(too_many).reason, "TOO_MANY_POINTS");
   EXPECT_EQ(DetailsOf(second->Append(0, std::vector<double>(12, 0.5), 0)).reason, "QUOTA_EXCEEDED");
   EXPECT_EQ(second->Committed().committed_points(), 0u);
   EXPECT_TRUE(second->Append(0, std::vector<double>(10, 0.5), 0).ok());
   EXPECT_TRUE(Create("b")->Append(0, std::vector<double>(20, 0.5), 0).ok());
-  std::shared_ptr<Operation> under_way;
-  ASSERT_TRUE(first->Close(0, &under_way).ok());
-  EXPECT_EQ(under_way, nullptr);
+  const absl::StatusOr<std::shared_ptr<Operation>> under_way = first->Close(0);
+  ASSERT_TRUE(under_way.ok());
+  EXPECT_EQ(*under_way, nullptr);
   EXPECT_TRUE(second->Append(5, std::vector<double>(10, 0.5), 0).ok()) << "the points of the closed one are free";
   EXPECT_EQ(DetailsOf(first->Append(10, {}, 0)).reason, "SESSION_NOT_FOUND");
 }
@@ -186,17 +186,17 @@ TEST_F(SessionStoreTest, PointsAreLimitedBySessionAndByTenant) {
 TEST_F(SessionStoreTest, KeepsTheLastHundredOperations) {
   const std::shared_ptr<Session> session = Create();
   for (int i = 0; i < 103; ++i) {
-    std::shared_ptr<Operation> operation;
-    ASSERT_TRUE(session->StartOperation({.dimension = 2}, 0, &operation).ok());
-    session->EndWaiting(*operation);
+    const absl::StatusOr<std::shared_ptr<Operation>> operation = session->StartOperation({.dimension = 2}, 0);
+    ASSERT_TRUE(operation.ok());
+    session->EndWaiting(**operation);
   }
   const auto kept = session->ListOperations(0, 1000);
   ASSERT_EQ(kept.size(), 100u);
   EXPECT_EQ(kept.front()->number(), 4u);
   EXPECT_EQ(session->ListOperations(101, 1000).size(), 2u);
-  std::shared_ptr<Operation> found;
-  EXPECT_TRUE(session->FindOperation(session->name() + "/operations/103", &found).ok());
-  EXPECT_EQ(DetailsOf(session->FindOperation(session->name() + "/operations/3", &found)).reason, "OPERATION_NOT_FOUND");
+  EXPECT_TRUE(session->FindOperation(session->name() + "/operations/103").ok());
+  EXPECT_EQ(DetailsOf(session->FindOperation(session->name() + "/operations/3").status()).reason,
+            "OPERATION_NOT_FOUND");
 }
 
 }  // namespace

@@ -18,15 +18,10 @@ namespace {
 
 class SessionTest : public ::testing::Test {
  protected:
-  SessionTest() {
-    EXPECT_TRUE(
-        store_.Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = {}}, &session_).ok());
-  }
-
   std::shared_ptr<Operation> Start() {
-    std::shared_ptr<Operation> operation;
-    EXPECT_TRUE(session_->StartOperation({.dimension = 2}, 0, &operation).ok());
-    return operation;
+    absl::StatusOr<std::shared_ptr<Operation>> operation = session_->StartOperation({.dimension = 2}, 0);
+    EXPECT_TRUE(operation.ok()) << operation.status();
+    return operation.value_or(nullptr);
   }
 
   // What a client sees of the session, its time of expiry excepted.
@@ -44,17 +39,17 @@ class SessionTest : public ::testing::Test {
     return names;
   }
 
-  const grpc::Status refusal_ = MakeError(v1::ERROR_REASON_QUEUE_FULL, "full");
+  const absl::Status refusal_ = MakeError(v1::ERROR_REASON_QUEUE_FULL, "full");
   ServiceOptions options_;
   MemoryBudget memory_{0};
   MemorySessionStore store_{options_, memory_, {}};
-  std::shared_ptr<Session> session_;
+  std::shared_ptr<Session> session_ =
+      store_.Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = {}}).value();
 };
 
 TEST_F(SessionTest, AnOperationHasTheSessionToItself) {
   const std::shared_ptr<Operation> operation = Start();
-  std::shared_ptr<Operation> second;
-  EXPECT_EQ(DetailsOf(session_->StartOperation({.dimension = 2}, 0, &second)).reason, "SESSION_BUSY");
+  EXPECT_EQ(DetailsOf(session_->StartOperation({.dimension = 2}, 0).status()).reason, "SESSION_BUSY");
   EXPECT_EQ(DetailsOf(session_->Append(0, std::vector<double>{0.5, 0.5}, 0)).reason, "SESSION_BUSY");
   EXPECT_TRUE(session_->EndWaiting(*operation));
   EXPECT_FALSE(session_->EndWaiting(*operation));
@@ -111,7 +106,7 @@ TEST_F(SessionTest, AnOperationThatWasCancelledBeforeItIsWithdrawnStays) {
 TEST_F(SessionTest, AnOperationThatHasEndedTakesNoJob) {
   MemoryBudget memory(0);
   JobPool pool({.workers = 1, .max_queued = 1, .max_per_tenant = 2}, memory);
-  const std::shared_ptr<Job> job = pool.Submit({.tenant = "a", .work = [](Job&) {}}).job;
+  const std::shared_ptr<Job> job = pool.Submit({.tenant = "a", .work = [](Job&) {}}).value();
   const std::shared_ptr<Operation> operation = Start();
   EXPECT_TRUE(operation->SetJob(job));
   EXPECT_EQ(operation->job(), job);

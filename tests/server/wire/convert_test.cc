@@ -40,21 +40,21 @@ v1::SizeBox& AddSizeBox(v1::MeshParameters& parameters, double low, double high,
 TEST(ParametersFromProto, FillsInDefaults) {
   v1::MeshParameters message;
   message.set_dimension(2);
-  core::MeshParameters parameters;
-  ASSERT_TRUE(ParametersFromProto(message, SmallLimits(), &parameters).ok());
-  EXPECT_EQ(parameters.dimension, 2);
-  EXPECT_EQ(parameters.rho, 0);
-  EXPECT_EQ(parameters.margin, core::MeshParameters().margin);
-  EXPECT_TRUE(parameters.domain_low.empty());
-  EXPECT_EQ(parameters.threads, 1);
-  EXPECT_EQ(parameters.max_vertices, 1000u);
-  EXPECT_EQ(parameters.criterion, core::Criterion::kRadiusEdge);
-  EXPECT_EQ(parameters.max_circumradius, 0);
-  EXPECT_TRUE(parameters.size_boxes.empty());
-  EXPECT_FALSE(parameters.min_dihedral.has_value());
-  EXPECT_FALSE(parameters.pump_weights);
-  EXPECT_EQ(parameters.merge_distance, 0);
-  EXPECT_FALSE(parameters.keep_vertices);
+  const absl::StatusOr<core::MeshParameters> parameters = ParametersFromProto(message, SmallLimits());
+  ASSERT_TRUE(parameters.ok());
+  EXPECT_EQ(parameters->dimension, 2);
+  EXPECT_EQ(parameters->rho, 0);
+  EXPECT_EQ(parameters->margin, core::MeshParameters().margin);
+  EXPECT_TRUE(parameters->domain_low.empty());
+  EXPECT_EQ(parameters->threads, 1);
+  EXPECT_EQ(parameters->max_vertices, 1000u);
+  EXPECT_EQ(parameters->criterion, core::Criterion::kRadiusEdge);
+  EXPECT_EQ(parameters->max_circumradius, 0);
+  EXPECT_TRUE(parameters->size_boxes.empty());
+  EXPECT_FALSE(parameters->min_dihedral.has_value());
+  EXPECT_FALSE(parameters->pump_weights);
+  EXPECT_EQ(parameters->merge_distance, 0);
+  EXPECT_FALSE(parameters->keep_vertices);
 }
 
 TEST(ParametersFromProto, TakesEveryField) {
@@ -71,46 +71,46 @@ TEST(ParametersFromProto, TakesEveryField) {
   message.set_pump_weights(true);
   message.set_merge_distance(1e-9);
   message.set_keep_vertices(true);
-  core::MeshParameters parameters;
-  ASSERT_TRUE(ParametersFromProto(message, SmallLimits(), &parameters).ok());
-  EXPECT_EQ(parameters.rho, 2.5);
-  EXPECT_EQ(parameters.margin, 0.5);
-  EXPECT_THAT(parameters.domain_low, ElementsAre(0, 0, 0));
-  EXPECT_THAT(parameters.domain_high, ElementsAre(1, 1, 1));
-  EXPECT_EQ(parameters.max_vertices, 77u);
-  EXPECT_EQ(parameters.threads, 2);
-  EXPECT_EQ(parameters.criterion, core::Criterion::kWellSpaced);
-  EXPECT_EQ(parameters.max_circumradius, 0.5);
-  ASSERT_EQ(parameters.size_boxes.size(), 2u);
-  EXPECT_THAT(parameters.size_boxes[0].low, ElementsAre(0.25, 0.25, 0.25));
-  EXPECT_THAT(parameters.size_boxes[0].high, ElementsAre(0.75, 0.75, 0.75));
-  EXPECT_EQ(parameters.size_boxes[0].max_circumradius, 0.125);
-  EXPECT_EQ(parameters.size_boxes[1].max_circumradius, 0.25);
-  EXPECT_EQ(parameters.min_dihedral, 0.0);
-  EXPECT_TRUE(parameters.pump_weights);
-  EXPECT_EQ(parameters.merge_distance, 1e-9);
-  EXPECT_EQ(ParametersToProto(parameters).merge_distance(), 1e-9);
-  EXPECT_TRUE(parameters.keep_vertices);
+  const absl::StatusOr<core::MeshParameters> parameters = ParametersFromProto(message, SmallLimits());
+  ASSERT_TRUE(parameters.ok());
+  EXPECT_EQ(parameters->rho, 2.5);
+  EXPECT_EQ(parameters->margin, 0.5);
+  EXPECT_THAT(parameters->domain_low, ElementsAre(0, 0, 0));
+  EXPECT_THAT(parameters->domain_high, ElementsAre(1, 1, 1));
+  EXPECT_EQ(parameters->max_vertices, 77u);
+  EXPECT_EQ(parameters->threads, 2);
+  EXPECT_EQ(parameters->criterion, core::Criterion::kWellSpaced);
+  EXPECT_EQ(parameters->max_circumradius, 0.5);
+  ASSERT_EQ(parameters->size_boxes.size(), 2u);
+  EXPECT_THAT(parameters->size_boxes[0].low, ElementsAre(0.25, 0.25, 0.25));
+  EXPECT_THAT(parameters->size_boxes[0].high, ElementsAre(0.75, 0.75, 0.75));
+  EXPECT_EQ(parameters->size_boxes[0].max_circumradius, 0.125);
+  EXPECT_EQ(parameters->size_boxes[1].max_circumradius, 0.25);
+  EXPECT_EQ(parameters->min_dihedral, 0.0);
+  EXPECT_TRUE(parameters->pump_weights);
+  EXPECT_EQ(parameters->merge_distance, 1e-9);
+  EXPECT_EQ(ParametersToProto(*parameters).merge_distance(), 1e-9);
+  EXPECT_TRUE(parameters->keep_vertices);
 }
 
 TEST(ParametersFromProto, EveryDimensionHasItsDefaults) {
   for (int dimension = core::kMinDimension; dimension <= core::kMaxDimension; ++dimension) {
     v1::MeshParameters message = UnitCubeParameters(dimension);
-    core::MeshParameters parameters;
-    ASSERT_TRUE(ParametersFromProto(message, SmallLimits(), &parameters).ok()) << dimension;
+    const absl::StatusOr<core::MeshParameters> parameters = ParametersFromProto(message, SmallLimits());
+    ASSERT_TRUE(parameters.ok()) << dimension;
     message.set_rho(core::MinimumRho(dimension));
-    EXPECT_TRUE(ParametersFromProto(message, SmallLimits(), &parameters).ok()) << dimension;
+    EXPECT_TRUE(ParametersFromProto(message, SmallLimits()).ok()) << dimension;
     message.set_rho(core::MinimumRho(dimension) * 0.999);
-    EXPECT_EQ(DetailsOf(ParametersFromProto(message, SmallLimits(), &parameters)).field, "parameters.rho") << dimension;
+    EXPECT_EQ(DetailsOf(ParametersFromProto(message, SmallLimits()).status()).field, "parameters.rho") << dimension;
   }
 }
 
 TEST(ParametersFromProto, TakesFewerThreadsThanAskedFor) {
   v1::MeshParameters message = UnitCubeParameters();
   message.set_threads(64);
-  core::MeshParameters parameters;
-  ASSERT_TRUE(ParametersFromProto(message, SmallLimits(), &parameters).ok());
-  EXPECT_EQ(parameters.threads, 2);
+  const absl::StatusOr<core::MeshParameters> parameters = ParametersFromProto(message, SmallLimits());
+  ASSERT_TRUE(parameters.ok());
+  EXPECT_EQ(parameters->threads, 2);
 }
 
 struct BadParameters {
@@ -124,8 +124,7 @@ class ParametersFromProtoRefuses : public ::testing::TestWithParam<BadParameters
 TEST_P(ParametersFromProtoRefuses, NamingTheField) {
   v1::MeshParameters message = UnitCubeParameters();
   GetParam().spoil(message);
-  core::MeshParameters parameters;
-  const grpc::Status status = ParametersFromProto(message, SmallLimits(), &parameters);
+  const grpc::Status status = ToGrpcStatus(ParametersFromProto(message, SmallLimits()).status());
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
   const ErrorDetails details = DetailsOf(status);
   EXPECT_EQ(details.reason, "INVALID_PARAMETERS");
@@ -232,7 +231,9 @@ v1::MeshPointsRequest PointsRequest(const std::vector<double>& coordinates) {
 }
 
 // What `receiver` says to `request`.
-grpc::Status Accept(CloudReceiver& receiver, v1::MeshPointsRequest request) { return receiver.Accept(&request); }
+grpc::Status Accept(CloudReceiver& receiver, v1::MeshPointsRequest request) {
+  return ToGrpcStatus(receiver.Accept(&request));
+}
 
 TEST(CloudReceiver, CollectsChunksInOrder) {
   const ServiceOptions options = SmallLimits();
@@ -275,7 +276,7 @@ TEST(CloudReceiver, RefusesPointsBeforeParameters) {
 
 TEST(CloudReceiver, RefusesAnEndBeforeParameters) {
   const ServiceOptions options = SmallLimits();
-  const grpc::Status status = CloudReceiver(options).AcceptEnd();
+  const grpc::Status status = ToGrpcStatus(CloudReceiver(options).AcceptEnd());
   EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
   EXPECT_EQ(DetailsOf(status).reason, "PARAMETERS_MISSING");
 }
@@ -390,27 +391,6 @@ TEST(EstimateToProto, TakesEveryField) {
   EXPECT_EQ(message.simplices(), 2u);
   EXPECT_EQ(message.memory_bytes(), 3u);
   EXPECT_EQ(message.tree_leaves(), 4u);
-}
-
-TEST(MakeError, EveryReasonHasACode) {
-  for (int number = 1; number <= v1::ErrorReason_MAX; ++number) {
-    ASSERT_TRUE(v1::ErrorReason_IsValid(number)) << number;
-    const auto reason = static_cast<v1::ErrorReason>(number);
-    const grpc::Status status = MakeError(reason, "why");
-    EXPECT_EQ(status.error_message(), "why");
-    EXPECT_EQ("ERROR_REASON_" + DetailsOf(status).reason, v1::ErrorReason_Name(reason));
-    EXPECT_EQ(status.error_code() == grpc::StatusCode::INTERNAL, reason == v1::ERROR_REASON_INTERNAL);
-  }
-}
-
-TEST(FromCoreStatus, TellsTheKindsApart) {
-  EXPECT_TRUE(FromCoreStatus(absl::OkStatus()).ok());
-  EXPECT_EQ(DetailsOf(FromCoreStatus(absl::InvalidArgumentError("x"))).reason, "INVALID_POINTS");
-  EXPECT_EQ(DetailsOf(FromCoreStatus(absl::ResourceExhaustedError("x"))).reason, "MESH_TOO_LARGE");
-  EXPECT_EQ(DetailsOf(FromCoreStatus(absl::FailedPreconditionError("x"))).reason, "MESH_NOT_READY");
-  EXPECT_EQ(DetailsOf(FromCoreStatus(absl::UnknownError("x"))).reason, "INTERNAL");
-  EXPECT_EQ(FromCoreStatus(absl::CancelledError("x")).error_code(), grpc::StatusCode::CANCELLED);
-  EXPECT_EQ(FromCoreStatus(absl::DeadlineExceededError("x")).error_code(), grpc::StatusCode::DEADLINE_EXCEEDED);
 }
 
 }  // namespace
