@@ -21,7 +21,8 @@ Observability::Observability(const std::vector<std::string>& services, std::shar
                              Connections& connections, CallObserver::TenantOf tenant_of)
     : log_(std::move(log)),
       call_metrics_(metrics_.registry(), AndThoseOfGrpc(services)),
-      calls_(*log_, call_metrics_, connections, std::move(tenant_of)) {
+      calls_(*log_, call_metrics_, connections, std::move(tenant_of)),
+      work_observer_(*log_, work_) {
   metrics_.AddGauge("wellspace_calls_in_flight", "Calls that have begun and not ended.",
                     [this] { return static_cast<double>(calls_.InFlight()); });
   metrics_.AddGauge("wellspace_connections", "Connections that are open.",

@@ -14,6 +14,7 @@
 #include "server/observability/metrics.h"
 #include "server/observability/metrics_endpoint.h"
 #include "server/observability/work_counters.h"
+#include "server/observability/work_observer.h"
 #include "spdlog/logger.h"
 
 namespace wellspace::server {
@@ -35,7 +36,7 @@ class Observability {
                 CallObserver::TenantOf tenant_of);
 
   CallObserver& calls() { return calls_; }
-  WorkCounters& work() { return work_; }
+  WorkObserver& work() { return work_observer_; }
   // For what else is to be read.
   Metrics& metrics() { return metrics_; }
   const Metrics& metrics() const { return metrics_; }
@@ -61,6 +62,7 @@ class Observability {
   CallMetrics call_metrics_;
   CallObserver calls_;
   WorkCounters work_;
+  WorkObserver work_observer_;
   std::unique_ptr<MetricsEndpoint> endpoint_;
   std::unique_ptr<AdminServer> admin_;
 };

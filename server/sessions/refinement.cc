@@ -11,7 +11,7 @@
 #include "core/mesher.h"
 #include "server/base/clock.h"
 #include "server/jobs/job_size.h"
-#include "server/log/log_fields.h"
+#include "server/observability/work_observer.h"
 #include "server/sessions/progress_pacer.h"
 #include "server/sessions/replay.h"
 #include "server/wire/errors.h"
@@ -46,13 +46,13 @@ absl::StatusOr<core::Mesh> Copy(const core::Mesh& mesh, const core::RunContext& 
   return copy;  // Update makes input_vertex anew
 }
 
-absl::StatusOr<core::Mesh> MeshFirst(const CallEnvironment& environment, const Session& session,
+absl::StatusOr<core::Mesh> MeshFirst(const MesherFactory& create_mesher, const Session& session,
                                      const core::MeshParameters& parameters, core::RunContext& context,
                                      SessionWork& work) {
   std::unique_ptr<core::Mesher> mesher;
   {
     WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> points, session.points().CopyFrom(0, context));
-    WELLSPACE_ASSIGN_OR_RETURN(mesher, environment.create_mesher(parameters, points, context));
+    WELLSPACE_ASSIGN_OR_RETURN(mesher, create_mesher(parameters, points, context));
   }
   WELLSPACE_RETURN_IF_ERROR(core::ReserveMemory(*mesher, parameters, context));
   WELLSPACE_RETURN_IF_ERROR(mesher->Refine(parameters, context));
@@ -61,13 +61,13 @@ absl::StatusOr<core::Mesh> MeshFirst(const CallEnvironment& environment, const S
   return mesh;
 }
 
-// Builds the mesher that was given up, if it was. Those who watch the operation see the progress of what it was started
-// for alone.
-absl::Status BringBack(const CallEnvironment& environment, const Session& session, Job& job, SessionWork& work) {
+// Builds the mesher that was given up, if it was. Watchers of the operation see the progress of what it was started for
+// alone.
+absl::Status BringBack(const MesherFactory& create_mesher, const Session& session, Job& job, SessionWork& work) {
   if (work.mesher == nullptr) {
     job.context().EnterPhase(core::Phase::kTree);
-    WELLSPACE_ASSIGN_OR_RETURN(work.mesher, Replay(session.steps(), session.points(), work.mesh->chunks.mesh(),
-                                                   environment.create_mesher, job));
+    WELLSPACE_ASSIGN_OR_RETURN(work.mesher,
+                               Replay(session.steps(), session.points(), work.mesh->chunks.mesh(), create_mesher, job));
   }
   return absl::OkStatus();
 }
@@ -95,25 +95,49 @@ absl::StatusOr<core::Mesh> MeshAgain(const Session& session, const core::MeshPar
 
 // Has the mesh made, by what the session has given for it. What did not succeed leaves nothing behind: a mesher that it
 // has changed is given up, and comes back by Replay.
-absl::Status Work(const CallEnvironment& environment, const Session& session, const core::MeshParameters& parameters,
-                  Job& job, SessionWork& work, std::shared_ptr<MeshSnapshot>* mesh) {
+absl::StatusOr<std::shared_ptr<MeshSnapshot>> MakeMesh(const MesherFactory& create_mesher, const Session& session,
+                                                       const core::MeshParameters& parameters, Job& job,
+                                                       SessionWork& work) {
   bool has_changed = false;
   const auto make = [&]() -> absl::StatusOr<core::Mesh> {
     if (work.mesh == nullptr) {
-      return MeshFirst(environment, session, parameters, job.context(), work);
+      return MeshFirst(create_mesher, session, parameters, job.context(), work);
     }
-    WELLSPACE_RETURN_IF_ERROR(BringBack(environment, session, job, work));
+    WELLSPACE_RETURN_IF_ERROR(BringBack(create_mesher, session, job, work));
     return MeshAgain(session, parameters, job.context(), work, &has_changed);
   };
-  absl::Status status = RunGuarded([&] {
+  std::shared_ptr<MeshSnapshot> mesh;
+  const absl::Status status = RunGuarded([&] {
     WELLSPACE_ASSIGN_OR_RETURN(core::Mesh made, make());
-    *mesh = std::make_shared<MeshSnapshot>(std::move(made));
+    mesh = std::make_shared<MeshSnapshot>(std::move(made));
     return absl::OkStatus();
   });
-  if (!status.ok() && (has_changed || work.mesh == nullptr)) {
+  if (status.ok()) {
+    return mesh;
+  }
+  if (has_changed || work.mesh == nullptr) {
     work.mesher = nullptr;
   }
   return status;
+}
+
+// The same, in the memory of `job`; what mesher and mesh have of it is theirs at the end, and the rest is released.
+absl::StatusOr<std::shared_ptr<MeshSnapshot>> Work(const MesherFactory& create_mesher, const Session& session,
+                                                   const core::MeshParameters& parameters, Job& job,
+                                                   SessionWork& work) {
+  job.GiveMemory(std::move(work.memory));
+  absl::StatusOr<std::shared_ptr<MeshSnapshot>> mesh = MakeMesh(create_mesher, session, parameters, job, work);
+  if (work.mesher != nullptr) {
+    work.memory = job.TakeMemory(work.mesher->memory_bytes());
+    work.memory.MakeLasting();
+  }
+  if (mesh.ok()) {
+    MemoryReservation memory = job.TakeMemory((*mesh)->chunks.memory_bytes());
+    memory.MakeLasting();
+    (*mesh)->chunks.KeepMemory(std::move(memory));
+  }
+  job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();  // clients that see the end may use it at once
+  return mesh;
 }
 
 void Run(const CallEnvironment& environment, Session& session, Operation& operation, Job& job) {
@@ -123,39 +147,24 @@ void Run(const CallEnvironment& environment, Session& session, Operation& operat
   if (!work.has_value()) {
     return;
   }
-  const size_t replayed = work->mesher == nullptr ? session.steps().all().size() : 0;
-  const uint64_t points = session.points().coordinate_count() / operation.parameters().dimension;
-  job.GiveMemory(std::move(work->memory));
-  std::shared_ptr<MeshSnapshot> mesh;
-  const absl::Status status = Work(environment, session, operation.parameters(), job, *work, &mesh);
-  if (work->mesher != nullptr) {
-    work->memory = job.TakeMemory(work->mesher->memory_bytes());
-    work->memory.MakeLasting();
+  RefinementReport report{
+      .operation = operation.name(),
+      .tenant = session.tenant(),
+      .status = absl::OkStatus(),
+      .duration = absl::ZeroDuration(),
+      .points = session.points().coordinate_count() / operation.parameters().dimension,
+      .replayed_steps = work->mesher == nullptr ? session.steps().all().size() : 0,
+  };
+  absl::StatusOr<std::shared_ptr<MeshSnapshot>> mesh =
+      Work(environment.create_mesher, session, operation.parameters(), job, *work);
+  report.status = mesh.status();
+  report.duration = SinceBoot() - start;
+  if (mesh.ok()) {
+    report.vertices = (*mesh)->chunks.mesh().vertex_count();
+    report.simplices = (*mesh)->chunks.mesh().simplex_count();
   }
-  if (mesh != nullptr) {
-    MemoryReservation memory = job.TakeMemory(mesh->chunks.memory_bytes());
-    memory.MakeLasting();
-    mesh->chunks.KeepMemory(std::move(memory));
-    environment.observability.work().vertices_made += mesh->chunks.mesh().vertex_count();
-    environment.observability.work().simplices_made += mesh->chunks.mesh().simplex_count();
-  }
-  job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();  // who is told of the end may use it at once
-  LogFields fields;
-  fields.Add("event", "refinement").Add("operation", operation.name()).Add("tenant", session.tenant());
-  const google::rpc::Status shown = StatusToProto(status);
-  fields.Add("code", absl::StatusCodeToString(static_cast<absl::StatusCode>(shown.code())));
-  fields.Add("seconds", absl::ToDoubleSeconds(SinceBoot() - start)).Add("points", points);
-  fields.Add("vertices", mesh == nullptr ? 0 : mesh->chunks.mesh().vertex_count());
-  if (replayed > 0) {
-    fields.Add("replayed_steps", replayed);
-  }
-  if (!status.ok()) {
-    fields.Add("message", shown.message());
-  }
-  environment.log.log(
-      shown.code() == static_cast<int>(absl::StatusCode::kInternal) ? spdlog::level::err : spdlog::level::info, "{}",
-      fields.text());
-  session.EndWork(operation, status, *std::move(work), std::move(mesh));
+  environment.observability.work().OnRefinement(report);  // before clients see the end
+  session.EndWork(operation, report.status, *std::move(work), mesh.ok() ? *std::move(mesh) : nullptr);
 }
 
 void Tick(Background& background, const std::weak_ptr<Operation>& weak) {

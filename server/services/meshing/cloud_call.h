@@ -130,7 +130,7 @@ void CloudCall<Reactor, Request>::SubmitJob() {
 
 template <typename Reactor, typename Request>
 void CloudCall<Reactor, Request>::OnEnd() {
-  this->environment().observability.work().points_received += receiver_.point_count();
+  this->environment().observability.work().OnPoints(receiver_.point_count());
   receiver_.TakePoints();
   received_.Release();
   if (job_ != nullptr) {

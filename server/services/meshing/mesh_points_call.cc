@@ -22,8 +22,7 @@ void MeshPointsCall::Work(PointChunks& points, Job& job) {
                              : core::MeshFeatures(parameters(), coordinates, features().View(), job.context()));
     mesh = std::make_shared<MeshChunks>(std::move(made));
     mesh->KeepMemory(job.TakeMemory(mesh->memory_bytes()));
-    environment().observability.work().vertices_made += mesh->mesh().vertex_count();
-    environment().observability.work().simplices_made += mesh->mesh().simplex_count();
+    environment().observability.work().OnMesh(mesh->mesh().vertex_count(), mesh->mesh().simplex_count());
     return absl::OkStatus();
   });
   std::lock_guard lock(mutex_);

@@ -99,7 +99,7 @@ void AddVerticesCall::EndWith(const RequestIds::Answer& answer) {
   if (answer.status.ok()) {
     response_->ParseFromString(answer.response);
     added_ = response_->vertices_size();
-    environment().observability.work().points_received += added_;
+    environment().observability.work().OnPoints(added_);
   }
   End(answer.status);
 }

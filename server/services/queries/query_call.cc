@@ -148,7 +148,7 @@ absl::Status QueryCall::Ask(const core::Mesher& mesher) {
   }
   WELLSPACE_RETURN_IF_ERROR(request_.query->Ask(mesher, some));
   next_ += size;
-  environment().observability.work().cells_served += size;
+  environment().observability.work().OnCells(size);
   return absl::OkStatus();
 }
 

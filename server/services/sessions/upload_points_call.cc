@@ -96,7 +96,7 @@ void UploadPointsCall::Take(const v1::UploadPointsRequest& request) {
   const google::protobuf::RepeatedField<double>& coordinates = request.points().coordinates();
   Session& session = session_->session();
   coordinate_count_ += coordinates.size();
-  environment().observability.work().points_received += coordinates.size() / session.dimension();
+  environment().observability.work().OnPoints(coordinates.size() / session.dimension());
   absl::Status status = RunGuarded([&] {
     return session.Append(request.point_offset(), {coordinates.data(), static_cast<size_t>(coordinates.size())},
                           expected_revision);
