@@ -33,14 +33,14 @@ absl::Status ReadOff(LineReader& reader, const CloudOptions& options, PointCloud
 absl::Status TakeColumns(const CloudOptions& options, PointCloud& cloud);
 
 // What a .node has beside its points.
-struct NodeExtras {
+struct NodeNumbers {
   uint64_t index_base = 0;        // the index of the first point, 0 or 1
   std::vector<double> weights{};  // of the points, if the file has them
   bool has_markers = false;       // whether its header says that points have markers
 };
 
 // ReadNode that tells these, too.
-absl::Status ReadNode(LineReader& reader, const CloudOptions& options, PointCloud& cloud, NodeExtras& extras);
+absl::Status ReadNode(LineReader& reader, const CloudOptions& options, PointCloud& cloud, NodeNumbers& numbers);
 
 // Reads a coordinate that a line must have.
 //

@@ -191,6 +191,18 @@ absl::Status CoordinateError(std::string_view text) {
       absl::StrCat(ParseFinite(text, value).message(), is_invalid ? std::string(kSkipInvalidHint) : Hint(text)));
 }
 
+absl::Status TakeFinite(std::string_view text, double& value) {
+  switch (ReadCoordinate(text, value)) {
+    case CoordinateKind::kFinite:
+      return absl::OkStatus();
+    case CoordinateKind::kInvalid:
+      return ParseFinite(text, value);
+    case CoordinateKind::kNone:
+      break;
+  }
+  return CoordinateError(text);
+}
+
 bool IsColumnName(std::string_view text) {
   double value = 0;
   if (text.empty() || text.size() > kMaxNameBytes || IsDigit(text[0]) ||

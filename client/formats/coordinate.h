@@ -25,6 +25,11 @@ CoordinateKind ReadCoordinate(std::string_view text, double& value);
 // REQUIRES: ReadCoordinate does not find it finite.
 absl::Status CoordinateError(std::string_view text);
 
+// ReadCoordinate where no point may be left out.
+//
+// Errors:     those of CoordinateError, without its hint at --skip-invalid.
+absl::Status TakeFinite(std::string_view text, double& value);
+
 // Whether `text` is a word for a value that is missing, such as NA or null.
 bool IsMissingWord(std::string_view text);
 

@@ -30,47 +30,6 @@ enum class Unnamed { kAll, kFirstThree };
 
 constexpr std::string_view kCloudCompare = "//";
 
-std::vector<std::string> FieldsOf(std::string_view line, char separator) {
-  std::vector<std::string> fields;
-  FieldSplitter splitter(line, separator);
-  for (std::string_view field; splitter.Next(field);) {
-    fields.emplace_back(field);
-  }
-  return fields;
-}
-
-// `line` without what stands between double quotes.
-std::string Unquoted(std::string_view line) {
-  std::string text;
-  bool is_quoted = false;
-  for (const char c : line) {
-    is_quoted ^= c == '"';
-    if (!is_quoted) {
-      text += c;
-    }
-  }
-  return is_quoted ? std::string(line) : text;
-}
-
-// The separator of the fields of a row: ';' before ',' before a tab beside commas, which are in numbers then, before
-// blanks.
-char SeparatorOf(std::string_view quoted_line) {
-  const std::string line = Unquoted(quoted_line);
-  if (line.find(';') != std::string_view::npos) {
-    return ';';
-  }
-  if (line.find(',') == std::string_view::npos) {
-    return ' ';
-  }
-  FieldSplitter splitter(line, ',');
-  for (std::string_view field; splitter.Next(field);) {
-    if (field.find('\t') != std::string_view::npos) {
-      return '\t';
-    }
-  }
-  return ',';
-}
-
 // Reads rows of one table into a cloud.
 class TableReader {
  public:

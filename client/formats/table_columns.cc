@@ -117,6 +117,19 @@ std::string NameOr(const std::vector<std::string>& names, size_t column) {
   return column < names.size() && !names[column].empty() ? absl::StrCat(" ", Quote(names[column])) : "";
 }
 
+// `line` without what stands between double quotes.
+std::string Unquoted(std::string_view line) {
+  std::string text;
+  bool is_quoted = false;
+  for (const char c : line) {
+    is_quoted ^= c == '"';
+    if (!is_quoted) {
+      text += c;
+    }
+  }
+  return is_quoted ? std::string(line) : text;
+}
+
 }  // namespace
 
 NamedColumns FindCoordinates(const std::vector<std::string>& names) {
@@ -223,6 +236,32 @@ std::string ColumnsOption(const std::vector<size_t>& columns, size_t count) {
     absl::StrAppend(&text, i == 0 ? "" : ",", columns[i] + 1);
   }
   return text;
+}
+
+std::vector<std::string> FieldsOf(std::string_view line, char separator) {
+  std::vector<std::string> fields;
+  FieldSplitter splitter(line, separator);
+  for (std::string_view field; splitter.Next(field);) {
+    fields.emplace_back(field);
+  }
+  return fields;
+}
+
+char SeparatorOf(std::string_view quoted_line) {
+  const std::string line = Unquoted(quoted_line);
+  if (line.find(';') != std::string_view::npos) {
+    return ';';
+  }
+  if (line.find(',') == std::string_view::npos) {
+    return ' ';
+  }
+  FieldSplitter splitter(line, ',');
+  for (std::string_view field; splitter.Next(field);) {
+    if (field.find('\t') != std::string_view::npos) {
+      return '\t';
+    }
+  }
+  return ',';
 }
 
 }  // namespace wellspace::formats

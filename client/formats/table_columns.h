@@ -1,4 +1,4 @@
-// Which columns of a table hold coordinates.
+// Rows of a table, and which of its columns hold coordinates.
 #ifndef WELLSPACE_CLIENT_FORMATS_TABLE_COLUMNS_H_
 #define WELLSPACE_CLIENT_FORMATS_TABLE_COLUMNS_H_
 
@@ -10,6 +10,13 @@
 #include "absl/status/statusor.h"
 
 namespace wellspace::formats {
+
+// All fields of a row; see FieldSplitter.
+std::vector<std::string> FieldsOf(std::string_view line, char separator);
+
+// The separator of the fields of a row: ';' before ',' before a tab beside commas, which are in numbers then, before
+// blanks.
+char SeparatorOf(std::string_view line);
 
 // What the names of columns say.
 struct NamedColumns {
