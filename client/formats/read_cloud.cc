@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/cloud_readers.h"
+#include "client/formats/open_input.h"
 #include "client/formats/registry.h"
 
 namespace wellspace::formats {
@@ -52,27 +53,19 @@ std::span<const Format<CloudReader>> CloudReaders() {
   return readers;
 }
 
-constexpr std::string_view kGzipExtension = ".gz";
-
 }  // namespace
 
 std::vector<std::string> CloudFormats() { return FormatNames(CloudReaders()); }
 
 absl::StatusOr<PointCloud> ReadCloud(const std::string& path, const CloudOptions& options) {
   const std::string format = options.format.empty() && path == kStandardStream ? "csv" : options.format;
-  const bool is_gzip = ExtensionOf(path) == kGzipExtension;
-  const auto row =
-      FindFormat(CloudReaders(), path.substr(0, path.size() - (is_gzip ? kGzipExtension.size() : 0)), format);
+  const auto row = FindInputFormat(CloudReaders(), path, format);
   if (!row.ok()) {
-    return absl::InvalidArgumentError(
-        absl::StrCat(row.status().message(), format.empty() ? "; each also compressed, with .gz after it" : ""));
+    return row.status();
   }
-  absl::StatusOr<InputFile> file = InputFile::Open(path);
+  absl::StatusOr<InputFile> file = OpenInflated(path);
   if (!file.ok()) {
     return file.status();
-  }
-  if (absl::Status status = file->InflateGzip(is_gzip); !status.ok()) {
-    return status;
   }
   PointCloud cloud;
   cloud.name = file->name();

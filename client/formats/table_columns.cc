@@ -173,40 +173,50 @@ NamedColumns FindCoordinates(const std::vector<std::string>& names) {
   return named;
 }
 
+absl::StatusOr<size_t> ResolveColumn(std::string_view option, const std::string& wanted,
+                                     const std::vector<std::string>& names, size_t count) {
+  const auto error = [option](const std::string& message) {
+    return absl::InvalidArgumentError(absl::StrCat(std::string(option), ": ", message));
+  };
+  uint64_t number = 0;
+  size_t column = kNone;
+  if (ParseUnsigned(wanted, kMaxCount, number)) {
+    column = number >= 1 && number <= count ? number - 1 : kNone;
+  } else {
+    const auto is_it = [&wanted](const std::string& name) {
+      return absl::AsciiStrToLower(name) == absl::AsciiStrToLower(wanted);
+    };
+    const auto at = std::find_if(names.begin(), names.end(), is_it);
+    if (at != names.end() && std::find_if(at + 1, names.end(), is_it) != names.end()) {
+      return error(absl::StrCat("two columns are called ", Quote(wanted), "; expected its number"));
+    }
+    column = at == names.end() ? kNone : at - names.begin();
+  }
+  if (column != kNone) {
+    return column;
+  }
+  std::string known;
+  for (const std::string& name : names) {
+    if (known.size() < 200) {
+      absl::StrAppend(&known, known.empty() ? "" : ", ", Quote(name));
+    }
+  }
+  return error(absl::StrCat("there is no column ", Quote(wanted), "; expected numbers from 1 to ", count,
+                            known.empty() ? " (the columns have no names)" : absl::StrCat(", or names of ", known)));
+}
+
 absl::StatusOr<std::vector<size_t>> ResolveColumns(const std::vector<std::string>& wanted,
                                                    const std::vector<std::string>& names, size_t count, int dimension) {
   std::vector<size_t> columns;
   for (const std::string& one : wanted) {
-    uint64_t number = 0;
-    size_t column = kNone;
-    if (ParseUnsigned(one, kMaxCount, number)) {
-      column = number >= 1 && number <= count ? number - 1 : kNone;
-    } else {
-      const auto is_it = [&one](const std::string& name) {
-        return absl::AsciiStrToLower(name) == absl::AsciiStrToLower(one);
-      };
-      const auto at = std::find_if(names.begin(), names.end(), is_it);
-      if (at != names.end() && std::find_if(at + 1, names.end(), is_it) != names.end()) {
-        return absl::InvalidArgumentError(
-            absl::StrCat("--columns: two columns are called ", Quote(one), "; expected its number"));
-      }
-      column = at == names.end() ? kNone : at - names.begin();
+    const absl::StatusOr<size_t> column = ResolveColumn("--columns", one, names, count);
+    if (!column.ok()) {
+      return column.status();
     }
-    if (column == kNone) {
-      std::string known;
-      for (const std::string& name : names) {
-        if (known.size() < 200) {
-          absl::StrAppend(&known, known.empty() ? "" : ", ", Quote(name));
-        }
-      }
-      return absl::InvalidArgumentError(
-          absl::StrCat("--columns: there is no column ", Quote(one), "; expected numbers from 1 to ", count,
-                       known.empty() ? " (the columns have no names)" : absl::StrCat(", or names of ", known)));
-    }
-    if (std::find(columns.begin(), columns.end(), column) != columns.end()) {
+    if (std::find(columns.begin(), columns.end(), *column) != columns.end()) {
       return absl::InvalidArgumentError(absl::StrCat("--columns: column ", Quote(one), " is given twice"));
     }
-    columns.push_back(column);
+    columns.push_back(*column);
   }
   if (dimension != 0 ? columns.size() != static_cast<size_t>(dimension)
                      : columns.size() < kMinDimension || columns.size() > kMaxDimension) {

@@ -28,8 +28,14 @@ struct NamedColumns {
 // Finds names such as x y z, lon lat altitude, easting northing, POINT_X, Points:0, "X [m]", in any case.
 NamedColumns FindCoordinates(const std::vector<std::string>& names);
 
-// The columns that `wanted` gives by name, in any case, or by number from 1, counted from 0. `names` is empty where
+// The column that `wanted` gives by name, in any case, or by number from 1, counted from 0. `names` is empty where
 // columns have none.
+//
+// Errors:     INVALID_ARGUMENT "OPTION: …" if there is no such column, or more than one.
+absl::StatusOr<size_t> ResolveColumn(std::string_view option, const std::string& wanted,
+                                     const std::vector<std::string>& names, size_t count);
+
+// The columns that `wanted` gives by name, in any case, or by number from 1, counted from 0; see ResolveColumn.
 //
 // Errors:     INVALID_ARGUMENT "--columns …": unless they are 2 to 6, and `dimension` if that is not 0, different, and
 //             there.
