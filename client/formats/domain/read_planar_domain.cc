@@ -1,0 +1,112 @@
+#include "client/formats/domain/read_planar_domain.h"
+
+#include <span>
+
+#include "absl/strings/str_cat.h"
+#include "client/formats/domain/domain_readers.h"
+#include "client/formats/open_input.h"
+#include "client/formats/registry.h"
+
+namespace wellspace::formats {
+namespace {
+
+enum class Kind { kPoly, kGeoJson, kObj, kCsv };
+
+std::span<const Format<Kind>> Kinds() {
+  static const std::vector<Format<Kind>> kinds = {
+      {"poly", {".poly"}, Kind::kPoly},
+      {"geojson", {".geojson", ".json"}, Kind::kGeoJson},
+      {"obj", {".obj"}, Kind::kObj},
+      {"csv", {".csv", ".tsv", ".txt", ".dat"}, Kind::kCsv},
+  };
+  return kinds;
+}
+
+absl::Status CheckOptions(const std::string& path, Kind kind, const DomainOptions& options) {
+  const auto error = [&path](const char* option, const char* format) {
+    return absl::InvalidArgumentError(
+        absl::StrCat(path, ": ", option, " is of the format ", format, "; expected none of another one"));
+  };
+  if (kind != Kind::kGeoJson && !options.region_property.empty()) {
+    return error("--region-property", "geojson");
+  }
+  if (kind != Kind::kGeoJson && !options.marker_property.empty()) {
+    return error("--marker-property", "geojson");
+  }
+  if (kind != Kind::kCsv && !options.columns.empty()) {
+    return error("--columns", "csv");
+  }
+  if (kind != Kind::kCsv && !options.id_column.empty()) {
+    return error("--id-column", "csv");
+  }
+  return absl::OkStatus();
+}
+
+absl::Status Read(InputFile& file, const std::string& path, Kind kind, const DomainOptions& options,
+                  PlanarDomain& domain) {
+  switch (kind) {
+    case Kind::kPoly:
+      return ReadPoly(file, path, domain);
+    case Kind::kGeoJson:
+      return ReadGeoJson(file, options, domain);
+    case Kind::kObj:
+      return ReadObjLines(file, domain);
+    case Kind::kCsv:
+      return ReadPolylines(file, options, domain);
+  }
+  return absl::OkStatus();
+}
+
+void NoteChanges(PlanarDomain& domain) {
+  const auto note = [&domain](uint64_t count, const char* one, const char* more) {
+    if (count > 0) {
+      domain.notes.push_back(absl::StrCat(domain.name, ": ", count, count == 1 ? one : more));
+    }
+  };
+  note(domain.repeated_points, " point is dropped, which is equal to the one before",
+       " points are dropped, which are equal to the ones before them");
+  note(domain.unclosed_rings, " ring is closed, whose last point is not its first",
+       " rings are closed, whose last points are not their first ones");
+  note(domain.altitudes, " position has an altitude, which is not used",
+       " positions have altitudes, which are not used");
+}
+
+}  // namespace
+
+std::vector<std::string> DomainFormats() { return FormatNames(Kinds()); }
+
+bool IsDomainPath(const std::string& path) {
+  const std::string extension = ExtensionOf(WithoutGzip(path));
+  return extension == ".poly" || extension == ".geojson";
+}
+
+absl::StatusOr<PlanarDomain> ReadPlanarDomain(const std::string& path, const DomainOptions& options) {
+  if (path == kStandardStream && options.format.empty()) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("<stdin>: expected to be told the format: one of ", absl::StrJoin(DomainFormats(), ", ")));
+  }
+  const auto row = FindInputFormat(Kinds(), path, options.format);
+  if (!row.ok()) {
+    return row.status();
+  }
+  const Kind kind = (*row)->handler;
+  if (absl::Status status = CheckOptions(path, kind, options); !status.ok()) {
+    return status;
+  }
+  absl::StatusOr<InputFile> file = OpenInflated(path);
+  if (!file.ok()) {
+    return file.status();
+  }
+  PlanarDomain domain;
+  domain.name = file->name();
+  if (absl::Status status = Read(*file, path, kind, options, domain); !status.ok()) {
+    return status;
+  }
+  if (domain.points.empty()) {
+    return absl::InvalidArgumentError(absl::StrCat(domain.name, ": no points; expected at least one"));
+  }
+  NoteChanges(domain);
+  return domain;
+}
+
+}  // namespace wellspace::formats

@@ -1,0 +1,300 @@
+// Triangle's .poly.
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "absl/status/statusor.h"
+#include "absl/strings/str_cat.h"
+#include "client/formats/coordinate.h"
+#include "client/formats/domain/domain_readers.h"
+#include "client/formats/number.h"
+#include "client/formats/open_input.h"
+#include "client/formats/registry.h"
+#include "client/formats/tetgen_lines.h"
+
+namespace wellspace::formats {
+namespace {
+
+// The file of points at `plain`, or compressed beside it.
+absl::StatusOr<InputFile> OpenNode(const std::string& plain) {
+  absl::StatusOr<InputFile> file = OpenInflated(plain);
+  return absl::IsNotFound(file.status()) ? OpenInflated(plain + std::string(kGzipExtension)) : std::move(file);
+}
+
+class PolyReader {
+ public:
+  PolyReader(InputFile& file, const std::string& path, PlanarDomain& domain)
+      : reader_(std::move(file)), path_(path), domain_(domain) {}
+
+  absl::Status Read() {
+    if (absl::Status status = ReadPoints(); !status.ok()) {
+      return status;
+    }
+    for (auto read : {&PolyReader::ReadSegments, &PolyReader::ReadHoles, &PolyReader::ReadRegions}) {
+      std::string_view line;
+      if (!reader_.NextContent(line)) {
+        return reader_.Finish();  // every later part may be missing
+      }
+      if (absl::Status status = (this->*read)(line); !status.ok()) {
+        return status;
+      }
+    }
+    if (absl::Status status = ExpectEnd(reader_, regions_, "regions"); !status.ok()) {
+      return status;
+    }
+    return reader_.Finish();
+  }
+
+ private:
+  absl::Status ReadPoints();
+  absl::Status ReadPointsBeside();
+  absl::Status ReadSegments(std::string_view line);
+  absl::Status ReadEnd(FieldSplitter& fields, uint32_t& end);
+  absl::Status ReadHoles(std::string_view line);
+  absl::Status ReadRegions(std::string_view line);
+  absl::Status ReadSeed(FieldSplitter& fields, PlanarDomain::Seed& seed);
+  absl::Status TakePoints(LineReader& reader, const NodeHeader& header);
+  absl::Status CheckDimension(const LineReader& reader, const NodeHeader& header) const;
+  // An error where the fields of the line go on.
+  absl::Status ExpectNoMore(FieldSplitter& fields, std::string_view expected);
+
+  LineReader reader_;
+  const std::string& path_;
+  PlanarDomain& domain_;
+  uint64_t index_base_ = 0;  // of the points
+  uint64_t regions_ = 0;
+};
+
+absl::Status PolyReader::ExpectNoMore(FieldSplitter& fields, std::string_view expected) {
+  std::string_view field;
+  return fields.Next(field)
+             ? reader_.Error(absl::StrCat("expected ", std::string(expected), ", got also ", Quote(field)))
+             : absl::OkStatus();
+}
+
+absl::Status PolyReader::CheckDimension(const LineReader& reader, const NodeHeader& header) const {
+  return header.dimension == 2
+             ? absl::OkStatus()
+             : reader.Error(absl::StrCat("expected dimension 2, since the domain is one in the plane, "
+                                         "got ",
+                                         header.dimension));
+}
+
+absl::Status PolyReader::TakePoints(LineReader& reader, const NodeHeader& header) {
+  PointCloud cloud;
+  NodeExtras extras = {.takes_markers = true, .may_skip = false};
+  if (absl::Status status = ReadNodePoints(reader, header, /*skip_invalid=*/false, cloud, extras); !status.ok()) {
+    return status;
+  }
+  domain_.points = std::move(cloud.points);
+  domain_.point_lines = std::move(cloud.lines);
+  domain_.point_markers = std::move(extras.markers);
+  index_base_ = extras.index_base;
+  return absl::OkStatus();
+}
+
+absl::Status PolyReader::ReadPoints() {
+  NodeHeader header;
+  if (absl::Status status = ReadNodeHeader(reader_, header); !status.ok()) {
+    return status;
+  }
+  if (absl::Status status = CheckDimension(reader_, header); !status.ok()) {
+    return status;
+  }
+  return header.count > 0 ? TakePoints(reader_, header) : ReadPointsBeside();
+}
+
+// Reads the points of the .node file beside the .poly, which has none itself.
+absl::Status PolyReader::ReadPointsBeside() {
+  if (path_ == kStandardStream) {
+    return reader_.Error(
+        "0 points stand for those of the .node file beside this one, and standard input has none; "
+        "expected the points here");
+  }
+  const std::string poly = WithoutGzip(path_);
+  const std::string plain = poly.substr(0, poly.size() - ExtensionOf(poly).size()) + ".node";
+  absl::StatusOr<InputFile> file = OpenNode(plain);
+  if (absl::IsNotFound(file.status())) {
+    return reader_.Error(absl::StrCat("0 points stand for those of the file ", plain,
+                                      ", and there is none; expected it, also with .gz, or the points here"));
+  }
+  if (!file.ok()) {
+    return file.status();
+  }
+  LineReader reader(*std::move(file));
+  NodeHeader header;
+  if (absl::Status status = ReadNodeHeader(reader, header); !status.ok()) {
+    return status;
+  }
+  if (absl::Status status = CheckDimension(reader, header); !status.ok()) {
+    return status;
+  }
+  if (absl::Status status = TakePoints(reader, header); !status.ok()) {
+    return status;
+  }
+  domain_.points_name = reader.name();
+  if (absl::Status status = ExpectEnd(reader, header.count, "points"); !status.ok()) {
+    return status;
+  }
+  return reader.Finish();
+}
+
+absl::Status PolyReader::ReadEnd(FieldSplitter& fields, uint32_t& end) {
+  std::string_view field;
+  if (!fields.Next(field)) {
+    return reader_.Error("expected an index and two points, got fewer numbers");
+  }
+  uint64_t point = 0;
+  const uint64_t count = domain_.point_count();
+  if (!ParseUnsigned(field, kMaxCount, point) || point < index_base_ || point - index_base_ >= count) {
+    return reader_.Error(
+        count == 0 ? absl::StrCat("expected no segment, since there are no points, got one to point ", Quote(field))
+                   : absl::StrCat("expected a point from ", index_base_, " to ", count - 1 + index_base_, ", got ",
+                                  Quote(field)));
+  }
+  end = static_cast<uint32_t>(point - index_base_);
+  return absl::OkStatus();
+}
+
+absl::Status PolyReader::ReadSegments(std::string_view line) {
+  std::array<uint64_t, 2> header{};
+  constexpr std::array kNames = {"number of segments", "number of markers"};
+  if (absl::Status status = ReadHeader(reader_, line, 1, kNames, header); !status.ok()) {
+    return status;
+  }
+  const auto [count, markers] = header;
+  if (markers > 1) {
+    return reader_.Error(absl::StrCat("expected 0 or 1 markers of each segment, got ", markers));
+  }
+  domain_.segments.reserve(2 * std::min(count, kMaxReserved));
+  domain_.markers.reserve(std::min(count, kMaxReserved));
+  uint64_t base = 0;
+  for (uint64_t segment = 0; segment < count; ++segment) {
+    if (!reader_.NextContent(line)) {
+      return CountError(reader_, count, "segments", segment);
+    }
+    FieldSplitter fields(line, ' ');
+    if (absl::Status status = ReadIndex(reader_, fields, segment, base); !status.ok()) {
+      return status;
+    }
+    std::array<uint32_t, 2> ends{};
+    for (uint32_t& end : ends) {
+      if (absl::Status status = ReadEnd(fields, end); !status.ok()) {
+        return status;
+      }
+    }
+    int32_t marker = 0;  // may be missing, as it may for Triangle
+    if (std::string_view field; markers == 1 && fields.Next(field)) {
+      if (absl::Status status = ReadMarker(field, marker); !status.ok()) {
+        return reader_.Error(absl::StrCat("marker: ", status.message()));
+      }
+    }
+    const char* what = markers == 1 ? "an index, two points and a marker"
+                                    : "an index and two points, and no marker, as the header says";
+    if (absl::Status status = ExpectNoMore(fields, what); !status.ok()) {
+      return status;
+    }
+    domain_.segments.insert(domain_.segments.end(), ends.begin(), ends.end());
+    domain_.markers.push_back(marker);
+    domain_.segment_lines.Add(reader_.line_number());
+  }
+  return absl::OkStatus();
+}
+
+absl::Status PolyReader::ReadSeed(FieldSplitter& fields, PlanarDomain::Seed& seed) {
+  for (auto [coordinate, name] : {std::pair{&seed.x, "x"}, std::pair{&seed.y, "y"}}) {
+    std::string_view field;
+    if (!fields.Next(field)) {
+      return reader_.Error(absl::StrCat("expected an index, x and y, got no ", name));
+    }
+    if (absl::Status status = TakeFinite(field, *coordinate); !status.ok()) {
+      return reader_.Error(absl::StrCat(name, ": ", status.message()));
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status PolyReader::ReadHoles(std::string_view line) {
+  std::array<uint64_t, 1> count{};
+  constexpr std::array kNames = {"number of holes"};
+  if (absl::Status status = ReadHeader(reader_, line, 1, kNames, count); !status.ok()) {
+    return status;
+  }
+  uint64_t base = 0;
+  for (uint64_t hole = 0; hole < count[0]; ++hole) {
+    if (!reader_.NextContent(line)) {
+      return CountError(reader_, count[0], "holes", hole);
+    }
+    FieldSplitter fields(line, ' ');
+    if (absl::Status status = ReadIndex(reader_, fields, hole, base); !status.ok()) {
+      return status;
+    }
+    PlanarDomain::Seed seed = {.is_hole = true};
+    if (absl::Status status = ReadSeed(fields, seed); !status.ok()) {
+      return status;
+    }
+    if (absl::Status status = ExpectNoMore(fields, "an index, x and y of a hole"); !status.ok()) {
+      return status;
+    }
+    domain_.seeds.push_back(seed);
+    domain_.seed_lines.Add(reader_.line_number());
+  }
+  return absl::OkStatus();
+}
+
+absl::Status PolyReader::ReadRegions(std::string_view line) {
+  constexpr std::array kNames = {"number of regions"};
+  if (absl::Status status = ReadHeader(reader_, line, 1, kNames, {&regions_, 1}); !status.ok()) {
+    return status;
+  }
+  uint64_t base = 0;
+  uint64_t without_area = 0;
+  for (uint64_t region = 0; region < regions_; ++region) {
+    if (!reader_.NextContent(line)) {
+      return CountError(reader_, regions_, "regions", region);
+    }
+    FieldSplitter fields(line, ' ');
+    if (absl::Status status = ReadIndex(reader_, fields, region, base); !status.ok()) {
+      return status;
+    }
+    PlanarDomain::Seed seed;
+    if (absl::Status status = ReadSeed(fields, seed); !status.ok()) {
+      return status;
+    }
+    std::string_view field;
+    if (!fields.Next(field)) {
+      return reader_.Error("expected an index, x, y, an attribute and perhaps a largest area, got no attribute");
+    }
+    if (absl::Status status = TakeFinite(field, seed.attribute); !status.ok()) {
+      return reader_.Error(absl::StrCat("attribute: ", status.message()));
+    }
+    if (!fields.Next(field)) {
+      ++without_area;
+    } else if (absl::Status status = TakeFinite(field, seed.max_area); !status.ok()) {
+      return reader_.Error(absl::StrCat("largest area: ", status.message()));
+    }
+    seed.max_area = std::max(seed.max_area, 0.0);  // a negative one is none, as for Triangle
+    if (absl::Status status = ExpectNoMore(fields, "an index, x, y, an attribute and a largest area"); !status.ok()) {
+      return status;
+    }
+    domain_.seeds.push_back(seed);
+    domain_.seed_lines.Add(reader_.line_number());
+  }
+  if (without_area > 0) {
+    domain_.notes.push_back(absl::StrCat(
+        domain_.name, ": of ", without_area, without_area == 1 ? " region" : " regions",
+        " the only number is taken for the attribute; a second one would be the largest area of a triangle"));
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+absl::Status ReadPoly(InputFile& file, const std::string& path, PlanarDomain& domain) {
+  domain.faces = PlanarDomain::FaceRule::kHoles;
+  return PolyReader(file, path, domain).Read();
+}
+
+}  // namespace wellspace::formats
