@@ -4,6 +4,8 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -356,16 +358,30 @@ TEST_F(ReadGeoJsonTest, CutFilesAreRefused) {
   }
 }
 
-// The land of the world: 127 rings of Natural Earth.
-TEST_F(ReadGeoJsonTest, ReadsTheWorld) {
+// The land of the world by Natural Earth, compressed.
+std::string Land() {
   const char* folder = std::getenv("WELLSPACE_EXAMPLES_DIR");
-  ASSERT_NE(folder, nullptr);
-  const absl::StatusOr<PlanarDomain> land = ReadPlanarDomain(std::string(folder) + "/land-110m.geojson.gz");
+  return std::string(folder != nullptr ? folder : "examples") + "/land-110m.geojson.gz";
+}
+
+TEST_F(ReadGeoJsonTest, ReadsTheWorld) {
+  const absl::StatusOr<PlanarDomain> land = ReadPlanarDomain(Land());
   ASSERT_TRUE(land.ok()) << land.status();
   EXPECT_EQ(land->point_count(), 5000u);
   EXPECT_EQ(land->segment_count(), 5000u);
   EXPECT_EQ(land->faces, PlanarDomain::FaceRule::kEvenOdd);
   EXPECT_EQ(land->unclosed_rings, 0u);
+  EXPECT_EQ(land->repeated_points, 0u);
+}
+
+TEST_F(ReadGeoJsonTest, ACutArchiveIsRefused) {
+  std::ifstream file(Land(), std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  ASSERT_GT(bytes.size(), 10000u);
+  // In the middle; and within the checksum, when the parser has seen the end of the text.
+  for (const size_t size : {bytes.size() / 2, bytes.size() - 5}) {
+    EXPECT_THAT(ReadBad("a.geojson.gz", bytes.substr(0, size)), StartsWith("a.geojson.gz: ")) << size;
+  }
 }
 
 }  // namespace

@@ -1,6 +1,8 @@
 // Triangle's .poly: parts that may be missing, numbering, markers, holes and regions, and errors at their lines.
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 #include <zlib.h>
 
 #include <filesystem>
@@ -243,10 +245,35 @@ TEST_F(ReadPolyTest, DirtyDomainsAreRead) {
   EXPECT_EQ(ReadPlanarDomain(Data("lake.poly"))->seeds.size(), 7u);
 }
 
-TEST_F(ReadPolyTest, StandardInputHasNoFileBeside) {
-  // Its name stands for it; the file that is opened here is another one.
+// A file in the place of standard input, as long as this lives.
+class StandardInput {
+ public:
+  explicit StandardInput(const std::string& path) : before_(dup(STDIN_FILENO)) {
+    const int file = open(path.c_str(), O_RDONLY);
+    dup2(file, STDIN_FILENO);
+    close(file);
+  }
+  ~StandardInput() {
+    dup2(before_, STDIN_FILENO);
+    close(before_);
+  }
+
+ private:
+  const int before_;
+};
+
+TEST_F(ReadPolyTest, StandardInputIsToldItsFormatAndHasNoFileBeside) {
   EXPECT_THAT(ReadPlanarDomain("-").status().message(),
-              HasSubstr("expected to be told the format: one of poly, geojson"));
+              StartsWith("<stdin>: expected to be told the format: one of poly, geojson"));
+  {
+    const StandardInput input(folder_.Write("a.poly", kAll));
+    const absl::StatusOr<PlanarDomain> domain = ReadPlanarDomain("-", {.format = "poly"});
+    ASSERT_TRUE(domain.ok()) << domain.status();
+    EXPECT_EQ(domain->SegmentOrigin(0), "<stdin>:10");
+  }
+  const StandardInput input(folder_.Write("b.poly", "0 2\n"));
+  EXPECT_THAT(ReadPlanarDomain("-", {.format = "poly"}).status().message(),
+              StartsWith("<stdin>:1: 0 points stand for those of the .node file beside this one"));
 }
 
 TEST_F(ReadPolyTest, OptionsOfOtherFormatsAreRefused) {
