@@ -8,9 +8,12 @@
 
 namespace wellspace::cli {
 
-void AddCloudOptions(CLI::App& command, formats::CloudOptions& options, const std::string& what) {
+void AddCloudOptions(CLI::App& command, formats::CloudOptions& options, const std::string& what,
+                     const std::vector<std::string>& more_formats) {
+  std::vector<std::string> all_formats = formats::CloudFormats();
+  all_formats.insert(all_formats.end(), more_formats.begin(), more_formats.end());
   command.add_option("--input-format", options.format, absl::StrCat("Format of ", what, "; default: by its extension"))
-      ->check(CLI::IsMember(formats::CloudFormats()));
+      ->check(CLI::IsMember(all_formats));
   const auto parse = [&options](const std::string& text) {
     options.columns.clear();
     formats::FieldSplitter fields(text, ',');

@@ -14,8 +14,10 @@
 
 namespace wellspace::cli {
 
-// Adds --input-format, --columns and --skip-invalid, about the file `what`. REQUIRES: `options` outlives `command`.
-void AddCloudOptions(CLI::App& command, formats::CloudOptions& options, const std::string& what = "IN");
+// Adds --input-format, which takes `more_formats`, too, --columns and --skip-invalid, about the file `what`. REQUIRES:
+// `options` outlives `command`.
+void AddCloudOptions(CLI::App& command, formats::CloudOptions& options, const std::string& what = "IN",
+                     const std::vector<std::string>& more_formats = {});
 
 // What was found while a cloud was read: which columns were taken, what was not used, how many points were skipped.
 struct CloudReport {

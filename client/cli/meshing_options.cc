@@ -13,7 +13,9 @@ namespace wellspace::cli {
 const char kCloudsHelp[] =
     "Clouds:  .csv .tsv .txt .dat (columns separated by commas, semicolons or blanks; a header may name x, y, z, or\n"
     "         lon, lat and the like), .xyz, .asc, .pts, .node, .npy, vertices of .ply, .obj and .off; each may be\n"
-    "         compressed (.csv.gz); \"-\" is standard input (csv, or --input-format)\n";
+    "         compressed (.csv.gz); \"-\" is standard input (csv, or --input-format)\n"
+    "Domains: in 2-D, .poly (Triangle's, with .node) and .geojson; with --segments lines of .obj and polylines of "
+    ".csv\n";
 
 const char kMeshesHelp[] =
     "Meshes:  .vtu, .vtkhdf, .msh (Gmsh 4.1; --format msh22: 2.2) and .mesh (MEDIT), 2-D and 3-D; .npz (arrays of\n"
@@ -32,7 +34,8 @@ void MeshingOptions::AddTo(CLI::App& command) {
   remote_.AddTo(command, RemoteCommand::Needs::kAnyServer);
   command.add_option("--stats", statistics_, "Write figures as JSON to this file, or - for standard output")
       ->type_name("FILE");
-  AddCloudOptions(command, cloud_options_);
+  AddCloudOptions(command, cloud_options_, "IN", {"poly", "geojson"});
+  domain_.AddTo(command);
 }
 
 bool MeshingOptions::has_figures_on_stdout() const { return statistics_ == formats::kStandardStream || remote_.json(); }
@@ -48,9 +51,19 @@ void MeshingOptions::AddFilesTo(formats::FilePlan& files) const {
   }
 }
 
-int MeshingOptions::Run(const Work& work) {
+absl::StatusOr<formats::PointCloud> MeshingOptions::Read() {
+  if (domain_.IsDomain(input_, cloud_options_.format)) {
+    return domain_.Read(input_, cloud_options_);
+  }
+  if (absl::Status status = domain_.CheckCloud(); !status.ok()) {
+    return status;
+  }
   cloud_options_.dimension = dimension();
-  const absl::StatusOr<formats::PointCloud> cloud = formats::ReadCloud(input_, cloud_options_);
+  return formats::ReadCloud(input_, cloud_options_);
+}
+
+int MeshingOptions::Run(const Work& work) {
+  const absl::StatusOr<formats::PointCloud> cloud = Read();
   if (!cloud.ok()) {
     return ReportError(cloud.status(), remote_.format());
   }
@@ -60,13 +73,17 @@ int MeshingOptions::Run(const Work& work) {
   if (!options.ok()) {
     return ReportError(options.status(), remote_.format());
   }
+  options->features = domain_.features();
   if (options->threads == 0) {
     options->threads = HelpfulThreads(*options, cloud->points);
   }
   return remote_.Run([&](client::Client& client, const client::CallOptions& call, const Interrupt& /*interrupt*/) {
     const absl::Status status = work(client, *options, *cloud, call);
     const absl::Status explained = parameters_.Explain(status);
-    return absl::IsInvalidArgument(status) && explained == status ? WithOrigins(status, *cloud) : explained;
+    if (!absl::IsInvalidArgument(status) || explained != status) {
+      return explained;
+    }
+    return domain_.features() != nullptr ? domain_.WithOrigins(status) : WithOrigins(status, *cloud);
   });
 }
 

@@ -9,6 +9,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "client/cli/cloud_options.h"
+#include "client/cli/domain_options.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/parameter_options.h"
 #include "client/cli/remote_command.h"
@@ -50,7 +51,7 @@ class MeshingOptions {
   // What is done with a cloud; an error is explained in terms of its file and of the options.
   using Work = std::function<absl::Status(client::Client&, const client::MeshOptions&, const formats::PointCloud&,
                                           const client::CallOptions&)>;
-  // Reads the cloud, opens the server and does `work`. Returns the exit code, errors reported.
+  // Reads the cloud, or the domain, opens the server and does `work`. Returns the exit code, errors reported.
   int Run(const Work& work);
 
   // Writes `statistics`, an object in JSON, with what was noted of the cloud, to where --stats and --output ask for it,
@@ -58,8 +59,11 @@ class MeshingOptions {
   absl::Status WriteStatistics(const std::string& statistics) const;
 
  private:
+  absl::StatusOr<formats::PointCloud> Read();
+
   std::string input_;
   formats::CloudOptions cloud_options_;
+  DomainOptions domain_;
   CloudReport report_;  // of the cloud, once it is read
   std::string statistics_;
   ParameterOptions parameters_;

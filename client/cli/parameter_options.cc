@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -82,6 +84,12 @@ void ParameterOptions::AddQualityTo(CLI::App& command) {
   AddCriterion(command, options_.criterion);
   AddNumber(command, "--rho", options_.rho,
             "Bound of the criterion; default: that of the dimension, sqrt(2) in 2-D, 2 in 3-D");
+  AddNumber(
+      command, "--min-angle", min_angle_,
+      "2-D: in the place of --rho, 1 / (2 sin) of this: no angle of a triangle is smaller, in degrees, up to 33.7; "
+      "above 20.7 refinement need not end")
+      ->excludes(command.get_option("--rho"))
+      ->check(CLI::Range(0.001, 33.7));
   AddSizes(command, options_.max_circumradius, size_boxes_);
   AddNumber(command, "--min-dihedral", options_.min_dihedral,
             "3-D: move and add vertices until no dihedral angle is smaller, in degrees, up to 18; 0: leave slivers as "
@@ -100,7 +108,7 @@ void ParameterOptions::AddQualityTo(CLI::App& command) {
       command, "--threads", [this](uint64_t count) { options_.threads = static_cast<int>(count); },
       "Threads that mesh; default: as many as help, up to all cores; of a session 1", 1, 1024);
   for (const char* name : {"--criterion", "--rho", "--size", "--size-box", "--min-dihedral", "--pump-weights",
-                           "--max-vertices", "--threads", "--keep-vertices"}) {
+                           "--max-vertices", "--threads", "--keep-vertices", "--min-angle"}) {
     quality_.push_back(command.get_option(name));
   }
 }
@@ -135,6 +143,13 @@ absl::StatusOr<client::MeshOptions> ParameterOptions::For(int dimension) const {
   client::MeshOptions options = options_;
   options.dimension = dimension;
   options.size_boxes = *std::move(boxes);
+  if (min_angle_ > 0) {
+    if (dimension != 2) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("--min-angle: it is for 2-D, and the points are in ", dimension, "-D; use --rho"));
+    }
+    options.rho = 0.5 / std::sin(min_angle_ * std::numbers::pi / 180);
+  }
   options.domain_low.assign(domain_.begin(), domain_.begin() + domain_.size() / 2);
   options.domain_high.assign(domain_.begin() + domain_.size() / 2, domain_.end());
   return options;
@@ -163,6 +178,7 @@ absl::StatusOr<client::MeshOptions> ParameterOptions::Replace(client::MeshOption
   replace(6, parameters.max_vertices, given->max_vertices);
   replace(7, parameters.threads, given->threads);
   replace(8, parameters.keep_vertices, given->keep_vertices);
+  replace(9, parameters.rho, given->rho);
   return parameters;
 }
 

@@ -54,6 +54,7 @@ class ParameterOptions {
   std::vector<double> domain_;
   std::vector<std::vector<double>> size_boxes_;
   client::MeshOptions options_;
+  double min_angle_ = 0;               // degrees; 0: not given
   std::vector<CLI::Option*> quality_;  // in the order of AddQualityTo
 };
 

@@ -45,6 +45,21 @@ absl::Status WithOrigins(const absl::Status& status, uint64_t first_index, uint6
   return absl::Status(status.code(), first_origin.empty() ? message : absl::StrCat(first_origin, ": ", message));
 }
 
+absl::Status WithPlaces(const absl::Status& status, std::string_view what, uint64_t count,
+                        const std::function<std::string(uint64_t)>& origin) {
+  std::string message(status.message());
+  for (size_t at = message.find(what); at != std::string::npos; at = message.find(what, at)) {
+    at += what.size();
+    uint64_t index = 0;
+    const char* const end = message.data() + message.size();
+    const std::from_chars_result result = std::from_chars(message.data() + at, end, index);
+    if (result.ec == std::errc() && result.ptr != end && *result.ptr == ']' && index < count) {
+      message.insert(result.ptr + 1 - message.data(), absl::StrCat(" (", origin(index), ")"));
+    }
+  }
+  return absl::Status(status.code(), message);
+}
+
 absl::Status WithOrigins(const absl::Status& status, const formats::PointCloud& cloud) {
   return WithOrigins(status, 0, cloud.size(), [&cloud](uint64_t point) { return cloud.Origin(point); });
 }

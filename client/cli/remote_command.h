@@ -5,6 +5,7 @@
 #include <CLI/CLI.hpp>
 #include <functional>
 #include <string>
+#include <string_view>
 
 #include "absl/status/status.h"
 #include "client/cli/exit_codes.h"
@@ -28,6 +29,9 @@ void PrintJson(const Json& json, bool indented = true);
 absl::Status WithOrigins(const absl::Status& status, uint64_t first_index, uint64_t count,
                          const std::function<std::string(uint64_t)>& origin);
 absl::Status WithOrigins(const absl::Status& status, const formats::PointCloud& cloud);
+// The same for what the server names as `what`, "segments[" for example; the place comes behind each.
+absl::Status WithPlaces(const absl::Status& status, std::string_view what, uint64_t count,
+                        const std::function<std::string(uint64_t)>& origin);
 
 // Thread safety: thread-compatible.
 class RemoteCommand {

@@ -1,0 +1,57 @@
+// The options that say how a file of segments is read, and which faces they bound.
+#ifndef WELLSPACE_CLIENT_CLI_DOMAIN_OPTIONS_H_
+#define WELLSPACE_CLIENT_CLI_DOMAIN_OPTIONS_H_
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "client/formats/cloud.h"
+#include "client/formats/domain/planar_domain.h"
+#include "client/formats/domain/read_planar_domain.h"
+#include "client/formats/read_cloud.h"
+#include "client/types.h"
+
+namespace wellspace::cli {
+
+// A domain in the plane: --segments, --faces, --split-crossings, --region-property and --marker-property.
+//
+// Thread safety: thread-compatible.
+class DomainOptions {
+ public:
+  // REQUIRES:   this outlives `command`.
+  void AddTo(CLI::App& command);
+
+  // Whether `path`, or the format that is given, has segments.
+  bool IsDomain(const std::string& path, const std::string& format) const;
+
+  // Refuses options that want segments beside a cloud.
+  absl::Status CheckCloud() const;
+
+  // Reads the domain, by the format and the columns that are given; its points alone are returned, with their origins,
+  // and its segments are kept.
+  //
+  // Errors:     those of formats::ReadPlanarDomain; INVALID_ARGUMENT for attributes that are no region.
+  absl::StatusOr<formats::PointCloud> Read(const std::string& path, const formats::CloudOptions& options);
+
+  // What has been read; null before.
+  const std::shared_ptr<const client::Features>& features() const { return features_; }
+
+  // `status`, with the places in the file of the points, segments and seeds that it names.
+  absl::Status WithOrigins(const absl::Status& status) const;
+
+ private:
+  bool has_segments_ = false;
+  std::string faces_;
+  bool split_crossings_ = false;
+  formats::DomainOptions reading_;
+  std::optional<formats::PlanarDomain> domain_;
+  std::shared_ptr<const client::Features> features_;
+};
+
+}  // namespace wellspace::cli
+
+#endif  // WELLSPACE_CLIENT_CLI_DOMAIN_OPTIONS_H_
