@@ -130,7 +130,39 @@ Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D == 3)
   return {{at.x[0], at.x[1], at.x[2]}, at.radius, at.error};
 }
 
-// The same by an approximate inverse and the residual, D > 3.
+// Puts I and an approximate inverse of `a` side by side into `m`, by Gauss and Jordan with row pivots; false where a
+// pivot is zero.
+template <int D>
+bool InvertRoughly(const std::array<Point<D>, D>& a, std::array<std::array<double, 2 * D>, D>& m) {
+  for (int j = 0; j < D; ++j) {
+    m[j] = {};
+    std::copy(a[j].begin(), a[j].end(), m[j].begin());
+    m[j][D + j] = 1;
+  }
+  for (int k = 0; k < D; ++k) {
+    int pivot = k;
+    for (int j = k + 1; j < D; ++j) {
+      pivot = std::abs(m[j][k]) > std::abs(m[pivot][k]) ? j : pivot;
+    }
+    if (m[pivot][k] == 0) {
+      return false;
+    }
+    std::swap(m[k], m[pivot]);
+    const double inverse = 1 / m[k][k];
+    for (int i = k; i < 2 * D; ++i) {
+      m[k][i] *= inverse;
+    }
+    for (int j = 0; j < D; ++j) {
+      const double factor = m[j][k];
+      for (int i = k; i < 2 * D && j != k; ++i) {
+        m[j][i] -= factor * m[k][i];
+      }
+    }
+  }
+  return true;
+}
+
+// The same by an approximate inverse Y and the residual, D > 3.
 //
 // Divide each plane by the length of its normal as computed, which is as good a scale as the exact one: A x = c, and
 // let A*, c*, x* be the exact ones. The rows of A carry at most 3 u each (difference, quotient; with lengths a few u
@@ -151,31 +183,9 @@ Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D > 3) 
     c[j] = planes[j]->offset / planes[j]->length;
     largest_offset = std::max(largest_offset, std::abs(c[j]));
   }
-  // Gauss and Jordan with row pivots turn the left half into I and the right half into Y.
-  std::array<std::array<double, 2 * D>, D> m{};
-  for (int j = 0; j < D; ++j) {
-    std::copy(a[j].begin(), a[j].end(), m[j].begin());
-    m[j][D + j] = 1;
-  }
-  for (int k = 0; k < D; ++k) {
-    int pivot = k;
-    for (int j = k + 1; j < D; ++j) {
-      pivot = std::abs(m[j][k]) > std::abs(m[pivot][k]) ? j : pivot;
-    }
-    if (m[pivot][k] == 0) {
-      return {};
-    }
-    std::swap(m[k], m[pivot]);
-    const double inverse = 1 / m[k][k];
-    for (int i = k; i < 2 * D; ++i) {
-      m[k][i] *= inverse;
-    }
-    for (int j = 0; j < D; ++j) {
-      const double factor = m[j][k];
-      for (int i = k; i < 2 * D && j != k; ++i) {
-        m[j][i] -= factor * m[k][i];
-      }
-    }
+  std::array<std::array<double, 2 * D>, D> m;
+  if (!InvertRoughly<D>(a, m)) {
+    return {};
   }
   Placement<D> placed;
   double inverse_sq = 0;

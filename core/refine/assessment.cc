@@ -37,6 +37,45 @@ bool IsPlainlyGood(const Polytope<D>& cell, const CellNode<D>& node, double rho_
   return !is_on_wall & (node.radius_sq <= rho_sq * most_sq);
 }
 
+// What the planes of a node tell of it.
+struct NodePlanes {
+  double edge_sq = Assessment::kNone;  // the shortest of its edges
+  int edge_plane = -1;                 // its bisector
+  VertexId generator = kNoVertex;      // and its other end
+  bool on_face = false;                // of the box that the site is not on
+  bool on_own_face = false;            // that it is on
+};
+
+// Notes in `result` whether the cell is clipped there, and a face that it touches there if that is nearer than
+// `nearest_face`.
+template <int D>
+NodePlanes LookAtPlanes(const Polytope<D>& cell, const CellNode<D>& node, FaceMask site_faces, double& nearest_face,
+                        Assessment& result) {
+  NodePlanes found;
+  for (const uint16_t index : node.planes) {
+    const Plane<D>& plane = cell.plane(index);
+    if (plane.kind == PlaneKind::kBisector) {
+      if (2 * plane.offset < found.edge_sq || (2 * plane.offset == found.edge_sq && plane.vertex < found.generator)) {
+        found.generator = plane.vertex;
+        found.edge_sq = 2 * plane.offset;
+        found.edge_plane = index;
+      }
+    } else if (plane.kind == PlaneKind::kClip) {
+      result.is_clipped = true;
+    } else if (((site_faces >> plane.face) & 1) != 0) {
+      found.on_own_face = true;
+    } else {
+      found.on_face = true;
+      const double distance = std::abs(plane.offset);
+      if (distance < nearest_face || (distance == nearest_face && plane.face < result.encroached_face)) {
+        nearest_face = distance;
+        result.encroached_face = plane.face;
+      }
+    }
+  }
+  return found;
+}
+
 // A node that may be repaired, and the nearest of its generators.
 template <int D>
 struct Candidate {
@@ -70,32 +109,8 @@ Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const MeshCriter
     if (!has_sizes && IsPlainlyGood(cell, node, rho_sq, cell_edge_sq)) {
       continue;
     }
-    double edge_sq = Assessment::kNone;
-    int edge_plane = -1;
-    VertexId generator = kNoVertex;
-    bool on_face = false;
-    bool on_own_face = false;
-    for (const uint16_t index : node.planes) {
-      const Plane<D>& plane = cell.plane(index);
-      if (plane.kind == PlaneKind::kBisector) {
-        if (2 * plane.offset < edge_sq || (2 * plane.offset == edge_sq && plane.vertex < generator)) {
-          generator = plane.vertex;
-          edge_sq = 2 * plane.offset;
-          edge_plane = index;
-        }
-      } else if (plane.kind == PlaneKind::kClip) {
-        result.is_clipped = true;
-      } else if (((site_faces >> plane.face) & 1) != 0) {
-        on_own_face = true;
-      } else {
-        on_face = true;
-        const double distance = std::abs(plane.offset);
-        if (distance < nearest_face || (distance == nearest_face && plane.face < result.encroached_face)) {
-          nearest_face = distance;
-          result.encroached_face = plane.face;
-        }
-      }
-    }
+    const auto [edge_sq, edge_plane, generator, on_face, on_own_face] =
+        LookAtPlanes(cell, node, site_faces, nearest_face, result);
     if (on_face) {
       continue;
     }

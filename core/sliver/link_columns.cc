@@ -41,10 +41,57 @@ void LinkColumns::Add(const Point<3>& e, double weight) {
   ++count_;
 }
 
+// The neighbour that is the least far beyond a facet: of those more than `least` above it, by the distance of the
+// sphere's centre from `centre`, half of which is that of the facet's circle.
+template <size_t kWidth>
+WELLSPACE_INLINE uint32_t LinkColumns::NearestBeyond(const std::array<double, 4>& origin, const Point<3>& normal,
+                                                     const Point<3>& centre, double least) const {
+  using Lanes = typename Wide<kWidth>::Lanes;
+  Lanes nearest = Lanes{} + std::numeric_limits<double>::infinity();
+  Lanes nearest_at = {};
+  Lanes number = {};
+  for (size_t lane = 0; lane < kWidth; ++lane) {
+    number[lane] = static_cast<double>(lane);
+  }
+  for (const Group& group : groups_) {
+    for (size_t from = 0; from < kLanes; from += kWidth) {
+      const auto [x, y, z, lift] = group.template RelativeTo<kWidth>(origin, from);
+      const Lanes height = x * normal[0] + y * normal[1] + z * normal[2];
+      const Lanes far = (lift - (x * centre[0] + y * centre[1] + z * centre[2])) / height;
+      const auto is_nearer = (height > least) & (far < nearest);
+      nearest = is_nearer ? far : nearest;
+      nearest_at = is_nearer ? number : nearest_at;
+      number += static_cast<double>(kWidth);
+    }
+  }
+  size_t best = 0;
+  for (size_t lane = 1; lane < kWidth; ++lane) {
+    best = nearest[lane] < nearest[best] ? lane : best;
+  }
+  return static_cast<uint32_t>(nearest_at[best]);
+}
+
+// A bit for each neighbour for which the function of these cofactors is not surely below `bound`.
+template <size_t kWidth>
+WELLSPACE_INLINE uint64_t LinkColumns::NotSurelyOutside(const std::array<double, 4>& origin,
+                                                        const std::array<double, 4>& cofactors, double bound) const {
+  using Lanes = typename Wide<kWidth>::Lanes;
+  uint64_t in_doubt = 0;
+  size_t at_bit = 0;
+  for (const Group& group : groups_) {
+    for (size_t from = 0; from < kLanes; from += kWidth) {
+      const auto [x, y, z, lift] = group.template RelativeTo<kWidth>(origin, from);
+      const Lanes value = x * cofactors[0] + y * cofactors[1] + z * cofactors[2] + lift * cofactors[3];
+      in_doubt |= uint64_t{Bits<kWidth>(value >= bound)} << at_bit;
+      at_bit += kWidth;
+    }
+  }
+  return in_doubt;
+}
+
 template <size_t kWidth>
 WELLSPACE_INLINE std::optional<LinkColumns::Tetrahedron> LinkColumns::WrapWith(uint32_t a, uint32_t b,
                                                                                uint32_t c) const {
-  using Lanes = typename Wide<kWidth>::Lanes;
   if (count_ > kMostNeighbours) {
     return std::nullopt;
   }
@@ -67,29 +114,7 @@ WELLSPACE_INLINE std::optional<LinkColumns::Tetrahedron> LinkColumns::WrapWith(u
   }
   const double least = kLeastHeight * std::sqrt(normal_sq) * largest_;
 
-  // Which is how far beyond.
-  Lanes nearest = Lanes{} + std::numeric_limits<double>::infinity();
-  Lanes nearest_at = {};
-  Lanes number = {};
-  for (size_t lane = 0; lane < kWidth; ++lane) {
-    number[lane] = static_cast<double>(lane);
-  }
-  for (const Group& group : groups_) {
-    for (size_t from = 0; from < kLanes; from += kWidth) {
-      const auto [x, y, z, lift] = group.template RelativeTo<kWidth>(lifted_origin, from);
-      const Lanes height = x * normal[0] + y * normal[1] + z * normal[2];
-      const Lanes far = (lift - (x * centre[0] + y * centre[1] + z * centre[2])) / height;
-      const auto is_nearer = (height > least) & (far < nearest);
-      nearest = is_nearer ? far : nearest;
-      nearest_at = is_nearer ? number : nearest_at;
-      number += static_cast<double>(kWidth);
-    }
-  }
-  size_t best = 0;
-  for (size_t lane = 1; lane < kWidth; ++lane) {
-    best = nearest[lane] < nearest[best] ? lane : best;
-  }
-  const auto apex = static_cast<uint32_t>(nearest_at[best]);
+  const uint32_t apex = NearestBeyond<kWidth>(lifted_origin, normal, centre, least);
 
   // Whether all others are surely outside. Edges here have two roundings, and lifts one more than LiftedPlane counts
   // with, but no term of a lift is more than half as large as there; so its bound holds.
@@ -106,17 +131,7 @@ WELLSPACE_INLINE std::optional<LinkColumns::Tetrahedron> LinkColumns::WrapWith(u
   if (!(cofactors[3] < -bound)) {
     return std::nullopt;
   }
-  const double value_bound = -bound * largest_ * largest_;
-  uint64_t in_doubt = 0;
-  size_t at_bit = 0;
-  for (const Group& group : groups_) {
-    for (size_t from = 0; from < kLanes; from += kWidth) {
-      const auto [x, y, z, lift] = group.template RelativeTo<kWidth>(lifted_origin, from);
-      const Lanes value = x * cofactors[0] + y * cofactors[1] + z * cofactors[2] + lift * cofactors[3];
-      in_doubt |= uint64_t{Bits<kWidth>(value >= value_bound)} << at_bit;
-      at_bit += kWidth;
-    }
-  }
+  const uint64_t in_doubt = NotSurelyOutside<kWidth>(lifted_origin, cofactors, -bound * largest_ * largest_);
   const uint64_t own = uint64_t{1} << a | uint64_t{1} << b | uint64_t{1} << c | uint64_t{1} << apex;
   if ((in_doubt & ~own) != 0) {
     return std::nullopt;

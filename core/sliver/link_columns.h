@@ -59,6 +59,12 @@ class LinkColumns {
 
   double at(uint32_t neighbour, int column) const { return groups_[neighbour / kLanes].x[column][neighbour % kLanes]; }
   template <size_t kWidth>
+  uint32_t NearestBeyond(const std::array<double, 4>& origin, const Point<3>& normal, const Point<3>& centre,
+                         double least) const;
+  template <size_t kWidth>
+  uint64_t NotSurelyOutside(const std::array<double, 4>& origin, const std::array<double, 4>& cofactors,
+                            double bound) const;
+  template <size_t kWidth>
   std::optional<Tetrahedron> WrapWith(uint32_t a, uint32_t b, uint32_t c) const;
   std::optional<Tetrahedron> WrapAvx2(uint32_t a, uint32_t b, uint32_t c) const;
 

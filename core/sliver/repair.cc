@@ -389,33 +389,37 @@ bool Repairer::MoveVertices(const Sliver& sliver, const Effort& effort) {
   return false;
 }
 
-// Looks for a better place of `v` nearby or, if it is no vertex of the sliver, on the way to the sliver's circumcentre,
-// such that the sliver goes and all that replaces what the move destroys is better than the flattest of that. Returns
-// whether it has moved.
-bool Repairer::Move(VertexId v, const Sliver& sliver, int samples) {
-  const Point<3> from = triangulation_.point(v);
-  const FaceMask faces = triangulation_.faces(v);
-  const Box<3>& box = triangulation_.box();
-  const bool is_own = std::find(sliver.vertices.begin(), sliver.vertices.end(), v) != sliver.vertices.end();
+// How `v` may move to do away with the sliver: nearby or, if it is no vertex of the sliver, on the way to the sliver's
+// circumcentre. None if v has too many simplices.
+std::optional<Repairer::Mover> Repairer::StartOf(VertexId v, const Sliver& sliver) {
   triangulation_.Star(v, star_);
   report_.operations += star_.size();
   if (star_.size() > kMostStar) {
-    return false;
+    return std::nullopt;
   }
-  double old = CosineOf(sliver.simplex);
+  Mover mover;
+  mover.from = triangulation_.point(v);
+  mover.faces = triangulation_.faces(v);
+  mover.flattest = CosineOf(sliver.simplex);
   double edge_sq = std::numeric_limits<double>::infinity();
   for (const SimplexId s : star_) {
-    old = std::max(old, CosineOf(s));
+    mover.flattest = std::max(mover.flattest, CosineOf(s));
     for (const VertexId u : triangulation_.item(s).vertices) {
       if (u != v) {
-        edge_sq = std::min(edge_sq, DistanceSq<3>(from, triangulation_.point(u)));
+        edge_sq = std::min(edge_sq, DistanceSq<3>(mover.from, triangulation_.point(u)));
       }
     }
   }
-  Point<3> way{};
-  if (!is_own) {
-    way = Difference<3>(MeasureSliver(triangulation_.Corners(sliver.simplex)).centre, from);
+  mover.reach = kReach * std::sqrt(edge_sq);
+  mover.is_own = std::find(sliver.vertices.begin(), sliver.vertices.end(), v) != sliver.vertices.end();
+  if (!mover.is_own) {
+    mover.way = Difference<3>(MeasureSliver(triangulation_.Corners(sliver.simplex)).centre, mover.from);
   }
+  return mover;
+}
+
+// Takes `v` out, and measures what fills the hole.
+void Repairer::OpenHole(VertexId v) {
   triangulation_.Remove(v, hole_);
   report_.operations += star_.size() * star_.size();  // each facet of the hole is held to each neighbour
   hole_cosine_.clear();
@@ -424,57 +428,74 @@ bool Repairer::Move(VertexId v, const Sliver& sliver, int samples) {
     const bool is_admissible = IsAdmissible(measure, triangulation_.item(s).vertices, v);
     hole_cosine_.push_back(is_admissible ? measure.cosine : kForbidden);
   }
-  suspects_.clear();
-  // One that is in conflict, if there is one.
-  const auto find_first = [&](const Point<3>& p) {
-    return std::find_if(hole_.begin(), hole_.end(), [&](SimplexId s) { return triangulation_.IsInConflict(s, p); });
-  };
-  // Whether something worse than `best` stays in the filling.
-  const auto leaves_worse = [&](const Point<3>& p, double best) {
-    for (size_t i = 0; i < hole_.size(); ++i) {
-      if (hole_cosine_[i] >= best && !triangulation_.IsInConflict(hole_[i], p)) {
-        return true;
-      }
+}
+
+// A place that is tried for a vertex.
+Point<3> Repairer::PlaceOf(const Mover& mover) {
+  Point<3> p = RandomInBall();
+  const double share = mover.is_own ? 0 : 0.5 * (1 + RandomInBall()[0]);
+  for (int i = 0; i < 3; ++i) {
+    p[i] = mover.from[i] + mover.reach * p[i] + share * mover.way[i];
+  }
+  for (int face = 0; face < 6; ++face) {
+    if (((mover.faces >> face) & 1) != 0) {
+      p[face / 2] = triangulation_.box().FaceCoordinate(face);
     }
+  }
+  return p;
+}
+
+// The simplex of the filling that is in conflict with `p`, if there is one.
+std::vector<SimplexId>::const_iterator Repairer::FirstInHole(const Point<3>& p) const {
+  return std::find_if(hole_.begin(), hole_.end(), [&](SimplexId s) { return triangulation_.IsInConflict(s, p); });
+}
+
+// The largest cosine of what `v` at `p` makes and what is left of the filling then; kForbidden if it is not below
+// `limit`, or the criteria do not allow for it.
+double Repairer::TryInHole(VertexId v, const Point<3>& p, double limit) {
+  for (size_t i = 0; i < hole_.size(); ++i) {
+    if (hole_cosine_[i] >= limit && !triangulation_.IsInConflict(hole_[i], p)) {
+      return kForbidden;
+    }
+  }
+  const auto first = FirstInHole(p);
+  double worst = first == hole_.end() ? kForbidden : TryAt(*first, p, v, limit);
+  for (size_t i = 0; worst != kForbidden && i < hole_.size(); ++i) {
+    worst = triangulation_.IsInCavity(hole_[i]) ? worst : std::max(worst, hole_cosine_[i]);
+  }
+  return worst;
+}
+
+// Looks for a better place of `v`, such that the sliver goes and all that replaces what the move destroys is better
+// than the flattest of that. Returns whether it has moved.
+bool Repairer::Move(VertexId v, const Sliver& sliver, int samples) {
+  const std::optional<Mover> mover = StartOf(v, sliver);
+  if (!mover.has_value()) {
     return false;
-  };
-  const double reach = kReach * std::sqrt(edge_sq);
-  double best = old;
-  Point<3> to = from;
+  }
+  OpenHole(v);
+  suspects_.clear();
+  const Box<3>& box = triangulation_.box();
+  double best = mover->flattest;
+  Point<3> to = mover->from;
   for (int k = 0; k < samples && best > flat_cosine_; ++k) {
     report_.operations += hole_.size();
-    Point<3> p = RandomInBall();
-    const double share = is_own ? 0 : 0.5 * (1 + RandomInBall()[0]);
-    for (int i = 0; i < 3; ++i) {
-      p[i] = from[i] + reach * p[i] + share * way[i];
-    }
-    for (int face = 0; face < 6; ++face) {
-      if (((faces >> face) & 1) != 0) {
-        p[face / 2] = box.FaceCoordinate(face);
-      }
-    }
-    if (!box.Contains(p) || box.FacesOf(p) != faces || (!is_own && !triangulation_.IsInConflict(sliver.simplex, p)) ||
-        leaves_worse(p, best)) {
+    const Point<3> p = PlaceOf(*mover);
+    if (!box.Contains(p) || box.FacesOf(p) != mover->faces ||
+        (!mover->is_own && !triangulation_.IsInConflict(sliver.simplex, p))) {
       continue;
     }
-    const auto first = find_first(p);
-    double worst = first == hole_.end() ? kForbidden : TryAt(*first, p, v, best);
-    if (worst == kForbidden) {
-      continue;
-    }
-    for (size_t i = 0; i < hole_.size(); ++i) {
-      worst = triangulation_.IsInCavity(hole_[i]) ? worst : std::max(worst, hole_cosine_[i]);
-    }
-    if (worst < best && (worst <= flat_cosine_ || IsBetter(worst, old))) {
+    const double worst = TryInHole(v, p, best);
+    if (worst < best && (worst <= flat_cosine_ || IsBetter(worst, mover->flattest))) {
       best = worst;
       to = p;
     }
   }
-  if (best == old) {
+  if (best == mover->flattest) {
     triangulation_.Restore();
     return false;
   }
-  triangulation_.FindCavity(*find_first(to), to, cavity_);
+  triangulation_.FindCavity(*FirstInHole(to), to, cavity_);
   if (!nearest_sq_.empty()) {
     nearest_sq_[Index(v)] = NewNearestSq(to, v).value();  // TryAt has found that there is one
   }

@@ -95,6 +95,16 @@ class Repairer {
     bool may_insert_poor = false;  // where the new vertex has slivers, though better ones
   };
 
+  // A vertex that is to move.
+  struct Mover {
+    Point<3> from{};
+    FaceMask faces = 0;   // that it stays on
+    double reach = 0;     // how far it may go beside its way
+    bool is_own = false;  // a vertex of the sliver
+    Point<3> way{};       // to the circumcentre of the sliver, if it is none
+    double flattest = 0;  // the largest cosine of what the move replaces
+  };
+
   absl::Status RunPasses(int threads, RunContext& context);
   absl::Status FindSlivers(int threads, const RunContext& context);
   bool HasWork() const { return report_.operations < kMostOperations * (report_.slivers + kFreeSlivers); }
@@ -113,6 +123,11 @@ class Repairer {
   Point<3> RandomInBall();
 
   bool MoveVertices(const Sliver& sliver, const Effort& effort);
+  std::optional<Mover> StartOf(VertexId v, const Sliver& sliver);
+  void OpenHole(VertexId v);
+  Point<3> PlaceOf(const Mover& mover);
+  std::vector<SimplexId>::const_iterator FirstInHole(const Point<3>& p) const;
+  double TryInHole(VertexId v, const Point<3>& p, double limit);
   bool Move(VertexId v, const Sliver& sliver, int samples);
   absl::Status Insert(const Sliver& sliver, const Effort& effort);
 

@@ -92,6 +92,12 @@ absl::Status Triangulation<D>::Build(const Box<D>& box, HugeVector<Point<D>> poi
                                                      " simplices is too large to be repaired or pumped; at most ",
                                                      std::numeric_limits<uint32_t>::max() / (D + 1), " are accepted"));
   }
+  WELLSPACE_RETURN_IF_ERROR(TakeSimplices(simplices, context));
+  return MatchFacets(threads, context);
+}
+
+template <int D>
+absl::Status Triangulation<D>::TakeSimplices(std::span<const uint32_t> simplices, const RunContext& context) {
   const size_t count = simplices.size() / (D + 1);
   items_.reserve(count + count / kRoomToGrow);
   items_.assign(count, {});
@@ -110,8 +116,15 @@ absl::Status Triangulation<D>::Build(const Box<D>& box, HugeVector<Point<D>> poi
     }
     items_[s].neighbours.fill(kNoSimplex);
   }
-  // Facets by their lowest vertex: those of one vertex are few, and are matched among themselves. The lowest vertex of
-  // a simplex is that of all its facets but the one opposite to it, which has the second.
+  return absl::OkStatus();
+}
+
+// Finds the neighbours of all simplices. Facets are sorted by their lowest vertex: those of one vertex are few, and are
+// matched among themselves. The lowest vertex of a simplex is that of all its facets but the one opposite to it, which
+// has the second.
+template <int D>
+absl::Status Triangulation<D>::MatchFacets(int threads, const RunContext& context) {
+  const size_t count = items_.size();
   HugeVector<uint32_t> next(points_.size() + 1, 0);  // by vertex
   for (size_t s = 0; s < count; ++s) {
     if (s % kCheckInterval == 0) {

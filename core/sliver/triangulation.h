@@ -181,6 +181,9 @@ class Triangulation {
   void Restore();
 
  private:
+  absl::Status TakeSimplices(std::span<const uint32_t> simplices, const RunContext& context);
+  absl::Status MatchFacets(int threads, const RunContext& context);
+
   // A facet that still lacks the simplex on its inner side: that of `vertices`, by their numbers in link_, with another
   // vertex in `slot`, which is then positively oriented.
   struct Open {

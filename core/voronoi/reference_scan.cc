@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <unordered_set>
 
@@ -102,6 +103,19 @@ Split<D> SplitBySpan(int count, NormalOf normal_of, const Point<D>& normal) {
   return split;
 }
 
+// Which weight is zero first if they move against `along`, or -1; lowers `step` to how far that is.
+template <int D>
+int FirstToVanish(std::span<const double> weights, const std::array<double, D>& along, double& step) {
+  int leaving = -1;
+  for (size_t j = 0; j < weights.size(); ++j) {
+    if (along[j] > 0 && weights[j] < step * along[j]) {
+      step = weights[j] / along[j];
+      leaving = static_cast<int>(j);
+    }
+  }
+  return leaving;
+}
+
 }  // namespace
 
 template <int D>
@@ -146,10 +160,9 @@ double EmptyBallProgram<D>::CertainBound(std::span<const HalfSpace> rows, std::s
   return b > b_error ? (b - b_error) / (Norm<D>(w) + w_error) * (1 - 8 * kUnit) : 0;
 }
 
-// The point c of least norm that lies in `centres`, in the half-spaces of the bisectors, and in `meets`.
+// Sets rows_ to what `centres`, the bisectors and `meets` ask for; returns the squared distance of the farthest centre.
 template <int D>
-typename EmptyBallProgram<D>::Optimum EmptyBallProgram<D>::Solve(const Box<D>& centres, const HalfSpace& meets) const {
-  ++solved_;
+double EmptyBallProgram<D>::SetRows(const Box<D>& centres, const HalfSpace& meets) const {
   rows_.clear();
   double farthest_sq = 0;
   for (int i = 0; i < D; ++i) {
@@ -163,6 +176,30 @@ typename EmptyBallProgram<D>::Optimum EmptyBallProgram<D>::Solve(const Box<D>& c
   }
   rows_.insert(rows_.end(), bisectors_.begin(), bisectors_.end());
   rows_.push_back(meets);
+  return farthest_sq;
+}
+
+// The row that `c` breaks most, or -1.
+template <int D>
+int EmptyBallProgram<D>::MostBroken(std::span<const HalfSpace> rows, const Point<D>& c) {
+  int broken = -1;
+  double most = 0;
+  for (size_t j = 0; j < rows.size(); ++j) {
+    const double along = Dot<D>(rows[j].normal, c);
+    const double excess = rows[j].offset - along - kFeasibility * (std::abs(rows[j].offset) + Norm<D>(c));
+    if (excess > most) {
+      most = excess;
+      broken = static_cast<int>(j);
+    }
+  }
+  return broken;
+}
+
+// The point c of least norm that lies in `centres`, in the half-spaces of the bisectors, and in `meets`.
+template <int D>
+typename EmptyBallProgram<D>::Optimum EmptyBallProgram<D>::Solve(const Box<D>& centres, const HalfSpace& meets) const {
+  ++solved_;
+  const double farthest_sq = SetRows(centres, meets);
   const std::span<const HalfSpace> rows = rows_;
 
   // Invariant: c = sum_j weights[j] normal(active[j]) is the point of least norm on the planes `active`, weights >= 0.
@@ -173,16 +210,7 @@ typename EmptyBallProgram<D>::Optimum EmptyBallProgram<D>::Solve(const Box<D>& c
   Point<D> c{};
   const auto bound = [&](int n) { return CertainBound(rows, std::span(active).first(n), std::span(weights).first(n)); };
   for (int pivot = 0; pivot < kMaxPivots; ++pivot) {
-    int broken = -1;
-    double most = 0;
-    for (size_t j = 0; j < rows.size(); ++j) {
-      const double along = Dot<D>(rows[j].normal, c);
-      const double excess = rows[j].offset - along - kFeasibility * (std::abs(rows[j].offset) + Norm<D>(c));
-      if (excess > most) {
-        most = excess;
-        broken = static_cast<int>(j);
-      }
-    }
+    const int broken = MostBroken(rows, c);
     if (broken < 0) {
       break;
     }
@@ -193,22 +221,14 @@ typename EmptyBallProgram<D>::Optimum EmptyBallProgram<D>::Solve(const Box<D>& c
           count, [&](int j) -> const Point<D>& { return rows[active[j]].normal; }, entering.normal);
       const double outside_sq = NormSq<D>(split.outside);
       // How far the weights can move until one of them is zero, and until the entering constraint is kept.
-      int leaving = -1;
       double step = kInfinity;
-      for (int j = 0; j < count; ++j) {
-        if (split.along[j] > 0 && weights[j] < step * split.along[j]) {
-          step = weights[j] / split.along[j];
-          leaving = j;
-        }
-      }
+      const int leaving = FirstToVanish<D>(std::span(weights).first(count), split.along, step);
       const double gap = entering.offset - Dot<D>(entering.normal, c);
       const bool is_outside = outside_sq > kDependence * kDependence && count < D;
       if (!is_outside && leaving < 0) {
         // The entering constraint contradicts the active ones: b > 0 for weights with w = 0, up to rounding.
         const double so_far = bound(count);
-        for (int j = 0; j < count; ++j) {
-          weights[j] = -split.along[j];
-        }
+        std::transform(split.along.begin(), split.along.begin() + count, weights.begin(), std::negate<>());
         active[count] = broken;
         weights[count] = 1;
         const double beyond = bound(count + 1);
@@ -270,6 +290,25 @@ typename EmptyBallProgram<D>::Optimum EmptyBallProgram<D>::Relax(const Box<D>& c
   return Solve(centres, Normalised(mean, 0.5 * offset));
 }
 
+// The part of a piece beyond `split` along `axis`, on that side, without centres farther away than `above`.
+template <int D>
+typename EmptyBallProgram<D>::Piece EmptyBallProgram<D>::PartOf(const Piece& whole, int axis, double split, bool high,
+                                                                double above, const Box<D>& q) const {
+  Piece piece = {whole.centres, {kInfinity, {}}};
+  (high ? piece.centres.low : piece.centres.high)[axis] = split;
+  bool is_empty = false;
+  for (int k = 0; k < D; ++k) {
+    piece.centres.low[k] = std::max(piece.centres.low[k], -above * (1 + 0x1p-40));
+    piece.centres.high[k] = std::min(piece.centres.high[k], above * (1 + 0x1p-40));
+    is_empty = is_empty || piece.centres.low[k] > piece.centres.high[k];
+  }
+  if (!is_empty) {
+    piece.optimum = Relax(piece.centres, q);
+    piece.optimum.radius = std::max(piece.optimum.radius, whole.optimum.radius);
+  }
+  return piece;
+}
+
 template <int D>
 double EmptyBallProgram<D>::DiameterTo(const Box<D>& q) const {
   if (q.Contains(Point<D>{})) {
@@ -316,19 +355,7 @@ double EmptyBallProgram<D>::DiameterTo(const Box<D>& q) const {
     const double y = least.centres.high[axis];
     const double split = Clamp(c[axis], x + 0.125 * (y - x), y - 0.125 * (y - x));
     for (const bool high : {false, true}) {
-      Piece piece = {least.centres, {kInfinity, {}}};
-      (high ? piece.centres.low : piece.centres.high)[axis] = split;
-      bool is_empty = false;
-      for (int k = 0; k < D; ++k) {
-        piece.centres.low[k] = std::max(piece.centres.low[k], -above * (1 + 0x1p-40));
-        piece.centres.high[k] = std::min(piece.centres.high[k], above * (1 + 0x1p-40));
-        is_empty = is_empty || piece.centres.low[k] > piece.centres.high[k];
-      }
-      if (!is_empty) {
-        piece.optimum = Relax(piece.centres, q);
-        piece.optimum.radius = std::max(piece.optimum.radius, least.optimum.radius);
-      }
-      pieces.push_back(piece);
+      pieces.push_back(PartOf(least, axis, split, high, above, q));
       std::push_heap(pieces.begin(), pieces.end(), later);
     }
   }

@@ -85,10 +85,13 @@ class EmptyBallProgram {
   };
 
   static HalfSpace Normalised(const Point<D>& normal, double offset);
+  double SetRows(const Box<D>& centres, const HalfSpace& meets) const;
+  static int MostBroken(std::span<const HalfSpace> rows, const Point<D>& c);
   Optimum Solve(const Box<D>& centres, const HalfSpace& meets) const;
   static double CertainBound(std::span<const HalfSpace> rows, std::span<const int> active,
                              std::span<const double> weights);
   Optimum Relax(const Box<D>& centres, const Box<D>& q) const;
+  Piece PartOf(const Piece& whole, int axis, double split, bool high, double above, const Box<D>& q) const;
 
   Box<D> centres_;
   std::vector<HalfSpace> bisectors_;
