@@ -22,7 +22,9 @@ SOUND = {
     "server/embedded_server.h": "#include <memory>\n",
     "server/wire/convert.cc": '#include "core/mesher.h"\n#include "wellspace/v1/mesh.pb.h"\n#include <grpcpp/grpcpp.h>\n',
     "client/client.h": '#include "absl/time/time.h"\n',
-    "client/connection.cc": '#include "client/client.h"\n#include "wellspace/v1/meshing.grpc.pb.h"\n',
+    "client/connection.cc": '#include "client/client.h"\n#include "google/rpc/status.pb.h"\n',
+    "client/grpc/calls.cc": '#include "client/client.h"\n#include "wellspace/v1/meshing.grpc.pb.h"\n#include <grpcpp/grpcpp.h>\n',
+    "client/grpc/calls.h": "#include <memory>\n",
     "client/formats/vtu.cc": '#include "client/formats/vtu.h"\n#include "core/base/status_macros.h"\n#include <zlib.h>\n',
     "client/cli/main.cc": '#include "client/formats/vtu.h"\n#include "server/embedded_server.h"\n#include "core/simplex/validate.h"\n',
     "client/formats/vtu.h": "#include <string>\n",
@@ -82,6 +84,17 @@ class CheckIncludesTest(unittest.TestCase):
 
     def test_client_library_includes_core(self):
         self.assert_found("client/connection.cc", '#include "core/mesher.h"', "client may include only client, proto")
+
+    def test_only_the_transport_of_the_client_sees_grpc_and_messages(self):
+        for header in ("grpcpp/grpcpp.h", "grpc/grpc.h", "wellspace/v1/meshing.grpc.pb.h"):
+            self.assert_found("client/client.h", f"#include <{header}>", "client must not see")
+
+    def test_the_transport_is_seen_by_itself_alone(self):
+        for path in ("client/client.h", "client/formats/vtu.cc", "client/cli/main.cc"):
+            self.assert_found(path, '#include "client/grpc/calls.h"', "may include only")
+
+    def test_a_new_folder_of_the_client_wants_a_rule(self):
+        self.assert_found("client/extra/a.h", "#include <memory>", "no rule for this folder")
 
     def test_client_library_includes_server(self):
         self.assert_found("client/connection.cc", '#  include "server/embedded_server.h"', "client may include only")
