@@ -19,12 +19,17 @@ const char kCloudsHelp[] =
 
 const char kMeshesHelp[] =
     "Meshes:  .vtu, .vtkhdf, .msh (Gmsh 4.1; --format msh22: 2.2) and .mesh (MEDIT), 2-D and 3-D; .npz (arrays of\n"
-    "         numpy), .node and .ele (a pair); \"-\" is standard output (vtu)\n";
+    "         numpy), .node and .ele, with .edge or .face, and .poly; \"-\" is standard output (vtu).\n"
+    "         Each has the boundary: the faces xmin, xmax, ymin, ... of the box are tagged 1, 2, 3, ...\n";
 
-void AddMeshOutput(CLI::App& command, std::string& path, std::string& format) {
+void AddMeshOutput(CLI::App& command, std::string& path, std::string& format, bool& no_boundary) {
   command.add_option("-o,--out", path, "File of the mesh, or - for standard output")->required()->type_name("FILE");
   command.add_option("--format", format, "Format of the mesh; default: by the extension of its file")
       ->check(CLI::IsMember(formats::MeshFormats()));
+  command.add_flag(
+      "--no-boundary", no_boundary,
+      "Leave out the boundary (facets of the faces xmin, xmax, ymin, ... with tags 1, 2, 3, ...), regions and "
+      "origins of vertices");
 }
 
 void MeshingOptions::AddTo(CLI::App& command) {

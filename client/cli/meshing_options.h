@@ -25,8 +25,8 @@ extern const char kCloudsHelp[];
 // What a help text says of the files that can be written.
 extern const char kMeshesHelp[];
 
-// -o,--out and --format, of a mesh.
-void AddMeshOutput(CLI::App& command, std::string& path, std::string& format);
+// -o,--out, --format and --no-boundary, of a mesh.
+void AddMeshOutput(CLI::App& command, std::string& path, std::string& format, bool& no_boundary);
 
 // A cloud to be read, the server to use and what it is asked.
 //

@@ -165,6 +165,13 @@ std::string Summary(const client::MeshHeader& mesh) {
       total == statistics.seconds.end() ? "" : absl::StrFormat("; %.2f s", total->second));
 }
 
+std::string BoundaryWarning(const client::MeshHeader& mesh) {
+  return mesh.boundary.empty()
+             ? "warning: the server is too old to tell the boundary of a mesh; the file has none (--no-boundary: no "
+               "warning)\n"
+             : "";
+}
+
 std::string SliverWarning(const client::MeshHeader& mesh) {
   if (!mesh.statistics.slivers.has_value() || mesh.statistics.slivers->left == 0) {
     return "";

@@ -31,6 +31,9 @@ std::string Summary(const client::MeshHeader& mesh);
 // "warning: 2 slivers are left below --min-dihedral (...)", and a line for each of the flattest; empty if none is left.
 std::string SliverWarning(const client::MeshHeader& mesh);
 
+// "warning: …" that the mesh came without its boundary, which was asked for; empty if it has one.
+std::string BoundaryWarning(const client::MeshHeader& mesh);
+
 // One JSON object: dimension, vertices, simplices, memory_bytes, tree_leaves.
 std::string EstimateJson(const client::MeshEstimate& estimate, int dimension);
 

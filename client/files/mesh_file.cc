@@ -1,5 +1,7 @@
 #include "client/files/mesh_file.h"
 
+#include "absl/strings/str_cat.h"
+
 namespace wellspace::client {
 namespace {
 
@@ -13,13 +15,28 @@ uint64_t InputVerticesOf(const MeshStatistics& statistics) {
 
 absl::Status MeshFile::Begin(const MeshHeader& header) {
   header_ = header;
-  const formats::MeshShape shape = {
+  if (header.has_simplex_regions) {
+    return absl::UnimplementedError(
+        absl::StrCat("cannot write ", path_, ": simplices of ", header.regions.size(), " regions, and files hold one"));
+  }
+  formats::MeshShape shape = {
       .dimension = header.dimension,
       .vertex_count = header.vertex_count,
       .simplex_count = header.simplex_count,
       .input_vertices = InputVerticesOf(header.statistics),
       .has_weights = header.has_weights,
+      .has_vertex_marks = header.has_vertex_marks,
+      .boundary = {},
+      .regions = {},
+      .low = header.domain_low,
+      .high = header.domain_high,
   };
+  for (const BoundaryPart& part : header.boundary) {
+    shape.boundary.push_back({part.tag, part.name, part.facet_count});
+  }
+  for (const Region& region : header.regions) {
+    shape.regions.push_back({region.id, region.name});
+  }
   absl::StatusOr<std::unique_ptr<formats::MeshWriter>> writer = formats::CreateMesh(path_, format_, shape, stop_);
   if (!writer.ok()) {
     return writer.status();

@@ -24,6 +24,8 @@ class MeshFile final : public MeshSink {
   MeshFile(std::string path, std::string format = "", std::stop_token stop = {})
       : path_(std::move(path)), format_(std::move(format)), stop_(std::move(stop)) {}
 
+  bool WantsBoundary() const override { return has_boundary_; }
+
   absl::Status Begin(const MeshHeader& header) override;
   absl::Status AddPoints(std::span<const double> points) override { return writer_->AddPoints(points); }
   absl::Status AddMovedVertices(std::span<const uint32_t> vertices) override {
@@ -31,9 +33,17 @@ class MeshFile final : public MeshSink {
     return absl::OkStatus();
   }
   absl::Status AddWeights(std::span<const double> weights) override { return writer_->AddWeights(weights); }
+  absl::Status AddVertexOrigins(std::span<const uint32_t> origins) override {
+    return writer_->AddVertexOrigins(origins);
+  }
+  absl::Status AddVertexTags(std::span<const int32_t> tags) override { return writer_->AddVertexTags(tags); }
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override { return writer_->AddSimplices(simplices); }
   absl::Status AddInputVertices(std::span<const uint32_t> vertices) override;
+  absl::Status AddFacets(std::span<const uint32_t> facets) override { return writer_->AddFacets(facets); }
   absl::Status Finish() override { return writer_->Commit(); }
+
+  // The file gets neither boundary nor regions nor origins of vertices. To be called before Begin.
+  void LeaveOutBoundary() { has_boundary_ = false; }
 
   // No format holds which vertex each input point became: this keeps it in memory. To be called before Begin.
   void KeepInputVertices() { keeps_input_vertices_ = true; }
@@ -49,6 +59,7 @@ class MeshFile final : public MeshSink {
   const std::stop_token stop_;
   MeshHeader header_;
   std::unique_ptr<formats::MeshWriter> writer_;
+  bool has_boundary_ = true;
   bool keeps_input_vertices_ = false;
   std::vector<uint32_t> input_vertex_;
   std::vector<uint32_t> moved_vertices_;

@@ -298,9 +298,12 @@ TEST_F(CommandsTest, MeshAndCheckInThePlane) {
 }
 
 TEST_F(CommandsTest, MeshAndCheckInSpace) {
+  Mesh(kSpace, "bare.node", {"--rho", "2", "--domain", "-1,-1,-1,2,2,2", "--no-boundary"});
+  EXPECT_THAT(folder_.Read("bare.node"), HasSubstr(" 3 0 0\n0 0 0 0\n1 1 0 0.1\n"));
+  EXPECT_THAT(folder_.Read("bare.ele"), HasSubstr(" 4 0\n0 "));
   Mesh(kSpace, "space.node", {"--rho", "2", "--domain", "-1,-1,-1,2,2,2", "--stats", Path("stats.json")});
-  EXPECT_THAT(folder_.Read("space.node"), HasSubstr(" 3 0 0\n0 0 0 0\n1 1 0 0.1\n"));
-  EXPECT_THAT(folder_.Read("space.ele"), HasSubstr(" 4 0\n0 "));
+  EXPECT_THAT(folder_.Read("space.node"), HasSubstr(" 3 0 1\n0 0 0 0 0\n1 1 0 0.1 0\n"));
+  EXPECT_THAT(folder_.Read("space.ele"), HasSubstr(" 4 1\n0 "));
   for (const char* name : {"space.node", "space.ele"}) {
     const RunResult check = RunWellspace({"check", Path(name), "--cloud", Path("cloud.csv"), "--rho", "2.0000001"});
     EXPECT_EQ(check.exit_code, 0) << check.out;
@@ -488,6 +491,50 @@ TEST_F(CommandsTest, CheckFindsPlantedFaults) {
   const RunResult rho = RunWellspace({"check", Path("good.node"), "--rho", "0.6"});
   EXPECT_EQ(rho.exit_code, 1);
   EXPECT_THAT(rho.out, HasSubstr("violation: "));
+}
+
+// Tags of facets in every format that is read back, and none with --no-boundary.
+TEST_F(CommandsTest, MeshesHaveTheirBoundary) {
+  for (const std::string& cloud : {std::string(kPlane), std::string(kSpace)}) {
+    const size_t tags = cloud == kPlane ? 4 : 6;
+    for (const char* name : {"b.vtu", "b.npz", "b.msh", "b.mesh", "b.node"}) {
+      SCOPED_TRACE(name);
+      Mesh(cloud, name);
+      const RunResult check = RunWellspace({"check", Path(name), "--output", "json"});
+      ASSERT_EQ(check.exit_code, 0) << check.out;
+      const nlohmann::json parts = nlohmann::json::parse(check.out)["boundary"];
+      ASSERT_EQ(parts.size(), tags);
+      for (size_t i = 0; i < tags; ++i) {
+        EXPECT_EQ(parts[i]["tag"], i + 1);
+        EXPECT_GT(parts[i]["facets"], 0);
+      }
+      EXPECT_THAT(RunWellspace({"check", Path(name)}).out,
+                  HasSubstr(tags == 4 ? " facets, 4 tags" : " facets, 6 tags"));
+      Mesh(cloud, name, {"--no-boundary"});
+      EXPECT_TRUE(formats::ReadMesh(Path(name))->boundary.empty());
+      EXPECT_EQ(RunWellspace({"check", Path(name)}).exit_code, 0);
+    }
+  }
+}
+
+TEST_F(CommandsTest, CheckFindsWrongBoundaries) {
+  Mesh(kPlane, "good.node");
+  const std::string edges = folder_.Read("good.edge");
+  const auto check = [&](const std::string& from, const std::string& to) {
+    std::string text = edges;
+    const size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos);
+    folder_.Write("good.edge", text.replace(at, from.size(), to));
+    const RunResult result = RunWellspace({"check", Path("good.node")});
+    EXPECT_EQ(result.exit_code, 1);
+    return result.out;
+  };
+  const size_t end = edges.find('\n', edges.find("\n0 ") + 1);
+  const std::string first = edges.substr(edges.find("\n0 ") + 1, end - edges.find("\n0 ") - 1);  // "0 a b 1"
+  ASSERT_EQ(first.back(), '1');
+  EXPECT_THAT(check(first, first.substr(0, first.size() - 1) + "2"), HasSubstr("lies on xmin, but has the tag 2"));
+  EXPECT_THAT(check(first, first.substr(0, first.size() - 1) + "0"),
+              HasSubstr("lies on xmin, but is no boundary facet"));
 }
 
 TEST_F(CommandsTest, CheckHoldsMeshesToTheCriterionAndToSizes) {

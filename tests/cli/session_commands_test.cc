@@ -442,6 +442,9 @@ TEST_F(SessionCommandsTest, DownloadWritesTheMesh) {
   };
   for (const char* name : {"a.vtu", "a.npz", "a.node"}) {
     const RunResult result = Run({"download", "one", "-o", folder_.Path(name)});
+    EXPECT_THAT(result.err, HasSubstr("warning: the server is too old to tell the boundary")) << "this one does not";
+    EXPECT_EQ(Run({"download", "one", "-o", folder_.Path("bare.vtu"), "--no-boundary"}).err.find("warning"),
+              std::string::npos);
     ASSERT_EQ(result.exit_code, 0) << result.err;
     const absl::StatusOr<formats::Mesh> mesh = formats::ReadMesh(folder_.Path(name));
     ASSERT_TRUE(mesh.ok()) << mesh.status();

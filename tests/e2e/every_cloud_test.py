@@ -57,8 +57,10 @@ class EveryCloud(unittest.TestCase):
         stats = json.loads(stats_file.read_text())
         mesh = meshio.read(mesh_file)
         self.assertEqual(mesh.points.shape, (stats["vertices"], 3))
-        self.assertEqual([(block.type, len(block.data)) for block in mesh.cells],
-                         [("triangle" if d == 2 else "tetra", stats["simplices"])])
+        simplices, facets = mesh.cells
+        self.assertEqual((simplices.type, len(simplices.data)), ("triangle" if d == 2 else "tetra", stats["simplices"]))
+        self.assertEqual(facets.type, "line" if d == 2 else "triangle")
+        self.assert_tagged(mesh, d)
         distinct = list(dict.fromkeys(map(tuple, points)))
         self.assertEqual(stats["duplicates"], len(points) - len(distinct))
         numpy.testing.assert_array_equal(mesh.points[:len(distinct), :d], numpy.array(distinct).reshape(-1, d))
@@ -66,6 +68,17 @@ class EveryCloud(unittest.TestCase):
         volumes = numpy.linalg.det((edges[:, 1:] - edges[:, :1])[:, :, :d]) / (2 if d == 2 else 6)
         self.assertGreater(volumes.min(), 0)
         self.assertAlmostEqual(volumes.sum(), 1, places=12)
+
+    def assert_tagged(self, mesh, d):
+        """Each facet lies on the face that its tag stands for, and those of a face are as large as it."""
+        facets, tags = mesh.cells[1].data, mesh.cell_data["boundary"][1]
+        corners = mesh.points[facets][:, :, :d]
+        sizes = numpy.abs(corners[:, 1] - corners[:, 0]).sum(axis=1) if d == 2 else numpy.linalg.norm(
+            numpy.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+        for face in range(2 * d):
+            self.assertTrue((corners[tags == face + 1][:, :, face // 2] == face % 2).all())
+            self.assertAlmostEqual(sizes[tags == face + 1].sum(), 1, places=12)
+        self.assertEqual(set(mesh.cell_data["region"][0]), {1})
 
     def test_generated(self):
         for d, rho, n in ((2, 2**0.5, 900), (2, 1.0, 400), (3, 2.0, 343)):

@@ -24,6 +24,7 @@
 #include "client/formats/read_cloud.h"
 #include "client/formats/read_mesh.h"
 #include "core/simplex/validate.h"
+#include "core/simplex/validate_boundary.h"
 
 namespace wellspace::cli {
 namespace {
@@ -32,8 +33,13 @@ namespace {
 constexpr int kFlat = 5;
 constexpr int kSliver = 12;
 
-Json ReportJson(const core::QualityReport& report, int dimension, bool has_weights) {
+Json ReportJson(const core::QualityReport& report, int dimension, bool has_weights,
+                const std::vector<formats::BoundaryPart>& boundary) {
   Json json;
+  json["boundary"] = Json::array();
+  for (const formats::BoundaryPart& part : boundary) {
+    json["boundary"].push_back({{"tag", part.tag}, {"name", part.name}, {"facets", part.facets}});
+  }
   json["dimension"] = dimension;
   json["vertices"] = report.vertices;
   json["simplices"] = report.simplices;
@@ -135,6 +141,8 @@ struct CheckCommand {
   OutputFormat format = OutputFormat::kText;
 
   absl::StatusOr<std::vector<core::SizeBox>> SizeBoxes(int dimension) const;
+  absl::Status Validate(const formats::Mesh& mesh, const core::MeshView& view, const std::vector<core::SizeBox>& boxes,
+                        const std::vector<double>& cloud) const;
   int Run() const;
 };
 
@@ -148,6 +156,30 @@ absl::StatusOr<std::vector<core::SizeBox>> CheckCommand::SizeBoxes(int dimension
     boxes.push_back({std::move(box.low), std::move(box.high), box.max_circumradius});
   }
   return boxes;
+}
+
+absl::Status CheckCommand::Validate(const formats::Mesh& mesh, const core::MeshView& view,
+                                    const std::vector<core::SizeBox>& boxes, const std::vector<double>& cloud) const {
+  const bool is_well_spaced = criterion == client::Criterion::kWellSpaced;
+  const absl::Status status = core::ValidateMesh(
+      view, {.rho = rho,
+             .criterion = is_well_spaced ? core::Criterion::kWellSpaced : core::Criterion::kRadiusEdge,
+             .max_circumradius = max_circumradius,
+             .size_boxes = boxes,
+             .cloud = cloud,
+             .merge_distance = merge_distance,
+             .min_angle_deg = min_dihedral});
+  if (!status.ok() || mesh.boundary.empty()) {
+    return status;
+  }
+  core::BoundaryView boundary{.facets = mesh.facets, .tags = {}};
+  std::vector<int32_t> tags;
+  for (const formats::BoundaryPart& part : mesh.boundary) {
+    tags.insert(tags.end(), part.facets, part.tag);
+    boundary.names.emplace(part.tag, part.name);
+  }
+  boundary.tags = tags;
+  return core::ValidateBoundary(view, boundary);
 }
 
 int CheckCommand::Run() const {
@@ -199,7 +231,7 @@ int CheckCommand::Run() const {
   if (status.ok()) {
     const core::QualityReport report = core::MeasureQuality(view);
     if (format == OutputFormat::kJson) {
-      json = ReportJson(report, mesh->dimension, !mesh->weights.empty());
+      json = ReportJson(report, mesh->dimension, !mesh->weights.empty(), mesh->boundary);
     } else {
       PrintReport(report, mesh->dimension);
     }
@@ -208,15 +240,7 @@ int CheckCommand::Run() const {
         return ReportError(plotted, format);
       }
     }
-    const bool is_well_spaced = criterion == client::Criterion::kWellSpaced;
-    status = core::ValidateMesh(
-        view, {.rho = rho,
-               .criterion = is_well_spaced ? core::Criterion::kWellSpaced : core::Criterion::kRadiusEdge,
-               .max_circumradius = max_circumradius,
-               .size_boxes = *boxes,
-               .cloud = cloud,
-               .merge_distance = merge_distance,
-               .min_angle_deg = min_dihedral});
+    status = Validate(*mesh, view, *boxes, cloud);
   }
   if (absl::IsInvalidArgument(status)) {  // what was asked for cannot be
     return ReportError(status, format);
@@ -232,6 +256,10 @@ int CheckCommand::Run() const {
     std::cout << "violation: " << std::string(status.message()) << "\n";
     return kExitFailed;
   }
+  if (!mesh->boundary.empty()) {
+    std::cout << "boundary: " << WithThousands(mesh->View().Shape().facet_count()) << " facets, "
+              << mesh->boundary.size() << " tags\n";
+  }
   if (!mesh->weights.empty()) {
     std::cout << "the regular triangulation of its weights\n";
   }
@@ -243,11 +271,11 @@ int CheckCommand::Run() const {
 
 void AddCheckCommand(CLI::App& app, int& exit_code) {
   const auto command = std::make_shared<CheckCommand>();
-  CLI::App* check = app.add_subcommand(
-      "check",
-      "Check a mesh: indices, orientation, topology, exact total volume, the Delaunay "
-      "property or, with weights, that of their regular triangulation, "
-      "circumcentres, and what the options ask for; print its figures and `valid` or the first violation");
+  CLI::App* check = app.add_subcommand("check",
+                                       "Check a mesh: indices, orientation, topology, exact total volume, the Delaunay "
+                                       "property or, with weights, that of their regular triangulation, "
+                                       "circumcentres, that tagged facets are the boundary, and what the options ask "
+                                       "for; print its figures and `valid` or the first violation");
   check->footer(kExitCodesHelp);
   AddMeshInput(*check, command->mesh_path);
   check->add_option("--cloud", command->cloud_path, "File of points that must be the first vertices, to the bit")

@@ -26,6 +26,7 @@ constexpr char kMeshExamples[] =
 struct MeshCommand {
   std::string output;
   std::string format;
+  bool no_boundary = false;
   MeshingOptions options;
 
   absl::Status CheckOptions() const;
@@ -59,6 +60,9 @@ absl::Status MeshCommand::Mesh(client::Client& client, const client::MeshOptions
   }
   client::MeshFile file(output, format, call.stop);
   file.KeepInputVertices();
+  if (no_boundary) {
+    file.LeaveOutBoundary();
+  }
   {
     ProgressBar bar(!options.remote().quiet());
     const absl::Status status = client.MeshPoints(
@@ -75,7 +79,8 @@ absl::Status MeshCommand::Mesh(client::Client& client, const client::MeshOptions
   }
   // A demand that is not met is told of without --quiet or with it; in JSON the statistics have it.
   if (!options.remote().json()) {
-    std::cerr << SliverWarning(file.header());
+    std::cerr << SliverWarning(file.header())
+              << (no_boundary || options.remote().quiet() ? "" : BoundaryWarning(file.header()));
   }
   return absl::OkStatus();
 }
@@ -96,7 +101,7 @@ void AddMeshCommand(CLI::App& app, int& exit_code) {
   CLI::App* mesh = app.add_subcommand("mesh", "Mesh a point cloud");
   mesh->footer(absl::StrCat(kCloudsHelp, kMeshesHelp, kMeshExamples, "\n", kExitCodesHelp));
   command->options.AddTo(*mesh);
-  AddMeshOutput(*mesh, command->output, command->format);
+  AddMeshOutput(*mesh, command->output, command->format, command->no_boundary);
   mesh->callback([command, &exit_code] { exit_code = command->Run(); });
 }
 

@@ -79,6 +79,7 @@ struct DownloadCommand {
   std::string session;
   std::string path;
   std::string format;
+  bool no_boundary = false;
   uint64_t revision = 0;
 
   absl::Status Check() const;
@@ -106,6 +107,9 @@ absl::Status DownloadCommand::Download(client::Client& client, const client::Cal
   if (remote.json()) {
     file.KeepInputVertices();
   }
+  if (no_boundary) {
+    file.LeaveOutBoundary();
+  }
   {
     ProgressBar bar(!remote.quiet() && !remote.json());
     const absl::Status status = client.DownloadMesh(
@@ -125,7 +129,7 @@ absl::Status DownloadCommand::Download(client::Client& client, const client::Cal
     std::cerr << Summary(file.header()) << (path == formats::kStandardStream ? "" : " -> " + path) << "\n";
   }
   if (!remote.json()) {
-    std::cerr << SliverWarning(file.header());
+    std::cerr << SliverWarning(file.header()) << (no_boundary || remote.quiet() ? "" : BoundaryWarning(file.header()));
   }
   return absl::OkStatus();
 }
@@ -155,7 +159,7 @@ void AddDownload(CLI::App& app, int& exit_code) {
   CLI::App* download = app.add_subcommand("download", "Write the mesh of a session to a file, while it arrives");
   download->footer(absl::StrCat(kMeshesHelp, "\n", kExitCodesHelp));
   AddSession(*download, command->session);
-  AddMeshOutput(*download, command->path, command->format);
+  AddMeshOutput(*download, command->path, command->format, command->no_boundary);
   AddCount(
       *download, "--revision", [command](uint64_t revision) { command->revision = revision; },
       "Fail unless the mesh is of this revision; default: the last", 1);
