@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that Wellspace needs. The one place with package lists.
 #
-#   deploy/install-deps.sh [GROUP…]        groups: build test interoperability lint tidy fuzz node bench container monitoring runtime dev; default: build test
+#   deploy/install-deps.sh [GROUP…]        groups: build test interoperability solvers lint tidy fuzz node bench container monitoring runtime dev; default: build test
 #
 # As root, or through sudo. Installs only what is missing; does not touch the network when nothing is.
 set -euo pipefail
@@ -12,7 +12,8 @@ declare -A packages=(
            libabsl-dev libc-ares-dev libspdlog-dev libboost-dev libtbb-dev libcli11-dev nlohmann-json3-dev
            prometheus-cpp-dev libcairo2-dev zlib1g-dev libminizip-dev libhdf5-dev python3"
   [test]="libgtest-dev libgmock-dev libcgal-dev python3 python3-grpcio python3-meshio python3-numpy openssl"
-  [interoperability]="gmsh freefem++ python3-vtk9 python3-numpy"
+  [interoperability]="gmsh freefem++ python3-gmsh python3-meshio python3-vtk9 python3-numpy"
+  [solvers]="openfoam python3-dolfinx"
   [lint]="git clang-format-14 python3"
   [tidy]="clang-tidy-14"
   [fuzz]="clang-14 libclang-rt-14-dev"

@@ -168,6 +168,63 @@ class PythonClient(unittest.TestCase):
         self.assertEqual(info.reason, "ERROR_REASON_MESH_TOO_LARGE")
         self.remote.delete(name)
 
+    def assert_tiled(self, metadata, mesh):
+        """The boundary of the unit box: of each face its facets, which cover it, and which have the mesh behind them."""
+        d = metadata.dimension
+        names = ["xmin", "xmax", "ymin", "ymax", "zmin", "zmax"][:2 * d]
+        self.assertEqual([(part.tag, part.name) for part in metadata.boundary], list(enumerate(names, 1)))
+        self.assertEqual([(region.id, region.name) for region in metadata.regions], [(1, "domain")])
+        for face, part in enumerate(metadata.boundary):
+            corners = mesh.points[mesh.facets[mesh.facet_tags == part.tag]]
+            self.assertTrue((corners[:, :, face // 2] == face % 2).all())
+            if d == 2:
+                edges = corners[:, 1] - corners[:, 0]
+                normals = numpy.stack([edges[:, 1], -edges[:, 0]], axis=1)
+            else:
+                normals = numpy.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+            outward = normals[:, face // 2] * (1 if face % 2 else -1)
+            self.assertGreater(outward.min(), 0)
+            self.assertAlmostEqual(outward.sum(), 1, places=12)
+        on_boundary = numpy.zeros(len(mesh.points), bool)
+        on_boundary[mesh.facets.ravel()] = True
+        numpy.testing.assert_array_equal(mesh.vertex_tags != 0, on_boundary)
+        inputs = numpy.flatnonzero(mesh.vertex_origins < 0xfffffffd)
+        numpy.testing.assert_array_equal(mesh.input_vertices[mesh.vertex_origins[inputs]], inputs)
+
+    def test_the_boundary_comes_to_those_that_ask(self):
+        for d in (2, 3):
+            with self.subTest(dimension=d):
+                points = uniform(400, d, seed=4)
+                session = self.remote.create(unit_box(d)).name
+                self.remote.upload(session, points)
+                self.remote.refine(session)
+                plain_metadata, plain = self.remote.download(session)
+                self.assertEqual((plain_metadata.facet_count, len(plain_metadata.boundary)), (0, 0))
+                metadata, chunks = self.remote.download(session, with_boundary=True)
+                mesh = Mesh(metadata, chunks)
+                self.assert_tiled(metadata, mesh)
+                numpy.testing.assert_array_equal(mesh.simplices, Mesh(plain_metadata, plain).simplices)
+                for first in range(len(chunks) + 1):
+                    _, rest = self.remote.download(session, with_boundary=True, next_chunk=first)
+                    self.assertEqual(content(rest), content(chunks[first:]))
+                with Fails(self, grpc.StatusCode.OUT_OF_RANGE, "CHUNK_OUT_OF_RANGE"):
+                    self.remote.download(session, next_chunk=len(plain) + 1)
+
+                # After an edit that splits facets, too.
+                more = numpy.full((2, d), 0.4)
+                more[0, 0] = 1
+                request = api().AddVerticesRequest(name=session, points=more.ravel())
+                added = self.remote.queries.AddVertices(request, timeout=PATIENCE).vertices
+                self.remote.refine(session)
+                metadata, chunks = self.remote.download(session, with_boundary=True)
+                mesh = Mesh(metadata, chunks)
+                self.assert_tiled(metadata, mesh)
+                self.assertEqual(list(mesh.vertex_tags[added]), [2, 0])
+                self.remote.delete(session)
+
+                metadata, chunks = self.remote.mesh(unit_box(d), points, with_boundary=True)
+                self.assert_tiled(metadata, Mesh(metadata, chunks))
+
     def test_all_in_one_call(self):
         points = uniform(300, 2, seed=3)
         metadata, chunks = self.remote.mesh(unit_box(2), points)

@@ -27,16 +27,17 @@ def place_of(phase):
     return len(api().Phase.values()) if phase == api().PHASE_DONE else phase
 
 
-def cloud(request, parameters, points, rows=50_000):
-    """The requests of MeshPoints or EstimateMesh, which are of type `request`."""
-    yield request(parameters=parameters)
+def cloud(request, parameters, points, rows=50_000, **others):
+    """The requests of MeshPoints or EstimateMesh, which are of type `request`; `others` is what the first has, too."""
+    yield request(parameters=parameters, **others)
     for first in range(0, len(points), rows):
         yield request(points=api().PointChunk(coordinates=points[first:first + rows].ravel()))
 
 
 def array_of(chunk):
     """Which array a chunk is of, and its values as they are on the wire."""
-    for name, kind in (("points", "<f8"), ("weights", "<f8"), ("simplices", "<u4"), ("input_vertices", "<u4")):
+    for name, kind in (("points", "<f8"), ("weights", "<f8"), ("simplices", "<u4"), ("input_vertices", "<u4"),
+                       ("vertex_origins", "<u4"), ("vertex_tags", "<i4"), ("facets", "<u4")):
         values = getattr(chunk, name)
         if values:
             return name, numpy.array(values, kind)
@@ -48,7 +49,8 @@ class Mesh:
 
     def __init__(self, metadata, chunks):
         assert [chunk.index for chunk in chunks] == list(range(metadata.chunk_count))
-        parts = {"points": [], "weights": [], "simplices": [], "input_vertices": []}
+        parts = {"points": [], "weights": [], "simplices": [], "input_vertices": [], "vertex_origins": [],
+                 "vertex_tags": [], "facets": []}
         for chunk in chunks:
             name, values = array_of(chunk)
             assert crc32c(values.tobytes()) == chunk.crc32c, chunk.index
@@ -58,6 +60,11 @@ class Mesh:
         self.weights = numpy.concatenate([numpy.zeros(0), *parts["weights"]])
         self.simplices = numpy.concatenate(parts["simplices"]).reshape(metadata.simplex_count, d + 1)
         self.input_vertices = numpy.concatenate([numpy.zeros(0, "<u4"), *parts["input_vertices"]])
+        self.vertex_origins = numpy.concatenate([numpy.zeros(0, "<u4"), *parts["vertex_origins"]])
+        self.vertex_tags = numpy.concatenate([numpy.zeros(0, "<i4"), *parts["vertex_tags"]])
+        self.facets = numpy.concatenate([numpy.zeros(0, "<u4"), *parts["facets"]]).reshape(metadata.facet_count, d)
+        self.facet_tags = numpy.repeat(numpy.array([part.tag for part in metadata.boundary], "<i4"),
+                                       [part.facet_count for part in metadata.boundary])
 
     def volume(self):
         """Of all simplices; each must be positively oriented."""
@@ -136,9 +143,10 @@ class Remote:
         first, *rest = self.sessions.DownloadMesh(request, timeout=PATIENCE)
         return first.metadata, [response.chunk for response in rest]
 
-    def mesh(self, parameters, points):
+    def mesh(self, parameters, points, **others):
         """All in one call: metadata and chunks."""
-        responses = self.meshing.MeshPoints(cloud(api().MeshPointsRequest, parameters, points), timeout=PATIENCE)
+        requests = cloud(api().MeshPointsRequest, parameters, points, **others)
+        responses = self.meshing.MeshPoints(requests, timeout=PATIENCE)
         found = {"progress": [], "metadata": [], "chunk": []}
         for response in responses:
             kind = response.WhichOneof("response")

@@ -1,0 +1,159 @@
+"""Solvers and other programs use the boundary that meshes have: FreeFEM, Gmsh, dolfinx, OpenFOAM, meshio.
+
+Wants freefem++, gmsh, python3-gmsh, python3-meshio, python3-dolfinx and openfoam, as deploy/install-deps.sh installs
+them for interoperability and solvers; what is not installed is skipped.
+"""
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy
+
+from wellspaced import BIN, ROOT
+
+# The clouds; what of them the maximum of u is, −Δu = 1 with u = 0 on the boundary of the box.
+CLOUDS = {2: ("coast-110m.csv", 12365), 3: ("spot.csv", 0.252)}
+NAMES = ["xmin", "xmax", "ymin", "ymax", "zmin", "zmax"]
+
+
+def has_module(name):
+    return subprocess.run([sys.executable, "-c", f"import {name}"], capture_output=True, timeout=120).returncode == 0
+
+
+class Solvers(unittest.TestCase):
+    """Meshes of both clouds, in every format."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.folder = pathlib.Path(cls.temporary.name)
+        cls.counts = {}
+        for dimension, (cloud, _) in CLOUDS.items():
+            for name, format in ((".mesh", "medit"), (".msh", "msh41"), ("-22.msh", "msh22"), (".npz", "npz")):
+                cls.wellspace("mesh", ROOT / "examples" / cloud, "--dimension", dimension, "-o", f"{dimension}{name}",
+                              "--format", format, "--quiet")
+            with numpy.load(cls.folder / f"{dimension}.npz") as mesh:
+                cls.counts[dimension] = numpy.bincount(mesh["facet_tags"], minlength=2 * dimension + 1)[1:]
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.temporary.cleanup()
+
+    @classmethod
+    def wellspace(cls, *arguments):
+        subprocess.run([BIN / "wellspace", *map(str, arguments)], cwd=cls.folder, check=True, timeout=120)
+
+    def run_program(self, *command, **environment):
+        result = subprocess.run(list(map(str, command)), cwd=self.folder, text=True, timeout=240, stdout=subprocess.PIPE,
+                                stderr=subprocess.STDOUT, env=os.environ | environment)
+        self.assertEqual(result.returncode, 0, result.stdout)
+        return result.stdout
+
+    @unittest.skipUnless(shutil.which("FreeFem++"), "freefem++ is not installed")
+    def test_freefem_solves_with_conditions_on_labels(self):
+        scripts = {2: 'mesh Th = readmesh("2.mesh");\nfespace Vh(Th, P1);\nVh u, v;\n'
+                      'solve Poisson(u, v) = int2d(Th)(dx(u)*dx(v) + dy(u)*dy(v)) - int2d(Th)(v)'
+                      ' + on(1, 2, 3, 4, u = 0);\n'
+                      'real area = int1d(Th, 2)(1.), outward = int1d(Th, 2)(N.x);\n',
+                   3: 'mesh3 Th = readmesh3("3.mesh");\nfespace Vh(Th, P1);\nVh u, v;\n'
+                      'solve Poisson(u, v) = int3d(Th)(dx(u)*dx(v) + dy(u)*dy(v) + dz(u)*dz(v)) - int3d(Th)(v)'
+                      ' + on(1, 2, 3, 4, 5, 6, u = 0);\n'
+                      'real area = int2d(Th, 2)(1.), outward = int2d(Th, 2)(N.x);\n'}
+        for dimension, (_, expected) in CLOUDS.items():
+            with self.subTest(dimension=dimension):
+                (self.folder / "poisson.edp").write_text(
+                    scripts[dimension] +
+                    'cout << "figures " << u[].max << " " << Th.nbe << " " << area << " " << outward << endl;\n'
+                    'int[int] found = labels(Th);\ncout << "labels " << found.n << endl;\n')
+                text = self.run_program("FreeFem++", "-nw", "-ne", "poisson.edp")
+                figures = re.search(r"^figures (\S+) (\d+) (\S+) (\S+)$", text, re.MULTILINE)
+                self.assertIsNotNone(figures, text)
+                self.assertAlmostEqual(float(figures[1]), expected, delta=0.01 * expected)
+                self.assertEqual(int(figures[2]), self.counts[dimension].sum())
+                self.assertAlmostEqual(float(figures[4]) / float(figures[3]), 1, places=9, msg="the normal of xmax is that of x")
+                self.assertRegex(text, rf"(?m)^labels {2 * dimension}$")
+
+    @unittest.skipUnless(shutil.which("gmsh") and has_module("gmsh"), "gmsh or python3-gmsh is not installed")
+    def test_gmsh_lists_named_groups(self):
+        script = """
+import sys, gmsh
+gmsh.initialize()
+gmsh.option.setNumber("General.Terminal", 0)
+gmsh.open(sys.argv[1])
+for dimension, tag in gmsh.model.getPhysicalGroups():
+    count = 0
+    for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, tag):
+        count += sum(map(len, gmsh.model.mesh.getElements(dimension, entity)[1]))
+    print("group", dimension, tag, gmsh.model.getPhysicalName(dimension, tag), count)
+gmsh.finalize()
+"""
+        for dimension in CLOUDS:
+            for name in (f"{dimension}.msh", f"{dimension}-22.msh"):
+                with self.subTest(name=name):
+                    text = self.run_program(sys.executable, "-c", script, name)
+                    groups = re.findall(r"^group (\d) (\d+) (\w+) (\d+)$", text, re.MULTILINE)
+                    boundary = [group for group in groups if int(group[0]) == dimension - 1]
+                    self.assertEqual([(int(tag), part, int(count)) for _, tag, part, count in boundary],
+                                     list(zip(range(1, 2 * dimension + 1), NAMES, self.counts[dimension])))
+                    regions = [group for group in groups if int(group[0]) == dimension]
+                    self.assertEqual([part for _, _, part, _ in regions], ["domain"])
+                    self.assertNotRegex(self.run_program("gmsh", "-check", name), "Error|Warning")
+
+    @unittest.skipUnless(has_module("meshio"), "python3-meshio is not installed")
+    def test_meshio_makes_markers_of_su2(self):
+        import meshio
+        # The writer of Debian's 7.0.0 unpacks blocks of cells, which have ceased to be tuples.
+        if not hasattr(meshio.CellBlock, "__iter__"):
+            meshio.CellBlock.__iter__ = lambda block: iter((block.type, block.data))
+        for dimension in CLOUDS:
+            with self.subTest(dimension=dimension):
+                mesh = meshio.read(self.folder / f"{dimension}-22.msh")
+                mesh.points = mesh.points[:, :dimension]  # as its command with --prune-z-0
+                mesh.write(self.folder / "mesh.su2")
+                text = (self.folder / "mesh.su2").read_text()
+                self.assertEqual(re.findall(r"(?m)^NMARK= ?(\d+)$", text), [str(2 * dimension)])
+                counts = [int(count) for count in re.findall(r"(?m)^MARKER_ELEMS= ?(\d+)$", text)]
+                self.assertEqual(sorted(counts), sorted(self.counts[dimension]))
+
+    @unittest.skipUnless(has_module("dolfinx.io.gmshio") and has_module("gmsh"), "python3-dolfinx is not installed")
+    def test_dolfinx_gets_facet_tags(self):
+        script = """
+import sys, gmsh, numpy
+from mpi4py import MPI
+from dolfinx.io import gmshio
+gmsh.initialize()
+gmsh.option.setNumber("General.Terminal", 0)
+gmsh.open(sys.argv[1])
+mesh, cells, facets = gmshio.model_to_mesh(gmsh.model, MPI.COMM_WORLD, 0, gdim=int(sys.argv[2]))
+gmsh.finalize()
+print("tags", *numpy.bincount(facets.values)[1:])
+print("cells", len(cells.values), len(set(cells.values)))
+"""
+        for dimension in CLOUDS:
+            with self.subTest(dimension=dimension):
+                text = self.run_program(sys.executable, "-c", script, f"{dimension}.msh", dimension)
+                self.assertIn("tags " + " ".join(map(str, self.counts[dimension])), text)
+                self.assertRegex(text, r"(?m)^cells \d+ 1$")
+
+    @unittest.skipUnless(shutil.which("gmshToFoam"), "openfoam is not installed")
+    def test_openfoam_finds_six_patches(self):
+        system = self.folder / "system"
+        system.mkdir(exist_ok=True)
+        header = "FoamFile {{ version 2.0; format ascii; class dictionary; object {}; }}\n"
+        (system / "controlDict").write_text(header.format("controlDict") + "application none; startFrom startTime; startTime 0;\n"
+                                            "stopAt endTime; endTime 1; deltaT 1; writeControl timeStep; writeInterval 1;\n")
+        (system / "fvSchemes").write_text(header.format("fvSchemes"))
+        (system / "fvSolution").write_text(header.format("fvSolution"))
+        self.run_program("gmshToFoam", "3-22.msh", WM_PROJECT_DIR="/usr/share/openfoam")
+        boundary = (self.folder / "constant/polyMesh/boundary").read_text()
+        patches = dict(re.findall(r"(?m)^    (\w+)\s*\{[^}]*?nFaces\s+(\d+);", boundary))
+        self.assertEqual({name: int(count) for name, count in patches.items()}, dict(zip(NAMES, self.counts[3])))
+
+
+if __name__ == "__main__":
+    unittest.main()
