@@ -160,9 +160,7 @@ absl::Status ReadNode(LineReader& reader, const CloudOptions& options, PointClou
   if (absl::Status status = ReadNodePoints(reader, header, options.skip_invalid, cloud, extras); !status.ok()) {
     return status;
   }
-  numbers = {.index_base = extras.index_base,
-             .weights = std::move(extras.weights),
-             .has_markers = header.markers > 0};
+  numbers = {.index_base = extras.index_base, .weights = std::move(extras.weights), .has_markers = header.markers > 0};
   return ExpectEnd(reader, header.count, "points");
 }
 

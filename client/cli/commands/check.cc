@@ -1,9 +1,12 @@
 // wellspace check: is it a mesh, and how good is it?
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -19,12 +22,14 @@
 #include "client/cli/remote_command.h"
 #include "client/cli/render/histograms.h"
 #include "client/cli/render/picture_format.h"
+#include "client/formats/domain/read_planar_domain.h"
 #include "client/formats/file_plan.h"
 #include "client/formats/line_reader.h"
 #include "client/formats/read_cloud.h"
 #include "client/formats/read_mesh.h"
 #include "core/simplex/validate.h"
 #include "core/simplex/validate_boundary.h"
+#include "core/simplex/validate_domain.h"
 
 namespace wellspace::cli {
 namespace {
@@ -127,6 +132,9 @@ absl::Status Plot(const core::QualityReport& report, int dimension, const std::s
   return render::WriteHistograms(histograms, caption, format, path);
 }
 
+// Splitting bends a segment by so much of the largest coordinate at most: a rounded crossing, a point that was near.
+constexpr double kBentBy = 0x1p-40;
+
 struct CheckCommand {
   std::string mesh_path;
   std::string cloud_path;
@@ -142,7 +150,7 @@ struct CheckCommand {
 
   absl::StatusOr<std::vector<core::SizeBox>> SizeBoxes(int dimension) const;
   absl::Status Validate(const formats::Mesh& mesh, const core::MeshView& view, const std::vector<core::SizeBox>& boxes,
-                        const std::vector<double>& cloud) const;
+                        const std::vector<double>& cloud, const std::optional<formats::PlanarDomain>& domain) const;
   int Run() const;
 };
 
@@ -158,8 +166,47 @@ absl::StatusOr<std::vector<core::SizeBox>> CheckCommand::SizeBoxes(int dimension
   return boxes;
 }
 
+// Whether the parts of a boundary are more than the faces of a box: then it is a domain with segments.
+bool HasSegments(const formats::Mesh& mesh) {
+  constexpr std::array<std::string_view, 6> kFaces = {"xmin", "xmax", "ymin", "ymax", "zmin", "zmax"};
+  return mesh.dimension == 2 &&
+         std::any_of(mesh.boundary.begin(), mesh.boundary.end(), [&](const formats::BoundaryPart& part) {
+           return std::find(kFaces.begin(), kFaces.end(), part.name) == kFaces.end();
+         });
+}
+
+// What a domain has to be, and be conforming to the one that is given, if one is.
+absl::Status ValidateDomain(const formats::Mesh& mesh, const core::MeshView& view, double rho,
+                            const formats::PlanarDomain* domain) {
+  if (const absl::Status status = core::ValidateDomainMesh(view, mesh.facets, rho).status();
+      !status.ok() || domain == nullptr) {
+    return status;
+  }
+  std::vector<double> holes;
+  for (const formats::PlanarDomain::Seed& seed : domain->seeds) {
+    if (seed.is_hole) {
+      holes.insert(holes.end(), {seed.x, seed.y});
+    }
+  }
+  double size = 0;
+  for (const double x : domain->points) {
+    size = std::max(size, std::abs(x));
+  }
+  return core::ValidateConformity(view, mesh.facets,
+                                  {.points = domain->points,
+                                   .segments = domain->segments,
+                                   .is_open = domain->is_line,
+                                   .holes = holes,
+                                   .is_even_odd = domain->faces == formats::PlanarDomain::FaceRule::kEvenOdd},
+                                  kBentBy * size);
+}
+
 absl::Status CheckCommand::Validate(const formats::Mesh& mesh, const core::MeshView& view,
-                                    const std::vector<core::SizeBox>& boxes, const std::vector<double>& cloud) const {
+                                    const std::vector<core::SizeBox>& boxes, const std::vector<double>& cloud,
+                                    const std::optional<formats::PlanarDomain>& domain) const {
+  if (HasSegments(mesh) || domain.has_value()) {
+    return ValidateDomain(mesh, view, rho, domain.has_value() ? &*domain : nullptr);
+  }
   const bool is_well_spaced = criterion == client::Criterion::kWellSpaced;
   const absl::Status status = core::ValidateMesh(
       view, {.rho = rho,
@@ -213,7 +260,14 @@ int CheckCommand::Run() const {
   }
   std::vector<double> cloud;
   CloudReport cloud_report;
-  if (!cloud_path.empty()) {
+  std::optional<formats::PlanarDomain> domain;
+  if (formats::IsDomainPath(cloud_path)) {
+    absl::StatusOr<formats::PlanarDomain> read = formats::ReadPlanarDomain(cloud_path);
+    if (!read.ok()) {
+      return ReportError(read.status(), format);
+    }
+    domain = *std::move(read);
+  } else if (!cloud_path.empty()) {
     formats::CloudOptions options = cloud_options;
     options.dimension = mesh->dimension;
     absl::StatusOr<formats::PointCloud> read = formats::ReadCloud(cloud_path, options);
@@ -240,7 +294,7 @@ int CheckCommand::Run() const {
         return ReportError(plotted, format);
       }
     }
-    status = Validate(*mesh, view, *boxes, cloud);
+    status = Validate(*mesh, view, *boxes, cloud, domain);
   }
   if (absl::IsInvalidArgument(status)) {  // what was asked for cannot be
     return ReportError(status, format);
@@ -278,7 +332,10 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
                                        "for; print its figures and `valid` or the first violation");
   check->footer(kExitCodesHelp);
   AddMeshInput(*check, command->mesh_path);
-  check->add_option("--cloud", command->cloud_path, "File of points that must be the first vertices, to the bit")
+  check
+      ->add_option("--cloud", command->cloud_path,
+                   "File of points that must be the first vertices, to the bit; or a .poly or .geojson that the mesh "
+                   "must conform to")
       ->type_name("FILE");
   AddNumber(*check, "--merge", command->merge_distance,
             "Points of --cloud no farther than this from a vertex that is one of them need not be vertices")
