@@ -263,7 +263,7 @@ class StandardInput {
 };
 
 TEST_F(ReadPolyTest, StandardInputIsToldItsFormatAndHasNoFileBeside) {
-  EXPECT_THAT(ReadPlanarDomain("-").status().message(),
+  EXPECT_THAT(std::string(ReadPlanarDomain("-").status().message()),
               StartsWith("<stdin>: expected to be told the format: one of poly, geojson"));
   {
     const StandardInput input(folder_.Write("a.poly", kAll));
@@ -272,7 +272,7 @@ TEST_F(ReadPolyTest, StandardInputIsToldItsFormatAndHasNoFileBeside) {
     EXPECT_EQ(domain->SegmentOrigin(0), "<stdin>:10");
   }
   const StandardInput input(folder_.Write("b.poly", "0 2\n"));
-  EXPECT_THAT(ReadPlanarDomain("-", {.format = "poly"}).status().message(),
+  EXPECT_THAT(std::string(ReadPlanarDomain("-", {.format = "poly"}).status().message()),
               StartsWith("<stdin>:1: 0 points stand for those of the .node file beside this one"));
 }
 

@@ -104,15 +104,12 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace wellspace;
   fuzz::ByteReader bytes(data, size);
   const fuzz::Choice& choice = fuzz::kChoices[static_cast<uint8_t>(bytes.Next() - '0') % fuzz::kChoices.size()];
-  formats::DomainOptions options = {.format = choice.format};
-  if (choice.has_properties) {
-    options.region_property = "a";
-    options.marker_property = "b";
-  }
-  if (choice.has_columns) {
-    options.columns = {"1", "2"};
-    options.id_column = "3";
-  }
+  const formats::DomainOptions options = {
+      .format = choice.format,
+      .region_property = choice.has_properties ? "a" : "",
+      .marker_property = choice.has_properties ? "b" : "",
+      .columns = choice.has_columns ? std::vector<std::string>{"1", "2"} : std::vector<std::string>{},
+      .id_column = choice.has_columns ? "3" : ""};
   const fuzz::ScratchFolder& folder = fuzz::ScratchFolder::Get();
   folder.Write("domain.node", choice.has_node ? bytes.TakeBlock() : "");
   const std::string path = folder.Write("domain.any", bytes.TakeText());

@@ -20,23 +20,39 @@ inline std::string PointText(const formats::PlanarDomain& domain, uint64_t point
   return text;
 }
 
+// Appends a whole number and what follows it.
+template <typename Number>
+void AppendWhole(Number value, const char* after, std::string& text) {
+  text += std::to_string(value);
+  text += after;
+}
+
 // The points as a .node file, or as the first part of a .poly, with indices from `base`.
 inline std::string NodeText(const formats::PlanarDomain& domain, uint64_t base) {
   const bool has_markers = !domain.point_markers.empty();
-  std::string text = std::to_string(domain.point_count()) + " 2 0 " + (has_markers ? "1\n" : "0\n");
+  std::string text;
+  AppendWhole(domain.point_count(), has_markers ? " 2 0 1\n" : " 2 0 0\n", text);
   for (uint64_t i = 0; i < domain.point_count(); ++i) {
-    text += std::to_string(i + base) + " " + PointText(domain, i, " ");
-    text += has_markers ? " " + std::to_string(domain.point_markers[i]) + "\n" : "\n";
+    AppendWhole(i + base, " ", text);
+    text += PointText(domain, i, " ");
+    if (has_markers) {
+      text += ' ';
+      text += std::to_string(domain.point_markers[i]);
+    }
+    text += '\n';
   }
   return text;
 }
 
 // The parts of a .poly after the points. REQUIRES: the holes are the first of the seeds.
 inline std::string PolyTailText(const formats::PlanarDomain& domain, uint64_t base) {
-  std::string text = std::to_string(domain.segment_count()) + " 1\n";
+  std::string text;
+  AppendWhole(domain.segment_count(), " 1\n", text);
   for (uint64_t i = 0; i < domain.segment_count(); ++i) {
-    text += std::to_string(i) + " " + std::to_string(domain.segments[2 * i] + base) + " " +
-            std::to_string(domain.segments[2 * i + 1] + base) + " " + std::to_string(domain.markers[i]) + "\n";
+    AppendWhole(i, " ", text);
+    AppendWhole(domain.segments[2 * i] + base, " ", text);
+    AppendWhole(domain.segments[2 * i + 1] + base, " ", text);
+    AppendWhole(domain.markers[i], "\n", text);
   }
   size_t holes = 0;
   while (holes < domain.seeds.size() && domain.seeds[holes].is_hole) {
@@ -45,7 +61,7 @@ inline std::string PolyTailText(const formats::PlanarDomain& domain, uint64_t ba
   for (const bool is_hole : {true, false}) {
     const size_t first = is_hole ? 0 : holes;
     const size_t end = is_hole ? holes : domain.seeds.size();
-    text += std::to_string(end - first) + "\n";
+    AppendWhole(end - first, "\n", text);
     for (size_t i = first; i < end; ++i) {
       const formats::PlanarDomain::Seed& seed = domain.seeds[i];
       text += std::to_string(i - first);
@@ -66,10 +82,14 @@ inline std::string GeoJsonText(const formats::PlanarDomain& domain) {
   std::string text = R"({"type": "MultiLineString", "coordinates": [)";
   for (uint64_t i = 0; i < domain.segment_count(); ++i) {
     text += i == 0 ? "\n" : ",\n";
-    text += "[[" + PointText(domain, domain.segments[2 * i], ", ") + "], [" +
-            PointText(domain, domain.segments[2 * i + 1], ", ") + "]]";
+    text += "[[";
+    text += PointText(domain, domain.segments[2 * i], ", ");
+    text += "], [";
+    text += PointText(domain, domain.segments[2 * i + 1], ", ");
+    text += "]]";
   }
-  return text + "]}\n";
+  text += "]}\n";
+  return text;
 }
 
 }  // namespace wellspace::test
