@@ -73,6 +73,10 @@ void DomainOptions::AddTo(CLI::App& command) {
                   "Of .geojson: the property, a whole number, that is the region of the triangles in a polygon")
       ->type_name("NAME");
   command
+      .add_option("--id-column", reading_.id_column,
+                  "Of polylines in a table: the column, a name or a number from 1, that tells them apart")
+      ->type_name("COLUMN");
+  command
       .add_option("--marker-property", reading_.marker_property,
                   "Of .geojson: the property, a whole number, that marks the boundary of a feature")
       ->type_name("NAME");

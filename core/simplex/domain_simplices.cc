@@ -230,9 +230,9 @@ absl::StatusOr<DomainSimplices> ComputeDomainSimplices(const QueryStructure<2>& 
     OfThread& own = of_threads[ThreadTeam::CurrentThread()];
     Block& block = blocks[number];
     own.list.Clear();
-    leaf_blocks.ForEachBucketOf(number, [&](const LeafTree<2>::Bucket& bucket, NodeId) {
-      for (uint32_t i = 0; i < bucket.count && !context.IsCancelled(); ++i) {
-        is_endless = !AppendStar(structure, bucket.ids[i], output_index, own, block) || is_endless;
+    leaf_blocks.ForEachLeafOf(number, [&](const LeafTree<2>::LeafVertices& inside, NodeId) {
+      for (uint32_t i = 0; i < inside.count && !context.IsCancelled(); ++i) {
+        is_endless = !AppendStar(structure, inside.ids[i], output_index, own, block) || is_endless;
       }
     });
     block.indices = own.list.indices();
