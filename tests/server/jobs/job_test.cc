@@ -37,12 +37,13 @@ TEST(Job, WhatTheWorkHoldsIsReleasedWithIt) {
   absl::StatusOr<MemoryReservation> held = pool.memory.Reserve(10 * kMegabyte, "points");
   ASSERT_TRUE(held.ok());
   MemoryReservation kept;
-  pool.pool.Submit({.tenant = "a", .held = *std::move(held), .work = [&](Job& job) {
-                      EXPECT_TRUE(job.context().ReserveMemory(20 * kMegabyte).ok());
-                      EXPECT_EQ(pool.memory.reserved(), 30 * kMegabyte);
-                      kept = job.TakeMemory(5 * kMegabyte);
-                      done.Set();
-                    }});
+  const auto work = [&](Job& job) {
+    EXPECT_TRUE(job.context().ReserveMemory(20 * kMegabyte).ok());
+    EXPECT_EQ(pool.memory.reserved(), 30 * kMegabyte);
+    kept = job.TakeMemory(5 * kMegabyte);
+    done.Set();
+  };
+  ASSERT_TRUE(pool.pool.Submit({.tenant = "a", .held = *std::move(held), .work = work}).ok());
   ASSERT_TRUE(done.Wait());
   while (pool.GetLoad().running > 0) {
     std::this_thread::yield();
