@@ -9,19 +9,15 @@
 
 #include "client/formats/read_mesh.h"
 #include "tests/cli/process.h"
-#include "tests/client/grpc/fake_server.h"
-#include "tests/formats/temporary_folder.h"
+#include "tests/cli/session_fixture.h"
 
 namespace wellspace {
 namespace {
 
 using nlohmann::json;
-using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using ::testing::Not;
-using ::testing::StartsWith;
 
 constexpr char kCities[] = "id,lat,lon\n0,0.1,10\n1,0.9,11\n2,0.2,11\n3,0.8,10.2\n";
 constexpr char kHoles[] = "x,y,z\n0,0,0\n1,0,0\nNA,NA,NA\n0,1,0\n0,0,1\nnan,0,0\n";
@@ -128,9 +124,8 @@ class SessionCloudsTest : public CloudOptionsTest {
  protected:
   SessionCloudsTest() {
     server_.sessions.get = [](const v1::GetSessionRequest&, v1::GetSessionResponse& response) {
-      response.mutable_session()->set_name("sessions/one");
-      response.mutable_session()->set_state(v1::Session::STATE_OPEN);
-      response.mutable_session()->mutable_parameters()->set_dimension(2);
+      *response.mutable_session() = MakeSession();
+      response.mutable_session()->set_committed_points(0);
       return grpc::Status::OK;
     };
     server_.sessions.upload = [this](grpc::ServerContext&, auto& reader, v1::UploadPointsResponse& response) {
@@ -145,8 +140,7 @@ class SessionCloudsTest : public CloudOptionsTest {
   }
 
   RunResult Run(const std::vector<std::string>& arguments, const std::string& input) {
-    return RunWellspace(
-        arguments, {.input = input, .environment = {"WELLSPACE_SERVER=" + server_.address()}, .error_descriptor = -1});
+    return RunAt(server_, arguments, input);
   }
 
   client::FakeServer server_;

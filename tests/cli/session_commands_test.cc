@@ -1,13 +1,8 @@
-// The commands about sessions from the outside, with a server of the test's making.
-#include <arpa/inet.h>
+// The commands about sessions from the outside, with a server of the test's making. Those about operations and queries
+// have files of their own.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
-#include <signal.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
-#include <future>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -15,14 +10,13 @@
 #include "client/formats/npy.h"
 #include "client/formats/read_mesh.h"
 #include "proto/checksum.h"
+#include "tests/cli/closed_port.h"
 #include "tests/cli/process.h"
-#include "tests/client/grpc/fake_server.h"
-#include "tests/formats/temporary_folder.h"
+#include "tests/cli/session_fixture.h"
 
 namespace wellspace {
 namespace {
 
-using client::FakeServer;
 using client::MakeError;
 using nlohmann::json;
 using ::testing::AllOf;
@@ -31,97 +25,6 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 using ::testing::StartsWith;
-
-constexpr char kSession[] = "sessions/one";
-constexpr char kOperation[] = "sessions/one/operations/two";
-
-v1::Session MakeSession() {
-  v1::Session session;
-  session.set_name(kSession);
-  session.set_state(v1::Session::STATE_OPEN);
-  session.mutable_parameters()->set_dimension(2);
-  session.mutable_parameters()->set_rho(1.5);
-  session.mutable_parameters()->set_threads(3);
-  session.mutable_ttl()->set_seconds(90);
-  (*session.mutable_labels())["job"] = "7";
-  session.set_revision(2);
-  session.set_committed_points(1234);
-  session.set_last_operation(kOperation);
-  return session;
-}
-
-v1::Operation MakeOperation(v1::Operation::State state) {
-  v1::Operation operation;
-  operation.set_name(kOperation);
-  operation.set_state(state);
-  operation.mutable_progress()->set_vertices(4321);
-  operation.set_mesh_revision(3);
-  return operation;
-}
-
-// A port of the loopback that is bound, and that no process listens to.
-class TcpPort {
- public:
-  TcpPort() : socket_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
-    sockaddr_in address = {};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t length = sizeof(address);
-    EXPECT_EQ(bind(socket_, reinterpret_cast<sockaddr*>(&address), length), 0);
-    EXPECT_EQ(getsockname(socket_, reinterpret_cast<sockaddr*>(&address), &length), 0);
-    number_ = ntohs(address.sin_port);
-  }
-  ~TcpPort() { close(socket_); }
-  TcpPort(const TcpPort&) = delete;
-  TcpPort& operator=(const TcpPort&) = delete;
-
-  uint16_t number() const { return number_; }
-
- private:
-  int socket_;
-  uint16_t number_ = 0;
-};
-
-class SessionCommandsTest : public testing::Test {
- protected:
-  SessionCommandsTest() {
-    server_.sessions.get = [](const v1::GetSessionRequest& request, v1::GetSessionResponse& response) {
-      *response.mutable_session() = MakeSession();
-      return request.name() == kSession ? grpc::Status::OK
-                                        : MakeError(grpc::StatusCode::NOT_FOUND, "no session " + request.name(),
-                                                    "ERROR_REASON_SESSION_NOT_FOUND");
-    };
-  }
-
-  RunResult Run(std::vector<std::string> arguments, const std::string& input = "") {
-    return RunWellspace(
-        arguments, {.input = input, .environment = {"WELLSPACE_SERVER=" + server_.address()}, .error_descriptor = -1});
-  }
-
-  // The operation ends as `end` when it is watched.
-  void OperationsEndAs(const v1::Operation& end) {
-    server_.operations.start = [this](const v1::StartRefinementRequest& request,
-                                      v1::StartRefinementResponse& response) {
-      started_ = request;
-      *response.mutable_operation() = MakeOperation(v1::Operation::STATE_QUEUED);
-      return grpc::Status::OK;
-    };
-    server_.operations.watch = [end](grpc::ServerContext&, const v1::WatchOperationRequest& request, auto& writer) {
-      EXPECT_EQ(request.name(), kOperation);
-      v1::WatchOperationResponse response;
-      response.mutable_progress()->set_phase(v1::PHASE_REFINEMENT);
-      response.mutable_progress()->set_fraction(0.5);
-      writer.Write(response);
-      *response.mutable_operation() = end;
-      writer.Write(response);
-      return grpc::Status::OK;
-    };
-  }
-
-  TemporaryFolder folder_;
-  FakeServer server_;
-  v1::StartRefinementRequest started_;
-};
 
 TEST(SessionCommandsWithoutServer, SayWhatTheyNeed) {
   TemporaryFolder folder;
@@ -318,99 +221,6 @@ TEST_F(SessionCommandsTest, UploadSendsTheFileAndNamesLinesInErrors) {
   EXPECT_THAT(solid.err, HasSubstr("<stdin>:1: expected 2 coordinates, got 3"));
 }
 
-TEST_F(SessionCommandsTest, RefineWaitsForTheEnd) {
-  OperationsEndAs(MakeOperation(v1::Operation::STATE_SUCCEEDED));
-  const RunResult text = Run({"refine", "one"});
-  ASSERT_EQ(text.exit_code, 0) << text.err;
-  EXPECT_EQ(text.out, "sessions/one/operations/two succeeded: 4,321 vertices, revision 3\n");
-  EXPECT_FALSE(started_.has_parameters());
-  const RunResult result = Run({"refine", "one", "--output", "json", "--rho", "3", "--expected-revision", "8"});
-  EXPECT_EQ(json::parse(result.out)["state"], "succeeded");
-  // What is not given stays as the session has it.
-  EXPECT_EQ(started_.parameters().dimension(), 2);
-  EXPECT_EQ(started_.parameters().rho(), 3);
-  EXPECT_EQ(started_.parameters().threads(), 3);
-  EXPECT_EQ(started_.expected_revision(), 8u);
-  const RunResult detached = Run({"refine", "one", "--detach"});
-  EXPECT_EQ(detached.out, std::string(kOperation) + "\n");
-}
-
-// The other parameters stay those of the session.
-TEST_F(SessionCommandsTest, RefineKeepsVerticesIfThatIsAsked) {
-  OperationsEndAs(MakeOperation(v1::Operation::STATE_SUCCEEDED));
-  EXPECT_EQ(Run({"refine", "one", "--keep-vertices", "--quiet"}).exit_code, 0);
-  EXPECT_TRUE(started_.parameters().keep_vertices());
-  EXPECT_EQ(started_.parameters().rho(), 1.5);
-  EXPECT_EQ(Run({"refine", "one", "--rho", "2", "--quiet"}).exit_code, 0);
-  EXPECT_FALSE(started_.parameters().keep_vertices());
-}
-
-TEST_F(SessionCommandsTest, AFailedOperationIsTheCommandsError) {
-  v1::Operation failed = MakeOperation(v1::Operation::STATE_FAILED);
-  failed.mutable_error()->set_code(grpc::StatusCode::RESOURCE_EXHAUSTED);
-  failed.mutable_error()->set_message("too many vertices");
-  OperationsEndAs(failed);
-  for (const char* command : {"refine", "watch"}) {
-    const RunResult result = Run({command, "one"});
-    EXPECT_EQ(result.exit_code, 4);
-    EXPECT_EQ(result.err, "wellspace: too many vertices [RESOURCE_EXHAUSTED]\n");
-    EXPECT_THAT(result.out, IsEmpty());
-  }
-}
-
-TEST_F(SessionCommandsTest, WatchPrintsEventsAsLinesOfJson) {
-  OperationsEndAs(MakeOperation(v1::Operation::STATE_SUCCEEDED));
-  const RunResult result = Run({"watch", kOperation, "--output", "json"});
-  ASSERT_EQ(result.exit_code, 0) << result.err;
-  const size_t end = result.out.find('\n');
-  EXPECT_EQ(json::parse(result.out.substr(0, end))["phase"], "refinement");
-  EXPECT_EQ(json::parse(result.out.substr(end))["mesh_revision"], 3);
-}
-
-TEST_F(SessionCommandsTest, CancelWaitsForTheEnd) {
-  OperationsEndAs(MakeOperation(v1::Operation::STATE_CANCELLED));
-  server_.operations.cancel = [](const v1::CancelOperationRequest& request, v1::CancelOperationResponse& response) {
-    EXPECT_EQ(request.name(), kOperation);
-    *response.mutable_operation() = MakeOperation(v1::Operation::STATE_RUNNING);
-    return grpc::Status::OK;
-  };
-  for (const char* name : {"one", kOperation}) {
-    const RunResult result = Run({"cancel", name});
-    EXPECT_EQ(result.exit_code, 0) << result.err;
-    EXPECT_EQ(result.out, "sessions/one/operations/two cancelled\n");
-  }
-}
-
-// The signal comes when the watch stands.
-TEST_F(SessionCommandsTest, CtrlCCancelsTheRefinementButNotAWatchedOne) {
-  OperationsEndAs({});
-  std::promise<void> watched;
-  int cancelled = 0;
-  server_.operations.watch = [&watched](grpc::ServerContext& context, const auto&, auto& writer) {
-    writer.Write({});
-    watched.set_value();
-    while (!context.IsCancelled()) {
-      writer.Write({});
-    }
-    return grpc::Status::CANCELLED;
-  };
-  server_.operations.cancel = [&cancelled](const v1::CancelOperationRequest& request, auto&) {
-    EXPECT_EQ(request.name(), kOperation);
-    ++cancelled;
-    return grpc::Status::OK;
-  };
-  for (const char* command : {"refine", "watch"}) {
-    watched = {};
-    cancelled = 0;
-    Process process({command, "one", "--server", server_.address()});
-    watched.get_future().wait();
-    ASSERT_EQ(kill(process.id(), SIGINT), 0);
-    const RunResult result = process.Wait();
-    EXPECT_EQ(result.exit_code, 130) << result.err;
-    EXPECT_EQ(cancelled, command == std::string("refine") ? 1 : 0);
-  }
-}
-
 TEST_F(SessionCommandsTest, DownloadWritesTheMesh) {
   server_.sessions.download = [](grpc::ServerContext&, const v1::DownloadMeshRequest& request, auto& writer) {
     if (request.revision() > 5) {
@@ -462,92 +272,6 @@ TEST_F(SessionCommandsTest, DownloadWritesTheMesh) {
   EXPECT_EQ(Run({"download", "one", "-o", "-", "--output", "json"}).exit_code, 2);
   EXPECT_EQ(Run({"download", "one", "-o", folder_.Path("b.stl")}).exit_code, 2);
   EXPECT_EQ(folder_.FileCount(), files);
-}
-
-TEST_F(SessionCommandsTest, CellsAsTextAndAsJson) {
-  std::vector<uint32_t> asked;
-  double beta = 0;
-  const auto answer = [&asked](const auto& request, v1::VoronoiCellBatch& cells, double radius) {
-    asked.assign(request.vertices().begin(), request.vertices().end());
-    for (const uint32_t vertex : asked) {
-      cells.add_vertices(vertex);
-      cells.add_clip_radii(radius);
-      cells.add_is_clipped(vertex == 7);
-      cells.add_node_counts(vertex == 7 ? 2 : 1);
-      for (int i = 0; i < (vertex == 7 ? 4 : 2); ++i) {
-        cells.add_nodes(i + 0.5);
-      }
-      cells.add_neighbour_counts(2);
-      cells.add_neighbours(vertex + 1);
-      cells.add_neighbours(vertex + 2);
-    }
-  };
-  server_.queries.cells = [&](grpc::ServerContext&, const v1::VoronoiCellsRequest& request, auto& writer) {
-    v1::VoronoiCellsResponse response;
-    answer(request, *response.mutable_cells(), std::numeric_limits<double>::infinity());
-    writer.Write(response);
-    return grpc::Status::OK;
-  };
-  server_.queries.clipped = [&](grpc::ServerContext&, const v1::ClippedVoronoiCellsRequest& request, auto& writer) {
-    beta = request.beta();
-    v1::ClippedVoronoiCellsResponse response;
-    answer(request, *response.mutable_cells(), 0.25);
-    writer.Write(response);
-    return grpc::Status::OK;
-  };
-  server_.queries.nearest = [](grpc::ServerContext&, const v1::ApproximateNearestNeighborsRequest& request,
-                               auto& writer) {
-    EXPECT_THAT(request.vertices(), IsEmpty());
-    v1::ApproximateNearestNeighborsResponse response;
-    response.add_distances(0.5);
-    response.add_distances(0.25);
-    writer.Write(response);
-    return grpc::Status::OK;
-  };
-  const RunResult text = Run({"cells", "one", "7", "3"});
-  ASSERT_EQ(text.exit_code, 0) << text.err;
-  EXPECT_EQ(text.out, "7 inf 1 0.5,1.5;2.5,3.5 8;9\n3 inf 0 0.5,1.5 4;5\n");
-  const RunResult clipped =
-      Run({"cells", "one", "--beta", "4", "--vertices", "-", "--output", "json"}, "7, 3\n# no\n1\n");
-  ASSERT_EQ(clipped.exit_code, 0) << clipped.err;
-  EXPECT_EQ(beta, 4);
-  EXPECT_THAT(asked, ElementsAre(7, 3, 1));
-  EXPECT_EQ(json::parse(clipped.out.substr(0, clipped.out.find('\n'))),
-            json::parse(R"({"vertex": 7, "clip_radius": 0.25,
-      "is_clipped": true, "nodes": [[0.5, 1.5], [2.5, 3.5]], "neighbours": [8, 9]})"));
-  ASSERT_EQ(Run({"cells", "one", "3", "-o", folder_.Path("cells.txt")}).exit_code, 0);
-  EXPECT_EQ(folder_.Read("cells.txt"), "3 inf 0 0.5,1.5 4;5\n");
-  EXPECT_EQ(Run({"cells", "one", "--nearest"}).out, "0 0.5\n1 0.25\n");
-  EXPECT_EQ(Run({"cells", "one", "--nearest", "--output", "json"}).out,
-            "{\"vertex\":0,\"distance\":0.5}\n{\"vertex\":1,\"distance\":0.25}\n");
-  const RunResult none = Run({"cells", "one", "--vertices", "-"}, "");
-  EXPECT_EQ(none.exit_code, 0);
-  EXPECT_THAT(none.out, IsEmpty());
-  const RunResult wrong = Run({"cells", "one", "--vertices", "-"}, "1\ntwo\n");
-  EXPECT_EQ(wrong.exit_code, 2);
-  EXPECT_THAT(wrong.err, HasSubstr("<stdin>:2: expected the number of a vertex, got \"two\""));
-}
-
-TEST_F(SessionCommandsTest, AddPrintsTheVertices) {
-  server_.queries.add = [](const v1::AddVerticesRequest& request, v1::AddVerticesResponse& response) {
-    EXPECT_THAT(request.points(), ElementsAre(1, 2, 3, 4));
-    response.add_vertices(8);
-    response.add_vertices(9);
-    response.set_revision(6);
-    return request.near().empty() || request.near(1) == 5
-               ? grpc::Status::OK
-               : MakeError(grpc::StatusCode::INVALID_ARGUMENT, "points[1] is outside", "ERROR_REASON_INVALID_POINTS");
-  };
-  EXPECT_EQ(Run({"add", "one", "-"}, "1,2\n3,4\n").out, "8\n9\n");
-  const std::string near = folder_.Write("near", "4 5");
-  EXPECT_EQ(json::parse(Run({"add", "one", "-", "--near", near, "--output", "json"}, "1,2\n3,4\n").out),
-            json::parse(R"({"vertices": [8, 9], "revision": 6})"));
-  const RunResult few = Run({"add", "one", "-", "--near", folder_.Write("few", "4")}, "1,2\n3,4\n");
-  EXPECT_EQ(few.exit_code, 2);
-  EXPECT_THAT(few.err, HasSubstr("expected a vertex for each of 2 points, got 1"));
-  const RunResult outside = Run({"add", "one", "-", "--near", folder_.Write("far", "4 6")}, "1,2\n3,4\n");
-  EXPECT_EQ(outside.exit_code, 2);
-  EXPECT_THAT(outside.err, HasSubstr("<stdin>:2: points[1] is outside"));
 }
 
 TEST_F(SessionCommandsTest, TimeoutIsExitCode5AndLeavesTheOperationAlone) {
@@ -619,10 +343,10 @@ TEST_F(SessionCommandsTest, AWatchWhoseEventsCannotBePrintedEnds) {
   EXPECT_EQ(result.exit_code, 4) << result.err;
 }
 
-// Nothing is behind the proxy: who goes there gets nowhere.
+// Nothing is behind the proxy: a call that goes there gets nowhere.
 TEST_F(SessionCommandsTest, AProxyOfTheEnvironmentIsNotForTheLoopbackAndIsNamed) {
-  const TcpPort closed;
-  const std::string proxy = "127.0.0.1:" + std::to_string(closed.number());
+  const ClosedPort closed;
+  const std::string proxy = closed.address();
   for (const char* variable : {"http_proxy", "https_proxy", "grpc_proxy"}) {
     const std::vector<std::string> environment = {std::string(variable) + "=http://me:secret@" + proxy,
                                                   "no_proxy=none"};
