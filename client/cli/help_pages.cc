@@ -74,49 +74,68 @@ std::string Quoted(const std::string& text) {
   return absl::StrCat("'", absl::StrReplaceAll(text, {{"'", "'\\''"}}), "'");
 }
 
-}  // namespace
+// The alternatives of bash's `case` statements in the script.
+struct CompletionCases {
+  // What follows an option: one of its choices (by the choices, joined), a file, or a value that is not completed.
+  void AddOption(const std::string& command, const CLI::Option& option);
+  // The command's word, its options, and what else may follow it.
+  void AddCommand(const Command& command);
 
-std::string BashCompletion(const CLI::App& app) {
   std::vector<std::string> names;
-  std::map<std::string, std::vector<std::string>> patterns_of_choices;  // by the choices, joined
+  std::map<std::string, std::vector<std::string>> patterns_of_choices;
   std::vector<std::string> file_patterns;
   std::vector<std::string> value_patterns;
   std::string words;
-  for (const Command& command : TreeOf(app)) {
-    if (!command.name.empty()) {
-      names.push_back(Quoted(command.name));
+};
+
+void CompletionCases::AddOption(const std::string& command, const CLI::Option& option) {
+  const std::vector<std::string> choices = ChoicesOf(option);
+  for (const std::string& name : NamesOf(option)) {
+    const std::string pattern = Quoted(absl::StrCat(command, " ", name));
+    if (!choices.empty()) {
+      patterns_of_choices[absl::StrJoin(choices, " ")].push_back(pattern);
+    } else if (IsFile(option)) {
+      file_patterns.push_back(pattern);
+    } else if (TakesValue(option)) {
+      value_patterns.push_back(pattern);
     }
-    std::vector<std::string> options;
-    std::vector<std::string> others;
-    bool takes_files = false;
-    for (const CLI::App* subcommand : command.Subcommands()) {
-      others.push_back(subcommand->get_name());
-    }
-    for (const CLI::Option* option : command.Options()) {
-      if (IsPositional(*option)) {
-        takes_files = takes_files || IsFile(*option);
-        const std::vector<std::string> choices = ChoicesOf(*option);
-        others.insert(others.end(), choices.begin(), choices.end());
-        continue;
-      }
+  }
+}
+
+void CompletionCases::AddCommand(const Command& command) {
+  if (!command.name.empty()) {
+    names.push_back(Quoted(command.name));
+  }
+  std::vector<std::string> options;
+  std::vector<std::string> others;
+  bool takes_files = false;
+  for (const CLI::App* subcommand : command.Subcommands()) {
+    others.push_back(subcommand->get_name());
+  }
+  for (const CLI::Option* option : command.Options()) {
+    if (IsPositional(*option)) {
+      takes_files = takes_files || IsFile(*option);
       const std::vector<std::string> choices = ChoicesOf(*option);
-      for (const std::string& name : NamesOf(*option)) {
-        options.push_back(name);
-        const std::string pattern = Quoted(absl::StrCat(command.name, " ", name));
-        if (!choices.empty()) {
-          patterns_of_choices[absl::StrJoin(choices, " ")].push_back(pattern);
-        } else if (IsFile(*option)) {
-          file_patterns.push_back(pattern);
-        } else if (TakesValue(*option)) {
-          value_patterns.push_back(pattern);
-        }
-      }
+      others.insert(others.end(), choices.begin(), choices.end());
+      continue;
     }
-    absl::StrAppend(&words, "    ", Quoted(command.name), ") options=", Quoted(absl::StrJoin(options, " ")),
-                    " words=", Quoted(absl::StrJoin(others, " ")), " files=", takes_files ? 1 : 0, " ;;\n");
+    const std::vector<std::string> option_names = NamesOf(*option);
+    options.insert(options.end(), option_names.begin(), option_names.end());
+    AddOption(command.name, *option);
+  }
+  absl::StrAppend(&words, "    ", Quoted(command.name), ") options=", Quoted(absl::StrJoin(options, " ")),
+                  " words=", Quoted(absl::StrJoin(others, " ")), " files=", takes_files ? 1 : 0, " ;;\n");
+}
+
+}  // namespace
+
+std::string BashCompletion(const CLI::App& app) {
+  CompletionCases cases;
+  for (const Command& command : TreeOf(app)) {
+    cases.AddCommand(command);
   }
   std::string choices;
-  for (const auto& [values, patterns] : patterns_of_choices) {
+  for (const auto& [values, patterns] : cases.patterns_of_choices) {
     absl::StrAppend(&choices, "    ", absl::StrJoin(patterns, " | "), ")\n      COMPREPLY=($(compgen -W ",
                     Quoted(values), " -- \"${current}\"))\n      return ;;\n");
   }
@@ -129,23 +148,23 @@ std::string BashCompletion(const CLI::App& app) {
       "  for ((i = 1; i < COMP_CWORD; ++i)); do\n"
       "    case \"${command}${command:+ }${COMP_WORDS[i]}\" in\n"
       "      ",
-      absl::StrJoin(names, " | "),
+      absl::StrJoin(cases.names, " | "),
       ")\n"
       "        command=\"${command}${command:+ }${COMP_WORDS[i]}\" ;;\n"
       "    esac\n"
       "  done\n"
       "  case \"${command} ${previous}\" in\n",
-      choices, "    ", absl::StrJoin(file_patterns, " | "),
+      choices, "    ", absl::StrJoin(cases.file_patterns, " | "),
       ")\n"
       "      compopt -o filenames 2>/dev/null\n"
       "      COMPREPLY=($(compgen -f -- \"${current}\"))\n"
       "      return ;;\n"
       "    ",
-      absl::StrJoin(value_patterns, " | "),
+      absl::StrJoin(cases.value_patterns, " | "),
       ") return ;;\n"
       "  esac\n"
       "  case \"${command}\" in\n",
-      words,
+      cases.words,
       "  esac\n"
       "  if [[ \"${current}\" == -* ]]; then\n"
       "    COMPREPLY=($(compgen -W \"${options}\" -- \"${current}\"))\n"

@@ -120,7 +120,59 @@ bool Covers(const Facet& facet, double x, double y) {
   return !(positive && negative);
 }
 
-// At every sample, what is painted last is the tetrahedron that a line of sight enters first, found among all of them.
+// The tetrahedra that a cut across x at 0.5 leaves, in the picture's directions: right, up, towards the eye.
+struct Kept {
+  // The smallest angle of the one that a line of sight enters first, found among all of them; -1: it meets none.
+  double AngleAt(double x, double y) const {
+    double nearest = -std::numeric_limits<double>::infinity();
+    double expected = -1;
+    for (size_t k = 0; k < corners.size(); ++k) {
+      const double depth = EntryDepth(corners[k], low_x + x, low_y + y);
+      if (depth > nearest) {
+        nearest = depth;
+        expected = angles[k];
+      }
+    }
+    return expected;
+  }
+
+  std::vector<std::array<Vector, 4>> corners;
+  std::vector<double> angles;
+  double low_x = std::numeric_limits<double>::infinity();
+  double low_y = std::numeric_limits<double>::infinity();
+};
+
+Kept KeptOf(const core::Mesh& mesh) {
+  // From the front, a little from the side (y) and from above (z).
+  const double norm = std::hypot(1, 0.55, 0.4);
+  const Vector towards = {1 / norm, 0.55 / norm, 0.4 / norm};
+  const double side = std::hypot(towards[0], towards[1]);
+  const Vector right = {-towards[1] / side, towards[0] / side, 0};
+  const Vector up = {towards[1] * right[2] - towards[2] * right[1], towards[2] * right[0] - towards[0] * right[2],
+                     towards[0] * right[1] - towards[1] * right[0]};
+  Kept kept;
+  for (uint64_t simplex = 0; simplex < mesh.simplex_count(); ++simplex) {
+    core::Simplex<3> corners;
+    std::array<Vector, 4> projected;
+    double centroid_x = 0;
+    for (int i = 0; i < 4; ++i) {
+      std::copy_n(&mesh.points[3 * mesh.simplices[4 * simplex + i]], 3, corners[i].begin());
+      projected[i] = {Dot(corners[i], right), Dot(corners[i], up), Dot(corners[i], towards)};
+      centroid_x += corners[i][0] / 4;
+    }
+    if (centroid_x <= 0.5) {
+      kept.corners.push_back(projected);
+      kept.angles.push_back(core::Angles<3>(corners).min_deg);
+      for (const Vector& corner : projected) {
+        kept.low_x = std::min(kept.low_x, corner[0]);
+        kept.low_y = std::min(kept.low_y, corner[1]);
+      }
+    }
+  }
+  return kept;
+}
+
+// At every sample, what is painted last is the tetrahedron that a line of sight enters first.
 TEST(SceneTest, PaintersOrderShowsWhatIsInFront) {
   const uint64_t seed = Seed();
   SCOPED_TRACE(testing::Message() << "WELLSPACE_SEED=" << seed);
@@ -140,35 +192,7 @@ TEST(SceneTest, PaintersOrderShowsWhatIsInFront) {
   const absl::StatusOr<Scene> scene = MakeScene(view, {.plane = Plane{{1, 0, 0}, 0.5}, .up = 2});
   ASSERT_TRUE(scene.ok()) << scene.status();
 
-  // The directions of the picture for a cut across x: from the front, a little from the side (y) and from above (z).
-  const double norm = std::hypot(1, 0.55, 0.4);
-  const Vector towards = {1 / norm, 0.55 / norm, 0.4 / norm};
-  const double side = std::hypot(towards[0], towards[1]);
-  const Vector right = {-towards[1] / side, towards[0] / side, 0};
-  const Vector up = {towards[1] * right[2] - towards[2] * right[1], towards[2] * right[0] - towards[0] * right[2],
-                     towards[0] * right[1] - towards[1] * right[0]};
-  std::vector<std::array<Vector, 4>> kept;
-  std::vector<double> angles;
-  double low_x = std::numeric_limits<double>::infinity();
-  double low_y = low_x;
-  for (uint64_t simplex = 0; simplex < mesh->simplex_count(); ++simplex) {
-    core::Simplex<3> corners;
-    std::array<Vector, 4> projected;
-    double centroid_x = 0;
-    for (int i = 0; i < 4; ++i) {
-      std::copy_n(&mesh->points[3 * mesh->simplices[4 * simplex + i]], 3, corners[i].begin());
-      projected[i] = {Dot(corners[i], right), Dot(corners[i], up), Dot(corners[i], towards)};
-      centroid_x += corners[i][0] / 4;
-    }
-    if (centroid_x <= 0.5) {
-      kept.push_back(projected);
-      angles.push_back(core::Angles<3>(corners).min_deg);
-      for (const Vector& corner : projected) {
-        low_x = std::min(low_x, corner[0]);
-        low_y = std::min(low_y, corner[1]);
-      }
-    }
-  }
+  const Kept kept = KeptOf(*mesh);
   int overlaps = 0;
   for (int sample = 0; sample < 20000; ++sample) {
     const double x = uniform(random) * scene->width;
@@ -186,16 +210,7 @@ TEST(SceneTest, PaintersOrderShowsWhatIsInFront) {
       continue;
     }
     overlaps += covers < 2 ? 0 : 1;
-    double nearest = -std::numeric_limits<double>::infinity();
-    double expected = -1;
-    for (size_t k = 0; k < kept.size(); ++k) {
-      const double depth = EntryDepth(kept[k], low_x + x, low_y + y);
-      if (depth > nearest) {
-        nearest = depth;
-        expected = angles[k];
-      }
-    }
-    ASSERT_NEAR(painted, expected, 1e-3) << x << " " << y;
+    ASSERT_NEAR(painted, kept.AngleAt(x, y), 1e-3) << x << " " << y;
   }
   EXPECT_GT(overlaps, 100);
 }

@@ -44,19 +44,59 @@ struct Task {
   core::MeshParameters then;
 };
 
-// Byte 0: bit 0 dimension 2 or 3, bits 1 and 2 the box: grown by a quarter, not grown, the grid's, the grid's but flat;
-// bit 3 two dimensions more; bit 4 well-spaced; bit 5 sizes; bit 6 an edit. Byte 1: the exponent of the tiny step; from
-// 3-D on bit 6 weights, bit 7 no repair. Byte 2: offset. Byte 3: scale. Byte 4: rho.
-//
-// With sizes a byte more: the lowest two bits the bound everywhere, if any, the next two that of a box, the next three
-// where it is, the last one whether it is a point.
-//
-// With an edit a byte more: the lowest three bits how many points come later, the next one whether one by one, the next
-// two rho then, the next one the other criterion, the last one no sizes any more.
+constexpr std::array kRhoFactors = {0.0, 1.0, 1.25, 2.0, 100.0};
+
+// `box`: grown by a quarter, not grown, the grid's, the grid's but flat.
+void SetBox(int box, const Placement& placement, core::MeshParameters& parameters) {
+  if (box < 2) {
+    parameters.margin = box == 0 ? 0.25 : 0;
+    return;
+  }
+  parameters.domain_low.assign(parameters.dimension, placement.Of(0));
+  parameters.domain_high.assign(parameters.dimension, placement.Of(kLastGridLine));
+  if (box == 3) {
+    parameters.domain_high.back() = placement.Of(kGridStep);
+  }
+}
+
+// `sizes`: the lowest two bits the bound everywhere, if any, the next two that of a box, the next three where it is,
+// the last one whether it is a point.
+void SetSizes(uint8_t sizes, const Placement& placement, core::MeshParameters& parameters) {
+  const double everywhere = std::array{0.0, 1.0, 0.5, 0.25}[sizes & 3];
+  const double inside = std::array{0.0, 0.5, 0.125, 0x1p-6}[sizes >> 2 & 3];
+  parameters.max_circumradius = everywhere * placement.scale;
+  if (inside > 0) {
+    const double low = (sizes >> 4 & 7) * kGridStep;
+    const double high = low + ((sizes >> 7) != 0 ? 0 : kGridStep);
+    parameters.size_boxes.push_back({std::vector<double>(parameters.dimension, placement.Of(low)),
+                                     std::vector<double>(parameters.dimension, placement.Of(high)),
+                                     inside * placement.scale});
+  }
+}
+
+// `edit`: the lowest three bits how many points come later, the next one whether one by one, the next two rho then, the
+// next one the other criterion, the last one no sizes any more.
+void SetEdit(uint8_t edit, Task& task) {
+  task.added_points = edit & 7;
+  task.one_by_one = (edit >> 3 & 1) != 0;
+  task.then = task.parameters;
+  task.then.rho = kRhoFactors[edit >> 4 & 3] * core::MinimumRho(task.parameters.dimension);
+  if ((edit >> 6 & 1) != 0) {
+    task.then.criterion = task.parameters.criterion == core::Criterion::kWellSpaced ? core::Criterion::kRadiusEdge
+                                                                                    : core::Criterion::kWellSpaced;
+  }
+  if ((edit >> 7) != 0) {
+    task.then.max_circumradius = 0;
+    task.then.size_boxes.clear();
+  }
+}
+
+// Byte 0: bit 0 dimension 2 or 3, bits 1 and 2 the box (SetBox); bit 3 two dimensions more; bit 4 well-spaced; bit 5
+// sizes; bit 6 an edit. Byte 1: the exponent of the tiny step; from 3-D on bit 6 weights, bit 7 no repair. Byte 2:
+// offset. Byte 3: scale. Byte 4: rho. With sizes a byte more (SetSizes), with an edit one more (SetEdit).
 Task ReadTask(ByteReader& bytes) {
   constexpr std::array kOffsets = {0.0, -0.5, 1.0, 0x1p20, -0x1p35};
   constexpr std::array kScales = {1.0, 3.0, 0x1p-40, 0x1p100, 0x1p-700, 0x1p900};
-  constexpr std::array kRhoFactors = {0.0, 1.0, 1.25, 2.0, 100.0};
   Task task;
   core::MeshParameters& parameters = task.parameters;
   Placement& placement = task.placement;
@@ -77,44 +117,13 @@ Task ReadTask(ByteReader& bytes) {
   if ((shape >> 4 & 1) != 0) {
     parameters.criterion = core::Criterion::kWellSpaced;
   }
-  const int box = shape >> 1 & 3;
-  if (box < 2) {
-    parameters.margin = box == 0 ? 0.25 : 0;
-  } else {
-    parameters.domain_low.assign(parameters.dimension, placement.Of(0));
-    parameters.domain_high.assign(parameters.dimension, placement.Of(kLastGridLine));
-    if (box == 3) {
-      parameters.domain_high.back() = placement.Of(kGridStep);
-    }
-  }
+  SetBox(shape >> 1 & 3, placement, parameters);
   if ((shape >> 5 & 1) != 0) {
-    const uint8_t sizes = bytes.Next();
-    const double everywhere = std::array{0.0, 1.0, 0.5, 0.25}[sizes & 3];
-    const double inside = std::array{0.0, 0.5, 0.125, 0x1p-6}[sizes >> 2 & 3];
-    parameters.max_circumradius = everywhere * placement.scale;
-    if (inside > 0) {
-      const double low = (sizes >> 4 & 7) * kGridStep;
-      const double high = low + ((sizes >> 7) != 0 ? 0 : kGridStep);
-      parameters.size_boxes.push_back({std::vector<double>(parameters.dimension, placement.Of(low)),
-                                       std::vector<double>(parameters.dimension, placement.Of(high)),
-                                       inside * placement.scale});
-    }
+    SetSizes(bytes.Next(), placement, parameters);
   }
   task.is_edit = (shape >> 6 & 1) != 0;
   if (task.is_edit) {
-    const uint8_t edit = bytes.Next();
-    task.added_points = edit & 7;
-    task.one_by_one = (edit >> 3 & 1) != 0;
-    task.then = parameters;
-    task.then.rho = kRhoFactors[edit >> 4 & 3] * core::MinimumRho(parameters.dimension);
-    if ((edit >> 6 & 1) != 0) {
-      task.then.criterion = parameters.criterion == core::Criterion::kWellSpaced ? core::Criterion::kRadiusEdge
-                                                                                 : core::Criterion::kWellSpaced;
-    }
-    if ((edit >> 7) != 0) {
-      task.then.max_circumradius = 0;
-      task.then.size_boxes.clear();
-    }
+    SetEdit(bytes.Next(), task);
   }
   return task;
 }

@@ -5,6 +5,7 @@
 #include <iostream>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -149,8 +150,16 @@ struct CheckCommand {
   OutputFormat format = OutputFormat::kText;
 
   absl::StatusOr<std::vector<core::SizeBox>> SizeBoxes(int dimension) const;
-  absl::Status Validate(const formats::Mesh& mesh, const core::MeshView& view, const std::vector<core::SizeBox>& boxes,
-                        const std::vector<double>& cloud, const std::optional<formats::PlanarDomain>& domain) const;
+  absl::Status CheckFiles() const;
+  // The points of --cloud, none without it; `report` says how they were read.
+  absl::StatusOr<std::vector<double>> ReadCloudOf(int dimension, CloudReport& report) const;
+  // What the mesh has to meet. REQUIRES: `boxes` and `cloud` outlive the result.
+  core::ValidationOptions ValidationFor(std::span<const core::SizeBox> boxes, std::span<const double> cloud) const;
+  // Holds the mesh to what it has to meet, its boundary too. `domain`: that of --cloud, if it has one.
+  absl::Status Validate(const formats::Mesh& mesh, const core::MeshView& view, std::span<const core::SizeBox> boxes,
+                        std::span<const double> cloud, const std::optional<formats::PlanarDomain>& domain) const;
+  // Prints the end of the report, and returns the exit code. `json`: what is reported so far.
+  int Conclude(const absl::Status& violation, const CloudReport& cloud, const formats::Mesh& mesh, Json json) const;
   int Run() const;
 };
 
@@ -201,21 +210,49 @@ absl::Status ValidateDomain(const formats::Mesh& mesh, const core::MeshView& vie
                                   kBentBy * size);
 }
 
+absl::Status CheckCommand::CheckFiles() const {
+  formats::FilePlan files;
+  files.ReadsMesh("MESH", mesh_path);
+  files.Reads("--cloud", cloud_path);
+  files.Writes("--plot", plot_path);
+  files.Writes("the figures", std::string(formats::kStandardStream));
+  return files.Check();
+}
+
+absl::StatusOr<std::vector<double>> CheckCommand::ReadCloudOf(int dimension, CloudReport& report) const {
+  if (cloud_path.empty() || formats::IsDomainPath(cloud_path)) {
+    return std::vector<double>();
+  }
+  formats::CloudOptions options = cloud_options;
+  options.dimension = dimension;
+  absl::StatusOr<formats::PointCloud> read = formats::ReadCloud(cloud_path, options);
+  if (!read.ok()) {
+    return read.status();
+  }
+  report = ReportOf(options, read->notes, read->skipped);
+  PrintNotes(report, format, /*quiet=*/false);
+  return std::move(read->points);
+}
+
+core::ValidationOptions CheckCommand::ValidationFor(std::span<const core::SizeBox> boxes,
+                                                    std::span<const double> cloud) const {
+  const bool is_well_spaced = criterion == client::Criterion::kWellSpaced;
+  return {.rho = rho,
+          .criterion = is_well_spaced ? core::Criterion::kWellSpaced : core::Criterion::kRadiusEdge,
+          .max_circumradius = max_circumradius,
+          .size_boxes = boxes,
+          .cloud = cloud,
+          .merge_distance = merge_distance,
+          .min_angle_deg = min_dihedral};
+}
+
 absl::Status CheckCommand::Validate(const formats::Mesh& mesh, const core::MeshView& view,
-                                    const std::vector<core::SizeBox>& boxes, const std::vector<double>& cloud,
+                                    std::span<const core::SizeBox> boxes, std::span<const double> cloud,
                                     const std::optional<formats::PlanarDomain>& domain) const {
   if (HasSegments(mesh) || domain.has_value()) {
     return ValidateDomain(mesh, view, rho, domain.has_value() ? &*domain : nullptr);
   }
-  const bool is_well_spaced = criterion == client::Criterion::kWellSpaced;
-  const absl::Status status = core::ValidateMesh(
-      view, {.rho = rho,
-             .criterion = is_well_spaced ? core::Criterion::kWellSpaced : core::Criterion::kRadiusEdge,
-             .max_circumradius = max_circumradius,
-             .size_boxes = boxes,
-             .cloud = cloud,
-             .merge_distance = merge_distance,
-             .min_angle_deg = min_dihedral});
+  const absl::Status status = core::ValidateMesh(view, ValidationFor(boxes, cloud));
   if (!status.ok() || mesh.boundary.empty()) {
     return status;
   }
@@ -229,18 +266,32 @@ absl::Status CheckCommand::Validate(const formats::Mesh& mesh, const core::MeshV
   return core::ValidateBoundary(view, boundary);
 }
 
+int CheckCommand::Conclude(const absl::Status& violation, const CloudReport& cloud, const formats::Mesh& mesh,
+                           Json json) const {
+  if (format == OutputFormat::kJson) {
+    AddNotes(cloud, json);
+    json["valid"] = violation.ok();
+    json["violation"] = violation.ok() ? Json(nullptr) : Json(std::string(violation.message()));
+    PrintJson(json);
+  } else if (!violation.ok()) {
+    std::cout << "violation: " << std::string(violation.message()) << "\n";
+  } else {
+    if (!mesh.boundary.empty()) {
+      std::cout << "boundary: " << WithThousands(mesh.View().Shape().facet_count()) << " facets, "
+                << mesh.boundary.size() << " tags\n";
+    }
+    std::cout << (mesh.weights.empty() ? "" : "the regular triangulation of its weights\n") << "valid\n";
+  }
+  return violation.ok() ? kExitOk : kExitFailed;
+}
+
 int CheckCommand::Run() const {
   const absl::StatusOr<render::PictureFormat> plot_format =
       plot_path.empty() ? render::PictureFormat::kPng : render::PictureFormatOf(plot_path);
   if (!plot_format.ok()) {
     return ReportError(plot_format.status(), format);
   }
-  formats::FilePlan files;
-  files.ReadsMesh("MESH", mesh_path);
-  files.Reads("--cloud", cloud_path);
-  files.Writes("--plot", plot_path);
-  files.Writes("the figures", std::string(formats::kStandardStream));
-  if (const absl::Status status = files.Check(); !status.ok()) {
+  if (const absl::Status status = CheckFiles(); !status.ok()) {
     return ReportError(status, format);
   }
   const absl::StatusOr<formats::Mesh> mesh = formats::ReadMesh(mesh_path);
@@ -258,7 +309,6 @@ int CheckCommand::Run() const {
                            "weights; expected a mesh without, or --min-dihedral")),
                        format);
   }
-  std::vector<double> cloud;
   CloudReport cloud_report;
   std::optional<formats::PlanarDomain> domain;
   if (formats::IsDomainPath(cloud_path)) {
@@ -267,16 +317,10 @@ int CheckCommand::Run() const {
       return ReportError(read.status(), format);
     }
     domain = *std::move(read);
-  } else if (!cloud_path.empty()) {
-    formats::CloudOptions options = cloud_options;
-    options.dimension = mesh->dimension;
-    absl::StatusOr<formats::PointCloud> read = formats::ReadCloud(cloud_path, options);
-    if (!read.ok()) {
-      return ReportError(read.status(), format);
-    }
-    cloud_report = ReportOf(options, read->notes, read->skipped);
-    PrintNotes(cloud_report, format, /*quiet=*/false);
-    cloud = std::move(read->points);
+  }
+  const absl::StatusOr<std::vector<double>> cloud = ReadCloudOf(mesh->dimension, cloud_report);
+  if (!cloud.ok()) {
+    return ReportError(cloud.status(), format);
   }
   const core::MeshView view = {
       .dimension = mesh->dimension, .points = mesh->points, .simplices = mesh->simplices, .weights = mesh->weights};
@@ -294,31 +338,12 @@ int CheckCommand::Run() const {
         return ReportError(plotted, format);
       }
     }
-    status = Validate(*mesh, view, *boxes, cloud, domain);
+    status = Validate(*mesh, view, *boxes, *cloud, domain);
   }
   if (absl::IsInvalidArgument(status)) {  // what was asked for cannot be
     return ReportError(status, format);
   }
-  if (format == OutputFormat::kJson) {
-    AddNotes(cloud_report, json);
-    json["valid"] = status.ok();
-    json["violation"] = status.ok() ? Json(nullptr) : Json(std::string(status.message()));
-    PrintJson(json);
-    return status.ok() ? kExitOk : kExitFailed;
-  }
-  if (!status.ok()) {
-    std::cout << "violation: " << std::string(status.message()) << "\n";
-    return kExitFailed;
-  }
-  if (!mesh->boundary.empty()) {
-    std::cout << "boundary: " << WithThousands(mesh->View().Shape().facet_count()) << " facets, "
-              << mesh->boundary.size() << " tags\n";
-  }
-  if (!mesh->weights.empty()) {
-    std::cout << "the regular triangulation of its weights\n";
-  }
-  std::cout << "valid\n";
-  return kExitOk;
+  return Conclude(status, cloud_report, *mesh, std::move(json));
 }
 
 }  // namespace
