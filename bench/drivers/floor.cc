@@ -68,7 +68,7 @@ double CopySeconds(std::span<const double> points, std::span<const uint32_t> sim
   const Meter meter;
   std::copy(points.begin(), points.end(), points_copy.begin());
   std::copy(simplices.begin(), simplices.end(), simplices_copy.begin());
-  // Somebody could look at them now.
+  // A program could look at them now.
   asm volatile("" : : "r"(points_copy.data()), "r"(simplices_copy.data()) : "memory");
   return meter.Seconds();
 }

@@ -21,7 +21,7 @@ void AddOutput(CLI::App& command, OutputFormat& format) {
 
 void PrintJson(const Json& json, bool indented) { std::cout << json.dump(indented ? 2 : -1) << "\n" << std::flush; }
 
-// The server knows points by their index; who wrote the file knows them by their line.
+// The server knows points by their index; the author of the file knows them by their line.
 absl::Status WithOrigins(const absl::Status& status, uint64_t first_index, uint64_t count,
                          const std::function<std::string(uint64_t)>& origin) {
   constexpr std::string_view kPoint = "points[";

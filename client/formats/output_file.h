@@ -59,8 +59,8 @@ class OutputFile {
   absl::Status status_;
 };
 
-// Unlinks the temporary files of this process, and lets none come or get its name any more: who tries waits for ever.
-// To be called before a signal ends the process, by a thread, not by a handler of signals.
+// Unlinks the temporary files of this process, and lets none come or get its name any more: a thread that tries waits
+// for ever. To be called before a signal ends the process, by a thread, not by a handler of signals.
 void RemoveTemporaryFilesForGood();
 
 }  // namespace wellspace::formats

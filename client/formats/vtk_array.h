@@ -28,7 +28,7 @@ class VtkArrayWriter {
   // Bytes are compressed in blocks of this size; every type's size divides it.
   static constexpr size_t kBlockBytes = 1 << 19;
 
-  // The array will have `bytes` bytes. REQUIRES: `output` outlives this, and nobody else writes to it before Finish.
+  // The array will have `bytes` bytes. REQUIRES: `output` outlives this, and only this writes to it before Finish.
   VtkArrayWriter(OutputFile& output, uint64_t bytes);
 
   // REQUIRES:   no more than `bytes` are added.

@@ -169,12 +169,12 @@ class Acceptance(unittest.TestCase):
         name = remote.create(unit_box(3)).name
         remote.upload(name, uniform(1000, 3, seed=4))
         tiny = unit_box(3, max_circumradius=1e-5)
-        operation, _ = remote.refine(name, tiny)  # foretold
+        operation, _ = remote.refine(name, tiny)  # predicted
         self.assertEqual(operation.error.code, grpc.StatusCode.RESOURCE_EXHAUSTED.value[0])
         self.assertRegex(operation.error.message, r"\d+ [KMG]iB|\d+ bytes|\d+ MB")
         self.assertEqual(remote.refine(name, unit_box(3))[0].state, api().Operation.STATE_SUCCEEDED)
         before = content(remote.download(name)[1])
-        operation, _ = remote.refine(name, tiny)  # not foretold: it grows until it is stopped
+        operation, _ = remote.refine(name, tiny)  # not predicted: it grows until it is stopped
         self.assertEqual(operation.error.code, grpc.StatusCode.RESOURCE_EXHAUSTED.value[0])
         session = remote.get(name)
         self.assertEqual((session.state, session.committed_points), (api().Session.STATE_READY, 1000))
@@ -198,7 +198,7 @@ class Acceptance(unittest.TestCase):
     def test_no_slivers(self):
         points = numpy.loadtxt(ROOT / "examples" / "spot.csv", delimiter=",", skiprows=1)
         angles = {}
-        for demanded in (None, 0, 15):  # None: what whoever asks for nothing gets
+        for demanded in (None, 0, 15):  # None: what a client gets that asks for nothing
             parameters = api().MeshParameters(dimension=3, min_dihedral=demanded)
             metadata, chunks = self.remote.mesh(parameters, points)
             mesh = Mesh(metadata, chunks)
@@ -223,7 +223,7 @@ class Acceptance(unittest.TestCase):
             "90 000 of a grid": grid,
             "a plane in 3-D": numpy.concatenate([grid[::45], numpy.full((2000, 1), 0.5)], axis=1),
         }
-        # Somebody else's work goes on, in the same server.
+        # Another client's work goes on, in the same server.
         theirs = self.remote.create(unit_box(2, max_circumradius=1e-4)).name
         operation = self.remote.start(theirs).name
         for name, points in clouds.items():
@@ -328,7 +328,7 @@ class Acceptance(unittest.TestCase):
         subprocess.run(["openssl", "req", "-x509", "-days", "2", "-subj", "/CN=localhost", "-addext",
                         "subjectAltName=IP:127.0.0.1,DNS:localhost", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes",
                         "-keyout", folder / "key.pem", "-out", folder / "cert.pem"], capture_output=True, check=True)
-        # Nobody opens a plain-text port to other machines by mistake.
+        # No plain-text port is opened to other machines by mistake.
         refused = subprocess.run([BIN / "wellspaced", "--listen", "0.0.0.0:0"], capture_output=True, text=True, timeout=PATIENCE,
                                  check=False)
         self.assertNotEqual(refused.returncode, 0)

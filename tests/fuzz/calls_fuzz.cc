@@ -214,7 +214,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
       message = bytes.TakeBlock();
     }
     if (!method.client_streaming() && messages.size() > 1) {
-      messages.resize(1);  // nobody would take the second one
+      messages.resize(1);  // the second one would not be taken
     }
     service.Call(method, std::move(messages));
   }

@@ -38,7 +38,7 @@ void ReadTokens(std::string_view text) {
   if (!tokens.ok()) {
     const std::string message = MessageOf(tokens.status());
     for (const std::string& word : words) {
-      // It may be a token that nobody hashed.
+      // It may be a token that was not hashed.
       Require(word.size() < server::TokenTable::kMinTokenLength || message.find(word) == std::string::npos,
               "an error repeats no token:", message);
     }

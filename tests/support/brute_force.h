@@ -37,7 +37,7 @@ core::Point<D> ToPoint(const IntegerPoint<D>& p) {
   return out;
 }
 
-// What one plane of a cell is to all who look at it: the face of the box it begins with, or 2 D + the vertex's number.
+// What one plane of a cell is to all that look at it: the face of the box it begins with, or 2 D + the vertex's number.
 using PlaneName = uint32_t;
 template <int D>
 using NodeName = std::array<PlaneName, D>;  // ascending

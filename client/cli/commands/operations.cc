@@ -77,7 +77,7 @@ absl::StatusOr<client::Operation> OperationCommand::Start(client::Client& client
     }
     changed = *std::move(replaced);
   }
-  // Not stopped by Ctrl-C: who does not hear that an operation was started cannot cancel it.
+  // Not stopped by Ctrl-C: a user that does not learn that an operation was started cannot cancel it.
   call.stop = {};
   call.expected_revision = expected_revision;
   absl::StatusOr<client::Operation> started = client.StartRefinement(name, changed, call);

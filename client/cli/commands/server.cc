@@ -1,4 +1,4 @@
-// wellspace server info, health: who is there, and is it well?
+// wellspace server info, health: which server is there, and is it well?
 #include <iostream>
 #include <memory>
 #include <string>
