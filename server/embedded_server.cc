@@ -26,7 +26,7 @@ std::unique_ptr<Server> StartWithoutListener(int workers) {
   ServerOptions options;
   options.service.workers = std::max(1, workers);
   options.service.max_threads = ReadResources().processors;
-  // The process's own machine is the limit: nobody else is to be protected.
+  // The process's own machine is the limit: no other user is to be protected.
   options.service.max_points = core::kMaxVertices;
   options.service.max_vertices = core::kMaxVertices;
   auto log = std::make_shared<spdlog::logger>("embedded", std::make_shared<spdlog::sinks::null_sink_mt>());

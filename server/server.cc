@@ -57,7 +57,7 @@ void EnableHealthAndReflection() {
   static std::once_flag once;
   std::call_once(once, [] {
     // The last one to leave gRPC would wait up to 10 seconds for its poller of writes that did not go out at once:
-    // nobody is the last.
+    // with this reference held, none is the last.
     grpc_init();
     grpc::EnableDefaultHealthCheckService(true);
     grpc::reflection::InitProtoReflectionServerBuilderPlugin();

@@ -24,9 +24,9 @@ class JobPool;
 // What is to be done, and for which tenant.
 struct JobRequest {
   std::string tenant{};
-  // Is expected to end within about a second (server/jobs/job_size.h): need not wait for those that are not.
+  // Is expected to end within about a second (server/jobs/job_size.h): it need not wait for jobs that are not small.
   bool is_small = false;
-  // Of what the work brings along, such as its points; released with the work.
+  // The memory of what the work brings along, such as its points; released with the work.
   MemoryReservation held{};
   // Has to return soon after the context of its job is cancelled, and must not throw.
   std::function<void(Job&)> work{};
@@ -49,8 +49,8 @@ class Job final : private core::MemoryLender, public std::enable_shared_from_thi
 
   // The following are for the work alone.
 
-  // Runs `run` with a context of its own, which is cancelled with that of the job and has the same lender: what the
-  // work needs first, and whose progress is not the job's.
+  // Runs `run` with a context of its own, which is cancelled with the job's and has the same lender. For what the work
+  // needs first: its progress is not the job's.
   absl::Status RunApart(const std::function<absl::Status(core::RunContext&)>& run);
 
   // Hands in what is reserved for what the run goes on with, such as its mesher: it counts as reserved by the run.

@@ -31,10 +31,10 @@ namespace wellspace::server {
 // Small jobs wait for no large ones: where all workers are taken, `small_workers` more run them alone. A small job has
 // a place of its own in the queue, whatever else is in it, and asks for memory without waiting for a starved job.
 //
-// What a run reserves first is its tree, what it then asks for is expected to be all that it needs. No tree is begun
-// with what those that wait with theirs need (RoomForTree in server/jobs/memory_admission.h); and one whose rest fits
-// goes on, first of its tenant or not. When all wait for the trees of one another all the same, one is refused
-// (VictimOfDeadlock).
+// What a run reserves first is its tree. What it asks for then is expected to be all that it needs. Memory that jobs
+// need which wait with their trees is given to no other tree (RoomForTree in server/jobs/memory_admission.h). A job
+// that has its tree goes on as soon as the rest fits, first of its tenant or not. If all jobs wait for the trees of
+// one another all the same, one is refused (VictimOfDeadlock).
 //
 // Thread safety: thread-safe. Work runs without any lock of the pool held.
 // Invariants: (1) at most `workers` jobs run and at most `max_queued` more are in the queue; with small workers as many
@@ -115,9 +115,9 @@ class JobPool {
   bool StartNext();
   // Starts the starved job, if there is one and its memory is there. `*is_held_up`: no other may start before it.
   bool StartStarved(uint64_t room_for_tree, bool* is_held_up);
-  // Gives a small worker to the small job whose turn it is, if there is one whose memory is there.
+  // Gives a small worker to the small job whose turn it is, if the memory of one is there.
   bool StartSmall();
-  // Resumes the oldest that waits with its tree and whose memory is there, first of its tenant or not.
+  // Resumes the oldest job that waits with its tree and whose memory is there, first of its tenant or not.
   bool StartOneWithATree();
   // Refuses the victim of a deadlock, if there is one.
   bool RefuseVictim();
@@ -153,7 +153,7 @@ class JobPool {
   std::deque<std::shared_ptr<Job>> started_;         // wait for their thread to wake
   std::map<uint64_t, std::shared_ptr<Job>> begun_;   // have a thread: they run, or wait for memory
   int running_ = 0;                                  // have a worker: started_, and begun_ that do not wait
-  int running_small_ = 0;                            // the same on small workers
+  int running_small_ = 0;                            // have a small worker
   int small_jobs_ = 0;                               // in the queue or running
   Counters counters_;
   std::condition_variable idle_;

@@ -14,7 +14,8 @@ namespace wellspace::server {
 
 class MemoryReservation;
 
-// Counts reservations against a limit. Nothing is allocated here: who reserves takes care to hold no more.
+// Counts reservations against a limit. Nothing is allocated here: the holder of a reservation takes care to hold no
+// more.
 //
 // Thread safety: thread-safe. A listener's locks must not be held when bytes are released.
 // Invariants: (1) reserved() <= limit(); (2) lasting() <= reserved(); (3) a reservation does not outlive its budget.

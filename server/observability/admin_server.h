@@ -18,7 +18,7 @@ namespace wellspace::server {
 void LeaveOutChannelz(grpc::ServerBuilder& builder);
 
 // Serves grpc.channelz.v1 for all gRPC servers and channels of the process, health and reflection, in plain text and to
-// whoever can connect, until it is destroyed.
+// all that can connect, until it is destroyed.
 class AdminServer {
  public:
   // Listens on `listen`, HOST:PORT on the loopback; port 0 takes a free one. REQUIRES: `observer` outlives this.

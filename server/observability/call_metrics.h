@@ -23,7 +23,7 @@ std::string_view CodeLabel(grpc::StatusCode code);
 // grpc_server_handling_seconds by grpc_type, grpc_service, grpc_method and, of those handled, grpc_code.
 //
 // Thread safety: thread-safe.
-// Invariants: the series are all there from the start, at 0; calls of methods that nobody serves are counted under
+// Invariants: the series are all there from the start, at 0; calls of methods that no service has are counted under
 // "unknown", so what clients send cannot make more.
 class CallMetrics {
  public:
@@ -31,7 +31,7 @@ class CallMetrics {
   struct Method {
     std::string service;  // "wellspace.v1.MeshingService"
     std::string name;     // "MeshPoints"
-    bool is_known;        // false: of all methods that nobody serves
+    bool is_known;        // false: of all methods that no service has
     prometheus::Counter* started;
     prometheus::Counter* received;  // messages
     prometheus::Counter* sent;      // messages

@@ -31,7 +31,7 @@ class Connections;
 // Thread safety: thread-safe.
 class CallObserver {
  public:
-  // Who calls, "" if nobody knows. Neither waits nor does I/O.
+  // The tenant of the caller, "" if it is not known. Neither waits nor does I/O.
   using TenantOf = std::function<std::string(const grpc::ServerContextBase&)>;
 
   // `connections` are told of each call. REQUIRES: `log`, `metrics` and `connections` outlive this, and this the

@@ -21,10 +21,10 @@ struct RefinementReport {
   uint64_t points = 0;          // of the session
   uint64_t replayed_steps = 0;  // before it, since the mesher had been given up
   uint64_t vertices = 0;        // of the new mesh; 0: there is none
-  uint64_t simplices = 0;       // the same
+  uint64_t simplices = 0;       // of the new mesh
 };
 
-// Is told what work was done, and writes and counts it. Those who do the work know neither the log nor the metrics.
+// Is told what work was done, logs it and counts it. The code that does the work knows neither the log nor the metrics.
 //
 // Thread safety: thread-safe.
 class WorkObserver {

@@ -113,8 +113,6 @@ absl::StatusOr<TlsMaterial> ReadTlsFiles(const TlsOptions& options) {
   return material;
 }
 
-absl::Status CheckTlsFiles(const TlsOptions& options) { return ReadTlsFiles(options).status(); }
-
 std::shared_ptr<const TlsMaterial> TlsSource::Get() const {
   std::lock_guard lock(mutex_);
   return material_;

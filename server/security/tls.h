@@ -41,9 +41,6 @@ struct TlsMaterial {
 //             read.
 absl::StatusOr<TlsMaterial> ReadTlsFiles(const TlsOptions& options);
 
-// Whether connections can be made with these files. Errors: those of ReadTlsFiles.
-absl::Status CheckTlsFiles(const TlsOptions& options);
-
 // What new connections are made with, all of it replaced at once while a server runs.
 //
 // Thread safety: thread-safe.

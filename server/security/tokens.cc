@@ -58,7 +58,7 @@ absl::StatusOr<TokenTable> TokenTable::Parse(std::string_view text) {
     if (fields.empty()) {
       continue;
     }
-    // The line itself stays out of the messages: it may be a token that somebody forgot to hash.
+    // The line itself stays out of the messages: it may be a token that was not hashed by mistake.
     const std::string digest = fields.size() == 2 ? ParseHash(fields[1]) : "";
     if (digest.empty()) {
       return absl::InvalidArgumentError(

@@ -1,4 +1,4 @@
-// An operation: long work on a session, as those see it who ask for it.
+// An operation: long work on a session, as its clients see it.
 #ifndef WELLSPACE_SERVER_SESSIONS_OPERATION_H_
 #define WELLSPACE_SERVER_SESSIONS_OPERATION_H_
 

@@ -23,7 +23,7 @@ class TenantPoints {
   enum class Outcome { kTaken, kAboveLimit, kNoRoom };
   struct Taken {
     Outcome outcome;
-    uint64_t points;  // those that there are, or would be
+    uint64_t points;  // how many there are now, or, if they were not taken, would be
   };
 
   uint64_t points() const;

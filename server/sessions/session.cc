@@ -299,7 +299,7 @@ absl::Status Session::Query(uint64_t* version, const std::function<absl::Status(
     }
     *version = structure_version_;
     mesher = work_.mesher.get();
-    running.lock();  // at once: whoever waits for queries has made the session busy before
+    running.lock();  // at once: the session is made busy before anything waits for queries
   }
   return query(*mesher);
 }

@@ -51,8 +51,8 @@ struct AddedVertices {
 // What an operation works on. The session has given it away until the operation has ended.
 struct SessionWork {
   std::unique_ptr<core::Mesher> mesher;      // null: there is none yet, or it was given up
-  uint64_t meshed_points = 0;                // of the session's points, those that `mesher` has, or would have
-  std::shared_ptr<const MeshSnapshot> mesh;  // the last one; null: there is none yet
+  uint64_t meshed_points = 0;                // how many of the session's points `mesher` has, or would have
+  std::shared_ptr<const MeshSnapshot> mesh;  // the last mesh; null before the first
   MemoryReservation memory;                  // of `mesher`
 };
 
@@ -98,12 +98,12 @@ class Session {
   absl::Status Update(std::optional<std::map<std::string, std::string>> labels, std::optional<absl::Duration> ttl,
                       uint64_t expected_revision);
 
-  // From now on all that changes or asks for points and mesh ends with SESSION_NOT_FOUND. For a session that leaves its
-  // store; returns the operation that is under way, which is to be cancelled, or null.
+  // For a session that leaves its store: from now on every change, and every question about points and mesh, ends with
+  // SESSION_NOT_FOUND. Returns the operation that is under way, which the caller is to cancel, or null.
   //
   // Errors:     REVISION_MISMATCH, SESSION_NOT_FOUND (it was closed before): nothing has been done.
   absl::StatusOr<std::shared_ptr<Operation>> Close(uint64_t expected_revision);
-  // The same if the lease has run out, so that nothing is under way; says whether it has.
+  // Closes the session if its lease has run out, so that nothing is under way. Says whether it has.
   bool CloseIfExpired();
 
   // Lets one upload have the session. False: another has it.
@@ -121,8 +121,8 @@ class Session {
   // Errors:     UPLOAD_GAP, UPLOAD_MISMATCH.
   absl::Status CheckPrefix(const Prefix& prefix) const;
 
-  // Appends those of `coordinates`, whole points of which the first is number `offset` of the session, that it does not
-  // have yet; the others have to be those that it has. `expected_revision` 0: any.
+  // Appends `coordinates`: whole points, of which the first becomes number `offset` of the session. Where the session
+  // has points already, they have to be equal, and are not appended again. `expected_revision` 0: any.
   //
   // Errors:     INVALID_CHUNK_SHAPE, INVALID_POINTS, UPLOAD_GAP, UPLOAD_MISMATCH, SESSION_BUSY, TOO_MANY_POINTS,
   //             QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH, SESSION_NOT_FOUND. Nothing has been appended.
@@ -133,26 +133,26 @@ class Session {
   // The last mesh; null before the first.
   std::shared_ptr<const MeshSnapshot> mesh() const;
 
-  // Has a structure to be queried, or to be added to, on this thread, a worker's: where a mesher was given up, it is
-  // built again by `job`. `*is_at_work`: another job does that now, and the status is SESSION_BUSY.
+  // Makes sure that the session has a structure for queries and additions. Where the mesher was given up, `job` builds
+  // it again, on this thread, a worker's. `*is_at_work`: another job builds it now, and the status is SESSION_BUSY.
   //
   // Errors:     MESH_NOT_READY, SESSION_BUSY, SESSION_NOT_FOUND, REVISION_MISMATCH; of building it again: MEMORY_LIMIT,
-  //             OUT_OF_MEMORY, CANCELLED. It can be tried again.
+  //             OUT_OF_MEMORY, CANCELLED. The caller may try again.
   absl::Status PrepareStructure(uint64_t expected_revision, const MesherFactory& create_mesher, Job& job,
                                 bool* is_at_work = nullptr);
 
-  // What work on the session would have to do with, now.
+  // How much there is to work on now.
   struct Size {
     uint64_t points = 0;
-    std::vector<double> some_points;  // all, if they are few
+    std::vector<double> some_points;  // all, if they are at most `few`; else none
     uint64_t vertices = 0;            // of the last mesh
-    uint64_t replayed_steps = 0;      // before anything else
+    uint64_t replayed_steps = 0;      // that have to be replayed before any other work
   };
   Size GetSize(uint64_t few) const;
 
-  // Runs `query` on this thread, a worker's. Any number of queries run at once. An operation that begins waits for
-  // those that run: keep each short (some milliseconds) and ask again for the next batch.
-  // `version` is that of the structure: 0 for the first batch, which sets it; for later ones as it was set.
+  // Runs `query` on this thread, a worker's. Any number of queries run at once. An operation that begins waits for the
+  // queries that run: keep each short (some milliseconds), and call this again for the next batch.
+  // `version` is the structure's: 0 for the first batch, which sets it; later batches leave it as it was set.
   //
   // Errors:     MESH_NOT_READY, SESSION_BUSY, SESSION_NOT_FOUND; REVISION_MISMATCH when the structure is no longer at
   //             `version`; those of `query`.
@@ -168,57 +168,58 @@ class Session {
   absl::StatusOr<AddedVertices> AddVertices(std::span<const double> points, std::span<const uint32_t> near,
                                             uint64_t expected_revision, core::RunContext& context);
 
-  // Begins an operation, whose work the caller is to submit: the session is busy until the operation has ended. If the
-  // work cannot be submitted, the caller calls Withdraw.
+  // Begins an operation. The session is busy until the operation has ended. The caller is to submit its work, or, if
+  // that is refused, to call Withdraw.
   //
   // Errors:     SESSION_BUSY, REVISION_MISMATCH, SESSION_NOT_FOUND.
   absl::StatusOr<std::shared_ptr<Operation>> StartOperation(const core::MeshParameters& parameters,
                                                             uint64_t expected_revision);
-  // Ends the operation that was started last, whose work was refused with `status`: the session is as it was before,
-  // and has no such operation. One that was cancelled in between stays, as cancelled.
+  // Ends `operation`, the one that was started last, since its work was refused with `status`. The session is as it was
+  // before it, and does not have it any more. An operation that was cancelled in between stays, as cancelled.
   //
-  // REQUIRES:   no job works on it.
+  // REQUIRES:   no job works on `operation`.
   void Withdraw(Operation& operation, const absl::Status& status);
-  // On the worker, whose job the operation has: what to work on; nothing if the operation has ended before it could
-  // begin.
+  // On the worker: what to work on; nothing if the operation has ended before it could begin.
+  //
+  // REQUIRES:   the operation has its job.
   std::optional<SessionWork> BeginWork(Operation& operation);
-  // On the worker: takes back what BeginWork gave, and ends the operation with `status`. `mesh` is the new mesh if that
-  // is OK.
+  // On the worker: takes back what BeginWork gave, and ends the operation with `status`. `mesh` is the new mesh if the
+  // status is OK.
   //
   // REQUIRES:   on an error, work.mesher is as it was, or null.
   void EndWork(Operation& operation, const absl::Status& status, SessionWork work, std::shared_ptr<MeshSnapshot> mesh);
-  // Ends an operation that still waits for a worker as CANCELLED; false when it does not.
+  // Ends an operation that still waits for a worker as CANCELLED. False, and nothing is done, if it does not wait.
   bool EndWaiting(Operation& operation);
 
   // Errors:     OPERATION_NOT_FOUND.
   absl::StatusOr<std::shared_ptr<Operation>> FindOperation(const std::string& operation_name) const;
-  // Those after number `after`, the oldest first, at most `count`.
+  // The operations after number `after`, the oldest first, at most `count`.
   std::vector<std::shared_ptr<Operation>> ListOperations(uint64_t after, size_t count) const;
 
-  // The points. To be called by the operation that is under way.
+  // These two are for the operation that is under way.
   const PointStore& points() const { return points_; }
-  // What has made the structure. The same.
+  // What has made the structure.
   const SessionSteps& steps() const { return steps_; }
 
  private:
   friend class SessionUse;
 
-  // What changes the points or the mesh, and lets nothing else do so.
+  // Which change of the points or the mesh is under way. There is one at most.
   enum class Busy { kNo, kOperation, kAddingVertices, kReplaying };
 
   // The following want mutex_ to be held.
   absl::Status CheckOpen() const;
   absl::Status CheckRevision(uint64_t expected_revision) const;
   absl::Status CheckIdle() const;
-  // All three.
+  // All three of these.
   absl::Status CheckReadyForChange(uint64_t expected_revision) const;
   // Whether there is something to query, or to build again.
   absl::Status CheckMesh() const;
   // Whether there is something to query now.
   absl::Status CheckStructure() const;
-  // That an upload begins at `offset` with no gap before it.
+  // Checks that an upload begins at `offset` with no gap before it.
   absl::Status CheckNoGap(uint64_t offset) const;
-  // That `coordinates` are those that the session has from point `first` on.
+  // Checks that the session has `coordinates` from point `first` on.
   absl::Status CheckKnown(uint64_t first, std::span<const double> coordinates) const;
   // Refuses what no mesh of this session could have. `first` is the number of the first point.
   absl::Status CheckCoordinates(uint64_t first, std::span<const double> coordinates) const;
@@ -227,20 +228,22 @@ class Session {
   void BeginBusy(Busy busy);
   void EndBusy();
 
-  // Without it, once nothing can begin a query any more: waits for those that run.
+  // The following are called without mutex_.
+
+  // Waits for the queries that run. To be called when no other can begin.
   void WaitForQueries();
-  // Without it, while the mesher is being built again: what it is built by.
+  // Builds the mesher again. To be called while the session is Busy::kReplaying.
   absl::Status Rebuild(const MesherFactory& create_mesher, Job& job);
-  // Without it: what AddVertices does before the mesher is touched; keeps others from the session then.
+  // What AddVertices does before it touches the mesher; makes the session Busy::kAddingVertices.
   absl::Status BeginAddition(std::span<const double> points, std::span<const uint32_t> near,
                              uint64_t expected_revision);
-  // Without it, while vertices are being added: the part that is the mesher's. `*uploaded` of the points that waited
-  // are in it then, on an error too.
+  // The part of AddVertices that the mesher does. First it takes in the points that were uploaded since it was last
+  // refined; `*uploaded` says how many it has taken in, on an error too.
   absl::StatusOr<std::vector<uint32_t>> AddToMesher(std::span<const double> points, std::span<const uint32_t> near,
                                                     core::RunContext& context, uint64_t* uploaded);
-  // The same: what of AddVertices is wrong before anything is done.
+  // Checks what AddVertices is given. The mesher is to take in `waiting` points before.
   absl::Status CheckVertices(std::span<const double> points, std::span<const uint32_t> near, uint64_t waiting) const;
-  // The same: has room for `count` more vertices in the mesher, or says that there is none.
+  // Reserves memory for `count` more vertices in the mesher.
   absl::Status ReserveForVertices(uint64_t count);
 
   const std::string tenant_;
@@ -261,14 +264,14 @@ class Session {
   bool is_uploading_ = false;
   bool is_ready_ = false;  // the last operation succeeded, and no points have come since
   uint64_t revision_ = 1;
-  PointAccount point_account_;      // with the points that AddVertices is adding
+  PointAccount point_account_;      // includes the points that AddVertices is adding
   PointStore points_;               // see invariant (2)
   SessionWork work_;                // its mesher is away while an operation is under way; see invariant (2)
   SessionSteps steps_;              // see invariant (2)
   uint64_t structure_version_ = 0;  // of what queries see; 0: nothing yet
   uint64_t next_operation_ = 1;
   std::deque<std::shared_ptr<Operation>> operations_;  // ascending by number
-  std::shared_ptr<Operation> displaced_;  // the one that the last of these has displaced, until its work has begun
+  std::shared_ptr<Operation> displaced_;  // the one that made room for the last, until the work of the last has begun
 };
 
 // Keeps a session from expiring, and renews its lease at the end.

@@ -56,7 +56,7 @@ void ReadCertificates(std::string_view text) {
   const server::TlsOptions options = {.certificate = folder.Write("certificate", parts[0]),
                                       .key = folder.Write("key", parts[1]),
                                       .client_ca = parts[2].empty() ? "" : folder.Write("ca", parts[2])};
-  if (const absl::Status status = server::CheckTlsFiles(options); !status.ok()) {
+  if (const absl::Status status = server::ReadTlsFiles(options).status(); !status.ok()) {
     MessageOf(status);
     RequireClearMessage({status.message().data(), status.message().size()});
   }

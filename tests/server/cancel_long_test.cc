@@ -136,7 +136,7 @@ TEST_F(CancelTest, InRefinementAndSimplicesOfALargeMesh) {
   }
 }
 
-// Slivers are repaired by the default.
+// Slivers are repaired by default.
 TEST_F(CancelTest, InRepairOfALargeMesh) {
   points_ = RandomPoints(60'000, 3);
   for (const double fraction : {0.0, 0.82, 0.86, 0.9, 0.94, 0.98}) {

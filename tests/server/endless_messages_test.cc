@@ -37,7 +37,7 @@ class EndlessMessages : public ::testing::Test {
     daemon_->Stop();
   }
 
-  // Nobody works: what the server takes is what gRPC holds.
+  // No job runs: what the server takes is what gRPC holds.
   void ExpectReceivedAtMost([[maybe_unused]] uint64_t bytes) const {
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
     EXPECT_LT(daemon_->process().PeakMemory(), kMaxMemoryBytes + bytes);

@@ -1,5 +1,5 @@
-// The real server among clients that speak HTTP/2 badly on purpose: it closes what cannot go on, and serves everybody
-// else.
+// The real server among clients that speak HTTP/2 badly on purpose: it closes what cannot go on, and serves all
+// others.
 #include <algorithm>
 #include <string>
 #include <vector>
@@ -88,7 +88,7 @@ TEST_F(MalformedHttp2, AfterThePrefaceSettingsHaveToCome) {
 }
 
 TEST_F(MalformedHttp2, FramesOfAWrongSizeEndTheConnection) {
-  // Larger than anybody has agreed to: it is refused by its length, before it has come.
+  // Larger than the two have agreed on: it is refused by its length, before it has come.
   EXPECT_TRUE(Closes(std::string("\xff\xff\xff\x00\x00\x00\x00\x00\x01", 9)));
   EXPECT_TRUE(Closes(std::string("\xff\xff\xff\x77\x00\x00\x00\x00\x00", 9)));
   EXPECT_TRUE(Closes(Frame{.type = Frame::kPing, .payload = "short"}));
@@ -111,11 +111,11 @@ TEST_F(MalformedHttp2, SettingsThatCannotBeEndTheConnection) {
   EXPECT_TRUE(Closes(settings(kFrameSize, 0xffffffff)));
 }
 
-TEST_F(MalformedHttp2, HeadersThatCannotBeDecodedHarmNobody) {
+TEST_F(MalformedHttp2, HeadersThatCannotBeDecodedHarmNoOther) {
   int closed = 0;
   for (const std::string& hpack :
        {std::string("\x80", 1),                                  // the entry 0
-        std::string("\xff\xff\xff\xff\x7f", 5),                  // an entry that nobody made
+        std::string("\xff\xff\xff\xff\x7f", 5),                  // an entry that was never made
         std::string("\xff\xff\xff\xff\xff\xff\xff\xff", 8),      // a number without end
         std::string("\x3f\xff\xff\xff\x7f", 5),                  // a table of half a gigabyte
         std::string("\x00\x7f\xff\xff\xff\x7f", 6),              // a name of half a gigabyte
@@ -131,7 +131,7 @@ TEST_F(MalformedHttp2, HeadersThatCannotBeDecodedHarmNobody) {
   EXPECT_GE(closed, 3);
 }
 
-TEST_F(MalformedHttp2, HeadersThatMustNotBeSentHarmNobody) {
+TEST_F(MalformedHttp2, HeadersThatMustNotBeSentHarmNoOther) {
   for (const std::string& header :
        {Header("Upper-Case", "x"), Header("with\nnewline", "x"), Header("x", std::string("a\0b", 3)),
         Header("", "no name"), Header(":path", "twice"), Header(":unknown", "x"), Header("grpc-timeout", "forever"),
@@ -155,7 +155,7 @@ TEST_F(MalformedHttp2, MetadataWithoutEndIsRefused) {
   EXPECT_EQ(connection.ReadStatus(1), grpc::StatusCode::RESOURCE_EXHAUSTED);
 }
 
-TEST_F(MalformedHttp2, HeadersInPiecesWithoutEndAreWaitedForAtNobodyElsesCost) {
+TEST_F(MalformedHttp2, HeadersInPiecesWithoutEndAreWaitedForAtNoOthersCost) {
   Frame first = BeginCall(1, kInfo);
   first.flags = 0;
   RawConnection waiting = Begin();
@@ -179,7 +179,7 @@ TEST_F(MalformedHttp2, FramesOutOfOrderEndTheConnection) {
   EXPECT_TRUE(Closes(unfinished.Serialize() + of_another.Serialize()));
 }
 
-TEST_F(MalformedHttp2, StreamsThatCannotBeHarmNobody) {
+TEST_F(MalformedHttp2, StreamsThatCannotBeHarmNoOther) {
   for (const uint32_t stream : {0u, 2u, 0x7ffffffeu}) {
     RawConnection connection = Begin();
     connection.Send(BeginCall(stream, kInfo));

@@ -222,7 +222,7 @@ TEST(Server, ListensOnLoopbackAndSaysWhere) {
   const absl::StatusOr<std::unique_ptr<Server>> server = Server::Start(options, NoLog());
   ASSERT_TRUE(server.ok()) << server.status();
   EXPECT_THAT((*server)->address(), ::testing::MatchesRegex("127\\.0\\.0\\.1:[1-9][0-9]*"));
-  // Nobody else gets the same port.
+  // No other server gets the same port.
   EXPECT_EQ(StartOn((*server)->address()).code(), absl::StatusCode::kUnavailable);
 }
 

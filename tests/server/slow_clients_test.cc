@@ -82,7 +82,7 @@ TEST_F(SlowClients, WithoutCallsAreClosed) {
   ExpectServing();
 }
 
-TEST_F(SlowClients, InTheMiddleOfHeadersOrMessagesHoldUpNobody) {
+TEST_F(SlowClients, InTheMiddleOfHeadersOrMessagesHoldUpNoOther) {
   constexpr int kRounds = 10;
   Start({});
   for (int round = 0; round < kRounds; ++round) {

@@ -1,4 +1,4 @@
-// Clients that stop in the middle of a stream: they are dropped, and nobody else notices.
+// Clients that stop in the middle of a stream: they are dropped, and no other client notices.
 #include <memory>
 #include <string>
 #include <vector>

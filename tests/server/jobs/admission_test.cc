@@ -245,7 +245,7 @@ TEST_F(AdmissionBesideAHolder, CancelWhileWaitingForMemoryGivesAllBack) {
   LetGo();
 }
 
-// Every kind of small work, where each worker and each place in the line has a large mesh of another.
+// Every kind of small work, where each worker and each place in the queue has a large mesh of another.
 TEST(Admission, SmallWorkWaitsForNoLargeMesh) {
   Event begun;
   Event may_end;
@@ -270,7 +270,7 @@ TEST(Admission, SmallWorkWaitsForNoLargeMesh) {
   const std::unique_ptr<TestCall> waiting = start(10'000);
   while (harness.Info().queued_jobs() != 1) {
   }
-  EXPECT_EQ(start(10'000)->Finish().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED) << "the line is full";
+  EXPECT_EQ(start(10'000)->Finish().error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED) << "the queue is full";
   for (int i = 0; i < 20; ++i) {
     const grpc::Status status = start(300)->Finish();
     EXPECT_TRUE(status.ok()) << status.error_message();

@@ -96,7 +96,7 @@ TEST_F(TokensWanted, EveryMethodAsksBeforeAnythingElse) {
   }
 }
 
-TEST_F(TokensWanted, HealthIsForEverybody) { EXPECT_TRUE(CallEmpty("/grpc.health.v1.Health/Check").ok()); }
+TEST_F(TokensWanted, HealthIsForAll) { EXPECT_TRUE(CallEmpty("/grpc.health.v1.Health/Check").ok()); }
 
 TEST_F(TokensWanted, AStreamIsRefusedBeforeItHasSentAll) {
   TestCall call(harness_.stub());
@@ -121,7 +121,7 @@ TEST_F(TokensWanted, TheLogKnowsTheTenantAndNotTheToken) {
   EXPECT_EQ(harness_.log().Count("kkk"), 0u);
 }
 
-TEST(NoDemands, EverybodyIsTheTenantDefault) {
+TEST(NoDemands, EveryCallerIsTheTenantDefault) {
   ServiceHarness harness;
   TestCall call(harness.stub());
   call.Send(UnitCubeParameters());

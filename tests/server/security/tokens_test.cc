@@ -55,7 +55,7 @@ TEST(Tokens, SaysWhichLineIsWrong) {
   }
 }
 
-TEST(Tokens, ATokenThatNobodyHashedStaysOutOfTheMessage) {
+TEST(Tokens, ATokenThatWasNotHashedStaysOutOfTheMessage) {
   const absl::Status status = TokenTable::Parse(absl::StrCat("acme ", kToken)).status();
   EXPECT_THAT(std::string(status.message()), Not(HasSubstr(kToken)));
 }

@@ -228,7 +228,7 @@ TEST(SlowReader, IsNotDroppedAsLongAsItReads) {
   EXPECT_EQ(call.chunks.size(), call.metadata.at(0).chunk_count());
 }
 
-TEST(SlowReader, CostsABoundedBufferAndHoldsUpNobodyElse) {
+TEST(SlowReader, CostsABoundedBufferAndHoldsUpNoOther) {
   ServiceHarness harness;
   TestCall slow(harness.stub());
   ASSERT_NO_FATAL_FAILURE(ReadFirstChunk(slow));

@@ -277,7 +277,7 @@ TEST_F(SessionServiceTest, ACallForAnotherRevisionChangesNothing) {
 }
 
 // "Sessions leaked by clients that died".
-TEST_F(SessionServiceTest, ASessionThatNobodyUsesIsDeleted) {
+TEST_F(SessionServiceTest, AnUnusedSessionIsDeleted) {
   v1::CreateSessionRequest request = CreateRequest();
   request.mutable_ttl()->set_seconds(1);
   const v1::Session session = calls_.Create(request);

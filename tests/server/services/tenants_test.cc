@@ -126,7 +126,7 @@ class TenantsTest : public ::testing::Test {
   std::string operation_;
 };
 
-// A name of the same form that nobody has.
+// A name of the same form that no session has.
 std::string Unused(std::string name) {
   char& letter = name[std::string("sessions/").size()];
   letter = letter == 'a' ? 'b' : 'a';

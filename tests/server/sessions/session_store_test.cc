@@ -85,7 +85,7 @@ TEST_F(SessionStoreTest, AnUnusedSessionExpires) {
   EXPECT_EQ(store_.List("a", absl::InfinitePast(), 10, {}).size(), 1u) << "and renews nothing";
   since_boot_ += absl::Seconds(1);
   EXPECT_TRUE(store_.List("a", absl::InfinitePast(), 10, {}).empty());
-  EXPECT_FALSE(Finds(*session)) << "though nobody has swept yet";
+  EXPECT_FALSE(Finds(*session)) << "though the sweep has not come yet";
   EXPECT_EQ(DetailsOf(status_).reason, "SESSION_NOT_FOUND");
   EXPECT_EQ(store_.RemoveExpired().size(), 1u);
   EXPECT_TRUE(store_.RemoveExpired().empty());
