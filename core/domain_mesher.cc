@@ -90,7 +90,7 @@ std::string PartName(int64_t part) {
   if (part < std::numeric_limits<int32_t>::min()) {
     return FaceName(static_cast<int>(part - kFirstSide));
   }
-  return part == 0 ? "unmarked" : absl::StrCat("marker ", part);
+  return part == 0 ? "unmarked" : absl::StrCat("marker_", part);
 }
 
 }  // namespace
@@ -360,7 +360,7 @@ void DomainMesher::SetRegions(std::span<const uint32_t> faces, Mesh& mesh) const
     regions[id] = value;
   }
   for (const auto& [id, value] : regions) {
-    mesh.regions.push_back({id, value == 0 ? "domain" : absl::StrCat("region ", value)});
+    mesh.regions.push_back({id, value == 0 ? "domain" : absl::StrCat("region_", value)});
   }
   if (regions.size() > 1) {
     mesh.simplex_regions.reserve(faces.size());

@@ -499,12 +499,15 @@ void QueryStructure<D>::ScanFor(NodeId own, Workspace<D>& workspace, Cut cut) co
 template <int D>
 void QueryStructure<D>::Scan(VertexId v, Workspace<D>& workspace, const ExtraVertices<D>& others) const {
   const NodeId own = LeafOf(v);
+  [[maybe_unused]] const bool has_segments = !tree_.segments().IsEmpty();
   workspace.segments.clear();
   ScanFor(own, workspace, [&](NodeId leaf) {
     CutByLeaf(leaf, v, workspace);
     if constexpr (D == 2) {
-      const std::span<const uint32_t> segments = tree_.segments().Of(leaf);
-      workspace.segments.insert(workspace.segments.end(), segments.begin(), segments.end());
+      if (has_segments) {
+        const std::span<const uint32_t> segments = tree_.segments().Of(leaf);
+        workspace.segments.insert(workspace.segments.end(), segments.begin(), segments.end());
+      }
     }
     if (leaf == own) {
       CutByOthers(others, v, workspace);

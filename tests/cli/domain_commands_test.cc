@@ -81,7 +81,7 @@ TEST_F(DomainCommandsTest, PolyWithAHoleAndMarkers) {
   EXPECT_NEAR(AreaOf(*mesh), 12, 1e-12);
   ASSERT_EQ(mesh->boundary.size(), 2u);
   EXPECT_THAT((std::vector<int32_t>{mesh->boundary[0].tag, mesh->boundary[1].tag}), ElementsAre(5, 9));
-  EXPECT_EQ(mesh->boundary[1].name, "marker 9");
+  EXPECT_EQ(mesh->boundary[1].name, "marker_9");
 }
 
 TEST_F(DomainCommandsTest, GeoJsonHasIslandsInLakes) {

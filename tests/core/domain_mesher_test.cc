@@ -141,7 +141,7 @@ TEST(DomainMesherTest, AHoleStaysEmptyAndItsEdgeHasAMarker) {
   EXPECT_NEAR(AreaOf(*mesh), outer - inner, 1e-12);
   ASSERT_EQ(mesh->boundary.size(), 2u);
   EXPECT_EQ(mesh->boundary[0].tag, 5);
-  EXPECT_EQ(mesh->boundary[1].name, "marker 7");
+  EXPECT_EQ(mesh->boundary[1].name, "marker_7");
   EXPECT_EQ(mesh->boundary[0].facets + mesh->boundary[1].facets, mesh->facet_count());
   EXPECT_LE(mesh->statistics.max_radius_edge, std::numbers::sqrt2 * (1 + 1e-9));
   // The domain is on the left of every facet, whose triangle there has both ends.
