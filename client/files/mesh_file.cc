@@ -1,7 +1,5 @@
 #include "client/files/mesh_file.h"
 
-#include "absl/strings/str_cat.h"
-
 namespace wellspace::client {
 namespace {
 
@@ -15,10 +13,6 @@ uint64_t InputVerticesOf(const MeshStatistics& statistics) {
 
 absl::Status MeshFile::Begin(const MeshHeader& header) {
   header_ = header;
-  if (header.has_simplex_regions) {
-    return absl::UnimplementedError(
-        absl::StrCat("cannot write ", path_, ": simplices of ", header.regions.size(), " regions, and files hold one"));
-  }
   formats::MeshShape shape = {
       .dimension = header.dimension,
       .vertex_count = header.vertex_count,
@@ -27,6 +21,7 @@ absl::Status MeshFile::Begin(const MeshHeader& header) {
       .has_weights = header.has_weights,
       .has_vertex_marks = header.has_vertex_marks,
       .boundary = {},
+      .has_simplex_regions = header.has_simplex_regions,
       .regions = {},
       .low = header.domain_low,
       .high = header.domain_high,

@@ -37,6 +37,9 @@ class MeshFile final : public MeshSink {
     return writer_->AddVertexOrigins(origins);
   }
   absl::Status AddVertexTags(std::span<const int32_t> tags) override { return writer_->AddVertexTags(tags); }
+  absl::Status AddSimplexRegions(std::span<const int32_t> regions) override {
+    return writer_->AddSimplexRegions(regions);
+  }
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override { return writer_->AddSimplices(simplices); }
   absl::Status AddInputVertices(std::span<const uint32_t> vertices) override;
   absl::Status AddFacets(std::span<const uint32_t> facets) override { return writer_->AddFacets(facets); }

@@ -60,7 +60,8 @@ struct MeshShape {
   bool has_weights = false;
   bool has_vertex_marks = false;         // each vertex has an origin and a tag
   std::vector<BoundaryPart> boundary{};  // in the order of their facets; empty: nothing is told of the boundary
-  std::vector<Region> regions{};         // all simplices are of the only one; empty: nothing is told of regions
+  bool has_simplex_regions = false;      // if not, all simplices are of the only region
+  std::vector<Region> regions{};         // empty: nothing is told of regions
   std::vector<double> low{};             // of the mesh's box; may be missing where there is no boundary
   std::vector<double> high{};
 
@@ -79,6 +80,7 @@ struct MeshView {
   std::span<const int32_t> vertex_tags{};      // vertex_count; 0: inside
   std::span<const uint32_t> facets{};          // facet_count x dimension, part after part
   std::span<const BoundaryPart> boundary{};
+  std::span<const int32_t> simplex_regions{};  // simplex_count ids; empty: all are of the only region
   std::span<const Region> regions{};
 
   uint64_t vertex_count() const { return dimension == 0 ? 0 : points.size() / dimension; }
@@ -91,6 +93,7 @@ struct MeshView {
                     .has_weights = !weights.empty(),
                     .has_vertex_marks = !vertex_tags.empty(),
                     .boundary = {boundary.begin(), boundary.end()},
+                    .has_simplex_regions = !simplex_regions.empty(),
                     .regions = {regions.begin(), regions.end()}};
     for (size_t i = 0; i < points.size() && !boundary.empty(); ++i) {
       const size_t axis = i % dimension;
@@ -114,6 +117,7 @@ struct Mesh {
   std::vector<int32_t> vertex_tags{};
   std::vector<uint32_t> facets{};
   std::vector<BoundaryPart> boundary{};
+  std::vector<int32_t> simplex_regions{};
   std::vector<Region> regions{};
 
   MeshView View() const {
@@ -125,6 +129,7 @@ struct Mesh {
             .vertex_tags = vertex_tags,
             .facets = facets,
             .boundary = boundary,
+            .simplex_regions = simplex_regions,
             .regions = regions};
   }
 };

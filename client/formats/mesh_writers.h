@@ -33,15 +33,25 @@ absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMsh41(const std::string& path,
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMedit(const std::string& path, const MeshShape& shape,
                                                         std::stop_token stop);
 
+// How many rows a writer has got.
+struct RowCounts {
+  uint64_t vertices = 0;
+  uint64_t weights = 0;
+  uint64_t simplex_regions = 0;
+  uint64_t simplices = 0;
+  uint64_t facets = 0;
+};
+
 // INTERNAL unless as many rows have come as `shape` says.
-absl::Status CheckComplete(const MeshShape& shape, uint64_t vertices, uint64_t weights, uint64_t simplices,
-                           uint64_t facets);
+absl::Status CheckComplete(const MeshShape& shape, const RowCounts& rows);
 
 // The comment ahead of the header of a .node whose attribute is the weight of its points.
 inline constexpr char kWeightsComment[] = "weights";
 
 // What the comment ahead of the header of a .edge, .face or .poly begins with; then come tags, each with its name.
 inline constexpr char kBoundaryComment[] = "boundary:";
+// The same ahead of the header of a .ele with several regions; then come ids, each with a name.
+inline constexpr char kRegionsComment[] = "regions:";
 
 // The files beside .node and .ele that have the boundary: .edge or .face, and up to 3-D .poly.
 std::vector<std::string> BoundaryFilesOf(const std::string& path, int dimension);

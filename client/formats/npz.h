@@ -18,6 +18,10 @@ inline constexpr char kNpzFacetTags[] = "facet_tags.npy";           // facet_cou
 inline constexpr char kNpzFacetNames[] = "facet_names.npy";         // of the parts of the boundary, in UTF-32
 inline constexpr char kNpzFacetNameTags[] = "facet_name_tags.npy";  // the tag of each name
 
+// Only where there are several regions.
+inline constexpr char kNpzRegionIds[] = "region_ids.npy";      // a row for each region
+inline constexpr char kNpzRegionNames[] = "region_names.npy";  // of these, in UTF-32
+
 }  // namespace wellspace::formats
 
 #endif  // WELLSPACE_CLIENT_FORMATS_NPZ_H_

@@ -10,6 +10,7 @@
 #include "client/formats/boundary.h"
 #include "client/formats/field_reader.h"
 #include "client/formats/mesh_readers.h"
+#include "client/formats/regions.h"
 
 namespace wellspace::formats {
 namespace {
@@ -58,6 +59,7 @@ class MeditReader {
           absl::StrCat("the file ends; expected ", has_vertices_ ? "Triangles or Tetrahedra" : "Vertices"));
     }
     facets_.MoveTo(mesh_);
+    regions_.MoveTo(mesh_);
     return std::move(mesh_);
   }
 
@@ -109,9 +111,11 @@ class MeditReader {
       if (absl::Status status = ReadCorners(mesh_.dimension + 1, mesh_.simplices); !status.ok()) {
         return status;
       }
-      if (absl::Status status = fields_.Skip("the reference of a simplex"); !status.ok()) {
+      int32_t region = 0;
+      if (absl::Status status = ReadReference("the reference of a simplex", region); !status.ok()) {
         return status;
       }
+      regions_.Add(region);
     }
     return absl::OkStatus();
   }
@@ -131,14 +135,20 @@ class MeditReader {
       if (absl::Status status = ReadCorners(mesh_.dimension, corners); !status.ok()) {
         return status;
       }
-      std::string_view field;
       int32_t tag = 0;
-      if (!fields_.Next(field) || !absl::SimpleAtoi(absl::string_view(field.data(), field.size()), &tag)) {
-        return reader_.EndError(absl::StrCat("expected the reference of a facet, a whole number, got ", Quote(field)));
+      if (absl::Status status = ReadReference("the reference of a facet", tag); !status.ok()) {
+        return status;
       }
       facets_.Add(corners, tag);
     }
     return absl::OkStatus();
+  }
+
+  absl::Status ReadReference(const char* what, int32_t& reference) {
+    std::string_view field;
+    return fields_.Next(field) && absl::SimpleAtoi(absl::string_view(field.data(), field.size()), &reference)
+               ? absl::OkStatus()
+               : reader_.EndError(absl::StrCat("expected ", what, ", a whole number, got ", Quote(field)));
   }
 
   absl::Status ReadCorners(int count, std::vector<uint32_t>& corners) {
@@ -159,6 +169,7 @@ class MeditReader {
   FieldReader fields_;
   Mesh mesh_;
   FacetSorter facets_;
+  RegionCollector regions_;
   uint64_t vertices_ = 0;
   bool has_vertices_ = false;
   bool has_simplices_ = false;

@@ -17,6 +17,7 @@
 #include "client/formats/field_reader.h"
 #include "client/formats/mesh_readers.h"
 #include "client/formats/msh.h"
+#include "client/formats/regions.h"
 
 namespace wellspace::formats {
 namespace {
@@ -215,8 +216,8 @@ class MshReader {
         return reader_.Error(
             absl::StrCat("expected a dimension, the number of a group and its name in quotes, got ", Quote(line)));
       }
-      if (dimension == "1" || dimension == "2") {
-        names_[dimension == "1" ? 1 : 2][group] = std::string(line.substr(open + 1, line.size() - open - 2));
+      if (dimension == "1" || dimension == "2" || dimension == "3") {
+        names_[dimension.front() - '0'][group] = std::string(line.substr(open + 1, line.size() - open - 2));
       }
     }
     return absl::OkStatus();
@@ -260,7 +261,7 @@ class MshReader {
         group = are_groups && i == 0 ? signed_number : group;
       }
     }
-    if (status.ok() && group != 0 && (dimension == 1 || dimension == 2)) {
+    if (status.ok() && group != 0 && dimension > 0) {
       groups_[dimension][number] = group;
     }
     return status;
@@ -478,8 +479,8 @@ class MshReader {
       return ValueError(absl::StrCat(
           "expected elements of type 15 (point), 1 (line), 2 (triangle) or 4 (tetrahedron), got type ", type));
     }
-    if (nodes == 2 || nodes == 3) {
-      (nodes == 2 ? line_groups_ : triangle_groups_).push_back(group);
+    if (nodes >= 2) {
+      element_groups_[nodes - 1].push_back(group);
     }
     for (int i = 0; i < nodes; ++i) {
       uint64_t number = 0;
@@ -563,6 +564,7 @@ class MshReader {
     Mesh mesh;
     mesh.dimension = tetrahedra_.empty() && !triangles_.empty() ? 2 : 3;
     SortFacets(mesh);
+    CollectRegions(mesh);
     mesh.simplices = std::move(mesh.dimension == 2 ? triangles_ : tetrahedra_);
     mesh.weights = std::move(weights_);
     if (mesh.dimension == 3) {
@@ -585,7 +587,7 @@ class MshReader {
   void SortFacets(Mesh& mesh) {
     FacetSorter sorter;
     const std::vector<uint32_t>& facets = mesh.dimension == 2 ? lines_ : triangles_;
-    const std::vector<int32_t>& groups = mesh.dimension == 2 ? line_groups_ : triangle_groups_;
+    const std::vector<int32_t>& groups = element_groups_[mesh.dimension - 1];
     for (size_t i = 0; i < groups.size(); ++i) {
       sorter.Add(std::span(facets).subspan(i * mesh.dimension, mesh.dimension), groups[i]);
     }
@@ -593,6 +595,17 @@ class MshReader {
       sorter.Name(group, name);
     }
     sorter.MoveTo(mesh);
+  }
+
+  void CollectRegions(Mesh& mesh) const {
+    RegionCollector collector;
+    for (const int32_t group : element_groups_[mesh.dimension]) {
+      collector.Add(group);
+    }
+    for (const auto& [group, name] : names_[mesh.dimension]) {
+      collector.Name(group, name);
+    }
+    collector.MoveTo(mesh);
   }
 
   LineReader& reader_;
@@ -606,10 +619,9 @@ class MshReader {
   std::vector<uint32_t> by_number_;  // the nodes, sorted; empty: they are numbered from 1 on
   // The first physical group of an entity and the name of a group, each by dimension and number.
   std::array<std::map<uint64_t, int32_t>, 4> groups_;
-  std::array<std::map<int32_t, std::string>, 3> names_;
-  std::vector<uint32_t> lines_;  // indices of nodes
-  std::vector<int32_t> line_groups_;
-  std::vector<int32_t> triangle_groups_;
+  std::array<std::map<int32_t, std::string>, 4> names_;
+  std::vector<uint32_t> lines_;                         // indices of nodes
+  std::array<std::vector<int32_t>, 4> element_groups_;  // of lines, triangles and tetrahedra, by dimension
   std::vector<uint32_t> triangles_;
   std::vector<uint32_t> tetrahedra_;
   std::vector<double> weights_;

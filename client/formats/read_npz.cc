@@ -15,6 +15,7 @@
 #include "client/formats/mesh_readers.h"
 #include "client/formats/npy.h"
 #include "client/formats/npz.h"
+#include "client/formats/regions.h"
 #include "client/formats/zip_file.h"
 
 namespace wellspace::formats {
@@ -53,13 +54,14 @@ absl::Status ReadTags(ZipReader& archive, const std::string& file, const std::st
 }
 
 // Texts of UTF-32, a row each, as FacetSorter wants them: what is not ASCII becomes a question mark.
-absl::Status ReadNames(ZipReader& archive, const std::string& file, std::vector<std::string>& names) {
-  const absl::StatusOr<uint64_t> size = archive.Begin(kNpzFacetNames);
+absl::Status ReadNames(ZipReader& archive, const std::string& file, const std::string& member,
+                       std::vector<std::string>& names) {
+  const absl::StatusOr<uint64_t> size = archive.Begin(member);
   if (!size.ok()) {
     return size.status();
   }
   const auto source = [&archive](char* buffer, size_t bytes) { return archive.Read(buffer, bytes); };
-  absl::StatusOr<NpyReader> array = NpyReader::Open(absl::StrCat(file, ": ", kNpzFacetNames), source, *size, 1);
+  absl::StatusOr<NpyReader> array = NpyReader::Open(absl::StrCat(file, ": ", member), source, *size, 1);
   return array.ok() ? array->ReadTexts(names) : array.status();
 }
 
@@ -92,7 +94,7 @@ absl::Status ReadBoundary(ZipReader& archive, const std::string& file, Mesh& mes
   if (archive.Has(kNpzFacetNames) && archive.Has(kNpzFacetNameTags)) {
     std::vector<std::string> names;
     std::vector<int32_t> named;
-    absl::Status status = ReadNames(archive, file, names);
+    absl::Status status = ReadNames(archive, file, kNpzFacetNames, names);
     if (status.ok()) {
       status = ReadTags(archive, file, kNpzFacetNameTags, named);
     }
@@ -104,6 +106,37 @@ absl::Status ReadBoundary(ZipReader& archive, const std::string& file, Mesh& mes
     }
   }
   sorter.MoveTo(mesh);
+  return absl::OkStatus();
+}
+
+absl::Status ReadRegions(ZipReader& archive, const std::string& file, Mesh& mesh) {
+  std::vector<int32_t> ids;
+  if (absl::Status status = ReadTags(archive, file, kNpzRegions, ids); !status.ok()) {
+    return status;
+  }
+  if (ids.size() != mesh.View().simplex_count()) {
+    return absl::InvalidArgumentError(absl::StrCat(file, ": ", kNpzRegions, ": expected ", mesh.View().simplex_count(),
+                                                   " regions, one for each simplex, got ", ids.size()));
+  }
+  RegionCollector collector;
+  for (const int32_t id : ids) {
+    collector.Add(id);
+  }
+  if (archive.Has(kNpzRegionIds) && archive.Has(kNpzRegionNames)) {
+    std::vector<int32_t> named;
+    std::vector<std::string> names;
+    absl::Status status = ReadTags(archive, file, kNpzRegionIds, named);
+    if (status.ok()) {
+      status = ReadNames(archive, file, kNpzRegionNames, names);
+    }
+    if (!status.ok()) {
+      return status;
+    }
+    for (size_t i = 0; i < std::min(names.size(), named.size()); ++i) {
+      collector.Name(named[i], names[i]);
+    }
+  }
+  collector.MoveTo(mesh);
   return absl::OkStatus();
 }
 
@@ -158,6 +191,11 @@ absl::StatusOr<Mesh> ReadNpz(const std::string& path) {
   }
   if (absl::Status status = simplices->ReadIndices(vertices, mesh.simplices); !status.ok()) {
     return status;
+  }
+  if ((*archive)->Has(kNpzRegions)) {
+    if (absl::Status status = ReadRegions(**archive, name, mesh); !status.ok()) {
+      return status;
+    }
   }
   if ((*archive)->Has(kNpzFacets)) {
     if (absl::Status status = ReadBoundary(**archive, name, mesh); !status.ok()) {

@@ -1,18 +1,23 @@
 // TetGen's and Triangle's .node and .ele.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "absl/strings/ascii.h"
 #include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_split.h"
+#include "absl/strings/strip.h"
 #include "client/formats/boundary.h"
 #include "client/formats/cloud_readers.h"
 #include "client/formats/mesh_readers.h"
 #include "client/formats/mesh_writers.h"
 #include "client/formats/number.h"
+#include "client/formats/regions.h"
 #include "client/formats/tetgen_lines.h"
 
 namespace wellspace::formats {
@@ -46,6 +51,33 @@ void TakeNames(std::string_view comment, FacetSorter& sorter) {
          absl::SimpleAtoi(absl::string_view(tag.data(), tag.size()), &number)) {
     sorter.Name(number, std::string(name));
   }
+}
+
+// "regions: 1 domain, 2 region 7": the names of regions.
+void TakeRegionNames(std::string_view comment, RegionCollector& collector) {
+  absl::string_view rest(comment.data(), comment.size());
+  if (!absl::ConsumePrefix(&rest, kRegionsComment)) {
+    return;
+  }
+  for (const absl::string_view name : absl::StrSplit(rest, ',')) {
+    const std::pair<absl::string_view, absl::string_view> parts =
+        absl::StrSplit(absl::StripLeadingAsciiWhitespace(name), absl::MaxSplits(' ', 1));
+    int32_t id = 0;
+    if (absl::SimpleAtoi(parts.first, &id)) {
+      collector.Name(id, std::string(absl::StripAsciiWhitespace(parts.second)));
+    }
+  }
+}
+
+// A region as the first attribute of a simplex: a whole number of 32 bits, which may be written as 7.0 or 7e0.
+bool ParseRegion(std::string_view field, int32_t& region) {
+  double value = 0;
+  if (!ParseFinite(field, value).ok() || std::abs(value) > std::numeric_limits<int32_t>::max() ||
+      value != std::trunc(value)) {
+    return false;
+  }
+  region = static_cast<int32_t>(value);
+  return true;
 }
 
 // .edge or .face; facets without a marker, and those with 0, are no boundary.
@@ -101,6 +133,9 @@ absl::Status ReadEle(LineReader& reader, uint64_t vertices, uint64_t index_base,
   if (absl::Status status = ReadHeader(reader, line, 2, names, header); !status.ok()) {
     return status;
   }
+  RegionCollector regions;
+  bool are_regions = true;  // the first attributes
+  TakeRegionNames(reader.comment(), regions);
   const auto [count, nodes, attributes] = header;
   if (nodes != corners) {
     return reader.Error(absl::StrCat("expected ", corners, " nodes for each of the ", what, ", got ", nodes));
@@ -128,12 +163,18 @@ absl::Status ReadEle(LineReader& reader, uint64_t vertices, uint64_t index_base,
       }
       mesh.simplices.push_back(static_cast<uint32_t>(node - index_base));
     }
+    int32_t region = 0;
     for (uint64_t attribute = 0; fields.Next(field); ++attribute) {
+      are_regions = are_regions && (attribute != 0 || ParseRegion(field, region));
       if (attribute == attributes) {
         return reader.Error(
             absl::StrCat("expected ", corners, " nodes and ", attributes, " attributes, got also ", Quote(field)));
       }
     }
+    regions.Add(region);
+  }
+  if (are_regions) {
+    regions.MoveTo(mesh);
   }
   return ExpectEnd(reader, count, what);
 }

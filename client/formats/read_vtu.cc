@@ -11,6 +11,7 @@
 #include "client/formats/line_reader.h"
 #include "client/formats/mesh_readers.h"
 #include "client/formats/number.h"
+#include "client/formats/regions.h"
 #include "client/formats/vtk_array.h"
 #include "client/formats/vtk_cells.h"
 #include "client/formats/xml_scanner.h"
@@ -108,6 +109,14 @@ class VtuReader {
     if (parent == "CellData" && xml_.Attribute("Name") == kVtkBoundary) {
       has_tags_ = true;
       return ReadArray<int64_t>(tags_);
+    }
+    // Others may have anything by that name.
+    const std::string_view type = xml_.Attribute("type");
+    const std::string_view components = xml_.Attribute("NumberOfComponents");
+    if (parent == "CellData" && xml_.Attribute("Name") == kVtkRegion && type.find("Int") != std::string_view::npos &&
+        (components.empty() || components == "1")) {
+      has_regions_ = true;
+      return ReadArray<int64_t>(regions_);
     }
     return parent == "Cells" ? ReadCellArray() : absl::OkStatus();
   }
@@ -254,6 +263,9 @@ class VtuReader {
     if (has_tags_ && tags_.size() != cell_count_) {
       return FileError(absl::StrCat("expected a tag for each of ", cell_count_, " cells, got ", tags_.size()));
     }
+    if (has_regions_ && regions_.size() != cell_count_) {
+      return FileError(absl::StrCat("expected a region for each of ", cell_count_, " cells, got ", regions_.size()));
+    }
     Mesh mesh;
     mesh.weights = weights_;
     mesh.dimension = !types_.empty() && types_[0] == kVtkTriangle ? 2 : 3;
@@ -278,6 +290,7 @@ class VtuReader {
                                     connectivity_.size()));
     }
     FacetSorter facets;
+    RegionCollector regions;
     std::vector<uint32_t> vertices;
     size_t first = 0;  // in connectivity_
     for (size_t cell = 0; cell < cell_count_; ++cell) {
@@ -299,6 +312,10 @@ class VtuReader {
         vertices.push_back(static_cast<uint32_t>(connectivity_[first]));
       }
       if (!is_facet) {
+        if (has_regions_ && regions_[cell] != static_cast<int32_t>(regions_[cell])) {
+          return FileError(absl::StrCat("cell ", cell, ": expected a region of at most 32 bits, got ", regions_[cell]));
+        }
+        regions.Add(has_regions_ ? static_cast<int32_t>(regions_[cell]) : 0);
         mesh.simplices.insert(mesh.simplices.end(), vertices.begin(), vertices.end());
       } else if (tags_[cell] < std::numeric_limits<int32_t>::min() ||
                  tags_[cell] > std::numeric_limits<int32_t>::max()) {
@@ -308,6 +325,7 @@ class VtuReader {
       }
     }
     facets.MoveTo(mesh);
+    regions.MoveTo(mesh);
     return absl::OkStatus();
   }
 
@@ -340,6 +358,8 @@ class VtuReader {
   std::vector<int64_t> types_;
   bool has_tags_ = false;
   std::vector<int64_t> tags_;  // of cells
+  bool has_regions_ = false;
+  std::vector<int64_t> regions_;  // of cells
 };
 
 }  // namespace

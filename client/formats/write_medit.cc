@@ -10,6 +10,7 @@
 #include "client/formats/mesh_writers.h"
 #include "client/formats/number.h"
 #include "client/formats/output_file.h"
+#include "client/formats/regions.h"
 
 namespace wellspace::formats {
 namespace {
@@ -38,16 +39,26 @@ class MeditWriter final : public MeshWriter {
     return absl::InternalError("a mesh without weights got some");
   }
 
+  absl::Status AddSimplexRegions(std::span<const int32_t> regions) override {
+    regions_.Add(regions);
+    return output_.status();
+  }
+
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
     BeginSimplices();
     const size_t corners = shape_.dimension + 1;
+    if (absl::Status status = regions_.CheckNext(shape_.has_simplex_regions ? simplices.size() / corners : 0);
+        !status.ok()) {
+      return status;
+    }
+    const int32_t only_region = shape_.regions.empty() ? 1 : shape_.regions[0].id;
     for (; !simplices.empty() && output_.status().ok(); simplices = simplices.subspan(corners)) {
       line_.clear();
       for (const uint32_t corner : simplices.first(corners)) {
         AppendNumber(uint64_t{corner} + 1, line_);
         line_ += ' ';
       }
-      absl::StrAppend(&line_, shape_.regions.empty() ? 1 : shape_.regions[0].id, "\n");
+      absl::StrAppend(&line_, shape_.has_simplex_regions ? regions_.Next() : only_region, "\n");
       output_.Write(line_);
       ++simplices_;
     }
@@ -78,7 +89,12 @@ class MeditWriter final : public MeshWriter {
     if (absl::Status status = output_.status(); !status.ok()) {
       return status;
     }
-    if (absl::Status status = CheckComplete(shape_, vertices_, 0, simplices_, facets_); !status.ok()) {
+    if (absl::Status status = CheckComplete(shape_, {.vertices = vertices_,
+                                                     .weights = 0,
+                                                     .simplex_regions = regions_.count(),
+                                                     .simplices = simplices_,
+                                                     .facets = facets_});
+        !status.ok()) {
       return status;
     }
     return output_.Commit();
@@ -100,6 +116,7 @@ class MeditWriter final : public MeshWriter {
   const MeshShape shape_;
   OutputFile output_;
   PartWalk walk_{shape_.boundary};
+  RegionQueue regions_;
   bool has_simplices_ = false;  // the section
   bool has_facets_ = false;     // the section
   uint64_t vertices_ = 0;

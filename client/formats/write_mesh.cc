@@ -103,17 +103,20 @@ absl::Status CheckMeshOutput(const std::string& path, const std::string& format,
   return absl::OkStatus();
 }
 
-absl::Status CheckComplete(const MeshShape& shape, uint64_t vertices, uint64_t weights, uint64_t simplices,
-                           uint64_t facets) {
-  if (vertices != shape.vertex_count || simplices != shape.simplex_count) {
+absl::Status CheckComplete(const MeshShape& shape, const RowCounts& rows) {
+  if (rows.vertices != shape.vertex_count || rows.simplices != shape.simplex_count) {
     return absl::InternalError(absl::StrCat("a mesh of ", shape.vertex_count, " vertices and ", shape.simplex_count,
-                                            " simplices got ", vertices, " and ", simplices));
+                                            " simplices got ", rows.vertices, " and ", rows.simplices));
   }
-  if (const uint64_t expected = shape.has_weights ? shape.vertex_count : 0; weights != expected) {
-    return absl::InternalError(absl::StrCat("a mesh of ", expected, " weights got ", weights));
+  if (const uint64_t expected = shape.has_weights ? shape.vertex_count : 0; rows.weights != expected) {
+    return absl::InternalError(absl::StrCat("a mesh of ", expected, " weights got ", rows.weights));
   }
-  if (facets != shape.facet_count()) {
-    return absl::InternalError(absl::StrCat("a mesh of ", shape.facet_count(), " boundary facets got ", facets));
+  if (const uint64_t expected = shape.has_simplex_regions ? shape.simplex_count : 0; rows.simplex_regions != expected) {
+    return absl::InternalError(
+        absl::StrCat("a mesh of ", expected, " regions of simplices got ", rows.simplex_regions));
+  }
+  if (rows.facets != shape.facet_count()) {
+    return absl::InternalError(absl::StrCat("a mesh of ", shape.facet_count(), " boundary facets got ", rows.facets));
   }
   return absl::OkStatus();
 }
@@ -143,6 +146,9 @@ absl::Status WriteMesh(const std::string& path, const std::string& format, const
   }
   if (status.ok() && has_marks) {
     status = rows.AddVertexTags(mesh.vertex_tags);
+  }
+  if (status.ok() && !mesh.simplex_regions.empty()) {
+    status = rows.AddSimplexRegions(mesh.simplex_regions);
   }
   if (status.ok()) {
     status = rows.AddSimplices(mesh.simplices);

@@ -65,13 +65,15 @@ class MeshWriter {
   MeshWriter& operator=(const MeshWriter&) = delete;
 
   // The next rows of the arrays: all points, then all weights if the shape has them, then all origins and all tags of
-  // vertices if it has marks, then all simplices, then all facets of its boundary. Returns the first error of all so
+  // vertices if it has marks, then all regions of simplices if it has them, then all simplices, then all facets of its
+  // boundary. Returns the first error of all so
   // far.
   // REQUIRES:   whole rows, no more than the shape says, nothing of an array before another that goes first.
   virtual absl::Status AddPoints(std::span<const double> points) = 0;
   virtual absl::Status AddWeights(std::span<const double> weights) = 0;
   virtual absl::Status AddVertexOrigins(std::span<const uint32_t> /*origins*/) { return absl::OkStatus(); }
   virtual absl::Status AddVertexTags(std::span<const int32_t> /*tags*/) { return absl::OkStatus(); }
+  virtual absl::Status AddSimplexRegions(std::span<const int32_t> regions) = 0;
   virtual absl::Status AddSimplices(std::span<const uint32_t> simplices) = 0;
   virtual absl::Status AddFacets(std::span<const uint32_t> facets) = 0;
 

@@ -1,6 +1,8 @@
 // Gmsh's MSH: 2.2 in ascii, 4.1 in binary.
+#include <algorithm>
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <memory>
 #include <set>
 #include <span>
@@ -14,6 +16,7 @@
 #include "client/formats/msh.h"
 #include "client/formats/number.h"
 #include "client/formats/output_file.h"
+#include "client/formats/regions.h"
 
 namespace wellspace::formats {
 namespace {
@@ -21,6 +24,37 @@ namespace {
 template <typename T>
 void AppendBytes(T value, std::string& bytes) {
   bytes.append(reinterpret_cast<const char*>(&value), sizeof(T));
+}
+
+// The regions that groups are made of: there is one even if nothing is told of regions.
+std::vector<Region> RegionsOf(const MeshShape& shape) {
+  return shape.regions.empty() ? std::vector<Region>{{.id = 1, .name = "domain"}} : shape.regions;
+}
+
+// The physical group of each region: its id if there are several and no part of the boundary has that number, else the
+// least number that is free. There are readers that tell groups by their numbers alone, whatever their dimensions.
+std::map<int32_t, int32_t> Groups(const MeshShape& shape) {
+  std::set<int32_t> taken;
+  for (const BoundaryPart& part : shape.boundary) {
+    taken.insert(part.tag);
+  }
+  std::map<int32_t, int32_t> groups;
+  const std::vector<Region> regions = RegionsOf(shape);
+  for (const Region& region : regions) {
+    if (shape.has_simplex_regions && region.id > 0 && taken.insert(region.id).second) {
+      groups[region.id] = region.id;
+    }
+  }
+  int32_t free = 1;
+  for (const Region& region : regions) {
+    if (!groups.contains(region.id)) {
+      while (!taken.insert(free).second) {
+        ++free;
+      }
+      groups[region.id] = free;
+    }
+  }
+  return groups;
 }
 
 // What both versions share: the order of the sections, and rows put together before they are written.
@@ -42,19 +76,34 @@ class MshWriter : public MeshWriter {
     return output_.status();
   }
 
+  absl::Status AddSimplexRegions(std::span<const int32_t> regions) final {
+    for (const int32_t region : regions) {
+      if (!groups_.contains(region)) {
+        return absl::InternalError(absl::StrCat("a mesh got a simplex of region ", region, ", and has no such region"));
+      }
+    }
+    regions_.Add(regions);
+    return output_.status();
+  }
+
   absl::Status AddSimplices(std::span<const uint32_t> simplices) final {
     BeginElements();
     const size_t corners = shape_.dimension + 1;
+    if (absl::Status status = regions_.CheckNext(shape_.has_simplex_regions ? simplices.size() / corners : 0);
+        !status.ok()) {
+      return status;
+    }
     for (; !simplices.empty() && output_.status().ok(); simplices = simplices.subspan(corners)) {
+      const int32_t group = shape_.has_simplex_regions ? groups_.at(regions_.Next()) : OnlyGroup();
       row_.clear();
-      AppendElement(simplices.first(corners), ++simplices_, row_);
-      output_.Write(row_);
+      WriteSimplex(simplices.first(corners), group, ++simplices_, row_);
     }
     return output_.status();
   }
 
   absl::Status AddFacets(std::span<const uint32_t> facets) final {
     BeginElements();
+    EndSimplices();
     for (; !facets.empty() && output_.status().ok(); facets = facets.subspan(shape_.dimension)) {
       row_.clear();
       const BoundaryPart& part = walk_.Next();
@@ -69,11 +118,17 @@ class MshWriter : public MeshWriter {
 
   absl::Status Commit() final {
     BeginElements();
+    EndSimplices();
     output_.Write(is_binary_ ? "\n$EndElements\n" : "$EndElements\n");
     if (absl::Status status = output_.status(); !status.ok()) {
       return status;
     }
-    if (absl::Status status = CheckComplete(shape_, vertices_, weights_.size(), simplices_, facets_); !status.ok()) {
+    if (absl::Status status = CheckComplete(shape_, {.vertices = vertices_,
+                                                     .weights = weights_.size(),
+                                                     .simplex_regions = regions_.count(),
+                                                     .simplices = simplices_,
+                                                     .facets = facets_});
+        !status.ok()) {
       return status;
     }
     WriteNodeData("input", [this](uint64_t vertex) { return vertex < shape_.input_vertices ? 1.0 : 0.0; });
@@ -91,36 +146,29 @@ class MshWriter : public MeshWriter {
   int facet_type() const { return shape_.dimension == 2 ? kMshLine : kMshTriangle; }
   uint64_t element_count() const { return shape_.simplex_count + shape_.facet_count(); }
 
-  // The physical group of the simplices. There are readers that tell groups by their numbers alone, whatever their
-  // dimensions: it is none of the boundary's.
-  int32_t Group() const {
-    std::set<int32_t> taken;
-    for (const BoundaryPart& part : shape_.boundary) {
-      taken.insert(part.tag);
-    }
-    int32_t group = 1;
-    while (taken.contains(group)) {
-      ++group;
-    }
-    return group;
-  }
+  // Whether groups have names, and entities are described.
+  bool has_groups() const { return !shape_.boundary.empty() || shape_.has_simplex_regions; }
+  // The physical group of simplices that are all of one region.
+  int32_t OnlyGroup() const { return groups_.begin()->second; }
 
   // The section with the names of groups, if there are any.
   std::string PhysicalNames() const {
-    if (shape_.boundary.empty()) {
+    if (!has_groups()) {
       return "";
     }
-    std::string text = absl::StrCat("$PhysicalNames\n", shape_.boundary.size() + 1, "\n");
+    std::string text = absl::StrCat("$PhysicalNames\n", shape_.boundary.size() + groups_.size(), "\n");
     for (const BoundaryPart& part : shape_.boundary) {
       absl::StrAppend(&text, shape_.dimension - 1, " ", part.tag, " \"", part.name, "\"\n");
     }
-    absl::StrAppend(&text, shape_.dimension, " ", group_, " \"",
-                    shape_.regions.empty() ? "domain" : shape_.regions[0].name, "\"\n$EndPhysicalNames\n");
-    return text;
+    for (const Region& region : RegionsOf(shape_)) {
+      absl::StrAppend(&text, shape_.dimension, " ", groups_.at(region.id), " \"", region.name, "\"\n");
+    }
+    return text + "$EndPhysicalNames\n";
   }
 
   const MeshShape shape_;
-  const int32_t group_ = Group();  // of the simplices
+  const std::map<int32_t, int32_t> groups_ = Groups(shape_);  // the physical group of each region's id
+  RegionQueue regions_;
   OutputFile output_;
 
  private:
@@ -128,7 +176,12 @@ class MshWriter : public MeshWriter {
   // Numbers of nodes and elements start at 1.
   virtual void AppendNode(std::span<const double> point, uint64_t number, std::string& row) const = 0;
   virtual std::string ElementsHeader() const = 0;
-  virtual void AppendElement(std::span<const uint32_t> corners, uint64_t number, std::string& row) const = 0;
+  // To be called once, at the end of the header: there is room for simplices.
+  virtual void BeginSimplices() {}
+  // Writes the next simplex. `row` is empty, and any use may be made of it.
+  virtual void WriteSimplex(std::span<const uint32_t> corners, int32_t group, uint64_t number, std::string& row) = 0;
+  // All simplices have come; may be called again.
+  virtual void EndSimplices() {}
   // What goes before the facets of a part.
   virtual void AppendBlock(const BoundaryPart& /*part*/, std::string& /*row*/) const {}
   virtual void AppendFacet(std::span<const uint32_t> corners, int32_t tag, uint64_t number, std::string& row) const = 0;
@@ -145,6 +198,7 @@ class MshWriter : public MeshWriter {
       BeginNodes();
       output_.Write(is_binary_ ? "\n$EndNodes\n" : "$EndNodes\n");
       output_.Write(ElementsHeader());
+      BeginSimplices();
     }
   }
 
@@ -193,8 +247,9 @@ class Msh22Writer final : public MshWriter {
 
   std::string ElementsHeader() const override { return absl::StrCat("$Elements\n", element_count(), "\n"); }
 
-  void AppendElement(std::span<const uint32_t> corners, uint64_t number, std::string& row) const override {
-    AppendRow(type(), corners, group_, kMshEntity, number, row);
+  void WriteSimplex(std::span<const uint32_t> corners, int32_t group, uint64_t number, std::string& row) override {
+    AppendRow(type(), corners, group, shape_.has_simplex_regions ? group : kMshEntity, number, row);
+    output_.Write(row);
   }
 
   void AppendFacet(std::span<const uint32_t> corners, int32_t tag, uint64_t number, std::string& row) const override {
@@ -257,19 +312,63 @@ class Msh41Writer final : public MshWriter {
 
   std::string ElementsHeader() const override {
     std::string text = "$Elements\n";
-    uint64_t blocks = shape_.simplex_count > 0 ? 1 : 0;
+    uint64_t blocks = shape_.has_simplex_regions ? regions_.Sizes().size() : shape_.simplex_count > 0 ? 1 : 0;
     for (const BoundaryPart& part : shape_.boundary) {
       blocks += part.facets > 0 ? 1 : 0;
     }
     AppendCounts(blocks, element_count(), text);
-    if (shape_.simplex_count > 0) {
+    if (shape_.simplex_count > 0 && !shape_.has_simplex_regions) {
       AppendBlockOf(type(), text);
       AppendBytes<uint64_t>(shape_.simplex_count, text);
     }
     return text;
   }
 
-  void AppendElement(std::span<const uint32_t> corners, uint64_t number, std::string& row) const override {
+  // The file has simplices by their regions: each gets as much room as it needs.
+  void BeginSimplices() override {
+    uint64_t number = 1;
+    for (const auto& [region, simplices] : regions_.Sizes()) {
+      RegionBlock& block = blocks_[groups_.at(region)];
+      for (const int32_t value : {static_cast<int32_t>(shape_.dimension), groups_.at(region), type()}) {
+        AppendBytes(value, block.header);
+      }
+      AppendBytes(simplices, block.header);
+      block.next_number = number;
+      number += simplices;
+      if (output_.IsSeekable()) {
+        output_.Write(block.header);
+        block.place = output_.size();
+        WriteZeros(simplices * (shape_.dimension + 2) * sizeof(uint64_t));
+      }
+    }
+  }
+
+  void WriteSimplex(std::span<const uint32_t> corners, int32_t group, uint64_t number, std::string& row) override {
+    if (!shape_.has_simplex_regions) {
+      AppendElement(corners, number, row);
+      output_.Write(row);
+      return;
+    }
+    RegionBlock& block = blocks_.at(group);
+    AppendElement(corners, block.next_number++, block.rows);
+    if (output_.IsSeekable() && block.rows.size() >= kBlockBytes) {
+      PutRows(block);
+    }
+  }
+
+  void EndSimplices() override {
+    for (auto& [group, block] : blocks_) {
+      if (output_.IsSeekable()) {
+        PutRows(block);
+      } else {
+        output_.Write(block.header);
+        output_.Write(block.rows);
+      }
+    }
+    blocks_.clear();
+  }
+
+  void AppendElement(std::span<const uint32_t> corners, uint64_t number, std::string& row) const {
     AppendBytes(number, row);
     for (const uint32_t corner : corners) {
       AppendBytes<uint64_t>(uint64_t{corner} + 1, row);
@@ -302,12 +401,12 @@ class Msh41Writer final : public MshWriter {
   // Points, curves, surfaces, volumes: of each its number, its bounding box, its groups, and what bounds it. Every part
   // of the boundary is an entity with its number; the bounding box of all is that of the mesh.
   void AppendEntities(std::string& text) const {
-    if (shape_.boundary.empty()) {
+    if (!has_groups()) {
       return;
     }
     text += "$Entities\n";
     for (int dimension = 0; dimension <= 3; ++dimension) {
-      AppendBytes<uint64_t>(dimension == shape_.dimension       ? 1
+      AppendBytes<uint64_t>(dimension == shape_.dimension       ? groups_.size()
                             : dimension == shape_.dimension - 1 ? shape_.boundary.size()
                                                                 : 0,
                             text);
@@ -316,10 +415,14 @@ class Msh41Writer final : public MshWriter {
       AppendEntity(part.tag, part.tag, text);
       AppendBytes<uint64_t>(0, text);
     }
-    AppendEntity(kMshEntity, group_, text);
-    AppendBytes<uint64_t>(shape_.boundary.size(), text);
-    for (const BoundaryPart& part : shape_.boundary) {
-      AppendBytes(part.tag, text);
+    for (const Region& region : RegionsOf(shape_)) {
+      const int32_t group = groups_.at(region.id);
+      AppendEntity(shape_.has_simplex_regions ? group : kMshEntity, group, text);
+      // All parts bound the only region. Which of them bound one of several is not known.
+      AppendBytes<uint64_t>(shape_.has_simplex_regions ? 0 : shape_.boundary.size(), text);
+      for (size_t i = 0; i < shape_.boundary.size() && !shape_.has_simplex_regions; ++i) {
+        AppendBytes(shape_.boundary[i].tag, text);
+      }
     }
     text += "\n$EndEntities\n";
   }
@@ -335,12 +438,37 @@ class Msh41Writer final : public MshWriter {
     AppendBytes(group, text);
   }
 
-  // The entity's dimension and number; then what the section has third.
+  // The dimension and number of the entity of nodes and of a mesh of one region; then what the section has third.
   void AppendBlockOf(int32_t third, std::string& text) const {
-    for (const int32_t value : {static_cast<int32_t>(shape_.dimension), kMshEntity, third}) {
+    const int32_t entity = shape_.has_simplex_regions ? OnlyGroup() : kMshEntity;
+    for (const int32_t value : {static_cast<int32_t>(shape_.dimension), entity, third}) {
       AppendBytes(value, text);
     }
   }
+
+  // The simplices of a region.
+  struct RegionBlock {
+    std::string header;
+    std::string rows;  // those that are not in the file yet; at most kBlockBytes and a row if it can be sought
+    uint64_t next_number = 0;
+    uint64_t place = 0;  // of the next row, if the file can be sought
+  };
+
+  void PutRows(RegionBlock& block) {
+    output_.Overwrite(block.place, block.rows);
+    block.place += block.rows.size();
+    block.rows.clear();
+  }
+
+  void WriteZeros(uint64_t bytes) {
+    const std::string zeros(std::min(bytes, kBlockBytes), '\0');
+    for (; bytes > 0 && output_.status().ok(); bytes -= std::min(bytes, kBlockBytes)) {
+      output_.Write(std::string_view(zeros).substr(0, std::min(bytes, kBlockBytes)));
+    }
+  }
+
+  static constexpr uint64_t kBlockBytes = 1 << 12;
+  std::map<int32_t, RegionBlock> blocks_;  // by physical group; empty: one region
 };
 
 template <typename Writer>

@@ -55,6 +55,15 @@ class NpzWriter final : public MeshWriter {
     return archive_.status();
   }
 
+  absl::Status AddSimplexRegions(std::span<const int32_t> regions) override {
+    if (!std::exchange(has_simplex_regions_, true)) {
+      Begin(kNpzRegions, "<i4", shape_.simplex_count, std::nullopt, sizeof(int32_t));
+    }
+    Write(regions);
+    simplex_regions_ += regions.size();
+    return archive_.status();
+  }
+
   absl::Status AddFacets(std::span<const uint32_t> facets) override {
     BeginSimplices();
     BeginFacets();
@@ -76,10 +85,18 @@ class NpzWriter final : public MeshWriter {
       BeginFacets();
       WriteTags();
     }
+    if (shape_.has_simplex_regions) {
+      WriteRegions();
+    }
     if (absl::Status status = archive_.Finish(); !status.ok()) {
       return status;
     }
-    if (absl::Status status = CheckComplete(shape_, vertices_, weights_, simplices_, facets_); !status.ok()) {
+    if (absl::Status status = CheckComplete(shape_, {.vertices = vertices_,
+                                                     .weights = weights_,
+                                                     .simplex_regions = simplex_regions_,
+                                                     .simplices = simplices_,
+                                                     .facets = facets_});
+        !status.ok()) {
       return status;
     }
     return output_.Commit();
@@ -110,30 +127,53 @@ class NpzWriter final : public MeshWriter {
     }
   }
 
-  // What is known of facets and regions beside the indices.
+  // What is known of facets, and of the only region, beside the indices.
   void WriteTags() {
     std::vector<int32_t> tags;
-    size_t longest = 1;
+    std::vector<std::string> names;
     Begin(kNpzFacetTags, "<i4", shape_.facet_count(), std::nullopt, sizeof(int32_t));
     for (const BoundaryPart& part : shape_.boundary) {
       WriteRepeated(part.tag, part.facets);
       tags.push_back(part.tag);
-      longest = std::max(longest, part.name.size());
+      names.push_back(part.name);
     }
-    Begin(kNpzFacetNames, absl::StrCat("<U", longest).c_str(), tags.size(), std::nullopt, longest * sizeof(char32_t));
-    for (const BoundaryPart& part : shape_.boundary) {
-      std::u32string name;
-      for (const char letter : part.name) {
-        name += static_cast<unsigned char>(letter);
-      }
-      name.resize(longest, U'\0');
-      Write(std::span<const char32_t>(name));
-    }
-    Begin(kNpzFacetNameTags, "<i4", tags.size(), std::nullopt, sizeof(int32_t));
-    Write(std::span<const int32_t>(tags));
-    if (!shape_.regions.empty()) {
+    WriteNames(kNpzFacetNames, names);
+    WriteNumbers(kNpzFacetNameTags, tags);
+    if (!shape_.regions.empty() && !shape_.has_simplex_regions) {
       Begin(kNpzRegions, "<i4", shape_.simplex_count, std::nullopt, sizeof(int32_t));
       WriteRepeated(shape_.regions[0].id, shape_.simplex_count);
+    }
+  }
+
+  void WriteRegions() {
+    std::vector<int32_t> ids;
+    std::vector<std::string> names;
+    for (const Region& region : shape_.regions) {
+      ids.push_back(region.id);
+      names.push_back(region.name);
+    }
+    WriteNumbers(kNpzRegionIds, ids);
+    WriteNames(kNpzRegionNames, names);
+  }
+
+  void WriteNumbers(const char* member, std::span<const int32_t> numbers) {
+    Begin(member, "<i4", numbers.size(), std::nullopt, sizeof(int32_t));
+    Write(numbers);
+  }
+
+  void WriteNames(const char* member, std::span<const std::string> names) {
+    size_t longest = 1;
+    for (const std::string& name : names) {
+      longest = std::max(longest, name.size());
+    }
+    Begin(member, absl::StrCat("<U", longest).c_str(), names.size(), std::nullopt, longest * sizeof(char32_t));
+    for (const std::string& name : names) {
+      std::u32string letters;
+      for (const char letter : name) {
+        letters += static_cast<unsigned char>(letter);
+      }
+      letters.resize(longest, U'\0');
+      Write(std::span<const char32_t>(letters));
     }
   }
 
@@ -160,7 +200,9 @@ class NpzWriter final : public MeshWriter {
   uint64_t simplices_ = 0;
   bool has_origins_ = false;  // the member; also the following
   bool has_vertex_tags_ = false;
+  bool has_simplex_regions_ = false;
   bool has_facets_ = false;
+  uint64_t simplex_regions_ = 0;
   uint64_t facets_ = 0;
 };
 

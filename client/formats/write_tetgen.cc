@@ -10,6 +10,7 @@
 #include "client/formats/mesh_writers.h"
 #include "client/formats/number.h"
 #include "client/formats/output_file.h"
+#include "client/formats/regions.h"
 #include "client/formats/registry.h"
 
 namespace wellspace::formats {
@@ -29,6 +30,9 @@ class NodeAndEleWriter final : public MeshWriter {
     files_.nodes.Write(absl::StrCat(shape.has_weights ? absl::StrCat("# ", kWeightsComment, "\n") : "",
                                     shape.vertex_count, " ", shape.dimension, shape.has_weights ? " 1" : " 0",
                                     shape.has_vertex_marks ? " 1\n" : " 0\n"));
+    if (shape.has_simplex_regions) {
+      files_.simplices.Write(absl::StrCat("# ", kRegionsComment, RegionNames(), "\n"));
+    }
     files_.simplices.Write(
         absl::StrCat(shape.simplex_count, " ", shape.dimension + 1, shape.regions.empty() ? " 0\n" : " 1\n"));
     if (!shape.regions.empty()) {
@@ -59,13 +63,25 @@ class NodeAndEleWriter final : public MeshWriter {
 
   absl::Status AddVertexTags(std::span<const int32_t> tags) override { return WriteKept(tags.size(), tags); }
 
+  absl::Status AddSimplexRegions(std::span<const int32_t> regions) override {
+    regions_.Add(regions);
+    return files_.simplices.status();
+  }
+
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
     const size_t corners = shape_.dimension + 1;
+    if (absl::Status status = regions_.CheckNext(shape_.has_simplex_regions ? simplices.size() / corners : 0);
+        !status.ok()) {
+      return status;
+    }
     OutputFile& output = files_.simplices;
     for (; !simplices.empty() && output.status().ok(); simplices = simplices.subspan(corners)) {
       line_.clear();
       AppendNumber(simplices_written_++, line_);
       AppendCorners(simplices.first(corners), line_);
+      if (shape_.has_simplex_regions) {
+        region_ = absl::StrCat(" ", regions_.Next());
+      }
       absl::StrAppend(&line_, region_, "\n");
       output.Write(line_);
     }
@@ -96,8 +112,11 @@ class NodeAndEleWriter final : public MeshWriter {
   }
 
   absl::Status Commit() override {
-    if (absl::Status status = CheckComplete(shape_, vertices_written_, shape_.has_weights ? vertices_written_ : 0,
-                                            simplices_written_, facets_written_);
+    if (absl::Status status = CheckComplete(shape_, {.vertices = vertices_written_,
+                                                     .weights = shape_.has_weights ? vertices_written_ : 0,
+                                                     .simplex_regions = regions_.count(),
+                                                     .simplices = simplices_written_,
+                                                     .facets = facets_written_});
         !status.ok()) {
       return status;
     }
@@ -130,6 +149,17 @@ class NodeAndEleWriter final : public MeshWriter {
     for (const BoundaryPart& part : shape_.boundary) {
       if (!part.name.empty()) {
         absl::StrAppend(&names, " ", part.tag, " ", part.name);
+      }
+    }
+    return names;
+  }
+
+  // " 1 domain, 2 region 7".
+  std::string RegionNames() const {
+    std::string names;
+    for (const Region& region : shape_.regions) {
+      if (!region.name.empty()) {
+        absl::StrAppend(&names, names.empty() ? " " : ", ", region.id, " ", region.name);
       }
     }
     return names;
@@ -185,6 +215,7 @@ class NodeAndEleWriter final : public MeshWriter {
   TetgenFiles files_;
   std::string region_;  // what ends the line of a simplex
   PartWalk walk_{shape_.boundary};
+  RegionQueue regions_;
   uint64_t vertices_written_ = 0;
   uint64_t simplices_written_ = 0;
   uint64_t facets_written_ = 0;

@@ -287,6 +287,20 @@ class VtkHdfWriter final : public MeshWriter {
     return file_->status();
   }
 
+  absl::Status AddSimplexRegions(std::span<const int32_t> regions) override {
+    const std::lock_guard lock(Hdf5Mutex());
+    if (!std::exchange(has_regions_, true)) {
+      const Handle cell_data(H5Gopen2(file_->root(), "CellData", H5P_DEFAULT), H5Gclose);
+      file_->BeginArray<int32_t>(cell_data, kVtkRegion, VtkCellCount(shape_));
+    }
+    file_->Add<int32_t>(regions);
+    simplex_regions_ += regions.size();
+    if (simplex_regions_ == shape_.simplex_count) {
+      AddRegionsOfFacets();
+    }
+    return file_->status();
+  }
+
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
     simplices_ += simplices.size() / (shape_.dimension + 1);
     return AddCells(simplices);
@@ -305,7 +319,12 @@ class VtkHdfWriter final : public MeshWriter {
         return status;
       }
     }
-    if (absl::Status status = CheckComplete(shape_, vertices_, weights_, simplices_, facets_); !status.ok()) {
+    if (absl::Status status = CheckComplete(shape_, {.vertices = vertices_,
+                                                     .weights = weights_,
+                                                     .simplex_regions = simplex_regions_,
+                                                     .simplices = simplices_,
+                                                     .facets = facets_});
+        !status.ok()) {
       return status;
     }
     return output_.Commit();
@@ -336,16 +355,29 @@ class VtkHdfWriter final : public MeshWriter {
     file_->BeginArray<T>(point_data, name, shape_.vertex_count);
   }
 
-  // Region and tag of every cell.
+  // What ends the array of regions: facets have none.
+  void AddRegionsOfFacets() {
+    const std::vector<int32_t> zeros(std::min<uint64_t>(shape_.facet_count(), kRowsPerChunk));
+    for (uint64_t done = 0; done < shape_.facet_count(); done += kRowsPerChunk) {
+      file_->Add<int32_t>(std::span(zeros).first(std::min<uint64_t>(shape_.facet_count() - done, kRowsPerChunk)));
+    }
+  }
+
+  // Region and tag of every cell. Regions of simplices come later if there are several.
   void AddCellData() {
-    if (shape_.boundary.empty()) {
+    if (shape_.boundary.empty() && !shape_.has_simplex_regions) {
       return;
     }
     const uint64_t cells = VtkCellCount(shape_);
     const Handle cell_data = file_->AddGroup(file_->root(), "CellData");
-    const int32_t region = shape_.regions.empty() ? 0 : shape_.regions[0].id;
-    file_->AddArray<int32_t>(cell_data, kVtkRegion, cells,
-                             [&](uint64_t cell) { return cell < shape_.simplex_count ? region : 0; });
+    if (!shape_.has_simplex_regions) {
+      const int32_t region = shape_.regions.empty() ? 0 : shape_.regions[0].id;
+      file_->AddArray<int32_t>(cell_data, kVtkRegion, cells,
+                               [&](uint64_t cell) { return cell < shape_.simplex_count ? region : 0; });
+    }
+    if (shape_.boundary.empty()) {
+      return;
+    }
     PartWalk walk(shape_.boundary);
     file_->AddArray<int32_t>(cell_data, kVtkBoundary, cells,
                              [&](uint64_t cell) { return cell < shape_.simplex_count ? 0 : walk.Next().tag; });
@@ -358,8 +390,10 @@ class VtkHdfWriter final : public MeshWriter {
   bool has_cells_ = false;        // the array
   bool has_origins_ = false;      // the array
   bool has_vertex_tags_ = false;  // the array
+  bool has_regions_ = false;      // the array
   uint64_t vertices_ = 0;
   uint64_t weights_ = 0;
+  uint64_t simplex_regions_ = 0;
   uint64_t simplices_ = 0;
   uint64_t facets_ = 0;
 };

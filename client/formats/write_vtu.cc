@@ -65,6 +65,15 @@ class VtuWriter final : public MeshWriter {
     return Status();
   }
 
+  absl::Status AddSimplexRegions(std::span<const int32_t> regions) override {
+    BeginRegions();
+    for (size_t i = 0; i < regions.size() && Status().ok(); ++i) {
+      array_->Add<int32_t>(regions[i]);
+    }
+    simplex_regions_ += regions.size();
+    return Status();
+  }
+
   absl::Status AddFacets(std::span<const uint32_t> facets) override {
     BeginCells();
     for (size_t i = 0; i < facets.size() && Status().ok(); ++i) {
@@ -101,7 +110,12 @@ class VtuWriter final : public MeshWriter {
     if (absl::Status status = Status(); !status.ok()) {
       return status;
     }
-    if (absl::Status status = CheckComplete(shape_, vertices_, weights_, simplices_, facets_); !status.ok()) {
+    if (absl::Status status = CheckComplete(shape_, {.vertices = vertices_,
+                                                     .weights = weights_,
+                                                     .simplex_regions = simplex_regions_,
+                                                     .simplices = simplices_,
+                                                     .facets = facets_});
+        !status.ok()) {
       return status;
     }
     return output_.Commit();
@@ -143,23 +157,45 @@ class VtuWriter final : public MeshWriter {
     BeginArray(absl::StrCat("type=\"", type, "\" Name=\"", name, "\""), shape_.vertex_count * value_bytes);
   }
 
-  // Region and tag of every cell.
+  void EndPointData() {
+    BeginPointData();
+    EndArray();
+    output_.Write("      </PointData>\n");
+  }
+
+  void BeginRegions() {
+    if (!std::exchange(has_regions_, true)) {
+      EndPointData();
+      output_.Write("      <CellData>\n");
+      BeginArray(absl::StrCat("type=\"Int32\" Name=\"", kVtkRegion, "\""), VtkCellCount(shape_) * sizeof(int32_t));
+    }
+  }
+
+  // Region and tag of every cell. Regions of simplices have been written if there are several.
   void WriteCellData() {
-    if (shape_.boundary.empty()) {
+    if (shape_.boundary.empty() && !shape_.has_simplex_regions) {
+      EndPointData();
       return;
     }
-    output_.Write("      <CellData>\n");
-    BeginArray(absl::StrCat("type=\"Int32\" Name=\"", kVtkRegion, "\""), VtkCellCount(shape_) * sizeof(int32_t));
-    AddRepeated(shape_.regions.empty() ? 0 : shape_.regions[0].id, shape_.simplex_count);
+    BeginRegions();
+    if (!shape_.has_simplex_regions) {
+      AddRepeated(shape_.regions.empty() ? 0 : shape_.regions[0].id, shape_.simplex_count);
+    }
     AddRepeated(0, shape_.facet_count());
     EndArray();
+    if (!shape_.boundary.empty()) {
+      WriteTags();
+    }
+    output_.Write("      </CellData>\n");
+  }
+
+  void WriteTags() {
     BeginArray(absl::StrCat("type=\"Int32\" Name=\"", kVtkBoundary, "\""), VtkCellCount(shape_) * sizeof(int32_t));
     AddRepeated(0, shape_.simplex_count);
     for (const BoundaryPart& part : shape_.boundary) {
       AddRepeated(part.tag, part.facets);
     }
     EndArray();
-    output_.Write("      </CellData>\n");
   }
 
   void AddRepeated(int32_t value, uint64_t count) {
@@ -170,9 +206,6 @@ class VtuWriter final : public MeshWriter {
 
   void BeginCells() {
     if (!std::exchange(has_cells_, true)) {
-      BeginPointData();
-      EndArray();
-      output_.Write("      </PointData>\n");
       WriteCellData();
       output_.Write("      <Cells>\n");
       BeginArray("type=\"Int64\" Name=\"connectivity\"", VtkOffset(shape_, VtkCellCount(shape_)) * sizeof(int64_t));
@@ -186,8 +219,10 @@ class VtuWriter final : public MeshWriter {
   bool has_cells_ = false;               // the element
   bool has_origins_ = false;             // the array
   bool has_vertex_tags_ = false;         // the array
+  bool has_regions_ = false;             // the array
   uint64_t vertices_ = 0;
   uint64_t weights_ = 0;
+  uint64_t simplex_regions_ = 0;
   uint64_t simplices_ = 0;
   uint64_t facets_ = 0;
   absl::Status status_;

@@ -196,7 +196,7 @@ TYPED_TEST(GuaranteesTest, PendingEdgesAreSeen) {
   add(0, 1e-3);
   EXPECT_EQ(checker.violation(), "");
   add(2, 0.1);
-  EXPECT_NE(checker.violation().find("waited"), std::string::npos) << checker.violation();
+  EXPECT_NE(checker.violation().find("was pending"), std::string::npos) << checker.violation();
 }
 
 // Termination: on every generator, in every box, within a multiple of what the tree over the points and the box needs.

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <stop_token>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/formats/write_mesh.h"
@@ -71,6 +72,29 @@ TEST_F(VtkHdfTest, HoldsWhatVtkExpects) {
   EXPECT_THAT(Integers("NumberOfConnectivityIds"), ElementsAre(6));
   EXPECT_THAT(Integers("PointData/input"), ElementsAre(1, 1, 1, 0));
   EXPECT_THAT(Reals("PointData/weights"), ElementsAreArray(weights));
+}
+
+TEST_F(VtkHdfTest, RegionsOfSimplicesAndTagsOfFacets) {
+  const std::vector<double> points = {0, 0, 1, 0, 0, 1, 1, 1};
+  const std::vector<uint32_t> simplices = {0, 1, 2, 1, 3, 2};
+  const std::vector<uint32_t> facets = {0, 1, 1, 2};
+  const std::vector<BoundaryPart> boundary = {{3, "", 1}, {4, "", 1}};
+  const std::vector<int32_t> simplex_regions = {20, 10};
+  const std::vector<Region> regions = {{10, ""}, {20, ""}};
+  MeshView mesh = {.dimension = 2, .points = points, .simplices = simplices};
+  mesh.simplex_regions = simplex_regions;
+  mesh.regions = regions;
+  ASSERT_TRUE(WriteMesh(path_, "", mesh).ok());
+  Open();
+  EXPECT_THAT(Integers("CellData/region"), ElementsAre(20, 10));
+  H5Fclose(std::exchange(file_, -1));
+  mesh.facets = facets;
+  mesh.boundary = boundary;
+  ASSERT_TRUE(WriteMesh(path_, "", mesh).ok());
+  Open();
+  EXPECT_THAT(Integers("CellData/region"), ElementsAre(20, 10, 0, 0));
+  EXPECT_THAT(Integers("CellData/boundary"), ElementsAre(0, 0, 3, 4));
+  EXPECT_THAT(Integers("Connectivity"), ElementsAre(0, 1, 2, 1, 3, 2, 0, 1, 1, 2));
 }
 
 TEST_F(VtkHdfTest, PiecesOfAnySizeMakeOneMesh) {

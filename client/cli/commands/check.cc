@@ -1,13 +1,11 @@
 // wellspace check: is it a mesh, and how good is it?
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <iostream>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -175,13 +173,28 @@ absl::StatusOr<std::vector<core::SizeBox>> CheckCommand::SizeBoxes(int dimension
   return boxes;
 }
 
-// Whether the parts of a boundary are more than the faces of a box: then it is a domain with segments.
+// Whether a facet lies on no face of the mesh's bounding box: then it is a domain with segments.
 bool HasSegments(const formats::Mesh& mesh) {
-  constexpr std::array<std::string_view, 6> kFaces = {"xmin", "xmax", "ymin", "ymax", "zmin", "zmax"};
-  return mesh.dimension == 2 &&
-         std::any_of(mesh.boundary.begin(), mesh.boundary.end(), [&](const formats::BoundaryPart& part) {
-           return std::find(kFaces.begin(), kFaces.end(), part.name) == kFaces.end();
-         });
+  if (mesh.dimension != 2 || mesh.facets.empty()) {
+    return false;
+  }
+  const formats::MeshShape shape = mesh.View().Shape();
+  const uint64_t vertices = mesh.View().vertex_count();
+  for (size_t f = 0; f < mesh.facets.size(); f += 2) {
+    if (mesh.facets[f] >= vertices || mesh.facets[f + 1] >= vertices) {
+      return true;  // the validator tells which
+    }
+    const double* const p = &mesh.points[2 * size_t{mesh.facets[f]}];
+    const double* const q = &mesh.points[2 * size_t{mesh.facets[f + 1]}];
+    bool is_on_face = false;
+    for (int axis = 0; axis < 2; ++axis) {
+      is_on_face = is_on_face || (p[axis] == q[axis] && (p[axis] == shape.low[axis] || p[axis] == shape.high[axis]));
+    }
+    if (!is_on_face) {
+      return true;
+    }
+  }
+  return false;
 }
 
 // What a domain has to be, and be conforming to the one that is given, if one is.

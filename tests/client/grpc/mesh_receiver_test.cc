@@ -356,9 +356,9 @@ INSTANTIATE_TEST_SUITE_P(
                  a = WeightedAnswer();
                  a.chunks[2].set_weights(0, -0.0);
                }},
-        Damage{"InputOfNoVertex", "name vertex 4294967295 of 4",
+        Damage{"InputOfNoVertex", "name vertex 4294967294 of 4",
                [](Answer& a) {
-                 a.chunks[3].set_input_vertices(0, 0xFFFFFFFFu);
+                 a.chunks[3].set_input_vertices(0, 0xFFFFFFFEu);
                  Sign(a.chunks[3]);
                }}),
     [](const auto& test) { return test.param.name; });
