@@ -204,7 +204,7 @@ TEST_F(LostOutputTest, SignalsLeaveNoTemporaryFile) {
     const int reader = open(pipe.c_str(), O_RDONLY | O_CLOEXEC);  // returns once the program opens it for writing
     ASSERT_GE(reader, 0);
     char buffer[4096];
-    ASSERT_GT(read(reader, buffer, 1), 0);  // what is buffered is full, and all files are open
+    ASSERT_GT(read(reader, buffer, 1), 0);      // what is buffered is full, and all files are open
     EXPECT_EQ(folder_.FileCount(), files + 3);  // .ele, .edge and .poly
     for (const int signal : one.signals) {
       Send(process, signal);
