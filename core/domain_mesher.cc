@@ -23,6 +23,7 @@ namespace {
 // A vertex is in the diametral disc of a subsegment only if it is nearer to its centre by more than this, relatively: a
 // foot makes a right angle, as far as doubles go.
 constexpr double kDiscTolerance = 1e-9;
+constexpr double kPlaceRounding = 0x1p-50;  // relative to coordinates
 
 // A ratio that exceeds rho by less, relatively, is what was rounded.
 constexpr double kRatioTolerance = 1e-9;
@@ -206,7 +207,10 @@ std::vector<DomainMesher::Subsegment> DomainMesher::EncroachedSubsegments(const 
       const Point<2>& p = structure_.point(chain[i]);
       const Point<2>& q = structure_.point(chain[i + 1]);
       const Neighbor nearest = structure_.NearestTo({0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])}, chain[i], workspace_);
-      if (nearest.distance_sq < 0.25 * DistanceSq<2>(p, q) * (1 - kDiscTolerance)) {
+      // What is rounded of the centre may make one of the ends the nearest.
+      const double rounding = kPlaceRounding * (std::abs(p[0]) + std::abs(p[1]));
+      const double radius = 0.5 * std::sqrt(DistanceSq<2>(p, q)) * (1 - kDiscTolerance) - rounding;
+      if (nearest.vertex != chain[i] && nearest.vertex != chain[i + 1] && std::sqrt(nearest.distance_sq) < radius) {
         encroached.push_back({segment, chain[i], chain[i + 1]});
       }
     }

@@ -17,6 +17,9 @@
 //         elements, also those of higher order, are refused. Weights are the $NodeData "weights".
 //   medit INRIA's .mesh in ascii, of dimension 2 with triangles or 3 with tetrahedra; edges in 2-D, and triangles in
 //         3-D, with another reference than 0 are the boundary; all else in it is skipped.
+//
+// Regions are where write_mesh.h says; in .msh that is the first physical group of a simplex, or 0. They are read if
+// simplices are of more than one. In .ele all first attributes have to be whole numbers of 32 bits for that.
 #ifndef WELLSPACE_CLIENT_FORMATS_READ_MESH_H_
 #define WELLSPACE_CLIENT_FORMATS_READ_MESH_H_
 

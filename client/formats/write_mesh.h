@@ -25,6 +25,12 @@
 //         attribute of .ele.
 //   msh41, msh22  physical groups with names: one of each part, with its tag as number, and one of the simplices.
 //   medit Edges in 2-D, Triangles in 3-D, with their tags as references.
+//
+// With several regions each simplex has the id of its own: cell data "region" of vtu and vtkhdf; `regions` of npz, with
+// names in `region_names` for the ids in `region_ids`; the attribute of .ele, with names in a comment "# regions:"; the
+// reference of medit. In msh41 and msh22 each region is a physical group with a name. Its number is the id, unless a
+// part of the boundary has that number: then it is the least that is free. In msh41 each region is an entity with a
+// block of its own: simplices stand by regions in the order of groups, otherwise in the order in which they came.
 #ifndef WELLSPACE_CLIENT_FORMATS_WRITE_MESH_H_
 #define WELLSPACE_CLIENT_FORMATS_WRITE_MESH_H_
 
@@ -56,7 +62,9 @@ absl::Status CheckMeshOutput(const std::string& path, const std::string& format,
 // Writes a mesh piece by piece, so that it need not fit into memory.
 //
 // Memory: a few blocks for a regular file; for vtu into a pipe or a device the compressed array that is being written;
-//         for node with weights or tags of vertices the points, for msh41 and msh22 with weights these.
+//         for node with weights or tags of vertices the points, for msh41 and msh22 with weights these. With several
+//         regions, for msh41, msh22, medit and node also 16 bytes for each run of simplices of one region; for msh41
+//         into a pipe or a device the simplices, and otherwise 4 KiB a region.
 // Thread safety: thread-compatible.
 class MeshWriter {
  public:

@@ -225,6 +225,26 @@ TEST(DomainMesherTest, SmallAnglesEndAndKeepTheBound) {
   }
 }
 
+// What is rounded is not little beside these: their centres are off by 1e-8 of their lengths.
+TEST(DomainMesherTest, VeryShortSegmentsAreNotSplitByWhatIsRounded) {
+  for (int turn = 0; turn < 40; ++turn) {
+    Input input;
+    input.faces = FaceRule::kBox;
+    const double angle = 0.157 * turn;
+    const double length = 3e-9 * (1 + turn % 7);
+    input.points = {0.61, 0.73, 0.61 + length * std::cos(angle), 0.73 + length * std::sin(angle)};
+    input.ends = {0, 1};
+    input.parameters.domain_low = {0, 0};
+    input.parameters.domain_high = {1, 1};
+    const auto mesh = input.Make();
+    ASSERT_TRUE(mesh.ok()) << turn << ": " << mesh.status();
+    EXPECT_EQ(mesh->statistics.domain->subsegments, mesh->facet_count());
+    EXPECT_EQ(std::count(mesh->vertex_tags.begin(), mesh->vertex_tags.end(), 5), 2)
+        << turn;  // no vertex between its ends
+    EXPECT_LT(mesh->vertex_count(), 600u);
+  }
+}
+
 TEST(DomainMesherTest, TheMeshDoesNotDependOnTheOrderOfTheInput) {
   Input input = Input().Circle({0, 0}, 1, 17, 1).Ring({{-0.2, -0.1}, {0.3, 0}, {0, 0.25}}, 2);
   const auto one = input.Make();

@@ -14,6 +14,9 @@ namespace {
 // A part of a segment that is shorter than this, relative to its distance from the site, is what was rounded.
 constexpr double kLeastPart = 1e-9;
 
+// What is rounded of a place, relative to its coordinates: not little beside a segment that is short.
+constexpr double kPlaceRounding = 0x1p-50;
+
 // Distances from a common end that differ by less than this, relatively, are equal: those of segments that are given
 // are rounded.
 constexpr double kSameDistance = 1e-9;
@@ -88,7 +91,8 @@ MetPart DomainRules::MeetSegment(const Polytope<2>& cell, uint32_t segment) cons
   }
   const double at = std::clamp(foot, low, std::max(low, high));
   const double distance = std::sqrt(NormSq<2>({from[0] + at * along[0], from[1] + at * along[1]}));
-  if (high - low > kLeastPart * distance) {
+  const double rounding = kPlaceRounding * (std::abs(cell.site()[0]) + std::abs(cell.site()[1]));
+  if (high - low > kLeastPart * distance + rounding) {
     part = {segment, low, high, distance};
   }
   return part;
