@@ -202,7 +202,7 @@ class MesherIn final : public Mesher {
     for (double& weight : mesh.weights) {
       weight /= domain_.scale * domain_.scale;
     }
-    WELLSPACE_RETURN_IF_ERROR(DescribeBoundary(mesh, context));
+    WELLSPACE_RETURN_IF_ERROR(DescribeBoundary(mesh, threads, context));
     mesh.statistics.max_radius_edge = simplices.max_radius_edge;
     mesh.statistics.min_angle_deg = simplices.min_angle_deg;
     stars_.Add(simplices.counters);
@@ -250,8 +250,8 @@ class MesherIn final : public Mesher {
     mesh.simplices.insert(mesh.simplices.end(), simplices.indices.begin(), simplices.indices.end());
     mesh.input_vertex = numbering_.input_vertex();
     mesh.moved_vertices.clear();  // else the mesh is extracted anew
-    if (const absl::Status described = DescribeBoundary(mesh, RunContext()); !described.ok()) {
-      std::abort();  // nobody can have cancelled that context
+    if (const absl::Status described = DescribeBoundary(mesh, threads, RunContext()); !described.ok()) {
+      std::abort();  // that context cannot have been cancelled
     }
     if (worst_has_gone) {
       const QualityReport report = MeasureQuality({D, mesh.points, mesh.simplices});
@@ -449,10 +449,10 @@ class MesherIn final : public Mesher {
   }
 
   // Sets what is said of the boundary, of regions and of origins.
-  absl::Status DescribeBoundary(Mesh& mesh, const RunContext& context) const {
+  absl::Status DescribeBoundary(Mesh& mesh, int threads, const RunContext& context) const {
     WELLSPACE_ASSIGN_OR_RETURN(
         BoxBoundary boundary,
-        FindBoxBoundary({mesh.domain_low, mesh.domain_high, mesh.points, mesh.simplices}, context));
+        FindBoxBoundary({mesh.domain_low, mesh.domain_high, mesh.points, mesh.simplices}, threads, context));
     mesh.vertex_tags = std::move(boundary.vertex_tags);
     mesh.facets = std::move(boundary.facets);
     mesh.boundary = std::move(boundary.parts);

@@ -44,7 +44,7 @@ class PartWalk {
 // Thread safety: thread-compatible.
 class FacetSorter {
  public:
-  // The facets with the tag 0 are left out: nobody has tagged them.
+  // The facets with the tag 0, which stands for none, are left out.
   void Add(std::span<const uint32_t> facet, int32_t tag) {
     if (tag != 0) {
       std::vector<uint32_t>& facets = by_tag_[tag];

@@ -1,17 +1,21 @@
 #include "core/simplex/boundary.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <utility>
 
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
+#include "core/base/thread_team.h"
 
 namespace wellspace::core {
 namespace {
 
-// Rows between two looks at the context.
-constexpr size_t kRowsBetweenChecks = 1 << 16;
+// Rows that one thread looks at before the next look at the context.
+constexpr size_t kRowsTogether = 1 << 16;
+
+size_t BlocksOf(size_t rows) { return (rows + kRowsTogether - 1) / kRowsTogether; }
 
 // A facet as it is found: that of `simplex` which is opposite to its vertex number `apex`.
 struct FoundFacet {
@@ -26,94 +30,105 @@ class BoundaryFinder {
   explicit BoundaryFinder(const BoxMesh& mesh)
       : points_(mesh.points), simplices_(mesh.simplices), box_{PointAt<D>(mesh.low, 0), PointAt<D>(mesh.high, 0)} {}
 
-  absl::StatusOr<BoxBoundary> Find(const RunContext& context) {
+  absl::StatusOr<BoxBoundary> Find(int threads, const RunContext& context) {
+    ThreadTeam team(threads);
     BoxBoundary boundary;
-    WELLSPACE_RETURN_IF_ERROR(MarkVertices(boundary.vertex_tags, context));
-    WELLSPACE_RETURN_IF_ERROR(FindFacets(context));
+    WELLSPACE_RETURN_IF_ERROR(MarkVertices(boundary.vertex_tags, team, context));
+    WELLSPACE_RETURN_IF_ERROR(FindFacets(team, context));
     Sort(boundary);
     return boundary;
   }
 
  private:
-  absl::Status MarkVertices(HugeVector<int32_t>& tags, const RunContext& context) {
+  absl::Status MarkVertices(HugeVector<int32_t>& tags, ThreadTeam& team, const RunContext& context) {
     const size_t vertices = points_.size() / D;
     faces_.resize(vertices);
     tags.resize(vertices);
-    for (size_t v = 0; v < vertices; ++v) {
-      if (v % kRowsBetweenChecks == 0) {
-        WELLSPACE_RETURN_IF_ERROR(context.Check());
+    return team.TryForEach(BlocksOf(vertices), [&](size_t block) {
+      const size_t end = std::min(vertices, (block + 1) * kRowsTogether);
+      for (size_t v = block * kRowsTogether; v < end; ++v) {
+        const FaceMask faces = box_.FacesOf(PointAt<D>(points_, v));
+        faces_[v] = faces;
+        tags[v] = faces == 0 ? kNoTag : FaceTag(std::countr_zero(faces));
       }
-      const FaceMask faces = box_.FacesOf(PointAt<D>(points_, v));
-      faces_[v] = faces;
-      tags[v] = faces == 0 ? kNoTag : FaceTag(std::countr_zero(faces));
-    }
-    return absl::OkStatus();
+      return context.Check();
+    });
   }
 
-  absl::Status FindFacets(const RunContext& context) {
+  absl::Status FindFacets(ThreadTeam& team, const RunContext& context) {
     const size_t count = simplices_.size() / (D + 1);
-    for (size_t s = 0; s < count; ++s) {
-      if (s % kRowsBetweenChecks == 0) {
-        WELLSPACE_RETURN_IF_ERROR(context.Check());
+    found_.resize(BlocksOf(count));
+    return team.TryForEach(found_.size(), [&](size_t block) {
+      const size_t end = std::min(count, (block + 1) * kRowsTogether);
+      for (size_t s = block * kRowsTogether; s < end; ++s) {
+        std::array<FaceMask, D + 1> faces;
+        int inner = 0;
+        for (int k = 0; k <= D; ++k) {
+          faces[k] = faces_[simplices_[s * (D + 1) + k]];
+          inner += faces[k] == 0 ? 1 : 0;
+        }
+        if (inner <= 1) {
+          AddFacets(s, faces, found_[block]);
+        }
       }
-      std::array<FaceMask, D + 1> faces;
-      int inner = 0;
-      for (int k = 0; k <= D; ++k) {
-        faces[k] = faces_[simplices_[s * (D + 1) + k]];
-        inner += faces[k] == 0 ? 1 : 0;
-      }
-      if (inner <= 1) {
-        AddFacets(s, faces);
-      }
-    }
-    return absl::OkStatus();
+      return context.Check();
+    });
   }
 
-  void AddFacets(size_t simplex, const std::array<FaceMask, D + 1>& faces) {
+  static void AddFacets(size_t simplex, const std::array<FaceMask, D + 1>& faces, std::vector<FoundFacet>& found) {
     for (int apex = 0; apex <= D; ++apex) {
       FaceMask shared = static_cast<FaceMask>(~FaceMask{0});
       for (int k = 0; k <= D; ++k) {
         shared &= k == apex ? static_cast<FaceMask>(~FaceMask{0}) : faces[k];
       }
       if (shared != 0) {
-        const int face = std::countr_zero(shared);
-        found_.push_back({simplex, static_cast<uint8_t>(apex), static_cast<uint8_t>(face)});
-        ++counts_[face];
+        found.push_back({simplex, static_cast<uint8_t>(apex), static_cast<uint8_t>(std::countr_zero(shared))});
       }
     }
   }
 
   // Puts the facets in the order of their parts.
   void Sort(BoxBoundary& boundary) const {
-    std::array<size_t, 2 * D> next{};  // of each face, in numbers of facets
-    size_t before = 0;
-    for (int face = 0; face < 2 * D; ++face) {
-      next[face] = before;
-      before += counts_[face];
-      boundary.parts.push_back({FaceTag(face), FaceName(face), counts_[face]});
+    std::array<uint64_t, 2 * D> counts{};
+    for (const std::vector<FoundFacet>& block : found_) {
+      for (const FoundFacet& facet : block) {
+        ++counts[facet.face];
+      }
     }
-    boundary.facets.resize(found_.size() * D);
-    for (const FoundFacet& facet : found_) {
-      uint32_t* out = &boundary.facets[next[facet.face]++ * D];
-      const uint32_t* corners = &simplices_[facet.simplex * (D + 1)];
-      for (int k = 0, at = 0; k <= D; ++k) {
-        if (k != facet.apex) {
-          out[at++] = corners[k];
-        }
+    std::array<size_t, 2 * D> next{};  // of each face, in numbers of facets
+    size_t count = 0;
+    for (int face = 0; face < 2 * D; ++face) {
+      next[face] = count;
+      count += counts[face];
+      boundary.parts.push_back({FaceTag(face), FaceName(face), counts[face]});
+    }
+    boundary.facets.resize(count * D);
+    for (const std::vector<FoundFacet>& block : found_) {
+      for (const FoundFacet& facet : block) {
+        Put(facet, &boundary.facets[next[facet.face]++ * D]);
       }
-      // The apex goes to the front by as many exchanges of neighbours as it has vertices before it.
-      if (facet.apex % 2 == 1) {
-        std::swap(out[D - 2], out[D - 1]);
+    }
+  }
+
+  // Writes the vertices of a facet.
+  void Put(const FoundFacet& facet, uint32_t* out) const {
+    const uint32_t* corners = &simplices_[facet.simplex * (D + 1)];
+    for (int k = 0, at = 0; k <= D; ++k) {
+      if (k != facet.apex) {
+        out[at++] = corners[k];
       }
+    }
+    // The apex goes to the front by as many exchanges of neighbours as it has vertices before it.
+    if (facet.apex % 2 == 1) {
+      std::swap(out[D - 2], out[D - 1]);
     }
   }
 
   std::span<const double> points_;
   std::span<const uint32_t> simplices_;
   Box<D> box_;
-  HugeVector<FaceMask> faces_;  // by vertex
-  std::vector<FoundFacet> found_;
-  std::array<uint64_t, 2 * D> counts_{};
+  HugeVector<FaceMask> faces_;                  // by vertex
+  std::vector<std::vector<FoundFacet>> found_;  // by block of simplices
 };
 
 }  // namespace
@@ -125,10 +140,10 @@ std::string FaceName(int face) {
 
 Region WholeBox() { return {.id = 1, .name = "domain"}; }
 
-absl::StatusOr<BoxBoundary> FindBoxBoundary(const BoxMesh& mesh, const RunContext& context) {
-#define WELLSPACE_FIND(D)                         \
-  if (mesh.low.size() == D) {                     \
-    return BoundaryFinder<D>(mesh).Find(context); \
+absl::StatusOr<BoxBoundary> FindBoxBoundary(const BoxMesh& mesh, int threads, const RunContext& context) {
+#define WELLSPACE_FIND(D)                                  \
+  if (mesh.low.size() == D) {                              \
+    return BoundaryFinder<D>(mesh).Find(threads, context); \
   }
   WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_FIND)
 #undef WELLSPACE_FIND

@@ -69,7 +69,8 @@ struct BoxMesh {
 //             counterclockwise seen from outside; (3) within a part, facets come in the order of their simplices.
 // Complexity: one pass over the points and one over the simplices; memory of two bytes a vertex beside the result.
 // Errors:     CANCELLED, DEADLINE_EXCEEDED.
-absl::StatusOr<BoxBoundary> FindBoxBoundary(const BoxMesh& mesh, const RunContext& context);
+// Threads:    uses `threads`, at most as many as the machine has cores; the result does not depend on them.
+absl::StatusOr<BoxBoundary> FindBoxBoundary(const BoxMesh& mesh, int threads, const RunContext& context);
 
 }  // namespace wellspace::core
 

@@ -325,12 +325,27 @@ TEST(Boundary, OriginsOfEqualPointsAndCorners) {
   EXPECT_THAT(std::vector(mesh.vertex_tags.begin(), mesh.vertex_tags.begin() + 3), ElementsAre(kNoTag, 2, kNoTag));
 }
 
+// Large enough for several blocks of rows.
+TEST(Boundary, DoesNotDependOnThreads) {
+  const Mesh mesh = MeshOf(test::InUnitBox(2), test::MakeCloud("uniform", 2, 40'000));
+  ASSERT_GT(mesh.simplex_count(), 100'000u);
+  RunContext context;
+  for (const int threads : {1, 3}) {
+    const absl::StatusOr<BoxBoundary> found =
+        FindBoxBoundary({mesh.domain_low, mesh.domain_high, mesh.points, mesh.simplices}, threads, context);
+    ASSERT_TRUE(found.ok()) << found.status();
+    EXPECT_EQ(found->facets, mesh.facets);
+    EXPECT_EQ(found->parts, mesh.boundary);
+    EXPECT_EQ(found->vertex_tags, mesh.vertex_tags);
+  }
+}
+
 TEST(Boundary, StopsWhenItIsCancelled) {
   const Mesh mesh = MeshOf(test::InUnitBox(2), {});
   RunContext context;
   context.Cancel();
   EXPECT_TRUE(absl::IsCancelled(
-      FindBoxBoundary({mesh.domain_low, mesh.domain_high, mesh.points, mesh.simplices}, context).status()));
+      FindBoxBoundary({mesh.domain_low, mesh.domain_high, mesh.points, mesh.simplices}, 1, context).status()));
 }
 
 // What is planted, and what is said of it.
