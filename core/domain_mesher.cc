@@ -23,7 +23,6 @@ namespace {
 // A vertex is in the diametral disc of a subsegment only if it is nearer to its centre by more than this, relatively: a
 // foot makes a right angle, as far as doubles go.
 constexpr double kDiscTolerance = 1e-9;
-constexpr double kPlaceRounding = 0x1p-50;  // relative to coordinates
 
 // A ratio that exceeds rho by less, relatively, is what was rounded.
 constexpr double kRatioTolerance = 1e-9;

@@ -10,16 +10,14 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_format.h"
 #include "core/base/status_macros.h"
+#include "core/features/place.h"
 #include "core/geometry/exact_measure.h"
 
 namespace wellspace::core {
 namespace {
 
 constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
-
-std::string Place(const Point<2>& p) { return absl::StrFormat("(%.17g, %.17g)", p[0], p[1]); }
 
 // Sets of numbers that are joined.
 class UnionFind {

@@ -11,8 +11,10 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "core/base/status_macros.h"
+#include "core/features/place.h"
 #include "core/features/segment_pairs.h"
 #include "core/geometry/exact_measure.h"
+#include "core/geometry/segment.h"
 
 namespace wellspace::core {
 namespace {
@@ -24,8 +26,6 @@ constexpr size_t kMostFaults = 1000;
 constexpr int kMostRounds = 64;
 
 constexpr uint32_t kNone = PlanarGraph::kNoInput;
-
-std::string Place(const Point<2>& p) { return absl::StrFormat("(%.17g, %.17g)", p[0], p[1]); }
 
 Sign SideOf(const Point<2>& a, const Point<2>& b, const Point<2>& p) { return Orientation<2>({a, b, p}).sign; }
 
@@ -50,8 +50,8 @@ Point<2> CrossingOf(const Point<2>& a, const Point<2>& b, const Point<2>& c, con
   const Point<2> along = Difference<2>(b, a);
   const Point<2> other = Difference<2>(d, c);
   const Point<2> from = Difference<2>(c, a);
-  const double determinant = along[0] * other[1] - along[1] * other[0];
-  const double t = determinant == 0 ? 0.5 : (from[0] * other[1] - from[1] * other[0]) / determinant;
+  const double determinant = Cross(along, other);
+  const double t = determinant == 0 ? 0.5 : Cross(from, other) / determinant;
   const double at = std::clamp(t, 0.0, 1.0);
   return {a[0] + at * along[0], a[1] + at * along[1]};
 }

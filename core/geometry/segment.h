@@ -10,6 +10,9 @@
 
 namespace wellspace::core {
 
+// Twice the area of the triangle of the two vectors, above 0 if b is counterclockwise from a; rounded.
+inline double Cross(const Point<2>& a, const Point<2>& b) { return a[0] * b[1] - a[1] * b[0]; }
+
 // The box of two points.
 inline Box<2> BoxOfEnds(const Point<2>& a, const Point<2>& b) {
   return {{std::min(a[0], b[0]), std::min(a[1], b[1])}, {std::max(a[0], b[0]), std::max(a[1], b[1])}};
@@ -27,7 +30,7 @@ inline bool SurelyMisses(const Point<2>& a, const Point<2>& b, const Box<2>& box
   const Point<2> centre = {0.5 * (box.low[0] + box.high[0]) - a[0], 0.5 * (box.low[1] + box.high[1]) - a[1]};
   const double half_x = 0.5 * (box.high[0] - box.low[0]);
   const double half_y = 0.5 * (box.high[1] - box.low[1]);
-  const double away = std::abs(along[0] * centre[1] - along[1] * centre[0]);
+  const double away = std::abs(Cross(along, centre));
   const double size = std::abs(along[0]) * half_y + std::abs(along[1]) * half_x;
   const double rounding = 0x1p-48 * (std::abs(along[0] * centre[1]) + std::abs(along[1] * centre[0]) + size);
   return away > size + rounding;

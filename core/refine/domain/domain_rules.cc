@@ -14,9 +14,6 @@ namespace {
 // A part of a segment that is shorter than this, relative to its distance from the site, is what was rounded.
 constexpr double kLeastPart = 1e-9;
 
-// What is rounded of a place, relative to its coordinates: not little beside a segment that is short.
-constexpr double kPlaceRounding = 0x1p-50;
-
 // Distances from a common end that differ by less than this, relatively, are equal: those of segments that are given
 // are rounded.
 constexpr double kSameDistance = 1e-9;
@@ -32,8 +29,6 @@ constexpr double kRadiusSqOfArea = 0.76980035891950102;
 // From this rho on, by the square, no vertex that takes the place of another comes nearer than the edge that asks.
 constexpr double kSafeRhoSq = 2 * (1 - 1e-12);
 
-double Cross(const Point<2>& a, const Point<2>& b) { return a[0] * b[1] - a[1] * b[0]; }
-
 // The multiple of the largest power of two that lies within `room` of `distance`.
 double RoundNear(double distance, double room) {
   double unit = std::exp2(std::ceil(std::log2(distance + room)));
@@ -47,7 +42,7 @@ double RoundNear(double distance, double room) {
 }
 
 // Whether the segments p q and a b cross each other in their interiors, as doubles tell.
-bool Cross(const Point<2>& p, const Point<2>& q, const Point<2>& a, const Point<2>& b) {
+bool CrossEachOther(const Point<2>& p, const Point<2>& q, const Point<2>& a, const Point<2>& b) {
   const Point<2> way = Difference<2>(q, p);
   const Point<2> along = Difference<2>(b, a);
   return Cross(way, Difference<2>(a, p)) * Cross(way, Difference<2>(b, p)) < 0 &&
@@ -229,12 +224,11 @@ DomainRules::Bound DomainRules::BoundOf(const Polytope<2>& cell, const CellNode<
 }
 
 Assessment DomainRules::AssessCell(VertexId v, Polytope<2>& cell, std::span<const uint32_t> segments,
-                                   double edge_limit_sq, std::span<const NodeName> refused,
-                                   DomainFinding& finding) const {
+                                   double edge_limit_sq, std::span<const NodeName> refused, MetPart& met) const {
   cell.Place();
   Assessment result;
-  finding.met = NearestMet(v, cell, segments);
-  result.encroached_face = finding.met.IsThere() ? 0 : -1;
+  met = NearestMet(v, cell, segments);
+  result.encroached_face = met.IsThere() ? 0 : -1;
   const double rho_sq = rules_.criteria().rho * rules_.criteria().rho;
   std::pair<double, NodeName> best;  // of the bad node
   for (size_t i = 0; i < cell.nodes().size(); ++i) {
@@ -275,13 +269,11 @@ Assessment DomainRules::AssessCell(VertexId v, Polytope<2>& cell, std::span<cons
   return result;
 }
 
-// Whether `node` of `cell`, that of `v`, is the circumcentre of a triangle with a corner on a segment.
-bool DomainRules::IsAtSegment(VertexId v, const Polytope<2>& cell, int node) const {
-  const auto is_on_segment = [&](VertexId u) { return !domain_.IsFree(u); };
-  const auto& planes = cell.nodes()[node].planes;
-  return is_on_segment(v) || std::any_of(planes.begin(), planes.end(), [&](uint16_t index) {
-           return cell.plane(index).kind == PlaneKind::kBisector && is_on_segment(cell.plane(index).vertex);
-         });
+// Whether a node of the cell of `v` is the circumcentre of a triangle with a corner on a segment.
+bool DomainRules::IsAtSegment(VertexId v, const NodeView& node) const {
+  const auto generators = std::span(node.generators).first(node.bisectors);
+  return !domain_.IsFree(v) || std::any_of(generators.begin(), generators.end(),
+                                           [&](const Plane<2>* plane) { return !domain_.IsFree(plane->vertex); });
 }
 
 // Where a vertex is to split `met`, which the cell of `v` meets.
@@ -306,14 +298,13 @@ SegmentPoint DomainRules::SplitPlace(VertexId v, const MetPart& met) const {
     }
   }
   // Else at the foot of v, as far as that is in the part.
-  const Point<2> along = domain_.DirectionOf(HalfEdgeOf(segment, false));
-  const double foot = Dot<2>(Difference<2>(structure_.point(v), domain_.EndOf(segment, false)), along) / length;
-  const double at = std::clamp(foot, met.from, met.to);
-  return KeepWithin(domain_.FromNearerEnd(segment, at), met.distance);
+  const double at = std::clamp(domain_.FootOf(structure_.point(v), segment).from_a, met.from, met.to);
+  return RoundPlace(domain_.FromNearerEnd(segment, at), met.distance);
 }
 
-// The place that is taken for one that no other distance gives, with nothing within `room`.
-SegmentPoint DomainRules::KeepWithin(SegmentPoint place, double room) const {
+// The place of a vertex that comes for another reason than an equal distance, with nothing within `room` of it: at a
+// round distance from an end with a small angle.
+SegmentPoint DomainRules::RoundPlace(SegmentPoint place, double room) const {
   const uint32_t segment = place.segment;
   const double length = domain_.LengthOf(segment);
   const bool is_acute_at_a = domain_.IsAcute(HalfEdgeOf(segment, false));
@@ -349,9 +340,8 @@ InsertionRequest<2> DomainRules::RequestAt(VertexId v, const SegmentPoint& place
 // The point that the bad node asks for, in the sector of its triangle if it can be; workspace.segments has all segments
 // that are nearer to it than any vertex.
 SteinerPoint<2> DomainRules::CandidateIn(size_t sector, VertexId v, const Polytope<2>& cell, const Assessment& found,
-                                         double edge_limit_sq, StepRules<2>::CellOf cell_of,
+                                         bool is_at_segment, double edge_limit_sq, StepRules<2>::CellOf cell_of,
                                          Workspace<2>& workspace) const {
-  const bool is_at_segment = IsAtSegment(v, cell, found.bad_node);
   const auto find_segments = [&](const SteinerPoint<2>& point) {
     structure_.SegmentsWithin(point.position, std::sqrt(point.empty_radius_sq), v, workspace);
   };
@@ -359,7 +349,7 @@ SteinerPoint<2> DomainRules::CandidateIn(size_t sector, VertexId v, const Polyto
   find_segments(candidate);
   const bool is_beyond = std::any_of(workspace.segments.begin(), workspace.segments.end(), [&](uint32_t s) {
     return !domain_.IsOn(v, s) &&
-           Cross(cell.site(), candidate.position, domain_.EndOf(s, false), domain_.EndOf(s, true));
+           CrossEachOther(cell.site(), candidate.position, domain_.EndOf(s, false), domain_.EndOf(s, true));
   });
   if (is_beyond || !LeadsInto(v, sector, candidate.position)) {
     // It is in the cell of another vertex, beyond a segment: a point of this cell takes its place.
@@ -371,17 +361,13 @@ SteinerPoint<2> DomainRules::CandidateIn(size_t sector, VertexId v, const Polyto
 
 // The foot of `candidate` on the nearest of `segments`, if that is nearer than the empty radius over the square root of
 // 2; or, if the candidate is not in the sector, on the nearest segment of `v`. `distance_sq` is how far it is then.
-SegmentPoint DomainRules::FootOf(const SteinerPoint<2>& candidate, VertexId v, bool is_in_sector,
-                                 std::span<const uint32_t> segments, double& distance_sq) const {
+SegmentPoint DomainRules::YieldPlace(const SteinerPoint<2>& candidate, VertexId v, bool is_in_sector,
+                                     std::span<const uint32_t> segments, double& distance_sq) const {
   distance_sq = is_in_sector ? 0.5 * candidate.empty_radius_sq : std::numeric_limits<double>::infinity();
   SegmentPoint place;
   for (const uint32_t segment : segments) {
-    const double length = domain_.LengthOf(segment);
-    const Point<2> along = domain_.DirectionOf(HalfEdgeOf(segment, false));
-    const Point<2> from = Difference<2>(candidate.position, domain_.EndOf(segment, false));
-    const double foot = Dot<2>(from, along) / length;
-    const double away = Cross(along, from) / length;
-    if (foot > 0 && foot < length && (is_in_sector || domain_.IsOn(v, segment)) &&
+    const auto [foot, away] = domain_.FootOf(candidate.position, segment);
+    if (foot > 0 && foot < domain_.LengthOf(segment) && (is_in_sector || domain_.IsOn(v, segment)) &&
         (away * away < distance_sq || (away * away == distance_sq && segment < place.segment))) {
       distance_sq = away * away;
       place = domain_.FromNearerEnd(segment, foot);
@@ -391,11 +377,11 @@ SegmentPoint DomainRules::FootOf(const SteinerPoint<2>& candidate, VertexId v, b
 }
 
 DomainRules::Answer DomainRules::NextRequest(VertexId v, const Polytope<2>& cell, const Assessment& found,
-                                             const DomainFinding& finding, double edge_limit_sq,
-                                             StepRules<2>::CellOf cell_of, Workspace<2>& workspace) const {
+                                             const MetPart& met, double edge_limit_sq, StepRules<2>::CellOf cell_of,
+                                             Workspace<2>& workspace) const {
   Answer answer;
-  if (finding.met.IsThere()) {
-    answer.request = RequestAt(v, SplitPlace(v, finding.met), edge_limit_sq, workspace);
+  if (met.IsThere()) {
+    answer.request = RequestAt(v, SplitPlace(v, met), edge_limit_sq, workspace);
     return answer;
   }
   if (found.bad_node < 0) {
@@ -403,10 +389,11 @@ DomainRules::Answer DomainRules::NextRequest(VertexId v, const Polytope<2>& cell
   }
   const NodeView view(cell, cell.nodes()[found.bad_node]);
   const size_t sector = domain_.SectorToward(v, view.toward);
-  const SteinerPoint<2> candidate = CandidateIn(sector, v, cell, found, edge_limit_sq, cell_of, workspace);
+  const SteinerPoint<2> candidate =
+      CandidateIn(sector, v, cell, found, IsAtSegment(v, view), edge_limit_sq, cell_of, workspace);
   double distance_sq = 0;
   const SegmentPoint place =
-      FootOf(candidate, v, LeadsInto(v, sector, candidate.position), workspace.segments, distance_sq);
+      YieldPlace(candidate, v, LeadsInto(v, sector, candidate.position), workspace.segments, distance_sq);
   const double rho_sq = rules_.criteria().rho * rules_.criteria().rho;
   if (place.IsOnSegment()) {
     const double rest_sq = std::max(0.0, candidate.empty_radius_sq - distance_sq);
@@ -415,7 +402,7 @@ DomainRules::Answer DomainRules::NextRequest(VertexId v, const Polytope<2>& cell
     if (is_acute && rho_sq < kSafeRhoSq && !found.is_too_large && rest_sq < found.bound_sq / rho_sq) {
       answer.refused = view.Name();
     } else {
-      answer.request = RequestAt(v, KeepWithin(place, std::sqrt(rest_sq)), edge_limit_sq, workspace);
+      answer.request = RequestAt(v, RoundPlace(place, std::sqrt(rest_sq)), edge_limit_sq, workspace);
     }
     return answer;
   }
@@ -439,11 +426,9 @@ double DomainRules::NearestSegmentSq(VertexId v, double limit_sq, Workspace<2>& 
     if (domain_.IsOn(v, segment)) {
       continue;
     }
-    const double length = domain_.LengthOf(segment);
-    const Point<2> along = domain_.DirectionOf(HalfEdgeOf(segment, false));
-    const Point<2> from = Difference<2>(p, domain_.EndOf(segment, false));
-    const double foot = std::clamp(Dot<2>(from, along) / length, 0.0, length) / length;
-    limit_sq = std::min(limit_sq, NormSq<2>({from[0] - foot * along[0], from[1] - foot * along[1]}));
+    const auto [foot, away] = domain_.FootOf(p, segment);
+    const double beyond = foot - std::clamp(foot, 0.0, domain_.LengthOf(segment));  // an end
+    limit_sq = std::min(limit_sq, away * away + beyond * beyond);
   }
   return limit_sq;
 }

@@ -29,12 +29,6 @@ struct MetPart {
   bool IsThere() const { return segment != SegmentPoint::kNone; }
 };
 
-// What is found of a cell in a domain, beside an Assessment. There a segment that the cell meets counts as an
-// encroached face; what a cell is beyond its vertex' segments, on sides that are not meshed, does not count.
-struct DomainFinding {
-  MetPart met;  // the nearest segment that the cell meets, and the vertex is not on
-};
-
 // A node by the vertices that it is equidistant from beside the site.
 using NodeName = std::pair<VertexId, VertexId>;
 
@@ -47,12 +41,13 @@ class DomainRules {
   // REQUIRES:   all references outlive this.
   DomainRules(const QueryStructure<2>& structure, const PlanarDomain& domain, const StepRules<2>& rules);
 
-  // What is wrong with the cell of `v`, whose nodes are placed; `segments` has all that meet it. Nodes in `refused` ask
-  // for nothing.
+  // What is wrong with the cell of `v`, whose nodes are placed; `segments` has all that meet it. `met` is the nearest
+  // of them that v is not on; it counts as an encroached face. What a cell is beyond the segments of v, on sides that
+  // are not meshed, does not count. Nodes in `refused` ask for nothing.
   //
   // Complexity: O(nodes segments).
   Assessment AssessCell(VertexId v, Polytope<2>& cell, std::span<const uint32_t> segments, double edge_limit_sq,
-                        std::span<const NodeName> refused, DomainFinding& finding) const;
+                        std::span<const NodeName> refused, MetPart& met) const;
 
   // The insertion that `cell`, that of `v`, asks for by what was found. `refused` is the node that asks for nothing
   // more, if one is; none of both if nothing is asked for.
@@ -60,7 +55,7 @@ class DomainRules {
     std::optional<InsertionRequest<2>> request;
     std::optional<NodeName> refused;
   };
-  Answer NextRequest(VertexId v, const Polytope<2>& cell, const Assessment& found, const DomainFinding& finding,
+  Answer NextRequest(VertexId v, const Polytope<2>& cell, const Assessment& found, const MetPart& met,
                      double edge_limit_sq, StepRules<2>::CellOf cell_of, Workspace<2>& workspace) const;
 
   // How far `v` is from the nearest segment that it is not on, squared, if that is less than `limit_sq`; else that.
@@ -77,10 +72,10 @@ class DomainRules {
   MetPart NearestMet(VertexId v, const Polytope<2>& cell, std::span<const uint32_t> segments) const;
   bool IsAcross(VertexId v, VertexId u, const Point<2>& toward) const;
   SegmentPoint SplitPlace(VertexId v, const MetPart& met) const;
-  SegmentPoint KeepWithin(SegmentPoint place, double room) const;
+  SegmentPoint RoundPlace(SegmentPoint place, double room) const;
   InsertionRequest<2> RequestAt(VertexId v, const SegmentPoint& place, double edge_limit_sq,
                                 Workspace<2>& workspace) const;
-  bool IsAtSegment(VertexId v, const Polytope<2>& cell, int node) const;
+  bool IsAtSegment(VertexId v, const NodeView& node) const;
   bool IsCrossed(VertexId v, const NodeView& node) const;
   Bound BoundOf(const Polytope<2>& cell, const CellNode<2>& node, const NodeView& view, uint32_t face) const;
   // Whether the way from `v` to `p` begins in a sector.
@@ -88,9 +83,10 @@ class DomainRules {
     return domain_.SectorToward(v, Difference<2>(p, structure_.point(v))) == sector;
   }
   SteinerPoint<2> CandidateIn(size_t sector, VertexId v, const Polytope<2>& cell, const Assessment& found,
-                              double edge_limit_sq, StepRules<2>::CellOf cell_of, Workspace<2>& workspace) const;
-  SegmentPoint FootOf(const SteinerPoint<2>& candidate, VertexId v, bool is_in_sector,
-                      std::span<const uint32_t> segments, double& distance_sq) const;
+                              bool is_at_segment, double edge_limit_sq, StepRules<2>::CellOf cell_of,
+                              Workspace<2>& workspace) const;
+  SegmentPoint YieldPlace(const SteinerPoint<2>& candidate, VertexId v, bool is_in_sector,
+                          std::span<const uint32_t> segments, double& distance_sq) const;
 
   const QueryStructure<2>& structure_;
   const PlanarDomain& domain_;

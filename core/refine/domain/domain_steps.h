@@ -37,7 +37,7 @@ class DomainSteps {
     if (cell().IsTooLarge()) {
       return nullptr;
     }
-    found_ = rules_.AssessCell(v_, cell(), workspace_.own.segments, edge_limit_sq_, refused_, finding_);
+    found_ = rules_.AssessCell(v_, cell(), workspace_.own.segments, edge_limit_sq_, refused_, met_);
     return &found_;
   }
 
@@ -60,7 +60,7 @@ class DomainSteps {
     };
     while (true) {
       DomainRules::Answer answer =
-          rules_.NextRequest(v_, cell(), found_, finding_, edge_limit_sq_, cell_of, workspace_.other);
+          rules_.NextRequest(v_, cell(), found_, met_, edge_limit_sq_, cell_of, workspace_.other);
       request_ = answer.request;
       if (!answer.refused.has_value()) {
         return request_.has_value() ? &*request_ : nullptr;
@@ -83,7 +83,7 @@ class DomainSteps {
   const VertexId v_;
   const double edge_limit_sq_;
   Assessment found_;
-  DomainFinding finding_;
+  MetPart met_;
   std::vector<NodeName> refused_;
   std::optional<InsertionRequest<2>> request_;
 };

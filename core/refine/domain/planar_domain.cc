@@ -42,7 +42,7 @@ PlanarDomain::PlanarDomain(PlanarGraph graph, PlanarFaces faces)
       const HalfEdge next = ways[(i + 1) % ways.size()];
       const Point<2> d = DirectionOf(h);
       const Point<2> e = DirectionOf(next);
-      min_angle_ = std::min(min_angle_, std::atan2(std::abs(d[0] * e[1] - d[1] * e[0]), Dot<2>(d, e)));
+      min_angle_ = std::min(min_angle_, std::atan2(std::abs(Cross(d, e)), Dot<2>(d, e)));
       const double cosine =
           Dot<2>(DirectionOf(h), DirectionOf(next)) / lengths_[SegmentOf(h)] / lengths_[SegmentOf(next)];
       if (cosine > 0.5 * (1 + 1e-12)) {

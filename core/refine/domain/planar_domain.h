@@ -13,10 +13,14 @@
 #include "core/features/planar_faces.h"
 #include "core/features/planar_graph.h"
 #include "core/geometry/point.h"
+#include "core/geometry/segment.h"
 #include "core/refine/domain/segment_point.h"
 #include "core/tree/segment_lists.h"
 
 namespace wellspace::core {
+
+// What is rounded of a place, relative to its coordinates: not little beside a segment that is short.
+inline constexpr double kPlaceRounding = 0x1p-50;
 
 // Segments are named by number, faces as in PlanarFaces. The first vertices are the points of the graph, in its order;
 // the others have been inserted: on a segment, or inside a face. That a vertex is on a segment is never computed.
@@ -79,6 +83,18 @@ class PlanarDomain {
   bool IsOn(VertexId v, uint32_t segment) const;
   // How far `v`, which is on `segment` or an end of it, is from one of its ends.
   double DistanceFromEnd(VertexId v, uint32_t segment, bool is_b) const;
+
+  // Where `p` is beside a segment: how far along from its end a the foot is, on the line through it, and how far away,
+  // with a sign. Units: those of the coordinates.
+  struct Foot {
+    double from_a = 0;
+    double away = 0;
+  };
+  Foot FootOf(const Point<2>& p, uint32_t segment) const {
+    const Point<2> along = DirectionOf(HalfEdgeOf(segment, false));
+    const Point<2> from = Difference<2>(p, EndOf(segment, false));
+    return {Dot<2>(from, along) / LengthOf(segment), Cross(along, from) / LengthOf(segment)};
+  }
 
   // Where a point of a segment is: computed from the nearer end, each coordinate rounded once or twice.
   Point<2> PositionOf(const SegmentPoint& place) const;
