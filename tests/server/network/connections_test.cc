@@ -173,9 +173,9 @@ std::pair<FileDescriptor, FileDescriptor> TcpPair() {
   return {std::move(server), std::move(peer)};
 }
 
-bool HasHungUp(int socket) {
+bool HasHungUp(int socket, int milliseconds = 0) {
   pollfd watched = {.fd = socket, .events = 0, .revents = 0};
-  return poll(&watched, 1, 0) == 1 && (watched.revents & POLLHUP) != 0;
+  return poll(&watched, 1, milliseconds) == 1 && (watched.revents & POLLHUP) != 0;
 }
 
 TEST(Connections, APeerThatReadsNothingIsShut) {
@@ -195,6 +195,23 @@ TEST(Connections, APeerThatReadsNothingIsShut) {
   connections.ShutUnread();
   EXPECT_TRUE(HasHungUp(server.get()));
   EXPECT_EQ(connections.ShutCount(), 1u);
+}
+
+TEST_F(ConnectionsTest, APeerWhoFoundTheWindowClosedHearsOfTheEndAtOnce) {
+  auto [server, peer] = TcpPair();
+  ASSERT_TRUE(connections_.Add(server.get(), Ipv4("127.0.0.1", 1)));
+  const std::string bytes(65536, 'x');
+  pollfd writable = {.fd = peer.get(), .events = POLLOUT, .revents = 0};
+  constexpr int kUntilTheWindowIsClosed = 1000;  // ms; Linux fills the last of it after 200
+  while (poll(&writable, 1, kUntilTheWindowIsClosed) == 1) {
+    send(peer.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+  }
+  shutdown(server.get(), SHUT_RDWR);  // as gRPC does
+  server = FileDescriptor();
+  connections_.Sweep();
+  EXPECT_EQ(connections_.Count(), 0u);
+  constexpr int kPatience = 5000;  // ms; without a reset Linux takes 60 s
+  EXPECT_TRUE(HasHungUp(peer.get(), kPatience));
 }
 
 TEST_F(ConnectionsTest, CallsOfNoConnectionAreNotCounted) {
