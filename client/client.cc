@@ -1,15 +1,14 @@
 #include "client/client.h"
 
 #include "client/connection.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::client {
 
 absl::StatusOr<Mesh> Client::MeshPoints(const MeshOptions& options, std::span<const double> points,
                                         const OnProgress& on_progress, const CallOptions& call) {
   MeshCollector collector;
-  if (absl::Status status = MeshPoints(options, points, collector, on_progress, call); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(MeshPoints(options, points, collector, on_progress, call));
   return std::move(collector.mesh());
 }
 

@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/cli/remote_command.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::cli {
 namespace {
@@ -100,21 +101,15 @@ absl::Status DomainOptions::CheckCloud() const {
 absl::StatusOr<formats::PointCloud> DomainOptions::Read(const std::string& path, const formats::CloudOptions& options) {
   reading_.format = options.format;
   reading_.columns = options.columns;
-  absl::StatusOr<formats::PlanarDomain> domain = formats::ReadPlanarDomain(path, reading_);
-  if (!domain.ok()) {
-    return domain.status();
-  }
-  absl::StatusOr<client::Features> features = FeaturesOf(*domain, faces_, split_crossings_);
-  if (!features.ok()) {
-    return features.status();
-  }
-  features_ = std::make_shared<const client::Features>(*std::move(features));
+  WELLSPACE_ASSIGN_OR_RETURN(formats::PlanarDomain domain, formats::ReadPlanarDomain(path, reading_));
+  WELLSPACE_ASSIGN_OR_RETURN(client::Features features, FeaturesOf(domain, faces_, split_crossings_));
+  features_ = std::make_shared<const client::Features>(std::move(features));
   formats::PointCloud cloud;
-  cloud.name = domain->name;
+  cloud.name = domain.name;
   cloud.dimension = 2;
-  cloud.points = domain->points;
-  cloud.notes = domain->notes;
-  domain_ = *std::move(domain);
+  cloud.points = domain.points;
+  cloud.notes = domain.notes;
+  domain_ = std::move(domain);
   return cloud;
 }
 

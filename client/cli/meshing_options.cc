@@ -7,6 +7,7 @@
 #include "client/formats/output_file.h"
 #include "client/formats/read_cloud.h"
 #include "client/formats/write_mesh.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::cli {
 
@@ -60,9 +61,7 @@ absl::StatusOr<formats::PointCloud> MeshingOptions::Read() {
   if (domain_.IsDomain(input_, cloud_options_.format)) {
     return domain_.Read(input_, cloud_options_);
   }
-  if (absl::Status status = domain_.CheckCloud(); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(domain_.CheckCloud());
   cloud_options_.dimension = dimension();
   return formats::ReadCloud(input_, cloud_options_);
 }
@@ -100,12 +99,9 @@ absl::Status MeshingOptions::WriteStatistics(const std::string& statistics) cons
   if (statistics_.empty() || statistics_ == formats::kStandardStream) {
     return absl::OkStatus();
   }
-  absl::StatusOr<formats::OutputFile> file = formats::OutputFile::Create(statistics_);
-  if (!file.ok()) {
-    return file.status();
-  }
-  file->Write(json);
-  return file->Commit();
+  WELLSPACE_ASSIGN_OR_RETURN(formats::OutputFile file, formats::OutputFile::Create(statistics_));
+  file.Write(json);
+  return file.Commit();
 }
 
 }  // namespace wellspace::cli

@@ -11,6 +11,7 @@
 #include "client/cli/options.h"
 #include "client/error_details.h"
 #include "client/formats/cloud.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::cli {
 namespace {
@@ -136,13 +137,10 @@ absl::Status ParameterOptions::Check() const {
 }
 
 absl::StatusOr<client::MeshOptions> ParameterOptions::For(int dimension) const {
-  absl::StatusOr<std::vector<client::SizeBox>> boxes = SizeBoxesOf(size_boxes_, dimension);
-  if (!boxes.ok()) {
-    return boxes.status();
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(std::vector<client::SizeBox> boxes, SizeBoxesOf(size_boxes_, dimension));
   client::MeshOptions options = options_;
   options.dimension = dimension;
-  options.size_boxes = *std::move(boxes);
+  options.size_boxes = std::move(boxes);
   if (min_angle_ > 0) {
     if (dimension != 2) {
       return absl::InvalidArgumentError(

@@ -5,6 +5,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "client/connection.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::cli {
 
@@ -19,11 +20,8 @@ absl::StatusOr<std::unique_ptr<ServerLink>> ServerLink::Open(const ServerChoice&
   if (!connect.token_file.empty()) {
     connect.token.clear();  // of the environment
   }
-  absl::StatusOr<client::Client> client = client::Connect(choice.address, connect);
-  if (!client.ok()) {
-    return client.status();
-  }
-  link->client_.emplace(*std::move(client));
+  WELLSPACE_ASSIGN_OR_RETURN(client::Client client, client::Connect(choice.address, connect));
+  link->client_.emplace(std::move(client));
   return link;
 }
 

@@ -6,6 +6,7 @@
 #include "client/cli/options.h"
 #include "client/formats/line_reader.h"
 #include "client/formats/number.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::cli {
 namespace {
@@ -53,15 +54,12 @@ absl::StatusOr<std::string> FindOperation(client::Client& client, const std::str
   if (name.find(kOperations) != std::string::npos) {
     return name;
   }
-  const absl::StatusOr<client::Session> session = client.GetSession(name, call);
-  if (!session.ok()) {
-    return session.status();
-  }
-  if (session->last_operation.empty()) {
+  WELLSPACE_ASSIGN_OR_RETURN(const client::Session session, client.GetSession(name, call));
+  if (session.last_operation.empty()) {
     return absl::FailedPreconditionError(
         absl::StrCat(name, " has had no operation yet; start one with: wellspace refine"));
   }
-  return session->last_operation;
+  return session.last_operation;
 }
 
 CLI::Option* AddLabels(CLI::App& command, client::Labels& labels, const std::string& description) {
@@ -87,11 +85,8 @@ void AddExpectedRevision(CLI::App& command, uint64_t& revision) {
 }
 
 absl::StatusOr<std::vector<uint32_t>> ReadVertices(const std::string& path) {
-  absl::StatusOr<formats::InputFile> file = formats::InputFile::Open(path);
-  if (!file.ok()) {
-    return file.status();
-  }
-  formats::LineReader reader(*std::move(file));
+  WELLSPACE_ASSIGN_OR_RETURN(formats::InputFile file, formats::InputFile::Open(path));
+  formats::LineReader reader(std::move(file));
   std::vector<uint32_t> vertices;
   std::string_view line;
   while (reader.NextContent(line)) {

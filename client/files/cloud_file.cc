@@ -5,6 +5,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "client/formats/npy_rows.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::client {
 namespace {
@@ -63,11 +64,8 @@ absl::StatusOr<std::unique_ptr<CloudFile>> CloudFile::Open(const std::string& pa
     }
     // As a whole it may do, or there is a better message.
   }
-  absl::StatusOr<formats::PointCloud> cloud = formats::ReadCloud(path, options);
-  if (!cloud.ok()) {
-    return cloud.status();
-  }
-  return std::make_unique<WholeCloud>(*std::move(cloud));
+  WELLSPACE_ASSIGN_OR_RETURN(formats::PointCloud cloud, formats::ReadCloud(path, options));
+  return std::make_unique<WholeCloud>(std::move(cloud));
 }
 
 }  // namespace wellspace::client

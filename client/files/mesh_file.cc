@@ -1,5 +1,7 @@
 #include "client/files/mesh_file.h"
 
+#include "core/base/status_macros.h"
+
 namespace wellspace::client {
 namespace {
 
@@ -32,11 +34,9 @@ absl::Status MeshFile::Begin(const MeshHeader& header) {
   for (const Region& region : header.regions) {
     shape.regions.push_back({region.id, region.name});
   }
-  absl::StatusOr<std::unique_ptr<formats::MeshWriter>> writer = formats::CreateMesh(path_, format_, shape, stop_);
-  if (!writer.ok()) {
-    return writer.status();
-  }
-  writer_ = *std::move(writer);
+  WELLSPACE_ASSIGN_OR_RETURN(std::unique_ptr<formats::MeshWriter> writer,
+                             formats::CreateMesh(path_, format_, shape, stop_));
+  writer_ = std::move(writer);
   return absl::OkStatus();
 }
 

@@ -3,6 +3,7 @@
 #include <string>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 
@@ -26,18 +27,14 @@ absl::Status FieldReader::NextOf(std::string_view what, std::string_view& field)
 
 absl::Status FieldReader::NextNumber(std::string_view what, double& value) {
   std::string_view field;
-  if (absl::Status status = NextOf(what, field); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(NextOf(what, field));
   const absl::Status status = ParseFinite(field, value);
   return status.ok() ? status : reader_.Error(absl::StrCat(std::string(what), ": ", status.message()));
 }
 
 absl::Status FieldReader::NextWhole(std::string_view what, uint64_t limit, uint64_t& value) {
   std::string_view field;
-  if (absl::Status status = NextOf(what, field); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(NextOf(what, field));
   if (!ParseUnsigned(field, limit, value)) {
     return reader_.Error(
         absl::StrCat("expected ", std::string(what), ", a whole number of at most ", limit, ", got ", Quote(field)));

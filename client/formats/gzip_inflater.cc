@@ -10,6 +10,7 @@
 
 #include "absl/status/status.h"
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -48,14 +49,11 @@ absl::Status GzipInflater::Error(std::string_view message) const {
 }
 
 absl::Status GzipInflater::Refill(const std::function<absl::StatusOr<size_t>(char*, size_t)>& source) {
-  const absl::StatusOr<size_t> got = source(stream_->input.data(), stream_->input.size());
-  if (!got.ok()) {
-    return got.status();
-  }
-  taken_ += *got;
-  stream_->at_end = *got == 0;
+  WELLSPACE_ASSIGN_OR_RETURN(const size_t got, source(stream_->input.data(), stream_->input.size()));
+  taken_ += got;
+  stream_->at_end = got == 0;
   stream_->z.next_in = reinterpret_cast<Bytef*>(stream_->input.data());
-  stream_->z.avail_in = static_cast<uInt>(*got);
+  stream_->z.avail_in = static_cast<uInt>(got);
   return absl::OkStatus();
 }
 
@@ -67,9 +65,7 @@ absl::StatusOr<size_t> GzipInflater::Read(const std::function<absl::StatusOr<siz
   const uInt wanted = z.avail_out;
   while (z.avail_out == wanted) {
     if (z.avail_in == 0 && !stream_->at_end) {
-      if (absl::Status status = Refill(source); !status.ok()) {
-        return status;
-      }
+      WELLSPACE_RETURN_IF_ERROR(Refill(source));
     }
     if (!stream_->in_member) {
       // Zeros may follow the last member, as tapes have them; or another member.

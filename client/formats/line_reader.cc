@@ -12,6 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/formats/file_error.h"
 #include "client/formats/number.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -64,14 +65,11 @@ absl::Status InputFile::InflateGzip(bool is_expected) {
   std::string start(kGzipMagic.size(), '\0');
   size_t taken = 0;
   while (taken < start.size()) {
-    const absl::StatusOr<size_t> got = ReadDescriptor(start.data() + taken, start.size() - taken);
-    if (!got.ok()) {
-      return got.status();
-    }
-    if (*got == 0) {
+    WELLSPACE_ASSIGN_OR_RETURN(const size_t got, ReadDescriptor(start.data() + taken, start.size() - taken));
+    if (got == 0) {
       break;
     }
-    taken += *got;
+    taken += got;
   }
   start.resize(taken);
   start_ = start;
@@ -115,12 +113,9 @@ absl::StatusOr<std::string> InputFile::ReadAll() {
   size_t used = 0;
   while (true) {
     text.resize(used + kChunkBytes + used / 2);
-    const absl::StatusOr<size_t> got = Read(text.data() + used, text.size() - used);
-    if (!got.ok()) {
-      return got.status();
-    }
-    used += *got;
-    if (*got == 0) {
+    WELLSPACE_ASSIGN_OR_RETURN(const size_t got, Read(text.data() + used, text.size() - used));
+    used += got;
+    if (got == 0) {
       text.resize(used);
       return text;
     }

@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/formats/number.h"
 #include "client/formats/vtk_array.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -136,9 +137,7 @@ std::string NpyPreamble(const std::string& type, uint64_t rows, std::optional<ui
 absl::StatusOr<NpyReader> NpyReader::Open(std::string name, ByteSource source, std::optional<uint64_t> size,
                                           size_t dimensions) {
   NpyReader reader(std::move(name), std::move(source), size);
-  if (absl::Status status = reader.ReadHeader(dimensions); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(reader.ReadHeader(dimensions));
   return reader;
 }
 
@@ -148,35 +147,27 @@ absl::Status NpyReader::Error(std::string_view message) const {
 
 absl::Status NpyReader::Take(char* buffer, size_t size) {
   for (size_t taken = 0; taken < size;) {
-    const absl::StatusOr<size_t> got = source_(buffer + taken, size - taken);
-    if (!got.ok()) {
-      return got.status();
-    }
-    if (*got == 0) {
+    WELLSPACE_ASSIGN_OR_RETURN(const size_t got, source_(buffer + taken, size - taken));
+    if (got == 0) {
       return Error(absl::StrCat("the array ends after ", taken_, " bytes, inside its ",
                                 header_.shape.empty() ? "header" : "values"));
     }
-    taken += *got;
-    taken_ += *got;
+    taken += got;
+    taken_ += got;
   }
   return absl::OkStatus();
 }
 
 absl::Status NpyReader::ExpectEnd() {
   char byte;
-  const absl::StatusOr<size_t> got = source_(&byte, 1);
-  if (!got.ok()) {
-    return got.status();
-  }
-  return *got == 0 ? absl::OkStatus()
-                   : Error(absl::StrCat("expected the end after ", taken_, " bytes, as the header says, got more"));
+  WELLSPACE_ASSIGN_OR_RETURN(const size_t got, source_(&byte, 1));
+  return got == 0 ? absl::OkStatus()
+                  : Error(absl::StrCat("expected the end after ", taken_, " bytes, as the header says, got more"));
 }
 
 absl::Status NpyReader::ReadHeader(size_t dimensions) {
   std::string magic(kMagic.size() + 2, '\0');
-  if (absl::Status status = Take(magic.data(), magic.size()); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(Take(magic.data(), magic.size()));
   if (std::string_view(magic).substr(0, kMagic.size()) != kMagic) {
     return Error(absl::StrCat("expected an array of numpy, which starts with ", Quote(kMagic), ", got ",
                               Quote(std::string_view(magic).substr(0, kMagic.size()))));
@@ -187,16 +178,12 @@ absl::Status NpyReader::ReadHeader(size_t dimensions) {
     return Error(absl::StrCat("expected version 1.0, 2.0 or 3.0 of the format, got ", major, ".", minor));
   }
   uint32_t length = 0;
-  if (absl::Status status = Take(reinterpret_cast<char*>(&length), major == 1 ? 2 : 4); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(Take(reinterpret_cast<char*>(&length), major == 1 ? 2 : 4));
   if (length > kMaxHeaderBytes) {
     return Error(absl::StrCat("expected a header of at most ", kMaxHeaderBytes, " bytes, got ", length));
   }
   std::string text(length, '\0');
-  if (absl::Status status = Take(text.data(), text.size()); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(Take(text.data(), text.size()));
   absl::StatusOr<NpyHeader> header = ParseNpyHeader(text);
   if (!header.ok()) {
     return Error(std::string(header.status().message()));
@@ -237,9 +224,7 @@ absl::Status NpyReader::ReadWords(std::vector<Value>& values, Convert convert) {
   std::string piece(std::min<uint64_t>(count, kWordsPieceBytes / sizeof(Word)) * sizeof(Word), '\0');
   for (uint64_t index = 0; index < count;) {
     const size_t words = std::min<uint64_t>(count - index, piece.size() / sizeof(Word));
-    if (absl::Status status = Take(piece.data(), words * sizeof(Word)); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(Take(piece.data(), words * sizeof(Word)));
     for (size_t i = 0; i < words; ++i, ++index) {
       const Word word = LoadWord<Word>(piece, i, is_big_endian);
       Value value;
@@ -339,9 +324,7 @@ absl::Status NpyReader::ReadTexts(std::vector<std::string>& values) {
   values.clear();
   std::u32string text(characters, U'\0');
   for (uint64_t row = 0; row < rows(); ++row) {
-    if (absl::Status status = Take(reinterpret_cast<char*>(text.data()), characters * sizeof(char32_t)); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(Take(reinterpret_cast<char*>(text.data()), characters * sizeof(char32_t)));
     std::string& value = values.emplace_back();
     for (const char32_t letter : text) {
       if (letter != U'\0') {

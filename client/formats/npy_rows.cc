@@ -8,25 +8,23 @@
 #include "client/formats/cloud.h"
 #include "client/formats/npy.h"
 #include "client/formats/number.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 
 static_assert(std::endian::native == std::endian::little, "values are taken as they are in the file");
 
 absl::StatusOr<NpyRows> NpyRows::Open(const std::string& path) {
-  absl::StatusOr<InputFile> file = InputFile::Open(path);
-  if (!file.ok()) {
-    return file.status();
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(InputFile file, InputFile::Open(path));
   const auto error = [&file](const auto&... parts) {
-    return absl::InvalidArgumentError(absl::StrCat(file->name(), ": ", parts...));
+    return absl::InvalidArgumentError(absl::StrCat(file.name(), ": ", parts...));
   };
-  const std::optional<uint64_t> size = file->size();
+  const std::optional<uint64_t> size = file.size();
   if (!size.has_value()) {
     return error("expected a regular file");
   }
   const absl::StatusOr<NpyReader> array = NpyReader::Open(
-      file->name(), [&file](char* buffer, size_t bytes) { return file->Read(buffer, bytes); }, size);
+      file.name(), [&file](char* buffer, size_t bytes) { return file.Read(buffer, bytes); }, size);
   if (!array.ok()) {
     return array.status();
   }
@@ -50,19 +48,16 @@ absl::StatusOr<NpyRows> NpyRows::Open(const std::string& path) {
   }
   const uint64_t rows = array->rows();
   const int columns = static_cast<int>(array->columns());
-  return NpyRows(*std::move(file), rows, columns, value_bytes, array->values_offset());
+  return NpyRows(std::move(file), rows, columns, value_bytes, array->values_offset());
 }
 
 absl::Status NpyRows::ReadBytes(uint64_t offset, char* bytes, size_t size) const {
   for (size_t taken = 0; taken < size;) {
-    const absl::StatusOr<size_t> got = file_.ReadAt(offset + taken, bytes + taken, size - taken);
-    if (!got.ok()) {
-      return got.status();
-    }
-    if (*got == 0) {
+    WELLSPACE_ASSIGN_OR_RETURN(const size_t got, file_.ReadAt(offset + taken, bytes + taken, size - taken));
+    if (got == 0) {
       return absl::InvalidArgumentError(absl::StrCat(name(), ": the file has become shorter while it was read"));
     }
-    taken += *got;
+    taken += got;
   }
   return absl::OkStatus();
 }
@@ -72,17 +67,11 @@ absl::StatusOr<uint64_t> NpyRows::Read(uint64_t first, std::span<double> values)
   const size_t count = rows * columns_;
   const uint64_t offset = offset_ + first * columns_ * value_bytes_;
   if (value_bytes_ == sizeof(double)) {
-    if (absl::Status status = ReadBytes(offset, reinterpret_cast<char*>(values.data()), count * sizeof(double));
-        !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(ReadBytes(offset, reinterpret_cast<char*>(values.data()), count * sizeof(double)));
     return rows;
   }
   narrow_.resize(count);
-  if (absl::Status status = ReadBytes(offset, reinterpret_cast<char*>(narrow_.data()), count * sizeof(float));
-      !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(ReadBytes(offset, reinterpret_cast<char*>(narrow_.data()), count * sizeof(float)));
   std::copy(narrow_.begin(), narrow_.end(), values.begin());
   return rows;
 }

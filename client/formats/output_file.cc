@@ -16,6 +16,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/formats/file_error.h"
 #include "client/formats/line_reader.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -195,9 +196,7 @@ absl::Status OutputFile::Flush() {
 }
 
 absl::Status OutputFile::Commit() {
-  if (absl::Status status = Flush(); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(Flush());
   // Some file systems report a failed write only here.
   if (descriptor_ > STDERR_FILENO && close(std::exchange(descriptor_, -1)) != 0) {
     return CannotWrite(errno);

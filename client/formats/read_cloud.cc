@@ -7,6 +7,7 @@
 #include "client/formats/cloud_readers.h"
 #include "client/formats/open_input.h"
 #include "client/formats/registry.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -18,9 +19,7 @@ using TextReader = absl::Status (*)(LineReader&, const CloudOptions&, PointCloud
 template <TextReader kReader>
 absl::Status ReadText(InputFile& file, const CloudOptions& options, PointCloud& cloud) {
   LineReader reader(std::move(file));
-  if (absl::Status status = kReader(reader, options, cloud); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(kReader(reader, options, cloud));
   return reader.Finish();
 }
 
@@ -63,15 +62,10 @@ absl::StatusOr<PointCloud> ReadCloud(const std::string& path, const CloudOptions
   if (!row.ok()) {
     return row.status();
   }
-  absl::StatusOr<InputFile> file = OpenInflated(path);
-  if (!file.ok()) {
-    return file.status();
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(InputFile file, OpenInflated(path));
   PointCloud cloud;
-  cloud.name = file->name();
-  if (absl::Status status = (*row)->handler(*file, options, cloud); !status.ok()) {
-    return status;
-  }
+  cloud.name = file.name();
+  WELLSPACE_RETURN_IF_ERROR((*row)->handler(file, options, cloud));
   if (cloud.skipped > 0) {
     cloud.notes.push_back(absl::StrCat(cloud.name, ": ", cloud.skipped,
                                        cloud.skipped == 1 ? " point is" : " points are",

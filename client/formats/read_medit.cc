@@ -11,6 +11,7 @@
 #include "client/formats/field_reader.h"
 #include "client/formats/mesh_readers.h"
 #include "client/formats/regions.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -25,9 +26,7 @@ class MeditReader {
     if (!fields_.Next(word) || word != "MeshVersionFormatted") {
       return reader_.EndError("expected \"MeshVersionFormatted\" at the start of the file");
     }
-    if (absl::Status status = fields_.NextWhole("the version", kMaxCount, version); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(fields_.NextWhole("the version", kMaxCount, version));
     while (fields_.Next(word)) {
       if (word == "End") {
         break;
@@ -66,9 +65,7 @@ class MeditReader {
  private:
   absl::Status ReadDimension() {
     uint64_t dimension = 0;
-    if (absl::Status status = fields_.NextWhole("the dimension", 3, dimension); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(fields_.NextWhole("the dimension", 3, dimension));
     if (dimension < 2 || mesh_.dimension != 0) {
       return reader_.Error("expected one \"Dimension\", 2 or 3");
     }
@@ -80,21 +77,15 @@ class MeditReader {
     if (mesh_.dimension == 0 || std::exchange(has_vertices_, true)) {
       return reader_.Error("expected \"Dimension\", and then \"Vertices\" once");
     }
-    if (absl::Status status = fields_.NextWhole("the number of vertices", kMaxCount, vertices_); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(fields_.NextWhole("the number of vertices", kMaxCount, vertices_));
     constexpr std::array kNames = {"x of a vertex", "y of a vertex", "z of a vertex"};
     for (uint64_t vertex = 0; vertex < vertices_; ++vertex) {
       for (int axis = 0; axis < mesh_.dimension; ++axis) {
         double value = 0;
-        if (absl::Status status = fields_.NextNumber(kNames[axis], value); !status.ok()) {
-          return status;
-        }
+        WELLSPACE_RETURN_IF_ERROR(fields_.NextNumber(kNames[axis], value));
         mesh_.points.push_back(value);
       }
-      if (absl::Status status = fields_.Skip("the reference of a vertex"); !status.ok()) {
-        return status;
-      }
+      WELLSPACE_RETURN_IF_ERROR(fields_.Skip("the reference of a vertex"));
     }
     return absl::OkStatus();
   }
@@ -104,17 +95,11 @@ class MeditReader {
       return reader_.Error("expected \"Vertices\", and then the simplices once");
     }
     uint64_t count = 0;
-    if (absl::Status status = fields_.NextWhole("the number of simplices", kMaxCount, count); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(fields_.NextWhole("the number of simplices", kMaxCount, count));
     for (uint64_t simplex = 0; simplex < count; ++simplex) {
-      if (absl::Status status = ReadCorners(mesh_.dimension + 1, mesh_.simplices); !status.ok()) {
-        return status;
-      }
+      WELLSPACE_RETURN_IF_ERROR(ReadCorners(mesh_.dimension + 1, mesh_.simplices));
       int32_t region = 0;
-      if (absl::Status status = ReadReference("the reference of a simplex", region); !status.ok()) {
-        return status;
-      }
+      WELLSPACE_RETURN_IF_ERROR(ReadReference("the reference of a simplex", region));
       regions_.Add(region);
     }
     return absl::OkStatus();
@@ -126,19 +111,13 @@ class MeditReader {
     if (!has_vertices_) {
       return reader_.Error("expected \"Vertices\", and then the facets");
     }
-    if (absl::Status status = fields_.NextWhole("the number of facets", kMaxCount, count); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(fields_.NextWhole("the number of facets", kMaxCount, count));
     std::vector<uint32_t> corners;
     for (uint64_t facet = 0; facet < count; ++facet) {
       corners.clear();
-      if (absl::Status status = ReadCorners(mesh_.dimension, corners); !status.ok()) {
-        return status;
-      }
+      WELLSPACE_RETURN_IF_ERROR(ReadCorners(mesh_.dimension, corners));
       int32_t tag = 0;
-      if (absl::Status status = ReadReference("the reference of a facet", tag); !status.ok()) {
-        return status;
-      }
+      WELLSPACE_RETURN_IF_ERROR(ReadReference("the reference of a facet", tag));
       facets_.Add(corners, tag);
     }
     return absl::OkStatus();
@@ -154,9 +133,7 @@ class MeditReader {
   absl::Status ReadCorners(int count, std::vector<uint32_t>& corners) {
     for (int corner = 0; corner < count; ++corner) {
       uint64_t vertex = 0;
-      if (absl::Status status = fields_.NextWhole("a vertex from 1 on", vertices_, vertex); !status.ok()) {
-        return status;
-      }
+      WELLSPACE_RETURN_IF_ERROR(fields_.NextWhole("a vertex from 1 on", vertices_, vertex));
       if (vertex == 0) {
         return reader_.Error("expected a vertex from 1 on, got 0");
       }
@@ -178,11 +155,8 @@ class MeditReader {
 }  // namespace
 
 absl::StatusOr<Mesh> ReadMedit(const std::string& path) {
-  absl::StatusOr<InputFile> file = InputFile::Open(path);
-  if (!file.ok()) {
-    return file.status();
-  }
-  LineReader reader(*std::move(file));
+  WELLSPACE_ASSIGN_OR_RETURN(InputFile file, InputFile::Open(path));
+  LineReader reader(std::move(file));
   return MeditReader(reader).Read();
 }
 

@@ -18,6 +18,7 @@
 #include "client/formats/mesh_readers.h"
 #include "client/formats/msh.h"
 #include "client/formats/regions.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -117,9 +118,7 @@ class MshReader {
     }
     if (is_binary_) {
       uint64_t one = 0;
-      if (absl::Status status = TakeWord<int32_t>("the number 1", 0x7fffffff, one); !status.ok()) {
-        return status;
-      }
+      WELLSPACE_RETURN_IF_ERROR(TakeWord<int32_t>("the number 1", 0x7fffffff, one));
       if (one != 1) {
         return ValueError(absl::StrCat("expected little-endian numbers, a 1 first, got ", one));
       }
@@ -138,9 +137,7 @@ class MshReader {
 
   absl::Status ReadSection(const char* end, Section read) {
     fields_.DropLine();
-    if (absl::Status status = (this->*read)(); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR((this->*read)());
     return ExpectLine(end);
   }
 
@@ -166,9 +163,7 @@ class MshReader {
   template <typename Word>
   absl::Status TakeWord(const char* what, uint64_t limit, uint64_t& value) {
     Word word{};
-    if (absl::Status status = TakeBytes(what, word); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(TakeBytes(what, word));
     if (word < 0 || static_cast<uint64_t>(word) > limit) {
       return ValueError(absl::StrCat("expected ", what, ", a whole number of at most ", limit, ", got ", word));
     }
@@ -187,9 +182,7 @@ class MshReader {
     if (!is_binary_) {
       return fields_.NextNumber(what, value);
     }
-    if (absl::Status status = TakeBytes(what, value); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(TakeBytes(what, value));
     return std::isfinite(value) ? absl::OkStatus()
                                 : ValueError(absl::StrCat(what, ": expected a finite number, got ", value));
   }
@@ -227,15 +220,11 @@ class MshReader {
   absl::Status ReadEntities() {
     std::array<uint64_t, 4> counts{};
     for (uint64_t& count : counts) {
-      if (absl::Status status = Size("the number of entities", kMaxCount, count); !status.ok()) {
-        return status;
-      }
+      WELLSPACE_RETURN_IF_ERROR(Size("the number of entities", kMaxCount, count));
     }
     for (int dimension = 0; dimension < 4; ++dimension) {
       for (uint64_t entity = 0; entity < counts[dimension]; ++entity) {
-        if (absl::Status status = ReadEntity(dimension); !status.ok()) {
-          return status;
-        }
+        WELLSPACE_RETURN_IF_ERROR(ReadEntity(dimension));
       }
     }
     return absl::OkStatus();
@@ -279,9 +268,7 @@ class MshReader {
 
   absl::Status AddPoint() {
     for (const char* what : {"x of a node", "y of a node", "z of a node"}) {
-      if (absl::Status status = Number(what, points_.emplace_back()); !status.ok()) {
-        return status;
-      }
+      WELLSPACE_RETURN_IF_ERROR(Number(what, points_.emplace_back()));
     }
     return absl::OkStatus();
   }
@@ -290,9 +277,7 @@ class MshReader {
     if (std::exchange(has_nodes_, true)) {
       return reader_.Error("expected one section \"$Nodes\", got another one");
     }
-    if (absl::Status status = is_2_2_ ? ReadNodes22() : ReadNodes41(); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(is_2_2_ ? ReadNodes22() : ReadNodes41());
     return IndexNodes();
   }
 
@@ -339,9 +324,7 @@ class MshReader {
   absl::Status ReadNodes41() {
     uint64_t blocks = 0;
     uint64_t count = 0;
-    if (absl::Status status = ReadCounts(blocks, count); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(ReadCounts(blocks, count));
     for (uint64_t block = 0; block < blocks; ++block) {
       uint64_t dimension = 0;
       uint64_t entity = 0;
@@ -444,9 +427,7 @@ class MshReader {
     uint64_t blocks = 0;
     uint64_t count = 0;
     uint64_t elements = 0;
-    if (absl::Status status = ReadCounts(blocks, count); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(ReadCounts(blocks, count));
     for (uint64_t block = 0; block < blocks; ++block) {
       uint64_t dimension = 0;
       uint64_t entity = 0;
@@ -630,11 +611,8 @@ class MshReader {
 }  // namespace
 
 absl::StatusOr<Mesh> ReadMsh(const std::string& path) {
-  absl::StatusOr<InputFile> file = InputFile::Open(path);
-  if (!file.ok()) {
-    return file.status();
-  }
-  LineReader reader(*std::move(file));
+  WELLSPACE_ASSIGN_OR_RETURN(InputFile file, InputFile::Open(path));
+  LineReader reader(std::move(file));
   return MshReader(reader).Read();
 }
 

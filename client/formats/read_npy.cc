@@ -11,6 +11,7 @@
 #include "client/formats/coordinate.h"
 #include "client/formats/npy.h"
 #include "client/formats/table_columns.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -45,22 +46,17 @@ absl::Status ReadNpy(InputFile& file, const CloudOptions& options, PointCloud& c
   if (!array.ok()) {
     return array.status();
   }
-  const absl::StatusOr<std::vector<size_t>> columns = ChooseColumns(*array, options, cloud.name);
-  if (!columns.ok()) {
-    return columns.status();
-  }
-  if (absl::Status status = array->ReadNumbers(cloud.points); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<size_t> columns, ChooseColumns(*array, options, cloud.name));
+  WELLSPACE_RETURN_IF_ERROR(array->ReadNumbers(cloud.points));
   const uint64_t stride = array->columns();
-  cloud.dimension = static_cast<int>(columns->size());
+  cloud.dimension = static_cast<int>(columns.size());
   // In place: a point never has more coordinates than its row.
   uint64_t kept = 0;
   for (uint64_t row = 0; row < array->rows(); ++row) {
     std::array<double, kMaxDimension> point;
     bool is_invalid = false;
-    for (size_t axis = 0; axis < columns->size(); ++axis) {
-      const double value = cloud.points[row * stride + (*columns)[axis]];
+    for (size_t axis = 0; axis < columns.size(); ++axis) {
+      const double value = cloud.points[row * stride + columns[axis]];
       if (!std::isfinite(value) && !options.skip_invalid) {
         return absl::InvalidArgumentError(absl::StrCat(cloud.name, "[", row, "]: coordinate ", axis + 1,
                                                        ": expected a finite number, got ", value,
@@ -73,13 +69,13 @@ absl::Status ReadNpy(InputFile& file, const CloudOptions& options, PointCloud& c
       ++cloud.skipped;
       continue;
     }
-    std::copy_n(point.begin(), columns->size(), cloud.points.begin() + kept * columns->size());
+    std::copy_n(point.begin(), columns.size(), cloud.points.begin() + kept * columns.size());
     ++kept;
     if (options.skip_invalid) {
       cloud.rows.Add(row);
     }
   }
-  cloud.points.resize(kept * columns->size());
+  cloud.points.resize(kept * columns.size());
   return absl::OkStatus();
 }
 

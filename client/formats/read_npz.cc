@@ -17,32 +17,25 @@
 #include "client/formats/npz.h"
 #include "client/formats/regions.h"
 #include "client/formats/zip_file.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
 
 absl::StatusOr<NpyReader> OpenArray(ZipReader& archive, const std::string& file, const std::string& member,
                                     size_t dimensions = 2) {
-  const absl::StatusOr<uint64_t> size = archive.Begin(member);
-  if (!size.ok()) {
-    return size.status();
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(const uint64_t size, archive.Begin(member));
   return NpyReader::Open(
       absl::StrCat(file, ": ", member), [&archive](char* buffer, size_t bytes) { return archive.Read(buffer, bytes); },
-      *size, dimensions);
+      size, dimensions);
 }
 
 // Whole numbers of 32 bits, a row each.
 absl::Status ReadTags(ZipReader& archive, const std::string& file, const std::string& member,
                       std::vector<int32_t>& tags) {
-  absl::StatusOr<NpyReader> array = OpenArray(archive, file, member, 1);
-  if (!array.ok()) {
-    return array.status();
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(NpyReader array, OpenArray(archive, file, member, 1));
   std::vector<double> values;
-  if (absl::Status status = array->ReadNumbers(values); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(array.ReadNumbers(values));
   for (size_t i = 0; i < values.size(); ++i) {
     if (!(std::abs(values[i]) <= std::numeric_limits<int32_t>::max()) || values[i] != std::trunc(values[i])) {
       return absl::InvalidArgumentError(
@@ -56,33 +49,23 @@ absl::Status ReadTags(ZipReader& archive, const std::string& file, const std::st
 // Texts of UTF-32, a row each, as FacetSorter wants them: what is not ASCII becomes a question mark.
 absl::Status ReadNames(ZipReader& archive, const std::string& file, const std::string& member,
                        std::vector<std::string>& names) {
-  const absl::StatusOr<uint64_t> size = archive.Begin(member);
-  if (!size.ok()) {
-    return size.status();
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(const uint64_t size, archive.Begin(member));
   const auto source = [&archive](char* buffer, size_t bytes) { return archive.Read(buffer, bytes); };
-  absl::StatusOr<NpyReader> array = NpyReader::Open(absl::StrCat(file, ": ", member), source, *size, 1);
+  absl::StatusOr<NpyReader> array = NpyReader::Open(absl::StrCat(file, ": ", member), source, size, 1);
   return array.ok() ? array->ReadTexts(names) : array.status();
 }
 
 absl::Status ReadBoundary(ZipReader& archive, const std::string& file, Mesh& mesh) {
-  absl::StatusOr<NpyReader> facets = OpenArray(archive, file, kNpzFacets);
-  if (!facets.ok()) {
-    return facets.status();
-  }
-  const uint64_t rows = facets->rows();
-  if (facets->columns() != static_cast<uint64_t>(mesh.dimension)) {
+  WELLSPACE_ASSIGN_OR_RETURN(NpyReader facets, OpenArray(archive, file, kNpzFacets));
+  const uint64_t rows = facets.rows();
+  if (facets.columns() != static_cast<uint64_t>(mesh.dimension)) {
     return absl::InvalidArgumentError(
-        absl::StrCat(file, ": ", kNpzFacets, ": expected ", mesh.dimension, " columns, got ", facets->columns()));
+        absl::StrCat(file, ": ", kNpzFacets, ": expected ", mesh.dimension, " columns, got ", facets.columns()));
   }
   std::vector<uint32_t> corners;
-  if (absl::Status status = facets->ReadIndices(mesh.View().vertex_count(), corners); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(facets.ReadIndices(mesh.View().vertex_count(), corners));
   std::vector<int32_t> tags;
-  if (absl::Status status = ReadTags(archive, file, kNpzFacetTags, tags); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(ReadTags(archive, file, kNpzFacetTags, tags));
   if (tags.size() != rows) {
     return absl::InvalidArgumentError(
         absl::StrCat(file, ": ", kNpzFacetTags, ": expected ", rows, " tags, one for each facet, got ", tags.size()));
@@ -111,9 +94,7 @@ absl::Status ReadBoundary(ZipReader& archive, const std::string& file, Mesh& mes
 
 absl::Status ReadRegions(ZipReader& archive, const std::string& file, Mesh& mesh) {
   std::vector<int32_t> ids;
-  if (absl::Status status = ReadTags(archive, file, kNpzRegions, ids); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(ReadTags(archive, file, kNpzRegions, ids));
   if (ids.size() != mesh.View().simplex_count()) {
     return absl::InvalidArgumentError(absl::StrCat(file, ": ", kNpzRegions, ": expected ", mesh.View().simplex_count(),
                                                    " regions, one for each simplex, got ", ids.size()));
@@ -143,64 +124,39 @@ absl::Status ReadRegions(ZipReader& archive, const std::string& file, Mesh& mesh
 }  // namespace
 
 absl::StatusOr<Mesh> ReadNpz(const std::string& path) {
-  absl::StatusOr<InputFile> file = InputFile::Open(path);
-  if (!file.ok()) {
-    return file.status();
-  }
-  const std::string name = file->name();
-  const absl::StatusOr<std::unique_ptr<ZipReader>> archive = ZipReader::Open(*std::move(file));
-  if (!archive.ok()) {
-    return archive.status();
-  }
-  absl::StatusOr<NpyReader> points = OpenArray(**archive, name, kNpzPoints);
-  if (!points.ok()) {
-    return points.status();
-  }
-  const uint64_t vertices = points->rows();
-  const uint64_t columns = points->columns();
+  WELLSPACE_ASSIGN_OR_RETURN(InputFile file, InputFile::Open(path));
+  const std::string name = file.name();
+  WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<ZipReader> archive, ZipReader::Open(std::move(file)));
+  WELLSPACE_ASSIGN_OR_RETURN(NpyReader points, OpenArray(*archive, name, kNpzPoints));
+  const uint64_t vertices = points.rows();
+  const uint64_t columns = points.columns();
   if (columns < kMinDimension || columns > kMaxDimension || vertices > std::numeric_limits<uint32_t>::max()) {
     return absl::InvalidArgumentError(absl::StrCat(
         name, ": ", kNpzPoints, ": expected fewer than 2^32 rows and ", kMinDimension, " to ", kMaxDimension,
         " columns, a row for each point, got ", vertices, " rows and ", columns, " columns"));
   }
   Mesh mesh{.dimension = static_cast<int>(columns), .points = {}, .simplices = {}};
-  if (absl::Status status = points->ReadNumbers(mesh.points); !status.ok()) {
-    return status;
-  }
-  if ((*archive)->Has(kNpzWeights)) {
-    absl::StatusOr<NpyReader> weights = OpenArray(**archive, name, kNpzWeights, 1);
-    if (!weights.ok()) {
-      return weights.status();
-    }
-    if (weights->rows() != vertices) {
+  WELLSPACE_RETURN_IF_ERROR(points.ReadNumbers(mesh.points));
+  if (archive->Has(kNpzWeights)) {
+    WELLSPACE_ASSIGN_OR_RETURN(NpyReader weights, OpenArray(*archive, name, kNpzWeights, 1));
+    if (weights.rows() != vertices) {
       return absl::InvalidArgumentError(absl::StrCat(name, ": ", kNpzWeights, ": expected ", vertices,
-                                                     " weights, one for each point, got ", weights->rows()));
+                                                     " weights, one for each point, got ", weights.rows()));
     }
-    if (absl::Status status = weights->ReadNumbers(mesh.weights); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(weights.ReadNumbers(mesh.weights));
   }
-  absl::StatusOr<NpyReader> simplices = OpenArray(**archive, name, kNpzSimplices);
-  if (!simplices.ok()) {
-    return simplices.status();
-  }
-  if (simplices->columns() != columns + 1) {
+  WELLSPACE_ASSIGN_OR_RETURN(NpyReader simplices, OpenArray(*archive, name, kNpzSimplices));
+  if (simplices.columns() != columns + 1) {
     return absl::InvalidArgumentError(absl::StrCat(name, ": ", kNpzSimplices, ": expected ", columns + 1,
                                                    " columns for simplices of points with ", columns,
-                                                   " coordinates, got ", simplices->columns()));
+                                                   " coordinates, got ", simplices.columns()));
   }
-  if (absl::Status status = simplices->ReadIndices(vertices, mesh.simplices); !status.ok()) {
-    return status;
+  WELLSPACE_RETURN_IF_ERROR(simplices.ReadIndices(vertices, mesh.simplices));
+  if (archive->Has(kNpzRegions)) {
+    WELLSPACE_RETURN_IF_ERROR(ReadRegions(*archive, name, mesh));
   }
-  if ((*archive)->Has(kNpzRegions)) {
-    if (absl::Status status = ReadRegions(**archive, name, mesh); !status.ok()) {
-      return status;
-    }
-  }
-  if ((*archive)->Has(kNpzFacets)) {
-    if (absl::Status status = ReadBoundary(**archive, name, mesh); !status.ok()) {
-      return status;
-    }
+  if (archive->Has(kNpzFacets)) {
+    WELLSPACE_RETURN_IF_ERROR(ReadBoundary(*archive, name, mesh));
   }
   return mesh;
 }

@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/formats/cloud_readers.h"
 #include "client/formats/number.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -46,17 +47,13 @@ class OffReader {
       : reader_(reader), options_(options), cloud_(cloud) {}
 
   absl::Status Read() {
-    if (absl::Status status = ReadHeader(); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(ReadHeader());
     if (options_.dimension != 0 && kind_.coordinates != static_cast<uint64_t>(options_.dimension)) {
       return reader_.Error(DimensionError(options_.dimension, kind_.coordinates));
     }
     cloud_.dimension = static_cast<int>(kind_.coordinates);
     for (uint64_t vertex = 0; vertex < vertices_; ++vertex) {
-      if (absl::Status status = ReadVertex(vertex); !status.ok()) {
-        return status;
-      }
+      WELLSPACE_RETURN_IF_ERROR(ReadVertex(vertex));
     }
     NoteFaces(faces_, cloud_);
     return absl::OkStatus();

@@ -15,6 +15,7 @@
 #include "client/formats/number.h"
 #include "client/formats/table_columns.h"
 #include "client/formats/vtk_array.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -106,12 +107,8 @@ class PlyReader {
       : reader_(reader), options_(options), cloud_(cloud) {}
 
   absl::Status Read() {
-    if (absl::Status status = ReadHeader(); !status.ok()) {
-      return status;
-    }
-    if (absl::Status status = ChooseProperties(elements_.back().properties); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(ReadHeader());
+    WELLSPACE_RETURN_IF_ERROR(ChooseProperties(elements_.back().properties));
     NoteFaces(faces_, cloud_);
     for (const Element& element : elements_) {
       const bool is_vertex = &element == &elements_.back();
@@ -315,9 +312,7 @@ class PlyReader {
         return reader_.Error(absl::StrCat("expected more than ", index - 1, " values, as the header says"));
       }
       if (property.list_count) {
-        if (absl::Status status = SkipList(fields, field, index); !status.ok()) {
-          return status;
-        }
+        WELLSPACE_RETURN_IF_ERROR(SkipList(fields, field, index));
       } else if (property.axis >= 0) {  // only coordinates have to be finite numbers
         const absl::Status status = TakeCoordinate(field, options_.skip_invalid, point[property.axis], is_invalid);
         if (!status.ok()) {

@@ -18,6 +18,7 @@
 #include "client/formats/coordinate.h"
 #include "client/formats/number.h"
 #include "client/formats/table_columns.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -125,9 +126,7 @@ absl::Status TableReader::Begin(std::string_view line) {
     TakeCommentedNames(reader_.comment(), fields);
   }
   std::vector<size_t> columns;
-  if (absl::Status status = Choose(line, names_.empty() ? fields : names_.size(), columns); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(Choose(line, names_.empty() ? fields : names_.size(), columns));
   coordinate_of_field_.assign(names_.empty() ? fields : names_.size(), kSkipped);
   for (size_t i = 0; i < columns.size(); ++i) {
     coordinate_of_field_[columns[i]] = static_cast<int>(i);
@@ -310,9 +309,7 @@ absl::Status TableReader::ReadLine(std::string_view line) {
     if (names_.empty() && TakeHeader(line)) {
       return absl::OkStatus();
     }
-    if (absl::Status status = Begin(line); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(Begin(line));
   }
   return ReadRow(line);
 }
@@ -352,9 +349,7 @@ class MoleculeReader {
         return reader_.Error(absl::StrCat("expected the end of the file after ", count, " points, as line ", count_line,
                                           " says, got ", Quote(line)));
       }
-      if (absl::Status status = ReadAtom(line, count_line + 1); !status.ok()) {
-        return status;
-      }
+      WELLSPACE_RETURN_IF_ERROR(ReadAtom(line, count_line + 1));
     }
     if (reader_.status().ok() && rows() != count) {
       return reader_.Error(absl::StrCat("expected ", count, " points, as line ", count_line, " says, got ", rows()));
@@ -411,9 +406,7 @@ class MoleculeReader {
                          "expected a comment, as the second line of a file in chemistry is one, got what looks like a "
                          "point; --input-format pts takes it for one");
       }
-      if (absl::Status status = Choose(fields_.size(), has_symbol); !status.ok()) {
-        return status;
-      }
+      WELLSPACE_RETURN_IF_ERROR(Choose(fields_.size(), has_symbol));
     }
     // Numbers that the user gave count the symbol.
     const size_t first = has_symbol && options_.columns.empty() ? 1 : 0;
@@ -446,9 +439,7 @@ absl::Status ReadTable(LineReader& reader, const CloudOptions& options, Unnamed 
                        std::string_view line) {
   TableReader table(reader, options, unnamed, cloud);
   do {
-    if (absl::Status status = table.ReadLine(line); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(table.ReadLine(line));
   } while (reader.NextContent(line));
   return table.CheckCount();
 }
@@ -479,9 +470,7 @@ absl::Status ReadPts(LineReader& reader, const CloudOptions& options, PointCloud
   TableReader table(reader, options, Unnamed::kFirstThree, cloud);
   for (std::string_view line; reader.NextContent(line);) {
     if (uint64_t count = 0; table.may_take_count() && ParseUnsigned(line, kMaxCount, count)) {
-      if (absl::Status status = table.CheckCount(); !status.ok()) {
-        return status;
-      }
+      WELLSPACE_RETURN_IF_ERROR(table.CheckCount());
       table.TakeCount(line);
       continue;
     }
@@ -489,9 +478,7 @@ absl::Status ReadPts(LineReader& reader, const CloudOptions& options, PointCloud
       return reader.Error(
           absl::StrCat("expected the number of points that follow, or the end of the file, got ", Quote(line)));
     }
-    if (absl::Status status = table.ReadLine(line); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(table.ReadLine(line));
   }
   return table.CheckCount();
 }

@@ -19,6 +19,7 @@
 #include "client/formats/number.h"
 #include "client/formats/regions.h"
 #include "client/formats/tetgen_lines.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -88,9 +89,7 @@ absl::Status ReadFacets(LineReader& reader, uint64_t vertices, uint64_t index_ba
   }
   std::array<uint64_t, 2> header{};
   const std::array names = {"number of facets", "number of markers"};
-  if (absl::Status status = ReadHeader(reader, line, 1, names, header); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(ReadHeader(reader, line, 1, names, header));
   FacetSorter sorter;
   TakeNames(reader.comment(), sorter);
   const auto [count, markers] = header;
@@ -101,14 +100,10 @@ absl::Status ReadFacets(LineReader& reader, uint64_t vertices, uint64_t index_ba
       return CountError(reader, count, "facets", facet);
     }
     FieldSplitter fields(line, ' ');
-    if (absl::Status status = ReadIndex(reader, fields, facet, facet_base); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(ReadIndex(reader, fields, facet, facet_base));
     corners.clear();
     for (int corner = 0; corner < mesh.dimension; ++corner) {
-      if (absl::Status status = TakeNode(reader, fields, vertices, index_base, corners); !status.ok()) {
-        return status;
-      }
+      WELLSPACE_RETURN_IF_ERROR(TakeNode(reader, fields, vertices, index_base, corners));
     }
     std::string_view field;
     int32_t tag = 0;
@@ -130,9 +125,7 @@ absl::Status ReadEle(LineReader& reader, uint64_t vertices, uint64_t index_base,
   }
   std::array<uint64_t, 3> header{};
   const std::array names = {"number of simplices", "number of nodes of each", "number of attributes"};
-  if (absl::Status status = ReadHeader(reader, line, 2, names, header); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(ReadHeader(reader, line, 2, names, header));
   RegionCollector regions;
   bool are_regions = true;  // the first attributes
   TakeRegionNames(reader.comment(), regions);
@@ -147,9 +140,7 @@ absl::Status ReadEle(LineReader& reader, uint64_t vertices, uint64_t index_base,
       return CountError(reader, count, what, simplex);
     }
     FieldSplitter fields(line, ' ');
-    if (absl::Status status = ReadIndex(reader, fields, simplex, element_base); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(ReadIndex(reader, fields, simplex, element_base));
     std::string_view field;
     for (uint64_t corner = 0; corner < corners; ++corner) {
       if (!fields.Next(field)) {
@@ -188,9 +179,7 @@ absl::Status ReadNode(LineReader& reader, const CloudOptions& options, PointClou
 
 absl::Status ReadNode(LineReader& reader, const CloudOptions& options, PointCloud& cloud, NodeNumbers& numbers) {
   NodeHeader header;
-  if (absl::Status status = ReadNodeHeader(reader, header); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(ReadNodeHeader(reader, header));
   if (options.dimension != 0 && static_cast<int>(header.dimension) != options.dimension) {
     return reader.Error(absl::StrCat("expected dimension ", options.dimension, ", got ", header.dimension,
                                      static_cast<int>(header.dimension) > options.dimension
@@ -198,43 +187,29 @@ absl::Status ReadNode(LineReader& reader, const CloudOptions& options, PointClou
                                          : ""));
   }
   NodeExtras extras;
-  if (absl::Status status = ReadNodePoints(reader, header, options.skip_invalid, cloud, extras); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(ReadNodePoints(reader, header, options.skip_invalid, cloud, extras));
   numbers = {.index_base = extras.index_base, .weights = std::move(extras.weights), .has_markers = header.markers > 0};
   return ExpectEnd(reader, header.count, "points");
 }
 
 absl::StatusOr<Mesh> ReadNodeAndEle(const std::string& path) {
-  absl::StatusOr<InputFile> node_file = InputFile::Open(WithExtension(path, ".node"));
-  if (!node_file.ok()) {
-    return node_file.status();
-  }
-  absl::StatusOr<InputFile> ele_file = InputFile::Open(WithExtension(path, ".ele"));
-  if (!ele_file.ok()) {
-    return ele_file.status();
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(InputFile node_file, InputFile::Open(WithExtension(path, ".node")));
+  WELLSPACE_ASSIGN_OR_RETURN(InputFile ele_file, InputFile::Open(WithExtension(path, ".ele")));
   PointCloud cloud;
   NodeNumbers numbers;
-  LineReader nodes(*std::move(node_file));
-  if (absl::Status status = ReadNode(nodes, {}, cloud, numbers); !status.ok()) {
-    return status;
-  }
+  LineReader nodes(std::move(node_file));
+  WELLSPACE_RETURN_IF_ERROR(ReadNode(nodes, {}, cloud, numbers));
   Mesh mesh{.dimension = cloud.dimension,
             .points = std::move(cloud.points),
             .simplices = {},
             .weights = std::move(numbers.weights)};
-  LineReader simplices(*std::move(ele_file));
-  if (absl::Status status = ReadEle(simplices, mesh.View().vertex_count(), numbers.index_base, mesh); !status.ok()) {
-    return status;
-  }
+  LineReader simplices(std::move(ele_file));
+  WELLSPACE_RETURN_IF_ERROR(ReadEle(simplices, mesh.View().vertex_count(), numbers.index_base, mesh));
   // Without markers in .node, a file of facets that lies there may be another mesh's.
   if (absl::StatusOr<InputFile> facet_file = InputFile::Open(BoundaryFilesOf(path, mesh.dimension).front());
       numbers.has_markers && facet_file.ok()) {
     LineReader facets(*std::move(facet_file));
-    if (absl::Status status = ReadFacets(facets, mesh.View().vertex_count(), numbers.index_base, mesh); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(ReadFacets(facets, mesh.View().vertex_count(), numbers.index_base, mesh));
   } else if (numbers.has_markers && !absl::IsNotFound(facet_file.status())) {
     return facet_file.status();
   }

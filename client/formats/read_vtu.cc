@@ -15,6 +15,7 @@
 #include "client/formats/vtk_array.h"
 #include "client/formats/vtk_cells.h"
 #include "client/formats/xml_scanner.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -27,9 +28,7 @@ class VtuReader {
   VtuReader(std::string_view document, const std::string& name) : xml_(document, name), name_(name) {}
 
   absl::StatusOr<Mesh> Read() {
-    if (absl::Status status = ReadElements(); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(ReadElements());
     if (pieces_ != 1) {
       return FileError(absl::StrCat("expected one <Piece> of an <UnstructuredGrid>, got ", pieces_));
     }
@@ -56,14 +55,10 @@ class VtuReader {
             return xml_.Error(absl::StrCat("expected elements at most ", kMaxDepth, " deep"));
           }
           path_.emplace_back(xml_.value());
-          if (absl::Status status = StartElement(); !status.ok()) {
-            return status;
-          }
+          WELLSPACE_RETURN_IF_ERROR(StartElement());
           break;
         case XmlScanner::Piece::kEndTag:
-          if (absl::Status status = EndElement(); !status.ok()) {
-            return status;
-          }
+          WELLSPACE_RETURN_IF_ERROR(EndElement());
           break;
       }
     }
@@ -269,9 +264,7 @@ class VtuReader {
     Mesh mesh;
     mesh.weights = weights_;
     mesh.dimension = !types_.empty() && types_[0] == kVtkTriangle ? 2 : 3;
-    if (absl::Status status = TakeCells(mesh); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(TakeCells(mesh));
     return TakePoints(std::move(mesh));
   }
 
@@ -365,15 +358,9 @@ class VtuReader {
 }  // namespace
 
 absl::StatusOr<Mesh> ReadVtu(const std::string& path) {
-  absl::StatusOr<InputFile> file = InputFile::Open(path);
-  if (!file.ok()) {
-    return file.status();
-  }
-  const absl::StatusOr<std::string> document = file->ReadAll();
-  if (!document.ok()) {
-    return document.status();
-  }
-  return VtuReader(*document, file->name()).Read();
+  WELLSPACE_ASSIGN_OR_RETURN(InputFile file, InputFile::Open(path));
+  WELLSPACE_ASSIGN_OR_RETURN(const std::string document, file.ReadAll());
+  return VtuReader(document, file.name()).Read();
 }
 
 }  // namespace wellspace::formats

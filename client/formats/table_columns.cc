@@ -8,6 +8,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/formats/cloud.h"
 #include "client/formats/number.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -209,14 +210,11 @@ absl::StatusOr<std::vector<size_t>> ResolveColumns(const std::vector<std::string
                                                    const std::vector<std::string>& names, size_t count, int dimension) {
   std::vector<size_t> columns;
   for (const std::string& one : wanted) {
-    const absl::StatusOr<size_t> column = ResolveColumn("--columns", one, names, count);
-    if (!column.ok()) {
-      return column.status();
-    }
-    if (std::find(columns.begin(), columns.end(), *column) != columns.end()) {
+    WELLSPACE_ASSIGN_OR_RETURN(const size_t column, ResolveColumn("--columns", one, names, count));
+    if (std::find(columns.begin(), columns.end(), column) != columns.end()) {
       return absl::InvalidArgumentError(absl::StrCat("--columns: column ", Quote(one), " is given twice"));
     }
-    columns.push_back(*column);
+    columns.push_back(column);
   }
   if (dimension != 0 ? columns.size() != static_cast<size_t>(dimension)
                      : columns.size() < kMinDimension || columns.size() > kMaxDimension) {

@@ -11,6 +11,7 @@
 #include "client/formats/cloud_readers.h"
 #include "client/formats/coordinate.h"
 #include "client/formats/mesh_writers.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -122,9 +123,7 @@ absl::Status ReadNodeHeader(LineReader& reader, NodeHeader& header) {
   }
   std::array<uint64_t, 4> values{};
   constexpr std::array kNames = {"number of points", "dimension", "number of attributes", "number of markers"};
-  if (absl::Status status = ReadHeader(reader, line, 2, kNames, values); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(ReadHeader(reader, line, 2, kNames, values));
   header = {.count = values[0],
             .dimension = values[1],
             .attributes = values[2],
@@ -147,9 +146,7 @@ absl::Status ReadNodePoints(LineReader& reader, const NodeHeader& header, bool s
       return CountError(reader, header.count, "points", point);
     }
     FieldSplitter fields(line, ' ');
-    if (absl::Status status = ReadIndex(reader, fields, point, extras.index_base); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(ReadIndex(reader, fields, point, extras.index_base));
     std::string_view field;
     std::array<double, kMaxDimension> coordinates;
     bool is_invalid = false;
@@ -163,9 +160,7 @@ absl::Status ReadNodePoints(LineReader& reader, const NodeHeader& header, bool s
         return reader.Error(absl::StrCat("coordinate ", axis + 1, ": ", status.message()));
       }
     }
-    if (absl::Status status = ReadExtras(reader, header, point, fields, extras); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(ReadExtras(reader, header, point, fields, extras));
     AddPoint({coordinates.data(), header.dimension}, is_invalid, reader.line_number(), cloud);
   }
   return absl::OkStatus();

@@ -11,6 +11,7 @@
 #include "client/formats/number.h"
 #include "client/formats/output_file.h"
 #include "client/formats/regions.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -47,10 +48,7 @@ class MeditWriter final : public MeshWriter {
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
     BeginSimplices();
     const size_t corners = shape_.dimension + 1;
-    if (absl::Status status = regions_.CheckNext(shape_.has_simplex_regions ? simplices.size() / corners : 0);
-        !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(regions_.CheckNext(shape_.has_simplex_regions ? simplices.size() / corners : 0));
     const int32_t only_region = shape_.regions.empty() ? 1 : shape_.regions[0].id;
     for (; !simplices.empty() && output_.status().ok(); simplices = simplices.subspan(corners)) {
       line_.clear();
@@ -86,17 +84,12 @@ class MeditWriter final : public MeshWriter {
       BeginFacets();
     }
     output_.Write("End\n");
-    if (absl::Status status = output_.status(); !status.ok()) {
-      return status;
-    }
-    if (absl::Status status = CheckComplete(shape_, {.vertices = vertices_,
+    WELLSPACE_RETURN_IF_ERROR(output_.status());
+    WELLSPACE_RETURN_IF_ERROR(CheckComplete(shape_, {.vertices = vertices_,
                                                      .weights = 0,
                                                      .simplex_regions = regions_.count(),
                                                      .simplices = simplices_,
-                                                     .facets = facets_});
-        !status.ok()) {
-      return status;
-    }
+                                                     .facets = facets_}));
     return output_.Commit();
   }
 
@@ -129,11 +122,8 @@ class MeditWriter final : public MeshWriter {
 
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMedit(const std::string& path, const MeshShape& shape,
                                                         std::stop_token stop) {
-  absl::StatusOr<OutputFile> output = OutputFile::Create(path, std::move(stop));
-  if (!output.ok()) {
-    return output.status();
-  }
-  return std::make_unique<MeditWriter>(*std::move(output), shape);
+  WELLSPACE_ASSIGN_OR_RETURN(OutputFile output, OutputFile::Create(path, std::move(stop)));
+  return std::make_unique<MeditWriter>(std::move(output), shape);
 }
 
 }  // namespace wellspace::formats

@@ -13,6 +13,7 @@
 #include "client/formats/line_reader.h"
 #include "client/formats/mesh_writers.h"
 #include "client/formats/registry.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -78,10 +79,7 @@ std::vector<std::string> FilesOfMeshWritten(const std::string& path, const std::
 }
 
 absl::Status CheckMeshOutput(const std::string& path, const std::string& format, int dimension, bool may_have_weights) {
-  const absl::StatusOr<WriterKind> writer = FindWriter(path, format, dimension, may_have_weights);
-  if (!writer.ok()) {
-    return writer.status();
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(const WriterKind writer, FindWriter(path, format, dimension, may_have_weights));
   if (path == kStandardStream) {
     return absl::OkStatus();
   }
@@ -93,9 +91,9 @@ absl::Status CheckMeshOutput(const std::string& path, const std::string& format,
     return absl::InvalidArgumentError(absl::StrCat("cannot write ", path, ": it is a folder; expected a file"));
   }
   const bool is_device = exists && !S_ISREG(attributes.st_mode);
-  if (is_device && writer->needs_file != nullptr) {
+  if (is_device && writer.needs_file != nullptr) {
     return absl::InvalidArgumentError(
-        absl::StrCat("cannot write ", path, ": ", writer->needs_file, "; expected the name of a regular file"));
+        absl::StrCat("cannot write ", path, ": ", writer.needs_file, "; expected the name of a regular file"));
   }
   if (access(is_device ? path.c_str() : folder.c_str(), W_OK) != 0) {
     return OpenOrReadError(errno, absl::StrCat("cannot write ", path));
@@ -123,19 +121,14 @@ absl::Status CheckComplete(const MeshShape& shape, const RowCounts& rows) {
 
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMesh(const std::string& path, const std::string& format,
                                                        const MeshShape& shape, std::stop_token stop) {
-  const absl::StatusOr<WriterKind> writer = FindWriter(path, format, shape.dimension, shape.has_weights);
-  if (!writer.ok()) {
-    return writer.status();
-  }
-  return writer->create(path, shape, std::move(stop));
+  WELLSPACE_ASSIGN_OR_RETURN(const WriterKind writer, FindWriter(path, format, shape.dimension, shape.has_weights));
+  return writer.create(path, shape, std::move(stop));
 }
 
 absl::Status WriteMesh(const std::string& path, const std::string& format, const MeshView& mesh, std::stop_token stop) {
-  const absl::StatusOr<std::unique_ptr<MeshWriter>> writer = CreateMesh(path, format, mesh.Shape(), std::move(stop));
-  if (!writer.ok()) {
-    return writer.status();
-  }
-  MeshWriter& rows = **writer;
+  WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<MeshWriter> writer,
+                             CreateMesh(path, format, mesh.Shape(), std::move(stop)));
+  MeshWriter& rows = *writer;
   const bool has_marks = !mesh.vertex_tags.empty();
   absl::Status status = rows.AddPoints(mesh.points);
   if (status.ok() && !mesh.weights.empty()) {

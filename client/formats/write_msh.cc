@@ -17,6 +17,7 @@
 #include "client/formats/number.h"
 #include "client/formats/output_file.h"
 #include "client/formats/regions.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -89,10 +90,7 @@ class MshWriter : public MeshWriter {
   absl::Status AddSimplices(std::span<const uint32_t> simplices) final {
     BeginElements();
     const size_t corners = shape_.dimension + 1;
-    if (absl::Status status = regions_.CheckNext(shape_.has_simplex_regions ? simplices.size() / corners : 0);
-        !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(regions_.CheckNext(shape_.has_simplex_regions ? simplices.size() / corners : 0));
     for (; !simplices.empty() && output_.status().ok(); simplices = simplices.subspan(corners)) {
       const int32_t group = shape_.has_simplex_regions ? groups_.at(regions_.Next()) : OnlyGroup();
       row_.clear();
@@ -120,17 +118,12 @@ class MshWriter : public MeshWriter {
     BeginElements();
     EndSimplices();
     output_.Write(is_binary_ ? "\n$EndElements\n" : "$EndElements\n");
-    if (absl::Status status = output_.status(); !status.ok()) {
-      return status;
-    }
-    if (absl::Status status = CheckComplete(shape_, {.vertices = vertices_,
+    WELLSPACE_RETURN_IF_ERROR(output_.status());
+    WELLSPACE_RETURN_IF_ERROR(CheckComplete(shape_, {.vertices = vertices_,
                                                      .weights = weights_.size(),
                                                      .simplex_regions = regions_.count(),
                                                      .simplices = simplices_,
-                                                     .facets = facets_});
-        !status.ok()) {
-      return status;
-    }
+                                                     .facets = facets_}));
     WriteNodeData("input", [this](uint64_t vertex) { return vertex < shape_.input_vertices ? 1.0 : 0.0; });
     if (shape_.has_weights) {
       WriteNodeData(kMshWeights, [this](uint64_t vertex) { return weights_[vertex]; });
@@ -480,11 +473,8 @@ absl::StatusOr<std::unique_ptr<MeshWriter>> Create(const std::string& path, cons
                                                    " vertices, and this mesh has ", shape.vertex_count,
                                                    "; expected vtu or npz"));
   }
-  absl::StatusOr<OutputFile> output = OutputFile::Create(path, std::move(stop));
-  if (!output.ok()) {
-    return output.status();
-  }
-  return std::make_unique<Writer>(*std::move(output), shape);
+  WELLSPACE_ASSIGN_OR_RETURN(OutputFile output, OutputFile::Create(path, std::move(stop)));
+  return std::make_unique<Writer>(std::move(output), shape);
 }
 
 }  // namespace

@@ -12,6 +12,7 @@
 #include "client/formats/npz.h"
 #include "client/formats/output_file.h"
 #include "client/formats/zip_file.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -88,17 +89,12 @@ class NpzWriter final : public MeshWriter {
     if (shape_.has_simplex_regions) {
       WriteRegions();
     }
-    if (absl::Status status = archive_.Finish(); !status.ok()) {
-      return status;
-    }
-    if (absl::Status status = CheckComplete(shape_, {.vertices = vertices_,
+    WELLSPACE_RETURN_IF_ERROR(archive_.Finish());
+    WELLSPACE_RETURN_IF_ERROR(CheckComplete(shape_, {.vertices = vertices_,
                                                      .weights = weights_,
                                                      .simplex_regions = simplex_regions_,
                                                      .simplices = simplices_,
-                                                     .facets = facets_});
-        !status.ok()) {
-      return status;
-    }
+                                                     .facets = facets_}));
     return output_.Commit();
   }
 
@@ -210,15 +206,12 @@ class NpzWriter final : public MeshWriter {
 
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateNpz(const std::string& path, const MeshShape& shape,
                                                       std::stop_token stop) {
-  absl::StatusOr<OutputFile> output = OutputFile::Create(path, std::move(stop));
-  if (!output.ok()) {
-    return output.status();
-  }
-  if (!output->IsSeekable()) {
+  WELLSPACE_ASSIGN_OR_RETURN(OutputFile output, OutputFile::Create(path, std::move(stop)));
+  if (!output.IsSeekable()) {
     return absl::InvalidArgumentError(
         absl::StrCat("cannot write ", path, ": npz is a zip archive, which needs a regular file"));
   }
-  return std::make_unique<NpzWriter>(*std::move(output), shape);
+  return std::make_unique<NpzWriter>(std::move(output), shape);
 }
 
 }  // namespace wellspace::formats

@@ -12,6 +12,7 @@
 #include "client/formats/output_file.h"
 #include "client/formats/regions.h"
 #include "client/formats/registry.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -70,10 +71,7 @@ class NodeAndEleWriter final : public MeshWriter {
 
   absl::Status AddSimplices(std::span<const uint32_t> simplices) override {
     const size_t corners = shape_.dimension + 1;
-    if (absl::Status status = regions_.CheckNext(shape_.has_simplex_regions ? simplices.size() / corners : 0);
-        !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(regions_.CheckNext(shape_.has_simplex_regions ? simplices.size() / corners : 0));
     OutputFile& output = files_.simplices;
     for (; !simplices.empty() && output.status().ok(); simplices = simplices.subspan(corners)) {
       line_.clear();
@@ -112,14 +110,11 @@ class NodeAndEleWriter final : public MeshWriter {
   }
 
   absl::Status Commit() override {
-    if (absl::Status status = CheckComplete(shape_, {.vertices = vertices_written_,
+    WELLSPACE_RETURN_IF_ERROR(CheckComplete(shape_, {.vertices = vertices_written_,
                                                      .weights = shape_.has_weights ? vertices_written_ : 0,
                                                      .simplex_regions = regions_.count(),
                                                      .simplices = simplices_written_,
-                                                     .facets = facets_written_});
-        !status.ok()) {
-      return status;
-    }
+                                                     .facets = facets_written_}));
     std::vector<OutputFile*> outputs = {&files_.nodes, &files_.simplices};
     if (files_.facets.has_value()) {
       outputs.push_back(&*files_.facets);
@@ -130,14 +125,10 @@ class NodeAndEleWriter final : public MeshWriter {
     }
     // No file appears before all are written.
     for (OutputFile* output : outputs) {
-      if (absl::Status status = output->Flush(); !status.ok()) {
-        return status;
-      }
+      WELLSPACE_RETURN_IF_ERROR(output->Flush());
     }
     for (OutputFile* output : outputs) {
-      if (absl::Status status = output->Commit(); !status.ok()) {
-        return status;
-      }
+      WELLSPACE_RETURN_IF_ERROR(output->Commit());
     }
     return absl::OkStatus();
   }
@@ -255,11 +246,8 @@ absl::StatusOr<std::unique_ptr<MeshWriter>> CreateNodeAndEle(const std::string& 
   }
   std::vector<OutputFile> outputs;
   for (const std::string& name : names) {
-    absl::StatusOr<OutputFile> output = OutputFile::Create(name, stop);
-    if (!output.ok()) {
-      return output.status();
-    }
-    outputs.push_back(*std::move(output));
+    WELLSPACE_ASSIGN_OR_RETURN(OutputFile output, OutputFile::Create(name, stop));
+    outputs.push_back(std::move(output));
   }
   TetgenFiles files{.nodes = std::move(outputs[0]), .simplices = std::move(outputs[1])};
   if (outputs.size() > 2) {

@@ -18,6 +18,7 @@
 #include "client/formats/mesh_writers.h"
 #include "client/formats/output_file.h"
 #include "client/formats/vtk_cells.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -315,18 +316,13 @@ class VtkHdfWriter final : public MeshWriter {
     {
       const std::lock_guard lock(Hdf5Mutex());
       BeginCells();
-      if (absl::Status status = file_->Finish(); !status.ok()) {
-        return status;
-      }
+      WELLSPACE_RETURN_IF_ERROR(file_->Finish());
     }
-    if (absl::Status status = CheckComplete(shape_, {.vertices = vertices_,
+    WELLSPACE_RETURN_IF_ERROR(CheckComplete(shape_, {.vertices = vertices_,
                                                      .weights = weights_,
                                                      .simplex_regions = simplex_regions_,
                                                      .simplices = simplices_,
-                                                     .facets = facets_});
-        !status.ok()) {
-      return status;
-    }
+                                                     .facets = facets_}));
     return output_.Commit();
   }
 
@@ -402,11 +398,8 @@ class VtkHdfWriter final : public MeshWriter {
 
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateVtkHdf(const std::string& path, const MeshShape& shape,
                                                          std::stop_token stop) {
-  absl::StatusOr<OutputFile> output = OutputFile::Create(path, stop);
-  if (!output.ok()) {
-    return output.status();
-  }
-  return std::make_unique<VtkHdfWriter>(*std::move(output), shape, std::move(stop));
+  WELLSPACE_ASSIGN_OR_RETURN(OutputFile output, OutputFile::Create(path, stop));
+  return std::make_unique<VtkHdfWriter>(std::move(output), shape, std::move(stop));
 }
 
 }  // namespace wellspace::formats

@@ -9,6 +9,7 @@
 #include "client/formats/output_file.h"
 #include "client/formats/vtk_array.h"
 #include "client/formats/vtk_cells.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -107,17 +108,12 @@ class VtuWriter final : public MeshWriter {
     }
     EndArray();
     output_.Write("      </Cells>\n    </Piece>\n  </UnstructuredGrid>\n</VTKFile>\n");
-    if (absl::Status status = Status(); !status.ok()) {
-      return status;
-    }
-    if (absl::Status status = CheckComplete(shape_, {.vertices = vertices_,
+    WELLSPACE_RETURN_IF_ERROR(Status());
+    WELLSPACE_RETURN_IF_ERROR(CheckComplete(shape_, {.vertices = vertices_,
                                                      .weights = weights_,
                                                      .simplex_regions = simplex_regions_,
                                                      .simplices = simplices_,
-                                                     .facets = facets_});
-        !status.ok()) {
-      return status;
-    }
+                                                     .facets = facets_}));
     return output_.Commit();
   }
 
@@ -232,11 +228,8 @@ class VtuWriter final : public MeshWriter {
 
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateVtu(const std::string& path, const MeshShape& shape,
                                                       std::stop_token stop) {
-  absl::StatusOr<OutputFile> output = OutputFile::Create(path, std::move(stop));
-  if (!output.ok()) {
-    return output.status();
-  }
-  return std::make_unique<VtuWriter>(*std::move(output), shape);
+  WELLSPACE_ASSIGN_OR_RETURN(OutputFile output, OutputFile::Create(path, std::move(stop)));
+  return std::make_unique<VtuWriter>(std::move(output), shape);
 }
 
 }  // namespace wellspace::formats

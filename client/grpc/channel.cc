@@ -11,6 +11,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "client/address.h"
+#include "core/base/status_macros.h"
 #include "grpcpp/create_channel.h"
 #include "grpcpp/security/credentials.h"
 #include "grpcpp/support/client_interceptor.h"
@@ -31,14 +32,11 @@ absl::Status ReadPem(const std::string& path, std::string* content) {
   if (path.empty()) {
     return absl::OkStatus();
   }
-  absl::StatusOr<std::string> read = ReadFile(path);
-  if (!read.ok()) {
-    return read.status();
-  }
-  if (read->find("-----BEGIN ") == std::string::npos) {
+  WELLSPACE_ASSIGN_OR_RETURN(std::string read, ReadFile(path));
+  if (read.find("-----BEGIN ") == std::string::npos) {
     return absl::InvalidArgumentError(absl::StrCat(path, ": expected PEM, which begins with -----BEGIN"));
   }
-  *content = *std::move(read);
+  *content = std::move(read);
   return absl::OkStatus();
 }
 
@@ -57,9 +55,7 @@ absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> MakeCredentials(const 
   for (const auto& [path, content] : {std::pair(&options.tls_ca, &ssl.pem_root_certs),
                                       {&options.tls_certificate, &ssl.pem_cert_chain},
                                       {&options.tls_key, &ssl.pem_private_key}}) {
-    if (absl::Status status = ReadPem(*path, content); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(ReadPem(*path, content));
   }
   return grpc::SslCredentials(ssl);
 }
@@ -88,11 +84,8 @@ class TokenSource {
   absl::StatusOr<std::string> Read() const {
     std::string token = token_;
     if (!file_.empty()) {
-      absl::StatusOr<std::string> content = ReadFile(file_);
-      if (!content.ok()) {
-        return content.status();
-      }
-      token = *std::move(content);
+      WELLSPACE_ASSIGN_OR_RETURN(std::string content, ReadFile(file_));
+      token = std::move(content);
     }
     absl::StripAsciiWhitespace(&token);
     if (token.empty() ||
@@ -174,32 +167,23 @@ class CredentialsInterceptorFactory final : public grpc::experimental::ClientInt
 
 absl::StatusOr<std::shared_ptr<grpc::Channel>> OpenChannel(const std::string& address, const ConnectOptions& options,
                                                            const grpc::ChannelArguments& arguments) {
-  const absl::StatusOr<std::string> host = HostOf(address);
-  if (!host.ok()) {
-    return host.status();
-  }
-  absl::StatusOr<TokenSource> token = TokenSource::Make(options);
-  if (!token.ok()) {
-    return token.status();
-  }
-  const absl::StatusOr<std::shared_ptr<grpc::ChannelCredentials>> credentials = MakeCredentials(options);
-  if (!credentials.ok()) {
-    return credentials.status();
-  }
-  if (token->exists() && !UsesTls(options) && !options.insecure_remote && !IsLoopback(*host)) {
+  WELLSPACE_ASSIGN_OR_RETURN(const std::string host, HostOf(address));
+  WELLSPACE_ASSIGN_OR_RETURN(TokenSource token, TokenSource::Make(options));
+  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<grpc::ChannelCredentials> credentials, MakeCredentials(options));
+  if (token.exists() && !UsesTls(options) && !options.insecure_remote && !IsLoopback(host)) {
     return absl::FailedPreconditionError(absl::StrCat("would send the token to ", address,
                                                       " in plain text; use TLS, or allow it with --insecure-remote"));
   }
   // A proxy's loopback is not this machine's.
-  const bool is_direct = IsLoopback(*host);
+  const bool is_direct = IsLoopback(host);
   grpc::ChannelArguments all_arguments = arguments;
   if (is_direct) {
     all_arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
   }
   std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> interceptors;
   interceptors.push_back(std::make_unique<CredentialsInterceptorFactory>(
-      Way{*std::move(token), *host, is_direct ? std::nullopt : ProxyFor(*host)}));
-  return grpc::experimental::CreateCustomChannelWithInterceptors(address, *credentials, all_arguments,
+      Way{std::move(token), host, is_direct ? std::nullopt : ProxyFor(host)}));
+  return grpc::experimental::CreateCustomChannelWithInterceptors(address, credentials, all_arguments,
                                                                  std::move(interceptors));
 }
 

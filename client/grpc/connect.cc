@@ -6,6 +6,7 @@
 #include "client/client.h"
 #include "client/connection.h"
 #include "client/grpc/channel.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::client {
 namespace {
@@ -30,11 +31,8 @@ absl::StatusOr<Client> Connect(const std::string& address, const ConnectOptions&
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, kKeepaliveTimeoutMs);
   arguments.SetInt(GRPC_ARG_INITIAL_RECONNECT_BACKOFF_MS, kInitialReconnectMs);
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS, kMaxReconnectMs);
-  absl::StatusOr<std::shared_ptr<grpc::Channel>> channel = OpenChannel(address, options, arguments);
-  if (!channel.ok()) {
-    return channel.status();
-  }
-  return Client(MakeConnection(*std::move(channel)));
+  WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<grpc::Channel> channel, OpenChannel(address, options, arguments));
+  return Client(MakeConnection(std::move(channel)));
 }
 
 }  // namespace wellspace::client

@@ -9,6 +9,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/grpc/convert.h"
+#include "core/base/status_macros.h"
 #include "proto/checksum.h"
 
 namespace wellspace::client {
@@ -138,9 +139,7 @@ absl::Status MeshReceiver::CheckBoundary(const MeshHeader& header) const {
       return Contradiction("a part of the boundary with the tag ", part.tag, " and ", part.facet_count,
                            " facets; tags are above 0, each once");
     }
-    if (absl::Status status = CheckName(part.name); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(CheckName(part.name));
   }
   if (facets != header.facet_count || header.facet_count > kMaxSimplices) {
     return Contradiction("parts of the boundary with ", facets, " facets, ", header.facet_count, " in all");
@@ -150,9 +149,7 @@ absl::Status MeshReceiver::CheckBoundary(const MeshHeader& header) const {
     if (region.id <= 0 || !regions.insert(region.id).second) {
       return Contradiction("a region with the id ", region.id, "; ids are above 0, each once");
     }
-    if (absl::Status status = CheckName(region.name); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(CheckName(region.name));
   }
   return absl::OkStatus();
 }
@@ -163,9 +160,7 @@ absl::Status MeshReceiver::SetMetadata(const v1::MeshMetadata& metadata) {
   }
   expects_metadata_ = false;
   MeshHeader header = HeaderFromProto(metadata);
-  if (absl::Status status = CheckMetadata(header); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(CheckMetadata(header));
   if (has_metadata_) {
     return IsTheSame(header, header_)
                ? absl::OkStatus()
@@ -243,16 +238,9 @@ absl::Status MeshReceiver::AddChunk(const v1::MeshChunk& chunk) {
   }
   const uint64_t values =
       VisitArray(chunk, array, [](const auto& array_values) -> uint64_t { return array_values.size(); });
-  if (absl::Status status = CheckOrder(array, values); !status.ok()) {
-    return status;
-  }
-  if (absl::Status status = CheckValues(array, chunk); !status.ok()) {
-    return status;
-  }
-  if (absl::Status moved = CheckMoved(chunk, array == kPoints ? received_[kPoints] / WidthOf(kPoints) : 0);
-      !moved.ok()) {
-    return moved;
-  }
+  WELLSPACE_RETURN_IF_ERROR(CheckOrder(array, values));
+  WELLSPACE_RETURN_IF_ERROR(CheckValues(array, chunk));
+  WELLSPACE_RETURN_IF_ERROR(CheckMoved(chunk, array == kPoints ? received_[kPoints] / WidthOf(kPoints) : 0));
   ++next_chunk_;
   moved_ += chunk.moved_vertices_size();
   received_[array] += values;

@@ -7,6 +7,7 @@
 #include "client/grpc/grpc_connection.h"
 #include "client/grpc/mesh_receiver.h"
 #include "client/grpc/request_writer.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::client {
 namespace {
@@ -154,11 +155,8 @@ absl::StatusOr<MeshEstimate> GrpcConnection::EstimateMesh(const MeshOptions& opt
 
 absl::StatusOr<ServerInfo> GrpcConnection::GetServerInfo(const CallOptions& call) {
   v1::GetServerInfoResponse response;
-  if (absl::Status status =
-          Call(*meshing_, &v1::MeshingService::Stub::GetServerInfo, v1::GetServerInfoRequest(), call, &response);
-      !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(
+      Call(*meshing_, &v1::MeshingService::Stub::GetServerInfo, v1::GetServerInfoRequest(), call, &response));
   return InfoFromProto(response);
 }
 
@@ -166,10 +164,7 @@ absl::StatusOr<Health> GrpcConnection::CheckHealth(const std::string& service, c
   grpc::health::v1::HealthCheckRequest request;
   request.set_service(service);
   grpc::health::v1::HealthCheckResponse response;
-  if (absl::Status status = Call(*health_, &grpc::health::v1::Health::Stub::Check, request, call, &response);
-      !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(Call(*health_, &grpc::health::v1::Health::Stub::Check, request, call, &response));
   switch (response.status()) {
     case grpc::health::v1::HealthCheckResponse::SERVING:
       return Health::kServing;

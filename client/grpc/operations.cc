@@ -1,6 +1,7 @@
 // OperationService on the client's side.
 #include "client/grpc/convert.h"
 #include "client/grpc/grpc_connection.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::client {
 
@@ -15,10 +16,7 @@ absl::StatusOr<Operation> GrpcConnection::StartRefinement(const std::string& ses
   request.set_request_id(RequestIdOf(call));
   request.set_expected_revision(call.expected_revision);
   v1::StartRefinementResponse response;
-  if (absl::Status status = Call(*operations_, &v1::OperationService::Stub::StartRefinement, request, call, &response);
-      !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(Call(*operations_, &v1::OperationService::Stub::StartRefinement, request, call, &response));
   return OperationFromProto(response.operation());
 }
 
@@ -26,10 +24,7 @@ absl::StatusOr<Operation> GrpcConnection::GetOperation(const std::string& operat
   v1::GetOperationRequest request;
   request.set_name(operation);
   v1::GetOperationResponse response;
-  if (absl::Status status = Call(*operations_, &v1::OperationService::Stub::GetOperation, request, call, &response);
-      !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(Call(*operations_, &v1::OperationService::Stub::GetOperation, request, call, &response));
   return OperationFromProto(response.operation());
 }
 
@@ -40,10 +35,7 @@ absl::StatusOr<OperationPage> GrpcConnection::ListOperations(const std::string& 
   request.set_page_size(page.page_size);
   request.set_page_token(page.page_token);
   v1::ListOperationsResponse response;
-  if (absl::Status status = Call(*operations_, &v1::OperationService::Stub::ListOperations, request, call, &response);
-      !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(Call(*operations_, &v1::OperationService::Stub::ListOperations, request, call, &response));
   OperationPage result;
   for (const v1::Operation& operation : response.operations()) {
     result.operations.push_back(OperationFromProto(operation));
@@ -56,10 +48,7 @@ absl::StatusOr<Operation> GrpcConnection::CancelOperation(const std::string& ope
   v1::CancelOperationRequest request;
   request.set_name(operation);
   v1::CancelOperationResponse response;
-  if (absl::Status status = Call(*operations_, &v1::OperationService::Stub::CancelOperation, request, call, &response);
-      !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(Call(*operations_, &v1::OperationService::Stub::CancelOperation, request, call, &response));
   return OperationFromProto(response.operation());
 }
 

@@ -5,6 +5,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/grpc/convert.h"
 #include "client/grpc/grpc_connection.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::client {
 namespace {
@@ -58,11 +59,8 @@ absl::Status StreamAnswers(
   const absl::Duration deadline = SinceBoot() + call.timeout;
   do {
     const size_t end = std::min(vertices.size(), answered + kVerticesOfARequest);
-    if (absl::Status status =
-            retrier.Run(deadline - SinceBoot(), call.stop, [&](Attempt& attempt) { return answer_part(end, attempt); });
-        !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(
+        retrier.Run(deadline - SinceBoot(), call.stop, [&](Attempt& attempt) { return answer_part(end, attempt); }));
   } while (!all && answered < vertices.size());
   return absl::OkStatus();
 }
@@ -70,14 +68,9 @@ absl::Status StreamAnswers(
 template <typename Response>
 std::function<absl::StatusOr<size_t>(const Response&)> HandOn(const OnCells& on_cells) {
   return [&on_cells](const Response& response) -> absl::StatusOr<size_t> {
-    const absl::StatusOr<CellBatch> cells = CellsFromProto(response.cells());
-    if (!cells.ok()) {
-      return cells.status();
-    }
-    if (absl::Status status = on_cells(*cells); !status.ok()) {
-      return status;
-    }
-    return cells->vertices.size();
+    WELLSPACE_ASSIGN_OR_RETURN(const CellBatch cells, CellsFromProto(response.cells()));
+    WELLSPACE_RETURN_IF_ERROR(on_cells(cells));
+    return cells.vertices.size();
   };
 }
 
@@ -94,9 +87,7 @@ absl::Status GrpcConnection::ApproximateNearestNeighbors(const std::string& sess
       },
       [&on_distances](const v1::ApproximateNearestNeighborsResponse& response) -> absl::StatusOr<size_t> {
         const size_t count = response.distances_size();
-        if (absl::Status status = on_distances({response.distances().data(), count}); !status.ok()) {
-          return status;
-        }
+        WELLSPACE_RETURN_IF_ERROR(on_distances({response.distances().data(), count}));
         return count;
       });
 }
@@ -135,10 +126,7 @@ absl::StatusOr<AddedVertices> GrpcConnection::AddVertices(const std::string& ses
   request.set_request_id(RequestIdOf(call));
   request.set_expected_revision(call.expected_revision);
   v1::AddVerticesResponse response;
-  if (absl::Status status = Call(*queries_, &v1::QueryService::Stub::AddVertices, request, call, &response);
-      !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(Call(*queries_, &v1::QueryService::Stub::AddVertices, request, call, &response));
   return AddedVertices{.vertices = {response.vertices().begin(), response.vertices().end()},
                        .revision = response.revision()};
 }

@@ -1,6 +1,7 @@
 // SessionService on the client's side, but for the streams.
 #include "client/grpc/convert.h"
 #include "client/grpc/grpc_connection.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::client {
 
@@ -13,10 +14,7 @@ absl::StatusOr<Session> GrpcConnection::CreateSession(const SessionOptions& opti
   }
   request.set_request_id(RequestIdOf(call));
   v1::CreateSessionResponse response;
-  if (absl::Status status = Call(*sessions_, &v1::SessionService::Stub::CreateSession, request, call, &response);
-      !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(Call(*sessions_, &v1::SessionService::Stub::CreateSession, request, call, &response));
   return SessionFromProto(response.session());
 }
 
@@ -25,9 +23,7 @@ absl::StatusOr<v1::Session> GrpcConnection::FetchSession(const std::string& sess
   request.set_name(session);
   v1::GetSessionResponse response;
   CallContext context(attempt);
-  if (absl::Status status = FromGrpcStatus(sessions_->GetSession(context.get(), request, &response)); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(FromGrpcStatus(sessions_->GetSession(context.get(), request, &response)));
   return response.session();
 }
 
@@ -50,10 +46,7 @@ absl::StatusOr<SessionPage> GrpcConnection::ListSessions(const Labels& labels, c
   request.set_page_token(page.page_token);
   request.mutable_labels()->insert(labels.begin(), labels.end());
   v1::ListSessionsResponse response;
-  if (absl::Status status = Call(*sessions_, &v1::SessionService::Stub::ListSessions, request, call, &response);
-      !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(Call(*sessions_, &v1::SessionService::Stub::ListSessions, request, call, &response));
   SessionPage result;
   for (const v1::Session& session : response.sessions()) {
     result.sessions.push_back(SessionFromProto(session));
@@ -78,10 +71,7 @@ absl::StatusOr<Session> GrpcConnection::UpdateSession(const std::string& session
   request.set_request_id(RequestIdOf(call));
   request.set_expected_revision(call.expected_revision);
   v1::UpdateSessionResponse response;
-  if (absl::Status status = Call(*sessions_, &v1::SessionService::Stub::UpdateSession, request, call, &response);
-      !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(Call(*sessions_, &v1::SessionService::Stub::UpdateSession, request, call, &response));
   return SessionFromProto(response.session());
 }
 

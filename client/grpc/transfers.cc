@@ -10,6 +10,7 @@
 #include "client/grpc/grpc_connection.h"
 #include "client/grpc/mesh_receiver.h"
 #include "client/grpc/request_writer.h"
+#include "core/base/status_macros.h"
 #include "proto/checksum.h"
 
 namespace wellspace::client {
@@ -45,24 +46,19 @@ class Upload {
 };
 
 absl::StatusOr<uint32_t> Upload::ReadChecked(uint64_t* count) {
-  if (absl::Status status = source_.Seek(0); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(source_.Seek(0));
   const int dimension = source_.dimension();
   const uint64_t wanted = std::exchange(*count, 0);
   rows_.resize(RowsOfARequest(dimension) * dimension);
   uint32_t checksum = 0;
   while (*count < wanted) {
     const uint64_t most = std::min<uint64_t>(rows_.size(), (wanted - *count) * dimension);
-    const absl::StatusOr<uint64_t> read = source_.Read(std::span(rows_).first(most));
-    if (!read.ok()) {
-      return read.status();
-    }
-    if (*read == 0) {
+    WELLSPACE_ASSIGN_OR_RETURN(const uint64_t read, source_.Read(std::span(rows_).first(most)));
+    if (read == 0) {
       break;
     }
-    checksum = ExtendCrc32c(checksum, rows_.data(), *read * dimension * sizeof(double));
-    *count += *read;
+    checksum = ExtendCrc32c(checksum, rows_.data(), read * dimension * sizeof(double));
+    *count += read;
   }
   return checksum;
 }
@@ -75,18 +71,15 @@ absl::Status Upload::Send(Stream& stream, v1::UploadPointsRequest& request) {
   const int dimension = source_.dimension();
   rows_.resize(RowsOfARequest(dimension) * dimension);
   while (true) {
-    const absl::StatusOr<uint64_t> read = source_.Read(rows_);
-    if (!read.ok()) {
-      return read.status();
-    }
-    if (*read == 0) {
+    WELLSPACE_ASSIGN_OR_RETURN(const uint64_t read, source_.Read(rows_));
+    if (read == 0) {
       break;
     }
-    request.mutable_points()->mutable_coordinates()->Assign(rows_.begin(), rows_.begin() + *read * dimension);
+    request.mutable_points()->mutable_coordinates()->Assign(rows_.begin(), rows_.begin() + read * dimension);
     if (!stream.Write(request)) {
       return absl::OkStatus();
     }
-    request.set_point_offset(request.point_offset() + *read);
+    request.set_point_offset(request.point_offset() + read);
     if (on_points_ != nullptr) {
       on_points_(request.point_offset() - *offset_);
     }

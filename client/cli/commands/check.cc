@@ -26,6 +26,7 @@
 #include "client/formats/line_reader.h"
 #include "client/formats/read_cloud.h"
 #include "client/formats/read_mesh.h"
+#include "core/base/status_macros.h"
 #include "core/simplex/validate.h"
 #include "core/simplex/validate_boundary.h"
 #include "core/simplex/validate_domain.h"
@@ -162,12 +163,9 @@ struct CheckCommand {
 };
 
 absl::StatusOr<std::vector<core::SizeBox>> CheckCommand::SizeBoxes(int dimension) const {
-  absl::StatusOr<std::vector<client::SizeBox>> read = SizeBoxesOf(size_boxes, dimension);
-  if (!read.ok()) {
-    return read.status();
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(std::vector<client::SizeBox> read, SizeBoxesOf(size_boxes, dimension));
   std::vector<core::SizeBox> boxes;
-  for (client::SizeBox& box : *read) {
+  for (client::SizeBox& box : read) {
     boxes.push_back({std::move(box.low), std::move(box.high), box.max_circumradius});
   }
   return boxes;
@@ -238,13 +236,10 @@ absl::StatusOr<std::vector<double>> CheckCommand::ReadCloudOf(int dimension, Clo
   }
   formats::CloudOptions options = cloud_options;
   options.dimension = dimension;
-  absl::StatusOr<formats::PointCloud> read = formats::ReadCloud(cloud_path, options);
-  if (!read.ok()) {
-    return read.status();
-  }
-  report = ReportOf(options, read->notes, read->skipped);
+  WELLSPACE_ASSIGN_OR_RETURN(formats::PointCloud read, formats::ReadCloud(cloud_path, options));
+  report = ReportOf(options, read.notes, read.skipped);
   PrintNotes(report, format, /*quiet=*/false);
-  return std::move(read->points);
+  return std::move(read.points);
 }
 
 core::ValidationOptions CheckCommand::ValidationFor(std::span<const core::SizeBox> boxes,

@@ -10,6 +10,7 @@
 #include "client/cli/statistics.h"
 #include "client/formats/file_plan.h"
 #include "client/formats/line_reader.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::cli {
 namespace {
@@ -20,9 +21,7 @@ constexpr char kEstimateExamples[] =
     "  wellspace estimate cow.csv --stats - --server mesher:7233\n";
 
 absl::Status CheckOptions(const MeshingOptions& options) {
-  if (absl::Status status = options.Check(); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(options.Check());
   formats::FilePlan files;
   options.AddFilesTo(files);
   if (!options.remote().quiet() && !options.has_figures_on_stdout()) {
@@ -37,14 +36,12 @@ int RunEstimate(MeshingOptions& options) {
   }
   return options.Run([&options](client::Client& client, const client::MeshOptions& mesh_options,
                                 const formats::PointCloud& cloud, const client::CallOptions& call) {
-    const absl::StatusOr<client::MeshEstimate> estimate = client.EstimateMesh(mesh_options, cloud.points, call);
-    if (!estimate.ok()) {
-      return estimate.status();
-    }
+    WELLSPACE_ASSIGN_OR_RETURN(const client::MeshEstimate estimate,
+                               client.EstimateMesh(mesh_options, cloud.points, call));
     if (!options.remote().quiet() && !options.has_figures_on_stdout()) {
-      std::cout << EstimateText(*estimate, cloud.dimension);
+      std::cout << EstimateText(estimate, cloud.dimension);
     }
-    return options.WriteStatistics(EstimateJson(*estimate, cloud.dimension));
+    return options.WriteStatistics(EstimateJson(estimate, cloud.dimension));
   });
 }
 

@@ -13,6 +13,7 @@
 #include "client/formats/file_plan.h"
 #include "client/formats/line_reader.h"
 #include "client/formats/write_mesh.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::cli {
 namespace {
@@ -36,15 +37,11 @@ struct MeshCommand {
 };
 
 absl::Status MeshCommand::CheckOptions() const {
-  if (absl::Status status = options.Check(); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(options.Check());
   if (options.has_figures_on_stdout() && output == formats::kStandardStream) {
     return absl::InvalidArgumentError("--stats or --output json, and --out: only one of them can be standard output");
   }
-  if (absl::Status status = formats::CheckMeshOutput(output, format, options.dimension()); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(formats::CheckMeshOutput(output, format, options.dimension()));
   formats::FilePlan files;
   options.AddFilesTo(files);
   files.WritesMesh("--out", output, format);
@@ -54,10 +51,7 @@ absl::Status MeshCommand::CheckOptions() const {
 absl::Status MeshCommand::Mesh(client::Client& client, const client::MeshOptions& mesh_options,
                                const formats::PointCloud& cloud, const client::CallOptions& call) const {
   // Now that the dimension is known for sure, and before hours of work.
-  if (absl::Status status = formats::CheckMeshOutput(output, format, cloud.dimension, mesh_options.pump_weights);
-      !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(formats::CheckMeshOutput(output, format, cloud.dimension, mesh_options.pump_weights));
   client::MeshFile file(output, format, call.stop);
   file.KeepInputVertices();
   if (no_boundary) {
@@ -71,9 +65,7 @@ absl::Status MeshCommand::Mesh(client::Client& client, const client::MeshOptions
       return status;
     }
   }
-  if (absl::Status status = options.WriteStatistics(StatisticsJson(file.header(), file.input_vertex())); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(options.WriteStatistics(StatisticsJson(file.header(), file.input_vertex())));
   if (!options.remote().quiet()) {
     std::cerr << Summary(file.header()) << (output == formats::kStandardStream ? "" : " -> " + output) << "\n";
   }

@@ -10,6 +10,7 @@
 #include "client/cli/progress_bar.h"
 #include "client/cli/remote_command.h"
 #include "client/cli/session_options.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::cli {
 namespace {
@@ -67,15 +68,9 @@ struct OperationCommand {
 absl::StatusOr<client::Operation> OperationCommand::Start(client::Client& client, client::CallOptions call) const {
   std::optional<client::MeshOptions> changed;
   if (parameters.has_quality()) {
-    const absl::StatusOr<client::Session> session = client.GetSession(name, call);
-    if (!session.ok()) {
-      return session.status();
-    }
-    absl::StatusOr<client::MeshOptions> replaced = parameters.Replace(session->parameters);
-    if (!replaced.ok()) {
-      return replaced.status();
-    }
-    changed = *std::move(replaced);
+    WELLSPACE_ASSIGN_OR_RETURN(const client::Session session, client.GetSession(name, call));
+    WELLSPACE_ASSIGN_OR_RETURN(client::MeshOptions replaced, parameters.Replace(session.parameters));
+    changed = std::move(replaced);
   }
   // Not stopped by Ctrl-C: a user that does not learn that an operation was started cannot cancel it.
   call.stop = {};
@@ -99,38 +94,31 @@ int OperationCommand::Refine() const {
   if (const absl::Status status = parameters.Check(); !status.ok()) {
     return ReportError(status, remote.format());
   }
-  return remote.Run(
-      [this](client::Client& client, const client::CallOptions& call, const Interrupt& interrupt) -> absl::Status {
-        const absl::StatusOr<client::Operation> started = Start(client, call);
-        if (!started.ok()) {
-          return started.status();
-        }
-        if (detach) {
-          remote.json() ? PrintJson(OperationJson(*started)) : static_cast<void>(std::cout << started->name << "\n");
-          return absl::OkStatus();
-        }
-        const absl::StatusOr<client::Operation> ended =
-            Follow(client, remote, started->name, call, /*prints_events=*/false);
-        if (!ended.ok()) {
-          if (interrupt.signal() != 0) {
-            return CancelNow(client, started->name);
-          }
-          // A server that cannot be reached may be gone, with all its work.
-          const char* fate = absl::IsUnavailable(ended.status()) ? " may go on" : " goes on";
-          return absl::Status(ended.status().code(), absl::StrCat(ended.status().message(), "; ", started->name, fate));
-        }
-        PrintEnd(remote, *ended, /*indented=*/true);
-        return parameters.Explain(EndOf(*ended));
-      });
+  return remote.Run([this](client::Client& client, const client::CallOptions& call,
+                           const Interrupt& interrupt) -> absl::Status {
+    WELLSPACE_ASSIGN_OR_RETURN(const client::Operation started, Start(client, call));
+    if (detach) {
+      remote.json() ? PrintJson(OperationJson(started)) : static_cast<void>(std::cout << started.name << "\n");
+      return absl::OkStatus();
+    }
+    const absl::StatusOr<client::Operation> ended = Follow(client, remote, started.name, call, /*prints_events=*/false);
+    if (!ended.ok()) {
+      if (interrupt.signal() != 0) {
+        return CancelNow(client, started.name);
+      }
+      // A server that cannot be reached may be gone, with all its work.
+      const char* fate = absl::IsUnavailable(ended.status()) ? " may go on" : " goes on";
+      return absl::Status(ended.status().code(), absl::StrCat(ended.status().message(), "; ", started.name, fate));
+    }
+    PrintEnd(remote, *ended, /*indented=*/true);
+    return parameters.Explain(EndOf(*ended));
+  });
 }
 
 int OperationCommand::Watch() const {
   return remote.Run([this](client::Client& client, const client::CallOptions& call, const Interrupt&) -> absl::Status {
-    const absl::StatusOr<std::string> operation = FindOperation(client, name, call);
-    if (!operation.ok()) {
-      return operation.status();
-    }
-    const absl::StatusOr<client::Operation> ended = Follow(client, remote, *operation, call, /*prints_events=*/true);
+    WELLSPACE_ASSIGN_OR_RETURN(const std::string operation, FindOperation(client, name, call));
+    const absl::StatusOr<client::Operation> ended = Follow(client, remote, operation, call, /*prints_events=*/true);
     if (!std::cout) {
       return absl::OkStatus();  // told at the end, see StandardOutput
     }
@@ -144,21 +132,16 @@ int OperationCommand::Watch() const {
 
 int OperationCommand::Cancel() const {
   return remote.Run([this](client::Client& client, const client::CallOptions& call, const Interrupt&) -> absl::Status {
-    const absl::StatusOr<std::string> operation = FindOperation(client, name, call);
-    if (!operation.ok()) {
-      return operation.status();
-    }
-    if (const absl::StatusOr<client::Operation> asked = client.CancelOperation(*operation, call); !asked.ok()) {
+    WELLSPACE_ASSIGN_OR_RETURN(const std::string operation, FindOperation(client, name, call));
+    if (const absl::StatusOr<client::Operation> asked = client.CancelOperation(operation, call); !asked.ok()) {
       return asked.status();
     }
-    const absl::StatusOr<client::Operation> ended = client.WatchOperation(*operation, nullptr, std::nullopt, call);
-    if (!ended.ok()) {
-      return ended.status();
-    }
+    WELLSPACE_ASSIGN_OR_RETURN(const client::Operation ended,
+                               client.WatchOperation(operation, nullptr, std::nullopt, call));
     if (remote.json()) {
-      PrintJson(OperationJson(*ended));
+      PrintJson(OperationJson(ended));
     } else if (!remote.quiet()) {
-      std::cout << ended->name << " " << StateName(ended->state) << "\n";
+      std::cout << ended.name << " " << StateName(ended.state) << "\n";
     }
     return absl::OkStatus();
   });

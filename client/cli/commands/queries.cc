@@ -19,6 +19,7 @@
 #include "client/formats/number.h"
 #include "client/formats/output_file.h"
 #include "client/formats/read_cloud.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::cli {
 namespace {
@@ -94,13 +95,10 @@ std::string LinesOf(const client::CellBatch& cells, bool json) {
 }
 
 absl::Status CellsCommand::Query(client::Client& client, const client::CallOptions& call) {
-  absl::StatusOr<formats::OutputFile> output = formats::OutputFile::Create(path, call.stop);
-  if (!output.ok()) {
-    return output.status();
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(formats::OutputFile output, formats::OutputFile::Create(path, call.stop));
   const auto take_cells = [&](const client::CellBatch& cells) {
-    output->Write(LinesOf(cells, remote.json()));
-    return output->status();
+    output.Write(LinesOf(cells, remote.json()));
+    return output.status();
   };
   absl::Status status;
   if (nearest) {
@@ -118,9 +116,9 @@ absl::Status CellsCommand::Query(client::Client& client, const client::CallOptio
               absl::StrAppend(&line, vertex, " ");
               formats::AppendNumber(distance, line);
             }
-            output->Write(line + "\n");
+            output.Write(line + "\n");
           }
-          return output->status();
+          return output.status();
         },
         call);
   } else if (beta != 0) {
@@ -133,7 +131,7 @@ absl::Status CellsCommand::Query(client::Client& client, const client::CallOptio
                ? absl::InvalidArgumentError(absl::StrCat("--beta: ", status.message()))
                : status;
   }
-  return output->Commit();
+  return output.Commit();
 }
 
 int CellsCommand::Run() {
@@ -181,34 +179,25 @@ absl::Status AddCommand::CheckFiles() const {
 }
 
 absl::Status AddCommand::Add(client::Client& client, client::CallOptions call) const {
-  const absl::StatusOr<client::Session> found = client.GetSession(session, call);
-  if (!found.ok()) {
-    return found.status();
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(const client::Session found, client.GetSession(session, call));
   formats::CloudOptions options = cloud_options;
-  options.dimension = found->parameters.dimension;
-  const absl::StatusOr<formats::PointCloud> cloud = formats::ReadCloud(input, options);
-  if (!cloud.ok()) {
-    return cloud.status();
-  }
-  const CloudReport report = ReportOf(options, cloud->notes, cloud->skipped);
+  options.dimension = found.parameters.dimension;
+  WELLSPACE_ASSIGN_OR_RETURN(const formats::PointCloud cloud, formats::ReadCloud(input, options));
+  const CloudReport report = ReportOf(options, cloud.notes, cloud.skipped);
   PrintNotes(report, remote.format(), remote.quiet());
   std::vector<uint32_t> near;
   if (!near_path.empty()) {
-    absl::StatusOr<std::vector<uint32_t>> read = ReadVertices(near_path);
-    if (!read.ok()) {
-      return read.status();
-    }
-    if (read->size() != cloud->size()) {
+    WELLSPACE_ASSIGN_OR_RETURN(std::vector<uint32_t> read, ReadVertices(near_path));
+    if (read.size() != cloud.size()) {
       return absl::InvalidArgumentError(absl::StrCat("--near ", near_path, ": expected a vertex for each of ",
-                                                     cloud->size(), " points, got ", read->size()));
+                                                     cloud.size(), " points, got ", read.size()));
     }
-    near = *std::move(read);
+    near = std::move(read);
   }
   call.expected_revision = expected_revision;
-  const absl::StatusOr<client::AddedVertices> added = client.AddVertices(session, cloud->points, near, call);
+  const absl::StatusOr<client::AddedVertices> added = client.AddVertices(session, cloud.points, near, call);
   if (!added.ok()) {
-    return WithOrigins(added.status(), *cloud);
+    return WithOrigins(added.status(), cloud);
   }
   if (remote.json()) {
     Json json = {{"vertices", added->vertices}, {"revision", added->revision}};

@@ -13,6 +13,7 @@
 #include "client/cli/render/scene.h"
 #include "client/formats/file_plan.h"
 #include "client/formats/read_mesh.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::cli {
 namespace {
@@ -32,32 +33,22 @@ absl::Status RenderCommand::Render() const {
   if (!plane.empty() && plane.size() != 4) {
     return absl::InvalidArgumentError(absl::StrCat("--plane: expected 4 numbers nx,ny,nz,d, got ", plane.size()));
   }
-  const absl::StatusOr<render::PictureFormat> picture_format = render::PictureFormatOf(picture_path);
-  if (!picture_format.ok()) {
-    return picture_format.status();
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(const render::PictureFormat picture_format, render::PictureFormatOf(picture_path));
   formats::FilePlan files;
   files.ReadsMesh("MESH", mesh_path);
   files.Writes("--out", picture_path);
-  if (absl::Status status = files.Check(); !status.ok()) {
-    return status;
-  }
-  const absl::StatusOr<formats::Mesh> mesh = formats::ReadMesh(mesh_path);
-  if (!mesh.ok()) {
-    return mesh.status();
-  }
+  WELLSPACE_RETURN_IF_ERROR(files.Check());
+  WELLSPACE_ASSIGN_OR_RETURN(const formats::Mesh mesh, formats::ReadMesh(mesh_path));
   render::View view;
   view.up = up[0] - 'x';
   if (!plane.empty()) {
     view.plane = {.normal = {plane[0], plane[1], plane[2]}, .offset = plane[3]};
   }
-  const absl::StatusOr<render::Scene> scene = render::MakeScene(mesh->View(), view);
+  const absl::StatusOr<render::Scene> scene = render::MakeScene(mesh.View(), view);
   if (!scene.ok()) {
     return absl::Status(scene.status().code(), absl::StrCat(mesh_path, ": ", scene.status().message()));
   }
-  if (absl::Status status = render::WritePicture(*scene, width, *picture_format, picture_path); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(render::WritePicture(*scene, width, picture_format, picture_path));
   if (format == OutputFormat::kJson) {
     PrintJson({{"mesh", mesh_path}, {"picture", picture_path}, {"width", width}});
   }

@@ -10,19 +10,17 @@
 #include "client/cli/progress_bar.h"
 #include "client/cli/remote_command.h"
 #include "client/cli/statistics.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::cli {
 namespace {
 
 absl::Status PrintInfo(const RemoteCommand& remote, client::Client& client, const client::CallOptions& call) {
-  const absl::StatusOr<client::ServerInfo> info = client.GetServerInfo(call);
-  if (!info.ok()) {
-    return info.status();
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(const client::ServerInfo info, client.GetServerInfo(call));
   const std::string server = remote.address().empty() ? "embedded" : remote.address();
   if (remote.json()) {
     Json json = {{"server", server}};
-    json.update(ServerInfoJson(*info));
+    json.update(ServerInfoJson(info));
     PrintJson(json);
     return absl::OkStatus();
   }
@@ -31,19 +29,19 @@ absl::Status PrintInfo(const RemoteCommand& remote, client::Client& client, cons
   };
   const auto seconds = [](absl::Duration duration) { return absl::StrFormat("%g s", absl::ToDoubleSeconds(duration)); };
   print("server", server);
-  print("version", info->version);
-  print("dimensions", absl::StrJoin(info->dimensions, ", "));
-  print("max points", WithThousands(info->max_points));
-  print("max vertices", WithThousands(info->max_vertices));
-  print("max request", WithBinaryUnit(info->max_request_bytes));
-  print("max memory", info->max_memory_bytes == 0 ? "no limit" : WithBinaryUnit(info->max_memory_bytes));
-  print("max sessions", absl::StrCat(WithThousands(info->max_sessions), ", of a tenant ",
-                                     WithThousands(info->max_sessions_per_tenant)));
-  print("ttl", absl::StrCat(seconds(info->default_ttl), ", at most ", seconds(info->max_ttl)));
-  print("stall limit", seconds(info->stall_limit));
-  print("workers", std::to_string(info->workers));
-  print("running jobs", std::to_string(info->running_jobs));
-  print("queued jobs", absl::StrCat(info->queued_jobs, " of at most ", info->max_queued_jobs));
+  print("version", info.version);
+  print("dimensions", absl::StrJoin(info.dimensions, ", "));
+  print("max points", WithThousands(info.max_points));
+  print("max vertices", WithThousands(info.max_vertices));
+  print("max request", WithBinaryUnit(info.max_request_bytes));
+  print("max memory", info.max_memory_bytes == 0 ? "no limit" : WithBinaryUnit(info.max_memory_bytes));
+  print("max sessions",
+        absl::StrCat(WithThousands(info.max_sessions), ", of a tenant ", WithThousands(info.max_sessions_per_tenant)));
+  print("ttl", absl::StrCat(seconds(info.default_ttl), ", at most ", seconds(info.max_ttl)));
+  print("stall limit", seconds(info.stall_limit));
+  print("workers", std::to_string(info.workers));
+  print("running jobs", std::to_string(info.running_jobs));
+  print("queued jobs", absl::StrCat(info.queued_jobs, " of at most ", info.max_queued_jobs));
   return absl::OkStatus();
 }
 
@@ -60,16 +58,13 @@ const char* HealthName(client::Health health) {
 
 absl::Status PrintHealth(const RemoteCommand& remote, const std::string& service, client::Client& client,
                          const client::CallOptions& call) {
-  const absl::StatusOr<client::Health> health = client.CheckHealth(service, call);
-  if (!health.ok()) {
-    return health.status();
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(const client::Health health, client.CheckHealth(service, call));
   if (remote.json()) {
-    PrintJson({{"service", service}, {"status", HealthName(*health)}});
+    PrintJson({{"service", service}, {"status", HealthName(health)}});
   } else if (!remote.quiet()) {
-    std::cout << HealthName(*health) << "\n";
+    std::cout << HealthName(health) << "\n";
   }
-  return *health == client::Health::kServing ? absl::OkStatus() : absl::UnavailableError("the server does not serve");
+  return health == client::Health::kServing ? absl::OkStatus() : absl::UnavailableError("the server does not serve");
 }
 
 }  // namespace

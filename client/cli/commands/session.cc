@@ -13,6 +13,7 @@
 #include "client/cli/progress_bar.h"
 #include "client/cli/remote_command.h"
 #include "client/cli/session_options.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::cli {
 namespace {
@@ -134,15 +135,12 @@ int SessionCommand::List() {
     do {
       constexpr uint64_t kLargestPage = 1000;
       page.page_size = static_cast<int>(limit == 0 ? 0 : std::min(limit - listed, kLargestPage));
-      const absl::StatusOr<client::SessionPage> result = client.ListSessions(labels, page, call);
-      if (!result.ok()) {
-        return result.status();
-      }
+      WELLSPACE_ASSIGN_OR_RETURN(const client::SessionPage result, client.ListSessions(labels, page, call));
       if (page.page_token.empty() && !remote.json() && !remote.quiet()) {
         std::cout << absl::StrFormat("%-44s %-9s %12s %12s  %-20s  %s\n", "NAME", "STATE", "POINTS", "VERTICES",
                                      "EXPIRES", "LABELS");
       }
-      for (const client::Session& one : result->sessions) {
+      for (const client::Session& one : result.sessions) {
         ++listed;
         if (remote.json()) {
           json.push_back(SessionJson(one));
@@ -152,7 +150,7 @@ int SessionCommand::List() {
                                        TimeText(one.expire_time), LabelsText(one.labels));
         }
       }
-      page.page_token = result->next_page_token;
+      page.page_token = result.next_page_token;
     } while (!page.page_token.empty() && (limit == 0 || listed < limit));
     if (remote.json()) {
       PrintJson(json);

@@ -18,6 +18,7 @@
 #include "client/formats/file_plan.h"
 #include "client/formats/line_reader.h"
 #include "client/formats/write_mesh.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::cli {
 namespace {
@@ -34,20 +35,14 @@ struct UploadCommand {
 };
 
 absl::Status UploadCommand::Upload(client::Client& client, client::CallOptions call) const {
-  const absl::StatusOr<client::Session> found = client.GetSession(session, call);
-  if (!found.ok()) {
-    return found.status();
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(const client::Session found, client.GetSession(session, call));
   formats::CloudOptions options = cloud_options;
-  options.dimension = found->parameters.dimension;
-  const absl::StatusOr<std::unique_ptr<client::CloudFile>> opened = client::CloudFile::Open(input, options);
-  if (!opened.ok()) {
-    return opened.status();
-  }
-  client::CloudFile& cloud = **opened;
+  options.dimension = found.parameters.dimension;
+  WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<client::CloudFile> opened, client::CloudFile::Open(input, options));
+  client::CloudFile& cloud = *opened;
   const CloudReport report = ReportOf(options, cloud.notes(), cloud.skipped());
   PrintNotes(report, remote.format(), remote.quiet());
-  const uint64_t first = offset.value_or(found->committed_points);
+  const uint64_t first = offset.value_or(found.committed_points);
   call.expected_revision = expected_revision;
   absl::StatusOr<client::Uploaded> uploaded = absl::InternalError("no upload");
   {
@@ -90,9 +85,7 @@ absl::Status DownloadCommand::Check() const {
   if (remote.json() && path == formats::kStandardStream) {
     return absl::InvalidArgumentError("--output json and --out: only one of them can be standard output");
   }
-  if (absl::Status status = formats::CheckMeshOutput(path, format); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(formats::CheckMeshOutput(path, format));
   formats::FilePlan files;
   remote.AddFilesTo(files);
   files.WritesMesh("--out", path, format);

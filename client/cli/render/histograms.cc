@@ -9,6 +9,7 @@
 #include "client/cli/render/canvas.h"
 #include "client/cli/render/colour_ramp.h"
 #include "client/formats/output_file.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::render {
 namespace {
@@ -114,24 +115,21 @@ void PaintAll(cairo_t* cairo, const std::vector<Histogram>& histograms, const st
 
 absl::Status WriteHistograms(const std::vector<Histogram>& histograms, const std::string& caption, PictureFormat format,
                              const std::string& path) {
-  absl::StatusOr<OutputFile> file = OutputFile::Create(path);
-  if (!file.ok()) {
-    return file.status();
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path));
   const int width = kPanelWidth * static_cast<int>(histograms.size());
   absl::Status status;
   if (format == PictureFormat::kSvg) {
     status = PaintAsSvg(
-        width, kHeight, [&](cairo_t* cairo) { PaintAll(cairo, histograms, caption); }, *file);
+        width, kHeight, [&](cairo_t* cairo) { PaintAll(cairo, histograms, caption); }, file);
   } else {
     const Surface picture(cairo_image_surface_create(CAIRO_FORMAT_RGB24, width, kHeight));
     const Canvas canvas(cairo_create(picture.get()));
     PaintBackground(canvas.get());
     PaintAll(canvas.get(), histograms, caption);
     const cairo_status_t painted = cairo_status(canvas.get());
-    status = painted == CAIRO_STATUS_SUCCESS ? WriteAsPng(picture.get(), *file) : CairoError(painted, *file);
+    status = painted == CAIRO_STATUS_SUCCESS ? WriteAsPng(picture.get(), file) : CairoError(painted, file);
   }
-  return status.ok() ? file->Commit() : status;
+  return status.ok() ? file.Commit() : status;
 }
 
 }  // namespace wellspace::render

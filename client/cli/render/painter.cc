@@ -11,6 +11,7 @@
 #include "client/cli/render/canvas.h"
 #include "client/cli/render/colour_ramp.h"
 #include "client/formats/output_file.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::render {
 namespace {
@@ -207,14 +208,11 @@ absl::Status WriteSvg(const Scene& scene, const Layout& layout, OutputFile& file
 }  // namespace
 
 absl::Status WritePicture(const Scene& scene, int width, PictureFormat format, const std::string& path) {
-  absl::StatusOr<OutputFile> file = OutputFile::Create(path);
-  if (!file.ok()) {
-    return file.status();
-  }
+  WELLSPACE_ASSIGN_OR_RETURN(OutputFile file, OutputFile::Create(path));
   const Layout layout = MakeLayout(scene, width);
   const absl::Status painted =
-      format == PictureFormat::kPng ? WritePng(scene, layout, *file) : WriteSvg(scene, layout, *file);
-  return painted.ok() ? file->Commit() : painted;
+      format == PictureFormat::kPng ? WritePng(scene, layout, file) : WriteSvg(scene, layout, file);
+  return painted.ok() ? file.Commit() : painted;
 }
 
 }  // namespace wellspace::render

@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 #include "core/simplex/quality.h"
 
 namespace wellspace::render {
@@ -97,9 +98,7 @@ absl::StatusOr<Scene> MakePlaneScene(const formats::MeshView& mesh) {
   Scene scene;
   scene.best_angle_deg = 60;
   scene.legend = "smallest angle";
-  if (absl::Status status = SetSize(extent, scene); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(SetSize(extent, scene));
   scene.facets.reserve(mesh.simplex_count());
   for (uint64_t simplex = 0; simplex < mesh.simplex_count(); ++simplex) {
     const Simplex<2> corners = SimplexOf<2>(mesh, simplex);
@@ -256,17 +255,14 @@ std::optional<VisibleFacet> MakeVisible(const Simplex<3>& simplex, int corner, c
 }
 
 absl::StatusOr<Scene> MakeCutScene(const formats::MeshView& mesh, const View& view) {
-  const absl::StatusOr<Plane> plane = CutOf(mesh, view.plane);
-  if (!plane.ok()) {
-    return plane.status();
-  }
-  const std::vector<uint64_t> kept = SimplicesBehind(mesh, *plane);
+  WELLSPACE_ASSIGN_OR_RETURN(const Plane plane, CutOf(mesh, view.plane));
+  const std::vector<uint64_t> kept = SimplicesBehind(mesh, plane);
   if (kept.empty()) {
     return absl::InvalidArgumentError(
         absl::StrCat("the plane cuts off all of the ", mesh.simplex_count(),
                      " tetrahedra; expected one with some behind it, which is where its normal does not point"));
   }
-  const Camera camera = MakeCamera(plane->normal, view.up);
+  const Camera camera = MakeCamera(plane.normal, view.up);
   std::vector<VisibleFacet> visible;
   Extent extent;
   for (const FacetOf& exposed : ExposedFacets(mesh, kept)) {
@@ -284,9 +280,7 @@ absl::StatusOr<Scene> MakeCutScene(const formats::MeshView& mesh, const View& vi
   Scene scene;
   scene.best_angle_deg = 70.528779365509308;
   scene.legend = "smallest dihedral angle";
-  if (absl::Status status = SetSize(extent, scene); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(SetSize(extent, scene));
   scene.facets.reserve(visible.size());
   for (const VisibleFacet& facet : visible) {
     scene.facets.push_back(MakeFacet(facet.corners, extent, facet.angle_deg, facet.shade));

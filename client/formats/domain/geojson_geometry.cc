@@ -6,6 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/formats/domain/polyline.h"
 #include "client/formats/number.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -181,10 +182,7 @@ absl::Status GeoJsonGeometry::MoveTo(GeometryType type, const GeoJsonPlace& geom
       place.first_point = domain.point_count();
       place.first_segment = domain.segment_count();
       const std::span<const double> all = positions_;
-      if (absl::Status status = AddPart(type, all.subspan(2 * first, 2 * (closed.positions - first)), place, domain);
-          !status.ok()) {
-        return status;
-      }
+      WELLSPACE_RETURN_IF_ERROR(AddPart(type, all.subspan(2 * first, 2 * (closed.positions - first)), place, domain));
       domain.places.push_back(place);
       first = closed.positions;
       (HasRings(type) ? ring : part) += 1;

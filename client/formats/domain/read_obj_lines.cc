@@ -8,6 +8,7 @@
 #include "client/formats/domain/domain_readers.h"
 #include "client/formats/number.h"
 #include "client/formats/obj_lines.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -110,9 +111,7 @@ absl::Status ObjLineReader::ReadLine(FieldSplitter& fields) {
   uint64_t count = 0;
   for (std::string_view field; fields.Next(field); ++count) {
     uint32_t vertex = 0;
-    if (absl::Status status = ReadIndex(field, vertex); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(ReadIndex(field, vertex));
     if (count > 0) {
       domain_.segments.insert(domain_.segments.end(), {last, vertex});
       domain_.segment_lines.Add(line_);

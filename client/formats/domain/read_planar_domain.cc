@@ -6,6 +6,7 @@
 #include "client/formats/domain/domain_readers.h"
 #include "client/formats/open_input.h"
 #include "client/formats/registry.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -90,18 +91,11 @@ absl::StatusOr<PlanarDomain> ReadPlanarDomain(const std::string& path, const Dom
     return row.status();
   }
   const Kind kind = (*row)->handler;
-  if (absl::Status status = CheckOptions(path, kind, options); !status.ok()) {
-    return status;
-  }
-  absl::StatusOr<InputFile> file = OpenInflated(path);
-  if (!file.ok()) {
-    return file.status();
-  }
+  WELLSPACE_RETURN_IF_ERROR(CheckOptions(path, kind, options));
+  WELLSPACE_ASSIGN_OR_RETURN(InputFile file, OpenInflated(path));
   PlanarDomain domain;
-  domain.name = file->name();
-  if (absl::Status status = Read(*file, path, kind, options, domain); !status.ok()) {
-    return status;
-  }
+  domain.name = file.name();
+  WELLSPACE_RETURN_IF_ERROR(Read(file, path, kind, options, domain));
   if (domain.points.empty()) {
     return absl::InvalidArgumentError(absl::StrCat(domain.name, ": no points; expected at least one"));
   }

@@ -13,6 +13,7 @@
 #include "client/formats/open_input.h"
 #include "client/formats/registry.h"
 #include "client/formats/tetgen_lines.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -29,21 +30,15 @@ class PolyReader {
       : reader_(std::move(file)), path_(path), domain_(domain) {}
 
   absl::Status Read() {
-    if (absl::Status status = ReadPoints(); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(ReadPoints());
     for (auto read : {&PolyReader::ReadSegments, &PolyReader::ReadHoles, &PolyReader::ReadRegions}) {
       std::string_view line;
       if (!reader_.NextContent(line)) {
         return reader_.Finish();  // every later part may be missing
       }
-      if (absl::Status status = (this->*read)(line); !status.ok()) {
-        return status;
-      }
+      WELLSPACE_RETURN_IF_ERROR((this->*read)(line));
     }
-    if (absl::Status status = ExpectEnd(reader_, regions_, "regions"); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(ExpectEnd(reader_, regions_, "regions"));
     return reader_.Finish();
   }
 
@@ -85,9 +80,7 @@ absl::Status PolyReader::CheckDimension(const LineReader& reader, const NodeHead
 absl::Status PolyReader::TakePoints(LineReader& reader, const NodeHeader& header) {
   PointCloud cloud;
   NodeExtras extras = {.takes_markers = true, .may_skip = false};
-  if (absl::Status status = ReadNodePoints(reader, header, /*skip_invalid=*/false, cloud, extras); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(ReadNodePoints(reader, header, /*skip_invalid=*/false, cloud, extras));
   domain_.points = std::move(cloud.points);
   domain_.point_lines = std::move(cloud.lines);
   domain_.point_markers = std::move(extras.markers);
@@ -97,12 +90,8 @@ absl::Status PolyReader::TakePoints(LineReader& reader, const NodeHeader& header
 
 absl::Status PolyReader::ReadPoints() {
   NodeHeader header;
-  if (absl::Status status = ReadNodeHeader(reader_, header); !status.ok()) {
-    return status;
-  }
-  if (absl::Status status = CheckDimension(reader_, header); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(ReadNodeHeader(reader_, header));
+  WELLSPACE_RETURN_IF_ERROR(CheckDimension(reader_, header));
   return header.count > 0 ? TakePoints(reader_, header) : ReadPointsBeside();
 }
 
@@ -125,19 +114,11 @@ absl::Status PolyReader::ReadPointsBeside() {
   }
   LineReader reader(*std::move(file));
   NodeHeader header;
-  if (absl::Status status = ReadNodeHeader(reader, header); !status.ok()) {
-    return status;
-  }
-  if (absl::Status status = CheckDimension(reader, header); !status.ok()) {
-    return status;
-  }
-  if (absl::Status status = TakePoints(reader, header); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(ReadNodeHeader(reader, header));
+  WELLSPACE_RETURN_IF_ERROR(CheckDimension(reader, header));
+  WELLSPACE_RETURN_IF_ERROR(TakePoints(reader, header));
   domain_.points_name = reader.name();
-  if (absl::Status status = ExpectEnd(reader, header.count, "points"); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(ExpectEnd(reader, header.count, "points"));
   return reader.Finish();
 }
 
@@ -161,9 +142,7 @@ absl::Status PolyReader::ReadEnd(FieldSplitter& fields, uint32_t& end) {
 absl::Status PolyReader::ReadSegments(std::string_view line) {
   std::array<uint64_t, 2> header{};
   constexpr std::array kNames = {"number of segments", "number of markers"};
-  if (absl::Status status = ReadHeader(reader_, line, 1, kNames, header); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(ReadHeader(reader_, line, 1, kNames, header));
   const auto [count, markers] = header;
   if (markers > 1) {
     return reader_.Error(absl::StrCat("expected 0 or 1 markers of each segment, got ", markers));
@@ -176,14 +155,10 @@ absl::Status PolyReader::ReadSegments(std::string_view line) {
       return CountError(reader_, count, "segments", segment);
     }
     FieldSplitter fields(line, ' ');
-    if (absl::Status status = ReadIndex(reader_, fields, segment, base); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(ReadIndex(reader_, fields, segment, base));
     std::array<uint32_t, 2> ends{};
     for (uint32_t& end : ends) {
-      if (absl::Status status = ReadEnd(fields, end); !status.ok()) {
-        return status;
-      }
+      WELLSPACE_RETURN_IF_ERROR(ReadEnd(fields, end));
     }
     int32_t marker = 0;  // may be missing, as it may for Triangle
     if (std::string_view field; markers == 1 && fields.Next(field)) {
@@ -193,9 +168,7 @@ absl::Status PolyReader::ReadSegments(std::string_view line) {
     }
     const char* what = markers == 1 ? "an index, two points and a marker"
                                     : "an index and two points, and no marker, as the header says";
-    if (absl::Status status = ExpectNoMore(fields, what); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(ExpectNoMore(fields, what));
     domain_.segments.insert(domain_.segments.end(), ends.begin(), ends.end());
     domain_.markers.push_back(marker);
     domain_.segment_lines.Add(reader_.line_number());
@@ -219,25 +192,17 @@ absl::Status PolyReader::ReadSeed(FieldSplitter& fields, PlanarDomain::Seed& see
 absl::Status PolyReader::ReadHoles(std::string_view line) {
   std::array<uint64_t, 1> count{};
   constexpr std::array kNames = {"number of holes"};
-  if (absl::Status status = ReadHeader(reader_, line, 1, kNames, count); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(ReadHeader(reader_, line, 1, kNames, count));
   uint64_t base = 0;
   for (uint64_t hole = 0; hole < count[0]; ++hole) {
     if (!reader_.NextContent(line)) {
       return CountError(reader_, count[0], "holes", hole);
     }
     FieldSplitter fields(line, ' ');
-    if (absl::Status status = ReadIndex(reader_, fields, hole, base); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(ReadIndex(reader_, fields, hole, base));
     PlanarDomain::Seed seed = {.is_hole = true};
-    if (absl::Status status = ReadSeed(fields, seed); !status.ok()) {
-      return status;
-    }
-    if (absl::Status status = ExpectNoMore(fields, "an index, x and y of a hole"); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(ReadSeed(fields, seed));
+    WELLSPACE_RETURN_IF_ERROR(ExpectNoMore(fields, "an index, x and y of a hole"));
     domain_.seeds.push_back(seed);
     domain_.seed_lines.Add(reader_.line_number());
   }
@@ -246,9 +211,7 @@ absl::Status PolyReader::ReadHoles(std::string_view line) {
 
 absl::Status PolyReader::ReadRegions(std::string_view line) {
   constexpr std::array kNames = {"number of regions"};
-  if (absl::Status status = ReadHeader(reader_, line, 1, kNames, {&regions_, 1}); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(ReadHeader(reader_, line, 1, kNames, {&regions_, 1}));
   uint64_t base = 0;
   uint64_t without_area = 0;
   for (uint64_t region = 0; region < regions_; ++region) {
@@ -256,13 +219,9 @@ absl::Status PolyReader::ReadRegions(std::string_view line) {
       return CountError(reader_, regions_, "regions", region);
     }
     FieldSplitter fields(line, ' ');
-    if (absl::Status status = ReadIndex(reader_, fields, region, base); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(ReadIndex(reader_, fields, region, base));
     PlanarDomain::Seed seed;
-    if (absl::Status status = ReadSeed(fields, seed); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(ReadSeed(fields, seed));
     std::string_view field;
     if (!fields.Next(field)) {
       return reader_.Error("expected an index, x, y, an attribute and perhaps a largest area, got no attribute");
@@ -276,9 +235,7 @@ absl::Status PolyReader::ReadRegions(std::string_view line) {
       return reader_.Error(absl::StrCat("largest area: ", status.message()));
     }
     seed.max_area = std::max(seed.max_area, 0.0);  // a negative one is none, as for Triangle
-    if (absl::Status status = ExpectNoMore(fields, "an index, x, y, an attribute and a largest area"); !status.ok()) {
-      return status;
-    }
+    WELLSPACE_RETURN_IF_ERROR(ExpectNoMore(fields, "an index, x, y, an attribute and a largest area"));
     domain_.seeds.push_back(seed);
     domain_.seed_lines.Add(reader_.line_number());
   }

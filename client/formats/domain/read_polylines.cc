@@ -15,6 +15,7 @@
 #include "client/formats/domain/polyline.h"
 #include "client/formats/number.h"
 #include "client/formats/table_columns.h"
+#include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
@@ -96,9 +97,7 @@ absl::Status PolylineReader::Read() {
   if (!reader_.status().ok()) {
     return reader_.status();
   }
-  if (absl::Status status = EndPolyline(); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(EndPolyline());
   domain_.markers.resize(domain_.segment_count());
   return reader_.Finish();
 }
@@ -113,12 +112,8 @@ absl::Status PolylineReader::Begin(std::string_view line, bool& is_header) {
   if (is_header) {
     names_ = fields;
   }
-  if (absl::Status status = ChooseCoordinates(fields.size()); !status.ok()) {
-    return status;
-  }
-  if (absl::Status status = ChooseId(fields.size()); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(ChooseCoordinates(fields.size()));
+  WELLSPACE_RETURN_IF_ERROR(ChooseId(fields.size()));
   NoteColumns(fields.size());
   return absl::OkStatus();
 }
@@ -192,9 +187,7 @@ absl::Status PolylineReader::ReadRow(std::string_view line) {
   for (std::string_view field; fields.Next(field); ++column) {
     if (column == id_column_) {
       has_id = true;
-      if (absl::Status status = TakeId(field); !status.ok()) {
-        return status;
-      }
+      WELLSPACE_RETURN_IF_ERROR(TakeId(field));
     }
     for (size_t axis = 0; axis < kAxes; ++axis) {
       if (column != columns_[axis]) {
@@ -225,9 +218,7 @@ absl::Status PolylineReader::TakeId(std::string_view id) {
   if (!positions_.empty() && id == id_) {
     return absl::OkStatus();
   }
-  if (absl::Status status = EndPolyline(); !status.ok()) {
-    return status;
-  }
+  WELLSPACE_RETURN_IF_ERROR(EndPolyline());
   id_ = id;
   const auto [at, is_new] = id_lines_.try_emplace(id_, reader_.line_number());
   if (!is_new) {
