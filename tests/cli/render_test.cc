@@ -9,7 +9,10 @@
 #include <cstring>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <random>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "client/cli/render/colour_ramp.h"
@@ -227,9 +230,78 @@ TEST(SceneTest, Errors) {
   EXPECT_THAT(message(Square(), {.plane = Plane{{1, 0, 0}, 0}, .up = 2}), HasSubstr("3-D meshes only"));
   EXPECT_THAT(message(Cubes(1), {.plane = Plane{{0, 0, 0}, 1}, .up = 2}), HasSubstr("normal has a direction"));
   EXPECT_THAT(message(Cubes(1), {.plane = Plane{{1, 0, 0}, -1}, .up = 2}), HasSubstr("cuts off all of the 6"));
+  EXPECT_THAT(message(Square(), {.colouring = Colouring::kRegion}), HasSubstr("tells of no regions"));
   formats::Mesh huge = Square();
   huge.points[0] = -1e300;
   EXPECT_THAT(message(huge, {}), HasSubstr("at most 1e150"));
+}
+
+// The square of two triangles, each a region of its own, with the diagonal and one side as boundary.
+formats::Mesh TwoRegions() {
+  formats::Mesh mesh = Square();
+  mesh.vertex_origins = {0, 1, 2, 3};
+  mesh.vertex_tags = {2, 0, 2, 0};
+  mesh.facets = {0, 1, 0, 2};
+  mesh.boundary = {{.tag = 1, .name = "south", .facets = 1}, {.tag = 2, .name = "", .facets = 1}};
+  mesh.simplex_regions = {7, 3};
+  mesh.regions = {{.id = 3, .name = "lake"}, {.id = 7, .name = ""}};
+  return mesh;
+}
+
+TEST(SceneTest, TheBoundaryOfAPlaneMeshIsDrawn) {
+  const absl::StatusOr<Scene> scene = MakeScene(TwoRegions().View(), {});
+  ASSERT_TRUE(scene.ok()) << scene.status();
+  const std::array<PicturePoint, 2> south = {{{0, 0}, {2, 0}}};
+  const std::array<PicturePoint, 2> diagonal = {{{0, 0}, {2, 1}}};
+  EXPECT_THAT(scene->boundary, ::testing::ElementsAre(south, diagonal));
+}
+
+TEST(SceneTest, ColoursMeanRegionsWhereThereAreSeveral) {
+  const formats::Mesh mesh = TwoRegions();
+  for (const std::optional<Colouring> colouring : {std::optional<Colouring>(), std::optional(Colouring::kRegion)}) {
+    const absl::StatusOr<Scene> scene = MakeScene(mesh.View(), {.colouring = colouring});
+    ASSERT_TRUE(scene.ok()) << scene.status();
+    EXPECT_THAT(scene->regions, ::testing::ElementsAre("lake", "region 7"));
+    EXPECT_EQ(scene->facets[0].region, 1u);
+    EXPECT_EQ(scene->facets[1].region, 0u);
+  }
+  EXPECT_TRUE(MakeScene(mesh.View(), {.colouring = Colouring::kAngle})->regions.empty());
+  formats::Mesh one = mesh;
+  one.simplex_regions = {};
+  one.regions.resize(1);
+  EXPECT_TRUE(MakeScene(one.View(), {})->regions.empty());
+  EXPECT_THAT(MakeScene(one.View(), {.colouring = Colouring::kRegion})->regions, ::testing::ElementsAre("lake"));
+}
+
+TEST(SceneTest, TetrahedraHaveTheColourOfTheirRegion) {
+  formats::Mesh cubes = Cubes(2);
+  cubes.regions = {{.id = 1, .name = "low"}, {.id = 2, .name = "high"}};
+  for (size_t simplex = 0; simplex < cubes.simplices.size() / 4; ++simplex) {
+    double z = 0;
+    for (int i = 0; i < 4; ++i) {
+      z += cubes.points[3 * cubes.simplices[4 * simplex + i] + 2] / 4;
+    }
+    cubes.simplex_regions.push_back(z < 1 ? 1 : 2);
+  }
+  // From above, the two layers of the left half: the top is of the upper one alone, each wall of both.
+  const absl::StatusOr<Scene> scene = MakeScene(cubes.View(), {.plane = Plane{{0, 0, 1}, 100}, .up = 2});
+  ASSERT_TRUE(scene.ok()) << scene.status();
+  const auto of_region = [&](uint32_t region) {
+    return std::count_if(scene->facets.begin(), scene->facets.end(),
+                         [region](const Facet& facet) { return facet.region == region; });
+  };
+  EXPECT_EQ(of_region(0), 2 * 2 * 2);
+  EXPECT_EQ(of_region(1), 2 * 2 * 2 + 2 * 4);
+}
+
+TEST(ColourRampTest, ColoursOfRegionsDiffer) {
+  std::set<std::array<double, 3>> colours;
+  for (size_t i = 0; i < 24; ++i) {
+    const Colour colour = CategoryColour(i);
+    colours.insert({colour.red, colour.green, colour.blue});
+  }
+  EXPECT_EQ(colours.size(), 24u);
+  EXPECT_EQ(CategoryColour(24).red, CategoryColour(0).red);
 }
 
 TEST(ColourRampTest, LightnessGrows) {
@@ -253,6 +325,35 @@ uint32_t BigEndian(const std::string& bytes, size_t at) {
   return value;
 }
 
+// A picture read back.
+class Picture {
+ public:
+  explicit Picture(const std::string& path) : surface_(cairo_image_surface_create_from_png(path.c_str())) {
+    EXPECT_EQ(cairo_surface_status(surface_), CAIRO_STATUS_SUCCESS) << path;
+  }
+  ~Picture() { cairo_surface_destroy(surface_); }
+  Picture(const Picture&) = delete;
+  Picture& operator=(const Picture&) = delete;
+
+  int height() const { return cairo_image_surface_get_height(surface_); }
+  // Red, green and blue.
+  uint32_t At(int x, int y) const {
+    uint32_t value = 0;
+    std::memcpy(&value, cairo_image_surface_get_data(surface_) + y * cairo_image_surface_get_stride(surface_) + 4 * x,
+                4);
+    return value & 0xffffff;
+  }
+
+ private:
+  cairo_surface_t* surface_;
+};
+
+void ExpectColour(uint32_t pixel, const Colour& expected) {
+  EXPECT_NEAR(pixel >> 16 & 255, 255 * expected.red, 2);
+  EXPECT_NEAR(pixel >> 8 & 255, 255 * expected.green, 2);
+  EXPECT_NEAR(pixel & 255, 255 * expected.blue, 2);
+}
+
 TEST(PainterTest, PngIsWhiteOutsideAndColouredByAngleInside) {
   TemporaryFolder folder;
   const absl::StatusOr<Scene> scene = MakeScene(Square().View(), {});
@@ -260,22 +361,43 @@ TEST(PainterTest, PngIsWhiteOutsideAndColouredByAngleInside) {
   ASSERT_TRUE(WritePicture(*scene, 800, PictureFormat::kPng, path).ok());
   EXPECT_EQ(BigEndian(folder.Read("square.png"), 16), 800u);
 
-  cairo_surface_t* picture = cairo_image_surface_create_from_png(path.c_str());
-  ASSERT_EQ(cairo_surface_status(picture), CAIRO_STATUS_SUCCESS);
-  const int height = cairo_image_surface_get_height(picture);
-  const auto pixel = [picture](int x, int y) {
-    uint32_t value = 0;
-    std::memcpy(&value, cairo_image_surface_get_data(picture) + y * cairo_image_surface_get_stride(picture) + 4 * x, 4);
-    return value & 0xffffff;
-  };
-  EXPECT_EQ(pixel(2, 2), 0xffffffu);
-  EXPECT_EQ(pixel(797, height - 3), 0xffffffu);
-  const Colour expected = RampColour(26.565 / 60);
-  const uint32_t inside = pixel(500, height / 2 + 60);
-  EXPECT_NEAR(inside >> 16 & 255, 255 * expected.red, 2);
-  EXPECT_NEAR(inside >> 8 & 255, 255 * expected.green, 2);
-  EXPECT_NEAR(inside & 255, 255 * expected.blue, 2);
-  cairo_surface_destroy(picture);
+  const Picture picture(path);
+  EXPECT_EQ(picture.At(2, 2), 0xffffffu);
+  EXPECT_EQ(picture.At(797, picture.height() - 3), 0xffffffu);
+  ExpectColour(picture.At(500, picture.height() / 2 + 60), RampColour(26.565 / 60));
+}
+
+TEST(PainterTest, RegionsHaveColoursAndTheBoundaryIsDark) {
+  TemporaryFolder folder;
+  const absl::StatusOr<Scene> scene = MakeScene(TwoRegions().View(), {});
+  const std::string path = folder.Path("regions.png");
+  ASSERT_TRUE(WritePicture(*scene, 800, PictureFormat::kPng, path).ok());
+  const Picture picture(path);
+  const int middle = picture.height() / 2;
+  ExpectColour(picture.At(500, middle + 60), CategoryColour(1));
+  ExpectColour(picture.At(200, middle - 60), CategoryColour(0));
+  // Down the left of the middle, from white through both triangles to white: the diagonal and the southern side are
+  // dark, the northern side has no tag.
+  std::vector<int> dark;
+  for (int y = 0; y < picture.height(); ++y) {
+    if ((picture.At(250, y) & 0xff) < 60 && (picture.At(250, y) >> 8 & 0xff) < 60) {
+      dark.push_back(y);
+    }
+  }
+  ASSERT_FALSE(dark.empty());
+  EXPECT_GT(dark.front(), middle);
+  EXPECT_GT(dark.back() - dark.front(), 60);
+}
+
+TEST(PainterTest, ManyRegionsWithLongNamesAreNamedAsFarAsThereIsRoom) {
+  TemporaryFolder folder;
+  formats::Mesh mesh = TwoRegions();
+  for (int i = 10; i < 300; ++i) {
+    mesh.regions.push_back({.id = i, .name = "Bodensee, \u00dcberlinger See " + std::to_string(i)});
+  }
+  const absl::StatusOr<Scene> scene = MakeScene(mesh.View(), {});
+  EXPECT_TRUE(WritePicture(*scene, kMinWidth, PictureFormat::kPng, folder.Path("many.png")).ok());
+  EXPECT_TRUE(WritePicture(*scene, 800, PictureFormat::kSvg, folder.Path("many.svg")).ok());
 }
 
 TEST(PainterTest, SizesStayWithinBounds) {

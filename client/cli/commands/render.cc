@@ -24,6 +24,7 @@ struct RenderCommand {
   int width = 1600;
   std::vector<double> plane;  // empty, or normal and offset
   std::string up = "z";
+  std::string colour = "auto";
   OutputFormat format = OutputFormat::kText;
 
   absl::Status Render() const;
@@ -41,6 +42,9 @@ absl::Status RenderCommand::Render() const {
   WELLSPACE_ASSIGN_OR_RETURN(const formats::Mesh mesh, formats::ReadMesh(mesh_path));
   render::View view;
   view.up = up[0] - 'x';
+  if (colour != "auto") {
+    view.colouring = colour == "region" ? render::Colouring::kRegion : render::Colouring::kAngle;
+  }
   if (!plane.empty()) {
     view.plane = {.normal = {plane[0], plane[1], plane[2]}, .offset = plane[3]};
   }
@@ -61,7 +65,8 @@ void AddRenderCommand(CLI::App& app, int& exit_code) {
   const auto command = std::make_shared<RenderCommand>();
   CLI::App* render = app.add_subcommand(
       "render",
-      "Draw a 2-D or 3-D mesh, coloured by the smallest angle of each simplex; 3-D meshes are cut open by a plane");
+      "Draw a 2-D or 3-D mesh, coloured by region or by the smallest angle of each simplex; the boundary of a 2-D mesh "
+      "is drawn, and 3-D meshes are cut open by a plane");
   render->footer(kExitCodesHelp);
   AddMeshInput(*render, command->mesh_path);
   render->add_option("-o,--out", command->picture_path, "File of the picture, .png or .svg")
@@ -75,6 +80,9 @@ void AddRenderCommand(CLI::App& app, int& exit_code) {
   render->add_option("--up", command->up, "Axis that points upwards in the picture of a 3-D mesh")
       ->capture_default_str()
       ->check(CLI::IsMember({"x", "y", "z"}));
+  render->add_option("--colour", command->colour, "What colours mean; auto: region if the mesh has several, else angle")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"auto", "angle", "region"}));
   AddOutput(*render, command->format);
   render->callback([command, &exit_code] {
     const Interrupt interrupt(Interrupt::First::kEnd);

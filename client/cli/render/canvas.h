@@ -21,6 +21,9 @@ struct DestroyCairo {
 using Surface = std::unique_ptr<cairo_surface_t, DestroyCairo>;
 using Canvas = std::unique_ptr<cairo_t, DestroyCairo>;
 
+// Of text and of frames.
+inline constexpr Colour kInk = {0.15, 0.15, 0.18};
+
 void SetColour(cairo_t* cairo, const Colour& colour, double alpha = 1);
 // White.
 void PaintBackground(cairo_t* cairo);

@@ -19,6 +19,17 @@ constexpr std::array<Colour, 11> kKnots = {{{0.267, 0.005, 0.329},
                                             {0.741, 0.873, 0.150},
                                             {0.993, 0.906, 0.144}}};
 
+// M. Okabe and K. Ito, "Color universal design", 2008: distinct for colour-blind readers too.
+constexpr std::array<Colour, 8> kCategories = {{{0.337, 0.706, 0.914},
+                                                {0.902, 0.624, 0.000},
+                                                {0.000, 0.620, 0.451},
+                                                {0.941, 0.894, 0.259},
+                                                {0.800, 0.475, 0.655},
+                                                {0.000, 0.447, 0.698},
+                                                {0.835, 0.369, 0.000},
+                                                {0.650, 0.650, 0.650}}};
+constexpr std::array<double, 3> kCategoryShades = {1, 0.72, 0.5};
+
 }  // namespace
 
 Colour RampColour(double t) {
@@ -29,6 +40,11 @@ Colour RampColour(double t) {
   const Colour& a = kKnots[knot];
   const Colour& b = kKnots[knot + 1];
   return {mix(a.red, b.red), mix(a.green, b.green), mix(a.blue, b.blue)};
+}
+
+Colour CategoryColour(size_t index) {
+  const size_t round = index / kCategories.size();
+  return Shaded(kCategories[index % kCategories.size()], kCategoryShades[round % kCategoryShades.size()]);
 }
 
 Colour Shaded(const Colour& colour, double factor) {

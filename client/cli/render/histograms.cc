@@ -28,8 +28,6 @@ constexpr double kTickLength = 5;
 // The axis of counts begins here: a bar of one has a height.
 constexpr double kLeastCount = 0.5;
 
-constexpr Colour kInk = {0.15, 0.15, 0.18};
-
 struct Panel {
   double left;
   double right;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numeric>
 #include <tuple>
 
@@ -64,12 +65,14 @@ struct Extent {
   }
 };
 
+PicturePoint PictureOf(const Point<2>& point, const Extent& extent) {
+  return {static_cast<float>(point[0] - extent.low[0]), static_cast<float>(point[1] - extent.low[1])};
+}
+
 Facet MakeFacet(const std::array<Point<2>, 3>& corners, const Extent& extent, double angle_deg, double shade) {
   Facet facet;
   for (int i = 0; i < 3; ++i) {
-    for (int axis = 0; axis < 2; ++axis) {
-      facet.corners[i][axis] = static_cast<float>(corners[i][axis] - extent.low[axis]);
-    }
+    facet.corners[i] = PictureOf(corners[i], extent);
   }
   facet.angle_deg = static_cast<float>(angle_deg);
   facet.shade = static_cast<float>(shade);
@@ -90,7 +93,39 @@ absl::Status SetSize(const Extent& extent, Scene& scene) {
   return absl::OkStatus();
 }
 
-absl::StatusOr<Scene> MakePlaneScene(const formats::MeshView& mesh) {
+// The region of each simplex, as an index into the mesh's regions, when colours mean regions.
+class RegionIndex {
+ public:
+  // REQUIRES:   `mesh` outlives this.
+  RegionIndex(const formats::MeshView& mesh, bool is_wanted) : mesh_(mesh) {
+    for (uint32_t i = 0; is_wanted && i < mesh.regions.size(); ++i) {
+      index_of_[mesh.regions[i].id] = i;
+    }
+  }
+
+  uint32_t Of(uint64_t simplex) const {
+    if (index_of_.empty() || mesh_.simplex_regions.empty()) {
+      return 0;
+    }
+    const auto found = index_of_.find(mesh_.simplex_regions[simplex]);
+    return found == index_of_.end() ? 0 : found->second;
+  }
+
+  std::vector<std::string> Names() const {
+    std::vector<std::string> names;
+    for (uint32_t i = 0; i < index_of_.size(); ++i) {
+      const formats::Region& region = mesh_.regions[i];
+      names.push_back(region.name.empty() ? absl::StrCat("region ", region.id) : region.name);
+    }
+    return names;
+  }
+
+ private:
+  const formats::MeshView& mesh_;
+  std::map<int32_t, uint32_t> index_of_;  // by id
+};
+
+absl::StatusOr<Scene> MakePlaneScene(const formats::MeshView& mesh, const RegionIndex& regions) {
   Extent extent;
   for (const uint32_t vertex : mesh.simplices) {
     extent.Add(PointOf<2>(mesh, vertex));
@@ -104,6 +139,11 @@ absl::StatusOr<Scene> MakePlaneScene(const formats::MeshView& mesh) {
     const Simplex<2> corners = SimplexOf<2>(mesh, simplex);
     scene.facets.push_back(
         MakeFacet({corners[0], corners[1], corners[2]}, extent, core::Angles<2>(corners).min_deg, 1));
+    scene.facets.back().region = regions.Of(simplex);
+  }
+  for (size_t i = 0; i + 1 < mesh.facets.size(); i += 2) {
+    scene.boundary.push_back(
+        {PictureOf(PointOf<2>(mesh, mesh.facets[i]), extent), PictureOf(PointOf<2>(mesh, mesh.facets[i + 1]), extent)});
   }
   return scene;
 }
@@ -229,6 +269,7 @@ struct VisibleFacet {
   double depth;
   double angle_deg;
   double shade;
+  uint32_t region = 0;
 };
 
 // None when the facet looks away.
@@ -254,7 +295,7 @@ std::optional<VisibleFacet> MakeVisible(const Simplex<3>& simplex, int corner, c
   return facet;
 }
 
-absl::StatusOr<Scene> MakeCutScene(const formats::MeshView& mesh, const View& view) {
+absl::StatusOr<Scene> MakeCutScene(const formats::MeshView& mesh, const View& view, const RegionIndex& regions) {
   WELLSPACE_ASSIGN_OR_RETURN(const Plane plane, CutOf(mesh, view.plane));
   const std::vector<uint64_t> kept = SimplicesBehind(mesh, plane);
   if (kept.empty()) {
@@ -266,9 +307,10 @@ absl::StatusOr<Scene> MakeCutScene(const formats::MeshView& mesh, const View& vi
   std::vector<VisibleFacet> visible;
   Extent extent;
   for (const FacetOf& exposed : ExposedFacets(mesh, kept)) {
-    const std::optional<VisibleFacet> facet =
+    std::optional<VisibleFacet> facet =
         MakeVisible(SimplexOf<3>(mesh, kept[exposed.kept]), static_cast<int>(exposed.corner), camera);
     if (facet.has_value()) {
+      facet->region = regions.Of(kept[exposed.kept]);
       visible.push_back(*facet);
       for (const Point<2>& corner : facet->corners) {
         extent.Add(corner);
@@ -284,6 +326,7 @@ absl::StatusOr<Scene> MakeCutScene(const formats::MeshView& mesh, const View& vi
   scene.facets.reserve(visible.size());
   for (const VisibleFacet& facet : visible) {
     scene.facets.push_back(MakeFacet(facet.corners, extent, facet.angle_deg, facet.shade));
+    scene.facets.back().region = facet.region;
   }
   return scene;
 }
@@ -304,11 +347,18 @@ absl::StatusOr<Scene> MakeScene(const formats::MeshView& mesh, const View& view)
           absl::StrCat("expected coordinates of magnitude at most 1e150, got ", coordinate));
     }
   }
-  if (mesh.dimension == 2) {
-    return view.plane.has_value() ? absl::InvalidArgumentError("a plane cuts 3-D meshes only, and this one is 2-D")
-                                  : MakePlaneScene(mesh);
+  if (mesh.dimension == 2 && view.plane.has_value()) {
+    return absl::InvalidArgumentError("a plane cuts 3-D meshes only, and this one is 2-D");
   }
-  return MakeCutScene(mesh, view);
+  const bool by_region = view.colouring == Colouring::kRegion || (!view.colouring && mesh.regions.size() > 1);
+  if (by_region && mesh.regions.empty()) {
+    return absl::InvalidArgumentError("the file tells of no regions; expected a mesh with some, or colours by angle");
+  }
+  const RegionIndex regions(mesh, by_region);
+  WELLSPACE_ASSIGN_OR_RETURN(Scene scene,
+                             mesh.dimension == 2 ? MakePlaneScene(mesh, regions) : MakeCutScene(mesh, view, regions));
+  scene.regions = regions.Names();
+  return scene;
 }
 
 }  // namespace wellspace::render
