@@ -1,11 +1,13 @@
 """The reference clouds of all benchmarks, and what meshes of them have had.
 
-Synthetic clouds come from make_clouds.py; real ones from examples/, scaled uniformly to a longest side of 0.8 and centred in the
+Synthetic clouds come from make_clouds.py; real ones and real domains from examples/, scaled uniformly to a longest side of 0.8 and centred in the
 unit box. The domain of all of them is the unit box.
 """
 import array
 import collections
 import csv
+import gzip
+import json
 import math
 import pathlib
 
@@ -54,12 +56,29 @@ def synthetic(name):
     return make_clouds.cloud(kind, int(dimension), int(count))
 
 
+def example_file(name):
+    """The file of an example: points, or polygons."""
+    polygons = ROOT / "examples" / f"{name}.geojson.gz"
+    return polygons if polygons.exists() else ROOT / "examples" / f"{name}.csv"
+
+
+def segments_of(path):
+    """The ends of the sides of a GeoJSON file's MultiPolygon, those of each side in a row."""
+    with gzip.open(path, "rt", encoding="utf-8") as file:
+        polygons = json.load(file)["geometry"]["coordinates"]
+    return [end[:2] for polygon in polygons for ring in polygon for side in zip(ring, ring[1:]) for end in side]
+
+
 def example(name):
-    """The points of examples/NAME.csv, brought into the unit box."""
-    with open(ROOT / "examples" / f"{name}.csv", newline="", encoding="utf-8") as file:
-        rows = csv.reader(file)
-        next(rows)  # the header
-        points = [[float(x) for x in row] for row in rows]
+    """The points of an example, brought into the unit box; of polygons, the ends of their sides, in pairs."""
+    path = example_file(name)
+    if path.suffix == ".gz":
+        points = segments_of(path)
+    else:
+        with open(path, newline="", encoding="utf-8") as file:
+            rows = csv.reader(file)
+            next(rows)  # the header
+            points = [[float(x) for x in row] for row in rows]
     low = [min(column) for column in zip(*points)]
     high = [max(column) for column in zip(*points)]
     factor = 0.8 / max(h - l for l, h in zip(low, high))
@@ -78,7 +97,7 @@ def store(name, folder):
     """Writes the cloud as doubles to a file of `folder`, unless it is there already, and returns where."""
     folder.mkdir(parents=True, exist_ok=True)
     found = list(folder.glob(f"{name}.[2-6]d"))
-    source = ROOT / "bench" / "make_clouds.py" if len(name.split("-")) == 3 else ROOT / "examples" / f"{name}.csv"
+    source = ROOT / "bench" / "make_clouds.py" if len(name.split("-")) == 3 else example_file(name)
     if not found or found[0].stat().st_mtime < source.stat().st_mtime:
         points = points_of(name)
         found = [folder / f"{name}.{len(points[0])}d"]

@@ -51,6 +51,10 @@ def bytes_per_vertex(ours, _):
     return ours["memory_bytes"] / ours["vertices"]
 
 
+def memory_growth(ours, peers):
+    return bytes_per_vertex(ours, peers) / bytes_per_vertex(peers[0], ours)
+
+
 def create_over_sort(ours, _):
     return ours["create_seconds"] / ours["sort_seconds"]
 
@@ -71,6 +75,23 @@ def mesh_2(cloud, targets=(), quick=False):
     """Against CGAL's Mesh_2 with the shape bound 0.125, the smallest angle of rho = sqrt(2)."""
     return Row(f"mesh_2/{cloud}", "x faster than CGAL Mesh_2", times_faster, ">=", targets,
                mesh_runs(cloud, SQRT2), [Run("cgal_mesh_2", cloud, (0.125,))], quick)
+
+
+def domain(cloud, targets=(), quick=False):
+    """All of the unit box with segments in it, whose ends `cloud` has in pairs. CGAL's edges of segments need not have
+    empty discs."""
+    return Row(f"domain/{cloud}", "x faster than CGAL Mesh_2; segments", times_faster, ">=", targets,
+               with_segments(mesh_runs(cloud, SQRT2)), [Run("cgal_mesh_2", cloud, (0.125, "--segments"))], quick)
+
+
+def domain_memory(cloud, like, target):
+    """Against a cloud whose mesh has about as many vertices."""
+    return Row(f"memory/{cloud}", f"memory a vertex / that of {like}", memory_growth, "<=", (target,),
+               with_segments(mesh_runs(cloud, SQRT2, threads=(1,))), [mesh_runs(like, SQRT2)[1]], False)
+
+
+def with_segments(runs):
+    return {t: run._replace(arguments=(*run.arguments, "--segments")) for t, run in runs.items()}
 
 
 def tetgen(cloud, targets=(), rho=2.0, quick=False):
@@ -147,6 +168,9 @@ ROWS = [
     cells("uniform-3-1000000", (3,)),
     initialize("uniform-2-1000000", (4,)),
     initialize("uniform-3-1000000", (8,)),
+    domain("segments-2-200000", (2, 3.2), quick=True),
+    domain("land-110m", (2, 3.2), quick=True),
+    domain_memory("segments-2-200000", "uniform-2-300000", 1.3),
     # Yardsticks, and the other clouds.
     delaunay("uniform-2-100000", quick=True),
     delaunay("uniform-3-100000"),

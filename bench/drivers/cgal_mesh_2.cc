@@ -1,4 +1,4 @@
-// Meshes points in the unit square by CGAL's Mesh_2, and reports one JSON object.
+// Meshes points or segments in the unit square by CGAL's Mesh_2, and reports one JSON object.
 #include <CGAL/Constrained_Delaunay_triangulation_2.h>
 #include <CGAL/Delaunay_mesh_face_base_2.h>
 #include <CGAL/Delaunay_mesh_size_criteria_2.h>
@@ -9,6 +9,8 @@
 #include <array>
 #include <cstdlib>
 #include <iostream>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "bench/drivers/meter.h"
@@ -25,8 +27,9 @@ using Criteria = CGAL::Delaunay_mesh_size_criteria_2<Triangulation>;
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 3) {
-    std::cerr << "usage: bench_cgal_mesh_2 POINTS SHAPE_BOUND\n";
+  const bool has_segments = argc == 4 && std::string_view(argv[3]) == "--segments";
+  if (argc != 3 && !has_segments) {
+    std::cerr << "usage: bench_cgal_mesh_2 POINTS SHAPE_BOUND [--segments]\n";
     return 2;
   }
   std::vector<Kernel::Point_2> points;
@@ -41,7 +44,16 @@ int main(int argc, char** argv) {
 
   const wellspace::bench::Meter meter;
   Triangulation triangulation;
-  triangulation.insert(points.begin(), points.end());
+  if (has_segments) {
+    // By the indices of their ends: CGAL then sorts all points along a curve first.
+    std::vector<std::pair<size_t, size_t>> segments(points.size() / 2);
+    for (size_t i = 0; i < segments.size(); ++i) {
+      segments[i] = {2 * i, 2 * i + 1};
+    }
+    triangulation.insert_constraints(points.begin(), points.end(), segments.begin(), segments.end());
+  } else {
+    triangulation.insert(points.begin(), points.end());
+  }
   const std::array<Kernel::Point_2, 4> corners = {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}};
   for (size_t i = 0; i < corners.size(); ++i) {
     triangulation.insert_constraint(corners[i], corners[(i + 1) % corners.size()]);

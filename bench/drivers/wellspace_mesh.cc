@@ -1,8 +1,11 @@
-// Meshes points in the unit box by Wellspace's core and reports one JSON object: bench/README.md has its fields.
+// Meshes points or segments in the unit box by Wellspace's core and reports one JSON object, whose fields
+// bench/README.md has.
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <iostream>
+#include <memory>
+#include <numeric>
 #include <span>
 #include <string>
 #include <vector>
@@ -15,6 +18,7 @@
 #include "bench/drivers/meter.h"
 #include "core/mesher.h"
 #include "core/simplex/validate.h"
+#include "core/simplex/validate_domain.h"
 #include "nlohmann/json.hpp"
 
 namespace wellspace::bench {
@@ -29,22 +33,50 @@ T OrExit(absl::StatusOr<T> result) {
   return *std::move(result);
 }
 
-// FNV-1a of the words of the mesh: equal meshes have equal ones.
-class Fingerprint {
- public:
-  template <typename T>
-  void Add(std::span<const T> values) {
-    for (const T value : values) {
-      uint64_t word = 0;
-      std::memcpy(&word, &value, sizeof(value));
-      hash_ = (hash_ ^ word) * 0x100000001b3;
-    }
+// FNV-1a of the words of `values`, after `hash`.
+template <typename T>
+uint64_t Hash(std::span<const T> values, uint64_t hash) {
+  for (const T value : values) {
+    uint64_t word = 0;
+    std::memcpy(&word, &value, sizeof(value));
+    hash = (hash ^ word) * 0x100000001b3;
   }
-  std::string Text() const { return absl::StrCat(absl::Hex(hash_, absl::kZeroPad16)); }
+  return hash;
+}
 
- private:
-  uint64_t hash_ = 0xcbf29ce484222325;
-};
+// Equal meshes have equal ones.
+std::string FingerprintOf(const core::Mesh& mesh) {
+  const uint64_t of_points = Hash<double>(mesh.points, 0xcbf29ce484222325);
+  return absl::StrCat(absl::Hex(Hash<uint32_t>(mesh.simplices, of_points), absl::kZeroPad16));
+}
+
+absl::StatusOr<std::unique_ptr<core::Mesher>> Create(const core::MeshParameters& parameters,
+                                                     std::span<const double> points, std::span<const uint32_t> segments,
+                                                     core::RunContext& context) {
+  if (segments.empty()) {
+    return core::Mesher::Create(parameters, points, context);
+  }
+  core::Features features;
+  features.ends = segments;
+  return core::Mesher::CreateInDomain(parameters, points, features, context);
+}
+
+// Checks every promise about `mesh`, of `segments` too.
+absl::Status Validate(const core::Mesh& mesh, double rho, std::span<const double> points,
+                      std::span<const uint32_t> segments) {
+  const core::MeshView view{mesh.dimension, mesh.points, mesh.simplices, mesh.weights};
+  if (segments.empty()) {
+    return core::ValidateMesh(view, {.rho = rho, .cloud = points});
+  }
+  constexpr double kTolerance = 1e-12;  // of places; the box is 1
+  if (const absl::Status status = core::ValidateDomainMesh(view, mesh.facets, rho).status(); !status.ok()) {
+    return status;
+  }
+  core::DomainView domain;
+  domain.points = points;
+  domain.segments = segments;
+  return core::ValidateConformity(view, mesh.facets, domain, kTolerance);
+}
 
 int Main(int argc, char** argv) {
   CLI::App app("Meshes points in the unit box by Wellspace's core");
@@ -52,21 +84,26 @@ int Main(int argc, char** argv) {
   core::MeshParameters parameters;
   double min_dihedral = 0;
   bool validate = false;
+  bool has_segments = false;
   app.add_option("points", path, "file of doubles")->required();
   app.add_option("--dimension", parameters.dimension)->required();
   app.add_option("--rho", parameters.rho)->required();
   app.add_option("--threads", parameters.threads)->capture_default_str();
   app.add_option("--min-dihedral", min_dihedral)->capture_default_str();
   app.add_flag("--validate", validate, "check every promise about the mesh, after the measurement");
+  app.add_flag("--segments", has_segments, "each two points in a row are the ends of a segment");
   CLI11_PARSE(app, argc, argv);
   const std::vector<double> points = ReadPoints(path);
   parameters.min_dihedral = min_dihedral;
   parameters.domain_low.assign(parameters.dimension, 0);
   parameters.domain_high.assign(parameters.dimension, 1);
 
+  std::vector<uint32_t> segments(has_segments ? points.size() / 4 * 2 : 0);
+  std::iota(segments.begin(), segments.end(), 0);
+
   core::RunContext context;
   const Meter meter(parameters.threads);
-  const auto mesher = OrExit(core::Mesher::Create(parameters, points, context));
+  const auto mesher = OrExit(Create(parameters, points, segments, context));
   const double created = meter.Seconds();
   if (const absl::Status status = mesher->Refine(parameters, context); !status.ok()) {
     std::cerr << "wellspace: " << status << '\n';
@@ -78,9 +115,6 @@ int Main(int argc, char** argv) {
   const double wall_seconds = meter.WallSeconds();
   const uint64_t memory = meter.PeakBytes();
 
-  Fingerprint fingerprint;
-  fingerprint.Add<double>(mesh.points);
-  fingerprint.Add<uint32_t>(mesh.simplices);
   nlohmann::json report = {{"seconds", seconds},
                            {"wall_seconds", wall_seconds},
                            {"create_seconds", created},
@@ -94,10 +128,9 @@ int Main(int argc, char** argv) {
                            {"max_radius_edge", mesh.statistics.max_radius_edge},
                            {"min_angle_deg", mesh.statistics.min_angle_deg},
                            {"slivers_left", mesh.statistics.slivers_left},
-                           {"fingerprint", fingerprint.Text()}};
+                           {"fingerprint", FingerprintOf(mesh)}};
   if (validate) {
-    const core::MeshView view{mesh.dimension, mesh.points, mesh.simplices, mesh.weights};
-    if (const absl::Status status = core::ValidateMesh(view, {.rho = parameters.rho, .cloud = points}); !status.ok()) {
+    if (const absl::Status status = Validate(mesh, parameters.rho, points, segments); !status.ok()) {
       std::cerr << "wellspace: " << status << '\n';
       return 1;
     }

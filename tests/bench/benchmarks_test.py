@@ -58,6 +58,7 @@ class CompareTest(unittest.TestCase):
             "tetgen/clusters-3-100000": (2, 3.5), "tetgen/sphere-3-100000": (4, 7), "tetgen/grid-3-64000": (2, 3),
             "tetgen/skew-3-20000": (100, 170), "memory/skew-3-20000": (150,), "growth/uniform-2-1000000": (1.5,),
             "growth/uniform-3-1000000": (1.5,), "memory/uniform-2-1000000": (170,), "memory/uniform-3-1000000": (450,),
+            "domain/segments-2-200000": (2, 3.2), "domain/land-110m": (2, 3.2), "memory/segments-2-200000": (1.3,),
             "cell/uniform-3-1000000": (3,), "initialize/uniform-2-1000000": (4,), "initialize/uniform-3-1000000": (8,)})
 
     def test_a_target_is_met_on_its_side(self):
@@ -140,7 +141,7 @@ class MicroTest(unittest.TestCase):
         parts = {part["name"].partition("-D")[0] for part in measured}
         self.assertEqual(parts, {f"{part}/{dimension}" for dimension in (2, 3) for part in [
             "RadixSort", "Initialize", "SortCloud", "Tree", "NearestNeighbor", "ClippedCell", "ClippedCellOfInput", "Star",
-            "Cut", "DecideCut/Integer", "DecideCut/WideInteger", "DecideCut/BigInteger"]})
+            "Cut", "DecideCut/Word", "DecideCut/Integer", "DecideCut/WideInteger", "DecideCut/BigInteger"]})
 
 
 if __name__ == "__main__":
