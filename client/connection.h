@@ -22,8 +22,9 @@ namespace wellspace::client {
 //
 // A program's test puts its own in the place of gRPC, and hands the program a Client over it:
 //
-//   class FakeConnection : public client::Connection { … };  // or a mock: MOCK_METHOD(absl::StatusOr<Session>,
-//   GetSession, …) client::Client client(std::make_shared<FakeConnection>());
+//   class FakeConnection : public client::Connection { … };  // or a mock, with MOCK_METHOD
+//
+//   client::Client client(std::make_shared<FakeConnection>());
 //
 // tests/client/client_test.cc does so. What a Connection returns reaches the caller of the Client as it is: a fake
 // decides about errors, events and meshes. For tests of what comes over the wire, MakeConnection takes any channel.

@@ -24,7 +24,6 @@ struct SizeBox {
   double max_circumradius = 0;
 };
 
-// What to mesh and how. Zero or empty means the server's default, as the comments of the proto's MeshParameters say.
 // Which faces, into which segments cut the plane, are meshed; see the proto's FaceRule.
 enum class FaceRule { kBox, kHoles, kEvenOdd };
 
@@ -47,6 +46,7 @@ struct Features {
   bool split_crossings = false;
 };
 
+// What to mesh and how. Zero or empty means the server's default, as the comments of the proto's MeshParameters say.
 struct MeshOptions {
   int dimension = 3;
   double rho = 0;

@@ -20,10 +20,9 @@
 //         element "vertex", of any scalar type. Other properties and the elements before it are skipped, lists too.
 //   obj   Wavefront's: two or three coordinates in each line "v"; what follows them (a weight, a colour) is skipped, as
 //         are all other lines. A line that ends in a backslash goes on in the next one.
-//   off   Geomview's in ascii: "OFF", the numbers of vertices, faces and edges, then a line for each vertex. ST, C and
-//   N
-//         before OFF (texture, colour, normal) announce numbers after the coordinates, which are skipped. 4OFF has four
-//         coordinates, all taken as they are; nOFF says how many before the counts.
+//   off   Geomview's in ascii: "OFF", the numbers of vertices, faces and edges, then a line for each vertex. What is
+//         before OFF announces numbers after the coordinates, which are skipped: ST texture, C colour, N normal. 4OFF
+//         has four coordinates, all taken as they are; nOFF says how many before the counts.
 // Of ply and off, what follows the last vertex is not looked at.
 // In those of text lines end in LF, CRLF or CR, '#' at the start of a line or after a blank starts a comment, and blank
 // lines are skipped. Numbers may have Fortran's exponents: 1.0D+00, 1.0-100. Each may be compressed by gzip, as

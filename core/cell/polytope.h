@@ -1,4 +1,6 @@
 // The Voronoi cell of one vertex under construction: a bounded simple polytope, cut by one bisector after the other.
+// In the plane it is a Polygon, in space a Polyhedron, which have the same functions and are several times as fast; the
+// template here is for 4-D to 6-D.
 #ifndef WELLSPACE_CORE_CELL_POLYTOPE_H_
 #define WELLSPACE_CORE_CELL_POLYTOPE_H_
 

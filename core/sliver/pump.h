@@ -20,9 +20,9 @@ inline constexpr double kMostWeight = 0.24;
 //
 // REQUIRES:   a Delaunay triangulation, no weights.
 // Guarantees: (1) the result is exactly the regular triangulation of its weights; (2) a weight changes only its
-//             vertex's star, and the smallest angle of that only for the better, or of all the stars around two; (3)
-//             weights have at most 24 bits;
-//             (4) points on a face of the box are triangulated as the face alone would be.
+//             vertex's star, and the smallest angle of that only for the better, or of all the stars around two;
+//             (3) weights have at most 24 bits; (4) points on a face of the box are triangulated as the face alone
+//             would be.
 // Returns:    the number of vertices with a weight.
 // Complexity: O(1) for each vertex of a well-spaced mesh.
 // Errors:     CANCELLED, DEADLINE_EXCEEDED.
