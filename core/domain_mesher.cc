@@ -412,8 +412,8 @@ void DomainMesher::SetStatistics(Mesh& mesh) const {
 
 absl::StatusOr<MeshEstimate> DomainMesher::Estimate(const MeshParameters& parameters, const RunContext& context) const {
   WELLSPACE_RETURN_IF_ERROR(ValidateParameters(parameters));
-  WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size,
-                             EstimateSize<2>(structure_, CriteriaIn<2>(domain_, parameters), context));
+  WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size, EstimateSize<2>(structure_, CriteriaIn<2>(domain_, parameters),
+                                                                      context, {}, planar_.get()));
   MeshEstimate estimate;
   estimate.vertices = SaturatedCount(size.vertices);
   estimate.simplices = SaturatedCount(size.simplices);

@@ -164,8 +164,7 @@ absl::StatusOr<Mesh> MeshPoints(const MeshParameters& parameters, std::span<cons
 absl::StatusOr<Mesh> MeshFeatures(const MeshParameters& parameters, std::span<const double> points,
                                   const Features& features, RunContext& context);
 
-// Estimates the mesh that MeshFeatures would make, without making it: as far as its points and the leaves that its
-// segments split tell, which may be a part of it.
+// Estimates the mesh that MeshFeatures would make, without making it.
 absl::StatusOr<MeshEstimate> EstimateFeatures(const MeshParameters& parameters, std::span<const double> points,
                                               const Features& features, RunContext& context);
 

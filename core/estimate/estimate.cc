@@ -9,6 +9,7 @@
 #include <limits>
 #include <numbers>
 #include <numeric>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -16,6 +17,7 @@
 #include "absl/container/flat_hash_map.h"
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
+#include "core/estimate/domain_surroundings.h"
 #include "core/estimate/mesh_size.h"
 #include "core/estimate/nearest_points.h"
 
@@ -25,7 +27,6 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // ---- The model; docs/design/estimate.md says how it was found
-// ----------------------------------------------------------
 
 // The integrals that vertices are counted by. Those over the box are of lfs^-D times Grading, those over its faces of
 // (distance to the second nearest point)^-(D-1).
@@ -149,7 +150,6 @@ class Draws {
 };
 
 // ---- The integrals over leaves
-// -----------------------------------------------------------------------------------------
 
 // What a leaf adds to the mesh.
 struct Share {
@@ -160,10 +160,16 @@ struct Share {
 template <int D>
 class Integrator {
  public:
-  Integrator(const QueryStructure<D>& structure, const MeshCriteria<D>& demands)
+  Integrator(const QueryStructure<D>& structure, const MeshCriteria<D>& demands, const PlanarDomain* domain)
       : box_(structure.box()),
         sizes_(ServedSizes(demands.sizes, box_)),
-        vertices_per_term_(VerticesPerTerm<D>(demands)) {}
+        vertices_per_term_(VerticesPerTerm<D>(demands)) {
+    if constexpr (D == 2) {
+      if (domain != nullptr) {
+        domain_.emplace(structure.tree(), *domain);
+      }
+    }
+  }
 
   absl::Status Prepare(const QueryStructure<D>& structure, const RunContext& context) {
     // The corners of the box count as its boundary, not as points; those that were not given come last.
@@ -199,7 +205,11 @@ class Integrator {
 
   // After `full_looks` looks, one child of each cell stands for all of them: few leaves need so many, but sizes much
   // smaller than a leaf may ask for any number.
-  Share IntegrateLeaf(const Box<D>& leaf, uint64_t full_looks) {
+  Share IntegrateLeaf(const LeafTree<D>& tree, NodeId id, uint64_t full_looks) {
+    const Box<D> leaf = tree.BoxOf(id);
+    if (domain_.has_value()) {
+      domain_->MoveTo(id);
+    }
     looks_ = 0;
     full_looks_ = full_looks;
     share_ = {};
@@ -230,6 +240,7 @@ class Integrator {
     FaceMask faces = 0;       // of that vertex
     double second_point = 0;  // distance to the second nearest point
     Term term = kPoints;      // what decides about lfs
+    uint32_t face = 0;        // of the domain, if there is one
   };
 
   Surroundings LookAt(const Point<D>& x) {
@@ -239,6 +250,32 @@ class Integrator {
     Surroundings result;
     result.nearest = std::sqrt(two.first_sq);
     result.second_point = std::sqrt(two.second_sq);
+    if constexpr (D == 2) {
+      if (domain_.has_value()) {
+        AddSegments(x, two, result);
+        return result;
+      }
+    }
+    AddBox(x, two, result);
+    return result;
+  }
+
+  // What the segments of a domain are around `x`; its box does not count.
+  void AddSegments(const Point<2>& x, const NearestTwo& two, Surroundings& result) {
+    const DomainSurroundings::Found found = domain_->LookAt(x, VertexId{two.first});
+    result.opposite = found.two_segments;
+    result.face = found.face;
+    SetLfs(std::max(result.nearest, found.with_point), result);
+    result.spacing = SpacingOf(two.first);
+  }
+
+  static void SetLfs(double with_face, Surroundings& result) {
+    result.lfs = std::min({result.second_point, with_face, result.opposite});
+    result.term = result.lfs == result.opposite ? kOpposite : result.lfs < result.second_point ? kNearFace : kPoints;
+  }
+
+  // What the faces and corners of the box are around `x`.
+  void AddBox(const Point<D>& x, const NearestTwo& two, Surroundings& result) {
     const bool has_point = two.first_sq < kInfinity;
     result.faces = has_point ? box_.FacesOf(points_[two.first]) : FaceMask{0};
     double face = kInfinity;
@@ -255,9 +292,7 @@ class Integrator {
       corner_sq += std::min(low, high) * std::min(low, high);
       corner |= high < low ? 1 << i : 0;
     }
-    const double with_face = std::max(result.nearest, face);
-    result.lfs = std::min({result.second_point, with_face, result.opposite});
-    result.term = result.lfs == result.opposite ? kOpposite : result.lfs < result.second_point ? kNearFace : kPoints;
+    SetLfs(std::max(result.nearest, face), result);
     if (corner_sq < two.first_sq) {
       result.nearest = std::sqrt(corner_sq);
       result.spacing = corner_spacing_[corner];
@@ -265,7 +300,6 @@ class Integrator {
     } else {
       result.spacing = SpacingOf(two.first);
     }
-    return result;
   }
 
   // Distance from a point to its nearest feature.
@@ -277,6 +311,9 @@ class Integrator {
       const FaceMask faces = box_.FacesOf(p);
       double corner_sq = 0;
       spacing = std::sqrt(points_.Nearest(p, point).first_sq);
+      if (domain_.has_value()) {
+        return spacing;
+      }
       for (int face = 0; face < 2 * D; ++face) {
         if (((faces >> face) & 1) == 0) {
           spacing = std::min(spacing, box_.DistanceToFace(p, face));
@@ -289,6 +326,12 @@ class Integrator {
       spacing = std::min(spacing, std::sqrt(corner_sq));
     }
     return spacing;
+  }
+
+  // The square of the size that is asked for at a place, be it by the largest area in its face.
+  double SizeSqAt(const Point<D>& x, const Surroundings& at) const {
+    const double size_sq = sizes_.IsUnbounded() ? kInfinity : sizes_.AtSq(x);
+    return domain_.has_value() ? std::min(size_sq, kRadiusSqOfArea * domain_->face(at.face).max_area) : size_sq;
   }
 
   // The bounds of h over a cell.
@@ -363,15 +406,18 @@ class Integrator {
       x[i] = cell.low[i] + draws_.Next() * (cell.high[i] - cell.low[i]);
     }
     const Surroundings at = LookAt(x);
+    if (domain_.has_value() && !domain_->face(at.face).is_meshed) {
+      return;
+    }
     const double density = std::pow(at.lfs, -D);
     const double graded = density * Grading(at.nearest / at.spacing);
     share_.terms[at.term] += volume * graded;
-    if (!sizes_.IsUnbounded()) {
-      const double wanted = kVerticesPerSize<D> * std::pow(sizes_.AtSq(x), -0.5 * D);
+    if (const double size_sq = SizeSqAt(x, at); size_sq < kInfinity) {
+      const double wanted = kVerticesPerSize<D> * std::pow(size_sq, -0.5 * D);
       const double there = density / BallVolume<D>() + graded * vertices_per_term_[at.term];
       share_.sizes += volume * std::max(0.0, wanted - there);
     }
-    for (int face = 0; face < 2 * D; ++face) {
+    for (int face = 0; face < 2 * D && !domain_.has_value(); ++face) {
       const int i = face / 2;
       const double coordinate = box_.FaceCoordinate(face);
       if (coordinate == (face % 2 == 0 ? cell.low[i] : cell.high[i])) {
@@ -405,6 +451,7 @@ class Integrator {
   const Box<D> box_;
   const SizeField<D> sizes_;
   const Terms vertices_per_term_;
+  std::optional<DomainSurroundings> domain_;       // none: the box
   NearestPoints<D> points_;                        // the input but the corners of the box
   absl::flat_hash_map<uint32_t, double> spacing_;  // by point, where it has been asked for
   std::array<double, 1 << D> corner_spacing_{};
@@ -417,7 +464,6 @@ class Integrator {
 };
 
 // ---- Sampling
-// ----------------------------------------------------------------------------------------------------------
 
 // What becomes of a leaf that holds `vertices` in the end, `at_first` before refinement: it is split for as long as its
 // parts are too full. How many there will be is known to about a quarter. Vertices keep apart, so that leaves of less
@@ -518,7 +564,7 @@ absl::StatusOr<Sample> SampleLeaves(const QueryStructure<D>& structure, Integrat
       std::swap(leaf,
                 widest->leaves[widest->taken +
                                std::min(rest - 1, static_cast<size_t>(draws.Next() * static_cast<double>(rest)))]);
-      const Share share = integrator.IntegrateLeaf(structure.tree().BoxOf(leaf), full_looks);
+      const Share share = integrator.IntegrateLeaf(structure.tree(), leaf, full_looks);
       Add(widest->sum, share);
       const double vertices = Sum(integrator.VerticesOf(share.terms)) + share.sizes;
       const auto* const inside = structure.tree().VerticesIn(leaf);
@@ -542,8 +588,9 @@ absl::StatusOr<Sample> SampleLeaves(const QueryStructure<D>& structure, Integrat
 
 template <int D>
 absl::StatusOr<SizeEstimate> EstimateSize(const QueryStructure<D>& structure, const MeshCriteria<D>& demands,
-                                          const RunContext& context, const EstimateEffort& effort) {
-  Integrator<D> integrator(structure, demands);
+                                          const RunContext& context, const EstimateEffort& effort,
+                                          const PlanarDomain* domain) {
+  Integrator<D> integrator(structure, demands, domain);
   WELLSPACE_RETURN_IF_ERROR(integrator.Prepare(structure, context));
   WELLSPACE_ASSIGN_OR_RETURN(const Sample sample, SampleLeaves<D>(structure, integrator, effort, context));
 
@@ -555,13 +602,17 @@ absl::StatusOr<SizeEstimate> EstimateSize(const QueryStructure<D>& structure, co
   estimate.vertices = structure.vertex_count() + Sum(added) + sample.sum.sizes;
   estimate.simplices = SimplicesOf<D>(estimate.vertices, on_boundary);
   estimate.bytes = BytesOf<D>(sample.leaves, estimate.vertices, estimate.simplices);
+  if (domain != nullptr) {
+    estimate.bytes += DomainBytesOf(estimate.vertices, domain->segment_count());
+  }
   estimate.sampling_error = sample.error / estimate.vertices;
   return estimate;
 }
 
 #define WELLSPACE_INSTANTIATE(D)                                                                          \
   template absl::StatusOr<SizeEstimate> EstimateSize<D>(const QueryStructure<D>&, const MeshCriteria<D>&, \
-                                                        const RunContext&, const EstimateEffort&);
+                                                        const RunContext&, const EstimateEffort&,         \
+                                                        const PlanarDomain*);
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 

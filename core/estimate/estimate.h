@@ -8,6 +8,7 @@
 #include "absl/status/statusor.h"
 #include "core/base/run_context.h"
 #include "core/refine/criteria.h"
+#include "core/refine/domain/planar_domain.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {
@@ -37,7 +38,8 @@ inline constexpr EstimateEffort kGlance{0.15, 24, 64, uint64_t{1} << 11};
 
 // Predicts what refinement for `demands` will make of `structure`.
 //
-// Shapes:     structure: as QueryStructure::Initialize leaves it; nothing has been refined.
+// Shapes:     structure: as QueryStructure::Initialize leaves it; nothing has been refined. domain: what its segments
+//             bound, in the plane; null: the box.
 // Units:      counts and bytes.
 // REQUIRES:   demands.rho at least MinimumRho(D).
 // Guarantees: (1) with the default effort, by the radius-edge criterion without sizes, each figure is right within a
@@ -51,7 +53,8 @@ inline constexpr EstimateEffort kGlance{0.15, 24, 64, uint64_t{1} << 11};
 // Source:     Ruppert 1995 (the size of a mesh is the integral of lfs^-D up to constants); docs/design/estimate.md.
 template <int D>
 absl::StatusOr<SizeEstimate> EstimateSize(const QueryStructure<D>& structure, const MeshCriteria<D>& demands,
-                                          const RunContext& context, const EstimateEffort& effort = {});
+                                          const RunContext& context, const EstimateEffort& effort = {},
+                                          const PlanarDomain* domain = nullptr);
 
 }  // namespace wellspace::core
 

@@ -74,6 +74,14 @@ double BytesOf(const Leaves& leaves, double vertices, double simplices) {
   return kMemoryMargin * (kFixedBytes + in_use + std::min(kLeftFree * in_use, kMostLeftFree));
 }
 
+// What a domain in the plane takes beside that: by vertex its place, and its triangles with their faces, which are kept
+// from the refinement to the output; by segment graph, faces and lists, as measured.
+inline double DomainBytesOf(double vertices, double segments) {
+  constexpr double kVertexBytes = 24 + 2 * (3 * sizeof(uint32_t) + sizeof(uint32_t));
+  constexpr double kSegmentBytes = 200;
+  return kMemoryMargin * (vertices * kVertexBytes + segments * kSegmentBytes);
+}
+
 }  // namespace wellspace::core
 
 #endif  // WELLSPACE_CORE_ESTIMATE_MESH_SIZE_H_

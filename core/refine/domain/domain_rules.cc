@@ -23,9 +23,6 @@ constexpr double kSameDistance = 1e-9;
 // ones that differ.
 constexpr double kRoundingShare = 0.3;
 
-// The squared circumradius of an equilateral triangle of area 1.
-constexpr double kRadiusSqOfArea = 0.76980035891950102;
-
 // From this rho on, by the square, no vertex that takes the place of another comes nearer than the edge that asks.
 constexpr double kSafeRhoSq = 2 * (1 - 1e-12);
 

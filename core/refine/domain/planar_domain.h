@@ -22,6 +22,9 @@ namespace wellspace::core {
 // What is rounded of a place, relative to its coordinates: not little beside a segment that is short.
 inline constexpr double kPlaceRounding = 0x1p-50;
 
+// The squared circumradius of an equilateral triangle of area 1.
+inline constexpr double kRadiusSqOfArea = 0.76980035891950102;
+
 // Segments are named by number, faces as in PlanarFaces. The first vertices are the points of the graph, in its order;
 // the others have been inserted: on a segment, or inside a face. That a vertex is on a segment is never computed.
 //
