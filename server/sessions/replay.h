@@ -28,8 +28,8 @@ absl::StatusOr<std::unique_ptr<core::Mesher>> BeginMesh(const MesherFactory& cre
 // Takes `steps` again, from the first on, in the work of `job` but apart from its context. `last_mesh` is the mesh of
 // the last refinement among them.
 //
-// REQUIRES:   `steps` is not empty; its points are in `points`, and what bounds them in `features`, which nothing changes
-//             meanwhile.
+// REQUIRES:   `steps` is not empty; its points are in `points`, and what bounds them in `features`. Nothing changes
+//             these meanwhile.
 // Guarantees: what is made of the mesher from now on is, to the bit, what would have been made of the one that the
 //             steps made.
 // Complexity: that of the steps. Reserves memory as the first refinement did.

@@ -123,7 +123,7 @@ class SessionClient {
 v1::UploadPointsRequest UploadRequest(const std::string& name, uint64_t offset, const std::vector<double>& coordinates);
 
 // A square of side 4 around one of side 2, which is a hole, with two lines from one to the other: points, and a request
-// with 10 segments, which have the markers 5, 9 and 0, and 2 seeds, of the hole and of region 3 on one side of the lines.
+// with 10 segments, which have the markers 5, 9 and 0, and 2 seeds, of the hole and of region 3 on a side of the lines.
 std::vector<double> FramePoints();
 v1::AddSegmentsRequest FrameRequest(const std::string& name);
 
