@@ -56,6 +56,11 @@ absl::StatusOr<Uploaded> Client::UploadPoints(const std::string& session, PointS
   return connection_->UploadPoints(session, source, offset, on_points, call);
 }
 
+absl::StatusOr<AddedSegments> Client::AddSegments(const std::string& session, const Features& features,
+                                                  const std::optional<FeatureOffset>& offset, const CallOptions& call) {
+  return connection_->AddSegments(session, features, offset, call);
+}
+
 absl::Status Client::DownloadMesh(const std::string& session, MeshSink& sink, uint64_t revision,
                                   const OnChunks& on_chunks, const CallOptions& call) {
   return connection_->DownloadMesh(session, sink, revision, on_chunks, call);

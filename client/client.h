@@ -82,6 +82,15 @@ class Client {
                                         std::optional<uint64_t> offset = std::nullopt,
                                         const OnPoints& on_points = nullptr, const CallOptions& call = {});
 
+  // Adds segments and seeds to a session in 2-D, and sets the rules of its faces, before its first refinement:
+  // FAILED_PRECONDITION (DOMAIN_FIXED). Ends are numbers of the session's points, which may come later. `offset`: what
+  // the session has before the first of these. Where it has some from there on, they have to be the same and are not
+  // added again, so that a call that broke off is simply repeated with the same offset. Absent: after those that are
+  // there when the call begins. `call.expected_revision` is that before the call.
+  absl::StatusOr<AddedSegments> AddSegments(const std::string& session, const Features& features,
+                                            const std::optional<FeatureOffset>& offset = std::nullopt,
+                                            const CallOptions& call = {});
+
   // Streams the mesh of a session into `sink`: that of `revision`, 0: the last one. A broken connection costs nothing
   // but time.
   absl::Status DownloadMesh(const std::string& session, MeshSink& sink, uint64_t revision = 0,

@@ -62,7 +62,8 @@ struct MeshOptions {
   double margin = 0.25;
   uint64_t max_vertices = 0;
   int threads = 0;
-  std::shared_ptr<const Features> features;  // of MeshPoints and EstimateMesh, in 2-D; null: none
+  std::shared_ptr<const Features>
+      features;  // of MeshPoints and EstimateMesh, in 2-D; null: none. Those of a session: AddSegments
 };
 
 // The vertex of an input point that lies in no face which is meshed.
@@ -236,6 +237,10 @@ struct Session {
   uint64_t vertex_count = 0;
   uint64_t simplex_count = 0;
   std::string last_operation;  // empty before the first
+  uint64_t segment_count = 0;
+  uint64_t seed_count = 0;
+  std::optional<FaceRule> faces;  // none: a cloud, without segments and faces
+  bool split_crossings = false;
 };
 
 // Which part of a list.
@@ -272,6 +277,21 @@ struct OperationPage {
 // Points and revision of a session after an upload.
 struct Uploaded {
   uint64_t committed_points = 0;
+  uint64_t revision = 0;
+};
+
+// Of a session's segments and seeds, the number before the first of those that are added.
+struct FeatureOffset {
+  uint64_t segments = 0;
+  uint64_t seeds = 0;
+
+  bool operator==(const FeatureOffset&) const = default;
+};
+
+// Segments, seeds and revision of a session after segments were added.
+struct AddedSegments {
+  uint64_t segment_count = 0;
+  uint64_t seed_count = 0;
   uint64_t revision = 0;
 };
 

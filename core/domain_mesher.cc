@@ -12,6 +12,7 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/saturate.h"
 #include "core/base/status_macros.h"
+#include "core/domain_parameters.h"
 #include "core/estimate/estimate.h"
 #include "core/feasibility.h"
 #include "core/simplex/boundary.h"
@@ -27,24 +28,11 @@ constexpr double kDiscTolerance = 1e-9;
 // A ratio that exceeds rho by less, relatively, is what was rounded.
 constexpr double kRatioTolerance = 1e-9;
 
-// Refuses parameters that a domain in the plane does not have.
-absl::Status CheckDomainParameters(const MeshParameters& parameters, const Features& features) {
-  WELLSPACE_RETURN_IF_ERROR(ValidateParameters(parameters));
-  if (parameters.dimension != 2) {
+// Refuses spans of other lengths than each other's.
+absl::Status CheckShapes(std::span<const double> points, const Features& features) {
+  if (points.size() % 2 != 0) {
     return absl::InvalidArgumentError(
-        absl::StrCat("dimension: segments bound domains in 2-D alone, and it is ", parameters.dimension));
-  }
-  if (parameters.criterion != Criterion::kRadiusEdge) {
-    return absl::InvalidArgumentError("criterion: a domain with segments has the radius-edge criterion alone");
-  }
-  if (parameters.merge_distance > 0) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("merge_distance: near points of a domain with segments are not merged, and it is ",
-                     parameters.merge_distance, "; leave it out"));
-  }
-  if (features.faces != FaceRule::kBox && !parameters.domain_low.empty()) {
-    return absl::InvalidArgumentError(
-        "domain: a box bounds a domain with segments by the face rule `box` alone; leave one of the two out");
+        absl::StrCat("points: ", points.size(), " coordinates are not a multiple of the dimension, 2"));
   }
   if (features.ends.size() % 2 != 0) {
     return absl::InvalidArgumentError(
@@ -97,11 +85,8 @@ std::string PartName(int64_t part) {
 
 absl::Status DomainMesher::Initialize(const MeshParameters& parameters, std::span<const double> points,
                                       const Features& features, RunContext& context) {
-  WELLSPACE_RETURN_IF_ERROR(CheckDomainParameters(parameters, features));
-  if (points.size() % 2 != 0) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("points: ", points.size(), " coordinates are not a multiple of the dimension, 2"));
-  }
+  WELLSPACE_RETURN_IF_ERROR(ValidateDomainParameters(parameters, features));
+  WELLSPACE_RETURN_IF_ERROR(CheckShapes(points, features));
   context.EnterPhase(Phase::kTree);
   Box<2> box{{0, 0}, {1, 1}};
   if (features.faces == FaceRule::kBox) {
@@ -242,9 +227,12 @@ absl::Status DomainMesher::Split(std::span<const Subsegment> subsegments, const 
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::vector<uint32_t>> DomainMesher::AddPointsNear(std::span<const double> /*points*/,
+absl::StatusOr<std::vector<uint32_t>> DomainMesher::AddPointsNear(std::span<const double> points,
                                                                   std::span<const uint32_t> /*near*/,
                                                                   RunContext& /*context*/) {
+  if (points.empty()) {
+    return std::vector<uint32_t>();
+  }
   return absl::FailedPreconditionError("points: none can be added to the mesh of a domain with segments");
 }
 

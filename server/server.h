@@ -54,7 +54,7 @@ class Server {
                                                        std::shared_ptr<spdlog::logger> log,
                                                        Mesher mesher = core::MeshPoints,
                                                        Estimator estimator = core::EstimateMesh,
-                                                       MesherFactory create_mesher = core::Mesher::Create);
+                                                       MesherFactory create_mesher = CreateMesher);
 
   // Shuts down at once.
   ~Server();

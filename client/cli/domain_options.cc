@@ -113,12 +113,14 @@ absl::StatusOr<formats::PointCloud> DomainOptions::Read(const std::string& path,
   return cloud;
 }
 
-absl::Status DomainOptions::WithOrigins(const absl::Status& status) const {
+absl::Status DomainOptions::WithOrigins(const absl::Status& status, const Before& before) const {
   const formats::PlanarDomain& domain = *domain_;
-  absl::Status told =
-      WithPlaces(status, "points[", domain.point_count(), [&](uint64_t i) { return domain.PointOrigin(i); });
-  told = WithPlaces(told, "segments[", domain.segment_count(), [&](uint64_t i) { return domain.SegmentOrigin(i); });
-  return WithPlaces(told, "seeds[", domain.seeds.size(), [&](uint64_t i) { return domain.SeedOrigin(i); });
+  absl::Status told = WithPlaces(status, "points[", before.points, domain.point_count(),
+                                 [&](uint64_t i) { return domain.PointOrigin(i); });
+  told = WithPlaces(told, "segments[", before.features.segments, domain.segment_count(),
+                    [&](uint64_t i) { return domain.SegmentOrigin(i); });
+  return WithPlaces(told, "seeds[", before.features.seeds, domain.seeds.size(),
+                    [&](uint64_t i) { return domain.SeedOrigin(i); });
 }
 
 }  // namespace wellspace::cli

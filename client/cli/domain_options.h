@@ -3,6 +3,7 @@
 #define WELLSPACE_CLIENT_CLI_DOMAIN_OPTIONS_H_
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -40,8 +41,14 @@ class DomainOptions {
   // What has been read; null before.
   const std::shared_ptr<const client::Features>& features() const { return features_; }
 
+  // What the server has before what was read.
+  struct Before {
+    uint64_t points = 0;
+    client::FeatureOffset features = {};
+  };
   // `status`, with the places in the file of the points, segments and seeds that it names.
-  absl::Status WithOrigins(const absl::Status& status) const;
+  absl::Status WithOrigins(const absl::Status& status, const Before& before) const;
+  absl::Status WithOrigins(const absl::Status& status) const { return WithOrigins(status, Before()); }
 
  private:
   bool has_segments_ = false;

@@ -22,6 +22,18 @@ const char* StateName(client::SessionState state) {
   }
 }
 
+const char* FaceRuleName(client::FaceRule rule) {
+  switch (rule) {
+    case client::FaceRule::kBox:
+      return "box";
+    case client::FaceRule::kHoles:
+      return "holes";
+    case client::FaceRule::kEvenOdd:
+      break;
+  }
+  return "even-odd";
+}
+
 const char* StateName(client::OperationState state) {
   switch (state) {
     case client::OperationState::kQueued:
@@ -88,6 +100,10 @@ Json SessionJson(const client::Session& session) {
   json["expire_time"] = TimeText(session.expire_time);
   json["revision"] = session.revision;
   json["committed_points"] = session.committed_points;
+  json["segment_count"] = session.segment_count;
+  json["seed_count"] = session.seed_count;
+  json["faces"] = session.faces.has_value() ? Json(FaceRuleName(*session.faces)) : Json(nullptr);
+  json["split_crossings"] = session.split_crossings;
   json["vertex_count"] = session.vertex_count;
   json["simplex_count"] = session.simplex_count;
   json["last_operation"] = session.last_operation.empty() ? Json(nullptr) : Json(session.last_operation);

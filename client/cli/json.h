@@ -18,8 +18,8 @@ using Json = nlohmann::ordered_json;
 Json ErrorJson(const absl::Status& status);
 // dimension, rho, criterion, max_circumradius, size_boxes, domain_low, domain_high, margin, max_vertices, threads.
 Json ParametersJson(const client::MeshOptions& parameters);
-// name, state, parameters, labels, ttl_seconds, create_time, expire_time, revision, committed_points, vertex_count,
-// simplex_count, last_operation.
+// name, state, parameters, labels, ttl_seconds, create_time, expire_time, revision, committed_points, segment_count,
+// seed_count, faces (a name, or null for a cloud), split_crossings, vertex_count, simplex_count, last_operation.
 Json SessionJson(const client::Session& session);
 // sequence, phase, vertices, estimated_vertices, simplices, fraction.
 Json ProgressJson(const client::Progress& progress);
@@ -31,6 +31,8 @@ Json ServerInfoJson(const client::ServerInfo& info);
 // "open", "running" and so on.
 const char* StateName(client::SessionState state);
 const char* StateName(client::OperationState state);
+// As --faces has it.
+const char* FaceRuleName(client::FaceRule rule);
 // "2026-01-31T23:59:59Z".
 std::string TimeText(absl::Time time);
 

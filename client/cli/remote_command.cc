@@ -45,7 +45,7 @@ absl::Status WithOrigins(const absl::Status& status, uint64_t first_index, uint6
   return absl::Status(status.code(), first_origin.empty() ? message : absl::StrCat(first_origin, ": ", message));
 }
 
-absl::Status WithPlaces(const absl::Status& status, std::string_view what, uint64_t count,
+absl::Status WithPlaces(const absl::Status& status, std::string_view what, uint64_t first_index, uint64_t count,
                         const std::function<std::string(uint64_t)>& origin) {
   std::string message(status.message());
   for (size_t at = message.find(what); at != std::string::npos; at = message.find(what, at)) {
@@ -53,8 +53,9 @@ absl::Status WithPlaces(const absl::Status& status, std::string_view what, uint6
     uint64_t index = 0;
     const char* const end = message.data() + message.size();
     const std::from_chars_result result = std::from_chars(message.data() + at, end, index);
-    if (result.ec == std::errc() && result.ptr != end && *result.ptr == ']' && index < count) {
-      message.insert(result.ptr + 1 - message.data(), absl::StrCat(" (", origin(index), ")"));
+    if (result.ec == std::errc() && result.ptr != end && *result.ptr == ']' && index >= first_index &&
+        index - first_index < count) {
+      message.insert(result.ptr + 1 - message.data(), absl::StrCat(" (", origin(index - first_index), ")"));
     }
   }
   return absl::Status(status.code(), message);

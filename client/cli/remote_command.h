@@ -30,7 +30,7 @@ absl::Status WithOrigins(const absl::Status& status, uint64_t first_index, uint6
                          const std::function<std::string(uint64_t)>& origin);
 absl::Status WithOrigins(const absl::Status& status, const formats::PointCloud& cloud);
 // The same for what the server names as `what`, "segments[" for example; the place comes behind each.
-absl::Status WithPlaces(const absl::Status& status, std::string_view what, uint64_t count,
+absl::Status WithPlaces(const absl::Status& status, std::string_view what, uint64_t first_index, uint64_t count,
                         const std::function<std::string(uint64_t)>& origin);
 
 // Thread safety: thread-compatible.

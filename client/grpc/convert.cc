@@ -44,6 +44,20 @@ SessionState StateFromProto(v1::Session::State state) {
   }
 }
 
+// None for one of a newer server.
+std::optional<FaceRule> RuleFromProto(v1::FaceRule rule) {
+  switch (rule) {
+    case v1::FACE_RULE_BOX:
+      return FaceRule::kBox;
+    case v1::FACE_RULE_HOLES:
+      return FaceRule::kHoles;
+    case v1::FACE_RULE_EVEN_ODD:
+      return FaceRule::kEvenOdd;
+    default:
+      return std::nullopt;
+  }
+}
+
 OperationState StateFromProto(v1::Operation::State state) {
   switch (state) {
     case v1::Operation::STATE_QUEUED:
@@ -288,7 +302,11 @@ Session SessionFromProto(const v1::Session& message) {
                  .committed_points = message.committed_points(),
                  .vertex_count = message.vertex_count(),
                  .simplex_count = message.simplex_count(),
-                 .last_operation = message.last_operation()};
+                 .last_operation = message.last_operation(),
+                 .segment_count = message.segment_count(),
+                 .seed_count = message.seed_count(),
+                 .faces = RuleFromProto(message.faces()),
+                 .split_crossings = message.crossings() == v1::CROSSING_RULE_SPLIT};
 }
 
 Operation OperationFromProto(const v1::Operation& message) {

@@ -40,6 +40,9 @@ class GrpcConnection final : public Connection {
   // transfers.cc
   absl::StatusOr<Uploaded> UploadPoints(const std::string& session, PointSource& source, std::optional<uint64_t> offset,
                                         const OnPoints& on_points, const CallOptions& call) override;
+  absl::StatusOr<AddedSegments> AddSegments(const std::string& session, const Features& features,
+                                            const std::optional<FeatureOffset>& offset,
+                                            const CallOptions& call) override;
   absl::Status DownloadMesh(const std::string& session, MeshSink& sink, uint64_t revision, const OnChunks& on_chunks,
                             const CallOptions& call) override;
 

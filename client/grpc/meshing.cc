@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "client/grpc/convert.h"
+#include "client/grpc/feature_messages.h"
 #include "client/grpc/grpc_connection.h"
 #include "client/grpc/mesh_receiver.h"
 #include "client/grpc/request_writer.h"
@@ -14,52 +15,18 @@ namespace {
 
 using MeshPointsStream = grpc::ClientReaderWriter<v1::MeshPointsRequest, v1::MeshPointsResponse>;
 
-// Segments and seeds of one message: about 256 KiB.
-constexpr size_t kSegmentsOfARequest = 16'384;
-constexpr size_t kSeedsOfARequest = 4'096;
-
-v1::FaceRule RuleToProto(FaceRule rule) {
-  return rule == FaceRule::kHoles     ? v1::FACE_RULE_HOLES
-         : rule == FaceRule::kEvenOdd ? v1::FACE_RULE_EVEN_ODD
-                                      : v1::FACE_RULE_BOX;
-}
-
 // Sends segments and faces; false when the call has ended. The rules come even where there is no segment.
 template <typename Request, typename Stream>
 bool UploadFeatures(const Features& features, Request& request, Stream& stream) {
-  const size_t count = features.ends.size() / 2;
-  const auto is_open = [&](size_t s) { return s < features.is_open.size() && features.is_open[s] != 0; };
-  for (size_t first = 0; first < count;) {
-    v1::SegmentChunk& chunk = *request.mutable_segments();
-    chunk.Clear();
-    chunk.set_open(is_open(first));
-    for (const size_t begin = first;
-         first < count && first - begin < kSegmentsOfARequest && is_open(first) == chunk.open(); ++first) {
-      chunk.add_ends(features.ends[2 * first]);
-      chunk.add_ends(features.ends[2 * first + 1]);
-      if (!features.markers.empty()) {
-        chunk.add_markers(features.markers[first]);
-      }
-    }
+  for (size_t next = 0; next < features.ends.size() / 2;) {
+    next = FillSegments(features, next, *request.mutable_segments());
     if (!stream.Write(request)) {
       return false;
     }
   }
   size_t next = 0;
   do {
-    v1::FaceOptions& options = *request.mutable_faces();
-    options.Clear();
-    options.set_faces(RuleToProto(features.faces));
-    options.set_crossings(features.split_crossings ? v1::CROSSING_RULE_SPLIT : v1::CROSSING_RULE_REFUSE);
-    for (const size_t end = std::min(next + kSeedsOfARequest, features.seeds.size()); next < end; ++next) {
-      const FaceSeed& seed = features.seeds[next];
-      v1::FaceSeed& message = *options.add_seeds();
-      message.set_x(seed.x);
-      message.set_y(seed.y);
-      message.set_hole(seed.is_hole);
-      message.set_region(seed.region);
-      message.set_max_area(seed.max_area);
-    }
+    next = FillFaces(features, next, *request.mutable_faces());
     if (!stream.Write(request)) {
       return false;
     }

@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/error_details.h"
 #include "client/grpc/convert.h"
+#include "client/grpc/feature_messages.h"
 #include "client/grpc/grpc_connection.h"
 #include "client/grpc/mesh_receiver.h"
 #include "client/grpc/request_writer.h"
@@ -139,7 +140,70 @@ absl::Status Upload::Run(v1::SessionService::Stub& stub, const v1::Session& sess
   return status;
 }
 
+// Segments and seeds of one call of AddSegments, and where they belong.
+struct Addition {
+  const std::string& session;
+  const Features& features;
+  FeatureOffset offset;
+};
+
+// Sends everything and half-closes. Stops early when the call has ended; its status says why.
+void Send(const Addition& addition, uint64_t expected_revision, RequestWriter<v1::AddSegmentsRequest>& stream) {
+  v1::AddSegmentsRequest request;
+  request.set_name(addition.session);
+  request.set_expected_revision(expected_revision);
+  request.set_seed_offset(addition.offset.seeds);
+  const size_t segments = addition.features.ends.size() / 2;
+  for (size_t next = 0; next < segments;) {
+    request.set_segment_offset(addition.offset.segments + next);
+    next = FillSegments(addition.features, next, *request.mutable_segments());
+    if (!stream.Write(request)) {
+      return;
+    }
+  }
+  request.clear_segments();
+  request.set_segment_offset(addition.offset.segments + segments);
+  size_t next = 0;
+  do {
+    request.set_seed_offset(addition.offset.seeds + next);
+    next = FillFaces(addition.features, next, *request.mutable_faces());
+    if (!stream.Write(request)) {
+      return;
+    }
+  } while (next < addition.features.seeds.size());
+  stream.WritesDone();
+}
+
 }  // namespace
+
+absl::StatusOr<AddedSegments> GrpcConnection::AddSegments(const std::string& session, const Features& features,
+                                                          const std::optional<FeatureOffset>& offset,
+                                                          const CallOptions& call) {
+  std::optional<FeatureOffset> begin = offset;
+  uint64_t expected_revision = call.expected_revision;
+  v1::AddSegmentsResponse response;
+  const absl::Status status = retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
+    if (!begin.has_value()) {
+      const absl::StatusOr<v1::Session> found = FetchSession(session, attempt);
+      if (!found.ok()) {
+        return found.status();
+      }
+      begin = FeatureOffset{.segments = found->segment_count(), .seeds = found->seed_count()};
+    }
+    CallContext context(attempt);
+    RequestWriter<v1::AddSegmentsRequest> stream([&](grpc::CompletionQueue* queue) {
+      return sessions_->PrepareAsyncAddSegments(context.get(), &response, queue);
+    });
+    // What an attempt before this one committed has changed the revision.
+    Send({session, features, *begin}, std::exchange(expected_revision, 0), stream);
+    return FromGrpcStatus(stream.Finish());
+  });
+  if (!status.ok()) {
+    return status;
+  }
+  return AddedSegments{
+      .segment_count = response.segment_count(), .seed_count = response.seed_count(), .revision = response.revision()};
+}
 
 absl::StatusOr<Uploaded> GrpcConnection::UploadPoints(const std::string& session, PointSource& source,
                                                       std::optional<uint64_t> offset, const OnPoints& on_points,

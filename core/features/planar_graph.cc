@@ -193,10 +193,10 @@ class GraphMaker {
         continue;
       }
       if (first.marker != next.marker && !next.IsBoxSide()) {
-        return absl::InvalidArgumentError(absl::StrCat("segments[", first.source, "] and segments[", next.source,
-                                                       "] lie on each other from ", Place(At(first.a)), " to ",
-                                                       Place(At(first.b)), ", and have the markers ", first.marker,
-                                                       " and ", next.marker, "; give both the same, or leave one out"));
+        return absl::InvalidArgumentError(absl::StrCat(
+            "markers: segments[", first.source, "] and segments[", next.source, "] lie on each other from ",
+            Place(At(first.a)), " to ", Place(At(first.b)), ", and have the markers ", first.marker, " and ",
+            next.marker, "; give both the same, or leave one out"));
       }
       // A side of the box keeps the marker of a segment along it.
       graph_.counts.duplicate_segments += next.IsBoxSide() ? 0 : 1;
@@ -333,7 +333,7 @@ class GraphMaker {
       return absl::InvalidArgumentError(
           kind == Fault::Kind::kCrossing
               ? absl::StrCat("segments: ", names, more, "; segments may meet in common ends alone, or be split there")
-              : absl::StrCat("points: ", names, more, "; at least ", absl::StrFormat("%.3g", least_separation_),
+              : absl::StrCat("segments: ", names, more, "; at least ", absl::StrFormat("%.3g", least_separation_),
                              " is needed, or the segment may be led through the point"));
     }
     return absl::OkStatus();

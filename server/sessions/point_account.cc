@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -41,32 +42,51 @@ PointAccount::PointAccount(std::string session, int dimension, const ServiceOpti
   reserved_.MakeLasting();
 }
 
-absl::Status PointAccount::Take(uint64_t count) {
-  const uint64_t points = points_ + count;
-  if (points > options_.max_points) {
-    return MakeError(v1::ERROR_REASON_TOO_MANY_POINTS,
-                     absl::StrCat(session_, " would have ", points, " points; a session of this server has at most ",
-                                  options_.max_points));
-  }
-  const auto reserve = [&] { return reserved_.Resize(BytesOf(points)); };
-  const TenantPoints::Taken taken = tenant_->Take(count, options_.max_points_per_tenant, reserve);
+absl::Status PointAccount::CheckOne(uint64_t count, const char* what) const {
+  return count <= options_.max_points
+             ? absl::OkStatus()
+             : MakeError(v1::ERROR_REASON_TOO_MANY_POINTS,
+                         absl::StrCat(session_, " would have ", count, " ", what,
+                                      "; a session of this server has at most ", options_.max_points));
+}
+
+absl::Status PointAccount::Grow(const Held& held, const char* what) {
+  const auto reserve = [&] { return reserved_.Resize(BytesOf(held)); };
+  const TenantPoints::Taken taken =
+      tenant_->Take(held.count() - held_.count(), options_.max_points_per_tenant, reserve);
   switch (taken.outcome) {
     case TenantPoints::Outcome::kTaken:
-      points_ = points;
+      held_ = held;
       return absl::OkStatus();
     case TenantPoints::Outcome::kAboveLimit:
       return MakeError(v1::ERROR_REASON_QUOTA_EXCEEDED,
-                       absl::StrCat("your sessions would have ", taken.points,
-                                    " points together; they may have at most ", options_.max_points_per_tenant));
+                       absl::StrCat("your sessions would have ", taken.points, " ", what,
+                                    " together; they may have at most ", options_.max_points_per_tenant));
     case TenantPoints::Outcome::kNoRoom:
       break;
   }
-  return memory_.Refusal(BytesOf(points), "the points of a session");
+  return memory_.Refusal(BytesOf(held), absl::StrCat("the ", what, " of a session"));
+}
+
+absl::Status PointAccount::Take(uint64_t count) {
+  Held held = held_;
+  held.points += count;
+  WELLSPACE_RETURN_IF_ERROR(CheckOne(held.points, "points"));
+  return Grow(held, "points");
+}
+
+absl::Status PointAccount::TakeFeatures(uint64_t segments, uint64_t seeds) {
+  Held held = held_;
+  held.segments += segments;
+  held.seeds += seeds;
+  WELLSPACE_RETURN_IF_ERROR(CheckOne(held.segments, "segments"));
+  WELLSPACE_RETURN_IF_ERROR(CheckOne(held.seeds, "seeds"));
+  return Grow(held, "points, segments and seeds");
 }
 
 void PointAccount::Return(uint64_t count) {
-  points_ -= count;
-  (void)reserved_.Resize(BytesOf(points_));  // shrinking never fails
+  held_.points -= count;
+  (void)reserved_.Resize(BytesOf(held_));  // shrinking never fails
   if (!is_closed_) {
     tenant_->Return(count);
   }
@@ -74,7 +94,7 @@ void PointAccount::Return(uint64_t count) {
 
 void PointAccount::Close() {
   if (!std::exchange(is_closed_, true)) {
-    tenant_->Return(points_);
+    tenant_->Return(held_.count());
   }
 }
 

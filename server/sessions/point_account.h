@@ -1,4 +1,4 @@
-// How many points a session has, and may have.
+// How many points, segments and seeds a session has, and may have.
 #ifndef WELLSPACE_SERVER_SESSIONS_POINT_ACCOUNT_H_
 #define WELLSPACE_SERVER_SESSIONS_POINT_ACCOUNT_H_
 
@@ -11,10 +11,11 @@
 #include "absl/status/status.h"
 #include "server/base/options.h"
 #include "server/jobs/memory_budget.h"
+#include "server/sessions/feature_store.h"
 
 namespace wellspace::server {
 
-// The points of all sessions of one tenant.
+// The points of all sessions of one tenant; each of their segments and seeds counts as a point.
 //
 // Thread safety: thread-safe.
 // Invariants: points() is at most the limit that Take was called with.
@@ -42,11 +43,11 @@ class TenantPoints {
   uint64_t points_ = 0;  // guarded by mutex_
 };
 
-// The points of one session, counted against three limits: that of a session, that of its tenant and the memory of the
-// server.
+// The points, segments and seeds of one session, counted against three limits: that of a session, which holds for each
+// of the three, that of its tenant, which holds for their sum, and the memory of the server.
 //
 // Thread safety: thread-compatible; accounts of one tenant may be used on different threads.
-// Invariants: the tenant's points include those of this account until Close.
+// Invariants: the tenant's points include all of this account until Close.
 class PointAccount {
  public:
   // `session` is the name that errors have.
@@ -58,7 +59,7 @@ class PointAccount {
   PointAccount(const PointAccount&) = delete;
   PointAccount& operator=(const PointAccount&) = delete;
 
-  uint64_t points() const { return points_; }
+  uint64_t points() const { return held_.points; }
 
   // Takes `count` more points into the account.
   //
@@ -67,6 +68,8 @@ class PointAccount {
   //             are being refused on another thread.
   // Errors:     TOO_MANY_POINTS, QUOTA_EXCEEDED, MEMORY_LIMIT.
   absl::Status Take(uint64_t count);
+  // The same for so many more segments and seeds.
+  absl::Status TakeFeatures(uint64_t segments, uint64_t seeds);
 
   // Takes the last `count` points out again.
   //
@@ -77,7 +80,21 @@ class PointAccount {
   void Close();
 
  private:
-  uint64_t BytesOf(uint64_t points) const { return points * dimension_ * sizeof(double); }
+  struct Held {
+    uint64_t points = 0;
+    uint64_t segments = 0;
+    uint64_t seeds = 0;
+
+    uint64_t count() const { return points + segments + seeds; }
+  };
+
+  uint64_t BytesOf(const Held& held) const {
+    return held.points * dimension_ * sizeof(double) + FeatureStore::BytesOf(held.segments, held.seeds);
+  }
+  // Refuses `count` of `what`, if a session may not have as many.
+  absl::Status CheckOne(uint64_t count, const char* what) const;
+  // Makes `held` what the account has. REQUIRES: no less than it has.
+  absl::Status Grow(const Held& held, const char* what);
 
   const std::string session_;
   const int dimension_;
@@ -85,8 +102,8 @@ class PointAccount {
   MemoryBudget& memory_;
   const std::shared_ptr<TenantPoints> tenant_;
   bool is_closed_ = false;
-  uint64_t points_ = 0;
-  MemoryReservation reserved_;  // of points_ points
+  Held held_;
+  MemoryReservation reserved_;  // of held_
 };
 
 }  // namespace wellspace::server

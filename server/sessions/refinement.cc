@@ -43,7 +43,7 @@ absl::StatusOr<core::Mesh> Copy(const core::Mesh& mesh, const core::RunContext& 
   WELLSPACE_ASSIGN_OR_RETURN(copy.points, Copy(mesh.points, context));
   WELLSPACE_ASSIGN_OR_RETURN(copy.weights, Copy(mesh.weights, context));
   WELLSPACE_ASSIGN_OR_RETURN(copy.simplices, Copy(mesh.simplices, context));
-  return copy;  // Update makes input_vertex anew
+  return copy;  // Update makes the rest anew
 }
 
 absl::StatusOr<core::Mesh> MeshFirst(const MesherFactory& create_mesher, const Session& session,
@@ -52,7 +52,7 @@ absl::StatusOr<core::Mesh> MeshFirst(const MesherFactory& create_mesher, const S
   std::unique_ptr<core::Mesher> mesher;
   {
     WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> points, session.points().CopyFrom(0, context));
-    WELLSPACE_ASSIGN_OR_RETURN(mesher, create_mesher(parameters, points, context));
+    WELLSPACE_ASSIGN_OR_RETURN(mesher, BeginMesh(create_mesher, parameters, points, session.features(), context));
   }
   WELLSPACE_RETURN_IF_ERROR(core::ReserveMemory(*mesher, parameters, context));
   WELLSPACE_RETURN_IF_ERROR(mesher->Refine(parameters, context));
@@ -66,8 +66,8 @@ absl::StatusOr<core::Mesh> MeshFirst(const MesherFactory& create_mesher, const S
 absl::Status BringBack(const MesherFactory& create_mesher, const Session& session, Job& job, SessionWork& work) {
   if (work.mesher == nullptr) {
     job.context().EnterPhase(core::Phase::kTree);
-    WELLSPACE_ASSIGN_OR_RETURN(work.mesher,
-                               Replay(session.steps(), session.points(), work.mesh->chunks.mesh(), create_mesher, job));
+    WELLSPACE_ASSIGN_OR_RETURN(work.mesher, Replay(session.steps(), session.points(), session.features(),
+                                                   work.mesh->chunks.mesh(), create_mesher, job));
   }
   return absl::OkStatus();
 }
@@ -181,8 +181,8 @@ absl::StatusOr<std::shared_ptr<Operation>> StartRefinement(const CallEnvironment
                                                            const core::MeshParameters& parameters,
                                                            uint64_t expected_revision) {
   const Session::Size size = session->GetSize(kMostPoints);
-  const bool is_small =
-      size.points <= kMostPoints && IsSmallRefinement(parameters, size.some_points, size.vertices, size.replayed_steps);
+  const bool is_small = size.points <= kMostPoints && size.segments <= kMostPoints &&
+                        IsSmallRefinement(parameters, size.some_points, size.vertices, size.replayed_steps);
   WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<Operation> operation,
                              session->StartOperation(parameters, expected_revision));
   const absl::StatusOr<std::shared_ptr<Job>> job = environment.jobs.Submit(

@@ -13,8 +13,8 @@ namespace {
 // The structure as far as the steps have made it.
 class Structure {
  public:
-  Structure(const PointStore& points, const MesherFactory& create_mesher)
-      : points_(points), create_mesher_(create_mesher) {}
+  Structure(const PointStore& points, const FeatureStore& features, const MesherFactory& create_mesher)
+      : points_(points), features_(features), create_mesher_(create_mesher) {}
 
   absl::Status Take(const SessionStep& step, core::RunContext& context) {
     if (mesher_ == nullptr) {
@@ -38,7 +38,7 @@ class Structure {
     const core::MeshParameters& parameters = *step.refined_with;
     {
       WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> points, Copy(parameters.dimension, step.end, context));
-      WELLSPACE_ASSIGN_OR_RETURN(mesher_, create_mesher_(parameters, points, context));
+      WELLSPACE_ASSIGN_OR_RETURN(mesher_, BeginMesh(create_mesher_, parameters, points, features_, context));
     }
     WELLSPACE_RETURN_IF_ERROR(core::ReserveMemory(*mesher_, parameters, context));
     WELLSPACE_RETURN_IF_ERROR(mesher_->Refine(parameters, context));
@@ -56,6 +56,7 @@ class Structure {
   }
 
   const PointStore& points_;
+  const FeatureStore& features_;
   const MesherFactory& create_mesher_;
   std::unique_ptr<core::Mesher> mesher_;
   core::Mesh mesh_;
@@ -64,15 +65,24 @@ class Structure {
 
 bool IsSame(const core::Mesh& a, const core::Mesh& b) {
   return std::ranges::equal(a.points, b.points) && std::ranges::equal(a.simplices, b.simplices) &&
-         std::ranges::equal(a.weights, b.weights);
+         std::ranges::equal(a.weights, b.weights) && std::ranges::equal(a.facets, b.facets) &&
+         std::ranges::equal(a.simplex_regions, b.simplex_regions);
 }
 
 }  // namespace
 
+absl::StatusOr<std::unique_ptr<core::Mesher>> BeginMesh(const MesherFactory& create_mesher,
+                                                        const core::MeshParameters& parameters,
+                                                        std::span<const double> points, const FeatureStore& features,
+                                                        core::RunContext& context) {
+  const core::Features bounds = features.View();
+  return create_mesher(parameters, points, features.IsEmpty() ? nullptr : &bounds, context);
+}
+
 absl::StatusOr<std::unique_ptr<core::Mesher>> Replay(const SessionSteps& steps, const PointStore& points,
-                                                     const core::Mesh& last_mesh, const MesherFactory& create_mesher,
-                                                     Job& job) {
-  Structure structure(points, create_mesher);
+                                                     const FeatureStore& features, const core::Mesh& last_mesh,
+                                                     const MesherFactory& create_mesher, Job& job) {
+  Structure structure(points, features, create_mesher);
   for (const SessionStep& step : steps.all()) {
     WELLSPACE_RETURN_IF_ERROR(job.RunApart([&](core::RunContext& context) { return structure.Take(step, context); }));
   }

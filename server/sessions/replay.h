@@ -11,23 +11,33 @@
 #include "core/mesher.h"
 #include "server/base/mesh_functions.h"
 #include "server/jobs/job.h"
+#include "server/sessions/feature_store.h"
 #include "server/sessions/point_store.h"
 #include "server/sessions/session_steps.h"
 
 namespace wellspace::server {
 
+// The mesher that the first refinement begins with: of the domain of `features`, or, if there are none, of a cloud.
+//
+// Errors:     those of `create_mesher`.
+absl::StatusOr<std::unique_ptr<core::Mesher>> BeginMesh(const MesherFactory& create_mesher,
+                                                        const core::MeshParameters& parameters,
+                                                        std::span<const double> points, const FeatureStore& features,
+                                                        core::RunContext& context);
+
 // Takes `steps` again, from the first on, in the work of `job` but apart from its context. `last_mesh` is the mesh of
 // the last refinement among them.
 //
-// REQUIRES:   `steps` is not empty; its points are in `points`, which nothing changes meanwhile.
+// REQUIRES:   `steps` is not empty; its points are in `points`, and what bounds them in `features`. Nothing changes
+//             these meanwhile.
 // Guarantees: what is made of the mesher from now on is, to the bit, what would have been made of the one that the
 //             steps made.
 // Complexity: that of the steps. Reserves memory as the first refinement did.
 // Errors:     those of the steps: RESOURCE_EXHAUSTED, CANCELLED, DEADLINE_EXCEEDED; INTERNAL: the mesh is not
 //             `last_mesh`.
 absl::StatusOr<std::unique_ptr<core::Mesher>> Replay(const SessionSteps& steps, const PointStore& points,
-                                                     const core::Mesh& last_mesh, const MesherFactory& create_mesher,
-                                                     Job& job);
+                                                     const FeatureStore& features, const core::Mesh& last_mesh,
+                                                     const MesherFactory& create_mesher, Job& job);
 
 }  // namespace wellspace::server
 

@@ -49,6 +49,10 @@ v1::Session Session::Describe() const {
   *message.mutable_expire_time() = TimeToProto(clock_.wall() + (lease_.ExpiresAt(since_boot) - since_boot));
   message.set_revision(revision_);
   message.set_committed_points(points_.coordinate_count() / dimension_);
+  message.set_segment_count(features_.segment_count());
+  message.set_seed_count(features_.seed_count());
+  message.set_faces(features_.face_rule());
+  message.set_crossings(features_.crossing_rule());
   if (work_.mesh != nullptr) {
     message.set_vertex_count(work_.mesh->chunks.mesh().vertex_count());
     message.set_simplex_count(work_.mesh->chunks.mesh().simplex_count());
@@ -308,6 +312,9 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::StartOperation(const core::M
                                                                    uint64_t expected_revision) {
   std::lock_guard lock(mutex_);
   WELLSPACE_RETURN_IF_ERROR(CheckReadyForChange(expected_revision));
+  if (!features_.IsEmpty()) {
+    WELLSPACE_RETURN_IF_ERROR(ValidateForDomain(parameters, features_.View()));
+  }
   auto operation = std::make_shared<Operation>(absl::StrCat(name_, "/operations/", next_operation_), next_operation_,
                                                parameters, clock_.wall());
   ++next_operation_;

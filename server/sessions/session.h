@@ -1,4 +1,4 @@
-// A session: a domain, a cloud of points and the mesh over it.
+// A session: a domain, its points and segments, and the mesh over them.
 #ifndef WELLSPACE_SERVER_SESSIONS_SESSION_H_
 #define WELLSPACE_SERVER_SESSIONS_SESSION_H_
 
@@ -24,6 +24,7 @@
 #include "server/base/options.h"
 #include "server/jobs/job.h"
 #include "server/jobs/memory_budget.h"
+#include "server/sessions/feature_store.h"
 #include "server/sessions/lease.h"
 #include "server/sessions/mesh_chunks.h"
 #include "server/sessions/operation.h"
@@ -57,8 +58,9 @@ struct SessionWork {
 };
 
 // Thread safety: thread-safe.
-// Invariants: (1) revision grows with every change of the points or of the mesh; (2) while an operation is under way,
-// or vertices are being added or the mesher is built again, points, mesh, mesher and steps are touched by nothing else;
+// Invariants: (1) revision grows with every change of the points, the features or the mesh; (2) while an operation is
+// under way, or vertices are being added or the mesher is built again, points, features, mesh, mesher and steps are
+// touched by nothing else;
 // (3) what did not succeed leaves the session as it was: structure and mesh are what Replay makes of the steps, whether
 // there is a mesher now or not; (4) the lock order is this session's mutex, then that of an operation, of
 // TenantPoints or, where memory is released, of the JobPool.
@@ -130,6 +132,16 @@ class Session {
   // Points and revision, as one.
   v1::UploadPointsResponse Committed() const;
 
+  // Appends the segments and seeds of `request`, of which the first become those of the numbers that it says, and takes
+  // over its rules: all or, on an error, none. Where the session has segments and seeds already, they have to be equal,
+  // and are not appended again. `expected_revision` 0: any.
+  //
+  // Errors:     INVALID_SEGMENTS, INVALID_CHUNK_SHAPE, UPLOAD_GAP, UPLOAD_MISMATCH, DOMAIN_FIXED, SESSION_BUSY,
+  //             TOO_MANY_POINTS, QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH, SESSION_NOT_FOUND.
+  absl::Status AddSegments(const v1::AddSegmentsRequest& request, uint64_t expected_revision);
+  // Segments, seeds and revision, as one.
+  v1::AddSegmentsResponse CommittedSegments() const;
+
   // The last mesh; null before the first.
   std::shared_ptr<const MeshSnapshot> mesh() const;
 
@@ -144,6 +156,7 @@ class Session {
   // How much there is to work on now.
   struct Size {
     uint64_t points = 0;
+    uint64_t segments = 0;
     std::vector<double> some_points;  // all, if they are at most `few`; else none
     uint64_t vertices = 0;            // of the last mesh
     uint64_t replayed_steps = 0;      // that have to be replayed before any other work
@@ -171,7 +184,8 @@ class Session {
   // Begins an operation. The session is busy until the operation has ended. The caller is to submit its work, or, if
   // that is refused, to call Withdraw.
   //
-  // Errors:     SESSION_BUSY, REVISION_MISMATCH, SESSION_NOT_FOUND.
+  // Errors:     SESSION_BUSY, REVISION_MISMATCH, SESSION_NOT_FOUND; INVALID_PARAMETERS, of those that a domain with
+  //             segments does not have.
   absl::StatusOr<std::shared_ptr<Operation>> StartOperation(const core::MeshParameters& parameters,
                                                             uint64_t expected_revision);
   // Ends `operation`, the one that was started last, since its work was refused with `status`. The session is as it was
@@ -196,8 +210,9 @@ class Session {
   // The operations after number `after`, the oldest first, at most `count`.
   std::vector<std::shared_ptr<Operation>> ListOperations(uint64_t after, size_t count) const;
 
-  // These two are for the operation that is under way.
+  // These are for the operation that is under way.
   const PointStore& points() const { return points_; }
+  const FeatureStore& features() const { return features_; }
   // What has made the structure.
   const SessionSteps& steps() const { return steps_; }
 
@@ -221,6 +236,9 @@ class Session {
   absl::Status CheckNoGap(uint64_t offset) const;
   // Checks that the session has `coordinates` from point `first` on.
   absl::Status CheckKnown(uint64_t first, std::span<const double> coordinates) const;
+  // Refuses an AddSegments whose segments or seeds leave a gap, or are others than the session has. `*segments` and
+  // `*seeds` become how many of them the session has already.
+  absl::Status CheckKnown(const v1::AddSegmentsRequest& request, uint64_t* segments, uint64_t* seeds) const;
   // Refuses what no mesh of this session could have. `first` is the number of the first point.
   absl::Status CheckCoordinates(uint64_t first, std::span<const double> coordinates) const;
   void CloseNow();
@@ -266,6 +284,7 @@ class Session {
   uint64_t revision_ = 1;
   PointAccount point_account_;      // includes the points that AddVertices is adding
   PointStore points_;               // see invariant (2)
+  FeatureStore features_;           // see invariant (2)
   SessionWork work_;                // its mesher is away while an operation is under way; see invariant (2)
   SessionSteps steps_;              // see invariant (2)
   uint64_t structure_version_ = 0;  // of what queries see; 0: nothing yet

@@ -43,6 +43,7 @@ Session::Size Session::GetSize(uint64_t few) const {
   std::lock_guard lock(mutex_);
   Size size;
   size.points = points_.coordinate_count() / dimension_;
+  size.segments = features_.segment_count();
   if (size.points <= few) {
     size.some_points = points_.CopyFrom(0, core::RunContext()).value_or(std::vector<double>());
   }
@@ -56,7 +57,8 @@ Session::Size Session::GetSize(uint64_t few) const {
 }
 
 absl::Status Session::Rebuild(const MesherFactory& create_mesher, Job& job) {
-  WELLSPACE_ASSIGN_OR_RETURN(work_.mesher, Replay(steps_, points_, work_.mesh->chunks.mesh(), create_mesher, job));
+  WELLSPACE_ASSIGN_OR_RETURN(work_.mesher,
+                             Replay(steps_, points_, features_, work_.mesh->chunks.mesh(), create_mesher, job));
   work_.memory = job.TakeMemory(work_.mesher->memory_bytes());
   work_.memory.MakeLasting();
   return absl::OkStatus();

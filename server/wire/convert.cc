@@ -6,6 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
+#include "core/domain_parameters.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -208,6 +209,15 @@ absl::StatusOr<core::MeshParameters> ParametersFromProto(const v1::MeshParameter
       message.max_vertices() == 0 ? std::min(options.max_vertices, core::kDefaultMaxVertices) : message.max_vertices();
   WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "max_vertices"));
   return parameters;
+}
+
+absl::Status ValidateForDomain(const core::MeshParameters& parameters, const core::Features& features) {
+  const absl::Status status = core::ValidateDomainParameters(parameters, features);
+  if (status.ok()) {
+    return status;
+  }
+  const std::string message(status.message());
+  return InvalidParameter(message, message.substr(0, message.find(':')));
 }
 
 v1::MeshParameters ParametersToProto(const core::MeshParameters& parameters) {

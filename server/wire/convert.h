@@ -23,6 +23,11 @@ namespace wellspace::server {
 absl::StatusOr<core::MeshParameters> ParametersFromProto(const v1::MeshParameters& message,
                                                          const ServiceOptions& options);
 
+// Refuses parameters that a domain with `features` does not have; see core::ValidateDomainParameters.
+//
+// Errors:     INVALID_PARAMETERS with the path of the first wrong field.
+absl::Status ValidateForDomain(const core::MeshParameters& parameters, const core::Features& features);
+
 // The parameters with every default that does not depend on points filled in.
 v1::MeshParameters ParametersToProto(const core::MeshParameters& parameters);
 

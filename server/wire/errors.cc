@@ -26,6 +26,9 @@ constexpr char kReason[] = "wellspace.v1/reason";
 constexpr char kField[] = "wellspace.v1/field";
 constexpr char kMayRetry[] = "wellspace.v1/may_retry";
 
+// What the core says where the mesh of a domain with segments cannot do what that of a cloud can.
+constexpr char kOfDomain[] = "the mesh of a domain with segments";
+
 absl::string_view ToAbsl(std::string_view text) { return {text.data(), text.size()}; }
 
 absl::StatusCode CodeOf(v1::ErrorReason reason) {
@@ -58,6 +61,7 @@ absl::StatusCode CodeOf(v1::ErrorReason reason) {
     case v1::ERROR_REASON_SESSION_BUSY:
     case v1::ERROR_REASON_MESH_NOT_READY:
     case v1::ERROR_REASON_UPLOAD_MISMATCH:
+    case v1::ERROR_REASON_DOMAIN_FIXED:
       return absl::StatusCode::kFailedPrecondition;
     case v1::ERROR_REASON_REVISION_MISMATCH:
       return absl::StatusCode::kAborted;
@@ -98,8 +102,10 @@ absl::Status FromCore(const absl::Status& status) {
   const std::string message(status.message());
   switch (status.code()) {
     case absl::StatusCode::kInvalidArgument:
-      for (const auto& [what, field] :
-           {std::pair("segments", "segments.ends"), {"seeds[", "faces.seeds"}, {"faces:", "faces.faces"}}) {
+      for (const auto& [what, field] : {std::pair("segments", "segments.ends"),
+                                        {"markers:", "segments.markers"},
+                                        {"seeds[", "faces.seeds"},
+                                        {"faces:", "faces.faces"}}) {
         if (message.rfind(what, 0) == 0) {
           return MakeError(v1::ERROR_REASON_INVALID_SEGMENTS, message, field);
         }
@@ -112,7 +118,9 @@ absl::Status FromCore(const absl::Status& status) {
       }
       return MakeError(v1::ERROR_REASON_MESH_TOO_LARGE, message);
     case absl::StatusCode::kFailedPrecondition:
-      return MakeError(v1::ERROR_REASON_MESH_NOT_READY, message);
+      return MakeError(message.find(kOfDomain) == std::string::npos ? v1::ERROR_REASON_MESH_NOT_READY
+                                                                    : v1::ERROR_REASON_DOMAIN_FIXED,
+                       message);
     case absl::StatusCode::kCancelled:
     case absl::StatusCode::kDeadlineExceeded:
       return status;

@@ -14,6 +14,7 @@ namespace {
 
 using ::testing::_;
 using ::testing::Field;
+using ::testing::Optional;
 using ::testing::Return;
 using ::testing::SizeIs;
 
@@ -35,6 +36,9 @@ class MockConnection : public Connection {
   MOCK_METHOD(absl::Status, DeleteSession, (const std::string&, const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<Uploaded>, UploadPoints,
               (const std::string&, PointSource&, std::optional<uint64_t>, const OnPoints&, const CallOptions&),
+              (override));
+  MOCK_METHOD(absl::StatusOr<AddedSegments>, AddSegments,
+              (const std::string&, const Features&, const std::optional<FeatureOffset>&, const CallOptions&),
               (override));
   MOCK_METHOD(absl::Status, DownloadMesh,
               (const std::string&, MeshSink&, uint64_t, const OnChunks&, const CallOptions&), (override));
@@ -93,6 +97,7 @@ TEST(Client, PassesSessionsAndOperationsToItsConnection) {
                        Field(&CallOptions::expected_revision, 4));
   const std::vector<double> points = {1, 2};
   SpanSource source(2, points);
+  const Features features;
   MeshCollector sink;
   EXPECT_CALL(*connection, CreateSession(_, is_call)).WillOnce(Return(E("create")));
   EXPECT_CALL(*connection, GetSession("s", is_call)).WillOnce(Return(E("get")));
@@ -102,6 +107,8 @@ TEST(Client, PassesSessionsAndOperationsToItsConnection) {
   EXPECT_CALL(*connection, DeleteSession("s", is_call)).WillOnce(Return(E("delete")));
   EXPECT_CALL(*connection, UploadPoints("s", ::testing::Ref(source), std::optional<uint64_t>(5), _, is_call))
       .WillOnce(Return(E("upload")));
+  EXPECT_CALL(*connection, AddSegments("s", ::testing::Ref(features), Optional(FeatureOffset{7, 8}), is_call))
+      .WillOnce(Return(E("segments")));
   EXPECT_CALL(*connection, DownloadMesh("s", ::testing::Ref(sink), 6, _, is_call)).WillOnce(Return(E("download")));
   EXPECT_CALL(*connection, StartRefinement("s", _, is_call)).WillOnce(Return(E("start")));
   EXPECT_CALL(*connection, GetOperation("o", is_call)).WillOnce(Return(E("operation")));
@@ -115,6 +122,7 @@ TEST(Client, PassesSessionsAndOperationsToItsConnection) {
   EXPECT_EQ(client.UpdateSession("s", {}, call).status(), E("update"));
   EXPECT_EQ(client.DeleteSession("s", call), E("delete"));
   EXPECT_EQ(client.UploadPoints("s", source, 5, nullptr, call).status(), E("upload"));
+  EXPECT_EQ(client.AddSegments("s", features, FeatureOffset{7, 8}, call).status(), E("segments"));
   EXPECT_EQ(client.DownloadMesh("s", sink, 6, nullptr, call), E("download"));
   EXPECT_EQ(client.StartRefinement("s", std::nullopt, call).status(), E("start"));
   EXPECT_EQ(client.GetOperation("o", call).status(), E("operation"));

@@ -266,6 +266,12 @@ constexpr std::array kCalls = {
     Call{[](client::Connection& c) { return c.ClippedVoronoiCells(kSession, kVertices, 2, RequireCells, Patience()); }},
     Call{[](client::Connection& c) { return c.VoronoiCells(kSession, {}, RequireCells, Patience()); }},
     Call{[](client::Connection& c) { return c.AddVertices(kSession, kPoints, kVertices, Patience()).status(); }},
+    Call{[](client::Connection& c) {
+      client::Features features;
+      features.ends = {0, 1};
+      features.seeds = {{.x = 1, .y = 2, .is_hole = true, .region = 0, .max_area = 0}};
+      return c.AddSegments(kSession, features, std::nullopt, Patience()).status();
+    }},
 };
 
 constexpr size_t kMeshPoints = 0;

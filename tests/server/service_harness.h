@@ -117,7 +117,7 @@ class ServiceHarness {
  public:
   explicit ServiceHarness(Mesher mesher = FakeMesher, const ServiceOptions& options = {},
                           Transport transport = Transport::kInProcess, Estimator estimator = FakeEstimator,
-                          MesherFactory create_mesher = core::Mesher::Create, const SecurityOptions& security = {});
+                          MesherFactory create_mesher = CreateMesher, const SecurityOptions& security = {});
 
   Server& server() { return *server_; }
   LogLines& log() { return *log_; }

@@ -140,6 +140,24 @@ v1::UploadPointsResponse SessionCalls::Upload(const std::string& name, uint64_t 
   return Upload({UploadRequest(name, offset, coordinates)}, status);
 }
 
+v1::AddSegmentsResponse SessionCalls::AddSegments(const std::vector<v1::AddSegmentsRequest>& requests,
+                                                  grpc::Status* status) {
+  grpc::ClientContext context;
+  v1::AddSegmentsResponse response;
+  const auto stream = sessions_->AddSegments(&context, &response);
+  for (const v1::AddSegmentsRequest& request : requests) {
+    stream->Write(request);
+  }
+  stream->WritesDone();
+  const grpc::Status ended = stream->Finish();
+  if (status != nullptr) {
+    *status = ended;
+  } else {
+    EXPECT_TRUE(ended.ok()) << ended.error_message();
+  }
+  return response;
+}
+
 v1::Operation SessionCalls::Start(const v1::StartRefinementRequest& request, grpc::Status* status) {
   return Call(*operations_, &v1::OperationService::Stub::StartRefinement, request, status).operation();
 }
@@ -175,9 +193,10 @@ v1::Operation SessionCalls::Refine(const std::string& name) {
 }
 
 Download SessionCalls::DownloadMesh(const std::string& name, uint64_t revision, uint64_t next_chunk,
-                                    std::optional<size_t> stop_after) {
+                                    std::optional<size_t> stop_after, bool with_boundary) {
   grpc::ClientContext context;
   v1::DownloadMeshRequest request;
+  request.set_with_boundary(with_boundary);
   request.set_name(name);
   request.set_revision(revision);
   request.set_next_chunk(next_chunk);
@@ -198,6 +217,29 @@ Download SessionCalls::DownloadMesh(const std::string& name, uint64_t revision, 
   }
   download.status = stream->Finish();
   return download;
+}
+
+std::vector<double> FramePoints() { return {0, 0, 4, 0, 4, 4, 0, 4, 1, 1, 3, 1, 3, 3, 1, 3}; }
+
+v1::AddSegmentsRequest FrameRequest(const std::string& name) {
+  v1::AddSegmentsRequest request;
+  request.set_name(name);
+  for (const uint32_t end : {0, 1, 1, 2, 2, 3, 3, 0, 4, 5, 5, 6, 6, 7, 7, 4, 0, 4, 2, 6}) {
+    request.mutable_segments()->add_ends(end);
+  }
+  for (const int32_t marker : {5, 5, 5, 5, 9, 9, 9, 9, 0, 0}) {
+    request.mutable_segments()->add_markers(marker);
+  }
+  request.mutable_faces()->set_faces(v1::FACE_RULE_HOLES);
+  v1::FaceSeed& hole = *request.mutable_faces()->add_seeds();
+  hole.set_x(2);
+  hole.set_y(2);
+  hole.set_hole(true);
+  v1::FaceSeed& region = *request.mutable_faces()->add_seeds();
+  region.set_x(0.5);
+  region.set_y(2);
+  region.set_region(3);
+  return request;
 }
 
 SessionClient::SessionClient(const std::shared_ptr<grpc::Channel>& channel, const v1::MeshParameters& parameters)

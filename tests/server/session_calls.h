@@ -68,6 +68,10 @@ class SessionCalls {
   v1::UploadPointsResponse Upload(const std::string& name, uint64_t offset, const std::vector<double>& coordinates,
                                   grpc::Status* status = nullptr);
 
+  // One stream of these requests.
+  v1::AddSegmentsResponse AddSegments(const std::vector<v1::AddSegmentsRequest>& requests,
+                                      grpc::Status* status = nullptr);
+
   v1::Operation Start(const v1::StartRefinementRequest& request, grpc::Status* status = nullptr);
   v1::Operation Start(const std::string& name, grpc::Status* status = nullptr);
   v1::Operation GetOperation(const std::string& name, grpc::Status* status = nullptr);
@@ -78,7 +82,7 @@ class SessionCalls {
 
   // Downloads a mesh from `next_chunk` on. Breaks off when `stop_after` chunks have come.
   Download DownloadMesh(const std::string& name, uint64_t revision = 0, uint64_t next_chunk = 0,
-                        std::optional<size_t> stop_after = std::nullopt);
+                        std::optional<size_t> stop_after = std::nullopt, bool with_boundary = false);
 
   v1::SessionService::Stub& sessions() { return *sessions_; }
   v1::OperationService::Stub& operations() { return *operations_; }
@@ -117,6 +121,11 @@ class SessionClient {
 };
 
 v1::UploadPointsRequest UploadRequest(const std::string& name, uint64_t offset, const std::vector<double>& coordinates);
+
+// A square of side 4 around one of side 2, which is a hole, with two lines from one to the other: points, and a request
+// with 10 segments, which have the markers 5, 9 and 0, and 2 seeds, of the hole and of region 3 on a side of the lines.
+std::vector<double> FramePoints();
+v1::AddSegmentsRequest FrameRequest(const std::string& name);
 
 // Points of the unit cube, away from its faces.
 std::vector<double> UniformPoints(size_t count, int dimension, uint64_t seed);

@@ -61,6 +61,11 @@ void PrintSession(const client::Session& session, bool json) {
   }
   print("quality", QualityText(session.parameters));
   print("points", WithThousands(session.committed_points));
+  if (session.faces.has_value()) {
+    print("segments", WithThousands(session.segment_count));
+    print("faces", absl::StrCat(FaceRuleName(*session.faces), ", ", WithThousands(session.seed_count),
+                                " holes and regions", session.split_crossings ? ", crossings split" : ""));
+  }
   print("vertices", WithThousands(session.vertex_count));
   print("simplices", WithThousands(session.simplex_count));
   print("revision", absl::StrCat(session.revision));

@@ -1,4 +1,4 @@
-// wellspace upload, download: points to a session, and its mesh to a file.
+// wellspace upload, download: points and segments to a session, and its mesh to a file.
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/cli/cloud_options.h"
 #include "client/cli/commands/commands.h"
+#include "client/cli/domain_options.h"
 #include "client/cli/meshing_options.h"
 #include "client/cli/options.h"
 #include "client/cli/progress_bar.h"
@@ -18,6 +19,7 @@
 #include "client/formats/file_plan.h"
 #include "client/formats/line_reader.h"
 #include "client/formats/write_mesh.h"
+#include "client/point_source.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::cli {
@@ -28,14 +30,64 @@ struct UploadCommand {
   std::string session;
   std::string input;
   formats::CloudOptions cloud_options;
+  DomainOptions domain;
   std::optional<uint64_t> offset;
+  std::optional<uint64_t> segment_offset;
+  std::optional<uint64_t> seed_offset;
   uint64_t expected_revision = 0;
 
-  absl::Status Upload(client::Client& client, client::CallOptions call) const;
+  absl::Status CheckOptions() const;
+  absl::Status Upload(client::Client& client, client::CallOptions call);
+  absl::Status UploadCloud(client::Client& client, const client::Session& found, const client::CallOptions& call);
+  absl::Status UploadDomain(client::Client& client, const client::Session& found, const client::CallOptions& call);
+  // Sends `total` points from number `first` of the session on, and shows how far that is.
+  absl::StatusOr<client::Uploaded> Send(client::Client& client, client::PointSource& source, uint64_t first,
+                                        uint64_t total, const client::CallOptions& call) const;
 };
 
-absl::Status UploadCommand::Upload(client::Client& client, client::CallOptions call) const {
+// Segments whose ends are numbers of points of the session, of which the first is `first`.
+absl::StatusOr<client::Features> Shifted(client::Features features, uint64_t first, uint64_t points) {
+  if (first + points > client::kNoVertex) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "--offset: after ", first, " points no segment can name those of IN; 2^32 - 1 points have numbers"));
+  }
+  for (uint32_t& end : features.ends) {
+    end += static_cast<uint32_t>(first);
+  }
+  return features;
+}
+
+absl::Status UploadCommand::CheckOptions() const {
+  if (domain.IsDomain(input, cloud_options.format)) {
+    return absl::OkStatus();
+  }
+  if (segment_offset.has_value() || seed_offset.has_value()) {
+    return absl::InvalidArgumentError(absl::StrCat(segment_offset.has_value() ? "--segment-offset" : "--seed-offset",
+                                                   ": IN has points alone; give a .poly or .geojson, or --segments"));
+  }
+  return domain.CheckCloud();
+}
+
+absl::StatusOr<client::Uploaded> UploadCommand::Send(client::Client& client, client::PointSource& source,
+                                                     uint64_t first, uint64_t total,
+                                                     const client::CallOptions& call) const {
+  ProgressBar bar(!remote.quiet() && !remote.json());
+  const double all = std::max<double>(1, total);
+  return client.UploadPoints(
+      session, source, first,
+      [&](uint64_t points) { bar.Update("upload", points / all, absl::StrCat(WithThousands(points), " points")); },
+      call);
+}
+
+absl::Status UploadCommand::Upload(client::Client& client, client::CallOptions call) {
   WELLSPACE_ASSIGN_OR_RETURN(const client::Session found, client.GetSession(session, call));
+  call.expected_revision = expected_revision;
+  return domain.IsDomain(input, cloud_options.format) ? UploadDomain(client, found, call)
+                                                      : UploadCloud(client, found, call);
+}
+
+absl::Status UploadCommand::UploadCloud(client::Client& client, const client::Session& found,
+                                        const client::CallOptions& call) {
   formats::CloudOptions options = cloud_options;
   options.dimension = found.parameters.dimension;
   WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<client::CloudFile> opened, client::CloudFile::Open(input, options));
@@ -43,16 +95,7 @@ absl::Status UploadCommand::Upload(client::Client& client, client::CallOptions c
   const CloudReport report = ReportOf(options, cloud.notes(), cloud.skipped());
   PrintNotes(report, remote.format(), remote.quiet());
   const uint64_t first = offset.value_or(found.committed_points);
-  call.expected_revision = expected_revision;
-  absl::StatusOr<client::Uploaded> uploaded = absl::InternalError("no upload");
-  {
-    ProgressBar bar(!remote.quiet() && !remote.json());
-    const double total = std::max<double>(1, cloud.size());
-    uploaded = client.UploadPoints(
-        session, cloud, first,
-        [&](uint64_t points) { bar.Update("upload", points / total, absl::StrCat(WithThousands(points), " points")); },
-        call);
-  }
+  const absl::StatusOr<client::Uploaded> uploaded = Send(client, cloud, first, cloud.size(), call);
   if (!uploaded.ok()) {
     return WithOrigins(uploaded.status(), first, cloud.size(),
                        [&cloud](uint64_t point) { return cloud.Origin(point); });
@@ -65,6 +108,54 @@ absl::Status UploadCommand::Upload(client::Client& client, client::CallOptions c
   } else if (!remote.quiet()) {
     std::cout << session << ": " << WithThousands(uploaded->committed_points) << " points, revision "
               << uploaded->revision << "\n";
+  }
+  return absl::OkStatus();
+}
+
+absl::Status UploadCommand::UploadDomain(client::Client& client, const client::Session& found,
+                                         const client::CallOptions& call) {
+  const absl::StatusOr<formats::PointCloud> cloud = domain.Read(input, cloud_options);
+  if (!cloud.ok()) {
+    return cloud.status();
+  }
+  const CloudReport report = ReportOf(cloud_options, cloud->notes, cloud->skipped);
+  PrintNotes(report, remote.format(), remote.quiet());
+  const bool is_first = offset == 0;  // an upload before which there were no points, and so no segments
+  const uint64_t first = offset.value_or(found.committed_points);
+  const client::FeatureOffset before = {.segments = segment_offset.value_or(is_first ? 0 : found.segment_count),
+                                        .seeds = seed_offset.value_or(is_first ? 0 : found.seed_count)};
+  const absl::StatusOr<client::Features> features = Shifted(*domain.features(), first, cloud->size());
+  if (!features.ok()) {
+    return features.status();
+  }
+  if (found.vertex_count > 0 && (before.segments + features->ends.size() / 2 > found.segment_count ||
+                                 before.seeds + features->seeds.size() > found.seed_count)) {
+    // The server would take the points before it refuses the segments.
+    return absl::FailedPreconditionError(
+        absl::StrCat(session, " has been refined; segments can be added only before the first refinement"));
+  }
+  client::SpanSource source(cloud->dimension, cloud->points);
+  const absl::StatusOr<client::Uploaded> uploaded = Send(client, source, first, cloud->size(), call);
+  if (!uploaded.ok()) {
+    return domain.WithOrigins(uploaded.status(), {first, before});
+  }
+  client::CallOptions next = call;
+  next.expected_revision = expected_revision == 0 ? 0 : uploaded->revision;
+  const absl::StatusOr<client::AddedSegments> added = client.AddSegments(session, *features, before, next);
+  if (!added.ok()) {
+    return domain.WithOrigins(added.status(), {first, before});
+  }
+  if (remote.json()) {
+    Json json = {{"session", session},
+                 {"committed_points", uploaded->committed_points},
+                 {"segment_count", added->segment_count},
+                 {"seed_count", added->seed_count},
+                 {"revision", added->revision}};
+    AddNotes(report, json);
+    PrintJson(json);
+  } else if (!remote.quiet()) {
+    std::cout << session << ": " << WithThousands(uploaded->committed_points) << " points, "
+              << WithThousands(added->segment_count) << " segments, revision " << added->revision << "\n";
   }
   return absl::OkStatus();
 }
@@ -129,19 +220,30 @@ absl::Status DownloadCommand::Download(client::Client& client, const client::Cal
 
 void AddUpload(CLI::App& app, int& exit_code) {
   const auto command = std::make_shared<UploadCommand>();
-  CLI::App* upload = app.add_subcommand("upload", "Add the points of a file to a session");
+  CLI::App* upload = app.add_subcommand("upload", "Add the points of a file, or a domain, to a session");
   upload->footer(absl::StrCat(kCloudsHelp, "\n", kExitCodesHelp));
   AddSession(*upload, command->session);
   upload->add_option("IN", command->input, "File of points, or - for standard input")->required()->type_name("FILE");
-  AddCloudOptions(*upload, command->cloud_options);
+  AddCloudOptions(*upload, command->cloud_options, "IN", {"poly", "geojson"});
+  command->domain.AddTo(*upload);
   AddCount(
       *upload, "--offset", [command](uint64_t offset) { command->offset = offset; },
       "Number of the session's points before the first of IN. What is there from it on has to be the same as in IN, "
       "and is not sent again, so that an upload that broke off is repeated with the same offset; default: after the "
       "session's points");
+  AddCount(
+      *upload, "--segment-offset", [command](uint64_t offset) { command->segment_offset = offset; },
+      "Of a domain: the same of the session's segments; default: 0 with --offset 0, else after them");
+  AddCount(
+      *upload, "--seed-offset", [command](uint64_t offset) { command->seed_offset = offset; },
+      "Of a domain: the same of the session's holes and regions; default: 0 with --offset 0, else after them");
   AddExpectedRevision(*upload, command->expected_revision);
   command->remote.AddTo(*upload, RemoteCommand::Needs::kLastingServer);
   upload->callback([command, &exit_code] {
+    if (const absl::Status status = command->CheckOptions(); !status.ok()) {
+      exit_code = ReportError(status, command->remote.format());
+      return;
+    }
     exit_code = command->remote.Run([&command](client::Client& client, const client::CallOptions& call,
                                                const Interrupt&) { return command->Upload(client, call); });
   });

@@ -54,7 +54,7 @@ class CloudCall : public RequestStream<Call<Reactor>> {
   const std::shared_ptr<Job>& job() const { return job_; }
   // Constant once there is a job.
   const core::MeshParameters& parameters() const { return receiver_.parameters(); }
-  const ReceivedFeatures& features() const { return receiver_.features(); }
+  const FeatureStore& features() const { return receiver_.features(); }
 
  private:
   void SubmitJob();

@@ -43,9 +43,9 @@ absl::Status CloudReceiver::Accept(Request* request) {
     case Request::kPoints:
       return AcceptPoints(request->mutable_points());
     case Request::kSegments:
-      return AcceptFeatures(request->segments(), "segments");
+      return AcceptSegments(request->segments());
     case Request::kFaces:
-      return AcceptFeatures(request->faces(), "faces");
+      return AcceptFaces(request->faces());
     case Request::REQUEST_NOT_SET:
       break;
   }
@@ -61,7 +61,7 @@ absl::Status CloudReceiver::AcceptEnd() const {
     return MakeError(v1::ERROR_REASON_PARAMETERS_MISSING,
                      "the stream ended before any request; send the parameters first", "parameters");
   }
-  return absl::OkStatus();
+  return features_.IsEmpty() ? absl::OkStatus() : ValidateForDomain(parameters_, features_.View());
 }
 
 absl::Status CloudReceiver::AcceptParameters(const v1::MeshParameters& message) {
@@ -74,18 +74,37 @@ absl::Status CloudReceiver::AcceptParameters(const v1::MeshParameters& message) 
   return absl::OkStatus();
 }
 
-template <typename Part>
-absl::Status CloudReceiver::AcceptFeatures(const Part& part, const char* field) {
+absl::Status CloudReceiver::CheckInDomain(const char* field) const {
   if (!has_parameters_) {
     return MakeError(v1::ERROR_REASON_PARAMETERS_MISSING,
                      absl::StrCat(field, " came before the parameters; send the parameters first"), "parameters");
   }
-  if (parameters_.dimension != 2) {
-    return MakeError(
-        v1::ERROR_REASON_INVALID_SEGMENTS,
-        absl::StrCat(field, " bound domains in 2-D alone, and parameters.dimension is ", parameters_.dimension), field);
-  }
-  return features_.Accept(part);
+  return parameters_.dimension == 2 ? absl::OkStatus() : NotInThePlane(field, parameters_.dimension);
+}
+
+absl::Status CloudReceiver::CheckCount(uint64_t count, const char* what) const {
+  return count <= options_.max_points ? absl::OkStatus()
+                                      : MakeError(v1::ERROR_REASON_TOO_MANY_POINTS,
+                                                  absl::StrCat("at least ", count, " ", what,
+                                                               "; this server accepts at most ", options_.max_points));
+}
+
+absl::Status CloudReceiver::AcceptSegments(const v1::SegmentChunk& chunk) {
+  const uint64_t first = features_.segment_count();
+  WELLSPACE_RETURN_IF_ERROR(CheckInDomain("segments"));
+  WELLSPACE_RETURN_IF_ERROR(CheckSegments(chunk, first));
+  WELLSPACE_RETURN_IF_ERROR(CheckCount(first + chunk.ends_size() / 2, "segments"));
+  features_.Append(chunk);
+  return absl::OkStatus();
+}
+
+absl::Status CloudReceiver::AcceptFaces(const v1::FaceOptions& options) {
+  const uint64_t first = features_.seed_count();
+  WELLSPACE_RETURN_IF_ERROR(CheckInDomain("faces"));
+  WELLSPACE_RETURN_IF_ERROR(CheckFaces(options, first));
+  WELLSPACE_RETURN_IF_ERROR(CheckCount(first + options.seeds_size(), "seeds"));
+  features_.Append(options);
+  return absl::OkStatus();
 }
 
 absl::Status CloudReceiver::AcceptPoints(v1::PointChunk* chunk) {
@@ -101,10 +120,7 @@ absl::Status CloudReceiver::AcceptPoints(v1::PointChunk* chunk) {
                      "points.coordinates");
   }
   const uint64_t total = point_count_ + count / parameters_.dimension;
-  if (total > options_.max_points) {
-    return MakeError(v1::ERROR_REASON_TOO_MANY_POINTS,
-                     absl::StrCat("at least ", total, " points; this server accepts at most ", options_.max_points));
-  }
+  WELLSPACE_RETURN_IF_ERROR(CheckCount(total, "points"));
   points_.Append(chunk->mutable_coordinates());
   point_count_ = total;
   return absl::OkStatus();

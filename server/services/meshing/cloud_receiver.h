@@ -11,7 +11,7 @@
 #include "core/mesher.h"
 #include "google/protobuf/repeated_field.h"
 #include "server/base/options.h"
-#include "server/services/meshing/received_features.h"
+#include "server/sessions/feature_store.h"
 #include "wellspace/v1/meshing.pb.h"
 
 namespace wellspace::server {
@@ -40,11 +40,11 @@ class PointChunks {
 // coordinate is looked at or copied.
 //
 // Thread safety: thread-compatible.
-// Invariants: never holds more than options.max_points points.
+// Invariants: never holds more than options.max_points points, segments or seeds.
 class CloudReceiver {
  public:
   // REQUIRES:   `options` outlives this.
-  explicit CloudReceiver(const ServiceOptions& options) : options_(options), features_(options.max_points) {}
+  explicit CloudReceiver(const ServiceOptions& options) : options_(options) {}
 
   // Takes over the contents of the next request.
   //
@@ -55,7 +55,7 @@ class CloudReceiver {
 
   // To be called when the client has ended its stream.
   //
-  // Errors:     PARAMETERS_MISSING.
+  // Errors:     PARAMETERS_MISSING; INVALID_PARAMETERS, of those that a domain with segments does not have.
   absl::Status AcceptEnd() const;
 
   bool has_parameters() const { return has_parameters_; }
@@ -64,7 +64,7 @@ class CloudReceiver {
   // Of what it holds.
   uint64_t held_bytes() const { return points_.coordinate_count() * sizeof(double) + features_.bytes(); }
   // Constant once the client has ended its stream.
-  const ReceivedFeatures& features() const { return features_; }
+  const FeatureStore& features() const { return features_; }
 
   // Hands over the points.
   PointChunks TakePoints() { return std::exchange(points_, PointChunks()); }
@@ -72,15 +72,19 @@ class CloudReceiver {
  private:
   absl::Status AcceptParameters(const v1::MeshParameters& message);
   absl::Status AcceptPoints(v1::PointChunk* chunk);
-  template <typename Part>
-  absl::Status AcceptFeatures(const Part& part, const char* field);
+  absl::Status AcceptSegments(const v1::SegmentChunk& chunk);
+  absl::Status AcceptFaces(const v1::FaceOptions& options);
+  // Checks that `field` may come now.
+  absl::Status CheckInDomain(const char* field) const;
+  // Checks that this may hold `count` of `what`.
+  absl::Status CheckCount(uint64_t count, const char* what) const;
 
   const ServiceOptions& options_;
   bool has_parameters_ = false;
   core::MeshParameters parameters_;
   uint64_t point_count_ = 0;
   PointChunks points_;
-  ReceivedFeatures features_;
+  FeatureStore features_;
 };
 
 }  // namespace wellspace::server

@@ -13,6 +13,7 @@
 #include "server/services/page_token.h"
 #include "server/services/resource_names.h"
 #include "server/services/session_fields.h"
+#include "server/services/sessions/add_segments_call.h"
 #include "server/services/sessions/download_mesh_call.h"
 #include "server/services/sessions/upload_points_call.h"
 #include "server/sessions/refinement.h"
@@ -157,6 +158,11 @@ grpc::ServerUnaryReactor* SessionService::DeleteSession(grpc::CallbackServerCont
 grpc::ServerReadReactor<grpc::ByteBuffer>* SessionService::UploadPoints(grpc::CallbackServerContext* context,
                                                                         grpc::ByteBuffer* response) {
   return UploadPointsCall::Begin(std::make_shared<UploadPointsCall>(environment_, context, response));
+}
+
+grpc::ServerReadReactor<grpc::ByteBuffer>* SessionService::AddSegments(grpc::CallbackServerContext* context,
+                                                                       grpc::ByteBuffer* response) {
+  return AddSegmentsCall::Begin(std::make_shared<AddSegmentsCall>(environment_, context, response));
 }
 
 grpc::ServerWriteReactor<grpc::ByteBuffer>* SessionService::DownloadMesh(grpc::CallbackServerContext* context,

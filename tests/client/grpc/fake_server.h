@@ -61,6 +61,9 @@ struct FakeSessions final : v1::SessionService::Service {
   std::function<grpc::Status(grpc::ServerContext&, grpc::ServerReader<v1::UploadPointsRequest>&,
                              v1::UploadPointsResponse&)>
       upload;
+  std::function<grpc::Status(grpc::ServerContext&, grpc::ServerReader<v1::AddSegmentsRequest>&,
+                             v1::AddSegmentsResponse&)>
+      add_segments;
   Streaming<v1::DownloadMeshRequest, v1::DownloadMeshResponse> download;
 
   grpc::Status CreateSession(grpc::ServerContext* /*context*/, const v1::CreateSessionRequest* request,
@@ -86,6 +89,10 @@ struct FakeSessions final : v1::SessionService::Service {
   grpc::Status UploadPoints(grpc::ServerContext* context, grpc::ServerReader<v1::UploadPointsRequest>* reader,
                             v1::UploadPointsResponse* response) override {
     return upload(*context, *reader, *response);
+  }
+  grpc::Status AddSegments(grpc::ServerContext* context, grpc::ServerReader<v1::AddSegmentsRequest>* reader,
+                           v1::AddSegmentsResponse* response) override {
+    return add_segments(*context, *reader, *response);
   }
   grpc::Status DownloadMesh(grpc::ServerContext* context, const v1::DownloadMeshRequest* request,
                             grpc::ServerWriter<v1::DownloadMeshResponse>* writer) override {

@@ -42,6 +42,10 @@ v1::Session MakeSession() {
   session.set_vertex_count(5);
   session.set_simplex_count(6);
   session.set_last_operation(kOperation);
+  session.set_segment_count(7);
+  session.set_seed_count(8);
+  session.set_faces(v1::FACE_RULE_EVEN_ODD);
+  session.set_crossings(v1::CROSSING_RULE_SPLIT);
   return session;
 }
 
@@ -63,6 +67,10 @@ void ExpectIsTheSession(const Session& session) {
   EXPECT_EQ(session.vertex_count, 5u);
   EXPECT_EQ(session.simplex_count, 6u);
   EXPECT_EQ(session.last_operation, kOperation);
+  EXPECT_EQ(session.segment_count, 7u);
+  EXPECT_EQ(session.seed_count, 8u);
+  EXPECT_EQ(session.faces, FaceRule::kEvenOdd);
+  EXPECT_TRUE(session.split_crossings);
 }
 
 TEST(Sessions, CreateSendsAllAndARequestIdOfItsOwn) {

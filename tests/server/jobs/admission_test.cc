@@ -187,7 +187,7 @@ TEST(Admission, SmallJobsOfATenantFinishWhileLargeOnesOfAnotherWait) {
     }
     return core::MeshPoints(parameters, points, context);
   };
-  ServiceHarness harness(mesher, LittleMemory(), Transport::kLoopback, FakeEstimator, core::Mesher::Create, security);
+  ServiceHarness harness(mesher, LittleMemory(), Transport::kLoopback, FakeEstimator, CreateMesher, security);
   TestCall first(harness.stub(), std::nullopt, large_token);
   SendPoints(first, 2);
   ASSERT_TRUE(holds.Wait());

@@ -40,7 +40,7 @@ class SecurityTest : public ::testing::Test {
  protected:
   void Start() {
     harness_ = std::make_unique<ServiceHarness>(FakeMesher, ServiceOptions(), Transport::kLoopback, FakeEstimator,
-                                                core::Mesher::Create, security_);
+                                                CreateMesher, security_);
   }
 
   // Certificates for a server and its clients.

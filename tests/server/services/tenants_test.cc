@@ -40,7 +40,7 @@ SecurityOptions TwoTenants(TemporaryFolder& folder) {
 class TenantsTest : public ::testing::Test {
  protected:
   TenantsTest()
-      : harness_(FakeMesher, {}, Transport::kLoopback, FakeEstimator, core::Mesher::Create, TwoTenants(folder_)),
+      : harness_(FakeMesher, {}, Transport::kLoopback, FakeEstimator, CreateMesher, TwoTenants(folder_)),
         acme_(ClientWith(kAcme)),
         beta_(ClientWith(kBeta)) {
     session_ = acme_.CreateSession(Options(), First()).value().name;
@@ -135,7 +135,7 @@ std::string Unused(std::string name) {
 
 TEST_F(TenantsTest, AnothersSessionIsAsIfThereWereNone) {
   const client::Session before = acme_.GetSession(session_).value();
-  ASSERT_THAT(Methods(), SizeIs(14));
+  ASSERT_THAT(Methods(), SizeIs(15));
   for (const google::protobuf::MethodDescriptor* method : Methods()) {
     const std::string& name = NameFor(*method);
     const std::string unused = Unused(name);
@@ -249,8 +249,8 @@ class QuotasTest : public ::testing::Test {
 
   TemporaryFolder folder_;
   Event started_;
-  ServiceHarness harness_{EndlessMesher(started_), Options(),          Transport::kLoopback, FakeEstimator,
-                          core::Mesher::Create,    TwoTenants(folder_)};
+  ServiceHarness harness_{EndlessMesher(started_), Options(),    Transport::kLoopback,
+                          FakeEstimator,           CreateMesher, TwoTenants(folder_)};
   const std::unique_ptr<v1::SessionService::Stub> sessions_ = v1::SessionService::NewStub(harness_.channel());
   const std::unique_ptr<v1::OperationService::Stub> operations_ = v1::OperationService::NewStub(harness_.channel());
 };

@@ -100,6 +100,29 @@ TEST_F(PointAccountTest, TakesAsManyAsTheMemoryHolds) {
   EXPECT_TRUE(account->Take(40).ok());
 }
 
+TEST_F(PointAccountTest, SegmentsAndSeedsCountAsPointsOfTheTenantAndTakeTheirMemory) {
+  std::unique_ptr<PointAccount> account = Open(unlimited_);
+  EXPECT_TRUE(account->Take(100).ok());
+  EXPECT_TRUE(account->TakeFeatures(1000, 50).ok());
+  EXPECT_EQ(tenant_->points(), 1150u);
+  EXPECT_EQ(unlimited_.lasting(), 100 * kPointBytes + FeatureStore::BytesOf(1000, 50));
+  EXPECT_EQ(DetailsOf(account->TakeFeatures(1, 0)).reason, "TOO_MANY_POINTS");
+  EXPECT_EQ(DetailsOf(account->TakeFeatures(0, 951)).reason, "TOO_MANY_POINTS");
+  const absl::Status refused = account->TakeFeatures(0, 351);
+  EXPECT_EQ(DetailsOf(refused).reason, "QUOTA_EXCEEDED");
+  EXPECT_EQ(refused.message(),
+            "your sessions would have 1501 points, segments and seeds together; they may have at most 1500");
+  EXPECT_EQ(tenant_->points(), 1150u);
+  account->Return(100);
+  account->Close();
+  EXPECT_EQ(tenant_->points(), 0u);
+  account.reset();
+  EXPECT_EQ(unlimited_.reserved(), 0u);
+
+  MemoryBudget memory(kProcessMemoryBytes + FeatureStore::BytesOf(10, 0));
+  EXPECT_EQ(DetailsOf(Open(memory)->TakeFeatures(11, 0)).reason, "MEMORY_LIMIT");
+}
+
 TEST_F(PointAccountTest, AClosedAccountHasNoneOfTheTenantsPointsButKeepsItsMemory) {
   std::unique_ptr<PointAccount> account = Open(unlimited_);
   EXPECT_TRUE(account->Take(500).ok());

@@ -173,17 +173,18 @@ class BreakableMesher final : public core::Mesher {
 };
 
 MesherFactory BreakableMeshers(Script& script) {
-  return [&script](const core::MeshParameters& parameters, std::span<const double> points,
-                   core::RunContext& context) -> absl::StatusOr<std::unique_ptr<core::Mesher>> {
-    script.NoteCreated();
-    absl::StatusOr<std::unique_ptr<core::Mesher>> mesher =
-        Broken(script, Call::kCreate, context,
-               [&](core::RunContext& inner) { return core::Mesher::Create(parameters, points, inner); });
-    if (!mesher.ok()) {
-      return mesher.status();
-    }
-    return std::make_unique<BreakableMesher>(*std::move(mesher), script);
-  };
+  return
+      [&script](const core::MeshParameters& parameters, std::span<const double> points, const core::Features* features,
+                core::RunContext& context) -> absl::StatusOr<std::unique_ptr<core::Mesher>> {
+        script.NoteCreated();
+        absl::StatusOr<std::unique_ptr<core::Mesher>> mesher =
+            Broken(script, Call::kCreate, context,
+                   [&](core::RunContext& inner) { return CreateMesher(parameters, points, features, inner); });
+        if (!mesher.ok()) {
+          return mesher.status();
+        }
+        return std::make_unique<BreakableMesher>(*std::move(mesher), script);
+      };
 }
 
 // The arrays of a mesh as they came.
@@ -191,6 +192,8 @@ struct Arrays {
   std::vector<double> points;
   std::vector<uint32_t> simplices;
   std::vector<uint32_t> input_vertices;
+  std::vector<uint32_t> facets;
+  std::vector<int32_t> simplex_regions;
 
   bool operator==(const Arrays&) const = default;
 };
@@ -264,13 +267,16 @@ class Replayed : public ::testing::Test {
 
   Arrays MeshOf(const std::string& name) {
     Arrays arrays;
-    const Download download = calls_.DownloadMesh(name);
+    const Download download = calls_.DownloadMesh(name, 0, 0, std::nullopt, /*with_boundary=*/true);
     EXPECT_TRUE(download.status.ok()) << download.status.error_message();
     for (const v1::MeshChunk& chunk : download.chunks) {
       arrays.points.insert(arrays.points.end(), chunk.points().begin(), chunk.points().end());
       arrays.simplices.insert(arrays.simplices.end(), chunk.simplices().begin(), chunk.simplices().end());
       arrays.input_vertices.insert(arrays.input_vertices.end(), chunk.input_vertices().begin(),
                                    chunk.input_vertices().end());
+      arrays.facets.insert(arrays.facets.end(), chunk.facets().begin(), chunk.facets().end());
+      arrays.simplex_regions.insert(arrays.simplex_regions.end(), chunk.simplex_regions().begin(),
+                                    chunk.simplex_regions().end());
     }
     return arrays;
   }
@@ -479,6 +485,46 @@ TEST_F(Replayed, AnAdditionThatFailsLeavesWhatWaitsWaiting) {
   AddVertices(name, {0.5, 0.5, 0.5}, &status);
   EXPECT_EQ(status.error_code(), grpc::StatusCode::CANCELLED) << status.error_message();
   EXPECT_TRUE(upload_rest(name) == expected);
+}
+
+// A mesher of a domain comes back with the segments, seeds and rules of the session.
+TEST_F(Replayed, SoWithSegments) {
+  const auto begin = [this] {
+    v1::CreateSessionRequest request;
+    request.mutable_parameters()->set_dimension(2);
+    const std::string name = calls_.Create(request).name();
+    calls_.Upload(name, 0, FramePoints());
+    calls_.AddSegments({FrameRequest(name)});
+    EXPECT_EQ(Refine(name).state(), v1::Operation::STATE_SUCCEEDED);
+    return name;
+  };
+  const auto refine = [this](const std::string& name, double size) {
+    v1::StartRefinementRequest request;
+    request.set_name(name);
+    request.mutable_parameters()->set_dimension(2);
+    request.mutable_parameters()->set_max_circumradius(size);
+    Watch watch(calls_.operations(), calls_.Start(request).name());
+    EXPECT_TRUE(watch.Finish().ok());
+    return watch.operation.value_or(v1::Operation()).state();
+  };
+  const std::string undisturbed = begin();
+  EXPECT_EQ(refine(undisturbed, 0.2), v1::Operation::STATE_SUCCEEDED);
+  const Arrays expected = MeshOf(undisturbed);
+  EXPECT_FALSE(expected.facets.empty());
+  EXPECT_FALSE(expected.simplex_regions.empty());
+  for (const Break& at : std::vector<Break>{{Call::kRefine, core::Phase::kRefinement, 1, Way::kCancel},
+                                            {Call::kRefine, core::Phase::kDone, 1, Way::kFail},
+                                            {Call::kUpdate, core::Phase::kDone, 1, Way::kCancel}}) {
+    SCOPED_TRACE(absl::StrCat("call ", static_cast<int>(at.call), " phase ", core::PhaseName(at.phase)));
+    const std::string name = begin();
+    const int created = script_.created();
+    script_.BreakOff(at);
+    EXPECT_NE(refine(name, 0.1), v1::Operation::STATE_SUCCEEDED);
+    EXPECT_TRUE(script_.IsBroken());
+    EXPECT_EQ(refine(name, 0.2), v1::Operation::STATE_SUCCEEDED);
+    EXPECT_EQ(script_.created(), created + 1) << "by replay";
+    EXPECT_TRUE(MeshOf(name) == expected);
+  }
 }
 
 // Points that the mesher refuses cost no replay: it takes all or none.

@@ -320,6 +320,69 @@ TEST(CloudReceiver, KeepsRefusingAfterBadParameters) {
   EXPECT_EQ(DetailsOf(Accept(receiver, PointsRequest({1, 2, 3}))).reason, "PARAMETERS_MISSING");
 }
 
+v1::MeshPointsRequest InThePlane() {
+  v1::MeshPointsRequest request;
+  request.mutable_parameters()->set_dimension(2);
+  return request;
+}
+
+v1::MeshPointsRequest SegmentsRequest(int count) {
+  v1::MeshPointsRequest request;
+  request.mutable_segments()->mutable_ends()->Resize(2 * count, 0);
+  return request;
+}
+
+TEST(CloudReceiver, RefusesParametersThatADomainDoesNotHave) {
+  const ServiceOptions options = SmallLimits();
+  const auto refusal = [&](const v1::MeshPointsRequest& parameters, const v1::MeshPointsRequest& features) {
+    CloudReceiver receiver(options);
+    EXPECT_TRUE(Accept(receiver, parameters).ok());
+    EXPECT_TRUE(receiver.AcceptEnd().ok()) << "a cloud has them all";
+    EXPECT_TRUE(Accept(receiver, features).ok());
+    return receiver.AcceptEnd();
+  };
+  v1::MeshPointsRequest parameters = InThePlane();
+  EXPECT_TRUE(refusal(parameters, SegmentsRequest(2)).ok());
+  parameters.mutable_parameters()->set_criterion(v1::CRITERION_WELL_SPACED);
+  EXPECT_EQ(DetailsOf(refusal(parameters, SegmentsRequest(2))).reason, "INVALID_PARAMETERS");
+  EXPECT_EQ(DetailsOf(refusal(parameters, SegmentsRequest(2))).field, "parameters.criterion");
+  parameters = InThePlane();
+  parameters.mutable_parameters()->set_merge_distance(1);
+  EXPECT_EQ(DetailsOf(refusal(parameters, SegmentsRequest(2))).field, "parameters.merge_distance");
+  parameters = InThePlane();
+  parameters.mutable_parameters()->mutable_domain()->mutable_low()->Resize(2, 0);
+  parameters.mutable_parameters()->mutable_domain()->mutable_high()->Resize(2, 1);
+  EXPECT_TRUE(refusal(parameters, SegmentsRequest(2)).ok());
+  v1::MeshPointsRequest holes;
+  holes.mutable_faces()->set_faces(v1::FACE_RULE_HOLES);
+  EXPECT_EQ(DetailsOf(refusal(parameters, holes)).field, "parameters.domain");
+}
+
+TEST(CloudReceiver, AcceptsAsManySegmentsAndSeedsAsPoints) {
+  const ServiceOptions options = SmallLimits();
+  CloudReceiver receiver(options);
+  ASSERT_TRUE(Accept(receiver, InThePlane()).ok());
+  ASSERT_TRUE(Accept(receiver, SegmentsRequest(10)).ok());
+  EXPECT_EQ(DetailsOf(Accept(receiver, SegmentsRequest(1))).reason, "TOO_MANY_POINTS");
+  v1::MeshPointsRequest seeds;
+  for (int i = 0; i < 11; ++i) {
+    seeds.mutable_faces()->add_seeds();
+  }
+  EXPECT_EQ(DetailsOf(Accept(receiver, seeds)).reason, "TOO_MANY_POINTS");
+  EXPECT_EQ(receiver.features().segment_count(), 10u);
+  EXPECT_EQ(receiver.features().seed_count(), 0u);
+}
+
+TEST(CloudReceiver, TakesSegmentsIn2DAlone) {
+  const ServiceOptions options = SmallLimits();
+  CloudReceiver receiver(options);
+  EXPECT_EQ(DetailsOf(Accept(receiver, SegmentsRequest(1))).reason, "PARAMETERS_MISSING");
+  ASSERT_TRUE(Accept(receiver, ParametersRequest()).ok());
+  const grpc::Status status = Accept(receiver, SegmentsRequest(1));
+  EXPECT_EQ(DetailsOf(status).reason, "INVALID_SEGMENTS");
+  EXPECT_EQ(DetailsOf(status).field, "segments");
+}
+
 TEST(MetadataToProto, CountsAndStatistics) {
   core::MeshParameters parameters;
   const core::Mesh mesh = MakeFakeMesh(parameters, std::vector<double>{0.25, 0.5, 0.75});

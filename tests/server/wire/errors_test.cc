@@ -3,7 +3,9 @@
 #include <new>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
+#include "core/mesher.h"
 #include "google/protobuf/text_format.h"
 #include "google/rpc/error_details.pb.h"
 #include "gtest/gtest.h"
@@ -63,12 +65,43 @@ TEST(ToGrpcStatus, RepeatsMemoryLimitsOnlyWhereItHelps) {
   EXPECT_FALSE(DetailsOf(MemoryLimitError("x", false)).may_retry);
 }
 
+// What the core says of a domain, by points, segments and faces that it makes.
+ErrorDetails RefusalOf(const std::vector<uint32_t>& ends, const std::vector<int32_t>& markers,
+                       const std::vector<core::FaceSeed>& seeds, core::FaceRule faces = core::FaceRule::kHoles) {
+  const std::vector<double> points = {0, 0, 4, 0, 4, 4, 0, 4, 2, 1e-17};
+  core::Features features;
+  features.ends = ends;
+  features.markers = markers;
+  features.seeds = seeds;
+  features.faces = faces;
+  core::RunContext context;
+  return DetailsOf(core::MeshFeatures({.dimension = 2}, points, features, context).status());
+}
+
+TEST(ToGrpcStatus, ErrorsOfADomainNameWhatIsWrong) {
+  const auto expect = [](const ErrorDetails& details, const std::string& field) {
+    EXPECT_EQ(details.reason, "INVALID_SEGMENTS");
+    EXPECT_EQ(details.field, field);
+  };
+  expect(RefusalOf({0, 1, 1, 2, 2, 7}, {}, {}), "segments.ends");
+  expect(RefusalOf({0, 2, 1, 3, 1, 2}, {}, {}), "segments.ends");   // they cross
+  expect(RefusalOf({0, 1, 1, 2, 2, 0}, {}, {}), "segments.ends");   // a point is too near
+  expect(RefusalOf({2, 3, 3, 2}, {1, 2}, {}), "segments.markers");  // two on one
+  expect(RefusalOf({2, 3}, {}, {}), "faces.faces");                 // nothing is enclosed
+  expect(RefusalOf({2, 3}, {}, {}, core::FaceRule::kEvenOdd), "faces.faces");
+  expect(RefusalOf({1, 2, 2, 3, 3, 1}, {}, {{.at = {4, 2}}}), "faces.seeds");
+}
+
 TEST(ToGrpcStatus, TellsErrorsOfTheCoreApart) {
   EXPECT_TRUE(ToGrpcStatus(absl::OkStatus()).ok());
   EXPECT_EQ(DetailsOf(absl::InvalidArgumentError("x")).reason, "INVALID_POINTS");
   EXPECT_EQ(DetailsOf(absl::InvalidArgumentError("x")).field, "points.coordinates");
   EXPECT_EQ(DetailsOf(absl::ResourceExhaustedError("x")).reason, "MESH_TOO_LARGE");
   EXPECT_EQ(DetailsOf(absl::FailedPreconditionError("x")).reason, "MESH_NOT_READY");
+  const absl::Status of_domain =
+      absl::FailedPreconditionError("points: none can be added to the mesh of a domain with segments");
+  EXPECT_EQ(DetailsOf(of_domain).reason, "DOMAIN_FIXED");
+  EXPECT_EQ(ToGrpcStatus(of_domain).error_code(), grpc::StatusCode::FAILED_PRECONDITION);
   EXPECT_EQ(DetailsOf(absl::UnknownError("x")).reason, "INTERNAL");
   EXPECT_EQ(ToGrpcStatus(absl::UnknownError("x")).error_code(), grpc::StatusCode::INTERNAL);
   EXPECT_EQ(ToGrpcStatus(absl::UnknownError("x")).error_message(), "internal error: x");

@@ -1,0 +1,62 @@
+#include "server/services/sessions/add_segments_call.h"
+
+#include <utility>
+
+#include "core/base/status_macros.h"
+#include "server/calls/wire.h"
+#include "server/services/resource_names.h"
+#include "server/wire/errors.h"
+
+namespace wellspace::server {
+
+void AddSegmentsCall::OnBegin() {
+  absl::StatusOr<MemoryReservation> memory = environment().memory.Reserve(kMessageBytes, "segments");
+  if (!memory.ok()) {
+    End(std::move(memory).status());
+    return;
+  }
+  memory_ = *std::move(memory);
+  ReadNext();
+}
+
+absl::Status AddSegmentsCall::Take(grpc::ByteBuffer* bytes) {
+  v1::AddSegmentsRequest request;
+  WELLSPACE_RETURN_IF_ERROR(ParseRequest(bytes, &request));
+  uint64_t expected_revision = 0;  // what the call has committed has changed the revision
+  if (!session_.has_value()) {
+    WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, FindSession(environment(), caller(), request.name()));
+    session_.emplace(std::move(session));
+    expected_revision = request.expected_revision();
+  }
+  segment_count_ += request.segments().ends_size() / 2;
+  seed_count_ += request.faces().seeds_size();
+  return session_->session().AddSegments(request, expected_revision);
+}
+
+void AddSegmentsCall::OnRequest(grpc::ByteBuffer* bytes) {
+  if (absl::Status status = RunGuarded([&] { return Take(bytes); }); !status.ok()) {
+    End(std::move(status));
+  } else {
+    ReadNext();
+  }
+}
+
+void AddSegmentsCall::OnRequestsEnd() {
+  if (!session_.has_value()) {
+    End(MakeError(v1::ERROR_REASON_EMPTY_REQUEST,
+                  "the stream ended before any request; send the name of the session first", "name"));
+  } else {
+    *response_ = Serialize(session_->session().CommittedSegments());
+    End(absl::OkStatus());
+  }
+}
+
+LogFields AddSegmentsCall::Figures() const {
+  LogFields figures;
+  if (session_.has_value()) {
+    figures.Add("session", session_->session().name()).Add("segments", segment_count_).Add("seeds", seed_count_);
+  }
+  return figures;
+}
+
+}  // namespace wellspace::server

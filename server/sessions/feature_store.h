@@ -1,0 +1,75 @@
+// Segments and faces as they came, of one call or of a session.
+#ifndef WELLSPACE_SERVER_SESSIONS_FEATURE_STORE_H_
+#define WELLSPACE_SERVER_SESSIONS_FEATURE_STORE_H_
+
+#include <cstdint>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "core/features/features.h"
+#include "wellspace/v1/mesh.pb.h"
+
+namespace wellspace::server {
+
+// INVALID_SEGMENTS: `field` was sent for points of another dimension than 2.
+absl::Status NotInThePlane(const char* field, int dimension);
+
+// Refuses a chunk that is no list of segments. `first` is the number of its first segment.
+//
+// Errors:     INVALID_CHUNK_SHAPE.
+absl::Status CheckSegments(const v1::SegmentChunk& chunk, uint64_t first);
+// Refuses rules that are not known, and seeds that name no face. `first` is the number of the first seed.
+//
+// Errors:     INVALID_SEGMENTS.
+absl::Status CheckFaces(const v1::FaceOptions& options, uint64_t first);
+
+// Segments, seeds and rules that grow at the end.
+//
+// Thread safety: thread-compatible.
+// Invariants: what is appended has passed CheckSegments or CheckFaces.
+class FeatureStore {
+ public:
+  // Appends the segments of `chunk` but for the first `known`. An exception, when memory ends, changes nothing.
+  //
+  // REQUIRES:   known is at most their number.
+  void Append(const v1::SegmentChunk& chunk, uint64_t known = 0);
+  // The same of seeds. The rules are from now on those of `options`.
+  void Append(const v1::FaceOptions& options, uint64_t known = 0);
+
+  // How many of the segments of `chunk`, of the first `count` at most, are those from number `first` on: all of these,
+  // or those before the first that is another.
+  //
+  // REQUIRES:   first + count <= segment_count().
+  uint64_t CountEqual(uint64_t first, uint64_t count, const v1::SegmentChunk& chunk) const;
+  // The same of seeds, whose coordinates are compared to the bit.
+  uint64_t CountEqual(uint64_t first, uint64_t count, const v1::FaceOptions& options) const;
+  // Whether Append(options) would change the rules, or make this other than empty.
+  bool HasOtherRules(const v1::FaceOptions& options) const;
+
+  // Whether there are neither segments nor rules: the points are a cloud, and are meshed in their box.
+  bool IsEmpty() const { return ends_.empty() && !has_rules_; }
+  uint64_t segment_count() const { return ends_.size() / 2; }
+  uint64_t seed_count() const { return seeds_.size(); }
+  v1::FaceRule face_rule() const;
+  v1::CrossingRule crossing_rule() const;
+  uint64_t bytes() const { return BytesOf(segment_count(), seed_count()); }
+  static uint64_t BytesOf(uint64_t segments, uint64_t seeds) {
+    return segments * (2 * sizeof(uint32_t) + sizeof(int32_t) + sizeof(uint8_t)) + seeds * sizeof(core::FaceSeed);
+  }
+
+  // Valid until the next Append.
+  core::Features View() const;
+
+ private:
+  bool has_rules_ = false;  // some have come
+  std::vector<uint32_t> ends_;
+  std::vector<int32_t> markers_;
+  std::vector<uint8_t> is_open_;
+  std::vector<core::FaceSeed> seeds_;
+  core::FaceRule faces_ = core::FaceRule::kBox;
+  core::CrossingRule crossings_ = core::CrossingRule::kRefuse;
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_SESSIONS_FEATURE_STORE_H_

@@ -1,0 +1,107 @@
+// What a session does with segments, seeds and the rules of faces.
+#include <algorithm>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
+#include "server/sessions/session.h"
+#include "server/wire/errors.h"
+
+namespace wellspace::server {
+namespace {
+
+// Where a request goes on with one kind of thing.
+struct Place {
+  const char* what;          // of several
+  const char* offset_field;  // of the request
+  const char* field;         // that has them
+  uint64_t offset;           // as the request says
+  uint64_t count;            // that come with it
+  uint64_t committed;        // that the session has
+
+  uint64_t known() const { return std::min(committed - offset, count); }
+};
+
+absl::Status CheckPlace(const Place& place, const std::string& session) {
+  return place.offset <= place.committed
+             ? absl::OkStatus()
+             : MakeError(v1::ERROR_REASON_UPLOAD_GAP,
+                         absl::StrCat(place.offset_field, " is ", place.offset, ", but ", session, " has ",
+                                      place.committed, " ", place.what, "; go on at ", place.committed, " or before"),
+                         place.offset_field);
+}
+
+// `equal`: how many of those that are known are those that the session has.
+absl::Status CheckEqual(const Place& place, uint64_t equal, const std::string& session) {
+  return equal == place.known()
+             ? absl::OkStatus()
+             : MakeError(v1::ERROR_REASON_UPLOAD_MISMATCH,
+                         absl::StrCat(place.what, "[", place.offset + equal, "]: ", session,
+                                      " has another there; send the same again, or add others at ", place.committed),
+                         place.field);
+}
+
+}  // namespace
+
+absl::Status Session::CheckKnown(const v1::AddSegmentsRequest& request, uint64_t* segments, uint64_t* seeds) const {
+  const Place segment_place{.what = "segments",
+                            .offset_field = "segment_offset",
+                            .field = "segments.ends",
+                            .offset = request.segment_offset(),
+                            .count = static_cast<uint64_t>(request.segments().ends_size()) / 2,
+                            .committed = features_.segment_count()};
+  const Place seed_place{.what = "seeds",
+                         .offset_field = "seed_offset",
+                         .field = "faces.seeds",
+                         .offset = request.seed_offset(),
+                         .count = static_cast<uint64_t>(request.faces().seeds_size()),
+                         .committed = features_.seed_count()};
+  WELLSPACE_RETURN_IF_ERROR(CheckPlace(segment_place, name_));
+  WELLSPACE_RETURN_IF_ERROR(CheckPlace(seed_place, name_));
+  *segments = segment_place.known();
+  *seeds = seed_place.known();
+  WELLSPACE_RETURN_IF_ERROR(
+      CheckEqual(segment_place, features_.CountEqual(segment_place.offset, *segments, request.segments()), name_));
+  return CheckEqual(seed_place, features_.CountEqual(seed_place.offset, *seeds, request.faces()), name_);
+}
+
+absl::Status Session::AddSegments(const v1::AddSegmentsRequest& request, uint64_t expected_revision) {
+  WELLSPACE_RETURN_IF_ERROR(CheckSegments(request.segments(), request.segment_offset()));
+  WELLSPACE_RETURN_IF_ERROR(CheckFaces(request.faces(), request.seed_offset()));
+  if (dimension_ != 2) {
+    return NotInThePlane(request.has_segments() || !request.has_faces() ? "segments" : "faces", dimension_);
+  }
+  std::lock_guard lock(mutex_);
+  WELLSPACE_RETURN_IF_ERROR(CheckReadyForChange(expected_revision));
+  uint64_t known_segments = 0;
+  uint64_t known_seeds = 0;
+  WELLSPACE_RETURN_IF_ERROR(CheckKnown(request, &known_segments, &known_seeds));
+  const uint64_t segments = request.segments().ends_size() / 2 - known_segments;
+  const uint64_t seeds = request.faces().seeds_size() - known_seeds;
+  if (segments == 0 && seeds == 0 && !(request.has_faces() && features_.HasOtherRules(request.faces()))) {
+    return absl::OkStatus();
+  }
+  if (work_.mesh != nullptr) {
+    return MakeError(v1::ERROR_REASON_DOMAIN_FIXED,
+                     absl::StrCat(name_,
+                                  " has been refined; segments and faces can be added only before the first "
+                                  "refinement: create another session for this domain"));
+  }
+  WELLSPACE_RETURN_IF_ERROR(point_account_.TakeFeatures(segments, seeds));
+  features_.Append(request.segments(), known_segments);
+  if (request.has_faces()) {
+    features_.Append(request.faces(), known_seeds);
+  }
+  ++revision_;
+  return absl::OkStatus();
+}
+
+v1::AddSegmentsResponse Session::CommittedSegments() const {
+  v1::AddSegmentsResponse message;
+  std::lock_guard lock(mutex_);
+  message.set_segment_count(features_.segment_count());
+  message.set_seed_count(features_.seed_count());
+  message.set_revision(revision_);
+  return message;
+}
+
+}  // namespace wellspace::server

@@ -1,0 +1,86 @@
+#include "server/sessions/feature_store.h"
+
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include "tests/server/service_harness.h"
+
+namespace wellspace::server {
+namespace {
+
+using ::testing::ElementsAre;
+
+v1::SegmentChunk Chunk(const std::vector<uint32_t>& ends, const std::vector<int32_t>& markers = {}, bool open = false) {
+  v1::SegmentChunk chunk;
+  chunk.mutable_ends()->Add(ends.begin(), ends.end());
+  chunk.mutable_markers()->Add(markers.begin(), markers.end());
+  chunk.set_open(open);
+  return chunk;
+}
+
+v1::FaceOptions Faces(v1::FaceRule rule, const std::vector<double>& seeds = {}, double max_area = 0) {
+  v1::FaceOptions options;
+  options.set_faces(rule);
+  for (size_t i = 0; i < seeds.size(); i += 2) {
+    v1::FaceSeed& seed = *options.add_seeds();
+    seed.set_x(seeds[i]);
+    seed.set_y(seeds[i + 1]);
+    seed.set_max_area(max_area);
+  }
+  return options;
+}
+
+TEST(FeatureStore, KeepsMarkersAndRingsOfSegmentsFromManyChunks) {
+  FeatureStore store;
+  EXPECT_TRUE(store.IsEmpty());
+  store.Append(Chunk({}));
+  EXPECT_TRUE(store.IsEmpty());
+  store.Append(Chunk({0, 1, 1, 2}));
+  store.Append(Chunk({2, 3, 3, 4, 4, 5}, {7, 8, 9}, true), 1);
+  store.Append(Chunk({5, 6}));
+  const core::Features features = store.View();
+  EXPECT_THAT(features.ends, ElementsAre(0, 1, 1, 2, 3, 4, 4, 5, 5, 6));
+  EXPECT_THAT(features.markers, ElementsAre(0, 0, 8, 9, 0));
+  EXPECT_THAT(features.is_open, ElementsAre(0, 0, 1, 1, 0));
+  EXPECT_EQ(store.segment_count(), 5u);
+  EXPECT_EQ(store.face_rule(), v1::FACE_RULE_BOX);
+  EXPECT_EQ(store.bytes(), 5u * 13);
+}
+
+TEST(FeatureStore, TheLastRulesHoldAndSeedsAddUp) {
+  FeatureStore store;
+  EXPECT_TRUE(store.HasOtherRules(Faces(v1::FACE_RULE_UNSPECIFIED))) << "a cloud becomes a domain";
+  store.Append(Faces(v1::FACE_RULE_HOLES, {1, 2}, 0.5));
+  EXPECT_FALSE(store.IsEmpty());
+  EXPECT_FALSE(store.HasOtherRules(Faces(v1::FACE_RULE_HOLES)));
+  store.Append(Faces(v1::FACE_RULE_EVEN_ODD, {3, 4, 5, 6}), 1);
+  EXPECT_TRUE(store.HasOtherRules(Faces(v1::FACE_RULE_HOLES)));
+  EXPECT_EQ(store.face_rule(), v1::FACE_RULE_EVEN_ODD);
+  ASSERT_EQ(store.seed_count(), 2u);
+  EXPECT_EQ(store.View().seeds[0].max_area, 0.5);
+  EXPECT_EQ(store.View().seeds[1].at[1], 6);
+}
+
+TEST(FeatureStore, FindsTheFirstThatIsAnother) {
+  FeatureStore store;
+  store.Append(Chunk({0, 1, 1, 2, 2, 3}, {4, 0, 6}));
+  EXPECT_EQ(store.CountEqual(1, 2, Chunk({1, 2, 2, 3}, {0, 6})), 2u);
+  EXPECT_EQ(store.CountEqual(1, 2, Chunk({1, 2, 2, 3})), 1u) << "no markers are zeros";
+  EXPECT_EQ(store.CountEqual(0, 1, Chunk({1, 0}, {4})), 0u) << "ends have an order";
+  EXPECT_EQ(store.CountEqual(1, 1, Chunk({1, 2}, {}, true)), 0u);
+  store.Append(Faces(v1::FACE_RULE_HOLES, {0, 1, 2, 3}));
+  EXPECT_EQ(store.CountEqual(0, 2, Faces(v1::FACE_RULE_BOX, {0, 1, 2, 3})), 2u) << "rules are no part of seeds";
+  EXPECT_EQ(store.CountEqual(0, 2, Faces(v1::FACE_RULE_HOLES, {-0.0, 1, 2, 3})), 0u) << "to the bit";
+  EXPECT_EQ(store.CountEqual(1, 1, Faces(v1::FACE_RULE_HOLES, {2, 3}, 1)), 0u);
+}
+
+TEST(CheckSegments, NamesThePlaceInAll) {
+  EXPECT_TRUE(CheckSegments(Chunk({1, 2, 3, 4}, {5, 6}), 0).ok());
+  EXPECT_THAT(CheckSegments(Chunk({1, 2, 3}), 40).message(), ::testing::HasSubstr("after segment 40"));
+  EXPECT_EQ(DetailsOf(CheckSegments(Chunk({1, 2, 3, 4}, {5}), 0)).field, "segments.markers");
+  EXPECT_THAT(CheckFaces(Faces(v1::FACE_RULE_BOX, {0, 0, 1, 1}, -1), 40).message(), ::testing::HasSubstr("seeds[40]"));
+}
+
+}  // namespace
+}  // namespace wellspace::server
