@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 #include <utility>
 
 #include "absl/status/status.h"
@@ -11,27 +10,9 @@
 #include "core/base/memory/huge_pages.h"
 #include "core/base/status_macros.h"
 #include "core/mesh_parameters.h"
+#include "core/refused_points.h"
 
 namespace wellspace::core {
-namespace {
-
-// Points that an error names.
-constexpr size_t kNamedTooClose = 10;
-
-// One error for all points that are refused, each with its number: it counts them, and names the first.
-absl::Status TooCloseInAll(std::vector<std::pair<uint32_t, absl::Status>> refused) {
-  std::sort(refused.begin(), refused.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  std::string text(refused.front().second.message());
-  for (size_t i = 1; i < refused.size() && i < kNamedTooClose; ++i) {
-    absl::StrAppend(&text, i == 1 ? "; so are " : ", ", "points[", refused[i].first, "]");
-  }
-  if (refused.size() > 1) {
-    absl::StrAppend(&text, refused.size() > kNamedTooClose ? ", …: " : ": ", refused.size(), " points in all");
-  }
-  return absl::InvalidArgumentError(text);
-}
-
-}  // namespace
 
 template <int D>
 absl::StatusOr<std::vector<uint32_t>> PointAdder<D>::AddPoints(std::span<const double> points,
@@ -164,7 +145,7 @@ absl::StatusOr<std::vector<VertexId>> PointAdder<D>::FindAll(const SortedCloud<D
                                                              std::span<const uint32_t> near,
                                                              const RunContext& context) {
   std::vector<VertexId> found(cloud.points.size(), kNoVertex);
-  std::vector<std::pair<uint32_t, absl::Status>> refused;
+  RefusedPoints refused;
   for (size_t i = 0; i < cloud.points.size(); ++i) {
     WELLSPACE_RETURN_IF_ERROR(context.Check());
     const uint32_t input = cloud.first_input[i];
@@ -172,11 +153,11 @@ absl::StatusOr<std::vector<VertexId>> PointAdder<D>::FindAll(const SortedCloud<D
     if (vertex.ok()) {
       found[i] = *vertex;
     } else {
-      refused.emplace_back(input, vertex.status());
+      refused.Add(input, vertex.status());
     }
   }
-  if (!refused.empty()) {
-    return TooCloseInAll(std::move(refused));
+  if (!refused.IsEmpty()) {
+    return refused.InAll("so are");
   }
   return found;
 }
