@@ -78,7 +78,7 @@ class MesherIn final : public Mesher {
     numbering_.CountMerged(merged.merged);
     is_given_.assign(structure_.built_count(), true);
     refinement_.emplace(structure_, domain_.MinEdge());
-    adder_.emplace(domain_, merge_distance_, structure_, *refinement_, numbering_, is_given_);
+    adder_.emplace(domain_, merge_distance_, structure_, *refinement_, numbering_, &is_given_);
     context.SetVertices(structure_.vertex_count());
     tree_seconds_ = absl::ToDoubleSeconds(context.TimeIn(Phase::kTree));
     return absl::OkStatus();

@@ -381,7 +381,12 @@ void Refinement<D>::VertexAdded(VertexId x) {
   if (!pending_.HasBegun()) {
     return;  // the next run schedules all
   }
-  const Neighbor nearest = structure_.ApproximateNearestNeighbor(x, workspace_.own);
+  Neighbor nearest = structure_.ApproximateNearestNeighbor(x, workspace_.own);
+  if constexpr (D == 2) {
+    if (domain_ != nullptr) {
+      nearest.distance_sq = domain_rules_->NearestSegmentSq(x, nearest.distance_sq, workspace_.own);
+    }
+  }
   AddPending(nearest.vertex, x, nearest.distance_sq);
 }
 
