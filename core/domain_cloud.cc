@@ -62,7 +62,7 @@ absl::StatusOr<DomainCloud> MakeDomainCloud(std::span<const double> points, cons
   }
   KeepMeshed(sorted_of, graph, faces);
   return DomainCloud{domain, std::move(cloud), std::make_unique<PlanarDomain>(std::move(graph), std::move(faces)),
-                     std::move(kept), dropped_points};
+                     dropped_points};
 }
 
 }  // namespace wellspace::core

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <memory>
 #include <span>
-#include <vector>
 
 #include "absl/status/statusor.h"
 #include "core/base/run_context.h"
@@ -21,7 +20,6 @@ struct DomainCloud {
   Domain<2> domain;      // its box holds the segments with room around them, and bounds nothing
   SortedCloud<2> cloud;  // of the points of the graph
   std::unique_ptr<PlanarDomain> planar;
-  std::vector<double> points;   // of the cloud, unscaled, with the bits that were given
   uint64_t dropped_points = 0;  // given ones that touch no face which is meshed
 };
 

@@ -10,13 +10,16 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "core/base/saturate.h"
+#include "core/base/memory/huge_pages.h"
 #include "core/base/status_macros.h"
+#include "core/base/stopwatch.h"
 #include "core/domain_parameters.h"
-#include "core/estimate/estimate.h"
 #include "core/feasibility.h"
+#include "core/mesh_estimate.h"
+#include "core/mesher_checks.h"
 #include "core/simplex/boundary.h"
 #include "core/simplex/quality.h"
+#include "core/vertex_queries.h"
 
 namespace wellspace::core {
 namespace {
@@ -99,7 +102,6 @@ absl::Status DomainMesher::Initialize(const MeshParameters& parameters, std::spa
   WELLSPACE_ASSIGN_OR_RETURN(DomainCloud made, MakeDomainCloud(points, features, box, parameters.threads, context));
   domain_ = made.domain;
   planar_ = std::move(made.planar);
-  points_ = std::move(made.points);
   dropped_points_ = made.dropped_points;
   const uint64_t max_vertices = VertexBudget(parameters);
   if (planar_->point_count() > max_vertices) {
@@ -107,46 +109,56 @@ absl::Status DomainMesher::Initialize(const MeshParameters& parameters, std::spa
                                                      " points of the domain are more than ",
                                                      "max_vertices = ", max_vertices, " vertices; raise max_vertices"));
   }
-  const HugeVector<uint32_t> sorted_of = made.cloud.SortedOfInputs();
-  output_index_.resize(sorted_of.size());
-  for (uint32_t i = 0; i < sorted_of.size(); ++i) {
-    output_index_[sorted_of[i]] = i;
-  }
-  Box<2> around{{points_[0], points_[1]}, {points_[0], points_[1]}};
-  for (size_t i = 0; i < points_.size(); i += 2) {
-    around.Include({PointAt<2>(points_, i / 2), PointAt<2>(points_, i / 2)});
-  }
-  mesh_low_.assign(around.low.begin(), around.low.end());
-  mesh_high_.assign(around.high.begin(), around.high.end());
+  NumberPoints(made, points);
   structure_.SetSegments(planar_->Ends());
   WELLSPACE_RETURN_IF_ERROR(structure_.Initialize(made.cloud.grid, std::move(made.cloud.points),
                                                   kLeavesPerVertex * max_vertices + 4, parameters.threads, context));
   WELLSPACE_RETURN_IF_ERROR(
       CheckSeparation<2>(domain_, structure_, 0, made.cloud.first_input, parameters.threads, context));
+  mesh_box_.low = mesh_box_.high = domain_.Unscaled(structure_.point(VertexId{0}));
+  NoteAddedFrom(0);
   refinement_.emplace(structure_, domain_.MinEdge(), planar_.get());
+  placer_.emplace(domain_, structure_, *planar_);
+  adder_.emplace(domain_, 0, structure_, *refinement_, numbering_, nullptr, &*placer_);
   context.SetVertices(structure_.vertex_count());
   tree_seconds_ = absl::ToDoubleSeconds(context.TimeIn(Phase::kTree));
   return absl::OkStatus();
 }
 
+// Numbers the points of the graph in the order that they have there.
+void DomainMesher::NumberPoints(const DomainCloud& made, std::span<const double> points) {
+  PointNames names;
+  const HugeVector<uint32_t> sorted_of = made.cloud.SortedOfInputs();
+  names.of_sorted.resize(sorted_of.size());
+  for (uint32_t i = 0; i < sorted_of.size(); ++i) {
+    names.of_sorted[sorted_of[i]] = i;
+  }
+  for (const uint32_t point : planar_->graph().point_of_input) {
+    names.of_input.push_back(point == PlanarGraph::kNoInput ? kNoOutput : names.of_sorted[point]);
+  }
+  numbering_.Begin(std::move(names), points, {});
+}
+
 uint64_t DomainMesher::memory_bytes() const {
-  return structure_.MemoryBytes() + refinement_->MemoryBytes() + planar_->MemoryBytes() +
-         points_.size() * sizeof(double) + output_index_.size() * sizeof(uint32_t) +
-         (made_.has_value() ? (made_->simplices.indices.size() + made_->faces.size()) * sizeof(uint32_t) : 0);
+  uint64_t bytes =
+      structure_.MemoryBytes() + refinement_->MemoryBytes() + planar_->MemoryBytes() + numbering_.MemoryBytes();
+  if (made_.has_value()) {
+    bytes += (made_->triangles.simplices.indices.size() + made_->triangles.faces.size() +
+              made_->chains.vertices.size() + made_->chains.first.size()) *
+             sizeof(uint32_t);
+  }
+  return bytes;
 }
 
 absl::Status DomainMesher::Refine(const MeshParameters& parameters, RunContext& context) {
-  WELLSPACE_RETURN_IF_ERROR(ValidateParameters(parameters));
+  WELLSPACE_RETURN_IF_ERROR(CheckParametersIn(parameters, 2));
   if (parameters.criterion != Criterion::kRadiusEdge) {
     return absl::InvalidArgumentError("criterion: a domain with segments has the radius-edge criterion alone");
   }
   made_.reset();
   context.EnterPhase(Phase::kRefinement);
-  const absl::Status status = MakeConforming(parameters, context);
-  if (!status.ok()) {
-    made_.reset();
-  }
-  return status;
+  const Stopwatch stopwatch(refinement_seconds_, simplices_seconds_);
+  return MakeConforming(parameters, context);
 }
 
 // Refines, and splits subsegments, until every one is an edge of the triangulation, with nothing in its diametral disc.
@@ -156,29 +168,40 @@ absl::Status DomainMesher::MakeConforming(const MeshParameters& parameters, RunC
   while (true) {
     WELLSPACE_RETURN_IF_ERROR(
         refinement_->Run(criteria, VertexBudget(parameters), parameters.threads, context, nullptr, nullptr));
-    refinement_seconds_ = absl::ToDoubleSeconds(context.TimeIn(Phase::kRefinement));
-    const PlanarDomain::Chains chains = planar_->FindChains();
+    PlanarDomain::Chains chains = planar_->FindChains();
     std::vector<Subsegment> to_split = EncroachedSubsegments(chains);
     WELLSPACE_RETURN_IF_ERROR(context.Check());
     if (to_split.empty()) {
-      HugeVector<uint32_t> output_index(structure_.vertex_count());
-      for (uint32_t v = 0; v < structure_.vertex_count(); ++v) {
-        output_index[v] = OutputIndex(VertexId{v});
-      }
-      WELLSPACE_ASSIGN_OR_RETURN(
-          made_, ComputeDomainSimplices(structure_, *planar_, chains, output_index, parameters.threads, context));
-      // Ties that doubles broke, at very small angles.
-      for (const uint32_t at : made_->broken) {
-        const auto segment = static_cast<uint32_t>(std::upper_bound(chains.first.begin(), chains.first.end(), at) -
-                                                   chains.first.begin() - 1);
-        to_split.push_back({segment, chains.vertices[at], chains.vertices[at + 1]});
-      }
+      WELLSPACE_ASSIGN_OR_RETURN(to_split, MakeTriangles(std::move(chains), parameters.threads, context));
     }
     if (to_split.empty()) {
       return absl::OkStatus();
     }
     WELLSPACE_RETURN_IF_ERROR(Split(to_split, parameters));
   }
+}
+
+// Makes the triangles, unless subsegments are no edges, and are to be split: ties that doubles broke, at very small
+// angles.
+absl::StatusOr<std::vector<DomainMesher::Subsegment>> DomainMesher::MakeTriangles(PlanarDomain::Chains chains,
+                                                                                  int threads, RunContext& context) {
+  const double no_time = 0;
+  const Stopwatch stopwatch(simplices_seconds_, no_time);
+  numbering_.Extend(structure_.vertex_count());
+  WELLSPACE_ASSIGN_OR_RETURN(
+      DomainSimplices triangles,
+      ComputeDomainSimplices(structure_, *planar_, chains, numbering_.output_index(), threads, context));
+  stars_.Add(triangles.simplices.counters);
+  std::vector<Subsegment> to_split;
+  for (const uint32_t at : triangles.broken) {
+    const auto segment = static_cast<uint32_t>(std::upper_bound(chains.first.begin(), chains.first.end(), at) -
+                                               chains.first.begin() - 1);
+    to_split.push_back({segment, chains.vertices[at], chains.vertices[at + 1]});
+  }
+  if (to_split.empty()) {
+    made_ = {std::move(chains), std::move(triangles)};
+  }
+  return to_split;
 }
 
 // The subsegments in whose diametral disc a vertex lies that no cell has seen, since it is clipped on a side that is
@@ -209,9 +232,7 @@ absl::Status DomainMesher::Split(std::span<const Subsegment> subsegments, const 
     const Point<2> position = planar_->PositionOf(place);
     const Neighbor nearest = structure_.NearestTo(position, subsegment.from, workspace_);
     if (structure_.vertex_count() >= VertexBudget(parameters)) {
-      return absl::ResourceExhaustedError(
-          absl::StrCat("the mesh needs more than max_vertices = ", VertexBudget(parameters),
-                       " vertices; raise max_vertices or rho"));
+      return TooManyVerticesError(VertexBudget(parameters));
     }
     if (nearest.distance_sq < domain_.MinEdge() * domain_.MinEdge()) {
       const Point<2> at = domain_.Unscaled(position);
@@ -227,85 +248,98 @@ absl::Status DomainMesher::Split(std::span<const Subsegment> subsegments, const 
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::vector<uint32_t>> DomainMesher::AddPointsNear(std::span<const double> points,
-                                                                  std::span<const uint32_t> /*near*/,
-                                                                  RunContext& /*context*/) {
-  if (points.empty()) {
-    return std::vector<uint32_t>();
+// Notes that vertex `first` and those after it, if there are any, have been added: they may be a little outside of the
+// box, beside segments that they are on.
+void DomainMesher::NoteAddedFrom(uint32_t first) {
+  if (first == structure_.vertex_count()) {
+    return;
   }
-  return absl::FailedPreconditionError("points: none can be added to the mesh of a domain with segments");
+  made_.reset();
+  for (uint32_t v = first; v < structure_.vertex_count(); ++v) {
+    const Point<2> p = domain_.Unscaled(structure_.point(VertexId{v}));
+    mesh_box_.Include({p, p});
+  }
+  structure_.SetBoxOfCells({domain_.Scaled(mesh_box_.low), domain_.Scaled(mesh_box_.high)});
 }
 
-absl::StatusOr<uint32_t> DomainMesher::AddVertex(uint32_t /*near*/, std::span<const double> /*point*/) {
-  return absl::FailedPreconditionError("point: none can be added to the mesh of a domain with segments");
+absl::StatusOr<std::vector<uint32_t>> DomainMesher::AddPointsNear(std::span<const double> points,
+                                                                  std::span<const uint32_t> near, RunContext& context) {
+  const uint32_t count = structure_.vertex_count();
+  absl::StatusOr<std::vector<uint32_t>> vertices = adder_->AddPoints(points, near, context);
+  NoteAddedFrom(count);
+  if (vertices.ok()) {
+    context.SetVertices(structure_.vertex_count());
+  }
+  return vertices;
 }
 
-absl::StatusOr<std::vector<double>> DomainMesher::NearestNeighborDistances(
-    std::span<const uint32_t> /*vertices*/) const {
-  return absl::FailedPreconditionError("vertices: the mesh of a domain with segments answers no queries");
+absl::StatusOr<uint32_t> DomainMesher::AddVertex(uint32_t near, std::span<const double> point) {
+  const uint32_t count = structure_.vertex_count();
+  absl::StatusOr<uint32_t> vertex = adder_->AddVertex(near, point);
+  NoteAddedFrom(count);
+  return vertex;
 }
 
-absl::StatusOr<std::vector<Cell>> DomainMesher::ClippedCells(std::span<const uint32_t> /*vertices*/,
-                                                             double /*beta*/) const {
-  return absl::FailedPreconditionError("vertices: the mesh of a domain with segments answers no queries");
+absl::StatusOr<std::vector<double>> DomainMesher::NearestNeighborDistances(std::span<const uint32_t> vertices) const {
+  return VertexQueries<2>(domain_, structure_, numbering_).NearestNeighborDistances(vertices);
+}
+
+absl::StatusOr<std::vector<Cell>> DomainMesher::ClippedCells(std::span<const uint32_t> vertices, double beta) const {
+  return VertexQueries<2>(domain_, structure_, numbering_).ClippedCells(vertices, beta);
 }
 
 absl::StatusOr<Mesh> DomainMesher::Extract(int threads, RunContext& context) {
-  if (!made_.has_value()) {
-    return absl::FailedPreconditionError("the mesh has not been refined; refine it first");
-  }
-  WELLSPACE_RETURN_IF_ERROR(CheckThreads(threads));
+  WELLSPACE_RETURN_IF_ERROR(CheckRefined(made_.has_value(), threads));
   context.EnterPhase(Phase::kSimplices);
   Mesh mesh;
   mesh.dimension = 2;
-  mesh.domain_low = mesh_low_;
-  mesh.domain_high = mesh_high_;
-  SetPoints(mesh);
-  mesh.simplices = made_->simplices.indices;
-  mesh.statistics.max_radius_edge = made_->simplices.max_radius_edge;
-  mesh.statistics.min_angle_deg = made_->simplices.min_angle_deg;
-  SetBoundary(planar_->FindChains(), mesh);
-  SetRegions(made_->faces, mesh);
+  mesh.domain_low.assign(mesh_box_.low.begin(), mesh_box_.low.end());
+  mesh.domain_high.assign(mesh_box_.high.begin(), mesh_box_.high.end());
+  WELLSPACE_ASSIGN_OR_RETURN(mesh.points, numbering_.PointsFrom(structure_, domain_, 0, context));
+  mesh.input_vertex = numbering_.input_vertex();
+  SetOrigins(mesh);
+  const Simplices& simplices = made_->triangles.simplices;
+  mesh.simplices = simplices.indices;
+  mesh.statistics.max_radius_edge = simplices.max_radius_edge;
+  mesh.statistics.min_angle_deg = simplices.min_angle_deg;
+  SetBoundary(mesh);
+  SetRegions(mesh);
   WELLSPACE_RETURN_IF_ERROR(context.Check());
   context.EnterPhase(Phase::kDone);
-  simplices_seconds_ = absl::ToDoubleSeconds(context.TimeIn(Phase::kSimplices));
+  simplices_seconds_ += absl::ToDoubleSeconds(context.TimeIn(Phase::kSimplices));
+  extracted_vertices_ = mesh.vertex_count();
+  extracted_simplices_ = mesh.simplex_count();
   SetStatistics(mesh);
   return mesh;
 }
 
 absl::Status DomainMesher::Update(Mesh& mesh, int threads, RunContext& context) {
+  WELLSPACE_RETURN_IF_ERROR(CheckRefined(made_.has_value(), threads));
+  WELLSPACE_RETURN_IF_ERROR(CheckLastMesh(mesh, 2, extracted_vertices_, extracted_simplices_));
   WELLSPACE_ASSIGN_OR_RETURN(mesh, Extract(threads, context));
   return absl::OkStatus();
 }
 
-// The vertices, and where they come from.
-void DomainMesher::SetPoints(Mesh& mesh) const {
-  const uint32_t vertices = structure_.vertex_count();
-  mesh.points.assign(points_.begin(), points_.end());
-  mesh.points.resize(size_t{2} * vertices);
-  mesh.vertex_origins.assign(vertices, kSteinerOrigin);
-  for (uint32_t v = 0; v < vertices; ++v) {
-    const uint32_t output = OutputIndex(VertexId{v});
-    if (v >= planar_->point_count()) {
-      const Point<2> p = domain_.Unscaled(structure_.point(VertexId{v}));
-      std::copy(p.begin(), p.end(), mesh.points.begin() + size_t{2} * output);
-    } else if (const uint32_t input = planar_->graph().input_of_point[v]; input != PlanarGraph::kNoInput) {
-      mesh.vertex_origins[output] = input;
-    } else {
-      const std::span<const HalfEdge> ways = planar_->WaysFrom(VertexId{v});
-      const bool is_corner = std::count_if(ways.begin(), ways.end(), [&](HalfEdge h) {
-                               return planar_->graph().segments[SegmentOf(h)].IsBoxSide();
-                             }) == 2;
-      mesh.vertex_origins[output] = is_corner ? kCornerOrigin : kSteinerOrigin;
+// Where vertices come from.
+void DomainMesher::SetOrigins(Mesh& mesh) const {
+  mesh.vertex_origins.assign(mesh.vertex_count(), kSteinerOrigin);
+  for (uint32_t p = 0; p < planar_->point_count(); ++p) {
+    const std::span<const HalfEdge> ways = planar_->WaysFrom(VertexId{p});
+    const auto sides = std::count_if(ways.begin(), ways.end(),
+                                     [&](HalfEdge h) { return planar_->graph().segments[SegmentOf(h)].IsBoxSide(); });
+    if (sides == 2) {
+      mesh.vertex_origins[numbering_.OutputIndex(VertexId{p})] = kCornerOrigin;
     }
   }
-  for (const uint32_t point : planar_->graph().point_of_input) {
-    mesh.input_vertex.push_back(point == PlanarGraph::kNoInput ? kNoOutput : OutputIndex(VertexId{point}));
+  for (size_t i = mesh.input_vertex.size(); i > 0; --i) {
+    if (const uint32_t v = mesh.input_vertex[i - 1]; v != kNoOutput) {
+      mesh.vertex_origins[v] = static_cast<uint32_t>(i - 1);
+    }
   }
 }
 
 // The subsegments, by what tells them apart; what is meshed is on the left of one that bounds it.
-void DomainMesher::SetBoundary(const PlanarDomain::Chains& chains, Mesh& mesh) const {
+void DomainMesher::SetBoundary(Mesh& mesh) const {
   const std::vector<GraphSegment>& segments = planar_->graph().segments;
   std::set<int64_t> values;
   for (const GraphSegment& segment : segments) {
@@ -323,10 +357,10 @@ void DomainMesher::SetBoundary(const PlanarDomain::Chains& chains, Mesh& mesh) c
       mesh.boundary.push_back({tag, PartName(PartOf(segments[s])), 0});
     }
     const bool is_left = planar_->faces().IsMeshed(planar_->faces().left_face[HalfEdgeOf(s, false)]);
-    const std::span<const VertexId> chain = chains.Of(s);
+    const std::span<const VertexId> chain = made_->chains.Of(s);
     for (size_t i = 0; i + 1 < chain.size(); ++i) {
-      const uint32_t from = OutputIndex(chain[i]);
-      const uint32_t to = OutputIndex(chain[i + 1]);
+      const uint32_t from = numbering_.OutputIndex(chain[i]);
+      const uint32_t to = numbering_.OutputIndex(chain[i + 1]);
       mesh.facets.push_back(is_left ? from : to);
       mesh.facets.push_back(is_left ? to : from);
       ++mesh.boundary.back().facets;
@@ -338,7 +372,7 @@ void DomainMesher::SetBoundary(const PlanarDomain::Chains& chains, Mesh& mesh) c
 }
 
 // The region of each triangle: that of its face.
-void DomainMesher::SetRegions(std::span<const uint32_t> faces, Mesh& mesh) const {
+void DomainMesher::SetRegions(Mesh& mesh) const {
   std::set<int64_t> values;
   for (const Face& face : planar_->faces().faces) {
     if (face.is_meshed) {
@@ -354,8 +388,8 @@ void DomainMesher::SetRegions(std::span<const uint32_t> faces, Mesh& mesh) const
     mesh.regions.push_back({id, value == 0 ? "domain" : absl::StrCat("region_", value)});
   }
   if (regions.size() > 1) {
-    mesh.simplex_regions.reserve(faces.size());
-    for (const uint32_t face : faces) {
+    mesh.simplex_regions.reserve(mesh.simplex_count());
+    for (const uint32_t face : made_->triangles.faces) {
       mesh.simplex_regions.push_back(ids.at(planar_->faces().faces[face].region));
     }
   }
@@ -376,7 +410,9 @@ uint64_t DomainMesher::CountExempt(const Mesh& mesh) const {
 void DomainMesher::SetStatistics(Mesh& mesh) const {
   MeshStatistics& statistics = mesh.statistics;
   statistics.input_points = mesh.input_vertex.size();
-  statistics.duplicates = planar_->graph().counts.equal_points;
+  const uint64_t added = mesh.input_vertex.size() - planar_->graph().point_of_input.size();
+  const uint64_t new_vertices = numbering_.distinct_inputs() - planar_->point_count();
+  statistics.duplicates = planar_->graph().counts.equal_points + added - new_vertices;
   const CleaningCounts& counts = planar_->graph().counts;
   DomainStatistics& domain = statistics.domain.emplace();
   domain.unmeshed_points = dropped_points_;
@@ -394,21 +430,13 @@ void DomainMesher::SetStatistics(Mesh& mesh) const {
   statistics.refinement_seconds = refinement_seconds_;
   statistics.simplices_seconds = simplices_seconds_;
   statistics.tree_leaves = structure_.tree().leaf_count();
-  SetQueryFigures(refinement_->counters(), made_->simplices.counters, statistics);
+  SetQueryFigures(refinement_->counters(), stars_, statistics);
   SetTotals(statistics);
 }
 
 absl::StatusOr<MeshEstimate> DomainMesher::Estimate(const MeshParameters& parameters, const RunContext& context) const {
-  WELLSPACE_RETURN_IF_ERROR(ValidateParameters(parameters));
-  WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size, EstimateSize<2>(structure_, CriteriaIn<2>(domain_, parameters),
-                                                                      context, {}, planar_.get()));
-  MeshEstimate estimate;
-  estimate.vertices = SaturatedCount(size.vertices);
-  estimate.simplices = SaturatedCount(size.simplices);
-  estimate.memory_bytes = SaturatedCount(size.bytes);
-  estimate.bytes_per_vertex = size.bytes / size.vertices;
-  estimate.tree_leaves = structure_.tree().leaf_count();
-  return estimate;
+  WELLSPACE_RETURN_IF_ERROR(CheckParametersIn(parameters, 2));
+  return EstimateMeshOf<2>(structure_, CriteriaIn<2>(domain_, parameters), context, planar_.get());
 }
 
 absl::StatusOr<std::unique_ptr<Mesher>> Mesher::CreateInDomain(const MeshParameters& parameters,

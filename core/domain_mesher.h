@@ -9,25 +9,29 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "core/base/memory/huge_pages.h"
 #include "core/base/run_context.h"
 #include "core/domain_cloud.h"
 #include "core/features/features.h"
+#include "core/geometry/box.h"
+#include "core/input_cloud.h"
 #include "core/mesher.h"
+#include "core/point_adder.h"
+#include "core/point_placer.h"
 #include "core/refine/domain/planar_domain.h"
 #include "core/refine/refine.h"
 #include "core/simplex/domain_simplices.h"
+#include "core/vertex_numbering.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {
 
 // Mesher::Create for features. Points of the graph have the numbers in the mesh that they have there, among those that
-// are meshed; vertices that are inserted have the same number inside as outside.
+// are meshed; vertices that are inserted or added have the same number inside as outside.
 //
 // Thread safety: as Mesher.
 class DomainMesher final : public Mesher {
  public:
-  // What Mesher::Create does for features.
+  // What Mesher::CreateInDomain does.
   absl::Status Initialize(const MeshParameters& parameters, std::span<const double> points, const Features& features,
                           RunContext& context);
 
@@ -52,30 +56,39 @@ class DomainMesher final : public Mesher {
     VertexId to;
   };
 
+  // What the last refinement has made.
+  struct Made {
+    PlanarDomain::Chains chains;
+    DomainSimplices triangles;
+  };
+
+  void NumberPoints(const DomainCloud& made, std::span<const double> points);
   std::vector<Subsegment> EncroachedSubsegments(const PlanarDomain::Chains& chains);
   absl::Status Split(std::span<const Subsegment> subsegments, const MeshParameters& parameters);
   absl::Status MakeConforming(const MeshParameters& parameters, RunContext& context);
-  uint32_t OutputIndex(VertexId v) const {
-    return Index(v) < output_index_.size() ? output_index_[Index(v)] : Index(v);
-  }
-  void SetPoints(Mesh& mesh) const;
-  void SetBoundary(const PlanarDomain::Chains& chains, Mesh& mesh) const;
-  void SetRegions(std::span<const uint32_t> faces, Mesh& mesh) const;
+  absl::StatusOr<std::vector<Subsegment>> MakeTriangles(PlanarDomain::Chains chains, int threads, RunContext& context);
+  void NoteAddedFrom(uint32_t first);
+  void SetOrigins(Mesh& mesh) const;
+  void SetBoundary(Mesh& mesh) const;
+  void SetRegions(Mesh& mesh) const;
   uint64_t CountExempt(const Mesh& mesh) const;
   void SetStatistics(Mesh& mesh) const;
 
   Domain<2> domain_;
-  std::vector<double> mesh_low_;  // of what is meshed
-  std::vector<double> mesh_high_;
+  Box<2> mesh_box_;  // of what is meshed, not scaled
   QueryStructure<2> structure_;
   std::unique_ptr<PlanarDomain> planar_;
   std::optional<Refinement<2>> refinement_;
   Workspace<2> workspace_;
-  std::vector<double> points_;         // of the graph, as given
-  HugeVector<uint32_t> output_index_;  // by point of the graph
+  VertexNumbering<2> numbering_;
+  std::optional<PointPlacer> placer_;
+  std::optional<PointAdder<2>> adder_;
   uint64_t dropped_points_ = 0;
-  std::optional<DomainSimplices> made_;  // since the last refinement
-  double rho_ = 0;                       // of the last refinement
+  std::optional<Made> made_;         // unless vertices have been added since
+  double rho_ = 0;                   // of the last refinement
+  uint64_t extracted_vertices_ = 0;  // of the last mesh
+  uint64_t extracted_simplices_ = 0;
+  QueryCounters stars_;
   double tree_seconds_ = 0;
   double refinement_seconds_ = 0;
   double simplices_seconds_ = 0;

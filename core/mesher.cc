@@ -1,7 +1,6 @@
 #include "core/mesher.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdlib>
 #include <optional>
 #include <type_traits>
@@ -18,7 +17,9 @@
 #include "core/estimate/estimate.h"
 #include "core/feasibility.h"
 #include "core/input_cloud.h"
+#include "core/mesh_estimate.h"
 #include "core/mesh_parts.h"
+#include "core/mesher_checks.h"
 #include "core/near_points.h"
 #include "core/point_adder.h"
 #include "core/refine/refine.h"
@@ -28,6 +29,7 @@
 #include "core/simplex/validate.h"
 #include "core/sliver/sliver_stage.h"
 #include "core/vertex_numbering.h"
+#include "core/vertex_queries.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {
@@ -76,7 +78,7 @@ class MesherIn final : public Mesher {
     numbering_.CountMerged(merged.merged);
     is_given_.assign(structure_.built_count(), true);
     refinement_.emplace(structure_, domain_.MinEdge());
-    adder_.emplace(domain_, merge_distance_, structure_, *refinement_, numbering_, is_given_);
+    adder_.emplace(domain_, merge_distance_, structure_, *refinement_, numbering_, &is_given_);
     context.SetVertices(structure_.vertex_count());
     tree_seconds_ = absl::ToDoubleSeconds(context.TimeIn(Phase::kTree));
     return absl::OkStatus();
@@ -90,12 +92,12 @@ class MesherIn final : public Mesher {
   }
 
   absl::Status CheckFeasible(const MeshParameters& parameters) const override {
-    WELLSPACE_RETURN_IF_ERROR(CheckParameters(parameters));
+    WELLSPACE_RETURN_IF_ERROR(CheckParametersIn(parameters, D));
     return core::CheckFeasible<D>(domain_, parameters, numbering_.distinct_inputs());
   }
 
   absl::Status Refine(const MeshParameters& parameters, RunContext& context) override {
-    WELLSPACE_RETURN_IF_ERROR(CheckParameters(parameters));
+    WELLSPACE_RETURN_IF_ERROR(CheckParametersIn(parameters, D));
     context.EnterPhase(Phase::kRefinement);
     is_refined_ = false;
     const MeshCriteria<D> criteria = CriteriaOf(parameters);
@@ -129,57 +131,15 @@ class MesherIn final : public Mesher {
   }
 
   absl::StatusOr<std::vector<double>> NearestNeighborDistances(std::span<const uint32_t> vertices) const override {
-    WELLSPACE_RETURN_IF_ERROR(CheckVertices(vertices, structure_.vertex_count()));
-    std::vector<double> distances;
-    distances.reserve(vertices.size());
-    Workspace<D> workspace;
-    for (const uint32_t vertex : vertices) {
-      const double distance_sq =
-          structure_.ApproximateNearestNeighbor(numbering_.VertexOf(vertex), workspace).distance_sq;
-      distances.push_back(std::sqrt(distance_sq) / domain_.scale);
-    }
-    return distances;
+    return VertexQueries<D>(domain_, structure_, numbering_).NearestNeighborDistances(vertices);
   }
 
   absl::StatusOr<std::vector<Cell>> ClippedCells(std::span<const uint32_t> vertices, double beta) const override {
-    WELLSPACE_RETURN_IF_ERROR(CheckVertices(vertices, structure_.vertex_count()));
-    if (!(beta >= 1)) {
-      return absl::InvalidArgumentError(absl::StrCat("beta: ", beta, " is not allowed; a number of at least 1 is"));
-    }
-    // Those of one leaf one after the other, since cells of vertices that are near each other take less time.
-    std::vector<std::pair<NodeId, size_t>> order;
-    order.reserve(vertices.size());
-    for (size_t i = 0; i < vertices.size(); ++i) {
-      order.emplace_back(structure_.tree().leaf_of(numbering_.VertexOf(vertices[i])), i);
-    }
-    std::sort(order.begin(), order.end());
-    std::vector<VertexId> sites;
-    sites.reserve(vertices.size());
-    for (const auto& [leaf, i] : order) {
-      sites.push_back(numbering_.VertexOf(vertices[i]));
-    }
-    std::vector<Cell> cells(vertices.size());
-    auto next = order.begin();
-    absl::Status status;
-    Workspace<D> workspace;
-    structure_.ClippedVoronoiOfEach(sites, beta, workspace, [&](VertexId, double radius) {
-      const size_t i = (next++)->second;
-      if (workspace.cell.IsTooLarge()) {
-        status = absl::FailedPreconditionError(absl::StrCat("the cell of vertex ", vertices[i], " has more than ",
-                                                            Polytope<D>::kMostNodes,
-                                                            " nodes; refine first, or ask with a smaller beta"));
-        return false;
-      }
-      cells[i] = DescribeCell<D>(vertices[i], radius, workspace.cell, domain_,
-                                 [this](VertexId u) { return numbering_.OutputIndex(u); });
-      return true;
-    });
-    WELLSPACE_RETURN_IF_ERROR(status);
-    return cells;
+    return VertexQueries<D>(domain_, structure_, numbering_).ClippedCells(vertices, beta);
   }
 
   absl::StatusOr<Mesh> Extract(int threads, RunContext& context) override {
-    WELLSPACE_RETURN_IF_ERROR(CheckRefined(threads));
+    WELLSPACE_RETURN_IF_ERROR(CheckRefined(is_refined_, threads));
     numbering_.Extend(structure_.vertex_count());
     Mesh mesh;
     mesh.dimension = D;
@@ -218,14 +178,8 @@ class MesherIn final : public Mesher {
   }
 
   absl::Status Update(Mesh& mesh, int threads, RunContext& context) override {
-    WELLSPACE_RETURN_IF_ERROR(CheckRefined(threads));
-    if (mesh.dimension != D || mesh.vertex_count() != extracted_vertices_ ||
-        mesh.simplex_count() != extracted_simplices_) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("mesh: it has ", mesh.vertex_count(), " vertices and ", mesh.simplex_count(), " simplices in ",
-                       mesh.dimension, "-D; the last that was extracted has ", extracted_vertices_, " and ",
-                       extracted_simplices_, " in ", D, "-D, and only that can be updated"));
-    }
+    WELLSPACE_RETURN_IF_ERROR(CheckRefined(is_refined_, threads));
+    WELLSPACE_RETURN_IF_ERROR(CheckLastMesh(mesh, D, extracted_vertices_, extracted_simplices_));
     if (MakesWhole() || has_moved_ || !mesh.weights.empty()) {
       WELLSPACE_ASSIGN_OR_RETURN(mesh, Extract(threads, context));
       return absl::OkStatus();
@@ -269,17 +223,8 @@ class MesherIn final : public Mesher {
   }
 
   absl::StatusOr<MeshEstimate> Estimate(const MeshParameters& parameters, const RunContext& context) const override {
-    WELLSPACE_RETURN_IF_ERROR(CheckParameters(parameters));
-    if (structure_.vertex_count() > structure_.built_count()) {
-      return absl::FailedPreconditionError(
-          "vertices have been inserted since the mesher was created; an estimate is made before that");
-    }
-    WELLSPACE_ASSIGN_OR_RETURN(const SizeEstimate size, EstimateSize<D>(structure_, CriteriaOf(parameters), context));
-    MeshEstimate estimate;
-    estimate.vertices = SaturatedCount(size.vertices);
-    estimate.simplices = SaturatedCount(size.simplices);
-    estimate.memory_bytes = SaturatedCount(size.bytes);
-    estimate.bytes_per_vertex = size.bytes / size.vertices;
+    WELLSPACE_RETURN_IF_ERROR(CheckParametersIn(parameters, D));
+    WELLSPACE_ASSIGN_OR_RETURN(MeshEstimate estimate, EstimateMeshOf<D>(structure_, CriteriaOf(parameters), context));
     if constexpr (D >= 3) {
       if (MinDihedralOf(parameters) > 0 || parameters.pump_weights) {
         const uint64_t bytes = SliverStage<D>::EstimateBytes(estimate.vertices, estimate.simplices);
@@ -287,7 +232,6 @@ class MesherIn final : public Mesher {
         estimate.bytes_per_vertex += static_cast<double>(bytes) / static_cast<double>(estimate.vertices);
       }
     }
-    estimate.tree_leaves = structure_.tree().leaf_count();
     return estimate;
   }
 
@@ -339,15 +283,6 @@ class MesherIn final : public Mesher {
     WELLSPACE_RETURN_IF_ERROR(
         CheckSeparation<D>(domain_, structure_, 0, cloud.first_input, parameters.threads, context));
     return cloud;
-  }
-
-  static absl::Status CheckParameters(const MeshParameters& parameters) {
-    WELLSPACE_RETURN_IF_ERROR(ValidateParameters(parameters));
-    if (parameters.dimension != D) {
-      return absl::InvalidArgumentError(
-          absl::StrCat("dimension: ", parameters.dimension, " is not that of the mesh, ", D));
-    }
-    return absl::OkStatus();
   }
 
   MeshCriteria<D> CriteriaOf(const MeshParameters& parameters) const { return CriteriaIn<D>(domain_, parameters); }
@@ -438,14 +373,6 @@ class MesherIn final : public Mesher {
       }
     }
     return vertices;
-  }
-
-  absl::Status CheckRefined(int threads) const {
-    if (!is_refined_) {
-      return absl::FailedPreconditionError(
-          "the mesh has not been refined since vertices were last added; refine it first");
-    }
-    return CheckThreads(threads);
   }
 
   // Sets what is said of the boundary, of regions and of origins.

@@ -43,8 +43,7 @@ class Mesher {
                                                         std::span<const double> points, RunContext& context);
 
   // The same in the plane for the domain that `features` make of `points`; docs/design/features.md says how. Only what
-  // is meshed is in the mesh: points that touch none of it have no vertex. The tree tells of no size, and no point can
-  // be added later.
+  // is meshed is in the mesh: points that touch none of it have no vertex. The tree tells of no size.
   //
   // Errors:     as above; INVALID_ARGUMENT of MakePlanarGraph and FindFaces, and for parameters that a domain does not
   //             have: another dimension or criterion, a merge_distance, a box beside another rule than kBox.
@@ -68,7 +67,7 @@ class Mesher {
   // of Create.
   //
   // Complexity: O(m) queries the first time and for other demands than the last; else in proportion to what was added
-  //             since.
+  //             since, and in a domain one pass over all.
   // Errors:     INVALID_ARGUMENT (parameters), RESOURCE_EXHAUSTED (max_vertices, smallest edge, memory of the
   //             context), CANCELLED, DEADLINE_EXCEEDED. Resumable: a later call goes on where this was left, and its
   //             mesh depends on it.
@@ -79,9 +78,14 @@ class Mesher {
   // Adds vertices at `points`, n x dimension: all of them or, on an error, none. Returns the vertex of each point; one
   // that is a vertex already is not added again. Then the mesh wants to be refined again.
   //
+  // In a domain a point lies inside a face that is meshed, or on a segment, which it splits. It is on the segment if it
+  // is no farther away than a quarter of the least separation, about 2^-46 of the largest coordinate: hardly any point
+  // is on a segment exactly, since coordinates are rounded. The vertex is where the point is.
+  //
   // Complexity: O(n (log n + depth of the tree)) and O(1) queries a point in a refined mesh.
-  // Errors:     INVALID_ARGUMENT as in Create, naming the point, also when it is too close to a vertex;
-  //             RESOURCE_EXHAUSTED when vertices can no longer be numbered; CANCELLED, DEADLINE_EXCEEDED.
+  // Errors:     INVALID_ARGUMENT as in Create, naming the point, also when it is too close to a vertex, or in a domain
+  //             to a segment that it is not on, or is not in the domain that is meshed; RESOURCE_EXHAUSTED when
+  //             vertices can no longer be numbered; CANCELLED, DEADLINE_EXCEEDED.
   absl::StatusOr<std::vector<uint32_t>> AddPoints(std::span<const double> points, RunContext& context) {
     return AddPointsNear(points, {}, context);
   }
@@ -103,8 +107,8 @@ class Mesher {
   // Source:     [HT08] Figure 3, ADDVERTEX.
   virtual absl::StatusOr<uint32_t> AddVertex(uint32_t near, std::span<const double> point) = 0;
 
-  // The distance from each of `vertices` to its nearest other vertex; exact, where the paper asks for a constant
-  // factor.
+  // The distance from each of `vertices` to its nearest other vertex, over segments and holes too; exact, where the
+  // paper asks for a constant factor.
   //
   // Complexity: O(1) each in a refined mesh or bottom-up.
   // Errors:     OUT_OF_RANGE, naming the first vertex that does not exist.
@@ -113,6 +117,10 @@ class Mesher {
 
   // The Voronoi cells of `vertices` in the box, each clipped at beta times the distance to the vertex' nearest
   // neighbour; whole ones when beta is infinite.
+  //
+  // In a domain the box is that of what is meshed, and segments cut nothing off: cells are convex, and fill the box,
+  // holes too. In a refined mesh no cell reaches over a segment that its vertex is not on. So the cell of a vertex on
+  // no segment lies in its face; that of a vertex on a segment is on both sides, be they meshed or not.
   //
   // Complexity: O(1) each in a refined mesh or bottom-up.
   // Errors:     OUT_OF_RANGE as above; INVALID_ARGUMENT unless beta is a number of at least 1; FAILED_PRECONDITION,
@@ -125,7 +133,8 @@ class Mesher {
   //
   // Guarantees: (1) the simplices are a Delaunay triangulation of the vertices and decompose exactly the box; (2) the
   //             criterion holds for each; (3) no circumcentre lies outside the box. With weights they are the regular
-  //             triangulation, and (2) and (3) are those of the Delaunay triangulation before.
+  //             triangulation, and (2) and (3) are those of the Delaunay triangulation before. Those of a domain are
+  //             in docs/design/features.md.
   // Complexity: O(m) time and memory.
   // Errors:     FAILED_PRECONDITION unless refined since vertices were last added; RESOURCE_EXHAUSTED (memory of the
   //             context); CANCELLED, DEADLINE_EXCEEDED.
@@ -135,7 +144,8 @@ class Mesher {
   // Brings `mesh`, the last that Extract or Update made, up to date: replaces the simplices around the vertices added
   // since, and moves those that have moved. The simplices are those that Extract would give, in another order.
   //
-  // Complexity: O(1) for each vertex added, and one pass over the indices of the mesh; with pump_weights as Extract.
+  // Complexity: O(1) for each vertex added, and one pass over the indices of the mesh; with pump_weights, and in a
+  //             domain, as Extract.
   // Errors:     as Extract; INVALID_ARGUMENT for another mesh. On an error `mesh` is unchanged.
   virtual absl::Status Update(Mesh& mesh, int threads, RunContext& context) = 0;
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 #include <utility>
 
 #include "absl/status/status.h"
@@ -11,28 +10,9 @@
 #include "core/base/memory/huge_pages.h"
 #include "core/base/status_macros.h"
 #include "core/mesh_parameters.h"
+#include "core/refused_points.h"
 
 namespace wellspace::core {
-namespace {
-
-// Points that an error names.
-constexpr size_t kNamedTooClose = 10;
-
-// One error for all points that are refused, each with its number: it counts them, and names the first.
-absl::Status TooCloseInAll(std::vector<std::pair<uint32_t, absl::Status>> refused) {
-  std::sort(refused.begin(), refused.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  std::string text(refused.front().second.message());
-  for (size_t i = 1; i < refused.size() && i < kNamedTooClose; ++i) {
-    absl::StrAppend(&text, i == 1 ? "; so are " : ", ", "points[", refused[i].first, "]");
-  }
-  if (refused.size() > 1) {
-    absl::StrAppend(&text, refused.size() > kNamedTooClose ? ", …: " : ": ", refused.size(), " points in all");
-  }
-  return absl::InvalidArgumentError(text);
-}
-
-}  // namespace
-
 template <int D>
 absl::StatusOr<std::vector<uint32_t>> PointAdder<D>::AddPoints(std::span<const double> points,
                                                                std::span<const uint32_t> near,
@@ -43,6 +23,7 @@ absl::StatusOr<std::vector<uint32_t>> PointAdder<D>::AddPoints(std::span<const d
         absl::StrCat("near: it has ", near.size(), " vertices for ", points.size() / D, " points"));
   }
   WELLSPACE_RETURN_IF_ERROR(CheckVertices(near, structure_.vertex_count()));
+  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<PlaceInDomain> places, FindPlaces(points, near, context));
   WELLSPACE_ASSIGN_OR_RETURN(const Merged merged, Merge(points, near, context));
   const bool merges = merge_distance_ > 0;
   const std::vector<uint32_t>& inputs = merged.others.inputs;
@@ -66,7 +47,7 @@ absl::StatusOr<std::vector<uint32_t>> PointAdder<D>::AddPoints(std::span<const d
   }
   for (size_t i = 0; i < cloud.points.size(); ++i) {
     if (const uint32_t input = cloud.first_input[i]; vertex_of[i] == kNoVertex) {
-      vertex_of[i] = Add(Start(near, input), cloud.points[i], points, input);
+      vertex_of[i] = Add(Start(near, input), cloud.points[i], points, input, places);
     }
   }
   std::vector<uint32_t> vertices;
@@ -76,7 +57,7 @@ absl::StatusOr<std::vector<uint32_t>> PointAdder<D>::AddPoints(std::span<const d
       v = vertex_of[sorted_of[merges ? merged.others.place_of[other] : other]];
       ++other;
     }
-    is_given_[Index(v)] = true;
+    NoteGiven(v);
     vertices.push_back(numbering_.OutputIndex(v));
   }
   numbering_.CountMerged(merged.others.merged);
@@ -94,6 +75,7 @@ absl::StatusOr<uint32_t> PointAdder<D>::AddVertex(uint32_t near, std::span<const
     return absl::ResourceExhaustedError(absl::StrCat("no more than ", kMaxVertices, " vertices can be numbered"));
   }
   const RunContext context;
+  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<PlaceInDomain> places, FindPlaces(point, {&near, 1}, context));
   WELLSPACE_RETURN_IF_ERROR(CheckPoints<D>(domain_, point, context));
   const VertexId start = numbering_.VertexOf(near);
   uint64_t merged = 0;
@@ -102,14 +84,26 @@ absl::StatusOr<uint32_t> PointAdder<D>::AddVertex(uint32_t near, std::span<const
     WELLSPACE_ASSIGN_OR_RETURN(const SortedCloud<D> cloud, SortCloud<D>(domain_, point, 1, context));
     WELLSPACE_ASSIGN_OR_RETURN(v, Find(cloud.points[0], 0, start));
     if (v == kNoVertex) {
-      v = Add(start, cloud.points[0], point, 0);
+      v = Add(start, cloud.points[0], point, 0, places);
     }
   }
-  is_given_[Index(v)] = true;
+  NoteGiven(v);
   const uint32_t vertex = numbering_.OutputIndex(v);
   numbering_.CountMerged(merged);
   numbering_.AppendInputs({&vertex, 1});
   return vertex;
+}
+
+// Where points lie in a domain of the plane; none where all of the box is meshed.
+template <int D>
+absl::StatusOr<std::vector<PlaceInDomain>> PointAdder<D>::FindPlaces(std::span<const double> points,
+                                                                     std::span<const uint32_t> near,
+                                                                     const RunContext& context) {
+  if (D != 2 || placer_ == nullptr) {
+    return std::vector<PlaceInDomain>();
+  }
+  return placer_->FindAll(
+      points, [&](size_t index) { return Start(near, index); }, context);
 }
 
 // Merges points with vertices that are near, and the others among themselves; nothing if points are not merged.
@@ -164,7 +158,7 @@ absl::StatusOr<std::vector<VertexId>> PointAdder<D>::FindAll(const SortedCloud<D
                                                              std::span<const uint32_t> near,
                                                              const RunContext& context) {
   std::vector<VertexId> found(cloud.points.size(), kNoVertex);
-  std::vector<std::pair<uint32_t, absl::Status>> refused;
+  RefusedPoints refused;
   for (size_t i = 0; i < cloud.points.size(); ++i) {
     WELLSPACE_RETURN_IF_ERROR(context.Check());
     const uint32_t input = cloud.first_input[i];
@@ -172,11 +166,11 @@ absl::StatusOr<std::vector<VertexId>> PointAdder<D>::FindAll(const SortedCloud<D
     if (vertex.ok()) {
       found[i] = *vertex;
     } else {
-      refused.emplace_back(input, vertex.status());
+      refused.Add(input, vertex.status());
     }
   }
-  if (!refused.empty()) {
-    return TooCloseInAll(std::move(refused));
+  if (!refused.IsEmpty()) {
+    return refused.InAll("so are");
   }
   return found;
 }
@@ -195,15 +189,27 @@ absl::StatusOr<VertexId> PointAdder<D>::Find(const Point<D>& p, size_t index, Ve
   return kNoVertex;
 }
 
-// Adds a vertex at `p`, which is input `index` of `points`. No neighbour is notified here: the next Refine does
-// that when it first looks at the cell of the vertex, as with every vertex that is inserted (PendingVertices::Notify).
+// Adds a vertex at `p`, which is input `index` of `points`, and has its place in `places` if all have one. No neighbour
+// is notified here: the next Refine does that when it first looks at the cell of the vertex, as with every vertex that
+// is inserted (PendingVertices::Notify).
 template <int D>
-VertexId PointAdder<D>::Add(VertexId near, const Point<D>& p, std::span<const double> points, size_t index) {
+VertexId PointAdder<D>::Add(VertexId near, const Point<D>& p, std::span<const double> points, size_t index,
+                            const std::vector<PlaceInDomain>& places) {
   const VertexId v = structure_.AddVertex(near, p);
-  is_given_.resize(structure_.vertex_count(), true);
+  if (!places.empty()) {
+    placer_->Add(places[index]);
+  }
   refinement_.VertexAdded(v);
   numbering_.AddInputVertex(v, points, index);
   return v;
+}
+
+template <int D>
+void PointAdder<D>::NoteGiven(VertexId v) {
+  if (is_given_ != nullptr) {
+    is_given_->resize(structure_.vertex_count(), true);
+    (*is_given_)[Index(v)] = true;
+  }
 }
 
 #define WELLSPACE_INSTANTIATE(D) template class PointAdder<D>;

@@ -13,30 +13,35 @@
 #include "core/geometry/point.h"
 #include "core/input_cloud.h"
 #include "core/near_points.h"
+#include "core/point_placer.h"
+#include "core/refine/domain/segment_point.h"
 #include "core/refine/refine.h"
 #include "core/vertex_numbering.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {
 
-// Adds vertices at points, unless there is a vertex already, or one so near that the two are merged.
+// Adds vertices at points, unless there is a vertex already, or one so near that the two are merged. In a domain of the
+// plane they lie on its segments, or in faces that are meshed.
 //
 // Thread safety: thread-compatible.
 template <int D>
 class PointAdder {
  public:
   // Points no farther than `merge_distance` from a vertex become that one. `is_given` has an entry for each vertex, and
-  // is set for those that points become.
+  // is set for those that points become; null: that is not asked for. `placer` is that of a domain in the plane, for
+  // which points are not merged; null: all of the box is meshed.
   //
   // REQUIRES:   all that is handed in outlives this.
   PointAdder(const Domain<D>& domain, double merge_distance, QueryStructure<D>& structure, Refinement<D>& refinement,
-             VertexNumbering<D>& numbering, std::vector<bool>& is_given)
+             VertexNumbering<D>& numbering, std::vector<bool>* is_given, PointPlacer* placer = nullptr)
       : domain_(domain),
         merge_distance_(merge_distance),
         structure_(structure),
         refinement_(refinement),
         numbering_(numbering),
-        is_given_(is_given) {}
+        is_given_(is_given),
+        placer_(placer) {}
 
   // Mesher::AddPointsNear.
   absl::StatusOr<std::vector<uint32_t>> AddPoints(std::span<const double> points, std::span<const uint32_t> near,
@@ -57,20 +62,25 @@ class PointAdder {
     return near.empty() ? kNoVertex : numbering_.VertexOf(near[index]);
   }
 
+  absl::StatusOr<std::vector<PlaceInDomain>> FindPlaces(std::span<const double> points, std::span<const uint32_t> near,
+                                                        const RunContext& context);
   absl::StatusOr<Merged> Merge(std::span<const double> points, std::span<const uint32_t> near,
                                const RunContext& context);
   VertexId FindMerged(const Point<D>& p, VertexId near, uint64_t& merged);
   absl::StatusOr<std::vector<VertexId>> FindAll(const SortedCloud<D>& cloud, std::span<const uint32_t> near,
                                                 const RunContext& context);
   absl::StatusOr<VertexId> Find(const Point<D>& p, size_t index, VertexId near);
-  VertexId Add(VertexId near, const Point<D>& p, std::span<const double> points, size_t index);
+  VertexId Add(VertexId near, const Point<D>& p, std::span<const double> points, size_t index,
+               const std::vector<PlaceInDomain>& places);
+  void NoteGiven(VertexId v);
 
   const Domain<D>& domain_;
   const double merge_distance_;
   QueryStructure<D>& structure_;
   Refinement<D>& refinement_;
   VertexNumbering<D>& numbering_;
-  std::vector<bool>& is_given_;
+  std::vector<bool>* const is_given_;
+  PointPlacer* const placer_;
   Workspace<D> workspace_;
 };
 

@@ -23,6 +23,11 @@ constexpr uint64_t kReportInterval = 256;
 
 }  // namespace
 
+absl::Status TooManyVerticesError(uint64_t max_vertices) {
+  return absl::ResourceExhaustedError(
+      absl::StrCat("the mesh needs more than max_vertices = ", max_vertices, " vertices; raise max_vertices or rho"));
+}
+
 template <int D>
 Refinement<D>::Refinement(QueryStructure<D>& structure, double min_edge, PlanarDomain* domain)
     : structure_(structure),
@@ -298,8 +303,7 @@ template <int D>
 absl::StatusOr<VertexId> Refinement<D>::Insert(const InsertionRequest<D>& request) {
   const SteinerPoint<D>& point = request.point;
   if (structure_.vertex_count() >= max_vertices_) {
-    return absl::ResourceExhaustedError(absl::StrCat("the mesh needs more than max_vertices = ", max_vertices_,
-                                                     " vertices; raise max_vertices or rho"));
+    return TooManyVerticesError(max_vertices_);
   }
   if (!rules_->IsLongEnough(point)) {
     return absl::ResourceExhaustedError(absl::StrCat("refinement came to an edge of length ",
@@ -377,7 +381,12 @@ void Refinement<D>::VertexAdded(VertexId x) {
   if (!pending_.HasBegun()) {
     return;  // the next run schedules all
   }
-  const Neighbor nearest = structure_.ApproximateNearestNeighbor(x, workspace_.own);
+  Neighbor nearest = structure_.ApproximateNearestNeighbor(x, workspace_.own);
+  if constexpr (D == 2) {
+    if (domain_ != nullptr) {
+      nearest.distance_sq = domain_rules_->NearestSegmentSq(x, nearest.distance_sq, workspace_.own);
+    }
+  }
   AddPending(nearest.vertex, x, nearest.distance_sq);
 }
 

@@ -27,6 +27,9 @@ namespace wellspace::core {
 
 class ThreadTeam;
 
+// RESOURCE_EXHAUSTED for a refinement that does not end with `max_vertices`.
+absl::Status TooManyVerticesError(uint64_t max_vertices);
+
 // Called after each insertion with the structure as it is then; for tests.
 template <int D>
 using RefinementObserver = std::function<void(const QueryStructure<D>&, const Insertion&)>;

@@ -6,10 +6,9 @@
 #include <numeric>
 #include <utility>
 
-#include "absl/time/clock.h"
-#include "absl/time/time.h"
 #include "core/base/sort_few.h"
 #include "core/base/status_macros.h"
+#include "core/base/stopwatch.h"
 #include "core/base/thread_team.h"
 #include "core/simplex/quality.h"
 #include "core/sliver/pump.h"
@@ -24,22 +23,6 @@ constexpr uint32_t kFewNew = 8;
 constexpr uint32_t kCheckInterval = 1 << 14;
 // Two ways to compute the quality of a tetrahedron differ by less.
 constexpr double kTolerance = 1e-9;
-
-// Adds the time that it lives, less what another clock has counted meanwhile, to a number of seconds.
-class Stopwatch {
- public:
-  Stopwatch(double& seconds, const double& other)
-      : seconds_(seconds), other_(other), other_before_(other), start_(absl::Now()) {}
-  ~Stopwatch() { seconds_ += absl::ToDoubleSeconds(absl::Now() - start_) - (other_ - other_before_); }
-  Stopwatch(const Stopwatch&) = delete;
-  Stopwatch& operator=(const Stopwatch&) = delete;
-
- private:
-  double& seconds_;
-  const double& other_;
-  const double other_before_;
-  const absl::Time start_;
-};
 
 // Appends simplex `s`, lowest output index first, the others ascending but for an exchange of the last two that keeps
 // it positive.

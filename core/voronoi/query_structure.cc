@@ -112,6 +112,7 @@ template <int D>
 absl::Status QueryStructure<D>::Initialize(const MortonGrid<D>& grid, HugeVector<Point<D>> points, uint64_t max_leaves,
                                            int threads, const RunContext& context) {
   box_ = grid.box();
+  box_of_cells_ = box_;
   points_ = std::move(points);
   faces_.clear();
   if (points_.capacity() > 2 * points_.size()) {  // room for many more vertices
@@ -395,7 +396,7 @@ void QueryStructure<D>::SegmentsWithin(const Point<D>& p, double reach, VertexId
 
 template <int D>
 void QueryStructure<D>::ClippedVoronoi(VertexId v, double radius, Workspace<D>& workspace, TieRule rule) const {
-  Clip(v, CubeAround<D>(point(v), radius), rule, workspace);
+  Clip(v, box_of_cells_, CubeAround<D>(point(v), radius), rule, workspace);
   Scan(v, workspace);
   workspace.cell.Place();
 }
@@ -403,15 +404,16 @@ void QueryStructure<D>::ClippedVoronoi(VertexId v, double radius, Workspace<D>& 
 template <int D>
 void QueryStructure<D>::UnplacedClippedVoronoi(VertexId v, const Box<D>& clip, Workspace<D>& workspace,
                                                const ExtraVertices<D>& others) const {
-  Clip(v, clip, TieRule::kPerturb, workspace);
+  Clip(v, box_, clip, TieRule::kPerturb, workspace);
   Scan(v, workspace, others);
 }
 
-// Begins the clipped cell of vertex `v`.
+// Begins the clipped cell of vertex `v` in `box`.
 template <int D>
-void QueryStructure<D>::Clip(VertexId v, const Box<D>& clip, TieRule rule, Workspace<D>& workspace) const {
+void QueryStructure<D>::Clip(VertexId v, const Box<D>& box, const Box<D>& clip, TieRule rule,
+                             Workspace<D>& workspace) const {
   std::array<PlaneKind, 2 * D> kinds;
-  const Box<D> bounds = ClippedBox<D>(box_, clip, kinds);
+  const Box<D> bounds = ClippedBox<D>(box, clip, kinds);
   workspace.cell.Reset(point(v), bounds, kinds, rule);
 }
 
@@ -451,7 +453,7 @@ void QueryStructure<D>::ClippedVoronoiByGathered(VertexId v, double radius, TieR
     const GatheredVertices<D>& gathered = workspace.gathered;
     Polytope<D>& cell = workspace.cell;
     if (gathered.Surrounds(point(v))) {
-      Clip(v, CubeAround<D>(point(v), radius), rule, workspace);
+      Clip(v, box_of_cells_, CubeAround<D>(point(v), radius), rule, workspace);
       workspace.counters.vertices += cell.CutByGathered(gathered, v);
       if (!cell.IsTooLarge() && cell.CutLimitSq() > gathered.ReachSq(point(v))) {
         ScanBeyondGathered(v, workspace);

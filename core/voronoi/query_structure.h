@@ -70,6 +70,12 @@ class QueryStructure {
   // are no vertices then. In the plane alone.
   void SetSegments(std::vector<SegmentLists::Ends> segments) { tree_.SetSegments(std::move(segments)); }
 
+  // Has what ClippedVoronoi and ClippedVoronoiOfEach compute end at `box`, which is that of the structure at first.
+  //
+  // REQUIRES:   `box` holds all vertices, and lies in the box of the structure; there are segments.
+  void SetBoxOfCells(const Box<D>& box) { box_of_cells_ = box; }
+  const Box<D>& box_of_cells() const { return box_of_cells_; }
+
   // Builds the structure for `points`, then adds the corners of the box that are not among them.
   //
   // REQUIRES:   points distinct as cubes of the grid, sorted in its Morton order, in its box.
@@ -274,7 +280,7 @@ class QueryStructure {
   size_t GatherAround(std::span<const VertexId> sites, Workspace<D>& workspace) const;
   double NearestSqOfGathered(VertexId v, Workspace<D>& workspace) const;
   void ClippedVoronoiByGathered(VertexId v, double radius, TieRule rule, Workspace<D>& workspace) const;
-  void Clip(VertexId v, const Box<D>& clip, TieRule rule, Workspace<D>& workspace) const;
+  void Clip(VertexId v, const Box<D>& box, const Box<D>& clip, TieRule rule, Workspace<D>& workspace) const;
   void Scan(VertexId v, Workspace<D>& workspace, const ExtraVertices<D>& others = {}) const;
   template <typename Cut>
   void ScanFor(NodeId own, Workspace<D>& workspace, Cut cut) const;
@@ -284,6 +290,7 @@ class QueryStructure {
   static void CountCuts(Workspace<D>& workspace);
 
   Box<D> box_;
+  Box<D> box_of_cells_;
   LeafTree<D> tree_;
   uint32_t vertex_count_ = 0;
   uint32_t given_count_ = 0;  // to Initialize

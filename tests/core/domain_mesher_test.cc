@@ -16,56 +16,17 @@
 #include "core/geometry/exact_measure.h"
 #include "core/mesher.h"
 #include "core/simplex/quality.h"
+#include "tests/core/domain_input.h"
 #include "tests/support/seeded_test.h"
 
 namespace wellspace::core {
 namespace {
 
+using test::At;
+using Input = test::DomainInput;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-struct Input {
-  std::vector<double> points;
-  std::vector<uint32_t> ends;
-  std::vector<int32_t> markers{};
-  std::vector<FaceSeed> seeds{};
-  FaceRule faces = FaceRule::kHoles;
-  CrossingRule crossings = CrossingRule::kRefuse;
-  MeshParameters parameters{.dimension = 2};
-
-  Input& Ring(const std::vector<Point<2>>& corners, int32_t marker = 0) {
-    const auto first = static_cast<uint32_t>(points.size() / 2);
-    const auto count = static_cast<uint32_t>(corners.size());
-    for (uint32_t i = 0; i < count; ++i) {
-      points.insert(points.end(), corners[i].begin(), corners[i].end());
-      ends.insert(ends.end(), {first + i, first + (i + 1) % count});
-      markers.push_back(marker);
-    }
-    return *this;
-  }
-  Input& Circle(const Point<2>& centre, double radius, int count, int32_t marker = 0) {
-    std::vector<Point<2>> corners;
-    for (int i = 0; i < count; ++i) {
-      const double angle = 2 * std::numbers::pi * i / count;
-      corners.push_back({centre[0] + radius * std::cos(angle), centre[1] + radius * std::sin(angle)});
-    }
-    return Ring(corners, marker);
-  }
-
-  absl::StatusOr<Mesh> Make() const {
-    Features features;
-    features.ends = ends;
-    features.markers = markers;
-    features.seeds = seeds;
-    features.faces = faces;
-    features.crossings = crossings;
-    RunContext context;
-    return MeshFeatures(parameters, points, features, context);
-  }
-};
-
-Point<2> At(const Mesh& mesh, uint32_t v) { return PointAt<2>(mesh.points, v); }
 
 double AreaOf(const Mesh& mesh) {
   double area = 0;

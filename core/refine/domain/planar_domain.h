@@ -112,6 +112,13 @@ class PlanarDomain {
     return from_a <= 0.5 * length ? SegmentPoint{segment, false, from_a} : SegmentPoint{segment, true, length - from_a};
   }
 
+  // The place on `segment` of `p`, which is near to it: its foot.
+  SegmentPoint PlaceBeside(const Point<2>& p, uint32_t segment) const {
+    const bool is_from_b = FootOf(p, segment).from_a > 0.5 * LengthOf(segment);
+    const Point<2> from = Difference<2>(p, EndOf(segment, is_from_b));
+    return {segment, is_from_b, Dot<2>(from, DirectionOf(HalfEdgeOf(segment, is_from_b))) / LengthOf(segment)};
+  }
+
   // Whether two ways that lead from the first end of `h` make an angle of less than 60 degrees, of which h is one.
   bool IsAcute(HalfEdge h) const { return is_acute_[h]; }
   // The smallest angle between two segments with a common end. Unit: radians; pi where there are no two.

@@ -1,0 +1,110 @@
+#include "core/point_placer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
+#include "core/features/place.h"
+#include "core/geometry/box.h"
+#include "core/refused_points.h"
+
+namespace wellspace::core {
+namespace {
+
+// A point is on a segment within this times the least separation. Vertices on one side of it and on the other, which
+// are that far apart, are so far apart along it that their order is theirs.
+constexpr double kOnSegment = 0.25;
+
+// What is looked for around a point is looked for so much farther, relatively, for what is rounded.
+constexpr double kRoom = 1e-9;
+
+}  // namespace
+
+absl::StatusOr<std::vector<PlaceInDomain>> PointPlacer::FindAll(std::span<const double> points,
+                                                                const std::function<VertexId(size_t)>& start,
+                                                                const RunContext& context) {
+  std::vector<PlaceInDomain> places(points.size() / 2);
+  const double within = kOnSegment * domain_.MinSeparation();
+  RefusedPoints not_meshed;
+  RefusedPoints too_close;
+  for (uint32_t i = 0; i < places.size(); ++i) {
+    WELLSPACE_RETURN_IF_ERROR(context.Check());
+    const Point<2> given = PointAt<2>(points, i);
+    if (!std::isfinite(given[0]) || !std::isfinite(given[1])) {
+      continue;
+    }
+    const Point<2> p = domain_.Scaled(given);
+    if (!(DistanceSq<2>(p, structure_.box_of_cells()) <= within * within)) {
+      not_meshed.Add(i, NotMeshedError(given, i));
+      continue;
+    }
+    const Neighbor nearest = structure_.NearestTo(p, start(i), workspace_);
+    if (nearest.distance_sq < domain_.MinSeparation() * domain_.MinSeparation()) {
+      continue;
+    }
+    absl::Status status = Find(p, i, nearest, places[i]);
+    if (!status.ok()) {
+      (IsTooClose(status) ? too_close : not_meshed).Add(i, std::move(status));
+    }
+  }
+  if (!not_meshed.IsEmpty()) {
+    return not_meshed.InAll("nor are");
+  }
+  if (!too_close.IsEmpty()) {
+    return too_close.InAll("so are");
+  }
+  return places;
+}
+
+// Sets the place of point `index`, which is `p` and no vertex. Nothing is between it and what is nearest to it, be that
+// a segment or a vertex: so its face is the one there.
+absl::Status PointPlacer::Find(const Point<2>& p, size_t index, const Neighbor& nearest, PlaceInDomain& place) {
+  const double reach = std::max(std::sqrt(nearest.distance_sq) * (1 + kRoom), domain_.MinSeparation());
+  structure_.SegmentsWithin(p, reach, nearest.vertex, workspace_);
+  Beside first;  // the nearest, where its foot is between its ends; the next
+  Beside second;
+  for (const uint32_t segment : workspace_.segments) {
+    const PlanarDomain::Foot foot = planar_.FootOf(p, segment);
+    if (segment == first.segment || foot.from_a <= 0 || foot.from_a >= planar_.LengthOf(segment)) {
+      continue;
+    }
+    const Beside beside{segment, foot.away};
+    if (!first.IsThere() || std::abs(beside.away) < std::abs(first.away)) {
+      second = std::exchange(first, beside);
+    } else if (!second.IsThere() || std::abs(beside.away) < std::abs(second.away)) {
+      second = beside;
+    }
+  }
+  const bool is_on = first.IsThere() && std::abs(first.away) <= kOnSegment * domain_.MinSeparation();
+  const Beside& other = is_on ? second : first;
+  if (other.IsThere() && std::abs(other.away) < domain_.MinSeparation()) {
+    return TooCloseError<2>(domain_, p, index, std::abs(other.away),
+                            absl::StrCat(NameOf(other.segment), ", which it is not on"));
+  }
+  if (is_on) {
+    place.on = planar_.PlaceBeside(p, first.segment);
+    return absl::OkStatus();
+  }
+  if (first.IsThere() && first.away * first.away <= nearest.distance_sq) {
+    place.face = planar_.faces().left_face[HalfEdgeOf(first.segment, first.away < 0)];
+  } else {
+    const Point<2> toward = Difference<2>(p, structure_.point(nearest.vertex));
+    place.face = planar_.FaceOfSector(nearest.vertex, planar_.SectorToward(nearest.vertex, toward));
+  }
+  return planar_.faces().IsMeshed(place.face) ? absl::OkStatus() : NotMeshedError(domain_.Unscaled(p), index);
+}
+
+std::string PointPlacer::NameOf(uint32_t segment) const {
+  const GraphSegment& named = planar_.graph().segments[segment];
+  return named.IsBoxSide() ? "a side of the box" : absl::StrCat("segments[", named.source, "]");
+}
+
+absl::Status PointPlacer::NotMeshedError(const Point<2>& p, size_t index) {
+  return absl::InvalidArgumentError(
+      absl::StrCat("points[", index, "] = ", Place(p),
+                   " is not in the domain that is meshed: inside a face of it, or on a segment"));
+}
+
+}  // namespace wellspace::core

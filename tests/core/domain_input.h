@@ -1,0 +1,77 @@
+// Domains in the plane, made by hand.
+#ifndef WELLSPACE_TESTS_CORE_DOMAIN_INPUT_H_
+#define WELLSPACE_TESTS_CORE_DOMAIN_INPUT_H_
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "core/base/run_context.h"
+#include "core/features/features.h"
+#include "core/geometry/point.h"
+#include "core/mesher.h"
+
+namespace wellspace::test {
+
+// Points and segments with all that is said of them.
+struct DomainInput {
+  std::vector<double> points;
+  std::vector<uint32_t> ends;
+  std::vector<int32_t> markers{};
+  std::vector<core::FaceSeed> seeds{};
+  core::FaceRule faces = core::FaceRule::kHoles;
+  core::CrossingRule crossings = core::CrossingRule::kRefuse;
+  core::MeshParameters parameters{.dimension = 2};
+
+  DomainInput& Ring(const std::vector<core::Point<2>>& corners, int32_t marker = 0) {
+    const auto first = static_cast<uint32_t>(points.size() / 2);
+    const auto count = static_cast<uint32_t>(corners.size());
+    for (uint32_t i = 0; i < count; ++i) {
+      points.insert(points.end(), corners[i].begin(), corners[i].end());
+      ends.insert(ends.end(), {first + i, first + (i + 1) % count});
+      markers.push_back(marker);
+    }
+    return *this;
+  }
+  DomainInput& Circle(const core::Point<2>& centre, double radius, int count, int32_t marker = 0) {
+    std::vector<core::Point<2>> corners;
+    for (int i = 0; i < count; ++i) {
+      const double angle = 2 * std::numbers::pi * i / count;
+      corners.push_back({centre[0] + radius * std::cos(angle), centre[1] + radius * std::sin(angle)});
+    }
+    return Ring(corners, marker);
+  }
+
+  core::Features features() const {
+    core::Features made;
+    made.ends = ends;
+    made.markers = markers;
+    made.seeds = seeds;
+    made.faces = faces;
+    made.crossings = crossings;
+    return made;
+  }
+  absl::StatusOr<core::Mesh> Make() const {
+    core::RunContext context;
+    return core::MeshFeatures(parameters, points, features(), context);
+  }
+  std::unique_ptr<core::Mesher> Create() const {
+    core::RunContext context;
+    absl::StatusOr<std::unique_ptr<core::Mesher>> mesher =
+        core::Mesher::CreateInDomain(parameters, points, features(), context);
+    EXPECT_TRUE(mesher.ok()) << mesher.status();
+    return *std::move(mesher);
+  }
+};
+
+inline core::Point<2> At(const core::Mesh& mesh, uint32_t v) { return core::PointAt<2>(mesh.points, v); }
+
+}  // namespace wellspace::test
+
+#endif  // WELLSPACE_TESTS_CORE_DOMAIN_INPUT_H_
