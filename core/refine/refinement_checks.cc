@@ -56,7 +56,12 @@ void RefinementChecks<D>::CheckInsertion(const StepRules<D>& rules, const Insert
   const double rounding = RoundingIn<D>(box);
   const double least = (encroaches ? 1 : rules.criteria().rho) * edge * (1 - kLengthRounding);
   const double most = std::sqrt(D) * rules.clip_factor() * limit * (1 + kLengthRounding) + rounding;
-  if (!(distance >= least && distance <= most)) {
+  // The first split of a segment between small angles is in its middle third, however near to its end the vertex is.
+  bool may_be_far = false;
+  if constexpr (D == 2) {
+    may_be_far = place.on.IsOnSegment();
+  }
+  if (!(distance >= least && (distance <= most || may_be_far))) {
     Require(false, which(), "it has to be from ", least, " to ", most);
   }
   if (!encroaches && !(edge <= limit * (1 + kLengthRounding))) {
