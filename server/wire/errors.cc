@@ -26,8 +26,6 @@ constexpr char kReason[] = "wellspace.v1/reason";
 constexpr char kField[] = "wellspace.v1/field";
 constexpr char kMayRetry[] = "wellspace.v1/may_retry";
 
-// What the core says where the mesh of a domain with segments cannot do what that of a cloud can.
-constexpr char kOfDomain[] = "the mesh of a domain with segments";
 
 absl::string_view ToAbsl(std::string_view text) { return {text.data(), text.size()}; }
 
@@ -118,9 +116,7 @@ absl::Status FromCore(const absl::Status& status) {
       }
       return MakeError(v1::ERROR_REASON_MESH_TOO_LARGE, message);
     case absl::StatusCode::kFailedPrecondition:
-      return MakeError(message.find(kOfDomain) == std::string::npos ? v1::ERROR_REASON_MESH_NOT_READY
-                                                                    : v1::ERROR_REASON_DOMAIN_FIXED,
-                       message);
+      return MakeError(v1::ERROR_REASON_MESH_NOT_READY, message);
     case absl::StatusCode::kCancelled:
     case absl::StatusCode::kDeadlineExceeded:
       return status;

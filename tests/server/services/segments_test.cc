@@ -259,6 +259,57 @@ TEST_F(SegmentsTest, SegmentsComeBeforeTheFirstRefinement) {
   EXPECT_EQ(calls_.Get(name).faces(), v1::FACE_RULE_HOLES);
 }
 
+// The frame goes from (0, 0) on; its lower side is a segment.
+TEST_F(SegmentsTest, VerticesAreAddedInFacesAndOnSegmentsAndQueriesAnswered) {
+  const std::string name = CreateFrame();
+  calls_.Refine(name);
+  const uint64_t before = calls_.Get(name).vertex_count();
+  const std::vector<double> frame = FramePoints();
+  v1::AddVerticesRequest request;
+  request.set_name(name);
+  // On the first side, a third of the way along it.
+  request.mutable_points()->add_coordinates(frame[0] + (frame[2] - frame[0]) / 3);
+  request.mutable_points()->add_coordinates(frame[1] + (frame[3] - frame[1]) / 3);
+  v1::AddVerticesResponse added;
+  {
+    grpc::ClientContext context;
+    const grpc::Status status = calls_.queries().AddVertices(&context, request, &added);
+    ASSERT_TRUE(status.ok()) << status.error_message();
+  }
+  ASSERT_EQ(added.vertices_size(), 1);
+  EXPECT_EQ(added.vertices(0), before);
+  calls_.Refine(name);
+  const Download mesh = DownloadMesh(name);
+  ASSERT_TRUE(mesh.status.ok()) << mesh.status.error_message();
+  EXPECT_GT(mesh.metadata[0].vertex_count(), before);
+  EXPECT_EQ(mesh.metadata[0].statistics().domain().segments(), kSegments);
+
+  v1::ApproximateNearestNeighborsRequest question;
+  question.set_name(name);
+  question.add_vertices(added.vertices(0));
+  grpc::ClientContext context;
+  const auto stream = calls_.queries().ApproximateNearestNeighbors(&context, question);
+  v1::ApproximateNearestNeighborsResponse answer;
+  ASSERT_TRUE(stream->Read(&answer));
+  EXPECT_TRUE(stream->Finish().ok());
+  ASSERT_EQ(answer.distances_size(), 1);
+  EXPECT_GT(answer.distances(0), 0);
+}
+
+TEST_F(SegmentsTest, VerticesOutsideOfWhatIsMeshedAreRefused) {
+  const std::string name = CreateFrame();
+  calls_.Refine(name);
+  v1::AddVerticesRequest request;
+  request.set_name(name);
+  request.mutable_points()->add_coordinates(1e3);
+  request.mutable_points()->add_coordinates(1e3);
+  v1::AddVerticesResponse added;
+  grpc::ClientContext context;
+  status_ = calls_.queries().AddVertices(&context, request, &added);
+  ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_POINTS", "points.coordinates");
+  EXPECT_EQ(calls_.Get(name).state(), v1::Session::STATE_READY);
+}
+
 TEST_F(SegmentsTest, ACallForAnotherRevisionChangesNothing) {
   const std::string name = Create();
   v1::AddSegmentsRequest request = FrameRequest(name);

@@ -98,10 +98,6 @@ TEST(ToGrpcStatus, TellsErrorsOfTheCoreApart) {
   EXPECT_EQ(DetailsOf(absl::InvalidArgumentError("x")).field, "points.coordinates");
   EXPECT_EQ(DetailsOf(absl::ResourceExhaustedError("x")).reason, "MESH_TOO_LARGE");
   EXPECT_EQ(DetailsOf(absl::FailedPreconditionError("x")).reason, "MESH_NOT_READY");
-  const absl::Status of_domain =
-      absl::FailedPreconditionError("points: none can be added to the mesh of a domain with segments");
-  EXPECT_EQ(DetailsOf(of_domain).reason, "DOMAIN_FIXED");
-  EXPECT_EQ(ToGrpcStatus(of_domain).error_code(), grpc::StatusCode::FAILED_PRECONDITION);
   EXPECT_EQ(DetailsOf(absl::UnknownError("x")).reason, "INTERNAL");
   EXPECT_EQ(ToGrpcStatus(absl::UnknownError("x")).error_code(), grpc::StatusCode::INTERNAL);
   EXPECT_EQ(ToGrpcStatus(absl::UnknownError("x")).error_message(), "internal error: x");
