@@ -52,7 +52,8 @@ class DomainMesher final : public Mesher {
     VertexId to;
   };
 
-  std::vector<Subsegment> EncroachedSubsegments(const PlanarDomain::Chains& chains);
+  bool IsEncroached(const Subsegment& subsegment, Workspace<2>& workspace) const;
+  std::vector<Subsegment> EncroachedSubsegments(const PlanarDomain::Chains& chains, int threads) const;
   absl::Status Split(std::span<const Subsegment> subsegments, const MeshParameters& parameters);
   absl::Status MakeConforming(const MeshParameters& parameters, RunContext& context);
   uint32_t OutputIndex(VertexId v) const {
@@ -78,6 +79,7 @@ class DomainMesher final : public Mesher {
   double rho_ = 0;                       // of the last refinement
   double tree_seconds_ = 0;
   double refinement_seconds_ = 0;
+  double made_seconds_ = 0;  // what triangles have taken in the last refinement
   double simplices_seconds_ = 0;
 };
 
