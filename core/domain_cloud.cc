@@ -35,8 +35,9 @@ absl::StatusOr<DomainCloud> MakeDomainCloud(std::span<const double> points, cons
   }
   WELLSPACE_ASSIGN_OR_RETURN(const Domain<2> domain, Domain<2>::Of(around));
   WELLSPACE_RETURN_IF_ERROR(CheckPoints<2>(domain, points, context));
-  WELLSPACE_ASSIGN_OR_RETURN(PlanarGraph graph, MakePlanarGraph(points, features, is_in_box ? &box : nullptr,
-                                                                domain.MinSeparation() / domain.scale, context));
+  WELLSPACE_ASSIGN_OR_RETURN(PlanarGraph graph,
+                             MakePlanarGraph(points, features, is_in_box ? &box : nullptr,
+                                             domain.MinSeparation() / domain.scale, threads, context));
   WELLSPACE_ASSIGN_OR_RETURN(PlanarFaces faces, FindFaces(graph, features.faces, features.seeds, context));
 
   const std::vector<bool> is_meshed = FindMeshedPoints(graph, faces);

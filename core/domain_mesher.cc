@@ -13,6 +13,7 @@
 #include "core/base/memory/huge_pages.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
+#include "core/base/thread_team.h"
 #include "core/domain_parameters.h"
 #include "core/feasibility.h"
 #include "core/mesh_estimate.h"
@@ -27,6 +28,9 @@ namespace {
 // A vertex is in the diametral disc of a subsegment only if it is nearer to its centre by more than this, relatively: a
 // foot makes a right angle, as far as doubles go.
 constexpr double kDiscTolerance = 1e-9;
+
+// Segments whose subsegments one thread looks at together.
+constexpr uint32_t kSegmentsTogether = 1024;
 
 // A ratio that exceeds rho by less, relatively, is what was rounded.
 constexpr double kRatioTolerance = 1e-9;
@@ -169,7 +173,7 @@ absl::Status DomainMesher::MakeConforming(const MeshParameters& parameters, RunC
     WELLSPACE_RETURN_IF_ERROR(
         refinement_->Run(criteria, VertexBudget(parameters), parameters.threads, context, nullptr, nullptr));
     PlanarDomain::Chains chains = planar_->FindChains();
-    std::vector<Subsegment> to_split = EncroachedSubsegments(chains);
+    std::vector<Subsegment> to_split = EncroachedSubsegments(chains, parameters.threads);
     WELLSPACE_RETURN_IF_ERROR(context.Check());
     if (to_split.empty()) {
       WELLSPACE_ASSIGN_OR_RETURN(to_split, MakeTriangles(std::move(chains), parameters.threads, context));
@@ -204,23 +208,41 @@ absl::StatusOr<std::vector<DomainMesher::Subsegment>> DomainMesher::MakeTriangle
   return to_split;
 }
 
+// Whether a vertex lies in the diametral disc of a subsegment.
+bool DomainMesher::IsEncroached(const Subsegment& subsegment, Workspace<2>& workspace) const {
+  const auto [segment, from, to] = subsegment;
+  const Point<2>& p = structure_.point(from);
+  const Point<2>& q = structure_.point(to);
+  const Neighbor nearest = structure_.NearestTo({0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])}, from, workspace);
+  // What is rounded of the centre may make one of the ends the nearest.
+  const double rounding = kPlaceRounding * (std::abs(p[0]) + std::abs(p[1]));
+  const double radius = 0.5 * std::sqrt(DistanceSq<2>(p, q)) * (1 - kDiscTolerance) - rounding;
+  return nearest.vertex != from && nearest.vertex != to && std::sqrt(nearest.distance_sq) < radius;
+}
+
 // The subsegments in whose diametral disc a vertex lies that no cell has seen, since it is clipped on a side that is
 // not meshed.
-std::vector<DomainMesher::Subsegment> DomainMesher::EncroachedSubsegments(const PlanarDomain::Chains& chains) {
-  std::vector<Subsegment> encroached;
-  for (uint32_t segment = 0; segment < planar_->segment_count(); ++segment) {
-    const std::span<const VertexId> chain = chains.Of(segment);
-    for (size_t i = 0; i + 1 < chain.size(); ++i) {
-      const Point<2>& p = structure_.point(chain[i]);
-      const Point<2>& q = structure_.point(chain[i + 1]);
-      const Neighbor nearest = structure_.NearestTo({0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])}, chain[i], workspace_);
-      // What is rounded of the centre may make one of the ends the nearest.
-      const double rounding = kPlaceRounding * (std::abs(p[0]) + std::abs(p[1]));
-      const double radius = 0.5 * std::sqrt(DistanceSq<2>(p, q)) * (1 - kDiscTolerance) - rounding;
-      if (nearest.vertex != chain[i] && nearest.vertex != chain[i + 1] && std::sqrt(nearest.distance_sq) < radius) {
-        encroached.push_back({segment, chain[i], chain[i + 1]});
+std::vector<DomainMesher::Subsegment> DomainMesher::EncroachedSubsegments(const PlanarDomain::Chains& chains,
+                                                                          int threads) const {
+  const uint32_t segments = planar_->segment_count();
+  std::vector<std::vector<Subsegment>> found((segments + kSegmentsTogether - 1) / kSegmentsTogether);  // by block
+  ThreadTeam team(threads);
+  std::vector<Workspace<2>> workspaces(team.threads());
+  team.ForEach(found.size(), [&](size_t block) {
+    const auto begin = static_cast<uint32_t>(block) * kSegmentsTogether;
+    for (uint32_t segment = begin; segment < std::min(segments, begin + kSegmentsTogether); ++segment) {
+      const std::span<const VertexId> chain = chains.Of(segment);
+      for (size_t i = 0; i + 1 < chain.size(); ++i) {
+        const Subsegment subsegment{segment, chain[i], chain[i + 1]};
+        if (IsEncroached(subsegment, workspaces[ThreadTeam::CurrentThread()])) {
+          found[block].push_back(subsegment);
+        }
       }
     }
+  });
+  std::vector<Subsegment> encroached;
+  for (const std::vector<Subsegment>& of_block : found) {
+    encroached.insert(encroached.end(), of_block.begin(), of_block.end());
   }
   return encroached;
 }
@@ -398,6 +420,9 @@ void DomainMesher::SetRegions(Mesh& mesh) const {
 // How many triangles break rho.
 uint64_t DomainMesher::CountExempt(const Mesh& mesh) const {
   uint64_t count = 0;
+  if (mesh.statistics.max_radius_edge <= rho_) {
+    return count;
+  }
   for (size_t t = 0; t < mesh.simplices.size(); t += 3) {
     const Simplex<2> corners = {PointAt<2>(mesh.points, mesh.simplices[t]),
                                 PointAt<2>(mesh.points, mesh.simplices[t + 1]),

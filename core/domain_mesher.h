@@ -63,7 +63,8 @@ class DomainMesher final : public Mesher {
   };
 
   void NumberPoints(const DomainCloud& made, std::span<const double> points);
-  std::vector<Subsegment> EncroachedSubsegments(const PlanarDomain::Chains& chains);
+  bool IsEncroached(const Subsegment& subsegment, Workspace<2>& workspace) const;
+  std::vector<Subsegment> EncroachedSubsegments(const PlanarDomain::Chains& chains, int threads) const;
   absl::Status Split(std::span<const Subsegment> subsegments, const MeshParameters& parameters);
   absl::Status MakeConforming(const MeshParameters& parameters, RunContext& context);
   absl::StatusOr<std::vector<Subsegment>> MakeTriangles(PlanarDomain::Chains chains, int threads, RunContext& context);

@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
 #include "core/base/status_macros.h"
+#include "core/base/thread_team.h"
 #include "core/features/place.h"
 #include "core/features/segment_pairs.h"
 #include "core/geometry/exact_measure.h"
@@ -70,8 +71,8 @@ struct Fault {
 // Makes the graph, step after step.
 class GraphMaker {
  public:
-  GraphMaker(const Features& features, double least_separation, const RunContext& context)
-      : features_(features), least_separation_(least_separation), context_(context) {}
+  GraphMaker(const Features& features, double least_separation, int threads, const RunContext& context)
+      : features_(features), least_separation_(least_separation), context_(context), team_(threads) {}
 
   absl::StatusOr<PlanarGraph> Make(std::span<const double> points, const Box<2>* box) {
     MergeEqualPoints(points);
@@ -215,8 +216,8 @@ class GraphMaker {
   }
 
   // Of all vertices that lie on segments or too near to them, and all segments that cross; ascending, each once. Stops
-  // early where there are more than an error tells of.
-  absl::StatusOr<std::vector<Fault>> FindFaults() const {
+  // early where a part has more than an error tells of.
+  absl::StatusOr<std::vector<Fault>> FindFaults() {
     std::vector<Fault> faults;
     if (graph_.segments.empty()) {
       return faults;
@@ -227,29 +228,43 @@ class GraphMaker {
       ends.push_back({segment.a, segment.b});
     }
     const size_t most = features_.crossings == CrossingRule::kSplit ? std::numeric_limits<size_t>::max() : kMostFaults;
-    size_t unwanted = 0;
-    SegmentPairs(graph_.points, ends, least_separation_)
-        .ForEachGroup([&](std::span<const uint32_t> segments, std::span<const uint32_t> points) {
-          for (const uint32_t s : segments) {
-            for (const uint32_t p : points) {
-              if (const auto kind = PointFault(s, p)) {
-                faults.push_back({*kind, s, p});
-                unwanted += *kind == Fault::Kind::kNear ? 1 : 0;
-              }
-            }
-            for (const uint32_t t : segments) {
-              if (s < t && Cross(s, t)) {
-                faults.push_back({Fault::Kind::kCrossing, s, t});
-                ++unwanted;
-              }
-            }
-          }
-          return unwanted <= most && !context_.IsCancelled();
-        });
+    const SegmentPairs pairs(graph_.points, ends, least_separation_);
+    const std::vector<SegmentPairs::Group> parts = pairs.Parts(team_);
+    std::vector<std::vector<Fault>> found(parts.size());
+    team_.ForEach(parts.size(), [&](size_t part) {
+      size_t unwanted = 0;
+      pairs.ForEachGroupOf(parts[part], [&](std::span<const uint32_t> segments, std::span<const uint32_t> points) {
+        const size_t first = found[part].size();
+        AppendFaults(segments, points, found[part]);
+        unwanted += std::count_if(found[part].begin() + static_cast<std::ptrdiff_t>(first), found[part].end(),
+                                  [](const Fault& fault) { return fault.kind != Fault::Kind::kOn; });
+        return unwanted <= most && !context_.IsCancelled();
+      });
+    });
     WELLSPACE_RETURN_IF_ERROR(context_.Check());
+    for (const std::vector<Fault>& of_part : found) {
+      faults.insert(faults.end(), of_part.begin(), of_part.end());
+    }
     std::sort(faults.begin(), faults.end());
     faults.erase(std::unique(faults.begin(), faults.end()), faults.end());
     return faults;
+  }
+
+  // Appends the faults among segments and points of a group.
+  void AppendFaults(std::span<const uint32_t> segments, std::span<const uint32_t> points,
+                    std::vector<Fault>& faults) const {
+    for (const uint32_t s : segments) {
+      for (const uint32_t p : points) {
+        if (const auto kind = PointFault(s, p)) {
+          faults.push_back({*kind, s, p});
+        }
+      }
+      for (const uint32_t t : segments) {
+        if (s < t && Cross(s, t)) {
+          faults.push_back({Fault::Kind::kCrossing, s, t});
+        }
+      }
+    }
   }
 
   std::optional<Fault::Kind> PointFault(uint32_t segment, uint32_t point) const {
@@ -410,6 +425,7 @@ class GraphMaker {
   const Features& features_;
   const double least_separation_;
   const RunContext& context_;
+  ThreadTeam team_;
   PlanarGraph graph_;
   std::multimap<Point<2>, uint32_t> by_cell_;  // points by cells as large as the least separation, of which so many:
   uint32_t in_cells_ = 0;
@@ -418,8 +434,8 @@ class GraphMaker {
 }  // namespace
 
 absl::StatusOr<PlanarGraph> MakePlanarGraph(std::span<const double> points, const Features& features, const Box<2>* box,
-                                            double least_separation, const RunContext& context) {
-  return GraphMaker(features, least_separation, context).Make(points, box);
+                                            double least_separation, int threads, const RunContext& context) {
+  return GraphMaker(features, least_separation, threads, context).Make(points, box);
 }
 
 }  // namespace wellspace::core

@@ -61,9 +61,10 @@ struct PlanarGraph {
 // Errors:     INVALID_ARGUMENT, naming segments, points and places: an end that does not exist; markers that differ on
 //             one segment; and, unless they are to be split, segments that cross and vertices that are too near;
 //             RESOURCE_EXHAUSTED when splitting does not end; CANCELLED, DEADLINE_EXCEEDED.
+// Threads:    uses `threads`, at most as many as the machine has cores.
 // Source:     docs/design/features.md.
 absl::StatusOr<PlanarGraph> MakePlanarGraph(std::span<const double> points, const Features& features, const Box<2>* box,
-                                            double least_separation, const RunContext& context);
+                                            double least_separation, int threads, const RunContext& context);
 
 }  // namespace wellspace::core
 

@@ -104,6 +104,9 @@ class CellSteps {
   }
   void FindStar(Star<D>& star) { cell().FindStar(star); }
 
+  // What has taken the place of what Assess found while the last request was looked for; null: nothing has.
+  const Assessment* Reassessed() const { return nullptr; }
+
  private:
   const StepRules<D>& rules_;
   Cells& cells_;

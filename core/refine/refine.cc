@@ -57,7 +57,7 @@ absl::Status Refinement<D>::Run(const MeshCriteria<D>& criteria, uint64_t max_ve
     pending_.End();
     WELLSPACE_RETURN_IF_ERROR(ScheduleAll(criteria, predict, team));
   }
-  rounds_.BeginRun(*rules_, team, context);
+  rounds_.BeginRun(*rules_, domain_, team, context);
   const absl::Cleanup end = [this] { rounds_.DropRun(); };  // where something is thrown
   absl::Status status = Loop();
   rounds_.EndRun(workspace_.own.counters);
@@ -121,7 +121,7 @@ absl::Status Refinement<D>::Loop() {
   WELLSPACE_RETURN_IF_ERROR(RefineInRounds());  // what a run that was stopped has detached
   Schedule& schedule = pending_.schedule();
   for (int lowest = schedule.Lowest(); lowest >= 0; lowest = schedule.Lowest()) {
-    if (domain_ == nullptr && rounds_.Begin(lowest)) {
+    if (rounds_.Begin(lowest)) {
       WELLSPACE_RETURN_IF_ERROR(RefineInRounds());
       continue;
     }
@@ -155,6 +155,9 @@ template <int D>
 absl::Status Refinement<D>::RefineInRounds() {
   rounds_.ForgetRecords();
   while (!rounds_.AreDone()) {
+    if (domain_ != nullptr) {
+      domain_->MakeRoom(QueryStructure<D>::kMostUncommitted);
+    }
     rounds_.BeginRound();
     absl::Status status;
     for (Batch<D>* batch = rounds_.NextBatch(); batch != nullptr; batch = status.ok() ? rounds_.NextBatch() : nullptr) {
@@ -194,7 +197,7 @@ absl::Status Refinement<D>::RefineNextOf(Batch<D>& batch) {
   pending_.schedule().Take(v);
   absl::Status status = context_->Check();
   if (status.ok()) {
-    const bool is_valid = batch.IsStillValid(batch.refined, structure_.point(v));
+    const bool is_valid = IsNextStillValid(batch);
     rounds_.CountRecord(batch, is_valid);
     if (is_valid) {
       RecordedSteps<D> steps(batch);
@@ -223,6 +226,19 @@ absl::Status Refinement<D>::RefineTaken(VertexId v, int bucket) {
     return status;
   }
   return CountRefined(bucket);
+}
+
+// Whether the record of the next vertex of a batch is still valid. In a domain it may depend on whether there is a
+// vertex on a segment, however far away.
+template <int D>
+bool Refinement<D>::IsNextStillValid(const Batch<D>& batch) const {
+  if (!batch.IsStillValid(batch.refined, structure_.point(batch.next()))) {
+    return false;
+  }
+  if constexpr (D == 2) {
+    return domain_ == nullptr || domain_rules_->AreInOrder(batch.RequestsOf(batch.refined));
+  }
+  return true;
 }
 
 // Refines `v`, which was taken from `bucket`, by steps that are computed.

@@ -95,6 +95,9 @@ class Refinement {
   // first run for these criteria.
   const StarLists<D>& stars() const { return stars_.lists(); }
 
+  // What threads have speculated on in all runs.
+  const SpeculationCounts& speculation() const { return rounds_.counts(); }
+
   // What all queries have cost.
   QueryCounters counters() const;
 
@@ -124,6 +127,7 @@ class Refinement {
   absl::Status RefineInRounds();
   absl::Status RefineBatch(Batch<D>& batch);
   absl::Status RefineNextOf(Batch<D>& batch);
+  bool IsNextStillValid(const Batch<D>& batch) const;
   absl::Status RefineTaken(VertexId v, int bucket);
   absl::Status RefineByCell(VertexId v, int bucket);
   absl::Status RefineInDomain(VertexId v, int bucket);

@@ -2,6 +2,7 @@
 #ifndef WELLSPACE_CORE_VORONOI_QUERY_STRUCTURE_H_
 #define WELLSPACE_CORE_VORONOI_QUERY_STRUCTURE_H_
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -232,6 +233,17 @@ class QueryStructure {
   // Complexity: O(1) for each of these, and the cuts.
   // Errors:     none.
   void CutByUncommitted(VertexId v, Polytope<D>& cell) const;
+
+  // The squared distance from `p` to the nearest uncommitted vertex, if it is less than `limit_sq`; else that.
+  //
+  // Complexity: O(1) for each of these.
+  // Errors:     none.
+  double NearestUncommittedSq(const Point<D>& p, double limit_sq) const {
+    for (uint32_t u = tree_.vertex_count(); u < vertex_count_; ++u) {
+      limit_sq = std::min(limit_sq, DistanceSq<D>(points_[u], p));
+    }
+    return limit_sq;
+  }
 
   uint32_t uncommitted_count() const { return vertex_count_ - tree_.vertex_count(); }
 

@@ -23,6 +23,9 @@ constexpr double kSameDistance = 1e-9;
 // ones that differ.
 constexpr double kRoundingShare = 0.3;
 
+// Leaves are looked into a little beyond a distance, so that rounding leaves out no segment within it.
+constexpr double kBeyond = 1 + 1e-9;
+
 // From this rho on, by the square, no vertex that takes the place of another comes nearer than the edge that asks.
 constexpr double kSafeRhoSq = 2 * (1 - 1e-12);
 
@@ -38,6 +41,20 @@ double RoundNear(double distance, double room) {
   return distance;
 }
 
+// Whether all nodes of `cell` lie on one side of a line, surely: the one through `from`, relative to the site, in the
+// direction `along`, which has length 1.
+bool AreBeside(const Polytope<2>& cell, const Point<2>& from, const Point<2>& along) {
+  double least = std::numeric_limits<double>::infinity();
+  double most = -least;
+  for (const CellNode<2>& node : cell.nodes()) {
+    const double away = Cross(along, Difference<2>(node.x, from));
+    least = std::min(least, away);
+    most = std::max(most, away);
+  }
+  const double rounding = kLeastPart * (std::abs(from[0]) + std::abs(from[1]) + std::sqrt(cell.reach_sq()));
+  return least > rounding || most < -rounding;
+}
+
 // Whether the segments p q and a b cross each other in their interiors, as doubles tell.
 bool CrossEachOther(const Point<2>& p, const Point<2>& q, const Point<2>& a, const Point<2>& b) {
   const Point<2> way = Difference<2>(q, p);
@@ -48,20 +65,24 @@ bool CrossEachOther(const Point<2>& p, const Point<2>& q, const Point<2>& a, con
 
 }  // namespace
 
-DomainRules::DomainRules(const QueryStructure<2>& structure, const PlanarDomain& domain, const StepRules<2>& rules)
-    : structure_(structure), domain_(domain), rules_(rules) {}
-
 // The part of `segment` that `cell` meets: cut by all planes of the cell.
 MetPart DomainRules::MeetSegment(const Polytope<2>& cell, uint32_t segment) const {
   const Point<2>& a = domain_.EndOf(segment, false);
   const double length = domain_.LengthOf(segment);
   const Point<2> from = Difference<2>(a, cell.site());
   Point<2> along = Difference<2>(domain_.EndOf(segment, true), a);
+  const double away = Cross(along, from) / length;  // of the line
+  MetPart part;
+  if (away * away > kBeyond * cell.reach_sq()) {
+    return part;
+  }
   along = {along[0] / length, along[1] / length};
   const double foot = std::clamp(-Dot<2>(from, along), 0.0, length);
   const Point<2> nearest = {from[0] + foot * along[0], from[1] + foot * along[1]};
-  MetPart part;
   if (NormSq<2>(nearest) > cell.reach_sq()) {
+    return part;
+  }
+  if (AreBeside(cell, from, along)) {
     return part;
   }
   double low = 0;
@@ -110,7 +131,7 @@ MetPart DomainRules::NearestMet(VertexId v, const Polytope<2>& cell, std::span<c
 // degrees there; and the triangle on their edge, which lies in the direction `toward` from v, is on the side of that
 // end, or between both segments. No vertex could make it better.
 bool DomainRules::IsAcross(VertexId v, VertexId u, const Point<2>& toward) const {
-  const Point<2> edge = Difference<2>(structure_.point(u), structure_.point(v));
+  const Point<2> edge = Difference<2>(PointOf(u), structure_.point(v));
   const double edge_sq = NormSq<2>(edge);
   for (const HalfEdge h : domain_.WaysFrom(v)) {
     const uint32_t segment = SegmentOf(h);
@@ -123,11 +144,11 @@ bool DomainRules::IsAcross(VertexId v, VertexId u, const Point<2>& toward) const
       if (!(edge_sq < distance * distance)) {
         continue;
       }
-      for (const HalfEdge k : domain_.WaysFrom(u)) {
+      for (const HalfEdge k : WaysFrom(u)) {
         const uint32_t other = SegmentOf(k);
         for (const bool other_b : {false, true}) {
           if (other == segment || domain_.EndVertex(other, other_b) != apex ||
-              std::abs(domain_.DistanceFromEnd(u, other, other_b) - distance) > kSameDistance * distance) {
+              std::abs(DistanceFromEnd(u, other, other_b) - distance) > kSameDistance * distance) {
             continue;
           }
           const Point<2> back = Difference<2>(domain_.EndOf(segment, is_b), structure_.point(v));
@@ -194,7 +215,7 @@ bool DomainRules::IsCrossed(VertexId v, const NodeView& node) const {
   return std::any_of(ways.begin(), ways.end(), [&](HalfEdge h) {
     const Point<2> d = domain_.DirectionOf(h);
     return turn * Cross(first.normal, d) > 0 && turn * Cross(d, second.normal) > 0 &&
-           !domain_.IsOn(first.vertex, SegmentOf(h)) && !domain_.IsOn(second.vertex, SegmentOf(h));
+           !IsOn(first.vertex, SegmentOf(h)) && !IsOn(second.vertex, SegmentOf(h));
   });
 }
 
@@ -227,7 +248,7 @@ Assessment DomainRules::AssessCell(VertexId v, Polytope<2>& cell, std::span<cons
   met = NearestMet(v, cell, segments);
   result.encroached_face = met.IsThere() ? 0 : -1;
   const double rho_sq = rules_.criteria().rho * rules_.criteria().rho;
-  std::pair<double, NodeName> best;  // of the bad node
+  std::tuple<double, NodeName, Point<2>> best;  // of the bad node; its place, since some on the clip have no name
   for (size_t i = 0; i < cell.nodes().size(); ++i) {
     const CellNode<2>& node = cell.nodes()[i];
     const NodeView view(cell, node);
@@ -252,7 +273,7 @@ Assessment DomainRules::AssessCell(VertexId v, Polytope<2>& cell, std::span<cons
     if (std::find(refused.begin(), refused.end(), name) != refused.end()) {
       continue;
     }
-    const std::pair<double, NodeName> own = {node.radius_sq, name};
+    const std::tuple<double, NodeName, Point<2>> own = {node.radius_sq, name, node.x};
     if (bound.sq > rho_sq * edge_limit_sq) {
       result.next_edge_sq = std::min(result.next_edge_sq, bound.sq / rho_sq);
     } else if (result.bad_node < 0 || bound.sq < result.bound_sq || (bound.sq == result.bound_sq && best < own)) {
@@ -270,11 +291,11 @@ Assessment DomainRules::AssessCell(VertexId v, Polytope<2>& cell, std::span<cons
 bool DomainRules::IsAtSegment(VertexId v, const NodeView& node) const {
   const auto generators = std::span(node.generators).first(node.bisectors);
   return !domain_.IsFree(v) || std::any_of(generators.begin(), generators.end(),
-                                           [&](const Plane<2>* plane) { return !domain_.IsFree(plane->vertex); });
+                                           [&](const Plane<2>* plane) { return !IsFree(plane->vertex); });
 }
 
 // Where a vertex is to split `met`, which the cell of `v` meets.
-SegmentPoint DomainRules::SplitPlace(VertexId v, const MetPart& met) const {
+PlaceInDomain DomainRules::SplitPlace(VertexId v, const MetPart& met) const {
   const uint32_t segment = met.segment;
   const double length = domain_.LengthOf(segment);
   // At the distance of v from a common end, if the angle there is acute: no new distance comes into being.
@@ -289,7 +310,7 @@ SegmentPoint DomainRules::SplitPlace(VertexId v, const MetPart& met) const {
         const Point<2> other = domain_.DirectionOf(HalfEdgeOf(segment, other_b));
         const double distance = domain_.DistanceFromEnd(v, SegmentOf(h), is_b);
         if (Dot<2>(own, other) > 0 && distance < (1 - kSameDistance) * length) {
-          return {segment, other_b, distance};
+          return {.on = {segment, other_b, distance}};
         }
       }
     }
@@ -301,32 +322,39 @@ SegmentPoint DomainRules::SplitPlace(VertexId v, const MetPart& met) const {
 
 // The place of a vertex that comes for another reason than an equal distance, with nothing within `room` of it: at a
 // round distance from an end with a small angle.
-SegmentPoint DomainRules::RoundPlace(SegmentPoint place, double room) const {
-  const uint32_t segment = place.segment;
+PlaceInDomain DomainRules::RoundPlace(SegmentPoint on, double room) const {
+  const uint32_t segment = on.segment;
   const double length = domain_.LengthOf(segment);
   const bool is_acute_at_a = domain_.IsAcute(HalfEdgeOf(segment, false));
   const bool is_acute_at_b = domain_.IsAcute(HalfEdgeOf(segment, true));
+  SplitOrder order = SplitOrder::kAny;
   if (is_acute_at_a && is_acute_at_b && domain_.SplitsOf(segment) == 0) {
-    place.distance = std::max(place.distance, length / 3);
+    order = expected_ != nullptr && expected_->AreOn(segment) ? SplitOrder::kAfterExpected : SplitOrder::kFirst;
   }
-  if (place.is_from_b ? is_acute_at_b : is_acute_at_a) {
-    const double rounded = RoundNear(place.distance, kRoundingShare * room);
+  if (order == SplitOrder::kFirst) {
+    on.distance = std::max(on.distance, length / 3);
+  }
+  if (on.is_from_b ? is_acute_at_b : is_acute_at_a) {
+    const double rounded = RoundNear(on.distance, kRoundingShare * room);
     if (rounded < length) {
-      place.distance = rounded;
+      on.distance = rounded;
     }
   }
-  return place;
+  return {.on = on, .order = order};
 }
 
 // The insertion of a vertex at `place`, for `v`.
-InsertionRequest<2> DomainRules::RequestAt(VertexId v, const SegmentPoint& place, double edge_limit_sq,
+InsertionRequest<2> DomainRules::RequestAt(VertexId v, const PlaceInDomain& place, double edge_limit_sq,
                                            Workspace<2>& workspace) const {
   InsertionRequest<2> request;
-  request.place.on = place;
+  request.place = place;
   request.insertion.reason = Reason::kEncroachment;
   request.insertion.near = v;
-  request.point.position = domain_.PositionOf(place);
-  request.point.empty_radius_sq = structure_.NearestTo(request.point.position, v, workspace).distance_sq;
+  const Point<2> position = domain_.PositionOf(place.on);
+  const double committed_sq = structure_.NearestTo(position, v, workspace).distance_sq;
+  request.point.position = position;
+  request.point.empty_radius_sq = expected_ != nullptr ? expected_->NearestSq(position, committed_sq)
+                                                       : structure_.NearestUncommittedSq(position, committed_sq);
   request.insertion.empty_radius_sq = request.point.empty_radius_sq;
   request.insertion.edge_sq = request.point.empty_radius_sq;
   request.insertion.edge_limit_sq = edge_limit_sq;
@@ -334,13 +362,16 @@ InsertionRequest<2> DomainRules::RequestAt(VertexId v, const SegmentPoint& place
   return request;
 }
 
-// The point that the bad node asks for, in the sector of its triangle if it can be; workspace.segments has all segments
-// that are nearer to it than any vertex.
+// The point that the bad node asks for, in the sector of its triangle if it can be; workspace.segments has the segments
+// that are nearer to it than any vertex, whatever the leaves of the tree.
 SteinerPoint<2> DomainRules::CandidateIn(size_t sector, VertexId v, const Polytope<2>& cell, const Assessment& found,
                                          bool is_at_segment, double edge_limit_sq, StepRules<2>::CellOf cell_of,
                                          Workspace<2>& workspace) const {
   const auto find_segments = [&](const SteinerPoint<2>& point) {
-    structure_.SegmentsWithin(point.position, std::sqrt(point.empty_radius_sq), v, workspace);
+    structure_.SegmentsWithin(point.position, kBeyond * std::sqrt(point.empty_radius_sq), v, workspace);
+    std::erase_if(workspace.segments, [&](uint32_t segment) {
+      return domain_.DistanceSqTo(point.position, segment) > point.empty_radius_sq;
+    });
   };
   SteinerPoint<2> candidate = rules_.CandidateFor(v, cell, found, is_at_segment, edge_limit_sq, cell_of);
   find_segments(candidate);
@@ -416,6 +447,24 @@ DomainRules::Answer DomainRules::NextRequest(VertexId v, const Polytope<2>& cell
   return answer;
 }
 
+bool DomainRules::AreInOrder(std::span<const InsertionRequest<2>> requests) const {
+  for (size_t i = 0; i < requests.size(); ++i) {
+    const PlaceInDomain& place = requests[i].place;
+    if (place.order == SplitOrder::kAny) {
+      continue;
+    }
+    const auto is_there = [&](const InsertionRequest<2>& request) {
+      return request.place.on.segment == place.on.segment;
+    };
+    const std::span<const InsertionRequest<2>> own = requests.first(i);
+    const bool is_split = domain_.SplitsOf(place.on.segment) > 0 || std::any_of(own.begin(), own.end(), is_there);
+    if (is_split != (place.order == SplitOrder::kAfterExpected)) {
+      return false;
+    }
+  }
+  return true;
+}
+
 double DomainRules::NearestSegmentSq(VertexId v, double limit_sq, Workspace<2>& workspace) const {
   const Point<2>& p = structure_.point(v);
   structure_.SegmentsWithin(p, std::sqrt(limit_sq), v, workspace);
@@ -423,9 +472,7 @@ double DomainRules::NearestSegmentSq(VertexId v, double limit_sq, Workspace<2>& 
     if (domain_.IsOn(v, segment)) {
       continue;
     }
-    const auto [foot, away] = domain_.FootOf(p, segment);
-    const double beyond = foot - std::clamp(foot, 0.0, domain_.LengthOf(segment));  // an end
-    limit_sq = std::min(limit_sq, away * away + beyond * beyond);
+    limit_sq = std::min(limit_sq, domain_.DistanceSqTo(p, segment));
   }
   return limit_sq;
 }

@@ -12,6 +12,7 @@
 #include "core/cell/polytope.h"
 #include "core/geometry/point.h"
 #include "core/refine/assessment.h"
+#include "core/refine/domain/expected_vertices.h"
 #include "core/refine/domain/planar_domain.h"
 #include "core/refine/insertion.h"
 #include "core/refine/step_rules.h"
@@ -35,11 +36,16 @@ using NodeName = std::pair<VertexId, VertexId>;
 // For the criteria of one run. What the functions return depends on the cell, on the places of vertices and on the
 // domain alone.
 //
-// Thread safety: thread-compatible; const functions may run at once.
+// Thread safety: thread-compatible; const functions may run at once, and, with expected vertices, beside
+// QueryStructure::AddUncommitted and PlanarDomain::AddVertex.
 class DomainRules {
  public:
+  // The vertices are those of the structure, uncommitted ones, too; or those that are committed, and the `expected`.
+  //
   // REQUIRES:   all references outlive this.
-  DomainRules(const QueryStructure<2>& structure, const PlanarDomain& domain, const StepRules<2>& rules);
+  DomainRules(const QueryStructure<2>& structure, const PlanarDomain& domain, const StepRules<2>& rules,
+              const ExpectedVertices* expected = nullptr)
+      : structure_(structure), domain_(domain), rules_(rules), expected_(expected) {}
 
   // What is wrong with the cell of `v`, whose nodes are placed; `segments` has all that meet it. `met` is the nearest
   // of them that v is not on; it counts as an encroached face. What a cell is beyond the segments of v, on sides that
@@ -58,6 +64,11 @@ class DomainRules {
   Answer NextRequest(VertexId v, const Polytope<2>& cell, const Assessment& found, const MetPart& met,
                      double edge_limit_sq, StepRules<2>::CellOf cell_of, Workspace<2>& workspace) const;
 
+  // Whether on the segments of recorded `requests`, those of one vertex, vertices have been inserted as it was assumed.
+  //
+  // Complexity: O(requests^2).
+  bool AreInOrder(std::span<const InsertionRequest<2>> requests) const;
+
   // How far `v` is from the nearest segment that it is not on, squared, if that is less than `limit_sq`; else that.
   double NearestSegmentSq(VertexId v, double limit_sq, Workspace<2>& workspace) const;
 
@@ -71,9 +82,9 @@ class DomainRules {
   MetPart MeetSegment(const Polytope<2>& cell, uint32_t segment) const;
   MetPart NearestMet(VertexId v, const Polytope<2>& cell, std::span<const uint32_t> segments) const;
   bool IsAcross(VertexId v, VertexId u, const Point<2>& toward) const;
-  SegmentPoint SplitPlace(VertexId v, const MetPart& met) const;
-  SegmentPoint RoundPlace(SegmentPoint place, double room) const;
-  InsertionRequest<2> RequestAt(VertexId v, const SegmentPoint& place, double edge_limit_sq,
+  PlaceInDomain SplitPlace(VertexId v, const MetPart& met) const;
+  PlaceInDomain RoundPlace(SegmentPoint on, double room) const;
+  InsertionRequest<2> RequestAt(VertexId v, const PlaceInDomain& place, double edge_limit_sq,
                                 Workspace<2>& workspace) const;
   bool IsAtSegment(VertexId v, const NodeView& node) const;
   bool IsCrossed(VertexId v, const NodeView& node) const;
@@ -88,9 +99,25 @@ class DomainRules {
   SegmentPoint YieldPlace(const SteinerPoint<2>& candidate, VertexId v, bool is_in_sector,
                           std::span<const uint32_t> segments, double& distance_sq) const;
 
+  // Of vertices that may be expected; else as the structure and the domain have it.
+  bool IsExpected(VertexId u) const { return expected_ != nullptr && expected_->Has(u); }
+  const Point<2>& PointOf(VertexId u) const { return IsExpected(u) ? expected_->point(u) : structure_.point(u); }
+  bool IsFree(VertexId u) const { return IsExpected(u) ? !expected_->PlaceOf(u).IsOnSegment() : domain_.IsFree(u); }
+  bool IsOn(VertexId u, uint32_t segment) const {
+    return IsExpected(u) ? expected_->PlaceOf(u).segment == segment : domain_.IsOn(u, segment);
+  }
+  std::span<const HalfEdge> WaysFrom(VertexId u) const {
+    return IsExpected(u) ? domain_.WaysFrom(expected_->PlaceOf(u)) : domain_.WaysFrom(u);
+  }
+  double DistanceFromEnd(VertexId u, uint32_t segment, bool is_b) const {
+    return IsExpected(u) ? domain_.DistanceFromEnd(expected_->PlaceOf(u), is_b)
+                         : domain_.DistanceFromEnd(u, segment, is_b);
+  }
+
   const QueryStructure<2>& structure_;
   const PlanarDomain& domain_;
   const StepRules<2>& rules_;
+  const ExpectedVertices* const expected_;  // null: none
 };
 
 }  // namespace wellspace::core

@@ -2,12 +2,14 @@
 #ifndef WELLSPACE_CORE_REFINE_DOMAIN_DOMAIN_STEPS_H_
 #define WELLSPACE_CORE_REFINE_DOMAIN_DOMAIN_STEPS_H_
 
+#include <cstddef>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "core/base/ids.h"
 #include "core/cell/polytope.h"
+#include "core/cell/star.h"
 #include "core/refine/assessment.h"
 #include "core/refine/cell_steps.h"
 #include "core/refine/domain/domain_rules.h"
@@ -44,20 +46,27 @@ class DomainSteps {
   // All neighbours: a node that asked for nothing, since a segment was in its way, may be one of a triangle now.
   std::span<const NeighborNotice> Notices() {
     workspace_.notices.clear();
-    for (const CellNode<2>& node : cell().nodes()) {
-      for (const uint16_t index : node.planes) {
-        if (const Plane<2>& plane = cell().plane(index); plane.kind == PlaneKind::kBisector) {
-          workspace_.notices.push_back({plane.vertex, 2 * plane.offset, true});
+    AppendNotices(workspace_.notices);
+    return workspace_.notices;
+  }
+  void AppendNotices(std::vector<NeighborNotice>& notices) {
+    const auto nodes = std::span(cell().nodes());
+    for (size_t i = 0; i < nodes.size(); ++i) {
+      for (const size_t k : {0, 1}) {
+        // Of the two nodes of an edge one tells of it.
+        const Plane<2>& plane = cell().plane(nodes[i].planes[1 - k]);
+        if (plane.kind == PlaneKind::kBisector && nodes[i].neighbours[k] > i) {
+          notices.push_back({plane.vertex, 2 * plane.offset, true});
         }
       }
     }
-    return workspace_.notices;
   }
 
   const InsertionRequest<2>* NextRequest() {
     const auto cell_of = [this](VertexId u, const Box<2>& clip) {
       return cells_.ComputeOther(u, clip, workspace_.other);
     };
+    is_reassessed_ = false;
     while (true) {
       DomainRules::Answer answer =
           rules_.NextRequest(v_, cell(), found_, met_, edge_limit_sq_, cell_of, workspace_.other);
@@ -67,14 +76,19 @@ class DomainSteps {
       }
       refused_.push_back(*answer.refused);
       Assess();
+      is_reassessed_ = true;
     }
   }
 
   void Inserted(VertexId x) { cell().CutBeforePlace(x, request_->point.position); }
 
   std::span<const WatchedNode<2>> NodesToWatch() { return {}; }
+  void AppendNodesToWatch(std::vector<WatchedNode<2>>& /*watched*/) {}
 
   typename StarWriter<2>::Simplices FindStar(StarWriter<2>& /*stars*/) { return {}; }
+  void FindStar(Star<2>& star) { star.clear(); }
+
+  const Assessment* Reassessed() const { return is_reassessed_ ? &found_ : nullptr; }
 
  private:
   const DomainRules& rules_;
@@ -85,6 +99,7 @@ class DomainSteps {
   Assessment found_;
   MetPart met_;
   std::vector<NodeName> refused_;
+  bool is_reassessed_ = false;
   std::optional<InsertionRequest<2>> request_;
 };
 

@@ -64,7 +64,13 @@ std::vector<SegmentLists::Ends> PlanarDomain::Ends() const {
 void PlanarDomain::AddVertex(const SegmentPoint& place, uint32_t face) {
   places_.push_back({place, face});
   if (place.IsOnSegment()) {
-    ++splits_[place.segment];
+    splits_[place.segment].fetch_add(1, std::memory_order_relaxed);
+  }
+}
+
+void PlanarDomain::MakeRoom(size_t vertices) {
+  if (places_.capacity() - places_.size() < vertices) {
+    places_.reserve(std::max(2 * places_.capacity(), places_.size() + vertices));
   }
 }
 
@@ -72,9 +78,7 @@ std::span<const HalfEdge> PlanarDomain::WaysFrom(VertexId v) const {
   if (IsPoint(v)) {
     return faces_.Around(Index(v));
   }
-  const SegmentPoint place = PlaceOf(v);
-  return place.IsOnSegment() ? std::span<const HalfEdge>(ways_).subspan(2 * size_t{place.segment}, 2)
-                             : std::span<const HalfEdge>();
+  return WaysFrom(PlaceOf(v));
 }
 
 size_t PlanarDomain::SectorToward(VertexId v, const Point<2>& d) const {
@@ -101,8 +105,13 @@ double PlanarDomain::DistanceFromEnd(VertexId v, uint32_t segment, bool is_b) co
   if (IsPoint(v)) {
     return EndVertex(segment, is_b) == v ? 0 : LengthOf(segment);
   }
-  const SegmentPoint place = PlaceOf(v);
-  return place.is_from_b == is_b ? place.distance : LengthOf(segment) - place.distance;
+  return DistanceFromEnd(PlaceOf(v), is_b);
+}
+
+double PlanarDomain::DistanceSqTo(const Point<2>& p, uint32_t segment) const {
+  const auto [foot, away] = FootOf(p, segment);
+  const double beyond = foot - std::clamp(foot, 0.0, LengthOf(segment));  // an end
+  return away * away + beyond * beyond;
 }
 
 Point<2> PlanarDomain::PositionOf(const SegmentPoint& place) const {
@@ -119,7 +128,7 @@ PlanarDomain::Chains PlanarDomain::FindChains() const {
   Chains chains;
   chains.first.assign(segment_count() + 1, 0);
   for (uint32_t s = 0; s < segment_count(); ++s) {
-    chains.first[s + 1] = chains.first[s] + 2 + splits_[s];
+    chains.first[s + 1] = chains.first[s] + 2 + SplitsOf(s);
   }
   chains.vertices.resize(chains.first.back());
   std::vector<uint32_t> next(chains.first.begin(), chains.first.end() - 1);

@@ -2,6 +2,8 @@
 #ifndef WELLSPACE_CORE_REFINE_DOMAIN_PLANAR_DOMAIN_H_
 #define WELLSPACE_CORE_REFINE_DOMAIN_PLANAR_DOMAIN_H_
 
+#include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <numbers>
 #include <span>
@@ -28,7 +30,8 @@ inline constexpr double kRadiusSqOfArea = 0.76980035891950102;
 // Segments are named by number, faces as in PlanarFaces. The first vertices are the points of the graph, in its order;
 // the others have been inserted: on a segment, or inside a face. That a vertex is on a segment is never computed.
 //
-// Thread safety: thread-compatible; const functions may run at once.
+// Thread safety: thread-compatible; const functions may run at once. Beside AddVertex, where MakeRoom has made room for
+// the vertex, those of them may run that are asked of segments, or of vertices that there were before.
 // Invariants: (1) a vertex that is on no segment lies inside a face that is meshed.
 class PlanarDomain {
  public:
@@ -55,6 +58,10 @@ class PlanarDomain {
 
   // Adds the vertex after the last: on a segment, or inside `face`.
   void AddVertex(const SegmentPoint& place, uint32_t face);
+  // Makes room for so many more vertices.
+  //
+  // Complexity: O(1), amortised.
+  void MakeRoom(size_t vertices);
 
   bool IsPoint(VertexId v) const { return Index(v) < point_count(); }
   // Where `v` is on a segment; on none if it is an end of segments, or inside a face.
@@ -74,6 +81,11 @@ class PlanarDomain {
   // The ways that lead from `v` along segments, counterclockwise: none from a vertex inside a face. Between two that
   // follow each other lies a sector, of the face left of the first.
   std::span<const HalfEdge> WaysFrom(VertexId v) const;
+  // The same of a vertex at `place`, which is no end of segments.
+  std::span<const HalfEdge> WaysFrom(const SegmentPoint& place) const {
+    return place.IsOnSegment() ? std::span<const HalfEdge>(ways_).subspan(2 * size_t{place.segment}, 2)
+                               : std::span<const HalfEdge>();
+  }
   // The number of the sector at `v` that the direction `d` leads into, as of the way before it; one of the two, where
   // it leads along a segment. 0 for a vertex inside a face.
   size_t SectorToward(VertexId v, const Point<2>& d) const;
@@ -86,6 +98,9 @@ class PlanarDomain {
   bool IsOn(VertexId v, uint32_t segment) const;
   // How far `v`, which is on `segment` or an end of it, is from one of its ends.
   double DistanceFromEnd(VertexId v, uint32_t segment, bool is_b) const;
+  double DistanceFromEnd(const SegmentPoint& place, bool is_b) const {
+    return place.is_from_b == is_b ? place.distance : LengthOf(place.segment) - place.distance;
+  }
 
   // Where `p` is beside a segment: how far along from its end a the foot is, on the line through it, and how far away,
   // with a sign. Units: those of the coordinates.
@@ -98,6 +113,8 @@ class PlanarDomain {
     const Point<2> from = Difference<2>(p, EndOf(segment, false));
     return {Dot<2>(from, along) / LengthOf(segment), Cross(along, from) / LengthOf(segment)};
   }
+  // The squared distance between `p` and a segment.
+  double DistanceSqTo(const Point<2>& p, uint32_t segment) const;
 
   // Where a point of a segment is: computed from the nearer end, each coordinate rounded once or twice.
   Point<2> PositionOf(const SegmentPoint& place) const;
@@ -123,8 +140,8 @@ class PlanarDomain {
   bool IsAcute(HalfEdge h) const { return is_acute_[h]; }
   // The smallest angle between two segments with a common end. Unit: radians; pi where there are no two.
   double MinAngle() const { return min_angle_; }
-  // How many vertices have been inserted on a segment.
-  uint32_t SplitsOf(uint32_t segment) const { return splits_[segment]; }
+  // How many vertices have been inserted on a segment; beside AddVertex, how many had been at some time.
+  uint32_t SplitsOf(uint32_t segment) const { return splits_[segment].load(std::memory_order_relaxed); }
 
   // The vertices on each segment in their order, with both of its ends: those of segment s are
   // vertices[first[s]] to vertices[first[s + 1]].
@@ -152,8 +169,8 @@ class PlanarDomain {
   std::vector<double> lengths_;
   std::vector<HalfEdge> ways_;  // 2 of each segment: those from a vertex on it, toward b and a
   double min_angle_ = std::numbers::pi;
-  std::vector<bool> is_acute_;    // by half-edge
-  std::vector<uint32_t> splits_;  // by segment
+  std::vector<bool> is_acute_;                 // by half-edge
+  std::vector<std::atomic<uint32_t>> splits_;  // by segment
   HugeVector<InsertedPlace> places_;
 };
 

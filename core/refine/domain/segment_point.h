@@ -18,10 +18,18 @@ struct SegmentPoint {
   bool IsOnSegment() const { return segment != kNone; }
 };
 
+// What the distance of a place on a segment depends on, beside the vertices near to it.
+enum class SplitOrder : uint8_t {
+  kAny,            // nothing
+  kFirst,          // no vertex has been inserted on the segment
+  kAfterExpected,  // none had when it was asked for, but one that was expected has
+};
+
 // Where a new vertex is: on a segment, or else inside a face.
 struct PlaceInDomain {
   SegmentPoint on;
   uint32_t face = 0;
+  SplitOrder order = SplitOrder::kAny;
 };
 
 }  // namespace wellspace::core

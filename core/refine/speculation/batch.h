@@ -28,8 +28,9 @@ namespace wellspace::core {
 // What is found of a cell between two insertions for it.
 struct RecordedStep {
   Assessment found;
-  uint32_t notices = 0;  // so many, the next of the batch's
-  bool asks = false;     // for the next of the batch's requests; if not, it is the last step of its vertex
+  uint32_t notices = 0;        // so many, the next of the batch's
+  bool asks = false;           // for the next of the batch's requests; if not, it is the last step of its vertex
+  bool is_reassessed = false;  // what is found has become the next of the batch's while a request was looked for
 };
 
 // Steps are recorded as if no vertices were refined meanwhile but those of the batch. They are in columns, vertex after
@@ -46,6 +47,7 @@ struct alignas(kCacheLines) Batch {
   struct Ends {
     uint32_t steps = 0;
     uint32_t requests = 0;
+    uint32_t reassessed = 0;
     uint32_t notices = 0;
     uint32_t watched = 0;
     uint32_t simplices = 0;
@@ -53,6 +55,7 @@ struct alignas(kCacheLines) Batch {
   // What is recorded of one vertex.
   struct Record {
     bool is_wanted = false;      // the vertex was pending
+    bool has_to_notify = false;  // some of its neighbours have not been told that it was added
     bool is_known = false;       // all its steps are recorded: they do not end with an error
     double reach_sq = 0;         // the squared distance beyond which no vertex cuts a cell that was computed for it
     uint32_t new_simplices = 0;  // from there on to the end simplices have vertices with provisional numbers
@@ -61,13 +64,14 @@ struct alignas(kCacheLines) Batch {
 
   Ends ends() const {
     const auto size = [](const auto& column) { return static_cast<uint32_t>(column.size()); };
-    return {size(steps), size(requests), size(notices), size(watched), size(simplices)};
+    return {size(steps), size(requests), size(reassessed), size(notices), size(watched), size(simplices)};
   }
 
   void CutTo(const Ends& ends) {
     steps.resize(ends.steps);
     requests.resize(ends.requests);
     inserted.CutTo(ends.requests);
+    reassessed.resize(ends.reassessed);
     notices.resize(ends.notices);
     watched.resize(ends.watched);
     simplices.resize(ends.simplices);
@@ -127,6 +131,12 @@ struct alignas(kCacheLines) Batch {
   // Where the record of vertex `at` ends, once all are made.
   Ends EndOf(size_t at) const { return at + 1 < records.size() ? records[at + 1].begin : ends(); }
 
+  // What the record of vertex `at` asks for.
+  std::span<const InsertionRequest<D>> RequestsOf(size_t at) const {
+    const uint32_t begin = records[at].begin.requests;
+    return std::span(requests).subspan(begin, EndOf(at).requests - begin);
+  }
+
   // What is expected to be inserted for vertex `at`.
   std::span<const Point<D>> ExpectedOf(size_t at) const {
     if (!is_speculated || !records[at].is_known) {
@@ -168,8 +178,8 @@ struct alignas(kCacheLines) Batch {
   // Roughly.
   uint64_t MemoryBytes() const {
     return steps.capacity() * sizeof(steps[0]) + requests.capacity() * sizeof(requests[0]) +
-           notices.capacity() * sizeof(notices[0]) + watched.capacity() * sizeof(watched[0]) +
-           (simplices.capacity() + written.capacity()) * sizeof(simplices[0]);
+           reassessed.capacity() * sizeof(reassessed[0]) + notices.capacity() * sizeof(notices[0]) +
+           watched.capacity() * sizeof(watched[0]) + (simplices.capacity() + written.capacity()) * sizeof(simplices[0]);
   }
 
   // The part of the segment that comes after this batch, its last vertex first: places among the detached vertices.
@@ -185,6 +195,7 @@ struct alignas(kCacheLines) Batch {
   std::vector<RecordedStep> steps;
   std::vector<InsertionRequest<D>> requests;
   ExtraVertices<D> inserted;  // by request
+  std::vector<Assessment> reassessed;
   std::vector<NeighborNotice> notices;
   std::vector<WatchedNode<D>> watched;
   Star<D> simplices;  // of the stars of good cells

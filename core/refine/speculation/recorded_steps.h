@@ -33,6 +33,7 @@ class RecordedSteps {
         end_(batch.EndOf(batch.refined)),
         step_(record_.begin.steps),
         request_(record_.begin.requests),
+        reassessed_(record_.begin.reassessed),
         notices_end_(record_.begin.notices) {}
 
   const Assessment* Assess() {
@@ -48,6 +49,9 @@ class RecordedSteps {
   std::span<const NeighborNotice> Notices() const { return notices_; }
 
   const InsertionRequest<D>* NextRequest() {
+    if (batch_.steps[step_].is_reassessed) {
+      batch_.steps[step_].found = batch_.reassessed[reassessed_++];
+    }
     if (!batch_.steps[step_].asks) {
       return nullptr;
     }
@@ -81,6 +85,7 @@ class RecordedSteps {
   const typename Batch<D>::Ends end_;
   size_t step_;     // of the batch's
   size_t request_;  // likewise, the next
+  size_t reassessed_;
   std::span<NeighborNotice> notices_;
   size_t notices_end_;
 };

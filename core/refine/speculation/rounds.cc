@@ -10,12 +10,18 @@
 #include "absl/cleanup/cleanup.h"
 #include "core/base/dimensions.h"
 #include "core/base/memory/prefetch.h"
+#include "core/refine/domain/domain_rules.h"
+#include "core/refine/domain/domain_steps.h"
+#include "core/refine/domain/expected_vertices.h"
 
 namespace wellspace::core {
 namespace {
 
 // Fewer vertices of a bucket are refined as they come.
 constexpr size_t kLeastInRounds = 64;
+// In a domain of few vertices, where turns among segments make more: neighbours along a curve fit worse.
+constexpr size_t kLeastInSmallDomain = 4096;
+constexpr uint32_t kSmallDomain = 32768;
 // A bucket is cut into so many segments, and so many vertices of each are a batch.
 constexpr size_t kSegments = 8;
 constexpr size_t kBatch = 128;
@@ -26,6 +32,8 @@ constexpr size_t kParts = 4;
 // unless they are so many times as large.
 constexpr double kLeastShareValid = 2.0 / 3;
 constexpr size_t kMoreThanDistrusted = 4;
+// More than what is rounded.
+constexpr double kBeyond = 1 + 1e-9;
 
 // Cells of the vertices that were in the structure when speculation began, and of those that the batch expects to be
 // inserted before. Notes in the record how far they reach.
@@ -41,19 +49,24 @@ class SpeculatedCells {
   }
 
   const Polytope<D>* ComputeOther(VertexId u, const Box<D>& clip, Workspace<D>& workspace) {
-    is_known_ = u < batch_.inserted.first();  // others are in no leaf
-    if (!is_known_) {
+    if (u >= batch_.inserted.first()) {  // in no leaf
+      is_known_ = false;
       return nullptr;
     }
     structure_.UnplacedClippedVoronoi(u, clip, workspace, batch_.inserted);
-    const double reach = std::sqrt(workspace.cell.CutLimitSq()) + std::sqrt(DistanceSq<D>(structure_.point(u), site_));
-    record_.reach_sq = std::max(record_.reach_sq, reach * reach);
-    is_known_ = !workspace.cell.IsTooLarge();
+    NoteBall(structure_.point(u), workspace.cell.CutLimitSq());
+    is_known_ = is_known_ && !workspace.cell.IsTooLarge();
     workspace.cell.Place();
     return &workspace.cell;
   }
 
-  // Whether the last cell of another vertex could be computed.
+  // Notes that a vertex in this ball, given by its squared radius, would have changed the record.
+  void NoteBall(const Point<D>& centre, double radius_sq) {
+    const double reach = std::sqrt(radius_sq) + std::sqrt(DistanceSq<D>(centre, site_));
+    record_.reach_sq = std::max(record_.reach_sq, reach * reach);
+  }
+
+  // Whether all cells of other vertices could be computed.
   bool IsKnown() const { return is_known_; }
 
  private:
@@ -67,8 +80,10 @@ class SpeculatedCells {
 }  // namespace
 
 template <int D>
-void Rounds<D>::BeginRun(const StepRules<D>& rules, ThreadTeam& team, const RunContext& context) {
+void Rounds<D>::BeginRun(const StepRules<D>& rules, const PlanarDomain* domain, ThreadTeam& team,
+                         const RunContext& context) {
   rules_ = &rules;
+  domain_ = domain;
   team_ = &team;
   context_ = &context;
   distrusted_size_ = 0;
@@ -100,11 +115,13 @@ void Rounds<D>::DropRun() {
 template <int D>
 bool Rounds<D>::Begin(int bucket) {
   Schedule& schedule = pending_.schedule();
-  if (schedule.MostIn(bucket) < kLeastInRounds) {
+  const bool is_small_domain = domain_ != nullptr && structure_.vertex_count() < kSmallDomain;
+  const size_t least = is_small_domain ? kLeastInSmallDomain : kLeastInRounds;
+  if (schedule.MostIn(bucket) < least) {
     return false;
   }
   detached_ = schedule.Detach(bucket);
-  if (detached_.size() < kLeastInRounds) {  // the others have moved on
+  if (detached_.size() < least) {  // the others have moved on
     for (const VertexId v : detached_) {
       schedule.Reattach(v, bucket);
     }
@@ -233,6 +250,7 @@ void Rounds<D>::Prepare(std::span<Batch<D>> batches) {
     batch.Prepare(structure_.vertex_count(), inserted_before_ + inserted_.size());
     for (size_t i = batch.refined; i < batch.vertices.size(); ++i) {
       batch.records[i].is_wanted = schedule.IsPendingIn(batch.vertices[i], bucket_);
+      batch.records[i].has_to_notify = domain_ == nullptr || pending_.HasToNotify(batch.vertices[i]);
     }
   }
 }
@@ -271,17 +289,44 @@ template <int D>
 void Rounds<D>::Record(Batch<D>& batch, size_t at, StepWorkspace<D>& workspace) const {
   const VertexId v = batch.vertices[at];
   SpeculatedCells<D> cells(structure_, batch, at);
-  CellSteps<D, SpeculatedCells<D>> steps(*rules_, v, structure_.faces(v), pending_.schedule().UpperLengthSq(bucket_),
-                                         cells, workspace);
+  const double edge_limit_sq = pending_.schedule().UpperLengthSq(bucket_);
+  if constexpr (D == 2) {
+    if (domain_ != nullptr) {
+      const ExpectedVertices expected(batch.inserted, batch.requests);
+      const DomainRules rules(structure_, *domain_, *rules_, &expected);
+      DomainSteps steps(rules, *rules_, v, edge_limit_sq, cells, workspace);
+      return RecordSteps(batch, at, cells, steps);
+    }
+  }
+  CellSteps<D, SpeculatedCells<D>> steps(*rules_, v, structure_.faces(v), edge_limit_sq, cells, workspace);
+  RecordSteps(batch, at, cells, steps);
+}
+
+template <int D>
+template <typename Cells, typename Steps>
+void Rounds<D>::RecordSteps(Batch<D>& batch, size_t at, Cells& cells, Steps& steps) const {
+  const VertexId v = batch.vertices[at];
   while (!context_->IsCancelled()) {
     const Assessment* const found = steps.Assess();
     if (found == nullptr) {
       return;
     }
+    RecordedStep step{*found};
     const size_t first_notice = batch.notices.size();
-    steps.AppendNotices(batch.notices);
+    if (batch.records[at].has_to_notify) {
+      steps.AppendNotices(batch.notices);
+    }
+    step.notices = static_cast<uint32_t>(batch.notices.size() - first_notice);
     const InsertionRequest<D>* const request = steps.NextRequest();
-    batch.steps.push_back({*found, static_cast<uint32_t>(batch.notices.size() - first_notice), request != nullptr});
+    if (!cells.IsKnown()) {
+      return;
+    }
+    step.asks = request != nullptr;
+    if (const Assessment* const reassessed = steps.Reassessed(); reassessed != nullptr) {
+      step.is_reassessed = true;
+      batch.reassessed.push_back(*reassessed);
+    }
+    batch.steps.push_back(step);
     if (request == nullptr) {
       steps.AppendNodesToWatch(batch.watched);
       if (found->IsGood()) {
@@ -291,8 +336,11 @@ void Rounds<D>::Record(Batch<D>& batch, size_t at, StepWorkspace<D>& workspace) 
       batch.SetKnown(at, structure_.point(v));
       return;
     }
-    if (!cells.IsKnown() || !rules_->IsLongEnough(request->point)) {
+    if (!rules_->IsLongEnough(request->point)) {
       return;
+    }
+    if (domain_ != nullptr) {
+      cells.NoteBall(request->point.position, kBeyond * request->point.empty_radius_sq);
     }
     batch.requests.push_back(*request);
     steps.Inserted(batch.inserted.Append(request->point.position));

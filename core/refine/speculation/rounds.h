@@ -13,6 +13,7 @@
 #include "core/base/thread_team.h"
 #include "core/geometry/point.h"
 #include "core/refine/cell_steps.h"
+#include "core/refine/domain/planar_domain.h"
 #include "core/refine/pending_vertices.h"
 #include "core/refine/speculation/batch.h"
 #include "core/refine/speculation/star_writer.h"
@@ -20,6 +21,12 @@
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {
+
+// How often a vertex was refined whose batch had been speculated on; and how often by its record, as that was valid.
+struct SpeculationCounts {
+  uint64_t speculated = 0;
+  uint64_t replayed = 0;
+};
 
 // A bucket with many vertices is detached from the schedule and cut into segments. A round refines a batch of each
 // segment of one half; the next round does so with the other half. To speculate is to record the steps of a batch's
@@ -45,9 +52,9 @@ class Rounds {
   Rounds(QueryStructure<D>& structure, PendingVertices<D>& pending, StarWriter<D>& stars)
       : structure_(structure), pending_(pending), stars_(stars) {}
 
-  // Begins a run, which speculates with the threads of `team`. EndRun or DropRun has to be called before one of these
-  // goes; DropRun may be called after EndRun, and does nothing then.
-  void BeginRun(const StepRules<D>& rules, ThreadTeam& team, const RunContext& context);
+  // Begins a run, which speculates with the threads of `team`, in `domain` if there is one. EndRun or DropRun has to be
+  // called before one of these goes; DropRun may be called after EndRun, and does nothing then.
+  void BeginRun(const StepRules<D>& rules, const PlanarDomain* domain, ThreadTeam& team, const RunContext& context);
   // Writes the stars that are left, and adds to `counters` what the queries of other threads have cost.
   void EndRun(QueryCounters& counters);
   // Ends a run in which something has been thrown.
@@ -92,7 +99,11 @@ class Rounds {
   void CountRecord(const Batch<D>& batch, bool was_valid) {
     speculated_count_ += batch.is_speculated ? 1 : 0;
     valid_count_ += was_valid ? 1 : 0;
+    counts_.speculated += batch.is_speculated ? 1 : 0;
+    counts_.replayed += was_valid ? 1 : 0;
   }
+  // Of all runs.
+  const SpeculationCounts& counts() const { return counts_; }
 
   // Whether other threads may speculate.
   bool IsAhead() const { return is_ahead_; }
@@ -114,6 +125,8 @@ class Rounds {
   void Prepare(std::span<Batch<D>> batches);
   void RecordPart(Batch<D>& batch, size_t part, size_t parts, StepWorkspace<D>& workspace) const;
   void Record(Batch<D>& batch, size_t at, StepWorkspace<D>& workspace) const;
+  template <typename Cells, typename Steps>
+  void RecordSteps(Batch<D>& batch, size_t at, Cells& cells, Steps& steps) const;
   uint64_t CountBytes() const;
 
   QueryStructure<D>& structure_;
@@ -132,10 +145,12 @@ class Rounds {
   size_t speculated_count_ = 0;  // of the vertices of the bucket that have been refined, how many had been recorded
   size_t valid_count_ = 0;       // and how many of these records were still valid
   size_t distrusted_size_ = 0;   // of the last bucket where too few were; 0 if none
+  SpeculationCounts counts_;
 
   // Of the run.
   const StepRules<D>* rules_ = nullptr;
-  ThreadTeam* team_ = nullptr;  // null between runs
+  const PlanarDomain* domain_ = nullptr;  // null: the box
+  ThreadTeam* team_ = nullptr;            // null between runs
   const RunContext* context_ = nullptr;
   std::vector<StepWorkspace<D>> workspaces_;  // by thread
   bool is_ahead_ = false;

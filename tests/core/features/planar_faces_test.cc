@@ -49,7 +49,7 @@ struct Drawing {
     features.ends = ends;
     features.is_open = is_open;
     features.crossings = CrossingRule::kSplit;
-    graph = *MakePlanarGraph(points, features, nullptr, 1e-12, RunContext());
+    graph = *MakePlanarGraph(points, features, nullptr, 1e-12, 1, RunContext());
     return FindFaces(graph, rule, seeds, RunContext());
   }
 };

@@ -27,12 +27,12 @@ struct Input {
   std::vector<int32_t> markers{};
   CrossingRule crossings = CrossingRule::kRefuse;
 
-  absl::StatusOr<PlanarGraph> Make(const Box<2>* box = nullptr) const {
+  absl::StatusOr<PlanarGraph> Make(const Box<2>* box = nullptr, int threads = 1) const {
     Features features;
     features.ends = ends;
     features.markers = markers;
     features.crossings = crossings;
-    return MakePlanarGraph(points, features, box, kSeparation, RunContext());
+    return MakePlanarGraph(points, features, box, kSeparation, threads, RunContext());
   }
 };
 
@@ -197,6 +197,31 @@ TEST_F(PlanarGraphPropertyTest, RandomSegmentsOnASmallGridBecomeAGraph) {
     for (size_t i = 0; i < 2 * count; ++i) {
       EXPECT_EQ(graph->points[graph->point_of_input[i]], (Point<2>{input.points[2 * i], input.points[2 * i + 1]}));
     }
+  }
+}
+
+TEST_F(PlanarGraphPropertyTest, ThreadsMakeTheSameGraphAndTheSameError) {
+  Input input;
+  for (uint32_t i = 0; i < 1600; i += 2) {
+    const Point<2> p = {random_.Unit(), random_.Unit()};
+    const Point<2> q = {p[0] + 0.1 * random_.Unit(), p[1] + 0.1 * random_.Unit()};
+    input.points.insert(input.points.end(), {p[0], p[1], q[0], q[1]});
+    input.ends.insert(input.ends.end(), {i, i + 1});
+  }
+  const absl::Status refused = input.Make().status();
+  EXPECT_FALSE(refused.ok());
+  input.crossings = CrossingRule::kSplit;
+  const auto alone = input.Make();
+  ASSERT_TRUE(alone.ok()) << alone.status();
+  EXPECT_GT(alone->counts.crossings, 100u);
+  for (const int threads : {2, 3, 4}) {
+    input.crossings = CrossingRule::kRefuse;
+    EXPECT_EQ(input.Make(nullptr, threads).status(), refused);
+    input.crossings = CrossingRule::kSplit;
+    const auto together = input.Make(nullptr, threads);
+    ASSERT_TRUE(together.ok()) << together.status();
+    EXPECT_EQ(together->points, alone->points);
+    EXPECT_EQ(PairsOf(*together), PairsOf(*alone));
   }
 }
 

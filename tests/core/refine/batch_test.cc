@@ -121,5 +121,18 @@ TEST_F(BatchTest, StepsAreReplayedWithTheNumbersOfTheStructure) {
   EXPECT_THAT(star, ElementsAre(std::array{VertexId{3}, VertexId{4}}, std::array{VertexId{150}, VertexId{3}}));
 }
 
+TEST_F(BatchTest, WhatIsReassessedTakesThePlaceOfWhatWasFound) {
+  batch_.BeginRecord(0);
+  batch_.steps.push_back({.found = {.bad_node = 3}, .is_reassessed = true});
+  batch_.reassessed.push_back({.bad_node = -1, .next_edge_sq = 4});
+  RecordedSteps<2> steps(batch_);
+  const Assessment* const found = steps.Assess();
+  ASSERT_NE(found, nullptr);
+  EXPECT_EQ(found->bad_node, 3) << "until a request is looked for";
+  EXPECT_EQ(steps.NextRequest(), nullptr);
+  EXPECT_EQ(found->bad_node, -1);
+  EXPECT_EQ(found->next_edge_sq, 4);
+}
+
 }  // namespace
 }  // namespace wellspace::core
