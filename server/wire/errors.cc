@@ -26,7 +26,6 @@ constexpr char kReason[] = "wellspace.v1/reason";
 constexpr char kField[] = "wellspace.v1/field";
 constexpr char kMayRetry[] = "wellspace.v1/may_retry";
 
-
 absl::string_view ToAbsl(std::string_view text) { return {text.data(), text.size()}; }
 
 absl::StatusCode CodeOf(v1::ErrorReason reason) {

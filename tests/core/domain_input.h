@@ -48,6 +48,14 @@ struct DomainInput {
     return Ring(corners, marker);
   }
 
+  DomainInput& Segment(const core::Point<2>& a, const core::Point<2>& b, int32_t marker = 0) {
+    const auto first = static_cast<uint32_t>(points.size() / 2);
+    points.insert(points.end(), {a[0], a[1], b[0], b[1]});
+    ends.insert(ends.end(), {first, first + 1});
+    markers.push_back(marker);
+    return *this;
+  }
+
   core::Features features() const {
     core::Features made;
     made.ends = ends;
