@@ -33,6 +33,15 @@ struct MetPart {
 // A node by the vertices that it is equidistant from beside the site.
 using NodeName = std::pair<VertexId, VertexId>;
 
+// A cell asks for one insertion at a time. The first of these that applies decides:
+//   1. It meets a segment that its site is not on: the nearest one is split (SplitPlace), at the foot of the site or,
+//      at a small angle, at the site's own distance from the common end.
+//   2. A node breaks a bound: a point in its sector (CandidateIn), or, if that is too near to a segment or beyond one,
+//      its foot there (YieldPlace). Where the foot would come too near at a small angle, the node is refused.
+//   3. Nothing: the vertex is done, or looked at later.
+// A node in a face that is not meshed, one whose triangle is across, and one between whose generators an own segment
+// lies, do not count.
+//
 // For the criteria of one run. What the functions return depends on the cell, on the places of vertices and on the
 // domain alone.
 //
@@ -79,15 +88,18 @@ class DomainRules {
     bool is_size = false;  // a size or an area, not rho
   };
 
+  // 1. Segments that the cell meets.
   MetPart MeetSegment(const Polytope<2>& cell, uint32_t segment) const;
   MetPart NearestMet(VertexId v, const Polytope<2>& cell, std::span<const uint32_t> segments) const;
-  bool IsAcross(VertexId v, VertexId u, const Point<2>& toward) const;
   PlaceInDomain SplitPlace(VertexId v, const MetPart& met) const;
   PlaceInDomain RoundPlace(SegmentPoint on, double room) const;
   InsertionRequest<2> RequestAt(VertexId v, const PlaceInDomain& place, double edge_limit_sq,
                                 Workspace<2>& workspace) const;
-  bool IsAtSegment(VertexId v, const NodeView& node) const;
+
+  // 2. Nodes: which of them count, by which bound, and what takes their place.
+  bool IsAcross(VertexId v, VertexId u, const Point<2>& toward) const;
   bool IsCrossed(VertexId v, const NodeView& node) const;
+  bool IsAtSegment(VertexId v, const NodeView& node) const;
   Bound BoundOf(const Polytope<2>& cell, const CellNode<2>& node, const NodeView& view, uint32_t face) const;
   // Whether the way from `v` to `p` begins in a sector.
   bool LeadsInto(VertexId v, size_t sector, const Point<2>& p) const {

@@ -81,8 +81,8 @@ struct alignas(kCacheLines) Batch {
   // The first vertex that has not been refined.
   VertexId next() const { return vertices[refined]; }
 
-  // Whether the whole segment has been refined.
-  bool IsLast() const { return IsRefined() && segment_begin == segment_end; }
+  // Whether the whole strip has been refined.
+  bool IsLast() const { return IsRefined() && strip_begin == strip_end; }
 
   // Forgets what was recorded; `vertices_now` are in the structure, and so many have been inserted in these rounds.
   void Prepare(uint32_t vertices_now, size_t inserted_now) {
@@ -182,9 +182,9 @@ struct alignas(kCacheLines) Batch {
            watched.capacity() * sizeof(watched[0]) + (simplices.capacity() + written.capacity()) * sizeof(simplices[0]);
   }
 
-  // The part of the segment that comes after this batch, its last vertex first: places among the detached vertices.
-  size_t segment_begin = 0;
-  size_t segment_end = 0;
+  // The part of the strip that comes after this batch, its last vertex first: places among the detached vertices.
+  size_t strip_begin = 0;
+  size_t strip_end = 0;
   std::vector<VertexId> vertices;
   size_t refined = 0;  // so many of the vertices, the first
 

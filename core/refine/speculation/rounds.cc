@@ -19,11 +19,11 @@ namespace {
 
 // Fewer vertices of a bucket are refined as they come.
 constexpr size_t kLeastInRounds = 64;
-// In a domain of few vertices, where turns among segments make more: neighbours along a curve fit worse.
+// In a domain of few vertices, where turns among strips make more: neighbours along a curve fit worse.
 constexpr size_t kLeastInSmallDomain = 4096;
 constexpr uint32_t kSmallDomain = 32768;
-// A bucket is cut into so many segments, and so many vertices of each are a batch.
-constexpr size_t kSegments = 8;
+// A bucket is cut into so many strips, and so many vertices of each are a batch.
+constexpr size_t kStrips = 8;
 constexpr size_t kBatch = 128;
 // The records of a batch are made in so many parts, in turn with other batches, so that threads come to the end of a
 // round together; unless a thread would wait for the part before.
@@ -134,22 +134,22 @@ bool Rounds<D>::Begin(int bucket) {
   valid_count_ = 0;
   inserted_.clear();
   inserted_before_ = 0;
-  batches_.resize(kSegments);
-  for (size_t i = 0; i < kSegments; ++i) {
-    batches_[i].segment_begin = i * detached_.size() / kSegments;
-    batches_[i].segment_end = (i + 1) * detached_.size() / kSegments;
+  batches_.resize(kStrips);
+  for (size_t i = 0; i < kStrips; ++i) {
+    batches_[i].strip_begin = i * detached_.size() / kStrips;
+    batches_[i].strip_end = (i + 1) * detached_.size() / kStrips;
     TakeNext(batches_[i]);
   }
   return true;
 }
 
-// Makes the next vertices of a segment its batch.
+// Makes the next vertices of a strip its batch.
 template <int D>
 void Rounds<D>::TakeNext(Batch<D>& batch) {
-  const size_t size = std::min(kBatch, batch.segment_end - batch.segment_begin);
-  batch.vertices.assign(detached_.rend() - static_cast<std::ptrdiff_t>(batch.segment_end),
-                        detached_.rend() - static_cast<std::ptrdiff_t>(batch.segment_end - size));
-  batch.segment_end -= size;
+  const size_t size = std::min(kBatch, batch.strip_end - batch.strip_begin);
+  batch.vertices.assign(detached_.rend() - static_cast<std::ptrdiff_t>(batch.strip_end),
+                        detached_.rend() - static_cast<std::ptrdiff_t>(batch.strip_end - size));
+  batch.strip_end -= size;
   batch.refined = 0;
   batch.is_speculated = false;
 }
@@ -164,8 +164,8 @@ void Rounds<D>::Drop() {
   };
   for (const Batch<D>& batch : batches_) {
     const auto begin = detached_.begin();
-    std::for_each(begin + static_cast<std::ptrdiff_t>(batch.segment_begin),
-                  begin + static_cast<std::ptrdiff_t>(batch.segment_end), reattach);
+    std::for_each(begin + static_cast<std::ptrdiff_t>(batch.strip_begin),
+                  begin + static_cast<std::ptrdiff_t>(batch.strip_end), reattach);
     std::for_each(batch.vertices.rbegin(), batch.vertices.rend() - static_cast<std::ptrdiff_t>(batch.refined),
                   reattach);
   }

@@ -28,8 +28,8 @@ struct SpeculationCounts {
   uint64_t replayed = 0;
 };
 
-// A bucket with many vertices is detached from the schedule and cut into segments. A round refines a batch of each
-// segment of one half; the next round does so with the other half. To speculate is to record the steps of a batch's
+// A bucket with many vertices is detached from the schedule and cut into strips. A round refines a batch of each
+// strip of one half; the next round does so with the other half. To speculate is to record the steps of a batch's
 // vertices on a structure that is not changed meanwhile: vertices that are added stay uncommitted until no thread
 // speculates any more.
 //
@@ -135,10 +135,10 @@ class Rounds {
 
   // Of the detached vertices.
   int bucket_ = -1;
-  HugeVector<VertexId> detached_;   // the last of each segment is the next
-  std::vector<Batch<D>> batches_;   // by segment, the next of each; none if no vertex is detached
+  HugeVector<VertexId> detached_;   // the last of each strip is the next
+  std::vector<Batch<D>> batches_;   // by strip, the next of each; none if no vertex is detached
   std::vector<Batch<D>> finished_;  // of the bucket before, whose stars may still be written
-  size_t half_ = 0;                 // whether this round is of the first half of the segments, or of the second
+  size_t half_ = 0;                 // whether this round is of the first half of the strips, or of the second
   size_t next_batch_ = 0;           // in this round and the next
   std::vector<Point<D>> inserted_;  // in these rounds, where they are speculated, from inserted_before_ on
   size_t inserted_before_ = 0;
