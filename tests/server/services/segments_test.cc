@@ -268,8 +268,8 @@ TEST_F(SegmentsTest, VerticesAreAddedInFacesAndOnSegmentsAndQueriesAnswered) {
   v1::AddVerticesRequest request;
   request.set_name(name);
   // On the first side, a third of the way along it.
-  request.mutable_points()->add_coordinates(frame[0] + (frame[2] - frame[0]) / 3);
-  request.mutable_points()->add_coordinates(frame[1] + (frame[3] - frame[1]) / 3);
+  request.add_points(frame[0] + (frame[2] - frame[0]) / 3);
+  request.add_points(frame[1] + (frame[3] - frame[1]) / 3);
   v1::AddVerticesResponse added;
   {
     grpc::ClientContext context;
@@ -301,8 +301,8 @@ TEST_F(SegmentsTest, VerticesOutsideOfWhatIsMeshedAreRefused) {
   calls_.Refine(name);
   v1::AddVerticesRequest request;
   request.set_name(name);
-  request.mutable_points()->add_coordinates(1e3);
-  request.mutable_points()->add_coordinates(1e3);
+  request.add_points(1e3);
+  request.add_points(1e3);
   v1::AddVerticesResponse added;
   grpc::ClientContext context;
   status_ = calls_.queries().AddVertices(&context, request, &added);
