@@ -79,13 +79,16 @@ class SessionLife(unittest.TestCase):
     def test_a_session_of_a_domain_makes_the_mesh_that_one_call_makes(self):
         plate = self.folder / "plate.poly"
         plate.write_text("8 2 0 0\n1 0 0\n2 4 0\n3 4 4\n4 0 4\n5 1 1\n6 3 1\n7 3 3\n8 1 3\n"
-                         "10 1\n1 1 2 5\n2 2 3 5\n3 3 4 5\n4 4 1 5\n5 5 6 9\n6 6 7 9\n7 7 8 9\n8 8 5 9\n9 1 5 0\n10 3 7 0\n"
+                         "10 1\n1 1 2 5\n2 2 3 5\n3 3 4 5\n4 4 1 5\n"
+                         "5 5 6 9\n6 6 7 9\n7 7 8 9\n8 8 5 9\n9 1 5 0\n10 3 7 0\n"
                          "1\n1 2 2\n1\n1 0.5 2 3 0.05\n")
         land = self.folder / "land.geojson"
-        land.write_text('{"type": "Polygon", "coordinates": [[[0, 0], [9, 0], [9, 9], [0, 9]], [[2, 2], [5, 2], [5, 5], [2, 5]]]}')
+        land.write_text('{"type": "Polygon", "coordinates": '
+                        '[[[0, 0], [9, 0], [9, 9], [0, 9]], [[2, 2], [5, 2], [5, 5], [2, 5]]]}')
         lines = self.folder / "lines.csv"
         lines.write_text("x,y\n0.1,0.1\n0.9,0.9\n\n0.1,0.8\n0.8,0.1\n")
-        for domain, options in ((plate, ()), (land, ("--faces", "holes")), (lines, ("--segments", "--split-crossings"))):
+        crossed = ("--segments", "--split-crossings")
+        for domain, options in ((plate, ()), (land, ("--faces", "holes")), (lines, crossed)):
             with self.subTest(domain.name):
                 name = self.create("--dimension", 2, "--size", 0.5)
                 self.run_tool("upload", name, domain, *options)

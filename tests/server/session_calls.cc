@@ -117,21 +117,31 @@ void SessionCalls::Delete(const std::string& name, grpc::Status* status) {
   Delete(request, status);
 }
 
-v1::UploadPointsResponse SessionCalls::Upload(const std::vector<v1::UploadPointsRequest>& requests,
-                                              grpc::Status* status) {
-  grpc::ClientContext context;
-  v1::UploadPointsResponse response;
-  const auto stream = sessions_->UploadPoints(&context, &response);
-  for (const v1::UploadPointsRequest& request : requests) {
-    stream->Write(request);
+namespace {
+
+// Sends `requests`, and ends the call: with `status`, or as a success.
+template <typename Request>
+void SendAll(grpc::ClientWriter<Request>& stream, const std::vector<Request>& requests, grpc::Status* status) {
+  for (const Request& request : requests) {
+    stream.Write(request);
   }
-  stream->WritesDone();
-  const grpc::Status ended = stream->Finish();
+  stream.WritesDone();
+  const grpc::Status ended = stream.Finish();
   if (status != nullptr) {
     *status = ended;
   } else {
     EXPECT_TRUE(ended.ok()) << ended.error_message();
   }
+}
+
+}  // namespace
+
+v1::UploadPointsResponse SessionCalls::Upload(const std::vector<v1::UploadPointsRequest>& requests,
+                                              grpc::Status* status) {
+  grpc::ClientContext context;
+  v1::UploadPointsResponse response;
+  const auto stream = sessions_->UploadPoints(&context, &response);
+  SendAll(*stream, requests, status);
   return response;
 }
 
@@ -145,16 +155,7 @@ v1::AddSegmentsResponse SessionCalls::AddSegments(const std::vector<v1::AddSegme
   grpc::ClientContext context;
   v1::AddSegmentsResponse response;
   const auto stream = sessions_->AddSegments(&context, &response);
-  for (const v1::AddSegmentsRequest& request : requests) {
-    stream->Write(request);
-  }
-  stream->WritesDone();
-  const grpc::Status ended = stream->Finish();
-  if (status != nullptr) {
-    *status = ended;
-  } else {
-    EXPECT_TRUE(ended.ok()) << ended.error_message();
-  }
+  SendAll(*stream, requests, status);
   return response;
 }
 
