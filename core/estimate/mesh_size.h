@@ -44,7 +44,7 @@ double SimplicesOf(double vertices, double on_boundary) {
 }
 
 // What a process touches whatever the mesh, as measured: code, threads, their stacks and scratch space.
-inline constexpr double kFixedBytes = 3.9e6;
+inline constexpr double kFixedBytes = 5.2e6;
 
 // What arrays leave free of the large pages that they share (PagePool), as measured: this part of all, up to this size.
 inline constexpr double kLeftFree = 0.3;
