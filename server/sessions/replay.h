@@ -12,7 +12,7 @@
 #include "server/base/mesh_functions.h"
 #include "server/jobs/job.h"
 #include "server/sessions/feature_store.h"
-#include "server/sessions/point_store.h"
+#include "server/store/point_store.h"
 #include "server/sessions/session_steps.h"
 
 namespace wellspace::server {

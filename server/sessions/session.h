@@ -26,10 +26,10 @@
 #include "server/jobs/memory_budget.h"
 #include "server/sessions/feature_store.h"
 #include "server/sessions/lease.h"
-#include "server/sessions/mesh_chunks.h"
+#include "server/store/mesh_chunks.h"
 #include "server/sessions/operation.h"
 #include "server/sessions/point_account.h"
-#include "server/sessions/point_store.h"
+#include "server/store/point_store.h"
 #include "server/sessions/session_steps.h"
 #include "wellspace/v1/sessions.pb.h"
 

@@ -49,9 +49,13 @@ absl::StatusCode CodeOf(v1::ErrorReason reason) {
     case v1::ERROR_REASON_MEMORY_LIMIT:
     case v1::ERROR_REASON_QUOTA_EXCEEDED:
     case v1::ERROR_REASON_TOO_MANY_SESSIONS:
+    case v1::ERROR_REASON_DISK_FULL:
       return absl::StatusCode::kResourceExhausted;
     case v1::ERROR_REASON_SERVER_STOPPING:
+    case v1::ERROR_REASON_STORE_FAILED:
       return absl::StatusCode::kUnavailable;
+    case v1::ERROR_REASON_FILE_DAMAGED:
+      return absl::StatusCode::kDataLoss;
     case v1::ERROR_REASON_SESSION_NOT_FOUND:
     case v1::ERROR_REASON_OPERATION_NOT_FOUND:
       return absl::StatusCode::kNotFound;
@@ -78,7 +82,8 @@ absl::StatusCode CodeOf(v1::ErrorReason reason) {
 
 bool PassesWithTime(v1::ErrorReason reason) {
   return reason == v1::ERROR_REASON_QUEUE_FULL || reason == v1::ERROR_REASON_OUT_OF_MEMORY ||
-         reason == v1::ERROR_REASON_QUOTA_EXCEEDED || reason == v1::ERROR_REASON_SERVER_STOPPING;
+         reason == v1::ERROR_REASON_QUOTA_EXCEEDED || reason == v1::ERROR_REASON_SERVER_STOPPING ||
+         reason == v1::ERROR_REASON_DISK_FULL || reason == v1::ERROR_REASON_STORE_FAILED;
 }
 
 absl::Status Make(absl::StatusCode code, v1::ErrorReason reason, std::string_view message, std::string_view field,

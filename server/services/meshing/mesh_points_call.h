@@ -10,7 +10,7 @@
 #include "grpcpp/support/server_callback.h"
 #include "server/calls/response_stream.h"
 #include "server/services/meshing/cloud_call.h"
-#include "server/sessions/mesh_chunks.h"
+#include "server/store/mesh_chunks.h"
 #include "server/sessions/progress_pacer.h"
 #include "wellspace/v1/meshing.pb.h"
 

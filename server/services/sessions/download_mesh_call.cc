@@ -6,7 +6,7 @@
 #include "core/base/status_macros.h"
 #include "server/calls/wire.h"
 #include "server/services/resource_names.h"
-#include "server/sessions/mesh_chunks.h"
+#include "server/store/mesh_chunks.h"
 #include "server/wire/convert.h"
 #include "server/wire/errors.h"
 

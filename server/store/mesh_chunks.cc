@@ -1,4 +1,4 @@
-#include "server/sessions/mesh_chunks.h"
+#include "server/store/mesh_chunks.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "server/sessions/point_store.h"
+#include "server/store/point_store.h"
 
 #include <numeric>
 #include <vector>

@@ -1,4 +1,4 @@
-#include "server/sessions/point_store.h"
+#include "server/store/point_store.h"
 
 #include <algorithm>
 #include <cstring>
@@ -8,8 +8,7 @@
 
 namespace wellspace::server {
 
-void PointStore::Append(std::span<const double> coordinates) {
-  coordinate_count_ += coordinates.size();
+absl::Status MemoryPoints::Append(std::span<const double> coordinates) {
   while (!coordinates.empty()) {
     if (blocks_.empty() || blocks_.back().size() == kBlockSize) {
       blocks_.emplace_back();
@@ -20,18 +19,32 @@ void PointStore::Append(std::span<const double> coordinates) {
     std::vector<double>& block = blocks_.back();
     const size_t count = std::min(coordinates.size(), kBlockSize - block.size());
     block.insert(block.end(), coordinates.begin(), coordinates.begin() + static_cast<std::ptrdiff_t>(count));
+    coordinate_count_ += count;
     coordinates = coordinates.subspan(count);
+  }
+  return absl::OkStatus();
+}
+
+void MemoryPoints::Truncate(uint64_t count) {
+  while (!blocks_.empty() && coordinate_count_ > count) {
+    std::vector<double>& block = blocks_.back();
+    const uint64_t excess = std::min<uint64_t>(coordinate_count_ - count, block.size());
+    block.resize(block.size() - excess);
+    coordinate_count_ -= excess;
+    if (block.empty()) {
+      blocks_.pop_back();
+    }
   }
 }
 
-std::span<const double> PointStore::PieceFrom(uint64_t first, uint64_t end) const {
+std::span<const double> MemoryPoints::PieceFrom(uint64_t first, uint64_t end) const {
   const std::span<const double> block(blocks_[first / kBlockSize]);
   const uint64_t skip = first % kBlockSize;
   return block.subspan(skip, std::min<uint64_t>(end - first, block.size() - skip));
 }
 
-absl::StatusOr<std::vector<double>> PointStore::Copy(uint64_t first, uint64_t end,
-                                                     const core::RunContext& context) const {
+absl::StatusOr<std::vector<double>> MemoryPoints::Copy(uint64_t first, uint64_t end,
+                                                       const core::RunContext& context) const {
   std::vector<double> coordinates;
   coordinates.reserve(end - first);
   while (first < end) {
@@ -43,7 +56,7 @@ absl::StatusOr<std::vector<double>> PointStore::Copy(uint64_t first, uint64_t en
   return coordinates;
 }
 
-uint64_t PointStore::CountEqual(uint64_t first, std::span<const double> coordinates) const {
+absl::StatusOr<uint64_t> MemoryPoints::CountEqual(uint64_t first, std::span<const double> coordinates) const {
   uint64_t equal = 0;
   while (equal < coordinates.size()) {
     const std::span<const double> piece = PieceFrom(first + equal, first + coordinates.size());
@@ -57,7 +70,7 @@ uint64_t PointStore::CountEqual(uint64_t first, std::span<const double> coordina
   return equal;
 }
 
-uint32_t PointStore::Checksum(uint64_t first, uint64_t end) const {
+absl::StatusOr<uint32_t> MemoryPoints::Checksum(uint64_t first, uint64_t end) const {
   uint32_t checksum = 0;
   while (first < end) {
     const std::span<const double> piece = PieceFrom(first, end);

@@ -1,0 +1,72 @@
+#include "server/store/memory_mesh.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/base/status_macros.h"
+#include "server/wire/convert.h"
+
+namespace wellspace::server {
+namespace {
+
+constexpr size_t kCopyBlock = size_t{1} << 20;  // numbers copied between two looks at the context
+
+template <typename T>
+absl::StatusOr<core::HugeVector<T>> Copy(const core::HugeVector<T>& values, const core::RunContext& context) {
+  core::HugeVector<T> copy;
+  copy.reserve(values.size());
+  for (size_t begin = 0; begin < values.size(); begin += kCopyBlock) {
+    WELLSPACE_RETURN_IF_ERROR(context.Check());
+    const T* first = values.data() + begin;
+    copy.insert(copy.end(), first, first + std::min(kCopyBlock, values.size() - begin));
+  }
+  return copy;
+}
+
+MeshSnapshot::Figures FiguresOf(uint64_t revision, const core::Mesh& mesh) {
+  return {.revision = revision,
+          .vertices = mesh.vertex_count(),
+          .simplices = mesh.simplex_count(),
+          .domain_low = mesh.domain_low,
+          .domain_high = mesh.domain_high};
+}
+
+}  // namespace
+
+MemoryMesh::MemoryMesh(uint64_t revision, core::Mesh mesh)
+    : MeshSnapshot(FiguresOf(revision, mesh)), chunks_(std::make_shared<MeshChunks>(std::move(mesh))) {}
+
+absl::StatusOr<v1::MeshMetadata> MemoryMesh::Metadata(bool with_boundary) const {
+  v1::MeshMetadata metadata = MetadataToProto(chunks_->mesh(), chunks_->count(with_boundary), with_boundary);
+  metadata.set_revision(revision());
+  return metadata;
+}
+
+absl::StatusOr<grpc::ByteBuffer> MemoryMesh::SerializeChunk(uint64_t index, int field, bool with_boundary) const {
+  return server::SerializeChunk(chunks_, index, field, with_boundary);
+}
+
+absl::StatusOr<core::Mesh> MemoryMesh::Load(const core::RunContext& context) const {
+  const core::Mesh& mesh = chunks_->mesh();
+  core::Mesh copy;
+  copy.dimension = mesh.dimension;
+  copy.domain_low = mesh.domain_low;
+  copy.domain_high = mesh.domain_high;
+  copy.statistics = mesh.statistics;
+  WELLSPACE_ASSIGN_OR_RETURN(copy.points, Copy(mesh.points, context));
+  WELLSPACE_ASSIGN_OR_RETURN(copy.weights, Copy(mesh.weights, context));
+  WELLSPACE_ASSIGN_OR_RETURN(copy.simplices, Copy(mesh.simplices, context));
+  return copy;  // Update makes the rest anew
+}
+
+absl::Status MemoryMesh::CheckSame(const core::Mesh& made) const {
+  const core::Mesh& mesh = chunks_->mesh();
+  const bool is_same = std::ranges::equal(mesh.points, made.points) &&
+                       std::ranges::equal(mesh.simplices, made.simplices) &&
+                       std::ranges::equal(mesh.weights, made.weights) && std::ranges::equal(mesh.facets, made.facets) &&
+                       std::ranges::equal(mesh.simplex_regions, made.simplex_regions);
+  return is_same ? absl::OkStatus()
+                 : absl::InternalError("the steps of the session make another mesh than they made before");
+}
+
+}  // namespace wellspace::server

@@ -1,0 +1,104 @@
+// Where sessions are written down, so that they outlive the process.
+#ifndef WELLSPACE_SERVER_STORE_SESSION_LOG_H_
+#define WELLSPACE_SERVER_STORE_SESSION_LOG_H_
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "core/base/run_context.h"
+#include "core/mesh.h"
+#include "server/store/mesh_snapshot.h"
+#include "server/store/point_store.h"
+#include "wellspace/store/v1/records.pb.h"
+
+namespace wellspace::server {
+
+// What changes with one change of a session: all of it, or nothing.
+struct SessionChange {
+  std::string session;                                       // its name
+  std::optional<store::v1::SessionRecord> state{};           // what it is from now on; none: as before
+  std::vector<store::v1::StepRecord> steps{};                // come behind those that there are
+  std::vector<store::v1::OperationRecord> operations{};      // new, or in the place of those of their numbers
+  std::vector<uint64_t> dropped_operations{};                // their numbers
+  std::optional<store::v1::AnswerRecord> answer{};           // to the request that has made the change
+  bool is_deletion = false;                                  // of the session and all that it has
+};
+
+// A request_id of a tenant.
+struct AnswerKey {
+  std::string tenant;
+  std::string request_id;
+};
+
+// A session as it was written down. Its features are read when they are needed (SessionLog::ReadFeatures).
+struct StoredSession {
+  store::v1::SessionRecord state;
+  std::vector<store::v1::StepRecord> steps;  // all but those of features, in their order
+  std::vector<uint64_t> step_numbers;        // of these, ascending
+  std::vector<store::v1::OperationRecord> operations;  // ascending by number
+};
+
+// All that was written down.
+struct StoredSessions {
+  std::vector<StoredSession> sessions;  // in the order of their creation
+  std::vector<store::v1::AnswerRecord> answers;
+};
+
+// Writes sessions down, with their points and meshes. What a log does not keep (EphemeralLog) ends with the process.
+//
+// Thread safety: thread-safe. Changes of one session are committed one after the other by its caller; those of several
+//                sessions at once, which cost one synchronisation of the disk together.
+class SessionLog {
+ public:
+  // What a change is to survive when Commit returns.
+  enum class Survives { kPowerLoss, kProcessDeath };
+
+  virtual ~SessionLog() = default;
+
+  // Whether anything outlives the process.
+  virtual bool is_durable() const = 0;
+
+  // What was there at the start. To be called once, before any other function.
+  //
+  // Errors:     DATA_LOSS, naming the file; INTERNAL.
+  virtual absl::StatusOr<StoredSessions> Load() = 0;
+
+  // Commits `change`. The files that it names have been synchronised before.
+  //
+  // Errors:     DISK_FULL; UNAVAILABLE: the log can write nothing any more. Nothing has changed.
+  virtual absl::Status Commit(const SessionChange& change, Survives survives = Survives::kPowerLoss) = 0;
+
+  // Drops answers that need not be kept any longer, with one of the next commits.
+  virtual void Forget(std::span<const AnswerKey> answers) = 0;
+
+  // The segments and seeds of a session, step by step.
+  //
+  // Errors:     DATA_LOSS.
+  virtual absl::StatusOr<std::vector<store::v1::StepRecord::Features>> ReadFeatures(const std::string& session) = 0;
+
+  // The points of a session of `dimension`, of which `committed` are there.
+  virtual std::unique_ptr<PointStore> OpenPoints(const std::string& session, int dimension,
+                                                 std::vector<store::v1::StepRecord::Points> committed) = 0;
+
+  // Keeps `mesh` as that of `revision`: when it returns, what it has written outlives a loss of power. Until a change
+  // names it (SessionRecord.mesh) it ends with the process all the same.
+  //
+  // Errors:     DISK_FULL, UNAVAILABLE; CANCELLED, DEADLINE_EXCEEDED.
+  virtual absl::StatusOr<std::shared_ptr<MeshSnapshot>> KeepMesh(const std::string& session, uint64_t revision,
+                                                                 core::Mesh mesh,
+                                                                 const core::RunContext& context) = 0;
+
+  // The mesh that `record` names. Its file is looked at when something of it is asked for.
+  virtual std::shared_ptr<MeshSnapshot> FindMesh(const std::string& session,
+                                                 const store::v1::SessionRecord& record) = 0;
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_STORE_SESSION_LOG_H_
