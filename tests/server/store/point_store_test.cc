@@ -8,14 +8,14 @@
 namespace wellspace::server {
 namespace {
 
-TEST(PointStore, GivesBackWhatCameInAnyPieces) {
+TEST(MemoryPoints, GivesBackWhatCameInAnyPieces) {
   std::vector<double> all(500'000);
   std::iota(all.begin(), all.end(), 0.0);
-  PointStore store;
+  MemoryPoints store;
   size_t at = 0;
   for (size_t piece = 0; at < all.size(); piece = piece * 3 + 1) {  // 0, 1, 4, … beyond a block
     const size_t count = std::min(piece, all.size() - at);
-    store.Append({all.data() + at, count});
+    ASSERT_TRUE(store.Append({all.data() + at, count}).ok());
     at += count;
   }
   EXPECT_EQ(store.coordinate_count(), all.size());
@@ -27,9 +27,9 @@ TEST(PointStore, GivesBackWhatCameInAnyPieces) {
   }
 }
 
-TEST(PointStore, CopyingCanBeCancelled) {
-  PointStore store;
-  store.Append(std::vector<double>(10, 1.0));
+TEST(MemoryPoints, CopyingCanBeCancelled) {
+  MemoryPoints store;
+  ASSERT_TRUE(store.Append(std::vector<double>(10, 1.0)).ok());
   core::RunContext context;
   context.Cancel();
   EXPECT_EQ(store.CopyFrom(0, context).status().code(), absl::StatusCode::kCancelled);
