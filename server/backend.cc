@@ -2,8 +2,10 @@
 
 #include <utility>
 
+#include "core/base/status_macros.h"
 #include "server/base/clock.h"
 #include "server/log/log_fields.h"
+#include "server/sessions/refinement.h"
 
 namespace wellspace::server {
 namespace {
@@ -11,18 +13,23 @@ namespace {
 // A lease that has run out is noticed at once by those who ask for the session; its memory is free this much later.
 constexpr absl::Duration kExpiryInterval = absl::Seconds(1);
 
+// Changes that wait for the disk at once: as many sessions can have theirs synchronised together.
+constexpr size_t kBlockingThreads = 64;
+
 }  // namespace
 
 Backend::Backend(const ServiceOptions& options, const Authenticator& authenticator, Observability& observability,
-                 std::shared_ptr<spdlog::logger> log, Mesher mesher, Estimator estimator, MesherFactory create_mesher)
+                 std::shared_ptr<spdlog::logger> log, std::unique_ptr<SessionLog> session_log, Mesher mesher,
+                 Estimator estimator, MesherFactory create_mesher)
     : options_(options),
       log_(std::move(log)),
       mesher_(std::move(mesher)),
       estimator_(std::move(estimator)),
       create_mesher_(std::move(create_mesher)),
-      request_ids_(SinceBoot),
+      session_log_(std::move(session_log)),
+      request_ids_(SinceBoot, *session_log_),
       memory_(options_.max_memory_bytes),
-      sessions_(options_, memory_, Clock()),
+      sessions_(options_, memory_, Clock(), *session_log_),
       environment_{.options = options_,
                    .mesher = mesher_,
                    .estimator = estimator_,
@@ -31,11 +38,14 @@ Backend::Backend(const ServiceOptions& options, const Authenticator& authenticat
                    .memory = memory_,
                    .jobs = jobs_,
                    .background = background_,
+                   .blocking = blocking_,
                    .calls = calls_,
                    .sessions = sessions_,
                    .request_ids = request_ids_,
+                   .session_log = *session_log_,
                    .observability = observability,
                    .log = *log_},
+      blocking_(kBlockingThreads),
       jobs_({.workers = options_.workers,
              .max_queued = options_.max_queued_jobs,
              .max_per_tenant = options_.max_jobs_per_tenant,
@@ -73,11 +83,51 @@ void Backend::AddMetrics(Metrics& metrics) {
                    [this] { return memory_.is_limited() ? static_cast<double>(memory_.limit()) : 0; });
 }
 
+absl::Status Backend::Restore() {
+  WELLSPACE_ASSIGN_OR_RETURN(StoredSessions stored, session_log_->Load());
+  request_ids_.Restore(std::move(stored.answers));
+  std::vector<ResumedOperation> resumed;
+  for (const StoredSession& one : stored.sessions) {
+    absl::StatusOr<std::shared_ptr<Session>> session = sessions_.Restore(one);
+    if (!session.ok()) {  // others are not to suffer from it
+      log_->error(LogFields()
+                      .Add("event", "session_not_restored")
+                      .Add("session", one.state.name())
+                      .Add("error", std::string_view(session.status().message().data(), session.status().message().size()))
+                      .text());
+      continue;
+    }
+    WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Operation> operation, (*session)->ResumeOperation());
+    if (operation != nullptr) {
+      resumed.push_back({.session = *std::move(session), .operation = std::move(operation)});
+    }
+  }
+  if (session_log_->is_durable()) {
+    log_->info(LogFields()
+                   .Add("event", "restored")
+                   .Add("sessions", static_cast<uint64_t>(sessions_.Count()))
+                   .Add("operations", static_cast<uint64_t>(resumed.size()))
+                   .text());
+  }
+  ResumeRefinements(environment_, std::move(resumed));
+  return absl::OkStatus();
+}
+
+// Its tasks give work to the others.
+Backend::~Backend() { background_.Stop(); }
+
+void Backend::RemoveExpired() {
+  for (const std::shared_ptr<Session>& session : sessions_.RemoveExpired()) {
+    log_->info(LogFields().Add("event", "session_expired").Add("session", session->name()).text());
+    if (session_log_->is_durable()) {
+      blocking_.Run(session->name(), [session] { session->LogExpiry(); });
+    }
+  }
+}
+
 void Backend::ScheduleExpiry() {
   background_.PostAfter(kExpiryInterval, [this] {
-    for (const std::shared_ptr<Session>& session : sessions_.RemoveExpired()) {
-      log_->info(LogFields().Add("event", "session_expired").Add("session", session->name()).text());
-    }
+    RemoveExpired();
     ScheduleExpiry();
   });
 }

@@ -9,11 +9,13 @@
 #include "server/calls/call_registry.h"
 #include "server/calls/request_ids.h"
 #include "server/jobs/background.h"
+#include "server/jobs/blocking_threads.h"
 #include "server/jobs/job_pool.h"
 #include "server/jobs/memory_budget.h"
 #include "server/observability/observability.h"
 #include "server/security/authenticator.h"
 #include "server/sessions/memory_session_store.h"
+#include "server/store/session_log.h"
 #include "spdlog/logger.h"
 
 namespace wellspace::server {
@@ -26,7 +28,17 @@ class Backend {
  public:
   // `authenticator` outlives this; `observability` too, but reads nothing any more when this is destroyed.
   Backend(const ServiceOptions& options, const Authenticator& authenticator, Observability& observability,
-          std::shared_ptr<spdlog::logger> log, Mesher mesher, Estimator estimator, MesherFactory create_mesher);
+          std::shared_ptr<spdlog::logger> log, std::unique_ptr<SessionLog> session_log, Mesher mesher,
+          Estimator estimator, MesherFactory create_mesher);
+
+  // Takes over what the session log has: sessions, answers, and operations that have not ended, whose work begins. To
+  // be called once, before any call is served.
+  //
+  // Errors:     those of SessionLog::Load and Commit.
+  absl::Status Restore();
+
+  // Operations whose work has not ended are the next process's, if the session log is durable.
+  ~Backend();
 
   const CallEnvironment& environment() const { return environment_; }
   CallRegistry& calls() { return calls_; }
@@ -34,6 +46,7 @@ class Backend {
 
  private:
   void ScheduleExpiry();
+  void RemoveExpired();
   void AddMetrics(Metrics& metrics);
 
   const ServiceOptions options_;
@@ -41,13 +54,15 @@ class Backend {
   const Mesher mesher_;
   const Estimator estimator_;
   const MesherFactory create_mesher_;
+  const std::unique_ptr<SessionLog> session_log_;
   CallRegistry calls_;
   RequestIds request_ids_;
   MemoryBudget memory_;
   MemorySessionStore sessions_;
   const CallEnvironment environment_;
-  // Jobs end before the background thread, to which they post; both end before what they work on.
+  // The background thread ends first. Of the others each ends before those above it, and before what it works on.
   Background background_;
+  BlockingThreads blocking_;
   JobPool jobs_;
 };
 

@@ -19,6 +19,7 @@
 #include "server/base/clock.h"
 #include "server/network/compression.h"
 #include "server/network/listen_address.h"
+#include "server/store/ephemeral_log.h"
 
 namespace wellspace::server {
 namespace {
@@ -67,7 +68,7 @@ void EnableHealthAndReflection() {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& options, std::shared_ptr<spdlog::logger> log,
-                                                      Mesher mesher, Estimator estimator, MesherFactory create_mesher) {
+                                                      std::unique_ptr<SessionLog> session_log, Mesher mesher, Estimator estimator, MesherFactory create_mesher) {
   EnableHealthAndReflection();
   WELLSPACE_ASSIGN_OR_RETURN(std::unique_ptr<Security> security, Security::Load(options.security, log));
   grpc::ServerBuilder builder;
@@ -93,8 +94,12 @@ absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& optio
     address.port = listener->port();
   }
 
-  std::unique_ptr<Server> server(new Server(options, std::move(security), std::move(log), std::move(mesher),
-                                            std::move(estimator), std::move(create_mesher)));
+  if (session_log == nullptr) {
+    session_log = std::make_unique<EphemeralLog>();
+  }
+  std::unique_ptr<Server> server(new Server(options, std::move(security), std::move(log), std::move(session_log),
+                                            std::move(mesher), std::move(estimator), std::move(create_mesher)));
+  WELLSPACE_RETURN_IF_ERROR(server->backend_.Restore());
   const std::array<grpc::Service*, 4> services = {&server->meshing_, &server->sessions_, &server->operations_,
                                                   &server->queries_};
   for (grpc::Service* service : services) {

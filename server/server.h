@@ -22,6 +22,7 @@
 #include "server/services/operations/operation_service.h"
 #include "server/services/queries/query_service.h"
 #include "server/services/sessions/session_service.h"
+#include "server/store/session_log.h"
 #include "spdlog/logger.h"
 
 namespace wellspace::server {
@@ -46,12 +47,14 @@ struct ServerOptions {
 // Thread safety: thread-safe.
 class Server {
  public:
-  // Starts to serve. Tests put other work in the place of the core's.
+  // Starts to serve, and goes on with what `session_log` has: sessions, and operations that have not ended. Null: an
+  // EphemeralLog. Tests put other work in the place of the core's.
   //
-  // Errors:     INVALID_ARGUMENT (listen), those of Security::Load and AddAcceptor, of Listener::Open and of
-  //             Observability::Listen.
+  // Errors:     INVALID_ARGUMENT (listen), those of Security::Load and AddAcceptor, of Listener::Open, of
+  //             Observability::Listen and of Backend::Restore.
   static absl::StatusOr<std::unique_ptr<Server>> Start(const ServerOptions& options,
                                                        std::shared_ptr<spdlog::logger> log,
+                                                       std::unique_ptr<SessionLog> session_log = nullptr,
                                                        Mesher mesher = core::MeshPoints,
                                                        Estimator estimator = core::EstimateMesh,
                                                        MesherFactory create_mesher = CreateMesher);
@@ -71,7 +74,8 @@ class Server {
   absl::StatusOr<std::shared_ptr<grpc::Channel>> InProcessChannel();
 
   // Not serving from now on: health says so, new calls end with UNAVAILABLE. Calls and jobs that are under way,
-  // unwatched operations among them, may go on for `grace`; calls then end with UNAVAILABLE, and jobs with the server.
+  // unwatched operations among them, may go on for `grace`; calls then end with UNAVAILABLE, and jobs with the server;
+  // operations that a durable session log has are then the next process's.
   // Returns when all have ended, shortly after `grace` at the latest. Further calls return at once.
   //
   // REQUIRES:   grace is finite.
@@ -79,13 +83,13 @@ class Server {
 
  private:
   Server(const ServerOptions& options, std::unique_ptr<Security> security, std::shared_ptr<spdlog::logger> log,
-         Mesher mesher, Estimator estimator, MesherFactory create_mesher)
+         std::unique_ptr<SessionLog> session_log, Mesher mesher, Estimator estimator, MesherFactory create_mesher)
       : security_(std::move(security)),
         connections_(options.connections.calls, log),
         observability_(ServiceNames(), log, connections_,
                        [this](const grpc::ServerContextBase& context) { return TenantOf(context); }),
-        backend_(options.service, security_->authenticator(), observability_, std::move(log), std::move(mesher),
-                 std::move(estimator), std::move(create_mesher)) {}
+        backend_(options.service, security_->authenticator(), observability_, std::move(log),
+                 std::move(session_log), std::move(mesher), std::move(estimator), std::move(create_mesher)) {}
 
   // Of the services that are ours.
   static std::vector<std::string> ServiceNames();

@@ -2,18 +2,16 @@
 #ifndef WELLSPACE_SERVER_CALLS_CALL_ENVIRONMENT_H_
 #define WELLSPACE_SERVER_CALLS_CALL_ENVIRONMENT_H_
 
-#include <span>
-
-#include "absl/status/statusor.h"
-#include "core/mesher.h"
 #include "server/base/mesh_functions.h"
 #include "server/base/options.h"
 #include "server/calls/call_registry.h"
 #include "server/jobs/background.h"
+#include "server/jobs/blocking_threads.h"
 #include "server/jobs/job_pool.h"
 #include "server/jobs/memory_budget.h"
 #include "server/observability/observability.h"
 #include "server/security/authenticator.h"
+#include "server/store/session_log.h"
 #include "spdlog/logger.h"
 
 namespace wellspace::server {
@@ -31,9 +29,11 @@ struct CallEnvironment {
   MemoryBudget& memory;
   JobPool& jobs;
   Background& background;
+  BlockingThreads& blocking;
   CallRegistry& calls;
   SessionStore& sessions;
   RequestIds& request_ids;
+  SessionLog& session_log;
   Observability& observability;
   spdlog::logger& log;
 };

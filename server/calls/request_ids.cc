@@ -3,7 +3,10 @@
 #include <google/protobuf/io/coded_stream.h>
 #include <google/protobuf/io/zero_copy_stream_impl_lite.h>
 
+#include <openssl/sha.h>
+
 #include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -12,8 +15,9 @@ namespace {
 // What an entry takes besides its id and its answer, generously.
 constexpr size_t kEntryBytes = 256;
 
-// Of the type and the content; equal messages have equal ones, whatever the order of their map fields.
-size_t HashOf(const google::protobuf::Message& message) {
+// Of the type and the content; equal messages have equal ones, whatever the order of their map fields, and in every
+// build.
+std::string DigestOf(const google::protobuf::Message& message) {
   std::string bytes = message.GetTypeName();
   {
     google::protobuf::io::StringOutputStream stream(&bytes);
@@ -21,15 +25,56 @@ size_t HashOf(const google::protobuf::Message& message) {
     out.SetSerializationDeterministic(true);
     message.SerializeToCodedStream(&out);
   }
-  return std::hash<std::string>()(bytes);
+  std::string digest(SHA256_DIGEST_LENGTH, '\0');
+  SHA256(reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size(),
+         reinterpret_cast<unsigned char*>(digest.data()));
+  return digest;
 }
 
 }  // namespace
 
-void RequestIds::Once(const std::string& tenant_name, const std::string& request_id,
-                      const google::protobuf::Message& request, const std::function<void(Done)>& work, Done done) {
+std::optional<store::v1::AnswerRecord> IdentifiedRequest::Answer(const google::protobuf::Message& response) const {
   if (request_id.empty()) {
-    work(std::move(done));
+    return std::nullopt;
+  }
+  store::v1::AnswerRecord record;
+  record.set_tenant(tenant);
+  record.set_request_id(request_id);
+  record.set_content(content);
+  record.set_response(response.SerializeAsString());
+  record.set_time_ns(absl::GetCurrentTimeNanos());
+  return record;
+}
+
+void RequestIds::Restore(std::vector<store::v1::AnswerRecord> answers) {
+  std::lock_guard lock(mutex_);
+  for (store::v1::AnswerRecord& record : answers) {
+    Tenant& tenant = tenants_[record.tenant()];
+    Entry& entry = Add(tenant, std::move(*record.mutable_request_id()), std::move(*record.mutable_content()));
+    entry.is_answered = true;
+    entry.answer.response = std::move(*record.mutable_response());
+    tenant.bytes += entry.answer.response.size();
+  }
+}
+
+RequestIds::Entry& RequestIds::Add(Tenant& tenant, std::string request_id, std::string content) {
+  tenant.bytes += kEntryBytes + request_id.size();
+  tenant.entries.push_back(Entry{.request_id = std::move(request_id),
+                                 .content = std::move(content),
+                                 .time = since_boot_(),
+                                 .answer = {},
+                                 .waiting = {}});
+  Entry& entry = tenant.entries.back();
+  tenant.by_id.emplace(entry.request_id, std::prev(tenant.entries.end()));
+  return entry;
+}
+
+void RequestIds::Once(const std::string& tenant_name, const std::string& request_id,
+                      const google::protobuf::Message& request,
+                      const std::function<void(const IdentifiedRequest&, Done)>& work, Done done) {
+  IdentifiedRequest identified{.tenant = tenant_name, .request_id = request_id, .content = {}};
+  if (request_id.empty()) {
+    work(identified, std::move(done));
     return;
   }
   if (request_id.size() > kMaxLength) {
@@ -40,25 +85,22 @@ void RequestIds::Once(const std::string& tenant_name, const std::string& request
           ""});
     return;
   }
-  const size_t content = HashOf(request);
+  identified.content = DigestOf(request);
   Answer known;
   {
     std::unique_lock lock(mutex_);
     Tenant& tenant = tenants_[tenant_name];
-    Trim(tenant);
+    Trim(tenant_name, tenant);
     const auto found = tenant.by_id.find(request_id);
     if (found == tenant.by_id.end()) {
-      tenant.entries.push_back(
-          Entry{.request_id = request_id, .content = content, .time = since_boot_(), .answer = {}, .waiting = {}});
-      tenant.entries.back().waiting.push_back(std::move(done));
-      tenant.by_id.emplace(request_id, std::prev(tenant.entries.end()));
-      tenant.bytes += kEntryBytes + request_id.size();
+      Add(tenant, request_id, identified.content).waiting.push_back(std::move(done));
       lock.unlock();
-      work([this, tenant_name, request_id](const Answer& answer) { Finish(tenant_name, request_id, answer); });
+      work(identified,
+           [this, tenant_name, request_id](const Answer& answer) { Finish(tenant_name, request_id, answer); });
       return;
     }
     Entry& entry = *found->second;
-    if (entry.content != content) {
+    if (entry.content != identified.content) {
       known.status = MakeError(v1::ERROR_REASON_REQUEST_ID_REUSED,
                                absl::StrCat("request_id \"", request_id, "\" was used for another request in the last ",
                                             absl::FormatDuration(kKeptFor), "; give every request an id of its own"),
@@ -84,7 +126,7 @@ void RequestIds::Finish(const std::string& tenant_name, const std::string& reque
     if (answer.status.ok()) {
       entry->answer = answer;
       tenant.bytes += answer.response.size();
-      Trim(tenant);
+      Trim(tenant_name, tenant);
     } else {
       Erase(tenant, entry);
     }
@@ -100,18 +142,23 @@ void RequestIds::Erase(Tenant& tenant, std::list<Entry>::iterator entry) {
   tenant.entries.erase(entry);
 }
 
-void RequestIds::Trim(Tenant& tenant) {
+void RequestIds::Trim(const std::string& tenant_name, Tenant& tenant) {
   const absl::Duration oldest = since_boot_() - kKeptFor;
+  std::vector<AnswerKey> forgotten;
   for (auto entry = tenant.entries.begin(); entry != tenant.entries.end();) {
     const bool is_too_much = tenant.entries.size() > kMaxPerTenant || tenant.bytes > kMaxBytesPerTenant;
     if (entry->time >= oldest && !is_too_much) {
-      return;
+      break;
     }
     const auto next = std::next(entry);
     if (entry->is_answered) {
+      forgotten.push_back({.tenant = tenant_name, .request_id = entry->request_id});
       Erase(tenant, entry);
     }
     entry = next;
+  }
+  if (!forgotten.empty()) {
+    log_.Forget(forgotten);
   }
 }
 

@@ -8,6 +8,7 @@
 #include <list>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <utility>
@@ -16,8 +17,20 @@
 #include "absl/status/status.h"
 #include "absl/time/time.h"
 #include "google/protobuf/message.h"
+#include "server/store/session_log.h"
+#include "wellspace/store/v1/records.pb.h"
 
 namespace wellspace::server {
+
+// A request with a request_id, for the change that it makes: its answer is written down with the change.
+struct IdentifiedRequest {
+  std::string tenant;
+  std::string request_id;  // empty: it has none
+  std::string content;     // SHA-256 of the request
+
+  // What is to be written down when `response` answers it; nothing without a request_id.
+  std::optional<store::v1::AnswerRecord> Answer(const google::protobuf::Message& response) const;
+};
 
 // Has calls that carry the same request_id done once. An answer is kept for kKeptFor; of a tenant with more than
 // kMaxPerTenant of them, or more than kMaxBytesPerTenant in them, the oldest go earlier. Errors are not kept: what
@@ -38,7 +51,15 @@ class RequestIds {
   };
   using Done = std::function<void(const Answer&)>;
 
-  explicit RequestIds(std::function<absl::Duration()> since_boot) : since_boot_(std::move(since_boot)) {}
+  // `log` has the answers, too: it is told which to forget.
+  //
+  // REQUIRES:   `log` outlives this.
+  RequestIds(std::function<absl::Duration()> since_boot, SessionLog& log)
+      : since_boot_(std::move(since_boot)), log_(log) {}
+
+  // Takes the answers that were written down before the server was started. They are kept from now on as new ones are.
+  // To be called first.
+  void Restore(std::vector<store::v1::AnswerRecord> answers);
 
   // Has `done` called with the answer to `request`, once. The first time it has `work` call it, now or later, in any
   // way exactly once; a call that repeats another gets that one's answer as soon as it is there. An empty id is none:
@@ -46,12 +67,12 @@ class RequestIds {
   //
   // Errors, as answers: INVALID_REQUEST (the id is too long), REQUEST_ID_REUSED.
   void Once(const std::string& tenant, const std::string& request_id, const google::protobuf::Message& request,
-            const std::function<void(Done)>& work, Done done);
+            const std::function<void(const IdentifiedRequest&, Done)>& work, Done done);
 
  private:
   struct Entry {
     std::string request_id;
-    size_t content = 0;   // hash of the request
+    std::string content;  // SHA-256 of the request
     absl::Duration time;  // since boot
     bool is_answered = false;
     Answer answer;
@@ -67,11 +88,13 @@ class RequestIds {
   void Finish(const std::string& tenant, const std::string& request_id, const Answer& answer);
 
   // The following want mutex_ to be held.
+  Entry& Add(Tenant& tenant, std::string request_id, std::string content);
   void Erase(Tenant& tenant, std::list<Entry>::iterator entry);
   // Drops what is too old, or too much. Those that are not answered yet stay.
-  void Trim(Tenant& tenant);
+  void Trim(const std::string& tenant_name, Tenant& tenant);
 
   const std::function<absl::Duration()> since_boot_;
+  SessionLog& log_;
   std::mutex mutex_;
   std::map<std::string, Tenant> tenants_;  // guarded by mutex_
 };

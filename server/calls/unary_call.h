@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <mutex>
+#include <string>
 #include <utility>
 
 #include "google/protobuf/message.h"
@@ -30,17 +31,41 @@ class UnaryCall final : public Call<grpc::ServerUnaryReactor> {
     return call.get();
   }
 
-  // The same for a request with a request_id: `handler` is asked once, however often the call is repeated.
+  // Serves a call that changes the session `key`, or none: absl::Status handler(const Caller&, const Request&,
+  // Response&). Where the session log takes its time, it is asked on a thread that may wait for it, one call of a
+  // session after the other.
   template <typename Request, typename Response, typename Handler>
-  static grpc::ServerUnaryReactor* ServeOnce(const CallEnvironment& environment, grpc::CallbackServerContext* context,
-                                             const Request* request, Response* response, const Handler& handler) {
+  static grpc::ServerUnaryReactor* ServeChange(const CallEnvironment& environment,
+                                               grpc::CallbackServerContext* context, const Request* request,
+                                               Response* response, const std::string& key, const Handler& handler) {
     const auto call = std::make_shared<UnaryCall>(environment, context);
     Begin(call);
     if (call->is_admitted_) {
-      const auto work = [&](const RequestIds::Done& done) {
+      Change(environment, key, *request, [call, response, handler](const Request& copy) {
         Response answer;
-        const absl::Status status = RunGuarded([&] { return handler(call->caller(), answer); });
-        done({status, answer.SerializeAsString()});
+        absl::Status status = RunGuarded([&] { return handler(call->caller(), copy, answer); });
+        call->EndWith({std::move(status), answer.SerializeAsString()}, *response);
+      });
+    }
+    return call.get();
+  }
+
+  // The same for a request with a request_id: `handler`, which is given it as its third argument, is asked once,
+  // however often the call is repeated.
+  template <typename Request, typename Response, typename Handler>
+  static grpc::ServerUnaryReactor* ServeOnce(const CallEnvironment& environment, grpc::CallbackServerContext* context,
+                                             const Request* request, Response* response, const std::string& key,
+                                             const Handler& handler) {
+    const auto call = std::make_shared<UnaryCall>(environment, context);
+    Begin(call);
+    if (call->is_admitted_) {
+      const auto work = [&](const IdentifiedRequest& identified, const RequestIds::Done& done) {
+        Change(environment, key, *request, [call, handler, identified, done](const Request& copy) {
+          Response answer;
+          absl::Status status =
+              RunGuarded([&] { return handler(call->caller(), copy, identified, answer); });
+          done({std::move(status), answer.SerializeAsString()});
+        });
       };
       environment.request_ids.Once(
           call->caller().tenant, request->request_id(), *request, work,
@@ -51,6 +76,17 @@ class UnaryCall final : public Call<grpc::ServerUnaryReactor> {
 
  private:
   void OnBegin() override { is_admitted_ = true; }
+
+  // Runs `work` with `request`, at once or, with a copy of it, on a thread that may wait.
+  template <typename Request, typename Work>
+  static void Change(const CallEnvironment& environment, const std::string& key, const Request& request,
+                     const Work& work) {
+    if (environment.session_log.is_durable()) {
+      environment.blocking.Run(key, [work, copy = std::make_shared<const Request>(request)] { work(*copy); });
+    } else {
+      work(request);
+    }
+  }
 
   void EndWith(absl::Status status) {
     std::lock_guard lock(mutex_);

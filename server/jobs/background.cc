@@ -4,10 +4,12 @@ namespace wellspace::server {
 
 Background::Background() : thread_([this] { Run(); }) {}
 
-Background::~Background() {
+void Background::Stop() {
   {
     std::lock_guard lock(mutex_);
-    stopping_ = true;
+    if (std::exchange(stopping_, true)) {
+      return;
+    }
   }
   wake_.notify_one();
   thread_.join();

@@ -20,14 +20,16 @@ namespace wellspace::server {
 class Background {
  public:
   Background();
-  // Waits for the task that runs; drops the others.
-  ~Background();
+  ~Background() { Stop(); }
   Background(const Background&) = delete;
   Background& operator=(const Background&) = delete;
 
   // Runs `task` as soon as its turn has come, or not before `delay` has passed. Tasks must not throw.
   void Post(std::function<void()> task) { PostAfter(absl::ZeroDuration(), std::move(task)); }
   void PostAfter(absl::Duration delay, std::function<void()> task);
+
+  // Waits for the task that runs. The others, and those that are posted from now on, do not run any more.
+  void Stop();
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -57,4 +57,9 @@ absl::StatusOr<FoundOperation> FindOperation(const CallEnvironment& environment,
   return found;
 }
 
+std::string SessionOf(const std::string& name) {
+  const std::vector<std::string> parts = Parts(name);
+  return parts.size() == 4 ? absl::StrCat(parts[0], "/", parts[1]) : name;
+}
+
 }  // namespace wellspace::server

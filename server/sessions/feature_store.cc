@@ -165,6 +165,32 @@ bool FeatureStore::HasOtherRules(const v1::FaceOptions& options) const {
   return IsEmpty() || rule != faces_ || RuleFromProto(options.crossings()) != crossings_;
 }
 
+FeatureStore::Extent FeatureStore::extent() const {
+  return {.segments = segment_count(),
+          .seeds = seed_count(),
+          .has_rules = has_rules_,
+          .faces = faces_,
+          .crossings = crossings_};
+}
+
+void FeatureStore::TakeBack(const Extent& extent) {
+  ends_.resize(2 * extent.segments);
+  markers_.resize(extent.segments);
+  is_open_.resize(extent.segments);
+  seeds_.resize(extent.seeds);
+  has_rules_ = extent.has_rules;
+  faces_ = extent.faces;
+  crossings_ = extent.crossings;
+}
+
+FeatureSummary FeatureStore::Summary() const {
+  return {.segments = segment_count(),
+          .seeds = seed_count(),
+          .has_rules = has_rules_,
+          .faces = face_rule(),
+          .crossings = crossing_rule()};
+}
+
 v1::FaceRule FeatureStore::face_rule() const {
   return IsEmpty()                            ? v1::FACE_RULE_UNSPECIFIED
          : faces_ == core::FaceRule::kHoles   ? v1::FACE_RULE_HOLES

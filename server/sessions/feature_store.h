@@ -23,18 +23,40 @@ absl::Status CheckSegments(const v1::SegmentChunk& chunk, uint64_t first);
 // Errors:     INVALID_SEGMENTS.
 absl::Status CheckFaces(const v1::FaceOptions& options, uint64_t first);
 
+// What is said of features without them.
+struct FeatureSummary {
+  uint64_t segments = 0;
+  uint64_t seeds = 0;
+  bool has_rules = false;  // some have come
+  v1::FaceRule faces = v1::FACE_RULE_UNSPECIFIED;
+  v1::CrossingRule crossings = v1::CROSSING_RULE_UNSPECIFIED;
+};
+
 // Segments, seeds and rules that grow at the end.
 //
 // Thread safety: thread-compatible.
 // Invariants: what is appended has passed CheckSegments or CheckFaces.
 class FeatureStore {
  public:
+  // How much there is, and which rules.
+  struct Extent {
+    size_t segments = 0;
+    size_t seeds = 0;
+    bool has_rules = false;
+    core::FaceRule faces = core::FaceRule::kBox;
+    core::CrossingRule crossings = core::CrossingRule::kRefuse;
+  };
+
   // Appends the segments of `chunk` but for the first `known`. An exception, when memory ends, changes nothing.
   //
   // REQUIRES:   known is at most their number.
   void Append(const v1::SegmentChunk& chunk, uint64_t known = 0);
   // The same of seeds. The rules are from now on those of `options`.
   void Append(const v1::FaceOptions& options, uint64_t known = 0);
+
+  Extent extent() const;
+  // Takes out again what was appended since.
+  void TakeBack(const Extent& extent);
 
   // How many of the segments of `chunk`, of the first `count` at most, are those from number `first` on: all of these,
   // or those before the first that is another.
@@ -48,10 +70,9 @@ class FeatureStore {
 
   // Whether there are neither segments nor rules: the points are a cloud, and are meshed in their box.
   bool IsEmpty() const { return ends_.empty() && !has_rules_; }
+  FeatureSummary Summary() const;
   uint64_t segment_count() const { return ends_.size() / 2; }
   uint64_t seed_count() const { return seeds_.size(); }
-  v1::FaceRule face_rule() const;
-  v1::CrossingRule crossing_rule() const;
   uint64_t bytes() const { return BytesOf(segment_count(), seed_count()); }
   static uint64_t BytesOf(uint64_t segments, uint64_t seeds) {
     return segments * (2 * sizeof(uint32_t) + sizeof(int32_t) + sizeof(uint8_t)) + seeds * sizeof(core::FaceSeed);
@@ -61,6 +82,9 @@ class FeatureStore {
   core::Features View() const;
 
  private:
+  v1::FaceRule face_rule() const;
+  v1::CrossingRule crossing_rule() const;
+
   bool has_rules_ = false;  // some have come
   std::vector<uint32_t> ends_;
   std::vector<int32_t> markers_;

@@ -8,6 +8,7 @@
 
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -24,33 +25,72 @@ std::string UnguessableName() {
 
 }  // namespace
 
-MemorySessionStore::MemorySessionStore(const ServiceOptions& options, MemoryBudget& memory, Clock clock)
-    : options_(options), memory_(memory), clock_(std::move(clock)) {}
+MemorySessionStore::MemorySessionStore(const ServiceOptions& options, MemoryBudget& memory, Clock clock,
+                                       SessionLog& log)
+    : options_(options), memory_(memory), clock_(std::move(clock)), log_(log) {}
 
-absl::StatusOr<std::shared_ptr<Session>> MemorySessionStore::Create(NewSession settings) {
+absl::StatusOr<std::shared_ptr<Session>> MemorySessionStore::Create(NewSession settings,
+                                                                    const AnswerTo<v1::Session>& answer) {
+  WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, Prepare(std::move(settings)));
+  absl::Status logged = session->LogCreation(answer);  // without any lock: it takes long
+  std::lock_guard lock(mutex_);
+  --tenants_[session->tenant()].pending;
+  --pending_;
+  if (!logged.ok()) {
+    DropIfEmpty(session->tenant());
+    return logged;
+  }
+  Publish(session);
+  return session;
+}
+
+absl::StatusOr<std::shared_ptr<Session>> MemorySessionStore::Prepare(NewSession settings) {
   std::lock_guard lock(mutex_);
   const auto known = tenants_.find(settings.tenant);
-  if (known != tenants_.end() && known->second.sessions.size() >= options_.max_sessions_per_tenant) {
+  const size_t count = known == tenants_.end() ? 0 : known->second.sessions.size() + known->second.pending;
+  if (count >= options_.max_sessions_per_tenant) {
     return MakeError(v1::ERROR_REASON_QUOTA_EXCEEDED,
-                     absl::StrCat("you have ", known->second.sessions.size(), " sessions, and may have at most ",
+                     absl::StrCat("you have ", count, " sessions, and may have at most ",
                                   options_.max_sessions_per_tenant, "; delete one"));
   }
-  if (by_name_.size() >= options_.max_sessions) {
+  if (by_name_.size() + pending_ >= options_.max_sessions) {
     return MakeError(v1::ERROR_REASON_TOO_MANY_SESSIONS,
-                     absl::StrCat("this server has ", by_name_.size(), " sessions, as many as it may have"));
+                     absl::StrCat("this server has ", by_name_.size() + pending_,
+                                  " sessions, as many as it may have"));
   }
   Tenant& tenant = tenants_[settings.tenant];
+  ++tenant.pending;
+  ++pending_;
   last_create_time_ = std::max(clock_.wall(), last_create_time_ + absl::Microseconds(1));
-  auto session = std::make_shared<Session>(Session::Settings{.tenant = std::move(settings.tenant),
-                                                             .name = UnguessableName(),
-                                                             .parameters = std::move(settings.parameters),
-                                                             .labels = std::move(settings.labels),
-                                                             .ttl = settings.ttl,
-                                                             .create_time = last_create_time_},
-                                           options_, memory_, clock_, tenant.points);
-  tenant.sessions.emplace(last_create_time_, session);
-  by_name_.emplace(session->name(), session);
+  return std::make_shared<Session>(Session::Settings{.tenant = std::move(settings.tenant),
+                                                     .name = UnguessableName(),
+                                                     .parameters = std::move(settings.parameters),
+                                                     .labels = std::move(settings.labels),
+                                                     .ttl = settings.ttl,
+                                                     .create_time = last_create_time_},
+                                   options_, memory_, clock_, tenant.points, log_);
+}
+
+absl::StatusOr<std::shared_ptr<Session>> MemorySessionStore::Restore(const StoredSession& stored) {
+  std::lock_guard lock(mutex_);
+  WELLSPACE_ASSIGN_OR_RETURN(
+      std::shared_ptr<Session> session,
+      Session::Restore(stored, options_, memory_, clock_, tenants_[stored.state.tenant()].points, log_));
+  last_create_time_ = std::max(last_create_time_, session->create_time());
+  Publish(session);
   return session;
+}
+
+void MemorySessionStore::Publish(const std::shared_ptr<Session>& session) {
+  tenants_[session->tenant()].sessions.emplace(session->create_time(), session);
+  by_name_.emplace(session->name(), session);
+}
+
+void MemorySessionStore::DropIfEmpty(const std::string& tenant) {
+  const auto known = tenants_.find(tenant);
+  if (known != tenants_.end() && known->second.sessions.empty() && known->second.pending == 0) {
+    tenants_.erase(known);
+  }
 }
 
 absl::StatusOr<std::shared_ptr<Session>> MemorySessionStore::Find(const std::string& tenant, const std::string& name) {
@@ -83,14 +123,11 @@ std::vector<std::shared_ptr<Session>> MemorySessionStore::List(const std::string
 
 bool MemorySessionStore::Remove(const Session& session) {
   std::lock_guard lock(mutex_);
-  const auto tenant = tenants_.find(session.tenant());
   if (by_name_.erase(session.name()) == 0) {
     return false;
   }
-  tenant->second.sessions.erase(session.create_time());
-  if (tenant->second.sessions.empty()) {
-    tenants_.erase(tenant);
-  }
+  tenants_[session.tenant()].sessions.erase(session.create_time());
+  DropIfEmpty(session.tenant());
   return true;
 }
 

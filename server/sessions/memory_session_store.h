@@ -1,4 +1,4 @@
-// Sessions that live as long as the process.
+// The sessions of a process, in memory; a SessionLog has what outlives it.
 #ifndef WELLSPACE_SERVER_SESSIONS_MEMORY_SESSION_STORE_H_
 #define WELLSPACE_SERVER_SESSIONS_MEMORY_SESSION_STORE_H_
 
@@ -21,10 +21,11 @@ namespace wellspace::server {
 //             round.
 class MemorySessionStore final : public SessionStore {
  public:
-  // REQUIRES:   `options` and `memory` outlive this and all sessions.
-  MemorySessionStore(const ServiceOptions& options, MemoryBudget& memory, Clock clock);
+  // REQUIRES:   `options`, `memory` and `log` outlive this and all sessions.
+  MemorySessionStore(const ServiceOptions& options, MemoryBudget& memory, Clock clock, SessionLog& log);
 
-  absl::StatusOr<std::shared_ptr<Session>> Create(NewSession settings) override;
+  absl::StatusOr<std::shared_ptr<Session>> Create(NewSession settings, const AnswerTo<v1::Session>& answer) override;
+  absl::StatusOr<std::shared_ptr<Session>> Restore(const StoredSession& stored) override;
   absl::StatusOr<std::shared_ptr<Session>> Find(const std::string& tenant, const std::string& name) override;
   std::vector<std::shared_ptr<Session>> List(const std::string& tenant, absl::Time after, size_t count,
                                              const std::map<std::string, std::string>& labels) override;
@@ -36,15 +37,26 @@ class MemorySessionStore final : public SessionStore {
   struct Tenant {
     std::shared_ptr<TenantPoints> points = std::make_shared<TenantPoints>();
     std::map<absl::Time, std::shared_ptr<Session>> sessions;  // by time of creation
+    size_t pending = 0;                                       // that are being written down
   };
+
+  // A session that has its place, but is not shown yet.
+  absl::StatusOr<std::shared_ptr<Session>> Prepare(NewSession settings);
+
+  // The following want mutex_ to be held.
+  void Publish(const std::shared_ptr<Session>& session);
+  // Forgets a tenant that has nothing any more.
+  void DropIfEmpty(const std::string& tenant);
 
   const ServiceOptions& options_;
   MemoryBudget& memory_;
   const Clock clock_;
+  SessionLog& log_;
   mutable std::mutex mutex_;
   // Guarded by mutex_.
   std::unordered_map<std::string, std::shared_ptr<Session>> by_name_;
   std::map<std::string, Tenant> tenants_;  // those that have sessions
+  size_t pending_ = 0;  // of all tenants
   absl::Time last_create_time_ = absl::InfinitePast();
 };
 

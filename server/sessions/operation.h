@@ -18,6 +18,7 @@
 #include "core/mesh_parameters.h"
 #include "server/jobs/job.h"
 #include "server/sessions/progress_pacer.h"
+#include "wellspace/store/v1/records.pb.h"
 #include "wellspace/v1/operations.pb.h"
 
 namespace wellspace::server {
@@ -37,6 +38,8 @@ class Operation {
   // `name` is "sessions/{session}/operations/{number}".
   Operation(std::string name, uint64_t number, core::MeshParameters parameters, absl::Time create_time)
       : name_(std::move(name)), number_(number), parameters_(std::move(parameters)), create_time_(create_time) {}
+  // One that was written down as `record`. One that had not ended waits for a worker again.
+  Operation(std::string name, const store::v1::OperationRecord& record, core::MeshParameters parameters);
 
   const std::string& name() const { return name_; }
   uint64_t number() const { return number_; }
@@ -44,6 +47,10 @@ class Operation {
   v1::Operation Describe() const;
   bool IsQueued() const;
   bool HasEnded() const;
+  // Whether a client has asked for its end.
+  bool IsCancelled() const;
+  // Whether a process died while it worked at it.
+  bool IsSuspect() const;
 
   // The first kept event that is later than number `after`; nothing: there is none.
   std::optional<v1::ProgressEvent> EventAfter(std::optional<uint64_t> after) const;
@@ -61,8 +68,24 @@ class Operation {
   // ProgressPacer::kMinInterval; `now` is a time since boot.
   bool Tick(absl::Duration now);
 
+  // What is written down of it: as it is now, or as it will be after Start, Succeed or Fail.
+  store::v1::OperationRecord Record() const;
+  store::v1::OperationRecord RecordOfStart(absl::Time now) const;
+  store::v1::OperationRecord RecordOfSuccess(absl::Time now, uint64_t mesh_revision, uint64_t vertices,
+                                             uint64_t simplices) const;
+  store::v1::OperationRecord RecordOfFailure(absl::Time now, const absl::Status& status) const;
+
+  // It is left to the next process, which counts no death of this one.
+  store::v1::OperationRecord RecordOfParking() const;
+
+  // Of one that was written down: why its work is not done again; OK if it is.
+  //
+  // Errors:     CANCELLED: a client has asked for its end; WORK_CRASHED.
+  absl::Status RefusalToResume() const;
+
   // For its session, which starts it at most once, and ends it once. After its end Notify is to be called, without any
   // lock.
+  void NoteCancel();
   void Start(absl::Time now);
   // The figures are those of the new mesh.
   void Succeed(absl::Time now, uint64_t mesh_revision, uint64_t vertices, uint64_t simplices);
@@ -73,6 +96,7 @@ class Operation {
  private:
   // The following want mutex_ to be held.
   core::Progress Snapshot() const;
+  store::v1::OperationRecord RecordLocked() const;
   void Keep(v1::ProgressEvent event);
   void End(v1::Operation::State state, absl::Time now);
   bool HasEndedLocked() const { return end_time_ != absl::InfiniteFuture(); }
@@ -81,12 +105,15 @@ class Operation {
   const uint64_t number_;
   const core::MeshParameters parameters_;
   const absl::Time create_time_;
+  const uint32_t attempts_ = 1;  // processes that have had it
+  const uint32_t crashes_ = 0;   // of these, those that died in its work before this one
 
   mutable std::mutex mutex_;
   // Guarded by mutex_.
   v1::Operation::State state_ = v1::Operation::STATE_QUEUED;
   absl::Time start_time_ = absl::InfiniteFuture();
   absl::Time end_time_ = absl::InfiniteFuture();
+  bool is_cancelled_ = false;
   uint64_t mesh_revision_ = 0;
   google::rpc::Status error_;
   std::shared_ptr<Job> job_;

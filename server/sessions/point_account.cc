@@ -1,5 +1,6 @@
 #include "server/sessions/point_account.h"
 
+#include <limits>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -31,10 +32,10 @@ void TenantPoints::Return(uint64_t count) {
   points_ -= count;
 }
 
-PointAccount::PointAccount(std::string session, int dimension, const ServiceOptions& options, MemoryBudget& memory,
-                           std::shared_ptr<TenantPoints> tenant)
+PointAccount::PointAccount(std::string session, int dimension, bool in_memory, const ServiceOptions& options,
+                           MemoryBudget& memory, std::shared_ptr<TenantPoints> tenant)
     : session_(std::move(session)),
-      dimension_(dimension),
+      bytes_per_point_(in_memory ? dimension * sizeof(double) : 0),
       options_(options),
       memory_(memory),
       tenant_(std::move(tenant)),
@@ -84,12 +85,31 @@ absl::Status PointAccount::TakeFeatures(uint64_t segments, uint64_t seeds) {
   return Grow(held, "points, segments and seeds");
 }
 
-void PointAccount::Return(uint64_t count) {
-  held_.points -= count;
-  (void)reserved_.Resize(BytesOf(held_));  // shrinking never fails
+void PointAccount::Restore(uint64_t points, uint64_t segments, uint64_t seeds) {
+  held_ = {.points = points, .segments = segments, .seeds = seeds};
+  (void)tenant_->Take(held_.count(), std::numeric_limits<uint64_t>::max(), [] { return true; });
+  (void)reserved_.Resize(BytesOf(held_));  // where there is no room, they count with the next that come
+}
+
+void PointAccount::Shrink(const Held& held) {
   if (!is_closed_) {
-    tenant_->Return(count);
+    tenant_->Return(held_.count() - held.count());
   }
+  held_ = held;
+  (void)reserved_.Resize(BytesOf(held_));  // shrinking never fails
+}
+
+void PointAccount::Return(uint64_t count) {
+  Held held = held_;
+  held.points -= count;
+  Shrink(held);
+}
+
+void PointAccount::ReturnFeatures(uint64_t segments, uint64_t seeds) {
+  Held held = held_;
+  held.segments -= segments;
+  held.seeds -= seeds;
+  Shrink(held);
 }
 
 void PointAccount::Close() {

@@ -50,10 +50,10 @@ class TenantPoints {
 // Invariants: the tenant's points include all of this account until Close.
 class PointAccount {
  public:
-  // `session` is the name that errors have.
+  // `session` is the name that errors have. `in_memory`: points take memory; those in a file do not.
   //
   // REQUIRES:   `options` and `memory` outlive this.
-  PointAccount(std::string session, int dimension, const ServiceOptions& options, MemoryBudget& memory,
+  PointAccount(std::string session, int dimension, bool in_memory, const ServiceOptions& options, MemoryBudget& memory,
                std::shared_ptr<TenantPoints> tenant);
   ~PointAccount() { Close(); }
   PointAccount(const PointAccount&) = delete;
@@ -71,10 +71,15 @@ class PointAccount {
   // The same for so many more segments and seeds.
   absl::Status TakeFeatures(uint64_t segments, uint64_t seeds);
 
+  // Takes what the session had before the server was started, whatever the limits are now. To be called first.
+  void Restore(uint64_t points, uint64_t segments, uint64_t seeds);
+
   // Takes the last `count` points out again.
   //
   // REQUIRES:   count <= points().
   void Return(uint64_t count);
+  // The same of segments and seeds.
+  void ReturnFeatures(uint64_t segments, uint64_t seeds);
 
   // From now on the points do not count as the tenant's. They keep their memory as long as this lives.
   void Close();
@@ -89,15 +94,17 @@ class PointAccount {
   };
 
   uint64_t BytesOf(const Held& held) const {
-    return held.points * dimension_ * sizeof(double) + FeatureStore::BytesOf(held.segments, held.seeds);
+    return held.points * bytes_per_point_ + FeatureStore::BytesOf(held.segments, held.seeds);
   }
   // Refuses `count` of `what`, if a session may not have as many.
   absl::Status CheckOne(uint64_t count, const char* what) const;
-  // Makes `held` what the account has. REQUIRES: no less than it has.
+  // Makes `held` what the account has. REQUIRES: no more than it has.
+  void Shrink(const Held& held);
+  // REQUIRES: no less than it has.
   absl::Status Grow(const Held& held, const char* what);
 
   const std::string session_;
-  const int dimension_;
+  const uint64_t bytes_per_point_;
   const ServiceOptions& options_;
   MemoryBudget& memory_;
   const std::shared_ptr<TenantPoints> tenant_;

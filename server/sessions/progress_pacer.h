@@ -15,11 +15,13 @@ namespace wellspace::server {
 // Thread safety: thread-compatible.
 // Invariants: (1) events are at least kMinInterval apart, the final one excepted; (2) asked at least every
 // kMinInterval, it lets no more than kHeartbeat + kMinInterval pass without one; (3) phase, vertices, simplices and
-// fraction never decrease; (4) sequence numbers count from 0.
+// fraction never decrease; (4) sequence numbers count from that of the first.
 class ProgressPacer {
  public:
   static constexpr absl::Duration kMinInterval = absl::Milliseconds(100);
   static constexpr absl::Duration kHeartbeat = absl::Seconds(1);
+
+  explicit ProgressPacer(uint64_t first_sequence = 0) : next_sequence_(first_sequence) {}
 
   // The event to be sent at `now`, a time since boot, if one is due: something changed or the last one is old.
   std::optional<v1::ProgressEvent> Next(const core::Progress& progress, absl::Duration now);
@@ -32,7 +34,7 @@ class ProgressPacer {
   v1::ProgressEvent Advance(const core::Progress& progress);
 
   absl::Duration last_time_ = -absl::InfiniteDuration();
-  uint64_t next_sequence_ = 0;
+  uint64_t next_sequence_;
   core::Phase phase_ = core::Phase::kWaiting;
   v1::ProgressEvent last_;
 };

@@ -1,8 +1,11 @@
 #include "server/sessions/refinement.h"
 
-#include <algorithm>
+#include <atomic>
 #include <cstdint>
+#include <deque>
+#include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -19,32 +22,10 @@
 namespace wellspace::server {
 namespace {
 
-constexpr size_t kCopyBlock = size_t{1} << 20;  // numbers copied between two looks at the context
-
-template <typename T>
-absl::StatusOr<core::HugeVector<T>> Copy(const core::HugeVector<T>& values, const core::RunContext& context) {
-  core::HugeVector<T> copy;
-  copy.reserve(values.size());
-  for (size_t begin = 0; begin < values.size(); begin += kCopyBlock) {
-    WELLSPACE_RETURN_IF_ERROR(context.Check());
-    const T* first = values.data() + begin;
-    copy.insert(copy.end(), first, first + std::min(kCopyBlock, values.size() - begin));
-  }
-  return copy;
-}
-
-// Downloads may still read the last mesh: the next one is made of a copy.
-absl::StatusOr<core::Mesh> Copy(const core::Mesh& mesh, const core::RunContext& context) {
-  core::Mesh copy;
-  copy.dimension = mesh.dimension;
-  copy.domain_low = mesh.domain_low;
-  copy.domain_high = mesh.domain_high;
-  copy.statistics = mesh.statistics;
-  WELLSPACE_ASSIGN_OR_RETURN(copy.points, Copy(mesh.points, context));
-  WELLSPACE_ASSIGN_OR_RETURN(copy.weights, Copy(mesh.weights, context));
-  WELLSPACE_ASSIGN_OR_RETURN(copy.simplices, Copy(mesh.simplices, context));
-  return copy;  // Update makes the rest anew
-}
+// Before the end of an operation is written down again for which the disk had no room.
+constexpr absl::Duration kEndRetryDelay = absl::Seconds(1);
+// Before an operation of an earlier process comes again that found the queue full.
+constexpr absl::Duration kResumeRetryDelay = absl::Milliseconds(200);
 
 absl::StatusOr<core::Mesh> MeshFirst(const MesherFactory& create_mesher, const Session& session,
                                      const core::MeshParameters& parameters, core::RunContext& context,
@@ -67,7 +48,7 @@ absl::Status BringBack(const MesherFactory& create_mesher, const Session& sessio
   if (work.mesher == nullptr) {
     job.context().EnterPhase(core::Phase::kTree);
     WELLSPACE_ASSIGN_OR_RETURN(work.mesher, Replay(session.steps(), session.points(), session.features(),
-                                                   work.mesh->chunks.mesh(), create_mesher, job));
+                                                   *work.mesh, create_mesher, job));
   }
   return absl::OkStatus();
 }
@@ -87,8 +68,9 @@ absl::StatusOr<core::Mesh> MeshAgain(const Session& session, const core::MeshPar
     }
   }
   WELLSPACE_RETURN_IF_ERROR(work.mesher->Refine(parameters, context));
-  WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(work.mesher->memory_bytes() + work.mesh->chunks.memory_bytes()));
-  WELLSPACE_ASSIGN_OR_RETURN(core::Mesh mesh, Copy(work.mesh->chunks.mesh(), context));
+  WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(work.mesher->memory_bytes() + work.mesh->loaded_bytes()));
+  // Downloads may still read the last mesh: the next one is made of a copy.
+  WELLSPACE_ASSIGN_OR_RETURN(core::Mesh mesh, work.mesh->Load(context));
   WELLSPACE_RETURN_IF_ERROR(work.mesher->Update(mesh, parameters.threads, context));
   return mesh;
 }
@@ -100,7 +82,7 @@ absl::StatusOr<std::shared_ptr<MeshSnapshot>> MakeMesh(const MesherFactory& crea
                                                        SessionWork& work) {
   bool has_changed = false;
   const auto make = [&]() -> absl::StatusOr<core::Mesh> {
-    if (work.mesh == nullptr) {
+    if (session.steps().empty()) {
       return MeshFirst(create_mesher, session, parameters, job.context(), work);
     }
     WELLSPACE_RETURN_IF_ERROR(BringBack(create_mesher, session, job, work));
@@ -109,13 +91,14 @@ absl::StatusOr<std::shared_ptr<MeshSnapshot>> MakeMesh(const MesherFactory& crea
   std::shared_ptr<MeshSnapshot> mesh;
   const absl::Status status = RunGuarded([&] {
     WELLSPACE_ASSIGN_OR_RETURN(core::Mesh made, make());
-    mesh = std::make_shared<MeshSnapshot>(std::move(made));
+    has_changed = true;
+    WELLSPACE_ASSIGN_OR_RETURN(mesh, session.KeepMesh(std::move(made), job.context()));
     return absl::OkStatus();
   });
   if (status.ok()) {
     return mesh;
   }
-  if (has_changed || work.mesh == nullptr) {
+  if (has_changed || session.steps().empty()) {
     work.mesher = nullptr;
   }
   return status;
@@ -132,39 +115,54 @@ absl::StatusOr<std::shared_ptr<MeshSnapshot>> Work(const MesherFactory& create_m
     work.memory.MakeLasting();
   }
   if (mesh.ok()) {
-    MemoryReservation memory = job.TakeMemory((*mesh)->chunks.memory_bytes());
+    MemoryReservation memory = job.TakeMemory((*mesh)->memory_bytes());
     memory.MakeLasting();
-    (*mesh)->chunks.KeepMemory(std::move(memory));
+    (*mesh)->KeepMemory(std::move(memory));
   }
   job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();  // clients that see the end may use it at once
   return mesh;
 }
 
-void Run(const CallEnvironment& environment, Session& session, Operation& operation, Job& job) {
+// Ends `operation`, or comes again until there is room on the disk for its end.
+void EndWhenPossible(const CallEnvironment& environment, const std::shared_ptr<Session>& session,
+                     const std::shared_ptr<Operation>& operation, const std::shared_ptr<WorkResult>& result) {
+  if (!session->EndWork(*operation, *result)) {
+    environment.background.PostAfter(kEndRetryDelay, [&environment, session, operation, result] {
+      environment.blocking.Run(session->name(), [&environment, session, operation, result] {
+        EndWhenPossible(environment, session, operation, result);
+      });
+    });
+  }
+}
+
+void Run(const CallEnvironment& environment, const std::shared_ptr<Session>& session,
+         const std::shared_ptr<Operation>& operation, Job& job) {
   const absl::Duration start = SinceBoot();
-  operation.SetJob(job.shared_from_this());  // this may come before StartRefinement knows the job
-  std::optional<SessionWork> work = session.BeginWork(operation);
+  operation->SetJob(job.shared_from_this());  // this may come before StartRefinement knows the job
+  std::optional<SessionWork> work = session->BeginWork(*operation);
   if (!work.has_value()) {
     return;
   }
   RefinementReport report{
-      .operation = operation.name(),
-      .tenant = session.tenant(),
+      .operation = operation->name(),
+      .tenant = session->tenant(),
       .status = absl::OkStatus(),
       .duration = absl::ZeroDuration(),
-      .points = session.points().coordinate_count() / operation.parameters().dimension,
-      .replayed_steps = work->mesher == nullptr ? session.steps().all().size() : 0,
+      .points = session->points().coordinate_count() / operation->parameters().dimension,
+      .replayed_steps = work->mesher == nullptr ? session->steps().all().size() : 0,
   };
   absl::StatusOr<std::shared_ptr<MeshSnapshot>> mesh =
-      Work(environment.create_mesher, session, operation.parameters(), job, *work);
+      Work(environment.create_mesher, *session, operation->parameters(), job, *work);
   report.status = mesh.status();
   report.duration = SinceBoot() - start;
   if (mesh.ok()) {
-    report.vertices = (*mesh)->chunks.mesh().vertex_count();
-    report.simplices = (*mesh)->chunks.mesh().simplex_count();
+    report.vertices = (*mesh)->figures().vertices;
+    report.simplices = (*mesh)->figures().simplices;
   }
   environment.observability.work().OnRefinement(report);  // before clients see the end
-  session.EndWork(operation, report.status, *std::move(work), mesh.ok() ? *std::move(mesh) : nullptr);
+  const auto result = std::make_shared<WorkResult>(WorkResult{
+      .status = report.status, .work = *std::move(work), .mesh = mesh.ok() ? *std::move(mesh) : nullptr});
+  EndWhenPossible(environment, session, operation, result);
 }
 
 void Tick(Background& background, const std::weak_ptr<Operation>& weak) {
@@ -174,41 +172,103 @@ void Tick(Background& background, const std::weak_ptr<Operation>& weak) {
   }
 }
 
+// Submits the work of `operation`, which has the session.
+absl::StatusOr<std::shared_ptr<Job>> Submit(const CallEnvironment& environment, const std::shared_ptr<Session>& session,
+                                            const std::shared_ptr<Operation>& operation) {
+  const Session::Size size = session->GetSize(kMostPoints);
+  const bool is_small =
+      size.points <= kMostPoints && size.segments <= kMostPoints &&
+      IsSmallRefinement(operation->parameters(), size.some_points, size.vertices, size.replayed_steps);
+  WELLSPACE_ASSIGN_OR_RETURN(
+      std::shared_ptr<Job> job,
+      environment.jobs.Submit({.tenant = session->tenant(),
+                               .is_small = is_small,
+                               .work = [&environment, session, operation](Job& self) {
+                                 Run(environment, session, operation, self);
+                               }}));
+  operation->SetJob(job);
+  return job;
+}
+
+// Has the work of an operation of an earlier process done, as soon as there is a place for it.
+void Resume(const CallEnvironment& environment, const ResumedOperation& resumed) {
+  if (!Submit(environment, resumed.session, resumed.operation).ok()) {
+    environment.background.PostAfter(kResumeRetryDelay, [&environment, resumed] { Resume(environment, resumed); });
+  }
+}
+
+// Calls `then` once, when `operation` has ended.
+void WhenEnded(Operation& operation, const std::function<void()>& then) {
+  const auto look = [&operation, then, is_done = std::make_shared<std::atomic<bool>>(false)] {
+    if (operation.HasEnded() && !is_done->exchange(true)) {
+      then();
+    }
+  };
+  operation.Watch(look);
+  look();
+}
+
+// Operations in whose work a process has died come one after the other: one of them is to blame, and the others are
+// not to pay for it a second time.
+void ResumeNext(const CallEnvironment& environment, const std::shared_ptr<std::deque<ResumedOperation>>& suspects) {
+  if (suspects->empty()) {
+    return;
+  }
+  const ResumedOperation next = std::move(suspects->front());
+  suspects->pop_front();
+  WhenEnded(*next.operation, [&environment, suspects] {
+    environment.background.Post([&environment, suspects] { ResumeNext(environment, suspects); });
+  });
+  Resume(environment, next);
+}
+
 }  // namespace
 
 absl::StatusOr<std::shared_ptr<Operation>> StartRefinement(const CallEnvironment& environment,
                                                            const std::shared_ptr<Session>& session,
                                                            const core::MeshParameters& parameters,
-                                                           uint64_t expected_revision) {
-  const Session::Size size = session->GetSize(kMostPoints);
-  const bool is_small = size.points <= kMostPoints && size.segments <= kMostPoints &&
-                        IsSmallRefinement(parameters, size.some_points, size.vertices, size.replayed_steps);
-  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<Operation> operation,
-                             session->StartOperation(parameters, expected_revision));
-  const absl::StatusOr<std::shared_ptr<Job>> job = environment.jobs.Submit(
-      {.tenant = session->tenant(), .is_small = is_small, .work = [&environment, session, operation](Job& self) {
-         Run(environment, *session, *operation, self);
-       }});
-  if (!job.ok()) {
-    session->Withdraw(*operation, job.status());
-    return job.status();
-  }
-  if (!operation->SetJob(*job)) {
-    environment.jobs.Cancel(*job);  // the operation was cancelled before it had a job, or has ended
+                                                           uint64_t expected_revision,
+                                                           const AnswerTo<v1::Operation>& answer) {
+  std::shared_ptr<Job> job;
+  const auto submit = [&](const std::shared_ptr<Operation>& operation) {
+    WELLSPACE_ASSIGN_OR_RETURN(job, Submit(environment, session, operation));
+    return absl::OkStatus();
+  };
+  absl::StatusOr<std::shared_ptr<Operation>> operation =
+      session->StartOperation(parameters, expected_revision, submit, answer);
+  if (!operation.ok()) {
+    if (job != nullptr) {
+      environment.jobs.Cancel(job);
+    }
+    return operation;
   }
   environment.background.Post(
-      [&background = environment.background, weak = std::weak_ptr(operation)] { Tick(background, weak); });
+      [&background = environment.background, weak = std::weak_ptr(*operation)] { Tick(background, weak); });
   return operation;
 }
 
-void CancelOperation(const CallEnvironment& environment, Session& session, Operation& operation) {
-  std::shared_ptr<Job> job = operation.job();  // null once it has ended
-  if (!session.EndWaiting(operation)) {
-    job = operation.job();  // it may have begun meanwhile, before StartRefinement knew its job
+void ResumeRefinements(const CallEnvironment& environment, std::vector<ResumedOperation> resumed) {
+  const auto suspects = std::make_shared<std::deque<ResumedOperation>>();
+  for (ResumedOperation& one : resumed) {
+    environment.background.Post([&background = environment.background, weak = std::weak_ptr(one.operation)] {
+      Tick(background, weak);
+    });
+    if (one.operation->IsSuspect()) {
+      suspects->push_back(std::move(one));
+    } else {
+      Resume(environment, one);
+    }
   }
+  ResumeNext(environment, suspects);
+}
+
+absl::Status CancelOperation(const CallEnvironment& environment, Session& session, Operation& operation) {
+  const std::shared_ptr<Job> job = operation.job();  // null once it has ended
+  WELLSPACE_RETURN_IF_ERROR(session.Cancel(operation));
   if (job != nullptr) {
     environment.jobs.Cancel(job);
   }
+  return absl::OkStatus();
 }
 
 }  // namespace wellspace::server

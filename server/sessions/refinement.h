@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "absl/status/statusor.h"
 #include "core/mesh_parameters.h"
@@ -19,14 +20,26 @@ namespace wellspace::server {
 // One that does not succeed leaves the session as it was: a mesher that it has changed is given up, and built again by
 // Replay when the structure is next needed.
 //
-// Errors:     QUEUE_FULL, QUOTA_EXCEEDED (jobs); those of Session::StartOperation.
+// Errors:     QUEUE_FULL, QUOTA_EXCEEDED (jobs); those of Session::StartOperation. The session is as it was.
 absl::StatusOr<std::shared_ptr<Operation>> StartRefinement(const CallEnvironment& environment,
                                                            const std::shared_ptr<Session>& session,
                                                            const core::MeshParameters& parameters,
-                                                           uint64_t expected_revision);
+                                                           uint64_t expected_revision,
+                                                           const AnswerTo<v1::Operation>& answer = nullptr);
+
+// An operation of an earlier process, and its session.
+struct ResumedOperation {
+  std::shared_ptr<Session> session;
+  std::shared_ptr<Operation> operation;
+};
+
+// Has the work of these done again. To be called once, at the start.
+void ResumeRefinements(const CallEnvironment& environment, std::vector<ResumedOperation> resumed);
 
 // Ends an operation that waits; has one that runs end soon.
-void CancelOperation(const CallEnvironment& environment, Session& session, Operation& operation);
+//
+// Errors:     those of Session::Cancel.
+absl::Status CancelOperation(const CallEnvironment& environment, Session& session, Operation& operation);
 
 }  // namespace wellspace::server
 

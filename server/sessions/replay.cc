@@ -1,6 +1,5 @@
 #include "server/sessions/replay.h"
 
-#include <algorithm>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -63,12 +62,6 @@ class Structure {
   uint64_t taken_ = 0;  // of the points
 };
 
-bool IsSame(const core::Mesh& a, const core::Mesh& b) {
-  return std::ranges::equal(a.points, b.points) && std::ranges::equal(a.simplices, b.simplices) &&
-         std::ranges::equal(a.weights, b.weights) && std::ranges::equal(a.facets, b.facets) &&
-         std::ranges::equal(a.simplex_regions, b.simplex_regions);
-}
-
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<core::Mesher>> BeginMesh(const MesherFactory& create_mesher,
@@ -80,15 +73,13 @@ absl::StatusOr<std::unique_ptr<core::Mesher>> BeginMesh(const MesherFactory& cre
 }
 
 absl::StatusOr<std::unique_ptr<core::Mesher>> Replay(const SessionSteps& steps, const PointStore& points,
-                                                     const FeatureStore& features, const core::Mesh& last_mesh,
+                                                     const FeatureStore& features, const MeshSnapshot& last_mesh,
                                                      const MesherFactory& create_mesher, Job& job) {
   Structure structure(points, features, create_mesher);
   for (const SessionStep& step : steps.all()) {
     WELLSPACE_RETURN_IF_ERROR(job.RunApart([&](core::RunContext& context) { return structure.Take(step, context); }));
   }
-  if (!IsSame(structure.mesh(), last_mesh)) {
-    return absl::InternalError("the steps of the session make another mesh than they made before");
-  }
+  WELLSPACE_RETURN_IF_ERROR(last_mesh.CheckSame(structure.mesh()));
   return structure.TakeMesher();
 }
 

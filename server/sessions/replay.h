@@ -12,6 +12,7 @@
 #include "server/base/mesh_functions.h"
 #include "server/jobs/job.h"
 #include "server/sessions/feature_store.h"
+#include "server/store/mesh_snapshot.h"
 #include "server/store/point_store.h"
 #include "server/sessions/session_steps.h"
 
@@ -34,9 +35,9 @@ absl::StatusOr<std::unique_ptr<core::Mesher>> BeginMesh(const MesherFactory& cre
 //             steps made.
 // Complexity: that of the steps. Reserves memory as the first refinement did.
 // Errors:     those of the steps: RESOURCE_EXHAUSTED, CANCELLED, DEADLINE_EXCEEDED; INTERNAL: the mesh is not
-//             `last_mesh`.
+//             `last_mesh`; DATA_LOSS.
 absl::StatusOr<std::unique_ptr<core::Mesher>> Replay(const SessionSteps& steps, const PointStore& points,
-                                                     const FeatureStore& features, const core::Mesh& last_mesh,
+                                                     const FeatureStore& features, const MeshSnapshot& last_mesh,
                                                      const MesherFactory& create_mesher, Job& job);
 
 }  // namespace wellspace::server

@@ -1,7 +1,6 @@
 #include "server/sessions/session.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -10,24 +9,20 @@
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
-namespace {
-
-constexpr size_t kKeptOperations = 100;
-
-}  // namespace
-
 Session::Session(Settings settings, const ServiceOptions& options, MemoryBudget& memory, Clock clock,
-                 std::shared_ptr<TenantPoints> tenant_points)
+                 std::shared_ptr<TenantPoints> tenant_points, SessionLog& log)
     : tenant_(std::move(settings.tenant)),
       name_(std::move(settings.name)),
       dimension_(settings.parameters.dimension),
       create_time_(settings.create_time),
       memory_(memory),
       clock_(std::move(clock)),
+      log_(log),
       parameters_(std::move(settings.parameters)),
       labels_(std::move(settings.labels)),
       lease_(settings.ttl, clock_.since_boot()),
-      point_account_(name_, dimension_, options, memory, std::move(tenant_points)) {}
+      point_account_(name_, dimension_, !log.is_durable(), options, memory, std::move(tenant_points)),
+      points_(log.OpenPoints(name_, dimension_, {})) {}
 
 core::MeshParameters Session::parameters() const {
   std::lock_guard lock(mutex_);
@@ -35,27 +30,32 @@ core::MeshParameters Session::parameters() const {
 }
 
 v1::Session Session::Describe() const {
+  std::lock_guard lock(mutex_);
+  return DescribeWith(labels_, lease_.ttl());
+}
+
+v1::Session Session::DescribeWith(const std::map<std::string, std::string>& labels, absl::Duration ttl) const {
   v1::Session message;
   message.set_name(name_);
   *message.mutable_create_time() = TimeToProto(create_time_);
-  std::lock_guard lock(mutex_);
   message.set_state(busy_ == Busy::kOperation ? v1::Session::STATE_REFINING
                     : is_ready_               ? v1::Session::STATE_READY
                                               : v1::Session::STATE_OPEN);
   *message.mutable_parameters() = ParametersToProto(parameters_);
-  message.mutable_labels()->insert(labels_.begin(), labels_.end());
-  *message.mutable_ttl() = DurationToProto(lease_.ttl());
+  message.mutable_labels()->insert(labels.begin(), labels.end());
+  *message.mutable_ttl() = DurationToProto(ttl);
   const absl::Duration since_boot = clock_.since_boot();
-  *message.mutable_expire_time() = TimeToProto(clock_.wall() + (lease_.ExpiresAt(since_boot) - since_boot));
+  const absl::Duration last_use = lease_.ExpiresAt(since_boot) - lease_.ttl();
+  *message.mutable_expire_time() = TimeToProto(clock_.wall() + (last_use + ttl - since_boot));
   message.set_revision(revision_);
-  message.set_committed_points(points_.coordinate_count() / dimension_);
-  message.set_segment_count(features_.segment_count());
-  message.set_seed_count(features_.seed_count());
-  message.set_faces(features_.face_rule());
-  message.set_crossings(features_.crossing_rule());
+  message.set_committed_points(committed_points_);
+  message.set_segment_count(feature_summary_.segments);
+  message.set_seed_count(feature_summary_.seeds);
+  message.set_faces(feature_summary_.faces);
+  message.set_crossings(feature_summary_.crossings);
   if (work_.mesh != nullptr) {
-    message.set_vertex_count(work_.mesh->chunks.mesh().vertex_count());
-    message.set_simplex_count(work_.mesh->chunks.mesh().simplex_count());
+    message.set_vertex_count(work_.mesh->figures().vertices);
+    message.set_simplex_count(work_.mesh->figures().simplices);
   }
   if (!operations_.empty()) {
     message.set_last_operation(operations_.back()->name());
@@ -82,10 +82,23 @@ bool Session::IsExpired() const {
 }
 
 absl::Status Session::Update(std::optional<std::map<std::string, std::string>> labels,
-                             std::optional<absl::Duration> ttl, uint64_t expected_revision) {
+                             std::optional<absl::Duration> ttl, uint64_t expected_revision,
+                             const AnswerTo<v1::Session>& answer) {
+  std::lock_guard change_lock(change_mutex_);
+  v1::Session described;
+  {
+    std::lock_guard lock(mutex_);
+    WELLSPACE_RETURN_IF_ERROR(CheckOpen());
+    WELLSPACE_RETURN_IF_ERROR(CheckRevision(expected_revision));
+    described = DescribeWith(labels.value_or(labels_), ttl.value_or(lease_.ttl()));
+  }
+  const std::optional<store::v1::AnswerRecord> answer_record = answer == nullptr ? std::nullopt : answer(described);
+  WELLSPACE_RETURN_IF_ERROR(Commit([&](SessionChange& change) {
+    *change.state->mutable_labels() = described.labels();
+    change.state->set_ttl_ns(absl::ToInt64Nanoseconds(ttl.value_or(lease_.ttl())));
+    change.answer = answer_record;
+  }));
   std::lock_guard lock(mutex_);
-  WELLSPACE_RETURN_IF_ERROR(CheckOpen());
-  WELLSPACE_RETURN_IF_ERROR(CheckRevision(expected_revision));
   if (labels.has_value()) {
     labels_ = *std::move(labels);
   }
@@ -95,10 +108,20 @@ absl::Status Session::Update(std::optional<std::map<std::string, std::string>> l
   return absl::OkStatus();
 }
 
-absl::StatusOr<std::shared_ptr<Operation>> Session::Close(uint64_t expected_revision) {
+absl::StatusOr<std::shared_ptr<Operation>> Session::Close(uint64_t expected_revision,
+                                                          const std::optional<store::v1::AnswerRecord>& answer) {
+  std::lock_guard change_lock(change_mutex_);
+  {
+    std::lock_guard lock(mutex_);
+    WELLSPACE_RETURN_IF_ERROR(CheckOpen());
+    WELLSPACE_RETURN_IF_ERROR(CheckRevision(expected_revision));
+  }
+  WELLSPACE_RETURN_IF_ERROR(Commit([&](SessionChange& change) {
+    change.state.reset();
+    change.is_deletion = true;
+    change.answer = answer;
+  }));
   std::lock_guard lock(mutex_);
-  WELLSPACE_RETURN_IF_ERROR(CheckOpen());
-  WELLSPACE_RETURN_IF_ERROR(CheckRevision(expected_revision));
   CloseNow();
   return busy_ == Busy::kOperation ? operations_.back() : nullptr;
 }
@@ -115,6 +138,9 @@ bool Session::CloseIfExpired() {
 void Session::CloseNow() {
   is_closed_ = true;
   point_account_.Close();
+  if (work_.mesh != nullptr) {
+    work_.mesh->MakeObsolete();
+  }
 }
 
 void Session::BeginBusy(Busy busy) {
@@ -134,17 +160,19 @@ absl::Status Session::CheckOpen() const {
 }
 
 absl::Status Session::CheckRevision(uint64_t expected_revision) const {
-  return expected_revision == 0 || expected_revision == revision_
+  return expected_revision == 0 || expected_revision == NextRevision()
              ? absl::OkStatus()
              : MakeError(v1::ERROR_REASON_REVISION_MISMATCH,
                          absl::StrCat("expected_revision is ", expected_revision, ", but ", name_, " is at revision ",
-                                      revision_));
+                                      NextRevision()));
 }
 
 absl::Status Session::CheckIdle() const {
   switch (busy_) {
     case Busy::kNo:
       return absl::OkStatus();
+    case Busy::kStarting:
+      return MakeError(v1::ERROR_REASON_SESSION_BUSY, absl::StrCat("an operation of ", name_, " is being started"));
     case Busy::kOperation:
       return MakeError(v1::ERROR_REASON_SESSION_BUSY,
                        absl::StrCat(operations_.back()->name(), " is under way; wait for its end, or cancel it"));
@@ -155,7 +183,7 @@ absl::Status Session::CheckIdle() const {
   }
   return MakeError(v1::ERROR_REASON_SESSION_BUSY,
                    absl::StrCat("a query or an addition of vertices has the structure of ", name_,
-                                " built again, which an operation without success gave up; try again later"));
+                                " built again, which was given up; try again later"));
 }
 
 absl::Status Session::CheckReadyForChange(uint64_t expected_revision) const {
@@ -165,9 +193,17 @@ absl::Status Session::CheckReadyForChange(uint64_t expected_revision) const {
 }
 
 absl::Status Session::CheckMesh() const {
-  return work_.mesh != nullptr ? absl::OkStatus()
-                               : MakeError(v1::ERROR_REASON_MESH_NOT_READY,
-                                           absl::StrCat(name_, " has no mesh yet; start a refinement first"));
+  if (work_.mesh == nullptr) {
+    return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
+                     absl::StrCat(name_, " has no mesh yet; start a refinement first"));
+  }
+  if (steps_.empty()) {
+    return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
+                     absl::StrCat("the mesh of ", name_,
+                                  " is that of an earlier version of the server, which made other meshes; it can be "
+                                  "downloaded, and for anything else start a refinement first"));
+  }
+  return absl::OkStatus();
 }
 
 absl::Status Session::CheckStructure() const {
@@ -175,118 +211,24 @@ absl::Status Session::CheckStructure() const {
   if (work_.mesher != nullptr) {
     return absl::OkStatus();
   }
-  return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
-                   absl::StrCat("an operation without success has given up the structure of ", name_,
-                                " in this moment; ask again, and it is built again"));
-}
-
-absl::Status Session::CheckCoordinates(uint64_t first, std::span<const double> coordinates) const {
-  // Before there is a mesh, a domain that was not given grows with the points.
-  const std::vector<double>* low = &parameters_.domain_low;
-  const std::vector<double>* high = &parameters_.domain_high;
-  if (work_.mesh != nullptr) {
-    low = &work_.mesh->chunks.mesh().domain_low;
-    high = &work_.mesh->chunks.mesh().domain_high;
-  }
-  int axis = 0;
-  for (size_t i = 0; i < coordinates.size(); ++i) {
-    const double x = coordinates[i];
-    if (low->empty() ? !std::isfinite(x) : !(x >= (*low)[axis] && x <= (*high)[axis])) {
-      return MakeError(
-          v1::ERROR_REASON_INVALID_POINTS,
-          absl::StrCat("points[", first + i / dimension_, "]: coordinate ", axis, " is ", x, "; ",
-                       low->empty() ? "a finite number is needed"
-                                    : absl::StrCat("in the domain it is from ", (*low)[axis], " to ", (*high)[axis])),
-          "points.coordinates");
-    }
-    axis = axis + 1 == dimension_ ? 0 : axis + 1;
-  }
-  return absl::OkStatus();
-}
-
-bool Session::BeginUpload() {
-  std::lock_guard lock(mutex_);
-  return !std::exchange(is_uploading_, true);
-}
-
-void Session::EndUpload() {
-  std::lock_guard lock(mutex_);
-  is_uploading_ = false;
-}
-
-absl::Status Session::CheckNoGap(uint64_t offset) const {
-  return offset <= point_account_.points()
-             ? absl::OkStatus()
-             : MakeError(v1::ERROR_REASON_UPLOAD_GAP,
-                         absl::StrCat("point_offset is ", offset, ", but ", name_, " has ", point_account_.points(),
-                                      " points; go on at ", point_account_.points(), " or before"),
-                         "point_offset");
-}
-
-absl::Status Session::CheckPrefix(const Prefix& prefix) const {
-  std::lock_guard lock(mutex_);
-  WELLSPACE_RETURN_IF_ERROR(CheckIdle());
-  WELLSPACE_RETURN_IF_ERROR(CheckNoGap(prefix.end));
-  const uint32_t checksum = points_.Checksum(prefix.first * dimension_, prefix.end * dimension_);
-  return checksum == prefix.crc32c
-             ? absl::OkStatus()
-             : MakeError(v1::ERROR_REASON_UPLOAD_MISMATCH,
-                         absl::StrCat(name_, " has other points from number ", prefix.first, " up to ", prefix.end,
-                                      " than those that this upload goes on after: their checksum is ", checksum,
-                                      ", not ", prefix.crc32c, "; add these points at ", point_account_.points(),
-                                      ", or to another session"),
-                         "checked_crc32c");
-}
-
-absl::Status Session::CheckKnown(uint64_t first, std::span<const double> coordinates) const {
-  const uint64_t equal = points_.CountEqual(first * dimension_, coordinates);
-  if (equal == coordinates.size()) {
-    return absl::OkStatus();
-  }
-  const uint64_t point = first + equal / dimension_;
-  return MakeError(v1::ERROR_REASON_UPLOAD_MISMATCH,
-                   absl::StrCat("points[", point, "]: coordinate ", equal % dimension_, " is ", coordinates[equal],
-                                "; ", name_, " has this point already, with ", points_.at(first * dimension_ + equal),
-                                "; send the same again, or add other points at ", point_account_.points()),
-                   "points.coordinates");
-}
-
-absl::Status Session::Append(uint64_t offset, std::span<const double> coordinates, uint64_t expected_revision) {
-  std::lock_guard lock(mutex_);
-  WELLSPACE_RETURN_IF_ERROR(CheckReadyForChange(expected_revision));
-  if (coordinates.size() % dimension_ != 0) {
-    return MakeError(v1::ERROR_REASON_INVALID_CHUNK_SHAPE,
-                     absl::StrCat("the chunk at point ", offset, " has ", coordinates.size(),
-                                  " coordinates; expected a multiple of the dimension ", dimension_),
-                     "points.coordinates");
-  }
-  WELLSPACE_RETURN_IF_ERROR(CheckNoGap(offset));
-  const uint64_t committed = point_account_.points();
-  const uint64_t known = std::min<uint64_t>(committed - offset, coordinates.size() / dimension_);
-  WELLSPACE_RETURN_IF_ERROR(CheckKnown(offset, coordinates.first(known * dimension_)));
-  coordinates = coordinates.subspan(known * dimension_);
-  if (coordinates.empty()) {
-    return absl::OkStatus();
-  }
-  WELLSPACE_RETURN_IF_ERROR(CheckCoordinates(committed, coordinates));
-  WELLSPACE_RETURN_IF_ERROR(point_account_.Take(coordinates.size() / dimension_));
-  points_.Append(coordinates);
-  is_ready_ = false;
-  ++revision_;
-  return absl::OkStatus();
-}
-
-v1::UploadPointsResponse Session::Committed() const {
-  v1::UploadPointsResponse message;
-  std::lock_guard lock(mutex_);
-  message.set_committed_points(points_.coordinate_count() / dimension_);
-  message.set_revision(revision_);
-  return message;
+  return MakeError(
+      v1::ERROR_REASON_MESH_NOT_READY,
+      absl::StrCat("the structure of ", name_, " was given up in this moment; ask again, and it is built again"));
 }
 
 std::shared_ptr<const MeshSnapshot> Session::mesh() const {
   std::lock_guard lock(mutex_);
   return work_.mesh;
+}
+
+absl::StatusOr<std::shared_ptr<MeshSnapshot>> Session::KeepMesh(core::Mesh mesh,
+                                                                const core::RunContext& context) const {
+  uint64_t revision = 0;
+  {
+    std::lock_guard lock(mutex_);
+    revision = revision_ + 1;  // no other change of it is made while the operation is under way
+  }
+  return log_.KeepMesh(name_, revision, std::move(mesh), context);
 }
 
 absl::Status Session::Query(uint64_t* version, const std::function<absl::Status(const core::Mesher&)>& query) const {
@@ -306,125 +248,6 @@ absl::Status Session::Query(uint64_t* version, const std::function<absl::Status(
     running.lock();  // at once: the session is made busy before anything waits for queries
   }
   return query(*mesher);
-}
-
-absl::StatusOr<std::shared_ptr<Operation>> Session::StartOperation(const core::MeshParameters& parameters,
-                                                                   uint64_t expected_revision) {
-  std::lock_guard lock(mutex_);
-  WELLSPACE_RETURN_IF_ERROR(CheckReadyForChange(expected_revision));
-  if (!features_.IsEmpty()) {
-    WELLSPACE_RETURN_IF_ERROR(ValidateForDomain(parameters, features_.View()));
-  }
-  auto operation = std::make_shared<Operation>(absl::StrCat(name_, "/operations/", next_operation_), next_operation_,
-                                               parameters, clock_.wall());
-  ++next_operation_;
-  BeginBusy(Busy::kOperation);
-  operations_.push_back(operation);
-  if (operations_.size() > kKeptOperations) {
-    displaced_ = std::move(operations_.front());
-    operations_.pop_front();
-  }
-  return operation;
-}
-
-void Session::Withdraw(Operation& operation, const absl::Status& status) {
-  std::shared_ptr<Operation> withdrawn;  // freed without the lock
-  {
-    std::lock_guard lock(mutex_);
-    if (!operation.IsQueued()) {
-      return;
-    }
-    operation.Fail(clock_.wall(), status);
-    withdrawn = std::move(operations_.back());
-    operations_.pop_back();
-    --next_operation_;
-    if (displaced_ != nullptr) {
-      operations_.push_front(std::move(displaced_));
-    }
-    EndBusy();
-  }
-  operation.Notify();  // others may have found and watched it
-}
-
-std::optional<SessionWork> Session::BeginWork(Operation& operation) {
-  std::shared_ptr<Operation> displaced;  // freed without the lock
-  {
-    std::lock_guard lock(mutex_);
-    if (!operation.IsQueued()) {
-      return std::nullopt;
-    }
-    operation.Start(clock_.wall());
-    displaced = std::move(displaced_);
-  }
-  WaitForQueries();
-  std::lock_guard lock(mutex_);
-  return SessionWork{.mesher = std::move(work_.mesher),
-                     .meshed_points = work_.meshed_points,
-                     .mesh = work_.mesh,
-                     .memory = std::move(work_.memory)};
-}
-
-void Session::EndWork(Operation& operation, const absl::Status& status, SessionWork work,
-                      std::shared_ptr<MeshSnapshot> mesh) {
-  {
-    std::lock_guard lock(mutex_);
-    const absl::Time now = clock_.wall();
-    if (status.ok()) {
-      mesh->revision = ++revision_;
-      work.mesh = std::move(mesh);
-      work.meshed_points = points_.coordinate_count() / dimension_;
-      steps_.NoteRefinement(work.meshed_points, operation.parameters());
-      parameters_ = operation.parameters();
-      is_ready_ = true;
-      ++structure_version_;
-      const core::Mesh& made = work.mesh->chunks.mesh();
-      operation.Succeed(now, revision_, made.vertex_count(), made.simplex_count());
-    } else {
-      operation.Fail(now, status);
-      work.meshed_points = steps_.points();
-    }
-    std::swap(work_, work);  // what was there is freed without the lock
-    EndBusy();
-  }
-  operation.Notify();
-}
-
-bool Session::EndWaiting(Operation& operation) {
-  std::shared_ptr<Operation> displaced;  // freed without the lock
-  {
-    std::lock_guard lock(mutex_);
-    if (!operation.IsQueued()) {
-      return false;
-    }
-    displaced = std::move(displaced_);
-    EndBusy();
-    operation.Fail(clock_.wall(), absl::CancelledError("the operation was cancelled"));
-  }
-  operation.Notify();
-  return true;
-}
-
-absl::StatusOr<std::shared_ptr<Operation>> Session::FindOperation(const std::string& operation_name) const {
-  std::lock_guard lock(mutex_);
-  const auto found = std::find_if(operations_.begin(), operations_.end(), [&](const std::shared_ptr<Operation>& kept) {
-    return kept->name() == operation_name;
-  });
-  if (found == operations_.end()) {
-    return MakeError(v1::ERROR_REASON_OPERATION_NOT_FOUND,
-                     absl::StrCat("there is no ", operation_name, "; the last ", kKeptOperations, " are kept"), "name");
-  }
-  return *found;
-}
-
-std::vector<std::shared_ptr<Operation>> Session::ListOperations(uint64_t after, size_t count) const {
-  std::vector<std::shared_ptr<Operation>> listed;
-  std::lock_guard lock(mutex_);
-  for (const std::shared_ptr<Operation>& operation : operations_) {
-    if (operation->number() > after && listed.size() < count) {
-      listed.push_back(operation);
-    }
-  }
-  return listed;
 }
 
 SessionUse::SessionUse(std::shared_ptr<Session> session) : session_(std::move(session)) {

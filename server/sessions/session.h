@@ -26,22 +26,21 @@
 #include "server/jobs/memory_budget.h"
 #include "server/sessions/feature_store.h"
 #include "server/sessions/lease.h"
-#include "server/store/mesh_chunks.h"
 #include "server/sessions/operation.h"
 #include "server/sessions/point_account.h"
 #include "server/store/point_store.h"
 #include "server/sessions/session_steps.h"
+#include "server/store/mesh_snapshot.h"
+#include "server/store/session_log.h"
+#include "wellspace/store/v1/records.pb.h"
 #include "wellspace/v1/sessions.pb.h"
 
 namespace wellspace::server {
 
-// The mesh of a session as it was at one revision. Immutable: a download holds it for as long as it wants.
-struct MeshSnapshot {
-  explicit MeshSnapshot(core::Mesh mesh) : chunks(std::move(mesh)) {}
-
-  uint64_t revision = 0;  // set by the session
-  MeshChunks chunks;
-};
+// What is written down as the answer to the request that a change is made for, given what it is answered with. It is
+// called once the change is certain to be made, unless it cannot be written down.
+template <typename T>
+using AnswerTo = std::function<std::optional<store::v1::AnswerRecord>(const T&)>;
 
 // What AddVertices did.
 struct AddedVertices {
@@ -51,10 +50,17 @@ struct AddedVertices {
 
 // What an operation works on. The session has given it away until the operation has ended.
 struct SessionWork {
-  std::unique_ptr<core::Mesher> mesher;      // null: there is none yet, or it was given up
-  uint64_t meshed_points = 0;                // how many of the session's points `mesher` has, or would have
-  std::shared_ptr<const MeshSnapshot> mesh;  // the last mesh; null before the first
-  MemoryReservation memory;                  // of `mesher`
+  std::unique_ptr<core::Mesher> mesher;  // null: there is none yet, or it was given up
+  uint64_t meshed_points = 0;            // how many of the session's points `mesher` has, or would have
+  std::shared_ptr<MeshSnapshot> mesh;    // the last mesh; null before the first
+  MemoryReservation memory;              // of `mesher`
+};
+
+// How the work of an operation has ended.
+struct WorkResult {
+  absl::Status status;
+  SessionWork work;                     // what BeginWork gave; on an error its mesher is as it was, or null
+  std::shared_ptr<MeshSnapshot> mesh;  // the new mesh, if the status is OK
 };
 
 // Thread safety: thread-safe.
@@ -62,8 +68,10 @@ struct SessionWork {
 // under way, or vertices are being added or the mesher is built again, points, features, mesh, mesher and steps are
 // touched by nothing else;
 // (3) what did not succeed leaves the session as it was: structure and mesh are what Replay makes of the steps, whether
-// there is a mesher now or not; (4) the lock order is this session's mutex, then that of an operation, of
-// TenantPoints or, where memory is released, of the JobPool.
+// there is a mesher now or not; (4) the lock order is change_mutex_, this session's mutex, then that of an operation, of
+// TenantPoints or, where memory is released, of the JobPool; (5) nobody is told of a change, and nothing shows it,
+// before the log has it; one that it cannot have is not made. Functions that change the session wait for the log: they
+// are to be called where that holds up no other work.
 class Session {
  public:
   struct Settings {
@@ -75,9 +83,16 @@ class Session {
     absl::Time create_time;
   };
 
-  // REQUIRES:   `options` and `memory` outlive this.
+  // REQUIRES:   `options`, `memory` and `log` outlive this.
   Session(Settings settings, const ServiceOptions& options, MemoryBudget& memory, Clock clock,
-          std::shared_ptr<TenantPoints> tenant_points);
+          std::shared_ptr<TenantPoints> tenant_points, SessionLog& log);
+  // The session that was written down as `stored`: without mesher, its files not looked at yet. Its lease begins anew.
+  // An operation that had not ended waits for a worker again.
+  //
+  // Errors:     those of parameters that this server does not know any more.
+  static absl::StatusOr<std::shared_ptr<Session>> Restore(const StoredSession& stored, const ServiceOptions& options,
+                                                          MemoryBudget& memory, Clock clock,
+                                                          std::shared_ptr<TenantPoints> tenant_points, SessionLog& log);
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
@@ -94,19 +109,32 @@ class Session {
   // A session with a SessionUse, or with an operation under way, does not expire.
   bool IsExpired() const;
 
+  // Of this and all other changes, besides those that are named there: DISK_FULL, STORE_FAILED.
+
+  // Writes down that there is this session. To be called once, of a new one, before others know it.
+  absl::Status LogCreation(const AnswerTo<v1::Session>& answer);
+
+  // For one that was written down before: writes down what the new process has changed of its operation, and returns
+  // it, for its work to be done; or null, if none was under way.
+  absl::StatusOr<std::shared_ptr<Operation>> ResumeOperation();
+
   // Changes what is given.
   //
   // Errors:     REVISION_MISMATCH.
   absl::Status Update(std::optional<std::map<std::string, std::string>> labels, std::optional<absl::Duration> ttl,
-                      uint64_t expected_revision);
+                      uint64_t expected_revision, const AnswerTo<v1::Session>& answer = nullptr);
 
   // For a session that leaves its store: from now on every change, and every question about points and mesh, ends with
   // SESSION_NOT_FOUND. Returns the operation that is under way, which the caller is to cancel, or null.
   //
   // Errors:     REVISION_MISMATCH, SESSION_NOT_FOUND (it was closed before): nothing has been done.
-  absl::StatusOr<std::shared_ptr<Operation>> Close(uint64_t expected_revision);
+  absl::StatusOr<std::shared_ptr<Operation>> Close(uint64_t expected_revision,
+                                                   const std::optional<store::v1::AnswerRecord>& answer = std::nullopt);
   // Closes the session if its lease has run out, so that nothing is under way. Says whether it has.
   bool CloseIfExpired();
+  // Writes down that a session which was closed by its lease is no more. Should that fail, it is there again after the
+  // next start, with a new lease.
+  void LogExpiry();
 
   // Lets one upload have the session. False: another has it.
   bool BeginUpload();
@@ -124,11 +152,16 @@ class Session {
   absl::Status CheckPrefix(const Prefix& prefix) const;
 
   // Appends `coordinates`: whole points, of which the first becomes number `offset` of the session. Where the session
-  // has points already, they have to be equal, and are not appended again. `expected_revision` 0: any.
+  // has points already, they have to be equal, and are not appended again. `expected_revision` 0: any. With a log that
+  // is durable they belong to the session when CommitPoints has succeeded, and do not wait for it here.
   //
   // Errors:     INVALID_CHUNK_SHAPE, INVALID_POINTS, UPLOAD_GAP, UPLOAD_MISMATCH, SESSION_BUSY, TOO_MANY_POINTS,
   //             QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH, SESSION_NOT_FOUND. Nothing has been appended.
   absl::Status Append(uint64_t offset, std::span<const double> coordinates, uint64_t expected_revision);
+  // Makes all points that were appended the session's, for good. On an error those that are not are dropped.
+  absl::Status CommitPoints();
+  // Bytes of points that are appended and not committed.
+  uint64_t UncommittedBytes() const;
   // Points and revision, as one.
   v1::UploadPointsResponse Committed() const;
 
@@ -144,6 +177,10 @@ class Session {
 
   // The last mesh; null before the first.
   std::shared_ptr<const MeshSnapshot> mesh() const;
+  // Keeps `mesh`, the work of an operation that is under way, as the log keeps meshes.
+  //
+  // Errors:     those of SessionLog::KeepMesh.
+  absl::StatusOr<std::shared_ptr<MeshSnapshot>> KeepMesh(core::Mesh mesh, const core::RunContext& context) const;
 
   // Makes sure that the session has a structure for queries and additions. Where the mesher was given up, `job` builds
   // it again, on this thread, a worker's. `*is_at_work`: another job builds it now, and the status is SESSION_BUSY.
@@ -179,31 +216,32 @@ class Session {
   //             INVALID_POINTS, VERTEX_OUT_OF_RANGE, TOO_MANY_POINTS, QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH,
   //             SESSION_NOT_FOUND; CANCELLED.
   absl::StatusOr<AddedVertices> AddVertices(std::span<const double> points, std::span<const uint32_t> near,
-                                            uint64_t expected_revision, core::RunContext& context);
+                                            uint64_t expected_revision, core::RunContext& context,
+                                            const AnswerTo<AddedVertices>& answer = nullptr);
 
-  // Begins an operation. The session is busy until the operation has ended. The caller is to submit its work, or, if
-  // that is refused, to call Withdraw.
+  // Begins an operation. The session is busy until the operation has ended. `submit` is called with it, to submit its
+  // work; what it refuses is not begun.
   //
   // Errors:     SESSION_BUSY, REVISION_MISMATCH, SESSION_NOT_FOUND; INVALID_PARAMETERS, of those that a domain with
-  //             segments does not have.
+  //             segments does not have; those of `submit`. Of a log that fails, `submit` was called, and the operation
+  //             has ended without a trace.
+  using SubmitWork = std::function<absl::Status(const std::shared_ptr<Operation>&)>;
   absl::StatusOr<std::shared_ptr<Operation>> StartOperation(const core::MeshParameters& parameters,
-                                                            uint64_t expected_revision);
-  // Ends `operation`, the one that was started last, since its work was refused with `status`. The session is as it was
-  // before it, and does not have it any more. An operation that was cancelled in between stays, as cancelled.
-  //
-  // REQUIRES:   no job works on `operation`.
-  void Withdraw(Operation& operation, const absl::Status& status);
+                                                            uint64_t expected_revision, const SubmitWork& submit,
+                                                            const AnswerTo<v1::Operation>& answer = nullptr);
   // On the worker: what to work on; nothing if the operation has ended before it could begin.
   //
   // REQUIRES:   the operation has its job.
   std::optional<SessionWork> BeginWork(Operation& operation);
-  // On the worker: takes back what BeginWork gave, and ends the operation with `status`. `mesh` is the new mesh if the
-  // status is OK.
+  // Takes back what BeginWork gave, and ends the operation. One whose job was cancelled while no client has asked for
+  // it, and which the log keeps, is not ended: the next process goes on with it.
   //
-  // REQUIRES:   on an error, work.mesher is as it was, or null.
-  void EndWork(Operation& operation, const absl::Status& status, SessionWork work, std::shared_ptr<MeshSnapshot> mesh);
-  // Ends an operation that still waits for a worker as CANCELLED. False, and nothing is done, if it does not wait.
-  bool EndWaiting(Operation& operation);
+  // False:      the log has no room for the end, and nothing is done but that a `result` that was OK is an error now.
+  //             To be called again after a while.
+  bool EndWork(Operation& operation, WorkResult& result);
+  // Ends an operation that still waits for a worker as CANCELLED. Of one that runs it is noted that a client has asked
+  // for its end: its job is to be cancelled. No error if it has ended.
+  absl::Status Cancel(Operation& operation);
 
   // Errors:     OPERATION_NOT_FOUND.
   absl::StatusOr<std::shared_ptr<Operation>> FindOperation(const std::string& operation_name) const;
@@ -211,7 +249,7 @@ class Session {
   std::vector<std::shared_ptr<Operation>> ListOperations(uint64_t after, size_t count) const;
 
   // These are for the operation that is under way.
-  const PointStore& points() const { return points_; }
+  const PointStore& points() const { return *points_; }
   const FeatureStore& features() const { return features_; }
   // What has made the structure.
   const SessionSteps& steps() const { return steps_; }
@@ -220,9 +258,35 @@ class Session {
   friend class SessionUse;
 
   // Which change of the points or the mesh is under way. There is one at most.
-  enum class Busy { kNo, kOperation, kAddingVertices, kReplaying };
+  enum class Busy { kNo, kStarting, kOperation, kAddingVertices, kReplaying };
+
+  // The following want change_mutex_ to be held.
+
+  // Writes down what `fill` makes of a change that has the session as it is now, if the log keeps anything.
+  absl::Status Commit(const std::function<void(SessionChange&)>& fill,
+                      SessionLog::Survives survives = SessionLog::Survives::kPowerLoss);
+  // Reads segments and seeds that were written down by another process, if that was not done yet.
+  //
+  // Errors:     DATA_LOSS.
+  absl::Status LoadFeatures();
+  // Writes down what AddSegments has appended: all of `request` but for what was known.
+  absl::Status CommitFeatures(const v1::AddSegmentsRequest& request, uint64_t known_segments, uint64_t known_seeds);
+  // Adds to `change` the points from committed_points_ on, up to number `end`, whose checksum is `crc32c`.
+  void AddPointsTo(SessionChange& change, uint64_t end, uint32_t crc32c) const;
+  absl::Status CommitStart(const Operation& operation, uint64_t end, const AnswerTo<v1::Operation>& answer);
+  absl::Status CommitSuccess(const Operation& operation, const WorkResult& result, absl::Time now);
 
   // The following want mutex_ to be held.
+  v1::Session DescribeWith(const std::map<std::string, std::string>& labels, absl::Duration ttl) const;
+  store::v1::SessionRecord Record() const;
+  void Keep(std::shared_ptr<Operation> operation);
+  // Drops points that are not committed.
+  void DropUncommitted();
+  uint64_t PointCount() const { return points_->coordinate_count() / dimension_; }
+  // Of the points that are appended and not committed.
+  bool HasUncommitted() const { return PointCount() > committed_points_; }
+  // What the revision is when what was appended is committed.
+  uint64_t NextRevision() const { return revision_ + (HasUncommitted() ? 1 : 0); }
   absl::Status CheckOpen() const;
   absl::Status CheckRevision(uint64_t expected_revision) const;
   absl::Status CheckIdle() const;
@@ -241,6 +305,8 @@ class Session {
   absl::Status CheckKnown(const v1::AddSegmentsRequest& request, uint64_t* segments, uint64_t* seeds) const;
   // Refuses what no mesh of this session could have. `first` is the number of the first point.
   absl::Status CheckCoordinates(uint64_t first, std::span<const double> coordinates) const;
+  // What Restore sets besides steps and operations.
+  void SetState(const StoredSession& stored);
   void CloseNow();
   // The session is the caller's alone until EndBusy, and does not expire.
   void BeginBusy(Busy busy);
@@ -259,6 +325,11 @@ class Session {
   // refined; `*uploaded` says how many it has taken in, on an error too.
   absl::StatusOr<std::vector<uint32_t>> AddToMesher(std::span<const double> points, std::span<const uint32_t> near,
                                                     core::RunContext& context, uint64_t* uploaded);
+  // The end of AddVertices where the mesher has taken `points` in, after `uploaded` others: the log has them then.
+  absl::Status CommitAddition(std::span<const double> points, uint64_t uploaded, const AnswerTo<AddedVertices>& answer,
+                              AddedVertices* added);
+  // Gives the mesher up.
+  void DropMesher();
   // Checks what AddVertices is given. The mesher is to take in `waiting` points before.
   absl::Status CheckVertices(std::span<const double> points, std::span<const uint32_t> near, uint64_t waiting) const;
   // Reserves memory for `count` more vertices in the mesher.
@@ -270,7 +341,9 @@ class Session {
   const absl::Time create_time_;
   MemoryBudget& memory_;
   const Clock clock_;
+  SessionLog& log_;
 
+  mutable std::mutex change_mutex_;  // before mutex_; held over a change, and until the log has it
   mutable std::shared_mutex queries_mutex_;  // after mutex_; held shared by queries
   mutable std::mutex mutex_;
   // Guarded by mutex_.
@@ -283,14 +356,17 @@ class Session {
   bool is_ready_ = false;  // the last operation succeeded, and no points have come since
   uint64_t revision_ = 1;
   PointAccount point_account_;      // includes the points that AddVertices is adding
-  PointStore points_;               // see invariant (2)
+  std::unique_ptr<PointStore> points_;  // see invariant (2)
+  uint64_t committed_points_ = 0;   // of points_, those that are the session's
+  uint32_t uncommitted_crc32c_ = 0; // of the others
   FeatureStore features_;           // see invariant (2)
+  bool has_features_ = true;        // false: they were written down by another process, and not read yet
+  FeatureSummary feature_summary_;  // of them, read or not
   SessionWork work_;                // its mesher is away while an operation is under way; see invariant (2)
   SessionSteps steps_;              // see invariant (2)
   uint64_t structure_version_ = 0;  // of what queries see; 0: nothing yet
   uint64_t next_operation_ = 1;
   std::deque<std::shared_ptr<Operation>> operations_;  // ascending by number
-  std::shared_ptr<Operation> displaced_;  // the one that made room for the last, until the work of the last has begun
 };
 
 // Keeps a session from expiring, and renews its lease at the end.

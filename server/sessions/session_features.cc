@@ -70,36 +70,79 @@ absl::Status Session::AddSegments(const v1::AddSegmentsRequest& request, uint64_
   if (dimension_ != 2) {
     return NotInThePlane(request.has_segments() || !request.has_faces() ? "segments" : "faces", dimension_);
   }
-  std::lock_guard lock(mutex_);
-  WELLSPACE_RETURN_IF_ERROR(CheckReadyForChange(expected_revision));
+  std::lock_guard change_lock(change_mutex_);
+  WELLSPACE_RETURN_IF_ERROR(LoadFeatures());
   uint64_t known_segments = 0;
   uint64_t known_seeds = 0;
-  WELLSPACE_RETURN_IF_ERROR(CheckKnown(request, &known_segments, &known_seeds));
-  const uint64_t segments = request.segments().ends_size() / 2 - known_segments;
-  const uint64_t seeds = request.faces().seeds_size() - known_seeds;
-  if (segments == 0 && seeds == 0 && !(request.has_faces() && features_.HasOtherRules(request.faces()))) {
-    return absl::OkStatus();
+  const uint64_t all_segments = request.segments().ends_size() / 2;
+  const uint64_t all_seeds = request.faces().seeds_size();
+  {
+    std::lock_guard lock(mutex_);
+    WELLSPACE_RETURN_IF_ERROR(CheckReadyForChange(expected_revision));
+    WELLSPACE_RETURN_IF_ERROR(CheckKnown(request, &known_segments, &known_seeds));
+    if (known_segments == all_segments && known_seeds == all_seeds &&
+        !(request.has_faces() && features_.HasOtherRules(request.faces()))) {
+      return absl::OkStatus();
+    }
+    if (work_.mesh != nullptr) {
+      return MakeError(v1::ERROR_REASON_DOMAIN_FIXED,
+                       absl::StrCat(name_,
+                                    " has been refined; segments and faces can be added only before the first "
+                                    "refinement: create another session for this domain"));
+    }
+    WELLSPACE_RETURN_IF_ERROR(point_account_.TakeFeatures(all_segments - known_segments, all_seeds - known_seeds));
   }
-  if (work_.mesh != nullptr) {
-    return MakeError(v1::ERROR_REASON_DOMAIN_FIXED,
-                     absl::StrCat(name_,
-                                  " has been refined; segments and faces can be added only before the first "
-                                  "refinement: create another session for this domain"));
+  const FeatureStore::Extent before = features_.extent();
+  const absl::Status status = RunGuarded([&] {
+    {
+      std::lock_guard lock(mutex_);
+      features_.Append(request.segments(), known_segments);
+      if (request.has_faces()) {
+        features_.Append(request.faces(), known_seeds);
+      }
+    }
+    return CommitFeatures(request, known_segments, known_seeds);
+  });
+  std::lock_guard lock(mutex_);
+  if (!status.ok()) {
+    features_.TakeBack(before);
+    point_account_.ReturnFeatures(all_segments - known_segments, all_seeds - known_seeds);
+    return status;
   }
-  WELLSPACE_RETURN_IF_ERROR(point_account_.TakeFeatures(segments, seeds));
-  features_.Append(request.segments(), known_segments);
-  if (request.has_faces()) {
-    features_.Append(request.faces(), known_seeds);
-  }
+  feature_summary_ = features_.Summary();
   ++revision_;
   return absl::OkStatus();
+}
+
+absl::Status Session::CommitFeatures(const v1::AddSegmentsRequest& request, uint64_t known_segments,
+                                     uint64_t known_seeds) {
+  return Commit([&](SessionChange& change) {
+    store::v1::StepRecord::Features& step = *change.steps.emplace_back().mutable_features();
+    *step.mutable_segments() = request.segments();
+    step.mutable_segments()->mutable_ends()->ExtractSubrange(0, static_cast<int>(2 * known_segments), nullptr);
+    if (request.segments().markers_size() != 0) {
+      step.mutable_segments()->mutable_markers()->ExtractSubrange(0, static_cast<int>(known_segments), nullptr);
+    }
+    if (request.has_faces()) {
+      *step.mutable_faces() = request.faces();
+      step.mutable_faces()->mutable_seeds()->DeleteSubrange(0, static_cast<int>(known_seeds));
+    }
+    const FeatureSummary summary = features_.Summary();
+    store::v1::SessionRecord& state = *change.state;
+    state.set_segments(summary.segments);
+    state.set_seeds(summary.seeds);
+    state.set_has_rules(summary.has_rules);
+    state.set_faces(summary.faces);
+    state.set_crossings(summary.crossings);
+    state.set_revision(state.revision() + 1);
+  });
 }
 
 v1::AddSegmentsResponse Session::CommittedSegments() const {
   v1::AddSegmentsResponse message;
   std::lock_guard lock(mutex_);
-  message.set_segment_count(features_.segment_count());
-  message.set_seed_count(features_.seed_count());
+  message.set_segment_count(feature_summary_.segments);
+  message.set_seed_count(feature_summary_.seeds);
   message.set_revision(revision_);
   return message;
 }

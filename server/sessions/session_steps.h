@@ -19,8 +19,7 @@ struct SessionStep {
 };
 
 // The steps of a session that succeeded, in their order. Structure and mesh are a function of these and of the points:
-// Replay (server/sessions/replay.h) computes it. What did not succeed is no step. These live as long as the session; a
-// log on disk can take their place.
+// Replay (server/sessions/replay.h) computes it. What did not succeed is no step. They are as well in the SessionLog.
 //
 // Thread safety: thread-compatible.
 // Invariants: (1) the first step is a refinement; (2) steps[i].end <= steps[i + 1].uploads_end <= steps[i + 1].end.

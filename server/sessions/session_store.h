@@ -33,10 +33,16 @@ class SessionStore {
  public:
   virtual ~SessionStore() = default;
 
-  // Makes a session without points.
+  // Makes a session without points, and has it written down.
   //
-  // Errors:     QUOTA_EXCEEDED (the tenant's sessions), TOO_MANY_SESSIONS (the server's).
-  virtual absl::StatusOr<std::shared_ptr<Session>> Create(NewSession settings) = 0;
+  // Errors:     QUOTA_EXCEEDED (the tenant's sessions), TOO_MANY_SESSIONS (the server's); DISK_FULL, STORE_FAILED.
+  virtual absl::StatusOr<std::shared_ptr<Session>> Create(NewSession settings,
+                                                          const AnswerTo<v1::Session>& answer = nullptr) = 0;
+
+  // Takes a session in that was written down before the server was started, whatever the limits are now.
+  //
+  // Errors:     those of Session::Restore.
+  virtual absl::StatusOr<std::shared_ptr<Session>> Restore(const StoredSession& stored) = 0;
 
   // The session `name` of `tenant`, its lease renewed.
   //
@@ -54,7 +60,7 @@ class SessionStore {
   // How many there are, of all tenants.
   virtual size_t Count() const = 0;
 
-  // Takes those out whose lease has run out.
+  // Takes those out whose lease has run out. The caller is to have their end written down (Session::LogExpiry).
   virtual std::vector<std::shared_ptr<Session>> RemoveExpired() = 0;
 };
 

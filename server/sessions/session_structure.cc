@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
+#include "proto/checksum.h"
 #include "server/sessions/replay.h"
 #include "server/sessions/session.h"
 #include "server/wire/errors.h"
@@ -21,6 +22,8 @@ constexpr uint64_t kReservedVertices = 2;
 absl::Status Session::PrepareStructure(uint64_t expected_revision, const MesherFactory& create_mesher, Job& job,
                                        bool* is_at_work) {
   {
+    std::lock_guard change_lock(change_mutex_);
+    WELLSPACE_RETURN_IF_ERROR(LoadFeatures());
     std::lock_guard lock(mutex_);
     if (is_at_work != nullptr) {
       *is_at_work = busy_ == Busy::kReplaying && !is_closed_;
@@ -42,13 +45,13 @@ absl::Status Session::PrepareStructure(uint64_t expected_revision, const MesherF
 Session::Size Session::GetSize(uint64_t few) const {
   std::lock_guard lock(mutex_);
   Size size;
-  size.points = points_.coordinate_count() / dimension_;
-  size.segments = features_.segment_count();
+  size.points = PointCount();
+  size.segments = feature_summary_.segments;
   if (size.points <= few) {
-    size.some_points = points_.CopyFrom(0, core::RunContext()).value_or(std::vector<double>());
+    size.some_points = points_->CopyFrom(0, core::RunContext()).value_or(std::vector<double>());
   }
   if (work_.mesh != nullptr) {
-    size.vertices = work_.mesh->chunks.mesh().vertex_count();
+    size.vertices = work_.mesh->figures().vertices;
     // Of a session that is busy the mesher is not looked at.
     const bool is_given_up = busy_ == Busy::kReplaying || (busy_ == Busy::kNo && work_.mesher == nullptr);
     size.replayed_steps = is_given_up ? steps_.all().size() : 0;
@@ -58,7 +61,7 @@ Session::Size Session::GetSize(uint64_t few) const {
 
 absl::Status Session::Rebuild(const MesherFactory& create_mesher, Job& job) {
   WELLSPACE_ASSIGN_OR_RETURN(work_.mesher,
-                             Replay(steps_, points_, features_, work_.mesh->chunks.mesh(), create_mesher, job));
+                             Replay(steps_, *points_, features_, *work_.mesh, create_mesher, job));
   work_.memory = job.TakeMemory(work_.mesher->memory_bytes());
   work_.memory.MakeLasting();
   return absl::OkStatus();
@@ -68,6 +71,7 @@ void Session::WaitForQueries() { std::unique_lock wait(queries_mutex_); }
 
 absl::Status Session::BeginAddition(std::span<const double> points, std::span<const uint32_t> near,
                                     uint64_t expected_revision) {
+  std::lock_guard change_lock(change_mutex_);
   std::lock_guard lock(mutex_);
   WELLSPACE_RETURN_IF_ERROR(CheckReadyForChange(expected_revision));
   WELLSPACE_RETURN_IF_ERROR(CheckStructure());
@@ -89,13 +93,14 @@ absl::Status Session::BeginAddition(std::span<const double> points, std::span<co
 }
 
 absl::StatusOr<AddedVertices> Session::AddVertices(std::span<const double> points, std::span<const uint32_t> near,
-                                                   uint64_t expected_revision, core::RunContext& context) {
+                                                   uint64_t expected_revision, core::RunContext& context,
+                                                   const AnswerTo<AddedVertices>& answer) {
   WELLSPACE_RETURN_IF_ERROR(BeginAddition(points, near, expected_revision));
   WaitForQueries();
   uint64_t uploaded = 0;
   bool has_returned = false;
   AddedVertices added;
-  const absl::Status status = RunGuarded([&] {
+  absl::Status status = RunGuarded([&] {
     absl::StatusOr<std::vector<uint32_t>> vertices = AddToMesher(points, near, context, &uploaded);
     has_returned = true;
     WELLSPACE_ASSIGN_OR_RETURN(added.vertices, std::move(vertices));
@@ -104,33 +109,76 @@ absl::StatusOr<AddedVertices> Session::AddVertices(std::span<const double> point
   if (!has_returned || (!status.ok() && uploaded > 0)) {
     // An exception leaves a mesher in an unknown state; else points that waited are in it, which would come with
     // others.
-    work_.mesher = nullptr;
-    work_.memory.Release();
+    DropMesher();
   } else if (memory_.is_limited()) {
     // What was reserved is more than was needed but for the most uneven points; those are counted by the next
     // refinement.
     (void)work_.memory.Resize(work_.mesher->memory_bytes());
   }
+  if (status.ok()) {
+    status = RunGuarded([&] { return CommitAddition(points, uploaded, answer, &added); });
+    if (!status.ok()) {
+      DropMesher();  // it has them
+    }
+  }
   std::lock_guard lock(mutex_);
   EndBusy();
-  const uint64_t count = points.size() / dimension_;
   if (!status.ok()) {
-    point_account_.Return(count);
+    point_account_.Return(points.size() / dimension_);
     return status;
   }
-  if (uploaded > 0 || count > 0) {
-    const uint64_t uploads_end = work_.meshed_points + uploaded;
-    steps_.NoteAddition(uploads_end, uploads_end + count);
-    work_.meshed_points = steps_.points();
-    ++structure_version_;
-  }
-  if (count > 0) {
-    points_.Append(points);
-    is_ready_ = false;
-    ++revision_;
-  }
-  added.revision = revision_;
   return added;
+}
+
+void Session::DropMesher() {
+  work_.mesher = nullptr;
+  work_.memory.Release();
+}
+
+absl::Status Session::CommitAddition(std::span<const double> points, uint64_t uploaded,
+                                     const AnswerTo<AddedVertices>& answer, AddedVertices* added) {
+  const uint64_t count = points.size() / dimension_;
+  if (uploaded == 0 && count == 0) {
+    added->revision = revision_;
+    return absl::OkStatus();
+  }
+  std::lock_guard change_lock(change_mutex_);
+  const uint64_t known = PointCount();
+  const uint64_t uploads_end = work_.meshed_points + uploaded;
+  const bool grows = known + count > committed_points_;
+  added->revision = revision_ + (grows ? 1 : 0);
+  const std::optional<store::v1::AnswerRecord> answer_record = answer == nullptr ? std::nullopt : answer(*added);
+  absl::Status status = points_->Append(points);
+  if (status.ok() && grows) {
+    status = points_->Synchronize();
+  }
+  if (status.ok()) {
+    status = Commit([&](SessionChange& change) {
+      if (grows) {
+        AddPointsTo(change, known + count,
+                    ExtendCrc32c(uncommitted_crc32c_, points.data(), points.size_bytes()));
+        change.state->set_revision(added->revision);
+        change.state->set_is_ready(false);
+      }
+      store::v1::StepRecord::Added& step = *change.steps.emplace_back().mutable_added();
+      step.set_uploads_end(uploads_end);
+      step.set_end(uploads_end + count);
+      change.answer = answer_record;
+    });
+  }
+  std::lock_guard lock(mutex_);
+  if (!status.ok()) {
+    points_->Truncate(known * dimension_);
+    return status;
+  }
+  steps_.NoteAddition(uploads_end, uploads_end + count);
+  work_.meshed_points = steps_.points();
+  ++structure_version_;
+  committed_points_ = known + count;
+  uncommitted_crc32c_ = 0;
+  is_ready_ = is_ready_ && !grows;
+  revision_ = added->revision;
+  return absl::OkStatus();
 }
 
 absl::Status Session::CheckVertices(std::span<const double> points, std::span<const uint32_t> near,
@@ -152,7 +200,7 @@ absl::StatusOr<std::vector<uint32_t>> Session::AddToMesher(std::span<const doubl
   WELLSPACE_RETURN_IF_ERROR(ReserveForVertices(point_account_.points() - work_.meshed_points));
   // Points that were uploaded since the last refinement come first: they have lower numbers.
   WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> waiting,
-                             points_.CopyFrom(work_.meshed_points * dimension_, context));
+                             points_->CopyFrom(work_.meshed_points * dimension_, context));
   if (!waiting.empty()) {
     // What is wrong with the vertices shows before the mesher has taken in others, which would cost it.
     WELLSPACE_RETURN_IF_ERROR(CheckVertices(points, near, waiting.size() / dimension_));

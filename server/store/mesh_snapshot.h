@@ -45,6 +45,11 @@ class MeshSnapshot {
 
   // What it takes in memory, chunks on their way included.
   virtual uint64_t memory_bytes() const = 0;
+  // What Load makes takes about as much.
+  uint64_t loaded_bytes() const {
+    const uint64_t dimension = figures_.domain_low.size();
+    return figures_.vertices * dimension * sizeof(double) + figures_.simplices * (dimension + 1) * sizeof(uint32_t);
+  }
   // Keeps what is reserved for it as long as it lives. To be called once, before others know it.
   virtual void KeepMemory(MemoryReservation memory) = 0;
 

@@ -2,13 +2,17 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
+#include "absl/cleanup/cleanup.h"
 #include "core/base/status_macros.h"
 #include "proto/checksum.h"
 
 namespace wellspace::server {
 
 absl::Status MemoryPoints::Append(std::span<const double> coordinates) {
+  const uint64_t before = coordinate_count_;
+  auto take_back = absl::MakeCleanup([this, before] { Truncate(before); });
   while (!coordinates.empty()) {
     if (blocks_.empty() || blocks_.back().size() == kBlockSize) {
       blocks_.emplace_back();
@@ -22,6 +26,7 @@ absl::Status MemoryPoints::Append(std::span<const double> coordinates) {
     coordinate_count_ += count;
     coordinates = coordinates.subspan(count);
   }
+  std::move(take_back).Cancel();
   return absl::OkStatus();
 }
 
@@ -34,6 +39,9 @@ void MemoryPoints::Truncate(uint64_t count) {
     if (block.empty()) {
       blocks_.pop_back();
     }
+  }
+  if (!blocks_.empty() && blocks_.back().empty()) {
+    blocks_.pop_back();
   }
 }
 

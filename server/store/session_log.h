@@ -39,8 +39,7 @@ struct AnswerKey {
 // A session as it was written down. Its features are read when they are needed (SessionLog::ReadFeatures).
 struct StoredSession {
   store::v1::SessionRecord state;
-  std::vector<store::v1::StepRecord> steps;  // all but those of features, in their order
-  std::vector<uint64_t> step_numbers;        // of these, ascending
+  std::vector<store::v1::StepRecord> steps;            // all but those of features, in their order
   std::vector<store::v1::OperationRecord> operations;  // ascending by number
 };
 

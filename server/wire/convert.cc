@@ -1,6 +1,7 @@
 #include "server/wire/convert.h"
 
 #include <algorithm>
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -218,6 +219,13 @@ absl::Status ValidateForDomain(const core::MeshParameters& parameters, const cor
   }
   const std::string message(status.message());
   return InvalidParameter(message, message.substr(0, message.find(':')));
+}
+
+absl::StatusOr<core::MeshParameters> ParametersFromRecord(const v1::MeshParameters& message) {
+  ServiceOptions unlimited;
+  unlimited.max_threads = std::numeric_limits<int>::max();
+  unlimited.max_vertices = core::kMaxVertices;
+  return ParametersFromProto(message, unlimited);
 }
 
 v1::MeshParameters ParametersToProto(const core::MeshParameters& parameters) {

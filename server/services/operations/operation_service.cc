@@ -17,16 +17,17 @@ namespace wellspace::server {
 namespace {
 
 absl::Status Start(const CallEnvironment& environment, const Caller& caller, const v1::StartRefinementRequest& request,
-                   v1::Operation* started) {
+                   const IdentifiedRequest& identified, v1::StartRefinementResponse& response) {
   WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<Session> session, FindSession(environment, caller, request.name()));
   core::MeshParameters parameters = session->parameters();
   if (request.has_parameters()) {
     WELLSPACE_ASSIGN_OR_RETURN(parameters, ParametersForSession(request.parameters(), environment.options, *session));
   }
-  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<Operation> operation,
-                             StartRefinement(environment, session, parameters, request.expected_revision()));
-  *started = operation->Describe();
-  return absl::OkStatus();
+  const auto answer = [&](const v1::Operation& started) {
+    *response.mutable_operation() = started;
+    return identified.Answer(response);
+  };
+  return StartRefinement(environment, session, parameters, request.expected_revision(), answer).status();
 }
 
 absl::Status Get(const CallEnvironment& environment, const Caller& caller, const v1::GetOperationRequest& request,
@@ -39,7 +40,7 @@ absl::Status Get(const CallEnvironment& environment, const Caller& caller, const
 absl::Status Cancel(const CallEnvironment& environment, const Caller& caller, const v1::CancelOperationRequest& request,
                     v1::Operation* cancelled) {
   WELLSPACE_ASSIGN_OR_RETURN(const FoundOperation found, FindOperation(environment, caller, request.name()));
-  CancelOperation(environment, *found.session, *found.operation);
+  WELLSPACE_RETURN_IF_ERROR(CancelOperation(environment, *found.session, *found.operation));
   *cancelled = found.operation->Describe();
   return absl::OkStatus();
 }
@@ -64,9 +65,10 @@ absl::Status List(const CallEnvironment& environment, const Caller& caller, cons
 grpc::ServerUnaryReactor* OperationService::StartRefinement(grpc::CallbackServerContext* context,
                                                             const v1::StartRefinementRequest* request,
                                                             v1::StartRefinementResponse* response) {
-  return UnaryCall::ServeOnce(environment_, context, request, response,
-                              [this, request](const Caller& caller, v1::StartRefinementResponse& answer) {
-                                return Start(environment_, caller, *request, answer.mutable_operation());
+  return UnaryCall::ServeOnce(environment_, context, request, response, request->name(),
+                              [this](const Caller& caller, const v1::StartRefinementRequest& own,
+                                     const IdentifiedRequest& identified, v1::StartRefinementResponse& answer) {
+                                return Start(environment_, caller, own, identified, answer);
                               });
 }
 
@@ -91,10 +93,11 @@ grpc::ServerUnaryReactor* OperationService::ListOperations(grpc::CallbackServerC
 grpc::ServerUnaryReactor* OperationService::CancelOperation(grpc::CallbackServerContext* context,
                                                             const v1::CancelOperationRequest* request,
                                                             v1::CancelOperationResponse* response) {
-  return UnaryCall::Serve(environment_, context, response,
-                          [this, request](const Caller& caller, v1::CancelOperationResponse& answer) {
-                            return Cancel(environment_, caller, *request, answer.mutable_operation());
-                          });
+  return UnaryCall::ServeChange(
+      environment_, context, request, response, SessionOf(request->name()),
+      [this](const Caller& caller, const v1::CancelOperationRequest& own, v1::CancelOperationResponse& answer) {
+        return Cancel(environment_, caller, own, answer.mutable_operation());
+      });
 }
 
 grpc::ServerWriteReactor<v1::WatchOperationResponse>* OperationService::WatchOperation(

@@ -18,7 +18,13 @@ struct Addition {
   std::vector<double> points;
   std::vector<uint32_t> near;
   uint64_t expected_revision = 0;
+  IdentifiedRequest identified;
 };
+
+void SetResponse(const AddedVertices& added, v1::AddVerticesResponse& response) {
+  response.mutable_vertices()->Assign(added.vertices.begin(), added.vertices.end());
+  response.set_revision(added.revision);
+}
 
 // On a worker.
 RequestIds::Answer Add(const Addition& addition, const MesherFactory& create_mesher, Job& job) {
@@ -26,11 +32,14 @@ RequestIds::Answer Add(const Addition& addition, const MesherFactory& create_mes
   absl::Status status = RunGuarded([&] {
     Session& session = addition.use.session();
     WELLSPACE_RETURN_IF_ERROR(session.PrepareStructure(addition.expected_revision, create_mesher, job));
-    WELLSPACE_ASSIGN_OR_RETURN(
-        const AddedVertices added,
-        session.AddVertices(addition.points, addition.near, addition.expected_revision, job.context()));
-    response.mutable_vertices()->Add(added.vertices.begin(), added.vertices.end());
-    response.set_revision(added.revision);
+    const auto answer = [&](const AddedVertices& added) {
+      SetResponse(added, response);
+      return addition.identified.Answer(response);
+    };
+    WELLSPACE_ASSIGN_OR_RETURN(const AddedVertices added,
+                               session.AddVertices(addition.points, addition.near, addition.expected_revision,
+                                                   job.context(), answer));
+    SetResponse(added, response);
     return absl::OkStatus();
   });
   return {std::move(status), response.SerializeAsString()};
@@ -47,13 +56,15 @@ grpc::ServerUnaryReactor* AddVerticesCall::Serve(const CallEnvironment& environm
   if (call->is_admitted_) {
     environment.request_ids.Once(
         call->caller().tenant, request->request_id(), *request,
-        [&call](RequestIds::Done done) { call->Submit(std::move(done)); },
+        [&call](const IdentifiedRequest& identified, RequestIds::Done done) {
+          call->Submit(identified, std::move(done));
+        },
         [call](const RequestIds::Answer& answer) { call->EndWith(answer); });
   }
   return call.get();
 }
 
-void AddVerticesCall::Submit(RequestIds::Done done) {
+void AddVerticesCall::Submit(const IdentifiedRequest& identified, RequestIds::Done done) {
   absl::StatusOr<std::shared_ptr<Session>> session = FindSession(environment(), caller(), request_->name());
   if (!session.ok()) {
     done({std::move(session).status(), ""});
@@ -66,7 +77,8 @@ void AddVerticesCall::Submit(RequestIds::Done done) {
       new Addition{.use = SessionUse(*std::move(session)),
                    .points = {request_->points().begin(), request_->points().end()},
                    .near = {request_->near().begin(), request_->near().end()},
-                   .expected_revision = request_->expected_revision()});
+                   .expected_revision = request_->expected_revision(),
+                   .identified = identified});
   absl::StatusOr<std::shared_ptr<Job>> job =
       environment().jobs.Submit({.tenant = caller().tenant,
                                  .is_small = is_small,

@@ -33,8 +33,8 @@ class AddVerticesCall final : public Call<grpc::ServerUnaryReactor> {
   void OnEnd() override;
   LogFields Figures() const override;
 
-  // Has the vertices added, and `done` called with what came of it.
-  void Submit(RequestIds::Done done);
+  // Has the vertices added for `identified`, and `done` called with what came of it.
+  void Submit(const IdentifiedRequest& identified, RequestIds::Done done);
   void EndWith(const RequestIds::Answer& answer);
 
   bool is_admitted_ = false;                     // set before the call is known to others

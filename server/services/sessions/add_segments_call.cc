@@ -19,22 +19,43 @@ void AddSegmentsCall::OnBegin() {
   ReadNext();
 }
 
-absl::Status AddSegmentsCall::Take(grpc::ByteBuffer* bytes) {
-  v1::AddSegmentsRequest request;
-  WELLSPACE_RETURN_IF_ERROR(ParseRequest(bytes, &request));
-  uint64_t expected_revision = 0;  // what the call has committed has changed the revision
+absl::Status AddSegmentsCall::Parse(grpc::ByteBuffer* bytes, v1::AddSegmentsRequest* request) {
+  WELLSPACE_RETURN_IF_ERROR(ParseRequest(bytes, request));
   if (!session_.has_value()) {
-    WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, FindSession(environment(), caller(), request.name()));
+    WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, FindSession(environment(), caller(), request->name()));
     session_.emplace(std::move(session));
-    expected_revision = request.expected_revision();
+  } else {
+    request->set_expected_revision(0);  // what the call has committed has changed the revision
   }
-  segment_count_ += request.segments().ends_size() / 2;
-  seed_count_ += request.faces().seeds_size();
-  return session_->session().AddSegments(request, expected_revision);
+  segment_count_ += request->segments().ends_size() / 2;
+  seed_count_ += request->faces().seeds_size();
+  return absl::OkStatus();
 }
 
 void AddSegmentsCall::OnRequest(grpc::ByteBuffer* bytes) {
-  if (absl::Status status = RunGuarded([&] { return Take(bytes); }); !status.ok()) {
+  const auto request = std::make_shared<v1::AddSegmentsRequest>();
+  if (absl::Status status = RunGuarded([&] { return Parse(bytes, request.get()); }); !status.ok()) {
+    End(std::move(status));
+  } else if (environment().session_log.is_durable()) {
+    environment().blocking.Run(session_->session().name(), [self = SharedAs<AddSegmentsCall>(), request] {
+      absl::Status added = self->Add(*request);
+      std::lock_guard lock(self->mutex_);
+      self->GoOn(std::move(added));
+    });
+  } else {
+    GoOn(Add(*request));
+  }
+}
+
+absl::Status AddSegmentsCall::Add(const v1::AddSegmentsRequest& request) {
+  return RunGuarded([&] { return session_->session().AddSegments(request, request.expected_revision()); });
+}
+
+void AddSegmentsCall::GoOn(absl::Status status) {
+  if (ending()) {
+    return;
+  }
+  if (!status.ok()) {
     End(std::move(status));
   } else {
     ReadNext();

@@ -32,8 +32,12 @@ class AddSegmentsCall final : public RequestStream<Call<grpc::ServerReadReactor<
   void OnEnd() override { memory_.Release(); }
   LogFields Figures() const override;
 
-  // Wants mutex_ to be held.
-  absl::Status Take(grpc::ByteBuffer* bytes);
+  // Reads `request` from `bytes`. The first one says which session it is for. Wants mutex_ to be held.
+  absl::Status Parse(grpc::ByteBuffer* bytes, v1::AddSegmentsRequest* request);
+  // Takes a message, on a thread that may wait for the session log.
+  absl::Status Add(const v1::AddSegmentsRequest& request);
+  // Reads the next message, or ends the call. Wants mutex_ to be held.
+  void GoOn(absl::Status status);
 
   grpc::ByteBuffer* const response_;  // gRPC's from Finish on
   // Guarded by mutex_.

@@ -6,8 +6,6 @@
 #include "core/base/status_macros.h"
 #include "server/calls/wire.h"
 #include "server/services/resource_names.h"
-#include "server/store/mesh_chunks.h"
-#include "server/wire/convert.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -28,17 +26,17 @@ absl::Status DownloadMeshCall::Find() {
     return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
                      absl::StrCat(session->name(), " has no mesh yet; refine it first"));
   }
-  if (request_.revision() != 0 && request_.revision() != mesh->revision) {
+  if (request_.revision() != 0 && request_.revision() != mesh->revision()) {
     return MakeError(absl::StatusCode::kFailedPrecondition, v1::ERROR_REASON_REVISION_MISMATCH,
-                     absl::StrCat("the mesh of ", session->name(), " is of revision ", mesh->revision, ", not ",
+                     absl::StrCat("the mesh of ", session->name(), " is of revision ", mesh->revision(), ", not ",
                                   request_.revision(), " as asked for; download it from its first chunk"),
                      "revision");
   }
-  const uint64_t chunks = mesh->chunks.count(request_.with_boundary());
-  if (request_.next_chunk() > chunks) {
+  WELLSPACE_ASSIGN_OR_RETURN(chunks_, mesh->ChunkCount(request_.with_boundary()));
+  if (request_.next_chunk() > chunks_) {
     return MakeError(
         v1::ERROR_REASON_CHUNK_OUT_OF_RANGE,
-        absl::StrCat("next_chunk is ", request_.next_chunk(), "; the mesh has ", chunks, " chunks, numbered from 0"),
+        absl::StrCat("next_chunk is ", request_.next_chunk(), "; the mesh has ", chunks_, " chunks, numbered from 0"),
         "next_chunk");
   }
   use_.emplace(std::move(session));
@@ -48,29 +46,35 @@ absl::Status DownloadMeshCall::Find() {
 }
 
 std::optional<grpc::ByteBuffer> DownloadMeshCall::NextResponse() {
-  const MeshChunks& chunks = mesh_->chunks;
-  const bool with_boundary = request_.with_boundary();
-  if (!metadata_sent_) {
-    metadata_sent_ = true;
-    v1::DownloadMeshResponse response;
-    *response.mutable_metadata() = MetadataToProto(chunks.mesh(), chunks.count(with_boundary), with_boundary);
-    response.mutable_metadata()->set_revision(mesh_->revision);
-    return Serialize(response);
-  }
-  if (next_chunk_ == chunks.count(with_boundary)) {
+  if (metadata_sent_ && next_chunk_ == chunks_) {
     End(absl::OkStatus());
     return std::nullopt;
   }
+  absl::StatusOr<grpc::ByteBuffer> response = MakeResponse();
+  if (!response.ok()) {
+    End(std::move(response).status());
+    return std::nullopt;
+  }
+  return *std::move(response);
+}
+
+absl::StatusOr<grpc::ByteBuffer> DownloadMeshCall::MakeResponse() {
+  const bool with_boundary = request_.with_boundary();
+  if (!metadata_sent_) {
+    v1::DownloadMeshResponse response;
+    WELLSPACE_ASSIGN_OR_RETURN(*response.mutable_metadata(), mesh_->Metadata(with_boundary));
+    metadata_sent_ = true;
+    return Serialize(response);
+  }
   environment().log.debug("call={} chunk={}", id(), next_chunk_);
-  return SerializeChunk(std::shared_ptr<const MeshChunks>(mesh_, &chunks), next_chunk_++,
-                        v1::DownloadMeshResponse::kChunkFieldNumber, with_boundary);
+  return mesh_->SerializeChunk(next_chunk_++, v1::DownloadMeshResponse::kChunkFieldNumber, with_boundary);
 }
 
 LogFields DownloadMeshCall::Figures() const {
   LogFields figures;
   if (mesh_ != nullptr) {
     figures.Add("session", request_.name())
-        .Add("vertices", mesh_->chunks.mesh().vertex_count())
+        .Add("vertices", mesh_->figures().vertices)
         .Add("chunks", next_chunk_ - request_.next_chunk());
   }
   return figures;

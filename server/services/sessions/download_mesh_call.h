@@ -34,6 +34,8 @@ class DownloadMeshCall final
 
   // Wants mutex_ to be held: finds the mesh.
   absl::Status Find();
+  // The same: the metadata, then the next chunk.
+  absl::StatusOr<grpc::ByteBuffer> MakeResponse();
 
   // Guarded by mutex_.
   grpc::ByteBuffer bytes_;
@@ -41,6 +43,7 @@ class DownloadMeshCall final
   std::optional<SessionUse> use_;
   std::shared_ptr<const MeshSnapshot> mesh_;  // null until found
   bool metadata_sent_ = false;
+  uint64_t chunks_ = 0;  // of the mesh, for this call
   uint64_t next_chunk_ = 0;
 };
 

@@ -25,16 +25,20 @@ namespace wellspace::server {
 namespace {
 
 absl::Status Create(const CallEnvironment& environment, const Caller& caller, const v1::CreateSessionRequest& request,
-                    v1::Session* created) {
+                    const IdentifiedRequest& identified, v1::CreateSessionResponse& response) {
   NewSession settings{.tenant = caller.tenant, .parameters = {}, .labels = {}, .ttl = {}};
   WELLSPACE_ASSIGN_OR_RETURN(settings.parameters, ParametersFromProto(request.parameters(), environment.options));
   WELLSPACE_RETURN_IF_ERROR(CheckParametersSize(settings.parameters));
   WELLSPACE_ASSIGN_OR_RETURN(settings.labels, LabelsFromProto(request.labels(), "labels"));
   WELLSPACE_ASSIGN_OR_RETURN(settings.ttl,
                              TtlFromProto(request.has_ttl() ? &request.ttl() : nullptr, "ttl", environment.options));
-  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<Session> session, environment.sessions.Create(std::move(settings)));
-  *created = session->Describe();
-  return absl::OkStatus();
+  return environment.sessions
+      .Create(std::move(settings),
+              [&](const v1::Session& created) {
+                *response.mutable_session() = created;
+                return identified.Answer(response);
+              })
+      .status();
 }
 
 // What the page tokens of a list of sessions depend on.
@@ -63,7 +67,7 @@ absl::Status List(const CallEnvironment& environment, const Caller& caller, cons
 }
 
 absl::Status Update(const CallEnvironment& environment, const Caller& caller, const v1::UpdateSessionRequest& request,
-                    v1::Session* updated) {
+                    const IdentifiedRequest& identified, v1::UpdateSessionResponse& response) {
   WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<Session> session,
                              FindSession(environment, caller, request.session().name(), "session.name"));
   bool sets_labels = !request.has_update_mask();
@@ -84,17 +88,21 @@ absl::Status Update(const CallEnvironment& environment, const Caller& caller, co
     const google::protobuf::Duration* given = request.session().has_ttl() ? &request.session().ttl() : nullptr;
     WELLSPACE_ASSIGN_OR_RETURN(ttl, TtlFromProto(given, "session.ttl", environment.options));
   }
-  WELLSPACE_RETURN_IF_ERROR(session->Update(std::move(labels), ttl, request.expected_revision()));
-  *updated = session->Describe();
-  return absl::OkStatus();
+  return session->Update(std::move(labels), ttl, request.expected_revision(), [&](const v1::Session& updated) {
+    *response.mutable_session() = updated;
+    return identified.Answer(response);
+  });
 }
 
-absl::Status Delete(const CallEnvironment& environment, const Caller& caller, const v1::DeleteSessionRequest& request) {
+absl::Status Delete(const CallEnvironment& environment, const Caller& caller, const v1::DeleteSessionRequest& request,
+                    const IdentifiedRequest& identified) {
   WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, FindSession(environment, caller, request.name()));
-  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<Operation> under_way, session->Close(request.expected_revision()));
+  WELLSPACE_ASSIGN_OR_RETURN(
+      const std::shared_ptr<Operation> under_way,
+      session->Close(request.expected_revision(), identified.Answer(v1::DeleteSessionResponse())));
   environment.sessions.Remove(*session);
   if (under_way != nullptr) {
-    CancelOperation(environment, *session, *under_way);
+    WELLSPACE_RETURN_IF_ERROR(CancelOperation(environment, *session, *under_way));
   }
   // To free much memory takes long.
   environment.background.Post([session = std::move(session)] {});
@@ -113,9 +121,10 @@ absl::Status Get(const CallEnvironment& environment, const Caller& caller, const
 grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerContext* context,
                                                         const v1::CreateSessionRequest* request,
                                                         v1::CreateSessionResponse* response) {
-  return UnaryCall::ServeOnce(environment_, context, request, response,
-                              [this, request](const Caller& caller, v1::CreateSessionResponse& answer) {
-                                return Create(environment_, caller, *request, answer.mutable_session());
+  return UnaryCall::ServeOnce(environment_, context, request, response, "",
+                              [this](const Caller& caller, const v1::CreateSessionRequest& own,
+                                     const IdentifiedRequest& identified, v1::CreateSessionResponse& answer) {
+                                return Create(environment_, caller, own, identified, answer);
                               });
 }
 
@@ -140,18 +149,20 @@ grpc::ServerUnaryReactor* SessionService::ListSessions(grpc::CallbackServerConte
 grpc::ServerUnaryReactor* SessionService::UpdateSession(grpc::CallbackServerContext* context,
                                                         const v1::UpdateSessionRequest* request,
                                                         v1::UpdateSessionResponse* response) {
-  return UnaryCall::ServeOnce(environment_, context, request, response,
-                              [this, request](const Caller& caller, v1::UpdateSessionResponse& answer) {
-                                return Update(environment_, caller, *request, answer.mutable_session());
+  return UnaryCall::ServeOnce(environment_, context, request, response, request->session().name(),
+                              [this](const Caller& caller, const v1::UpdateSessionRequest& own,
+                                     const IdentifiedRequest& identified, v1::UpdateSessionResponse& answer) {
+                                return Update(environment_, caller, own, identified, answer);
                               });
 }
 
 grpc::ServerUnaryReactor* SessionService::DeleteSession(grpc::CallbackServerContext* context,
                                                         const v1::DeleteSessionRequest* request,
                                                         v1::DeleteSessionResponse* response) {
-  return UnaryCall::ServeOnce(environment_, context, request, response,
-                              [this, request](const Caller& caller, v1::DeleteSessionResponse& /*answer*/) {
-                                return Delete(environment_, caller, *request);
+  return UnaryCall::ServeOnce(environment_, context, request, response, request->name(),
+                              [this](const Caller& caller, const v1::DeleteSessionRequest& own,
+                                     const IdentifiedRequest& identified, v1::DeleteSessionResponse& /*answer*/) {
+                                return Delete(environment_, caller, own, identified);
                               });
 }
 

@@ -17,6 +17,9 @@ namespace {
 constexpr absl::Duration kUploadRetryDelay = absl::Milliseconds(50);
 constexpr int kAttempts = 20;
 
+// Points wait for their commit until they are as many: less costs more of the disk, and more is lost with a connection.
+constexpr uint64_t kCommittedBytes = uint64_t{16} << 20;
+
 }  // namespace
 
 void UploadPointsCall::OnBegin() {
@@ -104,23 +107,72 @@ void UploadPointsCall::Take(const v1::UploadPointsRequest& request) {
   if (!status.ok()) {
     End(std::move(status));
   } else {
+    GoOn();
+  }
+}
+
+void UploadPointsCall::GoOn() {
+  const uint64_t waiting = session_->session().UncommittedBytes();
+  if (waiting >= kCommittedBytes && !is_committing_) {
+    is_committing_ = true;
+    Commit(&UploadPointsCall::OnCommitted);
+  }
+  is_reading_ = waiting < 2 * kCommittedBytes;
+  if (is_reading_) {
     ReadNext();
   }
+}
+
+void UploadPointsCall::Commit(void (UploadPointsCall::*then)(absl::Status)) {
+  environment().blocking.Run(session_->session().name(), [self = SharedAs<UploadPointsCall>(), then] {
+    absl::Status status = RunGuarded([&] { return self->session_->session().CommitPoints(); });
+    std::lock_guard lock(self->mutex_);
+    if (!self->ending()) {
+      (self.get()->*then)(std::move(status));
+    }
+  });
+}
+
+void UploadPointsCall::OnCommitted(absl::Status status) {
+  is_committing_ = false;
+  if (!status.ok()) {
+    End(std::move(status));
+  } else if (!is_reading_) {
+    GoOn();
+  }
+}
+
+void UploadPointsCall::OnLastCommitted(absl::Status status) {
+  if (status.ok()) {
+    *response_ = Serialize(session_->session().Committed());
+  }
+  End(std::move(status));
 }
 
 void UploadPointsCall::OnRequestsEnd() {
   if (!session_.has_value()) {
     End(MakeError(v1::ERROR_REASON_EMPTY_REQUEST,
                   "the stream ended before any request; send the name of the session first", "name"));
+  } else if (session_->session().UncommittedBytes() > 0) {
+    is_reading_ = true;  // there is nothing more to read
+    Commit(&UploadPointsCall::OnLastCommitted);
   } else {
-    *response_ = Serialize(session_->session().Committed());
-    End(absl::OkStatus());
+    OnLastCommitted(absl::OkStatus());
   }
 }
 
 void UploadPointsCall::OnEnd() {
   if (std::exchange(has_session_, false)) {
-    session_->session().EndUpload();
+    Session& session = session_->session();
+    if (session.UncommittedBytes() == 0) {
+      session.EndUpload();
+    } else {
+      // What was received is committed, and only then another upload may go on.
+      environment().blocking.Run(session.name(), [self = SharedAs<UploadPointsCall>(), &session] {
+        (void)RunGuarded([&] { return session.CommitPoints(); });
+        session.EndUpload();
+      });
+    }
   }
   first_.Clear();
   memory_.Release();

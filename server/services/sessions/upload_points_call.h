@@ -17,7 +17,7 @@
 
 namespace wellspace::server {
 
-// Commits each message before it reads the next. One upload has a session at a time: the first message of another waits
+// Commits what has come whenever it is kCommittedBytes, and at its end; it goes on reading meanwhile. One upload has a session at a time: the first message of another waits
 // for a moment, in which one whose connection broke is noticed.
 //
 // Thread safety and invariants: those of Call.
@@ -46,6 +46,13 @@ class UploadPointsCall final : public RequestStream<Call<grpc::ServerReadReactor
   absl::Status CheckPrefix(const v1::UploadPointsRequest& first) const;
   // Takes a message, and reads the next or ends the call.
   void Take(const v1::UploadPointsRequest& request);
+  // Begins a commit of what has come, if that is much and no other is under way; reads the next message unless too
+  // much waits for that.
+  void GoOn();
+  // Has what has come committed on a thread that may wait, and `then` called with the outcome, with mutex_ held.
+  void Commit(void (UploadPointsCall::*then)(absl::Status));
+  void OnCommitted(absl::Status status);
+  void OnLastCommitted(absl::Status status);
 
   grpc::ByteBuffer* const response_;  // gRPC's from Finish on
   // Guarded by mutex_.
@@ -53,6 +60,8 @@ class UploadPointsCall final : public RequestStream<Call<grpc::ServerReadReactor
   bool has_session_ = false;           // the session is this upload's
   int attempts_ = 0;                   // to have it
   bool is_first_ = true;               // no message has been taken
+  bool is_committing_ = false;         // a commit is under way
+  bool is_reading_ = true;             // a message is on its way; no: too much waits for the commit
   v1::UploadPointsRequest first_;      // while it waits for the session
   MemoryReservation memory_;           // of the message that comes
   uint64_t coordinate_count_ = 0;      // received

@@ -1,0 +1,241 @@
+// What a session does with its operations.
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
+#include "core/meshing_version.h"
+#include "server/sessions/session.h"
+#include "server/wire/convert.h"
+#include "server/wire/errors.h"
+
+namespace wellspace::server {
+namespace {
+
+constexpr size_t kKeptOperations = 100;
+
+}  // namespace
+
+void Session::Keep(std::shared_ptr<Operation> operation) {
+  operations_.push_back(std::move(operation));
+  if (operations_.size() > kKeptOperations) {
+    operations_.pop_front();
+  }
+}
+
+absl::StatusOr<std::shared_ptr<Operation>> Session::StartOperation(const core::MeshParameters& parameters,
+                                                                   uint64_t expected_revision, const SubmitWork& submit,
+                                                                   const AnswerTo<v1::Operation>& answer) {
+  std::lock_guard change_lock(change_mutex_);
+  WELLSPACE_RETURN_IF_ERROR(LoadFeatures());
+  std::shared_ptr<Operation> operation;
+  uint64_t end = 0;
+  {
+    std::lock_guard lock(mutex_);
+    WELLSPACE_RETURN_IF_ERROR(CheckReadyForChange(expected_revision));
+    if (!features_.IsEmpty()) {
+      WELLSPACE_RETURN_IF_ERROR(ValidateForDomain(parameters, features_.View()));
+    }
+    operation = std::make_shared<Operation>(absl::StrCat(name_, "/operations/", next_operation_), next_operation_,
+                                            parameters, clock_.wall());
+    BeginBusy(Busy::kStarting);
+    end = PointCount();
+  }
+  absl::Status status = submit(operation);
+  if (status.ok()) {
+    status = CommitStart(*operation, end, answer);
+  }
+  std::lock_guard lock(mutex_);
+  if (!status.ok()) {
+    EndBusy();
+    operation->Fail(clock_.wall(), status);  // its work, if it was submitted, does not begin
+    return status;
+  }
+  if (end > committed_points_) {
+    committed_points_ = end;
+    uncommitted_crc32c_ = 0;
+    is_ready_ = false;
+    ++revision_;
+  }
+  ++next_operation_;
+  busy_ = Busy::kOperation;
+  Keep(operation);
+  return operation;
+}
+
+absl::Status Session::CommitStart(const Operation& operation, uint64_t end, const AnswerTo<v1::Operation>& answer) {
+  const std::optional<store::v1::AnswerRecord> answer_record =
+      answer == nullptr ? std::nullopt : answer(operation.Describe());
+  if (end > committed_points_) {
+    WELLSPACE_RETURN_IF_ERROR(points_->Synchronize());
+  }
+  return Commit([&](SessionChange& change) {
+    if (end > committed_points_) {
+      AddPointsTo(change, end, uncommitted_crc32c_);
+      change.state->set_revision(change.state->revision() + 1);
+      change.state->set_is_ready(false);
+    }
+    change.state->set_next_operation(operation.number() + 1);
+    change.operations.push_back(operation.Record());
+    if (operations_.size() == kKeptOperations) {
+      change.dropped_operations.push_back(operations_.front()->number());
+    }
+    change.answer = answer_record;
+  });
+}
+
+std::optional<SessionWork> Session::BeginWork(Operation& operation) {
+  {
+    // An operation that is being started waits here until the log has it.
+    std::lock_guard change_lock(change_mutex_);
+    if (!operation.IsQueued()) {
+      return std::nullopt;
+    }
+    const absl::Time now = clock_.wall();
+    // Should the process die in this work, the next one is to know. Without that it would only try once more.
+    (void)Commit(
+        [&](SessionChange& change) {
+          change.state.reset();
+          change.operations.push_back(operation.RecordOfStart(now));
+        },
+        SessionLog::Survives::kProcessDeath);
+    operation.Start(now);
+  }
+  WaitForQueries();
+  std::lock_guard lock(mutex_);
+  return SessionWork{.mesher = std::move(work_.mesher),
+                     .meshed_points = work_.meshed_points,
+                     .mesh = work_.mesh,
+                     .memory = std::move(work_.memory)};
+}
+
+absl::Status Session::CommitSuccess(const Operation& operation, const WorkResult& result, absl::Time now) {
+  return Commit([&](SessionChange& change) {
+    const MeshSnapshot& mesh = *result.mesh;
+    store::v1::SessionRecord& state = *change.state;
+    state.set_revision(mesh.revision());
+    state.set_is_ready(true);
+    *state.mutable_parameters() = ParametersToProto(operation.parameters());
+    if (std::optional<store::v1::MeshRecord> record = mesh.record()) {
+      *state.mutable_mesh() = *std::move(record);
+    }
+    store::v1::StepRecord::Refined& step = *change.steps.emplace_back().mutable_refined();
+    step.set_points(committed_points_);
+    *step.mutable_parameters() = state.parameters();
+    if (steps_.empty()) {
+      step.set_begins(true);
+      step.set_meshing_version(core::kMeshingVersion);
+    }
+    const MeshSnapshot::Figures& figures = mesh.figures();
+    change.operations.push_back(
+        operation.RecordOfSuccess(now, figures.revision, figures.vertices, figures.simplices));
+  });
+}
+
+bool Session::EndWork(Operation& operation, WorkResult& result) {
+  std::unique_lock change_lock(change_mutex_);
+  const absl::Time now = clock_.wall();
+  if (result.status.ok()) {
+    result.status = CommitSuccess(operation, result, now);
+    if (!result.status.ok()) {
+      result.work.mesher = nullptr;
+      result.work.memory.Release();
+      result.mesh->MakeObsolete();
+    }
+  }
+  if (!result.status.ok()) {
+    const bool is_parked = absl::IsCancelled(result.status) && !operation.IsCancelled() && log_.is_durable();
+    const absl::Status logged = Commit([&](SessionChange& change) {
+      change.state.reset();
+      change.operations.push_back(is_parked ? operation.RecordOfParking() : operation.RecordOfFailure(now, result.status));
+    });
+    if (absl::IsResourceExhausted(logged)) {
+      return false;
+    }
+    if (is_parked) {
+      return true;
+    }
+  }
+  {
+    std::lock_guard lock(mutex_);
+    SessionWork& work = result.work;
+    if (result.status.ok()) {
+      if (work.mesh != nullptr) {
+        work.mesh->MakeObsolete();
+      }
+      work.mesh = std::move(result.mesh);
+      if (is_closed_) {
+        work.mesh->MakeObsolete();
+      }
+      revision_ = work.mesh->revision();
+      work.meshed_points = committed_points_;
+      steps_.NoteRefinement(work.meshed_points, operation.parameters());
+      parameters_ = operation.parameters();
+      is_ready_ = true;
+      ++structure_version_;
+      const MeshSnapshot::Figures& made = work.mesh->figures();
+      operation.Succeed(now, revision_, made.vertices, made.simplices);
+    } else {
+      operation.Fail(now, result.status);
+      work.meshed_points = steps_.points();
+    }
+    std::swap(work_, work);  // what was there is freed without the lock
+    EndBusy();
+  }
+  change_lock.unlock();
+  operation.Notify();
+  return true;
+}
+
+absl::Status Session::Cancel(Operation& operation) {
+  std::unique_lock change_lock(change_mutex_);
+  if (operation.HasEnded()) {
+    return absl::OkStatus();
+  }
+  const absl::Time now = clock_.wall();
+  const absl::Status cancelled = absl::CancelledError("the operation was cancelled");
+  const bool is_queued = operation.IsQueued();
+  store::v1::OperationRecord record = is_queued ? operation.RecordOfFailure(now, cancelled) : operation.Record();
+  record.set_is_cancelled(true);
+  WELLSPACE_RETURN_IF_ERROR(Commit([&](SessionChange& change) {
+    change.state.reset();
+    change.operations.push_back(std::move(record));
+  }));
+  operation.NoteCancel();
+  if (!is_queued) {
+    return absl::OkStatus();
+  }
+  {
+    std::lock_guard lock(mutex_);
+    EndBusy();
+    operation.Fail(now, cancelled);
+  }
+  change_lock.unlock();
+  operation.Notify();
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::shared_ptr<Operation>> Session::FindOperation(const std::string& operation_name) const {
+  std::lock_guard lock(mutex_);
+  const auto found = std::find_if(operations_.begin(), operations_.end(), [&](const std::shared_ptr<Operation>& kept) {
+    return kept->name() == operation_name;
+  });
+  if (found == operations_.end()) {
+    return MakeError(v1::ERROR_REASON_OPERATION_NOT_FOUND,
+                     absl::StrCat("there is no ", operation_name, "; the last ", kKeptOperations, " are kept"), "name");
+  }
+  return *found;
+}
+
+std::vector<std::shared_ptr<Operation>> Session::ListOperations(uint64_t after, size_t count) const {
+  std::vector<std::shared_ptr<Operation>> listed;
+  std::lock_guard lock(mutex_);
+  for (const std::shared_ptr<Operation>& operation : operations_) {
+    if (operation->number() > after && listed.size() < count) {
+      listed.push_back(operation);
+    }
+  }
+  return listed;
+}
+
+}  // namespace wellspace::server

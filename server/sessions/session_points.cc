@@ -1,0 +1,171 @@
+// What a session does with the points that are uploaded to it.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
+#include "proto/checksum.h"
+#include "server/sessions/session.h"
+#include "server/wire/errors.h"
+
+namespace wellspace::server {
+
+absl::Status Session::CheckCoordinates(uint64_t first, std::span<const double> coordinates) const {
+  // Before there is a mesh, a domain that was not given grows with the points.
+  const std::vector<double>* low = &parameters_.domain_low;
+  const std::vector<double>* high = &parameters_.domain_high;
+  if (work_.mesh != nullptr) {
+    low = &work_.mesh->figures().domain_low;
+    high = &work_.mesh->figures().domain_high;
+  }
+  int axis = 0;
+  for (size_t i = 0; i < coordinates.size(); ++i) {
+    const double x = coordinates[i];
+    if (low->empty() ? !std::isfinite(x) : !(x >= (*low)[axis] && x <= (*high)[axis])) {
+      return MakeError(
+          v1::ERROR_REASON_INVALID_POINTS,
+          absl::StrCat("points[", first + i / dimension_, "]: coordinate ", axis, " is ", x, "; ",
+                       low->empty() ? "a finite number is needed"
+                                    : absl::StrCat("in the domain it is from ", (*low)[axis], " to ", (*high)[axis])),
+          "points.coordinates");
+    }
+    axis = axis + 1 == dimension_ ? 0 : axis + 1;
+  }
+  return absl::OkStatus();
+}
+
+bool Session::BeginUpload() {
+  std::lock_guard lock(mutex_);
+  return !std::exchange(is_uploading_, true);
+}
+
+void Session::EndUpload() {
+  std::lock_guard lock(mutex_);
+  is_uploading_ = false;
+}
+
+absl::Status Session::CheckNoGap(uint64_t offset) const {
+  return offset <= point_account_.points()
+             ? absl::OkStatus()
+             : MakeError(v1::ERROR_REASON_UPLOAD_GAP,
+                         absl::StrCat("point_offset is ", offset, ", but ", name_, " has ", point_account_.points(),
+                                      " points; go on at ", point_account_.points(), " or before"),
+                         "point_offset");
+}
+
+absl::Status Session::CheckPrefix(const Prefix& prefix) const {
+  std::lock_guard lock(mutex_);
+  WELLSPACE_RETURN_IF_ERROR(CheckIdle());
+  WELLSPACE_RETURN_IF_ERROR(CheckNoGap(prefix.end));
+  WELLSPACE_ASSIGN_OR_RETURN(const uint32_t checksum,
+                             points_->Checksum(prefix.first * dimension_, prefix.end * dimension_));
+  return checksum == prefix.crc32c
+             ? absl::OkStatus()
+             : MakeError(v1::ERROR_REASON_UPLOAD_MISMATCH,
+                         absl::StrCat(name_, " has other points from number ", prefix.first, " up to ", prefix.end,
+                                      " than those that this upload goes on after: their checksum is ", checksum,
+                                      ", not ", prefix.crc32c, "; add these points at ", point_account_.points(),
+                                      ", or to another session"),
+                         "checked_crc32c");
+}
+
+absl::Status Session::CheckKnown(uint64_t first, std::span<const double> coordinates) const {
+  WELLSPACE_ASSIGN_OR_RETURN(const uint64_t equal, points_->CountEqual(first * dimension_, coordinates));
+  if (equal == coordinates.size()) {
+    return absl::OkStatus();
+  }
+  const uint64_t other = first * dimension_ + equal;
+  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> known, points_->Copy(other, other + 1, core::RunContext()));
+  const uint64_t point = first + equal / dimension_;
+  return MakeError(v1::ERROR_REASON_UPLOAD_MISMATCH,
+                   absl::StrCat("points[", point, "]: coordinate ", equal % dimension_, " is ", coordinates[equal],
+                                "; ", name_, " has this point already, with ", known[0],
+                                "; send the same again, or add other points at ", point_account_.points()),
+                   "points.coordinates");
+}
+
+absl::Status Session::Append(uint64_t offset, std::span<const double> coordinates, uint64_t expected_revision) {
+  std::lock_guard lock(mutex_);
+  WELLSPACE_RETURN_IF_ERROR(CheckReadyForChange(expected_revision));
+  if (coordinates.size() % dimension_ != 0) {
+    return MakeError(v1::ERROR_REASON_INVALID_CHUNK_SHAPE,
+                     absl::StrCat("the chunk at point ", offset, " has ", coordinates.size(),
+                                  " coordinates; expected a multiple of the dimension ", dimension_),
+                     "points.coordinates");
+  }
+  WELLSPACE_RETURN_IF_ERROR(CheckNoGap(offset));
+  const uint64_t committed = point_account_.points();
+  const uint64_t known = std::min<uint64_t>(committed - offset, coordinates.size() / dimension_);
+  WELLSPACE_RETURN_IF_ERROR(CheckKnown(offset, coordinates.first(known * dimension_)));
+  coordinates = coordinates.subspan(known * dimension_);
+  if (coordinates.empty()) {
+    return absl::OkStatus();
+  }
+  WELLSPACE_RETURN_IF_ERROR(CheckCoordinates(committed, coordinates));
+  WELLSPACE_RETURN_IF_ERROR(point_account_.Take(coordinates.size() / dimension_));
+  if (absl::Status appended = RunGuarded([&] { return points_->Append(coordinates); }); !appended.ok()) {
+    point_account_.Return(coordinates.size() / dimension_);
+    return appended;
+  }
+  if (log_.is_durable()) {
+    uncommitted_crc32c_ = ExtendCrc32c(uncommitted_crc32c_, coordinates.data(), coordinates.size_bytes());
+    return absl::OkStatus();
+  }
+  committed_points_ = PointCount();
+  is_ready_ = false;
+  ++revision_;
+  return absl::OkStatus();
+}
+
+void Session::DropUncommitted() {
+  point_account_.Return(PointCount() - committed_points_);
+  points_->Truncate(committed_points_ * dimension_);
+  uncommitted_crc32c_ = 0;
+}
+
+uint64_t Session::UncommittedBytes() const {
+  std::lock_guard lock(mutex_);
+  return (PointCount() - committed_points_) * dimension_ * sizeof(double);
+}
+
+absl::Status Session::CommitPoints() {
+  std::lock_guard change_lock(change_mutex_);
+  uint64_t end = 0;
+  uint32_t crc32c = 0;
+  {
+    std::lock_guard lock(mutex_);
+    if (busy_ == Busy::kAddingVertices || !HasUncommitted()) {
+      return absl::OkStatus();  // an addition commits these points with its own
+    }
+    end = PointCount();
+    crc32c = std::exchange(uncommitted_crc32c_, 0);  // from now on, of the points behind these
+  }
+  absl::Status status = points_->Synchronize();
+  if (status.ok()) {
+    status = Commit([&](SessionChange& change) {
+      AddPointsTo(change, end, crc32c);
+      change.state->set_revision(change.state->revision() + 1);
+      change.state->set_is_ready(false);
+    });
+  }
+  std::lock_guard lock(mutex_);
+  if (!status.ok()) {
+    DropUncommitted();
+    return status;
+  }
+  committed_points_ = end;
+  is_ready_ = false;
+  ++revision_;
+  return absl::OkStatus();
+}
+
+v1::UploadPointsResponse Session::Committed() const {
+  v1::UploadPointsResponse message;
+  std::lock_guard lock(mutex_);
+  message.set_committed_points(committed_points_);
+  message.set_revision(revision_);
+  return message;
+}
+
+}  // namespace wellspace::server
