@@ -34,7 +34,7 @@ std::string StemOf(const std::string& session) {
       return id;
     }
   }
-  return "x" + absl::BytesToHexString(session);
+  return absl::StrCat("x", absl::BytesToHexString(session));
 }
 
 absl::Status WithAdvice(const absl::Status& status) {
