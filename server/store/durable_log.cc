@@ -170,7 +170,7 @@ absl::StatusOr<std::shared_ptr<MeshSnapshot>> DurableLog::KeepMesh(const std::st
       in_use_->Take(path + std::string(kTemporaryEnd), /*is_written=*/true);
   WELLSPACE_ASSIGN_OR_RETURN(store::v1::MeshRecord record,
                              WriteMeshFile(files_, *health_, path, revision, mesh, context, max_mesh_chunk_bytes_));
-  return std::make_shared<MeshFile>(files_, std::move(record), std::move(use));
+  return std::make_shared<MeshFile>(files_, std::move(record), std::move(use), buffers_);
 }
 
 std::shared_ptr<MeshSnapshot> DurableLog::FindMesh(const std::string& session, const store::v1::SessionRecord& record) {
@@ -178,7 +178,7 @@ std::shared_ptr<MeshSnapshot> DurableLog::FindMesh(const std::string& session, c
     return nullptr;
   }
   const std::string path = folder_->paths().mesh(session, record.mesh().revision());
-  return std::make_shared<MeshFile>(files_, record.mesh(), in_use_->Take(path, /*is_written=*/false));
+  return std::make_shared<MeshFile>(files_, record.mesh(), in_use_->Take(path, /*is_written=*/false), buffers_);
 }
 
 absl::StatusOr<DataFolder::Sweep> DurableLog::RemoveGarbage() {

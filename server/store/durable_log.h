@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "server/base/options.h"
+#include "server/store/chunk_buffers.h"
 #include "server/store/data_folder.h"
 #include "server/store/file_system.h"
 #include "server/store/files_in_use.h"
@@ -82,6 +83,7 @@ class DurableLog final : public SessionLog {
   const std::unique_ptr<DataFolder> folder_;
   const std::unique_ptr<SessionTables> tables_;
   const std::shared_ptr<FilesInUse> in_use_;
+  const std::shared_ptr<ChunkBuffers> buffers_ = std::make_shared<ChunkBuffers>();
 
   std::mutex mutex_;
   // Guarded by mutex_.

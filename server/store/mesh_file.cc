@@ -8,7 +8,6 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
-#include "grpc/slice.h"
 #include "grpcpp/support/slice.h"
 #include "proto/checksum.h"
 #include "server/store/mesh_file_format.h"
@@ -54,8 +53,13 @@ uint64_t CountChunks(const store::v1::MeshDirectory& directory, bool with_bounda
 
 }  // namespace
 
-MeshFile::MeshFile(FileSystem& files, store::v1::MeshRecord record, std::unique_ptr<FilesInUse::Use> use)
-    : MeshSnapshot(FiguresOf(record)), files_(files), record_(std::move(record)), use_(std::move(use)) {}
+MeshFile::MeshFile(FileSystem& files, store::v1::MeshRecord record, std::unique_ptr<FilesInUse::Use> use,
+                   std::shared_ptr<ChunkBuffers> buffers)
+    : MeshSnapshot(FiguresOf(record)),
+      files_(files),
+      record_(std::move(record)),
+      use_(std::move(use)),
+      buffers_(std::move(buffers)) {}
 
 uint64_t MeshFile::memory_bytes() const {
   // The directory: metadata, and four bytes for each MiB.
@@ -222,13 +226,11 @@ absl::StatusOr<grpc::ByteBuffer> MeshFile::SerializeChunk(uint64_t index, int fi
     WELLSPACE_ASSIGN_OR_RETURN(moved_here, ReadMoved(*file, *moved, first, first + array->rows_per_chunk()));
   }
   const uint64_t size = BytesOfChunk(*array, chunk);
-  const grpc::Slice values(grpc_slice_malloc(size), grpc::Slice::STEAL_REF);
-  WELLSPACE_RETURN_IF_ERROR(ReadChunk(*file, *array, chunk,
-                                      reinterpret_cast<char*>(const_cast<uint8_t*>(values.begin())),  // ours alone yet
-                                      size));
+  ChunkBuffers::Buffer buffer = buffers_->Take(size);
+  WELLSPACE_RETURN_IF_ERROR(ReadChunk(*file, *array, chunk, buffer.bytes.get(), size));
   const std::array<grpc::Slice, 2> slices = {
       grpc::Slice(ChunkHead(field, index, array->crc32c(static_cast<int>(chunk)), moved_here, array->field(), size)),
-      values};
+      buffers_->MakeSlice(std::move(buffer), size)};
   return grpc::ByteBuffer(slices.data(), slices.size());
 }
 

@@ -9,6 +9,7 @@
 #include <mutex>
 #include <string>
 
+#include "server/store/chunk_buffers.h"
 #include "server/store/files_in_use.h"
 #include "server/store/mesh_chunks.h"
 #include "server/store/mesh_snapshot.h"
@@ -33,7 +34,8 @@ absl::StatusOr<store::v1::MeshRecord> WriteMeshFile(FileSystem& files, StoreHeal
 // Thread safety: that of MeshSnapshot.
 class MeshFile final : public MeshSnapshot {
  public:
-  MeshFile(FileSystem& files, store::v1::MeshRecord record, std::unique_ptr<FilesInUse::Use> use);
+  MeshFile(FileSystem& files, store::v1::MeshRecord record, std::unique_ptr<FilesInUse::Use> use,
+           std::shared_ptr<ChunkBuffers> buffers = std::make_shared<ChunkBuffers>());
 
   std::optional<store::v1::MeshRecord> record() const override { return record_; }
   uint64_t memory_bytes() const override;
@@ -74,6 +76,7 @@ class MeshFile final : public MeshSnapshot {
   FileSystem& files_;
   const store::v1::MeshRecord record_;
   const std::unique_ptr<FilesInUse::Use> use_;
+  const std::shared_ptr<ChunkBuffers> buffers_;
   MemoryReservation memory_;
   mutable std::mutex mutex_;
   mutable std::shared_ptr<const Directory> directory_;  // guarded by mutex_
