@@ -17,7 +17,7 @@ namespace {
 constexpr size_t kCopyBytes = size_t{1} << 20;
 
 // Each time, a session was deleted, or got another mesh, between the copy of the rows and that of its files.
-constexpr int kMostRounds = 100;
+constexpr int kMostCopies = 100;
 
 class Copier {
  public:
@@ -119,7 +119,7 @@ absl::StatusOr<DataReport> BackUp(const std::string& folder, const std::string& 
 
   Copier copier(from_paths, to_paths, files);
   absl::Status copied;
-  for (int round = 0; round < kMostRounds; ++round) {
+  for (int round = 0; round < kMostCopies; ++round) {
     WELLSPACE_RETURN_IF_ERROR(tables->BackUp(to_paths.database(), options.tables));
     WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<SessionTables> copy,
                                SessionTables::Open(to_paths.database(), read_only));

@@ -14,8 +14,8 @@ namespace wellspace::server {
 // one disk, and else copied. A server that is started with `to` has these sessions.
 //
 // Complexity: O(bytes); with links, O(bytes of the database and of points), and the check.
-// Errors:     FAILED_PRECONDITION: `to` is not empty, or in use. DATA_LOSS: the copy is not whole, since `folder` is not.
-//             Others of CheckData, and of a FileSystem. What was copied until then is left.
+// Errors:     FAILED_PRECONDITION: `to` is not empty, or in use. DATA_LOSS: the copy is not whole, since `folder` is
+//             not. Others of CheckData, and of a FileSystem. What was copied until then is left.
 absl::StatusOr<DataReport> BackUp(const std::string& folder, const std::string& to,
                                   const CheckDataOptions& options = {});
 

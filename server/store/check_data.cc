@@ -16,7 +16,7 @@ namespace wellspace::server {
 namespace {
 
 // A session that a server has changed in each of so many looks is taken as it is then.
-constexpr int kMostRounds = 10;
+constexpr int kMostLooks = 10;
 
 class SessionCheck {
  public:
@@ -146,7 +146,7 @@ absl::StatusOr<DataReport> CheckData(const std::string& folder, const CheckDataO
     std::set<std::string> changed;  // names
     for (const StoredSession& session : stored.sessions) {
       std::vector<std::string> problems = SessionCheck(paths, files, *tables, session).Run();
-      if (!problems.empty() && round < kMostRounds && HasChanged(*tables, session.state)) {
+      if (!problems.empty() && round < kMostLooks && HasChanged(*tables, session.state)) {
         changed.insert(session.state.name());
       } else {
         report.problems.insert(report.problems.end(), problems.begin(), problems.end());

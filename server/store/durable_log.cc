@@ -37,7 +37,7 @@ DurableLog::DurableLog(const DurableLogOptions& options, std::unique_ptr<DataFol
       health_(std::make_shared<StoreHealth>(options.on_failure)),
       folder_(std::move(folder)),
       tables_(std::move(tables)),
-      in_use_(std::make_shared<FilesInUse>(files_)) {}
+      in_use_(std::make_shared<FilesInUse>(files_, health_)) {}
 
 absl::StatusOr<std::unique_ptr<DurableLog>> DurableLog::Open(const DurableLogOptions& options) {
   WELLSPACE_ASSIGN_OR_RETURN(std::unique_ptr<DataFolder> folder, DataFolder::Open(options.folder, *options.files));
@@ -182,6 +182,7 @@ std::shared_ptr<MeshSnapshot> DurableLog::FindMesh(const std::string& session, c
 }
 
 absl::StatusOr<DataFolder::Sweep> DurableLog::RemoveGarbage() {
+  WELLSPACE_RETURN_IF_ERROR(health_->Check());
   return folder_->RemoveGarbage(*in_use_, [this] { return tables_->ReadStates(); });
 }
 

@@ -28,6 +28,12 @@ void FilesInUse::Remove(const std::string& path) {
   if (const auto state = states_.find(path); state != states_.end()) {
     state->second.is_obsolete = true;
   } else {
+    RemoveNow(path);
+  }
+}
+
+void FilesInUse::RemoveNow(const std::string& path) {
+  if (health_ == nullptr || health_->Check().ok()) {
     file_system_.Remove(path).IgnoreError();
   }
 }
@@ -39,7 +45,7 @@ void FilesInUse::Release(const std::string& path) {
     return;
   }
   if (state->second.is_obsolete) {
-    file_system_.Remove(path).IgnoreError();
+    RemoveNow(path);
   }
   states_.erase(state);
 }

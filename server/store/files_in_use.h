@@ -7,13 +7,16 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 
 #include "server/store/file_system.h"
+#include "server/store/store_health.h"
 
 namespace wellspace::server {
 
-// Removes files when their last user is gone. A file that could not be removed is garbage, which DataFolder::Sweep
-// removes.
+// Removes files when their last user is gone. A file that could not be removed is garbage, which
+// DataFolder::RemoveGarbage takes. After a failure of the store nothing is removed any more: the change that was under
+// way may have been written down, and name what its owner believes to be obsolete.
 //
 // Thread safety: thread-safe.
 class FilesInUse : public std::enable_shared_from_this<FilesInUse> {
@@ -38,7 +41,8 @@ class FilesInUse : public std::enable_shared_from_this<FilesInUse> {
     const uint64_t version_;
   };
 
-  explicit FilesInUse(FileSystem& file_system) : file_system_(file_system) {}
+  explicit FilesInUse(FileSystem& file_system, std::shared_ptr<StoreHealth> health = nullptr)
+      : file_system_(file_system), health_(std::move(health)) {}
 
   // `is_written`: a new file is about to be written in this place.
   std::unique_ptr<Use> Take(const std::string& path, bool is_written);
@@ -53,10 +57,12 @@ class FilesInUse : public std::enable_shared_from_this<FilesInUse> {
     bool is_obsolete = false;
   };
 
+  void RemoveNow(const std::string& path);
   void Release(const std::string& path);
   void MakeObsolete(const std::string& path, uint64_t version);
 
   FileSystem& file_system_;
+  const std::shared_ptr<StoreHealth> health_;
   mutable std::mutex mutex_;             // held while a file is removed, so that none is written in its place meanwhile
   std::map<std::string, State> states_;  // guarded by mutex_
 };

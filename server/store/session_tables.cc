@@ -14,9 +14,6 @@
 namespace wellspace::server {
 namespace {
 
-// The write-ahead log is taken over into the database when it has as many pages: 4 MiB.
-constexpr int kCheckpointPages = 1000;
-
 // The checksum of a record that belongs to `key`.
 uint64_t ChecksumOf(const std::string& key, std::string_view record) {
   return ExtendCrc32c(Crc32c(key.data(), key.size()), record.data(), record.size());
@@ -52,15 +49,17 @@ struct SessionTables::Statements {
 
 const int SessionTables::kSchema = SchemaVersion();
 
-SessionTables::SessionTables(std::unique_ptr<SqliteDatabase> database)
-    : database_(std::move(database)), statements_(std::make_unique<Statements>()) {}
+SessionTables::SessionTables(std::unique_ptr<SqliteDatabase> database, int checkpoint_pages)
+    : checkpoint_pages_(checkpoint_pages),
+      database_(std::move(database)),
+      statements_(std::make_unique<Statements>()) {}
 
 SessionTables::~SessionTables() { statements_.reset(); }  // before the database
 
 absl::StatusOr<std::unique_ptr<SessionTables>> SessionTables::Open(const std::string& path,
                                                                    const SessionTablesOptions& options) {
   WELLSPACE_ASSIGN_OR_RETURN(std::unique_ptr<SqliteDatabase> database, OpenSchema(path, options));
-  std::unique_ptr<SessionTables> tables(new SessionTables(std::move(database)));
+  std::unique_ptr<SessionTables> tables(new SessionTables(std::move(database), options.checkpoint_pages));
   WELLSPACE_RETURN_IF_ERROR(tables->Prepare());
   if (!options.is_read_only) {
     sqlite3_wal_hook(
@@ -223,7 +222,7 @@ absl::Status SessionTables::WriteAnswer(const store::v1::AnswerRecord& answer) {
 
 absl::Status SessionTables::Checkpoint() {
   const std::lock_guard lock(mutex_);
-  if (log_pages_ < kCheckpointPages) {
+  if (log_pages_ < checkpoint_pages_) {
     return absl::OkStatus();
   }
   WELLSPACE_RETURN_IF_ERROR(SetSurvives(SessionLog::Survives::kPowerLoss));

@@ -19,9 +19,10 @@
 namespace wellspace::server {
 
 struct SessionTablesOptions {
-  const char* vfs = nullptr;  // of SQLite; null: that of the machine
-  bool is_exclusive = false;  // no other process may look at it meanwhile; needs no shared memory
-  bool is_read_only = false;  // has to be there; is neither changed nor migrated
+  const char* vfs = nullptr;    // of SQLite; null: that of the machine
+  bool is_exclusive = false;    // no other process may look at it meanwhile; needs no shared memory
+  bool is_read_only = false;    // has to be there; is neither changed nor migrated
+  int checkpoint_pages = 1000;  // the write-ahead log is taken over into the database when it has as many: 4 MiB
 };
 
 // Each record has a CRC32C beside it, of itself and of what it belongs to: SQLite has none in its pages.
@@ -72,7 +73,7 @@ class SessionTables {
  private:
   struct Statements;
 
-  explicit SessionTables(std::unique_ptr<SqliteDatabase> database);
+  SessionTables(std::unique_ptr<SqliteDatabase> database, int checkpoint_pages);
   absl::Status Prepare();
   absl::Status ApplyOne(const SessionChange& change);
   absl::Status Delete(const std::string& session);
@@ -88,6 +89,7 @@ class SessionTables {
                          std::vector<std::string>* problems);
   absl::Status LoadAnswers(std::vector<store::v1::AnswerRecord>& answers, std::vector<std::string>* problems);
 
+  const int checkpoint_pages_;
   std::mutex mutex_;  // of all below
   const std::unique_ptr<SqliteDatabase> database_;
   std::unique_ptr<Statements> statements_;
