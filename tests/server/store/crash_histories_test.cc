@@ -1,5 +1,5 @@
-// Random lives of a log on a disk that loses power: what was acknowledged is there afterwards, and what was not is there
-// wholly or not at all.
+// Random lives of a log on a disk that loses power: what was acknowledged is there afterwards, and what was not is
+// there wholly or not at all.
 #include <algorithm>
 #include <array>
 #include <chrono>

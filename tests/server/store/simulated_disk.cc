@@ -179,13 +179,7 @@ bool SimulatedDisk::IsOmitted(const std::string& path) const {
 }
 
 void SimulatedDisk::ChangeNames(NameChange change) {
-  for (const auto& [path, entry] : change.entries) {
-    if (entry.has_value()) {
-      names_[path] = *entry;
-    } else {
-      names_.erase(path);
-    }
-  }
+  Apply(change, names_);
   name_changes_.push_back(std::move(change));
 }
 
@@ -198,13 +192,7 @@ absl::Status SimulatedDisk::SynchronizeFolder(const std::string& folder) {
     if (change.folder != folder) {
       return false;
     }
-    for (const auto& [path, entry] : change.entries) {
-      if (entry.has_value()) {
-        durable_names_[path] = *entry;
-      } else {
-        durable_names_.erase(path);
-      }
-    }
+    Apply(change, durable_names_);
     return true;
   });
   return absl::OkStatus();
@@ -259,69 +247,70 @@ std::vector<std::string> SimulatedDisk::List(const std::string& folder) const {
   return names;
 }
 
+void SimulatedDisk::Apply(const NameChange& change, std::map<std::string, Entry>& names) {
+  for (const auto& [path, entry] : change.entries) {
+    if (entry.has_value()) {
+      names[path] = *entry;
+    } else {
+      names.erase(path);
+    }
+  }
+}
+
 void SimulatedDisk::Restart(Loss loss, uint64_t seed) {
   test::SplitMix64 random(seed);
   constexpr std::array kChances = {0.02, 0.2, 0.5, 0.8, 0.98};
   const double chance = kChances[random.Below(kChances.size())];
-  const auto is_kept = [&] { return loss != Loss::kAll && random.Unit() < chance; };
+  const Draw is_kept = [&] { return loss != Loss::kAll && random.Unit() < chance; };
   if (loss != Loss::kProcess) {
     std::map<std::string, Entry> names = durable_names_;
     for (const NameChange& change : name_changes_) {
-      for (size_t i = 0; is_kept() && i < change.entries.size(); ++i) {
-        const auto& [path, entry] = change.entries[i];
-        if (entry.has_value()) {
-          names[path] = *entry;
-        } else {
-          names.erase(path);
-        }
-        random.Next();
-        if (i + 1 < change.entries.size()) {
-          // A rename is one change.
-          const auto& [other, gone] = change.entries[i + 1];
-          if (!gone.has_value()) {
-            names.erase(other);
-          }
-          break;
-        }
+      if (is_kept()) {
+        Apply(change, names);
       }
     }
     std::erase_if(
         names, [&](const auto& name) { return FolderOf(name.first) != "/" && !names.contains(FolderOf(name.first)); });
     names_ = std::move(names);
-  }
-  for (const auto& [path, inode] : names_) {
-    if (inode == nullptr) {
-      continue;
-    }
-    if (loss != Loss::kProcess) {
-      inode->content = inode->durable;
-      for (const Change& change : inode->changes) {
-        if (change.is_truncation) {
-          if (is_kept()) {
-            inode->content.resize(change.offset);
-          }
-          continue;
-        }
-        if (is_kept() && inode->content.size() < change.offset + change.bytes.size()) {
-          inode->content.resize(change.offset + change.bytes.size());  // the size alone
-        }
-        for (uint64_t done = 0; done < change.bytes.size();) {
-          const uint64_t at = change.offset + done;
-          const uint64_t count = std::min(kSectorBytes - at % kSectorBytes, change.bytes.size() - done);
-          if (is_kept()) {
-            Put(inode->content, at, std::string_view(change.bytes).substr(done, count));
-          }
-          done += count;
-        }
+    for (const auto& [path, inode] : names_) {
+      if (inode != nullptr) {
+        Lose(*inode, is_kept);
       }
     }
-    inode->durable = inode->content;
-    inode->changes.clear();
+  }
+  for (const auto& [path, inode] : names_) {
+    if (inode != nullptr) {
+      inode->durable = inode->content;
+      inode->changes.clear();
+    }
   }
   durable_names_ = names_;
   name_changes_.clear();
   dies_at_.reset();
   fail_count_ = 0;
+}
+
+void SimulatedDisk::Lose(Inode& inode, const Draw& is_kept) {
+  inode.content = inode.durable;
+  for (const Change& change : inode.changes) {
+    const uint64_t end = change.offset + change.bytes.size();
+    if (change.is_truncation) {
+      if (is_kept()) {
+        inode.content.resize(change.offset);
+      }
+      continue;
+    }
+    if (inode.content.size() < end && is_kept()) {
+      inode.content.resize(end);  // the size alone
+    }
+    for (uint64_t at = change.offset; at < end;) {
+      const uint64_t count = std::min(kSectorBytes - at % kSectorBytes, end - at);
+      if (is_kept()) {
+        Put(inode.content, at, std::string_view(change.bytes).substr(at - change.offset, count));
+      }
+      at += count;
+    }
+  }
 }
 
 void SimulatedDisk::Clear() {

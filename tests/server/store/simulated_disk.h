@@ -5,6 +5,7 @@
 #include <sqlite3.h>
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -103,6 +104,10 @@ class SimulatedDisk {
   absl::Status Link(const std::string& from, const std::string& to);
   absl::Status CreateFolder(const std::string& folder);
   void ChangeNames(NameChange change);
+  static void Apply(const NameChange& change, std::map<std::string, Entry>& names);
+  // Whether a change that was not synchronised is there all the same.
+  using Draw = std::function<bool()>;
+  static void Lose(Inode& inode, const Draw& is_kept);
   bool IsOmitted(const std::string& path) const;
 
   std::unique_ptr<FileSystem> files_;

@@ -169,9 +169,7 @@ int SimulatedVfs::Sync(sqlite3_file* file, int /*flags*/) {
     return SQLITE_IOERR_FSYNC;
   }
   if (open.has_new_name) {
-    if (!open.disk->SynchronizeFolder(FolderOf(*open.path)).ok()) {
-      return SQLITE_IOERR_DIR_FSYNC;
-    }
+    open.disk->SynchronizeFolder(FolderOf(*open.path)).IgnoreError();  // as SQLite does
     open.has_new_name = false;
   }
   return SQLITE_OK;
