@@ -262,32 +262,29 @@ void SimulatedDisk::Restart(Loss loss, uint64_t seed) {
   constexpr std::array kChances = {0.02, 0.2, 0.5, 0.8, 0.98};
   const double chance = kChances[random.Below(kChances.size())];
   const Draw is_kept = [&] { return loss != Loss::kAll && random.Unit() < chance; };
-  if (loss != Loss::kProcess) {
-    std::map<std::string, Entry> names = durable_names_;
-    for (const NameChange& change : name_changes_) {
-      if (is_kept()) {
-        Apply(change, names);
-      }
-    }
-    std::erase_if(
-        names, [&](const auto& name) { return FolderOf(name.first) != "/" && !names.contains(FolderOf(name.first)); });
-    names_ = std::move(names);
-    for (const auto& [path, inode] : names_) {
-      if (inode != nullptr) {
-        Lose(*inode, is_kept);
-      }
+  dies_at_.reset();
+  fail_count_ = 0;
+  if (loss == Loss::kProcess) {
+    return;  // the kernel goes on as if nothing had been
+  }
+  std::map<std::string, Entry> names = durable_names_;
+  for (const NameChange& change : name_changes_) {
+    if (is_kept()) {
+      Apply(change, names);
     }
   }
+  std::erase_if(names,
+                [&](const auto& name) { return FolderOf(name.first) != "/" && !names.contains(FolderOf(name.first)); });
+  names_ = std::move(names);
   for (const auto& [path, inode] : names_) {
     if (inode != nullptr) {
+      Lose(*inode, is_kept);
       inode->durable = inode->content;
       inode->changes.clear();
     }
   }
   durable_names_ = names_;
   name_changes_.clear();
-  dies_at_.reset();
-  fail_count_ = 0;
 }
 
 void SimulatedDisk::Lose(Inode& inode, const Draw& is_kept) {

@@ -26,7 +26,7 @@ class SimulatedDisk {
  public:
   // What is there after Restart.
   enum class Loss {
-    kProcess,  // only the process died: all is as it was last written
+    kProcess,  // only the process died: all is as it was last written, and may still be lost
     kAll,      // nothing that was not synchronised
     kSome,     // of that any part: writes torn at sectors, sizes without bytes, names in any order
   };

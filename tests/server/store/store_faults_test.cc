@@ -141,6 +141,28 @@ TEST(StoreFaults, AFailedSynchronisationIsFinal) {
   }
 }
 
+// The process ends since the disk could not be synchronised, and is started again at once. The kernel shows it what it
+// has in memory, which no synchronisation writes any more; and then there is a loss of power.
+TEST(StoreFaults, AStartWritesAgainWhatMayNotBeOnTheDisk) {
+  SimulatedDisk disk;
+  test::SplitMix64 random(1);
+  for (uint64_t operation = 0; operation < 40; ++operation) {
+    disk.Clear();
+    StoreLife life(disk);
+    ASSERT_TRUE(life.Open().ok());
+    ASSERT_TRUE(life.Do(Action::kCreate, 0).ok());
+    disk.FailAt(disk.operations() + operation, Fault::kBroken);
+    for (const Action action : {Action::kUpdate, Action::kUpload, Action::kSucceed}) {
+      life.Do(action, 0).IgnoreError();
+    }
+    ASSERT_EQ(life.Restart(Loss::kProcess, random), "") << disk.failed_operation();
+    ASSERT_TRUE(life.Do(Action::kUpdate, 0).ok());
+    ASSERT_TRUE(life.Do(Action::kTouch, 0).ok());
+    ASSERT_EQ(life.Restart(Loss::kProcess, random), "") << disk.failed_operation();
+    ASSERT_EQ(life.Restart(Loss::kAll, random), "") << disk.failed_operation();
+  }
+}
+
 // A write-ahead log that ends in the middle, or has other bytes: all before is there, or the start says what is wrong.
 TEST(StoreFaults, AWriteAheadLogThatIsTornEndsThere) {
   SimulatedDisk disk;
