@@ -17,7 +17,8 @@ namespace wellspace::server {
 //
 // Thread safety: thread-compatible; Synchronize may run beside the others.
 // Errors:     of all functions here and in FileSystem: NOT_FOUND (no such file); RESOURCE_EXHAUSTED (no room: ENOSPC,
-//             EDQUOT, EFBIG); PERMISSION_DENIED (EACCES, EPERM, EROFS); else UNAVAILABLE. The message names the file.
+//             EDQUOT, EFBIG; or no descriptor or memory: EMFILE, ENFILE, ENOMEM); PERMISSION_DENIED (EACCES, EPERM,
+//             EROFS); FAILED_PRECONDITION (ENOTDIR, EISDIR); else UNAVAILABLE. The message names the file.
 class File {
  public:
   virtual ~File() = default;
@@ -32,9 +33,16 @@ class File {
   virtual absl::Status Synchronize() = 0;
 };
 
+// A lock that is held as long as this lives, and as the process does.
+class FileLock {
+ public:
+  virtual ~FileLock() = default;
+};
+
 // Thread safety: thread-safe.
 class FileSystem {
  public:
+  // kRead, kWrite: the file has to be there. Files that are made can be read by this user alone.
   enum class Mode { kRead, kWrite, kCreateOrWrite };
 
   virtual ~FileSystem() = default;
@@ -42,12 +50,20 @@ class FileSystem {
   virtual absl::StatusOr<std::unique_ptr<File>> Open(const std::string& path, Mode mode) = 0;
   virtual absl::Status Rename(const std::string& from, const std::string& to) = 0;
   virtual absl::Status Remove(const std::string& path) = 0;
-  // Names of the files in a folder, in any order.
+  // Gives the file `from` the name `to` besides, which must not be there yet. UNAVAILABLE also where the two would be
+  // on different disks.
+  virtual absl::Status Link(const std::string& from, const std::string& to) = 0;
+  // Names of the files and folders in a folder, in any order.
   virtual absl::StatusOr<std::vector<std::string>> List(const std::string& folder) = 0;
   // The folder, and those above it, if they are not there yet. Only this user may look into it.
   virtual absl::Status CreateFolder(const std::string& folder) = 0;
   // The names in the folder outlive a loss of power from now on.
   virtual absl::Status SynchronizeFolder(const std::string& folder) = 0;
+
+  // Locks the file, which is made if it is not there yet, and writes the number of this process into it.
+  //
+  // Errors:     ABORTED: it is locked already; the message is what the holder has written.
+  virtual absl::StatusOr<std::unique_ptr<FileLock>> Lock(const std::string& path) = 0;
 };
 
 // That of the machine.

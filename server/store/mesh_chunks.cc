@@ -37,29 +37,37 @@ std::string TagOf(int field, uint64_t size) {
 
 }  // namespace
 
-MeshChunks::MeshChunks(core::Mesh mesh, uint64_t max_bytes) : mesh_(std::move(mesh)) {
+std::vector<MeshArray> CutMesh(const core::Mesh& mesh, uint64_t max_bytes) {
   const uint64_t bytes = std::max(max_bytes, 2 * kEnvelopeBytes) - kEnvelopeBytes;
-  const auto add = [&](int field, const auto& values, uint64_t width, bool is_of_boundary, uint64_t bytes_beside = 0) {
+  std::vector<MeshArray> arrays;
+  const auto add = [&](int field, const auto& values, uint64_t width, uint64_t bytes_beside = 0) {
     const uint64_t row_bytes = sizeof(values[0]) * width;
-    arrays_.push_back({.field = field,
-                       .is_of_boundary = is_of_boundary,
-                       .data = values.data(),
-                       .row_bytes = row_bytes,
-                       .rows = values.size() / width,
-                       .rows_per_chunk = bytes / (row_bytes + bytes_beside)});
+    arrays.push_back({.field = field,
+                      .data = values.data(),
+                      .row_bytes = row_bytes,
+                      .rows = values.size() / width,
+                      .rows_per_chunk = bytes / (row_bytes + bytes_beside)});
   };
-  const uint64_t dimension = mesh_.dimension;
+  const uint64_t dimension = mesh.dimension;
   // Beside each point that has moved stands its number.
-  add(v1::MeshChunk::kPointsFieldNumber, mesh_.points, dimension, false,
-      mesh_.moved_vertices.empty() ? 0 : sizeof(uint32_t));
-  add(v1::MeshChunk::kWeightsFieldNumber, mesh_.weights, 1, false);
-  add(v1::MeshChunk::kVertexOriginsFieldNumber, mesh_.vertex_origins, 1, true);
-  add(v1::MeshChunk::kVertexTagsFieldNumber, mesh_.vertex_tags, 1, true);
-  add(v1::MeshChunk::kSimplexRegionsFieldNumber, mesh_.simplex_regions, 1, true);
-  add(v1::MeshChunk::kSimplicesFieldNumber, mesh_.simplices, dimension + 1, false);
-  add(v1::MeshChunk::kInputVerticesFieldNumber, mesh_.input_vertex, 1, false);
-  add(v1::MeshChunk::kFacetsFieldNumber, mesh_.facets, dimension, true);
+  add(v1::MeshChunk::kPointsFieldNumber, mesh.points, dimension, mesh.moved_vertices.empty() ? 0 : sizeof(uint32_t));
+  add(v1::MeshChunk::kWeightsFieldNumber, mesh.weights, 1);
+  add(v1::MeshChunk::kVertexOriginsFieldNumber, mesh.vertex_origins, 1);
+  add(v1::MeshChunk::kVertexTagsFieldNumber, mesh.vertex_tags, 1);
+  add(v1::MeshChunk::kSimplexRegionsFieldNumber, mesh.simplex_regions, 1);
+  add(v1::MeshChunk::kSimplicesFieldNumber, mesh.simplices, dimension + 1);
+  add(v1::MeshChunk::kInputVerticesFieldNumber, mesh.input_vertex, 1);
+  add(v1::MeshChunk::kFacetsFieldNumber, mesh.facets, dimension);
+  return arrays;
 }
+
+bool IsOfBoundary(int field) {
+  return field == v1::MeshChunk::kVertexOriginsFieldNumber || field == v1::MeshChunk::kVertexTagsFieldNumber ||
+         field == v1::MeshChunk::kSimplexRegionsFieldNumber || field == v1::MeshChunk::kFacetsFieldNumber;
+}
+
+MeshChunks::MeshChunks(core::Mesh mesh, uint64_t max_bytes)
+    : mesh_(std::move(mesh)), arrays_(CutMesh(mesh_, max_bytes)) {}
 
 uint64_t MeshChunks::memory_bytes() const {
   const uint64_t indices = mesh_.simplices.capacity() + mesh_.input_vertex.capacity() +
@@ -71,16 +79,17 @@ uint64_t MeshChunks::memory_bytes() const {
 
 uint64_t MeshChunks::count(bool with_boundary) const {
   uint64_t count = 0;
-  for (const Array& array : arrays_) {
-    count += with_boundary || !array.is_of_boundary ? array.chunks() : 0;
+  for (const MeshArray& array : arrays_) {
+    count += with_boundary || !IsOfBoundary(array.field) ? array.chunks() : 0;
   }
   return count;
 }
 
 MeshChunks::Chunk MeshChunks::Get(uint64_t index, bool with_boundary) const {
   auto array = arrays_.begin();
-  while ((array->is_of_boundary && !with_boundary) || index >= array->chunks()) {
-    index -= array->is_of_boundary && !with_boundary ? 0 : array->chunks();
+  const auto is_left_out = [&] { return IsOfBoundary(array->field) && !with_boundary; };
+  while (is_left_out() || index >= array->chunks()) {
+    index -= is_left_out() ? 0 : array->chunks();
     ++array;
   }
   const uint64_t first = index * array->rows_per_chunk;
@@ -97,15 +106,21 @@ MeshChunks::Chunk MeshChunks::Get(uint64_t index, bool with_boundary) const {
 }
 
 // The arrays are the last fields of a chunk: what stands before them is small, and they follow as they are.
+std::string ChunkHead(int field, uint64_t index, uint32_t crc32c, std::span<const uint32_t> moved, int array_field,
+                      uint64_t size) {
+  v1::MeshChunk message;
+  message.set_index(index);
+  message.set_crc32c(crc32c);
+  message.mutable_moved_vertices()->Add(moved.begin(), moved.end());
+  const std::string before_values = message.SerializeAsString() + TagOf(array_field, size);
+  return TagOf(field, before_values.size() + size) + before_values;
+}
+
 grpc::ByteBuffer SerializeChunk(const std::shared_ptr<const MeshChunks>& mesh, uint64_t index, int field,
                                 bool with_boundary) {
   const MeshChunks::Chunk chunk = mesh->Get(index, with_boundary);
-  v1::MeshChunk message;
-  message.set_index(index);
-  message.set_crc32c(Crc32c(chunk.data, chunk.size));
-  message.mutable_moved_vertices()->Add(chunk.moved.begin(), chunk.moved.end());
-  const std::string before_values = message.SerializeAsString() + TagOf(chunk.field, chunk.size);
-  const std::string head = TagOf(field, before_values.size() + chunk.size) + before_values;
+  const std::string head =
+      ChunkHead(field, index, Crc32c(chunk.data, chunk.size), chunk.moved, chunk.field, chunk.size);
 
   auto* holder = new std::shared_ptr<const MeshChunks>(mesh);
   const std::array<grpc::Slice, 2> slices = {

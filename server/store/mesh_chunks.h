@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -14,6 +15,24 @@
 #include "server/jobs/memory_budget.h"
 
 namespace wellspace::server {
+
+// An array of a mesh, cut into chunks of as many rows, but for the last.
+struct MeshArray {
+  int field = 0;  // of v1.MeshChunk
+  const void* data = nullptr;
+  uint64_t row_bytes = 0;
+  uint64_t rows = 0;
+  uint64_t rows_per_chunk = 0;
+
+  uint64_t chunks() const { return (rows + rows_per_chunk - 1) / rows_per_chunk; }
+};
+
+// The arrays of `mesh` in the order in which they are sent, moved_vertices excepted, which come beside the points. A
+// response with a chunk has at most `max_bytes`.
+std::vector<MeshArray> CutMesh(const core::Mesh& mesh, uint64_t max_bytes = kMaxResponseBytes);
+
+// Whether only those who ask for the boundary get this array.
+bool IsOfBoundary(int field);
 
 // How a mesh is cut.
 //
@@ -44,22 +63,15 @@ class MeshChunks {
   Chunk Get(uint64_t index, bool with_boundary = false) const;
 
  private:
-  // An array of the mesh, cut into chunks of as many rows, but for the last.
-  struct Array {
-    int field = 0;  // of v1.MeshChunk
-    bool is_of_boundary = false;
-    const void* data = nullptr;
-    uint64_t row_bytes = 0;
-    uint64_t rows = 0;
-    uint64_t rows_per_chunk = 0;
-
-    uint64_t chunks() const { return (rows + rows_per_chunk - 1) / rows_per_chunk; }
-  };
-
   MemoryReservation memory_;
   core::Mesh mesh_;
-  std::vector<Array> arrays_;  // in the order in which they are sent
+  std::vector<MeshArray> arrays_;  // in the order in which they are sent
 };
+
+// What a response begins with that has nothing but the chunk number `index`, in field `field`: `size` bytes, which are
+// the values of the array, follow it as they are. `moved`: those of the vertices of a chunk of points.
+std::string ChunkHead(int field, uint64_t index, uint32_t crc32c, std::span<const uint32_t> moved, int array_field,
+                      uint64_t size);
 
 // A response that has nothing but the chunk number `index` of `mesh`, with its checksum, in field `field`: serialized
 // as protocol buffers would, but without a copy of the values. They are those of the mesh, which lives as long as the

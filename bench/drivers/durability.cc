@@ -1,0 +1,238 @@
+// What it costs that nothing is lost: commits, uploads, starts, meshes in files. Prints a table.
+//
+//   bench_durability FOLDER     on whose disk; what is written there is removed again
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "grpcpp/support/slice.h"
+#include "proto/checksum.h"
+#include "server/store/check_data.h"
+#include "server/store/durable_log.h"
+#include "server/store/memory_mesh.h"
+
+namespace wellspace::server {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double SecondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+void Check(const absl::Status& status) {
+  if (!status.ok()) {
+    std::fprintf(stderr, "bench_durability: %s\n", status.ToString().c_str());
+    std::exit(1);
+  }
+}
+
+template <typename Value>
+Value Get(absl::StatusOr<Value> value) {
+  Check(value.status());
+  return *std::move(value);
+}
+
+std::unique_ptr<DurableLog> OpenLog(const std::string& folder) { return Get(DurableLog::Open({.folder = folder})); }
+
+SessionChange MakeCreation(uint64_t number) {
+  SessionChange change{.session = absl::StrCat("sessions/", absl::Hex(number, absl::kZeroPad16))};
+  store::v1::SessionRecord& state = change.state.emplace();
+  state.set_name(change.session);
+  state.set_tenant("tenant");
+  state.set_create_time_ns(static_cast<int64_t>(number) + 1);
+  state.mutable_parameters()->set_dimension(3);
+  (*state.mutable_labels())["project"] = "of a length that labels have";
+  change.answer.emplace().set_tenant("tenant");
+  change.answer->set_request_id(change.session);
+  change.answer->set_response(std::string(300, 'x'));
+  return change;
+}
+
+// `threads` create sessions one after the other, each with an answer.
+void MeasureCommits(const std::string& folder, int threads) {
+  const auto log = OpenLog(folder);
+  constexpr double kSeconds = 3;
+  std::vector<std::vector<double>> times(threads);
+  std::vector<std::thread> writers;
+  const auto start = Clock::now();
+  for (int thread = 0; thread < threads; ++thread) {
+    writers.emplace_back([&, thread] {
+      for (uint64_t i = 0; SecondsSince(start) < kSeconds; ++i) {
+        const SessionChange change = MakeCreation(uint64_t{1'000'000} * (thread + 1) + i);
+        const auto begun = Clock::now();
+        Check(log->Commit(change));
+        times[thread].push_back(SecondsSince(begun));
+      }
+    });
+  }
+  for (std::thread& writer : writers) {
+    writer.join();
+  }
+  const double seconds = SecondsSince(start);
+  std::vector<double> all;
+  for (const std::vector<double>& some : times) {
+    all.insert(all.end(), some.begin(), some.end());
+  }
+  std::ranges::sort(all);
+  std::printf("creates, %2d threads   %7.0f /s   p50 %6.1f ms   p99 %6.1f ms\n", threads,
+              static_cast<double>(all.size()) / seconds, all[all.size() / 2] * 1e3, all[all.size() * 99 / 100] * 1e3);
+}
+
+// Messages of 1 MiB, synchronised and committed every 16 MiB, as the service does.
+void MeasureUpload(const std::string& folder) {
+  const auto log = OpenLog(folder);
+  SessionChange change = MakeCreation(1);
+  Check(log->Commit(change));
+  const auto points = log->OpenPoints(change.session, 3, {});
+  const std::vector<double> message(3 * 43'690, 0.5);
+  const auto start = Clock::now();
+  uint64_t bytes = 0;
+  for (int piece = 0; piece < 8; ++piece) {
+    for (int i = 0; i < 16; ++i) {
+      Check(points->Append(message));
+      bytes += message.size() * sizeof(double);
+    }
+    Check(points->Synchronize());
+    change.state->set_points(points->coordinate_count() / 3);
+    change.answer.reset();
+    change.steps.assign(1, {});
+    change.steps[0].mutable_points()->set_count(message.size() * 16 / 3);
+    Check(log->Commit(change));
+  }
+  std::printf("upload                %7.0f MB/s, synchronised\n",
+              static_cast<double>(bytes) / SecondsSince(start) / 1e6);
+}
+
+void MeasureStart(const std::string& folder, uint64_t sessions) {
+  {
+    const auto log = OpenLog(folder);
+    std::atomic<uint64_t> next = 0;
+    std::vector<std::thread> writers;
+    for (int thread = 0; thread < 64; ++thread) {
+      writers.emplace_back([&] {
+        for (uint64_t number = next++; number < sessions; number = next++) {
+          SessionChange change = MakeCreation(number);
+          change.steps.resize(4);
+          change.operations.resize(2);
+          change.operations[1].set_number(1);
+          Check(log->Commit(change));
+        }
+      });
+    }
+    for (std::thread& writer : writers) {
+      writer.join();
+    }
+  }
+  const auto start = Clock::now();
+  const auto log = OpenLog(folder);
+  const size_t loaded = Get(log->Load()).sessions.size();
+  const double seconds = SecondsSince(start);
+  Get(log->RemoveGarbage());
+  std::printf("start, %zu sessions %7.3f s; with garbage %.3f s; database %.1f MB\n", loaded, seconds,
+              SecondsSince(start), static_cast<double>(std::filesystem::file_size(folder + "/sessions.db")) / 1e6);
+}
+
+core::Mesh MakeLargeMesh() {
+  core::Mesh mesh;
+  mesh.dimension = 3;
+  mesh.domain_low.assign(3, 0);
+  mesh.domain_high.assign(3, 1);
+  mesh.points.assign(3 * 160'000, 0.5);
+  mesh.simplices.assign(4 * 1'000'000, 7);
+  mesh.input_vertex.assign(80'000, 7);
+  return mesh;
+}
+
+// Seconds for all chunks, through a socket, whose other end is read.
+double Download(const MeshSnapshot& mesh) {
+  int sockets[2];
+  if (::socketpair(AF_UNIX, SOCK_STREAM, 0, sockets) != 0) {
+    std::exit(1);
+  }
+  std::thread reader([&] {
+    std::vector<char> bytes(size_t{1} << 20);
+    while (::read(sockets[1], bytes.data(), bytes.size()) > 0) {
+    }
+  });
+  const auto start = Clock::now();
+  const uint64_t count = Get(mesh.ChunkCount(false));
+  for (uint64_t index = 0; index < count; ++index) {
+    std::vector<grpc::Slice> slices;
+    if (!Get(mesh.SerializeChunk(index, 2, false)).Dump(&slices).ok()) {
+      std::exit(1);
+    }
+    for (const grpc::Slice& slice : slices) {
+      for (size_t done = 0; done < slice.size();) {
+        const ssize_t written = ::write(sockets[0], slice.begin() + done, slice.size() - done);
+        done += written < 0 ? 0 : static_cast<size_t>(written);
+      }
+    }
+  }
+  ::shutdown(sockets[0], SHUT_RDWR);
+  reader.join();
+  const double seconds = SecondsSince(start);
+  ::close(sockets[0]);
+  ::close(sockets[1]);
+  return seconds;
+}
+
+void MeasureMesh(const std::string& folder) {
+  const auto log = OpenLog(folder);
+  const core::Mesh mesh = MakeLargeMesh();
+  const double megabytes = static_cast<double>(mesh.points.size() * 8 + mesh.simplices.size() * 4) / 1e6;
+  auto start = Clock::now();
+  const auto file = Get(log->KeepMesh("sessions/1", 1, mesh, core::RunContext()));
+  std::printf("mesh of 10^6 simplices, %.0f MB: kept in %.3f s", megabytes, SecondsSince(start));
+  start = Clock::now();
+  Get(file->Load(core::RunContext()));
+  std::printf(", loaded in %.3f s\n", SecondsSince(start));
+  const MemoryMesh memory(1, mesh);
+  std::vector<double> ratios;
+  double best_file = 1e9;
+  double best_memory = 1e9;
+  for (int round = 0; round < 21; ++round) {
+    const double of_memory = Download(memory);
+    const double of_file = Download(*file);
+    best_memory = std::min(best_memory, of_memory);
+    best_file = std::min(best_file, of_file);
+    ratios.push_back(of_memory / of_file);
+  }
+  std::ranges::sort(ratios);
+  std::printf("through a socket: memory %.0f MB/s, file %.0f MB/s; median of the ratios %.2f\n",
+              megabytes / best_memory, megabytes / best_file, ratios[ratios.size() / 2]);
+}
+
+}  // namespace
+}  // namespace wellspace::server
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::fprintf(stderr, "usage: bench_durability FOLDER\n");
+    return 2;
+  }
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);
+  const std::string root = std::string(argv[1]) + "/bench_durability";
+  const auto fresh = [&](const char* name) {
+    std::filesystem::remove_all(root);
+    return root + "/" + name;
+  };
+  for (const int threads : {1, 4, 16, 64}) {
+    wellspace::server::MeasureCommits(fresh("commits"), threads);
+  }
+  wellspace::server::MeasureUpload(fresh("upload"));
+  wellspace::server::MeasureStart(fresh("start"), 10'000);
+  wellspace::server::MeasureMesh(fresh("mesh"));
+  std::filesystem::remove_all(root);
+  return 0;
+}

@@ -1,0 +1,189 @@
+#include "server/store/durable_log.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/base/status_macros.h"
+#include "server/store/mesh_file.h"
+#include "server/store/point_file.h"
+#include "server/wire/errors.h"
+
+namespace wellspace::server {
+namespace {
+
+// Of one transaction: enough that a synchronisation costs each little, and few enough that none waits for long.
+constexpr size_t kMaxBatch = 256;
+constexpr uint64_t kMaxBatchBytes = uint64_t{8} << 20;
+
+uint64_t BytesOf(const SessionChange& change) {
+  uint64_t bytes = change.answer.has_value() ? change.answer->ByteSizeLong() : 0;
+  for (const store::v1::StepRecord& step : change.steps) {
+    bytes += step.ByteSizeLong();
+  }
+  return bytes;
+}
+
+// Whether it is not known, after this error, what is on the disk.
+bool IsFailure(const absl::Status& status) {
+  return status.code() == absl::StatusCode::kUnavailable || status.code() == absl::StatusCode::kDataLoss;
+}
+
+}  // namespace
+
+DurableLog::DurableLog(const DurableLogOptions& options, std::unique_ptr<DataFolder> folder,
+                       std::unique_ptr<SessionTables> tables)
+    : files_(*options.files),
+      max_mesh_chunk_bytes_(options.max_mesh_chunk_bytes),
+      health_(std::make_shared<StoreHealth>(options.on_failure)),
+      folder_(std::move(folder)),
+      tables_(std::move(tables)),
+      in_use_(std::make_shared<FilesInUse>(files_, health_)) {}
+
+absl::StatusOr<std::unique_ptr<DurableLog>> DurableLog::Open(const DurableLogOptions& options) {
+  WELLSPACE_ASSIGN_OR_RETURN(std::unique_ptr<DataFolder> folder, DataFolder::Open(options.folder, *options.files));
+  WELLSPACE_ASSIGN_OR_RETURN(std::unique_ptr<SessionTables> tables,
+                             SessionTables::Open(folder->paths().database(), options.tables));
+  // The names of the database and of its write-ahead log.
+  WELLSPACE_RETURN_IF_ERROR(options.files->SynchronizeFolder(options.folder));
+  return std::unique_ptr<DurableLog>(new DurableLog(options, std::move(folder), std::move(tables)));
+}
+
+absl::Status DurableLog::Commit(const SessionChange& change, Survives survives) {
+  std::vector<std::string> files_of_deleted;
+  if (change.is_deletion) {
+    WELLSPACE_ASSIGN_OR_RETURN(const auto state, tables_->ReadState(change.session));
+    if (state.has_value()) {
+      files_of_deleted = FilesOf(folder_->paths(), *state);
+      // There may be some that were not committed.
+      files_of_deleted.push_back(folder_->paths().points(change.session));
+    }
+  }
+  WELLSPACE_RETURN_IF_ERROR(Enqueue(change, survives));
+  for (const std::string& path : files_of_deleted) {
+    in_use_->Remove(path);
+  }
+  return absl::OkStatus();
+}
+
+// Who is first in the queue commits all that wait, while others come and wait behind. Then the next one is first.
+absl::Status DurableLog::Enqueue(const SessionChange& change, Survives survives) {
+  Waiting waiting{.change = &change, .survives = survives, .bytes = BytesOf(change)};
+  std::unique_lock lock(mutex_);
+  queue_.push_back(&waiting);
+  waiting.changed.wait(lock, [&] { return waiting.is_done || queue_.front() == &waiting; });
+  if (waiting.is_done) {
+    return waiting.status;
+  }
+  const std::vector<Waiting*> batch = TakeBatch();
+  std::vector<AnswerKey> forgotten = std::exchange(forgotten_, {});
+  lock.unlock();
+
+  CommitBatch(batch, std::move(forgotten));
+
+  lock.lock();
+  for (Waiting* other : batch) {
+    other->is_done = true;
+    if (other != &waiting) {
+      other->changed.notify_one();  // under the lock: it ends, with its condition variable, when the lock is free
+    }
+  }
+  // All but the first leave the queue; that keeps the others waiting.
+  queue_.erase(queue_.begin() + 1, queue_.begin() + static_cast<std::ptrdiff_t>(batch.size()));
+  lock.unlock();
+
+  if (const absl::Status checkpoint = tables_->Checkpoint(); IsFailure(checkpoint)) {
+    health_->Fail(checkpoint).IgnoreError();  // what was committed stays so
+  }
+
+  lock.lock();
+  queue_.pop_front();
+  if (!queue_.empty()) {
+    queue_.front()->changed.notify_one();
+  }
+  return waiting.status;
+}
+
+std::vector<DurableLog::Waiting*> DurableLog::TakeBatch() {
+  std::vector<Waiting*> batch;
+  uint64_t bytes = 0;
+  for (Waiting* waiting : queue_) {
+    bytes += waiting->bytes;
+    if (batch.size() == kMaxBatch || (!batch.empty() && bytes > kMaxBatchBytes)) {
+      break;
+    }
+    batch.push_back(waiting);
+  }
+  return batch;
+}
+
+void DurableLog::CommitBatch(std::span<Waiting* const> batch, std::vector<AnswerKey> forgotten) {
+  const absl::Status status = Apply(batch, forgotten);
+  for (Waiting* waiting : batch) {
+    waiting->status = status;
+  }
+  if (status.ok() || IsFailure(status)) {
+    return;
+  }
+  if (batch.size() > 1) {
+    // One of them may be at fault: each for itself, then.
+    for (Waiting* const& waiting : batch) {
+      waiting->status = Apply({&waiting, 1}, forgotten);
+      if (waiting->status.ok()) {
+        forgotten.clear();
+      }
+    }
+  }
+  const std::lock_guard lock(mutex_);
+  forgotten_.insert(forgotten_.begin(), forgotten.begin(), forgotten.end());
+}
+
+absl::Status DurableLog::Apply(std::span<Waiting* const> batch, std::span<const AnswerKey> forgotten) {
+  WELLSPACE_RETURN_IF_ERROR(health_->Check());
+  std::vector<const SessionChange*> changes;
+  bool survives_power_loss = false;
+  for (const Waiting* waiting : batch) {
+    changes.push_back(waiting->change);
+    survives_power_loss |= waiting->survives == Survives::kPowerLoss;
+  }
+  const absl::Status status =
+      tables_->Apply(changes, forgotten, survives_power_loss ? Survives::kPowerLoss : Survives::kProcessDeath);
+  return IsFailure(status) ? health_->Fail(status) : status;
+}
+
+void DurableLog::Forget(std::span<const AnswerKey> answers) {
+  const std::lock_guard lock(mutex_);
+  forgotten_.insert(forgotten_.end(), answers.begin(), answers.end());
+}
+
+std::unique_ptr<PointStore> DurableLog::OpenPoints(const std::string& session, int dimension,
+                                                   std::vector<store::v1::StepRecord::Points> committed) {
+  return std::make_unique<PointFile>(files_, health_, folder_->paths().points(session), dimension,
+                                     std::move(committed));
+}
+
+absl::StatusOr<std::shared_ptr<MeshSnapshot>> DurableLog::KeepMesh(const std::string& session, uint64_t revision,
+                                                                   core::Mesh mesh, const core::RunContext& context) {
+  const std::string path = folder_->paths().mesh(session, revision);
+  std::unique_ptr<FilesInUse::Use> use = in_use_->Take(path, /*is_written=*/true);
+  // RemoveGarbage is to leave the file alone that has this name first, too.
+  const std::unique_ptr<FilesInUse::Use> writing =
+      in_use_->Take(path + std::string(kTemporaryEnd), /*is_written=*/true);
+  WELLSPACE_ASSIGN_OR_RETURN(store::v1::MeshRecord record,
+                             WriteMeshFile(files_, *health_, path, revision, mesh, context, max_mesh_chunk_bytes_));
+  return std::make_shared<MeshFile>(files_, std::move(record), std::move(use), buffers_);
+}
+
+std::shared_ptr<MeshSnapshot> DurableLog::FindMesh(const std::string& session, const store::v1::SessionRecord& record) {
+  if (!record.has_mesh()) {
+    return nullptr;
+  }
+  const std::string path = folder_->paths().mesh(session, record.mesh().revision());
+  return std::make_shared<MeshFile>(files_, record.mesh(), in_use_->Take(path, /*is_written=*/false), buffers_);
+}
+
+absl::StatusOr<DataFolder::Sweep> DurableLog::RemoveGarbage() {
+  WELLSPACE_RETURN_IF_ERROR(health_->Check());
+  return folder_->RemoveGarbage(*in_use_, [this] { return tables_->ReadStates(); });
+}
+
+}  // namespace wellspace::server

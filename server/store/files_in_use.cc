@@ -1,0 +1,60 @@
+#include "server/store/files_in_use.h"
+
+#include <utility>
+
+namespace wellspace::server {
+
+FilesInUse::Use::Use(std::shared_ptr<FilesInUse> files, std::string path, uint64_t version)
+    : files_(std::move(files)), path_(std::move(path)), version_(version) {}
+
+std::unique_ptr<FilesInUse::Use> FilesInUse::Take(const std::string& path, bool is_written) {
+  const std::lock_guard lock(mutex_);
+  State& state = states_[path];
+  ++state.uses;
+  if (is_written) {
+    ++state.version;
+    state.is_obsolete = false;
+  }
+  return std::unique_ptr<Use>(new Use(shared_from_this(), path, state.version));
+}
+
+bool FilesInUse::Contains(const std::string& path) const {
+  const std::lock_guard lock(mutex_);
+  return states_.contains(path);
+}
+
+void FilesInUse::Remove(const std::string& path) {
+  const std::lock_guard lock(mutex_);
+  if (const auto state = states_.find(path); state != states_.end()) {
+    state->second.is_obsolete = true;
+  } else {
+    RemoveNow(path);
+  }
+}
+
+void FilesInUse::RemoveNow(const std::string& path) {
+  if (health_ == nullptr || health_->Check().ok()) {
+    file_system_.Remove(path).IgnoreError();
+  }
+}
+
+void FilesInUse::Release(const std::string& path) {
+  const std::lock_guard lock(mutex_);
+  const auto state = states_.find(path);
+  if (--state->second.uses > 0) {
+    return;
+  }
+  if (state->second.is_obsolete) {
+    RemoveNow(path);
+  }
+  states_.erase(state);
+}
+
+void FilesInUse::MakeObsolete(const std::string& path, uint64_t version) {
+  const std::lock_guard lock(mutex_);
+  if (State& state = states_.at(path); state.version == version) {
+    state.is_obsolete = true;
+  }
+}
+
+}  // namespace wellspace::server

@@ -1,0 +1,102 @@
+// The database of sessions: one row for each record.
+#ifndef WELLSPACE_SERVER_STORE_SESSION_TABLES_H_
+#define WELLSPACE_SERVER_STORE_SESSION_TABLES_H_
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "absl/status/status.h"
+#include "absl/status/statusor.h"
+#include "server/store/session_log.h"
+#include "server/store/sqlite.h"
+
+namespace wellspace::server {
+
+struct SessionTablesOptions {
+  const char* vfs = nullptr;    // of SQLite; null: that of the machine
+  bool is_exclusive = false;    // no other process may look at it meanwhile; needs no shared memory
+  bool is_read_only = false;    // has to be there; is neither changed nor migrated
+  int checkpoint_pages = 1000;  // the write-ahead log is taken over into the database when it has as many: 4 MiB
+};
+
+// Each record has a CRC32C beside it, of itself and of what it belongs to: SQLite has none in its pages.
+//
+// Thread safety: thread-safe; one function works at a time.
+// Errors:     of all functions, if not said otherwise: FILE_DAMAGED, naming the file; STORE_FAILED; OUT_OF_MEMORY;
+//             INTERNAL.
+class SessionTables {
+ public:
+  // The schema that this program knows; those before it are migrated.
+  static const int kSchema;
+
+  // Errors:     FAILED_PRECONDITION: the file is of a newer program, or of another one.
+  static absl::StatusOr<std::unique_ptr<SessionTables>> Open(const std::string& path,
+                                                             const SessionTablesOptions& options);
+  ~SessionTables();
+
+  // Applies `changes` in their order, and drops `forgotten`, in one transaction. With Survives::kProcessDeath it may be
+  // undone by a loss of power, until another one that is not is committed.
+  //
+  // Errors:     those of SessionLog::Commit, and OUT_OF_MEMORY: nothing has changed. INTERNAL: one of the changes is
+  //             of a session that is not there. STORE_FAILED, FILE_DAMAGED: it is not known what has changed.
+  absl::Status Apply(std::span<const SessionChange* const> changes, std::span<const AnswerKey> forgotten,
+                     SessionLog::Survives survives);
+
+  // Has what was committed take up less room, once that is worth it. To be called after Apply, by the same thread.
+  //
+  // Errors:     DISK_FULL: later, then; STORE_FAILED, FILE_DAMAGED: nothing may be written any more.
+  absl::Status Checkpoint();
+
+  // All records. With `problems`, damaged records are left out, and what is wrong with each is appended there.
+  absl::StatusOr<StoredSessions> Load(std::vector<std::string>* problems = nullptr);
+
+  absl::StatusOr<std::vector<store::v1::StepRecord::Features>> ReadFeatures(const std::string& session);
+
+  // None: there is no such session.
+  absl::StatusOr<std::optional<store::v1::SessionRecord>> ReadState(const std::string& session);
+  absl::StatusOr<std::vector<store::v1::SessionRecord>> ReadStates();
+
+  // What is wrong with the file itself, by SQLite's thorough look at it; nothing: it is whole.
+  absl::StatusOr<std::vector<std::string>> CheckFile();
+
+  // Copies all to the new file `path`, as it is at one moment.
+  //
+  // Errors:     DISK_FULL and STORE_FAILED are about the copy.
+  absl::Status BackUp(const std::string& path, const SessionTablesOptions& options);
+
+ private:
+  struct Statements;
+
+  SessionTables(std::unique_ptr<SqliteDatabase> database, int checkpoint_pages);
+  absl::Status Prepare();
+  absl::Status ApplyOne(const SessionChange& change);
+  absl::Status Delete(const std::string& session);
+  absl::Status Write(const SessionChange& change);
+  absl::Status WriteAnswer(const store::v1::AnswerRecord& answer);
+  absl::StatusOr<std::optional<int64_t>> FindId(const std::string& session);
+  absl::Status SetSurvives(SessionLog::Survives survives);
+
+  // Calls `take` with each row of `statement`; what it says is wrong is an error, or goes into `problems`.
+  absl::Status ForEach(SqliteStatement& statement, std::vector<std::string>* problems,
+                       const std::function<std::string(const SqliteStatement& row)>& take);
+  absl::Status LoadSteps(std::span<StoredSession> sessions, std::span<const int64_t> ids,
+                         std::vector<std::string>* problems);
+  absl::Status LoadAnswers(std::vector<store::v1::AnswerRecord>& answers, std::vector<std::string>* problems);
+
+  const int checkpoint_pages_;
+  std::mutex mutex_;  // of all below
+  const std::unique_ptr<SqliteDatabase> database_;
+  std::unique_ptr<Statements> statements_;
+  SessionLog::Survives survives_ = SessionLog::Survives::kPowerLoss;  // of what is committed now
+  int log_pages_ = 0;  // in the write-ahead log, to be taken over into the database
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_STORE_SESSION_TABLES_H_

@@ -1,0 +1,41 @@
+// Whether the store can still write, and what its errors are to clients.
+#ifndef WELLSPACE_SERVER_STORE_STORE_HEALTH_H_
+#define WELLSPACE_SERVER_STORE_STORE_HEALTH_H_
+
+#include <functional>
+#include <mutex>
+
+#include "absl/status/status.h"
+
+namespace wellspace::server {
+
+// Remembers the first failure after which it is not known what is on the disk. Nothing is written from then on: the
+// kernel takes pages that it could not write for written, so that trying again would succeed without a reason.
+//
+// Thread safety: thread-safe.
+class StoreHealth {
+ public:
+  // `on_failure` is called once, with the cause, by the thread that meets it; it may be empty.
+  explicit StoreHealth(std::function<void(const absl::Status& cause)> on_failure);
+
+  // Errors:     STORE_FAILED, after a failure.
+  absl::Status Check() const;
+
+  // Notes the failure. Returns STORE_FAILED.
+  absl::Status Fail(const absl::Status& cause);
+
+  // What a write, or another change of a file, that ended with `cause` is to clients: DISK_FULL, or a failure.
+  absl::Status OfWrite(const absl::Status& cause);
+
+ private:
+  const std::function<void(const absl::Status&)> on_failure_;
+  mutable std::mutex mutex_;
+  absl::Status cause_;  // guarded by mutex_; ok: none yet
+};
+
+// What a read that ended with `cause`, an error of a FileSystem, is to clients: FILE_DAMAGED, or OUT_OF_MEMORY.
+absl::Status ErrorOfRead(const absl::Status& cause);
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_STORE_STORE_HEALTH_H_

@@ -1,0 +1,170 @@
+#include "server/store/back_up.h"
+
+#include <atomic>
+#include <filesystem>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include "server/store/durable_log.h"
+#include "tests/server/store/store_support.h"
+
+namespace wellspace::server {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+// The machine's, without links: as if the copy were on another disk.
+class NoLinks final : public FileSystem {
+ public:
+  absl::StatusOr<std::unique_ptr<File>> Open(const std::string& path, Mode mode) override {
+    return PosixFileSystem().Open(path, mode);
+  }
+  absl::Status Rename(const std::string& from, const std::string& to) override {
+    return PosixFileSystem().Rename(from, to);
+  }
+  absl::Status Remove(const std::string& path) override { return PosixFileSystem().Remove(path); }
+  absl::Status Link(const std::string& from, const std::string& /*to*/) override {
+    return absl::UnavailableError(from + ": Invalid cross-device link");
+  }
+  absl::StatusOr<std::vector<std::string>> List(const std::string& folder) override {
+    return PosixFileSystem().List(folder);
+  }
+  absl::Status CreateFolder(const std::string& folder) override { return PosixFileSystem().CreateFolder(folder); }
+  absl::Status SynchronizeFolder(const std::string& folder) override {
+    return PosixFileSystem().SynchronizeFolder(folder);
+  }
+  absl::StatusOr<std::unique_ptr<FileLock>> Lock(const std::string& path) override {
+    return PosixFileSystem().Lock(path);
+  }
+};
+
+// One more piece of points, and another mesh in the place of the last.
+absl::Status Change(DurableLog& log, uint64_t number, uint64_t revision, PointStore& points,
+                    std::shared_ptr<MeshSnapshot>& mesh) {
+  const std::vector<double> piece = {1, 2, static_cast<double>(revision)};
+  SessionChange change{.session = SessionName(number), .state = MakeState(number, revision)};
+  if (absl::Status status = points.Append(piece); !status.ok()) {
+    return status;
+  }
+  if (absl::Status status = points.Synchronize(); !status.ok()) {
+    return status;
+  }
+  auto kept =
+      log.KeepMesh(change.session, revision, MakeMesh({.salt = static_cast<uint32_t>(revision)}), core::RunContext());
+  if (!kept.ok()) {
+    return kept.status();
+  }
+  change.steps = {MakePointsStep(revision - 1, piece, 3)};
+  change.state->set_points(revision);
+  *change.state->mutable_mesh() = *(*kept)->record();
+  if (absl::Status status = log.Commit(change); !status.ok()) {
+    return status;
+  }
+  if (mesh != nullptr) {
+    mesh->MakeObsolete();
+  }
+  mesh = *std::move(kept);
+  return absl::OkStatus();
+}
+
+class BackUpTest : public ::testing::Test {
+ protected:
+  const TestFolder folder_;
+  const std::string from_ = folder_.path() + "/data";
+  const std::string to_ = folder_.path() + "/backups/monday";
+};
+
+TEST_F(BackUpTest, AServerStartsOnTheCopy) {
+  const auto log = *DurableLog::Open({.folder = from_});
+  for (uint64_t number = 1; number <= 3; ++number) {
+    ASSERT_TRUE(log->Commit({.session = SessionName(number), .state = MakeState(number)}).ok());
+    const auto points = log->OpenPoints(SessionName(number), 3, {});
+    std::shared_ptr<MeshSnapshot> mesh;
+    for (uint64_t revision = 1; revision <= number; ++revision) {
+      ASSERT_TRUE(Change(*log, number, revision, *points, mesh).ok());
+    }
+    ASSERT_TRUE(points->Append(std::vector<double>(30, 1.0)).ok()) << "an upload is under way";
+  }
+  NoLinks no_links;
+  for (FileSystem* files : {&PosixFileSystem(), static_cast<FileSystem*>(&no_links)}) {
+    const std::string to = to_ + (files == &no_links ? " 2" : "");
+    const auto report = BackUp(from_, to, {.files = files});
+    ASSERT_TRUE(report.ok()) << report.status();
+    EXPECT_EQ(report->sessions, 3u);
+    EXPECT_EQ(report->points, 6u);
+    EXPECT_EQ(report->meshes, 3u);
+    const auto restored = DurableLog::Open({.folder = to});
+    ASSERT_TRUE(restored.ok()) << restored.status();
+    EXPECT_EQ(TextOf(*(*restored)->Load()), TextOf(*log->Load()));
+    EXPECT_THAT((*restored)->RemoveGarbage()->removed, IsEmpty());
+    EXPECT_EQ(std::filesystem::file_size(to + "/files/00000003.points"), 72u) << "the committed ones alone";
+  }
+}
+
+TEST_F(BackUpTest, IsOfOneMomentWhateverAServerDoesMeanwhile) {
+  const auto log = *DurableLog::Open({.folder = from_});
+  std::atomic<bool> is_over = false;
+  std::atomic<int> failed = 0;
+  std::vector<std::thread> writers;
+  for (uint64_t writer = 1; writer <= 2; ++writer) {
+    writers.emplace_back([&, writer] {
+      for (uint64_t number = writer; !is_over; number += 2) {
+        failed += log->Commit({.session = SessionName(number), .state = MakeState(number)}).ok() ? 0 : 1;
+        const auto points = log->OpenPoints(SessionName(number), 3, {});
+        std::shared_ptr<MeshSnapshot> mesh;
+        for (uint64_t revision = 1; revision < 10; ++revision) {
+          failed += Change(*log, number, revision, *points, mesh).ok() ? 0 : 1;
+        }
+        if (number % 3 != 0) {
+          failed += log->Commit({.session = SessionName(number), .is_deletion = true}).ok() ? 0 : 1;
+        }
+      }
+    });
+  }
+  for (int i = 0; i < 5; ++i) {
+    const auto report = BackUp(from_, to_ + std::to_string(i));
+    EXPECT_TRUE(report.ok()) << report.status();
+    const auto check = CheckData(from_);
+    ASSERT_TRUE(check.ok()) << check.status();
+    EXPECT_THAT(check->problems, IsEmpty());
+  }
+  is_over = true;
+  for (std::thread& writer : writers) {
+    writer.join();
+  }
+  EXPECT_EQ(failed, 0);
+}
+
+TEST_F(BackUpTest, WantsAFolderOfItsOwn) {
+  const auto log = *DurableLog::Open({.folder = from_});
+  const absl::Status self = BackUp(from_, from_).status();
+  EXPECT_EQ(self.code(), absl::StatusCode::kFailedPrecondition);
+  std::filesystem::create_directories(to_);
+  WriteFile(to_ + "/letter.txt", "");
+  const absl::Status full = BackUp(from_, to_).status();
+  EXPECT_EQ(full.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(std::string(full.message()), HasSubstr("not empty"));
+}
+
+TEST_F(BackUpTest, SaysThatTheFolderIsNotWhole) {
+  const auto log = *DurableLog::Open({.folder = from_});
+  ASSERT_TRUE(log->Commit({.session = SessionName(1), .state = MakeState(1)}).ok());
+  const auto points = log->OpenPoints(SessionName(1), 3, {});
+  std::shared_ptr<MeshSnapshot> mesh;
+  ASSERT_TRUE(Change(*log, 1, 1, *points, mesh).ok());
+  FlipBit(from_ + "/files/00000001.points", 3, 3);
+  const absl::Status damaged = BackUp(from_, to_).status();
+  EXPECT_EQ(damaged.code(), absl::StatusCode::kDataLoss);
+  EXPECT_THAT(std::string(damaged.message()), HasSubstr("00000001.points"));
+  std::filesystem::remove(from_ + "/files/00000001.points");
+  const absl::Status missing = BackUp(from_, to_ + "2").status();
+  EXPECT_EQ(missing.code(), absl::StatusCode::kDataLoss);
+  EXPECT_THAT(std::string(missing.message()), HasSubstr("00000001.points"));
+}
+
+}  // namespace
+}  // namespace wellspace::server

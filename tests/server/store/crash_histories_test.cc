@@ -1,0 +1,135 @@
+// Random lives of a log on a disk that loses power: what was acknowledged is there afterwards, and what was not is
+// there wholly or not at all.
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdlib>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include "server/store/check_data.h"
+#include "tests/server/store/simulated_disk.h"
+#include "tests/server/store/store_life.h"
+#include "tests/support/clouds.h"
+
+namespace wellspace::server {
+namespace {
+
+using Loss = SimulatedDisk::Loss;
+constexpr std::array kLosses = {Loss::kProcess, Loss::kAll, Loss::kSome, Loss::kSome};
+
+struct Bugs {
+  StoreLife::Bugs of_life{};
+  std::vector<std::string> unsynchronised{};  // ends of paths
+};
+
+// One life with some crashes. What is wrong after one of them; nothing: all is well.
+std::string RunHistory(SimulatedDisk& disk, uint64_t seed, const Bugs& bugs = {}) {
+  test::SplitMix64 random(seed);
+  disk.Clear();
+  for (const std::string& end : bugs.unsynchronised) {
+    disk.OmitSynchronize(end);
+  }
+  StoreLife life(disk, bugs.of_life);
+  const uint64_t crashes = 1 + random.Below(3);
+  for (uint64_t crash = 0; crash < crashes; ++crash) {
+    disk.DieAt(disk.operations() + random.Below(crash == 0 ? 400 : 250));
+    absl::Status status = life.log() == nullptr ? life.Open() : absl::OkStatus();
+    for (int step = 0; step < 40 && status.ok() && !disk.is_dead(); ++step) {
+      status = life.DoAnything(random);
+      if (!status.ok() && !disk.is_dead()) {
+        return absl::StrCat("a step fails: ", status.ToString());
+      }
+    }
+    const std::string problem = life.Restart(kLosses[random.Below(kLosses.size())], random);
+    if (!problem.empty()) {
+      return absl::StrCat("after crash ", crash, ", at ", disk.failed_operation(), ": ", problem);
+    }
+  }
+  return life.CheckWhole();
+}
+
+// Of so many histories, how many go wrong.
+int CountProblems(uint64_t first_seed, int histories, const Bugs& bugs, std::string& first_problem) {
+  SimulatedDisk disk;
+  int count = 0;
+  for (int i = 0; i < histories; ++i) {
+    const std::string problem = RunHistory(disk, first_seed + i, bugs);
+    if (!problem.empty() && count++ == 0) {
+      first_problem = absl::StrCat("seed ", first_seed + i, ": ", problem);
+    }
+  }
+  return count;
+}
+
+TEST(CrashHistories, NothingAcknowledgedIsLost) {
+  const char* wanted = std::getenv("WELLSPACE_HISTORIES");
+  const int histories = wanted != nullptr ? std::atoi(wanted) : WELLSPACE_HISTORIES;
+  const uint64_t seed = test::Seed(20261128);
+  std::cout << histories << " histories from WELLSPACE_SEED=" << seed << " on\n";
+  std::string problem;
+  EXPECT_EQ(CountProblems(seed, histories, {}, problem), 0) << problem;
+}
+
+// Every operation of one life, whatever else is drawn.
+TEST(CrashHistories, EveryOperationMayBeTheLast) {
+  const std::vector<std::pair<StoreLife::Action, uint64_t>> script = {
+      {StoreLife::Action::kCreate, 0},      {StoreLife::Action::kUpload, 0}, {StoreLife::Action::kStart, 0},
+      {StoreLife::Action::kSucceed, 0},     {StoreLife::Action::kCreate, 1}, {StoreLife::Action::kUpload, 0},
+      {StoreLife::Action::kAddFeatures, 1}, {StoreLife::Action::kTouch, 0},  {StoreLife::Action::kSucceed, 0},
+      {StoreLife::Action::kUpdate, 1},      {StoreLife::Action::kForget, 0}, {StoreLife::Action::kSucceed, 1},
+      {StoreLife::Action::kFail, 1},        {StoreLife::Action::kDelete, 0}, {StoreLife::Action::kSweep, 0},
+      {StoreLife::Action::kUpload, 1},
+  };
+  SimulatedDisk disk;
+  uint64_t operation = 0;
+  for (bool has_died = true; has_died; ++operation) {
+    for (const Loss loss : {Loss::kProcess, Loss::kAll, Loss::kSome}) {
+      for (uint64_t seed = 0; seed < (loss == Loss::kSome ? 4u : 1u); ++seed) {
+        disk.Clear();
+        disk.DieAt(operation);
+        StoreLife life(disk);
+        absl::Status status = life.Open();
+        for (size_t step = 0; step < script.size() && status.ok(); ++step) {
+          status = life.Do(script[step].first, script[step].second);
+        }
+        has_died = disk.is_dead();
+        const std::string at = has_died ? disk.failed_operation() : "the end";
+        test::SplitMix64 random(seed * 1000 + operation);
+        ASSERT_EQ(life.Restart(loss, random), "") << "operation " << operation << ", " << at << ", seed " << seed;
+      }
+    }
+  }
+  EXPECT_GT(operation, 150u);
+}
+
+struct PlantedBug {
+  const char* name;
+  Bugs bugs;
+};
+
+class CrashHistoriesWith : public ::testing::TestWithParam<PlantedBug> {};
+
+TEST_P(CrashHistoriesWith, AreFound) {
+  std::string problem;
+  EXPECT_GT(CountProblems(1, 300, GetParam().bugs, problem), 0);
+  std::cout << problem.substr(0, 300) << "\n";
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    PlantedBugs, CrashHistoriesWith,
+    ::testing::Values(PlantedBug{"AnswerBeforeCommit", {.of_life = {.answers_before_commit = true}}},
+                      PlantedBug{"AnswerInAnotherTransaction", {.of_life = {.answers_in_another_transaction = true}}},
+                      PlantedBug{"MeshNamedBeforeItsSynchronisation", {.unsynchronised = {".tmp"}}},
+                      PlantedBug{"RenameWithoutItsFolder", {.unsynchronised = {"/files"}}},
+                      PlantedBug{"PointsWithoutSynchronisation", {.unsynchronised = {".points"}}},
+                      PlantedBug{"LogWithoutSynchronisation", {.unsynchronised = {"-wal"}}},
+                      PlantedBug{"FolderWithoutItsName", {.unsynchronised = {"/data"}}}),
+    [](const auto& of) { return std::string(of.param.name); });
+
+}  // namespace
+}  // namespace wellspace::server

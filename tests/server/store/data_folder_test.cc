@@ -1,0 +1,116 @@
+#include "server/store/data_folder.h"
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include "tests/server/store/store_support.h"
+
+namespace wellspace::server {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::UnorderedElementsAre;
+
+class DataFolderTest : public ::testing::Test {
+ protected:
+  const TestFolder folder_;
+  const std::string root_ = folder_.path() + "/var/data";
+  const DataPaths paths_{root_};
+};
+
+TEST_F(DataFolderTest, IsMadeForThisUserAlone) {
+  const auto folder = DataFolder::Open(root_, PosixFileSystem());
+  ASSERT_TRUE(folder.ok()) << folder.status();
+  EXPECT_EQ(std::filesystem::status(root_).permissions(), std::filesystem::perms::owner_all);
+  EXPECT_TRUE(std::filesystem::is_directory(paths_.files()));
+}
+
+TEST_F(DataFolderTest, HasOneServerAtATime) {
+  auto folder = DataFolder::Open(root_, PosixFileSystem());
+  ASSERT_TRUE(folder.ok());
+  const absl::Status second = DataFolder::Open(root_, PosixFileSystem()).status();
+  EXPECT_EQ(second.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_EQ(second.message(), root_ + ": process " + std::to_string(::getpid()) +
+                                  " has this folder in use; stop it first, or name another folder");
+  folder->reset();
+  EXPECT_TRUE(DataFolder::Open(root_, PosixFileSystem()).ok());
+}
+
+TEST_F(DataFolderTest, IsNoFile) {
+  WriteFile(folder_.path() + "/file", "");
+  const absl::Status status = DataFolder::Open(folder_.path() + "/file", PosixFileSystem()).status();
+  EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
+  EXPECT_THAT(std::string(status.message()), HasSubstr("/file: cannot be used: Not a directory"));
+}
+
+TEST_F(DataFolderTest, FilesHaveTheirSessionsNames) {
+  EXPECT_EQ(paths_.points("sessions/01ef"), root_ + "/files/01ef.points");
+  EXPECT_EQ(paths_.mesh("sessions/01ef", 12), root_ + "/files/01ef.mesh-12");
+  EXPECT_EQ(paths_.points("sessions/../x"), root_ + "/files/x73657373696f6e732f2e2e2f78.points");
+  for (const char* name : {"01ef.points", "x73.points", "01ef.mesh-12", "01ef.mesh-12.tmp"}) {
+    EXPECT_TRUE(IsNameOfOurs(name)) << name;
+  }
+  for (const char* name : {"", "01ef", ".points", "x.points", "01eF.points", "01ef.points.tmp", "01ef.mesh-",
+                           "notes.txt", "01ef.mesh-1x", "01ef.mesh-.tmp", "01ef.mesh-1.tmp.tmp", "g.points"}) {
+    EXPECT_FALSE(IsNameOfOurs(name)) << name;
+  }
+}
+
+TEST_F(DataFolderTest, RemovesWhatNoSessionNamesAndLeavesWhatItDoesNotKnow) {
+  const auto folder = DataFolder::Open(root_, PosixFileSystem());
+  ASSERT_TRUE(folder.ok());
+  const auto in_use = std::make_shared<FilesInUse>(PosixFileSystem());
+  store::v1::SessionRecord session = MakeState(1);
+  session.set_name("sessions/aa");
+  session.mutable_mesh()->set_revision(3);
+  for (const char* name : {"aa.points", "aa.mesh-2", "aa.mesh-3", "aa.mesh-3.tmp", "bb.points", "bb.mesh-1",
+                           "cc.mesh-1", "cc.mesh-1.tmp", "notes.txt"}) {
+    WriteFile(paths_.files() + "/" + name, "x");
+  }
+  WriteFile(root_ + "/core", "x");
+  const auto use = in_use->Take(paths_.files() + "/cc.mesh-1", /*is_written=*/true);
+  const auto written = in_use->Take(paths_.files() + "/cc.mesh-1.tmp", /*is_written=*/true);
+  const auto sweep = (*folder)->RemoveGarbage(*in_use, [&] { return std::vector{session}; });
+  ASSERT_TRUE(sweep.ok()) << sweep.status();
+  EXPECT_THAT(sweep->removed, ElementsAre(paths_.files() + "/aa.mesh-2", paths_.files() + "/aa.mesh-3.tmp",
+                                          paths_.files() + "/bb.mesh-1", paths_.files() + "/bb.points"));
+  EXPECT_THAT(sweep->unknown, ElementsAre(root_ + "/core", paths_.files() + "/notes.txt"));
+  EXPECT_THAT(*PosixFileSystem().List(paths_.files()),
+              UnorderedElementsAre("aa.points", "aa.mesh-3", "cc.mesh-1", "cc.mesh-1.tmp", "notes.txt"));
+}
+
+// Between the look at the folder and the look at the rows a mesh is written, named and no longer read.
+TEST_F(DataFolderTest, LeavesAFileAloneThatIsWrittenMeanwhile) {
+  const auto folder = DataFolder::Open(root_, PosixFileSystem());
+  ASSERT_TRUE(folder.ok());
+  const auto in_use = std::make_shared<FilesInUse>(PosixFileSystem());
+  for (const char* name : {"/aa.mesh-1", "/aa.mesh-1.tmp"}) {
+    const std::string path = paths_.files() + name;
+    WriteFile(path, "of a process that died");
+    const auto sweep = (*folder)->RemoveGarbage(*in_use, [&] {
+      in_use->Take(path, /*is_written=*/true).reset();
+      return std::vector<store::v1::SessionRecord>();
+    });
+    ASSERT_TRUE(sweep.ok()) << sweep.status();
+    EXPECT_TRUE(std::filesystem::exists(path));
+  }
+}
+
+TEST_F(DataFolderTest, RemovesNothingWhereTheRowsCannotBeRead) {
+  const auto folder = DataFolder::Open(root_, PosixFileSystem());
+  ASSERT_TRUE(folder.ok());
+  const auto in_use = std::make_shared<FilesInUse>(PosixFileSystem());
+  WriteFile(paths_.files() + "/aa.points", "x");
+  EXPECT_FALSE((*folder)->RemoveGarbage(*in_use, [] { return absl::DataLossError("damaged"); }).ok());
+  EXPECT_TRUE(std::filesystem::exists(paths_.files() + "/aa.points"));
+}
+
+}  // namespace
+}  // namespace wellspace::server

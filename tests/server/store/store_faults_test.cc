@@ -1,0 +1,184 @@
+// Each operation of a life fails once: with a full disk nothing is changed and all goes on; with a broken one the log
+// says so once, and acknowledges nothing more. What was acknowledged is there in any case.
+#include <array>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "gmock/gmock.h"
+#include "gtest/gtest.h"
+#include "server/store/check_data.h"
+#include "server/store/data_folder.h"
+#include "tests/server/store/simulated_disk.h"
+#include "tests/server/store/store_life.h"
+#include "tests/support/clouds.h"
+
+namespace wellspace::server {
+namespace {
+
+using Action = StoreLife::Action;
+using Fault = SimulatedDisk::Fault;
+using Loss = SimulatedDisk::Loss;
+
+const std::vector<std::pair<Action, uint64_t>>& Script() {
+  static const std::vector<std::pair<Action, uint64_t>> script = {
+      {Action::kCreate, 0},      {Action::kUpload, 0},  {Action::kStart, 0},  {Action::kSucceed, 0},
+      {Action::kCreate, 1},      {Action::kUpload, 0},  {Action::kTouch, 0},  {Action::kUpload, 1},
+      {Action::kAddFeatures, 1}, {Action::kSucceed, 0}, {Action::kForget, 0}, {Action::kUpdate, 1},
+      {Action::kSucceed, 1},     {Action::kDelete, 0},  {Action::kSweep, 0},  {Action::kUpload, 1},
+  };
+  return script;
+}
+
+// The life in which `count` operations from `operation` on fail. False: the life was over before.
+bool LiveWithFault(SimulatedDisk& disk, uint64_t operation, Fault fault, uint64_t count, Loss loss) {
+  disk.Clear();
+  disk.CountReads();
+  disk.FailAt(operation, fault, count);
+  StoreLife life(disk);
+  absl::Status opened = life.Open();
+  for (int attempt = 0; !opened.ok() && attempt < 200; ++attempt) {
+    EXPECT_THAT(std::string(opened.message()), ::testing::StartsWith("/")) << "names a file";
+    opened = life.Open();
+  }
+  EXPECT_TRUE(opened.ok()) << "at " << disk.failed_operation() << ": " << opened;
+  const auto where = [&] { return absl::StrCat("operation ", operation, ", ", disk.failed_operation()); };
+  for (const auto& [action, number] : Script()) {
+    const bool has_failed = life.failures() > 0;
+    const int acknowledgments = life.acknowledgments();
+    const absl::Status status = life.Do(action, number);
+    if (has_failed) {
+      EXPECT_EQ(life.acknowledgments(), acknowledgments) << where() << ": acknowledged after a failure";
+      EXPECT_TRUE(status.ok() || action == Action::kSweep || ReasonOf(status) == "STORE_FAILED") << where() << status;
+    }
+    if (status.code() == absl::StatusCode::kUnavailable && action != Action::kSweep) {
+      EXPECT_EQ(life.failures(), 1) << where() << ": " << status;
+    }
+    if (count == 1 && fault != Fault::kBroken && !status.ok() && disk.failed_operation().starts_with("write ")) {
+      EXPECT_TRUE(ReasonOf(status) == "DISK_FULL") << where() << ": " << status;
+    }
+  }
+  EXPECT_LE(life.failures(), 1) << where();
+  const bool is_within = disk.operations() > operation;
+  const std::string at = where();
+  disk.FailAt(0, fault, 0);
+  if (life.failures() == 0) {
+    const std::string problem = life.Check();
+    EXPECT_TRUE(problem.empty()) << at << ": " << problem.substr(0, 1000);
+  }
+  test::SplitMix64 random(operation);
+  const std::string problem = life.Restart(loss, random);
+  EXPECT_TRUE(problem.empty()) << at << ": " << problem.substr(0, 1000);
+  return is_within;
+}
+
+class StoreFaults : public ::testing::TestWithParam<std::tuple<Fault, uint64_t>> {};
+
+TEST_P(StoreFaults, LoseNothingWhereverTheyAre) {
+  const auto [fault, count] = GetParam();
+  SimulatedDisk disk;
+  uint64_t operation = 0;
+  while (LiveWithFault(disk, operation, fault, count, operation % 2 == 0 ? Loss::kProcess : Loss::kSome) &&
+         !HasFailure()) {
+    ++operation;
+  }
+  EXPECT_GT(operation, 200u);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, StoreFaults,
+                         ::testing::Combine(::testing::Values(Fault::kNoSpace, Fault::kBroken, Fault::kShortWrite),
+                                            ::testing::Values(1u, 7u)));
+
+// A disk that is full for a while takes nothing, and then goes on.
+TEST(StoreFaults, AFullDiskPasses) {
+  SimulatedDisk disk;
+  StoreLife life(disk);
+  ASSERT_TRUE(life.Open().ok());
+  ASSERT_TRUE(life.Do(Action::kCreate, 0).ok());
+  ASSERT_TRUE(life.Do(Action::kUpload, 0).ok());
+  // Writes of the database, of points and of meshes all come first in their kind.
+  for (const Action action : {Action::kUpdate, Action::kUpload, Action::kSucceed, Action::kDelete}) {
+    disk.FailAt(disk.operations(), Fault::kNoSpace, 1);
+    // The first operation may be the opening of a file, which a full disk refuses where it has to be made.
+    const absl::Status status = life.Do(action, 0);
+    EXPECT_EQ(ReasonOf(status), "DISK_FULL") << static_cast<int>(action);
+    EXPECT_EQ(life.Check(), "");
+  }
+  EXPECT_EQ(life.failures(), 0);
+  for (const Action action : {Action::kUpdate, Action::kUpload, Action::kSucceed, Action::kDelete}) {
+    EXPECT_TRUE(life.Do(action, 0).ok());
+  }
+  EXPECT_EQ(life.Check(), "");
+}
+
+// After a synchronisation that failed nothing is tried again on the same file: it would succeed, and be wrong.
+TEST(StoreFaults, AFailedSynchronisationIsFinal) {
+  SimulatedDisk disk;
+  for (const Action action : {Action::kUpdate, Action::kUpload, Action::kSucceed}) {
+    bool is_found = false;
+    for (uint64_t skip = 0; !is_found; ++skip) {
+      disk.Clear();
+      StoreLife life(disk);
+      ASSERT_TRUE(life.Open().ok());
+      ASSERT_TRUE(life.Do(Action::kCreate, 0).ok());
+      ASSERT_TRUE(life.Do(Action::kUpload, 0).ok());
+      disk.FailAt(disk.operations() + skip, Fault::kBroken);
+      const absl::Status status = life.Do(action, 0);
+      ASSERT_TRUE(disk.has_failed());
+      is_found = disk.failed_operation().starts_with("synchronise ");
+      if (is_found) {
+        EXPECT_EQ(ReasonOf(status), "STORE_FAILED");
+        EXPECT_EQ(life.failures(), 1);
+        EXPECT_EQ(ReasonOf(life.Do(Action::kUpdate, 0)), "STORE_FAILED");
+        EXPECT_EQ(ReasonOf(life.Do(Action::kUpload, 0)), "STORE_FAILED");
+        EXPECT_EQ(ReasonOf(life.Do(Action::kSucceed, 0)), "STORE_FAILED");
+        EXPECT_EQ(life.failures(), 1) << "said once";
+        test::SplitMix64 random(skip);
+        EXPECT_EQ(life.Restart(Loss::kAll, random), "");
+      }
+    }
+  }
+}
+
+// The process ends since the disk could not be synchronised, and is started again at once. The kernel shows it what it
+// has in memory, which no synchronisation writes any more; and then there is a loss of power.
+TEST(StoreFaults, AStartWritesAgainWhatMayNotBeOnTheDisk) {
+  SimulatedDisk disk;
+  test::SplitMix64 random(1);
+  for (uint64_t operation = 0; operation < 40; ++operation) {
+    disk.Clear();
+    StoreLife life(disk);
+    ASSERT_TRUE(life.Open().ok());
+    ASSERT_TRUE(life.Do(Action::kCreate, 0).ok());
+    disk.FailAt(disk.operations() + operation, Fault::kBroken);
+    for (const Action action : {Action::kUpdate, Action::kUpload, Action::kSucceed}) {
+      life.Do(action, 0).IgnoreError();
+    }
+    ASSERT_EQ(life.Restart(Loss::kProcess, random), "") << disk.failed_operation();
+    ASSERT_TRUE(life.Do(Action::kUpdate, 0).ok());
+    ASSERT_TRUE(life.Do(Action::kTouch, 0).ok());
+    ASSERT_EQ(life.Restart(Loss::kProcess, random), "") << disk.failed_operation();
+    ASSERT_EQ(life.Restart(Loss::kAll, random), "") << disk.failed_operation();
+  }
+}
+
+// A write-ahead log that ends in the middle, or has other bytes: all before is there, or the start says what is wrong.
+TEST(StoreFaults, AWriteAheadLogThatIsTornEndsThere) {
+  SimulatedDisk disk;
+  StoreLife life(disk);
+  ASSERT_TRUE(life.Open().ok());
+  ASSERT_TRUE(life.Do(Action::kCreate, 0).ok());
+  ASSERT_TRUE(life.Do(Action::kCreate, 1).ok());
+  const std::string wal = std::string(StoreLife::kFolder) + "/sessions.db-wal";
+  const uint64_t size = disk.SizeOf(wal);
+  ASSERT_TRUE(life.Do(Action::kTouch, 0).ok());
+  ASSERT_GT(disk.SizeOf(wal), size);
+  disk.Flip(wal, size + 2000, 3);  // of the last change, which was not synchronised
+  test::SplitMix64 random(1);
+  EXPECT_THAT(life.Restart(Loss::kProcess, random), ::testing::StartsWith("found is")) << "it is lost";
+  EXPECT_EQ(life.log()->Load()->sessions.size(), 2u) << "and nothing else";
+}
+
+}  // namespace
+}  // namespace wellspace::server
