@@ -10,8 +10,9 @@
 #include "absl/status/statusor.h"
 #include "core/base/memory/huge_pages.h"
 #include "core/base/run_context.h"
+#include "core/domain.h"
 #include "core/geometry/point.h"
-#include "core/input_cloud.h"
+#include "core/sorted_cloud.h"
 
 namespace wellspace::core {
 

@@ -11,6 +11,7 @@
 #include "core/base/status_macros.h"
 #include "core/mesh_parameters.h"
 #include "core/refused_points.h"
+#include "core/separation.h"
 
 namespace wellspace::core {
 template <int D>

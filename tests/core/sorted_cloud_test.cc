@@ -1,5 +1,5 @@
 // Sorting of clouds, against its definition.
-#include "core/input_cloud.h"
+#include "core/sorted_cloud.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/base/run_context.h"
+#include "core/domain.h"
 #include "core/tree/morton.h"
 #include "tests/support/brute_force.h"
 #include "tests/support/seeded_test.h"
