@@ -71,8 +71,8 @@ class MesherIn final : public Mesher {
     WELLSPACE_RETURN_IF_ERROR(CheckShapeFeasible<D>(domain_, parameters, points.size() / D));
     absl::StatusOr<SortedCloud<D>> cloud = BuildTree(parameters, points, merged, context);
     if (IsTooClose(cloud.status())) {
-      return TooNearError<D>(domain_, merge_distance_ > 0 ? merged.points : points, merged.inputs,
-                             !parameters.domain_low.empty(), parameters.margin, cloud.status(), context);
+      return TooClosePairsError<D>(domain_, merge_distance_ > 0 ? merged.points : points, merged.inputs,
+                                   !parameters.domain_low.empty(), parameters.margin, cloud.status(), context);
     }
     WELLSPACE_RETURN_IF_ERROR(cloud.status());
     WELLSPACE_ASSIGN_OR_RETURN(PointNames names, NamePoints<D>(*std::move(cloud), context));
