@@ -246,7 +246,7 @@ Assessment DomainRules::AssessCell(VertexId v, Polytope<2>& cell, std::span<cons
   cell.Place();
   Assessment result;
   met = NearestMet(v, cell, segments);
-  result.encroached_face = met.IsThere() ? 0 : -1;
+  result.is_segment_encroached = met.IsThere();
   const double rho_sq = rules_.criteria().rho * rules_.criteria().rho;
   std::tuple<double, NodeName, Point<2>> best;  // of the bad node; its place, since some on the clip have no name
   for (size_t i = 0; i < cell.nodes().size(); ++i) {

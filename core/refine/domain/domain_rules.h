@@ -57,8 +57,8 @@ class DomainRules {
       : structure_(structure), domain_(domain), rules_(rules), expected_(expected) {}
 
   // What is wrong with the cell of `v`, whose nodes are placed; `segments` has all that meet it. `met` is the nearest
-  // of them that v is not on; it counts as an encroached face. What a cell is beyond the segments of v, on sides that
-  // are not meshed, does not count. Nodes in `refused` ask for nothing.
+  // of them that v is not on. What a cell is beyond the segments of v, on sides that are not meshed, does not count.
+  // Nodes in `refused` ask for nothing.
   //
   // Complexity: O(nodes segments).
   Assessment AssessCell(VertexId v, Polytope<2>& cell, std::span<const uint32_t> segments, double edge_limit_sq,
