@@ -1,6 +1,7 @@
-// Where a vertex is in a domain of the plane.
-#ifndef WELLSPACE_CORE_REFINE_DOMAIN_SEGMENT_POINT_H_
-#define WELLSPACE_CORE_REFINE_DOMAIN_SEGMENT_POINT_H_
+// Where a vertex is in a domain of the plane: a point of a segment, or inside a face. Places are what PlanarDomain
+// keeps of vertices, what requests carry (InsertionRequest), and what points that are added get (PointPlacer).
+#ifndef WELLSPACE_CORE_REFINE_DOMAIN_PLACE_IN_DOMAIN_H_
+#define WELLSPACE_CORE_REFINE_DOMAIN_PLACE_IN_DOMAIN_H_
 
 #include <cstdint>
 #include <limits>
@@ -18,7 +19,8 @@ struct SegmentPoint {
   bool IsOnSegment() const { return segment != kNone; }
 };
 
-// What the distance of a place on a segment depends on, beside the vertices near to it.
+// What the distance of a place on a segment depends on, beside the vertices near to it. RoundPlace notes it, and
+// AreSplitsInOrder asks of a recorded request whether it still is so.
 enum class SplitOrder : uint8_t {
   kAny,            // nothing
   kFirst,          // no vertex has been inserted on the segment
@@ -34,4 +36,4 @@ struct PlaceInDomain {
 
 }  // namespace wellspace::core
 
-#endif  // WELLSPACE_CORE_REFINE_DOMAIN_SEGMENT_POINT_H_
+#endif  // WELLSPACE_CORE_REFINE_DOMAIN_PLACE_IN_DOMAIN_H_

@@ -135,10 +135,10 @@ void ExpectSame(const Refined& actual, const Refined& expected) {
   for (uint32_t i = 0; i < actual.structure.vertex_count(); ++i) {
     const VertexId v{i};
     ASSERT_EQ(actual.structure.point(v), expected.structure.point(v)) << "vertex " << i;
-    ASSERT_EQ(actual.planar->IsFree(v), expected.planar->IsFree(v)) << "vertex " << i;
+    ASSERT_EQ(actual.planar->IsInFace(v), expected.planar->IsInFace(v)) << "vertex " << i;
     ASSERT_EQ(actual.planar->PlaceOf(v).segment, expected.planar->PlaceOf(v).segment) << "vertex " << i;
     ASSERT_EQ(actual.planar->PlaceOf(v).distance, expected.planar->PlaceOf(v).distance) << "vertex " << i;
-    if (actual.planar->IsFree(v)) {
+    if (actual.planar->IsInFace(v)) {
       ASSERT_EQ(actual.planar->FaceOf(v), expected.planar->FaceOf(v)) << "vertex " << i;
     }
   }
