@@ -1,4 +1,5 @@
-// The Voronoi cell of one vertex in the plane under construction.
+// The Voronoi cell of one vertex in the plane under construction: Polytope<2>. What its functions promise is said in
+// polytope.h.
 #ifndef WELLSPACE_CORE_CELL_POLYGON_H_
 #define WELLSPACE_CORE_CELL_POLYGON_H_
 

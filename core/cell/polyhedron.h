@@ -1,4 +1,5 @@
-// The Voronoi cell of one vertex in space under construction.
+// The Voronoi cell of one vertex in space under construction: Polytope<3>. What its functions promise is said in
+// polytope.h.
 #ifndef WELLSPACE_CORE_CELL_POLYHEDRON_H_
 #define WELLSPACE_CORE_CELL_POLYHEDRON_H_
 

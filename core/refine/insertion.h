@@ -1,4 +1,5 @@
-// Insertions of the refinement: those that have happened, and those that a cell asks for.
+// Insertions of the refinement: those that a cell asks for, as the rules return them and batches record them; and those
+// that have happened, as observers see them.
 #ifndef WELLSPACE_CORE_REFINE_INSERTION_H_
 #define WELLSPACE_CORE_REFINE_INSERTION_H_
 

@@ -61,18 +61,18 @@ bool DomainRules::IsAcrossFrom(uint32_t segment, bool is_b, VertexId v, VertexId
     return false;
   }
   const Point<2>& p = structure().point(v);
-  const Point<2> edge = Difference<2>(view_.point(u), p);
+  const Point<2> edge = Difference<2>(visible_.point(u), p);
   const double distance = domain().DistanceFromEnd(v, segment, is_b);
   if (!(NormSq<2>(edge) < distance * distance)) {
     return false;  // at equal distances: an angle of 60 degrees or more
   }
   const bool is_inward = Cross(edge, toward) * Cross(edge, Difference<2>(domain().EndOf(segment, is_b), p)) > 0;
   const double beyond = (1 + kSameDistance) * distance;
-  for (const HalfEdge h : view_.WaysFrom(u)) {
+  for (const HalfEdge h : visible_.WaysFrom(u)) {
     const uint32_t other = SegmentOf(h);
     for (const bool other_b : {false, true}) {
       if (other == segment || domain().EndVertex(other, other_b) != apex ||
-          std::abs(view_.DistanceFromEnd(u, other, other_b) - distance) > kSameDistance * distance) {
+          std::abs(visible_.DistanceFromEnd(u, other, other_b) - distance) > kSameDistance * distance) {
         continue;
       }
       const bool both_go_on = domain().LengthOf(segment) > beyond && domain().LengthOf(other) > beyond;
@@ -97,7 +97,7 @@ bool DomainRules::IsCrossed(VertexId v, const NodeView& node) const {
   return std::any_of(ways.begin(), ways.end(), [&](HalfEdge h) {
     const Point<2> d = domain().DirectionOf(h);
     return turn * Cross(first.normal, d) > 0 && turn * Cross(d, second.normal) > 0 &&
-           !view_.IsOn(first.vertex, SegmentOf(h)) && !view_.IsOn(second.vertex, SegmentOf(h));
+           !visible_.IsOn(first.vertex, SegmentOf(h)) && !visible_.IsOn(second.vertex, SegmentOf(h));
   });
 }
 
@@ -173,7 +173,7 @@ DomainAssessment DomainRules::AssessCell(VertexId v, Polytope<2>& cell, std::spa
 bool DomainRules::IsAtSegment(VertexId v, const NodeView& node) const {
   const auto generators = std::span(node.generators).first(node.bisectors);
   return !domain().IsInFace(v) || std::any_of(generators.begin(), generators.end(),
-                                              [&](const Plane<2>* plane) { return !view_.IsInFace(plane->vertex); });
+                                              [&](const Plane<2>* plane) { return !visible_.IsInFace(plane->vertex); });
 }
 
 // The insertion of a vertex at `place`, for `v`.
@@ -184,7 +184,7 @@ InsertionRequest<2> DomainRules::RequestAt(VertexId v, const PlaceInDomain& plac
   request.insertion.reason = Reason::kEncroachment;
   request.insertion.near = v;
   request.point.position = domain().PositionOf(place.on);
-  request.point.empty_radius_sq = view_.NearestSq(request.point.position, v, workspace);
+  request.point.empty_radius_sq = visible_.NearestSq(request.point.position, v, workspace);
   request.insertion.empty_radius_sq = request.point.empty_radius_sq;
   request.insertion.edge_sq = request.point.empty_radius_sq;
   request.insertion.edge_limit_sq = edge_limit_sq;
@@ -239,7 +239,7 @@ DomainRules::Answer DomainRules::NextRequest(VertexId v, const Polytope<2>& cell
                                              Workspace<2>& workspace) const {
   Answer answer;
   if (found.met.IsThere()) {  // rule 1
-    answer.request = RequestAt(v, SplitPlace(view_, v, found.met), edge_limit_sq, workspace);
+    answer.request = RequestAt(v, SplitPlace(visible_, v, found.met), edge_limit_sq, workspace);
     return answer;
   }
   if (found.bad_node < 0) {  // rule 3
@@ -260,7 +260,7 @@ DomainRules::Answer DomainRules::NextRequest(VertexId v, const Polytope<2>& cell
     if (is_acute && rho_sq < kSafeRhoSq && !found.is_too_large && rest_sq < found.bound_sq / rho_sq) {
       answer.refused = view.Name();
     } else {
-      answer.request = RequestAt(v, RoundPlace(view_, place, std::sqrt(rest_sq)), edge_limit_sq, workspace);
+      answer.request = RequestAt(v, RoundPlace(visible_, place, std::sqrt(rest_sq)), edge_limit_sq, workspace);
     }
     return answer;
   }

@@ -12,12 +12,12 @@
 #include "core/cell/polytope.h"
 #include "core/geometry/point.h"
 #include "core/refine/assessment.h"
-#include "core/refine/domain/domain_view.h"
 #include "core/refine/domain/expected_vertices.h"
 #include "core/refine/domain/met_part.h"
 #include "core/refine/domain/node_view.h"
 #include "core/refine/domain/place_in_domain.h"
 #include "core/refine/domain/planar_domain.h"
+#include "core/refine/domain/visible_domain.h"
 #include "core/refine/insertion.h"
 #include "core/refine/step_rules.h"
 #include "core/voronoi/query_structure.h"
@@ -50,7 +50,7 @@ class DomainRules {
   // REQUIRES:   all references outlive this.
   DomainRules(const QueryStructure<2>& structure, const PlanarDomain& domain, const StepRules<2>& rules,
               const ExpectedVertices* expected = nullptr)
-      : view_(structure, domain, expected), rules_(rules) {}
+      : visible_(structure, domain, expected), rules_(rules) {}
 
   // How far `v` is from the nearest segment that it is not on, squared, if that is less than `limit_sq`; else that. By
   // it a vertex comes into its first bucket.
@@ -83,8 +83,8 @@ class DomainRules {
     bool is_size = false;  // a size or an area, not rho
   };
 
-  const QueryStructure<2>& structure() const { return view_.structure(); }
-  const PlanarDomain& domain() const { return view_.domain(); }
+  const QueryStructure<2>& structure() const { return visible_.structure(); }
+  const PlanarDomain& domain() const { return visible_.domain(); }
 
   // Which nodes count, and by which bound.
   bool IsAcross(VertexId v, VertexId u, const Point<2>& toward) const;
@@ -108,7 +108,7 @@ class DomainRules {
   InsertionRequest<2> RequestAt(VertexId v, const PlaceInDomain& place, double edge_limit_sq,
                                 Workspace<2>& workspace) const;
 
-  const DomainView view_;
+  const VisibleDomain visible_;
   const StepRules<2>& rules_;
 };
 

@@ -1,5 +1,5 @@
 // Vertices of a domain in the plane that are not inserted yet, but that recorded steps are to insert. Rounds::Record
-// makes one of its batch; the rules see it by a DomainView.
+// makes one of its batch; the rules see it by a VisibleDomain.
 #ifndef WELLSPACE_CORE_REFINE_DOMAIN_EXPECTED_VERTICES_H_
 #define WELLSPACE_CORE_REFINE_DOMAIN_EXPECTED_VERTICES_H_
 

@@ -28,8 +28,8 @@ double RoundNear(double distance, double room) {
 
 }  // namespace
 
-PlaceInDomain SplitPlace(const DomainView& view, VertexId v, const MetPart& met) {
-  const PlanarDomain& domain = view.domain();
+PlaceInDomain SplitPlace(const VisibleDomain& visible, VertexId v, const MetPart& met) {
+  const PlanarDomain& domain = visible.domain();
   const uint32_t segment = met.segment;
   const double length = domain.LengthOf(segment);
   // At the distance of v from a common end, if the angle there is below 90 degrees.
@@ -50,17 +50,17 @@ PlaceInDomain SplitPlace(const DomainView& view, VertexId v, const MetPart& met)
     }
   }
   // Else at the foot of v, as far as that is in the part.
-  const double at = std::clamp(domain.FootOf(view.structure().point(v), segment).from_a, met.from, met.to);
-  return RoundPlace(view, domain.FromNearerEnd(segment, at), met.distance);
+  const double at = std::clamp(domain.FootOf(visible.structure().point(v), segment).from_a, met.from, met.to);
+  return RoundPlace(visible, domain.FromNearerEnd(segment, at), met.distance);
 }
 
-PlaceInDomain RoundPlace(const DomainView& view, SegmentPoint on, double room) {
-  const PlanarDomain& domain = view.domain();
+PlaceInDomain RoundPlace(const VisibleDomain& visible, SegmentPoint on, double room) {
+  const PlanarDomain& domain = visible.domain();
   const uint32_t segment = on.segment;
   const double length = domain.LengthOf(segment);
   const bool is_acute_at_a = domain.IsAcute(HalfEdgeOf(segment, false));
   const bool is_acute_at_b = domain.IsAcute(HalfEdgeOf(segment, true));
-  const SplitOrder order = is_acute_at_a && is_acute_at_b ? view.OrderOfSplit(segment) : SplitOrder::kAny;
+  const SplitOrder order = is_acute_at_a && is_acute_at_b ? visible.OrderOfSplit(segment) : SplitOrder::kAny;
   if (order == SplitOrder::kFirst) {
     on.distance = std::max(on.distance, length / 3);
   }

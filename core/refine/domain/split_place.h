@@ -6,10 +6,10 @@
 #include <span>
 
 #include "core/base/ids.h"
-#include "core/refine/domain/domain_view.h"
 #include "core/refine/domain/met_part.h"
 #include "core/refine/domain/place_in_domain.h"
 #include "core/refine/domain/planar_domain.h"
+#include "core/refine/domain/visible_domain.h"
 #include "core/refine/insertion.h"
 
 namespace wellspace::core {
@@ -24,12 +24,12 @@ inline constexpr double kSameDistance = 1e-9;
 //   2. Else at the foot of v, as far as that is in the part, by RoundPlace.
 //
 // Source:     docs/design/features.md, where a segment is split.
-PlaceInDomain SplitPlace(const DomainView& view, VertexId v, const MetPart& met);
+PlaceInDomain SplitPlace(const VisibleDomain& visible, VertexId v, const MetPart& met);
 
 // The place of a vertex that comes to `on` for another reason than an equal distance, with nothing within `room` of it.
 // The first on a segment with small angles at both ends is kept in the middle third; at an end with a small angle the
 // distance becomes a round one, so that equal reasons find equal distances.
-PlaceInDomain RoundPlace(const DomainView& view, SegmentPoint on, double room);
+PlaceInDomain RoundPlace(const VisibleDomain& visible, SegmentPoint on, double room);
 
 // Whether on the segments of recorded `requests`, those of one vertex, vertices have been inserted as it was assumed.
 //

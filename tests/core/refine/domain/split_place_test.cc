@@ -27,12 +27,12 @@ class SplitPlaceTest : public ::testing::Test {
   test::SmallDomain domain_{{kApex, kRight, kAbove, {0, 1}}, {0, 1, 1, 2, 2, 0}, FaceRule::kBox};
   const PlanarDomain& planar_ = *domain_.planar;
   const test::SmallDomain::Found long_ = domain_.Between(kApex, kRight);
-  const DomainView view_{domain_.structure, planar_, nullptr};
+  const VisibleDomain visible_{domain_.structure, planar_, nullptr};
 };
 
 TEST_F(SplitPlaceTest, AVertexOnASegmentNearbyGivesItsOwnDistance) {
   const VertexId v = domain_.Split(kApex, kAbove, 1.7);
-  const PlaceInDomain place = SplitPlace(view_, v, Met(long_));
+  const PlaceInDomain place = SplitPlace(visible_, v, Met(long_));
   EXPECT_EQ(place.on.segment, long_.segment);
   EXPECT_EQ(place.on.is_from_b, long_.is_from_b);
   EXPECT_EQ(place.on.distance, 1.7) << "to the bit";
@@ -43,17 +43,17 @@ TEST_F(SplitPlaceTest, AVertexInAFaceGivesItsFootAtARoundDistance) {
   domain_.Split(kApex, kRight, 3.5);
   const VertexId v = domain_.At({0, 1});
   const MetPart met{long_.segment, long_.is_from_b ? 2.9 : 0.9, long_.is_from_b ? 3.1 : 1.1, 1};
-  const PlaceInDomain place = SplitPlace(view_, v, met);  // the foot is beyond the part
+  const PlaceInDomain place = SplitPlace(visible_, v, met);  // the foot is beyond the part
   EXPECT_EQ(FromApex(place.on), 1) << "0.9, rounded by at most 0.3";
 }
 
 TEST_F(SplitPlaceTest, TheFirstBetweenTwoSmallAnglesIsInTheMiddleThird) {
   const SegmentPoint near_apex{long_.segment, long_.is_from_b, 0.25};
-  const PlaceInDomain first = RoundPlace(view_, near_apex, 1e-3);
+  const PlaceInDomain first = RoundPlace(visible_, near_apex, 1e-3);
   EXPECT_NEAR(first.on.distance, 4 / 3.0, 1e-3);
   EXPECT_EQ(first.order, SplitOrder::kFirst);
   domain_.Split(kApex, kRight, 2);
-  const PlaceInDomain later = RoundPlace(view_, near_apex, 1e-3);
+  const PlaceInDomain later = RoundPlace(visible_, near_apex, 1e-3);
   EXPECT_EQ(later.on.distance, 0.25);
   EXPECT_EQ(later.order, SplitOrder::kAny);
 }
@@ -66,7 +66,7 @@ TEST_F(SplitPlaceTest, AnExpectedVertexSplitsASegmentToo) {
   requests[0].point.position = {2, 0};
   positions.Append({2, 0});
   const ExpectedVertices expected(positions, requests);
-  const DomainView view(domain_.structure, planar_, &expected);
+  const VisibleDomain view(domain_.structure, planar_, &expected);
   EXPECT_EQ(RoundPlace(view, {long_.segment, long_.is_from_b, 0.25}, 1e-3).order, SplitOrder::kAfterExpected);
   EXPECT_TRUE(view.IsOn(VertexId{1000}, long_.segment));
   EXPECT_EQ(view.point(VertexId{1000}), (Point<2>{2, 0}));

@@ -1,7 +1,7 @@
 // A domain as a step sees it: vertices of the structure and of the domain, and those that a batch expects. By it the
 // rules are the same for the thread that inserts and for those that speculate.
-#ifndef WELLSPACE_CORE_REFINE_DOMAIN_DOMAIN_VIEW_H_
-#define WELLSPACE_CORE_REFINE_DOMAIN_DOMAIN_VIEW_H_
+#ifndef WELLSPACE_CORE_REFINE_DOMAIN_VISIBLE_DOMAIN_H_
+#define WELLSPACE_CORE_REFINE_DOMAIN_VISIBLE_DOMAIN_H_
 
 #include <cstdint>
 #include <span>
@@ -21,10 +21,10 @@ namespace wellspace::core {
 //
 // Thread safety: thread-compatible; with expected vertices the functions may run beside
 // QueryStructure::AddUncommitted and PlanarDomain::AddVertex.
-class DomainView {
+class VisibleDomain {
  public:
   // REQUIRES:   all that is given outlives this; `expected` may be null.
-  DomainView(const QueryStructure<2>& structure, const PlanarDomain& domain, const ExpectedVertices* expected)
+  VisibleDomain(const QueryStructure<2>& structure, const PlanarDomain& domain, const ExpectedVertices* expected)
       : structure_(structure), domain_(domain), expected_(expected) {}
 
   // What is never expected: segments, faces, and vertices that cells are looked at of.
@@ -71,4 +71,4 @@ class DomainView {
 
 }  // namespace wellspace::core
 
-#endif  // WELLSPACE_CORE_REFINE_DOMAIN_DOMAIN_VIEW_H_
+#endif  // WELLSPACE_CORE_REFINE_DOMAIN_VISIBLE_DOMAIN_H_
