@@ -16,6 +16,17 @@ namespace wellspace {
 inline constexpr char kPlane[] = "x,y\n0,0\n1,0.1\n0.4,0.9\n0.5,0.45\n0,0\n0.1,0.2\n";
 inline constexpr char kSpace[] = "0 0 0\n1 0 0.1\n0 1 0\n0.1 0 1\n0.3 0.3 0.35\n0.31 0.3 0.35\n";
 
+// The points of a slanted grid.
+inline std::string Grid(int side) {
+  std::string grid;
+  for (int i = 0; i < side; ++i) {
+    for (int j = 0; j < side; ++j) {
+      grid += std::to_string(i) + " " + std::to_string(j * 1.0625 + i * 0.25) + "\n";
+    }
+  }
+  return grid;
+}
+
 class CommandsTest : public testing::Test {
  protected:
   std::string Path(const std::string& name) const { return folder_.Path(name); }

@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <pty.h>
-#include <sched.h>
 #include <signal.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -481,37 +480,17 @@ TEST_F(CommandsTest, ProgressBarOnlyOnATerminalAndUnlessQuiet) {
   EXPECT_THAT(RunWellspace({"mesh", cloud, "-o", Path("out.vtu")}).err, Not(HasSubstr("\r")));
 }
 
-bool IsPending(pid_t process, int signal) {
-  std::ifstream status("/proc/" + std::to_string(process) + "/status");
-  std::string line;
-  while (std::getline(status, line)) {
-    if (line.substr(0, 7) == "ShdPnd:") {
-      return (std::stoull(line.substr(7), nullptr, 16) >> (signal - 1) & 1) != 0;
-    }
-  }
-  return false;
-}
-
 // The program is stopped while it writes a big mesh into a pipe that is not emptied, so that the signal finds it at
 // work.
 TEST_F(CommandsTest, CtrlCIsExitCode130) {
-  std::string grid;
-  for (int i = 0; i < 150; ++i) {
-    for (int j = 0; j < 150; ++j) {
-      grid += std::to_string(i) + " " + std::to_string(j * 1.0625 + i * 0.25) + "\n";
-    }
-  }
-  const std::string cloud = folder_.Write("grid.csv", grid);
+  const std::string cloud = folder_.Write("grid.csv", Grid(150));
   for (const int signal : {SIGINT, SIGTERM}) {
     const std::string pipe = Path("pipe" + std::to_string(signal));
     ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
     Process process({"mesh", cloud, "-o", pipe, "--format", "vtu"});
     const int reader = open(pipe.c_str(), O_RDONLY);  // returns once the program opens it for writing
     ASSERT_GE(reader, 0);
-    ASSERT_EQ(kill(process.id(), signal), 0);
-    while (IsPending(process.id(), signal)) {
-      sched_yield();
-    }
+    process.Send(signal);
     const std::string written = ReadAll(reader);
     close(reader);
     const RunResult result = process.Wait();

@@ -2,16 +2,15 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sched.h>
 #include <signal.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "tests/client/cli/commands_fixture.h"
 #include "tests/client/cli/process.h"
 #include "tests/support/temporary_folder.h"
 
@@ -20,20 +19,8 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr char kPlane[] = "x,y\n0,0\n1,0.1\n0.4,0.9\n0.5,0.45\n0,0\n0.1,0.2\n";
-
 RunResult RunAfter(const std::string& shell, const std::vector<std::string>& arguments) {
   return RunWellspace(arguments, {.input = "", .environment = {}, .error_descriptor = -1, .shell = shell});
-}
-
-std::string Grid(int side) {
-  std::string grid;
-  for (int i = 0; i < side; ++i) {
-    for (int j = 0; j < side; ++j) {
-      grid += std::to_string(i) + " " + std::to_string(j * 1.0625 + i * 0.25) + "\n";
-    }
-  }
-  return grid;
 }
 
 class LostOutputTest : public testing::Test {
@@ -168,24 +155,6 @@ TEST_F(LostOutputTest, TheLimitOfAFilesSizeLeavesNoFile) {
   }
 }
 
-bool IsPending(pid_t process, int signal) {
-  std::ifstream status("/proc/" + std::to_string(process) + "/status");
-  std::string line;
-  while (std::getline(status, line)) {
-    if (line.substr(0, 7) == "ShdPnd:") {
-      return (std::stoull(line.substr(7), nullptr, 16) >> (signal - 1) & 1) != 0;
-    }
-  }
-  return false;
-}
-
-void Send(const Process& process, int signal) {
-  ASSERT_EQ(kill(process.id(), signal), 0);
-  while (IsPending(process.id(), signal)) {
-    sched_yield();
-  }
-}
-
 // The .node is a pipe that fills up, so that signals find the program at work on a .ele with its temporary name.
 TEST_F(LostOutputTest, SignalsLeaveNoTemporaryFile) {
   const std::string grid = folder_.Write("grid.csv", Grid(150));
@@ -207,7 +176,7 @@ TEST_F(LostOutputTest, SignalsLeaveNoTemporaryFile) {
     ASSERT_GT(read(reader, buffer, 1), 0);      // what is buffered is full, and all files are open
     EXPECT_EQ(folder_.FileCount(), files + 3);  // .ele, .edge and .poly
     for (const int signal : one.signals) {
-      Send(process, signal);
+      process.Send(signal);
     }
     if (one.signals.size() == 1) {
       while (read(reader, buffer, sizeof(buffer)) > 0) {

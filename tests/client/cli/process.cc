@@ -2,16 +2,30 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sched.h>
 #include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cstdlib>
+#include <fstream>
 #include <string_view>
 
 namespace wellspace {
 namespace {
+
+// Whether the process has not taken a signal yet that was sent to it.
+bool IsPending(pid_t process, int signal) {
+  std::ifstream status("/proc/" + std::to_string(process) + "/status");
+  std::string line;
+  while (std::getline(status, line)) {
+    if (line.substr(0, 7) == "ShdPnd:") {
+      return (std::stoull(line.substr(7), nullptr, 16) >> (signal - 1) & 1) != 0;
+    }
+  }
+  return false;
+}
 
 std::string Program() {
   const char* folder = std::getenv("WELLSPACE_BIN_DIR");
@@ -72,6 +86,13 @@ Process::~Process() {
   if (id_ > 0) {
     kill(id_, SIGKILL);
     waitpid(id_, nullptr, 0);
+  }
+}
+
+void Process::Send(int signal) const {
+  ASSERT_EQ(kill(id_, signal), 0);
+  while (IsPending(id_, signal)) {
+    sched_yield();
   }
 }
 

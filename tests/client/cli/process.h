@@ -36,6 +36,8 @@ class Process {
   Process& operator=(const Process&) = delete;
 
   pid_t id() const { return id_; }
+  // Sends a signal, and returns once the program has taken it.
+  void Send(int signal) const;
   // Waits for its end. Call once.
   RunResult Wait();
 

@@ -9,8 +9,8 @@
 
 #include "client/formats/read_mesh.h"
 #include "client/formats/write_mesh.h"
+#include "tests/client/formats/mesh_files_fixture.h"
 #include "tests/client/formats/random_mesh.h"
-#include "tests/support/temporary_folder.h"
 
 namespace wellspace::formats {
 namespace {
@@ -61,27 +61,7 @@ Mesh Square() {
           .regions = {{1, "domain"}}};
 }
 
-class BoundaryFilesTest : public testing::Test {
- protected:
-  Mesh ReadGood(const std::string& name) {
-    const absl::StatusOr<Mesh> mesh = ReadMesh(folder_.Path(name));
-    EXPECT_TRUE(mesh.ok()) << mesh.status();
-    return mesh.ok() ? *mesh : Mesh{};
-  }
-
-  std::string ReadBad(const std::string& name) {
-    const absl::StatusOr<Mesh> mesh = ReadMesh(folder_.Path(name));
-    EXPECT_EQ(mesh.status().code(), absl::StatusCode::kInvalidArgument) << mesh.status();
-    return std::string(mesh.status().message());
-  }
-
-  void Write(const Mesh& mesh, const std::string& name, const std::string& format = "") {
-    const absl::Status written = WriteMesh(folder_.Path(name), format, mesh.View());
-    EXPECT_TRUE(written.ok()) << written;
-  }
-
-  TemporaryFolder folder_;
-};
+class BoundaryFilesTest : public MeshFilesFixture {};
 
 TEST_F(BoundaryFilesTest, RoundTripsKeepFacetsAndTags) {
   for (const Kind& kind : kKinds) {
@@ -230,17 +210,10 @@ TEST_F(BoundaryFilesTest, Errors) {
   }
 }
 
-// A file cut anywhere is refused, or has lost what stands after the mesh.
 TEST_F(BoundaryFilesTest, CutAnywhereIsNoTrouble) {
   for (const Kind& kind : kKinds) {
     SCOPED_TRACE(kind.format);
-    Write(Square(), kind.file, kind.format);
-    const std::string good = folder_.Read(kind.file);
-    for (size_t size = 0; size < good.size(); ++size) {
-      folder_.Write(kind.file, good.substr(0, size));
-      const absl::StatusOr<Mesh> mesh = ReadMesh(folder_.Path(kind.file));
-      EXPECT_TRUE(mesh.ok() || absl::IsInvalidArgument(mesh.status())) << size << mesh.status();
-    }
+    ExpectCutAnywhereIsNoTrouble(Square(), kind.file, kind.format);
   }
 }
 
