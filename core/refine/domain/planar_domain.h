@@ -1,6 +1,6 @@
 // A domain in the plane while it is refined: its segments and faces, and where each vertex is on them. MakeDomainCloud
-// makes it of the planar graph. Refinement and PointAdder add each vertex here as well as to the QueryStructure; the
-// rules, the triangles and the estimate read it.
+// makes it of the planar graph. Refinement, DomainMesher and PointPlacer add each vertex here that is added to the
+// QueryStructure; the rules, the triangles and the estimate read it.
 #ifndef WELLSPACE_CORE_REFINE_DOMAIN_PLANAR_DOMAIN_H_
 #define WELLSPACE_CORE_REFINE_DOMAIN_PLANAR_DOMAIN_H_
 

@@ -179,23 +179,16 @@ TEST_F(BoundaryFilesTest, WhatNobodyHasTaggedIsNoBoundary) {
 }
 
 TEST_F(BoundaryFilesTest, Errors) {
-  const auto replaced = [&](const std::string& name, const std::string& from, const std::string& to) {
-    std::string text = folder_.Read(name);
-    const size_t at = text.find(from);
-    EXPECT_NE(at, std::string::npos) << from;
-    folder_.Write(name, text.replace(at, from.size(), to));
-    return ReadBad(name);
-  };
   Write(Square(), "a.mesh");
-  EXPECT_THAT(replaced("a.mesh", "3 1 1\n", "3 1 x\n"), HasSubstr("expected the reference of a facet"));
+  EXPECT_THAT(ReadBadWith("a.mesh", "3 1 1\n", "3 1 x\n"), HasSubstr("expected the reference of a facet"));
   Write(Square(), "a.mesh");
-  EXPECT_THAT(replaced("a.mesh", "3 1 1\n", "5 1 1\n"), HasSubstr("a vertex from 1 on"));
+  EXPECT_THAT(ReadBadWith("a.mesh", "3 1 1\n", "5 1 1\n"), HasSubstr("a vertex from 1 on"));
   Write(Square(), "a.msh", "msh22");
-  EXPECT_THAT(replaced("a.msh", "1 1 \"xmin\"", "1 1 xmin"), HasSubstr("its name in quotes"));
+  EXPECT_THAT(ReadBadWith("a.msh", "1 1 \"xmin\"", "1 1 xmin"), HasSubstr("its name in quotes"));
   Write(Square(), "a.msh", "msh22");
-  EXPECT_THAT(replaced("a.msh", "3 1 2 1 1 3 1", "3 1 2 x 1 3 1"), HasSubstr("expected a tag, got"));
+  EXPECT_THAT(ReadBadWith("a.msh", "3 1 2 1 1 3 1", "3 1 2 x 1 3 1"), HasSubstr("expected a tag, got"));
   Write(Square(), "a.vtu");
-  EXPECT_THAT(replaced("a.vtu", "NumberOfCells=\"6\"", "NumberOfCells=\"5\""), HasSubstr("for each of 5 cells"));
+  EXPECT_THAT(ReadBadWith("a.vtu", "NumberOfCells=\"6\"", "NumberOfCells=\"5\""), HasSubstr("for each of 5 cells"));
 
   Write(Square(), "a.node");
   for (const auto& [content, message] :

@@ -32,6 +32,15 @@ class MeshFilesFixture : public testing::Test {
     return std::string(mesh.status().message());
   }
 
+  // The same of a file in which `to` takes the place of `from`.
+  std::string ReadBadWith(const std::string& name, const std::string& from, const std::string& to) {
+    std::string text = folder_.Read(name);
+    const size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    folder_.Write(name, text.replace(at, from.size(), to));
+    return ReadBad(name);
+  }
+
   // A file of `mesh` cut anywhere is refused, or has lost what stands after the mesh.
   void ExpectCutAnywhereIsNoTrouble(const Mesh& mesh, const std::string& name, const std::string& format) {
     Write(mesh, name, format);
