@@ -71,6 +71,9 @@ class CredentialsTest(Case):
         open_channel("a.example:7233", Credentials(token="secret", tls=True)).close()
         open_channel("127.0.0.1:7233", Credentials(token="secret")).close()
 
+    def test_tokens_are_not_shown(self):
+        self.assertNotIn("secret", repr(Credentials(token="secret")))
+
     def test_wrong_credentials(self):
         with tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder, "file")

@@ -157,6 +157,35 @@ class MeshReceiverTest(Case):
         with self.fails(DamagedAnswerError, "another mesh"):
             receiver.set_metadata(bytes_of(metadata(revision=5)))
 
+    def test_bytes_of_every_kind(self):
+        """Whatever comes, the error is one of the package."""
+        random = np.random.default_rng(5)
+        outcomes = []
+        for good, take in (
+            (metadata().SerializeToString(), lambda data: MeshReceiver(2, 3).set_metadata(data)),
+            (chunk(0, "points").SerializeToString(), lambda data: self.receiver().add_chunk(data)),
+            (chunk(3, "simplices").SerializeToString(), lambda data: self.receiver(3).add_chunk(data)),
+        ):
+            for _ in range(1000):
+                data = bytearray(good)
+                for _ in range(random.integers(1, 4)):
+                    data[random.integers(len(data))] = random.integers(256)
+                end = random.integers(len(data)) if random.integers(4) == 0 else len(data)
+                try:
+                    take(memoryview(bytes(data[:end])))
+                    outcomes.append("taken")
+                except (DamagedAnswerError, LimitError):
+                    outcomes.append("refused")
+        self.assertGreater(outcomes.count("refused"), 1500)
+        self.assertGreater(outcomes.count("taken"), 10, "counts that nothing contradicts yet")
+
+    def test_numbers_of_more_than_31_bits(self):
+        numbers = np.array([0, 5, 2**32 - 3, 2**32 - 1], np.uint32)
+        small = _mesh.signed(numbers, 2**31)
+        self.assertEqual((small.dtype, small.base is numbers, list(small)), (np.int32, True, [0, 5, -3, -1]))
+        large = _mesh.signed(np.array([2**31, 2**32 - 4, 2**32 - 1], np.uint32), 2**32 - 4)
+        self.assertEqual((large.dtype, list(large)), (np.int64, [2**31, 2**32 - 4, -1]))
+
     def test_more_than_the_memory_holds(self):
         with self.fails(LimitError, "no memory for 3298534883328 numbers of simplices", code="RESOURCE_EXHAUSTED"):
             self.receiver(simplex_count=2**40)

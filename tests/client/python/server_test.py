@@ -88,6 +88,16 @@ class LocalServerTest(Case):
         wellspace.mesh(uniform(10, 2))
         self.assertNotEqual(_server.shared_server().address, first.address)
 
+    def test_calls_do_not_wait_for_one_that_has_crashed(self):
+        with wellspace.LocalServer() as server, Client(server) as client:
+            client.info()
+            os.killpg(server._process.pid, signal.SIGKILL)
+            begin = time.monotonic()
+            with self.fails(UnavailableError):
+                client.info()
+            # Eight attempts would take at least ten seconds, as for a server that may come back.
+            self.assertLess(time.monotonic() - begin, 8)
+
     def test_not_installed(self):
         for environment, message in (
             ({"PATH": "/nowhere"}, "no wellspaced on the path"),

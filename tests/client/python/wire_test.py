@@ -4,7 +4,7 @@ import unittest
 
 import numpy as np
 
-from wellspace import _api, _wire
+from wellspace import DamagedAnswerError, _api, _wire
 
 
 def read(serialized):
@@ -59,17 +59,17 @@ class WireTest(unittest.TestCase):
             (b"\x00\x00", "without a number"),
             (b"\x1b", "unknown type 3"),
         ):
-            with self.subTest(serialized), self.assertRaisesRegex(_wire.MalformedMessage, message):
+            with self.subTest(serialized), self.assertRaisesRegex(DamagedAnswerError, message):
                 read(serialized)
 
     def test_what_is_no_array(self):
-        with self.assertRaisesRegex(_wire.MalformedMessage, "a multiple of 8"):
+        with self.assertRaisesRegex(DamagedAnswerError, "a multiple of 8"):
             _wire.packed(read(b"\x1a\x04\0\0\0\0")[0], "<f8")
-        with self.assertRaisesRegex(_wire.MalformedMessage, "has the type 0"):
+        with self.assertRaisesRegex(DamagedAnswerError, "has the type 0"):
             _wire.packed(read(b"\x18\x01")[0], "<f8")
-        with self.assertRaisesRegex(_wire.MalformedMessage, "ends within"):
+        with self.assertRaisesRegex(DamagedAnswerError, "ends within"):
             _wire.packed_varints(read(b"\x22\x01\x80")[0])
-        with self.assertRaisesRegex(_wire.MalformedMessage, "above 2\\^32"):
+        with self.assertRaisesRegex(DamagedAnswerError, "above 2\\^32"):
             _wire.packed_varints(read(b"\x22\x06\x80\x80\x80\x80\x80\x01")[0])
 
 

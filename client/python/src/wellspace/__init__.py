@@ -20,7 +20,8 @@ from ._parameters import Parameters, takes
 from ._progress import Progress, ProgressOption
 from ._retry import CancelToken, RetryPolicy
 from ._server import LocalServer
-from ._sessions import Session, SessionInfo
+from ._session_info import SessionInfo
+from ._sessions import Session
 from ._version import __version__
 from .errors import (
     CancelledError,

@@ -14,7 +14,7 @@ import grpc
 from . import _api
 from ._channel import Credentials
 from ._retry import Attempt, CancelToken, Retrier, RetryPolicy, now
-from .errors import CredentialsError, DamagedAnswerError, Error, from_status
+from .errors import CredentialsError, DamagedAnswerError, Error, UnavailableError, from_status
 
 T = TypeVar("T")
 
@@ -36,7 +36,11 @@ class CallOptions:
 class Calls:
     """Makes calls on a channel. Thread-safe."""
 
-    def __init__(self, channel: grpc.Channel, credentials: Credentials, policy: RetryPolicy) -> None:
+    def __init__(
+        self, channel: grpc.Channel, credentials: Credentials, policy: RetryPolicy, is_gone: Callable[[], bool]
+    ) -> None:
+        """`is_gone` says whether the server will never answer again."""
+        self._is_gone = is_gone
         self._channel = channel
         self._credentials = credentials
         self._retrier = Retrier(policy)
@@ -44,7 +48,15 @@ class Calls:
     def run(self, options: CallOptions, make: Callable[[Attempt], T]) -> T:
         """Runs attempts until one succeeds."""
         deadline = math.inf if options.timeout is None else now() + options.timeout
-        return self._retrier.run(deadline, options.cancel or CancelToken(), make)
+
+        def make_unless_gone(attempt: Attempt) -> T:
+            try:
+                return make(attempt)
+            except UnavailableError:
+                attempt.is_final = attempt.is_final or self._is_gone()
+                raise
+
+        return self._retrier.run(deadline, options.cancel or CancelToken(), make_unless_gone)
 
     def unary(self, method: str, request: Any, response: str, options: CallOptions) -> Any:
         """A call with one request and one answer, of the type `response`."""

@@ -48,7 +48,7 @@ class Credentials:
     tls_ca: str | os.PathLike[str] | None = None
     tls_certificate: str | os.PathLike[str] | None = None
     tls_key: str | os.PathLike[str] | None = None
-    token: str | None = None
+    token: str | None = dataclasses.field(default=None, repr=False)
     token_file: str | os.PathLike[str] | None = None
     insecure_remote: bool = False
 

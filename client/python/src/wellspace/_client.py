@@ -19,14 +19,13 @@ from ._progress import OnProgress, ProgressOption, progress_of, told
 from ._receiver import MeshReceiver
 from ._retry import Attempt, CancelToken, RetryPolicy
 from ._server import LocalServer, shared_server
+from ._session_info import SessionInfo, info_of_session
 from .errors import InvalidArgumentError
 from .statistics import Estimate, ServerInfo, info_of
 from .statistics import fill as fill_dataclass
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
-
-    from ._sessions import SessionInfo
 
 _WAITING = 1  # PHASE_WAITING: the work has not begun
 
@@ -58,10 +57,17 @@ class Client:
         credentials: Credentials | None = None,
         retry: RetryPolicy | None = None,
     ) -> None:
-        address, self._credentials = _address_of(server, credentials)
-        self.address = address
-        self._channel = open_channel(address, self._credentials)
-        self._calls = Calls(self._channel, self._credentials, retry or RetryPolicy())
+        if server is None and "WELLSPACE_SERVER" not in os.environ:
+            server = shared_server()
+        self.address, self._credentials = _address_of(server, credentials)
+        self._channel = open_channel(self.address, self._credentials)
+        own = server if isinstance(server, LocalServer) else None
+        self._calls = Calls(
+            self._channel,
+            self._credentials,
+            retry or RetryPolicy(),
+            is_gone=lambda: own is not None and not own.is_running,
+        )
 
     def close(self) -> None:
         """Closes the connection; calls that are under way end with `CancelledError`."""
@@ -148,8 +154,6 @@ class Client:
 
     def sessions(self, labels: Mapping[str, str] | None = None, *, timeout: float | None = None) -> list[SessionInfo]:
         """The caller's sessions that have all of `labels`, in the order of their creation."""
-        from ._sessions import info_of_session
-
         request = _api.message("ListSessionsRequest")(labels=dict(labels or {}))
         found = []
         while True:
@@ -169,9 +173,6 @@ Server = Union[str, LocalServer, Client, None]
 def _address_of(server: str | LocalServer | None, credentials: Credentials | None) -> tuple[str, Credentials]:
     if isinstance(server, LocalServer):
         return server.address, server.credentials
-    if server is None and "WELLSPACE_SERVER" not in os.environ:
-        local = shared_server()
-        return local.address, local.credentials
     token = os.environ.get("WELLSPACE_TOKEN") if server is None else None
     address = os.environ["WELLSPACE_SERVER"] if server is None else server
     if not isinstance(address, str):

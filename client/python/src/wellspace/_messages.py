@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from . import _wire
 from ._arrays import Floats
-from ._receiver import MeshReceiver, damaged
+from ._receiver import MeshReceiver
 
 _BYTES_OF_A_REQUEST = 1 << 20
 
@@ -21,20 +21,12 @@ def point_chunks(cloud: Floats, first: int = 0) -> Iterator[tuple[int, int, byte
 
 def messages_of(answer: bytes) -> Iterator[tuple[int, memoryview]]:
     """The fields of an answer, which are messages."""
-    try:
-        for field in _wire.fields(memoryview(answer)):
-            if field.kind == _wire.BYTES:
-                yield field.number, field.value
-    except _wire.MalformedMessage as error:
-        raise damaged(f"no message: {error}") from error
+    return ((field.number, field.value) for field in _wire.fields(memoryview(answer)) if field.kind == _wire.BYTES)
 
 
 def receive(receiver: MeshReceiver, number: int, part: memoryview) -> None:
     """Field 0 is metadata, 1 a chunk."""
-    try:
-        if number == 0:
-            receiver.set_metadata(part)
-        elif number == 1:
-            receiver.add_chunk(part)
-    except _wire.MalformedMessage as error:
-        raise damaged(f"no message: {error}") from error
+    if number == 0:
+        receiver.set_metadata(part)
+    elif number == 1:
+        receiver.add_chunk(part)

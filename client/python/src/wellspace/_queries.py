@@ -39,7 +39,7 @@ def stream_answers(
         try:
             with calls.stream(method, request, attempt) as answers:
                 for answer in answers:
-                    answered += _counted(take, answer)
+                    answered += take(answer)
                     attempt.progressed = True
         except Error:
             attempt.is_final = not len(vertices) and answered > 0 and not attempt.cancel.is_cancelled
@@ -50,13 +50,6 @@ def stream_answers(
     for begin in range(0, max(1, len(vertices)), _VERTICES_OF_A_REQUEST):
         left = None if math.isinf(deadline) else max(0.0, deadline - now())
         calls.run(CallOptions(timeout=left, cancel=options.cancel), attempt_once)
-
-
-def _counted(take: Callable[[bytes], int], answer: bytes) -> int:
-    try:
-        return take(answer)
-    except _wire.MalformedMessage as error:
-        raise damaged(f"no message: {error}") from error
 
 
 def nearest_distances(calls: Calls, session: str, vertices: Indices, options: CallOptions) -> npt.NDArray[np.float64]:

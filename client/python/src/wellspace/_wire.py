@@ -13,11 +13,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from .errors import DamagedAnswerError
+
 VARINT, FIXED64, BYTES, FIXED32 = 0, 1, 2, 5
 
 
-class MalformedMessage(ValueError):
-    """The bytes are no message."""
+def malformed(what: str) -> DamagedAnswerError:
+    """The error for bytes that are no message."""
+    return DamagedAnswerError(f"the server's answer is damaged: no message: {what}")
 
 
 class Field(NamedTuple):
@@ -33,7 +36,7 @@ def read_varint(data: memoryview, at: int) -> tuple[int, int]:
     result = shift = 0
     while True:
         if at >= len(data) or shift > 63:
-            raise MalformedMessage("a number without an end")
+            raise malformed("a number without an end")
         byte = data[at]
         at += 1
         result |= (byte & 0x7F) << shift
@@ -49,7 +52,7 @@ def fields(data: memoryview) -> Iterator[Field]:
         tag, at = read_varint(data, at)
         number, kind = tag >> 3, tag & 7
         if number == 0:
-            raise MalformedMessage("a field without a number")
+            raise malformed("a field without a number")
         if kind == VARINT:
             value, at = read_varint(data, at)
             yield Field(number, kind, value)
@@ -59,9 +62,9 @@ def fields(data: memoryview) -> Iterator[Field]:
         elif kind in (FIXED32, FIXED64):
             length = 4 if kind == FIXED32 else 8
         else:
-            raise MalformedMessage(f"a field of the unknown type {kind}")
+            raise malformed(f"a field of the unknown type {kind}")
         if length > len(data) - at:
-            raise MalformedMessage(f"a field of {length} bytes where {len(data) - at} are left")
+            raise malformed(f"a field of {length} bytes where {len(data) - at} are left")
         part = data[at : at + length]
         at += length
         yield Field(number, kind, part if kind == BYTES else int.from_bytes(part, "little"))
@@ -73,10 +76,10 @@ def packed(field: Field, dtype: str) -> npt.NDArray[Any]:
     if field.kind != BYTES:  # a single number may come alone
         expected = FIXED32 if width == 4 else FIXED64
         if field.kind != expected:
-            raise MalformedMessage(f"field {field.number} has the type {field.kind}; expected {BYTES} or {expected}")
+            raise malformed(f"field {field.number} has the type {field.kind}; expected {BYTES} or {expected}")
         return np.frombuffer(int(field.value).to_bytes(width, "little"), dtype)
     if len(field.value) % width != 0:
-        raise MalformedMessage(f"field {field.number} has {len(field.value)} bytes; expected a multiple of {width}")
+        raise malformed(f"field {field.number} has {len(field.value)} bytes; expected a multiple of {width}")
     return np.frombuffer(field.value, dtype)
 
 
@@ -85,17 +88,17 @@ def packed_varints(field: Field) -> npt.NDArray[np.int64]:
     if field.kind == VARINT:
         return np.array([field.value], np.int64)
     if field.kind != BYTES:
-        raise MalformedMessage(f"field {field.number} has the type {field.kind}; expected {BYTES} or {VARINT}")
+        raise malformed(f"field {field.number} has the type {field.kind}; expected {BYTES} or {VARINT}")
     octets = np.frombuffer(field.value, np.uint8)
     is_last = octets < 0x80
     if len(octets) and not is_last[-1]:
-        raise MalformedMessage(f"field {field.number} ends within a number")
+        raise malformed(f"field {field.number} ends within a number")
     if is_last.all():
         return octets.astype(np.int64)
     ends = np.flatnonzero(is_last)
     begins = np.concatenate([[0], ends[:-1] + 1])
     if (ends - begins).max() >= 5:
-        raise MalformedMessage(f"field {field.number} has a number above 2^32")
+        raise malformed(f"field {field.number} has a number above 2^32")
     place = np.arange(len(octets)) - np.repeat(begins, ends - begins + 1)
     return np.add.reduceat((octets & 0x7F).astype(np.int64) << (7 * place), begins)
 

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import wellspace
 
-from . import _client, _mesh, _operations, _sessions
+from . import _client, _mesh, _operations, _session_info, _sessions
 from ._cells import Cells
 from ._domain import DomainArguments
 from ._parameters import Parameters, takes
@@ -162,10 +162,10 @@ class Session:
         """As `wellspace.Session.sizes`, which makes no call."""
         self._session.sizes(size, size_boxes)
 
-    async def info(self, **options: Any) -> _sessions.SessionInfo:
+    async def info(self, **options: Any) -> _session_info.SessionInfo:
         return await _run(self._session.info, **options)
 
-    async def update(self, **options: Any) -> _sessions.SessionInfo:
+    async def update(self, **options: Any) -> _session_info.SessionInfo:
         return await _run(self._session.update, **options)
 
     async def delete(self, **options: Any) -> None:
