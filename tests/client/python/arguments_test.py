@@ -62,7 +62,7 @@ class ParametersTest(Case):
                                    (wellspace.aio.mesh, names + segments)):
             for name in expected:
                 self.assertIn(name, inspect.signature(function).parameters, function)
-        for document in (wellspace.mesh.__doc__, wellspace.Session.refine.__doc__):
+        for document in (wellspace.mesh.__doc__, wellspace.Session.__doc__, wellspace.Session.refine.__doc__):
             for name in names:
                 self.assertIn(f"\n{name} : ", inspect.cleandoc(document))
             self.assertNotIn("**arguments", document)

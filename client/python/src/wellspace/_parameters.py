@@ -102,12 +102,16 @@ def takes(*kinds: Any) -> Callable[[Function], Function]:
             for name, annotation in kind.__annotations__.items()
         ]
         function.__signature__ = signature.replace(parameters=[*own, *named])  # type: ignore[attr-defined]
-        lines = "\n".join(inspect.cleandoc(kind.__doc__ or "") for kind in kinds)
-        own_doc = inspect.cleandoc(function.__doc__ or "")
-        function.__doc__ = own_doc.replace("**arguments", lines) if "**arguments" in own_doc else own_doc
+        function.__doc__ = naming(function.__doc__, *kinds)
         return function
 
     return change
+
+
+def naming(document: str | None, *kinds: Any) -> str:
+    """A docstring in the place of whose "**arguments" the keys of `kinds` stand."""
+    lines = "\n".join(inspect.cleandoc(kind.__doc__ or "") for kind in kinds)
+    return inspect.cleandoc(document or "").replace("**arguments", lines)
 
 
 def _text(annotation: Any) -> Any:

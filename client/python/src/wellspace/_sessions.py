@@ -16,7 +16,7 @@ from ._client import Client, Server, client_of
 from ._domain import DomainArguments, make_domain
 from ._mesh import Mesh, signed
 from ._operations import Operation, operation_of, watch
-from ._parameters import Parameters, fill, split, takes
+from ._parameters import Parameters, fill, naming, split, takes
 from ._progress import ProgressOption, told
 from ._queries import nearest_distances, stream_cells
 from ._retry import CancelToken
@@ -33,9 +33,9 @@ _SECONDS_TO_CANCEL = 5.0
 class Session:
     """A session of a server. Thread-safe, but for `sizes`.
 
-    As a context manager it is deleted at the end of the block. All calls take `timeout`, in seconds for all attempts
-    together, and `cancel`; those that change the session take `expected_revision`: at another revision they raise
-    `ConflictError` and change nothing.
+    As a context manager it is deleted at the end of the block. Calls take `timeout`, in seconds for all attempts
+    together, and most of them `cancel`. Those that change the session take `expected_revision`: at another revision
+    they raise `ConflictError` and change nothing.
 
     Parameters
     ----------
@@ -383,6 +383,9 @@ class Session:
             limit = None if beta is None else number(beta, "beta")
             stream_cells(self._calls, self.name, wanted, limit, reader, CallOptions(timeout=timeout, cancel=cancel))
         return reader.cells()
+
+
+Session.__doc__ = naming(Session.__doc__, Parameters)
 
 
 def _set_duration(message: Any, seconds: float) -> None:
