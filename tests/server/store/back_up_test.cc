@@ -144,7 +144,7 @@ TEST_F(BackUpTest, WantsAFolderOfItsOwn) {
   const absl::Status self = BackUp(from_, from_).status();
   EXPECT_EQ(self.code(), absl::StatusCode::kFailedPrecondition);
   std::filesystem::create_directories(to_);
-  WriteFile(to_ + "/letter.txt", "");
+  WriteTestFile(to_ + "/letter.txt", "");
   const absl::Status full = BackUp(from_, to_).status();
   EXPECT_EQ(full.code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(std::string(full.message()), HasSubstr("not empty"));

@@ -131,8 +131,8 @@ TEST_F(SessionTablesTest, FeaturesAreReadApart) {
   ASSERT_TRUE(features.ok()) << features.status();
   ASSERT_EQ(features->size(), 3u);
   EXPECT_EQ(features->at(2).segments().ends(0), 2u);
-  EXPECT_THAT(*tables->ReadFeatures(SessionName(2)), IsEmpty());
-  EXPECT_THAT(*tables->ReadFeatures(SessionName(3)), IsEmpty());
+  EXPECT_TRUE(tables->ReadFeatures(SessionName(2))->empty());
+  EXPECT_TRUE(tables->ReadFeatures(SessionName(3))->empty());
   EXPECT_EQ(tables->Load()->sessions[0].steps.size(), 4u) << "those of points alone";
 }
 
@@ -176,7 +176,7 @@ TEST_F(SessionTablesTest, AFileOfAnotherProgramIsRefused) {
     ASSERT_TRUE((*database)->Execute("CREATE TABLE recipes(name)").ok());
   }
   EXPECT_EQ(SessionTables::Open(path_, {}).status().code(), absl::StatusCode::kFailedPrecondition);
-  WriteFile(path_, std::string(10'000, 'x'));
+  WriteTestFile(path_, std::string(10'000, 'x'));
   const absl::Status status = SessionTables::Open(path_, {}).status();
   EXPECT_EQ(ReasonOf(status), "FILE_DAMAGED");
   EXPECT_THAT(std::string(status.message()), HasSubstr(path_));
