@@ -140,7 +140,7 @@ TEST_F(MeshFileTest, ADamagedChunkCostsThatChunkAlone) {
 
 TEST_F(MeshFileTest, AFileThatIsMissingShortOrLongIsDamaged) {
   const auto record = *Keep(MakeMesh({}))->record();
-  const std::string bytes = ReadFile(path_);
+  const std::string bytes = BytesOfFile(path_);
   for (const uint64_t size : {uint64_t{0}, uint64_t{10}, record.size() - 1, record.size() + 1}) {
     std::filesystem::resize_file(path_, size);
     const auto file = Find(record);

@@ -33,14 +33,14 @@ TEST_F(PosixFileSystemTest, ReadsWhatItWrites) {
   EXPECT_EQ(*(*file)->ReadAt(1, read), 5u) << "fewer, before the end";
   EXPECT_EQ(read, "bcdef.....");
   EXPECT_EQ(*(*file)->ReadAt(100, read), 0u);
-  EXPECT_EQ(ReadFile(Path("a")), "abcdef");
+  EXPECT_EQ(BytesOfFile(Path("a")), "abcdef");
 }
 
 TEST_F(PosixFileSystemTest, OpensForWritingWithoutLossOfWhatIsThere) {
   WriteFile(Path("a"), "abc");
   for (const auto mode : {FileSystem::Mode::kWrite, FileSystem::Mode::kCreateOrWrite}) {
     ASSERT_TRUE(files_.Open(Path("a"), mode).ok());
-    EXPECT_EQ(ReadFile(Path("a")), "abc");
+    EXPECT_EQ(BytesOfFile(Path("a")), "abc");
   }
 }
 
@@ -76,7 +76,7 @@ TEST_F(PosixFileSystemTest, NamesFilesAndFolders) {
   ASSERT_TRUE(files_.SynchronizeFolder(Path("x")).ok());
   EXPECT_THAT(*files_.List(Path("x")), UnorderedElementsAre("b", "c", "y"));
   ASSERT_TRUE(files_.Remove(Path("x/b")).ok());
-  EXPECT_EQ(ReadFile(Path("x/c")), "a");
+  EXPECT_EQ(BytesOfFile(Path("x/c")), "a");
 }
 
 TEST_F(PosixFileSystemTest, ALockIsHeldUntilItsEnd) {

@@ -148,7 +148,7 @@ std::string TextOf(const StoredSessions& stored) {
   return text;
 }
 
-std::string ReadFile(const std::string& path) {
+std::string BytesOfFile(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   std::ostringstream bytes;
   bytes << file.rdbuf();

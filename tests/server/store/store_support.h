@@ -56,7 +56,7 @@ store::v1::AnswerRecord MakeAnswer(const std::string& tenant, const std::string&
 std::string TextOf(const StoredSessions& stored);
 
 // Whatever of the file is there.
-std::string ReadFile(const std::string& path);
+std::string BytesOfFile(const std::string& path);
 void WriteFile(const std::string& path, const std::string& bytes);
 void FlipBit(const std::string& path, uint64_t byte, int bit);
 
