@@ -8,10 +8,11 @@
 
 #include "absl/status/statusor.h"
 #include "core/base/run_context.h"
+#include "core/domain.h"
 #include "core/features/features.h"
 #include "core/geometry/box.h"
-#include "core/input_cloud.h"
 #include "core/refine/domain/planar_domain.h"
+#include "core/sorted_cloud.h"
 
 namespace wellspace::core {
 

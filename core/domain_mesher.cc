@@ -18,8 +18,10 @@
 #include "core/feasibility.h"
 #include "core/mesh_estimate.h"
 #include "core/mesher_checks.h"
+#include "core/separation.h"
 #include "core/simplex/boundary.h"
 #include "core/simplex/quality.h"
+#include "core/sorted_cloud.h"
 #include "core/vertex_queries.h"
 
 namespace wellspace::core {

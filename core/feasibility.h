@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "absl/status/status.h"
-#include "core/input_cloud.h"
+#include "core/domain.h"
 #include "core/mesh_parameters.h"
 #include "core/refine/criteria.h"
 

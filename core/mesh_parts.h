@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/cell/polytope.h"
-#include "core/input_cloud.h"
+#include "core/domain.h"
 #include "core/mesh.h"
 #include "core/simplex/quality.h"
 

@@ -14,20 +14,22 @@
 #include "core/base/saturate.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
+#include "core/domain.h"
 #include "core/estimate/estimate.h"
 #include "core/feasibility.h"
-#include "core/input_cloud.h"
 #include "core/mesh_estimate.h"
 #include "core/mesh_parts.h"
 #include "core/mesher_checks.h"
 #include "core/near_points.h"
 #include "core/point_adder.h"
 #include "core/refine/refine.h"
+#include "core/separation.h"
 #include "core/simplex/boundary.h"
 #include "core/simplex/quality.h"
 #include "core/simplex/simplices.h"
 #include "core/simplex/validate.h"
 #include "core/sliver/sliver_stage.h"
+#include "core/sorted_cloud.h"
 #include "core/vertex_numbering.h"
 #include "core/vertex_queries.h"
 #include "core/voronoi/query_structure.h"
@@ -69,8 +71,8 @@ class MesherIn final : public Mesher {
     WELLSPACE_RETURN_IF_ERROR(CheckShapeFeasible<D>(domain_, parameters, points.size() / D));
     absl::StatusOr<SortedCloud<D>> cloud = BuildTree(parameters, points, merged, context);
     if (IsTooClose(cloud.status())) {
-      return TooNearError<D>(domain_, merge_distance_ > 0 ? merged.points : points, merged.inputs,
-                             !parameters.domain_low.empty(), parameters.margin, cloud.status(), context);
+      return TooClosePairsError<D>(domain_, merge_distance_ > 0 ? merged.points : points, merged.inputs,
+                                   !parameters.domain_low.empty(), parameters.margin, cloud.status(), context);
     }
     WELLSPACE_RETURN_IF_ERROR(cloud.status());
     WELLSPACE_ASSIGN_OR_RETURN(PointNames names, NamePoints<D>(*std::move(cloud), context));

@@ -10,6 +10,10 @@
 
 namespace wellspace::core {
 
+// Leaves that the tree may have for each vertex of the budget; around isolated close pairs balance costs up to about
+// two.
+inline constexpr uint64_t kLeavesPerVertex = 8;
+
 // Refuses parameters that are not valid, or not those of a mesh in `dimension`.
 //
 // Errors:     INVALID_ARGUMENT, naming the field.

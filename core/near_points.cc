@@ -93,7 +93,7 @@ class PointGrid {
   std::vector<Point<D>> points_;
 };
 
-// A pair of places in a cloud that are too near.
+// A pair of places in a cloud that are too close.
 struct Pair {
   size_t first = 0;
   size_t second = 0;
@@ -185,7 +185,7 @@ std::string Coordinates(std::span<const double> points, size_t place) {
   return text + ")";
 }
 
-// The error that blames points far away, if without them no pair is too near; OK if they are not to blame.
+// The error that blames points far away, if without them no pair is too close; OK if they are not to blame.
 template <int D>
 absl::Status BlameOutliers(const Domain<D>& domain, std::span<const double> points, std::span<const uint32_t> inputs,
                            double margin, const Pairs& pairs, const RunContext& context) {
@@ -309,8 +309,9 @@ absl::StatusOr<SortedCloud<D>> SortMerged(const Domain<D>& domain, const MergedP
 }
 
 template <int D>
-absl::Status TooNearError(const Domain<D>& domain, std::span<const double> points, std::span<const uint32_t> inputs,
-                          bool is_domain_given, double margin, const absl::Status& found, const RunContext& context) {
+absl::Status TooClosePairsError(const Domain<D>& domain, std::span<const double> points,
+                                std::span<const uint32_t> inputs, bool is_domain_given, double margin,
+                                const absl::Status& found, const RunContext& context) {
   WELLSPACE_ASSIGN_OR_RETURN(const Pairs pairs, PairsNearer<D>(domain, points, domain.MinSeparation(), context));
   if (pairs.named.empty()) {
     return found;
@@ -344,8 +345,8 @@ absl::Status TooNearError(const Domain<D>& domain, std::span<const double> point
                                                      const RunContext&);                                            \
   template absl::StatusOr<SortedCloud<D>> SortMerged<D>(const Domain<D>&, const MergedPoints&, int,                 \
                                                         const RunContext&);                                         \
-  template absl::Status TooNearError<D>(const Domain<D>&, std::span<const double>, std::span<const uint32_t>, bool, \
-                                        double, const absl::Status&, const RunContext&);
+  template absl::Status TooClosePairsError<D>(const Domain<D>&, std::span<const double>, std::span<const uint32_t>, \
+                                              bool, double, const absl::Status&, const RunContext&);
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 

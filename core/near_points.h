@@ -1,4 +1,4 @@
-// Points of the input that are near each other: merged where that is asked for, told of where they are too near.
+// Points of the input that are near each other: merged where that is asked for, told of where they are too close.
 #ifndef WELLSPACE_CORE_NEAR_POINTS_H_
 #define WELLSPACE_CORE_NEAR_POINTS_H_
 
@@ -10,8 +10,9 @@
 #include "absl/status/statusor.h"
 #include "core/base/memory/huge_pages.h"
 #include "core/base/run_context.h"
+#include "core/domain.h"
 #include "core/geometry/point.h"
-#include "core/input_cloud.h"
+#include "core/sorted_cloud.h"
 
 namespace wellspace::core {
 
@@ -51,15 +52,16 @@ absl::StatusOr<SortedCloud<D>> SortMerged(const Domain<D>& domain, const MergedP
 template <int D>
 inline constexpr uint64_t kMergeBytes = 3 * sizeof(Point<D>) + sizeof(int64_t) * D + 48;
 
-// Says which points of a cloud are too near to each other for `domain`: how many pairs, and the first of them. Where
-// few points far away are what makes the domain so large that others are too near, these are blamed. `inputs` has the
+// Says which points of a cloud are too close to each other for `domain`: how many pairs, and the first of them. Where
+// few points far away are what makes the domain so large that others are too close, these are blamed. `inputs` has the
 // numbers of the points, and is empty if they are 0, 1, …. `is_domain_given`: not by the points.
 //
 // Complexity: O(n log n), times 2^D.
-// Errors:     INVALID_ARGUMENT always, `found` if no pair is too near; CANCELLED, DEADLINE_EXCEEDED.
+// Errors:     INVALID_ARGUMENT always, `found` if no pair is too close; CANCELLED, DEADLINE_EXCEEDED.
 template <int D>
-absl::Status TooNearError(const Domain<D>& domain, std::span<const double> points, std::span<const uint32_t> inputs,
-                          bool is_domain_given, double margin, const absl::Status& found, const RunContext& context);
+absl::Status TooClosePairsError(const Domain<D>& domain, std::span<const double> points,
+                                std::span<const uint32_t> inputs, bool is_domain_given, double margin,
+                                const absl::Status& found, const RunContext& context);
 
 }  // namespace wellspace::core
 

@@ -11,6 +11,7 @@
 #include "core/base/status_macros.h"
 #include "core/mesh_parameters.h"
 #include "core/refused_points.h"
+#include "core/separation.h"
 
 namespace wellspace::core {
 template <int D>
@@ -29,7 +30,7 @@ absl::StatusOr<std::vector<uint32_t>> PointAdder<D>::AddPoints(std::span<const d
   const std::vector<uint32_t>& inputs = merged.others.inputs;
   const std::span<const double> others = merges ? merged.others.points : points;
   const auto explain = [&](const absl::Status& found) {
-    return IsTooClose(found) ? TooNearError<D>(domain_, others, inputs, true, 0, found, context) : found;
+    return IsTooClose(found) ? TooClosePairsError<D>(domain_, others, inputs, true, 0, found, context) : found;
   };
   absl::StatusOr<SortedCloud<D>> sorted = SortCloud<D>(domain_, others, 1, context, inputs);
   WELLSPACE_RETURN_IF_ERROR(explain(sorted.status()));

@@ -13,10 +13,10 @@
 #include "absl/status/statusor.h"
 #include "core/base/ids.h"
 #include "core/base/run_context.h"
+#include "core/domain.h"
 #include "core/geometry/point.h"
-#include "core/input_cloud.h"
+#include "core/refine/domain/place_in_domain.h"
 #include "core/refine/domain/planar_domain.h"
-#include "core/refine/domain/segment_point.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {

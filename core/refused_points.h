@@ -1,4 +1,4 @@
-// The points of a batch that are refused, told in one error.
+// The points that AddPoints refuses at once, told in one error. PointAdder and PointPlacer collect them.
 #ifndef WELLSPACE_CORE_REFUSED_POINTS_H_
 #define WELLSPACE_CORE_REFUSED_POINTS_H_
 

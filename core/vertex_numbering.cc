@@ -76,8 +76,8 @@ absl::StatusOr<HugeVector<double>> VertexNumbering<D>::PointsFrom(const QueryStr
     if (i % kStepsBetweenChecks == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
     }
-    if (count - i > kAhead) {
-      __builtin_prefetch(&out[place_of(i + kAhead)], 1);
+    if (count - i > kPointsAhead) {
+      __builtin_prefetch(&out[place_of(i + kPointsAhead)], 1);
     }
     const Point<D> p = domain.Unscaled(structure.point(VertexId{i}));
     std::copy(p.begin(), p.end(), &out[place_of(i)]);

@@ -13,7 +13,8 @@
 #include "core/base/ids.h"
 #include "core/base/memory/huge_pages.h"
 #include "core/base/run_context.h"
-#include "core/input_cloud.h"
+#include "core/domain.h"
+#include "core/sorted_cloud.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {

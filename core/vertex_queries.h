@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "absl/status/statusor.h"
-#include "core/input_cloud.h"
+#include "core/domain.h"
 #include "core/mesh.h"
 #include "core/vertex_numbering.h"
 #include "core/voronoi/query_structure.h"

@@ -13,6 +13,9 @@ namespace {
 // A lease that has run out is noticed at once by those who ask for the session; its memory is free this much later.
 constexpr absl::Duration kExpiryInterval = absl::Seconds(1);
 
+// Files that a fault, or a death of the process, has left are removed as often.
+constexpr absl::Duration kGarbageInterval = absl::Hours(1);
+
 // Changes that wait for the disk at once: as many sessions can have theirs synchronised together.
 constexpr size_t kBlockingThreads = 64;
 
@@ -110,6 +113,9 @@ absl::Status Backend::Restore() {
                    .text());
   }
   ResumeRefinements(environment_, std::move(resumed));
+  if (session_log_->is_durable()) {
+    RemoveGarbage();
+  }
   return absl::OkStatus();
 }
 
@@ -123,6 +129,21 @@ void Backend::RemoveExpired() {
       blocking_.Run(session->name(), [session] { session->LogExpiry(); });
     }
   }
+}
+
+void Backend::RemoveGarbage() {
+  blocking_.Run("", [this] {
+    const absl::StatusOr<Garbage> garbage = session_log_->RemoveGarbage();
+    if (garbage.ok()) {
+      for (const std::string& path : garbage->removed) {
+        log_->info(LogFields().Add("event", "file_removed").Add("path", path).text());
+      }
+      for (const std::string& path : garbage->unknown) {
+        log_->warn(LogFields().Add("event", "unknown_file").Add("path", path).text());
+      }
+    }
+  });
+  background_.PostAfter(kGarbageInterval, [this] { RemoveGarbage(); });
 }
 
 void Backend::ScheduleExpiry() {

@@ -47,6 +47,7 @@ class Backend {
  private:
   void ScheduleExpiry();
   void RemoveExpired();
+  void RemoveGarbage();
   void AddMetrics(Metrics& metrics);
 
   const ServiceOptions options_;

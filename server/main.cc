@@ -1,9 +1,12 @@
 // wellspaced: serves wellspace.v1 until SIGTERM or SIGINT.
 //
 //     wellspaced hash-token TENANT < TOKEN >> TOKENS
-// makes a line for --token-file.
+// makes a line for --token-file;
+//     wellspaced check-data DIR
+//     wellspaced back-up DIR TO
+// check and copy the folder of a server, also while it serves.
 //
-// Exit codes: 0 stopped by a signal, 1 cannot serve, 2 wrong options or no token.
+// Exit codes: 0 stopped by a signal, 1 cannot serve, or the folder is not whole, 2 wrong options or no token.
 #include <malloc.h>
 #include <pthread.h>
 #include <signal.h>
@@ -27,6 +30,9 @@
 #include "server/log/log_writer.h"
 #include "server/security/tokens.h"
 #include "server/server.h"
+#include "server/store/back_up.h"
+#include "server/store/check_data.h"
+#include "server/store/durable_log.h"
 
 namespace wellspace::server {
 namespace {
@@ -42,7 +48,12 @@ struct Flags {
   absl::Duration grace = absl::Seconds(10);
   std::string log_level = "info";
   std::string log_format = "text";
+  std::string data;             // the folder of the session log; empty: sessions end with the process
+  bool is_ephemeral = false;    // they do, whatever `data` says
   std::string hash_for_tenant;  // makes a line of tokens and does not serve
+  std::string checked_folder;   // checks it and does not serve
+  std::string copied_folder;    // copies it to the next and does not serve
+  std::string copy;
 };
 
 void DeclareSecurity(CLI::App& app, SecurityOptions& security) {
@@ -69,6 +80,11 @@ void Declare(CLI::App& app, Flags& flags) {
   DeclareSecurity(app, flags.server.security);
   DeclareLimits(app, flags.server.service);
   DeclareConnections(app, flags.server.connections);
+  app.add_option("--data", flags.data,
+                 "Folder in which sessions are kept, so that they outlive this process; default: none, and they end "
+                 "with it")
+      ->type_name("DIR");
+  app.add_flag("--ephemeral", flags.is_ephemeral, "Keep no session, also where the file of options has a folder");
   AddSeconds(app, "--grace", flags.grace, absl::ZeroDuration(), kMaxGrace,
              "Time that running work gets to end after SIGTERM or SIGINT");
   app.add_option("--log-level", flags.log_level, "What to log on standard error")
@@ -86,6 +102,16 @@ void Declare(CLI::App& app, Flags& flags) {
   DeclareConfigFile(app);
   app.add_subcommand("hash-token", "Print the line of --token-file for the token that is read from standard input")
       ->add_option("tenant", flags.hash_for_tenant, "Tenant whose calls show the token")
+      ->required();
+  app.add_subcommand("check-data", "Check every byte of a folder of --data, also while a server serves it")
+      ->add_option("folder", flags.checked_folder, "The folder")
+      ->type_name("DIR")
+      ->required();
+  CLI::App& back_up =
+      *app.add_subcommand("back-up", "Copy a folder of --data, also while a server serves it, and check the copy");
+  back_up.add_option("folder", flags.copied_folder, "The folder")->type_name("DIR")->required();
+  back_up.add_option("to", flags.copy, "New or empty folder, with which a server can be started")
+      ->type_name("DIR")
       ->required();
 }
 
@@ -116,6 +142,7 @@ LogFields StartOf(const Flags& flags, const Server& server) {
   fields.Add("max_connection_idle_seconds", absl::ToDoubleSeconds(connections.max_idle));
   fields.Add("max_streams", count(connections.calls.max_streams));
   fields.Add("max_calls", count(connections.calls.max_calls));
+  fields.Add("data", flags.is_ephemeral ? "" : flags.data);
   return fields.Add("grace_seconds", absl::ToDoubleSeconds(flags.grace));
 }
 
@@ -139,6 +166,43 @@ int HashToken(const std::string& tenant) {
   }
   std::cout << *line << "\n";
   return ExitOfPrinted("the line");
+}
+
+// Prints what was found in a folder. The exit code is not 0 unless it is whole.
+int Report(const std::string& folder, const absl::StatusOr<DataReport>& report) {
+  if (!report.ok()) {
+    std::cerr << "wellspaced: " << folder << ": " << report.status().message() << std::endl;
+    return 1;
+  }
+  for (const std::string& problem : report->problems) {
+    std::cerr << "wellspaced: " << problem << std::endl;
+  }
+  for (const std::string& unknown : report->unknown) {
+    std::cerr << "wellspaced: " << unknown << ": not of a server, and left as it is" << std::endl;
+  }
+  std::cout << folder << ": " << (report->is_whole() ? "whole" : "damaged") << "; " << report->sessions
+            << " sessions, " << report->operations << " operations, " << report->points << " points, "
+            << report->meshes << " meshes, " << report->file_bytes << " bytes of files\n";
+  const int exit = ExitOfPrinted("the report");
+  return report->is_whole() ? exit : 1;
+}
+
+// The session log that the flags ask for; null: none. The process ends when it fails: what is on the disk is not known
+// then, and the next start finds it out.
+absl::StatusOr<std::unique_ptr<DurableLog>> OpenSessionLog(const Flags& flags,
+                                                           const std::shared_ptr<spdlog::logger>& log) {
+  if (flags.data.empty() || flags.is_ephemeral) {
+    return nullptr;
+  }
+  return DurableLog::Open({.folder = flags.data, .on_failure = [log](const absl::Status& cause) {
+                             const absl::string_view message = cause.message();
+                             log->critical(LogFields()
+                                               .Add("event", "store_failed")
+                                               .Add("error", std::string_view(message.data(), message.size()))
+                                               .text());
+                             log->flush();
+                             _exit(1);
+                           }});
 }
 
 // SIGTERM and SIGINT, blocked in this thread and all that it starts later, to be waited for.
@@ -182,6 +246,12 @@ int Main(int argc, char** argv) {
   if (!flags.hash_for_tenant.empty()) {
     return HashToken(flags.hash_for_tenant);
   }
+  if (!flags.checked_folder.empty()) {
+    return Report(flags.checked_folder, CheckData(flags.checked_folder));
+  }
+  if (!flags.copied_folder.empty()) {
+    return Report(flags.copy, BackUp(flags.copied_folder, flags.copy));
+  }
 
   mallopt(M_MMAP_THRESHOLD, kReturnedBytes);
   StopSignals signals;
@@ -190,7 +260,12 @@ int Main(int argc, char** argv) {
       MakeLogger(flags.log_level, flags.log_format == "json" ? LogFormat::kJson : LogFormat::kText,
                  std::make_shared<LogWriter>(STDERR_FILENO));
   const GrpcLog grpc_log(log);
-  absl::StatusOr<std::unique_ptr<Server>> server = Server::Start(flags.server, log);
+  absl::StatusOr<std::unique_ptr<DurableLog>> session_log = OpenSessionLog(flags, log);
+  if (!session_log.ok()) {
+    std::cerr << "wellspaced: --data " << flags.data << ": " << session_log.status().message() << std::endl;
+    return 1;
+  }
+  absl::StatusOr<std::unique_ptr<Server>> server = Server::Start(flags.server, log, *std::move(session_log));
   if (!server.ok()) {
     std::cerr << "wellspaced: " << server.status().message() << std::endl;
     return 1;
@@ -209,6 +284,7 @@ int Main(int argc, char** argv) {
   log->info("event=stopping signal={} grace={}", received, absl::FormatDuration(flags.grace));
   signals.Release();
   (*server)->Shutdown(flags.grace);
+  *server = nullptr;  // work that has not ended is the next process's from here on
   log->info("event=stopped");
   return 0;
 }

@@ -13,11 +13,12 @@
 #include <vector>
 
 #include "bench/drivers/floor.h"
+#include "core/domain.h"
 #include "core/geometry/power_predicate.h"
-#include "core/input_cloud.h"
 #include "core/mesh_parameters.h"
 #include "core/mesher.h"
 #include "core/refine/refine.h"
+#include "core/sorted_cloud.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::bench {

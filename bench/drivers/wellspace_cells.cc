@@ -12,7 +12,8 @@
 #include "CLI/Config.hpp"
 #include "CLI/Formatter.hpp"
 #include "bench/drivers/meter.h"
-#include "core/input_cloud.h"
+#include "core/domain.h"
+#include "core/sorted_cloud.h"
 #include "core/voronoi/query_structure.h"
 #include "nlohmann/json.hpp"
 

@@ -1,11 +1,8 @@
 // Gmsh's MSH: 2.2 in ascii, 4.1 in ascii and in binary.
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
-#include <limits>
 #include <map>
-#include <numeric>
 #include <span>
 #include <string>
 #include <utility>
@@ -17,13 +14,13 @@
 #include "client/formats/field_reader.h"
 #include "client/formats/mesh_readers.h"
 #include "client/formats/msh.h"
+#include "client/formats/msh_nodes.h"
+#include "client/formats/msh_numbers.h"
 #include "client/formats/regions.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
-
-constexpr uint64_t kAnyNumber = std::numeric_limits<uint64_t>::max();
 
 // How many nodes an element of this type has; 0 if it is none of a simplicial mesh.
 int NodesOf(uint64_t type) {
@@ -41,17 +38,19 @@ int NodesOf(uint64_t type) {
   }
 }
 
+// Reads section after section. Rows of the versions differ in their order alone; what numbers look like is MshNumbers'
+// to know.
 class MshReader {
  public:
-  explicit MshReader(LineReader& reader) : reader_(reader), fields_(reader) {}
+  explicit MshReader(LineReader& reader) : reader_(reader), file_(reader), nodes_(file_) {}
 
   absl::StatusOr<Mesh> Read() {
     std::string_view line;
-    if (!NextLine(line) || line != "$MeshFormat") {
+    if (!file_.NextLine(line) || line != "$MeshFormat") {
       return reader_.EndError("expected \"$MeshFormat\" at the start of the file");
     }
     absl::Status status = ReadFormat();
-    while (status.ok() && NextLine(line)) {
+    while (status.ok() && file_.NextLine(line)) {
       if (line.front() != '$') {
         status = reader_.Error(absl::StrCat("expected the start of a section, such as \"$Nodes\", got ", Quote(line)));
       } else if (line == "$PhysicalNames") {
@@ -65,7 +64,7 @@ class MshReader {
       } else if (line == "$NodeData") {
         status = ReadSection("$EndNodeData", &MshReader::ReadNodeData);
       } else {
-        status = SkipTo(absl::StrCat("$End", std::string(line.substr(1))));
+        status = file_.SkipTo(absl::StrCat("$End", std::string(line.substr(1))));
       }
     }
     if (!status.ok()) {
@@ -81,27 +80,9 @@ class MshReader {
  private:
   using Section = absl::Status (MshReader::*)();
 
-  // The next line that is not blank.
-  bool NextLine(std::string_view& line) {
-    while (reader_.Next(line)) {
-      line = TrimBlanks(line);
-      if (!line.empty()) {
-        return true;
-      }
-    }
-    return false;
-  }
-
-  // At the place that was read last.
-  absl::Status ValueError(const std::string& message) const {
-    return is_binary_ ? absl::InvalidArgumentError(
-                            absl::StrCat(reader_.name(), ": before byte ", reader_.offset(), ": ", message))
-                      : reader_.Error(message);
-  }
-
   absl::Status ReadFormat() {
     std::string_view line;
-    if (!NextLine(line)) {
+    if (!file_.NextLine(line)) {
       return reader_.EndError("the file ends; expected the version");
     }
     FieldSplitter fields(line, ' ');
@@ -110,92 +91,38 @@ class MshReader {
       fields.Next(word);
     }
     is_2_2_ = words[0] == "2.2";
-    is_binary_ = words[1] == "1";
+    const bool is_binary = words[1] == "1";
     if ((!is_2_2_ && words[0] != "4.1") || (words[1] != "0" && words[1] != "1") || words[2] != "8" ||
-        (is_2_2_ && is_binary_)) {
+        (is_2_2_ && is_binary)) {
       return reader_.Error(absl::StrCat(
           "expected version 2.2 in ascii (0 8), or 4.1 in ascii (0 8) or binary (1 8), got ", Quote(line)));
     }
-    if (is_binary_) {
+    if (is_binary) {
+      file_.SetBinary();
       uint64_t one = 0;
-      WELLSPACE_RETURN_IF_ERROR(TakeWord<int32_t>("the number 1", 0x7fffffff, one));
+      WELLSPACE_RETURN_IF_ERROR(file_.Int("the number 1", 0x7fffffff, one));
       if (one != 1) {
-        return ValueError(absl::StrCat("expected little-endian numbers, a 1 first, got ", one));
+        return file_.ValueError(absl::StrCat("expected little-endian numbers, a 1 first, got ", one));
       }
     }
-    return ExpectLine("$EndMeshFormat");
-  }
-
-  absl::Status ExpectLine(const char* expected) {
-    std::string_view line;
-    if (!NextLine(line)) {
-      return reader_.EndError(absl::StrCat("the file ends; expected ", Quote(expected)));
-    }
-    return line == expected ? absl::OkStatus()
-                            : reader_.Error(absl::StrCat("expected ", Quote(expected), ", got ", Quote(line)));
+    return file_.ExpectLine("$EndMeshFormat");
   }
 
   absl::Status ReadSection(const char* end, Section read) {
-    fields_.DropLine();
+    file_.DropLine();
     WELLSPACE_RETURN_IF_ERROR((this->*read)());
-    return ExpectLine(end);
-  }
-
-  absl::Status SkipTo(const std::string& end) {
-    std::string_view line;
-    while (NextLine(line)) {
-      if (line == end) {
-        return absl::OkStatus();
-      }
-    }
-    return reader_.EndError(absl::StrCat("the file ends; expected ", Quote(end)));
-  }
-
-  template <typename T>
-  absl::Status TakeBytes(const char* what, T& value) {
-    if (reader_.Take(reinterpret_cast<char*>(&value), sizeof(value)) == sizeof(value)) {
-      return absl::OkStatus();
-    }
-    return reader_.status().ok() ? ValueError(absl::StrCat("the file ends; expected ", what)) : reader_.status();
-  }
-
-  // One number in binary; `limit` is the greatest that is accepted.
-  template <typename Word>
-  absl::Status TakeWord(const char* what, uint64_t limit, uint64_t& value) {
-    Word word{};
-    WELLSPACE_RETURN_IF_ERROR(TakeBytes(what, word));
-    if (word < 0 || static_cast<uint64_t>(word) > limit) {
-      return ValueError(absl::StrCat("expected ", what, ", a whole number of at most ", limit, ", got ", word));
-    }
-    value = static_cast<uint64_t>(word);
-    return absl::OkStatus();
-  }
-
-  // Numbers as the file has them: counts and numbers of nodes; dimensions, types and numbers of entities; coordinates.
-  absl::Status Size(const char* what, uint64_t limit, uint64_t& value) {
-    return is_binary_ ? TakeWord<int64_t>(what, limit, value) : fields_.NextWhole(what, limit, value);
-  }
-  absl::Status Int(const char* what, uint64_t limit, uint64_t& value) {
-    return is_binary_ ? TakeWord<int32_t>(what, limit, value) : fields_.NextWhole(what, limit, value);
-  }
-  absl::Status Number(const char* what, double& value) {
-    if (!is_binary_) {
-      return fields_.NextNumber(what, value);
-    }
-    WELLSPACE_RETURN_IF_ERROR(TakeBytes(what, value));
-    return std::isfinite(value) ? absl::OkStatus()
-                                : ValueError(absl::StrCat(what, ": expected a finite number, got ", value));
+    return file_.ExpectLine(end);
   }
 
   // Rows of a dimension, the number of a group and its name in quotes.
   absl::Status ReadPhysicalNames() {
     std::string_view line;
     uint64_t rows = 0;
-    if (!NextLine(line) || !ParseUnsigned(line, kMaxCount, rows)) {
+    if (!file_.NextLine(line) || !ParseUnsigned(line, kMaxCount, rows)) {
       return reader_.EndError("expected the number of physical names");
     }
     for (uint64_t row = 0; row < rows; ++row) {
-      if (!NextLine(line)) {
+      if (!file_.NextLine(line)) {
         return reader_.EndError("the file ends; expected a physical name");
       }
       FieldSplitter fields(line, ' ');
@@ -220,7 +147,7 @@ class MshReader {
   absl::Status ReadEntities() {
     std::array<uint64_t, 4> counts{};
     for (uint64_t& count : counts) {
-      WELLSPACE_RETURN_IF_ERROR(Size("the number of entities", kMaxCount, count));
+      WELLSPACE_RETURN_IF_ERROR(file_.Size("the number of entities", kMaxCount, count));
     }
     for (int dimension = 0; dimension < 4; ++dimension) {
       for (uint64_t entity = 0; entity < counts[dimension]; ++entity) {
@@ -232,10 +159,10 @@ class MshReader {
 
   absl::Status ReadEntity(int dimension) {
     uint64_t number = 0;
-    absl::Status status = Int("the number of an entity", kMaxCount, number);
+    absl::Status status = file_.Int("the number of an entity", kMaxCount, number);
     double bound = 0;
     for (int i = 0; status.ok() && i < (dimension == 0 ? 3 : 6); ++i) {
-      status = Number("a bound of an entity", bound);
+      status = file_.Number("a bound of an entity", bound);
     }
     int32_t group = 0;
     uint64_t count = 0;
@@ -243,10 +170,10 @@ class MshReader {
       if (!status.ok() || (dimension == 0 && !are_groups)) {
         break;
       }
-      status = Size("a number of groups or entities", kMaxCount, count);
+      status = file_.Size("a number of groups or entities", kMaxCount, count);
       for (uint64_t i = 0; status.ok() && i < count; ++i) {
         int32_t signed_number = 0;
-        status = SignedInt("the number of a group or an entity", signed_number);
+        status = file_.SignedInt("the number of a group or an entity", signed_number);
         group = are_groups && i == 0 ? signed_number : group;
       }
     }
@@ -256,38 +183,21 @@ class MshReader {
     return status;
   }
 
-  absl::Status SignedInt(const char* what, int32_t& value) {
-    if (is_binary_) {
-      return TakeBytes(what, value);
-    }
-    std::string_view field;
-    return fields_.Next(field) && absl::SimpleAtoi(absl::string_view(field.data(), field.size()), &value)
-               ? absl::OkStatus()
-               : reader_.EndError(absl::StrCat("expected ", what, ", got ", Quote(field)));
-  }
-
-  absl::Status AddPoint() {
-    for (const char* what : {"x of a node", "y of a node", "z of a node"}) {
-      WELLSPACE_RETURN_IF_ERROR(Number(what, points_.emplace_back()));
-    }
-    return absl::OkStatus();
-  }
-
   absl::Status ReadNodes() {
     if (std::exchange(has_nodes_, true)) {
       return reader_.Error("expected one section \"$Nodes\", got another one");
     }
     WELLSPACE_RETURN_IF_ERROR(is_2_2_ ? ReadNodes22() : ReadNodes41());
-    return IndexNodes();
+    return nodes_.Index();
   }
 
   absl::Status ReadNodes22() {
     uint64_t count = 0;
-    absl::Status status = Size("the number of nodes", kMaxCount, count);
+    absl::Status status = file_.Size("the number of nodes", kMaxCount, count);
     for (uint64_t node = 0; status.ok() && node < count; ++node) {
-      status = Size("the number of a node", kAnyNumber, numbers_.emplace_back());
+      status = nodes_.ReadNumber();
       if (status.ok()) {
-        status = AddPoint();
+        status = nodes_.ReadPoint();
       }
     }
     return status;
@@ -296,26 +206,26 @@ class MshReader {
   // The dimension and number of an entity, what the section has third, and the rows of the block.
   absl::Status ReadBlock(const char* third_name, uint64_t& dimension, uint64_t& entity, uint64_t& third,
                          uint64_t& rows) {
-    absl::Status status = Int("the dimension of an entity", 3, dimension);
+    absl::Status status = file_.Int("the dimension of an entity", 3, dimension);
     if (status.ok()) {
-      status = Int("the number of an entity", kMaxCount, entity);
+      status = file_.Int("the number of an entity", kMaxCount, entity);
     }
     if (status.ok()) {
-      status = Int(third_name, 1000, third);
+      status = file_.Int(third_name, 1000, third);
     }
-    return status.ok() ? Size("the rows of a block", kMaxCount, rows) : status;
+    return status.ok() ? file_.Size("the rows of a block", kMaxCount, rows) : status;
   }
 
   // The counts at the start of a section, and the smallest and the largest number.
   absl::Status ReadCounts(uint64_t& blocks, uint64_t& rows) {
     uint64_t ignored = 0;
-    absl::Status status = Size("the number of blocks", kMaxCount, blocks);
+    absl::Status status = file_.Size("the number of blocks", kMaxCount, blocks);
     if (status.ok()) {
-      status = Size("the number of rows", kMaxCount, rows);
+      status = file_.Size("the number of rows", kMaxCount, rows);
     }
     for (const char* what : {"the smallest number", "the largest number"}) {
       if (status.ok()) {
-        status = Size(what, kAnyNumber, ignored);
+        status = file_.Size(what, kAnyNumber, ignored);
       }
     }
     return status;
@@ -332,64 +242,22 @@ class MshReader {
       uint64_t rows = 0;
       absl::Status status = ReadBlock("0 or 1, for parameters", dimension, entity, parametric, rows);
       for (uint64_t row = 0; status.ok() && row < rows; ++row) {
-        status = Size("the number of a node", kAnyNumber, numbers_.emplace_back());
+        status = nodes_.ReadNumber();
       }
       double parameter = 0;
       for (uint64_t row = 0; status.ok() && row < rows; ++row) {
-        status = AddPoint();
+        status = nodes_.ReadPoint();
         for (uint64_t i = 0; status.ok() && parametric != 0 && i < dimension; ++i) {
-          status = Number("a parameter of a node", parameter);
+          status = file_.Number("a parameter of a node", parameter);
         }
       }
       if (!status.ok()) {
         return status;
       }
     }
-    return numbers_.size() == count
-               ? absl::OkStatus()
-               : ValueError(absl::StrCat("expected ", count, " nodes, as the section says, got ", numbers_.size()));
-  }
-
-  // Nodes that are numbered from 1 on, in order, are found without a table.
-  absl::Status IndexNodes() {
-    if (numbers_.size() > kMaxCount) {
-      return ValueError(absl::StrCat("expected fewer than 2^32 nodes, got ", numbers_.size()));
-    }
-    bool in_order = true;
-    for (size_t i = 0; i < numbers_.size() && in_order; ++i) {
-      in_order = numbers_[i] == i + 1;
-    }
-    if (in_order) {
-      return absl::OkStatus();
-    }
-    by_number_.resize(numbers_.size());
-    std::iota(by_number_.begin(), by_number_.end(), 0u);
-    std::sort(by_number_.begin(), by_number_.end(),
-              [this](uint32_t a, uint32_t b) { return numbers_[a] < numbers_[b]; });
-    for (size_t i = 1; i < by_number_.size(); ++i) {
-      if (numbers_[by_number_[i]] == numbers_[by_number_[i - 1]]) {
-        return ValueError(absl::StrCat("expected one node of every number, got two of ", numbers_[by_number_[i]]));
-      }
-    }
-    return absl::OkStatus();
-  }
-
-  // The index of the node of this number.
-  absl::Status FindNode(uint64_t number, uint32_t& index) const {
-    if (by_number_.empty()) {
-      if (number == 0 || number > numbers_.size()) {
-        return ValueError(absl::StrCat("expected a node from 1 to ", numbers_.size(), ", got ", number));
-      }
-      index = static_cast<uint32_t>(number - 1);
-      return absl::OkStatus();
-    }
-    const auto found = std::lower_bound(by_number_.begin(), by_number_.end(), number,
-                                        [this](uint32_t node, uint64_t wanted) { return numbers_[node] < wanted; });
-    if (found == by_number_.end() || numbers_[*found] != number) {
-      return ValueError(absl::StrCat("expected the number of a node, got ", number));
-    }
-    index = *found;
-    return absl::OkStatus();
+    return nodes_.count() == count ? absl::OkStatus()
+                                   : file_.ValueError(absl::StrCat(
+                                         "expected ", count, " nodes, as the section says, got ", nodes_.count()));
   }
 
   absl::Status ReadElements() {
@@ -401,20 +269,20 @@ class MshReader {
 
   absl::Status ReadElements22() {
     uint64_t count = 0;
-    absl::Status status = Size("the number of elements", kMaxCount, count);
+    absl::Status status = file_.Size("the number of elements", kMaxCount, count);
     for (uint64_t element = 0; status.ok() && element < count; ++element) {
       uint64_t type = 0;
       uint64_t tags = 0;
-      status = fields_.Skip("the number of an element");
+      status = file_.SkipField("the number of an element");
       if (status.ok()) {
-        status = Int("the type of an element", 1000, type);
+        status = file_.Int("the type of an element", 1000, type);
       }
       if (status.ok()) {
-        status = Int("the number of tags", kMaxCount, tags);
+        status = file_.Int("the number of tags", kMaxCount, tags);
       }
       int32_t group = 0;  // the first tag
       for (uint64_t tag = 0; status.ok() && tag < tags; ++tag) {
-        status = tag == 0 ? SignedInt("a tag", group) : fields_.Skip("a tag");
+        status = tag == 0 ? file_.SignedInt("a tag", group) : file_.SkipField("a tag");
       }
       if (status.ok()) {
         status = AddElement(type, group);
@@ -439,7 +307,7 @@ class MshReader {
       const auto found = groups.find(entity);
       const int32_t group = found == groups.end() ? 0 : found->second;
       for (uint64_t row = 0; status.ok() && row < rows; ++row) {
-        status = Size("the number of an element", kAnyNumber, number);
+        status = file_.Size("the number of an element", kAnyNumber, number);
         if (status.ok()) {
           status = AddElement(type, group);
         }
@@ -451,13 +319,13 @@ class MshReader {
     }
     return elements == count
                ? absl::OkStatus()
-               : ValueError(absl::StrCat("expected ", count, " elements, as the section says, got ", elements));
+               : file_.ValueError(absl::StrCat("expected ", count, " elements, as the section says, got ", elements));
   }
 
   absl::Status AddElement(uint64_t type, int32_t group) {
     const int nodes = NodesOf(type);
     if (nodes == 0) {
-      return ValueError(absl::StrCat(
+      return file_.ValueError(absl::StrCat(
           "expected elements of type 15 (point), 1 (line), 2 (triangle) or 4 (tetrahedron), got type ", type));
     }
     if (nodes >= 2) {
@@ -466,9 +334,9 @@ class MshReader {
     for (int i = 0; i < nodes; ++i) {
       uint64_t number = 0;
       uint32_t index = 0;
-      absl::Status status = Size("the number of a node", kAnyNumber, number);
+      absl::Status status = file_.Size("the number of a node", kAnyNumber, number);
       if (status.ok()) {
-        status = FindNode(number, index);
+        status = nodes_.Find(number, index);
       }
       if (!status.ok()) {
         return status;
@@ -489,7 +357,7 @@ class MshReader {
     for (int kind = 0; kind < 3; ++kind) {
       std::string_view line;
       uint64_t tags = 0;
-      if (!NextLine(line) || !ParseUnsigned(line, kMaxTags, tags)) {
+      if (!file_.NextLine(line) || !ParseUnsigned(line, kMaxTags, tags)) {
         return reader_.EndError(absl::StrCat("expected the number of tags of data, at most ", kMaxTags));
       }
       for (uint64_t tag = 0; tag < tags; ++tag) {
@@ -506,26 +374,26 @@ class MshReader {
     }
     const auto [step, width, rows] = whole;
     const bool are_weights = has_nodes_ && width == 1 && name == absl::StrCat("\"", kMshWeights, "\"");
-    if (are_weights && (rows != numbers_.size() || !weights_.empty())) {
-      return ValueError(absl::StrCat("expected ", numbers_.size(), " weights, once, got ", rows));
+    if (are_weights && (rows != nodes_.count() || !weights_.empty())) {
+      return file_.ValueError(absl::StrCat("expected ", nodes_.count(), " weights, once, got ", rows));
     }
     std::vector<bool> seen(are_weights ? rows : 0);
     weights_.resize(are_weights ? rows : weights_.size());
     for (uint64_t row = 0; row < rows; ++row) {
       uint64_t number = 0;
-      absl::Status status = Int("the number of a node", kMaxCount, number);
+      absl::Status status = file_.Int("the number of a node", kMaxCount, number);
       for (uint64_t i = 0; status.ok() && !are_weights && i < width; ++i) {
-        status = is_binary_ ? SkipNumber() : fields_.Skip("a value");
+        status = file_.SkipNumber();
       }
       if (status.ok() && are_weights) {
         uint32_t index = 0;
-        status = FindNode(number, index);
+        status = nodes_.Find(number, index);
         if (status.ok() && seen[index]) {
-          status = ValueError(absl::StrCat("expected one weight of every node, got two of node ", number));
+          status = file_.ValueError(absl::StrCat("expected one weight of every node, got two of node ", number));
         }
         if (status.ok()) {
           seen[index] = true;
-          status = Number("a weight", weights_[index]);
+          status = file_.Number("a weight", weights_[index]);
         }
       }
       if (!status.ok()) {
@@ -533,12 +401,6 @@ class MshReader {
       }
     }
     return absl::OkStatus();
-  }
-
-  absl::Status SkipNumber() {
-    char bytes[sizeof(double)];
-    return reader_.Take(bytes, sizeof(bytes)) == sizeof(bytes) ? absl::OkStatus()
-                                                               : reader_.EndError("the file ends inside data");
   }
 
   absl::StatusOr<Mesh> MakeMesh() {
@@ -549,17 +411,17 @@ class MshReader {
     mesh.simplices = std::move(mesh.dimension == 2 ? triangles_ : tetrahedra_);
     mesh.weights = std::move(weights_);
     if (mesh.dimension == 3) {
-      mesh.points = std::move(points_);
+      mesh.points = nodes_.TakePoints();
       return mesh;
     }
-    mesh.points.reserve(points_.size() / 3 * 2);
-    for (size_t i = 0; i < points_.size(); i += 3) {
-      if (points_[i + 2] != 0) {
-        return absl::InvalidArgumentError(absl::StrCat(reader_.name(), ": node ", numbers_[i / 3],
-                                                       ": expected z = 0 in a mesh of triangles, got ",
-                                                       points_[i + 2]));
+    const std::vector<double> points = nodes_.TakePoints();
+    mesh.points.reserve(points.size() / 3 * 2);
+    for (size_t i = 0; i < points.size(); i += 3) {
+      if (points[i + 2] != 0) {
+        return absl::InvalidArgumentError(absl::StrCat(reader_.name(), ": node ", nodes_.NumberOf(i / 3),
+                                                       ": expected z = 0 in a mesh of triangles, got ", points[i + 2]));
       }
-      mesh.points.insert(mesh.points.end(), {points_[i], points_[i + 1]});
+      mesh.points.insert(mesh.points.end(), {points[i], points[i + 1]});
     }
     return mesh;
   }
@@ -590,14 +452,11 @@ class MshReader {
   }
 
   LineReader& reader_;
-  FieldReader fields_;
+  MshNumbers file_;
+  MshNodes nodes_;
   bool is_2_2_ = false;
-  bool is_binary_ = false;
   bool has_nodes_ = false;
   bool has_elements_ = false;
-  std::vector<uint64_t> numbers_;    // of the nodes
-  std::vector<double> points_;       // nodes x 3
-  std::vector<uint32_t> by_number_;  // the nodes, sorted; empty: they are numbered from 1 on
   // The first physical group of an entity and the name of a group, each by dimension and number.
   std::array<std::map<uint64_t, int32_t>, 4> groups_;
   std::array<std::map<int32_t, std::string>, 4> names_;

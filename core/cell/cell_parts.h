@@ -1,4 +1,4 @@
-// What the Voronoi cell of one vertex is made of.
+// What the Voronoi cell of one vertex is made of, whichever class it is: planes, and nodes where these meet.
 #ifndef WELLSPACE_CORE_CELL_CELL_PARTS_H_
 #define WELLSPACE_CORE_CELL_CELL_PARTS_H_
 

@@ -23,6 +23,8 @@ namespace wellspace::core {
 
 template <int D>
 struct FloatBisector;
+template <typename Cell, int D>
+struct CellOnUnit;
 
 // The part of Polygon and Polyhedron that does not depend on how nodes are joined. While cuts are made nodes are
 // floats, in units of about the reach that the cell began with.

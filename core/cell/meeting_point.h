@@ -1,4 +1,5 @@
-// Where planes meet, in doubles, and how far that may be from where they meet exactly.
+// Where planes meet, in doubles, and how far that may be from where they meet exactly: what Place computes for each
+// node.
 #ifndef WELLSPACE_CORE_CELL_MEETING_POINT_H_
 #define WELLSPACE_CORE_CELL_MEETING_POINT_H_
 

@@ -1,4 +1,4 @@
-// What every candidate for a cut is tested against: the positions of a cell's nodes, four side by side.
+// What every candidate for a cut is tested against from 4-D on: the positions of a cell's nodes, four side by side.
 #ifndef WELLSPACE_CORE_CELL_NODE_COLUMNS_H_
 #define WELLSPACE_CORE_CELL_NODE_COLUMNS_H_
 

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "core/base/simd/lane_bits.h"
+#include "core/cell/cell_on_unit.h"
 #include "core/cell/meeting_point.h"
 #include "core/cell/near_vertices.h"
 
@@ -239,69 +240,16 @@ WELLSPACE_INLINE bool Polygon::CutOff(const FloatBisector<2>& bisector, VertexId
   return true;
 }
 
-template <VectorUnit kUnit, typename Vertices>
-WELLSPACE_INLINE size_t Polygon::CutByThose(const Vertices& vertices, VertexId site) {
-  NearVertices<2> near;
-  near.Pick<kUnit>(
-      vertices, site, site_, scale_,
-      most_radius_, [this](const Floats* w, const Floats& low, FloatMask& is_near) __attribute__((always_inline)) {
-        if (cuts_ != 0) {  // most miss the cell, now and later
-          is_near &= IsAtMost<kUnit>(low, MostProducts<kUnit, 2>(groups(), w));
-        }
-      });
-  near.CutInOrder(
-      [&](const FloatBisector<2>& bisector, size_t slot) __attribute__((always_inline)) {
-        return CutOff<kUnit>(bisector, vertices.name(slot), vertices.position(slot));
-      },
-      [this] { return IsTooLarge() ? -1 : MostOffset<2>(most_radius_); });
-  return near.within_reach;
-}
-
-template <VectorUnit kUnit>
-WELLSPACE_INLINE size_t Polygon::CutByEachWith(std::span<const Point<2>> positions, const VertexNames& names,
-                                               VertexId site) {
-  return CutByThose<kUnit>(VerticesTogether<2>{positions, names}, site);
-}
-
-template <VectorUnit kUnit>
-WELLSPACE_INLINE size_t Polygon::CutByGatheredWith(const GatheredVertices<2>& gathered, VertexId site) {
-  return CutByThoseGathered<kUnit, 2>(
-      *this, gathered, [&](const VerticesChosen<2>& vertices) __attribute__((always_inline)) {
-        return CutByThose<kUnit>(vertices, site);
-      });
-}
-
-WELLSPACE_AVX2 size_t Polygon::CutByGatheredAvx2(const GatheredVertices<2>& gathered, VertexId site) {
-  return CutByGatheredWith<VectorUnit::kAvx2>(gathered, site);
-}
-
 size_t Polygon::CutByGathered(const GatheredVertices<2>& gathered, VertexId site) {
-  return unit_ == VectorUnit::kAvx2 ? CutByGatheredAvx2(gathered, site)
-                                    : CutByGatheredWith<VectorUnit::kBaseline>(gathered, site);
+  return CellOnUnit<Polygon, 2>::CutByGathered(*this, gathered, site);
 }
 
 bool Polygon::CutBeforePlace(VertexId u, const Point<2>& position) {
-  const Point<2> normal = Difference<2>(position, site_);
-  if (!(NormSq<2>(normal) <= CutLimitSq())) {
-    return false;
-  }
-  const auto bisector = FloatBisector<2>::Of(normal, scale_, most_radius_);
-  return unit_ == VectorUnit::kAvx2 ? CutOffAvx2(bisector, u, position)
-                                    : CutOff<VectorUnit::kBaseline>(bisector, u, position);
-}
-
-WELLSPACE_AVX2 bool Polygon::CutOffAvx2(const FloatBisector<2>& bisector, VertexId u, const Point<2>& position) {
-  return CutOff<VectorUnit::kAvx2>(bisector, u, position);
+  return CellOnUnit<Polygon, 2>::CutBeforePlace(*this, u, position);
 }
 
 size_t Polygon::CutByEach(std::span<const Point<2>> positions, const VertexNames& names, VertexId site) {
-  return unit_ == VectorUnit::kAvx2 ? CutByEachAvx2(positions, names, site)
-                                    : CutByEachWith<VectorUnit::kBaseline>(positions, names, site);
-}
-
-WELLSPACE_AVX2 size_t Polygon::CutByEachAvx2(std::span<const Point<2>> positions, const VertexNames& names,
-                                             VertexId site) {
-  return CutByEachWith<VectorUnit::kAvx2>(positions, names, site);
+  return CellOnUnit<Polygon, 2>::CutByEach(*this, positions, names, site);
 }
 
 // Places all by their planes, bisectors by vertex, then walls by face: so they do not depend on the order of the cuts.
@@ -368,16 +316,7 @@ bool Polygon::KeepsRatio(double ratio) const {
 
 WELLSPACE_AVX2 bool Polygon::KeepsRatioAvx2(double ratio) const { return KeepsRatioWith<VectorUnit::kAvx2>(ratio); }
 
-template <VectorUnit kUnit>
-WELLSPACE_INLINE bool Polygon::ReachesWith(const Box<2>& cube) const {
-  return AreReached<kUnit, 2>(groups(), most_radius_, ScaledTo(cube.low), ScaledTo(cube.high));
-}
-
-WELLSPACE_AVX2 bool Polygon::ReachesAvx2(const Box<2>& cube) const { return ReachesWith<VectorUnit::kAvx2>(cube); }
-
-bool Polygon::Reaches(const Box<2>& cube) const {
-  return unit_ == VectorUnit::kAvx2 ? ReachesAvx2(cube) : ReachesWith<VectorUnit::kBaseline>(cube);
-}
+bool Polygon::Reaches(const Box<2>& cube) const { return CellOnUnit<Polygon, 2>::Reaches(*this, cube); }
 
 void Polygon::FindStar(Star<2>& out) const {
   out.resize(count_);

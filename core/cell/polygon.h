@@ -1,4 +1,5 @@
-// The Voronoi cell of one vertex in the plane under construction.
+// The Voronoi cell of one vertex in the plane under construction: Polytope<2>. What its functions promise is said in
+// polytope.h.
 #ifndef WELLSPACE_CORE_CELL_POLYGON_H_
 #define WELLSPACE_CORE_CELL_POLYGON_H_
 
@@ -57,6 +58,8 @@ class Polygon : public FloatCell<2> {
   uint64_t MemoryBytes() const;
 
  private:
+  friend struct CellOnUnit<Polygon, 2>;
+
   // Nodes, each with the edge from it to the next one: the square of the length of what its bisector stands for, 0 of a
   // wall, and its plane, by index. Places beyond the last node are at the site, which no bisector cuts off.
   struct alignas(kTogether * sizeof(float)) Group {
@@ -76,17 +79,8 @@ class Polygon : public FloatCell<2> {
     uint32_t count;
   };
 
-  template <VectorUnit kUnit, typename Vertices>
-  size_t CutByThose(const Vertices& vertices, VertexId site);
-  template <VectorUnit kUnit>
-  size_t CutByGatheredWith(const GatheredVertices<2>& gathered, VertexId site);
-  size_t CutByGatheredAvx2(const GatheredVertices<2>& gathered, VertexId site);
-  template <VectorUnit kUnit>
-  size_t CutByEachWith(std::span<const Point<2>> positions, const VertexNames& names, VertexId site);
-  size_t CutByEachAvx2(std::span<const Point<2>> positions, const VertexNames& names, VertexId site);
   template <VectorUnit kUnit>
   bool CutOff(const FloatBisector<2>& bisector, VertexId u, const Point<2>& position);
-  bool CutOffAvx2(const FloatBisector<2>& bisector, VertexId u, const Point<2>& position);
   Floats MostExcesses(const FloatBisector<2>& bisector) const;
   template <VectorUnit kUnit>
   bool FindRest(const FloatBisector<2>& bisector, const Floats& most, uint32_t maybe, const Point<2>& position,
@@ -100,9 +94,6 @@ class Polygon : public FloatCell<2> {
   template <VectorUnit kUnit>
   bool KeepsRatioWith(double ratio) const;
   bool KeepsRatioAvx2(double ratio) const;
-  template <VectorUnit kUnit>
-  bool ReachesWith(const Box<2>& cube) const;
-  bool ReachesAvx2(const Box<2>& cube) const;
   void SetReach(float radius_sq);
   Point<2> PositionOf(size_t node) const;  // in the units of the nodes
   std::span<const Group> groups() const { return {groups_.data(), GroupsFor(count_)}; }

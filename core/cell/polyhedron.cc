@@ -7,6 +7,7 @@
 #include <cstring>
 #include <limits>
 
+#include "core/cell/cell_on_unit.h"
 #include "core/cell/near_vertices.h"
 
 namespace wellspace::core {
@@ -357,69 +358,16 @@ WELLSPACE_INLINE bool Polyhedron::CutOff(const FloatBisector<3>& bisector, Verte
   return true;
 }
 
-template <VectorUnit kUnit, typename Vertices>
-WELLSPACE_INLINE size_t Polyhedron::CutByThose(const Vertices& vertices, VertexId site) {
-  NearVertices<3> near;
-  near.Pick<kUnit>(
-      vertices, site, site_, scale_,
-      most_radius_, [this](const Floats* w, const Floats& low, FloatMask& is_near) __attribute__((always_inline)) {
-        if (cuts_ != 0 && Bits<kUnit>(is_near) != 0) {  // most miss the cell, now and later
-          is_near &= IsAtMost<kUnit>(low, MostProducts<kUnit, 3>(groups(), w));
-        }
-      });
-  near.CutInOrder(
-      [&](const FloatBisector<3>& bisector, size_t slot) __attribute__((always_inline)) {
-        return CutOff<kUnit>(bisector, vertices.name(slot), vertices.position(slot));
-      },
-      [this] { return IsTooLarge() ? -1 : MostOffset<3>(most_radius_); });
-  return near.within_reach;
-}
-
-template <VectorUnit kUnit>
-WELLSPACE_INLINE size_t Polyhedron::CutByEachWith(std::span<const Point<3>> positions, const VertexNames& names,
-                                                  VertexId site) {
-  return CutByThose<kUnit>(VerticesTogether<3>{positions, names}, site);
-}
-
-template <VectorUnit kUnit>
-WELLSPACE_INLINE size_t Polyhedron::CutByGatheredWith(const GatheredVertices<3>& gathered, VertexId site) {
-  return CutByThoseGathered<kUnit, 3>(
-      *this, gathered, [&](const VerticesChosen<3>& vertices) __attribute__((always_inline)) {
-        return CutByThose<kUnit>(vertices, site);
-      });
-}
-
-WELLSPACE_AVX2 size_t Polyhedron::CutByGatheredAvx2(const GatheredVertices<3>& gathered, VertexId site) {
-  return CutByGatheredWith<VectorUnit::kAvx2>(gathered, site);
-}
-
 size_t Polyhedron::CutByGathered(const GatheredVertices<3>& gathered, VertexId site) {
-  return unit_ == VectorUnit::kAvx2 ? CutByGatheredAvx2(gathered, site)
-                                    : CutByGatheredWith<VectorUnit::kBaseline>(gathered, site);
-}
-
-WELLSPACE_AVX2 size_t Polyhedron::CutByEachAvx2(std::span<const Point<3>> positions, const VertexNames& names,
-                                                VertexId site) {
-  return CutByEachWith<VectorUnit::kAvx2>(positions, names, site);
-}
-
-size_t Polyhedron::CutByEach(std::span<const Point<3>> positions, const VertexNames& names, VertexId site) {
-  return unit_ == VectorUnit::kAvx2 ? CutByEachAvx2(positions, names, site)
-                                    : CutByEachWith<VectorUnit::kBaseline>(positions, names, site);
-}
-
-WELLSPACE_AVX2 bool Polyhedron::CutOffAvx2(const FloatBisector<3>& bisector, VertexId u, const Point<3>& position) {
-  return CutOff<VectorUnit::kAvx2>(bisector, u, position);
+  return CellOnUnit<Polyhedron, 3>::CutByGathered(*this, gathered, site);
 }
 
 bool Polyhedron::CutBeforePlace(VertexId u, const Point<3>& position) {
-  const Point<3> normal = Difference<3>(position, site_);
-  if (!(NormSq<3>(normal) <= CutLimitSq())) {
-    return false;
-  }
-  const auto bisector = FloatBisector<3>::Of(normal, scale_, most_radius_);
-  return unit_ == VectorUnit::kAvx2 ? CutOffAvx2(bisector, u, position)
-                                    : CutOff<VectorUnit::kBaseline>(bisector, u, position);
+  return CellOnUnit<Polyhedron, 3>::CutBeforePlace(*this, u, position);
+}
+
+size_t Polyhedron::CutByEach(std::span<const Point<3>> positions, const VertexNames& names, VertexId site) {
+  return CellOnUnit<Polyhedron, 3>::CutByEach(*this, positions, names, site);
 }
 
 template <VectorUnit kUnit>
@@ -445,16 +393,7 @@ bool Polyhedron::KeepsRatio(double ratio) const {
   return unit_ == VectorUnit::kAvx2 ? KeepsRatioAvx2(ratio_sq) : KeepsRatioWith<VectorUnit::kBaseline>(ratio_sq);
 }
 
-template <VectorUnit kUnit>
-WELLSPACE_INLINE bool Polyhedron::ReachesWith(const Box<3>& cube) const {
-  return AreReached<kUnit, 3>(groups(), most_radius_, ScaledTo(cube.low), ScaledTo(cube.high));
-}
-
-WELLSPACE_AVX2 bool Polyhedron::ReachesAvx2(const Box<3>& cube) const { return ReachesWith<VectorUnit::kAvx2>(cube); }
-
-bool Polyhedron::Reaches(const Box<3>& cube) const {
-  return unit_ == VectorUnit::kAvx2 ? ReachesAvx2(cube) : ReachesWith<VectorUnit::kBaseline>(cube);
-}
+bool Polyhedron::Reaches(const Box<3>& cube) const { return CellOnUnit<Polyhedron, 3>::Reaches(*this, cube); }
 
 void Polyhedron::FindStar(Star<3>& out) const {
   out.resize(count_);

@@ -1,4 +1,5 @@
-// The Voronoi cell of one vertex in space under construction.
+// The Voronoi cell of one vertex in space under construction: Polytope<3>. What its functions promise is said in
+// polytope.h.
 #ifndef WELLSPACE_CORE_CELL_POLYHEDRON_H_
 #define WELLSPACE_CORE_CELL_POLYHEDRON_H_
 
@@ -54,6 +55,8 @@ class Polyhedron : public FloatCell<3> {
   uint64_t MemoryBytes() const;
 
  private:
+  friend struct CellOnUnit<Polyhedron, 3>;
+
   // Nodes; places beyond the last are at the site, which no bisector cuts off.
   struct alignas(kTogether * sizeof(float)) Group {
     float x[3][kTogether];
@@ -79,17 +82,8 @@ class Polyhedron : public FloatCell<3> {
   // So many nodes are placed together.
   static constexpr size_t kPlacedTogether = 4;
 
-  template <VectorUnit kUnit, typename Vertices>
-  size_t CutByThose(const Vertices& vertices, VertexId site);
-  template <VectorUnit kUnit>
-  size_t CutByGatheredWith(const GatheredVertices<3>& gathered, VertexId site);
-  size_t CutByGatheredAvx2(const GatheredVertices<3>& gathered, VertexId site);
-  template <VectorUnit kUnit>
-  size_t CutByEachWith(std::span<const Point<3>> positions, const VertexNames& names, VertexId site);
-  size_t CutByEachAvx2(std::span<const Point<3>> positions, const VertexNames& names, VertexId site);
   template <VectorUnit kUnit>
   bool CutOff(const FloatBisector<3>& bisector, VertexId u, const Point<3>& position);
-  bool CutOffAvx2(const FloatBisector<3>& bisector, VertexId u, const Point<3>& position);
   template <VectorUnit kUnit>
   bool FindRemoved(const FloatBisector<3>& bisector, const Point<3>& position);
   bool SetRemoved(size_t word, uint64_t maybe, uint64_t surely, const Point<3>& generator);
@@ -115,9 +109,6 @@ class Polyhedron : public FloatCell<3> {
   template <VectorUnit kUnit>
   bool KeepsRatioWith(float ratio_sq) const;
   bool KeepsRatioAvx2(float ratio_sq) const;
-  template <VectorUnit kUnit>
-  bool ReachesWith(const Box<3>& cube) const;
-  bool ReachesAvx2(const Box<3>& cube) const;
   template <VectorUnit kUnit>
   void SetReach();
   bool IsRemoved(size_t node) const { return (removed_words_[node / kWordBits] >> node % kWordBits & 1) != 0; }

@@ -1,4 +1,4 @@
-// The simplices of one vertex.
+// The simplices of one vertex, as Polytope::FindStar tells them and StarLists keeps them.
 #ifndef WELLSPACE_CORE_CELL_STAR_H_
 #define WELLSPACE_CORE_CELL_STAR_H_
 

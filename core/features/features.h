@@ -17,10 +17,10 @@ enum class FaceRule : uint8_t {
   kEvenOdd,  // those that an odd number of ring segments separates from infinity
 };
 
-// What becomes of segments that cross, and of vertices that are too near to a segment.
+// What becomes of segments that cross, and of vertices that are too close to a segment.
 enum class CrossingRule : uint8_t {
   kRefuse,  // an error names them
-  kSplit,   // a crossing, rounded, becomes a vertex; a segment is led through a vertex that is too near to it
+  kSplit,   // a crossing, rounded, becomes a vertex; a segment is led through a vertex that is too close to it
 };
 
 // A point that names the face which it lies in.

@@ -215,7 +215,7 @@ class GraphMaker {
     return absl::OkStatus();
   }
 
-  // Of all vertices that lie on segments or too near to them, and all segments that cross; ascending, each once. Stops
+  // Of all vertices that lie on segments or too close to them, and all segments that cross; ascending, each once. Stops
   // early where a part has more than an error tells of.
   absl::StatusOr<std::vector<Fault>> FindFaults() {
     std::vector<Fault> faults;
@@ -282,7 +282,7 @@ class GraphMaker {
     if (SideOf(a, b, p) == Sign::kZero) {
       return IsBetween(a, b, p) ? std::optional(Fault::Kind::kOn) : std::nullopt;
     }
-    // Beyond an end, two points are too near to each other, which is told elsewhere.
+    // Beyond an end, two points are too close to each other, which is told elsewhere.
     const double t = Along(a, b, p);
     return t > 0 && t < 1 && DistanceToSegment(a, b, p) < least_separation_ ? std::optional(Fault::Kind::kNear)
                                                                             : std::nullopt;

@@ -35,7 +35,7 @@ struct CleaningCounts {
   uint64_t duplicate_segments = 0;  // beyond the first
   uint64_t touching_vertices = 0;   // that lay on a segment, which was split there
   uint64_t crossings = 0;           // of two segments, which were split there
-  uint64_t near_vertices = 0;       // that lay too near to a segment, which was led through them
+  uint64_t near_vertices = 0;       // that lay too close to a segment, which was led through them
 };
 
 // Invariants: (1) points are distinct; (2) two segments have at most one point in common, and then an end of both; (3)
@@ -55,11 +55,11 @@ struct PlanarGraph {
 // `least_separation`, the distance that has to be between a vertex and a segment that it is not on. With `box` its
 // corners and sides belong to the graph, too.
 //
-// Guarantees: (1) where nothing crosses and nothing is too near, no coordinate is computed: a segment is split only at
+// Guarantees: (1) where nothing crosses and nothing is too close, no coordinate is computed: a segment is split only at
 //             points that lie on it exactly.
 // Complexity: O((n + m) log (n + m)) for most inputs, and what is found.
 // Errors:     INVALID_ARGUMENT, naming segments, points and places: an end that does not exist; markers that differ on
-//             one segment; and, unless they are to be split, segments that cross and vertices that are too near;
+//             one segment; and, unless they are to be split, segments that cross and vertices that are too close;
 //             RESOURCE_EXHAUSTED when splitting does not end; CANCELLED, DEADLINE_EXCEEDED.
 // Threads:    uses `threads`, at most as many as the machine has cores.
 // Source:     docs/design/features.md.

@@ -1,4 +1,5 @@
-// What is wrong with a clipped Voronoi cell.
+// What is wrong with a clipped Voronoi cell, as the nodes tell. StepRules::AssessCell asks for it in every step of a
+// vertex; what becomes of it is PendingVertices' and StepRules::NextRequest's to say.
 #ifndef WELLSPACE_CORE_REFINE_ASSESSMENT_H_
 #define WELLSPACE_CORE_REFINE_ASSESSMENT_H_
 
@@ -10,7 +11,8 @@
 
 namespace wellspace::core {
 
-// Lengths are squared; infinite where there is none.
+// Made by Assess for a cell in the box, and by DomainRules::AssessCell for one in a domain of the plane, where segments
+// take the place of the faces of the box. Lengths are squared; infinite where there is none.
 struct Assessment {
   // The node to be repaired first: of the nodes whose bound is of the shortest edge the farthest, the plane of the
   // bisector with its nearest generator (-1 if it is on none), and the distance from the site that it must not exceed.
@@ -22,16 +24,21 @@ struct Assessment {
   // The farthest node; 0 where is_plain, since it is not looked for.
   double radius_sq = 0;
   // The shortest edge with a node on one of the site's own faces that is too far for it: no circumcentre, so it asks
-  // for nothing now, but the site must look again, with that edge, once a new vertex cuts the facet there.
+  // for nothing now, but the site must look again, with that edge, once a new vertex cuts the facet there. In a domain,
+  // with a node between whose generators one of the site's own segments lies.
   double own_face_edge_sq = kNone;
-  // A face of the box that the cell touches though its site does not lie on it, the nearest one; -1 for none.
+  // A face of the box that the cell touches though its site does not lie on it, the nearest one; -1 for none, and in a
+  // domain.
   int encroached_face = -1;
-  bool is_too_large = false;  // the bound is one of the sizes, not of rho
-  bool is_clipped = false;    // the cell reaches the cube that it was clipped by
+  bool is_segment_encroached = false;  // in a domain: the cell meets a segment that its site does not lie on
+  bool is_too_large = false;           // the bound is one of the sizes, not of rho
+  bool is_clipped = false;             // the cell reaches the cube that it was clipped by
   // Found good by Polytope::PlaceUnlessKeeps alone: the cell touches no face, and its nodes may not be placed.
   bool is_plain = false;
 
-  bool IsGood() const { return bad_node < 0 && encroached_face < 0 && !is_clipped && next_edge_sq == kNone; }
+  bool IsGood() const {
+    return bad_node < 0 && encroached_face < 0 && !is_segment_encroached && !is_clipped && next_edge_sq == kNone;
+  }
 
   static constexpr double kNone = std::numeric_limits<double>::infinity();
 };

@@ -1,4 +1,5 @@
-// What is remembered of a vertex' cell between two looks at it.
+// What is remembered of a vertex' cell between two looks at it. PendingVertices keeps one for each vertex, and asks it
+// whether a new neighbour matters.
 #ifndef WELLSPACE_CORE_REFINE_CELL_MEMO_H_
 #define WELLSPACE_CORE_REFINE_CELL_MEMO_H_
 

@@ -1,4 +1,5 @@
-// The steps of one vertex, computed from its cell.
+// The steps of one vertex in the box, computed from its cell. Made by Refinement::RefineByCell for the loop, and by
+// Rounds::Record to be recorded; in a domain DomainSteps takes its place.
 #ifndef WELLSPACE_CORE_REFINE_CELL_STEPS_H_
 #define WELLSPACE_CORE_REFINE_CELL_STEPS_H_
 

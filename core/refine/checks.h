@@ -1,4 +1,4 @@
-// What the checking build asserts of the refinement.
+// How the checking build asserts: the switch and the abort. What it asserts is in refinement_checks.h.
 #ifndef WELLSPACE_CORE_REFINE_CHECKS_H_
 #define WELLSPACE_CORE_REFINE_CHECKS_H_
 

@@ -1,4 +1,5 @@
 // Nodes on faces of the box that vertices there watch, to be looked at again once a new vertex cuts one off.
+// PendingVertices keeps them, beside the memo of the edge of a face.
 #ifndef WELLSPACE_CORE_REFINE_FACE_WATCHERS_H_
 #define WELLSPACE_CORE_REFINE_FACE_WATCHERS_H_
 

@@ -1,11 +1,12 @@
-// Insertions of the refinement: those that have happened, and those that a cell asks for.
+// Insertions of the refinement: those that a cell asks for, as the rules return them and batches record them; and those
+// that have happened, as observers see them.
 #ifndef WELLSPACE_CORE_REFINE_INSERTION_H_
 #define WELLSPACE_CORE_REFINE_INSERTION_H_
 
 #include <type_traits>
 
 #include "core/base/ids.h"
-#include "core/refine/domain/segment_point.h"
+#include "core/refine/domain/place_in_domain.h"
 #include "core/refine/steiner_point.h"
 
 namespace wellspace::core {

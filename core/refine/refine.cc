@@ -11,6 +11,7 @@
 #include "core/base/thread_team.h"
 #include "core/refine/checks.h"
 #include "core/refine/domain/domain_steps.h"
+#include "core/refine/domain/split_place.h"
 
 namespace wellspace::core {
 namespace {
@@ -236,7 +237,7 @@ bool Refinement<D>::IsNextStillValid(const Batch<D>& batch) const {
     return false;
   }
   if constexpr (D == 2) {
-    return domain_ == nullptr || domain_rules_->AreInOrder(batch.RequestsOf(batch.refined));
+    return domain_ == nullptr || AreSplitsInOrder(*domain_, batch.RequestsOf(batch.refined));
   }
   return true;
 }

@@ -1,4 +1,4 @@
-// What the checking build asserts of the refinement at each step.
+// What the checking build asserts of the refinement at each step. Refinement calls it where kChecks is set (checks.h).
 #ifndef WELLSPACE_CORE_REFINE_REFINEMENT_CHECKS_H_
 #define WELLSPACE_CORE_REFINE_REFINEMENT_CHECKS_H_
 

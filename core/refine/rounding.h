@@ -1,4 +1,4 @@
-// What rounding may do to what the refinement compares.
+// What rounding may do to what the refinement compares: nodes that are watched, and what the checking build asserts.
 #ifndef WELLSPACE_CORE_REFINE_ROUNDING_H_
 #define WELLSPACE_CORE_REFINE_ROUNDING_H_
 

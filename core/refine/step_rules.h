@@ -1,4 +1,5 @@
 // How a step follows from a cell: what is wrong with it, where a new vertex goes, and what its neighbours are to know.
+// CellSteps asks in each step of a vertex in the box; DomainRules takes clip and candidates from here.
 #ifndef WELLSPACE_CORE_REFINE_STEP_RULES_H_
 #define WELLSPACE_CORE_REFINE_STEP_RULES_H_
 

@@ -67,7 +67,7 @@ class DomainStars {
       const uint32_t segment = SegmentOf(h);
       const std::span<const VertexId> chain = chains_.Of(segment);
       size_t at = IsFromB(h) ? chain.size() - 1 : 0;
-      if (!domain_.IsPoint(v)) {
+      if (!domain_.IsGraphPoint(v)) {
         at = place_[Index(v)];
       }
       const size_t next = IsFromB(h) ? at - 1 : at + 1;

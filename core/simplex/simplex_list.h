@@ -1,4 +1,5 @@
-// Simplices one after the other, in the form of the output, with the worst of their shapes.
+// Simplices one after the other, in the form of the output, with the worst of their shapes: what each block of vertices
+// is made into.
 #ifndef WELLSPACE_CORE_SIMPLEX_SIMPLEX_LIST_H_
 #define WELLSPACE_CORE_SIMPLEX_SIMPLEX_LIST_H_
 

@@ -1,4 +1,5 @@
-// The mesh as the union of the stars of its vertices.
+// The mesh as the union of the stars of its vertices. The mesher calls it to extract a mesh and to bring one up to
+// date.
 #ifndef WELLSPACE_CORE_SIMPLEX_SIMPLICES_H_
 #define WELLSPACE_CORE_SIMPLEX_SIMPLICES_H_
 

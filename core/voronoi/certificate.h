@@ -1,4 +1,5 @@
-// Proof, after the fact, that a Voronoi cell is what the paper claims of it: no larger and no smaller.
+// Proof, after the fact, that a Voronoi cell is what the paper claims of it: no larger and no smaller. For tests, and
+// for users of the structure alone.
 #ifndef WELLSPACE_CORE_VORONOI_CERTIFICATE_H_
 #define WELLSPACE_CORE_VORONOI_CERTIFICATE_H_
 

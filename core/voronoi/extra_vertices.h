@@ -1,4 +1,5 @@
-// Vertices that a cell is to be cut by though its structure does not hold them.
+// Vertices that a cell is to be cut by though its structure does not hold them: those that a batch expects to be
+// inserted.
 #ifndef WELLSPACE_CORE_VORONOI_EXTRA_VERTICES_H_
 #define WELLSPACE_CORE_VORONOI_EXTRA_VERTICES_H_
 

@@ -1,4 +1,4 @@
-// Leaves that a scan has met and not yet opened, the near ones first.
+// Leaves that a scan has met and not yet opened, the near ones first. QueryStructure begins one for each query.
 #ifndef WELLSPACE_CORE_VORONOI_LEAF_QUEUE_H_
 #define WELLSPACE_CORE_VORONOI_LEAF_QUEUE_H_
 

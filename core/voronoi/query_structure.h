@@ -58,6 +58,10 @@ struct Neighbor {
   double distance_sq = 0;
 };
 
+// Vertices, the tree over them, and the queries: where a vertex is (points, faces), what is nearest to it, and its
+// cell, clipped or whole. A query writes nothing but its workspace. The functions come in the order of the paper's
+// Figure 3.
+//
 // Thread safety: thread-compatible; queries with different workspaces may run at once, and AddUncommitted beside them;
 // AddVertex and the rest alone.
 // Invariants: (1) vertices are distinct and lie in the box; (2) faces(v) are exactly the faces of the box that v lies

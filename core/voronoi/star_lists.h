@@ -1,4 +1,5 @@
-// The simplices at each vertex, as cells have told that were computed anyway: a mesh without a second scan.
+// The simplices at each vertex, as cells have told that were computed anyway: a mesh without a second scan. Refinement
+// writes them by its StarWriter, ComputeSimplices reads them.
 #ifndef WELLSPACE_CORE_VORONOI_STAR_LISTS_H_
 #define WELLSPACE_CORE_VORONOI_STAR_LISTS_H_
 

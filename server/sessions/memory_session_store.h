@@ -24,7 +24,8 @@ class MemorySessionStore final : public SessionStore {
   // REQUIRES:   `options`, `memory` and `log` outlive this and all sessions.
   MemorySessionStore(const ServiceOptions& options, MemoryBudget& memory, Clock clock, SessionLog& log);
 
-  absl::StatusOr<std::shared_ptr<Session>> Create(NewSession settings, const AnswerTo<v1::Session>& answer) override;
+  absl::StatusOr<std::shared_ptr<Session>> Create(NewSession settings,
+                                                  const AnswerTo<v1::Session>& answer = nullptr) override;
   absl::StatusOr<std::shared_ptr<Session>> Restore(const StoredSession& stored) override;
   absl::StatusOr<std::shared_ptr<Session>> Find(const std::string& tenant, const std::string& name) override;
   std::vector<std::shared_ptr<Session>> List(const std::string& tenant, absl::Time after, size_t count,

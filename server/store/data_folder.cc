@@ -137,7 +137,7 @@ absl::StatusOr<std::unique_ptr<DataFolder>> DataFolder::Open(const std::string& 
   return folder;
 }
 
-absl::StatusOr<DataFolder::Sweep> DataFolder::RemoveGarbage(
+absl::StatusOr<Garbage> DataFolder::RemoveGarbage(
     FilesInUse& in_use, const std::function<absl::StatusOr<std::vector<store::v1::SessionRecord>>()>& read_sessions) {
   WELLSPACE_ASSIGN_OR_RETURN(const std::vector<std::string> names, files_.List(paths_.files()));
   // Uses keep what is written in these places from now on: only what was there before becomes obsolete.
@@ -154,7 +154,7 @@ absl::StatusOr<DataFolder::Sweep> DataFolder::RemoveGarbage(
     candidates.erase(paths_.points(session.name()));  // points may be on their way
     candidates.erase(paths_.mesh(session.name(), session.mesh().revision()));
   }
-  Sweep sweep;
+  Garbage sweep;
   for (const auto& [path, use] : candidates) {
     use->MakeObsolete();
     sweep.removed.push_back(path);

@@ -19,6 +19,7 @@
 #include "absl/status/statusor.h"
 #include "server/store/file_system.h"
 #include "server/store/files_in_use.h"
+#include "server/store/session_log.h"
 #include "wellspace/store/v1/records.pb.h"
 
 namespace wellspace::server {
@@ -46,12 +47,6 @@ bool IsNameOfOurs(const std::string& name);
 // Thread safety: thread-safe.
 class DataFolder {
  public:
-  // What was done about files that no row names.
-  struct Sweep {
-    std::vector<std::string> removed;  // paths
-    std::vector<std::string> unknown;  // paths; not ours, and left where they are
-  };
-
   // Makes the folder if it is not there yet, for this user alone.
   //
   // Errors:     FAILED_PRECONDITION: another process serves it, or it is no folder. PERMISSION_DENIED: it cannot be
@@ -64,7 +59,7 @@ class DataFolder {
   // returns. To be called at the start, and now and then.
   //
   // Errors:     those of `read_sessions`, and of a FileSystem.
-  absl::StatusOr<Sweep> RemoveGarbage(
+  absl::StatusOr<Garbage> RemoveGarbage(
       FilesInUse& in_use, const std::function<absl::StatusOr<std::vector<store::v1::SessionRecord>>()>& read_sessions);
 
  private:

@@ -181,7 +181,7 @@ std::shared_ptr<MeshSnapshot> DurableLog::FindMesh(const std::string& session, c
   return std::make_shared<MeshFile>(files_, record.mesh(), in_use_->Take(path, /*is_written=*/false), buffers_);
 }
 
-absl::StatusOr<DataFolder::Sweep> DurableLog::RemoveGarbage() {
+absl::StatusOr<Garbage> DurableLog::RemoveGarbage() {
   WELLSPACE_RETURN_IF_ERROR(health_->Check());
   return folder_->RemoveGarbage(*in_use_, [this] { return tables_->ReadStates(); });
 }

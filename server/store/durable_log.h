@@ -55,8 +55,7 @@ class DurableLog final : public SessionLog {
                                                          const core::RunContext& context) override;
   std::shared_ptr<MeshSnapshot> FindMesh(const std::string& session, const store::v1::SessionRecord& record) override;
 
-  // Removes files that no row names, and finds unknown ones. To be called after the start, and hourly.
-  absl::StatusOr<DataFolder::Sweep> RemoveGarbage();
+  absl::StatusOr<Garbage> RemoveGarbage() override;
 
  private:
   // A change, and the thread that waits for it.

@@ -33,6 +33,7 @@ class EphemeralLog final : public SessionLog {
                                                          const core::RunContext& /*context*/) override {
     return std::make_shared<MemoryMesh>(revision, std::move(mesh));
   }
+  absl::StatusOr<Garbage> RemoveGarbage() override { return Garbage(); }
   std::shared_ptr<MeshSnapshot> FindMesh(const std::string& /*session*/,
                                          const store::v1::SessionRecord& /*record*/) override {
     return nullptr;

@@ -49,6 +49,12 @@ struct StoredSessions {
   std::vector<store::v1::AnswerRecord> answers;
 };
 
+// Files that nothing written down names.
+struct Garbage {
+  std::vector<std::string> removed;  // paths
+  std::vector<std::string> unknown;  // paths; not ours, and left where they are
+};
+
 // Writes sessions down, with their points and meshes. What a log does not keep (EphemeralLog) ends with the process.
 //
 // Thread safety: thread-safe. Changes of one session are committed one after the other by its caller; those of several
@@ -92,6 +98,9 @@ class SessionLog {
   virtual absl::StatusOr<std::shared_ptr<MeshSnapshot>> KeepMesh(const std::string& session, uint64_t revision,
                                                                  core::Mesh mesh,
                                                                  const core::RunContext& context) = 0;
+
+  // Removes files that nothing written down names. To be called after the start, and hourly.
+  virtual absl::StatusOr<Garbage> RemoveGarbage() = 0;
 
   // The mesh that `record` names. Its file is looked at when something of it is asked for.
   virtual std::shared_ptr<MeshSnapshot> FindMesh(const std::string& session,

@@ -63,6 +63,7 @@ absl::StatusCode CodeOf(v1::ErrorReason reason) {
     case v1::ERROR_REASON_MESH_NOT_READY:
     case v1::ERROR_REASON_UPLOAD_MISMATCH:
     case v1::ERROR_REASON_DOMAIN_FIXED:
+    case v1::ERROR_REASON_WORK_CRASHED:
       return absl::StatusCode::kFailedPrecondition;
     case v1::ERROR_REASON_REVISION_MISMATCH:
       return absl::StatusCode::kAborted;

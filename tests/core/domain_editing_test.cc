@@ -85,12 +85,7 @@ class DomainEditingTest : public test::SeededTest {
     }
     const DomainView domain{.points = input.points, .segments = input.ends, .is_open = {}, .holes = holes};
     EXPECT_EQ(ValidateConformity(view, mesh.facets, domain, 2 * kLeastSeparation), absl::OkStatus());
-    ASSERT_EQ(mesh.input_vertex.size(), given.size() / 2);
-    for (size_t i = 0; i < mesh.input_vertex.size(); ++i) {
-      if (mesh.input_vertex[i] != kNoOutput) {
-        EXPECT_EQ(At(mesh, mesh.input_vertex[i]), PointAt<2>(given, i)) << i;
-      }
-    }
+    test::ExpectPointsKept(given, mesh);
   }
 
   static std::vector<double> Joined(std::vector<double> points, const std::vector<double>& more) {
@@ -389,18 +384,8 @@ TEST_F(DomainEditingTest, TimesAddUp) {
 // Random segments on a grid, where many meet in acute angles, and points of all kinds in and on what they bound.
 TEST_F(DomainEditingTest, RandomPointsInRandomDomains) {
   for (int run = 0; run < 40; ++run) {
-    Input input;
-    input.faces = FaceRule::kBox;
-    input.crossings = CrossingRule::kSplit;
-    input.parameters.domain_low = {-1, -1};
-    input.parameters.domain_high = {9, 9};
-    const uint64_t size = 2 + random_.Below(7);
-    const size_t count = 1 + random_.Below(8);
-    for (size_t i = 0; i < 2 * count; ++i) {
-      input.points.push_back(static_cast<double>(random_.Below(size)));
-      input.points.push_back(static_cast<double>(random_.Below(size)));
-      input.ends.push_back(static_cast<uint32_t>(i));
-    }
+    Input input = test::SegmentsOnASmallGrid(random_);
+    const size_t count = input.ends.size() / 2;
     const auto mesher = input.Create();
     std::vector<double> given = input.points;
     Mesh before;

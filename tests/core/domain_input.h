@@ -16,6 +16,7 @@
 #include "core/features/features.h"
 #include "core/geometry/point.h"
 #include "core/mesher.h"
+#include "tests/support/clouds.h"
 
 namespace wellspace::test {
 
@@ -78,7 +79,34 @@ struct DomainInput {
   }
 };
 
+// Random segments between points of a small grid, which cross and touch; in a box with room around them.
+inline DomainInput SegmentsOnASmallGrid(SplitMix64& random) {
+  DomainInput input;
+  input.faces = core::FaceRule::kBox;
+  input.crossings = core::CrossingRule::kSplit;
+  input.parameters.domain_low = {-1, -1};
+  input.parameters.domain_high = {9, 9};
+  const uint64_t size = 2 + random.Below(7);
+  const size_t count = 1 + random.Below(8);
+  for (size_t i = 0; i < 2 * count; ++i) {
+    input.points.push_back(static_cast<double>(random.Below(size)));
+    input.points.push_back(static_cast<double>(random.Below(size)));
+    input.ends.push_back(static_cast<uint32_t>(i));
+  }
+  return input;
+}
+
 inline core::Point<2> At(const core::Mesh& mesh, uint32_t v) { return core::PointAt<2>(mesh.points, v); }
+
+// Checks that each of the points that were `given`, if it is meshed, is a vertex where it was.
+inline void ExpectPointsKept(const std::vector<double>& given, const core::Mesh& mesh) {
+  ASSERT_EQ(mesh.input_vertex.size(), given.size() / 2);
+  for (size_t i = 0; i < mesh.input_vertex.size(); ++i) {
+    if (mesh.input_vertex[i] != core::kNoOutput) {
+      EXPECT_EQ(At(mesh, mesh.input_vertex[i]), core::PointAt<2>(given, i)) << i;
+    }
+  }
+}
 
 }  // namespace wellspace::test
 

@@ -23,6 +23,7 @@ namespace wellspace::core {
 namespace {
 
 using test::At;
+using test::ExpectPointsKept;
 using Input = test::DomainInput;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
@@ -70,16 +71,6 @@ void ExpectConforming(const Mesh& mesh) {
   }
 }
 
-// Checks that each vertex but those of the graph is near to the segment that its facets say it is on.
-void ExpectPointsKept(const Input& input, const Mesh& mesh) {
-  ASSERT_EQ(mesh.input_vertex.size(), input.points.size() / 2);
-  for (size_t i = 0; i < mesh.input_vertex.size(); ++i) {
-    if (mesh.input_vertex[i] != kNoOutput) {
-      EXPECT_EQ(At(mesh, mesh.input_vertex[i]), (Point<2>{input.points[2 * i], input.points[2 * i + 1]}));
-    }
-  }
-}
-
 TEST(DomainMesherTest, ASquareIsTwoTriangles) {
   const auto mesh = Input().Ring({{0, 0}, {1, 0}, {1, 1}, {0, 1}}).Make();
   ASSERT_TRUE(mesh.ok()) << mesh.status();
@@ -96,7 +87,7 @@ TEST(DomainMesherTest, AHoleStaysEmptyAndItsEdgeHasAMarker) {
   const auto mesh = input.Make();
   ASSERT_TRUE(mesh.ok()) << mesh.status();
   ExpectConforming(*mesh);
-  ExpectPointsKept(input, *mesh);
+  ExpectPointsKept(input.points, *mesh);
   const double outer = 0.5 * 30 * 4 * std::sin(2 * std::numbers::pi / 30);
   const double inner = 0.5 * 20 * std::sin(2 * std::numbers::pi / 20);
   EXPECT_NEAR(AreaOf(*mesh), outer - inner, 1e-12);
@@ -276,22 +267,11 @@ class DomainMesherPropertyTest : public test::SeededTest {
 
 TEST_F(DomainMesherPropertyTest, RandomSegmentsOnASmallGridAreMeshed) {
   for (int run = 0; run < 60; ++run) {
-    Input input;
-    input.faces = FaceRule::kBox;
-    input.crossings = CrossingRule::kSplit;
-    const uint64_t size = 2 + random_.Below(7);
-    const size_t count = 1 + random_.Below(8);
-    for (size_t i = 0; i < 2 * count; ++i) {
-      input.points.push_back(static_cast<double>(random_.Below(size)));
-      input.points.push_back(static_cast<double>(random_.Below(size)));
-      input.ends.push_back(static_cast<uint32_t>(i));
-    }
-    input.parameters.domain_low = {-1, -1};
-    input.parameters.domain_high = {9, 9};
+    Input input = test::SegmentsOnASmallGrid(random_);
     input.parameters.rho = run % 2 == 0 ? 0 : 1;
     const auto mesh = input.Make();
     ASSERT_TRUE(mesh.ok()) << run << ": " << mesh.status();
-    ExpectPointsKept(input, *mesh);
+    ExpectPointsKept(input.points, *mesh);
     EXPECT_NEAR(AreaOf(*mesh), 100, 1e-10);
     if (mesh->vertex_count() < 1000) {
       ExpectConforming(*mesh);

@@ -11,7 +11,8 @@
 #include <vector>
 
 #include "core/base/run_context.h"
-#include "core/input_cloud.h"
+#include "core/domain.h"
+#include "core/sorted_cloud.h"
 #include "core/voronoi/query_structure.h"
 #include "tests/support/brute_force.h"
 

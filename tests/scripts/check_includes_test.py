@@ -115,6 +115,15 @@ class CheckIncludesTest(unittest.TestCase):
         self.assert_found("core/mesher.h", '#include "../server/embedded_server.h"', "from the root")
         self.assert_found("core/simplex/star.h", '#include "validate.h"', "from the root")
 
+    def test_test_of_no_folder(self):
+        self.assert_found("tests/core/magic/spell_test.cc", "", "there is no folder core/magic")
+
+    def test_test_beside_the_folder_of_its_header(self):
+        self.assert_found("tests/core/voronoi/polytope_test.cc", "", "is in core/cell: it belongs there")
+        self.assertEqual(self.run_with("tests/core/cell/polytope_test.cc"), (0, []))
+        self.assertEqual(self.run_with("tests/core/voronoi/star_test.cc"), (0, []), "one of two headers of the name")
+        self.assertEqual(self.run_with("tests/e2e/polytope_test.cc"), (0, []), "a folder that mirrors nothing")
+
     def test_header_that_does_not_exist(self):
         self.assert_found("core/mesher.h", '#include "core/simplex/stars.h"', "no such file")
 

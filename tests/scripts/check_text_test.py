@@ -65,6 +65,15 @@ class CheckTextTest(unittest.TestCase):
         text = "struct A {\n  int Long(int x,\n           int y) {\n" + "    ++x;\n" * 61 + "  }\n};\n"
         self.assert_found({"core/a.h": text}, "core/a.h:3: ", "Long has 61 lines")
 
+    def test_python_of_the_package(self):
+        wide = "x = '" + "x" * 115 + "'\n"
+        self.assert_found({"client/python/a.py": "x = 1\n" + wide}, "client/python/a.py:2: ", "121 columns")
+        self.assertEqual(self.run_with({"bench/a.py": wide})[0], 0)
+        body = "    x = 1\n" * 60
+        self.assert_found({"examples/a.py": f"def long():\n    y = 1\n{body}"}, "examples/a.py:1: ", "long has 61 lines")
+        text = f'class A:\n  async def short(self):\n    """Two\n\n    lines."""\n{body}'
+        self.assertEqual(self.run_with({"tests/client/a.py": text})[0], 0, "docstrings do not count")
+
     def test_subjects(self):
         script = SCRIPT.read_text(encoding="utf-8")
         cases = (("core: " + "x" * 67, "73 characters"), ("Mend it", "no area"), ("core: " + "x" * 66, ""))

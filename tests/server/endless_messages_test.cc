@@ -9,9 +9,9 @@
 #include "gtest/gtest.h"
 #include "server/base/options.h"
 #include "server/security/tokens.h"
-#include "tests/formats/temporary_folder.h"
 #include "tests/server/daemon.h"
 #include "tests/server/raw_http2.h"
+#include "tests/support/temporary_folder.h"
 
 namespace wellspace::server {
 namespace {

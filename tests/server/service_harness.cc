@@ -246,15 +246,17 @@ size_t LogLines::Count(const std::string& part) const {
 }
 
 ServiceHarness::ServiceHarness(Mesher mesher, const ServiceOptions& options, Transport transport, Estimator estimator,
-                               MesherFactory create_mesher, const SecurityOptions& security) {
+                               MesherFactory create_mesher, const SecurityOptions& security,
+                               std::unique_ptr<SessionLog> session_log) {
   auto logger = std::make_shared<spdlog::logger>("test", std::make_shared<LinesSink>(log_));
   logger->set_level(spdlog::level::debug);
   ServerOptions server_options;
   server_options.service = options;
   server_options.security = security;
   server_options.listen = transport == Transport::kLoopback ? "127.0.0.1:0" : "";
-  absl::StatusOr<std::unique_ptr<Server>> server = Server::Start(server_options, std::move(logger), std::move(mesher),
-                                                                 std::move(estimator), std::move(create_mesher));
+  absl::StatusOr<std::unique_ptr<Server>> server =
+      Server::Start(server_options, std::move(logger), std::move(session_log), std::move(mesher), std::move(estimator),
+                    std::move(create_mesher));
   if (!server.ok()) {
     throw std::runtime_error(server.status().ToString());
   }

@@ -117,7 +117,8 @@ class ServiceHarness {
  public:
   explicit ServiceHarness(Mesher mesher = FakeMesher, const ServiceOptions& options = {},
                           Transport transport = Transport::kInProcess, Estimator estimator = FakeEstimator,
-                          MesherFactory create_mesher = CreateMesher, const SecurityOptions& security = {});
+                          MesherFactory create_mesher = CreateMesher, const SecurityOptions& security = {},
+                          std::unique_ptr<SessionLog> session_log = nullptr);
 
   Server& server() { return *server_; }
   LogLines& log() { return *log_; }

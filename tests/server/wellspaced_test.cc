@@ -8,10 +8,10 @@
 #include "client/client.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
-#include "tests/formats/temporary_folder.h"
 #include "tests/server/daemon.h"
 #include "tests/server/patience.h"
 #include "tests/server/subprocess.h"
+#include "tests/support/temporary_folder.h"
 
 namespace wellspace::server {
 namespace {

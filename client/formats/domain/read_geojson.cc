@@ -1,10 +1,8 @@
 // GeoJSON, RFC 7946, as its parser comes to each value.
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -14,8 +12,9 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_replace.h"
 #include "client/formats/domain/domain_readers.h"
+#include "client/formats/domain/geojson_features.h"
 #include "client/formats/domain/geojson_geometry.h"
-#include "client/formats/domain/interior_point.h"
+#include "client/formats/domain/geojson_objects.h"
 #include "client/formats/domain/json_source.h"
 #include "client/formats/number.h"
 
@@ -23,6 +22,10 @@ namespace wellspace::formats {
 namespace {
 
 using nlohmann::json;
+
+using Level = GeoJsonLevel;
+using Member = GeoJsonMember;
+using Role = GeoJsonRole;
 
 // Deeper nesting is no geometry and no property of one.
 constexpr size_t kMaxNesting = 256;
@@ -41,61 +44,11 @@ bool IsLikeNan(std::string_view token) {
   return std::find(kStarts.begin(), kStarts.end(), token) != kStarts.end();
 }
 
-// What an object of GeoJSON may have of those members that mean something.
-enum class Member { kType, kFeatures, kGeometry, kGeometries, kCoordinates, kProperties, kForeign };
-constexpr std::array<const char*, 6> kMemberNames = {"type",       "features",    "geometry",
-                                                     "geometries", "coordinates", "properties"};
-
-Member MemberOf(std::string_view name) {
-  return static_cast<Member>(std::find(kMemberNames.begin(), kMemberNames.end(), name) - kMemberNames.begin());
-}
-
-// The types of objects: those of GeometryType, in its order, then the others.
-constexpr std::array<const char*, 9> kTypeNames = {
-    "Point",        "MultiPoint",         "LineString", "MultiLineString",  "Polygon",
-    "MultiPolygon", "GeometryCollection", "Feature",    "FeatureCollection"};
-constexpr int kGeometryTypes = 6;
-enum ObjectType { kNoType = -1, kGeometryCollection = kGeometryTypes, kFeature, kFeatureCollection };
-
-// The member that a type of object has to have.
-Member ContentOf(int type) {
-  switch (type) {
-    case kFeatureCollection:
-      return Member::kFeatures;
-    case kFeature:
-      return Member::kGeometry;
-    case kGeometryCollection:
-      return Member::kGeometries;
-    default:
-      return Member::kCoordinates;
-  }
-}
-
-// Where an object of GeoJSON may stand.
-enum class Role { kTop, kFeature, kGeometry };
-
-// A container of GeoJSON that is open. Those of "coordinates" and of foreign members are not among them.
-struct Level {
-  enum Kind { kObject, kFeatures, kGeometries, kProperties } kind = kObject;
-  uint64_t line = 0;   // where it starts
-  uint64_t index = 0;  // of the element that comes, of an array
-  // Of an object:
-  Role role = Role::kTop;
-  Member member = Member::kForeign;  // the last key
-  int type = kNoType;
-  std::array<bool, 7> has{};  // by Member
-  // Of a feature: what the properties say, and what the domain had before.
-  std::optional<double> region = std::nullopt;
-  std::optional<int32_t> marker = std::nullopt;
-  uint64_t first_segment = 0;
-  size_t first_place = 0;
-};
-
 // What the parser calls; true goes on, false ends it, and status() says why.
 class GeoJsonReader {
  public:
   GeoJsonReader(JsonSource& source, const DomainOptions& options, PlanarDomain& domain)
-      : source_(source), options_(options), domain_(domain) {}
+      : source_(source), domain_(domain), features_(options, domain) {}
 
   bool null() { return Scalar("null", nullptr); }
   bool boolean(bool value) { return Scalar(value ? "true" : "false", nullptr); }
@@ -129,12 +82,9 @@ class GeoJsonReader {
   bool Skip() { return ++foreign_depth_ + levels_.size() <= kMaxNesting || FailNesting(); }
   bool EndGeoJsonObject();
   bool EndGeometry(const Level& object);
-  bool EndFeature(const Level& feature);
-  bool AddRegions(const Level& feature);
   // The value that has just ended is no more the element that comes.
   void EndValue();
   bool Has(Level& object, Member member);
-  GeoJsonPlace Place(const Level& geometry);
 
   std::string Path() const;
   bool Fail(std::string_view message) { return FailAt(source_.line(), message); }
@@ -142,21 +92,15 @@ class GeoJsonReader {
   bool FailNesting() { return Fail(absl::StrCat("expected at most ", kMaxNesting, " nested values, got more")); }
   // "expected an object, got WHAT" for a value in the place that comes.
   bool FailKind(std::string_view got);
-  void NoteFeatures();
-  void NoteWidth();
 
   JsonSource& source_;
-  const DomainOptions& options_;
   PlanarDomain& domain_;
   absl::Status status_;
   std::vector<Level> levels_;
   GeoJsonGeometry geometry_;
-  size_t foreign_depth_ = 0;     // open containers that mean nothing
-  std::string property_;         // the last key of "properties"
-  uint64_t empty_ = 0;           // features and geometries without positions
-  uint64_t without_region_ = 0;  // features with polygons
-  uint64_t without_marker_ = 0;  // features with segments
-  uint64_t flat_ = 0;            // polygons that are to have an attribute, and have no inside
+  GeoJsonFeatures features_;
+  size_t foreign_depth_ = 0;  // open containers that mean nothing
+  std::string property_;      // the last key of "properties"
 };
 
 std::string GeoJsonReader::Path() const {
@@ -172,7 +116,7 @@ std::string GeoJsonReader::Path() const {
         break;
       case Level::kObject:
         if (level.member != Member::kForeign) {
-          absl::StrAppend(&path, path.empty() ? "" : ".", kMemberNames[static_cast<size_t>(level.member)]);
+          absl::StrAppend(&path, path.empty() ? "" : ".", kGeoJsonMembers[static_cast<size_t>(level.member)]);
         }
         break;
     }
@@ -272,7 +216,7 @@ bool GeoJsonReader::Scalar(std::string_view text, const std::string* string) {
       if (text != "null") {
         return FailKind(shown);
       }
-      ++empty_;
+      features_.CountEmpty();
       break;
     default:
       return FailKind(shown);
@@ -283,21 +227,9 @@ bool GeoJsonReader::Scalar(std::string_view text, const std::string* string) {
 
 bool GeoJsonReader::TakeType(const std::string& name) {
   Level& object = levels_.back();
-  const auto at = std::find(kTypeNames.begin(), kTypeNames.end(), name);
-  const int type = static_cast<int>(at - kTypeNames.begin());
-  size_t first = 0;
-  size_t last = kTypeNames.size();
-  if (object.role == Role::kFeature) {
-    first = kFeature;
-    last = kFeature + 1;
-  } else if (object.role == Role::kGeometry) {
-    last = kFeature;
-  }
-  if (at < kTypeNames.begin() + first || at >= kTypeNames.begin() + last) {
-    std::string accepted;
-    for (size_t i = first; i < last; ++i) {
-      absl::StrAppend(&accepted, i == first ? "" : i + 1 == last ? " or " : ", ", kTypeNames[i]);
-    }
+  std::string accepted;
+  const int type = GeoJsonTypeOf(name, object.role, accepted);
+  if (type == kNoType) {
     return Fail(absl::StrCat("expected ", accepted, ", got ", Quote(name)));
   }
   object.type = type;
@@ -305,25 +237,8 @@ bool GeoJsonReader::TakeType(const std::string& name) {
 }
 
 bool GeoJsonReader::Property(const double* number, std::string_view text) {
-  Level& feature = levels_[levels_.size() - 2];
-  if (text == "null" && number == nullptr) {
-    return true;
-  }
-  if (!options_.region_property.empty() && property_ == options_.region_property) {
-    if (number == nullptr) {
-      return Fail(absl::StrCat("expected a number for the attribute of the region, got ", std::string(text)));
-    }
-    feature.region = *number;
-  }
-  if (!options_.marker_property.empty() && property_ == options_.marker_property) {
-    constexpr double kLimit = 2147483648.0;
-    if (number == nullptr || *number != std::floor(*number) || *number < -kLimit || *number >= kLimit) {
-      return Fail(
-          absl::StrCat("expected a whole number from -2^31 to below 2^31 for the marker, got ", std::string(text)));
-    }
-    feature.marker = static_cast<int32_t>(*number);
-  }
-  return true;
+  const absl::Status status = features_.TakeProperty(levels_[levels_.size() - 2], property_, number, text);
+  return status.ok() || Fail(std::string(status.message()));
 }
 
 bool GeoJsonReader::start_object(size_t /*elements*/) {
@@ -383,7 +298,7 @@ bool GeoJsonReader::key(std::string& name) {
     property_ = name;
     return true;
   }
-  level.member = MemberOf(name);
+  level.member = GeoJsonMemberOf(name);
   return Has(level, level.member);
 }
 
@@ -462,95 +377,27 @@ bool GeoJsonReader::end_array() {
 bool GeoJsonReader::EndGeoJsonObject() {
   Level object = levels_.back();
   levels_.back().member = Member::kForeign;
-  if (object.type == kNoType) {
-    return FailAt(object.line, "expected an object of GeoJSON, with a \"type\", got one without");
-  }
-  const Member wanted = ContentOf(object.type);
-  for (const Member member : {Member::kFeatures, Member::kGeometry, Member::kGeometries, Member::kCoordinates}) {
-    if (object.has[static_cast<size_t>(member)] != (member == wanted)) {
-      return FailAt(object.line, absl::StrCat("expected ", member == wanted ? "" : "no ", "\"",
-                                              kMemberNames[static_cast<size_t>(member)], "\" in a ",
-                                              kTypeNames[object.type], member == wanted ? ", got none" : ""));
-    }
+  if (const std::string wrong = WrongMembers(object); !wrong.empty()) {
+    return FailAt(object.line, wrong);
   }
   levels_.pop_back();
-  if (object.type < kGeometryTypes) {
+  if (object.type < kGeoJsonGeometryTypes) {
     return EndGeometry(object);
   }
-  return object.type != kFeature || EndFeature(object);
-}
-
-// The place of a geometry whose level is closed.
-GeoJsonPlace GeoJsonReader::Place(const Level& geometry) {
-  GeoJsonPlace place = {.line = geometry.line};
-  std::string chain;
-  for (const Level& level : levels_) {
-    if (level.kind == Level::kFeatures) {
-      place.feature = static_cast<uint32_t>(level.index);
-    } else if (level.kind == Level::kGeometries) {
-      absl::StrAppend(&chain, "geometries[", level.index, "].");
-    } else if (level.kind == Level::kObject && level.member == Member::kGeometry) {
-      place.is_feature = true;
-    }
+  if (object.type == kFeature) {
+    features_.End(object);
   }
-  if (!chain.empty()) {
-    place.collection = static_cast<uint32_t>(domain_.collections.size());
-    domain_.collections.push_back(std::move(chain));
-  }
-  return place;
+  return true;
 }
 
 bool GeoJsonReader::EndGeometry(const Level& object) {
-  const GeoJsonPlace place = Place(object);
+  const GeoJsonPlace place = GeoJsonPlaceOf(object, levels_, domain_);
   bool is_empty = false;
   status_ = geometry_.MoveTo(static_cast<GeometryType>(object.type), place, domain_, is_empty);
-  empty_ += is_empty ? 1 : 0;
+  if (is_empty) {
+    features_.CountEmpty();
+  }
   return status_.ok();
-}
-
-bool GeoJsonReader::EndFeature(const Level& feature) {
-  const uint64_t segments = domain_.segment_count();
-  if (feature.marker) {
-    domain_.markers.resize(feature.first_segment);
-    domain_.markers.resize(segments, *feature.marker);
-  }
-  without_marker_ += !feature.marker && segments > feature.first_segment ? 1 : 0;
-  return AddRegions(feature);
-}
-
-// Adds a seed in each polygon of a feature.
-bool GeoJsonReader::AddRegions(const Level& feature) {
-  bool has_polygons = false;
-  for (size_t at = feature.first_place; at < domain_.places.size();) {
-    const size_t outer = at++;
-    if (domain_.places[outer].ring == GeoJsonPlace::kNone) {
-      continue;
-    }
-    has_polygons = true;
-    while (at < domain_.places.size() && domain_.places[at].ring != GeoJsonPlace::kNone &&
-           domain_.places[at].ring > 0) {
-      ++at;
-    }
-    if (!feature.region) {
-      continue;
-    }
-    const uint64_t first = domain_.places[outer].first_point;
-    const uint64_t end = at < domain_.places.size() ? domain_.places[at].first_point : domain_.point_count();
-    std::vector<size_t> starts;
-    for (size_t ring = outer; ring < at; ++ring) {
-      starts.push_back(domain_.places[ring].first_point - first);
-    }
-    const auto point =
-        InteriorPoint(std::span<const double>(domain_.points).subspan(2 * first, 2 * (end - first)), starts);
-    if (!point) {
-      ++flat_;
-      continue;
-    }
-    domain_.seeds.push_back({.x = (*point)[0], .y = (*point)[1], .attribute = *feature.region});
-    domain_.seed_places.push_back(static_cast<uint32_t>(outer));
-  }
-  without_region_ += has_polygons && !feature.region ? 1 : 0;
-  return true;
 }
 
 bool GeoJsonReader::parse_error(size_t /*position*/, const std::string& last_token, const json::exception& exception) {
@@ -573,46 +420,6 @@ bool GeoJsonReader::parse_error(size_t /*position*/, const std::string& last_tok
                            IsLikeNan(last_token) ? " (JSON has neither NaN nor infinities)" : ""));
 }
 
-void GeoJsonReader::NoteFeatures() {
-  const auto note = [this](uint64_t count, std::string_view one, std::string_view more) {
-    if (count > 0) {
-      domain_.notes.push_back(absl::StrCat(domain_.name, ": ", count, std::string(count == 1 ? one : more)));
-    }
-  };
-  note(empty_, " geometry is null or has no positions", " geometries are null or have no positions");
-  if (!options_.region_property.empty()) {
-    const std::string name = Quote(options_.region_property);
-    note(without_region_, absl::StrCat(" feature with polygons has no property ", name, ", and gets no region"),
-         absl::StrCat(" features with polygons have no property ", name, ", and get no regions"));
-    note(flat_, " polygon has no inside, and gets no region", " polygons have no inside, and get no regions");
-  }
-  if (!options_.marker_property.empty()) {
-    const std::string name = Quote(options_.marker_property);
-    note(without_marker_, absl::StrCat(" feature has no property ", name, ", and its segments the marker 0"),
-         absl::StrCat(" features have no property ", name, ", and their segments the marker 0"));
-  }
-}
-
-// Longitudes that go around the world are no coordinates of one plane.
-void GeoJsonReader::NoteWidth() {
-  constexpr double kHalfTurn = 180;
-  double low = INFINITY;
-  double high = -INFINITY;
-  for (size_t i = 0; i < domain_.points.size(); i += 2) {
-    low = std::min(low, domain_.points[i]);
-    high = std::max(high, domain_.points[i]);
-    if (std::abs(domain_.points[i]) > 2 * kHalfTurn || std::abs(domain_.points[i + 1]) > kHalfTurn / 2) {
-      return;  // these are no longitudes and latitudes
-    }
-  }
-  if (high - low > kHalfTurn) {
-    domain_.notes.push_back(absl::StrCat(domain_.name, ": longitudes span ", high - low,
-                                         " degrees; they are taken as coordinates of a plane, in which both sides of "
-                                         "the 180th meridian are far apart, and triangles near the poles are not what "
-                                         "they are on the sphere"));
-  }
-}
-
 void GeoJsonReader::Finish() {
   domain_.markers.resize(domain_.segment_count());
   const auto has = [this](uint8_t value) {
@@ -622,8 +429,7 @@ void GeoJsonReader::Finish() {
     domain_.is_line.clear();
   }
   domain_.segment_lines = {};  // places say where segments are
-  NoteFeatures();
-  NoteWidth();
+  features_.Note();
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
-// The steps of one vertex in a domain of the plane, computed from its cell.
+// The steps of one vertex in a domain of the plane, computed from its cell: what CellSteps is in the box. Made by
+// Refinement::RefineInDomain for the loop, and by Rounds::Record to be recorded.
 #ifndef WELLSPACE_CORE_REFINE_DOMAIN_DOMAIN_STEPS_H_
 #define WELLSPACE_CORE_REFINE_DOMAIN_DOMAIN_STEPS_H_
 
@@ -13,6 +14,7 @@
 #include "core/refine/assessment.h"
 #include "core/refine/cell_steps.h"
 #include "core/refine/domain/domain_rules.h"
+#include "core/refine/domain/node_view.h"
 #include "core/refine/face_watchers.h"
 #include "core/refine/insertion.h"
 #include "core/refine/neighbor_notice.h"
@@ -20,7 +22,11 @@
 
 namespace wellspace::core {
 
-// As CellSteps, whose functions it has; segments take the place of faces of the box.
+// As CellSteps, whose functions it has; segments take the place of faces of the box. Three things differ:
+// - A node may be refused by the rules. Then the cell is assessed again, without it, before the next request is looked
+//   for; what was found before no longer holds (Reassessed).
+// - All neighbours get a notice, and no nodes are watched.
+// - No simplices are listed: which face they lie in is found in the end (ComputeDomainSimplices).
 //
 // Thread safety: as CellSteps.
 template <typename Cells>
@@ -39,7 +45,7 @@ class DomainSteps {
     if (cell().IsTooLarge()) {
       return nullptr;
     }
-    found_ = rules_.AssessCell(v_, cell(), workspace_.own.segments, edge_limit_sq_, refused_, met_);
+    found_ = rules_.AssessCell(v_, cell(), workspace_.own.segments, edge_limit_sq_, refused_);
     return &found_;
   }
 
@@ -68,8 +74,7 @@ class DomainSteps {
     };
     is_reassessed_ = false;
     while (true) {
-      DomainRules::Answer answer =
-          rules_.NextRequest(v_, cell(), found_, met_, edge_limit_sq_, cell_of, workspace_.other);
+      DomainRules::Answer answer = rules_.NextRequest(v_, cell(), found_, edge_limit_sq_, cell_of, workspace_.other);
       request_ = answer.request;
       if (!answer.refused.has_value()) {
         return request_.has_value() ? &*request_ : nullptr;
@@ -96,10 +101,9 @@ class DomainSteps {
   StepWorkspace<2>& workspace_;
   const VertexId v_;
   const double edge_limit_sq_;
-  Assessment found_;
-  MetPart met_;
-  std::vector<NodeName> refused_;
-  bool is_reassessed_ = false;
+  DomainAssessment found_;
+  std::vector<NodeName> refused_;  // in all steps of the vertex
+  bool is_reassessed_ = false;     // while the last request was looked for
   std::optional<InsertionRequest<2>> request_;
 };
 

@@ -1,4 +1,5 @@
-// Vertices of a domain in the plane that are not inserted yet, but that recorded steps are to insert.
+// Vertices of a domain in the plane that are not inserted yet, but that recorded steps are to insert. Rounds::Record
+// makes one of its batch; the rules see it by a VisibleDomain.
 #ifndef WELLSPACE_CORE_REFINE_DOMAIN_EXPECTED_VERTICES_H_
 #define WELLSPACE_CORE_REFINE_DOMAIN_EXPECTED_VERTICES_H_
 
@@ -9,7 +10,7 @@
 
 #include "core/base/ids.h"
 #include "core/geometry/point.h"
-#include "core/refine/domain/segment_point.h"
+#include "core/refine/domain/place_in_domain.h"
 #include "core/refine/insertion.h"
 #include "core/voronoi/extra_vertices.h"
 

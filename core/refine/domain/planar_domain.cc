@@ -75,7 +75,7 @@ void PlanarDomain::MakeRoom(size_t vertices) {
 }
 
 std::span<const HalfEdge> PlanarDomain::WaysFrom(VertexId v) const {
-  if (IsPoint(v)) {
+  if (IsGraphPoint(v)) {
     return faces_.Around(Index(v));
   }
   return WaysFrom(PlaceOf(v));
@@ -98,11 +98,12 @@ size_t PlanarDomain::SectorToward(VertexId v, const Point<2>& d) const {
 }
 
 bool PlanarDomain::IsOn(VertexId v, uint32_t segment) const {
-  return IsPoint(v) ? EndVertex(segment, false) == v || EndVertex(segment, true) == v : PlaceOf(v).segment == segment;
+  return IsGraphPoint(v) ? EndVertex(segment, false) == v || EndVertex(segment, true) == v
+                         : PlaceOf(v).segment == segment;
 }
 
 double PlanarDomain::DistanceFromEnd(VertexId v, uint32_t segment, bool is_b) const {
-  if (IsPoint(v)) {
+  if (IsGraphPoint(v)) {
     return EndVertex(segment, is_b) == v ? 0 : LengthOf(segment);
   }
   return DistanceFromEnd(PlaceOf(v), is_b);

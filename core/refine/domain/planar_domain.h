@@ -1,4 +1,6 @@
-// A domain in the plane while it is refined: its segments and faces, and where each vertex is on them.
+// A domain in the plane while it is refined: its segments and faces, and where each vertex is on them. MakeDomainCloud
+// makes it of the planar graph. Refinement, DomainMesher and PointPlacer add each vertex here that is added to the
+// QueryStructure; the rules, the triangles and the estimate read it.
 #ifndef WELLSPACE_CORE_REFINE_DOMAIN_PLANAR_DOMAIN_H_
 #define WELLSPACE_CORE_REFINE_DOMAIN_PLANAR_DOMAIN_H_
 
@@ -16,7 +18,7 @@
 #include "core/features/planar_graph.h"
 #include "core/geometry/point.h"
 #include "core/geometry/segment.h"
-#include "core/refine/domain/segment_point.h"
+#include "core/refine/domain/place_in_domain.h"
 #include "core/tree/segment_lists.h"
 
 namespace wellspace::core {
@@ -32,7 +34,8 @@ inline constexpr double kRadiusSqOfArea = 0.76980035891950102;
 //
 // Thread safety: thread-compatible; const functions may run at once. Beside AddVertex, where MakeRoom has made room for
 // the vertex, those of them may run that are asked of segments, or of vertices that there were before.
-// Invariants: (1) a vertex that is on no segment lies inside a face that is meshed.
+// Invariants: (1) a vertex that is on no segment lies inside a face that is meshed; (2) segments and faces stay as they
+//             were made.
 class PlanarDomain {
  public:
   // REQUIRES:   every point of the graph is an end of a segment, or lies in a face that is meshed.
@@ -43,6 +46,8 @@ class PlanarDomain {
   uint32_t segment_count() const { return static_cast<uint32_t>(graph_.segments.size()); }
   uint32_t point_count() const { return static_cast<uint32_t>(graph_.points.size()); }
   uint32_t vertex_count() const { return point_count() + static_cast<uint32_t>(places_.size()); }
+
+  // Segments.
 
   const Point<2>& EndOf(uint32_t segment, bool is_b) const { return graph_.points[Index(EndVertex(segment, is_b))]; }
   VertexId EndVertex(uint32_t segment, bool is_b) const {
@@ -56,51 +61,15 @@ class PlanarDomain {
   // The ends of all segments, by segment.
   std::vector<SegmentLists::Ends> Ends() const;
 
-  // Adds the vertex after the last: on a segment, or inside `face`.
-  void AddVertex(const SegmentPoint& place, uint32_t face);
-  // Makes room for so many more vertices.
-  //
-  // Complexity: O(1), amortised.
-  void MakeRoom(size_t vertices);
+  // Whether two ways that lead from the first end of `h` make an angle of less than 60 degrees, of which h is one.
+  bool IsAcute(HalfEdge h) const { return is_acute_[h]; }
+  // The smallest angle between two segments with a common end. Unit: radians; pi where there are no two.
+  double MinAngle() const { return min_angle_; }
 
-  bool IsPoint(VertexId v) const { return Index(v) < point_count(); }
-  // Where `v` is on a segment; on none if it is an end of segments, or inside a face.
-  SegmentPoint PlaceOf(VertexId v) const {
-    return IsPoint(v) ? SegmentPoint() : places_[Index(v) - point_count()].place;
-  }
-  // Whether it is inside a face.
-  bool IsFree(VertexId v) const {
-    return IsPoint(v) ? faces_.point_face[Index(v)] != PlanarFaces::kOnSegments
-                      : !places_[Index(v) - point_count()].place.IsOnSegment();
-  }
-  // REQUIRES:   IsFree(v).
-  uint32_t FaceOf(VertexId v) const {
-    return IsPoint(v) ? faces_.point_face[Index(v)] : places_[Index(v) - point_count()].face;
-  }
+  // How many vertices have been inserted on a segment; beside AddVertex, how many had been at some time.
+  uint32_t SplitsOf(uint32_t segment) const { return splits_[segment].load(std::memory_order_relaxed); }
 
-  // The ways that lead from `v` along segments, counterclockwise: none from a vertex inside a face. Between two that
-  // follow each other lies a sector, of the face left of the first.
-  std::span<const HalfEdge> WaysFrom(VertexId v) const;
-  // The same of a vertex at `place`, which is no end of segments.
-  std::span<const HalfEdge> WaysFrom(const SegmentPoint& place) const {
-    return place.IsOnSegment() ? std::span<const HalfEdge>(ways_).subspan(2 * size_t{place.segment}, 2)
-                               : std::span<const HalfEdge>();
-  }
-  // The number of the sector at `v` that the direction `d` leads into, as of the way before it; one of the two, where
-  // it leads along a segment. 0 for a vertex inside a face.
-  size_t SectorToward(VertexId v, const Point<2>& d) const;
-  uint32_t FaceOfSector(VertexId v, size_t sector) const {
-    const std::span<const HalfEdge> ways = WaysFrom(v);
-    return ways.empty() ? FaceOf(v) : faces_.left_face[ways[sector]];
-  }
-
-  // Whether `v` is on `segment`, or an end of it.
-  bool IsOn(VertexId v, uint32_t segment) const;
-  // How far `v`, which is on `segment` or an end of it, is from one of its ends.
-  double DistanceFromEnd(VertexId v, uint32_t segment, bool is_b) const;
-  double DistanceFromEnd(const SegmentPoint& place, bool is_b) const {
-    return place.is_from_b == is_b ? place.distance : LengthOf(place.segment) - place.distance;
-  }
+  // Points beside a segment.
 
   // Where `p` is beside a segment: how far along from its end a the foot is, on the line through it, and how far away,
   // with a sign. Units: those of the coordinates.
@@ -116,19 +85,22 @@ class PlanarDomain {
   // The squared distance between `p` and a segment.
   double DistanceSqTo(const Point<2>& p, uint32_t segment) const;
 
+  // Places on segments.
+
   // Where a point of a segment is: computed from the nearer end, each coordinate rounded once or twice.
   Point<2> PositionOf(const SegmentPoint& place) const;
-
-  // The place on `segment` halfway between two vertices on it, or at its ends.
-  SegmentPoint MiddleOf(uint32_t segment, VertexId u, VertexId w) const {
-    return FromNearerEnd(segment, 0.5 * (DistanceFromEnd(u, segment, false) + DistanceFromEnd(w, segment, false)));
+  double DistanceFromEnd(const SegmentPoint& place, bool is_b) const {
+    return place.is_from_b == is_b ? place.distance : LengthOf(place.segment) - place.distance;
   }
   // The place at a distance from end a, as the distance from the nearer end.
   SegmentPoint FromNearerEnd(uint32_t segment, double from_a) const {
     const double length = LengthOf(segment);
     return from_a <= 0.5 * length ? SegmentPoint{segment, false, from_a} : SegmentPoint{segment, true, length - from_a};
   }
-
+  // The place on `segment` halfway between two vertices on it, or at its ends.
+  SegmentPoint MiddleOf(uint32_t segment, VertexId u, VertexId w) const {
+    return FromNearerEnd(segment, 0.5 * (DistanceFromEnd(u, segment, false) + DistanceFromEnd(w, segment, false)));
+  }
   // The place on `segment` of `p`, which is near to it: its foot.
   SegmentPoint PlaceBeside(const Point<2>& p, uint32_t segment) const {
     const bool is_from_b = FootOf(p, segment).from_a > 0.5 * LengthOf(segment);
@@ -136,12 +108,52 @@ class PlanarDomain {
     return {segment, is_from_b, Dot<2>(from, DirectionOf(HalfEdgeOf(segment, is_from_b))) / LengthOf(segment)};
   }
 
-  // Whether two ways that lead from the first end of `h` make an angle of less than 60 degrees, of which h is one.
-  bool IsAcute(HalfEdge h) const { return is_acute_[h]; }
-  // The smallest angle between two segments with a common end. Unit: radians; pi where there are no two.
-  double MinAngle() const { return min_angle_; }
-  // How many vertices have been inserted on a segment; beside AddVertex, how many had been at some time.
-  uint32_t SplitsOf(uint32_t segment) const { return splits_[segment].load(std::memory_order_relaxed); }
+  // Vertices.
+
+  // Adds the vertex after the last: on a segment, or inside `face`.
+  void AddVertex(const SegmentPoint& place, uint32_t face);
+  // Makes room for so many more vertices.
+  //
+  // Complexity: O(1), amortised.
+  void MakeRoom(size_t vertices);
+
+  // Whether `v` is a point of the graph, and has not been inserted.
+  bool IsGraphPoint(VertexId v) const { return Index(v) < point_count(); }
+  // Where `v` is on a segment; on none if it is an end of segments, or inside a face.
+  SegmentPoint PlaceOf(VertexId v) const {
+    return IsGraphPoint(v) ? SegmentPoint() : places_[Index(v) - point_count()].place;
+  }
+  // Whether `v` is inside a face: on no segment, and an end of none.
+  bool IsInFace(VertexId v) const {
+    return IsGraphPoint(v) ? faces_.point_face[Index(v)] != PlanarFaces::kOnSegments
+                           : !places_[Index(v) - point_count()].place.IsOnSegment();
+  }
+  // REQUIRES:   IsInFace(v).
+  uint32_t FaceOf(VertexId v) const {
+    return IsGraphPoint(v) ? faces_.point_face[Index(v)] : places_[Index(v) - point_count()].face;
+  }
+  // Whether `v` is on `segment`, or an end of it.
+  bool IsOn(VertexId v, uint32_t segment) const;
+  // How far `v`, which is on `segment` or an end of it, is from one of its ends.
+  double DistanceFromEnd(VertexId v, uint32_t segment, bool is_b) const;
+
+  // Ways and sectors around a vertex.
+
+  // The ways that lead from `v` along segments, counterclockwise: none from a vertex inside a face. Between two that
+  // follow each other lies a sector, of the face left of the first.
+  std::span<const HalfEdge> WaysFrom(VertexId v) const;
+  // The ways from a vertex at `place`, which is no end of segments.
+  std::span<const HalfEdge> WaysFrom(const SegmentPoint& place) const {
+    return place.IsOnSegment() ? std::span<const HalfEdge>(ways_).subspan(2 * size_t{place.segment}, 2)
+                               : std::span<const HalfEdge>();
+  }
+  // The number of the sector at `v` that the direction `d` leads into, as of the way before it; one of the two, where
+  // it leads along a segment. 0 for a vertex inside a face.
+  size_t SectorToward(VertexId v, const Point<2>& d) const;
+  uint32_t FaceOfSector(VertexId v, size_t sector) const {
+    const std::span<const HalfEdge> ways = WaysFrom(v);
+    return ways.empty() ? FaceOf(v) : faces_.left_face[ways[sector]];
+  }
 
   // The vertices on each segment in their order, with both of its ends: those of segment s are
   // vertices[first[s]] to vertices[first[s + 1]].
@@ -166,12 +178,12 @@ class PlanarDomain {
 
   PlanarGraph graph_;
   PlanarFaces faces_;
-  std::vector<double> lengths_;
-  std::vector<HalfEdge> ways_;  // 2 of each segment: those from a vertex on it, toward b and a
+  std::vector<double> lengths_;  // by segment
+  std::vector<HalfEdge> ways_;   // 2 of each segment: those from a vertex on it, toward b and a
   double min_angle_ = std::numbers::pi;
   std::vector<bool> is_acute_;                 // by half-edge
   std::vector<std::atomic<uint32_t>> splits_;  // by segment
-  HugeVector<InsertedPlace> places_;
+  HugeVector<InsertedPlace> places_;           // by vertex that was inserted
 };
 
 }  // namespace wellspace::core

@@ -37,6 +37,14 @@ struct RecordedStep {
 // vertex. What would be inserted has provisional numbers: from the vertices of the structure on, as many as
 // there were then.
 //
+// The life of a batch, which Rounds calls for unless it says otherwise:
+//   1. It gets the next vertices of its strip (TakeNext).
+//   2. Prepare; then other threads record vertex after vertex: BeginRecord, the columns, AppendStar, SetKnown.
+//   3. BeginBatch notes as conflicts what has been inserted since step 2.
+//   4. Refinement::RefineBatch takes its vertices in order. If a record IsStillValid it is replayed, else the steps are
+//      computed; what has been inserted then is compared to what was expected (NoteInserted).
+// A batch that was not speculated on skips steps 2 and 3, and has no record that is valid.
+//
 // A record is still valid if no vertex conflicts with it. Vertices conflict that could cut the cells it was computed
 // from and were inserted but not expected, or expected but not inserted.
 //
@@ -182,12 +190,14 @@ struct alignas(kCacheLines) Batch {
            watched.capacity() * sizeof(watched[0]) + (simplices.capacity() + written.capacity()) * sizeof(simplices[0]);
   }
 
-  // The part of the strip that comes after this batch, its last vertex first: places among the detached vertices.
+  // The vertices. First the part of the strip that comes after this batch, its last vertex first: places among the
+  // detached vertices.
   size_t strip_begin = 0;
   size_t strip_end = 0;
   std::vector<VertexId> vertices;
   size_t refined = 0;  // so many of the vertices, the first
 
+  // The records, in columns.
   bool is_speculated = false;   // the records are complete
   size_t parts_done = 0;        // of the parts that records are made in
   size_t first_unknown = 0;     // of what is inserted in these rounds, the first that the records were made without
@@ -203,6 +213,7 @@ struct alignas(kCacheLines) Batch {
   Box<D> reach;       // holds the ball that each record reaches
   Star<D> star;       // scratch
 
+  // What has become of the requests.
   std::vector<VertexId> numbers;    // by request, in the structure; kNoVertex if it has not been inserted
   std::vector<Point<D>> conflicts;  // the points within reach
 };

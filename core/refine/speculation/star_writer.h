@@ -1,4 +1,5 @@
-// Writes the simplices of vertices that are done into lists, be it by another thread.
+// Writes the simplices of vertices that are done into lists, be it by another thread. Refinement::Finish hands the
+// stars over; Rounds says when another thread may write.
 #ifndef WELLSPACE_CORE_REFINE_SPECULATION_STAR_WRITER_H_
 #define WELLSPACE_CORE_REFINE_SPECULATION_STAR_WRITER_H_
 

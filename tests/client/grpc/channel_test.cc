@@ -8,7 +8,7 @@
 #include "client/address.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
-#include "tests/formats/temporary_folder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace wellspace::client {
 namespace {

@@ -130,7 +130,7 @@ TEST(PlanarGraphTest, ACrossingBecomesAVertexIfThatIsAskedFor) {
   EXPECT_EQ(graph->counts.crossings, 1u);
 }
 
-TEST(PlanarGraphTest, AVertexTooNearToASegmentIsRefusedOrLedThrough) {
+TEST(PlanarGraphTest, AVertexTooCloseToASegmentIsRefusedOrLedThrough) {
   Input input{.points = {0, 0, 2, 0, 1, 1e-12, 1, 1}, .ends = {0, 1, 2, 3}};
   const auto refused = input.Make();
   EXPECT_THAT(refused.status().message(),

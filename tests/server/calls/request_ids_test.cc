@@ -5,6 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "gtest/gtest.h"
+#include "server/store/ephemeral_log.h"
 #include "tests/server/service_harness.h"
 #include "wellspace/v1/sessions.pb.h"
 
@@ -22,7 +23,7 @@ class RequestIdsTest : public ::testing::Test {
     got.response = "never answered";
     ids_.Once(
         tenant, id, request,
-        [&](const RequestIds::Done& done) {
+        [&](const IdentifiedRequest&, const RequestIds::Done& done) {
           ++done_;
           done(answer);
         },
@@ -31,7 +32,8 @@ class RequestIdsTest : public ::testing::Test {
   }
 
   absl::Duration now_ = absl::Hours(1);
-  RequestIds ids_{[this] { return now_; }};
+  EphemeralLog log_;
+  RequestIds ids_{[this] { return now_; }, log_};
   int done_ = 0;
 };
 
@@ -66,7 +68,7 @@ TEST_F(RequestIdsTest, TheOrderOfLabelsIsNoOtherRequest) {
     (*forward.mutable_labels())[absl::StrCat("key", i)] = "value";
     (*backward.mutable_labels())[absl::StrCat("key", 63 - i)] = "value";
   }
-  const auto work = [&](const RequestIds::Done& done) {
+  const auto work = [&](const IdentifiedRequest&, const RequestIds::Done& done) {
     ++done_;
     done(Ok("answer"));
   };
@@ -107,6 +109,37 @@ TEST_F(RequestIdsTest, AnswersTakeBoundedMemory) {
   EXPECT_EQ(Ask("0", "x", Ok("second")).response, "second");
 }
 
+TEST_F(RequestIdsTest, AnswersOfAnEarlierProcessAreGivenAgain) {
+  v1::DeleteSessionRequest request;
+  request.set_name("x");
+  v1::CreateSessionResponse response;
+  response.mutable_session()->set_name("sessions/1");
+  std::vector<store::v1::AnswerRecord> written;
+  ids_.Once(
+      "a", "1", request,
+      [&](const IdentifiedRequest& identified, const RequestIds::Done& done) {
+        written.push_back(identified.Answer(response).value());
+        done(Ok(response.SerializeAsString()));
+      },
+      [](const RequestIds::Answer&) {});
+  RequestIds next([this] { return now_; }, log_);
+  next.Restore(written);
+  const auto ask = [&](const std::string& name) {
+    request.set_name(name);
+    RequestIds::Answer got;
+    next.Once(
+        "a", "1", request, [](const IdentifiedRequest&, const RequestIds::Done&) { ADD_FAILURE() << "done twice"; },
+        [&](const RequestIds::Answer& answer) { got = answer; });
+    return got;
+  };
+  EXPECT_EQ(ask("x").response, response.SerializeAsString());
+  EXPECT_EQ(DetailsOf(ask("y").status).reason, "REQUEST_ID_REUSED");
+}
+
+TEST_F(RequestIdsTest, ARequestWithoutAnIdHasNoAnswerToBeWritten) {
+  EXPECT_FALSE(IdentifiedRequest().Answer(v1::DeleteSessionResponse()).has_value());
+}
+
 TEST_F(RequestIdsTest, TheLengthOfAnIdIsLimited) {
   EXPECT_TRUE(Ask(std::string(RequestIds::kMaxLength, 'x'), "x", Ok("")).status.ok());
   const absl::Status status = Ask(std::string(RequestIds::kMaxLength + 1, 'x'), "x", Ok("")).status;
@@ -120,9 +153,9 @@ TEST_F(RequestIdsTest, ACallThatRepeatsOneUnderWayGetsItsAnswer) {
   std::vector<std::string> answers;
   const auto note = [&](const RequestIds::Answer& answer) { answers.push_back(answer.response); };
   ids_.Once(
-      "a", "1", request, [&](RequestIds::Done done) { first_is_done = std::move(done); }, note);
+      "a", "1", request, [&](const IdentifiedRequest&, RequestIds::Done done) { first_is_done = std::move(done); }, note);
   ids_.Once(
-      "a", "1", request, [&](const RequestIds::Done&) { ADD_FAILURE() << "done twice"; }, note);
+      "a", "1", request, [&](const IdentifiedRequest&, const RequestIds::Done&) { ADD_FAILURE() << "done twice"; }, note);
   EXPECT_TRUE(answers.empty());
   first_is_done(Ok("answer"));
   EXPECT_EQ(answers, std::vector<std::string>(2, "answer"));

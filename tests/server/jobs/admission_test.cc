@@ -8,9 +8,9 @@
 
 #include "gtest/gtest.h"
 #include "server/security/tokens.h"
-#include "tests/formats/temporary_folder.h"
 #include "tests/server/service_harness.h"
 #include "tests/server/session_calls.h"
+#include "tests/support/temporary_folder.h"
 
 namespace wellspace::server {
 namespace {

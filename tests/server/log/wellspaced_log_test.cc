@@ -20,11 +20,11 @@
 #include "server/base/resources.h"
 #include "server/log/log_fields.h"
 #include "server/security/tokens.h"
-#include "tests/formats/temporary_folder.h"
 #include "tests/server/daemon.h"
 #include "tests/server/raw_call.h"
 #include "tests/server/raw_http2.h"
 #include "tests/server/security/certificates.h"
+#include "tests/support/temporary_folder.h"
 #include "wellspace/v1/operations.pb.h"
 
 namespace wellspace::server {

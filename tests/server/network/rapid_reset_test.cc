@@ -13,10 +13,10 @@
 #include "client/client.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
-#include "tests/formats/temporary_folder.h"
 #include "tests/server/daemon.h"
 #include "tests/server/http_get.h"
 #include "tests/server/raw_http2.h"
+#include "tests/support/temporary_folder.h"
 
 namespace wellspace::server {
 namespace {

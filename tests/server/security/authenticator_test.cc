@@ -2,11 +2,11 @@
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
-#include "tests/formats/temporary_folder.h"
 #include "tests/server/raw_call.h"
 #include "tests/server/raw_http2.h"
 #include "tests/server/service_harness.h"
 #include "tests/server/service_methods.h"
+#include "tests/support/temporary_folder.h"
 
 namespace wellspace::server {
 namespace {

@@ -5,8 +5,8 @@
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
-#include "tests/formats/temporary_folder.h"
 #include "tests/server/service_harness.h"
+#include "tests/support/temporary_folder.h"
 
 namespace wellspace::server {
 namespace {

@@ -6,7 +6,7 @@
 #include "absl/strings/str_cat.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
-#include "tests/cli/process.h"
+#include "tests/client/cli/process.h"
 #include "tests/server/daemon.h"
 #include "tests/server/security/certificates.h"
 

@@ -44,8 +44,22 @@ TEST(FeatureStore, KeepsMarkersAndRingsOfSegmentsFromManyChunks) {
   EXPECT_THAT(features.markers, ElementsAre(0, 0, 8, 9, 0));
   EXPECT_THAT(features.is_open, ElementsAre(0, 0, 1, 1, 0));
   EXPECT_EQ(store.segment_count(), 5u);
-  EXPECT_EQ(store.face_rule(), v1::FACE_RULE_BOX);
+  EXPECT_EQ(store.Summary().faces, v1::FACE_RULE_BOX);
   EXPECT_EQ(store.bytes(), 5u * 13);
+}
+
+TEST(FeatureStore, WhatWasAppendedCanBeTakenBack) {
+  FeatureStore store;
+  store.Append(Chunk({0, 1, 1, 2}));
+  const FeatureStore::Extent before = store.extent();
+  store.Append(Chunk({2, 3}, {7}));
+  store.Append(Faces(v1::FACE_RULE_HOLES, {1, 2}, 0.5));
+  store.TakeBack(before);
+  EXPECT_THAT(store.View().ends, ElementsAre(0, 1, 1, 2));
+  EXPECT_THAT(store.View().markers, ElementsAre(0, 0));
+  EXPECT_EQ(store.seed_count(), 0u);
+  EXPECT_FALSE(store.Summary().has_rules);
+  EXPECT_EQ(store.Summary().faces, v1::FACE_RULE_BOX) << "segments alone";
 }
 
 TEST(FeatureStore, TheLastRulesHoldAndSeedsAddUp) {
@@ -56,7 +70,7 @@ TEST(FeatureStore, TheLastRulesHoldAndSeedsAddUp) {
   EXPECT_FALSE(store.HasOtherRules(Faces(v1::FACE_RULE_HOLES)));
   store.Append(Faces(v1::FACE_RULE_EVEN_ODD, {3, 4, 5, 6}), 1);
   EXPECT_TRUE(store.HasOtherRules(Faces(v1::FACE_RULE_HOLES)));
-  EXPECT_EQ(store.face_rule(), v1::FACE_RULE_EVEN_ODD);
+  EXPECT_EQ(store.Summary().faces, v1::FACE_RULE_EVEN_ODD);
   ASSERT_EQ(store.seed_count(), 2u);
   EXPECT_EQ(store.View().seeds[0].max_area, 0.5);
   EXPECT_EQ(store.View().seeds[1].at[1], 6);

@@ -18,7 +18,7 @@ constexpr uint64_t kPointBytes = kDimension * sizeof(double);
 class PointAccountTest : public ::testing::Test {
  protected:
   std::unique_ptr<PointAccount> Open(MemoryBudget& memory) {
-    return std::make_unique<PointAccount>("sessions/1", kDimension, options_, memory, tenant_);
+    return std::make_unique<PointAccount>("sessions/1", kDimension, in_memory_, options_, memory, tenant_);
   }
 
   // Tries to take points that never fit, `bulk` at once, on several threads beside others that take and return one
@@ -55,6 +55,7 @@ class PointAccountTest : public ::testing::Test {
   }
 
   ServiceOptions options_{.max_points = 1000, .max_points_per_tenant = 1500};
+  bool in_memory_ = true;
   std::shared_ptr<TenantPoints> tenant_ = std::make_shared<TenantPoints>();
   MemoryBudget unlimited_{0};
 };
@@ -121,6 +122,26 @@ TEST_F(PointAccountTest, SegmentsAndSeedsCountAsPointsOfTheTenantAndTakeTheirMem
 
   MemoryBudget memory(kProcessMemoryBytes + FeatureStore::BytesOf(10, 0));
   EXPECT_EQ(DetailsOf(Open(memory)->TakeFeatures(11, 0)).reason, "MEMORY_LIMIT");
+}
+
+TEST_F(PointAccountTest, PointsInAFileTakeNoMemory) {
+  in_memory_ = false;
+  MemoryBudget memory(kProcessMemoryBytes + 8);
+  const std::unique_ptr<PointAccount> account = Open(memory);
+  EXPECT_TRUE(account->Take(2).ok());
+  EXPECT_EQ(memory.reserved(), 0u);
+  EXPECT_EQ(tenant_->points(), 2u);
+}
+
+TEST_F(PointAccountTest, WhatWasThereBeforeIsTakenWhateverTheLimits) {
+  const std::unique_ptr<PointAccount> account = Open(unlimited_);
+  account->Restore(options_.max_points + 1, 2, 1);
+  EXPECT_EQ(tenant_->points(), options_.max_points + 4);
+  EXPECT_FALSE(account->Take(1).ok());
+  account->ReturnFeatures(2, 1);
+  account->Return(2);
+  EXPECT_EQ(tenant_->points(), options_.max_points - 1);
+  EXPECT_TRUE(account->Take(1).ok());
 }
 
 TEST_F(PointAccountTest, AClosedAccountHasNoneOfTheTenantsPointsButKeepsItsMemory) {

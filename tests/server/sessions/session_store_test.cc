@@ -9,11 +9,15 @@
 #include "absl/strings/escaping.h"
 #include "gtest/gtest.h"
 #include "server/sessions/memory_session_store.h"
+#include "server/store/ephemeral_log.h"
 #include "server/wire/errors.h"
 #include "tests/server/service_harness.h"
 
 namespace wellspace::server {
 namespace {
+
+// Work that never begins.
+absl::Status Submitted(const std::shared_ptr<Operation>& /*operation*/) { return absl::OkStatus(); }
 
 class SessionStoreTest : public ::testing::Test {
  protected:
@@ -35,8 +39,9 @@ class SessionStoreTest : public ::testing::Test {
   absl::Time now_ = absl::FromUnixSeconds(1'000'000);
   MemoryBudget memory_{0};
   absl::Duration since_boot_ = absl::Hours(1);
+  EphemeralLog log_;
   MemorySessionStore store_{
-      options_, memory_, {.wall = [this] { return now_; }, .since_boot = [this] { return since_boot_; }}};
+      options_, memory_, {.wall = [this] { return now_; }, .since_boot = [this] { return since_boot_; }}, log_};
   absl::Status status_;
 };
 
@@ -122,11 +127,11 @@ TEST_F(SessionStoreTest, ASessionInUseDoesNotExpire) {
 
 TEST_F(SessionStoreTest, ASessionWithAnOperationDoesNotExpire) {
   const std::shared_ptr<Session> session = Create("a", absl::Seconds(10));
-  const absl::StatusOr<std::shared_ptr<Operation>> operation = session->StartOperation({.dimension = 2}, 0);
+  const absl::StatusOr<std::shared_ptr<Operation>> operation = session->StartOperation({.dimension = 2}, 0, Submitted);
   ASSERT_TRUE(operation.ok());
   since_boot_ += absl::Hours(1);
   EXPECT_TRUE(store_.RemoveExpired().empty());
-  EXPECT_TRUE(session->EndWaiting(**operation));
+  EXPECT_TRUE(session->Cancel(**operation).ok());
   since_boot_ += absl::Seconds(10);
   EXPECT_EQ(store_.RemoveExpired().size(), 1u);
 }
@@ -186,9 +191,9 @@ TEST_F(SessionStoreTest, PointsAreLimitedBySessionAndByTenant) {
 TEST_F(SessionStoreTest, KeepsTheLastHundredOperations) {
   const std::shared_ptr<Session> session = Create();
   for (int i = 0; i < 103; ++i) {
-    const absl::StatusOr<std::shared_ptr<Operation>> operation = session->StartOperation({.dimension = 2}, 0);
+    const absl::StatusOr<std::shared_ptr<Operation>> operation = session->StartOperation({.dimension = 2}, 0, Submitted);
     ASSERT_TRUE(operation.ok());
-    session->EndWaiting(**operation);
+    EXPECT_TRUE(session->Cancel(**operation).ok());
   }
   const auto kept = session->ListOperations(0, 1000);
   ASSERT_EQ(kept.size(), 100u);

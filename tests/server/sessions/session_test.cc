@@ -10,6 +10,7 @@
 #include "gtest/gtest.h"
 #include "server/jobs/job_pool.h"
 #include "server/sessions/memory_session_store.h"
+#include "server/store/ephemeral_log.h"
 #include "server/wire/errors.h"
 #include "tests/server/service_harness.h"
 
@@ -19,9 +20,15 @@ namespace {
 class SessionTest : public ::testing::Test {
  protected:
   std::shared_ptr<Operation> Start() {
-    absl::StatusOr<std::shared_ptr<Operation>> operation = session_->StartOperation({.dimension = 2}, 0);
+    absl::StatusOr<std::shared_ptr<Operation>> operation = TryToStart(absl::OkStatus());
     EXPECT_TRUE(operation.ok()) << operation.status();
     return operation.value_or(nullptr);
+  }
+
+  // Where the queue of jobs answers with `submitted`.
+  absl::StatusOr<std::shared_ptr<Operation>> TryToStart(const absl::Status& submitted) {
+    return session_->StartOperation({.dimension = 2}, 0,
+                                    [submitted](const std::shared_ptr<Operation>& /*operation*/) { return submitted; });
   }
 
   // What a client sees of the session, its time of expiry excepted.
@@ -42,65 +49,58 @@ class SessionTest : public ::testing::Test {
   const absl::Status refusal_ = MakeError(v1::ERROR_REASON_QUEUE_FULL, "full");
   ServiceOptions options_;
   MemoryBudget memory_{0};
-  MemorySessionStore store_{options_, memory_, {}};
+  EphemeralLog log_;
+  MemorySessionStore store_{options_, memory_, {}, log_};
   std::shared_ptr<Session> session_ =
       store_.Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = {}}).value();
 };
 
 TEST_F(SessionTest, AnOperationHasTheSessionToItself) {
   const std::shared_ptr<Operation> operation = Start();
-  EXPECT_EQ(DetailsOf(session_->StartOperation({.dimension = 2}, 0).status()).reason, "SESSION_BUSY");
+  EXPECT_EQ(DetailsOf(TryToStart(absl::OkStatus()).status()).reason, "SESSION_BUSY");
   EXPECT_EQ(DetailsOf(session_->Append(0, std::vector<double>{0.5, 0.5}, 0)).reason, "SESSION_BUSY");
-  EXPECT_TRUE(session_->EndWaiting(*operation));
-  EXPECT_FALSE(session_->EndWaiting(*operation));
+  EXPECT_TRUE(session_->Cancel(*operation).ok());
+  EXPECT_TRUE(session_->Cancel(*operation).ok()) << "it has ended";
   EXPECT_EQ(operation->Describe().state(), v1::Operation::STATE_CANCELLED);
   EXPECT_NE(Start(), nullptr);
 }
 
-TEST_F(SessionTest, AWithdrawnOperationLeavesTheSessionAsItWas) {
-  EXPECT_TRUE(session_->EndWaiting(*Start()));
+TEST_F(SessionTest, AnOperationWhoseWorkIsRefusedLeavesTheSessionAsItWas) {
+  EXPECT_TRUE(session_->Cancel(*Start()).ok());
   const std::string seen = Seen();
   const std::vector<std::string> operations = Operations();
-  const std::shared_ptr<Operation> operation = Start();
-  session_->Withdraw(*operation, refusal_);
+  EXPECT_EQ(TryToStart(refusal_).status(), refusal_);
   EXPECT_EQ(Seen(), seen);
   EXPECT_EQ(Operations(), operations);
   EXPECT_TRUE(session_->Append(0, std::vector<double>{0.5, 0.5}, 0).ok());
-  EXPECT_EQ(Start()->name(), operation->name()) << "its number is given again";
+  EXPECT_EQ(Start()->number(), 2u) << "its number is given again";
 }
 
-TEST_F(SessionTest, AWithdrawnOperationDisplacesNoOther) {
+TEST_F(SessionTest, AnOperationWhoseWorkIsRefusedDisplacesNoOther) {
   for (int i = 0; i < 100; ++i) {
-    EXPECT_TRUE(session_->EndWaiting(*Start()));
+    EXPECT_TRUE(session_->Cancel(*Start()).ok());
   }
   const std::vector<std::string> operations = Operations();
-  session_->Withdraw(*Start(), refusal_);
+  EXPECT_FALSE(TryToStart(refusal_).ok());
   EXPECT_EQ(Operations(), operations);
-  EXPECT_TRUE(session_->EndWaiting(*Start()));
-  session_->Withdraw(*Start(), refusal_);
+  EXPECT_TRUE(session_->Cancel(*Start()).ok());
   EXPECT_EQ(Operations().size(), 100u);
   EXPECT_EQ(Operations().front(), operations[1]);
 }
 
-TEST_F(SessionTest, WatchersOfAWithdrawnOperationSeeItsEnd) {
-  const std::shared_ptr<Operation> operation = Start();
-  int changes = 0;
-  operation->Watch([&changes] { ++changes; });
-  session_->Withdraw(*operation, refusal_);
-  EXPECT_EQ(changes, 1);
-  EXPECT_TRUE(operation->HasEnded());
-  EXPECT_EQ(operation->Describe().state(), v1::Operation::STATE_FAILED);
-  EXPECT_EQ(operation->Describe().error().message(), "full");
-}
-
-TEST_F(SessionTest, AnOperationThatWasCancelledBeforeItIsWithdrawnStays) {
-  const std::shared_ptr<Operation> operation = Start();
-  EXPECT_TRUE(session_->EndWaiting(*operation));
-  const std::shared_ptr<Operation> next = Start();
-  session_->Withdraw(*operation, refusal_);
-  EXPECT_EQ(operation->Describe().state(), v1::Operation::STATE_CANCELLED);
-  EXPECT_EQ(Operations(), std::vector<std::string>({operation->name(), next->name()}));
-  EXPECT_TRUE(next->IsQueued());
+TEST_F(SessionTest, WhileItsWorkIsSubmittedTheSessionIsBusyAndDoesNotShowTheOperation) {
+  const std::string before = Seen();
+  EXPECT_TRUE(session_
+                  ->StartOperation({.dimension = 2}, 0,
+                                   [&](const std::shared_ptr<Operation>& operation) {
+                                     EXPECT_EQ(Seen(), before);
+                                     EXPECT_TRUE(Operations().empty());
+                                     EXPECT_TRUE(operation->IsQueued());
+                                     const absl::Status busy = session_->Append(0, std::vector<double>{0.5, 0.5}, 0);
+                                     EXPECT_EQ(DetailsOf(busy).reason, "SESSION_BUSY");
+                                     return absl::OkStatus();
+                                   })
+                  .ok());
 }
 
 TEST_F(SessionTest, AnOperationThatHasEndedTakesNoJob) {
@@ -110,7 +110,7 @@ TEST_F(SessionTest, AnOperationThatHasEndedTakesNoJob) {
   const std::shared_ptr<Operation> operation = Start();
   EXPECT_TRUE(operation->SetJob(job));
   EXPECT_EQ(operation->job(), job);
-  EXPECT_TRUE(session_->EndWaiting(*operation));
+  EXPECT_TRUE(session_->Cancel(*operation).ok());
   EXPECT_EQ(operation->job(), nullptr);
   EXPECT_FALSE(operation->SetJob(job)) << "the caller has to cancel it";
   EXPECT_EQ(operation->job(), nullptr);

@@ -27,6 +27,20 @@ TEST(MemoryPoints, GivesBackWhatCameInAnyPieces) {
   }
 }
 
+TEST(MemoryPoints, TheLastCanBeTakenOutAgain) {
+  std::vector<double> all(300'000);
+  std::iota(all.begin(), all.end(), 0.0);
+  for (const size_t left : {size_t{0}, size_t{1}, size_t{131'071}, size_t{131'072}, size_t{131'073}, all.size()}) {
+    MemoryPoints store;
+    ASSERT_TRUE(store.Append(all).ok());
+    store.Truncate(left);
+    ASSERT_EQ(store.coordinate_count(), left);
+    ASSERT_TRUE(store.Append(std::vector<double>{-1, -2}).ok());
+    EXPECT_EQ(store.CountEqual(0, std::span(all).first(left)).value(), left);
+    EXPECT_EQ(store.CopyFrom(left, core::RunContext()).value(), std::vector<double>({-1, -2})) << left;
+  }
+}
+
 TEST(MemoryPoints, CopyingCanBeCancelled) {
   MemoryPoints store;
   ASSERT_TRUE(store.Append(std::vector<double>(10, 1.0)).ok());

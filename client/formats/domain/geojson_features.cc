@@ -1,0 +1,127 @@
+#include "client/formats/domain/geojson_features.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "client/formats/domain/interior_point.h"
+#include "client/formats/number.h"
+
+namespace wellspace::formats {
+
+absl::Status GeoJsonFeatures::TakeProperty(GeoJsonLevel& feature, const std::string& name, const double* number,
+                                           std::string_view text) const {
+  if (text == "null" && number == nullptr) {
+    return absl::OkStatus();
+  }
+  if (!options_.region_property.empty() && name == options_.region_property) {
+    if (number == nullptr) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("expected a number for the attribute of the region, got ", std::string(text)));
+    }
+    feature.region = *number;
+  }
+  if (!options_.marker_property.empty() && name == options_.marker_property) {
+    constexpr double kLimit = 2147483648.0;
+    if (number == nullptr || *number != std::floor(*number) || *number < -kLimit || *number >= kLimit) {
+      return absl::InvalidArgumentError(
+          absl::StrCat("expected a whole number from -2^31 to below 2^31 for the marker, got ", std::string(text)));
+    }
+    feature.marker = static_cast<int32_t>(*number);
+  }
+  return absl::OkStatus();
+}
+
+void GeoJsonFeatures::End(const GeoJsonLevel& feature) {
+  const uint64_t segments = domain_.segment_count();
+  if (feature.marker) {
+    domain_.markers.resize(feature.first_segment);
+    domain_.markers.resize(segments, *feature.marker);
+  }
+  without_marker_ += !feature.marker && segments > feature.first_segment ? 1 : 0;
+  AddRegions(feature);
+}
+
+// Adds a seed in each polygon of a feature.
+void GeoJsonFeatures::AddRegions(const GeoJsonLevel& feature) {
+  bool has_polygons = false;
+  for (size_t at = feature.first_place; at < domain_.places.size();) {
+    const size_t outer = at++;
+    if (domain_.places[outer].ring == GeoJsonPlace::kNone) {
+      continue;
+    }
+    has_polygons = true;
+    while (at < domain_.places.size() && domain_.places[at].ring != GeoJsonPlace::kNone &&
+           domain_.places[at].ring > 0) {
+      ++at;
+    }
+    if (!feature.region) {
+      continue;
+    }
+    const uint64_t first = domain_.places[outer].first_point;
+    const uint64_t end = at < domain_.places.size() ? domain_.places[at].first_point : domain_.point_count();
+    std::vector<size_t> starts;
+    for (size_t ring = outer; ring < at; ++ring) {
+      starts.push_back(domain_.places[ring].first_point - first);
+    }
+    const auto point =
+        InteriorPoint(std::span<const double>(domain_.points).subspan(2 * first, 2 * (end - first)), starts);
+    if (!point) {
+      ++flat_;
+      continue;
+    }
+    domain_.seeds.push_back({.x = (*point)[0], .y = (*point)[1], .attribute = *feature.region});
+    domain_.seed_places.push_back(static_cast<uint32_t>(outer));
+  }
+  without_region_ += has_polygons && !feature.region ? 1 : 0;
+}
+
+void GeoJsonFeatures::NoteFeatures() const {
+  const auto note = [this](uint64_t count, std::string_view one, std::string_view more) {
+    if (count > 0) {
+      domain_.notes.push_back(absl::StrCat(domain_.name, ": ", count, std::string(count == 1 ? one : more)));
+    }
+  };
+  note(empty_, " geometry is null or has no positions", " geometries are null or have no positions");
+  if (!options_.region_property.empty()) {
+    const std::string name = Quote(options_.region_property);
+    note(without_region_, absl::StrCat(" feature with polygons has no property ", name, ", and gets no region"),
+         absl::StrCat(" features with polygons have no property ", name, ", and get no regions"));
+    note(flat_, " polygon has no inside, and gets no region", " polygons have no inside, and get no regions");
+  }
+  if (!options_.marker_property.empty()) {
+    const std::string name = Quote(options_.marker_property);
+    note(without_marker_, absl::StrCat(" feature has no property ", name, ", and its segments the marker 0"),
+         absl::StrCat(" features have no property ", name, ", and their segments the marker 0"));
+  }
+}
+
+// Longitudes that go around the world are no coordinates of one plane.
+void GeoJsonFeatures::NoteWidth() const {
+  constexpr double kHalfTurn = 180;
+  double low = INFINITY;
+  double high = -INFINITY;
+  for (size_t i = 0; i < domain_.points.size(); i += 2) {
+    low = std::min(low, domain_.points[i]);
+    high = std::max(high, domain_.points[i]);
+    if (std::abs(domain_.points[i]) > 2 * kHalfTurn || std::abs(domain_.points[i + 1]) > kHalfTurn / 2) {
+      return;  // these are no longitudes and latitudes
+    }
+  }
+  if (high - low > kHalfTurn) {
+    domain_.notes.push_back(absl::StrCat(domain_.name, ": longitudes span ", high - low,
+                                         " degrees; they are taken as coordinates of a plane, in which both sides of "
+                                         "the 180th meridian are far apart, and triangles near the poles are not what "
+                                         "they are on the sphere"));
+  }
+}
+
+void GeoJsonFeatures::Note() const {
+  NoteFeatures();
+  NoteWidth();
+}
+
+}  // namespace wellspace::formats

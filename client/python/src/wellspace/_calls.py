@@ -1,0 +1,152 @@
+"""Calls of gRPC, with bytes in and out, errors as exceptions, and an end when the caller wants one."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import math
+import uuid
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, TypeVar
+
+import grpc
+
+from . import _api
+from ._channel import Credentials
+from ._retry import Attempt, CancelToken, Retrier, RetryPolicy, now
+from .errors import CredentialsError, DamagedAnswerError, Error, UnavailableError, from_status
+
+T = TypeVar("T")
+
+
+@dataclasses.dataclass(frozen=True)
+class CallOptions:
+    """What every call takes besides its arguments."""
+
+    timeout: float | None = None  # seconds for all attempts together
+    cancel: CancelToken | None = None
+    request_id: str = ""
+    expected_revision: int = 0
+
+    def id_or_new(self) -> str:
+        """One for a call that changes something, so that what is repeated after a lost connection is done once."""
+        return self.request_id or uuid.uuid4().hex
+
+
+class Calls:
+    """Makes calls on a channel. Thread-safe."""
+
+    def __init__(
+        self, channel: grpc.Channel, credentials: Credentials, policy: RetryPolicy, is_gone: Callable[[], bool]
+    ) -> None:
+        """`is_gone` says whether the server will never answer again."""
+        self._is_gone = is_gone
+        self._channel = channel
+        self._credentials = credentials
+        self._retrier = Retrier(policy)
+
+    def run(self, options: CallOptions, make: Callable[[Attempt], T]) -> T:
+        """Runs attempts until one succeeds."""
+        deadline = math.inf if options.timeout is None else now() + options.timeout
+
+        def make_unless_gone(attempt: Attempt) -> T:
+            try:
+                return make(attempt)
+            except UnavailableError:
+                attempt.is_final = attempt.is_final or self._is_gone()
+                raise
+
+        return self._retrier.run(deadline, options.cancel or CancelToken(), make_unless_gone)
+
+    def unary(self, method: str, request: Any, response: str, options: CallOptions) -> Any:
+        """A call with one request and one answer, of the type `response`."""
+        answer: Any = self.run(options, lambda attempt: self.attempt_unary(method, request, response, attempt))
+        return answer
+
+    def unary_bytes(self, method: str, request: bytes, options: CallOptions) -> bytes:
+        """The same with serialized messages."""
+
+        def attempt_once(attempt: Attempt) -> bytes:
+            call = self._channel.unary_unary(_path(method)).future(request, **self._context(attempt))
+            return self._result(call, attempt)
+
+        return self.run(options, attempt_once)
+
+    def attempt_unary(self, method: str, request: Any, response: str, attempt: Attempt) -> Any:
+        """One attempt at such a call."""
+        call = self._channel.unary_unary(_path(method)).future(request.SerializeToString(), **self._context(attempt))
+        return parse(response, self._result(call, attempt))
+
+    def attempt_upload(self, method: str, requests: Iterable[bytes], response: str, attempt: Attempt) -> Any:
+        """One attempt at a call with a stream of requests and one answer."""
+        call = self._channel.stream_unary(_path(method)).future(iter(requests), **self._context(attempt))
+        return parse(response, self._result(call, attempt))
+
+    @contextlib.contextmanager
+    def stream(self, method: str, requests: bytes | Iterable[bytes], attempt: Attempt) -> Iterator[Iterator[bytes]]:
+        """One attempt at a call with a stream of answers, which ends with the block."""
+        if isinstance(requests, bytes):
+            call = self._channel.unary_stream(_path(method))(requests, **self._context(attempt))
+        else:
+            call = self._channel.stream_stream(_path(method))(iter(requests), **self._context(attempt))
+        with _cancelled_by(call, attempt):
+            yield self._answers(call)
+            call.cancel()
+
+    def _answers(self, call: Any) -> Iterator[bytes]:
+        try:
+            yield from call
+        except grpc.RpcError as error:
+            raise self._error(error) from None
+
+    def _result(self, call: Any, attempt: Attempt) -> bytes:
+        with _cancelled_by(call, attempt):
+            try:
+                result: bytes = call.result()
+                return result
+            except grpc.RpcError as error:
+                raise self._error(error) from None
+            except grpc.FutureCancelledError:
+                raise from_status("CANCELLED", "the call was cancelled", b"") from None
+
+    def _context(self, attempt: Attempt) -> dict[str, Any]:
+        token = self._credentials.read_token()
+        metadata = [] if token is None else [("authorization", f"Bearer {token}")]
+        return {"timeout": attempt.time_left(), "metadata": metadata}
+
+    @staticmethod
+    def _error(error: Any) -> Error:
+        code, message = error.code().name, error.details() or ""
+        details = b""
+        for key, value in error.trailing_metadata() or ():
+            if key == "grpc-status-details-bin":
+                details = value
+        if code == "UNAVAILABLE" and not details and "handshake failed" in message.lower():
+            return CredentialsError(f"the server's certificate is not trusted, or it speaks no TLS: {message}")
+        return from_status(code, message, details)
+
+
+@contextlib.contextmanager
+def _cancelled_by(call: Any, attempt: Attempt) -> Iterator[None]:
+    """Cancels `call` when the caller wants that, and when the block is left by an exception: Ctrl-C is one."""
+    cancel = call.cancel
+    attempt.cancel._add(cancel)
+    try:
+        yield
+    except BaseException:
+        cancel()
+        raise
+    finally:
+        attempt.cancel._remove(cancel)
+
+
+def _path(method: str) -> str:
+    return method if method.startswith("/") else f"/wellspace.v1.{method}"
+
+
+def parse(name: str, serialized: bytes) -> Any:
+    """The message `name` of its bytes; raises `DamagedAnswerError`."""
+    try:
+        return _api.message(name).FromString(serialized)
+    except Exception as error:  # of protobuf, which has several
+        raise DamagedAnswerError("the server's answer is damaged: no message") from error

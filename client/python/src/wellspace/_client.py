@@ -1,0 +1,240 @@
+"""A client of a server: meshes, estimates, and what the server says of itself."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Union
+
+from . import _api, _wire
+from ._arrays import coordinates
+from ._calls import Calls, CallOptions, parse
+from ._channel import Credentials, open_channel
+from ._domain import DomainArguments, make_domain
+from ._mesh import Mesh, mesh_of
+from ._messages import messages_of, point_chunks, receive
+from ._parameters import Parameters, fill, helpful_threads, split, takes
+from ._progress import OnProgress, ProgressOption, progress_of, told
+from ._receiver import MeshReceiver
+from ._retry import Attempt, CancelToken, RetryPolicy
+from ._server import LocalServer, shared_server
+from ._session_info import SessionInfo, info_of_session
+from .errors import InvalidArgumentError
+from .statistics import Estimate, ServerInfo, info_of
+from .statistics import fill as fill_dataclass
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+_WAITING = 1  # PHASE_WAITING: the work has not begun
+
+
+class MeshArguments(DomainArguments, Parameters, total=False):
+    """What `mesh` and `estimate` take besides points."""
+
+
+class Client:
+    """Talks to one server. Thread-safe.
+
+    What a lost connection interrupted is made again, once each; uploads, watches and downloads go on where they were.
+
+    Parameters
+    ----------
+    server : str, LocalServer or None
+        ``"HOST:PORT"``. None: ``$WELLSPACE_SERVER`` if that is set, with ``$WELLSPACE_TOKEN``; else a server of this
+        process's own, which is started if need be.
+    credentials : Credentials
+        What to show the server, and what to be shown.
+    retry : RetryPolicy
+        How patient to be.
+    """
+
+    def __init__(
+        self,
+        server: str | LocalServer | None = None,
+        *,
+        credentials: Credentials | None = None,
+        retry: RetryPolicy | None = None,
+    ) -> None:
+        if server is None and "WELLSPACE_SERVER" not in os.environ:
+            server = shared_server()
+        self.address, self._credentials = _address_of(server, credentials)
+        self._channel = open_channel(self.address, self._credentials)
+        own = server if isinstance(server, LocalServer) else None
+        self._calls = Calls(
+            self._channel,
+            self._credentials,
+            retry or RetryPolicy(),
+            is_gone=lambda: own is not None and not own.is_running,
+        )
+
+    def close(self) -> None:
+        """Closes the connection; calls that are under way end with `CancelledError`."""
+        self._channel.close()
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(self, *exception: Any) -> None:
+        self.close()
+
+    @takes(DomainArguments, Parameters)
+    def mesh(
+        self,
+        points: Any,
+        *,
+        boundary: bool = True,
+        progress: ProgressOption = None,
+        timeout: float | None = None,
+        cancel: CancelToken | None = None,
+        **arguments: Unpack[MeshArguments],
+    ) -> Mesh:
+        """Meshes points, and in 2-D segments between them. See `wellspace.mesh`, which has the same arguments."""
+        cloud = _Cloud(points, arguments, "mesh")
+        with told(progress) as on_progress:
+            return self._calls.run(
+                CallOptions(timeout=timeout, cancel=cancel),
+                lambda attempt: self._attempt_mesh(cloud, boundary, on_progress, attempt),
+            )
+
+    def _attempt_mesh(self, cloud: _Cloud, boundary: bool, on_progress: OnProgress, attempt: Attempt) -> Mesh:
+        receiver = MeshReceiver(cloud.points.shape[1], len(cloud.points))
+        has_begun = False  # the work, which is not done twice
+        try:
+            with self._calls.stream("MeshingService/MeshPoints", cloud.requests(boundary), attempt) as answers:
+                for number, part in (field for answer in answers for field in messages_of(answer)):
+                    if number == 1:
+                        event = parse("ProgressEvent", bytes(part))
+                        has_begun = has_begun or event.phase != _WAITING
+                        on_progress(progress_of(event))
+                    else:
+                        has_begun = True
+                        receive(receiver, number - 2, part)
+        except Exception:
+            attempt.is_final = has_begun and not attempt.cancel.is_cancelled
+            raise
+        receiver.finish()
+        return mesh_of(receiver)
+
+    @takes(DomainArguments, Parameters)
+    def estimate(
+        self,
+        points: Any,
+        *,
+        timeout: float | None = None,
+        cancel: CancelToken | None = None,
+        **arguments: Unpack[MeshArguments],
+    ) -> Estimate:
+        """Says how large the mesh of the same arguments would be, without meshing. See `wellspace.mesh`."""
+        cloud = _Cloud(points, arguments, "estimate")
+
+        def attempt_once(attempt: Attempt) -> Any:
+            requests = cloud.requests(boundary=False)
+            return self._calls.attempt_upload("MeshingService/EstimateMesh", requests, "EstimateMeshResponse", attempt)
+
+        return fill_dataclass(Estimate, self._calls.run(CallOptions(timeout=timeout, cancel=cancel), attempt_once))
+
+    def info(self, *, timeout: float | None = None) -> ServerInfo:
+        """What the server is, accepts and does."""
+        request = _api.message("GetServerInfoRequest")()
+        return info_of(
+            self._calls.unary(
+                "MeshingService/GetServerInfo", request, "GetServerInfoResponse", CallOptions(timeout=timeout)
+            )
+        )
+
+    def is_serving(self, *, timeout: float | None = None) -> bool:
+        """Whether the server takes work: False while it stops."""
+        health = "grpc.health.v1.Health"
+        request = _api.message("grpc.health.v1.HealthCheckRequest")()
+        response = "grpc.health.v1.HealthCheckResponse"
+        answer = self._calls.unary(f"/{health}/Check", request, response, CallOptions(timeout=timeout))
+        return bool(answer.status == 1)
+
+    def sessions(self, labels: Mapping[str, str] | None = None, *, timeout: float | None = None) -> list[SessionInfo]:
+        """The caller's sessions that have all of `labels`, in the order of their creation."""
+        request = _api.message("ListSessionsRequest")(labels=dict(labels or {}))
+        found = []
+        while True:
+            page = self._calls.unary(
+                "SessionService/ListSessions", request, "ListSessionsResponse", CallOptions(timeout=timeout)
+            )
+            found += [info_of_session(session) for session in page.sessions]
+            if not page.next_page_token:
+                return found
+            request.page_token = page.next_page_token
+
+
+# What the functions of the package take for a server.
+Server = Union[str, LocalServer, Client, None]
+
+
+def _address_of(server: str | LocalServer | None, credentials: Credentials | None) -> tuple[str, Credentials]:
+    if isinstance(server, LocalServer):
+        return server.address, server.credentials
+    token = os.environ.get("WELLSPACE_TOKEN") if server is None else None
+    address = os.environ["WELLSPACE_SERVER"] if server is None else server
+    if not isinstance(address, str):
+        raise InvalidArgumentError(f"server is {address!r}; expected 'HOST:PORT'", field="server")
+    return address, credentials or Credentials(token=token)
+
+
+_clients: dict[tuple[str, Credentials], Client] = {}
+_lock = threading.Lock()
+
+
+def client_of(server: Server) -> Client:
+    """The client of a server, one for each address."""
+    if isinstance(server, Client):
+        return server
+    if server is None and "WELLSPACE_SERVER" not in os.environ:
+        server = shared_server()
+    with _lock:
+        if isinstance(server, LocalServer):
+            server.client = server.client or Client(server)
+            return server.client
+        address, credentials = _address_of(server, None)
+        if (address, credentials) not in _clients:
+            _clients[address, credentials] = Client(address, credentials=credentials)
+        return _clients[address, credentials]
+
+
+def _forget_clients() -> None:
+    global _lock
+    _lock = threading.Lock()
+    _clients.clear()  # a channel of the parent is of no use in a forked child
+
+
+os.register_at_fork(after_in_child=_forget_clients)
+
+
+class _Cloud:
+    """Points, and in 2-D segments, with what is asked of their mesh; checked."""
+
+    def __init__(self, points: Any, arguments: Mapping[str, Any], function: str) -> None:
+        domain, parameters = split(function, arguments, DomainArguments, Parameters)
+        self.points = coordinates(points, "points")
+        self.domain = None
+        if domain:
+            if self.points.shape[1] != 2:
+                name = next(iter(domain))
+                raise InvalidArgumentError(
+                    f"{name}: for points in 2-D only; these are in {self.points.shape[1]}-D", field=name
+                )
+            self.domain = make_domain(domain, len(self.points), "box" in parameters)
+        self.message = fill(_api.message("MeshParameters")(), self.points.shape[1], parameters)
+        if "threads" not in parameters:
+            self.message.threads = helpful_threads(self.points, parameters)
+
+    def requests(self, boundary: bool) -> Iterator[bytes]:
+        """Serialized requests of MeshPoints, and of EstimateMesh."""
+        first = _wire.message_field(1, self.message.SerializeToString())
+        yield first + (_wire.varint(3 << 3) + b"\1" if boundary else b"")
+        for _, _, chunk in point_chunks(self.points):
+            yield _wire.message_field(2, chunk)
+        if self.domain is not None:
+            for _, chunk in self.domain.segment_chunks():
+                yield _wire.message_field(4, chunk)
+            for _, chunk in self.domain.face_options():
+                yield _wire.message_field(5, chunk)

@@ -1,0 +1,143 @@
+"""Segments between points in 2-D, and the faces that they bound."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from typing import Any, TypedDict
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _api, _wire
+from ._arrays import Floats, Indices, choice, coordinates, indices, number, whole_numbers
+from .errors import InvalidArgumentError
+
+# Segments and seeds of one message: about 256 KiB.
+_SEGMENTS_OF_A_REQUEST = 16_384
+_SEEDS_OF_A_REQUEST = 4_096
+
+_FACES = _api.enum_numbers("FaceRule")
+_CROSSINGS = _api.enum_numbers("CrossingRule")
+
+
+@dataclasses.dataclass(frozen=True)
+class RegionSeed:
+    """A point that stands for the face which it lies in; it becomes no vertex.
+
+    Parameters
+    ----------
+    x, y : float
+        In the unit of the points. Not on a segment.
+    region : int
+        The region of the triangles there, see `Mesh.regions`: the name is ``"region_7"`` for 7. 0: that of faces
+        without a seed.
+    max_area : float
+        No triangle there is larger. In the unit of the points, squared; 0: no bound.
+    """
+
+    x: float
+    y: float
+    region: int = 0
+    max_area: float = 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Domain:
+    """Segments, seeds and rules, checked; for messages."""
+
+    ends: Indices  # (m, 2)
+    markers: npt.NDArray[np.int32] | None  # (m,)
+    first_open: int  # segments from this one on are part of no ring
+    holes: Floats  # (k, 2)
+    regions: tuple[RegionSeed, ...]
+    faces: int
+    crossings: int
+
+    def segment_chunks(self) -> Iterator[tuple[int, bytes]]:
+        """Serialized SegmentChunks, and the number of the first segment of each."""
+        for begin, end, is_open in ((0, self.first_open, False), (self.first_open, len(self.ends), True)):
+            for first in range(begin, end, _SEGMENTS_OF_A_REQUEST):
+                last = min(first + _SEGMENTS_OF_A_REQUEST, end)
+                message = _api.message("SegmentChunk")(open=is_open)
+                if self.markers is not None:
+                    message.markers.extend(self.markers[first:last].tolist())
+                yield first, _wire.packed_field(1, self.ends[first:last]) + message.SerializeToString()
+
+    def face_options(self) -> Iterator[tuple[int, bytes]]:
+        """Serialized FaceOptions, at least one, and the number of the first seed of each."""
+        seed = _api.message("FaceSeed")
+        seeds = [seed(x=x, y=y, hole=True) for x, y in self.holes.tolist()]
+        seeds += [seed(x=r.x, y=r.y, region=r.region, max_area=r.max_area) for r in self.regions]
+        for first in range(0, max(1, len(seeds)), _SEEDS_OF_A_REQUEST):
+            options = _api.message("FaceOptions")(faces=self.faces, crossings=self.crossings)
+            options.seeds.extend(seeds[first : first + _SEEDS_OF_A_REQUEST])
+            yield first, options.SerializeToString()
+
+
+class DomainArguments(TypedDict, total=False):
+    """
+    segments : (m, 2) int
+        In 2-D: numbers of points. The mesh has each segment as a union of edges. Default: none.
+    markers : (m,) int
+        A marker for each segment, which tells parts of the boundary apart: see `Mesh.facet_names`. Default: 0.
+    open_segments : (k, 2) int
+        Segments that are part of no ring: `faces` "even-odd" passes over them.
+    open_markers : (k,) int
+        Their markers.
+    holes : (h, 2) float
+        Points in faces that are not meshed.
+    regions : sequence of RegionSeed, or of (x, y, region, max_area)
+        Points in faces that are a region of their own, or that have a largest area of triangles.
+    faces : {"box", "holes", "even-odd"}
+        Which faces, into which segments cut the plane, are meshed: all in the box; all bounded ones; those that an odd
+        number of segments separates from infinity. Faces with a hole never are. Default "holes", with `box` "box".
+    crossings : {"refuse", "split"}
+        What becomes of segments that cross, and of points too near to a segment: an error, or vertices at crossings,
+        and segments led through such points. Default "refuse".
+    """
+
+    segments: Any
+    markers: Any
+    open_segments: Any
+    open_markers: Any
+    holes: Any
+    regions: Any
+    faces: str
+    crossings: str
+
+
+def make_domain(given: Mapping[str, Any], point_count: int | None = None, has_box: bool = False) -> Domain:
+    """Checks the DomainArguments that are given; `point_count` is None where points may come later."""
+    closed = indices(given.get("segments", []), "segments", 2, point_count)
+    opened = indices(given.get("open_segments", []), "open_segments", 2, point_count)
+    marked = None
+    if "markers" in given or "open_markers" in given:
+        parts = (("markers", len(closed)), ("open_markers", len(opened)))
+        marked = np.concatenate(
+            [whole_numbers(given.get(name, np.zeros(size, np.int32)), name, size) for name, size in parts]
+        )
+    rule = given.get("faces", "box" if has_box else "holes")
+    return Domain(
+        ends=np.concatenate([closed, opened]),
+        markers=marked,
+        first_open=len(closed),
+        holes=coordinates(given.get("holes", []), "holes", 2),
+        regions=tuple(_seed(one, f"regions[{row}]") for row, one in enumerate(given.get("regions", ()))),
+        faces=choice(rule, "faces", _FACES),
+        crossings=choice(given.get("crossings", "refuse"), "crossings", _CROSSINGS),
+    )
+
+
+def _seed(value: Any, name: str) -> RegionSeed:
+    """A RegionSeed, or (x, y[, region[, max_area]])."""
+    if isinstance(value, RegionSeed):
+        value = dataclasses.astuple(value)
+    row = list(value) if isinstance(value, (tuple, list, np.ndarray)) else []
+    if not 2 <= len(row) <= 4:
+        raise InvalidArgumentError(f"{name} is {value!r}; expected (x, y, region, max_area)", field=name)
+    x, y, region, max_area = (*row, 0, 0.0)[:4] if len(row) < 3 else (*row, 0.0)[:4]
+    if number(region, name) != int(number(region, name)) or not -(2**31) <= region < 2**31:
+        raise InvalidArgumentError(f"{name} has the region {region!r}; expected a whole number of 32 bits", field=name)
+    place = coordinates([[x, y]], name, 2)[0].tolist()
+    return RegionSeed(place[0], place[1], int(region), number(max_area, name))

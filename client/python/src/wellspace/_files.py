@@ -1,0 +1,174 @@
+"""Meshes in files, and as objects of other packages."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import pathlib
+import tempfile
+import zipfile
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .errors import InvalidArgumentError, MissingPackageError
+
+if TYPE_CHECKING:
+    from ._mesh import Mesh
+
+# By the dimension: the simplices and the facets of meshio.
+_CELLS = {2: ("triangle", "line"), 3: ("tetra", "triangle")}
+_VTK_TRIANGLE, _VTK_TETRA = 5, 10
+
+
+def save(mesh: Mesh, path: str | os.PathLike[str], options: dict[str, Any]) -> None:
+    """See Mesh.save. A file that cannot be written to its end is not there."""
+    target = pathlib.Path(path)
+    if target.suffix != ".npz":
+        write = _package("meshio", f"to write {target.suffix or 'files without an extension'}").write
+        converted = to_meshio(mesh)
+        if target.suffix == ".msh":  # of Gmsh, 2.2: meshio takes it for one of ANSYS, and has no entities for 4.1
+            options = {"file_format": "gmsh22", **options}
+            del converted.cell_data["wellspace:tag"]  # which physical groups are, and meshio could not read again
+        write(target, converted, **options)
+        return
+    if options:
+        raise InvalidArgumentError(f".npz takes no options; got {', '.join(options)}", field=next(iter(options)))
+    handle, part = tempfile.mkstemp(prefix=target.name, suffix=".part", dir=target.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            np.savez(file, **_members(mesh))
+        umask = os.umask(0)
+        os.umask(umask)
+        os.chmod(part, 0o666 & ~umask)
+        os.replace(part, target)
+    except BaseException:
+        os.unlink(part)
+        raise
+
+
+def _members(mesh: Mesh) -> dict[str, Any]:
+    """The arrays of the file: client/formats/npz.h has their names."""
+    members: dict[str, Any] = {"points": mesh.points}
+    if mesh.weights is not None:
+        members["weights"] = mesh.weights
+    members["simplices"] = mesh.simplices.astype(np.uint32, copy=False)
+    if mesh.facet_names:
+        members["vertex_origins"] = mesh.vertex_origins.astype(np.int64)
+        members["vertex_tags"] = mesh.vertex_tags
+        members["facets"] = mesh.facets.astype(np.uint32, copy=False)
+        members["facet_tags"] = mesh.facet_tags
+        members["facet_names"] = np.array(list(mesh.facet_names.values()), "U")
+        members["facet_name_tags"] = np.array(list(mesh.facet_names), np.int32)
+    if mesh.region_names:
+        members["regions"] = mesh.regions
+        members["region_ids"] = np.array(list(mesh.region_names), np.int32)
+        members["region_names"] = np.array(list(mesh.region_names.values()), "U")
+    return members
+
+
+def load(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The attributes of a Mesh from a .npz."""
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            found = {name: archive[name] for name in archive.files}
+    except (zipfile.BadZipFile, ValueError, AttributeError) as error:
+        raise InvalidArgumentError(f"{path}: expected .npz, with arrays of numbers: {error}", field="path") from error
+    for name in ("points", "simplices"):
+        if name not in found or found[name].ndim != 2:
+            raise InvalidArgumentError(f"{path}: no array {name!r} of two dimensions", field="path")
+    points, simplices = found["points"], found["simplices"]
+    if simplices.shape[1] != points.shape[1] + 1:
+        what = f"simplices of {simplices.shape[1]} vertices in {points.shape[1]}-D"
+        raise InvalidArgumentError(f"{path}: {what}", field="path")
+    d, kind = points.shape[1], np.int32 if len(points) <= 2**31 else np.int64
+    none = np.empty(0, np.int32)
+    if len(points):
+        box = np.array([points.min(axis=0), points.max(axis=0)])
+    else:
+        box = np.zeros((2, d))
+    regions = found.get("regions", none)
+    ids = found["region_ids"].tolist() if "region_ids" in found else np.unique(regions).tolist()
+    names = found["region_names"].tolist() if "region_names" in found else [_region_name(number) for number in ids]
+    return {
+        "points": points,
+        "simplices": simplices.astype(kind),
+        "input_vertices": none,
+        "facets": found.get("facets", none.reshape(0, d)).astype(kind),
+        "facet_tags": found.get("facet_tags", none),
+        "facet_names": dict(zip(found.get("facet_name_tags", none).tolist(), found.get("facet_names", none).tolist())),
+        "regions": regions,
+        "region_names": dict(zip(ids, names)),
+        "vertex_origins": found.get("vertex_origins", none),
+        "vertex_tags": found.get("vertex_tags", none),
+        "weights": found.get("weights"),
+        "moved_vertices": none,
+        "box": box,
+    }
+
+
+def _region_name(number: int) -> str:
+    return "domain" if number == 1 else f"region_{number}"
+
+
+def to_meshio(mesh: Mesh) -> Any:
+    """See Mesh.to_meshio."""
+    meshio = _package("meshio", "for to_meshio")
+    simplex, facet = _cells_of(mesh)
+    points = _spatial(mesh) if mesh.dimension == 2 else mesh.points
+    blocks = [(simplex, mesh.simplices, mesh.regions if len(mesh.regions) else np.zeros(len(mesh.simplices), np.int32))]
+    if len(mesh.facets):
+        blocks.append((facet, mesh.facets, mesh.facet_tags))
+    tags = [tags for _, _, tags in blocks]
+    data: dict[str, Any] = {"wellspace:tag": tags, "gmsh:physical": tags, "gmsh:geometrical": tags}
+    point_data: dict[str, Any] = {}
+    if len(mesh.vertex_origins):
+        point_data = {"wellspace:origin": mesh.vertex_origins, "wellspace:tag": mesh.vertex_tags}
+    if mesh.weights is not None:
+        point_data["wellspace:weight"] = mesh.weights
+    names = {name: np.array([tag, mesh.dimension - 1]) for tag, name in mesh.facet_names.items()}
+    names |= {name: np.array([tag, mesh.dimension]) for tag, name in mesh.region_names.items()}
+    cells = [(kind, rows) for kind, rows, _ in blocks]
+    return meshio.Mesh(points, cells, point_data=point_data, cell_data=data, field_data=names)
+
+
+def to_pyvista(mesh: Mesh) -> Any:
+    """See Mesh.to_pyvista."""
+    pyvista = _package("pyvista", "for to_pyvista")
+    _cells_of(mesh)
+    kind = _VTK_TRIANGLE if mesh.dimension == 2 else _VTK_TETRA
+    width = mesh.dimension + 1
+    cells = np.empty((len(mesh.simplices), width + 1), np.int64)
+    cells[:, 0] = width
+    cells[:, 1:] = mesh.simplices
+    grid = pyvista.UnstructuredGrid(cells.ravel(), np.full(len(cells), kind, np.uint8), _spatial(mesh))
+    if len(mesh.regions):
+        grid.cell_data["region"] = mesh.regions
+    if len(mesh.vertex_tags):
+        grid.point_data["tag"] = mesh.vertex_tags
+        grid.point_data["origin"] = mesh.vertex_origins
+    if mesh.weights is not None:
+        grid.point_data["weight"] = mesh.weights
+    return grid
+
+
+def _spatial(mesh: Mesh) -> Any:
+    """The vertices with three coordinates."""
+    if mesh.dimension == 3:
+        return mesh.points
+    return np.column_stack([mesh.points, np.zeros(len(mesh.points))])
+
+
+def _cells_of(mesh: Mesh) -> tuple[str, str]:
+    if mesh.dimension not in _CELLS:
+        raise InvalidArgumentError(
+            f"a mesh in {mesh.dimension}-D; meshio and pyvista have 2-D and 3-D, save takes .npz", field="mesh"
+        )
+    return _CELLS[mesh.dimension]
+
+
+def _package(name: str, purpose: str) -> Any:
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise MissingPackageError(f"{name} is needed {purpose}, and is not installed: pip install {name}") from error

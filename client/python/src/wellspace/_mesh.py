@@ -1,0 +1,178 @@
+"""A mesh as arrays."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _files
+from ._receiver import MeshReceiver
+from .errors import InvalidArgumentError
+from .statistics import Statistics, statistics_of
+
+# Of Mesh.vertex_origins, where the number of an input point does not stand.
+STEINER, REPAIR, CORNER = -1, -2, -3
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Mesh:
+    """A simplicial mesh of n vertices and m simplices in d dimensions.
+
+    All numbers of vertices count from 0. Arrays of them are of int32, or of int64 where that is too small. Lengths are
+    in the unit of the input points.
+
+    Attributes
+    ----------
+    points : (n, d) float64
+        The vertices. The distinct input points come first, in their order and with their bits unchanged.
+    simplices : (m, d + 1) int
+        Triangles in 2-D, tetrahedra in 3-D, and so on, each positively oriented.
+    input_vertices : (p,) int
+        For each input point the vertex that it became; -1 for one that lies in no face which is meshed.
+    facets : (f, d) int
+        The facets of the boundary, edges in 2-D and triangles in 3-D. They look outward: in 2-D the mesh is on the left
+        of an edge, in 3-D a triangle is counterclockwise seen from outside.
+    facet_tags : (f,) int32
+        The tag of each facet, above 0.
+    facet_names : dict of int to str
+        The name of each tag: ``"xmin"``, ``"xmax"``, ``"ymin"`` … of the box, ``"marker_7"`` or ``"unmarked"`` of
+        segments.
+    regions : (m,) int32
+        The region of each simplex.
+    region_names : dict of int to str
+        The name of each region: ``"domain"``, or ``"region_7"`` for the region 7 of a `RegionSeed`.
+    vertex_origins : (n,) int
+        Where each vertex comes from: the number of the first input point that became it, or -1: the refinement, -2: the
+        repair of slivers, -3: it is a corner of the box.
+    vertex_tags : (n,) int32
+        The least tag of a facet that each vertex is of; 0 inside.
+    weights : (n,) float64, or None
+        Of a regular triangulation: squared radii of spheres about the vertices.
+    moved_vertices : (k,) int
+        In a session: vertices that its last mesh had at another place. Ascending.
+    box : (2, d) float64
+        Low and high corner of the box that the simplices decompose; of a domain with segments the bounding box of what
+        is meshed.
+    statistics : Statistics or None
+        Figures of the mesh and of the run that made it; None for a mesh from a file.
+    revision : int
+        Of the session's mesh; 0 for others.
+
+    What is about the boundary, from `facets` to `vertex_tags`, is empty if the mesh was asked for without it.
+    """
+
+    points: npt.NDArray[np.float64]
+    simplices: npt.NDArray[Any]
+    input_vertices: npt.NDArray[Any]
+    facets: npt.NDArray[Any]
+    facet_tags: npt.NDArray[np.int32]
+    facet_names: dict[int, str]
+    regions: npt.NDArray[np.int32]
+    region_names: dict[int, str]
+    vertex_origins: npt.NDArray[Any]
+    vertex_tags: npt.NDArray[np.int32]
+    weights: npt.NDArray[np.float64] | None
+    moved_vertices: npt.NDArray[Any]
+    box: npt.NDArray[np.float64]
+    statistics: Statistics | None = None
+    revision: int = 0
+
+    @property
+    def dimension(self) -> int:
+        """Of the space: d."""
+        return int(self.points.shape[1])
+
+    def __repr__(self) -> str:
+        return f"<wellspace.Mesh: {len(self.points)} vertices, {len(self.simplices)} simplices in {self.dimension}-D>"
+
+    def tag(self, name: str) -> int:
+        """The tag of the part of the boundary with this name."""
+        for tag, other in self.facet_names.items():
+            if other == name:
+                return tag
+        names = ", ".join(map(repr, self.facet_names.values())) or "none: the mesh has no boundary"
+        raise InvalidArgumentError(f"no part of the boundary is called {name!r}; there are {names}", field="name")
+
+    def boundary(self, name: str | None = None) -> npt.NDArray[Any]:
+        """The facets with this name, (k, d); without a name all."""
+        return self.facets if name is None else self.facets[self.facet_tags == self.tag(name)]
+
+    def boundary_vertices(self, name: str | None = None) -> npt.NDArray[Any]:
+        """The vertices of these facets, ascending, each once."""
+        return np.unique(self.boundary(name))
+
+    def region(self, name: str) -> npt.NDArray[Any]:
+        """The simplices of the region with this name, (k, d + 1)."""
+        for number, other in self.region_names.items():
+            if other == name:
+                return self.simplices[self.regions == number]
+        names = ", ".join(map(repr, self.region_names.values())) or "none: the mesh was asked for without them"
+        raise InvalidArgumentError(f"no region is called {name!r}; there are {names}", field="name")
+
+    def save(self, path: str | os.PathLike[str], **options: Any) -> None:
+        """Writes the mesh to a file; the extension says in which format.
+
+        ``.npz`` is written as the tool `wellspace` does: ``wellspace check`` reads it. All other formats are those of
+        `meshio.write`, which gets `options`, and are for 2-D and 3-D.
+        """
+        _files.save(self, path, options)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Mesh:
+        """Reads a ``.npz`` of `save`, or of the tool `wellspace`."""
+        return cls(**_files.load(path))
+
+    def to_meshio(self) -> Any:
+        """The mesh as a `meshio.Mesh`, with the facets as cells, tags and regions as ``"wellspace:tag"`` of the cells.
+
+        Tags and regions are physical groups of Gmsh, too. For 2-D and 3-D.
+        """
+        return _files.to_meshio(self)
+
+    def to_pyvista(self) -> Any:
+        """The simplices as a `pyvista.UnstructuredGrid`, with ``"region"`` of the cells and ``"tag"`` of the points.
+
+        For 2-D and 3-D; in 2-D, z is 0.
+        """
+        return _files.to_pyvista(self)
+
+
+def signed(values: npt.NDArray[Any], limit: int) -> npt.NDArray[Any]:
+    """uint32 as int32, without a copy, where all below `limit` fit; the highest numbers become -1, -2, -3."""
+    if limit <= 2**31:
+        return values.view("<i4")
+    wide = values.astype(np.int64)
+    wide[values >= np.uint32(2**32 - 3)] -= 2**32
+    return wide
+
+
+def mesh_of(receiver: MeshReceiver) -> Mesh:
+    """The mesh that has come."""
+    m, arrays = receiver.metadata, receiver.arrays
+    d, n = m.dimension, m.vertex_count
+    counts = [part.facet_count for part in m.boundary]
+    regions = arrays["simplex_regions"]
+    if not m.has_simplex_regions:
+        only = m.regions[0].id if m.regions else 0
+        regions = np.full(m.simplex_count if m.regions else 0, only, np.int32)
+    return Mesh(
+        points=arrays["points"].reshape(n, d),
+        simplices=signed(arrays["simplices"], n).reshape(-1, d + 1),
+        input_vertices=signed(arrays["input_vertices"], n),
+        facets=signed(arrays["facets"], n).reshape(-1, d),
+        facet_tags=np.repeat(np.array([part.tag for part in m.boundary], np.int32), counts),
+        facet_names={part.tag: part.name for part in m.boundary},
+        regions=regions,
+        region_names={region.id: region.name for region in m.regions},
+        vertex_origins=signed(arrays["vertex_origins"], m.input_point_count),
+        vertex_tags=arrays["vertex_tags"],
+        weights=arrays["weights"] if m.has_weights else None,
+        moved_vertices=signed(receiver.moved_vertices, n),
+        box=np.array([list(m.domain.low), list(m.domain.high)]),
+        statistics=statistics_of(m.statistics),
+        revision=m.revision,
+    )

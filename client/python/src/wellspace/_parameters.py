@@ -1,0 +1,228 @@
+"""What to mesh, and how well: MeshParameters of the service, with the names of this package."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import math
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, TypedDict, TypeVar
+
+import numpy as np
+
+from . import _api
+from ._arrays import Floats, choice, count, number, row_of_numbers
+from .errors import InvalidArgumentError
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+# Of the service, and hence the argument.
+_CRITERIA = _api.enum_numbers("Criterion")
+
+
+class Parameters(TypedDict, total=False):
+    """
+    criterion : {"radius-edge", "well-spaced"}
+        What `rho` bounds: circumradius / shortest edge of every simplex; or, for every vertex, the farthest node of its
+        Voronoi cell / its nearest neighbour, which is stronger and takes three to four times as many vertices. Default
+        "radius-edge".
+    rho : float
+        The bound of `criterion`. Default: sqrt(2) in 2-D, 2 in 3-D, 2.9, 4.1 and 5.8 in 4-D to 6-D, for which
+        refinement ends whatever the points.
+    min_angle : float
+        In 2-D, in the place of `rho`: no angle of a triangle is smaller. Degrees, above 0 and up to 33.7; above 20.7
+        refinement need not end.
+    size : float
+        No simplex has a larger circumradius. In the unit of the points. Default: no bound.
+    size_boxes : sequence of (low, high, size)
+        Boxes with `d` low and `d` high coordinates in which circumradii are smaller still; away from a box, sizes grow
+        no faster than the distance from it. In the unit of the points. Default: none.
+    min_dihedral : float
+        In 3-D, no dihedral angle of a tetrahedron is smaller: vertices are moved, and some added, until that holds.
+        What cannot be repaired is counted in ``statistics.slivers.left``. Degrees, from 0 to 18; 0 turns it off.
+        Default: 12 in 3-D, 0 elsewhere.
+    pump_weights : bool
+        From 3-D on: give vertices weights, under which the worst simplices are best. The mesh is then the regular
+        triangulation of its vertices with `Mesh.weights`, and `rho` does not hold. Default False.
+    merge_distance : float
+        Points no farther than this from another one become that one's vertex. In the unit of the points. In a session
+        it cannot change. Default 0: equal points only.
+    keep_vertices : bool
+        In a session: vertices of its last mesh stay where they are, and the repair of slivers moves only new ones.
+        Default False.
+    box : (low, high)
+        The box to mesh: `d` low and `d` high coordinates, in the unit of the points. In a session it cannot change.
+        Default: the bounding box of the points, grown by `margin`.
+    margin : float
+        By how much that is grown on every side: a part of its longest side, at least 0. Not used with `box`. Default
+        0.25.
+    max_vertices : int
+        Fail with `LimitError` before the mesh has more vertices. Default: what the server allows, but not above 50
+        million.
+    threads : int
+        Threads that mesh; the server takes fewer if it has fewer. The mesh does not depend on it. Default: as many as
+        help, up to the processors of this machine; in a session 1.
+    """
+
+    criterion: str
+    rho: float
+    min_angle: float
+    size: float
+    size_boxes: Iterable[tuple[Sequence[float], Sequence[float], float]]
+    min_dihedral: float
+    pump_weights: bool
+    merge_distance: float
+    keep_vertices: bool
+    box: tuple[Sequence[float], Sequence[float]]
+    margin: float
+    max_vertices: int
+    threads: int
+
+
+# Those of the service that a number sets as it is.
+_NUMBERS = {
+    "rho": "rho",
+    "size": "max_circumradius",
+    "min_dihedral": "min_dihedral",
+    "merge_distance": "merge_distance",
+    "margin": "margin",
+}
+
+
+def takes(*kinds: Any) -> Callable[[Function], Function]:
+    """Has the signature and the docstring of a function, which takes the keys of `kinds` as **arguments, name them."""
+
+    def change(function: Function) -> Function:
+        signature = inspect.signature(function)
+        own = [p for p in signature.parameters.values() if p.kind is not inspect.Parameter.VAR_KEYWORD]
+        named = [
+            inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=_text(annotation))
+            for kind in kinds
+            for name, annotation in kind.__annotations__.items()
+        ]
+        function.__signature__ = signature.replace(parameters=[*own, *named])  # type: ignore[attr-defined]
+        function.__doc__ = naming(function.__doc__, *kinds)
+        return function
+
+    return change
+
+
+def naming(document: str | None, *kinds: Any) -> str:
+    """A docstring in the place of whose "**arguments" the keys of `kinds` stand."""
+    lines = "\n".join(inspect.cleandoc(kind.__doc__ or "") for kind in kinds)
+    return inspect.cleandoc(document or "").replace("**arguments", lines)
+
+
+def _text(annotation: Any) -> Any:
+    return getattr(annotation, "__forward_arg__", annotation)
+
+
+def split(function: str, arguments: Mapping[str, Any], *kinds: Any) -> list[dict[str, Any]]:
+    """`arguments` by the kind that has their names, without those that are None. Raises TypeError, as Python does."""
+    for name in arguments:
+        if not any(name in kind.__annotations__ for kind in kinds):
+            raise TypeError(f"{function}() got an unexpected keyword argument {name!r}")
+    given = {name: value for name, value in arguments.items() if value is not None}
+    return [{name: value for name, value in given.items() if name in kind.__annotations__} for kind in kinds]
+
+
+def fill(message: Any, dimension: int, given: Mapping[str, Any]) -> Any:
+    """Sets the fields of a MeshParameters that `given` names; `split` has checked the names."""
+    message.dimension = count(dimension, "dimension", 2**31 - 1)
+    for name, field in _NUMBERS.items():
+        if name in given:
+            setattr(message, field, number(given[name], name))
+    for name in ("pump_weights", "keep_vertices"):
+        if name in given:
+            setattr(message, name, bool(given[name]))
+    if "max_vertices" in given:
+        message.max_vertices = count(given["max_vertices"], "max_vertices")
+    if "threads" in given:
+        message.threads = count(given["threads"], "threads", 2**31 - 1)
+    if "criterion" in given:
+        message.criterion = choice(given["criterion"], "criterion", _CRITERIA)
+    if "min_angle" in given:
+        if "rho" in given:
+            raise InvalidArgumentError("both rho and min_angle; expected one of them", field="min_angle")
+        message.rho = rho_of_angle(number(given["min_angle"], "min_angle"), dimension)
+    if "box" in given:
+        low, high = _box(given["box"], dimension, "box")
+        message.ClearField("domain")
+        message.domain.low.extend(low)
+        message.domain.high.extend(high)
+    if "size_boxes" in given:
+        message.ClearField("size_boxes")
+        for row, one in enumerate(given["size_boxes"]):
+            _add_size_box(message.size_boxes.add(), one, dimension, f"size_boxes[{row}]")
+    return message
+
+
+def rho_of_angle(degrees: float, dimension: int) -> float:
+    """The bound on circumradius / shortest edge of triangles without smaller angles."""
+    if dimension != 2:
+        what = f"min_angle is for 2-D, and the points are in {dimension}-D; use rho"
+        raise InvalidArgumentError(what, field="min_angle")
+    if not 0.001 <= degrees <= 33.7:
+        raise InvalidArgumentError(f"min_angle is {degrees}; expected degrees from 0.001 to 33.7", field="min_angle")
+    return 0.5 / math.sin(math.radians(degrees))
+
+
+def _box(value: Any, dimension: int, name: str) -> tuple[list[float], list[float]]:
+    try:
+        low, high = value
+    except (TypeError, ValueError):
+        raise InvalidArgumentError(f"{name} is {value!r}; expected (low, high)", field=name) from None
+    sides = row_of_numbers(low, f"{name}.low", dimension), row_of_numbers(high, f"{name}.high", dimension)
+    return sides[0].tolist(), sides[1].tolist()
+
+
+def _add_size_box(message: Any, value: Any, dimension: int, name: str) -> None:
+    try:
+        low, high, size = value
+    except (TypeError, ValueError):
+        raise InvalidArgumentError(f"{name} is {value!r}; expected (low, high, size)", field=name) from None
+    low, high = _box((low, high), dimension, name)
+    message.low.extend(low)
+    message.high.extend(high)
+    message.max_circumradius = number(size, f"{name}.size")
+
+
+def helpful_threads(points: Floats, parameters: Mapping[str, Any]) -> int:
+    """How many threads shorten the meshing of `points`: each has at least some vertices to look after."""
+    rows, dimension = points.shape
+    vertices = 2.0 * rows
+    size = parameters.get("size")
+    if size and rows:
+        sides = points.max(axis=0) - points.min(axis=0)
+        if parameters.get("box") is not None:
+            low, high = _box(parameters["box"], dimension, "box")
+            sides = np.array(high) - np.array(low)
+        with np.errstate(over="ignore", divide="ignore"):
+            vertices = max(vertices, float(np.prod(sides / number(size, "size"))))
+    for_each = 10_000 if dimension <= 3 else 1_000
+    most = os.cpu_count() or 1
+    return int(max(1, min(most, vertices / for_each)))
+
+
+@functools.cache
+def _criterion_names() -> dict[int, str]:
+    return _api.enum_names("Criterion")
+
+
+def read(message: Any) -> dict[str, Any]:
+    """A MeshParameters by the names of this package; what is not set is left out."""
+    numbers = {name: getattr(message, field) for name, field in _NUMBERS.items()}
+    found: dict[str, Any] = {name: value for name, value in numbers.items() if value}
+    found["criterion"] = _criterion_names().get(message.criterion, "radius-edge")
+    for name in ("min_dihedral", "margin"):
+        if message.HasField(name):
+            found[name] = getattr(message, name)
+    for name in ("pump_weights", "keep_vertices", "max_vertices", "threads"):
+        if getattr(message, name):
+            found[name] = getattr(message, name)
+    if message.HasField("domain"):
+        found["box"] = (tuple(message.domain.low), tuple(message.domain.high))
+    if message.size_boxes:
+        found["size_boxes"] = [(tuple(b.low), tuple(b.high), b.max_circumradius) for b in message.size_boxes]
+    return found

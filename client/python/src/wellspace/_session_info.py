@@ -1,0 +1,80 @@
+"""What a session is at."""
+
+from __future__ import annotations
+
+import dataclasses
+import datetime
+from typing import Any
+
+from . import _api
+from ._parameters import read
+from .statistics import seconds_of
+
+
+@dataclasses.dataclass(frozen=True)
+class SessionInfo:
+    """What a session is at.
+
+    Attributes
+    ----------
+    name : str
+        ``"sessions/…"``
+    state : str
+        ``"open"``: takes points, and can be refined. ``"refining"``. ``"ready"``: its mesh is that of all its points.
+    dimension : int
+    parameters : dict
+        Of the last refinement that succeeded, by the names of this package; defaults resolved.
+    labels : dict
+    ttl : float
+        Seconds that the session lives without any use.
+    create_time, expire_time : datetime
+        In UTC.
+    revision : int
+        Grows with every change.
+    point_count, segment_count, seed_count : int
+        What was uploaded, duplicates included.
+    vertex_count, simplex_count : int
+        Of the last mesh; 0 before the first.
+    last_operation : str
+        Empty before the first.
+    """
+
+    name: str
+    state: str
+    dimension: int
+    parameters: dict[str, Any]
+    labels: dict[str, str]
+    ttl: float
+    create_time: datetime.datetime
+    expire_time: datetime.datetime
+    revision: int
+    point_count: int
+    segment_count: int
+    seed_count: int
+    vertex_count: int
+    simplex_count: int
+    last_operation: str
+
+
+def info_of_session(message: Any) -> SessionInfo:
+    """Of a Session."""
+    def time(stamp: Any) -> datetime.datetime:
+        return datetime.datetime.fromtimestamp(seconds_of(stamp), datetime.timezone.utc)
+
+    return SessionInfo(
+        name=message.name,
+        state=_api.enum_names("Session.State").get(message.state, "unknown"),
+        dimension=message.parameters.dimension,
+        parameters=read(message.parameters),
+        labels=dict(message.labels),
+        ttl=seconds_of(message.ttl),
+        create_time=time(message.create_time),
+        expire_time=time(message.expire_time),
+        revision=message.revision,
+        point_count=message.committed_points,
+        segment_count=message.segment_count,
+        seed_count=message.seed_count,
+        vertex_count=message.vertex_count,
+        simplex_count=message.simplex_count,
+        last_operation=message.last_operation,
+    )

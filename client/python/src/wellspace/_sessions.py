@@ -1,0 +1,396 @@
+"""Sessions: points, segments and a mesh over them, kept by the server between calls."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _api, _wire
+from ._arrays import coordinates, indices, number
+from ._calls import CallOptions
+from ._cells import CellReader, Cells
+from ._client import Client, Server, client_of
+from ._domain import DomainArguments, make_domain
+from ._mesh import Mesh, signed
+from ._operations import Operation, operation_of, watch
+from ._parameters import Parameters, fill, naming, split, takes
+from ._progress import ProgressOption, told
+from ._queries import nearest_distances, stream_cells
+from ._retry import CancelToken
+from ._session_info import SessionInfo, info_of_session
+from ._transfers import Addition, Download, Upload
+from .errors import CancelledError, Error, InvalidArgumentError, NotFoundError
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+_SECONDS_TO_CANCEL = 5.0
+
+
+class Session:
+    """A session of a server. Thread-safe, but for `sizes`.
+
+    As a context manager it is deleted at the end of the block. Calls take `timeout`, in seconds for all attempts
+    together, and most of them `cancel`. Those that change the session take `expected_revision`: at another revision
+    they raise `ConflictError` and change nothing.
+
+    Parameters
+    ----------
+    dimension : int
+        Of the space.
+    server : str, LocalServer, Client or None
+        Where; see `Client`.
+    labels : dict
+        At most 64; `Client.sessions` finds sessions by them.
+    ttl : float
+        Seconds that the session lives without any use. Default: the server's.
+    **arguments
+
+    Examples
+    --------
+    >>> with wellspace.Session(3, size=0.2) as session:
+    ...     session.upload(points)
+    ...     session.refine()
+    ...     mesh = session.download()
+    """
+
+    @takes(Parameters)
+    def __init__(
+        self,
+        dimension: int,
+        *,
+        server: Server = None,
+        labels: Mapping[str, str] | None = None,
+        ttl: float | None = None,
+        timeout: float | None = None,
+        cancel: CancelToken | None = None,
+        **arguments: Unpack[Parameters],
+    ) -> None:
+        """Creates a session without points."""
+        (parameters,) = split("Session", arguments, Parameters)
+        options = CallOptions(timeout=timeout, cancel=cancel)
+        request = _api.message("CreateSessionRequest")(labels=dict(labels or {}), request_id=options.id_or_new())
+        fill(request.parameters, dimension, parameters)
+        if ttl is not None:
+            _set_duration(request.ttl, ttl)
+        client = client_of(server)
+        answer = client._calls.unary("SessionService/CreateSession", request, "CreateSessionResponse", options)
+        self._attach(client, answer.session.name, dimension)
+
+    def _attach(self, client: Client, name: str, dimension: int) -> None:
+        self.client = client
+        self.name = name
+        self.dimension = dimension
+        self._calls = client._calls
+        self._sizes: dict[str, Any] = {}
+
+    @classmethod
+    def attach(cls, name: str, *, server: Server = None, timeout: float | None = None) -> Session:
+        """The session called `name`, which is there already. Outside of a ``with`` nothing deletes it."""
+        session = cls.__new__(cls)
+        session._attach(client_of(server), name, 0)
+        session.dimension = session.info(timeout=timeout).dimension
+        return session
+
+    def __enter__(self) -> Session:
+        return self
+
+    def __exit__(self, kind: Any, *exception: Any) -> None:
+        try:
+            self.delete(timeout=_SECONDS_TO_CANCEL if kind is not None else None)
+        except NotFoundError:
+            pass
+        except Error:
+            if kind is None:
+                raise
+
+    def __repr__(self) -> str:
+        return f"<wellspace.Session: {self.name} in {self.dimension}-D at {self.client.address}>"
+
+    def info(self, *, timeout: float | None = None, cancel: CancelToken | None = None) -> SessionInfo:
+        """What the session is at. Renews its lease."""
+        return info_of_session(self._get(CallOptions(timeout=timeout, cancel=cancel)))
+
+    def _get(self, options: CallOptions) -> Any:
+        request = _api.message("GetSessionRequest")(name=self.name)
+        return self._calls.unary("SessionService/GetSession", request, "GetSessionResponse", options).session
+
+    def update(
+        self,
+        *,
+        labels: Mapping[str, str] | None = None,
+        ttl: float | None = None,
+        expected_revision: int = 0,
+        timeout: float | None = None,
+        cancel: CancelToken | None = None,
+    ) -> SessionInfo:
+        """Replaces the labels, sets the `ttl` in seconds, or both."""
+        options = CallOptions(timeout=timeout, cancel=cancel)
+        request = _api.message("UpdateSessionRequest")(
+            request_id=options.id_or_new(), expected_revision=expected_revision
+        )
+        request.session.name = self.name
+        request.update_mask.SetInParent()
+        if labels is not None:
+            request.session.labels.update(labels)
+            request.update_mask.paths.append("labels")
+        if ttl is not None:
+            _set_duration(request.session.ttl, ttl)
+            request.update_mask.paths.append("ttl")
+        answer = self._calls.unary("SessionService/UpdateSession", request, "UpdateSessionResponse", options)
+        return info_of_session(answer.session)
+
+    def delete(
+        self, *, expected_revision: int = 0, timeout: float | None = None, cancel: CancelToken | None = None
+    ) -> None:
+        """Deletes the session with its points and its mesh; an operation that is under way is cancelled."""
+        options = CallOptions(timeout=timeout, cancel=cancel)
+        request = _api.message("DeleteSessionRequest")(
+            name=self.name, request_id=options.id_or_new(), expected_revision=expected_revision
+        )
+        self._calls.unary("SessionService/DeleteSession", request, "DeleteSessionResponse", options)
+
+    def upload(
+        self,
+        points: Any,
+        *,
+        offset: int | None = None,
+        progress: ProgressOption = None,
+        expected_revision: int = 0,
+        timeout: float | None = None,
+        cancel: CancelToken | None = None,
+    ) -> int:
+        """Adds points, (n, d), to the session; returns how many it has now.
+
+        `offset` is the number of the session's points before the first of these. What is there from it on is compared
+        by a checksum and not sent again, so that an upload that broke off is simply repeated with the same offset.
+        Default: after the points that are there.
+        """
+        cloud = coordinates(points, "points", self.dimension)
+        with told(progress) as on_progress:
+            upload = Upload(self._calls, self.name, cloud, offset, expected_revision, on_progress)
+            options = CallOptions(timeout=timeout, cancel=cancel)
+            return upload.run(options)
+
+    @takes(DomainArguments)
+    def add_segments(
+        self,
+        *,
+        offset: tuple[int, int] | None = None,
+        expected_revision: int = 0,
+        timeout: float | None = None,
+        cancel: CancelToken | None = None,
+        **arguments: Unpack[DomainArguments],
+    ) -> None:
+        """Adds segments, holes and regions to a session in 2-D, and sets the rules, before its first refinement.
+
+        Segments are numbers of the session's points, which may come later.
+
+        Parameters
+        ----------
+        offset : (segments, seeds)
+            How many the session has before these; see `upload`. Default: after those that are there.
+        **arguments
+        """
+        if self.dimension != 2:
+            raise InvalidArgumentError(f"segments are for 2-D; the session is in {self.dimension}-D", field="segments")
+        (given,) = split("add_segments", arguments, DomainArguments)
+        session = self._get(CallOptions(timeout=timeout, cancel=cancel))
+        domain = make_domain(given, has_box=session.parameters.HasField("domain"))
+        begin = offset if offset is not None else (session.segment_count, session.seed_count)
+        Addition(self._calls, self.name, domain, begin, expected_revision).run(
+            CallOptions(timeout=timeout, cancel=cancel)
+        )
+
+    def sizes(self, size: float | None = None, size_boxes: Any = None) -> None:
+        """Sets what the next `refine` asks of sizes; see there. 0 and an empty list take them back."""
+        if size is not None:
+            self._sizes["size"] = number(size, "size")
+        if size_boxes is not None:
+            self._sizes["size_boxes"] = list(size_boxes)
+
+    @takes(Parameters)
+    def refine(
+        self,
+        *,
+        progress: ProgressOption = None,
+        expected_revision: int = 0,
+        timeout: float | None = None,
+        cancel: CancelToken | None = None,
+        **arguments: Unpack[Parameters],
+    ) -> Operation:
+        """Makes the mesh of what was uploaded, or brings it to other parameters, and waits for it.
+
+        The first time all is meshed, later only what has changed. Vertices keep their numbers. Parameters that are
+        not named stay what they were. Ctrl-C and `cancel` cancel the work, and leave the session as it was; when
+        `timeout` has passed, the work goes on.
+
+        Parameters
+        ----------
+        progress : function or bool
+            Called with `Progress`; True shows a bar.
+        **arguments
+        """
+        operation = self.start_refinement(
+            expected_revision=expected_revision, timeout=timeout, cancel=cancel, **arguments
+        )
+        try:
+            ended = self.watch(operation.name, progress=progress, timeout=timeout, cancel=cancel)
+        except (KeyboardInterrupt, CancelledError):
+            self._cancel_quietly(operation.name)
+            raise
+        if ended.error is not None:
+            raise ended.error
+        return ended
+
+    @takes(Parameters)
+    def start_refinement(
+        self,
+        *,
+        expected_revision: int = 0,
+        timeout: float | None = None,
+        cancel: CancelToken | None = None,
+        **arguments: Unpack[Parameters],
+    ) -> Operation:
+        """As `refine`, but does not wait: `watch` does, and `cancel_operation` ends the work."""
+        (changes,) = split("refine", {**self._sizes, **arguments}, Parameters)
+        options = CallOptions(timeout=timeout, cancel=cancel)
+        request = _api.message("StartRefinementRequest")(
+            name=self.name, request_id=options.id_or_new(), expected_revision=expected_revision
+        )
+        if changes:
+            request.parameters.CopyFrom(self._get(options).parameters)
+            fill(request.parameters, self.dimension, changes)
+        method = "OperationService/StartRefinement"
+        started = self._calls.unary(method, request, "StartRefinementResponse", options)
+        self._sizes = {}
+        return operation_of(started.operation)
+
+    def watch(
+        self,
+        operation: str | None = None,
+        *,
+        progress: ProgressOption = None,
+        timeout: float | None = None,
+        cancel: CancelToken | None = None,
+    ) -> Operation:
+        """Waits until an operation has ended, by default the session's last, and returns it: with its error in it."""
+        options = CallOptions(timeout=timeout, cancel=cancel)
+        name = operation or self._get(options).last_operation
+        if not name:
+            raise NotFoundError(f"{self.name} has had no operation", field="operation")
+        with told(progress) as on_progress:
+            return watch(self._calls, name, on_progress, options)
+
+    def cancel_operation(self, operation: str | None = None, *, timeout: float | None = None) -> Operation:
+        """Cancels an operation, by default the session's last; it ends within 100 ms. No error if it has ended."""
+        options = CallOptions(timeout=timeout)
+        name = operation or self._get(options).last_operation
+        request = _api.message("CancelOperationRequest")(name=name)
+        method = "OperationService/CancelOperation"
+        return operation_of(self._calls.unary(method, request, "CancelOperationResponse", options).operation)
+
+    def operations(self, *, timeout: float | None = None) -> list[Operation]:
+        """The session's operations, the oldest first; it keeps the last 100."""
+        request = _api.message("ListOperationsRequest")(parent=self.name)
+        method, found = "OperationService/ListOperations", []
+        while True:
+            page = self._calls.unary(method, request, "ListOperationsResponse", CallOptions(timeout=timeout))
+            found += [operation_of(one) for one in page.operations]
+            if not page.next_page_token:
+                return found
+            request.page_token = page.next_page_token
+
+    def _cancel_quietly(self, operation: str) -> None:
+        try:
+            self.cancel_operation(operation, timeout=_SECONDS_TO_CANCEL)
+        except Error:
+            pass
+
+    def download(
+        self,
+        *,
+        boundary: bool = True,
+        revision: int = 0,
+        progress: ProgressOption = None,
+        timeout: float | None = None,
+        cancel: CancelToken | None = None,
+    ) -> Mesh:
+        """The session's mesh: that of `revision`, by default the last one.
+
+        `boundary` False leaves facets, regions and origins of vertices out.
+        """
+        with told(progress) as on_progress:
+            download = Download(self._calls, self.name, boundary, revision, on_progress)
+            return download.run(CallOptions(timeout=timeout, cancel=cancel))
+
+    def add(
+        self,
+        points: Any,
+        *,
+        near: Any = None,
+        expected_revision: int = 0,
+        timeout: float | None = None,
+        cancel: CancelToken | None = None,
+    ) -> npt.NDArray[Any]:
+        """Adds vertices at points, (k, d), of a session that was refined; returns their numbers, (k,).
+
+        All become vertices or, on an error, none. `near` has a vertex near each, from which the place is found in
+        O(1). The session is then to be refined again, which costs their surroundings.
+        """
+        cloud = coordinates(points, "points", self.dimension)
+        hints = indices([] if near is None else near, "near")
+        if near is not None and len(hints) != len(cloud):
+            raise InvalidArgumentError(f"near: {len(hints)} vertices for {len(cloud)} points", field="near")
+        options = CallOptions(timeout=timeout, cancel=cancel)
+        request = _api.message("AddVerticesRequest")(
+            name=self.name, request_id=options.id_or_new(), expected_revision=expected_revision
+        )
+        arrays = _wire.packed_field(2, cloud) + _wire.packed_field(3, hints)
+        answer = self._calls.unary_bytes("QueryService/AddVertices", request.SerializeToString() + arrays, options)
+        fields = [f for f in _wire.fields(memoryview(answer)) if f.number == 1]
+        vertices = np.concatenate([np.empty(0, np.uint32), *(_wire.packed(field, "<u4") for field in fields)])
+        return signed(vertices, int(vertices.max(initial=0)) + 1)
+
+    def nearest(
+        self, vertices: Any = None, *, timeout: float | None = None, cancel: CancelToken | None = None
+    ) -> npt.NDArray[np.float64]:
+        """The distance of each of `vertices`, by default of all, to its nearest other vertex; exact. Shape (c,)."""
+        wanted = indices([] if vertices is None else vertices, "vertices")
+        if vertices is not None and not len(wanted):
+            return np.empty(0)
+        return nearest_distances(self._calls, self.name, wanted, CallOptions(timeout=timeout, cancel=cancel))
+
+    def cells(
+        self,
+        vertices: Any = None,
+        *,
+        beta: float | None = None,
+        timeout: float | None = None,
+        cancel: CancelToken | None = None,
+    ) -> Cells:
+        """The Voronoi cells of `vertices`, by default of all, in the box.
+
+        With `beta`, at least 1, each is clipped by the cube about its vertex of which half the side is `beta` times the
+        distance to the nearest other vertex.
+        """
+        wanted = indices([] if vertices is None else vertices, "vertices")
+        reader = CellReader(self.dimension)
+        if vertices is None or len(wanted):
+            limit = None if beta is None else number(beta, "beta")
+            stream_cells(self._calls, self.name, wanted, limit, reader, CallOptions(timeout=timeout, cancel=cancel))
+        return reader.cells()
+
+
+Session.__doc__ = naming(Session.__doc__, Parameters)
+
+
+def _set_duration(message: Any, seconds: float) -> None:
+    value = number(seconds, "ttl")
+    if not 0 <= value < 2**53:
+        raise InvalidArgumentError(f"ttl is {seconds!r}; expected seconds", field="ttl")
+    message.seconds = int(value)
+    message.nanos = round((value - int(value)) * 1e9) % 10**9

@@ -1,0 +1,156 @@
+"""Uploads and downloads of sessions, which go on where a connection broke off."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from . import _api, _wire
+from ._arrays import Floats
+from ._calls import Calls, CallOptions
+from ._checksum import crc32c
+from ._domain import Domain
+from ._mesh import Mesh, mesh_of
+from ._messages import messages_of, point_chunks, receive
+from ._progress import OnProgress, Progress
+from ._receiver import MeshReceiver, damaged
+from ._retry import Attempt
+from .errors import Error
+
+
+def _part_of(phase: str, done: int, total: int) -> Progress:
+    return Progress(phase, 0, 0, 0, done / total if total else 1.0)
+
+
+class Upload:
+    """One upload of points, in as many streams as it takes."""
+
+    def __init__(
+        self,
+        calls: Calls,
+        session: str,
+        cloud: Floats,
+        offset: int | None,
+        expected_revision: int,
+        on_progress: OnProgress,
+    ) -> None:
+        self._calls = calls
+        self._session = session
+        self._cloud = cloud
+        self._offset = offset
+        self._expected_revision = expected_revision
+        self._on_progress = on_progress
+        self._committed = 0  # as far as is known
+        self._attempts = 0
+
+    def run(self, options: CallOptions) -> int:
+        """Uploads, and returns how many points the session has then."""
+        return self._calls.run(options, self._attempt)
+
+    def _attempt(self, attempt: Attempt) -> int:
+        get = _api.message("GetSessionRequest")(name=self._session)
+        method = "SessionService/GetSession"
+        committed = self._calls.attempt_unary(method, get, "GetSessionResponse", attempt).session.committed_points
+        if committed > self._committed:
+            self._committed = committed
+            attempt.progressed = True
+        if self._offset is None:
+            self._offset = committed
+        # What is there from the offset on has to be of these points: the server compares.
+        first = min(max(self._offset, committed) - self._offset, len(self._cloud))
+        head = _api.message("UploadPointsRequest")(name=self._session, expected_revision=self._expected_revision)
+        # What the attempts before this one committed has changed the revision.
+        self._expected_revision = 0
+        if first > 0:
+            head.checked_from = self._offset
+            head.checked_crc32c = crc32c(self._cloud[:first])
+        self._attempts += 1
+        try:
+            requests = self._requests(head, self._offset, first)
+            upload = self._calls.attempt_upload
+            answer = upload("SessionService/UploadPoints", requests, "UploadPointsResponse", attempt)
+        except Error as error:
+            # The server may not have noticed yet that the last attempt broke off.
+            attempt.is_worth_repeating = self._attempts > 1 and error.reason == "SESSION_BUSY"
+            raise
+        if answer.committed_points < self._offset + len(self._cloud):
+            raise attempt.final(
+                damaged(f"{answer.committed_points} points after points up to {self._offset + len(self._cloud)} came")
+            )
+        return int(answer.committed_points)
+
+    def _requests(self, head: Any, offset: int, first: int) -> Iterator[bytes]:
+        head.point_offset = offset + first
+        yield head.SerializeToString()  # says which session it is
+        later = type(head)()
+        for begin, end, chunk in point_chunks(self._cloud, first):
+            later.point_offset = offset + begin
+            yield later.SerializeToString() + _wire.message_field(3, chunk)
+            self._on_progress(_part_of("upload", end, len(self._cloud)))
+
+
+class Addition:
+    """Segments and seeds for a session, after those of `offset`."""
+
+    def __init__(
+        self, calls: Calls, session: str, domain: Domain, offset: tuple[int, int], expected_revision: int
+    ) -> None:
+        self._calls = calls
+        self._session = session
+        self._domain = domain
+        self._segments, self._seeds = offset
+        self._expected_revision = expected_revision
+
+    def run(self, options: CallOptions) -> None:
+        """Adds them. What an attempt has brought is compared by the server when it comes again."""
+        self._calls.run(options, self._attempt)
+
+    def _attempt(self, attempt: Attempt) -> None:
+        requests = list(self._requests())
+        # What an attempt before this one committed has changed the revision.
+        self._expected_revision = 0
+        self._calls.attempt_upload("SessionService/AddSegments", requests, "AddSegmentsResponse", attempt)
+
+    def _requests(self) -> Iterator[bytes]:
+        head = _api.message("AddSegmentsRequest")(name=self._session, expected_revision=self._expected_revision)
+        head.seed_offset = self._seeds
+        for first, chunk in self._domain.segment_chunks():
+            head.segment_offset = self._segments + first
+            yield head.SerializeToString() + _wire.message_field(3, chunk)
+        head.segment_offset = self._segments + len(self._domain.ends)
+        for first, chunk in self._domain.face_options():
+            head.seed_offset = self._seeds + first
+            yield head.SerializeToString() + _wire.message_field(5, chunk)
+
+
+class Download:
+    """One download of a mesh, in as many streams as it takes."""
+
+    def __init__(self, calls: Calls, session: str, boundary: bool, revision: int, on_progress: OnProgress) -> None:
+        self._calls = calls
+        self._request = _api.message("DownloadMeshRequest")(name=session, revision=revision, with_boundary=boundary)
+        self._receiver = MeshReceiver()
+        self._on_progress = on_progress
+
+    def run(self, options: CallOptions) -> Mesh:
+        """Downloads the mesh."""
+        return self._calls.run(options, self._attempt)
+
+    def _attempt(self, attempt: Attempt) -> Mesh:
+        receiver, request = self._receiver, self._request
+        if receiver.metadata is not None:
+            request.revision = receiver.metadata.revision
+        request.next_chunk = receiver.next_chunk
+        receiver.resume()
+        try:
+            with self._calls.stream("SessionService/DownloadMesh", request.SerializeToString(), attempt) as answers:
+                for number, part in (field for answer in answers for field in messages_of(answer)):
+                    receive(receiver, number - 1, part)
+                    attempt.progressed = attempt.progressed or number == 2
+                    self._on_progress(_part_of("download", receiver.next_chunk, receiver.metadata.chunk_count))
+        except Error as error:
+            # A connection that breaks after the last chunk costs nothing.
+            if error.code == "DATA_LOSS" or not receiver.has_all_chunks:
+                raise
+        receiver.finish()
+        return mesh_of(receiver)

@@ -1,0 +1,105 @@
+// What a Polygon and a Polyhedron do alike with the vector unit that there is: be cut by many vertices, and tell what
+// they reach. For polygon.cc and polyhedron.cc alone, into which all is compiled.
+#ifndef WELLSPACE_CORE_CELL_CELL_ON_UNIT_H_
+#define WELLSPACE_CORE_CELL_CELL_ON_UNIT_H_
+
+#include <cstddef>
+#include <span>
+
+#include "core/base/ids.h"
+#include "core/base/simd/lane_bits.h"
+#include "core/base/simd/lanes.h"
+#include "core/cell/gathered_vertices.h"
+#include "core/cell/near_vertices.h"
+#include "core/geometry/box.h"
+#include "core/geometry/point.h"
+
+namespace wellspace::core {
+
+// `Cell` has the dimension D, and is a FloatCell<D> that this is a friend of. It has groups(), which has the nodes, and
+// CutOff<kUnit>(bisector, u, position), which cuts by one vertex.
+//
+// Each function chooses the unit once. What it calls is made for that unit, and inlined: a call in between would leave
+// the vectors of AVX2.
+template <typename Cell, int D>
+struct CellOnUnit {
+  // As Polytope::CutBeforePlace.
+  static bool CutBeforePlace(Cell& cell, VertexId u, const Point<D>& position) {
+    const Point<D> normal = Difference<D>(position, cell.site_);
+    if (!(NormSq<D>(normal) <= cell.CutLimitSq())) {
+      return false;
+    }
+    const auto bisector = FloatBisector<D>::Of(normal, cell.scale_, cell.most_radius_);
+    return cell.unit_ == VectorUnit::kAvx2 ? CutOffAvx2(cell, bisector, u, position)
+                                           : cell.template CutOff<VectorUnit::kBaseline>(bisector, u, position);
+  }
+
+  // As Polytope::CutByEach.
+  static size_t CutByEach(Cell& cell, std::span<const Point<D>> positions, const VertexNames& names, VertexId site) {
+    return cell.unit_ == VectorUnit::kAvx2
+               ? CutByEachAvx2(cell, positions, names, site)
+               : CutByThose<VectorUnit::kBaseline>(cell, VerticesTogether<D>{positions, names}, site);
+  }
+
+  // As Polygon::CutByGathered.
+  static size_t CutByGathered(Cell& cell, const GatheredVertices<D>& gathered, VertexId site) {
+    return cell.unit_ == VectorUnit::kAvx2 ? CutByGatheredAvx2(cell, gathered, site)
+                                           : CutByGatheredWith<VectorUnit::kBaseline>(cell, gathered, site);
+  }
+
+  // As Polytope::Reaches.
+  static bool Reaches(const Cell& cell, const Box<D>& cube) {
+    return cell.unit_ == VectorUnit::kAvx2 ? ReachesAvx2(cell, cube) : ReachesWith<VectorUnit::kBaseline>(cell, cube);
+  }
+
+ private:
+  template <VectorUnit kUnit, typename Vertices>
+  WELLSPACE_INLINE static size_t CutByThose(Cell& cell, const Vertices& vertices, VertexId site) {
+    NearVertices<D> near;
+    near.template Pick<kUnit>(
+        vertices, site, cell.site_, cell.scale_, cell.most_radius_,
+        [&cell](const Floats* w, const Floats& low, FloatMask& is_near) __attribute__((always_inline)) {
+          if (cell.cuts_ != 0 && (D == 2 || Bits<kUnit>(is_near) != 0)) {  // most miss the cell, now and later
+            is_near &= IsAtMost<kUnit>(low, MostProducts<kUnit, D>(cell.groups(), w));
+          }
+        });
+    near.CutInOrder(
+        [&](const FloatBisector<D>& bisector, size_t slot) __attribute__((always_inline)) {
+          return cell.template CutOff<kUnit>(bisector, vertices.name(slot), vertices.position(slot));
+        },
+        [&cell] { return cell.IsTooLarge() ? -1 : MostOffset<D>(cell.most_radius_); });
+    return near.within_reach;
+  }
+
+  template <VectorUnit kUnit>
+  WELLSPACE_INLINE static size_t CutByGatheredWith(Cell& cell, const GatheredVertices<D>& gathered, VertexId site) {
+    return CutByThoseGathered<kUnit, D>(
+        cell, gathered, [&](const VerticesChosen<D>& vertices) __attribute__((always_inline)) {
+          return CutByThose<kUnit>(cell, vertices, site);
+        });
+  }
+
+  template <VectorUnit kUnit>
+  WELLSPACE_INLINE static bool ReachesWith(const Cell& cell, const Box<D>& cube) {
+    return AreReached<kUnit, D>(cell.groups(), cell.most_radius_, cell.ScaledTo(cube.low), cell.ScaledTo(cube.high));
+  }
+
+  WELLSPACE_AVX2 static bool CutOffAvx2(Cell& cell, const FloatBisector<D>& bisector, VertexId u,
+                                        const Point<D>& position) {
+    return cell.template CutOff<VectorUnit::kAvx2>(bisector, u, position);
+  }
+  WELLSPACE_AVX2 static size_t CutByEachAvx2(Cell& cell, std::span<const Point<D>> positions, const VertexNames& names,
+                                             VertexId site) {
+    return CutByThose<VectorUnit::kAvx2>(cell, VerticesTogether<D>{positions, names}, site);
+  }
+  WELLSPACE_AVX2 static size_t CutByGatheredAvx2(Cell& cell, const GatheredVertices<D>& gathered, VertexId site) {
+    return CutByGatheredWith<VectorUnit::kAvx2>(cell, gathered, site);
+  }
+  WELLSPACE_AVX2 static bool ReachesAvx2(const Cell& cell, const Box<D>& cube) {
+    return ReachesWith<VectorUnit::kAvx2>(cell, cube);
+  }
+};
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_CELL_CELL_ON_UNIT_H_

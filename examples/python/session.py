@@ -1,0 +1,39 @@
+"""A mesh that grows: points in pieces, a refinement where it is needed, and vertices that are added.
+
+    python3 session.py
+"""
+
+import pathlib
+
+import numpy as np
+
+import wellspace
+
+CLOUDS = pathlib.Path(__file__).resolve().parent.parent
+
+
+def main():
+    points = np.loadtxt(CLOUDS / "coast-110m.csv", delimiter=",", skiprows=1)
+    with wellspace.Session(2, labels={"example": "coast"}) as session:
+        for piece in np.array_split(points, 4):
+            session.upload(piece)
+        session.refine(progress=True)
+        mesh = session.download()
+        print(f"the coast: {mesh}")
+
+        # Only what is around the new points is refined again; vertices keep their numbers.
+        london, rome = session.add([[-0.12, 51.51], [12.48, 41.89]])
+        session.sizes(size_boxes=[([5, 40], [15, 45], 0.5)])
+        session.refine()
+        finer = session.download()
+        print(f"with two towns, and finer in Italy: {finer}")
+        assert (finer.points[: len(mesh.points)] == mesh.points).all()
+
+        cell = session.cells([rome])[0]
+        print(f"the cell of Rome has {len(cell.nodes)} corners and {len(cell.neighbours)} neighbours")
+        near, far = session.nearest([rome, london])
+        print(f"nearest vertex of Rome: {near:.2f} degrees, of London: {far:.2f}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,151 @@
+// Domains in the plane from the outside: files in, meshes out, errors with their places.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "client/formats/read_mesh.h"
+#include "tests/client/cli/process.h"
+#include "tests/support/temporary_folder.h"
+
+namespace wellspace {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+// A square with a square hole, and a marker each.
+constexpr char kFrame[] =
+    "8 2 0 0\n1 0 0\n2 4 0\n3 4 4\n4 0 4\n5 1 1\n6 3 1\n7 3 3\n8 1 3\n"
+    "8 1\n1 1 2 5\n2 2 3 5\n3 3 4 5\n4 4 1 5\n5 5 6 9\n6 6 7 9\n7 7 8 9\n8 8 5 9\n"
+    "1\n1 2 2\n";
+
+class DomainCommandsTest : public testing::Test {
+ protected:
+  std::string Path(const std::string& name) const { return folder_.Path(name); }
+
+  // Meshes `text`, a file `name`; the mesh is out.msh, and the figures are returned.
+  nlohmann::json Mesh(const std::string& name, std::string_view text, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments = {"mesh",    folder_.Write(name, text), "-o", Path("out.msh"),
+                                          "--stats", Path("stats.json")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const RunResult result = RunWellspace(arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result.exit_code == 0 ? nlohmann::json::parse(folder_.Read("stats.json")) : nlohmann::json();
+  }
+
+  std::string MeshFails(const std::string& name, std::string_view text, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments = {"mesh", folder_.Write(name, text), "-o", Path("out.msh")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const RunResult result = RunWellspace(arguments);
+    EXPECT_EQ(result.exit_code, 2) << result.err;
+    return result.err;
+  }
+
+  void ExpectValid(const std::string& domain) {
+    const RunResult result =
+        RunWellspace({"check", Path("out.msh"), "--cloud", Path(domain), "--rho", "1.4142135623730951"});
+    EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
+    EXPECT_THAT(result.out, HasSubstr("valid"));
+  }
+
+  TemporaryFolder folder_;
+};
+
+double AreaOf(const formats::Mesh& mesh) {
+  double area = 0;
+  for (size_t t = 0; t < mesh.simplices.size(); t += 3) {
+    const double* const a = &mesh.points[2 * mesh.simplices[t]];
+    const double* const b = &mesh.points[2 * mesh.simplices[t + 1]];
+    const double* const c = &mesh.points[2 * mesh.simplices[t + 2]];
+    area += 0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]));
+  }
+  return area;
+}
+
+TEST_F(DomainCommandsTest, PolyWithAHoleAndMarkers) {
+  const nlohmann::json stats = Mesh("frame.poly", kFrame, {"--size", "0.5"});
+  ExpectValid("frame.poly");
+  EXPECT_EQ(stats["domain"]["segments"], 8);
+  EXPECT_EQ(stats["domain"]["exempt_simplices"], 0);
+  const auto mesh = formats::ReadMesh(Path("out.msh"));
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_NEAR(AreaOf(*mesh), 12, 1e-12);
+  ASSERT_EQ(mesh->boundary.size(), 2u);
+  EXPECT_THAT((std::vector<int32_t>{mesh->boundary[0].tag, mesh->boundary[1].tag}), ElementsAre(5, 9));
+  EXPECT_EQ(mesh->boundary[1].name, "marker_9");
+}
+
+TEST_F(DomainCommandsTest, GeoJsonHasIslandsInLakes) {
+  const auto square = [](double low, double high) {
+    return absl::StrFormat("[[%g,%g],[%g,%g],[%g,%g],[%g,%g],[%g,%g]]", low, low, high, low, high, high, low, high, low,
+                           low);
+  };
+  Mesh("lakes.geojson", absl::StrCat(R"({"type":"MultiPolygon","coordinates":[[)", square(0, 9), ",", square(1, 8),
+                                     "],[", square(2, 7), "]]}"));
+  ExpectValid("lakes.geojson");
+  const auto mesh = formats::ReadMesh(Path("out.msh"));
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_NEAR(AreaOf(*mesh), 81 - 49 + 25, 1e-10);
+}
+
+TEST_F(DomainCommandsTest, PolylinesInABox) {
+  const nlohmann::json stats =
+      Mesh("lines.csv", "x,y\n0.1,0.1\n0.9,0.8\n\n0.1,0.7\n0.5,0.9\n", {"--segments", "--domain", "0,0,1,1"});
+  EXPECT_EQ(stats["domain"]["segments"], 6);
+  const auto mesh = formats::ReadMesh(Path("out.msh"));
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_NEAR(AreaOf(*mesh), 1, 1e-14);
+  EXPECT_EQ(mesh->boundary.size(), 5u);  // the sides of the box, and what has no marker
+}
+
+TEST_F(DomainCommandsTest, CrossingsAreNamedByTheirLines) {
+  constexpr char kCross[] = "4 2 0 0\n1 0 0\n2 2 2\n3 0 2\n4 2 0\n4 0\n1 1 2\n2 3 4\n3 1 3\n4 2 4\n";
+  EXPECT_THAT(MeshFails("cross.poly", kCross),
+              AllOf(HasSubstr("segments[0]"), HasSubstr("cross.poly:7"), HasSubstr("cross.poly:8"), HasSubstr("(1, 1)"),
+                    HasSubstr("cross")));
+  const nlohmann::json stats = Mesh("cross.poly", kCross, {"--split-crossings"});
+  EXPECT_EQ(stats["domain"]["crossings"], 1);
+}
+
+TEST_F(DomainCommandsTest, WhatEnclosesNothingSaysSo) {
+  EXPECT_THAT(MeshFails("open.poly", "3 2 0 0\n1 0 0\n2 1 0\n3 1 1\n2 0\n1 1 2\n2 2 3\n"),
+              HasSubstr("enclose nothing"));
+}
+
+TEST_F(DomainCommandsTest, OptionsOfDomainsWantADomain) {
+  EXPECT_THAT(MeshFails("cloud.csv", "0,0\n1,0\n0,1\n", {"--faces", "holes"}), HasSubstr("--faces"));
+  EXPECT_THAT(MeshFails("cloud.csv", "0,0\n1,0\n0,1\n", {"--split-crossings"}), HasSubstr("--split-crossings"));
+}
+
+TEST_F(DomainCommandsTest, MinAngleIsABoundOfRho) {
+  const nlohmann::json stats = Mesh("frame.poly", kFrame, {"--min-angle", "28"});
+  EXPECT_GE(stats["min_angle_deg"], 28 * (1 - 1e-9));
+  EXPECT_THAT(MeshFails("space.csv", "0,0,0\n1,0,0\n0,1,0\n0,0,1\n", {"--min-angle", "20"}), HasSubstr("--min-angle"));
+}
+
+TEST_F(DomainCommandsTest, CheckFindsAMeshOfAnotherDomain) {
+  Mesh("frame.poly", kFrame);
+  std::string moved = kFrame;
+  moved.replace(moved.find("1 2 2\n"), 6, "1 0.5 0.5\n");  // the hole is elsewhere
+  folder_.Write("moved.poly", moved);
+  const RunResult result = RunWellspace({"check", Path("out.msh"), "--cloud", Path("moved.poly")});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.out, HasSubstr("hole 0"));
+}
+
+TEST_F(DomainCommandsTest, EstimateTakesADomain) {
+  const RunResult result = RunWellspace({"estimate", folder_.Write("frame.poly", kFrame)});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+}
+
+}  // namespace
+}  // namespace wellspace

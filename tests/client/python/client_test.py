@@ -1,0 +1,203 @@
+"""Clients: addresses, credentials, what servers say of themselves, errors and their details, bars."""
+
+import io
+import os
+import pathlib
+import pickle
+import sys
+import tempfile
+import unittest
+from unittest import mock
+
+from support import Break, Breaker, Case, grpc, uniform
+
+import wellspace
+from wellspace import (
+    Credentials,
+    CredentialsError,
+    Error,
+    InvalidArgumentError,
+    LimitError,
+    NotFoundError,
+    UnavailableError,
+    WrongStateError,
+    _api,
+    _progress,
+    errors,
+)
+from wellspace._channel import host_of, is_loopback, open_channel
+
+
+def status(code, message, *details):
+    packed = _api.message("google.rpc.Status")(code=code, message=message)
+    for detail in details:
+        url = f"type.googleapis.com/{detail.DESCRIPTOR.full_name}"
+        packed.details.add(type_url=url, value=detail.SerializeToString())
+    return packed
+
+
+class AddressTest(Case):
+    def test_hosts(self):
+        for address, host in (("localhost:7233", "localhost"), ("[::1]:1", "::1"), ("a.example:65535", "a.example")):
+            self.assertEqual(host_of(address), host)
+        for address, message in (("localhost", "expected HOST:PORT"), ("localhost:0", "from 1 to 65535"),
+                                 ("localhost:99999", "from 1 to 65535"), (":7233", "expected HOST:PORT"),
+                                 ("https://a.example:1/x", "such as 'a.example:1'"), ("a:b", "expected HOST:PORT")):
+            with self.subTest(address), self.fails(InvalidArgumentError, message, field="server"):
+                host_of(address)
+        self.assertEqual([is_loopback(h) for h in ("127.8.0.1", "::1", "Localhost", "10.0.0.1", "a.example")],
+                         [True, True, True, False, False])
+
+    def test_servers_that_are_none(self):
+        with self.fails(InvalidArgumentError, "server is 7233; expected 'HOST:PORT'", field="server"):
+            wellspace.mesh([[0, 0]], server=7233)
+
+    def test_the_environment_names_a_server(self):
+        with wellspace.LocalServer() as server:
+            named = {"WELLSPACE_SERVER": server.address, "WELLSPACE_TOKEN": server.credentials.token}
+            with mock.patch.dict(os.environ, named):
+                self.assertEqual(wellspace.Client().address, server.address)
+                wellspace.mesh(uniform(10, 2))
+            with mock.patch.dict(os.environ, {**named, "WELLSPACE_TOKEN": "wrong"}):
+                with self.fails(CredentialsError, "", reason="UNAUTHENTICATED"):
+                    wellspace.Client().info()
+
+
+class CredentialsTest(Case):
+    def test_tokens_go_nowhere_in_plain_text(self):
+        with self.fails(WrongStateError, "in plain text"):
+            open_channel("a.example:7233", Credentials(token="secret"))
+        open_channel("a.example:7233", Credentials(token="secret", insecure_remote=True)).close()
+        open_channel("a.example:7233", Credentials(token="secret", tls=True)).close()
+        open_channel("127.0.0.1:7233", Credentials(token="secret")).close()
+
+    def test_tokens_are_not_shown(self):
+        self.assertNotIn("secret", repr(Credentials(token="secret")))
+
+    def test_wrong_credentials(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder, "file")
+            file.write_text("two words\n")
+            for given, kind, message in (
+                ({"token": "a", "token_file": file}, InvalidArgumentError, "expected one of them"),
+                ({"token_file": file}, InvalidArgumentError, "expected one token of visible characters"),
+                ({"token_file": file.with_name("none")}, NotFoundError, "cannot read"),
+                ({"tls_ca": file}, InvalidArgumentError, "expected PEM"),
+                ({"tls_certificate": file}, InvalidArgumentError, "wants its key"),
+            ):
+                with self.subTest(given), self.fails(kind, message):
+                    open_channel("127.0.0.1:7233", Credentials(**given))
+
+    def test_a_token_file_is_read_for_each_call(self):
+        with wellspace.LocalServer() as server, tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder, "token")
+            file.write_text("wrong\n")
+            with wellspace.Client(server.address, credentials=Credentials(token_file=file)) as client:
+                with self.fails(CredentialsError):
+                    client.info()
+                file.write_text(server.credentials.token + "\n")
+                client.info()
+
+    def test_a_server_without_tls(self):
+        with wellspace.LocalServer() as server:
+            client = wellspace.Client(server.address, credentials=Credentials(tls=True))
+            with client, self.fails(Error) as caught:
+                client.info(timeout=20)
+            self.assertIn(type(caught.exception), (CredentialsError, UnavailableError))
+
+
+class ServerTest(Case):
+    def test_what_a_server_says(self):
+        with wellspace.Client() as client:
+            info = client.info()
+            self.assertEqual(info.dimensions, (2, 3, 4, 5, 6))
+            self.assertRegex(info.version, r"^\d+\.\d+\.\d+$")
+            self.assertEqual((info.default_ttl, info.stall_limit), (3600, 60))
+            self.assertTrue(client.is_serving())
+
+    def test_nobody_listens(self):
+        with self.fails(UnavailableError, "", code="UNAVAILABLE"):
+            wellspace.Client("127.0.0.1:1", retry=wellspace.RetryPolicy(initial_backoff=0.01)).info()
+        with self.assertRaises(ConnectionError):
+            wellspace.Client("127.0.0.1:1", retry=wellspace.RetryPolicy(max_first_attempts=1)).info()
+
+
+class ErrorsTest(Case):
+    def test_details(self):
+        violation = _api.message("google.rpc.BadRequest")()
+        violation.field_violations.add(field="parameters.size_boxes[3].low", description="")
+        retry = _api.message("google.rpc.RetryInfo")()
+        retry.retry_delay.seconds, retry.retry_delay.nanos = 2, 500_000_000
+        info = _api.message("google.rpc.ErrorInfo")(reason="ERROR_REASON_QUEUE_FULL", domain="wellspace.v1")
+        error = errors.from_message(status(8, "full", violation, retry, info))
+        self.assertIsInstance(error, LimitError)
+        self.assertEqual((error.code, error.reason, error.retry_after), ("RESOURCE_EXHAUSTED", "QUEUE_FULL", 2.5))
+        self.assertEqual((error.field, error.argument), ("parameters.size_boxes[3].low", "size_boxes"))
+        self.assertEqual((error.message, str(error)), ("full", "full (argument size_boxes)"))
+        again = pickle.loads(pickle.dumps(error))
+        self.assertEqual((type(again), vars(again)), (type(error), vars(error)))
+
+    def test_errors_without_details(self):
+        error = errors.from_status("DEADLINE_EXCEEDED", "READER_STALLED: too slow", b"no protobuf")
+        self.assertEqual((error.reason, error.field, error.retry_after), ("READER_STALLED", "", None))
+        self.assertIsInstance(error, TimeoutError)
+        error = errors.from_status("INTERNAL", "a bug", b"")
+        self.assertEqual((type(error), error.code), (Error, "INTERNAL"))
+
+    def test_every_code_of_the_service_has_a_class(self):
+        for code, builtin in (
+            ("INVALID_ARGUMENT", ValueError),
+            ("NOT_FOUND", LookupError),
+            ("OUT_OF_RANGE", IndexError),
+            ("UNAVAILABLE", ConnectionError),
+            ("UNAUTHENTICATED", PermissionError),
+            ("DEADLINE_EXCEEDED", TimeoutError),
+        ):
+            self.assertIsInstance(errors.from_status(code, "", b""), builtin)
+
+    def test_they_come_by_the_wire(self):
+        retry = _api.message("google.rpc.RetryInfo")()
+        retry.retry_delay.seconds = 3600
+        breaker = Breaker(wellspace.LocalServer())
+        self.addCleanup(breaker.close)
+
+        def refuse(*message):
+            raise Break(grpc.StatusCode.RESOURCE_EXHAUSTED, "full", status(8, "full", retry).SerializeToString())
+
+        breaker.on_request = refuse
+        with self.fails(LimitError, "full", retry_after=3600.0):
+            wellspace.Client(breaker.address).info(timeout=60)
+        self.assertEqual(breaker.count("GetServerInfo"), 1, "the deadline comes before it")
+
+
+class BarTest(Case):
+    def test_by_tqdm(self):
+        output = io.StringIO()
+        with mock.patch.object(sys, "stderr", output):
+            wellspace.mesh(uniform(1000, 2), progress=True)
+        self.assertIn("done: 100%", output.getvalue())
+        self.assertIn("vertices", output.getvalue())
+
+    def test_without_tqdm(self):
+        output = io.StringIO()
+        with mock.patch.object(sys, "stderr", output), mock.patch.dict(sys.modules, {"tqdm": None, "tqdm.auto": None}):
+            wellspace.mesh(uniform(1000, 2), progress=True)
+        self.assertRegex(output.getvalue(), r"\rdone: 100%, \d+ vertices\n$")
+
+    def test_none(self):
+        output = io.StringIO()
+        with mock.patch.object(sys, "stderr", output):
+            wellspace.mesh(uniform(1000, 2), progress=False)
+        self.assertEqual(output.getvalue(), "")
+
+    def test_an_error_of_the_function_ends_the_call(self):
+        def fail(progress):
+            raise RuntimeError("of the test")
+
+        with self.assertRaisesRegex(RuntimeError, "of the test"):
+            wellspace.mesh(uniform(1000, 2), progress=fail)
+        self.assertEqual(_progress.Progress("done", 1, 2, 3, 1.0).sequence, 0)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,127 @@
+"""Domains in the plane: segments, markers, holes, regions and rules, in one call and in sessions."""
+
+import unittest
+
+import numpy as np
+from support import Case, unit_box, volume
+
+import wellspace
+from wellspace import InvalidArgumentError, RegionSeed, WrongStateError
+
+# A square of side 4 with a square hole of side 1 in its middle.
+POINTS = np.array([[0, 0], [4, 0], [4, 4], [0, 4], [1.5, 1.5], [2.5, 1.5], [2.5, 2.5], [1.5, 2.5]], float)
+RINGS = np.array([[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4]])
+MARKERS = [1, 1, 1, 1, 9, 9, 9, 9]
+
+
+class DomainTest(Case):
+    def test_hole_and_markers(self):
+        mesh = wellspace.mesh(POINTS, segments=RINGS, markers=MARKERS, holes=[[2, 2]])
+        self.assertAlmostEqual(volume(mesh) / 2, 15)
+        self.assertEqual(mesh.facet_names, {1: "marker_1", 9: "marker_9"})
+        edges = mesh.points[mesh.boundary("marker_9")]
+        self.assertAlmostEqual(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1).sum(), 4)
+        self.assertEqual(mesh.statistics.domain.segments, 8)
+        self.assertEqual(mesh.statistics.domain.min_input_angle_deg, 90)
+
+    def test_rules(self):
+        for given, area in (
+            ({}, 16),
+            ({"faces": "holes", "holes": [[2, 2]]}, 15),
+            ({"faces": "even-odd"}, 15),
+            ({"faces": "box", "box": ([-1, -1], [5, 5])}, 36),
+            ({"box": ([-1, -1], [5, 5])}, 36),
+        ):
+            with self.subTest(given):
+                mesh = wellspace.mesh(POINTS, segments=RINGS, **given)
+                self.assertAlmostEqual(volume(mesh) / 2, area)
+
+    def test_regions(self):
+        regions = [(0.5, 0.5, 3), RegionSeed(2, 2, region=5, max_area=0.01)]
+        mesh = wellspace.mesh(POINTS, segments=RINGS, regions=regions)
+        self.assertEqual(set(mesh.region_names.values()), {"region_3", "region_5"})
+        inner = mesh.points[mesh.region("region_5")]
+        areas = np.linalg.det(inner[:, 1:] - inner[:, :1]) / 2
+        self.assertAlmostEqual(areas.sum(), 1)
+        self.assertLessEqual(areas.max(), 0.01)
+
+    def test_open_segments(self):
+        points = np.vstack([POINTS[:4], [[1, 2], [3, 2]]])
+        mesh = wellspace.mesh(points, segments=RINGS[:4], markers=MARKERS[:4], open_segments=[[4, 5]], open_markers=[7],
+                              faces="even-odd")
+        self.assertAlmostEqual(volume(mesh) / 2, 16)
+        edges = mesh.points[mesh.boundary("marker_7")]
+        self.assertAlmostEqual(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1).sum(), 2)
+        self.assertTrue((edges[:, :, 1] == 2).all())
+
+    def test_crossings(self):
+        cross = {"segments": [[0, 2], [1, 3]], "box": unit_box(2)}
+        points = np.array([[0.1, 0.1], [0.9, 0.1], [0.9, 0.9], [0.1, 0.9]])
+        with self.fails(InvalidArgumentError, "segments[0]", reason="INVALID_SEGMENTS"):
+            wellspace.mesh(points, **cross)
+        mesh = wellspace.mesh(points, crossings="split", **cross)
+        self.assertEqual(mesh.statistics.domain.crossings, 1)
+        self.assertTrue((mesh.points == 0.5).all(axis=1).any())
+
+    def test_points_of_no_face(self):
+        points = np.vstack([POINTS, [[10, 10]]])
+        mesh = wellspace.mesh(points, segments=RINGS)
+        self.assertEqual(mesh.input_vertices[8], -1)
+        self.assertEqual(mesh.statistics.domain.unmeshed_points, 1)
+
+    def test_more_segments_than_fit_into_a_request(self):
+        angles = np.linspace(0, 2 * np.pi, 40_000, endpoint=False)
+        points = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        ring = np.arange(40_000)
+        mesh = wellspace.mesh(points, segments=np.stack([ring, np.roll(ring, -1)], axis=1), markers=ring % 2 + 1)
+        self.assertAlmostEqual(volume(mesh) / 2, np.pi, places=6)
+        self.assertEqual(set(mesh.facet_names), {1, 2})
+
+    def test_estimate(self):
+        estimate = wellspace.estimate(POINTS, segments=RINGS, holes=[[2, 2]], size=0.1)
+        mesh = wellspace.mesh(POINTS, segments=RINGS, holes=[[2, 2]], size=0.1)
+        self.assertLess(abs(np.log(estimate.vertices / len(mesh.points))), np.log(2))
+
+    def test_wrong_input(self):
+        with self.fails(InvalidArgumentError, "segments[1] names 8; expected numbers from 0, below 8",
+                        field="segments[1]", argument="segments"):
+            wellspace.mesh(POINTS, segments=[[0, 1], [2, 8]])
+        with self.fails(InvalidArgumentError, "in 3-D", field="segments"):
+            wellspace.mesh(np.zeros((3, 3)), segments=[[0, 1]])
+        with self.fails(InvalidArgumentError, "", reason="INVALID_SEGMENTS"):
+            wellspace.mesh(POINTS, segments=RINGS, holes=[[0, 2]])
+
+
+class SessionTest(Case):
+    def test_segments_in_pieces(self):
+        with wellspace.Session(2) as session:
+            session.add_segments(segments=RINGS[:4], markers=MARKERS[:4])
+            session.upload(POINTS)
+            session.add_segments(segments=RINGS[4:], markers=MARKERS[4:], holes=[[2, 2]])
+            info = session.info()
+            self.assertEqual((info.point_count, info.segment_count, info.seed_count), (8, 8, 1))
+            session.add_segments(segments=RINGS[4:], markers=MARKERS[4:], holes=[[2, 2]], offset=(4, 0))
+            self.assertEqual(session.info().segment_count, 8, "a repetition")
+            session.refine()
+            mesh = session.download()
+            one = wellspace.mesh(POINTS, segments=RINGS, markers=MARKERS, holes=[[2, 2]])
+            np.testing.assert_array_equal(mesh.simplices, one.simplices)
+            self.assertEqual(mesh.facet_names, one.facet_names)
+            with self.fails(WrongStateError, "", reason="DOMAIN_FIXED"):
+                session.add_segments(segments=[[0, 2]])
+            vertices = session.add([[0.5, 0.5]])
+            session.refine()
+            np.testing.assert_array_equal(session.download().points[vertices], [[0.5, 0.5]])
+
+    def test_wrong_input(self):
+        with wellspace.Session(3) as session, self.fails(InvalidArgumentError, "in 3-D", field="segments"):
+            session.add_segments(segments=[[0, 1]])
+        with wellspace.Session(2) as session:
+            session.upload(POINTS)
+            with self.fails(WrongStateError, "", reason="UPLOAD_MISMATCH"):
+                session.add_segments(segments=RINGS)
+                session.add_segments(segments=RINGS[::-1], offset=(0, 0))
+
+
+if __name__ == "__main__":
+    unittest.main()
