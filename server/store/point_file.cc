@@ -37,13 +37,17 @@ PointFile::PointFile(FileSystem& files, std::shared_ptr<StoreHealth> health, std
 }
 
 absl::StatusOr<std::shared_ptr<File>> PointFile::OpenToAppend() {
+  auto mode = FileSystem::Mode::kWrite;
   {
     const std::lock_guard lock(mutex_);
     if (unsynchronised_ != nullptr) {
       return unsynchronised_;
     }
+    if (has_new_name_) {
+      mode = FileSystem::Mode::kCreateOrWrite;
+    }
   }
-  auto opened = files_.Open(path_, has_new_name_ ? FileSystem::Mode::kCreateOrWrite : FileSystem::Mode::kWrite);
+  auto opened = files_.Open(path_, mode);
   if (!opened.ok()) {
     return opened.status().code() == absl::StatusCode::kNotFound ? Damaged(path_, "the file is missing")
                                                                  : health_->OfWrite(opened.status());

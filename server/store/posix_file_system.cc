@@ -252,8 +252,8 @@ class PosixFiles final : public FileSystem {
       return absl::AbortedError(std::string(holder.data(), std::max<ssize_t>(count, 0)));
     }
     const std::string self = absl::StrCat(::getpid());
-    if (::ftruncate(number, 0) != 0 || ::pwrite(number, self.data(), self.size(), 0) < 0) {
-      return SystemError(path, "cannot be written");
+    if ((::ftruncate(number, 0) != 0 || ::pwrite(number, self.data(), self.size(), 0) < 0) && errno != ENOSPC) {
+      return SystemError(path, "cannot be written");  // without room the lock holds all the same
     }
     return std::make_unique<PosixLock>(std::move(descriptor));
   }

@@ -107,12 +107,6 @@ absl::StatusOr<std::unique_ptr<SqliteDatabase>> OpenSchema(const std::string& pa
   // Checkpoints are SessionTables::Checkpoint's: SQLite's own would pass over their errors.
   WELLSPACE_RETURN_IF_ERROR(database->Execute("PRAGMA synchronous=FULL;PRAGMA wal_autocheckpoint=0"));
   WELLSPACE_RETURN_IF_ERROR(Migrate(*database, version));
-  // A process before this one may have ended since it could not synchronise the write-ahead log. The kernel then shows
-  // what it has in memory, and takes it for written: so it is written again, into the database.
-  const int code = sqlite3_wal_checkpoint_v2(database->handle(), nullptr, SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
-  if (code != SQLITE_OK && code != SQLITE_BUSY) {  // busy: a back-up is under way, and nothing is left out
-    return database->ErrorOf(code);
-  }
   return database;
 }
 

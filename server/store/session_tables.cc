@@ -62,6 +62,13 @@ absl::StatusOr<std::unique_ptr<SessionTables>> SessionTables::Open(const std::st
   std::unique_ptr<SessionTables> tables(new SessionTables(std::move(database), options.checkpoint_pages));
   WELLSPACE_RETURN_IF_ERROR(tables->Prepare());
   if (!options.is_read_only) {
+    // A process before this one may have ended since it could not synchronise the write-ahead log. The kernel then shows
+    // what it has in memory, and takes it for written: so it is written again, into the database.
+    const absl::Status taken_over = tables->TakeOver();
+    tables->has_doubtful_log_ = !taken_over.ok();
+    if (!taken_over.ok() && taken_over.code() != absl::StatusCode::kResourceExhausted) {
+      return taken_over;  // else there is no room yet: what is there can be read
+    }
     sqlite3_wal_hook(
         tables->database_->handle(),
         [](void* self, sqlite3*, const char*, int pages) {
@@ -118,6 +125,10 @@ absl::Status SessionTables::SetSurvives(SessionLog::Survives survives) {
 absl::Status SessionTables::Apply(std::span<const SessionChange* const> changes, std::span<const AnswerKey> forgotten,
                                   SessionLog::Survives survives) {
   const std::lock_guard lock(mutex_);
+  if (has_doubtful_log_) {
+    WELLSPACE_RETURN_IF_ERROR(TakeOver());
+    has_doubtful_log_ = false;
+  }
   WELLSPACE_RETURN_IF_ERROR(SetSurvives(survives));
   const auto apply = [&]() -> absl::Status {
     WELLSPACE_RETURN_IF_ERROR(statements_->begin.Run());
@@ -135,6 +146,14 @@ absl::Status SessionTables::Apply(std::span<const SessionChange* const> changes,
     WELLSPACE_RETURN_IF_ERROR(statements_->rollback.Run());
   }
   return applied;
+}
+
+absl::Status SessionTables::TakeOver() {
+  WELLSPACE_RETURN_IF_ERROR(SetSurvives(SessionLog::Survives::kPowerLoss));
+  const int code =
+      sqlite3_wal_checkpoint_v2(database_->handle(), nullptr, SQLITE_CHECKPOINT_TRUNCATE, nullptr, nullptr);
+  // Busy: a back-up reads it, and only the end of the log is not cut off.
+  return code == SQLITE_OK || code == SQLITE_BUSY ? absl::OkStatus() : database_->ErrorOf(code);
 }
 
 absl::Status SessionTables::ApplyOne(const SessionChange& change) {

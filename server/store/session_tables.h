@@ -75,6 +75,8 @@ class SessionTables {
 
   SessionTables(std::unique_ptr<SqliteDatabase> database, int checkpoint_pages);
   absl::Status Prepare();
+  // Takes the write-ahead log over into the database.
+  absl::Status TakeOver();
   absl::Status ApplyOne(const SessionChange& change);
   absl::Status Delete(const std::string& session);
   absl::Status Write(const SessionChange& change);
@@ -94,6 +96,9 @@ class SessionTables {
   const std::unique_ptr<SqliteDatabase> database_;
   std::unique_ptr<Statements> statements_;
   SessionLog::Survives survives_ = SessionLog::Survives::kPowerLoss;  // of what is committed now
+  // The write-ahead log may have bytes that are not on the disk, though they can be read: nothing may be committed
+  // behind them.
+  bool has_doubtful_log_ = false;
   int log_pages_ = 0;  // in the write-ahead log, to be taken over into the database
 };
 

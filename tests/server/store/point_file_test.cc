@@ -3,10 +3,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <limits>
 #include <numeric>
+#include <thread>
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
@@ -161,6 +163,26 @@ TEST_F(PointFileTest, HasADescriptorOnlyUntilItIsSynchronised) {
   ASSERT_TRUE(file->Synchronize().ok());
   ASSERT_TRUE(file->CopyFrom(0, context_).ok());
   EXPECT_EQ(OpenDescriptors(), before);
+}
+
+TEST_F(PointFileTest, IsSynchronisedBesideItsWriterAndReaders) {
+  const auto file = Open();
+  std::atomic<bool> is_over = false;
+  std::atomic<int> failed = 0;
+  std::thread synchroniser([&] {
+    while (!is_over) {
+      failed += file->Synchronize().ok() ? 0 : 1;
+    }
+  });
+  for (size_t at = 0; at < 20'000; at += 100) {
+    failed += file->Append({all_.data() + at, 100}).ok() ? 0 : 1;
+    failed += *file->CountEqual(at / 2, {all_.data() + at / 2, 100}) == 100 ? 0 : 1;
+  }
+  is_over = true;
+  synchroniser.join();
+  EXPECT_EQ(failed, 0);
+  EXPECT_TRUE(file->Synchronize().ok());
+  EXPECT_EQ(*file->CountEqual(0, {all_.data(), 20'000}), 20'000u);
 }
 
 TEST_F(PointFileTest, WritesNothingAfterAFailure) {

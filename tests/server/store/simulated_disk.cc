@@ -106,7 +106,8 @@ absl::Status SimulatedDisk::Begin(const std::string& what, const std::string& pa
     }
     return absl::UnavailableError(path + ": the machine has no power");
   }
-  if (number < fails_at_ || number - fails_at_ >= fail_count_ || (is_read && fault_ != Fault::kBroken)) {
+  if (number < fails_at_ || number - fails_at_ >= fail_count_ || (is_read && fault_ != Fault::kBroken) ||
+      (fault_ == Fault::kNoRoom && what != "write")) {
     return absl::OkStatus();
   }
   if (!has_failed_) {

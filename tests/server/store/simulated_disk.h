@@ -32,6 +32,7 @@ class SimulatedDisk {
   };
   enum class Fault {
     kNoSpace,     // nothing is done, and the disk is full; reads go on
+    kNoRoom,      // as kNoSpace, but of writes alone
     kBroken,      // nothing is done, and the disk is broken
     kShortWrite,  // half of a write is done, then the disk is full; others as kNoSpace
   };

@@ -163,6 +163,40 @@ TEST(StoreFaults, AStartWritesAgainWhatMayNotBeOnTheDisk) {
   }
 }
 
+TEST(StoreFaults, AStartWithoutRoomReadsAndThenGoesOn) {
+  SimulatedDisk disk;
+  const DurableLogOptions options = {
+      .folder = "/data", .files = &disk.files(), .tables = {.vfs = disk.vfs(), .is_exclusive = true}};
+  absl::StatusOr<std::unique_ptr<DurableLog>> log = nullptr;
+  // The second change is written and not synchronised, and the process ends.
+  for (uint64_t skip = 0; !disk.failed_operation().starts_with("synchronise "); ++skip) {
+    log->reset();
+    disk.Clear();
+    log = DurableLog::Open(options);
+    ASSERT_TRUE(log.ok()) << log.status();
+    ASSERT_TRUE((*log)->Commit({.session = SessionName(1), .state = MakeState(1)}).ok());
+    disk.FailAt(disk.operations() + skip, Fault::kBroken);
+    ASSERT_FALSE((*log)->Commit({.session = SessionName(1), .state = MakeState(1, 2)}).ok());
+  }
+  disk.DieAt(disk.operations());
+  log->reset();
+  disk.Restart(Loss::kProcess, 1);
+
+  disk.FailAt(disk.operations(), Fault::kNoRoom, 1'000'000);
+  log = DurableLog::Open(options);
+  ASSERT_TRUE(log.ok()) << log.status();
+  EXPECT_EQ((*log)->Load()->sessions.size(), 1u);
+  EXPECT_EQ(ReasonOf((*log)->Commit({.session = SessionName(2), .state = MakeState(2)})), "DISK_FULL");
+  disk.FailAt(0, Fault::kNoRoom, 0);
+  ASSERT_TRUE((*log)->Commit({.session = SessionName(2), .state = MakeState(2)}).ok());
+  disk.DieAt(disk.operations());
+  log->reset();
+  disk.Restart(Loss::kAll, 1);
+  log = DurableLog::Open(options);
+  ASSERT_TRUE(log.ok()) << log.status();
+  EXPECT_EQ((*log)->Load()->sessions.size(), 2u) << "acknowledged behind what may not have been on the disk";
+}
+
 // A write-ahead log that ends in the middle, or has other bytes: all before is there, or the start says what is wrong.
 TEST(StoreFaults, AWriteAheadLogThatIsTornEndsThere) {
   SimulatedDisk disk;
