@@ -1,10 +1,8 @@
 #include "server/store/back_up.h"
 
 #include <algorithm>
-#include <map>
 #include <memory>
-#include <set>
-#include <utility>
+#include <span>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
@@ -16,83 +14,38 @@ namespace {
 
 constexpr size_t kCopyBytes = size_t{1} << 20;
 
-// Each time, a session was deleted, or got another mesh, between the copy of the rows and that of its files.
-constexpr int kMostCopies = 100;
-
-class Copier {
- public:
-  Copier(DataPaths from, DataPaths to, FileSystem& files) : from_(std::move(from)), to_(std::move(to)), files_(files) {}
-
-  // Copies the files that these sessions name, as far as they are not there yet. NOT_FOUND: one of them is gone.
-  absl::Status Copy(const std::vector<store::v1::SessionRecord>& sessions) {
-    named_.clear();
-    for (const store::v1::SessionRecord& session : sessions) {
-      if (session.points() > 0) {
-        const uint64_t size = session.points() * session.parameters().dimension() * sizeof(double);
-        WELLSPACE_RETURN_IF_ERROR(CopyFile(from_.points(session.name()), to_.points(session.name()), size));
-      }
-      if (session.has_mesh()) {
-        const uint64_t revision = session.mesh().revision();
-        WELLSPACE_RETURN_IF_ERROR(LinkOrCopy(from_.mesh(session.name(), revision), to_.mesh(session.name(), revision),
-                                             session.mesh().size()));
-      }
+// Copies the first `size` bytes.
+absl::Status CopyFile(FileSystem& files, const std::string& from, const std::string& to, uint64_t size) {
+  WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<File> source, files.Open(from, FileSystem::Mode::kRead));
+  WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<File> target, files.Open(to, FileSystem::Mode::kCreateOrWrite));
+  std::vector<char> block(kCopyBytes);
+  for (uint64_t done = 0; done < size;) {
+    const std::span<char> part(block.data(), std::min<uint64_t>(block.size(), size - done));
+    WELLSPACE_ASSIGN_OR_RETURN(const uint64_t count, source->ReadAt(done, part));
+    if (count < part.size()) {
+      return absl::DataLossError(
+          absl::StrCat(from, ": the file ends at byte ", done + count, ", and should have ", size, " at least"));
     }
+    WELLSPACE_RETURN_IF_ERROR(target->WriteAt(done, part));
+    done += count;
+  }
+  return target->Synchronize();
+}
+
+// Copies the files that `session` names.
+absl::Status CopyFiles(FileSystem& files, const DataPaths& from, const DataPaths& to,
+                       const store::v1::SessionRecord& session) {
+  if (session.points() > 0) {
+    const uint64_t size = session.points() * session.parameters().dimension() * sizeof(double);
+    WELLSPACE_RETURN_IF_ERROR(CopyFile(files, from.points(session.name()), to.points(session.name()), size));
+  }
+  if (!session.has_mesh()) {
     return absl::OkStatus();
   }
-
-  // Removes what an earlier round has copied, and the last one does not name.
-  absl::Status RemoveOthers() {
-    for (auto copied = copied_.begin(); copied != copied_.end();) {
-      if (named_.contains(copied->first)) {
-        ++copied;
-        continue;
-      }
-      WELLSPACE_RETURN_IF_ERROR(files_.Remove(copied->first));
-      copied = copied_.erase(copied);
-    }
-    return absl::OkStatus();
-  }
-
- private:
-  absl::Status LinkOrCopy(const std::string& from, const std::string& to, uint64_t size) {
-    named_.insert(to);
-    if (copied_.contains(to)) {
-      return absl::OkStatus();
-    }
-    const absl::Status linked = files_.Link(from, to);
-    if (linked.ok()) {
-      copied_[to] = size;
-      return linked;
-    }
-    return linked.code() == absl::StatusCode::kNotFound ? linked : CopyFile(from, to, size);
-  }
-
-  // Copies the first `size` bytes, but for those that were copied in an earlier round: they are the same.
-  absl::Status CopyFile(const std::string& from, const std::string& to, uint64_t size) {
-    named_.insert(to);
-    uint64_t& done = copied_[to];
-    WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<File> source, files_.Open(from, FileSystem::Mode::kRead));
-    WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<File> target, files_.Open(to, FileSystem::Mode::kCreateOrWrite));
-    std::vector<char> block(kCopyBytes);
-    while (done < size) {
-      const std::span<char> part(block.data(), std::min<uint64_t>(block.size(), size - done));
-      WELLSPACE_ASSIGN_OR_RETURN(const uint64_t count, source->ReadAt(done, part));
-      if (count < part.size()) {
-        return absl::DataLossError(
-            absl::StrCat(from, ": the file ends at byte ", done + count, ", and should have ", size, " at least"));
-      }
-      WELLSPACE_RETURN_IF_ERROR(target->WriteAt(done, part));
-      done += count;
-    }
-    return target->Synchronize();
-  }
-
-  const DataPaths from_;
-  const DataPaths to_;
-  FileSystem& files_;
-  std::map<std::string, uint64_t> copied_;  // bytes, by path
-  std::set<std::string> named_;             // paths
-};
+  const std::string source = from.mesh(session.name(), session.mesh().revision());
+  const std::string target = to.mesh(session.name(), session.mesh().revision());
+  return files.Link(source, target).ok() ? absl::OkStatus() : CopyFile(files, source, target, session.mesh().size());
+}
 
 absl::Status CheckEmpty(const DataPaths& to, FileSystem& files) {
   WELLSPACE_ASSIGN_OR_RETURN(std::vector<std::string> names, files.List(to.root));
@@ -117,23 +70,26 @@ absl::StatusOr<DataReport> BackUp(const std::string& folder, const std::string& 
   WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<DataFolder> target, DataFolder::Open(to, files));
   WELLSPACE_RETURN_IF_ERROR(CheckEmpty(to_paths, files));
 
-  Copier copier(from_paths, to_paths, files);
-  absl::Status copied;
-  for (int round = 0; round < kMostCopies; ++round) {
-    WELLSPACE_RETURN_IF_ERROR(tables->BackUp(to_paths.database(), options.tables));
+  // A server removes no file from now on, so that all that the rows name stays until it is copied.
+  const auto keeps_files = files.Lock(from_paths.back_up_lock());
+  if (keeps_files.status().code() == absl::StatusCode::kAborted) {
+    return absl::FailedPreconditionError(absl::StrCat(folder, ": process ", std::string(keeps_files.status().message()),
+                                                      " is backing this folder up; wait for its end"));
+  }
+  WELLSPACE_RETURN_IF_ERROR(keeps_files.status());
+  WELLSPACE_RETURN_IF_ERROR(tables->BackUp(to_paths.database(), options.tables));
+  {
     WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<SessionTables> copy,
                                SessionTables::Open(to_paths.database(), read_only));
     WELLSPACE_ASSIGN_OR_RETURN(const std::vector<store::v1::SessionRecord> sessions, copy->ReadStates());
-    copied = copier.Copy(sessions);
-    if (copied.code() != absl::StatusCode::kNotFound) {
-      break;
+    for (const store::v1::SessionRecord& session : sessions) {
+      const absl::Status copied = CopyFiles(files, from_paths, to_paths, session);
+      if (copied.code() == absl::StatusCode::kNotFound) {
+        return absl::DataLossError(absl::StrCat(std::string(copied.message()), "; check the folder that is backed up"));
+      }
+      WELLSPACE_RETURN_IF_ERROR(copied);
     }
   }
-  if (copied.code() == absl::StatusCode::kNotFound) {
-    return absl::DataLossError(absl::StrCat(std::string(copied.message()), "; check the folder that is backed up"));
-  }
-  WELLSPACE_RETURN_IF_ERROR(copied);
-  WELLSPACE_RETURN_IF_ERROR(copier.RemoveOthers());
   WELLSPACE_RETURN_IF_ERROR(files.SynchronizeFolder(to_paths.files()));
   WELLSPACE_RETURN_IF_ERROR(files.SynchronizeFolder(to));
   WELLSPACE_ASSIGN_OR_RETURN(DataReport report, CheckData(to, options));

@@ -10,12 +10,14 @@
 namespace wellspace::server {
 
 // Copies all sessions of `folder`, as they are at one moment, to the new or empty folder `to`, and checks the copy. A
-// server may serve the folder meanwhile. Meshes, which are never written again, are linked where both folders are on
-// one disk, and else copied. A server that is started with `to` has these sessions.
+// server may serve the folder meanwhile; it removes no file until the copy is made. Meshes, which are never written
+// again, are linked where both folders are on one disk, and else copied. A server that is started with `to` has these
+// sessions.
 //
 // Complexity: O(bytes); with links, O(bytes of the database and of points), and the check.
-// Errors:     FAILED_PRECONDITION: `to` is not empty, or in use. DATA_LOSS: the copy is not whole, since `folder` is
-//             not. Others of CheckData, and of a FileSystem. What was copied until then is left.
+// Errors:     FAILED_PRECONDITION: `to` is not empty, or in use, or another back-up of `folder` is under way.
+//             DATA_LOSS: the copy is not whole, since `folder` is not. Others of CheckData, and of a FileSystem. What
+//             was copied until then is left.
 absl::StatusOr<DataReport> BackUp(const std::string& folder, const std::string& to,
                                   const CheckDataOptions& options = {});
 

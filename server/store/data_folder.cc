@@ -93,8 +93,8 @@ std::vector<std::string> FilesOf(const DataPaths& paths, const store::v1::Sessio
 }
 
 absl::StatusOr<std::vector<std::string>> FindUnknown(const DataPaths& paths, FileSystem& files) {
-  static constexpr std::array<std::string_view, 6> kKnown = {
-      "lock", "files", "sessions.db", "sessions.db-journal", "sessions.db-shm", "sessions.db-wal"};
+  static constexpr std::array<std::string_view, 7> kKnown = {
+      "lock", "back-up.lock", "files", "sessions.db", "sessions.db-journal", "sessions.db-shm", "sessions.db-wal"};
   std::vector<std::string> unknown;
   WELLSPACE_ASSIGN_OR_RETURN(const std::vector<std::string> names, files.List(paths.root));
   for (const std::string& name : names) {

@@ -1,6 +1,7 @@
 // The folder in which a server keeps its sessions.
 //
 //   lock              held by the server, whose process number it has
+//   back-up.lock      held by a back-up
 //   sessions.db       and -wal, -shm beside it: the database (SessionTables)
 //   files/            points and meshes of sessions
 //     ID.points         the points, as they came (PointFile)
@@ -32,6 +33,8 @@ struct DataPaths {
   std::string root;
 
   std::string lock() const { return root + "/lock"; }
+  // Held by a back-up: what rows name, or have named, stays meanwhile.
+  std::string back_up_lock() const { return root + "/back-up.lock"; }
   std::string database() const { return root + "/sessions.db"; }
   std::string files() const { return root + "/files"; }
   // `session`: its name.

@@ -23,6 +23,12 @@ uint64_t BytesOf(const SessionChange& change) {
   return bytes;
 }
 
+// Whether files may be removed. Not after a failure: the change that was under way may have been written down, and name
+// what its owner believes to be obsolete. Not during a back-up: its copy of the rows names what is obsolete by now.
+bool MayRemove(const StoreHealth& health, const DataPaths& paths, FileSystem& files) {
+  return health.Check().ok() && files.Lock(paths.back_up_lock()).status().code() != absl::StatusCode::kAborted;
+}
+
 // Whether it is not known, after this error, what is on the disk.
 bool IsFailure(const absl::Status& status) {
   return status.code() == absl::StatusCode::kUnavailable || status.code() == absl::StatusCode::kDataLoss;
@@ -37,7 +43,9 @@ DurableLog::DurableLog(const DurableLogOptions& options, std::unique_ptr<DataFol
       health_(std::make_shared<StoreHealth>(options.on_failure)),
       folder_(std::move(folder)),
       tables_(std::move(tables)),
-      in_use_(std::make_shared<FilesInUse>(files_, health_)) {}
+      in_use_(std::make_shared<FilesInUse>(files_, [health = health_, paths = folder_->paths(), files = &files_] {
+        return MayRemove(*health, paths, *files);
+      })) {}
 
 absl::StatusOr<std::unique_ptr<DurableLog>> DurableLog::Open(const DurableLogOptions& options) {
   WELLSPACE_ASSIGN_OR_RETURN(std::unique_ptr<DataFolder> folder, DataFolder::Open(options.folder, *options.files));

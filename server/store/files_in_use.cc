@@ -33,7 +33,7 @@ void FilesInUse::Remove(const std::string& path) {
 }
 
 void FilesInUse::RemoveNow(const std::string& path) {
-  if (health_ == nullptr || health_->Check().ok()) {
+  if (!may_remove_ || may_remove_()) {
     file_system_.Remove(path).IgnoreError();
   }
 }

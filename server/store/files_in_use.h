@@ -3,6 +3,7 @@
 #define WELLSPACE_SERVER_STORE_FILES_IN_USE_H_
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -10,13 +11,11 @@
 #include <utility>
 
 #include "server/store/file_system.h"
-#include "server/store/store_health.h"
 
 namespace wellspace::server {
 
 // Removes files when their last user is gone. A file that could not be removed is garbage, which
-// DataFolder::RemoveGarbage takes. After a failure of the store nothing is removed any more: the change that was under
-// way may have been written down, and name what its owner believes to be obsolete.
+// DataFolder::RemoveGarbage takes.
 //
 // Thread safety: thread-safe.
 class FilesInUse : public std::enable_shared_from_this<FilesInUse> {
@@ -41,8 +40,9 @@ class FilesInUse : public std::enable_shared_from_this<FilesInUse> {
     const uint64_t version_;
   };
 
-  explicit FilesInUse(FileSystem& file_system, std::shared_ptr<StoreHealth> health = nullptr)
-      : file_system_(file_system), health_(std::move(health)) {}
+  // Nothing is removed while `may_remove` says no; it may be empty.
+  explicit FilesInUse(FileSystem& file_system, std::function<bool()> may_remove = nullptr)
+      : file_system_(file_system), may_remove_(std::move(may_remove)) {}
 
   // `is_written`: a new file is about to be written in this place.
   std::unique_ptr<Use> Take(const std::string& path, bool is_written);
@@ -62,7 +62,7 @@ class FilesInUse : public std::enable_shared_from_this<FilesInUse> {
   void MakeObsolete(const std::string& path, uint64_t version);
 
   FileSystem& file_system_;
-  const std::shared_ptr<StoreHealth> health_;
+  const std::function<bool()> may_remove_;
   mutable std::mutex mutex_;             // held while a file is removed, so that none is written in its place meanwhile
   std::map<std::string, State> states_;  // guarded by mutex_
 };

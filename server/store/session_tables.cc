@@ -62,8 +62,8 @@ absl::StatusOr<std::unique_ptr<SessionTables>> SessionTables::Open(const std::st
   std::unique_ptr<SessionTables> tables(new SessionTables(std::move(database), options.checkpoint_pages));
   WELLSPACE_RETURN_IF_ERROR(tables->Prepare());
   if (!options.is_read_only) {
-    // A process before this one may have ended since it could not synchronise the write-ahead log. The kernel then shows
-    // what it has in memory, and takes it for written: so it is written again, into the database.
+    // A process before this one may have ended since it could not synchronise the write-ahead log. The kernel then
+    // shows what it has in memory, and takes it for written: so it is written again, into the database.
     const absl::Status taken_over = tables->TakeOver();
     tables->has_doubtful_log_ = !taken_over.ok();
     if (!taken_over.ok() && taken_over.code() != absl::StatusCode::kResourceExhausted) {

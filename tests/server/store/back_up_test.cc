@@ -8,6 +8,7 @@
 
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include "server/store/data_folder.h"
 #include "server/store/durable_log.h"
 #include "tests/server/store/store_support.h"
 
@@ -139,12 +140,35 @@ TEST_F(BackUpTest, IsOfOneMomentWhateverAServerDoesMeanwhile) {
   EXPECT_EQ(failed, 0);
 }
 
+// What the copy of the rows names has to stay until it is copied, too.
+TEST_F(BackUpTest, AServerRemovesNothingMeanwhile) {
+  const auto log = *DurableLog::Open({.folder = from_});
+  std::shared_ptr<MeshSnapshot> mesh;
+  ASSERT_TRUE(log->Commit({.session = SessionName(1), .state = MakeState(1)}).ok());
+  const auto points = log->OpenPoints(SessionName(1), 3, {});
+  ASSERT_TRUE(Change(*log, 1, 1, *points, mesh).ok());
+  {
+    const auto back_up = PosixFileSystem().Lock(DataPaths{from_}.back_up_lock());
+    ASSERT_TRUE(back_up.ok());
+    const absl::Status second = BackUp(from_, to_).status();
+    EXPECT_EQ(second.code(), absl::StatusCode::kFailedPrecondition);
+    EXPECT_THAT(std::string(second.message()), HasSubstr("is backing this folder up"));
+    ASSERT_TRUE(Change(*log, 1, 2, *points, mesh).ok());
+    ASSERT_TRUE(log->Commit({.session = SessionName(1), .is_deletion = true}).ok());
+    mesh.reset();
+    ASSERT_TRUE(log->RemoveGarbage().ok());
+    EXPECT_EQ(PosixFileSystem().List(from_ + "/files")->size(), 3u);
+  }
+  ASSERT_TRUE(log->RemoveGarbage().ok());
+  EXPECT_THAT(*PosixFileSystem().List(from_ + "/files"), IsEmpty());
+}
+
 TEST_F(BackUpTest, WantsAFolderOfItsOwn) {
   const auto log = *DurableLog::Open({.folder = from_});
   const absl::Status self = BackUp(from_, from_).status();
   EXPECT_EQ(self.code(), absl::StatusCode::kFailedPrecondition);
   std::filesystem::create_directories(to_);
-  WriteTestFile(to_ + "/letter.txt", "");
+  WriteFile(to_ + "/letter.txt", "");
   const absl::Status full = BackUp(from_, to_).status();
   EXPECT_EQ(full.code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(std::string(full.message()), HasSubstr("not empty"));

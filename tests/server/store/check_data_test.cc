@@ -93,7 +93,7 @@ TEST_F(CheckDataTest, NamesDamagedAndMissingFilesAndThoseThatItDoesNotKnow) {
   FlipBit(files_ + "00000001.points", 50, 1);
   FlipBit(files_ + "00000002.mesh-2", 77, 1);
   std::filesystem::remove(files_ + "00000003.mesh-2");
-  WriteTestFile(files_ + "notes.txt", "");
+  WriteFile(files_ + "notes.txt", "");
   const auto report = CheckData(folder_.path());
   ASSERT_TRUE(report.ok()) << report.status();
   EXPECT_FALSE(report->is_whole());

@@ -44,7 +44,7 @@ TEST_F(DataFolderTest, HasOneServerAtATime) {
 }
 
 TEST_F(DataFolderTest, IsNoFile) {
-  WriteTestFile(folder_.path() + "/file", "");
+  WriteFile(folder_.path() + "/file", "");
   const absl::Status status = DataFolder::Open(folder_.path() + "/file", PosixFileSystem()).status();
   EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_THAT(std::string(status.message()), HasSubstr("/file: cannot be used: Not a directory"));
@@ -72,9 +72,9 @@ TEST_F(DataFolderTest, RemovesWhatNoSessionNamesAndLeavesWhatItDoesNotKnow) {
   session.mutable_mesh()->set_revision(3);
   for (const char* name : {"aa.points", "aa.mesh-2", "aa.mesh-3", "aa.mesh-3.tmp", "bb.points", "bb.mesh-1",
                            "cc.mesh-1", "cc.mesh-1.tmp", "notes.txt"}) {
-    WriteTestFile(paths_.files() + "/" + name, "x");
+    WriteFile(paths_.files() + "/" + name, "x");
   }
-  WriteTestFile(root_ + "/core", "x");
+  WriteFile(root_ + "/core", "x");
   const auto use = in_use->Take(paths_.files() + "/cc.mesh-1", /*is_written=*/true);
   const auto written = in_use->Take(paths_.files() + "/cc.mesh-1.tmp", /*is_written=*/true);
   const auto sweep = (*folder)->RemoveGarbage(*in_use, [&] { return std::vector{session}; });
@@ -93,7 +93,7 @@ TEST_F(DataFolderTest, LeavesAFileAloneThatIsWrittenMeanwhile) {
   const auto in_use = std::make_shared<FilesInUse>(PosixFileSystem());
   for (const char* name : {"/aa.mesh-1", "/aa.mesh-1.tmp"}) {
     const std::string path = paths_.files() + name;
-    WriteTestFile(path, "of a process that died");
+    WriteFile(path, "of a process that died");
     const auto sweep = (*folder)->RemoveGarbage(*in_use, [&] {
       in_use->Take(path, /*is_written=*/true).reset();
       return std::vector<store::v1::SessionRecord>();
@@ -107,7 +107,7 @@ TEST_F(DataFolderTest, RemovesNothingWhereTheRowsCannotBeRead) {
   const auto folder = DataFolder::Open(root_, PosixFileSystem());
   ASSERT_TRUE(folder.ok());
   const auto in_use = std::make_shared<FilesInUse>(PosixFileSystem());
-  WriteTestFile(paths_.files() + "/aa.points", "x");
+  WriteFile(paths_.files() + "/aa.points", "x");
   EXPECT_FALSE((*folder)->RemoveGarbage(*in_use, [] { return absl::DataLossError("damaged"); }).ok());
   EXPECT_TRUE(std::filesystem::exists(paths_.files() + "/aa.points"));
 }

@@ -140,12 +140,12 @@ TEST_F(MeshFileTest, ADamagedChunkCostsThatChunkAlone) {
 
 TEST_F(MeshFileTest, AFileThatIsMissingShortOrLongIsDamaged) {
   const auto record = *Keep(MakeMesh({}))->record();
-  const std::string bytes = ReadTestFile(path_);
+  const std::string bytes = BytesOfFile(path_);
   for (const uint64_t size : {uint64_t{0}, uint64_t{10}, record.size() - 1, record.size() + 1}) {
     std::filesystem::resize_file(path_, size);
     const auto file = Find(record);
     EXPECT_EQ(ReasonOf(file->Metadata(false).status()), "FILE_DAMAGED") << size;
-    WriteTestFile(path_, bytes);
+    WriteFile(path_, bytes);
     EXPECT_TRUE(file->Metadata(false).ok()) << "an error is not remembered";
   }
   std::filesystem::remove(path_);
@@ -180,7 +180,7 @@ TEST_F(MeshFileTest, AFileThatIsNotObsoleteStays) {
 }
 
 TEST_F(MeshFileTest, WritesOverWhatAProcessThatDiedHasLeft) {
-  WriteTestFile(path_ + ".tmp", std::string(100'000, 'x'));
+  WriteFile(path_ + ".tmp", std::string(100'000, 'x'));
   EXPECT_TRUE(Keep(MakeMesh({}))->Check().ok());
 }
 

@@ -33,14 +33,14 @@ TEST_F(PosixFileSystemTest, ReadsWhatItWrites) {
   EXPECT_EQ(*(*file)->ReadAt(1, read), 5u) << "fewer, before the end";
   EXPECT_EQ(read, "bcdef.....");
   EXPECT_EQ(*(*file)->ReadAt(100, read), 0u);
-  EXPECT_EQ(ReadTestFile(Path("a")), "abcdef");
+  EXPECT_EQ(BytesOfFile(Path("a")), "abcdef");
 }
 
 TEST_F(PosixFileSystemTest, OpensForWritingWithoutLossOfWhatIsThere) {
-  WriteTestFile(Path("a"), "abc");
+  WriteFile(Path("a"), "abc");
   for (const auto mode : {FileSystem::Mode::kWrite, FileSystem::Mode::kCreateOrWrite}) {
     ASSERT_TRUE(files_.Open(Path("a"), mode).ok());
-    EXPECT_EQ(ReadTestFile(Path("a")), "abc");
+    EXPECT_EQ(BytesOfFile(Path("a")), "abc");
   }
 }
 
@@ -52,7 +52,7 @@ TEST_F(PosixFileSystemTest, ErrorsNameFileAndCause) {
   EXPECT_EQ(files_.Remove(Path("none")).code(), absl::StatusCode::kNotFound);
   EXPECT_EQ(files_.Rename(Path("none"), Path("b")).code(), absl::StatusCode::kNotFound);
   EXPECT_EQ(files_.List(Path("none")).status().code(), absl::StatusCode::kNotFound);
-  WriteTestFile(Path("a"), "");
+  WriteFile(Path("a"), "");
   EXPECT_EQ(files_.Open(Path("a/b"), FileSystem::Mode::kRead).status().code(), absl::StatusCode::kFailedPrecondition);
   EXPECT_EQ(files_.CreateFolder(Path("a")).code(), absl::StatusCode::kFailedPrecondition);
 }
@@ -70,13 +70,13 @@ TEST_F(PosixFileSystemTest, NamesFilesAndFolders) {
   ASSERT_TRUE(files_.CreateFolder(Path("x/y/z")).ok());
   ASSERT_TRUE(files_.CreateFolder(Path("x/y/z")).ok()) << "again";
   EXPECT_EQ(std::filesystem::status(Path("x/y/z")).permissions(), std::filesystem::perms::owner_all);
-  WriteTestFile(Path("x/a"), "a");
+  WriteFile(Path("x/a"), "a");
   ASSERT_TRUE(files_.Rename(Path("x/a"), Path("x/b")).ok());
   ASSERT_TRUE(files_.Link(Path("x/b"), Path("x/c")).ok());
   ASSERT_TRUE(files_.SynchronizeFolder(Path("x")).ok());
   EXPECT_THAT(*files_.List(Path("x")), UnorderedElementsAre("b", "c", "y"));
   ASSERT_TRUE(files_.Remove(Path("x/b")).ok());
-  EXPECT_EQ(ReadTestFile(Path("x/c")), "a");
+  EXPECT_EQ(BytesOfFile(Path("x/c")), "a");
 }
 
 TEST_F(PosixFileSystemTest, ALockIsHeldUntilItsEnd) {

@@ -176,7 +176,7 @@ TEST_F(SessionTablesTest, AFileOfAnotherProgramIsRefused) {
     ASSERT_TRUE((*database)->Execute("CREATE TABLE recipes(name)").ok());
   }
   EXPECT_EQ(SessionTables::Open(path_, {}).status().code(), absl::StatusCode::kFailedPrecondition);
-  WriteTestFile(path_, std::string(10'000, 'x'));
+  WriteFile(path_, std::string(10'000, 'x'));
   const absl::Status status = SessionTables::Open(path_, {}).status();
   EXPECT_EQ(ReasonOf(status), "FILE_DAMAGED");
   EXPECT_THAT(std::string(status.message()), HasSubstr(path_));

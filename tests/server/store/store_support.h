@@ -56,8 +56,8 @@ store::v1::AnswerRecord MakeAnswer(const std::string& tenant, const std::string&
 std::string TextOf(const StoredSessions& stored);
 
 // Whatever of the file is there.
-std::string ReadTestFile(const std::string& path);
-void WriteTestFile(const std::string& path, const std::string& bytes);
+std::string BytesOfFile(const std::string& path);
+void WriteFile(const std::string& path, const std::string& bytes);
 void FlipBit(const std::string& path, uint64_t byte, int bit);
 
 // The name of its reason without ERROR_REASON_, or of its code.

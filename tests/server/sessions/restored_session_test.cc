@@ -1,0 +1,165 @@
+// Sessions after the death of a process, without a server around them.
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "gtest/gtest.h"
+#include "server/sessions/memory_session_store.h"
+#include "server/store/durable_log.h"
+#include "server/wire/errors.h"
+#include "tests/server/service_harness.h"
+#include "tests/server/store/store_support.h"
+
+namespace wellspace::server {
+namespace {
+
+class RestoredSessionTest : public ::testing::Test {
+ protected:
+  RestoredSessionTest() {
+    StartProcess();
+    session_ = store_->Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = absl::Hours(1)})
+                   .value();
+  }
+
+  // A process: what the one before had in memory is gone, whatever it was at.
+  void StartProcess() {
+    const std::string name = session_ == nullptr ? "" : session_->name();
+    session_ = nullptr;
+    store_.reset();
+    log_ = nullptr;
+    log_ = DurableLog::Open({.folder = folder_.path()}).value();
+    store_.emplace(options_, memory_, Clock(), *log_);
+    const StoredSessions before = log_->Load().value();
+    for (const StoredSession& stored : before.sessions) {
+      ASSERT_TRUE(store_->Restore(stored).ok());
+    }
+    if (!name.empty()) {
+      session_ = store_->Find("a", name).value();
+      resumed_ = session_->ResumeOperation().value();
+    }
+  }
+
+  std::shared_ptr<Operation> StartOperation() {
+    return session_
+        ->StartOperation({.dimension = 2}, 0,
+                         [](const std::shared_ptr<Operation>& /*operation*/) { return absl::OkStatus(); })
+        .value();
+  }
+
+  TestFolder folder_;
+  ServiceOptions options_;
+  MemoryBudget memory_{0};
+  std::unique_ptr<DurableLog> log_;
+  std::optional<MemorySessionStore> store_;
+  std::shared_ptr<Session> session_;
+  std::shared_ptr<Operation> resumed_;  // by the last process
+};
+
+TEST_F(RestoredSessionTest, AnOperationInWhichTwoProcessesDiedIsNotTriedAgain) {
+  const std::string name = StartOperation()->name();
+  ASSERT_TRUE(session_->BeginWork(*session_->FindOperation(name).value()).has_value());
+  StartProcess();
+  ASSERT_NE(resumed_, nullptr);
+  EXPECT_EQ(resumed_->name(), name);
+  EXPECT_TRUE(resumed_->IsSuspect());
+  EXPECT_EQ(DetailsOf(session_->Append(0, std::vector<double>{0, 0}, 0)).reason, "SESSION_BUSY");
+  ASSERT_TRUE(session_->BeginWork(*resumed_).has_value());
+  StartProcess();
+  EXPECT_EQ(resumed_, nullptr);
+  const v1::Operation operation = session_->FindOperation(name).value()->Describe();
+  EXPECT_EQ(operation.state(), v1::Operation::STATE_FAILED);
+  EXPECT_EQ(operation.error().code(), static_cast<int>(absl::StatusCode::kFailedPrecondition));
+  EXPECT_TRUE(session_->Append(0, std::vector<double>{0, 0}, 0).ok()) << "the session is free";
+  StartProcess();
+  EXPECT_EQ(session_->FindOperation(name).value()->Describe().state(), v1::Operation::STATE_FAILED);
+}
+
+TEST_F(RestoredSessionTest, AnOperationThatOnlyWaitedIsNoSuspect) {
+  const std::string name = StartOperation()->name();
+  for (int i = 0; i < 5; ++i) {
+    StartProcess();
+    ASSERT_NE(resumed_, nullptr);
+    EXPECT_EQ(resumed_->name(), name);
+    EXPECT_FALSE(resumed_->IsSuspect());
+  }
+}
+
+TEST_F(RestoredSessionTest, AParkedOperationIsNoSuspect) {
+  StartOperation();
+  for (int i = 0; i < 5; ++i) {
+    const std::shared_ptr<Operation> operation = session_->ListOperations(0, 1).front();
+    std::optional<SessionWork> work = session_->BeginWork(*operation);
+    ASSERT_TRUE(work.has_value());
+    WorkResult result{.status = absl::CancelledError("the server stops"), .work = *std::move(work), .mesh = nullptr};
+    EXPECT_TRUE(session_->EndWork(*operation, result));
+    EXPECT_FALSE(operation->HasEnded()) << "it is the next process's";
+    StartProcess();
+    ASSERT_NE(resumed_, nullptr);
+    EXPECT_FALSE(resumed_->IsSuspect());
+  }
+}
+
+TEST_F(RestoredSessionTest, ACancelThatWasNotedEndsTheOperation) {
+  const std::shared_ptr<Operation> operation = StartOperation();
+  ASSERT_TRUE(session_->BeginWork(*operation).has_value());
+  EXPECT_TRUE(session_->Cancel(*operation).ok());
+  EXPECT_FALSE(operation->HasEnded()) << "its work goes on until it hears of it";
+  StartProcess();
+  EXPECT_EQ(resumed_, nullptr);
+  EXPECT_EQ(session_->ListOperations(0, 1).front()->Describe().state(), v1::Operation::STATE_CANCELLED);
+}
+
+TEST_F(RestoredSessionTest, PointsThatWereNotCommittedAreGone) {
+  ASSERT_TRUE(session_->Append(0, std::vector<double>{0, 0, 1, 0}, 0).ok());
+  EXPECT_EQ(session_->Describe().committed_points(), 0u);
+  EXPECT_EQ(session_->Describe().revision(), 1u);
+  ASSERT_TRUE(session_->CommitPoints().ok());
+  EXPECT_EQ(session_->Describe().committed_points(), 2u);
+  EXPECT_EQ(session_->Describe().revision(), 2u);
+  ASSERT_TRUE(session_->Append(2, std::vector<double>{0.5, 1}, 0).ok());
+  EXPECT_EQ(session_->UncommittedBytes(), 16u);
+  StartProcess();
+  EXPECT_EQ(session_->Describe().committed_points(), 2u);
+  EXPECT_EQ(DetailsOf(session_->Append(3, std::vector<double>{0.5, 1}, 0)).reason, "UPLOAD_GAP");
+  EXPECT_TRUE(session_->Append(1, std::vector<double>{1, 0, 7, 7}, 0).ok());
+  ASSERT_TRUE(session_->CommitPoints().ok());
+  StartProcess();
+  EXPECT_EQ(session_->Describe().committed_points(), 3u);
+  EXPECT_EQ(session_->points().Copy(4, 6, core::RunContext()).value(), std::vector<double>({7, 7}));
+}
+
+TEST_F(RestoredSessionTest, AnOperationTakesAllPointsThatWereAppended) {
+  ASSERT_TRUE(session_->Append(0, std::vector<double>{0, 0, 1, 0}, 0).ok());
+  StartOperation();
+  StartProcess();
+  EXPECT_NE(resumed_, nullptr);
+  EXPECT_EQ(session_->Describe().committed_points(), 2u);
+}
+
+TEST_F(RestoredSessionTest, LimitsThatWereLoweredLoseNothing) {
+  ASSERT_TRUE(session_->Append(0, std::vector<double>(20, 0.5), 0).ok());
+  ASSERT_TRUE(session_->CommitPoints().ok());
+  options_.max_points = 1;
+  options_.max_points_per_tenant = 1;
+  options_.max_sessions = 0;
+  StartProcess();
+  EXPECT_EQ(session_->Describe().committed_points(), 10u);
+  EXPECT_EQ(DetailsOf(session_->Append(10, std::vector<double>{1, 2}, 0)).reason, "TOO_MANY_POINTS");
+}
+
+TEST_F(RestoredSessionTest, AClosedSessionIsWrittenDownNoMore) {
+  const std::shared_ptr<Operation> operation = StartOperation();
+  std::optional<SessionWork> work = session_->BeginWork(*operation);
+  ASSERT_TRUE(session_->Close(0).ok());
+  WorkResult result{.status = absl::CancelledError("deleted"), .work = *std::move(work), .mesh = nullptr};
+  EXPECT_TRUE(session_->EndWork(*operation, result));
+  const std::string name = session_->name();
+  session_ = nullptr;
+  StartProcess();
+  EXPECT_FALSE(store_->Find("a", name).ok());
+}
+
+}  // namespace
+}  // namespace wellspace::server
