@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "absl/cleanup/cleanup.h"
 #include "absl/strings/str_cat.h"
 #include "grpcpp/grpcpp.h"
 #include "gtest/gtest.h"
@@ -332,7 +333,8 @@ TEST(Kill, WhatWasAcknowledgedIsThere) {
   MortalServer server(folder.path());
   std::atomic<bool> is_over = false;
   std::vector<std::unique_ptr<Recorder>> clients;
-  std::vector<std::thread> threads;
+  std::vector<std::jthread> threads;
+  const absl::Cleanup end = [&] { is_over = true; };  // an exception, too, is no reason to wait for ever
   for (int i = 0; i < kClients; ++i) {
     clients.push_back(std::make_unique<Recorder>(server.address(), i, is_over));
     threads.emplace_back([client = clients.back().get()] { client->Run(); });
