@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
 #include "core/base/status_macros.h"
 #include "server/store/data_folder.h"
 
@@ -13,6 +15,10 @@ namespace wellspace::server {
 namespace {
 
 constexpr size_t kCopyBytes = size_t{1} << 20;
+
+// A second, in all.
+constexpr int kLockAttempts = 200;
+constexpr absl::Duration kBetweenLockAttempts = absl::Milliseconds(5);
 
 // Copies the first `size` bytes.
 absl::Status CopyFile(FileSystem& files, const std::string& from, const std::string& to, uint64_t size) {
@@ -47,6 +53,16 @@ absl::Status CopyFiles(FileSystem& files, const DataPaths& from, const DataPaths
   return files.Link(source, target).ok() ? absl::OkStatus() : CopyFile(files, source, target, session.mesh().size());
 }
 
+// A server that looks whether it is locked has it for a moment.
+absl::StatusOr<std::unique_ptr<FileLock>> LockForBackUp(FileSystem& files, const std::string& path) {
+  auto lock = files.Lock(path);
+  for (int i = 0; i < kLockAttempts && lock.status().code() == absl::StatusCode::kAborted; ++i) {
+    absl::SleepFor(kBetweenLockAttempts);
+    lock = files.Lock(path);
+  }
+  return lock;
+}
+
 absl::Status CheckEmpty(const DataPaths& to, FileSystem& files) {
   WELLSPACE_ASSIGN_OR_RETURN(std::vector<std::string> names, files.List(to.root));
   std::erase_if(names, [](const std::string& name) { return name == "lock" || name == "files"; });
@@ -71,7 +87,7 @@ absl::StatusOr<DataReport> BackUp(const std::string& folder, const std::string& 
   WELLSPACE_RETURN_IF_ERROR(CheckEmpty(to_paths, files));
 
   // A server removes no file from now on, so that all that the rows name stays until it is copied.
-  const auto keeps_files = files.Lock(from_paths.back_up_lock());
+  const auto keeps_files = LockForBackUp(files, from_paths.back_up_lock());
   if (keeps_files.status().code() == absl::StatusCode::kAborted) {
     return absl::FailedPreconditionError(absl::StrCat(folder, ": process ", std::string(keeps_files.status().message()),
                                                       " is backing this folder up; wait for its end"));
