@@ -93,11 +93,12 @@ absl::Status Backend::Restore() {
   for (const StoredSession& one : stored.sessions) {
     absl::StatusOr<std::shared_ptr<Session>> session = sessions_.Restore(one);
     if (!session.ok()) {  // others are not to suffer from it
-      log_->error(LogFields()
-                      .Add("event", "session_not_restored")
-                      .Add("session", one.state.name())
-                      .Add("error", std::string_view(session.status().message().data(), session.status().message().size()))
-                      .text());
+      log_->error(
+          LogFields()
+              .Add("event", "session_not_restored")
+              .Add("session", one.state.name())
+              .Add("error", std::string_view(session.status().message().data(), session.status().message().size()))
+              .text());
       continue;
     }
     WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Operation> operation, (*session)->ResumeOperation());

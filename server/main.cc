@@ -180,9 +180,9 @@ int Report(const std::string& folder, const absl::StatusOr<DataReport>& report) 
   for (const std::string& unknown : report->unknown) {
     std::cerr << "wellspaced: " << unknown << ": not of a server, and left as it is" << std::endl;
   }
-  std::cout << folder << ": " << (report->is_whole() ? "whole" : "damaged") << "; " << report->sessions
-            << " sessions, " << report->operations << " operations, " << report->points << " points, "
-            << report->meshes << " meshes, " << report->file_bytes << " bytes of files\n";
+  std::cout << folder << ": " << (report->is_whole() ? "whole" : "damaged") << "; " << report->sessions << " sessions, "
+            << report->operations << " operations, " << report->points << " points, " << report->meshes << " meshes, "
+            << report->file_bytes << " bytes of files\n";
   const int exit = ExitOfPrinted("the report");
   return report->is_whole() ? exit : 1;
 }

@@ -68,7 +68,8 @@ void EnableHealthAndReflection() {
 }  // namespace
 
 absl::StatusOr<std::unique_ptr<Server>> Server::Start(const ServerOptions& options, std::shared_ptr<spdlog::logger> log,
-                                                      std::unique_ptr<SessionLog> session_log, Mesher mesher, Estimator estimator, MesherFactory create_mesher) {
+                                                      std::unique_ptr<SessionLog> session_log, Mesher mesher,
+                                                      Estimator estimator, MesherFactory create_mesher) {
   EnableHealthAndReflection();
   WELLSPACE_ASSIGN_OR_RETURN(std::unique_ptr<Security> security, Security::Load(options.security, log));
   grpc::ServerBuilder builder;

@@ -88,8 +88,8 @@ class Server {
         connections_(options.connections.calls, log),
         observability_(ServiceNames(), log, connections_,
                        [this](const grpc::ServerContextBase& context) { return TenantOf(context); }),
-        backend_(options.service, security_->authenticator(), observability_, std::move(log),
-                 std::move(session_log), std::move(mesher), std::move(estimator), std::move(create_mesher)) {}
+        backend_(options.service, security_->authenticator(), observability_, std::move(log), std::move(session_log),
+                 std::move(mesher), std::move(estimator), std::move(create_mesher)) {}
 
   // Of the services that are ours.
   static std::vector<std::string> ServiceNames();

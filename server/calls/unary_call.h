@@ -35,9 +35,9 @@ class UnaryCall final : public Call<grpc::ServerUnaryReactor> {
   // Response&). Where the session log takes its time, it is asked on a thread that may wait for it, one call of a
   // session after the other.
   template <typename Request, typename Response, typename Handler>
-  static grpc::ServerUnaryReactor* ServeChange(const CallEnvironment& environment,
-                                               grpc::CallbackServerContext* context, const Request* request,
-                                               Response* response, const std::string& key, const Handler& handler) {
+  static grpc::ServerUnaryReactor* ServeChange(const CallEnvironment& environment, grpc::CallbackServerContext* context,
+                                               const Request* request, Response* response, const std::string& key,
+                                               const Handler& handler) {
     const auto call = std::make_shared<UnaryCall>(environment, context);
     Begin(call);
     if (call->is_admitted_) {
@@ -62,8 +62,7 @@ class UnaryCall final : public Call<grpc::ServerUnaryReactor> {
       const auto work = [&](const IdentifiedRequest& identified, const RequestIds::Done& done) {
         Change(environment, key, *request, [call, handler, identified, done](const Request& copy) {
           Response answer;
-          absl::Status status =
-              RunGuarded([&] { return handler(call->caller(), copy, identified, answer); });
+          absl::Status status = RunGuarded([&] { return handler(call->caller(), copy, identified, answer); });
           done({std::move(status), answer.SerializeAsString()});
         });
       };

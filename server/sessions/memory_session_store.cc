@@ -55,8 +55,7 @@ absl::StatusOr<std::shared_ptr<Session>> MemorySessionStore::Prepare(NewSession 
   }
   if (by_name_.size() + pending_ >= options_.max_sessions) {
     return MakeError(v1::ERROR_REASON_TOO_MANY_SESSIONS,
-                     absl::StrCat("this server has ", by_name_.size() + pending_,
-                                  " sessions, as many as it may have"));
+                     absl::StrCat("this server has ", by_name_.size() + pending_, " sessions, as many as it may have"));
   }
   Tenant& tenant = tenants_[settings.tenant];
   ++tenant.pending;

@@ -57,7 +57,7 @@ class MemorySessionStore final : public SessionStore {
   // Guarded by mutex_.
   std::unordered_map<std::string, std::shared_ptr<Session>> by_name_;
   std::map<std::string, Tenant> tenants_;  // those that have sessions
-  size_t pending_ = 0;  // of all tenants
+  size_t pending_ = 0;                     // of all tenants
   absl::Time last_create_time_ = absl::InfinitePast();
 };
 

@@ -47,8 +47,8 @@ absl::StatusOr<core::Mesh> MeshFirst(const MesherFactory& create_mesher, const S
 absl::Status BringBack(const MesherFactory& create_mesher, const Session& session, Job& job, SessionWork& work) {
   if (work.mesher == nullptr) {
     job.context().EnterPhase(core::Phase::kTree);
-    WELLSPACE_ASSIGN_OR_RETURN(work.mesher, Replay(session.steps(), session.points(), session.features(),
-                                                   *work.mesh, create_mesher, job));
+    WELLSPACE_ASSIGN_OR_RETURN(
+        work.mesher, Replay(session.steps(), session.points(), session.features(), *work.mesh, create_mesher, job));
   }
   return absl::OkStatus();
 }
@@ -160,8 +160,8 @@ void Run(const CallEnvironment& environment, const std::shared_ptr<Session>& ses
     report.simplices = (*mesh)->figures().simplices;
   }
   environment.observability.work().OnRefinement(report);  // before clients see the end
-  const auto result = std::make_shared<WorkResult>(WorkResult{
-      .status = report.status, .work = *std::move(work), .mesh = mesh.ok() ? *std::move(mesh) : nullptr});
+  const auto result = std::make_shared<WorkResult>(
+      WorkResult{.status = report.status, .work = *std::move(work), .mesh = mesh.ok() ? *std::move(mesh) : nullptr});
   EndWhenPossible(environment, session, operation, result);
 }
 
@@ -181,11 +181,10 @@ absl::StatusOr<std::shared_ptr<Job>> Submit(const CallEnvironment& environment, 
       IsSmallRefinement(operation->parameters(), size.some_points, size.vertices, size.replayed_steps);
   WELLSPACE_ASSIGN_OR_RETURN(
       std::shared_ptr<Job> job,
-      environment.jobs.Submit({.tenant = session->tenant(),
-                               .is_small = is_small,
-                               .work = [&environment, session, operation](Job& self) {
-                                 Run(environment, session, operation, self);
-                               }}));
+      environment.jobs.Submit(
+          {.tenant = session->tenant(), .is_small = is_small, .work = [&environment, session, operation](Job& self) {
+             Run(environment, session, operation, self);
+           }}));
   operation->SetJob(job);
   return job;
 }
@@ -250,9 +249,8 @@ absl::StatusOr<std::shared_ptr<Operation>> StartRefinement(const CallEnvironment
 void ResumeRefinements(const CallEnvironment& environment, std::vector<ResumedOperation> resumed) {
   const auto suspects = std::make_shared<std::deque<ResumedOperation>>();
   for (ResumedOperation& one : resumed) {
-    environment.background.Post([&background = environment.background, weak = std::weak_ptr(one.operation)] {
-      Tick(background, weak);
-    });
+    environment.background.Post(
+        [&background = environment.background, weak = std::weak_ptr(one.operation)] { Tick(background, weak); });
     if (one.operation->IsSuspect()) {
       suspects->push_back(std::move(one));
     } else {

@@ -12,9 +12,9 @@
 #include "server/base/mesh_functions.h"
 #include "server/jobs/job.h"
 #include "server/sessions/feature_store.h"
+#include "server/sessions/session_steps.h"
 #include "server/store/mesh_snapshot.h"
 #include "server/store/point_store.h"
-#include "server/sessions/session_steps.h"
 
 namespace wellspace::server {
 

@@ -28,9 +28,9 @@
 #include "server/sessions/lease.h"
 #include "server/sessions/operation.h"
 #include "server/sessions/point_account.h"
-#include "server/store/point_store.h"
 #include "server/sessions/session_steps.h"
 #include "server/store/mesh_snapshot.h"
+#include "server/store/point_store.h"
 #include "server/store/session_log.h"
 #include "wellspace/store/v1/records.pb.h"
 #include "wellspace/v1/sessions.pb.h"
@@ -59,7 +59,7 @@ struct SessionWork {
 // How the work of an operation has ended.
 struct WorkResult {
   absl::Status status;
-  SessionWork work;                     // what BeginWork gave; on an error its mesher is as it was, or null
+  SessionWork work;                    // what BeginWork gave; on an error its mesher is as it was, or null
   std::shared_ptr<MeshSnapshot> mesh;  // the new mesh, if the status is OK
 };
 
@@ -68,8 +68,8 @@ struct WorkResult {
 // under way, or vertices are being added or the mesher is built again, points, features, mesh, mesher and steps are
 // touched by nothing else;
 // (3) what did not succeed leaves the session as it was: structure and mesh are what Replay makes of the steps, whether
-// there is a mesher now or not; (4) the lock order is change_mutex_, this session's mutex, then that of an operation, of
-// TenantPoints or, where memory is released, of the JobPool; (5) nobody is told of a change, and nothing shows it,
+// there is a mesher now or not; (4) the lock order is change_mutex_, this session's mutex, then that of an operation,
+// of TenantPoints or, where memory is released, of the JobPool; (5) nobody is told of a change, and nothing shows it,
 // before the log has it; one that it cannot have is not made. Functions that change the session wait for the log: they
 // are to be called where that holds up no other work.
 class Session {
@@ -343,7 +343,7 @@ class Session {
   const Clock clock_;
   SessionLog& log_;
 
-  mutable std::mutex change_mutex_;  // before mutex_; held over a change, and until the log has it
+  mutable std::mutex change_mutex_;          // before mutex_; held over a change, and until the log has it
   mutable std::shared_mutex queries_mutex_;  // after mutex_; held shared by queries
   mutable std::mutex mutex_;
   // Guarded by mutex_.
@@ -355,16 +355,16 @@ class Session {
   bool is_uploading_ = false;
   bool is_ready_ = false;  // the last operation succeeded, and no points have come since
   uint64_t revision_ = 1;
-  PointAccount point_account_;      // includes the points that AddVertices is adding
+  PointAccount point_account_;          // includes the points that AddVertices is adding
   std::unique_ptr<PointStore> points_;  // see invariant (2)
-  uint64_t committed_points_ = 0;   // of points_, those that are the session's
-  uint32_t uncommitted_crc32c_ = 0; // of the others
-  FeatureStore features_;           // see invariant (2)
-  bool has_features_ = true;        // false: they were written down by another process, and not read yet
-  FeatureSummary feature_summary_;  // of them, read or not
-  SessionWork work_;                // its mesher is away while an operation is under way; see invariant (2)
-  SessionSteps steps_;              // see invariant (2)
-  uint64_t structure_version_ = 0;  // of what queries see; 0: nothing yet
+  uint64_t committed_points_ = 0;       // of points_, those that are the session's
+  uint32_t uncommitted_crc32c_ = 0;     // of the others
+  FeatureStore features_;               // see invariant (2)
+  bool has_features_ = true;            // false: they were written down by another process, and not read yet
+  FeatureSummary feature_summary_;      // of them, read or not
+  SessionWork work_;                    // its mesher is away while an operation is under way; see invariant (2)
+  SessionSteps steps_;                  // see invariant (2)
+  uint64_t structure_version_ = 0;      // of what queries see; 0: nothing yet
   uint64_t next_operation_ = 1;
   std::deque<std::shared_ptr<Operation>> operations_;  // ascending by number
 };

@@ -127,8 +127,7 @@ absl::Status Session::CommitSuccess(const Operation& operation, const WorkResult
       step.set_meshing_version(core::kMeshingVersion);
     }
     const MeshSnapshot::Figures& figures = mesh.figures();
-    change.operations.push_back(
-        operation.RecordOfSuccess(now, figures.revision, figures.vertices, figures.simplices));
+    change.operations.push_back(operation.RecordOfSuccess(now, figures.revision, figures.vertices, figures.simplices));
   });
 }
 
@@ -147,7 +146,8 @@ bool Session::EndWork(Operation& operation, WorkResult& result) {
     const bool is_parked = absl::IsCancelled(result.status) && !operation.IsCancelled() && log_.is_durable();
     const absl::Status logged = Commit([&](SessionChange& change) {
       change.state.reset();
-      change.operations.push_back(is_parked ? operation.RecordOfParking() : operation.RecordOfFailure(now, result.status));
+      change.operations.push_back(is_parked ? operation.RecordOfParking()
+                                            : operation.RecordOfFailure(now, result.status));
     });
     if (absl::IsResourceExhausted(logged)) {
       return false;

@@ -65,8 +65,8 @@ absl::StatusOr<std::shared_ptr<Session>> Session::Restore(const StoredSession& s
     operations.push_back(std::make_shared<Operation>(absl::StrCat(settings.name, "/operations/", record.number()),
                                                      record, std::move(parameters)));
   }
-  auto session = std::make_shared<Session>(std::move(settings), options, memory, std::move(clock),
-                                           std::move(tenant_points), log);
+  auto session =
+      std::make_shared<Session>(std::move(settings), options, memory, std::move(clock), std::move(tenant_points), log);
   session->steps_ = std::move(steps);
   session->operations_ = std::move(operations);
   session->SetState(stored);

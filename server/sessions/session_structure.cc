@@ -60,8 +60,7 @@ Session::Size Session::GetSize(uint64_t few) const {
 }
 
 absl::Status Session::Rebuild(const MesherFactory& create_mesher, Job& job) {
-  WELLSPACE_ASSIGN_OR_RETURN(work_.mesher,
-                             Replay(steps_, *points_, features_, *work_.mesh, create_mesher, job));
+  WELLSPACE_ASSIGN_OR_RETURN(work_.mesher, Replay(steps_, *points_, features_, *work_.mesh, create_mesher, job));
   work_.memory = job.TakeMemory(work_.mesher->memory_bytes());
   work_.memory.MakeLasting();
   return absl::OkStatus();
@@ -155,8 +154,7 @@ absl::Status Session::CommitAddition(std::span<const double> points, uint64_t up
   if (status.ok()) {
     status = Commit([&](SessionChange& change) {
       if (grows) {
-        AddPointsTo(change, known + count,
-                    ExtendCrc32c(uncommitted_crc32c_, points.data(), points.size_bytes()));
+        AddPointsTo(change, known + count, ExtendCrc32c(uncommitted_crc32c_, points.data(), points.size_bytes()));
         change.state->set_revision(added->revision);
         change.state->set_is_ready(false);
       }

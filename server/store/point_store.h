@@ -76,7 +76,8 @@ class MemoryPoints final : public PointStore {
   absl::Status Synchronize() override { return absl::OkStatus(); }
   absl::StatusOr<uint64_t> CountEqual(uint64_t first, std::span<const double> coordinates) const override;
   absl::StatusOr<uint32_t> Checksum(uint64_t first, uint64_t end) const override;
-  absl::StatusOr<std::vector<double>> Copy(uint64_t first, uint64_t end, const core::RunContext& context) const override;
+  absl::StatusOr<std::vector<double>> Copy(uint64_t first, uint64_t end,
+                                           const core::RunContext& context) const override;
 
  private:
   // Of the coordinates from number `first` on, those that lie in one block with it, `end` excepted.

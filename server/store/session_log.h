@@ -21,13 +21,13 @@ namespace wellspace::server {
 
 // What changes with one change of a session: all of it, or nothing.
 struct SessionChange {
-  std::string session;                                       // its name
-  std::optional<store::v1::SessionRecord> state{};           // what it is from now on; none: as before
-  std::vector<store::v1::StepRecord> steps{};                // come behind those that there are
-  std::vector<store::v1::OperationRecord> operations{};      // new, or in the place of those of their numbers
-  std::vector<uint64_t> dropped_operations{};                // their numbers
-  std::optional<store::v1::AnswerRecord> answer{};           // to the request that has made the change
-  bool is_deletion = false;                                  // of the session and all that it has
+  std::string session;                                   // its name
+  std::optional<store::v1::SessionRecord> state{};       // what it is from now on; none: as before
+  std::vector<store::v1::StepRecord> steps{};            // come behind those that there are
+  std::vector<store::v1::OperationRecord> operations{};  // new, or in the place of those of their numbers
+  std::vector<uint64_t> dropped_operations{};            // their numbers
+  std::optional<store::v1::AnswerRecord> answer{};       // to the request that has made the change
+  bool is_deletion = false;                              // of the session and all that it has
 };
 
 // A request_id of a tenant.
@@ -96,8 +96,7 @@ class SessionLog {
   //
   // Errors:     DISK_FULL, UNAVAILABLE; CANCELLED, DEADLINE_EXCEEDED.
   virtual absl::StatusOr<std::shared_ptr<MeshSnapshot>> KeepMesh(const std::string& session, uint64_t revision,
-                                                                 core::Mesh mesh,
-                                                                 const core::RunContext& context) = 0;
+                                                                 core::Mesh mesh, const core::RunContext& context) = 0;
 
   // Removes files that nothing written down names. To be called after the start, and hourly.
   virtual absl::StatusOr<Garbage> RemoveGarbage() = 0;

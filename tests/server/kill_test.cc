@@ -143,8 +143,7 @@ class Recorder {
   }
 
   template <typename Request, typename Response, typename Stub>
-  std::optional<Response> Ask(Stub& stub,
-                              grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
+  std::optional<Response> Ask(Stub& stub, grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
                               const Request& request) {
     Response response;
     const bool has_come = Try([&](grpc::ClientContext& context) {

@@ -10,8 +10,8 @@
 #include "grpcpp/support/server_callback.h"
 #include "server/calls/response_stream.h"
 #include "server/services/meshing/cloud_call.h"
-#include "server/store/mesh_chunks.h"
 #include "server/sessions/progress_pacer.h"
+#include "server/store/mesh_chunks.h"
 #include "wellspace/v1/meshing.pb.h"
 
 namespace wellspace::server {

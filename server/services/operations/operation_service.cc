@@ -65,11 +65,10 @@ absl::Status List(const CallEnvironment& environment, const Caller& caller, cons
 grpc::ServerUnaryReactor* OperationService::StartRefinement(grpc::CallbackServerContext* context,
                                                             const v1::StartRefinementRequest* request,
                                                             v1::StartRefinementResponse* response) {
-  return UnaryCall::ServeOnce(environment_, context, request, response, request->name(),
-                              [this](const Caller& caller, const v1::StartRefinementRequest& own,
-                                     const IdentifiedRequest& identified, v1::StartRefinementResponse& answer) {
-                                return Start(environment_, caller, own, identified, answer);
-                              });
+  return UnaryCall::ServeOnce(
+      environment_, context, request, response, request->name(),
+      [this](const Caller& caller, const v1::StartRefinementRequest& own, const IdentifiedRequest& identified,
+             v1::StartRefinementResponse& answer) { return Start(environment_, caller, own, identified, answer); });
 }
 
 grpc::ServerUnaryReactor* OperationService::GetOperation(grpc::CallbackServerContext* context,

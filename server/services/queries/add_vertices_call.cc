@@ -36,9 +36,9 @@ RequestIds::Answer Add(const Addition& addition, const MesherFactory& create_mes
       SetResponse(added, response);
       return addition.identified.Answer(response);
     };
-    WELLSPACE_ASSIGN_OR_RETURN(const AddedVertices added,
-                               session.AddVertices(addition.points, addition.near, addition.expected_revision,
-                                                   job.context(), answer));
+    WELLSPACE_ASSIGN_OR_RETURN(
+        const AddedVertices added,
+        session.AddVertices(addition.points, addition.near, addition.expected_revision, job.context(), answer));
     SetResponse(added, response);
     return absl::OkStatus();
   });

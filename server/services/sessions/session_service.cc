@@ -121,11 +121,10 @@ absl::Status Get(const CallEnvironment& environment, const Caller& caller, const
 grpc::ServerUnaryReactor* SessionService::CreateSession(grpc::CallbackServerContext* context,
                                                         const v1::CreateSessionRequest* request,
                                                         v1::CreateSessionResponse* response) {
-  return UnaryCall::ServeOnce(environment_, context, request, response, "",
-                              [this](const Caller& caller, const v1::CreateSessionRequest& own,
-                                     const IdentifiedRequest& identified, v1::CreateSessionResponse& answer) {
-                                return Create(environment_, caller, own, identified, answer);
-                              });
+  return UnaryCall::ServeOnce(
+      environment_, context, request, response, "",
+      [this](const Caller& caller, const v1::CreateSessionRequest& own, const IdentifiedRequest& identified,
+             v1::CreateSessionResponse& answer) { return Create(environment_, caller, own, identified, answer); });
 }
 
 grpc::ServerUnaryReactor* SessionService::GetSession(grpc::CallbackServerContext* context,
@@ -149,21 +148,19 @@ grpc::ServerUnaryReactor* SessionService::ListSessions(grpc::CallbackServerConte
 grpc::ServerUnaryReactor* SessionService::UpdateSession(grpc::CallbackServerContext* context,
                                                         const v1::UpdateSessionRequest* request,
                                                         v1::UpdateSessionResponse* response) {
-  return UnaryCall::ServeOnce(environment_, context, request, response, request->session().name(),
-                              [this](const Caller& caller, const v1::UpdateSessionRequest& own,
-                                     const IdentifiedRequest& identified, v1::UpdateSessionResponse& answer) {
-                                return Update(environment_, caller, own, identified, answer);
-                              });
+  return UnaryCall::ServeOnce(
+      environment_, context, request, response, request->session().name(),
+      [this](const Caller& caller, const v1::UpdateSessionRequest& own, const IdentifiedRequest& identified,
+             v1::UpdateSessionResponse& answer) { return Update(environment_, caller, own, identified, answer); });
 }
 
 grpc::ServerUnaryReactor* SessionService::DeleteSession(grpc::CallbackServerContext* context,
                                                         const v1::DeleteSessionRequest* request,
                                                         v1::DeleteSessionResponse* response) {
-  return UnaryCall::ServeOnce(environment_, context, request, response, request->name(),
-                              [this](const Caller& caller, const v1::DeleteSessionRequest& own,
-                                     const IdentifiedRequest& identified, v1::DeleteSessionResponse& /*answer*/) {
-                                return Delete(environment_, caller, own, identified);
-                              });
+  return UnaryCall::ServeOnce(
+      environment_, context, request, response, request->name(),
+      [this](const Caller& caller, const v1::DeleteSessionRequest& own, const IdentifiedRequest& identified,
+             v1::DeleteSessionResponse& /*answer*/) { return Delete(environment_, caller, own, identified); });
 }
 
 grpc::ServerReadReactor<grpc::ByteBuffer>* SessionService::UploadPoints(grpc::CallbackServerContext* context,

@@ -17,8 +17,8 @@
 
 namespace wellspace::server {
 
-// Commits what has come whenever it is kCommittedBytes, and at its end; it goes on reading meanwhile. One upload has a session at a time: the first message of another waits
-// for a moment, in which one whose connection broke is noticed.
+// Commits what has come whenever it is kCommittedBytes, and at its end; it goes on reading meanwhile. One upload has a
+// session at a time: the first message of another waits for a moment, in which one whose connection broke is noticed.
 //
 // Thread safety and invariants: those of Call.
 class UploadPointsCall final : public RequestStream<Call<grpc::ServerReadReactor<grpc::ByteBuffer>>> {

@@ -36,7 +36,8 @@ class ManualTest(unittest.TestCase):
     def test_has_every_command_and_option(self):
         page = run("manual").replace("\\-", "-")
         names = list(leaves())
-        for name in ("mesh estimate upload refine watch cancel download cells add check render completion manual").split():
+        names = "mesh estimate upload refine watch cancel download cells add check render completion manual"
+        for name in names.split():
             self.assertIn((name,), names)
         for name in ("create list show update delete").split():
             self.assertIn(("session", name), names)
@@ -61,7 +62,8 @@ class CompletionTest(unittest.TestCase):
     def complete(self, *words, folder="."):
         """What bash offers for the last of `words`."""
         line = " ".join(f"'{word}'" for word in ("wellspace", *words))
-        script = f'source "$1"; COMP_WORDS=({line}); COMP_CWORD={len(words)}; _wellspace; printf "%s\\n" "${{COMPREPLY[@]}}"'
+        script = (f'source "$1"; COMP_WORDS=({line}); COMP_CWORD={len(words)}; _wellspace; '
+                  'printf "%s\\n" "${COMPREPLY[@]}"')
         with tempfile.NamedTemporaryFile("w") as completion:
             completion.write(run("completion", "bash"))
             completion.flush()
@@ -93,7 +95,8 @@ class CompletionTest(unittest.TestCase):
             for name in ("cloud.csv", "other.npz"):
                 open(os.path.join(folder, name), "w").close()
             self.assertEqual(self.complete("mesh", "cl", folder=folder), ["cloud.csv"])
-            self.assertEqual(sorted(self.complete("mesh", "a.csv", "-o", "", folder=folder)), ["cloud.csv", "other.npz"])
+            self.assertEqual(sorted(self.complete("mesh", "a.csv", "-o", "", folder=folder)),
+                             ["cloud.csv", "other.npz"])
 
 
 if __name__ == "__main__":

@@ -34,7 +34,8 @@ class Interoperability(unittest.TestCase):
         self.folder = pathlib.Path(folder.name)
 
     def convert(self, source, target, *options, format=None):
-        subprocess.run([CONVERT_MESH, *options, self.folder / source, self.folder / target, *([format] if format else [])],
+        formats = [format] if format else []
+        subprocess.run([CONVERT_MESH, *options, self.folder / source, self.folder / target, *formats],
                        check=True, timeout=60)
 
     def assert_same_bits(self, mesh, points, cells, dimension):
@@ -99,7 +100,8 @@ class Interoperability(unittest.TestCase):
 
     def test_meshio_reads_our_msh_and_mesh(self):
         for dimension in (2, 3):
-            for name, format, theirs in (("a.msh", "msh41", "gmsh"), ("b.msh", "msh22", "gmsh"), ("c.mesh", "medit", "medit")):
+            for name, format, theirs in (("a.msh", "msh41", "gmsh"), ("b.msh", "msh22", "gmsh"),
+                                         ("c.mesh", "medit", "medit")):
                 with self.subTest(dimension=dimension, format=format):
                     points, cells = random_mesh(dimension)
                     self.write_pair("mesh", points, cells)

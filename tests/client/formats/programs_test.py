@@ -60,7 +60,8 @@ class Programs(unittest.TestCase):
                     points, cells, _ = self.write(dimension, "mesh.msh", format)
                     self.run_program("gmsh", "-check", "mesh.msh")
                     for version, binary in (("2.2", []), ("4.1", []), ("4.1", ["-bin"])):
-                        text = self.run_program("gmsh", "mesh.msh", "-save", "-save_all", "-format", "msh" + version[0] + version[2],
+                        text = self.run_program("gmsh", "mesh.msh", "-save", "-save_all",
+                                                "-format", "msh" + version[0] + version[2],
                                                 *binary, "-o", "theirs.msh")
                         self.assertRegex(text, rf"{len(points)} nodes")
                         self.assertNotRegex(text, r"Error|Warning")

@@ -153,9 +153,11 @@ TEST_F(RequestIdsTest, ACallThatRepeatsOneUnderWayGetsItsAnswer) {
   std::vector<std::string> answers;
   const auto note = [&](const RequestIds::Answer& answer) { answers.push_back(answer.response); };
   ids_.Once(
-      "a", "1", request, [&](const IdentifiedRequest&, RequestIds::Done done) { first_is_done = std::move(done); }, note);
+      "a", "1", request, [&](const IdentifiedRequest&, RequestIds::Done done) { first_is_done = std::move(done); },
+      note);
   ids_.Once(
-      "a", "1", request, [&](const IdentifiedRequest&, const RequestIds::Done&) { ADD_FAILURE() << "done twice"; }, note);
+      "a", "1", request, [&](const IdentifiedRequest&, const RequestIds::Done&) { ADD_FAILURE() << "done twice"; },
+      note);
   EXPECT_TRUE(answers.empty());
   first_is_done(Ok("answer"));
   EXPECT_EQ(answers, std::vector<std::string>(2, "answer"));

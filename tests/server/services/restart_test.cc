@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "gtest/gtest.h"
-#include "server/store/durable_log.h"
 #include "server/store/check_data.h"
+#include "server/store/durable_log.h"
 #include "tests/server/scripted_mesher.h"
 #include "tests/server/service_harness.h"
 #include "tests/server/session_calls.h"
@@ -204,7 +204,8 @@ TEST_F(RestartTest, WhateverTheRestartsTheMeshesAreTheSameToTheBit) {
   };
   Start();
   const std::string undisturbed = live(0);
-  for (const uint32_t restarts : {0b1111111u, 0b1u, 0b10u, 0b100u, 0b1000u, 0b10000u, 0b100000u, 0b1000000u, 0b0101010u}) {
+  for (const uint32_t restarts :
+       {0b1111111u, 0b1u, 0b10u, 0b100u, 0b1000u, 0b10000u, 0b100000u, 0b1000000u, 0b0101010u}) {
     EXPECT_TRUE(live(restarts) == undisturbed) << restarts;
   }
 }

@@ -19,8 +19,8 @@ class RestoredSessionTest : public ::testing::Test {
  protected:
   RestoredSessionTest() {
     StartProcess();
-    session_ = store_->Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = absl::Hours(1)})
-                   .value();
+    session_ =
+        store_->Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = absl::Hours(1)}).value();
   }
 
   // A process: what the one before had in memory is gone, whatever it was at.

@@ -191,7 +191,8 @@ TEST_F(SessionStoreTest, PointsAreLimitedBySessionAndByTenant) {
 TEST_F(SessionStoreTest, KeepsTheLastHundredOperations) {
   const std::shared_ptr<Session> session = Create();
   for (int i = 0; i < 103; ++i) {
-    const absl::StatusOr<std::shared_ptr<Operation>> operation = session->StartOperation({.dimension = 2}, 0, Submitted);
+    const absl::StatusOr<std::shared_ptr<Operation>> operation =
+        session->StartOperation({.dimension = 2}, 0, Submitted);
     ASSERT_TRUE(operation.ok());
     EXPECT_TRUE(session->Cancel(**operation).ok());
   }
