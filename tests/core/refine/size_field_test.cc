@@ -238,6 +238,36 @@ TYPED_TEST(SizeFieldTest, TheLeastInABoxIsNotAboveThatAtItsPlaces) {
   }
 }
 
+// How many bounds a look takes, of places and of nodes, on average over the unit box; sizes vary smoothly.
+template <int D>
+double BoundsPerLook(size_t samples, uint64_t seed) {
+  test::SplitMix64 random(seed);
+  std::vector<SizedPlace<Point<D>>> places(samples);
+  for (auto& [p, size] : places) {
+    std::generate(p.begin(), p.end(), [&random] { return random.Unit(); });
+    size = 0.05 + 0.02 * std::sin(6 * p[0]);
+  }
+  const SampleTree<D> tree(std::move(places));
+  constexpr int kLooks = 1000;
+  uint64_t bounds = 0;
+  for (int i = 0; i < kLooks; ++i) {
+    Point<D> x;
+    std::generate(x.begin(), x.end(), [&random] { return random.Unit(); });
+    tree.Least(x, kInfinity, [&bounds](double size, double gap_sq) {
+      ++bounds;
+      return size + 0.3 * std::sqrt(gap_sq);
+    });
+  }
+  return static_cast<double>(bounds) / kLooks;
+}
+
+TEST(SizeTree, LooksAtFewOfManyPlaces) {
+  EXPECT_LT(BoundsPerLook<2>(40'000, 1), 100);
+  EXPECT_LT(BoundsPerLook<3>(40'000, 1), 200);
+  EXPECT_LT(BoundsPerLook<2>(40'000, 1), 2 * BoundsPerLook<2>(1'000, 1));
+  EXPECT_LT(BoundsPerLook<3>(40'000, 1), 2 * BoundsPerLook<3>(1'000, 1));
+}
+
 TEST(SizeField, OfNothingIsUnbounded) {
   EXPECT_TRUE(SizeField<2>().IsUnbounded());
   EXPECT_TRUE(SizeField<2>(kInfinity, {}, std::make_shared<const SampleTree<2>>()).IsUnbounded());
