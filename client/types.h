@@ -24,6 +24,16 @@ struct SizeBox {
   double max_circumradius = 0;
 };
 
+// What a size says; see the proto's SizeMeasure.
+enum class SizeMeasure { kCircumradius, kEdgeLength };
+
+// Sizes at points; see the proto's SizeSamples.
+struct SizeSamples {
+  std::vector<double> points;  // n x dimension, row-major
+  std::vector<double> sizes;   // n
+  SizeMeasure measure = SizeMeasure::kCircumradius;
+};
+
 // Which faces, into which segments cut the plane, are meshed; see the proto's FaceRule.
 enum class FaceRule { kBox, kHoles, kEvenOdd };
 
@@ -52,7 +62,9 @@ struct MeshOptions {
   double rho = 0;
   Criterion criterion = Criterion::kRadiusEdge;
   double max_circumradius = 0;
+  double edge_length = 0;
   std::vector<SizeBox> size_boxes;
+  double gradation = 0;                // from boxes and samples
   std::optional<double> min_dihedral;  // degrees; 0: slivers are left as they are
   bool pump_weights = false;
   double merge_distance = 0;   // points this near to each other become one vertex
@@ -64,6 +76,7 @@ struct MeshOptions {
   int threads = 0;
   std::shared_ptr<const Features>
       features;  // of MeshPoints and EstimateMesh, in 2-D; null: none. Those of a session: AddSegments
+  std::shared_ptr<const SizeSamples> size_samples;  // of MeshPoints and EstimateMesh; null: none
 };
 
 // The vertex of an input point that lies in no face which is meshed.

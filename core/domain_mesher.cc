@@ -123,6 +123,7 @@ absl::Status DomainMesher::Initialize(const MeshParameters& parameters, std::spa
       CheckSeparation<2>(domain_, structure_, 0, made.cloud.first_input, parameters.threads, context));
   mesh_box_.low = mesh_box_.high = domain_.Unscaled(structure_.point(VertexId{0}));
   NoteAddedFrom(0);
+  WELLSPACE_RETURN_IF_ERROR(samples_.Take(domain_, mesh_box_, parameters, context));
   refinement_.emplace(structure_, domain_.MinEdge(), planar_.get());
   placer_.emplace(domain_, structure_, *planar_);
   adder_.emplace(domain_, 0, structure_, *refinement_, numbering_, nullptr, &*placer_);
@@ -146,8 +147,8 @@ void DomainMesher::NumberPoints(const DomainCloud& made, std::span<const double>
 }
 
 uint64_t DomainMesher::memory_bytes() const {
-  uint64_t bytes =
-      structure_.MemoryBytes() + refinement_->MemoryBytes() + planar_->MemoryBytes() + numbering_.MemoryBytes();
+  uint64_t bytes = structure_.MemoryBytes() + refinement_->MemoryBytes() + planar_->MemoryBytes() +
+                   numbering_.MemoryBytes() + samples_.MemoryBytes();
   if (made_.has_value()) {
     bytes += (made_->triangles.simplices.indices.size() + made_->triangles.faces.size() +
               made_->chains.vertices.size() + made_->chains.first.size()) *
@@ -161,15 +162,16 @@ absl::Status DomainMesher::Refine(const MeshParameters& parameters, RunContext& 
   if (parameters.criterion != Criterion::kRadiusEdge) {
     return absl::InvalidArgumentError("criterion: a domain with segments has the radius-edge criterion alone");
   }
-  made_.reset();
   context.EnterPhase(Phase::kRefinement);
+  WELLSPACE_RETURN_IF_ERROR(samples_.Take(domain_, mesh_box_, parameters, context));
+  made_.reset();
   const Stopwatch stopwatch(refinement_seconds_, simplices_seconds_);
   return MakeConforming(parameters, context);
 }
 
 // Refines, and splits subsegments, until every one is an edge of the triangulation, with nothing in its diametral disc.
 absl::Status DomainMesher::MakeConforming(const MeshParameters& parameters, RunContext& context) {
-  const MeshCriteria<2> criteria = CriteriaIn<2>(domain_, parameters);
+  const MeshCriteria<2> criteria = CriteriaIn<2>(domain_, parameters, samples_);
   rho_ = criteria.rho;
   while (true) {
     WELLSPACE_RETURN_IF_ERROR(
@@ -463,7 +465,11 @@ void DomainMesher::SetStatistics(Mesh& mesh) const {
 
 absl::StatusOr<MeshEstimate> DomainMesher::Estimate(const MeshParameters& parameters, const RunContext& context) const {
   WELLSPACE_RETURN_IF_ERROR(CheckParametersIn(parameters, 2));
-  return EstimateMeshOf<2>(structure_, CriteriaIn<2>(domain_, parameters), context, planar_.get());
+  WELLSPACE_ASSIGN_OR_RETURN(
+      MeshEstimate estimate,
+      EstimateMeshOf<2>(structure_, CriteriaIn<2>(domain_, parameters, samples_), context, planar_.get()));
+  estimate.memory_bytes += samples_.MemoryBytes();
+  return estimate;
 }
 
 absl::StatusOr<std::unique_ptr<Mesher>> Mesher::CreateInDomain(const MeshParameters& parameters,

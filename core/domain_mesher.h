@@ -19,6 +19,7 @@
 #include "core/point_placer.h"
 #include "core/refine/domain/planar_domain.h"
 #include "core/refine/refine.h"
+#include "core/scaled_samples.h"
 #include "core/simplex/domain_simplices.h"
 #include "core/vertex_numbering.h"
 #include "core/voronoi/query_structure.h"
@@ -76,7 +77,8 @@ class DomainMesher final : public Mesher {
   void SetStatistics(Mesh& mesh) const;
 
   Domain<2> domain_;
-  Box<2> mesh_box_;  // of what is meshed, not scaled
+  Box<2> mesh_box_;           // of what is meshed, not scaled
+  ScaledSamples<2> samples_;  // of the last parameters
   QueryStructure<2> structure_;
   std::unique_ptr<PlanarDomain> planar_;
   std::optional<Refinement<2>> refinement_;

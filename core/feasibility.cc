@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
+#include <vector>
 
 #include "absl/strings/cord.h"
 #include "absl/strings/str_cat.h"
@@ -15,8 +17,8 @@
 namespace wellspace::core {
 namespace {
 
-// Sides of a scaled box, and all lengths in it that doubles can tell apart, are within 2^120 of 1. Sizes, and boxes of
-// sizes, farther out mean the same as these, and squares of them are neither 0 nor infinite.
+// Sides of a scaled box, and all lengths in it that doubles can tell apart, are within 2^120 of 1. Boxes of sizes that
+// reach farther mean the same as these.
 constexpr double kFarBeyond = 0x1p400;
 
 // No circumradius in a box is so many times an edge that doubles can tell from a point: a larger rho asks for no more.
@@ -36,8 +38,6 @@ double VerticesLeft(uint64_t most, uint64_t vertices) {
   return std::max(budget - kVerticesPerPoint * static_cast<double>(vertices), budget / 4) / kModelError<D>;
 }
 
-double ScaledSize(double size, double scale) { return std::clamp(size * scale, 1 / kFarBeyond, kFarBeyond); }
-
 // `x` with two digits, rounded up, as what is at least needed.
 std::string RoundedUp(double x) {
   const double unit = std::pow(10, std::floor(std::log10(x)) - 1);
@@ -56,6 +56,11 @@ absl::Status WithPayload(absl::Status status) {
   return status;
 }
 
+template <int D>
+double RhoOf(const MeshParameters& parameters) {
+  return parameters.rho == 0 ? DefaultRho(D) : std::min(parameters.rho, kMostRho);
+}
+
 // A number for a message, which may be past what doubles have.
 std::string AboutText(double number) {
   return std::isfinite(number) ? absl::StrFormat("%.2g", number) : "1e308 or more";
@@ -70,30 +75,93 @@ absl::Status TooFine(std::string_view what, double typical, double least, uint64
       what, AboutText(predicted), AboutText(MegabytesFor<D>(predicted)), AboutText(least), most, what_fits)));
 }
 
-// The size that asks for most.
+// The boxes of sizes, in their order.
 template <int D>
-std::string FinestSize(const MeshParameters& parameters, const SizeField<D>& sizes) {
-  const auto finest = std::min_element(sizes.regions.begin(), sizes.regions.end(), [](const auto& a, const auto& b) {
-    return a.max_circumradius < b.max_circumradius;
-  });
-  if (finest == sizes.regions.end() || finest->max_circumradius >= sizes.max_circumradius) {
-    return absl::StrFormat("max_circumradius: %g", parameters.max_circumradius);
+std::vector<typename SizeField<D>::Region> ScaledRegions(const Domain<D>& domain, const MeshParameters& parameters) {
+  std::vector<typename SizeField<D>::Region> regions;
+  regions.reserve(parameters.size_boxes.size());
+  for (const SizeBox& size : parameters.size_boxes) {
+    Box<D> box;
+    for (int i = 0; i < D; ++i) {
+      box.low[i] = std::clamp(size.low[i] * domain.scale + 0.0, -kFarBeyond, kFarBeyond);
+      box.high[i] = std::clamp(size.high[i] * domain.scale + 0.0, -kFarBeyond, kFarBeyond);
+    }
+    regions.push_back({box, ScaledSize(size.max_circumradius, domain.scale)});
   }
-  const auto index = static_cast<size_t>(finest - sizes.regions.begin());
-  return absl::StrFormat("size_boxes[%d].max_circumradius: %g", index, parameters.size_boxes[index].max_circumradius);
+  return regions;
 }
 
-// Refuses boxes of sizes that no simplex in them could keep, whose edges the arithmetic tells apart.
+// The bound everywhere, not scaled, and infinite where there is none.
+double BoundEverywhere(const MeshParameters& parameters) {
+  double bound = std::numeric_limits<double>::infinity();
+  if (parameters.max_circumradius != 0) {
+    bound = parameters.max_circumradius;
+  }
+  if (parameters.edge_length != 0) {
+    bound = std::min(bound, CircumradiusOf(parameters.edge_length, parameters.dimension));
+  }
+  return bound;
+}
+
+// The size that asks for most, and how many circumradii its unit is.
+struct NamedSize {
+  std::string name;
+  double unit = 1;
+};
+
+NamedSize FinestSize(const MeshParameters& parameters) {
+  const double edge = CircumradiusOf(1, parameters.dimension);
+  double finest = BoundEverywhere(parameters);
+  NamedSize named{absl::StrFormat("max_circumradius: %g", parameters.max_circumradius)};
+  if (finest != parameters.max_circumradius) {
+    named = {absl::StrFormat("edge_length: %g", parameters.edge_length), edge};
+  }
+  for (size_t i = 0; i < parameters.size_boxes.size(); ++i) {
+    if (const double size = parameters.size_boxes[i].max_circumradius; size < finest) {
+      finest = size;
+      named = {absl::StrFormat("size_boxes[%d].max_circumradius: %g", i, size)};
+    }
+  }
+  if (const SizeSamples* samples = parameters.size_samples.get(); samples != nullptr && !samples->sizes.empty()) {
+    const auto least = std::min_element(samples->sizes.begin(), samples->sizes.end());
+    const double unit = samples->measure == SizeMeasure::kEdgeLength ? edge : 1;
+    if (unit * *least < finest) {
+      named = {absl::StrFormat("size_samples.sizes[%d]: %g", least - samples->sizes.begin(), *least), unit};
+    }
+  }
+  return named;
+}
+
+template <int D>
+absl::Status TooFineForDoubles(const Domain<D>& domain, std::string_view what, double least) {
+  return WithPayload(absl::ResourceExhaustedError(absl::StrFormat(
+      "%s is too fine for the arithmetic of doubles in this domain; the smallest size that fits is about %s", what,
+      RoundedUp(8 * least / domain.scale))));
+}
+
+// Refuses sizes in boxes and at points that no simplex there could keep, whose edges the arithmetic tells apart.
 template <int D>
 absl::Status CheckLeastSize(const Domain<D>& domain, const MeshParameters& parameters, const SizeField<D>& sizes) {
   const Box<D>& box = domain.scaled_box;
-  for (size_t i = 0; i < sizes.regions.size(); ++i) {
-    const auto& [region, size] = sizes.regions[i];
+  const std::vector<typename SizeField<D>::Region> regions = ScaledRegions<D>(domain, parameters);
+  for (size_t i = 0; i < regions.size(); ++i) {
+    const auto& [region, size] = regions[i];
     if (2 * size < domain.MinEdge() && DistanceSq<D>(region, box) == 0) {
-      return WithPayload(absl::ResourceExhaustedError(absl::StrFormat(
-          "size_boxes[%d].max_circumradius: %g is too fine for the arithmetic of doubles in this domain; the smallest "
-          "size that fits is about %s",
-          i, parameters.size_boxes[i].max_circumradius, RoundedUp(8 * domain.MinEdge() / domain.scale))));
+      return TooFineForDoubles<D>(
+          domain, absl::StrFormat("size_boxes[%d].max_circumradius: %g", i, parameters.size_boxes[i].max_circumradius),
+          domain.MinEdge());
+    }
+  }
+  // A simplex whose circumball has a sample with size H in it has R <= H + G R.
+  const double least = domain.MinEdge() * (1 - sizes.growth().of_samples);
+  const size_t samples = parameters.size_samples == nullptr ? 0 : parameters.size_samples->sizes.size();
+  for (size_t i = 0; i < samples; ++i) {
+    const double size = parameters.size_samples->sizes[i];
+    const double circumradius =
+        parameters.size_samples->measure == SizeMeasure::kEdgeLength ? CircumradiusOf(size, D) : size;
+    if (2 * ScaledSize(circumradius, domain.scale) < least) {
+      return TooFineForDoubles<D>(domain, absl::StrFormat("size_samples.sizes[%d]: %g", i, size),
+                                  least * size / circumradius);
     }
   }
   return absl::OkStatus();
@@ -102,29 +170,23 @@ absl::Status CheckLeastSize(const Domain<D>& domain, const MeshParameters& param
 }  // namespace
 
 template <int D>
-MeshCriteria<D> CriteriaIn(const Domain<D>& domain, const MeshParameters& parameters) {
-  MeshCriteria<D> criteria;
-  criteria.criterion = parameters.criterion;
-  criteria.rho = parameters.rho == 0 ? DefaultRho(D) : std::min(parameters.rho, kMostRho);
-  if (parameters.max_circumradius != 0) {
-    criteria.sizes.max_circumradius = ScaledSize(parameters.max_circumradius, domain.scale);
+MeshCriteria<D> CriteriaIn(const Domain<D>& domain, const MeshParameters& parameters, const ScaledSamples<D>& samples) {
+  const double bound = BoundEverywhere(parameters);
+  typename SizeField<D>::Growth growth{.of_regions = 1, .of_samples = kDefaultSampleGradation};
+  if (parameters.gradation != 0) {
+    growth = {.of_regions = parameters.gradation, .of_samples = parameters.gradation};
   }
-  for (const SizeBox& size : parameters.size_boxes) {
-    Box<D> box;
-    for (int i = 0; i < D; ++i) {
-      box.low[i] = std::clamp(size.low[i] * domain.scale + 0.0, -kFarBeyond, kFarBeyond);
-      box.high[i] = std::clamp(size.high[i] * domain.scale + 0.0, -kFarBeyond, kFarBeyond);
-    }
-    criteria.sizes.regions.push_back({box, ScaledSize(size.max_circumradius, domain.scale)});
-  }
-  return criteria;
+  return {.criterion = parameters.criterion,
+          .rho = RhoOf<D>(parameters),
+          .sizes = SizeField<D>(std::isfinite(bound) ? ScaledSize(bound, domain.scale) : bound,
+                                ScaledRegions<D>(domain, parameters), samples.Of(domain, parameters), growth)};
 }
 
 template <int D>
 absl::Status CheckShapeFeasible(const Domain<D>& domain, const MeshParameters& parameters, uint64_t vertices) {
   const Box<D>& box = domain.scaled_box;
   const uint64_t most = VertexBudget(parameters);
-  const double least = LeastVerticesForShape<D>(box, CriteriaIn<D>(domain, parameters).rho);
+  const double least = LeastVerticesForShape<D>(box, RhoOf<D>(parameters));
   if (least <= static_cast<double>(most)) {
     return absl::OkStatus();
   }
@@ -141,25 +203,28 @@ absl::Status CheckShapeFeasible(const Domain<D>& domain, const MeshParameters& p
 }
 
 template <int D>
-absl::Status CheckFeasible(const Domain<D>& domain, const MeshParameters& parameters, uint64_t vertices) {
+absl::Status CheckFeasible(const Domain<D>& domain, const MeshParameters& parameters, const ScaledSamples<D>& samples,
+                           uint64_t vertices) {
   WELLSPACE_RETURN_IF_ERROR(CheckShapeFeasible<D>(domain, parameters, vertices));
   const Box<D>& box = domain.scaled_box;
   const uint64_t most = VertexBudget(parameters);
-  const SizeField<D> sizes = CriteriaIn<D>(domain, parameters).sizes;
+  const SizeField<D> sizes = CriteriaIn<D>(domain, parameters, samples).sizes;
   WELLSPACE_RETURN_IF_ERROR(CheckLeastSize<D>(domain, parameters, sizes));
   const double least = LeastVerticesForSizes<D>(box, sizes);
   if (least <= static_cast<double>(most)) {
     return absl::OkStatus();
   }
   const double size = SmallestSizeFor<D>(box, sizes, VerticesLeft<D>(most, vertices));
-  return TooFine<D>(FinestSize<D>(parameters, sizes), TypicalVerticesForSizes<D>(box, sizes), least, most,
-                    absl::StrCat("the smallest size that fits is about ", RoundedUp(size / domain.scale)));
+  const NamedSize finest = FinestSize(parameters);
+  return TooFine<D>(
+      finest.name, TypicalVerticesForSizes<D>(box, sizes), least, most,
+      absl::StrCat("the smallest size that fits is about ", RoundedUp(size / domain.scale / finest.unit)));
 }
 
-#define WELLSPACE_INSTANTIATE(D)                                                                  \
-  template MeshCriteria<D> CriteriaIn<D>(const Domain<D>&, const MeshParameters&);                \
-  template absl::Status CheckShapeFeasible<D>(const Domain<D>&, const MeshParameters&, uint64_t); \
-  template absl::Status CheckFeasible<D>(const Domain<D>&, const MeshParameters&, uint64_t);
+#define WELLSPACE_INSTANTIATE(D)                                                                            \
+  template MeshCriteria<D> CriteriaIn<D>(const Domain<D>&, const MeshParameters&, const ScaledSamples<D>&); \
+  template absl::Status CheckShapeFeasible<D>(const Domain<D>&, const MeshParameters&, uint64_t);           \
+  template absl::Status CheckFeasible<D>(const Domain<D>&, const MeshParameters&, const ScaledSamples<D>&, uint64_t);
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 

@@ -8,15 +8,17 @@
 #include "core/domain.h"
 #include "core/mesh_parameters.h"
 #include "core/refine/criteria.h"
+#include "core/scaled_samples.h"
 
 namespace wellspace::core {
 
 // The criteria that `parameters` ask for, scaled. What is so large or small that doubles could not tell is no larger or
-// smaller in the result than that: nothing of it is 0, infinite or NaN, nor are squares of it.
+// smaller in the result than that: nothing of it is 0, infinite or NaN, nor are squares of it. `samples` may have those
+// of `parameters`.
 //
 // REQUIRES:   ValidateParameters(parameters).ok().
 template <int D>
-MeshCriteria<D> CriteriaIn(const Domain<D>& domain, const MeshParameters& parameters);
+MeshCriteria<D> CriteriaIn(const Domain<D>& domain, const MeshParameters& parameters, const ScaledSamples<D>& samples);
 
 // Refuses demands for which it is proved that every mesh of `domain` has more vertices than `parameters` allow.
 // `vertices` is how many there are before refinement.
@@ -25,7 +27,8 @@ MeshCriteria<D> CriteriaIn(const Domain<D>& domain, const MeshParameters& parame
 // Errors:     RESOURCE_EXHAUSTED with the payload kDemandsTooFine: the parameter, about how many vertices it takes, the
 //             limit, and the smallest size, or side of the domain, that fits.
 template <int D>
-absl::Status CheckFeasible(const Domain<D>& domain, const MeshParameters& parameters, uint64_t vertices);
+absl::Status CheckFeasible(const Domain<D>& domain, const MeshParameters& parameters, const ScaledSamples<D>& samples,
+                           uint64_t vertices);
 
 // The same for the shape of the domain alone: that of a tree over it is as large.
 template <int D>

@@ -36,6 +36,51 @@ absl::Status CheckSizeBox(const SizeBox& size, size_t index, int dimension) {
   return absl::OkStatus();
 }
 
+absl::Status CheckSizeSamples(const SizeSamples& samples, int dimension) {
+  const auto refuse = [](const auto&... text) {
+    return absl::InvalidArgumentError(absl::StrCat("size_samples.", text...));
+  };
+  if (samples.points.size() != samples.sizes.size() * dimension) {
+    return refuse("points: ", samples.points.size(), " coordinates for ", samples.sizes.size(), " sizes; ", dimension,
+                  " for each are needed");
+  }
+  for (size_t i = 0; i < samples.points.size(); ++i) {
+    if (!std::isfinite(samples.points[i])) {
+      return refuse("points[", i / dimension, "]: coordinate ", i % dimension, " is ", samples.points[i],
+                    "; a finite number is needed");
+    }
+  }
+  for (size_t i = 0; i < samples.sizes.size(); ++i) {
+    if (!(samples.sizes[i] > 0 && std::isfinite(samples.sizes[i]))) {
+      return refuse("sizes[", i, "]: ", samples.sizes[i], " is not allowed; a number above 0 is");
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::Status CheckSizes(const MeshParameters& parameters) {
+  const auto check_bound = [](const char* name, double bound) {
+    return bound >= 0 && std::isfinite(bound)
+               ? absl::OkStatus()
+               : absl::InvalidArgumentError(
+                     absl::StrCat(name, ": ", bound, " is not allowed; a number above 0 is, or 0 for no bound"));
+  };
+  WELLSPACE_RETURN_IF_ERROR(check_bound("max_circumradius", parameters.max_circumradius));
+  WELLSPACE_RETURN_IF_ERROR(check_bound("edge_length", parameters.edge_length));
+  for (size_t i = 0; i < parameters.size_boxes.size(); ++i) {
+    WELLSPACE_RETURN_IF_ERROR(CheckSizeBox(parameters.size_boxes[i], i, parameters.dimension));
+  }
+  if (parameters.size_samples != nullptr) {
+    WELLSPACE_RETURN_IF_ERROR(CheckSizeSamples(*parameters.size_samples, parameters.dimension));
+  }
+  if (!(parameters.gradation >= 0 && parameters.gradation <= 1)) {
+    return absl::InvalidArgumentError(absl::StrCat("gradation: ", parameters.gradation,
+                                                   " is not allowed; a number above 0 and at most 1 is, or 0 for the "
+                                                   "default"));
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 double DefaultRho(int dimension) {
@@ -88,13 +133,7 @@ absl::Status ValidateParameters(const MeshParameters& parameters) {
     return absl::InvalidArgumentError(absl::StrCat("merge_distance: ", parameters.merge_distance,
                                                    " is not allowed; a number above 0 is, or 0 for equal points only"));
   }
-  if (!(parameters.max_circumradius >= 0 && std::isfinite(parameters.max_circumradius))) {
-    return absl::InvalidArgumentError(absl::StrCat("max_circumradius: ", parameters.max_circumradius,
-                                                   " is not allowed; a number above 0 is, or 0 for no bound"));
-  }
-  for (size_t i = 0; i < parameters.size_boxes.size(); ++i) {
-    WELLSPACE_RETURN_IF_ERROR(CheckSizeBox(parameters.size_boxes[i], i, dimension));
-  }
+  WELLSPACE_RETURN_IF_ERROR(CheckSizes(parameters));
   if (parameters.min_dihedral.has_value()) {
     const double most = dimension == 3 ? kMostMinDihedral : 0;
     if (!(*parameters.min_dihedral >= 0 && *parameters.min_dihedral <= most)) {

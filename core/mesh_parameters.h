@@ -3,6 +3,7 @@
 #define WELLSPACE_CORE_MESH_PARAMETERS_H_
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -22,8 +23,18 @@ struct MeshParameters {
 
   // No simplex has a larger circumradius. 0 means no bound.
   double max_circumradius = 0;
-  // Boxes in which it is smaller still. Away from a box, sizes grow no faster than the distance from it.
+  // The same by the length that edges have on average where points ask for no shorter ones; see CircumradiusOf. The
+  // smaller of the two holds. 0 means no bound.
+  double edge_length = 0;
+  // Boxes in which circumradii are smaller still. Away from a box, sizes grow no faster than the gradation times the
+  // distance from it.
   std::vector<SizeBox> size_boxes{};
+  // Points in the domain at which they are: a simplex with circumcentre c has a circumradius of at most
+  // size + gradation * (distance of c), for each of them. Null for none.
+  std::shared_ptr<const SizeSamples> size_samples{};
+  // How fast circumradii may grow with the distance. Above 0 and at most 1. 0 means 1 from boxes, and
+  // kDefaultSampleGradation from samples.
+  double gradation = 0;
 
   // Refine moves vertices, all but those that were given, and adds some, until no dihedral angle is smaller, in
   // degrees; what cannot be repaired is counted in the statistics. 0 for none of that; none means
@@ -74,6 +85,7 @@ double DefaultMinDihedral(int dimension);
 
 // Refuses parameters that no cloud could make valid: dimension, rho, sizes, slivers, domain, margin, threads.
 //
+// Complexity: O(1) for each box and sample.
 // Errors:     INVALID_ARGUMENT, naming the field, its value and what would be accepted.
 absl::Status ValidateParameters(const MeshParameters& parameters);
 

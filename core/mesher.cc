@@ -23,6 +23,7 @@
 #include "core/near_points.h"
 #include "core/point_adder.h"
 #include "core/refine/refine.h"
+#include "core/scaled_samples.h"
 #include "core/separation.h"
 #include "core/simplex/boundary.h"
 #include "core/simplex/quality.h"
@@ -65,9 +66,11 @@ class MesherIn final : public Mesher {
     WELLSPACE_RETURN_IF_ERROR(CheckShape(points, D));
     context.EnterPhase(Phase::kTree);
     WELLSPACE_RETURN_IF_ERROR(context.ReserveMemory(
-        kFixedBytes + points.size() / D * (kTreeBytes<D> + (parameters.merge_distance > 0 ? kMergeBytes<D> : 0))));
+        kFixedBytes + points.size() / D * (kTreeBytes<D> + (parameters.merge_distance > 0 ? kMergeBytes<D> : 0)) +
+        ScaledSamples<D>::BytesFor(parameters)));
     merge_distance_ = parameters.merge_distance;
     WELLSPACE_ASSIGN_OR_RETURN(const MergedPoints merged, SetDomain(parameters, points, context));
+    WELLSPACE_RETURN_IF_ERROR(samples_.Take(domain_, domain_.box, parameters, context));
     WELLSPACE_RETURN_IF_ERROR(CheckShapeFeasible<D>(domain_, parameters, points.size() / D));
     absl::StatusOr<SortedCloud<D>> cloud = BuildTree(parameters, points, merged, context);
     if (IsTooClose(cloud.status())) {
@@ -90,17 +93,18 @@ class MesherIn final : public Mesher {
   uint64_t vertex_count() const override { return structure_.vertex_count(); }
   uint64_t memory_bytes() const override {
     return structure_.MemoryBytes() + refinement_->MemoryBytes() + SliverMemoryBytes() + numbering_.MemoryBytes() +
-           moved_.size() / 8;
+           moved_.size() / 8 + samples_.MemoryBytes();
   }
 
   absl::Status CheckFeasible(const MeshParameters& parameters) const override {
     WELLSPACE_RETURN_IF_ERROR(CheckParametersIn(parameters, D));
-    return core::CheckFeasible<D>(domain_, parameters, numbering_.distinct_inputs());
+    return core::CheckFeasible<D>(domain_, parameters, samples_, numbering_.distinct_inputs());
   }
 
   absl::Status Refine(const MeshParameters& parameters, RunContext& context) override {
     WELLSPACE_RETURN_IF_ERROR(CheckParametersIn(parameters, D));
     context.EnterPhase(Phase::kRefinement);
+    WELLSPACE_RETURN_IF_ERROR(samples_.Take(domain_, domain_.box, parameters, context));
     is_refined_ = false;
     const MeshCriteria<D> criteria = CriteriaOf(parameters);
     absl::Status status = refinement_->Run(criteria, VertexBudget(parameters), parameters.threads, context, nullptr,
@@ -227,6 +231,7 @@ class MesherIn final : public Mesher {
   absl::StatusOr<MeshEstimate> Estimate(const MeshParameters& parameters, const RunContext& context) const override {
     WELLSPACE_RETURN_IF_ERROR(CheckParametersIn(parameters, D));
     WELLSPACE_ASSIGN_OR_RETURN(MeshEstimate estimate, EstimateMeshOf<D>(structure_, CriteriaOf(parameters), context));
+    estimate.memory_bytes += samples_.MemoryBytes();
     if constexpr (D >= 3) {
       if (MinDihedralOf(parameters) > 0 || parameters.pump_weights) {
         const uint64_t bytes = SliverStage<D>::EstimateBytes(estimate.vertices, estimate.simplices);
@@ -287,7 +292,9 @@ class MesherIn final : public Mesher {
     return cloud;
   }
 
-  MeshCriteria<D> CriteriaOf(const MeshParameters& parameters) const { return CriteriaIn<D>(domain_, parameters); }
+  MeshCriteria<D> CriteriaOf(const MeshParameters& parameters) const {
+    return CriteriaIn<D>(domain_, parameters, samples_);
+  }
 
   // How many vertices a first refinement will end with; 0 if the context knows, or it ends too soon to be worth an
   // estimate.
@@ -428,6 +435,7 @@ class MesherIn final : public Mesher {
   }
 
   Domain<D> domain_;
+  ScaledSamples<D> samples_;  // of the last parameters
   QueryStructure<D> structure_;
   std::optional<Refinement<D>> refinement_;
   bool is_refined_ = false;

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <cstdlib>
 #include <iostream>
+#include <memory>
+#include <numbers>
 #include <random>
 #include <string>
 #include <utility>
@@ -293,6 +295,36 @@ void Decide(benchmark::State& state, core::Stage stage) {
   SetItems(state);
 }
 
+// A mesh of the unit box by so many sizes at random points, which vary smoothly; the time for each vertex.
+template <int D>
+void BM_MeshBySamples(benchmark::State& state) {
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> unit;
+  const double mean = D == 2 ? 0.003 : 0.03;
+  auto samples = std::make_shared<core::SizeSamples>();
+  for (int64_t i = 0; i < state.range(0); ++i) {
+    double sum = 0;
+    for (int k = 0; k < D; ++k) {
+      samples->points.push_back(unit(random));
+      sum += std::sin(2 * std::numbers::pi * samples->points.back());
+    }
+    samples->sizes.push_back(mean * (1 + 0.2 * sum / D));
+  }
+  core::MeshParameters parameters{.dimension = D, .max_circumradius = mean};
+  parameters.size_samples = samples;
+  parameters.domain_low.assign(D, 0);
+  parameters.domain_high.assign(D, 1);
+  double vertices = 0;
+  for (auto _ : state) {
+    core::RunContext context;
+    const absl::StatusOr<core::Mesh> mesh = core::MeshPoints(parameters, {}, context);
+    ExitUnless(mesh.status());
+    vertices += static_cast<double>(mesh->vertex_count());
+  }
+  state.counters["per_vertex"] =
+      benchmark::Counter(vertices, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
+}
+
 template <int D>
 void RegisterAll() {
   const std::string suffix = "/" + std::to_string(D) + "-D";
@@ -314,6 +346,7 @@ void RegisterAll() {
   add_queries("ClippedCellOfInput", BM_ClippedCellOfInput<D>);
   add("ClippedCellsOfInput", BM_ClippedCellsOfInput<D>)->Arg(100'000)->Unit(benchmark::kMillisecond);
   add_queries("Star", BM_Star<D>);
+  add("MeshBySamples", BM_MeshBySamples<D>)->Arg(10)->Arg(1'000)->Arg(40'000)->Unit(benchmark::kMillisecond);
   add("Cut", BM_Cut<D>)->Arg(10'000)->Unit(benchmark::kMicrosecond);
   for (const auto& [name, stage] :
        {std::pair("DecideCut/Word", core::Stage::kWord), std::pair("DecideCut/Integer", core::Stage::kInteger),

@@ -18,6 +18,9 @@ constexpr double kVerticesPerThread = 10'000;
 // Above 3-D a vertex costs tens of times as much.
 constexpr double kVerticesPerThreadAbove3D = 1'000;
 
+// The circumradius that a length of edges stands for, roughly.
+constexpr double kRadiusOfEdge = 0.75;
+
 // How many simplices of circumradius `size` fill a box, by its sides; that is about the number of vertices, too. 0
 // without a size.
 double VerticesOfSize(const std::vector<double>& sides, double size) {
@@ -26,6 +29,16 @@ double VerticesOfSize(const std::vector<double>& sides, double size) {
     vertices *= side / size;
   }
   return size > 0 ? vertices : 0;
+}
+
+// The same of sizes at points, each of which stands for its part of the box.
+double VerticesOfSamples(const std::vector<double>& sides, const client::SizeSamples& samples) {
+  const double unit = samples.measure == client::SizeMeasure::kEdgeLength ? kRadiusOfEdge : 1;
+  double vertices = 0;
+  for (const double size : samples.sizes) {
+    vertices += VerticesOfSize(sides, unit * size) / static_cast<double>(samples.sizes.size());
+  }
+  return vertices;
 }
 
 // The sides of the box to be meshed.
@@ -59,6 +72,10 @@ std::vector<double> SidesOfDomain(const client::MeshOptions& options, std::span<
 int HelpfulThreads(const client::MeshOptions& options, std::span<const double> points) {
   double vertices = kVerticesPerPoint * static_cast<double>(points.size()) / options.dimension;
   vertices += VerticesOfSize(SidesOfDomain(options, points), options.max_circumradius);
+  vertices += VerticesOfSize(SidesOfDomain(options, points), kRadiusOfEdge * options.edge_length);
+  if (options.size_samples != nullptr) {
+    vertices += VerticesOfSamples(SidesOfDomain(options, points), *options.size_samples);
+  }
   for (const client::SizeBox& box : options.size_boxes) {
     std::vector<double> sides(box.high);
     for (size_t axis = 0; axis < sides.size(); ++axis) {

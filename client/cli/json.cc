@@ -72,6 +72,8 @@ Json ParametersJson(const client::MeshOptions& parameters) {
   json["rho"] = parameters.rho;
   json["criterion"] = parameters.criterion == client::Criterion::kWellSpaced ? "well-spaced" : "radius-edge";
   json["max_circumradius"] = parameters.max_circumradius;
+  json["edge_length"] = parameters.edge_length;
+  json["gradation"] = parameters.gradation;
   json["size_boxes"] = Json::array();
   for (const client::SizeBox& box : parameters.size_boxes) {
     json["size_boxes"].push_back({{"low", box.low}, {"high", box.high}, {"max_circumradius", box.max_circumradius}});

@@ -42,6 +42,7 @@ void MeshingOptions::AddTo(CLI::App& command) {
       ->type_name("FILE");
   AddCloudOptions(command, cloud_options_, "IN", {"poly", "geojson"});
   domain_.AddTo(command);
+  size_field_.AddTo(command);
 }
 
 bool MeshingOptions::has_figures_on_stdout() const { return statistics_ == formats::kStandardStream || remote_.json(); }
@@ -50,6 +51,7 @@ absl::Status MeshingOptions::Check() const { return parameters_.Check(); }
 
 void MeshingOptions::AddFilesTo(formats::FilePlan& files) const {
   files.Reads("IN", input_);
+  size_field_.AddFilesTo(files);
   remote_.AddFilesTo(files);
   files.Writes("--stats", statistics_);
   if (remote_.json() && statistics_ != formats::kStandardStream) {
@@ -66,6 +68,16 @@ absl::StatusOr<formats::PointCloud> MeshingOptions::Read() {
   return formats::ReadCloud(input_, cloud_options_);
 }
 
+absl::StatusOr<client::MeshOptions> MeshingOptions::OptionsFor(const formats::PointCloud& cloud) {
+  WELLSPACE_ASSIGN_OR_RETURN(client::MeshOptions options, parameters_.For(cloud.dimension));
+  options.features = domain_.features();
+  WELLSPACE_ASSIGN_OR_RETURN(options.size_samples, size_field_.Read(cloud.dimension));
+  if (options.threads == 0) {
+    options.threads = HelpfulThreads(options, cloud.points);
+  }
+  return options;
+}
+
 int MeshingOptions::Run(const Work& work) {
   const absl::StatusOr<formats::PointCloud> cloud = Read();
   if (!cloud.ok()) {
@@ -73,17 +85,13 @@ int MeshingOptions::Run(const Work& work) {
   }
   report_ = ReportOf(cloud_options_, cloud->notes, cloud->skipped);
   PrintNotes(report_, remote_.format(), remote_.quiet());
-  absl::StatusOr<client::MeshOptions> options = parameters_.For(cloud->dimension);
+  const absl::StatusOr<client::MeshOptions> options = OptionsFor(*cloud);
   if (!options.ok()) {
     return ReportError(options.status(), remote_.format());
   }
-  options->features = domain_.features();
-  if (options->threads == 0) {
-    options->threads = HelpfulThreads(*options, cloud->points);
-  }
   return remote_.Run([&](client::Client& client, const client::CallOptions& call, const Interrupt& /*interrupt*/) {
     const absl::Status status = work(client, *options, *cloud, call);
-    const absl::Status explained = parameters_.Explain(status);
+    const absl::Status explained = size_field_.WithOrigins(parameters_.Explain(status));
     if (!absl::IsInvalidArgument(status) || explained != status) {
       return explained;
     }

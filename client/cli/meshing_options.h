@@ -13,6 +13,7 @@
 #include "client/cli/interrupt.h"
 #include "client/cli/parameter_options.h"
 #include "client/cli/remote_command.h"
+#include "client/cli/size_field_options.h"
 #include "client/client.h"
 #include "client/formats/cloud.h"
 #include "client/formats/file_plan.h"
@@ -60,10 +61,13 @@ class MeshingOptions {
 
  private:
   absl::StatusOr<formats::PointCloud> Read();
+  // What is asked of a mesh of `cloud`; reads --size-field.
+  absl::StatusOr<client::MeshOptions> OptionsFor(const formats::PointCloud& cloud);
 
   std::string input_;
   formats::CloudOptions cloud_options_;
   DomainOptions domain_;
+  SizeFieldOptions size_field_;
   CloudReport report_;  // of the cloud, once it is read
   std::string statistics_;
   ParameterOptions parameters_;

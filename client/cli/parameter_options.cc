@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
 #include "client/cli/options.h"
+#include "client/cli/size_field_options.h"
 #include "client/error_details.h"
 #include "client/formats/cloud.h"
 #include "core/base/status_macros.h"
@@ -92,6 +93,9 @@ void ParameterOptions::AddQualityTo(CLI::App& command) {
       ->excludes(command.get_option("--rho"))
       ->check(CLI::Range(0.001, 33.7));
   AddSizes(command, options_.max_circumradius, size_boxes_);
+  AddNumber(command, "--edge-length", options_.edge_length,
+            "Length that edges have on average where the points ask for no shorter ones; default: none");
+  AddGradation(command, options_.gradation);
   AddNumber(command, "--min-dihedral", options_.min_dihedral,
             "3-D: move and add vertices until no dihedral angle is smaller, in degrees, up to 18; 0: leave slivers as "
             "they are; default: 12");
@@ -108,8 +112,9 @@ void ParameterOptions::AddQualityTo(CLI::App& command) {
   AddCount(
       command, "--threads", [this](uint64_t count) { options_.threads = static_cast<int>(count); },
       "Threads that mesh; default: as many as help, up to all cores; of a session 1", 1, 1024);
-  for (const char* name : {"--criterion", "--rho", "--size", "--size-box", "--min-dihedral", "--pump-weights",
-                           "--max-vertices", "--threads", "--keep-vertices", "--min-angle"}) {
+  for (const char* name :
+       {"--criterion", "--rho", "--size", "--size-box", "--min-dihedral", "--pump-weights", "--max-vertices",
+        "--threads", "--keep-vertices", "--min-angle", "--edge-length", "--gradation"}) {
     quality_.push_back(command.get_option(name));
   }
 }
@@ -177,6 +182,8 @@ absl::StatusOr<client::MeshOptions> ParameterOptions::Replace(client::MeshOption
   replace(7, parameters.threads, given->threads);
   replace(8, parameters.keep_vertices, given->keep_vertices);
   replace(9, parameters.rho, given->rho);
+  replace(10, parameters.edge_length, given->edge_length);
+  replace(11, parameters.gradation, given->gradation);
   return parameters;
 }
 

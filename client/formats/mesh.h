@@ -113,6 +113,7 @@ struct Mesh {
   std::vector<double> points;
   std::vector<uint32_t> simplices;
   std::vector<double> weights{};  // see MeshView; also for the following
+  std::vector<double> numbers{};  // of the vertices, by the name that a reader was given; else empty
   std::vector<uint32_t> vertex_origins{};
   std::vector<int32_t> vertex_tags{};
   std::vector<uint32_t> facets{};

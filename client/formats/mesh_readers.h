@@ -9,9 +9,11 @@
 
 namespace wellspace::formats {
 
-absl::StatusOr<Mesh> ReadVtu(const std::string& path);
-absl::StatusOr<Mesh> ReadNpz(const std::string& path);
-absl::StatusOr<Mesh> ReadMsh(const std::string& path);
+// `numbers`, unless it is empty, is the name of numbers of the vertices that Mesh::numbers gets, if the file has them.
+absl::StatusOr<Mesh> ReadVtu(const std::string& path, const std::string& numbers);
+// With `numbers` the simplices may be missing.
+absl::StatusOr<Mesh> ReadNpz(const std::string& path, const std::string& numbers);
+absl::StatusOr<Mesh> ReadMsh(const std::string& path, const std::string& numbers);
 absl::StatusOr<Mesh> ReadMedit(const std::string& path);
 // `path` is that of either file.
 absl::StatusOr<Mesh> ReadNodeAndEle(const std::string& path);

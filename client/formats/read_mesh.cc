@@ -13,11 +13,18 @@ namespace {
 
 using MeshReader = absl::StatusOr<Mesh> (*)(const std::string&);
 
+using NumbersReader = absl::StatusOr<Mesh> (*)(const std::string&, const std::string&);
+
+template <NumbersReader kReader>
+absl::StatusOr<Mesh> Read(const std::string& path) {
+  return kReader(path, "");
+}
+
 std::span<const Format<MeshReader>> MeshReaders() {
   static const std::vector<Format<MeshReader>> readers = {
-      {"vtu", {".vtu"}, ReadVtu},
-      {"npz", {".npz"}, ReadNpz},
-      {"msh", {".msh"}, ReadMsh},
+      {"vtu", {".vtu"}, Read<ReadVtu>},
+      {"npz", {".npz"}, Read<ReadNpz>},
+      {"msh", {".msh"}, Read<ReadMsh>},
       {"medit", {".mesh"}, ReadMedit},
       {"node", {".node", ".ele"}, ReadNodeAndEle},
   };

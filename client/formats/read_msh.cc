@@ -42,7 +42,11 @@ int NodesOf(uint64_t type) {
 // to know.
 class MshReader {
  public:
-  explicit MshReader(LineReader& reader) : reader_(reader), file_(reader), nodes_(file_) {}
+  MshReader(LineReader& reader, const std::string& numbers)
+      : reader_(reader),
+        file_(reader),
+        nodes_(file_),
+        numbers_name_(numbers.empty() ? "" : absl::StrCat("\"", numbers, "\"")) {}
 
   absl::StatusOr<Mesh> Read() {
     std::string_view line;
@@ -373,27 +377,31 @@ class MshReader {
       }
     }
     const auto [step, width, rows] = whole;
-    const bool are_weights = has_nodes_ && width == 1 && name == absl::StrCat("\"", kMshWeights, "\"");
-    if (are_weights && (rows != nodes_.count() || !weights_.empty())) {
-      return file_.ValueError(absl::StrCat("expected ", nodes_.count(), " weights, once, got ", rows));
+    const bool are_weights = name == absl::StrCat("\"", kMshWeights, "\"");
+    const bool are_taken =
+        has_nodes_ && width == 1 && (are_weights || (!numbers_name_.empty() && name == numbers_name_));
+    std::vector<double>& taken = are_weights ? weights_ : of_nodes_;
+    const char* what = are_weights ? "weight" : "number";
+    if (are_taken && (rows != nodes_.count() || !taken.empty())) {
+      return file_.ValueError(absl::StrCat("expected ", nodes_.count(), " ", what, "s, once, got ", rows));
     }
-    std::vector<bool> seen(are_weights ? rows : 0);
-    weights_.resize(are_weights ? rows : weights_.size());
+    std::vector<bool> seen(are_taken ? rows : 0);
+    taken.resize(are_taken ? rows : taken.size());
     for (uint64_t row = 0; row < rows; ++row) {
       uint64_t number = 0;
       absl::Status status = file_.Int("the number of a node", kMaxCount, number);
-      for (uint64_t i = 0; status.ok() && !are_weights && i < width; ++i) {
+      for (uint64_t i = 0; status.ok() && !are_taken && i < width; ++i) {
         status = file_.SkipNumber();
       }
-      if (status.ok() && are_weights) {
+      if (status.ok() && are_taken) {
         uint32_t index = 0;
         status = nodes_.Find(number, index);
         if (status.ok() && seen[index]) {
-          status = file_.ValueError(absl::StrCat("expected one weight of every node, got two of node ", number));
+          status = file_.ValueError(absl::StrCat("expected one ", what, " of every node, got two of node ", number));
         }
         if (status.ok()) {
           seen[index] = true;
-          status = file_.Number("a weight", weights_[index]);
+          status = file_.Number(are_weights ? "a weight" : "a number", taken[index]);
         }
       }
       if (!status.ok()) {
@@ -410,6 +418,7 @@ class MshReader {
     CollectRegions(mesh);
     mesh.simplices = std::move(mesh.dimension == 2 ? triangles_ : tetrahedra_);
     mesh.weights = std::move(weights_);
+    mesh.numbers = std::move(of_nodes_);
     if (mesh.dimension == 3) {
       mesh.points = nodes_.TakePoints();
       return mesh;
@@ -465,14 +474,16 @@ class MshReader {
   std::vector<uint32_t> triangles_;
   std::vector<uint32_t> tetrahedra_;
   std::vector<double> weights_;
+  const std::string numbers_name_;  // of data of nodes that are asked for, in quotes; or empty
+  std::vector<double> of_nodes_;    // that data
 };
 
 }  // namespace
 
-absl::StatusOr<Mesh> ReadMsh(const std::string& path) {
+absl::StatusOr<Mesh> ReadMsh(const std::string& path, const std::string& numbers) {
   WELLSPACE_ASSIGN_OR_RETURN(InputFile file, InputFile::Open(path));
   LineReader reader(std::move(file));
-  return MshReader(reader).Read();
+  return MshReader(reader, numbers).Read();
 }
 
 }  // namespace wellspace::formats

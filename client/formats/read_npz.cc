@@ -30,6 +30,17 @@ absl::StatusOr<NpyReader> OpenArray(ZipReader& archive, const std::string& file,
       size, dimensions);
 }
 
+// Numbers of the points, of which there are `vertices`.
+absl::Status ReadOfPoints(ZipReader& archive, const std::string& file, const std::string& member, const char* what,
+                          uint64_t vertices, std::vector<double>& values) {
+  WELLSPACE_ASSIGN_OR_RETURN(NpyReader array, OpenArray(archive, file, member, 1));
+  if (array.rows() != vertices) {
+    return absl::InvalidArgumentError(absl::StrCat(file, ": ", member, ": expected ", vertices, " ", what,
+                                                   ", one for each point, got ", array.rows()));
+  }
+  return array.ReadNumbers(values);
+}
+
 // Whole numbers of 32 bits, a row each.
 absl::Status ReadTags(ZipReader& archive, const std::string& file, const std::string& member,
                       std::vector<int32_t>& tags) {
@@ -123,7 +134,7 @@ absl::Status ReadRegions(ZipReader& archive, const std::string& file, Mesh& mesh
 
 }  // namespace
 
-absl::StatusOr<Mesh> ReadNpz(const std::string& path) {
+absl::StatusOr<Mesh> ReadNpz(const std::string& path, const std::string& numbers) {
   WELLSPACE_ASSIGN_OR_RETURN(InputFile file, InputFile::Open(path));
   const std::string name = file.name();
   WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<ZipReader> archive, ZipReader::Open(std::move(file)));
@@ -138,12 +149,13 @@ absl::StatusOr<Mesh> ReadNpz(const std::string& path) {
   Mesh mesh{.dimension = static_cast<int>(columns), .points = {}, .simplices = {}};
   WELLSPACE_RETURN_IF_ERROR(points.ReadNumbers(mesh.points));
   if (archive->Has(kNpzWeights)) {
-    WELLSPACE_ASSIGN_OR_RETURN(NpyReader weights, OpenArray(*archive, name, kNpzWeights, 1));
-    if (weights.rows() != vertices) {
-      return absl::InvalidArgumentError(absl::StrCat(name, ": ", kNpzWeights, ": expected ", vertices,
-                                                     " weights, one for each point, got ", weights.rows()));
-    }
-    WELLSPACE_RETURN_IF_ERROR(weights.ReadNumbers(mesh.weights));
+    WELLSPACE_RETURN_IF_ERROR(ReadOfPoints(*archive, name, kNpzWeights, "weights", vertices, mesh.weights));
+  }
+  if (const std::string member = numbers + ".npy"; !numbers.empty() && archive->Has(member)) {
+    WELLSPACE_RETURN_IF_ERROR(ReadOfPoints(*archive, name, member, "numbers", vertices, mesh.numbers));
+  }
+  if (!numbers.empty() && !archive->Has(kNpzSimplices)) {
+    return mesh;
   }
   WELLSPACE_ASSIGN_OR_RETURN(NpyReader simplices, OpenArray(*archive, name, kNpzSimplices));
   if (simplices.columns() != columns + 1) {

@@ -25,7 +25,8 @@ constexpr size_t kMaxDepth = 64;
 // Collects the arrays of the only piece, then makes the mesh of them.
 class VtuReader {
  public:
-  VtuReader(std::string_view document, const std::string& name) : xml_(document, name), name_(name) {}
+  VtuReader(std::string_view document, const std::string& name, const std::string& numbers)
+      : xml_(document, name), name_(name), numbers_name_(numbers) {}
 
   absl::StatusOr<Mesh> Read() {
     WELLSPACE_RETURN_IF_ERROR(ReadElements());
@@ -100,6 +101,10 @@ class VtuReader {
     if (parent == "PointData" && xml_.Attribute("Name") == "weights") {
       has_weights_ = true;
       return ReadArray<double>(weights_);
+    }
+    if (parent == "PointData" && !numbers_name_.empty() && xml_.Attribute("Name") == numbers_name_) {
+      numbers_.clear();
+      return ReadArray<double>(numbers_);
     }
     if (parent == "CellData" && xml_.Attribute("Name") == kVtkBoundary) {
       has_tags_ = true;
@@ -255,6 +260,10 @@ class VtuReader {
     if (has_weights_ && weights_.size() != point_count_) {
       return FileError(absl::StrCat("expected a weight for each of ", point_count_, " points, got ", weights_.size()));
     }
+    if (!numbers_.empty() && numbers_.size() != point_count_) {
+      return FileError(absl::StrCat("point data ", Quote(numbers_name_), ": expected a number for each of ",
+                                    point_count_, " points, got ", numbers_.size()));
+    }
     if (has_tags_ && tags_.size() != cell_count_) {
       return FileError(absl::StrCat("expected a tag for each of ", cell_count_, " cells, got ", tags_.size()));
     }
@@ -263,6 +272,7 @@ class VtuReader {
     }
     Mesh mesh;
     mesh.weights = weights_;
+    mesh.numbers = numbers_;
     mesh.dimension = !types_.empty() && types_[0] == kVtkTriangle ? 2 : 3;
     WELLSPACE_RETURN_IF_ERROR(TakeCells(mesh));
     return TakePoints(std::move(mesh));
@@ -346,6 +356,8 @@ class VtuReader {
   std::vector<double> coordinates_;
   bool has_weights_ = false;
   std::vector<double> weights_;
+  const std::string numbers_name_;  // of point data that are asked for; may be empty
+  std::vector<double> numbers_;
   std::vector<int64_t> connectivity_;
   std::vector<int64_t> offsets_;
   std::vector<int64_t> types_;
@@ -357,10 +369,10 @@ class VtuReader {
 
 }  // namespace
 
-absl::StatusOr<Mesh> ReadVtu(const std::string& path) {
+absl::StatusOr<Mesh> ReadVtu(const std::string& path, const std::string& numbers) {
   WELLSPACE_ASSIGN_OR_RETURN(InputFile file, InputFile::Open(path));
   WELLSPACE_ASSIGN_OR_RETURN(const std::string document, file.ReadAll());
-  return VtuReader(document, file.name()).Read();
+  return VtuReader(document, file.name(), numbers).Read();
 }
 
 }  // namespace wellspace::formats

@@ -189,6 +189,8 @@ void SetParameters(const MeshOptions& options, v1::MeshParameters* parameters) {
   parameters->set_criterion(options.criterion == Criterion::kWellSpaced ? v1::CRITERION_WELL_SPACED
                                                                         : v1::CRITERION_RADIUS_EDGE);
   parameters->set_max_circumradius(options.max_circumradius);
+  parameters->set_edge_length(options.edge_length);
+  parameters->set_gradation(options.gradation);
   for (const SizeBox& box : options.size_boxes) {
     v1::SizeBox* message = parameters->add_size_boxes();
     message->mutable_low()->Assign(box.low.begin(), box.low.end());
@@ -217,6 +219,8 @@ MeshOptions OptionsFromProto(const v1::MeshParameters& parameters) {
   options.criterion =
       parameters.criterion() == v1::CRITERION_WELL_SPACED ? Criterion::kWellSpaced : Criterion::kRadiusEdge;
   options.max_circumradius = parameters.max_circumradius();
+  options.edge_length = parameters.edge_length();
+  options.gradation = parameters.gradation();
   for (const v1::SizeBox& box : parameters.size_boxes()) {
     options.size_boxes.push_back(
         {.low = VectorOf(box.low()), .high = VectorOf(box.high()), .max_circumradius = box.max_circumradius()});

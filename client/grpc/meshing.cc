@@ -8,6 +8,7 @@
 #include "client/grpc/grpc_connection.h"
 #include "client/grpc/mesh_receiver.h"
 #include "client/grpc/request_writer.h"
+#include "client/grpc/size_messages.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::client {
@@ -34,12 +35,28 @@ bool UploadFeatures(const Features& features, Request& request, Stream& stream) 
   return true;
 }
 
+// The same of sizes at points. They come before the points, so that wrong ones are refused at once.
+template <typename Request, typename Stream>
+bool UploadSizes(const SizeSamples& samples, int dimension, Request& request, Stream& stream) {
+  size_t next = 0;
+  do {
+    next = FillSizes(samples, dimension, next, *request.mutable_size_samples());
+    if (!stream.Write(request)) {
+      return false;
+    }
+  } while (next < samples.sizes.size());
+  return true;
+}
+
 // Sends everything and half-closes. Stops early when the call has ended; its status says why.
 // `request` is the first message, but for the parameters.
 template <typename Request, typename Stream>
 void SendCloud(const MeshOptions& options, std::span<const double> points, Request request, Stream& stream) {
   SetParameters(options, request.mutable_parameters());
   if (!stream.Write(request)) {
+    return;
+  }
+  if (options.size_samples != nullptr && !UploadSizes(*options.size_samples, options.dimension, request, stream)) {
     return;
   }
   const size_t row = std::max(1, options.dimension);

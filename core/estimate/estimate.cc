@@ -244,11 +244,8 @@ class Integrator {
       center[i] = cell.low[i] + 0.5 * side;
       diagonal_sq += side * side;
     }
-    double least = sizes_.max_circumradius;
-    for (const auto& region : sizes_.regions) {
-      least = std::min(least, std::max(region.max_circumradius, std::sqrt(DistanceSq<D>(cell, region.box))));
-    }
-    return {least, std::min(std::sqrt(sizes_.AtSq(center)) + 0.5 * std::sqrt(diagonal_sq), sizes_.max_circumradius)};
+    const double around = 0.5 * std::sqrt(diagonal_sq) * sizes_.growth().Most();
+    return {sizes_.LeastIn(cell), std::min(std::sqrt(sizes_.AtSq(center)) + around, sizes_.max_circumradius())};
   }
 
   // Adds `weight` times the integrals over the part of a cube that lies in the box.

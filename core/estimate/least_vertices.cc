@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <queue>
 #include <vector>
 
 #include "core/base/dimensions.h"
@@ -25,6 +26,9 @@ constexpr size_t kMostRegions = 1000;
 
 // Sizes between those of a box and those far from it are taken in steps of this ratio.
 constexpr double kShellRatio = 1.25;
+
+// Parts of the box for which sizes at points are looked at.
+constexpr size_t kMostParts = 4096;
 
 double BallVolume(int dimension) {
   return std::pow(std::numbers::pi, 0.5 * dimension) / std::tgamma(0.5 * dimension + 1);
@@ -88,6 +92,75 @@ double LeastPerSizeEverywhere() {
   return D == 3 ? kCovering3 / BallVolume(D) : LeastPerSize<D>();
 }
 
+// A part of the box, and the sizes there.
+template <int D>
+struct SizedPart {
+  Box<D> box;
+  double volume = 0;  // in units of unit^D
+  double size = 0;    // in the middle
+  double most = 0;    // anywhere
+
+  double Count(double of_size, double unit) const { return volume == 0 ? 0 : volume * CountOf(unit, of_size, D); }
+};
+
+// Cuts the box in parts, in each of which h is about the same, as far as so many tell: where most vertices are wanted
+// first.
+template <int D>
+std::vector<SizedPart<D>> PartsBySize(const Box<D>& box, const SizeField<D>& sizes, double unit) {
+  const auto part_of = [&](const Box<D>& in) {
+    Point<D> middle;
+    double diagonal_sq = 0;
+    for (int i = 0; i < D; ++i) {
+      middle[i] = 0.5 * (in.low[i] + in.high[i]);
+      diagonal_sq += (in.high[i] - in.low[i]) * (in.high[i] - in.low[i]);
+    }
+    SizedPart<D> part{.box = in, .volume = SharedVolume<D>(in, in, unit)};
+    part.size = std::sqrt(sizes.AtSq(middle));
+    part.most =
+        std::min(part.size + 0.5 * sizes.growth().of_samples * std::sqrt(diagonal_sq), sizes.max_circumradius());
+    return part;
+  };
+  const auto is_after = [&](const SizedPart<D>& a, const SizedPart<D>& b) {
+    return a.Count(a.size, unit) < b.Count(b.size, unit);
+  };
+  std::priority_queue<SizedPart<D>, std::vector<SizedPart<D>>, decltype(is_after)> open(is_after);
+  std::vector<SizedPart<D>> parts;
+  open.push(part_of(box));
+  while (!open.empty()) {
+    const SizedPart<D> part = open.top();
+    open.pop();
+    if (part.most <= 2 * part.size || parts.size() + open.size() >= kMostParts) {
+      parts.push_back(part);
+      continue;
+    }
+    int axis = 0;
+    for (int i = 1; i < D; ++i) {
+      axis = part.box.high[i] - part.box.low[i] > part.box.high[axis] - part.box.low[axis] ? i : axis;
+    }
+    Box<D> low = part.box;
+    Box<D> high = part.box;
+    low.high[axis] = high.low[axis] = 0.5 * (part.box.low[axis] + part.box.high[axis]);
+    open.push(part_of(low));
+    open.push(part_of(high));
+  }
+  return parts;
+}
+
+// Vertices that sizes at points take at least. A simplex with a place y and circumcentre c has R <= h(c) <= h(y) + G R.
+template <int D>
+double LeastVerticesForSamples(const Box<D>& box, const SizeField<D>& sizes) {
+  const double slack = 1 - sizes.growth().of_samples;
+  if (sizes.samples().empty() || slack == 0) {
+    return 0;
+  }
+  const double unit = box.LongestSide();
+  double sum = 0;
+  for (const SizedPart<D>& part : PartsBySize<D>(box, sizes.OfSamples(), unit)) {
+    sum += part.Count(part.most / slack, unit);
+  }
+  return LeastPerSize<D>() * sum;
+}
+
 // The least x in [least, most] with fits(x), if it fits at all from some x on; `most` if none below does.
 template <typename F>
 double LeastThat(double least, double most, F fits) {
@@ -109,19 +182,18 @@ double LeastVerticesForSizes(const Box<D>& box, const SizeField<D>& sizes) {
     return 0;
   }
   const double unit = box.LongestSide();
-  const double everywhere = sizes.max_circumradius;
+  const double everywhere = sizes.max_circumradius();
   const double whole =
       std::max(LeastToCover<D>(box, everywhere),
                LeastPerSizeEverywhere<D>() * SharedVolume<D>(box, box, unit) * CountOf(unit, everywhere, D));
   // The smallest sizes first, of each box what no smaller size has been counted in.
-  std::vector<typename SizeField<D>::Region> regions = sizes.regions;
-  std::sort(regions.begin(), regions.end(),
-            [](const auto& a, const auto& b) { return a.max_circumradius < b.max_circumradius; });
+  std::vector<typename SizeField<D>::Region> regions = sizes.regions();
+  std::sort(regions.begin(), regions.end(), [](const auto& a, const auto& b) { return a.size < b.size; });
   double rest = SharedVolume<D>(box, box, unit);
   double sum = 0;
   double most = 0;
-  for (size_t i = 0; i < std::min(regions.size(), kMostRegions) && regions[i].max_circumradius < everywhere; ++i) {
-    Box<D> inside = regions[i].box;
+  for (size_t i = 0; i < std::min(regions.size(), kMostRegions) && regions[i].size < everywhere; ++i) {
+    Box<D> inside = regions[i].place;
     bool meets = true;
     for (int k = 0; k < D; ++k) {
       inside.low[k] = std::max(inside.low[k], box.low[k]);
@@ -134,13 +206,13 @@ double LeastVerticesForSizes(const Box<D>& box, const SizeField<D>& sizes) {
     double own = SharedVolume<D>(inside, inside, unit);
     rest -= own;
     for (size_t j = 0; j < i; ++j) {
-      own -= SharedVolume<D>(inside, regions[j].box, unit);
+      own -= SharedVolume<D>(inside, regions[j].place, unit);
     }
-    sum += std::max(0.0, own) * CountOf(unit, regions[i].max_circumradius, D);
-    most = std::max(most, LeastToCover<D>(inside, regions[i].max_circumradius));
+    sum += std::max(0.0, own) * CountOf(unit, regions[i].size, D);
+    most = std::max(most, LeastToCover<D>(inside, regions[i].size));
   }
   sum += std::max(0.0, rest) * CountOf(unit, everywhere, D);
-  return kRounding * std::max({whole, most, LeastPerSize<D>() * sum});
+  return kRounding * std::max({whole, most, LeastPerSize<D>() * sum, LeastVerticesForSamples<D>(box, sizes)});
 }
 
 template <int D>
@@ -151,22 +223,30 @@ double LeastVerticesForShape(const Box<D>& box, double rho) {
 template <int D>
 double TypicalVerticesForSizes(const Box<D>& box, const SizeField<D>& sizes) {
   const double unit = box.LongestSide();
-  const double everywhere = std::min(sizes.max_circumradius, unit);
+  const double everywhere = std::min(sizes.max_circumradius(), unit);
   // With half a layer more at each face.
   double sum = 1;
   for (const double side : SidesOf<D>(box)) {
     sum *= side / everywhere + 1;
   }
-  for (const auto& region : sizes.regions) {
-    double size = region.max_circumradius;
+  const double growth = sizes.growth().of_regions;
+  for (const auto& region : sizes.regions()) {
+    double size = std::max(region.size, sizes.least());
     double before = 0;
     // What is nearer to the box than its size, and then shells about that, in which sizes are as large as the shell is
-    // far.
-    for (double reach = size; size < everywhere; size = reach, reach *= kShellRatio) {
-      const double within = SharedVolume<D>(Grown<D>(region.box, reach), box, unit);
+    // far, times the growth.
+    for (double reach = size / growth; size < everywhere; size = growth * reach, reach *= kShellRatio) {
+      const double within = SharedVolume<D>(Grown<D>(region.place, reach), box, unit);
       sum += (within - before) * CountOf(unit, size, D);
       before = within;
     }
+  }
+  if (!sizes.samples().empty()) {
+    double of_samples = 0;
+    for (const SizedPart<D>& part : PartsBySize<D>(box, sizes.OfSamples(), unit)) {
+      of_samples += part.Count(std::max(part.size, 0.5 * part.most), unit);
+    }
+    sum = std::max(sum, of_samples);
   }
   return kVerticesPerSize<D> * sum;
 }
@@ -184,9 +264,12 @@ double TypicalVerticesForShape(const Box<D>& box) {
 
 template <int D>
 double SmallestSizeFor(const Box<D>& box, const SizeField<D>& sizes, double vertices) {
-  double least = sizes.max_circumradius;
-  for (const auto& region : sizes.regions) {
-    least = std::min(least, region.max_circumradius);
+  double least = sizes.max_circumradius();
+  for (const auto& region : sizes.regions()) {
+    least = std::min(least, region.size);
+  }
+  for (const auto& sample : sizes.samples()) {
+    least = std::min(least, sample.size);
   }
   const double most = box.LongestSide();
   return LeastThat(std::min(least, most), most, [&](double size) {

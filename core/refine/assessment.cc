@@ -102,6 +102,7 @@ Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const MeshCriter
   double nearest_face = Assessment::kNone;
   const double rho_sq = criteria.rho * criteria.rho;
   const bool has_sizes = !criteria.sizes.IsUnbounded();
+  SizeHint hint;
   const double cell_edge_sq = criteria.criterion == Criterion::kWellSpaced ? ShortestEdgeSq(cell) : Assessment::kNone;
   for (size_t i = 0; i < cell.nodes().size(); ++i) {
     const CellNode<D>& node = cell.nodes()[i];
@@ -130,7 +131,7 @@ Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const MeshCriter
       for (int k = 0; k < D; ++k) {
         x[k] += node.x[k];
       }
-      const double size_sq = criteria.sizes.AtSq(x);
+      const double size_sq = criteria.sizes.AtSq(x, std::min(node.radius_sq, bound_sq), &hint);
       if (node.radius_sq > size_sq && size_sq < bound_sq) {
         bound_sq = size_sq;
         is_too_large = true;

@@ -18,6 +18,7 @@
 #include "core/geometry/exact_measure.h"
 #include "core/simplex/merged_cloud.h"
 #include "core/simplex/quality.h"
+#include "core/simplex/validate_sizes.h"
 
 namespace wellspace::core {
 namespace {
@@ -230,33 +231,14 @@ class Checker {
     return absl::OkStatus();
   }
 
-  absl::Status Sizing(double max_circumradius, std::span<const SizeBox> boxes) const {
-    WELLSPACE_RETURN_IF_ERROR(CheckSizes(max_circumradius, boxes));
-    if (max_circumradius == 0 && boxes.empty()) {
+  absl::Status Sizing(const SizeBounds& bounds) const {
+    WELLSPACE_RETURN_IF_ERROR(CheckSizeBounds(bounds, D));
+    if (bounds.IsEmpty()) {
       return absl::OkStatus();
     }
     for (size_t s = 0; s < SimplexCount(); ++s) {
-      const Simplex<D> corners = Corners(s);
-      const Point<D> offset = CircumcentreOffset<D>(corners);
-      const double radius = Distance<D>(offset, Point<D>{});
-      if (max_circumradius > 0 && !(radius <= max_circumradius * (1 + kRelativeTolerance))) {
-        return Violation("simplex %d (%s) has circumradius %.17g, more than %.17g", s, IndexText(s), radius,
-                         max_circumradius);
-      }
-      for (size_t b = 0; b < boxes.size(); ++b) {
-        // Relative to the corner, so that the distance has an error in proportion to itself and the radius.
-        Point<D> gap;
-        for (int k = 0; k < D; ++k) {
-          gap[k] = std::max(
-              {boxes[b].low[k] - corners[0][k] - offset[k], 0.0, offset[k] - (boxes[b].high[k] - corners[0][k])});
-        }
-        const double distance = Distance<D>(gap, Point<D>{});
-        if (!(radius <= std::max(boxes[b].max_circumradius, distance) * (1 + kRelativeTolerance))) {
-          return Violation(
-              "simplex %d (%s) has circumradius %.17g, more than the %.17g of size box %d, at a distance of %.17g from "
-              "it",
-              s, IndexText(s), radius, boxes[b].max_circumradius, b, distance);
-        }
+      if (const std::string excess = SizeExcess<D>(Corners(s), bounds); !excess.empty()) {
+        return Violation("simplex %d (%s) has %s", s, IndexText(s), excess);
       }
     }
     return absl::OkStatus();
@@ -344,32 +326,6 @@ class Checker {
   }
 
  private:
-  static absl::Status CheckSizes(double max_circumradius, std::span<const SizeBox> boxes) {
-    if (!(max_circumradius >= 0 && std::isfinite(max_circumradius))) {
-      return absl::InvalidArgumentError(
-          absl::StrFormat("max_circumradius is %g; a finite number, 0 or more, is needed", max_circumradius));
-    }
-    for (size_t b = 0; b < boxes.size(); ++b) {
-      const SizeBox& box = boxes[b];
-      if (box.low.size() != D || box.high.size() != D) {
-        return absl::InvalidArgumentError(absl::StrFormat(
-            "size box %d has corners of %d and %d coordinates; %d are needed", b, box.low.size(), box.high.size(), D));
-      }
-      for (int k = 0; k < D; ++k) {
-        if (!(std::isfinite(box.low[k]) && std::isfinite(box.high[k]) && box.low[k] <= box.high[k])) {
-          return absl::InvalidArgumentError(absl::StrFormat(
-              "size box %d reaches from %g to %g on axis %d; finite numbers in ascending order are needed", b,
-              box.low[k], box.high[k], k));
-        }
-      }
-      if (!(box.max_circumradius > 0 && std::isfinite(box.max_circumradius))) {
-        return absl::InvalidArgumentError(absl::StrFormat(
-            "size box %d: max_circumradius is %g; a positive, finite number is needed", b, box.max_circumradius));
-      }
-    }
-    return absl::OkStatus();
-  }
-
   // A facet by its ascending vertices, as seen from one of its simplices.
   struct Facet {
     std::array<uint32_t, D> vertices;
@@ -552,8 +508,8 @@ absl::Status ValidateWellSpaced(const MeshView& mesh, double rho) {
   return RunCheck(mesh, [rho](const auto& checker) { return checker.WellSpaced(rho); });
 }
 
-absl::Status ValidateSizing(const MeshView& mesh, double max_circumradius, std::span<const SizeBox> boxes) {
-  return RunCheck(mesh, [&](const auto& checker) { return checker.Sizing(max_circumradius, boxes); });
+absl::Status ValidateSizing(const MeshView& mesh, const SizeBounds& bounds) {
+  return RunCheck(mesh, [&](const auto& checker) { return checker.Sizing(bounds); });
 }
 
 absl::Status ValidateCircumcentres(const MeshView& mesh) {
@@ -580,7 +536,8 @@ absl::Status ValidateMesh(const MeshView& mesh, const ValidationOptions& options
                                                                               : checker.RadiusEdge(options.rho));
       }
       WELLSPACE_RETURN_IF_ERROR(checker.Circumcentres());
-      WELLSPACE_RETURN_IF_ERROR(checker.Sizing(options.max_circumradius, options.size_boxes));
+      WELLSPACE_RETURN_IF_ERROR(
+          checker.Sizing({options.max_circumradius, options.size_boxes, options.size_samples, options.gradation}));
     }
     if (options.min_angle_deg != 0) {
       WELLSPACE_RETURN_IF_ERROR(checker.MinAngle(options.min_angle_deg));

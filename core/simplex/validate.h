@@ -13,6 +13,7 @@
 
 #include "absl/status/status.h"
 #include "core/geometry/criterion.h"
+#include "core/simplex/validate_sizes.h"
 
 namespace wellspace::core {
 
@@ -99,10 +100,11 @@ absl::Status ValidateRadiusEdge(const MeshView& mesh, double rho);
 //
 // REQUIRES:   ValidateDelaunay and ValidateCircumcentres are OK.
 absl::Status ValidateWellSpaced(const MeshView& mesh, double rho);
-// Every simplex has circumradius R <= max_circumradius, where that is not 0; and R <= max(H, dist(circumcentre, box))
-// for each of `boxes`, H its bound: no circumball that meets the box is larger. Each times 1 + 1e-9. INVALID_ARGUMENT
-// for bounds that are negative or not finite, of a box also 0, and for boxes that are none.
-absl::Status ValidateSizing(const MeshView& mesh, double max_circumradius, std::span<const SizeBox> boxes);
+// Every simplex has circumradius R <= max_circumradius, where that is not 0; R <= max(H, G dist(circumcentre, box)) for
+// each box, H its bound and G the gradation: no circumball that meets the box is larger; and R <= H + G dist(
+// circumcentre, point) for each sample. Each times 1 + 1e-9. INVALID_ARGUMENT for bounds that are negative or not
+// finite, of a box or a sample also 0, and for boxes and points that are none.
+absl::Status ValidateSizing(const MeshView& mesh, const SizeBounds& bounds);
 // Every circumcentre lies in the box, up to 1e-9 times its longest side.
 absl::Status ValidateCircumcentres(const MeshView& mesh);
 // The distinct points of `cloud` (n x dimension), in order of first appearance, are the first vertices of the mesh, to
@@ -114,10 +116,12 @@ absl::Status ValidateCloud(const MeshView& mesh, std::span<const double> cloud, 
 struct ValidationOptions {
   double rho = 0;  // bound of the criterion; 0: not checked
   Criterion criterion = Criterion::kRadiusEdge;
-  double max_circumradius = 0;            // 0: not checked
-  std::span<const SizeBox> size_boxes{};  // empty: not checked
-  std::span<const double> cloud{};        // empty: not checked
-  double merge_distance = 0;              // of the points of the cloud
+  double max_circumradius = 0;                // 0: not checked
+  std::span<const SizeBox> size_boxes{};      // empty: not checked
+  const SizeSamples* size_samples = nullptr;  // null: not checked
+  double gradation = 0;                       // 0: that of each kind of size
+  std::span<const double> cloud{};            // empty: not checked
+  double merge_distance = 0;                  // of the points of the cloud
   // No angle between two facets of a simplex (in 2-D, of a triangle) is below min_angle_deg * (1 - 1e-9).
   // INVALID_ARGUMENT unless that is from 0 to LargestSmallestAngle; 0: not checked.
   double min_angle_deg = 0;

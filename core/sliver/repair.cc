@@ -244,7 +244,7 @@ bool Repairer::IsAdmissible(const TetrahedronMeasure& measure, const std::array<
       }
     }
   }
-  return criteria.sizes.IsUnbounded() || measure.radius_sq <= criteria.sizes.AtSq(measure.centre);
+  return criteria.sizes.IsUnbounded() || measure.radius_sq <= criteria.sizes.AtSq(measure.centre, measure.radius_sq);
 }
 
 // The squared distance of a vertex at `p`, which would replace the cavity, to its nearest neighbour; none if it would

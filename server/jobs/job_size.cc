@@ -60,6 +60,26 @@ double Cubes(std::span<const double> sides, double size) {
   return cubes;
 }
 
+// Each sample stands for its part of the box.
+double VerticesOfSamples(const core::MeshParameters& parameters, std::span<const double> points) {
+  if (parameters.size_samples == nullptr) {
+    return 0;
+  }
+  const int dimension = parameters.dimension;
+  const core::SizeSamples& samples = *parameters.size_samples;
+  std::vector<double> sides = Sides(parameters, points);
+  const auto count = static_cast<double>(samples.sizes.size());
+  for (double& side : sides) {
+    side /= std::pow(count, 1.0 / dimension);
+  }
+  const double unit = samples.measure == core::SizeMeasure::kEdgeLength ? core::CircumradiusOf(1, dimension) : 1;
+  double vertices = 0;
+  for (const double size : samples.sizes) {
+    vertices += kVerticesPerCube * Cubes(sides, unit * size);
+  }
+  return vertices;
+}
+
 double PredictVertices(const core::MeshParameters& parameters, std::span<const double> points) {
   const int dimension = parameters.dimension;
   const double count = static_cast<double>(points.size()) / dimension;
@@ -67,6 +87,11 @@ double PredictVertices(const core::MeshParameters& parameters, std::span<const d
   if (parameters.max_circumradius > 0) {
     vertices += kVerticesPerCube * Cubes(Sides(parameters, points), parameters.max_circumradius);
   }
+  if (parameters.edge_length > 0) {
+    vertices +=
+        kVerticesPerCube * Cubes(Sides(parameters, points), core::CircumradiusOf(parameters.edge_length, dimension));
+  }
+  vertices += VerticesOfSamples(parameters, points);
   std::vector<double> sides(dimension);
   for (const core::SizeBox& box : parameters.size_boxes) {
     for (int k = 0; k < dimension; ++k) {
@@ -79,19 +104,23 @@ double PredictVertices(const core::MeshParameters& parameters, std::span<const d
   return is_harder ? kHarderDemand * vertices : vertices;
 }
 
+bool HasManySamples(const core::MeshParameters& parameters) {
+  return parameters.size_samples != nullptr && parameters.size_samples->sizes.size() > kMostPoints;
+}
+
 bool IsSmall(int dimension, double vertices) { return vertices * kSecondsPerVertex[dimension] <= kSmallSeconds; }
 
 }  // namespace
 
 bool IsSmallMesh(const core::MeshParameters& parameters, std::span<const double> points) {
-  return points.size() / parameters.dimension <= kMostPoints &&
+  return points.size() / parameters.dimension <= kMostPoints && !HasManySamples(parameters) &&
          IsSmall(parameters.dimension, PredictVertices(parameters, points));
 }
 
 bool IsSmallRefinement(const core::MeshParameters& parameters, std::span<const double> points, uint64_t vertices,
                        uint64_t steps) {
   const double built = static_cast<double>(vertices) * static_cast<double>(1 + steps);
-  return points.size() / parameters.dimension <= kMostPoints &&
+  return points.size() / parameters.dimension <= kMostPoints && !HasManySamples(parameters) &&
          IsSmall(parameters.dimension, built + PredictVertices(parameters, points));
 }
 

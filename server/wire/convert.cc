@@ -182,6 +182,10 @@ absl::StatusOr<core::MeshParameters> ParametersFromProto(const v1::MeshParameter
   }
   parameters.max_circumradius = message.max_circumradius();
   WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "max_circumradius"));
+  parameters.edge_length = message.edge_length();
+  WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "edge_length"));
+  parameters.gradation = message.gradation();
+  WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "gradation"));
   // At once: one by one would look at many boxes many times.
   for (const v1::SizeBox& box : message.size_boxes()) {
     parameters.size_boxes.push_back(SizeBoxFromProto(box));
@@ -247,6 +251,8 @@ v1::MeshParameters ParametersToProto(const core::MeshParameters& parameters) {
     message.mutable_domain()->mutable_high()->Assign(parameters.domain_high.begin(), parameters.domain_high.end());
   }
   message.set_max_circumradius(parameters.max_circumradius);
+  message.set_edge_length(parameters.edge_length);
+  message.set_gradation(parameters.gradation);
   for (const core::SizeBox& box : parameters.size_boxes) {
     v1::SizeBox* size_box = message.add_size_boxes();
     size_box->mutable_low()->Assign(box.low.begin(), box.low.end());

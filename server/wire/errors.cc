@@ -37,6 +37,7 @@ absl::StatusCode CodeOf(v1::ErrorReason reason) {
     case v1::ERROR_REASON_INVALID_CHUNK_SHAPE:
     case v1::ERROR_REASON_INVALID_POINTS:
     case v1::ERROR_REASON_INVALID_SEGMENTS:
+    case v1::ERROR_REASON_INVALID_SIZES:
     case v1::ERROR_REASON_MALFORMED_REQUEST:
     case v1::ERROR_REASON_REQUEST_ID_REUSED:
     case v1::ERROR_REASON_INVALID_REQUEST:
@@ -100,6 +101,9 @@ absl::Status Make(absl::StatusCode code, v1::ErrorReason reason, std::string_vie
   return status;
 }
 
+// With what the core's errors about sizes at points begin.
+constexpr char kSizes[] = "size_samples.";
+
 // An error of the core, with the reason that it has for clients; CANCELLED and DEADLINE_EXCEEDED have none.
 absl::Status FromCore(const absl::Status& status) {
   const std::string message(status.message());
@@ -113,11 +117,15 @@ absl::Status FromCore(const absl::Status& status) {
           return MakeError(v1::ERROR_REASON_INVALID_SEGMENTS, message, field);
         }
       }
+      if (message.rfind(kSizes, 0) == 0) {
+        return MakeError(v1::ERROR_REASON_INVALID_SIZES, message, "size_samples.points");
+      }
       return MakeError(v1::ERROR_REASON_INVALID_POINTS, message, "points.coordinates");
     case absl::StatusCode::kResourceExhausted:
       if (status.GetPayload(ToAbsl(core::kDemandsTooFine)).has_value()) {
-        return MakeError(v1::ERROR_REASON_DEMANDS_TOO_FINE, message,
-                         absl::StrCat("parameters.", message.substr(0, message.find(':'))));
+        return MakeError(
+            v1::ERROR_REASON_DEMANDS_TOO_FINE, message,
+            absl::StrCat(message.rfind(kSizes, 0) == 0 ? "" : "parameters.", message.substr(0, message.find(':'))));
       }
       return MakeError(v1::ERROR_REASON_MESH_TOO_LARGE, message);
     case absl::StatusCode::kFailedPrecondition:

@@ -31,7 +31,7 @@ absl::Status MemoryLimitError(std::string_view message, bool may_retry);
 // the call may be repeated. To be called where a status leaves the server, nowhere else.
 //
 // A status without a reason is the core's. The parameters were validated before, so that its INVALID_ARGUMENT is about
-// points, segments or faces. CANCELLED and DEADLINE_EXCEEDED have no reason.
+// points, segments, faces or sizes at points. CANCELLED and DEADLINE_EXCEEDED have no reason.
 grpc::Status ToGrpcStatus(const absl::Status& status);
 
 // `status` as a message, as it would reach a client.

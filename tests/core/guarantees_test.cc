@@ -28,6 +28,7 @@ using core::Point;
 using core::QueryStructure;
 using core::RunContext;
 using core::SizeBox;
+using core::SizeField;
 using core::VertexId;
 
 template <typename T>
@@ -349,11 +350,10 @@ TYPED_TEST(GuaranteesTest, AtEveryInsertionWithSizes) {
   constexpr int D = TypeParam::kValue;
   for (const std::string_view kind : {"none", "uniform", "boundary", "near-faces", "pairs"}) {
     SCOPED_TRACE(std::string(kind));
-    MeshCriteria<D> criteria{.rho = LeastRho<D>(), .sizes = {}};
-    criteria.sizes.max_circumradius = D == 2 ? 0.05 : 0.2;
     core::Box<D> region = UnitBox<D>();
     region.high.fill(0.2);
-    criteria.sizes.regions.push_back({region, D == 2 ? 0.01 : 0.08});
+    const MeshCriteria<D> criteria{.rho = LeastRho<D>(),
+                                   .sizes = SizeField<D>(D == 2 ? 0.05 : 0.2, {{region, D == 2 ? 0.01 : 0.08}})};
     std::optional<GuaranteeChecker<D>> checker;
     const Outcome outcome = RefineInput<D>(
         MakeInput<D>(kind, "unit", 8, this->seed_), criteria, 1e6,

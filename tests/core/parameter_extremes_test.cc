@@ -30,6 +30,9 @@ std::vector<Field> Fields() {
   const auto box = [](MeshParameters& p, double low, double high, double size) {
     p.size_boxes.push_back({std::vector<double>(p.dimension, low), std::vector<double>(p.dimension, high), size});
   };
+  const auto sample = [](MeshParameters& p, double place, double size) {
+    p.size_samples = std::make_shared<SizeSamples>(SizeSamples{std::vector<double>(p.dimension, place), {size}});
+  };
   return {
       {"rho", [](MeshParameters& p, double x) { p.rho = x; }},
       {"margin", [](MeshParameters& p, double x) { p.margin = x; }},
@@ -43,6 +46,20 @@ std::vector<Field> Fields() {
       {"size of a place", [box](MeshParameters& p, double x) { box(p, 0.25, 0.25, x); }},
       {"corners of a size box", [box](MeshParameters& p, double x) { box(p, -x, x, 0.5); }},
       {"corner of a size box", [box](MeshParameters& p, double x) { box(p, x, x, 0.5); }},
+      {"edge_length", [](MeshParameters& p, double x) { p.edge_length = x; }},
+      {"size of a sample", [sample](MeshParameters& p, double x) { sample(p, 0.25, x); }},
+      {"place of a sample", [sample](MeshParameters& p, double x) { sample(p, x, 0.5); }},
+      {"place of a sample in a large domain",
+       [sample](MeshParameters& p, double x) {
+         SetDomain(p, 1e300);
+         sample(p, x, 0.5);
+       }},
+      {"gradation",
+       [sample, box](MeshParameters& p, double x) {
+         p.gradation = x;
+         sample(p, 0.25, 0.1);
+         box(p, 0.25, 0.5, 0.2);
+       }},
       {"domain", [](MeshParameters& p, double x) { SetDomain(p, x); }},
       {"domain beside a size",
        [](MeshParameters& p, double x) {

@@ -50,6 +50,8 @@ void RequireValid(const core::Mesh& mesh, const core::MeshParameters& parameters
       .criterion = parameters.criterion,
       .max_circumradius = parameters.max_circumradius,
       .size_boxes = parameters.size_boxes,
+      .size_samples = parameters.size_samples.get(),
+      .gradation = parameters.gradation,
       .cloud = points};
   const absl::Status valid = core::ValidateMesh(
       {.dimension = mesh.dimension, .points = mesh.points, .simplices = mesh.simplices, .weights = mesh.weights},

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -42,6 +44,7 @@ struct Task {
   size_t added_points = 0;
   bool one_by_one = false;
   core::MeshParameters then;
+  uint8_t samples = 0;  // what SetSamples takes
 };
 
 constexpr std::array kRhoFactors = {0.0, 1.0, 1.25, 2.0, 100.0};
@@ -92,8 +95,9 @@ void SetEdit(uint8_t edit, Task& task) {
 }
 
 // Byte 0: bit 0 dimension 2 or 3, bits 1 and 2 the box (SetBox); bit 3 two dimensions more; bit 4 well-spaced; bit 5
-// sizes; bit 6 an edit. Byte 1: the exponent of the tiny step; from 3-D on bit 6 weights, bit 7 no repair. Byte 2:
-// offset. Byte 3: scale. Byte 4: rho. With sizes a byte more (SetSizes), with an edit one more (SetEdit).
+// sizes; bit 6 an edit; bit 7 sizes at points. Byte 1: the exponent of the tiny step; from 3-D on bit 6 weights, bit 7
+// no repair. Byte 2: offset. Byte 3: scale. Byte 4: rho. With sizes a byte more (SetSizes), with an edit one more
+// (SetEdit), with sizes at points one more (SetSamples).
 Task ReadTask(ByteReader& bytes) {
   constexpr std::array kOffsets = {0.0, -0.5, 1.0, 0x1p20, -0x1p35};
   constexpr std::array kScales = {1.0, 3.0, 0x1p-40, 0x1p100, 0x1p-700, 0x1p900};
@@ -125,7 +129,29 @@ Task ReadTask(ByteReader& bytes) {
   if (task.is_edit) {
     SetEdit(bytes.Next(), task);
   }
+  if ((shape >> 7) != 0) {
+    task.samples = static_cast<uint8_t>(bytes.Next() | 1);
+  }
   return task;
+}
+
+// The first points of a cloud have sizes. `samples`: the lowest bit whether, the next two how many of them, the next
+// two the gradation, the next one whether they are lengths of edges, the last two the exponent of the sizes.
+void SetSamples(uint8_t samples, const Placement& placement, std::span<const double> points,
+                core::MeshParameters& parameters) {
+  if ((samples & 1) == 0) {
+    return;
+  }
+  const size_t dimension = parameters.dimension;
+  const size_t count = std::min<size_t>((samples >> 1 & 3) + 1, points.size() / dimension);
+  auto made = std::make_shared<core::SizeSamples>();
+  made->points.assign(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(count * dimension));
+  for (size_t i = 0; i < count; ++i) {
+    made->sizes.push_back(std::ldexp(placement.scale, -static_cast<int>(i + (samples >> 6) * 4)));
+  }
+  made->measure = (samples >> 5 & 1) != 0 ? core::SizeMeasure::kEdgeLength : core::SizeMeasure::kCircumradius;
+  parameters.size_samples = made;
+  parameters.gradation = std::array{0.0, 1.0, 0.5, 0x1p-10}[samples >> 3 & 3];
 }
 
 // The lowest three bits: the grid line. The next three: how many tiny steps off. The highest two: at once much nearer
@@ -144,7 +170,7 @@ double ReadCoordinate(ByteReader& bytes, const Placement& placement) {
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace wellspace;
   fuzz::ByteReader bytes(data, size);
-  const fuzz::Task task = fuzz::ReadTask(bytes);
+  fuzz::Task task = fuzz::ReadTask(bytes);
   const core::MeshParameters& parameters = task.parameters;
   const size_t dimension = parameters.dimension;
   std::vector<double> points;
@@ -156,6 +182,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
           parameters.domain_low.empty() ? x : std::clamp(x, parameters.domain_low[axis], parameters.domain_high[axis]));
     }
   }
+  fuzz::SetSamples(task.samples, task.placement, points, task.parameters);
   if (!core::ValidateParameters(parameters).ok()) {
     return 0;
   }

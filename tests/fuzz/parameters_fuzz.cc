@@ -81,6 +81,10 @@ void ReadField(ByteReader& bytes, v1::MeshParameters& parameters) {
       return parameters.set_threads(static_cast<int32_t>(ReadInteger(bytes)));
     case 12:
       return parameters.set_dimension(static_cast<int32_t>(ReadInteger(bytes)));
+    case 13:
+      return parameters.set_edge_length(ReadDouble(bytes));
+    case 14:
+      return parameters.set_gradation(ReadDouble(bytes));
     default:
       return parameters.set_pump_weights(true);
   }

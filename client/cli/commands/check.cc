@@ -21,6 +21,7 @@
 #include "client/cli/remote_command.h"
 #include "client/cli/render/histograms.h"
 #include "client/cli/render/picture_format.h"
+#include "client/cli/size_field_options.h"
 #include "client/formats/domain/read_planar_domain.h"
 #include "client/formats/file_plan.h"
 #include "client/formats/line_reader.h"
@@ -135,6 +136,12 @@ absl::Status Plot(const core::QualityReport& report, int dimension, const std::s
 // Splitting bends a segment by so much of the largest coordinate at most: a rounded crossing, a point that was near.
 constexpr double kBentBy = 0x1p-40;
 
+// Sizes that the mesh is held to.
+struct WantedSizes {
+  std::vector<core::SizeBox> boxes;
+  core::SizeSamples samples;
+};
+
 struct CheckCommand {
   std::string mesh_path;
   std::string cloud_path;
@@ -144,31 +151,39 @@ struct CheckCommand {
   client::Criterion criterion = client::Criterion::kRadiusEdge;
   double max_circumradius = 0;
   std::vector<std::vector<double>> size_boxes;
+  SizeFieldOptions size_field;
+  double gradation = 0;
   double min_dihedral = 0;
   std::string plot_path;
   OutputFormat format = OutputFormat::kText;
 
-  absl::StatusOr<std::vector<core::SizeBox>> SizeBoxes(int dimension) const;
+  absl::StatusOr<WantedSizes> Sizes(int dimension);
   absl::Status CheckFiles() const;
   // The points of --cloud, none without it; `report` says how they were read.
   absl::StatusOr<std::vector<double>> ReadCloudOf(int dimension, CloudReport& report) const;
-  // What the mesh has to meet. REQUIRES: `boxes` and `cloud` outlive the result.
-  core::ValidationOptions ValidationFor(std::span<const core::SizeBox> boxes, std::span<const double> cloud) const;
+  // What the mesh has to meet. REQUIRES: `sizes` and `cloud` outlive the result.
+  core::ValidationOptions ValidationFor(const WantedSizes& sizes, std::span<const double> cloud) const;
   // Holds the mesh to what it has to meet, its boundary too. `domain`: that of --cloud, if it has one.
-  absl::Status Validate(const formats::Mesh& mesh, const core::MeshView& view, std::span<const core::SizeBox> boxes,
+  absl::Status Validate(const formats::Mesh& mesh, const core::MeshView& view, const WantedSizes& sizes,
                         std::span<const double> cloud, const std::optional<formats::PlanarDomain>& domain) const;
   // Prints the end of the report, and returns the exit code. `json`: what is reported so far.
   int Conclude(const absl::Status& violation, const CloudReport& cloud, const formats::Mesh& mesh, Json json) const;
-  int Run() const;
+  int Run();
 };
 
-absl::StatusOr<std::vector<core::SizeBox>> CheckCommand::SizeBoxes(int dimension) const {
+absl::StatusOr<WantedSizes> CheckCommand::Sizes(int dimension) {
   WELLSPACE_ASSIGN_OR_RETURN(std::vector<client::SizeBox> read, SizeBoxesOf(size_boxes, dimension));
-  std::vector<core::SizeBox> boxes;
+  WantedSizes sizes;
   for (client::SizeBox& box : read) {
-    boxes.push_back({std::move(box.low), std::move(box.high), box.max_circumradius});
+    sizes.boxes.push_back({std::move(box.low), std::move(box.high), box.max_circumradius});
   }
-  return boxes;
+  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const client::SizeSamples> samples, size_field.Read(dimension));
+  if (samples != nullptr) {
+    sizes.samples = {samples->points, samples->sizes,
+                     samples->measure == client::SizeMeasure::kEdgeLength ? core::SizeMeasure::kEdgeLength
+                                                                          : core::SizeMeasure::kCircumradius};
+  }
+  return sizes;
 }
 
 // Whether a facet lies on no face of the mesh's bounding box: then it is a domain with segments.
@@ -225,6 +240,7 @@ absl::Status CheckCommand::CheckFiles() const {
   formats::FilePlan files;
   files.ReadsMesh("MESH", mesh_path);
   files.Reads("--cloud", cloud_path);
+  size_field.AddFilesTo(files);
   files.Writes("--plot", plot_path);
   files.Writes("the figures", std::string(formats::kStandardStream));
   return files.Check();
@@ -242,25 +258,26 @@ absl::StatusOr<std::vector<double>> CheckCommand::ReadCloudOf(int dimension, Clo
   return std::move(read.points);
 }
 
-core::ValidationOptions CheckCommand::ValidationFor(std::span<const core::SizeBox> boxes,
-                                                    std::span<const double> cloud) const {
+core::ValidationOptions CheckCommand::ValidationFor(const WantedSizes& sizes, std::span<const double> cloud) const {
   const bool is_well_spaced = criterion == client::Criterion::kWellSpaced;
   return {.rho = rho,
           .criterion = is_well_spaced ? core::Criterion::kWellSpaced : core::Criterion::kRadiusEdge,
           .max_circumradius = max_circumradius,
-          .size_boxes = boxes,
+          .size_boxes = sizes.boxes,
+          .size_samples = &sizes.samples,
+          .gradation = gradation,
           .cloud = cloud,
           .merge_distance = merge_distance,
           .min_angle_deg = min_dihedral};
 }
 
-absl::Status CheckCommand::Validate(const formats::Mesh& mesh, const core::MeshView& view,
-                                    std::span<const core::SizeBox> boxes, std::span<const double> cloud,
+absl::Status CheckCommand::Validate(const formats::Mesh& mesh, const core::MeshView& view, const WantedSizes& sizes,
+                                    std::span<const double> cloud,
                                     const std::optional<formats::PlanarDomain>& domain) const {
   if (HasSegments(mesh) || domain.has_value()) {
     return ValidateDomain(mesh, view, rho, domain.has_value() ? &*domain : nullptr);
   }
-  const absl::Status status = core::ValidateMesh(view, ValidationFor(boxes, cloud));
+  const absl::Status status = core::ValidateMesh(view, ValidationFor(sizes, cloud));
   if (!status.ok() || mesh.boundary.empty()) {
     return status;
   }
@@ -293,7 +310,7 @@ int CheckCommand::Conclude(const absl::Status& violation, const CloudReport& clo
   return violation.ok() ? kExitOk : kExitFailed;
 }
 
-int CheckCommand::Run() const {
+int CheckCommand::Run() {
   const absl::StatusOr<render::PictureFormat> plot_format =
       plot_path.empty() ? render::PictureFormat::kPng : render::PictureFormatOf(plot_path);
   if (!plot_format.ok()) {
@@ -306,15 +323,15 @@ int CheckCommand::Run() const {
   if (!mesh.ok()) {
     return ReportError(mesh.status(), format);
   }
-  const absl::StatusOr<std::vector<core::SizeBox>> boxes = SizeBoxes(mesh->dimension);
-  if (!boxes.ok()) {
-    return ReportError(boxes.status(), format);
+  const absl::StatusOr<WantedSizes> sizes = Sizes(mesh->dimension);
+  if (!sizes.ok()) {
+    return ReportError(sizes.status(), format);
   }
-  if (!mesh->weights.empty() && (rho != 0 || max_circumradius != 0 || !size_boxes.empty())) {
+  if (!mesh->weights.empty() && (rho != 0 || max_circumradius != 0 || !size_boxes.empty() || size_field.IsGiven())) {
     return ReportError(absl::InvalidArgumentError(absl::StrCat(
                            mesh_path,
-                           ": --rho, --size and --size-box are about Delaunay simplices, and this mesh has "
-                           "weights; expected a mesh without, or --min-dihedral")),
+                           ": --rho, --size, --size-box and --size-field are about Delaunay simplices, and this "
+                           "mesh has weights; expected a mesh without, or --min-dihedral")),
                        format);
   }
   CloudReport cloud_report;
@@ -346,7 +363,7 @@ int CheckCommand::Run() const {
         return ReportError(plotted, format);
       }
     }
-    status = Validate(*mesh, view, *boxes, *cloud, domain);
+    status = Validate(*mesh, view, *sizes, *cloud, domain);
   }
   if (absl::IsInvalidArgument(status)) {  // what was asked for cannot be
     return ReportError(status, format);
@@ -379,6 +396,8 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
           ->check(AboveZero());
   AddCriterion(*check, command->criterion)->needs(rho);
   AddSizes(*check, command->max_circumradius, command->size_boxes);
+  command->size_field.AddTo(*check);
+  AddGradation(*check, command->gradation);
   AddNumber(*check, "--min-dihedral", command->min_dihedral,
             "Bound on the dihedral angles, in 2-D on the angles, in degrees; default: not checked")
       ->check(AboveZero());

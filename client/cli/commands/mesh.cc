@@ -22,7 +22,8 @@ constexpr char kMeshExamples[] =
     "Examples:\n"
     "  wellspace mesh coast.csv -o coast.vtu --rho 1.5 --stats -\n"
     "  wellspace mesh cow.csv -o cow.node --domain -1,-1,-1,1,1,1 --server mesher:7233\n"
-    "  wellspace mesh cow.csv -o cow.vtu --size 0.2 --size-box -0.5,0,0,0,0.5,0.5,0.05\n";
+    "  wellspace mesh cow.csv -o cow.vtu --size 0.2 --size-box -0.5,0,0,0,0.5,0.5,0.05\n"
+    "  wellspace mesh cow.csv -o cow.vtu --size-field sizes.csv --gradation 0.2\n";
 
 struct MeshCommand {
   std::string output;

@@ -111,7 +111,7 @@ DomainRules::Bound DomainRules::BoundOf(const Polytope<2>& cell, const CellNode<
   }
   if (!criteria.sizes.IsUnbounded()) {
     const Point<2> x = {cell.site()[0] + node.x[0], cell.site()[1] + node.x[1]};
-    const double size_sq = criteria.sizes.AtSq(x);
+    const double size_sq = criteria.sizes.AtSq(x, std::min(node.radius_sq, bound.sq));
     if (node.radius_sq > size_sq && size_sq < bound.sq) {
       bound = {size_sq, true};
     }

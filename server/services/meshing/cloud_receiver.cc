@@ -46,22 +46,28 @@ absl::Status CloudReceiver::Accept(Request* request) {
       return AcceptSegments(request->segments());
     case Request::kFaces:
       return AcceptFaces(request->faces());
+    case Request::kSizeSamples:
+      return AcceptSizes(request->size_samples());
     case Request::REQUEST_NOT_SET:
       break;
   }
   return MakeError(v1::ERROR_REASON_EMPTY_REQUEST,
-                   "a request has neither parameters, points, segments nor faces; set one of them", "request");
+                   "a request has neither parameters, points, segments, faces nor sizes; set one of them", "request");
 }
 
 template absl::Status CloudReceiver::Accept(v1::MeshPointsRequest*);
 template absl::Status CloudReceiver::Accept(v1::EstimateMeshRequest*);
 
-absl::Status CloudReceiver::AcceptEnd() const {
+absl::Status CloudReceiver::AcceptEnd() {
   if (!has_parameters_) {
     return MakeError(v1::ERROR_REASON_PARAMETERS_MISSING,
                      "the stream ended before any request; send the parameters first", "parameters");
   }
-  return features_.IsEmpty() ? absl::OkStatus() : ValidateForDomain(parameters_, features_.View());
+  if (!features_.IsEmpty()) {
+    WELLSPACE_RETURN_IF_ERROR(ValidateForDomain(parameters_, features_.View()));
+  }
+  parameters_.size_samples = sizes_.Take();
+  return absl::OkStatus();
 }
 
 absl::Status CloudReceiver::AcceptParameters(const v1::MeshParameters& message) {
@@ -104,6 +110,17 @@ absl::Status CloudReceiver::AcceptFaces(const v1::FaceOptions& options) {
   WELLSPACE_RETURN_IF_ERROR(CheckFaces(options, first));
   WELLSPACE_RETURN_IF_ERROR(CheckCount(first + options.seeds_size(), "seeds"));
   features_.Append(options);
+  return absl::OkStatus();
+}
+
+absl::Status CloudReceiver::AcceptSizes(const v1::SizeSamples& chunk) {
+  if (!has_parameters_) {
+    return MakeError(v1::ERROR_REASON_PARAMETERS_MISSING,
+                     "size_samples came before the parameters; send the parameters first", "parameters");
+  }
+  WELLSPACE_RETURN_IF_ERROR(CheckSizes(chunk, sizes_.count(), parameters_.dimension, "size_samples"));
+  WELLSPACE_RETURN_IF_ERROR(CheckCount(sizes_.count() + chunk.sizes_size(), "samples of sizes"));
+  sizes_.Append(chunk);
   return absl::OkStatus();
 }
 

@@ -1,4 +1,4 @@
-// What a client sends in one call of MeshPoints or EstimateMesh: parameters, then points, segments and faces.
+// What a client sends in one call of MeshPoints or EstimateMesh: parameters, then points, segments, faces and sizes.
 #ifndef WELLSPACE_SERVER_SERVICES_MESHING_CLOUD_RECEIVER_H_
 #define WELLSPACE_SERVER_SERVICES_MESHING_CLOUD_RECEIVER_H_
 
@@ -12,6 +12,7 @@
 #include "google/protobuf/repeated_field.h"
 #include "server/base/options.h"
 #include "server/sessions/feature_store.h"
+#include "server/sessions/size_store.h"
 #include "wellspace/v1/meshing.pb.h"
 
 namespace wellspace::server {
@@ -40,7 +41,7 @@ class PointChunks {
 // coordinate is looked at or copied.
 //
 // Thread safety: thread-compatible.
-// Invariants: never holds more than options.max_points points, segments or seeds.
+// Invariants: never holds more than options.max_points points, segments, seeds or samples of sizes.
 class CloudReceiver {
  public:
   // REQUIRES:   `options` outlives this.
@@ -49,20 +50,23 @@ class CloudReceiver {
   // Takes over the contents of the next request.
   //
   // Errors:     EMPTY_REQUEST, PARAMETERS_MISSING, PARAMETERS_REPEATED, INVALID_PARAMETERS, INVALID_CHUNK_SHAPE,
-  //             TOO_MANY_POINTS, INVALID_SEGMENTS; the call is to be ended.
+  //             TOO_MANY_POINTS, INVALID_SEGMENTS, INVALID_SIZES; the call is to be ended.
   template <typename Request>
   absl::Status Accept(Request* request);
 
-  // To be called when the client has ended its stream.
+  // To be called when the client has ended its stream: from then on parameters() has the sizes at points.
   //
   // Errors:     PARAMETERS_MISSING; INVALID_PARAMETERS, of those that a domain with segments does not have.
-  absl::Status AcceptEnd() const;
+  absl::Status AcceptEnd();
 
   bool has_parameters() const { return has_parameters_; }
   const core::MeshParameters& parameters() const { return parameters_; }
   uint64_t point_count() const { return point_count_; }
   // Of what it holds.
-  uint64_t held_bytes() const { return points_.coordinate_count() * sizeof(double) + features_.bytes(); }
+  uint64_t held_bytes() const {
+    return points_.coordinate_count() * sizeof(double) + features_.bytes() + sizes_.bytes() +
+           (parameters_.size_samples == nullptr ? 0 : parameters_.size_samples->bytes());
+  }
   // Constant once the client has ended its stream.
   const FeatureStore& features() const { return features_; }
 
@@ -74,6 +78,7 @@ class CloudReceiver {
   absl::Status AcceptPoints(v1::PointChunk* chunk);
   absl::Status AcceptSegments(const v1::SegmentChunk& chunk);
   absl::Status AcceptFaces(const v1::FaceOptions& options);
+  absl::Status AcceptSizes(const v1::SizeSamples& chunk);
   // Checks that `field` may come now.
   absl::Status CheckInDomain(const char* field) const;
   // Checks that this may hold `count` of `what`.
@@ -85,6 +90,7 @@ class CloudReceiver {
   uint64_t point_count_ = 0;
   PointChunks points_;
   FeatureStore features_;
+  SizeStore sizes_;
 };
 
 }  // namespace wellspace::server

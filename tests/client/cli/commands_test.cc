@@ -406,6 +406,41 @@ TEST_F(CommandsTest, CheckHoldsMeshesToTheCriterionAndToSizes) {
   }
 }
 
+TEST_F(CommandsTest, SizesAtPointsAreReadKeptAndChecked) {
+  folder_.Write("sizes.csv", "x,y,h\n0.25,0.25,0.01\n0.75,0.75,0.02\n");
+  const std::string sizes = Path("sizes.csv");
+  const std::vector<std::string> domain = {"--domain", "-1,-1,3,3", "--gradation", "0.2"};
+  std::vector<std::string> options = domain;
+  options.insert(options.end(), {"--size-field", sizes});
+  Mesh(kPlane, "sized.vtu", options);
+  Mesh(kPlane, "plain.vtu", domain);
+  const auto check = [&](const std::string& name, const std::string& gradation) {
+    return RunWellspace({"check", Path(name), "--size-field", sizes, "--gradation", gradation});
+  };
+  EXPECT_EQ(check("sized.vtu", "0.2").exit_code, 0);
+  EXPECT_EQ(check("sized.vtu", "0.05").exit_code, 1);
+  EXPECT_THAT(check("plain.vtu", "0.2").out, HasSubstr("of the size at point "));
+
+  // As lengths of edges they are about a quarter smaller.
+  options.insert(options.end(), {"--size-unit", "edge"});
+  Mesh(kPlane, "edges.vtu", options);
+  EXPECT_EQ(check("edges.vtu", "0.2").exit_code, 0);
+  EXPECT_EQ(
+      RunWellspace({"check", Path("sized.vtu"), "--size-field", sizes, "--gradation", "0.2", "--size-unit", "edge"})
+          .exit_code,
+      1);
+
+  // What is wrong is named by the row of the file.
+  folder_.Write("sizes.csv", "x,y,h\n0.25,0.25,0.01\n5,0.75,0.02\n");
+  EXPECT_THAT(MeshFails("cloud.csv", kPlane, 2, options),
+              HasSubstr("--size-field " + sizes + ":3: size_samples.points[1]: (5, 0.75) lies outside the domain"));
+  folder_.Write("sizes.csv", "x,y,h\n0.25,0.25,0.01\n0.5,0.75,0\n");
+  EXPECT_THAT(MeshFails("cloud.csv", kPlane, 2, options), HasSubstr(sizes + ":3: size 0 is not allowed"));
+  EXPECT_THAT(MeshFails("cloud.csv", kPlane, 2, {"--gradation", "1.5"}), HasSubstr("--gradation: gradation: 1.5 is"));
+  EXPECT_THAT(MeshFails("cloud.csv", kPlane, 2, {"--edge-length", "-1"}), HasSubstr("--edge-length: edge_length: -1"));
+  EXPECT_THAT(MeshFails("cloud.csv", kPlane, 2, {"--size-unit", "edge"}), HasSubstr("--size-unit requires"));
+}
+
 uint32_t BigEndian(const std::string& bytes, size_t at) {
   uint32_t value = 0;
   for (size_t i = 0; i < 4 && at + i < bytes.size(); ++i) {

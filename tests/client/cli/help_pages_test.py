@@ -82,7 +82,7 @@ class CompletionTest(unittest.TestCase):
     def test_options_of_every_command(self):
         for command in leaves():
             self.assertLessEqual(options(command), set(self.complete(*command, "--")), command)
-        self.assertEqual(self.complete("mesh", "in.csv", "--size-"), ["--size-box"])
+        self.assertEqual(self.complete("mesh", "in.csv", "--size-"), ["--size-box", "--size-field", "--size-unit"])
 
     def test_values(self):
         self.assertEqual(self.complete("mesh", "--criterion", ""), ["radius-edge", "well-spaced"])

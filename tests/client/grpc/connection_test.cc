@@ -179,6 +179,8 @@ TEST(Connection, SendsCriterionAndSizes) {
   MeshOptions options = UnitSquare();
   options.criterion = Criterion::kWellSpaced;
   options.max_circumradius = 0.5;
+  options.edge_length = 0.75;
+  options.gradation = 0.25;
   options.size_boxes = {{.low = {0, 0.25}, .high = {1, 2}, .max_circumradius = 0.125},
                         {.low = {3}, .high = {}, .max_circumradius = 0}};
   std::promise<Upload> seen;
@@ -190,6 +192,8 @@ TEST(Connection, SendsCriterionAndSizes) {
   const v1::MeshParameters parameters = seen.get_future().get().parameters;
   EXPECT_EQ(parameters.criterion(), v1::CRITERION_WELL_SPACED);
   EXPECT_EQ(parameters.max_circumradius(), 0.5);
+  EXPECT_EQ(parameters.edge_length(), 0.75);
+  EXPECT_EQ(parameters.gradation(), 0.25);
   ASSERT_EQ(parameters.size_boxes_size(), 2);
   EXPECT_THAT(parameters.size_boxes(0).low(), ElementsAre(0, 0.25));
   EXPECT_THAT(parameters.size_boxes(0).high(), ElementsAre(1, 2));
@@ -197,6 +201,43 @@ TEST(Connection, SendsCriterionAndSizes) {
   // The server judges, not the client.
   EXPECT_THAT(parameters.size_boxes(1).low(), ElementsAre(3));
   EXPECT_TRUE(parameters.size_boxes(1).high().empty());
+}
+
+TEST(Connection, SendsSizesAtPointsInSmallRequests) {
+  MeshOptions options = UnitSquare();
+  auto samples = std::make_shared<SizeSamples>();
+  for (int i = 0; i < 100'001; ++i) {
+    samples->points.insert(samples->points.end(), {0.5 * i, 0.25 * i});
+    samples->sizes.push_back(i + 1);
+  }
+  samples->measure = SizeMeasure::kEdgeLength;
+  options.size_samples = samples;
+  struct Seen {
+    SizeSamples samples;
+    size_t messages = 0;
+    size_t largest = 0;
+  };
+  std::promise<Seen> seen;
+  FakeServer server([&seen](grpc::ServerContext&, Stream& stream) {
+    Seen all;
+    v1::MeshPointsRequest request;
+    while (stream.Read(&request)) {
+      const v1::SizeSamples& chunk = request.size_samples();
+      all.samples.points.insert(all.samples.points.end(), chunk.points().begin(), chunk.points().end());
+      all.samples.sizes.insert(all.samples.sizes.end(), chunk.sizes().begin(), chunk.sizes().end());
+      EXPECT_TRUE(!request.has_size_samples() || chunk.measure() == v1::SIZE_MEASURE_EDGE_LENGTH);
+      all.messages += request.has_size_samples() ? 1 : 0;
+      all.largest = std::max(all.largest, request.ByteSizeLong());
+    }
+    seen.set_value(std::move(all));
+    return grpc::Status(grpc::StatusCode::NOT_FOUND, "");
+  });
+  EXPECT_FALSE(server.Client().MeshPoints(options, {}).ok());
+  const Seen all = seen.get_future().get();
+  EXPECT_EQ(all.samples.points, samples->points);
+  EXPECT_EQ(all.samples.sizes, samples->sizes);
+  EXPECT_GT(all.messages, 1u);
+  EXPECT_LE(all.largest, 1u << 20);
 }
 
 TEST(Connection, LeavesOutTheDomainWhenThereIsNone) {

@@ -21,6 +21,8 @@ FIELDS = {
     "max_circumradius": ("size", 0.25, 0.25),
     "size_boxes": ("size_boxes", [([0, 0, 0], [1, 1, 1], 0.5)],
                    [_api.message("SizeBox")(low=[0, 0, 0], high=[1, 1, 1], max_circumradius=0.5)]),
+    "edge_length": ("edge_length", 0.1, 0.1),
+    "gradation": ("gradation", 0.5, 0.5),
     "min_dihedral": ("min_dihedral", 0, 0.0),
     "pump_weights": ("pump_weights", True, True),
     "merge_distance": ("merge_distance", 1e-3, 1e-3),

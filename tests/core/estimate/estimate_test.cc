@@ -201,17 +201,16 @@ TYPED_TEST(EstimateTest, SizesAloneAskForVerticesByVolume) {
   constexpr int D = TypeParam::kValue;
   const QueryStructure<D> structure = MakeStructure<D>({});
   MeshCriteria<D> demands = RadiusEdge<D>(2);
-  demands.sizes.max_circumradius = 0.04;
+  demands.sizes = SizeField<D>(0.04);
   const double coarse = Estimate<D>(structure, demands).vertices;
-  demands.sizes.max_circumradius = 0.02;
+  demands.sizes = SizeField<D>(0.02);
   const double fine = Estimate<D>(structure, demands).vertices;
   EXPECT_NEAR(fine / coarse, 1 << D, 0.1 * (1 << D));
 
   // A box of a quarter of the volume, and all of the volume.
-  demands.sizes = {};
   Box<D> half = test::UnitBox<D>();
   half.high.fill(0.5);
-  demands.sizes.regions.push_back({half, 0.02});
+  demands.sizes = SizeField<D>(std::numeric_limits<double>::infinity(), {{half, 0.02}});
   const double in_a_box = Estimate<D>(structure, demands).vertices;
   EXPECT_GT(in_a_box, fine / (1 << D));
   EXPECT_LT(in_a_box, fine);
@@ -222,7 +221,7 @@ TYPED_TEST(EstimateTest, SizesLargerThanTheMeshHasAnywayChangeNothing) {
   const QueryStructure<D> structure = MakeStructure<D>(test::SortedCloud<D>("uniform", 500));
   MeshCriteria<D> demands = RadiusEdge<D>(2);
   const double without = Estimate<D>(structure, demands).vertices;
-  demands.sizes.max_circumradius = 10;
+  demands.sizes = SizeField<D>(10);
   EXPECT_NEAR(Estimate<D>(structure, demands).vertices, without, 0.02 * without);
 }
 

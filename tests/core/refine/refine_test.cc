@@ -321,7 +321,7 @@ TYPED_TEST(RefineTest, AssessesTheCellOfACorner) {
 
 TEST(SizeFieldTest, LeastAroundAPointIsTheLeastOfItsBall) {
   constexpr double kFar = 1.7;
-  const SizeField<2> sizes{.max_circumradius = 1.5, .regions = {{{{0, 0}, {1, 1}}, 0.25}, {{{4, 0}, {5, 1}}, 0.5}}};
+  const SizeField<2> sizes(1.5, {{{{0, 0}, {1, 1}}, 0.25}, {{{4, 0}, {5, 1}}, 0.5}});
   test::SplitMix64 random(test::Seed(2008));
   for (int repeat = 0; repeat < 50; ++repeat) {
     const Point<2> x = {8 * random.Unit() - 2, 5 * random.Unit() - 2};

@@ -72,7 +72,8 @@ const std::vector<NamedCheck>& NamedChecks() {
       {"well-spaced",
        [](const Sound& sound, const MeshView& mesh) { return ValidateWellSpaced(mesh, sound.well_spaced_rho); }},
       {"circumcentres", [](const Sound&, const MeshView& mesh) { return ValidateCircumcentres(mesh); }},
-      {"sizing", [](const Sound& sound, const MeshView& mesh) { return ValidateSizing(mesh, sound.largest, {}); }},
+      {"sizing", [](const Sound& sound,
+                    const MeshView& mesh) { return ValidateSizing(mesh, {.max_circumradius = sound.largest}); }},
       {"cloud", [](const Sound& sound, const MeshView& mesh) { return ValidateCloud(mesh, sound.cloud); }},
   };
   return *checks;

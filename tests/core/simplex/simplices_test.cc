@@ -292,8 +292,8 @@ TEST_F(StarsOfRefinementTest, GiveTheSimplicesAfterVerticesWereAdded) {
 }
 
 TEST_F(StarsOfRefinementTest, GiveTheSimplicesOfAllDemandsWithinBudgets) {
-  const SizeField<2> sizes_2{.max_circumradius = 0.1, .regions = {{{{0, 0}, {0.5, 0.5}}, 0.02}}};
-  const SizeField<3> sizes_3{.max_circumradius = 0.25, .regions = {{{{0, 0, 0}, {0.5, 0.5, 0.5}}, 0.1}}};
+  const SizeField<2> sizes_2(0.1, {{{{0, 0}, {0.5, 0.5}}, 0.02}});
+  const SizeField<3> sizes_3(0.25, {{{{0, 0, 0}, {0.5, 0.5, 0.5}}, 0.1}});
   for (const Criterion criterion : {Criterion::kRadiusEdge, Criterion::kWellSpaced}) {
     ExpectThoseOfCellsWithinBudgets<2>({.criterion = criterion, .rho = 2});
     ExpectThoseOfCellsWithinBudgets<2>({.criterion = criterion, .rho = 2, .sizes = sizes_2});

@@ -54,7 +54,7 @@ const std::vector<Check>& AllChecks() {
                              ValidateDelaunay,
                              [](const MeshView& mesh) { return ValidateRadiusEdge(mesh, 2); },
                              [](const MeshView& mesh) { return ValidateWellSpaced(mesh, 2); },
-                             [](const MeshView& mesh) { return ValidateSizing(mesh, 1000, {}); },
+                             [](const MeshView& mesh) { return ValidateSizing(mesh, {.max_circumradius = 1000}); },
                              ValidateCircumcentres,
                              [](const MeshView& mesh) { return ValidateCloud(mesh, mesh.points); },
                              [](const MeshView& mesh) { return ValidateMesh(mesh, {}); }};
@@ -330,13 +330,13 @@ TEST_P(ValidateTest, WellSpaced) {
 TEST_P(ValidateTest, SizingEverywhere) {
   const TestMesh mesh = Grid();
   const double radius = std::sqrt(D()) / 2;
-  EXPECT_TRUE(ValidateSizing(mesh.View(), 0, {}).ok());
-  EXPECT_TRUE(ValidateSizing(mesh.View(), radius * (1 - 0.9e-9), {}).ok());
+  EXPECT_TRUE(ValidateSizing(mesh.View(), {.max_circumradius = 0}).ok());
+  EXPECT_TRUE(ValidateSizing(mesh.View(), {.max_circumradius = radius * (1 - 0.9e-9)}).ok());
   const auto too_large = Violates(AllOf(HasSubstr("simplex 0 ("), HasSubstr("has circumradius ")));
-  EXPECT_THAT(ValidateSizing(mesh.View(), radius * (1 - 1.1e-9), {}), too_large);
+  EXPECT_THAT(ValidateSizing(mesh.View(), {.max_circumradius = radius * (1 - 1.1e-9)}), too_large);
   EXPECT_THAT(ValidateMesh(mesh.View(), {.max_circumradius = radius * 0.99}), too_large);
   for (const double bad : {-1.0, kNaN, kInfinity}) {
-    EXPECT_THAT(ValidateSizing(mesh.View(), bad, {}), Refuses("max_circumradius is "));
+    EXPECT_THAT(ValidateSizing(mesh.View(), {.max_circumradius = bad}), Refuses("max_circumradius is "));
   }
 }
 
@@ -348,14 +348,14 @@ TEST_P(ValidateTest, SizingInBoxes) {
   box.low.assign(static_cast<size_t>(D()), 0.25);
   box.high.assign(static_cast<size_t>(D()), 0.75);
   box.max_circumradius = radius * (1 - 0.9e-9);
-  EXPECT_TRUE(ValidateSizing(mesh.View(), 0, {&box, 1}).ok());
+  EXPECT_TRUE(ValidateSizing(mesh.View(), {.boxes = {&box, 1}}).ok());
   box.max_circumradius = radius * (1 - 1.1e-9);
   const auto too_large =
       Violates(AllOf(HasSubstr("simplex 0 ("), HasSubstr("of size box 1, at a distance of 0 from it")));
   SizeBox harmless = box;
   harmless.max_circumradius = 100;
   const std::vector<SizeBox> boxes = {harmless, box};
-  EXPECT_THAT(ValidateSizing(mesh.View(), 0, boxes), too_large);
+  EXPECT_THAT(ValidateSizing(mesh.View(), {.boxes = boxes}), too_large);
   EXPECT_THAT(ValidateMesh(mesh.View(), {.size_boxes = boxes}), too_large);
 
   // A box outside the mesh, far along the first axis, that the balls of the nearest cells just do not, or do, meet.
@@ -366,9 +366,11 @@ TEST_P(ValidateTest, SizingInBoxes) {
   outside.max_circumradius = 1e-3;
   outside.high[0] = 100;
   outside.low[0] = middle + radius * (1 - 0.9e-9);
-  EXPECT_TRUE(ValidateSizing(mesh.View(), 0, {&outside, 1}).ok()) << ValidateSizing(mesh.View(), 0, {&outside, 1});
+  EXPECT_TRUE(ValidateSizing(mesh.View(), {.boxes = {&outside, 1}}).ok())
+      << ValidateSizing(mesh.View(), {.boxes = {&outside, 1}});
   outside.low[0] = middle + radius * (1 - 1.1e-9);
-  EXPECT_THAT(ValidateSizing(mesh.View(), 0, {&outside, 1}), Violates(HasSubstr("of size box 0, at a distance of ")));
+  EXPECT_THAT(ValidateSizing(mesh.View(), {.boxes = {&outside, 1}}),
+              Violates(HasSubstr("of size box 0, at a distance of ")));
 }
 
 TEST_P(ValidateTest, SizeBoxesThatAreNone) {
@@ -377,19 +379,19 @@ TEST_P(ValidateTest, SizeBoxesThatAreNone) {
   good.low.assign(static_cast<size_t>(D()), 0);
   good.high.assign(static_cast<size_t>(D()), 1);
   good.max_circumradius = 100;
-  EXPECT_TRUE(ValidateSizing(mesh.View(), 0, {&good, 1}).ok());
+  EXPECT_TRUE(ValidateSizing(mesh.View(), {.boxes = {&good, 1}}).ok());
   SizeBox bad = good;
   bad.high.pop_back();
-  EXPECT_THAT(ValidateSizing(mesh.View(), 0, {&bad, 1}), Refuses("size box 0 has corners of "));
+  EXPECT_THAT(ValidateSizing(mesh.View(), {.boxes = {&bad, 1}}), Refuses("size box 0 has corners of "));
   bad = good;
   bad.low[1] = 2;
-  EXPECT_THAT(ValidateSizing(mesh.View(), 0, {&bad, 1}), Refuses("size box 0 reaches from 2 to 1 on axis 1"));
+  EXPECT_THAT(ValidateSizing(mesh.View(), {.boxes = {&bad, 1}}), Refuses("size box 0 reaches from 2 to 1 on axis 1"));
   bad.low[1] = kNaN;
-  EXPECT_THAT(ValidateSizing(mesh.View(), 0, {&bad, 1}), Refuses("size box 0 reaches from nan to 1 on axis 1"));
+  EXPECT_THAT(ValidateSizing(mesh.View(), {.boxes = {&bad, 1}}), Refuses("size box 0 reaches from nan to 1 on axis 1"));
   for (const double bound : {0.0, -1.0, kNaN, kInfinity}) {
     bad = good;
     bad.max_circumradius = bound;
-    EXPECT_THAT(ValidateSizing(mesh.View(), 0, {&bad, 1}), Refuses("size box 0: max_circumradius is "));
+    EXPECT_THAT(ValidateSizing(mesh.View(), {.boxes = {&bad, 1}}), Refuses("size box 0: max_circumradius is "));
   }
 }
 

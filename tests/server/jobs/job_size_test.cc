@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include "gtest/gtest.h"
@@ -27,6 +28,24 @@ TEST(IsSmallMesh, ByTheNumberOfPoints) {
   EXPECT_TRUE(IsSmallMesh(UnitBox(4), UniformPoints(100, 4, 1)));
   EXPECT_FALSE(IsSmallMesh(UnitBox(4), UniformPoints(5'000, 4, 1)));
   EXPECT_FALSE(IsSmallMesh(UnitBox(6), UniformPoints(300, 6, 1)));
+}
+
+TEST(IsSmallMesh, BySizesAtPointsAndLengthsOfEdges) {
+  core::MeshParameters parameters = UnitBox(3);
+  parameters.edge_length = 0.3;
+  EXPECT_TRUE(IsSmallMesh(parameters, {}));
+  parameters.edge_length = 0.01;
+  EXPECT_FALSE(IsSmallMesh(parameters, {}));
+  parameters.edge_length = 0;
+  const auto with = [&parameters](size_t count, double size) {
+    parameters.size_samples =
+        std::make_shared<core::SizeSamples>(core::SizeSamples{UniformPoints(count, 3, 1), std::vector(count, size)});
+    return IsSmallMesh(parameters, {});
+  };
+  EXPECT_TRUE(with(100, 0.3));
+  EXPECT_FALSE(with(100, 0.01));
+  EXPECT_FALSE(with(100, 1e-300));
+  EXPECT_FALSE(with(60'000, 10));
 }
 
 TEST(IsSmallMesh, ByTheSizesInTheBox) {

@@ -56,7 +56,7 @@ TEST_P(ExtremeRequests, EndWithCountsOrARefusal) {
   for (const v1::Criterion criterion : {v1::CRITERION_RADIUS_EDGE, v1::CRITERION_WELL_SPACED}) {
     for (int exponent = -1074 + dimension; exponent <= 1023; exponent += dimension < 4 ? 67 : 263) {
       const double x = std::ldexp(1.0, exponent);
-      std::vector<v1::MeshParameters> requests(6, InTheUnitBox(dimension));
+      std::vector<v1::MeshParameters> requests(8, InTheUnitBox(dimension));
       requests[0].set_max_circumradius(x);
       requests[1].set_rho(x);
       for (int k = 2; k < 4; ++k) {
@@ -70,6 +70,10 @@ TEST_P(ExtremeRequests, EndWithCountsOrARefusal) {
         requests[k].mutable_domain()->mutable_high()->Resize(dimension, x);
         requests[k].set_max_circumradius(k == 4 ? 1 : 0);
       }
+      requests[6].set_edge_length(x);
+      requests[7] = requests[2];
+      requests[7].mutable_size_boxes(0)->set_max_circumradius(0.5);
+      requests[7].set_gradation(x);
       for (v1::MeshParameters& parameters : requests) {
         parameters.set_criterion(criterion);
         v1::EstimateMeshResponse estimate;

@@ -51,6 +51,8 @@ TEST(ParametersFromProto, FillsInDefaults) {
   EXPECT_EQ(parameters->criterion, core::Criterion::kRadiusEdge);
   EXPECT_EQ(parameters->max_circumradius, 0);
   EXPECT_TRUE(parameters->size_boxes.empty());
+  EXPECT_EQ(parameters->edge_length, 0);
+  EXPECT_EQ(parameters->gradation, 0);
   EXPECT_FALSE(parameters->min_dihedral.has_value());
   EXPECT_FALSE(parameters->pump_weights);
   EXPECT_EQ(parameters->merge_distance, 0);
@@ -67,6 +69,8 @@ TEST(ParametersFromProto, TakesEveryField) {
   message.set_max_circumradius(0.5);
   AddSizeBox(message, 0.25, 0.75, 0.125);
   AddSizeBox(message, -1, 2, 0.25);
+  message.set_edge_length(0.375);
+  message.set_gradation(0.25);
   message.set_min_dihedral(0);
   message.set_pump_weights(true);
   message.set_merge_distance(1e-9);
@@ -86,6 +90,10 @@ TEST(ParametersFromProto, TakesEveryField) {
   EXPECT_THAT(parameters->size_boxes[0].high, ElementsAre(0.75, 0.75, 0.75));
   EXPECT_EQ(parameters->size_boxes[0].max_circumradius, 0.125);
   EXPECT_EQ(parameters->size_boxes[1].max_circumradius, 0.25);
+  EXPECT_EQ(parameters->edge_length, 0.375);
+  EXPECT_EQ(ParametersToProto(*parameters).edge_length(), 0.375);
+  EXPECT_EQ(parameters->gradation, 0.25);
+  EXPECT_EQ(ParametersToProto(*parameters).gradation(), 0.25);
   EXPECT_EQ(parameters->min_dihedral, 0.0);
   EXPECT_TRUE(parameters->pump_weights);
   EXPECT_EQ(parameters->merge_distance, 1e-9);
@@ -192,6 +200,10 @@ INSTANTIATE_TEST_SUITE_P(
                       [](auto& p) { p.set_max_circumradius(std::nan("")); }},
         BadParameters{"CircumradiusInfinite", "parameters.max_circumradius",
                       [](auto& p) { p.set_max_circumradius(kInfinity); }},
+        BadParameters{"EdgeLengthNegative", "parameters.edge_length", [](auto& p) { p.set_edge_length(-1); }},
+        BadParameters{"EdgeLengthNan", "parameters.edge_length", [](auto& p) { p.set_edge_length(std::nan("")); }},
+        BadParameters{"GradationAboveOne", "parameters.gradation", [](auto& p) { p.set_gradation(1.5); }},
+        BadParameters{"GradationNan", "parameters.gradation", [](auto& p) { p.set_gradation(std::nan("")); }},
         BadParameters{"SizeBoxInverted", "parameters.size_boxes[2].high[1]",
                       [](auto& p) {
                         AddSizeBox(p, 0, 1, 0.5);

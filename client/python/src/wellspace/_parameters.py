@@ -37,7 +37,12 @@ class Parameters(TypedDict, total=False):
         No simplex has a larger circumradius. In the unit of the points. Default: no bound.
     size_boxes : sequence of (low, high, size)
         Boxes with `d` low and `d` high coordinates in which circumradii are smaller still; away from a box, sizes grow
-        no faster than the distance from it. In the unit of the points. Default: none.
+        no faster than `gradation` times the distance from it. In the unit of the points. Default: none.
+    edge_length : float
+        Edges have this length, on average where points ask for no shorter ones: a `size` of 0.733 times as much in 2-D,
+        0.747 in 3-D. Of both, the smaller holds. In the unit of the points. Default: no bound.
+    gradation : float
+        How fast sizes grow with the distance from `size_boxes`: above 0 and at most 1. Default: 1.
     min_dihedral : float
         In 3-D, no dihedral angle of a tetrahedron is smaller: vertices are moved, and some added, until that holds.
         What cannot be repaired is counted in ``statistics.slivers.left``. Degrees, from 0 to 18; 0 turns it off.
@@ -70,6 +75,8 @@ class Parameters(TypedDict, total=False):
     min_angle: float
     size: float
     size_boxes: Iterable[tuple[Sequence[float], Sequence[float], float]]
+    edge_length: float
+    gradation: float
     min_dihedral: float
     pump_weights: bool
     merge_distance: float
@@ -84,6 +91,8 @@ class Parameters(TypedDict, total=False):
 _NUMBERS = {
     "rho": "rho",
     "size": "max_circumradius",
+    "edge_length": "edge_length",
+    "gradation": "gradation",
     "min_dihedral": "min_dihedral",
     "merge_distance": "merge_distance",
     "margin": "margin",

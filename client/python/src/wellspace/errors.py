@@ -21,6 +21,8 @@ _ARGUMENTS = {
     "criterion": "criterion",
     "max_circumradius": "size",
     "size_boxes": "size_boxes",
+    "edge_length": "edge_length",
+    "gradation": "gradation",
     "min_dihedral": "min_dihedral",
     "pump_weights": "pump_weights",
     "merge_distance": "merge_distance",

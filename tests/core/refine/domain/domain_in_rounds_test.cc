@@ -119,7 +119,7 @@ struct Refined {
     EXPECT_TRUE(structure.Initialize(made->cloud.grid, std::move(made->cloud.points), kMany, 1, context).ok());
     refinement = std::make_unique<Refinement<2>>(structure, made->domain.MinEdge(), planar.get());
     MeshCriteria<2> criteria{.rho = rho};
-    criteria.sizes.max_circumradius = size * made->domain.scale;
+    criteria.sizes = SizeField<2>(size * made->domain.scale);
     const absl::Status status = refinement->Run(criteria, kMany, threads, context);
     EXPECT_TRUE(status.ok()) << status;
   }

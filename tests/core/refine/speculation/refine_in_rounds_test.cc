@@ -123,12 +123,12 @@ TEST_P(RefineInRoundsTest, IsTheSameForAnyNumberOfThreadsAndHoweverOftenItIsStop
   MeshCriteria<2> tight = PlainCriteria();
   tight.rho = 1;
   MeshCriteria<2> sized = PlainCriteria();
-  sized.sizes = {.max_circumradius = 0.02, .regions = {{{{0.2, 0.3}, {0.4, 0.5}}, 0.004}}};
+  sized.sizes = SizeField<2>(0.02, {{{{0.2, 0.3}, {0.4, 0.5}}, 0.004}});
   MeshCriteria<2> well_spaced = PlainCriteria();
   well_spaced.criterion = Criterion::kWellSpaced;
   for (const MeshCriteria<2>& criteria : {PlainCriteria(), tight, sized, well_spaced}) {
     SCOPED_TRACE(criteria.rho);
-    SCOPED_TRACE(criteria.sizes.max_circumradius);
+    SCOPED_TRACE(criteria.sizes.max_circumradius());
     ExpectSameHoweverItIsRun<2>(cloud_, criteria, 200, random_);
     ASSERT_FALSE(HasFatalFailure());
   }

@@ -1,0 +1,73 @@
+#include "client/cli/size_field_options.h"
+
+#include <charconv>
+#include <cstdint>
+#include <string_view>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "client/cli/options.h"
+#include "client/formats/read_sizes.h"
+#include "core/base/status_macros.h"
+
+namespace wellspace::cli {
+namespace {
+
+constexpr char kRadius[] = "radius";
+constexpr char kEdge[] = "edge";
+
+}  // namespace
+
+CLI::Option* AddGradation(CLI::App& command, double& gradation) {
+  return AddNumber(command, "--gradation", gradation,
+                   "How fast sizes, as circumradii, grow with the distance from boxes and points that have one, up to "
+                   "1; default: 1 from boxes, 0.3 from points");
+}
+
+void SizeFieldOptions::AddTo(CLI::App& command) {
+  CLI::Option* field =
+      command
+          .add_option("--size-field", path_,
+                      "File of points with a size each, from which sizes grow by --gradation: .csv and the like with "
+                      "columns x, y, (z,) h; or .vtu, .msh, .npz with h at their points")
+          ->type_name("FILE");
+  command
+      .add_option_function<std::string>(
+          "--size-unit",
+          [this](const std::string& name) {
+            measure_ = name == kEdge ? client::SizeMeasure::kEdgeLength : client::SizeMeasure::kCircumradius;
+          },
+          "What the sizes of --size-field are: radius, bounds on circumradii; or edge, lengths of edges as of "
+          "--edge-length; default: radius")
+      ->check(CLI::IsMember({kRadius, kEdge}))
+      ->needs(field);
+}
+
+void SizeFieldOptions::AddFilesTo(formats::FilePlan& files) const { files.Reads("--size-field", path_); }
+
+absl::StatusOr<std::shared_ptr<const client::SizeSamples>> SizeFieldOptions::Read(int dimension) {
+  if (path_.empty()) {
+    return nullptr;
+  }
+  WELLSPACE_ASSIGN_OR_RETURN(formats::SizedPoints read, formats::ReadSizes(path_, dimension));
+  auto samples = std::make_shared<client::SizeSamples>();
+  samples->points = std::exchange(read.cloud.points, {});
+  samples->sizes = std::move(read.sizes);
+  samples->measure = measure_;
+  origins_ = std::move(read.cloud);
+  return samples;
+}
+
+absl::Status SizeFieldOptions::WithOrigins(const absl::Status& status) const {
+  const std::string_view message(status.message().data(), status.message().size());
+  for (const std::string_view prefix : {"size_samples.points[", "size_samples.sizes["}) {
+    uint64_t index = 0;
+    if (message.substr(0, prefix.size()) == prefix &&
+        std::from_chars(message.data() + prefix.size(), message.data() + message.size(), index).ec == std::errc()) {
+      return absl::Status(status.code(), absl::StrCat("--size-field ", origins_.Origin(index), ": ", status.message()));
+    }
+  }
+  return status;
+}
+
+}  // namespace wellspace::cli

@@ -1,0 +1,38 @@
+// Sizes at points from files.
+//
+// Formats:
+//   csv   A table as in read_cloud.h, of coordinates and a size. With a header the sizes are the column "h" or "size",
+//         in any case; the others are the coordinates, or those among them that have names of coordinates. Without a
+//         header the last column has the sizes.
+//   vtu   As in read_mesh.h, with point data "h".
+//   msh   The same, with $NodeData "h".
+//   npz   The same, with an array `h`; `simplices` may be missing.
+// Tables may be compressed by gzip.
+#ifndef WELLSPACE_CLIENT_FORMATS_READ_SIZES_H_
+#define WELLSPACE_CLIENT_FORMATS_READ_SIZES_H_
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "client/formats/cloud.h"
+
+namespace wellspace::formats {
+
+// Points with a size each.
+struct SizedPoints {
+  PointCloud cloud;           // of the points; its origins say where each was read
+  std::vector<double> sizes;  // of each, above 0 and finite
+};
+
+// Reads the sizes of `path` at points of `dimension`, in the order of the file.
+//
+// Complexity: one pass over the file; memory for all.
+// Errors:     of opening and reading; INVALID_ARGUMENT "FILE:LINE: …" or "FILE[POINT]: …" for what are no sizes at
+//             finite points of this dimension, and for a file without any.
+absl::StatusOr<SizedPoints> ReadSizes(const std::string& path, int dimension);
+
+}  // namespace wellspace::formats
+
+#endif  // WELLSPACE_CLIENT_FORMATS_READ_SIZES_H_

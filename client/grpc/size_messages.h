@@ -1,0 +1,19 @@
+// Sizes at points as messages. Private to this folder.
+#ifndef WELLSPACE_CLIENT_GRPC_SIZE_MESSAGES_H_
+#define WELLSPACE_CLIENT_GRPC_SIZE_MESSAGES_H_
+
+#include <cstddef>
+
+#include "client/types.h"
+#include "wellspace/v1/mesh.pb.h"
+
+namespace wellspace::client {
+
+// Makes `chunk` hold the samples from number `first` on, as many as a message of 1 MiB holds. Returns the
+// number after the last. What has other than `dimension` coordinates for each size goes as it is, in one message: the
+// server refuses it.
+size_t FillSizes(const SizeSamples& samples, int dimension, size_t first, v1::SizeSamples& chunk);
+
+}  // namespace wellspace::client
+
+#endif  // WELLSPACE_CLIENT_GRPC_SIZE_MESSAGES_H_
