@@ -69,9 +69,9 @@ struct WorkResult {
 // touched by nothing else;
 // (3) what did not succeed leaves the session as it was: structure and mesh are what Replay makes of the steps, whether
 // there is a mesher now or not; (4) the lock order is change_mutex_, this session's mutex, then that of an operation,
-// of TenantPoints or, where memory is released, of the JobPool; (5) nobody is told of a change, and nothing shows it,
-// before the log has it; one that it cannot have is not made. Functions that change the session wait for the log: they
-// are to be called where that holds up no other work.
+// of TenantPoints or, where memory is released, of the JobPool; (5) no client is told of a change, and nothing shows
+// it, before the log has it; one that it cannot have is not made. Functions that change the session wait for the log:
+// they are to be called where that holds up no other work.
 class Session {
  public:
   struct Settings {
