@@ -112,9 +112,7 @@ absl::Status Session::Append(uint64_t offset, std::span<const double> coordinate
     uncommitted_crc32c_ = ExtendCrc32c(uncommitted_crc32c_, coordinates.data(), coordinates.size_bytes());
     return absl::OkStatus();
   }
-  committed_points_ = PointCount();
-  is_ready_ = false;
-  ++revision_;
+  NotePoints(PointCount());
   return absl::OkStatus();
 }
 
@@ -143,20 +141,14 @@ absl::Status Session::CommitPoints() {
   }
   absl::Status status = points_->Synchronize();
   if (status.ok()) {
-    status = Commit([&](SessionChange& change) {
-      AddPointsTo(change, end, crc32c);
-      change.state->set_revision(change.state->revision() + 1);
-      change.state->set_is_ready(false);
-    });
+    status = CommitState([&](SessionChange& change) { AddPointsTo(change, end, crc32c); });
   }
   std::lock_guard lock(mutex_);
   if (!status.ok()) {
     DropUncommitted();
     return status;
   }
-  committed_points_ = end;
-  is_ready_ = false;
-  ++revision_;
+  NotePoints(end);
   return absl::OkStatus();
 }
 
