@@ -137,9 +137,6 @@ bool Session::CloseIfExpired() {
 void Session::CloseNow() {
   is_closed_ = true;
   point_account_.Close();
-  if (work_.mesh != nullptr) {
-    work_.mesh->MakeObsolete();
-  }
 }
 
 void Session::BeginBusy(Busy busy) {

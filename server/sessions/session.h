@@ -164,7 +164,8 @@ class Session {
   // Errors:     INVALID_CHUNK_SHAPE, INVALID_POINTS, UPLOAD_GAP, UPLOAD_MISMATCH, SESSION_BUSY, TOO_MANY_POINTS,
   //             QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH, SESSION_NOT_FOUND. Nothing has been appended.
   absl::Status Append(uint64_t offset, std::span<const double> coordinates, uint64_t expected_revision);
-  // Makes all points that were appended the session's, for good. On an error those that are not are dropped.
+  // Makes all points that were appended the session's, for good. On an error those that are not are dropped, unless
+  // vertices are being added, which come behind them.
   absl::Status CommitPoints();
   // Bytes of points that are appended and not committed.
   uint64_t UncommittedBytes() const;

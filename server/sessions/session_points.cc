@@ -133,8 +133,8 @@ absl::Status Session::CommitPoints() {
   uint32_t crc32c = 0;
   {
     std::lock_guard lock(mutex_);
-    if (busy_ == Busy::kAddingVertices || !HasUncommitted()) {
-      return absl::OkStatus();  // an addition commits these points with its own
+    if (!HasUncommitted()) {
+      return absl::OkStatus();
     }
     end = PointCount();
     crc32c = std::exchange(uncommitted_crc32c_, 0);  // from now on, of the points behind these
@@ -145,7 +145,11 @@ absl::Status Session::CommitPoints() {
   }
   std::lock_guard lock(mutex_);
   if (!status.ok()) {
-    DropUncommitted();
+    if (busy_ == Busy::kAddingVertices) {
+      uncommitted_crc32c_ = crc32c;  // the mesher takes these points in; the addition tries to commit them, too
+    } else {
+      DropUncommitted();
+    }
     return status;
   }
   NotePoints(end);
