@@ -93,12 +93,11 @@ absl::Status Backend::Restore() {
   for (const StoredSession& one : stored.sessions) {
     absl::StatusOr<std::shared_ptr<Session>> session = sessions_.Restore(one);
     if (!session.ok()) {  // others are not to suffer from it
-      log_->error(
-          LogFields()
-              .Add("event", "session_not_restored")
-              .Add("session", one.state.name())
-              .Add("error", std::string_view(session.status().message().data(), session.status().message().size()))
-              .text());
+      log_->error(LogFields()
+                      .Add("event", "session_not_restored")
+                      .Add("session", one.state.name())
+                      .Add("error", std::string(session.status().message()))
+                      .text());
       continue;
     }
     WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Operation> operation, (*session)->ResumeOperation());
@@ -135,13 +134,15 @@ void Backend::RemoveExpired() {
 void Backend::RemoveGarbage() {
   blocking_.Run("", [this] {
     const absl::StatusOr<Garbage> garbage = session_log_->RemoveGarbage();
-    if (garbage.ok()) {
-      for (const std::string& path : garbage->removed) {
-        log_->info(LogFields().Add("event", "file_removed").Add("path", path).text());
-      }
-      for (const std::string& path : garbage->unknown) {
-        log_->warn(LogFields().Add("event", "unknown_file").Add("path", path).text());
-      }
+    if (!garbage.ok()) {
+      log_->warn(LogFields().Add("event", "garbage_left").Add("error", std::string(garbage.status().message())).text());
+      return;
+    }
+    for (const std::string& path : garbage->removed) {
+      log_->info(LogFields().Add("event", "file_removed").Add("path", path).text());
+    }
+    for (const std::string& path : garbage->unknown) {
+      log_->warn(LogFields().Add("event", "unknown_file").Add("path", path).text());
     }
   });
   background_.PostAfter(kGarbageInterval, [this] { RemoveGarbage(); });

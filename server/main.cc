@@ -194,15 +194,12 @@ absl::StatusOr<std::unique_ptr<DurableLog>> OpenSessionLog(const Flags& flags,
   if (flags.data.empty() || flags.is_ephemeral) {
     return nullptr;
   }
-  return DurableLog::Open({.folder = flags.data, .on_failure = [log](const absl::Status& cause) {
-                             const absl::string_view message = cause.message();
-                             log->critical(LogFields()
-                                               .Add("event", "store_failed")
-                                               .Add("error", std::string_view(message.data(), message.size()))
-                                               .text());
-                             log->flush();
-                             _exit(1);
-                           }});
+  return DurableLog::Open(
+      {.folder = flags.data, .on_failure = [log](const absl::Status& cause) {
+         log->critical(LogFields().Add("event", "store_failed").Add("error", std::string(cause.message())).text());
+         log->flush();
+         _exit(1);
+       }});
 }
 
 // SIGTERM and SIGINT, blocked in this thread and all that it starts later, to be waited for.

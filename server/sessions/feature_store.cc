@@ -71,6 +71,14 @@ absl::Status CheckSeed(const v1::FaceSeed& seed, uint64_t number) {
 
 }  // namespace
 
+void SetFeatures(const FeatureSummary& summary, store::v1::SessionRecord& record) {
+  record.set_segments(summary.segments);
+  record.set_seeds(summary.seeds);
+  record.set_has_rules(summary.has_rules);
+  record.set_faces(summary.faces);
+  record.set_crossings(summary.crossings);
+}
+
 absl::Status NotInThePlane(const char* field, int dimension) {
   return MakeError(v1::ERROR_REASON_INVALID_SEGMENTS,
                    absl::StrCat(field, " bound domains in 2-D alone, and parameters.dimension is ", dimension), field);
@@ -165,22 +173,14 @@ bool FeatureStore::HasOtherRules(const v1::FaceOptions& options) const {
   return IsEmpty() || rule != faces_ || RuleFromProto(options.crossings()) != crossings_;
 }
 
-FeatureStore::Extent FeatureStore::extent() const {
-  return {.segments = segment_count(),
-          .seeds = seed_count(),
-          .has_rules = has_rules_,
-          .faces = faces_,
-          .crossings = crossings_};
-}
-
-void FeatureStore::TakeBack(const Extent& extent) {
-  ends_.resize(2 * extent.segments);
-  markers_.resize(extent.segments);
-  is_open_.resize(extent.segments);
-  seeds_.resize(extent.seeds);
-  has_rules_ = extent.has_rules;
-  faces_ = extent.faces;
-  crossings_ = extent.crossings;
+void FeatureStore::TakeBack(const FeatureSummary& before) {
+  ends_.resize(2 * before.segments);
+  markers_.resize(before.segments);
+  is_open_.resize(before.segments);
+  seeds_.resize(before.seeds);
+  has_rules_ = before.has_rules;
+  (void)RuleFromProto(before.faces, &faces_);
+  crossings_ = RuleFromProto(before.crossings);
 }
 
 FeatureSummary FeatureStore::Summary() const {

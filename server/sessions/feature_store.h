@@ -7,6 +7,7 @@
 
 #include "absl/status/status.h"
 #include "core/features/features.h"
+#include "wellspace/store/v1/records.pb.h"
 #include "wellspace/v1/mesh.pb.h"
 
 namespace wellspace::server {
@@ -32,21 +33,15 @@ struct FeatureSummary {
   v1::CrossingRule crossings = v1::CROSSING_RULE_UNSPECIFIED;
 };
 
+// Writes it down in `record`.
+void SetFeatures(const FeatureSummary& summary, store::v1::SessionRecord& record);
+
 // Segments, seeds and rules that grow at the end.
 //
 // Thread safety: thread-compatible.
 // Invariants: what is appended has passed CheckSegments or CheckFaces.
 class FeatureStore {
  public:
-  // How much there is, and which rules.
-  struct Extent {
-    size_t segments = 0;
-    size_t seeds = 0;
-    bool has_rules = false;
-    core::FaceRule faces = core::FaceRule::kBox;
-    core::CrossingRule crossings = core::CrossingRule::kRefuse;
-  };
-
   // Appends the segments of `chunk` but for the first `known`. An exception, when memory ends, changes nothing.
   //
   // REQUIRES:   known is at most their number.
@@ -54,9 +49,8 @@ class FeatureStore {
   // The same of seeds. The rules are from now on those of `options`.
   void Append(const v1::FaceOptions& options, uint64_t known = 0);
 
-  Extent extent() const;
-  // Takes out again what was appended since.
-  void TakeBack(const Extent& extent);
+  // Takes out again what was appended since Summary() was `before`.
+  void TakeBack(const FeatureSummary& before);
 
   // How many of the segments of `chunk`, of the first `count` at most, are those from number `first` on: all of these,
   // or those before the first that is another.

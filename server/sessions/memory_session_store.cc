@@ -32,7 +32,7 @@ MemorySessionStore::MemorySessionStore(const ServiceOptions& options, MemoryBudg
 absl::StatusOr<std::shared_ptr<Session>> MemorySessionStore::Create(NewSession settings,
                                                                     const AnswerTo<v1::Session>& answer) {
   WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, Prepare(std::move(settings)));
-  absl::Status logged = session->LogCreation(answer);  // without any lock: it takes long
+  absl::Status logged = RunGuarded([&] { return session->LogCreation(answer); });  // without a lock: it takes long
   std::lock_guard lock(mutex_);
   --tenants_[session->tenant()].pending;
   --pending_;

@@ -172,6 +172,11 @@ void Tick(Background& background, const std::weak_ptr<Operation>& weak) {
   }
 }
 
+// Makes events of the progress of `operation` until its end.
+void StartTicking(Background& background, const std::shared_ptr<Operation>& operation) {
+  background.Post([&background, weak = std::weak_ptr(operation)] { Tick(background, weak); });
+}
+
 // Submits the work of `operation`, which has the session.
 absl::StatusOr<std::shared_ptr<Job>> Submit(const CallEnvironment& environment, const std::shared_ptr<Session>& session,
                                             const std::shared_ptr<Operation>& operation) {
@@ -241,16 +246,14 @@ absl::StatusOr<std::shared_ptr<Operation>> StartRefinement(const CallEnvironment
     }
     return operation;
   }
-  environment.background.Post(
-      [&background = environment.background, weak = std::weak_ptr(*operation)] { Tick(background, weak); });
+  StartTicking(environment.background, *operation);
   return operation;
 }
 
 void ResumeRefinements(const CallEnvironment& environment, std::vector<ResumedOperation> resumed) {
   const auto suspects = std::make_shared<std::deque<ResumedOperation>>();
   for (ResumedOperation& one : resumed) {
-    environment.background.Post(
-        [&background = environment.background, weak = std::weak_ptr(one.operation)] { Tick(background, weak); });
+    StartTicking(environment.background, one.operation);
     if (one.operation->IsSuspect()) {
       suspects->push_back(std::move(one));
     } else {

@@ -92,8 +92,8 @@ absl::Status Session::Update(std::optional<std::map<std::string, std::string>> l
     WELLSPACE_RETURN_IF_ERROR(CheckRevision(expected_revision));
     described = DescribeWith(labels.value_or(labels_), ttl.value_or(lease_.ttl()));
   }
-  const std::optional<store::v1::AnswerRecord> answer_record = answer == nullptr ? std::nullopt : answer(described);
-  WELLSPACE_RETURN_IF_ERROR(Commit([&](SessionChange& change) {
+  const std::optional<store::v1::AnswerRecord> answer_record = AnswerRecordOf(answer, described);
+  WELLSPACE_RETURN_IF_ERROR(CommitState([&](SessionChange& change) {
     *change.state->mutable_labels() = described.labels();
     change.state->set_ttl_ns(absl::ToInt64Nanoseconds(ttl.value_or(lease_.ttl())));
     change.answer = answer_record;
@@ -117,7 +117,6 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::Close(uint64_t expected_revi
     WELLSPACE_RETURN_IF_ERROR(CheckRevision(expected_revision));
   }
   WELLSPACE_RETURN_IF_ERROR(Commit([&](SessionChange& change) {
-    change.state.reset();
     change.is_deletion = true;
     change.answer = answer;
   }));
@@ -138,9 +137,6 @@ bool Session::CloseIfExpired() {
 void Session::CloseNow() {
   is_closed_ = true;
   point_account_.Close();
-  if (work_.mesh != nullptr) {
-    work_.mesh->MakeObsolete();
-  }
 }
 
 void Session::BeginBusy(Busy busy) {

@@ -42,6 +42,12 @@ namespace wellspace::server {
 template <typename T>
 using AnswerTo = std::function<std::optional<store::v1::AnswerRecord>(const T&)>;
 
+// Nothing where `answer` is null.
+template <typename T>
+std::optional<store::v1::AnswerRecord> AnswerRecordOf(const AnswerTo<T>& answer, const T& with) {
+  return answer == nullptr ? std::nullopt : answer(with);
+}
+
 // What AddVertices did.
 struct AddedVertices {
   std::vector<uint32_t> vertices;  // by point
@@ -69,9 +75,9 @@ struct WorkResult {
 // touched by nothing else;
 // (3) what did not succeed leaves the session as it was: structure and mesh are what Replay makes of the steps, whether
 // there is a mesher now or not; (4) the lock order is change_mutex_, this session's mutex, then that of an operation,
-// of TenantPoints or, where memory is released, of the JobPool; (5) nobody is told of a change, and nothing shows it,
-// before the log has it; one that it cannot have is not made. Functions that change the session wait for the log: they
-// are to be called where that holds up no other work.
+// of TenantPoints or, where memory is released, of the JobPool; (5) no client is told of a change, and nothing shows
+// it, before the log has it; one that it cannot have is not made. Functions that change the session wait for the log:
+// they are to be called where that holds up no other work.
 class Session {
  public:
   struct Settings {
@@ -158,7 +164,8 @@ class Session {
   // Errors:     INVALID_CHUNK_SHAPE, INVALID_POINTS, UPLOAD_GAP, UPLOAD_MISMATCH, SESSION_BUSY, TOO_MANY_POINTS,
   //             QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH, SESSION_NOT_FOUND. Nothing has been appended.
   absl::Status Append(uint64_t offset, std::span<const double> coordinates, uint64_t expected_revision);
-  // Makes all points that were appended the session's, for good. On an error those that are not are dropped.
+  // Makes all points that were appended the session's, for good. On an error those that are not are dropped, unless
+  // vertices are being added, which come behind them.
   absl::Status CommitPoints();
   // Bytes of points that are appended and not committed.
   uint64_t UncommittedBytes() const;
@@ -262,16 +269,19 @@ class Session {
 
   // The following want change_mutex_ to be held.
 
-  // Writes down what `fill` makes of a change that has the session as it is now, if the log keeps anything.
+  // Writes down what `fill` makes of an empty change, if the log keeps anything and the session is not closed.
   absl::Status Commit(const std::function<void(SessionChange&)>& fill,
                       SessionLog::Survives survives = SessionLog::Survives::kPowerLoss);
+  // The same of a change that has the state of the session as it is now.
+  absl::Status CommitState(const std::function<void(SessionChange&)>& fill);
   // Reads segments and seeds that were written down by another process, if that was not done yet.
   //
   // Errors:     DATA_LOSS.
   absl::Status LoadFeatures();
   // Writes down what AddSegments has appended: all of `request` but for what was known.
   absl::Status CommitFeatures(const v1::AddSegmentsRequest& request, uint64_t known_segments, uint64_t known_seeds);
-  // Adds to `change` the points from committed_points_ on, up to number `end`, whose checksum is `crc32c`.
+  // Adds to `change` that points have come: those from committed_points_ on, up to number `end`, whose checksum is
+  // `crc32c`.
   void AddPointsTo(SessionChange& change, uint64_t end, uint32_t crc32c) const;
   absl::Status CommitStart(const Operation& operation, uint64_t end, const AnswerTo<v1::Operation>& answer);
   absl::Status CommitSuccess(const Operation& operation, const WorkResult& result, absl::Time now);
@@ -280,6 +290,8 @@ class Session {
   v1::Session DescribeWith(const std::map<std::string, std::string>& labels, absl::Duration ttl) const;
   store::v1::SessionRecord Record() const;
   void Keep(std::shared_ptr<Operation> operation);
+  // The points up to number `end` are the session's from now on.
+  void NotePoints(uint64_t end);
   // Drops points that are not committed.
   void DropUncommitted();
   uint64_t PointCount() const { return points_->coordinate_count() / dimension_; }

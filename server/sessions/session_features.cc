@@ -92,7 +92,7 @@ absl::Status Session::AddSegments(const v1::AddSegmentsRequest& request, uint64_
     }
     WELLSPACE_RETURN_IF_ERROR(point_account_.TakeFeatures(all_segments - known_segments, all_seeds - known_seeds));
   }
-  const FeatureStore::Extent before = features_.extent();
+  const FeatureSummary before = features_.Summary();
   const absl::Status status = RunGuarded([&] {
     {
       std::lock_guard lock(mutex_);
@@ -116,7 +116,7 @@ absl::Status Session::AddSegments(const v1::AddSegmentsRequest& request, uint64_
 
 absl::Status Session::CommitFeatures(const v1::AddSegmentsRequest& request, uint64_t known_segments,
                                      uint64_t known_seeds) {
-  return Commit([&](SessionChange& change) {
+  return CommitState([&](SessionChange& change) {
     store::v1::StepRecord::Features& step = *change.steps.emplace_back().mutable_features();
     *step.mutable_segments() = request.segments();
     step.mutable_segments()->mutable_ends()->ExtractSubrange(0, static_cast<int>(2 * known_segments), nullptr);
@@ -127,14 +127,8 @@ absl::Status Session::CommitFeatures(const v1::AddSegmentsRequest& request, uint
       *step.mutable_faces() = request.faces();
       step.mutable_faces()->mutable_seeds()->DeleteSubrange(0, static_cast<int>(known_seeds));
     }
-    const FeatureSummary summary = features_.Summary();
-    store::v1::SessionRecord& state = *change.state;
-    state.set_segments(summary.segments);
-    state.set_seeds(summary.seeds);
-    state.set_has_rules(summary.has_rules);
-    state.set_faces(summary.faces);
-    state.set_crossings(summary.crossings);
-    state.set_revision(state.revision() + 1);
+    SetFeatures(features_.Summary(), *change.state);
+    change.state->set_revision(change.state->revision() + 1);
   });
 }
 

@@ -52,10 +52,8 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::StartOperation(const core::M
     return status;
   }
   if (end > committed_points_) {
-    committed_points_ = end;
     uncommitted_crc32c_ = 0;
-    is_ready_ = false;
-    ++revision_;
+    NotePoints(end);
   }
   ++next_operation_;
   busy_ = Busy::kOperation;
@@ -64,16 +62,13 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::StartOperation(const core::M
 }
 
 absl::Status Session::CommitStart(const Operation& operation, uint64_t end, const AnswerTo<v1::Operation>& answer) {
-  const std::optional<store::v1::AnswerRecord> answer_record =
-      answer == nullptr ? std::nullopt : answer(operation.Describe());
+  const std::optional<store::v1::AnswerRecord> answer_record = AnswerRecordOf(answer, operation.Describe());
   if (end > committed_points_) {
     WELLSPACE_RETURN_IF_ERROR(points_->Synchronize());
   }
-  return Commit([&](SessionChange& change) {
+  return CommitState([&](SessionChange& change) {
     if (end > committed_points_) {
       AddPointsTo(change, end, uncommitted_crc32c_);
-      change.state->set_revision(change.state->revision() + 1);
-      change.state->set_is_ready(false);
     }
     change.state->set_next_operation(operation.number() + 1);
     change.operations.push_back(operation.Record());
@@ -93,12 +88,8 @@ std::optional<SessionWork> Session::BeginWork(Operation& operation) {
     }
     const absl::Time now = clock_.wall();
     // Should the process die in this work, the next one is to know. Without that it would only try once more.
-    (void)Commit(
-        [&](SessionChange& change) {
-          change.state.reset();
-          change.operations.push_back(operation.RecordOfStart(now));
-        },
-        SessionLog::Survives::kProcessDeath);
+    (void)Commit([&](SessionChange& change) { change.operations.push_back(operation.RecordOfStart(now)); },
+                 SessionLog::Survives::kProcessDeath);
     operation.Start(now);
   }
   WaitForQueries();
@@ -110,7 +101,7 @@ std::optional<SessionWork> Session::BeginWork(Operation& operation) {
 }
 
 absl::Status Session::CommitSuccess(const Operation& operation, const WorkResult& result, absl::Time now) {
-  return Commit([&](SessionChange& change) {
+  return CommitState([&](SessionChange& change) {
     const MeshSnapshot& mesh = *result.mesh;
     store::v1::SessionRecord& state = *change.state;
     state.set_revision(mesh.revision());
@@ -145,7 +136,6 @@ bool Session::EndWork(Operation& operation, WorkResult& result) {
   if (!result.status.ok()) {
     const bool is_parked = absl::IsCancelled(result.status) && !operation.IsCancelled() && log_.is_durable();
     const absl::Status logged = Commit([&](SessionChange& change) {
-      change.state.reset();
       change.operations.push_back(is_parked ? operation.RecordOfParking()
                                             : operation.RecordOfFailure(now, result.status));
     });
@@ -197,10 +187,7 @@ absl::Status Session::Cancel(Operation& operation) {
   const bool is_queued = operation.IsQueued();
   store::v1::OperationRecord record = is_queued ? operation.RecordOfFailure(now, cancelled) : operation.Record();
   record.set_is_cancelled(true);
-  WELLSPACE_RETURN_IF_ERROR(Commit([&](SessionChange& change) {
-    change.state.reset();
-    change.operations.push_back(std::move(record));
-  }));
+  WELLSPACE_RETURN_IF_ERROR(Commit([&](SessionChange& change) { change.operations.push_back(std::move(record)); }));
   operation.NoteCancel();
   if (!is_queued) {
     return absl::OkStatus();

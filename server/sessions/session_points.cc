@@ -112,9 +112,7 @@ absl::Status Session::Append(uint64_t offset, std::span<const double> coordinate
     uncommitted_crc32c_ = ExtendCrc32c(uncommitted_crc32c_, coordinates.data(), coordinates.size_bytes());
     return absl::OkStatus();
   }
-  committed_points_ = PointCount();
-  is_ready_ = false;
-  ++revision_;
+  NotePoints(PointCount());
   return absl::OkStatus();
 }
 
@@ -135,28 +133,26 @@ absl::Status Session::CommitPoints() {
   uint32_t crc32c = 0;
   {
     std::lock_guard lock(mutex_);
-    if (busy_ == Busy::kAddingVertices || !HasUncommitted()) {
-      return absl::OkStatus();  // an addition commits these points with its own
+    if (!HasUncommitted()) {
+      return absl::OkStatus();
     }
     end = PointCount();
     crc32c = std::exchange(uncommitted_crc32c_, 0);  // from now on, of the points behind these
   }
   absl::Status status = points_->Synchronize();
   if (status.ok()) {
-    status = Commit([&](SessionChange& change) {
-      AddPointsTo(change, end, crc32c);
-      change.state->set_revision(change.state->revision() + 1);
-      change.state->set_is_ready(false);
-    });
+    status = CommitState([&](SessionChange& change) { AddPointsTo(change, end, crc32c); });
   }
   std::lock_guard lock(mutex_);
   if (!status.ok()) {
-    DropUncommitted();
+    if (busy_ == Busy::kAddingVertices) {
+      uncommitted_crc32c_ = crc32c;  // the mesher takes these points in; the addition tries to commit them, too
+    } else {
+      DropUncommitted();
+    }
     return status;
   }
-  committed_points_ = end;
-  is_ready_ = false;
-  ++revision_;
+  NotePoints(end);
   return absl::OkStatus();
 }
 

@@ -107,11 +107,7 @@ store::v1::SessionRecord Session::Record() const {
   record.set_ttl_ns(absl::ToInt64Nanoseconds(lease_.ttl()));
   record.set_revision(revision_);
   record.set_points(committed_points_);
-  record.set_segments(feature_summary_.segments);
-  record.set_seeds(feature_summary_.seeds);
-  record.set_has_rules(feature_summary_.has_rules);
-  record.set_faces(feature_summary_.faces);
-  record.set_crossings(feature_summary_.crossings);
+  SetFeatures(feature_summary_, record);
   record.set_is_ready(is_ready_);
   record.set_next_operation(next_operation_);
   if (work_.mesh != nullptr) {
@@ -126,22 +122,31 @@ absl::Status Session::Commit(const std::function<void(SessionChange&)>& fill, Se
   if (!log_.is_durable()) {
     return absl::OkStatus();
   }
-  SessionChange change{.session = name_};
   {
     std::lock_guard lock(mutex_);
     if (is_closed_) {
       return absl::OkStatus();
     }
-    change.state = Record();
   }
+  SessionChange change{.session = name_};
   fill(change);
   return log_.Commit(change, survives);
 }
 
+absl::Status Session::CommitState(const std::function<void(SessionChange&)>& fill) {
+  return Commit([&](SessionChange& change) {
+    {
+      std::lock_guard lock(mutex_);
+      change.state = Record();
+    }
+    fill(change);
+  });
+}
+
 absl::Status Session::LogCreation(const AnswerTo<v1::Session>& answer) {
   std::lock_guard change_lock(change_mutex_);
-  const std::optional<store::v1::AnswerRecord> answer_record = answer == nullptr ? std::nullopt : answer(Describe());
-  return Commit([&](SessionChange& change) { change.answer = answer_record; });
+  const std::optional<store::v1::AnswerRecord> answer_record = AnswerRecordOf(answer, Describe());
+  return CommitState([&](SessionChange& change) { change.answer = answer_record; });
 }
 
 void Session::LogExpiry() {
@@ -160,7 +165,6 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::ResumeOperation() {
   const absl::Status refusal = operation->RefusalToResume();
   const absl::Time now = clock_.wall();
   WELLSPACE_RETURN_IF_ERROR(Commit([&](SessionChange& change) {
-    change.state.reset();
     change.operations.push_back(refusal.ok() ? operation->Record() : operation->RecordOfFailure(now, refusal));
   }));
   if (refusal.ok()) {
@@ -178,6 +182,14 @@ void Session::AddPointsTo(SessionChange& change, uint64_t end, uint32_t crc32c) 
   points.set_count(end - committed_points_);
   points.set_crc32c(crc32c);
   change.state->set_points(end);
+  change.state->set_revision(change.state->revision() + 1);
+  change.state->set_is_ready(false);
+}
+
+void Session::NotePoints(uint64_t end) {
+  committed_points_ = end;
+  is_ready_ = false;
+  ++revision_;
 }
 
 absl::Status Session::LoadFeatures() {

@@ -146,17 +146,15 @@ absl::Status Session::CommitAddition(std::span<const double> points, uint64_t up
   const uint64_t uploads_end = work_.meshed_points + uploaded;
   const bool grows = known + count > committed_points_;
   added->revision = revision_ + (grows ? 1 : 0);
-  const std::optional<store::v1::AnswerRecord> answer_record = answer == nullptr ? std::nullopt : answer(*added);
+  const std::optional<store::v1::AnswerRecord> answer_record = AnswerRecordOf(answer, *added);
   absl::Status status = points_->Append(points);
   if (status.ok() && grows) {
     status = points_->Synchronize();
   }
   if (status.ok()) {
-    status = Commit([&](SessionChange& change) {
+    status = CommitState([&](SessionChange& change) {
       if (grows) {
         AddPointsTo(change, known + count, ExtendCrc32c(uncommitted_crc32c_, points.data(), points.size_bytes()));
-        change.state->set_revision(added->revision);
-        change.state->set_is_ready(false);
       }
       store::v1::StepRecord::Added& step = *change.steps.emplace_back().mutable_added();
       step.set_uploads_end(uploads_end);
@@ -172,10 +170,10 @@ absl::Status Session::CommitAddition(std::span<const double> points, uint64_t up
   steps_.NoteAddition(uploads_end, uploads_end + count);
   work_.meshed_points = steps_.points();
   ++structure_version_;
-  committed_points_ = known + count;
-  uncommitted_crc32c_ = 0;
-  is_ready_ = is_ready_ && !grows;
-  revision_ = added->revision;
+  if (grows) {
+    uncommitted_crc32c_ = 0;
+    NotePoints(known + count);
+  }
   return absl::OkStatus();
 }
 

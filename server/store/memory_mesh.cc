@@ -65,8 +65,7 @@ absl::Status MemoryMesh::CheckSame(const core::Mesh& made) const {
                        std::ranges::equal(mesh.simplices, made.simplices) &&
                        std::ranges::equal(mesh.weights, made.weights) && std::ranges::equal(mesh.facets, made.facets) &&
                        std::ranges::equal(mesh.simplex_regions, made.simplex_regions);
-  return is_same ? absl::OkStatus()
-                 : absl::InternalError("the steps of the session make another mesh than they made before");
+  return is_same ? absl::OkStatus() : OtherMesh();
 }
 
 }  // namespace wellspace::server

@@ -287,7 +287,7 @@ absl::Status MeshFile::CheckSame(const core::Mesh& made) const {
       data += size;
     }
     if (!is_same) {
-      return absl::InternalError("the steps of the session make another mesh than they made before");
+      return OtherMesh();
     }
   }
   return absl::OkStatus();

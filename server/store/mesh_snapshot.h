@@ -77,6 +77,11 @@ class MeshSnapshot {
   virtual absl::Status CheckSame(const core::Mesh& made) const = 0;
 
  protected:
+  // What CheckSame says of another mesh.
+  static absl::Status OtherMesh() {
+    return absl::InternalError("the steps of the session make another mesh than they made before");
+  }
+
   explicit MeshSnapshot(Figures figures) : figures_(std::move(figures)) {}
 
  private:

@@ -115,7 +115,7 @@ class ServerTest(Case):
             self.assertEqual((info.default_ttl, info.stall_limit), (3600, 60))
             self.assertTrue(client.is_serving())
 
-    def test_nobody_listens(self):
+    def test_no_server_listens(self):
         with self.fails(UnavailableError, "", code="UNAVAILABLE"):
             wellspace.Client("127.0.0.1:1", retry=wellspace.RetryPolicy(initial_backoff=0.01)).info()
         with self.assertRaises(ConnectionError):

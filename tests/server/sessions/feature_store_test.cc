@@ -51,7 +51,7 @@ TEST(FeatureStore, KeepsMarkersAndRingsOfSegmentsFromManyChunks) {
 TEST(FeatureStore, WhatWasAppendedCanBeTakenBack) {
   FeatureStore store;
   store.Append(Chunk({0, 1, 1, 2}));
-  const FeatureStore::Extent before = store.extent();
+  const FeatureSummary before = store.Summary();
   store.Append(Chunk({2, 3}, {7}));
   store.Append(Faces(v1::FACE_RULE_HOLES, {1, 2}, 0.5));
   store.TakeBack(before);

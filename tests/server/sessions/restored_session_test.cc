@@ -1,7 +1,9 @@
 // Sessions after the death of a process, without a server around them.
+#include <atomic>
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -9,6 +11,7 @@
 #include "server/sessions/memory_session_store.h"
 #include "server/store/durable_log.h"
 #include "server/wire/errors.h"
+#include "tests/server/scripted_mesher.h"
 #include "tests/server/service_harness.h"
 #include "tests/server/store/store_support.h"
 
@@ -30,7 +33,7 @@ class RestoredSessionTest : public ::testing::Test {
     store_.reset();
     log_ = nullptr;
     log_ = DurableLog::Open({.folder = folder_.path()}).value();
-    store_.emplace(options_, memory_, Clock(), *log_);
+    store_.emplace(options_, memory_, Clock{.since_boot = [this] { return since_boot_; }}, *log_);
     const StoredSessions before = log_->Load().value();
     for (const StoredSession& stored : before.sessions) {
       ASSERT_TRUE(store_->Restore(stored).ok());
@@ -48,6 +51,22 @@ class RestoredSessionTest : public ::testing::Test {
         .value();
   }
 
+  // Has the session refined, to a mesh that is none.
+  void Refine() {
+    const std::shared_ptr<Operation> operation = StartOperation();
+    core::RunContext context;
+    std::optional<SessionWork> work = session_->BeginWork(*operation);
+    ASSERT_TRUE(work.has_value());
+    work->mesher = script_(operation->parameters(), {}, nullptr, context).value();
+    WorkResult result{.status = absl::OkStatus(),
+                      .work = *std::move(work),
+                      .mesh = session_->KeepMesh(MakeMesh({.dimension = 2}), context).value()};
+    ASSERT_TRUE(session_->EndWork(*operation, result));
+    ASSERT_EQ(operation->Describe().state(), v1::Operation::STATE_SUCCEEDED);
+  }
+
+  absl::Duration since_boot_ = absl::Hours(1);
+  MesherFactory script_ = ScriptedMesher([](core::Phase, core::RunContext&) { return absl::OkStatus(); });
   TestFolder folder_;
   ServiceOptions options_;
   MemoryBudget memory_{0};
@@ -128,6 +147,52 @@ TEST_F(RestoredSessionTest, PointsThatWereNotCommittedAreGone) {
   StartProcess();
   EXPECT_EQ(session_->Describe().committed_points(), 3u);
   EXPECT_EQ(session_->points().Copy(4, 6, core::RunContext()).value(), std::vector<double>({7, 7}));
+}
+
+TEST_F(RestoredSessionTest, PointsAreCommittedWhileVerticesAreAdded) {
+  Event begun;
+  Event may_end;
+  std::atomic<bool> is_adding = false;
+  script_ = ScriptedMesher([&](core::Phase, core::RunContext&) {
+    if (is_adding) {
+      begun.Set();
+      EXPECT_TRUE(may_end.Wait());
+    }
+    return absl::OkStatus();
+  });
+  ASSERT_TRUE(session_->Append(0, std::vector<double>{0, 0, 1, 0}, 0).ok());
+  Refine();
+  const std::vector<double> inside = {session_->mesh()->figures().domain_low[0],
+                                      session_->mesh()->figures().domain_low[1]};
+  ASSERT_TRUE(session_->Append(2, inside, 0).ok());
+  is_adding = true;
+  absl::StatusOr<AddedVertices> added;
+  std::thread adding([&] {
+    core::RunContext context;
+    added = session_->AddVertices(inside, {}, 0, context);
+  });
+  ASSERT_TRUE(begun.Wait());
+  EXPECT_TRUE(session_->CommitPoints().ok());
+  EXPECT_EQ(session_->Describe().committed_points(), 3u) << "an upload that ends is told of all its points";
+  may_end.Set();
+  adding.join();
+  ASSERT_TRUE(added.ok()) << added.status();
+  EXPECT_EQ(session_->Describe().committed_points(), 4u);
+  const uint64_t revision = session_->Describe().revision();
+  EXPECT_EQ(added->revision, revision);
+  StartProcess();
+  EXPECT_EQ(session_->Describe().committed_points(), 4u);
+  EXPECT_EQ(session_->Describe().revision(), revision);
+  EXPECT_EQ(session_->steps().points(), 4u);
+}
+
+TEST_F(RestoredSessionTest, ASessionWhoseExpiryWasNotWrittenDownIsWhole) {
+  ASSERT_TRUE(session_->Append(0, std::vector<double>{0, 0, 1, 0}, 0).ok());
+  Refine();
+  since_boot_ += absl::Hours(1);
+  EXPECT_EQ(store_->RemoveExpired().size(), 1u);
+  StartProcess();
+  EXPECT_TRUE(session_->mesh()->Metadata(true).ok()) << session_->mesh()->Metadata(true).status();
 }
 
 TEST_F(RestoredSessionTest, AnOperationTakesAllPointsThatWereAppended) {
