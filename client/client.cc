@@ -61,15 +61,24 @@ absl::StatusOr<AddedSegments> Client::AddSegments(const std::string& session, co
   return connection_->AddSegments(session, features, offset, call);
 }
 
+absl::StatusOr<SizesSet> Client::SetSizes(const std::string& session, const SizeSamples& samples,
+                                          const CallOptions& call) {
+  return connection_->SetSizes(session, samples, call);
+}
+
+absl::StatusOr<SizesSet> Client::SetVertexSizes(const std::string& session, const VertexSizes& sizes,
+                                                const CallOptions& call) {
+  return connection_->SetVertexSizes(session, sizes, call);
+}
+
 absl::Status Client::DownloadMesh(const std::string& session, MeshSink& sink, uint64_t revision,
                                   const OnChunks& on_chunks, const CallOptions& call) {
   return connection_->DownloadMesh(session, sink, revision, on_chunks, call);
 }
 
-absl::StatusOr<Operation> Client::StartRefinement(const std::string& session,
-                                                  const std::optional<MeshOptions>& parameters,
+absl::StatusOr<Operation> Client::StartRefinement(const std::string& session, const RefinementOptions& refinement,
                                                   const CallOptions& call) {
-  return connection_->StartRefinement(session, parameters, call);
+  return connection_->StartRefinement(session, refinement, call);
 }
 
 absl::StatusOr<Operation> Client::GetOperation(const std::string& operation, const CallOptions& call) {

@@ -91,15 +91,21 @@ class Client {
                                             const std::optional<FeatureOffset>& offset = std::nullopt,
                                             const CallOptions& call = {});
 
+  // Replaces the sizes at points that the next refinements of a session keep to; without any, it has none from then on.
+  // They are taken together, so that a call that broke off is simply repeated.
+  absl::StatusOr<SizesSet> SetSizes(const std::string& session, const SizeSamples& samples,
+                                    const CallOptions& call = {});
+  // The same with one size for each vertex of the session's mesh, in their order.
+  absl::StatusOr<SizesSet> SetVertexSizes(const std::string& session, const VertexSizes& sizes,
+                                          const CallOptions& call = {});
+
   // Streams the mesh of a session into `sink`: that of `revision`, 0: the last one. A broken connection costs nothing
   // but time.
   absl::Status DownloadMesh(const std::string& session, MeshSink& sink, uint64_t revision = 0,
                             const OnChunks& on_chunks = nullptr, const CallOptions& call = {});
 
   // Operations; see the proto's OperationService. `operation` is a name, "sessions/{session}/operations/{operation}".
-  // `parameters` absent: the session's.
-  absl::StatusOr<Operation> StartRefinement(const std::string& session,
-                                            const std::optional<MeshOptions>& parameters = std::nullopt,
+  absl::StatusOr<Operation> StartRefinement(const std::string& session, const RefinementOptions& refinement = {},
                                             const CallOptions& call = {});
   absl::StatusOr<Operation> GetOperation(const std::string& operation, const CallOptions& call = {});
   absl::StatusOr<OperationPage> ListOperations(const std::string& session, const PageOptions& page = {},

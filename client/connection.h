@@ -57,11 +57,14 @@ class Connection {
   virtual absl::StatusOr<AddedSegments> AddSegments(const std::string& session, const Features& features,
                                                     const std::optional<FeatureOffset>& offset,
                                                     const CallOptions& call) = 0;
+  virtual absl::StatusOr<SizesSet> SetSizes(const std::string& session, const SizeSamples& samples,
+                                            const CallOptions& call) = 0;
+  virtual absl::StatusOr<SizesSet> SetVertexSizes(const std::string& session, const VertexSizes& sizes,
+                                                  const CallOptions& call) = 0;
   virtual absl::Status DownloadMesh(const std::string& session, MeshSink& sink, uint64_t revision,
                                     const OnChunks& on_chunks, const CallOptions& call) = 0;
 
-  virtual absl::StatusOr<Operation> StartRefinement(const std::string& session,
-                                                    const std::optional<MeshOptions>& parameters,
+  virtual absl::StatusOr<Operation> StartRefinement(const std::string& session, const RefinementOptions& refinement,
                                                     const CallOptions& call) = 0;
   virtual absl::StatusOr<Operation> GetOperation(const std::string& operation, const CallOptions& call) = 0;
   virtual absl::StatusOr<OperationPage> ListOperations(const std::string& session, const PageOptions& page,

@@ -34,6 +34,13 @@ struct SizeSamples {
   SizeMeasure measure = SizeMeasure::kCircumradius;
 };
 
+// One size for each vertex of a session's mesh; see the proto's VertexSizes.
+struct VertexSizes {
+  std::vector<double> sizes;
+  SizeMeasure measure = SizeMeasure::kCircumradius;
+  uint64_t mesh_revision = 0;  // of the mesh whose vertices they are; 0: the last one
+};
+
 // Which faces, into which segments cut the plane, are meshed; see the proto's FaceRule.
 enum class FaceRule { kBox, kHoles, kEvenOdd };
 
@@ -76,7 +83,8 @@ struct MeshOptions {
   int threads = 0;
   std::shared_ptr<const Features>
       features;  // of MeshPoints and EstimateMesh, in 2-D; null: none. Those of a session: AddSegments
-  std::shared_ptr<const SizeSamples> size_samples;  // of MeshPoints and EstimateMesh; null: none
+  std::shared_ptr<const SizeSamples>
+      size_samples;  // of MeshPoints and EstimateMesh; null: none. Those of a session: SetSizes
 };
 
 // The vertex of an input point that lies in no face which is meshed.
@@ -254,6 +262,7 @@ struct Session {
   uint64_t seed_count = 0;
   std::optional<FaceRule> faces;  // none: a cloud, without segments and faces
   bool split_crossings = false;
+  uint64_t size_count = 0;  // samples of sizes, see SetSizes
 };
 
 // Which part of a list.
@@ -280,6 +289,7 @@ struct Operation {
   std::optional<absl::Time> start_time;
   std::optional<absl::Time> end_time;
   uint64_t mesh_revision = 0;
+  bool restart = false;
 };
 
 struct OperationPage {
@@ -299,6 +309,18 @@ struct FeatureOffset {
   uint64_t seeds = 0;
 
   bool operator==(const FeatureOffset&) const = default;
+};
+
+// How many sizes at points a session has, and its revision.
+struct SizesSet {
+  uint64_t size_count = 0;
+  uint64_t revision = 0;
+};
+
+// What StartRefinement does; see the proto's StartRefinementRequest.
+struct RefinementOptions {
+  std::optional<MeshOptions> parameters{};  // absent: the session's
+  bool restart = false;                     // the mesh is made anew, from the session's points alone
 };
 
 // Segments, seeds and revision of a session after segments were added.

@@ -7,8 +7,8 @@
 
 #include "absl/status/status.h"
 #include "core/base/run_context.h"
-#include "core/geometry/criterion.h"
 #include "core/domain.h"
+#include "core/geometry/criterion.h"
 #include "core/mesh_parameters.h"
 #include "core/refine/sizing.h"
 

@@ -106,6 +106,7 @@ Json SessionJson(const client::Session& session) {
   json["seed_count"] = session.seed_count;
   json["faces"] = session.faces.has_value() ? Json(FaceRuleName(*session.faces)) : Json(nullptr);
   json["split_crossings"] = session.split_crossings;
+  json["size_count"] = session.size_count;
   json["vertex_count"] = session.vertex_count;
   json["simplex_count"] = session.simplex_count;
   json["last_operation"] = session.last_operation.empty() ? Json(nullptr) : Json(session.last_operation);

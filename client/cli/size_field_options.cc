@@ -24,7 +24,7 @@ CLI::Option* AddGradation(CLI::App& command, double& gradation) {
                    "1; default: 1 from boxes, 0.3 from points");
 }
 
-void SizeFieldOptions::AddTo(CLI::App& command) {
+CLI::Option* SizeFieldOptions::AddTo(CLI::App& command) {
   CLI::Option* field =
       command
           .add_option("--size-field", path_,
@@ -41,6 +41,7 @@ void SizeFieldOptions::AddTo(CLI::App& command) {
           "--edge-length; default: radius")
       ->check(CLI::IsMember({kRadius, kEdge}))
       ->needs(field);
+  return field;
 }
 
 void SizeFieldOptions::AddFilesTo(formats::FilePlan& files) const { files.Reads("--size-field", path_); }
@@ -60,7 +61,8 @@ absl::StatusOr<std::shared_ptr<const client::SizeSamples>> SizeFieldOptions::Rea
 
 absl::Status SizeFieldOptions::WithOrigins(const absl::Status& status) const {
   const std::string_view message(status.message().data(), status.message().size());
-  for (const std::string_view prefix : {"size_samples.points[", "size_samples.sizes["}) {
+  for (const std::string_view prefix :
+       {"size_samples.points[", "size_samples.sizes[", "samples.points[", "samples.sizes["}) {
     uint64_t index = 0;
     if (message.substr(0, prefix.size()) == prefix &&
         std::from_chars(message.data() + prefix.size(), message.data() + message.size(), index).ec == std::errc()) {

@@ -22,8 +22,10 @@ CLI::Option* AddGradation(CLI::App& command, double& gradation);
 // Thread safety: thread-compatible.
 class SizeFieldOptions {
  public:
+  // Returns --size-field.
+  //
   // REQUIRES:   this outlives `command`.
-  void AddTo(CLI::App& command);
+  CLI::Option* AddTo(CLI::App& command);
 
   bool IsGiven() const { return !path_.empty(); }
   void AddFilesTo(formats::FilePlan& files) const;

@@ -310,7 +310,8 @@ Session SessionFromProto(const v1::Session& message) {
                  .segment_count = message.segment_count(),
                  .seed_count = message.seed_count(),
                  .faces = RuleFromProto(message.faces()),
-                 .split_crossings = message.crossings() == v1::CROSSING_RULE_SPLIT};
+                 .split_crossings = message.crossings() == v1::CROSSING_RULE_SPLIT,
+                 .size_count = message.size_count()};
 }
 
 Operation OperationFromProto(const v1::Operation& message) {
@@ -331,6 +332,7 @@ Operation OperationFromProto(const v1::Operation& message) {
     operation.end_time = TimeFromProto(message.end_time());
   }
   operation.mesh_revision = message.mesh_revision();
+  operation.restart = message.restart();
   return operation;
 }
 

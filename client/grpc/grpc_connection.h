@@ -16,6 +16,8 @@
 
 namespace wellspace::client {
 
+using FillSizesRequest = std::function<size_t(size_t first, v1::SetSizesRequest& request)>;
+
 class GrpcConnection final : public Connection {
  public:
   GrpcConnection(const std::shared_ptr<grpc::Channel>& channel, const RetryPolicy& policy);
@@ -43,11 +45,15 @@ class GrpcConnection final : public Connection {
   absl::StatusOr<AddedSegments> AddSegments(const std::string& session, const Features& features,
                                             const std::optional<FeatureOffset>& offset,
                                             const CallOptions& call) override;
+  absl::StatusOr<SizesSet> SetSizes(const std::string& session, const SizeSamples& samples,
+                                    const CallOptions& call) override;
+  absl::StatusOr<SizesSet> SetVertexSizes(const std::string& session, const VertexSizes& sizes,
+                                          const CallOptions& call) override;
   absl::Status DownloadMesh(const std::string& session, MeshSink& sink, uint64_t revision, const OnChunks& on_chunks,
                             const CallOptions& call) override;
 
   // operations.cc
-  absl::StatusOr<Operation> StartRefinement(const std::string& session, const std::optional<MeshOptions>& parameters,
+  absl::StatusOr<Operation> StartRefinement(const std::string& session, const RefinementOptions& refinement,
                                             const CallOptions& call) override;
   absl::StatusOr<Operation> GetOperation(const std::string& operation, const CallOptions& call) override;
   absl::StatusOr<OperationPage> ListOperations(const std::string& session, const PageOptions& page,
@@ -76,6 +82,10 @@ class GrpcConnection final : public Connection {
       return FromGrpcStatus((stub.*method)(context.get(), request, response));
     });
   }
+
+  // `fill` puts the sizes from a number on into a request, and returns the number after the last.
+  absl::StatusOr<SizesSet> SendAllSizes(const std::string& session, size_t count, const CallOptions& call,
+                                        const FillSizesRequest& fill);
 
   // One attempt at GetSession.
   absl::StatusOr<v1::Session> FetchSession(const std::string& session, const Attempt& attempt);

@@ -6,13 +6,14 @@
 namespace wellspace::client {
 
 absl::StatusOr<Operation> GrpcConnection::StartRefinement(const std::string& session,
-                                                          const std::optional<MeshOptions>& parameters,
+                                                          const RefinementOptions& refinement,
                                                           const CallOptions& call) {
   v1::StartRefinementRequest request;
   request.set_name(session);
-  if (parameters.has_value()) {
-    SetParameters(*parameters, request.mutable_parameters());
+  if (refinement.parameters.has_value()) {
+    SetParameters(*refinement.parameters, request.mutable_parameters());
   }
+  request.set_restart(refinement.restart);
   request.set_request_id(RequestIdOf(call));
   request.set_expected_revision(call.expected_revision);
   v1::StartRefinementResponse response;

@@ -6,6 +6,7 @@
 
 #include "client/types.h"
 #include "wellspace/v1/mesh.pb.h"
+#include "wellspace/v1/sessions.pb.h"
 
 namespace wellspace::client {
 
@@ -13,6 +14,9 @@ namespace wellspace::client {
 // number after the last. What has other than `dimension` coordinates for each size goes as it is, in one message: the
 // server refuses it.
 size_t FillSizes(const SizeSamples& samples, int dimension, size_t first, v1::SizeSamples& chunk);
+
+// The same of sizes of vertices.
+size_t FillSizes(const VertexSizes& sizes, size_t first, v1::VertexSizes& chunk);
 
 }  // namespace wellspace::client
 

@@ -11,6 +11,7 @@
 #include "client/grpc/grpc_connection.h"
 #include "client/grpc/mesh_receiver.h"
 #include "client/grpc/request_writer.h"
+#include "client/grpc/size_messages.h"
 #include "core/base/status_macros.h"
 #include "proto/checksum.h"
 
@@ -174,7 +175,57 @@ void Send(const Addition& addition, uint64_t expected_revision, RequestWriter<v1
   stream.WritesDone();
 }
 
+// Sends `count` sizes for `session` and half-closes. Stops early when the call has ended; its status says why.
+void SendSizes(const std::string& session, uint64_t expected_revision, size_t count, const FillSizesRequest& fill,
+               RequestWriter<v1::SetSizesRequest>& stream) {
+  v1::SetSizesRequest request;
+  request.set_name(session);
+  request.set_expected_revision(expected_revision);
+  size_t next = 0;
+  do {
+    next = fill(next, request);
+    if (!stream.Write(request)) {
+      return;
+    }
+  } while (next < count);
+  stream.WritesDone();
+}
+
 }  // namespace
+
+absl::StatusOr<SizesSet> GrpcConnection::SetSizes(const std::string& session, const SizeSamples& samples,
+                                                  const CallOptions& call) {
+  const size_t count = samples.sizes.size();
+  const auto dimension = static_cast<int>(count == 0 ? 0 : samples.points.size() / count);
+  return SendAllSizes(session, count, call, [&](size_t first, v1::SetSizesRequest& request) {
+    return FillSizes(samples, dimension, first, *request.mutable_samples());
+  });
+}
+
+absl::StatusOr<SizesSet> GrpcConnection::SetVertexSizes(const std::string& session, const VertexSizes& sizes,
+                                                        const CallOptions& call) {
+  return SendAllSizes(session, sizes.sizes.size(), call, [&](size_t first, v1::SetSizesRequest& request) {
+    return FillSizes(sizes, first, *request.mutable_vertex_sizes());
+  });
+}
+
+absl::StatusOr<SizesSet> GrpcConnection::SendAllSizes(const std::string& session, size_t count, const CallOptions& call,
+                                                      const FillSizesRequest& fill) {
+  uint64_t expected_revision = call.expected_revision;
+  v1::SetSizesResponse response;
+  const absl::Status status = retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
+    CallContext context(attempt);
+    RequestWriter<v1::SetSizesRequest> stream(
+        [&](grpc::CompletionQueue* queue) { return sessions_->PrepareAsyncSetSizes(context.get(), &response, queue); });
+    // What an attempt before this one has set has changed the revision.
+    SendSizes(session, std::exchange(expected_revision, 0), count, fill, stream);
+    return FromGrpcStatus(stream.Finish());
+  });
+  if (!status.ok()) {
+    return status;
+  }
+  return SizesSet{.size_count = response.size_count(), .revision = response.revision()};
+}
 
 absl::StatusOr<AddedSegments> GrpcConnection::AddSegments(const std::string& session, const Features& features,
                                                           const std::optional<FeatureOffset>& offset,

@@ -36,6 +36,7 @@ Operation::Operation(std::string name, const store::v1::OperationRecord& record,
     : name_(std::move(name)),
       number_(record.number()),
       parameters_(std::move(parameters)),
+      restart_(record.restart()),
       create_time_(absl::FromUnixNanos(record.create_time_ns())),
       attempts_(record.attempts() + (IsEnd(record.state()) ? 0 : 1)),
       crashes_(record.crashes() + (record.state() == v1::Operation::STATE_RUNNING ? 1 : 0)),
@@ -73,6 +74,7 @@ v1::Operation Operation::Describe() const {
     *message.mutable_end_time() = TimeToProto(end_time_);
   }
   message.set_mesh_revision(mesh_revision_);
+  message.set_restart(restart_);
   return message;
 }
 
@@ -103,6 +105,7 @@ store::v1::OperationRecord Operation::RecordLocked() const {
     *record.mutable_error() = error_;
   }
   record.set_mesh_revision(mesh_revision_);
+  record.set_restart(restart_);
   return record;
 }
 

@@ -36,14 +36,21 @@ class Operation {
   static constexpr size_t kEventsOfEnded = 8;
 
   // `name` is "sessions/{session}/operations/{number}".
-  Operation(std::string name, uint64_t number, core::MeshParameters parameters, absl::Time create_time)
-      : name_(std::move(name)), number_(number), parameters_(std::move(parameters)), create_time_(create_time) {}
+  // `restart`: it makes the structure anew.
+  Operation(std::string name, uint64_t number, core::MeshParameters parameters, bool restart, absl::Time create_time)
+      : name_(std::move(name)),
+        number_(number),
+        parameters_(std::move(parameters)),
+        restart_(restart),
+        create_time_(create_time) {}
   // One that was written down as `record`. One that had not ended waits for a worker again.
   Operation(std::string name, const store::v1::OperationRecord& record, core::MeshParameters parameters);
 
   const std::string& name() const { return name_; }
   uint64_t number() const { return number_; }
+  // Without the sizes at points that it keeps to, which are the session's.
   const core::MeshParameters& parameters() const { return parameters_; }
+  bool restart() const { return restart_; }
   v1::Operation Describe() const;
   bool IsQueued() const;
   bool HasEnded() const;
@@ -104,6 +111,7 @@ class Operation {
   const std::string name_;
   const uint64_t number_;
   const core::MeshParameters parameters_;
+  const bool restart_;
   const absl::Time create_time_;
   const uint32_t attempts_ = 1;  // processes that have had it
   const uint32_t crashes_ = 0;   // of these, those that died in its work before this one

@@ -36,6 +36,7 @@ PointAccount::PointAccount(std::string session, int dimension, bool in_memory, c
                            MemoryBudget& memory, std::shared_ptr<TenantPoints> tenant)
     : session_(std::move(session)),
       bytes_per_point_(in_memory ? dimension * sizeof(double) : 0),
+      bytes_per_size_((dimension + 1) * sizeof(double)),
       options_(options),
       memory_(memory),
       tenant_(std::move(tenant)),
@@ -85,8 +86,14 @@ absl::Status PointAccount::TakeFeatures(uint64_t segments, uint64_t seeds) {
   return Grow(held, "points, segments and seeds");
 }
 
-void PointAccount::Restore(uint64_t points, uint64_t segments, uint64_t seeds) {
-  held_ = {.points = points, .segments = segments, .seeds = seeds};
+absl::Status PointAccount::TakeSizes(uint64_t count) {
+  Held held = held_;
+  held.sizes += count;
+  return Grow(held, "points, segments, seeds and sizes");
+}
+
+void PointAccount::Restore(const Held& held) {
+  held_ = held;
   (void)tenant_->Take(held_.count(), std::numeric_limits<uint64_t>::max(), [] { return true; });
   (void)reserved_.Resize(BytesOf(held_));  // where there is no room, they count with the next that come
 }
@@ -109,6 +116,12 @@ void PointAccount::ReturnFeatures(uint64_t segments, uint64_t seeds) {
   Held held = held_;
   held.segments -= segments;
   held.seeds -= seeds;
+  Shrink(held);
+}
+
+void PointAccount::ReturnSizes(uint64_t count) {
+  Held held = held_;
+  held.sizes -= count;
   Shrink(held);
 }
 

@@ -1,4 +1,4 @@
-// How many points, segments and seeds a session has, and may have.
+// How many points, segments, seeds and sizes a session has, and may have.
 #ifndef WELLSPACE_SERVER_SESSIONS_POINT_ACCOUNT_H_
 #define WELLSPACE_SERVER_SESSIONS_POINT_ACCOUNT_H_
 
@@ -15,7 +15,7 @@
 
 namespace wellspace::server {
 
-// The points of all sessions of one tenant; each of their segments and seeds counts as a point.
+// The points of all sessions of one tenant; each of their segments, seeds and sizes counts as a point.
 //
 // Thread safety: thread-safe.
 // Invariants: points() is at most the limit that Take was called with.
@@ -43,8 +43,8 @@ class TenantPoints {
   uint64_t points_ = 0;  // guarded by mutex_
 };
 
-// The points, segments and seeds of one session, counted against three limits: that of a session, which holds for each
-// of the three, that of its tenant, which holds for their sum, and the memory of the server.
+// The points, segments, seeds and sizes of one session, counted against three limits: that of a session, which holds
+// for each of these, that of its tenant, which holds for their sum, and the memory of the server.
 //
 // Thread safety: thread-compatible; accounts of one tenant may be used on different threads.
 // Invariants: the tenant's points include all of this account until Close.
@@ -71,8 +71,20 @@ class PointAccount {
   // The same for so many more segments and seeds.
   absl::Status TakeFeatures(uint64_t segments, uint64_t seeds);
 
+  // The same for `count` more sizes at points.
+  absl::Status TakeSizes(uint64_t count);
+
+  // What an account holds.
+  struct Held {
+    uint64_t points = 0;
+    uint64_t segments = 0;
+    uint64_t seeds = 0;
+    uint64_t sizes = 0;  // of all sets that the session keeps
+
+    uint64_t count() const { return points + segments + seeds + sizes; }
+  };
   // Takes what the session had before the server was started, whatever the limits are now. To be called first.
-  void Restore(uint64_t points, uint64_t segments, uint64_t seeds);
+  void Restore(const Held& held);
 
   // Takes the last `count` points out again.
   //
@@ -80,21 +92,15 @@ class PointAccount {
   void Return(uint64_t count);
   // The same of segments and seeds.
   void ReturnFeatures(uint64_t segments, uint64_t seeds);
+  void ReturnSizes(uint64_t count);
 
   // From now on the points do not count as the tenant's. They keep their memory as long as this lives.
   void Close();
 
  private:
-  struct Held {
-    uint64_t points = 0;
-    uint64_t segments = 0;
-    uint64_t seeds = 0;
-
-    uint64_t count() const { return points + segments + seeds; }
-  };
-
   uint64_t BytesOf(const Held& held) const {
-    return held.points * bytes_per_point_ + FeatureStore::BytesOf(held.segments, held.seeds);
+    return held.points * bytes_per_point_ + FeatureStore::BytesOf(held.segments, held.seeds) +
+           held.sizes * bytes_per_size_;
   }
   // Refuses `count` of `what`, if a session may not have as many.
   absl::Status CheckOne(uint64_t count, const char* what) const;
@@ -105,6 +111,7 @@ class PointAccount {
 
   const std::string session_;
   const uint64_t bytes_per_point_;
+  const uint64_t bytes_per_size_;
   const ServiceOptions& options_;
   MemoryBudget& memory_;
   const std::shared_ptr<TenantPoints> tenant_;

@@ -75,14 +75,15 @@ absl::StatusOr<core::Mesh> MeshAgain(const Session& session, const core::MeshPar
   return mesh;
 }
 
-// Has the mesh made, by what the session has given for it. What did not succeed leaves nothing behind: a mesher that it
-// has changed is given up, and comes back by Replay.
+// Has the mesh made, by what the session has given for it; `is_first`: by its points alone. What did not succeed leaves
+// nothing behind: a mesher that it has changed is given up, and comes back by Replay.
 absl::StatusOr<std::shared_ptr<MeshSnapshot>> MakeMesh(const MesherFactory& create_mesher, const Session& session,
-                                                       const core::MeshParameters& parameters, Job& job,
+                                                       const core::MeshParameters& parameters, bool is_first, Job& job,
                                                        SessionWork& work) {
-  bool has_changed = false;
+  bool has_changed = is_first;
   const auto make = [&]() -> absl::StatusOr<core::Mesh> {
-    if (session.steps().empty()) {
+    if (is_first) {
+      work.mesher = nullptr;  // of a restart
       return MeshFirst(create_mesher, session, parameters, job.context(), work);
     }
     WELLSPACE_RETURN_IF_ERROR(BringBack(create_mesher, session, job, work));
@@ -98,7 +99,7 @@ absl::StatusOr<std::shared_ptr<MeshSnapshot>> MakeMesh(const MesherFactory& crea
   if (status.ok()) {
     return mesh;
   }
-  if (has_changed || session.steps().empty()) {
+  if (has_changed) {
     work.mesher = nullptr;
   }
   return status;
@@ -106,10 +107,11 @@ absl::StatusOr<std::shared_ptr<MeshSnapshot>> MakeMesh(const MesherFactory& crea
 
 // The same, in the memory of `job`; what mesher and mesh have of it is theirs at the end, and the rest is released.
 absl::StatusOr<std::shared_ptr<MeshSnapshot>> Work(const MesherFactory& create_mesher, const Session& session,
-                                                   const core::MeshParameters& parameters, Job& job,
+                                                   const core::MeshParameters& parameters, bool is_first, Job& job,
                                                    SessionWork& work) {
   job.GiveMemory(std::move(work.memory));
-  absl::StatusOr<std::shared_ptr<MeshSnapshot>> mesh = MakeMesh(create_mesher, session, parameters, job, work);
+  absl::StatusOr<std::shared_ptr<MeshSnapshot>> mesh =
+      MakeMesh(create_mesher, session, parameters, is_first, job, work);
   if (work.mesher != nullptr) {
     work.memory = job.TakeMemory(work.mesher->memory_bytes());
     work.memory.MakeLasting();
@@ -143,16 +145,17 @@ void Run(const CallEnvironment& environment, const std::shared_ptr<Session>& ses
   if (!work.has_value()) {
     return;
   }
+  const bool is_first = session->steps().empty() || operation->restart();
   RefinementReport report{
       .operation = operation->name(),
       .tenant = session->tenant(),
       .status = absl::OkStatus(),
       .duration = absl::ZeroDuration(),
       .points = session->points().coordinate_count() / operation->parameters().dimension,
-      .replayed_steps = work->mesher == nullptr ? session->steps().all().size() : 0,
+      .replayed_steps = work->mesher == nullptr && !is_first ? session->steps().all().size() : 0,
   };
   absl::StatusOr<std::shared_ptr<MeshSnapshot>> mesh =
-      Work(environment.create_mesher, *session, operation->parameters(), job, *work);
+      Work(environment.create_mesher, *session, session->ParametersOf(*operation), is_first, job, *work);
   report.status = mesh.status();
   report.duration = SinceBoot() - start;
   if (mesh.ok()) {
@@ -183,7 +186,7 @@ absl::StatusOr<std::shared_ptr<Job>> Submit(const CallEnvironment& environment, 
   const Session::Size size = session->GetSize(kMostPoints);
   const bool is_small =
       size.points <= kMostPoints && size.segments <= kMostPoints &&
-      IsSmallRefinement(operation->parameters(), size.some_points, size.vertices, size.replayed_steps);
+      IsSmallRefinement(session->ParametersOf(*operation), size.some_points, size.vertices, size.replayed_steps);
   WELLSPACE_ASSIGN_OR_RETURN(
       std::shared_ptr<Job> job,
       environment.jobs.Submit(
@@ -230,7 +233,7 @@ void ResumeNext(const CallEnvironment& environment, const std::shared_ptr<std::d
 
 absl::StatusOr<std::shared_ptr<Operation>> StartRefinement(const CallEnvironment& environment,
                                                            const std::shared_ptr<Session>& session,
-                                                           const core::MeshParameters& parameters,
+                                                           const core::MeshParameters& parameters, bool restart,
                                                            uint64_t expected_revision,
                                                            const AnswerTo<v1::Operation>& answer) {
   std::shared_ptr<Job> job;
@@ -239,7 +242,7 @@ absl::StatusOr<std::shared_ptr<Operation>> StartRefinement(const CallEnvironment
     return absl::OkStatus();
   };
   absl::StatusOr<std::shared_ptr<Operation>> operation =
-      session->StartOperation(parameters, expected_revision, submit, answer);
+      session->StartOperation(parameters, restart, expected_revision, submit, answer);
   if (!operation.ok()) {
     if (job != nullptr) {
       environment.jobs.Cancel(job);

@@ -15,7 +15,7 @@
 namespace wellspace::server {
 
 // Starts an operation that refines `session` with `parameters`, on a worker: from its points the first time, from then
-// on by what has changed.
+// on by what has changed. With `restart` again from its points.
 //
 // One that does not succeed leaves the session as it was: a mesher that it has changed is given up, and built again by
 // Replay when the structure is next needed.
@@ -23,7 +23,7 @@ namespace wellspace::server {
 // Errors:     QUEUE_FULL, QUOTA_EXCEEDED (jobs); those of Session::StartOperation. The session is as it was.
 absl::StatusOr<std::shared_ptr<Operation>> StartRefinement(const CallEnvironment& environment,
                                                            const std::shared_ptr<Session>& session,
-                                                           const core::MeshParameters& parameters,
+                                                           const core::MeshParameters& parameters, bool restart,
                                                            uint64_t expected_revision,
                                                            const AnswerTo<v1::Operation>& answer = nullptr);
 

@@ -53,6 +53,7 @@ v1::Session Session::DescribeWith(const std::map<std::string, std::string>& labe
   message.set_seed_count(feature_summary_.seeds);
   message.set_faces(feature_summary_.faces);
   message.set_crossings(feature_summary_.crossings);
+  message.set_size_count(sizes_in_use_.count);
   if (work_.mesh != nullptr) {
     message.set_vertex_count(work_.mesh->figures().vertices);
     message.set_simplex_count(work_.mesh->figures().simplices);

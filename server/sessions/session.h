@@ -1,4 +1,4 @@
-// A session: a domain, its points and segments, and the mesh over them.
+// A session: a domain, its points, segments and sizes, and the mesh over them.
 #ifndef WELLSPACE_SERVER_SESSIONS_SESSION_H_
 #define WELLSPACE_SERVER_SESSIONS_SESSION_H_
 
@@ -70,14 +70,13 @@ struct WorkResult {
 };
 
 // Thread safety: thread-safe.
-// Invariants: (1) revision grows with every change of the points, the features or the mesh; (2) while an operation is
-// under way, or vertices are being added or the mesher is built again, points, features, mesh, mesher and steps are
-// touched by nothing else;
-// (3) what did not succeed leaves the session as it was: structure and mesh are what Replay makes of the steps, whether
-// there is a mesher now or not; (4) the lock order is change_mutex_, this session's mutex, then that of an operation,
-// of TenantPoints or, where memory is released, of the JobPool; (5) no client is told of a change, and nothing shows
-// it, before the log has it; one that it cannot have is not made. Functions that change the session wait for the log:
-// they are to be called where that holds up no other work.
+// Invariants: (1) revision grows with every change of the points, the features, the sizes or the mesh; (2) while an
+// operation is under way, or vertices are being added or the mesher is built again, points, features, sizes, mesh,
+// mesher and steps are touched by nothing else; (3) what did not succeed leaves the session as it was: structure and
+// mesh are what Replay makes of the steps, whether there is a mesher now or not; (4) the lock order is change_mutex_,
+// this session's mutex, then that of an operation, of TenantPoints or, where memory is released, of the JobPool; (5) no
+// client is told of a change, and nothing shows it, before the log has it; one that it cannot have is not made.
+// Functions that change the session wait for the log: they are to be called where that holds up no other work.
 class Session {
  public:
   struct Settings {
@@ -182,6 +181,16 @@ class Session {
   // Segments, seeds and revision, as one.
   v1::AddSegmentsResponse CommittedSegments() const;
 
+  // Replaces the sizes at points that the next refinements keep to; null for none. `expected_revision` 0: any.
+  //
+  // REQUIRES:   `samples` has passed CheckSizes.
+  // Complexity: O(samples).
+  // Errors:     INVALID_SIZES (outside the domain), SESSION_BUSY, QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH,
+  //             SESSION_NOT_FOUND. Nothing has changed.
+  absl::Status SetSizes(std::shared_ptr<const core::SizeSamples> samples, uint64_t expected_revision);
+  // The number of sizes, and the revision, as one.
+  v1::SetSizesResponse CommittedSizes() const;
+
   // The last mesh; null before the first.
   std::shared_ptr<const MeshSnapshot> mesh() const;
   // Keeps `mesh`, the work of an operation that is under way, as the log keeps meshes.
@@ -227,13 +236,13 @@ class Session {
                                             const AnswerTo<AddedVertices>& answer = nullptr);
 
   // Begins an operation. The session is busy until the operation has ended. `submit` is called with it, to submit its
-  // work; what it refuses is not begun.
+  // work; what it refuses is not begun. With `restart` the structure is made anew, in the same box.
   //
   // Errors:     SESSION_BUSY, REVISION_MISMATCH, SESSION_NOT_FOUND; INVALID_PARAMETERS, of those that a domain with
   //             segments does not have; those of `submit`. Of a log that fails, `submit` was called, and the operation
   //             has ended without a trace.
   using SubmitWork = std::function<absl::Status(const std::shared_ptr<Operation>&)>;
-  absl::StatusOr<std::shared_ptr<Operation>> StartOperation(const core::MeshParameters& parameters,
+  absl::StatusOr<std::shared_ptr<Operation>> StartOperation(core::MeshParameters parameters, bool restart,
                                                             uint64_t expected_revision, const SubmitWork& submit,
                                                             const AnswerTo<v1::Operation>& answer = nullptr);
   // On the worker: what to work on; nothing if the operation has ended before it could begin.
@@ -258,6 +267,8 @@ class Session {
   // These are for the operation that is under way.
   const PointStore& points() const { return *points_; }
   const FeatureStore& features() const { return features_; }
+  // Those of `operation`, and the sizes at points that it keeps to.
+  core::MeshParameters ParametersOf(const Operation& operation) const;
   // What has made the structure.
   const SessionSteps& steps() const { return steps_; }
 
@@ -274,10 +285,11 @@ class Session {
                       SessionLog::Survives survives = SessionLog::Survives::kPowerLoss);
   // The same of a change that has the state of the session as it is now.
   absl::Status CommitState(const std::function<void(SessionChange&)>& fill);
-  // Reads segments and seeds that were written down by another process, if that was not done yet.
+  // Reads segments, seeds and sizes that were written down by another process, if that was not done yet.
   //
   // Errors:     DATA_LOSS.
-  absl::Status LoadFeatures();
+  absl::Status LoadInputs();
+  absl::Status LoadSizes();
   // Writes down what AddSegments has appended: all of `request` but for what was known.
   absl::Status CommitFeatures(const v1::AddSegmentsRequest& request, uint64_t known_segments, uint64_t known_seeds);
   // Adds to `change` that points have come: those from committed_points_ on, up to number `end`, whose checksum is
@@ -292,6 +304,10 @@ class Session {
   void Keep(std::shared_ptr<Operation> operation);
   // The points up to number `end` are the session's from now on.
   void NotePoints(uint64_t end);
+  // Refuses samples outside the domain, if that is known.
+  absl::Status CheckSamples(const core::SizeSamples& samples) const;
+  // The sets of sizes that are of no use once only `steps`, and the set `current`, are there.
+  std::vector<SizesInUse> UnusedSizes(const SessionSteps& steps, uint64_t current) const;
   // Drops points that are not committed.
   void DropUncommitted();
   uint64_t PointCount() const { return points_->coordinate_count() / dimension_; }
@@ -367,16 +383,18 @@ class Session {
   bool is_uploading_ = false;
   bool is_ready_ = false;  // the last operation succeeded, and no points have come since
   uint64_t revision_ = 1;
-  PointAccount point_account_;          // includes the points that AddVertices is adding
-  std::unique_ptr<PointStore> points_;  // see invariant (2)
-  uint64_t committed_points_ = 0;       // of points_, those that are the session's
-  uint32_t uncommitted_crc32c_ = 0;     // of the others
-  FeatureStore features_;               // see invariant (2)
-  bool has_features_ = true;            // false: they were written down by another process, and not read yet
-  FeatureSummary feature_summary_;      // of them, read or not
-  SessionWork work_;                    // its mesher is away while an operation is under way; see invariant (2)
-  SessionSteps steps_;                  // see invariant (2)
-  uint64_t structure_version_ = 0;      // of what queries see; 0: nothing yet
+  PointAccount point_account_;                      // includes the points that AddVertices is adding
+  std::unique_ptr<PointStore> points_;              // see invariant (2)
+  uint64_t committed_points_ = 0;                   // of points_, those that are the session's
+  uint32_t uncommitted_crc32c_ = 0;                 // of the others
+  FeatureStore features_;                           // see invariant (2)
+  FeatureSummary feature_summary_;                  // of them, read or not
+  std::shared_ptr<const core::SizeSamples> sizes_;  // see invariant (2); null: none, or not read
+  SizesInUse sizes_in_use_;                         // which these are
+  bool has_inputs_ = true;          // false: features and sizes were written down by another process, and not read yet
+  SessionWork work_;                // its mesher is away while an operation is under way; see invariant (2)
+  SessionSteps steps_;              // see invariant (2)
+  uint64_t structure_version_ = 0;  // of what queries see; 0: nothing yet
   uint64_t next_operation_ = 1;
   std::deque<std::shared_ptr<Operation>> operations_;  // ascending by number
 };

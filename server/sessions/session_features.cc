@@ -71,7 +71,7 @@ absl::Status Session::AddSegments(const v1::AddSegmentsRequest& request, uint64_
     return NotInThePlane(request.has_segments() || !request.has_faces() ? "segments" : "faces", dimension_);
   }
   std::lock_guard change_lock(change_mutex_);
-  WELLSPACE_RETURN_IF_ERROR(LoadFeatures());
+  WELLSPACE_RETURN_IF_ERROR(LoadInputs());
   uint64_t known_segments = 0;
   uint64_t known_seeds = 0;
   const uint64_t all_segments = request.segments().ends_size() / 2;

@@ -23,11 +23,11 @@ void Session::Keep(std::shared_ptr<Operation> operation) {
   }
 }
 
-absl::StatusOr<std::shared_ptr<Operation>> Session::StartOperation(const core::MeshParameters& parameters,
+absl::StatusOr<std::shared_ptr<Operation>> Session::StartOperation(core::MeshParameters parameters, bool restart,
                                                                    uint64_t expected_revision, const SubmitWork& submit,
                                                                    const AnswerTo<v1::Operation>& answer) {
   std::lock_guard change_lock(change_mutex_);
-  WELLSPACE_RETURN_IF_ERROR(LoadFeatures());
+  WELLSPACE_RETURN_IF_ERROR(LoadInputs());
   std::shared_ptr<Operation> operation;
   uint64_t end = 0;
   {
@@ -36,8 +36,13 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::StartOperation(const core::M
     if (!features_.IsEmpty()) {
       WELLSPACE_RETURN_IF_ERROR(ValidateForDomain(parameters, features_.View()));
     }
+    if (restart && work_.mesh != nullptr && (features_.IsEmpty() || feature_summary_.faces == v1::FACE_RULE_BOX)) {
+      // The box does not change with the points that have come since.
+      parameters.domain_low = work_.mesh->figures().domain_low;
+      parameters.domain_high = work_.mesh->figures().domain_high;
+    }
     operation = std::make_shared<Operation>(absl::StrCat(name_, "/operations/", next_operation_), next_operation_,
-                                            parameters, clock_.wall());
+                                            std::move(parameters), restart, clock_.wall());
     BeginBusy(Busy::kStarting);
     end = PointCount();
   }
@@ -113,9 +118,14 @@ absl::Status Session::CommitSuccess(const Operation& operation, const WorkResult
     store::v1::StepRecord::Refined& step = *change.steps.emplace_back().mutable_refined();
     step.set_points(committed_points_);
     *step.mutable_parameters() = state.parameters();
-    if (steps_.empty()) {
+    step.set_sizes(sizes_in_use_.number);
+    step.set_size_count(sizes_in_use_.count);
+    if (steps_.empty() || operation.restart()) {
       step.set_begins(true);
       step.set_meshing_version(core::kMeshingVersion);
+      for (const SizesInUse& set : UnusedSizes({}, sizes_in_use_.number)) {
+        change.dropped_sizes.push_back(set.number);
+      }
     }
     const MeshSnapshot::Figures& figures = mesh.figures();
     change.operations.push_back(operation.RecordOfSuccess(now, figures.revision, figures.vertices, figures.simplices));
@@ -159,8 +169,16 @@ bool Session::EndWork(Operation& operation, WorkResult& result) {
       }
       revision_ = work.mesh->revision();
       work.meshed_points = committed_points_;
-      steps_.NoteRefinement(work.meshed_points, operation.parameters());
+      if (operation.restart()) {
+        for (const SizesInUse& set : UnusedSizes({}, sizes_in_use_.number)) {
+          point_account_.ReturnSizes(set.count);
+        }
+        steps_ = SessionSteps();
+      }
       parameters_ = operation.parameters();
+      core::MeshParameters refined_with = parameters_;
+      refined_with.size_samples = sizes_;
+      steps_.NoteRefinement(work.meshed_points, refined_with, sizes_in_use_);
       is_ready_ = true;
       ++structure_version_;
       const MeshSnapshot::Figures& made = work.mesh->figures();

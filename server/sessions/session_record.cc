@@ -32,7 +32,7 @@ absl::StatusOr<SessionSteps> StepsOf(const std::vector<store::v1::StepRecord>& r
       }
       if (refined.begins() ? refined.meshing_version() == core::kMeshingVersion : !steps.empty()) {
         WELLSPACE_ASSIGN_OR_RETURN(const core::MeshParameters parameters, ParametersFromRecord(refined.parameters()));
-        steps.NoteRefinement(refined.points(), parameters);
+        steps.NoteRefinement(refined.points(), parameters, {.number = refined.sizes(), .count = refined.size_count()});
       }
     } else if (record.has_added() && !steps.empty()) {
       steps.NoteAddition(record.added().uploads_end(), record.added().end());
@@ -84,8 +84,16 @@ void Session::SetState(const StoredSession& stored) {
                       .has_rules = state.has_rules(),
                       .faces = state.faces(),
                       .crossings = state.crossings()};
-  has_features_ = feature_summary_.segments == 0 && feature_summary_.seeds == 0 && !feature_summary_.has_rules;
-  point_account_.Restore(committed_points_, feature_summary_.segments, feature_summary_.seeds);
+  sizes_in_use_ = {.number = state.sizes(), .count = state.size_count()};
+  const std::vector<SizesInUse> sizes = UnusedSizes({}, 0);  // all of them
+  has_inputs_ =
+      feature_summary_.segments == 0 && feature_summary_.seeds == 0 && !feature_summary_.has_rules && sizes.empty();
+  PointAccount::Held held{
+      .points = committed_points_, .segments = feature_summary_.segments, .seeds = feature_summary_.seeds};
+  for (const SizesInUse& set : sizes) {
+    held.sizes += set.count;
+  }
+  point_account_.Restore(held);
   if (state.has_mesh()) {
     work_.mesh = log_.FindMesh(name_, state);
     work_.meshed_points = steps_.points();
@@ -108,6 +116,8 @@ store::v1::SessionRecord Session::Record() const {
   record.set_revision(revision_);
   record.set_points(committed_points_);
   SetFeatures(feature_summary_, record);
+  record.set_sizes(sizes_in_use_.number);
+  record.set_size_count(sizes_in_use_.count);
   record.set_is_ready(is_ready_);
   record.set_next_operation(next_operation_);
   if (work_.mesh != nullptr) {
@@ -162,7 +172,10 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::ResumeOperation() {
     return nullptr;
   }
   const std::shared_ptr<Operation> operation = operations_.back();
-  const absl::Status refusal = operation->RefusalToResume();
+  absl::Status refusal = operation->RefusalToResume();
+  if (refusal.ok()) {
+    refusal = LoadInputs();  // which its work needs
+  }
   const absl::Time now = clock_.wall();
   WELLSPACE_RETURN_IF_ERROR(Commit([&](SessionChange& change) {
     change.operations.push_back(refusal.ok() ? operation->Record() : operation->RecordOfFailure(now, refusal));
@@ -192,10 +205,11 @@ void Session::NotePoints(uint64_t end) {
   ++revision_;
 }
 
-absl::Status Session::LoadFeatures() {
-  if (has_features_) {
+absl::Status Session::LoadInputs() {
+  if (has_inputs_) {
     return absl::OkStatus();
   }
+  WELLSPACE_RETURN_IF_ERROR(LoadSizes());
   WELLSPACE_ASSIGN_OR_RETURN(const std::vector<store::v1::StepRecord::Features> steps, log_.ReadFeatures(name_));
   std::lock_guard lock(mutex_);
   for (const store::v1::StepRecord::Features& step : steps) {
@@ -204,7 +218,7 @@ absl::Status Session::LoadFeatures() {
       features_.Append(step.faces());
     }
   }
-  has_features_ = true;
+  has_inputs_ = true;
   return absl::OkStatus();
 }
 

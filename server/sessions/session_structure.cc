@@ -23,7 +23,7 @@ absl::Status Session::PrepareStructure(uint64_t expected_revision, const MesherF
                                        bool* is_at_work) {
   {
     std::lock_guard change_lock(change_mutex_);
-    WELLSPACE_RETURN_IF_ERROR(LoadFeatures());
+    WELLSPACE_RETURN_IF_ERROR(LoadInputs());
     std::lock_guard lock(mutex_);
     if (is_at_work != nullptr) {
       *is_at_work = busy_ == Busy::kReplaying && !is_closed_;

@@ -1,23 +1,22 @@
 #include "server/sessions/size_store.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "absl/strings/str_cat.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
+namespace {
 
-absl::Status CheckSizes(const v1::SizeSamples& chunk, uint64_t first, int dimension, std::string_view field) {
-  const std::string name(field);
-  if (chunk.points_size() != chunk.sizes_size() * dimension) {
-    return MakeError(
-        v1::ERROR_REASON_INVALID_CHUNK_SHAPE,
-        absl::StrCat("the chunk of sizes after sample ", first, " has ", chunk.points_size(), " coordinates for ",
-                     chunk.sizes_size(), " sizes; expected ", dimension, " for each, as parameters.dimension says"),
-        name + ".points");
-  }
+constexpr size_t kSamplesOfRecord = size_t{1} << 14;
+
+// Checks sizes and measure of a chunk.
+template <typename Chunk>
+absl::Status CheckValues(const Chunk& chunk, uint64_t first, const std::string& name) {
   if (!v1::SizeMeasure_IsValid(chunk.measure())) {
     return MakeError(
         v1::ERROR_REASON_INVALID_SIZES,
@@ -25,14 +24,6 @@ absl::Status CheckSizes(const v1::SizeSamples& chunk, uint64_t first, int dimens
                      static_cast<int>(v1::SIZE_MEASURE_CIRCUMRADIUS), " (circumradius) and ",
                      static_cast<int>(v1::SIZE_MEASURE_EDGE_LENGTH), " (edge length) are, and 0 for the default"),
         name + ".measure");
-  }
-  for (int i = 0; i < chunk.points_size(); ++i) {
-    if (!std::isfinite(chunk.points(i))) {
-      return MakeError(v1::ERROR_REASON_INVALID_SIZES,
-                       absl::StrCat(name, ".points[", first + i / dimension, "]: coordinate ", i % dimension, " is ",
-                                    chunk.points(i), "; a finite number is needed"),
-                       name + ".points");
-    }
   }
   for (int i = 0; i < chunk.sizes_size(); ++i) {
     if (!(chunk.sizes(i) > 0 && std::isfinite(chunk.sizes(i)))) {
@@ -45,11 +36,68 @@ absl::Status CheckSizes(const v1::SizeSamples& chunk, uint64_t first, int dimens
   return absl::OkStatus();
 }
 
+core::SizeMeasure MeasureOf(v1::SizeMeasure measure) {
+  return measure == v1::SIZE_MEASURE_EDGE_LENGTH ? core::SizeMeasure::kEdgeLength : core::SizeMeasure::kCircumradius;
+}
+
+}  // namespace
+
+absl::Status CheckSizes(const v1::SizeSamples& chunk, uint64_t first, int dimension, std::string_view field) {
+  const std::string name(field);
+  if (chunk.points_size() != chunk.sizes_size() * dimension) {
+    return MakeError(
+        v1::ERROR_REASON_INVALID_CHUNK_SHAPE,
+        absl::StrCat("the chunk of sizes after sample ", first, " has ", chunk.points_size(), " coordinates for ",
+                     chunk.sizes_size(), " sizes; expected ", dimension, " for each, as parameters.dimension says"),
+        name + ".points");
+  }
+  for (int i = 0; i < chunk.points_size(); ++i) {
+    if (!std::isfinite(chunk.points(i))) {
+      return MakeError(v1::ERROR_REASON_INVALID_SIZES,
+                       absl::StrCat(name, ".points[", first + i / dimension, "]: coordinate ", i % dimension, " is ",
+                                    chunk.points(i), "; a finite number is needed"),
+                       name + ".points");
+    }
+  }
+  return CheckValues(chunk, first, name);
+}
+
+absl::Status CheckSizes(const v1::VertexSizes& chunk, uint64_t first, std::string_view field) {
+  return CheckValues(chunk, first, std::string(field));
+}
+
+std::vector<store::v1::SizesRecord> RecordsOf(const core::SizeSamples& samples, int dimension) {
+  std::vector<store::v1::SizesRecord> records;
+  const size_t count = samples.sizes.size();
+  for (size_t begin = 0; begin < count; begin += kSamplesOfRecord) {
+    const size_t end = std::min(count, begin + kSamplesOfRecord);
+    v1::SizeSamples& part = *records.emplace_back().mutable_samples();
+    const double* points = samples.points.data();
+    part.mutable_points()->Assign(points + begin * dimension, points + end * dimension);
+    part.mutable_sizes()->Assign(samples.sizes.data() + begin, samples.sizes.data() + end);
+    part.set_measure(samples.measure == core::SizeMeasure::kEdgeLength ? v1::SIZE_MEASURE_EDGE_LENGTH
+                                                                       : v1::SIZE_MEASURE_CIRCUMRADIUS);
+  }
+  return records;
+}
+
+std::shared_ptr<const core::SizeSamples> SamplesOf(const std::vector<store::v1::SizesRecord>& records) {
+  SizeStore store;
+  for (const store::v1::SizesRecord& record : records) {
+    store.Append(record.samples());
+  }
+  return store.Take();
+}
+
 void SizeStore::Append(const v1::SizeSamples& chunk) {
   samples_.points.insert(samples_.points.end(), chunk.points().begin(), chunk.points().end());
   samples_.sizes.insert(samples_.sizes.end(), chunk.sizes().begin(), chunk.sizes().end());
-  samples_.measure = chunk.measure() == v1::SIZE_MEASURE_EDGE_LENGTH ? core::SizeMeasure::kEdgeLength
-                                                                     : core::SizeMeasure::kCircumradius;
+  samples_.measure = MeasureOf(chunk.measure());
+}
+
+void SizeStore::Append(const v1::VertexSizes& chunk) {
+  samples_.sizes.insert(samples_.sizes.end(), chunk.sizes().begin(), chunk.sizes().end());
+  samples_.measure = MeasureOf(chunk.measure());
 }
 
 std::shared_ptr<const core::SizeSamples> SizeStore::Take() {

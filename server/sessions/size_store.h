@@ -5,10 +5,13 @@
 #include <cstdint>
 #include <memory>
 #include <string_view>
+#include <vector>
 
 #include "absl/status/status.h"
 #include "core/geometry/criterion.h"
+#include "wellspace/store/v1/records.pb.h"
 #include "wellspace/v1/mesh.pb.h"
+#include "wellspace/v1/sessions.pb.h"
 
 namespace wellspace::server {
 
@@ -18,6 +21,13 @@ namespace wellspace::server {
 // Complexity: O(samples of the chunk).
 // Errors:     INVALID_CHUNK_SHAPE; INVALID_SIZES, naming the sample.
 absl::Status CheckSizes(const v1::SizeSamples& chunk, uint64_t first, int dimension, std::string_view field);
+// The same of sizes of vertices, without points.
+absl::Status CheckSizes(const v1::VertexSizes& chunk, uint64_t first, std::string_view field);
+
+// What is written down of `samples`: several records, if they are many.
+std::vector<store::v1::SizesRecord> RecordsOf(const core::SizeSamples& samples, int dimension);
+// What was written down.
+std::shared_ptr<const core::SizeSamples> SamplesOf(const std::vector<store::v1::SizesRecord>& records);
 
 // Samples that grow at the end.
 //
@@ -27,6 +37,14 @@ class SizeStore {
  public:
   // The measure is from now on that of `chunk`.
   void Append(const v1::SizeSamples& chunk);
+
+  // Sizes alone, whose points come later, by SetPoints.
+  void Append(const v1::VertexSizes& chunk);
+  // Takes the points of the samples: count() x dimension, row-major.
+  template <typename Coordinates>
+  void SetPoints(const Coordinates& points) {
+    samples_.points.assign(points.begin(), points.end());
+  }
 
   uint64_t count() const { return samples_.sizes.size(); }
   uint64_t bytes() const { return samples_.bytes(); }

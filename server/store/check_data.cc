@@ -1,5 +1,6 @@
 #include "server/store/check_data.h"
 
+#include <map>
 #include <memory>
 #include <set>
 #include <utility>
@@ -26,6 +27,7 @@ class SessionCheck {
   std::vector<std::string> Run() {
     CheckPoints();
     CheckFeatures();
+    CheckSizes();
     CheckOperations();
     CheckMesh();
     return std::move(problems_);
@@ -81,6 +83,37 @@ class SessionCheck {
     }
   }
 
+  void CheckSizes() {
+    const auto sets = tables_.ReadSizes(state_.name());
+    if (!sets.ok()) {
+      Add(sets.status());
+      return;
+    }
+    std::map<uint64_t, uint64_t> counts;
+    for (const StoredSizes& set : *sets) {
+      for (const store::v1::SizesRecord& part : set.parts) {
+        counts[set.number] += part.samples().sizes_size();
+      }
+    }
+    const auto check = [&](uint64_t number, uint64_t count) {
+      if (number != 0 && counts[number] != count) {
+        Add("there are ", count, " sizes in set ", number, ", and ", counts[number], " in its records");
+      }
+    };
+    check(state_.sizes(), state_.size_count());
+    // Those before the structure began anew are not needed any more.
+    std::map<uint64_t, uint64_t> needed;
+    for (const store::v1::StepRecord& step : session_.steps) {
+      if (step.refined().begins()) {
+        needed.clear();
+      }
+      needed[step.refined().sizes()] = step.refined().size_count();
+    }
+    for (const auto& [number, count] : needed) {
+      check(number, count);
+    }
+  }
+
   void CheckOperations() {
     for (const store::v1::OperationRecord& operation : session_.operations) {
       if (operation.number() >= state_.next_operation()) {
@@ -112,7 +145,7 @@ bool HasChanged(SessionTables& tables, const store::v1::SessionRecord& state) {
   return now.ok() &&
          (!now->has_value() || (*now)->revision() != state.revision() || (*now)->points() != state.points() ||
           (*now)->segments() != state.segments() || (*now)->next_operation() != state.next_operation() ||
-          (*now)->mesh().revision() != state.mesh().revision());
+          (*now)->sizes() != state.sizes() || (*now)->mesh().revision() != state.mesh().revision());
 }
 
 void Count(const StoredSessions& stored, DataReport& report) {

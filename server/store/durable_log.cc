@@ -20,6 +20,11 @@ uint64_t BytesOf(const SessionChange& change) {
   for (const store::v1::StepRecord& step : change.steps) {
     bytes += step.ByteSizeLong();
   }
+  if (change.sizes.has_value()) {
+    for (const store::v1::SizesRecord& part : change.sizes->parts) {
+      bytes += part.ByteSizeLong();
+    }
+  }
   return bytes;
 }
 

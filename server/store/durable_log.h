@@ -49,6 +49,9 @@ class DurableLog final : public SessionLog {
   absl::StatusOr<std::vector<store::v1::StepRecord::Features>> ReadFeatures(const std::string& session) override {
     return tables_->ReadFeatures(session);
   }
+  absl::StatusOr<std::vector<StoredSizes>> ReadSizes(const std::string& session) override {
+    return tables_->ReadSizes(session);
+  }
   std::unique_ptr<PointStore> OpenPoints(const std::string& session, int dimension,
                                          std::vector<store::v1::StepRecord::Points> committed) override;
   absl::StatusOr<std::shared_ptr<MeshSnapshot>> KeepMesh(const std::string& session, uint64_t revision, core::Mesh mesh,

@@ -24,6 +24,9 @@ class EphemeralLog final : public SessionLog {
   absl::StatusOr<std::vector<store::v1::StepRecord::Features>> ReadFeatures(const std::string& /*session*/) override {
     return std::vector<store::v1::StepRecord::Features>();
   }
+  absl::StatusOr<std::vector<StoredSizes>> ReadSizes(const std::string& /*session*/) override {
+    return std::vector<StoredSizes>();
+  }
   std::unique_ptr<PointStore> OpenPoints(const std::string& /*session*/, int /*dimension*/,
                                          std::vector<store::v1::StepRecord::Points> /*committed*/) override {
     return std::make_unique<MemoryPoints>();

@@ -59,6 +59,10 @@ absl::StatusOr<core::Mesh> MemoryMesh::Load(const core::RunContext& context) con
   return copy;  // Update makes the rest anew
 }
 
+absl::StatusOr<core::HugeVector<double>> MemoryMesh::LoadPoints(const core::RunContext& context) const {
+  return Copy(chunks_->mesh().points, context);
+}
+
 absl::Status MemoryMesh::CheckSame(const core::Mesh& made) const {
   const core::Mesh& mesh = chunks_->mesh();
   const bool is_same = std::ranges::equal(mesh.points, made.points) &&

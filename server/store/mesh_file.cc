@@ -269,6 +269,14 @@ absl::StatusOr<core::Mesh> MeshFile::Load(const core::RunContext& context) const
   return mesh;
 }
 
+absl::StatusOr<core::HugeVector<double>> MeshFile::LoadPoints(const core::RunContext& context) const {
+  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const Directory> whole, directory());
+  WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<File> file, Open());
+  core::HugeVector<double> points;
+  WELLSPACE_RETURN_IF_ERROR(LoadArray(*file, *whole, v1::MeshChunk::kPointsFieldNumber, context, points));
+  return points;
+}
+
 absl::Status MeshFile::CheckSame(const core::Mesh& made) const {
   constexpr std::array kFields = {v1::MeshChunk::kPointsFieldNumber, v1::MeshChunk::kSimplicesFieldNumber,
                                   v1::MeshChunk::kWeightsFieldNumber, v1::MeshChunk::kFacetsFieldNumber,

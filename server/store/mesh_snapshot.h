@@ -9,6 +9,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "core/base/memory/huge_pages.h"
 #include "core/base/run_context.h"
 #include "core/mesh.h"
 #include "grpcpp/support/byte_buffer.h"
@@ -72,6 +73,11 @@ class MeshSnapshot {
   //
   // Errors:     CANCELLED, DEADLINE_EXCEEDED.
   virtual absl::StatusOr<core::Mesh> Load(const core::RunContext& context) const = 0;
+
+  // A copy of its points: vertices x dimension, row-major.
+  //
+  // Errors:     CANCELLED, DEADLINE_EXCEEDED.
+  virtual absl::StatusOr<core::HugeVector<double>> LoadPoints(const core::RunContext& context) const = 0;
 
   // Errors:     INTERNAL: `made` is another mesh.
   virtual absl::Status CheckSame(const core::Mesh& made) const = 0;

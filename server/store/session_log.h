@@ -19,6 +19,12 @@
 
 namespace wellspace::server {
 
+// A set of sizes at points, which a session has, or has had for a step that is taken again by Replay.
+struct StoredSizes {
+  uint64_t number = 0;  // of those of its session; above 0
+  std::vector<store::v1::SizesRecord> parts;
+};
+
 // What changes with one change of a session: all of it, or nothing.
 struct SessionChange {
   std::string session;                                   // its name
@@ -26,6 +32,8 @@ struct SessionChange {
   std::vector<store::v1::StepRecord> steps{};            // come behind those that there are
   std::vector<store::v1::OperationRecord> operations{};  // new, or in the place of those of their numbers
   std::vector<uint64_t> dropped_operations{};            // their numbers
+  std::optional<StoredSizes> sizes{};                    // a new set
+  std::vector<uint64_t> dropped_sizes{};                 // the numbers of sets
   std::optional<store::v1::AnswerRecord> answer{};       // to the request that has made the change
   bool is_deletion = false;                              // of the session and all that it has
 };
@@ -36,7 +44,8 @@ struct AnswerKey {
   std::string request_id;
 };
 
-// A session as it was written down. Its features are read when they are needed (SessionLog::ReadFeatures).
+// A session as it was written down. Its features and sizes are read when they are needed (SessionLog::ReadFeatures,
+// ReadSizes).
 struct StoredSession {
   store::v1::SessionRecord state;
   std::vector<store::v1::StepRecord> steps;            // all but those of features, in their order
@@ -86,6 +95,11 @@ class SessionLog {
   //
   // Errors:     DATA_LOSS.
   virtual absl::StatusOr<std::vector<store::v1::StepRecord::Features>> ReadFeatures(const std::string& session) = 0;
+
+  // The sets of sizes of a session, ascending by number.
+  //
+  // Errors:     DATA_LOSS.
+  virtual absl::StatusOr<std::vector<StoredSizes>> ReadSizes(const std::string& session) = 0;
 
   // The points of a session of `dimension`, of which `committed` are there.
   virtual std::unique_ptr<PointStore> OpenPoints(const std::string& session, int dimension,

@@ -28,6 +28,9 @@ constexpr std::array kMigrations = {
     "                        crc32c INTEGER NOT NULL, PRIMARY KEY(session, number)) WITHOUT ROWID;"
     "CREATE TABLE answers(tenant TEXT NOT NULL, request_id TEXT NOT NULL, record BLOB NOT NULL, time INTEGER NOT NULL,"
     "                     crc32c INTEGER NOT NULL, PRIMARY KEY(tenant, request_id)) WITHOUT ROWID;",
+    // number: of the set, of which each row is a part.
+    "CREATE TABLE sizes(session INTEGER NOT NULL, number INTEGER NOT NULL, part INTEGER NOT NULL, record BLOB NOT NULL,"
+    "                   crc32c INTEGER NOT NULL, PRIMARY KEY(session, number, part)) WITHOUT ROWID;",
 };
 
 absl::Status Migrate(SqliteDatabase& database, int64_t version) {

@@ -24,6 +24,9 @@ std::string KeyOfStep(int64_t session, int64_t number, int64_t kind) {
   return absl::StrCat("step ", session, " ", number, " ", kind);
 }
 std::string KeyOfOperation(int64_t session, int64_t number) { return absl::StrCat("operation ", session, " ", number); }
+std::string KeyOfSizes(int64_t session, int64_t number, int64_t part) {
+  return absl::StrCat("sizes ", session, " ", number, " ", part);
+}
 std::string KeyOfAnswer(std::string_view tenant, std::string_view request_id) {
   return absl::StrCat("answer ", tenant.size(), " ", std::string(tenant), " ", std::string(request_id));
 }
@@ -44,6 +47,7 @@ struct SessionTables::Statements {
   SqliteStatement find_session, insert_session, update_session, delete_session, read_session;
   SqliteStatement next_step, insert_step, delete_steps, read_features;
   SqliteStatement put_operation, drop_operation, delete_operations;
+  SqliteStatement insert_sizes, read_sizes, drop_sizes, delete_sizes;
   SqliteStatement put_answer, drop_answer;
 };
 
@@ -102,6 +106,11 @@ absl::Status SessionTables::Prepare() {
       {&statements_->put_operation, "REPLACE INTO operations(session, number, record, crc32c) VALUES(?, ?, ?, ?)"},
       {&statements_->drop_operation, "DELETE FROM operations WHERE session = ? AND number = ?"},
       {&statements_->delete_operations, "DELETE FROM operations WHERE session = ?"},
+      {&statements_->insert_sizes, "INSERT INTO sizes(session, number, part, record, crc32c) VALUES(?, ?, ?, ?, ?)"},
+      {&statements_->read_sizes,
+       "SELECT session, number, part, record, crc32c FROM sizes WHERE session = ? ORDER BY number, part"},
+      {&statements_->drop_sizes, "DELETE FROM sizes WHERE session = ? AND number = ?"},
+      {&statements_->delete_sizes, "DELETE FROM sizes WHERE session = ?"},
       {&statements_->put_answer,
        "REPLACE INTO answers(tenant, request_id, record, time, crc32c) VALUES(?, ?, ?, ?, ?)"},
       {&statements_->drop_answer, "DELETE FROM answers WHERE tenant = ? AND request_id = ?"},
@@ -175,8 +184,8 @@ absl::Status SessionTables::Delete(const std::string& session) {
   if (!id.has_value()) {
     return absl::OkStatus();
   }
-  for (SqliteStatement* statement :
-       {&statements_->delete_steps, &statements_->delete_operations, &statements_->delete_session}) {
+  for (SqliteStatement* statement : {&statements_->delete_steps, &statements_->delete_operations,
+                                     &statements_->delete_sizes, &statements_->delete_session}) {
     statement->Bind(*id);
     WELLSPACE_RETURN_IF_ERROR(statement->Run());
   }
@@ -198,35 +207,67 @@ absl::Status SessionTables::Write(const SessionChange& change) {
     id = id.has_value() ? id : sqlite3_last_insert_rowid(database_->handle());
   }
   if (!id.has_value()) {
-    const bool is_of_none = change.steps.empty() && change.operations.empty() && change.dropped_operations.empty();
+    const bool is_of_none = change.steps.empty() && change.operations.empty() && change.dropped_operations.empty() &&
+                            !change.sizes.has_value();
     return is_of_none ? absl::OkStatus()
                       : MakeError(v1::ERROR_REASON_INTERNAL,
                                   absl::StrCat("no session ", change.session, " is written down that could change"));
   }
-  if (!change.steps.empty()) {
-    statements_->next_step.Bind(*id);
-    WELLSPACE_RETURN_IF_ERROR(statements_->next_step.Step().status());
-    int64_t number = statements_->next_step.Number(0);
-    statements_->next_step.Reset();
-    for (const store::v1::StepRecord& step : change.steps) {
-      const std::string record = step.SerializeAsString();
-      const int64_t kind = step.step_case();
-      statements_->insert_step.Bind(*id, number, kind, SqliteStatement::Blob{record},
-                                    ChecksumOf(KeyOfStep(*id, number, kind), record));
-      WELLSPACE_RETURN_IF_ERROR(statements_->insert_step.Run());
-      ++number;
-    }
+  WELLSPACE_RETURN_IF_ERROR(WriteSteps(*id, change.steps));
+  WELLSPACE_RETURN_IF_ERROR(WriteOperations(*id, change));
+  return WriteSizes(*id, change);
+}
+
+absl::Status SessionTables::WriteSteps(int64_t session, const std::vector<store::v1::StepRecord>& steps) {
+  if (steps.empty()) {
+    return absl::OkStatus();
   }
+  statements_->next_step.Bind(session);
+  WELLSPACE_RETURN_IF_ERROR(statements_->next_step.Step().status());
+  int64_t number = statements_->next_step.Number(0);
+  statements_->next_step.Reset();
+  for (const store::v1::StepRecord& step : steps) {
+    const std::string record = step.SerializeAsString();
+    const int64_t kind = step.step_case();
+    statements_->insert_step.Bind(session, number, kind, SqliteStatement::Blob{record},
+                                  ChecksumOf(KeyOfStep(session, number, kind), record));
+    WELLSPACE_RETURN_IF_ERROR(statements_->insert_step.Run());
+    ++number;
+  }
+  return absl::OkStatus();
+}
+
+absl::Status SessionTables::WriteOperations(int64_t session, const SessionChange& change) {
   for (const store::v1::OperationRecord& operation : change.operations) {
     const std::string record = operation.SerializeAsString();
     const auto number = static_cast<int64_t>(operation.number());
-    statements_->put_operation.Bind(*id, number, SqliteStatement::Blob{record},
-                                    ChecksumOf(KeyOfOperation(*id, number), record));
+    statements_->put_operation.Bind(session, number, SqliteStatement::Blob{record},
+                                    ChecksumOf(KeyOfOperation(session, number), record));
     WELLSPACE_RETURN_IF_ERROR(statements_->put_operation.Run());
   }
   for (const uint64_t number : change.dropped_operations) {
-    statements_->drop_operation.Bind(*id, number);
+    statements_->drop_operation.Bind(session, number);
     WELLSPACE_RETURN_IF_ERROR(statements_->drop_operation.Run());
+  }
+  return absl::OkStatus();
+}
+
+absl::Status SessionTables::WriteSizes(int64_t session, const SessionChange& change) {
+  for (const uint64_t number : change.dropped_sizes) {
+    statements_->drop_sizes.Bind(session, number);
+    WELLSPACE_RETURN_IF_ERROR(statements_->drop_sizes.Run());
+  }
+  if (!change.sizes.has_value()) {
+    return absl::OkStatus();
+  }
+  const auto number = static_cast<int64_t>(change.sizes->number);
+  int64_t part = 0;
+  for (const store::v1::SizesRecord& sizes : change.sizes->parts) {
+    const std::string record = sizes.SerializeAsString();
+    statements_->insert_sizes.Bind(session, number, part, SqliteStatement::Blob{record},
+                                   ChecksumOf(KeyOfSizes(session, number, part), record));
+    WELLSPACE_RETURN_IF_ERROR(statements_->insert_sizes.Run());
+    ++part;
   }
   return absl::OkStatus();
 }
@@ -377,6 +418,29 @@ absl::StatusOr<std::vector<store::v1::StepRecord::Features>> SessionTables::Read
     return std::string();
   }));
   return features;
+}
+
+absl::StatusOr<std::vector<StoredSizes>> SessionTables::ReadSizes(const std::string& session) {
+  const std::lock_guard lock(mutex_);
+  std::vector<StoredSizes> sets;
+  WELLSPACE_ASSIGN_OR_RETURN(const std::optional<int64_t> id, FindId(session));
+  if (!id.has_value()) {
+    return sets;
+  }
+  SqliteStatement& read = statements_->read_sizes;
+  read.Bind(*id);
+  WELLSPACE_RETURN_IF_ERROR(ForEach(read, nullptr, [&](const SqliteStatement& row) {
+    const auto number = static_cast<uint64_t>(row.Number(1));
+    if (sets.empty() || sets.back().number != number) {
+      sets.push_back({.number = number, .parts = {}});
+    }
+    if (!ParseRecord(KeyOfSizes(row.Number(0), row.Number(1), row.Number(2)), row.Bytes(3), row.Number(4),
+                     sets.back().parts.emplace_back())) {
+      return absl::StrCat("part ", row.Number(2), " of sizes ", number, " of session '", session, "' is damaged");
+    }
+    return std::string();
+  }));
+  return sets;
 }
 
 absl::StatusOr<std::optional<store::v1::SessionRecord>> SessionTables::ReadState(const std::string& session) {

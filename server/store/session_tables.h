@@ -57,6 +57,7 @@ class SessionTables {
   absl::StatusOr<StoredSessions> Load(std::vector<std::string>* problems = nullptr);
 
   absl::StatusOr<std::vector<store::v1::StepRecord::Features>> ReadFeatures(const std::string& session);
+  absl::StatusOr<std::vector<StoredSizes>> ReadSizes(const std::string& session);
 
   // None: there is no such session.
   absl::StatusOr<std::optional<store::v1::SessionRecord>> ReadState(const std::string& session);
@@ -80,6 +81,9 @@ class SessionTables {
   absl::Status ApplyOne(const SessionChange& change);
   absl::Status Delete(const std::string& session);
   absl::Status Write(const SessionChange& change);
+  absl::Status WriteSteps(int64_t session, const std::vector<store::v1::StepRecord>& steps);
+  absl::Status WriteOperations(int64_t session, const SessionChange& change);
+  absl::Status WriteSizes(int64_t session, const SessionChange& change);
   absl::Status WriteAnswer(const store::v1::AnswerRecord& answer);
   absl::StatusOr<std::optional<int64_t>> FindId(const std::string& session);
   absl::Status SetSurvives(SessionLog::Survives survives);

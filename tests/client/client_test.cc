@@ -40,10 +40,14 @@ class MockConnection : public Connection {
   MOCK_METHOD(absl::StatusOr<AddedSegments>, AddSegments,
               (const std::string&, const Features&, const std::optional<FeatureOffset>&, const CallOptions&),
               (override));
+  MOCK_METHOD(absl::StatusOr<SizesSet>, SetSizes, (const std::string&, const SizeSamples&, const CallOptions&),
+              (override));
+  MOCK_METHOD(absl::StatusOr<SizesSet>, SetVertexSizes, (const std::string&, const VertexSizes&, const CallOptions&),
+              (override));
   MOCK_METHOD(absl::Status, DownloadMesh,
               (const std::string&, MeshSink&, uint64_t, const OnChunks&, const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<Operation>, StartRefinement,
-              (const std::string&, const std::optional<MeshOptions>&, const CallOptions&), (override));
+              (const std::string&, const RefinementOptions&, const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<Operation>, GetOperation, (const std::string&, const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<OperationPage>, ListOperations,
               (const std::string&, const PageOptions&, const CallOptions&), (override));
@@ -98,6 +102,8 @@ TEST(Client, PassesSessionsAndOperationsToItsConnection) {
   const std::vector<double> points = {1, 2};
   SpanSource source(2, points);
   const Features features;
+  const SizeSamples samples;
+  const VertexSizes vertex_sizes;
   MeshCollector sink;
   EXPECT_CALL(*connection, CreateSession(_, is_call)).WillOnce(Return(E("create")));
   EXPECT_CALL(*connection, GetSession("s", is_call)).WillOnce(Return(E("get")));
@@ -109,8 +115,12 @@ TEST(Client, PassesSessionsAndOperationsToItsConnection) {
       .WillOnce(Return(E("upload")));
   EXPECT_CALL(*connection, AddSegments("s", ::testing::Ref(features), Optional(FeatureOffset{7, 8}), is_call))
       .WillOnce(Return(E("segments")));
+  EXPECT_CALL(*connection, SetSizes("s", ::testing::Ref(samples), is_call)).WillOnce(Return(E("sizes")));
+  EXPECT_CALL(*connection, SetVertexSizes("s", ::testing::Ref(vertex_sizes), is_call))
+      .WillOnce(Return(E("vertex sizes")));
   EXPECT_CALL(*connection, DownloadMesh("s", ::testing::Ref(sink), 6, _, is_call)).WillOnce(Return(E("download")));
-  EXPECT_CALL(*connection, StartRefinement("s", _, is_call)).WillOnce(Return(E("start")));
+  EXPECT_CALL(*connection, StartRefinement("s", Field(&RefinementOptions::restart, true), is_call))
+      .WillOnce(Return(E("start")));
   EXPECT_CALL(*connection, GetOperation("o", is_call)).WillOnce(Return(E("operation")));
   EXPECT_CALL(*connection, ListOperations("s", Field(&PageOptions::page_size, 2), is_call))
       .WillOnce(Return(E("operations")));
@@ -123,8 +133,10 @@ TEST(Client, PassesSessionsAndOperationsToItsConnection) {
   EXPECT_EQ(client.DeleteSession("s", call), E("delete"));
   EXPECT_EQ(client.UploadPoints("s", source, 5, nullptr, call).status(), E("upload"));
   EXPECT_EQ(client.AddSegments("s", features, FeatureOffset{7, 8}, call).status(), E("segments"));
+  EXPECT_EQ(client.SetSizes("s", samples, call).status(), E("sizes"));
+  EXPECT_EQ(client.SetVertexSizes("s", vertex_sizes, call).status(), E("vertex sizes"));
   EXPECT_EQ(client.DownloadMesh("s", sink, 6, nullptr, call), E("download"));
-  EXPECT_EQ(client.StartRefinement("s", std::nullopt, call).status(), E("start"));
+  EXPECT_EQ(client.StartRefinement("s", {.restart = true}, call).status(), E("start"));
   EXPECT_EQ(client.GetOperation("o", call).status(), E("operation"));
   EXPECT_EQ(client.ListOperations("s", {.page_size = 2, .page_token = ""}, call).status(), E("operations"));
   EXPECT_EQ(client.CancelOperation("o", call).status(), E("cancel"));

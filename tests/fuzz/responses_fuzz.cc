@@ -252,7 +252,7 @@ constexpr std::array kCalls = {
       const auto count = [](uint64_t done, uint64_t total) { Require(done <= total, "chunks are counted"); };
       return c.DownloadMesh(kSession, sink, 0, count, Patience());
     }},
-    Call{[](client::Connection& c) { return c.StartRefinement(kSession, std::nullopt, Patience()).status(); }},
+    Call{[](client::Connection& c) { return c.StartRefinement(kSession, {}, Patience()).status(); }},
     Call{[](client::Connection& c) { return c.GetOperation(kSession, Patience()).status(); }},
     Call{[](client::Connection& c) { return c.ListOperations(kSession, {}, Patience()).status(); }},
     Call{[](client::Connection& c) { return c.CancelOperation(kSession, Patience()).status(); }},

@@ -159,6 +159,14 @@ v1::AddSegmentsResponse SessionCalls::AddSegments(const std::vector<v1::AddSegme
   return response;
 }
 
+v1::SetSizesResponse SessionCalls::SetSizes(const std::vector<v1::SetSizesRequest>& requests, grpc::Status* status) {
+  grpc::ClientContext context;
+  v1::SetSizesResponse response;
+  const auto stream = sessions_->SetSizes(&context, &response);
+  SendAll(*stream, requests, status);
+  return response;
+}
+
 v1::Operation SessionCalls::Start(const v1::StartRefinementRequest& request, grpc::Status* status) {
   return Call(*operations_, &v1::OperationService::Stub::StartRefinement, request, status).operation();
 }
@@ -187,7 +195,13 @@ v1::Operation SessionCalls::Cancel(const std::string& name, grpc::Status* status
 }
 
 v1::Operation SessionCalls::Refine(const std::string& name) {
-  Watch watch(*operations_, Start(name).name());
+  v1::StartRefinementRequest request;
+  request.set_name(name);
+  return Refine(request);
+}
+
+v1::Operation SessionCalls::Refine(const v1::StartRefinementRequest& request) {
+  Watch watch(*operations_, Start(request).name());
   const grpc::Status status = watch.Finish();
   EXPECT_TRUE(status.ok()) << status.error_message();
   return watch.operation.value_or(v1::Operation());
@@ -218,6 +232,15 @@ Download SessionCalls::DownloadMesh(const std::string& name, uint64_t revision, 
   }
   download.status = stream->Finish();
   return download;
+}
+
+v1::SetSizesRequest SizesRequest(const std::string& name, const std::vector<double>& points,
+                                 const std::vector<double>& sizes) {
+  v1::SetSizesRequest request;
+  request.set_name(name);
+  request.mutable_samples()->mutable_points()->Assign(points.begin(), points.end());
+  request.mutable_samples()->mutable_sizes()->Assign(sizes.begin(), sizes.end());
+  return request;
 }
 
 std::vector<double> FramePoints() { return {0, 0, 4, 0, 4, 4, 0, 4, 1, 1, 3, 1, 3, 3, 1, 3}; }

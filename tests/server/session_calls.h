@@ -72,6 +72,9 @@ class SessionCalls {
   v1::AddSegmentsResponse AddSegments(const std::vector<v1::AddSegmentsRequest>& requests,
                                       grpc::Status* status = nullptr);
 
+  // One stream of these requests.
+  v1::SetSizesResponse SetSizes(const std::vector<v1::SetSizesRequest>& requests, grpc::Status* status = nullptr);
+
   v1::Operation Start(const v1::StartRefinementRequest& request, grpc::Status* status = nullptr);
   v1::Operation Start(const std::string& name, grpc::Status* status = nullptr);
   v1::Operation GetOperation(const std::string& name, grpc::Status* status = nullptr);
@@ -79,6 +82,7 @@ class SessionCalls {
   v1::Operation Cancel(const std::string& name, grpc::Status* status = nullptr);
   // Starts a refinement and watches it to its end.
   v1::Operation Refine(const std::string& name);
+  v1::Operation Refine(const v1::StartRefinementRequest& request);
 
   // Downloads a mesh from `next_chunk` on. Breaks off when `stop_after` chunks have come.
   Download DownloadMesh(const std::string& name, uint64_t revision = 0, uint64_t next_chunk = 0,
@@ -121,6 +125,10 @@ class SessionClient {
 };
 
 v1::UploadPointsRequest UploadRequest(const std::string& name, uint64_t offset, const std::vector<double>& coordinates);
+
+// Samples of sizes in the plane, row by row.
+v1::SetSizesRequest SizesRequest(const std::string& name, const std::vector<double>& points,
+                                 const std::vector<double>& sizes);
 
 // A square of side 4 around one of side 2, which is a hole, with two lines from one to the other: points, and a request
 // with 10 segments, which have the markers 5, 9 and 0, and 2 seeds, of the hole and of region 3 on a side of the lines.

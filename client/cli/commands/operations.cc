@@ -10,6 +10,7 @@
 #include "client/cli/progress_bar.h"
 #include "client/cli/remote_command.h"
 #include "client/cli/session_options.h"
+#include "client/cli/size_field_options.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::cli {
@@ -56,26 +57,49 @@ struct OperationCommand {
   RemoteCommand remote;
   ParameterOptions parameters;
   std::string name;
+  SizeFieldOptions sizes;
+  bool no_sizes = false;
+  bool restart = false;
   bool detach = false;
   uint64_t expected_revision = 0;
 
-  absl::StatusOr<client::Operation> Start(client::Client& client, client::CallOptions call) const;
-  int Refine() const;
+  absl::Status SetSizes(client::Client& client, client::CallOptions& call);
+  absl::StatusOr<client::Operation> Start(client::Client& client, client::CallOptions call);
+  int Refine();
   int Watch() const;
   int Cancel() const;
 };
 
-absl::StatusOr<client::Operation> OperationCommand::Start(client::Client& client, client::CallOptions call) const {
-  std::optional<client::MeshOptions> changed;
+// Gives the session the sizes of the file, or takes those that it has. The revision that the refinement expects, if it
+// expects one, is then that after this.
+absl::Status OperationCommand::SetSizes(client::Client& client, client::CallOptions& call) {
+  client::SizeSamples samples;
+  if (sizes.IsGiven()) {
+    WELLSPACE_ASSIGN_OR_RETURN(const client::Session session, client.GetSession(name, call));
+    WELLSPACE_ASSIGN_OR_RETURN(const auto read, sizes.Read(session.parameters.dimension));
+    samples = *read;
+  } else if (!no_sizes) {
+    return absl::OkStatus();
+  }
+  const absl::StatusOr<client::SizesSet> set = client.SetSizes(name, samples, call);
+  if (!set.ok()) {
+    return sizes.WithOrigins(set.status());
+  }
+  call.expected_revision = call.expected_revision == 0 ? 0 : set->revision;
+  return absl::OkStatus();
+}
+
+absl::StatusOr<client::Operation> OperationCommand::Start(client::Client& client, client::CallOptions call) {
+  client::RefinementOptions refinement{.restart = restart};
   if (parameters.has_quality()) {
     WELLSPACE_ASSIGN_OR_RETURN(const client::Session session, client.GetSession(name, call));
-    WELLSPACE_ASSIGN_OR_RETURN(client::MeshOptions replaced, parameters.Replace(session.parameters));
-    changed = std::move(replaced);
+    WELLSPACE_ASSIGN_OR_RETURN(refinement.parameters, parameters.Replace(session.parameters));
   }
+  call.expected_revision = expected_revision;
+  WELLSPACE_RETURN_IF_ERROR(SetSizes(client, call));
   // Not stopped by Ctrl-C: a user that does not learn that an operation was started cannot cancel it.
   call.stop = {};
-  call.expected_revision = expected_revision;
-  absl::StatusOr<client::Operation> started = client.StartRefinement(name, changed, call);
+  absl::StatusOr<client::Operation> started = client.StartRefinement(name, refinement, call);
   return started.ok() ? started : parameters.Explain(started.status());
 }
 
@@ -90,7 +114,7 @@ absl::Status CancelNow(client::Client& client, const std::string& operation) {
   return absl::CancelledError(absl::StrCat("interrupted; ", operation, " is cancelled, its session keeps its points"));
 }
 
-int OperationCommand::Refine() const {
+int OperationCommand::Refine() {
   if (const absl::Status status = parameters.Check(); !status.ok()) {
     return ReportError(status, remote.format());
   }
@@ -111,7 +135,7 @@ int OperationCommand::Refine() const {
       return absl::Status(ended.status().code(), absl::StrCat(ended.status().message(), "; ", started.name, fate));
     }
     PrintEnd(remote, *ended, /*indented=*/true);
-    return parameters.Explain(EndOf(*ended));
+    return sizes.WithOrigins(parameters.Explain(EndOf(*ended)));
   });
 }
 
@@ -156,6 +180,14 @@ void AddOperationCommands(CLI::App& app, int& exit_code) {
   refine_app->footer(kExitCodesHelp);
   AddSession(*refine_app, refine->name);
   refine->parameters.AddQualityTo(*refine_app);
+  CLI::Option* field = refine->sizes.AddTo(*refine_app);
+  refine_app
+      ->add_flag("--no-size-field", refine->no_sizes,
+                 "The session has no sizes at points any more; without this and --size-field it keeps those it has")
+      ->excludes(field);
+  refine_app->add_flag("--restart", refine->restart,
+                       "Make the mesh anew, from the points of the session alone: it becomes coarser where sizes have "
+                       "grown, and vertices get new numbers");
   refine_app->add_flag("--detach", refine->detach,
                        "Do not wait: print the name of the operation, for watch and cancel");
   AddExpectedRevision(*refine_app, refine->expected_revision);

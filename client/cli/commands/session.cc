@@ -66,6 +66,9 @@ void PrintSession(const client::Session& session, bool json) {
     print("faces", absl::StrCat(FaceRuleName(*session.faces), ", ", WithThousands(session.seed_count),
                                 " holes and regions", session.split_crossings ? ", crossings split" : ""));
   }
+  if (session.size_count > 0) {
+    print("sizes", absl::StrCat("at ", WithThousands(session.size_count), " points"));
+  }
   print("vertices", WithThousands(session.vertex_count));
   print("simplices", WithThousands(session.simplex_count));
   print("revision", absl::StrCat(session.revision));

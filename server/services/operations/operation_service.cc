@@ -27,7 +27,8 @@ absl::Status Start(const CallEnvironment& environment, const Caller& caller, con
     *response.mutable_operation() = started;
     return identified.Answer(response);
   };
-  return StartRefinement(environment, session, parameters, request.expected_revision(), answer).status();
+  return StartRefinement(environment, session, parameters, request.restart(), request.expected_revision(), answer)
+      .status();
 }
 
 absl::Status Get(const CallEnvironment& environment, const Caller& caller, const v1::GetOperationRequest& request,

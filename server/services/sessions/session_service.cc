@@ -15,6 +15,7 @@
 #include "server/services/session_fields.h"
 #include "server/services/sessions/add_segments_call.h"
 #include "server/services/sessions/download_mesh_call.h"
+#include "server/services/sessions/set_sizes_call.h"
 #include "server/services/sessions/upload_points_call.h"
 #include "server/sessions/refinement.h"
 #include "server/sessions/session_store.h"
@@ -171,6 +172,11 @@ grpc::ServerReadReactor<grpc::ByteBuffer>* SessionService::UploadPoints(grpc::Ca
 grpc::ServerReadReactor<grpc::ByteBuffer>* SessionService::AddSegments(grpc::CallbackServerContext* context,
                                                                        grpc::ByteBuffer* response) {
   return AddSegmentsCall::Begin(std::make_shared<AddSegmentsCall>(environment_, context, response));
+}
+
+grpc::ServerReadReactor<grpc::ByteBuffer>* SessionService::SetSizes(grpc::CallbackServerContext* context,
+                                                                    grpc::ByteBuffer* response) {
+  return SetSizesCall::Begin(std::make_shared<SetSizesCall>(environment_, context, response));
 }
 
 grpc::ServerWriteReactor<grpc::ByteBuffer>* SessionService::DownloadMesh(grpc::CallbackServerContext* context,

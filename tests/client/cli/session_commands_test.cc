@@ -222,6 +222,68 @@ TEST_F(SessionCommandsTest, UploadSendsTheFileAndNamesLinesInErrors) {
 }
 
 // A triangle, with a hole of no segments.
+class RefineWithSizesTest : public SessionCommandsTest {
+ protected:
+  RefineWithSizesTest() {
+    server_.sessions.get = [](const v1::GetSessionRequest&, v1::GetSessionResponse& response) {
+      *response.mutable_session() = MakeSession();
+      return grpc::Status::OK;
+    };
+    server_.sessions.set_sizes = [this](grpc::ServerContext&, auto& reader, v1::SetSizesResponse& response) {
+      v1::SetSizesRequest request;
+      while (reader.Read(&request)) {
+        sizes_.push_back(request);
+      }
+      response.set_revision(8);
+      return error_;
+    };
+    server_.operations.start = [this](const v1::StartRefinementRequest& request,
+                                      v1::StartRefinementResponse& response) {
+      start_ = request;
+      response.mutable_operation()->set_name("sessions/one/operations/1");
+      return grpc::Status::OK;
+    };
+  }
+
+  std::vector<v1::SetSizesRequest> sizes_;
+  v1::StartRefinementRequest start_;
+  grpc::Status error_;
+};
+
+TEST_F(RefineWithSizesTest, SizesComeBeforeTheRefinement) {
+  const std::string field = folder_.Write("sizes.csv", "x,y,h\n1,2,0.5\n4,5,0.25\n");
+  const RunResult result = Run({"refine", "one", "--detach", "--size-field", field, "--size-unit", "edge", "--restart",
+                                "--expected-revision", "7"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  ASSERT_EQ(sizes_.size(), 1u);
+  EXPECT_EQ(sizes_[0].name(), kSession);
+  EXPECT_EQ(sizes_[0].expected_revision(), 7u);
+  EXPECT_THAT(sizes_[0].samples().points(), ElementsAre(1, 2, 4, 5));
+  EXPECT_THAT(sizes_[0].samples().sizes(), ElementsAre(0.5, 0.25));
+  EXPECT_EQ(sizes_[0].samples().measure(), v1::SIZE_MEASURE_EDGE_LENGTH);
+  EXPECT_EQ(start_.expected_revision(), 8u) << "that after the sizes";
+  EXPECT_TRUE(start_.restart());
+}
+
+TEST_F(RefineWithSizesTest, SizesAreTakenBack) {
+  ASSERT_EQ(Run({"refine", "one", "--detach"}).exit_code, 0);
+  EXPECT_TRUE(sizes_.empty());
+  EXPECT_FALSE(start_.restart());
+  ASSERT_EQ(Run({"refine", "one", "--detach", "--no-size-field"}).exit_code, 0);
+  ASSERT_EQ(sizes_.size(), 1u);
+  EXPECT_EQ(sizes_[0].samples().sizes_size(), 0);
+}
+
+TEST_F(RefineWithSizesTest, ErrorsNameTheLineOfTheFile) {
+  error_ = MakeError(grpc::StatusCode::INVALID_ARGUMENT, "samples.points[1]: coordinate 0 is 4; in the domain …",
+                     "ERROR_REASON_INVALID_SIZES");
+  const std::string field = folder_.Write("sizes.csv", "x,y,h\n1,2,0.5\n4,5,0.25\n");
+  const RunResult result = Run({"refine", "one", "--detach", "--size-field", field});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("sizes.csv:3"));
+  EXPECT_TRUE(start_.name().empty());
+}
+
 constexpr char kTriangle[] = "3 2 0 0\n1 0 0\n2 9 0\n3 0 9\n3 1\n1 1 2 5\n2 2 3 5\n3 3 1 6\n1\n1 1 1\n";
 
 class DomainUploadTest : public SessionCommandsTest {

@@ -64,6 +64,8 @@ struct FakeSessions final : v1::SessionService::Service {
   std::function<grpc::Status(grpc::ServerContext&, grpc::ServerReader<v1::AddSegmentsRequest>&,
                              v1::AddSegmentsResponse&)>
       add_segments;
+  std::function<grpc::Status(grpc::ServerContext&, grpc::ServerReader<v1::SetSizesRequest>&, v1::SetSizesResponse&)>
+      set_sizes;
   Streaming<v1::DownloadMeshRequest, v1::DownloadMeshResponse> download;
 
   grpc::Status CreateSession(grpc::ServerContext* /*context*/, const v1::CreateSessionRequest* request,
@@ -93,6 +95,10 @@ struct FakeSessions final : v1::SessionService::Service {
   grpc::Status AddSegments(grpc::ServerContext* context, grpc::ServerReader<v1::AddSegmentsRequest>* reader,
                            v1::AddSegmentsResponse* response) override {
     return add_segments(*context, *reader, *response);
+  }
+  grpc::Status SetSizes(grpc::ServerContext* context, grpc::ServerReader<v1::SetSizesRequest>* reader,
+                        v1::SetSizesResponse* response) override {
+    return set_sizes(*context, *reader, *response);
   }
   grpc::Status DownloadMesh(grpc::ServerContext* context, const v1::DownloadMeshRequest* request,
                             grpc::ServerWriter<v1::DownloadMeshResponse>* writer) override {

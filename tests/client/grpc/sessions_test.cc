@@ -199,7 +199,7 @@ TEST(Operations, StartGetListCancel) {
   Client client = server.Client();
   MeshOptions parameters;
   parameters.rho = 3;
-  ASSERT_TRUE(client.StartRefinement(kSession, parameters).ok());
+  ASSERT_TRUE(client.StartRefinement(kSession, {.parameters = parameters, .restart = true}).ok());
   const absl::StatusOr<Operation> started = client.StartRefinement(kSession);
   ASSERT_TRUE(started.ok()) << started.status();
   EXPECT_EQ(started->state, OperationState::kQueued);
@@ -207,7 +207,9 @@ TEST(Operations, StartGetListCancel) {
   EXPECT_TRUE(started->error.ok());
   ASSERT_THAT(starts, SizeIs(2));
   EXPECT_EQ(starts[0].parameters().rho(), 3);
+  EXPECT_TRUE(starts[0].restart());
   EXPECT_FALSE(starts[1].has_parameters());
+  EXPECT_FALSE(starts[1].restart());
   EXPECT_FALSE(starts[1].request_id().empty());
   const absl::StatusOr<Operation> failed = client.GetOperation(kOperation);
   ASSERT_TRUE(failed.ok()) << failed.status();

@@ -39,7 +39,7 @@ class AioTest(unittest.IsolatedAsyncioTestCase, Case):
     async def test_session(self):
         async with await wellspace.aio.Session.create(2, box=unit_box(2)) as session:
             await session.upload(uniform(200, 2))
-            session.sizes(0.1)
+            self.assertEqual(await session.sizes([0.1], [[0.5, 0.5]]), 1)
             self.assertEqual((await session.refine()).state, "succeeded")
             mesh = await session.download()
             vertices = await session.add([[0.5, 0.5]])

@@ -56,8 +56,7 @@ class SessionTest(Case):
     def test_parameters_stay_unless_they_are_named(self):
         with wellspace.Session(2, box=unit_box(2), rho=2) as session:
             session.upload(uniform(200, 2))
-            session.sizes(0.05, [([0, 0], [0.1, 0.1], 0.01)])
-            session.refine()
+            session.refine(size=0.05, size_boxes=[([0, 0], [0.1, 0.1], 0.01)])
             parameters = session.info().parameters
             self.assertEqual((parameters["rho"], parameters["size"]), (2, 0.05))
             self.assertEqual(parameters["size_boxes"], [((0, 0), (0.1, 0.1), 0.01)])
@@ -65,8 +64,7 @@ class SessionTest(Case):
             parameters = session.info().parameters
             self.assertEqual((parameters["rho"], parameters["size"]), (1.5, 0.05))
             self.assertEqual(parameters["box"], ((0, 0), (1, 1)))
-            session.sizes(0, [])
-            session.refine()
+            session.refine(size=0, size_boxes=[])
             self.assertNotIn("size", session.info().parameters)
             self.assertNotIn("size_boxes", session.info().parameters)
 

@@ -298,6 +298,68 @@ TEST_F(RestartTest, OperationsThatWereUnderWayGoOnUnderTheirNames) {
   EXPECT_EQ(MeshOf(running), MeshOf(fresh));
 }
 
+// Segments and sizes are read when they are needed, and an operation that goes on needs them.
+TEST_F(RestartTest, OperationsGoOnWithSegmentsAndSizes) {
+  Event begun;
+  Start(ScriptedMesher(EndlessIn(core::Phase::kRefinement, [&] { begun.Set(); })));
+  v1::CreateSessionRequest create;
+  create.mutable_parameters()->set_dimension(2);
+  const auto fill = [&] {
+    const std::string name = calls().Create(create).name();
+    calls().Upload(name, 0, FramePoints());
+    calls().AddSegments({FrameRequest(name)});
+    calls().SetSizes({SizesRequest(name, {0.5, 0.5}, {0.05})});
+    return name;
+  };
+  const std::string name = fill();
+  const std::string operation = calls().Start(name).name();
+  ASSERT_TRUE(begun.Wait());
+  Restart();
+  EXPECT_EQ(WaitFor(operation).state(), v1::Operation::STATE_SUCCEEDED);
+  const std::string fresh = fill();
+  calls().Refine(fresh);
+  EXPECT_EQ(MeshOf(name), MeshOf(fresh));
+}
+
+// Each set of sizes that a step kept to is needed again, and no other.
+TEST_F(RestartTest, SizesComeBackWithTheStepsThatKeptToThem) {
+  const auto live = [&](bool restarts) {
+    const std::string name = SessionWithPoints();
+    const auto may_restart = [&] {
+      if (restarts) {
+        Restart();
+      }
+    };
+    for (const double size : {0.05, 0.02, 0.01}) {
+      calls().SetSizes({SizesRequest(name, {size * 10, 0.5}, {1})});  // of no use
+      may_restart();
+      calls().SetSizes({SizesRequest(name, {size * 10, 0.5}, {size})});
+      may_restart();
+      calls().Refine(name);
+      may_restart();
+      Add(name, {size, size});
+    }
+    may_restart();
+    v1::StartRefinementRequest restart;
+    restart.set_name(name);
+    restart.set_restart(true);
+    const std::string before = MeshOf(name);
+    EXPECT_TRUE(calls().Refine(restart).restart());
+    EXPECT_NE(MeshOf(name), before);
+    may_restart();
+    calls().SetSizes({SizesRequest(name, {0.9, 0.9}, {0.02})});
+    calls().Refine(name);
+    may_restart();
+    Add(name, {0.51, 0.52});
+    calls().Refine(name);
+    EXPECT_EQ(calls().Get(name).size_count(), 1u);
+    return MeshOf(name);
+  };
+  Start();
+  const std::string undisturbed = live(false);
+  EXPECT_EQ(live(true), undisturbed);
+}
+
 TEST_F(RestartTest, WatchersOfAnEndedOperationHearItsLastEventOnce) {
   Start();
   const std::string name = SessionWithPoints();

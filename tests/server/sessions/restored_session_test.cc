@@ -46,7 +46,7 @@ class RestoredSessionTest : public ::testing::Test {
 
   std::shared_ptr<Operation> StartOperation() {
     return session_
-        ->StartOperation({.dimension = 2}, 0,
+        ->StartOperation({.dimension = 2}, /*restart=*/false, 0,
                          [](const std::shared_ptr<Operation>& /*operation*/) { return absl::OkStatus(); })
         .value();
   }

@@ -127,7 +127,8 @@ TEST_F(SessionStoreTest, ASessionInUseDoesNotExpire) {
 
 TEST_F(SessionStoreTest, ASessionWithAnOperationDoesNotExpire) {
   const std::shared_ptr<Session> session = Create("a", absl::Seconds(10));
-  const absl::StatusOr<std::shared_ptr<Operation>> operation = session->StartOperation({.dimension = 2}, 0, Submitted);
+  const absl::StatusOr<std::shared_ptr<Operation>> operation =
+      session->StartOperation({.dimension = 2}, /*restart=*/false, 0, Submitted);
   ASSERT_TRUE(operation.ok());
   since_boot_ += absl::Hours(1);
   EXPECT_TRUE(store_.RemoveExpired().empty());
@@ -192,7 +193,7 @@ TEST_F(SessionStoreTest, KeepsTheLastHundredOperations) {
   const std::shared_ptr<Session> session = Create();
   for (int i = 0; i < 103; ++i) {
     const absl::StatusOr<std::shared_ptr<Operation>> operation =
-        session->StartOperation({.dimension = 2}, 0, Submitted);
+        session->StartOperation({.dimension = 2}, /*restart=*/false, 0, Submitted);
     ASSERT_TRUE(operation.ok());
     EXPECT_TRUE(session->Cancel(**operation).ok());
   }

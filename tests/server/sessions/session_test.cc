@@ -27,7 +27,7 @@ class SessionTest : public ::testing::Test {
 
   // Where the queue of jobs answers with `submitted`.
   absl::StatusOr<std::shared_ptr<Operation>> TryToStart(const absl::Status& submitted) {
-    return session_->StartOperation({.dimension = 2}, 0,
+    return session_->StartOperation({.dimension = 2}, /*restart=*/false, 0,
                                     [submitted](const std::shared_ptr<Operation>& /*operation*/) { return submitted; });
   }
 
@@ -91,7 +91,7 @@ TEST_F(SessionTest, AnOperationWhoseWorkIsRefusedDisplacesNoOther) {
 TEST_F(SessionTest, WhileItsWorkIsSubmittedTheSessionIsBusyAndDoesNotShowTheOperation) {
   const std::string before = Seen();
   EXPECT_TRUE(session_
-                  ->StartOperation({.dimension = 2}, 0,
+                  ->StartOperation({.dimension = 2}, /*restart=*/false, 0,
                                    [&](const std::shared_ptr<Operation>& operation) {
                                      EXPECT_EQ(Seen(), before);
                                      EXPECT_TRUE(Operations().empty());

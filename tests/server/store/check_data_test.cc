@@ -42,6 +42,8 @@ class CheckDataTest : public ::testing::Test {
     features.mutable_features()->mutable_segments()->mutable_ends()->Add(1);
     features.mutable_features()->mutable_faces()->add_seeds();
     change.steps.push_back(features);
+    change.sizes = StoredSizes{.number = 2, .parts = {}};
+    change.sizes->parts.emplace_back().mutable_samples()->add_sizes(0.5);
     change.operations.emplace_back().set_number(1);
     change.answer = MakeAnswer("tenant", change.session, "done");
     const auto mesh = log.KeepMesh(change.session, 2, MakeMesh({.vertices = 30}), core::RunContext());
@@ -49,6 +51,8 @@ class CheckDataTest : public ::testing::Test {
     change.state->set_points(4);
     change.state->set_segments(1);
     change.state->set_seeds(1);
+    change.state->set_sizes(2);
+    change.state->set_size_count(1);
     *change.state->mutable_mesh() = *(*mesh)->record();
     ASSERT_TRUE(log.Commit(change).ok());
   }
@@ -119,6 +123,11 @@ TEST_F(CheckDataTest, NamesRecordsThatDoNotFitTogether) {
   EXPECT_THAT(Problems(), ElementsAre(session + "operation 1 is there before its time; the next one is 1"));
   Commit([](store::v1::SessionRecord& state) {
     state.set_next_operation(2);
+    state.set_size_count(3);
+  });
+  EXPECT_THAT(Problems(), ElementsAre(session + "there are 3 sizes in set 2, and 1 in its records"));
+  Commit([](store::v1::SessionRecord& state) {
+    state.set_size_count(1);
     state.mutable_mesh()->set_vertices(31);
   });
   EXPECT_THAT(Problems(), ElementsAre(HasSubstr("00000002.mesh-2: the directory is of another mesh")));

@@ -136,6 +136,37 @@ TEST_F(SessionTablesTest, FeaturesAreReadApart) {
   EXPECT_EQ(tables->Load()->sessions[0].steps.size(), 4u) << "those of points alone";
 }
 
+TEST_F(SessionTablesTest, SizesAreReadSetBySet) {
+  const auto tables = Open();
+  const auto make = [](uint64_t number, const std::vector<double>& sizes) {
+    StoredSizes set{.number = number, .parts = {}};
+    for (const double size : sizes) {
+      set.parts.emplace_back().mutable_samples()->add_sizes(size);
+    }
+    return set;
+  };
+  SessionChange change = MakeCreation(1);
+  change.sizes = make(7, {1, 2, 3});
+  ASSERT_TRUE(Apply(*tables, {change, MakeCreation(2)}).ok());
+  ASSERT_TRUE(Apply(*tables, {{.session = SessionName(1), .sizes = make(11, {4})}}).ok());
+  auto sets = tables->ReadSizes(SessionName(1));
+  ASSERT_TRUE(sets.ok()) << sets.status();
+  ASSERT_EQ(sets->size(), 2u);
+  EXPECT_EQ(sets->at(0).number, 7u);
+  ASSERT_EQ(sets->at(0).parts.size(), 3u);
+  EXPECT_EQ(sets->at(0).parts[2].samples().sizes(0), 3);
+  EXPECT_EQ(sets->at(1).number, 11u);
+  EXPECT_TRUE(tables->ReadSizes(SessionName(2))->empty());
+  EXPECT_TRUE(tables->ReadSizes(SessionName(3))->empty());
+  ASSERT_TRUE(Apply(*tables, {{.session = SessionName(1), .dropped_sizes = {7}}}).ok());
+  sets = tables->ReadSizes(SessionName(1));
+  ASSERT_EQ(sets->size(), 1u);
+  EXPECT_EQ(sets->at(0).number, 11u);
+  ASSERT_TRUE(Apply(*tables, {{.session = SessionName(1), .is_deletion = true}}).ok());
+  ASSERT_TRUE(Apply(*tables, {MakeCreation(1)}).ok());
+  EXPECT_TRUE(tables->ReadSizes(SessionName(1))->empty()) << "they go with their session";
+}
+
 // All of a batch, or nothing.
 TEST_F(SessionTablesTest, ABatchWithAFaultChangesNothing) {
   const auto tables = Open();
@@ -200,6 +231,8 @@ TEST_F(SessionTablesTest, AFlippedBitIsFoundWhereverItChangesARecord) {
     store::v1::StepRecord features;
     features.mutable_features()->mutable_segments()->add_ends(3);
     creation.steps.push_back(features);
+    creation.sizes = StoredSizes{.number = 5, .parts = {}};
+    creation.sizes->parts.emplace_back().mutable_samples()->add_sizes(0.5);
     ASSERT_TRUE(Apply(*tables, {creation, MakeCreation(2)}).ok());
   }
   const std::string before = TextOf(*Open()->Load());
@@ -215,6 +248,11 @@ TEST_F(SessionTablesTest, AFlippedBitIsFoundWhereverItChangesARecord) {
       if (const auto read = (*tables)->ReadFeatures(SessionName(1)); read.ok()) {
         ASSERT_EQ(read->size(), 1u) << byte;
         EXPECT_EQ(read->at(0).ShortDebugString(), features) << byte;
+      }
+      if (const auto read = (*tables)->ReadSizes(SessionName(1)); read.ok()) {
+        ASSERT_EQ(read->size(), 1u) << byte;
+        EXPECT_EQ(read->at(0).number, 5u) << byte;
+        EXPECT_EQ(read->at(0).parts.at(0).samples().sizes(0), 0.5) << byte;
       }
     }
     found += stored.ok() ? 0 : 1;

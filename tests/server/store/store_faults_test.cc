@@ -23,10 +23,11 @@ using Loss = SimulatedDisk::Loss;
 
 const std::vector<std::pair<Action, uint64_t>>& Script() {
   static const std::vector<std::pair<Action, uint64_t>> script = {
-      {Action::kCreate, 0},      {Action::kUpload, 0},  {Action::kStart, 0},  {Action::kSucceed, 0},
-      {Action::kCreate, 1},      {Action::kUpload, 0},  {Action::kTouch, 0},  {Action::kUpload, 1},
-      {Action::kAddFeatures, 1}, {Action::kSucceed, 0}, {Action::kForget, 0}, {Action::kUpdate, 1},
-      {Action::kSucceed, 1},     {Action::kDelete, 0},  {Action::kSweep, 0},  {Action::kUpload, 1},
+      {Action::kCreate, 0},      {Action::kUpload, 0},   {Action::kStart, 0},   {Action::kSucceed, 0},
+      {Action::kCreate, 1},      {Action::kUpload, 0},   {Action::kTouch, 0},   {Action::kUpload, 1},
+      {Action::kAddFeatures, 1}, {Action::kSetSizes, 1}, {Action::kSucceed, 0}, {Action::kForget, 0},
+      {Action::kUpdate, 1},      {Action::kSucceed, 1},  {Action::kDelete, 0},  {Action::kSweep, 0},
+      {Action::kUpload, 1},
   };
   return script;
 }

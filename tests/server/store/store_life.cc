@@ -32,6 +32,25 @@ std::vector<store::v1::StepRecord::Features> FeaturesOf(const LifeState::Session
   return features;
 }
 
+std::string TextOfSizes(const std::vector<StoredSizes>& sets) {
+  std::string text;
+  for (const StoredSizes& set : sets) {
+    absl::StrAppend(&text, set.number, ":\n");
+    for (const store::v1::SizesRecord& part : set.parts) {
+      absl::StrAppend(&text, part.ShortDebugString(), "\n");
+    }
+  }
+  return text;
+}
+
+std::vector<StoredSizes> SizesOf(const LifeState::Session& session) {
+  std::vector<StoredSizes> sets;
+  for (const auto& [ignored, set] : session.sizes) {
+    sets.push_back(set);
+  }
+  return sets;
+}
+
 DurableLogOptions OptionsOf(SimulatedDisk& disk, int& failures) {
   return {.folder = StoreLife::kFolder,
           .files = &disk.files(),
@@ -216,6 +235,19 @@ absl::Status StoreLife::Change(uint64_t number, Action action) {
     step.mutable_features()->mutable_segments()->add_ends(static_cast<uint32_t>(salt_ + 1));
     session.steps.push_back(step);
     session.state.set_segments(session.state.segments() + 1);
+  } else if (action == Action::kSetSizes) {
+    // The second set before this one goes.
+    change.sizes = StoredSizes{.number = salt_, .parts = {}};
+    for (int part = 0; part < 2; ++part) {
+      change.sizes->parts.emplace_back().mutable_samples()->add_sizes(static_cast<double>(salt_) + part);
+    }
+    if (session.sizes.size() > 1) {
+      change.dropped_sizes = {session.sizes.begin()->first};
+      session.sizes.erase(session.sizes.begin());
+    }
+    session.sizes[salt_] = *change.sizes;
+    session.state.set_sizes(salt_);
+    session.state.set_size_count(2);
   } else if (action == Action::kStart || action == Action::kFail) {
     store::v1::OperationRecord& operation = change.operations.emplace_back();
     operation.set_number(salt_ % 5);
@@ -373,6 +405,10 @@ std::string StoreLife::CheckFiles(const LifeState& expected, const StoredSession
     const auto features = log_->ReadFeatures(found.state.name());
     if (!features.ok() || TextOfFeatures(*features) != TextOfFeatures(FeaturesOf(session))) {
       return absl::StrCat("features of ", found.state.name(), ": ", features.status().ToString());
+    }
+    const auto sizes = log_->ReadSizes(found.state.name());
+    if (!sizes.ok() || TextOfSizes(*sizes) != TextOfSizes(SizesOf(session))) {
+      return absl::StrCat("sizes of ", found.state.name(), ": ", sizes.status().ToString());
     }
     const auto points = open_.at(number).points->Copy(0, session.points.size(), context);
     if (!points.ok() || *points != session.points) {

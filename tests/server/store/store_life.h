@@ -23,6 +23,7 @@ struct LifeState {
   struct Session {
     store::v1::SessionRecord state;
     std::vector<store::v1::StepRecord> steps;  // those of features, too
+    std::map<uint64_t, StoredSizes> sizes;     // by number
     std::map<uint64_t, store::v1::OperationRecord> operations;
     std::vector<double> points;
     std::optional<MeshShape> mesh;
@@ -44,6 +45,7 @@ class StoreLife {
     kUpdate,
     kTouch,
     kAddFeatures,
+    kSetSizes,
     kStart,
     kSucceed,
     kFail,
@@ -51,7 +53,7 @@ class StoreLife {
     kForget,
     kSweep,
   };
-  static constexpr int kActions = 11;
+  static constexpr int kActions = 12;
 
   // Bugs that tests plant, to see that they are found.
   struct Bugs {

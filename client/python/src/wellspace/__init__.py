@@ -22,6 +22,7 @@ from ._retry import CancelToken, RetryPolicy
 from ._server import LocalServer
 from ._session_info import SessionInfo
 from ._sessions import Session
+from ._sizes import SizeArguments
 from ._version import __version__
 from .errors import (
     CancelledError,
@@ -45,7 +46,7 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 
-@takes(DomainArguments, Parameters)
+@takes(DomainArguments, SizeArguments, Parameters)
 def mesh(
     points: Any,
     *,
@@ -94,7 +95,7 @@ def mesh(
     )
 
 
-@takes(DomainArguments, Parameters)
+@takes(DomainArguments, SizeArguments, Parameters)
 def estimate(
     points: Any,
     *,

@@ -20,6 +20,7 @@ from ._receiver import MeshReceiver
 from ._retry import Attempt, CancelToken, RetryPolicy
 from ._server import LocalServer, shared_server
 from ._session_info import SessionInfo, info_of_session
+from ._sizes import SizeArguments, make_size_field
 from .errors import InvalidArgumentError
 from .statistics import Estimate, ServerInfo, info_of
 from .statistics import fill as fill_dataclass
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 _WAITING = 1  # PHASE_WAITING: the work has not begun
 
 
-class MeshArguments(DomainArguments, Parameters, total=False):
+class MeshArguments(DomainArguments, SizeArguments, Parameters, total=False):
     """What `mesh` and `estimate` take besides points."""
 
 
@@ -79,7 +80,7 @@ class Client:
     def __exit__(self, *exception: Any) -> None:
         self.close()
 
-    @takes(DomainArguments, Parameters)
+    @takes(DomainArguments, SizeArguments, Parameters)
     def mesh(
         self,
         points: Any,
@@ -117,7 +118,7 @@ class Client:
         receiver.finish()
         return mesh_of(receiver)
 
-    @takes(DomainArguments, Parameters)
+    @takes(DomainArguments, SizeArguments, Parameters)
     def estimate(
         self,
         points: Any,
@@ -213,7 +214,7 @@ class _Cloud:
     """Points, and in 2-D segments, with what is asked of their mesh; checked."""
 
     def __init__(self, points: Any, arguments: Mapping[str, Any], function: str) -> None:
-        domain, parameters = split(function, arguments, DomainArguments, Parameters)
+        domain, sizes, parameters = split(function, arguments, DomainArguments, SizeArguments, Parameters)
         self.points = coordinates(points, "points")
         self.domain = None
         if domain:
@@ -223,6 +224,7 @@ class _Cloud:
                     f"{name}: for points in 2-D only; these are in {self.points.shape[1]}-D", field=name
                 )
             self.domain = make_domain(domain, len(self.points), "box" in parameters)
+        self.sizes = make_size_field(sizes, self.points.shape[1]) if sizes else None
         self.message = fill(_api.message("MeshParameters")(), self.points.shape[1], parameters)
         if "threads" not in parameters:
             self.message.threads = helpful_threads(self.points, parameters)
@@ -231,6 +233,9 @@ class _Cloud:
         """Serialized requests of MeshPoints, and of EstimateMesh."""
         first = _wire.message_field(1, self.message.SerializeToString())
         yield first + (_wire.varint(3 << 3) + b"\1" if boundary else b"")
+        if self.sizes is not None:
+            for chunk in self.sizes.chunks():
+                yield _wire.message_field(6, chunk)
         for _, _, chunk in point_chunks(self.points):
             yield _wire.message_field(2, chunk)
         if self.domain is not None:

@@ -29,6 +29,8 @@ class Operation:
         Of one that has failed or was cancelled.
     mesh_revision : int
         Of one that has succeeded: the revision of its mesh.
+    restart : bool
+        It makes the mesh anew, see `Session.refine`.
     """
 
     name: str
@@ -36,6 +38,7 @@ class Operation:
     progress: Progress
     error: Error | None
     mesh_revision: int
+    restart: bool = False
 
 
 def operation_of(message: Any) -> Operation:
@@ -47,6 +50,7 @@ def operation_of(message: Any) -> Operation:
         progress=progress_of(message.progress),
         error=from_message(message.error) if state in ("failed", "cancelled") else None,
         mesh_revision=message.mesh_revision,
+        restart=message.restart,
     )
 
 

@@ -42,7 +42,8 @@ class Parameters(TypedDict, total=False):
         Edges have this length, on average where points ask for no shorter ones: a `size` of 0.733 times as much in 2-D,
         0.747 in 3-D. Of both, the smaller holds. In the unit of the points. Default: no bound.
     gradation : float
-        How fast sizes grow with the distance from `size_boxes`: above 0 and at most 1. Default: 1.
+        How fast sizes grow with the distance from `size_boxes` and from points that have a size: above 0 and at most 1.
+        Default: 1 from boxes, 0.3 from points.
     min_dihedral : float
         In 3-D, no dihedral angle of a tetrahedron is smaller: vertices are moved, and some added, until that holds.
         What cannot be repaired is counted in ``statistics.slivers.left``. Degrees, from 0 to 18; 0 turns it off.

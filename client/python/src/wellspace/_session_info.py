@@ -33,6 +33,8 @@ class SessionInfo:
         Grows with every change.
     point_count, segment_count, seed_count : int
         What was uploaded, duplicates included.
+    size_count : int
+        Sizes at points, see `Session.sizes`.
     vertex_count, simplex_count : int
         Of the last mesh; 0 before the first.
     last_operation : str
@@ -51,6 +53,7 @@ class SessionInfo:
     point_count: int
     segment_count: int
     seed_count: int
+    size_count: int
     vertex_count: int
     simplex_count: int
     last_operation: str
@@ -74,6 +77,7 @@ def info_of_session(message: Any) -> SessionInfo:
         point_count=message.committed_points,
         segment_count=message.segment_count,
         seed_count=message.seed_count,
+        size_count=message.size_count,
         vertex_count=message.vertex_count,
         simplex_count=message.simplex_count,
         last_operation=message.last_operation,

@@ -21,6 +21,7 @@ from ._progress import ProgressOption, told
 from ._queries import nearest_distances, stream_cells
 from ._retry import CancelToken
 from ._session_info import SessionInfo, info_of_session
+from ._sizes import SizeField, check_sizes, set_sizes, unit_of
 from ._transfers import Addition, Download, Upload
 from .errors import CancelledError, Error, InvalidArgumentError, NotFoundError
 
@@ -31,7 +32,7 @@ _SECONDS_TO_CANCEL = 5.0
 
 
 class Session:
-    """A session of a server. Thread-safe, but for `sizes`.
+    """A session of a server. Thread-safe.
 
     As a context manager it is deleted at the end of the block. Calls take `timeout`, in seconds for all attempts
     together, and most of them `cancel`. Those that change the session take `expected_revision`: at another revision
@@ -85,7 +86,6 @@ class Session:
         self.name = name
         self.dimension = dimension
         self._calls = client._calls
-        self._sizes: dict[str, Any] = {}
 
     @classmethod
     def attach(cls, name: str, *, server: Server = None, timeout: float | None = None) -> Session:
@@ -205,17 +205,47 @@ class Session:
             CallOptions(timeout=timeout, cancel=cancel)
         )
 
-    def sizes(self, size: float | None = None, size_boxes: Any = None) -> None:
-        """Sets what the next `refine` asks of sizes; see there. 0 and an empty list take them back."""
-        if size is not None:
-            self._sizes["size"] = number(size, "size")
-        if size_boxes is not None:
-            self._sizes["size_boxes"] = list(size_boxes)
+    def sizes(
+        self,
+        values: Any,
+        points: Any = None,
+        *,
+        unit: str = "radius",
+        mesh_revision: int = 0,
+        expected_revision: int = 0,
+        timeout: float | None = None,
+        cancel: CancelToken | None = None,
+    ) -> int:
+        """Replaces the sizes at points that the next refinements keep to; returns how many there are.
+
+        They hold until others come; an empty list takes them back.
+
+        Parameters
+        ----------
+        values : (m,) float
+            Sizes above 0; see `size_values` of `wellspace.mesh`.
+        points : (m, d) float
+            Where they are. Default: at the vertices of the session's mesh, one for each, as an adaptive solver has
+            them.
+        unit : {"radius", "edge"}
+            What the values are: bounds on circumradii, or lengths of edges.
+        mesh_revision : int
+            Without points: that of the mesh whose vertices they are, `Mesh.revision`; should the session have another
+            one by then, `ConflictError` is raised. Default: the last mesh.
+        """
+        options = CallOptions(timeout=timeout, cancel=cancel)
+        if points is None and np.size(values) == 0:
+            points = []
+        where = None if points is None else coordinates(points, "points", self.dimension)
+        sizes = check_sizes(values, "values", None if where is None else len(where))
+        field = SizeField(where, sizes, unit_of(unit))
+        return set_sizes(self._calls, self.name, field, mesh_revision, expected_revision, options)
 
     @takes(Parameters)
     def refine(
         self,
         *,
+        restart: bool = False,
         progress: ProgressOption = None,
         expected_revision: int = 0,
         timeout: float | None = None,
@@ -230,12 +260,15 @@ class Session:
 
         Parameters
         ----------
+        restart : bool
+            Make the mesh anew, from the session's points, segments and sizes alone: it becomes coarser where sizes have
+            grown. Vertices get new numbers.
         progress : function or bool
             Called with `Progress`; True shows a bar.
         **arguments
         """
         operation = self.start_refinement(
-            expected_revision=expected_revision, timeout=timeout, cancel=cancel, **arguments
+            restart=restart, expected_revision=expected_revision, timeout=timeout, cancel=cancel, **arguments
         )
         try:
             ended = self.watch(operation.name, progress=progress, timeout=timeout, cancel=cancel)
@@ -250,23 +283,23 @@ class Session:
     def start_refinement(
         self,
         *,
+        restart: bool = False,
         expected_revision: int = 0,
         timeout: float | None = None,
         cancel: CancelToken | None = None,
         **arguments: Unpack[Parameters],
     ) -> Operation:
         """As `refine`, but does not wait: `watch` does, and `cancel_operation` ends the work."""
-        (changes,) = split("refine", {**self._sizes, **arguments}, Parameters)
+        (changes,) = split("refine", arguments, Parameters)
         options = CallOptions(timeout=timeout, cancel=cancel)
         request = _api.message("StartRefinementRequest")(
-            name=self.name, request_id=options.id_or_new(), expected_revision=expected_revision
+            name=self.name, request_id=options.id_or_new(), expected_revision=expected_revision, restart=restart
         )
         if changes:
             request.parameters.CopyFrom(self._get(options).parameters)
             fill(request.parameters, self.dimension, changes)
         method = "OperationService/StartRefinement"
         started = self._calls.unary(method, request, "StartRefinementResponse", options)
-        self._sizes = {}
         return operation_of(started.operation)
 
     def watch(

@@ -27,6 +27,7 @@ from ._domain import DomainArguments
 from ._parameters import Parameters, takes
 from ._progress import Progress, ProgressOption
 from ._retry import CancelToken
+from ._sizes import SizeArguments
 from .statistics import Estimate, ServerInfo
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ async def _run(call: Callable[..., T], /, *positional: Any, **options: Any) -> T
             given._remove(token.cancel)
 
 
-@takes(DomainArguments, Parameters)
+@takes(DomainArguments, SizeArguments, Parameters)
 async def mesh(
     points: Any,
     *,
@@ -94,7 +95,7 @@ async def mesh(
     )
 
 
-@takes(DomainArguments, Parameters)
+@takes(DomainArguments, SizeArguments, Parameters)
 async def estimate(
     points: Any,
     *,
@@ -158,10 +159,6 @@ class Session:
 
         await _run(call)
 
-    def sizes(self, size: float | None = None, size_boxes: Any = None) -> None:
-        """As `wellspace.Session.sizes`, which makes no call."""
-        self._session.sizes(size, size_boxes)
-
     async def info(self, **options: Any) -> _session_info.SessionInfo:
         return await _run(self._session.info, **options)
 
@@ -176,6 +173,9 @@ class Session:
 
     async def add_segments(self, **options: Any) -> None:
         await _run(self._session.add_segments, **options)
+
+    async def sizes(self, values: Any, points: Any = None, **options: Any) -> int:
+        return await _run(self._session.sizes, values, points, **options)
 
     async def refine(self, **options: Any) -> _operations.Operation:
         return await _run(self._session.refine, **options)

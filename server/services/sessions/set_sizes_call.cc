@@ -1,0 +1,153 @@
+#include "server/services/sessions/set_sizes_call.h"
+
+#include <memory>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
+#include "server/calls/wire.h"
+#include "server/services/resource_names.h"
+#include "server/wire/errors.h"
+
+namespace wellspace::server {
+
+void SetSizesCall::OnBegin() {
+  memory_ = environment().memory.ReserveNothing();
+  if (absl::Status status = ReserveFor(0); !status.ok()) {
+    End(std::move(status));
+  } else {
+    ReadNext();
+  }
+}
+
+absl::Status SetSizesCall::ReserveFor(uint64_t more) {
+  const uint64_t bytes = kMessageBytes + sizes_.bytes() + more;
+  return memory_.Resize(bytes) ? absl::OkStatus() : environment().memory.Refusal(bytes, "sizes at points");
+}
+
+void SetSizesCall::OnRequest(grpc::ByteBuffer* bytes) {
+  absl::Status status = RunGuarded([&] { return Take(bytes); });
+  if (status.ok()) {
+    status = ReserveFor(0);
+  }
+  if (!status.ok()) {
+    End(std::move(status));
+  } else {
+    ReadNext();
+  }
+}
+
+absl::Status SetSizesCall::Take(grpc::ByteBuffer* bytes) {
+  v1::SetSizesRequest request;
+  WELLSPACE_RETURN_IF_ERROR(ParseRequest(bytes, &request));
+  if (!session_.has_value()) {
+    WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, FindSession(environment(), caller(), request.name()));
+    session_.emplace(std::move(session));
+    expected_revision_ = request.expected_revision();
+  }
+  if (request.sizes_case() == v1::SetSizesRequest::SIZES_NOT_SET) {
+    return absl::OkStatus();
+  }
+  if (sizes_case_ == v1::SetSizesRequest::SIZES_NOT_SET) {
+    sizes_case_ = request.sizes_case();
+    mesh_revision_ = request.vertex_sizes().mesh_revision();
+  } else if (request.sizes_case() != sizes_case_) {
+    return MakeError(v1::ERROR_REASON_INVALID_SIZES,
+                     "there are samples as well as vertex_sizes; send either of them in all messages",
+                     request.has_samples() ? "samples" : "vertex_sizes");
+  }
+  return TakeSamples(request);
+}
+
+absl::Status SetSizesCall::TakeSamples(const v1::SetSizesRequest& request) {
+  const uint64_t count = request.has_samples() ? request.samples().sizes_size() : request.vertex_sizes().sizes_size();
+  if (const uint64_t all = sizes_.count() + count; all > environment().options.max_points) {
+    return MakeError(v1::ERROR_REASON_TOO_MANY_POINTS,
+                     absl::StrCat("there are ", all, " samples of sizes; a session of this server has at most ",
+                                  environment().options.max_points));
+  }
+  if (request.has_samples()) {
+    const int dimension = session_->session().dimension();
+    WELLSPACE_RETURN_IF_ERROR(CheckSizes(request.samples(), sizes_.count(), dimension, "samples"));
+    sizes_.Append(request.samples());
+  } else {
+    WELLSPACE_RETURN_IF_ERROR(CheckSizes(request.vertex_sizes(), sizes_.count(), "vertex_sizes"));
+    sizes_.Append(request.vertex_sizes());
+  }
+  count_ = sizes_.count();
+  return absl::OkStatus();
+}
+
+void SetSizesCall::OnRequestsEnd() {
+  if (!session_.has_value()) {
+    End(MakeError(v1::ERROR_REASON_EMPTY_REQUEST,
+                  "the stream ended before any request; send the name of the session first", "name"));
+    return;
+  }
+  const auto sizes = std::make_shared<SizeStore>(std::exchange(sizes_, {}));
+  const bool of_vertices = sizes_case_ == v1::SetSizesRequest::kVertexSizes;
+  environment().blocking.Run(session_->session().name(), [self = SharedAs<SetSizesCall>(), sizes, of_vertices] {
+    absl::Status status = RunGuarded([&] { return self->Set(std::move(*sizes), of_vertices); });
+    std::lock_guard lock(self->mutex_);
+    if (!self->ending()) {
+      if (status.ok()) {
+        *self->response_ = Serialize(self->session_->session().CommittedSizes());
+      }
+      self->End(std::move(status));
+    }
+  });
+}
+
+absl::Status SetSizesCall::Set(SizeStore sizes, bool of_vertices) {
+  if (of_vertices) {
+    WELLSPACE_RETURN_IF_ERROR(FindPoints(sizes));
+  }
+  {
+    std::lock_guard lock(mutex_);
+    memory_.Release();  // the session sets memory aside for them
+  }
+  return session_->session().SetSizes(sizes.Take(), expected_revision_);
+}
+
+absl::Status SetSizesCall::FindPoints(SizeStore& sizes) {
+  const Session& session = session_->session();
+  const std::shared_ptr<const MeshSnapshot> mesh = session.mesh();
+  if (mesh == nullptr) {
+    return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
+                     absl::StrCat(session.name(), " has no mesh yet, and so no vertices; send samples with points"));
+  }
+  if (mesh_revision_ != 0 && mesh->revision() != mesh_revision_) {
+    return MakeError(v1::ERROR_REASON_REVISION_MISMATCH,
+                     absl::StrCat("vertex_sizes.mesh_revision is ", mesh_revision_, ", but the mesh of ",
+                                  session.name(), " is of revision ", mesh->revision()));
+  }
+  if (mesh->figures().vertices != sizes.count()) {
+    return MakeError(v1::ERROR_REASON_INVALID_SIZES,
+                     absl::StrCat("vertex_sizes.sizes: there are ", sizes.count(), ", but the mesh has ",
+                                  mesh->figures().vertices, " vertices; send one for each"),
+                     "vertex_sizes.sizes");
+  }
+  {
+    std::lock_guard lock(mutex_);
+    const uint64_t coordinates = sizes.count() * session.dimension();
+    WELLSPACE_RETURN_IF_ERROR(ReserveFor(sizes.bytes() + 2 * coordinates * sizeof(double)));
+  }
+  WELLSPACE_ASSIGN_OR_RETURN(const core::HugeVector<double> points, mesh->LoadPoints(core::RunContext()));
+  sizes.SetPoints(points);
+  return absl::OkStatus();
+}
+
+void SetSizesCall::OnEnd() {
+  sizes_ = SizeStore();
+  memory_.Release();
+}
+
+LogFields SetSizesCall::Figures() const {
+  LogFields figures;
+  if (session_.has_value()) {
+    figures.Add("session", session_->session().name()).Add("sizes", count_);
+  }
+  return figures;
+}
+
+}  // namespace wellspace::server

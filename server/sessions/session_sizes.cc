@@ -1,0 +1,139 @@
+// What a session does with sizes at points.
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
+#include "core/base/status_macros.h"
+#include "server/sessions/session.h"
+#include "server/sessions/size_store.h"
+#include "server/wire/errors.h"
+
+namespace wellspace::server {
+namespace {
+
+bool AreEqual(const core::SizeSamples* a, const core::SizeSamples* b) {
+  return a == b ||
+         (a != nullptr && b != nullptr && a->measure == b->measure && a->sizes == b->sizes && a->points == b->points);
+}
+
+}  // namespace
+
+absl::Status Session::CheckSamples(const core::SizeSamples& samples) const {
+  const std::vector<double>& low = work_.mesh != nullptr ? work_.mesh->figures().domain_low : parameters_.domain_low;
+  const std::vector<double>& high = work_.mesh != nullptr ? work_.mesh->figures().domain_high : parameters_.domain_high;
+  if (low.empty()) {
+    return absl::OkStatus();  // the refinement, which will know the domain, refuses what is outside
+  }
+  for (size_t i = 0; i < samples.points.size(); ++i) {
+    const size_t axis = i % dimension_;
+    if (!(samples.points[i] >= low[axis] && samples.points[i] <= high[axis])) {
+      return MakeError(v1::ERROR_REASON_INVALID_SIZES,
+                       absl::StrCat("samples.points[", i / dimension_, "]: coordinate ", axis, " is ",
+                                    samples.points[i], "; in the domain it is from ", low[axis], " to ", high[axis]),
+                       "samples.points");
+    }
+  }
+  return absl::OkStatus();
+}
+
+std::vector<SizesInUse> Session::UnusedSizes(const SessionSteps& steps, uint64_t current) const {
+  std::vector<SizesInUse> had = steps_.sizes();
+  if (sizes_in_use_.number != 0 && std::ranges::find(had, sizes_in_use_) == had.end()) {
+    had.push_back(sizes_in_use_);
+  }
+  const std::vector<SizesInUse> kept = steps.sizes();
+  std::erase_if(
+      had, [&](const SizesInUse& set) { return set.number == current || std::ranges::find(kept, set) != kept.end(); });
+  return had;
+}
+
+absl::Status Session::SetSizes(std::shared_ptr<const core::SizeSamples> samples, uint64_t expected_revision) {
+  std::lock_guard change_lock(change_mutex_);
+  WELLSPACE_RETURN_IF_ERROR(LoadInputs());
+  const uint64_t count = samples == nullptr ? 0 : samples->sizes.size();
+  SizesInUse in_use;
+  std::vector<SizesInUse> unused;
+  uint64_t dropped = 0;
+  {
+    std::lock_guard lock(mutex_);
+    WELLSPACE_RETURN_IF_ERROR(CheckReadyForChange(expected_revision));
+    if (AreEqual(samples.get(), sizes_.get())) {
+      return absl::OkStatus();
+    }
+    if (samples != nullptr) {
+      WELLSPACE_RETURN_IF_ERROR(CheckSamples(*samples));
+    }
+    in_use = {.number = count == 0 ? 0 : revision_ + 1, .count = count};
+    unused = UnusedSizes(steps_, in_use.number);
+    for (const SizesInUse& set : unused) {
+      dropped += set.count;
+    }
+    WELLSPACE_RETURN_IF_ERROR(point_account_.TakeSizes(count > dropped ? count - dropped : 0));
+  }
+  const absl::Status status = RunGuarded([&] {
+    return CommitState([&](SessionChange& change) {
+      change.state->set_revision(change.state->revision() + 1);
+      change.state->set_sizes(in_use.number);
+      change.state->set_size_count(in_use.count);
+      if (samples != nullptr) {
+        change.sizes = StoredSizes{.number = in_use.number, .parts = RecordsOf(*samples, dimension_)};
+      }
+      for (const SizesInUse& set : unused) {
+        change.dropped_sizes.push_back(set.number);
+      }
+    });
+  });
+  std::lock_guard lock(mutex_);
+  if (!status.ok()) {
+    point_account_.ReturnSizes(count > dropped ? count - dropped : 0);
+    return status;
+  }
+  point_account_.ReturnSizes(dropped > count ? dropped - count : 0);
+  sizes_ = std::move(samples);
+  sizes_in_use_ = in_use;
+  ++revision_;
+  return absl::OkStatus();
+}
+
+v1::SetSizesResponse Session::CommittedSizes() const {
+  v1::SetSizesResponse message;
+  std::lock_guard lock(mutex_);
+  message.set_size_count(sizes_in_use_.count);
+  message.set_revision(revision_);
+  return message;
+}
+
+absl::Status Session::LoadSizes() {
+  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<StoredSizes> sets, log_.ReadSizes(name_));
+  std::map<uint64_t, std::shared_ptr<const core::SizeSamples>> samples;
+  for (const StoredSizes& set : sets) {
+    samples[set.number] = SamplesOf(set.parts);
+  }
+  std::lock_guard lock(mutex_);
+  std::vector<SizesInUse> wanted = steps_.sizes();
+  wanted.push_back(sizes_in_use_);
+  for (const SizesInUse& set : wanted) {
+    const auto found = samples.find(set.number);
+    const uint64_t count = found == samples.end() || found->second == nullptr ? 0 : found->second->sizes.size();
+    if (count != set.count) {
+      return MakeError(v1::ERROR_REASON_FILE_DAMAGED,
+                       absl::StrCat("set ", set.number, " of the sizes of ", name_, " has ", count,
+                                    " samples, and not ", set.count, "; restore a back-up"));
+    }
+  }
+  const auto find = [&](uint64_t number) { return samples[number]; };
+  steps_.ResolveSizes(find);
+  sizes_ = find(sizes_in_use_.number);
+  return absl::OkStatus();
+}
+
+core::MeshParameters Session::ParametersOf(const Operation& operation) const {
+  core::MeshParameters parameters = operation.parameters();
+  std::lock_guard lock(mutex_);
+  parameters.size_samples = sizes_;
+  return parameters;
+}
+
+}  // namespace wellspace::server
