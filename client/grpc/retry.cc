@@ -12,10 +12,15 @@
 
 #include "absl/time/clock.h"
 #include "client/error_details.h"
+#include "google/rpc/error_details.pb.h"
 #include "google/rpc/status.pb.h"
 
 namespace wellspace::client {
 namespace {
+
+// The one error that comes without details: the server sends it ahead of a message that is not read, and can add none.
+// Its message begins so.
+constexpr char kReaderStalled[] = "READER_STALLED";
 
 absl::Status CancelledByCaller() { return absl::CancelledError("cancelled by the caller"); }
 
@@ -39,6 +44,12 @@ absl::Status FromGrpcStatus(const grpc::Status& status) {
   absl::Status result(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
   google::rpc::Status details;
   if (!result.ok() && details.ParseFromString(status.error_details())) {
+    AddDetails(details, result);
+  }
+  if (status.error_details().empty() && status.error_message().starts_with(kReaderStalled)) {
+    google::rpc::ErrorInfo info;
+    info.set_reason("ERROR_REASON_READER_STALLED");
+    details.add_details()->PackFrom(info);
     AddDetails(details, result);
   }
   return result;

@@ -89,7 +89,8 @@ void ResponseStream<Base, Response>::CheckStall() {
                              absl::FormatDuration(stall_.limit()), "; read it faster, or go on where it ended"));
   const std::string message = ToGrpcStatus(status).error_message();
   this->End(std::move(status));
-  // Finish would wait behind the write. This sends code and message ahead of it, and ends the write.
+  // Finish would wait behind the write. This sends code and message ahead of it, and ends the write. There are no
+  // details then: clients know the reason by what the message begins with.
   grpc_call_cancel_with_status(this->context()->c_call(), GRPC_STATUS_DEADLINE_EXCEEDED, message.c_str(), nullptr);
 }
 

@@ -124,6 +124,18 @@ TEST_F(PointAccountTest, SegmentsAndSeedsCountAsPointsOfTheTenantAndTakeTheirMem
   EXPECT_EQ(DetailsOf(Open(memory)->TakeFeatures(11, 0)).reason, "MEMORY_LIMIT");
 }
 
+TEST_F(PointAccountTest, SizesCountAsPointsOfTheTenantAndTakeTheirMemory) {
+  std::unique_ptr<PointAccount> account = Open(unlimited_);
+  const uint64_t bytes = kPointBytes + sizeof(double);
+  EXPECT_TRUE(account->TakeSizes(1500).ok());
+  EXPECT_EQ(tenant_->points(), 1500u);
+  EXPECT_EQ(unlimited_.lasting(), 1500 * bytes);
+  EXPECT_EQ(DetailsOf(account->TakeSizes(1)).reason, "QUOTA_EXCEEDED");
+  account->ReturnSizes(600);
+  EXPECT_EQ(tenant_->points(), 900u);
+  EXPECT_EQ(unlimited_.lasting(), 900 * bytes);
+}
+
 TEST_F(PointAccountTest, PointsInAFileTakeNoMemory) {
   in_memory_ = false;
   MemoryBudget memory(kProcessMemoryBytes + 8);
@@ -135,7 +147,7 @@ TEST_F(PointAccountTest, PointsInAFileTakeNoMemory) {
 
 TEST_F(PointAccountTest, WhatWasThereBeforeIsTakenWhateverTheLimits) {
   const std::unique_ptr<PointAccount> account = Open(unlimited_);
-  account->Restore(options_.max_points + 1, 2, 1);
+  account->Restore({.points = options_.max_points + 1, .segments = 2, .seeds = 1});
   EXPECT_EQ(tenant_->points(), options_.max_points + 4);
   EXPECT_FALSE(account->Take(1).ok());
   account->ReturnFeatures(2, 1);
