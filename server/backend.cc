@@ -33,6 +33,7 @@ Backend::Backend(const ServiceOptions& options, const Authenticator& authenticat
       request_ids_(SinceBoot, *session_log_),
       memory_(options_.max_memory_bytes),
       sessions_(options_, memory_, Clock(), *session_log_),
+      idle_sessions_(sessions_, memory_, observability.work()),
       environment_{.options = options_,
                    .mesher = mesher_,
                    .estimator = estimator_,
@@ -82,6 +83,8 @@ void Backend::AddMetrics(Metrics& metrics) {
                    [this] { return static_cast<double>(memory_.reserved()); });
   metrics.AddGauge("wellspace_memory_lasting_bytes", "Of that, what sessions keep.",
                    [this] { return static_cast<double>(memory_.lasting()); });
+  metrics.AddGauge("wellspace_memory_yielding_bytes", "Of what sessions keep, what they give up while they are idle.",
+                   [this] { return static_cast<double>(memory_.yielding()); });
   metrics.AddGauge("wellspace_memory_limit_bytes", "Most that can be reserved; 0: no limit.",
                    [this] { return memory_.is_limited() ? static_cast<double>(memory_.limit()) : 0; });
 }

@@ -14,6 +14,7 @@
 #include "server/jobs/memory_budget.h"
 #include "server/observability/observability.h"
 #include "server/security/authenticator.h"
+#include "server/sessions/idle_sessions.h"
 #include "server/sessions/memory_session_store.h"
 #include "server/store/session_log.h"
 #include "spdlog/logger.h"
@@ -60,6 +61,7 @@ class Backend {
   RequestIds request_ids_;
   MemoryBudget memory_;
   MemorySessionStore sessions_;
+  const IdleSessions idle_sessions_;
   const CallEnvironment environment_;
   // The background thread ends first. Of the others each ends before those above it, and before what it works on.
   Background background_;

@@ -64,6 +64,10 @@ class Call : public Reactor, public std::enable_shared_from_this<Call<Reactor>> 
   // Constant from Begin on.
   const Caller& caller() const { return caller_; }
 
+  // Calls `reserve`, and `then`, if it has succeeded. Where it fails for want of `bytes`, idle sessions give up memory
+  // on a thread that may wait, and it is called once more, with mutex_ held. Ends the call with its last error.
+  void ReserveThen(uint64_t bytes, const std::function<absl::Status()>& reserve, const std::function<void()>& then);
+
   // This, held, as the class that derives from it.
   template <typename Derived>
   std::shared_ptr<Derived> SharedAs() {
@@ -142,6 +146,30 @@ void Call<Reactor>::End(absl::Status status) {
   OnEnd();
   if (!IsWriting()) {
     FinishNow();
+  }
+}
+
+template <typename Reactor>
+void Call<Reactor>::ReserveThen(uint64_t bytes, const std::function<absl::Status()>& reserve,
+                                const std::function<void()>& then) {
+  absl::Status status = reserve();
+  if (status.ok()) {
+    then();
+  } else if (!environment_.memory.CanMakeRoom()) {
+    End(std::move(status));
+  } else {
+    environment_.blocking.Run("", [self = this->shared_from_this(), bytes, reserve, then] {
+      (void)self->environment_.memory.MakeRoom(bytes, MemoryBudget::Want::kAllOrNothing);
+      std::lock_guard lock(self->mutex_);
+      if (self->ending()) {
+        return;
+      }
+      if (absl::Status again = reserve(); !again.ok()) {
+        self->End(std::move(again));
+      } else {
+        then();
+      }
+    });
   }
 }
 

@@ -11,6 +11,7 @@ Job::Job(JobPool& pool, JobRequest request)
     : pool_(pool),
       tenant_(std::move(request.tenant)),
       is_small_(request.is_small && pool.limits_.small_workers > 0),
+      of_call_(request.of_call),
       held_(std::move(request.held)),
       work_(std::move(request.work)) {
   if (pool_.memory_.is_limited()) {
@@ -61,11 +62,21 @@ MemoryReservation Job::TakeMemory(uint64_t bytes) {
 absl::Status Job::Reserve(uint64_t bytes) { return pool_.Reserve(*this, bytes); }
 
 absl::Status Job::Allow(uint64_t bytes) {
-  std::lock_guard lock(memory_mutex_);
-  if (bytes <= memory_.bytes() || memory_.Resize(bytes + bytes / 8) || memory_.Resize(bytes)) {
+  uint64_t missing = 0;
+  if (TryToAllow(bytes, &missing) ||
+      (pool_.memory_.MakeRoom(missing, MemoryBudget::Want::kAllOrNothing) && TryToAllow(bytes, &missing))) {
     return absl::OkStatus();
   }
   return pool_.MemoryRefusal(bytes);
+}
+
+bool Job::TryToAllow(uint64_t bytes, uint64_t* missing) {
+  std::lock_guard lock(memory_mutex_);
+  if (bytes <= memory_.bytes() || memory_.Resize(bytes + bytes / 8) || memory_.Resize(bytes)) {
+    return true;
+  }
+  *missing = bytes - memory_.bytes();
+  return false;
 }
 
 bool Job::TakeWanted(uint64_t room_for_tree) {
@@ -85,12 +96,13 @@ JobMemory Job::GetMemory() const {
                    .has_all = has_all_,
                    .wanted = wanted_bytes_,
                    .run = memory_.bytes(),
-                   .freed = held_.passing_bytes() + memory_.passing_bytes()};
+                   .freed = held_.passing_bytes() + memory_.passing_bytes(),
+                   .of_call = of_call_};
 }
 
-uint64_t Job::LastingBytes() const {
+uint64_t Job::KeptBytes() const {
   std::lock_guard lock(memory_mutex_);
-  return memory_.bytes() - memory_.passing_bytes();
+  return memory_.kept_bytes();
 }
 
 bool Job::ShrinkTo(uint64_t bytes) {

@@ -28,6 +28,8 @@ struct JobRequest {
   bool is_small = false;
   // The memory of what the work brings along, such as its points; released with the work.
   MemoryReservation held{};
+  // What the call has reserved that waits for the job, for longer than the work: bytes.
+  uint64_t of_call = 0;
   // Has to return soon after the context of its job is cancelled, and must not throw.
   std::function<void(Job&)> work{};
 };
@@ -79,8 +81,10 @@ class Job final : private core::MemoryLender, public std::enable_shared_from_thi
   bool TakeWanted(uint64_t room_for_tree);
   // What is known of its memory. Wants the pool's mutex to be held.
   JobMemory GetMemory() const;
-  // What of the run's memory a session keeps.
-  uint64_t LastingBytes() const;
+  // What of the run's memory a session keeps, whatever others want.
+  uint64_t KeptBytes() const;
+  // Has the run have `bytes`, if there is room. Else false, and `*missing` is how many there are none of.
+  bool TryToAllow(uint64_t bytes, uint64_t* missing);
   // Gives back what the run has above `bytes`; false, and nothing is changed, if it has less.
   bool ShrinkTo(uint64_t bytes);
   void ReleaseAll();
@@ -88,6 +92,7 @@ class Job final : private core::MemoryLender, public std::enable_shared_from_thi
   JobPool& pool_;
   const std::string tenant_;
   const bool is_small_;
+  const uint64_t of_call_;
   const absl::Duration submitted_ = SinceBoot();
   core::RunContext context_;
 
@@ -106,6 +111,7 @@ class Job final : private core::MemoryLender, public std::enable_shared_from_thi
   uint64_t wanted_bytes_ = 0;     // while kWaiting
   bool has_all_ = false;          // its run was given more than its tree: it is expected to end with that
   bool is_refused_ = false;       // its next Reserve fails
+  bool is_to_make_room_ = false;  // while kWaiting: its thread has idle sessions give up memory
   std::condition_variable wake_;  // of the thread that waits
 };
 

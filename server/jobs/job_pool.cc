@@ -146,7 +146,7 @@ absl::Status JobPool::MemoryRefusal(uint64_t bytes) const { return memory_.Refus
 
 absl::Status JobPool::Reserve(Job& job, uint64_t bytes) {
   WELLSPACE_RETURN_IF_ERROR(job.context_.Check());
-  if (!FitsBesideSessions(bytes, job.LastingBytes(), memory_.lasting(), memory_.limit())) {
+  if (!FitsBesideSessions(bytes, job.KeptBytes(), memory_.lasting() - memory_.yielding(), memory_.limit())) {
     return MemoryRefusal(bytes);
   }
   if (job.ShrinkTo(bytes)) {
@@ -174,7 +174,7 @@ absl::Status JobPool::WaitInQueue(Job& job, std::unique_lock<std::mutex>& lock) 
     StartThread();
   }
   Dispatch();
-  job.wake_.wait(lock, [&job] { return job.state_ == Job::State::kRunning; });
+  WaitFor(job, lock);
   --blocked_;
   wake_.notify_all();  // a thread may be one too many now
   WELLSPACE_RETURN_IF_ERROR(job.context_.Check());
@@ -184,10 +184,30 @@ absl::Status JobPool::WaitInQueue(Job& job, std::unique_lock<std::mutex>& lock) 
   return absl::OkStatus();
 }
 
+void JobPool::WaitFor(Job& job, std::unique_lock<std::mutex>& lock) {
+  while (true) {
+    job.wake_.wait(lock, [&job] { return job.state_ == Job::State::kRunning || job.is_to_make_room_; });
+    if (!std::exchange(job.is_to_make_room_, false)) {
+      return;
+    }
+    const uint64_t room = job.state_ == Job::State::kRunning ? 0 : RoomFor(job);
+    if (room > 0) {
+      lock.unlock();
+      (void)memory_.MakeRoom(room, MemoryBudget::Want::kAsMuchAsPossible);  // what is released is dispatched
+      lock.lock();
+    }
+    is_making_room_ = false;
+    Dispatch();
+  }
+}
+
 void JobPool::Dispatch() {
   while (running_ < limits_.workers && !queue_.empty() && StartNext()) {
   }
   while (running_small_ < limits_.small_workers && StartSmall()) {
+  }
+  if (running_ < limits_.workers || running_small_ < limits_.small_workers) {
+    (void)AskForRoom();
   }
   if (jobs_of_.empty()) {
     idle_.notify_all();
@@ -251,8 +271,42 @@ bool JobPool::StartOneWithATree() {
   return false;
 }
 
+uint64_t JobPool::RoomFor(const Job& job) const {
+  const JobMemory memory = job.GetMemory();
+  if (!memory.is_waiting) {
+    return 0;
+  }
+  const uint64_t unreserved = memory_.limit() - memory_.reserved();
+  const uint64_t missing = memory.wanted - std::min(memory.wanted, memory.run);
+  const uint64_t room_for_tree = memory.run > 0 || job.is_small_ ? kNoBound : GetRoomForTree();
+  if (missing > room_for_tree) {  // what others wait for with their trees has to be free besides
+    return unreserved + (missing - room_for_tree);
+  }
+  return missing > unreserved ? missing : 0;
+}
+
+bool JobPool::AskForRoom() {
+  if (is_making_room_ || !memory_.CanMakeRoom()) {
+    return is_making_room_;
+  }
+  const auto ask = [this](Job& job) {
+    if (RoomFor(job) == 0) {
+      return false;
+    }
+    job.is_to_make_room_ = true;
+    is_making_room_ = true;
+    job.wake_.notify_one();
+    return true;
+  };
+  const QueuedJob* starved = queue_.FindStarved();
+  if (starved != nullptr && ask(*queued_.at(starved->sequence))) {
+    return true;
+  }
+  return std::ranges::any_of(queued_, [&](const auto& queued) { return ask(*queued.second); });
+}
+
 bool JobPool::RefuseVictim() {
-  if (running_ + running_small_ > 0) {
+  if (running_ + running_small_ > 0 || AskForRoom()) {
     return false;
   }
   const uint64_t passing = memory_.passing();

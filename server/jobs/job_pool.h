@@ -36,6 +36,8 @@ namespace wellspace::server {
 // that has its tree goes on as soon as the rest fits, first of its tenant or not. If all jobs wait for the trees of
 // one another all the same, one is refused (VictimOfDeadlock).
 //
+// Where idle sessions can give up memory (MemoryBudget::MakeRoom), the thread of a job that waits has them do so.
+//
 // Thread safety: thread-safe. Work runs without any lock of the pool held.
 // Invariants: (1) at most `workers` jobs run and at most `max_queued` more are in the queue; with small workers as many
 // run besides, and as many small jobs are taken besides; of either kind `max_per_tenant` of one tenant; (2) the work of
@@ -104,6 +106,8 @@ class JobPool {
   absl::Status MemoryRefusal(uint64_t bytes) const;
   // Lets the thread of `job`, which cannot have its memory now, wait in the queue for it.
   absl::Status WaitInQueue(Job& job, std::unique_lock<std::mutex>& lock);
+  // Waits until `job` goes on, and makes room where it is asked to.
+  void WaitFor(Job& job, std::unique_lock<std::mutex>& lock);
 
   // The following want mutex_ to be held.
 
@@ -121,6 +125,11 @@ class JobPool {
   bool StartOneWithATree();
   // Refuses the victim of a deadlock, if there is one.
   bool RefuseVictim();
+  // Asks the thread of a job that waits to make room: the starved one, or the oldest. Not while another does, and only
+  // where idle sessions may have memory. Says whether one does now.
+  bool AskForRoom();
+  // How much has to be free, and is not, for `job` to have what it waits for; 0: it is not memory that it waits for.
+  uint64_t RoomFor(const Job& job) const;
   // Whether `queued` needs nothing but a worker; where it waits for memory that is there, it has it then.
   bool CanStart(const QueuedJob& queued, uint64_t room_for_tree);
   // Takes `job` out of the queue and gives it a worker, a small one or another.
@@ -161,6 +170,7 @@ class JobPool {
   std::list<std::thread> threads_;
   std::list<std::thread> ended_threads_;  // to be joined
   size_t blocked_ = 0;                    // threads whose job waits for memory
+  bool is_making_room_ = false;           // one of these, now
 };
 
 }  // namespace wellspace::server

@@ -6,8 +6,8 @@
 
 namespace wellspace::server {
 
-bool FitsBesideSessions(uint64_t bytes, uint64_t own_lasting, uint64_t lasting, uint64_t limit) {
-  const uint64_t of_others = lasting - std::min(lasting, own_lasting);
+bool FitsBesideSessions(uint64_t bytes, uint64_t own_kept, uint64_t kept, uint64_t limit) {
+  const uint64_t of_others = kept - std::min(kept, own_kept);
   return bytes <= limit - std::min(of_others, limit);
 }
 
@@ -42,7 +42,7 @@ std::optional<uint64_t> VictimOfDeadlock(uint64_t passing, std::span<const JobMe
   uint64_t freed = 0;
   const JobMemory* victim = nullptr;
   for (const JobMemory& job : queued) {
-    freed += job.freed;
+    freed += job.freed + job.of_call;
     if (victim == nullptr || order(job) > order(*victim)) {
       victim = &job;
     }

@@ -23,13 +23,14 @@ struct JobMemory {
   uint64_t wanted = 0;      // what its run is to have in all; while it waits
   uint64_t run = 0;         // what its run has: its tree, or all
   uint64_t freed = 0;       // what will be free once the job has ended
+  uint64_t of_call = 0;     // what its call has reserved, which waits for the job
 };
 
 inline constexpr uint64_t kNoBound = std::numeric_limits<uint64_t>::max();
 
-// Whether a run may ever have `bytes`, of which it has `own_lasting` already: sessions have `lasting` of `limit`, and
-// nothing says when they end.
-bool FitsBesideSessions(uint64_t bytes, uint64_t own_lasting, uint64_t lasting, uint64_t limit);
+// Whether a run may ever have `bytes`, of which it has `own_kept` already: sessions keep `kept` of `limit` whatever
+// others want, and nothing says when they end.
+bool FitsBesideSessions(uint64_t bytes, uint64_t own_kept, uint64_t kept, uint64_t limit);
 
 // The most that a tree may take, for good, so that those of `begun`, all jobs that have begun, that wait with their
 // trees can go on one after the other, the least need first. `unreserved` is what no reservation has.
@@ -39,9 +40,9 @@ bool FitsBesideSessions(uint64_t bytes, uint64_t own_lasting, uint64_t lasting, 
 // Complexity: O(b log b) for b jobs.
 uint64_t RoomForTree(uint64_t unreserved, std::span<const JobMemory> begun);
 
-// If `queued`, all jobs in the queue, will free whatever work can free, nothing would ever change: then the job to
-// refuse, by its sequence. It is the youngest that waits with memory, or the youngest if none does. Otherwise nothing.
-// `passing` is what is reserved, and not by sessions.
+// If `queued`, all jobs in the queue, and the calls that wait for them, will free whatever work can free, nothing would
+// ever change: then the job to refuse, by its sequence. It is the youngest that waits with memory, or the youngest if
+// none does. Otherwise nothing. `passing` is what is reserved, and not by sessions.
 //
 // REQUIRES:   no job runs.
 std::optional<uint64_t> VictimOfDeadlock(uint64_t passing, std::span<const JobMemory> queued);

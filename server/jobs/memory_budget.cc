@@ -31,13 +31,18 @@ uint64_t MemoryBudget::lasting() const {
   return lasting_;
 }
 
+uint64_t MemoryBudget::yielding() const {
+  std::lock_guard lock(mutex_);
+  return yielding_;
+}
+
 uint64_t MemoryBudget::passing() const {
   std::lock_guard lock(mutex_);
   return reserved_ - lasting_;
 }
 
 absl::StatusOr<MemoryReservation> MemoryBudget::Reserve(uint64_t bytes, const std::string& what) {
-  if (!Take(bytes, /*lasting=*/false)) {
+  if (!Take(bytes, Lasts::kWork)) {
     return Refusal(bytes, what);
   }
   return MemoryReservation(this, bytes);
@@ -64,29 +69,61 @@ void MemoryBudget::SetReleaseListener(std::function<void()> listener) {
   listener_ = std::move(listener);
 }
 
-bool MemoryBudget::Take(uint64_t bytes, bool lasting) {
+void MemoryBudget::SetGiveUp(GiveUp give_up) {
+  std::lock_guard lock(give_up_mutex_);
+  give_up_ = std::move(give_up);
+}
+
+void MemoryBudget::NoteIdle() {
+  if (is_limited()) {
+    can_make_room_ = true;
+    Notify();
+  }
+}
+
+bool MemoryBudget::MakeRoom(uint64_t bytes, Want want) {
+  const auto unreserved = [this] { return limit_ - reserved(); };
+  if (bytes <= unreserved() || !can_make_room_) {
+    return bytes <= unreserved();
+  }
+  std::lock_guard lock(give_up_mutex_);
+  if (const uint64_t free = unreserved(); free < bytes) {
+    can_make_room_ = false;  // first: a session that becomes idle meanwhile may be overlooked
+    if (give_up_ != nullptr && give_up_(bytes - free, want)) {
+      can_make_room_ = true;
+    }
+  }
+  return bytes <= unreserved();
+}
+
+void MemoryBudget::Count(uint64_t bytes, Lasts lasts, int sign) {
+  reserved_ += sign * bytes;
+  lasting_ += lasts == Lasts::kWork ? 0 : sign * bytes;
+  yielding_ += lasts == Lasts::kUntilWanted ? sign * bytes : 0;
+}
+
+bool MemoryBudget::Take(uint64_t bytes, Lasts lasts) {
   std::lock_guard lock(mutex_);
   if (bytes > limit_ - reserved_) {
     return false;
   }
-  reserved_ += bytes;
-  lasting_ += lasting ? bytes : 0;
+  Count(bytes, lasts, 1);
   return true;
 }
 
-void MemoryBudget::Release(uint64_t bytes, bool lasting) {
+void MemoryBudget::Release(uint64_t bytes, Lasts lasts) {
   {
     std::lock_guard lock(mutex_);
-    reserved_ -= bytes;
-    lasting_ -= lasting ? bytes : 0;
+    Count(bytes, lasts, -1);
   }
   Notify();
 }
 
-void MemoryBudget::MakeLasting(uint64_t bytes) {
+void MemoryBudget::MakeLasting(uint64_t bytes, Lasts lasts) {
   {
     std::lock_guard lock(mutex_);
-    lasting_ += bytes;
+    Count(bytes, Lasts::kWork, -1);
+    Count(bytes, lasts, 1);
   }
   Notify();
 }
@@ -105,18 +142,18 @@ MemoryReservation& MemoryReservation::operator=(MemoryReservation&& other) noexc
     Release();
     budget_ = std::exchange(other.budget_, nullptr);
     bytes_ = std::exchange(other.bytes_, 0);
-    lasting_ = std::exchange(other.lasting_, false);
+    lasts_ = std::exchange(other.lasts_, Lasts::kWork);
   }
   return *this;
 }
 
 bool MemoryReservation::Resize(uint64_t bytes) {
   if (bytes > bytes_) {
-    if (!budget_->Take(bytes - bytes_, lasting_)) {
+    if (!budget_->Take(bytes - bytes_, lasts_)) {
       return false;
     }
   } else if (bytes < bytes_) {
-    budget_->Release(bytes_ - bytes, lasting_);
+    budget_->Release(bytes_ - bytes, lasts_);
   }
   bytes_ = bytes;
   return true;
@@ -126,22 +163,22 @@ MemoryReservation MemoryReservation::Split(uint64_t bytes) {
   MemoryReservation part;
   part.budget_ = budget_;
   part.bytes_ = std::min(bytes, bytes_);
-  part.lasting_ = lasting_;
+  part.lasts_ = lasts_;
   bytes_ -= part.bytes_;
   return part;
 }
 
-void MemoryReservation::MakeLasting() {
-  if (budget_ != nullptr && !lasting_) {
-    lasting_ = true;
-    budget_->MakeLasting(bytes_);
+void MemoryReservation::MakeLasting(Lasts lasts) {
+  if (budget_ != nullptr && lasts_ == Lasts::kWork) {
+    lasts_ = lasts;
+    budget_->MakeLasting(bytes_, lasts);
   }
 }
 
 void MemoryReservation::Release() {
   if (budget_ != nullptr) {
     if (bytes_ > 0) {
-      budget_->Release(bytes_, lasting_);
+      budget_->Release(bytes_, lasts_);
     }
     bytes_ = 0;
     budget_ = nullptr;

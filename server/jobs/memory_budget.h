@@ -2,6 +2,7 @@
 #ifndef WELLSPACE_SERVER_JOBS_MEMORY_BUDGET_H_
 #define WELLSPACE_SERVER_JOBS_MEMORY_BUDGET_H_
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <mutex>
@@ -14,11 +15,19 @@ namespace wellspace::server {
 
 class MemoryReservation;
 
+// How long memory is reserved.
+enum class Lasts {
+  kWork,         // until work ends
+  kSession,      // as long as a session wants it
+  kUntilWanted,  // as long as a session wants it, unless other work does while the session is idle
+};
+
 // Counts reservations against a limit. Nothing is allocated here: the holder of a reservation takes care to hold no
 // more.
 //
 // Thread safety: thread-safe. A listener's locks must not be held when bytes are released.
-// Invariants: (1) reserved() <= limit(); (2) lasting() <= reserved(); (3) a reservation does not outlive its budget.
+// Invariants: (1) reserved() <= limit(); (2) yielding() <= lasting() <= reserved(); (3) a reservation does not outlive
+//             its budget.
 class MemoryBudget {
  public:
   // Of `max_memory_bytes` for the whole process, kProcessMemoryBytes are set aside for what is no work. 0: no limit.
@@ -32,7 +41,9 @@ class MemoryBudget {
   uint64_t reserved() const;
   // Of that, what sessions keep: it is not freed by itself when work ends.
   uint64_t lasting() const;
-  // The rest of it.
+  // Of what lasts, what sessions keep until it is wanted (Lasts::kUntilWanted).
+  uint64_t yielding() const;
+  // Of what is reserved, what does not last.
   uint64_t passing() const;
 
   // Sets `bytes` aside for `what`, which the error names: "a call", "the points of a session", …
@@ -47,17 +58,38 @@ class MemoryBudget {
   // The error of Reserve.
   absl::Status Refusal(uint64_t bytes, const std::string& what) const;
 
-  // `listener` is called after bytes were released, without any lock of the budget held. One at a time; null for none.
-  // Returns when no call of the last one is under way.
+  // `listener` is called after bytes were released, or could be (NoteIdle), without any lock but its own held. One at a
+  // time; null for none. Returns when no call of the last one is under way.
   void SetReleaseListener(std::function<void()> listener);
+
+  // What MakeRoom does if idle sessions do not hold enough.
+  enum class Want { kAllOrNothing, kAsMuchAsPossible };
+  // Has idle sessions give up memory, `missing` bytes if they can. Says whether idle sessions hold still more.
+  using GiveUp = std::function<bool(uint64_t missing, Want want)>;
+  // `give_up` is called by MakeRoom, one call at a time; null for none. Returns when no call of the last one is under
+  // way.
+  void SetGiveUp(GiveUp give_up);
+
+  // A session that has memory to give up may have become idle. No lock of a session or of the pool is to be held.
+  void NoteIdle();
+  // Whether there may be an idle session with memory that MakeRoom would find.
+  bool CanMakeRoom() const { return can_make_room_; }
+  // Has idle sessions give up memory until `bytes` are not reserved. Says whether so many are free now.
+  //
+  // REQUIRES:   the caller holds no lock, and may wait: large structures are freed.
+  // Complexity: that of the sessions that there are; constant where CanMakeRoom() is false.
+  bool MakeRoom(uint64_t bytes, Want want);
 
  private:
   friend class MemoryReservation;
 
   // Whether there was room.
-  bool Take(uint64_t bytes, bool lasting);
-  void Release(uint64_t bytes, bool lasting);
-  void MakeLasting(uint64_t bytes);
+  bool Take(uint64_t bytes, Lasts lasts);
+  void Release(uint64_t bytes, Lasts lasts);
+  // What was reserved for work lasts as `lasts` says from now on.
+  void MakeLasting(uint64_t bytes, Lasts lasts);
+  // Counts `bytes` more, or, if `sign` is -1, less. Wants mutex_ to be held.
+  void Count(uint64_t bytes, Lasts lasts, int sign);
   void Notify();
 
   const uint64_t max_memory_bytes_;
@@ -66,8 +98,13 @@ class MemoryBudget {
   // Guarded by mutex_.
   uint64_t reserved_ = 0;
   uint64_t lasting_ = 0;
+  uint64_t yielding_ = 0;
   std::mutex listener_mutex_;       // before mutex_
   std::function<void()> listener_;  // guarded by listener_mutex_
+  // Before listener_mutex_ and the locks of sessions: held while room is made, so that the next caller finds it.
+  std::mutex give_up_mutex_;
+  GiveUp give_up_;                          // guarded by give_up_mutex_
+  std::atomic<bool> can_make_room_{false};  // a session has become idle since MakeRoom has found none
 };
 
 // Bytes of a budget, given back at the end of its life. Movable; what was moved from has none.
@@ -82,7 +119,9 @@ class MemoryReservation {
 
   uint64_t bytes() const { return bytes_; }
   // Of these, what no session keeps.
-  uint64_t passing_bytes() const { return lasting_ ? 0 : bytes_; }
+  uint64_t passing_bytes() const { return lasts_ == Lasts::kWork ? bytes_ : 0; }
+  // Of these, what a session keeps whatever others want.
+  uint64_t kept_bytes() const { return lasts_ == Lasts::kSession ? bytes_ : 0; }
 
   // Makes it `bytes` large. Growing fails, and changes nothing, where there is no room; shrinking never fails.
   //
@@ -92,8 +131,10 @@ class MemoryReservation {
   // Hands over `bytes` of it, or all that it has.
   MemoryReservation Split(uint64_t bytes);
 
-  // From now on, and for what is added to it, it counts as kept by a session.
-  void MakeLasting();
+  // From now on, and for what is added to it, it counts as kept by a session. One that lasts already stays as it is.
+  //
+  // REQUIRES:   lasts != Lasts::kWork.
+  void MakeLasting(Lasts lasts = Lasts::kSession);
 
   // Gives all back.
   void Release();
@@ -104,7 +145,7 @@ class MemoryReservation {
 
   MemoryBudget* budget_ = nullptr;
   uint64_t bytes_ = 0;
-  bool lasting_ = false;
+  Lasts lasts_ = Lasts::kWork;
 };
 
 }  // namespace wellspace::server

@@ -38,6 +38,8 @@ Observability::Observability(const std::vector<std::string>& services, std::shar
   add("wellspace_simplices_made_total", "Simplices of finished meshes.", work_.simplices_made);
   add("wellspace_cells_served_total", "Vertices that queries, for cells or neighbours, were answered for.",
       work_.cells_served);
+  add("wellspace_structures_given_up_total",
+      "Structures that idle sessions gave up, for other work to have the memory.", work_.structures_given_up);
 }
 
 void Observability::Watch(grpc::ServerBuilder& builder) {

@@ -10,9 +10,10 @@ namespace wellspace::server {
 // Thread safety: thread-safe.
 struct WorkCounters {
   std::atomic<uint64_t> points_received{0};
-  std::atomic<uint64_t> vertices_made{0};   // of meshes that were finished
-  std::atomic<uint64_t> simplices_made{0};  // of meshes that were finished
-  std::atomic<uint64_t> cells_served{0};    // vertices that queries were answered for
+  std::atomic<uint64_t> vertices_made{0};        // of meshes that were finished
+  std::atomic<uint64_t> simplices_made{0};       // of meshes that were finished
+  std::atomic<uint64_t> cells_served{0};         // vertices that queries were answered for
+  std::atomic<uint64_t> structures_given_up{0};  // by idle sessions, for other work
 };
 
 }  // namespace wellspace::server

@@ -28,4 +28,12 @@ void WorkObserver::OnRefinement(const RefinementReport& report) {
   log_.log(code == absl::StatusCode::kInternal ? spdlog::level::err : spdlog::level::info, "{}", fields.text());
 }
 
+void WorkObserver::OnStructureGivenUp(const StructureReport& report) {
+  ++counters_.structures_given_up;
+  LogFields fields;
+  fields.Add("event", "structure_given_up").Add("session", report.session).Add("tenant", report.tenant);
+  fields.Add("bytes", report.bytes).Add("idle_seconds", absl::ToDoubleSeconds(report.idle));
+  log_.info("{}", fields.text());
+}
+
 }  // namespace wellspace::server

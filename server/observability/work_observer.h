@@ -24,6 +24,14 @@ struct RefinementReport {
   uint64_t simplices = 0;       // of the new mesh
 };
 
+// A session has given up its structure, for other work to have the memory.
+struct StructureReport {
+  std::string session;  // its name
+  std::string tenant;
+  uint64_t bytes = 0;   // that were freed
+  absl::Duration idle;  // since the session was used last
+};
+
 // Is told what work was done, logs it and counts it. The code that does the work knows neither the log nor the metrics.
 //
 // Thread safety: thread-safe.
@@ -40,6 +48,7 @@ class WorkObserver {
   void OnMesh(uint64_t vertices, uint64_t simplices);
   // A refinement has ended. Its mesh is counted here.
   void OnRefinement(const RefinementReport& report);
+  void OnStructureGivenUp(const StructureReport& report);
 
  private:
   spdlog::logger& log_;

@@ -120,6 +120,16 @@ std::vector<std::shared_ptr<Session>> MemorySessionStore::List(const std::string
   return listed;
 }
 
+std::vector<std::shared_ptr<Session>> MemorySessionStore::All() const {
+  std::vector<std::shared_ptr<Session>> all;
+  std::lock_guard lock(mutex_);
+  all.reserve(by_name_.size());
+  for (const auto& [name, session] : by_name_) {
+    all.push_back(session);
+  }
+  return all;
+}
+
 bool MemorySessionStore::Remove(const Session& session) {
   std::lock_guard lock(mutex_);
   if (by_name_.erase(session.name()) == 0) {

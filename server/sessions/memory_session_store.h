@@ -30,6 +30,7 @@ class MemorySessionStore final : public SessionStore {
   absl::StatusOr<std::shared_ptr<Session>> Find(const std::string& tenant, const std::string& name) override;
   std::vector<std::shared_ptr<Session>> List(const std::string& tenant, absl::Time after, size_t count,
                                              const std::map<std::string, std::string>& labels) override;
+  std::vector<std::shared_ptr<Session>> All() const override;
   bool Remove(const Session& session) override;
   size_t Count() const override;
   std::vector<std::shared_ptr<Session>> RemoveExpired() override;

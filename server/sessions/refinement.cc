@@ -114,7 +114,7 @@ absl::StatusOr<std::shared_ptr<MeshSnapshot>> Work(const MesherFactory& create_m
       MakeMesh(create_mesher, session, parameters, is_first, job, work);
   if (work.mesher != nullptr) {
     work.memory = job.TakeMemory(work.mesher->memory_bytes());
-    work.memory.MakeLasting();
+    work.memory.MakeLasting(session.MesherLasts());
   }
   if (mesh.ok()) {
     MemoryReservation memory = job.TakeMemory((*mesh)->memory_bytes());

@@ -247,6 +247,44 @@ absl::Status Session::Query(uint64_t* version, const std::function<absl::Status(
   return query(*mesher);
 }
 
+void Session::NoteIdle() const {
+  {
+    std::lock_guard lock(mutex_);
+    if (!log_.is_durable() || work_.mesher == nullptr || busy_ != Busy::kNo || structure_uses_ > 0) {
+      return;
+    }
+  }
+  memory_.NoteIdle();
+}
+
+std::optional<Session::Spare> Session::GetSpare() const {
+  std::lock_guard lock(mutex_);
+  if (!log_.is_durable() || busy_ != Busy::kNo || structure_uses_ > 0 || work_.mesher == nullptr ||
+      work_.memory.bytes() == 0) {
+    return std::nullopt;
+  }
+  return Spare{.bytes = work_.memory.bytes(), .last_use = lease_.ExpiresAt(clock_.since_boot()) - lease_.ttl()};
+}
+
+uint64_t Session::GiveUpMesher() {
+  std::unique_ptr<core::Mesher> mesher;
+  MemoryReservation memory;
+  {
+    std::lock_guard lock(mutex_);
+    std::unique_lock queries(queries_mutex_, std::try_to_lock);  // none can begin without mutex_
+    if (!log_.is_durable() || busy_ != Busy::kNo || structure_uses_ > 0 || work_.mesher == nullptr ||
+        !queries.owns_lock()) {
+      return 0;
+    }
+    mesher = std::move(work_.mesher);
+    memory = std::move(work_.memory);
+  }
+  const uint64_t bytes = memory.bytes();
+  mesher = nullptr;  // before others may have its memory
+  memory.Release();
+  return bytes;
+}
+
 SessionUse::SessionUse(std::shared_ptr<Session> session) : session_(std::move(session)) {
   std::lock_guard lock(session_->mutex_);
   session_->lease_.BeginUse();
@@ -255,6 +293,19 @@ SessionUse::SessionUse(std::shared_ptr<Session> session) : session_(std::move(se
 SessionUse::~SessionUse() {
   std::lock_guard lock(session_->mutex_);
   session_->lease_.EndUse(session_->clock_.since_boot());
+}
+
+StructureUse::StructureUse(std::shared_ptr<Session> session) : session_(std::move(session)) {
+  std::lock_guard lock(session_->mutex_);
+  ++session_->structure_uses_;
+}
+
+StructureUse::~StructureUse() {
+  {
+    std::lock_guard lock(session_->mutex_);
+    --session_->structure_uses_;
+  }
+  session_->NoteIdle();
 }
 
 }  // namespace wellspace::server

@@ -198,6 +198,21 @@ class Session {
   // Errors:     those of SessionLog::KeepMesh.
   absl::StatusOr<std::shared_ptr<MeshSnapshot>> KeepMesh(core::Mesh mesh, const core::RunContext& context) const;
 
+  // What of the session's memory other work may have.
+  struct Spare {
+    uint64_t bytes = 0;                              // that GiveUpMesher frees
+    absl::Duration last_use = absl::ZeroDuration();  // since boot
+  };
+  // Nothing of a session that is busy, or whose structure is in use, or which ends with the process.
+  std::optional<Spare> GetSpare() const;
+  // Gives the mesher up for other work; it comes back as PrepareStructure and operations say. Returns how much memory
+  // that has freed: 0, and nothing is done, where there is nothing to spare.
+  //
+  // Complexity: that of freeing the mesher, on this thread, without a lock.
+  uint64_t GiveUpMesher();
+  // How long memory is reserved for its mesher.
+  Lasts MesherLasts() const { return log_.is_durable() ? Lasts::kUntilWanted : Lasts::kSession; }
+
   // Makes sure that the session has a structure for queries and additions. Where the mesher was given up, `job` builds
   // it again, on this thread, a worker's. `*is_at_work`: another job builds it now, and the status is SESSION_BUSY.
   //
@@ -227,7 +242,8 @@ class Session {
   // Adds vertices at `points` on this thread, a worker's: all or, on an error, none. `near` has a vertex for each, or
   // is empty.
   //
-  // REQUIRES:   PrepareStructure has succeeded; if the mesher was given up since, the error is MESH_NOT_READY.
+  // REQUIRES:   PrepareStructure has succeeded; if the mesher was given up since, the error is MESH_NOT_READY. A
+  //             StructureUse keeps others from having it given up.
   // Errors:     MESH_NOT_READY, SESSION_BUSY, INVALID_CHUNK_SHAPE, INVALID_REQUEST (the length of `near`),
   //             INVALID_POINTS, VERTEX_OUT_OF_RANGE, TOO_MANY_POINTS, QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH,
   //             SESSION_NOT_FOUND; CANCELLED.
@@ -274,6 +290,7 @@ class Session {
 
  private:
   friend class SessionUse;
+  friend class StructureUse;
 
   // Which change of the points or the mesh is under way. There is one at most.
   enum class Busy { kNo, kStarting, kOperation, kAddingVertices, kReplaying };
@@ -290,6 +307,8 @@ class Session {
   // Errors:     DATA_LOSS.
   absl::Status LoadInputs();
   absl::Status LoadSizes();
+  // What AddSegments does.
+  absl::Status TryToAddSegments(const v1::AddSegmentsRequest& request, uint64_t expected_revision);
   // Writes down what AddSegments has appended: all of `request` but for what was known.
   absl::Status CommitFeatures(const v1::AddSegmentsRequest& request, uint64_t known_segments, uint64_t known_seeds);
   // Adds to `change` that points have come: those from committed_points_ on, up to number `end`, whose checksum is
@@ -344,6 +363,8 @@ class Session {
 
   // Waits for the queries that run. To be called when no other can begin.
   void WaitForQueries();
+  // To be called where the session was busy, or its structure in use: it may be spared now.
+  void NoteIdle() const;
   // Builds the mesher again. To be called while the session is Busy::kReplaying.
   absl::Status Rebuild(const MesherFactory& create_mesher, Job& job);
   // What AddVertices does before it touches the mesher; makes the session Busy::kAddingVertices.
@@ -395,6 +416,7 @@ class Session {
   SessionWork work_;                // its mesher is away while an operation is under way; see invariant (2)
   SessionSteps steps_;              // see invariant (2)
   uint64_t structure_version_ = 0;  // of what queries see; 0: nothing yet
+  int structure_uses_ = 0;          // while there are any, the mesher is not given up for other work
   uint64_t next_operation_ = 1;
   std::deque<std::shared_ptr<Operation>> operations_;  // ascending by number
 };
@@ -408,6 +430,20 @@ class SessionUse {
   SessionUse& operator=(const SessionUse&) = delete;
 
   Session& session() const { return *session_; }
+  const std::shared_ptr<Session>& session_ptr() const { return session_; }
+
+ private:
+  const std::shared_ptr<Session> session_;
+};
+
+// Keeps a session from giving up its structure for other work: what PrepareStructure has built stays until it was
+// asked.
+class StructureUse {
+ public:
+  explicit StructureUse(std::shared_ptr<Session> session);
+  ~StructureUse();
+  StructureUse(const StructureUse&) = delete;
+  StructureUse& operator=(const StructureUse&) = delete;
 
  private:
   const std::shared_ptr<Session> session_;

@@ -65,6 +65,17 @@ absl::Status Session::CheckKnown(const v1::AddSegmentsRequest& request, uint64_t
 }
 
 absl::Status Session::AddSegments(const v1::AddSegmentsRequest& request, uint64_t expected_revision) {
+  absl::Status added = TryToAddSegments(request, expected_revision);
+  if (!absl::IsResourceExhausted(added)) {
+    return added;
+  }
+  const uint64_t bytes = FeatureStore::BytesOf(request.segments().ends_size() / 2, request.faces().seeds_size());
+  return memory_.CanMakeRoom() && memory_.MakeRoom(bytes, MemoryBudget::Want::kAllOrNothing)
+             ? TryToAddSegments(request, expected_revision)
+             : added;
+}
+
+absl::Status Session::TryToAddSegments(const v1::AddSegmentsRequest& request, uint64_t expected_revision) {
   WELLSPACE_RETURN_IF_ERROR(CheckSegments(request.segments(), request.segment_offset()));
   WELLSPACE_RETURN_IF_ERROR(CheckFaces(request.faces(), request.seed_offset()));
   if (dimension_ != 2) {

@@ -26,7 +26,7 @@ void Session::Keep(std::shared_ptr<Operation> operation) {
 absl::StatusOr<std::shared_ptr<Operation>> Session::StartOperation(core::MeshParameters parameters, bool restart,
                                                                    uint64_t expected_revision, const SubmitWork& submit,
                                                                    const AnswerTo<v1::Operation>& answer) {
-  std::lock_guard change_lock(change_mutex_);
+  std::unique_lock change_lock(change_mutex_);
   WELLSPACE_RETURN_IF_ERROR(LoadInputs());
   std::shared_ptr<Operation> operation;
   uint64_t end = 0;
@@ -50,12 +50,17 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::StartOperation(core::MeshPar
   if (status.ok()) {
     status = CommitStart(*operation, end, answer);
   }
-  std::lock_guard lock(mutex_);
   if (!status.ok()) {
-    EndBusy();
+    {
+      std::lock_guard lock(mutex_);
+      EndBusy();
+    }
     operation->Fail(clock_.wall(), status);  // its work, if it was submitted, does not begin
+    change_lock.unlock();
+    NoteIdle();
     return status;
   }
+  std::lock_guard lock(mutex_);
   if (end > committed_points_) {
     uncommitted_crc32c_ = 0;
     NotePoints(end);
@@ -192,6 +197,7 @@ bool Session::EndWork(Operation& operation, WorkResult& result) {
   }
   change_lock.unlock();
   operation.Notify();
+  NoteIdle();
   return true;
 }
 
@@ -217,6 +223,7 @@ absl::Status Session::Cancel(Operation& operation) {
   }
   change_lock.unlock();
   operation.Notify();
+  NoteIdle();
   return absl::OkStatus();
 }
 

@@ -54,6 +54,9 @@ class SessionStore {
   virtual std::vector<std::shared_ptr<Session>> List(const std::string& tenant, absl::Time after, size_t count,
                                                      const std::map<std::string, std::string>& labels) = 0;
 
+  // All sessions, of all tenants, in no order.
+  virtual std::vector<std::shared_ptr<Session>> All() const = 0;
+
   // Takes `session` out of the store. False when it is not there any more.
   virtual bool Remove(const Session& session) = 0;
 

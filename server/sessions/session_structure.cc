@@ -37,8 +37,11 @@ absl::Status Session::PrepareStructure(uint64_t expected_revision, const MesherF
   }
   const absl::Status status = RunGuarded([&] { return Rebuild(create_mesher, job); });
   job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();
-  std::lock_guard lock(mutex_);
-  EndBusy();
+  {
+    std::lock_guard lock(mutex_);
+    EndBusy();
+  }
+  NoteIdle();
   return status;
 }
 
@@ -62,7 +65,7 @@ Session::Size Session::GetSize(uint64_t few) const {
 absl::Status Session::Rebuild(const MesherFactory& create_mesher, Job& job) {
   WELLSPACE_ASSIGN_OR_RETURN(work_.mesher, Replay(steps_, *points_, features_, *work_.mesh, create_mesher, job));
   work_.memory = job.TakeMemory(work_.mesher->memory_bytes());
-  work_.memory.MakeLasting();
+  work_.memory.MakeLasting(MesherLasts());
   return absl::OkStatus();
 }
 
@@ -120,10 +123,15 @@ absl::StatusOr<AddedVertices> Session::AddVertices(std::span<const double> point
       DropMesher();  // it has them
     }
   }
-  std::lock_guard lock(mutex_);
-  EndBusy();
+  {
+    std::lock_guard lock(mutex_);
+    EndBusy();
+    if (!status.ok()) {
+      point_account_.Return(points.size() / dimension_);
+    }
+  }
+  NoteIdle();
   if (!status.ok()) {
-    point_account_.Return(points.size() / dimension_);
     return status;
   }
   return added;
@@ -217,7 +225,12 @@ absl::Status Session::ReserveForVertices(uint64_t count) {
   const uint64_t bytes = work_.mesher->memory_bytes();
   const uint64_t wanted =
       bytes + kReservedVertices * count * (bytes / std::max<uint64_t>(1, work_.mesher->vertex_count()));
-  return work_.memory.Resize(wanted) ? absl::OkStatus() : memory_.Refusal(wanted, "the vertices of a session");
+  if (work_.memory.Resize(wanted) ||
+      (memory_.MakeRoom(wanted - std::min(wanted, work_.memory.bytes()), MemoryBudget::Want::kAllOrNothing) &&
+       work_.memory.Resize(wanted))) {
+    return absl::OkStatus();
+  }
+  return memory_.Refusal(wanted, "the vertices of a session");
 }
 
 }  // namespace wellspace::server

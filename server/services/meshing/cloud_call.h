@@ -2,6 +2,7 @@
 #ifndef WELLSPACE_SERVER_SERVICES_MESHING_CLOUD_CALL_H_
 #define WELLSPACE_SERVER_SERVICES_MESHING_CLOUD_CALL_H_
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -58,10 +59,8 @@ class CloudCall : public RequestStream<Call<Reactor>> {
 
  private:
   void SubmitJob();
-  // Sets memory aside for the points so far, and for the next message.
-  //
-  // Errors:     MEMORY_LIMIT.
-  absl::Status ReserveForNext();
+  // Sets memory aside for the points so far, and for the next message, and reads that; or ends with MEMORY_LIMIT.
+  void ReadNextWithMemory();
 
   // Guarded by mutex_.
   CloudReceiver receiver_;
@@ -72,18 +71,17 @@ class CloudCall : public RequestStream<Call<Reactor>> {
 template <typename Reactor, typename Request>
 void CloudCall<Reactor, Request>::OnBegin() {
   received_ = this->environment().memory.ReserveNothing();
-  if (absl::Status status = ReserveForNext(); !status.ok()) {
-    this->End(std::move(status));
-    return;
-  }
-  this->ReadNext();
+  ReadNextWithMemory();
 }
 
 template <typename Reactor, typename Request>
-absl::Status CloudCall<Reactor, Request>::ReserveForNext() {
+void CloudCall<Reactor, Request>::ReadNextWithMemory() {
   const uint64_t bytes = receiver_.held_bytes() + kMessageBytes;
-  return received_.Resize(bytes) ? absl::OkStatus()
-                                 : this->environment().memory.Refusal(bytes, "the next part of the cloud");
+  const auto reserve = [this, bytes] {
+    return received_.Resize(bytes) ? absl::OkStatus()
+                                   : this->environment().memory.Refusal(bytes, "the next part of the cloud");
+  };
+  this->ReserveThen(bytes - std::min(bytes, received_.bytes()), reserve, [this] { this->ReadNext(); });
 }
 
 template <typename Reactor, typename Request>
@@ -94,9 +92,6 @@ void CloudCall<Reactor, Request>::OnRequest(grpc::ByteBuffer* bytes) {
   if (status.ok()) {
     status = receiver_.Accept(&request);
   }
-  if (status.ok()) {
-    status = ReserveForNext();
-  }
   if (!status.ok()) {
     this->End(std::move(status));
     return;
@@ -104,7 +99,7 @@ void CloudCall<Reactor, Request>::OnRequest(grpc::ByteBuffer* bytes) {
   if (!had_parameters) {
     OnParameters(request);
   }
-  this->ReadNext();
+  ReadNextWithMemory();
 }
 
 template <typename Reactor, typename Request>

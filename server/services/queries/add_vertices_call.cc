@@ -31,6 +31,7 @@ RequestIds::Answer Add(const Addition& addition, const MesherFactory& create_mes
   v1::AddVerticesResponse response;
   absl::Status status = RunGuarded([&] {
     Session& session = addition.use.session();
+    const StructureUse structure(addition.use.session_ptr());
     WELLSPACE_RETURN_IF_ERROR(session.PrepareStructure(addition.expected_revision, create_mesher, job));
     const auto answer = [&](const AddedVertices& added) {
       SetResponse(added, response);

@@ -31,17 +31,22 @@ constexpr std::array<uint64_t, core::kMaxDimension + 1> kVerticesPerLook = {0, 0
 }  // namespace
 
 void QueryCall::OnBegin() {
-  if (absl::Status status = Find(); !status.ok()) {
-    End(std::move(status));
-    return;
-  }
-  WorkAhead();
+  // The request as bytes and as numbers; batches that wait, one that is made, and one that is written.
+  const uint64_t bytes = 2 * bytes_.Length() + (kBatchesAhead + 3) * kMaxResponseBytes;
+  const auto reserve = [this, bytes] {
+    WELLSPACE_ASSIGN_OR_RETURN(memory_, environment().memory.Reserve(bytes, "the batches of a query"));
+    return absl::OkStatus();
+  };
+  ReserveThen(bytes, reserve, [this] {
+    if (absl::Status status = Find(); !status.ok()) {
+      End(std::move(status));
+      return;
+    }
+    WorkAhead();
+  });
 }
 
 absl::Status QueryCall::Find() {
-  // The request as bytes and as numbers; batches that wait, one that is made, and one that is written.
-  const uint64_t bytes = 2 * bytes_.Length() + (kBatchesAhead + 3) * kMaxResponseBytes;
-  WELLSPACE_ASSIGN_OR_RETURN(memory_, environment().memory.Reserve(bytes, "the batches of a query"));
   WELLSPACE_ASSIGN_OR_RETURN(request_, parse_(&bytes_));
   WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, FindSession(environment(), caller(), request_.session));
   use_.emplace(std::move(session));
@@ -56,6 +61,7 @@ void QueryCall::WorkAhead() {
   absl::StatusOr<std::shared_ptr<Job>> job =
       environment().jobs.Submit({.tenant = caller().tenant,
                                  .is_small = IsSmallAddition(0, size.vertices, size.replayed_steps),
+                                 .of_call = memory_.bytes(),
                                  .work = [self = SharedAs<QueryCall>()](Job& running) { self->MakeBatches(running); }});
   if (job.ok()) {
     work_ = Work::kUnderWay;
@@ -116,6 +122,9 @@ void QueryCall::MakeBatches(Job& job) {
 
 absl::Status QueryCall::FillBatch(Job& job, bool* is_at_work) {
   Session& session = use_->session();
+  if (!structure_.has_value()) {
+    structure_.emplace(use_->session_ptr());
+  }
   do {
     WELLSPACE_RETURN_IF_ERROR(job.context().Check());
     WELLSPACE_RETURN_IF_ERROR(session.PrepareStructure(0, environment().create_mesher, job, is_at_work));

@@ -65,9 +65,10 @@ class QueryCall final : public ResponseStream<Call<grpc::ServerWriteReactor<grpc
   // Of the job under way; before the first, guarded by mutex_.
   VertexQueryRequest request_;
   std::optional<SessionUse> use_;
-  uint64_t version_ = 0;           // of the structure; see Session::Query
-  uint64_t next_ = 0;              // of the vertices asked about
-  std::optional<uint64_t> count_;  // of them
+  std::optional<StructureUse> structure_;  // from the first batch on
+  uint64_t version_ = 0;                   // of the structure; see Session::Query
+  uint64_t next_ = 0;                      // of the vertices asked about
+  std::optional<uint64_t> count_;          // of them
 
   // Guarded by mutex_.
   grpc::ByteBuffer bytes_;

@@ -10,13 +10,11 @@
 namespace wellspace::server {
 
 void AddSegmentsCall::OnBegin() {
-  absl::StatusOr<MemoryReservation> memory = environment().memory.Reserve(kMessageBytes, "segments");
-  if (!memory.ok()) {
-    End(std::move(memory).status());
-    return;
-  }
-  memory_ = *std::move(memory);
-  ReadNext();
+  const auto reserve = [this] {
+    WELLSPACE_ASSIGN_OR_RETURN(memory_, environment().memory.Reserve(kMessageBytes, "segments"));
+    return absl::OkStatus();
+  };
+  ReserveThen(kMessageBytes, reserve, [this] { ReadNext(); });
 }
 
 absl::Status AddSegmentsCall::Parse(grpc::ByteBuffer* bytes, v1::AddSegmentsRequest* request) {

@@ -23,13 +23,11 @@ constexpr uint64_t kCommittedBytes = uint64_t{16} << 20;
 }  // namespace
 
 void UploadPointsCall::OnBegin() {
-  absl::StatusOr<MemoryReservation> memory = environment().memory.Reserve(kMessageBytes, "an upload");
-  if (!memory.ok()) {
-    End(std::move(memory).status());
-    return;
-  }
-  memory_ = *std::move(memory);
-  ReadNext();
+  const auto reserve = [this] {
+    WELLSPACE_ASSIGN_OR_RETURN(memory_, environment().memory.Reserve(kMessageBytes, "an upload"));
+    return absl::OkStatus();
+  };
+  ReserveThen(kMessageBytes, reserve, [this] { ReadNext(); });
 }
 
 void UploadPointsCall::OnRequest(grpc::ByteBuffer* bytes) {

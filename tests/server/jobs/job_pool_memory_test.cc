@@ -131,6 +131,17 @@ TEST(JobPool, WhenAllWaitForOneAnotherTheYoungestTreeIsRefusedAndTheOldestGoesOn
   EXPECT_TRUE(jobs[3].mesh_status.ok()) << jobs[3].mesh_status;
 }
 
+TEST(JobPool, AJobThatWaitsForWhatItsOwnCallHoldsIsRefused) {
+  Needy job(95 * kMegabyte);
+  Pool pool(1, 1, 1, kMaxMemory);
+  const absl::StatusOr<MemoryReservation> call = pool.memory.Reserve(10 * kMegabyte, "a call");
+  ASSERT_TRUE(call.ok());
+  ASSERT_TRUE(pool.pool.Submit({.of_call = call->bytes(), .work = job.Work()}).ok());
+  ASSERT_TRUE(job.ended.Wait());
+  EXPECT_EQ(DetailsOf(job.status).reason, "MEMORY_LIMIT");
+  EXPECT_TRUE(DetailsOf(job.status).may_retry);
+}
+
 TEST(JobPool, ATreeWhoseMeshFitsGoesOnBehindALargeOneOfItsTenant) {
   WithTree large(30 * kMegabyte, 100 * kMegabyte);
   WithTree small(10 * kMegabyte, 40 * kMegabyte);

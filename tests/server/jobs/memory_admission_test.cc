@@ -106,6 +106,13 @@ TEST(VictimOfDeadlock, IsNoneWhileOtherWorkCanFreeMemory) {
   EXPECT_EQ(VictimOfDeadlock(0, {}), std::nullopt);
 }
 
+TEST(VictimOfDeadlock, CountsWhatCallsHaveThatWaitForTheirJobs) {
+  std::vector<JobMemory> queued = {Waiting(1, 40, 90)};
+  EXPECT_FALSE(VictimOfDeadlock(45, queued).has_value()) << "5 may be freed";
+  queued[0].of_call = 5;
+  EXPECT_EQ(VictimOfDeadlock(45, queued), 1u) << "but not by the call that waits for the job";
+}
+
 TEST(VictimOfDeadlock, IsTheYoungestThatWaitsWithMemory) {
   const JobMemory with_points{.sequence = 9, .freed = 10};  // waits for a worker
   EXPECT_EQ(VictimOfDeadlock(70, std::vector{Waiting(2, 30, 80), Waiting(1, 30, 80), with_points}), 2u);
