@@ -54,7 +54,7 @@ absl::StatusOr<std::vector<Cell>> VertexQueries<D>::ClippedCells(std::span<const
     const size_t i = (next++)->second;
     if (workspace.cell.IsTooLarge()) {
       status = absl::FailedPreconditionError(absl::StrCat("the cell of vertex ", vertices[i], " has more than ",
-                                                          Polytope<D>::kMostNodes,
+                                                          kMostNodes<D>,
                                                           " nodes; refine first, or ask with a smaller beta"));
       return false;
     }

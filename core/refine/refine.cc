@@ -276,7 +276,7 @@ absl::Status Refinement<D>::RefineVertex(VertexId v, int bucket, Steps& steps) {
   while (true) {
     const Assessment* const found = steps.Assess();  // lines 7, 8 and 11
     if (found == nullptr) {
-      return absl::ResourceExhaustedError(absl::StrCat("the cell of a vertex has more than ", Polytope<D>::kMostNodes,
+      return absl::ResourceExhaustedError(absl::StrCat("the cell of a vertex has more than ", kMostNodes<D>,
                                                        " nodes; lower rho = ", rules_->criteria().rho));
     }
     if (pending_.IsNew(v)) {
