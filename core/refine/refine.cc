@@ -69,7 +69,7 @@ absl::Status Refinement<D>::Run(const MeshCriteria<D>& criteria, uint64_t max_ve
 template <int D>
 absl::Status Refinement<D>::ScheduleAll(const MeshCriteria<D>& criteria, const VertexPredictor& predict,
                                         ThreadTeam& team) {
-  rounds_.Drop();
+  rounds_.ReattachAll();
   structure_.CommitAll();  // what was added before something was thrown
   absl::Status predicted;
   const absl::Cleanup end = [&team] { team.Drop(); };  // of what is begun, where something is thrown
@@ -166,7 +166,7 @@ absl::Status Refinement<D>::RefineInRounds() {
     }
     rounds_.EndRound();
     WELLSPACE_RETURN_IF_ERROR(status);
-    rounds_.GoOn();
+    rounds_.NextRound();
   }
   return absl::OkStatus();
 }
@@ -182,7 +182,7 @@ absl::Status Refinement<D>::RefineBatch(Batch<D>& batch) {
     if (pending_.schedule().IsPendingIn(batch.next(), rounds_.bucket())) {
       WELLSPACE_RETURN_IF_ERROR(RefineNextOf(batch));
     } else {
-      batch.NoteConflicts(batch.ExpectedOf(batch.refined));
+      batch.NoteConflicts(batch.records.ExpectedOf(batch.refined));
     }
   }
   return absl::OkStatus();
@@ -237,7 +237,7 @@ bool Refinement<D>::IsNextStillValid(const Batch<D>& batch) const {
     return false;
   }
   if constexpr (D == 2) {
-    return domain_ == nullptr || AreSplitsInOrder(*domain_, batch.RequestsOf(batch.refined));
+    return domain_ == nullptr || AreSplitsInOrder(*domain_, batch.records.RequestsOf(batch.refined));
   }
   return true;
 }
@@ -334,7 +334,7 @@ absl::StatusOr<VertexId> Refinement<D>::Insert(const InsertionRequest<D>& reques
   }
   Insertion insertion = request.insertion;
   insertion.vertex = structure_.AddUncommitted(insertion.near, point.position);
-  if (!rounds_.IsAhead() || *observer_ || structure_.uncommitted_count() == QueryStructure<D>::kMostUncommitted) {
+  if (!rounds_.IsRecording() || *observer_ || structure_.uncommitted_count() == QueryStructure<D>::kMostUncommitted) {
     rounds_.CommitAdded();
   }
   if constexpr (D == 2) {
