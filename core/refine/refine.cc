@@ -212,7 +212,7 @@ absl::Status Refinement<D>::RefineNextOf(Batch<D>& batch) {
     return status;
   }
   batch.NoteInserted(rounds_.InsertedFrom(first), first_new);
-  return CountRefined(bucket);
+  return CountRefined();
 }
 
 // Refines `v`, which was taken from `bucket`.
@@ -226,7 +226,7 @@ absl::Status Refinement<D>::RefineTaken(VertexId v, int bucket) {
     pending_.schedule().AddToBucket(v, bucket);
     return status;
   }
-  return CountRefined(bucket);
+  return CountRefined();
 }
 
 // Whether the record of the next vertex of a batch is still valid. In a domain it may depend on whether there is a
@@ -384,10 +384,9 @@ void Refinement<D>::ComputeCell(VertexId v, const Box<D>& clip, Workspace<D>& wo
 
 // Tells now and then how far the run is, and asks for the memory that it has come to.
 template <int D>
-absl::Status Refinement<D>::CountRefined(int bucket) {
+absl::Status Refinement<D>::CountRefined() {
   if (++refined_ % kReportInterval == 0) {
     WELLSPACE_RETURN_IF_ERROR(context_->AllowMemory(structure_.MemoryBytes() + MemoryBytes()));
-    context_->SetBucket(bucket);
     context_->SetPhaseFraction(1 - static_cast<double>(pending_.schedule().size()) / structure_.vertex_count());
   }
   return absl::OkStatus();

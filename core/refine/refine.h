@@ -138,7 +138,7 @@ class Refinement {
   absl::StatusOr<VertexId> Insert(const InsertionRequest<D>& request);
   void AddPending(VertexId near, VertexId x, double nearest_sq);
   void ComputeCell(VertexId v, const Box<D>& clip, Workspace<D>& workspace);
-  absl::Status CountRefined(int bucket);
+  absl::Status CountRefined();
   double EdgeLimitSq(int bucket) const { return pending_.schedule().UpperLengthSq(bucket); }
 
   QueryStructure<D>& structure_;
