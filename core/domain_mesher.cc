@@ -116,9 +116,9 @@ absl::Status DomainMesher::Initialize(const MeshParameters& parameters, std::spa
                                                      "max_vertices = ", max_vertices, " vertices; raise max_vertices"));
   }
   NumberPoints(made, points);
-  structure_.SetSegments(planar_->Ends());
   WELLSPACE_RETURN_IF_ERROR(structure_.Initialize(made.cloud.grid, std::move(made.cloud.points),
-                                                  kLeavesPerVertex * max_vertices + 4, parameters.threads, context));
+                                                  kLeavesPerVertex * max_vertices + 4, parameters.threads, context,
+                                                  planar_->Ends()));
   WELLSPACE_RETURN_IF_ERROR(
       CheckSeparation<2>(domain_, structure_, 0, made.cloud.first_input, parameters.threads, context));
   mesh_box_.low = mesh_box_.high = domain_.Unscaled(structure_.point(VertexId{0}));

@@ -110,7 +110,8 @@ void QueryCounters::Add(const QueryCounters& other) {
 
 template <int D>
 absl::Status QueryStructure<D>::Initialize(const MortonGrid<D>& grid, HugeVector<Point<D>> points, uint64_t max_leaves,
-                                           int threads, const RunContext& context) {
+                                           int threads, const RunContext& context,
+                                           std::vector<SegmentLists::Ends> segments) {
   box_ = grid.box();
   box_of_cells_ = box_;
   points_ = std::move(points);
@@ -120,7 +121,7 @@ absl::Status QueryStructure<D>::Initialize(const MortonGrid<D>& grid, HugeVector
     tree_.Reserve(room);
     faces_.reserve(room);
   }
-  WELLSPACE_RETURN_IF_ERROR(tree_.Build(grid, points_, max_leaves, threads, context));
+  WELLSPACE_RETURN_IF_ERROR(tree_.Build(grid, points_, max_leaves, threads, context, std::move(segments)));
   vertex_count_ = static_cast<uint32_t>(points_.size());
   near_.clear();
   MakeRoom();
