@@ -20,8 +20,7 @@ absl::StatusOr<std::vector<double>> VertexQueries<D>::NearestNeighborDistances(
   distances.reserve(vertices.size());
   Workspace<D> workspace;
   for (const uint32_t vertex : vertices) {
-    const double distance_sq =
-        structure_.ApproximateNearestNeighbor(numbering_.VertexOf(vertex), workspace).distance_sq;
+    const double distance_sq = structure_.NearestNeighbor(numbering_.VertexOf(vertex), workspace).distance_sq;
     distances.push_back(std::sqrt(distance_sq) / domain_.scale);
   }
   return distances;

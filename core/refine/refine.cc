@@ -397,7 +397,7 @@ void Refinement<D>::VertexAdded(VertexId x) {
   if (!pending_.HasBegun()) {
     return;  // the next run schedules all
   }
-  Neighbor nearest = structure_.ApproximateNearestNeighbor(x, workspace_.own);
+  Neighbor nearest = structure_.NearestNeighbor(x, workspace_.own);
   if constexpr (D == 2) {
     if (domain_ != nullptr) {
       nearest.distance_sq = domain_rules_->NearestSegmentSq(x, nearest.distance_sq, workspace_.own);

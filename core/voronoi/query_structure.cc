@@ -312,7 +312,7 @@ void QueryStructure<D>::ScanOutward(const Point<D>& site, NodeId own, Workspace<
 }
 
 template <int D>
-Neighbor QueryStructure<D>::ApproximateNearestNeighbor(VertexId v, Workspace<D>& workspace) const {
+Neighbor QueryStructure<D>::NearestNeighbor(VertexId v, Workspace<D>& workspace) const {
   return NearestWithin(v, std::numeric_limits<double>::infinity(), workspace);
 }
 
@@ -443,7 +443,7 @@ double QueryStructure<D>::NearestSqOfGathered(VertexId v, Workspace<D>& workspac
       }
     }
   }
-  return ApproximateNearestNeighbor(v, workspace).distance_sq;
+  return NearestNeighbor(v, workspace).distance_sq;
 }
 
 // As ClippedVoronoi, where vertices may have been gathered around `v`.

@@ -96,7 +96,7 @@ class QueryStructure {
   // Complexity: O(1) when bottom-up.
   // Errors:     none.
   // Source:     [HT08] Figure 3, APPROXIMATENN.
-  Neighbor ApproximateNearestNeighbor(VertexId v, Workspace<D>& workspace) const;
+  Neighbor NearestNeighbor(VertexId v, Workspace<D>& workspace) const;
 
   // The same among the vertices whose squared distance is less than `limit_sq`; kNoVertex and the limit if there is
   // none.
