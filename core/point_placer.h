@@ -15,8 +15,8 @@
 #include "core/base/run_context.h"
 #include "core/domain.h"
 #include "core/geometry/point.h"
-#include "core/refine/domain/place_in_domain.h"
 #include "core/refine/domain/planar_domain.h"
+#include "core/refine/place_in_domain.h"
 #include "core/refused_points.h"
 #include "core/voronoi/query_structure.h"
 

@@ -90,12 +90,12 @@ void PendingVertices<D>::Notify(VertexId v, const Assessment& found, std::span<c
   notified_[Index(v)] = found.is_clipped ? Notified::kWithinClip : Notified::kAll;
   const double rho_sq = criteria_->rho * criteria_->rho;
   const bool is_well_spaced = criteria_->criterion == Criterion::kWellSpaced;
-  for (const auto& [u, edge_sq, is_on_face] : notices) {
+  for (const auto& [u, edge_sq, is_on_boundary] : notices) {
     if (!is_first && schedule_.IsPending(u)) {
       continue;
     }
     const CellMemo memo = memos_[Index(u)];
-    const bool was_cut = memo.HasFaceEdge() && is_on_face;
+    const bool was_cut = memo.HasFaceEdge() && is_on_boundary;
     const bool is_too_far = is_well_spaced && memo.MayReachBeyond(rho_sq * edge_sq);
     if (was_cut || is_too_far) {
       Collect(u, edge_sq);
@@ -113,8 +113,8 @@ void PendingVertices<D>::Postpone(VertexId v, const Assessment& found, int bucke
 
 template <int D>
 void PendingVertices<D>::Remember(VertexId v, const Assessment& found, std::span<const WatchedNode<D>> watched) {
-  if (found.own_face_edge_sq != Assessment::kNone) {
-    SetMemo(v, CellMemo::OfFaceEdge(found.own_face_edge_sq), watched);
+  if (found.own_boundary_edge_sq != Assessment::kNone) {
+    SetMemo(v, CellMemo::OfFaceEdge(found.own_boundary_edge_sq), watched);
   } else {
     SetMemo(v, found.IsGood() ? CellMemo::OfRadius(found.radius_sq) : CellMemo());
   }

@@ -13,6 +13,7 @@
 #include "core/refine/domain/domain_rules.h"
 #include "core/refine/domain/domain_steps.h"
 #include "core/refine/domain/expected_vertices.h"
+#include "core/refine/rounding.h"
 
 namespace wellspace::core {
 namespace {
@@ -32,8 +33,6 @@ constexpr size_t kParts = 4;
 // unless they are so many times as large.
 constexpr double kLeastShareValid = 2.0 / 3;
 constexpr size_t kMoreThanDistrusted = 4;
-// More than what is rounded.
-constexpr double kBeyond = 1 + 1e-9;
 
 // Cells of the vertices that were in the structure when speculation began, and of those that the batch expects to be
 // inserted before. Notes in the record how far they reach.
