@@ -21,7 +21,8 @@ struct Leaves {
 };
 
 // Simplices per vertex without a boundary. In 2-D by Euler's formula; in 3-D as measured: 5 to 6 around surfaces and
-// curves, 6.6 in uniformly random points; from 4-D on those of random points, 31.8, 187 and 1297, a tenth less. "The model".
+// curves, 6.6 in uniformly random points; from 4-D on those of random points, 31.8, 187 and 1297, a tenth less. "The
+// model".
 template <int D>
 constexpr double kSimplicesPerVertex = D == 2   ? 2.0
                                        : D == 3 ? 6.1
@@ -38,8 +39,8 @@ double SimplicesOf(double vertices, double on_boundary) {
   if constexpr (D == 2) {
     return 2 * vertices - 2 - on_boundary;
   } else {
-    // About half of the simplices around a vertex of the interior are around one of the boundary: "The model". The empty
-    // box has D!.
+    // About half of the simplices around a vertex of the interior are around one of the boundary: "The model". The
+    // empty box has D!.
     const double corners = 1 << D;
     return std::tgamma(D + 1) +
            kSimplicesPerVertex<D> * std::max(0.0, vertices - corners - 0.52 * (on_boundary - corners));

@@ -49,7 +49,7 @@ class LeafTree {
   // In 5-D and 6-D a vertex has hundreds of neighbours and a node 32 or 64 children: fewer, larger leaves serve better.
   static constexpr int kLeafCapacity = D <= 3 ? 48 : D == 4 ? 64 : 16 << D;
   // A leaf may be this many times larger than lfs on it. At least 2, so that the neighbours of a leaf hold all that is
-  // near it; 128 and 1024 are the best of those measured in docs/design/tree.md, "Capacity and coarseness by dimension".
+  // near it. docs/design/tree.md, "Capacity and coarseness by dimension", has what was measured with 128 and 1024.
   static constexpr double kCoarseness = D <= 4 ? 128 : 1024;
 
   using VertexPool = LeafVertexPool<D, kLeafCapacity>;
