@@ -18,7 +18,7 @@
 #include "core/refine/refinement_checks.h"
 #include "core/refine/speculation/recorded_steps.h"
 #include "core/refine/speculation/rounds.h"
-#include "core/refine/speculation/star_writer.h"
+#include "core/refine/star_writer.h"
 #include "core/refine/step_rules.h"
 #include "core/voronoi/query_structure.h"
 #include "core/voronoi/star_lists.h"

@@ -16,7 +16,7 @@
 #include "core/refine/domain/planar_domain.h"
 #include "core/refine/pending_vertices.h"
 #include "core/refine/speculation/batch.h"
-#include "core/refine/speculation/star_writer.h"
+#include "core/refine/star_writer.h"
 #include "core/refine/step_rules.h"
 #include "core/voronoi/query_structure.h"
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/refine/speculation/recorded_steps.h"
-#include "core/refine/speculation/star_writer.h"
+#include "core/refine/star_writer.h"
 
 namespace wellspace::core {
 namespace {
