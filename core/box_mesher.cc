@@ -18,7 +18,7 @@
 #include "core/simplex/boundary.h"
 #include "core/simplex/quality.h"
 #include "core/simplex/simplices.h"
-#include "core/simplex/validate.h"
+#include "core/validate/validate.h"
 #include "core/vertex_queries.h"
 
 namespace wellspace::core {
