@@ -116,9 +116,9 @@ absl::Status DomainMesher::Initialize(const MeshParameters& parameters, std::spa
                                                      "max_vertices = ", max_vertices, " vertices; raise max_vertices"));
   }
   NumberPoints(made, points);
-  structure_.SetSegments(planar_->Ends());
   WELLSPACE_RETURN_IF_ERROR(structure_.Initialize(made.cloud.grid, std::move(made.cloud.points),
-                                                  kLeavesPerVertex * max_vertices + 4, parameters.threads, context));
+                                                  kLeavesPerVertex * max_vertices + 4, parameters.threads, context,
+                                                  planar_->Ends()));
   WELLSPACE_RETURN_IF_ERROR(
       CheckSeparation<2>(domain_, structure_, 0, made.cloud.first_input, parameters.threads, context));
   mesh_box_.low = mesh_box_.high = domain_.Unscaled(structure_.point(VertexId{0}));
@@ -128,7 +128,7 @@ absl::Status DomainMesher::Initialize(const MeshParameters& parameters, std::spa
   placer_.emplace(domain_, structure_, *planar_);
   adder_.emplace(domain_, 0, structure_, *refinement_, numbering_, nullptr, &*placer_);
   context.SetVertices(structure_.vertex_count());
-  tree_seconds_ = absl::ToDoubleSeconds(context.TimeIn(Phase::kTree));
+  figures_.tree_seconds = absl::ToDoubleSeconds(context.TimeIn(Phase::kTree));
   return absl::OkStatus();
 }
 
@@ -165,7 +165,7 @@ absl::Status DomainMesher::Refine(const MeshParameters& parameters, RunContext& 
   context.EnterPhase(Phase::kRefinement);
   WELLSPACE_RETURN_IF_ERROR(samples_.Take(domain_, mesh_box_, parameters, context));
   made_.reset();
-  const Stopwatch stopwatch(refinement_seconds_, simplices_seconds_);
+  const Stopwatch stopwatch(figures_.refinement_seconds, figures_.simplices_seconds);
   return MakeConforming(parameters, context);
 }
 
@@ -194,12 +194,12 @@ absl::Status DomainMesher::MakeConforming(const MeshParameters& parameters, RunC
 absl::StatusOr<std::vector<DomainMesher::Subsegment>> DomainMesher::MakeTriangles(PlanarDomain::Chains chains,
                                                                                   int threads, RunContext& context) {
   const double no_time = 0;
-  const Stopwatch stopwatch(simplices_seconds_, no_time);
+  const Stopwatch stopwatch(figures_.simplices_seconds, no_time);
   numbering_.Extend(structure_.vertex_count());
   WELLSPACE_ASSIGN_OR_RETURN(
       DomainSimplices triangles,
       ComputeDomainSimplices(structure_, *planar_, chains, numbering_.output_index(), threads, context));
-  stars_.Add(triangles.simplices.counters);
+  figures_.star_queries.Add(triangles.simplices.counters);
   std::vector<Subsegment> to_split;
   for (const uint32_t at : triangles.broken) {
     const auto segment = static_cast<uint32_t>(std::upper_bound(chains.first.begin(), chains.first.end(), at) -
@@ -332,16 +332,15 @@ absl::StatusOr<Mesh> DomainMesher::Extract(int threads, RunContext& context) {
   SetRegions(mesh);
   WELLSPACE_RETURN_IF_ERROR(context.Check());
   context.EnterPhase(Phase::kDone);
-  simplices_seconds_ += absl::ToDoubleSeconds(context.TimeIn(Phase::kSimplices));
-  extracted_vertices_ = mesh.vertex_count();
-  extracted_simplices_ = mesh.simplex_count();
+  figures_.simplices_seconds += absl::ToDoubleSeconds(context.TimeIn(Phase::kSimplices));
+  figures_.NoteMesh(mesh);
   SetStatistics(mesh);
   return mesh;
 }
 
 absl::Status DomainMesher::Update(Mesh& mesh, int threads, RunContext& context) {
   WELLSPACE_RETURN_IF_ERROR(CheckRefined(made_.has_value(), threads));
-  WELLSPACE_RETURN_IF_ERROR(CheckLastMesh(mesh, 2, extracted_vertices_, extracted_simplices_));
+  WELLSPACE_RETURN_IF_ERROR(CheckLastMesh(mesh, 2, figures_.extracted_vertices, figures_.extracted_simplices));
   WELLSPACE_ASSIGN_OR_RETURN(mesh, Extract(threads, context));
   return absl::OkStatus();
 }
@@ -455,11 +454,9 @@ void DomainMesher::SetStatistics(Mesh& mesh) const {
   domain.min_input_angle_deg = planar_->MinAngle() * 180 / std::numbers::pi;
   statistics.vertices = mesh.vertex_count();
   statistics.simplices = mesh.simplex_count();
-  statistics.tree_seconds = tree_seconds_;
-  statistics.refinement_seconds = refinement_seconds_;
-  statistics.simplices_seconds = simplices_seconds_;
+  figures_.SetSeconds(statistics);
   statistics.tree_leaves = structure_.tree().leaf_count();
-  SetQueryFigures(refinement_->counters(), stars_, statistics);
+  SetQueryFigures(refinement_->counters(), figures_.star_queries, statistics);
   SetTotals(statistics);
 }
 

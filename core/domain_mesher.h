@@ -15,6 +15,7 @@
 #include "core/features/features.h"
 #include "core/geometry/box.h"
 #include "core/mesher.h"
+#include "core/mesher_figures.h"
 #include "core/point_adder.h"
 #include "core/point_placer.h"
 #include "core/refine/domain/planar_domain.h"
@@ -87,14 +88,9 @@ class DomainMesher final : public Mesher {
   std::optional<PointPlacer> placer_;
   std::optional<PointAdder<2>> adder_;
   uint64_t dropped_points_ = 0;
-  std::optional<Made> made_;         // unless vertices have been added since
-  double rho_ = 0;                   // of the last refinement
-  uint64_t extracted_vertices_ = 0;  // of the last mesh
-  uint64_t extracted_simplices_ = 0;
-  QueryCounters stars_;
-  double tree_seconds_ = 0;
-  double refinement_seconds_ = 0;
-  double simplices_seconds_ = 0;
+  std::optional<Made> made_;  // unless vertices have been added since
+  double rho_ = 0;            // of the last refinement
+  MesherFigures figures_;
 };
 
 }  // namespace wellspace::core

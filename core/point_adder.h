@@ -14,7 +14,7 @@
 #include "core/geometry/point.h"
 #include "core/near_points.h"
 #include "core/point_placer.h"
-#include "core/refine/domain/place_in_domain.h"
+#include "core/refine/place_in_domain.h"
 #include "core/refine/refine.h"
 #include "core/sorted_cloud.h"
 #include "core/vertex_numbering.h"

@@ -6,9 +6,9 @@
 
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
+#include "core/features/near_segment.h"
 #include "core/features/place.h"
 #include "core/geometry/box.h"
-#include "core/refused_points.h"
 
 namespace wellspace::core {
 namespace {
@@ -27,8 +27,7 @@ absl::StatusOr<std::vector<PlaceInDomain>> PointPlacer::FindAll(std::span<const 
                                                                 const RunContext& context) {
   std::vector<PlaceInDomain> places(points.size() / 2);
   const double within = kOnSegment * domain_.MinSeparation();
-  RefusedPoints not_meshed;
-  RefusedPoints too_close;
+  Refused refused;
   for (uint32_t i = 0; i < places.size(); ++i) {
     WELLSPACE_RETURN_IF_ERROR(context.Check());
     const Point<2> given = PointAt<2>(points, i);
@@ -37,30 +36,28 @@ absl::StatusOr<std::vector<PlaceInDomain>> PointPlacer::FindAll(std::span<const 
     }
     const Point<2> p = domain_.Scaled(given);
     if (!(DistanceSq<2>(p, structure_.box_of_cells()) <= within * within)) {
-      not_meshed.Add(i, NotMeshedError(given, i));
+      refused.not_meshed.Add(i, NotMeshedError(given, i));
       continue;
     }
     const Neighbor nearest = structure_.NearestTo(p, start(i), workspace_);
     if (nearest.distance_sq < domain_.MinSeparation() * domain_.MinSeparation()) {
       continue;
     }
-    absl::Status status = Find(p, i, nearest, places[i]);
-    if (!status.ok()) {
-      (IsTooClose(status) ? too_close : not_meshed).Add(i, std::move(status));
-    }
+    places[i] = Find(p, i, nearest, refused);
   }
-  if (!not_meshed.IsEmpty()) {
-    return not_meshed.InAll("nor are");
+  if (!refused.not_meshed.IsEmpty()) {
+    return refused.not_meshed.InAll("nor are");
   }
-  if (!too_close.IsEmpty()) {
-    return too_close.InAll("so are");
+  if (!refused.too_close.IsEmpty()) {
+    return refused.too_close.InAll("so are");
   }
   return places;
 }
 
-// Sets the place of point `index`, which is `p` and no vertex. Nothing is between it and what is nearest to it, be that
-// a segment or a vertex: so its face is the one there.
-absl::Status PointPlacer::Find(const Point<2>& p, size_t index, const Neighbor& nearest, PlaceInDomain& place) {
+// The place of point `index`, which is `p` and no vertex; if it has none, `refused` has it then. Nothing is between it
+// and what is nearest to it, be that a segment or a vertex: so its face is the one there.
+PlaceInDomain PointPlacer::Find(const Point<2>& p, uint32_t index, const Neighbor& nearest, Refused& refused) {
+  PlaceInDomain place;
   const double reach = std::max(std::sqrt(nearest.distance_sq) * (1 + kRoom), domain_.MinSeparation());
   structure_.SegmentsWithin(p, reach, nearest.vertex, workspace_);
   Beside first;  // the nearest, where its foot is between its ends; the next
@@ -80,12 +77,12 @@ absl::Status PointPlacer::Find(const Point<2>& p, size_t index, const Neighbor& 
   const bool is_on = first.IsThere() && std::abs(first.away) <= kOnSegment * domain_.MinSeparation();
   const Beside& other = is_on ? second : first;
   if (other.IsThere() && std::abs(other.away) < domain_.MinSeparation()) {
-    return TooCloseError<2>(domain_, p, index, std::abs(other.away),
-                            absl::StrCat(NameOf(other.segment), ", which it is not on"));
+    refused.too_close.Add(index, TooCloseError(p, index, other));
+    return place;
   }
   if (is_on) {
     place.on = planar_.PlaceBeside(p, first.segment);
-    return absl::OkStatus();
+    return place;
   }
   if (first.IsThere() && first.away * first.away <= nearest.distance_sq) {
     place.face = planar_.faces().left_face[HalfEdgeOf(first.segment, first.away < 0)];
@@ -93,7 +90,17 @@ absl::Status PointPlacer::Find(const Point<2>& p, size_t index, const Neighbor& 
     const Point<2> toward = Difference<2>(p, structure_.point(nearest.vertex));
     place.face = planar_.FaceOfSector(nearest.vertex, planar_.SectorToward(nearest.vertex, toward));
   }
-  return planar_.faces().IsMeshed(place.face) ? absl::OkStatus() : NotMeshedError(domain_.Unscaled(p), index);
+  if (!planar_.faces().IsMeshed(place.face)) {
+    refused.not_meshed.Add(index, NotMeshedError(domain_.Unscaled(p), index));
+  }
+  return place;
+}
+
+absl::Status PointPlacer::TooCloseError(const Point<2>& p, size_t index, const Beside& beside) const {
+  const double least = domain_.MinSeparation() / domain_.scale;
+  return NearSegmentError(DescribeNearSegment(absl::StrCat("points[", index, "]"), domain_.Unscaled(p),
+                                              std::abs(beside.away) / domain_.scale, NameOf(beside.segment)),
+                          least, kOnSegment * least);
 }
 
 std::string PointPlacer::NameOf(uint32_t segment) const {
@@ -103,7 +110,7 @@ std::string PointPlacer::NameOf(uint32_t segment) const {
 
 absl::Status PointPlacer::NotMeshedError(const Point<2>& p, size_t index) {
   return absl::InvalidArgumentError(
-      absl::StrCat("points[", index, "] = ", Place(p),
+      absl::StrCat("points[", index, "] = ", PlaceText(p),
                    " is not in the domain that is meshed: inside a face of it, or on a segment"));
 }
 

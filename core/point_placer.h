@@ -15,8 +15,9 @@
 #include "core/base/run_context.h"
 #include "core/domain.h"
 #include "core/geometry/point.h"
-#include "core/refine/domain/place_in_domain.h"
 #include "core/refine/domain/planar_domain.h"
+#include "core/refine/place_in_domain.h"
+#include "core/refused_points.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {
@@ -54,7 +55,14 @@ class PointPlacer {
     bool IsThere() const { return segment != SegmentPoint::kNone; }
   };
 
-  absl::Status Find(const Point<2>& p, size_t index, const Neighbor& nearest, PlaceInDomain& place);
+  // Points without a place.
+  struct Refused {
+    RefusedPoints not_meshed;
+    RefusedPoints too_close;
+  };
+
+  PlaceInDomain Find(const Point<2>& p, uint32_t index, const Neighbor& nearest, Refused& refused);
+  absl::Status TooCloseError(const Point<2>& p, size_t index, const Beside& beside) const;
   std::string NameOf(uint32_t segment) const;
   static absl::Status NotMeshedError(const Point<2>& p, size_t index);
 

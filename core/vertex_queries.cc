@@ -20,8 +20,7 @@ absl::StatusOr<std::vector<double>> VertexQueries<D>::NearestNeighborDistances(
   distances.reserve(vertices.size());
   Workspace<D> workspace;
   for (const uint32_t vertex : vertices) {
-    const double distance_sq =
-        structure_.ApproximateNearestNeighbor(numbering_.VertexOf(vertex), workspace).distance_sq;
+    const double distance_sq = structure_.NearestNeighbor(numbering_.VertexOf(vertex), workspace).distance_sq;
     distances.push_back(std::sqrt(distance_sq) / domain_.scale);
   }
   return distances;
@@ -54,7 +53,7 @@ absl::StatusOr<std::vector<Cell>> VertexQueries<D>::ClippedCells(std::span<const
     const size_t i = (next++)->second;
     if (workspace.cell.IsTooLarge()) {
       status = absl::FailedPreconditionError(absl::StrCat("the cell of vertex ", vertices[i], " has more than ",
-                                                          Polytope<D>::kMostNodes,
+                                                          kMostNodes<D>,
                                                           " nodes; refine first, or ask with a smaller beta"));
       return false;
     }

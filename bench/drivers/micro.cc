@@ -163,9 +163,8 @@ template <int D>
 void BM_NearestNeighbor(benchmark::State& state) {
   const core::QueryStructure<D> structure = Structure<D>(state.range(0), true);
   core::Workspace<D> workspace;
-  RunQueries<D>(state, structure, workspace, [&](VertexId v) {
-    benchmark::DoNotOptimize(structure.ApproximateNearestNeighbor(v, workspace).distance_sq);
-  });
+  RunQueries<D>(state, structure, workspace,
+                [&](VertexId v) { benchmark::DoNotOptimize(structure.NearestNeighbor(v, workspace).distance_sq); });
 }
 
 template <int D>
@@ -173,7 +172,7 @@ void ComputeClippedCells(benchmark::State& state, bool is_refined) {
   const core::QueryStructure<D> structure = Structure<D>(state.range(0), is_refined);
   core::Workspace<D> workspace;
   RunQueries<D>(state, structure, workspace, [&](VertexId v) {
-    const double nearest = std::sqrt(structure.ApproximateNearestNeighbor(v, workspace).distance_sq);
+    const double nearest = std::sqrt(structure.NearestNeighbor(v, workspace).distance_sq);
     structure.ClippedVoronoi(v, kBeta * nearest, workspace);
     benchmark::DoNotOptimize(workspace.cell.nodes().data());
   });

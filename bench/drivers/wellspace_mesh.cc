@@ -17,8 +17,8 @@
 #include "bench/drivers/floor.h"
 #include "bench/drivers/meter.h"
 #include "core/mesher.h"
-#include "core/simplex/validate.h"
-#include "core/simplex/validate_domain.h"
+#include "core/validate/validate.h"
+#include "core/validate/validate_domain.h"
 #include "nlohmann/json.hpp"
 
 namespace wellspace::bench {

@@ -16,8 +16,8 @@ using Json = nlohmann::ordered_json;
 
 // code, reason and field (where the server gave one), message.
 Json ErrorJson(const absl::Status& status);
-// dimension, rho, criterion, max_circumradius, edge_length, gradation, size_boxes, domain_low, domain_high, margin,
-// max_vertices, threads.
+// dimension, rho, criterion, max_circumradius, edge_length, gradation, size_boxes, min_dihedral, pump_weights,
+// keep_vertices, domain_low, domain_high, margin, merge_distance, max_vertices, threads.
 Json ParametersJson(const client::MeshOptions& parameters);
 // name, state, parameters, labels, ttl_seconds, create_time, expire_time, revision, committed_points, segment_count,
 // seed_count, faces (a name, or null for a cloud), split_crossings, vertex_count, simplex_count, last_operation.

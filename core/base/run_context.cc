@@ -59,7 +59,6 @@ Progress RunContext::Snapshot() const {
   const uint64_t estimate = estimated_vertices_.load(std::memory_order_relaxed);
   progress.estimated_vertices = estimate == 0 ? 0 : std::max(estimate, progress.vertices);
   progress.simplices = simplices_.load(std::memory_order_relaxed);
-  progress.bucket = bucket_.load(std::memory_order_relaxed);
   progress.fraction = fraction_.load(std::memory_order_relaxed);
   return progress;
 }

@@ -26,7 +26,6 @@ struct Progress {
   uint64_t vertices = 0;            // in the mesh so far
   uint64_t estimated_vertices = 0;  // of the finished mesh, roughly; 0 while unknown
   uint64_t simplices = 0;           // so far
-  int bucket = 0;                   // floor(log_b) of the edge length that the refinement works at
   double fraction = 0;              // of the whole run, in [0, 1], never decreasing
 };
 
@@ -83,7 +82,6 @@ class RunContext {
   void SetEstimatedVertices(uint64_t vertices) { estimated_vertices_.store(vertices, std::memory_order_relaxed); }
   uint64_t estimated_vertices() const { return estimated_vertices_.load(std::memory_order_relaxed); }
   void AddSimplices(uint64_t count) { simplices_.fetch_add(count, std::memory_order_relaxed); }
-  void SetBucket(int bucket) { bucket_.store(bucket, std::memory_order_relaxed); }
   // `done` in [0, 1] of the current phase.
   void SetPhaseFraction(double done);
 
@@ -99,7 +97,6 @@ class RunContext {
   std::atomic<uint64_t> vertices_{0};
   std::atomic<uint64_t> estimated_vertices_{0};
   std::atomic<uint64_t> simplices_{0};
-  std::atomic<int> bucket_{0};
   std::atomic<double> fraction_{0};
   std::array<std::atomic<int64_t>, kPhaseCount> entered_ns_{};
 };

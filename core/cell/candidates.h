@@ -1,5 +1,6 @@
 // The vertices of a leaf that may cut a cell, from 4-D on: picked, sorted and dropped side by side, without branches
-// that the data decide, since half of those would be mispredicted. In the plane and in space near_vertices.h does so.
+// that the data decide, since half of those would be mispredicted. In the plane and in space float_candidates.h does
+// so.
 #ifndef WELLSPACE_CORE_CELL_CANDIDATES_H_
 #define WELLSPACE_CORE_CELL_CANDIDATES_H_
 

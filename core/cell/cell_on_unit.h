@@ -9,8 +9,9 @@
 #include "core/base/ids.h"
 #include "core/base/simd/lane_bits.h"
 #include "core/base/simd/lanes.h"
+#include "core/cell/float_bisector.h"
+#include "core/cell/float_candidates.h"
 #include "core/cell/gathered_vertices.h"
-#include "core/cell/near_vertices.h"
 #include "core/geometry/box.h"
 #include "core/geometry/point.h"
 
@@ -55,20 +56,20 @@ struct CellOnUnit {
  private:
   template <VectorUnit kUnit, typename Vertices>
   WELLSPACE_INLINE static size_t CutByThose(Cell& cell, const Vertices& vertices, VertexId site) {
-    NearVertices<D> near;
-    near.template Pick<kUnit>(
+    FloatCandidates<D> candidates;
+    candidates.template Pick<kUnit>(
         vertices, site, cell.site_, cell.scale_, cell.most_radius_,
         [&cell](const Floats* w, const Floats& low, FloatMask& is_near) __attribute__((always_inline)) {
           if (cell.cuts_ != 0 && (D == 2 || Bits<kUnit>(is_near) != 0)) {  // most miss the cell, now and later
             is_near &= IsAtMost<kUnit>(low, MostProducts<kUnit, D>(cell.groups(), w));
           }
         });
-    near.CutInOrder(
+    candidates.CutInOrder(
         [&](const FloatBisector<D>& bisector, size_t slot) __attribute__((always_inline)) {
           return cell.template CutOff<kUnit>(bisector, vertices.name(slot), vertices.position(slot));
         },
         [&cell] { return cell.IsTooLarge() ? -1 : MostOffset<D>(cell.most_radius_); });
-    return near.within_reach;
+    return candidates.within_reach;
   }
 
   template <VectorUnit kUnit>

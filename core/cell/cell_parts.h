@@ -114,11 +114,36 @@ FaceMask FacesOf(std::span<const Plane<D>> planes, const CellNode<D>& node) {
 // So many vertices at most cut a cell in one go, in the plane and in space.
 inline constexpr size_t kMostCutTogether = 64;
 
+// What a cell is cut to at most, so that its parts can be numbered and a cut ends soon. Cells of a refined mesh are
+// far smaller; a vertex amid unrefined ones can have all of them for neighbours.
+template <int D>
+inline constexpr size_t kMostNodes = D <= 4 ? size_t{1} << 14 : size_t{1} << 18;
+inline constexpr size_t kMostPlanes = size_t{1} << 15;
+
+// A vertex whose squared distance from the site, as computed, is more than so many times the squared reach of a cell
+// cannot cut it: its bisector is half as far. What is over 4 is for rounding.
+inline constexpr double kCutLimit = 4 * (1 + 0x1p-49);
+
 // How often the stages after the floating-point filter were needed.
 struct DecisionCounters {
   uint64_t exact = 0;
   uint64_t perturbed = 0;
 };
+
+// Whether the bisector of `site` and `generator` cuts off the node where those of `planes` meet that `node` names,
+// exactly; the decision is counted.
+template <int D, typename PlaneIndex>
+bool DecideNode(const Point<D>& site, std::span<const Plane<D>> planes, const std::array<PlaneIndex, D>& node,
+                const Point<D>& generator, TieRule rule, DecisionCounters& counters) {
+  std::array<PlaneSource<D>, D> sources;
+  for (int k = 0; k < D; ++k) {
+    sources[k] = planes[node[k]].source;
+  }
+  const ExactDecision decision = DecideCut<D>(site, sources, generator, rule);
+  ++counters.exact;
+  counters.perturbed += decision.perturbed ? 1 : 0;
+  return decision.sign == Sign::kPositive;
+}
 
 }  // namespace wellspace::core
 

@@ -33,12 +33,10 @@ struct CellOnUnit;
 template <int D>
 class FloatCell {
  public:
-  static constexpr size_t kMostNodes = size_t{1} << 14;
-  static constexpr size_t kMostPlanes = size_t{1} << 15;
   // So many nodes are worked on together.
   static constexpr size_t kTogether = kFloatLanes;
 
-  bool IsTooLarge() const { return count_ > kMostNodes || plane_count_ > kMostPlanes; }
+  bool IsTooLarge() const { return count_ > kMostNodes<D> || plane_count_ > kMostPlanes; }
   FaceMask FacesOf(const CellNode<D>& node) const { return core::FacesOf<D>(planes_, node); }
 
   const Point<D>& site() const { return site_; }
@@ -47,7 +45,7 @@ class FloatCell {
     const double reach = std::min(most_radius_ * unit_length_, placed_reach_);
     return reach * reach;
   }
-  double CutLimitSq() const { return 4 * (1 + 0x1p-49) * reach_sq(); }
+  double CutLimitSq() const { return kCutLimit * reach_sq(); }
   std::span<const CellNode<D>> nodes() const { return nodes_; }
   const Plane<D>& plane(int index) const { return planes_[index]; }
   int plane_count() const { return static_cast<int>(plane_count_); }
@@ -101,14 +99,7 @@ class FloatCell {
   // Whether the bisector of the site and `generator` cuts off the node of these planes, exactly.
   template <typename PlaneIndex>
   bool IsCutOff(const std::array<PlaneIndex, D>& planes, const Point<D>& generator) {
-    std::array<PlaneSource<D>, D> sources;
-    for (int k = 0; k < D; ++k) {
-      sources[k] = planes_[planes[k]].source;
-    }
-    const ExactDecision decision = DecideCut<D>(site_, sources, generator, rule_);
-    ++counters_.exact;
-    counters_.perturbed += decision.perturbed ? 1 : 0;
-    return decision.sign == Sign::kPositive;
+    return DecideNode<D>(site_, planes_, planes, generator, rule_, counters_);
   }
 
   // In the units of the nodes.

@@ -2,7 +2,7 @@
 
 #include <bit>
 
-#include "core/cell/near_vertices.h"
+#include "core/cell/float_candidates.h"
 
 namespace wellspace::core {
 namespace {

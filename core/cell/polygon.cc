@@ -9,8 +9,10 @@
 
 #include "core/base/simd/lane_bits.h"
 #include "core/cell/cell_on_unit.h"
+#include "core/cell/float_bisector.h"
+#include "core/cell/float_candidates.h"
+#include "core/cell/float_errors.h"
 #include "core/cell/meeting_point.h"
-#include "core/cell/near_vertices.h"
 
 namespace wellspace::core {
 

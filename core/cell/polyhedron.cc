@@ -8,7 +8,9 @@
 #include <limits>
 
 #include "core/cell/cell_on_unit.h"
-#include "core/cell/near_vertices.h"
+#include "core/cell/float_bisector.h"
+#include "core/cell/float_candidates.h"
+#include "core/cell/float_errors.h"
 
 namespace wellspace::core {
 namespace {

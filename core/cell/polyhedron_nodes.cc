@@ -6,8 +6,8 @@
 #include <cstdint>
 
 #include "core/base/sort_few.h"
+#include "core/cell/float_errors.h"
 #include "core/cell/meeting_point.h"
-#include "core/cell/near_vertices.h"
 #include "core/cell/polyhedron.h"
 
 namespace wellspace::core {

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/base/dimensions.h"
+#include "core/cell/cell_class.h"
 #include "core/cell/excesses.h"
 #include "core/cell/meeting_point.h"
 
@@ -151,19 +152,6 @@ void Polytope<D>::Tighten() {
   }
 }
 
-// Whether the bisector of the site and `generator` cuts off a node, exactly.
-template <int D>
-bool Polytope<D>::IsCutOff(const NodeTopology& node, const Point<D>& generator) {
-  std::array<PlaneSource<D>, D> sources;
-  for (int k = 0; k < D; ++k) {
-    sources[k] = planes_[node.planes[k]].source;
-  }
-  const ExactDecision decision = DecideCut<D>(site_, sources, generator, rule_);
-  ++counters_.exact;
-  counters_.perturbed += decision.perturbed ? 1 : 0;
-  return decision.sign == Sign::kPositive;
-}
-
 // Decides what the excesses leave in doubt. Returns whether anything is cut off.
 template <int D>
 WELLSPACE_INLINE bool Polytope<D>::DecideDoubtful(const Point<D>& generator) {
@@ -171,7 +159,8 @@ WELLSPACE_INLINE bool Polytope<D>::DecideDoubtful(const Point<D>& generator) {
   uint64_t any = 0;
   for (auto& found : columns_.found()) {
     for (uint64_t doubtful = found.maybe & ~found.surely; doubtful != 0; doubtful &= doubtful - 1) {
-      if (IsCutOff(topologies_[first + std::countr_zero(doubtful)], generator)) {
+      const NodeTopology& node = topologies_[first + std::countr_zero(doubtful)];
+      if (DecideNode<D>(site_, planes_, node.planes, generator, rule_, counters_)) {
         found.surely |= doubtful & -doubtful;
       }
     }
@@ -542,5 +531,9 @@ void Polytope<D>::BoundExcesses(size_t begin, Candidates<D>& candidates) {
 #define WELLSPACE_INSTANTIATE(D) template class Polytope<D>;
 WELLSPACE_FOR_EACH_DIMENSION_ABOVE_3(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
+
+static_assert(CellClass<Polygon, 2>);
+static_assert(CellClass<Polyhedron, 3>);
+static_assert(CellClass<Polytope<4>, 4>);
 
 }  // namespace wellspace::core

@@ -1,6 +1,6 @@
 // The Voronoi cell of one vertex under construction: a bounded simple polytope, cut by one bisector after the other.
-// In the plane it is a Polygon, in space a Polyhedron, which have the same functions and are several times as fast; the
-// template here is for 4-D to 6-D.
+// In the plane it is a Polygon, in space a Polyhedron, which are several times as fast; the template here is for 4-D to
+// 6-D. All three are a CellClass (cell_class.h), as polytope.cc asserts.
 #ifndef WELLSPACE_CORE_CELL_POLYTOPE_H_
 #define WELLSPACE_CORE_CELL_POLYTOPE_H_
 
@@ -31,11 +31,6 @@ namespace wellspace::core {
 template <int D>
 class Polytope {
  public:
-  // What a cell is cut to at most, so that its parts can be numbered and a cut ends soon. Cells of a refined mesh are
-  // far smaller; a vertex amid unrefined ones can have all of them for neighbours.
-  static constexpr size_t kMostNodes = D <= 4 ? size_t{1} << 14 : size_t{1} << 18;
-  static constexpr size_t kMostPlanes = size_t{1} << 15;
-
   // Begins with the box [low, high], which holds `site` and whose faces are of kind `kinds[FaceIndex]`. Its nodes are
   // still to be placed, by Place().
   void Reset(const Point<D>& site, const Box<D>& bounds, const std::array<PlaneKind, 2 * D>& kinds, TieRule rule);
@@ -112,7 +107,7 @@ class Polytope {
   }
 
   // Whether the last cut has made the cell larger than it may be.
-  bool IsTooLarge() const { return columns_.count() > kMostNodes || plane_count_ > kMostPlanes; }
+  bool IsTooLarge() const { return columns_.count() > kMostNodes<D> || plane_count_ > kMostPlanes; }
 
   // Puts into `out` a simplex for each node that lies on bisectors alone. The nodes need not be placed.
   //
@@ -133,7 +128,7 @@ class Polytope {
   // At least the squared distance from the site to the farthest node: little more after Tighten() or Place().
   double reach_sq() const { return reach_ * reach_; }
   // A vertex whose computed squared distance from the site is larger than this cannot cut the cell.
-  double CutLimitSq() const { return 4 * (1 + 0x1p-49) * reach_sq(); }
+  double CutLimitSq() const { return kCutLimit * reach_sq(); }
   // REQUIRES:   since Reset and the last CutBeforePlace, Cut or Place has been called, or PlaceUnlessKeeps, which
   //             returned false.
   std::span<const CellNode<D>> nodes() const { return nodes_; }
@@ -181,7 +176,6 @@ class Polytope {
   bool CutOffAvx2(VertexId u, const Point<D>& position, const Point<D>& normal, double length_sq);
   template <size_t kWidth>
   bool CutOffWith(VertexId u, const Point<D>& position, const Point<D>& normal, double length_sq);
-  bool IsCutOff(const NodeTopology& node, const Point<D>& generator);
   bool DecideDoubtful(const Point<D>& generator);
   void FindCutEdges();
   template <size_t kWidth>

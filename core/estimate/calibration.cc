@@ -69,11 +69,11 @@ std::span<const Calibration> CalibrationFor(Criterion criterion) {
 }  // namespace
 
 template <int D>
-Terms VerticesPerTerm(const MeshCriteria<D>& demands) {
+Terms VerticesPerTerm(const MeshCriteria<D>& criteria) {
   // For D > 3 by analogy: the multiple of the least rho for which refinement ends, and balls of the same volume.
-  const double rho = D <= 3 ? demands.rho : demands.rho * std::exp2(-0.5 * (D - 3));
+  const double rho = D <= 3 ? criteria.rho : criteria.rho * std::exp2(-0.5 * (D - 3));
   const double scale = D <= 3 ? 1.0 : BallVolume<3>() / BallVolume<D>();
-  const std::span<const Calibration> table = CalibrationFor<D>(demands.criterion);
+  const std::span<const Calibration> table = CalibrationFor<D>(criteria.criterion);
   size_t i = 1;
   while (i + 1 < table.size() && table[i].rho < rho) {
     ++i;

@@ -34,7 +34,7 @@ double BallVolume() {
 
 // Vertices per unit of each integral, for these criteria. Above 3-D by analogy.
 template <int D>
-Terms VerticesPerTerm(const MeshCriteria<D>& demands);
+Terms VerticesPerTerm(const MeshCriteria<D>& criteria);
 
 }  // namespace wellspace::core
 

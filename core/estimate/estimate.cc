@@ -61,10 +61,10 @@ struct Share {
 template <int D>
 class Integrator {
  public:
-  Integrator(const QueryStructure<D>& structure, const MeshCriteria<D>& demands, const PlanarDomain* domain)
+  Integrator(const QueryStructure<D>& structure, const MeshCriteria<D>& criteria, const PlanarDomain* domain)
       : box_(structure.box()),
-        sizes_(ServedSizes(demands.sizes, box_)),
-        vertices_per_term_(VerticesPerTerm<D>(demands)) {
+        sizes_(ServedSizes(criteria.sizes, box_)),
+        vertices_per_term_(VerticesPerTerm<D>(criteria)) {
     if constexpr (D == 2) {
       if (domain != nullptr) {
         domain_.emplace(structure.tree(), *domain);
@@ -485,10 +485,10 @@ absl::StatusOr<Sample> SampleLeaves(const QueryStructure<D>& structure, Integrat
 }  // namespace
 
 template <int D>
-absl::StatusOr<SizeEstimate> EstimateSize(const QueryStructure<D>& structure, const MeshCriteria<D>& demands,
+absl::StatusOr<SizeEstimate> EstimateSize(const QueryStructure<D>& structure, const MeshCriteria<D>& criteria,
                                           const RunContext& context, const EstimateEffort& effort,
                                           const PlanarDomain* domain) {
-  Integrator<D> integrator(structure, demands, domain);
+  Integrator<D> integrator(structure, criteria, domain);
   WELLSPACE_RETURN_IF_ERROR(integrator.Prepare(structure, context));
   WELLSPACE_ASSIGN_OR_RETURN(const Sample sample, SampleLeaves<D>(structure, integrator, effort, context));
 

@@ -36,12 +36,12 @@ struct EstimateEffort {
 // Enough for a bar of progress, at about a hundredth of what meshing costs.
 inline constexpr EstimateEffort kGlance{0.15, 24, 64, uint64_t{1} << 11};
 
-// Predicts what refinement for `demands` will make of `structure`.
+// Predicts what refinement for `criteria` will make of `structure`.
 //
 // Shapes:     structure: as QueryStructure::Initialize leaves it; nothing has been refined. domain: what its segments
 //             bound, in the plane; null: the box.
 // Units:      counts and bytes.
-// REQUIRES:   demands.rho at least MinimumRho(D).
+// REQUIRES:   criteria.rho at least MinimumRho(D).
 // Guarantees: (1) with the default effort, by the radius-edge criterion without sizes, each figure is right within a
 //             factor of 1.5 at rho = sqrt(2) in 2-D and 2 in 3-D, and of 2 from rho = 1 in 2-D and 1.2 in 3-D, on the
 //             clouds and with the exceptions that docs/design/estimate.md lists; for D > 3 an order of magnitude;
@@ -52,7 +52,7 @@ inline constexpr EstimateEffort kGlance{0.15, 24, 64, uint64_t{1} << 11};
 // Threads:    thread-compatible.
 // Source:     Ruppert 1995 (the size of a mesh is the integral of lfs^-D up to constants); docs/design/estimate.md.
 template <int D>
-absl::StatusOr<SizeEstimate> EstimateSize(const QueryStructure<D>& structure, const MeshCriteria<D>& demands,
+absl::StatusOr<SizeEstimate> EstimateSize(const QueryStructure<D>& structure, const MeshCriteria<D>& criteria,
                                           const RunContext& context, const EstimateEffort& effort = {},
                                           const PlanarDomain* domain = nullptr);
 

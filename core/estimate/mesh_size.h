@@ -12,6 +12,8 @@
 
 namespace wellspace::core {
 
+// Of what was measured, docs/design/estimate.md says more: in the sections that are named below.
+
 // Leaves that refinement leaves behind.
 struct Leaves {
   double all = 0;
@@ -19,7 +21,8 @@ struct Leaves {
 };
 
 // Simplices per vertex without a boundary. In 2-D by Euler's formula; in 3-D as measured: 5 to 6 around surfaces and
-// curves, 6.6 in uniformly random points; from 4-D on those of random points, 31.8, 187 and 1297, a tenth less.
+// curves, 6.6 in uniformly random points; from 4-D on those of random points, 31.8, 187 and 1297, a tenth less. "The
+// model".
 template <int D>
 constexpr double kSimplicesPerVertex = D == 2   ? 2.0
                                        : D == 3 ? 6.1
@@ -27,7 +30,7 @@ constexpr double kSimplicesPerVertex = D == 2   ? 2.0
                                        : D == 5 ? 170.0
                                                 : 1170.0;
 
-// Vertices per h^-D where sizes h alone decide.
+// Vertices per h^-D where sizes h alone decide: kappa in "How it is computed".
 template <int D>
 constexpr double kVerticesPerSize = D == 2 ? 0.7 : 0.82;
 
@@ -36,17 +39,19 @@ double SimplicesOf(double vertices, double on_boundary) {
   if constexpr (D == 2) {
     return 2 * vertices - 2 - on_boundary;
   } else {
-    // About half of the simplices around a vertex of the interior are around one of the boundary. The empty box has D!.
+    // About half of the simplices around a vertex of the interior are around one of the boundary: "The model". The
+    // empty box has D!.
     const double corners = 1 << D;
     return std::tgamma(D + 1) +
            kSimplicesPerVertex<D> * std::max(0.0, vertices - corners - 0.52 * (on_boundary - corners));
   }
 }
 
-// What a process touches whatever the mesh, as measured: code, threads, their stacks and scratch space.
+// What a process touches whatever the mesh, as measured: code, threads, their stacks and scratch space. "The model".
 inline constexpr double kFixedBytes = 5.2e6;
 
 // What arrays leave free of the large pages that they share (PagePool), as measured: this part of all, up to this size.
+// "Calibration" has what the estimate of the memory is with it, and with the margin.
 inline constexpr double kLeftFree = 0.3;
 inline constexpr double kMostLeftFree = 3e6;
 

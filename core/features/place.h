@@ -10,7 +10,7 @@
 namespace wellspace::core {
 
 // "(0.5, 1)", to the bit.
-inline std::string Place(const Point<2>& p) { return absl::StrFormat("(%.17g, %.17g)", p[0], p[1]); }
+inline std::string PlaceText(const Point<2>& p) { return absl::StrFormat("(%.17g, %.17g)", p[0], p[1]); }
 
 }  // namespace wellspace::core
 

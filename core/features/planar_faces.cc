@@ -185,7 +185,7 @@ class FaceFinder {
         if (!is_point && ((above != met.end() && !IsBelow{this}(at(event), *above)) || IsOnEnd(at(event)))) {
           const GraphSegment& on = graph_.segments[above != met.end() ? *above : 0];
           return absl::InvalidArgumentError(absl::StrCat(
-              "seeds[", event - points, "] at ", Place(at(event)), " lies on ",
+              "seeds[", event - points, "] at ", PlaceText(at(event)), " lies on ",
               above != met.end() && !on.IsBoxSide() ? absl::StrCat("segments[", on.source, "]") : "a segment",
               "; a seed has to lie inside the face that it names"));
         }
@@ -283,7 +283,7 @@ class FaceFinder {
         } else if (out_.faces[beyond].is_meshed != is_odd) {
           return absl::InvalidArgumentError(absl::StrCat(
               "faces: the rings are not closed, so that inside and outside cannot be told apart beside segments[",
-              segment.source, "] from ", Place(At(segment.a)), " to ", Place(At(segment.b)),
+              segment.source, "] from ", PlaceText(At(segment.a)), " to ", PlaceText(At(segment.b)),
               "; close the rings, or name the holes by seeds"));
         }
       }
@@ -300,8 +300,8 @@ class FaceFinder {
         first = i;
       } else if (seeds_[first].is_hole != seed.is_hole || seeds_[first].region != seed.region ||
                  seeds_[first].max_area != seed.max_area) {
-        return absl::InvalidArgumentError(absl::StrCat("seeds[", first, "] at ", Place(seeds_[first].at), " and seeds[",
-                                                       i, "] at ", Place(seed.at),
+        return absl::InvalidArgumentError(absl::StrCat("seeds[", first, "] at ", PlaceText(seeds_[first].at),
+                                                       " and seeds[", i, "] at ", PlaceText(seed.at),
                                                        " lie in one face and differ; leave one out"));
       }
       Face& face = out_.faces[seed_face_[i]];

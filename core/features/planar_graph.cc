@@ -9,9 +9,9 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "absl/strings/str_format.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
+#include "core/features/near_segment.h"
 #include "core/features/place.h"
 #include "core/features/segment_pairs.h"
 #include "core/geometry/exact_measure.h"
@@ -68,7 +68,7 @@ struct Fault {
   auto operator<=>(const Fault&) const = default;
 };
 
-// Makes the graph, step after step.
+// Makes the graph, step after step; in the coordinates as they are given, which the mesher scales later.
 class GraphMaker {
  public:
   GraphMaker(const Features& features, double least_separation, int threads, const RunContext& context)
@@ -196,7 +196,7 @@ class GraphMaker {
       if (first.marker != next.marker && !next.IsBoxSide()) {
         return absl::InvalidArgumentError(absl::StrCat(
             "markers: segments[", first.source, "] and segments[", next.source, "] lie on each other from ",
-            Place(At(first.a)), " to ", Place(At(first.b)), ", and have the markers ", first.marker, " and ",
+            PlaceText(At(first.a)), " to ", PlaceText(At(first.b)), ", and have the markers ", first.marker, " and ",
             next.marker, "; give both the same, or leave one out"));
       }
       // A side of the box keeps the marker of a segment along it.
@@ -304,14 +304,13 @@ class GraphMaker {
   std::string NameOf(uint32_t segment) const {
     const GraphSegment& s = graph_.segments[segment];
     if (s.IsBoxSide()) {
-      return absl::StrCat("a side of the box from ", Place(At(s.a)), " to ", Place(At(s.b)));
+      return absl::StrCat("a side of the box from ", PlaceText(At(s.a)), " to ", PlaceText(At(s.b)));
     }
     return absl::StrCat("segments[", s.source, "]");
   }
   std::string NameOfPoint(uint32_t point) const {
-    return graph_.input_of_point[point] == kNone
-               ? absl::StrCat("the vertex at ", Place(At(point)))
-               : absl::StrCat("points[", graph_.input_of_point[point], "] at ", Place(At(point)));
+    return graph_.input_of_point[point] == kNone ? "the vertex"
+                                                 : absl::StrCat("points[", graph_.input_of_point[point], "]");
   }
 
   std::string Describe(const Fault& fault) const {
@@ -319,11 +318,11 @@ class GraphMaker {
     if (fault.kind == Fault::Kind::kCrossing) {
       const GraphSegment& t = graph_.segments[fault.other];
       return absl::StrCat(NameOf(fault.segment), " and ", NameOf(fault.other), " cross at ",
-                          Place(CrossingOf(At(s.a), At(s.b), At(t.a), At(t.b))));
+                          PlaceText(CrossingOf(At(s.a), At(s.b), At(t.a), At(t.b))));
     }
-    return absl::StrCat(NameOfPoint(fault.other), " is ",
-                        absl::StrFormat("%.3g", DistanceToSegment(At(s.a), At(s.b), At(fault.other))), " from ",
-                        NameOf(fault.segment), " and not on it");
+    const Point<2>& p = At(fault.other);
+    return DescribeNearSegment(NameOfPoint(fault.other), p, DistanceToSegment(At(s.a), At(s.b), p),
+                               NameOf(fault.segment));
   }
 
   // Refuses faults that are not to be split at.
@@ -345,11 +344,12 @@ class GraphMaker {
       const std::string more =
           count > kNamed ? absl::StrCat("; and ", count - kNamed, " more", count >= kMostFaults ? " at least" : "")
                          : "";
+      const std::string described = absl::StrCat("segments: ", names, more);
+      if (kind == Fault::Kind::kNear) {
+        return NearSegmentError(described, least_separation_, 0);
+      }
       return absl::InvalidArgumentError(
-          kind == Fault::Kind::kCrossing
-              ? absl::StrCat("segments: ", names, more, "; segments may meet in common ends alone, or be split there")
-              : absl::StrCat("segments: ", names, more, "; at least ", absl::StrFormat("%.3g", least_separation_),
-                             " is needed, or the segment may be led through the point"));
+          absl::StrCat(described, "; segments may meet in common ends alone, or be split there"));
     }
     return absl::OkStatus();
   }

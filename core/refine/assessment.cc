@@ -122,7 +122,7 @@ Assessment Assess(const Polytope<D>& cell, FaceMask site_faces, const MeshCriter
     }
     if (on_own_face) {
       if (bound_sq != Assessment::kNone) {
-        result.own_face_edge_sq = std::min(result.own_face_edge_sq, bound_sq / rho_sq);
+        result.own_boundary_edge_sq = std::min(result.own_boundary_edge_sq, bound_sq / rho_sq);
       }
       continue;
     }

@@ -23,10 +23,11 @@ struct Assessment {
   double next_edge_sq = kNone;
   // The farthest node; 0 where is_plain, since it is not looked for.
   double radius_sq = 0;
-  // The shortest edge with a node on one of the site's own faces that is too far for it: no circumcentre, so it asks
-  // for nothing now, but the site must look again, with that edge, once a new vertex cuts the facet there. In a domain,
-  // with a node between whose generators one of the site's own segments lies.
-  double own_face_edge_sq = kNone;
+  // The shortest edge with a node that is too far for it and belongs to the boundary where the site is: it lies on one
+  // of the site's own faces of the box or, in a domain, one of the site's own segments lies between its generators. It
+  // is no circumcentre, so it asks for nothing now; but the site must look again, with that edge, once a new vertex
+  // cuts it off.
+  double own_boundary_edge_sq = kNone;
   // A face of the box that the cell touches though its site does not lie on it, the nearest one; -1 for none, and in a
   // domain.
   int encroached_face = -1;

@@ -8,7 +8,7 @@
 
 namespace wellspace::core {
 
-// One of three: nothing; a radius; or the edge of a face. Four bytes, since there is one for every vertex. What is
+// One of three: nothing; a radius; or an edge at the boundary. Four bytes, since there is one for every vertex. What is
 // remembered is rounded to the safe side: a radius up, an edge down.
 class CellMemo {
  public:
@@ -20,17 +20,18 @@ class CellMemo {
   static CellMemo OfRadius(double radius_sq) { return CellMemo(RoundedUp(radius_sq)); }
 
   // Of the nodes on faces that the vertex lies on, some are too far for an edge of this squared length, the shortest
-  // such. They ask for nothing, as they are no circumcentres, until a new vertex cuts one of them off.
-  static CellMemo OfFaceEdge(double edge_sq) { return CellMemo(RoundedUp(-edge_sq)); }
+  // such; in a domain, of those at segments (Assessment::own_boundary_edge_sq). They ask for nothing, as they are no
+  // circumcentres, until a new vertex cuts one of them off.
+  static CellMemo OfBoundaryEdge(double edge_sq) { return CellMemo(RoundedUp(-edge_sq)); }
 
-  bool HasFaceEdge() const { return value_ < 0; }
+  bool HasBoundaryEdge() const { return value_ < 0; }
 
-  // REQUIRES:   HasFaceEdge().
-  double face_edge_sq() const { return -static_cast<double>(value_); }
+  // REQUIRES:   HasBoundaryEdge().
+  double boundary_edge_sq() const { return -static_cast<double>(value_); }
 
   // Whether the cell may have a node farther than this, by the square; also where nothing is remembered.
   //
-  // False where the edge of a face is remembered.
+  // False where an edge at the boundary is remembered.
   //
   // REQUIRES:   the well-spaced criterion, by which radii are known.
   bool MayReachBeyond(double distance_sq) const { return value_ > distance_sq; }

@@ -16,7 +16,7 @@
 #include "core/refine/face_watchers.h"
 #include "core/refine/insertion.h"
 #include "core/refine/neighbor_notice.h"
-#include "core/refine/speculation/star_writer.h"
+#include "core/refine/star_writer.h"
 #include "core/refine/step_rules.h"
 #include "core/voronoi/query_structure.h"
 

@@ -6,7 +6,7 @@
 #include <type_traits>
 
 #include "core/base/ids.h"
-#include "core/refine/domain/place_in_domain.h"
+#include "core/refine/place_in_domain.h"
 #include "core/refine/steiner_point.h"
 
 namespace wellspace::core {

@@ -9,8 +9,8 @@ namespace wellspace::core {
 // A neighbour that may have to be looked at again, in view of a node that its cell shares with that of a new vertex.
 struct NeighborNotice {
   VertexId vertex = kNoVertex;
-  double edge_sq = 0;       // the squared distance between the two
-  bool is_on_face = false;  // the node lies on a face of the box
+  double edge_sq = 0;           // the squared distance between the two
+  bool is_on_boundary = false;  // the node lies on a face of the box; in a domain true of every node
 };
 
 }  // namespace wellspace::core

@@ -90,12 +90,12 @@ void PendingVertices<D>::Notify(VertexId v, const Assessment& found, std::span<c
   notified_[Index(v)] = found.is_clipped ? Notified::kWithinClip : Notified::kAll;
   const double rho_sq = criteria_->rho * criteria_->rho;
   const bool is_well_spaced = criteria_->criterion == Criterion::kWellSpaced;
-  for (const auto& [u, edge_sq, is_on_face] : notices) {
+  for (const auto& [u, edge_sq, is_on_boundary] : notices) {
     if (!is_first && schedule_.IsPending(u)) {
       continue;
     }
     const CellMemo memo = memos_[Index(u)];
-    const bool was_cut = memo.HasFaceEdge() && is_on_face;
+    const bool was_cut = memo.HasBoundaryEdge() && is_on_boundary;
     const bool is_too_far = is_well_spaced && memo.MayReachBeyond(rho_sq * edge_sq);
     if (was_cut || is_too_far) {
       Collect(u, edge_sq);
@@ -113,8 +113,8 @@ void PendingVertices<D>::Postpone(VertexId v, const Assessment& found, int bucke
 
 template <int D>
 void PendingVertices<D>::Remember(VertexId v, const Assessment& found, std::span<const WatchedNode<D>> watched) {
-  if (found.own_face_edge_sq != Assessment::kNone) {
-    SetMemo(v, CellMemo::OfFaceEdge(found.own_face_edge_sq), watched);
+  if (found.own_boundary_edge_sq != Assessment::kNone) {
+    SetMemo(v, CellMemo::OfBoundaryEdge(found.own_boundary_edge_sq), watched);
   } else {
     SetMemo(v, found.IsGood() ? CellMemo::OfRadius(found.radius_sq) : CellMemo());
   }
@@ -135,7 +135,7 @@ void PendingVertices<D>::CellChanged(VertexId v, double nearest_sq) {
   memos_.resize(structure_.vertex_count());
   notified_.resize(structure_.vertex_count(), Notified::kAll);
   const bool is_on_face = structure_.faces(v) != 0;
-  SetMemo(v, is_on_face ? CellMemo::OfFaceEdge(nearest_sq) : CellMemo());
+  SetMemo(v, is_on_face ? CellMemo::OfBoundaryEdge(nearest_sq) : CellMemo());
   if (is_on_face && criteria_->criterion == Criterion::kWellSpaced) {
     schedule_.Add(v, nearest_sq);  // what is remembered for the faces leaves no room for the radius
   }
@@ -143,11 +143,11 @@ void PendingVertices<D>::CellChanged(VertexId v, double nearest_sq) {
 
 template <int D>
 void PendingVertices<D>::SetMemo(VertexId v, CellMemo memo, std::span<const WatchedNode<D>> watched) {
-  if (memos_[Index(v)].HasFaceEdge()) {
+  if (memos_[Index(v)].HasBoundaryEdge()) {
     watchers_.Remove(v);
   }
   memos_[Index(v)] = memo;
-  if (memo.HasFaceEdge()) {
+  if (memo.HasBoundaryEdge()) {
     watchers_.Add(v, watched);
   }
 }
@@ -156,7 +156,7 @@ void PendingVertices<D>::SetMemo(VertexId v, CellMemo memo, std::span<const Watc
 template <int D>
 void PendingVertices<D>::Collect(VertexId u, double edge_sq) {
   const CellMemo memo = memos_[Index(u)];
-  collected_.emplace_back(u, memo.HasFaceEdge() ? std::min(memo.face_edge_sq(), edge_sq) : edge_sq);
+  collected_.emplace_back(u, memo.HasBoundaryEdge() ? std::min(memo.boundary_edge_sq(), edge_sq) : edge_sq);
 }
 
 template <int D>

@@ -69,7 +69,7 @@ absl::Status Refinement<D>::Run(const MeshCriteria<D>& criteria, uint64_t max_ve
 template <int D>
 absl::Status Refinement<D>::ScheduleAll(const MeshCriteria<D>& criteria, const VertexPredictor& predict,
                                         ThreadTeam& team) {
-  rounds_.Drop();
+  rounds_.ReattachAll();
   structure_.CommitAll();  // what was added before something was thrown
   absl::Status predicted;
   const absl::Cleanup end = [&team] { team.Drop(); };  // of what is begun, where something is thrown
@@ -166,7 +166,7 @@ absl::Status Refinement<D>::RefineInRounds() {
     }
     rounds_.EndRound();
     WELLSPACE_RETURN_IF_ERROR(status);
-    rounds_.GoOn();
+    rounds_.NextRound();
   }
   return absl::OkStatus();
 }
@@ -182,7 +182,7 @@ absl::Status Refinement<D>::RefineBatch(Batch<D>& batch) {
     if (pending_.schedule().IsPendingIn(batch.next(), rounds_.bucket())) {
       WELLSPACE_RETURN_IF_ERROR(RefineNextOf(batch));
     } else {
-      batch.NoteConflicts(batch.ExpectedOf(batch.refined));
+      batch.NoteConflicts(batch.records.ExpectedOf(batch.refined));
     }
   }
   return absl::OkStatus();
@@ -212,7 +212,7 @@ absl::Status Refinement<D>::RefineNextOf(Batch<D>& batch) {
     return status;
   }
   batch.NoteInserted(rounds_.InsertedFrom(first), first_new);
-  return CountRefined(bucket);
+  return CountRefined();
 }
 
 // Refines `v`, which was taken from `bucket`.
@@ -226,7 +226,7 @@ absl::Status Refinement<D>::RefineTaken(VertexId v, int bucket) {
     pending_.schedule().AddToBucket(v, bucket);
     return status;
   }
-  return CountRefined(bucket);
+  return CountRefined();
 }
 
 // Whether the record of the next vertex of a batch is still valid. In a domain it may depend on whether there is a
@@ -237,7 +237,7 @@ bool Refinement<D>::IsNextStillValid(const Batch<D>& batch) const {
     return false;
   }
   if constexpr (D == 2) {
-    return domain_ == nullptr || AreSplitsInOrder(*domain_, batch.RequestsOf(batch.refined));
+    return domain_ == nullptr || AreSplitsInOrder(*domain_, batch.records.RequestsOf(batch.refined));
   }
   return true;
 }
@@ -276,7 +276,7 @@ absl::Status Refinement<D>::RefineVertex(VertexId v, int bucket, Steps& steps) {
   while (true) {
     const Assessment* const found = steps.Assess();  // lines 7, 8 and 11
     if (found == nullptr) {
-      return absl::ResourceExhaustedError(absl::StrCat("the cell of a vertex has more than ", Polytope<D>::kMostNodes,
+      return absl::ResourceExhaustedError(absl::StrCat("the cell of a vertex has more than ", kMostNodes<D>,
                                                        " nodes; lower rho = ", rules_->criteria().rho));
     }
     if (pending_.IsNew(v)) {
@@ -334,7 +334,7 @@ absl::StatusOr<VertexId> Refinement<D>::Insert(const InsertionRequest<D>& reques
   }
   Insertion insertion = request.insertion;
   insertion.vertex = structure_.AddUncommitted(insertion.near, point.position);
-  if (!rounds_.IsAhead() || *observer_ || structure_.uncommitted_count() == QueryStructure<D>::kMostUncommitted) {
+  if (!rounds_.IsRecording() || *observer_ || structure_.uncommitted_count() == QueryStructure<D>::kMostUncommitted) {
     rounds_.CommitAdded();
   }
   if constexpr (D == 2) {
@@ -384,10 +384,9 @@ void Refinement<D>::ComputeCell(VertexId v, const Box<D>& clip, Workspace<D>& wo
 
 // Tells now and then how far the run is, and asks for the memory that it has come to.
 template <int D>
-absl::Status Refinement<D>::CountRefined(int bucket) {
+absl::Status Refinement<D>::CountRefined() {
   if (++refined_ % kReportInterval == 0) {
     WELLSPACE_RETURN_IF_ERROR(context_->AllowMemory(structure_.MemoryBytes() + MemoryBytes()));
-    context_->SetBucket(bucket);
     context_->SetPhaseFraction(1 - static_cast<double>(pending_.schedule().size()) / structure_.vertex_count());
   }
   return absl::OkStatus();
@@ -398,7 +397,7 @@ void Refinement<D>::VertexAdded(VertexId x) {
   if (!pending_.HasBegun()) {
     return;  // the next run schedules all
   }
-  Neighbor nearest = structure_.ApproximateNearestNeighbor(x, workspace_.own);
+  Neighbor nearest = structure_.NearestNeighbor(x, workspace_.own);
   if constexpr (D == 2) {
     if (domain_ != nullptr) {
       nearest.distance_sq = domain_rules_->NearestSegmentSq(x, nearest.distance_sq, workspace_.own);

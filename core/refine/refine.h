@@ -18,7 +18,7 @@
 #include "core/refine/refinement_checks.h"
 #include "core/refine/speculation/recorded_steps.h"
 #include "core/refine/speculation/rounds.h"
-#include "core/refine/speculation/star_writer.h"
+#include "core/refine/star_writer.h"
 #include "core/refine/step_rules.h"
 #include "core/voronoi/query_structure.h"
 #include "core/voronoi/star_lists.h"
@@ -138,7 +138,7 @@ class Refinement {
   absl::StatusOr<VertexId> Insert(const InsertionRequest<D>& request);
   void AddPending(VertexId near, VertexId x, double nearest_sq);
   void ComputeCell(VertexId v, const Box<D>& clip, Workspace<D>& workspace);
-  absl::Status CountRefined(int bucket);
+  absl::Status CountRefined();
   double EdgeLimitSq(int bucket) const { return pending_.schedule().UpperLengthSq(bucket); }
 
   QueryStructure<D>& structure_;

@@ -12,6 +12,8 @@ namespace wellspace::core {
 // To lengths, relatively; to coordinates, relative to the largest.
 inline constexpr double kLengthRounding = 1e-9;
 inline constexpr double kCoordinateRounding = 0x1p-49;
+// What is looked for within a reach is looked for so much farther, so that rounding leaves out nothing within it.
+inline constexpr double kBeyond = 1 + kLengthRounding;
 
 // To a coordinate.
 template <int D>

@@ -160,14 +160,14 @@ void StepRules<D>::AppendNotices(const Polytope<D>& cell, FaceMask site_faces, c
     return;
   }
   for (const CellNode<D>& node : cell.nodes()) {
-    const bool is_on_face = cell.FacesOf(node) != 0;
-    if (!is_on_face && !is_well_spaced) {
+    const bool is_on_boundary = cell.FacesOf(node) != 0;
+    if (!is_on_boundary && !is_well_spaced) {
       continue;
     }
     for (const uint16_t index : node.planes) {
       const Plane<D>& plane = cell.plane(index);
       if (plane.kind == PlaneKind::kBisector) {
-        notices.push_back({plane.vertex, 2 * plane.offset, is_on_face});
+        notices.push_back({plane.vertex, 2 * plane.offset, is_on_boundary});
       }
     }
   }
@@ -176,11 +176,11 @@ void StepRules<D>::AppendNotices(const Polytope<D>& cell, FaceMask site_faces, c
 template <int D>
 void StepRules<D>::AppendNodesToWatch(VertexId v, const Polytope<D>& cell, const Assessment& found,
                                       std::vector<WatchedNode<D>>& watched) const {
-  if (found.own_face_edge_sq == Assessment::kNone) {
+  if (found.own_boundary_edge_sq == Assessment::kNone) {
     return;
   }
   const double rounding = 4 * std::sqrt(D) * RoundingIn<D>(structure_.box());
-  const double least_sq = criteria_.rho * criteria_.rho * found.own_face_edge_sq * (1 - kLengthRounding);
+  const double least_sq = criteria_.rho * criteria_.rho * found.own_boundary_edge_sq * (1 - kLengthRounding);
   for (const CellNode<D>& node : cell.nodes()) {
     const auto faces = static_cast<FaceMask>(cell.FacesOf(node) & structure_.faces(v));
     if (faces == 0 || node.radius_sq <= least_sq) {

@@ -12,7 +12,6 @@
 
 #include "core/base/status_macros.h"
 #include "core/simplex/quality.h"
-#include "core/simplex/validate.h"
 #include "core/sliver/tetrahedron.h"
 
 namespace wellspace::core {

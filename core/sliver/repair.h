@@ -4,6 +4,7 @@
 #define WELLSPACE_CORE_SLIVER_REPAIR_H_
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -98,36 +99,38 @@ class Repairer {
   // A vertex that is to move.
   struct Mover {
     Point<3> from{};
-    FaceMask faces = 0;   // that it stays on
-    double reach = 0;     // how far it may go beside its way
-    bool is_own = false;  // a vertex of the sliver
-    Point<3> way{};       // to the circumcentre of the sliver, if it is none
-    double flattest = 0;  // the largest cosine of what the move replaces
+    size_t star_size = 0;  // its simplices
+    FaceMask faces = 0;    // that it stays on
+    double reach = 0;      // how far it may go beside its way
+    bool is_own = false;   // a vertex of the sliver
+    Point<3> way{};        // to the circumcentre of the sliver, if it is none
+    double flattest = 0;   // the largest cosine of what the move replaces
   };
 
+  static Effort EffortOf(int pass, size_t left);
   absl::Status RunPasses(int threads, RunContext& context);
   absl::Status FindSlivers(int threads, const RunContext& context);
   bool HasWork() const { return report_.operations < kMostOperations * (report_.slivers + kFreeSlivers); }
   void ExplainLeft();
   SliverReason ReasonOf(const Sliver& sliver);
-  Point<3> PlaceInBall(const TetrahedronMeasure& measure, bool is_centre);
+  Point<3> DrawInBall(const TetrahedronMeasure& measure, bool is_centre);
   bool IsThere(const Sliver& sliver) const;
   double CosineOf(SimplexId s) const { return cosine_[Index(s)]; }
   bool IsAdmissible(const TetrahedronMeasure& measure, const std::array<VertexId, 4>& vertices, VertexId moved) const;
   std::optional<double> NewNearestSq(const Point<3>& p, VertexId moved) const;
-  double TryFacet(const Cavity::Facet& facet, const Point<3>& p, VertexId v, double limit) const;
+  std::optional<double> TryFacet(const Cavity::Facet& facet, const Point<3>& p, VertexId v, double limit) const;
   bool FailsAtSuspect(const Point<3>& p, VertexId v, double limit);
-  double TryAt(SimplexId from, const Point<3>& p, VertexId v, double limit);
+  std::optional<double> TryAt(SimplexId from, const Point<3>& p, VertexId v, double limit);
   void Note(std::span<const SimplexId> created);
   void ReportStars();
   Point<3> RandomInBall();
 
   bool MoveVertices(const Sliver& sliver, const Effort& effort);
   std::optional<Mover> StartOf(VertexId v, const Sliver& sliver);
-  void OpenHole(VertexId v);
-  Point<3> PlaceOf(const Mover& mover);
+  void OpenHole(VertexId v, size_t star_size);
+  Point<3> DrawPlaceFor(const Mover& mover);
   std::vector<SimplexId>::const_iterator FirstInHole(const Point<3>& p) const;
-  double TryInHole(VertexId v, const Point<3>& p, double limit);
+  std::optional<double> TryInHole(VertexId v, const Point<3>& p, double limit);
   bool Move(VertexId v, const Sliver& sliver, int samples);
   absl::Status Insert(const Sliver& sliver, const Effort& effort);
 
@@ -147,7 +150,7 @@ class Repairer {
   std::vector<Cavity::Facet> suspects_;  // for which TryAt has failed since Move or Insert began, the latest first
   std::vector<SimplexId> star_;
   std::vector<SimplexId> hole_;
-  std::vector<double> hole_cosine_;
+  std::vector<double> hole_cosine_;  // by simplex of the hole
   std::vector<SimplexId> created_;
   std::vector<VertexId> changed_;  // vertices of new simplices, that have not been told of
   std::vector<bool> is_changed_;   // by vertex

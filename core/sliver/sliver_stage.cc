@@ -196,7 +196,7 @@ absl::Status SliverStage<D>::FollowStructure(const QueryStructure<D>& structure,
   for (uint32_t i = triangulation_->vertex_count(); i < count; ++i) {
     WELLSPACE_RETURN_IF_ERROR(context.Check());
     const Point<D>& p = structure.point(VertexId{i});
-    const VertexId nearest = structure.ApproximateNearestNeighbor(VertexId{i}, workspace).vertex;
+    const VertexId nearest = structure.NearestNeighbor(VertexId{i}, workspace).vertex;
     const VertexId start = Index(nearest) < i ? nearest : last;
     triangulation_->FindCavity(triangulation_->Locate(p, start), p, cavity);
     last = triangulation_->AddVertex();

@@ -52,8 +52,9 @@ class ColumnsWithPoints {
 
 template <int D>
 absl::Status LeafTree<D>::Build(const MortonGrid<D>& grid, std::span<const Point<D>> points, uint64_t max_leaves,
-                                int threads, const RunContext& context) {
+                                int threads, const RunContext& context, std::vector<SegmentLists::Ends> segments) {
   box_ = grid.box();
+  segments_.Begin(std::move(segments));
   max_level_ = static_cast<uint8_t>(grid.levels());
   sides_.clear();
   for (int level = 0; level <= grid.levels(); ++level) {

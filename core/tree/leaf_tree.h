@@ -49,7 +49,7 @@ class LeafTree {
   // In 5-D and 6-D a vertex has hundreds of neighbours and a node 32 or 64 children: fewer, larger leaves serve better.
   static constexpr int kLeafCapacity = D <= 3 ? 48 : D == 4 ? 64 : 16 << D;
   // A leaf may be this many times larger than lfs on it. At least 2, so that the neighbours of a leaf hold all that is
-  // near it.
+  // near it. docs/design/tree.md, "Capacity and coarseness by dimension", has what was measured with 128 and 1024.
   static constexpr double kCoarseness = D <= 4 ? 128 : 1024;
 
   using VertexPool = LeafVertexPool<D, kLeafCapacity>;
@@ -57,7 +57,8 @@ class LeafTree {
   using LeafVertices = typename VertexPool::LeafVertices;
 
   // Builds the tree over the box of `grid` for `points`, sorted in the grid's Morton order and distinct as cubes of it;
-  // vertex i is points[i].
+  // vertex i is points[i]. In the plane it lists `segments` of the box, if there are any, at the leaves that they meet,
+  // and splits leaves which too many of them meet.
   //
   // Complexity: O(D 2^D L) for L leaves.
   // Errors:     RESOURCE_EXHAUSTED when it would have more than `max_leaves` leaves, or of the context's memory;
@@ -67,11 +68,7 @@ class LeafTree {
   //             which matters only when leaves are compressed; here every leaf is one that a mesh of optimal size
   //             needs.
   absl::Status Build(const MortonGrid<D>& grid, std::span<const Point<D>> points, uint64_t max_leaves, int threads,
-                     const RunContext& context);
-
-  // Has the tree that is built next list `segments` of its box at the leaves that they meet, and split leaves which too
-  // many of them meet. In the plane alone.
-  void SetSegments(std::vector<SegmentLists::Ends> segments) { segments_.Begin(std::move(segments)); }
+                     const RunContext& context, std::vector<SegmentLists::Ends> segments = {});
   const SegmentLists& segments() const { return segments_; }
 
   // Makes room for so many vertices to be told where they are.

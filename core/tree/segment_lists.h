@@ -32,8 +32,12 @@ class SegmentLists {
 
   bool IsEmpty() const { return segments_.empty(); }
 
-  // Lists all segments at node 0.
+  // Lists these segments at node 0, if there are any, and none elsewhere.
   void Begin(std::vector<Ends> segments) {
+    *this = {};
+    if (segments.empty()) {
+      return;
+    }
     segments_ = std::move(segments);
     listed_.resize(segments_.size());
     std::iota(listed_.begin(), listed_.end(), 0);

@@ -110,7 +110,8 @@ void QueryCounters::Add(const QueryCounters& other) {
 
 template <int D>
 absl::Status QueryStructure<D>::Initialize(const MortonGrid<D>& grid, HugeVector<Point<D>> points, uint64_t max_leaves,
-                                           int threads, const RunContext& context) {
+                                           int threads, const RunContext& context,
+                                           std::vector<SegmentLists::Ends> segments) {
   box_ = grid.box();
   box_of_cells_ = box_;
   points_ = std::move(points);
@@ -120,7 +121,7 @@ absl::Status QueryStructure<D>::Initialize(const MortonGrid<D>& grid, HugeVector
     tree_.Reserve(room);
     faces_.reserve(room);
   }
-  WELLSPACE_RETURN_IF_ERROR(tree_.Build(grid, points_, max_leaves, threads, context));
+  WELLSPACE_RETURN_IF_ERROR(tree_.Build(grid, points_, max_leaves, threads, context, std::move(segments)));
   vertex_count_ = static_cast<uint32_t>(points_.size());
   near_.clear();
   MakeRoom();
@@ -311,7 +312,7 @@ void QueryStructure<D>::ScanOutward(const Point<D>& site, NodeId own, Workspace<
 }
 
 template <int D>
-Neighbor QueryStructure<D>::ApproximateNearestNeighbor(VertexId v, Workspace<D>& workspace) const {
+Neighbor QueryStructure<D>::NearestNeighbor(VertexId v, Workspace<D>& workspace) const {
   return NearestWithin(v, std::numeric_limits<double>::infinity(), workspace);
 }
 
@@ -442,7 +443,7 @@ double QueryStructure<D>::NearestSqOfGathered(VertexId v, Workspace<D>& workspac
       }
     }
   }
-  return ApproximateNearestNeighbor(v, workspace).distance_sq;
+  return NearestNeighbor(v, workspace).distance_sq;
 }
 
 // As ClippedVoronoi, where vertices may have been gathered around `v`.

@@ -71,17 +71,14 @@ class QueryStructure {
  public:
   static constexpr uint32_t kMostUncommitted = 2048;
 
-  // Has the structure that is initialized next list `segments`, by which its points are bounded: the corners of the box
-  // are no vertices then. In the plane alone.
-  void SetSegments(std::vector<SegmentLists::Ends> segments) { tree_.SetSegments(std::move(segments)); }
-
   // Has what ClippedVoronoi and ClippedVoronoiOfEach compute end at `box`, which is that of the structure at first.
   //
   // REQUIRES:   `box` holds all vertices, and lies in the box of the structure; there are segments.
   void SetBoxOfCells(const Box<D>& box) { box_of_cells_ = box; }
   const Box<D>& box_of_cells() const { return box_of_cells_; }
 
-  // Builds the structure for `points`, then adds the corners of the box that are not among them.
+  // Builds the structure for `points`, then adds the corners of the box that are not among them; but not where the
+  // points are bounded by `segments`, in the plane, which the structure lists then.
   //
   // REQUIRES:   points distinct as cubes of the grid, sorted in its Morton order, in its box.
   // Complexity: O(L) for L leaves; O(n log n) has been paid for sorting.
@@ -90,7 +87,7 @@ class QueryStructure {
   // Threads:    as LeafTree::Build.
   // Source:     [HT08] Figure 3, INITIALIZE.
   absl::Status Initialize(const MortonGrid<D>& grid, HugeVector<Point<D>> points, uint64_t max_leaves, int threads,
-                          const RunContext& context);
+                          const RunContext& context, std::vector<SegmentLists::Ends> segments = {});
 
   // The vertex nearest to `v`, and its squared distance. Exact up to rounding, where the paper asks for a constant
   // factor: the scan stops as soon as it is known.
@@ -99,7 +96,7 @@ class QueryStructure {
   // Complexity: O(1) when bottom-up.
   // Errors:     none.
   // Source:     [HT08] Figure 3, APPROXIMATENN.
-  Neighbor ApproximateNearestNeighbor(VertexId v, Workspace<D>& workspace) const;
+  Neighbor NearestNeighbor(VertexId v, Workspace<D>& workspace) const;
 
   // The same among the vertices whose squared distance is less than `limit_sq`; kNoVertex and the limit if there is
   // none.

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "core/mesher.h"
-#include "core/simplex/validate.h"
+#include "core/validate/validate.h"
 #include "tests/support/clouds.h"
 #include "tests/support/parameters.h"
 

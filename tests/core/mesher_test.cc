@@ -16,7 +16,7 @@
 #include <thread>
 #include <vector>
 
-#include "core/simplex/validate.h"
+#include "core/validate/validate.h"
 #include "tests/support/canonical.h"
 #include "tests/support/clouds.h"
 #include "tests/support/parameters.h"

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "core/mesher.h"
-#include "core/simplex/validate.h"
+#include "core/validate/validate.h"
 #include "tests/support/canonical.h"
 #include "tests/support/clouds.h"
 #include "tests/support/parameters.h"

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/simplex/validate.h"
+#include "core/validate/validate.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace wellspace::fuzz {

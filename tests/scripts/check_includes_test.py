@@ -12,10 +12,14 @@ SOUND = {
     "core/base/ids.h": "#include <cstdint>\n",
     "core/base/status_macros.h": '#include "absl/status/status.h"\n',
     "core/geometry/point.h": '#include "core/base/ids.h"\n',
-    "core/simplex/validate.h": '#include "absl/status/status.h"\n#include "core/geometry/point.h"\n',
-    "core/simplex/star.h": '#include "core/simplex/validate.h"\n',
+    "core/validate/validate.h": '#include "absl/status/status.h"\n#include "core/geometry/point.h"\n',
+    "core/simplex/star.h": '#include "core/validate/validate.h"\n',
     "core/cell/polytope.h": '#include "core/geometry/point.h"\n',
     "core/voronoi/star.h": '#include "core/cell/polytope.h"\n',
+    "core/refine/rules.h": '#include "core/voronoi/star.h"\n',
+    "core/refine/domain/planar.h": '#include "core/refine/rules.h"\n',
+    "core/refine/speculation/rounds.h": '#include "core/refine/domain/planar.h"\n',
+    "core/refine/refine.h": '#include "core/refine/domain/planar.h"\n#include "core/refine/speculation/rounds.h"\n',
     "server/sessions/session.h": '#include "server/base/options.h"\n',
     "server/base/options.h": "#include <memory>\n",
     "core/mesher.h": '#include "core/simplex/star.h"\n',
@@ -26,7 +30,7 @@ SOUND = {
     "client/grpc/calls.cc": '#include "client/client.h"\n#include "wellspace/v1/meshing.grpc.pb.h"\n#include <grpcpp/grpcpp.h>\n',
     "client/grpc/calls.h": "#include <memory>\n",
     "client/formats/vtu.cc": '#include "client/formats/vtu.h"\n#include "core/base/status_macros.h"\n#include <zlib.h>\n',
-    "client/cli/main.cc": '#include "client/formats/vtu.h"\n#include "server/embedded_server.h"\n#include "core/simplex/validate.h"\n',
+    "client/cli/main.cc": '#include "client/formats/vtu.h"\n#include "server/embedded_server.h"\n#include "core/validate/validate.h"\n',
     "client/formats/vtu.h": "#include <string>\n",
     "tests/core/mesher_test.cc": '#include "core/mesher.h"\n#include "gtest/gtest.h"\n',
 }
@@ -68,6 +72,16 @@ class CheckIncludesTest(unittest.TestCase):
         self.assert_found("core/cell/polytope.h", '#include "core/voronoi/star.h"', "core/cell may include only")
         self.assert_found("server/wire/convert.cc", '#include "server/sessions/session.h"', "server/wire may include only")
         self.assert_found("server/sessions/session.h", '#include "server/embedded_server.h"', "server/sessions may include only")
+
+    def test_parts_of_the_refinement_include_what_is_above_them(self):
+        for path, header in (
+            ("core/refine/rules.h", "domain/planar.h"),
+            ("core/refine/rules.h", "speculation/rounds.h"),
+            ("core/refine/domain/planar.h", "speculation/rounds.h"),
+        ):
+            self.assert_found(path, f'#include "core/refine/{header}"', "may include only")
+        for path in ("core/refine/rules.h", "core/refine/domain/planar.h", "core/refine/speculation/rounds.h"):
+            self.assert_found(path, '#include "core/refine/refine.h"', "stands above")
 
     def test_core_includes_server(self):
         self.assert_found("core/mesher.h", '#include "server/embedded_server.h"', "core may include only")

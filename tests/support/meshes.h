@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/simplex/validate.h"
+#include "core/validate/validate.h"
 
 namespace wellspace::test {
 

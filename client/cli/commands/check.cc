@@ -28,9 +28,9 @@
 #include "client/formats/read_cloud.h"
 #include "client/formats/read_mesh.h"
 #include "core/base/status_macros.h"
-#include "core/simplex/validate.h"
-#include "core/simplex/validate_boundary.h"
-#include "core/simplex/validate_domain.h"
+#include "core/validate/validate.h"
+#include "core/validate/validate_boundary.h"
+#include "core/validate/validate_domain.h"
 
 namespace wellspace::cli {
 namespace {

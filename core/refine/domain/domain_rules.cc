@@ -7,13 +7,11 @@
 
 #include "core/geometry/segment.h"
 #include "core/refine/domain/split_place.h"
+#include "core/refine/rounding.h"
 #include "core/refine/steiner_point.h"
 
 namespace wellspace::core {
 namespace {
-
-// Leaves are looked into a little beyond a distance, so that rounding leaves out no segment within it.
-constexpr double kBeyond = 1 + 1e-9;
 
 // From this rho on, by the square, no vertex that takes the place of another comes nearer than the edge that asks.
 constexpr double kSafeRhoSq = 2 * (1 - 1e-12);
@@ -145,7 +143,7 @@ DomainAssessment DomainRules::AssessCell(VertexId v, Polytope<2>& cell, std::spa
       continue;
     }
     if (IsCrossed(v, view)) {
-      result.own_face_edge_sq = std::min(result.own_face_edge_sq, bound.sq / rho_sq);
+      result.own_boundary_edge_sq = std::min(result.own_boundary_edge_sq, bound.sq / rho_sq);
       continue;
     }
     if (!bound.is_size && view.nearest >= 0 && IsAcross(v, cell.plane(view.nearest).vertex, view.toward)) {
@@ -255,9 +253,9 @@ DomainRules::Answer DomainRules::NextRequest(VertexId v, const Polytope<2>& cell
   const double rho_sq = rules_.criteria().rho * rules_.criteria().rho;
   if (place.IsOnSegment()) {  // the point yields to its foot
     const double rest_sq = std::max(0.0, candidate.empty_radius_sq - distance_sq);
-    const bool is_acute =
-        domain().IsAcute(HalfEdgeOf(place.segment, false)) || domain().IsAcute(HalfEdgeOf(place.segment, true));
-    if (is_acute && rho_sq < kSafeRhoSq && !found.is_too_large && rest_sq < found.bound_sq / rho_sq) {
+    const bool is_small = domain().HasSmallAngle(HalfEdgeOf(place.segment, false)) ||
+                          domain().HasSmallAngle(HalfEdgeOf(place.segment, true));
+    if (is_small && rho_sq < kSafeRhoSq && !found.is_too_large && rest_sq < found.bound_sq / rho_sq) {
       answer.refused = view.Name();
     } else {
       answer.request = RequestAt(v, RoundPlace(visible_, place, std::sqrt(rest_sq)), edge_limit_sq, workspace);

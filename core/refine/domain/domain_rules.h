@@ -15,10 +15,10 @@
 #include "core/refine/domain/expected_vertices.h"
 #include "core/refine/domain/met_part.h"
 #include "core/refine/domain/node_view.h"
-#include "core/refine/domain/place_in_domain.h"
 #include "core/refine/domain/planar_domain.h"
 #include "core/refine/domain/visible_domain.h"
 #include "core/refine/insertion.h"
+#include "core/refine/place_in_domain.h"
 #include "core/refine/step_rules.h"
 #include "core/voronoi/query_structure.h"
 

@@ -10,8 +10,8 @@
 
 #include "core/base/ids.h"
 #include "core/geometry/point.h"
-#include "core/refine/domain/place_in_domain.h"
 #include "core/refine/insertion.h"
+#include "core/refine/place_in_domain.h"
 #include "core/voronoi/extra_vertices.h"
 
 namespace wellspace::core {

@@ -7,15 +7,13 @@
 
 #include "core/geometry/point.h"
 #include "core/geometry/segment.h"
+#include "core/refine/rounding.h"
 
 namespace wellspace::core {
 namespace {
 
 // A part of a segment that is shorter than this, relative to its distance from the site, is what was rounded.
 constexpr double kLeastPart = 1e-9;
-
-// Segments a little beyond the reach of a cell are looked at, so that rounding leaves out none within it.
-constexpr double kBeyond = 1 + 1e-9;
 
 // Whether all nodes of `cell` lie on one side of a line, surely: the one through `from`, relative to the site, in the
 // direction `along`, which has length 1.

@@ -7,8 +7,8 @@
 
 #include "core/base/ids.h"
 #include "core/cell/polytope.h"
-#include "core/refine/domain/place_in_domain.h"
 #include "core/refine/domain/planar_domain.h"
+#include "core/refine/place_in_domain.h"
 
 namespace wellspace::core {
 

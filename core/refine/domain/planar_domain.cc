@@ -28,7 +28,7 @@ double PseudoAngleFrom(double from, const Point<2>& d) {
 PlanarDomain::PlanarDomain(PlanarGraph graph, PlanarFaces faces)
     : graph_(std::move(graph)),
       faces_(std::move(faces)),
-      is_acute_(2 * graph_.segments.size()),
+      has_small_angle_(2 * graph_.segments.size()),
       splits_(graph_.segments.size()) {
   for (uint32_t s = 0; s < segment_count(); ++s) {
     lengths_.push_back(Distance<2>(EndOf(s, false), EndOf(s, true)));
@@ -46,7 +46,7 @@ PlanarDomain::PlanarDomain(PlanarGraph graph, PlanarFaces faces)
       const double cosine =
           Dot<2>(DirectionOf(h), DirectionOf(next)) / lengths_[SegmentOf(h)] / lengths_[SegmentOf(next)];
       if (cosine > 0.5 * (1 + 1e-12)) {
-        is_acute_[h] = is_acute_[next] = true;
+        has_small_angle_[h] = has_small_angle_[next] = true;
       }
     }
   }

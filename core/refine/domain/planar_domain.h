@@ -18,7 +18,7 @@
 #include "core/features/planar_graph.h"
 #include "core/geometry/point.h"
 #include "core/geometry/segment.h"
-#include "core/refine/domain/place_in_domain.h"
+#include "core/refine/place_in_domain.h"
 #include "core/tree/segment_lists.h"
 
 namespace wellspace::core {
@@ -62,7 +62,7 @@ class PlanarDomain {
   std::vector<SegmentLists::Ends> Ends() const;
 
   // Whether two ways that lead from the first end of `h` make an angle of less than 60 degrees, of which h is one.
-  bool IsAcute(HalfEdge h) const { return is_acute_[h]; }
+  bool HasSmallAngle(HalfEdge h) const { return has_small_angle_[h]; }
   // The smallest angle between two segments with a common end. Unit: radians; pi where there are no two.
   double MinAngle() const { return min_angle_; }
 
@@ -181,7 +181,7 @@ class PlanarDomain {
   std::vector<double> lengths_;  // by segment
   std::vector<HalfEdge> ways_;   // 2 of each segment: those from a vertex on it, toward b and a
   double min_angle_ = std::numbers::pi;
-  std::vector<bool> is_acute_;                 // by half-edge
+  std::vector<bool> has_small_angle_;          // by half-edge
   std::vector<std::atomic<uint32_t>> splits_;  // by segment
   HugeVector<InsertedPlace> places_;           // by vertex that was inserted
 };

@@ -58,13 +58,13 @@ PlaceInDomain RoundPlace(const VisibleDomain& visible, SegmentPoint on, double r
   const PlanarDomain& domain = visible.domain();
   const uint32_t segment = on.segment;
   const double length = domain.LengthOf(segment);
-  const bool is_acute_at_a = domain.IsAcute(HalfEdgeOf(segment, false));
-  const bool is_acute_at_b = domain.IsAcute(HalfEdgeOf(segment, true));
-  const SplitOrder order = is_acute_at_a && is_acute_at_b ? visible.OrderOfSplit(segment) : SplitOrder::kAny;
+  const bool is_small_at_a = domain.HasSmallAngle(HalfEdgeOf(segment, false));
+  const bool is_small_at_b = domain.HasSmallAngle(HalfEdgeOf(segment, true));
+  const SplitOrder order = is_small_at_a && is_small_at_b ? visible.OrderOfSplit(segment) : SplitOrder::kAny;
   if (order == SplitOrder::kFirst) {
     on.distance = std::max(on.distance, length / 3);
   }
-  if (on.is_from_b ? is_acute_at_b : is_acute_at_a) {
+  if (on.is_from_b ? is_small_at_b : is_small_at_a) {
     const double rounded = RoundNear(on.distance, kRoundingShare * room);
     if (rounded < length) {
       on.distance = rounded;

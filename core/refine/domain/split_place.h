@@ -7,10 +7,10 @@
 
 #include "core/base/ids.h"
 #include "core/refine/domain/met_part.h"
-#include "core/refine/domain/place_in_domain.h"
 #include "core/refine/domain/planar_domain.h"
 #include "core/refine/domain/visible_domain.h"
 #include "core/refine/insertion.h"
+#include "core/refine/place_in_domain.h"
 
 namespace wellspace::core {
 

@@ -10,8 +10,8 @@
 #include "core/features/planar_faces.h"
 #include "core/geometry/point.h"
 #include "core/refine/domain/expected_vertices.h"
-#include "core/refine/domain/place_in_domain.h"
 #include "core/refine/domain/planar_domain.h"
+#include "core/refine/place_in_domain.h"
 #include "core/voronoi/query_structure.h"
 
 namespace wellspace::core {

@@ -14,7 +14,7 @@
 #include "core/refine/insertion.h"
 #include "core/refine/neighbor_notice.h"
 #include "core/refine/speculation/batch.h"
-#include "core/refine/speculation/star_writer.h"
+#include "core/refine/star_writer.h"
 
 namespace wellspace::core {
 
@@ -30,16 +30,16 @@ class RecordedSteps {
   // REQUIRES:   its record is still valid; the batch outlives this.
   explicit RecordedSteps(Batch<D>& batch)
       : batch_(batch),
-        record_(batch.records[batch.refined]),
-        end_(batch.EndOf(batch.refined)),
+        record_(batch.records.by_vertex[batch.refined]),
+        end_(batch.records.EndOf(batch.refined)),
         step_(record_.begin.steps),
         request_(record_.begin.requests),
         reassessed_(record_.begin.reassessed),
         notices_end_(record_.begin.notices) {}
 
   const Assessment* Assess() {
-    const RecordedStep& step = batch_.steps[step_];
-    notices_ = std::span(batch_.notices).subspan(notices_end_, step.notices);
+    const RecordedStep& step = batch_.records.steps[step_];
+    notices_ = std::span(batch_.records.notices).subspan(notices_end_, step.notices);
     notices_end_ += step.notices;
     for (NeighborNotice& notice : notices_) {
       batch_.Renumber(notice.vertex);
@@ -50,13 +50,14 @@ class RecordedSteps {
   std::span<const NeighborNotice> Notices() const { return notices_; }
 
   const InsertionRequest<D>* NextRequest() {
-    if (batch_.steps[step_].is_reassessed) {
-      batch_.steps[step_].found = batch_.reassessed[reassessed_++];
+    RecordedStep& step = batch_.records.steps[step_];
+    if (step.is_reassessed) {
+      step.found = batch_.records.reassessed[reassessed_++];
     }
-    if (!batch_.steps[step_].asks) {
+    if (!step.asks) {
       return nullptr;
     }
-    InsertionRequest<D>& request = batch_.requests[request_];
+    InsertionRequest<D>& request = batch_.records.requests[request_];
     batch_.Renumber(request.insertion.other);
     return &request;
   }
@@ -68,22 +69,23 @@ class RecordedSteps {
   }
 
   std::span<const WatchedNode<D>> NodesToWatch() const {
-    return std::span(batch_.watched).subspan(record_.begin.watched, end_.watched - record_.begin.watched);
+    return std::span(batch_.records.watched).subspan(record_.begin.watched, end_.watched - record_.begin.watched);
   }
 
   typename StarWriter<D>::Simplices FindStar(StarWriter<D>& /*stars*/) {
     for (uint32_t i = record_.new_simplices; i < end_.simplices; ++i) {
-      for (VertexId& u : batch_.simplices[i]) {
+      for (VertexId& u : batch_.records.simplices[i]) {
         batch_.Renumber(u);
       }
     }
-    return std::span(batch_.simplices).subspan(record_.begin.simplices, end_.simplices - record_.begin.simplices);
+    return std::span(batch_.records.simplices)
+        .subspan(record_.begin.simplices, end_.simplices - record_.begin.simplices);
   }
 
  private:
   Batch<D>& batch_;
-  const typename Batch<D>::Record& record_;
-  const typename Batch<D>::Ends end_;
+  const typename BatchRecords<D>::Record& record_;
+  const typename BatchRecords<D>::Ends end_;
   size_t step_;     // of the batch's
   size_t request_;  // likewise, the next
   size_t reassessed_;

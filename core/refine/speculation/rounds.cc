@@ -13,6 +13,7 @@
 #include "core/refine/domain/domain_rules.h"
 #include "core/refine/domain/domain_steps.h"
 #include "core/refine/domain/expected_vertices.h"
+#include "core/refine/rounding.h"
 
 namespace wellspace::core {
 namespace {
@@ -32,8 +33,6 @@ constexpr size_t kParts = 4;
 // unless they are so many times as large.
 constexpr double kLeastShareValid = 2.0 / 3;
 constexpr size_t kMoreThanDistrusted = 4;
-// More than what is rounded.
-constexpr double kBeyond = 1 + 1e-9;
 
 // Cells of the vertices that were in the structure when speculation began, and of those that the batch expects to be
 // inserted before. Notes in the record how far they reach.
@@ -41,19 +40,22 @@ template <int D>
 class SpeculatedCells {
  public:
   SpeculatedCells(const QueryStructure<D>& structure, Batch<D>& batch, size_t at)
-      : structure_(structure), batch_(batch), record_(batch.records[at]), site_(structure.point(batch.vertices[at])) {}
+      : structure_(structure),
+        inserted_(batch.records.inserted),
+        record_(batch.records.by_vertex[at]),
+        site_(structure.point(batch.vertices[at])) {}
 
   void ComputeOwn(VertexId v, const Box<D>& clip, Workspace<D>& workspace) {
-    structure_.UnplacedClippedVoronoi(v, clip, workspace, batch_.inserted);
+    structure_.UnplacedClippedVoronoi(v, clip, workspace, inserted_);
     record_.reach_sq = workspace.cell.CutLimitSq();
   }
 
   const Polytope<D>* ComputeOther(VertexId u, const Box<D>& clip, Workspace<D>& workspace) {
-    if (u >= batch_.inserted.first()) {  // in no leaf
+    if (u >= inserted_.first()) {  // in no leaf
       is_known_ = false;
       return nullptr;
     }
-    structure_.UnplacedClippedVoronoi(u, clip, workspace, batch_.inserted);
+    structure_.UnplacedClippedVoronoi(u, clip, workspace, inserted_);
     NoteBall(structure_.point(u), workspace.cell.CutLimitSq());
     is_known_ = is_known_ && !workspace.cell.IsTooLarge();
     workspace.cell.Place();
@@ -71,8 +73,8 @@ class SpeculatedCells {
 
  private:
   const QueryStructure<D>& structure_;
-  Batch<D>& batch_;
-  typename Batch<D>::Record& record_;
+  const ExtraVertices<D>& inserted_;
+  typename BatchRecords<D>::Record& record_;
   const Point<D> site_;
   bool is_known_ = true;
 };
@@ -104,9 +106,9 @@ void Rounds<D>::EndRun(QueryCounters& counters) {
 
 template <int D>
 void Rounds<D>::DropRun() {
-  if (is_ahead_ || stars_.IsWriting()) {
+  if (is_recording_ || stars_.IsWriting()) {
     team_->Drop();
-    is_ahead_ = false;
+    is_recording_ = false;
     stars_.EndWriting();
   }
   team_ = nullptr;
@@ -151,11 +153,11 @@ void Rounds<D>::TakeNext(Batch<D>& batch) {
                         detached_.rend() - static_cast<std::ptrdiff_t>(batch.strip_end - size));
   batch.strip_end -= size;
   batch.refined = 0;
-  batch.is_speculated = false;
+  batch.records.is_speculated = false;
 }
 
 template <int D>
-void Rounds<D>::Drop() {
+void Rounds<D>::ReattachAll() {
   Schedule& schedule = pending_.schedule();
   const auto reattach = [&](VertexId v) {
     if (schedule.IsPendingIn(v, bucket_)) {
@@ -176,7 +178,7 @@ void Rounds<D>::Drop() {
 template <int D>
 void Rounds<D>::ForgetRecords() {
   for (Batch<D>& batch : batches_) {
-    batch.is_speculated = false;
+    batch.records.is_speculated = false;
   }
 }
 
@@ -198,10 +200,11 @@ Batch<D>* Rounds<D>::NextBatch() {
   if (next_batch_ == now.size() + then.size()) {
     return nullptr;
   }
-  while (is_ahead_ && team_->Help()) {
+  while (is_recording_ && team_->Help()) {
   }
   Batch<D>& batch = then[next_batch_ - now.size()];
-  if (!is_ahead_ || team_->HasEnded() || !std::atomic_ref(batch.is_speculated).load(std::memory_order_acquire)) {
+  if (!is_recording_ || team_->HasEnded() ||
+      !std::atomic_ref(batch.records.is_speculated).load(std::memory_order_acquire)) {
     return nullptr;
   }
   ++next_batch_;
@@ -216,9 +219,9 @@ void Rounds<D>::Speculate() {
   const std::span<Batch<D>> now = HalfOf(0);
   const std::span<Batch<D>> then = HalfOf(1);
   if (detached_.size() <= kMoreThanDistrusted * distrusted_size_) {
-    is_speculated_ = now.front().is_speculated;
-    stars_.SetCollecting(is_speculated_);
-    if (!is_speculated_) {
+    notes_insertions_ = now.front().records.is_speculated;
+    stars_.SetCollecting(notes_insertions_);
+    if (!notes_insertions_) {
       AwaitOthers();  // they may still write stars, which is done by this thread then
     }
     return;
@@ -228,14 +231,14 @@ void Rounds<D>::Speculate() {
   const auto record = [this](Batch<D>& batch, size_t part, size_t parts) {
     RecordPart(batch, part, parts, workspaces_[ThreadTeam::CurrentThread()]);
   };
-  if (!now.front().is_speculated) {
+  if (!now.front().records.is_speculated) {
     Prepare(now);
     team_->ForEach(now.size(), [&](size_t i) { record(now[i], 0, 1); });
   }
   Prepare(then);
   bytes_before_ = CountBytes();
-  is_ahead_ = true;
-  is_speculated_ = true;
+  is_recording_ = true;
+  notes_insertions_ = true;
   const size_t parts = 2 * static_cast<size_t>(team_->threads()) <= then.size() ? kParts : 1;
   team_->Begin(parts * then.size(), [=](size_t i) { record(then[i % then.size()], i / then.size(), parts); });
 }
@@ -249,17 +252,18 @@ void Rounds<D>::Prepare(std::span<Batch<D>> batches) {
     }
     batch.Prepare(structure_.vertex_count(), inserted_before_ + inserted_.size());
     for (size_t i = batch.refined; i < batch.vertices.size(); ++i) {
-      batch.records[i].is_wanted = schedule.IsPendingIn(batch.vertices[i], bucket_);
-      batch.records[i].has_to_notify = domain_ == nullptr || pending_.HasToNotify(batch.vertices[i]);
+      batch.records.by_vertex[i].is_wanted = schedule.IsPendingIn(batch.vertices[i], bucket_);
+      batch.records.by_vertex[i].has_to_notify = domain_ == nullptr || pending_.HasToNotify(batch.vertices[i]);
     }
   }
 }
 
 // Makes the records of one of equal parts of the vertices of a batch that have not been refined, once the parts before
-// it are done. Nothing but the batch and the workspace is written.
+// it are done. Nothing but the records and the workspace is written.
 template <int D>
 void Rounds<D>::RecordPart(Batch<D>& batch, size_t part, size_t parts, StepWorkspace<D>& workspace) const {
-  const std::atomic_ref parts_done(batch.parts_done);
+  BatchRecords<D>& records = batch.records;
+  const std::atomic_ref parts_done(records.parts_done);
   while (parts_done.load(std::memory_order_acquire) < part) {
     std::this_thread::yield();
   }
@@ -268,18 +272,17 @@ void Rounds<D>::RecordPart(Batch<D>& batch, size_t part, size_t parts, StepWorks
   const size_t size = batch.vertices.size() - batch.refined;
   const size_t end = batch.refined + (part + 1) * size / parts;
   for (size_t i = batch.refined + part * size / parts; i < end; ++i) {
-    batch.BeginRecord(i);
+    records.Begin(i);
     PrefetchAhead(std::span(batch.vertices), i, [this](VertexId v, int step) { structure_.Prefetch(v, step); });
-    if (batch.records[i].is_wanted && !context_->IsCancelled()) {
+    if (records.by_vertex[i].is_wanted && !context_->IsCancelled()) {
       Record(batch, i, workspace);
-      if (!batch.records[i].is_known) {
-        batch.CutTo(batch.records[i].begin);
+      if (!records.by_vertex[i].is_known) {
+        records.CutTo(records.by_vertex[i].begin);
       }
     }
   }
   if (part + 1 == parts) {
-    batch.numbers.assign(batch.inserted.size(), kNoVertex);
-    std::atomic_ref(batch.is_speculated).store(true, std::memory_order_release);
+    std::atomic_ref(records.is_speculated).store(true, std::memory_order_release);
   }
 }
 
@@ -292,7 +295,7 @@ void Rounds<D>::Record(Batch<D>& batch, size_t at, StepWorkspace<D>& workspace) 
   const double edge_limit_sq = pending_.schedule().UpperLengthSq(bucket_);
   if constexpr (D == 2) {
     if (domain_ != nullptr) {
-      const ExpectedVertices expected(batch.inserted, batch.requests);
+      const ExpectedVertices expected(batch.records.inserted, batch.records.requests);
       const DomainRules rules(structure_, *domain_, *rules_, &expected);
       DomainSteps steps(rules, *rules_, v, edge_limit_sq, cells, workspace);
       return RecordSteps(batch, at, cells, steps);
@@ -305,18 +308,18 @@ void Rounds<D>::Record(Batch<D>& batch, size_t at, StepWorkspace<D>& workspace) 
 template <int D>
 template <typename Cells, typename Steps>
 void Rounds<D>::RecordSteps(Batch<D>& batch, size_t at, Cells& cells, Steps& steps) const {
-  const VertexId v = batch.vertices[at];
+  BatchRecords<D>& records = batch.records;
   while (!context_->IsCancelled()) {
     const Assessment* const found = steps.Assess();
     if (found == nullptr) {
       return;
     }
     RecordedStep step{*found};
-    const size_t first_notice = batch.notices.size();
-    if (batch.records[at].has_to_notify) {
-      steps.AppendNotices(batch.notices);
+    const size_t first_notice = records.notices.size();
+    if (records.by_vertex[at].has_to_notify) {
+      steps.AppendNotices(records.notices);
     }
-    step.notices = static_cast<uint32_t>(batch.notices.size() - first_notice);
+    step.notices = static_cast<uint32_t>(records.notices.size() - first_notice);
     const InsertionRequest<D>* const request = steps.NextRequest();
     if (!cells.IsKnown()) {
       return;
@@ -324,16 +327,16 @@ void Rounds<D>::RecordSteps(Batch<D>& batch, size_t at, Cells& cells, Steps& ste
     step.asks = request != nullptr;
     if (const Assessment* const reassessed = steps.Reassessed(); reassessed != nullptr) {
       step.is_reassessed = true;
-      batch.reassessed.push_back(*reassessed);
+      records.reassessed.push_back(*reassessed);
     }
-    batch.steps.push_back(step);
+    records.steps.push_back(step);
     if (request == nullptr) {
-      steps.AppendNodesToWatch(batch.watched);
+      steps.AppendNodesToWatch(records.watched);
       if (found->IsGood()) {
-        steps.FindStar(batch.star);
-        batch.AppendStar(at);
+        steps.FindStar(records.star);
+        records.AppendStar(at);
       }
-      batch.SetKnown(at, structure_.point(v));
+      records.SetKnown(at, structure_.point(batch.vertices[at]));
       return;
     }
     if (!rules_->IsLongEnough(request->point)) {
@@ -342,32 +345,32 @@ void Rounds<D>::RecordSteps(Batch<D>& batch, size_t at, Cells& cells, Steps& ste
     if (domain_ != nullptr) {
       cells.NoteBall(request->point.position, kBeyond * request->point.empty_radius_sq);
     }
-    batch.requests.push_back(*request);
-    steps.Inserted(batch.inserted.Append(request->point.position));
+    records.requests.push_back(*request);
+    steps.Inserted(records.inserted.Append(request->point.position));
   }
 }
 
 template <int D>
 void Rounds<D>::EndRound() {
   AwaitOthers();
-  is_speculated_ = false;
+  notes_insertions_ = false;
   if (speculated_count_ >= kLeastInRounds && valid_count_ < kLeastShareValid * static_cast<double>(speculated_count_)) {
     distrusted_size_ = detached_.size();
   }
   for (Batch<D>& batch : HalfOf(0)) {
-    std::swap(batch.simplices, batch.written);
+    std::swap(batch.records.simplices, batch.written);
   }
   stars_.BeginWriting(*team_);
   structure_.CommitAll();
   // The records of the next batches may have been made without what has been inserted meanwhile.
   const Batch<D>& next = HalfOf(1).front();
-  const size_t is_known = next.is_speculated ? next.first_unknown - inserted_before_ : inserted_.size();
+  const size_t is_known = next.records.is_speculated ? next.first_unknown - inserted_before_ : inserted_.size();
   inserted_.erase(inserted_.begin(), inserted_.begin() + static_cast<std::ptrdiff_t>(is_known));
   inserted_before_ += is_known;
 }
 
 template <int D>
-void Rounds<D>::GoOn() {
+void Rounds<D>::NextRound() {
   for (Batch<D>& batch : HalfOf(0)) {
     TakeNext(batch);
   }
@@ -380,8 +383,8 @@ void Rounds<D>::GoOn() {
 
 template <int D>
 void Rounds<D>::BeginBatch(Batch<D>& batch) {
-  if (batch.is_speculated) {
-    batch.NoteConflicts(InsertedFrom(batch.first_unknown - inserted_before_));
+  if (batch.records.is_speculated) {
+    batch.BeginReplay(InsertedFrom(batch.first_unknown - inserted_before_));
   }
 }
 
@@ -392,7 +395,7 @@ void Rounds<D>::Prefetch(const Batch<D>& batch) const {
       pending_.Prefetch(v);
       stars_.Prefetch(v);
     }
-    if (!batch.is_speculated) {
+    if (!batch.records.is_speculated) {
       structure_.Prefetch(v, step);
     }
   });
@@ -400,9 +403,9 @@ void Rounds<D>::Prefetch(const Batch<D>& batch) const {
 
 template <int D>
 void Rounds<D>::AwaitOthers() {
-  if (is_ahead_ || stars_.IsWriting()) {
+  if (is_recording_ || stars_.IsWriting()) {
     team_->End();
-    is_ahead_ = false;
+    is_recording_ = false;
     stars_.EndWriting();
   }
 }

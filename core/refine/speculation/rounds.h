@@ -16,7 +16,7 @@
 #include "core/refine/domain/planar_domain.h"
 #include "core/refine/pending_vertices.h"
 #include "core/refine/speculation/batch.h"
-#include "core/refine/speculation/star_writer.h"
+#include "core/refine/star_writer.h"
 #include "core/refine/step_rules.h"
 #include "core/voronoi/query_structure.h"
 
@@ -40,11 +40,37 @@ struct SpeculationCounts {
 //       rounds.BeginRound();
 //       while (Batch<D>* batch = rounds.NextBatch()) … refine its vertices …
 //       rounds.EndRound();
-//       rounds.GoOn();
+//       rounds.NextRound();
 //     }
 //
+// What a call may find, and what it leaves; a dash where that stays. A bucket is detached, or none is. Others record
+// (IsRecording), or not. Stars are written at once, collected (StarWriter::NeedsStars), or written by another thread
+// (StarWriter::IsWriting), which may go on while stars are collected.
+//
+//   function       before                                   after
+//                  detached  recording  stars               detached  recording  stars
+//   BeginRun       any       no         at once             -         -          -
+//   Begin          none      no         at once, by other   one [1]   -          -
+//   ForgetRecords  any       no         at once, by other   -         -          -
+//   BeginRound     one       no         at once, by other   -         yes [2]    collected [2], by other
+//   NextBatch      one       any        any                 -         -          -
+//   AwaitOthers    any       any        any                 -         no         no more by other
+//   CommitAdded    any       any        any                 -         no         no more by other
+//   EndRound       one       any        any                 -         no         by other [3]
+//   NextRound      one       no         at once, by other   one [4]   -          -
+//   EndRun         any       no         at once, by other   -         -          at once
+//   DropRun        any       any        any                 -         no         no more by other
+//   ReattachAll    any       no         at once             none      -          -
+//
+//   [1] if it returns true
+//   [2] with several threads, and unless few records were valid of late; then no other records, and stars are collected
+//       only if this round was speculated on
+//   [3] if any were collected, else at once
+//   [4] none after the last batch
+//
 // Thread safety: thread-compatible.
-// Invariants: (1) while IsAhead, other threads read the structure, and write nothing but the batches of the next round.
+// Invariants: (1) while IsRecording, other threads read the structure, and write nothing but the records of the next
+//             round's batches.
 template <int D>
 class Rounds {
  public:
@@ -63,7 +89,7 @@ class Rounds {
   // Detaches the vertices of `bucket`, the lowest; false if there are too few, and they stay where they are.
   bool Begin(int bucket);
   // Has the detached vertices that have not been refined be pending in their bucket alone.
-  void Drop();
+  void ReattachAll();
   // Whether no vertex is detached any more.
   bool AreDone() const { return batches_.empty(); }
   // Of the detached vertices.
@@ -80,7 +106,7 @@ class Rounds {
   // Ends the speculation, commits what was added, and has another thread write stars.
   void EndRound();
   // Goes on to the next round, with new batches in the place of those that have been refined.
-  void GoOn();
+  void NextRound();
 
   // Begins to refine `batch`.
   void BeginBatch(Batch<D>& batch);
@@ -88,7 +114,7 @@ class Rounds {
   void Prefetch(const Batch<D>& batch) const;
   // Notes that a vertex has been added at `p`.
   void NoteInserted(const Point<D>& p) {
-    if (is_speculated_) {
+    if (notes_insertions_) {
       inserted_.push_back(p);
     }
   }
@@ -97,23 +123,23 @@ class Rounds {
   std::span<const Point<D>> InsertedFrom(size_t i) const { return std::span(inserted_).subspan(i); }
   // Counts the record of a vertex of `batch` that is refined, for the decision whether to go on speculating.
   void CountRecord(const Batch<D>& batch, bool was_valid) {
-    speculated_count_ += batch.is_speculated ? 1 : 0;
+    speculated_count_ += batch.records.is_speculated ? 1 : 0;
     valid_count_ += was_valid ? 1 : 0;
-    counts_.speculated += batch.is_speculated ? 1 : 0;
+    counts_.speculated += batch.records.is_speculated ? 1 : 0;
     counts_.replayed += was_valid ? 1 : 0;
   }
   // Of all runs.
   const SpeculationCounts& counts() const { return counts_; }
 
   // Whether other threads may speculate.
-  bool IsAhead() const { return is_ahead_; }
+  bool IsRecording() const { return is_recording_; }
   // Returns when other threads have done what was begun.
   void AwaitOthers();
   // Has queries find all vertices that have been added, once other threads have done what was begun.
   void CommitAdded();
 
   // Of what a round needs; roughly.
-  uint64_t MemoryBytes() const { return is_ahead_ ? bytes_before_ : CountBytes(); }
+  uint64_t MemoryBytes() const { return is_recording_ ? bytes_before_ : CountBytes(); }
 
  private:
   // The batches of the round, for 0, or of the next one.
@@ -153,9 +179,9 @@ class Rounds {
   ThreadTeam* team_ = nullptr;            // null between runs
   const RunContext* context_ = nullptr;
   std::vector<StepWorkspace<D>> workspaces_;  // by thread
-  bool is_ahead_ = false;
-  bool is_speculated_ = false;  // the round: insertions are noted
-  uint64_t bytes_before_ = 0;   // of what other threads write, before they began
+  bool is_recording_ = false;
+  bool notes_insertions_ = false;  // this round has been speculated on, so that what is inserted may conflict
+  uint64_t bytes_before_ = 0;      // of what other threads write, before they began
 };
 
 }  // namespace wellspace::core

@@ -59,14 +59,12 @@ TEST(RunContextTest, SnapshotShowsWhatTheMesherReports) {
   context.EnterPhase(Phase::kRefinement);
   context.SetVertices(7);
   context.SetEstimatedVertices(70);
-  context.SetBucket(-3);
   context.AddSimplices(5);
   context.AddSimplices(6);
   const Progress progress = context.Snapshot();
   EXPECT_EQ(progress.phase, Phase::kRefinement);
   EXPECT_EQ(progress.vertices, 7u);
   EXPECT_EQ(progress.estimated_vertices, 70u);
-  EXPECT_EQ(progress.bucket, -3);
   EXPECT_EQ(progress.simplices, 11u);
 }
 

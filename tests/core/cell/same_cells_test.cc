@@ -96,8 +96,8 @@ TYPED_TEST(SameCellsTest, ScansAreTheSameByEveryVectorUnit) {
     ASSERT_EQ(fast.unit, VectorUnit::kAvx2);
     for (uint32_t v = 0; v < structure.vertex_count(); v += 7) {
       ASSERT_EQ(CellNow<D>(structure, VertexId{v}, fast), CellNow<D>(structure, VertexId{v}, plain)) << "vertex " << v;
-      const Neighbor nearest = structure.ApproximateNearestNeighbor(VertexId{v}, fast);
-      ASSERT_EQ(nearest.distance_sq, structure.ApproximateNearestNeighbor(VertexId{v}, plain).distance_sq);
+      const Neighbor nearest = structure.NearestNeighbor(VertexId{v}, fast);
+      ASSERT_EQ(nearest.distance_sq, structure.NearestNeighbor(VertexId{v}, plain).distance_sq);
       ASSERT_EQ(fast.counters.leaves, plain.counters.leaves);
     }
     EXPECT_GT(fast.counters.leaves, fast.counters.queries);
@@ -112,7 +112,7 @@ TYPED_TEST(SameCellsTest, ScansAreTheSameByEveryVectorUnit) {
       structure.NearestOfEach(leaf, plain, by_plain);
       ASSERT_EQ(by_fast, by_plain);
       for (uint32_t i = 0; i < inside->count; ++i) {
-        ASSERT_EQ(by_fast[i], structure.ApproximateNearestNeighbor(inside->ids[i], fast).distance_sq);
+        ASSERT_EQ(by_fast[i], structure.NearestNeighbor(inside->ids[i], fast).distance_sq);
       }
     });
   }
@@ -196,7 +196,7 @@ TYPED_TEST(SameCellsTest, ThoseOfManySitesAreThoseOfEach) {
         size_t taken = 0;
         const auto take = [&](VertexId v, double radius) {
           EXPECT_EQ(v, sites[taken++]);
-          EXPECT_EQ(radius, beta * std::sqrt(structure.ApproximateNearestNeighbor(v, alone).distance_sq));
+          EXPECT_EQ(radius, beta * std::sqrt(structure.NearestNeighbor(v, alone).distance_sq));
           structure.ClippedVoronoi(v, radius, alone, rule);
           EXPECT_EQ(Description<D>(together.cell), Description<D>(alone.cell)) << "vertex " << Index(v);
           return !this->HasFailure();

@@ -133,8 +133,8 @@ TEST(PlanarGraphTest, ACrossingBecomesAVertexIfThatIsAskedFor) {
 TEST(PlanarGraphTest, AVertexTooCloseToASegmentIsRefusedOrLedThrough) {
   Input input{.points = {0, 0, 2, 0, 1, 1e-12, 1, 1}, .ends = {0, 1, 2, 3}};
   const auto refused = input.Make();
-  EXPECT_THAT(refused.status().message(),
-              AllOf(HasSubstr("points[2] at (1, "), HasSubstr("1e-12 from segments[0]"), HasSubstr("1e-09")));
+  EXPECT_THAT(refused.status().message(), AllOf(HasSubstr("points[2] at (1, "), HasSubstr("1e-12 from segments[0]"),
+                                                HasSubstr("1e-09"), HasSubstr("make it an end of the segment")));
   input.crossings = CrossingRule::kSplit;
   const auto graph = input.Make();
   ASSERT_TRUE(graph.ok()) << graph.status();

@@ -309,9 +309,9 @@ TYPED_TEST(RefineTest, AssessesTheCellOfACorner) {
   // A node on an own face at (1/2, ...) that is too far asks for nothing, but is remembered with its edge.
   const double on_face = std::sqrt(0.25 * (D - 1));
   const Assessment remembered = Assess<D>(workspace.cell, faces, {.rho = on_face - 1e-9}, 0.99);
-  EXPECT_DOUBLE_EQ(remembered.own_face_edge_sq, 1);
+  EXPECT_DOUBLE_EQ(remembered.own_boundary_edge_sq, 1);
   EXPECT_DOUBLE_EQ(remembered.radius_sq, 0.25 * D);
-  EXPECT_EQ(Assess<D>(workspace.cell, faces, {.rho = on_face + 1e-9}, 0.99).own_face_edge_sq, Assessment::kNone);
+  EXPECT_EQ(Assess<D>(workspace.cell, faces, {.rho = on_face + 1e-9}, 0.99).own_boundary_edge_sq, Assessment::kNone);
 
   structure.ClippedVoronoi(VertexId{0}, 0.4, workspace);
   const Assessment clipped = Assess<D>(workspace.cell, faces, {.rho = 2}, 100);

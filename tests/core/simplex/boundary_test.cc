@@ -14,7 +14,7 @@
 
 #include "core/geometry/exact_measure.h"
 #include "core/mesher.h"
-#include "core/simplex/validate_boundary.h"
+#include "core/validate/validate_boundary.h"
 #include "tests/support/clouds.h"
 #include "tests/support/parameters.h"
 

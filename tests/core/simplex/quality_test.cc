@@ -9,7 +9,7 @@
 #include <numeric>
 #include <utility>
 
-#include "core/simplex/validate.h"
+#include "core/validate/validate.h"
 #include "tests/support/clouds.h"
 #include "tests/support/dimensions.h"
 #include "tests/support/meshes.h"

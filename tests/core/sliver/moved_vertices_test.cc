@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/mesher.h"
-#include "core/simplex/validate.h"
+#include "core/validate/validate.h"
 #include "tests/support/clouds.h"
 
 namespace wellspace::core {

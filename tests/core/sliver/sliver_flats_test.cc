@@ -13,8 +13,8 @@
 #include "core/geometry/point.h"
 #include "core/mesher.h"
 #include "core/simplex/quality.h"
-#include "core/simplex/validate.h"
 #include "core/sliver/repair.h"
+#include "core/validate/validate.h"
 
 namespace wellspace::core {
 namespace {

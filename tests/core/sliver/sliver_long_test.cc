@@ -19,7 +19,7 @@
 
 #include "absl/strings/str_format.h"
 #include "core/mesher.h"
-#include "core/simplex/validate.h"
+#include "core/validate/validate.h"
 #include "tests/support/clouds.h"
 #include "tests/support/parameters.h"
 

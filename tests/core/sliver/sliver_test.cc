@@ -13,7 +13,7 @@
 
 #include "core/geometry/point.h"
 #include "core/mesher.h"
-#include "core/simplex/validate.h"
+#include "core/validate/validate.h"
 #include "tests/support/canonical.h"
 #include "tests/support/clouds.h"
 

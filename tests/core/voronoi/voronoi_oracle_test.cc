@@ -69,7 +69,7 @@ class QueryChecker {
   void CheckAll(const QueryStructure<D>& structure, VertexId v) {
     SCOPED_TRACE("vertex " + std::to_string(Index(v)) + " of " + std::to_string(structure.vertex_count()));
     const double nearest_sq = test::NearestDistanceSq<D>(structure, v);
-    const Neighbor found = structure.ApproximateNearestNeighbor(v, fast_);
+    const Neighbor found = structure.NearestNeighbor(v, fast_);
     ASSERT_EQ(found.distance_sq, nearest_sq);
     ASSERT_NE(found.vertex, v);
     ASSERT_EQ(DistanceSq<D>(structure.point(found.vertex), structure.point(v)), nearest_sq);

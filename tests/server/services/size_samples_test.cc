@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/mesher.h"
-#include "core/simplex/validate.h"
+#include "core/validate/validate.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "tests/server/service_harness.h"

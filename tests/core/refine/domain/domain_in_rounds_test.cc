@@ -115,8 +115,8 @@ struct Refined {
         MakeDomainCloud(input.points, input.features(), {{-0.1, -0.1}, {1.1, 1.1}}, 1, context);
     EXPECT_TRUE(made.ok()) << made.status();
     planar = std::move(made->planar);
-    structure.SetSegments(planar->Ends());
-    EXPECT_TRUE(structure.Initialize(made->cloud.grid, std::move(made->cloud.points), kMany, 1, context).ok());
+    EXPECT_TRUE(
+        structure.Initialize(made->cloud.grid, std::move(made->cloud.points), kMany, 1, context, planar->Ends()).ok());
     refinement = std::make_unique<Refinement<2>>(structure, made->domain.MinEdge(), planar.get());
     MeshCriteria<2> criteria{.rho = rho};
     criteria.sizes = SizeField<2>(size * made->domain.scale);

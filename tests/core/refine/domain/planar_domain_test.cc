@@ -68,9 +68,9 @@ TEST_F(PlanarDomainTest, AcuteIsBelowSixtyDegrees) {
     const auto [segment, is_from_b] = domain_.Between(p, q);
     return HalfEdgeOf(segment, is_from_b);
   };
-  EXPECT_FALSE(planar_.IsAcute(way(kApex, kRight)));
-  EXPECT_TRUE(planar_.IsAcute(way(kRight, kApex)));
-  EXPECT_TRUE(planar_.IsAcute(way(kRight, kTop)));
+  EXPECT_FALSE(planar_.HasSmallAngle(way(kApex, kRight)));
+  EXPECT_TRUE(planar_.HasSmallAngle(way(kRight, kApex)));
+  EXPECT_TRUE(planar_.HasSmallAngle(way(kRight, kTop)));
   EXPECT_NEAR(planar_.MinAngle(), std::numbers::pi / 4, 1e-15);
 }
 

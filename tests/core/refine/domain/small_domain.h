@@ -36,8 +36,9 @@ struct SmallDomain {
     EXPECT_TRUE(made.ok()) << made.status();
     EXPECT_EQ(made->domain.scale, 1);
     planar = std::move(made->planar);
-    structure.SetSegments(planar->Ends());
-    EXPECT_TRUE(structure.Initialize(made->cloud.grid, std::move(made->cloud.points), 100'000, 1, context).ok());
+    EXPECT_TRUE(
+        structure.Initialize(made->cloud.grid, std::move(made->cloud.points), 100'000, 1, context, planar->Ends())
+            .ok());
   }
 
   // The vertex at `p`.

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/refine/speculation/recorded_steps.h"
-#include "core/refine/speculation/star_writer.h"
+#include "core/refine/star_writer.h"
 
 namespace wellspace::core {
 namespace {
@@ -33,25 +33,25 @@ class BatchTest : public ::testing::Test {
     batch_.Prepare(kCount, 0);
     Record(0, kFirstSite, kFirstNew, VertexId{7});
     Record(1, kSecondSite, kSecondNew, VertexId{kCount});
-    batch_.numbers.assign(batch_.inserted.size(), kNoVertex);
-    batch_.is_speculated = true;
+    batch_.records.is_speculated = true;
+    batch_.BeginReplay({});
   }
 
   void Record(size_t at, const Point<2>& site, const Point<2>& p, VertexId neighbour) {
-    batch_.BeginRecord(at);
-    batch_.records[at].reach_sq = kReach * kReach;
-    batch_.notices.push_back({neighbour, 1, false});
-    batch_.steps.push_back({{}, 1, true});
+    batch_.records.Begin(at);
+    batch_.records.by_vertex[at].reach_sq = kReach * kReach;
+    batch_.records.notices.push_back({neighbour, 1, false});
+    batch_.records.steps.push_back({{}, 1, true});
     InsertionRequest<2> request;
     request.insertion.near = batch_.vertices[at];
     request.insertion.other = neighbour;
     request.point.position = p;
-    batch_.requests.push_back(request);
-    const VertexId x = batch_.inserted.Append(p);
-    batch_.steps.push_back({{}, 0, false});
-    batch_.star = {{x, VertexId{3}}, {VertexId{3}, VertexId{4}}};
-    batch_.AppendStar(at);
-    batch_.SetKnown(at, site);
+    batch_.records.requests.push_back(request);
+    const VertexId x = batch_.records.inserted.Append(p);
+    batch_.records.steps.push_back({{}, 0, false});
+    batch_.records.star = {{x, VertexId{3}}, {VertexId{3}, VertexId{4}}};
+    batch_.records.AppendStar(at);
+    batch_.records.SetKnown(at, site);
   }
 
   bool AreValid(bool first, bool second) const {
@@ -72,15 +72,15 @@ TEST_F(BatchTest, RecordsAreValidUntilAVertexConflicts) {
 }
 
 TEST_F(BatchTest, WithoutARecordNothingIsValid) {
-  batch_.records[1].is_known = false;
+  batch_.records.by_vertex[1].is_known = false;
   EXPECT_TRUE(AreValid(true, false));
-  EXPECT_THAT(batch_.ExpectedOf(1), IsEmpty());
-  batch_.is_speculated = false;
+  EXPECT_THAT(batch_.records.ExpectedOf(1), IsEmpty());
+  batch_.records.is_speculated = false;
   EXPECT_TRUE(AreValid(false, false));
 }
 
 TEST_F(BatchTest, WhatIsExpectedDoesNotConflictOnceItIsInserted) {
-  EXPECT_THAT(batch_.ExpectedOf(0), ElementsAre(kFirstNew));
+  EXPECT_THAT(batch_.records.ExpectedOf(0), ElementsAre(kFirstNew));
   const std::vector<Point<2>> inserted = {kFirstNew};
   batch_.NoteInserted(inserted, VertexId{140});
   EXPECT_THAT(batch_.conflicts, IsEmpty());
@@ -122,9 +122,9 @@ TEST_F(BatchTest, StepsAreReplayedWithTheNumbersOfTheStructure) {
 }
 
 TEST_F(BatchTest, WhatIsReassessedTakesThePlaceOfWhatWasFound) {
-  batch_.BeginRecord(0);
-  batch_.steps.push_back({.found = {.bad_node = 3}, .is_reassessed = true});
-  batch_.reassessed.push_back({.bad_node = -1, .next_edge_sq = 4});
+  batch_.records.Begin(0);
+  batch_.records.steps.push_back({.found = {.bad_node = 3}, .is_reassessed = true});
+  batch_.records.reassessed.push_back({.bad_node = -1, .next_edge_sq = 4});
   RecordedSteps<2> steps(batch_);
   const Assessment* const found = steps.Assess();
   ASSERT_NE(found, nullptr);

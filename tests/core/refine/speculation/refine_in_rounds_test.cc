@@ -207,7 +207,7 @@ TEST_P(RefineInRoundsTest, IsToldOfVerticesThatOthersAddWhileItIsStopped) {
     ASSERT_FALSE(HasFatalFailure());
     const VertexId last{refined.structure.vertex_count() - 1};
     const double angle = 2 * std::numbers::pi * random_.Unit();
-    const double radius = 1.5 * std::sqrt(refined.structure.ApproximateNearestNeighbor(last, workspace).distance_sq);
+    const double radius = 1.5 * std::sqrt(refined.structure.NearestNeighbor(last, workspace).distance_sq);
     Point<2> p = refined.structure.point(last);
     p = {p[0] + radius * std::cos(angle), p[1] + radius * std::sin(angle)};
     if (status.ok() || refined.structure.vertex_count() > 3 * kPoints || !test::UnitBox<2>().Contains(p)) {

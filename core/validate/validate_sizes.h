@@ -1,6 +1,6 @@
 // Which bounds on sizes a simplex is held to, and whether it keeps them.
-#ifndef WELLSPACE_CORE_SIMPLEX_VALIDATE_SIZES_H_
-#define WELLSPACE_CORE_SIMPLEX_VALIDATE_SIZES_H_
+#ifndef WELLSPACE_CORE_VALIDATE_VALIDATE_SIZES_H_
+#define WELLSPACE_CORE_VALIDATE_VALIDATE_SIZES_H_
 
 #include <span>
 #include <string>
@@ -38,4 +38,4 @@ std::string SizeExcess(const Simplex<D>& corners, const SizeBounds& bounds);
 
 }  // namespace wellspace::core
 
-#endif  // WELLSPACE_CORE_SIMPLEX_VALIDATE_SIZES_H_
+#endif  // WELLSPACE_CORE_VALIDATE_VALIDATE_SIZES_H_

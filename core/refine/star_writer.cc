@@ -1,4 +1,4 @@
-#include "core/refine/speculation/star_writer.h"
+#include "core/refine/star_writer.h"
 
 #include "core/base/dimensions.h"
 

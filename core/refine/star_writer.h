@@ -1,7 +1,7 @@
 // Writes the simplices of vertices that are done into lists, be it by another thread. Refinement::Finish hands the
 // stars over; Rounds says when another thread may write.
-#ifndef WELLSPACE_CORE_REFINE_SPECULATION_STAR_WRITER_H_
-#define WELLSPACE_CORE_REFINE_SPECULATION_STAR_WRITER_H_
+#ifndef WELLSPACE_CORE_REFINE_STAR_WRITER_H_
+#define WELLSPACE_CORE_REFINE_STAR_WRITER_H_
 
 #include <array>
 #include <cstddef>
@@ -112,4 +112,4 @@ class StarWriter {
 
 }  // namespace wellspace::core
 
-#endif  // WELLSPACE_CORE_REFINE_SPECULATION_STAR_WRITER_H_
+#endif  // WELLSPACE_CORE_REFINE_STAR_WRITER_H_

@@ -1,7 +1,7 @@
 // Where a vertex is in a domain of the plane: a point of a segment, or inside a face. Places are what PlanarDomain
 // keeps of vertices, what requests carry (InsertionRequest), and what points that are added get (PointPlacer).
-#ifndef WELLSPACE_CORE_REFINE_DOMAIN_PLACE_IN_DOMAIN_H_
-#define WELLSPACE_CORE_REFINE_DOMAIN_PLACE_IN_DOMAIN_H_
+#ifndef WELLSPACE_CORE_REFINE_PLACE_IN_DOMAIN_H_
+#define WELLSPACE_CORE_REFINE_PLACE_IN_DOMAIN_H_
 
 #include <cstdint>
 #include <limits>
@@ -36,4 +36,4 @@ struct PlaceInDomain {
 
 }  // namespace wellspace::core
 
-#endif  // WELLSPACE_CORE_REFINE_DOMAIN_PLACE_IN_DOMAIN_H_
+#endif  // WELLSPACE_CORE_REFINE_PLACE_IN_DOMAIN_H_

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/simplex/validate.h"
+#include "core/validate/validate.h"
 #include "tests/support/meshes.h"
 
 namespace wellspace::core {

@@ -1,4 +1,4 @@
-#include "core/simplex/validate.h"
+#include "core/validate/validate.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,13 +1,13 @@
 // Slow, independent checks that triangles are the mesh of a domain in the plane.
-#ifndef WELLSPACE_CORE_SIMPLEX_VALIDATE_DOMAIN_H_
-#define WELLSPACE_CORE_SIMPLEX_VALIDATE_DOMAIN_H_
+#ifndef WELLSPACE_CORE_VALIDATE_VALIDATE_DOMAIN_H_
+#define WELLSPACE_CORE_VALIDATE_VALIDATE_DOMAIN_H_
 
 #include <cstdint>
 #include <span>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "core/simplex/validate.h"
+#include "core/validate/validate.h"
 
 namespace wellspace::core {
 
@@ -47,4 +47,4 @@ absl::Status ValidateConformity(const MeshView& mesh, std::span<const uint32_t> 
 
 }  // namespace wellspace::core
 
-#endif  // WELLSPACE_CORE_SIMPLEX_VALIDATE_DOMAIN_H_
+#endif  // WELLSPACE_CORE_VALIDATE_VALIDATE_DOMAIN_H_

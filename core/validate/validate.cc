@@ -1,4 +1,4 @@
-#include "core/simplex/validate.h"
+#include "core/validate/validate.h"
 
 #include <algorithm>
 #include <bit>
@@ -16,9 +16,9 @@
 #include "core/base/status_macros.h"
 #include "core/geometry/box.h"
 #include "core/geometry/exact_measure.h"
-#include "core/simplex/merged_cloud.h"
 #include "core/simplex/quality.h"
-#include "core/simplex/validate_sizes.h"
+#include "core/validate/merged_cloud.h"
+#include "core/validate/validate_sizes.h"
 
 namespace wellspace::core {
 namespace {

@@ -3,8 +3,8 @@
 // ValidateOrientation, ValidateTopology and ValidateVolume together prove a decomposition of the box: the facets pair
 // up, so every point of the box off the facets is covered equally often; all simplices count positive; and the volumes
 // allow for once only.
-#ifndef WELLSPACE_CORE_SIMPLEX_VALIDATE_H_
-#define WELLSPACE_CORE_SIMPLEX_VALIDATE_H_
+#ifndef WELLSPACE_CORE_VALIDATE_VALIDATE_H_
+#define WELLSPACE_CORE_VALIDATE_VALIDATE_H_
 
 #include <array>
 #include <cstdint>
@@ -13,7 +13,7 @@
 
 #include "absl/status/status.h"
 #include "core/geometry/criterion.h"
-#include "core/simplex/validate_sizes.h"
+#include "core/validate/validate_sizes.h"
 
 namespace wellspace::core {
 
@@ -134,4 +134,4 @@ absl::Status ValidateMesh(const MeshView& mesh, const ValidationOptions& options
 
 }  // namespace wellspace::core
 
-#endif  // WELLSPACE_CORE_SIMPLEX_VALIDATE_H_
+#endif  // WELLSPACE_CORE_VALIDATE_VALIDATE_H_

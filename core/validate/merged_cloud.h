@@ -1,6 +1,6 @@
 // Whether a mesh has the points of a cloud of which near ones were merged: what ValidateCloud asks then.
-#ifndef WELLSPACE_CORE_SIMPLEX_MERGED_CLOUD_H_
-#define WELLSPACE_CORE_SIMPLEX_MERGED_CLOUD_H_
+#ifndef WELLSPACE_CORE_VALIDATE_MERGED_CLOUD_H_
+#define WELLSPACE_CORE_VALIDATE_MERGED_CLOUD_H_
 
 #include <algorithm>
 #include <array>
@@ -118,4 +118,4 @@ std::optional<size_t> FirstMissingOfMerged(std::span<const double> cloud, std::s
 
 }  // namespace wellspace::core
 
-#endif  // WELLSPACE_CORE_SIMPLEX_MERGED_CLOUD_H_
+#endif  // WELLSPACE_CORE_VALIDATE_MERGED_CLOUD_H_

@@ -1,6 +1,6 @@
 // A slow, independent check that tagged facets are the boundary of a mesh of a box.
-#ifndef WELLSPACE_CORE_SIMPLEX_VALIDATE_BOUNDARY_H_
-#define WELLSPACE_CORE_SIMPLEX_VALIDATE_BOUNDARY_H_
+#ifndef WELLSPACE_CORE_VALIDATE_VALIDATE_BOUNDARY_H_
+#define WELLSPACE_CORE_VALIDATE_VALIDATE_BOUNDARY_H_
 
 #include <cstdint>
 #include <map>
@@ -8,7 +8,7 @@
 #include <string>
 
 #include "absl/status/status.h"
-#include "core/simplex/validate.h"
+#include "core/validate/validate.h"
 
 namespace wellspace::core {
 
@@ -32,4 +32,4 @@ absl::Status ValidateBoundary(const MeshView& mesh, const BoundaryView& boundary
 
 }  // namespace wellspace::core
 
-#endif  // WELLSPACE_CORE_SIMPLEX_VALIDATE_BOUNDARY_H_
+#endif  // WELLSPACE_CORE_VALIDATE_VALIDATE_BOUNDARY_H_

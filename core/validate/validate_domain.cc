@@ -1,4 +1,4 @@
-#include "core/simplex/validate_domain.h"
+#include "core/validate/validate_domain.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "core/simplex/validate_sizes.h"
+#include "core/validate/validate_sizes.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "core/simplex/validate_boundary.h"
+#include "core/validate/validate_boundary.h"
 
 #include <algorithm>
 #include <array>

@@ -1,7 +1,7 @@
-// What cells in the plane and in space are cut by, eight vertices at a time. For gathered_vertices.cc, polygon.cc,
-// polyhedron.cc and polyhedron_nodes.cc alone, into which all is compiled.
-#ifndef WELLSPACE_CORE_CELL_NEAR_VERTICES_H_
-#define WELLSPACE_CORE_CELL_NEAR_VERTICES_H_
+// What cells in the plane and in space are cut by, eight vertices at a time. For gathered_vertices.cc, polygon.cc and
+// polyhedron.cc alone, into which all is compiled.
+#ifndef WELLSPACE_CORE_CELL_FLOAT_CANDIDATES_H_
+#define WELLSPACE_CORE_CELL_FLOAT_CANDIDATES_H_
 
 #include <algorithm>
 #include <bit>
@@ -16,73 +16,12 @@
 #include "core/base/simd/lane_bits.h"
 #include "core/base/simd/lanes.h"
 #include "core/cell/cell_parts.h"
-#include "core/cell/float_cell.h"
+#include "core/cell/float_bisector.h"
+#include "core/cell/float_errors.h"
 #include "core/cell/gathered_vertices.h"
 #include "core/geometry/point.h"
 
 namespace wellspace::core {
-
-// In units of u = 2^-24: a node x is wrong by at most kNodeError |x|. In the plane that is its rounding, and half of it
-// from where it was computed in doubles; in space it may lie at the end of an edge as short.
-template <int D>
-inline constexpr float kNodeError = D == 2 ? 1.5f : 16;
-// With R at least the distance of the nodes, an excess x . w - |w|^2 / 2 is wrong by at most u ((kNodeError + D + 2) R
-// |w| + (2 D + 2) |w|^2 / 2): w is by u |w|; the products by u |x| |w| together, the D sums by D u (|x| |w| + |w|^2 /
-// 2), and |w|^2 / 2 by (D + 2) u of itself. A vertex that may cut has
-// |w| <= 2 R, so that all is less than 12 u R |w| in 2-D, 29 u R |w| in 3-D; one u more for what is taken off |w|^2 /
-// 2.
-template <int D>
-inline constexpr float kExcessError = D == 2 ? 0x1p-20f : 0x1p-19f;
-// What squares of distances can lose below the least float, and more: nothing that a cell is made of is as small.
-inline constexpr float kUnderflow = 0x1p-80f;
-// A distance differs by less than this share of itself from that of the exact node, a square by less than twice as
-// much.
-template <int D>
-inline constexpr float kDistanceError = D == 2 ? 0x1p-21f : 0x1p-19f;
-// By how much, in shares of |x|^2, the power p . (p - 2 x) of a point p within 2 |x| may be wrong: (44 + 4 kNodeError)
-// u. Farther out it is positive.
-template <int D>
-inline constexpr float kPowerError = D == 2 ? 0x1p-18f : 0x1p-17f;
-// A ratio is surely kept, whatever the rounding and whatever that of placed nodes (kPlaced), if it is by this share.
-inline constexpr double kSurely = 0x1p-17;
-inline float SurelyKeptRatioSq(double ratio) {
-  const double surely = ratio * (1 - kSurely);
-  return static_cast<float>(surely * surely);
-}
-
-// The bisector to a vertex, in the units of the nodes.
-template <int D>
-struct FloatBisector {
-  float w[D];    // the vector to the vertex
-  float offset;  // |w|^2 / 2
-  float low;     // the offset, less by what an excess over it may be wrong by at most
-
-  WELLSPACE_INLINE static FloatBisector Of(const Point<D>& normal, double scale, float most_radius) {
-    FloatBisector bisector;
-    float length_sq = 0;
-    for (int axis = 0; axis < D; ++axis) {
-      bisector.w[axis] = static_cast<float>(normal[axis] * scale);
-      length_sq += bisector.w[axis] * bisector.w[axis];
-    }
-    bisector.offset = 0.5f * length_sq;
-    bisector.low = bisector.offset - (kExcessError<D> * most_radius * __builtin_sqrtf(length_sq) + kUnderflow);
-    return bisector;
-  }
-};
-
-// The square of what the excess of the node x, as computed in doubles, over the bisector to a vertex at that squared
-// distance may be wrong by.
-template <int D>
-double NodeDoubtSq(const Point<D>& x, double length_sq) {
-  constexpr double kShare = 1.01 * 0x1p-24 * kNodeError<D>;
-  return kShare * kShare * NormSq<D>(x) * length_sq + double{kUnderflow} * kUnderflow;
-}
-
-// Half the square of the distance from its site within which a vertex may cut a cell of that radius, in floats.
-template <int D>
-WELLSPACE_INLINE float MostOffset(float most_radius) {
-  return 2 * (1 + 8 * kDistanceError<D>)*most_radius * most_radius;
-}
 
 // Vectors from `site` to eight positions, times `scale`.
 WELLSPACE_INLINE void VectorsTo(const Point<2>* positions, const Point<2>& site, double scale, Floats* w) {
@@ -275,7 +214,7 @@ WELLSPACE_INLINE bool AreReached(std::span<const Group> groups, float most_radiu
 
 // The vertices that may cut a cell, in columns; whole vectors are written, the last one perhaps from the last one on.
 template <int D>
-struct alignas(sizeof(Floats)) NearVertices {
+struct alignas(sizeof(Floats)) FloatCandidates {
   static constexpr size_t kMost = kMostCutTogether;
   static constexpr size_t kCapacity = kMost + kFloatLanes;
 
@@ -390,4 +329,4 @@ struct alignas(sizeof(Floats)) NearVertices {
 
 }  // namespace wellspace::core
 
-#endif  // WELLSPACE_CORE_CELL_NEAR_VERTICES_H_
+#endif  // WELLSPACE_CORE_CELL_FLOAT_CANDIDATES_H_

@@ -1,0 +1,55 @@
+// By how much what is computed of a cell in floats may be wrong, in the plane and in space: every bound, and its
+// derivation.
+#ifndef WELLSPACE_CORE_CELL_FLOAT_ERRORS_H_
+#define WELLSPACE_CORE_CELL_FLOAT_ERRORS_H_
+
+#include "core/base/simd/lanes.h"
+#include "core/geometry/point.h"
+
+namespace wellspace::core {
+
+// In units of u = 2^-24: a node x is wrong by at most kNodeError |x|. In the plane that is its rounding, and half of it
+// from where it was computed in doubles; in space it may lie at the end of an edge as short.
+template <int D>
+inline constexpr float kNodeError = D == 2 ? 1.5f : 16;
+// With R at least the distance of the nodes, an excess x . w - |w|^2 / 2 is wrong by at most u ((kNodeError + D + 2) R
+// |w| + (2 D + 2) |w|^2 / 2): w is by u |w|; the products by u |x| |w| together, the D sums by D u (|x| |w| + |w|^2 /
+// 2), and |w|^2 / 2 by (D + 2) u of itself. A vertex that may cut has
+// |w| <= 2 R, so that all is less than 12 u R |w| in 2-D, 29 u R |w| in 3-D; one u more for what is taken off |w|^2 /
+// 2.
+template <int D>
+inline constexpr float kExcessError = D == 2 ? 0x1p-20f : 0x1p-19f;
+// What squares of distances can lose below the least float, and more: nothing that a cell is made of is as small.
+inline constexpr float kUnderflow = 0x1p-80f;
+// A distance differs by less than this share of itself from that of the exact node, a square by less than twice as
+// much.
+template <int D>
+inline constexpr float kDistanceError = D == 2 ? 0x1p-21f : 0x1p-19f;
+// By how much, in shares of |x|^2, the power p . (p - 2 x) of a point p within 2 |x| may be wrong: (44 + 4 kNodeError)
+// u. Farther out it is positive.
+template <int D>
+inline constexpr float kPowerError = D == 2 ? 0x1p-18f : 0x1p-17f;
+// A ratio is surely kept, whatever the rounding and whatever that of placed nodes (kPlaced), if it is by this share.
+inline constexpr double kSurely = 0x1p-17;
+inline float SurelyKeptRatioSq(double ratio) {
+  const double surely = ratio * (1 - kSurely);
+  return static_cast<float>(surely * surely);
+}
+
+// The square of what the excess of the node x, as computed in doubles, over the bisector to a vertex at that squared
+// distance may be wrong by.
+template <int D>
+double NodeDoubtSq(const Point<D>& x, double length_sq) {
+  constexpr double kShare = 1.01 * 0x1p-24 * kNodeError<D>;
+  return kShare * kShare * NormSq<D>(x) * length_sq + double{kUnderflow} * kUnderflow;
+}
+
+// Half the square of the distance from its site within which a vertex may cut a cell of that radius, in floats.
+template <int D>
+WELLSPACE_INLINE float MostOffset(float most_radius) {
+  return 2 * (1 + 8 * kDistanceError<D>)*most_radius * most_radius;
+}
+
+}  // namespace wellspace::core
+
+#endif  // WELLSPACE_CORE_CELL_FLOAT_ERRORS_H_
