@@ -114,6 +114,11 @@ absl::Status Client::VoronoiCells(const std::string& session, std::span<const ui
   return connection_->VoronoiCells(session, vertices, on_cells, call);
 }
 
+absl::StatusOr<Located> Client::Locate(const std::string& session, std::span<const double> points,
+                                       const LocateOptions& options, const CallOptions& call) {
+  return connection_->Locate(session, points, options, call);
+}
+
 absl::StatusOr<AddedVertices> Client::AddVertices(const std::string& session, std::span<const double> points,
                                                   std::span<const uint32_t> near, const CallOptions& call) {
   return connection_->AddVertices(session, points, near, call);

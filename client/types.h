@@ -330,6 +330,21 @@ struct AddedSegments {
   uint64_t revision = 0;
 };
 
+// Where n points lie in a mesh; see the proto's LocateResponse.
+struct Located {
+  std::vector<uint32_t> simplices;  // n; kNoSimplex for a point in none
+  std::vector<uint32_t> vertices;   // n x (dimension + 1), row-major
+  std::vector<double> coordinates;  // n x (dimension + 1), row-major: barycentric
+  uint64_t revision = 0;            // of the mesh
+};
+inline constexpr uint32_t kNoSimplex = 0xffff'ffff;
+
+// How Locate does it.
+struct LocateOptions {
+  uint64_t revision = 0;       // of the mesh; 0: the last one
+  bool allow_outside = false;  // points in no simplex are no error
+};
+
 struct AddedVertices {
   std::vector<uint32_t> vertices;  // that each point became, or was already
   uint64_t revision = 0;

@@ -69,6 +69,8 @@ class GrpcConnection final : public Connection {
                                    const OnCells& on_cells, const CallOptions& call) override;
   absl::Status VoronoiCells(const std::string& session, std::span<const uint32_t> vertices, const OnCells& on_cells,
                             const CallOptions& call) override;
+  absl::StatusOr<Located> Locate(const std::string& session, std::span<const double> points,
+                                 const LocateOptions& options, const CallOptions& call) override;
   absl::StatusOr<AddedVertices> AddVertices(const std::string& session, std::span<const double> points,
                                             std::span<const uint32_t> near, const CallOptions& call) override;
 

@@ -13,6 +13,9 @@ namespace {
 // Of one request, which then has half a MiB.
 constexpr size_t kVerticesOfARequest = 1 << 17;
 
+// Of one request to locate them.
+constexpr size_t kPointsOfARequest = 1 << 14;
+
 // Makes as many calls as the vertices take, and goes on after the last answered vertex when a connection breaks off.
 // Answers of a call about all vertices are not counted beforehand: it is repeated only as long as nothing has come.
 //
@@ -115,6 +118,42 @@ absl::Status GrpcConnection::VoronoiCells(const std::string& session, std::span<
         return queries_->VoronoiCells(context, part);
       },
       HandOn<v1::VoronoiCellsResponse>(on_cells));
+}
+
+absl::StatusOr<Located> GrpcConnection::Locate(const std::string& session, std::span<const double> points,
+                                               const LocateOptions& options, const CallOptions& call) {
+  WELLSPACE_ASSIGN_OR_RETURN(const Session found, GetSession(session, call));
+  const size_t dimension = std::max(1, found.parameters.dimension);
+  v1::LocateRequest request;
+  request.set_name(session);
+  request.set_revision(options.revision);
+  request.set_allow_outside(options.allow_outside);
+  Located located;
+  size_t done = 0;  // coordinates
+  do {
+    const std::span<const double> part =
+        points.subspan(done, std::min(kPointsOfARequest * dimension, points.size() - done));
+    request.mutable_points()->Assign(part.begin(), part.end());
+    request.set_point_offset(done / dimension);
+    v1::LocateResponse response;
+    WELLSPACE_RETURN_IF_ERROR(Call(*queries_, &v1::QueryService::Stub::Locate, request, call, &response));
+    const size_t count = part.size() / dimension;
+    const size_t corners = count * (dimension + 1);
+    if (static_cast<size_t>(response.simplices_size()) != count ||
+        static_cast<size_t>(response.vertices_size()) != corners ||
+        static_cast<size_t>(response.coordinates_size()) != corners) {
+      return absl::DataLossError(absl::StrCat("the server's answer is damaged: ", response.simplices_size(),
+                                              " simplices, ", response.vertices_size(), " vertices and ",
+                                              response.coordinates_size(), " coordinates for ", count, " points"));
+    }
+    located.simplices.insert(located.simplices.end(), response.simplices().begin(), response.simplices().end());
+    located.vertices.insert(located.vertices.end(), response.vertices().begin(), response.vertices().end());
+    located.coordinates.insert(located.coordinates.end(), response.coordinates().begin(), response.coordinates().end());
+    located.revision = response.revision();
+    request.set_revision(response.revision());  // all parts are of one mesh
+    done += part.size();
+  } while (done < points.size());
+  return located;
 }
 
 absl::StatusOr<AddedVertices> GrpcConnection::AddVertices(const std::string& session, std::span<const double> points,

@@ -13,6 +13,7 @@
 #include "core/base/status_macros.h"
 #include "core/simplex/quality.h"
 #include "core/sliver/tetrahedron.h"
+#include "core/validate/validate.h"
 
 namespace wellspace::core {
 namespace {

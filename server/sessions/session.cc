@@ -250,7 +250,7 @@ absl::Status Session::Query(uint64_t* version, const std::function<absl::Status(
 void Session::NoteIdle() const {
   {
     std::lock_guard lock(mutex_);
-    if (!log_.is_durable() || work_.mesher == nullptr || busy_ != Busy::kNo || structure_uses_ > 0) {
+    if (!log_.is_durable() || SpareBytes() == 0) {
       return;
     }
   }
@@ -259,27 +259,40 @@ void Session::NoteIdle() const {
 
 std::optional<Session::Spare> Session::GetSpare() const {
   std::lock_guard lock(mutex_);
-  if (!log_.is_durable() || busy_ != Busy::kNo || structure_uses_ > 0 || work_.mesher == nullptr ||
-      work_.memory.bytes() == 0) {
+  const uint64_t bytes = log_.is_durable() ? SpareBytes() : 0;
+  if (bytes == 0) {
     return std::nullopt;
   }
-  return Spare{.bytes = work_.memory.bytes(), .last_use = lease_.ExpiresAt(clock_.since_boot()) - lease_.ttl()};
+  return Spare{.bytes = bytes, .last_use = lease_.ExpiresAt(clock_.since_boot()) - lease_.ttl()};
+}
+
+uint64_t Session::SpareBytes() const {
+  if (busy_ != Busy::kNo || structure_uses_ > 0) {
+    return 0;
+  }
+  // A locator that is looked into now is held by others, too.
+  const bool has_locator = located_mesh_ != nullptr && located_mesh_.use_count() == 1;
+  return (work_.mesher == nullptr ? 0 : work_.memory.bytes()) + (has_locator ? located_mesh_->memory.bytes() : 0);
 }
 
 uint64_t Session::GiveUpMesher() {
   std::unique_ptr<core::Mesher> mesher;
+  std::shared_ptr<const LocatedMesh> located;
   MemoryReservation memory;
+  uint64_t bytes = 0;
   {
     std::lock_guard lock(mutex_);
     std::unique_lock queries(queries_mutex_, std::try_to_lock);  // none can begin without mutex_
-    if (!log_.is_durable() || busy_ != Busy::kNo || structure_uses_ > 0 || work_.mesher == nullptr ||
-        !queries.owns_lock()) {
+    bytes = log_.is_durable() && queries.owns_lock() ? SpareBytes() : 0;
+    if (bytes == 0) {
       return 0;
+    }
+    if (located_mesh_ != nullptr && located_mesh_.use_count() == 1) {
+      located = std::move(located_mesh_);
     }
     mesher = std::move(work_.mesher);
     memory = std::move(work_.memory);
   }
-  const uint64_t bytes = memory.bytes();
   mesher = nullptr;  // before others may have its memory
   memory.Release();
   return bytes;

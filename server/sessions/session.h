@@ -18,6 +18,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
+#include "core/mesh_locator.h"
 #include "core/mesher.h"
 #include "server/base/clock.h"
 #include "server/base/mesh_functions.h"
@@ -60,6 +61,13 @@ struct SessionWork {
   uint64_t meshed_points = 0;            // how many of the session's points `mesher` has, or would have
   std::shared_ptr<MeshSnapshot> mesh;    // the last mesh; null before the first
   MemoryReservation memory;              // of `mesher`
+};
+
+// A mesh of a session in which points can be located.
+struct LocatedMesh {
+  std::unique_ptr<const core::MeshLocator> locator;
+  uint64_t revision = 0;
+  MemoryReservation memory;
 };
 
 // How the work of an operation has ended.
@@ -205,7 +213,7 @@ class Session {
   };
   // Nothing of a session that is busy, or whose structure is in use, or which ends with the process.
   std::optional<Spare> GetSpare() const;
-  // Gives the mesher up for other work; it comes back as PrepareStructure and operations say. Returns how much memory
+  // Gives the mesher up for other work, and what points are located by; it comes back as PrepareStructure and operations say. Returns how much memory
   // that has freed: 0, and nothing is done, where there is nothing to spare.
   //
   // Complexity: that of freeing the mesher, on this thread, without a lock.
@@ -220,6 +228,14 @@ class Session {
   //             OUT_OF_MEMORY, CANCELLED. The caller may try again.
   absl::Status PrepareStructure(uint64_t expected_revision, const MesherFactory& create_mesher, Job& job,
                                 bool* is_at_work = nullptr);
+
+  // The session's last mesh, for points to be located in. The first time `job` makes the locator, on this thread, a
+  // worker's; others that ask meanwhile wait for it. `revision` 0: any.
+  //
+  // Errors:     MESH_NOT_READY, REVISION_MISMATCH, SESSION_NOT_FOUND; of making it: MEMORY_LIMIT, CANCELLED, DATA_LOSS.
+  absl::StatusOr<std::shared_ptr<const LocatedMesh>> PrepareLocator(uint64_t revision, Job& job);
+  // Whether that is there, and need not be made.
+  bool HasLocator() const;
 
   // How much there is to work on now.
   struct Size {
@@ -329,6 +345,8 @@ class Session {
   std::vector<SizesInUse> UnusedSizes(const SessionSteps& steps, uint64_t current) const;
   // Drops points that are not committed.
   void DropUncommitted();
+  // What GiveUpMesher would free, of a durable session.
+  uint64_t SpareBytes() const;
   uint64_t PointCount() const { return points_->coordinate_count() / dimension_; }
   // Of the points that are appended and not committed.
   bool HasUncommitted() const { return PointCount() > committed_points_; }
@@ -394,6 +412,7 @@ class Session {
 
   mutable std::mutex change_mutex_;          // before mutex_; held over a change, and until the log has it
   mutable std::shared_mutex queries_mutex_;  // after mutex_; held shared by queries
+  std::mutex locator_mutex_;                 // before mutex_; held while a locator is made
   mutable std::mutex mutex_;
   // Guarded by mutex_.
   core::MeshParameters parameters_;  // of the last refinement that succeeded; before it, those of the creation
@@ -416,7 +435,8 @@ class Session {
   SessionWork work_;                // its mesher is away while an operation is under way; see invariant (2)
   SessionSteps steps_;              // see invariant (2)
   uint64_t structure_version_ = 0;  // of what queries see; 0: nothing yet
-  int structure_uses_ = 0;          // while there are any, the mesher is not given up for other work
+  std::shared_ptr<const LocatedMesh> located_mesh_;  // null, or of this mesh or one before
+  int structure_uses_ = 0;                           // while there are any, the mesher is not given up for other work
   uint64_t next_operation_ = 1;
   std::deque<std::shared_ptr<Operation>> operations_;  // ascending by number
 };

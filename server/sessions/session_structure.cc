@@ -69,6 +69,49 @@ absl::Status Session::Rebuild(const MesherFactory& create_mesher, Job& job) {
   return absl::OkStatus();
 }
 
+bool Session::HasLocator() const {
+  std::lock_guard lock(mutex_);
+  return located_mesh_ != nullptr && work_.mesh != nullptr && located_mesh_->revision == work_.mesh->revision();
+}
+
+absl::StatusOr<std::shared_ptr<const LocatedMesh>> Session::PrepareLocator(uint64_t revision, Job& job) {
+  std::lock_guard locator_lock(locator_mutex_);
+  std::shared_ptr<const MeshSnapshot> mesh;
+  std::shared_ptr<const LocatedMesh> before;  // is freed without the lock
+  {
+    std::lock_guard lock(mutex_);
+    WELLSPACE_RETURN_IF_ERROR(CheckOpen());
+    if (work_.mesh == nullptr) {
+      return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
+                       absl::StrCat(name_, " has no mesh yet; start a refinement first"));
+    }
+    mesh = work_.mesh;
+    if (revision != 0 && revision != mesh->revision()) {
+      return MakeError(v1::ERROR_REASON_REVISION_MISMATCH, absl::StrCat("revision is ", revision, ", but the mesh of ",
+                                                                        name_, " is of revision ", mesh->revision()));
+    }
+    if (located_mesh_ != nullptr && located_mesh_->revision == mesh->revision()) {
+      return located_mesh_;
+    }
+    before = std::exchange(located_mesh_, nullptr);
+  }
+  before = nullptr;
+  const uint64_t bytes = mesh->loaded_bytes() + core::MeshLocator::BytesFor(dimension_, mesh->figures().simplices);
+  auto located = std::make_shared<LocatedMesh>();
+  const absl::Status made = job.RunApart([&](core::RunContext& context) -> absl::Status {
+    WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(bytes));
+    WELLSPACE_ASSIGN_OR_RETURN(core::Mesh loaded, mesh->Load(context));
+    WELLSPACE_ASSIGN_OR_RETURN(located->locator, core::MeshLocator::Create(std::move(loaded), context));
+    return absl::OkStatus();
+  });
+  located->revision = mesh->revision();
+  located->memory = job.TakeMemory(bytes);
+  located->memory.MakeLasting(MesherLasts());
+  std::lock_guard lock(mutex_);
+  located_mesh_ = located;
+  return located;
+}
+
 void Session::WaitForQueries() { std::unique_lock wait(queries_mutex_); }
 
 absl::Status Session::BeginAddition(std::span<const double> points, std::span<const uint32_t> near,

@@ -60,6 +60,8 @@ class MockConnection : public Connection {
               (const std::string&, std::span<const uint32_t>, double, const OnCells&, const CallOptions&), (override));
   MOCK_METHOD(absl::Status, VoronoiCells,
               (const std::string&, std::span<const uint32_t>, const OnCells&, const CallOptions&), (override));
+  MOCK_METHOD(absl::StatusOr<Located>, Locate,
+              (const std::string&, std::span<const double>, const LocateOptions&, const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<AddedVertices>, AddVertices,
               (const std::string&, std::span<const double>, std::span<const uint32_t>, const CallOptions&), (override));
 };
@@ -151,10 +153,12 @@ TEST(Client, PassesQueriesToItsConnection) {
   EXPECT_CALL(*connection, ApproximateNearestNeighbors("s", SizeIs(3), _, _)).WillOnce(Return(E("nearest")));
   EXPECT_CALL(*connection, ClippedVoronoiCells("s", SizeIs(3), 4, _, _)).WillOnce(Return(E("clipped")));
   EXPECT_CALL(*connection, VoronoiCells("s", SizeIs(3), _, _)).WillOnce(Return(E("cells")));
+  EXPECT_CALL(*connection, Locate("s", SizeIs(2), Field(&LocateOptions::revision, 5), _)).WillOnce(Return(E("locate")));
   EXPECT_CALL(*connection, AddVertices("s", SizeIs(2), SizeIs(3), _)).WillOnce(Return(E("add")));
   EXPECT_EQ(client.ApproximateNearestNeighbors("s", vertices, nullptr), E("nearest"));
   EXPECT_EQ(client.ClippedVoronoiCells("s", vertices, 4, nullptr), E("clipped"));
   EXPECT_EQ(client.VoronoiCells("s", vertices, nullptr), E("cells"));
+  EXPECT_EQ(client.Locate("s", points, {.revision = 5}).status(), E("locate"));
   EXPECT_EQ(client.AddVertices("s", points, vertices).status(), E("add"));
 }
 

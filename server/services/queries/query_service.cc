@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "server/services/queries/add_vertices_call.h"
+#include "server/services/queries/locate_call.h"
 #include "server/services/queries/query_call.h"
 #include "server/services/queries/vertex_query.h"
 
@@ -21,6 +22,11 @@ grpc::ServerWriteReactor<grpc::ByteBuffer>* QueryService::ClippedVoronoiCells(gr
 grpc::ServerWriteReactor<grpc::ByteBuffer>* QueryService::VoronoiCells(grpc::CallbackServerContext* context,
                                                                        const grpc::ByteBuffer* request) {
   return QueryCall::Begin(std::make_shared<QueryCall>(environment_, context, &ParseCells, *request));
+}
+
+grpc::ServerUnaryReactor* QueryService::Locate(grpc::CallbackServerContext* context, const v1::LocateRequest* request,
+                                               v1::LocateResponse* response) {
+  return LocateCall::Begin(std::make_shared<LocateCall>(environment_, context, request, response));
 }
 
 grpc::ServerUnaryReactor* QueryService::AddVertices(grpc::CallbackServerContext* context,

@@ -10,7 +10,8 @@ namespace wellspace::server {
 // Queries are read and written as bytes, which the workers make.
 using QueryServiceBase = v1::QueryService::WithRawCallbackMethod_ApproximateNearestNeighbors<
     v1::QueryService::WithRawCallbackMethod_ClippedVoronoiCells<v1::QueryService::WithRawCallbackMethod_VoronoiCells<
-        v1::QueryService::WithCallbackMethod_AddVertices<v1::QueryService::Service>>>>;
+        v1::QueryService::WithCallbackMethod_Locate<
+            v1::QueryService::WithCallbackMethod_AddVertices<v1::QueryService::Service>>>>>;
 
 // Thread safety: thread-safe.
 class QueryService final : public QueryServiceBase {
@@ -24,6 +25,8 @@ class QueryService final : public QueryServiceBase {
                                                                   const grpc::ByteBuffer* request) override;
   grpc::ServerWriteReactor<grpc::ByteBuffer>* VoronoiCells(grpc::CallbackServerContext* context,
                                                            const grpc::ByteBuffer* request) override;
+  grpc::ServerUnaryReactor* Locate(grpc::CallbackServerContext* context, const v1::LocateRequest* request,
+                                   v1::LocateResponse* response) override;
   grpc::ServerUnaryReactor* AddVertices(grpc::CallbackServerContext* context, const v1::AddVerticesRequest* request,
                                         v1::AddVerticesResponse* response) override;
 

@@ -14,6 +14,7 @@ from ._cells import Cell, Cells
 from ._channel import Credentials
 from ._client import Client, MeshArguments, Server, client_of
 from ._domain import DomainArguments, RegionSeed
+from ._locate import Located
 from ._mesh import CORNER, REPAIR, STEINER, Mesh
 from ._operations import Operation
 from ._parameters import Parameters, takes
@@ -130,6 +131,7 @@ __all__ = [
     "InvalidArgumentError",
     "LimitError",
     "LocalServer",
+    "Located",
     "Mesh",
     "MissingPackageError",
     "NotFoundError",

@@ -14,6 +14,7 @@ from ._calls import CallOptions
 from ._cells import CellReader, Cells
 from ._client import Client, Server, client_of
 from ._domain import DomainArguments, make_domain
+from ._locate import Located, locate
 from ._mesh import Mesh, signed
 from ._operations import Operation, operation_of, watch
 from ._parameters import Parameters, fill, naming, split, takes
@@ -387,6 +388,30 @@ class Session:
         fields = [f for f in _wire.fields(memoryview(answer)) if f.number == 1]
         vertices = np.concatenate([np.empty(0, np.uint32), *(_wire.packed(field, "<u4") for field in fields)])
         return signed(vertices, int(vertices.max(initial=0)) + 1)
+
+    def locate(
+        self,
+        points: Any,
+        *,
+        allow_outside: bool = False,
+        revision: int = 0,
+        timeout: float | None = None,
+        cancel: CancelToken | None = None,
+    ) -> Located:
+        """The simplex of the session's mesh that each of `points`, (n, d), lies in, and its place there.
+
+        ``session.locate(points).interpolate(values)`` carries a function from the vertices of the mesh to the points.
+
+        Parameters
+        ----------
+        allow_outside : bool
+            Points in no simplex, outside the domain or in a hole, are no error.
+        revision : int
+            `Mesh.revision` that the mesh must have; should it be another, `ConflictError` is raised. Default: any.
+        """
+        cloud = coordinates(points, "points", self.dimension)
+        options = CallOptions(timeout=timeout, cancel=cancel)
+        return locate(self._calls, self.name, cloud, revision, allow_outside, options)
 
     def nearest(
         self, vertices: Any = None, *, timeout: float | None = None, cancel: CancelToken | None = None

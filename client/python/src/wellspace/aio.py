@@ -24,6 +24,7 @@ import wellspace
 from . import _client, _mesh, _operations, _session_info, _sessions
 from ._cells import Cells
 from ._domain import DomainArguments
+from ._locate import Located
 from ._parameters import Parameters, takes
 from ._progress import Progress, ProgressOption
 from ._retry import CancelToken
@@ -173,6 +174,9 @@ class Session:
 
     async def add_segments(self, **options: Any) -> None:
         await _run(self._session.add_segments, **options)
+
+    async def locate(self, points: Any, **options: Any) -> Located:
+        return await _run(self._session.locate, points, **options)
 
     async def sizes(self, values: Any, points: Any = None, **options: Any) -> int:
         return await _run(self._session.sizes, values, points, **options)
