@@ -14,6 +14,7 @@ from ._cells import Cell, Cells
 from ._channel import Credentials
 from ._client import Client, MeshArguments, Server, client_of
 from ._domain import DomainArguments, RegionSeed
+from ._dual import DualCells
 from ._locate import Located
 from ._mesh import CORNER, REPAIR, STEINER, Mesh
 from ._operations import Operation
@@ -126,6 +127,7 @@ __all__ = [
     "CredentialsError",
     "DamagedAnswerError",
     "DeadlineError",
+    "DualCells",
     "Error",
     "Estimate",
     "InvalidArgumentError",

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from . import _files
+from . import _dual, _files
+from ._dual import DualCells
 from ._receiver import MeshReceiver
 from .errors import InvalidArgumentError
 from .statistics import Statistics, statistics_of
@@ -112,6 +113,13 @@ class Mesh:
                 return self.simplices[self.regions == number]
         names = ", ".join(map(repr, self.region_names.values())) or "none: the mesh was asked for without them"
         raise InvalidArgumentError(f"no region is called {name!r}; there are {names}", field="name")
+
+    def dual_cells(self) -> DualCells:
+        """The Voronoi cell of each vertex within the domain, as finite volumes need them. For 2-D and 3-D.
+
+        Costs a few passes over the simplices. The mesh has to be Delaunay, as all are but those of `pump_weights`.
+        """
+        return _dual.dual_cells(self)
 
     def save(self, path: str | os.PathLike[str], **options: Any) -> None:
         """Writes the mesh to a file; the extension says in which format.
