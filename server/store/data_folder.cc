@@ -154,11 +154,19 @@ absl::StatusOr<Garbage> DataFolder::RemoveGarbage(
     candidates.erase(paths_.points(session.name()));  // points may be on their way
     candidates.erase(paths_.mesh(session.name(), session.mesh().revision()));
   }
-  Garbage sweep;
+  std::set<std::string> obsolete;
   for (const auto& [path, use] : candidates) {
     use->MakeObsolete();
-    sweep.removed.push_back(path);
+    obsolete.insert(path);
   }
+  candidates.clear();
+  // A back-up keeps them, or another has begun to write in their place.
+  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<std::string> left, files_.List(paths_.files()));
+  for (const std::string& name : left) {
+    obsolete.erase(absl::StrCat(paths_.files(), "/", name));
+  }
+  Garbage sweep;
+  sweep.removed.assign(obsolete.begin(), obsolete.end());
   WELLSPACE_ASSIGN_OR_RETURN(sweep.unknown, FindUnknown(paths_, files_));
   return sweep;
 }

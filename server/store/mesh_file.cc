@@ -11,6 +11,7 @@
 #include "grpcpp/support/slice.h"
 #include "proto/checksum.h"
 #include "server/store/mesh_file_format.h"
+#include "server/wire/convert.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -153,11 +154,7 @@ absl::StatusOr<v1::MeshMetadata> MeshFile::Metadata(bool with_boundary) const {
   v1::MeshMetadata metadata = whole->metadata();
   metadata.set_chunk_count(CountChunks(*whole, with_boundary));
   if (!with_boundary) {
-    metadata.clear_boundary();
-    metadata.clear_facet_count();
-    metadata.clear_regions();
-    metadata.clear_has_simplex_regions();
-    metadata.clear_has_vertex_marks();
+    ClearBoundary(metadata);
   }
   return metadata;
 }

@@ -158,13 +158,17 @@ absl::Status PointFile::ReadBlocks(const File& file, uint64_t first, uint64_t en
   return absl::OkStatus();
 }
 
+std::vector<PointFile::Piece>::iterator PointFile::PieceOf(uint64_t coordinate) const {
+  return std::ranges::upper_bound(pieces_, coordinate, {}, &Piece::end);
+}
+
 absl::Status PointFile::CheckPieces(const File& file, uint64_t first, uint64_t end) const {
   std::vector<Piece> unchecked;
   {
     const std::lock_guard lock(mutex_);
-    for (const Piece& piece : pieces_) {
-      if (!piece.is_checked && piece.first < end && first < piece.end) {
-        unchecked.push_back(piece);
+    for (auto piece = PieceOf(first); piece != pieces_.end() && piece->first < end; ++piece) {
+      if (!piece->is_checked) {
+        unchecked.push_back(*piece);
       }
     }
   }
@@ -179,8 +183,8 @@ absl::Status PointFile::CheckPieces(const File& file, uint64_t first, uint64_t e
                                          piece.end * sizeof(double), " are not those that were written"));
     }
     const std::lock_guard lock(mutex_);
-    const auto same = std::ranges::find(pieces_, piece.first, &Piece::first);
-    if (same != pieces_.end() && same->end == piece.end) {
+    const auto same = PieceOf(piece.first);
+    if (same != pieces_.end() && same->first == piece.first && same->end == piece.end) {
       same->is_checked = true;
     }
   }

@@ -52,6 +52,8 @@ class PointFile final : public PointStore {
   absl::StatusOr<std::unique_ptr<File>> OpenToRead() const;
   // Checks those of the pieces that have some of these coordinates, and were not checked before.
   absl::Status CheckPieces(const File& file, uint64_t first, uint64_t end) const;
+  // The piece that has it, or the first behind it. Wants mutex_ to be held.
+  std::vector<Piece>::iterator PieceOf(uint64_t coordinate) const;
   // Hands the coordinates to `take`, a block at a time.
   absl::Status ReadBlocks(const File& file, uint64_t first, uint64_t end, const Take& take) const;
   absl::Status Read(uint64_t first, uint64_t end, const Take& take) const;

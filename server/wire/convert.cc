@@ -288,9 +288,6 @@ v1::MeshMetadata MetadataToProto(const core::Mesh& mesh, uint64_t chunk_count, b
   metadata.set_has_weights(!mesh.weights.empty());
   metadata.set_moved_vertex_count(mesh.moved_vertices.size());
   *metadata.mutable_statistics() = StatisticsToProto(mesh.statistics);
-  if (!with_boundary) {
-    return metadata;
-  }
   for (const core::BoundaryPart& part : mesh.boundary) {
     v1::BoundaryPart& message = *metadata.add_boundary();
     message.set_tag(part.tag);
@@ -305,7 +302,18 @@ v1::MeshMetadata MetadataToProto(const core::Mesh& mesh, uint64_t chunk_count, b
   }
   metadata.set_has_simplex_regions(!mesh.simplex_regions.empty());
   metadata.set_has_vertex_marks(!mesh.vertex_tags.empty());
+  if (!with_boundary) {
+    ClearBoundary(metadata);
+  }
   return metadata;
+}
+
+void ClearBoundary(v1::MeshMetadata& metadata) {
+  metadata.clear_boundary();
+  metadata.clear_facet_count();
+  metadata.clear_regions();
+  metadata.clear_has_simplex_regions();
+  metadata.clear_has_vertex_marks();
 }
 
 v1::EstimateMeshResponse EstimateToProto(const core::MeshEstimate& estimate) {

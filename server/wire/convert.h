@@ -37,6 +37,8 @@ google::protobuf::Timestamp TimeToProto(absl::Time time);
 
 // The metadata of `mesh`, to be followed by `chunk_count` chunks. `with_boundary`: as the request says.
 v1::MeshMetadata MetadataToProto(const core::Mesh& mesh, uint64_t chunk_count, bool with_boundary = false);
+// Leaves of metadata with boundary what there is without.
+void ClearBoundary(v1::MeshMetadata& metadata);
 
 v1::EstimateMeshResponse EstimateToProto(const core::MeshEstimate& estimate);
 

@@ -156,10 +156,14 @@ TEST_F(BackUpTest, AServerRemovesNothingMeanwhile) {
     ASSERT_TRUE(Change(*log, 1, 2, *points, mesh).ok());
     ASSERT_TRUE(log->Commit({.session = SessionName(1), .is_deletion = true}).ok());
     mesh.reset();
-    ASSERT_TRUE(log->RemoveGarbage().ok());
+    const absl::StatusOr<Garbage> kept = log->RemoveGarbage();
+    ASSERT_TRUE(kept.ok());
+    EXPECT_THAT(kept->removed, IsEmpty()) << "nor does it say so";
     EXPECT_EQ(PosixFileSystem().List(from_ + "/files")->size(), 3u);
   }
-  ASSERT_TRUE(log->RemoveGarbage().ok());
+  const absl::StatusOr<Garbage> removed = log->RemoveGarbage();
+  ASSERT_TRUE(removed.ok());
+  EXPECT_EQ(removed->removed.size(), 3u);
   EXPECT_THAT(*PosixFileSystem().List(from_ + "/files"), IsEmpty());
 }
 

@@ -132,6 +132,36 @@ TEST_F(PointFileTest, AFlippedBitIsFoundAndNamedAndCostsItsPieceAlone) {
   EXPECT_TRUE(failures_.empty()) << "the damage is that of one session";
 }
 
+TEST_F(PointFileTest, ThePiecesOfARangeAreFoundAmongMany) {
+  std::vector<store::v1::StepRecord::Points> committed;
+  const auto file = Open();
+  const auto append = [&](uint64_t end) {
+    const uint64_t first = file->coordinate_count();
+    const std::vector<double> part(all_.begin() + first, all_.begin() + end);
+    EXPECT_TRUE(file->Append(part).ok());
+    committed.push_back(MakePointsStep(first / 2, part, 2).points());
+  };
+  for (uint64_t end = 0; end <= 200; end += 10) {
+    append(end);  // the first one is empty
+    append(end);
+  }
+  ASSERT_TRUE(file->Synchronize().ok());
+  for (uint64_t damaged = 0; damaged < 200; damaged += 10) {
+    FlipBit(path_, 8 * damaged + 5, 1);
+    for (uint64_t first = 0; first < 200; first += 5) {
+      const uint64_t end = std::min<uint64_t>(first + 15, 200);
+      const bool has_some = first < damaged + 10 && damaged < end;
+      const auto reader = Open(committed);
+      EXPECT_EQ(reader->Copy(first, end, context_).ok(), !has_some) << damaged << " " << first;
+    }
+    FlipBit(path_, 8 * damaged + 5, 1);
+  }
+  const auto reader = Open(committed);
+  EXPECT_TRUE(reader->Copy(0, 200, context_).ok());
+  FlipBit(path_, 0, 1);
+  EXPECT_TRUE(reader->Copy(0, 200, context_).ok()) << "each piece is checked once";
+}
+
 TEST_F(PointFileTest, AFileThatIsMissingOrTooShortIsDamaged) {
   const auto committed = Write();
   std::filesystem::resize_file(path_, 299'999 * sizeof(double));

@@ -1,0 +1,296 @@
+// A session is a function of its steps: whatever the threads, the pieces in which its points come, restarts, structures
+// that are given up, and operations that do not succeed, the same steps end with the same mesh.
+#include <algorithm>
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "gtest/gtest.h"
+#include "proto/checksum.h"
+#include "server/backend.h"
+#include "server/network/connections.h"
+#include "server/sessions/refinement.h"
+#include "server/store/check_data.h"
+#include "server/store/durable_log.h"
+#include "spdlog/logger.h"
+#include "tests/server/service_harness.h"
+#include "tests/server/store/store_support.h"
+#include "tests/support/seeded_test.h"
+
+namespace wellspace::server {
+namespace {
+
+// Lives, and variations of each; the long test has many.
+constexpr int kLives = WELLSPACE_LIVES;
+constexpr int kVariations = WELLSPACE_VARIATIONS;
+
+// A step of a life.
+struct LifeStep {
+  enum class Kind { kUpload, kRefine, kAdd } kind = Kind::kUpload;
+  std::vector<double> points{};  // of kUpload and kAdd
+  double size = 0;               // of kRefine
+};
+
+struct Life {
+  int dimension = 2;
+  std::vector<LifeStep> steps;
+};
+
+std::vector<double> DrawPoints(test::SplitMix64& random, uint64_t count, int dimension) {
+  std::vector<double> points(count * dimension);
+  std::ranges::generate(points, [&] { return 0.05 + 0.9 * random.Unit(); });
+  return points;
+}
+
+Life DrawLife(test::SplitMix64& random) {
+  Life life{.dimension = random.Below(3) == 0 ? 3 : 2, .steps = {}};
+  const auto upload = [&] {
+    life.steps.push_back(
+        {.kind = LifeStep::Kind::kUpload, .points = DrawPoints(random, 1 + random.Below(60), life.dimension)});
+  };
+  const auto refine = [&] {
+    life.steps.push_back({.kind = LifeStep::Kind::kRefine, .size = random.Below(2) == 0 ? 0 : 0.15 + random.Unit()});
+  };
+  upload();
+  refine();
+  for (uint64_t i = 2 + random.Below(4); i > 0; --i) {
+    switch (random.Below(3)) {
+      case 0:
+        upload();
+        break;
+      case 1:
+        refine();
+        break;
+      default:
+        life.steps.push_back(
+            {.kind = LifeStep::Kind::kAdd, .points = DrawPoints(random, 1 + random.Below(5), life.dimension)});
+    }
+  }
+  refine();
+  return life;
+}
+
+// A process of the server over a folder, without the network.
+class Process {
+ public:
+  explicit Process(const std::string& folder)
+      : backend_({.workers = 2}, authenticator_, observability_, logger_, DurableLog::Open({.folder = folder}).value(),
+                 FakeMesher, FakeEstimator, CreateMesher) {
+    EXPECT_TRUE(backend_.Restore().ok());
+  }
+
+  const CallEnvironment& environment() const { return backend_.environment(); }
+
+  // Does `work` on a worker, and waits for it.
+  absl::Status Work(const std::function<absl::Status(Job&)>& work) {
+    Event done;
+    absl::Status status;
+    const auto job = environment().jobs.Submit({.tenant = "a", .work = [&](Job& running) {
+                                                  status = work(running);
+                                                  done.Set();
+                                                }});
+    EXPECT_TRUE(job.ok() && done.Wait());
+    return status;
+  }
+
+ private:
+  const std::shared_ptr<spdlog::logger> logger_ = std::make_shared<spdlog::logger>("none");
+  Authenticator authenticator_;
+  Connections connections_{{}, logger_};
+  Observability observability_{{}, logger_, connections_, [](const grpc::ServerContextBase&) { return ""; }};
+  Backend backend_;
+};
+
+// Lives a life in a folder of its own.
+class Living {
+ public:
+  // `random`: what is varied; null: nothing.
+  Living(const Life& life, test::SplitMix64* random) : life_(life), random_(random) { Restart(); }
+
+  // Of the last mesh.
+  uint32_t Hash() {
+    session_ = process_->environment()
+                   .sessions.Create({.tenant = "a", .parameters = Parameters(0), .labels = {}, .ttl = absl::Hours(1)})
+                   .value();
+    for (const LifeStep& step : life_.steps) {
+      Disturb();
+      switch (step.kind) {
+        case LifeStep::Kind::kUpload:
+          Upload(step.points);
+          break;
+        case LifeStep::Kind::kRefine:
+          Refine(step.size);
+          break;
+        case LifeStep::Kind::kAdd:
+          Add(step.points);
+          break;
+      }
+    }
+    Disturb();
+    return HashOf(*session_->mesh());
+  }
+
+  const std::string& what() const { return what_; }
+
+  ~Living() {
+    session_ = nullptr;
+    process_.reset();
+    const absl::StatusOr<DataReport> report = CheckData(folder_.path());
+    EXPECT_TRUE(report.ok() && report->is_whole() && report->unknown.empty());
+  }
+
+ private:
+  // Whether something that comes once in `n` times comes now.
+  bool Draw(uint64_t n) { return random_ != nullptr && random_->Below(n) == 0; }
+
+  core::MeshParameters Parameters(double size) {
+    core::MeshParameters parameters{.dimension = life_.dimension};
+    parameters.domain_low.assign(life_.dimension, 0);
+    parameters.domain_high.assign(life_.dimension, 1);
+    parameters.max_circumradius = size;
+    parameters.threads = random_ == nullptr ? 1 : static_cast<int>(1 + random_->Below(3));
+    return parameters;
+  }
+
+  void Restart() {
+    const std::string name = session_ == nullptr ? "" : session_->name();
+    session_ = nullptr;
+    process_.reset();
+    process_.emplace(folder_.path());
+    if (!name.empty()) {
+      session_ = process_->environment().sessions.Find("a", name).value();
+    }
+  }
+
+  // What leaves nothing behind.
+  void Disturb() {
+    if (Draw(4)) {
+      what_ += " restart";
+      Restart();
+    }
+    if (Draw(3)) {
+      what_ += " give-up";
+      (void)session_->GiveUpMesher();  // nothing, where it has none
+    }
+    if (session_->mesh() != nullptr && Draw(4)) {
+      what_ += " query";
+      EXPECT_TRUE(process_->Work([&](Job& job) { return Query(job); }).ok());
+    }
+    if (Draw(4)) {
+      what_ += " fail";
+      Fail();
+    }
+  }
+
+  absl::Status Query(Job& job) {
+    const StructureUse use(session_);
+    const absl::Status prepared = session_->PrepareStructure(0, process_->environment().create_mesher, job);
+    uint64_t version = 0;
+    return prepared.ok() ? session_->Query(&version, [](const core::Mesher&) { return absl::OkStatus(); }) : prepared;
+  }
+
+  // An operation that is cancelled at some moment, or fails since its mesh is too large.
+  void Fail() {
+    core::MeshParameters parameters = Parameters(0.01);
+    parameters.max_vertices = 400 + random_->Below(1000);
+    const std::shared_ptr<Operation> operation =
+        StartRefinement(process_->environment(), session_, parameters, 0).value();
+    if (Draw(2)) {
+      std::this_thread::sleep_for(std::chrono::microseconds(random_->Below(3000)));
+      (void)CancelOperation(process_->environment(), *session_, *operation);
+    }
+    EXPECT_NE(End(*operation), v1::Operation::STATE_SUCCEEDED);
+  }
+
+  static v1::Operation::State End(const Operation& operation) {
+    while (!operation.HasEnded()) {
+      std::this_thread::sleep_for(std::chrono::microseconds(200));
+    }
+    return operation.Describe().state();
+  }
+
+  void Upload(const std::vector<double>& points) {
+    const uint64_t first = session_->Committed().committed_points();
+    const uint64_t count = points.size() / life_.dimension;
+    for (uint64_t done = 0; done < count;) {
+      const uint64_t again = random_ == nullptr ? 0 : random_->Below(done + 1);  // of those that it has
+      const uint64_t end = random_ == nullptr ? count : done + 1 + random_->Below(count - done);
+      const std::vector<double> piece(points.begin() + (done - again) * life_.dimension,
+                                      points.begin() + end * life_.dimension);
+      EXPECT_TRUE(session_->Append(first + done - again, piece, 0).ok());
+      done = end;
+      if (Draw(2)) {
+        EXPECT_TRUE(session_->CommitPoints().ok());
+      }
+    }
+    EXPECT_TRUE(session_->CommitPoints().ok());
+  }
+
+  void Refine(double size) {
+    std::shared_ptr<Operation> operation =
+        StartRefinement(process_->environment(), session_, Parameters(size), 0).value();
+    if (Draw(4)) {
+      what_ += " restart-within";
+      const std::string name = operation->name();
+      operation = nullptr;
+      Restart();
+      operation = session_->FindOperation(name).value();
+    }
+    EXPECT_EQ(End(*operation), v1::Operation::STATE_SUCCEEDED) << operation->Describe().error().message();
+  }
+
+  void Add(const std::vector<double>& points) {
+    const absl::Status added = process_->Work([&](Job& job) {
+      const StructureUse use(session_);
+      const absl::Status prepared = session_->PrepareStructure(0, process_->environment().create_mesher, job);
+      return prepared.ok() ? session_->AddVertices(points, {}, 0, job.context()).status() : prepared;
+    });
+    EXPECT_TRUE(added.ok()) << added;
+  }
+
+  static uint32_t HashOf(const MeshSnapshot& mesh) {
+    uint32_t crc32c = 0;
+    for (uint64_t chunk = 0; chunk < mesh.ChunkCount(true).value(); ++chunk) {
+      const std::string bytes = BytesOf(mesh.SerializeChunk(chunk, 2, true).value());
+      crc32c = ExtendCrc32c(crc32c, bytes.data(), bytes.size());
+    }
+    return crc32c;
+  }
+
+  const Life& life_;
+  test::SplitMix64* const random_;
+  const TestFolder folder_;
+  std::optional<Process> process_;
+  std::shared_ptr<Session> session_;
+  std::string what_;
+};
+
+class MetamorphicTest : public test::SeededTest {
+ protected:
+  MetamorphicTest() : SeededTest(20'261'128) {}
+};
+
+TEST_F(MetamorphicTest, TheSameStepsEndWithTheSameMesh) {
+  std::set<uint32_t> hashes;
+  for (int i = 0; i < kLives; ++i) {
+    const Life life = DrawLife(random_);
+    const uint32_t undisturbed = Living(life, nullptr).Hash();
+    hashes.insert(undisturbed);
+    for (int variation = 0; variation < kVariations; ++variation) {
+      Living living(life, &random_);
+      const uint32_t hash = living.Hash();
+      ASSERT_EQ(hash, undisturbed) << "life " << i << ", variation " << variation << ":" << living.what();
+    }
+  }
+  EXPECT_EQ(hashes.size(), static_cast<size_t>(kLives)) << "other steps end with another mesh";
+}
+
+}  // namespace
+}  // namespace wellspace::server
