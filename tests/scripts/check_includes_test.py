@@ -13,7 +13,7 @@ SOUND = {
     "core/base/status_macros.h": '#include "absl/status/status.h"\n',
     "core/geometry/point.h": '#include "core/base/ids.h"\n',
     "core/validate/validate.h": '#include "absl/status/status.h"\n#include "core/geometry/point.h"\n',
-    "core/simplex/star.h": '#include "core/validate/validate.h"\n',
+    "core/simplex/star.h": '#include "core/geometry/point.h"\n',
     "core/cell/polytope.h": '#include "core/geometry/point.h"\n',
     "core/voronoi/star.h": '#include "core/cell/polytope.h"\n',
     "core/refine/rules.h": '#include "core/voronoi/star.h"\n',
@@ -127,7 +127,7 @@ class CheckIncludesTest(unittest.TestCase):
 
     def test_relative_include(self):
         self.assert_found("core/mesher.h", '#include "../server/embedded_server.h"', "from the root")
-        self.assert_found("core/simplex/star.h", '#include "validate.h"', "from the root")
+        self.assert_found("core/validate/validate.h", '#include "faults.h"', "from the root")
 
     def test_test_of_no_folder(self):
         self.assert_found("tests/core/magic/spell_test.cc", "", "there is no folder core/magic")
