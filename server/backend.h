@@ -15,7 +15,7 @@
 #include "server/observability/observability.h"
 #include "server/security/authenticator.h"
 #include "server/sessions/idle_sessions.h"
-#include "server/sessions/memory_session_store.h"
+#include "server/sessions/session_registry.h"
 #include "server/store/session_log.h"
 #include "spdlog/logger.h"
 
@@ -60,7 +60,7 @@ class Backend {
   CallRegistry calls_;
   RequestIds request_ids_;
   MemoryBudget memory_;
-  MemorySessionStore sessions_;
+  SessionRegistry sessions_;
   const IdleSessions idle_sessions_;
   const CallEnvironment environment_;
   // The background thread ends first. Of the others each ends before those above it, and before what it works on.

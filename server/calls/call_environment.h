@@ -17,7 +17,7 @@
 namespace wellspace::server {
 
 class RequestIds;
-class SessionStore;
+class SessionRegistry;
 
 // What all calls share; outlives them.
 struct CallEnvironment {
@@ -31,7 +31,7 @@ struct CallEnvironment {
   Background& background;
   BlockingThreads& blocking;
   CallRegistry& calls;
-  SessionStore& sessions;
+  SessionRegistry& sessions;
   RequestIds& request_ids;
   SessionLog& session_log;
   Observability& observability;

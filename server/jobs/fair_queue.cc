@@ -31,20 +31,20 @@ void FairQueue::Start(const std::string& tenant, uint64_t sequence) {
   }
 }
 
-std::optional<uint64_t> FairQueue::FindFirst(const Condition& can_start) const {
+std::optional<uint64_t> FairQueue::FindFirst(const Admit& admit) const {
   for (const std::string& tenant : turns_) {
     const QueuedJob& first = tenants_.at(tenant).begin()->second.job;
-    if (can_start(first)) {
+    if (admit(first)) {
       return first.sequence;
     }
   }
   return std::nullopt;
 }
 
-std::optional<uint64_t> FairQueue::FindSmall(const Condition& can_start) const {
+std::optional<uint64_t> FairQueue::FindSmall(const Admit& admit) const {
   for (const std::string& tenant : turns_) {
     for (const auto& [sequence, entry] : tenants_.at(tenant)) {
-      if (entry.job.is_small && can_start(entry.job)) {
+      if (entry.job.is_small && admit(entry.job)) {
         return sequence;
       }
     }

@@ -36,7 +36,8 @@ class FairQueue {
  public:
   static constexpr int kMaxSkips = 16;
 
-  using Condition = std::function<bool(const QueuedJob&)>;
+  // Whether a job can start now. It may take what the job needs, where that is there: what it admits is then started.
+  using Admit = std::function<bool(const QueuedJob&)>;
 
   bool empty() const { return size_ == 0; }
   size_t size() const { return size_; }
@@ -52,11 +53,11 @@ class FairQueue {
   // REQUIRES:   there is such a job.
   void Start(const std::string& tenant, uint64_t sequence);
 
-  // Of the first jobs of each tenant, the first in the order of turns of which `can_start` is true. The condition is
-  // asked in that order, and no more once it was true.
-  std::optional<uint64_t> FindFirst(const Condition& can_start) const;
+  // Of the first jobs of each tenant, the first in the order of turns that `admit` admits. It is asked in that order, and
+  // no more once it was true.
+  std::optional<uint64_t> FindFirst(const Admit& admit) const;
   // The same of small jobs, whatever they are behind.
-  std::optional<uint64_t> FindSmall(const Condition& can_start) const;
+  std::optional<uint64_t> FindSmall(const Admit& admit) const;
 
   // A job was started: each tenant's first job, if it waits for memory, was skipped.
   void CountSkips();

@@ -216,7 +216,7 @@ void JobPool::Dispatch() {
 
 bool JobPool::StartSmall() {
   const std::optional<uint64_t> small =
-      queue_.FindSmall([this](const QueuedJob& queued) { return CanStart(queued, kNoBound); });
+      queue_.FindSmall([this](const QueuedJob& queued) { return Admit(queued, kNoBound); });
   if (small.has_value()) {
     Start(*queued_.at(*small), /*small_worker=*/true);
   }
@@ -225,15 +225,12 @@ bool JobPool::StartSmall() {
 
 bool JobPool::StartNext() {
   const uint64_t room_for_tree = GetRoomForTree();
-  bool is_held_up = false;
-  if (StartStarved(room_for_tree, &is_held_up)) {
-    return true;
-  }
-  if (is_held_up) {
-    return false;
+  const Starved starved = StartStarved(room_for_tree);
+  if (starved != Starved::kNone) {
+    return starved == Starved::kStarted;
   }
   const std::optional<uint64_t> next =
-      queue_.FindFirst([&](const QueuedJob& queued) { return CanStart(queued, room_for_tree); });
+      queue_.FindFirst([&](const QueuedJob& queued) { return Admit(queued, room_for_tree); });
   if (next.has_value()) {
     Start(*queued_.at(*next));
   }
@@ -244,21 +241,21 @@ bool JobPool::StartNext() {
   return RefuseVictim();
 }
 
-bool JobPool::StartStarved(uint64_t room_for_tree, bool* is_held_up) {
+JobPool::Starved JobPool::StartStarved(uint64_t room_for_tree) {
   const QueuedJob* starved = queue_.FindStarved();
   if (starved == nullptr) {
-    return false;
+    return Starved::kNone;
   }
   Job& job = *queued_.at(starved->sequence);
-  if (CanStart(*starved, room_for_tree)) {
+  if (Admit(*starved, room_for_tree)) {
     Start(job);
-    return true;
+    return Starved::kStarted;
   }
-  *is_held_up = running_ + running_small_ > 0;
-  if (!*is_held_up) {
-    queue_.ForgetSkips(job.tenant_, job.sequence_);  // what it waits for is no job's: others go on
+  if (running_ + running_small_ > 0) {
+    return Starved::kHoldsUp;
   }
-  return false;
+  queue_.ForgetSkips(job.tenant_, job.sequence_);  // what it waits for is no job's: others go on
+  return Starved::kNone;
 }
 
 bool JobPool::StartOneWithATree() {
@@ -323,7 +320,7 @@ bool JobPool::RefuseVictim() {
   return victim.has_value();
 }
 
-bool JobPool::CanStart(const QueuedJob& queued, uint64_t room_for_tree) {
+bool JobPool::Admit(const QueuedJob& queued, uint64_t room_for_tree) {
   return !queued.waits_for_memory || queued_.at(queued.sequence)->TakeWanted(room_for_tree);
 }
 

@@ -117,8 +117,10 @@ class JobPool {
   void Dispatch();
   // Starts the job whose turn it is, or refuses one where nothing else helps. False when all have to wait.
   bool StartNext();
-  // Starts the starved job, if there is one and its memory is there. `*is_held_up`: no other may start before it.
-  bool StartStarved(uint64_t room_for_tree, bool* is_held_up);
+  // What a starved job, if there is one, means for the others: none may start before it, or they go on.
+  enum class Starved { kNone, kStarted, kHoldsUp };
+  // Starts it, if its memory is there.
+  Starved StartStarved(uint64_t room_for_tree);
   // Gives a small worker to the small job whose turn it is, if the memory of one is there.
   bool StartSmall();
   // Resumes the oldest job that waits with its tree and whose memory is there, first of its tenant or not.
@@ -131,7 +133,7 @@ class JobPool {
   // How much has to be free, and is not, for `job` to have what it waits for; 0: it is not memory that it waits for.
   uint64_t RoomFor(const Job& job) const;
   // Whether `queued` needs nothing but a worker; where it waits for memory that is there, it has it then.
-  bool CanStart(const QueuedJob& queued, uint64_t room_for_tree);
+  bool Admit(const QueuedJob& queued, uint64_t room_for_tree);
   // Takes `job` out of the queue and gives it a worker, a small one or another.
   void Start(Job& job, bool small_worker = false);
   // How many run on workers of the kind that `job` has.
@@ -154,7 +156,17 @@ class JobPool {
   MemoryBudget& memory_;
   mutable std::mutex mutex_;
   std::condition_variable wake_;
-  // Guarded by mutex_. Jobs are by their sequence.
+  // Guarded by mutex_. Jobs are by their sequence. Where a job is, and what counts it, by its state:
+  //
+  //   state                     in                 counted in
+  //   kQueued                   queue_, queued_
+  //   kRunning, no thread yet   started_           running_ or running_small_, by has_small_worker_
+  //   kRunning                  begun_             the same
+  //   kWaiting (for memory)     queue_, queued_,   blocked_
+  //                             and begun_
+  //   kDone                     none
+  //
+  // jobs_of_ and small_jobs_ count it from Submit to kDone.
   uint64_t next_sequence_ = 0;
   FairQueue queue_;
   std::map<uint64_t, std::shared_ptr<Job>> queued_;  // those in queue_

@@ -105,7 +105,7 @@ double PredictVertices(const core::MeshParameters& parameters, std::span<const d
 }
 
 bool HasManySamples(const core::MeshParameters& parameters) {
-  return parameters.size_samples != nullptr && parameters.size_samples->sizes.size() > kMostPoints;
+  return parameters.size_samples != nullptr && parameters.size_samples->sizes.size() > kMostSmallPoints;
 }
 
 bool IsSmall(int dimension, double vertices) { return vertices * kSecondsPerVertex[dimension] <= kSmallSeconds; }
@@ -113,18 +113,18 @@ bool IsSmall(int dimension, double vertices) { return vertices * kSecondsPerVert
 }  // namespace
 
 bool IsSmallMesh(const core::MeshParameters& parameters, std::span<const double> points) {
-  return points.size() / parameters.dimension <= kMostPoints && !HasManySamples(parameters) &&
+  return points.size() / parameters.dimension <= kMostSmallPoints && !HasManySamples(parameters) &&
          IsSmall(parameters.dimension, PredictVertices(parameters, points));
 }
 
 bool IsSmallRefinement(const core::MeshParameters& parameters, std::span<const double> points, uint64_t vertices,
                        uint64_t steps) {
   const double built = static_cast<double>(vertices) * static_cast<double>(1 + steps);
-  return points.size() / parameters.dimension <= kMostPoints && !HasManySamples(parameters) &&
+  return points.size() / parameters.dimension <= kMostSmallPoints && !HasManySamples(parameters) &&
          IsSmall(parameters.dimension, built + PredictVertices(parameters, points));
 }
 
-bool IsSmallEstimate(int dimension, uint64_t points) { return points <= kMostPoints >> (2 * (dimension - 2)); }
+bool IsSmallEstimate(int dimension, uint64_t points) { return points <= kMostSmallPoints >> (2 * (dimension - 2)); }
 
 bool IsSmallAddition(uint64_t points, uint64_t vertices, uint64_t steps) {
   constexpr uint64_t kMostReplayed = 2'000;  // vertices, all steps together

@@ -9,14 +9,16 @@
 
 namespace wellspace::server {
 
+// No mesh of more points is small, nor one with more sizes at points.
+inline constexpr uint64_t kMostSmallPoints = 40'000;
+
 // Whether a mesh is expected within about a second: by the number of points, and by the sizes that are wanted in the
-// box. Above kMostPoints it never is, and the points need not be given.
+// box. Above kMostSmallPoints it never is, and the points need not be given.
 //
 // Shapes:     points: n x parameters.dimension, row-major.
 // Guarantees: from above for even clouds; points that come ever closer to each other may take ten times as long.
 // Complexity: O(n), and not much for those that may be small.
 bool IsSmallMesh(const core::MeshParameters& parameters, std::span<const double> points);
-inline constexpr uint64_t kMostPoints = 40'000;
 
 // The same of a refinement of a mesh that is there, which may have to be built first, by so many steps.
 bool IsSmallRefinement(const core::MeshParameters& parameters, std::span<const double> points, uint64_t vertices,

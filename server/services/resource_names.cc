@@ -7,7 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 #include "core/base/status_macros.h"
-#include "server/sessions/session_store.h"
+#include "server/sessions/session_registry.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {

@@ -34,7 +34,7 @@ std::vector<size_t> ChooseIdle(std::span<const Session::Spare> sessions, uint64_
   return chosen;
 }
 
-IdleSessions::IdleSessions(const SessionStore& sessions, MemoryBudget& memory, WorkObserver& observer, Clock clock)
+IdleSessions::IdleSessions(const SessionRegistry& sessions, MemoryBudget& memory, WorkObserver& observer, Clock clock)
     : sessions_(sessions), memory_(memory), observer_(observer), clock_(std::move(clock)) {
   memory_.SetGiveUp([this](uint64_t missing, MemoryBudget::Want want) { return GiveUp(missing, want); });
 }

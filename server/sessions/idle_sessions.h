@@ -11,7 +11,7 @@
 #include "server/base/clock.h"
 #include "server/jobs/memory_budget.h"
 #include "server/observability/work_observer.h"
-#include "server/sessions/session_store.h"
+#include "server/sessions/session_registry.h"
 
 namespace wellspace::server {
 
@@ -30,7 +30,7 @@ std::vector<size_t> ChooseIdle(std::span<const Session::Spare> sessions, uint64_
 class IdleSessions {
  public:
   // REQUIRES:   all outlive this; no other has the budget's SetGiveUp.
-  IdleSessions(const SessionStore& sessions, MemoryBudget& memory, WorkObserver& observer, Clock clock = Clock());
+  IdleSessions(const SessionRegistry& sessions, MemoryBudget& memory, WorkObserver& observer, Clock clock = Clock());
   ~IdleSessions();
   IdleSessions(const IdleSessions&) = delete;
   IdleSessions& operator=(const IdleSessions&) = delete;
@@ -41,7 +41,7 @@ class IdleSessions {
   // Has those of `all` give up memory that are chosen now. Returns how much they have freed.
   uint64_t GiveUpOnce(std::span<const std::shared_ptr<Session>> all, uint64_t missing, MemoryBudget::Want want) const;
 
-  const SessionStore& sessions_;
+  const SessionRegistry& sessions_;
   MemoryBudget& memory_;
   WorkObserver& observer_;
   const Clock clock_;

@@ -183,9 +183,9 @@ void StartTicking(Background& background, const std::shared_ptr<Operation>& oper
 // Submits the work of `operation`, which has the session.
 absl::StatusOr<std::shared_ptr<Job>> Submit(const CallEnvironment& environment, const std::shared_ptr<Session>& session,
                                             const std::shared_ptr<Operation>& operation) {
-  const Session::Size size = session->GetSize(kMostPoints);
+  const Session::Size size = session->GetSize(kMostSmallPoints);
   const bool is_small =
-      size.points <= kMostPoints && size.segments <= kMostPoints &&
+      size.points <= kMostSmallPoints && size.segments <= kMostSmallPoints &&
       IsSmallRefinement(session->ParametersOf(*operation), size.some_points, size.vertices, size.replayed_steps);
   WELLSPACE_ASSIGN_OR_RETURN(
       std::shared_ptr<Job> job,

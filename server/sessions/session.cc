@@ -31,10 +31,10 @@ core::MeshParameters Session::parameters() const {
 
 v1::Session Session::Describe() const {
   std::lock_guard lock(mutex_);
-  return DescribeWith(labels_, lease_.ttl());
+  return DescribeWithLocked(labels_, lease_.ttl());
 }
 
-v1::Session Session::DescribeWith(const std::map<std::string, std::string>& labels, absl::Duration ttl) const {
+v1::Session Session::DescribeWithLocked(const std::map<std::string, std::string>& labels, absl::Duration ttl) const {
   v1::Session message;
   message.set_name(name_);
   *message.mutable_create_time() = TimeToProto(create_time_);
@@ -89,9 +89,9 @@ absl::Status Session::Update(std::optional<std::map<std::string, std::string>> l
   v1::Session described;
   {
     std::lock_guard lock(mutex_);
-    WELLSPACE_RETURN_IF_ERROR(CheckOpen());
-    WELLSPACE_RETURN_IF_ERROR(CheckRevision(expected_revision));
-    described = DescribeWith(labels.value_or(labels_), ttl.value_or(lease_.ttl()));
+    WELLSPACE_RETURN_IF_ERROR(CheckOpenLocked());
+    WELLSPACE_RETURN_IF_ERROR(CheckRevisionLocked(expected_revision));
+    described = DescribeWithLocked(labels.value_or(labels_), ttl.value_or(lease_.ttl()));
   }
   const std::optional<store::v1::AnswerRecord> answer_record = AnswerRecordOf(answer, described);
   WELLSPACE_RETURN_IF_ERROR(CommitState([&](SessionChange& change) {
@@ -114,15 +114,15 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::Close(uint64_t expected_revi
   std::lock_guard change_lock(change_mutex_);
   {
     std::lock_guard lock(mutex_);
-    WELLSPACE_RETURN_IF_ERROR(CheckOpen());
-    WELLSPACE_RETURN_IF_ERROR(CheckRevision(expected_revision));
+    WELLSPACE_RETURN_IF_ERROR(CheckOpenLocked());
+    WELLSPACE_RETURN_IF_ERROR(CheckRevisionLocked(expected_revision));
   }
   WELLSPACE_RETURN_IF_ERROR(Commit([&](SessionChange& change) {
     change.is_deletion = true;
     change.answer = answer;
   }));
   std::lock_guard lock(mutex_);
-  CloseNow();
+  CloseNowLocked();
   return busy_ == Busy::kOperation ? operations_.back() : nullptr;
 }
 
@@ -130,41 +130,41 @@ bool Session::CloseIfExpired() {
   std::lock_guard lock(mutex_);
   const bool is_expired = !is_closed_ && lease_.HasExpired(clock_.since_boot());
   if (is_expired) {
-    CloseNow();
+    CloseNowLocked();
   }
   return is_expired;
 }
 
-void Session::CloseNow() {
+void Session::CloseNowLocked() {
   is_closed_ = true;
   point_account_.Close();
 }
 
-void Session::BeginBusy(Busy busy) {
+void Session::BeginBusyLocked(Busy busy) {
   busy_ = busy;
   lease_.BeginUse();
 }
 
-void Session::EndBusy() {
+void Session::EndBusyLocked() {
   busy_ = Busy::kNo;
   lease_.EndUse(clock_.since_boot());
 }
 
-absl::Status Session::CheckOpen() const {
+absl::Status Session::CheckOpenLocked() const {
   return is_closed_ ? MakeError(v1::ERROR_REASON_SESSION_NOT_FOUND,
                                 absl::StrCat(name_, " does not exist any more: it was deleted, or has expired"))
                     : absl::OkStatus();
 }
 
-absl::Status Session::CheckRevision(uint64_t expected_revision) const {
-  return expected_revision == 0 || expected_revision == NextRevision()
+absl::Status Session::CheckRevisionLocked(uint64_t expected_revision) const {
+  return expected_revision == 0 || expected_revision == NextRevisionLocked()
              ? absl::OkStatus()
              : MakeError(v1::ERROR_REASON_REVISION_MISMATCH,
                          absl::StrCat("expected_revision is ", expected_revision, ", but ", name_, " is at revision ",
-                                      NextRevision()));
+                                      NextRevisionLocked()));
 }
 
-absl::Status Session::CheckIdle() const {
+absl::Status Session::CheckIdleLocked() const {
   switch (busy_) {
     case Busy::kNo:
       return absl::OkStatus();
@@ -183,13 +183,13 @@ absl::Status Session::CheckIdle() const {
                                 " built again, which was given up; try again later"));
 }
 
-absl::Status Session::CheckReadyForChange(uint64_t expected_revision) const {
-  WELLSPACE_RETURN_IF_ERROR(CheckOpen());
-  WELLSPACE_RETURN_IF_ERROR(CheckIdle());
-  return CheckRevision(expected_revision);
+absl::Status Session::CheckReadyForChangeLocked(uint64_t expected_revision) const {
+  WELLSPACE_RETURN_IF_ERROR(CheckOpenLocked());
+  WELLSPACE_RETURN_IF_ERROR(CheckIdleLocked());
+  return CheckRevisionLocked(expected_revision);
 }
 
-absl::Status Session::CheckMesh() const {
+absl::Status Session::CheckMeshLocked() const {
   if (work_.mesh == nullptr) {
     return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
                      absl::StrCat(name_, " has no mesh yet; start a refinement first"));
@@ -203,8 +203,8 @@ absl::Status Session::CheckMesh() const {
   return absl::OkStatus();
 }
 
-absl::Status Session::CheckStructure() const {
-  WELLSPACE_RETURN_IF_ERROR(CheckMesh());
+absl::Status Session::CheckStructureLocked() const {
+  WELLSPACE_RETURN_IF_ERROR(CheckMeshLocked());
   if (work_.mesher != nullptr) {
     return absl::OkStatus();
   }
@@ -233,9 +233,9 @@ absl::Status Session::Query(uint64_t* version, const std::function<absl::Status(
   const core::Mesher* mesher = nullptr;
   {
     std::lock_guard lock(mutex_);
-    WELLSPACE_RETURN_IF_ERROR(CheckOpen());
-    WELLSPACE_RETURN_IF_ERROR(CheckIdle());
-    WELLSPACE_RETURN_IF_ERROR(CheckStructure());
+    WELLSPACE_RETURN_IF_ERROR(CheckOpenLocked());
+    WELLSPACE_RETURN_IF_ERROR(CheckIdleLocked());
+    WELLSPACE_RETURN_IF_ERROR(CheckStructureLocked());
     if (*version != 0 && *version != structure_version_) {
       return MakeError(v1::ERROR_REASON_REVISION_MISMATCH,
                        absl::StrCat(name_, " has changed since the first batch of this call"));
@@ -250,7 +250,7 @@ absl::Status Session::Query(uint64_t* version, const std::function<absl::Status(
 void Session::NoteIdle() const {
   {
     std::lock_guard lock(mutex_);
-    if (!log_.is_durable() || SpareBytes() == 0) {
+    if (!log_.is_durable() || SpareBytesLocked() == 0) {
       return;
     }
   }
@@ -259,14 +259,14 @@ void Session::NoteIdle() const {
 
 std::optional<Session::Spare> Session::GetSpare() const {
   std::lock_guard lock(mutex_);
-  const uint64_t bytes = log_.is_durable() ? SpareBytes() : 0;
+  const uint64_t bytes = log_.is_durable() ? SpareBytesLocked() : 0;
   if (bytes == 0) {
     return std::nullopt;
   }
   return Spare{.bytes = bytes, .last_use = lease_.ExpiresAt(clock_.since_boot()) - lease_.ttl()};
 }
 
-uint64_t Session::SpareBytes() const {
+uint64_t Session::SpareBytesLocked() const {
   if (busy_ != Busy::kNo || structure_uses_ > 0) {
     return 0;
   }
@@ -283,7 +283,7 @@ uint64_t Session::GiveUpMesher() {
   {
     std::lock_guard lock(mutex_);
     std::unique_lock queries(queries_mutex_, std::try_to_lock);  // none can begin without mutex_
-    bytes = log_.is_durable() && queries.owns_lock() ? SpareBytes() : 0;
+    bytes = log_.is_durable() && queries.owns_lock() ? SpareBytesLocked() : 0;
     if (bytes == 0) {
       return 0;
     }

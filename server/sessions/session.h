@@ -333,49 +333,52 @@ class Session {
   absl::Status CommitStart(const Operation& operation, uint64_t end, const AnswerTo<v1::Operation>& answer);
   absl::Status CommitSuccess(const Operation& operation, const WorkResult& result, absl::Time now);
 
-  // The following want mutex_ to be held.
-  v1::Session DescribeWith(const std::map<std::string, std::string>& labels, absl::Duration ttl) const;
-  store::v1::SessionRecord Record() const;
-  void Keep(std::shared_ptr<Operation> operation);
+  // Functions whose names end in Locked want mutex_ to be held.
+
+  v1::Session DescribeWithLocked(const std::map<std::string, std::string>& labels, absl::Duration ttl) const;
+  store::v1::SessionRecord RecordLocked() const;
+  void KeepLocked(std::shared_ptr<Operation> operation);
   // The points up to number `end` are the session's from now on.
-  void NotePoints(uint64_t end);
+  void NotePointsLocked(uint64_t end);
+  // All points are meshed, by `operation`, which has succeeded.
+  void NoteRefinementLocked(const Operation& operation);
   // Refuses samples outside the domain, if that is known.
-  absl::Status CheckSamples(const core::SizeSamples& samples) const;
+  absl::Status CheckSamplesLocked(const core::SizeSamples& samples) const;
   // The sets of sizes that are of no use once only `steps`, and the set `current`, are there.
-  std::vector<SizesInUse> UnusedSizes(const SessionSteps& steps, uint64_t current) const;
+  std::vector<SizesInUse> UnusedSizesLocked(const SessionSteps& steps, uint64_t current) const;
   // Drops points that are not committed.
-  void DropUncommitted();
+  void DropUncommittedLocked();
   // What GiveUpMesher would free, of a durable session.
-  uint64_t SpareBytes() const;
-  uint64_t PointCount() const { return points_->coordinate_count() / dimension_; }
+  uint64_t SpareBytesLocked() const;
+  uint64_t PointCountLocked() const { return points_->coordinate_count() / dimension_; }
   // Of the points that are appended and not committed.
-  bool HasUncommitted() const { return PointCount() > committed_points_; }
+  bool HasUncommittedLocked() const { return PointCountLocked() > committed_points_; }
   // What the revision is when what was appended is committed.
-  uint64_t NextRevision() const { return revision_ + (HasUncommitted() ? 1 : 0); }
-  absl::Status CheckOpen() const;
-  absl::Status CheckRevision(uint64_t expected_revision) const;
-  absl::Status CheckIdle() const;
+  uint64_t NextRevisionLocked() const { return revision_ + (HasUncommittedLocked() ? 1 : 0); }
+  absl::Status CheckOpenLocked() const;
+  absl::Status CheckRevisionLocked(uint64_t expected_revision) const;
+  absl::Status CheckIdleLocked() const;
   // All three of these.
-  absl::Status CheckReadyForChange(uint64_t expected_revision) const;
+  absl::Status CheckReadyForChangeLocked(uint64_t expected_revision) const;
   // Whether there is something to query, or to build again.
-  absl::Status CheckMesh() const;
+  absl::Status CheckMeshLocked() const;
   // Whether there is something to query now.
-  absl::Status CheckStructure() const;
+  absl::Status CheckStructureLocked() const;
   // Checks that an upload begins at `offset` with no gap before it.
-  absl::Status CheckNoGap(uint64_t offset) const;
+  absl::Status CheckNoGapLocked(uint64_t offset) const;
   // Checks that the session has `coordinates` from point `first` on.
-  absl::Status CheckKnown(uint64_t first, std::span<const double> coordinates) const;
+  absl::Status CheckKnownLocked(uint64_t first, std::span<const double> coordinates) const;
   // Refuses an AddSegments whose segments or seeds leave a gap, or are others than the session has. `*segments` and
   // `*seeds` become how many of them the session has already.
-  absl::Status CheckKnown(const v1::AddSegmentsRequest& request, uint64_t* segments, uint64_t* seeds) const;
+  absl::Status CheckKnownLocked(const v1::AddSegmentsRequest& request, uint64_t* segments, uint64_t* seeds) const;
   // Refuses what no mesh of this session could have. `first` is the number of the first point.
-  absl::Status CheckCoordinates(uint64_t first, std::span<const double> coordinates) const;
+  absl::Status CheckCoordinatesLocked(uint64_t first, std::span<const double> coordinates) const;
   // What Restore sets besides steps and operations.
   void SetState(const StoredSession& stored);
-  void CloseNow();
+  void CloseNowLocked();
   // The session is the caller's alone until EndBusy, and does not expire.
-  void BeginBusy(Busy busy);
-  void EndBusy();
+  void BeginBusyLocked(Busy busy);
+  void EndBusyLocked();
 
   // The following are called without mutex_.
 
@@ -414,7 +417,7 @@ class Session {
   mutable std::shared_mutex queries_mutex_;  // after mutex_; held shared by queries
   std::mutex locator_mutex_;                 // before mutex_; held while a locator is made
   mutable std::mutex mutex_;
-  // Guarded by mutex_.
+  // Guarded by mutex_. While the session is busy, who has made it so may read without it what nothing else changes then.
   core::MeshParameters parameters_;  // of the last refinement that succeeded; before it, those of the creation
   std::map<std::string, std::string> labels_;
   Lease lease_;
@@ -423,15 +426,19 @@ class Session {
   bool is_uploading_ = false;
   bool is_ready_ = false;  // the last operation succeeded, and no points have come since
   uint64_t revision_ = 1;
-  PointAccount point_account_;                      // includes the points that AddVertices is adding
-  std::unique_ptr<PointStore> points_;              // see invariant (2)
-  uint64_t committed_points_ = 0;                   // of points_, those that are the session's
-  uint32_t uncommitted_crc32c_ = 0;                 // of the others
+  // Five counts of points, each at most the one before but for the moment in which vertices are added:
+  // point_account_.points() are paid for, those that AddVertices is adding included; PointCountLocked() are in points_;
+  // committed_points_ are the session's, as clients see them; work_.meshed_points are in the mesher, or would be if it
+  // was not given up; steps_.points() are what Replay makes a mesher of.
+  PointAccount point_account_;
+  std::unique_ptr<PointStore> points_;  // see invariant (2)
+  uint64_t committed_points_ = 0;
+  uint32_t uncommitted_crc32c_ = 0;                 // of the points behind the committed ones
   FeatureStore features_;                           // see invariant (2)
   FeatureSummary feature_summary_;                  // of them, read or not
   std::shared_ptr<const core::SizeSamples> sizes_;  // see invariant (2); null: none, or not read
   SizesInUse sizes_in_use_;                         // which these are
-  bool has_inputs_ = true;          // false: features and sizes were written down by another process, and not read yet
+  bool are_inputs_loaded_ = true;   // false: features and sizes were written down by another process, and not read yet
   SessionWork work_;                // its mesher is away while an operation is under way; see invariant (2)
   SessionSteps steps_;              // see invariant (2)
   uint64_t structure_version_ = 0;  // of what queries see; 0: nothing yet

@@ -42,7 +42,8 @@ absl::Status CheckEqual(const Place& place, uint64_t equal, const std::string& s
 
 }  // namespace
 
-absl::Status Session::CheckKnown(const v1::AddSegmentsRequest& request, uint64_t* segments, uint64_t* seeds) const {
+absl::Status Session::CheckKnownLocked(const v1::AddSegmentsRequest& request, uint64_t* segments,
+                                       uint64_t* seeds) const {
   const Place segment_place{.what = "segments",
                             .offset_field = "segment_offset",
                             .field = "segments.ends",
@@ -89,8 +90,8 @@ absl::Status Session::TryToAddSegments(const v1::AddSegmentsRequest& request, ui
   const uint64_t all_seeds = request.faces().seeds_size();
   {
     std::lock_guard lock(mutex_);
-    WELLSPACE_RETURN_IF_ERROR(CheckReadyForChange(expected_revision));
-    WELLSPACE_RETURN_IF_ERROR(CheckKnown(request, &known_segments, &known_seeds));
+    WELLSPACE_RETURN_IF_ERROR(CheckReadyForChangeLocked(expected_revision));
+    WELLSPACE_RETURN_IF_ERROR(CheckKnownLocked(request, &known_segments, &known_seeds));
     if (known_segments == all_segments && known_seeds == all_seeds &&
         !(request.has_faces() && features_.HasOtherRules(request.faces()))) {
       return absl::OkStatus();

@@ -16,7 +16,7 @@ constexpr size_t kKeptOperations = 100;
 
 }  // namespace
 
-void Session::Keep(std::shared_ptr<Operation> operation) {
+void Session::KeepLocked(std::shared_ptr<Operation> operation) {
   operations_.push_back(std::move(operation));
   if (operations_.size() > kKeptOperations) {
     operations_.pop_front();
@@ -32,7 +32,7 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::StartOperation(core::MeshPar
   uint64_t end = 0;
   {
     std::lock_guard lock(mutex_);
-    WELLSPACE_RETURN_IF_ERROR(CheckReadyForChange(expected_revision));
+    WELLSPACE_RETURN_IF_ERROR(CheckReadyForChangeLocked(expected_revision));
     if (!features_.IsEmpty()) {
       WELLSPACE_RETURN_IF_ERROR(ValidateForDomain(parameters, features_.View()));
     }
@@ -43,8 +43,8 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::StartOperation(core::MeshPar
     }
     operation = std::make_shared<Operation>(absl::StrCat(name_, "/operations/", next_operation_), next_operation_,
                                             std::move(parameters), restart, clock_.wall());
-    BeginBusy(Busy::kStarting);
-    end = PointCount();
+    BeginBusyLocked(Busy::kStarting);
+    end = PointCountLocked();
   }
   absl::Status status = submit(operation);
   if (status.ok()) {
@@ -53,7 +53,7 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::StartOperation(core::MeshPar
   if (!status.ok()) {
     {
       std::lock_guard lock(mutex_);
-      EndBusy();
+      EndBusyLocked();
     }
     operation->Fail(clock_.wall(), status);  // its work, if it was submitted, does not begin
     change_lock.unlock();
@@ -63,11 +63,11 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::StartOperation(core::MeshPar
   std::lock_guard lock(mutex_);
   if (end > committed_points_) {
     uncommitted_crc32c_ = 0;
-    NotePoints(end);
+    NotePointsLocked(end);
   }
   ++next_operation_;
   busy_ = Busy::kOperation;
-  Keep(operation);
+  KeepLocked(operation);
   return operation;
 }
 
@@ -128,13 +128,26 @@ absl::Status Session::CommitSuccess(const Operation& operation, const WorkResult
     if (steps_.empty() || operation.restart()) {
       step.set_begins(true);
       step.set_meshing_version(core::kMeshingVersion);
-      for (const SizesInUse& set : UnusedSizes({}, sizes_in_use_.number)) {
+      for (const SizesInUse& set : UnusedSizesLocked({}, sizes_in_use_.number)) {
         change.dropped_sizes.push_back(set.number);
       }
     }
     const MeshSnapshot::Figures& figures = mesh.figures();
     change.operations.push_back(operation.RecordOfSuccess(now, figures.revision, figures.vertices, figures.simplices));
   });
+}
+
+void Session::NoteRefinementLocked(const Operation& operation) {
+  if (operation.restart()) {
+    for (const SizesInUse& set : UnusedSizesLocked({}, sizes_in_use_.number)) {
+      point_account_.ReturnSizes(set.count);
+    }
+    steps_ = SessionSteps();
+  }
+  parameters_ = operation.parameters();
+  core::MeshParameters refined_with = parameters_;
+  refined_with.size_samples = sizes_;
+  steps_.NoteRefinement(committed_points_, refined_with, sizes_in_use_);
 }
 
 bool Session::EndWork(Operation& operation, WorkResult& result) {
@@ -174,16 +187,7 @@ bool Session::EndWork(Operation& operation, WorkResult& result) {
       }
       revision_ = work.mesh->revision();
       work.meshed_points = committed_points_;
-      if (operation.restart()) {
-        for (const SizesInUse& set : UnusedSizes({}, sizes_in_use_.number)) {
-          point_account_.ReturnSizes(set.count);
-        }
-        steps_ = SessionSteps();
-      }
-      parameters_ = operation.parameters();
-      core::MeshParameters refined_with = parameters_;
-      refined_with.size_samples = sizes_;
-      steps_.NoteRefinement(work.meshed_points, refined_with, sizes_in_use_);
+      NoteRefinementLocked(operation);
       is_ready_ = true;
       ++structure_version_;
       const MeshSnapshot::Figures& made = work.mesh->figures();
@@ -193,7 +197,7 @@ bool Session::EndWork(Operation& operation, WorkResult& result) {
       work.meshed_points = steps_.points();
     }
     std::swap(work_, work);  // what was there is freed without the lock
-    EndBusy();
+    EndBusyLocked();
   }
   change_lock.unlock();
   operation.Notify();
@@ -218,7 +222,7 @@ absl::Status Session::Cancel(Operation& operation) {
   }
   {
     std::lock_guard lock(mutex_);
-    EndBusy();
+    EndBusyLocked();
     operation.Fail(now, cancelled);
   }
   change_lock.unlock();

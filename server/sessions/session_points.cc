@@ -11,7 +11,7 @@
 
 namespace wellspace::server {
 
-absl::Status Session::CheckCoordinates(uint64_t first, std::span<const double> coordinates) const {
+absl::Status Session::CheckCoordinatesLocked(uint64_t first, std::span<const double> coordinates) const {
   // Before there is a mesh, a domain that was not given grows with the points.
   const std::vector<double>* low = &parameters_.domain_low;
   const std::vector<double>* high = &parameters_.domain_high;
@@ -45,7 +45,7 @@ void Session::EndUpload() {
   is_uploading_ = false;
 }
 
-absl::Status Session::CheckNoGap(uint64_t offset) const {
+absl::Status Session::CheckNoGapLocked(uint64_t offset) const {
   return offset <= point_account_.points()
              ? absl::OkStatus()
              : MakeError(v1::ERROR_REASON_UPLOAD_GAP,
@@ -56,8 +56,8 @@ absl::Status Session::CheckNoGap(uint64_t offset) const {
 
 absl::Status Session::CheckPrefix(const Prefix& prefix) const {
   std::lock_guard lock(mutex_);
-  WELLSPACE_RETURN_IF_ERROR(CheckIdle());
-  WELLSPACE_RETURN_IF_ERROR(CheckNoGap(prefix.end));
+  WELLSPACE_RETURN_IF_ERROR(CheckIdleLocked());
+  WELLSPACE_RETURN_IF_ERROR(CheckNoGapLocked(prefix.end));
   WELLSPACE_ASSIGN_OR_RETURN(const uint32_t checksum,
                              points_->Checksum(prefix.first * dimension_, prefix.end * dimension_));
   return checksum == prefix.crc32c
@@ -70,7 +70,7 @@ absl::Status Session::CheckPrefix(const Prefix& prefix) const {
                          "checked_crc32c");
 }
 
-absl::Status Session::CheckKnown(uint64_t first, std::span<const double> coordinates) const {
+absl::Status Session::CheckKnownLocked(uint64_t first, std::span<const double> coordinates) const {
   WELLSPACE_ASSIGN_OR_RETURN(const uint64_t equal, points_->CountEqual(first * dimension_, coordinates));
   if (equal == coordinates.size()) {
     return absl::OkStatus();
@@ -87,22 +87,22 @@ absl::Status Session::CheckKnown(uint64_t first, std::span<const double> coordin
 
 absl::Status Session::Append(uint64_t offset, std::span<const double> coordinates, uint64_t expected_revision) {
   std::lock_guard lock(mutex_);
-  WELLSPACE_RETURN_IF_ERROR(CheckReadyForChange(expected_revision));
+  WELLSPACE_RETURN_IF_ERROR(CheckReadyForChangeLocked(expected_revision));
   if (coordinates.size() % dimension_ != 0) {
     return MakeError(v1::ERROR_REASON_INVALID_CHUNK_SHAPE,
                      absl::StrCat("the chunk at point ", offset, " has ", coordinates.size(),
                                   " coordinates; expected a multiple of the dimension ", dimension_),
                      "points.coordinates");
   }
-  WELLSPACE_RETURN_IF_ERROR(CheckNoGap(offset));
-  const uint64_t committed = point_account_.points();
-  const uint64_t known = std::min<uint64_t>(committed - offset, coordinates.size() / dimension_);
-  WELLSPACE_RETURN_IF_ERROR(CheckKnown(offset, coordinates.first(known * dimension_)));
+  WELLSPACE_RETURN_IF_ERROR(CheckNoGapLocked(offset));
+  const uint64_t count = point_account_.points();  // those that are not committed yet, too
+  const uint64_t known = std::min<uint64_t>(count - offset, coordinates.size() / dimension_);
+  WELLSPACE_RETURN_IF_ERROR(CheckKnownLocked(offset, coordinates.first(known * dimension_)));
   coordinates = coordinates.subspan(known * dimension_);
   if (coordinates.empty()) {
     return absl::OkStatus();
   }
-  WELLSPACE_RETURN_IF_ERROR(CheckCoordinates(committed, coordinates));
+  WELLSPACE_RETURN_IF_ERROR(CheckCoordinatesLocked(count, coordinates));
   WELLSPACE_RETURN_IF_ERROR(point_account_.Take(coordinates.size() / dimension_));
   if (absl::Status appended = RunGuarded([&] { return points_->Append(coordinates); }); !appended.ok()) {
     point_account_.Return(coordinates.size() / dimension_);
@@ -112,19 +112,19 @@ absl::Status Session::Append(uint64_t offset, std::span<const double> coordinate
     uncommitted_crc32c_ = ExtendCrc32c(uncommitted_crc32c_, coordinates.data(), coordinates.size_bytes());
     return absl::OkStatus();
   }
-  NotePoints(PointCount());
+  NotePointsLocked(PointCountLocked());
   return absl::OkStatus();
 }
 
-void Session::DropUncommitted() {
-  point_account_.Return(PointCount() - committed_points_);
+void Session::DropUncommittedLocked() {
+  point_account_.Return(PointCountLocked() - committed_points_);
   points_->Truncate(committed_points_ * dimension_);
   uncommitted_crc32c_ = 0;
 }
 
 uint64_t Session::UncommittedBytes() const {
   std::lock_guard lock(mutex_);
-  return (PointCount() - committed_points_) * dimension_ * sizeof(double);
+  return (PointCountLocked() - committed_points_) * dimension_ * sizeof(double);
 }
 
 absl::Status Session::CommitPoints() {
@@ -133,10 +133,10 @@ absl::Status Session::CommitPoints() {
   uint32_t crc32c = 0;
   {
     std::lock_guard lock(mutex_);
-    if (!HasUncommitted()) {
+    if (!HasUncommittedLocked()) {
       return absl::OkStatus();
     }
-    end = PointCount();
+    end = PointCountLocked();
     crc32c = std::exchange(uncommitted_crc32c_, 0);  // from now on, of the points behind these
   }
   absl::Status status = points_->Synchronize();
@@ -148,11 +148,11 @@ absl::Status Session::CommitPoints() {
     if (busy_ == Busy::kAddingVertices) {
       uncommitted_crc32c_ = crc32c;  // the mesher takes these points in; the addition tries to commit them, too
     } else {
-      DropUncommitted();
+      DropUncommittedLocked();
     }
     return status;
   }
-  NotePoints(end);
+  NotePointsLocked(end);
   return absl::OkStatus();
 }
 

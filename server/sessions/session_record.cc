@@ -85,8 +85,8 @@ void Session::SetState(const StoredSession& stored) {
                       .faces = state.faces(),
                       .crossings = state.crossings()};
   sizes_in_use_ = {.number = state.sizes(), .count = state.size_count()};
-  const std::vector<SizesInUse> sizes = UnusedSizes({}, 0);  // all of them
-  has_inputs_ =
+  const std::vector<SizesInUse> sizes = UnusedSizesLocked({}, 0);  // all of them
+  are_inputs_loaded_ =
       feature_summary_.segments == 0 && feature_summary_.seeds == 0 && !feature_summary_.has_rules && sizes.empty();
   PointAccount::Held held{
       .points = committed_points_, .segments = feature_summary_.segments, .seeds = feature_summary_.seeds};
@@ -101,11 +101,11 @@ void Session::SetState(const StoredSession& stored) {
   }
   next_operation_ = state.next_operation();
   if (!operations_.empty() && !operations_.back()->HasEnded()) {
-    BeginBusy(Busy::kOperation);
+    BeginBusyLocked(Busy::kOperation);
   }
 }
 
-store::v1::SessionRecord Session::Record() const {
+store::v1::SessionRecord Session::RecordLocked() const {
   store::v1::SessionRecord record;
   record.set_name(name_);
   record.set_tenant(tenant_);
@@ -147,7 +147,7 @@ absl::Status Session::CommitState(const std::function<void(SessionChange&)>& fil
   return Commit([&](SessionChange& change) {
     {
       std::lock_guard lock(mutex_);
-      change.state = Record();
+      change.state = RecordLocked();
     }
     fill(change);
   });
@@ -185,7 +185,7 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::ResumeOperation() {
   }
   std::lock_guard lock(mutex_);
   operation->Fail(now, refusal);
-  EndBusy();
+  EndBusyLocked();
   return nullptr;
 }
 
@@ -199,14 +199,14 @@ void Session::AddPointsTo(SessionChange& change, uint64_t end, uint32_t crc32c) 
   change.state->set_is_ready(false);
 }
 
-void Session::NotePoints(uint64_t end) {
+void Session::NotePointsLocked(uint64_t end) {
   committed_points_ = end;
   is_ready_ = false;
   ++revision_;
 }
 
 absl::Status Session::LoadInputs() {
-  if (has_inputs_) {
+  if (are_inputs_loaded_) {
     return absl::OkStatus();
   }
   WELLSPACE_RETURN_IF_ERROR(LoadSizes());
@@ -218,7 +218,7 @@ absl::Status Session::LoadInputs() {
       features_.Append(step.faces());
     }
   }
-  has_inputs_ = true;
+  are_inputs_loaded_ = true;
   return absl::OkStatus();
 }
 

@@ -20,7 +20,7 @@ bool AreEqual(const core::SizeSamples* a, const core::SizeSamples* b) {
 
 }  // namespace
 
-absl::Status Session::CheckSamples(const core::SizeSamples& samples) const {
+absl::Status Session::CheckSamplesLocked(const core::SizeSamples& samples) const {
   const std::vector<double>& low = work_.mesh != nullptr ? work_.mesh->figures().domain_low : parameters_.domain_low;
   const std::vector<double>& high = work_.mesh != nullptr ? work_.mesh->figures().domain_high : parameters_.domain_high;
   if (low.empty()) {
@@ -38,7 +38,7 @@ absl::Status Session::CheckSamples(const core::SizeSamples& samples) const {
   return absl::OkStatus();
 }
 
-std::vector<SizesInUse> Session::UnusedSizes(const SessionSteps& steps, uint64_t current) const {
+std::vector<SizesInUse> Session::UnusedSizesLocked(const SessionSteps& steps, uint64_t current) const {
   std::vector<SizesInUse> had = steps_.sizes();
   if (sizes_in_use_.number != 0 && std::ranges::find(had, sizes_in_use_) == had.end()) {
     had.push_back(sizes_in_use_);
@@ -58,15 +58,15 @@ absl::Status Session::SetSizes(std::shared_ptr<const core::SizeSamples> samples,
   uint64_t dropped = 0;
   {
     std::lock_guard lock(mutex_);
-    WELLSPACE_RETURN_IF_ERROR(CheckReadyForChange(expected_revision));
+    WELLSPACE_RETURN_IF_ERROR(CheckReadyForChangeLocked(expected_revision));
     if (AreEqual(samples.get(), sizes_.get())) {
       return absl::OkStatus();
     }
     if (samples != nullptr) {
-      WELLSPACE_RETURN_IF_ERROR(CheckSamples(*samples));
+      WELLSPACE_RETURN_IF_ERROR(CheckSamplesLocked(*samples));
     }
     in_use = {.number = count == 0 ? 0 : revision_ + 1, .count = count};
-    unused = UnusedSizes(steps_, in_use.number);
+    unused = UnusedSizesLocked(steps_, in_use.number);
     for (const SizesInUse& set : unused) {
       dropped += set.count;
     }

@@ -28,18 +28,18 @@ absl::Status Session::PrepareStructure(uint64_t expected_revision, const MesherF
     if (is_at_work != nullptr) {
       *is_at_work = busy_ == Busy::kReplaying && !is_closed_;
     }
-    WELLSPACE_RETURN_IF_ERROR(CheckReadyForChange(expected_revision));
-    WELLSPACE_RETURN_IF_ERROR(CheckMesh());
+    WELLSPACE_RETURN_IF_ERROR(CheckReadyForChangeLocked(expected_revision));
+    WELLSPACE_RETURN_IF_ERROR(CheckMeshLocked());
     if (work_.mesher != nullptr) {
       return absl::OkStatus();
     }
-    BeginBusy(Busy::kReplaying);
+    BeginBusyLocked(Busy::kReplaying);
   }
   const absl::Status status = RunGuarded([&] { return Rebuild(create_mesher, job); });
   job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();
   {
     std::lock_guard lock(mutex_);
-    EndBusy();
+    EndBusyLocked();
   }
   NoteIdle();
   return status;
@@ -48,7 +48,7 @@ absl::Status Session::PrepareStructure(uint64_t expected_revision, const MesherF
 Session::Size Session::GetSize(uint64_t few) const {
   std::lock_guard lock(mutex_);
   Size size;
-  size.points = PointCount();
+  size.points = PointCountLocked();
   size.segments = feature_summary_.segments;
   if (size.points <= few) {
     size.some_points = points_->CopyFrom(0, core::RunContext()).value_or(std::vector<double>());
@@ -80,7 +80,7 @@ absl::StatusOr<std::shared_ptr<const LocatedMesh>> Session::PrepareLocator(uint6
   std::shared_ptr<const LocatedMesh> before;  // is freed without the lock
   {
     std::lock_guard lock(mutex_);
-    WELLSPACE_RETURN_IF_ERROR(CheckOpen());
+    WELLSPACE_RETURN_IF_ERROR(CheckOpenLocked());
     if (work_.mesh == nullptr) {
       return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
                        absl::StrCat(name_, " has no mesh yet; start a refinement first"));
@@ -118,8 +118,8 @@ absl::Status Session::BeginAddition(std::span<const double> points, std::span<co
                                     uint64_t expected_revision) {
   std::lock_guard change_lock(change_mutex_);
   std::lock_guard lock(mutex_);
-  WELLSPACE_RETURN_IF_ERROR(CheckReadyForChange(expected_revision));
-  WELLSPACE_RETURN_IF_ERROR(CheckStructure());
+  WELLSPACE_RETURN_IF_ERROR(CheckReadyForChangeLocked(expected_revision));
+  WELLSPACE_RETURN_IF_ERROR(CheckStructureLocked());
   if (points.size() % dimension_ != 0) {
     return MakeError(
         v1::ERROR_REASON_INVALID_CHUNK_SHAPE,
@@ -133,7 +133,7 @@ absl::Status Session::BeginAddition(std::span<const double> points, std::span<co
                      "near");
   }
   WELLSPACE_RETURN_IF_ERROR(point_account_.Take(points.size() / dimension_));
-  BeginBusy(Busy::kAddingVertices);
+  BeginBusyLocked(Busy::kAddingVertices);
   return absl::OkStatus();
 }
 
@@ -168,7 +168,7 @@ absl::StatusOr<AddedVertices> Session::AddVertices(std::span<const double> point
   }
   {
     std::lock_guard lock(mutex_);
-    EndBusy();
+    EndBusyLocked();
     if (!status.ok()) {
       point_account_.Return(points.size() / dimension_);
     }
@@ -187,13 +187,14 @@ void Session::DropMesher() {
 
 absl::Status Session::CommitAddition(std::span<const double> points, uint64_t uploaded,
                                      const AnswerTo<AddedVertices>& answer, AddedVertices* added) {
+  // Of a session that is busy, what is read here changes with change_mutex_ held alone: by an upload that ends.
+  std::lock_guard change_lock(change_mutex_);
   const uint64_t count = points.size() / dimension_;
   if (uploaded == 0 && count == 0) {
     added->revision = revision_;
     return absl::OkStatus();
   }
-  std::lock_guard change_lock(change_mutex_);
-  const uint64_t known = PointCount();
+  const uint64_t known = PointCountLocked();
   const uint64_t uploads_end = work_.meshed_points + uploaded;
   const bool grows = known + count > committed_points_;
   added->revision = revision_ + (grows ? 1 : 0);
@@ -223,7 +224,7 @@ absl::Status Session::CommitAddition(std::span<const double> points, uint64_t up
   ++structure_version_;
   if (grows) {
     uncommitted_crc32c_ = 0;
-    NotePoints(known + count);
+    NotePointsLocked(known + count);
   }
   return absl::OkStatus();
 }
@@ -238,7 +239,7 @@ absl::Status Session::CheckVertices(std::span<const double> points, std::span<co
                                   work_.mesher->vertex_count()),
                      "near");
   }
-  return CheckCoordinates(0, points);
+  return CheckCoordinatesLocked(0, points);
 }
 
 absl::StatusOr<std::vector<uint32_t>> Session::AddToMesher(std::span<const double> points,

@@ -42,8 +42,8 @@ void MeshPointsCall::Work(PointChunks& points, Job& job) {
 }
 
 bool MeshPointsCall::IsSmall(const PointChunks& points) const {
-  return points.coordinate_count() <= kMostPoints * parameters().dimension &&
-         features().segment_count() <= kMostPoints && IsSmallMesh(parameters(), points.Copy());
+  return points.coordinate_count() <= kMostSmallPoints * parameters().dimension &&
+         features().segment_count() <= kMostSmallPoints && IsSmallMesh(parameters(), points.Copy());
 }
 
 void MeshPointsCall::ScheduleTick() {

@@ -18,7 +18,7 @@
 #include "server/services/sessions/set_sizes_call.h"
 #include "server/services/sessions/upload_points_call.h"
 #include "server/sessions/refinement.h"
-#include "server/sessions/session_store.h"
+#include "server/sessions/session_registry.h"
 #include "server/wire/convert.h"
 #include "server/wire/errors.h"
 

@@ -11,7 +11,7 @@
 
 #include "gtest/gtest.h"
 #include "server/observability/work_counters.h"
-#include "server/sessions/memory_session_store.h"
+#include "server/sessions/session_registry.h"
 #include "server/store/durable_log.h"
 #include "server/store/ephemeral_log.h"
 #include "spdlog/logger.h"
@@ -148,7 +148,7 @@ class IdleSessionsTest : public ::testing::Test {
   ServiceOptions options_;
   MemoryBudget memory_{kProcessMemoryBytes + 100 * kMegabyte};
   std::unique_ptr<SessionLog> log_;
-  MemorySessionStore store_{options_, memory_, clock_, *log_};
+  SessionRegistry store_{options_, memory_, clock_, *log_};
   spdlog::logger logger_{"none"};
   WorkCounters counters_;
   WorkObserver observer_{logger_, counters_};

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "gtest/gtest.h"
-#include "server/sessions/memory_session_store.h"
+#include "server/sessions/session_registry.h"
 #include "server/store/durable_log.h"
 #include "server/wire/errors.h"
 #include "tests/server/scripted_mesher.h"
@@ -71,7 +71,7 @@ class RestoredSessionTest : public ::testing::Test {
   ServiceOptions options_;
   MemoryBudget memory_{0};
   std::unique_ptr<DurableLog> log_;
-  std::optional<MemorySessionStore> store_;
+  std::optional<SessionRegistry> store_;
   std::shared_ptr<Session> session_;
   std::shared_ptr<Operation> resumed_;  // by the last process
 };

@@ -9,7 +9,7 @@
 
 #include "gtest/gtest.h"
 #include "server/jobs/job_pool.h"
-#include "server/sessions/memory_session_store.h"
+#include "server/sessions/session_registry.h"
 #include "server/store/ephemeral_log.h"
 #include "server/wire/errors.h"
 #include "tests/server/service_harness.h"
@@ -50,7 +50,7 @@ class SessionTest : public ::testing::Test {
   ServiceOptions options_;
   MemoryBudget memory_{0};
   EphemeralLog log_;
-  MemorySessionStore store_{options_, memory_, {}, log_};
+  SessionRegistry store_{options_, memory_, {}, log_};
   std::shared_ptr<Session> session_ =
       store_.Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = {}}).value();
 };

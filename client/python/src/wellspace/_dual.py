@@ -28,7 +28,7 @@ class DualCells:
     volumes : (n,) float
         Of the cell of each vertex: areas in 2-D. Their sum is that of the simplices, but for rounding.
     edges : (e, 2) int
-        The edges of the mesh, each once, the lower vertex first: the cells of these two are neighbours.
+        The edges of the mesh, each once, the lower vertex first: the cells of the two are neighbours.
     areas : (e,) float
         Of the facet between the two cells: lengths in 2-D. At least 0, but for rounding; 0 where the cells meet in less.
     lengths : (e,) float
@@ -97,7 +97,7 @@ def _part(corners: Floats, i: int, j: int) -> Floats:
 
 
 def _height(corners: Floats, face: tuple[int, int, int], opposite: int) -> Floats:
-    """How far the circumcentre of a tetrahedron is from a face; negative beyond it, as seen from the opposite corner."""
+    """How far the circumcentre of a tetrahedron is from a face; negative beyond it, seen from the opposite corner."""
     a, b, c = (corners[:, k] - corners[:, face[0]] for k in (face[1], face[2], opposite))
     normal = np.cross(a, b)
     aa, bb, cc = _dot(a, a), _dot(b, b), _dot(c, c)

@@ -28,8 +28,8 @@ class Located:
     Attributes
     ----------
     simplices : (n,) int
-        The simplex that has each point; of several, as it is on a face of theirs, the one with the lowest number. -1 for
-        a point in none.
+        The simplex that has each point; of several, as it is on a face of theirs, the one with the lowest number. -1
+        for a point in none.
     vertices : (n, d + 1) int
         Its vertices.
     coordinates : (n, d + 1) float

@@ -1,4 +1,6 @@
 // Sessions and their store, with a clock that the test moves.
+#include "server/sessions/session_registry.h"
+
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -8,7 +10,6 @@
 
 #include "absl/strings/escaping.h"
 #include "gtest/gtest.h"
-#include "server/sessions/memory_session_store.h"
 #include "server/store/ephemeral_log.h"
 #include "server/wire/errors.h"
 #include "tests/server/service_harness.h"
@@ -19,7 +20,7 @@ namespace {
 // Work that never begins.
 absl::Status Submitted(const std::shared_ptr<Operation>& /*operation*/) { return absl::OkStatus(); }
 
-class SessionStoreTest : public ::testing::Test {
+class SessionRegistryTest : public ::testing::Test {
  protected:
   std::shared_ptr<Session> Create(const std::string& tenant = "a", absl::Duration ttl = absl::Minutes(1),
                                   std::map<std::string, std::string> labels = {}) {
@@ -40,12 +41,12 @@ class SessionStoreTest : public ::testing::Test {
   MemoryBudget memory_{0};
   absl::Duration since_boot_ = absl::Hours(1);
   EphemeralLog log_;
-  MemorySessionStore store_{
+  SessionRegistry store_{
       options_, memory_, {.wall = [this] { return now_; }, .since_boot = [this] { return since_boot_; }}, log_};
   absl::Status status_;
 };
 
-TEST_F(SessionStoreTest, NamesCannotBeGuessed) {
+TEST_F(SessionRegistryTest, NamesCannotBeGuessed) {
   constexpr int kNames = 1000;
   constexpr size_t kBits = 128;
   const size_t prefix = std::string("sessions/").size();
@@ -69,7 +70,7 @@ TEST_F(SessionStoreTest, NamesCannotBeGuessed) {
   }
 }
 
-TEST_F(SessionStoreTest, AnotherTenantsSessionDoesNotExist) {
+TEST_F(SessionRegistryTest, AnotherTenantsSessionDoesNotExist) {
   const std::shared_ptr<Session> session = Create("a");
   EXPECT_TRUE(Finds(*session, "a"));
   EXPECT_FALSE(Finds(*session, "b"));
@@ -82,7 +83,7 @@ TEST_F(SessionStoreTest, AnotherTenantsSessionDoesNotExist) {
   EXPECT_TRUE(store_.List("b", absl::InfinitePast(), 10, {}).empty());
 }
 
-TEST_F(SessionStoreTest, AnUnusedSessionExpires) {
+TEST_F(SessionRegistryTest, AnUnusedSessionExpires) {
   const std::shared_ptr<Session> session = Create("a", absl::Seconds(10));
   since_boot_ += absl::Seconds(9);
   EXPECT_TRUE(Finds(*session)) << "and renews the lease";
@@ -96,7 +97,7 @@ TEST_F(SessionStoreTest, AnUnusedSessionExpires) {
   EXPECT_TRUE(store_.RemoveExpired().empty());
 }
 
-TEST_F(SessionStoreTest, TheClockOnTheWallMayJump) {
+TEST_F(SessionRegistryTest, TheClockOnTheWallMayJump) {
   const std::shared_ptr<Session> session = Create("a", absl::Seconds(10));
   const absl::Time created = session->create_time();
   now_ += absl::Hours(2);
@@ -112,7 +113,7 @@ TEST_F(SessionStoreTest, TheClockOnTheWallMayJump) {
   EXPECT_FALSE(Finds(*session)) << "nor does it last longer";
 }
 
-TEST_F(SessionStoreTest, ASessionInUseDoesNotExpire) {
+TEST_F(SessionRegistryTest, ASessionInUseDoesNotExpire) {
   const std::shared_ptr<Session> session = Create("a", absl::Seconds(10));
   {
     const SessionUse use(session);
@@ -125,7 +126,7 @@ TEST_F(SessionStoreTest, ASessionInUseDoesNotExpire) {
   EXPECT_TRUE(session->IsExpired());
 }
 
-TEST_F(SessionStoreTest, ASessionWithAnOperationDoesNotExpire) {
+TEST_F(SessionRegistryTest, ASessionWithAnOperationDoesNotExpire) {
   const std::shared_ptr<Session> session = Create("a", absl::Seconds(10));
   const absl::StatusOr<std::shared_ptr<Operation>> operation =
       session->StartOperation({.dimension = 2}, /*restart=*/false, 0, Submitted);
@@ -137,7 +138,7 @@ TEST_F(SessionStoreTest, ASessionWithAnOperationDoesNotExpire) {
   EXPECT_EQ(store_.RemoveExpired().size(), 1u);
 }
 
-TEST_F(SessionStoreTest, SessionsAreLimitedByTenantAndInAll) {
+TEST_F(SessionRegistryTest, SessionsAreLimitedByTenantAndInAll) {
   std::vector<std::shared_ptr<Session>> sessions;
   for (int i = 0; i < 3; ++i) {
     sessions.push_back(Create("a"));
@@ -155,7 +156,7 @@ TEST_F(SessionStoreTest, SessionsAreLimitedByTenantAndInAll) {
   EXPECT_NE(Create("a"), nullptr);
 }
 
-TEST_F(SessionStoreTest, ListsInTheOrderOfCreationWhateverTheClockSays) {
+TEST_F(SessionRegistryTest, ListsInTheOrderOfCreationWhateverTheClockSays) {
   std::vector<std::string> created;
   for (int i = 0; i < 3; ++i) {
     created.push_back(Create("a", absl::Minutes(1), {{"even", i % 2 == 0 ? "yes" : "no"}})->name());
@@ -172,7 +173,7 @@ TEST_F(SessionStoreTest, ListsInTheOrderOfCreationWhateverTheClockSays) {
   EXPECT_EQ(store_.List("a", absl::InfinitePast(), 10, {{"even", "yes"}, {"odd", ""}}).size(), 0u);
 }
 
-TEST_F(SessionStoreTest, PointsAreLimitedBySessionAndByTenant) {
+TEST_F(SessionRegistryTest, PointsAreLimitedBySessionAndByTenant) {
   const std::shared_ptr<Session> first = Create();
   const std::shared_ptr<Session> second = Create();
   EXPECT_TRUE(first->Append(0, std::vector<double>(20, 0.5), 0).ok());
@@ -189,7 +190,7 @@ TEST_F(SessionStoreTest, PointsAreLimitedBySessionAndByTenant) {
   EXPECT_EQ(DetailsOf(first->Append(10, {}, 0)).reason, "SESSION_NOT_FOUND");
 }
 
-TEST_F(SessionStoreTest, KeepsTheLastHundredOperations) {
+TEST_F(SessionRegistryTest, KeepsTheLastHundredOperations) {
   const std::shared_ptr<Session> session = Create();
   for (int i = 0; i < 103; ++i) {
     const absl::StatusOr<std::shared_ptr<Operation>> operation =

@@ -1,4 +1,4 @@
-#include "server/sessions/memory_session_store.h"
+#include "server/sessions/session_registry.h"
 
 #include <unistd.h>
 
@@ -25,12 +25,11 @@ std::string UnguessableName() {
 
 }  // namespace
 
-MemorySessionStore::MemorySessionStore(const ServiceOptions& options, MemoryBudget& memory, Clock clock,
-                                       SessionLog& log)
+SessionRegistry::SessionRegistry(const ServiceOptions& options, MemoryBudget& memory, Clock clock, SessionLog& log)
     : options_(options), memory_(memory), clock_(std::move(clock)), log_(log) {}
 
-absl::StatusOr<std::shared_ptr<Session>> MemorySessionStore::Create(NewSession settings,
-                                                                    const AnswerTo<v1::Session>& answer) {
+absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(NewSession settings,
+                                                                 const AnswerTo<v1::Session>& answer) {
   WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, Prepare(std::move(settings)));
   absl::Status logged = RunGuarded([&] { return session->LogCreation(answer); });  // without a lock: it takes long
   std::lock_guard lock(mutex_);
@@ -44,7 +43,7 @@ absl::StatusOr<std::shared_ptr<Session>> MemorySessionStore::Create(NewSession s
   return session;
 }
 
-absl::StatusOr<std::shared_ptr<Session>> MemorySessionStore::Prepare(NewSession settings) {
+absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Prepare(NewSession settings) {
   std::lock_guard lock(mutex_);
   const auto known = tenants_.find(settings.tenant);
   const size_t count = known == tenants_.end() ? 0 : known->second.sessions.size() + known->second.pending;
@@ -70,7 +69,7 @@ absl::StatusOr<std::shared_ptr<Session>> MemorySessionStore::Prepare(NewSession 
                                    options_, memory_, clock_, tenant.points, log_);
 }
 
-absl::StatusOr<std::shared_ptr<Session>> MemorySessionStore::Restore(const StoredSession& stored) {
+absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Restore(const StoredSession& stored) {
   std::lock_guard lock(mutex_);
   WELLSPACE_ASSIGN_OR_RETURN(
       std::shared_ptr<Session> session,
@@ -80,19 +79,19 @@ absl::StatusOr<std::shared_ptr<Session>> MemorySessionStore::Restore(const Store
   return session;
 }
 
-void MemorySessionStore::Publish(const std::shared_ptr<Session>& session) {
+void SessionRegistry::Publish(const std::shared_ptr<Session>& session) {
   tenants_[session->tenant()].sessions.emplace(session->create_time(), session);
   by_name_.emplace(session->name(), session);
 }
 
-void MemorySessionStore::DropIfEmpty(const std::string& tenant) {
+void SessionRegistry::DropIfEmpty(const std::string& tenant) {
   const auto known = tenants_.find(tenant);
   if (known != tenants_.end() && known->second.sessions.empty() && known->second.pending == 0) {
     tenants_.erase(known);
   }
 }
 
-absl::StatusOr<std::shared_ptr<Session>> MemorySessionStore::Find(const std::string& tenant, const std::string& name) {
+absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Find(const std::string& tenant, const std::string& name) {
   std::lock_guard lock(mutex_);
   const auto found = by_name_.find(name);
   if (found == by_name_.end() || found->second->tenant() != tenant || !found->second->Renew()) {
@@ -102,9 +101,8 @@ absl::StatusOr<std::shared_ptr<Session>> MemorySessionStore::Find(const std::str
   return found->second;
 }
 
-std::vector<std::shared_ptr<Session>> MemorySessionStore::List(const std::string& tenant, absl::Time after,
-                                                               size_t count,
-                                                               const std::map<std::string, std::string>& labels) {
+std::vector<std::shared_ptr<Session>> SessionRegistry::List(const std::string& tenant, absl::Time after, size_t count,
+                                                            const std::map<std::string, std::string>& labels) {
   std::vector<std::shared_ptr<Session>> listed;
   std::lock_guard lock(mutex_);
   const auto known = tenants_.find(tenant);
@@ -120,7 +118,7 @@ std::vector<std::shared_ptr<Session>> MemorySessionStore::List(const std::string
   return listed;
 }
 
-std::vector<std::shared_ptr<Session>> MemorySessionStore::All() const {
+std::vector<std::shared_ptr<Session>> SessionRegistry::All() const {
   std::vector<std::shared_ptr<Session>> all;
   std::lock_guard lock(mutex_);
   all.reserve(by_name_.size());
@@ -130,7 +128,7 @@ std::vector<std::shared_ptr<Session>> MemorySessionStore::All() const {
   return all;
 }
 
-bool MemorySessionStore::Remove(const Session& session) {
+bool SessionRegistry::Remove(const Session& session) {
   std::lock_guard lock(mutex_);
   if (by_name_.erase(session.name()) == 0) {
     return false;
@@ -140,12 +138,12 @@ bool MemorySessionStore::Remove(const Session& session) {
   return true;
 }
 
-size_t MemorySessionStore::Count() const {
+size_t SessionRegistry::Count() const {
   std::lock_guard lock(mutex_);
   return by_name_.size();
 }
 
-std::vector<std::shared_ptr<Session>> MemorySessionStore::RemoveExpired() {
+std::vector<std::shared_ptr<Session>> SessionRegistry::RemoveExpired() {
   std::vector<std::shared_ptr<Session>> expired;
   {
     std::lock_guard lock(mutex_);

@@ -1,0 +1,101 @@
+// The sessions of a process, in memory; a SessionLog has what outlives it.
+#ifndef WELLSPACE_SERVER_SESSIONS_SESSION_REGISTRY_H_
+#define WELLSPACE_SERVER_SESSIONS_SESSION_REGISTRY_H_
+
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "absl/status/statusor.h"
+#include "absl/time/time.h"
+#include "core/mesh_parameters.h"
+#include "server/base/options.h"
+#include "server/jobs/memory_budget.h"
+#include "server/sessions/session.h"
+
+namespace wellspace::server {
+
+// What a new session is made of.
+struct NewSession {
+  std::string tenant;
+  core::MeshParameters parameters;
+  std::map<std::string, std::string> labels;
+  absl::Duration ttl;
+};
+
+// The sessions of all tenants. No tenant sees those of another.
+//
+// Thread safety: thread-safe. Locks of sessions are taken with that of the registry held, never the other way round.
+// Invariants: (1) never more sessions than the limits of the server allow; (2) names are never used again, and cannot
+//             be guessed.
+class SessionRegistry {
+ public:
+  // REQUIRES:   `options`, `memory` and `log` outlive this and all sessions.
+  SessionRegistry(const ServiceOptions& options, MemoryBudget& memory, Clock clock, SessionLog& log);
+
+  // Makes a session without points, and has it written down.
+  //
+  // Errors:     QUOTA_EXCEEDED (the tenant's sessions), TOO_MANY_SESSIONS (the server's); DISK_FULL, STORE_FAILED.
+  absl::StatusOr<std::shared_ptr<Session>> Create(NewSession settings, const AnswerTo<v1::Session>& answer = nullptr);
+
+  // Takes a session in that was written down before the server was started, whatever the limits are now.
+  //
+  // Errors:     those of Session::Restore.
+  absl::StatusOr<std::shared_ptr<Session>> Restore(const StoredSession& stored);
+
+  // The session `name` of `tenant`, its lease renewed.
+  //
+  // Errors:     SESSION_NOT_FOUND: there is none, it has expired, or it is another tenant's.
+  absl::StatusOr<std::shared_ptr<Session>> Find(const std::string& tenant, const std::string& name);
+
+  // Of the sessions of `tenant` that were created after `after`, in the order of their creation, the first `count` that
+  // have all of `labels`. No two sessions were created at the same time.
+  std::vector<std::shared_ptr<Session>> List(const std::string& tenant, absl::Time after, size_t count,
+                                             const std::map<std::string, std::string>& labels);
+
+  // All sessions, of all tenants, in no order.
+  std::vector<std::shared_ptr<Session>> All() const;
+
+  // Takes `session` out. False when it is not there any more.
+  bool Remove(const Session& session);
+
+  // How many there are, of all tenants.
+  size_t Count() const;
+
+  // Takes those out whose lease has run out. The caller is to have their end written down (Session::LogExpiry).
+  std::vector<std::shared_ptr<Session>> RemoveExpired();
+
+ private:
+  struct Tenant {
+    std::shared_ptr<TenantPoints> points = std::make_shared<TenantPoints>();
+    std::map<absl::Time, std::shared_ptr<Session>> sessions;  // by time of creation
+    size_t pending = 0;                                       // that are being written down
+  };
+
+  // A session that has its place, but is not shown yet.
+  absl::StatusOr<std::shared_ptr<Session>> Prepare(NewSession settings);
+
+  // The following want mutex_ to be held.
+  void Publish(const std::shared_ptr<Session>& session);
+  // Forgets a tenant that has nothing any more.
+  void DropIfEmpty(const std::string& tenant);
+
+  const ServiceOptions& options_;
+  MemoryBudget& memory_;
+  const Clock clock_;
+  SessionLog& log_;
+  mutable std::mutex mutex_;
+  // Guarded by mutex_.
+  std::unordered_map<std::string, std::shared_ptr<Session>> by_name_;
+  std::map<std::string, Tenant> tenants_;  // those that have sessions
+  size_t pending_ = 0;                     // of all tenants
+  absl::Time last_create_time_ = absl::InfinitePast();
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_SESSIONS_SESSION_REGISTRY_H_
