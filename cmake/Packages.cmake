@@ -47,8 +47,11 @@ wellspace_package(DEVELOPMENT libwellspace-dev libdevel "quality simplicial mesh
 points and planar domains, and simplices up to 6-D. These are its libraries,
 for linking statically: the mesher, the client of its server, and files of
 points and meshes; with files for CMake and pkg-config, and the protos.")
+# The compiler, since CMake finds Debian's gRPC only where gRPC's plugin for it is.
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
-    "libabsl-dev, libtbb-dev, libgrpc++-dev, libprotobuf-dev, libhdf5-dev, libminizip-dev, zlib1g-dev, pkg-config")
+    "libabsl-dev, libtbb-dev, libgrpc++-dev, protobuf-compiler-grpc, libprotobuf-dev, libhdf5-dev, libminizip-dev"
+    "zlib1g-dev, pkg-config")
+list(JOIN CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS ", " CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS)
 
 wellspace_package(PYTHON python3-wellspace python "quality simplicial meshes of point clouds (Python)"
 "Wellspace makes meshes of triangles and tetrahedra of quality from clouds of

@@ -160,6 +160,19 @@ class Parts(unittest.TestCase):
         for other in ("libwellspace_client.a", "libwellspace_proto.a", "libwellspace_formats.a", "bin/wellspaced"):
             self.assertNotIn(other, targets)
 
+    @unittest.skipUnless((BIN.parent / "build.ninja").exists(), "wants a build by Ninja")
+    def test_core_is_made_of_abseil_onetbb_and_boost(self):
+        """The headers that went into the objects of the core, by their packages."""
+        inputs = run("ninja", "-C", BIN.parent, "-t", "inputs", "core/libwellspace_core.a", "core/libwellspace_core_sliver.a",
+                     "core/libwellspace_core_refine.a", "core/libwellspace_core_geometry.a").split()
+        objects = [name for name in inputs if name.endswith(".o")]
+        self.assertGreater(len(objects), 40)
+        headers = set(re.findall(r"^    (/usr/\S+)$", run("ninja", "-C", BIN.parent, "-t", "deps", *objects), re.MULTILINE))
+        owners = run("dpkg-query", "--search", *sorted({str(pathlib.Path(header).resolve()) for header in headers}))
+        packages = {owner.split(":")[0] for line in owners.splitlines() for owner in line.rsplit(": ", 1)[0].split(", ")}
+        compiler = {"libc6-dev", "libgcc-12-dev", "libstdc++-12-dev", "linux-libc-dev"}
+        self.assertEqual(packages - compiler, {"libabsl-dev", "libtbb-dev", "libboost1.74-dev"})
+
     def test_unknown_part(self):
         output = run("cmake", "-S", ROOT, "-B", in_folder(self), "-DWELLSPACE_COMPONENTS=core;solver", exit_code=1)
         self.assertIn("WELLSPACE_COMPONENTS has 'solver'; there are: core;formats;client;server;tool;python",
