@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs the Debian 12 packages that Wellspace needs. The one place with package lists.
 #
-#   deploy/install-deps.sh [GROUP…]        groups: build test interoperability solvers lint tidy fuzz node bench container monitoring runtime dev; default: build test
+#   deploy/install-deps.sh [GROUP…]        groups: build test interoperability solvers lint tidy fuzz node bench container package monitoring runtime dev; default: build test
 #
 # As root, or through sudo. Installs only what is missing; does not touch the network when nothing is.
 set -euo pipefail
@@ -15,7 +15,7 @@ declare -A packages=(
   [test]="libgtest-dev libgmock-dev libcgal-dev python3 python3-grpcio python3-meshio python3-numpy openssl
           python3-protobuf python3-scipy python3-tqdm libisal2 mypy
           python3-build python3-pip python3-setuptools python3-venv python3-wheel"
-  [interoperability]="gmsh freefem++ python3-gmsh python3-meshio python3-vtk9 python3-numpy"
+  [interoperability]="gmsh freefem++ python3-gmsh python3-meshio python3-vtk9 python3-numpy fish zsh"
   [solvers]="openfoam python3-dolfinx"
   [lint]="git clang-format-14 python3"
   [tidy]="clang-tidy-14"
@@ -23,6 +23,7 @@ declare -A packages=(
   [node]="nodejs npm"
   [bench]="libtet1.5-dev libcgal-dev voro++-dev libbenchmark-dev python3 python3-matplotlib"
   [container]="debootstrap podman buildah"
+  [package]="dpkg-dev lintian groff-base debootstrap"
   [monitoring]="prometheus"
   [runtime]="libgrpc++1.51 libprotobuf32 libabsl20220623 libspdlog1.10 libtbb12 libprometheus-cpp-core1.0 libcairo2 zlib1g
              libminizip1 libsz2 libsqlite3-0"

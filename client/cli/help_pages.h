@@ -1,4 +1,4 @@
-// What is told of the tool elsewhere than in --help, made of the same descriptions.
+// What is told of the tool elsewhere than in --help, made of the same descriptions; completions.h has the shells.
 #ifndef WELLSPACE_CLIENT_CLI_HELP_PAGES_H_
 #define WELLSPACE_CLIENT_CLI_HELP_PAGES_H_
 
@@ -6,9 +6,6 @@
 #include <string>
 
 namespace wellspace::cli {
-
-// A script that makes bash complete commands, options, the values of options that have few, and names of files.
-std::string BashCompletion(const CLI::App& app);
 
 // The manual page wellspace(1), in the macros of man(7). `version` is that of the tool.
 std::string ManualPage(const CLI::App& app, const std::string& version);

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "client/cli/commands/commands.h"
+#include "client/cli/completions.h"
 #include "client/cli/exit_codes.h"
 #include "client/cli/help_pages.h"
 
@@ -15,10 +16,12 @@ void AddCompletionCommands(CLI::App& app, int& exit_code) {
       app.add_subcommand("completion", "Print a script that makes a shell complete the tool's words");
   completion->footer(
       "Example:\n"
-      "  wellspace completion bash > ~/.local/share/bash-completion/completions/wellspace\n");
-  completion->add_option("SHELL", *shell, "The shell")->required()->check(CLI::IsMember({"bash"}));
+      "  wellspace completion bash > ~/.local/share/bash-completion/completions/wellspace\n"
+      "  wellspace completion zsh > ~/.zfunc/_wellspace            # a folder of fpath\n"
+      "  wellspace completion fish > ~/.config/fish/completions/wellspace.fish\n");
+  completion->add_option("SHELL", *shell, "The shell")->required()->check(CLI::IsMember({"bash", "zsh", "fish"}));
   completion->callback([&app, shell, &exit_code] {
-    std::cout << BashCompletion(app);
+    std::cout << (*shell == "bash" ? BashCompletion(app) : *shell == "zsh" ? ZshCompletion(app) : FishCompletion(app));
     exit_code = kExitOk;
   });
 

@@ -1,4 +1,4 @@
-"""The manual page and bash's completion against --help of every command."""
+"""The manual page and the shells' completions against --help of every command."""
 
 import os
 import re
@@ -58,7 +58,7 @@ class ManualTest(unittest.TestCase):
         self.assertEqual(result.stderr, "")
 
 
-class CompletionTest(unittest.TestCase):
+class BashTest(unittest.TestCase):
     def complete(self, *words, folder="."):
         """What bash offers for the last of `words`."""
         line = " ".join(f"'{word}'" for word in ("wellspace", *words))
@@ -77,7 +77,7 @@ class CompletionTest(unittest.TestCase):
         self.assertEqual(self.complete("se"), ["session", "server"])
         self.assertEqual(sorted(self.complete("session", "")), sorted(subcommands("session")))
         self.assertEqual(self.complete("server", "h"), ["health"])
-        self.assertEqual(self.complete("completion", ""), ["bash"])
+        self.assertEqual(self.complete("completion", ""), ["bash", "zsh", "fish"])
 
     def test_options_of_every_command(self):
         for command in leaves():
@@ -97,6 +97,93 @@ class CompletionTest(unittest.TestCase):
             self.assertEqual(self.complete("mesh", "cl", folder=folder), ["cloud.csv"])
             self.assertEqual(sorted(self.complete("mesh", "a.csv", "-o", "", folder=folder)),
                              ["cloud.csv", "other.npz"])
+
+
+def script_of(test, shell, name):
+    """The shell's script in a folder of its own."""
+    folder = tempfile.TemporaryDirectory()
+    test.addCleanup(folder.cleanup)
+    path = os.path.join(folder.name, name)
+    with open(path, "w") as file:
+        file.write(run("completion", shell))
+    return path
+
+
+@unittest.skipUnless(shutil.which("fish"), "fish is not installed")
+class FishTest(unittest.TestCase):
+    def setUp(self):
+        self.script = script_of(self, "fish", "wellspace.fish")
+
+    def complete(self, *lines):
+        """What fish offers at the end of each line: words without their descriptions."""
+        commands = "".join(f"complete -C'wellspace {line}'; echo ---;" for line in lines)
+        folder = os.path.dirname(self.script)
+        result = subprocess.run(["fish", "-c", f"source {self.script}; {commands}"], capture_output=True, text=True,
+                                check=True, cwd=folder, env=os.environ | {"HOME": folder})
+        self.assertEqual(result.stderr, "")
+        return [[word.partition("\t")[0] for word in part.splitlines()] for part in result.stdout.split("---\n")[:-1]]
+
+    def test_options_of_every_command(self):
+        commands = list(leaves())
+        lines = (" ".join(command) + " --" for command in commands)
+        for command, offered in zip(commands, self.complete(*lines)):
+            self.assertLessEqual(options(command), set(offered), command)
+
+    def test_words(self):
+        lines = ("", "se", "session ", "completion ", "mesh --criterion ", "session list --output j", "mesh --rho ",
+                 "mesh well", "mesh a.csv -o well")
+        expected = (subcommands(), ["server", "session"], subcommands("session"), ["bash", "zsh", "fish"],
+                    ["radius-edge", "well-spaced"], ["json"], [], ["wellspace.fish"], ["wellspace.fish"])
+        for line, words, offered in zip(lines, expected, self.complete(*lines)):
+            self.assertEqual(sorted(words), sorted(offered), line)
+
+
+# zsh at a terminal of its own, which is given a line and a tab, until it shows the word that is looked for.
+ZSH_AT_A_TERMINAL = r"""
+zmodload zsh/zpty
+zpty shell zsh -f -i
+zpty -w shell "PS1=; fpath=($1 \$fpath); autoload -Uz compinit; compinit -D -u; bindkey '^I' list-choices"
+zpty -w shell "print READY\$((1+1))"
+zpty -r shell output '*READY2*'
+zpty -w -n shell "$2"$'\t'
+zpty -r shell output "*$3*"
+zpty -d shell
+"""
+
+
+@unittest.skipUnless(shutil.which("zsh"), "zsh is not installed")
+class ZshTest(unittest.TestCase):
+    def setUp(self):
+        self.script = script_of(self, "zsh", "_wellspace")
+
+    def specifications(self, *words):
+        """What the script hands to zsh's own functions for the last of `words`."""
+        line = " ".join(f"'{word}'" for word in ("wellspace", *words))
+        code = ('_arguments() { print -rl -- "$@" }; _describe() { print -rl -- "${(@P)2}" }; '
+                f'words=({line}); CURRENT=$#words; source "$1"')
+        result = subprocess.run(["zsh", "-f", "-c", code, "zsh", self.script], capture_output=True, text=True,
+                                check=True)
+        self.assertEqual(result.stderr, "")
+        return result.stdout
+
+    def test_options_of_every_command(self):
+        for command in leaves():
+            offered = self.specifications(*command, "--")
+            self.assertLessEqual(options(command), set(re.findall(r"^\*(--[\w-]+)\[", offered, re.MULTILINE)), command)
+
+    def test_words(self):
+        for command in ((), ("session",), ("server",)):
+            offered = re.findall(r"^(\w+):", self.specifications(*command, ""), re.MULTILINE)
+            self.assertEqual(sorted(offered), sorted(subcommands(*command)))
+        self.assertIn(":SHELL:(bash zsh fish)\n", self.specifications("completion", ""))
+        self.assertRegex(self.specifications("mesh", ""), r"\*--criterion\[.*\]:value:\(radius-edge well-spaced\)\n")
+        self.assertRegex(self.specifications("mesh", ""), r"\*--out\[.*\]:value:_files\n")
+
+    def test_at_a_terminal(self):
+        for line, shown in (("wellspace session c", "create "), ("wellspace mesh --criterion ", "well-spaced"),
+                            ("wellspace server info --tls-c", "--tls-cert"), ("wellspace mesh a --quie", "--quiet")):
+            subprocess.run(["zsh", "-f", "-c", ZSH_AT_A_TERMINAL, "zsh", os.path.dirname(self.script), line, shown],
+                           capture_output=True, check=True, timeout=60)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -65,6 +66,19 @@ class PackageTest(unittest.TestCase):
             prefix = self.sdist.name.removesuffix(".tar.gz")
             self.assertEqual(sdist.extractfile(f"{prefix}/src/wellspace/_api.binpb").read(), descriptors)
         self.assertLessEqual({"LICENSE", "README.md", "setup.py", "pyproject.toml", "src/wellspace/py.typed"}, names)
+
+    def test_debian_package_says_the_same(self):
+        """METADATA.in, from which it has its metadata, against those of the wheel."""
+
+        def plain(text):
+            return [re.sub(r"[() ]", "", line) for line in text.splitlines() if "Version" not in line.partition(":")[0]]
+
+        with zipfile.ZipFile(self.wheel) as wheel:
+            (metadata,) = [wheel.read(name).decode() for name in wheel.namelist() if name.endswith("METADATA")]
+        debian = plain((ROOT / "client" / "python" / "METADATA.in").read_text(encoding="utf-8"))
+        required = {line for line in plain(metadata) if line.startswith("Requires-") and "extra==" not in line}
+        self.assertLessEqual(set(debian), set(plain(metadata)))
+        self.assertEqual({line for line in debian if line.startswith("Requires-")}, required)
 
     def test_version_is_that_of_the_project(self):
         cmake = (ROOT / "CMakeLists.txt").read_text(encoding="utf-8")

@@ -1,0 +1,11 @@
+# Installs a unit of systemd, which names the program where it is installed: /usr/local/bin becomes PREFIX/bin.
+function(wellspace_install_unit unit)
+  get_filename_component(name ${unit} NAME)
+  file(READ ${unit} text)
+  string(REPLACE /usr/local/bin/ ${CMAKE_INSTALL_PREFIX}/bin/ text "${text}")
+  set(target ${CMAKE_INSTALL_PREFIX}/lib/systemd/system/${name})
+  message(STATUS "Installing: $ENV{DESTDIR}${target}")
+  file(WRITE $ENV{DESTDIR}${target} "${text}")
+  list(APPEND CMAKE_INSTALL_MANIFEST_FILES ${target})
+  set(CMAKE_INSTALL_MANIFEST_FILES "${CMAKE_INSTALL_MANIFEST_FILES}" PARENT_SCOPE)
+endfunction()
