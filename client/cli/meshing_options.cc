@@ -19,8 +19,9 @@ const char kCloudsHelp[] =
     ".csv\n";
 
 const char kMeshesHelp[] =
-    "Meshes:  .vtu, .vtkhdf, .msh (Gmsh 4.1; --format msh22: 2.2) and .mesh (MEDIT), 2-D and 3-D; .npz (arrays of\n"
-    "         numpy), .node and .ele, with .edge or .face, and .poly; \"-\" is standard output (vtu).\n"
+    "Meshes:  .vtu, .vtkhdf, .vtk, .xdmf (with .h5), .msh (Gmsh 4.1; --format msh22: 2.2), .mesh (MEDIT), .su2 and\n"
+    "         .inp (Abaqus), 2-D and 3-D; .npz (arrays of numpy), .node and .ele, with .edge or .face, and .poly;\n"
+    "         \"-\" is standard output (vtu).\n"
     "         Each has the boundary: the faces xmin, xmax, ymin, ... of the box are tagged 1, 2, 3, ...\n";
 
 void AddMeshOutput(CLI::App& command, std::string& path, std::string& format, bool& no_boundary) {

@@ -14,7 +14,7 @@
 #include "client/formats/coordinate.h"
 #include "client/formats/number.h"
 #include "client/formats/table_columns.h"
-#include "client/formats/vtk_array.h"
+#include "client/formats/vtk/vtk_array.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {

@@ -24,6 +24,8 @@ struct WriterKind {
   // Why it cannot go to a pipe or a device; null: it can.
   const char* needs_file;
   bool has_weights = true;
+  // All files that a mesh of this name may be; null: that one.
+  std::vector<std::string> (*files)(const std::string& path) = nullptr;
 };
 
 std::span<const Format<WriterKind>> Writers() {
@@ -34,7 +36,11 @@ std::span<const Format<WriterKind>> Writers() {
       {"msh41", {".msh"}, {CreateMsh41, 3, nullptr}},
       {"msh22", {}, {CreateMsh22, 3, nullptr}},
       {"medit", {".mesh"}, {CreateMedit, 3, nullptr, false}},
-      {"node", {".node", ".ele"}, {CreateNodeAndEle, kMaxDimension, "node is a pair of files"}},
+      {"node", {".node", ".ele"}, {CreateNodeAndEle, kMaxDimension, "node is a pair of files", true, TetgenFilesOf}},
+      {"vtk", {".vtk"}, {CreateVtk, 3, nullptr}},
+      {"xdmf", {".xdmf"}, {CreateXdmf, 3, "xdmf has its arrays in a file of HDF5 beside it", true, XdmfFilesOf}},
+      {"su2", {".su2"}, {CreateSu2, 3, nullptr, false}},
+      {"abaqus", {".inp"}, {CreateAbaqus, 3, nullptr, false}},
   };
   return writers;
 }
@@ -61,7 +67,7 @@ absl::StatusOr<WriterKind> FindWriter(const std::string& path, const std::string
     return absl::InvalidArgumentError(
         absl::StrCat("cannot write ", path, ": ", (*row)->name,
                      " has no place for the weights of a mesh; expected vtu, vtkhdf, npz, "
-                     "msh41, msh22 or node"));
+                     "msh41, msh22, node, vtk or xdmf"));
   }
   return writer;
 }
@@ -72,10 +78,7 @@ std::vector<std::string> MeshFormats() { return FormatNames(Writers()); }
 
 std::vector<std::string> FilesOfMeshWritten(const std::string& path, const std::string& format) {
   const absl::StatusOr<WriterKind> writer = FindWriter(path, format, /*dimension=*/0, /*has_weights=*/false);
-  if (writer.ok() && writer->create == CreateNodeAndEle) {
-    return TetgenFilesOf(path);
-  }
-  return {path};
+  return writer.ok() && writer->files != nullptr ? writer->files(path) : std::vector<std::string>{path};
 }
 
 absl::Status CheckMeshOutput(const std::string& path, const std::string& format, int dimension, bool may_have_weights) {

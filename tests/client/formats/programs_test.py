@@ -84,12 +84,14 @@ class Programs(unittest.TestCase):
                 self.assertEqual((int(figures[1]), int(figures[2])), (len(points), len(cells)))
                 self.assertAlmostEqual(float(figures[3]), volume, places=12)
 
-    def test_vtk_reads_our_vtu_and_vtkhdf(self):
+    def test_vtk_reads_our_vtu_vtkhdf_and_vtk(self):
         import vtk
-        for dimension, format in itertools.product((2, 3), ("vtu", "vtkhdf")):
+        readers = {"vtu": vtk.vtkXMLUnstructuredGridReader, "vtkhdf": vtk.vtkHDFReader,
+                   "vtk": vtk.vtkUnstructuredGridReader}
+        for dimension, format in itertools.product((2, 3), readers):
             with self.subTest(dimension=dimension, format=format):
                 points, cells, volume = self.write(dimension, f"mesh.{format}", format)
-                reader = vtk.vtkXMLUnstructuredGridReader() if format == "vtu" else vtk.vtkHDFReader()
+                reader = readers[format]()
                 reader.SetFileName(str(self.folder / f"mesh.{format}"))
                 sizes = vtk.vtkCellSizeFilter()
                 sizes.SetInputConnection(reader.GetOutputPort())

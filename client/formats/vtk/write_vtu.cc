@@ -7,8 +7,8 @@
 #include "absl/strings/str_cat.h"
 #include "client/formats/mesh_writers.h"
 #include "client/formats/output_file.h"
-#include "client/formats/vtk_array.h"
-#include "client/formats/vtk_cells.h"
+#include "client/formats/vtk/vtk_array.h"
+#include "client/formats/vtk/vtk_cells.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {

@@ -12,9 +12,9 @@
 #include "client/formats/mesh_readers.h"
 #include "client/formats/number.h"
 #include "client/formats/regions.h"
-#include "client/formats/vtk_array.h"
-#include "client/formats/vtk_cells.h"
-#include "client/formats/xml_scanner.h"
+#include "client/formats/vtk/vtk_array.h"
+#include "client/formats/vtk/vtk_cells.h"
+#include "client/formats/vtk/xml_scanner.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {
