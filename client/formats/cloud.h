@@ -32,13 +32,22 @@ class LineIndex {
   uint64_t size_ = 0;
 };
 
+// A number that every point of a cloud has beside its coordinates: an intensity, a colour, an id.
+struct PointAttribute {
+  std::string name;
+  std::vector<double> values;  // NaN: missing. Whole numbers beyond 2^53 are rounded.
+
+  bool operator==(const PointAttribute&) const = default;
+};
+
 struct PointCloud {
   std::string name;  // of the file, as messages say it
   int dimension = 0;
   std::vector<double> points;  // size() x dimension, row-major
   LineIndex lines;             // of every point, or of none when the file has no lines
   LineIndex rows;              // of every point in a file without lines, if points were skipped; or of none
-  uint64_t skipped = 0;        // points left out since a coordinate is missing or not finite
+  std::vector<PointAttribute> attributes{};  // if they were asked for, with as many values as there are points
+  uint64_t skipped = 0;                      // points left out since a coordinate is missing or not finite
   // What a user would want to know of how the file was read, a sentence each: which columns were taken, what was not
   // used.
   std::vector<std::string> notes;

@@ -21,7 +21,7 @@ std::string Labels::Take(std::string_view name, std::string_view kind, int32_t n
     }
   }
   if (!absl::ascii_isalpha(label[0]) && label[0] != '_') {
-    label.insert(0, "_");
+    label = absl::StrCat("_", label);
   }
   label.resize(std::min(label.size(), kMaxLabelBytes));
   // Others may have become the same: then the number tells them apart, and if that is taken, underscores.

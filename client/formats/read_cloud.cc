@@ -48,6 +48,12 @@ std::span<const Format<CloudReader>> CloudReaders() {
       {"npy", {".npy"}, ReadNpy},
       {"asc", {".asc"}, ReadText<ReadAsc>},
       {"pts", {".pts"}, ReadText<ReadPts>},
+      {"stl", {".stl"}, ReadStl},
+      {"pcd", {".pcd"}, ReadText<ReadPcd>},
+      {"las", {".las", ".laz"}, ReadText<ReadLas>},
+      {"vtk", {".vtk"}, ReadText<ReadVtkPoints>},
+      {"vtp", {".vtp"}, ReadVtp},
+      {"vtu", {".vtu"}, ReadVtuPoints},
   };
   return readers;
 }
