@@ -205,6 +205,9 @@ std::string ValueOf(const CLI::Option& option) {
                          : absl::StrJoin(choices, "|");
 }
 
+// Choices may go on in the next line.
+std::string Breakable(const std::string& choices) { return absl::StrReplaceAll(choices, {{"|", "|\\:"}}); }
+
 std::string OptionEntry(const CLI::Option& option) {
   std::string entry = ".TP\n";
   if (IsPositional(option)) {
@@ -215,7 +218,7 @@ std::string OptionEntry(const CLI::Option& option) {
       names.push_back(absl::StrCat("\\fB", Escaped(name), "\\fR"));
     }
     absl::StrAppend(&entry, absl::StrJoin(names, ", "),
-                    TakesValue(option) ? absl::StrCat(" \\fI", Escaped(ValueOf(option)), "\\fR") : "", "\n");
+                    TakesValue(option) ? absl::StrCat(" \\fI", Breakable(Escaped(ValueOf(option))), "\\fR") : "", "\n");
   }
   absl::StrAppend(&entry, Escaped(option.get_description()));
   if (!option.get_envname().empty()) {

@@ -34,6 +34,15 @@ void AddMeshOutput(CLI::App& command, std::string& path, std::string& format, bo
       "origins of vertices");
 }
 
+void AddNoAttributes(CLI::App& command, bool& no_attributes) {
+  command.add_flag(
+      "--no-attributes", no_attributes,
+      "Leave out what points have beside coordinates (intensity, colour, id, named columns), which .vtu, .vtkhdf, "
+      ".vtk, "
+      ".xdmf and .npz have as data of vertices otherwise, NaN where the mesher added one; --no-boundary leaves it out, "
+      "too");
+}
+
 void MeshingOptions::AddTo(CLI::App& command) {
   command.add_option("IN", input_, "File of points, or - for standard input")->required()->type_name("FILE");
   parameters_.AddSpaceTo(command);

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "client/formats/attributes.h"
+
 namespace wellspace::formats {
 
 inline constexpr int kMinDimension = 2;
@@ -30,14 +32,6 @@ class LineIndex {
   };
   std::vector<Run> runs_;
   uint64_t size_ = 0;
-};
-
-// A number that every point of a cloud has beside its coordinates: an intensity, a colour, an id.
-struct PointAttribute {
-  std::string name;
-  std::vector<double> values;  // NaN: missing. Whole numbers beyond 2^53 are rounded.
-
-  bool operator==(const PointAttribute&) const = default;
 };
 
 struct PointCloud {

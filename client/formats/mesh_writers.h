@@ -50,6 +50,7 @@ struct RowCounts {
   uint64_t simplex_regions = 0;
   uint64_t simplices = 0;
   uint64_t facets = 0;
+  uint64_t attribute_values = 0;
 };
 
 // INTERNAL unless as many rows have come as `shape` says.

@@ -62,6 +62,9 @@ struct CloudOptions {
 // The names that CloudOptions::format may take.
 std::vector<std::string> CloudFormats();
 
+// The name of the format in which ReadCloud reads `path` if CloudOptions::format is `format`; empty: none.
+std::string CloudFormatOf(const std::string& path, const std::string& format);
+
 // Reads the points of `path`, in the order of the file; "-" is standard input.
 //
 // Guarantees: coordinates are correctly rounded, to the bit.

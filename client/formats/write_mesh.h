@@ -39,6 +39,9 @@
 //   abaqus  *NSET of the vertices and *SURFACE of the sides of elements, one each of every part.
 // Labels of su2 and abaqus are names as Labels makes them (labels.h).
 //
+// Attributes of vertices, which input points have and others have not, are numbers of 8 bytes, NaN where there is none:
+// point data of vtu, vtkhdf, vtk and xdmf under their names, "attribute_NAME" in npz. Other formats leave them out.
+//
 // With several regions each simplex has the id of its own: cell data "region" of vtu and vtkhdf; `regions` of npz, with
 // names in `region_names` for the ids in `region_ids`; the attribute of .ele, with names in a comment "# regions:"; the
 // reference of medit. In msh41 and msh22 each region is a physical group with a name. Its number is the id, unless a
@@ -62,6 +65,9 @@ namespace wellspace::formats {
 
 // The names that `format` may take below.
 std::vector<std::string> MeshFormats();
+
+// Whether a mesh in `path` and `format` has attributes of its vertices.
+bool HasPlaceForAttributes(const std::string& path, const std::string& format);
 
 // The files that WriteMesh makes of `path` and `format`: that one, or a pair. What cannot be written is taken for one
 // file.
@@ -87,14 +93,15 @@ class MeshWriter {
   MeshWriter& operator=(const MeshWriter&) = delete;
 
   // The next rows of the arrays: all points, then all weights if the shape has them, then all origins and all tags of
-  // vertices if it has marks, then all regions of simplices if it has them, then all simplices, then all facets of its
-  // boundary. Returns the first error of all so
-  // far.
+  // vertices if it has marks, then each of its attributes, then all regions of simplices if it has them, then all
+  // simplices, then all facets of its boundary. Returns the first error of all so far.
   // REQUIRES:   whole rows, no more than the shape says, nothing of an array before another that goes first.
   virtual absl::Status AddPoints(std::span<const double> points) = 0;
   virtual absl::Status AddWeights(std::span<const double> weights) = 0;
   virtual absl::Status AddVertexOrigins(std::span<const uint32_t> /*origins*/) { return absl::OkStatus(); }
   virtual absl::Status AddVertexTags(std::span<const int32_t> /*tags*/) { return absl::OkStatus(); }
+  // The next vertices' values of the attribute `index` of the shape; ignored by formats without a place for attributes.
+  virtual absl::Status AddAttribute(size_t /*index*/, std::span<const double> /*values*/) { return absl::OkStatus(); }
   virtual absl::Status AddSimplexRegions(std::span<const int32_t> regions) = 0;
   virtual absl::Status AddSimplices(std::span<const uint32_t> simplices) = 0;
   virtual absl::Status AddFacets(std::span<const uint32_t> facets) = 0;

@@ -87,6 +87,8 @@ constexpr std::array kChoices = {
     Choice{"vtk", 0, "", true, true},
     Choice{"vtp", 0, "", true, true},
     Choice{"vtu", 3, "", false, true},
+    Choice{"csv", 0, "", true, true},
+    Choice{"ply", 0, "", true, true},
 };
 
 void RequireCloud(const PointCloud& cloud, const CloudOptions& options) {

@@ -32,6 +32,19 @@ void AppendBigEndian(T value, std::string& bytes) {
   bytes.append(word, sizeof(T));
 }
 
+// A name is one word: VTK has other bytes than those of printable ASCII by their numbers, "My%20name".
+std::string EncodedVtkName(const std::string& name) {
+  std::string encoded;
+  for (const char c : name) {
+    if (c > ' ' && c < '\x7f' && c != '%' && c != '"' && c != '#') {
+      encoded += c;
+    } else {
+      absl::StrAppend(&encoded, "%", absl::Hex(static_cast<uint8_t>(c), absl::kZeroPad2));
+    }
+  }
+  return encoded;
+}
+
 class VtkWriter final : public MeshWriter {
  public:
   VtkWriter(OutputFile output, const MeshShape& shape) : shape_(shape), output_(std::move(output)) {
@@ -77,6 +90,12 @@ class VtkWriter final : public MeshWriter {
     return output_.status();
   }
 
+  absl::Status AddAttribute(size_t index, std::span<const double> values) override {
+    Keep<double>(values, EncodedVtkName(shape_.attributes[index]), "double");
+    attribute_values_ += values.size();
+    return output_.status();
+  }
+
   absl::Status AddSimplexRegions(std::span<const int32_t> regions) override {
     regions_.Add(regions);
     return output_.status();
@@ -101,7 +120,8 @@ class VtkWriter final : public MeshWriter {
                                                      .weights = weights_,
                                                      .simplex_regions = regions_.count(),
                                                      .simplices = simplices_,
-                                                     .facets = facets_}));
+                                                     .facets = facets_,
+                                                     .attribute_values = attribute_values_}));
     const uint64_t cells = VtkCellCount(shape_);
     output_.Write(absl::StrCat("\nCELL_TYPES ", cells, "\n"));
     WriteEach(cells, [this](uint64_t cell) -> int32_t { return VtkCellType(shape_, cell); });
@@ -119,7 +139,7 @@ class VtkWriter final : public MeshWriter {
   };
 
   template <typename T>
-  void Keep(std::span<const T> values, const char* name, const char* type) {
+  void Keep(std::span<const T> values, const std::string& name, const char* type) {
     if (point_data_.empty() || point_data_.back().name != name) {
       point_data_.push_back({name, type, {}});
     }
@@ -198,6 +218,7 @@ class VtkWriter final : public MeshWriter {
   uint64_t weights_ = 0;
   uint64_t simplices_ = 0;
   uint64_t facets_ = 0;
+  uint64_t attribute_values_ = 0;
   std::string row_;
 };
 

@@ -100,6 +100,17 @@ class VtkHdfWriter final : public MeshWriter {
     return file_->status();
   }
 
+  absl::Status AddAttribute(size_t index, std::span<const double> values) override {
+    const std::lock_guard lock(Hdf5Mutex());
+    if (attributes_begun_ == index) {
+      ++attributes_begun_;
+      BeginPointData<double>(shape_.attributes[index].c_str());
+    }
+    file_->Add<double>(values);
+    attribute_values_ += values.size();
+    return file_->status();
+  }
+
   absl::Status AddSimplexRegions(std::span<const int32_t> regions) override {
     const std::lock_guard lock(Hdf5Mutex());
     if (!std::exchange(has_regions_, true)) {
@@ -135,7 +146,8 @@ class VtkHdfWriter final : public MeshWriter {
                                                      .weights = weights_,
                                                      .simplex_regions = simplex_regions_,
                                                      .simplices = simplices_,
-                                                     .facets = facets_}));
+                                                     .facets = facets_,
+                                                     .attribute_values = attribute_values_}));
     return output_.Commit();
   }
 
@@ -201,11 +213,13 @@ class VtkHdfWriter final : public MeshWriter {
   bool has_origins_ = false;      // the array
   bool has_vertex_tags_ = false;  // the array
   bool has_regions_ = false;      // the array
+  size_t attributes_begun_ = 0;   // arrays
   uint64_t vertices_ = 0;
   uint64_t weights_ = 0;
   uint64_t simplex_regions_ = 0;
   uint64_t simplices_ = 0;
   uint64_t facets_ = 0;
+  uint64_t attribute_values_ = 0;
 };
 
 }  // namespace

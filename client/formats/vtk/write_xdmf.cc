@@ -93,6 +93,10 @@ class XdmfWriter final : public MeshWriter {
   absl::Status AddVertexTags(std::span<const int32_t> tags) override {
     return Add<int32_t>(kVtkBoundary, shape_.vertex_count, 1, tags);
   }
+  absl::Status AddAttribute(size_t index, std::span<const double> values) override {
+    attribute_values_ += values.size();
+    return Add<double>(ArrayOfAttribute(index), shape_.vertex_count, 1, values);
+  }
   absl::Status AddSimplexRegions(std::span<const int32_t> regions) override {
     simplex_regions_ += regions.size();
     return Add<int32_t>(kVtkRegion, shape_.simplex_count, 1, regions);
@@ -123,7 +127,8 @@ class XdmfWriter final : public MeshWriter {
                                                      .weights = weights_,
                                                      .simplex_regions = simplex_regions_,
                                                      .simplices = simplices_,
-                                                     .facets = facets_}));
+                                                     .facets = facets_,
+                                                     .attribute_values = attribute_values_}));
     // No file appears before all are written, and arrays before what refers to them.
     std::vector<OutputFile*> outputs;
     WriteMeshGrid();
@@ -215,6 +220,9 @@ class XdmfWriter final : public MeshWriter {
     }
   }
 
+  // Names of arrays are ours: XDMF has no way to write a colon in one.
+  static std::string ArrayOfAttribute(size_t index) { return absl::StrCat("attribute_", index); }
+
   void WriteMeshGrid() {
     std::string grid = BeginGrid(mesh_, "mesh", "simplices", shape_.simplex_count, shape_.dimension + 1);
     if (shape_.has_simplex_regions || !shape_.regions.empty()) {
@@ -227,6 +235,9 @@ class XdmfWriter final : public MeshWriter {
     if (shape_.has_vertex_marks) {
       grid += Attribute(mesh_, kVtkOrigin, "Node", kVtkOrigin, shape_.vertex_count, kXdmfInt64);
       grid += Attribute(mesh_, kVtkBoundary, "Node", kVtkBoundary, shape_.vertex_count, kXdmfInt32);
+    }
+    for (size_t i = 0; i < shape_.attributes.size(); ++i) {
+      grid += Attribute(mesh_, shape_.attributes[i], "Node", ArrayOfAttribute(i), shape_.vertex_count, kXdmfDouble);
     }
     mesh_.grid.Write(grid);
     mesh_.grid.Write(EndGrid());
@@ -249,6 +260,7 @@ class XdmfWriter final : public MeshWriter {
   uint64_t simplex_regions_ = 0;
   uint64_t simplices_ = 0;
   uint64_t facets_ = 0;
+  uint64_t attribute_values_ = 0;
 };
 
 // The pair of files "NAME.xdmf" and "NAME.h5".
