@@ -33,6 +33,9 @@ std::string Verbatim(const std::string& text) {
   return lines + ".fi\n";
 }
 
+// Choices may go on in the next line.
+std::string Breakable(const std::string& choices) { return absl::StrReplaceAll(choices, {{"|", "|\\:"}}); }
+
 std::string OptionEntry(const CLI::Option& option) {
   std::string entry = ".TP\n";
   if (IsPositional(option)) {
@@ -43,7 +46,7 @@ std::string OptionEntry(const CLI::Option& option) {
       names.push_back(absl::StrCat("\\fB", Escaped(name), "\\fR"));
     }
     absl::StrAppend(&entry, absl::StrJoin(names, ", "),
-                    TakesValue(option) ? absl::StrCat(" \\fI", Escaped(ValueOf(option)), "\\fR") : "", "\n");
+                    TakesValue(option) ? absl::StrCat(" \\fI", Breakable(Escaped(ValueOf(option))), "\\fR") : "", "\n");
   }
   absl::StrAppend(&entry, Escaped(option.get_description()));
   if (!option.get_envname().empty()) {

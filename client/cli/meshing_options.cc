@@ -13,14 +13,15 @@ namespace wellspace::cli {
 
 const char kCloudsHelp[] =
     "Clouds:  .csv .tsv .txt .dat (columns separated by commas, semicolons or blanks; a header may name x, y, z, or\n"
-    "         lon, lat and the like), .xyz, .asc, .pts, .node, .npy, vertices of .ply, .obj and .off; each may be\n"
-    "         compressed (.csv.gz); \"-\" is standard input (csv, or --input-format)\n"
+    "         lon, lat and the like), .xyz, .asc, .pts, .node, .npy, .pcd, .las, vertices of .ply, .obj, .off, .stl,\n"
+    "         .vtk, .vtp and .vtu; each may be compressed (.csv.gz); \"-\" is standard input (csv, or --input-format)\n"
     "Domains: in 2-D, .poly (Triangle's, with .node) and .geojson; with --segments lines of .obj and polylines of "
     ".csv\n";
 
 const char kMeshesHelp[] =
-    "Meshes:  .vtu, .vtkhdf, .msh (Gmsh 4.1; --format msh22: 2.2) and .mesh (MEDIT), 2-D and 3-D; .npz (arrays of\n"
-    "         numpy), .node and .ele, with .edge or .face, and .poly; \"-\" is standard output (vtu).\n"
+    "Meshes:  .vtu, .vtkhdf, .vtk, .xdmf (with .h5), .msh (Gmsh 4.1; --format msh22: 2.2), .mesh (MEDIT), .su2 and\n"
+    "         .inp (Abaqus), 2-D and 3-D; .npz (arrays of numpy), .node and .ele, with .edge or .face, and .poly;\n"
+    "         \"-\" is standard output (vtu).\n"
     "         Each has the boundary: the faces xmin, xmax, ymin, ... of the box are tagged 1, 2, 3, ...\n";
 
 void AddMeshOutput(CLI::App& command, std::string& path, std::string& format, bool& no_boundary) {
@@ -31,6 +32,15 @@ void AddMeshOutput(CLI::App& command, std::string& path, std::string& format, bo
       "--no-boundary", no_boundary,
       "Leave out the boundary (facets of the faces xmin, xmax, ymin, ... with tags 1, 2, 3, ...), regions and "
       "origins of vertices");
+}
+
+void AddNoAttributes(CLI::App& command, bool& no_attributes) {
+  command.add_flag(
+      "--no-attributes", no_attributes,
+      "Leave out what points have beside coordinates (intensity, colour, id, named columns), which .vtu, .vtkhdf, "
+      ".vtk, "
+      ".xdmf and .npz have as data of vertices otherwise, NaN where the mesher added one; --no-boundary leaves it out, "
+      "too");
 }
 
 void MeshingOptions::AddTo(CLI::App& command) {

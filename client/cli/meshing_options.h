@@ -29,6 +29,9 @@ extern const char kMeshesHelp[];
 // -o,--out, --format and --no-boundary, of a mesh.
 void AddMeshOutput(CLI::App& command, std::string& path, std::string& format, bool& no_boundary);
 
+// --no-attributes, of a mesh of a file of points.
+void AddNoAttributes(CLI::App& command, bool& no_attributes);
+
 // A cloud to be read, the server to use and what it is asked.
 //
 // Thread safety: thread-compatible.
@@ -42,6 +45,9 @@ class MeshingOptions {
   int dimension() const { return parameters_.dimension(); }
   // Whether figures go to standard output.
   bool has_figures_on_stdout() const;
+
+  // From here on the cloud is read with what its points have beside coordinates. To be called before Run.
+  void KeepAttributes() { cloud_options_.keep_attributes = true; }
 
   // What can be known to be wrong with the options before anything is read.
   absl::Status Check() const;

@@ -1,9 +1,14 @@
 #include "client/files/mesh_file.h"
 
+#include <algorithm>
+#include <limits>
+
 #include "core/base/status_macros.h"
 
 namespace wellspace::client {
 namespace {
+
+constexpr size_t kValuesAtOnce = 1 << 14;
 
 // How many vertices, the first of a mesh, are input points.
 uint64_t InputVerticesOf(const MeshStatistics& statistics) {
@@ -31,12 +36,48 @@ absl::Status MeshFile::Begin(const MeshHeader& header) {
   for (const BoundaryPart& part : header.boundary) {
     shape.boundary.push_back({part.tag, part.name, part.facet_count});
   }
+  if (header.has_vertex_marks && formats::HasPlaceForAttributes(path_, format_)) {
+    shape.attributes = formats::NamesToWrite(attributes_);
+  }
+  has_attributes_ = !shape.attributes.empty();
+  origins_.clear();
+  tagged_vertices_ = 0;
   for (const Region& region : header.regions) {
     shape.regions.push_back({region.id, region.name});
   }
   WELLSPACE_ASSIGN_OR_RETURN(std::unique_ptr<formats::MeshWriter> writer,
                              formats::CreateMesh(path_, format_, shape, stop_));
   writer_ = std::move(writer);
+  return absl::OkStatus();
+}
+
+absl::Status MeshFile::AddVertexOrigins(std::span<const uint32_t> origins) {
+  if (has_attributes_) {
+    origins_.insert(origins_.end(), origins.begin(), origins.end());
+  }
+  return writer_->AddVertexOrigins(origins);
+}
+
+absl::Status MeshFile::AddVertexTags(std::span<const int32_t> tags) {
+  WELLSPACE_RETURN_IF_ERROR(writer_->AddVertexTags(tags));
+  tagged_vertices_ += tags.size();
+  return has_attributes_ && tagged_vertices_ == header_.vertex_count ? WriteAttributes() : absl::OkStatus();
+}
+
+absl::Status MeshFile::WriteAttributes() {
+  std::vector<double> values;
+  for (size_t i = 0; i < attributes_.size(); ++i) {
+    const std::vector<double>& of_points = attributes_[i].values;
+    for (size_t first = 0; first < origins_.size(); first += kValuesAtOnce) {
+      values.clear();
+      for (size_t vertex = first; vertex < std::min(origins_.size(), first + kValuesAtOnce); ++vertex) {
+        const uint32_t origin = origins_[vertex];
+        values.push_back(origin < of_points.size() ? of_points[origin] : std::numeric_limits<double>::quiet_NaN());
+      }
+      WELLSPACE_RETURN_IF_ERROR(writer_->AddAttribute(i, values));
+    }
+  }
+  origins_ = {};
   return absl::OkStatus();
 }
 

@@ -2,7 +2,9 @@
 #ifndef WELLSPACE_CLIENT_FILES_MESH_FILE_H_
 #define WELLSPACE_CLIENT_FILES_MESH_FILE_H_
 
+#include <cstdint>
 #include <memory>
+#include <span>
 #include <stop_token>
 #include <string>
 #include <utility>
@@ -33,10 +35,8 @@ class MeshFile final : public MeshSink {
     return absl::OkStatus();
   }
   absl::Status AddWeights(std::span<const double> weights) override { return writer_->AddWeights(weights); }
-  absl::Status AddVertexOrigins(std::span<const uint32_t> origins) override {
-    return writer_->AddVertexOrigins(origins);
-  }
-  absl::Status AddVertexTags(std::span<const int32_t> tags) override { return writer_->AddVertexTags(tags); }
+  absl::Status AddVertexOrigins(std::span<const uint32_t> origins) override;
+  absl::Status AddVertexTags(std::span<const int32_t> tags) override;
   absl::Status AddSimplexRegions(std::span<const int32_t> regions) override {
     return writer_->AddSimplexRegions(regions);
   }
@@ -51,18 +51,32 @@ class MeshFile final : public MeshSink {
   // No format holds which vertex each input point became: this keeps it in memory. To be called before Begin.
   void KeepInputVertices() { keeps_input_vertices_ = true; }
 
+  // Gives vertices what their input points have: `attributes` of all points that were sent, NaN for others. That takes
+  // the origins of vertices: a file that leaves out the boundary has none. To be called before Begin.
+  //
+  // Memory:     4 bytes a vertex, if there are attributes and the format has a place for them.
+  // REQUIRES:   `attributes` outlive this.
+  void AddAttributes(std::span<const formats::PointAttribute> attributes) { attributes_ = attributes; }
+
   // What has been told of the mesh, and what was kept.
   const MeshHeader& header() const { return header_; }
   const std::vector<uint32_t>& input_vertex() const { return input_vertex_; }
   const std::vector<uint32_t>& moved_vertices() const { return moved_vertices_; }
 
  private:
+  // The attributes of all vertices, whose origins have come.
+  absl::Status WriteAttributes();
+
   const std::string path_;
   const std::string format_;
   const std::stop_token stop_;
   MeshHeader header_;
   std::unique_ptr<formats::MeshWriter> writer_;
   bool has_boundary_ = true;
+  std::span<const formats::PointAttribute> attributes_;
+  std::vector<uint32_t> origins_;  // of vertices, if the file gets attributes
+  bool has_attributes_ = false;    // the file
+  uint64_t tagged_vertices_ = 0;   // that have come
   bool keeps_input_vertices_ = false;
   std::vector<uint32_t> input_vertex_;
   std::vector<uint32_t> moved_vertices_;

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "client/formats/attributes.h"
+
 namespace wellspace::formats {
 
 inline constexpr int kMinDimension = 2;
@@ -38,7 +40,8 @@ struct PointCloud {
   std::vector<double> points;  // size() x dimension, row-major
   LineIndex lines;             // of every point, or of none when the file has no lines
   LineIndex rows;              // of every point in a file without lines, if points were skipped; or of none
-  uint64_t skipped = 0;        // points left out since a coordinate is missing or not finite
+  std::vector<PointAttribute> attributes{};  // if they were asked for, with as many values as there are points
+  uint64_t skipped = 0;                      // points left out since a coordinate is missing or not finite
   // What a user would want to know of how the file was read, a sentence each: which columns were taken, what was not
   // used.
   std::vector<std::string> notes;

@@ -25,6 +25,12 @@ absl::Status ReadAsc(LineReader& reader, const CloudOptions& options, PointCloud
 absl::Status ReadPts(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
 absl::Status ReadPly(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
 absl::Status ReadNpy(InputFile& file, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadStl(InputFile& file, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadPcd(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadLas(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadVtkPoints(LineReader& reader, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadVtp(InputFile& file, const CloudOptions& options, PointCloud& cloud);
+absl::Status ReadVtuPoints(InputFile& file, const CloudOptions& options, PointCloud& cloud);
 
 // These leave options.columns to TakeColumns, which is called with what they return when no dimension was asked for.
 absl::Status ReadNode(LineReader& reader, const CloudOptions& options, PointCloud& cloud);

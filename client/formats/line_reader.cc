@@ -53,7 +53,8 @@ InputFile::InputFile(InputFile&& other) noexcept
     : descriptor_(std::exchange(other.descriptor_, -1)),
       name_(std::move(other.name_)),
       start_(std::move(other.start_)),
-      inflater_(std::move(other.inflater_)) {}
+      inflater_(std::move(other.inflater_)),
+      peeked_(std::move(other.peeked_)) {}
 
 InputFile::~InputFile() {
   if (descriptor_ > STDERR_FILENO) {
@@ -84,6 +85,30 @@ absl::Status InputFile::InflateGzip(bool is_expected) {
 }
 
 absl::StatusOr<size_t> InputFile::Read(char* buffer, size_t size) {
+  if (peeked_.empty()) {
+    return ReadBehindPeeked(buffer, size);
+  }
+  const size_t part = std::min(size, peeked_.size());
+  std::memcpy(buffer, peeked_.data(), part);
+  peeked_.erase(0, part);
+  return part;
+}
+
+absl::StatusOr<std::string_view> InputFile::Peek(size_t size) {
+  while (peeked_.size() < size) {
+    const size_t had = peeked_.size();
+    peeked_.resize(size);
+    const absl::StatusOr<size_t> got = ReadBehindPeeked(peeked_.data() + had, size - had);
+    peeked_.resize(had + got.value_or(0));
+    WELLSPACE_RETURN_IF_ERROR(got.status());
+    if (*got == 0) {
+      break;
+    }
+  }
+  return std::string_view(peeked_).substr(0, size);
+}
+
+absl::StatusOr<size_t> InputFile::ReadBehindPeeked(char* buffer, size_t size) {
   const auto read = [this](char* to, size_t bytes) -> absl::StatusOr<size_t> {
     if (start_.empty()) {
       return ReadDescriptor(to, bytes);
@@ -252,6 +277,12 @@ absl::Status LineReader::Finish() {
     Fill();
   }
   return status_;
+}
+
+bool LineReader::NextStartsWith(std::string_view text) {
+  while (end_ - begin_ < text.size() && status_.ok() && Fill()) {
+  }
+  return std::string_view(buffer_.data() + begin_, end_ - begin_).substr(0, text.size()) == text;
 }
 
 size_t LineReader::Take(char* bytes, size_t size) {

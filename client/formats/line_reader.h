@@ -50,6 +50,8 @@ class InputFile {
   // Up to `size` bytes; 0 at the end of the file. Errors: of reading; INVALID_ARGUMENT for compressed data that are
   // damaged.
   absl::StatusOr<size_t> Read(char* buffer, size_t size);
+  // The next `size` bytes, or all that are left if there are fewer; Read gives them again. Valid until the next call.
+  absl::StatusOr<std::string_view> Peek(size_t size);
   // All that is left.
   absl::StatusOr<std::string> ReadAll();
   // How many bytes Read gives from the start; none when it is not known (of a pipe, a device, a compressed file).
@@ -60,11 +62,13 @@ class InputFile {
  private:
   InputFile(int descriptor, std::string name) : descriptor_(descriptor), name_(std::move(name)) {}
   absl::StatusOr<size_t> ReadDescriptor(char* buffer, size_t size);
+  absl::StatusOr<size_t> ReadBehindPeeked(char* buffer, size_t size);
 
   int descriptor_;
   std::string name_;
   std::string start_;  // bytes that InflateGzip has read, and Read has not given yet
   std::unique_ptr<GzipInflater> inflater_;
+  std::string peeked_;  // bytes that Peek has read, and Read has not given yet
 };
 
 // Lines end in LF, CRLF or CR; a byte order mark at the start of the file is skipped.
@@ -81,6 +85,8 @@ class LineReader {
   bool NextContent(std::string_view& line);
   // The line that NextContent returned last, with the blanks around it.
   std::string_view whole_line() const { return whole_line_; }
+  // Whether the bytes that follow the line that was returned last start with `text`, which is no longer than a block.
+  bool NextStartsWith(std::string_view text);
   // Takes up to `size` bytes that follow the line that was returned last, as they are, and returns how many there were:
   // fewer only at the end of the file and on an error.
   size_t Take(char* bytes, size_t size);

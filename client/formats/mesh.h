@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "client/formats/attributes.h"
+
 namespace wellspace::formats {
 
 // "triangles", "tetrahedra" or, in higher dimensions, "simplices".
@@ -64,6 +66,7 @@ struct MeshShape {
   std::vector<Region> regions{};         // empty: nothing is told of regions
   std::vector<double> low{};             // of the mesh's box; may be missing where there is no boundary
   std::vector<double> high{};
+  std::vector<std::string> attributes{};  // of vertices: names as of NamesToWrite
 
   uint64_t facet_count() const { return CountFacets(boundary); }
 };
@@ -82,6 +85,7 @@ struct MeshView {
   std::span<const BoundaryPart> boundary{};
   std::span<const int32_t> simplex_regions{};  // simplex_count ids; empty: all are of the only region
   std::span<const Region> regions{};
+  std::span<const PointAttribute> attributes{};  // of vertices
 
   uint64_t vertex_count() const { return dimension == 0 ? 0 : points.size() / dimension; }
   uint64_t simplex_count() const { return dimension == 0 ? 0 : simplices.size() / (dimension + 1); }
@@ -94,7 +98,8 @@ struct MeshView {
                     .has_vertex_marks = !vertex_tags.empty(),
                     .boundary = {boundary.begin(), boundary.end()},
                     .has_simplex_regions = !simplex_regions.empty(),
-                    .regions = {regions.begin(), regions.end()}};
+                    .regions = {regions.begin(), regions.end()},
+                    .attributes = NamesToWrite(attributes)};
     for (size_t i = 0; i < points.size() && !boundary.empty(); ++i) {
       const size_t axis = i % dimension;
       if (i < static_cast<size_t>(dimension)) {

@@ -29,9 +29,19 @@ absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMsh22(const std::string& path,
                                                         std::stop_token stop);
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMsh41(const std::string& path, const MeshShape& shape,
                                                         std::stop_token stop);
-// INVALID_ARGUMENT for a shape with weights.
+// These have no place for weights.
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMedit(const std::string& path, const MeshShape& shape,
                                                         std::stop_token stop);
+absl::StatusOr<std::unique_ptr<MeshWriter>> CreateSu2(const std::string& path, const MeshShape& shape,
+                                                      std::stop_token stop);
+absl::StatusOr<std::unique_ptr<MeshWriter>> CreateAbaqus(const std::string& path, const MeshShape& shape,
+                                                         std::stop_token stop);
+
+absl::StatusOr<std::unique_ptr<MeshWriter>> CreateVtk(const std::string& path, const MeshShape& shape,
+                                                      std::stop_token stop);
+// All of XdmfFilesOf are written, the last two for a boundary.
+absl::StatusOr<std::unique_ptr<MeshWriter>> CreateXdmf(const std::string& path, const MeshShape& shape,
+                                                       std::stop_token stop);
 
 // How many rows a writer has got.
 struct RowCounts {
@@ -40,6 +50,7 @@ struct RowCounts {
   uint64_t simplex_regions = 0;
   uint64_t simplices = 0;
   uint64_t facets = 0;
+  uint64_t attribute_values = 0;
 };
 
 // INTERNAL unless as many rows have come as `shape` says.
@@ -58,6 +69,9 @@ std::vector<std::string> BoundaryFilesOf(const std::string& path, int dimension)
 
 // All files that a mesh in .node and .ele may have, whatever its dimension.
 std::vector<std::string> TetgenFilesOf(const std::string& path);
+
+// The files of a mesh in XDMF: "mesh.xdmf", its arrays "mesh.h5", "mesh_boundary.xdmf", "mesh_boundary.h5".
+std::vector<std::string> XdmfFilesOf(const std::string& path);
 
 // "a/mesh.ele" of "a/mesh.node" and the other way round: `path` with its extension replaced.
 std::string WithExtension(const std::string& path, const std::string& extension);

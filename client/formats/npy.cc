@@ -8,7 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/number.h"
-#include "client/formats/vtk_array.h"
+#include "client/formats/vtk/vtk_array.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {

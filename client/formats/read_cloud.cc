@@ -48,6 +48,12 @@ std::span<const Format<CloudReader>> CloudReaders() {
       {"npy", {".npy"}, ReadNpy},
       {"asc", {".asc"}, ReadText<ReadAsc>},
       {"pts", {".pts"}, ReadText<ReadPts>},
+      {"stl", {".stl"}, ReadStl},
+      {"pcd", {".pcd"}, ReadText<ReadPcd>},
+      {"las", {".las", ".laz"}, ReadText<ReadLas>},
+      {"vtk", {".vtk"}, ReadText<ReadVtkPoints>},
+      {"vtp", {".vtp"}, ReadVtp},
+      {"vtu", {".vtu"}, ReadVtuPoints},
   };
   return readers;
 }
@@ -55,6 +61,11 @@ std::span<const Format<CloudReader>> CloudReaders() {
 }  // namespace
 
 std::vector<std::string> CloudFormats() { return FormatNames(CloudReaders()); }
+
+std::string CloudFormatOf(const std::string& path, const std::string& format) {
+  const auto row = FindInputFormat(CloudReaders(), path, format.empty() && path == kStandardStream ? "csv" : format);
+  return row.ok() ? (*row)->name : std::string();
+}
 
 absl::StatusOr<PointCloud> ReadCloud(const std::string& path, const CloudOptions& options) {
   const std::string format = options.format.empty() && path == kStandardStream ? "csv" : options.format;
@@ -66,6 +77,10 @@ absl::StatusOr<PointCloud> ReadCloud(const std::string& path, const CloudOptions
   PointCloud cloud;
   cloud.name = file.name();
   WELLSPACE_RETURN_IF_ERROR((*row)->handler(file, options, cloud));
+  // Columns in which words stand were given up.
+  std::erase_if(cloud.attributes, [&](const PointAttribute& attribute) {
+    return cloud.size() == 0 || attribute.values.size() != cloud.size();
+  });
   if (cloud.skipped > 0) {
     cloud.notes.push_back(absl::StrCat(cloud.name, ": ", cloud.skipped,
                                        cloud.skipped == 1 ? " point is" : " points are",

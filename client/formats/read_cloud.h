@@ -23,6 +23,12 @@
 //   off   Geomview's in ascii: "OFF", the numbers of vertices, faces and edges, then a line for each vertex. What is
 //         before OFF announces numbers after the coordinates, which are skipped: ST texture, C colour, N normal. 4OFF
 //         has four coordinates, all taken as they are; nOFF says how many before the counts.
+//   stl   In ascii or binary: the corners of the triangles, each once; -0 is 0.
+//   pcd   The Point Cloud Library's: fields x, y and, if it is there, z; data in ascii, binary or binary_compressed.
+//   las   1.0 to 1.4 of the ASPRS, point formats 0 to 10; points that are marked as withheld are left out. Compressed
+//         ones (laz) are refused: docs/adr/0033-laz-is-refused.md.
+//   vtk   VTK's legacy format in ascii or binary, of the kinds POLYDATA, UNSTRUCTURED_GRID and STRUCTURED_GRID.
+//   vtp, vtu  VTK's XML, one piece, arrays as ReadMesh takes them.
 // Of ply and off, what follows the last vertex is not looked at.
 // In those of text lines end in LF, CRLF or CR, '#' at the start of a line or after a blank starts a comment, and blank
 // lines are skipped. Numbers may have Fortran's exponents: 1.0D+00, 1.0-100. Each may be compressed by gzip, as
@@ -39,19 +45,25 @@
 namespace wellspace::formats {
 
 struct CloudOptions {
-  std::string format;  // empty: by the file's extension; standard input is csv
-  int dimension = 0;   // that the file must have; 0: as many as it has columns, of a table without names at most three
+  std::string format = "";  // empty: by the file's extension; standard input is csv
+  int dimension = 0;  // that the file must have; 0: as many as it has columns, of a table without names at most three
   // The columns that hold the coordinates, in this order: names, in any case, or numbers counted from 1. Empty: see
   // above. Columns of ply are the properties of its vertices; those of node, obj, off and npy the coordinates, which
-  // are x, y, z up to 3-D.
+  // are x, y, z up to 3-D. Columns of pcd, las, vtk, vtp and vtu are coordinates and attributes; one of several numbers
+  // is NAME:0, NAME:1 and so on.
   std::vector<std::string> columns = {};
   // Leave out points of which a coordinate is missing (an empty field, NA and the like), NaN, infinite or too large for
   // a double, and count them; otherwise the first one is an error.
   bool skip_invalid = false;
+  // Keep what points have beside coordinates: see PointCloud::attributes. Of tables, columns that a header names.
+  bool keep_attributes = false;
 };
 
 // The names that CloudOptions::format may take.
 std::vector<std::string> CloudFormats();
+
+// The name of the format in which ReadCloud reads `path` if CloudOptions::format is `format`; empty: none.
+std::string CloudFormatOf(const std::string& path, const std::string& format);
 
 // Reads the points of `path`, in the order of the file; "-" is standard input.
 //

@@ -41,6 +41,11 @@ absl::StatusOr<Mesh> ReadMesh(const std::string& path) {
   return (*row)->handler(path);
 }
 
+std::string MeshFormatOf(const std::string& path) {
+  const auto row = FindFormat(MeshReaders(), path, path == kStandardStream ? "vtu" : "");
+  return row.ok() ? (*row)->name : std::string();
+}
+
 std::vector<std::string> FilesOfMeshRead(const std::string& path) {
   const auto row = FindFormat(MeshReaders(), path, path == kStandardStream ? "vtu" : "");
   if (row.ok() && (*row)->handler == ReadNodeAndEle) {

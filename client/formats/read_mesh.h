@@ -38,6 +38,9 @@ namespace wellspace::formats {
 // Errors:     of opening and reading; INVALID_ARGUMENT "FILE:LINE: …" for what is not such a mesh.
 absl::StatusOr<Mesh> ReadMesh(const std::string& path);
 
+// The name of the format in which ReadMesh reads `path`; empty: none.
+std::string MeshFormatOf(const std::string& path);
+
 // The files that ReadMesh reads: `path`, or a pair.
 std::vector<std::string> FilesOfMeshRead(const std::string& path);
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -14,7 +15,7 @@
 #include "client/formats/coordinate.h"
 #include "client/formats/number.h"
 #include "client/formats/table_columns.h"
-#include "client/formats/vtk_array.h"
+#include "client/formats/vtk/vtk_array.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {
@@ -92,7 +93,8 @@ struct Property {
   std::optional<Scalar> list_count;  // the type of the number of values, if it is a list
   Scalar type;
   std::string name;
-  int axis = -1;  // of the coordinate that it holds, or -1
+  int axis = -1;       // of the coordinate that it holds, or -1
+  int attribute = -1;  // of the cloud that it is, or -1
 };
 
 struct Element {
@@ -109,6 +111,7 @@ class PlyReader {
   absl::Status Read() {
     WELLSPACE_RETURN_IF_ERROR(ReadHeader());
     WELLSPACE_RETURN_IF_ERROR(ChooseProperties(elements_.back().properties));
+    KeepAttributes(elements_.back().properties);
     NoteFaces(faces_, cloud_);
     for (const Element& element : elements_) {
       const bool is_vertex = &element == &elements_.back();
@@ -168,6 +171,22 @@ class PlyReader {
                                         wanted < cloud_.dimension ? "; --columns x,y takes 2 of them" : ""));
     }
     return absl::OkStatus();
+  }
+
+  void KeepAttributes(std::vector<Property>& properties) {
+    for (Property& property : properties) {
+      if (options_.keep_attributes && property.axis < 0 && !property.list_count) {
+        property.attribute = static_cast<int>(cloud_.attributes.size());
+        cloud_.attributes.push_back({.name = property.name, .values = {}});
+      }
+    }
+    attributes_.resize(cloud_.attributes.size());
+  }
+
+  void AddAttributes() {
+    for (size_t i = 0; i < attributes_.size(); ++i) {
+      cloud_.attributes[i].values.push_back(attributes_[i]);
+    }
   }
 
   // The next line of the header as fields. False at the end of the file.
@@ -318,12 +337,18 @@ class PlyReader {
         if (!status.ok()) {
           return reader_.Error(absl::StrCat("value ", index, ": ", status.message()));
         }
+      } else if (property.attribute >= 0 &&
+                 ReadCoordinate(field, attributes_[property.attribute]) != CoordinateKind::kFinite) {
+        attributes_[property.attribute] = std::numeric_limits<double>::quiet_NaN();
       }
     }
     if (fields.Next(field)) {
       return reader_.Error(absl::StrCat("expected the end of the line, as the header says, got ", Quote(field)));
     }
     AddPoint({point.data(), static_cast<size_t>(cloud_.dimension)}, is_invalid, reader_.line_number(), cloud_);
+    if (!is_invalid) {
+      AddAttributes();
+    }
     return absl::OkStatus();
   }
 
@@ -391,12 +416,15 @@ class PlyReader {
         }
         is_invalid |= !std::isfinite(value);
         point[property.axis] = value;
+      } else if (property.attribute >= 0) {
+        attributes_[property.attribute] = value;
       }
     }
     if (is_vertex && is_invalid) {
       ++cloud_.skipped;
     } else if (is_vertex) {
       cloud_.points.insert(cloud_.points.end(), point.begin(), point.begin() + cloud_.dimension);
+      AddAttributes();
       if (options_.skip_invalid) {
         cloud_.rows.Add(row);
       }
@@ -424,8 +452,9 @@ class PlyReader {
   uint64_t faces_ = 0;
   bool is_ascii_ = true;
   bool is_big_endian_ = false;
-  std::vector<Element> elements_;  // up to the vertices
-  bool is_kept_ = false;           // the element that the header speaks of
+  std::vector<Element> elements_;   // up to the vertices
+  bool is_kept_ = false;            // the element that the header speaks of
+  std::vector<double> attributes_;  // of a vertex
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <numeric>
 #include <optional>
 #include <string>
@@ -23,7 +24,7 @@
 namespace wellspace::formats {
 namespace {
 
-// Which coordinate a field holds.
+// Which coordinate a field holds; from kMaxDimension on, which attribute.
 constexpr int kSkipped = -1;
 
 // The columns that hold coordinates where nothing says which.
@@ -57,6 +58,8 @@ class TableReader {
   absl::Status CheckDimension(const std::vector<size_t>& columns) const;
   void NoteColumns(const std::vector<size_t>& columns, size_t fields);
   absl::Status ReadRow(std::string_view line);
+  void TakeAttribute(std::string_view text, size_t field);
+  void AddAttributes();
   absl::Status CountError(size_t fields, size_t coordinates) const;
   uint64_t rows() const { return cloud_.size() + cloud_.skipped; }
   std::string_view Row(std::string_view line) const { return separator_ == '\t' ? reader_.whole_line() : line; }
@@ -71,6 +74,7 @@ class TableReader {
   bool has_begun_ = false;
   uint64_t first_row_ = 0;                // its line
   std::vector<int> coordinate_of_field_;  // of every field of a row
+  std::vector<double> attributes_;        // of the row
   bool has_skipped_columns_ = false;
   bool may_be_counted_ = false;
   std::optional<uint64_t> expected_rows_;  // as the last count says
@@ -132,6 +136,13 @@ absl::Status TableReader::Begin(std::string_view line) {
     coordinate_of_field_[columns[i]] = static_cast<int>(i);
   }
   has_skipped_columns_ = columns.size() < coordinate_of_field_.size();
+  for (size_t i = 0; i < names_.size() && options_.keep_attributes; ++i) {
+    if (coordinate_of_field_[i] == kSkipped && !names_[i].empty()) {
+      coordinate_of_field_[i] = kMaxDimension + static_cast<int>(cloud_.attributes.size());
+      cloud_.attributes.push_back({.name = names_[i], .values = {}});
+    }
+  }
+  attributes_.resize(cloud_.attributes.size());
   cloud_.dimension = static_cast<int>(columns.size());
   return absl::OkStatus();
 }
@@ -254,6 +265,30 @@ absl::Status TableReader::CountError(size_t fields, size_t coordinates) const {
                                     header_line_ != 0 ? header_line_ : first_row_, " has, got ", fields));
 }
 
+// A column with a word in it is none of numbers: it is given up.
+void TableReader::TakeAttribute(std::string_view text, size_t field) {
+  const int attribute = coordinate_of_field_[field] - kMaxDimension;
+  double& value = attributes_[attribute];
+  switch (ReadCoordinate(text, value)) {
+    case CoordinateKind::kFinite:
+      break;
+    case CoordinateKind::kInvalid:
+      value = std::numeric_limits<double>::quiet_NaN();
+      break;
+    case CoordinateKind::kNone:
+      coordinate_of_field_[field] = kSkipped;
+      cloud_.attributes[attribute].values = {};
+  }
+}
+
+void TableReader::AddAttributes() {
+  for (const int place : coordinate_of_field_) {
+    if (place >= kMaxDimension) {
+      cloud_.attributes[place - kMaxDimension].values.push_back(attributes_[place - kMaxDimension]);
+    }
+  }
+}
+
 absl::Status TableReader::ReadRow(std::string_view line) {
   std::array<double, kMaxDimension> point;
   FieldSplitter fields(Row(line), separator_);
@@ -262,6 +297,7 @@ absl::Status TableReader::ReadRow(std::string_view line) {
   size_t count = 0;
   size_t index = 0;
   size_t used = 0;  // fields, without empty ones behind the last column
+  std::fill(attributes_.begin(), attributes_.end(), std::numeric_limits<double>::quiet_NaN());
   while (fields.Next(field)) {
     const size_t place = index++;
     if (place >= coordinate_of_field_.size()) {
@@ -271,6 +307,10 @@ absl::Status TableReader::ReadRow(std::string_view line) {
     used = index;
     const int coordinate = coordinate_of_field_[place];
     if (coordinate == kSkipped) {
+      continue;
+    }
+    if (coordinate >= kMaxDimension) {
+      TakeAttribute(field, place);
       continue;
     }
     ++count;
@@ -290,6 +330,9 @@ absl::Status TableReader::ReadRow(std::string_view line) {
     return CountError(used, count);
   }
   AddPoint({point.data(), static_cast<size_t>(cloud_.dimension)}, is_invalid, reader_.line_number(), cloud_);
+  if (!is_invalid) {
+    AddAttributes();
+  }
   return absl::OkStatus();
 }
 

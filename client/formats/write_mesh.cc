@@ -24,17 +24,28 @@ struct WriterKind {
   // Why it cannot go to a pipe or a device; null: it can.
   const char* needs_file;
   bool has_weights = true;
+  // All files that a mesh of this name may be; null: that one.
+  std::vector<std::string> (*files)(const std::string& path) = nullptr;
+  bool has_attributes = false;
 };
 
 std::span<const Format<WriterKind>> Writers() {
   static const std::vector<Format<WriterKind>> writers = {
-      {"vtu", {".vtu"}, {CreateVtu, 3, nullptr}},
-      {"vtkhdf", {".vtkhdf", ".hdf"}, {CreateVtkHdf, 3, "vtkhdf is a file of HDF5, completed from its start"}},
-      {"npz", {".npz"}, {CreateNpz, kMaxDimension, "npz is a zip archive, completed from its start"}},
+      {"vtu", {".vtu"}, {CreateVtu, 3, nullptr, true, nullptr, true}},
+      {"vtkhdf",
+       {".vtkhdf", ".hdf"},
+       {CreateVtkHdf, 3, "vtkhdf is a file of HDF5, completed from its start", true, nullptr, true}},
+      {"npz",
+       {".npz"},
+       {CreateNpz, kMaxDimension, "npz is a zip archive, completed from its start", true, nullptr, true}},
       {"msh41", {".msh"}, {CreateMsh41, 3, nullptr}},
       {"msh22", {}, {CreateMsh22, 3, nullptr}},
       {"medit", {".mesh"}, {CreateMedit, 3, nullptr, false}},
-      {"node", {".node", ".ele"}, {CreateNodeAndEle, kMaxDimension, "node is a pair of files"}},
+      {"node", {".node", ".ele"}, {CreateNodeAndEle, kMaxDimension, "node is a pair of files", true, TetgenFilesOf}},
+      {"vtk", {".vtk"}, {CreateVtk, 3, nullptr, true, nullptr, true}},
+      {"xdmf", {".xdmf"}, {CreateXdmf, 3, "xdmf has its arrays in a file of HDF5 beside it", true, XdmfFilesOf, true}},
+      {"su2", {".su2"}, {CreateSu2, 3, nullptr, false}},
+      {"abaqus", {".inp"}, {CreateAbaqus, 3, nullptr, false}},
   };
   return writers;
 }
@@ -61,7 +72,7 @@ absl::StatusOr<WriterKind> FindWriter(const std::string& path, const std::string
     return absl::InvalidArgumentError(
         absl::StrCat("cannot write ", path, ": ", (*row)->name,
                      " has no place for the weights of a mesh; expected vtu, vtkhdf, npz, "
-                     "msh41, msh22 or node"));
+                     "msh41, msh22, node, vtk or xdmf"));
   }
   return writer;
 }
@@ -70,12 +81,14 @@ absl::StatusOr<WriterKind> FindWriter(const std::string& path, const std::string
 
 std::vector<std::string> MeshFormats() { return FormatNames(Writers()); }
 
+bool HasPlaceForAttributes(const std::string& path, const std::string& format) {
+  const absl::StatusOr<WriterKind> writer = FindWriter(path, format, /*dimension=*/0, /*has_weights=*/false);
+  return writer.ok() && writer->has_attributes;
+}
+
 std::vector<std::string> FilesOfMeshWritten(const std::string& path, const std::string& format) {
   const absl::StatusOr<WriterKind> writer = FindWriter(path, format, /*dimension=*/0, /*has_weights=*/false);
-  if (writer.ok() && writer->create == CreateNodeAndEle) {
-    return TetgenFilesOf(path);
-  }
-  return {path};
+  return writer.ok() && writer->files != nullptr ? writer->files(path) : std::vector<std::string>{path};
 }
 
 absl::Status CheckMeshOutput(const std::string& path, const std::string& format, int dimension, bool may_have_weights) {
@@ -113,6 +126,10 @@ absl::Status CheckComplete(const MeshShape& shape, const RowCounts& rows) {
     return absl::InternalError(
         absl::StrCat("a mesh of ", expected, " regions of simplices got ", rows.simplex_regions));
   }
+  if (const uint64_t expected = shape.attributes.size() * shape.vertex_count; rows.attribute_values != expected) {
+    return absl::InternalError(
+        absl::StrCat("a mesh of ", expected, " values of attributes got ", rows.attribute_values));
+  }
   if (rows.facets != shape.facet_count()) {
     return absl::InternalError(absl::StrCat("a mesh of ", shape.facet_count(), " boundary facets got ", rows.facets));
   }
@@ -122,7 +139,11 @@ absl::Status CheckComplete(const MeshShape& shape, const RowCounts& rows) {
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMesh(const std::string& path, const std::string& format,
                                                        const MeshShape& shape, std::stop_token stop) {
   WELLSPACE_ASSIGN_OR_RETURN(const WriterKind writer, FindWriter(path, format, shape.dimension, shape.has_weights));
-  return writer.create(path, shape, std::move(stop));
+  MeshShape held = shape;
+  if (!writer.has_attributes) {
+    held.attributes.clear();
+  }
+  return writer.create(path, held, std::move(stop));
 }
 
 absl::Status WriteMesh(const std::string& path, const std::string& format, const MeshView& mesh, std::stop_token stop) {
@@ -139,6 +160,9 @@ absl::Status WriteMesh(const std::string& path, const std::string& format, const
   }
   if (status.ok() && has_marks) {
     status = rows.AddVertexTags(mesh.vertex_tags);
+  }
+  for (size_t i = 0; i < mesh.attributes.size() && status.ok(); ++i) {
+    status = rows.AddAttribute(i, mesh.attributes[i].values);
   }
   if (status.ok() && !mesh.simplex_regions.empty()) {
     status = rows.AddSimplexRegions(mesh.simplex_regions);

@@ -15,6 +15,13 @@
 //   msh22 The same in MSH 2.2, in ascii; every simplex is of the physical group 1.
 //   medit INRIA's .mesh of version 2 (double precision) in ascii, 2-D and 3-D only: the reference of a vertex is 1 if
 //         it is an input point, else 0, that of a simplex is 1. There is no place for weights.
+//   vtk   VTK's legacy format, version 3.0 in binary, 2-D and 3-D only: as vtu, arrays of the field of data.
+//   xdmf  XDMF 3, 2-D and 3-D only: NAME.xdmf with the grid "mesh", its arrays in NAME.h5, in chunks compressed by
+//         zlib; data as vtu. Names of parts and regions as meshio has them in <Information>.
+//   su2   SU2's, in ascii, 2-D and 3-D only. There is no place for weights, and none for regions.
+//   abaqus  The .inp of Abaqus and CalculiX, 2-D (CPS3) and 3-D (C3D4) only; *NSET "input" of the input points, *ELSET
+//         of the simplices by their regions. There is no place for weights.
+// vtk, xdmf, su2 and abaqus are not read back.
 //
 // With a boundary there are, beside that:
 //   vtu, vtkhdf  its facets as cells after the simplices; cell data "region" and "boundary" (the tag), 0 where there is
@@ -25,6 +32,15 @@
 //         attribute of .ele.
 //   msh41, msh22  physical groups with names: one of each part, with its tag as number, and one of the simplices.
 //   medit Edges in 2-D, Triangles in 3-D, with their tags as references.
+//   vtk   as vtu, "origin" of 32 bits.
+//   xdmf  NAME_boundary.xdmf with the grid "boundary" of facets, which have their tag as cell data "boundary"; its
+//         arrays in NAME_boundary.h5.
+//   su2   markers; those of parts without facets are left out.
+//   abaqus  *NSET of the vertices and *SURFACE of the sides of elements, one each of every part.
+// Labels of su2 and abaqus are names as Labels makes them (labels.h).
+//
+// Attributes of vertices, which input points have and others have not, are numbers of 8 bytes, NaN where there is none:
+// point data of vtu, vtkhdf, vtk and xdmf under their names, "attribute_NAME" in npz. Other formats leave them out.
 //
 // With several regions each simplex has the id of its own: cell data "region" of vtu and vtkhdf; `regions` of npz, with
 // names in `region_names` for the ids in `region_ids`; the attribute of .ele, with names in a comment "# regions:"; the
@@ -50,6 +66,9 @@ namespace wellspace::formats {
 // The names that `format` may take below.
 std::vector<std::string> MeshFormats();
 
+// Whether a mesh in `path` and `format` has attributes of its vertices.
+bool HasPlaceForAttributes(const std::string& path, const std::string& format);
+
 // The files that WriteMesh makes of `path` and `format`: that one, or a pair. What cannot be written is taken for one
 // file.
 std::vector<std::string> FilesOfMeshWritten(const std::string& path, const std::string& format);
@@ -64,7 +83,8 @@ absl::Status CheckMeshOutput(const std::string& path, const std::string& format,
 // Memory: a few blocks for a regular file; for vtu into a pipe or a device the compressed array that is being written;
 //         for node with weights or tags of vertices the points, for msh41 and msh22 with weights these. With several
 //         regions, for msh41, msh22, medit and node also 16 bytes for each run of simplices of one region; for msh41
-//         into a pipe or a device the simplices, and otherwise 4 KiB a region.
+//         into a pipe or a device the simplices, and otherwise 4 KiB a region. For vtk all data of vertices; for abaqus
+//         the facets, and the simplices that may have one.
 // Thread safety: thread-compatible.
 class MeshWriter {
  public:
@@ -73,14 +93,15 @@ class MeshWriter {
   MeshWriter& operator=(const MeshWriter&) = delete;
 
   // The next rows of the arrays: all points, then all weights if the shape has them, then all origins and all tags of
-  // vertices if it has marks, then all regions of simplices if it has them, then all simplices, then all facets of its
-  // boundary. Returns the first error of all so
-  // far.
+  // vertices if it has marks, then each of its attributes, then all regions of simplices if it has them, then all
+  // simplices, then all facets of its boundary. Returns the first error of all so far.
   // REQUIRES:   whole rows, no more than the shape says, nothing of an array before another that goes first.
   virtual absl::Status AddPoints(std::span<const double> points) = 0;
   virtual absl::Status AddWeights(std::span<const double> weights) = 0;
   virtual absl::Status AddVertexOrigins(std::span<const uint32_t> /*origins*/) { return absl::OkStatus(); }
   virtual absl::Status AddVertexTags(std::span<const int32_t> /*tags*/) { return absl::OkStatus(); }
+  // The next vertices' values of the attribute `index` of the shape; ignored by formats without a place for attributes.
+  virtual absl::Status AddAttribute(size_t /*index*/, std::span<const double> /*values*/) { return absl::OkStatus(); }
   virtual absl::Status AddSimplexRegions(std::span<const int32_t> regions) = 0;
   virtual absl::Status AddSimplices(std::span<const uint32_t> simplices) = 0;
   virtual absl::Status AddFacets(std::span<const uint32_t> facets) = 0;

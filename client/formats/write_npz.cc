@@ -56,6 +56,17 @@ class NpzWriter final : public MeshWriter {
     return archive_.status();
   }
 
+  absl::Status AddAttribute(size_t index, std::span<const double> values) override {
+    if (attributes_begun_ == index) {
+      ++attributes_begun_;
+      Begin(absl::StrCat("attribute_", shape_.attributes[index], ".npy").c_str(), "<f8", shape_.vertex_count,
+            std::nullopt, sizeof(double));
+    }
+    Write(values);
+    attribute_values_ += values.size();
+    return archive_.status();
+  }
+
   absl::Status AddSimplexRegions(std::span<const int32_t> regions) override {
     if (!std::exchange(has_simplex_regions_, true)) {
       Begin(kNpzRegions, "<i4", shape_.simplex_count, std::nullopt, sizeof(int32_t));
@@ -94,7 +105,8 @@ class NpzWriter final : public MeshWriter {
                                                      .weights = weights_,
                                                      .simplex_regions = simplex_regions_,
                                                      .simplices = simplices_,
-                                                     .facets = facets_}));
+                                                     .facets = facets_,
+                                                     .attribute_values = attribute_values_}));
     return output_.Commit();
   }
 
@@ -198,8 +210,10 @@ class NpzWriter final : public MeshWriter {
   bool has_vertex_tags_ = false;
   bool has_simplex_regions_ = false;
   bool has_facets_ = false;
+  size_t attributes_begun_ = 0;  // members
   uint64_t simplex_regions_ = 0;
   uint64_t facets_ = 0;
+  uint64_t attribute_values_ = 0;
 };
 
 }  // namespace

@@ -34,7 +34,8 @@ class Solvers(unittest.TestCase):
         cls.folder = pathlib.Path(cls.temporary.name)
         cls.counts = {}
         for dimension, (cloud, _) in CLOUDS.items():
-            for name, format in ((".mesh", "medit"), (".msh", "msh41"), ("-22.msh", "msh22"), (".npz", "npz")):
+            for name, format in ((".mesh", "medit"), (".msh", "msh41"), ("-22.msh", "msh22"), (".npz", "npz"),
+                                 (".xdmf", "xdmf")):
                 cls.wellspace("mesh", ROOT / "examples" / cloud, "--dimension", dimension, "-o", f"{dimension}{name}",
                               "--format", format, "--quiet")
             with numpy.load(cls.folder / f"{dimension}.npz") as mesh:
@@ -119,6 +120,28 @@ gmsh.finalize()
                 self.assertEqual(re.findall(r"(?m)^NMARK= ?(\d+)$", text), [str(2 * dimension)])
                 counts = [int(count) for count in re.findall(r"(?m)^MARKER_ELEMS= ?(\d+)$", text)]
                 self.assertEqual(sorted(counts), sorted(self.counts[dimension]))
+
+    @unittest.skipUnless(has_module("dolfinx.io"), "python3-dolfinx is not installed")
+    def test_dolfinx_reads_xdmf_with_facet_tags(self):
+        script = """
+import sys, numpy
+from mpi4py import MPI
+from dolfinx.io import XDMFFile
+with XDMFFile(MPI.COMM_WORLD, sys.argv[1] + ".xdmf", "r") as file:
+    mesh = file.read_mesh(name="mesh")
+    regions = file.read_meshtags(mesh, name="mesh")
+mesh.topology.create_connectivity(mesh.topology.dim - 1, mesh.topology.dim)
+with XDMFFile(MPI.COMM_WORLD, sys.argv[1] + "_boundary.xdmf", "r") as file:
+    facets = file.read_meshtags(mesh, name="boundary")
+print("tags", *numpy.bincount(facets.values)[1:])
+print("cells", len(regions.values), *set(regions.values))
+"""
+        for dimension in CLOUDS:
+            with self.subTest(dimension=dimension):
+                text = self.run_program(sys.executable, "-c", script, dimension)
+                with numpy.load(self.folder / f"{dimension}.npz") as mesh:
+                    self.assertIn(f"cells {len(mesh['simplices'])} 1\n", text)
+                self.assertIn("tags " + " ".join(map(str, self.counts[dimension])), text)
 
     @unittest.skipUnless(has_module("dolfinx.io.gmshio") and has_module("gmsh"), "python3-dolfinx is not installed")
     def test_dolfinx_gets_facet_tags(self):

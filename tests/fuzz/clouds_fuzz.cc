@@ -28,6 +28,7 @@ struct Choice {
   int dimension;
   std::string_view columns = "";  // a character each
   bool skip_invalid = false;
+  bool keep_attributes = false;
 };
 constexpr std::array kChoices = {
     Choice{"csv", 0},
@@ -72,6 +73,22 @@ constexpr std::array kChoices = {
     Choice{"ply", 0, "yx", true},
     Choice{"obj", 2, "13"},
     Choice{"off", 0, "zyx"},
+    // From 'Y' on.
+    Choice{"stl", 0},
+    Choice{"pcd", 0},
+    Choice{"las", 0},
+    Choice{"vtk", 0},
+    Choice{"vtp", 0},
+    Choice{"vtu", 0},
+    // From '_' on.
+    Choice{"stl", 0, "zx", true},
+    Choice{"pcd", 0, "", true, true},
+    Choice{"las", 2, "xy", true, true},
+    Choice{"vtk", 0, "", true, true},
+    Choice{"vtp", 0, "", true, true},
+    Choice{"vtu", 3, "", false, true},
+    Choice{"csv", 0, "", true, true},
+    Choice{"ply", 0, "", true, true},
 };
 
 void RequireCloud(const PointCloud& cloud, const CloudOptions& options) {
@@ -89,12 +106,18 @@ void RequireCloud(const PointCloud& cloud, const CloudOptions& options) {
   for (const std::string& note : cloud.notes) {
     RequireClearMessage(note);
   }
-  if (options.format == "npy" || (options.format == "ply" && cloud.lines.size() == 0)) {  // or in binary
-    Require(cloud.lines.size() == 0, "an array has no lines");
-    Require(cloud.rows.size() == (options.skip_invalid ? cloud.size() : 0),
+  for (const formats::PointAttribute& attribute : cloud.attributes) {
+    Require(options.keep_attributes, "attributes are kept only if that was asked for");
+    Require(attribute.values.size() == cloud.size(), "every point has all attributes");
+  }
+  constexpr std::array<std::string_view, 8> kMayBeBinary = {"npy", "ply", "stl", "pcd", "las", "vtk", "vtp", "vtu"};
+  if (cloud.lines.size() == 0 &&
+      std::find(kMayBeBinary.begin(), kMayBeBinary.end(), options.format) != kMayBeBinary.end()) {
+    Require(cloud.rows.size() == cloud.size() || (cloud.rows.size() == 0 && cloud.skipped == 0),
             "every point has a row if some are skipped");
     return;
   }
+  Require(options.format != "npy", "an array has no lines");
   Require(cloud.lines.size() == cloud.size(), "every point has a line");
   uint64_t line = 0;
   for (uint64_t point = 0; point < cloud.size(); ++point) {
@@ -145,6 +168,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const fuzz::Choice& choice = fuzz::kChoices[static_cast<uint8_t>(bytes.Next() - '0') % fuzz::kChoices.size()];
   formats::CloudOptions options = {.format = choice.format, .dimension = choice.dimension};
   options.skip_invalid = choice.skip_invalid;
+  options.keep_attributes = choice.keep_attributes;
   for (const char column : choice.columns) {
     options.columns.emplace_back(1, column);
   }

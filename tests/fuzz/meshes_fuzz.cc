@@ -18,7 +18,7 @@
 #include "client/formats/cloud.h"
 #include "client/formats/output_file.h"
 #include "client/formats/read_mesh.h"
-#include "client/formats/vtk_array.h"
+#include "client/formats/vtk/vtk_array.h"
 #include "client/formats/write_mesh.h"
 #include "client/formats/zip_file.h"
 #include "tests/fuzz/fuzz.h"

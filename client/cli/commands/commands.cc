@@ -9,6 +9,8 @@ void AddCommands(CLI::App& app, int& exit_code) {
   AddTransferCommands(app, exit_code);
   AddOperationCommands(app, exit_code);
   AddQueryCommands(app, exit_code);
+  AddConvertCommand(app, exit_code);
+  AddInfoCommand(app, exit_code);
   AddCheckCommand(app, exit_code);
   AddRenderCommand(app, exit_code);
   AddServerCommands(app, exit_code);

@@ -14,6 +14,8 @@ void AddSessionCommands(CLI::App& app, int& exit_code);    // session create, li
 void AddTransferCommands(CLI::App& app, int& exit_code);   // upload, download
 void AddOperationCommands(CLI::App& app, int& exit_code);  // refine, watch, cancel
 void AddQueryCommands(CLI::App& app, int& exit_code);      // cells, add
+void AddConvertCommand(CLI::App& app, int& exit_code);
+void AddInfoCommand(CLI::App& app, int& exit_code);
 void AddCheckCommand(CLI::App& app, int& exit_code);
 void AddRenderCommand(CLI::App& app, int& exit_code);
 void AddServerCommands(CLI::App& app, int& exit_code);      // server info, health

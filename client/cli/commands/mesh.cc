@@ -29,6 +29,7 @@ struct MeshCommand {
   std::string output;
   std::string format;
   bool no_boundary = false;
+  bool no_attributes = false;
   MeshingOptions options;
 
   absl::Status CheckOptions() const;
@@ -55,6 +56,7 @@ absl::Status MeshCommand::Mesh(client::Client& client, const client::MeshOptions
   WELLSPACE_RETURN_IF_ERROR(formats::CheckMeshOutput(output, format, cloud.dimension, mesh_options.pump_weights));
   client::MeshFile file(output, format, call.stop);
   file.KeepInputVertices();
+  file.AddAttributes(cloud.attributes);
   if (no_boundary) {
     file.LeaveOutBoundary();
   }
@@ -82,6 +84,9 @@ int MeshCommand::Run() {
   if (const absl::Status status = CheckOptions(); !status.ok()) {
     return ReportError(status, options.remote().format());
   }
+  if (!no_attributes && !no_boundary && formats::HasPlaceForAttributes(output, format)) {
+    options.KeepAttributes();
+  }
   return options.Run([this](client::Client& client, const client::MeshOptions& mesh_options,
                             const formats::PointCloud& cloud,
                             const client::CallOptions& call) { return Mesh(client, mesh_options, cloud, call); });
@@ -95,6 +100,7 @@ void AddMeshCommand(CLI::App& app, int& exit_code) {
   mesh->footer(absl::StrCat(kCloudsHelp, kMeshesHelp, kMeshExamples, "\n", kExitCodesHelp));
   command->options.AddTo(*mesh);
   AddMeshOutput(*mesh, command->output, command->format, command->no_boundary);
+  AddNoAttributes(*mesh, command->no_attributes);
   mesh->callback([command, &exit_code] { exit_code = command->Run(); });
 }
 

@@ -143,7 +143,8 @@ TEST_F(LostOutputTest, TheLimitOfAFilesSizeLeavesNoFile) {
       {"render", Path("grid.npz"), "-o", Path("out.png")},
       {"render", Path("grid.npz"), "-o", Path("out.svg")},
       {"check", Path("grid.npz"), "--plot", Path("out.svg"), "--output", "json"}};
-  for (const char* name : {"out.vtu", "out.vtkhdf", "out.npz", "out.msh", "out.mesh", "out.node"}) {
+  for (const char* name : {"out.vtu", "out.vtkhdf", "out.npz", "out.msh", "out.mesh", "out.node", "out.vtk", "out.xdmf",
+                           "out.su2", "out.inp"}) {
     writing.push_back({"mesh", grid, "-o", Path(name)});
   }
   writing.push_back({"mesh", grid, "-o", Path("out.txt"), "--format", "msh22"});

@@ -1,9 +1,11 @@
 """Other people's programs read what Wellspace writes, and Wellspace reads what they write; every bit the same."""
+import importlib.util
 import os
 import pathlib
 import subprocess
 import tempfile
 import unittest
+import warnings
 
 import meshio
 import numpy
@@ -110,6 +112,73 @@ class Interoperability(unittest.TestCase):
                     self.assert_same_bits(mesh, points if theirs == "medit" else pad(points), cells, dimension)
                     if theirs == "gmsh":
                         numpy.testing.assert_array_equal(mesh.point_data["input"].ravel(), numpy.zeros(len(points)))
+
+    def write_with_boundary(self, dimension):
+        """A mesh of random numbers with two regions, and facets of two parts; as arrays."""
+        points, cells = random_mesh(dimension)
+        facets = numpy.random.default_rng(9).integers(0, len(points), size=(90, dimension))
+        tags = numpy.repeat([2, 5], [30, 60])
+        regions = numpy.arange(len(cells)) % 3 // 2 + 7
+        numpy.savez(self.folder / "mesh.npz", points=points, simplices=cells, facets=facets, facet_tags=tags,
+                    facet_names=["xmax", "ice & snow"], facet_name_tags=[2, 5], regions=regions,
+                    region_ids=[7, 8], region_names=["land", "deep sea"],
+                    vertex_origins=numpy.arange(len(points)), vertex_tags=numpy.arange(len(points)) % 4)
+        return points, cells, facets, tags, regions
+
+    def assert_blocks(self, mesh, *blocks):
+        self.assertEqual([block.type for block in mesh.cells], [kind for kind, _ in blocks])
+        for block, (_, expected) in zip(mesh.cells, blocks):
+            numpy.testing.assert_array_equal(block.data, expected)
+
+    def test_meshio_reads_our_vtk_and_su2_with_boundary(self):
+        for dimension in (2, 3):
+            points, cells, facets, tags, regions = self.write_with_boundary(dimension)
+            blocks = (cell_type(dimension), cells), ("line" if dimension == 2 else "triangle", facets)
+            with self.subTest(dimension=dimension, format="vtk"):
+                self.convert("mesh.npz", "mesh.vtk")
+                mesh = meshio.read(self.folder / "mesh.vtk")
+                numpy.testing.assert_array_equal(mesh.points.astype(numpy.float64).view(numpy.uint64),
+                                                 pad(points).view(numpy.uint64))
+                self.assert_blocks(mesh, *blocks)
+                for name, values in (("region", (regions, 0 * tags)), ("boundary", (0 * regions, tags))):
+                    for found, expected in zip(mesh.cell_data[name], values):
+                        numpy.testing.assert_array_equal(found, expected)
+            with self.subTest(dimension=dimension, format="su2"), warnings.catch_warnings():
+                self.convert("mesh.npz", "mesh.su2")
+                mesh = meshio.read(self.folder / "mesh.su2")  # which makes tags 1, 2, ... of names
+                numpy.testing.assert_array_equal(mesh.points.view(numpy.uint64), points.view(numpy.uint64))
+                self.assert_blocks(mesh, *blocks)
+                numpy.testing.assert_array_equal(mesh.cell_data["su2:tag"][1], numpy.repeat([1, 2], [30, 60]))
+
+    def test_meshio_reads_our_inp_with_sets(self):
+        for dimension in (2, 3):
+            with self.subTest(dimension=dimension):
+                points, cells, facets, tags, regions = self.write_with_boundary(dimension)
+                self.convert("mesh.npz", "mesh.inp")
+                mesh = meshio.read(self.folder / "mesh.inp")
+                numpy.testing.assert_array_equal(mesh.points.view(numpy.uint64), points.view(numpy.uint64))
+                self.assert_blocks(mesh, (cell_type(dimension), cells))
+                for name, tag in (("xmax", 2), ("ice___snow", 5)):
+                    numpy.testing.assert_array_equal(mesh.point_sets[name], numpy.unique(facets[tags == tag]))
+                for name, region in (("land", 7), ("deep_sea", 8)):
+                    numpy.testing.assert_array_equal(mesh.cell_sets[name][0], numpy.flatnonzero(regions == region))
+
+    @unittest.skipUnless(importlib.util.find_spec("h5py"), "python3-h5py is not installed")
+    def test_meshio_reads_our_xdmf_with_boundary(self):
+        for dimension in (2, 3):
+            with self.subTest(dimension=dimension):
+                points, cells, facets, tags, regions = self.write_with_boundary(dimension)
+                self.convert("mesh.npz", "mesh.xdmf")
+                mesh = meshio.read(self.folder / "mesh.xdmf")
+                self.assert_same_bits(mesh, points, cells, dimension)
+                numpy.testing.assert_array_equal(mesh.cell_data["region"][0], regions)
+                self.assertEqual({name: list(map(int, row)) for name, row in mesh.field_data.items()},
+                                 {"xmax": [2, dimension - 1], "ice & snow": [5, dimension - 1],
+                                  "land": [7, dimension], "deep sea": [8, dimension]})
+                boundary = meshio.read(self.folder / "mesh_boundary.xdmf")
+                numpy.testing.assert_array_equal(boundary.points.view(numpy.uint64), points.view(numpy.uint64))
+                self.assert_blocks(boundary, ("line" if dimension == 2 else "triangle", facets))
+                numpy.testing.assert_array_equal(boundary.cell_data["boundary"][0], tags)
 
     def test_we_read_the_msh_and_mesh_of_meshio(self):
         for dimension in (2, 3):

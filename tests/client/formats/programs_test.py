@@ -84,12 +84,14 @@ class Programs(unittest.TestCase):
                 self.assertEqual((int(figures[1]), int(figures[2])), (len(points), len(cells)))
                 self.assertAlmostEqual(float(figures[3]), volume, places=12)
 
-    def test_vtk_reads_our_vtu_and_vtkhdf(self):
+    def test_vtk_reads_our_vtu_vtkhdf_and_vtk(self):
         import vtk
-        for dimension, format in itertools.product((2, 3), ("vtu", "vtkhdf")):
+        readers = {"vtu": vtk.vtkXMLUnstructuredGridReader, "vtkhdf": vtk.vtkHDFReader,
+                   "vtk": vtk.vtkUnstructuredGridReader}
+        for dimension, format in itertools.product((2, 3), readers):
             with self.subTest(dimension=dimension, format=format):
                 points, cells, volume = self.write(dimension, f"mesh.{format}", format)
-                reader = vtk.vtkXMLUnstructuredGridReader() if format == "vtu" else vtk.vtkHDFReader()
+                reader = readers[format]()
                 reader.SetFileName(str(self.folder / f"mesh.{format}"))
                 sizes = vtk.vtkCellSizeFilter()
                 sizes.SetInputConnection(reader.GetOutputPort())
@@ -100,6 +102,51 @@ class Programs(unittest.TestCase):
                                  (len(points), len(cells)))
                 total = sizes.GetOutput().GetFieldData().GetArray("Area" if dimension == 2 else "Volume").GetValue(0)
                 self.assertAlmostEqual(total, volume, places=12)
+
+
+    def assert_cloud(self, name, points, type="float64"):
+        self.run_program(CONVERT_MESH, "--cloud", name, "cloud.npz")
+        with numpy.load(self.folder / "cloud.npz") as cloud:
+            numpy.testing.assert_array_equal(cloud["points"].astype(type), numpy.asarray(points, type))
+
+    def test_we_read_the_points_of_vtk(self):
+        import vtk
+        sphere = vtk.vtkSphereSource()
+        sphere.Update()
+        surface = sphere.GetOutput()
+        points = numpy.array([surface.GetPoint(i) for i in range(surface.GetNumberOfPoints())])  # floats
+        for version, binary in itertools.product((42, 51), (False, True)):
+            with self.subTest(format="vtk", version=version, binary=binary):
+                writer = vtk.vtkPolyDataWriter()
+                writer.SetFileVersion(version)
+                writer.SetFileType(2 if binary else 1)
+                writer.SetFileName(str(self.folder / "sphere.vtk"))
+                writer.SetInputData(surface)
+                writer.Write()
+                expected = points if binary else [[float(f"{x:g}") for x in point] for point in points]
+                self.assert_cloud("sphere.vtk", expected)
+        for mode in ("Ascii", "Binary"):
+            with self.subTest(format="vtp", mode=mode):
+                writer = vtk.vtkXMLPolyDataWriter()
+                getattr(writer, f"SetDataModeTo{mode}")()
+                writer.SetFileName(str(self.folder / "sphere.vtp"))
+                writer.SetInputData(surface)
+                writer.Write()
+                with open(self.folder / "sphere.vtp") as file:
+                    self.assertIn(mode.lower(), file.read())
+                self.assert_cloud("sphere.vtp", points, "float64" if mode == "Binary" else "float32")
+        for binary in (False, True):
+            with self.subTest(format="stl", binary=binary):
+                writer = vtk.vtkSTLWriter()
+                writer.SetFileType(2 if binary else 1)
+                writer.SetFileName(str(self.folder / "sphere.stl"))
+                writer.SetInputData(surface)
+                writer.Write()
+                self.run_program(CONVERT_MESH, "--cloud", "sphere.stl", "cloud.npz")
+                with numpy.load(self.folder / "cloud.npz") as cloud:
+                    self.assertEqual(cloud["points"].shape, points.shape)  # each once, in another order
+                    found = sorted(map(tuple, cloud["points"].round(4) + 0.0))
+                    self.assertEqual(found, sorted(map(tuple, points.round(4) + 0.0)))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 // Meshes three points in a box by the installed core, adds a fourth, and checks the mesh.
 #include <wellspace/core/mesher.h>
-#include <wellspace/core/simplex/validate.h>
+#include <wellspace/core/validate/validate.h>
 
 #include <iostream>
 #include <memory>

@@ -4,8 +4,8 @@
 // it is
 //               shorter (else 0), then the compressed bytes of each block.
 // Uncompressed: base64(header data); header: number of bytes.
-#ifndef WELLSPACE_CLIENT_FORMATS_VTK_ARRAY_H_
-#define WELLSPACE_CLIENT_FORMATS_VTK_ARRAY_H_
+#ifndef WELLSPACE_CLIENT_FORMATS_VTK_VTK_ARRAY_H_
+#define WELLSPACE_CLIENT_FORMATS_VTK_VTK_ARRAY_H_
 
 #include <cstdint>
 #include <cstring>
@@ -96,4 +96,4 @@ absl::StatusOr<std::string> DecodeBase64(std::string_view text);
 
 }  // namespace wellspace::formats
 
-#endif  // WELLSPACE_CLIENT_FORMATS_VTK_ARRAY_H_
+#endif  // WELLSPACE_CLIENT_FORMATS_VTK_VTK_ARRAY_H_

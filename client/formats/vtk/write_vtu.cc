@@ -7,8 +7,8 @@
 #include "absl/strings/str_cat.h"
 #include "client/formats/mesh_writers.h"
 #include "client/formats/output_file.h"
-#include "client/formats/vtk_array.h"
-#include "client/formats/vtk_cells.h"
+#include "client/formats/vtk/vtk_array.h"
+#include "client/formats/vtk/vtk_cells.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {
@@ -66,6 +66,18 @@ class VtuWriter final : public MeshWriter {
     return Status();
   }
 
+  absl::Status AddAttribute(size_t index, std::span<const double> values) override {
+    if (attributes_begun_ == index) {
+      ++attributes_begun_;
+      NextOfPointData("Float64", shape_.attributes[index].c_str(), sizeof(double));
+    }
+    for (size_t i = 0; i < values.size() && Status().ok(); ++i) {
+      array_->Add<double>(values[i]);
+    }
+    attribute_values_ += values.size();
+    return Status();
+  }
+
   absl::Status AddSimplexRegions(std::span<const int32_t> regions) override {
     BeginRegions();
     for (size_t i = 0; i < regions.size() && Status().ok(); ++i) {
@@ -113,7 +125,8 @@ class VtuWriter final : public MeshWriter {
                                                      .weights = weights_,
                                                      .simplex_regions = simplex_regions_,
                                                      .simplices = simplices_,
-                                                     .facets = facets_}));
+                                                     .facets = facets_,
+                                                     .attribute_values = attribute_values_}));
     return output_.Commit();
   }
 
@@ -216,11 +229,13 @@ class VtuWriter final : public MeshWriter {
   bool has_origins_ = false;             // the array
   bool has_vertex_tags_ = false;         // the array
   bool has_regions_ = false;             // the array
+  size_t attributes_begun_ = 0;          // arrays
   uint64_t vertices_ = 0;
   uint64_t weights_ = 0;
   uint64_t simplex_regions_ = 0;
   uint64_t simplices_ = 0;
   uint64_t facets_ = 0;
+  uint64_t attribute_values_ = 0;
   absl::Status status_;
 };
 

@@ -1,6 +1,6 @@
 // The little of XML that the files of VTK use.
-#ifndef WELLSPACE_CLIENT_FORMATS_XML_SCANNER_H_
-#define WELLSPACE_CLIENT_FORMATS_XML_SCANNER_H_
+#ifndef WELLSPACE_CLIENT_FORMATS_VTK_XML_SCANNER_H_
+#define WELLSPACE_CLIENT_FORMATS_VTK_XML_SCANNER_H_
 
 #include <cstdint>
 #include <string>
@@ -56,4 +56,4 @@ class XmlScanner {
 
 }  // namespace wellspace::formats
 
-#endif  // WELLSPACE_CLIENT_FORMATS_XML_SCANNER_H_
+#endif  // WELLSPACE_CLIENT_FORMATS_VTK_XML_SCANNER_H_

@@ -1,4 +1,4 @@
-#include "client/formats/xml_scanner.h"
+#include "client/formats/vtk/xml_scanner.h"
 
 #include <algorithm>
 

@@ -1,6 +1,6 @@
 // The cells of a mesh as VTK has them: first the simplices, then the facets of the boundary. Private to this folder.
-#ifndef WELLSPACE_CLIENT_FORMATS_VTK_CELLS_H_
-#define WELLSPACE_CLIENT_FORMATS_VTK_CELLS_H_
+#ifndef WELLSPACE_CLIENT_FORMATS_VTK_VTK_CELLS_H_
+#define WELLSPACE_CLIENT_FORMATS_VTK_VTK_CELLS_H_
 
 #include <cstdint>
 
@@ -33,4 +33,4 @@ inline constexpr char kVtkRegion[] = "region";
 
 }  // namespace wellspace::formats
 
-#endif  // WELLSPACE_CLIENT_FORMATS_VTK_CELLS_H_
+#endif  // WELLSPACE_CLIENT_FORMATS_VTK_VTK_CELLS_H_

@@ -1,4 +1,4 @@
-#include "client/formats/vtk_array.h"
+#include "client/formats/vtk/vtk_array.h"
 
 #include <zlib.h>
 

@@ -1,0 +1,117 @@
+// wellspace convert: a file of a mesh or of points in another format.
+#include <iostream>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "client/cli/cloud_options.h"
+#include "client/cli/commands/commands.h"
+#include "client/cli/exit_codes.h"
+#include "client/cli/interrupt.h"
+#include "client/cli/meshing_options.h"
+#include "client/cli/progress_bar.h"
+#include "client/cli/remote_command.h"
+#include "client/formats/file_plan.h"
+#include "client/formats/line_reader.h"
+#include "client/formats/mesh_or_cloud.h"
+#include "client/formats/write_mesh.h"
+#include "core/base/status_macros.h"
+
+namespace wellspace::cli {
+namespace {
+
+constexpr char kConvertExamples[] =
+    "Examples:\n"
+    "  wellspace convert land.msh land.su2\n"
+    "  wellspace convert scan.las scan.vtu\n";
+
+struct ConvertCommand {
+  std::string input;
+  std::string output;
+  std::string mesh_format;
+  formats::CloudOptions cloud_options;
+  bool no_attributes = false;
+  OutputFormat format = OutputFormat::kText;
+
+  absl::Status Convert();
+};
+
+// The tag of a vertex is the least of its facets. Formats that hold origins get them only if they are known.
+void MarkVertices(const std::string& output, const std::string& format, formats::Mesh& mesh) {
+  const uint64_t vertices = mesh.View().vertex_count();
+  const bool has_origins = mesh.vertex_origins.size() == vertices;
+  const std::string by_name = format.empty() ? output : "." + format;
+  const bool is_node = by_name.ends_with(".node") || by_name.ends_with(".ele");
+  if (mesh.boundary.empty() || (!has_origins && !is_node)) {
+    mesh.vertex_origins.clear();
+    return;
+  }
+  mesh.vertex_origins.resize(vertices, formats::kSteinerOrigin);
+  mesh.vertex_tags.assign(vertices, 0);
+  size_t corner = 0;
+  for (const formats::BoundaryPart& part : mesh.boundary) {
+    for (const size_t end = corner + part.facets * mesh.dimension; corner < end; ++corner) {
+      int32_t& tag = mesh.vertex_tags[mesh.facets[corner]];
+      tag = tag == 0 ? part.tag : std::min(tag, part.tag);
+    }
+  }
+}
+
+absl::Status ConvertCommand::Convert() {
+  formats::FilePlan files;
+  files.ReadsMesh("IN", input);
+  files.WritesMesh("OUT", output, mesh_format);
+  WELLSPACE_RETURN_IF_ERROR(files.Check());
+  WELLSPACE_RETURN_IF_ERROR(formats::CheckMeshOutput(output, mesh_format));
+  cloud_options.keep_attributes = !no_attributes;
+  WELLSPACE_ASSIGN_OR_RETURN(formats::MeshOrCloud read, formats::ReadMeshOrCloud(input, cloud_options));
+  PrintNotes(ReportOf(cloud_options, read.notes, read.skipped), format, /*quiet=*/false);
+  if (no_attributes) {
+    read.attributes.clear();
+  }
+  MarkVertices(output, mesh_format, read.mesh);
+  const formats::MeshView view = read.View();
+  WELLSPACE_RETURN_IF_ERROR(formats::WriteMesh(output, mesh_format, view));
+  if (format == OutputFormat::kJson) {
+    PrintJson({{"input", input},
+               {"output", output},
+               {"kind", read.is_mesh ? "mesh" : "cloud"},
+               {"dimension", view.dimension},
+               {"vertices", view.vertex_count()},
+               {"simplices", view.simplex_count()}});
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void AddConvertCommand(CLI::App& app, int& exit_code) {
+  const auto command = std::make_shared<ConvertCommand>();
+  CLI::App* convert = app.add_subcommand(
+      "convert",
+      "Write a mesh, or points, in another format: with boundary, regions, names and attributes as far as both formats "
+      "have them; points become vertices of a mesh without simplices");
+  convert->footer(absl::StrCat(kCloudsHelp, kMeshesHelp, kConvertExamples, "\n", kExitCodesHelp));
+  convert->add_option("IN", command->input, "File of a mesh or of points")->required()->type_name("FILE");
+  convert->add_option("OUT", command->output, "File of the mesh, or - for standard output")
+      ->required()
+      ->type_name("FILE");
+  convert->add_option("--format", command->mesh_format, "Format of OUT; default: by its extension")
+      ->check(CLI::IsMember(formats::MeshFormats()));
+  AddCloudOptions(*convert, command->cloud_options);
+  convert->add_flag("--no-attributes", command->no_attributes, "Leave out what points have beside coordinates");
+  AddOutput(*convert, command->format);
+  convert->callback([command, &exit_code] {
+    const Interrupt interrupt(Interrupt::First::kEnd);
+    const absl::Status status =
+        command->output == formats::kStandardStream && command->format == OutputFormat::kJson
+            ? absl::InvalidArgumentError("--output json, and OUT: only one of them can be standard output")
+            : command->Convert();
+    exit_code = status.ok() ? kExitOk : ReportError(status, command->format);
+  });
+}
+
+}  // namespace wellspace::cli

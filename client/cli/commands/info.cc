@@ -1,0 +1,222 @@
+// wellspace info: what is in a file?
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+#include <limits>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "absl/strings/str_format.h"
+#include "client/cli/cloud_options.h"
+#include "client/cli/commands/commands.h"
+#include "client/cli/exit_codes.h"
+#include "client/cli/interrupt.h"
+#include "client/cli/json.h"
+#include "client/cli/meshing_options.h"
+#include "client/cli/progress_bar.h"
+#include "client/cli/remote_command.h"
+#include "client/formats/mesh_or_cloud.h"
+#include "core/base/status_macros.h"
+#include "core/validate/validate.h"
+
+namespace wellspace::cli {
+namespace {
+
+constexpr char kInfoExamples[] =
+    "Examples:\n"
+    "  wellspace info land.msh\n"
+    "  wellspace info scan.las --json\n";
+
+struct InfoCommand {
+  std::string path;
+  formats::CloudOptions cloud_options;
+  bool is_json = false;
+  OutputFormat format = OutputFormat::kText;
+
+  absl::Status Run();
+};
+
+// The least or largest number of each axis; null without points.
+Json BoundOf(const formats::Mesh& mesh, bool is_low) {
+  if (mesh.points.empty()) {
+    return nullptr;
+  }
+  std::vector<double> bound(mesh.points.begin(), mesh.points.begin() + mesh.dimension);
+  for (size_t i = 0; i < mesh.points.size(); ++i) {
+    double& x = bound[i % mesh.dimension];
+    x = is_low ? std::min(x, mesh.points[i]) : std::max(x, mesh.points[i]);
+  }
+  return bound;
+}
+
+// name, min, max (null if all are missing) and how many values are missing.
+Json AttributeJson(const formats::PointAttribute& attribute) {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  uint64_t missing = 0;
+  for (const double value : attribute.values) {
+    missing += std::isnan(value) ? 1 : 0;
+    low = std::min(low, std::isnan(value) ? low : value);
+    high = std::max(high, std::isnan(value) ? high : value);
+  }
+  const bool has_values = missing < attribute.values.size();
+  return {{"name", attribute.name},
+          {"min", has_values ? Json(low) : Json(nullptr)},
+          {"max", has_values ? Json(high) : Json(nullptr)},
+          {"missing", missing}};
+}
+
+Json RegionsJson(const formats::Mesh& mesh) {
+  std::map<int32_t, uint64_t> sizes;
+  for (const int32_t region : mesh.simplex_regions) {
+    ++sizes[region];
+  }
+  Json regions = Json::array();
+  for (const formats::Region& region : mesh.regions) {
+    regions.push_back({{"id", region.id}, {"name", region.name}, {"simplices", sizes[region.id]}});
+  }
+  return regions;
+}
+
+// Of the simplices; null without any, or if indices are wrong, which `check` tells more of.
+Json QualityJson(const formats::Mesh& mesh) {
+  const core::MeshView view = {
+      .dimension = mesh.dimension, .points = mesh.points, .simplices = mesh.simplices, .weights = mesh.weights};
+  if (mesh.simplices.empty() || !core::ValidateIndices(view).ok()) {
+    return nullptr;
+  }
+  const core::QualityReport report = core::MeasureQuality(view);
+  return {{"max_radius_edge", report.max_radius_edge},
+          {"min_angle_deg", report.min_angle_deg},
+          {"max_angle_deg", report.max_angle_deg}};
+}
+
+Json InfoJson(const std::string& path, const formats::MeshOrCloud& read) {
+  const formats::MeshView view = read.View();
+  Json json;
+  json["file"] = path;
+  json["kind"] = read.is_mesh ? "mesh" : "cloud";
+  json["format"] = read.format;
+  json["dimension"] = view.dimension;
+  json[read.is_mesh ? "vertices" : "points"] = view.vertex_count();
+  json["low"] = BoundOf(read.mesh, /*is_low=*/true);
+  json["high"] = BoundOf(read.mesh, /*is_low=*/false);
+  json["attributes"] = Json::array();
+  for (const formats::PointAttribute& attribute : read.attributes) {
+    json["attributes"].push_back(AttributeJson(attribute));
+  }
+  if (!read.is_mesh) {
+    return json;
+  }
+  json["simplices"] = view.simplex_count();
+  json["weights"] = !view.weights.empty();
+  json["boundary"] = Json::array();
+  for (const formats::BoundaryPart& part : view.boundary) {
+    json["boundary"].push_back({{"tag", part.tag}, {"name", part.name}, {"facets", part.facets}});
+  }
+  json["regions"] = RegionsJson(read.mesh);
+  json["quality"] = QualityJson(read.mesh);
+  return json;
+}
+
+void PrintLine(const std::string& label, const std::string& text) {
+  std::cout << absl::StrFormat("%-20s %s\n", label, text);
+}
+
+std::string Numbers(const Json& numbers) {
+  std::string text;
+  for (const Json& number : numbers) {
+    absl::StrAppend(&text, text.empty() ? "" : ", ", absl::StrFormat("%.9g", number.get<double>()));
+  }
+  return text;
+}
+
+// "3 north", or the number alone.
+std::string Numbered(const Json& row, const char* number) {
+  const std::string name = row["name"];
+  return absl::StrCat(row[number].get<int32_t>(), name.empty() ? "" : " ", name);
+}
+
+void PrintInfo(const Json& json) {
+  PrintLine("file", json["file"]);
+  PrintLine("kind", absl::StrCat(std::string(json["kind"]), ", ", std::string(json["format"]), ", ",
+                                 json["dimension"].get<int>(), "-D"));
+  const bool is_mesh = json["kind"] == "mesh";
+  const char* points = is_mesh ? "vertices" : "points";
+  PrintLine(points, WithThousands(json[points]));
+  if (is_mesh) {
+    PrintLine(formats::SimplexName(json["dimension"]), WithThousands(json["simplices"]));
+  }
+  if (!json["low"].is_null()) {
+    PrintLine("from", Numbers(json["low"]));
+    PrintLine("to", Numbers(json["high"]));
+  }
+  for (const Json& attribute : json["attributes"]) {
+    const uint64_t missing = attribute["missing"];
+    PrintLine(
+        absl::StrCat("attribute"),
+        absl::StrCat(std::string(attribute["name"]),
+                     attribute["min"].is_null() ? ""
+                                                : absl::StrFormat(": %.9g to %.9g", attribute["min"].get<double>(),
+                                                                  attribute["max"].get<double>()),
+                     missing == 0 ? "" : absl::StrCat(", ", WithThousands(missing), " missing")));
+  }
+  if (!is_mesh) {
+    return;
+  }
+  for (const Json& part : json["boundary"]) {
+    PrintLine("boundary", absl::StrCat(Numbered(part, "tag"), ": ", WithThousands(part["facets"]), " facets"));
+  }
+  for (const Json& region : json["regions"]) {
+    PrintLine("region", absl::StrCat(Numbered(region, "id"), ": ", WithThousands(region["simplices"]), " simplices"));
+  }
+  if (const Json& quality = json["quality"]; !quality.is_null()) {
+    const char* angle = json["dimension"] == 2 ? "angles" : "dihedral angles";
+    PrintLine(angle, absl::StrFormat("%.6g\u00b0 to %.6g\u00b0", quality["min_angle_deg"].get<double>(),
+                                     quality["max_angle_deg"].get<double>()));
+    PrintLine("largest radius-edge", absl::StrFormat("%.9g", quality["max_radius_edge"].get<double>()));
+  }
+}
+
+absl::Status InfoCommand::Run() {
+  cloud_options.keep_attributes = true;
+  WELLSPACE_ASSIGN_OR_RETURN(const formats::MeshOrCloud read, formats::ReadMeshOrCloud(path, cloud_options));
+  const CloudReport report = ReportOf(cloud_options, read.notes, read.skipped);
+  PrintNotes(report, format, /*quiet=*/false);
+  Json json = InfoJson(path, read);
+  if (format == OutputFormat::kJson) {
+    AddNotes(report, json);
+    PrintJson(json);
+  } else {
+    PrintInfo(json);
+  }
+  return absl::OkStatus();
+}
+
+}  // namespace
+
+void AddInfoCommand(CLI::App& app, int& exit_code) {
+  const auto command = std::make_shared<InfoCommand>();
+  CLI::App* info = app.add_subcommand(
+      "info",
+      "Tell what is in a file of a mesh or of points: format, dimension, counts, bounds, attributes, and of a mesh its "
+      "boundary, regions and the quality of its simplices");
+  info->footer(absl::StrCat(kCloudsHelp, kInfoExamples, "\n", kExitCodesHelp));
+  info->add_option("FILE", command->path, "File of a mesh or of points, or - for points on standard input")
+      ->required()
+      ->type_name("FILE");
+  AddCloudOptions(*info, command->cloud_options, "FILE");
+  AddOutput(*info, command->format);
+  info->add_flag("--json", command->is_json, "The same as --output json");
+  info->callback([command, &exit_code] {
+    const Interrupt interrupt(Interrupt::First::kEnd);
+    command->format = command->is_json ? OutputFormat::kJson : command->format;
+    const absl::Status status = command->Run();
+    exit_code = status.ok() ? kExitOk : ReportError(status, command->format);
+  });
+}
+
+}  // namespace wellspace::cli

@@ -1,0 +1,25 @@
+// Numbers that points have beside their coordinates: an intensity, a colour, an id.
+#ifndef WELLSPACE_CLIENT_FORMATS_ATTRIBUTES_H_
+#define WELLSPACE_CLIENT_FORMATS_ATTRIBUTES_H_
+
+#include <span>
+#include <string>
+#include <vector>
+
+namespace wellspace::formats {
+
+// One number of every point.
+struct PointAttribute {
+  std::string name;
+  std::vector<double> values;  // NaN: missing. Whole numbers beyond 2^53 are rounded.
+
+  bool operator==(const PointAttribute&) const = default;
+};
+
+// Names of attributes as files of meshes have them: no two are the same, none is that of other data of a mesh, and none
+// has what the syntax of a format may have; "_" takes its place.
+std::vector<std::string> NamesToWrite(std::span<const PointAttribute> attributes);
+
+}  // namespace wellspace::formats
+
+#endif  // WELLSPACE_CLIENT_FORMATS_ATTRIBUTES_H_

@@ -1,0 +1,69 @@
+#include "client/formats/mesh_or_cloud.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "client/formats/line_reader.h"
+#include "client/formats/read_mesh.h"
+#include "client/formats/vtk/vtk_cells.h"
+#include "core/base/status_macros.h"
+
+namespace wellspace::formats {
+namespace {
+
+// Takes the data of points of a .vtu: what the mesher has written there tells input points and origins, the rest are
+// attributes. A file without is a mesh all the same.
+void TakePointData(const std::string& path, MeshOrCloud& read) {
+  absl::StatusOr<PointCloud> cloud = ReadCloud(path, {.format = "vtu", .keep_attributes = true});
+  if (!cloud.ok() || cloud->size() != read.mesh.View().vertex_count()) {
+    return;
+  }
+  for (PointAttribute& attribute : cloud->attributes) {
+    if (attribute.name == "input") {
+      read.input_vertices = std::find(attribute.values.begin(), attribute.values.end(), 0) - attribute.values.begin();
+    } else if (attribute.name == kVtkOrigin) {
+      for (const double origin : attribute.values) {
+        read.mesh.vertex_origins.push_back(static_cast<uint32_t>(static_cast<int64_t>(origin)));
+      }
+    } else if (attribute.name != kVtkBoundary && attribute.name != "weights") {
+      read.attributes.push_back(std::move(attribute));
+    }
+  }
+}
+
+}  // namespace
+
+absl::StatusOr<MeshOrCloud> ReadMeshOrCloud(const std::string& path, const CloudOptions& options) {
+  const bool asks_for_cloud = !options.format.empty() || !options.columns.empty() || options.skip_invalid;
+  const std::string mesh_format = path == kStandardStream || asks_for_cloud ? "" : MeshFormatOf(path);
+  MeshOrCloud read;
+  absl::Status refusal;
+  if (!mesh_format.empty()) {
+    absl::StatusOr<Mesh> mesh = ReadMesh(path);
+    if (mesh.ok()) {
+      read.is_mesh = true;
+      read.format = mesh_format;
+      read.mesh = *std::move(mesh);
+      if (mesh_format == "vtu") {
+        TakePointData(path, read);
+      }
+      return read;
+    }
+    refusal = mesh.status();
+  }
+  absl::StatusOr<PointCloud> cloud = ReadCloud(path, options);
+  if (!cloud.ok()) {
+    return refusal.ok() ? cloud.status() : refusal;
+  }
+  read.format = CloudFormatOf(path, options.format);
+  read.mesh.dimension = cloud->dimension;
+  read.mesh.points = std::move(cloud->points);
+  read.attributes = std::move(cloud->attributes);
+  read.input_vertices = read.mesh.View().vertex_count();
+  read.notes = std::move(cloud->notes);
+  read.skipped = cloud->skipped;
+  return read;
+}
+
+}  // namespace wellspace::formats

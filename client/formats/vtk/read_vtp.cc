@@ -1,0 +1,108 @@
+// VTK's XML for polygons and for unstructured grids: the points.
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "client/formats/cloud_readers.h"
+#include "client/formats/number.h"
+#include "client/formats/point_rows.h"
+#include "client/formats/vtk/vtk_xml.h"
+#include "core/base/status_macros.h"
+
+namespace wellspace::formats {
+namespace {
+
+constexpr uint64_t kMaxVtkComponents = 64;
+
+class VtkXmlPointsReader final : public VtkXmlReader {
+ public:
+  VtkXmlPointsReader(std::string_view document, const std::string& name, const char* kind, const CloudOptions& options,
+                     PointCloud& cloud)
+      : VtkXmlReader(document, name, kind), options_(options), cloud_(cloud) {}
+
+  absl::Status Read() {
+    WELLSPACE_RETURN_IF_ERROR(ReadElements());
+    if (coordinates_.size() != 3 * point_count()) {
+      return FileError(absl::StrCat("expected ", 3 * point_count(), " coordinates for ", point_count(), " points, got ",
+                                    coordinates_.size()));
+    }
+    std::vector<std::string> names = {"x", "y", "z"};
+    std::vector<std::vector<double>> columns = Columns(coordinates_, 3);
+    coordinates_ = {};
+    for (const PointArray& array : arrays_) {
+      if (array.values.size() != array.components * point_count()) {
+        return FileError(absl::StrCat("expected ", array.components, " values of ", Quote(array.name), " for each of ",
+                                      point_count(), " points, got ", array.values.size()));
+      }
+      for (std::vector<double>& column : Columns(array.values, array.components)) {
+        columns.push_back(std::move(column));
+      }
+      const std::vector<std::string> components = DataNames(array.name, array.components);
+      names.insert(names.end(), components.begin(), components.end());
+    }
+    return AddAllRows(names, columns, options_, cloud_);
+  }
+
+ private:
+  struct PointArray {
+    std::string name;
+    uint64_t components = 1;
+    std::vector<double> values;
+  };
+
+  absl::Status ReadDataArray(const std::string& parent) override {
+    if (parent == "Points") {
+      return xml().Attribute("NumberOfComponents") == "3"
+                 ? ReadAnyNumbers(coordinates_)
+                 : xml().Error(absl::StrCat("expected NumberOfComponents 3 for the points, got ",
+                                            Quote(xml().Attribute("NumberOfComponents"))));
+    }
+    if (parent != "PointData" || (!options_.keep_attributes && options_.columns.empty()) ||
+        xml().Attribute("type") == "String") {
+      return absl::OkStatus();
+    }
+    PointArray array{.name = std::string(xml().Attribute("Name")), .components = 1, .values = {}};
+    const std::string_view components = xml().Attribute("NumberOfComponents");
+    if (!components.empty() &&
+        (!ParseUnsigned(components, kMaxVtkComponents, array.components) || array.components == 0)) {
+      return xml().Error(
+          absl::StrCat("expected NumberOfComponents from 1 to ", kMaxVtkComponents, ", got ", Quote(components)));
+    }
+    WELLSPACE_RETURN_IF_ERROR(ReadAnyNumbers(array.values));
+    arrays_.push_back(std::move(array));
+    return absl::OkStatus();
+  }
+
+  static std::vector<std::vector<double>> Columns(const std::vector<double>& values, uint64_t width) {
+    std::vector<std::vector<double>> columns(width);
+    for (size_t i = 0; i < values.size(); ++i) {
+      columns[i % width].push_back(values[i]);
+    }
+    return columns;
+  }
+
+  const CloudOptions& options_;
+  PointCloud& cloud_;
+  std::vector<double> coordinates_;
+  std::vector<PointArray> arrays_;
+};
+
+absl::Status ReadVtkXmlPoints(InputFile& file, const char* kind, const CloudOptions& options, PointCloud& cloud) {
+  WELLSPACE_ASSIGN_OR_RETURN(const std::string document, file.ReadAll());
+  return VtkXmlPointsReader(document, cloud.name, kind, options, cloud).Read();
+}
+
+}  // namespace
+
+absl::Status ReadVtp(InputFile& file, const CloudOptions& options, PointCloud& cloud) {
+  return ReadVtkXmlPoints(file, "PolyData", options, cloud);
+}
+
+absl::Status ReadVtuPoints(InputFile& file, const CloudOptions& options, PointCloud& cloud) {
+  return ReadVtkXmlPoints(file, "UnstructuredGrid", options, cloud);
+}
+
+}  // namespace wellspace::formats

@@ -1,0 +1,152 @@
+// wellspace convert and wellspace info, and attributes from a cloud to its mesh.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "client/formats/read_cloud.h"
+#include "client/formats/read_mesh.h"
+#include "tests/client/cli/commands_fixture.h"
+
+namespace wellspace {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+// The fifth point is the first one again.
+constexpr char kMeasured[] =
+    "id,x,y,place,heat\n7,0,0,a,0.5\n8,1,0.1,b,\n9,0.4,0.9,c,2\n10,0.5,0.45,d,3\n11,0,0,e,4\n12,0.1,0.2,f,-1e300\n";
+
+class FileCommandsTest : public CommandsTest {
+ protected:
+  nlohmann::json Info(const std::string& name, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments = {"info", Path(name), "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const RunResult result = RunWellspace(arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return nlohmann::json::parse(result.out);
+  }
+};
+
+TEST_F(FileCommandsTest, VerticesHaveTheAttributesOfTheirPoints) {
+  for (const char* name : {"a.vtu", "a.vtk"}) {
+    SCOPED_TRACE(name);
+    Mesh(kMeasured, name);
+    const absl::StatusOr<formats::PointCloud> mesh = formats::ReadCloud(Path(name), {.keep_attributes = true});
+    ASSERT_TRUE(mesh.ok()) << mesh.status();
+    ASSERT_EQ(mesh->attributes.size(), 5);  // input, origin, boundary
+    const formats::PointAttribute& id = mesh->attributes[3];
+    const formats::PointAttribute& heat = mesh->attributes[4];
+    EXPECT_EQ(id.name, "id");
+    EXPECT_EQ(heat.name, "heat");
+    ASSERT_GT(mesh->size(), 5);
+    EXPECT_THAT(std::vector<double>(id.values.begin(), id.values.begin() + 5), ElementsAre(7, 8, 9, 10, 12));
+    EXPECT_EQ(heat.values[0], 0.5);
+    EXPECT_TRUE(std::isnan(heat.values[1]));  // the file has none
+    EXPECT_EQ(heat.values[4], -1e300);
+    for (size_t vertex = 5; vertex < mesh->size(); ++vertex) {
+      EXPECT_TRUE(std::isnan(id.values[vertex]) && std::isnan(heat.values[vertex])) << vertex;
+    }
+  }
+  for (const char* flag : {"--no-attributes", "--no-boundary"}) {
+    Mesh(kMeasured, "bare.vtu", {flag});
+    EXPECT_THAT(folder_.Read("bare.vtu"), Not(HasSubstr("heat")));
+  }
+}
+
+TEST_F(FileCommandsTest, ConvertKeepsBoundaryRegionsNamesAndAttributes) {
+  Mesh(kMeasured, "a.vtu");
+  const absl::StatusOr<formats::Mesh> first = formats::ReadMesh(Path("a.vtu"));
+  ASSERT_TRUE(first.ok());
+  Mesh(kMeasured, "named.msh");
+  std::string from = "named.msh";
+  for (const char* to : {"b.npz", "b.mesh", "b.node", "b.vtu", "b.msh"}) {
+    SCOPED_TRACE(to);
+    const RunResult result = RunWellspace({"convert", Path(from), Path(to)});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const absl::StatusOr<formats::Mesh> mesh = formats::ReadMesh(Path(to));
+    ASSERT_TRUE(mesh.ok()) << mesh.status();
+    EXPECT_EQ(mesh->points, first->points);
+    EXPECT_EQ(mesh->simplices, first->simplices);
+    EXPECT_EQ(mesh->facets, first->facets);
+    ASSERT_EQ(mesh->boundary.size(), 4);
+    from = to;
+  }
+  ASSERT_EQ(RunWellspace({"convert", Path("named.msh"), Path("c.npz")}).exit_code, 0);
+  EXPECT_EQ(formats::ReadMesh(Path("c.npz"))->boundary[3].name, "ymax");
+  ASSERT_EQ(RunWellspace({"convert", Path("a.vtu"), Path("c.vtu")}).exit_code, 0);
+  const absl::StatusOr<formats::PointCloud> before = formats::ReadCloud(Path("a.vtu"), {.keep_attributes = true});
+  const absl::StatusOr<formats::PointCloud> after = formats::ReadCloud(Path("c.vtu"), {.keep_attributes = true});
+  ASSERT_TRUE(before.ok() && after.ok());
+  ASSERT_EQ(before->attributes.size(), 5);
+  ASSERT_EQ(after->attributes.size(), 5);
+  for (size_t i = 0; i < 5; ++i) {
+    EXPECT_EQ(after->attributes[i].name, before->attributes[i].name);
+    for (size_t vertex = 0; vertex < before->size(); ++vertex) {
+      const double value = before->attributes[i].values[vertex];
+      EXPECT_TRUE(after->attributes[i].values[vertex] == value || std::isnan(value)) << i << " " << vertex;
+    }
+  }
+  EXPECT_EQ(RunWellspace({"convert", Path("a.vtu"), Path("a.vtu")}).exit_code, 2);
+  EXPECT_THAT(RunWellspace({"convert", Path("a.vtu"), Path("a.xyz")}).err, HasSubstr("no format is known"));
+  EXPECT_THAT(RunWellspace({"convert", Path("none.msh"), Path("d.vtu")}).err, HasSubstr("none.msh"));
+}
+
+TEST_F(FileCommandsTest, ConvertMakesVerticesOfPoints) {
+  folder_.Write("a.csv", kMeasured);
+  const RunResult result = RunWellspace({"convert", Path("a.csv"), Path("a.vtu"), "--output", "json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(nlohmann::json::parse(result.out)["vertices"], 6);
+  EXPECT_EQ(nlohmann::json::parse(result.out)["kind"], "cloud");
+  const absl::StatusOr<formats::PointCloud> cloud = formats::ReadCloud(Path("a.vtu"), {.keep_attributes = true});
+  ASSERT_TRUE(cloud.ok()) << cloud.status();
+  EXPECT_EQ(cloud->attributes[1], (formats::PointAttribute{"id", {7, 8, 9, 10, 11, 12}}));
+  ASSERT_EQ(RunWellspace({"convert", Path("a.csv"), Path("b.vtu"), "--no-attributes"}).exit_code, 0);
+  EXPECT_THAT(folder_.Read("b.vtu"), Not(HasSubstr("\"id\"")));
+}
+
+TEST_F(FileCommandsTest, InfoOfAMesh) {
+  Mesh(kMeasured, "a.msh");
+  const nlohmann::json info = Info("a.msh");
+  EXPECT_EQ(info["kind"], "mesh");
+  EXPECT_EQ(info["format"], "msh");
+  EXPECT_EQ(info["dimension"], 2);
+  const absl::StatusOr<formats::Mesh> mesh = formats::ReadMesh(Path("a.msh"));
+  EXPECT_EQ(info["vertices"], mesh->points.size() / 2);
+  EXPECT_EQ(info["simplices"], mesh->simplices.size() / 3);
+  ASSERT_EQ(info["boundary"].size(), 4);
+  EXPECT_EQ(info["boundary"][0]["name"], "xmin");
+  EXPECT_EQ(info["boundary"][0]["facets"], mesh->boundary[0].facets);
+  const nlohmann::json check = nlohmann::json::parse(RunWellspace({"check", Path("a.msh"), "--output", "json"}).out);
+  EXPECT_EQ(info["quality"]["min_angle_deg"], check["min_angle_deg"]);
+  EXPECT_EQ(info["quality"]["max_radius_edge"], check["max_radius_edge"]);
+  EXPECT_LT(info["low"][0], 0);
+  EXPECT_GT(info["high"][1], 0.9);
+  const RunResult text = RunWellspace({"info", Path("a.msh")});
+  EXPECT_THAT(text.out, HasSubstr("kind                 mesh, msh, 2-D\n"));
+  EXPECT_THAT(text.out, HasSubstr("boundary             4 ymax: "));
+}
+
+TEST_F(FileCommandsTest, InfoOfACloud) {
+  folder_.Write("a.csv", kMeasured);
+  const nlohmann::json info = Info("a.csv");
+  EXPECT_EQ(info["kind"], "cloud");
+  EXPECT_EQ(info["format"], "csv");
+  EXPECT_EQ(info["points"], 6);
+  EXPECT_EQ(info["low"], nlohmann::json::parse("[0.0, 0.0]"));
+  EXPECT_EQ(info["high"], nlohmann::json::parse("[1.0, 0.9]"));
+  EXPECT_EQ(info["attributes"], nlohmann::json::parse(R"([{"name": "id", "min": 7.0, "max": 12.0, "missing": 0},
+                                      {"name": "heat", "min": -1e300, "max": 4.0, "missing": 1}])"));
+  EXPECT_EQ(Info("a.csv", {"--columns", "id,heat", "--skip-invalid"})["points"], 5);
+  EXPECT_THAT(RunWellspace({"info", Path("a.csv")}).out, HasSubstr("attribute            id: 7 to 12\n"));
+  folder_.Write("b.node", "1 2 0 0\n0 1 2\n");  // without .ele it is a cloud
+  EXPECT_EQ(Info("b.node")["kind"], "cloud");
+  EXPECT_EQ(RunWellspace({"info", Path("none.csv")}).exit_code, 2);
+}
+
+}  // namespace
+}  // namespace wellspace
