@@ -10,7 +10,7 @@
 #include <cstdlib>
 
 #include "client/cli/exit_codes.h"
-#include "client/formats/output_file.h"
+#include "client/formats/io/output_file.h"
 
 namespace wellspace::cli {
 namespace {

@@ -3,8 +3,9 @@
 #include <iostream>
 
 #include "client/cli/helpful_threads.h"
-#include "client/formats/line_reader.h"
-#include "client/formats/output_file.h"
+#include "client/formats/io/input_file.h"
+#include "client/formats/io/line_reader.h"
+#include "client/formats/io/output_file.h"
 #include "client/formats/read_cloud.h"
 #include "client/formats/write_mesh.h"
 #include "core/base/status_macros.h"

@@ -4,8 +4,9 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/cli/options.h"
-#include "client/formats/line_reader.h"
-#include "client/formats/number.h"
+#include "client/formats/io/input_file.h"
+#include "client/formats/io/line_reader.h"
+#include "client/formats/io/number.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::cli {

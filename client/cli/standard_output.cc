@@ -9,7 +9,8 @@
 #include <string>
 #include <string_view>
 
-#include "client/formats/line_reader.h"
+#include "client/formats/io/input_file.h"
+#include "client/formats/io/line_reader.h"
 
 namespace wellspace::cli {
 

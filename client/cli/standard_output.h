@@ -5,7 +5,7 @@
 #include <streambuf>
 
 #include "absl/status/status.h"
-#include "client/formats/output_file.h"
+#include "client/formats/io/output_file.h"
 
 namespace wellspace::cli {
 

@@ -4,7 +4,7 @@
 
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
-#include "client/formats/npy_rows.h"
+#include "client/formats/numpy/npy_rows.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::client {

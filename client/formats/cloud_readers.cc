@@ -5,7 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/coordinate.h"
-#include "client/formats/number.h"
+#include "client/formats/io/number.h"
 #include "client/formats/table_columns.h"
 
 namespace wellspace::formats {

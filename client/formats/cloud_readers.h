@@ -13,7 +13,8 @@
 
 #include "absl/status/status.h"
 #include "client/formats/cloud.h"
-#include "client/formats/line_reader.h"
+#include "client/formats/io/input_file.h"
+#include "client/formats/io/line_reader.h"
 #include "client/formats/read_cloud.h"
 
 namespace wellspace::formats {

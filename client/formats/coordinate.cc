@@ -8,7 +8,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
-#include "client/formats/number.h"
+#include "client/formats/io/number.h"
 
 namespace wellspace::formats {
 namespace {

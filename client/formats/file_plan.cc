@@ -7,7 +7,8 @@
 #include <tuple>
 
 #include "absl/strings/str_cat.h"
-#include "client/formats/line_reader.h"
+#include "client/formats/io/input_file.h"
+#include "client/formats/io/line_reader.h"
 #include "client/formats/read_mesh.h"
 #include "client/formats/write_mesh.h"
 

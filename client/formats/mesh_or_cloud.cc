@@ -4,7 +4,8 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
-#include "client/formats/line_reader.h"
+#include "client/formats/io/input_file.h"
+#include "client/formats/io/line_reader.h"
 #include "client/formats/read_mesh.h"
 #include "client/formats/vtk/vtk_cells.h"
 #include "core/base/status_macros.h"

@@ -11,6 +11,7 @@
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "client/formats/mesh.h"
+#include "client/formats/tetgen/tetgen.h"
 #include "client/formats/write_mesh.h"
 
 namespace wellspace::formats {
@@ -55,20 +56,6 @@ struct RowCounts {
 
 // INTERNAL unless as many rows have come as `shape` says.
 absl::Status CheckComplete(const MeshShape& shape, const RowCounts& rows);
-
-// The comment ahead of the header of a .node whose attribute is the weight of its points.
-inline constexpr char kWeightsComment[] = "weights";
-
-// What the comment ahead of the header of a .edge, .face or .poly begins with; then come tags, each with its name.
-inline constexpr char kBoundaryComment[] = "boundary:";
-// The same ahead of the header of a .ele with several regions; then come ids, each with a name.
-inline constexpr char kRegionsComment[] = "regions:";
-
-// The files beside .node and .ele that have the boundary: .edge or .face, and up to 3-D .poly.
-std::vector<std::string> BoundaryFilesOf(const std::string& path, int dimension);
-
-// All files that a mesh in .node and .ele may have, whatever its dimension.
-std::vector<std::string> TetgenFilesOf(const std::string& path);
 
 // The files of a mesh in XDMF: "mesh.xdmf", its arrays "mesh.h5", "mesh_boundary.xdmf", "mesh_boundary.h5".
 std::vector<std::string> XdmfFilesOf(const std::string& path);

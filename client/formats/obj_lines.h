@@ -7,8 +7,8 @@
 #include <string_view>
 
 #include "absl/status/status.h"
-#include "client/formats/line_reader.h"
-#include "client/formats/number.h"
+#include "client/formats/io/line_reader.h"
+#include "client/formats/io/number.h"
 
 namespace wellspace::formats {
 

@@ -3,10 +3,12 @@
 #include <span>
 #include <vector>
 
-#include "client/formats/line_reader.h"
+#include "client/formats/io/input_file.h"
+#include "client/formats/io/line_reader.h"
 #include "client/formats/mesh_readers.h"
 #include "client/formats/mesh_writers.h"
 #include "client/formats/registry.h"
+#include "client/formats/tetgen/tetgen.h"
 
 namespace wellspace::formats {
 namespace {

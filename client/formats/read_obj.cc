@@ -5,7 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/cloud_readers.h"
-#include "client/formats/number.h"
+#include "client/formats/io/number.h"
 #include "client/formats/obj_lines.h"
 
 namespace wellspace::formats {

@@ -6,7 +6,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/cloud_readers.h"
-#include "client/formats/number.h"
+#include "client/formats/io/number.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {

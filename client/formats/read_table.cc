@@ -17,7 +17,7 @@
 #include "absl/strings/str_join.h"
 #include "client/formats/cloud_readers.h"
 #include "client/formats/coordinate.h"
-#include "client/formats/number.h"
+#include "client/formats/io/number.h"
 #include "client/formats/table_columns.h"
 #include "core/base/status_macros.h"
 

@@ -12,7 +12,7 @@
 #include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_join.h"
-#include "client/formats/number.h"
+#include "client/formats/io/number.h"
 
 namespace wellspace::formats {
 

@@ -7,9 +7,9 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/boundary.h"
+#include "client/formats/io/number.h"
+#include "client/formats/io/output_file.h"
 #include "client/formats/mesh_writers.h"
-#include "client/formats/number.h"
-#include "client/formats/output_file.h"
 #include "client/formats/regions.h"
 #include "core/base/status_macros.h"
 

@@ -9,10 +9,12 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/cloud.h"
-#include "client/formats/file_error.h"
-#include "client/formats/line_reader.h"
+#include "client/formats/io/file_error.h"
+#include "client/formats/io/input_file.h"
+#include "client/formats/io/line_reader.h"
 #include "client/formats/mesh_writers.h"
 #include "client/formats/registry.h"
+#include "client/formats/tetgen/tetgen.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {

@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
-#include "client/formats/npy_rows.h"
-#include "client/formats/number.h"
+#include "client/formats/io/number.h"
+#include "client/formats/numpy/npy_rows.h"
 #include "client/formats/read_cloud.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/fuzz/scratch_folder.h"

@@ -16,11 +16,11 @@
 #include <vector>
 
 #include "client/formats/cloud.h"
-#include "client/formats/output_file.h"
+#include "client/formats/io/output_file.h"
+#include "client/formats/numpy/zip_file.h"
 #include "client/formats/read_mesh.h"
 #include "client/formats/vtk/vtk_array.h"
 #include "client/formats/write_mesh.h"
-#include "client/formats/zip_file.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/fuzz/scratch_folder.h"
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "client/formats/domain/planar_domain.h"
-#include "client/formats/number.h"
+#include "client/formats/io/number.h"
 
 namespace wellspace::test {
 

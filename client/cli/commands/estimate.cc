@@ -9,7 +9,8 @@
 #include "client/cli/meshing_options.h"
 #include "client/cli/statistics.h"
 #include "client/formats/file_plan.h"
-#include "client/formats/line_reader.h"
+#include "client/formats/io/input_file.h"
+#include "client/formats/io/line_reader.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::cli {

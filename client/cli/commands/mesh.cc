@@ -11,7 +11,8 @@
 #include "client/cli/statistics.h"
 #include "client/files/mesh_file.h"
 #include "client/formats/file_plan.h"
-#include "client/formats/line_reader.h"
+#include "client/formats/io/input_file.h"
+#include "client/formats/io/line_reader.h"
 #include "client/formats/write_mesh.h"
 #include "core/base/status_macros.h"
 

@@ -15,9 +15,10 @@
 #include "client/cli/remote_command.h"
 #include "client/cli/session_options.h"
 #include "client/formats/file_plan.h"
-#include "client/formats/line_reader.h"
-#include "client/formats/number.h"
-#include "client/formats/output_file.h"
+#include "client/formats/io/input_file.h"
+#include "client/formats/io/line_reader.h"
+#include "client/formats/io/number.h"
+#include "client/formats/io/output_file.h"
 #include "client/formats/read_cloud.h"
 #include "core/base/status_macros.h"
 

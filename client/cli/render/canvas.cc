@@ -4,7 +4,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/cli/render/picture_format.h"
-#include "client/formats/number.h"
+#include "client/formats/io/number.h"
 #include "client/formats/registry.h"
 
 namespace wellspace::render {

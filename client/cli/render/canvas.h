@@ -10,7 +10,7 @@
 
 #include "absl/status/status.h"
 #include "client/cli/render/colour_ramp.h"
-#include "client/formats/output_file.h"
+#include "client/formats/io/output_file.h"
 
 namespace wellspace::render {
 

@@ -8,7 +8,7 @@
 #include "absl/strings/str_format.h"
 #include "client/cli/render/canvas.h"
 #include "client/cli/render/colour_ramp.h"
-#include "client/formats/output_file.h"
+#include "client/formats/io/output_file.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::render {

@@ -12,7 +12,7 @@
 #include "client/cli/render/colour_ramp.h"
 #include "client/cli/render/layout.h"
 #include "client/cli/render/legend.h"
-#include "client/formats/output_file.h"
+#include "client/formats/io/output_file.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::render {

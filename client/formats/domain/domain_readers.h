@@ -8,7 +8,8 @@
 #include "absl/status/status.h"
 #include "client/formats/domain/planar_domain.h"
 #include "client/formats/domain/read_planar_domain.h"
-#include "client/formats/line_reader.h"
+#include "client/formats/io/input_file.h"
+#include "client/formats/io/line_reader.h"
 
 namespace wellspace::formats {
 

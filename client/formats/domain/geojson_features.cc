@@ -8,7 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/domain/interior_point.h"
-#include "client/formats/number.h"
+#include "client/formats/io/number.h"
 
 namespace wellspace::formats {
 

@@ -5,7 +5,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/domain/polyline.h"
-#include "client/formats/number.h"
+#include "client/formats/io/number.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {

@@ -1,7 +1,7 @@
 #include "client/formats/domain/polyline.h"
 
 #include "absl/strings/str_cat.h"
-#include "client/formats/number.h"
+#include "client/formats/io/number.h"
 
 namespace wellspace::formats {
 namespace {

@@ -16,7 +16,8 @@
 #include "client/formats/domain/geojson_geometry.h"
 #include "client/formats/domain/geojson_objects.h"
 #include "client/formats/domain/json_source.h"
-#include "client/formats/number.h"
+#include "client/formats/io/input_file.h"
+#include "client/formats/io/number.h"
 
 namespace wellspace::formats {
 namespace {

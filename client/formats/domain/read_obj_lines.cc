@@ -6,7 +6,8 @@
 #include "absl/strings/str_cat.h"
 #include "client/formats/coordinate.h"
 #include "client/formats/domain/domain_readers.h"
-#include "client/formats/number.h"
+#include "client/formats/io/input_file.h"
+#include "client/formats/io/number.h"
 #include "client/formats/obj_lines.h"
 #include "core/base/status_macros.h"
 

@@ -4,7 +4,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/domain/domain_readers.h"
-#include "client/formats/open_input.h"
+#include "client/formats/io/input_file.h"
+#include "client/formats/io/open_input.h"
 #include "client/formats/registry.h"
 #include "core/base/status_macros.h"
 

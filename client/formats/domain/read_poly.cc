@@ -9,10 +9,11 @@
 #include "absl/strings/str_cat.h"
 #include "client/formats/coordinate.h"
 #include "client/formats/domain/domain_readers.h"
-#include "client/formats/number.h"
-#include "client/formats/open_input.h"
+#include "client/formats/io/input_file.h"
+#include "client/formats/io/number.h"
+#include "client/formats/io/open_input.h"
 #include "client/formats/registry.h"
-#include "client/formats/tetgen_lines.h"
+#include "client/formats/tetgen/tetgen_lines.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {

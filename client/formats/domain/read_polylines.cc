@@ -13,7 +13,8 @@
 #include "client/formats/coordinate.h"
 #include "client/formats/domain/domain_readers.h"
 #include "client/formats/domain/polyline.h"
-#include "client/formats/number.h"
+#include "client/formats/io/input_file.h"
+#include "client/formats/io/number.h"
 #include "client/formats/table_columns.h"
 #include "core/base/status_macros.h"
 

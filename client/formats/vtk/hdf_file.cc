@@ -3,7 +3,7 @@
 #include <cerrno>
 
 #include "absl/strings/str_cat.h"
-#include "client/formats/file_error.h"
+#include "client/formats/io/file_error.h"
 
 namespace wellspace::formats {
 namespace {

@@ -7,7 +7,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/cloud_readers.h"
-#include "client/formats/number.h"
+#include "client/formats/io/input_file.h"
+#include "client/formats/io/number.h"
 #include "client/formats/point_rows.h"
 #include "client/formats/vtk/vtk_xml.h"
 #include "core/base/status_macros.h"

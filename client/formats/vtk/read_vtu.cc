@@ -6,7 +6,8 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/boundary.h"
-#include "client/formats/line_reader.h"
+#include "client/formats/io/input_file.h"
+#include "client/formats/io/line_reader.h"
 #include "client/formats/mesh_readers.h"
 #include "client/formats/regions.h"
 #include "client/formats/vtk/vtk_cells.h"

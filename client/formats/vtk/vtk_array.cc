@@ -8,8 +8,8 @@
 #include <limits>
 
 #include "absl/strings/str_cat.h"
-#include "client/formats/compression.h"
-#include "client/formats/number.h"
+#include "client/formats/io/compression.h"
+#include "client/formats/io/number.h"
 
 namespace wellspace::formats {
 namespace {

@@ -15,7 +15,7 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
-#include "client/formats/output_file.h"
+#include "client/formats/io/output_file.h"
 
 namespace wellspace::formats {
 

@@ -5,7 +5,7 @@
 #include <type_traits>
 
 #include "client/formats/coordinate.h"
-#include "client/formats/number.h"
+#include "client/formats/io/number.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "client/formats/boundary.h"
+#include "client/formats/io/output_file.h"
 #include "client/formats/mesh_writers.h"
-#include "client/formats/output_file.h"
 #include "client/formats/vtk/hdf_file.h"
 #include "client/formats/vtk/vtk_cells.h"
 #include "core/base/status_macros.h"

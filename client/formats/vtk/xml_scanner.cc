@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "absl/strings/str_cat.h"
-#include "client/formats/number.h"
+#include "client/formats/io/number.h"
 
 namespace wellspace::formats {
 namespace {

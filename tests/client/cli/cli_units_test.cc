@@ -15,7 +15,7 @@
 #include "client/cli/options.h"
 #include "client/cli/progress_bar.h"
 #include "client/cli/statistics.h"
-#include "client/formats/output_file.h"
+#include "client/formats/io/output_file.h"
 #include "tests/support/temporary_folder.h"
 
 namespace wellspace::cli {

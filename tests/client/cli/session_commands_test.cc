@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "client/formats/npy.h"
+#include "client/formats/numpy/npy.h"
 #include "client/formats/read_mesh.h"
 #include "proto/checksum.h"
 #include "tests/client/cli/closed_port.h"

@@ -8,7 +8,7 @@
 #include <string>
 #include <thread>
 
-#include "client/formats/npy.h"
+#include "client/formats/numpy/npy.h"
 #include "tests/client/formats/read_cloud_fixture.h"
 
 namespace wellspace::formats {

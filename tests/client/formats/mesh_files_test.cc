@@ -8,12 +8,12 @@
 #include <array>
 #include <random>
 
-#include "client/formats/npy.h"
-#include "client/formats/output_file.h"
+#include "client/formats/io/output_file.h"
+#include "client/formats/numpy/npy.h"
+#include "client/formats/numpy/zip_file.h"
 #include "client/formats/read_cloud.h"
 #include "client/formats/read_mesh.h"
 #include "client/formats/write_mesh.h"
-#include "client/formats/zip_file.h"
 #include "tests/client/formats/random_mesh.h"
 #include "tests/support/temporary_folder.h"
 

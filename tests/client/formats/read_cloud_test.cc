@@ -10,8 +10,8 @@
 #include <random>
 #include <thread>
 
-#include "client/formats/line_reader.h"
-#include "client/formats/number.h"
+#include "client/formats/io/line_reader.h"
+#include "client/formats/io/number.h"
 #include "tests/client/formats/read_cloud_fixture.h"
 
 namespace wellspace::formats {

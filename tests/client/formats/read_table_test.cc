@@ -8,7 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/coordinate.h"
-#include "client/formats/line_reader.h"
+#include "client/formats/io/line_reader.h"
 #include "client/formats/table_columns.h"
 #include "tests/client/formats/read_cloud_fixture.h"
 

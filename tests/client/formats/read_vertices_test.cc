@@ -10,7 +10,7 @@
 #include <limits>
 #include <random>
 
-#include "client/formats/number.h"
+#include "client/formats/io/number.h"
 #include "client/formats/read_cloud.h"
 #include "tests/client/formats/read_cloud_fixture.h"
 

@@ -48,7 +48,7 @@ def save(mesh: Mesh, path: str | os.PathLike[str], options: dict[str, Any]) -> N
 
 
 def _members(mesh: Mesh) -> dict[str, Any]:
-    """The arrays of the file: client/formats/npz.h has their names."""
+    """The arrays of the file: client/formats/numpy/npz.h has their names."""
     members: dict[str, Any] = {"points": mesh.points}
     if mesh.weights is not None:
         members["weights"] = mesh.weights

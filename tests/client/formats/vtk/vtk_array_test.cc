@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "client/formats/output_file.h"
+#include "client/formats/io/output_file.h"
 #include "tests/support/temporary_folder.h"
 
 namespace wellspace::formats {

@@ -1,0 +1,500 @@
+// Gmsh's MSH: 2.2 in ascii, 4.1 in binary.
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <memory>
+#include <set>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "absl/strings/str_cat.h"
+#include "client/formats/boundary.h"
+#include "client/formats/io/number.h"
+#include "client/formats/io/output_file.h"
+#include "client/formats/mesh_writers.h"
+#include "client/formats/msh/msh.h"
+#include "client/formats/regions.h"
+#include "core/base/status_macros.h"
+
+namespace wellspace::formats {
+namespace {
+
+template <typename T>
+void AppendBytes(T value, std::string& bytes) {
+  bytes.append(reinterpret_cast<const char*>(&value), sizeof(T));
+}
+
+// The regions that groups are made of: there is one even if nothing is told of regions.
+std::vector<Region> RegionsOf(const MeshShape& shape) {
+  return shape.regions.empty() ? std::vector<Region>{{.id = 1, .name = "domain"}} : shape.regions;
+}
+
+// The physical group of each region: its id if there are several and no part of the boundary has that number, else the
+// least number that is free. There are readers that tell groups by their numbers alone, whatever their dimensions.
+std::map<int32_t, int32_t> Groups(const MeshShape& shape) {
+  std::set<int32_t> taken;
+  for (const BoundaryPart& part : shape.boundary) {
+    taken.insert(part.tag);
+  }
+  std::map<int32_t, int32_t> groups;
+  const std::vector<Region> regions = RegionsOf(shape);
+  for (const Region& region : regions) {
+    if (shape.has_simplex_regions && region.id > 0 && taken.insert(region.id).second) {
+      groups[region.id] = region.id;
+    }
+  }
+  int32_t free = 1;
+  for (const Region& region : regions) {
+    if (!groups.contains(region.id)) {
+      while (!taken.insert(free).second) {
+        ++free;
+      }
+      groups[region.id] = free;
+    }
+  }
+  return groups;
+}
+
+// What both versions share: the order of the sections, and rows put together before they are written. What the versions
+// do differently is called in this order: WriteNodesHeader; AppendNode for each vertex; ElementsHeader and
+// BeginSimplices; WriteSimplex for each simplex; EndSimplices; for each part of the boundary AppendBlock, then
+// AppendFacet for each facet; AppendData for each vertex, once for each array of numbers.
+class MshWriter : public MeshWriter {
+ public:
+  absl::Status AddPoints(std::span<const double> points) final {
+    BeginNodes();
+    for (; !points.empty() && output_.status().ok(); points = points.subspan(shape_.dimension)) {
+      row_.clear();
+      AppendNode(points.first(shape_.dimension), ++vertices_, row_);
+      output_.Write(row_);
+    }
+    return output_.status();
+  }
+
+  // Gmsh looks for data after the elements only: weights are kept until then.
+  absl::Status AddWeights(std::span<const double> weights) final {
+    weights_.insert(weights_.end(), weights.begin(), weights.end());
+    return output_.status();
+  }
+
+  absl::Status AddSimplexRegions(std::span<const int32_t> regions) final {
+    for (const int32_t region : regions) {
+      if (!groups_.contains(region)) {
+        return absl::InternalError(absl::StrCat("a mesh got a simplex of region ", region, ", and has no such region"));
+      }
+    }
+    regions_.Add(regions);
+    return output_.status();
+  }
+
+  absl::Status AddSimplices(std::span<const uint32_t> simplices) final {
+    BeginElements();
+    const size_t corners = shape_.dimension + 1;
+    WELLSPACE_RETURN_IF_ERROR(regions_.CheckNext(shape_.has_simplex_regions ? simplices.size() / corners : 0));
+    for (; !simplices.empty() && output_.status().ok(); simplices = simplices.subspan(corners)) {
+      const int32_t group = shape_.has_simplex_regions ? groups_.at(regions_.Next()) : OnlyGroup();
+      row_.clear();
+      WriteSimplex(simplices.first(corners), group, ++simplices_, row_);
+    }
+    return output_.status();
+  }
+
+  absl::Status AddFacets(std::span<const uint32_t> facets) final {
+    BeginElements();
+    EndSimplices();
+    for (; !facets.empty() && output_.status().ok(); facets = facets.subspan(shape_.dimension)) {
+      row_.clear();
+      const BoundaryPart& part = walk_.Next();
+      if (walk_.is_first()) {
+        AppendBlock(part, row_);
+      }
+      AppendFacet(facets.first(shape_.dimension), part.tag, simplices_ + ++facets_, row_);
+      output_.Write(row_);
+    }
+    return output_.status();
+  }
+
+  absl::Status Commit() final {
+    BeginElements();
+    EndSimplices();
+    EndSection("$EndElements");
+    WELLSPACE_RETURN_IF_ERROR(output_.status());
+    WELLSPACE_RETURN_IF_ERROR(CheckComplete(shape_, {.vertices = vertices_,
+                                                     .weights = weights_.size(),
+                                                     .simplex_regions = regions_.count(),
+                                                     .simplices = simplices_,
+                                                     .facets = facets_}));
+    WriteNodeData("input", [this](uint64_t vertex) { return vertex < shape_.input_vertices ? 1.0 : 0.0; });
+    if (shape_.has_weights) {
+      WriteNodeData(kMshWeights, [this](uint64_t vertex) { return weights_[vertex]; });
+    }
+    return output_.Commit();
+  }
+
+ protected:
+  MshWriter(OutputFile output, const MeshShape& shape, bool is_binary)
+      : shape_(shape), output_(std::move(output)), is_binary_(is_binary) {}
+
+  int type() const { return shape_.dimension == 2 ? kMshTriangle : kMshTetrahedron; }
+  int facet_type() const { return shape_.dimension == 2 ? kMshLine : kMshTriangle; }
+  uint64_t element_count() const { return shape_.simplex_count + shape_.facet_count(); }
+
+  // Whether groups have names, and entities are described.
+  bool has_groups() const { return !shape_.boundary.empty() || shape_.has_simplex_regions; }
+  // The physical group of simplices that are all of one region.
+  int32_t OnlyGroup() const { return groups_.begin()->second; }
+
+  // The section with the names of groups, if there are any.
+  std::string PhysicalNames() const {
+    if (!has_groups()) {
+      return "";
+    }
+    std::string text = absl::StrCat("$PhysicalNames\n", shape_.boundary.size() + groups_.size(), "\n");
+    for (const BoundaryPart& part : shape_.boundary) {
+      absl::StrAppend(&text, shape_.dimension - 1, " ", part.tag, " \"", part.name, "\"\n");
+    }
+    for (const Region& region : RegionsOf(shape_)) {
+      absl::StrAppend(&text, shape_.dimension, " ", groups_.at(region.id), " \"", region.name, "\"\n");
+    }
+    return text + "$EndPhysicalNames\n";
+  }
+
+  const MeshShape shape_;
+  const std::map<int32_t, int32_t> groups_ = Groups(shape_);  // the physical group of each region's id
+  RegionQueue regions_;
+  OutputFile output_;
+
+ private:
+  virtual void WriteNodesHeader() = 0;
+  // Numbers of nodes and elements start at 1.
+  virtual void AppendNode(std::span<const double> point, uint64_t number, std::string& row) const = 0;
+  virtual std::string ElementsHeader() const = 0;
+  // To be called once, at the end of the header: there is room for simplices.
+  virtual void BeginSimplices() {}
+  // Writes the next simplex. `row` is empty, and any use may be made of it.
+  virtual void WriteSimplex(std::span<const uint32_t> corners, int32_t group, uint64_t number, std::string& row) = 0;
+  // All simplices have come; may be called again.
+  virtual void EndSimplices() {}
+  // What goes before the facets of a part.
+  virtual void AppendBlock(const BoundaryPart& /*part*/, std::string& /*row*/) const {}
+  virtual void AppendFacet(std::span<const uint32_t> corners, int32_t tag, uint64_t number, std::string& row) const = 0;
+  virtual void AppendData(uint64_t node, double value, std::string& row) const = 0;
+
+  // `end`: "$EndNodes" and the like. Behind bytes, it is in a line of its own.
+  void EndSection(std::string_view end) {
+    output_.Write(absl::StrCat(is_binary_ ? "\n" : "", absl::string_view(end.data(), end.size()), "\n"));
+  }
+
+  void BeginNodes() {
+    if (!std::exchange(has_nodes_, true)) {
+      WriteNodesHeader();
+    }
+  }
+
+  void BeginElements() {
+    if (!std::exchange(has_elements_, true)) {
+      BeginNodes();
+      EndSection("$EndNodes");
+      output_.Write(ElementsHeader());
+      BeginSimplices();
+    }
+  }
+
+  // One text, the name; one number, the time; four whole numbers: the step, numbers in a value, values, the partition.
+  template <typename Value>
+  void WriteNodeData(std::string_view name, Value value) {
+    output_.Write(absl::StrCat("$NodeData\n1\n\"", absl::string_view(name.data(), name.size()), "\"\n1\n0\n4\n0\n1\n",
+                               shape_.vertex_count, "\n0\n"));
+    for (uint64_t vertex = 0; vertex < shape_.vertex_count && output_.status().ok(); ++vertex) {
+      row_.clear();
+      AppendData(vertex + 1, value(vertex), row_);
+      output_.Write(row_);
+    }
+    EndSection("$EndNodeData");
+  }
+
+  const bool is_binary_;
+  bool has_nodes_ = false;     // the section
+  bool has_elements_ = false;  // the section
+  uint64_t vertices_ = 0;
+  uint64_t simplices_ = 0;
+  uint64_t facets_ = 0;
+  PartWalk walk_{shape_.boundary};
+  std::vector<double> weights_;
+  std::string row_;
+};
+
+class Msh22Writer final : public MshWriter {
+ public:
+  Msh22Writer(OutputFile output, const MeshShape& shape) : MshWriter(std::move(output), shape, false) {}
+
+ private:
+  void WriteNodesHeader() override {
+    output_.Write(
+        absl::StrCat("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n", PhysicalNames(), "$Nodes\n", shape_.vertex_count, "\n"));
+  }
+
+  void AppendNode(std::span<const double> point, uint64_t number, std::string& row) const override {
+    AppendNumber(number, row);
+    for (const double x : point) {
+      row += ' ';
+      AppendNumber(x, row);
+    }
+    row += point.size() == 2 ? " 0\n" : "\n";
+  }
+
+  std::string ElementsHeader() const override { return absl::StrCat("$Elements\n", element_count(), "\n"); }
+
+  void WriteSimplex(std::span<const uint32_t> corners, int32_t group, uint64_t number, std::string& row) override {
+    AppendRow(type(), corners, group, shape_.has_simplex_regions ? group : kMshEntity, number, row);
+    output_.Write(row);
+  }
+
+  void AppendFacet(std::span<const uint32_t> corners, int32_t tag, uint64_t number, std::string& row) const override {
+    AppendRow(facet_type(), corners, tag, tag, number, row);
+  }
+
+  // Two tags: the physical group and the geometric entity.
+  static void AppendRow(int type, std::span<const uint32_t> corners, int32_t group, int32_t entity, uint64_t number,
+                        std::string& row) {
+    absl::StrAppend(&row, number, " ", type, " 2 ", group, " ", entity);
+    for (const uint32_t corner : corners) {
+      row += ' ';
+      AppendNumber(uint64_t{corner} + 1, row);
+    }
+    row += '\n';
+  }
+
+  void AppendData(uint64_t node, double value, std::string& row) const override {
+    AppendNumber(node, row);
+    row += ' ';
+    AppendNumber(value, row);
+    row += '\n';
+  }
+};
+
+class Msh41Writer final : public MshWriter {
+ public:
+  Msh41Writer(OutputFile output, const MeshShape& shape) : MshWriter(std::move(output), shape, true) {}
+
+ private:
+  // One block of one entity; all numbers of nodes, then all coordinates. Words are of the machine's order, as the
+  // integer 1 tells.
+  void WriteNodesHeader() override {
+    std::string text = "$MeshFormat\n4.1 1 8\n";
+    AppendBytes<int32_t>(1, text);
+    absl::StrAppend(&text, "\n$EndMeshFormat\n", PhysicalNames());
+    AppendEntities(text);
+    text += "$Nodes\n";
+    AppendCounts(shape_.vertex_count > 0 ? 1 : 0, shape_.vertex_count, text);
+    if (shape_.vertex_count > 0) {
+      AppendBlockOf(0, text);
+      AppendBytes<uint64_t>(shape_.vertex_count, text);
+    }
+    output_.Write(text);
+    for (uint64_t node = 1; node <= shape_.vertex_count && output_.status().ok(); ++node) {
+      text.clear();
+      AppendBytes(node, text);
+      output_.Write(text);
+    }
+  }
+
+  void AppendNode(std::span<const double> point, uint64_t, std::string& row) const override {
+    for (const double x : point) {
+      AppendBytes(x, row);
+    }
+    if (point.size() == 2) {
+      AppendBytes(0.0, row);
+    }
+  }
+
+  std::string ElementsHeader() const override {
+    std::string text = "$Elements\n";
+    uint64_t blocks = shape_.has_simplex_regions ? regions_.Sizes().size() : shape_.simplex_count > 0 ? 1 : 0;
+    for (const BoundaryPart& part : shape_.boundary) {
+      blocks += part.facets > 0 ? 1 : 0;
+    }
+    AppendCounts(blocks, element_count(), text);
+    if (shape_.simplex_count > 0 && !shape_.has_simplex_regions) {
+      AppendBlockOf(type(), text);
+      AppendBytes<uint64_t>(shape_.simplex_count, text);
+    }
+    return text;
+  }
+
+  // The file has simplices by their regions: each gets as much room as it needs.
+  void BeginSimplices() override {
+    uint64_t number = 1;
+    for (const auto& [region, simplices] : regions_.Sizes()) {
+      RegionBlock& block = blocks_[groups_.at(region)];
+      for (const int32_t value : {static_cast<int32_t>(shape_.dimension), groups_.at(region), type()}) {
+        AppendBytes(value, block.header);
+      }
+      AppendBytes(simplices, block.header);
+      block.next_number = number;
+      number += simplices;
+      if (output_.IsSeekable()) {
+        output_.Write(block.header);
+        block.place = output_.size();
+        WriteZeros(simplices * (shape_.dimension + 2) * sizeof(uint64_t));
+      }
+    }
+  }
+
+  void WriteSimplex(std::span<const uint32_t> corners, int32_t group, uint64_t number, std::string& row) override {
+    if (!shape_.has_simplex_regions) {
+      AppendElement(corners, number, row);
+      output_.Write(row);
+      return;
+    }
+    RegionBlock& block = blocks_.at(group);
+    AppendElement(corners, block.next_number++, block.rows);
+    if (output_.IsSeekable() && block.rows.size() >= kBlockBytes) {
+      PutRows(block);
+    }
+  }
+
+  void EndSimplices() override {
+    for (auto& [group, block] : blocks_) {
+      if (output_.IsSeekable()) {
+        PutRows(block);
+      } else {
+        output_.Write(block.header);
+        output_.Write(block.rows);
+      }
+    }
+    blocks_.clear();
+  }
+
+  void AppendElement(std::span<const uint32_t> corners, uint64_t number, std::string& row) const {
+    AppendBytes(number, row);
+    for (const uint32_t corner : corners) {
+      AppendBytes<uint64_t>(uint64_t{corner} + 1, row);
+    }
+  }
+
+  void AppendData(uint64_t node, double value, std::string& row) const override {
+    AppendBytes(static_cast<int32_t>(node), row);
+    AppendBytes(value, row);
+  }
+
+  // Of blocks, of rows, the first and the last number.
+  static void AppendCounts(uint64_t blocks, uint64_t rows, std::string& text) {
+    for (const uint64_t value : {blocks, rows, rows > 0 ? uint64_t{1} : uint64_t{0}, rows}) {
+      AppendBytes(value, text);
+    }
+  }
+
+  void AppendBlock(const BoundaryPart& part, std::string& row) const override {
+    for (const int32_t value : {static_cast<int32_t>(shape_.dimension - 1), part.tag, facet_type()}) {
+      AppendBytes(value, row);
+    }
+    AppendBytes<uint64_t>(part.facets, row);
+  }
+
+  void AppendFacet(std::span<const uint32_t> corners, int32_t, uint64_t number, std::string& row) const override {
+    AppendElement(corners, number, row);
+  }
+
+  // Points, curves, surfaces, volumes: of each its number, its bounding box, its groups, and what bounds it. Every part
+  // of the boundary is an entity with its number; the bounding box of all is that of the mesh.
+  void AppendEntities(std::string& text) const {
+    if (!has_groups()) {
+      return;
+    }
+    text += "$Entities\n";
+    for (int dimension = 0; dimension <= 3; ++dimension) {
+      AppendBytes<uint64_t>(dimension == shape_.dimension       ? groups_.size()
+                            : dimension == shape_.dimension - 1 ? shape_.boundary.size()
+                                                                : 0,
+                            text);
+    }
+    for (const BoundaryPart& part : shape_.boundary) {
+      AppendEntity(part.tag, part.tag, text);
+      AppendBytes<uint64_t>(0, text);
+    }
+    for (const Region& region : RegionsOf(shape_)) {
+      const int32_t group = groups_.at(region.id);
+      AppendEntity(shape_.has_simplex_regions ? group : kMshEntity, group, text);
+      // All parts bound the only region. Which of them bound one of several is not known.
+      AppendBytes<uint64_t>(shape_.has_simplex_regions ? 0 : shape_.boundary.size(), text);
+      for (size_t i = 0; i < shape_.boundary.size() && !shape_.has_simplex_regions; ++i) {
+        AppendBytes(shape_.boundary[i].tag, text);
+      }
+    }
+    text += "\n$EndEntities\n";
+  }
+
+  void AppendEntity(int32_t number, int32_t group, std::string& text) const {
+    AppendBytes(number, text);
+    for (const std::vector<double>* corner : {&shape_.low, &shape_.high}) {
+      for (size_t axis = 0; axis < 3; ++axis) {
+        AppendBytes(axis < corner->size() ? (*corner)[axis] : 0.0, text);
+      }
+    }
+    AppendBytes<uint64_t>(1, text);
+    AppendBytes(group, text);
+  }
+
+  // The dimension and number of the entity of nodes and of a mesh of one region; then what the section has third.
+  void AppendBlockOf(int32_t third, std::string& text) const {
+    const int32_t entity = shape_.has_simplex_regions ? OnlyGroup() : kMshEntity;
+    for (const int32_t value : {static_cast<int32_t>(shape_.dimension), entity, third}) {
+      AppendBytes(value, text);
+    }
+  }
+
+  // The simplices of a region.
+  struct RegionBlock {
+    std::string header;
+    std::string rows;  // those that are not in the file yet; at most kBlockBytes and a row if it can be sought
+    uint64_t next_number = 0;
+    uint64_t place = 0;  // of the next row, if the file can be sought
+  };
+
+  void PutRows(RegionBlock& block) {
+    output_.Overwrite(block.place, block.rows);
+    block.place += block.rows.size();
+    block.rows.clear();
+  }
+
+  void WriteZeros(uint64_t bytes) {
+    const std::string zeros(std::min(bytes, kBlockBytes), '\0');
+    for (; bytes > 0 && output_.status().ok(); bytes -= std::min(bytes, kBlockBytes)) {
+      output_.Write(std::string_view(zeros).substr(0, std::min(bytes, kBlockBytes)));
+    }
+  }
+
+  static constexpr uint64_t kBlockBytes = 1 << 12;
+  std::map<int32_t, RegionBlock> blocks_;  // by physical group; empty: one region
+};
+
+template <typename Writer>
+absl::StatusOr<std::unique_ptr<MeshWriter>> Create(const std::string& path, const MeshShape& shape,
+                                                   std::stop_token stop) {
+  constexpr uint64_t kMaxVertices = std::numeric_limits<int32_t>::max();
+  if (shape.vertex_count > kMaxVertices) {
+    return absl::InvalidArgumentError(absl::StrCat("cannot write ", path, ": MSH numbers at most ", kMaxVertices,
+                                                   " vertices, and this mesh has ", shape.vertex_count,
+                                                   "; expected vtu or npz"));
+  }
+  WELLSPACE_ASSIGN_OR_RETURN(OutputFile output, OutputFile::Create(path, std::move(stop)));
+  return std::make_unique<Writer>(std::move(output), shape);
+}
+
+}  // namespace
+
+absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMsh22(const std::string& path, const MeshShape& shape,
+                                                        std::stop_token stop) {
+  return Create<Msh22Writer>(path, shape, std::move(stop));
+}
+
+absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMsh41(const std::string& path, const MeshShape& shape,
+                                                        std::stop_token stop) {
+  return Create<Msh41Writer>(path, shape, std::move(stop));
+}
+
+}  // namespace wellspace::formats

@@ -1,0 +1,27 @@
+// The members of a .npz that holds a mesh: a zip archive of .npy arrays, as numpy.savez writes it. Private to this
+// folder.
+#ifndef WELLSPACE_CLIENT_FORMATS_NUMPY_NPZ_H_
+#define WELLSPACE_CLIENT_FORMATS_NUMPY_NPZ_H_
+
+namespace wellspace::formats {
+
+inline constexpr char kNpzPoints[] = "points.npy";        // vertex_count x dimension
+inline constexpr char kNpzWeights[] = "weights.npy";      // vertex_count, of regular triangulations only
+inline constexpr char kNpzSimplices[] = "simplices.npy";  // simplex_count x (dimension + 1), indices of points
+
+// Only where the boundary is known.
+inline constexpr char kNpzOrigins[] = "vertex_origins.npy";         // vertex_count; numbers of input points, or below 0
+inline constexpr char kNpzVertexTags[] = "vertex_tags.npy";         // vertex_count
+inline constexpr char kNpzRegions[] = "regions.npy";                // simplex_count
+inline constexpr char kNpzFacets[] = "facets.npy";                  // facet_count x dimension, indices of points
+inline constexpr char kNpzFacetTags[] = "facet_tags.npy";           // facet_count
+inline constexpr char kNpzFacetNames[] = "facet_names.npy";         // of the parts of the boundary, in UTF-32
+inline constexpr char kNpzFacetNameTags[] = "facet_name_tags.npy";  // the tag of each name
+
+// Only where there are several regions.
+inline constexpr char kNpzRegionIds[] = "region_ids.npy";      // a row for each region
+inline constexpr char kNpzRegionNames[] = "region_names.npy";  // of these, in UTF-32
+
+}  // namespace wellspace::formats
+
+#endif  // WELLSPACE_CLIENT_FORMATS_NUMPY_NPZ_H_

@@ -1,0 +1,26 @@
+// What readers and writers of TetGen's and Triangle's files share. Private to client/formats.
+#ifndef WELLSPACE_CLIENT_FORMATS_TETGEN_TETGEN_H_
+#define WELLSPACE_CLIENT_FORMATS_TETGEN_TETGEN_H_
+
+#include <string>
+#include <vector>
+
+namespace wellspace::formats {
+
+// The comment ahead of the header of a .node whose attribute is the weight of its points.
+inline constexpr char kWeightsComment[] = "weights";
+
+// What the comment ahead of the header of a .edge, .face or .poly begins with; then come tags, each with its name.
+inline constexpr char kBoundaryComment[] = "boundary:";
+// The same ahead of the header of a .ele with several regions; then come ids, each with a name.
+inline constexpr char kRegionsComment[] = "regions:";
+
+// The files beside .node and .ele that have the boundary: .edge or .face, and up to 3-D .poly.
+std::vector<std::string> BoundaryFilesOf(const std::string& path, int dimension);
+
+// All files that a mesh in .node and .ele may have, whatever its dimension.
+std::vector<std::string> TetgenFilesOf(const std::string& path);
+
+}  // namespace wellspace::formats
+
+#endif  // WELLSPACE_CLIENT_FORMATS_TETGEN_TETGEN_H_
