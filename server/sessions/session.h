@@ -213,8 +213,8 @@ class Session {
   };
   // Nothing of a session that is busy, or whose structure is in use, or which ends with the process.
   std::optional<Spare> GetSpare() const;
-  // Gives the mesher up for other work, and what points are located by; it comes back as PrepareStructure and operations say. Returns how much memory
-  // that has freed: 0, and nothing is done, where there is nothing to spare.
+  // Gives the mesher up for other work, and what points are located by; it comes back as PrepareStructure and
+  // operations say. Returns how much memory that has freed: 0, and nothing is done, where there is nothing to spare.
   //
   // Complexity: that of freeing the mesher, on this thread, without a lock.
   uint64_t GiveUpMesher();
@@ -417,7 +417,7 @@ class Session {
   mutable std::shared_mutex queries_mutex_;  // after mutex_; held shared by queries
   std::mutex locator_mutex_;                 // before mutex_; held while a locator is made
   mutable std::mutex mutex_;
-  // Guarded by mutex_. While the session is busy, who has made it so may read without it what nothing else changes then.
+  // Guarded by mutex_. While the session is busy, who has made it so may read without it what nothing else changes.
   core::MeshParameters parameters_;  // of the last refinement that succeeded; before it, those of the creation
   std::map<std::string, std::string> labels_;
   Lease lease_;

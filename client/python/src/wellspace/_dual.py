@@ -30,7 +30,7 @@ class DualCells:
     edges : (e, 2) int
         The edges of the mesh, each once, the lower vertex first: the cells of the two are neighbours.
     areas : (e,) float
-        Of the facet between the two cells: lengths in 2-D. At least 0, but for rounding; 0 where the cells meet in less.
+        Of the facet between the two cells: lengths in 2-D. At least 0 but for rounding; 0 where they meet in less.
     lengths : (e,) float
         Of the edges.
     facet_areas : (f, d) float
