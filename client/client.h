@@ -124,8 +124,8 @@ class Client {
                                    const OnCells& on_cells, const CallOptions& call = {});
   absl::Status VoronoiCells(const std::string& session, std::span<const uint32_t> vertices, const OnCells& on_cells,
                             const CallOptions& call = {});
-  // Where `points`, k x dimension, row-major, lie in the session's mesh, in calls of some 10^4 points each, all about the
-  // same mesh. ABORTED (REVISION_MISMATCH) if it is replaced meanwhile.
+  // Where `points`, k x dimension, row-major, lie in the session's mesh, in calls of some 10^4 points each, all about
+  // the same mesh. ABORTED (REVISION_MISMATCH) if it is replaced meanwhile.
   absl::StatusOr<Located> Locate(const std::string& session, std::span<const double> points,
                                  const LocateOptions& options = {}, const CallOptions& call = {});
   // `points`: k x dimension, row-major. `near`: a vertex near each, or empty.

@@ -56,7 +56,9 @@ class BoxMesher final : public Mesher {
                                          const RunContext& context);
   absl::StatusOr<SortedCloud<D>> BuildTree(const MeshParameters& parameters, std::span<const double> points,
                                            const MergedPoints& merged, const RunContext& context);
-  MeshCriteria<D> CriteriaOf(const MeshParameters& parameters) const { return CriteriaIn<D>(domain_, parameters, samples_); }
+  MeshCriteria<D> CriteriaOf(const MeshParameters& parameters) const {
+    return CriteriaIn<D>(domain_, parameters, samples_);
+  }
   absl::StatusOr<uint64_t> PredictVertices(const MeshCriteria<D>& criteria, const RunContext& context) const;
   absl::Status RepairSlivers(const MeshParameters& parameters, RunContext& context);
   static double MinDihedralOf(const MeshParameters& parameters);

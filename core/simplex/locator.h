@@ -46,8 +46,8 @@ class Locator {
   // Complexity: O(n log n).
   std::vector<uint32_t> CurveOrder(std::span<const double> points) const;
 
-  // The simplex that has `x`; of several, as `x` is on a face of theirs, the one with the lowest number. A coordinate is
-  // 0 if and only if `x` is on the facet opposite to its vertex: that is decided exactly.
+  // The simplex that has `x`; of several, as `x` is on a face of theirs, the one with the lowest number. A coordinate
+  // is 0 if and only if `x` is on the facet opposite to its vertex: that is decided exactly.
   //
   // `hint`: any number of a simplex, or kNoSimplex. It is faster if `x` is near it.
   //
@@ -80,8 +80,8 @@ class Locator {
   using Volumes = std::array<double, D + 1>;
 
   Simplex<D> CornersOf(uint32_t simplex) const;
-  // Where `x` is in `simplex`. Unless it is outside, `*volumes` are those of the simplices that it makes with the facets,
-  // times D!, by the corners opposite to them: 0 if and only if it is on the facet.
+  // Where `x` is in `simplex`. Unless it is outside, `*volumes` are those of the simplices that it makes with the
+  // facets, times D!, by the corners opposite to them: 0 if and only if it is on the facet.
   // If it is, `*beyond` is the number of a corner whose facet it is beyond.
   Side Test(uint32_t simplex, const Point<D>& x, Volumes* volumes, int* beyond) const;
   // Walks from `from` towards `x`, over facets. Of the simplex that has `x` inside, `*volumes` are as Test has them; or

@@ -53,8 +53,8 @@ class FairQueue {
   // REQUIRES:   there is such a job.
   void Start(const std::string& tenant, uint64_t sequence);
 
-  // Of the first jobs of each tenant, the first in the order of turns that `admit` admits. It is asked in that order, and
-  // no more once it was true.
+  // Of the first jobs of each tenant, the first in the order of turns that `admit` admits. It is asked in that order,
+  // and no more once it was true.
   std::optional<uint64_t> FindFirst(const Admit& admit) const;
   // The same of small jobs, whatever they are behind.
   std::optional<uint64_t> FindSmall(const Admit& admit) const;

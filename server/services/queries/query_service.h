@@ -9,8 +9,8 @@ namespace wellspace::server {
 
 // Queries are read and written as bytes, which the workers make.
 using QueryServiceBase = v1::QueryService::WithRawCallbackMethod_ApproximateNearestNeighbors<
-    v1::QueryService::WithRawCallbackMethod_ClippedVoronoiCells<v1::QueryService::WithRawCallbackMethod_VoronoiCells<
-        v1::QueryService::WithCallbackMethod_Locate<
+    v1::QueryService::WithRawCallbackMethod_ClippedVoronoiCells<
+        v1::QueryService::WithRawCallbackMethod_VoronoiCells<v1::QueryService::WithCallbackMethod_Locate<
             v1::QueryService::WithCallbackMethod_AddVertices<v1::QueryService::Service>>>>>;
 
 // Thread safety: thread-safe.
