@@ -8,6 +8,7 @@
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
 #include "core/geometry/point.h"
+#include "core/simplex/quality.h"
 
 namespace wellspace::core {
 namespace {
@@ -72,7 +73,7 @@ absl::Status CheckSizeBounds(const SizeBounds& bounds, int dimension) {
 }
 
 template <int D>
-std::string SizeExcess(const Simplex<D>& corners, const SizeBounds& bounds) {
+std::string SizeExcess(const std::array<Point<D>, D + 1>& corners, const SizeBounds& bounds) {
   const Point<D> offset = CircumcentreOffset<D>(corners);
   const double radius = Distance<D>(offset, Point<D>{});
   const auto keeps = [radius](double bound) { return radius <= bound * (1 + kRelativeTolerance); };
@@ -116,7 +117,8 @@ std::string SizeExcess(const Simplex<D>& corners, const SizeBounds& bounds) {
   return "";
 }
 
-#define WELLSPACE_INSTANTIATE(D) template std::string SizeExcess<D>(const Simplex<D>&, const SizeBounds&);
+#define WELLSPACE_INSTANTIATE(D) \
+  template std::string SizeExcess<D>(const std::array<Point<D>, D + 1>&, const SizeBounds&);
 WELLSPACE_FOR_EACH_DIMENSION(WELLSPACE_INSTANTIATE)
 #undef WELLSPACE_INSTANTIATE
 

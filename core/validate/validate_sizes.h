@@ -2,12 +2,13 @@
 #ifndef WELLSPACE_CORE_VALIDATE_VALIDATE_SIZES_H_
 #define WELLSPACE_CORE_VALIDATE_VALIDATE_SIZES_H_
 
+#include <array>
 #include <span>
 #include <string>
 
 #include "absl/status/status.h"
 #include "core/geometry/criterion.h"
-#include "core/simplex/quality.h"
+#include "core/geometry/point.h"
 
 namespace wellspace::core {
 
@@ -34,7 +35,7 @@ absl::Status CheckSizeBounds(const SizeBounds& bounds, int dimension);
 // REQUIRES:   CheckSizeBounds(bounds, D).ok().
 // Complexity: O(boxes + samples): each is looked at.
 template <int D>
-std::string SizeExcess(const Simplex<D>& corners, const SizeBounds& bounds);
+std::string SizeExcess(const std::array<Point<D>, D + 1>& corners, const SizeBounds& bounds);
 
 }  // namespace wellspace::core
 
