@@ -46,6 +46,9 @@ class DocumentsTest(unittest.TestCase):
     def test_guide(self):
         self.run_blocks(ROOT / "docs" / "python.md", 10)
 
+    def test_tutorial(self):
+        self.run_blocks(ROOT / "docs" / "tutorial.md", 8)
+
     def test_readme_of_the_package(self):
         self.run_blocks(ROOT / "client" / "python" / "README.md", 1)
 
