@@ -25,7 +25,9 @@ void TakePointData(const std::string& path, MeshOrCloud& read) {
       read.input_vertices = std::find(attribute.values.begin(), attribute.values.end(), 0) - attribute.values.begin();
     } else if (attribute.name == kVtkOrigin) {
       for (const double origin : attribute.values) {
-        read.mesh.vertex_origins.push_back(static_cast<uint32_t>(static_cast<int64_t>(origin)));
+        const bool is_origin = origin >= SignedOrigin(kCornerOrigin) && origin < kCornerOrigin;
+        read.mesh.vertex_origins.push_back(is_origin ? static_cast<uint32_t>(static_cast<int64_t>(origin))
+                                                     : kSteinerOrigin);
       }
     } else if (attribute.name != kVtkBoundary && attribute.name != "weights") {
       read.attributes.push_back(std::move(attribute));

@@ -139,10 +139,10 @@ TEST_F(ReadCloudTest, DimensionIsCheckedAndStandsInForAnEmptyFile) {
 TEST_F(ReadCloudTest, FormatByNameAndByExtension) {
   EXPECT_EQ(ReadGood("points.data", "1 2 3\n", {.format = "xyz", .dimension = 0}).dimension, 3);
   EXPECT_EQ(ReadGood("POINTS.CSV", "1 2 3\n").dimension, 3);
-  EXPECT_THAT(ReadBad("cloud.stl", "1 2\n"),
-              HasSubstr("no format is known by the extension \".stl\"; expected one of .csv"));
+  EXPECT_THAT(ReadBad("cloud.step", "1 2\n"),
+              HasSubstr("no format is known by the extension \".step\"; expected one of .csv"));
   EXPECT_THAT(ReadBad("cloud", "1 2\n"), HasSubstr("no format is known by the extension \"\""));
-  EXPECT_THAT(ReadBad("cloud.csv", "1 2\n", {.format = "las", .dimension = 0}),
+  EXPECT_THAT(ReadBad("cloud.csv", "1 2\n", {.format = "e57", .dimension = 0}),
               HasSubstr("expected one of csv, xyz, node, ply, obj, off, npy, asc, pts"));
 }
 
