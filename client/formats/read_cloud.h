@@ -26,7 +26,7 @@
 //   stl   In ascii or binary: the corners of the triangles, each once; -0 is 0.
 //   pcd   The Point Cloud Library's: fields x, y and, if it is there, z; data in ascii, binary or binary_compressed.
 //   las   1.0 to 1.4 of the ASPRS, point formats 0 to 10; points that are marked as withheld are left out. Compressed
-//         ones (laz) are refused: docs/adr/0033-laz-is-refused.md.
+//         ones (laz) are refused: docs/adr/0034-laz-is-refused.md.
 //   vtk   VTK's legacy format in ascii or binary, of the kinds POLYDATA, UNSTRUCTURED_GRID and STRUCTURED_GRID.
 //   vtp, vtu  VTK's XML, one piece, arrays as ReadMesh takes them.
 // Of ply and off, what follows the last vertex is not looked at.

@@ -110,7 +110,7 @@ class IdleSessionsTest : public ::testing::Test {
 
   std::shared_ptr<Operation> Start(Session& session) {
     return session
-        .StartOperation({.dimension = 2}, 0,
+        .StartOperation({.dimension = 2}, /*restart=*/false, 0,
                         [](const std::shared_ptr<Operation>& /*operation*/) { return absl::OkStatus(); })
         .value();
   }

@@ -33,9 +33,10 @@ constexpr int kVariations = WELLSPACE_VARIATIONS;
 
 // A step of a life.
 struct LifeStep {
-  enum class Kind { kUpload, kRefine, kAdd } kind = Kind::kUpload;
-  std::vector<double> points{};  // of kUpload and kAdd
+  enum class Kind { kUpload, kRefine, kAdd, kSetSizes } kind = Kind::kUpload;
+  std::vector<double> points{};  // of all but kRefine
   double size = 0;               // of kRefine
+  bool restart = false;          // of kRefine
 };
 
 struct Life {
@@ -61,12 +62,19 @@ Life DrawLife(test::SplitMix64& random) {
   upload();
   refine();
   for (uint64_t i = 2 + random.Below(4); i > 0; --i) {
-    switch (random.Below(3)) {
+    switch (random.Below(5)) {
       case 0:
         upload();
         break;
       case 1:
         refine();
+        break;
+      case 2:
+        life.steps.push_back({.kind = LifeStep::Kind::kRefine, .size = 0.3, .restart = true});
+        break;
+      case 3:
+        life.steps.push_back(
+            {.kind = LifeStep::Kind::kSetSizes, .points = DrawPoints(random, random.Below(4), life.dimension)});
         break;
       default:
         life.steps.push_back(
@@ -126,7 +134,10 @@ class Living {
           Upload(step.points);
           break;
         case LifeStep::Kind::kRefine:
-          Refine(step.size);
+          Refine(step.size, step.restart);
+          break;
+        case LifeStep::Kind::kSetSizes:
+          SetSizes(step.points);
           break;
         case LifeStep::Kind::kAdd:
           Add(step.points);
@@ -201,7 +212,7 @@ class Living {
     core::MeshParameters parameters = Parameters(0.01);
     parameters.max_vertices = 400 + random_->Below(1000);
     const std::shared_ptr<Operation> operation =
-        StartRefinement(process_->environment(), session_, parameters, 0).value();
+        StartRefinement(process_->environment(), session_, parameters, /*restart=*/Draw(3), 0).value();
     if (Draw(2)) {
       std::this_thread::sleep_for(std::chrono::microseconds(random_->Below(3000)));
       (void)CancelOperation(process_->environment(), *session_, *operation);
@@ -233,9 +244,20 @@ class Living {
     EXPECT_TRUE(session_->CommitPoints().ok());
   }
 
-  void Refine(double size) {
+  // A set of sizes, 0.04 at each point; none without any.
+  void SetSizes(const std::vector<double>& points) {
+    std::shared_ptr<core::SizeSamples> samples;
+    if (!points.empty()) {
+      samples = std::make_shared<core::SizeSamples>();
+      samples->points = points;
+      samples->sizes.assign(points.size() / life_.dimension, 0.04);
+    }
+    EXPECT_TRUE(session_->SetSizes(samples, 0).ok());
+  }
+
+  void Refine(double size, bool restart) {
     std::shared_ptr<Operation> operation =
-        StartRefinement(process_->environment(), session_, Parameters(size), 0).value();
+        StartRefinement(process_->environment(), session_, Parameters(size), restart, 0).value();
     if (Draw(4)) {
       what_ += " restart-within";
       const std::string name = operation->name();

@@ -25,7 +25,7 @@ class Parameters(TypedDict, total=False):
     """
     criterion : {"radius-edge", "well-spaced"}
         What `rho` bounds: circumradius / shortest edge of every simplex; or, for every vertex, the farthest node of its
-        Voronoi cell / its nearest neighbour, which is stronger and takes three to four times as many vertices. Default
+        Voronoi cell / its nearest neighbour, which is stronger and takes about 2.5 times as many vertices. Default
         "radius-edge".
     rho : float
         The bound of `criterion`. Default: sqrt(2) in 2-D, 2 in 3-D, 2.9, 4.1 and 5.8 in 4-D to 6-D, for which
