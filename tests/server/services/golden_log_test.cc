@@ -57,6 +57,9 @@ class OtherMeshesLog final : public SessionLog {
   absl::StatusOr<std::vector<store::v1::StepRecord::Features>> ReadFeatures(const std::string& session) override {
     return log_->ReadFeatures(session);
   }
+  absl::StatusOr<std::vector<StoredSizes>> ReadSizes(const std::string& session) override {
+    return log_->ReadSizes(session);
+  }
   std::unique_ptr<PointStore> OpenPoints(const std::string& session, int dimension,
                                          std::vector<store::v1::StepRecord::Points> committed) override {
     return log_->OpenPoints(session, dimension, std::move(committed));
@@ -241,6 +244,18 @@ void WriteUndisturbed(GoldenServer& server) {
   EXPECT_TRUE(server.Add(added, UniformPoints(5, 2, 5)).ok());
   server.calls().Upload(added, 45, UniformPoints(3, 2, 6));
 
+  const std::string sizes = server.Create("sizes-at-points", UnitCubeParameters(2));
+  server.calls().Upload(sizes, 0, UniformPoints(20, 2, 9));
+  server.calls().SetSizes({SizesRequest(sizes, {0.25, 0.75}, {0.02})});
+  server.Refine(sizes);
+  server.calls().SetSizes({SizesRequest(sizes, {0.75, 0.25}, {0.04})});
+  v1::StartRefinementRequest restart = GoldenServer::StartRequest(sizes, nullptr, "");
+  restart.set_restart(true);
+  server.WaitFor(server.calls().Start(restart).name());
+  server.calls().SetSizes({SizesRequest(sizes, {0.5, 0.5}, {0.03})});
+  server.Refine(sizes);
+  server.calls().SetSizes({SizesRequest(sizes, {0.4, 0.5}, {0.03})});
+
   const std::string space = server.Create("space", UnitCubeParameters(3));
   server.calls().Upload(space, 0, UniformPoints(12, 3, 7));
   server.Refine(space);
@@ -389,6 +404,7 @@ TEST(GoldenLog, FoldersOfEarlierBuildsAreCheckedAndBackedUp) {
     const TestFolder folder;
     const std::string data = CopyOf(golden, folder);
     const std::string copy = folder.path() + "/copy";
+    { GoldenServer brings_the_schema_up(data); }
     EXPECT_EQ(RunProgram({"check-data", data}), 0);
     EXPECT_EQ(RunProgram({"back-up", data, copy}), 0);
     EXPECT_EQ(RunProgram({"check-data", copy}), 0);
