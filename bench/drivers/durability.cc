@@ -1,4 +1,5 @@
-// What it costs that nothing is lost: commits, uploads, starts, meshes in files. Prints a table.
+// What it costs that nothing is lost: commits, uploads, starts, meshes in files, and calls beside uploads. Prints a
+// table.
 //
 //   bench_durability FOLDER     on whose disk; what is written there is removed again
 #include <sys/socket.h>
@@ -11,17 +12,23 @@
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <random>
 #include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "absl/strings/str_cat.h"
+#include "grpcpp/grpcpp.h"
 #include "grpcpp/support/slice.h"
 #include "proto/checksum.h"
+#include "server/server.h"
 #include "server/store/check_data.h"
 #include "server/store/durable_log.h"
 #include "server/store/memory_mesh.h"
+#include "spdlog/logger.h"
+#include "wellspace/v1/operations.grpc.pb.h"
+#include "wellspace/v1/sessions.grpc.pb.h"
 
 namespace wellspace::server {
 namespace {
@@ -213,6 +220,193 @@ void MeasureMesh(const std::string& folder) {
               megabytes / best_memory, megabytes / best_file, ratios[ratios.size() / 2]);
 }
 
+// A server on the loopback, and a client of it. Empty `folder`: sessions end with it.
+struct Service {
+  explicit Service(const std::string& folder) {
+    ServerOptions options;
+    options.listen = "127.0.0.1:0";
+    options.service.max_sessions_per_tenant = 1000;
+    options.service.max_points = 100'000'000;
+    options.service.max_points_per_tenant = 1'000'000'000;
+    server = Get(Server::Start(options, std::make_shared<spdlog::logger>("none"),
+                               folder.empty() ? nullptr : std::unique_ptr<SessionLog>(OpenLog(folder))));
+    channel = grpc::CreateChannel(server->address(), grpc::InsecureChannelCredentials());
+    sessions = v1::SessionService::NewStub(channel);
+  }
+
+  std::string Create() {
+    grpc::ClientContext context;
+    v1::CreateSessionRequest request;
+    request.mutable_parameters()->set_dimension(3);
+    v1::CreateSessionResponse response;
+    Check(sessions->CreateSession(&context, request, &response));
+    return response.session().name();
+  }
+
+  static void Check(const grpc::Status& status) {
+    if (!status.ok()) {
+      std::fprintf(stderr, "bench_durability: %s\n", status.error_message().c_str());
+      std::exit(1);
+    }
+  }
+
+  std::unique_ptr<Server> server;
+  std::shared_ptr<grpc::Channel> channel;
+  std::unique_ptr<v1::SessionService::Stub> sessions;
+};
+
+// Sends messages of 1 MiB to a session until `stop`, by a connection of its own; goes on where an attempt ends that the
+// server gives up, as the client library does. Returns how many it has. `pause`: after each.
+uint64_t UploadUntil(const std::atomic<bool>& stop, Service& service, const std::string& name,
+                     std::chrono::milliseconds pause) {
+  constexpr uint64_t kPoints = 43'690;  // of a message
+  grpc::ChannelArguments arguments;
+  arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);
+  const auto channel =
+      grpc::CreateCustomChannel(service.server->address(), grpc::InsecureChannelCredentials(), arguments);
+  const auto stub = v1::SessionService::NewStub(channel);
+  v1::UploadPointsRequest request;
+  request.set_name(name);
+  request.mutable_points()->mutable_coordinates()->Resize(3 * kPoints, 0.5);
+  uint64_t committed = 0;
+  while (!stop) {
+    grpc::ClientContext context;
+    v1::UploadPointsResponse response;
+    const auto stream = stub->UploadPoints(&context, &response);
+    request.set_point_offset(committed);
+    while (!stop && stream->Write(request)) {
+      request.set_point_offset(request.point_offset() + kPoints);
+      std::this_thread::sleep_for(pause);
+    }
+    stream->WritesDone();
+    (void)stream->Finish();
+    grpc::ClientContext get_context;
+    v1::GetSessionRequest get;
+    get.set_name(name);
+    v1::GetSessionResponse got;
+    Service::Check(stub->GetSession(&get_context, get, &got));
+    committed = got.session().committed_points();
+  }
+  return committed / kPoints;
+}
+
+// GetSession of one client, one after the other, beside `uploads`, which pause after each message.
+void MeasureGets(const std::string& folder, int uploads, std::chrono::milliseconds pause) {
+  constexpr double kSeconds = 10;
+  Service service(folder);
+  const std::string asked = service.Create();
+  std::atomic<bool> stop = false;
+  std::atomic<uint64_t> megabytes = 0;
+  std::vector<std::string> names;
+  for (int i = 0; i < uploads; ++i) {
+    names.push_back(service.Create());
+  }
+  std::vector<std::thread> uploaders;
+  for (int i = 0; i < uploads; ++i) {
+    uploaders.emplace_back([&, i, name = names[i]] {
+      std::this_thread::sleep_for(pause * i / uploads);  // not all at the same moment
+      megabytes += UploadUntil(stop, service, name, pause);
+    });
+  }
+  std::vector<double> times;
+  const auto start = Clock::now();
+  while (SecondsSince(start) < kSeconds) {
+    grpc::ClientContext context;
+    v1::GetSessionRequest request;
+    request.set_name(asked);
+    v1::GetSessionResponse response;
+    const auto begun = Clock::now();
+    Service::Check(service.sessions->GetSession(&context, request, &response));
+    times.push_back(SecondsSince(begun));
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  stop = true;
+  for (std::thread& uploader : uploaders) {
+    uploader.join();
+  }
+  const double seconds = SecondsSince(start);
+  std::ranges::sort(times);
+  std::printf("GetSession, %3d uploads p50 %6.2f ms   p99 %6.2f ms   of %zu; uploads %.0f MB/s\n", uploads,
+              times[times.size() / 2] * 1e3, times[times.size() * 99 / 100] * 1e3, times.size(),
+              static_cast<double>(megabytes) * 1.048576 / seconds);
+}
+
+// A session with a mesh of about 10^6 simplices.
+std::string MakeMeshedSession(Service& service) {
+  const std::string name = service.Create();
+  {
+    grpc::ClientContext context;
+    v1::UploadPointsResponse response;
+    const auto stream = service.sessions->UploadPoints(&context, &response);
+    std::mt19937_64 random(1);
+    std::uniform_real_distribution<double> uniform(0, 1);
+    v1::UploadPointsRequest request;
+    request.set_name(name);
+    for (int point = 0; point < 60'000; point += 20'000) {
+      request.set_point_offset(point);
+      request.mutable_points()->clear_coordinates();
+      for (int i = 0; i < 3 * 20'000; ++i) {
+        request.mutable_points()->add_coordinates(uniform(random));
+      }
+      stream->Write(request);
+    }
+    stream->WritesDone();
+    Service::Check(stream->Finish());
+  }
+  const auto operations = v1::OperationService::NewStub(service.channel);
+  grpc::ClientContext context;
+  v1::StartRefinementRequest start;
+  start.set_name(name);
+  v1::StartRefinementResponse started;
+  Service::Check(operations->StartRefinement(&context, start, &started));
+  v1::GetOperationRequest get;
+  get.set_name(started.operation().name());
+  v1::GetOperationResponse got;
+  while (got.operation().state() != v1::Operation::STATE_SUCCEEDED) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    grpc::ClientContext get_context;
+    Service::Check(operations->GetOperation(&get_context, get, &got));
+  }
+  return name;
+}
+
+// MB/s of a download over gRPC, by a client that takes the messages apart.
+double DownloadRate(Service& service, const std::string& name) {
+  grpc::ClientContext context;
+  v1::DownloadMeshRequest request;
+  request.set_name(name);
+  const auto start = Clock::now();
+  const auto stream = service.sessions->DownloadMesh(&context, request);
+  v1::DownloadMeshResponse response;
+  uint64_t bytes = 0;
+  while (stream->Read(&response)) {
+    bytes += response.ByteSizeLong();
+  }
+  Service::Check(stream->Finish());
+  return static_cast<double>(bytes) / SecondsSince(start) / 1e6;
+}
+
+// From a file and from memory, one after the other.
+void MeasureDownloads(const std::string& folder) {
+  Service durable(folder);
+  Service ephemeral("");
+  const std::string in_file = MakeMeshedSession(durable);
+  const std::string in_memory = MakeMeshedSession(ephemeral);
+  std::vector<double> file;
+  std::vector<double> memory;
+  std::vector<double> ratios;
+  for (int round = 0; round < 31; ++round) {
+    memory.push_back(DownloadRate(ephemeral, in_memory));
+    file.push_back(DownloadRate(durable, in_file));
+    ratios.push_back(file.back() / memory.back());
+  }
+  for (std::vector<double>* const rates : {&memory, &file, &ratios}) {
+    std::ranges::sort(*rates);
+  }
+  std::printf("over gRPC: memory %.0f MB/s, file %.0f MB/s at best, %.0f and %.0f in the median; ratio %.2f, %.2f\n",
+              memory.back(), file.back(), memory[15], file[15], file.back() / memory.back(), ratios[15]);
+}
+
 }  // namespace
 }  // namespace wellspace::server
 
@@ -233,6 +427,11 @@ int main(int argc, char** argv) {
   wellspace::server::MeasureUpload(fresh("upload"));
   wellspace::server::MeasureStart(fresh("start"), 10'000);
   wellspace::server::MeasureMesh(fresh("mesh"));
+  wellspace::server::MeasureDownloads(fresh("downloads"));
+  using std::chrono::milliseconds;
+  wellspace::server::MeasureGets(fresh("gets"), 0, milliseconds(0));
+  wellspace::server::MeasureGets(fresh("gets"), 100, milliseconds(1000));
+  wellspace::server::MeasureGets(fresh("gets"), 100, milliseconds(0));
   std::filesystem::remove_all(root);
   return 0;
 }
