@@ -1,4 +1,5 @@
 """The whole life of a session from Python: Debian's grpcio, stubs made of the protos, and nothing else of this project."""
+import threading
 import unittest
 
 import grpc
@@ -25,15 +26,18 @@ class PythonClient(unittest.TestCase):
     def upload_in_resumable_pieces(self, name, points):
         """One call that breaks off, then one that goes on where the server has got to, with some points twice."""
         sent = pieces(name, points, 0, 100)
+        is_known = threading.Event()  # `call`: requests are asked for before it is there
 
         def a_part():
             yield next(sent)
             while self.remote.get(name).committed_points < 100:
                 pass
+            is_known.wait()
             call.cancel()
             yield next(sent)  # never arrives
 
         call = self.remote.sessions.UploadPoints.future(a_part(), timeout=PATIENCE)
+        is_known.set()
         with self.assertRaises(grpc.FutureCancelledError):
             call.result()
         committed = self.remote.get(name).committed_points

@@ -67,7 +67,7 @@ def dual_cells(mesh: Mesh) -> DualCells:
     cones = areas * lengths / (2 * mesh.dimension)
     volumes = sum(np.bincount(edges[:, k], cones, minlength=len(mesh.points)) for k in (0, 1))
     facets = mesh.points[mesh.facets] if len(mesh.facets) else np.empty((0, mesh.dimension, mesh.dimension))
-    return DualCells(np.asarray(volumes, float), edges, areas, lengths, _shares(facets))
+    return DualCells(np.asarray(volumes, np.float64), edges, np.asarray(areas, np.float64), lengths, _shares(facets))
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
@@ -91,9 +91,8 @@ def _part(corners: Floats, i: int, j: int) -> Floats:
     if len(others) == 1:
         return _foot(corners, i, j, others[0])
     k, last = others
-    return 0.5 * sum(
-        _foot(corners, i, j, on) * _height(corners, (i, j, on), opposite) for on, opposite in ((k, last), (last, k))
-    )
+    of_k = _foot(corners, i, j, k) * _height(corners, (i, j, k), last)
+    return 0.5 * (of_k + _foot(corners, i, j, last) * _height(corners, (i, j, last), k))
 
 
 def _height(corners: Floats, face: tuple[int, int, int], opposite: int) -> Floats:

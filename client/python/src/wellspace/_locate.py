@@ -78,7 +78,10 @@ def locate(
         left = None if math.isinf(deadline) else max(0.0, deadline - now())
         answer = calls.unary_bytes("QueryService/Locate", request, CallOptions(timeout=left, cancel=options.cancel))
         fields = {field.number: field for field in _wire.fields(memoryview(answer))}
-        for number, kind, target in ((1, "<u4", simplices), (2, "<u4", vertices), (3, "<f8", coordinates)):
+        targets: tuple[tuple[int, str, npt.NDArray[Any]], ...] = (
+            (1, "<u4", simplices), (2, "<u4", vertices), (3, "<f8", coordinates)
+        )
+        for number, kind, target in targets:
             found = _wire.packed(fields[number], kind) if number in fields else np.empty(0, kind)
             if found.size != target[part].size:
                 raise damaged(f"{found.size} numbers in field {number} for {part.stop - begin} points")
