@@ -10,7 +10,7 @@ Run = collections.namedtuple("Run", "program cloud arguments")
 #   value(ours, peers) -> float: from the reports of one repetition, ours by number of threads
 #   better: ">=" or "<=": how the value is compared with the targets
 #   targets: by number of threads; none for what is measured only to be known
-#   ours: {threads: Run}; peers: [Run]; shown: the report of `ours` and of `peers` whose vertices and memory the table shows
+#   ours: {threads: Run}; peers: [Run]
 Row = collections.namedtuple("Row", "name what value better targets ours peers quick")
 
 THREADS = (1, 2)

@@ -211,14 +211,13 @@ absl::StatusOr<SizesSet> GrpcConnection::SetVertexSizes(const std::string& sessi
 
 absl::StatusOr<SizesSet> GrpcConnection::SendAllSizes(const std::string& session, size_t count, const CallOptions& call,
                                                       const FillSizesRequest& fill) {
-  uint64_t expected_revision = call.expected_revision;
   v1::SetSizesResponse response;
   const absl::Status status = retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
     CallContext context(attempt);
     RequestWriter<v1::SetSizesRequest> stream(
         [&](grpc::CompletionQueue* queue) { return sessions_->PrepareAsyncSetSizes(context.get(), &response, queue); });
-    // What an attempt before this one has set has changed the revision.
-    SendSizes(session, std::exchange(expected_revision, 0), count, fill, stream);
+    // Also after one that may have been taken: the same sizes are no change, whatever the revision is then.
+    SendSizes(session, call.expected_revision, count, fill, stream);
     return FromGrpcStatus(stream.Finish());
   });
   if (!status.ok()) {

@@ -1,4 +1,7 @@
 // What a class of cells has to offer, whatever its dimension and however it keeps its nodes.
+//
+// The folder in the order of reading: cell_parts, meeting_point; then from 4-D on polytope, node_columns, candidates;
+// in 2-D and 3-D float_cell, polygon and polyhedron, gathered_vertices, float_candidates.
 #ifndef WELLSPACE_CORE_CELL_CELL_CLASS_H_
 #define WELLSPACE_CORE_CELL_CELL_CLASS_H_
 

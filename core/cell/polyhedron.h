@@ -27,6 +27,8 @@ namespace wellspace::core {
 // the new plane. Which triangle is beside which need not be known for that. What floats leave in doubt is decided
 // exactly.
 //
+// What cuts is in polyhedron.cc; what places nodes, and looks at them, in polyhedron_nodes.cc.
+//
 // Thread safety: thread-compatible. Reused from site to site: no allocation once warm.
 // Invariants: the nodes are those that exact arithmetic and the tie rule give, whatever the rounding.
 class Polyhedron : public FloatCell<3> {

@@ -79,7 +79,7 @@ class Polytope {
   bool KeepsRatio(double ratio) const;
 
   // Returns KeepsRatio(ratio). Unless that holds nodes() may be asked for: those of which it does not surely hold are
-  // placed then, the others only roughly, though so that it holds of them.
+  // placed then, the others only roughly, though so that it holds of them. In 3-D they do not tell their neighbours.
   //
   // Complexity: O(nodes).
   // Errors:     none.

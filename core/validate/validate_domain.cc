@@ -49,8 +49,9 @@ class PointTree {
       return;
     }
     const size_t middle = (begin + end) / 2;
-    std::nth_element(order_.begin() + begin, order_.begin() + middle, order_.begin() + end,
-                     [&](uint32_t u, uint32_t v) { return points_[2 * u + axis] < points_[2 * v + axis]; });
+    std::nth_element(
+        order_.begin() + begin, order_.begin() + middle, order_.begin() + end,
+        [&](uint32_t u, uint32_t v) { return points_[size_t{2} * u + axis] < points_[size_t{2} * v + axis]; });
     Sort(begin, middle, 1 - axis);
     Sort(middle + 1, end, 1 - axis);
   }

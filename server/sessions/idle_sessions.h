@@ -23,8 +23,8 @@ namespace wellspace::server {
 // Complexity: O(s log s) for s sessions.
 std::vector<size_t> ChooseIdle(std::span<const Session::Spare> sessions, uint64_t missing, MemoryBudget::Want want);
 
-// Has the sessions of a store give up their meshers where the budget wants it, the one first that has not been used for
-// longest. Each comes back by replay, when it is needed.
+// Has the sessions of a registry give up their meshers where the budget wants it, the one first that has not been used
+// for longest. Each comes back by replay, when it is needed.
 //
 // Thread safety: thread-safe.
 class IdleSessions {

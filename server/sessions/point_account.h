@@ -44,7 +44,8 @@ class TenantPoints {
 };
 
 // The points, segments, seeds and sizes of one session, counted against three limits: that of a session, which holds
-// for each of these, that of its tenant, which holds for their sum, and the memory of the server.
+// for points, segments and seeds each, and for a set of sizes where it comes, that of its tenant, which holds for their
+// sum, and the memory of the server.
 //
 // Thread safety: thread-compatible; accounts of one tenant may be used on different threads.
 // Invariants: the tenant's points include all of this account until Close.

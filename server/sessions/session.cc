@@ -294,6 +294,7 @@ uint64_t Session::GiveUpMesher() {
     memory = std::move(work_.memory);
   }
   mesher = nullptr;  // before others may have its memory
+  located = nullptr;
   memory.Release();
   return bytes;
 }

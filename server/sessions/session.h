@@ -57,17 +57,17 @@ struct AddedVertices {
 
 // What an operation works on. The session has given it away until the operation has ended.
 struct SessionWork {
+  MemoryReservation memory;              // of `mesher`; first, so that it is given back when that is freed
   std::unique_ptr<core::Mesher> mesher;  // null: there is none yet, or it was given up
   uint64_t meshed_points = 0;            // how many of the session's points `mesher` has, or would have
   std::shared_ptr<MeshSnapshot> mesh;    // the last mesh; null before the first
-  MemoryReservation memory;              // of `mesher`
 };
 
 // A mesh of a session in which points can be located.
 struct LocatedMesh {
+  MemoryReservation memory;  // first, so that it is given back when the locator is freed
   std::unique_ptr<const core::MeshLocator> locator;
   uint64_t revision = 0;
-  MemoryReservation memory;
 };
 
 // How the work of an operation has ended.
@@ -77,6 +77,11 @@ struct WorkResult {
   std::shared_ptr<MeshSnapshot> mesh;  // the new mesh, if the status is OK
 };
 
+// Where its functions are: session.cc: state, lease, queries, what it gives up; session_points.cc: uploads;
+// session_features.cc: segments; session_sizes.cc: sizes at points; session_operations.cc: operations;
+// session_structure.cc: the mesher that is built again, vertices that are added, the locator; session_record.cc: how it
+// is written down, and comes back.
+//
 // Thread safety: thread-safe.
 // Invariants: (1) revision grows with every change of the points, the features, the sizes or the mesh; (2) while an
 // operation is under way, or vertices are being added or the mesher is built again, points, features, sizes, mesh,
@@ -137,8 +142,8 @@ class Session {
   absl::Status Update(std::optional<std::map<std::string, std::string>> labels, std::optional<absl::Duration> ttl,
                       uint64_t expected_revision, const AnswerTo<v1::Session>& answer = nullptr);
 
-  // For a session that leaves its store: from now on every change, and every question about points and mesh, ends with
-  // SESSION_NOT_FOUND. Returns the operation that is under way, which the caller is to cancel, or null.
+  // For a session that leaves its registry: from now on every change, and every question about points and mesh, ends
+  // with SESSION_NOT_FOUND. Returns the operation that is under way, which the caller is to cancel, or null.
   //
   // Errors:     REVISION_MISMATCH, SESSION_NOT_FOUND (it was closed before): nothing has been done.
   absl::StatusOr<std::shared_ptr<Operation>> Close(uint64_t expected_revision,
@@ -195,7 +200,8 @@ class Session {
   // Complexity: O(samples).
   // Errors:     INVALID_SIZES (outside the domain), SESSION_BUSY, QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH,
   //             SESSION_NOT_FOUND. Nothing has changed.
-  absl::Status SetSizes(std::shared_ptr<const core::SizeSamples> samples, uint64_t expected_revision);
+  // Where memory is short, idle sessions give some up first.
+  absl::Status SetSizes(const std::shared_ptr<const core::SizeSamples>& samples, uint64_t expected_revision);
   // The number of sizes, and the revision, as one.
   v1::SetSizesResponse CommittedSizes() const;
 
@@ -323,6 +329,8 @@ class Session {
   // Errors:     DATA_LOSS.
   absl::Status LoadInputs();
   absl::Status LoadSizes();
+  // What SetSizes does.
+  absl::Status TryToSetSizes(const std::shared_ptr<const core::SizeSamples>& samples, uint64_t expected_revision);
   // What AddSegments does.
   absl::Status TryToAddSegments(const v1::AddSegmentsRequest& request, uint64_t expected_revision);
   // Writes down what AddSegments has appended: all of `request` but for what was known.
@@ -376,7 +384,7 @@ class Session {
   // What Restore sets besides steps and operations.
   void SetState(const StoredSession& stored);
   void CloseNowLocked();
-  // The session is the caller's alone until EndBusy, and does not expire.
+  // The session is the caller's alone until EndBusyLocked, and does not expire.
   void BeginBusyLocked(Busy busy);
   void EndBusyLocked();
 

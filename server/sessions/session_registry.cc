@@ -92,13 +92,19 @@ void SessionRegistry::DropIfEmpty(const std::string& tenant) {
 }
 
 absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Find(const std::string& tenant, const std::string& name) {
-  std::lock_guard lock(mutex_);
-  const auto found = by_name_.find(name);
-  if (found == by_name_.end() || found->second->tenant() != tenant || !found->second->Renew()) {
+  std::shared_ptr<Session> session;
+  {
+    std::lock_guard lock(mutex_);
+    if (const auto found = by_name_.find(name); found != by_name_.end()) {
+      session = found->second;
+    }
+  }
+  // Without the lock: a session that is written to, or read, may have its own for a while.
+  if (session == nullptr || session->tenant() != tenant || !session->Renew()) {
     return MakeError(v1::ERROR_REASON_SESSION_NOT_FOUND,
                      absl::StrCat("there is no ", name, "; it may have been deleted, or have expired"));
   }
-  return found->second;
+  return session;
 }
 
 std::vector<std::shared_ptr<Session>> SessionRegistry::List(const std::string& tenant, absl::Time after, size_t count,

@@ -49,7 +49,18 @@ std::vector<SizesInUse> Session::UnusedSizesLocked(const SessionSteps& steps, ui
   return had;
 }
 
-absl::Status Session::SetSizes(std::shared_ptr<const core::SizeSamples> samples, uint64_t expected_revision) {
+absl::Status Session::SetSizes(const std::shared_ptr<const core::SizeSamples>& samples, uint64_t expected_revision) {
+  absl::Status set = TryToSetSizes(samples, expected_revision);
+  if (!absl::IsResourceExhausted(set) || !memory_.CanMakeRoom()) {
+    return set;
+  }
+  return memory_.MakeRoom(samples->bytes(), MemoryBudget::Want::kAllOrNothing)
+             ? TryToSetSizes(samples, expected_revision)
+             : set;
+}
+
+absl::Status Session::TryToSetSizes(const std::shared_ptr<const core::SizeSamples>& samples,
+                                    uint64_t expected_revision) {
   std::lock_guard change_lock(change_mutex_);
   WELLSPACE_RETURN_IF_ERROR(LoadInputs());
   const uint64_t count = samples == nullptr ? 0 : samples->sizes.size();
@@ -58,10 +69,12 @@ absl::Status Session::SetSizes(std::shared_ptr<const core::SizeSamples> samples,
   uint64_t dropped = 0;
   {
     std::lock_guard lock(mutex_);
-    WELLSPACE_RETURN_IF_ERROR(CheckReadyForChangeLocked(expected_revision));
+    WELLSPACE_RETURN_IF_ERROR(CheckOpenLocked());
+    WELLSPACE_RETURN_IF_ERROR(CheckIdleLocked());
     if (AreEqual(samples.get(), sizes_.get())) {
-      return absl::OkStatus();
+      return absl::OkStatus();  // a repetition, at whatever revision
     }
+    WELLSPACE_RETURN_IF_ERROR(CheckRevisionLocked(expected_revision));
     if (samples != nullptr) {
       WELLSPACE_RETURN_IF_ERROR(CheckSamplesLocked(*samples));
     }
@@ -91,7 +104,7 @@ absl::Status Session::SetSizes(std::shared_ptr<const core::SizeSamples> samples,
     return status;
   }
   point_account_.ReturnSizes(dropped > count ? dropped - count : 0);
-  sizes_ = std::move(samples);
+  sizes_ = samples;
   sizes_in_use_ = in_use;
   ++revision_;
   return absl::OkStatus();

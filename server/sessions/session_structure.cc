@@ -104,6 +104,7 @@ absl::StatusOr<std::shared_ptr<const LocatedMesh>> Session::PrepareLocator(uint6
     WELLSPACE_ASSIGN_OR_RETURN(located->locator, core::MeshLocator::Create(std::move(loaded), context));
     return absl::OkStatus();
   });
+  WELLSPACE_RETURN_IF_ERROR(made);
   located->revision = mesh->revision();
   located->memory = job.TakeMemory(bytes);
   located->memory.MakeLasting(MesherLasts());

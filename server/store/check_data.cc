@@ -188,7 +188,8 @@ absl::StatusOr<DataReport> CheckData(const std::string& folder, const CheckDataO
     if (changed.empty()) {
       break;
     }
-    WELLSPACE_ASSIGN_OR_RETURN(stored, tables->Load());
+    std::vector<std::string> told;  // damaged records, which are in the report
+    WELLSPACE_ASSIGN_OR_RETURN(stored, tables->Load(&told));
     std::erase_if(stored.sessions, [&](const StoredSession& s) { return !changed.contains(s.state.name()); });
   }
   return report;

@@ -129,7 +129,8 @@ absl::StatusOr<std::unique_ptr<DataFolder>> DataFolder::Open(const std::string& 
   WELLSPACE_RETURN_IF_ERROR(files.SynchronizeFolder(folder->paths_.files()));
   WELLSPACE_RETURN_IF_ERROR(files.SynchronizeFolder(root));
   // The name of the folder itself. Those above may be closed to this user, who has then not made it either.
-  const std::string parent = std::filesystem::path(root).parent_path().string();
+  const std::filesystem::path path(root);
+  const std::string parent = (path.has_filename() ? path : path.parent_path()).parent_path().string();
   if (const absl::Status named = files.SynchronizeFolder(parent.empty() ? "." : parent);
       !named.ok() && named.code() != absl::StatusCode::kPermissionDenied) {
     return named;

@@ -1,6 +1,6 @@
 // A mesh cut into chunks for a stream.
-#ifndef WELLSPACE_SERVER_SESSIONS_MESH_CHUNKS_H_
-#define WELLSPACE_SERVER_SESSIONS_MESH_CHUNKS_H_
+#ifndef WELLSPACE_SERVER_STORE_MESH_CHUNKS_H_
+#define WELLSPACE_SERVER_STORE_MESH_CHUNKS_H_
 
 #include <cstdint>
 #include <memory>
@@ -85,4 +85,4 @@ grpc::ByteBuffer SerializeChunk(const std::shared_ptr<const MeshChunks>& mesh, u
 
 }  // namespace wellspace::server
 
-#endif  // WELLSPACE_SERVER_SESSIONS_MESH_CHUNKS_H_
+#endif  // WELLSPACE_SERVER_STORE_MESH_CHUNKS_H_

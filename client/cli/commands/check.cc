@@ -164,6 +164,8 @@ struct CheckCommand {
   absl::StatusOr<std::vector<double>> ReadCloudOf(int dimension, CloudReport& report) const;
   // What the mesh has to meet. REQUIRES: `sizes` and `cloud` outlive the result.
   core::ValidationOptions ValidationFor(const WantedSizes& sizes, std::span<const double> cloud) const;
+  // Refuses what is asked of a box, and not of a domain with segments.
+  absl::Status CheckOptionsOfDomain() const;
   // Holds the mesh to what it has to meet, its boundary too. `domain`: that of --cloud, if it has one.
   absl::Status Validate(const formats::Mesh& mesh, const core::MeshView& view, const WantedSizes& sizes,
                         std::span<const double> cloud, const std::optional<formats::PlanarDomain>& domain) const;
@@ -272,11 +274,34 @@ core::ValidationOptions CheckCommand::ValidationFor(const WantedSizes& sizes, st
           .min_angle_deg = min_dihedral};
 }
 
+absl::Status CheckCommand::CheckOptionsOfDomain() const {
+  if (criterion == client::Criterion::kWellSpaced) {
+    return absl::InvalidArgumentError("--criterion well-spaced: a domain with segments has the radius-edge one alone");
+  }
+  if (merge_distance != 0) {
+    return absl::InvalidArgumentError("--merge: points of a domain with segments are not merged; leave it out");
+  }
+  if (!cloud_path.empty() && !formats::IsDomainPath(cloud_path)) {
+    return absl::InvalidArgumentError(absl::StrCat(
+        "--cloud ", cloud_path, ": the mesh is one of a domain with segments; give the domain, a .poly or .geojson"));
+  }
+  return absl::OkStatus();
+}
+
 absl::Status CheckCommand::Validate(const formats::Mesh& mesh, const core::MeshView& view, const WantedSizes& sizes,
                                     std::span<const double> cloud,
                                     const std::optional<formats::PlanarDomain>& domain) const {
   if (HasSegments(mesh) || domain.has_value()) {
-    return ValidateDomain(mesh, view, rho, domain.has_value() ? &*domain : nullptr);
+    WELLSPACE_RETURN_IF_ERROR(CheckOptionsOfDomain());
+    WELLSPACE_RETURN_IF_ERROR(ValidateDomain(mesh, view, rho, domain.has_value() ? &*domain : nullptr));
+    const core::ValidationOptions options = ValidationFor(sizes, cloud);
+    WELLSPACE_RETURN_IF_ERROR(core::ValidateSizing(
+        view, {options.max_circumradius, options.size_boxes, options.size_samples, options.gradation}));
+    const double least = core::MeasureQuality(view).min_angle_deg;
+    return least >= options.min_angle_deg
+               ? absl::OkStatus()
+               : absl::FailedPreconditionError(
+                     absl::StrFormat("the smallest angle is %.6g\u00b0, less than %.6g", least, options.min_angle_deg));
   }
   const absl::Status status = core::ValidateMesh(view, ValidationFor(sizes, cloud));
   if (!status.ok() || mesh.boundary.empty()) {
@@ -367,7 +392,7 @@ int CheckCommand::Run() {
     status = Validate(*mesh, view, *sizes, *cloud, domain);
   }
   if (absl::IsInvalidArgument(status)) {  // what was asked for cannot be
-    return ReportError(status, format);
+    return ReportError(size_field.WithOrigins(status), format);
   }
   return Conclude(status, cloud_report, *mesh, std::move(json));
 }

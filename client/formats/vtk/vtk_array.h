@@ -1,8 +1,7 @@
 // The inline binary form of data arrays in VTK's XML files: base64 of blocks, each compressed by zlib or not at all.
 //
-// Compressed:   base64(header) base64(blocks); header: number of blocks, bytes of a block, bytes of the last block when
-// it is
-//               shorter (else 0), then the compressed bytes of each block.
+// Compressed:   base64(header) base64(blocks); header: number of blocks, bytes of a block, bytes of the last block if
+//               that is shorter (else 0), then the compressed bytes of each block.
 // Uncompressed: base64(header data); header: number of bytes.
 #ifndef WELLSPACE_CLIENT_FORMATS_VTK_VTK_ARRAY_H_
 #define WELLSPACE_CLIENT_FORMATS_VTK_VTK_ARRAY_H_

@@ -38,7 +38,7 @@ class PointChunks {
 };
 
 // Checks the order and the contents of the requests of one call and keeps the points. Fast enough for a reaction: no
-// coordinate is looked at or copied.
+// coordinate of a point is looked at or copied. Segments and sizes, which are few, are.
 //
 // Thread safety: thread-compatible.
 // Invariants: never holds more than options.max_points points, segments, seeds or samples of sizes.

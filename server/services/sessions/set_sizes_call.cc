@@ -13,11 +13,12 @@ namespace wellspace::server {
 
 void SetSizesCall::OnBegin() {
   memory_ = environment().memory.ReserveNothing();
-  if (absl::Status status = ReserveFor(0); !status.ok()) {
-    End(std::move(status));
-  } else {
-    ReadNext();
-  }
+  ReserveAndRead();
+}
+
+void SetSizesCall::ReserveAndRead() {
+  ReserveThen(
+      kMessageBytes + sizes_.bytes(), [this] { return ReserveFor(0); }, [this] { ReadNext(); });
 }
 
 absl::Status SetSizesCall::ReserveFor(uint64_t more) {
@@ -26,14 +27,10 @@ absl::Status SetSizesCall::ReserveFor(uint64_t more) {
 }
 
 void SetSizesCall::OnRequest(grpc::ByteBuffer* bytes) {
-  absl::Status status = RunGuarded([&] { return Take(bytes); });
-  if (status.ok()) {
-    status = ReserveFor(0);
-  }
-  if (!status.ok()) {
+  if (absl::Status status = RunGuarded([&] { return Take(bytes); }); !status.ok()) {
     End(std::move(status));
   } else {
-    ReadNext();
+    ReserveAndRead();
   }
 }
 

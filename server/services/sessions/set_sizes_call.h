@@ -38,6 +38,8 @@ class SetSizesCall final : public RequestStream<Call<grpc::ServerReadReactor<grp
   // Takes the samples of the message in `bytes`. The first one says which session it is for.
   absl::Status Take(grpc::ByteBuffer* bytes);
   absl::Status TakeSamples(const v1::SetSizesRequest& request);
+  // Sets memory aside for what has come and for the next message, which it then reads.
+  void ReserveAndRead();
   // Sets memory aside for what has come, and for `more` bytes.
   //
   // Errors:     MEMORY_LIMIT.

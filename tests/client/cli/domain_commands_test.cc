@@ -71,6 +71,29 @@ double AreaOf(const formats::Mesh& mesh) {
   return area;
 }
 
+TEST_F(DomainCommandsTest, CheckHoldsADomainToAllThatIsAsked) {
+  Mesh("frame.poly", kFrame, {"--size", "0.5", "--min-angle", "20"});
+  const auto check = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"check", Path("out.msh")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return RunWellspace(arguments);
+  };
+  EXPECT_EQ(check({"--size", "0.5", "--min-dihedral", "20"}).exit_code, 0);
+  const RunResult size = check({"--size", "0.01"});
+  EXPECT_EQ(size.exit_code, 1);
+  EXPECT_THAT(size.out, HasSubstr("violation"));
+  EXPECT_THAT(size.out, HasSubstr("circumradius"));
+  EXPECT_EQ(check({"--size-box", "0,0,4,4,0.01"}).exit_code, 1);
+  EXPECT_EQ(check({"--size-field", folder_.Write("sizes.csv", "x,y,h\n0.5,0.5,0.01\n")}).exit_code, 1);
+  const RunResult angle = check({"--min-dihedral", "59"});
+  EXPECT_EQ(angle.exit_code, 1);
+  EXPECT_THAT(angle.out, HasSubstr("smallest angle"));
+  const std::string cloud = folder_.Write("cloud.csv", "0,0\n");
+  EXPECT_EQ(check({"--rho", "2", "--criterion", "well-spaced"}).exit_code, 2);
+  EXPECT_EQ(check({"--cloud", cloud}).exit_code, 2);
+  EXPECT_EQ(check({"--cloud", Path("frame.poly"), "--merge", "0.1"}).exit_code, 2);
+}
+
 TEST_F(DomainCommandsTest, PolyWithAHoleAndMarkers) {
   const nlohmann::json stats = Mesh("frame.poly", kFrame, {"--size", "0.5"});
   ExpectValid("frame.poly");

@@ -82,7 +82,7 @@ TEST(SetSizes, AreRepeatedAsAWholeWhenTheyBreakOff) {
   EXPECT_EQ(held.points, samples.points);
   EXPECT_EQ(held.sizes, samples.sizes);
   EXPECT_THAT(held.measures, Each(v1::SIZE_MEASURE_EDGE_LENGTH));
-  EXPECT_THAT(held.revisions, ElementsAre(3, 0));
+  EXPECT_THAT(held.revisions, ElementsAre(3, 3));
 }
 
 TEST(SetSizes, OfVertices) {

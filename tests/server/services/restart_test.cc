@@ -403,6 +403,18 @@ TEST_F(RestartTest, ADamagedMeshCostsItsSessionAlone) {
   Start();
   const Download download = calls().DownloadMesh(damaged);
   EXPECT_EQ(DetailsOf(download.status).reason, "FILE_DAMAGED");
+  v1::LocateRequest locate;
+  locate.mutable_points()->Add(0.5);
+  locate.mutable_points()->Add(0.5);
+  v1::LocateResponse located;
+  for (int i = 0; i < 2; ++i) {
+    grpc::ClientContext context;
+    locate.set_name(damaged);
+    EXPECT_EQ(DetailsOf(calls().queries().Locate(&context, locate, &located)).reason, "FILE_DAMAGED");
+  }
+  grpc::ClientContext context;
+  locate.set_name(other);
+  EXPECT_TRUE(calls().queries().Locate(&context, locate, &located).ok());
   EXPECT_NE(download.status.error_message().find(path.substr(path.rfind('/'))), std::string::npos)
       << download.status.error_message();
   EXPECT_TRUE(calls().DownloadMesh(other).status.ok());

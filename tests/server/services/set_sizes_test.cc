@@ -123,6 +123,9 @@ TEST_F(SetSizesTest, TheSameAgainChangesNothing) {
   const v1::SetSizesRequest request = SizesRequest(name, {0.5, 0.5}, {0.02});
   const v1::SetSizesResponse first = calls_.SetSizes({request});
   EXPECT_EQ(calls_.SetSizes({request}).revision(), first.revision());
+  v1::SetSizesRequest late = request;  // a repetition, whose first answer was lost
+  late.set_expected_revision(first.revision() - 1);
+  EXPECT_EQ(calls_.SetSizes({late}).revision(), first.revision());
   v1::SetSizesRequest edges = request;
   edges.mutable_samples()->set_measure(v1::SIZE_MEASURE_EDGE_LENGTH);
   EXPECT_EQ(calls_.SetSizes({edges}).revision(), first.revision() + 1);

@@ -88,12 +88,13 @@ def unit_of(unit: str | None) -> int:
 def set_sizes(
     calls: Calls, session: str, field: SizeField, mesh_revision: int, expected_revision: int, options: CallOptions
 ) -> int:
-    """Replaces the sizes of a session; returns how many it has then. They are taken together, so repeating is safe."""
-    expected = [expected_revision, 0]  # what an attempt before this one has set has changed the revision
+    """Replaces the sizes of a session; returns how many it has then. They are taken together, so repeating is safe.
+
+    An attempt may have been taken though its answer was lost: the same sizes are no change, whatever the revision is.
+    """
 
     def attempt_once(attempt: Attempt) -> Any:
-        head = _api.message("SetSizesRequest")(name=session, expected_revision=expected[0])
-        expected[0] = expected[1]
+        head = _api.message("SetSizesRequest")(name=session, expected_revision=expected_revision)
         if field.points is None:
             head.vertex_sizes.mesh_revision = mesh_revision
         number = 3 if field.points is not None else 4
