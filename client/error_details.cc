@@ -39,6 +39,12 @@ std::optional<absl::Duration> RetryDelayOf(const absl::Status& status) {
   return absl::Seconds(detail->retry_delay().seconds()) + absl::Nanoseconds(detail->retry_delay().nanos());
 }
 
+absl::Status WithMessage(const absl::Status& status, std::string_view message) {
+  absl::Status other(status.code(), absl::string_view(message.data(), message.size()));
+  status.ForEachPayload([&](absl::string_view type, const absl::Cord& payload) { other.SetPayload(type, payload); });
+  return other;
+}
+
 void AddDetails(const google::rpc::Status& details, absl::Status& status) {
   for (const google::protobuf::Any& detail : details.details()) {
     status.SetPayload(detail.type_url(), absl::Cord(detail.value()));

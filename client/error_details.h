@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "absl/status/status.h"
 #include "absl/time/time.h"
@@ -24,6 +25,9 @@ std::string ReasonOf(const absl::Status& status);
 
 // How long the server wants a client to wait before it tries again; absent: it does not say that this would help.
 std::optional<absl::Duration> RetryDelayOf(const absl::Status& status);
+
+// `status` with another message, and with all that the server has said besides.
+absl::Status WithMessage(const absl::Status& status, std::string_view message);
 
 // Adds the details to `status`, as payloads under their type URLs. REQUIRES: !status.ok().
 void AddDetails(const google::rpc::Status& details, absl::Status& status);

@@ -213,7 +213,7 @@ std::string ParameterOptions::OptionOf(const std::string& field) const {
 
 absl::Status ParameterOptions::Explain(const absl::Status& status) const {
   const std::string option = OptionOf(client::BlamedField(status));
-  return option.empty() ? status : absl::Status(status.code(), absl::StrCat(option, ": ", status.message()));
+  return option.empty() ? status : client::WithMessage(status, absl::StrCat(option, ": ", status.message()));
 }
 
 }  // namespace wellspace::cli

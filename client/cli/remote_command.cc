@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/cli/options.h"
+#include "client/error_details.h"
 
 namespace wellspace::cli {
 
@@ -42,7 +43,7 @@ absl::Status WithOrigins(const absl::Status& status, uint64_t first_index, uint6
       message.insert(result.ptr + 1 - message.data(), absl::StrCat(" (", origin(point - first_index), ")"));
     }
   }
-  return absl::Status(status.code(), first_origin.empty() ? message : absl::StrCat(first_origin, ": ", message));
+  return client::WithMessage(status, first_origin.empty() ? message : absl::StrCat(first_origin, ": ", message));
 }
 
 absl::Status WithPlaces(const absl::Status& status, std::string_view what, uint64_t first_index, uint64_t count,
@@ -58,7 +59,7 @@ absl::Status WithPlaces(const absl::Status& status, std::string_view what, uint6
       message.insert(result.ptr + 1 - message.data(), absl::StrCat(" (", origin(index - first_index), ")"));
     }
   }
-  return absl::Status(status.code(), message);
+  return client::WithMessage(status, message);
 }
 
 absl::Status WithOrigins(const absl::Status& status, const formats::PointCloud& cloud) {

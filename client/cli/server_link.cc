@@ -5,6 +5,7 @@
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "client/connection.h"
+#include "client/error_details.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::cli {
@@ -29,19 +30,15 @@ absl::Status ServerLink::Explain(const absl::Status& status) const {
   const client::ConnectOptions& connect = choice_.connect;
   if (absl::IsUnauthenticated(status) && !client::ReasonOf(status).empty() && connect.token.empty() &&
       connect.token_file.empty()) {
-    absl::Status explained(status.code(),
-                           absl::StrCat(status.message(), "; give --token-file, or set WELLSPACE_TOKEN"));
-    status.ForEachPayload(
-        [&](absl::string_view type, const absl::Cord& payload) { explained.SetPayload(type, payload); });
-    return explained;
+    return client::WithMessage(status, absl::StrCat(status.message(), "; give --token-file, or set WELLSPACE_TOKEN"));
   }
   if (choice_.address.empty() || !absl::IsUnavailable(status)) {
     return status;
   }
   const bool may_want_tls = !connect.tls && connect.tls_ca.empty() && connect.tls_certificate.empty() &&
                             absl::StrContains(status.message(), "Socket closed");
-  return absl::UnavailableError(absl::StrCat("server ", choice_.address, ": ", status.message(),
-                                             may_want_tls ? "; if it wants TLS, give --tls or --tls-ca" : ""));
+  return client::WithMessage(status, absl::StrCat("server ", choice_.address, ": ", status.message(),
+                                                  may_want_tls ? "; if it wants TLS, give --tls or --tls-ca" : ""));
 }
 
 }  // namespace wellspace::cli

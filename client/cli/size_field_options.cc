@@ -7,6 +7,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/cli/options.h"
+#include "client/error_details.h"
 #include "client/formats/read_sizes.h"
 #include "core/base/status_macros.h"
 
@@ -66,7 +67,7 @@ absl::Status SizeFieldOptions::WithOrigins(const absl::Status& status) const {
     uint64_t index = 0;
     if (message.substr(0, prefix.size()) == prefix &&
         std::from_chars(message.data() + prefix.size(), message.data() + message.size(), index).ec == std::errc()) {
-      return absl::Status(status.code(), absl::StrCat("--size-field ", origins_.Origin(index), ": ", status.message()));
+      return client::WithMessage(status, absl::StrCat("--size-field ", origins_.Origin(index), ": ", status.message()));
     }
   }
   return status;

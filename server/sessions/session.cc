@@ -247,6 +247,13 @@ absl::Status Session::Query(uint64_t* version, const std::function<absl::Status(
   return query(*mesher);
 }
 
+absl::Status Session::RetryWithRoom(uint64_t bytes, const std::function<absl::Status()>& change) {
+  absl::Status made = change();
+  return IsMemoryLimit(made) && memory_.CanMakeRoom() && memory_.MakeRoom(bytes, MemoryBudget::Want::kAllOrNothing)
+             ? change()
+             : made;
+}
+
 void Session::NoteIdle() const {
   {
     std::lock_guard lock(mutex_);

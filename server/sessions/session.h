@@ -219,6 +219,8 @@ class Session {
   };
   // Nothing of a session that is busy, or whose structure is in use, or which ends with the process.
   std::optional<Spare> GetSpare() const;
+  // To be called, without a lock, where the session was busy, or its structure or its locator in use: it may be spared.
+  void NoteIdle() const;
   // Gives the mesher up for other work, and what points are located by; it comes back as PrepareStructure and
   // operations say. Returns how much memory that has freed: 0, and nothing is done, where there is nothing to spare.
   //
@@ -390,10 +392,10 @@ class Session {
 
   // The following are called without mutex_.
 
+  // Returns `change()`. Where memory has no room for it, it is called once more after idle sessions gave up `bytes`.
+  absl::Status RetryWithRoom(uint64_t bytes, const std::function<absl::Status()>& change);
   // Waits for the queries that run. To be called when no other can begin.
   void WaitForQueries();
-  // To be called where the session was busy, or its structure in use: it may be spared now.
-  void NoteIdle() const;
   // Builds the mesher again. To be called while the session is Busy::kReplaying.
   absl::Status Rebuild(const MesherFactory& create_mesher, Job& job);
   // What AddVertices does before it touches the mesher; makes the session Busy::kAddingVertices.

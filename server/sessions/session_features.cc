@@ -66,14 +66,8 @@ absl::Status Session::CheckKnownLocked(const v1::AddSegmentsRequest& request, ui
 }
 
 absl::Status Session::AddSegments(const v1::AddSegmentsRequest& request, uint64_t expected_revision) {
-  absl::Status added = TryToAddSegments(request, expected_revision);
-  if (!absl::IsResourceExhausted(added)) {
-    return added;
-  }
-  const uint64_t bytes = FeatureStore::BytesOf(request.segments().ends_size() / 2, request.faces().seeds_size());
-  return memory_.CanMakeRoom() && memory_.MakeRoom(bytes, MemoryBudget::Want::kAllOrNothing)
-             ? TryToAddSegments(request, expected_revision)
-             : added;
+  return RetryWithRoom(FeatureStore::BytesOf(request.segments().ends_size() / 2, request.faces().seeds_size()),
+                       [&] { return TryToAddSegments(request, expected_revision); });
 }
 
 absl::Status Session::TryToAddSegments(const v1::AddSegmentsRequest& request, uint64_t expected_revision) {

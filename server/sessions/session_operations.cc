@@ -104,10 +104,10 @@ std::optional<SessionWork> Session::BeginWork(Operation& operation) {
   }
   WaitForQueries();
   std::lock_guard lock(mutex_);
-  return SessionWork{.mesher = std::move(work_.mesher),
+  return SessionWork{.memory = std::move(work_.memory),
+                     .mesher = std::move(work_.mesher),
                      .meshed_points = work_.meshed_points,
-                     .mesh = work_.mesh,
-                     .memory = std::move(work_.memory)};
+                     .mesh = work_.mesh};
 }
 
 absl::Status Session::CommitSuccess(const Operation& operation, const WorkResult& result, absl::Time now) {

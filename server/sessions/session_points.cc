@@ -145,8 +145,8 @@ absl::Status Session::CommitPoints() {
   }
   std::lock_guard lock(mutex_);
   if (!status.ok()) {
-    if (busy_ == Busy::kAddingVertices) {
-      uncommitted_crc32c_ = crc32c;  // the mesher takes these points in; the addition tries to commit them, too
+    if (busy_ == Busy::kAddingVertices || busy_ == Busy::kReplaying) {
+      uncommitted_crc32c_ = crc32c;  // others read the points now; the next change tries to commit these, too
     } else {
       DropUncommittedLocked();
     }

@@ -50,13 +50,8 @@ std::vector<SizesInUse> Session::UnusedSizesLocked(const SessionSteps& steps, ui
 }
 
 absl::Status Session::SetSizes(const std::shared_ptr<const core::SizeSamples>& samples, uint64_t expected_revision) {
-  absl::Status set = TryToSetSizes(samples, expected_revision);
-  if (!absl::IsResourceExhausted(set) || !memory_.CanMakeRoom()) {
-    return set;
-  }
-  return memory_.MakeRoom(samples->bytes(), MemoryBudget::Want::kAllOrNothing)
-             ? TryToSetSizes(samples, expected_revision)
-             : set;
+  return RetryWithRoom(samples == nullptr ? 0 : samples->bytes(),
+                       [&] { return TryToSetSizes(samples, expected_revision); });
 }
 
 absl::Status Session::TryToSetSizes(const std::shared_ptr<const core::SizeSamples>& samples,

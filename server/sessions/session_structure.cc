@@ -200,12 +200,15 @@ absl::Status Session::CommitAddition(std::span<const double> points, uint64_t up
   const bool grows = known + count > committed_points_;
   added->revision = revision_ + (grows ? 1 : 0);
   const std::optional<store::v1::AnswerRecord> answer_record = AnswerRecordOf(answer, *added);
-  absl::Status status = points_->Append(points);
-  if (status.ok() && grows) {
-    status = points_->Synchronize();
-  }
-  if (status.ok()) {
-    status = CommitState([&](SessionChange& change) {
+  const absl::Status status = RunGuarded([&]() -> absl::Status {
+    {
+      std::lock_guard lock(mutex_);
+      WELLSPACE_RETURN_IF_ERROR(points_->Append(points));
+    }
+    if (grows) {
+      WELLSPACE_RETURN_IF_ERROR(points_->Synchronize());
+    }
+    return CommitState([&](SessionChange& change) {
       if (grows) {
         AddPointsTo(change, known + count, ExtendCrc32c(uncommitted_crc32c_, points.data(), points.size_bytes()));
       }
@@ -214,7 +217,7 @@ absl::Status Session::CommitAddition(std::span<const double> points, uint64_t up
       step.set_end(uploads_end + count);
       change.answer = answer_record;
     });
-  }
+  });
   std::lock_guard lock(mutex_);
   if (!status.ok()) {
     points_->Truncate(known * dimension_);

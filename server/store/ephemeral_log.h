@@ -15,7 +15,7 @@ namespace wellspace::server {
 // Writes nothing down: points and meshes are in memory.
 //
 // Thread safety: that of SessionLog.
-class EphemeralLog final : public SessionLog {
+class EphemeralLog : public SessionLog {
  public:
   bool is_durable() const override { return false; }
   absl::StatusOr<StoredSessions> Load() override { return StoredSessions(); }

@@ -177,6 +177,10 @@ absl::Status MemoryLimitError(std::string_view message, bool may_retry) {
   return Make(CodeOf(v1::ERROR_REASON_MEMORY_LIMIT), v1::ERROR_REASON_MEMORY_LIMIT, message, "", may_retry);
 }
 
+bool IsMemoryLimit(const absl::Status& status) {
+  return status.GetPayload(kReason) == absl::Cord(v1::ErrorReason_Name(v1::ERROR_REASON_MEMORY_LIMIT));
+}
+
 grpc::Status ToGrpcStatus(const absl::Status& status) {
   if (status.ok()) {
     return grpc::Status::OK;

@@ -26,6 +26,7 @@ absl::Status MakeError(v1::ErrorReason reason, std::string_view message, std::st
 absl::Status MakeError(absl::StatusCode code, v1::ErrorReason reason, std::string_view message, std::string_view field);
 // A MEMORY_LIMIT, which passes with time or does not.
 absl::Status MemoryLimitError(std::string_view message, bool may_retry);
+bool IsMemoryLimit(const absl::Status& status);
 
 // The status of a call that ended with `status`: with ErrorInfo, BadRequest where there is a field, and RetryInfo where
 // the call may be repeated. To be called where a status leaves the server, nowhere else.

@@ -11,6 +11,7 @@
 #include "client/cli/remote_command.h"
 #include "client/cli/session_options.h"
 #include "client/cli/size_field_options.h"
+#include "client/error_details.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::cli {
@@ -132,7 +133,7 @@ int OperationCommand::Refine() {
       }
       // A server that cannot be reached may be gone, with all its work.
       const char* fate = absl::IsUnavailable(ended.status()) ? " may go on" : " goes on";
-      return absl::Status(ended.status().code(), absl::StrCat(ended.status().message(), "; ", started.name, fate));
+      return client::WithMessage(ended.status(), absl::StrCat(ended.status().message(), "; ", started.name, fate));
     }
     PrintEnd(remote, *ended, /*indented=*/true);
     return sizes.WithOrigins(parameters.Explain(EndOf(*ended)));

@@ -13,6 +13,7 @@
 #include "client/cli/progress_bar.h"
 #include "client/cli/remote_command.h"
 #include "client/cli/session_options.h"
+#include "client/error_details.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::cli {
@@ -86,7 +87,7 @@ absl::Status ExplainSettings(const absl::Status& status) {
   const bool is_label = field.find("labels") != std::string::npos;
   return !is_ttl && !is_label
              ? status
-             : absl::Status(status.code(), absl::StrCat(is_ttl ? "--ttl: " : "--label: ", status.message()));
+             : client::WithMessage(status, absl::StrCat(is_ttl ? "--ttl: " : "--label: ", status.message()));
 }
 
 struct SessionCommand {
@@ -202,7 +203,7 @@ int SessionCommand::Delete() {
     call.expected_revision = expected_revision;
     for (const std::string& one : sessions) {
       if (absl::Status status = client.DeleteSession(one, call); !status.ok()) {
-        return absl::Status(status.code(), absl::StrCat(one, ": ", status.message()));
+        return client::WithMessage(status, absl::StrCat(one, ": ", status.message()));
       }
     }
     if (remote.json()) {

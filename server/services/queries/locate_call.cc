@@ -102,6 +102,7 @@ void LocateCall::Locate(Job& job) {
     return allow_outside_ ? absl::OkStatus() : CheckInside(located, offset_);
   });
   job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();
+  use_->session().NoteIdle();
   std::lock_guard lock(mutex_);
   if (ending()) {
     return;

@@ -94,6 +94,9 @@ TEST_F(SessionCommandsTest, ErrorsOfTheServerNameTheOptionAndTheReason) {
   const RunResult text = Run({"session", "create", "--dimension", "2", "--rho", "0.1"});
   EXPECT_EQ(text.exit_code, 2);
   EXPECT_EQ(text.err, "wellspace: --rho: rho: too small [INVALID_ARGUMENT]\n");
+  const RunResult as_json = Run({"session", "create", "--dimension", "2", "--rho", "0.1", "--output", "json"});
+  EXPECT_EQ(json::parse(as_json.err), json::parse(R"({"error": {"code": "INVALID_ARGUMENT",
+      "reason": "ERROR_REASON_INVALID_PARAMETERS", "field": "parameters.rho", "message": "--rho: rho: too small"}})"));
   const RunResult missing = Run({"session", "show", "other", "--output", "json"});
   EXPECT_EQ(missing.exit_code, 2);
   EXPECT_EQ(json::parse(missing.err), json::parse(R"({"error": {"code": "NOT_FOUND",

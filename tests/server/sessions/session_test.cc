@@ -117,5 +117,45 @@ TEST_F(SessionTest, AnOperationThatHasEndedTakesNoJob) {
   EXPECT_FALSE(session_->BeginWork(*operation).has_value());
 }
 
+// A log that has no room while `is_full`.
+class LogOnAFullDisk final : public EphemeralLog {
+ public:
+  bool is_durable() const override { return true; }
+  absl::Status Commit(const SessionChange& /*change*/, Survives /*survives*/) override {
+    return is_full ? MakeError(v1::ERROR_REASON_DISK_FULL, "full") : absl::OkStatus();
+  }
+
+  bool is_full = false;
+};
+
+TEST(SessionOnAFullDisk, ChangesAreRefusedAndNoneIsMade) {
+  const ServiceOptions options;
+  MemoryBudget memory(uint64_t{1} << 30);
+  LogOnAFullDisk log;
+  SessionRegistry registry(options, memory, {}, log);
+  const std::shared_ptr<Session> session =
+      registry.Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = {}}).value();
+  const auto sizes = std::make_shared<const core::SizeSamples>(core::SizeSamples{.points = {0, 0}, .sizes = {1}});
+  ASSERT_TRUE(session->SetSizes(sizes, 0).ok());
+  log.is_full = true;
+  memory.NoteIdle();  // as far as it knows, a session may give up memory: that is no help with a disk
+  v1::Session before = session->Describe();
+  EXPECT_EQ(DetailsOf(session->SetSizes(nullptr, 0)).reason, "DISK_FULL");
+  v1::AddSegmentsRequest request;
+  request.mutable_segments()->add_ends(0);
+  request.mutable_segments()->add_ends(1);
+  EXPECT_EQ(DetailsOf(session->AddSegments(request, 0)).reason, "DISK_FULL");
+  ASSERT_TRUE(session->Append(0, std::vector<double>{0.5, 0.5}, 0).ok());
+  EXPECT_EQ(DetailsOf(session->CommitPoints()).reason, "DISK_FULL");
+  EXPECT_TRUE(memory.CanMakeRoom()) << "nothing was given up for it";
+  v1::Session after = session->Describe();
+  before.clear_expire_time();
+  after.clear_expire_time();
+  EXPECT_EQ(after.DebugString(), before.DebugString());
+  log.is_full = false;
+  EXPECT_TRUE(session->SetSizes(nullptr, 0).ok());
+  EXPECT_EQ(session->Describe().size_count(), 0u);
+}
+
 }  // namespace
 }  // namespace wellspace::server
