@@ -56,6 +56,11 @@ absl::StatusOr<Uploaded> Client::UploadPoints(const std::string& session, PointS
   return connection_->UploadPoints(session, source, offset, on_points, call);
 }
 
+absl::StatusOr<PointsLeft> Client::RemovePoints(const std::string& session, std::span<const uint64_t> points,
+                                                const CallOptions& call) {
+  return connection_->RemovePoints(session, points, call);
+}
+
 absl::StatusOr<AddedSegments> Client::AddSegments(const std::string& session, const Features& features,
                                                   const std::optional<FeatureOffset>& offset, const CallOptions& call) {
   return connection_->AddSegments(session, features, offset, call);

@@ -82,6 +82,11 @@ class Client {
                                         std::optional<uint64_t> offset = std::nullopt,
                                         const OnPoints& on_points = nullptr, const CallOptions& call = {});
 
+  // Takes the points with these numbers out of a session. Those behind move down, and the next refinement makes the
+  // mesh anew of those that are left; see the proto. At most some 10^5 numbers, as many as one request has room for.
+  absl::StatusOr<PointsLeft> RemovePoints(const std::string& session, std::span<const uint64_t> points,
+                                          const CallOptions& call = {});
+
   // Adds segments and seeds to a session in 2-D, and sets the rules of its faces, before its first refinement:
   // FAILED_PRECONDITION (DOMAIN_FIXED). Ends are numbers of the session's points, which may come later. `offset`: what
   // the session has before the first of these. Where it has some from there on, they have to be the same and are not

@@ -54,6 +54,8 @@ class Connection {
   virtual absl::StatusOr<Uploaded> UploadPoints(const std::string& session, PointSource& source,
                                                 std::optional<uint64_t> offset, const OnPoints& on_points,
                                                 const CallOptions& call) = 0;
+  virtual absl::StatusOr<PointsLeft> RemovePoints(const std::string& session, std::span<const uint64_t> points,
+                                                  const CallOptions& call) = 0;
   virtual absl::StatusOr<AddedSegments> AddSegments(const std::string& session, const Features& features,
                                                     const std::optional<FeatureOffset>& offset,
                                                     const CallOptions& call) = 0;

@@ -311,6 +311,12 @@ struct FeatureOffset {
   bool operator==(const FeatureOffset&) const = default;
 };
 
+// How many points a session has after some were removed, and its revision.
+struct PointsLeft {
+  uint64_t point_count = 0;
+  uint64_t revision = 0;
+};
+
 // How many sizes at points a session has, and its revision.
 struct SizesSet {
   uint64_t size_count = 0;

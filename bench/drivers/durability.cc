@@ -101,7 +101,7 @@ void MeasureUpload(const std::string& folder) {
   const auto log = OpenLog(folder);
   SessionChange change = MakeCreation(1);
   Check(log->Commit(change));
-  const auto points = log->OpenPoints(change.session, 3, {});
+  const auto points = log->OpenPoints(change.session, 3, 0, {});
   const std::vector<double> message(3 * 43'690, 0.5);
   const auto start = Clock::now();
   uint64_t bytes = 0;

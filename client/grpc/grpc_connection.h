@@ -38,6 +38,8 @@ class GrpcConnection final : public Connection {
   absl::StatusOr<Session> UpdateSession(const std::string& session, const SessionChange& change,
                                         const CallOptions& call) override;
   absl::Status DeleteSession(const std::string& session, const CallOptions& call) override;
+  absl::StatusOr<PointsLeft> RemovePoints(const std::string& session, std::span<const uint64_t> points,
+                                          const CallOptions& call) override;
 
   // transfers.cc
   absl::StatusOr<Uploaded> UploadPoints(const std::string& session, PointSource& source, std::optional<uint64_t> offset,

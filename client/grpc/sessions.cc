@@ -75,6 +75,18 @@ absl::StatusOr<Session> GrpcConnection::UpdateSession(const std::string& session
   return SessionFromProto(response.session());
 }
 
+absl::StatusOr<PointsLeft> GrpcConnection::RemovePoints(const std::string& session, std::span<const uint64_t> points,
+                                                        const CallOptions& call) {
+  v1::RemovePointsRequest request;
+  request.set_name(session);
+  request.mutable_points()->Assign(points.begin(), points.end());
+  request.set_request_id(RequestIdOf(call));
+  request.set_expected_revision(call.expected_revision);
+  v1::RemovePointsResponse response;
+  WELLSPACE_RETURN_IF_ERROR(Call(*sessions_, &v1::SessionService::Stub::RemovePoints, request, call, &response));
+  return PointsLeft{.point_count = response.committed_points(), .revision = response.revision()};
+}
+
 absl::Status GrpcConnection::DeleteSession(const std::string& session, const CallOptions& call) {
   v1::DeleteSessionRequest request;
   request.set_name(session);

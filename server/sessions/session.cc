@@ -22,7 +22,7 @@ Session::Session(Settings settings, const ServiceOptions& options, MemoryBudget&
       labels_(std::move(settings.labels)),
       lease_(settings.ttl, clock_.since_boot()),
       point_account_(name_, dimension_, !log.is_durable(), options, memory, std::move(tenant_points)),
-      points_(log.OpenPoints(name_, dimension_, {})) {}
+      points_(log.OpenPoints(name_, dimension_, points_file_, {})) {}
 
 core::MeshParameters Session::parameters() const {
   std::lock_guard lock(mutex_);
@@ -175,6 +175,8 @@ absl::Status Session::CheckIdleLocked() const {
                        absl::StrCat(operations_.back()->name(), " is under way; wait for its end, or cancel it"));
     case Busy::kAddingVertices:
       return MakeError(v1::ERROR_REASON_SESSION_BUSY, absl::StrCat("vertices are being added to ", name_));
+    case Busy::kRemovingPoints:
+      return MakeError(v1::ERROR_REASON_SESSION_BUSY, absl::StrCat("points are being removed from ", name_));
     case Busy::kReplaying:
       break;
   }
@@ -193,6 +195,12 @@ absl::Status Session::CheckMeshLocked() const {
   if (work_.mesh == nullptr) {
     return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
                      absl::StrCat(name_, " has no mesh yet; start a refinement first"));
+  }
+  if (points_file_ > work_.mesh->revision()) {
+    return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
+                     absl::StrCat("the mesh of ", name_,
+                                  " is the one from before points were removed; it can be downloaded and located in, "
+                                  "and for anything else start a refinement first"));
   }
   if (steps_.empty()) {
     return MakeError(v1::ERROR_REASON_MESH_NOT_READY,

@@ -70,6 +70,12 @@ struct LocatedMesh {
   uint64_t revision = 0;
 };
 
+// What a session has after points were removed.
+struct PointsLeft {
+  uint64_t points = 0;
+  uint64_t revision = 0;  // of the session
+};
+
 // How the work of an operation has ended.
 struct WorkResult {
   absl::Status status;
@@ -78,17 +84,18 @@ struct WorkResult {
 };
 
 // Where its functions are: session.cc: state, lease, queries, what it gives up; session_points.cc: uploads;
-// session_features.cc: segments; session_sizes.cc: sizes at points; session_operations.cc: operations;
-// session_structure.cc: the mesher that is built again, vertices that are added, the locator; session_record.cc: how it
-// is written down, and comes back.
+// session_removal.cc: points that are taken out; session_features.cc: segments; session_sizes.cc: sizes at points;
+// session_operations.cc: operations; session_structure.cc: the mesher that is built again, vertices that are added, the
+// locator; session_record.cc: how it is written down, and comes back.
 //
 // Thread safety: thread-safe.
 // Invariants: (1) revision grows with every change of the points, the features, the sizes or the mesh; (2) while an
-// operation is under way, or vertices are being added or the mesher is built again, points, features, sizes, mesh,
-// mesher and steps are touched by nothing else; (3) what did not succeed leaves the session as it was: structure and
-// mesh are what Replay makes of the steps, whether there is a mesher now or not; (4) the lock order is change_mutex_,
-// this session's mutex, then that of an operation, of TenantPoints or, where memory is released, of the JobPool; (5) no
-// client is told of a change, and nothing shows it, before the log has it; one that it cannot have is not made.
+// operation is under way, or vertices are being added, points removed or the mesher built again, points, features,
+// sizes, mesh, mesher and steps are touched by nothing else; (3) what did not succeed leaves the session as it was:
+// structure and mesh are what Replay makes of the steps, whether there is a mesher now or not; (4) the lock order is
+// change_mutex_, this session's mutex, then that of an operation, of TenantPoints or, where memory is released, of the
+// JobPool; (5) no client is told of a change, and nothing shows it, before the log has it; one that it cannot have is
+// not made.
 // Functions that change the session wait for the log: they are to be called where that holds up no other work.
 class Session {
  public:
@@ -183,6 +190,15 @@ class Session {
   uint64_t UncommittedBytes() const;
   // Points and revision, as one.
   v1::UploadPointsResponse Committed() const;
+
+  // Takes the points with these `numbers` out, and numbers the others anew, in their order: all or, on an error, none.
+  // The structure goes with them: the next refinement begins another one, and until then the mesh is the last one.
+  // `expected_revision` 0: any.
+  //
+  // Complexity: O(points + numbers log numbers), on this thread.
+  // Errors:     INVALID_POINTS, SESSION_BUSY, MEMORY_LIMIT, REVISION_MISMATCH, SESSION_NOT_FOUND; DATA_LOSS.
+  absl::StatusOr<PointsLeft> RemovePoints(std::span<const uint64_t> numbers, uint64_t expected_revision,
+                                          const AnswerTo<PointsLeft>& answer = nullptr);
 
   // Appends the segments and seeds of `request`, of which the first become those of the numbers that it says, and takes
   // over its rules: all or, on an error, none. Where the session has segments and seeds already, they have to be equal,
@@ -317,7 +333,7 @@ class Session {
   friend class StructureUse;
 
   // Which change of the points or the mesh is under way. There is one at most.
-  enum class Busy { kNo, kStarting, kOperation, kAddingVertices, kReplaying };
+  enum class Busy { kNo, kStarting, kOperation, kAddingVertices, kRemovingPoints, kReplaying };
 
   // The following want change_mutex_ to be held.
 
@@ -365,6 +381,8 @@ class Session {
   bool HasUncommittedLocked() const { return PointCountLocked() > committed_points_; }
   // What the revision is when what was appended is committed.
   uint64_t NextRevisionLocked() const { return revision_ + (HasUncommittedLocked() ? 1 : 0); }
+  // Refuses ascending `numbers` that are not all points, or of which segments are made.
+  absl::Status CheckRemovableLocked(std::span<const uint64_t> numbers) const;
   absl::Status CheckOpenLocked() const;
   absl::Status CheckRevisionLocked(uint64_t expected_revision) const;
   absl::Status CheckIdleLocked() const;
@@ -392,6 +410,19 @@ class Session {
 
   // The following are called without mutex_.
 
+  // What RemovePoints does before it copies points; makes the session Busy::kRemovingPoints.
+  absl::Status BeginRemoval(std::span<const uint64_t> numbers, uint64_t expected_revision);
+  // What is left of the points.
+  struct KeptPoints {
+    MemoryReservation memory;           // that the copy takes besides, if it is in memory
+    std::unique_ptr<PointStore> store;  // synchronised
+    uint64_t file = 0;                  // its number
+    uint32_t crc32c = 0;
+  };
+  // `*kept` is what there is of it, on an error too.
+  absl::Status CopyPointsWithout(std::span<const uint64_t> numbers, KeptPoints* kept);
+  // The end of RemovePoints: the session has what is kept from now on.
+  absl::StatusOr<PointsLeft> CommitRemoval(KeptPoints& kept, const AnswerTo<PointsLeft>& answer);
   // Returns `change()`. Where memory has no room for it, it is called once more after idle sessions gave up `bytes`.
   absl::Status RetryWithRoom(uint64_t bytes, const std::function<absl::Status()>& change);
   // Waits for the queries that run. To be called when no other can begin.
@@ -442,6 +473,7 @@ class Session {
   // was not given up; steps_.points() are what Replay makes a mesher of.
   PointAccount point_account_;
   std::unique_ptr<PointStore> points_;  // see invariant (2)
+  uint64_t points_file_ = 0;            // the number of its file
   uint64_t committed_points_ = 0;
   uint32_t uncommitted_crc32c_ = 0;                 // of the points behind the committed ones
   FeatureStore features_;                           // see invariant (2)

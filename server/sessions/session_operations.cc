@@ -36,7 +36,8 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::StartOperation(core::MeshPar
     if (!features_.IsEmpty()) {
       WELLSPACE_RETURN_IF_ERROR(ValidateForDomain(parameters, features_.View()));
     }
-    if (restart && work_.mesh != nullptr && (features_.IsEmpty() || feature_summary_.faces == v1::FACE_RULE_BOX)) {
+    if ((restart || steps_.empty()) && work_.mesh != nullptr &&
+        (features_.IsEmpty() || feature_summary_.faces == v1::FACE_RULE_BOX)) {
       // The box does not change with the points that have come since.
       parameters.domain_low = work_.mesh->figures().domain_low;
       parameters.domain_high = work_.mesh->figures().domain_high;

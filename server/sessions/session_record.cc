@@ -21,11 +21,14 @@ absl::StatusOr<Session::Settings> SettingsOf(const store::v1::SessionRecord& sta
                            .create_time = absl::FromUnixNanos(state.create_time_ns())};
 }
 
-// The steps that the structure is made of; none, if another version of the core has made them.
+// The steps that the structure is made of; none, if another version of the core has made them, or points were removed
+// since.
 absl::StatusOr<SessionSteps> StepsOf(const std::vector<store::v1::StepRecord>& records) {
   SessionSteps steps;
   for (const store::v1::StepRecord& record : records) {
-    if (record.has_refined()) {
+    if (record.has_removed()) {
+      steps = SessionSteps();
+    } else if (record.has_refined()) {
       const store::v1::StepRecord::Refined& refined = record.refined();
       if (refined.begins()) {
         steps = SessionSteps();
@@ -44,7 +47,9 @@ absl::StatusOr<SessionSteps> StepsOf(const std::vector<store::v1::StepRecord>& r
 std::vector<store::v1::StepRecord::Points> PointsOf(const std::vector<store::v1::StepRecord>& records) {
   std::vector<store::v1::StepRecord::Points> points;
   for (const store::v1::StepRecord& record : records) {
-    if (record.has_points()) {
+    if (record.has_removed()) {
+      points.clear();
+    } else if (record.has_points()) {
       points.push_back(record.points());
     }
   }
@@ -78,7 +83,8 @@ void Session::SetState(const StoredSession& stored) {
   revision_ = state.revision();
   is_ready_ = state.is_ready();
   committed_points_ = state.points();
-  points_ = log_.OpenPoints(name_, dimension_, PointsOf(stored.steps));
+  points_file_ = state.points_file();
+  points_ = log_.OpenPoints(name_, dimension_, points_file_, PointsOf(stored.steps));
   feature_summary_ = {.segments = state.segments(),
                       .seeds = state.seeds(),
                       .has_rules = state.has_rules(),
@@ -115,6 +121,7 @@ store::v1::SessionRecord Session::RecordLocked() const {
   record.set_ttl_ns(absl::ToInt64Nanoseconds(lease_.ttl()));
   record.set_revision(revision_);
   record.set_points(committed_points_);
+  record.set_points_file(points_file_);
   SetFeatures(feature_summary_, record);
   record.set_sizes(sizes_in_use_.number);
   record.set_size_count(sizes_in_use_.count);

@@ -43,7 +43,9 @@ absl::Status CopyFiles(FileSystem& files, const DataPaths& from, const DataPaths
                        const store::v1::SessionRecord& session) {
   if (session.points() > 0) {
     const uint64_t size = session.points() * session.parameters().dimension() * sizeof(double);
-    WELLSPACE_RETURN_IF_ERROR(CopyFile(files, from.points(session.name()), to.points(session.name()), size));
+    const uint64_t number = session.points_file();
+    WELLSPACE_RETURN_IF_ERROR(
+        CopyFile(files, from.points(session.name(), number), to.points(session.name(), number), size));
   }
   if (!session.has_mesh()) {
     return absl::OkStatus();

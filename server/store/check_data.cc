@@ -48,6 +48,10 @@ class SessionCheck {
     std::vector<store::v1::StepRecord::Points> committed;
     uint64_t points = 0;
     for (const store::v1::StepRecord& step : session_.steps) {
+      if (step.has_removed()) {
+        committed.clear();
+        points = 0;
+      }
       if (step.has_points()) {
         if (step.points().first() != points) {
           Add("points ", step.points().first(), " come behind ", points);
@@ -60,8 +64,9 @@ class SessionCheck {
       Add("there are ", state_.points(), " points, and ", points, " in its steps");
       return;
     }
-    const PointFile file(files_, std::make_shared<StoreHealth>(nullptr), paths_.points(state_.name()),
-                         state_.parameters().dimension(), std::move(committed));
+    const PointFile file(files_, std::make_shared<StoreHealth>(nullptr),
+                         paths_.points(state_.name(), state_.points_file()), state_.parameters().dimension(),
+                         std::move(committed));
     Add(file.Checksum(0, file.coordinate_count()).status());
   }
 
@@ -104,7 +109,7 @@ class SessionCheck {
     // Those before the structure began anew are not needed any more.
     std::map<uint64_t, uint64_t> needed;
     for (const store::v1::StepRecord& step : session_.steps) {
-      if (step.refined().begins()) {
+      if (step.refined().begins() || step.has_removed()) {
         needed.clear();
       }
       needed[step.refined().sizes()] = step.refined().size_count();

@@ -47,8 +47,9 @@ absl::Status WithAdvice(const absl::Status& status) {
 
 }  // namespace
 
-std::string DataPaths::points(const std::string& session) const {
-  return absl::StrCat(files(), "/", StemOf(session), std::string(kPoints));
+std::string DataPaths::points(const std::string& session, uint64_t number) const {
+  const std::string first = absl::StrCat(files(), "/", StemOf(session), std::string(kPoints));
+  return number == 0 ? first : absl::StrCat(first, "-", number);
 }
 
 std::string DataPaths::mesh(const std::string& session, uint64_t revision) const {
@@ -71,6 +72,10 @@ bool IsNameOfOurs(const std::string& name) {
   if (end == kPoints) {
     return true;
   }
+  if (end.starts_with(kPoints)) {
+    end.remove_prefix(kPoints.size());
+    return end.starts_with('-') && HasOnly(end.substr(1), kDigits);
+  }
   if (!end.starts_with(kMesh)) {
     return false;
   }
@@ -84,7 +89,7 @@ bool IsNameOfOurs(const std::string& name) {
 std::vector<std::string> FilesOf(const DataPaths& paths, const store::v1::SessionRecord& session) {
   std::vector<std::string> named;
   if (session.points() > 0) {
-    named.push_back(paths.points(session.name()));
+    named.push_back(paths.points(session.name(), session.points_file()));
   }
   if (session.has_mesh()) {
     named.push_back(paths.mesh(session.name(), session.mesh().revision()));
@@ -152,7 +157,7 @@ absl::StatusOr<Garbage> DataFolder::RemoveGarbage(
   // After that, so that what has come to be named meanwhile is seen.
   WELLSPACE_ASSIGN_OR_RETURN(const std::vector<store::v1::SessionRecord> sessions, read_sessions());
   for (const store::v1::SessionRecord& session : sessions) {
-    candidates.erase(paths_.points(session.name()));  // points may be on their way
+    candidates.erase(paths_.points(session.name(), session.points_file()));  // points may be on their way
     candidates.erase(paths_.mesh(session.name(), session.mesh().revision()));
   }
   std::set<std::string> obsolete;

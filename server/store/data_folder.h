@@ -5,6 +5,7 @@
 //   sessions.db       and -wal, -shm beside it: the database (SessionTables)
 //   files/            points and meshes of sessions
 //     ID.points         the points, as they came (PointFile)
+//     ID.points-NUMBER  those that are left since points were removed
 //     ID.mesh-REVISION  the mesh at a revision (MeshFile); with .tmp behind it, one that is being written
 #ifndef WELLSPACE_SERVER_STORE_DATA_FOLDER_H_
 #define WELLSPACE_SERVER_STORE_DATA_FOLDER_H_
@@ -37,8 +38,8 @@ struct DataPaths {
   std::string back_up_lock() const { return root + "/back-up.lock"; }
   std::string database() const { return root + "/sessions.db"; }
   std::string files() const { return root + "/files"; }
-  // `session`: its name.
-  std::string points(const std::string& session) const;
+  // `session`: its name. `number`: that of its points file (SessionRecord.points_file).
+  std::string points(const std::string& session, uint64_t number) const;
   std::string mesh(const std::string& session, uint64_t revision) const;
 };
 

@@ -68,7 +68,7 @@ absl::Status DurableLog::Commit(const SessionChange& change, Survives survives) 
     if (state.has_value()) {
       files_of_deleted = FilesOf(folder_->paths(), *state);
       // There may be some that were not committed.
-      files_of_deleted.push_back(folder_->paths().points(change.session));
+      files_of_deleted.push_back(folder_->paths().points(change.session, state->points_file()));
     }
   }
   WELLSPACE_RETURN_IF_ERROR(Enqueue(change, survives));
@@ -168,10 +168,17 @@ void DurableLog::Forget(std::span<const AnswerKey> answers) {
   forgotten_.insert(forgotten_.end(), answers.begin(), answers.end());
 }
 
-std::unique_ptr<PointStore> DurableLog::OpenPoints(const std::string& session, int dimension,
+std::unique_ptr<PointStore> DurableLog::OpenPoints(const std::string& session, int dimension, uint64_t number,
                                                    std::vector<store::v1::StepRecord::Points> committed) {
-  return std::make_unique<PointFile>(files_, health_, folder_->paths().points(session), dimension,
-                                     std::move(committed));
+  std::string path = folder_->paths().points(session, number);
+  // A file that no change names yet is not garbage.
+  std::unique_ptr<FilesInUse::Use> use =
+      number != 0 && committed.empty() ? in_use_->Take(path, /*is_written=*/true) : nullptr;
+  return std::make_unique<PointFile>(files_, health_, std::move(path), dimension, std::move(committed), std::move(use));
+}
+
+void DurableLog::DropPoints(const std::string& session, uint64_t number) {
+  in_use_->Remove(folder_->paths().points(session, number));
 }
 
 absl::StatusOr<std::shared_ptr<MeshSnapshot>> DurableLog::KeepMesh(const std::string& session, uint64_t revision,

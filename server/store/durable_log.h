@@ -52,8 +52,9 @@ class DurableLog final : public SessionLog {
   absl::StatusOr<std::vector<StoredSizes>> ReadSizes(const std::string& session) override {
     return tables_->ReadSizes(session);
   }
-  std::unique_ptr<PointStore> OpenPoints(const std::string& session, int dimension,
+  std::unique_ptr<PointStore> OpenPoints(const std::string& session, int dimension, uint64_t number,
                                          std::vector<store::v1::StepRecord::Points> committed) override;
+  void DropPoints(const std::string& session, uint64_t number) override;
   absl::StatusOr<std::shared_ptr<MeshSnapshot>> KeepMesh(const std::string& session, uint64_t revision, core::Mesh mesh,
                                                          const core::RunContext& context) override;
   std::shared_ptr<MeshSnapshot> FindMesh(const std::string& session, const store::v1::SessionRecord& record) override;

@@ -27,10 +27,11 @@ class EphemeralLog : public SessionLog {
   absl::StatusOr<std::vector<StoredSizes>> ReadSizes(const std::string& /*session*/) override {
     return std::vector<StoredSizes>();
   }
-  std::unique_ptr<PointStore> OpenPoints(const std::string& /*session*/, int /*dimension*/,
+  std::unique_ptr<PointStore> OpenPoints(const std::string& /*session*/, int /*dimension*/, uint64_t /*number*/,
                                          std::vector<store::v1::StepRecord::Points> /*committed*/) override {
     return std::make_unique<MemoryPoints>();
   }
+  void DropPoints(const std::string& /*session*/, uint64_t /*number*/) override {}
   absl::StatusOr<std::shared_ptr<MeshSnapshot>> KeepMesh(const std::string& /*session*/, uint64_t revision,
                                                          core::Mesh mesh,
                                                          const core::RunContext& /*context*/) override {

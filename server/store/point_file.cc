@@ -25,8 +25,8 @@ absl::Status Damaged(const std::string& path, const std::string& what) {
 }  // namespace
 
 PointFile::PointFile(FileSystem& files, std::shared_ptr<StoreHealth> health, std::string path, int dimension,
-                     std::vector<store::v1::StepRecord::Points> committed)
-    : files_(files), health_(std::move(health)), path_(std::move(path)) {
+                     std::vector<store::v1::StepRecord::Points> committed, std::unique_ptr<FilesInUse::Use> use)
+    : files_(files), health_(std::move(health)), path_(std::move(path)), use_(std::move(use)) {
   for (const store::v1::StepRecord::Points& points : committed) {
     const uint64_t count = points.count() * dimension;
     pieces_.push_back({.first = committed_count_, .end = committed_count_ + count, .crc32c = points.crc32c()});

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "server/store/file_system.h"
+#include "server/store/files_in_use.h"
 #include "server/store/point_store.h"
 #include "server/store/store_health.h"
 #include "wellspace/store/v1/records.pb.h"
@@ -23,9 +24,10 @@ namespace wellspace::server {
 //             of an upload that broke off.
 class PointFile final : public PointStore {
  public:
-  // `committed`: one behind the other, from point 0 on; their checksums are looked at when they are first read.
+  // `committed`: one behind the other, from point 0 on; their checksums are looked at when they are first read. `use`
+  // lasts as long as this.
   PointFile(FileSystem& files, std::shared_ptr<StoreHealth> health, std::string path, int dimension,
-            std::vector<store::v1::StepRecord::Points> committed);
+            std::vector<store::v1::StepRecord::Points> committed, std::unique_ptr<FilesInUse::Use> use = nullptr);
 
   bool is_in_memory() const override { return false; }
   uint64_t coordinate_count() const override { return coordinate_count_; }
@@ -61,7 +63,8 @@ class PointFile final : public PointStore {
   FileSystem& files_;
   const std::shared_ptr<StoreHealth> health_;
   const std::string path_;
-  uint64_t committed_count_ = 0;  // coordinates, when this was opened
+  const std::unique_ptr<FilesInUse::Use> use_;  // or null
+  uint64_t committed_count_ = 0;                // coordinates, when this was opened
   uint64_t coordinate_count_ = 0;
   bool is_cut_ = false;  // what was beyond the committed pieces is gone
 

@@ -101,9 +101,13 @@ class SessionLog {
   // Errors:     DATA_LOSS.
   virtual absl::StatusOr<std::vector<StoredSizes>> ReadSizes(const std::string& session) = 0;
 
-  // The points of a session of `dimension`, of which `committed` are there.
-  virtual std::unique_ptr<PointStore> OpenPoints(const std::string& session, int dimension,
+  // The points of a session of `dimension`, of which `committed` are there. `number` is that of their file
+  // (SessionRecord.points_file). What is appended to a new file before a change names it ends with the process.
+  virtual std::unique_ptr<PointStore> OpenPoints(const std::string& session, int dimension, uint64_t number,
                                                  std::vector<store::v1::StepRecord::Points> committed) = 0;
+
+  // Removes the points file that `session` has no more, or that it has not come to have.
+  virtual void DropPoints(const std::string& session, uint64_t number) = 0;
 
   // Keeps `mesh` as that of `revision`: when it returns, what it has written outlives a loss of power. Until a change
   // names it (SessionRecord.mesh) it ends with the process all the same.

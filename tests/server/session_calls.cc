@@ -103,6 +103,10 @@ v1::ListSessionsResponse SessionCalls::List(const v1::ListSessionsRequest& reque
   return Call(*sessions_, &v1::SessionService::Stub::ListSessions, request, status);
 }
 
+v1::RemovePointsResponse SessionCalls::RemovePoints(const v1::RemovePointsRequest& request, grpc::Status* status) {
+  return Call(*sessions_, &v1::SessionService::Stub::RemovePoints, request, status);
+}
+
 v1::Session SessionCalls::Update(const v1::UpdateSessionRequest& request, grpc::Status* status) {
   return Call(*sessions_, &v1::SessionService::Stub::UpdateSession, request, status).session();
 }

@@ -61,6 +61,7 @@ class SessionCalls {
   v1::Session Get(const std::string& name, grpc::Status* status = nullptr);
   v1::ListSessionsResponse List(const v1::ListSessionsRequest& request, grpc::Status* status = nullptr);
   v1::Session Update(const v1::UpdateSessionRequest& request, grpc::Status* status = nullptr);
+  v1::RemovePointsResponse RemovePoints(const v1::RemovePointsRequest& request, grpc::Status* status = nullptr);
   void Delete(const v1::DeleteSessionRequest& request, grpc::Status* status = nullptr);
   void Delete(const std::string& name, grpc::Status* status = nullptr);
   // One stream of these requests.

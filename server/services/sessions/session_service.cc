@@ -110,6 +110,25 @@ absl::Status Delete(const CallEnvironment& environment, const Caller& caller, co
   return absl::OkStatus();
 }
 
+absl::Status Remove(const CallEnvironment& environment, const Caller& caller, const v1::RemovePointsRequest& request,
+                    const IdentifiedRequest& identified, v1::RemovePointsResponse& response) {
+  WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, FindSession(environment, caller, request.name()));
+  const SessionUse use(session);
+  const auto set_response = [&](const PointsLeft& left) {
+    response.set_committed_points(left.points);
+    response.set_revision(left.revision);
+  };
+  const std::vector<uint64_t> numbers(request.points().begin(), request.points().end());
+  const auto answer = [&](const PointsLeft& left) {
+    set_response(left);
+    return identified.Answer(response);
+  };
+  WELLSPACE_ASSIGN_OR_RETURN(const PointsLeft left,
+                             session->RemovePoints(numbers, request.expected_revision(), answer));
+  set_response(left);
+  return absl::OkStatus();
+}
+
 absl::Status Get(const CallEnvironment& environment, const Caller& caller, const v1::GetSessionRequest& request,
                  v1::Session* found) {
   WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<Session> session, FindSession(environment, caller, request.name()));
@@ -167,6 +186,15 @@ grpc::ServerUnaryReactor* SessionService::DeleteSession(grpc::CallbackServerCont
 grpc::ServerReadReactor<grpc::ByteBuffer>* SessionService::UploadPoints(grpc::CallbackServerContext* context,
                                                                         grpc::ByteBuffer* response) {
   return UploadPointsCall::Begin(std::make_shared<UploadPointsCall>(environment_, context, response));
+}
+
+grpc::ServerUnaryReactor* SessionService::RemovePoints(grpc::CallbackServerContext* context,
+                                                       const v1::RemovePointsRequest* request,
+                                                       v1::RemovePointsResponse* response) {
+  return UnaryCall::ServeOnce(
+      environment_, context, request, response, request->name(),
+      [this](const Caller& caller, const v1::RemovePointsRequest& own, const IdentifiedRequest& identified,
+             v1::RemovePointsResponse& answer) { return Remove(environment_, caller, own, identified, answer); });
 }
 
 grpc::ServerReadReactor<grpc::ByteBuffer>* SessionService::AddSegments(grpc::CallbackServerContext* context,

@@ -30,6 +30,8 @@ class SessionService final
                                           v1::DeleteSessionResponse* response) override;
   grpc::ServerReadReactor<grpc::ByteBuffer>* UploadPoints(grpc::CallbackServerContext* context,
                                                           grpc::ByteBuffer* response) override;
+  grpc::ServerUnaryReactor* RemovePoints(grpc::CallbackServerContext* context, const v1::RemovePointsRequest* request,
+                                         v1::RemovePointsResponse* response) override;
   grpc::ServerReadReactor<grpc::ByteBuffer>* AddSegments(grpc::CallbackServerContext* context,
                                                          grpc::ByteBuffer* response) override;
   grpc::ServerReadReactor<grpc::ByteBuffer>* SetSizes(grpc::CallbackServerContext* context,

@@ -57,6 +57,7 @@ struct FakeSessions final : v1::SessionService::Service {
   Unary<v1::GetSessionRequest, v1::GetSessionResponse> get;
   Unary<v1::ListSessionsRequest, v1::ListSessionsResponse> list;
   Unary<v1::UpdateSessionRequest, v1::UpdateSessionResponse> update;
+  Unary<v1::RemovePointsRequest, v1::RemovePointsResponse> remove_points;
   Unary<v1::DeleteSessionRequest, v1::DeleteSessionResponse> remove;
   std::function<grpc::Status(grpc::ServerContext&, grpc::ServerReader<v1::UploadPointsRequest>&,
                              v1::UploadPointsResponse&)>
@@ -79,6 +80,10 @@ struct FakeSessions final : v1::SessionService::Service {
   grpc::Status ListSessions(grpc::ServerContext* /*context*/, const v1::ListSessionsRequest* request,
                             v1::ListSessionsResponse* response) override {
     return list(*request, *response);
+  }
+  grpc::Status RemovePoints(grpc::ServerContext* /*context*/, const v1::RemovePointsRequest* request,
+                            v1::RemovePointsResponse* response) override {
+    return remove_points(*request, *response);
   }
   grpc::Status UpdateSession(grpc::ServerContext* /*context*/, const v1::UpdateSessionRequest* request,
                              v1::UpdateSessionResponse* response) override {

@@ -152,6 +152,29 @@ TEST(Sessions, GetListUpdateDelete) {
   EXPECT_TRUE(client.DeleteSession(kSession, call).ok());
 }
 
+TEST(Sessions, PointsAreRemovedByTheirNumbers) {
+  FakeServer server;
+  std::vector<v1::RemovePointsRequest> requests;
+  server.sessions.remove_points = [&](const v1::RemovePointsRequest& request, v1::RemovePointsResponse& response) {
+    requests.push_back(request);
+    response.set_committed_points(8);
+    response.set_revision(10);
+    return grpc::Status::OK;
+  };
+  CallOptions call;
+  call.expected_revision = 9;
+  const std::vector<uint64_t> points = {7, 3};
+  const absl::StatusOr<PointsLeft> left = server.Client().RemovePoints(kSession, points, call);
+  ASSERT_TRUE(left.ok()) << left.status();
+  EXPECT_EQ(left->point_count, 8u);
+  EXPECT_EQ(left->revision, 10u);
+  ASSERT_THAT(requests, SizeIs(1));
+  EXPECT_EQ(requests[0].name(), kSession);
+  EXPECT_THAT(requests[0].points(), ElementsAre(7, 3));
+  EXPECT_EQ(requests[0].expected_revision(), 9u);
+  EXPECT_FALSE(requests[0].request_id().empty()) << "repeated after a broken connection, it is to remove once";
+}
+
 v1::Operation MakeOperation(v1::Operation::State state) {
   v1::Operation operation;
   operation.set_name(kOperation);

@@ -43,6 +43,8 @@ class AioTest(unittest.IsolatedAsyncioTestCase, Case):
             self.assertEqual((await session.refine()).state, "succeeded")
             mesh = await session.download()
             vertices = await session.add([[0.5, 0.5]])
+            left = await session.remove([0])
+            self.assertEqual(left, (await session.info()).point_count)
             self.assertEqual(list(vertices), [len(mesh.points)])
             started = await session.start_refinement()
             self.assertEqual((await session.watch(started.name)).state, "succeeded")

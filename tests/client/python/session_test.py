@@ -53,6 +53,25 @@ class SessionTest(Case):
         with self.fails(NotFoundError, "", reason="SESSION_NOT_FOUND"):
             session.info()
 
+    def test_points_are_removed_by_the_numbers_of_their_vertices(self):
+        points, more = uniform(300, 2), uniform(30, 2, seed=2)
+        with wellspace.Session(2, box=unit_box(2)) as session:
+            session.upload(points)
+            session.refine()
+            vertices = session.add(more)
+            session.refine()
+            mesh = session.download()
+            self.assertEqual(session.remove(mesh.vertex_origins[vertices[:20]]), 310)
+            self.assertEqual(session.info().state, "open")
+            session.refine()
+            left = session.download()
+            self.assertEqual(left.points[:310].tolist(), np.concatenate([points, more[20:]]).tolist())
+            with self.fails(InvalidArgumentError, "points has 310, and no", reason="INVALID_POINTS", field="points"):
+                session.remove([310])
+            with self.fails(InvalidArgumentError, "points: an array of float64", field="points"):
+                session.remove([0.5])
+            self.assertEqual(session.remove([]), 310)
+
     def test_parameters_stay_unless_they_are_named(self):
         with wellspace.Session(2, box=unit_box(2), rho=2) as session:
             session.upload(uniform(200, 2))

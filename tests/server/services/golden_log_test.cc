@@ -60,10 +60,11 @@ class OtherMeshesLog final : public SessionLog {
   absl::StatusOr<std::vector<StoredSizes>> ReadSizes(const std::string& session) override {
     return log_->ReadSizes(session);
   }
-  std::unique_ptr<PointStore> OpenPoints(const std::string& session, int dimension,
+  std::unique_ptr<PointStore> OpenPoints(const std::string& session, int dimension, uint64_t number,
                                          std::vector<store::v1::StepRecord::Points> committed) override {
-    return log_->OpenPoints(session, dimension, std::move(committed));
+    return log_->OpenPoints(session, dimension, number, std::move(committed));
   }
+  void DropPoints(const std::string& session, uint64_t number) override { log_->DropPoints(session, number); }
   absl::StatusOr<std::shared_ptr<MeshSnapshot>> KeepMesh(const std::string& session, uint64_t revision, core::Mesh mesh,
                                                          const core::RunContext& context) override {
     return log_->KeepMesh(session, revision, std::move(mesh), context);

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <thread>
 #include <utility>
@@ -33,10 +34,11 @@ constexpr int kVariations = WELLSPACE_VARIATIONS;
 
 // A step of a life.
 struct LifeStep {
-  enum class Kind { kUpload, kRefine, kAdd, kSetSizes } kind = Kind::kUpload;
-  std::vector<double> points{};  // of all but kRefine
+  enum class Kind { kUpload, kRefine, kAdd, kSetSizes, kRemove } kind = Kind::kUpload;
+  std::vector<double> points{};  // of kUpload, kAdd and kSetSizes
   double size = 0;               // of kRefine
   bool restart = false;          // of kRefine
+  uint64_t one_of = 0;           // of kRemove: one point of so many goes
 };
 
 struct Life {
@@ -62,7 +64,7 @@ Life DrawLife(test::SplitMix64& random) {
   upload();
   refine();
   for (uint64_t i = 2 + random.Below(4); i > 0; --i) {
-    switch (random.Below(5)) {
+    switch (random.Below(6)) {
       case 0:
         upload();
         break;
@@ -75,6 +77,10 @@ Life DrawLife(test::SplitMix64& random) {
       case 3:
         life.steps.push_back(
             {.kind = LifeStep::Kind::kSetSizes, .points = DrawPoints(random, random.Below(4), life.dimension)});
+        break;
+      case 4:
+        life.steps.push_back({.kind = LifeStep::Kind::kRemove, .one_of = 2 + random.Below(8)});
+        refine();  // nothing can be added before
         break;
       default:
         life.steps.push_back(
@@ -142,6 +148,9 @@ class Living {
         case LifeStep::Kind::kAdd:
           Add(step.points);
           break;
+        case LifeStep::Kind::kRemove:
+          Remove(step.one_of);
+          break;
       }
     }
     Disturb();
@@ -190,7 +199,7 @@ class Living {
       what_ += " give-up";
       (void)session_->GiveUpMesher();  // nothing, where it has none
     }
-    if (session_->mesh() != nullptr && Draw(4)) {
+    if (has_structure_ && Draw(4)) {
       what_ += " query";
       EXPECT_TRUE(process_->Work([&](Job& job) { return Query(job); }).ok());
     }
@@ -255,6 +264,25 @@ class Living {
     EXPECT_TRUE(session_->SetSizes(samples, 0).ok());
   }
 
+  // All points at once, or the last of them first.
+  void Remove(uint64_t one_of) {
+    std::vector<uint64_t> numbers;
+    for (uint64_t i = 0; i < session_->Committed().committed_points(); i += one_of) {
+      numbers.push_back(i);
+    }
+    const uint64_t first = random_ == nullptr ? 0 : random_->Below(numbers.size() + 1);
+    const std::span<const uint64_t> all(numbers);
+    for (const std::span<const uint64_t> part : {all.subspan(first), all.first(first)}) {
+      const absl::StatusOr<PointsLeft> left = session_->RemovePoints(part, 0);
+      EXPECT_TRUE(left.ok()) << left.status();
+      has_structure_ &= part.empty();
+      if (Draw(3)) {
+        what_ += " restart-of-removal";
+        Restart();
+      }
+    }
+  }
+
   void Refine(double size, bool restart) {
     std::shared_ptr<Operation> operation =
         StartRefinement(process_->environment(), session_, Parameters(size), restart, 0).value();
@@ -266,6 +294,7 @@ class Living {
       operation = session_->FindOperation(name).value();
     }
     EXPECT_EQ(End(*operation), v1::Operation::STATE_SUCCEEDED) << operation->Describe().error().message();
+    has_structure_ = true;
   }
 
   void Add(const std::vector<double>& points) {
@@ -291,6 +320,7 @@ class Living {
   const TestFolder folder_;
   std::optional<Process> process_;
   std::shared_ptr<Session> session_;
+  bool has_structure_ = false;  // that can be queried
   std::string what_;
 };
 

@@ -83,7 +83,7 @@ TEST_F(BackUpTest, AServerStartsOnTheCopy) {
   const auto log = *DurableLog::Open({.folder = from_});
   for (uint64_t number = 1; number <= 3; ++number) {
     ASSERT_TRUE(log->Commit({.session = SessionName(number), .state = MakeState(number)}).ok());
-    const auto points = log->OpenPoints(SessionName(number), 3, {});
+    const auto points = log->OpenPoints(SessionName(number), 3, 0, {});
     std::shared_ptr<MeshSnapshot> mesh;
     for (uint64_t revision = 1; revision <= number; ++revision) {
       ASSERT_TRUE(Change(*log, number, revision, *points, mesh).ok());
@@ -115,7 +115,7 @@ TEST_F(BackUpTest, IsOfOneMomentWhateverAServerDoesMeanwhile) {
     writers.emplace_back([&, writer] {
       for (uint64_t number = writer; !is_over; number += 2) {
         failed += log->Commit({.session = SessionName(number), .state = MakeState(number)}).ok() ? 0 : 1;
-        const auto points = log->OpenPoints(SessionName(number), 3, {});
+        const auto points = log->OpenPoints(SessionName(number), 3, 0, {});
         std::shared_ptr<MeshSnapshot> mesh;
         for (uint64_t revision = 1; revision < 10; ++revision) {
           failed += Change(*log, number, revision, *points, mesh).ok() ? 0 : 1;
@@ -145,7 +145,7 @@ TEST_F(BackUpTest, AServerRemovesNothingMeanwhile) {
   const auto log = *DurableLog::Open({.folder = from_});
   std::shared_ptr<MeshSnapshot> mesh;
   ASSERT_TRUE(log->Commit({.session = SessionName(1), .state = MakeState(1)}).ok());
-  const auto points = log->OpenPoints(SessionName(1), 3, {});
+  const auto points = log->OpenPoints(SessionName(1), 3, 0, {});
   ASSERT_TRUE(Change(*log, 1, 1, *points, mesh).ok());
   {
     const auto back_up = PosixFileSystem().Lock(DataPaths{from_}.back_up_lock());
@@ -181,7 +181,7 @@ TEST_F(BackUpTest, WantsAFolderOfItsOwn) {
 TEST_F(BackUpTest, SaysThatTheFolderIsNotWhole) {
   const auto log = *DurableLog::Open({.folder = from_});
   ASSERT_TRUE(log->Commit({.session = SessionName(1), .state = MakeState(1)}).ok());
-  const auto points = log->OpenPoints(SessionName(1), 3, {});
+  const auto points = log->OpenPoints(SessionName(1), 3, 0, {});
   std::shared_ptr<MeshSnapshot> mesh;
   ASSERT_TRUE(Change(*log, 1, 1, *points, mesh).ok());
   FlipBit(from_ + "/files/00000001.points", 3, 3);

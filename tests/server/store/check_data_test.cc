@@ -32,7 +32,7 @@ class CheckDataTest : public ::testing::Test {
     const std::vector<double> points = {1, 2, 3, 4, 5, static_cast<double>(number)};
     SessionChange change{.session = SessionName(number), .state = MakeState(number, 1)};
     ASSERT_TRUE(log.Commit(change).ok());
-    const auto store = log.OpenPoints(change.session, 3, {});
+    const auto store = log.OpenPoints(change.session, 3, 0, {});
     ASSERT_TRUE(store->Append(points).ok());
     ASSERT_TRUE(store->Append(points).ok());
     ASSERT_TRUE(store->Synchronize().ok());

@@ -51,14 +51,16 @@ TEST_F(DataFolderTest, IsNoFile) {
 }
 
 TEST_F(DataFolderTest, FilesHaveTheirSessionsNames) {
-  EXPECT_EQ(paths_.points("sessions/01ef"), root_ + "/files/01ef.points");
+  EXPECT_EQ(paths_.points("sessions/01ef", 0), root_ + "/files/01ef.points");
   EXPECT_EQ(paths_.mesh("sessions/01ef", 12), root_ + "/files/01ef.mesh-12");
-  EXPECT_EQ(paths_.points("sessions/../x"), root_ + "/files/x73657373696f6e732f2e2e2f78.points");
-  for (const char* name : {"01ef.points", "x73.points", "01ef.mesh-12", "01ef.mesh-12.tmp"}) {
+  EXPECT_EQ(paths_.points("sessions/../x", 0), root_ + "/files/x73657373696f6e732f2e2e2f78.points");
+  EXPECT_EQ(paths_.points("sessions/01ef", 12), root_ + "/files/01ef.points-12");
+  for (const char* name : {"01ef.points", "x73.points", "01ef.points-12", "01ef.mesh-12", "01ef.mesh-12.tmp"}) {
     EXPECT_TRUE(IsNameOfOurs(name)) << name;
   }
-  for (const char* name : {"", "01ef", ".points", "x.points", "01eF.points", "01ef.points.tmp", "01ef.mesh-",
-                           "notes.txt", "01ef.mesh-1x", "01ef.mesh-.tmp", "01ef.mesh-1.tmp.tmp", "g.points"}) {
+  for (const char* name : {"", "01ef", ".points", "x.points", "01eF.points", "01ef.points.tmp", "01ef.points-",
+                           "01ef.points-x", "01ef.points12", "01ef.mesh-", "notes.txt", "01ef.mesh-1x",
+                           "01ef.mesh-.tmp", "01ef.mesh-1.tmp.tmp", "g.points"}) {
     EXPECT_FALSE(IsNameOfOurs(name)) << name;
   }
 }

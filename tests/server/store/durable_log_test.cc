@@ -41,7 +41,7 @@ TEST_F(DurableLogTest, ASessionOutlivesIt) {
     EXPECT_TRUE(log->is_durable());
     EXPECT_THAT(log->Load()->sessions, IsEmpty());
     ASSERT_TRUE(log->Commit({.session = SessionName(1), .state = MakeState(1)}).ok());
-    const auto store = log->OpenPoints(SessionName(1), 3, {});
+    const auto store = log->OpenPoints(SessionName(1), 3, 0, {});
     ASSERT_TRUE(store->Append(points).ok());
     ASSERT_TRUE(store->Synchronize().ok());
     const auto kept = log->KeepMesh(SessionName(1), 2, mesh, core::RunContext());
@@ -57,7 +57,7 @@ TEST_F(DurableLogTest, ASessionOutlivesIt) {
   ASSERT_TRUE(stored.ok()) << stored.status();
   EXPECT_EQ(TextOf(*stored), before);
   const StoredSession& session = stored->sessions.at(0);
-  const auto store = log->OpenPoints(SessionName(1), 3, {session.steps.at(0).points()});
+  const auto store = log->OpenPoints(SessionName(1), 3, 0, {session.steps.at(0).points()});
   EXPECT_EQ(*store->CopyFrom(0, core::RunContext()), points);
   EXPECT_EQ(*DownloadOf(*log->FindMesh(SessionName(1), session.state), true), *DownloadOf(MemoryMesh(2, mesh), true));
   EXPECT_EQ(log->FindMesh(SessionName(2), MakeState(2)), nullptr);
@@ -109,7 +109,7 @@ TEST_F(DurableLogTest, ManyCommitAtOnce) {
 TEST_F(DurableLogTest, ADeletionTakesTheFiles) {
   const auto log = Open();
   ASSERT_TRUE(log->Commit({.session = SessionName(1), .state = MakeState(1)}).ok());
-  const auto store = log->OpenPoints(SessionName(1), 3, {});
+  const auto store = log->OpenPoints(SessionName(1), 3, 0, {});
   ASSERT_TRUE(store->Append(std::vector<double>{1, 2, 3}).ok());
   auto mesh = *log->KeepMesh(SessionName(1), 1, MakeMesh({}), core::RunContext());
   store::v1::SessionRecord state = MakeState(1, 1);

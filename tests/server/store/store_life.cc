@@ -123,6 +123,8 @@ absl::Status StoreLife::Do(Action action, uint64_t number) {
       return Create(number);
     case Action::kUpload:
       return Upload(number);
+    case Action::kRemove:
+      return Remove(number);
     case Action::kSucceed:
       return Succeed(number);
     default:
@@ -140,7 +142,7 @@ absl::Status StoreLife::Create(uint64_t number) {
   next.sessions[number].state = *change.state;
   next.answers[{"tenant", change.answer->request_id()}] = *change.answer;
   WELLSPACE_RETURN_IF_ERROR(Commit(std::move(change), std::move(next)));
-  open_[number].points = log_->OpenPoints(SessionName(number), 3, {});
+  open_[number].points = log_->OpenPoints(SessionName(number), 3, 0, {});
   return absl::OkStatus();
 }
 
@@ -180,6 +182,46 @@ absl::Status StoreLife::Upload(uint64_t number) {
   if (!status.ok()) {
     store.Truncate(before * 3);
   }
+  return status;
+}
+
+absl::Status StoreLife::Remove(uint64_t number) {
+  LifeState next = state();
+  LifeState::Session& session = next.sessions.at(number);
+  uint64_t file = salt_;
+  std::unique_ptr<PointStore> store = log_->OpenPoints(SessionName(number), 3, file, {});
+  std::vector<double> kept;
+  for (size_t i = 0; i < session.points.size(); i += 3) {
+    if (i / 3 % 4 != salt_ % 4) {
+      kept.insert(kept.end(), session.points.begin() + i, session.points.begin() + i + 3);
+    }
+  }
+  const auto make = [&]() -> absl::Status {
+    WELLSPACE_RETURN_IF_ERROR(store->Append(kept));
+    WELLSPACE_RETURN_IF_ERROR(store->Synchronize());
+    if (salt_ % 5 == 0) {
+      return absl::OkStatus();  // no change names it
+    }
+    SessionChange change{.session = SessionName(number)};
+    change.steps.emplace_back().mutable_removed();
+    if (!kept.empty()) {
+      change.steps.push_back(MakePointsStep(0, kept, 3));
+    }
+    session.steps.insert(session.steps.end(), change.steps.begin(), change.steps.end());
+    session.points = kept;
+    session.state.set_points(kept.size() / 3);
+    session.state.set_points_file(file);
+    session.state.set_revision(salt_);
+    change.state = session.state;
+    const uint64_t before = state().sessions.at(number).state.points_file();
+    WELLSPACE_RETURN_IF_ERROR(Commit(std::move(change), std::move(next)));
+    std::swap(store, open_.at(number).points);
+    file = before;
+    return absl::OkStatus();
+  };
+  const absl::Status status = make();
+  store = nullptr;
+  log_->DropPoints(SessionName(number), file);
   return status;
 }
 
@@ -357,11 +399,14 @@ std::string StoreLife::FindState(size_t least) {
       for (const auto& [number, session] : states_[0].sessions) {
         std::vector<store::v1::StepRecord::Points> committed;
         for (const store::v1::StepRecord& step : session.steps) {
+          if (step.has_removed()) {
+            committed.clear();
+          }
           if (step.has_points()) {
             committed.push_back(step.points());
           }
         }
-        open_[number].points = log_->OpenPoints(SessionName(number), 3, committed);
+        open_[number].points = log_->OpenPoints(SessionName(number), 3, session.state.points_file(), committed);
         open_[number].mesh = log_->FindMesh(SessionName(number), session.state);
       }
       return "";
@@ -437,7 +482,7 @@ std::string StoreLife::CheckFolder(const LifeState& expected) {
     bool is_named = false;
     for (const auto& [number, session] : expected.sessions) {
       const std::string path = paths.files() + "/" + name;
-      is_named |= path == paths.points(session.state.name()) ||
+      is_named |= path == paths.points(session.state.name(), session.state.points_file()) ||
                   path == paths.mesh(session.state.name(), session.state.mesh().revision());
     }
     if (!is_named) {

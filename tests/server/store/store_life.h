@@ -42,6 +42,7 @@ class StoreLife {
   enum class Action {
     kCreate,
     kUpload,
+    kRemove,
     kUpdate,
     kTouch,
     kAddFeatures,
@@ -53,7 +54,7 @@ class StoreLife {
     kForget,
     kSweep,
   };
-  static constexpr int kActions = 12;
+  static constexpr int kActions = 13;
 
   // Bugs that tests plant, to see that they are found.
   struct Bugs {
@@ -97,6 +98,8 @@ class StoreLife {
 
   absl::Status Create(uint64_t number);
   absl::Status Upload(uint64_t number);
+  // Takes some points out.
+  absl::Status Remove(uint64_t number);
   absl::Status Succeed(uint64_t number);
   absl::Status Change(uint64_t number, Action action);
   absl::Status Commit(SessionChange change, LifeState next,

@@ -389,6 +389,31 @@ class Session:
         vertices = np.concatenate([np.empty(0, np.uint32), *(_wire.packed(field, "<u4") for field in fields)])
         return signed(vertices, int(vertices.max(initial=0)) + 1)
 
+    def remove(
+        self,
+        points: Any,
+        *,
+        expected_revision: int = 0,
+        timeout: float | None = None,
+        cancel: CancelToken | None = None,
+    ) -> int:
+        """Takes points out of the session, uploaded and added ones alike; returns how many are left.
+
+        `points` are their numbers, (k,): `Mesh.vertex_origins` has that of each vertex. Points behind them move down.
+        The session is then to be refined again, which makes the mesh anew, as `refine(restart=True)` does; until then
+        its mesh is the last one.
+        """
+        numbers = indices(points, "points")
+        options = CallOptions(timeout=timeout, cancel=cancel)
+        request = _api.message("RemovePointsRequest")(
+            name=self.name,
+            points=numbers.tolist(),
+            request_id=options.id_or_new(),
+            expected_revision=expected_revision,
+        )
+        answer = self._calls.unary("SessionService/RemovePoints", request, "RemovePointsResponse", options)
+        return int(answer.committed_points)
+
     def locate(
         self,
         points: Any,

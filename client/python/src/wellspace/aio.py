@@ -210,6 +210,9 @@ class Session:
     async def add(self, points: Any, **options: Any) -> npt.NDArray[Any]:
         return await _run(self._session.add, points, **options)
 
+    async def remove(self, points: Any, **options: Any) -> int:
+        return await _run(self._session.remove, points, **options)
+
     async def nearest(self, vertices: Any = None, **options: Any) -> npt.NDArray[np.float64]:
         return await _run(self._session.nearest, vertices, **options)
 
