@@ -44,6 +44,9 @@ struct VertexSizes {
 // Which faces, into which segments cut the plane, are meshed; see the proto's FaceRule.
 enum class FaceRule { kBox, kHoles, kEvenOdd };
 
+// What becomes of segments that cross, and of points too near to a segment; see the proto's CrossingRule.
+enum class CrossingRule { kRefuse, kSnap, kSplit };
+
 // See the proto's FaceSeed.
 struct FaceSeed {
   double x = 0;
@@ -60,7 +63,7 @@ struct Features {
   std::vector<uint8_t> is_open;  // m, or none: 1 for a segment that is part of no ring
   std::vector<FaceSeed> seeds;
   FaceRule faces = FaceRule::kBox;
-  bool split_crossings = false;
+  CrossingRule crossings = CrossingRule::kRefuse;
 };
 
 // What to mesh and how. Zero or empty means the server's default, as the comments of the proto's MeshParameters say.
@@ -261,7 +264,7 @@ struct Session {
   uint64_t segment_count = 0;
   uint64_t seed_count = 0;
   std::optional<FaceRule> faces;  // none: a cloud, without segments and faces
-  bool split_crossings = false;
+  CrossingRule crossings = CrossingRule::kRefuse;
   uint64_t size_count = 0;  // samples of sizes, see SetSizes
 };
 

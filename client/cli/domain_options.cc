@@ -29,13 +29,13 @@ client::FaceRule RuleOf(const std::string& name, formats::PlanarDomain::FaceRule
 
 // What the file says of faces and segments, for the server.
 absl::StatusOr<client::Features> FeaturesOf(const formats::PlanarDomain& domain, const std::string& faces,
-                                            bool split_crossings) {
+                                            client::CrossingRule crossings) {
   client::Features features;
   features.ends = domain.segments;
   features.markers = domain.markers;
   features.is_open = domain.is_line;
   features.faces = RuleOf(faces, domain.faces);
-  features.split_crossings = split_crossings;
+  features.crossings = crossings;
   for (size_t i = 0; i < domain.seeds.size(); ++i) {
     const formats::PlanarDomain::Seed& seed = domain.seeds[i];
     const bool is_region =
@@ -66,9 +66,11 @@ void DomainOptions::AddTo(CLI::App& command) {
                   "ones but holes; even-odd, those that an odd number of rings surrounds; default: holes for .poly, "
                   "even-odd for polygons of .geojson, box for lines")
       ->check(CLI::IsMember({kBox, kHoles, kEvenOdd}));
-  command.add_flag("--split-crossings", split_crossings_,
+  command.add_flag("--split-crossings", splits_crossings_,
                    "Make vertices of the crossings of segments, and lead segments through points that are too near to "
                    "them; default: both are errors");
+  command.add_flag("--snap", snaps_,
+                   "Lead segments through points that are too near to them, and leave crossings an error");
   command
       .add_option("--region-property", reading_.region_property,
                   "Of .geojson: the property, a whole number, that is the region of the triangles in a polygon")
@@ -89,7 +91,8 @@ bool DomainOptions::IsDomain(const std::string& path, const std::string& format)
 
 absl::Status DomainOptions::CheckCloud() const {
   const char* const option = !faces_.empty()                     ? "--faces"
-                             : split_crossings_                  ? "--split-crossings"
+                             : splits_crossings_                 ? "--split-crossings"
+                             : snaps_                            ? "--snap"
                              : !reading_.region_property.empty() ? "--region-property"
                              : !reading_.marker_property.empty() ? "--marker-property"
                                                                  : nullptr;
@@ -102,7 +105,10 @@ absl::StatusOr<formats::PointCloud> DomainOptions::Read(const std::string& path,
   reading_.format = options.format;
   reading_.columns = options.columns;
   WELLSPACE_ASSIGN_OR_RETURN(formats::PlanarDomain domain, formats::ReadPlanarDomain(path, reading_));
-  WELLSPACE_ASSIGN_OR_RETURN(client::Features features, FeaturesOf(domain, faces_, split_crossings_));
+  const client::CrossingRule rule = splits_crossings_ ? client::CrossingRule::kSplit
+                                    : snaps_          ? client::CrossingRule::kSnap
+                                                      : client::CrossingRule::kRefuse;
+  WELLSPACE_ASSIGN_OR_RETURN(client::Features features, FeaturesOf(domain, faces_, rule));
   features_ = std::make_shared<const client::Features>(std::move(features));
   formats::PointCloud cloud;
   cloud.name = domain.name;

@@ -18,7 +18,7 @@
 
 namespace wellspace::cli {
 
-// A domain in the plane: --segments, --faces, --split-crossings, --region-property and --marker-property.
+// A domain in the plane: --segments, --faces, --split-crossings, --snap, --region-property and --marker-property.
 //
 // Thread safety: thread-compatible.
 class DomainOptions {
@@ -53,7 +53,8 @@ class DomainOptions {
  private:
   bool has_segments_ = false;
   std::string faces_;
-  bool split_crossings_ = false;
+  bool splits_crossings_ = false;
+  bool snaps_ = false;
   formats::DomainOptions reading_;
   std::optional<formats::PlanarDomain> domain_;
   std::shared_ptr<const client::Features> features_;

@@ -34,6 +34,18 @@ const char* FaceRuleName(client::FaceRule rule) {
   return "even-odd";
 }
 
+const char* CrossingRuleName(client::CrossingRule rule) {
+  switch (rule) {
+    case client::CrossingRule::kRefuse:
+      return "refuse";
+    case client::CrossingRule::kSnap:
+      return "snap";
+    case client::CrossingRule::kSplit:
+      break;
+  }
+  return "split";
+}
+
 const char* StateName(client::OperationState state) {
   switch (state) {
     case client::OperationState::kQueued:
@@ -105,7 +117,7 @@ Json SessionJson(const client::Session& session) {
   json["segment_count"] = session.segment_count;
   json["seed_count"] = session.seed_count;
   json["faces"] = session.faces.has_value() ? Json(FaceRuleName(*session.faces)) : Json(nullptr);
-  json["split_crossings"] = session.split_crossings;
+  json["crossings"] = session.faces.has_value() ? nlohmann::ordered_json(CrossingRuleName(session.crossings)) : nullptr;
   json["size_count"] = session.size_count;
   json["vertex_count"] = session.vertex_count;
   json["simplex_count"] = session.simplex_count;

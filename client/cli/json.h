@@ -20,7 +20,7 @@ Json ErrorJson(const absl::Status& status);
 // keep_vertices, domain_low, domain_high, margin, merge_distance, max_vertices, threads.
 Json ParametersJson(const client::MeshOptions& parameters);
 // name, state, parameters, labels, ttl_seconds, create_time, expire_time, revision, committed_points, segment_count,
-// seed_count, faces (a name, or null for a cloud), split_crossings, vertex_count, simplex_count, last_operation.
+// seed_count, faces (a name, or null for a cloud), crossings (likewise), vertex_count, simplex_count, last_operation.
 Json SessionJson(const client::Session& session);
 // sequence, phase, vertices, estimated_vertices, simplices, fraction.
 Json ProgressJson(const client::Progress& progress);
@@ -34,6 +34,7 @@ const char* StateName(client::SessionState state);
 const char* StateName(client::OperationState state);
 // As --faces has it.
 const char* FaceRuleName(client::FaceRule rule);
+const char* CrossingRuleName(client::CrossingRule rule);
 // "2026-01-31T23:59:59Z".
 std::string TimeText(absl::Time time);
 

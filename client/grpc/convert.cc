@@ -310,7 +310,9 @@ Session SessionFromProto(const v1::Session& message) {
                  .segment_count = message.segment_count(),
                  .seed_count = message.seed_count(),
                  .faces = RuleFromProto(message.faces()),
-                 .split_crossings = message.crossings() == v1::CROSSING_RULE_SPLIT,
+                 .crossings = message.crossings() == v1::CROSSING_RULE_SPLIT  ? CrossingRule::kSplit
+                              : message.crossings() == v1::CROSSING_RULE_SNAP ? CrossingRule::kSnap
+                                                                              : CrossingRule::kRefuse,
                  .size_count = message.size_count()};
 }
 

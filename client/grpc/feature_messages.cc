@@ -36,7 +36,9 @@ size_t FillFaces(const Features& features, size_t first, v1::FaceOptions& option
   const size_t end = std::min(first + kSeedsOfARequest, features.seeds.size());
   options.Clear();
   options.set_faces(RuleToProto(features.faces));
-  options.set_crossings(features.split_crossings ? v1::CROSSING_RULE_SPLIT : v1::CROSSING_RULE_REFUSE);
+  options.set_crossings(features.crossings == CrossingRule::kSplit  ? v1::CROSSING_RULE_SPLIT
+                        : features.crossings == CrossingRule::kSnap ? v1::CROSSING_RULE_SNAP
+                                                                    : v1::CROSSING_RULE_REFUSE);
   for (; first < end; ++first) {
     const FaceSeed& seed = features.seeds[first];
     v1::FaceSeed& message = *options.add_seeds();

@@ -20,7 +20,8 @@ enum class FaceRule : uint8_t {
 // What becomes of segments that cross, and of vertices that are too close to a segment.
 enum class CrossingRule : uint8_t {
   kRefuse,  // an error names them
-  kSplit,   // a crossing, rounded, becomes a vertex; a segment is led through a vertex that is too close to it
+  kSnap,    // a segment is led through a vertex that is too close to it; crossings are refused
+  kSplit,   // the same, and a crossing, rounded, becomes a vertex
 };
 
 // A point that names the face which it lies in.

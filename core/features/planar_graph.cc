@@ -227,7 +227,6 @@ class GraphMaker {
     for (const GraphSegment& segment : graph_.segments) {
       ends.push_back({segment.a, segment.b});
     }
-    const size_t most = features_.crossings == CrossingRule::kSplit ? std::numeric_limits<size_t>::max() : kMostFaults;
     const SegmentPairs pairs(graph_.points, ends, least_separation_);
     const std::vector<SegmentPairs::Group> parts = pairs.Parts(team_);
     std::vector<std::vector<Fault>> found(parts.size());
@@ -237,8 +236,8 @@ class GraphMaker {
         const size_t first = found[part].size();
         AppendFaults(segments, points, found[part]);
         unwanted += std::count_if(found[part].begin() + static_cast<std::ptrdiff_t>(first), found[part].end(),
-                                  [](const Fault& fault) { return fault.kind != Fault::Kind::kOn; });
-        return unwanted <= most && !context_.IsCancelled();
+                                  [this](const Fault& fault) { return !IsSplitAt(fault.kind); });
+        return unwanted <= kMostFaults && !context_.IsCancelled();
       });
     });
     WELLSPACE_RETURN_IF_ERROR(context_.Check());
@@ -325,16 +324,18 @@ class GraphMaker {
                                NameOf(fault.segment));
   }
 
+  bool IsSplitAt(Fault::Kind kind) const {
+    return kind == Fault::Kind::kOn || features_.crossings == CrossingRule::kSplit ||
+           (kind == Fault::Kind::kNear && features_.crossings == CrossingRule::kSnap);
+  }
+
   // Refuses faults that are not to be split at.
   absl::Status CheckAllowed(const std::vector<Fault>& faults) const {
-    if (features_.crossings == CrossingRule::kSplit) {
-      return absl::OkStatus();
-    }
     for (const auto kind : {Fault::Kind::kCrossing, Fault::Kind::kNear}) {
       std::string names;
       size_t count = 0;
       for (const Fault& fault : faults) {
-        if (fault.kind == kind && count++ < kNamed) {
+        if (fault.kind == kind && !IsSplitAt(kind) && count++ < kNamed) {
           absl::StrAppend(&names, count == 1 ? "" : "; ", Describe(fault));
         }
       }

@@ -30,7 +30,9 @@ bool RuleFromProto(v1::FaceRule rule, core::FaceRule* out) {
 }
 
 core::CrossingRule RuleFromProto(v1::CrossingRule rule) {
-  return rule == v1::CROSSING_RULE_SPLIT ? core::CrossingRule::kSplit : core::CrossingRule::kRefuse;
+  return rule == v1::CROSSING_RULE_SPLIT  ? core::CrossingRule::kSplit
+         : rule == v1::CROSSING_RULE_SNAP ? core::CrossingRule::kSnap
+                                          : core::CrossingRule::kRefuse;
 }
 
 core::FaceSeed SeedFromProto(const v1::FaceSeed& seed) {
@@ -109,10 +111,10 @@ absl::Status CheckFaces(const v1::FaceOptions& options, uint64_t first) {
                                   " is not known; 1 (box), 2 (holes) and 3 (even-odd) are, and 0 for the default"),
                      "faces.faces");
   }
-  if (options.crossings() < v1::CROSSING_RULE_UNSPECIFIED || options.crossings() > v1::CROSSING_RULE_SPLIT) {
+  if (options.crossings() < v1::CROSSING_RULE_UNSPECIFIED || options.crossings() > v1::CROSSING_RULE_SNAP) {
     return MakeError(v1::ERROR_REASON_INVALID_SEGMENTS,
                      absl::StrCat("crossings: ", static_cast<int>(options.crossings()),
-                                  " is not known; 1 (refuse) and 2 (split) are, and 0 for the default"),
+                                  " is not known; 1 (refuse), 2 (split) and 3 (snap) are, and 0 for the default"),
                      "faces.crossings");
   }
   for (int i = 0; i < options.seeds_size(); ++i) {
@@ -201,6 +203,7 @@ v1::FaceRule FeatureStore::face_rule() const {
 v1::CrossingRule FeatureStore::crossing_rule() const {
   return IsEmpty()                                  ? v1::CROSSING_RULE_UNSPECIFIED
          : crossings_ == core::CrossingRule::kSplit ? v1::CROSSING_RULE_SPLIT
+         : crossings_ == core::CrossingRule::kSnap  ? v1::CROSSING_RULE_SNAP
                                                     : v1::CROSSING_RULE_REFUSE;
 }
 

@@ -64,8 +64,11 @@ void PrintSession(const client::Session& session, bool json) {
   print("points", WithThousands(session.committed_points));
   if (session.faces.has_value()) {
     print("segments", WithThousands(session.segment_count));
-    print("faces", absl::StrCat(FaceRuleName(*session.faces), ", ", WithThousands(session.seed_count),
-                                " holes and regions", session.split_crossings ? ", crossings split" : ""));
+    print("faces",
+          absl::StrCat(FaceRuleName(*session.faces), ", ", WithThousands(session.seed_count), " holes and regions",
+                       session.crossings == client::CrossingRule::kSplit  ? ", crossings split"
+                       : session.crossings == client::CrossingRule::kSnap ? ", snapped"
+                                                                          : ""));
   }
   if (session.size_count > 0) {
     print("sizes", absl::StrCat("at ", WithThousands(session.size_count), " points"));

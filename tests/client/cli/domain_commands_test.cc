@@ -139,6 +139,19 @@ TEST_F(DomainCommandsTest, CrossingsAreNamedByTheirLines) {
   EXPECT_EQ(stats["domain"]["crossings"], 1);
 }
 
+TEST_F(DomainCommandsTest, PointsTooNearToASegmentAreSnappedTo) {
+  // The last point is 1e-17 above the middle of the first segment, and a part of the hole's ring.
+  const std::string near =
+      "7 2 0 0\n1 0 0\n2 2 0\n3 2 2\n4 0 2\n5 0.5 0.5\n6 1.5 0.5\n7 1 1e-17\n"
+      "7 0\n1 1 2\n2 2 3\n3 3 4\n4 4 1\n5 5 6\n6 6 7\n7 7 5\n1\n1 1 0.3\n";
+  EXPECT_THAT(MeshFails("near.poly", near), HasSubstr("segments[0]"));
+  const nlohmann::json stats = Mesh("near.poly", near, {"--snap"});
+  EXPECT_EQ(stats["domain"]["near_points"], 1);
+  EXPECT_EQ(stats["domain"]["crossings"], 0);
+  constexpr char kCross[] = "4 2 0 0\n1 0 0\n2 2 2\n3 0 2\n4 2 0\n4 0\n1 1 2\n2 3 4\n3 1 3\n4 2 4\n";
+  EXPECT_THAT(MeshFails("cross.poly", kCross, {"--snap"}), HasSubstr("cross at (1, 1)"));
+}
+
 TEST_F(DomainCommandsTest, WhatEnclosesNothingSaysSo) {
   EXPECT_THAT(MeshFails("open.poly", "3 2 0 0\n1 0 0\n2 1 0\n3 1 1\n2 0\n1 1 2\n2 2 3\n"),
               HasSubstr("enclose nothing"));
@@ -147,6 +160,7 @@ TEST_F(DomainCommandsTest, WhatEnclosesNothingSaysSo) {
 TEST_F(DomainCommandsTest, OptionsOfDomainsWantADomain) {
   EXPECT_THAT(MeshFails("cloud.csv", "0,0\n1,0\n0,1\n", {"--faces", "holes"}), HasSubstr("--faces"));
   EXPECT_THAT(MeshFails("cloud.csv", "0,0\n1,0\n0,1\n", {"--split-crossings"}), HasSubstr("--split-crossings"));
+  EXPECT_THAT(MeshFails("cloud.csv", "0,0\n1,0\n0,1\n", {"--snap"}), HasSubstr("--snap"));
 }
 
 TEST_F(DomainCommandsTest, MinAngleIsABoundOfRho) {

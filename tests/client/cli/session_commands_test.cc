@@ -414,7 +414,7 @@ TEST_F(DomainUploadTest, ShowTellsOfSegments) {
   EXPECT_EQ(session["segment_count"], 1234);
   EXPECT_EQ(session["seed_count"], 2);
   EXPECT_EQ(session["faces"], "even-odd");
-  EXPECT_EQ(session["split_crossings"], true);
+  EXPECT_EQ(session["crossings"], "split");
 }
 
 TEST_F(SessionCommandsTest, DownloadWritesTheMesh) {

@@ -70,7 +70,7 @@ void ExpectIsTheSession(const Session& session) {
   EXPECT_EQ(session.segment_count, 7u);
   EXPECT_EQ(session.seed_count, 8u);
   EXPECT_EQ(session.faces, FaceRule::kEvenOdd);
-  EXPECT_TRUE(session.split_crossings);
+  EXPECT_EQ(session.crossings, CrossingRule::kSplit);
 }
 
 TEST(Sessions, CreateSendsAllAndARequestIdOfItsOwn) {

@@ -18,6 +18,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr double kSeparation = 1e-9;
 
@@ -135,11 +136,27 @@ TEST(PlanarGraphTest, AVertexTooCloseToASegmentIsRefusedOrLedThrough) {
   const auto refused = input.Make();
   EXPECT_THAT(refused.status().message(), AllOf(HasSubstr("points[2] at (1, "), HasSubstr("1e-12 from segments[0]"),
                                                 HasSubstr("1e-09"), HasSubstr("make it an end of the segment")));
-  input.crossings = CrossingRule::kSplit;
+  for (const CrossingRule rule : {CrossingRule::kSnap, CrossingRule::kSplit}) {
+    input.crossings = rule;
+    const auto graph = input.Make();
+    ASSERT_TRUE(graph.ok()) << graph.status();
+    EXPECT_EQ(PairsOf(*graph), (std::set<std::pair<uint32_t, uint32_t>>{{0, 2}, {1, 2}, {2, 3}}));
+    EXPECT_EQ(graph->counts.near_vertices, 1u);
+  }
+}
+
+TEST(PlanarGraphTest, WhereSegmentsAreLedThroughPointsCrossingsAreRefusedAlone) {
+  // More near points than an error names, and one crossing.
+  Input input{.points = {0, 0, 100, 0, 50.5, -1, 50.5, 1}, .ends = {0, 1, 2, 3}, .crossings = CrossingRule::kSnap};
+  for (int i = 1; i < 100; ++i) {
+    input.points.insert(input.points.end(), {static_cast<double>(i), 1e-12});
+  }
+  const absl::Status refused = input.Make().status();
+  EXPECT_THAT(refused.message(), AllOf(HasSubstr("cross at (50.5, "), Not(HasSubstr("points["))));
+  input.ends.resize(2);
   const auto graph = input.Make();
   ASSERT_TRUE(graph.ok()) << graph.status();
-  EXPECT_EQ(PairsOf(*graph), (std::set<std::pair<uint32_t, uint32_t>>{{0, 2}, {1, 2}, {2, 3}}));
-  EXPECT_EQ(graph->counts.near_vertices, 1u);
+  EXPECT_EQ(graph->counts.near_vertices, 99u);
 }
 
 TEST(PlanarGraphTest, TheBoxBelongsToTheGraph) {

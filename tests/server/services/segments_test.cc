@@ -365,6 +365,10 @@ TEST_F(SegmentsTest, WhatBoundsNoDomainFailsTheOperationAndOtherRulesHelp) {
   v1::AddSegmentsRequest rules;
   rules.set_name(name);
   rules.mutable_faces()->set_faces(v1::FACE_RULE_HOLES);
+  rules.mutable_faces()->set_crossings(v1::CROSSING_RULE_SNAP);
+  calls_.AddSegments({rules});
+  EXPECT_EQ(calls_.Get(name).crossings(), v1::CROSSING_RULE_SNAP);
+  EXPECT_EQ(Refine(RefineTo(name, 1)).state(), v1::Operation::STATE_FAILED) << "crossings are refused still";
   rules.mutable_faces()->set_crossings(v1::CROSSING_RULE_SPLIT);
   calls_.AddSegments({rules});
   EXPECT_EQ(Refine(RefineTo(name, 1)).state(), v1::Operation::STATE_SUCCEEDED);

@@ -92,9 +92,9 @@ class DomainArguments(TypedDict, total=False):
     faces : {"box", "holes", "even-odd"}
         Which faces, into which segments cut the plane, are meshed: all in the box; all bounded ones; those that an odd
         number of segments separates from infinity. Faces with a hole never are. Default "holes", with `box` "box".
-    crossings : {"refuse", "split"}
-        What becomes of segments that cross, and of points too near to a segment: an error, or vertices at crossings,
-        and segments led through such points. Default "refuse".
+    crossings : {"refuse", "snap", "split"}
+        What becomes of segments that cross, and of points too near to a segment. "refuse", the default: an error.
+        "snap": segments are led through such points. "split": also, and crossings become vertices.
     """
 
     segments: Any
