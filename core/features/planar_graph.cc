@@ -33,19 +33,6 @@ Sign SideOf(const Point<2>& a, const Point<2>& b, const Point<2>& p) { return Or
 // Whether `p`, a point of the line through `a` and `b`, lies strictly between them.
 bool IsBetween(const Point<2>& a, const Point<2>& b, const Point<2>& p) { return (a < p && p < b) || (b < p && p < a); }
 
-// How far along the segment from `a` to `b` a point is, in its lengths.
-double Along(const Point<2>& a, const Point<2>& b, const Point<2>& p) {
-  const Point<2> along = Difference<2>(b, a);
-  return Dot<2>(Difference<2>(p, a), along) / NormSq<2>(along);
-}
-
-double DistanceToSegment(const Point<2>& a, const Point<2>& b, const Point<2>& p) {
-  const double t = std::clamp(Along(a, b, p), 0.0, 1.0);
-  const Point<2> foot = t < 0.5 ? Point<2>{a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])}
-                                : Point<2>{b[0] + (1 - t) * (a[0] - b[0]), b[1] + (1 - t) * (a[1] - b[1])};
-  return Distance<2>(foot, p);
-}
-
 // Where two segments that cross do so, rounded.
 Point<2> CrossingOf(const Point<2>& a, const Point<2>& b, const Point<2>& c, const Point<2>& d) {
   const Point<2> along = Difference<2>(b, a);

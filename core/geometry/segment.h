@@ -13,6 +13,20 @@ namespace wellspace::core {
 // Twice the area of the triangle of the two vectors, above 0 if b is counterclockwise from a; rounded.
 inline double Cross(const Point<2>& a, const Point<2>& b) { return a[0] * b[1] - a[1] * b[0]; }
 
+// How far along the segment from `a` to `b`, which has a length, the foot of `p` is, in its lengths.
+inline double Along(const Point<2>& a, const Point<2>& b, const Point<2>& p) {
+  const Point<2> along = Difference<2>(b, a);
+  return Dot<2>(Difference<2>(p, a), along) / NormSq<2>(along);
+}
+
+// The distance of `p` from the segment from `a` to `b`.
+inline double DistanceToSegment(const Point<2>& a, const Point<2>& b, const Point<2>& p) {
+  const double t = std::clamp(Along(a, b, p), 0.0, 1.0);
+  const Point<2> foot = t < 0.5 ? Point<2>{a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])}
+                                : Point<2>{b[0] + (1 - t) * (a[0] - b[0]), b[1] + (1 - t) * (a[1] - b[1])};
+  return Distance<2>(foot, p);
+}
+
 // The box of two points.
 inline Box<2> BoxOfEnds(const Point<2>& a, const Point<2>& b) {
   return {{std::min(a[0], b[0]), std::min(a[1], b[1])}, {std::max(a[0], b[0]), std::max(a[1], b[1])}};

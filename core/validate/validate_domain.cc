@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numbers>
 #include <numeric>
 #include <optional>
 #include <utility>
@@ -14,6 +15,7 @@
 #include "core/base/status_macros.h"
 #include "core/geometry/exact_measure.h"
 #include "core/geometry/point.h"
+#include "core/geometry/segment.h"
 #include "core/simplex/quality.h"
 
 namespace wellspace::core {
@@ -24,6 +26,13 @@ using Edge = std::pair<uint32_t, uint32_t>;
 constexpr double kRatioTolerance = 1e-9;
 // A circle is looked through that is larger by so much, relatively, than the one that was computed.
 constexpr double kCircleRoom = 1e-9;
+// How far from its circumcentre a triangle is looked around, in circumradii, for the segment that a better vertex would
+// have come too near to. That vertex lies within the circumcircle or a little beyond, and so much nearer to the
+// segment.
+constexpr double kReach = 1 + 0.5 * std::numbers::sqrt2;
+// A line of facets goes on where two of them differ in direction by less, by the cosine: places of vertices are
+// rounded.
+constexpr double kStraight = 1e-9;
 
 absl::Status Violation(const std::string& what) { return absl::FailedPreconditionError(what); }
 
@@ -85,6 +94,87 @@ Simplex<2> PlacesOf(const MeshView& mesh, const std::array<uint32_t, 3>& corners
 }
 
 std::string NameOf(const Edge& edge) { return absl::StrCat("the edge of vertices ", edge.first, " and ", edge.second); }
+
+// The lines that facets form.
+class FacetLines {
+ public:
+  FacetLines(const MeshView& mesh, std::span<const uint32_t> facets) : mesh_(mesh), facets_(facets) {
+    for (size_t f = 0; f < facets.size(); f += 2) {
+      beside_.emplace(facets[f], facets[f + 1]);
+      beside_.emplace(facets[f + 1], facets[f]);
+    }
+  }
+
+  // Whether a line that comes within `reach` of `p` meets another one at less than 60 degrees.
+  //
+  // Complexity: O(facets), times the length of lines within reach.
+  bool HaveSmallAngleNear(const Point<2>& p, double reach) const {
+    for (size_t f = 0; f < facets_.size(); f += 2) {
+      const uint32_t u = facets_[f];
+      const uint32_t v = facets_[f + 1];
+      if (DistanceToSegment(At(u), At(v), p) <= reach && (LeadsToSmallAngle(u, v) || LeadsToSmallAngle(v, u))) {
+        return true;
+      }
+    }
+    return false;
+  }
+
+ private:
+  Point<2> At(uint32_t v) const { return PointAt<2>(mesh_.points, v); }
+
+  // Follows the line of the facet from `from` to `to`, and onwards.
+  bool LeadsToSmallAngle(uint32_t from, uint32_t to) const {
+    for (size_t i = 0; i < facets_.size() / 2; ++i) {
+      const Point<2> back = Difference<2>(At(from), At(to));
+      uint32_t next = to;
+      const auto [begin, end] = beside_.equal_range(to);
+      for (auto other = begin; other != end; ++other) {
+        if (other->second == from) {
+          continue;
+        }
+        const Point<2> away = Difference<2>(At(other->second), At(to));
+        const double cosine = Dot<2>(back, away) / std::sqrt(NormSq<2>(back) * NormSq<2>(away));
+        if (cosine > 0.5) {
+          return true;
+        }
+        if (cosine < -1 + kStraight) {
+          next = other->second;
+        }
+      }
+      if (next == to) {
+        return false;
+      }
+      from = std::exchange(to, next);
+    }
+    return false;
+  }
+
+  const MeshView& mesh_;
+  const std::span<const uint32_t> facets_;
+  std::multimap<uint32_t, uint32_t> beside_;
+};
+
+// Whether a triangle may break rho, the radius-edge ratio being `ratio`. `is_on_facet`: of vertices.
+bool IsExempt(const MeshView& mesh, const FacetLines& lines, const std::vector<bool>& is_on_facet, size_t triangle,
+              double ratio) {
+  const auto corners = CornersOf(mesh, triangle);
+  const Simplex<2> places = PlacesOf(mesh, corners);
+  int shortest = 0;
+  for (int k = 1; k < 3; ++k) {
+    if (DistanceSq<2>(places[k], places[(k + 1) % 3]) < DistanceSq<2>(places[shortest], places[(shortest + 1) % 3])) {
+      shortest = k;
+    }
+  }
+  if (is_on_facet[corners[shortest]] && is_on_facet[corners[(shortest + 1) % 3]]) {
+    return true;
+  }
+  if (ratio > std::numbers::sqrt2 * (1 + kRatioTolerance)) {
+    return false;
+  }
+  const Point<2> offset = ExactCircumcentreOffset<2>(places);
+  return lines.HaveSmallAngleNear({places[0][0] + offset[0], places[0][1] + offset[1]},
+                                  kReach * std::sqrt(NormSq<2>(offset)));
+}
 
 absl::Status CheckEdges(const MeshView& mesh, std::span<const uint32_t> facets) {
   std::map<Edge, int> directed;
@@ -161,20 +251,13 @@ absl::StatusOr<DomainReport> ValidateDomainMesh(const MeshView& mesh, std::span<
   for (const uint32_t v : facets) {
     is_on_facet[v] = true;
   }
+  const FacetLines lines(mesh, facets);
   for (size_t t = 0; t < mesh.simplices.size() / 3; ++t) {
-    const auto corners = CornersOf(mesh, t);
-    const Simplex<2> places = PlacesOf(mesh, corners);
-    const double ratio = RadiusEdgeRatio<2>(places);
+    const double ratio = RadiusEdgeRatio<2>(PlacesOf(mesh, CornersOf(mesh, t)));
     if (ratio <= rho * (1 + kRatioTolerance)) {
       continue;
     }
-    int shortest = 0;
-    for (int k = 1; k < 3; ++k) {
-      if (DistanceSq<2>(places[k], places[(k + 1) % 3]) < DistanceSq<2>(places[shortest], places[(shortest + 1) % 3])) {
-        shortest = k;
-      }
-    }
-    if (!is_on_facet[corners[shortest]] || !is_on_facet[corners[(shortest + 1) % 3]]) {
+    if (!IsExempt(mesh, lines, is_on_facet, t, ratio)) {
       return Violation(absl::StrCat("triangle ", t, ": circumradius over shortest edge is ", ratio, "; at most ", rho,
                                     " is allowed but at small angles of segments"));
     }

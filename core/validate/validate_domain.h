@@ -27,7 +27,8 @@ struct DomainReport {
 
 // Checks the mesh alone: triangles are positively oriented; an edge has two triangles, one on each side, or one and is
 // a facet; facets are edges, each there once; and no vertex lies strictly inside a circumcircle, so that no two
-// triangles overlap. With rho above 0 a triangle may break it only if both ends of its shortest edge are on facets.
+// triangles overlap. With rho above 0 a triangle may break it only at a small angle: if both ends of its shortest edge
+// are on facets; or up to sqrt(2), if near it is a line of facets that meets another at less than 60 degrees.
 //
 // Shapes:     facets: rows of 2 vertices.
 // Complexity: O(m log m) for most meshes.

@@ -2,9 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <functional>
+#include <numbers>
 #include <vector>
 
 #include "core/mesher.h"
+#include "tests/core/domain_input.h"
 #include "tests/support/clouds.h"
 
 namespace wellspace::test {
@@ -33,21 +37,14 @@ Work WorkOf(const core::MeshStatistics& s) {
           .cuts_per_star = Ratio(s.star_cuts, s.stars_computed) / cell_size};
 }
 
-}  // namespace
-
-void ExpectConstantWork(std::string_view kind, int dimension, std::span<const size_t> sizes) {
+void ExpectConstant(std::span<const size_t> sizes,
+                    const std::function<absl::StatusOr<core::Mesh>(size_t size)>& make_mesh) {
   // Measured from 10^3 to 10^6: at most 1.15 (visits of uniform points in 3-D). What grew like log n would double.
   constexpr double kMostGrowth = 1.25;
   std::vector<Work> work;
   for (const size_t n : sizes) {
     SCOPED_TRACE(n);
-    core::MeshParameters parameters;
-    parameters.dimension = dimension;
-    parameters.min_dihedral = 0;  // of the query structure's work none is there
-    parameters.domain_low = UnitLow(dimension);
-    parameters.domain_high = UnitHigh(dimension);
-    core::RunContext context;
-    const absl::StatusOr<core::Mesh> mesh = core::MeshPoints(parameters, MakeCloud(kind, dimension, n), context);
+    const absl::StatusOr<core::Mesh> mesh = make_mesh(n);
     ASSERT_TRUE(mesh.ok()) << mesh.status();
     work.push_back(WorkOf(mesh->statistics));
     EXPECT_GT(work.back().visits_per_star, 0);
@@ -57,6 +54,75 @@ void ExpectConstantWork(std::string_view kind, int dimension, std::span<const si
     EXPECT_LE(work.back().visits_per_star, kMostGrowth * work.front().visits_per_star);
     EXPECT_LE(work.back().cuts_per_star, kMostGrowth * work.front().cuts_per_star);
   }
+}
+
+DomainInput RandomSegments(size_t count) {
+  DomainInput input;
+  input.faces = core::FaceRule::kBox;
+  input.parameters.domain_low = {0, 0};
+  input.parameters.domain_high = {1, 1};
+  SplitMix64 random(count);
+  const auto side = static_cast<size_t>(std::sqrt(static_cast<double>(count)));
+  const double cell = 1.0 / static_cast<double>(side);
+  for (size_t i = 0; i < side * side; ++i) {
+    const auto place = [&]() -> core::Point<2> {
+      return {(static_cast<double>(i % side) + 0.05 + 0.9 * random.Unit()) * cell,
+              (static_cast<double>(i / side) + 0.05 + 0.9 * random.Unit()) * cell};
+    };
+    const core::Point<2> a = place();
+    input.Segment(a, place());
+  }
+  return input;
+}
+
+// As many steps as make `count` segments, or a few more.
+DomainInput Snowflake(size_t count) {
+  std::vector<core::Point<2>> ring = {{0, 0}, {0.5, std::sqrt(0.75)}, {1, 0}};
+  while (ring.size() < count) {
+    std::vector<core::Point<2>> finer;
+    for (size_t i = 0; i < ring.size(); ++i) {
+      const auto [ax, ay] = ring[i];
+      const auto [bx, by] = ring[(i + 1) % ring.size()];
+      const double x = (bx - ax) / 3;
+      const double y = (by - ay) / 3;
+      finer.insert(finer.end(), {{ax, ay},
+                                 {ax + x, ay + y},
+                                 {ax + 1.5 * x - std::sqrt(0.75) * y, ay + 1.5 * y + std::sqrt(0.75) * x},
+                                 {ax + 2 * x, ay + 2 * y}});
+    }
+    ring = std::move(finer);
+  }
+  return DomainInput().Ring(ring);
+}
+
+DomainInput HoleInABox(size_t count) {
+  DomainInput input;
+  input.Circle({0.5, 0.5}, 0.25, static_cast<int>(count));
+  input.faces = core::FaceRule::kBox;
+  input.seeds.push_back({.at = {0.5, 0.5}, .is_hole = true});
+  input.parameters.domain_low = {0, 0};
+  input.parameters.domain_high = {1, 1};
+  return input;
+}
+
+}  // namespace
+
+void ExpectConstantWork(std::string_view kind, int dimension, std::span<const size_t> sizes) {
+  ExpectConstant(sizes, [&](size_t size) {
+    core::MeshParameters parameters;
+    parameters.dimension = dimension;
+    parameters.min_dihedral = 0;  // of the query structure's work none is there
+    parameters.domain_low = UnitLow(dimension);
+    parameters.domain_high = UnitHigh(dimension);
+    core::RunContext context;
+    return core::MeshPoints(parameters, MakeCloud(kind, dimension, size), context);
+  });
+}
+
+void ExpectConstantWorkInDomains(std::string_view kind, std::span<const size_t> sizes) {
+  ExpectConstant(sizes, [&](size_t size) {
+    return (kind == "random" ? RandomSegments(size) : kind == "coast" ? Snowflake(size) : HoleInABox(size)).Make();
+  });
 }
 
 }  // namespace wellspace::test

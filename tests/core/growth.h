@@ -11,6 +11,10 @@ namespace wellspace::test {
 // vertex of the later ones stay within constant factors of the first one's.
 void ExpectConstantWork(std::string_view kind, int dimension, std::span<const size_t> sizes);
 
+// The same of domains of about so many segments: "random", segments in a box, each in a cell of a grid; "coast", Koch's
+// snowflake; "hole", a ring of a regular polygon in a box, whose inside is not meshed.
+void ExpectConstantWorkInDomains(std::string_view kind, std::span<const size_t> sizes);
+
 }  // namespace wellspace::test
 
 #endif  // WELLSPACE_TESTS_CORE_GROWTH_H_

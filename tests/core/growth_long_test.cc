@@ -15,5 +15,8 @@ TEST(GrowthLongTest, Clusters3) { ExpectConstantWork("clusters", 3, kSizes); }
 // The Delaunay triangulation of the points alone is quadratic: 2.5 * 10^11 simplices for 10^6 of them.
 TEST(GrowthLongTest, Skew3) { ExpectConstantWork("skew", 3, kSizes); }
 
+TEST(GrowthLongTest, RandomSegments) { ExpectConstantWorkInDomains("random", kSizes); }
+TEST(GrowthLongTest, Coast) { ExpectConstantWorkInDomains("coast", kSizes); }
+
 }  // namespace
 }  // namespace wellspace::test

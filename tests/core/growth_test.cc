@@ -15,5 +15,10 @@ TEST(GrowthTest, Clusters3) { ExpectConstantWork("clusters", 3, kSizes); }
 // The Delaunay triangulation of the points alone is quadratic.
 TEST(GrowthTest, Skew3) { ExpectConstantWork("skew", 3, kSizes); }
 
+TEST(GrowthTest, RandomSegments) { ExpectConstantWorkInDomains("random", kSizes); }
+TEST(GrowthTest, Coast) { ExpectConstantWorkInDomains("coast", kSizes); }
+// Vertices far away see the hole, whose inside no scan may cross.
+TEST(GrowthTest, HoleInABox) { ExpectConstantWorkInDomains("hole", std::array<size_t, 3>{100, 1000, 10000}); }
+
 }  // namespace
 }  // namespace wellspace::test

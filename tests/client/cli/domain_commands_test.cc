@@ -163,6 +163,24 @@ TEST_F(DomainCommandsTest, OptionsOfDomainsWantADomain) {
   EXPECT_THAT(MeshFails("cloud.csv", "0,0\n1,0\n0,1\n", {"--snap"}), HasSubstr("--snap"));
 }
 
+TEST_F(DomainCommandsTest, CheckKnowsWhatWasRefusedAtSmallAngles) {
+  // A zigzag with angles of a degree, at which a bound of 30 degrees cannot be kept everywhere.
+  std::string zigzag = "25 2 0 0\n";
+  for (int i = 0; i < 25; ++i) {
+    absl::StrAppend(&zigzag, i, " ", i * 0.00872686779075879, " ", i % 2, "\n");
+  }
+  absl::StrAppend(&zigzag, "24 0\n");
+  for (int i = 0; i < 24; ++i) {
+    absl::StrAppend(&zigzag, i, " ", i, " ", i + 1, "\n");
+  }
+  Mesh("zigzag.poly", zigzag + "0\n", {"--min-angle", "30", "--faces", "box"});
+  const RunResult kept =
+      RunWellspace({"check", Path("out.msh"), "--cloud", Path("zigzag.poly"), "--rho", "1.0000000001"});
+  EXPECT_EQ(kept.exit_code, 0) << kept.out << kept.err;
+  const RunResult broken = RunWellspace({"check", Path("out.msh"), "--cloud", Path("zigzag.poly"), "--rho", "0.7"});
+  EXPECT_EQ(broken.exit_code, 1) << "what is exempt is not everything";
+}
+
 TEST_F(DomainCommandsTest, MinAngleIsABoundOfRho) {
   const nlohmann::json stats = Mesh("frame.poly", kFrame, {"--min-angle", "28"});
   EXPECT_GE(stats["min_angle_deg"], 28 * (1 - 1e-9));
