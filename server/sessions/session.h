@@ -472,8 +472,8 @@ class Session {
   // committed_points_ are the session's, as clients see them; work_.meshed_points are in the mesher, or would be if it
   // was not given up; steps_.points() are what Replay makes a mesher of.
   PointAccount point_account_;
+  uint64_t points_file_ = 0;            // the number of the file of points_, which is made with it
   std::unique_ptr<PointStore> points_;  // see invariant (2)
-  uint64_t points_file_ = 0;            // the number of its file
   uint64_t committed_points_ = 0;
   uint32_t uncommitted_crc32c_ = 0;                 // of the points behind the committed ones
   FeatureStore features_;                           // see invariant (2)

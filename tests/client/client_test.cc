@@ -34,6 +34,8 @@ class MockConnection : public Connection {
   MOCK_METHOD(absl::StatusOr<Session>, UpdateSession, (const std::string&, const SessionChange&, const CallOptions&),
               (override));
   MOCK_METHOD(absl::Status, DeleteSession, (const std::string&, const CallOptions&), (override));
+  MOCK_METHOD(absl::StatusOr<PointsLeft>, RemovePoints,
+              (const std::string&, std::span<const uint64_t>, const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<Uploaded>, UploadPoints,
               (const std::string&, PointSource&, std::optional<uint64_t>, const OnPoints&, const CallOptions&),
               (override));
@@ -113,6 +115,7 @@ TEST(Client, PassesSessionsAndOperationsToItsConnection) {
       .WillOnce(Return(E("list")));
   EXPECT_CALL(*connection, UpdateSession("s", _, is_call)).WillOnce(Return(E("update")));
   EXPECT_CALL(*connection, DeleteSession("s", is_call)).WillOnce(Return(E("delete")));
+  EXPECT_CALL(*connection, RemovePoints("s", SizeIs(2), is_call)).WillOnce(Return(E("remove")));
   EXPECT_CALL(*connection, UploadPoints("s", ::testing::Ref(source), std::optional<uint64_t>(5), _, is_call))
       .WillOnce(Return(E("upload")));
   EXPECT_CALL(*connection, AddSegments("s", ::testing::Ref(features), Optional(FeatureOffset{7, 8}), is_call))
@@ -133,6 +136,7 @@ TEST(Client, PassesSessionsAndOperationsToItsConnection) {
   EXPECT_EQ(client.ListSessions({{"a", "b"}}, {.page_size = 0, .page_token = "t"}, call).status(), E("list"));
   EXPECT_EQ(client.UpdateSession("s", {}, call).status(), E("update"));
   EXPECT_EQ(client.DeleteSession("s", call), E("delete"));
+  EXPECT_EQ(client.RemovePoints("s", std::vector<uint64_t>{1, 2}, call).status(), E("remove"));
   EXPECT_EQ(client.UploadPoints("s", source, 5, nullptr, call).status(), E("upload"));
   EXPECT_EQ(client.AddSegments("s", features, FeatureOffset{7, 8}, call).status(), E("segments"));
   EXPECT_EQ(client.SetSizes("s", samples, call).status(), E("sizes"));

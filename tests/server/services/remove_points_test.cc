@@ -83,7 +83,7 @@ class RemovePointsTest : public ::testing::TestWithParam<bool> {
 };
 
 INSTANTIATE_TEST_SUITE_P(All, RemovePointsTest, ::testing::Bool(),
-                         [](const auto& info) { return info.param ? "InAFolder" : "InMemory"; });
+                         [](const auto& kind) { return kind.param ? "InAFolder" : "InMemory"; });
 
 // `points` without those of the numbers i for which i % 7 is 3, and those numbers in no order.
 std::vector<double> EverySeventhLess(const std::vector<double>& points, std::vector<uint64_t>* numbers) {
