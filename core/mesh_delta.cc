@@ -94,9 +94,17 @@ class RowTable {
   HugeVector<uint32_t> slots_;  // numbers of rows; free ones are kNoRow
 };
 
+uint64_t BytesIn(const MovedRows& rows) {
+  return rows.runs.size() * sizeof(RowRun) + rows.added.size() * sizeof(uint32_t);
+}
+
+absl::Status TooLarge(uint64_t max_bytes) {
+  return absl::ResourceExhaustedError(absl::StrCat("the difference takes more than ", max_bytes, " bytes"));
+}
+
 // Where the rows of `next` come from. Equal rows next to each other make a run, so that most of them are not looked up.
 absl::StatusOr<MovedRows> DiffMovedRows(std::span<const uint32_t> base, std::span<const uint32_t> next, size_t width,
-                                        const RunContext& context) {
+                                        uint64_t max_bytes, const RunContext& context) {
   RowTable table(base, width);
   WELLSPACE_RETURN_IF_ERROR(table.Fill(context));
   MovedRows moved;
@@ -105,6 +113,9 @@ absl::StatusOr<MovedRows> DiffMovedRows(std::span<const uint32_t> base, std::spa
   for (uint64_t row = 0; row < next.size() / width; ++row) {
     if (row % kRowsBetweenChecks == 0) {
       WELLSPACE_RETURN_IF_ERROR(context.Check());
+      if (BytesIn(moved) > max_bytes) {
+        return TooLarge(max_bytes);
+      }
     }
     const uint32_t* values = &next[row * width];
     const bool goes_on = expected < base_rows && std::equal(values, values + width, &base[expected * width]);
@@ -268,7 +279,7 @@ absl::StatusOr<HugeVector<int32_t>> ApplyRegions(const Mesh& base, const MeshDel
 
 template <typename T>
 uint64_t BytesOf(const HugeVector<T>& values) {
-  return values.capacity() * sizeof(T);
+  return values.size() * sizeof(T);
 }
 
 template <typename T>
@@ -276,18 +287,17 @@ uint64_t BytesOf(const ChangedRows<T>& rows) {
   return BytesOf(rows.changed) + BytesOf(rows.values);
 }
 
-uint64_t BytesOf(const MovedRows& rows) { return BytesOf(rows.runs) + BytesOf(rows.added); }
-
 }  // namespace
 
 uint64_t MeshDelta::memory_bytes() const {
   return BytesOf(points) + BytesOf(weights) + BytesOf(input_vertex) + BytesOf(vertex_origins) + BytesOf(vertex_tags) +
-         BytesOf(kept_simplices) + BytesOf(simplex_regions) + BytesOf(kept_facets) + BytesOf(moved_vertices);
+         BytesIn(kept_simplices) + BytesOf(simplex_regions) + BytesIn(kept_facets) + BytesOf(moved_vertices);
 }
 
 uint64_t DeltaScratchBytes(uint64_t base_simplices) { return SlotsFor(base_simplices) * sizeof(uint32_t); }
 
-absl::StatusOr<MeshDelta> DiffMeshes(const Mesh& base, const Mesh& next, const RunContext& context) {
+absl::StatusOr<MeshDelta> DiffMeshes(const Mesh& base, const Mesh& next, uint64_t max_bytes,
+                                     const RunContext& context) {
   if (base.dimension != next.dimension || base.dimension < 1) {
     return absl::InvalidArgumentError(
         absl::StrCat("meshes of dimension ", base.dimension, " and ", next.dimension, " have no difference"));
@@ -313,16 +323,17 @@ absl::StatusOr<MeshDelta> DiffMeshes(const Mesh& base, const Mesh& next, const R
   delta.vertex_tags = DiffChangedRows<int32_t>(base.vertex_tags, next.vertex_tags, 1);
   WELLSPACE_RETURN_IF_ERROR(context.Check());
   WELLSPACE_ASSIGN_OR_RETURN(delta.kept_simplices,
-                             DiffMovedRows(base.simplices, next.simplices, dimension + 1, context));
+                             DiffMovedRows(base.simplices, next.simplices, dimension + 1, max_bytes, context));
   delta.simplex_regions = DiffRegions(base, next, delta.kept_simplices.runs);
-  WELLSPACE_ASSIGN_OR_RETURN(delta.kept_facets, DiffMovedRows(base.facets, next.facets, dimension, context));
+  WELLSPACE_ASSIGN_OR_RETURN(delta.kept_facets,
+                             DiffMovedRows(base.facets, next.facets, dimension, max_bytes, context));
   delta.domain_low = next.domain_low;
   delta.domain_high = next.domain_high;
   delta.moved_vertices = next.moved_vertices;
   delta.boundary = next.boundary;
   delta.regions = next.regions;
   delta.statistics = next.statistics;
-  return delta;
+  return delta.memory_bytes() <= max_bytes ? absl::StatusOr<MeshDelta>(std::move(delta)) : TooLarge(max_bytes);
 }
 
 absl::StatusOr<Mesh> ApplyDelta(const Mesh& base, const MeshDelta& delta) {

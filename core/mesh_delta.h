@@ -70,15 +70,17 @@ struct MeshDelta {
   uint64_t memory_bytes() const;
 };
 
-// What makes `base` the mesh `next`. It is small where `next` is an update of `base`, and right for any two meshes.
+// What makes `base` the mesh `next`. It is small where `next` is an update of `base`, and right for any two meshes. One
+// that takes more than `max_bytes` is not made.
 //
 // REQUIRES:   both are as Mesher makes them, or empty arrays in the place of what is about the boundary.
 // Guarantees: ApplyDelta(base, it) is `next` to the bit, in its order.
 // Complexity: expected O(n) for n rows of both, and DeltaScratchBytes of memory beside the result.
-// Errors:     INVALID_ARGUMENT: meshes of two dimensions; RESOURCE_EXHAUSTED: more rows than 32 bits can number;
-//             CANCELLED, DEADLINE_EXCEEDED.
+// Errors:     INVALID_ARGUMENT: meshes of two dimensions; RESOURCE_EXHAUSTED: max_bytes, more rows than 32 bits
+//             can number; CANCELLED, DEADLINE_EXCEEDED.
 // Threads:    thread-safe.
-absl::StatusOr<MeshDelta> DiffMeshes(const Mesh& base, const Mesh& next, const RunContext& context);
+absl::StatusOr<MeshDelta> DiffMeshes(const Mesh& base, const Mesh& next, uint64_t max_bytes,
+                                     const RunContext& context);
 
 // What DiffMeshes takes beside its result. Unit: bytes.
 uint64_t DeltaScratchBytes(uint64_t base_simplices);

@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
+#include <iostream>
 #include <memory>
 #include <string>
 #include <utility>
@@ -18,6 +18,8 @@
 
 namespace wellspace::core {
 namespace {
+
+constexpr uint64_t kMuch = uint64_t{1} << 40;  // bytes
 
 template <typename T>
 bool IsSame(const HugeVector<T>& a, const HugeVector<T>& b) {
@@ -43,7 +45,7 @@ void ExpectSame(const Mesh& a, const Mesh& b) {
 }
 
 MeshDelta Diff(const Mesh& base, const Mesh& next) {
-  absl::StatusOr<MeshDelta> delta = DiffMeshes(base, next, RunContext());
+  absl::StatusOr<MeshDelta> delta = DiffMeshes(base, next, kMuch, RunContext());
   EXPECT_TRUE(delta.ok()) << delta.status();
   return delta.ok() ? *std::move(delta) : MeshDelta();
 }
@@ -157,6 +159,21 @@ TEST_P(MeshDeltaTest, OfTheSameMeshHasNoRows) {
   ExpectApplied(mesh, mesh);
 }
 
+TEST_P(MeshDeltaTest, IsNotMadeIfItTakesMoreThanItMay) {
+  const Mesh base = RandomMesh(30, 60, true);
+  const Mesh next = RandomMesh(30, 60, true);
+  const uint64_t bytes = Diff(base, next).memory_bytes();
+  EXPECT_TRUE(DiffMeshes(base, next, bytes, RunContext()).ok());
+  EXPECT_EQ(DiffMeshes(base, next, bytes - 1, RunContext()).status().code(), absl::StatusCode::kResourceExhausted);
+}
+
+TEST_P(MeshDeltaTest, IsNotMadeOnceItIsCancelled) {
+  RunContext context;
+  context.Cancel();
+  const Mesh mesh = RandomMesh(30, 60, true);
+  EXPECT_EQ(DiffMeshes(mesh, mesh, kMuch, context).status().code(), absl::StatusCode::kCancelled);
+}
+
 TEST_P(MeshDeltaTest, ZerosHaveSigns) {
   Mesh base = RandomMesh(3, 1, false);
   base.points[0] = 0.0;
@@ -181,7 +198,7 @@ TEST_P(MeshDeltaTest, IsRefusedByAnotherMesh) {
   Mesh other_dimension = base;
   other_dimension.dimension = GetParam() == 2 ? 3 : 2;
   EXPECT_EQ(ApplyDelta(other_dimension, delta).status().code(), absl::StatusCode::kInvalidArgument);
-  EXPECT_EQ(DiffMeshes(base, other_dimension, RunContext()).status().code(), absl::StatusCode::kInvalidArgument);
+  EXPECT_EQ(DiffMeshes(base, other_dimension, kMuch, RunContext()).status().code(), absl::StatusCode::kInvalidArgument);
 }
 
 TEST_P(MeshDeltaTest, IsRefusedIfItContradictsItself) {
@@ -248,7 +265,8 @@ TEST(MeshDeltaOfUpdate, IsSmallInEachDimension) {
     ExpectApplied(updated.mesh, next);
     EXPECT_GT(next.vertex_count(), updated.mesh.vertex_count());
     // What is new are rows about the point: in 5-D and 6-D that is a large part of so small a mesh.
-    const double part = static_cast<double>(delta.kept_simplices.added.size()) / static_cast<double>(next.simplices.size());
+    const double part =
+        static_cast<double>(delta.kept_simplices.added.size()) / static_cast<double>(next.simplices.size());
     EXPECT_LT(part, dimension <= 3 ? 0.03 : 0.6) << dimension << "-D";
     std::cout << dimension << "-D: " << part << " of " << next.simplex_count() << " simplices are new, in "
               << delta.kept_simplices.runs.size() << " runs\n";
