@@ -159,11 +159,11 @@ class DeltaReceiver:
         if len(moved) != metadata.moved_vertex_count or (len(moved) and moved[-1] >= metadata.vertex_count):
             raise damaged("a difference with other moved vertices than announced")
         checksums = metadata.delta.checksums
-        for name, values in arrays.items():
-            if crc32c(values) != getattr(checksums, name):
+        for name, array in arrays.items():
+            if crc32c(array) != getattr(checksums, name):
                 raise damaged(f"a difference that makes other {name} than those of revision {metadata.revision}")
-            if len(values):
-                check_values(metadata, name, values)
+            if len(array):
+                check_values(metadata, name, array)
         return mesh_from(metadata, arrays, moved.astype(np.uint32))
 
     def _sources(self, name: str, field: int, base_rows: int, rows: int, added: int) -> Array:
@@ -179,7 +179,7 @@ class DeltaReceiver:
         total = int(kept.sum())
         if total > base_rows or new.sum() != added or total + added != rows:
             raise damaged(f"a difference that keeps {total} of {base_rows} {name} and has {added} new ones, of {rows}")
-        source = np.full(rows, -1, np.int64)
+        source: Array = np.full(rows, -1, np.int64)
         before = np.cumsum(kept) - kept  # of each run: the kept rows of those before it
         steps = np.arange(total)
         places = np.repeat(np.cumsum(kept + new) - kept - new - before, kept) + steps
@@ -189,25 +189,26 @@ class DeltaReceiver:
 
 def _numbers(gaps: Array) -> Array:
     """Ascending numbers that are listed by the gaps between them."""
-    return np.cumsum(gaps + 1) - 1
+    numbers: Array = np.cumsum(gaps + 1) - 1
+    return numbers
 
 
 def _joined(before: Array, source: Array, added: Array, width: int) -> Array:
     if len(added) != int((source < 0).sum()) * width:
         raise damaged(f"a difference with {len(added)} numbers in rows of {width}")
-    result = before[np.maximum(source, 0)] if len(before) else np.empty((len(source), width), before.dtype)
+    result: Array = before[np.maximum(source, 0)] if len(before) else np.empty((len(source), width), before.dtype)
     result[source < 0] = added.reshape(-1, width)
     return result.reshape(-1)
 
 
 def _changed(name: str, before: Array, source: Array, changed: Array, values: Array) -> Array:
-    """The rows of `before` that `source` says, those with the numbers `changed` and those that are new from `values`."""
+    """The rows of `before` that `source` says; those with the numbers `changed`, and those that are new, of `values`."""
     width = before.shape[1]
     is_new = source < 0
     if len(values) != (len(changed) + int(is_new.sum())) * width or (len(changed) and changed[-1] >= len(source)):
         raise damaged(f"a difference with {len(values)} numbers of {name}")
     rows = values.reshape(-1, width)
-    result = np.empty((len(source), width), values.dtype)
+    result: Array = np.empty((len(source), width), values.dtype)
     result[~is_new] = before[source[~is_new]]
     result[changed] = rows[: len(changed)]
     result[is_new] = rows[len(changed) :]
