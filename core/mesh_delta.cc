@@ -325,8 +325,7 @@ absl::StatusOr<MeshDelta> DiffMeshes(const Mesh& base, const Mesh& next, uint64_
   WELLSPACE_ASSIGN_OR_RETURN(delta.kept_simplices,
                              DiffMovedRows(base.simplices, next.simplices, dimension + 1, max_bytes, context));
   delta.simplex_regions = DiffRegions(base, next, delta.kept_simplices.runs);
-  WELLSPACE_ASSIGN_OR_RETURN(delta.kept_facets,
-                             DiffMovedRows(base.facets, next.facets, dimension, max_bytes, context));
+  WELLSPACE_ASSIGN_OR_RETURN(delta.kept_facets, DiffMovedRows(base.facets, next.facets, dimension, max_bytes, context));
   delta.domain_low = next.domain_low;
   delta.domain_high = next.domain_high;
   delta.moved_vertices = next.moved_vertices;

@@ -53,8 +53,8 @@ struct MeshDelta {
   ChangedRows<uint32_t> vertex_origins{};
   ChangedRows<int32_t> vertex_tags{};
   MovedRows kept_simplices{};
-  // Numbers of simplices of the new mesh that are kept, with other regions; then the regions of those that are new. If the
-  // base has no regions, those of all.
+  // Numbers of simplices of the new mesh that are kept, with other regions; then the regions of those that are new. If
+  // the base has no regions, those of all.
   ChangedRows<int32_t> simplex_regions{};
   MovedRows kept_facets{};
 
@@ -79,8 +79,7 @@ struct MeshDelta {
 // Errors:     INVALID_ARGUMENT: meshes of two dimensions; RESOURCE_EXHAUSTED: max_bytes, more rows than 32 bits
 //             can number; CANCELLED, DEADLINE_EXCEEDED.
 // Threads:    thread-safe.
-absl::StatusOr<MeshDelta> DiffMeshes(const Mesh& base, const Mesh& next, uint64_t max_bytes,
-                                     const RunContext& context);
+absl::StatusOr<MeshDelta> DiffMeshes(const Mesh& base, const Mesh& next, uint64_t max_bytes, const RunContext& context);
 
 // What DiffMeshes takes beside its result. Unit: bytes.
 uint64_t DeltaScratchBytes(uint64_t base_simplices);

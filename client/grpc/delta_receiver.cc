@@ -184,7 +184,8 @@ absl::Status DeltaReceiver::SetMetadata(const v1::MeshMetadata& metadata) {
     return header.chunk_count == 0 ? absl::OkStatus() : Contradiction("of ", header.chunk_count, " parts from itself");
   }
   if (is_begun_ && (header.revision != header_.revision || header.chunk_count != header_.chunk_count)) {
-    return Contradiction("to revision ", header.revision, " goes on where one to revision ", header_.revision, " ended");
+    return Contradiction("to revision ", header.revision, " goes on where one to revision ", header_.revision,
+                         " ended");
   }
   is_begun_ = true;
   header_ = std::move(header);
@@ -208,23 +209,23 @@ absl::Status DeltaReceiver::AddPart(const v1::MeshDelta& part) {
 absl::Status DeltaReceiver::CheckSizes() const {
   const uint64_t dimension = header_.dimension;
   const auto fits = [](uint64_t count, uint64_t most) { return count <= most; };
-  const bool do_fit =
-      fits(delta_.changed_points_size(), header_.vertex_count) &&
-      fits(delta_.points_size(), header_.vertex_count * dimension) &&
-      fits(delta_.changed_weights_size(), header_.vertex_count) && fits(delta_.weights_size(), header_.vertex_count) &&
-      fits(delta_.kept_simplices().kept_size(), header_.simplex_count) &&
-      fits(delta_.simplices_size(), header_.simplex_count * (dimension + 1)) &&
-      fits(delta_.changed_input_vertices_size(), header_.input_point_count) &&
-      fits(delta_.input_vertices_size(), header_.input_point_count) &&
-      fits(delta_.moved_vertices_size(), header_.moved_vertex_count) &&
-      fits(delta_.changed_vertex_origins_size(), header_.vertex_count) &&
-      fits(delta_.vertex_origins_size(), header_.vertex_count) &&
-      fits(delta_.changed_vertex_tags_size(), header_.vertex_count) &&
-      fits(delta_.vertex_tags_size(), header_.vertex_count) &&
-      fits(delta_.changed_simplex_regions_size(), header_.simplex_count) &&
-      fits(delta_.simplex_regions_size(), header_.simplex_count) &&
-      fits(delta_.kept_facets().kept_size(), header_.facet_count) &&
-      fits(delta_.facets_size(), header_.facet_count * dimension);
+  const bool do_fit = fits(delta_.changed_points_size(), header_.vertex_count) &&
+                      fits(delta_.points_size(), header_.vertex_count * dimension) &&
+                      fits(delta_.changed_weights_size(), header_.vertex_count) &&
+                      fits(delta_.weights_size(), header_.vertex_count) &&
+                      fits(delta_.kept_simplices().kept_size(), header_.simplex_count) &&
+                      fits(delta_.simplices_size(), header_.simplex_count * (dimension + 1)) &&
+                      fits(delta_.changed_input_vertices_size(), header_.input_point_count) &&
+                      fits(delta_.input_vertices_size(), header_.input_point_count) &&
+                      fits(delta_.moved_vertices_size(), header_.moved_vertex_count) &&
+                      fits(delta_.changed_vertex_origins_size(), header_.vertex_count) &&
+                      fits(delta_.vertex_origins_size(), header_.vertex_count) &&
+                      fits(delta_.changed_vertex_tags_size(), header_.vertex_count) &&
+                      fits(delta_.vertex_tags_size(), header_.vertex_count) &&
+                      fits(delta_.changed_simplex_regions_size(), header_.simplex_count) &&
+                      fits(delta_.simplex_regions_size(), header_.simplex_count) &&
+                      fits(delta_.kept_facets().kept_size(), header_.facet_count) &&
+                      fits(delta_.facets_size(), header_.facet_count * dimension);
   return do_fit ? absl::OkStatus() : Contradiction("larger than the mesh of ", header_.vertex_count, " vertices");
 }
 
@@ -247,11 +248,11 @@ absl::Status DeltaReceiver::Apply() {
                                          header_.input_point_count, &next.input_vertex));
   WELLSPACE_RETURN_IF_ERROR(ApplyChanged(mesh_.vertex_origins, delta.changed_vertex_origins(), delta.vertex_origins(),
                                          1, marks, &next.vertex_origins));
-  WELLSPACE_RETURN_IF_ERROR(ApplyChanged(mesh_.vertex_tags, delta.changed_vertex_tags(), delta.vertex_tags(), 1, marks,
-                                         &next.vertex_tags));
   WELLSPACE_RETURN_IF_ERROR(
-      ApplyRegions(mesh_.simplex_regions, delta, runs, mesh_.simplices.size() / (dimension + 1),
-                   header_.has_simplex_regions ? header_.simplex_count : 0, &next.simplex_regions));
+      ApplyChanged(mesh_.vertex_tags, delta.changed_vertex_tags(), delta.vertex_tags(), 1, marks, &next.vertex_tags));
+  WELLSPACE_RETURN_IF_ERROR(ApplyRegions(mesh_.simplex_regions, delta, runs, mesh_.simplices.size() / (dimension + 1),
+                                         header_.has_simplex_regions ? header_.simplex_count : 0,
+                                         &next.simplex_regions));
   WELLSPACE_RETURN_IF_ERROR(
       ApplyKept(mesh_.facets, delta.kept_facets(), delta.facets(), dimension, header_.facet_count, &next.facets)
           .status());

@@ -27,8 +27,7 @@ std::vector<MeshDeltas::Delta> MeshDeltas::Advance(Delta delta, uint64_t mesh_by
     dropped.push_back(std::move(deltas_.front()));
     deltas_.pop_front();
   };
-  const bool goes_on =
-      delta != nullptr && !deltas_.empty() && deltas_.back()->revision() == delta->base_revision();
+  const bool goes_on = delta != nullptr && !deltas_.empty() && deltas_.back()->revision() == delta->base_revision();
   while (!goes_on && !deltas_.empty()) {
     drop_first();
   }
@@ -50,7 +49,8 @@ absl::StatusOr<std::vector<MeshDeltas::Delta>> MeshDeltas::Between(uint64_t sinc
   }
   std::lock_guard lock(mutex_);
   const auto first = std::ranges::find(deltas_, since, [](const Delta& delta) { return delta->base_revision(); });
-  const auto last = std::find_if(first, deltas_.end(), [&](const Delta& delta) { return delta->revision() == revision; });
+  const auto last =
+      std::find_if(first, deltas_.end(), [&](const Delta& delta) { return delta->revision() == revision; });
   if (last != deltas_.end()) {
     chain.assign(first, last + 1);
     return chain;

@@ -78,8 +78,8 @@ absl::StatusOr<core::Mesh> MeshAgain(const Session& session, const core::MeshPar
 
 // What makes the last mesh `next`, if clients may want it, and it is small. Null otherwise, and where memory does not
 // allow it: they download the mesh then.
-std::shared_ptr<DeltaSnapshot> MakeDelta(const Session& session, const core::Mesh& next, const core::RunContext& context,
-                                         const SessionWork& work) {
+std::shared_ptr<DeltaSnapshot> MakeDelta(const Session& session, const core::Mesh& next,
+                                         const core::RunContext& context, const SessionWork& work) {
   const MeshSnapshot& last = *work.mesh;
   if (!session.deltas().IsWanted(last.revision())) {
     return nullptr;

@@ -228,8 +228,9 @@ class Session {
   std::optional<Spare> GetSpare() const;
   // To be called, without a lock, where the session was busy, or its structure or its locator in use: it may be spared.
   void NoteIdle() const;
-  // Gives the mesher up for other work, what points are located by, and the differences of meshes; it comes back as PrepareStructure and
-  // operations say. Returns how much memory that has freed: 0, and nothing is done, where there is nothing to spare.
+  // Gives the mesher up for other work, what points are located by, and the differences of meshes. The first two come
+  // back as PrepareStructure, PrepareLocator and operations say. Returns how much memory that has freed: 0, and nothing
+  // is done, where there is nothing to spare.
   //
   // Complexity: that of freeing the mesher, on this thread, without a lock.
   uint64_t GiveUpMesher();

@@ -41,10 +41,11 @@ absl::Status DownloadMeshCall::Find() {
 
 absl::Status DownloadMeshCall::FindDeltas(const Session& session) {
   if (request_.since_revision() > mesh_->revision()) {
-    return MakeError(v1::ERROR_REASON_INVALID_REQUEST,
-                     absl::StrCat("since_revision is ", request_.since_revision(), "; expected the revision of a mesh of ",
-                                  session.name(), ", the last of which is of revision ", mesh_->revision()),
-                     "since_revision");
+    return MakeError(
+        v1::ERROR_REASON_INVALID_REQUEST,
+        absl::StrCat("since_revision is ", request_.since_revision(), "; expected the revision of a mesh of ",
+                     session.name(), ", the last of which is of revision ", mesh_->revision()),
+        "since_revision");
   }
   WELLSPACE_ASSIGN_OR_RETURN(deltas_, session.deltas().Between(request_.since_revision(), mesh_->revision()));
   return absl::OkStatus();
@@ -52,12 +53,12 @@ absl::Status DownloadMeshCall::FindDeltas(const Session& session) {
 
 absl::Status DownloadMeshCall::CheckContinued(uint64_t revision, uint64_t chunks) const {
   if (request_.revision() != 0 && request_.revision() != revision) {
-    return MakeError(absl::StatusCode::kFailedPrecondition, v1::ERROR_REASON_REVISION_MISMATCH,
-                     absl::StrCat(IsDelta() ? "the first difference is to the mesh of revision "
-                                            : "the mesh of the session is of revision ",
-                                  revision, ", not ", request_.revision(),
-                                  " as asked for; download it from its first chunk"),
-                     "revision");
+    return MakeError(
+        absl::StatusCode::kFailedPrecondition, v1::ERROR_REASON_REVISION_MISMATCH,
+        absl::StrCat(
+            IsDelta() ? "the first difference is to the mesh of revision " : "the mesh of the session is of revision ",
+            revision, ", not ", request_.revision(), " as asked for; download it from its first chunk"),
+        "revision");
   }
   if (request_.next_chunk() > chunks) {
     return MakeError(v1::ERROR_REASON_CHUNK_OUT_OF_RANGE,
@@ -129,9 +130,7 @@ absl::StatusOr<grpc::ByteBuffer> DownloadMeshCall::MakeResponse() {
 LogFields DownloadMeshCall::Figures() const {
   LogFields figures;
   if (mesh_ != nullptr) {
-    figures.Add("session", request_.name())
-        .Add("vertices", mesh_->figures().vertices)
-        .Add("chunks", sent_chunks_);
+    figures.Add("session", request_.name()).Add("vertices", mesh_->figures().vertices).Add("chunks", sent_chunks_);
     if (IsDelta()) {
       figures.Add("since", request_.since_revision()).Add("deltas", uint64_t{deltas_.size()});
     }

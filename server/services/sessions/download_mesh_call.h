@@ -57,8 +57,8 @@ class DownloadMeshCall final
   v1::DownloadMeshRequest request_;
   std::optional<SessionUse> use_;
   std::shared_ptr<const MeshSnapshot> mesh_;  // null until found
-  std::vector<MeshDeltas::Delta> deltas_;      // to be sent in its place; none: it has not changed
-  size_t delta_ = 0;                           // which of them is sent now
+  std::vector<MeshDeltas::Delta> deltas_;     // to be sent in its place; none: it has not changed
+  size_t delta_ = 0;                          // which of them is sent now
   bool metadata_sent_ = false;
   uint64_t chunks_ = 0;  // of the mesh, or of the difference, for this call
   uint64_t next_chunk_ = 0;

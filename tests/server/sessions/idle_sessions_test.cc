@@ -216,8 +216,7 @@ TEST_F(IdleSessionsTest, OneThatAnswersAQueryIsLeftAlone) {
 
 TEST_F(IdleSessionsTest, DifferencesOfMeshesAreGivenUpToo) {
   const std::shared_ptr<Session> session = Refined();
-  const auto delta =
-      std::make_shared<DeltaSnapshot>(2, 3, core::MeshDelta{.dimension = 2}, MakeMesh({.dimension = 2}));
+  const auto delta = std::make_shared<DeltaSnapshot>(2, 3, core::MeshDelta{.dimension = 2}, MakeMesh({.dimension = 2}));
   (void)session->deltas().Advance(delta, kStructure);
   const uint64_t bytes = session->deltas().memory_bytes();
   EXPECT_GT(bytes, 0u);

@@ -202,7 +202,7 @@ def _joined(before: Array, source: Array, added: Array, width: int) -> Array:
 
 
 def _changed(name: str, before: Array, source: Array, changed: Array, values: Array) -> Array:
-    """The rows of `before` that `source` says; those with the numbers `changed`, and those that are new, of `values`."""
+    """The rows of `before` that `source` says; those with the numbers `changed`, and new ones, of `values`."""
     width = before.shape[1]
     is_new = source < 0
     if len(values) != (len(changed) + int(is_new.sum())) * width or (len(changed) and changed[-1] >= len(source)):
