@@ -81,6 +81,11 @@ absl::Status Client::DownloadMesh(const std::string& session, MeshSink& sink, ui
   return connection_->DownloadMesh(session, sink, revision, on_chunks, call);
 }
 
+absl::Status Client::UpdateMesh(const std::string& session, Mesh& mesh, const OnChunks& on_chunks,
+                                const CallOptions& call) {
+  return connection_->UpdateMesh(session, mesh, on_chunks, call);
+}
+
 absl::StatusOr<Operation> Client::StartRefinement(const std::string& session, const RefinementOptions& refinement,
                                                   const CallOptions& call) {
   return connection_->StartRefinement(session, refinement, call);

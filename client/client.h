@@ -109,6 +109,13 @@ class Client {
   absl::Status DownloadMesh(const std::string& session, MeshSink& sink, uint64_t revision = 0,
                             const OnChunks& on_chunks = nullptr, const CallOptions& call = {});
 
+  // Brings `mesh`, which a MeshCollector has got of the session, up to date: what has changed since `mesh.revision` is
+  // downloaded and applied, and its checksum looked at. Where the server does not know what has changed, or `mesh` is
+  // not what it was, all is downloaded. Then `mesh` is, to the bit, what DownloadMesh would bring. On an error it is as
+  // it was, or as the session had it in between.
+  absl::Status UpdateMesh(const std::string& session, Mesh& mesh, const OnChunks& on_chunks = nullptr,
+                          const CallOptions& call = {});
+
   // Operations; see the proto's OperationService. `operation` is a name, "sessions/{session}/operations/{operation}".
   absl::StatusOr<Operation> StartRefinement(const std::string& session, const RefinementOptions& refinement = {},
                                             const CallOptions& call = {});

@@ -65,6 +65,8 @@ class Connection {
                                                   const CallOptions& call) = 0;
   virtual absl::Status DownloadMesh(const std::string& session, MeshSink& sink, uint64_t revision,
                                     const OnChunks& on_chunks, const CallOptions& call) = 0;
+  virtual absl::Status UpdateMesh(const std::string& session, Mesh& mesh, const OnChunks& on_chunks,
+                                  const CallOptions& call) = 0;
 
   virtual absl::StatusOr<Operation> StartRefinement(const std::string& session, const RefinementOptions& refinement,
                                                     const CallOptions& call) = 0;

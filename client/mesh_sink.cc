@@ -2,13 +2,18 @@
 
 namespace wellspace::client {
 
+void SetHeader(const MeshHeader& header, Mesh& mesh) {
+  mesh.dimension = header.dimension;
+  mesh.domain_low = header.domain_low;
+  mesh.domain_high = header.domain_high;
+  mesh.boundary = header.boundary;
+  mesh.regions = header.regions;
+  mesh.statistics = header.statistics;
+  mesh.revision = header.revision;
+}
+
 absl::Status MeshCollector::Begin(const MeshHeader& header) {
-  mesh_.dimension = header.dimension;
-  mesh_.domain_low = header.domain_low;
-  mesh_.domain_high = header.domain_high;
-  mesh_.boundary = header.boundary;
-  mesh_.regions = header.regions;
-  mesh_.statistics = header.statistics;
+  SetHeader(header, mesh_);
   return absl::OkStatus();
 }
 

@@ -48,6 +48,9 @@ class MeshSink {
   virtual absl::Status Finish() = 0;
 };
 
+// Has `mesh` be of this header, but for the arrays.
+void SetHeader(const MeshHeader& header, Mesh& mesh);
+
 // Keeps the whole mesh in memory, which grows with what arrives, not with what was announced.
 //
 // Thread safety: thread-compatible.

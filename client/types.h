@@ -220,6 +220,7 @@ struct Mesh {
   std::vector<int32_t> simplex_regions;  // empty: all are of the only region
   std::vector<Region> regions;
   MeshStatistics statistics;
+  uint64_t revision = 0;  // of the session's mesh; 0: of no session
 };
 
 // How large a mesh would be.

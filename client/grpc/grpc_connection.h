@@ -54,6 +54,10 @@ class GrpcConnection final : public Connection {
   absl::Status DownloadMesh(const std::string& session, MeshSink& sink, uint64_t revision, const OnChunks& on_chunks,
                             const CallOptions& call) override;
 
+  // updates.cc
+  absl::Status UpdateMesh(const std::string& session, Mesh& mesh, const OnChunks& on_chunks,
+                          const CallOptions& call) override;
+
   // operations.cc
   absl::StatusOr<Operation> StartRefinement(const std::string& session, const RefinementOptions& refinement,
                                             const CallOptions& call) override;

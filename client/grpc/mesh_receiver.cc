@@ -90,47 +90,7 @@ bool IsTheSame(const MeshHeader& a, const MeshHeader& b) {
          a.has_simplex_regions == b.has_simplex_regions && a.has_vertex_marks == b.has_vertex_marks;
 }
 
-}  // namespace
-
-uint64_t MeshReceiver::WidthOf(int array) const {
-  return array == kPoints || array == kFacets ? header_.dimension : array == kSimplices ? header_.dimension + 1 : 1;
-}
-
-uint64_t MeshReceiver::SizeOf(int array) const {
-  const auto if_any = [](bool are_there, uint64_t rows) { return are_there ? rows : 0; };
-  const std::array<uint64_t, kArrays> rows = {header_.vertex_count,
-                                              if_any(header_.has_weights, header_.vertex_count),
-                                              if_any(header_.has_vertex_marks, header_.vertex_count),
-                                              if_any(header_.has_vertex_marks, header_.vertex_count),
-                                              if_any(header_.has_simplex_regions, header_.simplex_count),
-                                              header_.simplex_count,
-                                              header_.input_point_count,
-                                              header_.facet_count};
-  return rows[array] * WidthOf(array);
-}
-
-absl::Status MeshReceiver::CheckMetadata(const MeshHeader& header) const {
-  const size_t dimension = header.dimension;
-  if (header.dimension < 1 || header.dimension > kMaxDimension ||
-      (expectation_.dimension.has_value() && header.dimension != *expectation_.dimension) ||
-      header.domain_low.size() != dimension || header.domain_high.size() != dimension) {
-    return Contradiction(
-        "a mesh of dimension ", header.dimension, " with a domain of ", header.domain_low.size(), " low and ",
-        header.domain_high.size(), " high coordinates",
-        expectation_.dimension.has_value() ? absl::StrCat(", for points of dimension ", *expectation_.dimension) : "");
-  }
-  if (header.vertex_count > kMaxVertices || header.simplex_count > kMaxSimplices ||
-      header.input_point_count > kMaxInputPoints) {
-    return Contradiction(header.vertex_count, " vertices, ", header.simplex_count, " simplices and ",
-                         header.input_point_count, " points are more than can be");
-  }
-  if (expectation_.input_points.has_value() && header.input_point_count != *expectation_.input_points) {
-    return Contradiction("a mesh of ", header.input_point_count, " points; ", *expectation_.input_points, " were sent");
-  }
-  return CheckBoundary(header);
-}
-
-absl::Status MeshReceiver::CheckBoundary(const MeshHeader& header) const {
+absl::Status CheckBoundary(const MeshHeader& header) {
   uint64_t facets = 0;
   std::set<int32_t> tags;
   for (const BoundaryPart& part : header.boundary) {
@@ -154,13 +114,53 @@ absl::Status MeshReceiver::CheckBoundary(const MeshHeader& header) const {
   return absl::OkStatus();
 }
 
+}  // namespace
+
+absl::Status CheckHeader(const MeshHeader& header, const MeshExpectation& expectation) {
+  const size_t dimension = header.dimension;
+  if (header.dimension < 1 || header.dimension > kMaxDimension ||
+      (expectation.dimension.has_value() && header.dimension != *expectation.dimension) ||
+      header.domain_low.size() != dimension || header.domain_high.size() != dimension) {
+    return Contradiction(
+        "a mesh of dimension ", header.dimension, " with a domain of ", header.domain_low.size(), " low and ",
+        header.domain_high.size(), " high coordinates",
+        expectation.dimension.has_value() ? absl::StrCat(", for points of dimension ", *expectation.dimension) : "");
+  }
+  if (header.vertex_count > kMaxVertices || header.simplex_count > kMaxSimplices ||
+      header.input_point_count > kMaxInputPoints) {
+    return Contradiction(header.vertex_count, " vertices, ", header.simplex_count, " simplices and ",
+                         header.input_point_count, " points are more than can be");
+  }
+  if (expectation.input_points.has_value() && header.input_point_count != *expectation.input_points) {
+    return Contradiction("a mesh of ", header.input_point_count, " points; ", *expectation.input_points, " were sent");
+  }
+  return CheckBoundary(header);
+}
+
+uint64_t MeshReceiver::WidthOf(int array) const {
+  return array == kPoints || array == kFacets ? header_.dimension : array == kSimplices ? header_.dimension + 1 : 1;
+}
+
+uint64_t MeshReceiver::SizeOf(int array) const {
+  const auto if_any = [](bool are_there, uint64_t rows) { return are_there ? rows : 0; };
+  const std::array<uint64_t, kArrays> rows = {header_.vertex_count,
+                                              if_any(header_.has_weights, header_.vertex_count),
+                                              if_any(header_.has_vertex_marks, header_.vertex_count),
+                                              if_any(header_.has_vertex_marks, header_.vertex_count),
+                                              if_any(header_.has_simplex_regions, header_.simplex_count),
+                                              header_.simplex_count,
+                                              header_.input_point_count,
+                                              header_.facet_count};
+  return rows[array] * WidthOf(array);
+}
+
 absl::Status MeshReceiver::SetMetadata(const v1::MeshMetadata& metadata) {
   if (!expects_metadata_) {
     return Contradiction("a second metadata message");
   }
   expects_metadata_ = false;
   MeshHeader header = HeaderFromProto(metadata);
-  WELLSPACE_RETURN_IF_ERROR(CheckMetadata(header));
+  WELLSPACE_RETURN_IF_ERROR(CheckHeader(header, expectation_));
   if (has_metadata_) {
     return IsTheSame(header, header_)
                ? absl::OkStatus()

@@ -12,17 +12,24 @@
 
 namespace wellspace::client {
 
+// What a mesh is known to be.
+struct MeshExpectation {
+  std::optional<int> dimension;
+  std::optional<uint64_t> input_points;
+};
+
+// Whether there can be such a mesh.
+//
+// Errors:     DATA_LOSS, naming what is wrong.
+absl::Status CheckHeader(const MeshHeader& header, const MeshExpectation& expectation);
+
 // Takes the metadata, then the chunks in their order; what is right goes to a sink at once.
 //
 // Thread safety: thread-compatible.
 // Invariants: nothing of the mesh is kept.
 class MeshReceiver {
  public:
-  // What the mesh is known to be.
-  struct Expectation {
-    std::optional<int> dimension;
-    std::optional<uint64_t> input_points;
-  };
+  using Expectation = MeshExpectation;
 
   // REQUIRES:   `sink` outlives this.
   MeshReceiver(MeshSink& sink, const Expectation& expectation) : sink_(sink), expectation_(expectation) {}
@@ -58,8 +65,6 @@ class MeshReceiver {
     kArrays
   };
 
-  absl::Status CheckMetadata(const MeshHeader& header) const;
-  absl::Status CheckBoundary(const MeshHeader& header) const;
   uint64_t WidthOf(int array) const;
   uint64_t SizeOf(int array) const;  // in numbers
   // Whether `values` may follow what has come of `array`.

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/base/status_macros.h"
+#include "core/mesh_delta.h"
 #include "core/mesher.h"
 #include "server/base/clock.h"
 #include "server/jobs/job_size.h"
@@ -75,11 +76,37 @@ absl::StatusOr<core::Mesh> MeshAgain(const Session& session, const core::MeshPar
   return mesh;
 }
 
+// What makes the last mesh `next`, if clients may want it, and it is small. Null otherwise, and where memory does not
+// allow it: they download the mesh then.
+std::shared_ptr<DeltaSnapshot> MakeDelta(const Session& session, const core::Mesh& next,
+                                         const core::RunContext& context, const SessionWork& work) {
+  const MeshSnapshot& last = *work.mesh;
+  if (!session.deltas().IsWanted(last.revision())) {
+    return nullptr;
+  }
+  std::shared_ptr<DeltaSnapshot> made;
+  const absl::Status status = RunGuarded([&]() -> absl::Status {
+    const uint64_t most = last.loaded_bytes() / 2;
+    WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(work.mesher->memory_bytes() + 2 * last.loaded_bytes() +
+                                                  core::DeltaScratchBytes(last.figures().simplices) + most));
+    WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const core::Mesh> base, last.Whole(context));
+    WELLSPACE_ASSIGN_OR_RETURN(const core::MeshDelta delta, core::DiffMeshes(*base, next, most, context));
+    made = std::make_shared<DeltaSnapshot>(last.revision(), session.NextMeshRevision(), delta, next);
+    return absl::OkStatus();
+  });
+  return status.ok() ? made : nullptr;
+}
+
+// What an operation has made.
+struct Made {
+  std::shared_ptr<MeshSnapshot> mesh{};
+  std::shared_ptr<DeltaSnapshot> delta{};  // null: none
+};
+
 // Has the mesh made, by what the session has given for it; `is_first`: by its points alone. What did not succeed leaves
 // nothing behind: a mesher that it has changed is given up, and comes back by Replay.
-absl::StatusOr<std::shared_ptr<MeshSnapshot>> MakeMesh(const MesherFactory& create_mesher, const Session& session,
-                                                       const core::MeshParameters& parameters, bool is_first, Job& job,
-                                                       SessionWork& work) {
+absl::StatusOr<Made> MakeMesh(const MesherFactory& create_mesher, const Session& session,
+                              const core::MeshParameters& parameters, bool is_first, Job& job, SessionWork& work) {
   bool has_changed = is_first;
   const auto make = [&]() -> absl::StatusOr<core::Mesh> {
     if (is_first) {
@@ -89,15 +116,18 @@ absl::StatusOr<std::shared_ptr<MeshSnapshot>> MakeMesh(const MesherFactory& crea
     WELLSPACE_RETURN_IF_ERROR(BringBack(create_mesher, session, job, work));
     return MeshAgain(session, parameters, job.context(), work, &has_changed);
   };
-  std::shared_ptr<MeshSnapshot> mesh;
+  Made made;
   const absl::Status status = RunGuarded([&] {
-    WELLSPACE_ASSIGN_OR_RETURN(core::Mesh made, make());
+    WELLSPACE_ASSIGN_OR_RETURN(core::Mesh mesh, make());
     has_changed = true;
-    WELLSPACE_ASSIGN_OR_RETURN(mesh, session.KeepMesh(std::move(made), job.context()));
+    if (!is_first) {
+      made.delta = MakeDelta(session, mesh, job.context(), work);
+    }
+    WELLSPACE_ASSIGN_OR_RETURN(made.mesh, session.KeepMesh(std::move(mesh), job.context()));
     return absl::OkStatus();
   });
   if (status.ok()) {
-    return mesh;
+    return made;
   }
   if (has_changed) {
     work.mesher = nullptr;
@@ -105,24 +135,28 @@ absl::StatusOr<std::shared_ptr<MeshSnapshot>> MakeMesh(const MesherFactory& crea
   return status;
 }
 
-// The same, in the memory of `job`; what mesher and mesh have of it is theirs at the end, and the rest is released.
-absl::StatusOr<std::shared_ptr<MeshSnapshot>> Work(const MesherFactory& create_mesher, const Session& session,
-                                                   const core::MeshParameters& parameters, bool is_first, Job& job,
-                                                   SessionWork& work) {
+// The same, in the memory of `job`; what mesher, mesh and delta have of it is theirs at the end, and the rest is
+// released.
+absl::StatusOr<Made> Work(const MesherFactory& create_mesher, const Session& session,
+                          const core::MeshParameters& parameters, bool is_first, Job& job, SessionWork& work) {
   job.GiveMemory(std::move(work.memory));
-  absl::StatusOr<std::shared_ptr<MeshSnapshot>> mesh =
-      MakeMesh(create_mesher, session, parameters, is_first, job, work);
+  absl::StatusOr<Made> made = MakeMesh(create_mesher, session, parameters, is_first, job, work);
   if (work.mesher != nullptr) {
     work.memory = job.TakeMemory(work.mesher->memory_bytes());
     work.memory.MakeLasting(session.MesherLasts());
   }
-  if (mesh.ok()) {
-    MemoryReservation memory = job.TakeMemory((*mesh)->memory_bytes());
+  if (made.ok()) {
+    MemoryReservation memory = job.TakeMemory(made->mesh->memory_bytes());
     memory.MakeLasting();
-    (*mesh)->KeepMemory(std::move(memory));
+    made->mesh->KeepMemory(std::move(memory));
+    if (made->delta != nullptr) {
+      memory = job.TakeMemory(made->delta->memory_bytes());
+      memory.MakeLasting(session.MesherLasts());
+      made->delta->KeepMemory(std::move(memory));
+    }
   }
   job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();  // clients that see the end may use it at once
-  return mesh;
+  return made;
 }
 
 // Ends `operation`, or comes again until there is room on the disk for its end.
@@ -154,17 +188,19 @@ void Run(const CallEnvironment& environment, const std::shared_ptr<Session>& ses
       .points = session->points().coordinate_count() / operation->parameters().dimension,
       .replayed_steps = work->mesher == nullptr && !is_first ? session->steps().all().size() : 0,
   };
-  absl::StatusOr<std::shared_ptr<MeshSnapshot>> mesh =
+  absl::StatusOr<Made> made =
       Work(environment.create_mesher, *session, session->ParametersOf(*operation), is_first, job, *work);
-  report.status = mesh.status();
+  report.status = made.status();
   report.duration = SinceBoot() - start;
-  if (mesh.ok()) {
-    report.vertices = (*mesh)->figures().vertices;
-    report.simplices = (*mesh)->figures().simplices;
+  if (made.ok()) {
+    report.vertices = made->mesh->figures().vertices;
+    report.simplices = made->mesh->figures().simplices;
+  } else {
+    made = Made();
   }
   environment.observability.work().OnRefinement(report);  // before clients see the end
   const auto result = std::make_shared<WorkResult>(
-      WorkResult{.status = report.status, .work = *std::move(work), .mesh = mesh.ok() ? *std::move(mesh) : nullptr});
+      WorkResult{.status = report.status, .work = *std::move(work), .mesh = made->mesh, .delta = made->delta});
   EndWhenPossible(environment, session, operation, result);
 }
 

@@ -226,14 +226,14 @@ std::shared_ptr<const MeshSnapshot> Session::mesh() const {
   return work_.mesh;
 }
 
+uint64_t Session::NextMeshRevision() const {
+  std::lock_guard lock(mutex_);
+  return revision_ + 1;  // no other change of it is made while the operation is under way
+}
+
 absl::StatusOr<std::shared_ptr<MeshSnapshot>> Session::KeepMesh(core::Mesh mesh,
                                                                 const core::RunContext& context) const {
-  uint64_t revision = 0;
-  {
-    std::lock_guard lock(mutex_);
-    revision = revision_ + 1;  // no other change of it is made while the operation is under way
-  }
-  return log_.KeepMesh(name_, revision, std::move(mesh), context);
+  return log_.KeepMesh(name_, NextMeshRevision(), std::move(mesh), context);
 }
 
 absl::Status Session::Query(uint64_t* version, const std::function<absl::Status(const core::Mesher&)>& query) const {
@@ -287,12 +287,14 @@ uint64_t Session::SpareBytesLocked() const {
   }
   // A locator that is looked into now is held by others, too.
   const bool has_locator = located_mesh_ != nullptr && located_mesh_.use_count() == 1;
-  return (work_.mesher == nullptr ? 0 : work_.memory.bytes()) + (has_locator ? located_mesh_->memory.bytes() : 0);
+  return (work_.mesher == nullptr ? 0 : work_.memory.bytes()) + (has_locator ? located_mesh_->memory.bytes() : 0) +
+         deltas_.memory_bytes();
 }
 
 uint64_t Session::GiveUpMesher() {
   std::unique_ptr<core::Mesher> mesher;
   std::shared_ptr<const LocatedMesh> located;
+  std::vector<MeshDeltas::Delta> deltas;
   MemoryReservation memory;
   uint64_t bytes = 0;
   {
@@ -307,9 +309,11 @@ uint64_t Session::GiveUpMesher() {
     }
     mesher = std::move(work_.mesher);
     memory = std::move(work_.memory);
+    deltas = deltas_.GiveUp();
   }
   mesher = nullptr;  // before others may have its memory
   located = nullptr;
+  deltas.clear();
   memory.Release();
   return bytes;
 }

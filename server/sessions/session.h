@@ -27,6 +27,7 @@
 #include "server/jobs/memory_budget.h"
 #include "server/sessions/feature_store.h"
 #include "server/sessions/lease.h"
+#include "server/sessions/mesh_deltas.h"
 #include "server/sessions/operation.h"
 #include "server/sessions/point_account.h"
 #include "server/sessions/session_steps.h"
@@ -81,6 +82,7 @@ struct WorkResult {
   absl::Status status;
   SessionWork work;                    // what BeginWork gave; on an error its mesher is as it was, or null
   std::shared_ptr<MeshSnapshot> mesh;  // the new mesh, if the status is OK
+  MeshDeltas::Delta delta{};           // from the last mesh to it; null: not made
 };
 
 // Where its functions are: session.cc: state, lease, queries, what it gives up; session_points.cc: uploads;
@@ -223,6 +225,11 @@ class Session {
 
   // The last mesh; null before the first.
   std::shared_ptr<const MeshSnapshot> mesh() const;
+  // What is known of how it came from the meshes before.
+  MeshDeltas& deltas() { return deltas_; }
+  const MeshDeltas& deltas() const { return deltas_; }
+  // The revision of the mesh that the operation which is under way makes.
+  uint64_t NextMeshRevision() const;
   // Keeps `mesh`, the work of an operation that is under way, as the log keeps meshes.
   //
   // Errors:     those of SessionLog::KeepMesh.
@@ -237,8 +244,9 @@ class Session {
   std::optional<Spare> GetSpare() const;
   // To be called, without a lock, where the session was busy, or its structure or its locator in use: it may be spared.
   void NoteIdle() const;
-  // Gives the mesher up for other work, and what points are located by; it comes back as PrepareStructure and
-  // operations say. Returns how much memory that has freed: 0, and nothing is done, where there is nothing to spare.
+  // Gives the mesher up for other work, what points are located by, and the differences of meshes. The first two come
+  // back as PrepareStructure, PrepareLocator and operations say. Returns how much memory that has freed: 0, and nothing
+  // is done, where there is nothing to spare.
   //
   // Complexity: that of freeing the mesher, on this thread, without a lock.
   uint64_t GiveUpMesher();
@@ -485,6 +493,7 @@ class Session {
   SessionSteps steps_;              // see invariant (2)
   uint64_t structure_version_ = 0;  // of what queries see; 0: nothing yet
   std::shared_ptr<const LocatedMesh> located_mesh_;  // null, or of this mesh or one before
+  MeshDeltas deltas_;                                // has a lock of its own, after mutex_
   int structure_uses_ = 0;                           // while there are any, the mesher is not given up for other work
   uint64_t next_operation_ = 1;
   std::deque<std::shared_ptr<Operation>> operations_;  // ascending by number

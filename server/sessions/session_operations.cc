@@ -175,6 +175,7 @@ bool Session::EndWork(Operation& operation, WorkResult& result) {
       return true;
     }
   }
+  std::vector<MeshDeltas::Delta> dropped;  // is freed without the lock
   {
     std::lock_guard lock(mutex_);
     SessionWork& work = result.work;
@@ -187,6 +188,7 @@ bool Session::EndWork(Operation& operation, WorkResult& result) {
         work.mesh->MakeObsolete();
       }
       revision_ = work.mesh->revision();
+      dropped = deltas_.Advance(std::move(result.delta), work.mesh->loaded_bytes());
       work.meshed_points = committed_points_;
       NoteRefinementLocked(operation);
       is_ready_ = true;

@@ -59,6 +59,10 @@ absl::StatusOr<core::Mesh> MemoryMesh::Load(const core::RunContext& context) con
   return copy;  // Update makes the rest anew
 }
 
+absl::StatusOr<std::shared_ptr<const core::Mesh>> MemoryMesh::Whole(const core::RunContext& /*context*/) const {
+  return std::shared_ptr<const core::Mesh>(chunks_, &chunks_->mesh());
+}
+
 absl::StatusOr<core::HugeVector<double>> MemoryMesh::LoadPoints(const core::RunContext& context) const {
   return Copy(chunks_->mesh().points, context);
 }

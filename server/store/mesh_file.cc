@@ -266,6 +266,28 @@ absl::StatusOr<core::Mesh> MeshFile::Load(const core::RunContext& context) const
   return mesh;
 }
 
+absl::StatusOr<std::shared_ptr<const core::Mesh>> MeshFile::Whole(const core::RunContext& context) const {
+  using Chunk = v1::MeshChunk;
+  WELLSPACE_ASSIGN_OR_RETURN(core::Mesh loaded, Load(context));
+  auto mesh = std::make_shared<core::Mesh>(std::move(loaded));
+  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const Directory> whole, directory());
+  WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<File> file, Open());
+  const auto load = [&](int field, auto& values) { return LoadArray(*file, *whole, field, context, values); };
+  WELLSPACE_RETURN_IF_ERROR(load(Chunk::kVertexOriginsFieldNumber, mesh->vertex_origins));
+  WELLSPACE_RETURN_IF_ERROR(load(Chunk::kVertexTagsFieldNumber, mesh->vertex_tags));
+  WELLSPACE_RETURN_IF_ERROR(load(Chunk::kSimplexRegionsFieldNumber, mesh->simplex_regions));
+  WELLSPACE_RETURN_IF_ERROR(load(Chunk::kInputVerticesFieldNumber, mesh->input_vertex));
+  WELLSPACE_RETURN_IF_ERROR(load(Chunk::kFacetsFieldNumber, mesh->facets));
+  WELLSPACE_RETURN_IF_ERROR(load(Chunk::kMovedVerticesFieldNumber, mesh->moved_vertices));
+  for (const v1::BoundaryPart& part : whole->metadata().boundary()) {
+    mesh->boundary.push_back({.tag = part.tag(), .name = part.name(), .facets = part.facet_count()});
+  }
+  for (const v1::Region& region : whole->metadata().regions()) {
+    mesh->regions.push_back({.id = region.id(), .name = region.name()});
+  }
+  return std::shared_ptr<const core::Mesh>(std::move(mesh));
+}
+
 absl::StatusOr<core::HugeVector<double>> MeshFile::LoadPoints(const core::RunContext& context) const {
   WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const Directory> whole, directory());
   WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<File> file, Open());

@@ -3,6 +3,7 @@
 #define WELLSPACE_SERVER_STORE_MESH_SNAPSHOT_H_
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -73,6 +74,11 @@ class MeshSnapshot {
   //
   // Errors:     CANCELLED, DEADLINE_EXCEEDED.
   virtual absl::StatusOr<core::Mesh> Load(const core::RunContext& context) const = 0;
+
+  // All of it but the statistics, for which others ask Metadata. It may be this one's own.
+  //
+  // Errors:     CANCELLED, DEADLINE_EXCEEDED.
+  virtual absl::StatusOr<std::shared_ptr<const core::Mesh>> Whole(const core::RunContext& context) const = 0;
 
   // A copy of its points: vertices x dimension, row-major.
   //

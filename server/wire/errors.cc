@@ -65,6 +65,7 @@ absl::StatusCode CodeOf(v1::ErrorReason reason) {
     case v1::ERROR_REASON_UPLOAD_MISMATCH:
     case v1::ERROR_REASON_DOMAIN_FIXED:
     case v1::ERROR_REASON_WORK_CRASHED:
+    case v1::ERROR_REASON_DELTA_NOT_KEPT:
       return absl::StatusCode::kFailedPrecondition;
     case v1::ERROR_REASON_REVISION_MISMATCH:
       return absl::StatusCode::kAborted;

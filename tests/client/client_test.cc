@@ -48,6 +48,7 @@ class MockConnection : public Connection {
               (override));
   MOCK_METHOD(absl::Status, DownloadMesh,
               (const std::string&, MeshSink&, uint64_t, const OnChunks&, const CallOptions&), (override));
+  MOCK_METHOD(absl::Status, UpdateMesh, (const std::string&, Mesh&, const OnChunks&, const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<Operation>, StartRefinement,
               (const std::string&, const RefinementOptions&, const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<Operation>, GetOperation, (const std::string&, const CallOptions&), (override));
@@ -124,6 +125,8 @@ TEST(Client, PassesSessionsAndOperationsToItsConnection) {
   EXPECT_CALL(*connection, SetVertexSizes("s", ::testing::Ref(vertex_sizes), is_call))
       .WillOnce(Return(E("vertex sizes")));
   EXPECT_CALL(*connection, DownloadMesh("s", ::testing::Ref(sink), 6, _, is_call)).WillOnce(Return(E("download")));
+  Mesh mesh;
+  EXPECT_CALL(*connection, UpdateMesh("s", ::testing::Ref(mesh), _, is_call)).WillOnce(Return(E("update")));
   EXPECT_CALL(*connection, StartRefinement("s", Field(&RefinementOptions::restart, true), is_call))
       .WillOnce(Return(E("start")));
   EXPECT_CALL(*connection, GetOperation("o", is_call)).WillOnce(Return(E("operation")));
@@ -142,6 +145,7 @@ TEST(Client, PassesSessionsAndOperationsToItsConnection) {
   EXPECT_EQ(client.SetSizes("s", samples, call).status(), E("sizes"));
   EXPECT_EQ(client.SetVertexSizes("s", vertex_sizes, call).status(), E("vertex sizes"));
   EXPECT_EQ(client.DownloadMesh("s", sink, 6, nullptr, call), E("download"));
+  EXPECT_EQ(client.UpdateMesh("s", mesh, nullptr, call), E("update"));
   EXPECT_EQ(client.StartRefinement("s", {.restart = true}, call).status(), E("start"));
   EXPECT_EQ(client.GetOperation("o", call).status(), E("operation"));
   EXPECT_EQ(client.ListOperations("s", {.page_size = 2, .page_token = ""}, call).status(), E("operations"));

@@ -238,6 +238,25 @@ Download SessionCalls::DownloadMesh(const std::string& name, uint64_t revision, 
   return download;
 }
 
+Download SessionCalls::DownloadMesh(const v1::DownloadMeshRequest& request) {
+  grpc::ClientContext context;
+  const auto stream = sessions_->DownloadMesh(&context, request);
+  Download download;
+  v1::DownloadMeshResponse response;
+  while (stream->Read(&response)) {
+    EXPECT_LE(response.ByteSizeLong(), size_t{kMaxResponseBytes});
+    if (response.has_metadata()) {
+      download.metadata.push_back(response.metadata());
+    } else if (response.has_chunk()) {
+      download.chunks.push_back(response.chunk());
+    } else {
+      download.deltas.push_back(response.delta());
+    }
+  }
+  download.status = stream->Finish();
+  return download;
+}
+
 v1::SetSizesRequest SizesRequest(const std::string& name, const std::vector<double>& points,
                                  const std::vector<double>& sizes) {
   v1::SetSizesRequest request;

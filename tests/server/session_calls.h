@@ -48,6 +48,7 @@ struct Download {
   grpc::Status status;
   std::vector<v1::MeshMetadata> metadata;
   std::vector<v1::MeshChunk> chunks;
+  std::vector<v1::MeshDelta> deltas;  // parts
 };
 
 class SessionCalls {
@@ -88,6 +89,8 @@ class SessionCalls {
   // Downloads a mesh from `next_chunk` on. Breaks off when `stop_after` chunks have come.
   Download DownloadMesh(const std::string& name, uint64_t revision = 0, uint64_t next_chunk = 0,
                         std::optional<size_t> stop_after = std::nullopt, bool with_boundary = false);
+  // Downloads what `request` asks for, to its end.
+  Download DownloadMesh(const v1::DownloadMeshRequest& request);
 
   v1::SessionService::Stub& sessions() { return *sessions_; }
   v1::OperationService::Stub& operations() { return *operations_; }

@@ -2,9 +2,11 @@
 #ifndef WELLSPACE_SERVER_SERVICES_SESSIONS_DOWNLOAD_MESH_CALL_H_
 #define WELLSPACE_SERVER_SERVICES_SESSIONS_DOWNLOAD_MESH_CALL_H_
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "grpcpp/support/byte_buffer.h"
 #include "grpcpp/support/server_callback.h"
@@ -16,7 +18,8 @@
 
 namespace wellspace::server {
 
-// Sends the mesh that the session has when the call begins, whatever becomes of the session.
+// Sends the mesh that the session has when the call begins, or what leads to it from one before, whatever becomes of
+// the session.
 //
 // Thread safety and invariants: those of ResponseStream.
 class DownloadMeshCall final
@@ -32,9 +35,21 @@ class DownloadMeshCall final
   LogFields Figures() const override;
   std::optional<grpc::ByteBuffer> NextResponse() override;
 
-  // Wants mutex_ to be held: finds the mesh.
+  // The following want mutex_ to be held.
+
+  // Finds the mesh, and the differences that lead to it.
   absl::Status Find();
-  // The same: the metadata, then the next chunk.
+  // Finds the differences since request_.since_revision().
+  absl::Status FindDeltas(const Session& session);
+  // Refuses what is continued if it is not the mesh, or the first difference, of this revision and with these chunks.
+  absl::Status CheckContinued(uint64_t revision, uint64_t chunks) const;
+  // Begins what comes next: the mesh, or the next difference.
+  absl::Status BeginPart();
+  // Whether chunks are those of a difference.
+  bool IsDelta() const { return request_.since_revision() != 0; }
+  // Of what is sent now.
+  absl::StatusOr<v1::MeshMetadata> Metadata() const;
+  // The metadata, then the next chunk.
   absl::StatusOr<grpc::ByteBuffer> MakeResponse();
 
   // Guarded by mutex_.
@@ -42,9 +57,12 @@ class DownloadMeshCall final
   v1::DownloadMeshRequest request_;
   std::optional<SessionUse> use_;
   std::shared_ptr<const MeshSnapshot> mesh_;  // null until found
+  std::vector<MeshDeltas::Delta> deltas_;     // to be sent in its place; none: it has not changed
+  size_t delta_ = 0;                          // which of them is sent now
   bool metadata_sent_ = false;
-  uint64_t chunks_ = 0;  // of the mesh, for this call
+  uint64_t chunks_ = 0;  // of the mesh, or of the difference, for this call
   uint64_t next_chunk_ = 0;
+  uint64_t sent_chunks_ = 0;
 };
 
 }  // namespace wellspace::server

@@ -214,6 +214,18 @@ TEST_F(IdleSessionsTest, OneThatAnswersAQueryIsLeftAlone) {
   EXPECT_EQ(session->GiveUpMesher(), 0u) << "there is nothing any more";
 }
 
+TEST_F(IdleSessionsTest, DifferencesOfMeshesAreGivenUpToo) {
+  const std::shared_ptr<Session> session = Refined();
+  const auto delta = std::make_shared<DeltaSnapshot>(2, 3, core::MeshDelta{.dimension = 2}, MakeMesh({.dimension = 2}));
+  (void)session->deltas().Advance(delta, kStructure);
+  const uint64_t bytes = session->deltas().memory_bytes();
+  EXPECT_GT(bytes, 0u);
+  EXPECT_EQ(session->GetSpare()->bytes, kStructure + bytes);
+  EXPECT_EQ(session->GiveUpMesher(), kStructure + bytes);
+  EXPECT_EQ(session->deltas().memory_bytes(), 0u);
+  EXPECT_FALSE(session->GetSpare().has_value());
+}
+
 class EphemeralIdleSessionsTest : public IdleSessionsTest {
  protected:
   EphemeralIdleSessionsTest() : IdleSessionsTest(std::make_unique<EphemeralLog>()) {}

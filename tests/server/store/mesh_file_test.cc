@@ -68,6 +68,29 @@ TEST_P(MeshFileOf, IsToDownloadsWhatMemoryIs) {
   EXPECT_FALSE(std::filesystem::exists(path_ + ".tmp"));
 }
 
+TEST_P(MeshFileOf, IsWholeWhatWasWritten) {
+  const auto [dimension, vertices, has_weights, has_moved, has_regions] = GetParam();
+  const core::Mesh mesh = MakeMesh({.dimension = dimension,
+                                    .vertices = vertices,
+                                    .simplices = vertices * 6,
+                                    .has_weights = has_weights,
+                                    .has_moved = has_moved,
+                                    .has_regions = has_regions});
+  const auto whole = Keep(mesh, /*max_chunk_bytes=*/2000)->Whole(core::RunContext());
+  ASSERT_TRUE(whole.ok()) << whole.status();
+  EXPECT_EQ((*whole)->points, mesh.points);
+  EXPECT_EQ((*whole)->weights, mesh.weights);
+  EXPECT_EQ((*whole)->simplices, mesh.simplices);
+  EXPECT_EQ((*whole)->input_vertex, mesh.input_vertex);
+  EXPECT_EQ((*whole)->moved_vertices, mesh.moved_vertices);
+  EXPECT_EQ((*whole)->vertex_origins, mesh.vertex_origins);
+  EXPECT_EQ((*whole)->vertex_tags, mesh.vertex_tags);
+  EXPECT_EQ((*whole)->simplex_regions, mesh.simplex_regions);
+  EXPECT_EQ((*whole)->facets, mesh.facets);
+  EXPECT_EQ((*whole)->boundary, mesh.boundary);
+  EXPECT_EQ((*whole)->regions, mesh.regions);
+}
+
 TEST_P(MeshFileOf, LoadsWhatUpdateNeeds) {
   const auto [dimension, vertices, has_weights, has_moved, has_regions] = GetParam();
   const core::Mesh mesh = MakeMesh({.dimension = dimension,

@@ -160,7 +160,11 @@ def signed(values: npt.NDArray[Any], limit: int) -> npt.NDArray[Any]:
 
 def mesh_of(receiver: MeshReceiver) -> Mesh:
     """The mesh that has come."""
-    m, arrays = receiver.metadata, receiver.arrays
+    return mesh_from(receiver.metadata, receiver.arrays, receiver.moved_vertices)
+
+
+def mesh_from(m: Any, arrays: dict[str, npt.NDArray[Any]], moved: npt.NDArray[np.uint32]) -> Mesh:
+    """The mesh of these metadata, arrays and moved vertices."""
     d, n = m.dimension, m.vertex_count
     counts = [part.facet_count for part in m.boundary]
     regions = arrays["simplex_regions"]
@@ -179,7 +183,7 @@ def mesh_of(receiver: MeshReceiver) -> Mesh:
         vertex_origins=signed(arrays["vertex_origins"], m.input_point_count),
         vertex_tags=arrays["vertex_tags"],
         weights=arrays["weights"] if m.has_weights else None,
-        moved_vertices=signed(receiver.moved_vertices, n),
+        moved_vertices=signed(moved, n),
         box=np.array([list(m.domain.low), list(m.domain.high)]),
         statistics=statistics_of(m.statistics),
         revision=m.revision,

@@ -92,8 +92,7 @@ class MeshReceiver:
             metadata = message("MeshMetadata").FromString(bytes(serialized))
         except Exception as error:
             raise damaged("no message") from error
-        self._check_counts(metadata)
-        _check_names(metadata)
+        check_metadata(metadata, self._dimension, self._input_points)
         if self.metadata is not None:
             if _identity(metadata) != _identity(self.metadata):
                 raise damaged(f"a continued download of another mesh: revision {metadata.revision} after "
@@ -134,7 +133,7 @@ class MeshReceiver:
         checksum = crc32c(part)
         if checksum != crc:
             raise damaged(f"chunk {index} has the CRC32C {checksum:08x}, not {crc:08x} as sent")
-        self._check_values(place, part)
+        check_values(self.metadata, _ARRAYS[place].name, part)
         if moved is not None:
             rows = [count // self.metadata.dimension if place == 0 else 0 for count in (first, first + len(values))]
             self._check_moved(index, moved, *rows)
@@ -159,43 +158,10 @@ class MeshReceiver:
         return np.concatenate([np.empty(0, np.uint32), *self._moved])
 
     def _sizes(self) -> list[int]:
-        """Of the arrays: how many numbers they have."""
-        m = self.metadata
-        marks = m.vertex_count if m.has_vertex_marks else 0
-        regions = m.simplex_count if m.has_simplex_regions else 0
-        weights = m.vertex_count if m.has_weights else 0
-        return [
-            m.vertex_count * m.dimension,
-            weights,
-            marks,
-            marks,
-            regions,
-            m.simplex_count * (m.dimension + 1),
-            m.input_point_count,
-            m.facet_count * m.dimension,
-        ]
+        return list(sizes_of(self.metadata).values())
 
     def _widths(self) -> list[int]:
-        d = self.metadata.dimension
-        return [d, 1, 1, 1, 1, d + 1, 1, d]
-
-    def _check_counts(self, m: Any) -> None:
-        expected = self._dimension
-        if (
-            not 1 <= m.dimension <= _MAX_DIMENSION
-            or expected not in (None, m.dimension)
-            or not len(m.domain.low) == len(m.domain.high) == m.dimension
-        ):
-            raise damaged(f"a mesh of dimension {m.dimension} in a box of {len(m.domain.low)} low and "
-                          f"{len(m.domain.high)} high coordinates; expected {expected or 'one dimension'}")
-        if (
-            m.vertex_count > _MAX_VERTICES
-            or max(m.simplex_count, m.input_point_count, m.facet_count) > _MAX_SIMPLICES
-        ):
-            raise damaged(f"{m.vertex_count} vertices, {m.simplex_count} simplices, {m.facet_count} facets and "
-                          f"{m.input_point_count} points are more than can be")
-        if self._input_points not in (None, m.input_point_count):
-            raise damaged(f"a mesh of {m.input_point_count} points; {self._input_points} were sent")
+        return list(widths_of(self.metadata).values())
 
     def _check_order(self, place: int, count: int) -> None:
         sizes, name = self._sizes(), _ARRAYS[place].name
@@ -211,21 +177,6 @@ class MeshReceiver:
         if self._received[place] + count > sizes[place]:
             raise damaged(f"more than the announced {sizes[place]} numbers of {name}")
 
-    def _check_values(self, place: int, values: npt.NDArray[Any]) -> None:
-        """Whether the values can be those of the array: vertices that there are, tags that were announced."""
-        m, name = self.metadata, _ARRAYS[place].name
-        if name in ("simplices", "facets"):
-            if values.max() >= m.vertex_count:
-                raise damaged(f"{name} name vertex {values.max()} of {m.vertex_count}")
-        elif name == "input_vertices":
-            _check_below(name, "vertex", values, m.vertex_count, NO_VERTEX)
-        elif name == "vertex_origins":
-            _check_below(name, "input point", values, m.input_point_count, CORNER_ORIGIN)
-        elif name == "vertex_tags":
-            _check_known(name, "tag", values, [0, *(part.tag for part in m.boundary)])
-        elif name == "simplex_regions":
-            _check_known(name, "region", values, [region.id for region in m.regions])
-
     def _check_moved(self, index: int, moved: npt.NDArray[np.uint32], begin: int, end: int) -> None:
         """Vertices that have moved come with their points, which are those from `begin` up to `end`."""
         steps = np.diff(moved.astype(np.int64))
@@ -234,6 +185,62 @@ class MeshReceiver:
         if len(self.moved_vertices) + len(moved) > self.metadata.moved_vertex_count:
             raise damaged(f"more than the announced {self.metadata.moved_vertex_count} moved vertices")
         self._moved.append(moved.copy())
+
+
+def sizes_of(m: Any) -> dict[str, int]:
+    """Of the arrays of a mesh with these metadata: how many numbers they have."""
+    marks = m.vertex_count if m.has_vertex_marks else 0
+    return {
+        "points": m.vertex_count * m.dimension,
+        "weights": m.vertex_count if m.has_weights else 0,
+        "vertex_origins": marks,
+        "vertex_tags": marks,
+        "simplex_regions": m.simplex_count if m.has_simplex_regions else 0,
+        "simplices": m.simplex_count * (m.dimension + 1),
+        "input_vertices": m.input_point_count,
+        "facets": m.facet_count * m.dimension,
+    }
+
+
+def widths_of(m: Any) -> dict[str, int]:
+    """How many numbers their rows have."""
+    wide = {"points": m.dimension, "simplices": m.dimension + 1, "facets": m.dimension}
+    return {array.name: wide.get(array.name, 1) for array in _ARRAYS}
+
+
+def check_metadata(m: Any, dimension: int | None, input_points: int | None) -> None:
+    """Whether there can be such a mesh, of what it is known to be."""
+    if (
+        not 1 <= m.dimension <= _MAX_DIMENSION
+        or dimension not in (None, m.dimension)
+        or not len(m.domain.low) == len(m.domain.high) == m.dimension
+    ):
+        raise damaged(f"a mesh of dimension {m.dimension} in a box of {len(m.domain.low)} low and "
+                      f"{len(m.domain.high)} high coordinates; expected {dimension or 'one dimension'}")
+    if (
+        m.vertex_count > _MAX_VERTICES
+        or max(m.simplex_count, m.input_point_count, m.facet_count) > _MAX_SIMPLICES
+    ):
+        raise damaged(f"{m.vertex_count} vertices, {m.simplex_count} simplices, {m.facet_count} facets and "
+                      f"{m.input_point_count} points are more than can be")
+    if input_points not in (None, m.input_point_count):
+        raise damaged(f"a mesh of {m.input_point_count} points; {input_points} were sent")
+    _check_names(m)
+
+
+def check_values(m: Any, name: str, values: npt.NDArray[Any]) -> None:
+    """Whether the values can be those of the array: vertices that there are, tags that were announced."""
+    if name in ("simplices", "facets"):
+        if values.max() >= m.vertex_count:
+            raise damaged(f"{name} name vertex {values.max()} of {m.vertex_count}")
+    elif name == "input_vertices":
+        _check_below(name, "vertex", values, m.vertex_count, NO_VERTEX)
+    elif name == "vertex_origins":
+        _check_below(name, "input point", values, m.input_point_count, CORNER_ORIGIN)
+    elif name == "vertex_tags":
+        _check_known(name, "tag", values, [0, *(part.tag for part in m.boundary)])
+    elif name == "simplex_regions":
+        _check_known(name, "region", values, [region.id for region in m.regions])
 
 
 def _check_below(name: str, what: str, values: npt.NDArray[Any], count: int, least_other: int) -> None:

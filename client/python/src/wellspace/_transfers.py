@@ -9,6 +9,7 @@ from . import _api, _wire
 from ._arrays import Floats
 from ._calls import Calls, CallOptions
 from ._checksum import crc32c
+from ._delta import DeltaReceiver, metadata_of
 from ._domain import Domain
 from ._mesh import Mesh, mesh_of
 from ._messages import messages_of, point_chunks, receive
@@ -154,3 +155,75 @@ class Download:
                 raise
         receiver.finish()
         return mesh_of(receiver)
+
+
+class Update:
+    """One download of what has changed since a mesh, or of the whole mesh where that is of no use."""
+
+    def __init__(self, calls: Calls, session: str, since: Mesh, boundary: bool, on_progress: OnProgress) -> None:
+        self._calls = calls
+        self._session = session
+        self._boundary = boundary
+        self._on_progress = on_progress
+        self._deltas = DeltaReceiver(since)
+        self._whole: MeshReceiver | None = None
+        if since.revision == 0 or boundary != bool(since.facet_names):
+            self._whole = MeshReceiver()
+
+    def run(self, options: CallOptions) -> Mesh:
+        """Returns the session's mesh."""
+        return self._calls.run(options, self._attempt)
+
+    def _attempt(self, attempt: Attempt) -> Mesh:
+        if self._whole is None:
+            try:
+                return self._stream(attempt)
+            except Error as error:
+                # Also a mesh that is not what it was: the server's is not damaged then.
+                if error.reason != "DELTA_NOT_KEPT" and error.code != "DATA_LOSS":
+                    raise
+                self._whole = MeshReceiver()
+        return self._stream(attempt)
+
+    def _request(self) -> bytes:
+        request = _api.message("DownloadMeshRequest")(name=self._session, with_boundary=self._boundary)
+        if self._whole is None:
+            request.since_revision = self._deltas.mesh.revision
+            request.revision = self._deltas.revision
+            request.next_chunk = self._deltas.next_part
+        else:
+            request.revision = 0 if self._whole.metadata is None else self._whole.metadata.revision
+            request.next_chunk = self._whole.next_chunk
+        return bytes(request.SerializeToString())
+
+    def _stream(self, attempt: Attempt) -> Mesh:
+        self._deltas.resume()
+        if self._whole is not None:
+            self._whole.resume()
+        try:
+            with self._calls.stream("SessionService/DownloadMesh", self._request(), attempt) as answers:
+                for number, part in (field for answer in answers for field in messages_of(answer)):
+                    self._take(number, part)
+                    attempt.progressed = attempt.progressed or number > 1
+        except Error as error:
+            if error.code == "DATA_LOSS" or self._whole is None or not self._whole.has_all_chunks:
+                raise
+        if self._whole is None:
+            self._deltas.finish()
+            return self._deltas.mesh
+        self._whole.finish()
+        return mesh_of(self._whole)
+
+    def _take(self, number: int, part: memoryview) -> None:
+        if number == 1 and self._whole is None:
+            metadata = metadata_of(part)
+            if metadata.HasField("delta"):
+                self._deltas.set_metadata(metadata)
+                return
+            self._whole = MeshReceiver()  # a server that is too old for differences
+        if self._whole is not None:
+            receive(self._whole, number - 1, part)
+            self._on_progress(_part_of("download", self._whole.next_chunk, self._whole.metadata.chunk_count))
+        elif number == 3:
+            self._deltas.add_part(part)
+            self._on_progress(_part_of("download", self._deltas.next_part, self._deltas.part_count))
