@@ -12,7 +12,7 @@ declare -A packages=(
            libabsl-dev libc-ares-dev libspdlog-dev libboost-dev libtbb-dev libcli11-dev nlohmann-json3-dev
            prometheus-cpp-dev libcairo2-dev zlib1g-dev libminizip-dev libhdf5-dev
            libsqlite3-dev python3"
-  [test]="libgtest-dev libgmock-dev libcgal-dev python3 python3-grpcio python3-meshio python3-numpy openssl
+  [test]="libgtest-dev libgmock-dev libcgal-dev libeigen3-dev python3 python3-grpcio python3-meshio python3-numpy openssl
           python3-protobuf python3-scipy python3-tqdm libisal2 mypy
           python3-build python3-pip python3-setuptools python3-venv python3-wheel"
   [interoperability]="gmsh freefem++ python3-gmsh python3-h5py python3-meshio python3-vtk9 python3-numpy fish zsh"

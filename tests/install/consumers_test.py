@@ -55,12 +55,12 @@ class Consumers(unittest.TestCase):
         (folder / "CMakeLists.txt").write_text("cmake_minimum_required(VERSION 3.25)\nproject(any LANGUAGES CXX)\n" + text)
         return run("cmake", "-G", "Ninja", "-S", folder, "-B", folder / "build", f"-DCMAKE_PREFIX_PATH={self.prefix}", exit_code=exit_code)
 
-    def build(self, name):
+    def build(self, source, program="consumer"):
         folder = in_folder(self)
-        run("cmake", "-G", "Ninja", "-S", HERE / name, "-B", folder, f"-DCMAKE_PREFIX_PATH={self.prefix}",
+        run("cmake", "-G", "Ninja", "-S", source, "-B", folder, f"-DCMAKE_PREFIX_PATH={self.prefix}",
             "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Werror")
         run("cmake", "--build", folder)
-        return folder / "consumer"
+        return folder / program
 
     def build_by_pkg_config(self, name, *modules):
         program = in_folder(self) / "consumer"
@@ -72,17 +72,21 @@ class Consumers(unittest.TestCase):
     def mesh_by_core(self, program):
         self.assertRegex(run(program), r"^\d+ vertices, \d+ simplices: OK\n$")
 
-    def mesh_by_server(self, program):
-        mesh = in_folder(self) / "spot.npz"
+    def run_with_server(self, program, *arguments):
+        """Runs a program, which gets the address of a server of its own."""
         server = subprocess.Popen([BIN / "wellspaced", "--listen", "127.0.0.1:0"], stdout=subprocess.PIPE, text=True,
                                   stderr=subprocess.DEVNULL)
         try:
             address = server.stdout.readline().removeprefix("listening on ").strip()
-            output = run(program, address, ROOT / "examples" / "spot.csv", mesh)
+            return run(program, address, *arguments)
         finally:
             server.kill()
             server.wait()
             server.stdout.close()
+
+    def mesh_by_server(self, program):
+        mesh = in_folder(self) / "spot.npz"
+        output = self.run_with_server(program, ROOT / "examples" / "spot.csv", mesh)
         vertices = re.fullmatch(r"(\d+) vertices\n", output)[1]
         self.assertRegex(run(BIN / "wellspace", "check", mesh), f"^vertices +{int(vertices):,}\n")
 
@@ -114,13 +118,17 @@ class Consumers(unittest.TestCase):
                     self.assertNotIn(str(path), file.read_text(), file)
 
     def test_core_by_find_package(self):
-        self.mesh_by_core(self.build("core"))
+        self.mesh_by_core(self.build(HERE / "core"))
 
     def test_core_by_pkg_config(self):
         self.mesh_by_core(self.build_by_pkg_config("core", "wellspace-core"))
 
     def test_client_and_formats_by_find_package(self):
-        self.mesh_by_server(self.build("client"))
+        self.mesh_by_server(self.build(HERE / "client"))
+
+    def test_example_of_a_solver(self):
+        output = self.run_with_server(self.build(ROOT / "examples" / "poisson", "poisson"), 2, 2)
+        self.assertRegex(output, r"^(\d+ vertices, error \S+\n){2}$")
 
     def test_client_and_formats_by_pkg_config(self):
         self.mesh_by_server(self.build_by_pkg_config("client", "wellspace-client-files"))
