@@ -296,8 +296,9 @@ class Session {
   //             To be called again after a while.
   bool EndWork(Operation& operation, WorkResult& result);
   // Ends an operation that still waits for a worker as CANCELLED. Of one that runs it is noted that a client has asked
-  // for its end: its job is to be cancelled. No error if it has ended.
-  absl::Status Cancel(Operation& operation);
+  // for its end. Returns the job that the caller is to cancel, which one that runs has; null if there is none, or the
+  // operation had ended.
+  absl::StatusOr<std::shared_ptr<Job>> Cancel(Operation& operation);
 
   // Errors:     OPERATION_NOT_FOUND.
   absl::StatusOr<std::shared_ptr<Operation>> FindOperation(const std::string& operation_name) const;
@@ -328,7 +329,7 @@ class Session {
   absl::Status CommitState(const std::function<void(SessionChange&)>& fill);
   // Reads segments, seeds and sizes that were written down by another process, if that was not done yet.
   //
-  // Errors:     DATA_LOSS.
+  // Errors:     SESSION_NOT_FOUND, DATA_LOSS.
   absl::Status LoadInputs();
   absl::Status LoadSizes();
   // What SetSizes does.

@@ -214,6 +214,14 @@ TEST_F(RestoredSessionTest, LimitsThatWereLoweredLoseNothing) {
   EXPECT_EQ(DetailsOf(session_->Append(10, std::vector<double>{1, 2}, 0)).reason, "TOO_MANY_POINTS");
 }
 
+TEST_F(RestoredSessionTest, AClosedSessionIsNotTakenForADamagedOne) {
+  const auto sizes = std::make_shared<const core::SizeSamples>(core::SizeSamples{.points = {0, 0}, .sizes = {1}});
+  ASSERT_TRUE(session_->SetSizes(sizes, 0).ok());
+  StartProcess();
+  ASSERT_TRUE(session_->Close(0).ok());
+  EXPECT_EQ(DetailsOf(session_->SetSizes(sizes, 0)).reason, "SESSION_NOT_FOUND") << "its sizes were not read yet";
+}
+
 TEST_F(RestoredSessionTest, AClosedSessionIsWrittenDownNoMore) {
   const std::shared_ptr<Operation> operation = StartOperation();
   std::optional<SessionWork> work = session_->BeginWork(*operation);
