@@ -12,6 +12,7 @@
 #include "gtest/gtest.h"
 #include "server/observability/work_counters.h"
 #include "server/sessions/session_registry.h"
+#include "server/sessions/session_use.h"
 #include "server/store/durable_log.h"
 #include "server/store/ephemeral_log.h"
 #include "spdlog/logger.h"

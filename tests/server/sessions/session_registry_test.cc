@@ -10,6 +10,7 @@
 
 #include "absl/strings/escaping.h"
 #include "gtest/gtest.h"
+#include "server/sessions/session_use.h"
 #include "server/store/ephemeral_log.h"
 #include "server/wire/errors.h"
 #include "tests/server/service_harness.h"
