@@ -11,8 +11,8 @@
 
 namespace wellspace::server {
 
-// That of the mesh; before there is one, that of the parameters. Both corners are empty if none was given: it grows with
-// the points, and is open. A view.
+// That of the mesh; before there is one, that of the parameters. If none was given it is open, and grows with the
+// points: both corners are empty. A view.
 struct SessionBox {
   const std::vector<double>& low;
   const std::vector<double>& high;
