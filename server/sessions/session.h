@@ -62,8 +62,8 @@ struct AddedVertices {
 // Invariants: (1) revision grows with every change of the points, the features, the sizes or the mesh; (2) while the
 // session is busy, points, features, sizes, mesh, mesher and steps are touched by the work alone that has made it so;
 // (3) what did not succeed leaves the session as it was: structure and mesh are what Replay makes of the steps, whether
-// there is a mesher now or not; (4) no client is told of a change, and nothing shows it, before the log has it; a change
-// that the log cannot have is not made.
+// there is a mesher now or not; (4) no client is told of a change, and nothing shows it, before the log has it; one
+// that it cannot have is not made.
 class Session {
  public:
   struct Settings {
