@@ -104,6 +104,7 @@ TEST_F(OperationCancelTest, AJobThatBeginsMeanwhileHearsOfIt) {
     std::atomic<int> ready = 0;
     const auto meet = [&] {
       for (++ready; ready < 2;) {
+        std::this_thread::yield();
       }
     };
     std::atomic<bool> is_heard = false;
