@@ -23,8 +23,8 @@ namespace wellspace::server {
 namespace {
 
 // From below upwards: StartRefinement and ResumeRefinements submit a job (Submit). On a worker it takes what the
-// session gives it (Run), has the memory counted (Work) and the mesh made (MakeMesh: MeshFirst, or BringBack and MeshAgain),
-// and ends the operation (EndWhenPossible).
+// session gives it (Run), has the memory counted (Work) and the mesh made (MakeMesh: MeshFirst, or BringBack and
+// MeshAgain), and ends the operation (EndWhenPossible).
 
 // Before the end of an operation is written down again for which the disk had no room.
 constexpr absl::Duration kEndRetryDelay = absl::Seconds(1);
