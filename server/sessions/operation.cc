@@ -243,10 +243,10 @@ void Operation::Succeed(absl::Time now, uint64_t mesh_revision, uint64_t vertice
   End(v1::Operation::STATE_SUCCEEDED, now);
 }
 
-void Operation::Fail(absl::Time now, const absl::Status& status) {
+std::shared_ptr<Job> Operation::Fail(absl::Time now, const absl::Status& status) {
   std::lock_guard lock(mutex_);
   error_ = StatusToProto(status);
-  End(EndOf(status), now);
+  return End(EndOf(status), now);
 }
 
 core::Progress Operation::Snapshot() const {
@@ -260,13 +260,13 @@ void Operation::Keep(v1::ProgressEvent event) {
   }
 }
 
-void Operation::End(v1::Operation::State state, absl::Time now) {
+std::shared_ptr<Job> Operation::End(v1::Operation::State state, absl::Time now) {
   state_ = state;
   end_time_ = now;
   while (events_.size() > kEventsOfEnded) {
     events_.pop_front();
   }
-  job_ = nullptr;
+  return std::exchange(job_, nullptr);
 }
 
 void Operation::Notify() const {

@@ -66,8 +66,9 @@ class Operation {
   uint64_t Watch(std::function<void()> on_change);
   void Unwatch(uint64_t watch);
 
-  // The job that does the work, or will. False, and nothing is changed, if the operation has ended already.
-  bool SetJob(std::shared_ptr<Job> job);
+  // The job that does the work, or will. False, and nothing is changed, if the operation has ended already: the job is
+  // to be cancelled.
+  [[nodiscard]] bool SetJob(std::shared_ptr<Job> job);
   // Null before it is known, and again once the operation has ended. One that runs has a job.
   std::shared_ptr<Job> job() const;
 
@@ -96,8 +97,8 @@ class Operation {
   void Start(absl::Time now);
   // The figures are those of the new mesh.
   void Succeed(absl::Time now, uint64_t mesh_revision, uint64_t vertices, uint64_t simplices);
-  // CANCELLED if that is the code of `status`, else FAILED.
-  void Fail(absl::Time now, const absl::Status& status);
+  // CANCELLED if that is the code of `status`, else FAILED. Returns the job that it had, if any.
+  std::shared_ptr<Job> Fail(absl::Time now, const absl::Status& status);
   void Notify() const;
 
  private:
@@ -105,7 +106,8 @@ class Operation {
   core::Progress Snapshot() const;
   store::v1::OperationRecord RecordLocked() const;
   void Keep(v1::ProgressEvent event);
-  void End(v1::Operation::State state, absl::Time now);
+  // Returns the job that it had.
+  std::shared_ptr<Job> End(v1::Operation::State state, absl::Time now);
   bool HasEndedLocked() const { return end_time_ != absl::InfiniteFuture(); }
 
   const std::string name_;

@@ -23,6 +23,10 @@
 namespace wellspace::server {
 namespace {
 
+// From below upwards: StartRefinement and ResumeRefinements submit a job (Submit). On a worker it takes what the
+// session gives it (Run), has the memory counted (Work) and the mesh made (MakeMesh: MeshFirst, or BringBack and
+// MeshAgain), and ends the operation (EndWhenPossible).
+
 // Before the end of an operation is written down again for which the disk had no room.
 constexpr absl::Duration kEndRetryDelay = absl::Seconds(1);
 // Before an operation of an earlier process comes again that found the queue full.
@@ -174,7 +178,9 @@ void EndWhenPossible(const CallEnvironment& environment, const std::shared_ptr<S
 void Run(const CallEnvironment& environment, const std::shared_ptr<Session>& session,
          const std::shared_ptr<Operation>& operation, Job& job) {
   const absl::Duration start = SinceBoot();
-  operation->SetJob(job.shared_from_this());  // this may come before StartRefinement knows the job
+  if (!operation->SetJob(job.shared_from_this())) {  // that of Submit may come later
+    return;
+  }
   std::optional<SessionWork> work = session->BeginWork(*operation);
   if (!work.has_value()) {
     return;
@@ -229,7 +235,10 @@ absl::StatusOr<std::shared_ptr<Job>> Submit(const CallEnvironment& environment, 
           {.tenant = session->tenant(), .is_small = is_small, .work = [&environment, session, operation](Job& self) {
              Run(environment, session, operation, self);
            }}));
-  operation->SetJob(job);
+  if (!operation->SetJob(job)) {
+    environment.jobs.Cancel(
+        job);  // the operation has ended: an earlier process left it, and it was cancelled meanwhile
+  }
   return job;
 }
 
@@ -303,8 +312,7 @@ void ResumeRefinements(const CallEnvironment& environment, std::vector<ResumedOp
 }
 
 absl::Status CancelOperation(const CallEnvironment& environment, Session& session, Operation& operation) {
-  const std::shared_ptr<Job> job = operation.job();  // null once it has ended
-  WELLSPACE_RETURN_IF_ERROR(session.Cancel(operation));
+  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<Job> job, session.Cancel(operation));
   if (job != nullptr) {
     environment.jobs.Cancel(job);
   }

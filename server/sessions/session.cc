@@ -87,25 +87,24 @@ absl::Status Session::Update(std::optional<std::map<std::string, std::string>> l
                              const AnswerTo<v1::Session>& answer) {
   std::lock_guard change_lock(change_mutex_);
   v1::Session described;
+  const absl::Duration next_ttl = ttl.value_or(lease_.ttl());
   {
     std::lock_guard lock(mutex_);
     WELLSPACE_RETURN_IF_ERROR(CheckOpenLocked());
     WELLSPACE_RETURN_IF_ERROR(CheckRevisionLocked(expected_revision));
-    described = DescribeWithLocked(labels.value_or(labels_), ttl.value_or(lease_.ttl()));
+    described = DescribeWithLocked(labels.value_or(labels_), next_ttl);
   }
   const std::optional<store::v1::AnswerRecord> answer_record = AnswerRecordOf(answer, described);
   WELLSPACE_RETURN_IF_ERROR(CommitState([&](SessionChange& change) {
     *change.state->mutable_labels() = described.labels();
-    change.state->set_ttl_ns(absl::ToInt64Nanoseconds(ttl.value_or(lease_.ttl())));
+    change.state->set_ttl_ns(absl::ToInt64Nanoseconds(next_ttl));
     change.answer = answer_record;
   }));
   std::lock_guard lock(mutex_);
   if (labels.has_value()) {
     labels_ = *std::move(labels);
   }
-  if (ttl.has_value()) {
-    lease_.SetTtl(*ttl);
-  }
+  lease_.SetTtl(next_ttl);
   return absl::OkStatus();
 }
 
@@ -192,10 +191,13 @@ absl::Status Session::CheckReadyForChangeLocked(uint64_t expected_revision) cons
 }
 
 absl::Status Session::CheckMeshLocked() const {
-  if (work_.mesh == nullptr) {
-    return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
-                     absl::StrCat(name_, " has no mesh yet; start a refinement first"));
-  }
+  return work_.mesh != nullptr ? absl::OkStatus()
+                               : MakeError(v1::ERROR_REASON_MESH_NOT_READY,
+                                           absl::StrCat(name_, " has no mesh yet; start a refinement first"));
+}
+
+absl::Status Session::CheckStepsLocked() const {
+  WELLSPACE_RETURN_IF_ERROR(CheckMeshLocked());
   if (points_file_ > work_.mesh->revision()) {
     return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
                      absl::StrCat("the mesh of ", name_,
@@ -212,13 +214,19 @@ absl::Status Session::CheckMeshLocked() const {
 }
 
 absl::Status Session::CheckStructureLocked() const {
-  WELLSPACE_RETURN_IF_ERROR(CheckMeshLocked());
+  WELLSPACE_RETURN_IF_ERROR(CheckStepsLocked());
   if (work_.mesher != nullptr) {
     return absl::OkStatus();
   }
   return MakeError(
       v1::ERROR_REASON_MESH_NOT_READY,
       absl::StrCat("the structure of ", name_, " was given up in this moment; ask again, and it is built again"));
+}
+
+SessionBox Session::BoxLocked() const {
+  return work_.mesh != nullptr
+             ? SessionBox{.low = work_.mesh->figures().domain_low, .high = work_.mesh->figures().domain_high}
+             : SessionBox{.low = parameters_.domain_low, .high = parameters_.domain_high};
 }
 
 std::shared_ptr<const MeshSnapshot> Session::mesh() const {
@@ -285,10 +293,7 @@ uint64_t Session::SpareBytesLocked() const {
   if (busy_ != Busy::kNo || structure_uses_ > 0) {
     return 0;
   }
-  // A locator that is looked into now is held by others, too.
-  const bool has_locator = located_mesh_ != nullptr && located_mesh_.use_count() == 1;
-  return (work_.mesher == nullptr ? 0 : work_.memory.bytes()) + (has_locator ? located_mesh_->memory.bytes() : 0) +
-         deltas_.memory_bytes();
+  return (work_.mesher == nullptr ? 0 : work_.memory.bytes()) + locator_.SpareBytes() + deltas_.memory_bytes();
 }
 
 uint64_t Session::GiveUpMesher() {
@@ -296,49 +301,25 @@ uint64_t Session::GiveUpMesher() {
   std::shared_ptr<const LocatedMesh> located;
   std::vector<MeshDeltas::Delta> deltas;
   MemoryReservation memory;
-  uint64_t bytes = 0;
+  uint64_t delta_bytes = 0;
   {
     std::lock_guard lock(mutex_);
     std::unique_lock queries(queries_mutex_, std::try_to_lock);  // none can begin without mutex_
-    bytes = log_.is_durable() && queries.owns_lock() ? SpareBytesLocked() : 0;
-    if (bytes == 0) {
+    if (!log_.is_durable() || !queries.owns_lock() || SpareBytesLocked() == 0) {
       return 0;
     }
-    if (located_mesh_ != nullptr && located_mesh_.use_count() == 1) {
-      located = std::move(located_mesh_);
-    }
+    located = locator_.GiveUp();
     mesher = std::move(work_.mesher);
     memory = std::move(work_.memory);
+    delta_bytes = deltas_.memory_bytes();
     deltas = deltas_.GiveUp();
   }
+  const uint64_t bytes = memory.bytes() + (located == nullptr ? 0 : located->memory.bytes()) + delta_bytes;
   mesher = nullptr;  // before others may have its memory
   located = nullptr;
   deltas.clear();
   memory.Release();
   return bytes;
-}
-
-SessionUse::SessionUse(std::shared_ptr<Session> session) : session_(std::move(session)) {
-  std::lock_guard lock(session_->mutex_);
-  session_->lease_.BeginUse();
-}
-
-SessionUse::~SessionUse() {
-  std::lock_guard lock(session_->mutex_);
-  session_->lease_.EndUse(session_->clock_.since_boot());
-}
-
-StructureUse::StructureUse(std::shared_ptr<Session> session) : session_(std::move(session)) {
-  std::lock_guard lock(session_->mutex_);
-  ++session_->structure_uses_;
-}
-
-StructureUse::~StructureUse() {
-  {
-    std::lock_guard lock(session_->mutex_);
-    --session_->structure_uses_;
-  }
-  session_->NoteIdle();
 }
 
 }  // namespace wellspace::server

@@ -12,25 +12,27 @@
 #include <shared_mutex>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
 #include "absl/time/time.h"
-#include "core/mesh_locator.h"
 #include "core/mesher.h"
 #include "server/base/clock.h"
 #include "server/base/mesh_functions.h"
 #include "server/base/options.h"
 #include "server/jobs/job.h"
 #include "server/jobs/memory_budget.h"
+#include "server/sessions/answer_to.h"
 #include "server/sessions/feature_store.h"
 #include "server/sessions/lease.h"
 #include "server/sessions/mesh_deltas.h"
 #include "server/sessions/operation.h"
 #include "server/sessions/point_account.h"
+#include "server/sessions/session_box.h"
+#include "server/sessions/session_locator.h"
 #include "server/sessions/session_steps.h"
+#include "server/sessions/session_work.h"
 #include "server/store/mesh_snapshot.h"
 #include "server/store/point_store.h"
 #include "server/store/session_log.h"
@@ -39,36 +41,10 @@
 
 namespace wellspace::server {
 
-// What is written down as the answer to the request that a change is made for, given what it is answered with. It is
-// called once the change is certain to be made, unless it cannot be written down.
-template <typename T>
-using AnswerTo = std::function<std::optional<store::v1::AnswerRecord>(const T&)>;
-
-// Nothing where `answer` is null.
-template <typename T>
-std::optional<store::v1::AnswerRecord> AnswerRecordOf(const AnswerTo<T>& answer, const T& with) {
-  return answer == nullptr ? std::nullopt : answer(with);
-}
-
 // What AddVertices did.
 struct AddedVertices {
   std::vector<uint32_t> vertices;  // by point
   uint64_t revision = 0;           // of the session
-};
-
-// What an operation works on. The session has given it away until the operation has ended.
-struct SessionWork {
-  MemoryReservation memory;              // of `mesher`; first, so that it is given back when that is freed
-  std::unique_ptr<core::Mesher> mesher;  // null: there is none yet, or it was given up
-  uint64_t meshed_points = 0;            // how many of the session's points `mesher` has, or would have
-  std::shared_ptr<MeshSnapshot> mesh;    // the last mesh; null before the first
-};
-
-// A mesh of a session in which points can be located.
-struct LocatedMesh {
-  MemoryReservation memory;  // first, so that it is given back when the locator is freed
-  std::unique_ptr<const core::MeshLocator> locator;
-  uint64_t revision = 0;
 };
 
 // What a session has after points were removed.
@@ -77,28 +53,25 @@ struct PointsLeft {
   uint64_t revision = 0;  // of the session
 };
 
-// How the work of an operation has ended.
-struct WorkResult {
-  absl::Status status;
-  SessionWork work;                    // what BeginWork gave; on an error its mesher is as it was, or null
-  std::shared_ptr<MeshSnapshot> mesh;  // the new mesh, if the status is OK
-  MeshDeltas::Delta delta{};           // from the last mesh to it; null: not made
-};
-
-// Where its functions are: session.cc: state, lease, queries, what it gives up; session_points.cc: uploads;
-// session_removal.cc: points that are taken out; session_features.cc: segments; session_sizes.cc: sizes at points;
-// session_operations.cc: operations; session_structure.cc: the mesher that is built again, vertices that are added, the
-// locator; session_record.cc: how it is written down, and comes back.
+// A session. Its functions are in several files, which the parts of the class name:
 //
-// Thread safety: thread-safe.
-// Invariants: (1) revision grows with every change of the points, the features, the sizes or the mesh; (2) while an
-// operation is under way, or vertices are being added, points removed or the mesher built again, points, features,
-// sizes, mesh, mesher and steps are touched by nothing else; (3) what did not succeed leaves the session as it was:
-// structure and mesh are what Replay makes of the steps, whether there is a mesher now or not; (4) the lock order is
-// change_mutex_, this session's mutex, then that of an operation, of TenantPoints or, where memory is released, of the
-// JobPool; (5) no client is told of a change, and nothing shows it, before the log has it; one that it cannot have is
-// not made.
-// Functions that change the session wait for the log: they are to be called where that holds up no other work.
+//   session.cc             what clients see, labels, lease and end; queries; the mesher that is given up; checks
+//   session_points.cc      uploads                           session_features.cc    segments, seeds, rules of faces
+//   session_removal.cc     points that are taken out         session_operations.cc  operations
+//   session_sizes.cc       sizes at points
+//   session_structure.cc   the mesher that is built again, vertices that are added, the locator
+//   session_record.cc      how it is written down, and comes back
+//
+// What it is made of: session_work.h (mesher and mesh), session_steps.h, session_locator.h, mesh_deltas.h,
+// point_account.h, lease.h, operation.h, feature_store.h, session_box.h. Its states, and what changes them: docs/design/sessions.md, "States".
+//
+// Thread safety: thread-safe. Which lock is for what, and their order: below, at the members. Functions that change the
+//                session wait for the log: they are to be called where that holds up no other work.
+// Invariants: (1) revision grows with every change of the points, the features, the sizes or the mesh; (2) while the
+// session is busy, points, features, sizes, mesh, mesher and steps are touched by the work alone that has made it so;
+// (3) what did not succeed leaves the session as it was: structure and mesh are what Replay makes of the steps, whether
+// there is a mesher now or not; (4) no client is told of a change, and nothing shows it, before the log has it; one
+// that it cannot have is not made.
 class Session {
  public:
   struct Settings {
@@ -123,6 +96,8 @@ class Session {
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
+  // ---- What clients see, labels, lease and end: session.cc ----
+
   const std::string& tenant() const { return tenant_; }
   const std::string& name() const { return name_; }
   int dimension() const { return dimension_; }
@@ -136,18 +111,10 @@ class Session {
   // A session with a SessionUse, or with an operation under way, does not expire.
   bool IsExpired() const;
 
-  // Of this and all other changes, besides those that are named there: DISK_FULL, STORE_FAILED.
-
-  // Writes down that there is this session. To be called once, of a new one, before others know it.
-  absl::Status LogCreation(const AnswerTo<v1::Session>& answer);
-
-  // For one that was written down before: writes down what the new process has changed of its operation, and returns
-  // it, for its work to be done; or null, if none was under way.
-  absl::StatusOr<std::shared_ptr<Operation>> ResumeOperation();
-
   // Changes what is given.
   //
-  // Errors:     REVISION_MISMATCH.
+  // Errors:     REVISION_MISMATCH, SESSION_NOT_FOUND. Of this and all other changes, besides what is named there:
+  //             DISK_FULL, STORE_FAILED.
   absl::Status Update(std::optional<std::map<std::string, std::string>> labels, std::optional<absl::Duration> ttl,
                       uint64_t expected_revision, const AnswerTo<v1::Session>& answer = nullptr);
 
@@ -159,9 +126,19 @@ class Session {
                                                    const std::optional<store::v1::AnswerRecord>& answer = std::nullopt);
   // Closes the session if its lease has run out, so that nothing is under way. Says whether it has.
   bool CloseIfExpired();
+
+  // ---- How it is written down, and comes back: session_record.cc; Restore, above, too ----
+
+  // Writes down that there is this session. To be called once, of a new one, before others know it.
+  absl::Status LogCreation(const AnswerTo<v1::Session>& answer);
+  // For one that was written down before: writes down what the new process has changed of its operation, and returns
+  // it, for its work to be done; or null, if none was under way.
+  absl::StatusOr<std::shared_ptr<Operation>> ResumeOperation();
   // Writes down that a session which was closed by its lease is no more. Should that fail, it is there again after the
   // next start, with a new lease.
   void LogExpiry();
+
+  // ---- Uploads: session_points.cc ----
 
   // Lets one upload have the session. False: another has it.
   bool BeginUpload();
@@ -193,6 +170,8 @@ class Session {
   // Points and revision, as one.
   v1::UploadPointsResponse Committed() const;
 
+  // ---- Points that are taken out: session_removal.cc ----
+
   // Takes the points with these `numbers` out, and numbers the others anew, in their order: all or, on an error, none.
   // The structure goes with them: the next refinement begins another one, and until then the mesh is the last one.
   // `expected_revision` 0: any.
@@ -201,6 +180,8 @@ class Session {
   // Errors:     INVALID_POINTS, SESSION_BUSY, MEMORY_LIMIT, REVISION_MISMATCH, SESSION_NOT_FOUND; DATA_LOSS.
   absl::StatusOr<PointsLeft> RemovePoints(std::span<const uint64_t> numbers, uint64_t expected_revision,
                                           const AnswerTo<PointsLeft>& answer = nullptr);
+
+  // ---- Segments, seeds and rules of faces: session_features.cc ----
 
   // Appends the segments and seeds of `request`, of which the first become those of the numbers that it says, and takes
   // over its rules: all or, on an error, none. Where the session has segments and seeds already, they have to be equal,
@@ -211,6 +192,8 @@ class Session {
   absl::Status AddSegments(const v1::AddSegmentsRequest& request, uint64_t expected_revision);
   // Segments, seeds and revision, as one.
   v1::AddSegmentsResponse CommittedSegments() const;
+
+  // ---- Sizes at points: session_sizes.cc ----
 
   // Replaces the sizes at points that the next refinements keep to; null for none. `expected_revision` 0: any.
   //
@@ -223,17 +206,20 @@ class Session {
   // The number of sizes, and the revision, as one.
   v1::SetSizesResponse CommittedSizes() const;
 
+  // ---- Mesh and queries, and what is given up for other work: session.cc ----
+
   // The last mesh; null before the first.
   std::shared_ptr<const MeshSnapshot> mesh() const;
   // What is known of how it came from the meshes before.
   MeshDeltas& deltas() { return deltas_; }
   const MeshDeltas& deltas() const { return deltas_; }
-  // The revision of the mesh that the operation which is under way makes.
-  uint64_t NextMeshRevision() const;
-  // Keeps `mesh`, the work of an operation that is under way, as the log keeps meshes.
+  // Runs `query` on this thread, a worker's. Any number of queries run at once. An operation that begins waits for the
+  // queries that run: keep each short (some milliseconds), and call this again for the next batch.
+  // `version` is the structure's: 0 for the first batch, which sets it; later batches leave it as it was set.
   //
-  // Errors:     those of SessionLog::KeepMesh.
-  absl::StatusOr<std::shared_ptr<MeshSnapshot>> KeepMesh(core::Mesh mesh, const core::RunContext& context) const;
+  // Errors:     MESH_NOT_READY, SESSION_BUSY, SESSION_NOT_FOUND; REVISION_MISMATCH when the structure is no longer at
+  //             `version`; those of `query`.
+  absl::Status Query(uint64_t* version, const std::function<absl::Status(const core::Mesher&)>& query) const;
 
   // What of the session's memory other work may have.
   struct Spare {
@@ -253,6 +239,8 @@ class Session {
   // How long memory is reserved for its mesher.
   Lasts MesherLasts() const { return log_.is_durable() ? Lasts::kUntilWanted : Lasts::kSession; }
 
+  // ---- The structure, vertices that are added, and the locator: session_structure.cc ----
+
   // Makes sure that the session has a structure for queries and additions. Where the mesher was given up, `job` builds
   // it again, on this thread, a worker's. `*is_at_work`: another job builds it now, and the status is SESSION_BUSY.
   //
@@ -261,8 +249,19 @@ class Session {
   absl::Status PrepareStructure(uint64_t expected_revision, const MesherFactory& create_mesher, Job& job,
                                 bool* is_at_work = nullptr);
 
-  // The session's last mesh, for points to be located in. The first time `job` makes the locator, on this thread, a
-  // worker's; others that ask meanwhile wait for it. `revision` 0: any.
+  // Adds vertices at `points` on this thread, a worker's: all or, on an error, none. `near` has a vertex for each, or
+  // is empty.
+  //
+  // REQUIRES:   PrepareStructure has succeeded; if the mesher was given up since, the error is MESH_NOT_READY. A
+  //             StructureUse keeps others from having it given up.
+  // Errors:     MESH_NOT_READY, SESSION_BUSY, INVALID_CHUNK_SHAPE, INVALID_REQUEST (the length of `near`),
+  //             INVALID_POINTS, VERTEX_OUT_OF_RANGE, TOO_MANY_POINTS, QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH,
+  //             SESSION_NOT_FOUND; CANCELLED.
+  absl::StatusOr<AddedVertices> AddVertices(std::span<const double> points, std::span<const uint32_t> near,
+                                            uint64_t expected_revision, core::RunContext& context,
+                                            const AnswerTo<AddedVertices>& answer = nullptr);
+
+  // The session's last mesh, for points to be located in, as SessionLocator::Prepare says. `revision` 0: any.
   //
   // Errors:     MESH_NOT_READY, REVISION_MISMATCH, SESSION_NOT_FOUND; of making it: MEMORY_LIMIT, CANCELLED, DATA_LOSS.
   absl::StatusOr<std::shared_ptr<const LocatedMesh>> PrepareLocator(uint64_t revision, Job& job);
@@ -279,25 +278,7 @@ class Session {
   };
   Size GetSize(uint64_t few) const;
 
-  // Runs `query` on this thread, a worker's. Any number of queries run at once. An operation that begins waits for the
-  // queries that run: keep each short (some milliseconds), and call this again for the next batch.
-  // `version` is the structure's: 0 for the first batch, which sets it; later batches leave it as it was set.
-  //
-  // Errors:     MESH_NOT_READY, SESSION_BUSY, SESSION_NOT_FOUND; REVISION_MISMATCH when the structure is no longer at
-  //             `version`; those of `query`.
-  absl::Status Query(uint64_t* version, const std::function<absl::Status(const core::Mesher&)>& query) const;
-
-  // Adds vertices at `points` on this thread, a worker's: all or, on an error, none. `near` has a vertex for each, or
-  // is empty.
-  //
-  // REQUIRES:   PrepareStructure has succeeded; if the mesher was given up since, the error is MESH_NOT_READY. A
-  //             StructureUse keeps others from having it given up.
-  // Errors:     MESH_NOT_READY, SESSION_BUSY, INVALID_CHUNK_SHAPE, INVALID_REQUEST (the length of `near`),
-  //             INVALID_POINTS, VERTEX_OUT_OF_RANGE, TOO_MANY_POINTS, QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH,
-  //             SESSION_NOT_FOUND; CANCELLED.
-  absl::StatusOr<AddedVertices> AddVertices(std::span<const double> points, std::span<const uint32_t> near,
-                                            uint64_t expected_revision, core::RunContext& context,
-                                            const AnswerTo<AddedVertices>& answer = nullptr);
+  // ---- Operations: session_operations.cc ----
 
   // Begins an operation. The session is busy until the operation has ended. `submit` is called with it, to submit its
   // work; what it refuses is not begun. With `restart` the structure is made anew, in the same box.
@@ -320,21 +301,28 @@ class Session {
   //             To be called again after a while.
   bool EndWork(Operation& operation, WorkResult& result);
   // Ends an operation that still waits for a worker as CANCELLED. Of one that runs it is noted that a client has asked
-  // for its end: its job is to be cancelled. No error if it has ended.
-  absl::Status Cancel(Operation& operation);
+  // for its end. Returns the job that the caller is to cancel, which one that runs has; null if there is none, or the
+  // operation had ended.
+  absl::StatusOr<std::shared_ptr<Job>> Cancel(Operation& operation);
 
   // Errors:     OPERATION_NOT_FOUND.
   absl::StatusOr<std::shared_ptr<Operation>> FindOperation(const std::string& operation_name) const;
   // The operations after number `after`, the oldest first, at most `count`.
   std::vector<std::shared_ptr<Operation>> ListOperations(uint64_t after, size_t count) const;
 
-  // These are for the operation that is under way.
+  // The following are for the operation that is under way.
   const PointStore& points() const { return *points_; }
   const FeatureStore& features() const { return features_; }
   // Those of `operation`, and the sizes at points that it keeps to.
   core::MeshParameters ParametersOf(const Operation& operation) const;
   // What has made the structure.
   const SessionSteps& steps() const { return steps_; }
+  // The revision of the mesh that it makes.
+  uint64_t NextMeshRevision() const;
+  // Keeps `mesh`, the work of an operation that is under way, as the log keeps meshes.
+  //
+  // Errors:     those of SessionLog::KeepMesh.
+  absl::StatusOr<std::shared_ptr<MeshSnapshot>> KeepMesh(core::Mesh mesh, const core::RunContext& context) const;
 
  private:
   friend class SessionUse;
@@ -343,22 +331,19 @@ class Session {
   // Which change of the points or the mesh is under way. There is one at most.
   enum class Busy { kNo, kStarting, kOperation, kAddingVertices, kRemovingPoints, kReplaying };
 
-  // The following want change_mutex_ to be held.
+  // ---- For those that hold change_mutex_, and not mutex_ ----
 
   // Writes down what `fill` makes of an empty change, if the log keeps anything and the session is not closed.
   absl::Status Commit(const std::function<void(SessionChange&)>& fill,
                       SessionLog::Survives survives = SessionLog::Survives::kPowerLoss);
   // The same of a change that has the state of the session as it is now.
   absl::Status CommitState(const std::function<void(SessionChange&)>& fill);
-  // Reads segments, seeds and sizes that were written down by another process, if that was not done yet.
+  // Reads segments, seeds and sizes that were written down by another process, if that was not done yet. Whatever looks
+  // at them calls this first, without mutex_, since it reads files.
   //
-  // Errors:     DATA_LOSS.
+  // Errors:     SESSION_NOT_FOUND, DATA_LOSS.
   absl::Status LoadInputs();
   absl::Status LoadSizes();
-  // What SetSizes does.
-  absl::Status TryToSetSizes(const std::shared_ptr<const core::SizeSamples>& samples, uint64_t expected_revision);
-  // What AddSegments does.
-  absl::Status TryToAddSegments(const v1::AddSegmentsRequest& request, uint64_t expected_revision);
   // Writes down what AddSegments has appended: all of `request` but for what was known.
   absl::Status CommitFeatures(const v1::AddSegmentsRequest& request, uint64_t known_segments, uint64_t known_seeds);
   // Adds to `change` that points have come: those from committed_points_ on, up to number `end`, whose checksum is
@@ -367,7 +352,7 @@ class Session {
   absl::Status CommitStart(const Operation& operation, uint64_t end, const AnswerTo<v1::Operation>& answer);
   absl::Status CommitSuccess(const Operation& operation, const WorkResult& result, absl::Time now);
 
-  // Functions whose names end in Locked want mutex_ to be held.
+  // ---- For those that hold mutex_; const ones also for the work that has made the session busy, without it ----
 
   v1::Session DescribeWithLocked(const std::map<std::string, std::string>& labels, absl::Duration ttl) const;
   store::v1::SessionRecord RecordLocked() const;
@@ -376,8 +361,6 @@ class Session {
   void NotePointsLocked(uint64_t end);
   // All points are meshed, by `operation`, which has succeeded.
   void NoteRefinementLocked(const Operation& operation);
-  // Refuses samples outside the domain, if that is known.
-  absl::Status CheckSamplesLocked(const core::SizeSamples& samples) const;
   // The sets of sizes that are of no use once only `steps`, and the set `current`, are there.
   std::vector<SizesInUse> UnusedSizesLocked(const SessionSteps& steps, uint64_t current) const;
   // Drops points that are not committed.
@@ -396,29 +379,54 @@ class Session {
   absl::Status CheckIdleLocked() const;
   // All three of these.
   absl::Status CheckReadyForChangeLocked(uint64_t expected_revision) const;
-  // Whether there is something to query, or to build again.
+  // Whether there is a mesh.
   absl::Status CheckMeshLocked() const;
-  // Whether there is something to query now.
+  // Whether there is a structure to query, or steps that Replay can take.
+  absl::Status CheckStepsLocked() const;
+  // Whether there is a structure to query now.
   absl::Status CheckStructureLocked() const;
-  // Checks that an upload begins at `offset` with no gap before it.
-  absl::Status CheckNoGapLocked(uint64_t offset) const;
-  // Checks that the session has `coordinates` from point `first` on.
-  absl::Status CheckKnownLocked(uint64_t first, std::span<const double> coordinates) const;
-  // Refuses an AddSegments whose segments or seeds leave a gap, or are others than the session has. `*segments` and
-  // `*seeds` become how many of them the session has already.
-  absl::Status CheckKnownLocked(const v1::AddSegmentsRequest& request, uint64_t* segments, uint64_t* seeds) const;
-  // Refuses what no mesh of this session could have. `first` is the number of the first point.
-  absl::Status CheckCoordinatesLocked(uint64_t first, std::span<const double> coordinates) const;
-  // What Restore sets besides steps and operations.
-  void SetState(const StoredSession& stored);
+  SessionBox BoxLocked() const;
   void CloseNowLocked();
   // The session is the caller's alone until EndBusyLocked, and does not expire.
   void BeginBusyLocked(Busy busy);
   void EndBusyLocked();
 
-  // The following are called without mutex_.
+  // ---- For those that hold neither ----
 
-  // What RemovePoints does before it copies points; makes the session Busy::kRemovingPoints.
+  // What Restore sets besides steps and operations, before others know the session.
+  void SetState(const StoredSession& stored);
+  // What SetSizes and AddSegments do, but for RetryWithRoom.
+  absl::Status TryToSetSizes(const std::shared_ptr<const core::SizeSamples>& samples, uint64_t expected_revision);
+  absl::Status TryToAddSegments(const v1::AddSegmentsRequest& request, uint64_t expected_revision);
+  // Returns `change()`. Where memory has no room for it, it is called once more after idle sessions gave up `bytes`.
+  absl::Status RetryWithRoom(uint64_t bytes, const std::function<absl::Status()>& change);
+  // The last mesh. Errors: SESSION_NOT_FOUND, MESH_NOT_READY, REVISION_MISMATCH. `revision` 0: any.
+  absl::StatusOr<std::shared_ptr<const MeshSnapshot>> MeshAt(uint64_t revision) const;
+  // Waits for the queries that run. To be called when the session is busy, so that no other can begin.
+  void WaitForQueries();
+  // Builds the mesher again. For the work that has made the session Busy::kReplaying.
+  absl::Status Rebuild(const MesherFactory& create_mesher, Job& job);
+
+  // The parts of AddVertices, in their order.
+
+  // What it does before it touches the mesher; makes the session Busy::kAddingVertices. The following are for the work
+  // that has made it so.
+  absl::Status BeginAddition(std::span<const double> points, std::span<const uint32_t> near,
+                             uint64_t expected_revision);
+  // The part that the mesher does. First it takes in the points that were uploaded since it was last refined;
+  // `*uploaded` says how many it has taken in, on an error too.
+  absl::StatusOr<std::vector<uint32_t>> AddToMesher(std::span<const double> points, std::span<const uint32_t> near,
+                                                    core::RunContext& context, uint64_t* uploaded);
+  // The end where the mesher has taken `points` in, after `uploaded` others: the log has them then.
+  absl::Status CommitAddition(std::span<const double> points, uint64_t uploaded, const AnswerTo<AddedVertices>& answer,
+                              AddedVertices* added);
+  // Gives the mesher up, where it has what the session does not get.
+  void DropMesher();
+
+  // The parts of RemovePoints, in their order.
+
+  // What it does before it copies points; makes the session Busy::kRemovingPoints. The following are for the work that
+  // has made it so.
   absl::Status BeginRemoval(std::span<const uint64_t> numbers, uint64_t expected_revision);
   // What is left of the points.
   struct KeptPoints {
@@ -429,30 +437,8 @@ class Session {
   };
   // `*kept` is what there is of it, on an error too.
   absl::Status CopyPointsWithout(std::span<const uint64_t> numbers, KeptPoints* kept);
-  // The end of RemovePoints: the session has what is kept from now on.
+  // The end: the session has what is kept from now on.
   absl::StatusOr<PointsLeft> CommitRemoval(KeptPoints& kept, const AnswerTo<PointsLeft>& answer);
-  // Returns `change()`. Where memory has no room for it, it is called once more after idle sessions gave up `bytes`.
-  absl::Status RetryWithRoom(uint64_t bytes, const std::function<absl::Status()>& change);
-  // Waits for the queries that run. To be called when no other can begin.
-  void WaitForQueries();
-  // Builds the mesher again. To be called while the session is Busy::kReplaying.
-  absl::Status Rebuild(const MesherFactory& create_mesher, Job& job);
-  // What AddVertices does before it touches the mesher; makes the session Busy::kAddingVertices.
-  absl::Status BeginAddition(std::span<const double> points, std::span<const uint32_t> near,
-                             uint64_t expected_revision);
-  // The part of AddVertices that the mesher does. First it takes in the points that were uploaded since it was last
-  // refined; `*uploaded` says how many it has taken in, on an error too.
-  absl::StatusOr<std::vector<uint32_t>> AddToMesher(std::span<const double> points, std::span<const uint32_t> near,
-                                                    core::RunContext& context, uint64_t* uploaded);
-  // The end of AddVertices where the mesher has taken `points` in, after `uploaded` others: the log has them then.
-  absl::Status CommitAddition(std::span<const double> points, uint64_t uploaded, const AnswerTo<AddedVertices>& answer,
-                              AddedVertices* added);
-  // Gives the mesher up.
-  void DropMesher();
-  // Checks what AddVertices is given. The mesher is to take in `waiting` points before.
-  absl::Status CheckVertices(std::span<const double> points, std::span<const uint32_t> near, uint64_t waiting) const;
-  // Reserves memory for `count` more vertices in the mesher.
-  absl::Status ReserveForVertices(uint64_t count);
 
   const std::string tenant_;
   const std::string name_;
@@ -462,11 +448,22 @@ class Session {
   const Clock clock_;
   SessionLog& log_;
 
-  mutable std::mutex change_mutex_;          // before mutex_; held over a change, and until the log has it
-  mutable std::shared_mutex queries_mutex_;  // after mutex_; held shared by queries
-  std::mutex locator_mutex_;                 // before mutex_; held while a locator is made
-  mutable std::mutex mutex_;
-  // Guarded by mutex_. While the session is busy, who has made it so may read without it what nothing else changes.
+  // Locks, in their order; none is taken under one that stands below it. What others take before, between and after:
+  // docs/design/sessions.md, "Locks".
+  mutable std::mutex change_mutex_;          // held over a change, from its checks until it is made
+  mutable std::mutex mutex_;                 // guards what is below; never held over meshing, or over a commit
+  mutable std::shared_mutex queries_mutex_;  // held shared by a batch of queries, over its work
+  // Beside change_mutex_: no one holds both. It has its own locks, one of them before mutex_.
+  SessionLocator locator_;
+
+  // What is below is written with mutex_ held, and read with it. But:
+  //   - of a session that is busy, work_.mesher and work_.memory belong to the work that has made it so, which writes
+  //     them without mutex_. Others look at busy_ first, and leave them alone;
+  //   - that work reads without mutex_ what invariant (2) keeps from all others: points_, features_, sizes_, work_,
+  //     steps_, parameters_;
+  //   - who holds change_mutex_ reads without mutex_ what changes under both alone: parameters_, labels_, the length of
+  //     lease_, features_, sizes_, sizes_in_use_, are_inputs_loaded_, steps_, operations_, next_operation_, and, of a
+  //     session that is busy or durable, revision_ and committed_points_.
   core::MeshParameters parameters_;  // of the last refinement that succeeded; before it, those of the creation
   std::map<std::string, std::string> labels_;
   Lease lease_;
@@ -480,51 +477,22 @@ class Session {
   // committed_points_ are the session's, as clients see them; work_.meshed_points are in the mesher, or would be if it
   // was not given up; steps_.points() are what Replay makes a mesher of.
   PointAccount point_account_;
-  uint64_t points_file_ = 0;            // the number of the file of points_, which is made with it
-  std::unique_ptr<PointStore> points_;  // see invariant (2)
+  uint64_t points_file_ = 0;  // the number of the file of points_, which is made with it
+  std::unique_ptr<PointStore> points_;
   uint64_t committed_points_ = 0;
-  uint32_t uncommitted_crc32c_ = 0;                 // of the points behind the committed ones
-  FeatureStore features_;                           // see invariant (2)
+  uint32_t uncommitted_crc32c_ = 0;  // of the points behind the committed ones
+  FeatureStore features_;
   FeatureSummary feature_summary_;                  // of them, read or not
-  std::shared_ptr<const core::SizeSamples> sizes_;  // see invariant (2); null: none, or not read
+  std::shared_ptr<const core::SizeSamples> sizes_;  // null: none, or not read
   SizesInUse sizes_in_use_;                         // which these are
-  bool are_inputs_loaded_ = true;   // false: features and sizes were written down by another process, and not read yet
-  SessionWork work_;                // its mesher is away while an operation is under way; see invariant (2)
-  SessionSteps steps_;              // see invariant (2)
+  bool are_inputs_loaded_ = true;  // false: features and sizes were written down by another process, and not read yet
+  SessionWork work_;               // its mesher is away while an operation is under way
+  SessionSteps steps_;
   uint64_t structure_version_ = 0;  // of what queries see; 0: nothing yet
-  std::shared_ptr<const LocatedMesh> located_mesh_;  // null, or of this mesh or one before
-  MeshDeltas deltas_;                                // has a lock of its own, after mutex_
-  int structure_uses_ = 0;                           // while there are any, the mesher is not given up for other work
+  MeshDeltas deltas_;               // has a lock of its own, after mutex_
+  int structure_uses_ = 0;          // while there are any, the mesher is not given up for other work
   uint64_t next_operation_ = 1;
   std::deque<std::shared_ptr<Operation>> operations_;  // ascending by number
-};
-
-// Keeps a session from expiring, and renews its lease at the end.
-class SessionUse {
- public:
-  explicit SessionUse(std::shared_ptr<Session> session);
-  ~SessionUse();
-  SessionUse(const SessionUse&) = delete;
-  SessionUse& operator=(const SessionUse&) = delete;
-
-  Session& session() const { return *session_; }
-  const std::shared_ptr<Session>& session_ptr() const { return session_; }
-
- private:
-  const std::shared_ptr<Session> session_;
-};
-
-// Keeps a session from giving up its structure for other work: what PrepareStructure has built stays until it was
-// asked.
-class StructureUse {
- public:
-  explicit StructureUse(std::shared_ptr<Session> session);
-  ~StructureUse();
-  StructureUse(const StructureUse&) = delete;
-  StructureUse& operator=(const StructureUse&) = delete;
-
- private:
-  const std::shared_ptr<Session> session_;
 };
 
 }  // namespace wellspace::server

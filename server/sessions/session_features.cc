@@ -40,30 +40,32 @@ absl::Status CheckEqual(const Place& place, uint64_t equal, const std::string& s
                          place.field);
 }
 
-}  // namespace
-
-absl::Status Session::CheckKnownLocked(const v1::AddSegmentsRequest& request, uint64_t* segments,
-                                       uint64_t* seeds) const {
+// Refuses a request whose segments or seeds leave a gap, or are others than `features` of `session` have. `*segments`
+// and `*seeds` become how many of them it has already.
+absl::Status CheckRepeatedFeatures(const v1::AddSegmentsRequest& request, const FeatureStore& features,
+                                   const std::string& session, uint64_t* segments, uint64_t* seeds) {
   const Place segment_place{.what = "segments",
                             .offset_field = "segment_offset",
                             .field = "segments.ends",
                             .offset = request.segment_offset(),
                             .count = static_cast<uint64_t>(request.segments().ends_size()) / 2,
-                            .committed = features_.segment_count()};
+                            .committed = features.segment_count()};
   const Place seed_place{.what = "seeds",
                          .offset_field = "seed_offset",
                          .field = "faces.seeds",
                          .offset = request.seed_offset(),
                          .count = static_cast<uint64_t>(request.faces().seeds_size()),
-                         .committed = features_.seed_count()};
-  WELLSPACE_RETURN_IF_ERROR(CheckPlace(segment_place, name_));
-  WELLSPACE_RETURN_IF_ERROR(CheckPlace(seed_place, name_));
+                         .committed = features.seed_count()};
+  WELLSPACE_RETURN_IF_ERROR(CheckPlace(segment_place, session));
+  WELLSPACE_RETURN_IF_ERROR(CheckPlace(seed_place, session));
   *segments = segment_place.known();
   *seeds = seed_place.known();
   WELLSPACE_RETURN_IF_ERROR(
-      CheckEqual(segment_place, features_.CountEqual(segment_place.offset, *segments, request.segments()), name_));
-  return CheckEqual(seed_place, features_.CountEqual(seed_place.offset, *seeds, request.faces()), name_);
+      CheckEqual(segment_place, features.CountEqual(segment_place.offset, *segments, request.segments()), session));
+  return CheckEqual(seed_place, features.CountEqual(seed_place.offset, *seeds, request.faces()), session);
 }
+
+}  // namespace
 
 absl::Status Session::AddSegments(const v1::AddSegmentsRequest& request, uint64_t expected_revision) {
   return RetryWithRoom(FeatureStore::BytesOf(request.segments().ends_size() / 2, request.faces().seeds_size()),
@@ -85,7 +87,7 @@ absl::Status Session::TryToAddSegments(const v1::AddSegmentsRequest& request, ui
   {
     std::lock_guard lock(mutex_);
     WELLSPACE_RETURN_IF_ERROR(CheckReadyForChangeLocked(expected_revision));
-    WELLSPACE_RETURN_IF_ERROR(CheckKnownLocked(request, &known_segments, &known_seeds));
+    WELLSPACE_RETURN_IF_ERROR(CheckRepeatedFeatures(request, features_, name_, &known_segments, &known_seeds));
     if (known_segments == all_segments && known_seeds == all_seeds &&
         !(request.has_faces() && features_.HasOtherRules(request.faces()))) {
       return absl::OkStatus();

@@ -208,10 +208,10 @@ bool Session::EndWork(Operation& operation, WorkResult& result) {
   return true;
 }
 
-absl::Status Session::Cancel(Operation& operation) {
+absl::StatusOr<std::shared_ptr<Job>> Session::Cancel(Operation& operation) {
   std::unique_lock change_lock(change_mutex_);
   if (operation.HasEnded()) {
-    return absl::OkStatus();
+    return nullptr;
   }
   const absl::Time now = clock_.wall();
   const absl::Status cancelled = absl::CancelledError("the operation was cancelled");
@@ -221,17 +221,18 @@ absl::Status Session::Cancel(Operation& operation) {
   WELLSPACE_RETURN_IF_ERROR(Commit([&](SessionChange& change) { change.operations.push_back(std::move(record)); }));
   operation.NoteCancel();
   if (!is_queued) {
-    return absl::OkStatus();
+    return operation.job();  // neither BeginWork nor EndWork can come in between
   }
+  std::shared_ptr<Job> job;
   {
     std::lock_guard lock(mutex_);
     EndBusyLocked();
-    operation.Fail(now, cancelled);
+    job = operation.Fail(now, cancelled);
   }
   change_lock.unlock();
   operation.Notify();
   NoteIdle();
-  return absl::OkStatus();
+  return job;
 }
 
 absl::StatusOr<std::shared_ptr<Operation>> Session::FindOperation(const std::string& operation_name) const {

@@ -1,6 +1,5 @@
 // What a session does with the points that are uploaded to it.
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -10,30 +9,36 @@
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
+namespace {
 
-absl::Status Session::CheckCoordinatesLocked(uint64_t first, std::span<const double> coordinates) const {
-  // Before there is a mesh, a domain that was not given grows with the points.
-  const std::vector<double>* low = &parameters_.domain_low;
-  const std::vector<double>* high = &parameters_.domain_high;
-  if (work_.mesh != nullptr) {
-    low = &work_.mesh->figures().domain_low;
-    high = &work_.mesh->figures().domain_high;
-  }
-  int axis = 0;
-  for (size_t i = 0; i < coordinates.size(); ++i) {
-    const double x = coordinates[i];
-    if (low->empty() ? !std::isfinite(x) : !(x >= (*low)[axis] && x <= (*high)[axis])) {
-      return MakeError(
-          v1::ERROR_REASON_INVALID_POINTS,
-          absl::StrCat("points[", first + i / dimension_, "]: coordinate ", axis, " is ", x, "; ",
-                       low->empty() ? "a finite number is needed"
-                                    : absl::StrCat("in the domain it is from ", (*low)[axis], " to ", (*high)[axis])),
-          "points.coordinates");
-    }
-    axis = axis + 1 == dimension_ ? 0 : axis + 1;
-  }
-  return absl::OkStatus();
+// Checks that an upload to `session`, which has `count` points, begins at `offset` with no gap before it.
+absl::Status CheckNoGap(uint64_t offset, uint64_t count, const std::string& session) {
+  return offset <= count ? absl::OkStatus()
+                         : MakeError(v1::ERROR_REASON_UPLOAD_GAP,
+                                     absl::StrCat("point_offset is ", offset, ", but ", session, " has ", count,
+                                                  " points; go on at ", count, " or before"),
+                                     "point_offset");
 }
+
+// Checks that `coordinates` are those that `session` has from point `first` on, whose points are `points`.
+absl::Status CheckRepeatedPoints(const PointStore& points, int dimension, uint64_t first,
+                                 std::span<const double> coordinates, const std::string& session) {
+  WELLSPACE_ASSIGN_OR_RETURN(const uint64_t equal, points.CountEqual(first * dimension, coordinates));
+  if (equal == coordinates.size()) {
+    return absl::OkStatus();
+  }
+  const uint64_t other = first * dimension + equal;
+  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> known, points.Copy(other, other + 1, core::RunContext()));
+  const uint64_t point = first + equal / dimension;
+  return MakeError(
+      v1::ERROR_REASON_UPLOAD_MISMATCH,
+      absl::StrCat("points[", point, "]: coordinate ", equal % dimension, " is ", coordinates[equal], "; ", session,
+                   " has this point already, with ", known[0], "; send the same again, or add other points at ",
+                   points.coordinate_count() / dimension),
+      "points.coordinates");
+}
+
+}  // namespace
 
 bool Session::BeginUpload() {
   std::lock_guard lock(mutex_);
@@ -45,19 +50,10 @@ void Session::EndUpload() {
   is_uploading_ = false;
 }
 
-absl::Status Session::CheckNoGapLocked(uint64_t offset) const {
-  return offset <= point_account_.points()
-             ? absl::OkStatus()
-             : MakeError(v1::ERROR_REASON_UPLOAD_GAP,
-                         absl::StrCat("point_offset is ", offset, ", but ", name_, " has ", point_account_.points(),
-                                      " points; go on at ", point_account_.points(), " or before"),
-                         "point_offset");
-}
-
 absl::Status Session::CheckPrefix(const Prefix& prefix) const {
   std::lock_guard lock(mutex_);
   WELLSPACE_RETURN_IF_ERROR(CheckIdleLocked());
-  WELLSPACE_RETURN_IF_ERROR(CheckNoGapLocked(prefix.end));
+  WELLSPACE_RETURN_IF_ERROR(CheckNoGap(prefix.end, point_account_.points(), name_));
   WELLSPACE_ASSIGN_OR_RETURN(const uint32_t checksum,
                              points_->Checksum(prefix.first * dimension_, prefix.end * dimension_));
   return checksum == prefix.crc32c
@@ -70,21 +66,6 @@ absl::Status Session::CheckPrefix(const Prefix& prefix) const {
                          "checked_crc32c");
 }
 
-absl::Status Session::CheckKnownLocked(uint64_t first, std::span<const double> coordinates) const {
-  WELLSPACE_ASSIGN_OR_RETURN(const uint64_t equal, points_->CountEqual(first * dimension_, coordinates));
-  if (equal == coordinates.size()) {
-    return absl::OkStatus();
-  }
-  const uint64_t other = first * dimension_ + equal;
-  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> known, points_->Copy(other, other + 1, core::RunContext()));
-  const uint64_t point = first + equal / dimension_;
-  return MakeError(v1::ERROR_REASON_UPLOAD_MISMATCH,
-                   absl::StrCat("points[", point, "]: coordinate ", equal % dimension_, " is ", coordinates[equal],
-                                "; ", name_, " has this point already, with ", known[0],
-                                "; send the same again, or add other points at ", point_account_.points()),
-                   "points.coordinates");
-}
-
 absl::Status Session::Append(uint64_t offset, std::span<const double> coordinates, uint64_t expected_revision) {
   std::lock_guard lock(mutex_);
   WELLSPACE_RETURN_IF_ERROR(CheckReadyForChangeLocked(expected_revision));
@@ -94,15 +75,16 @@ absl::Status Session::Append(uint64_t offset, std::span<const double> coordinate
                                   " coordinates; expected a multiple of the dimension ", dimension_),
                      "points.coordinates");
   }
-  WELLSPACE_RETURN_IF_ERROR(CheckNoGapLocked(offset));
+  WELLSPACE_RETURN_IF_ERROR(CheckNoGap(offset, point_account_.points(), name_));
   const uint64_t count = point_account_.points();  // those that are not committed yet, too
   const uint64_t known = std::min<uint64_t>(count - offset, coordinates.size() / dimension_);
-  WELLSPACE_RETURN_IF_ERROR(CheckKnownLocked(offset, coordinates.first(known * dimension_)));
+  WELLSPACE_RETURN_IF_ERROR(
+      CheckRepeatedPoints(*points_, dimension_, offset, coordinates.first(known * dimension_), name_));
   coordinates = coordinates.subspan(known * dimension_);
   if (coordinates.empty()) {
     return absl::OkStatus();
   }
-  WELLSPACE_RETURN_IF_ERROR(CheckCoordinatesLocked(count, coordinates));
+  WELLSPACE_RETURN_IF_ERROR(CheckPoints(BoxLocked(), dimension_, count, coordinates));
   WELLSPACE_RETURN_IF_ERROR(point_account_.Take(coordinates.size() / dimension_));
   if (absl::Status appended = RunGuarded([&] { return points_->Append(coordinates); }); !appended.ok()) {
     point_account_.Return(coordinates.size() / dimension_);

@@ -216,6 +216,11 @@ absl::Status Session::LoadInputs() {
   if (are_inputs_loaded_) {
     return absl::OkStatus();
   }
+  {
+    // The log has no records any more of a session that was deleted, which would pass for damage.
+    std::lock_guard lock(mutex_);
+    WELLSPACE_RETURN_IF_ERROR(CheckOpenLocked());
+  }
   WELLSPACE_RETURN_IF_ERROR(LoadSizes());
   WELLSPACE_ASSIGN_OR_RETURN(const std::vector<store::v1::StepRecord::Features> steps, log_.ReadFeatures(name_));
   std::lock_guard lock(mutex_);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <iterator>
 #include <utility>
 
 #include "absl/strings/escaping.h"
@@ -99,7 +100,6 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Find(const std::string
       session = found->second;
     }
   }
-  // Without the lock: a session that is written to, or read, may have its own for a while.
   if (session == nullptr || session->tenant() != tenant || !session->Renew()) {
     return MakeError(v1::ERROR_REASON_SESSION_NOT_FOUND,
                      absl::StrCat("there is no ", name, "; it may have been deleted, or have expired"));
@@ -109,16 +109,19 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Find(const std::string
 
 std::vector<std::shared_ptr<Session>> SessionRegistry::List(const std::string& tenant, absl::Time after, size_t count,
                                                             const std::map<std::string, std::string>& labels) {
-  std::vector<std::shared_ptr<Session>> listed;
-  std::lock_guard lock(mutex_);
-  const auto known = tenants_.find(tenant);
-  if (known == tenants_.end()) {
-    return listed;
+  std::vector<std::shared_ptr<Session>> sessions;
+  {
+    std::lock_guard lock(mutex_);
+    if (const auto known = tenants_.find(tenant); known != tenants_.end()) {
+      const auto& all = known->second.sessions;
+      std::transform(all.upper_bound(after), all.end(), std::back_inserter(sessions),
+                     [](const auto& session) { return session.second; });
+    }
   }
-  const auto& sessions = known->second.sessions;
-  for (auto at = sessions.upper_bound(after); at != sessions.end() && listed.size() < count; ++at) {
-    if (at->second->HasLabels(labels) && !at->second->IsExpired()) {
-      listed.push_back(at->second);
+  std::vector<std::shared_ptr<Session>> listed;
+  for (const std::shared_ptr<Session>& session : sessions) {
+    if (listed.size() < count && session->HasLabels(labels) && !session->IsExpired()) {
+      listed.push_back(session);
     }
   }
   return listed;
@@ -150,15 +153,8 @@ size_t SessionRegistry::Count() const {
 }
 
 std::vector<std::shared_ptr<Session>> SessionRegistry::RemoveExpired() {
-  std::vector<std::shared_ptr<Session>> expired;
-  {
-    std::lock_guard lock(mutex_);
-    for (const auto& [name, session] : by_name_) {
-      if (session->CloseIfExpired()) {
-        expired.push_back(session);
-      }
-    }
-  }
+  std::vector<std::shared_ptr<Session>> expired = All();
+  std::erase_if(expired, [](const std::shared_ptr<Session>& session) { return !session->CloseIfExpired(); });
   for (const std::shared_ptr<Session>& session : expired) {
     Remove(*session);
   }

@@ -29,7 +29,8 @@ struct NewSession {
 
 // The sessions of all tenants. No tenant sees those of another.
 //
-// Thread safety: thread-safe. Locks of sessions are taken with that of the registry held, never the other way round.
+// Thread safety: thread-safe. No session is asked with the lock of the registry held: one that is written to, or read,
+//                may have its own for a while, which is not to hold up the others.
 // Invariants: (1) never more sessions than the limits of the server allow; (2) names are never used again, and cannot
 //             be guessed.
 class SessionRegistry {

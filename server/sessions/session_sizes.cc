@@ -20,24 +20,6 @@ bool AreEqual(const core::SizeSamples* a, const core::SizeSamples* b) {
 
 }  // namespace
 
-absl::Status Session::CheckSamplesLocked(const core::SizeSamples& samples) const {
-  const std::vector<double>& low = work_.mesh != nullptr ? work_.mesh->figures().domain_low : parameters_.domain_low;
-  const std::vector<double>& high = work_.mesh != nullptr ? work_.mesh->figures().domain_high : parameters_.domain_high;
-  if (low.empty()) {
-    return absl::OkStatus();  // the refinement, which will know the domain, refuses what is outside
-  }
-  for (size_t i = 0; i < samples.points.size(); ++i) {
-    const size_t axis = i % dimension_;
-    if (!(samples.points[i] >= low[axis] && samples.points[i] <= high[axis])) {
-      return MakeError(v1::ERROR_REASON_INVALID_SIZES,
-                       absl::StrCat("samples.points[", i / dimension_, "]: coordinate ", axis, " is ",
-                                    samples.points[i], "; in the domain it is from ", low[axis], " to ", high[axis]),
-                       "samples.points");
-    }
-  }
-  return absl::OkStatus();
-}
-
 std::vector<SizesInUse> Session::UnusedSizesLocked(const SessionSteps& steps, uint64_t current) const {
   std::vector<SizesInUse> had = steps_.sizes();
   if (sizes_in_use_.number != 0 && std::ranges::find(had, sizes_in_use_) == had.end()) {
@@ -71,7 +53,7 @@ absl::Status Session::TryToSetSizes(const std::shared_ptr<const core::SizeSample
     }
     WELLSPACE_RETURN_IF_ERROR(CheckRevisionLocked(expected_revision));
     if (samples != nullptr) {
-      WELLSPACE_RETURN_IF_ERROR(CheckSamplesLocked(*samples));
+      WELLSPACE_RETURN_IF_ERROR(CheckSamples(BoxLocked(), dimension_, *samples));
     }
     in_use = {.number = count == 0 ? 0 : revision_ + 1, .count = count};
     unused = UnusedSizesLocked(steps_, in_use.number);

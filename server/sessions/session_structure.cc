@@ -17,6 +17,33 @@ namespace {
 // clouds.
 constexpr uint64_t kReservedVertices = 2;
 
+// Reserves memory for `count` more vertices in the mesher of `work`.
+absl::Status ReserveForVertices(uint64_t count, MemoryBudget& memory, SessionWork& work) {
+  if (!memory.is_limited()) {
+    return absl::OkStatus();
+  }
+  const uint64_t bytes = work.mesher->memory_bytes();
+  const uint64_t wanted =
+      bytes + kReservedVertices * count * (bytes / std::max<uint64_t>(1, work.mesher->vertex_count()));
+  if (work.memory.Resize(wanted) ||
+      (memory.MakeRoom(wanted - std::min(wanted, work.memory.bytes()), MemoryBudget::Want::kAllOrNothing) &&
+       work.memory.Resize(wanted))) {
+    return absl::OkStatus();
+  }
+  return memory.Refusal(wanted, "the vertices of a session");
+}
+
+// Refuses vertices `near` that `mesher` does not have even when it has taken in `waiting` points.
+absl::Status CheckNear(std::span<const uint32_t> near, const core::Mesher& mesher, uint64_t waiting) {
+  const uint64_t most = mesher.vertex_count() + waiting;
+  const auto missing = std::ranges::find_if(near, [most](uint32_t vertex) { return vertex >= most; });
+  return missing == near.end() ? absl::OkStatus()
+                               : MakeError(v1::ERROR_REASON_VERTEX_OUT_OF_RANGE,
+                                           absl::StrCat("near[", missing - near.begin(), "] is ", *missing,
+                                                        ", and no vertex; there are ", mesher.vertex_count()),
+                                           "near");
+}
+
 }  // namespace
 
 absl::Status Session::PrepareStructure(uint64_t expected_revision, const MesherFactory& create_mesher, Job& job,
@@ -29,7 +56,7 @@ absl::Status Session::PrepareStructure(uint64_t expected_revision, const MesherF
       *is_at_work = busy_ == Busy::kReplaying && !is_closed_;
     }
     WELLSPACE_RETURN_IF_ERROR(CheckReadyForChangeLocked(expected_revision));
-    WELLSPACE_RETURN_IF_ERROR(CheckMeshLocked());
+    WELLSPACE_RETURN_IF_ERROR(CheckStepsLocked());
     if (work_.mesher != nullptr) {
       return absl::OkStatus();
     }
@@ -69,48 +96,25 @@ absl::Status Session::Rebuild(const MesherFactory& create_mesher, Job& job) {
   return absl::OkStatus();
 }
 
+absl::StatusOr<std::shared_ptr<const MeshSnapshot>> Session::MeshAt(uint64_t revision) const {
+  std::lock_guard lock(mutex_);
+  WELLSPACE_RETURN_IF_ERROR(CheckOpenLocked());
+  WELLSPACE_RETURN_IF_ERROR(CheckMeshLocked());
+  if (revision != 0 && revision != work_.mesh->revision()) {
+    return MakeError(v1::ERROR_REASON_REVISION_MISMATCH,
+                     absl::StrCat("revision is ", revision, ", but the mesh of ", name_, " is of revision ",
+                                  work_.mesh->revision()));
+  }
+  return work_.mesh;
+}
+
 bool Session::HasLocator() const {
   std::lock_guard lock(mutex_);
-  return located_mesh_ != nullptr && work_.mesh != nullptr && located_mesh_->revision == work_.mesh->revision();
+  return work_.mesh != nullptr && locator_.Has(work_.mesh->revision());
 }
 
 absl::StatusOr<std::shared_ptr<const LocatedMesh>> Session::PrepareLocator(uint64_t revision, Job& job) {
-  std::lock_guard locator_lock(locator_mutex_);
-  std::shared_ptr<const MeshSnapshot> mesh;
-  std::shared_ptr<const LocatedMesh> before;  // is freed without the lock
-  {
-    std::lock_guard lock(mutex_);
-    WELLSPACE_RETURN_IF_ERROR(CheckOpenLocked());
-    if (work_.mesh == nullptr) {
-      return MakeError(v1::ERROR_REASON_MESH_NOT_READY,
-                       absl::StrCat(name_, " has no mesh yet; start a refinement first"));
-    }
-    mesh = work_.mesh;
-    if (revision != 0 && revision != mesh->revision()) {
-      return MakeError(v1::ERROR_REASON_REVISION_MISMATCH, absl::StrCat("revision is ", revision, ", but the mesh of ",
-                                                                        name_, " is of revision ", mesh->revision()));
-    }
-    if (located_mesh_ != nullptr && located_mesh_->revision == mesh->revision()) {
-      return located_mesh_;
-    }
-    before = std::exchange(located_mesh_, nullptr);
-  }
-  before = nullptr;
-  const uint64_t bytes = mesh->loaded_bytes() + core::MeshLocator::BytesFor(dimension_, mesh->figures().simplices);
-  auto located = std::make_shared<LocatedMesh>();
-  const absl::Status made = job.RunApart([&](core::RunContext& context) -> absl::Status {
-    WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(bytes));
-    WELLSPACE_ASSIGN_OR_RETURN(core::Mesh loaded, mesh->Load(context));
-    WELLSPACE_ASSIGN_OR_RETURN(located->locator, core::MeshLocator::Create(std::move(loaded), context));
-    return absl::OkStatus();
-  });
-  WELLSPACE_RETURN_IF_ERROR(made);
-  located->revision = mesh->revision();
-  located->memory = job.TakeMemory(bytes);
-  located->memory.MakeLasting(MesherLasts());
-  std::lock_guard lock(mutex_);
-  located_mesh_ = located;
-  return located;
+  return locator_.Prepare([&] { return MeshAt(revision); }, MesherLasts(), job);
 }
 
 void Session::WaitForQueries() { std::unique_lock wait(queries_mutex_); }
@@ -233,29 +237,17 @@ absl::Status Session::CommitAddition(std::span<const double> points, uint64_t up
   return absl::OkStatus();
 }
 
-absl::Status Session::CheckVertices(std::span<const double> points, std::span<const uint32_t> near,
-                                    uint64_t waiting) const {
-  const uint64_t most = work_.mesher->vertex_count() + waiting;
-  const auto missing = std::ranges::find_if(near, [most](uint32_t vertex) { return vertex >= most; });
-  if (missing != near.end()) {
-    return MakeError(v1::ERROR_REASON_VERTEX_OUT_OF_RANGE,
-                     absl::StrCat("near[", missing - near.begin(), "] is ", *missing, ", and no vertex; there are ",
-                                  work_.mesher->vertex_count()),
-                     "near");
-  }
-  return CheckCoordinatesLocked(0, points);
-}
-
 absl::StatusOr<std::vector<uint32_t>> Session::AddToMesher(std::span<const double> points,
                                                            std::span<const uint32_t> near, core::RunContext& context,
                                                            uint64_t* uploaded) {
-  WELLSPACE_RETURN_IF_ERROR(ReserveForVertices(point_account_.points() - work_.meshed_points));
+  WELLSPACE_RETURN_IF_ERROR(ReserveForVertices(point_account_.points() - work_.meshed_points, memory_, work_));
   // Points that were uploaded since the last refinement come first: they have lower numbers.
   WELLSPACE_ASSIGN_OR_RETURN(const std::vector<double> waiting,
                              points_->CopyFrom(work_.meshed_points * dimension_, context));
   if (!waiting.empty()) {
     // What is wrong with the vertices shows before the mesher has taken in others, which would cost it.
-    WELLSPACE_RETURN_IF_ERROR(CheckVertices(points, near, waiting.size() / dimension_));
+    WELLSPACE_RETURN_IF_ERROR(CheckNear(near, *work_.mesher, waiting.size() / dimension_));
+    WELLSPACE_RETURN_IF_ERROR(CheckPoints(BoxLocked(), dimension_, 0, points));
     WELLSPACE_RETURN_IF_ERROR(work_.mesher->AddPoints(waiting, context).status());
     *uploaded = waiting.size() / dimension_;
   }
@@ -264,21 +256,6 @@ absl::StatusOr<std::vector<uint32_t>> Session::AddToMesher(std::span<const doubl
     return MakeError(v1::ERROR_REASON_VERTEX_OUT_OF_RANGE, std::string(added.status().message()), "near");
   }
   return added;
-}
-
-absl::Status Session::ReserveForVertices(uint64_t count) {
-  if (!memory_.is_limited()) {
-    return absl::OkStatus();
-  }
-  const uint64_t bytes = work_.mesher->memory_bytes();
-  const uint64_t wanted =
-      bytes + kReservedVertices * count * (bytes / std::max<uint64_t>(1, work_.mesher->vertex_count()));
-  if (work_.memory.Resize(wanted) ||
-      (memory_.MakeRoom(wanted - std::min(wanted, work_.memory.bytes()), MemoryBudget::Want::kAllOrNothing) &&
-       work_.memory.Resize(wanted))) {
-    return absl::OkStatus();
-  }
-  return memory_.Refusal(wanted, "the vertices of a session");
 }
 
 }  // namespace wellspace::server

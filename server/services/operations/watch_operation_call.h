@@ -11,7 +11,7 @@
 #include "server/calls/call.h"
 #include "server/calls/response_stream.h"
 #include "server/sessions/operation.h"
-#include "server/sessions/session.h"
+#include "server/sessions/session_use.h"
 #include "wellspace/v1/operations.pb.h"
 
 namespace wellspace::server {

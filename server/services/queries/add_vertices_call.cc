@@ -7,6 +7,7 @@
 #include "core/base/status_macros.h"
 #include "server/jobs/job_size.h"
 #include "server/services/resource_names.h"
+#include "server/sessions/session_use.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {

@@ -11,7 +11,7 @@
 #include "server/calls/call.h"
 #include "server/jobs/job.h"
 #include "server/log/log_fields.h"
-#include "server/sessions/session.h"
+#include "server/sessions/session_use.h"
 #include "wellspace/v1/queries.pb.h"
 
 namespace wellspace::server {

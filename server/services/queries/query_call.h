@@ -16,6 +16,7 @@
 #include "server/log/log_fields.h"
 #include "server/services/queries/vertex_query.h"
 #include "server/sessions/session.h"
+#include "server/sessions/session_use.h"
 
 namespace wellspace::server {
 

@@ -13,7 +13,7 @@
 #include "server/calls/call.h"
 #include "server/calls/response_stream.h"
 #include "server/log/log_fields.h"
-#include "server/sessions/session.h"
+#include "server/sessions/session_use.h"
 #include "wellspace/v1/sessions.pb.h"
 
 namespace wellspace::server {

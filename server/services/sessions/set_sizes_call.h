@@ -10,7 +10,7 @@
 #include "server/calls/call.h"
 #include "server/calls/request_stream.h"
 #include "server/jobs/memory_budget.h"
-#include "server/sessions/session.h"
+#include "server/sessions/session_use.h"
 #include "server/sessions/size_store.h"
 #include "wellspace/v1/sessions.pb.h"
 

@@ -12,6 +12,7 @@
 #include "gtest/gtest.h"
 #include "server/observability/work_counters.h"
 #include "server/sessions/session_registry.h"
+#include "server/sessions/session_use.h"
 #include "server/store/durable_log.h"
 #include "server/store/ephemeral_log.h"
 #include "spdlog/logger.h"
@@ -105,7 +106,8 @@ class IdleSessionsTest : public ::testing::Test {
   }
 
   std::shared_ptr<Session> Create() {
-    return store_.Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = absl::Hours(1)}).value();
+    return registry_.Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = absl::Hours(1)})
+        .value();
   }
 
   std::shared_ptr<Operation> Start(Session& session) {
@@ -148,11 +150,11 @@ class IdleSessionsTest : public ::testing::Test {
   ServiceOptions options_;
   MemoryBudget memory_{kProcessMemoryBytes + 100 * kMegabyte};
   std::unique_ptr<SessionLog> log_;
-  SessionRegistry store_{options_, memory_, clock_, *log_};
+  SessionRegistry registry_{options_, memory_, clock_, *log_};
   spdlog::logger logger_{"none"};
   WorkCounters counters_;
   WorkObserver observer_{logger_, counters_};
-  IdleSessions idle_{store_, memory_, observer_, clock_};
+  IdleSessions idle_{registry_, memory_, observer_, clock_};
 };
 
 TEST_F(IdleSessionsTest, TheOneThatWasNotUsedForLongestGivesUp) {

@@ -18,6 +18,7 @@
 #include "server/backend.h"
 #include "server/network/connections.h"
 #include "server/sessions/refinement.h"
+#include "server/sessions/session_use.h"
 #include "server/store/check_data.h"
 #include "server/store/durable_log.h"
 #include "spdlog/logger.h"

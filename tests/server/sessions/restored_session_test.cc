@@ -23,23 +23,23 @@ class RestoredSessionTest : public ::testing::Test {
   RestoredSessionTest() {
     StartProcess();
     session_ =
-        store_->Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = absl::Hours(1)}).value();
+        registry_->Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = absl::Hours(1)}).value();
   }
 
   // A process: what the one before had in memory is gone, whatever it was at.
   void StartProcess() {
     const std::string name = session_ == nullptr ? "" : session_->name();
     session_ = nullptr;
-    store_.reset();
+    registry_.reset();
     log_ = nullptr;
     log_ = DurableLog::Open({.folder = folder_.path()}).value();
-    store_.emplace(options_, memory_, Clock{.since_boot = [this] { return since_boot_; }}, *log_);
+    registry_.emplace(options_, memory_, Clock{.since_boot = [this] { return since_boot_; }}, *log_);
     const StoredSessions before = log_->Load().value();
     for (const StoredSession& stored : before.sessions) {
-      ASSERT_TRUE(store_->Restore(stored).ok());
+      ASSERT_TRUE(registry_->Restore(stored).ok());
     }
     if (!name.empty()) {
-      session_ = store_->Find("a", name).value();
+      session_ = registry_->Find("a", name).value();
       resumed_ = session_->ResumeOperation().value();
     }
   }
@@ -71,7 +71,7 @@ class RestoredSessionTest : public ::testing::Test {
   ServiceOptions options_;
   MemoryBudget memory_{0};
   std::unique_ptr<DurableLog> log_;
-  std::optional<SessionRegistry> store_;
+  std::optional<SessionRegistry> registry_;
   std::shared_ptr<Session> session_;
   std::shared_ptr<Operation> resumed_;  // by the last process
 };
@@ -190,7 +190,7 @@ TEST_F(RestoredSessionTest, ASessionWhoseExpiryWasNotWrittenDownIsWhole) {
   ASSERT_TRUE(session_->Append(0, std::vector<double>{0, 0, 1, 0}, 0).ok());
   Refine();
   since_boot_ += absl::Hours(1);
-  EXPECT_EQ(store_->RemoveExpired().size(), 1u);
+  EXPECT_EQ(registry_->RemoveExpired().size(), 1u);
   StartProcess();
   EXPECT_TRUE(session_->mesh()->Metadata(true).ok()) << session_->mesh()->Metadata(true).status();
 }
@@ -214,6 +214,14 @@ TEST_F(RestoredSessionTest, LimitsThatWereLoweredLoseNothing) {
   EXPECT_EQ(DetailsOf(session_->Append(10, std::vector<double>{1, 2}, 0)).reason, "TOO_MANY_POINTS");
 }
 
+TEST_F(RestoredSessionTest, AClosedSessionIsNotTakenForADamagedOne) {
+  const auto sizes = std::make_shared<const core::SizeSamples>(core::SizeSamples{.points = {0, 0}, .sizes = {1}});
+  ASSERT_TRUE(session_->SetSizes(sizes, 0).ok());
+  StartProcess();
+  ASSERT_TRUE(session_->Close(0).ok());
+  EXPECT_EQ(DetailsOf(session_->SetSizes(sizes, 0)).reason, "SESSION_NOT_FOUND") << "its sizes were not read yet";
+}
+
 TEST_F(RestoredSessionTest, AClosedSessionIsWrittenDownNoMore) {
   const std::shared_ptr<Operation> operation = StartOperation();
   std::optional<SessionWork> work = session_->BeginWork(*operation);
@@ -223,7 +231,7 @@ TEST_F(RestoredSessionTest, AClosedSessionIsWrittenDownNoMore) {
   const std::string name = session_->name();
   session_ = nullptr;
   StartProcess();
-  EXPECT_FALSE(store_->Find("a", name).ok());
+  EXPECT_FALSE(registry_->Find("a", name).ok());
 }
 
 }  // namespace

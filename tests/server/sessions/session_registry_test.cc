@@ -1,4 +1,4 @@
-// Sessions and their store, with a clock that the test moves.
+// Sessions and their registry, with a clock that the test moves.
 #include "server/sessions/session_registry.h"
 
 #include <array>
@@ -10,6 +10,7 @@
 
 #include "absl/strings/escaping.h"
 #include "gtest/gtest.h"
+#include "server/sessions/session_use.h"
 #include "server/store/ephemeral_log.h"
 #include "server/wire/errors.h"
 #include "tests/server/service_harness.h"
@@ -25,13 +26,13 @@ class SessionRegistryTest : public ::testing::Test {
   std::shared_ptr<Session> Create(const std::string& tenant = "a", absl::Duration ttl = absl::Minutes(1),
                                   std::map<std::string, std::string> labels = {}) {
     absl::StatusOr<std::shared_ptr<Session>> session =
-        store_.Create({.tenant = tenant, .parameters = {.dimension = 2}, .labels = std::move(labels), .ttl = ttl});
+        registry_.Create({.tenant = tenant, .parameters = {.dimension = 2}, .labels = std::move(labels), .ttl = ttl});
     status_ = session.status();
     return session.value_or(nullptr);
   }
 
   bool Finds(const Session& session, const std::string& tenant = "a") {
-    status_ = store_.Find(tenant, session.name()).status();
+    status_ = registry_.Find(tenant, session.name()).status();
     return status_.ok();
   }
 
@@ -41,7 +42,7 @@ class SessionRegistryTest : public ::testing::Test {
   MemoryBudget memory_{0};
   absl::Duration since_boot_ = absl::Hours(1);
   EphemeralLog log_;
-  SessionRegistry store_{
+  SessionRegistry registry_{
       options_, memory_, {.wall = [this] { return now_; }, .since_boot = [this] { return since_boot_; }}, log_};
   absl::Status status_;
 };
@@ -61,7 +62,7 @@ TEST_F(SessionRegistryTest, NamesCannotBeGuessed) {
     for (size_t bit = 0; bit < kBits; ++bit) {
       ones[bit] += static_cast<uint8_t>(bytes[bit / 8]) >> bit % 8 & 1;
     }
-    store_.Remove(*session);
+    registry_.Remove(*session);
   }
   EXPECT_EQ(names.size(), kNames);
   // No bit of them is known: each is a one about half of the time, within seven standard deviations.
@@ -75,12 +76,12 @@ TEST_F(SessionRegistryTest, AnotherTenantsSessionDoesNotExist) {
   EXPECT_TRUE(Finds(*session, "a"));
   EXPECT_FALSE(Finds(*session, "b"));
   const absl::Status of_other = status_;
-  store_.Remove(*session);
+  registry_.Remove(*session);
   EXPECT_FALSE(Finds(*session, "a"));
   EXPECT_EQ(status_.message(), of_other.message()) << "whether a session exists can be told";
   EXPECT_EQ(ToGrpcStatus(status_).error_details(), ToGrpcStatus(of_other).error_details());
   EXPECT_EQ(DetailsOf(of_other).reason, "SESSION_NOT_FOUND");
-  EXPECT_TRUE(store_.List("b", absl::InfinitePast(), 10, {}).empty());
+  EXPECT_TRUE(registry_.List("b", absl::InfinitePast(), 10, {}).empty());
 }
 
 TEST_F(SessionRegistryTest, AnUnusedSessionExpires) {
@@ -88,13 +89,13 @@ TEST_F(SessionRegistryTest, AnUnusedSessionExpires) {
   since_boot_ += absl::Seconds(9);
   EXPECT_TRUE(Finds(*session)) << "and renews the lease";
   since_boot_ += absl::Seconds(9);
-  EXPECT_EQ(store_.List("a", absl::InfinitePast(), 10, {}).size(), 1u) << "and renews nothing";
+  EXPECT_EQ(registry_.List("a", absl::InfinitePast(), 10, {}).size(), 1u) << "and renews nothing";
   since_boot_ += absl::Seconds(1);
-  EXPECT_TRUE(store_.List("a", absl::InfinitePast(), 10, {}).empty());
+  EXPECT_TRUE(registry_.List("a", absl::InfinitePast(), 10, {}).empty());
   EXPECT_FALSE(Finds(*session)) << "though the sweep has not come yet";
   EXPECT_EQ(DetailsOf(status_).reason, "SESSION_NOT_FOUND");
-  EXPECT_EQ(store_.RemoveExpired().size(), 1u);
-  EXPECT_TRUE(store_.RemoveExpired().empty());
+  EXPECT_EQ(registry_.RemoveExpired().size(), 1u);
+  EXPECT_TRUE(registry_.RemoveExpired().empty());
 }
 
 TEST_F(SessionRegistryTest, TheClockOnTheWallMayJump) {
@@ -102,7 +103,7 @@ TEST_F(SessionRegistryTest, TheClockOnTheWallMayJump) {
   const absl::Time created = session->create_time();
   now_ += absl::Hours(2);
   EXPECT_TRUE(Finds(*session)) << "no lease runs out by it";
-  EXPECT_TRUE(store_.RemoveExpired().empty());
+  EXPECT_TRUE(registry_.RemoveExpired().empty());
   EXPECT_EQ(session->Describe().expire_time().seconds(), absl::ToUnixSeconds(now_ + absl::Seconds(10)))
       << "what is shown goes by it";
   now_ -= absl::Hours(5);
@@ -118,7 +119,7 @@ TEST_F(SessionRegistryTest, ASessionInUseDoesNotExpire) {
   {
     const SessionUse use(session);
     since_boot_ += absl::Hours(1);
-    EXPECT_TRUE(store_.RemoveExpired().empty());
+    EXPECT_TRUE(registry_.RemoveExpired().empty());
   }
   since_boot_ += absl::Seconds(9);
   EXPECT_FALSE(session->IsExpired()) << "the end of a use renews the lease";
@@ -132,10 +133,10 @@ TEST_F(SessionRegistryTest, ASessionWithAnOperationDoesNotExpire) {
       session->StartOperation({.dimension = 2}, /*restart=*/false, 0, Submitted);
   ASSERT_TRUE(operation.ok());
   since_boot_ += absl::Hours(1);
-  EXPECT_TRUE(store_.RemoveExpired().empty());
+  EXPECT_TRUE(registry_.RemoveExpired().empty());
   EXPECT_TRUE(session->Cancel(**operation).ok());
   since_boot_ += absl::Seconds(10);
-  EXPECT_EQ(store_.RemoveExpired().size(), 1u);
+  EXPECT_EQ(registry_.RemoveExpired().size(), 1u);
 }
 
 TEST_F(SessionRegistryTest, SessionsAreLimitedByTenantAndInAll) {
@@ -151,8 +152,8 @@ TEST_F(SessionRegistryTest, SessionsAreLimitedByTenantAndInAll) {
   ASSERT_NE(Create("b"), nullptr);
   EXPECT_EQ(Create("b"), nullptr);
   EXPECT_EQ(DetailsOf(status_).reason, "TOO_MANY_SESSIONS");
-  EXPECT_TRUE(store_.Remove(*sessions[1]));
-  EXPECT_FALSE(store_.Remove(*sessions[1]));
+  EXPECT_TRUE(registry_.Remove(*sessions[1]));
+  EXPECT_FALSE(registry_.Remove(*sessions[1]));
   EXPECT_NE(Create("a"), nullptr);
 }
 
@@ -162,15 +163,15 @@ TEST_F(SessionRegistryTest, ListsInTheOrderOfCreationWhateverTheClockSays) {
     created.push_back(Create("a", absl::Minutes(1), {{"even", i % 2 == 0 ? "yes" : "no"}})->name());
   }
   Create("b");
-  const auto listed = store_.List("a", absl::InfinitePast(), 10, {});
+  const auto listed = registry_.List("a", absl::InfinitePast(), 10, {});
   ASSERT_EQ(listed.size(), 3u);
   for (int i = 0; i < 3; ++i) {
     EXPECT_EQ(listed[i]->name(), created[i]);
-    EXPECT_EQ(store_.List("a", listed[i]->create_time(), 10, {}).size(), 2u - i);
+    EXPECT_EQ(registry_.List("a", listed[i]->create_time(), 10, {}).size(), 2u - i);
   }
-  EXPECT_EQ(store_.List("a", absl::InfinitePast(), 2, {}).size(), 2u);
-  EXPECT_EQ(store_.List("a", absl::InfinitePast(), 10, {{"even", "yes"}}).size(), 2u);
-  EXPECT_EQ(store_.List("a", absl::InfinitePast(), 10, {{"even", "yes"}, {"odd", ""}}).size(), 0u);
+  EXPECT_EQ(registry_.List("a", absl::InfinitePast(), 2, {}).size(), 2u);
+  EXPECT_EQ(registry_.List("a", absl::InfinitePast(), 10, {{"even", "yes"}}).size(), 2u);
+  EXPECT_EQ(registry_.List("a", absl::InfinitePast(), 10, {{"even", "yes"}, {"odd", ""}}).size(), 0u);
 }
 
 TEST_F(SessionRegistryTest, PointsAreLimitedBySessionAndByTenant) {

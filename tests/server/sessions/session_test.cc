@@ -50,9 +50,9 @@ class SessionTest : public ::testing::Test {
   ServiceOptions options_;
   MemoryBudget memory_{0};
   EphemeralLog log_;
-  SessionRegistry store_{options_, memory_, {}, log_};
+  SessionRegistry registry_{options_, memory_, {}, log_};
   std::shared_ptr<Session> session_ =
-      store_.Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = {}}).value();
+      registry_.Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = {}}).value();
 };
 
 TEST_F(SessionTest, AnOperationHasTheSessionToItself) {

@@ -1,0 +1,41 @@
+// What keeps a session, or its structure, for as long as it is used.
+#ifndef WELLSPACE_SERVER_SESSIONS_SESSION_USE_H_
+#define WELLSPACE_SERVER_SESSIONS_SESSION_USE_H_
+
+#include <memory>
+
+#include "server/sessions/session.h"
+
+namespace wellspace::server {
+
+// Keeps a session from expiring, and renews its lease at the end.
+class SessionUse {
+ public:
+  explicit SessionUse(std::shared_ptr<Session> session);
+  ~SessionUse();
+  SessionUse(const SessionUse&) = delete;
+  SessionUse& operator=(const SessionUse&) = delete;
+
+  Session& session() const { return *session_; }
+  const std::shared_ptr<Session>& session_ptr() const { return session_; }
+
+ private:
+  const std::shared_ptr<Session> session_;
+};
+
+// Keeps a session from giving up its structure for other work: what PrepareStructure has built stays until it was
+// asked.
+class StructureUse {
+ public:
+  explicit StructureUse(std::shared_ptr<Session> session);
+  ~StructureUse();
+  StructureUse(const StructureUse&) = delete;
+  StructureUse& operator=(const StructureUse&) = delete;
+
+ private:
+  const std::shared_ptr<Session> session_;
+};
+
+}  // namespace wellspace::server
+
+#endif  // WELLSPACE_SERVER_SESSIONS_SESSION_USE_H_
