@@ -63,7 +63,8 @@ struct PointsLeft {
 //   session_record.cc      how it is written down, and comes back
 //
 // What it is made of: session_work.h (mesher and mesh), session_steps.h, session_locator.h, mesh_deltas.h,
-// point_account.h, lease.h, operation.h, feature_store.h, session_box.h. Its states, and what changes them: docs/design/sessions.md, "States".
+// point_account.h, lease.h, operation.h, feature_store.h, session_box.h. Its states, and what changes them:
+// docs/design/sessions.md, "States".
 //
 // Thread safety: thread-safe. Which lock is for what, and their order: below, at the members. Functions that change the
 //                session wait for the log: they are to be called where that holds up no other work.
