@@ -105,7 +105,7 @@ WELLSPACE_INLINE void DropThose(size_t begin, Candidates<D>& all) {
   size_t count = first;
   for (size_t from = first; from < all.count; from += kWidth) {
     const uint32_t kept =
-        (Bits<kWidth>(LanesAt<kWidth>(all.most, from) >= 0) | done) & BitsOfItems<kWidth>(all.count - from);
+        (Bits<kWidth>(LanesAt<kWidth>(all.excess_bound, from) >= 0) | done) & BitsOfItems<kWidth>(all.count - from);
     const auto compress = [&](auto* column) __attribute__((always_inline)) {
       Compress<kWidth>(*reinterpret_cast<const Mask*>(column + from), kept, column, count);
     };

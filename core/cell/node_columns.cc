@@ -10,8 +10,8 @@ namespace wellspace::core {
 namespace {
 
 template <int D, size_t kWidth>
-WELLSPACE_INLINE void Most(std::span<const typename NodeColumns<D>::Group> groups, double slack, double relative_error,
-                           size_t begin, Candidates<D>& candidates) {
+WELLSPACE_INLINE void BoundAll(std::span<const typename NodeColumns<D>::Group> groups, double slack,
+                               double relative_error, size_t begin, Candidates<D>& candidates) {
   using Lanes = typename Wide<kWidth>::Lanes;
   for (size_t from = begin / kWidth * kWidth; from < candidates.count; from += kWidth) {
     Lanes w[D];
@@ -34,7 +34,7 @@ WELLSPACE_INLINE void Most(std::span<const typename NodeColumns<D>::Group> group
       length[lane] = __builtin_sqrt(length_sq[lane]);
     }
     const Lanes offset = 0.5 * length_sq;
-    LanesAt<kWidth>(candidates.most, from) = (largest - offset) + (slack * length + relative_error * offset);
+    LanesAt<kWidth>(candidates.excess_bound, from) = (largest - offset) + (slack * length + relative_error * offset);
   }
 }
 
@@ -89,9 +89,9 @@ WELLSPACE_AVX2 typename NodeColumns<D>::Largest LargestAvx2(std::span<const type
 }
 
 template <int D>
-WELLSPACE_AVX2 void MostAvx2(std::span<const typename NodeColumns<D>::Group> groups, double slack,
-                             double relative_error, size_t begin, Candidates<D>& candidates) {
-  Most<D, 4>(groups, slack, relative_error, begin, candidates);
+WELLSPACE_AVX2 void BoundAllAvx2(std::span<const typename NodeColumns<D>::Group> groups, double slack,
+                                 double relative_error, size_t begin, Candidates<D>& candidates) {
+  BoundAll<D, 4>(groups, slack, relative_error, begin, candidates);
 }
 
 template <int D>
@@ -103,11 +103,11 @@ WELLSPACE_AVX2 bool IsReachedAvx2(std::span<const typename NodeColumns<D>::Group
 }  // namespace
 
 template <int D>
-void NodeColumns<D>::ComputeMost(double slack, double relative_error, size_t begin, Candidates<D>& candidates) const {
+void NodeColumns<D>::BoundExcesses(double slack, double relative_error, size_t begin, Candidates<D>& candidates) const {
   if (unit_ == VectorUnit::kAvx2) {
-    MostAvx2<D>(groups(), slack, relative_error, begin, candidates);
+    BoundAllAvx2<D>(groups(), slack, relative_error, begin, candidates);
   } else {
-    Most<D, 2>(groups(), slack, relative_error, begin, candidates);
+    BoundAll<D, 2>(groups(), slack, relative_error, begin, candidates);
   }
 }
 

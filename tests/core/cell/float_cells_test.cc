@@ -220,7 +220,7 @@ TYPED_TEST(FloatCellsTest, NodesArePlacedAsOneByOneAndKnowTheirNeighbours) {
         EXPECT_EQ(node.radius_sq, NormSq<D>(x));
         EXPECT_EQ(node.reach, std::sqrt(NormSq<D>(x)) + slack);
         reach = std::max(reach, node.reach);
-        nearly_dependent += Meet<D>(planes).error > kPlaced * std::sqrt(NormSq<D>(x)) ? 1 : 0;
+        nearly_dependent += Meet<D>(planes).error > kPlacedError * std::sqrt(NormSq<D>(x)) ? 1 : 0;
       }
       EXPECT_LE(cell.reach_sq(), reach * reach);
     }
