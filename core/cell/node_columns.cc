@@ -9,6 +9,7 @@
 namespace wellspace::core {
 namespace {
 
+// NodeColumns::BoundExcesses: a vector of candidates at a time, each against every node.
 template <int D, size_t kWidth>
 WELLSPACE_INLINE void BoundAll(std::span<const typename NodeColumns<D>::Group> groups, double slack,
                                double relative_error, size_t begin, Candidates<D>& candidates) {
@@ -38,6 +39,7 @@ WELLSPACE_INLINE void BoundAll(std::span<const typename NodeColumns<D>::Group> g
   }
 }
 
+// NodeColumns::Reaches: p is x, moved into the cube axis by axis; |p x|^2 - |x|^2 is the sum of p (p - 2 x).
 template <int D, size_t kWidth>
 WELLSPACE_INLINE bool IsReached(std::span<const typename NodeColumns<D>::Group> groups, const Point<D>& low,
                                 const Point<D>& high, double doubt) {
@@ -60,6 +62,7 @@ WELLSPACE_INLINE bool IsReached(std::span<const typename NodeColumns<D>::Group> 
   return Bits<kWidth>(any) != 0;
 }
 
+// NodeColumns::FindLargest.
 template <int D, size_t kWidth>
 WELLSPACE_INLINE typename NodeColumns<D>::Largest Largest(std::span<const typename NodeColumns<D>::Group> groups) {
   using Lanes = typename Wide<kWidth>::Lanes;
