@@ -60,6 +60,8 @@ struct CellOnUnit {
   }
 
  private:
+  // By up to kMostCutTogether vertices, ContiguousVertices or ChosenVertices: picks those that may cut, and cuts by them,
+  // the nearest first. Returns how many but the site are within reach.
   template <VectorUnit kUnit, typename Vertices>
   WELLSPACE_INLINE static size_t CutByVertices(Cell& cell, const Vertices& vertices, VertexId site) {
     FloatCandidates<D> candidates;
@@ -76,6 +78,7 @@ struct CellOnUnit {
         [&](const FloatBisector<D>& bisector, size_t slot) __attribute__((always_inline)) {
           return cell.template CutOff<kUnit>(bisector, vertices.name(slot), vertices.position(slot));
         },
+        // No offset is as little as -1: a cell that is too large is cut no more.
         [&cell] { return cell.IsTooLarge() ? -1 : OffsetBound<D>(cell.radius_bound_); });
     return candidates.within_reach;
   }

@@ -35,8 +35,9 @@ struct alignas(sizeof(Floats)) FloatCandidates {
   uint32_t order[kCapacity];  // from the nearest on, but for distances that agree to one part in 2^17
   size_t within_reach = 0;    // but for the site
 
-  // Picks those of `vertices` but `site_name` that may cut a cell about `site` of that radius, and that `may_cut`:
-  // given the vectors of eight and their lows, it tells which.
+  // Picks those of `vertices` but `site_name` that are near enough to cut a cell about `site` of that radius, and that
+  // `may_cut` leaves: given the vectors to eight, their least offsets, and which of them are near, it drops from the
+  // last those that miss the cell. Then finds the order.
   template <VectorUnit kUnit, typename Vertices, typename MayCut>
   WELLSPACE_INLINE void Pick(const Vertices& vertices, VertexId site_name, const Point<D>& site, double scale,
                              float radius_bound, MayCut may_cut) {
@@ -55,12 +56,14 @@ struct alignas(sizeof(Floats)) FloatCandidates {
       for (size_t lane = 0; lane < kFloatLanes; ++lane) {
         length[lane] = __builtin_sqrtf(length_sq[lane]);
       }
+      // As FloatBisector::Of.
       const Floats offsets = 0.5f * length_sq;
       const Floats least_offsets = offsets - (error * length + kUnderflow);
       FloatMask is_near = IsAtMost<kUnit>(offsets, far) & IsLess<kUnit>(slots, end);
       is_near &= ~vertices.template AreNamed<kUnit>(site_name, from);
       within_reach += static_cast<size_t>(std::popcount(Bits<kUnit>(is_near)));
       may_cut(vectors, least_offsets, is_near);
+      // Those that are left are appended to each column, by one shuffle that moves them to the front.
       const uint32_t kept = Bits<kUnit>(is_near);
       const FloatMask lanes = OrderOf<kUnit>(kept);
       const auto append = [&](const auto& items, auto* column) __attribute__((always_inline)) {
@@ -105,7 +108,7 @@ struct alignas(sizeof(Floats)) FloatCandidates {
   }
 
  private:
-  // By counting those before each.
+  // Finds the place of each by counting those before it.
   template <VectorUnit kUnit>
   WELLSPACE_INLINE void FindOrder() {
     constexpr int kNumberBits = 6;

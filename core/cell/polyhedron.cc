@@ -239,6 +239,8 @@ WELLSPACE_INLINE void Polyhedron::PlaceOnHorizon(uint32_t plane) {
   const double n_sq = NormSq<3>(n);
   std::fill_n(&horizon_[horizon_count_], 3, horizon_[0]);  // four are read at a time
   for (size_t first = 0; first < horizon_count_; first += 4) {
+    // Of the planes p and q of each edge the normals, by axis, then the offsets; n is the normal of the new plane.
+    // x = (offset of p (q x n) + of q (n x p) + of n (p x q)) / det(p, q, n).
     const HorizonEdge* const edges = &horizon_[first];
     Four p[4];
     Four q[4];
@@ -250,7 +252,7 @@ WELLSPACE_INLINE void Polyhedron::PlaceOnHorizon(uint32_t plane) {
     const Four determinant = p[0] * q_n[0] + p[1] * q_n[1] + p[2] * q_n[2];
     const Four product_sq =
         (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2]) * n_sq;
-    const auto is_good = determinant * determinant > 0x1p-38 * product_sq;
+    const auto is_good = determinant * determinant > 0x1p-38 * product_sq;  // |det| > 2^-19 P
     const Four inverse = scale_ / determinant;
     FourFloats x[3];
     for (int axis = 0; axis < 3; ++axis) {
