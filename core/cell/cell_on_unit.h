@@ -60,8 +60,8 @@ struct CellOnUnit {
   }
 
  private:
-  // By up to kMostCutTogether vertices, ContiguousVertices or ChosenVertices: picks those that may cut, and cuts by them,
-  // the nearest first. Returns how many but the site are within reach.
+  // By up to kMostCutTogether vertices, ContiguousVertices or ChosenVertices: picks those that may cut, and cuts by
+  // them, the nearest first. Returns how many but the site are within reach.
   template <VectorUnit kUnit, typename Vertices>
   WELLSPACE_INLINE static size_t CutByVertices(Cell& cell, const Vertices& vertices, VertexId site) {
     FloatCandidates<D> candidates;

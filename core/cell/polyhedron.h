@@ -118,12 +118,12 @@ class Polyhedron : public FloatCell<3> {
   bool KeepsRatioAvx2(float ratio_sq) const;
 
   // ---- Nodes
-  template <typename Wants>
-  void PlaceNodes(Wants wants);
-  template <typename Wants>
-  void PlaceThose(Wants wants);
-  template <typename Wants>
-  void PlaceThoseAvx2(Wants wants);
+  template <typename IsWanted>
+  void PlaceWanted(IsWanted is_wanted);
+  template <typename IsWanted>
+  void PlaceWantedWith(IsWanted is_wanted);
+  template <typename IsWanted>
+  void PlaceWantedAvx2(IsWanted is_wanted);
   void SortPlanes(size_t i);
   uint32_t PlaceTogether(const std::array<uint32_t, kPlacedAtOnce>& nodes);
   void KeepRoughPosition(size_t i);

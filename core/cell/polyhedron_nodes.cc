@@ -14,7 +14,7 @@ namespace wellspace::core {
 
 void Polyhedron::Place() {
   if (!is_placed_) {
-    PlaceNodes([](size_t) { return true; });
+    PlaceWanted([](size_t) { return true; });
     FindNeighbours();
     is_placed_ = true;
   }
@@ -24,7 +24,7 @@ bool Polyhedron::PlaceUnlessKeeps(double ratio) {
   if (KeepsRatio(ratio)) {
     return true;
   }
-  PlaceNodes([this, ratio_sq = SurelyKeptRatioSq(ratio)](size_t i) {
+  PlaceWanted([this, ratio_sq = SurelyKeptRatioSq(ratio)](size_t i) {
     const Group& group = groups_[i / kGroupSize];
     const size_t lane = i % kGroupSize;
     const float x = group.x[0][lane];
@@ -35,10 +35,10 @@ bool Polyhedron::PlaceUnlessKeeps(double ratio) {
   return false;
 }
 
-// Fills nodes_, and places those that wants(node) asks for by their planes, bisectors by vertex, then walls by face: so
-// they do not depend on the order of the cuts.
-template <typename Wants>
-WELLSPACE_INLINE void Polyhedron::PlaceThose(Wants wants) {
+// Fills nodes_, and places those that is_wanted(node) holds of by their planes, bisectors by vertex, then walls by
+// face: so they do not depend on the order of the cuts.
+template <typename IsWanted>
+WELLSPACE_INLINE void Polyhedron::PlaceWantedWith(IsWanted is_wanted) {
   nodes_.resize(count_);
   placed_reach_ = 0;
   for (size_t first = 0; first < count_; first += kPlacedAtOnce) {
@@ -48,7 +48,7 @@ WELLSPACE_INLINE void Polyhedron::PlaceThose(Wants wants) {
     for (size_t lane = 0; lane < kPlacedAtOnce; ++lane) {
       nodes[lane] = static_cast<uint32_t>(std::min(first + lane, count_ - 1));
       SortPlanes(nodes[lane]);
-      is_any_wanted |= wants(nodes[lane]);
+      is_any_wanted |= is_wanted(nodes[lane]);
     }
     uint32_t good = 0;
     if (is_any_wanted) {
@@ -56,7 +56,7 @@ WELLSPACE_INLINE void Polyhedron::PlaceThose(Wants wants) {
     }
     for (size_t lane = 0; lane < kPlacedAtOnce; ++lane) {
       CellNode<3>& node = nodes_[nodes[lane]];
-      if (!wants(nodes[lane])) {
+      if (!is_wanted(nodes[lane])) {
         KeepRoughPosition(nodes[lane]);
       } else if ((good >> lane & 1) == 0) [[unlikely]] {
         PlaceNode<3>(site_, planes_, node);
@@ -66,17 +66,17 @@ WELLSPACE_INLINE void Polyhedron::PlaceThose(Wants wants) {
   }
 }
 
-template <typename Wants>
-WELLSPACE_AVX2 void Polyhedron::PlaceThoseAvx2(Wants wants) {
-  PlaceThose(wants);
+template <typename IsWanted>
+WELLSPACE_AVX2 void Polyhedron::PlaceWantedAvx2(IsWanted is_wanted) {
+  PlaceWantedWith(is_wanted);
 }
 
-template <typename Wants>
-void Polyhedron::PlaceNodes(Wants wants) {
+template <typename IsWanted>
+void Polyhedron::PlaceWanted(IsWanted is_wanted) {
   if (unit_ == VectorUnit::kAvx2) {
-    PlaceThoseAvx2(wants);
+    PlaceWantedAvx2(is_wanted);
   } else {
-    PlaceThose(wants);
+    PlaceWantedWith(is_wanted);
   }
 }
 

@@ -78,7 +78,7 @@ WELLSPACE_AVX2 bool Polytope<D>::CutOffAvx2(VertexId u, const Point<D>& position
   return CutOffWith<4>(u, position, normal, length_sq);
 }
 
-// Cuts by the bisector of the site and `position` = site + normal.
+// Cuts by the bisector of the site and `position` = site + normal: a step a line, as in docs/design/cell.md.
 template <int D>
 template <size_t kWidth>
 WELLSPACE_INLINE bool Polytope<D>::CutOffWith(VertexId u, const Point<D>& position, const Point<D>& normal,
@@ -109,11 +109,13 @@ WELLSPACE_INLINE bool Polytope<D>::CutOffWith(VertexId u, const Point<D>& positi
   return true;
 }
 
+// Far vertices are looked at in vain mostly once near ones have cut: so those that surely miss are dropped before they
+// are sorted, and again after every few cuts.
 template <int D>
 size_t Polytope<D>::CutByEach(std::span<const Point<D>> positions, const VertexNames& names, VertexId) {
   near_.Pick(positions, site_, CutLimitSq());
   const size_t within_reach = near_.count;
-  if (cuts_ != 0) {
+  if (cuts_ != 0) {  // few of those within the limit miss a cell that is still a box
     BoundExcesses(0, near_);
     near_.DropThoseThatMiss(0);
   }

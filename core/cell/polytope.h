@@ -147,8 +147,8 @@ class Polytope {
   }
   void SetReach(const typename NodeColumns<D>::Largest& largest);
 
-  template <typename Wants>
-  void PlaceThose(Wants wants);
+  template <typename IsWanted>
+  void PlaceWanted(IsWanted is_wanted);
   void PlaceNode(size_t node);
   bool SurelyKeeps(size_t node, double ratio) const;
 

@@ -15,7 +15,7 @@ namespace wellspace::core {
 
 template <int D>
 void Polytope<D>::Place() {
-  PlaceThose([](size_t) { return true; });
+  PlaceWanted([](size_t) { return true; });
 }
 
 template <int D>
@@ -23,14 +23,14 @@ bool Polytope<D>::PlaceUnlessKeeps(double ratio) {
   if (KeepsRatio(ratio)) {
     return true;
   }
-  PlaceThose([this, ratio](size_t node) { return !SurelyKeeps(node, ratio); });
+  PlaceWanted([this, ratio](size_t node) { return !SurelyKeeps(node, ratio); });
   return false;
 }
 
-// Fills nodes_, and places those that wants(node) asks for.
+// Fills nodes_, and places those that is_wanted(node) holds of.
 template <int D>
-template <typename Wants>
-void Polytope<D>::PlaceThose(Wants wants) {
+template <typename IsWanted>
+void Polytope<D>::PlaceWanted(IsWanted is_wanted) {
   if (is_placed_) {
     return;
   }
@@ -39,7 +39,7 @@ void Polytope<D>::PlaceThose(Wants wants) {
   for (size_t i = 0; i < nodes_.size(); ++i) {
     const NodeTopology& topology = topologies_[i];
     if (!topology.is_placed) {
-      if (wants(i)) {
+      if (is_wanted(i)) {
         PlaceNode(i);
       } else {
         is_placed_ = false;
