@@ -12,8 +12,8 @@
 //
 // All else may be asked in every state. A caller may rely on this, whichever the class:
 //
-//   1. The planes, the nodes as sets of planes, and cuts() are those of exact arithmetic and the tie rule. Rounding may
-//      cost time, and never changes the answer.
+//   1. Whether a vertex cuts, and which nodes there are, as sets of planes, is what exact arithmetic and the tie rule
+//      say. Rounding may cost time, and never changes the answer.
 //   2. Once placed, a cell is the same to the bit whatever the order of its cuts, and by every vector unit; only the
 //      numbers of its nodes and planes differ. With TieRule::kKeep so are positions, while nodes that coincide may be
 //      joined otherwise.
