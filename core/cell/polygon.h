@@ -72,7 +72,7 @@ class Polygon : public FloatCell<2> {
   // site, which no bisector cuts off.
   struct alignas(kGroupSize * sizeof(float)) Group {
     float x[2][kGroupSize];
-    float edge_sq[kGroupSize];  // the squared length of the edge from the site to the vertex of that plane; 0 of a wall
+    float edge_sq[kGroupSize];  // the squared length of the edge from the site to the vertex of `plane`; 0 of a wall
     int32_t plane[kGroupSize];  // along which the cell runs from this node to the next
   };
   // One lane of a Group.
