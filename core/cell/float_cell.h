@@ -27,8 +27,8 @@ template <typename Cell, int D>
 struct CellOnUnit;
 
 // The part of Polygon and Polyhedron that does not depend on how nodes are joined. While cuts are made nodes are
-// floats, in *the units of the nodes*: lengths times scale_, a power of two that brings the box that the cell began
-// with to about 1, so that no square of a float overflows, and scaling rounds nothing. Planes stay in doubles, in the
+// floats, in *the units of the nodes*: lengths times scale_. That is the power of two that brings the box that the cell
+// began with to about 1: no square of a float overflows, and scaling rounds nothing. Planes stay in doubles, in the
 // units of the input.
 //
 // Thread safety: thread-compatible.

@@ -24,8 +24,8 @@ namespace wellspace::core {
 
 // The cell in space: a simple polyhedron, kept as its dual, a triangulated sphere. A plane is a vertex of the sphere, a
 // node a triangle of three planes, an edge between two nodes one between two planes. A cut is what the insertion of a
-// vertex is to a convex hull: the nodes beyond the bisector are a disk of triangles, which are taken out, and each edge
-// of the horizon around it makes a new triangle with the new plane. Which triangle is beside which need not be known
+// vertex is to a convex hull. The nodes beyond the bisector are a disk of triangles, which are taken out. Each edge of
+// the horizon around the disk makes a new triangle with the new plane. Which triangle is beside which need not be known
 // for that. What floats leave in doubt is decided exactly.
 //
 //   FindRemoved      which nodes are beyond the bisector, in floats; in doubt by DecideDoubtful

@@ -25,8 +25,8 @@
 namespace wellspace::core {
 
 // The cell in 4-D to 6-D: nodes in doubles, each with a bound on its error, and the edges between them. A cut finds the
-// nodes beyond the bisector, puts a new node on each edge that leads out of these, and joins the new nodes along the
-// edges of the new facet.
+// nodes beyond the bisector, and puts a new node on each edge that leads out of these. Then it joins the new nodes
+// along the edges of the new facet.
 //
 // What its functions promise is said in cell_class.h, but for BoundExcesses. What cuts is in polytope.cc; what places
 // nodes, and looks at them, in polytope_nodes.cc.
