@@ -47,6 +47,7 @@ WELLSPACE_INLINE void Compress(const typename Wide<kWidth>::Mask& wide, uint32_t
     const Halves compressed = WELLSPACE_SHUFFLE(reinterpret_cast<const Halves&>(wide), order);
     std::memcpy(to, &compressed, sizeof(compressed));
   } else {
+    // Both, then the second again, over the first unless that is kept.
     const int64_t second = wide[1];
     std::memcpy(to, &wide, sizeof(wide));
     std::memcpy(to + (kept & 1), &second, sizeof(second));
@@ -59,6 +60,7 @@ uint32_t BitsOfItems(size_t left) {
   return (1u << std::min(left, kWidth)) - 1;
 }
 
+// Candidates::Pick: a vector of positions at a time, of which Compress keeps those within the limit, in every column.
 template <int D, size_t kWidth>
 WELLSPACE_INLINE void PickThose(std::span<const Point<D>> positions, const Point<D>& site, double limit_sq,
                                 Candidates<D>& out) {
@@ -97,6 +99,7 @@ WELLSPACE_INLINE void PickThose(std::span<const Point<D>> positions, const Point
   out.count = count;
 }
 
+// Candidates::DropThoseThatMiss: every column is compressed in place.
 template <int D, size_t kWidth>
 WELLSPACE_INLINE void DropThose(size_t begin, Candidates<D>& all) {
   using Mask = typename Wide<kWidth>::Mask;
@@ -105,7 +108,7 @@ WELLSPACE_INLINE void DropThose(size_t begin, Candidates<D>& all) {
   size_t count = first;
   for (size_t from = first; from < all.count; from += kWidth) {
     const uint32_t kept =
-        (Bits<kWidth>(LanesAt<kWidth>(all.most, from) >= 0) | done) & BitsOfItems<kWidth>(all.count - from);
+        (Bits<kWidth>(LanesAt<kWidth>(all.excess_bound, from) >= 0) | done) & BitsOfItems<kWidth>(all.count - from);
     const auto compress = [&](auto* column) __attribute__((always_inline)) {
       Compress<kWidth>(*reinterpret_cast<const Mask*>(column + from), kept, column, count);
     };
@@ -136,7 +139,8 @@ WELLSPACE_INLINE void Scatter(const Candidates<D>& from, const uint32_t* places,
   }
 }
 
-// The place of each is the number of those before it. Loops over whole vectors: their ends are predicted better.
+// The place of each is the number of those before it: all are compared with all, by keys of 32 bits that are made of
+// squares and numbers. Loops over whole vectors: their ends are predicted better.
 template <int D, size_t kWidth>
 WELLSPACE_INLINE void SortByRank(const Candidates<D>& from, Candidates<D>& to) {
   constexpr size_t kItems = 2 * kWidth;
@@ -190,7 +194,7 @@ WELLSPACE_AVX2 void SortByRankAvx2(const Candidates<D>& from, Candidates<D>& to)
   SortByRank<D, 4>(from, to);
 }
 
-// Of a leaf as full as from 5-D on.
+// For more than kMostRanked, of a leaf as full as from 5-D on.
 template <int D>
 void SortByComparing(const Candidates<D>& from, Candidates<D>& to) {
   std::array<uint32_t, Candidates<D>::kCapacity> order;

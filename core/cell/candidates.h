@@ -14,7 +14,7 @@
 
 namespace wellspace::core {
 
-// Candidates of one cell, in columns.
+// Candidates of one cell, in columns: candidate j is entry j of each, for j < count.
 //
 // Thread safety: thread-compatible.
 template <int D>
@@ -24,8 +24,8 @@ struct alignas(kLanes * sizeof(double)) Candidates {
 
   double w[D][kCapacity];       // the vector from the site
   double length_sq[kCapacity];  // |w|^2
-  double
-      most[kCapacity];  // of x . w - |w|^2 / 2 + error over the nodes x of the cell, once BoundExcesses has computed it
+  // By NodeColumns::BoundExcesses: at least the excess x . w - |w|^2 / 2 of every node x of the cell.
+  double excess_bound[kCapacity];
   uint64_t slot[kCapacity];  // where in its leaf
   size_t count = 0;
 
@@ -37,14 +37,14 @@ struct alignas(kLanes * sizeof(double)) Candidates {
   void Pick(std::span<const Point<D>> positions, const Point<D>& site, double limit_sq,
             VectorUnit unit = BestVectorUnit());
 
-  // Drops those from `begin` on whose `most` is negative.
+  // Drops those from `begin` on whose `excess_bound` is negative: they cut nothing.
   //
   // Complexity: O(count - begin).
   // Errors:     none.
   void DropThoseThatMiss(size_t begin, VectorUnit unit = BestVectorUnit());
 
-  // Puts those of `from` in order, the nearest first, but for squares that agree to one part in 2^13; `most` is as good
-  // as unknown then.
+  // Puts those of `from` in order, the nearest first, but for squares that agree to one part in 2^13; `excess_bound`
+  // is as good as unknown then.
   //
   // Complexity: O(count^2) up to 64, in vectors; else O(count log count).
   // Errors:     none.

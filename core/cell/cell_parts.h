@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <span>
 #include <type_traits>
 
@@ -17,7 +18,7 @@
 
 namespace wellspace::core {
 
-// What a bounding plane of a cell is.
+// What a bounding plane of a cell is. Those that are no bisectors are its walls, at right angles to an axis.
 enum class PlaneKind : uint8_t {
   kBisector,
   kFace,  // of the box
@@ -48,11 +49,11 @@ struct Plane {
   PlaneKind kind = PlaneKind::kBisector;
   uint8_t face = 0;             // FaceIndex, unless a bisector
   VertexId vertex = kNoVertex;  // of a bisector
-  Point<D> normal;              // relative to the site: normal . x = offset; for a bisector the vector to its vertex
+  Point<D> normal;              // relative to the site: normal . x = offset; of a bisector the vector to its vertex
   double offset = 0;
   double length = 0;      // |normal|
   double distance = 0;    // of the plane from the site, |offset| / length
-  PlaneSource<D> source;  // exact
+  PlaneSource<D> source;  // what exact decisions take, in the coordinates of the input; the rest is rounded
 };
 
 // Makes `plane` the wall on face `face` of `bounds`.
@@ -93,11 +94,35 @@ template <int D>
 struct CellNode {
   Point<D> x;                      // relative to the site
   double radius_sq = 0;            // |x|^2
-  double reach = 0;                // at least the exact |x|
+  double reach = 0;                // at least |x| of the exact node
   double slack = 0;                // bounds the error of x, and of products with it, per unit of length
   std::array<uint16_t, D> planes;  // that meet here, by index; of a placed one bisectors by vertex, then walls by face
   std::array<NodeIndex<D>, D> neighbours;  // neighbours[k]: the node at the other end of the edge that leaves planes[k]
 };
+
+// The order that a placed node has its planes in is that of these keys: bisectors by their vertices, then walls, whose
+// vertex is kNoVertex, the largest, by face. It does not depend on when a plane came, so the node does not either.
+template <int D>
+WELLSPACE_INLINE uint64_t PlaneOrderKey(std::span<const Plane<D>> planes, uint16_t index) {
+  return uint64_t{Index(planes[index].vertex)} << 16 | index;
+}
+
+// The places in that order of the planes with these indices.
+template <int D>
+WELLSPACE_INLINE std::array<uint32_t, D> RanksOf(std::span<const Plane<D>> planes,
+                                                 const std::array<uint16_t, D>& indices) {
+  std::array<uint64_t, D> keys;
+  for (int k = 0; k < D; ++k) {
+    keys[k] = PlaneOrderKey<D>(planes, indices[k]);
+  }
+  std::array<uint32_t, D> ranks{};
+  for (int k = 0; k < D; ++k) {
+    for (int i = 0; i < D; ++i) {
+      ranks[k] += keys[i] < keys[k] ? 1 : 0;
+    }
+  }
+  return ranks;
+}
 
 // The faces of the box that a node of a cell with these planes lies on.
 template <int D>
@@ -123,6 +148,15 @@ inline constexpr size_t kMostPlanes = size_t{1} << 15;
 // A vertex whose squared distance from the site, as computed, is more than so many times the squared reach of a cell
 // cannot cut it: its bisector is half as far. What is over 4 is for rounding.
 inline constexpr double kCutLimit = 4 * (1 + 0x1p-49);
+
+// Ends the program unless `holds`: something that must be true of the graph of a cell after a cut. Exact decisions take
+// away a connected part of the nodes, so that it is true whatever the input; the check is for errors of the program or
+// of the machine, which would else become a mesh that is wrong unnoticed. A cut pays a few comparisons for it.
+WELLSPACE_INLINE void AbortUnlessCellHolds(bool holds) {
+  if (!holds) [[unlikely]] {
+    std::abort();
+  }
+}
 
 // How often the stages after the floating-point filter were needed.
 struct DecisionCounters {

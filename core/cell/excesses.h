@@ -1,4 +1,5 @@
-// How far the nodes of a cell are beyond a bisector: NodeColumns::ComputeExcesses, for its callers.
+// How far the nodes of a cell are beyond a bisector, from 4-D on: NodeColumns::ComputeExcesses, the filter before exact
+// decisions. Apart from node_columns.h since it is compiled into polytope.cc alone, once for each vector unit.
 #ifndef WELLSPACE_CORE_CELL_EXCESSES_H_
 #define WELLSPACE_CORE_CELL_EXCESSES_H_
 
@@ -34,6 +35,7 @@ WELLSPACE_INLINE bool NodeColumns<D>::ComputeExcesses(const Point<D>& normal, do
           excess += LanesAt<kWidth>(group->x[axis], from) * normal[axis];
         }
         excess -= offset;
+        // The error of the node times |normal|, and that of the rest (kOffsetError in polytope.cc).
         const Lanes doubt = LanesAt<kWidth>(group->slack, from) * length + error;
         LanesAt<kWidth>(excesses->values, from) = excess;
         maybe |= uint64_t{Bits<kWidth>(excess + doubt >= 0)} << node;

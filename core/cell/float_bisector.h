@@ -1,4 +1,8 @@
-// The bisector that cuts a cell in floats, in the plane and in space.
+// The bisector that cuts a cell in floats, in the plane and in space: the filter before exact decisions.
+//
+// With b = x . w - least_offset as computed, the exact excess of a node x is at most b, and at least b - 2 (offset -
+// least_offset). So a node with b < 0 surely stays, one with b > 2 (offset - least_offset) is surely cut off, and one
+// between is in doubt: Polygon::FindKept, Polyhedron::FindRemoved.
 #ifndef WELLSPACE_CORE_CELL_FLOAT_BISECTOR_H_
 #define WELLSPACE_CORE_CELL_FLOAT_BISECTOR_H_
 
@@ -11,11 +15,13 @@ namespace wellspace::core {
 // The bisector to a vertex, in the units of the nodes.
 template <int D>
 struct FloatBisector {
-  float w[D];    // the vector to the vertex
-  float offset;  // |w|^2 / 2
-  float low;     // the offset, less by what an excess over it may be wrong by at most
+  float w[D];          // the vector to the vertex
+  float offset;        // |w|^2 / 2
+  float least_offset;  // the offset, less by what an excess over it may be wrong by at most (kExcessError)
 
-  WELLSPACE_INLINE static FloatBisector Of(const Point<D>& normal, double scale, float most_radius) {
+  // Of the vertex at `normal` from the site, in the units of the input, for a cell whose nodes are within
+  // `radius_bound`.
+  WELLSPACE_INLINE static FloatBisector Of(const Point<D>& normal, double scale, float radius_bound) {
     FloatBisector bisector;
     float length_sq = 0;
     for (int axis = 0; axis < D; ++axis) {
@@ -23,7 +29,8 @@ struct FloatBisector {
       length_sq += bisector.w[axis] * bisector.w[axis];
     }
     bisector.offset = 0.5f * length_sq;
-    bisector.low = bisector.offset - (kExcessError<D> * most_radius * __builtin_sqrtf(length_sq) + kUnderflow);
+    bisector.least_offset =
+        bisector.offset - (kExcessError<D> * radius_bound * __builtin_sqrtf(length_sq) + kUnderflow);
     return bisector;
   }
 };

@@ -27,22 +27,24 @@ template <typename Cell, int D>
 struct CellOnUnit;
 
 // The part of Polygon and Polyhedron that does not depend on how nodes are joined. While cuts are made nodes are
-// floats, in units of about the reach that the cell began with.
+// floats, in *the units of the nodes*: lengths times scale_. That is the power of two that brings the box that the cell
+// began with to about 1: no square of a float overflows, and scaling rounds nothing. Planes stay in doubles, in the
+// units of the input.
 //
 // Thread safety: thread-compatible.
 template <int D>
 class FloatCell {
  public:
-  // So many nodes are worked on together.
-  static constexpr size_t kTogether = kFloatLanes;
+  // So many nodes are worked on together: those of a Group.
+  static constexpr size_t kGroupSize = kFloatLanes;
 
   bool IsTooLarge() const { return count_ > kMostNodes<D> || plane_count_ > kMostPlanes; }
   FaceMask FacesOf(const CellNode<D>& node) const { return core::FacesOf<D>(planes_, node); }
 
   const Point<D>& site() const { return site_; }
-  void Tighten() {}  // it always is
+  void Tighten() {}  // each cut does so
   double reach_sq() const {
-    const double reach = std::min(most_radius_ * unit_length_, placed_reach_);
+    const double reach = std::min(radius_bound_ * unit_length_, placed_reach_);
     return reach * reach;
   }
   double CutLimitSq() const { return kCutLimit * reach_sq(); }
@@ -55,8 +57,8 @@ class FloatCell {
  protected:
   explicit FloatCell(VectorUnit unit) : unit_(unit) {}
 
-  // How many groups of kTogether hold `count` nodes.
-  static constexpr size_t GroupsFor(size_t count) { return (count + kTogether - 1) / kTogether; }
+  // How many groups of kGroupSize hold `count` nodes.
+  static constexpr size_t GroupsFor(size_t count) { return (count + kGroupSize - 1) / kGroupSize; }
 
   // Forgets the cell before, and takes the walls for planes.
   void BeginWalls(const Point<D>& site, const Box<D>& bounds, const std::array<PlaneKind, 2 * D>& kinds, TieRule rule) {
@@ -80,7 +82,7 @@ class FloatCell {
     scale_ = std::bit_cast<double>((kMostExponent - exponent) << kMantissaBits);
     is_placed_ = false;
     placed_reach_ = std::numeric_limits<double>::infinity();
-    most_radius_ = std::numeric_limits<float>::infinity();
+    radius_bound_ = std::numeric_limits<float>::infinity();
   }
 
   // Appends the bisector of the site and `position`, and returns its index.
@@ -114,15 +116,15 @@ class FloatCell {
   VectorUnit unit_;
   Point<D> site_{};
   TieRule rule_ = TieRule::kKeep;
-  double scale_ = 1;              // the units of the nodes, so many to one of the coordinates, a power of two
+  double scale_ = 1;              // from the units of the input to those of the nodes; a power of two
   double unit_length_ = 1;        // 1 / scale_
-  float most_radius_ = 0;         // at least the distance from the site to the farthest node, in the units of the nodes
-  double placed_reach_ = 0;       // the same of the nodes that were placed last, in those of the coordinates
+  float radius_bound_ = 0;        // at least the distance from the site to the farthest node, in the units of the nodes
+  double placed_reach_ = 0;       // the same of the nodes that were placed last, in the units of the input
   size_t count_ = 0;              // of the nodes
-  std::vector<Plane<D>> planes_;  // and more
+  std::vector<Plane<D>> planes_;  // by plane, plane_count_ of them: walls by FaceIndex, then bisectors as they cut
   size_t plane_count_ = 0;
   bool is_placed_ = false;          // all nodes are
-  std::vector<CellNode<D>> nodes_;  // as of the last that placed any
+  std::vector<CellNode<D>> nodes_;  // by node: what nodes() tells
   uint64_t cuts_ = 0;
   DecisionCounters counters_;
 };

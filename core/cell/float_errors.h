@@ -1,5 +1,15 @@
 // By how much what is computed of a cell in floats may be wrong, in the plane and in space: every bound, and its
-// derivation.
+// derivation. u = 2^-24 is the unit of rounding of floats; x are nodes, w a vector to a vertex, R bounds the distance
+// of all nodes; lengths are in the units of the nodes (float_cell.h). A bound per node would cost a column; one for all
+// is looser, and what it leaves in doubt goes to NodeDoubtSq, and then to DecideCut.
+//
+//   what is wrong                  bound            2-D     3-D     times     used by
+//   a node                         kNodeError       1.5 u   16 u    |x|       all below
+//   an excess x . w - |w|^2 / 2    kExcessError     16 u    32 u    R |w|     FloatBisector: which nodes are cut off
+//   the same of one node           NodeDoubtSq      1.5 u   16 u    |x| |w|   DecideDoubtful, before DecideCut
+//   a distance                     kDistanceError   8 u     32 u    |x|       SetReach, OffsetBound
+//   a power p . (p - 2 x)          kPowerError      64 u    128 u   R^2       AreReached
+//   a ratio, now and once placed   kRatioMargin     128 u   128 u   ratio     KeepsRatio
 #ifndef WELLSPACE_CORE_CELL_FLOAT_ERRORS_H_
 #define WELLSPACE_CORE_CELL_FLOAT_ERRORS_H_
 
@@ -8,7 +18,7 @@
 
 namespace wellspace::core {
 
-// In units of u = 2^-24: a node x is wrong by at most kNodeError |x|. In the plane that is its rounding, and half of it
+// In units of u: a node x is wrong by at most kNodeError |x|. In the plane that is its rounding, and half of it
 // from where it was computed in doubles; in space it may lie at the end of an edge as short.
 template <int D>
 inline constexpr float kNodeError = D == 2 ? 1.5f : 16;
@@ -29,25 +39,27 @@ inline constexpr float kDistanceError = D == 2 ? 0x1p-21f : 0x1p-19f;
 // u. Farther out it is positive.
 template <int D>
 inline constexpr float kPowerError = D == 2 ? 0x1p-18f : 0x1p-17f;
-// A ratio is surely kept, whatever the rounding and whatever that of placed nodes (kPlaced), if it is by this share.
-inline constexpr double kSurely = 0x1p-17;
+// A ratio is surely kept, whatever the rounding and whatever that of placed nodes (kPlacedError), if it is by this
+// share.
+inline constexpr double kRatioMargin = 0x1p-17;
 inline float SurelyKeptRatioSq(double ratio) {
-  const double surely = ratio * (1 - kSurely);
+  const double surely = ratio * (1 - kRatioMargin);
   return static_cast<float>(surely * surely);
 }
 
 // The square of what the excess of the node x, as computed in doubles, over the bisector to a vertex at that squared
-// distance may be wrong by.
+// distance may be wrong by: the error of the node itself times |w|, and a hundredth for what doubles add.
 template <int D>
 double NodeDoubtSq(const Point<D>& x, double length_sq) {
   constexpr double kShare = 1.01 * 0x1p-24 * kNodeError<D>;
   return kShare * kShare * NormSq<D>(x) * length_sq + double{kUnderflow} * kUnderflow;
 }
 
-// Half the square of the distance from its site within which a vertex may cut a cell of that radius, in floats.
+// Half the square of the distance from its site within which a vertex may cut a cell of that radius, in floats: 2 R^2,
+// since it is within 2 R. To compare with FloatBisector::offset.
 template <int D>
-WELLSPACE_INLINE float MostOffset(float most_radius) {
-  return 2 * (1 + 8 * kDistanceError<D>)*most_radius * most_radius;
+WELLSPACE_INLINE float OffsetBound(float radius_bound) {
+  return 2 * (1 + 8 * kDistanceError<D>)*radius_bound * radius_bound;
 }
 
 }  // namespace wellspace::core

@@ -2,7 +2,7 @@
 
 #include <bit>
 
-#include "core/cell/float_candidates.h"
+#include "core/cell/float_vertices.h"
 
 namespace wellspace::core {
 namespace {
@@ -19,37 +19,47 @@ constexpr double kNear = 2.1;
 
 }  // namespace
 
+// As many of the sites, from the first on, as lie in a box no longer than a leaf, or two; `spacing` is the mean
+// distance of vertices in their leaves.
 template <int D>
-size_t GatheredVertices<D>::Gather(const LeafTree<D>& tree, std::span<const Point<D>> points,
-                                   std::span<const VertexId> sites, std::span<uint32_t> seen, uint32_t mark) {
-  Clear();
+typename GatheredVertices<D>::SitesTogether GatheredVertices<D>::TakeSites(const LeafTree<D>& tree,
+                                                                           std::span<const Point<D>> points,
+                                                                           std::span<const VertexId> sites) {
   const auto point = [&](VertexId v) -> const Point<D>& { return points[Index(v)]; };
   const NodeId first = tree.leaf_of(sites[0]);
   const size_t in_two = size_t{tree.VerticesIn(first)->count} << D;
   const double longest = tree.SideOf(first) * (in_two <= kMostInTwo ? 2 : 1);
-  Box<D> box{point(sites[0]), point(sites[0])};
+  SitesTogether taken{.box = {point(sites[0]), point(sites[0])}};
   NodeId leaf = kNoNode;
   double volume = 0;  // of the leaves that they are in
   double vertices = 0;
-  size_t taken = 0;
-  for (; taken < sites.size(); ++taken) {
-    const VertexId v = sites[taken];
-    Box<D> with = box;
+  for (; taken.count < sites.size(); ++taken.count) {
+    const VertexId v = sites[taken.count];
+    Box<D> with = taken.box;
     with.Include({point(v), point(v)});
     if (with.LongestSide() > longest) {
       break;
     }
-    box = with;
+    taken.box = with;
     if (tree.leaf_of(v) != leaf) {
       leaf = tree.leaf_of(v);
       volume += std::pow(tree.SideOf(leaf), D);
       vertices += tree.VerticesIn(leaf)->count;
     }
   }
-  if (taken < kFewestSites) {
-    return taken;
+  taken.spacing = std::pow(volume / vertices, 1.0 / D);
+  return taken;
+}
+
+template <int D>
+size_t GatheredVertices<D>::Gather(const LeafTree<D>& tree, std::span<const Point<D>> points,
+                                   std::span<const VertexId> sites, std::span<uint32_t> seen, uint32_t mark) {
+  Clear();
+  const SitesTogether taken = TakeSites(tree, points, sites);
+  if (taken.count < kFewestSites) {
+    return taken.count;
   }
-  Begin(box, std::pow(volume / vertices, 1.0 / D));
+  Begin(taken.box, taken.spacing);
   const auto meet = [&](NodeId met) {
     const bool is_new = seen[Index(met)] != mark;
     seen[Index(met)] = mark;
@@ -57,12 +67,13 @@ size_t GatheredVertices<D>::Gather(const LeafTree<D>& tree, std::span<const Poin
       leaves_.push_back(met);
     }
   };
-  meet(first);
+  // From leaf to leaf across faces: leaves_ is the queue of a breadth-first search.
+  meet(tree.leaf_of(sites[0]));
   for (size_t i = 0; i < leaves_.size(); ++i) {
     const auto* inside = tree.VerticesIn(leaves_[i]);
     if (inside != nullptr && !Add({inside->positions, inside->count}, inside->ids)) {
       Clear();
-      return taken;
+      return taken.count;
     }
     tree.ForEachFaceNeighbour(leaves_[i], meet);
   }
@@ -70,7 +81,7 @@ size_t GatheredVertices<D>::Gather(const LeafTree<D>& tree, std::span<const Poin
     std::fill_n(&column[count_], kFloatLanes, std::numeric_limits<float>::quiet_NaN());
   }
   is_whole_ = true;
-  return taken;
+  return taken.count;
 }
 
 template <int D>

@@ -61,9 +61,11 @@ class GatheredVertices {
     return reach * reach;
   }
 
-  // Of the gathered vertices other than `v`, which is at `site` and surrounded, the nearest one's squared distance.
+  // Of the gathered vertices other than `v`, which is at `site` and surrounded, the nearest one's squared distance;
+  // infinite if there is no other.
   //
   // Complexity: O(count()), little for each.
+  // Errors:     none.
   double NearestSq(VertexId v, const Point<D>& site, VectorUnit unit) const;
 
   size_t count() const { return count_; }
@@ -87,24 +89,32 @@ class GatheredVertices {
   // by three times that; so the length, below 4, in up to three dimensions by (3 sqrt(3) + 7) 2^-24.
   static constexpr double kColumnError = 0x1p-20;
 
+  // Sites that are gathered for together.
+  struct SitesTogether {
+    size_t count = 0;
+    Box<D> box{};
+    double spacing = 0;
+  };
+  static SitesTogether TakeSites(const LeafTree<D>& tree, std::span<const Point<D>> points,
+                                 std::span<const VertexId> sites);
   void Begin(const Box<D>& sites, double spacing);
   bool Add(std::span<const Point<D>> positions, const VertexId* names);
   template <VectorUnit kUnit>
   double NearestSqWith(VertexId v, const Point<D>& site) const;
   double NearestSqAvx2(VertexId v, const Point<D>& site) const;
 
-  Box<D> sites_;
-  double within_ = 0;
-  double near_sq_ = 0;
-  Point<D> center_;
-  double scale_ = 1;  // of the columns; a power of two
-  bool is_whole_ = false;
+  Box<D> sites_;           // that holds the sites
+  double within_ = 0;      // of `sites_` so far around all vertices are gathered
+  double near_sq_ = 0;     // as near_sq() has it
+  Point<D> center_;        // of the columns: that of `sites_`
+  double scale_ = 1;       // of the columns; a power of two
+  bool is_whole_ = false;  // all have been gathered, and not too many
+  // By number, count_ of them, with room for one too many, and to be read by eight.
   size_t count_ = 0;
-  // With room for one too many, and to be read by eight.
   std::vector<Point<D>> positions_;
   std::vector<VertexId> names_;
-  std::array<std::vector<float>, D> columns_;
-  std::vector<NodeId> leaves_;
+  std::array<std::vector<float>, D> columns_;  // by axis: as InColumn
+  std::vector<NodeId> leaves_;                 // that have been walked through, or are still to be
 };
 
 }  // namespace wellspace::core

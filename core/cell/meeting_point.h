@@ -1,5 +1,11 @@
-// Where planes meet, in doubles, and how far that may be from where they meet exactly: what Place computes for each
+// Where D planes meet, in doubles, and how far that may be from where they meet exactly: what Place computes for each
 // node.
+//
+//   PlaceNode, PlaceByPlanes   what cells call: Meet, or ExactMeetingPoint where its bound is not good enough
+//   Meet                       D <= 3 by Cramer's rule, D > 3 by an approximate inverse; the bound is derived there
+//   MeetInSpace                Meet in 3-D, also of four nodes side by side (Polyhedron::PlaceTogether)
+//
+// u = kUnit = 2^-53 is the unit of rounding.
 #ifndef WELLSPACE_CORE_CELL_MEETING_POINT_H_
 #define WELLSPACE_CORE_CELL_MEETING_POINT_H_
 
@@ -7,6 +13,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <span>
 #include <utility>
@@ -56,7 +63,7 @@ struct SpacePlacements {
   T error;
 };
 
-// The meeting point of D planes by Cramer's rule, D <= 3.
+// The meeting point of three planes by Cramer's rule. The bound is derived for D <= 3.
 //
 // With a_j = |n_j|, P = prod a_j and S = sum_j |c_j| P / a_j, the numerators are sums of products bounded by S, the
 // determinant by sqrt(D) P; each factor carries at most one rounding (n) or D + 3 (c), each product and sum one more:
@@ -99,6 +106,7 @@ WELLSPACE_INLINE void MeetInSpace(const SpacePlanes<kNodes>& planes, SpacePlacem
   placed.error = size > 256 * kUnit * product ? error : none;
 }
 
+// Cramer's rule, with the bound of MeetInSpace.
 template <int D>
 Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D == 2) {
   Placement<D> placed;
@@ -117,6 +125,7 @@ Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D == 2)
   return placed;
 }
 
+// MeetInSpace of one node.
 template <int D>
 Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D == 3) {
   SpacePlanes<1> three;
@@ -163,7 +172,35 @@ WELLSPACE_INLINE bool InvertRoughly(const std::array<Point<D>, D>& a, std::array
   return true;
 }
 
-// The same by an approximate inverse Y and the residual, D > 3.
+// Planes divided by the lengths of their normals: a[j] . x = c[j].
+template <int D>
+struct UnitPlanes {
+  std::array<Point<D>, D> a;
+  Point<D> c;
+  double largest_offset = 0;  // max |c[j]|
+
+  WELLSPACE_INLINE explicit UnitPlanes(const std::array<const Plane<D>*, D>& planes) {
+    for (int j = 0; j < D; ++j) {
+      for (int i = 0; i < D; ++i) {
+        a[j][i] = planes[j]->normal[i] / planes[j]->length;
+      }
+      c[j] = planes[j]->offset / planes[j]->length;
+      largest_offset = std::max(largest_offset, std::abs(c[j]));
+    }
+  }
+
+  // |A x - c|^2
+  WELLSPACE_INLINE double ResidualSq(const Point<D>& x) const {
+    double residual_sq = 0;
+    for (int j = 0; j < D; ++j) {
+      const double r = Dot<D>(a[j], x) - c[j];
+      residual_sq += r * r;
+    }
+    return residual_sq;
+  }
+};
+
+// The meeting point of D planes by an approximate inverse Y and the residual, D > 3.
 //
 // Divide each plane by the length of its normal as computed, which is as good a scale as the exact one: A x = c, and
 // let A*, c*, x* be the exact ones. The rows of A carry at most 3 u each (difference, quotient; with lengths a few u
@@ -174,31 +211,22 @@ WELLSPACE_INLINE bool InvertRoughly(const std::array<Point<D>, D>& a, std::array
 // |x - x*| <= 2 |Y| (|r| + (2 D + 10) u sqrt(D) (|x| + max |c|)).
 template <int D>
 Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D > 3) {
-  std::array<Point<D>, D> a;
-  Point<D> c;
-  double largest_offset = 0;
-  for (int j = 0; j < D; ++j) {
-    for (int i = 0; i < D; ++i) {
-      a[j][i] = planes[j]->normal[i] / planes[j]->length;
-    }
-    c[j] = planes[j]->offset / planes[j]->length;
-    largest_offset = std::max(largest_offset, std::abs(c[j]));
-  }
-  std::array<std::array<double, 2 * D>, D> m;
-  if (!InvertRoughly<D>(a, m)) {
+  const UnitPlanes<D> unit(planes);
+  std::array<std::array<double, 2 * D>, D> m;  // Y is its right half
+  if (!InvertRoughly<D>(unit.a, m)) {
     return {};
   }
   Placement<D> placed;
-  double inverse_sq = 0;
-  double defect_sq = 0;
+  double inverse_sq = 0;  // |Y|^2
+  double defect_sq = 0;   // F^2
   for (int i = 0; i < D; ++i) {
     placed.x[i] = 0;
     for (int j = 0; j < D; ++j) {
-      placed.x[i] += m[i][D + j] * c[j];
+      placed.x[i] += m[i][D + j] * unit.c[j];
       inverse_sq += m[i][D + j] * m[i][D + j];
       double entry = i == j ? -1 : 0;
       for (int k = 0; k < D; ++k) {
-        entry += m[i][D + k] * a[k][j];
+        entry += m[i][D + k] * unit.a[k][j];
       }
       defect_sq += entry * entry;
     }
@@ -208,25 +236,21 @@ Placement<D> Meet(const std::array<const Plane<D>*, D>& planes) requires(D > 3) 
   if (!(std::sqrt(defect_sq) + (2 * D + 8) * kUnit * root * inverse_norm < 0.5)) {
     return placed;
   }
-  double residual_sq = 0;
-  for (int j = 0; j < D; ++j) {
-    const double r = Dot<D>(a[j], placed.x) - c[j];
-    residual_sq += r * r;
-  }
   // One more part in a hundred pays for the roundings of the bound itself.
   placed.radius = std::sqrt(NormSq<D>(placed.x));
   placed.error =
-      2.02 * inverse_norm * (std::sqrt(residual_sq) + (2 * D + 10) * kUnit * root * (placed.radius + largest_offset));
+      2.02 * inverse_norm *
+      (std::sqrt(unit.ResidualSq(placed.x)) + (2 * D + 10) * kUnit * root * (placed.radius + unit.largest_offset));
   return placed;
 }
 
-// What a slack is more than the error of a node, in shares of its distance, so that it also bounds those of products
-// with it.
+// A slack is the error of a node, and this share of its distance: so it also bounds the rounding of products x . w, by
+// slack |w|.
 inline constexpr double kProductError = 16 * kUnit;
 
 // A placed node is wrong by at most this share of its distance from the site. What is sure of nodes by twice as much
 // does not depend on how they were placed.
-inline constexpr double kPlaced = 0x1p-20;
+inline constexpr double kPlacedError = 0x1p-20;
 
 // Computes where planes of a cell, in their order, meet, exactly where they are too nearly dependent for doubles, and
 // returns the slack.
@@ -236,7 +260,7 @@ double PlaceByPlanes(const Point<D>& site, const std::array<const Plane<D>*, D>&
   if (std::all_of(planes.begin(), planes.end(),
                   [](const Plane<D>* plane) { return plane->kind != PlaneKind::kBisector; })) {
     placed.error = 0;  // walls are at right angles
-  } else if (!(std::isfinite(placed.error) && placed.error <= kPlaced * placed.radius)) {
+  } else if (!(std::isfinite(placed.error) && placed.error <= kPlacedError * placed.radius)) {
     std::array<PlaneSource<D>, D> sources;
     for (int k = 0; k < D; ++k) {
       sources[k] = planes[k]->source;
@@ -249,14 +273,21 @@ double PlaceByPlanes(const Point<D>& site, const std::array<const Plane<D>*, D>&
   return placed.error + kProductError * placed.radius;
 }
 
+// The same for those of the planes of a cell that have these indices.
+template <int D>
+double PlaceByPlanes(const Point<D>& site, std::span<const Plane<D>> planes, const std::array<uint16_t, D>& indices,
+                     Point<D>& x) {
+  std::array<const Plane<D>*, D> own;
+  for (int k = 0; k < D; ++k) {
+    own[k] = &planes[indices[k]];
+  }
+  return PlaceByPlanes<D>(site, own, x);
+}
+
 // Places `node`, of a cell with these planes, by its own.
 template <int D>
 void PlaceNode(const Point<D>& site, std::span<const Plane<D>> planes, CellNode<D>& node) {
-  std::array<const Plane<D>*, D> own;
-  for (int k = 0; k < D; ++k) {
-    own[k] = &planes[node.planes[k]];
-  }
-  node.slack = PlaceByPlanes<D>(site, own, node.x);
+  node.slack = PlaceByPlanes<D>(site, planes, node.planes, node.x);
   node.radius_sq = NormSq<D>(node.x);
   node.reach = std::sqrt(node.radius_sq) + node.slack;
 }

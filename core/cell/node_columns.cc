@@ -9,9 +9,10 @@
 namespace wellspace::core {
 namespace {
 
+// NodeColumns::BoundExcesses: a vector of candidates at a time, each against every node.
 template <int D, size_t kWidth>
-WELLSPACE_INLINE void Most(std::span<const typename NodeColumns<D>::Group> groups, double slack, double relative_error,
-                           size_t begin, Candidates<D>& candidates) {
+WELLSPACE_INLINE void BoundAll(std::span<const typename NodeColumns<D>::Group> groups, double slack,
+                               double relative_error, size_t begin, Candidates<D>& candidates) {
   using Lanes = typename Wide<kWidth>::Lanes;
   for (size_t from = begin / kWidth * kWidth; from < candidates.count; from += kWidth) {
     Lanes w[D];
@@ -34,10 +35,11 @@ WELLSPACE_INLINE void Most(std::span<const typename NodeColumns<D>::Group> group
       length[lane] = __builtin_sqrt(length_sq[lane]);
     }
     const Lanes offset = 0.5 * length_sq;
-    LanesAt<kWidth>(candidates.most, from) = (largest - offset) + (slack * length + relative_error * offset);
+    LanesAt<kWidth>(candidates.excess_bound, from) = (largest - offset) + (slack * length + relative_error * offset);
   }
 }
 
+// NodeColumns::Reaches: p is x, moved into the cube axis by axis; |p x|^2 - |x|^2 is the sum of p (p - 2 x).
 template <int D, size_t kWidth>
 WELLSPACE_INLINE bool IsReached(std::span<const typename NodeColumns<D>::Group> groups, const Point<D>& low,
                                 const Point<D>& high, double doubt) {
@@ -60,6 +62,7 @@ WELLSPACE_INLINE bool IsReached(std::span<const typename NodeColumns<D>::Group> 
   return Bits<kWidth>(any) != 0;
 }
 
+// NodeColumns::FindLargest.
 template <int D, size_t kWidth>
 WELLSPACE_INLINE typename NodeColumns<D>::Largest Largest(std::span<const typename NodeColumns<D>::Group> groups) {
   using Lanes = typename Wide<kWidth>::Lanes;
@@ -89,9 +92,9 @@ WELLSPACE_AVX2 typename NodeColumns<D>::Largest LargestAvx2(std::span<const type
 }
 
 template <int D>
-WELLSPACE_AVX2 void MostAvx2(std::span<const typename NodeColumns<D>::Group> groups, double slack,
-                             double relative_error, size_t begin, Candidates<D>& candidates) {
-  Most<D, 4>(groups, slack, relative_error, begin, candidates);
+WELLSPACE_AVX2 void BoundAllAvx2(std::span<const typename NodeColumns<D>::Group> groups, double slack,
+                                 double relative_error, size_t begin, Candidates<D>& candidates) {
+  BoundAll<D, 4>(groups, slack, relative_error, begin, candidates);
 }
 
 template <int D>
@@ -103,11 +106,11 @@ WELLSPACE_AVX2 bool IsReachedAvx2(std::span<const typename NodeColumns<D>::Group
 }  // namespace
 
 template <int D>
-void NodeColumns<D>::ComputeMost(double slack, double relative_error, size_t begin, Candidates<D>& candidates) const {
+void NodeColumns<D>::BoundExcesses(double slack, double relative_error, size_t begin, Candidates<D>& candidates) const {
   if (unit_ == VectorUnit::kAvx2) {
-    MostAvx2<D>(groups(), slack, relative_error, begin, candidates);
+    BoundAllAvx2<D>(groups(), slack, relative_error, begin, candidates);
   } else {
-    Most<D, 2>(groups(), slack, relative_error, begin, candidates);
+    BoundAll<D, 2>(groups(), slack, relative_error, begin, candidates);
   }
 }
 

@@ -1,4 +1,5 @@
-// What every candidate for a cut is tested against from 4-D on: the positions of a cell's nodes, four side by side.
+// The positions of a cell's nodes from 4-D on, four side by side, and what is asked of all of them: excesses over a
+// bisector, bounds on those over many, what they reach, the farthest.
 #ifndef WELLSPACE_CORE_CELL_NODE_COLUMNS_H_
 #define WELLSPACE_CORE_CELL_NODE_COLUMNS_H_
 
@@ -78,7 +79,8 @@ class NodeColumns {
   WELLSPACE_INLINE bool ComputeExcesses(const Point<D>& normal, double offset, double length, double error);
   std::span<const double> excesses() const { return {excesses_.front().values, count_}; }
 
-  // What the last ComputeExcesses found: bit b of word w stands for node kWordBits w + b.
+  // What the last ComputeExcesses found: bit b of word w stands for node kWordBits w + b. Nodes of `maybe` that are not
+  // of `surely` are in doubt.
   struct Found {
     uint64_t maybe = 0;
     uint64_t surely = 0;
@@ -90,9 +92,9 @@ class NodeColumns {
            found_.capacity() * sizeof(Found);
   }
 
-  // Computes `most` of the candidates from `begin` on; `slack` is at least those of the nodes, and a candidate w has
-  // the error `slack` |w| + `relative_error` |w|^2 / 2.
-  void ComputeMost(double slack, double relative_error, size_t begin, Candidates<D>& candidates) const;
+  // Computes `excess_bound` of the candidates from `begin` on; `slack` is at least those of the nodes, and a candidate
+  // w has the error `slack` |w| + `relative_error` |w|^2 / 2.
+  void BoundExcesses(double slack, double relative_error, size_t begin, Candidates<D>& candidates) const;
 
   // Whether some node x has |p x|^2 <= |x|^2 + doubt, for the point p of the cube [low, high] nearest to it; `low` and
   // `high` are relative to the site.
@@ -123,11 +125,11 @@ class NodeColumns {
 
   VectorUnit unit_;
   size_t count_ = 0;
-  // More than are needed; places beyond the last node are as the class says.
-  std::vector<Group> groups_;
-  std::vector<Row> rows_;
-  std::vector<Pack> excesses_;
-  std::vector<Found> found_;
+  // Arrays only grow; places beyond the last node are as the class says.
+  std::vector<Group> groups_;   // node n is lane n % 4 of group n / 4
+  std::vector<Row> rows_;       // by node, the same again
+  std::vector<Pack> excesses_;  // as groups_; valid from ComputeExcesses on, of the nodes of then
+  std::vector<Found> found_;    // by node / 64, bit; the same
 };
 
 }  // namespace wellspace::core

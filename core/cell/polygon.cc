@@ -3,22 +3,21 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <limits>
 
 #include "core/base/simd/lane_bits.h"
 #include "core/cell/cell_on_unit.h"
 #include "core/cell/float_bisector.h"
-#include "core/cell/float_candidates.h"
 #include "core/cell/float_errors.h"
+#include "core/cell/float_nodes.h"
 #include "core/cell/meeting_point.h"
 
 namespace wellspace::core {
 
 // Takes note of the largest squared distance of a node, in floats.
 WELLSPACE_INLINE void Polygon::SetReach(float radius_sq) {
-  most_radius_ = std::min(most_radius_, std::sqrt(radius_sq) * (1 + kDistanceError<2>));  // the cell only shrinks
+  radius_bound_ = std::min(radius_bound_, std::sqrt(radius_sq) * (1 + kDistanceError<2>));  // the cell only shrinks
 }
 
 void Polygon::Reset(const Point<2>& site, const Box<2>& bounds, const std::array<PlaneKind, 4>& kinds, TieRule rule) {
@@ -38,8 +37,8 @@ void Polygon::Reset(const Point<2>& site, const Box<2>& bounds, const std::array
 }
 
 Point<2> Polygon::PositionOf(size_t node) const {
-  const Group& group = groups_[node / kTogether];
-  return {group.x[0][node % kTogether], group.x[1][node % kTogether]};
+  const Group& group = groups_[node / kGroupSize];
+  return {group.x[0][node % kGroupSize], group.x[1][node % kGroupSize]};
 }
 
 // Of the nodes `first` + i for the bits i of `doubtful`: a bit for whether it is cut off, by its own error if that
@@ -61,17 +60,17 @@ Point<2> Polygon::PositionOf(size_t node) const {
   return removed;
 }
 
-// Computes where `plane` meets the edges at whose ends the rest ends, in the order of the nodes, and the edges from
+// Computes where `plane` meets the two edges that the kept run ends at, in the order of the nodes, and the edges from
 // there.
 //
 // As Meet does, by Cramer's rule in doubles: wrong by at most 64 * 2^-53 P (d + d' + |x|) / |det| with P = |n| |n'|,
 // and the distances d and d' of the two planes are |x| at most. So |det| > 2^-19 P has x wrong by less than half a unit
 // of floats, 2^-26 |x|.
-WELLSPACE_INLINE void Polygon::PlaceEnds(const Rest& rest, uint32_t plane, std::array<Node, 2>& ends) const {
+WELLSPACE_INLINE void Polygon::PlaceEnds(const KeptRun& run, uint32_t plane, std::array<Node, 2>& ends) const {
   using Pair = Wide<2>::Lanes;
-  size_t last = rest.first + rest.count - 1;
+  size_t last = run.first + run.count - 1;
   last = last < count_ ? last : last - count_;
-  const size_t before = Before(rest.first);
+  const size_t before = Before(run.first);
   const std::array<uint32_t, 2> along = {PlaneFrom(last), PlaneFrom(before)};
   const Plane<2>& cut = planes_[plane];
   const Plane<2>& a = planes_[along[0]];
@@ -101,16 +100,17 @@ WELLSPACE_INLINE void Polygon::PlaceEnds(const Rest& rest, uint32_t plane, std::
   ends[1].x = static_cast<float>(x[1]);
   ends[1].y = static_cast<float>(y[1]);
   ends[1].plane = static_cast<int32_t>(along[1]);
-  ends[1].edge_sq = groups_[before / kTogether].edge_sq[before % kTogether];
+  ends[1].edge_sq = groups_[before / kGroupSize].edge_sq[before % kGroupSize];
 }
 
-// Makes the rest and the ends the nodes; both before and after kTogether at most.
+// Makes the kept run and the two ends the nodes, where one vector holds them before and after. A lane takes its node
+// from the lane `run.first` further on, around; the two lanes after the run take the ends.
 template <VectorUnit kUnit>
-WELLSPACE_INLINE void Polygon::Replace(const Rest& rest, const std::array<Node, 2>& ends) {
+WELLSPACE_INLINE void Polygon::Replace(const KeptRun& run, const std::array<Node, 2>& ends) {
   Group& group = groups_.front();
   const auto old_count = static_cast<int32_t>(count_);
-  const auto kept = static_cast<int32_t>(rest.count);
-  FloatMask from = kEachLane + static_cast<int32_t>(rest.first);
+  const auto kept = static_cast<int32_t>(run.count);
+  FloatMask from = kEachLane + static_cast<int32_t>(run.first);
   from = from - (~IsLess<kUnit>(from, Splat(old_count)) & old_count);
   const FloatMask is_kept = IsLess<kUnit>(kEachLane, Splat(kept));
   const FloatMask is_second = ~IsLess<kUnit>(kEachLane, Splat(kept + 1));
@@ -126,30 +126,31 @@ WELLSPACE_INLINE void Polygon::Replace(const Rest& rest, const std::array<Node, 
   VectorAt(group.x[1]) = used(replaced(group.x[1], ends[0].y, ends[1].y));
   VectorAt(group.edge_sq) = replaced(group.edge_sq, ends[0].edge_sq, ends[1].edge_sq);
   VectorAt(group.plane) = replaced(group.plane, ends[0].plane, ends[1].plane);
-  count_ = rest.count + 2;
+  count_ = run.count + 2;
   SetReach(Largest<kUnit>(RadiiSq<2>(group)));
 }
 
-[[gnu::noinline]] void Polygon::ReplaceAmongMany(const Rest& rest, const std::array<Node, 2>& ends) {
-  around_.clear();
-  for (size_t j = 0; j < rest.count; ++j) {
-    const size_t i = (rest.first + j) % count_;
-    const Group& group = groups_[i / kTogether];
-    const size_t lane = i % kTogether;
-    around_.push_back({group.x[0][lane], group.x[1][lane], group.edge_sq[lane], group.plane[lane]});
+// The same for any number of nodes, one by one.
+[[gnu::noinline]] void Polygon::ReplaceAmongMany(const KeptRun& run, const std::array<Node, 2>& ends) {
+  reordered_.clear();
+  for (size_t j = 0; j < run.count; ++j) {
+    const size_t i = (run.first + j) % count_;
+    const Group& group = groups_[i / kGroupSize];
+    const size_t lane = i % kGroupSize;
+    reordered_.push_back({group.x[0][lane], group.x[1][lane], group.edge_sq[lane], group.plane[lane]});
   }
-  around_.insert(around_.end(), ends.begin(), ends.end());
-  count_ = around_.size();
+  reordered_.insert(reordered_.end(), ends.begin(), ends.end());
+  count_ = reordered_.size();
   const size_t groups = GroupsFor(count_);
   if (groups_.size() < groups) {
     groups_.resize(2 * groups);
   }
-  around_.resize(groups * kTogether);
+  reordered_.resize(groups * kGroupSize);
   float radius_sq = 0;
-  for (size_t i = 0; i < around_.size(); ++i) {
-    const Node& node = around_[i];
-    Group& group = groups_[i / kTogether];
-    const size_t lane = i % kTogether;
+  for (size_t i = 0; i < reordered_.size(); ++i) {
+    const Node& node = reordered_[i];
+    Group& group = groups_[i / kGroupSize];
+    const size_t lane = i % kGroupSize;
     group.x[0][lane] = node.x;
     group.x[1][lane] = node.y;
     group.edge_sq[lane] = node.edge_sq;
@@ -159,19 +160,20 @@ WELLSPACE_INLINE void Polygon::Replace(const Rest& rest, const std::array<Node, 
   SetReach(radius_sq);
 }
 
-// By how much the nodes, kTogether or fewer, may exceed the bisector at most.
-WELLSPACE_INLINE Floats Polygon::MostExcesses(const FloatBisector<2>& bisector) const {
+// Upper bounds on the excesses of the nodes, kGroupSize or fewer, over the bisector.
+WELLSPACE_INLINE Floats Polygon::BoundExcesses(const FloatBisector<2>& bisector) const {
   const Group& group = groups_.front();
-  return Load(group.x[0]) * bisector.w[0] + (Load(group.x[1]) * bisector.w[1] - bisector.low);
+  return Load(group.x[0]) * bisector.w[0] + (Load(group.x[1]) * bisector.w[1] - bisector.least_offset);
 }
 
-// Tells what the bisector leaves of the nodes, kTogether or fewer, of which those of the bits `maybe` may be beyond it;
-// false if all.
+// Tells what the bisector leaves of the nodes, kGroupSize or fewer, of which those of the bits `maybe` may be beyond
+// it; false if all.
 template <VectorUnit kUnit>
-WELLSPACE_INLINE bool Polygon::FindRest(const FloatBisector<2>& bisector, const Floats& most, uint32_t maybe,
-                                        const Point<2>& position, Rest& rest) {
+WELLSPACE_INLINE bool Polygon::FindKept(const FloatBisector<2>& bisector, const Floats& excess_bounds, uint32_t maybe,
+                                        const Point<2>& position, KeptRun& run) {
   const auto count = static_cast<uint32_t>(count_);
-  uint32_t removed = Bits<kUnit>(IsLess<kUnit>(Splat(2 * (bisector.offset - bisector.low)), most)) & maybe;
+  uint32_t removed =
+      Bits<kUnit>(IsLess<kUnit>(Splat(2 * (bisector.offset - bisector.least_offset)), excess_bounds)) & maybe;
   if (removed != maybe) [[unlikely]] {
     removed |= DecideDoubtful(0, maybe & ~removed, position);
     if (removed == 0) {
@@ -180,22 +182,26 @@ WELLSPACE_INLINE bool Polygon::FindRest(const FloatBisector<2>& bisector, const 
   }
   const uint32_t is_before = removed << 1 | removed >> (count - 1);  // by node, whether the one before it goes
   const uint32_t first = is_before & ~removed & ((1u << count) - 1);
-  if (!std::has_single_bit(first)) {
-    std::abort();  // exact decisions take out a run
-  }
-  rest.first = static_cast<uint32_t>(std::countr_zero(first));
-  rest.count = count - static_cast<uint32_t>(std::popcount(removed));
+  // What a line cuts off a convex polygon is one run of nodes, and decisions are exact: so one node that stays comes
+  // after one that goes, unless all go, which the site's side of the bisector forbids.
+  AbortUnlessCellHolds(std::has_single_bit(first));
+  run.first = static_cast<uint32_t>(std::countr_zero(first));
+  run.count = count - static_cast<uint32_t>(std::popcount(removed));
   return true;
 }
 
-[[gnu::noinline]] bool Polygon::FindRestOfMany(const FloatBisector<2>& bisector, const Point<2>& position, Rest& rest) {
+// The same of any number of nodes, one by one.
+[[gnu::noinline]] bool Polygon::FindKeptOfMany(const FloatBisector<2>& bisector, const Point<2>& position,
+                                               KeptRun& run) {
   is_removed_.assign(count_, 0);
   size_t removed_count = 0;
   for (size_t i = 0; i < count_; ++i) {
-    const Group& group = groups_[i / kTogether];
-    const size_t lane = i % kTogether;
-    const float most = group.x[0][lane] * bisector.w[0] + (group.x[1][lane] * bisector.w[1] - bisector.low);
-    if (most >= 0 && (most > 2 * (bisector.offset - bisector.low) || DecideDoubtful(i, 1, position) != 0)) {
+    const Group& group = groups_[i / kGroupSize];
+    const size_t lane = i % kGroupSize;
+    const float excess_bound =
+        group.x[0][lane] * bisector.w[0] + (group.x[1][lane] * bisector.w[1] - bisector.least_offset);
+    if (excess_bound >= 0 &&
+        (excess_bound > 2 * (bisector.offset - bisector.least_offset) || DecideDoubtful(i, 1, position) != 0)) {
       is_removed_[i] = 1;
       ++removed_count;
     }
@@ -206,38 +212,36 @@ WELLSPACE_INLINE bool Polygon::FindRest(const FloatBisector<2>& bisector, const 
   size_t runs = 0;
   for (size_t i = 0; i < count_; ++i) {
     if (is_removed_[i] == 0 && is_removed_[Before(i)] != 0) {
-      rest.first = static_cast<uint32_t>(i);
+      run.first = static_cast<uint32_t>(i);
       ++runs;
     }
   }
-  if (runs != 1) {
-    std::abort();
-  }
-  rest.count = static_cast<uint32_t>(count_ - removed_count);
+  AbortUnlessCellHolds(runs == 1);  // as in FindKept
+  run.count = static_cast<uint32_t>(count_ - removed_count);
   return true;
 }
 
 // Cuts by the bisector of the site and `position`.
 template <VectorUnit kUnit>
 WELLSPACE_INLINE bool Polygon::CutOff(const FloatBisector<2>& bisector, VertexId u, const Point<2>& position) {
-  Rest rest;
-  if (count_ <= kTogether) {
-    const Floats most = MostExcesses(bisector);
-    const uint32_t maybe = ~Bits<kUnit>(reinterpret_cast<const FloatMask&>(most)) & ((1u << count_) - 1);
-    if (maybe == 0 || !FindRest<kUnit>(bisector, most, maybe, position, rest)) {
+  KeptRun run;
+  if (count_ <= kGroupSize) {
+    const Floats excess_bounds = BoundExcesses(bisector);
+    const uint32_t maybe = ~Bits<kUnit>(reinterpret_cast<const FloatMask&>(excess_bounds)) & ((1u << count_) - 1);
+    if (maybe == 0 || !FindKept<kUnit>(bisector, excess_bounds, maybe, position, run)) {
       return false;
     }
-  } else if (!FindRestOfMany(bisector, position, rest)) {
+  } else if (!FindKeptOfMany(bisector, position, run)) {
     return false;
   }
   const size_t index = AddBisector(u, position);
   std::array<Node, 2> ends;
-  PlaceEnds(rest, static_cast<uint32_t>(index), ends);
+  PlaceEnds(run, static_cast<uint32_t>(index), ends);
   ends[0].edge_sq = 2 * bisector.offset;
-  if (count_ <= kTogether && rest.count + 2 <= kTogether) {
-    Replace<kUnit>(rest, ends);
+  if (count_ <= kGroupSize && run.count + 2 <= kGroupSize) {
+    Replace<kUnit>(run, ends);
   } else {
-    ReplaceAmongMany(rest, ends);
+    ReplaceAmongMany(run, ends);
   }
   return true;
 }
@@ -254,7 +258,7 @@ size_t Polygon::CutByEach(std::span<const Point<2>> positions, const VertexNames
   return CellOnUnit<Polygon, 2>::CutByEach(*this, positions, names, site);
 }
 
-// Places all by their planes, bisectors by vertex, then walls by face: so they do not depend on the order of the cuts.
+// Places all by their planes, in the order of PlaneOrderKey.
 void Polygon::Place() {
   if (is_placed_) {
     return;
@@ -266,10 +270,10 @@ void Polygon::Place() {
     CellNode<2>& node = nodes_[i];
     const size_t before = Before(i);
     const size_t after = i + 1 < count_ ? i + 1 : 0;
-    const std::array<uint32_t, 2> planes = {PlaneFrom(before), PlaneFrom(i)};
-    const auto key = [this](uint32_t index) { return uint64_t{Index(planes_[index].vertex)} << 32 | index; };
-    const bool swaps = key(planes[1]) < key(planes[0]);
-    node.planes = {static_cast<uint16_t>(planes[swaps ? 1 : 0]), static_cast<uint16_t>(planes[swaps ? 0 : 1])};
+    const std::array<uint16_t, 2> planes = {static_cast<uint16_t>(PlaneFrom(before)),
+                                            static_cast<uint16_t>(PlaneFrom(i))};
+    const bool swaps = PlaneOrderKey<2>(planes_, planes[1]) < PlaneOrderKey<2>(planes_, planes[0]);
+    node.planes = {planes[swaps ? 1 : 0], planes[swaps ? 0 : 1]};
     // The edge that leaves the plane of the edge before runs along the one after, and the other way round.
     node.neighbours = {static_cast<uint16_t>(swaps ? before : after), static_cast<uint16_t>(swaps ? after : before)};
     PlaceNode<2>(site_, planes_, node);
@@ -289,7 +293,7 @@ bool Polygon::PlaceUnlessKeeps(double ratio) {
 template <VectorUnit kUnit>
 WELLSPACE_INLINE bool Polygon::KeepsRatioWith(double ratio) const {
   const float ratio_sq = SurelyKeptRatioSq(ratio);
-  if (count_ <= kTogether) {
+  if (count_ <= kGroupSize) {
     const Group& group = groups_.front();
     const FloatMask before = Choose<kUnit>(kEachLane == 0, Splat(static_cast<int32_t>(count_ - 1)), kEachLane - 1);
     const Floats from = Load(group.edge_sq);
@@ -301,9 +305,9 @@ WELLSPACE_INLINE bool Polygon::KeepsRatioWith(double ratio) const {
   }
   for (size_t i = 0; i < count_; ++i) {
     const size_t before = Before(i);
-    const Group& group = groups_[i / kTogether];
-    const size_t lane = i % kTogether;
-    const float nearest_sq = std::min(group.edge_sq[lane], groups_[before / kTogether].edge_sq[before % kTogether]);
+    const Group& group = groups_[i / kGroupSize];
+    const size_t lane = i % kGroupSize;
+    const float nearest_sq = std::min(group.edge_sq[lane], groups_[before / kGroupSize].edge_sq[before % kGroupSize]);
     const float radius_sq = group.x[0][lane] * group.x[0][lane] + group.x[1][lane] * group.x[1][lane];
     if (!(radius_sq + kUnderflow <= ratio_sq * nearest_sq)) {
       return false;
@@ -336,7 +340,7 @@ void Polygon::FindStar(Star<2>& out) const {
 
 uint64_t Polygon::MemoryBytes() const {
   return groups_.capacity() * sizeof(Group) + planes_.capacity() * sizeof(Plane<2>) +
-         nodes_.capacity() * sizeof(CellNode<2>) + around_.capacity() * sizeof(Node) + is_removed_.capacity();
+         nodes_.capacity() * sizeof(CellNode<2>) + reordered_.capacity() * sizeof(Node) + is_removed_.capacity();
 }
 
 }  // namespace wellspace::core

@@ -1,5 +1,5 @@
 // The Voronoi cell of one vertex in the plane under construction: Polytope<2>. What its functions promise is said in
-// polytope.h.
+// cell_class.h.
 #ifndef WELLSPACE_CORE_CELL_POLYGON_H_
 #define WELLSPACE_CORE_CELL_POLYGON_H_
 
@@ -22,9 +22,16 @@
 
 namespace wellspace::core {
 
-// Polytope<2>, to which its functions that are not told about here belong: a convex polygon, whose nodes are kept in
-// order around the site, so that a cut takes a run of them out and puts two in. What floats leave in doubt is decided
-// exactly. Up to eight nodes, as most cells have, are worked on as one vector.
+// The cell in the plane: a convex polygon, whose nodes are kept in order around the site, counter-clockwise, so that a
+// cut takes a run of them out and puts two in. What floats leave in doubt is decided exactly.
+//
+//   BoundExcesses, FindKept   which run of nodes the bisector leaves; in doubt by DecideDoubtful
+//   AddBisector               the new plane (float_cell.h)
+//   PlaceEnds                 where the new plane meets the two edges that the run ends at
+//   Replace                   the run and the two ends become the nodes, and the farthest one the reach
+//
+// Up to eight nodes, as most cells have, are worked on as one vector; those with more, one by one (FindKeptOfMany,
+// ReplaceAmongMany).
 //
 // Thread safety: thread-compatible. Reused from site to site: no allocation once warm.
 // Invariants: the nodes are those that exact arithmetic and the tie rule give, whatever the rounding.
@@ -43,7 +50,8 @@ class Polygon : public FloatCell<2> {
   bool CutBeforePlace(VertexId u, const Point<2>& position);
 
   size_t CutByEach(std::span<const Point<2>> positions, const VertexNames& names, VertexId site);
-  // Cuts the cell by the vertices that have been gathered around its site. Returns how many others are within reach.
+  // Cuts the cell by the vertices that have been gathered around its site, in the place of CutByEach, leaf after leaf.
+  // Returns how many others are within reach.
   //
   // REQUIRES:   gathered.Surrounds(site()); the cell has not been cut.
   // Complexity: O(gathered), little for each, and the cuts; no allocation once warm.
@@ -60,37 +68,38 @@ class Polygon : public FloatCell<2> {
  private:
   friend struct CellOnUnit<Polygon, 2>;
 
-  // Nodes, each with the edge from it to the next one: the square of the length of what its bisector stands for, 0 of a
-  // wall, and its plane, by index. Places beyond the last node are at the site, which no bisector cuts off.
-  struct alignas(kTogether * sizeof(float)) Group {
-    float x[2][kTogether];
-    float edge_sq[kTogether];
-    int32_t plane[kTogether];
+  // What is computed of kGroupSize nodes at a time, in the units of the nodes. Lanes beyond the last node are at the
+  // site, which no bisector cuts off.
+  struct alignas(kGroupSize * sizeof(float)) Group {
+    float x[2][kGroupSize];
+    float edge_sq[kGroupSize];  // the squared length of the edge from the site to the vertex of `plane`; 0 of a wall
+    int32_t plane[kGroupSize];  // along which the cell runs from this node to the next
   };
+  // One lane of a Group.
   struct Node {
     float x;
     float y;
     float edge_sq;
     int32_t plane;
   };
-  // What is left of the nodes: so many from there on, around.
-  struct Rest {
+  // The nodes that a cut leaves: so many from there on, around.
+  struct KeptRun {
     uint32_t first;
     uint32_t count;
   };
 
   template <VectorUnit kUnit>
   bool CutOff(const FloatBisector<2>& bisector, VertexId u, const Point<2>& position);
-  Floats MostExcesses(const FloatBisector<2>& bisector) const;
+  Floats BoundExcesses(const FloatBisector<2>& bisector) const;
   template <VectorUnit kUnit>
-  bool FindRest(const FloatBisector<2>& bisector, const Floats& most, uint32_t maybe, const Point<2>& position,
-                Rest& rest);
-  bool FindRestOfMany(const FloatBisector<2>& bisector, const Point<2>& position, Rest& rest);
+  bool FindKept(const FloatBisector<2>& bisector, const Floats& excess_bounds, uint32_t maybe, const Point<2>& position,
+                KeptRun& run);
+  bool FindKeptOfMany(const FloatBisector<2>& bisector, const Point<2>& position, KeptRun& run);
   uint32_t DecideDoubtful(size_t first, uint32_t doubtful, const Point<2>& generator);
-  void PlaceEnds(const Rest& rest, uint32_t plane, std::array<Node, 2>& ends) const;
+  void PlaceEnds(const KeptRun& run, uint32_t plane, std::array<Node, 2>& ends) const;
   template <VectorUnit kUnit>
-  void Replace(const Rest& rest, const std::array<Node, 2>& ends);
-  void ReplaceAmongMany(const Rest& rest, const std::array<Node, 2>& ends);
+  void Replace(const KeptRun& run, const std::array<Node, 2>& ends);
+  void ReplaceAmongMany(const KeptRun& run, const std::array<Node, 2>& ends);
   template <VectorUnit kUnit>
   bool KeepsRatioWith(double ratio) const;
   bool KeepsRatioAvx2(double ratio) const;
@@ -98,13 +107,15 @@ class Polygon : public FloatCell<2> {
   Point<2> PositionOf(size_t node) const;  // in the units of the nodes
   std::span<const Group> groups() const { return {groups_.data(), GroupsFor(count_)}; }
   uint32_t PlaneFrom(size_t node) const {
-    return static_cast<uint32_t>(groups_[node / kTogether].plane[node % kTogether]);
+    return static_cast<uint32_t>(groups_[node / kGroupSize].plane[node % kGroupSize]);
   }
   size_t Before(size_t node) const { return (node == 0 ? count_ : node) - 1; }
 
-  std::vector<Group> groups_;        // and more
-  std::vector<Node> around_;         // scratch of ReplaceAmongMany
-  std::vector<uint8_t> is_removed_;  // scratch of FindRestOfMany
+  // Arrays only grow. Beside those of FloatCell: planes_, by plane, of which plane_count_ are valid, and nodes_, by
+  // node, valid once the cell is placed.
+  std::vector<Group> groups_;        // node n is lane n % 8 of group n / 8; count_ nodes are valid
+  std::vector<Node> reordered_;      // by node, the new nodes, in ReplaceAmongMany
+  std::vector<uint8_t> is_removed_;  // by node, in FindKeptOfMany
 };
 
 }  // namespace wellspace::core

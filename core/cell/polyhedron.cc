@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <limits>
 
 #include "core/cell/cell_on_unit.h"
 #include "core/cell/float_bisector.h"
-#include "core/cell/float_candidates.h"
 #include "core/cell/float_errors.h"
+#include "core/cell/float_nodes.h"
 
 namespace wellspace::core {
 namespace {
@@ -26,29 +25,29 @@ WELLSPACE_INLINE void Polyhedron::SetReach() {
   Floats most_sq{};
   ForEachGroup([&](const Group& group)
                    __attribute__((always_inline)) { most_sq = Max<kUnit>(most_sq, RadiiSq<3>(group)); });
-  most_radius_ =
-      std::min(most_radius_, std::sqrt(Largest<kUnit>(most_sq)) * (1 + kDistanceError<3>));  // the cell only shrinks
+  radius_bound_ =
+      std::min(radius_bound_, std::sqrt(Largest<kUnit>(most_sq)) * (1 + kDistanceError<3>));  // the cell only shrinks
 }
 
 void Polyhedron::Reset(const Point<3>& site, const Box<3>& bounds, const std::array<PlaneKind, 6>& kinds,
                        TieRule rule) {
   BeginWalls(site, bounds, kinds, rule);
-  if (rows_.empty()) {
-    rows_.resize(kWordBits);
-    edge_sq_.resize(kWordBits);
-    groups_.resize(kWordBits / kTogether);
+  if (plane_rows_.empty()) {
+    plane_rows_.resize(kWordBits);
+    plane_edge_sq_.resize(kWordBits);
+    groups_.resize(kWordBits / kGroupSize);
     triangles_.resize(kWordBits);
     removed_words_.resize(1);
     removed_.resize(kWordBits);
-    rim_.resize(kWordBits + 4);
-    for (auto& column : new_) {
-      column.resize(rim_.size());
+    horizon_.resize(kWordBits + 4);
+    for (auto& column : horizon_x_) {
+      column.resize(horizon_.size());
     }
   }
   for (int face = 0; face < 6; ++face) {
     const Plane<3>& plane = planes_[face];
-    rows_[face] = {{plane.normal[0], plane.normal[1], plane.normal[2]}, plane.offset};
-    edge_sq_[face] = 0;
+    plane_rows_[face] = {{plane.normal[0], plane.normal[1], plane.normal[2]}, plane.offset};
+    plane_edge_sq_[face] = 0;
   }
   std::fill_n(groups_.begin(), GroupsFor(count_), Group{});
   count_ = 8;
@@ -70,20 +69,21 @@ void Polyhedron::Reset(const Point<3>& site, const Box<3>& bounds, const std::ar
 // Finds the nodes that are cut off; whether there are any.
 template <VectorUnit kUnit>
 WELLSPACE_INLINE bool Polyhedron::FindRemoved(const FloatBisector<3>& bisector, const Point<3>& position) {
-  const Floats surely_from = Splat(2 * (bisector.offset - bisector.low));
+  const Floats surely_from = Splat(2 * (bisector.offset - bisector.least_offset));
   uint64_t maybe = 0;
   uint64_t surely = 0;
   size_t node = 0;  // of a word
   const auto look_at = [&](const Group& group) __attribute__((always_inline)) {
-    const Floats most = Load(group.x[0]) * bisector.w[0] +
-                        (Load(group.x[1]) * bisector.w[1] + (Load(group.x[2]) * bisector.w[2] - bisector.low));
-    maybe |= uint64_t{Bits<kUnit>(reinterpret_cast<const FloatMask&>(most)) ^ 0xff} << node;  // by sign
-    surely |= uint64_t{Bits<kUnit>(IsLess<kUnit>(surely_from, most))} << node;
-    node += kTogether;
+    const Floats excess_bounds =
+        Load(group.x[0]) * bisector.w[0] +
+        (Load(group.x[1]) * bisector.w[1] + (Load(group.x[2]) * bisector.w[2] - bisector.least_offset));
+    maybe |= uint64_t{Bits<kUnit>(reinterpret_cast<const FloatMask&>(excess_bounds)) ^ 0xff} << node;  // by sign
+    surely |= uint64_t{Bits<kUnit>(IsLess<kUnit>(surely_from, excess_bounds))} << node;
+    node += kGroupSize;
   };
   if (count_ <= kWordBits) [[likely]] {
     ForEachGroup(look_at);
-    return SetRemoved(0, maybe, surely, position);
+    return SetRemovedWord(0, maybe, surely, position);
   }
   bool is_any = false;
   const Group* const end = groups_.data() + GroupsFor(count_);
@@ -94,14 +94,15 @@ WELLSPACE_INLINE bool Polyhedron::FindRemoved(const FloatBisector<3>& bisector, 
     for (node = 0; node < kWordBits && group != end; ++group) {
       look_at(*group);
     }
-    is_any |= SetRemoved(word, maybe, surely, position);
+    is_any |= SetRemovedWord(word, maybe, surely, position);
   }
   return is_any;
 }
 
 // Sets a word of removed_words_, given which of its nodes the bisector to `generator` may cut off, and which it surely
 // does; whether there are any.
-WELLSPACE_INLINE bool Polyhedron::SetRemoved(size_t word, uint64_t maybe, uint64_t surely, const Point<3>& generator) {
+WELLSPACE_INLINE bool Polyhedron::SetRemovedWord(size_t word, uint64_t maybe, uint64_t surely,
+                                                 const Point<3>& generator) {
   const size_t nodes = std::min(count_ - word * kWordBits, kWordBits);
   maybe &= ~uint64_t{0} >> (kWordBits - nodes);
   surely &= maybe;
@@ -131,15 +132,21 @@ WELLSPACE_INLINE bool Polyhedron::SetRemoved(size_t word, uint64_t maybe, uint64
   return removed;
 }
 
-// Lists the nodes that are cut off, and the edges of the rim around them: those of their triangles that no other of
+// Lists the nodes that are cut off, and the edges of the horizon around them: those of their triangles that no other of
 // them has the other way round.
-WELLSPACE_INLINE void Polyhedron::FindRim() {
+WELLSPACE_INLINE void Polyhedron::FindHorizon() {
   removed_count_ = 0;
-  rim_count_ = 0;
+  horizon_count_ = 0;
   if (plane_count_ > kWordBits || count_ > kWordBits) {
-    FindRimAmongMany();
-    return;
+    FindHorizonAmongMany();
+  } else {
+    ListHorizon(NoteEdgesOfRemoved());
   }
+}
+
+// Lists the nodes that are cut off, and notes their edges in leads_to_ and leads_from_; a bit for each plane that has
+// any.
+WELLSPACE_INLINE uint64_t Polyhedron::NoteEdgesOfRemoved() {
   const Triangle* const triangles = triangles_.data();
   uint32_t* removed_end = removed_.data();
   uint64_t touched = 0;
@@ -157,29 +164,39 @@ WELLSPACE_INLINE void Polyhedron::FindRim() {
     touched |= bits[0] | bits[1] | bits[2];
   }
   removed_count_ = static_cast<size_t>(removed_end - removed_.data());
+  return touched;
+}
+
+// Lists the edges that lead one way only, and clears the notes. From each plane of the horizon one such edge leads.
+//
+// The removed triangles are a disk, since decisions are exact: the nodes beyond a plane are a connected part of a
+// convex polyhedron, and so are the others. Let it have F triangles, h edges on its horizon, and so h planes there, and
+// i planes inside, which the new one cuts off altogether. Its edges are (3 F + h) / 2, so Euler's formula for a disk, V
+// - E + F = 1, says h + 2 i = F + 2. Together with one edge from each plane this is what the check asks.
+WELLSPACE_INLINE void Polyhedron::ListHorizon(uint64_t touched) {
   const auto touched_count = static_cast<size_t>(std::popcount(touched));
-  RimEdge* const rim = rim_.data();
-  size_t rim_count = 0;
-  uint64_t doubled = 0;
+  HorizonEdge* const horizon = horizon_.data();
+  size_t horizon_count = 0;
+  uint64_t doubled = 0;  // not 0 if several such edges lead from one plane
   for (; touched != 0; touched &= touched - 1) {
     const auto from = static_cast<uint32_t>(std::countr_zero(touched));
     const uint64_t to = leads_to_[from] & ~leads_from_[from];
     leads_to_[from] = 0;
     leads_from_[from] = 0;
-    // No branch, since it could not be predicted.
-    rim[rim_count] = {static_cast<uint16_t>(from), static_cast<uint16_t>(std::countr_zero(to | uint64_t{1} << 63))};
+    // No branch, since it could not be predicted: what is written for a plane inside is written over.
+    horizon[horizon_count] = {static_cast<uint16_t>(from),
+                              static_cast<uint16_t>(std::countr_zero(to | uint64_t{1} << 63))};
     doubled |= to & (to - 1) & -static_cast<uint64_t>(to != 0);
-    rim_count += to != 0 ? 1 : 0;
+    horizon_count += to != 0 ? 1 : 0;
   }
-  rim_count_ = rim_count;
-  // Exact decisions take a disk out. Euler's formula of one whose inner vertices are the planes that are gone then.
-  if (doubled != 0 || rim_count_ + 2 * (touched_count - rim_count_) != removed_count_ + 2) {
-    std::abort();
-  }
+  horizon_count_ = horizon_count;
+  const size_t inside = touched_count - horizon_count_;
+  AbortUnlessCellHolds(doubled == 0 && horizon_count_ + 2 * inside == removed_count_ + 2);
 }
 
-[[gnu::noinline]] void Polyhedron::FindRimAmongMany() {
-  edges_.clear();
+// The same by sorting edges: the two that join the same planes, one in each direction, come one after the other.
+[[gnu::noinline]] void Polyhedron::FindHorizonAmongMany() {
+  sorted_edges_.clear();
   for (uint32_t node = 0; node < count_; ++node) {
     if (!IsRemoved(node)) {
       continue;
@@ -189,42 +206,42 @@ WELLSPACE_INLINE void Polyhedron::FindRim() {
     for (int k = 0; k < 3; ++k) {
       const uint32_t from = planes[k];
       const uint32_t to = planes[(k + 1) % 3];
-      edges_.push_back({std::min(from, to), std::max(from, to), from});
+      sorted_edges_.push_back({std::min(from, to), std::max(from, to), from});
     }
   }
-  std::sort(edges_.begin(), edges_.end());
-  if (rim_.size() < edges_.size() + 4) {
-    rim_.resize(2 * edges_.size() + 4);
-    for (auto& column : new_) {
-      column.resize(rim_.size());
+  std::sort(sorted_edges_.begin(), sorted_edges_.end());
+  if (horizon_.size() < sorted_edges_.size() + 4) {
+    horizon_.resize(2 * sorted_edges_.size() + 4);
+    for (auto& column : horizon_x_) {
+      column.resize(horizon_.size());
     }
   }
-  for (size_t i = 0; i < edges_.size(); ++i) {
-    const auto& [low, high, from] = edges_[i];
-    if (i + 1 < edges_.size() && edges_[i + 1][0] == low && edges_[i + 1][1] == high) {
+  for (size_t i = 0; i < sorted_edges_.size(); ++i) {
+    const auto& [low, high, from] = sorted_edges_[i];
+    if (i + 1 < sorted_edges_.size() && sorted_edges_[i + 1][0] == low && sorted_edges_[i + 1][1] == high) {
       ++i;
       continue;
     }
-    rim_[rim_count_++] = {static_cast<uint16_t>(from), static_cast<uint16_t>(from == low ? high : low)};
+    horizon_[horizon_count_++] = {static_cast<uint16_t>(from), static_cast<uint16_t>(from == low ? high : low)};
   }
-  if (rim_count_ < 3) {
-    std::abort();
-  }
+  AbortUnlessCellHolds(horizon_count_ >= 3);  // a new facet has three corners at least
 }
 
-// Computes the nodes where `plane` meets the edges that lead out of what is cut off, which lie on the planes of the
-// edges of the rim.
+// Computes the nodes where `plane` meets the edges of the cell that lead out of what is cut off: such an edge runs
+// along the two planes of an edge of the horizon. Four at a time.
 //
 // As Meet does, by Cramer's rule in doubles: wrong by at most 64 * 2^-53 P (d + d' + d'' + |x|) / |det|, where P is the
 // product of the lengths of the normals, and the distances of the planes are |x| at most. So |det| > 2^-19 P has x
 // wrong by less than 2^-26 |x|.
-WELLSPACE_INLINE void Polyhedron::PlaceOnRim(uint32_t plane) {
-  const Row& own = rows_[plane];
+WELLSPACE_INLINE void Polyhedron::PlaceOnHorizon(uint32_t plane) {
+  const PlaneRow& own = plane_rows_[plane];
   const Point<3> n = {own.normal[0], own.normal[1], own.normal[2]};
   const double n_sq = NormSq<3>(n);
-  std::fill_n(&rim_[rim_count_], 3, rim_[0]);  // four are read at a time
-  for (size_t first = 0; first < rim_count_; first += 4) {
-    const RimEdge* const edges = &rim_[first];
+  std::fill_n(&horizon_[horizon_count_], 3, horizon_[0]);  // four are read at a time
+  for (size_t first = 0; first < horizon_count_; first += 4) {
+    // Of the planes p and q of each edge the normals, by axis, then the offsets; n is the normal of the new plane.
+    // x = (offset of p (q x n) + of q (n x p) + of n (p x q)) / det(p, q, n).
+    const HorizonEdge* const edges = &horizon_[first];
     Four p[4];
     Four q[4];
     TakeColumns<uint16_t>({edges[0].from, edges[1].from, edges[2].from, edges[3].from}, p);
@@ -235,7 +252,7 @@ WELLSPACE_INLINE void Polyhedron::PlaceOnRim(uint32_t plane) {
     const Four determinant = p[0] * q_n[0] + p[1] * q_n[1] + p[2] * q_n[2];
     const Four product_sq =
         (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) * (q[0] * q[0] + q[1] * q[1] + q[2] * q[2]) * n_sq;
-    const auto is_good = determinant * determinant > 0x1p-38 * product_sq;
+    const auto is_good = determinant * determinant > 0x1p-38 * product_sq;  // |det| > 2^-19 P
     const Four inverse = scale_ / determinant;
     FourFloats x[3];
     for (int axis = 0; axis < 3; ++axis) {
@@ -243,7 +260,7 @@ WELLSPACE_INLINE void Polyhedron::PlaceOnRim(uint32_t plane) {
           __builtin_convertvector((p[3] * q_n[axis] + q[3] * n_p[axis] + own.offset * p_q[axis]) * inverse, FourFloats);
     }
     for (int axis = 0; axis < 3; ++axis) {
-      std::memcpy(&new_[axis][first], &x[axis], sizeof(x[axis]));
+      std::memcpy(&horizon_x_[axis][first], &x[axis], sizeof(x[axis]));
     }
     const uint32_t good = Bits<2>(reinterpret_cast<const Wide<2>::Mask*>(&is_good)[0]) |
                           Bits<2>(reinterpret_cast<const Wide<2>::Mask*>(&is_good)[1]) << 2;
@@ -257,37 +274,50 @@ WELLSPACE_INLINE void Polyhedron::PlaceOnRim(uint32_t plane) {
   }
 }
 
-// Places a node whose planes are nearly dependent, as where slivers have nodes close to each other: at the end of its
-// edge that stays, if that is short enough.
-[[gnu::noinline]] void Polyhedron::PlaceOnShortEdge(size_t j, uint32_t plane) {
-  const RimEdge edge = rim_[j];
-  const auto has = [](const Triangle& triangle, uint32_t from, uint32_t to) {
-    const std::array<uint16_t, 3>& planes = triangle.planes;
+// The node whose triangle leads from one plane to the other; there is one, since the sphere is closed.
+size_t Polyhedron::TriangleWith(uint32_t from, uint32_t to) const {
+  const auto has = [&](const std::array<uint16_t, 3>& planes) {
     return (planes[0] == from && planes[1] == to) || (planes[1] == from && planes[2] == to) ||
            (planes[2] == from && planes[0] == to);
   };
-  size_t kept = 0;
-  while (!has(triangles_[kept], edge.to, edge.from)) {
-    ++kept;
+  size_t node = 0;
+  while (!has(triangles_[node].planes)) {
+    ++node;
   }
-  size_t removed = 0;
-  while (!has(triangles_[removed], edge.from, edge.to)) {
-    ++removed;
-  }
+  return node;
+}
+
+// Places a node whose planes are nearly dependent, as where slivers have nodes close to each other: at the end of its
+// edge that stays, if that is short enough.
+[[gnu::noinline]] void Polyhedron::PlaceOnShortEdge(size_t j, uint32_t plane) {
+  const HorizonEdge edge = horizon_[j];
+  const size_t kept = TriangleWith(edge.to, edge.from);
+  const size_t removed = TriangleWith(edge.from, edge.to);
   const Point<3> x = PositionOf(kept);
   const double length = std::sqrt(DistanceSq<3>(x, PositionOf(removed)));
   // Each end is wrong by 1.5 u |x| at most, so the node by the length and 5 u |x|, in the place of 16.
-  if (!triangles_[kept].is_at_end && !triangles_[removed].is_at_end && length < 8 * 0x1p-24 * std::sqrt(NormSq<3>(x))) {
+  if (!triangles_[kept].is_at_edge_end && !triangles_[removed].is_at_edge_end &&
+      length < 8 * 0x1p-24 * std::sqrt(NormSq<3>(x))) {
     for (int axis = 0; axis < 3; ++axis) {
-      new_[axis][j] = static_cast<float>(x[axis]);
+      horizon_x_[axis][j] = static_cast<float>(x[axis]);
     }
-    rim_[j].is_at_end = true;
+    horizon_[j].is_at_edge_end = true;
     return;
   }
   const Point<3> exact =
       ExactMeetingPoint<3>(site_, {planes_[edge.from].source, planes_[edge.to].source, planes_[plane].source});
   for (int axis = 0; axis < 3; ++axis) {
-    new_[axis][j] = static_cast<float>(exact[axis] * scale_);
+    horizon_x_[axis][j] = static_cast<float>(exact[axis] * scale_);
+  }
+}
+
+WELLSPACE_INLINE void Polyhedron::MakeRoomForNodes(size_t count) {
+  if (groups_.size() * kGroupSize < count) {
+    const size_t groups = 2 * GroupsFor(count);
+    groups_.resize(groups);
+    triangles_.resize(groups * kGroupSize);
+    removed_.resize(groups * kGroupSize);
+    removed_words_.resize((groups * kGroupSize + kWordBits - 1) / kWordBits);
   }
 }
 
@@ -295,46 +325,46 @@ WELLSPACE_INLINE void Polyhedron::PlaceOnRim(uint32_t plane) {
 // and of places that are left those at the end are filled.
 WELLSPACE_INLINE void Polyhedron::Replace(uint32_t plane) {
   const size_t old = count_;
-  count_ = std::max(old, old + rim_count_ - removed_count_);
-  if (groups_.size() * kTogether < count_) {
-    const size_t groups = 2 * GroupsFor(count_);
-    groups_.resize(groups);
-    triangles_.resize(groups * kTogether);
-    removed_.resize(groups * kTogether);
-    removed_words_.resize((groups * kTogether + kWordBits - 1) / kWordBits);
-  }
+  count_ = std::max(old, old + horizon_count_ - removed_count_);
+  MakeRoomForNodes(count_);
   Group* const groups = groups_.data();
   Triangle* const triangles = triangles_.data();
-  const RimEdge* const rim = rim_.data();
+  const HorizonEdge* const horizon = horizon_.data();
   const uint32_t* const removed = removed_.data();
-  const float* const edge_sq = edge_sq_.data();
-  const std::array<const float*, 3> x = {new_[0].data(), new_[1].data(), new_[2].data()};
-  const size_t rim_count = rim_count_;
+  const float* const edge_sq = plane_edge_sq_.data();
+  const std::array<const float*, 3> x = {horizon_x_[0].data(), horizon_x_[1].data(), horizon_x_[2].data()};
+  const size_t horizon_count = horizon_count_;
   const size_t removed_count = removed_count_;
   const float own_sq = edge_sq[plane];
-  for (size_t j = 0; j < rim_count; ++j) {
-    // No branch, since it could not be predicted.
+  for (size_t j = 0; j < horizon_count; ++j) {
+    // removed[j] if there is one, else the next place at the end. No branch, since it could not be predicted.
     const size_t added = old + j - removed_count;
     const size_t index = added ^ ((added ^ removed[j]) & -static_cast<size_t>(j < removed_count));
-    const RimEdge edge = rim[j];
-    Group& group = groups[index / kTogether];
-    const size_t lane = index % kTogether;
+    const HorizonEdge edge = horizon[j];
+    Group& group = groups[index / kGroupSize];
+    const size_t lane = index % kGroupSize;
     group.x[0][lane] = x[0][j];
     group.x[1][lane] = x[1][j];
     group.x[2][lane] = x[2][j];
     group.edge_sq[lane] = std::min(std::min(edge_sq[edge.from], edge_sq[edge.to]), own_sq);
-    triangles[index] = {{edge.from, edge.to, static_cast<uint16_t>(plane)}, edge.is_at_end};
+    triangles[index] = {{edge.from, edge.to, static_cast<uint16_t>(plane)}, edge.is_at_edge_end};
   }
-  for (size_t i = removed_count_; i-- > rim_count_;) {
+  FillHoles();
+}
+
+// Moves nodes from the end into the places of removed nodes that no new one has taken.
+WELLSPACE_INLINE void Polyhedron::FillHoles() {
+  // The last hole first: the last node is never one then, unless it is that hole.
+  for (size_t i = removed_count_; i-- > horizon_count_;) {
     const size_t hole = removed_[i];
     const size_t last = --count_;
-    Group& from = groups_[last / kTogether];
-    Group& to = groups_[hole / kTogether];
+    Group& from = groups_[last / kGroupSize];
+    Group& to = groups_[hole / kGroupSize];
     for (int axis = 0; axis < 3; ++axis) {
-      to.x[axis][hole % kTogether] = from.x[axis][last % kTogether];
-      from.x[axis][last % kTogether] = 0;
+      to.x[axis][hole % kGroupSize] = from.x[axis][last % kGroupSize];
+      from.x[axis][last % kGroupSize] = 0;
     }
-    to.edge_sq[hole % kTogether] = from.edge_sq[last % kTogether];
+    to.edge_sq[hole % kGroupSize] = from.edge_sq[last % kGroupSize];
     triangles_[hole] = triangles_[last];
   }
 }
@@ -346,15 +376,15 @@ WELLSPACE_INLINE bool Polyhedron::CutOff(const FloatBisector<3>& bisector, Verte
     return false;
   }
   const size_t index = AddBisector(u, position);
-  if (rows_.size() < plane_count_) {
-    rows_.resize(2 * plane_count_);
-    edge_sq_.resize(2 * plane_count_);
+  if (plane_rows_.size() < plane_count_) {
+    plane_rows_.resize(2 * plane_count_);
+    plane_edge_sq_.resize(2 * plane_count_);
   }
   const Plane<3>& plane = planes_[index];
-  rows_[index] = {{plane.normal[0], plane.normal[1], plane.normal[2]}, plane.offset};
-  edge_sq_[index] = 2 * bisector.offset;
-  FindRim();
-  PlaceOnRim(static_cast<uint32_t>(index));
+  plane_rows_[index] = {{plane.normal[0], plane.normal[1], plane.normal[2]}, plane.offset};
+  plane_edge_sq_[index] = 2 * bisector.offset;
+  FindHorizon();
+  PlaceOnHorizon(static_cast<uint32_t>(index));
   Replace(static_cast<uint32_t>(index));
   SetReach<kUnit>();
   return true;
@@ -377,8 +407,8 @@ WELLSPACE_INLINE bool Polyhedron::KeepsRatioWith(float ratio_sq) const {
   size_t left = count_;
   for (const Group& group : groups()) {
     const Floats radius_sq = RadiiSq<3>(group);
-    const uint32_t all = left < kTogether ? (1u << left) - 1 : 0xff;
-    left -= std::min(left, kTogether);
+    const uint32_t all = left < kGroupSize ? (1u << left) - 1 : 0xff;
+    left -= std::min(left, kGroupSize);
     if ((Bits<kUnit>(IsAtMost<kUnit>(radius_sq + kUnderflow, ratio_sq * Load(group.edge_sq))) & all) != all) {
       return false;
     }
@@ -415,10 +445,10 @@ void Polyhedron::FindStar(Star<3>& out) const {
 
 uint64_t Polyhedron::MemoryBytes() const {
   return groups_.capacity() * sizeof(Group) + triangles_.capacity() * sizeof(Triangle) +
-         planes_.capacity() * (sizeof(Plane<3>) + sizeof(Row) + sizeof(float)) +
-         nodes_.capacity() * sizeof(CellNode<3>) + rim_.capacity() * (sizeof(RimEdge) + 3 * sizeof(float)) +
-         removed_.capacity() * sizeof(uint32_t) + having_.capacity() * sizeof(uint16_t) +
-         edges_.capacity() * sizeof(edges_[0]);
+         planes_.capacity() * (sizeof(Plane<3>) + sizeof(PlaneRow) + sizeof(float)) +
+         nodes_.capacity() * sizeof(CellNode<3>) + horizon_.capacity() * (sizeof(HorizonEdge) + 3 * sizeof(float)) +
+         removed_.capacity() * sizeof(uint32_t) + node_from_to_.capacity() * sizeof(uint16_t) +
+         sorted_edges_.capacity() * sizeof(sorted_edges_[0]);
 }
 
 }  // namespace wellspace::core

@@ -1,5 +1,5 @@
 // The Voronoi cell of one vertex in space under construction: Polytope<3>. What its functions promise is said in
-// polytope.h.
+// cell_class.h.
 #ifndef WELLSPACE_CORE_CELL_POLYHEDRON_H_
 #define WELLSPACE_CORE_CELL_POLYHEDRON_H_
 
@@ -22,12 +22,21 @@
 
 namespace wellspace::core {
 
-// Polytope<3>, to which its functions that are not told about here belong: a simple polyhedron, kept as its dual, a
-// triangulated sphere. A node is a triangle of three planes; a cut takes a disk of triangles out, and joins its rim to
-// the new plane. Which triangle is beside which need not be known for that. What floats leave in doubt is decided
-// exactly.
+// The cell in space: a simple polyhedron, kept as its dual, a triangulated sphere. A plane is a vertex of the sphere, a
+// node a triangle of three planes, an edge between two nodes one between two planes. A cut is what the insertion of a
+// vertex is to a convex hull. The nodes beyond the bisector are a disk of triangles, which are taken out. Each edge of
+// the horizon around the disk makes a new triangle with the new plane. Which triangle is beside which need not be known
+// for that. What floats leave in doubt is decided exactly.
 //
-// What cuts is in polyhedron.cc; what places nodes, and looks at them, in polyhedron_nodes.cc.
+//   FindRemoved      which nodes are beyond the bisector, in floats; in doubt by DecideDoubtful
+//   AddBisector      the new plane (float_cell.h)
+//   FindHorizon      the edges around the nodes that go
+//   PlaceOnHorizon   where the new plane meets the edges of the cell that these stand for
+//   Replace          new nodes into the places of those that go
+//   SetReach         the distance of the farthest node
+//
+// These are in polyhedron.cc; what places nodes, and finds their neighbours, in polyhedron_nodes.cc. Cells of more than
+// kWordBits nodes or planes, which are rare, go by the functions called AmongMany.
 //
 // Thread safety: thread-compatible. Reused from site to site: no allocation once warm.
 // Invariants: the nodes are those that exact arithmetic and the tie rule give, whatever the rounding.
@@ -45,12 +54,11 @@ class Polyhedron : public FloatCell<3> {
   }
   bool CutBeforePlace(VertexId u, const Point<3>& position);
   size_t CutByEach(std::span<const Point<3>> positions, const VertexNames& names, VertexId site);
-  // As Polygon::CutByGathered.
+  // As Polygon::CutByGathered, which is no part of CellClass.
   size_t CutByGathered(const GatheredVertices<3>& gathered, VertexId site);
 
   void Place();
   bool KeepsRatio(double ratio) const;
-  // The nodes that may be asked for then do not tell their neighbours.
   bool PlaceUnlessKeeps(double ratio);
   bool Reaches(const Box<3>& cube) const;
   void FindStar(Star<3>& out) const;
@@ -59,72 +67,83 @@ class Polyhedron : public FloatCell<3> {
  private:
   friend struct CellOnUnit<Polyhedron, 3>;
 
-  // Nodes; places beyond the last are at the site, which no bisector cuts off.
-  struct alignas(kTogether * sizeof(float)) Group {
-    float x[3][kTogether];
-    float edge_sq[kTogether];  // the least square of the length of what its bisectors stand for; 0 on a wall
+  // What is computed of kGroupSize nodes at a time, in the units of the nodes. Lanes beyond the last node are at the
+  // site, which no bisector cuts off.
+  struct alignas(kGroupSize * sizeof(float)) Group {
+    float x[3][kGroupSize];
+    float edge_sq[kGroupSize];  // the least plane_edge_sq_ of the three planes: of the shortest edge from the site
   };
   // The planes of a node, in the same sense around the node for all, seen from outside.
   struct Triangle {
     std::array<uint16_t, 3> planes;
-    bool is_at_end = false;  // of an edge that was too short to tell the node from it
+    bool is_at_edge_end = false;  // it was put at the end of its edge, which was too short to tell them apart
   };
-  // Of a plane what nodes are computed from.
-  struct alignas(4 * sizeof(double)) Row {
+  // What nodes are computed from, of a plane: one vector, where a Plane is too large to be read fast.
+  struct alignas(4 * sizeof(double)) PlaneRow {
     double normal[3];
     double offset;
   };
-  // An edge of the rim of what is cut off, as the triangle there that goes had it.
-  struct RimEdge {
+  // An edge of the horizon, between two planes, as the triangle there that goes had it.
+  struct HorizonEdge {
     uint16_t from;
     uint16_t to;
-    bool is_at_end = false;  // as of the new triangle
+    bool is_at_edge_end = false;  // as of the new triangle
   };
+  // Nodes and planes up to so many have a bit each in one word.
   static constexpr size_t kWordBits = 64;
   // So many nodes are placed together.
-  static constexpr size_t kPlacedTogether = 4;
+  static constexpr size_t kPlacedAtOnce = 4;
 
+  // ---- Cuts
   template <VectorUnit kUnit>
   bool CutOff(const FloatBisector<3>& bisector, VertexId u, const Point<3>& position);
   template <VectorUnit kUnit>
   bool FindRemoved(const FloatBisector<3>& bisector, const Point<3>& position);
-  bool SetRemoved(size_t word, uint64_t maybe, uint64_t surely, const Point<3>& generator);
+  bool SetRemovedWord(size_t word, uint64_t maybe, uint64_t surely, const Point<3>& generator);
   uint64_t DecideDoubtful(size_t word, uint64_t doubtful, const Point<3>& generator);
-  void FindRim();
-  void FindRimAmongMany();
-  void PlaceOnRim(uint32_t plane);
+  void FindHorizon();
+  uint64_t NoteEdgesOfRemoved();
+  void ListHorizon(uint64_t touched);
+  void FindHorizonAmongMany();
+  void PlaceOnHorizon(uint32_t plane);
   void PlaceOnShortEdge(size_t j, uint32_t plane);
+  size_t TriangleWith(uint32_t from, uint32_t to) const;
   void Replace(uint32_t plane);
-  template <typename Wants>
-  void PlaceNodes(Wants wants);
-  template <typename Wants>
-  void PlaceThose(Wants wants);
-  template <typename Wants>
-  void PlaceThoseAvx2(Wants wants);
+  void FillHoles();
+  void MakeRoomForNodes(size_t count);
+  template <VectorUnit kUnit>
+  void SetReach();
+  template <VectorUnit kUnit>
+  bool KeepsRatioWith(float ratio_sq) const;
+  bool KeepsRatioAvx2(float ratio_sq) const;
+
+  // ---- Nodes
+  template <typename IsWanted>
+  void PlaceWanted(IsWanted is_wanted);
+  template <typename IsWanted>
+  void PlaceWantedWith(IsWanted is_wanted);
+  template <typename IsWanted>
+  void PlaceWantedAvx2(IsWanted is_wanted);
   void SortPlanes(size_t i);
-  uint32_t PlaceTogether(const std::array<uint32_t, kPlacedTogether>& nodes);
-  void TakeWhereItIs(size_t i);
+  uint32_t PlaceTogether(const std::array<uint32_t, kPlacedAtOnce>& nodes);
+  void KeepRoughPosition(size_t i);
   void FindNeighbours();
   void FindNeighboursAmongMany();
   static std::array<uint32_t, 2> PlanesBut(const std::array<uint16_t, 3>& planes, uint32_t k);
   void JoinNodes(uint32_t a, uint32_t b);
-  template <VectorUnit kUnit>
-  bool KeepsRatioWith(float ratio_sq) const;
-  bool KeepsRatioAvx2(float ratio_sq) const;
-  template <VectorUnit kUnit>
-  void SetReach();
+
   bool IsRemoved(size_t node) const { return (removed_words_[node / kWordBits] >> node % kWordBits & 1) != 0; }
   // In the units of the nodes.
   Point<3> PositionOf(size_t node) const {
-    const Group& group = groups_[node / kTogether];
-    const size_t lane = node % kTogether;
+    const Group& group = groups_[node / kGroupSize];
+    const size_t lane = node % kGroupSize;
     return {group.x[0][lane], group.x[1][lane], group.x[2][lane]};
   }
   // The normals of four planes and their offsets, in columns.
   template <typename PlaneIndex>
   WELLSPACE_INLINE void TakeColumns(const std::array<PlaneIndex, 4>& planes, Wide<4>::Lanes* columns) const {
     const auto row = [&](size_t k) __attribute__((always_inline))->const Wide<4>::Lanes& {
-      return *reinterpret_cast<const Wide<4>::Lanes*>(&rows_[planes[k]]);
+      return *reinterpret_cast<const Wide<4>::Lanes*>(&plane_rows_[planes[k]]);
     };
     Transpose(row(0), row(1), row(2), row(3), columns);
   }
@@ -142,25 +161,47 @@ class Polyhedron : public FloatCell<3> {
     }
   }
 
-  std::vector<Group> groups_;        // and more, four at least
-  std::vector<Triangle> triangles_;  // by node, and more
-  std::vector<Row> rows_;            // by plane, and more
-  std::vector<float> edge_sq_;       // by plane, and more: of a bisector the square of its vertex' distance, else 0
+  // Arrays only grow; what is in them beyond their count means nothing, but for groups_. Those of FloatCell are here
+  // for completeness.
+  //
+  //   array            index                  count            holds                               valid
+  //   of the cell
+  //   planes_          plane                  plane_count_     walls, then bisectors as they cut   always
+  //   plane_rows_      plane                  plane_count_     normal and offset of planes_        always
+  //   plane_edge_sq_   plane                  plane_count_     squared length of the edge from     always
+  //                                                            the site to its vertex; 0: wall
+  //   groups_          node / 8, lane         count_           position, shortest edge             always
+  //   triangles_       node                   count_           planes                              always
+  //   nodes_           node                   count_           what nodes() tells                  once placed or rough
+  //   of one cut
+  //   removed_words_   node / 64, bit         count_           whether the node is cut off         from FindRemoved on
+  //   removed_         0, 1, ...              removed_count_   nodes cut off, ascending            from FindHorizon on
+  //   horizon_         horizon edge           horizon_count_   edges around those                  from FindHorizon on
+  //   horizon_x_       axis, horizon edge     horizon_count_   where the new node is               from PlaceOnHorizon
+  //   leads_to_        plane < 64, bit        64               an edge of a removed triangle       in FindHorizon; else
+  //                                                            leads from here to that plane       all 0
+  //   leads_from_      plane < 64, bit        64               the same the other way round        as leads_to_
+  //   of FindNeighbours
+  //   node_from_to_    64 from + to, planes   64 * 64          the node whose triangle has that    in FindNeighbours
+  //                                                            edge
+  //   of both, with many planes or nodes
+  //   sorted_edges_    0, 1, ...              its size()       edges by two planes, and whose      in ...AmongMany
+  std::vector<PlaneRow> plane_rows_;
+  std::vector<float> plane_edge_sq_;
+  std::vector<Group> groups_;  // four at least (ForEachGroup)
+  std::vector<Triangle> triangles_;
 
-  // Scratch of cuts; arrays only grow.
-  std::vector<uint64_t> removed_words_;  // by node a bit for whether it is cut off
-  std::vector<uint32_t> removed_;        // ascending
+  std::vector<uint64_t> removed_words_;
+  std::vector<uint32_t> removed_;
   size_t removed_count_ = 0;
-  std::vector<RimEdge> rim_;
-  size_t rim_count_ = 0;
-  std::array<std::vector<float>, 3> new_;  // by axis and edge of the rim: the node there
-  // By plane, one of the first kWordBits, a bit for each to which, and from which, an edge of a triangle that goes
-  // leads; all 0 between cuts.
+  std::vector<HorizonEdge> horizon_;  // with room for three more: four are read at a time
+  size_t horizon_count_ = 0;
+  std::array<std::vector<float>, 3> horizon_x_;  // the same
   std::array<uint64_t, kWordBits> leads_to_{};
   std::array<uint64_t, kWordBits> leads_from_{};
-  // Of FindNeighbours, by two of the first kWordBits planes: the node whose triangle leads from the one to the other.
-  std::vector<uint16_t> having_;
-  std::vector<std::array<uint32_t, 3>> edges_;  // where there are many
+
+  std::vector<uint16_t> node_from_to_;
+  std::vector<std::array<uint32_t, 3>> sorted_edges_;
 };
 
 }  // namespace wellspace::core

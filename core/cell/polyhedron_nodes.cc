@@ -14,7 +14,7 @@ namespace wellspace::core {
 
 void Polyhedron::Place() {
   if (!is_placed_) {
-    PlaceNodes([](size_t) { return true; });
+    PlaceWanted([](size_t) { return true; });
     FindNeighbours();
     is_placed_ = true;
   }
@@ -24,9 +24,9 @@ bool Polyhedron::PlaceUnlessKeeps(double ratio) {
   if (KeepsRatio(ratio)) {
     return true;
   }
-  PlaceNodes([this, ratio_sq = SurelyKeptRatioSq(ratio)](size_t i) {
-    const Group& group = groups_[i / kTogether];
-    const size_t lane = i % kTogether;
+  PlaceWanted([this, ratio_sq = SurelyKeptRatioSq(ratio)](size_t i) {
+    const Group& group = groups_[i / kGroupSize];
+    const size_t lane = i % kGroupSize;
     const float x = group.x[0][lane];
     const float y = group.x[1][lane];
     const float z = group.x[2][lane];
@@ -35,29 +35,29 @@ bool Polyhedron::PlaceUnlessKeeps(double ratio) {
   return false;
 }
 
-// Fills nodes_, and places those that wants(node) asks for by their planes, bisectors by vertex, then walls by face: so
-// they do not depend on the order of the cuts.
-template <typename Wants>
-WELLSPACE_INLINE void Polyhedron::PlaceThose(Wants wants) {
+// Fills nodes_, and places those that is_wanted(node) holds of by their planes, bisectors by vertex, then walls by
+// face: so they do not depend on the order of the cuts.
+template <typename IsWanted>
+WELLSPACE_INLINE void Polyhedron::PlaceWantedWith(IsWanted is_wanted) {
   nodes_.resize(count_);
   placed_reach_ = 0;
-  for (size_t first = 0; first < count_; first += kPlacedTogether) {
+  for (size_t first = 0; first < count_; first += kPlacedAtOnce) {
     // The last node in the place of those that are none.
-    std::array<uint32_t, kPlacedTogether> nodes;
+    std::array<uint32_t, kPlacedAtOnce> nodes;
     bool is_any_wanted = false;
-    for (size_t lane = 0; lane < kPlacedTogether; ++lane) {
+    for (size_t lane = 0; lane < kPlacedAtOnce; ++lane) {
       nodes[lane] = static_cast<uint32_t>(std::min(first + lane, count_ - 1));
       SortPlanes(nodes[lane]);
-      is_any_wanted |= wants(nodes[lane]);
+      is_any_wanted |= is_wanted(nodes[lane]);
     }
     uint32_t good = 0;
     if (is_any_wanted) {
       good = PlaceTogether(nodes);
     }
-    for (size_t lane = 0; lane < kPlacedTogether; ++lane) {
+    for (size_t lane = 0; lane < kPlacedAtOnce; ++lane) {
       CellNode<3>& node = nodes_[nodes[lane]];
-      if (!wants(nodes[lane])) {
-        TakeWhereItIs(nodes[lane]);
+      if (!is_wanted(nodes[lane])) {
+        KeepRoughPosition(nodes[lane]);
       } else if ((good >> lane & 1) == 0) [[unlikely]] {
         PlaceNode<3>(site_, planes_, node);
       }
@@ -66,26 +66,26 @@ WELLSPACE_INLINE void Polyhedron::PlaceThose(Wants wants) {
   }
 }
 
-template <typename Wants>
-WELLSPACE_AVX2 void Polyhedron::PlaceThoseAvx2(Wants wants) {
-  PlaceThose(wants);
+template <typename IsWanted>
+WELLSPACE_AVX2 void Polyhedron::PlaceWantedAvx2(IsWanted is_wanted) {
+  PlaceWantedWith(is_wanted);
 }
 
-template <typename Wants>
-void Polyhedron::PlaceNodes(Wants wants) {
+template <typename IsWanted>
+void Polyhedron::PlaceWanted(IsWanted is_wanted) {
   if (unit_ == VectorUnit::kAvx2) {
-    PlaceThoseAvx2(wants);
+    PlaceWantedAvx2(is_wanted);
   } else {
-    PlaceThose(wants);
+    PlaceWantedWith(is_wanted);
   }
 }
 
-// Names the planes of a node in their order.
+// Sets the planes of a node of nodes_, in the order of PlaneOrderKey.
 WELLSPACE_INLINE void Polyhedron::SortPlanes(size_t i) {
   const std::array<uint16_t, 3>& planes = triangles_[i].planes;
   std::array<uint64_t, 3> keys;
   for (int k = 0; k < 3; ++k) {
-    keys[k] = uint64_t{Index(planes_[planes[k]].vertex)} << 16 | planes[k];
+    keys[k] = PlaneOrderKey<3>(planes_, planes[k]);
   }
   SortFew(keys);
   nodes_[i].planes = {static_cast<uint16_t>(keys[0]), static_cast<uint16_t>(keys[1]), static_cast<uint16_t>(keys[2])};
@@ -93,12 +93,12 @@ WELLSPACE_INLINE void Polyhedron::SortPlanes(size_t i) {
 
 // Places nodes as PlaceByPlanes does, but for those that are on walls alone or need exact arithmetic; a bit for each
 // that is placed.
-WELLSPACE_INLINE uint32_t Polyhedron::PlaceTogether(const std::array<uint32_t, kPlacedTogether>& nodes) {
-  using Four = Wide<kPlacedTogether>::Lanes;
-  SpacePlanes<kPlacedTogether> four{};
+WELLSPACE_INLINE uint32_t Polyhedron::PlaceTogether(const std::array<uint32_t, kPlacedAtOnce>& nodes) {
+  using Four = Wide<kPlacedAtOnce>::Lanes;
+  SpacePlanes<kPlacedAtOnce> four{};
   for (int k = 0; k < 3; ++k) {
-    std::array<uint16_t, kPlacedTogether> planes;
-    for (size_t lane = 0; lane < kPlacedTogether; ++lane) {
+    std::array<uint16_t, kPlacedAtOnce> planes;
+    for (size_t lane = 0; lane < kPlacedAtOnce; ++lane) {
       planes[lane] = nodes_[nodes[lane]].planes[k];
       four.length[k][lane] = planes_[planes[lane]].length;
       four.distance[k][lane] = planes_[planes[lane]].distance;
@@ -110,13 +110,13 @@ WELLSPACE_INLINE uint32_t Polyhedron::PlaceTogether(const std::array<uint32_t, k
     }
     four.offset[k] = columns[3];
   }
-  SpacePlacements<kPlacedTogether> placed;
-  MeetInSpace<kPlacedTogether>(four, placed);
+  SpacePlacements<kPlacedAtOnce> placed;
+  MeetInSpace<kPlacedAtOnce>(four, placed);
   const Four slack = placed.error + kProductError * placed.radius;
   const Four reach = placed.radius + slack;
-  const Four most_error = kPlaced * placed.radius;
+  const Four most_error = kPlacedError * placed.radius;
   uint32_t good = 0;
-  for (size_t lane = 0; lane < kPlacedTogether; ++lane) {
+  for (size_t lane = 0; lane < kPlacedAtOnce; ++lane) {
     CellNode<3>& node = nodes_[nodes[lane]];
     node.x = {placed.x[0][lane], placed.x[1][lane], placed.x[2][lane]};
     node.radius_sq = placed.radius_sq[lane];
@@ -128,8 +128,8 @@ WELLSPACE_INLINE uint32_t Polyhedron::PlaceTogether(const std::array<uint32_t, k
   return good;
 }
 
-// Leaves a node where it is, in floats.
-WELLSPACE_INLINE void Polyhedron::TakeWhereItIs(size_t i) {
+// Leaves a node where it was while the cell was cut, in floats.
+WELLSPACE_INLINE void Polyhedron::KeepRoughPosition(size_t i) {
   CellNode<3>& node = nodes_[i];
   node.x = PositionOf(i);
   for (double& coordinate : node.x) {
@@ -147,14 +147,14 @@ void Polyhedron::FindNeighbours() {
     FindNeighboursAmongMany();
     return;
   }
-  having_.resize(kWordBits * kWordBits);
-  const auto having = [this](uint32_t from, uint32_t to) __attribute__((always_inline))->uint16_t& {
-    return having_[from * kWordBits + to];
+  node_from_to_.resize(kWordBits * kWordBits);
+  const auto node_from_to = [this](uint32_t from, uint32_t to) __attribute__((always_inline))->uint16_t& {
+    return node_from_to_[from * kWordBits + to];
   };
   for (uint32_t i = 0; i < count_; ++i) {
     const std::array<uint16_t, 3>& planes = triangles_[i].planes;
     for (int k = 0; k < 3; ++k) {
-      having(planes[k], planes[(k + 1) % 3]) = static_cast<uint16_t>(i);
+      node_from_to(planes[k], planes[(k + 1) % 3]) = static_cast<uint16_t>(i);
     }
   }
   for (uint32_t i = 0; i < count_; ++i) {
@@ -162,7 +162,7 @@ void Polyhedron::FindNeighbours() {
     CellNode<3>& node = nodes_[i];
     for (int k = 0; k < 3; ++k) {
       // Beyond the edge that leaves planes[k].
-      const uint16_t beyond = having(planes[(k + 2) % 3], planes[(k + 1) % 3]);
+      const uint16_t beyond = node_from_to(planes[(k + 2) % 3], planes[(k + 1) % 3]);
       const int place = (node.planes[1] == planes[k] ? 1 : 0) + (node.planes[2] == planes[k] ? 2 : 0);
       node.neighbours[place] = beyond;
     }
@@ -170,16 +170,16 @@ void Polyhedron::FindNeighbours() {
 }
 
 [[gnu::noinline]] void Polyhedron::FindNeighboursAmongMany() {
-  edges_.clear();
+  sorted_edges_.clear();
   for (uint32_t i = 0; i < count_; ++i) {
     for (uint32_t k = 0; k < 3; ++k) {
       const auto [low, high] = PlanesBut(nodes_[i].planes, k);
-      edges_.push_back({low, high, 3 * i + k});
+      sorted_edges_.push_back({low, high, 3 * i + k});
     }
   }
-  std::sort(edges_.begin(), edges_.end());
-  for (size_t e = 0; e + 1 < edges_.size(); e += 2) {
-    JoinNodes(edges_[e][2], edges_[e + 1][2]);
+  std::sort(sorted_edges_.begin(), sorted_edges_.end());
+  for (size_t e = 0; e + 1 < sorted_edges_.size(); e += 2) {
+    JoinNodes(sorted_edges_[e][2], sorted_edges_[e + 1][2]);
   }
 }
 

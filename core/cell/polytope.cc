@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
-#include <utility>
 
 #include "core/base/dimensions.h"
 #include "core/cell/cell_class.h"
@@ -25,7 +23,7 @@ constexpr double kOffsetError = (D + 5) * kUnit;
 constexpr int kCutsBetweenLooks = 4;
 
 // A node between two others may be wrong by this share of its distance from the site: few cuts are left in doubt by it.
-constexpr double kGoodPlace = 0x1p-20;
+constexpr double kMostRoughSlack = 0x1p-20;
 
 }  // namespace
 
@@ -80,7 +78,7 @@ WELLSPACE_AVX2 bool Polytope<D>::CutOffAvx2(VertexId u, const Point<D>& position
   return CutOffWith<4>(u, position, normal, length_sq);
 }
 
-// Cuts by the bisector of the site and `position` = site + normal.
+// Cuts by the bisector of the site and `position` = site + normal: a step a line, as in docs/design/cell.md.
 template <int D>
 template <size_t kWidth>
 WELLSPACE_INLINE bool Polytope<D>::CutOffWith(VertexId u, const Point<D>& position, const Point<D>& normal,
@@ -111,11 +109,13 @@ WELLSPACE_INLINE bool Polytope<D>::CutOffWith(VertexId u, const Point<D>& positi
   return true;
 }
 
+// Far vertices are looked at in vain mostly once near ones have cut: so those that surely miss are dropped before they
+// are sorted, and again after every few cuts.
 template <int D>
 size_t Polytope<D>::CutByEach(std::span<const Point<D>> positions, const VertexNames& names, VertexId) {
   near_.Pick(positions, site_, CutLimitSq());
   const size_t within_reach = near_.count;
-  if (cuts_ != 0) {
+  if (cuts_ != 0) {  // few of those within the limit miss a cell that is still a box
     BoundExcesses(0, near_);
     near_.DropThoseThatMiss(0);
   }
@@ -181,7 +181,7 @@ WELLSPACE_INLINE void Polytope<D>::FindCutEdges() {
   if (cut_edges_.size() < removed_count_ * D) {
     removed_.resize(2 * removed_count_ * D);
     cut_edges_.resize(2 * removed_count_ * D);
-    placed_.resize(2 * removed_count_ * D);
+    new_rows_.resize(2 * removed_count_ * D);
   }
   constexpr size_t kWordBits = NodeColumns<D>::kWordBits;
   const End* const opposite = opposite_.data();
@@ -210,8 +210,8 @@ WELLSPACE_INLINE void Polytope<D>::FindCutEdges() {
   cut_count_ = static_cast<size_t>(edge - cut_edges_.data());
 }
 
-// Computes where `plane` meets the cut edges: by how much their ends exceed it, or, of edges that are short enough, at
-// their ends, where that is good enough to decide on cuts; else from the planes.
+// Computes where the new plane meets a cut edge, and returns the slack of that node: from the excesses of the ends, or,
+// on an edge that is short enough, at an end, where that is good enough to decide on cuts; else from the planes.
 //
 // With k and r the ends as computed, s their larger slack, d = r - k, e_k and e_r their excesses as computed and eps
 // the bound on the errors of those, t = e_k / (e_k - e_r) differs from that of the exact ends by |e_r a - e_k b| / (g
@@ -223,65 +223,70 @@ WELLSPACE_INLINE void Polytope<D>::FindCutEdges() {
 // the bound.
 template <int D>
 template <size_t kWidth>
-WELLSPACE_INLINE void Polytope<D>::PlaceCutEdges(uint16_t plane) {
+WELLSPACE_INLINE double Polytope<D>::PlaceOnCutEdge(const CutEdge& edge, const NewPlane& plane, Row& placed) const {
   using Lanes = typename Wide<kWidth>::Lanes;
-  using Row = typename NodeColumns<D>::Row;
   constexpr size_t kVectors = PaddedCount(D + 1) / kWidth;
-  const double length = planes_[plane].length;
-  const double offset_error = kOffsetError<D> * planes_[plane].offset;
-  const double rounding = 32 * kUnit * reach_;
-  const double most = kGoodPlace * reach_;
-  const auto excesses = columns_.excesses();
-  const auto rows = columns_.rows();
+  const size_t node = NodeOf(edge.kept);
+  const double below = plane.excesses[node];
+  const double gap = plane.excesses[edge.removed] - below;
+  const Row& kept = plane.rows[node];
+  const Row& removed = plane.rows[edge.removed];
+  const double slack = std::max(kept.values[D], removed.values[D]);
+  const double doubt = slack * plane.length + plane.offset_error;
+  const double inverse = 1 / gap;
+  const double t = -below * inverse;
+  Lanes along[kVectors];  // the difference of the slacks, too
+  Lanes x[kVectors];
+  for (size_t v = 0; v < kVectors; ++v) {
+    along[v] = LanesAt<kWidth>(removed.values, v * kWidth) - LanesAt<kWidth>(kept.values, v * kWidth);
+    x[v] = LanesAt<kWidth>(kept.values, v * kWidth) + t * along[v];
+  }
+  double distance = 2 * slack;
+  for (int i = 0; i < D; ++i) {
+    distance += std::abs(along[i / kWidth][i % kWidth]);
+  }
+  double new_slack = slack + plane.rounding + 1.02 * doubt * inverse * distance;
+  if ((gap > 256 * doubt) & (new_slack < plane.largest_good_slack)) {
+    x[D / kWidth][D % kWidth] = new_slack;
+    for (size_t v = 0; v < kVectors; ++v) {
+      LanesAt<kWidth>(placed.values, v * kWidth) = x[v];
+    }
+  } else if (const double at_end = slack + plane.rounding + distance;
+             at_end < plane.largest_good_slack) {  // as between nodes that a tie leaves at one place
+    new_slack = at_end;
+    placed = kept;
+    placed.values[D] = new_slack;
+  } else {
+    const std::array<uint16_t, D> indices = PlanesOn(edge.kept, plane.index);
+    const std::array<uint32_t, D> ranks = RanksOf<D>(planes_, indices);
+    std::array<uint16_t, D> planes;
+    for (int k = 0; k < D; ++k) {
+      planes[ranks[k]] = indices[k];
+    }
+    Point<D> exact;
+    new_slack = PlaceByPlanes<D>(site_, planes_, planes, exact);
+    std::copy(exact.begin(), exact.end(), placed.values);
+    placed.values[D] = new_slack;
+  }
+  return new_slack;
+}
+
+// Fills new_rows_.
+template <int D>
+template <size_t kWidth>
+WELLSPACE_INLINE void Polytope<D>::PlaceCutEdges(uint16_t plane) {
+  const NewPlane new_plane = {.index = plane,
+                              .length = planes_[plane].length,
+                              .offset_error = kOffsetError<D> * planes_[plane].offset,
+                              .rounding = 32 * kUnit * reach_,
+                              .largest_good_slack = kMostRoughSlack * reach_,
+                              .excesses = columns_.excesses(),
+                              .rows = columns_.rows()};
   const CutEdge* const cut_edges = cut_edges_.data();
-  Row* const all_placed = placed_.data();
+  Row* const new_rows = new_rows_.data();
   double largest_slack = largest_slack_;
   for (size_t j = 0; j < cut_count_; ++j) {
-    const CutEdge edge = cut_edges[j];
-    const size_t node = NodeOf(edge.kept);
-    const double below = excesses[node];
-    const double gap = excesses[edge.removed] - below;
-    const Row& kept = rows[node];
-    const Row& removed = rows[edge.removed];
-    const double slack = std::max(kept.values[D], removed.values[D]);
-    const double doubt = slack * length + offset_error;
-    const double inverse = 1 / gap;
-    const double t = -below * inverse;
-    Lanes along[kVectors];  // the difference of the slacks, too
-    Lanes x[kVectors];
-    for (size_t v = 0; v < kVectors; ++v) {
-      along[v] = LanesAt<kWidth>(removed.values, v * kWidth) - LanesAt<kWidth>(kept.values, v * kWidth);
-      x[v] = LanesAt<kWidth>(kept.values, v * kWidth) + t * along[v];
-    }
-    double distance = 2 * slack;
-    for (int i = 0; i < D; ++i) {
-      distance += std::abs(along[i / kWidth][i % kWidth]);
-    }
-    double new_slack = slack + rounding + 1.02 * doubt * inverse * distance;
-    Row& placed = all_placed[j];
-    if ((gap > 256 * doubt) & (new_slack < most)) {
-      x[D / kWidth][D % kWidth] = new_slack;
-      for (size_t v = 0; v < kVectors; ++v) {
-        LanesAt<kWidth>(placed.values, v * kWidth) = x[v];
-      }
-    } else if (const double at_end = slack + rounding + distance;
-               at_end < most) {  // as between nodes that a tie leaves at one place
-      new_slack = at_end;
-      placed = kept;
-      placed.values[D] = new_slack;
-    } else {
-      const std::array<uint16_t, D> indices = PlanesOn(edge.kept, plane);
-      const std::array<uint32_t, D> ranks = RanksOf(indices);
-      std::array<uint16_t, D> planes;
-      for (int k = 0; k < D; ++k) {
-        planes[ranks[k]] = indices[k];
-      }
-      Point<D> exact;
-      new_slack = PlaceByPlanes(planes, exact);
-      std::copy(exact.begin(), exact.end(), placed.values);
-      placed.values[D] = new_slack;
-    }
-    largest_slack = std::max(largest_slack, new_slack);
+    largest_slack = std::max(largest_slack, PlaceOnCutEdge<kWidth>(cut_edges[j], new_plane, new_rows[j]));
   }
   largest_slack_ = largest_slack;
 }
@@ -305,8 +310,8 @@ WELLSPACE_INLINE std::array<uint16_t, D> Polytope<D>::PlanesOn(End kept, uint16_
 // that the nodes stay without holes.
 template <int D>
 WELLSPACE_INLINE void Polytope<D>::MakeNewNodes(uint16_t plane) {
-  if (new_.size() < cut_count_) {
-    new_.resize(2 * cut_count_);
+  if (new_nodes_.size() < cut_count_) {
+    new_nodes_.resize(2 * cut_count_);
   }
   const size_t old = columns_.count();
   columns_.Resize(std::max(old, old + cut_count_ - removed_count_));
@@ -320,8 +325,8 @@ WELLSPACE_INLINE void Polytope<D>::MakeNewNodes(uint16_t plane) {
     topology.planes = PlanesOn(kept, plane);
     topology.is_placed = false;
     Join(EndAt(index, D - 1), kept);
-    columns_.Set(index, placed_[j]);
-    new_[j] = static_cast<Index>(index);
+    columns_.Set(index, new_rows_[j]);
+    new_nodes_[j] = static_cast<Index>(index);
   }
 }
 
@@ -344,131 +349,37 @@ void Polytope<D>::FillHoles(size_t filled) {
   columns_.Resize(count);
 }
 
-template <int D>
-void Polytope<D>::Place() {
-  PlaceThose([](size_t) { return true; });
-}
-
-template <int D>
-bool Polytope<D>::PlaceUnlessKeeps(double ratio) {
-  if (KeepsRatio(ratio)) {
-    return true;
-  }
-  PlaceThose([this, ratio](size_t node) { return !SurelyKeeps(node, ratio); });
-  return false;
-}
-
-// Fills nodes_, and places those that wants(node) asks for.
-template <int D>
-template <typename Wants>
-void Polytope<D>::PlaceThose(Wants wants) {
-  if (is_placed_) {
-    return;
-  }
-  is_placed_ = true;
-  nodes_.resize(columns_.count());
-  for (size_t i = 0; i < nodes_.size(); ++i) {
-    const NodeTopology& topology = topologies_[i];
-    if (!topology.is_placed) {
-      if (wants(i)) {
-        PlaceNode(i);
-      } else {
-        is_placed_ = false;
-      }
-    }
-    CellNode<D>& node = nodes_[i];
-    node.x = columns_.x(i);
-    node.slack = columns_.slack(i);
-    node.radius_sq = NormSq<D>(node.x);
-    node.reach = std::sqrt(node.radius_sq) + node.slack;
-    node.planes = topology.planes;
-    for (int k = 0; k < D; ++k) {
-      node.neighbours[k] = static_cast<Index>(NodeOf(opposite_[EndAt(i, k)]));
-    }
-  }
-  SetReach(columns_.FindLargest());
-}
-
-// Places a node by its planes, in their order.
-template <int D>
-void Polytope<D>::PlaceNode(size_t node) {
-  NodeTopology& topology = topologies_[node];
-  topology.is_placed = true;
-  const std::array<uint16_t, D> planes = topology.planes;
-  std::array<End, D> ends;
-  std::copy_n(&opposite_[EndAt(node, 0)], D, ends.begin());
-  const std::array<uint32_t, D> ranks = RanksOf(planes);
-  for (int k = 0; k < D; ++k) {
-    topology.planes[ranks[k]] = planes[k];
-    Join(EndAt(node, ranks[k]), ends[k]);
-  }
-  Point<D> x;
-  const double slack = PlaceByPlanes(topology.planes, x);
-  columns_.Set(node, x, slack);
-}
-
-// The places of planes in order: bisectors by vertex, then walls by face.
-template <int D>
-WELLSPACE_INLINE std::array<uint32_t, D> Polytope<D>::RanksOf(const std::array<uint16_t, D>& indices) const {
-  std::array<uint64_t, D> keys;
-  for (int k = 0; k < D; ++k) {
-    keys[k] = uint64_t{core::Index(planes_[indices[k]].vertex)} << 16 | indices[k];
-  }
-  std::array<uint32_t, D> ranks{};
-  for (int k = 0; k < D; ++k) {
-    for (int i = 0; i < D; ++i) {
-      ranks[k] += keys[i] < keys[k] ? 1 : 0;
-    }
-  }
-  return ranks;
-}
-
-// Computes where planes, in order, meet, and returns the slack.
-template <int D>
-double Polytope<D>::PlaceByPlanes(const std::array<uint16_t, D>& indices, Point<D>& x) const {
-  std::array<const Plane<D>*, D> planes;
-  for (int k = 0; k < D; ++k) {
-    planes[k] = &planes_[indices[k]];
-  }
-  return core::PlaceByPlanes<D>(site_, planes, x);
-}
-
-// Joins the new nodes along the edges of the new facet: two are joined if they share D - 2 planes beside the new one,
-// which is the last of each. Exact decisions leave no edge with one end.
+// Joins the new nodes along the edges of the new facet. Such an edge runs along the new plane, which is the last of
+// each new node, and D - 2 others: so its two ends are those with the same others.
+//
+// The new facet is a simple polytope of D - 1 dimensions, bounded, so that each of its edges has two ends. Decisions
+// that are exact never make another; the check is against errors of the program and of the machine, which would else
+// become a mesh that is wrong unnoticed.
 template <int D>
 WELLSPACE_INLINE void Polytope<D>::LinkNewNodes() {
   static_assert(D <= 6);
-  ridges_.clear();
+  open_ends_.clear();
   for (size_t j = 0; j < cut_count_; ++j) {
     for (uint32_t slot = 0; slot < D - 1; ++slot) {
       std::array<uint16_t, D - 2> along;
       for (uint32_t k = 0; k < D - 2; ++k) {
-        along[k] = topologies_[new_[j]].planes[k + (k >= slot ? 1 : 0)];
+        along[k] = topologies_[new_nodes_[j]].planes[k + (k >= slot ? 1 : 0)];
       }
       std::sort(along.begin(), along.end());
-      Ridge ridge{0, EndAt(new_[j], slot)};
+      OpenEnd open_end{0, EndAt(new_nodes_[j], slot)};
       for (const uint16_t plane : along) {
-        ridge.planes = ridge.planes << 16 | plane;
+        open_end.planes = open_end.planes << 16 | plane;
       }
-      ridges_.push_back(ridge);
+      open_ends_.push_back(open_end);
     }
   }
-  std::sort(ridges_.begin(), ridges_.end(), [](const Ridge& a, const Ridge& b) { return a.planes < b.planes; });
-  if (ridges_.size() % 2 != 0) {
-    std::abort();
+  std::sort(open_ends_.begin(), open_ends_.end(),
+            [](const OpenEnd& a, const OpenEnd& b) { return a.planes < b.planes; });
+  AbortUnlessCellHolds(open_ends_.size() % 2 == 0);
+  for (size_t i = 0; i < open_ends_.size(); i += 2) {
+    AbortUnlessCellHolds(open_ends_[i].planes == open_ends_[i + 1].planes);
+    Join(open_ends_[i].end, open_ends_[i + 1].end);
   }
-  for (size_t i = 0; i < ridges_.size(); i += 2) {
-    if (ridges_[i].planes != ridges_[i + 1].planes) {
-      std::abort();
-    }
-    Join(ridges_[i].end, ridges_[i + 1].end);
-  }
-}
-
-template <int D>
-WELLSPACE_INLINE void Polytope<D>::Join(End a, End b) {
-  opposite_[a] = b;
-  opposite_[b] = a;
 }
 
 template <int D>
@@ -478,54 +389,11 @@ void Polytope<D>::SetReach(const typename NodeColumns<D>::Largest& largest) {
   is_tight_ = true;
 }
 
-template <int D>
-bool Polytope<D>::KeepsRatio(double ratio) const {
-  for (size_t i = 0; i < columns_.count(); ++i) {
-    if (!SurelyKeeps(i, ratio)) {
-      return false;
-    }
-  }
-  return true;
-}
-
-// KeepsRatio, of one node.
-template <int D>
-WELLSPACE_INLINE bool Polytope<D>::SurelyKeeps(size_t node, double ratio) const {
-  // No branch, since it could not be predicted.
-  double nearest = std::numeric_limits<double>::infinity();
-  bool is_on_wall = false;
-  for (const uint16_t index : topologies_[node].planes) {
-    const Plane<D>& plane = planes_[index];
-    is_on_wall |= plane.kind != PlaneKind::kBisector;
-    nearest = std::min(nearest, plane.length);
-  }
-  const double reach = std::sqrt(NormSq<D>(columns_.x(node))) + columns_.slack(node);
-  return !is_on_wall & (reach <= ratio * (1 - 4 * kPlaced) * nearest);
-}
-
-template <int D>
-void Polytope<D>::FindStar(Star<D>& out) const {
-  out.resize(columns_.count());
-  size_t count = 0;
-  for (size_t i = 0; i < columns_.count(); ++i) {
-    // No branch, since it could not be predicted where there are walls.
-    std::array<VertexId, D>& simplex = out[count];
-    uint32_t is_simplex = 1;
-    for (int k = 0; k < D; ++k) {
-      const Plane<D>& plane = planes_[topologies_[i].planes[k]];
-      simplex[k] = plane.vertex;
-      is_simplex &= plane.kind == PlaneKind::kBisector ? 1 : 0;
-    }
-    count += is_simplex;
-  }
-  out.resize(count);
-}
-
-// As in Cut, with the largest slack.
+// The error of an excess is that of CutOffWith, with the largest slack for that of each node.
 template <int D>
 void Polytope<D>::BoundExcesses(size_t begin, Candidates<D>& candidates) {
   Tighten();
-  columns_.ComputeMost(largest_slack_, kOffsetError<D>, begin, candidates);
+  columns_.BoundExcesses(largest_slack_, kOffsetError<D>, begin, candidates);
 }
 
 #define WELLSPACE_INSTANTIATE(D) template class Polytope<D>;

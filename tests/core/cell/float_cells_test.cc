@@ -181,7 +181,6 @@ TYPED_TEST(FloatCellsTest, EveryUnitTellsTheSame) {
   EXPECT_GT(reached, 0);
 }
 
-// More nodes and planes than one vector or word holds, and a cell that has them no more.
 // Nodes are placed side by side with as many as a vector holds; each is to be where it would be alone.
 TYPED_TEST(FloatCellsTest, NodesArePlacedAsOneByOneAndKnowTheirNeighbours) {
   constexpr int D = TypeParam::kValue;
@@ -220,7 +219,7 @@ TYPED_TEST(FloatCellsTest, NodesArePlacedAsOneByOneAndKnowTheirNeighbours) {
         EXPECT_EQ(node.radius_sq, NormSq<D>(x));
         EXPECT_EQ(node.reach, std::sqrt(NormSq<D>(x)) + slack);
         reach = std::max(reach, node.reach);
-        nearly_dependent += Meet<D>(planes).error > kPlaced * std::sqrt(NormSq<D>(x)) ? 1 : 0;
+        nearly_dependent += Meet<D>(planes).error > kPlacedError * std::sqrt(NormSq<D>(x)) ? 1 : 0;
       }
       EXPECT_LE(cell.reach_sq(), reach * reach);
     }
@@ -228,6 +227,7 @@ TYPED_TEST(FloatCellsTest, NodesArePlacedAsOneByOneAndKnowTheirNeighbours) {
   EXPECT_GT(nearly_dependent, 50);
 }
 
+// More nodes and planes than one vector or word holds, and a cell that has them no more.
 TYPED_TEST(FloatCellsTest, ManyNodesComeAndGo) {
   constexpr int D = TypeParam::kValue;
   for (const VectorUnit unit : Units()) {

@@ -1,4 +1,5 @@
-// Cells under construction, against half-space intersection by all D-subsets of planes in integers.
+// The contract of cells (cell_class.h) in every dimension, against half-space intersection by all D-subsets of planes
+// in integers. Guarantees are those of Cut, by number.
 #include "core/cell/polytope.h"
 
 #include <gtest/gtest.h>
@@ -214,7 +215,6 @@ TYPED_TEST(PolytopeTest, CosphericalVerticesGiveOneCellInAnyOrder) {
   }
 }
 
-// Guarantees (1) and (2), Cut's result and Reaches, after each cut.
 // What is cut by approximate positions alone, and placed at the end, is the cell to the bit.
 TYPED_TEST(PolytopeTest, WhenNodesArePlacedMakesNoDifference) {
   constexpr int D = TypeParam::kValue;
@@ -247,6 +247,7 @@ TYPED_TEST(PolytopeTest, WhenNodesArePlacedMakesNoDifference) {
   }
 }
 
+// Guarantees (1) and (2), Cut's result and Reaches, after each cut.
 TYPED_TEST(PolytopeTest, EachCutOnlyRemoves) {
   constexpr int D = TypeParam::kValue;
   for (int i = 0; i < ByDimension<D>({10, 10, 10, 4}); ++i) {
@@ -363,7 +364,6 @@ TYPED_TEST(PolytopeTest, ReachesExactlyTheBoxesOfVerticesThatWouldCut) {
 }
 
 // ---- Positions of nodes
-// ---------------------------------------------------------------------------------------------------------
 
 // D planes through the neighbourhood of one site: bisectors and walls, the last one as dependent on the others as `gap`
 // says, of length 1 if it is 1.

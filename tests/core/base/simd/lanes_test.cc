@@ -113,9 +113,9 @@ TYPED_TEST(LanesTest, EveryUnitComputesTheSame) {
       ASSERT_EQ(baseline.Reaches(low, high, 1e-3), wide.Reaches(low, high, 1e-3));
     }
     Candidates<D> same = candidates;
-    baseline.ComputeMost(slack, 1e-9, 0, candidates);
-    wide.ComputeMost(slack, 1e-9, 0, same);
-    EXPECT_TRUE(std::equal(candidates.most, candidates.most + candidates.count, same.most));
+    baseline.BoundExcesses(slack, 1e-9, 0, candidates);
+    wide.BoundExcesses(slack, 1e-9, 0, same);
+    EXPECT_TRUE(std::equal(candidates.excess_bound, candidates.excess_bound + candidates.count, same.excess_bound));
   }
 }
 
@@ -152,8 +152,8 @@ TYPED_TEST(LanesTest, CandidatesBoundedNotToCutDoNot) {
     cell.BoundExcesses(0, candidates);
     for (size_t j = 0; j < candidates.count; ++j) {
       const bool has_cut = cell.Cut(VertexId{next++}, points[j]);
-      ASSERT_TRUE(!has_cut || candidates.most[j] >= 0);
-      idle += candidates.most[j] < 0 ? 1 : 0;
+      ASSERT_TRUE(!has_cut || candidates.excess_bound[j] >= 0);
+      idle += candidates.excess_bound[j] < 0 ? 1 : 0;
       cutting += has_cut ? 1 : 0;
     }
   }
@@ -176,7 +176,7 @@ class CandidatesTest : public test::SeededTest {
         column[i] = Draw(random);
       }
       drawn.length_sq[i] = static_cast<double>(random.Below(values));
-      drawn.most[i] = Draw(random);
+      drawn.excess_bound[i] = Draw(random);
       drawn.slot[i] = i;
     }
     return drawn;
@@ -251,7 +251,7 @@ TYPED_TEST(CandidatesTest, AreDroppedIfTheyMiss) {
       left.DropThoseThatMiss(begin, unit);
       size_t expected = 0;
       for (size_t i = 0; i < count; ++i) {
-        if (i < begin || all.most[i] >= 0) {
+        if (i < begin || all.excess_bound[i] >= 0) {
           ASSERT_LT(expected, left.count);
           ASSERT_TRUE(this->IsSame(left, expected++, all, i));
         }
