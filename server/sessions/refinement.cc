@@ -236,8 +236,7 @@ absl::StatusOr<std::shared_ptr<Job>> Submit(const CallEnvironment& environment, 
              Run(environment, session, operation, self);
            }}));
   if (!operation->SetJob(job)) {
-    environment.jobs.Cancel(
-        job);  // the operation has ended: an earlier process left it, and it was cancelled meanwhile
+    environment.jobs.Cancel(job);  // the operation, which an earlier process left, was cancelled meanwhile
   }
   return job;
 }

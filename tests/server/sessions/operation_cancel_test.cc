@@ -85,6 +85,7 @@ TEST_F(OperationCancelTest, AJobThatComesMeanwhileLeavesTheQueue) {
   EXPECT_EQ(operation->Describe().state(), v1::Operation::STATE_CANCELLED);
   EXPECT_EQ(environment().jobs.GetLoad().queued, 0) << "it has a place that others could have";
   may_end.Set();
+  EXPECT_TRUE(environment().jobs.WaitUntilIdle(absl::Minutes(1)));
 }
 
 TEST_F(OperationCancelTest, AJobThatComesAfterwardsLeavesTheQueue) {
@@ -95,6 +96,7 @@ TEST_F(OperationCancelTest, AJobThatComesAfterwardsLeavesTheQueue) {
   ResumeRefinements(environment(), {{.session = session_, .operation = operation}});
   EXPECT_EQ(environment().jobs.GetLoad().queued, 0);
   may_end.Set();
+  EXPECT_TRUE(environment().jobs.WaitUntilIdle(absl::Minutes(1)));
 }
 
 TEST_F(OperationCancelTest, AJobThatBeginsMeanwhileHearsOfIt) {
