@@ -86,7 +86,7 @@ std::shared_ptr<DeltaSnapshot> MakeDelta(const Session& session, const core::Mes
   }
   std::shared_ptr<DeltaSnapshot> made;
   const absl::Status status = RunGuarded([&]() -> absl::Status {
-    const uint64_t most = last.loaded_bytes() / 2;
+    const uint64_t most = last.loaded_bytes() / 2;  // beyond it, the whole mesh is hardly more
     WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(work.mesher->memory_bytes() + 2 * last.loaded_bytes() +
                                                   core::DeltaScratchBytes(last.figures().simplices) + most));
     WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const core::Mesh> base, last.Whole(context));

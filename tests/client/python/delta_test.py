@@ -70,7 +70,7 @@ class DeltaTest(Case):
             self.assertEqual(mesh.weights.tobytes(), other.weights.tobytes())
 
     def test_ten_points_take_three_percent(self):
-        for d, count in ((2, 4500), (3, 1000)):
+        for d, count in ((2, 8000), (3, 1500)):
             session = self.refined(uniform(count, d), d)
             before = session.download()
             self.assertGreater(len(before.simplices), 10_000)
