@@ -122,7 +122,7 @@ class DeltaTest(Case):
         session.upload([[0, 0], [2, 0], [2, 1], [0, 1], [1, 0], [1, 1]])
         session.add_segments(
             segments=[[0, 4], [4, 1], [1, 2], [2, 5], [5, 3], [3, 0], [4, 5]],
-            regions=[wellspace.RegionSeed((0.5, 0.5), 3), wellspace.RegionSeed((1.5, 0.5), 5)],
+            regions=[wellspace.RegionSeed(0.5, 0.5, region=3), wellspace.RegionSeed(1.5, 0.5, region=5)],
         )
         session.refine(size=0.02)
         before = session.download()
