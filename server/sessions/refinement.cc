@@ -199,8 +199,10 @@ void Run(const CallEnvironment& environment, const std::shared_ptr<Session>& ses
     made = Made();
   }
   environment.observability.work().OnRefinement(report);  // before clients see the end
-  const auto result = std::make_shared<WorkResult>(
-      WorkResult{.status = report.status, .work = *std::move(work), .mesh = made->mesh, .delta = made->delta});
+  const auto result = std::make_shared<WorkResult>(WorkResult{.status = report.status,
+                                                              .work = *std::move(work),
+                                                              .mesh = std::move(made->mesh),
+                                                              .delta = std::move(made->delta)});
   EndWhenPossible(environment, session, operation, result);
 }
 
