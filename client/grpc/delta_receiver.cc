@@ -62,6 +62,10 @@ absl::StatusOr<std::vector<Run>> ReadRuns(const v1::KeptRows& message, uint64_t 
              : Contradiction("keeps ", kept, " rows, and ", taken, " are new, of ", rows);
 }
 
+uint64_t MostOf(const v1::KeptRows& rows) {
+  return std::max({rows.skipped_size(), rows.kept_size(), rows.added_size()});
+}
+
 // Appends what the runs make of rows of `base` and of `added`.
 template <typename T, typename Added>
 void JoinRuns(const std::vector<Run>& runs, const std::vector<T>& base, Added added, size_t width,
@@ -213,7 +217,7 @@ absl::Status DeltaReceiver::CheckSizes() const {
                       fits(delta_.points_size(), header_.vertex_count * dimension) &&
                       fits(delta_.changed_weights_size(), header_.vertex_count) &&
                       fits(delta_.weights_size(), header_.vertex_count) &&
-                      fits(delta_.kept_simplices().kept_size(), header_.simplex_count) &&
+                      fits(MostOf(delta_.kept_simplices()), header_.simplex_count) &&
                       fits(delta_.simplices_size(), header_.simplex_count * (dimension + 1)) &&
                       fits(delta_.changed_input_vertices_size(), header_.input_point_count) &&
                       fits(delta_.input_vertices_size(), header_.input_point_count) &&
@@ -224,7 +228,7 @@ absl::Status DeltaReceiver::CheckSizes() const {
                       fits(delta_.vertex_tags_size(), header_.vertex_count) &&
                       fits(delta_.changed_simplex_regions_size(), header_.simplex_count) &&
                       fits(delta_.simplex_regions_size(), header_.simplex_count) &&
-                      fits(delta_.kept_facets().kept_size(), header_.facet_count) &&
+                      fits(MostOf(delta_.kept_facets()), header_.facet_count) &&
                       fits(delta_.facets_size(), header_.facet_count * dimension);
   return do_fit ? absl::OkStatus() : Contradiction("larger than the mesh of ", header_.vertex_count, " vertices");
 }

@@ -29,8 +29,6 @@ class MeshDeltas {
   void NoteDownload(uint64_t revision);
   // Whether the difference from the mesh of this revision, which is the last one, is of use.
   bool IsWanted(uint64_t revision) const;
-  // Whether a difference of so many bytes is worth keeping beside a mesh of `mesh_bytes`.
-  static bool IsSmall(uint64_t bytes, uint64_t mesh_bytes) { return bytes <= mesh_bytes / 2; }
 
   // The session has another mesh now, of `mesh_bytes`, to which `delta` leads; null: none does. Returns what is not
   // kept any more, to be freed without locks.

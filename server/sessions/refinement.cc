@@ -90,7 +90,7 @@ std::shared_ptr<DeltaSnapshot> MakeDelta(const Session& session, const core::Mes
   }
   std::shared_ptr<DeltaSnapshot> made;
   const absl::Status status = RunGuarded([&]() -> absl::Status {
-    const uint64_t most = last.loaded_bytes() / 2;
+    const uint64_t most = last.loaded_bytes() / 2;  // beyond it, the whole mesh is hardly more
     WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(work.mesher->memory_bytes() + 2 * last.loaded_bytes() +
                                                   core::DeltaScratchBytes(last.figures().simplices) + most));
     WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const core::Mesh> base, last.Whole(context));
@@ -205,8 +205,10 @@ void Run(const CallEnvironment& environment, const std::shared_ptr<Session>& ses
     made = Made();
   }
   environment.observability.work().OnRefinement(report);  // before clients see the end
-  const auto result = std::make_shared<WorkResult>(
-      WorkResult{.status = report.status, .work = *std::move(work), .mesh = made->mesh, .delta = made->delta});
+  const auto result = std::make_shared<WorkResult>(WorkResult{.status = report.status,
+                                                              .work = *std::move(work),
+                                                              .mesh = std::move(made->mesh),
+                                                              .delta = std::move(made->delta)});
   EndWhenPossible(environment, session, operation, result);
 }
 

@@ -127,18 +127,20 @@ DeltaSnapshot::DeltaSnapshot(uint64_t base_revision, uint64_t revision, const co
   WritePlain(delta, writer);
   plain_parts_ = parts_.size();
   WriteBoundary(delta, writer);
-  metadata_ = MetadataToProto(next, parts_.size(), /*with_boundary=*/true);
-  metadata_.set_revision(revision);
-  metadata_.mutable_delta()->set_base_revision(base_revision);
-  *metadata_.mutable_delta()->mutable_checksums() = ChecksumsOf(next);
-  memory_bytes_ = sizeof(*this) + metadata_.SpaceUsedLong();
+  v1::MeshMetadata metadata = MetadataToProto(next, parts_.size(), /*with_boundary=*/true);
+  metadata.set_revision(revision);
+  metadata.mutable_delta()->set_base_revision(base_revision);
+  *metadata.mutable_delta()->mutable_checksums() = ChecksumsOf(next);
+  metadata_ = metadata.SerializeAsString();
+  memory_bytes_ = sizeof(*this) + metadata_.capacity();
   for (const grpc::Slice& part : parts_) {
     memory_bytes_ += sizeof(part) + part.size();
   }
 }
 
 v1::MeshMetadata DeltaSnapshot::Metadata(bool with_boundary) const {
-  v1::MeshMetadata metadata = metadata_;
+  v1::MeshMetadata metadata;
+  metadata.ParseFromString(metadata_);  // it is what the constructor has made
   metadata.set_chunk_count(PartCount(with_boundary));
   if (!with_boundary) {
     ClearBoundary(metadata);

@@ -3,6 +3,7 @@
 #define WELLSPACE_SERVER_STORE_DELTA_SNAPSHOT_H_
 
 #include <cstdint>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -47,7 +48,7 @@ class DeltaSnapshot {
   MemoryReservation memory_;
   const uint64_t base_revision_;
   const uint64_t revision_;
-  v1::MeshMetadata metadata_;       // with the boundary
+  std::string metadata_;            // a serialized MeshMetadata, with the boundary
   std::vector<grpc::Slice> parts_;  // serialized DownloadMeshResponses
   uint64_t plain_parts_ = 0;
   uint64_t memory_bytes_ = 0;

@@ -218,6 +218,32 @@ client::MeshOptions PlaneOptions() {
   return options;
 }
 
+// The mesh that a client has of revision 1.
+client::Mesh Triangle() {
+  client::Mesh mesh;
+  mesh.dimension = 2;
+  mesh.domain_low = {0, 0};
+  mesh.domain_high = {1, 1};
+  mesh.points.assign(kPoints.begin(), kPoints.end());
+  mesh.simplices = {0, 1, 2};
+  mesh.input_vertex = {0, 1, 2};
+  mesh.revision = 1;
+  return mesh;
+}
+
+// Whatever has come, a mesh has whole rows, and numbers of vertices that there are.
+void RequireWhole(const client::Mesh& mesh) {
+  const size_t dimension = mesh.dimension;
+  const size_t vertices = mesh.points.size() / dimension;
+  const auto is_vertex = [&](uint32_t vertex) { return vertex < vertices; };
+  Require(mesh.points.size() == vertices * dimension && mesh.simplices.size() % (dimension + 1) == 0 &&
+              mesh.facets.size() % dimension == 0,
+          "rows are whole");
+  Require(std::ranges::all_of(mesh.simplices, is_vertex) && std::ranges::all_of(mesh.facets, is_vertex) &&
+              std::ranges::all_of(mesh.moved_vertices, is_vertex),
+          "vertices are of the mesh");
+}
+
 client::CallOptions Patience() {
   client::CallOptions call;
   call.timeout = kTimeout;
@@ -271,6 +297,13 @@ constexpr std::array kCalls = {
       features.ends = {0, 1};
       features.seeds = {{.x = 1, .y = 2, .is_hole = true, .region = 0, .max_area = 0}};
       return c.AddSegments(kSession, features, std::nullopt, Patience()).status();
+    }},
+    Call{[](client::Connection& c) {
+      client::Mesh mesh = Triangle();
+      const auto count = [](uint64_t done, uint64_t total) { Require(done <= total, "parts are counted"); };
+      const absl::Status status = c.UpdateMesh(kSession, mesh, count, Patience());
+      RequireWhole(mesh);
+      return status;
     }},
 };
 

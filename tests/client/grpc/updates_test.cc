@@ -115,11 +115,11 @@ class UpdatesTest : public ::testing::Test {
 };
 
 TEST_F(UpdatesTest, TenPointsTakeThreePercentOfTheBytes) {
-  for (const auto& [dimension, points] : {std::pair(2, 4500), {3, 1500}}) {
+  for (const auto& [dimension, points] : {std::pair(2, 8000), {3, 1500}}) {
     const std::string name = Refined(dimension, points);
     Mesh mesh = Whole(name);
     const size_t simplices = mesh.simplices.size() / (dimension + 1);
-    EXPECT_GT(simplices, 15'000);
+    EXPECT_GT(simplices, 12'000);
     Add(name, dimension, 10, 2);
     const Mesh whole = Whole(name);
     const uint64_t whole_bytes = bytes_;

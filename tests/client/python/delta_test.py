@@ -70,7 +70,7 @@ class DeltaTest(Case):
             self.assertEqual(mesh.weights.tobytes(), other.weights.tobytes())
 
     def test_ten_points_take_three_percent(self):
-        for d, count in ((2, 4500), (3, 1000)):
+        for d, count in ((2, 8000), (3, 1500)):
             session = self.refined(uniform(count, d), d)
             before = session.download()
             self.assertGreater(len(before.simplices), 10_000)
@@ -122,7 +122,7 @@ class DeltaTest(Case):
         session.upload([[0, 0], [2, 0], [2, 1], [0, 1], [1, 0], [1, 1]])
         session.add_segments(
             segments=[[0, 4], [4, 1], [1, 2], [2, 5], [5, 3], [3, 0], [4, 5]],
-            regions=[wellspace.RegionSeed((0.5, 0.5), 3), wellspace.RegionSeed((1.5, 0.5), 5)],
+            regions=[wellspace.RegionSeed(0.5, 0.5, region=3), wellspace.RegionSeed(1.5, 0.5, region=5)],
         )
         session.refine(size=0.02)
         before = session.download()
