@@ -10,7 +10,7 @@ namespace wellspace::server {
 namespace {
 
 // Tags, lengths and index around the values of a part, generously.
-constexpr uint64_t kEnvelopeBytes = 256;
+constexpr uint64_t kPartEnvelopeBytes = 256;
 // A number of up to 64 bits, as protocol buffers write it.
 constexpr uint64_t kMostVarintBytes = 10;
 
@@ -18,7 +18,7 @@ constexpr uint64_t kMostVarintBytes = 10;
 class PartWriter {
  public:
   PartWriter(uint64_t max_bytes, std::vector<grpc::Slice>& parts)
-      : max_bytes_(max_bytes - kEnvelopeBytes), parts_(parts) {}
+      : max_bytes_(max_bytes - kPartEnvelopeBytes), parts_(parts) {}
 
   // The part to which a value of at most `bytes` goes.
   v1::MeshDelta& PartFor(uint64_t bytes) {
