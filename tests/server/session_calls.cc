@@ -257,6 +257,16 @@ Download SessionCalls::DownloadMesh(const v1::DownloadMeshRequest& request) {
   return download;
 }
 
+std::string SessionCalls::MeshBytes(const std::string& name) {
+  const Download download = DownloadMesh(name, 0, 0, std::nullopt, true);
+  EXPECT_TRUE(download.status.ok()) << download.status.error_message();
+  std::string bytes;
+  for (const v1::MeshChunk& chunk : download.chunks) {
+    bytes += chunk.SerializeAsString();
+  }
+  return bytes;
+}
+
 v1::SetSizesRequest SizesRequest(const std::string& name, const std::vector<double>& points,
                                  const std::vector<double>& sizes) {
   v1::SetSizesRequest request;

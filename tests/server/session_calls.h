@@ -92,6 +92,9 @@ class SessionCalls {
   // Downloads what `request` asks for, to its end.
   Download DownloadMesh(const v1::DownloadMeshRequest& request);
 
+  // The chunks of the last mesh with its boundary, one behind the other.
+  std::string MeshBytes(const std::string& name);
+
   v1::SessionService::Stub& sessions() { return *sessions_; }
   v1::OperationService::Stub& operations() { return *operations_; }
   v1::QueryService::Stub& queries() { return *queries_; }

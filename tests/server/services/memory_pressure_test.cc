@@ -93,15 +93,7 @@ class MemoryPressureTest : public ::testing::Test {
     return cells;
   }
 
-  std::string MeshOf(const std::string& name) {
-    const Download download = calls().DownloadMesh(name, 0, 0, std::nullopt, true);
-    EXPECT_TRUE(download.status.ok()) << download.status.error_message();
-    std::string bytes;
-    for (const v1::MeshChunk& chunk : download.chunks) {
-      bytes += chunk.SerializeAsString();
-    }
-    return bytes;
-  }
+  std::string MeshOf(const std::string& name) { return calls().MeshBytes(name); }
 
   size_t GivenUp() { return service_->log().Count("event=structure_given_up"); }
 

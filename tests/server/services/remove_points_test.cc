@@ -66,15 +66,7 @@ class RemovePointsTest : public ::testing::TestWithParam<bool> {
     return calls().queries().AddVertices(&context, request, &response);
   }
 
-  std::string MeshOf(const std::string& name) {
-    const Download download = calls().DownloadMesh(name, 0, 0, std::nullopt, true);
-    EXPECT_TRUE(download.status.ok()) << download.status.error_message();
-    std::string bytes;
-    for (const v1::MeshChunk& chunk : download.chunks) {
-      bytes += chunk.SerializeAsString();
-    }
-    return bytes;
-  }
+  std::string MeshOf(const std::string& name) { return calls().MeshBytes(name); }
 
   TestFolder folder_;
   ServiceOptions options_{.workers = 2};

@@ -62,15 +62,7 @@ class RestartTest : public ::testing::Test {
     return session.DebugString();
   }
 
-  std::string MeshOf(const std::string& name) {
-    const Download download = calls().DownloadMesh(name, 0, 0, std::nullopt, true);
-    EXPECT_TRUE(download.status.ok()) << download.status.error_message();
-    std::string bytes;
-    for (const v1::MeshChunk& chunk : download.chunks) {
-      bytes += chunk.SerializeAsString();
-    }
-    return bytes;
-  }
+  std::string MeshOf(const std::string& name) { return calls().MeshBytes(name); }
 
   v1::AddVerticesResponse Add(const std::string& name, const std::vector<double>& points,
                               const std::string& request_id = "") {
