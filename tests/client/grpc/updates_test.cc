@@ -115,7 +115,7 @@ class UpdatesTest : public ::testing::Test {
 };
 
 TEST_F(UpdatesTest, TenPointsTakeThreePercentOfTheBytes) {
-  for (const auto& [dimension, points] : {std::pair(2, 8000), {3, 1500}}) {
+  for (const auto& [dimension, points] : {std::pair(2, 8000), {3, 2000}}) {
     const std::string name = Refined(dimension, points);
     Mesh mesh = Whole(name);
     const size_t simplices = mesh.simplices.size() / (dimension + 1);
