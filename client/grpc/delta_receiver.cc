@@ -20,7 +20,7 @@ template <typename T>
 using Field = google::protobuf::RepeatedField<T>;
 
 template <typename... Parts>
-absl::Status Contradiction(const Parts&... parts) {
+absl::Status MisfitOf(const Parts&... parts) {
   return absl::DataLossError(absl::StrCat("the server's answer is damaged: a difference ", parts...));
 }
 
@@ -36,8 +36,8 @@ struct Run {
 absl::StatusOr<std::vector<Run>> ReadRuns(const v1::KeptRows& message, uint64_t base_rows, uint64_t rows,
                                           uint64_t added) {
   if (message.skipped_size() != message.kept_size() || message.kept_size() != message.added_size()) {
-    return Contradiction("with ", message.skipped_size(), ", ", message.kept_size(), " and ", message.added_size(),
-                         " numbers of runs");
+    return MisfitOf("with ", message.skipped_size(), ", ", message.kept_size(), " and ", message.added_size(),
+                    " numbers of runs");
   }
   std::vector<Run> runs;
   uint64_t expected = 0;
@@ -49,17 +49,16 @@ absl::StatusOr<std::vector<Run>> ReadRuns(const v1::KeptRows& message, uint64_t 
                      .added = message.added(i)};
     if (run.begin > base_rows || run.kept > base_rows - run.begin || run.kept > base_rows - kept ||
         run.added > added - taken) {
-      return Contradiction("keeps ", run.kept, " rows from row ", run.begin, " on, of ", base_rows, ", and has ",
-                           run.added, " new ones");
+      return MisfitOf("keeps ", run.kept, " rows from row ", run.begin, " on, of ", base_rows, ", and has ", run.added,
+                      " new ones");
     }
     runs.push_back(run);
     expected = run.begin + run.kept;
     kept += run.kept;
     taken += run.added;
   }
-  return taken == added && kept + taken == rows
-             ? absl::StatusOr<std::vector<Run>>(std::move(runs))
-             : Contradiction("keeps ", kept, " rows, and ", taken, " are new, of ", rows);
+  return taken == added && kept + taken == rows ? absl::StatusOr<std::vector<Run>>(std::move(runs))
+                                                : MisfitOf("keeps ", kept, " rows, and ", taken, " are new, of ", rows);
 }
 
 uint64_t MostOf(const v1::KeptRows& rows) {
@@ -82,7 +81,7 @@ absl::StatusOr<std::vector<Run>> ApplyKept(const std::vector<uint32_t>& base, co
                                            const Field<uint32_t>& added, size_t width, uint64_t rows,
                                            std::vector<uint32_t>* next) {
   if (added.size() % width != 0) {
-    return Contradiction("with ", added.size(), " numbers in rows of ", width);
+    return MisfitOf("with ", added.size(), " numbers in rows of ", width);
   }
   WELLSPACE_ASSIGN_OR_RETURN(std::vector<Run> runs, ReadRuns(kept, base.size() / width, rows, added.size() / width));
   next->reserve(rows * width);
@@ -98,7 +97,7 @@ absl::Status PutChanged(const Field<uint32_t>& gaps, const Field<T>& values, siz
   for (const uint32_t gap : gaps) {
     row += gap;
     if (row >= array.size() / width || static_cast<size_t>(values.end() - value) < width) {
-      return Contradiction("changes row ", row, " of ", array.size() / width);
+      return MisfitOf("changes row ", row, " of ", array.size() / width);
     }
     std::copy_n(value, width, array.begin() + row * width);
     value += width;
@@ -112,8 +111,8 @@ absl::Status ApplyChanged(const std::vector<T>& base, const Field<uint32_t>& gap
                           uint64_t rows, std::vector<T>* next) {
   const uint64_t kept = std::min<uint64_t>(base.size() / width, rows);
   if ((rows - kept + gaps.size()) * width != static_cast<uint64_t>(values.size())) {
-    return Contradiction("with ", values.size(), " numbers for ", gaps.size(), " changed and ", rows - kept,
-                         " new rows of ", width);
+    return MisfitOf("with ", values.size(), " numbers for ", gaps.size(), " changed and ", rows - kept, " new rows of ",
+                    width);
   }
   next->reserve(rows * width);
   next->assign(base.begin(), base.begin() + kept * width);
@@ -133,7 +132,7 @@ absl::Status ApplyRegions(const std::vector<int32_t>& base, const v1::MeshDelta&
   }
   const int changed = delta.changed_simplex_regions_size();
   if (base.size() != base_rows || changed + added != static_cast<uint64_t>(delta.simplex_regions_size())) {
-    return Contradiction("with regions of other simplices");
+    return MisfitOf("with regions of other simplices");
   }
   JoinRuns(runs, base, delta.simplex_regions().begin() + changed, 1, next);
   return PutChanged(delta.changed_simplex_regions(), delta.simplex_regions(), 1, *next);
@@ -144,7 +143,7 @@ absl::Status ReadList(const Field<uint32_t>& gaps, uint64_t end, std::vector<uin
   for (const uint32_t gap : gaps) {
     number += gap;
     if (number >= end) {
-      return Contradiction("names vertex ", number, " of ", end);
+      return MisfitOf("names vertex ", number, " of ", end);
     }
     numbers->push_back(static_cast<uint32_t>(number));
     ++number;
@@ -166,30 +165,29 @@ bool HasChecksums(const Mesh& mesh, const v1::MeshChecksums& checksums) {
          HasChecksum(mesh.simplex_regions, checksums.simplex_regions()) && HasChecksum(mesh.facets, checksums.facets());
 }
 
-absl::Status CheckVertices(const std::vector<uint32_t>& vertices, uint64_t count, bool may_be_none) {
+absl::Status CheckNumbers(const std::vector<uint32_t>& vertices, uint64_t count, bool may_be_none) {
   const auto wrong = std::ranges::find_if(
       vertices, [&](uint32_t vertex) { return vertex >= count && !(may_be_none && vertex == kNoVertex); });
-  return wrong == vertices.end() ? absl::OkStatus() : Contradiction("names vertex ", *wrong, " of ", count);
+  return wrong == vertices.end() ? absl::OkStatus() : MisfitOf("names vertex ", *wrong, " of ", count);
 }
 
 }  // namespace
 
 absl::Status DeltaReceiver::SetMetadata(const v1::MeshMetadata& metadata) {
   if (!expects_metadata_) {
-    return Contradiction("of which parts are missing");
+    return MisfitOf("of which parts are missing");
   }
   MeshHeader header = HeaderFromProto(metadata);
   WELLSPACE_RETURN_IF_ERROR(CheckHeader(header, {.dimension = mesh_.dimension, .input_points = std::nullopt}));
   if (metadata.delta().base_revision() != mesh_.revision) {
-    return Contradiction("from the mesh of revision ", metadata.delta().base_revision(), "; that of revision ",
-                         mesh_.revision, " is there");
+    return MisfitOf("from the mesh of revision ", metadata.delta().base_revision(), "; that of revision ",
+                    mesh_.revision, " is there");
   }
   if (header.revision == mesh_.revision) {
-    return header.chunk_count == 0 ? absl::OkStatus() : Contradiction("of ", header.chunk_count, " parts from itself");
+    return header.chunk_count == 0 ? absl::OkStatus() : MisfitOf("of ", header.chunk_count, " parts from itself");
   }
   if (is_begun_ && (header.revision != header_.revision || header.chunk_count != header_.chunk_count)) {
-    return Contradiction("to revision ", header.revision, " goes on where one to revision ", header_.revision,
-                         " ended");
+    return MisfitOf("to revision ", header.revision, " goes on where one to revision ", header_.revision, " ended");
   }
   is_begun_ = true;
   header_ = std::move(header);
@@ -200,8 +198,8 @@ absl::Status DeltaReceiver::SetMetadata(const v1::MeshMetadata& metadata) {
 
 absl::Status DeltaReceiver::AddPart(const v1::MeshDelta& part) {
   if (expects_metadata_ || part.index() != next_part_) {
-    return Contradiction("with part ", part.index(), " where part ", next_part_, " of ", header_.chunk_count,
-                         " was expected");
+    return MisfitOf("with part ", part.index(), " where part ", next_part_, " of ", header_.chunk_count,
+                    " was expected");
   }
   delta_.MergeFrom(part);
   WELLSPACE_RETURN_IF_ERROR(CheckSizes());
@@ -230,7 +228,7 @@ absl::Status DeltaReceiver::CheckSizes() const {
                       fits(delta_.simplex_regions_size(), header_.simplex_count) &&
                       fits(MostOf(delta_.kept_facets()), header_.facet_count) &&
                       fits(delta_.facets_size(), header_.facet_count * dimension);
-  return do_fit ? absl::OkStatus() : Contradiction("larger than the mesh of ", header_.vertex_count, " vertices");
+  return do_fit ? absl::OkStatus() : MisfitOf("larger than the mesh of ", header_.vertex_count, " vertices");
 }
 
 absl::Status DeltaReceiver::Apply() {
@@ -262,11 +260,11 @@ absl::Status DeltaReceiver::Apply() {
           .status());
   WELLSPACE_RETURN_IF_ERROR(ReadList(delta.moved_vertices(), vertices, &next.moved_vertices));
   if (next.moved_vertices.size() != header_.moved_vertex_count || !HasChecksums(next, checksums_)) {
-    return Contradiction("that makes another mesh than that of revision ", header_.revision);
+    return MisfitOf("that makes another mesh than that of revision ", header_.revision);
   }
-  WELLSPACE_RETURN_IF_ERROR(CheckVertices(next.simplices, vertices, /*may_be_none=*/false));
-  WELLSPACE_RETURN_IF_ERROR(CheckVertices(next.facets, vertices, /*may_be_none=*/false));
-  WELLSPACE_RETURN_IF_ERROR(CheckVertices(next.input_vertex, vertices, /*may_be_none=*/true));
+  WELLSPACE_RETURN_IF_ERROR(CheckNumbers(next.simplices, vertices, /*may_be_none=*/false));
+  WELLSPACE_RETURN_IF_ERROR(CheckNumbers(next.facets, vertices, /*may_be_none=*/false));
+  WELLSPACE_RETURN_IF_ERROR(CheckNumbers(next.input_vertex, vertices, /*may_be_none=*/true));
   SetHeader(header_, next);
   mesh_ = std::move(next);
   return absl::OkStatus();
