@@ -7,7 +7,7 @@
 //   a node                         kNodeError       1.5 u   16 u    |x|       all below
 //   an excess x . w - |w|^2 / 2    kExcessError     16 u    32 u    R |w|     FloatBisector: which nodes are cut off
 //   the same of one node           NodeDoubtSq      1.5 u   16 u    |x| |w|   DecideDoubtful, before DecideCut
-//   a distance                     kDistanceError   8 u     32 u    |x|       SetReach, OffsetBound
+//   a distance                     kDistanceError   8 u     32 u    |x|       SetReach, OffsetBound, KeepRoughPosition
 //   a power p . (p - 2 x)          kPowerError      64 u    128 u   R^2       AreReached
 //   a ratio, now and once placed   kRatioMargin     128 u   128 u   ratio     KeepsRatio
 #ifndef WELLSPACE_CORE_CELL_FLOAT_ERRORS_H_

@@ -24,6 +24,9 @@ bool Polyhedron::PlaceUnlessKeeps(double ratio) {
   if (KeepsRatio(ratio)) {
     return true;
   }
+  if (is_placed_) {
+    return false;
+  }
   PlaceWanted([this, ratio_sq = SurelyKeptRatioSq(ratio)](size_t i) {
     const Group& group = groups_[i / kGroupSize];
     const size_t lane = i % kGroupSize;

@@ -22,7 +22,7 @@ constexpr double kOffsetError = (D + 5) * kUnit;
 // After so many cuts by the vertices of one leaf, those that are left are looked at together.
 constexpr int kCutsBetweenLooks = 4;
 
-// A node between two others may be wrong by this share of its distance from the site: few cuts are left in doubt by it.
+// A node between two others may be wrong by this share of the cell's reach: few cuts are left in doubt by it.
 constexpr double kMostRoughSlack = 0x1p-20;
 
 }  // namespace

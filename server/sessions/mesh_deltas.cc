@@ -36,7 +36,7 @@ std::vector<MeshDeltas::Delta> MeshDeltas::Advance(Delta delta, uint64_t mesh_by
   }
   memory_bytes_ += delta->memory_bytes();
   deltas_.push_back(std::move(delta));
-  while (deltas_.size() > kMost || (memory_bytes_ > mesh_bytes && deltas_.size() > 1)) {
+  while (deltas_.size() > kMost || memory_bytes_ > mesh_bytes) {
     drop_first();
   }
   return dropped;

@@ -228,9 +228,10 @@ void StartTicking(Background& background, const std::shared_ptr<Operation>& oper
 absl::StatusOr<std::shared_ptr<Job>> Submit(const CallEnvironment& environment, const std::shared_ptr<Session>& session,
                                             const std::shared_ptr<Operation>& operation) {
   const Session::Size size = session->GetSize(kMostSmallPoints);
+  const uint64_t replayed_steps = operation->restart() ? 0 : size.replayed_steps;
   const bool is_small =
       size.points <= kMostSmallPoints && size.segments <= kMostSmallPoints &&
-      IsSmallRefinement(session->ParametersOf(*operation), size.some_points, size.vertices, size.replayed_steps);
+      IsSmallRefinement(session->ParametersOf(*operation), size.some_points, size.vertices, replayed_steps);
   WELLSPACE_ASSIGN_OR_RETURN(
       std::shared_ptr<Job> job,
       environment.jobs.Submit(

@@ -72,7 +72,7 @@ struct PointsLeft {
 // session is busy, points, features, sizes, mesh, mesher and steps are touched by the work alone that has made it so;
 // (3) what did not succeed leaves the session as it was: structure and mesh are what Replay makes of the steps, whether
 // there is a mesher now or not; (4) no client is told of a change, and nothing shows it, before the log has it; one
-// that it cannot have is not made.
+// that it cannot have is not made. An expiry alone shows at once (LogExpiry).
 class Session {
  public:
   struct Settings {
@@ -153,7 +153,7 @@ class Session {
   };
   // Refuses an upload that goes on where another has ended.
   //
-  // Errors:     UPLOAD_GAP, UPLOAD_MISMATCH.
+  // Errors:     SESSION_BUSY, UPLOAD_GAP, UPLOAD_MISMATCH.
   absl::Status CheckPrefix(const Prefix& prefix) const;
 
   // Appends `coordinates`: whole points, of which the first becomes number `offset` of the session. Where the session
@@ -164,7 +164,7 @@ class Session {
   //             QUOTA_EXCEEDED, MEMORY_LIMIT, REVISION_MISMATCH, SESSION_NOT_FOUND. Nothing has been appended.
   absl::Status Append(uint64_t offset, std::span<const double> coordinates, uint64_t expected_revision);
   // Makes all points that were appended the session's, for good. On an error those that are not are dropped, unless
-  // vertices are being added, which come behind them.
+  // vertices are being added or the mesher is built again: the next change commits them.
   absl::Status CommitPoints();
   // Bytes of points that are appended and not committed.
   uint64_t UncommittedBytes() const;
@@ -275,7 +275,7 @@ class Session {
     uint64_t segments = 0;
     std::vector<double> some_points;  // all, if they are at most `few`; else none
     uint64_t vertices = 0;            // of the last mesh
-    uint64_t replayed_steps = 0;      // that have to be replayed before any other work
+    uint64_t replayed_steps = 0;  // that have to be replayed before other work than one that begins a structure anew
   };
   Size GetSize(uint64_t few) const;
 
@@ -461,17 +461,18 @@ class Session {
   //   - of a session that is busy, work_.mesher and work_.memory belong to the work that has made it so, which writes
   //     them without mutex_. Others look at busy_ first, and leave them alone;
   //   - that work reads without mutex_ what invariant (2) keeps from all others: points_, features_, sizes_, work_,
-  //     steps_, parameters_;
+  //     steps_, parameters_; and while points are removed, when no upload comes, committed_points_ and revision_;
   //   - who holds change_mutex_ reads without mutex_ what changes under both alone: parameters_, labels_, the length of
   //     lease_, features_, sizes_, sizes_in_use_, are_inputs_loaded_, steps_, operations_, next_operation_, and, of a
-  //     session that is busy or durable, revision_ and committed_points_.
+  //     session that is busy or durable, revision_ and committed_points_; before others know the session, busy_;
+  //   - while vertices are added, none but the work that adds them touches point_account_.
   core::MeshParameters parameters_;  // of the last refinement that succeeded; before it, those of the creation
   std::map<std::string, std::string> labels_;
   Lease lease_;
   bool is_closed_ = false;
   Busy busy_ = Busy::kNo;
   bool is_uploading_ = false;
-  bool is_ready_ = false;  // the last operation succeeded, and no points have come since
+  bool is_ready_ = false;  // the mesh is that of all points
   uint64_t revision_ = 1;
   // Five counts of points, each at most the one before but for the moment in which vertices are added:
   // point_account_.points() are paid for, those that AddVertices is adding included; PointCountLocked() are in points_;
@@ -487,7 +488,7 @@ class Session {
   std::shared_ptr<const core::SizeSamples> sizes_;  // null: none, or not read
   SizesInUse sizes_in_use_;                         // which these are
   bool are_inputs_loaded_ = true;  // false: features and sizes were written down by another process, and not read yet
-  SessionWork work_;               // its mesher is away while an operation is under way
+  SessionWork work_;               // its mesher is away while an operation runs
   SessionSteps steps_;
   uint64_t structure_version_ = 0;  // of what queries see; 0: nothing yet
   MeshDeltas deltas_;               // has a lock of its own, after mutex_

@@ -184,9 +184,13 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::ResumeOperation() {
     refusal = LoadInputs();  // which its work needs
   }
   const absl::Time now = clock_.wall();
-  WELLSPACE_RETURN_IF_ERROR(Commit([&](SessionChange& change) {
+  const absl::Status logged = Commit([&](SessionChange& change) {
     change.operations.push_back(refusal.ok() ? operation->Record() : operation->RecordOfFailure(now, refusal));
-  }));
+  });
+  // Where the disk is full, the next process finds what this one has found.
+  if (!logged.ok() && !absl::IsResourceExhausted(logged)) {
+    return logged;
+  }
   if (refusal.ok()) {
     return operation;
   }

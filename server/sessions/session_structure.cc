@@ -82,8 +82,9 @@ Session::Size Session::GetSize(uint64_t few) const {
   }
   if (work_.mesh != nullptr) {
     size.vertices = work_.mesh->figures().vertices;
-    // Of a session that is busy the mesher is not looked at.
-    const bool is_given_up = busy_ == Busy::kReplaying || (busy_ == Busy::kNo && work_.mesher == nullptr);
+    // While vertices are added, or points removed, the mesher is theirs, and not looked at.
+    const bool may_look = busy_ == Busy::kNo || busy_ == Busy::kStarting || busy_ == Busy::kOperation;
+    const bool is_given_up = busy_ == Busy::kReplaying || (may_look && work_.mesher == nullptr);
     size.replayed_steps = is_given_up ? steps_.all().size() : 0;
   }
   return size;

@@ -13,7 +13,7 @@
 
 namespace wellspace::server {
 
-// What an operation works on. The session has given it away until the operation has ended.
+// What an operation works on. While it runs, the mesher is its alone; the mesh is shared, and never changed.
 struct SessionWork {
   MemoryReservation memory;              // of `mesher`; first, so that it is given back when that is freed
   std::unique_ptr<core::Mesher> mesher;  // null: there is none yet, or it was given up

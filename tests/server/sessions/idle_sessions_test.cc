@@ -174,6 +174,19 @@ TEST_F(IdleSessionsTest, TheOneThatWasNotUsedForLongestGivesUp) {
   EXPECT_EQ(second->GetSize(0).replayed_steps, 1u);
 }
 
+TEST_F(IdleSessionsTest, WhoStartsAnOperationSeesWhatIsReplayedFirst) {
+  const std::shared_ptr<Session> session = Refined();
+  EXPECT_GT(session->GiveUpMesher(), 0u);
+  uint64_t replayed_steps = 0;
+  const auto submit = [&](const std::shared_ptr<Operation>&) {
+    replayed_steps = session->GetSize(0).replayed_steps;
+    return absl::OkStatus();
+  };
+  ASSERT_TRUE(session->StartOperation(session->parameters(), /*restart=*/false, 0, submit).ok());
+  EXPECT_EQ(replayed_steps, 1u) << "else a long replay would be taken for small work";
+  EXPECT_EQ(session->GetSize(0).replayed_steps, 1u) << "one that an earlier process left is submitted while it waits";
+}
+
 TEST_F(IdleSessionsTest, NothingIsGivenUpWithoutNeedOrForNothing) {
   const std::shared_ptr<Session> session = Refined();
   EXPECT_TRUE(memory_.MakeRoom(70 * kMegabyte, Want::kAllOrNothing)) << "there is room";

@@ -11,6 +11,7 @@
 #include "server/jobs/job_pool.h"
 #include "server/sessions/session_registry.h"
 #include "server/store/ephemeral_log.h"
+#include "server/wire/convert.h"
 #include "server/wire/errors.h"
 #include "tests/server/service_harness.h"
 
@@ -155,6 +156,41 @@ TEST(SessionOnAFullDisk, ChangesAreRefusedAndNoneIsMade) {
   log.is_full = false;
   EXPECT_TRUE(session->SetSizes(nullptr, 0).ok());
   EXPECT_EQ(session->Describe().size_count(), 0u);
+}
+
+TEST(SessionOnAFullDisk, OperationsOfAnEarlierProcessAreTakenUp) {
+  const ServiceOptions options;
+  MemoryBudget memory(uint64_t{1} << 30);
+  LogOnAFullDisk log;
+  log.is_full = true;
+  StoredSession stored;
+  stored.state.set_name("sessions/1");
+  stored.state.set_revision(1);
+  stored.state.set_next_operation(2);
+  *stored.state.mutable_parameters() = ParametersToProto({.dimension = 2});
+  store::v1::OperationRecord& waiting = stored.operations.emplace_back();
+  waiting.set_number(1);
+  waiting.set_attempts(1);
+  waiting.set_state(v1::Operation::STATE_QUEUED);
+  *waiting.mutable_parameters() = stored.state.parameters();
+  const auto resume = [&](const std::shared_ptr<Session>& session) {
+    const absl::StatusOr<std::shared_ptr<Operation>> resumed = session->ResumeOperation();
+    EXPECT_TRUE(resumed.ok()) << "the server would not start: " << resumed.status();
+    return resumed.value_or(nullptr);
+  };
+  const auto restore = [&] {
+    return Session::Restore(stored, options, memory, {}, std::make_shared<TenantPoints>(), log).value();
+  };
+  const std::shared_ptr<Session> session = restore();
+  const std::shared_ptr<Operation> resumed = resume(session);
+  ASSERT_NE(resumed, nullptr);
+  EXPECT_TRUE(resumed->IsQueued());
+
+  waiting.set_crashes(2);
+  waiting.set_state(v1::Operation::STATE_RUNNING);
+  const std::shared_ptr<Session> crashed = restore();
+  EXPECT_EQ(resume(crashed), nullptr);
+  EXPECT_EQ(crashed->FindOperation("sessions/1/operations/1").value()->Describe().state(), v1::Operation::STATE_FAILED);
 }
 
 }  // namespace
