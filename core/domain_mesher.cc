@@ -196,10 +196,10 @@ absl::StatusOr<std::vector<DomainMesher::Subsegment>> DomainMesher::MakeTriangle
   const double no_time = 0;
   const Stopwatch stopwatch(figures_.simplices_seconds, no_time);
   numbering_.Extend(structure_.vertex_count());
-  WELLSPACE_ASSIGN_OR_RETURN(
-      DomainSimplices triangles,
-      ComputeDomainSimplices(structure_, *planar_, chains, refinement_->stars(), [this] { refinement_->DropStars(); },
-                             numbering_.output_index(), threads, context));
+  WELLSPACE_ASSIGN_OR_RETURN(DomainSimplices triangles,
+                             ComputeDomainSimplices(
+                                 structure_, *planar_, chains, refinement_->stars(),
+                                 [this] { refinement_->DropStars(); }, numbering_.output_index(), threads, context));
   figures_.star_queries.Add(triangles.simplices.counters);
   std::vector<Subsegment> to_split;
   for (const uint32_t at : triangles.broken) {

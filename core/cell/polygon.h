@@ -55,8 +55,8 @@ class Polygon : public FloatCell<2> {
   bool PlaceUnlessKeeps(double ratio);
   bool Reaches(const Box<2>& cube) const;
   void FindStar(Star<2>& out) const;
-  // Whether surely no node lies beyond the line through `foot`, relative to the site, at a right angle to the way there.
-  // The nodes need not be placed.
+  // Whether surely no node lies beyond the line through `foot`, relative to the site, at a right angle to the way
+  // there. The nodes need not be placed.
   bool IsSurelyBefore(const Point<2>& foot) const;
   // Calls f(plane) with that of each edge, one after the other around the site, placed or not.
   template <typename F>

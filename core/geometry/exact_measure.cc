@@ -159,7 +159,7 @@ std::optional<Sign> FilterOrientation(const Simplex<D>& simplex) {
                      D + ExpansionRoundings(D));
 }
 
-// In the plane, where it is clear, and what is computed can neither underflow nor overflow: then nothing need be scaled.
+// The same in the plane without scaling, where the sign is clear, and nothing that counts underflows or overflows.
 std::optional<Sign> GlanceOrientation(const Simplex<2>& simplex) {
   const double left = (simplex[1][0] - simplex[0][0]) * (simplex[2][1] - simplex[0][1]);
   const double right = (simplex[1][1] - simplex[0][1]) * (simplex[2][0] - simplex[0][0]);

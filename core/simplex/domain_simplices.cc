@@ -329,6 +329,29 @@ void FindListed(const ZOrder& order, std::span<const uint32_t> output_index, Thr
   });
 }
 
+// Puts the indices of the triangles in the place of their rows, and their faces into `faces`.
+void PutInOrder(const QueryStructure<2>& structure, const ZOrder& order, std::span<const uint32_t> output_index,
+                ThreadTeam& team, std::deque<ListedOfThread>& of_threads, RowsByRank& by_rank,
+                HugeVector<uint32_t>& faces, RunContext& context) {
+  faces.resize(by_rank.words.size() / 3);
+  team.ForEach(order.first.size() - 1, [&](size_t block) {
+    auto& [stars, found, sorted, list] = of_threads[ThreadTeam::CurrentThread()];
+    list.Clear();
+    const uint32_t begin = by_rank.first[order.first[block]];
+    for (uint32_t r = order.first[block]; r < order.first[block + 1] && !context.IsCancelled(); ++r) {
+      const VertexId v = order.vertex[r];
+      by_rank.SortedOf(r, sorted);
+      for (const Row& row : sorted) {
+        list.Add({structure.point(v), structure.point(row.first), structure.point(row.second)},
+                 {output_index[Index(v)], output_index[Index(row.first)], output_index[Index(row.second)]});
+        faces[by_rank.first[r] + (&row - sorted.data())] = row.face;
+      }
+    }
+    std::copy(list.indices().begin(), list.indices().end(), by_rank.words.begin() + 3 * size_t{begin});
+    context.AddSimplices(list.size());
+  });
+}
+
 // The triangles that are listed at vertices, in the same order as those of cells; none if these are not exactly those
 // of the domain, since a subsegment is no edge, or a triangle has been spoiled beyond a segment, unseen.
 absl::StatusOr<std::optional<DomainSimplices>> ListedDomainSimplices(
@@ -337,10 +360,10 @@ absl::StatusOr<std::optional<DomainSimplices>> ListedDomainSimplices(
     int threads, RunContext& context) {
   WELLSPACE_ASSIGN_OR_RETURN(StaleStars stale, StaleStars::Of(star_lists, structure.vertex_count(), context));
   // Two triangles a vertex, as they are found and in their order, and four numbers a vertex.
-  WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(
-      structure.MemoryBytes() + domain.MemoryBytes() + star_lists.MemoryBytes() + stale.MemoryBytes() +
-      output_index.size_bytes() +
-      structure.vertex_count() * (2 * (sizeof(RankedRow) + sizeof(Row)) + 4 * sizeof(uint32_t))));
+  WELLSPACE_RETURN_IF_ERROR(
+      context.AllowMemory(structure.MemoryBytes() + domain.MemoryBytes() + star_lists.MemoryBytes() +
+                          stale.MemoryBytes() + output_index.size_bytes() +
+                          structure.vertex_count() * (2 * (sizeof(RankedRow) + sizeof(Row)) + 4 * sizeof(uint32_t))));
   std::vector<uint32_t> place = PlacesIn(chains, domain.segment_count(), structure.vertex_count());
   const Subsegments subsegments(domain, chains, place);
   const LeafBlocks<2> leaf_blocks(structure.tree(), kVerticesInBlock);
@@ -361,28 +384,12 @@ absl::StatusOr<std::optional<DomainSimplices>> ListedDomainSimplices(
   if (!(outline == OutlineOf(domain, chains))) {
     return std::nullopt;
   }
-  drop_stars();
+  drop_stars();  // and what else is not read again
   stale = {};
   place = {};
   RowsByRank by_rank(of_threads, structure.vertex_count());
   order.rank = {};
-  all.faces.resize(by_rank.words.size() / 3);
-  team.ForEach(leaf_blocks.count(), [&](size_t block) {
-    auto& [stars, found, sorted, list] = of_threads[ThreadTeam::CurrentThread()];
-    list.Clear();
-    const uint32_t begin = by_rank.first[order.first[block]];
-    for (uint32_t r = order.first[block]; r < order.first[block + 1] && !context.IsCancelled(); ++r) {
-      const VertexId v = order.vertex[r];
-      by_rank.SortedOf(r, sorted);
-      for (const Row& row : sorted) {
-        list.Add({structure.point(v), structure.point(row.first), structure.point(row.second)},
-                 {output_index[Index(v)], output_index[Index(row.first)], output_index[Index(row.second)]});
-        all.faces[by_rank.first[r] + (&row - sorted.data())] = row.face;
-      }
-    }
-    std::copy(list.indices().begin(), list.indices().end(), by_rank.words.begin() + 3 * size_t{begin});
-    context.AddSimplices(list.size());
-  });
+  PutInOrder(structure, order, output_index, team, of_threads, by_rank, all.faces, context);
   WELLSPACE_RETURN_IF_ERROR(context.Check());
   all.simplices.indices = std::move(by_rank.words);
   all.simplices.min_angle_deg = std::numeric_limits<double>::infinity();

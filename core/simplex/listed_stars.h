@@ -1,5 +1,5 @@
-// The simplices of a mesh out of those that are listed at its vertices. ComputeSimplices and ComputeDomainSimplices read
-// them so.
+// The simplices of a mesh out of those that are listed at its vertices. ComputeSimplices and ComputeDomainSimplices
+// read them so.
 #ifndef WELLSPACE_CORE_SIMPLEX_LISTED_STARS_H_
 #define WELLSPACE_CORE_SIMPLEX_LISTED_STARS_H_
 

@@ -399,8 +399,7 @@ void QueryStructure<D>::SegmentsWithin(const Point<D>& p, double reach, VertexId
   workspace.seen_segments.resize(tree_.segments().count());
   ScanOutward(
       p, tree_.LeafHolding(CommittedNear(near), p), workspace, [&] { return reach * reach; },
-      [](NodeId) { return true; },
-      [&](NodeId leaf) { ListSegmentsOf(leaf, workspace); });
+      [](NodeId) { return true; }, [&](NodeId leaf) { ListSegmentsOf(leaf, workspace); });
 }
 
 template <int D>

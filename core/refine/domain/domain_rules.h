@@ -60,8 +60,9 @@ class DomainRules {
   // Complexity: that of a query.
   double NearestSegmentSq(VertexId v, double limit_sq, Workspace<2>& workspace) const;
 
-  // What is wrong with the cell of `v`, whose nodes are placed unless that is plain: nothing; `segments` has all that meet it. What a cell is beyond
-  // the segments of v, on sides that are not meshed, does not count. Nodes in `refused` ask for nothing.
+  // What is wrong with the cell of `v`, whose nodes are placed unless it is plainly good; `segments` has all that meet
+  // it. What a cell is beyond the segments of v, on sides that are not meshed, does not count. Nodes in `refused` ask
+  // for nothing.
   //
   // Complexity: O(nodes segments).
   DomainAssessment AssessCell(VertexId v, Polytope<2>& cell, std::span<const uint32_t> segments, double edge_limit_sq,

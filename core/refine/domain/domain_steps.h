@@ -68,8 +68,8 @@ class DomainSteps {
     };
     is_reassessed_ = false;
     while (true) {
-      DomainRules::Answer answer = rules_.NextRequest(v_, cell(), workspace_.own.segments, found_, edge_limit_sq_,
-                                                     cell_of, workspace_.other);
+      DomainRules::Answer answer =
+          rules_.NextRequest(v_, cell(), workspace_.own.segments, found_, edge_limit_sq_, cell_of, workspace_.other);
       request_ = answer.request;
       if (!answer.refused.has_value()) {
         return request_.has_value() ? &*request_ : nullptr;

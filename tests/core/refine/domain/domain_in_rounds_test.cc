@@ -196,9 +196,9 @@ DomainSimplices TrianglesOf(const Refined& refined, int threads) {
     output_index[i] = static_cast<uint32_t>(output_index.size()) - 1 - i;  // any order
   }
   RunContext context;
-  absl::StatusOr<DomainSimplices> triangles =
-      ComputeDomainSimplices(refined.structure, *refined.planar, refined.planar->FindChains(),
-                             refined.refinement->stars(), [] {}, output_index, threads, context);
+  absl::StatusOr<DomainSimplices> triangles = ComputeDomainSimplices(
+      refined.structure, *refined.planar, refined.planar->FindChains(), refined.refinement->stars(), [] {},
+      output_index, threads, context);
   EXPECT_TRUE(triangles.ok()) << triangles.status();
   EXPECT_TRUE(triangles->broken.empty());
   return *std::move(triangles);
