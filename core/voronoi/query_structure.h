@@ -130,8 +130,8 @@ class QueryStructure {
   // Errors:     none.
   Neighbor NearestTo(const Point<D>& p, VertexId near, Workspace<D>& workspace) const;
 
-  // Puts into workspace.segments all segments of the tree within `reach` of `p`, each once, and maybe others; looked for
-  // outward from `near`.
+  // Puts into workspace.segments all segments of the tree within `reach` of `p`, each once, and maybe others;
+  // looked for outward from `near`.
   //
   // REQUIRES:   p in the box.
   // Complexity: that of looking into the leaves within reach.
