@@ -196,9 +196,10 @@ absl::StatusOr<std::vector<DomainMesher::Subsegment>> DomainMesher::MakeTriangle
   const double no_time = 0;
   const Stopwatch stopwatch(figures_.simplices_seconds, no_time);
   numbering_.Extend(structure_.vertex_count());
-  WELLSPACE_ASSIGN_OR_RETURN(
-      DomainSimplices triangles,
-      ComputeDomainSimplices(structure_, *planar_, chains, numbering_.output_index(), threads, context));
+  WELLSPACE_ASSIGN_OR_RETURN(DomainSimplices triangles,
+                             ComputeDomainSimplices(
+                                 structure_, *planar_, chains, refinement_->stars(),
+                                 [this] { refinement_->DropStars(); }, numbering_.output_index(), threads, context));
   figures_.star_queries.Add(triangles.simplices.counters);
   std::vector<Subsegment> to_split;
   for (const uint32_t at : triangles.broken) {
@@ -321,15 +322,22 @@ absl::StatusOr<Mesh> DomainMesher::Extract(int threads, RunContext& context) {
   mesh.dimension = 2;
   mesh.domain_low.assign(mesh_box_.low.begin(), mesh_box_.low.end());
   mesh.domain_high.assign(mesh_box_.high.begin(), mesh_box_.high.end());
+  if (made_->AreTrianglesTaken()) {  // by an earlier mesh
+    WELLSPACE_ASSIGN_OR_RETURN(const std::vector<Subsegment> broken, MakeTriangles(made_->chains, threads, context));
+    if (!broken.empty()) {
+      return absl::InternalError("a subsegment is no longer an edge");
+    }
+  }
   WELLSPACE_ASSIGN_OR_RETURN(mesh.points, numbering_.PointsFrom(structure_, domain_, 0, context));
   mesh.input_vertex = numbering_.input_vertex();
   SetOrigins(mesh);
-  const Simplices& simplices = made_->triangles.simplices;
-  mesh.simplices = simplices.indices;
+  DomainSimplices triangles = std::exchange(made_->triangles, {});
+  Simplices& simplices = triangles.simplices;
+  mesh.simplices = std::move(simplices.indices);
   mesh.statistics.max_radius_edge = simplices.max_radius_edge;
   mesh.statistics.min_angle_deg = simplices.min_angle_deg;
   SetBoundary(mesh);
-  SetRegions(mesh);
+  SetRegions(mesh, triangles.faces);
   WELLSPACE_RETURN_IF_ERROR(context.Check());
   context.EnterPhase(Phase::kDone);
   figures_.simplices_seconds += absl::ToDoubleSeconds(context.TimeIn(Phase::kSimplices));
@@ -396,8 +404,8 @@ void DomainMesher::SetBoundary(Mesh& mesh) const {
   }
 }
 
-// The region of each triangle: that of its face.
-void DomainMesher::SetRegions(Mesh& mesh) const {
+// The region of each triangle: that of its face, which `faces_of` has.
+void DomainMesher::SetRegions(Mesh& mesh, std::span<const uint32_t> faces_of) const {
   std::set<int64_t> values;
   for (const Face& face : planar_->faces().faces) {
     if (face.is_meshed) {
@@ -414,7 +422,7 @@ void DomainMesher::SetRegions(Mesh& mesh) const {
   }
   if (regions.size() > 1) {
     mesh.simplex_regions.reserve(mesh.simplex_count());
-    for (const uint32_t face : made_->triangles.faces) {
+    for (const uint32_t face : faces_of) {
       mesh.simplex_regions.push_back(ids.at(planar_->faces().faces[face].region));
     }
   }

@@ -61,7 +61,9 @@ class DomainMesher final : public Mesher {
   // What the last refinement has made.
   struct Made {
     PlanarDomain::Chains chains;
-    DomainSimplices triangles;
+    DomainSimplices triangles;  // none once a mesh has taken them
+
+    bool AreTrianglesTaken() const { return triangles.faces.empty(); }
   };
 
   void NumberPoints(const DomainCloud& made, std::span<const double> points);
@@ -73,7 +75,7 @@ class DomainMesher final : public Mesher {
   void NoteAddedFrom(uint32_t first);
   void SetOrigins(Mesh& mesh) const;
   void SetBoundary(Mesh& mesh) const;
-  void SetRegions(Mesh& mesh) const;
+  void SetRegions(Mesh& mesh, std::span<const uint32_t> faces_of) const;
   uint64_t CountExempt(const Mesh& mesh) const;
   void SetStatistics(Mesh& mesh) const;
 

@@ -63,6 +63,16 @@ class Polygon : public FloatCell<2> {
   bool PlaceUnlessKeeps(double ratio);
   bool Reaches(const Box<2>& cube) const;
   void FindStar(Star<2>& out) const;
+  // Whether surely no node lies beyond the line through `foot`, relative to the site, at a right angle to the way
+  // there. The nodes need not be placed.
+  bool IsSurelyBefore(const Point<2>& foot) const;
+  // Calls f(plane) with that of each edge, one after the other around the site, placed or not.
+  template <typename F>
+  void ForEachEdge(F f) const {
+    for (size_t i = 0; i < count_; ++i) {
+      f(planes_[PlaneFrom(i)]);
+    }
+  }
   uint64_t MemoryBytes() const;
 
  private:

@@ -159,6 +159,22 @@ std::optional<Sign> FilterOrientation(const Simplex<D>& simplex) {
                      D + ExpansionRoundings(D));
 }
 
+// The same in the plane without scaling, where the sign is clear, and nothing that counts underflows or overflows.
+std::optional<Sign> GlanceOrientation(const Simplex<2>& simplex) {
+  const double left = (simplex[1][0] - simplex[0][0]) * (simplex[2][1] - simplex[0][1]);
+  const double right = (simplex[1][1] - simplex[0][1]) * (simplex[2][0] - simplex[0][0]);
+  const double determinant = left - right;
+  const double permanent = std::abs(left) + std::abs(right);
+  // Two roundings of differences, one of a product, and one of their difference, each 2^-53: less than half of this.
+  constexpr double kRoundings = 0x1p-50;
+  constexpr double kLeast = 0x1p-900;  // beside it what underflows is nothing
+  if (!(std::abs(determinant) > kRoundings * permanent && permanent > kLeast &&
+        permanent < std::numeric_limits<double>::infinity())) {
+    return std::nullopt;
+  }
+  return determinant > 0 ? Sign::kPositive : Sign::kNegative;
+}
+
 template <int D>
 std::optional<Sign> FilterInSphere(const Simplex<D>& simplex, const Point<D>& q) {
   const std::array<Point<D>, D + 1> differences = ScaledDifferences<D, D + 1>(simplex, q).points;
@@ -294,6 +310,11 @@ BigInteger NormSq(const std::array<BigInteger, N>& row) {
 
 template <int D>
 MeasuredSign Orientation(const Simplex<D>& simplex) {
+  if constexpr (D == 2) {
+    if (const std::optional<Sign> sign = GlanceOrientation(simplex)) {
+      return {*sign, Stage::kFilter};
+    }
+  }
   if (const std::optional<Sign> sign = FilterOrientation<D>(simplex)) {
     return {*sign, Stage::kFilter};
   }

@@ -307,9 +307,7 @@ void Refinement<D>::Finish(VertexId v, const Assessment& found, int bucket, Step
     pending_.ScheduleLater(v, found, bucket, rules_->ClipRadius(EdgeLimitSq(bucket)));
     return;
   }
-  if (domain_ == nullptr) {
-    stars_.Write(v, steps.FindStar(stars_), structure_.vertex_count());
-  }
+  stars_.Write(v, steps.FindStar(stars_), structure_.vertex_count());
   if (pending_.HasToNotify(v)) {
     pending_.Notify(v, found, steps.Notices());
   }

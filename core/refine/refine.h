@@ -95,6 +95,9 @@ class Refinement {
   // first run for these criteria.
   const StarLists<D>& stars() const { return stars_.lists(); }
 
+  // Forgets the simplices; none are listed until all vertices are scheduled again.
+  void DropStars() { stars_.GiveUp(); }
+
   // What threads have speculated on in all runs.
   const SpeculationCounts& speculation() const { return rounds_.counts(); }
 

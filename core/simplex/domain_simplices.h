@@ -9,12 +9,14 @@
 #include <utility>
 #include <vector>
 
+#include "absl/functional/function_ref.h"
 #include "absl/status/statusor.h"
 #include "core/base/memory/huge_pages.h"
 #include "core/base/run_context.h"
 #include "core/refine/domain/planar_domain.h"
 #include "core/simplex/simplices.h"
 #include "core/voronoi/query_structure.h"
+#include "core/voronoi/star_lists.h"
 
 namespace wellspace::core {
 
@@ -27,17 +29,21 @@ struct DomainSimplices {
 };
 
 // The Delaunay triangles of all vertices in the faces of `domain` that are meshed, in the order of the vertices along
-// the Z curve. Which face a triangle is in follows from the order of the neighbours around its lowest vertex: no point
-// is located, and no sign computed.
+// the Z curve: those that `star_lists` has, if these are complete, and turn out to be exactly the triangles of the
+// domain; else by the cells of all vertices. Which face a triangle is in follows from subsegments at it, or from the
+// order of the neighbours around a vertex: no point is located. Calls drop_stars() when the lists are needed no more,
+// so that they can give up their memory; not if they have not been of use.
 //
 // Shapes:     output_index: as for ComputeSimplices.
-// REQUIRES:   `structure` refined in `domain`; `chains` those of the domain.
+// REQUIRES:   `structure` refined in `domain`; `chains` those of the domain; `star_lists` of that refinement.
 // Complexity: O(m) for m vertices.
 // Errors:     as ComputeSimplices.
 // Threads:    uses `threads`, at most as many as the machine has cores.
 // Source:     docs/design/features.md.
 absl::StatusOr<DomainSimplices> ComputeDomainSimplices(const QueryStructure<2>& structure, const PlanarDomain& domain,
                                                        const PlanarDomain::Chains& chains,
+                                                       const StarLists<2>& star_lists,
+                                                       absl::FunctionRef<void()> drop_stars,
                                                        std::span<const uint32_t> output_index, int threads,
                                                        RunContext& context);
 

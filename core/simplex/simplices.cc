@@ -18,6 +18,7 @@
 #include "core/base/sort_few.h"
 #include "core/base/status_macros.h"
 #include "core/base/thread_team.h"
+#include "core/simplex/listed_stars.h"
 #include "core/simplex/simplex_list.h"
 #include "core/tree/leaf_blocks.h"
 
@@ -222,8 +223,7 @@ absl::StatusOr<Simplices> JoinCells(const QueryStructure<D>& structure, std::spa
       [](const Workspace<D>& workspace) { return workspace.counters; });
 }
 
-// The simplices at one vertex after the other, of those that are listed there the ones that are in the mesh: the vertex
-// is the last of them to have been looked at, and no vertex that came later spoils them.
+// The simplices of one vertex after the other that are in the mesh, of those that are listed there.
 //
 // Thread safety: thread-compatible.
 template <int D>
@@ -232,78 +232,26 @@ class ListedSimplices {
   // All arguments must outlive it.
   ListedSimplices(const QueryStructure<D>& structure, const StarLists<D>& stars, const StaleStars& stale,
                   std::span<const uint32_t> output_index)
-      : structure_(structure), stars_(stars), stale_(stale), output_index_(output_index) {}
+      : structure_(structure), stars_(structure, stars, stale), output_index_(output_index) {}
 
   // Appends those of `v`, in an order that does not depend on how cells were computed.
   void Append(VertexId v, SimplexList<D>& out) {
-    const auto listed = stars_.Of(v);
-    ++counters_.queries;
-    counters_.vertices += D * listed.size();
-    rows_.resize(listed.size());
-    size_t count = 0;
-    for (const Row& row : listed) {
-      // No branch, since it could not be predicted.
-      rows_[count] = row;
-      uint32_t is_last = 1;
-      for (const VertexId u : row) {
-        is_last &= stars_.WasLookedAtBefore(u, v) ? 1 : 0;
-      }
-      count += is_last;
-    }
-    rows_.resize(count);
-    if (const auto stale = stale_.At(v); !stale.empty()) {
-      std::erase_if(rows_, [&](const Row& row) { return IsSpoiled(v, row, stale); });
-    }
-    for (Row& row : rows_) {
+    auto& rows = stars_.Find(v);
+    for (auto& row : rows) {
       SortFew(row);
     }
-    std::sort(rows_.begin(), rows_.end());
-    for (const Row& row : rows_) {
+    std::sort(rows.begin(), rows.end());
+    for (const auto& row : rows) {
       AppendSimplex<D>(structure_, v, row, output_index_, out);
     }
   }
 
-  // What its scratch takes in memory.
-  uint64_t MemoryBytes() const { return rows_.capacity() * sizeof(Row); }
-  // Queries are stars.
-  const QueryCounters& counters() const { return counters_; }
+  const ListedStars<D>& stars() const { return stars_; }
 
  private:
-  using Row = std::array<VertexId, D>;  // the other vertices of a simplex
-
-  // Whether the ball through `v` and `others` holds one of the vertices that make the list of v stale; ties as in
-  // cells.
-  bool IsSpoiled(VertexId v, const Row& others, std::span<const StalePair> stale) {
-    Simplex<D> simplex;
-    simplex[D] = structure_.point(v);
-    for (int k = 0; k < D; ++k) {
-      simplex[k] = structure_.point(others[k]);
-    }
-    const Sign orientation = Orientation<D>(simplex).sign;
-    return std::any_of(stale.begin(), stale.end(), [&](const StalePair& pair) {
-      const Point<D>& u = structure_.point(pair.second);
-      ++counters_.cuts;
-      const MeasuredSign inside = InSphere<D>(simplex, u);
-      counters_.decisions.exact += inside.stage == Stage::kFilter ? 0 : 1;
-      return (inside.sign == Sign::kZero ? IsInsideOnTie(simplex, u) : inside.sign * orientation) == Sign::kPositive;
-    });
-  }
-
-  Sign IsInsideOnTie(const Simplex<D>& simplex, const Point<D>& u) {
-    std::array<PlaneSource<D>, D> planes;
-    for (int k = 0; k < D; ++k) {
-      planes[k].generator = simplex[k];
-    }
-    ++counters_.decisions.perturbed;
-    return DecideCut<D>(simplex[D], planes, u, TieRule::kPerturb).sign;
-  }
-
   const QueryStructure<D>& structure_;
-  const StarLists<D>& stars_;
-  const StaleStars& stale_;
+  ListedStars<D> stars_;
   const std::span<const uint32_t> output_index_;
-  std::vector<Row> rows_;
-  QueryCounters counters_;
 };
 
 }  // namespace
@@ -345,8 +293,8 @@ absl::StatusOr<Simplices> ComputeSimplices(const QueryStructure<D>& structure, c
   };
   return JoinBlocks<D, Listed>(
       blocks.count(), held_bytes + stale.MemoryBytes(), threads, context, append,
-      [](const Listed& listed) { return listed->MemoryBytes(); },
-      [](const Listed& listed) { return listed->counters(); });
+      [](const Listed& listed) { return listed->stars().MemoryBytes(); },
+      [](const Listed& listed) { return listed->stars().counters(); });
 }
 
 template <int D>

@@ -31,6 +31,7 @@ class SegmentLists {
   static constexpr size_t kCapacity = 8;
 
   bool IsEmpty() const { return segments_.empty(); }
+  size_t count() const { return segments_.size(); }
 
   // Lists these segments at node 0, if there are any, and none elsewhere.
   void Begin(std::vector<Ends> segments) {

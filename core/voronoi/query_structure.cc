@@ -246,7 +246,18 @@ void QueryStructure<D>::BeginWalk(Workspace<D>& workspace) const {
   workspace.seen.resize(tree_.node_count(), 0);
   if (++workspace.query == 0) {
     std::fill(workspace.seen.begin(), workspace.seen.end(), 0);
+    std::fill(workspace.seen_segments.begin(), workspace.seen_segments.end(), 0);
     workspace.query = 1;
+  }
+}
+
+// Appends the segments that meet `leaf` to those of the workspace, but for those which this query has met.
+template <int D>
+void QueryStructure<D>::ListSegmentsOf(NodeId leaf, Workspace<D>& workspace) const {
+  for (const uint32_t segment : tree_.segments().Of(leaf)) {
+    if (std::exchange(workspace.seen_segments[segment], workspace.query) != workspace.query) {
+      workspace.segments.push_back(segment);
+    }
   }
 }
 
@@ -384,15 +395,11 @@ Neighbor QueryStructure<D>::FindBeyond(const Point<D>& p, NodeId leaf, Neighbor 
 
 template <int D>
 void QueryStructure<D>::SegmentsWithin(const Point<D>& p, double reach, VertexId near, Workspace<D>& workspace) const {
-  const SegmentLists& segments = tree_.segments();
   workspace.segments.clear();
+  workspace.seen_segments.resize(tree_.segments().count());
   ScanOutward(
       p, tree_.LeafHolding(CommittedNear(near), p), workspace, [&] { return reach * reach; },
-      [](NodeId) { return true; },
-      [&](NodeId leaf) {
-        const std::span<const uint32_t> listed = segments.Of(leaf);
-        workspace.segments.insert(workspace.segments.end(), listed.begin(), listed.end());
-      });
+      [](NodeId) { return true; }, [&](NodeId leaf) { ListSegmentsOf(leaf, workspace); });
 }
 
 template <int D>
@@ -504,12 +511,14 @@ void QueryStructure<D>::Scan(VertexId v, Workspace<D>& workspace, const ExtraVer
   const NodeId own = LeafOf(v);
   [[maybe_unused]] const bool has_segments = !tree_.segments().IsEmpty();
   workspace.segments.clear();
+  if (has_segments) {
+    workspace.seen_segments.resize(tree_.segments().count());
+  }
   ScanFor(own, workspace, [&](NodeId leaf) {
     CutByLeaf(leaf, v, workspace);
     if constexpr (D == 2) {
       if (has_segments) {
-        const std::span<const uint32_t> segments = tree_.segments().Of(leaf);
-        workspace.segments.insert(workspace.segments.end(), segments.begin(), segments.end());
+        ListSegmentsOf(leaf, workspace);
       }
     }
     if (leaf == own) {

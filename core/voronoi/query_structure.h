@@ -43,10 +43,11 @@ struct Workspace {
   Polytope<D> cell;
   QueryCounters counters;
   // The segments that meet the leaves which were opened for the cell, or, of SegmentsWithin, those that are in reach;
-  // an item may be there more than once. Only where the tree lists segments.
+  // each once. Only where the tree lists segments.
   std::vector<uint32_t> segments;
   // Private to the queries.
-  HugeVector<uint32_t> seen;  // by tree node: the query that last met it
+  HugeVector<uint32_t> seen;           // by tree node: the query that last met it
+  HugeVector<uint32_t> seen_segments;  // by segment, the same
   uint32_t query = 0;
   LeafQueue::Memory queued_leaves;
   GatheredVertices<D> gathered;        // while cells of several vertices are computed
@@ -129,8 +130,8 @@ class QueryStructure {
   // Errors:     none.
   Neighbor NearestTo(const Point<D>& p, VertexId near, Workspace<D>& workspace) const;
 
-  // Puts into workspace.segments all segments of the tree within `reach` of `p`, some of them more than once, and maybe
-  // others; looked for outward from `near`.
+  // Puts into workspace.segments all segments of the tree within `reach` of `p`, each once, and maybe others;
+  // looked for outward from `near`.
   //
   // REQUIRES:   p in the box.
   // Complexity: that of looking into the leaves within reach.
@@ -277,6 +278,7 @@ class QueryStructure {
   VertexId CommittedNear(VertexId near) const;
   NodeId LeafOf(VertexId v) const;
   void BeginWalk(Workspace<D>& workspace) const;
+  void ListSegmentsOf(NodeId leaf, Workspace<D>& workspace) const;
   // Calls open(leaf) for leaves outward from `own`, which holds `site`: as long as reach_sq() says for those whose
   // distance allows it, and wants(leaf) agrees.
   template <typename ReachSq, typename Wants, typename Open>

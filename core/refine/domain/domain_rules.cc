@@ -24,6 +24,28 @@ bool CrossEachOther(const Point<2>& p, const Point<2>& q, const Point<2>& a, con
          Cross(along, Difference<2>(p, a)) * Cross(along, Difference<2>(q, a)) < 0;
 }
 
+// The faces around a vertex, by direction.
+class FacesAround {
+ public:
+  // REQUIRES:   `domain` outlives this.
+  FacesAround(const PlanarDomain& domain, VertexId v) : domain_(domain), ways_(domain.WaysFrom(v)) {
+    const std::vector<uint32_t>& left_face = domain.faces().left_face;
+    first_ = ways_.empty() ? domain.FaceOf(v) : left_face[ways_[0]];
+    are_equal_ = std::all_of(ways_.begin(), ways_.end(), [&](HalfEdge h) { return left_face[h] == first_; });
+  }
+
+  // That of the sector which `d` leads into.
+  uint32_t Toward(const Point<2>& d) const {
+    return are_equal_ ? first_ : domain_.faces().left_face[ways_[domain_.SectorToward(ways_, d)]];
+  }
+
+ private:
+  const PlanarDomain& domain_;
+  const std::span<const HalfEdge> ways_;
+  uint32_t first_ = 0;
+  bool are_equal_ = false;
+};
+
 }  // namespace
 
 double DomainRules::NearestSegmentSq(VertexId v, double limit_sq, Workspace<2>& workspace) const {
@@ -123,16 +145,25 @@ DomainRules::Bound DomainRules::BoundOf(const Polytope<2>& cell, const CellNode<
 
 DomainAssessment DomainRules::AssessCell(VertexId v, Polytope<2>& cell, std::span<const uint32_t> segments,
                                          double edge_limit_sq, std::span<const NodeName> refused) const {
-  cell.Place();
   DomainAssessment result;
+  const bool keeps_ratio = cell.KeepsRatio(plain_ratio_);
+  if (keeps_ratio && !MayMeetAny(domain(), v, cell, segments)) {
+    result.is_plain = true;
+    return result;
+  }
+  cell.Place();
   result.met = NearestMet(domain(), v, cell, segments);
   result.is_segment_encroached = result.met.IsThere();
+  if (keeps_ratio) {
+    return result;  // no node is on the clip, or bad
+  }
+  const FacesAround around(domain(), v);
   const double rho_sq = rules_.criteria().rho * rules_.criteria().rho;
   std::tuple<double, NodeName, Point<2>> best;  // of the bad node; its place, since some on the clip have no name
   for (size_t i = 0; i < cell.nodes().size(); ++i) {
     const CellNode<2>& node = cell.nodes()[i];
     const NodeView view(cell, node);
-    const uint32_t face = domain().FaceOfSector(v, domain().SectorToward(v, view.toward));
+    const uint32_t face = around.Toward(view.toward);
     if (!domain().faces().IsMeshed(face)) {
       continue;
     }
@@ -191,16 +222,20 @@ InsertionRequest<2> DomainRules::RequestAt(VertexId v, const PlaceInDomain& plac
 }
 
 // The point that the bad node asks for, in the sector of its triangle if it can be; workspace.segments has the segments
-// that are nearer to it than any vertex, whatever the leaves of the tree.
-SteinerPoint<2> DomainRules::CandidateIn(size_t sector, VertexId v, const Polytope<2>& cell, const Assessment& found,
+// that are nearer to it than any vertex, whatever the leaves of the tree: the ball about a point of a cell that touches
+// its site is covered by those about the nodes, so that leaves it meets have been opened for the cell. That is the own
+// one, for which `segments` are listed, or the one of cell_of, for which they are in the workspace.
+SteinerPoint<2> DomainRules::CandidateIn(size_t sector, VertexId v, const Polytope<2>& cell,
+                                         std::span<const uint32_t> segments, const Assessment& found,
                                          bool is_at_segment, double edge_limit_sq, StepRules<2>::CellOf cell_of,
                                          Workspace<2>& workspace) const {
   const auto find_segments = [&](const SteinerPoint<2>& point) {
-    structure().SegmentsWithin(point.position, kBeyond * std::sqrt(point.empty_radius_sq), v, workspace);
+    workspace.segments.insert(workspace.segments.end(), segments.begin(), segments.end());
     std::erase_if(workspace.segments, [&](uint32_t segment) {
       return domain().DistanceSqTo(point.position, segment) > point.empty_radius_sq;
     });
   };
+  workspace.segments.clear();
   SteinerPoint<2> candidate = rules_.CandidateFor(v, cell, found, is_at_segment, edge_limit_sq, cell_of);
   find_segments(candidate);
   const bool is_beyond = std::any_of(workspace.segments.begin(), workspace.segments.end(), [&](uint32_t s) {
@@ -210,6 +245,7 @@ SteinerPoint<2> DomainRules::CandidateIn(size_t sector, VertexId v, const Polyto
   if (is_beyond || !LeadsInto(v, sector, candidate.position)) {
     // It is in the cell of another vertex, beyond a segment: a point of this cell takes its place.
     candidate = rules_.OffCenterFor(cell, found, is_at_segment);
+    workspace.segments.clear();
     find_segments(candidate);
   }
   return candidate;
@@ -232,9 +268,9 @@ SegmentPoint DomainRules::YieldPlace(const SteinerPoint<2>& candidate, VertexId 
   return place;
 }
 
-DomainRules::Answer DomainRules::NextRequest(VertexId v, const Polytope<2>& cell, const DomainAssessment& found,
-                                             double edge_limit_sq, StepRules<2>::CellOf cell_of,
-                                             Workspace<2>& workspace) const {
+DomainRules::Answer DomainRules::NextRequest(VertexId v, const Polytope<2>& cell, std::span<const uint32_t> segments,
+                                             const DomainAssessment& found, double edge_limit_sq,
+                                             StepRules<2>::CellOf cell_of, Workspace<2>& workspace) const {
   Answer answer;
   if (found.met.IsThere()) {  // rule 1
     answer.request = RequestAt(v, SplitPlace(visible_, v, found.met), edge_limit_sq, workspace);
@@ -246,7 +282,7 @@ DomainRules::Answer DomainRules::NextRequest(VertexId v, const Polytope<2>& cell
   const NodeView view(cell, cell.nodes()[found.bad_node]);
   const size_t sector = domain().SectorToward(v, view.toward);
   const SteinerPoint<2> candidate =
-      CandidateIn(sector, v, cell, found, IsAtSegment(v, view), edge_limit_sq, cell_of, workspace);
+      CandidateIn(sector, v, cell, segments, found, IsAtSegment(v, view), edge_limit_sq, cell_of, workspace);
   double distance_sq = 0;
   const SegmentPoint place =
       YieldPlace(candidate, v, LeadsInto(v, sector, candidate.position), workspace.segments, distance_sq);

@@ -50,7 +50,9 @@ class DomainRules {
   // REQUIRES:   all references outlive this.
   DomainRules(const QueryStructure<2>& structure, const PlanarDomain& domain, const StepRules<2>& rules,
               const ExpectedVertices* expected = nullptr)
-      : visible_(structure, domain, expected), rules_(rules) {}
+      : visible_(structure, domain, expected),
+        rules_(rules),
+        plain_ratio_(rules.criteria().sizes.IsUnbounded() && !domain.HasAreaBounds() ? rules.criteria().rho : 0) {}
 
   // How far `v` is from the nearest segment that it is not on, squared, if that is less than `limit_sq`; else that. By
   // it a vertex comes into its first bucket.
@@ -58,23 +60,26 @@ class DomainRules {
   // Complexity: that of a query.
   double NearestSegmentSq(VertexId v, double limit_sq, Workspace<2>& workspace) const;
 
-  // What is wrong with the cell of `v`, whose nodes are placed; `segments` has all that meet it. What a cell is beyond
-  // the segments of v, on sides that are not meshed, does not count. Nodes in `refused` ask for nothing.
+  // What is wrong with the cell of `v`, whose nodes are placed unless it is plainly good; `segments` has all that meet
+  // it. What a cell is beyond the segments of v, on sides that are not meshed, does not count. Nodes in `refused` ask
+  // for nothing.
   //
   // Complexity: O(nodes segments).
   DomainAssessment AssessCell(VertexId v, Polytope<2>& cell, std::span<const uint32_t> segments, double edge_limit_sq,
                               std::span<const NodeName> refused) const;
 
   // The insertion that `cell`, that of `v`, asks for by what was found; or the node that is refused, after which the
-  // cell has to be assessed again; none of both if nothing is asked for.
+  // cell has to be assessed again; none of both if nothing is asked for. `segments` as in AssessCell; cell_of computes
+  // cells in `workspace`.
   //
   // Complexity: O(nodes), a few queries, and the cell of cell_of.
   struct Answer {
     std::optional<InsertionRequest<2>> request;
     std::optional<NodeName> refused;
   };
-  Answer NextRequest(VertexId v, const Polytope<2>& cell, const DomainAssessment& found, double edge_limit_sq,
-                     StepRules<2>::CellOf cell_of, Workspace<2>& workspace) const;
+  Answer NextRequest(VertexId v, const Polytope<2>& cell, std::span<const uint32_t> segments,
+                     const DomainAssessment& found, double edge_limit_sq, StepRules<2>::CellOf cell_of,
+                     Workspace<2>& workspace) const;
 
  private:
   // The squared distance from the site that a node must not exceed.
@@ -94,9 +99,9 @@ class DomainRules {
 
   // What is inserted for a node that counts.
   bool IsAtSegment(VertexId v, const NodeView& node) const;
-  SteinerPoint<2> CandidateIn(size_t sector, VertexId v, const Polytope<2>& cell, const Assessment& found,
-                              bool is_at_segment, double edge_limit_sq, StepRules<2>::CellOf cell_of,
-                              Workspace<2>& workspace) const;
+  SteinerPoint<2> CandidateIn(size_t sector, VertexId v, const Polytope<2>& cell, std::span<const uint32_t> segments,
+                              const Assessment& found, bool is_at_segment, double edge_limit_sq,
+                              StepRules<2>::CellOf cell_of, Workspace<2>& workspace) const;
   // Whether the way from `v` to `p` begins in a sector.
   bool LeadsInto(VertexId v, size_t sector, const Point<2>& p) const {
     return domain().SectorToward(v, Difference<2>(p, structure().point(v))) == sector;
@@ -110,6 +115,7 @@ class DomainRules {
 
   const VisibleDomain visible_;
   const StepRules<2>& rules_;
+  const double plain_ratio_;  // rho, where nothing else is asked of triangles; else 0
 };
 
 }  // namespace wellspace::core

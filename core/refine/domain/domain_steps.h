@@ -22,11 +22,10 @@
 
 namespace wellspace::core {
 
-// As CellSteps, whose functions it has; segments take the place of faces of the box. Three things differ:
+// As CellSteps, whose functions it has; segments take the place of faces of the box. Two things differ:
 // - A node may be refused by the rules. Then the cell is assessed again, without it, before the next request is looked
 //   for; what was found before no longer holds (Reassessed).
 // - All neighbours get a notice, and no nodes are watched.
-// - No simplices are listed: which face they lie in is found in the end (ComputeDomainSimplices).
 //
 // Thread safety: as CellSteps.
 template <typename Cells>
@@ -56,16 +55,11 @@ class DomainSteps {
     return workspace_.notices;
   }
   void AppendNotices(std::vector<NeighborNotice>& notices) {
-    const auto nodes = std::span(cell().nodes());
-    for (size_t i = 0; i < nodes.size(); ++i) {
-      for (const size_t k : {0, 1}) {
-        // Of the two nodes of an edge one tells of it.
-        const Plane<2>& plane = cell().plane(nodes[i].planes[1 - k]);
-        if (plane.kind == PlaneKind::kBisector && nodes[i].neighbours[k] > i) {
-          notices.push_back({plane.vertex, 2 * plane.offset, true});
-        }
+    cell().ForEachEdge([&](const Plane<2>& plane) {
+      if (plane.kind == PlaneKind::kBisector) {
+        notices.push_back({plane.vertex, 2 * plane.offset, true});
       }
-    }
+    });
   }
 
   const InsertionRequest<2>* NextRequest() {
@@ -74,7 +68,8 @@ class DomainSteps {
     };
     is_reassessed_ = false;
     while (true) {
-      DomainRules::Answer answer = rules_.NextRequest(v_, cell(), found_, edge_limit_sq_, cell_of, workspace_.other);
+      DomainRules::Answer answer =
+          rules_.NextRequest(v_, cell(), workspace_.own.segments, found_, edge_limit_sq_, cell_of, workspace_.other);
       request_ = answer.request;
       if (!answer.refused.has_value()) {
         return request_.has_value() ? &*request_ : nullptr;
@@ -90,8 +85,16 @@ class DomainSteps {
   std::span<const WatchedNode<2>> NodesToWatch() { return {}; }
   void AppendNodesToWatch(std::vector<WatchedNode<2>>& /*watched*/) {}
 
-  typename StarWriter<2>::Simplices FindStar(StarWriter<2>& /*stars*/) { return {}; }
-  void FindStar(Star<2>& star) { star.clear(); }
+  // As CellSteps: all triangles in faces that are meshed, and those of others within the clip.
+  typename StarWriter<2>::Simplices FindStar(StarWriter<2>& stars) {
+    if (!stars.NeedsStars()) {
+      return {};
+    }
+    Star<2>& star = stars.Room();
+    FindStar(star);
+    return star;
+  }
+  void FindStar(Star<2>& star) { cell().FindStar(star); }
 
   const Assessment* Reassessed() const { return is_reassessed_ ? &found_ : nullptr; }
 

@@ -29,42 +29,70 @@ bool AreBeside(const Polytope<2>& cell, const Point<2>& from, const Point<2>& al
   return least > rounding || most < -rounding;
 }
 
+// A segment, seen from the site of a cell.
+struct SeenSegment {
+  Point<2> from;   // its end a
+  Point<2> along;  // from there, of length 1
+  double length = 0;
+  double away = 0;  // of the line from the site, with a sign
+  double foot = 0;  // how far along the point nearest to the site is
+
+  // Looks at `segment`; false if it is beyond the reach of `cell`, and what is here makes no sense.
+  bool LookAt(const PlanarDomain& domain, const Polytope<2>& cell, uint32_t segment) {
+    const Point<2>& a = domain.EndOf(segment, false);
+    length = domain.LengthOf(segment);
+    from = Difference<2>(a, cell.site());
+    along = Difference<2>(domain.EndOf(segment, true), a);
+    away = Cross(along, from) / length;
+    const double reach_sq = cell.reach_sq();
+    if (away * away > kBeyond * reach_sq) {
+      return false;
+    }
+    along = {along[0] / length, along[1] / length};
+    foot = std::clamp(-Dot<2>(from, along), 0.0, length);
+    return NormSq<2>({from[0] + foot * along[0], from[1] + foot * along[1]}) <= reach_sq;
+  }
+
+  // What is rounded of places on the segment beside a cell of that reach, and more.
+  double RoundingIn(const Polytope<2>& cell) const {
+    return kLeastPart * (std::abs(from[0]) + std::abs(from[1]) + std::sqrt(cell.reach_sq()));
+  }
+
+  // Whether the cell, whose nodes need not be placed, may reach the line so far that AreBeside says no.
+  bool MayCross(const Polytope<2>& cell) const {
+    const double share = 1 - 2 * RoundingIn(cell) / std::abs(away);
+    return !(share > 0 && cell.IsSurelyBefore({-share * away * along[1], share * away * along[0]}));
+  }
+};
+
 // The part of `segment` that `cell` meets: cut by all planes of the cell.
 MetPart MeetSegment(const PlanarDomain& domain, const Polytope<2>& cell, uint32_t segment) {
-  const Point<2>& a = domain.EndOf(segment, false);
-  const double length = domain.LengthOf(segment);
-  const Point<2> from = Difference<2>(a, cell.site());
-  Point<2> along = Difference<2>(domain.EndOf(segment, true), a);
-  const double away = Cross(along, from) / length;  // of the line
   MetPart part;
-  if (away * away > kBeyond * cell.reach_sq()) {
+  SeenSegment seen;
+  if (!seen.LookAt(domain, cell, segment) || !seen.MayCross(cell)) {
     return part;
   }
-  along = {along[0] / length, along[1] / length};
-  const double foot = std::clamp(-Dot<2>(from, along), 0.0, length);
-  const Point<2> nearest = {from[0] + foot * along[0], from[1] + foot * along[1]};
-  if (NormSq<2>(nearest) > cell.reach_sq()) {
-    return part;
-  }
+  const auto& [from, along, length, away, foot] = seen;
   if (AreBeside(cell, from, along)) {
     return part;
   }
   double low = 0;
   double high = length;
-  for (const CellNode<2>& node : cell.nodes()) {
-    for (const uint16_t index : node.planes) {
-      const Plane<2>& plane = cell.plane(index);
-      const double outward = plane.kind == PlaneKind::kBisector || plane.face % 2 == 1 ? 1 : -1;
-      const double slope = outward * Dot<2>(plane.normal, along);
-      const double gap = outward * (plane.offset - Dot<2>(plane.normal, from));
-      if (slope > 0) {
-        high = std::min(high, gap / slope);
-      } else if (slope < 0) {
-        low = std::max(low, gap / slope);
-      } else if (gap < 0) {
-        return part;
-      }
+  bool is_beyond = false;
+  cell.ForEachEdge([&](const Plane<2>& plane) {
+    const double outward = plane.kind == PlaneKind::kBisector || plane.face % 2 == 1 ? 1 : -1;
+    const double slope = outward * Dot<2>(plane.normal, seen.along);
+    const double gap = outward * (plane.offset - Dot<2>(plane.normal, seen.from));
+    if (slope > 0) {
+      high = std::min(high, gap / slope);
+    } else if (slope < 0) {
+      low = std::max(low, gap / slope);
+    } else {
+      is_beyond = is_beyond || gap < 0;
     }
+  });
+  if (is_beyond) {
+    return part;
   }
   const double at = std::clamp(foot, low, std::max(low, high));
   const double distance = std::sqrt(NormSq<2>({from[0] + at * along[0], from[1] + at * along[1]}));
@@ -76,6 +104,13 @@ MetPart MeetSegment(const PlanarDomain& domain, const Polytope<2>& cell, uint32_
 }
 
 }  // namespace
+
+bool MayMeetAny(const PlanarDomain& domain, VertexId v, const Polytope<2>& cell, std::span<const uint32_t> segments) {
+  SeenSegment seen;
+  return std::any_of(segments.begin(), segments.end(), [&](uint32_t segment) {
+    return !domain.IsOn(v, segment) && seen.LookAt(domain, cell, segment) && seen.MayCross(cell);
+  });
+}
 
 MetPart NearestMet(const PlanarDomain& domain, VertexId v, const Polytope<2>& cell,
                    std::span<const uint32_t> segments) {

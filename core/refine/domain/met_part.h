@@ -22,6 +22,12 @@ struct MetPart {
   bool IsThere() const { return segment != SegmentPoint::kNone; }
 };
 
+// Whether the `cell` of `v`, whose nodes need not be placed, may meet any of `segments` that v is not on: if not,
+// NearestMet finds none.
+//
+// Complexity: O(segments).
+bool MayMeetAny(const PlanarDomain& domain, VertexId v, const Polytope<2>& cell, std::span<const uint32_t> segments);
+
 // The part of the nearest of `segments` that `cell`, that of `v`, meets though v is not on it; of those that are as
 // near the one of the lowest number. A part that is no longer than what is rounded does not count.
 //

@@ -29,7 +29,9 @@ PlanarDomain::PlanarDomain(PlanarGraph graph, PlanarFaces faces)
     : graph_(std::move(graph)),
       faces_(std::move(faces)),
       has_small_angle_(2 * graph_.segments.size()),
-      splits_(graph_.segments.size()) {
+      splits_(graph_.segments.size()),
+      has_area_bounds_(std::any_of(faces_.faces.begin(), faces_.faces.end(),
+                                   [](const Face& face) { return !std::isinf(face.max_area); })) {
   for (uint32_t s = 0; s < segment_count(); ++s) {
     lengths_.push_back(Distance<2>(EndOf(s, false), EndOf(s, true)));
     ways_.push_back(HalfEdgeOf(s, false));
@@ -62,7 +64,8 @@ std::vector<SegmentLists::Ends> PlanarDomain::Ends() const {
 }
 
 void PlanarDomain::AddVertex(const SegmentPoint& place, uint32_t face) {
-  places_.push_back({place, face});
+  places_.push_back(place.IsOnSegment() ? InsertedPlace{place.segment, place.is_from_b ? 1u : 0u, place.distance}
+                                        : InsertedPlace{SegmentPoint::kNone, face, 0});
   if (place.IsOnSegment()) {
     splits_[place.segment].fetch_add(1, std::memory_order_relaxed);
   }
@@ -81,8 +84,7 @@ std::span<const HalfEdge> PlanarDomain::WaysFrom(VertexId v) const {
   return WaysFrom(PlaceOf(v));
 }
 
-size_t PlanarDomain::SectorToward(VertexId v, const Point<2>& d) const {
-  const std::span<const HalfEdge> ways = WaysFrom(v);
+size_t PlanarDomain::SectorToward(std::span<const HalfEdge> ways, const Point<2>& d) const {
   if (ways.size() < 2) {
     return 0;
   }
@@ -95,11 +97,6 @@ size_t PlanarDomain::SectorToward(VertexId v, const Point<2>& d) const {
     (PseudoAngleFrom(first, DirectionOf(ways[middle])) <= angle ? low : high) = middle;
   }
   return low;
-}
-
-bool PlanarDomain::IsOn(VertexId v, uint32_t segment) const {
-  return IsGraphPoint(v) ? EndVertex(segment, false) == v || EndVertex(segment, true) == v
-                         : PlaceOf(v).segment == segment;
 }
 
 double PlanarDomain::DistanceFromEnd(VertexId v, uint32_t segment, bool is_b) const {

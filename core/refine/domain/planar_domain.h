@@ -47,6 +47,9 @@ class PlanarDomain {
   uint32_t point_count() const { return static_cast<uint32_t>(graph_.points.size()); }
   uint32_t vertex_count() const { return point_count() + static_cast<uint32_t>(places_.size()); }
 
+  // Whether a face has a bound on areas.
+  bool HasAreaBounds() const { return has_area_bounds_; }
+
   // Segments.
 
   const Point<2>& EndOf(uint32_t segment, bool is_b) const { return graph_.points[Index(EndVertex(segment, is_b))]; }
@@ -121,19 +124,22 @@ class PlanarDomain {
   bool IsGraphPoint(VertexId v) const { return Index(v) < point_count(); }
   // Where `v` is on a segment; on none if it is an end of segments, or inside a face.
   SegmentPoint PlaceOf(VertexId v) const {
-    return IsGraphPoint(v) ? SegmentPoint() : places_[Index(v) - point_count()].place;
+    return IsGraphPoint(v) ? SegmentPoint() : places_[Index(v) - point_count()].OnSegment();
   }
   // Whether `v` is inside a face: on no segment, and an end of none.
   bool IsInFace(VertexId v) const {
     return IsGraphPoint(v) ? faces_.point_face[Index(v)] != PlanarFaces::kOnSegments
-                           : !places_[Index(v) - point_count()].place.IsOnSegment();
+                           : places_[Index(v) - point_count()].segment == SegmentPoint::kNone;
   }
   // REQUIRES:   IsInFace(v).
   uint32_t FaceOf(VertexId v) const {
-    return IsGraphPoint(v) ? faces_.point_face[Index(v)] : places_[Index(v) - point_count()].face;
+    return IsGraphPoint(v) ? faces_.point_face[Index(v)] : places_[Index(v) - point_count()].face_or_end;
   }
   // Whether `v` is on `segment`, or an end of it.
-  bool IsOn(VertexId v, uint32_t segment) const;
+  bool IsOn(VertexId v, uint32_t segment) const {
+    return IsGraphPoint(v) ? EndVertex(segment, false) == v || EndVertex(segment, true) == v
+                           : places_[Index(v) - point_count()].segment == segment;
+  }
   // How far `v`, which is on `segment` or an end of it, is from one of its ends.
   double DistanceFromEnd(VertexId v, uint32_t segment, bool is_b) const;
 
@@ -149,7 +155,9 @@ class PlanarDomain {
   }
   // The number of the sector at `v` that the direction `d` leads into, as of the way before it; one of the two, where
   // it leads along a segment. 0 for a vertex inside a face.
-  size_t SectorToward(VertexId v, const Point<2>& d) const;
+  size_t SectorToward(VertexId v, const Point<2>& d) const { return SectorToward(WaysFrom(v), d); }
+  // The same by the ways from a vertex.
+  size_t SectorToward(std::span<const HalfEdge> ways, const Point<2>& d) const;
   uint32_t FaceOfSector(VertexId v, size_t sector) const {
     const std::span<const HalfEdge> ways = WaysFrom(v);
     return ways.empty() ? FaceOf(v) : faces_.left_face[ways[sector]];
@@ -171,9 +179,15 @@ class PlanarDomain {
   uint64_t MemoryBytes() const;
 
  private:
+  // On a segment, or inside a face: there is one for every vertex.
   struct InsertedPlace {
-    SegmentPoint place;
-    uint32_t face = 0;
+    uint32_t segment = SegmentPoint::kNone;
+    uint32_t face_or_end = 0;  // the face; on a segment whether the distance is from its end b
+    double distance = 0;
+
+    SegmentPoint OnSegment() const {
+      return segment == SegmentPoint::kNone ? SegmentPoint() : SegmentPoint{segment, face_or_end != 0, distance};
+    }
   };
 
   PlanarGraph graph_;
@@ -183,7 +197,8 @@ class PlanarDomain {
   double min_angle_ = std::numbers::pi;
   std::vector<bool> has_small_angle_;          // by half-edge
   std::vector<std::atomic<uint32_t>> splits_;  // by segment
-  HugeVector<InsertedPlace> places_;           // by vertex that was inserted
+  bool has_area_bounds_ = false;
+  HugeVector<InsertedPlace> places_;  // by vertex that was inserted
 };
 
 }  // namespace wellspace::core

@@ -181,6 +181,41 @@ TYPED_TEST(FloatCellsTest, EveryUnitTellsTheSame) {
   EXPECT_GT(reached, 0);
 }
 
+class PolygonTest : public test::SeededTest {
+ protected:
+  PolygonTest() : SeededTest(73) {}
+};
+
+// A line that cells are surely before has no node beyond it, and no other is in doubt but where one is near.
+TEST_F(PolygonTest, CellsAreSurelyBeforeLinesBeyondAllNodes) {
+  int before = 0;
+  int in_doubt = 0;
+  for (int i = 0; i < 500; ++i) {
+    const size_t count = 2 + random_.Below(40);
+    Polytope<2> cell;
+    const auto points = DrawPoints<2>(count, 10, random_);
+    BeginIn<2>(-1, 1024, points[0], TieRule::kPerturb, cell);
+    CutByAll<2>(points, 48, cell);
+    Polytope<2> placed = cell;
+    placed.Place();
+    for (int j = 0; j < 20; ++j) {
+      const double angle = 2 * std::numbers::pi * random_.Unit();
+      const double distance = 1000 * random_.Unit();
+      const Point<2> normal = {std::cos(angle), std::sin(angle)};
+      double most = 0;
+      for (const CellNode<2>& node : placed.nodes()) {
+        most = std::max(most, Dot<2>(node.x, normal));
+      }
+      const bool is_before = cell.IsSurelyBefore({distance * normal[0], distance * normal[1]});
+      EXPECT_FALSE(is_before && most > distance);
+      before += is_before ? 1 : 0;
+      in_doubt += !is_before && most < distance - 0.1 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(before, 1000);
+  EXPECT_EQ(in_doubt, 0);
+}
+
 // Nodes are placed side by side with as many as a vector holds; each is to be where it would be alone.
 TYPED_TEST(FloatCellsTest, NodesArePlacedAsOneByOneAndKnowTheirNeighbours) {
   constexpr int D = TypeParam::kValue;

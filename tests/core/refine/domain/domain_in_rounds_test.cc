@@ -8,12 +8,14 @@
 #include <ostream>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/base/thread_team.h"
 #include "core/domain_cloud.h"
 #include "core/mesher.h"
 #include "core/refine/refine.h"
+#include "core/simplex/domain_simplices.h"
 #include "tests/support/clouds.h"
 #include "tests/support/seeded_test.h"
 
@@ -184,6 +186,42 @@ TEST_P(DomainInRoundsTest, ThreadsSpeculateAndTheMeshIsTheSame) {
         EXPECT_GT(counts.replayed, counts.speculated * 3 / 4) << "the bulk of the records";
       }
     }
+  }
+}
+
+// The triangles of a refined domain.
+DomainSimplices TrianglesOf(const Refined& refined, int threads) {
+  std::vector<uint32_t> output_index(refined.structure.vertex_count());
+  for (uint32_t i = 0; i < output_index.size(); ++i) {
+    output_index[i] = static_cast<uint32_t>(output_index.size()) - 1 - i;  // any order
+  }
+  RunContext context;
+  absl::StatusOr<DomainSimplices> triangles = ComputeDomainSimplices(
+      refined.structure, *refined.planar, refined.planar->FindChains(), refined.refinement->stars(), [] {},
+      output_index, threads, context);
+  EXPECT_TRUE(triangles.ok()) << triangles.status();
+  EXPECT_TRUE(triangles->broken.empty());
+  return *std::move(triangles);
+}
+
+void ExpectSame(const DomainSimplices& actual, const DomainSimplices& expected) {
+  EXPECT_EQ(actual.simplices.indices, expected.simplices.indices);
+  EXPECT_EQ(actual.faces, expected.faces);
+  EXPECT_EQ(actual.simplices.max_radius_edge, expected.simplices.max_radius_edge);
+  EXPECT_EQ(actual.simplices.min_angle_deg, expected.simplices.min_angle_deg);
+}
+
+TEST_P(DomainInRoundsTest, ListedTrianglesAreThoseOfCells) {
+  test::SplitMix64 random(test::Seed(72));
+  const Input input = GetParam().make(random);
+  for (const int threads : {1, 2}) {
+    const Refined refined(input, GetParam().rho, GetParam().size, threads);
+    const DomainSimplices listed = TrianglesOf(refined, threads);
+    EXPECT_EQ(listed.simplices.counters.leaves, 0) << "no cell is computed";
+    refined.refinement->DropStars();
+    const DomainSimplices computed = TrianglesOf(refined, threads);
+    EXPECT_GT(computed.simplices.counters.leaves, 0);
+    ExpectSame(listed, computed);
   }
 }
 

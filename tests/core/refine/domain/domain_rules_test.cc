@@ -27,11 +27,11 @@ class Looks {
   }
   DomainRules::Answer Next(VertexId v, const DomainAssessment& found) {
     const auto cell_of = [this](VertexId u, const Box<2>& clip) {
-      domain_.structure.UnplacedClippedVoronoi(u, clip, other_);
-      other_.cell.Place();
-      return &other_.cell;
+      domain_.structure.UnplacedClippedVoronoi(u, clip, scratch_);
+      scratch_.cell.Place();
+      return &scratch_.cell;
     };
-    return rules_.NextRequest(v, workspace_.cell, found, kLimitSq, cell_of, scratch_);
+    return rules_.NextRequest(v, workspace_.cell, workspace_.segments, found, kLimitSq, cell_of, scratch_);
   }
   NodeName NameOf(int node) const { return NodeView(workspace_.cell, workspace_.cell.nodes()[node]).Name(); }
 
@@ -43,7 +43,6 @@ class Looks {
   const StepRules<2> step_rules_;
   const DomainRules rules_{domain_.structure, *domain_.planar, step_rules_};
   Workspace<2> workspace_;
-  Workspace<2> other_;
   Workspace<2> scratch_;
 };
 
