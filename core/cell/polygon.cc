@@ -325,7 +325,7 @@ WELLSPACE_AVX2 bool Polygon::KeepsRatioAvx2(double ratio) const { return KeepsRa
 bool Polygon::Reaches(const Box<2>& cube) const { return CellOnUnit<Polygon, 2>::Reaches(*this, cube); }
 
 bool Polygon::IsSurelyBefore(const Point<2>& foot) const {
-  const auto line = FloatBisector<2>::Of({2 * foot[0], 2 * foot[1]}, scale_, most_radius_);
+  const auto line = FloatBisector<2>::Of({2 * foot[0], 2 * foot[1]}, scale_, radius_bound_);
   if (!(line.low > 0)) {
     return false;
   }
@@ -334,7 +334,7 @@ bool Polygon::IsSurelyBefore(const Point<2>& foot) const {
     const Floats most = Load(group.x[0]) * line.w[0] + (Load(group.x[1]) * line.w[1] - line.low);
     are_before &= reinterpret_cast<const FloatMask&>(most);
   }
-  constexpr uint32_t kAll = (uint32_t{1} << kTogether) - 1;
+  constexpr uint32_t kAll = (uint32_t{1} << kGroupSize) - 1;
   return Bits<VectorUnit::kBaseline>(are_before) == kAll;
 }
 
