@@ -326,12 +326,12 @@ bool Polygon::Reaches(const Box<2>& cube) const { return CellOnUnit<Polygon, 2>:
 
 bool Polygon::IsSurelyBefore(const Point<2>& foot) const {
   const auto line = FloatBisector<2>::Of({2 * foot[0], 2 * foot[1]}, scale_, radius_bound_);
-  if (!(line.low > 0)) {
+  if (!(line.least_offset > 0)) {
     return false;
   }
   FloatMask are_before = ~FloatMask{};  // by the sign; of places beyond the last node, too
   for (const Group& group : groups()) {
-    const Floats most = Load(group.x[0]) * line.w[0] + (Load(group.x[1]) * line.w[1] - line.low);
+    const Floats most = Load(group.x[0]) * line.w[0] + (Load(group.x[1]) * line.w[1] - line.least_offset);
     are_before &= reinterpret_cast<const FloatMask&>(most);
   }
   constexpr uint32_t kAll = (uint32_t{1} << kGroupSize) - 1;
