@@ -14,6 +14,9 @@
 namespace wellspace::test {
 namespace {
 
+// Measured from 10^3 to 10^6: at most 1.15 (visits of uniform points in 3-D). What grew like log n would double.
+constexpr double kMostGrowth = 1.25;
+
 // Averages over the queries of one run. Visits and cuts are divided by simplices per vertex, a measure of the cells
 // themselves: a cell at the box has fewer nodes, and the share of vertices there falls slowly. (In 3-D, uniform points
 // have 4.6 simplices a vertex for n = 10^3 and 6.1 for 10^6; unbounded meshes have 6.5. The plain visits a query rise
@@ -24,6 +27,7 @@ struct Work {
   double cuts_per_query;
   double visits_per_star;
   double cuts_per_star;
+  double star_share;  // of all visits, those for stars
 };
 
 double Ratio(uint64_t a, uint64_t b) { return static_cast<double>(a) / static_cast<double>(b); }
@@ -34,26 +38,24 @@ Work WorkOf(const core::MeshStatistics& s) {
           .visits_per_query = Ratio(s.leaves_visited + s.vertices_visited, s.cells_computed) / cell_size,
           .cuts_per_query = Ratio(s.cuts, s.cells_computed) / cell_size,
           .visits_per_star = Ratio(s.star_leaves_visited + s.star_vertices_visited, s.stars_computed) / cell_size,
-          .cuts_per_star = Ratio(s.star_cuts, s.stars_computed) / cell_size};
+          .cuts_per_star = Ratio(s.star_cuts, s.stars_computed) / cell_size,
+          .star_share = Ratio(s.star_leaves_visited + s.star_vertices_visited, s.leaves_visited + s.vertices_visited)};
 }
 
-void ExpectConstant(std::span<const size_t> sizes,
-                    const std::function<absl::StatusOr<core::Mesh>(size_t size)>& make_mesh) {
-  // Measured from 10^3 to 10^6: at most 1.15 (visits of uniform points in 3-D). What grew like log n would double.
-  constexpr double kMostGrowth = 1.25;
+// What the work is for meshes of these sizes, of which that of the queries is expected to be constant.
+std::vector<Work> ExpectConstantQueries(std::span<const size_t> sizes,
+                                        const std::function<absl::StatusOr<core::Mesh>(size_t size)>& make_mesh) {
   std::vector<Work> work;
   for (const size_t n : sizes) {
     SCOPED_TRACE(n);
     const absl::StatusOr<core::Mesh> mesh = make_mesh(n);
-    ASSERT_TRUE(mesh.ok()) << mesh.status();
-    work.push_back(WorkOf(mesh->statistics));
-    EXPECT_GT(work.back().visits_per_star, 0);
+    EXPECT_TRUE(mesh.ok()) << mesh.status();
+    work.push_back(WorkOf(mesh.ok() ? mesh->statistics : core::MeshStatistics()));
     EXPECT_LE(work.back().queries_per_vertex, kMostGrowth * work.front().queries_per_vertex);
     EXPECT_LE(work.back().visits_per_query, kMostGrowth * work.front().visits_per_query);
     EXPECT_LE(work.back().cuts_per_query, kMostGrowth * work.front().cuts_per_query);
-    EXPECT_LE(work.back().visits_per_star, kMostGrowth * work.front().visits_per_star);
-    EXPECT_LE(work.back().cuts_per_star, kMostGrowth * work.front().cuts_per_star);
   }
+  return work;
 }
 
 DomainInput RandomSegments(size_t count) {
@@ -108,7 +110,7 @@ DomainInput HoleInABox(size_t count) {
 }  // namespace
 
 void ExpectConstantWork(std::string_view kind, int dimension, std::span<const size_t> sizes) {
-  ExpectConstant(sizes, [&](size_t size) {
+  const std::vector<Work> work = ExpectConstantQueries(sizes, [&](size_t size) {
     core::MeshParameters parameters;
     parameters.dimension = dimension;
     parameters.min_dihedral = 0;  // of the query structure's work none is there
@@ -117,12 +119,21 @@ void ExpectConstantWork(std::string_view kind, int dimension, std::span<const si
     core::RunContext context;
     return core::MeshPoints(parameters, MakeCloud(kind, dimension, size), context);
   });
+  for (const Work& of_size : work) {
+    EXPECT_GT(of_size.visits_per_star, 0);
+    EXPECT_LE(of_size.visits_per_star, kMostGrowth * work.front().visits_per_star);
+    EXPECT_LE(of_size.cuts_per_star, kMostGrowth * work.front().cuts_per_star);
+  }
 }
 
 void ExpectConstantWorkInDomains(std::string_view kind, std::span<const size_t> sizes) {
-  ExpectConstant(sizes, [&](size_t size) {
+  const std::vector<Work> work = ExpectConstantQueries(sizes, [&](size_t size) {
     return (kind == "random" ? RandomSegments(size) : kind == "coast" ? Snowflake(size) : HoleInABox(size)).Make();
   });
+  // Triangles are listed by the refinement. Stars are computed where a list is stale: 0.07 to 0.13 of the visits.
+  for (const Work& of_size : work) {
+    EXPECT_LE(of_size.star_share, 0.2);
+  }
 }
 
 }  // namespace wellspace::test
