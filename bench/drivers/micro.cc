@@ -17,6 +17,7 @@
 #include "bench/drivers/floor.h"
 #include "core/domain.h"
 #include "core/geometry/power_predicate.h"
+#include "core/mesh_locator.h"
 #include "core/mesh_parameters.h"
 #include "core/mesher.h"
 #include "core/refine/refine.h"
@@ -324,6 +325,28 @@ void BM_MeshBySamples(benchmark::State& state) {
       benchmark::Counter(vertices, benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
 
+// Points anywhere in a mesh of 10^5 points, by one thread, all at once. Items are points.
+template <int D>
+void BM_Locate(benchmark::State& state) {
+  core::MeshParameters parameters{.dimension = D};
+  parameters.domain_low.assign(D, 0);
+  parameters.domain_high.assign(D, 1);
+  core::RunContext context;
+  absl::StatusOr<core::Mesh> mesh = core::MeshPoints(parameters, UniformPoints(D, 100'000), context);
+  ExitUnless(mesh.status());
+  const auto locator = core::MeshLocator::Create(*std::move(mesh), context);
+  ExitUnless(locator.status());
+  std::vector<double> points(static_cast<size_t>(D * state.range(0)));
+  std::mt19937_64 random(2);
+  std::ranges::generate(points, [&] { return std::ldexp(static_cast<double>(random() >> 11), -53); });
+  for (auto _ : state) {
+    const auto located = (*locator)->Locate(points, context);
+    ExitUnless(located.status());
+    benchmark::DoNotOptimize(located->simplices.data());
+  }
+  SetItems(state, state.range(0));
+}
+
 template <int D>
 void RegisterAll() {
   const std::string suffix = "/" + std::to_string(D) + "-D";
@@ -345,6 +368,7 @@ void RegisterAll() {
   add_queries("ClippedCellOfInput", BM_ClippedCellOfInput<D>);
   add("ClippedCellsOfInput", BM_ClippedCellsOfInput<D>)->Arg(100'000)->Unit(benchmark::kMillisecond);
   add_queries("Star", BM_Star<D>);
+  add("Locate", BM_Locate<D>)->Arg(1'000'000)->Unit(benchmark::kMillisecond);
   add("MeshBySamples", BM_MeshBySamples<D>)->Arg(10)->Arg(1'000)->Arg(40'000)->Unit(benchmark::kMillisecond);
   add("Cut", BM_Cut<D>)->Arg(10'000)->Unit(benchmark::kMicrosecond);
   for (const auto& [name, stage] :
