@@ -182,7 +182,8 @@ class Parts(unittest.TestCase):
         self.assertEqual(packages - compiler, {"libabsl-dev", "libtbb-dev", "libboost1.74-dev"})
 
     def test_unknown_part(self):
-        output = run("cmake", "-S", ROOT, "-B", in_folder(self), "-DWELLSPACE_COMPONENTS=core;solver", exit_code=1)
+        output = run("cmake", "-G", "Ninja", "-S", ROOT, "-B", in_folder(self), "-DWELLSPACE_COMPONENTS=core;solver",
+                     exit_code=1)
         self.assertIn("WELLSPACE_COMPONENTS has 'solver'; there are: core;formats;client;server;tool;python",
                       re.sub(r"\s+", " ", output))
 
