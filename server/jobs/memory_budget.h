@@ -76,7 +76,7 @@ class MemoryBudget {
   bool CanMakeRoom() const { return can_make_room_; }
   // Has idle sessions give up memory until `bytes` are not reserved. Says whether so many are free now.
   //
-  // REQUIRES:   the caller holds no lock, and may wait: large structures are freed.
+  // REQUIRES:   the caller holds no lock of a session or of the pool, and may wait: large structures are freed.
   // Complexity: that of the sessions that there are; constant where CanMakeRoom() is false.
   bool MakeRoom(uint64_t bytes, Want want);
 

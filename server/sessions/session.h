@@ -72,7 +72,7 @@ struct PointsLeft {
 // session is busy, points, features, sizes, mesh, mesher and steps are touched by the work alone that has made it so;
 // (3) what did not succeed leaves the session as it was: structure and mesh are what Replay makes of the steps, whether
 // there is a mesher now or not; (4) no client is told of a change, and nothing shows it, before the log has it; one
-// that it cannot have is not made. An expiry alone shows at once (LogExpiry).
+// that it cannot have is not made. An expiry, and what becomes of an operation, show even where it cannot have them.
 class Session {
  public:
   struct Settings {
@@ -461,11 +461,11 @@ class Session {
   //   - of a session that is busy, work_.mesher and work_.memory belong to the work that has made it so, which writes
   //     them without mutex_. Others look at busy_ first, and leave them alone;
   //   - that work reads without mutex_ what invariant (2) keeps from all others: points_, features_, sizes_, work_,
-  //     steps_, parameters_; and while points are removed, when no upload comes, committed_points_ and revision_;
+  //     steps_, parameters_; and while points are removed, when none are committed, committed_points_ and revision_;
   //   - who holds change_mutex_ reads without mutex_ what changes under both alone: parameters_, labels_, the length of
   //     lease_, features_, sizes_, sizes_in_use_, are_inputs_loaded_, steps_, operations_, next_operation_, and, of a
   //     session that is busy or durable, revision_ and committed_points_; before others know the session, busy_;
-  //   - while vertices are added, none but the work that adds them touches point_account_.
+  //   - while vertices are added, none but the work that adds them takes points into point_account_, or out of it.
   core::MeshParameters parameters_;  // of the last refinement that succeeded; before it, those of the creation
   std::map<std::string, std::string> labels_;
   Lease lease_;

@@ -115,7 +115,8 @@ absl::Status Session::CommitPoints() {
   uint32_t crc32c = 0;
   {
     std::lock_guard lock(mutex_);
-    if (!HasUncommittedLocked()) {
+    // While points are removed, all that are left are copied, and committed then.
+    if (!HasUncommittedLocked() || busy_ == Busy::kRemovingPoints) {
       return absl::OkStatus();
     }
     end = PointCountLocked();

@@ -31,8 +31,8 @@ struct NewSession {
 //
 // Thread safety: thread-safe. No session is asked with the lock of the registry held: one that is written to, or read,
 //                may have its own for a while, which is not to hold up the others.
-// Invariants: (1) never more sessions than the limits of the server allow; (2) names are never used again, and cannot
-//             be guessed.
+// Invariants: (1) never more sessions than the limits of the server allow, but those of Restore; (2) names are never
+//             used again, and cannot be guessed.
 class SessionRegistry {
  public:
   // REQUIRES:   `options`, `memory` and `log` outlive this and all sessions.
@@ -92,7 +92,7 @@ class SessionRegistry {
   mutable std::mutex mutex_;
   // Guarded by mutex_.
   std::unordered_map<std::string, std::shared_ptr<Session>> by_name_;
-  std::map<std::string, Tenant> tenants_;  // those that have sessions
+  std::map<std::string, Tenant> tenants_;  // those that have, or have had, sessions
   size_t pending_ = 0;                     // of all tenants
   absl::Time last_create_time_ = absl::InfinitePast();
 };

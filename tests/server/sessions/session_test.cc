@@ -2,6 +2,7 @@
 #include "server/sessions/session.h"
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -156,6 +157,48 @@ TEST(SessionOnAFullDisk, ChangesAreRefusedAndNoneIsMade) {
   log.is_full = false;
   EXPECT_TRUE(session->SetSizes(nullptr, 0).ok());
   EXPECT_EQ(session->Describe().size_count(), 0u);
+}
+
+// A log that tells when points are about to be copied to a file of their own.
+class LogThatTellsOfRemovals final : public EphemeralLog {
+ public:
+  bool is_durable() const override { return true; }
+  std::unique_ptr<PointStore> OpenPoints(const std::string& session, int dimension, uint64_t number,
+                                         std::vector<store::v1::StepRecord::Points> committed) override {
+    if (number > 0) {
+      on_removal();
+    }
+    return EphemeralLog::OpenPoints(session, dimension, number, std::move(committed));
+  }
+
+  std::function<void()> on_removal;
+};
+
+TEST(SessionRemoval, WhatIsAppendedIsCommittedWithTheRemoval) {
+  const ServiceOptions options;
+  MemoryBudget memory(uint64_t{1} << 30);
+  LogThatTellsOfRemovals log;
+  SessionRegistry registry(options, memory, {}, log);
+  const std::shared_ptr<Session> session =
+      registry.Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = {}}).value();
+  ASSERT_TRUE(session->Append(0, std::vector<double>{0, 0, 1, 0, 0, 1}, 0).ok());
+  ASSERT_TRUE(session->CommitPoints().ok());
+  ASSERT_TRUE(session->Append(3, std::vector<double>{1, 1}, 0).ok());
+  const uint64_t revision = session->Describe().revision();
+  bool is_told = false;
+  log.on_removal = [&] {
+    is_told = true;
+    EXPECT_TRUE(session->CommitPoints().ok()) << "an upload that ends now";
+    EXPECT_EQ(session->Committed().committed_points(), 3u) << "points that are being copied stay what they are";
+    EXPECT_EQ(DetailsOf(session->Append(4, std::vector<double>{2, 2}, 0)).reason, "SESSION_BUSY");
+  };
+  const absl::StatusOr<PointsLeft> left = session->RemovePoints(std::vector<uint64_t>{1}, 0);
+  ASSERT_TRUE(left.ok()) << left.status();
+  EXPECT_TRUE(is_told);
+  EXPECT_EQ(left->points, 3u);
+  EXPECT_EQ(left->revision, revision + 1);
+  EXPECT_EQ(session->Committed().committed_points(), 3u);
+  EXPECT_EQ(session->Committed().revision(), left->revision);
 }
 
 TEST(SessionOnAFullDisk, OperationsOfAnEarlierProcessAreTakenUp) {
