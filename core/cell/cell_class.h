@@ -28,7 +28,7 @@
 //   nodes while cut             floats, eight a vector; one bound for    doubles, four a vector; a slack each, since
 //                               all, since they come from planes         new nodes come from nodes before them
 //   Tighten                     does nothing: a cut brings reach_sq()    finds the farthest node, which a cut leaves
-//                               down at once                             to whoever asks
+//                               down at once                             to those that ask
 //   CutByGathered               is there (polygon.h)                     is not: the walk to the vertices, which it
 //                                                                        saves, is a small part of a query there
 //   vector unit                 the constructor's                        the best that there is
