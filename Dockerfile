@@ -19,7 +19,7 @@ COPY deploy/install-deps.sh /tmp/
 # Licences stay: those of shared libraries where Debian has them, those of what is compiled in beside Wellspace's own.
 RUN printf 'path-exclude /usr/share/%s/*\n' doc man locale > /etc/dpkg/dpkg.cfg.d/small \
  && echo 'path-include /usr/share/doc/*/copyright' >> /etc/dpkg/dpkg.cfg.d/small \
- && /tmp/install-deps.sh runtime && rm -rf /tmp/install-deps.sh /var/lib/apt/lists/* \
+ && /tmp/install-deps.sh runtime && rm -rf /tmp/install-deps.sh /var/lib/apt/lists/* /var/cache/apt/* \
  && useradd --system --uid 7233 --no-create-home --shell /usr/sbin/nologin wellspace \
  && install --directory --owner 7233 --group 7233 --mode 0700 /var/lib/wellspace
 COPY LICENSE README.md THIRD_PARTY.md /usr/share/doc/wellspace/
