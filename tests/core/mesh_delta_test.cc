@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstring>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -14,6 +13,7 @@
 #include "core/mesher.h"
 #include "tests/support/clouds.h"
 #include "tests/support/parameters.h"
+#include "tests/support/same_mesh.h"
 #include "tests/support/seeded_test.h"
 
 namespace wellspace::core {
@@ -21,26 +21,8 @@ namespace {
 
 constexpr uint64_t kMuch = uint64_t{1} << 40;  // bytes
 
-template <typename T>
-bool IsSame(const HugeVector<T>& a, const HugeVector<T>& b) {
-  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
-}
-
 void ExpectSame(const Mesh& a, const Mesh& b) {
-  EXPECT_EQ(a.dimension, b.dimension);
-  EXPECT_EQ(a.domain_low, b.domain_low);
-  EXPECT_EQ(a.domain_high, b.domain_high);
-  EXPECT_TRUE(IsSame(a.points, b.points));
-  EXPECT_TRUE(IsSame(a.weights, b.weights));
-  EXPECT_TRUE(IsSame(a.simplices, b.simplices));
-  EXPECT_TRUE(IsSame(a.input_vertex, b.input_vertex));
-  EXPECT_TRUE(IsSame(a.moved_vertices, b.moved_vertices));
-  EXPECT_TRUE(IsSame(a.vertex_origins, b.vertex_origins));
-  EXPECT_TRUE(IsSame(a.vertex_tags, b.vertex_tags));
-  EXPECT_TRUE(IsSame(a.facets, b.facets));
-  EXPECT_TRUE(IsSame(a.simplex_regions, b.simplex_regions));
-  EXPECT_EQ(a.boundary, b.boundary);
-  EXPECT_EQ(a.regions, b.regions);
+  test::ExpectSameMesh(a, b);
   EXPECT_EQ(a.statistics.vertices, b.statistics.vertices);
 }
 

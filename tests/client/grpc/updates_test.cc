@@ -1,6 +1,5 @@
 // Meshes that are brought up to date, from a server that is real, by a connection that breaks when a test wants it.
 #include <algorithm>
-#include <cstring>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -11,31 +10,14 @@
 #include "tests/client/grpc/fake_server.h"
 #include "tests/server/service_harness.h"
 #include "tests/server/session_calls.h"
+#include "tests/support/same_mesh.h"
 
 namespace wellspace::client {
 namespace {
 
-template <typename T>
-bool IsSame(const std::vector<T>& a, const std::vector<T>& b) {
-  return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(T)) == 0);
-}
-
 void ExpectSame(const Mesh& a, const Mesh& b) {
-  EXPECT_EQ(a.dimension, b.dimension);
+  test::ExpectSameMesh(a, b);
   EXPECT_EQ(a.revision, b.revision);
-  EXPECT_EQ(a.domain_low, b.domain_low);
-  EXPECT_EQ(a.domain_high, b.domain_high);
-  EXPECT_TRUE(IsSame(a.points, b.points));
-  EXPECT_TRUE(IsSame(a.weights, b.weights));
-  EXPECT_TRUE(IsSame(a.simplices, b.simplices));
-  EXPECT_TRUE(IsSame(a.input_vertex, b.input_vertex));
-  EXPECT_TRUE(IsSame(a.moved_vertices, b.moved_vertices));
-  EXPECT_TRUE(IsSame(a.vertex_origins, b.vertex_origins));
-  EXPECT_TRUE(IsSame(a.vertex_tags, b.vertex_tags));
-  EXPECT_TRUE(IsSame(a.facets, b.facets));
-  EXPECT_TRUE(IsSame(a.simplex_regions, b.simplex_regions));
-  EXPECT_EQ(a.boundary, b.boundary);
-  EXPECT_EQ(a.regions, b.regions);
   EXPECT_EQ(a.statistics.simplices, b.statistics.simplices);
   EXPECT_EQ(a.statistics.seconds, b.statistics.seconds);
 }
