@@ -5,31 +5,19 @@ import dataclasses
 import unittest
 
 import numpy as np
-from support import Break, Breaker, Case, uniform, unit_box
+from support import Break, BreakerCase, uniform, unit_box
 
 import wellspace
 import wellspace.aio
-from wellspace import Client, InvalidArgumentError, RetryPolicy, _api
+from wellspace import InvalidArgumentError, _api
 
 ARRAYS = ("points", "simplices", "input_vertices", "facets", "facet_tags", "regions", "vertex_origins", "vertex_tags",
           "moved_vertices", "box")
-QUICK = RetryPolicy(initial_backoff=0.001, max_backoff=0.01)
 
 
-class DeltaTest(Case):
-    @classmethod
-    def setUpClass(cls):
-        cls.server = wellspace.LocalServer()
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.server.close()
-
+class DeltaTest(BreakerCase):
     def setUp(self):
-        self.breaker = Breaker(self.server)
-        self.addCleanup(self.breaker.close)
-        self.client = Client(self.breaker.address, retry=QUICK)
-        self.addCleanup(self.client.close)
+        super().setUp()
         self.random = np.random.default_rng(5)
         self.requests, self.bytes = [], 0
         self.breaker.on_request, self.breaker.on_answer = self.note_request, self.note_answer

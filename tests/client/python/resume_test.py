@@ -3,29 +3,13 @@
 import unittest
 
 import numpy as np
-from support import Break, Breaker, Case, grpc, uniform, unit_box
+from support import Break, BreakerCase, grpc, uniform, unit_box
 
 import wellspace
-from wellspace import Client, DamagedAnswerError, RetryPolicy, UnavailableError, _api
-
-QUICK = RetryPolicy(initial_backoff=0.001, max_backoff=0.01)
+from wellspace import DamagedAnswerError, UnavailableError, _api
 
 
-class ResumeTest(Case):
-    @classmethod
-    def setUpClass(cls):
-        cls.server = wellspace.LocalServer()
-
-    @classmethod
-    def tearDownClass(cls):
-        cls.server.close()
-
-    def setUp(self):
-        self.breaker = Breaker(self.server)
-        self.addCleanup(self.breaker.close)
-        self.client = Client(self.breaker.address, retry=QUICK)
-        self.addCleanup(self.client.close)
-
+class ResumeTest(BreakerCase):
     def break_answers(self, method, calls=1, at=0):
         """Breaks the first `calls` calls of the method before answer number `at`."""
 

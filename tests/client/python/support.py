@@ -134,3 +134,22 @@ class _NoDeadline:
     @staticmethod
     def time_left():
         return None
+
+
+class BreakerCase(Case):
+    """Tests with a server of their own, behind a Breaker, and a client that does not wait before it tries again."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.server = wellspace.LocalServer()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.server.close()
+
+    def setUp(self):
+        self.breaker = Breaker(self.server)
+        self.addCleanup(self.breaker.close)
+        retry = wellspace.RetryPolicy(initial_backoff=0.001, max_backoff=0.01)
+        self.client = wellspace.Client(self.breaker.address, retry=retry)
+        self.addCleanup(self.client.close)
