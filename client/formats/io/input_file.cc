@@ -11,6 +11,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/io/file_error.h"
+#include "client/formats/io/number.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {
