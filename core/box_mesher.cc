@@ -28,15 +28,6 @@ namespace {
 template <int D>
 constexpr uint64_t kLeastPredicted = D == 2 ? 50'000 : (D == 3 ? 20'000 : 2'000);
 
-// What building the tree takes for each point, but for the most uneven clouds: keys, the point twice, a place in a
-// split leaf, indices.
-template <int D>
-constexpr uint64_t kTreeBytes =
-    2 * sizeof(Point<D>) + sizeof(uint64_t) * D + 24 +
-    LeafTree<D>::VertexPool::BytesFor(LeafTree<D>::kLeafCapacity / LeafTree<D>::kChildren) * LeafTree<D>::kChildren
-        / LeafTree<D>::kLeafCapacity;
-constexpr uint64_t kTreeFixedBytes = uint64_t{4} << 20;
-
 template <int D>
 Box<D> BoxOf(const std::vector<double>& low, const std::vector<double>& high) {
   Box<D> box;
@@ -52,9 +43,8 @@ absl::Status BoxMesher<D>::Initialize(const MeshParameters& parameters, std::spa
                                       RunContext& context) {
   WELLSPACE_RETURN_IF_ERROR(CheckShape(points, D));
   context.EnterPhase(Phase::kTree);
-  WELLSPACE_RETURN_IF_ERROR(context.ReserveMemory(
-      kTreeFixedBytes + points.size() / D * (kTreeBytes<D> + (parameters.merge_distance > 0 ? kMergeBytes<D> : 0)) +
-      ScaledSamples<D>::BytesFor(parameters)));
+  WELLSPACE_RETURN_IF_ERROR(ReserveForBuilding<D>(
+      parameters, points.size() / D, kTreeBytes<D> + (parameters.merge_distance > 0 ? kMergeBytes<D> : 0), 0, context));
   merge_distance_ = parameters.merge_distance;
   WELLSPACE_ASSIGN_OR_RETURN(const MergedPoints merged, SetDomain(parameters, points, context));
   WELLSPACE_RETURN_IF_ERROR(samples_.Take(domain_, domain_.box, parameters, context));
@@ -92,6 +82,7 @@ template <int D>
 absl::Status BoxMesher<D>::Refine(const MeshParameters& parameters, RunContext& context) {
   WELLSPACE_RETURN_IF_ERROR(CheckParametersIn(parameters, D));
   context.EnterPhase(Phase::kRefinement);
+  WELLSPACE_RETURN_IF_ERROR(AllowSamples<D>(parameters, samples_, memory_bytes(), context));
   WELLSPACE_RETURN_IF_ERROR(samples_.Take(domain_, domain_.box, parameters, context));
   is_refined_ = false;
   const MeshCriteria<D> criteria = CriteriaOf(parameters);

@@ -5,14 +5,49 @@
 #include <cstdint>
 
 #include "absl/status/status.h"
+#include "core/base/run_context.h"
+#include "core/geometry/point.h"
 #include "core/mesh.h"
 #include "core/mesh_parameters.h"
+#include "core/scaled_samples.h"
+#include "core/tree/leaf_tree.h"
 
 namespace wellspace::core {
 
 // Leaves that the tree may have for each vertex of the budget; around isolated close pairs balance costs up to about
 // two.
 inline constexpr uint64_t kLeavesPerVertex = 8;
+
+// What building the tree takes for each point, but for the most uneven clouds: keys, the point twice, a place in a
+// split leaf, indices.
+template <int D>
+constexpr uint64_t kTreeBytes =
+    2 * sizeof(Point<D>) + sizeof(uint64_t) * D + 24 +
+    LeafTree<D>::VertexPool::BytesFor(LeafTree<D>::kLeafCapacity / LeafTree<D>::kChildren) * LeafTree<D>::kChildren
+        / LeafTree<D>::kLeafCapacity;
+
+// Reserves what building a mesher takes before its first array is made: so many bytes for each of `points`, `others`,
+// and the samples of `parameters`.
+//
+// Errors:     those of the context's lender.
+template <int D>
+absl::Status ReserveForBuilding(const MeshParameters& parameters, uint64_t points, uint64_t bytes_per_point,
+                                uint64_t others, const RunContext& context) {
+  constexpr uint64_t kFixedBytes = uint64_t{4} << 20;
+  return context.ReserveMemory(kFixedBytes + points * bytes_per_point + others +
+                               ScaledSamples<D>::BytesFor(parameters));
+}
+
+// Asks for what the samples of `parameters` take, beside `held` bytes, unless `taken` has them.
+//
+// Errors:     those of the context's lender.
+template <int D>
+absl::Status AllowSamples(const MeshParameters& parameters, const ScaledSamples<D>& taken, uint64_t held,
+                          const RunContext& context) {
+  return parameters.size_samples == nullptr || taken.Has(parameters)
+             ? absl::OkStatus()
+             : context.AllowMemory(held + ScaledSamples<D>::BytesFor(parameters));
+}
 
 // Refuses parameters that are not valid, or not those of a mesh in `dimension`.
 //

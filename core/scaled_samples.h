@@ -35,6 +35,9 @@ class ScaledSamples {
   // Those of `parameters`, which are built here and now if they were not taken. Null for none.
   std::shared_ptr<const SampleTree<D>> Of(const Domain<D>& domain, const MeshParameters& parameters) const;
 
+  // Whether those of `parameters` were taken.
+  bool Has(const MeshParameters& parameters) const { return parameters.size_samples == taken_; }
+
   uint64_t MemoryBytes() const { return tree_ == nullptr ? 0 : SampleTree<D>::BytesFor(tree_->places().size()); }
   // What Take will hold.
   static uint64_t BytesFor(const MeshParameters& parameters) {
