@@ -11,6 +11,7 @@
 #include "absl/strings/str_format.h"
 #include "core/base/dimensions.h"
 #include "core/base/status_macros.h"
+#include "core/estimate/domain_shape.h"
 #include "core/estimate/least_vertices.h"
 #include "core/estimate/mesh_size.h"
 
@@ -107,14 +108,24 @@ double BoundEverywhere(const MeshParameters& parameters) {
 struct NamedSize {
   std::string name;
   double unit = 1;
+  bool is_area = false;
+
+  // A circumradius in what it is given in.
+  double Of(double circumradius) const {
+    return is_area ? circumradius * circumradius / kRadiusSqOfArea : circumradius / unit;
+  }
 };
 
-NamedSize FinestSize(const MeshParameters& parameters) {
+NamedSize FinestSize(const MeshParameters& parameters, const LargestArea& area) {
   const double edge = CircumradiusOf(1, parameters.dimension);
   double finest = BoundEverywhere(parameters);
   NamedSize named{absl::StrFormat("max_circumradius: %g", parameters.max_circumradius)};
   if (finest != parameters.max_circumradius) {
     named = {absl::StrFormat("edge_length: %g", parameters.edge_length), edge};
+  }
+  if (const double size = std::sqrt(kRadiusSqOfArea * area.area); size < finest) {
+    finest = size;
+    named = {absl::StrFormat("seeds[%d].max_area: %g", area.seed, area.area), 1, true};
   }
   for (size_t i = 0; i < parameters.size_boxes.size(); ++i) {
     if (const double size = parameters.size_boxes[i].max_circumradius; size < finest) {
@@ -139,14 +150,27 @@ absl::Status TooFineForDoubles(const Domain<D>& domain, std::string_view what, d
       RoundedUp(8 * least / domain.scale))));
 }
 
-// Refuses sizes in boxes and at points that no simplex there could keep, whose edges the arithmetic tells apart.
+// Whether what is meshed has a point in common with `part`, surely.
 template <int D>
-absl::Status CheckLeastSize(const Domain<D>& domain, const MeshParameters& parameters, const SizeField<D>& sizes) {
-  const Box<D>& box = domain.scaled_box;
+bool Meets(const Box<D>& box, const Box<D>& part) {
+  return DistanceSq<D>(part, box) == 0;
+}
+template <int D>
+bool Meets(const DomainShape& shape, const Box<2>& part) {
+  return shape.Meets(part);
+}
+
+// Samples that are so fine, and are looked for in what is meshed: where none of these is, others will not be, either.
+constexpr size_t kMostFineSamples = 16;
+
+// Refuses sizes in boxes and at points that no simplex there could keep, whose edges the arithmetic tells apart.
+template <int D, typename Shape>
+absl::Status CheckLeastSize(const Shape& shape, const Domain<D>& domain, const MeshParameters& parameters,
+                            const SizeField<D>& sizes) {
   const std::vector<typename SizeField<D>::Region> regions = ScaledRegions<D>(domain, parameters);
   for (size_t i = 0; i < regions.size(); ++i) {
     const auto& [region, size] = regions[i];
-    if (2 * size < domain.MinEdge() && DistanceSq<D>(region, box) == 0) {
+    if (2 * size < domain.MinEdge() && Meets<D>(shape, region)) {
       return TooFineForDoubles<D>(
           domain, absl::StrFormat("size_boxes[%d].max_circumradius: %g", i, parameters.size_boxes[i].max_circumradius),
           domain.MinEdge());
@@ -155,16 +179,38 @@ absl::Status CheckLeastSize(const Domain<D>& domain, const MeshParameters& param
   // A simplex whose circumball has a sample with size H in it has R <= H + G R.
   const double least = domain.MinEdge() * (1 - sizes.growth().of_samples);
   const size_t samples = parameters.size_samples == nullptr ? 0 : parameters.size_samples->sizes.size();
-  for (size_t i = 0; i < samples; ++i) {
+  size_t looked_for = 0;
+  for (size_t i = 0; i < samples && looked_for < kMostFineSamples; ++i) {
     const double size = parameters.size_samples->sizes[i];
     const double circumradius =
         parameters.size_samples->measure == SizeMeasure::kEdgeLength ? CircumradiusOf(size, D) : size;
-    if (2 * ScaledSize(circumradius, domain.scale) < least) {
+    if (2 * ScaledSize(circumradius, domain.scale) >= least) {
+      continue;
+    }
+    const Point<D> p = domain.Scaled(PointAt<D>(parameters.size_samples->points, i));
+    ++looked_for;
+    if (Meets<D>(shape, {p, p})) {
       return TooFineForDoubles<D>(domain, absl::StrFormat("size_samples.sizes[%d]: %g", i, size),
                                   least * size / circumradius);
     }
   }
   return absl::OkStatus();
+}
+
+template <int D, typename Shape>
+absl::Status CheckSizesFeasible(const Shape& shape, const Domain<D>& domain, const MeshParameters& parameters,
+                                const ScaledSamples<D>& samples, uint64_t vertices, const LargestArea& area) {
+  const uint64_t most = VertexBudget(parameters);
+  const SizeField<D> sizes = CriteriaIn<D>(domain, parameters, samples).sizes;
+  WELLSPACE_RETURN_IF_ERROR((CheckLeastSize<D>(shape, domain, parameters, sizes)));
+  const double least = LeastVerticesForSizes(shape, sizes);
+  if (least <= static_cast<double>(most)) {
+    return absl::OkStatus();
+  }
+  const double size = SmallestSizeFor(shape, sizes, VerticesLeft<D>(most, vertices));
+  const NamedSize finest = FinestSize(parameters, area);
+  return TooFine<D>(finest.name, TypicalVerticesForSizes(shape, sizes), least, most,
+                    absl::StrCat("the smallest size that fits is about ", RoundedUp(finest.Of(size / domain.scale))));
 }
 
 }  // namespace
@@ -206,19 +252,12 @@ template <int D>
 absl::Status CheckFeasible(const Domain<D>& domain, const MeshParameters& parameters, const ScaledSamples<D>& samples,
                            uint64_t vertices) {
   WELLSPACE_RETURN_IF_ERROR(CheckShapeFeasible<D>(domain, parameters, vertices));
-  const Box<D>& box = domain.scaled_box;
-  const uint64_t most = VertexBudget(parameters);
-  const SizeField<D> sizes = CriteriaIn<D>(domain, parameters, samples).sizes;
-  WELLSPACE_RETURN_IF_ERROR(CheckLeastSize<D>(domain, parameters, sizes));
-  const double least = LeastVerticesForSizes<D>(box, sizes);
-  if (least <= static_cast<double>(most)) {
-    return absl::OkStatus();
-  }
-  const double size = SmallestSizeFor<D>(box, sizes, VerticesLeft<D>(most, vertices));
-  const NamedSize finest = FinestSize(parameters);
-  return TooFine<D>(
-      finest.name, TypicalVerticesForSizes<D>(box, sizes), least, most,
-      absl::StrCat("the smallest size that fits is about ", RoundedUp(size / domain.scale / finest.unit)));
+  return CheckSizesFeasible<D>(domain.scaled_box, domain, parameters, samples, vertices, LargestArea());
+}
+
+absl::Status CheckFeasible(const DomainShape& shape, const Domain<2>& domain, const MeshParameters& parameters,
+                           const ScaledSamples<2>& samples, uint64_t vertices, const LargestArea& area) {
+  return CheckSizesFeasible<2>(shape, domain, parameters, samples, vertices, area);
 }
 
 #define WELLSPACE_INSTANTIATE(D)                                                                            \

@@ -2,10 +2,13 @@
 #ifndef WELLSPACE_CORE_FEASIBILITY_H_
 #define WELLSPACE_CORE_FEASIBILITY_H_
 
+#include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #include "absl/status/status.h"
 #include "core/domain.h"
+#include "core/estimate/domain_shape.h"
 #include "core/mesh_parameters.h"
 #include "core/refine/criteria.h"
 #include "core/scaled_samples.h"
@@ -29,6 +32,18 @@ MeshCriteria<D> CriteriaIn(const Domain<D>& domain, const MeshParameters& parame
 template <int D>
 absl::Status CheckFeasible(const Domain<D>& domain, const MeshParameters& parameters, const ScaledSamples<D>& samples,
                            uint64_t vertices);
+
+// The largest area that is asked for where it is least, and the seed that asks for it; infinite: none.
+struct LargestArea {
+  double area = std::numeric_limits<double>::infinity();  // not scaled
+  size_t seed = 0;
+};
+
+// The same of a domain in the plane, for sizes and largest areas; `area` is the least of these.
+//
+// Complexity: O(n log n) for n segments; that of LeastVerticesForSizes.
+absl::Status CheckFeasible(const DomainShape& shape, const Domain<2>& domain, const MeshParameters& parameters,
+                           const ScaledSamples<2>& samples, uint64_t vertices, const LargestArea& area);
 
 // The same for the shape of the domain alone: that of a tree over it is as large.
 template <int D>

@@ -101,20 +101,22 @@ class Integrator {
       }
       corner_spacing_[corner] = std::min(shortest_side, std::sqrt(points_.Nearest(p).first_sq));
     }
-    return absl::OkStatus();
+    return domain_.has_value() ? domain_->Prepare(context) : absl::OkStatus();
   }
 
   // After `full_looks` looks, one child of each cell stands for all of them: few leaves need so many, but sizes much
   // smaller than a leaf may ask for any number.
-  Share IntegrateLeaf(const LeafTree<D>& tree, NodeId id, uint64_t full_looks) {
+  absl::StatusOr<Share> IntegrateLeaf(const LeafTree<D>& tree, NodeId id, uint64_t full_looks,
+                                      const RunContext& context) {
     const Box<D> leaf = tree.BoxOf(id);
     if (domain_.has_value()) {
-      domain_->MoveTo(id);
+      WELLSPACE_RETURN_IF_ERROR(domain_->MoveTo(id, context));
     }
     looks_ = 0;
     full_looks_ = full_looks;
     share_ = {};
-    Integrate(leaf.low, leaf.high[0] - leaf.low[0], 1.0);
+    Integrate(leaf.low, leaf.high[0] - leaf.low[0], 1.0, context);
+    WELLSPACE_RETURN_IF_ERROR(context.Check());
     return share_;
   }
 
@@ -125,6 +127,9 @@ class Integrator {
     return result;
   }
   uint64_t on_boundary() const { return on_boundary_; }
+  // Places looked at in the last leaf.
+  uint64_t looks() const { return looks_; }
+  uint64_t segments_compared() const { return domain_.has_value() ? domain_->compared() : 0; }
 
  private:
   static SizeField<D> ServedSizes(SizeField<D> sizes, const Box<D>& box) {
@@ -248,8 +253,11 @@ class Integrator {
     return {sizes_.LeastIn(cell), std::min(std::sqrt(sizes_.AtSq(center)) + around, sizes_.max_circumradius())};
   }
 
-  // Adds `weight` times the integrals over the part of a cube that lies in the box.
-  void Integrate(const Point<D>& low, double side, double weight) {
+  // Adds `weight` times the integrals over the part of a cube that lies in the box, unless the run is cancelled.
+  void Integrate(const Point<D>& low, double side, double weight, const RunContext& context) {
+    if (context.IsCancelled()) {
+      return;
+    }
     Box<D> cell;
     Point<D> center;
     double volume = weight;
@@ -276,11 +284,11 @@ class Integrator {
     };
     if (looks_ < full_looks_) {
       for (int child = 0; child < (1 << D); ++child) {
-        Integrate(child_low(child), half, weight);
+        Integrate(child_low(child), half, weight, context);
       }
     } else {
       const int child = std::min(static_cast<int>(draws_.Next() * (1 << D)), (1 << D) - 1);
-      Integrate(child_low(child), half, weight * (1 << D));
+      Integrate(child_low(child), half, weight * (1 << D), context);
     }
   }
 
@@ -420,6 +428,10 @@ void Add(Share& sum, const Share& share, double factor = 1) {
 // Leaves looked at between two looks at the error, at most.
 constexpr size_t kLeavesTogether = 64;
 
+// After so many places, in all leaves, few are looked at in each further one: seconds have passed.
+constexpr uint64_t kMostLooks = uint64_t{1} << 21;
+constexpr uint64_t kFewLooks = 64;
+
 // Draws leaves without replacement: from those with vertices and those without, as there may be few of the former and
 // nearly all new vertices in them.
 template <int D>
@@ -433,6 +445,7 @@ absl::StatusOr<Sample> SampleLeaves(const QueryStructure<D>& structure, Integrat
   const uint64_t full_looks =
       std::max(effort.looks_per_leaf, effort.looks / (strata[0].leaves.size() + strata[1].leaves.size()));
   const size_t least = std::max<size_t>(effort.least_leaves, 1);
+  uint64_t looks = 0;
   Draws draws;
   Sample sample;
   while (true) {
@@ -462,7 +475,11 @@ absl::StatusOr<Sample> SampleLeaves(const QueryStructure<D>& structure, Integrat
       std::swap(leaf,
                 widest->leaves[widest->taken +
                                std::min(rest - 1, static_cast<size_t>(draws.Next() * static_cast<double>(rest)))]);
-      const Share share = integrator.IntegrateLeaf(structure.tree(), leaf, full_looks);
+      WELLSPACE_ASSIGN_OR_RETURN(
+          const Share share,
+          integrator.IntegrateLeaf(structure.tree(), leaf,
+                                   looks > kMostLooks ? std::min(kFewLooks, full_looks) : full_looks, context));
+      looks += integrator.looks();
       Add(widest->sum, share);
       const double vertices = Sum(integrator.VerticesOf(share.terms)) + share.sizes;
       const auto* const inside = structure.tree().VerticesIn(leaf);
@@ -504,6 +521,7 @@ absl::StatusOr<SizeEstimate> EstimateSize(const QueryStructure<D>& structure, co
     estimate.bytes += DomainBytesOf(estimate.vertices, domain->segment_count());
   }
   estimate.sampling_error = sample.error / estimate.vertices;
+  estimate.segments_compared = integrator.segments_compared();
   return estimate;
 }
 

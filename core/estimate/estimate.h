@@ -20,6 +20,8 @@ struct SizeEstimate {
   // The standard error of `vertices`, as a share of it, that comes from not looking at every leaf; 0 where all were
   // looked at. The error of the model is not in it.
   double sampling_error = 0;
+  // In a domain: segments that have been compared with places, or with parts of a leaf; what it has cost.
+  uint64_t segments_compared = 0;
 };
 
 // How closely an estimate looks.

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numbers>
 #include <queue>
 #include <vector>
@@ -92,6 +93,78 @@ double LeastPerSizeEverywhere() {
   return D == 3 ? kCovering3 / BallVolume(D) : LeastPerSize<D>();
 }
 
+// What is meshed: the box, or the faces of a domain.
+template <int D>
+struct BoxShape {
+  Box<D> box;
+
+  // In units of unit^D; the second about.
+  double VolumeIn(const Box<D>& part, double unit) const { return SharedVolume<D>(part, box, unit); }
+  double AboutIn(const Box<D>& part, double unit) const { return SharedVolume<D>(part, box, unit); }
+  double Volume(double unit) const { return SharedVolume<D>(box, box, unit); }
+  bool IsBounded(const SizeField<D>& sizes) const { return !sizes.IsUnbounded(); }
+  double LeastSize() const { return std::numeric_limits<double>::infinity(); }
+  // Vertices at least where the bound is the same everywhere, and to cover a part of the box.
+  double Least(double bound, double unit) const {
+    return std::max(LeastToCover<D>(box, bound), LeastPerSizeEverywhere<D>() * Volume(unit) * CountOf(unit, bound, D));
+  }
+  double LeastIn(const Box<D>& part, double bound) const { return LeastToCover<D>(part, bound); }
+  // About how many by kVerticesPerSize: with half a layer more at each face.
+  double Typical(const SizeField<D>& sizes) const {
+    const double bound = std::min(sizes.max_circumradius(), box.LongestSide());
+    double sum = 1;
+    for (const double side : SidesOf<D>(box)) {
+      sum *= side / bound + 1;
+    }
+    return sum;
+  }
+};
+
+struct FacesShape {
+  // With more boxes of sizes, what each shares with the faces is not looked at, but taken as that of its neighbourhood.
+  static constexpr size_t kFewRegions = 8;
+
+  const DomainShape& domain;
+  Box<2> box;
+  double filled = 1;  // that part of the box
+  bool has_few_regions = true;
+
+  FacesShape(const DomainShape& shape, const SizeField<2>& sizes)
+      : domain(shape), box(shape.box()), has_few_regions(sizes.regions().size() <= kFewRegions) {
+    const double all = (box.high[0] - box.low[0]) * (box.high[1] - box.low[1]);
+    filled = all > 0 ? std::min(1.0, shape.area() / all) : 0;
+  }
+  double VolumeIn(const Box<2>& part, double unit) const { return domain.AreaIn(part) / (unit * unit); }
+  double AboutIn(const Box<2>& part, double unit) const {
+    return has_few_regions ? VolumeIn(part, unit) : filled * SharedVolume<2>(part, box, unit);
+  }
+  double Volume(double unit) const { return domain.area() / (unit * unit); }
+  bool IsBounded(const SizeField<2>& sizes) const { return !sizes.IsUnbounded() || !std::isinf(LeastSize()); }
+  double LeastSize() const {
+    double least = std::numeric_limits<double>::infinity();
+    for (const DomainShape::Part& part : domain.parts()) {
+      least = part.SizeFor(least);
+    }
+    return least;
+  }
+  double Least(double bound, double unit) const {
+    double sum = 0;
+    for (const DomainShape::Part& part : domain.parts()) {
+      sum += part.area / (unit * unit) * CountOf(unit, part.SizeFor(bound), 2);
+    }
+    return std::max(LeastPerSize<2>() * sum, domain.LeastVertices(bound));
+  }
+  double LeastIn(const Box<2>& /*part*/, double /*bound*/) const { return 0; }
+  double Typical(const SizeField<2>& sizes) const {
+    double sum = 1;
+    for (const DomainShape::Part& part : domain.parts()) {
+      const double size = std::min(std::max(part.SizeFor(sizes.max_circumradius()), sizes.least()), box.LongestSide());
+      sum += part.area / size / size + 0.5 * part.length / size;
+    }
+    return sum;
+  }
+};
+
 // A part of the box, and the sizes there.
 template <int D>
 struct SizedPart {
@@ -105,8 +178,8 @@ struct SizedPart {
 
 // Cuts the box in parts, in each of which h is about the same, as far as so many tell: where most vertices are wanted
 // first.
-template <int D>
-std::vector<SizedPart<D>> PartsBySize(const Box<D>& box, const SizeField<D>& sizes, double unit) {
+template <int D, typename Shape>
+std::vector<SizedPart<D>> PartsBySize(const Shape& shape, const SizeField<D>& sizes, double unit) {
   const auto part_of = [&](const Box<D>& in) {
     Point<D> middle;
     double diagonal_sq = 0;
@@ -114,7 +187,7 @@ std::vector<SizedPart<D>> PartsBySize(const Box<D>& box, const SizeField<D>& siz
       middle[i] = 0.5 * (in.low[i] + in.high[i]);
       diagonal_sq += (in.high[i] - in.low[i]) * (in.high[i] - in.low[i]);
     }
-    SizedPart<D> part{.box = in, .volume = SharedVolume<D>(in, in, unit)};
+    SizedPart<D> part{.box = in, .volume = shape.VolumeIn(in, unit)};
     part.size = std::sqrt(sizes.AtSq(middle));
     part.most =
         std::min(part.size + 0.5 * sizes.growth().of_samples * std::sqrt(diagonal_sq), sizes.max_circumradius());
@@ -125,7 +198,7 @@ std::vector<SizedPart<D>> PartsBySize(const Box<D>& box, const SizeField<D>& siz
   };
   std::priority_queue<SizedPart<D>, std::vector<SizedPart<D>>, decltype(is_after)> open(is_after);
   std::vector<SizedPart<D>> parts;
-  open.push(part_of(box));
+  open.push(part_of(shape.box));
   while (!open.empty()) {
     const SizedPart<D> part = open.top();
     open.pop();
@@ -147,15 +220,15 @@ std::vector<SizedPart<D>> PartsBySize(const Box<D>& box, const SizeField<D>& siz
 }
 
 // Vertices that sizes at points take at least. A simplex with a place y and circumcentre c has R <= h(c) <= h(y) + G R.
-template <int D>
-double LeastVerticesForSamples(const Box<D>& box, const SizeField<D>& sizes) {
+template <int D, typename Shape>
+double LeastVerticesForSamples(const Shape& shape, const SizeField<D>& sizes) {
   const double slack = 1 - sizes.growth().of_samples;
   if (sizes.samples().empty() || slack == 0) {
     return 0;
   }
-  const double unit = box.LongestSide();
+  const double unit = shape.box.LongestSide();
   double sum = 0;
-  for (const SizedPart<D>& part : PartsBySize<D>(box, sizes.OfSamples(), unit)) {
+  for (const SizedPart<D>& part : PartsBySize<D>(shape, sizes.OfSamples(), unit)) {
     sum += part.Count(part.most / slack, unit);
   }
   return LeastPerSize<D>() * sum;
@@ -174,22 +247,18 @@ double LeastThat(double least, double most, F fits) {
   return most;
 }
 
-}  // namespace
-
-template <int D>
-double LeastVerticesForSizes(const Box<D>& box, const SizeField<D>& sizes) {
-  if (sizes.IsUnbounded()) {
+template <int D, typename Shape>
+double LeastFor(const Shape& shape, const SizeField<D>& sizes) {
+  if (!shape.IsBounded(sizes)) {
     return 0;
   }
+  const Box<D>& box = shape.box;
   const double unit = box.LongestSide();
   const double everywhere = sizes.max_circumradius();
-  const double whole =
-      std::max(LeastToCover<D>(box, everywhere),
-               LeastPerSizeEverywhere<D>() * SharedVolume<D>(box, box, unit) * CountOf(unit, everywhere, D));
   // The smallest sizes first, of each box what no smaller size has been counted in.
   std::vector<typename SizeField<D>::Region> regions = sizes.regions();
   std::sort(regions.begin(), regions.end(), [](const auto& a, const auto& b) { return a.size < b.size; });
-  double rest = SharedVolume<D>(box, box, unit);
+  double rest = shape.Volume(unit);
   double sum = 0;
   double most = 0;
   for (size_t i = 0; i < std::min(regions.size(), kMostRegions) && regions[i].size < everywhere; ++i) {
@@ -203,16 +272,74 @@ double LeastVerticesForSizes(const Box<D>& box, const SizeField<D>& sizes) {
     if (!meets) {
       continue;
     }
-    double own = SharedVolume<D>(inside, inside, unit);
+    double own = shape.VolumeIn(inside, unit);
     rest -= own;
     for (size_t j = 0; j < i; ++j) {
       own -= SharedVolume<D>(inside, regions[j].place, unit);
     }
     sum += std::max(0.0, own) * CountOf(unit, regions[i].size, D);
-    most = std::max(most, LeastToCover<D>(inside, regions[i].size));
+    most = std::max(most, shape.LeastIn(inside, regions[i].size));
   }
   sum += std::max(0.0, rest) * CountOf(unit, everywhere, D);
-  return kRounding * std::max({whole, most, LeastPerSize<D>() * sum, LeastVerticesForSamples<D>(box, sizes)});
+  return kRounding * std::max({shape.Least(everywhere, unit), most, LeastPerSize<D>() * sum,
+                               LeastVerticesForSamples<D>(shape, sizes)});
+}
+
+// Ends early once it is above `most`.
+template <int D, typename Shape>
+double TypicalFor(const Shape& shape, const SizeField<D>& sizes,
+                  double most = std::numeric_limits<double>::infinity()) {
+  const double unit = shape.box.LongestSide();
+  const double everywhere = std::min(sizes.max_circumradius(), unit);
+  double sum = shape.Typical(sizes);
+  const double growth = sizes.growth().of_regions;
+  for (const auto& region : sizes.regions()) {
+    double size = std::max(region.size, sizes.least());
+    double before = 0;
+    // What is nearer to the box than its size, and then shells about that, in which sizes are as large as the shell is
+    // far, times the growth.
+    for (double reach = size / growth; size < everywhere && kVerticesPerSize<D> * sum <= most;
+         size = growth * reach, reach *= kShellRatio) {
+      const double within = shape.AboutIn(Grown<D>(region.place, reach), unit);
+      sum += (within - before) * CountOf(unit, size, D);
+      before = within;
+    }
+  }
+  if (!sizes.samples().empty() && kVerticesPerSize<D> * sum <= most) {
+    double of_samples = 0;
+    for (const SizedPart<D>& part : PartsBySize<D>(shape, sizes.OfSamples(), unit)) {
+      of_samples += part.Count(std::max(part.size, 0.5 * part.most), unit);
+    }
+    sum = std::max(sum, of_samples);
+  }
+  return kVerticesPerSize<D> * sum;
+}
+
+template <int D, typename Shape>
+double SmallestFor(const Shape& shape, const SizeField<D>& sizes, double vertices) {
+  double least = std::min(sizes.max_circumradius(), shape.LeastSize());
+  for (const auto& region : sizes.regions()) {
+    least = std::min(least, region.size);
+  }
+  for (const auto& sample : sizes.samples()) {
+    least = std::min(least, sample.size);
+  }
+  const double most = shape.box.LongestSide();
+  return LeastThat(std::min(least, most), most, [&](double size) {
+    SizeField<D> raised = sizes;
+    raised.RaiseTo(size);
+    return TypicalFor<D>(shape, raised, vertices) <= vertices;
+  });
+}
+
+}  // namespace
+
+template <int D>
+double LeastVerticesForSizes(const Box<D>& box, const SizeField<D>& sizes) {
+  return LeastFor<D>(BoxShape<D>{box}, sizes);
+}
+double LeastVerticesForSizes(const DomainShape& shape, const SizeField<2>& sizes) {
+  return LeastFor<2>(FacesShape(shape, sizes), sizes);
 }
 
 template <int D>
@@ -222,33 +349,10 @@ double LeastVerticesForShape(const Box<D>& box, double rho) {
 
 template <int D>
 double TypicalVerticesForSizes(const Box<D>& box, const SizeField<D>& sizes) {
-  const double unit = box.LongestSide();
-  const double everywhere = std::min(sizes.max_circumradius(), unit);
-  // With half a layer more at each face.
-  double sum = 1;
-  for (const double side : SidesOf<D>(box)) {
-    sum *= side / everywhere + 1;
-  }
-  const double growth = sizes.growth().of_regions;
-  for (const auto& region : sizes.regions()) {
-    double size = std::max(region.size, sizes.least());
-    double before = 0;
-    // What is nearer to the box than its size, and then shells about that, in which sizes are as large as the shell is
-    // far, times the growth.
-    for (double reach = size / growth; size < everywhere; size = growth * reach, reach *= kShellRatio) {
-      const double within = SharedVolume<D>(Grown<D>(region.place, reach), box, unit);
-      sum += (within - before) * CountOf(unit, size, D);
-      before = within;
-    }
-  }
-  if (!sizes.samples().empty()) {
-    double of_samples = 0;
-    for (const SizedPart<D>& part : PartsBySize<D>(box, sizes.OfSamples(), unit)) {
-      of_samples += part.Count(std::max(part.size, 0.5 * part.most), unit);
-    }
-    sum = std::max(sum, of_samples);
-  }
-  return kVerticesPerSize<D> * sum;
+  return TypicalFor<D>(BoxShape<D>{box}, sizes);
+}
+double TypicalVerticesForSizes(const DomainShape& shape, const SizeField<2>& sizes) {
+  return TypicalFor<2>(FacesShape(shape, sizes), sizes);
 }
 
 template <int D>
@@ -264,19 +368,10 @@ double TypicalVerticesForShape(const Box<D>& box) {
 
 template <int D>
 double SmallestSizeFor(const Box<D>& box, const SizeField<D>& sizes, double vertices) {
-  double least = sizes.max_circumradius();
-  for (const auto& region : sizes.regions()) {
-    least = std::min(least, region.size);
-  }
-  for (const auto& sample : sizes.samples()) {
-    least = std::min(least, sample.size);
-  }
-  const double most = box.LongestSide();
-  return LeastThat(std::min(least, most), most, [&](double size) {
-    SizeField<D> raised = sizes;
-    raised.RaiseTo(size);
-    return TypicalVerticesForSizes<D>(box, raised) <= vertices;
-  });
+  return SmallestFor<D>(BoxShape<D>{box}, sizes, vertices);
+}
+double SmallestSizeFor(const DomainShape& shape, const SizeField<2>& sizes, double vertices) {
+  return SmallestFor<2>(FacesShape(shape, sizes), sizes, vertices);
 }
 
 template <int D>

@@ -3,6 +3,7 @@
 #ifndef WELLSPACE_CORE_ESTIMATE_LEAST_VERTICES_H_
 #define WELLSPACE_CORE_ESTIMATE_LEAST_VERTICES_H_
 
+#include "core/estimate/domain_shape.h"
 #include "core/geometry/box.h"
 #include "core/refine/sizing.h"
 
@@ -22,6 +23,11 @@ namespace wellspace::core {
 // Source:     Coxeter, Few and Rogers 1959, for 3-D; docs/design/estimate.md.
 template <int D>
 double LeastVerticesForSizes(const Box<D>& box, const SizeField<D>& sizes);
+// The same of a domain in the plane, with the largest areas in its faces: of these the first bound holds for each
+// alone, and no edge on a segment is longer than twice the circumradius beside it.
+//
+// Complexity: O(regions^2), and O(n log n) for n segments.
+double LeastVerticesForSizes(const DomainShape& shape, const SizeField<2>& sizes);
 
 // No mesh of `box` has fewer vertices that keeps `rho`, by either criterion: a thin box needs many.
 //
@@ -36,6 +42,7 @@ double LeastVerticesForShape(const Box<D>& box, double rho);
 // Source:     the model of docs/design/estimate.md, without points.
 template <int D>
 double TypicalVerticesForSizes(const Box<D>& box, const SizeField<D>& sizes);
+double TypicalVerticesForSizes(const DomainShape& shape, const SizeField<2>& sizes);
 template <int D>
 double TypicalVerticesForShape(const Box<D>& box);
 
@@ -43,6 +50,8 @@ double TypicalVerticesForShape(const Box<D>& box);
 // side in the same way. At most the longest side of the box.
 template <int D>
 double SmallestSizeFor(const Box<D>& box, const SizeField<D>& sizes, double vertices);
+// Largest areas are raised as sizes are.
+double SmallestSizeFor(const DomainShape& shape, const SizeField<2>& sizes, double vertices);
 template <int D>
 double SmallestSideFor(const Box<D>& box, double vertices);
 

@@ -14,6 +14,27 @@ namespace {
 // Leaves that one thread fills at a time.
 constexpr size_t kFilledTogether = 4096;
 
+// Whether a leaf is to be split for the sake of segments: if it is crowded, and the lists of all leaves have fewer
+// entries than 16 for each segment and four million. Where segments are so near each other that this is not enough, a
+// mesh has several times as many vertices as the lists have entries, from sixteen million on: that more segments meet a
+// leaf is its least trouble, and the estimate, which refuses it, has a tree to look at.
+bool HasTooMany(const SegmentLists& lists, NodeId leaf, uint64_t nodes) {
+  constexpr uint64_t kBytesPerSegment = sizeof(SegmentLists::Ends) + 16 * sizeof(uint32_t);
+  constexpr uint64_t kBytesPerNode = 2 * sizeof(uint32_t);
+  constexpr uint64_t kBytesAnyway = uint64_t{16} << 20;
+  return lists.IsCrowded(leaf) &&
+         lists.MemoryBytes() <= lists.count() * kBytesPerSegment + nodes * kBytesPerNode + kBytesAnyway;
+}
+
+// What there is beside the tree while it is built: points, and of a domain its graph and faces.
+template <int D>
+uint64_t BytesBeside(std::span<const Point<D>> points, const SegmentLists& lists) {
+  constexpr uint64_t kDomainBytesPerSegment = 80;
+  constexpr uint64_t kDomainBytesPerPoint = 40;
+  return points.size_bytes() +
+         (lists.IsEmpty() ? 0 : lists.count() * kDomainBytesPerSegment + points.size() * kDomainBytesPerPoint);
+}
+
 // The next larger number with the same bits in `fixed`.
 constexpr uint32_t NextAlong(uint32_t number, uint32_t fixed) {
   return (((number | fixed) + 1) & ~fixed) | (number & fixed);
@@ -88,7 +109,7 @@ absl::Status LeafTree<D>::Build(const MortonGrid<D>& grid, std::span<const Point
         if (At(leaf).first_child != kNoNode) {
           continue;
         }
-        if (ranges_[Index(leaf)].size() > kLeafCapacity || segments_.IsCrowded(leaf) ||
+        if (ranges_[Index(leaf)].size() > kLeafCapacity || HasTooMany(segments_, leaf, node_count()) ||
             (!only_crowded && IsTooCoarse(leaf))) {
           Split(leaf);
         }
@@ -99,7 +120,7 @@ absl::Status LeafTree<D>::Build(const MortonGrid<D>& grid, std::span<const Point
         }
         if ((++looked_at & 1023) == 0) {
           WELLSPACE_RETURN_IF_ERROR(context.Check());
-          WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(MemoryBytes() + points.size_bytes()));
+          WELLSPACE_RETURN_IF_ERROR(context.AllowMemory(MemoryBytes() + BytesBeside<D>(points, segments_)));
         }
       }
     }
