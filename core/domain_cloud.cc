@@ -1,5 +1,6 @@
 #include "core/domain_cloud.h"
 
+#include <algorithm>
 #include <numeric>
 #include <utility>
 #include <vector>
@@ -15,7 +16,45 @@ namespace {
 // as near to a cell in the domain as a segment.
 constexpr double kRoom = 0.5;
 
+// Of a graph and its copy without what is not meshed, its faces, the sweep that finds them, and the sorted points.
+constexpr uint64_t kPointBytes = 120;
+constexpr uint64_t kSegmentBytes = 215;
+constexpr uint64_t kSeedBytes = 16;
+
+// The numbers that the points which are meshed have in the graph, and their coordinates.
+struct MeshedPoints {
+  std::vector<double> coordinates;
+  std::vector<uint32_t> names;
+  uint64_t dropped = 0;  // given points that are not among them
+};
+
+absl::StatusOr<MeshedPoints> TakeMeshedPoints(const PlanarGraph& graph, const PlanarFaces& faces,
+                                              const RunContext& context) {
+  const std::vector<bool> is_meshed = FindMeshedPoints(graph, faces);
+  const auto count = static_cast<size_t>(std::count(is_meshed.begin(), is_meshed.end(), true));
+  MeshedPoints taken;
+  taken.coordinates.reserve(2 * count);
+  taken.names.reserve(count);
+  for (size_t p = 0; p < graph.points.size(); ++p) {
+    if (p % kStepsBetweenChecks == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
+    if (is_meshed[p]) {
+      taken.coordinates.insert(taken.coordinates.end(), graph.points[p].begin(), graph.points[p].end());
+      taken.names.push_back(graph.input_of_point[p]);
+    }
+  }
+  for (const uint32_t point : graph.point_of_input) {
+    taken.dropped += is_meshed[point] ? 0 : 1;
+  }
+  return taken;
+}
+
 }  // namespace
+
+uint64_t DomainCloudBytes(uint64_t points, uint64_t segments, uint64_t seeds) {
+  return points * kPointBytes + segments * kSegmentBytes + seeds * kSeedBytes;
+}
 
 absl::StatusOr<DomainCloud> MakeDomainCloud(std::span<const double> points, const Features& features, const Box<2>& box,
                                             int threads, const RunContext& context) {
@@ -38,22 +77,15 @@ absl::StatusOr<DomainCloud> MakeDomainCloud(std::span<const double> points, cons
   WELLSPACE_ASSIGN_OR_RETURN(PlanarGraph graph,
                              MakePlanarGraph(points, features, is_in_box ? &box : nullptr,
                                              domain.MinSeparation() / domain.scale, threads, context));
+  // Crossings may have made many more of them.
+  WELLSPACE_RETURN_IF_ERROR(
+      context.AllowMemory(DomainCloudBytes(graph.points.size(), graph.segments.size(), features.seeds.size())));
   WELLSPACE_ASSIGN_OR_RETURN(PlanarFaces faces, FindFaces(graph, features.faces, features.seeds, context));
-
-  const std::vector<bool> is_meshed = FindMeshedPoints(graph, faces);
-  std::vector<double> kept;
-  std::vector<uint32_t> names;
-  for (size_t p = 0; p < graph.points.size(); ++p) {
-    if (is_meshed[p]) {
-      kept.insert(kept.end(), graph.points[p].begin(), graph.points[p].end());
-      names.push_back(graph.input_of_point[p]);
-    }
-  }
-  uint64_t dropped_points = 0;
-  for (const uint32_t point : graph.point_of_input) {
-    dropped_points += is_meshed[point] ? 0 : 1;
-  }
-  WELLSPACE_ASSIGN_OR_RETURN(SortedCloud<2> cloud, SortCloud<2>(domain, kept, threads, context, names));
+  WELLSPACE_ASSIGN_OR_RETURN(MeshedPoints meshed, TakeMeshedPoints(graph, faces, context));
+  WELLSPACE_ASSIGN_OR_RETURN(SortedCloud<2> cloud,
+                             SortCloud<2>(domain, meshed.coordinates, threads, context, meshed.names));
+  meshed.coordinates = {};  // the cloud has them
+  meshed.names = {};
   const HugeVector<uint32_t> sorted_of = cloud.SortedOfInputs();
   for (Point<2>& p : graph.points) {
     p = domain.Scaled(p);
@@ -63,7 +95,7 @@ absl::StatusOr<DomainCloud> MakeDomainCloud(std::span<const double> points, cons
   }
   KeepMeshed(sorted_of, graph, faces);
   return DomainCloud{domain, std::move(cloud), std::make_unique<PlanarDomain>(std::move(graph), std::move(faces)),
-                     dropped_points};
+                     meshed.dropped};
 }
 
 }  // namespace wellspace::core

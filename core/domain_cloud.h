@@ -24,12 +24,19 @@ struct DomainCloud {
   uint64_t dropped_points = 0;  // given ones that touch no face which is meshed
 };
 
+// What MakeDomainCloud takes at its peak for so many points, segments and seeds, and what building the tree over them
+// takes beside its own then; as measured.
+//
+// Complexity: O(1).
+uint64_t DomainCloudBytes(uint64_t points, uint64_t segments, uint64_t seeds);
+
 // Cleans points and segments, finds faces, and sorts what is meshed. With FaceRule::kBox the sides of `box` bound the
 // domain; with the others it is not used.
 //
 // Shapes:     points: n x 2, row-major.
 // Complexity: O((n + m) log (n + m)) for most inputs.
-// Errors:     those of CheckPoints, MakePlanarGraph, FindFaces and SortCloud.
+// Errors:     those of CheckPoints, MakePlanarGraph, FindFaces and SortCloud; RESOURCE_EXHAUSTED, or another of the
+//             context's lender, when crossings make more of them than there is memory for.
 absl::StatusOr<DomainCloud> MakeDomainCloud(std::span<const double> points, const Features& features, const Box<2>& box,
                                             int threads, const RunContext& context);
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <numeric>
@@ -10,11 +12,13 @@
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "core/base/cancellable_sort.h"
 #include "core/base/memory/huge_pages.h"
 #include "core/base/status_macros.h"
 #include "core/base/stopwatch.h"
 #include "core/base/thread_team.h"
 #include "core/domain_parameters.h"
+#include "core/estimate/domain_shape.h"
 #include "core/feasibility.h"
 #include "core/mesh_estimate.h"
 #include "core/mesher_checks.h"
@@ -36,6 +40,9 @@ constexpr uint32_t kSegmentsTogether = 1024;
 
 // A ratio that exceeds rho by less, relatively, is what was rounded.
 constexpr double kRatioTolerance = 1e-9;
+
+// Vertices that one thread looks at between two looks at the context.
+constexpr uint32_t kVerticesBetweenChecks = 1 << 14;
 
 // Refuses spans of other lengths than each other's.
 absl::Status CheckShapes(std::span<const double> points, const Features& features) {
@@ -83,6 +90,18 @@ int64_t PartOf(const GraphSegment& segment) {
                                                     : int64_t{segment.marker};
 }
 
+// The least of the largest areas in faces that are meshed.
+LargestArea LeastAreaOf(const PlanarDomain& planar, std::span<const FaceSeed> seeds, double scale) {
+  LargestArea least;
+  for (const Face& face : planar.faces().faces) {
+    least.area = face.is_meshed ? std::min(least.area, face.max_area) : least.area;
+  }
+  least.area /= scale * scale;  // powers of two: as it was given
+  const auto asks = [&](const FaceSeed& seed) { return !seed.is_hole && seed.max_area == least.area; };
+  least.seed = static_cast<size_t>(std::find_if(seeds.begin(), seeds.end(), asks) - seeds.begin());
+  return least;
+}
+
 std::string PartName(int64_t part) {
   if (part < std::numeric_limits<int32_t>::min()) {
     return FaceName(static_cast<int>(part - kFirstSide));
@@ -97,6 +116,10 @@ absl::Status DomainMesher::Initialize(const MeshParameters& parameters, std::spa
   WELLSPACE_RETURN_IF_ERROR(ValidateDomainParameters(parameters, features));
   WELLSPACE_RETURN_IF_ERROR(CheckShapes(points, features));
   context.EnterPhase(Phase::kTree);
+  const uint64_t count = points.size() / 2;
+  WELLSPACE_RETURN_IF_ERROR(
+      ReserveForBuilding<2>(parameters, count, kTreeBytes<2>,
+                            DomainCloudBytes(count, features.segment_count(), features.seeds.size()), context));
   Box<2> box{{0, 0}, {1, 1}};
   if (features.faces == FaceRule::kBox) {
     if (parameters.domain_low.empty()) {
@@ -108,6 +131,7 @@ absl::Status DomainMesher::Initialize(const MeshParameters& parameters, std::spa
   WELLSPACE_ASSIGN_OR_RETURN(DomainCloud made, MakeDomainCloud(points, features, box, parameters.threads, context));
   domain_ = made.domain;
   planar_ = std::move(made.planar);
+  least_area_ = LeastAreaOf(*planar_, features.seeds, domain_.scale);
   dropped_points_ = made.dropped_points;
   const uint64_t max_vertices = VertexBudget(parameters);
   if (planar_->point_count() > max_vertices) {
@@ -115,7 +139,7 @@ absl::Status DomainMesher::Initialize(const MeshParameters& parameters, std::spa
                                                      " points of the domain are more than ",
                                                      "max_vertices = ", max_vertices, " vertices; raise max_vertices"));
   }
-  NumberPoints(made, points);
+  WELLSPACE_RETURN_IF_ERROR(NumberPoints(made, points, context));
   WELLSPACE_RETURN_IF_ERROR(structure_.Initialize(made.cloud.grid, std::move(made.cloud.points),
                                                   kLeavesPerVertex * max_vertices + 4, parameters.threads, context,
                                                   planar_->Ends()));
@@ -133,9 +157,11 @@ absl::Status DomainMesher::Initialize(const MeshParameters& parameters, std::spa
 }
 
 // Numbers the points of the graph in the order that they have there.
-void DomainMesher::NumberPoints(const DomainCloud& made, std::span<const double> points) {
+absl::Status DomainMesher::NumberPoints(const DomainCloud& made, std::span<const double> points,
+                                        const RunContext& context) {
   PointNames names;
   const HugeVector<uint32_t> sorted_of = made.cloud.SortedOfInputs();
+  WELLSPACE_RETURN_IF_ERROR(context.Check());
   names.of_sorted.resize(sorted_of.size());
   for (uint32_t i = 0; i < sorted_of.size(); ++i) {
     names.of_sorted[sorted_of[i]] = i;
@@ -143,7 +169,9 @@ void DomainMesher::NumberPoints(const DomainCloud& made, std::span<const double>
   for (const uint32_t point : planar_->graph().point_of_input) {
     names.of_input.push_back(point == PlanarGraph::kNoInput ? kNoOutput : names.of_sorted[point]);
   }
+  WELLSPACE_RETURN_IF_ERROR(context.Check());
   numbering_.Begin(std::move(names), points, {});
+  return absl::OkStatus();
 }
 
 uint64_t DomainMesher::memory_bytes() const {
@@ -157,12 +185,18 @@ uint64_t DomainMesher::memory_bytes() const {
   return bytes;
 }
 
+absl::Status DomainMesher::CheckFeasible(const MeshParameters& parameters) const {
+  WELLSPACE_RETURN_IF_ERROR(CheckParametersIn(parameters, 2));
+  return core::CheckFeasible(DomainShape(*planar_), domain_, parameters, samples_, planar_->point_count(), least_area_);
+}
+
 absl::Status DomainMesher::Refine(const MeshParameters& parameters, RunContext& context) {
   WELLSPACE_RETURN_IF_ERROR(CheckParametersIn(parameters, 2));
   if (parameters.criterion != Criterion::kRadiusEdge) {
     return absl::InvalidArgumentError("criterion: a domain with segments has the radius-edge criterion alone");
   }
   context.EnterPhase(Phase::kRefinement);
+  WELLSPACE_RETURN_IF_ERROR(AllowSamples<2>(parameters, samples_, memory_bytes(), context));
   WELLSPACE_RETURN_IF_ERROR(samples_.Take(domain_, mesh_box_, parameters, context));
   made_.reset();
   const Stopwatch stopwatch(figures_.refinement_seconds, figures_.simplices_seconds);
@@ -177,15 +211,15 @@ absl::Status DomainMesher::MakeConforming(const MeshParameters& parameters, RunC
     WELLSPACE_RETURN_IF_ERROR(
         refinement_->Run(criteria, VertexBudget(parameters), parameters.threads, context, nullptr, nullptr));
     PlanarDomain::Chains chains = planar_->FindChains();
-    std::vector<Subsegment> to_split = EncroachedSubsegments(chains, parameters.threads);
-    WELLSPACE_RETURN_IF_ERROR(context.Check());
+    WELLSPACE_ASSIGN_OR_RETURN(std::vector<Subsegment> to_split,
+                               EncroachedSubsegments(chains, parameters.threads, context));
     if (to_split.empty()) {
       WELLSPACE_ASSIGN_OR_RETURN(to_split, MakeTriangles(std::move(chains), parameters.threads, context));
     }
     if (to_split.empty()) {
       return absl::OkStatus();
     }
-    WELLSPACE_RETURN_IF_ERROR(Split(to_split, parameters));
+    WELLSPACE_RETURN_IF_ERROR(Split(to_split, parameters, context));
   }
 }
 
@@ -227,8 +261,8 @@ bool DomainMesher::IsEncroached(const Subsegment& subsegment, Workspace<2>& work
 
 // The subsegments in whose diametral disc a vertex lies that no cell has seen, since it is clipped on a side that is
 // not meshed.
-std::vector<DomainMesher::Subsegment> DomainMesher::EncroachedSubsegments(const PlanarDomain::Chains& chains,
-                                                                          int threads) const {
+absl::StatusOr<std::vector<DomainMesher::Subsegment>> DomainMesher::EncroachedSubsegments(
+    const PlanarDomain::Chains& chains, int threads, const RunContext& context) const {
   const uint32_t segments = planar_->segment_count();
   std::vector<std::vector<Subsegment>> found((segments + kSegmentsTogether - 1) / kSegmentsTogether);  // by block
   ThreadTeam team(threads);
@@ -237,7 +271,7 @@ std::vector<DomainMesher::Subsegment> DomainMesher::EncroachedSubsegments(const 
     const auto begin = static_cast<uint32_t>(block) * kSegmentsTogether;
     for (uint32_t segment = begin; segment < std::min(segments, begin + kSegmentsTogether); ++segment) {
       const std::span<const VertexId> chain = chains.Of(segment);
-      for (size_t i = 0; i + 1 < chain.size(); ++i) {
+      for (size_t i = 0; i + 1 < chain.size() && !context.IsCancelled(); ++i) {
         const Subsegment subsegment{segment, chain[i], chain[i + 1]};
         if (IsEncroached(subsegment, workspaces[ThreadTeam::CurrentThread()])) {
           found[block].push_back(subsegment);
@@ -245,6 +279,7 @@ std::vector<DomainMesher::Subsegment> DomainMesher::EncroachedSubsegments(const 
       }
     }
   });
+  WELLSPACE_RETURN_IF_ERROR(context.Check());
   std::vector<Subsegment> encroached;
   for (const std::vector<Subsegment>& of_block : found) {
     encroached.insert(encroached.end(), of_block.begin(), of_block.end());
@@ -253,8 +288,10 @@ std::vector<DomainMesher::Subsegment> DomainMesher::EncroachedSubsegments(const 
 }
 
 // Splits each subsegment in its middle.
-absl::Status DomainMesher::Split(std::span<const Subsegment> subsegments, const MeshParameters& parameters) {
+absl::Status DomainMesher::Split(std::span<const Subsegment> subsegments, const MeshParameters& parameters,
+                                 const RunContext& context) {
   for (const Subsegment& subsegment : subsegments) {
+    WELLSPACE_RETURN_IF_ERROR(context.Check());
     const SegmentPoint place = planar_->MiddleOf(subsegment.segment, subsegment.from, subsegment.to);
     const Point<2> position = planar_->PositionOf(place);
     const Neighbor nearest = structure_.NearestTo(position, subsegment.from, workspace_);
@@ -330,19 +367,19 @@ absl::StatusOr<Mesh> DomainMesher::Extract(int threads, RunContext& context) {
   }
   WELLSPACE_ASSIGN_OR_RETURN(mesh.points, numbering_.PointsFrom(structure_, domain_, 0, context));
   mesh.input_vertex = numbering_.input_vertex();
-  SetOrigins(mesh);
+  WELLSPACE_RETURN_IF_ERROR(SetOrigins(mesh, context));
   DomainSimplices triangles = std::exchange(made_->triangles, {});
   Simplices& simplices = triangles.simplices;
   mesh.simplices = std::move(simplices.indices);
   mesh.statistics.max_radius_edge = simplices.max_radius_edge;
   mesh.statistics.min_angle_deg = simplices.min_angle_deg;
-  SetBoundary(mesh);
-  SetRegions(mesh, triangles.faces);
-  WELLSPACE_RETURN_IF_ERROR(context.Check());
+  WELLSPACE_RETURN_IF_ERROR(SetBoundary(mesh, context));
+  WELLSPACE_RETURN_IF_ERROR(SetRegions(mesh, triangles.faces, context));
+  WELLSPACE_ASSIGN_OR_RETURN(const uint64_t exempt, CountExempt(mesh, context));
   context.EnterPhase(Phase::kDone);
   figures_.simplices_seconds += absl::ToDoubleSeconds(context.TimeIn(Phase::kSimplices));
   figures_.NoteMesh(mesh);
-  SetStatistics(mesh);
+  SetStatistics(mesh, exempt);
   return mesh;
 }
 
@@ -354,9 +391,12 @@ absl::Status DomainMesher::Update(Mesh& mesh, int threads, RunContext& context) 
 }
 
 // Where vertices come from.
-void DomainMesher::SetOrigins(Mesh& mesh) const {
+absl::Status DomainMesher::SetOrigins(Mesh& mesh, const RunContext& context) const {
   mesh.vertex_origins.assign(mesh.vertex_count(), kSteinerOrigin);
   for (uint32_t p = 0; p < planar_->point_count(); ++p) {
+    if (p % kVerticesBetweenChecks == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
     const std::span<const HalfEdge> ways = planar_->WaysFrom(VertexId{p});
     const auto sides = std::count_if(ways.begin(), ways.end(),
                                      [&](HalfEdge h) { return planar_->graph().segments[SegmentOf(h)].IsBoxSide(); });
@@ -369,23 +409,29 @@ void DomainMesher::SetOrigins(Mesh& mesh) const {
       mesh.vertex_origins[v] = static_cast<uint32_t>(i - 1);
     }
   }
+  return context.Check();
 }
 
 // The subsegments, by what tells them apart; what is meshed is on the left of one that bounds it.
-void DomainMesher::SetBoundary(Mesh& mesh) const {
+absl::Status DomainMesher::SetBoundary(Mesh& mesh, const RunContext& context) const {
   const std::vector<GraphSegment>& segments = planar_->graph().segments;
   std::set<int64_t> values;
-  for (const GraphSegment& segment : segments) {
-    values.insert(PartOf(segment));
+  for (uint32_t s = 0; s < segments.size(); ++s) {
+    if (s % kVerticesBetweenChecks == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
+    values.insert(PartOf(segments[s]));
   }
   const std::map<int64_t, int32_t> tags = NumberAboveZero(values);
   std::vector<std::pair<int32_t, uint32_t>> order;  // tags and segments
+  order.reserve(segments.size());
   for (uint32_t s = 0; s < segments.size(); ++s) {
     order.emplace_back(tags.at(PartOf(segments[s])), s);
   }
-  std::sort(order.begin(), order.end());
+  WELLSPACE_RETURN_IF_ERROR(CancellableSort(order, std::less<>(), context));
   mesh.vertex_tags.assign(structure_.vertex_count(), kNoTag);
   for (const auto& [tag, s] : order) {
+    WELLSPACE_RETURN_IF_ERROR(context.Check());
     if (mesh.boundary.empty() || mesh.boundary.back().tag != tag) {
       mesh.boundary.push_back({tag, PartName(PartOf(segments[s])), 0});
     }
@@ -402,10 +448,11 @@ void DomainMesher::SetBoundary(Mesh& mesh) const {
       }
     }
   }
+  return absl::OkStatus();
 }
 
 // The region of each triangle: that of its face, which `faces_of` has.
-void DomainMesher::SetRegions(Mesh& mesh, std::span<const uint32_t> faces_of) const {
+absl::Status DomainMesher::SetRegions(Mesh& mesh, std::span<const uint32_t> faces_of, const RunContext& context) const {
   std::set<int64_t> values;
   for (const Face& face : planar_->faces().faces) {
     if (face.is_meshed) {
@@ -423,18 +470,25 @@ void DomainMesher::SetRegions(Mesh& mesh, std::span<const uint32_t> faces_of) co
   if (regions.size() > 1) {
     mesh.simplex_regions.reserve(mesh.simplex_count());
     for (const uint32_t face : faces_of) {
+      if (mesh.simplex_regions.size() % kVerticesBetweenChecks == 0) {
+        WELLSPACE_RETURN_IF_ERROR(context.Check());
+      }
       mesh.simplex_regions.push_back(ids.at(planar_->faces().faces[face].region));
     }
   }
+  return absl::OkStatus();
 }
 
 // How many triangles break rho.
-uint64_t DomainMesher::CountExempt(const Mesh& mesh) const {
+absl::StatusOr<uint64_t> DomainMesher::CountExempt(const Mesh& mesh, const RunContext& context) const {
   uint64_t count = 0;
   if (mesh.statistics.max_radius_edge <= rho_) {
     return count;
   }
   for (size_t t = 0; t < mesh.simplices.size(); t += 3) {
+    if (t % (3 * kVerticesBetweenChecks) == 0) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
     const Simplex<2> corners = {PointAt<2>(mesh.points, mesh.simplices[t]),
                                 PointAt<2>(mesh.points, mesh.simplices[t + 1]),
                                 PointAt<2>(mesh.points, mesh.simplices[t + 2])};
@@ -443,7 +497,7 @@ uint64_t DomainMesher::CountExempt(const Mesh& mesh) const {
   return count;
 }
 
-void DomainMesher::SetStatistics(Mesh& mesh) const {
+void DomainMesher::SetStatistics(Mesh& mesh, uint64_t exempt) const {
   MeshStatistics& statistics = mesh.statistics;
   statistics.input_points = mesh.input_vertex.size();
   const uint64_t added = mesh.input_vertex.size() - planar_->graph().point_of_input.size();
@@ -458,7 +512,7 @@ void DomainMesher::SetStatistics(Mesh& mesh) const {
   domain.touching_points = counts.touching_vertices;
   domain.crossings = counts.crossings;
   domain.near_points = counts.near_vertices;
-  domain.exempt_simplices = CountExempt(mesh);
+  domain.exempt_simplices = exempt;
   domain.min_input_angle_deg = planar_->MinAngle() * 180 / std::numbers::pi;
   statistics.vertices = mesh.vertex_count();
   statistics.simplices = mesh.simplex_count();

@@ -12,6 +12,7 @@
 #include "core/base/run_context.h"
 #include "core/domain.h"
 #include "core/domain_cloud.h"
+#include "core/feasibility.h"
 #include "core/features/features.h"
 #include "core/geometry/box.h"
 #include "core/mesher.h"
@@ -40,6 +41,7 @@ class DomainMesher final : public Mesher {
   int dimension() const override { return 2; }
   uint64_t vertex_count() const override { return structure_.vertex_count(); }
   uint64_t memory_bytes() const override;
+  absl::Status CheckFeasible(const MeshParameters& parameters) const override;
   absl::Status Refine(const MeshParameters& parameters, RunContext& context) override;
   absl::StatusOr<std::vector<uint32_t>> AddPointsNear(std::span<const double> points, std::span<const uint32_t> near,
                                                       RunContext& context) override;
@@ -66,22 +68,25 @@ class DomainMesher final : public Mesher {
     bool AreTrianglesTaken() const { return triangles.faces.empty(); }
   };
 
-  void NumberPoints(const DomainCloud& made, std::span<const double> points);
+  absl::Status NumberPoints(const DomainCloud& made, std::span<const double> points, const RunContext& context);
   bool IsEncroached(const Subsegment& subsegment, Workspace<2>& workspace) const;
-  std::vector<Subsegment> EncroachedSubsegments(const PlanarDomain::Chains& chains, int threads) const;
-  absl::Status Split(std::span<const Subsegment> subsegments, const MeshParameters& parameters);
+  absl::StatusOr<std::vector<Subsegment>> EncroachedSubsegments(const PlanarDomain::Chains& chains, int threads,
+                                                                const RunContext& context) const;
+  absl::Status Split(std::span<const Subsegment> subsegments, const MeshParameters& parameters,
+                     const RunContext& context);
   absl::Status MakeConforming(const MeshParameters& parameters, RunContext& context);
   absl::StatusOr<std::vector<Subsegment>> MakeTriangles(PlanarDomain::Chains chains, int threads, RunContext& context);
   void NoteAddedFrom(uint32_t first);
-  void SetOrigins(Mesh& mesh) const;
-  void SetBoundary(Mesh& mesh) const;
-  void SetRegions(Mesh& mesh, std::span<const uint32_t> faces_of) const;
-  uint64_t CountExempt(const Mesh& mesh) const;
-  void SetStatistics(Mesh& mesh) const;
+  absl::Status SetOrigins(Mesh& mesh, const RunContext& context) const;
+  absl::Status SetBoundary(Mesh& mesh, const RunContext& context) const;
+  absl::Status SetRegions(Mesh& mesh, std::span<const uint32_t> faces_of, const RunContext& context) const;
+  absl::StatusOr<uint64_t> CountExempt(const Mesh& mesh, const RunContext& context) const;
+  void SetStatistics(Mesh& mesh, uint64_t exempt) const;
 
   Domain<2> domain_;
   Box<2> mesh_box_;           // of what is meshed, not scaled
   ScaledSamples<2> samples_;  // of the last parameters
+  LargestArea least_area_;    // of the largest areas in faces that are meshed
   QueryStructure<2> structure_;
   std::unique_ptr<PlanarDomain> planar_;
   std::optional<Refinement<2>> refinement_;

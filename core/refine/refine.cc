@@ -26,7 +26,8 @@ constexpr uint64_t kReportInterval = 256;
 
 absl::Status TooManyVerticesError(uint64_t max_vertices) {
   return absl::ResourceExhaustedError(
-      absl::StrCat("the mesh needs more than max_vertices = ", max_vertices, " vertices; raise max_vertices or rho"));
+      absl::StrCat("the mesh needs more than max_vertices = ", max_vertices,
+                   " vertices; raise max_vertices, the sizes that are asked for, or rho"));
 }
 
 template <int D>
@@ -384,7 +385,9 @@ void Refinement<D>::ComputeCell(VertexId v, const Box<D>& clip, Workspace<D>& wo
 template <int D>
 absl::Status Refinement<D>::CountRefined() {
   if (++refined_ % kReportInterval == 0) {
-    WELLSPACE_RETURN_IF_ERROR(context_->AllowMemory(structure_.MemoryBytes() + MemoryBytes()));
+    const uint64_t of_samples = SampleTree<D>::BytesFor(rules_->criteria().sizes.samples().size());
+    const uint64_t of_domain = domain_ == nullptr ? 0 : domain_->MemoryBytes();
+    WELLSPACE_RETURN_IF_ERROR(context_->AllowMemory(structure_.MemoryBytes() + MemoryBytes() + of_samples + of_domain));
     context_->SetPhaseFraction(1 - static_cast<double>(pending_.schedule().size()) / structure_.vertex_count());
   }
   return absl::OkStatus();

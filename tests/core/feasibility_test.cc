@@ -4,12 +4,17 @@
 #include <cmath>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <tuple>
 #include <vector>
 
+#include "absl/strings/str_cat.h"
+#include "core/domain_cloud.h"
+#include "core/estimate/domain_shape.h"
 #include "core/mesher.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include "tests/core/domain_input.h"
 
 namespace wellspace::core {
 namespace {
@@ -177,6 +182,155 @@ TEST(Feasibility, WithoutADomainPointsSayHowLargeItIs) {
   RunContext context;
   EXPECT_TRUE(IsTooFine(MeshPoints(parameters, std::vector<double>{0, 0, 0, 1, 1, 1}, context).status()));
   EXPECT_TRUE(MeshPoints(parameters, std::vector<double>{0, 0, 0, 1e-4, 1e-4, 1e-4}, context).ok());
+}
+
+// ---- Domains in the plane
+
+using test::DomainInput;
+
+// An L of three unit squares, with a square hole in one of them.
+DomainInput Angle() {
+  DomainInput input = DomainInput().Ring({{0, 0}, {2, 0}, {2, 1}, {1, 1}, {1, 2}, {0, 2}});
+  input.Ring({{0.25, 0.25}, {0.75, 0.25}, {0.75, 0.75}, {0.25, 0.75}});
+  input.seeds.push_back({.at = {0.5, 0.5}, .is_hole = true});
+  return input;
+}
+constexpr double kAngleArea = 3 - 0.25;
+
+absl::Status Feasible(const DomainInput& input) {
+  MeshParameters of_tree = input.parameters;
+  of_tree.max_vertices = 0;
+  DomainInput plain = input;
+  plain.parameters = of_tree;
+  return plain.Create()->CheckFeasible(input.parameters);
+}
+
+std::shared_ptr<const SizeSamples> OneSize(double x, double y, double size) {
+  auto samples = std::make_shared<SizeSamples>();
+  samples->points = {x, y};
+  samples->sizes = {size};
+  return samples;
+}
+
+TEST(DomainFeasibility, HopelessSizesOfEveryKindAreRefusedBeforeAnyWorkWithWhatFits) {
+  struct Demand {
+    const char* name;
+    std::string_view unit;
+    void (*set)(DomainInput&, double size);
+  };
+  const std::vector<Demand> demands = {
+      {"max_circumradius: ", "size", [](DomainInput& input, double size) { input.parameters.max_circumradius = size; }},
+      {"edge_length: ", "size", [](DomainInput& input, double size) { input.parameters.edge_length = size; }},
+      {"size_boxes[0].max_circumradius: ", "size",
+       [](DomainInput& input, double size) {
+         input.parameters.size_boxes = {{{0.9, 0.1}, {1.9, 0.9}, size}};
+       }},
+      {"size_samples.sizes[0]: ", "size",
+       [](DomainInput& input, double size) {
+         input.parameters.gradation = 0.002;  // at the default it would ask for little
+         input.parameters.size_samples = OneSize(1.5, 0.5, size);
+       }},
+      {"seeds[1].max_area: ", "area", [](DomainInput& input, double area) {
+         input.seeds.resize(1);
+         input.seeds.push_back({.at = {1.5, 0.5}, .region = 1, .max_area = area});
+       }}};
+  for (const Demand& demand : demands) {
+    for (const uint64_t most : {uint64_t{2'000}, uint64_t{20'000}}) {
+      DomainInput input = Angle();
+      input.parameters.max_vertices = most;
+      demand.set(input, 1e-9);
+      RunContext context;
+      const absl::Status status = MeshFeatures(input.parameters, input.points, input.features(), context).status();
+      const bool is_sample = std::string_view(demand.name).starts_with("size_samples");
+      ASSERT_TRUE(IsTooFine(status)) << demand.name << status;
+      const std::string text(status.message());
+      EXPECT_THAT(text, AllOf(HasSubstr(demand.name), HasSubstr(absl::StrCat("max_vertices = ", most)),
+                              ::testing::Not(HasSubstr("rho"))));
+      EXPECT_GT(NumberAfter(text, "takes about "), static_cast<double>(most));
+      EXPECT_EQ(context.Snapshot().vertices, 10u) << "before any work";
+      demand.set(input, NumberAfter(text, "fits is about "));
+      const absl::StatusOr<Mesh> mesh = input.Make();
+      ASSERT_TRUE(mesh.ok()) << demand.name << mesh.status() << text;
+      EXPECT_GE(mesh->vertex_count(), most / (is_sample ? 40 : 10)) << text << " is not the smallest";
+    }
+  }
+}
+
+TEST(DomainFeasibility, WhatWasMeshedIsNotRefused) {
+  for (const double size : {0.5, 0.1, 0.03}) {
+    for (int kind = 0; kind < 5; ++kind) {
+      DomainInput input = kind == 4 ? DomainInput().Ring({{0, 0}, {1, 0}, {1, 1e-3}, {0, 1e-3}}) : Angle();
+      input.parameters.max_circumradius = kind == 0 || kind == 4 ? size : 0;
+      if (kind == 1) {
+        input.parameters.size_boxes = {{{-3, -3}, {0.5, 5}, size / 2}, {{0.2, 0.2}, {1.2, 0.8}, size / 3}};
+      } else if (kind == 2) {
+        input.parameters.size_samples = OneSize(1.5, 0.5, size / 10);
+      } else if (kind == 3) {
+        input.seeds.push_back({.at = {1.5, 0.5}, .region = 1, .max_area = size * size});
+      }
+      const absl::StatusOr<Mesh> mesh = input.Make();
+      ASSERT_TRUE(mesh.ok()) << mesh.status();
+      input.parameters.max_vertices = mesh->vertex_count();
+      EXPECT_TRUE(Feasible(input).ok()) << kind << ": " << Feasible(input) << " but took " << mesh->vertex_count();
+    }
+  }
+}
+
+TEST(DomainFeasibility, BoundsAreNearWhatMeshesTake) {
+  DomainInput input = Angle();
+  input.parameters.max_circumradius = 0.02;
+  const absl::StatusOr<Mesh> mesh = input.Make();
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  input.parameters.max_vertices = static_cast<uint64_t>(mesh->vertex_count() / 2.5);
+  EXPECT_TRUE(IsTooFine(Feasible(input)));
+}
+
+// A strip takes as many vertices as its sides are long, however small its area is.
+TEST(DomainFeasibility, LongSidesCount) {
+  DomainInput input = DomainInput().Ring({{0, 0}, {1, 0}, {1, 1e-6}, {0, 1e-6}});
+  input.parameters.rho = 1e6;
+  input.parameters.max_circumradius = 1e-6;
+  input.parameters.max_vertices = 100'000;
+  EXPECT_TRUE(IsTooFine(Feasible(input))) << Feasible(input);
+}
+
+TEST(DomainFeasibility, SizesInHolesAreNoDemands) {
+  DomainInput input = Angle();
+  input.parameters.size_boxes = {{{0.3, 0.3}, {0.7, 0.7}, 1e-3}};
+  input.parameters.max_vertices = 5'000;
+  EXPECT_TRUE(Feasible(input).ok()) << Feasible(input);
+  input.parameters.size_boxes = {{{0.4, 0.4}, {0.6, 0.6}, 1e-200}};
+  EXPECT_TRUE(Feasible(input).ok()) << Feasible(input);
+}
+
+TEST(DomainFeasibility, SizesBelowWhatDoublesServeAreBlamed) {
+  DomainInput input = Angle();
+  input.parameters.size_boxes = {{{0.4, 0.4}, {0.6, 0.6}, 1e-200}, {{1.5, 0.5}, {1.5, 0.5}, 1e-200}};
+  EXPECT_TRUE(IsTooFine(Feasible(input)));
+  EXPECT_THAT(std::string(Feasible(input).message()), HasSubstr("size_boxes[1].max_circumradius: 1e-200 is too fine"));
+  input.parameters.size_boxes.clear();
+  input.parameters.size_samples = OneSize(1.5, 0.5, 1e-200);
+  EXPECT_THAT(std::string(Feasible(input).message()), HasSubstr("size_samples.sizes[0]: 1e-200 is too fine"));
+}
+
+TEST(DomainFeasibility, WhatLiesInABoxIsMeasured) {
+  const DomainInput input = Angle();
+  RunContext context;
+  const absl::StatusOr<DomainCloud> made =
+      MakeDomainCloud(input.points, input.features(), {{0, 0}, {1, 1}}, 1, context);
+  ASSERT_TRUE(made.ok()) << made.status();
+  const DomainShape shape(*made->planar);
+  const double unit = made->domain.scale * made->domain.scale;
+  EXPECT_NEAR(shape.area(), kAngleArea * unit, 1e-9 * unit);
+  const auto area_in = [&](const Point<2>& low, const Point<2>& high) {
+    return shape.AreaIn({made->domain.Scaled(low), made->domain.Scaled(high)}) / unit;
+  };
+  EXPECT_NEAR(area_in({-9, -9}, {9, 9}), kAngleArea, 1e-9);
+  EXPECT_NEAR(area_in({0, 0}, {1, 1}), 0.75, 1e-9);
+  EXPECT_NEAR(area_in({0.5, 0.5}, {1.5, 1.5}), 0.25 * 3 - 0.0625, 1e-9);
+  EXPECT_NEAR(area_in({1.25, -1}, {1.5, 3}), 0.25, 1e-9);
+  EXPECT_EQ(area_in({0.3, 0.3}, {0.7, 0.7}), 0);
+  EXPECT_EQ(area_in({1.2, 1.2}, {1.7, 1.7}), 0);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include "core/mesher.h"
 #include "gtest/gtest.h"
+#include "tests/core/domain_input.h"
 #include "tests/support/clouds.h"
 
 namespace wellspace::core {
@@ -110,6 +111,107 @@ TEST(Memory, ARunThatOutgrowsItInAnyPhaseEndsWithTheLendersErrorAndCanGoOn) {
     const absl::StatusOr<Mesh> expected = MeshPoints(parameters, Cloud(), other);
     ASSERT_TRUE(expected.ok());
     EXPECT_EQ(mesh->simplices, expected->simplices);
+  }
+}
+
+// A thousand squares side by side, each with four points and as many segments.
+test::DomainInput Squares() {
+  test::DomainInput input;
+  for (int i = 0; i < 1000; ++i) {
+    const double x = 3.0 * (i % 32);
+    const double y = 3.0 * (i / 32);
+    input.Ring({{x, y}, {x + 1, y}, {x + 1, y + 1}, {x, y + 1}});
+  }
+  return input;
+}
+
+TEST(Memory, OfADomainIsReservedForItsGraphThenForTheMeshAndTheRunHoldsNoMore) {
+  for (const double size : {0.0, 0.1}) {
+    test::DomainInput input = Squares();
+    input.parameters.max_circumradius = size;
+    RunContext context;
+    Lender lender(context);
+    const absl::StatusOr<Mesh> mesh = MeshFeatures(input.parameters, input.points, input.features(), context);
+    ASSERT_TRUE(mesh.ok()) << mesh.status();
+    ASSERT_EQ(lender.reserved.size(), 2u);
+    // Coordinates, ends, and what a graph, its faces, a sweep over it and a tree need of each at least.
+    EXPECT_GT(lender.reserved[0], input.points.size() / 2 * 100 + input.ends.size() / 2 * 100);
+    EXPECT_LE(lender.peak, lender.reserved[1]);
+    for (const Phase phase : {Phase::kTree, Phase::kRefinement}) {  // which ends with the triangles
+      EXPECT_GT(lender.asked[static_cast<int>(phase)], 0) << PhaseName(phase);
+    }
+  }
+}
+
+TEST(Memory, OfADomainIsReservedBeforeItsFirstArrayIsMade) {
+  const test::DomainInput input = Squares();
+  for (const bool is_estimate : {false, true}) {
+    RunContext context;
+    Lender lender(context);
+    lender.reserve_limit = 4 << 20;
+    const absl::Status status =
+        is_estimate ? EstimateFeatures(input.parameters, input.points, input.features(), context).status()
+                    : MeshFeatures(input.parameters, input.points, input.features(), context).status();
+    EXPECT_EQ(status.message(), "reserve");
+    EXPECT_EQ(lender.reserved.size(), 1u);
+    EXPECT_EQ(lender.peak, 0u) << "it was asked for memory that was made";
+  }
+}
+
+TEST(Memory, ADomainThatOutgrowsItInAnyPhaseEndsWithTheLendersErrorAndCanGoOn) {
+  const test::DomainInput input = Squares();
+  RunContext context;
+  Lender lender(context);
+  lender.refused_phase = Phase::kTree;
+  EXPECT_EQ(Mesher::CreateInDomain(input.parameters, input.points, input.features(), context).status().message(),
+            "allow");
+
+  lender.refused_phase = Phase::kRefinement;
+  absl::StatusOr<std::unique_ptr<Mesher>> mesher =
+      Mesher::CreateInDomain(input.parameters, input.points, input.features(), context);
+  ASSERT_TRUE(mesher.ok()) << mesher.status();
+  EXPECT_EQ((*mesher)->Refine(input.parameters, context).message(), "allow");
+
+  lender.refused_phase = Phase::kDone;
+  ASSERT_TRUE((*mesher)->Refine(input.parameters, context).ok());
+  const absl::StatusOr<Mesh> mesh = (*mesher)->Extract(1, context);
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  const absl::StatusOr<Mesh> expected = input.Make();
+  ASSERT_TRUE(expected.ok()) << expected.status();
+  EXPECT_EQ(mesh->simplices, expected->simplices);
+}
+
+TEST(Memory, SizesAtPointsAreAskedForBeforeTheyAreTakenAndCountWhileTheMeshGrows) {
+  auto samples = std::make_shared<SizeSamples>();
+  for (int i = 0; i < 20'000; ++i) {
+    samples->points.insert(samples->points.end(), {0.5 + 1e-6 * (i % 100), 0.5 + 1e-6 * (i / 100)});
+    samples->sizes.push_back(0.1);
+  }
+  MeshParameters parameters{.dimension = 2, .domain_low = {0, 0}, .domain_high = {1, 1}};
+  const uint64_t of_samples = samples->sizes.size() * 4 * sizeof(double);  // at least: places, sizes, and their tree
+  test::DomainInput square = test::DomainInput().Ring({{0, 0}, {1, 0}, {1, 1}, {0, 1}});
+  for (const bool is_domain : {false, true}) {
+    RunContext context;
+    Lender lender(context);
+    absl::StatusOr<std::unique_ptr<Mesher>> mesher =
+        is_domain ? Mesher::CreateInDomain(square.parameters, square.points, square.features(), context)
+                  : Mesher::Create(parameters, test::MakeCloud("uniform", 2, 2'000), context);
+    ASSERT_TRUE(mesher.ok()) << mesher.status();
+    MeshParameters sized = is_domain ? square.parameters : parameters;
+    sized.size_samples = samples;
+
+    lender.refused_phase = Phase::kRefinement;
+    const int asked = lender.asked[static_cast<int>(Phase::kRefinement)];
+    EXPECT_EQ((*mesher)->Refine(sized, context).message(), "allow");
+    EXPECT_EQ(lender.asked[static_cast<int>(Phase::kRefinement)], asked + 1);
+    EXPECT_GE(lender.peak, (*mesher)->memory_bytes() + of_samples);
+
+    lender.refused_phase = Phase::kDone;
+    ASSERT_TRUE((*mesher)->Refine(sized, context).ok());
+    sized.max_circumradius = 0.01;
+    lender.peak = 0;
+    ASSERT_TRUE((*mesher)->Refine(sized, context).ok());
+    EXPECT_GE(lender.peak, of_samples) << "they are there while the mesh grows";
   }
 }
 

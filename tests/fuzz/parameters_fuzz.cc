@@ -1,16 +1,20 @@
-// Numbers of every exponent and size in MeshParameters, through the server's checks, into the estimate and the mesher.
+// Numbers of every exponent and size in MeshParameters, through the server's checks, into the estimate and the mesher:
+// of a cloud, or of a domain in the plane.
 //
-// Input: a byte for the dimension, the criterion and how many points there are; then fields, each a byte that says
-//        which and the
-// eight bytes of its double, low one first, or of its integer.
+// Input: a byte for the dimension, the criterion, how many points there are, and, by its highest bit, whether a domain
+//        is meshed; of that a double, the largest area in a part of it; then fields, each a byte that says which and
+//        the eight bytes of its double, low one first, or of its integer.
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "core/base/saturate.h"
+#include "core/features/features.h"
 #include "core/mesher.h"
+#include "core/validate/validate.h"
 #include "server/wire/convert.h"
 #include "tests/fuzz/fuzz.h"
 #include "tests/fuzz/mesh_check.h"
@@ -90,13 +94,44 @@ void ReadField(ByteReader& bytes, v1::MeshParameters& parameters) {
   }
 }
 
-void RequireCounts(const core::MeshEstimate& estimate, int dimension) {
+void RequireCounts(const core::MeshEstimate& estimate, uint64_t least) {
   constexpr auto kMost = static_cast<uint64_t>(core::kMostCounted);
-  Require(estimate.vertices >= (uint64_t{1} << dimension) && estimate.vertices <= kMost,
-          "an estimate counts the corners");
+  Require(estimate.vertices >= least && estimate.vertices <= kMost, "an estimate counts the vertices that are given");
   Require(estimate.simplices >= 2 && estimate.simplices <= kMost, "a box has simplices");
   Require(estimate.memory_bytes > 0 && estimate.memory_bytes <= kMost, "a mesh takes memory");
   Require(std::isfinite(estimate.bytes_per_vertex) && estimate.bytes_per_vertex > 0, "a vertex takes memory");
+}
+
+// A square with a square hole, and a segment that cuts a part off, in which there is a largest area.
+void RequireDomainOrRefusal(const core::MeshParameters& parameters, double max_area) {
+  const std::vector<double> points = {0,   0,    1,   0,   1,    1,   0,    1, 0.25, 0.25,
+                                      0.5, 0.25, 0.5, 0.5, 0.25, 0.5, 0.75, 0, 0.75, 1};
+  const std::vector<uint32_t> ends = {0, 8, 8, 1, 1, 2, 2, 9, 9, 3, 3, 0, 4, 5, 5, 6, 6, 7, 7, 4, 8, 9};
+  const std::vector<core::FaceSeed> seeds = {{.at = {0.3, 0.3}, .is_hole = true},
+                                             {.at = {0.9, 0.5}, .region = 1, .max_area = max_area}};
+  core::Features features;
+  features.ends = ends;
+  features.seeds = seeds;
+  features.faces = parameters.domain_low.empty() ? core::FaceRule::kHoles : core::FaceRule::kBox;
+  core::RunContext context;
+  if (const auto estimate = core::EstimateFeatures(parameters, points, features, context); estimate.ok()) {
+    RequireCounts(*estimate, points.size() / 2);
+  }
+  const absl::StatusOr<core::Mesh> mesh = core::MeshFeatures(parameters, points, features, context);
+  if (!mesh.ok()) {
+    Require(mesh.status().code() == absl::StatusCode::kInvalidArgument ||
+                mesh.status().code() == absl::StatusCode::kResourceExhausted,
+            "a refusal is an INVALID_ARGUMENT or a RESOURCE_EXHAUSTED:", mesh.status().ToString());
+    return;
+  }
+  const core::MeshView view = {.dimension = 2, .points = mesh->points, .simplices = mesh->simplices};
+  for (const absl::Status& valid : {core::ValidateIndices(view), core::ValidateOrientation(view),
+                                    core::ValidateSizing(view, {.max_circumradius = parameters.max_circumradius,
+                                                               .boxes = parameters.size_boxes,
+                                                               .samples = parameters.size_samples.get(),
+                                                               .gradation = parameters.gradation})}) {
+    Require(valid.ok(), "a mesh is valid:", valid.ToString());
+  }
 }
 
 }  // namespace
@@ -106,8 +141,10 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace wellspace;
   fuzz::ByteReader bytes(data, size);
   const uint8_t shape = bytes.Next();
+  const bool is_domain = shape >> 7 != 0;
+  const double max_area = is_domain ? fuzz::ReadDouble(bytes) : 0;
   v1::MeshParameters message;
-  message.set_dimension(2 + shape % 5);
+  message.set_dimension(is_domain ? 2 : 2 + shape % 5);
   message.set_criterion((shape >> 3 & 1) != 0 ? v1::CRITERION_WELL_SPACED : v1::CRITERION_RADIUS_EDGE);
   for (size_t i = 0; i < fuzz::kMaxFields && !bytes.empty() && message.dimension() >= 2 && message.dimension() <= 6;
        ++i) {
@@ -121,6 +158,10 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   core::MeshParameters parameters = *std::move(accepted);
   parameters.max_vertices = std::min(
       parameters.max_vertices, (uint64_t{1} << parameters.dimension) + fuzz::kMaxVertices[parameters.dimension - 2]);
+  if (is_domain) {
+    fuzz::RequireDomainOrRefusal(parameters, max_area > 0 ? max_area : std::numeric_limits<double>::infinity());
+    return 0;
+  }
   // In the unit box, or none: of another domain they would be outside.
   const size_t count = parameters.domain_low.empty() ? 1 + (shape >> 4 & 3) : 0;
   std::vector<double> points;
@@ -129,7 +170,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   }
   core::RunContext context;
   if (const auto estimate = core::EstimateMesh(parameters, points, context); estimate.ok()) {
-    fuzz::RequireCounts(*estimate, parameters.dimension);
+    fuzz::RequireCounts(*estimate, uint64_t{1} << parameters.dimension);
   }
   fuzz::RequireMeshOrRefusal(parameters, points);
   return 0;
