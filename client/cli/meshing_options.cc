@@ -110,8 +110,11 @@ int MeshingOptions::Run(const Work& work) {
   });
 }
 
-absl::Status MeshingOptions::WriteStatistics(const std::string& statistics) const {
-  const std::string json = WithNotes(report_, statistics);
+absl::Status MeshingOptions::WriteStatistics(const std::string& statistics,
+                                             const std::vector<std::string>& more_notes) const {
+  CloudReport report = report_;
+  report.notes.insert(report.notes.end(), more_notes.begin(), more_notes.end());
+  const std::string json = WithNotes(report, statistics);
   if (has_figures_on_stdout()) {
     std::cout << json << std::flush;
   }

@@ -63,7 +63,8 @@ class MeshingOptions {
 
   // Writes `statistics`, an object in JSON, with what was noted of the cloud, to where --stats and --output ask for it,
   // if they do.
-  absl::Status WriteStatistics(const std::string& statistics) const;
+  // With the notes of the cloud, and those of a file that was written.
+  absl::Status WriteStatistics(const std::string& statistics, const std::vector<std::string>& more_notes = {}) const;
 
  private:
   absl::StatusOr<formats::PointCloud> Read();

@@ -62,6 +62,8 @@ class MeshFile final : public MeshSink {
   const MeshHeader& header() const { return header_; }
   const std::vector<uint32_t>& input_vertex() const { return input_vertex_; }
   const std::vector<uint32_t>& moved_vertices() const { return moved_vertices_; }
+  // See formats::MeshWriter; none before Begin.
+  std::vector<std::string> notes() const { return writer_ == nullptr ? std::vector<std::string>() : writer_->notes(); }
 
  private:
   // The attributes of all vertices, whose origins have come.

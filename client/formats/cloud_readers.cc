@@ -9,6 +9,16 @@
 #include "client/formats/table_columns.h"
 
 namespace wellspace::formats {
+namespace {
+
+void NoteUnused(uint64_t count, const char* what, PointCloud& cloud) {
+  if (count > 0) {
+    cloud.notes.push_back(
+        absl::StrCat(cloud.name, ": ", count, " ", what, count == 1 ? " is" : "s are", " not used, only the points"));
+  }
+}
+
+}  // namespace
 
 absl::Status TakeCoordinate(std::string_view text, bool skip_invalid, double& value, bool& is_invalid) {
   switch (ReadCoordinate(text, value)) {
@@ -49,12 +59,9 @@ std::string DimensionError(int wanted, uint64_t count) {
                           : "");
 }
 
-void NoteFaces(uint64_t faces, PointCloud& cloud) {
-  if (faces > 0) {
-    cloud.notes.push_back(
-        absl::StrCat(cloud.name, ": ", faces, faces == 1 ? " face is" : " faces are", " not used, only the points"));
-  }
-}
+void NoteFaces(uint64_t faces, PointCloud& cloud) { NoteUnused(faces, "face", cloud); }
+
+void NoteCells(uint64_t cells, PointCloud& cloud) { NoteUnused(cells, "cell", cloud); }
 
 absl::Status TakeColumns(const CloudOptions& options, PointCloud& cloud) {
   const size_t count = cloud.dimension;

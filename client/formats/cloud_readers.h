@@ -63,8 +63,9 @@ void AddPoint(std::span<const double> point, bool is_invalid, uint64_t line, Poi
 // takes two".
 std::string DimensionError(int wanted, uint64_t count);
 
-// Notes that a file has faces.
+// Notes that a file has faces, or cells that are not vertices.
 void NoteFaces(uint64_t faces, PointCloud& cloud);
+void NoteCells(uint64_t cells, PointCloud& cloud);
 
 }  // namespace wellspace::formats
 

@@ -31,7 +31,16 @@ std::string Labels::Take(std::string_view name, std::string_view kind, int32_t n
     suffix = suffix.empty() ? absl::StrCat("_", number) : absl::StrCat("_", suffix);
     suffix.resize(std::min(suffix.size(), kMaxLabelBytes - 1));
   }
-  return absl::StrCat(label.substr(0, kMaxLabelBytes - suffix.size()), suffix);
+  label = absl::StrCat(label.substr(0, kMaxLabelBytes - suffix.size()), suffix);
+  if (!name.empty()) {
+    changes_.Add(name, label);
+  }
+  return label;
+}
+
+std::string Labels::ChangesNote() const {
+  return changes_.Note(absl::StrCat("names are labels of letters, digits, _, - and ., of at most ", kMaxLabelBytes,
+                                    " characters, and no two alike but for the case"));
 }
 
 }  // namespace wellspace::formats

@@ -7,6 +7,8 @@
 #include <string>
 #include <string_view>
 
+#include "client/formats/names.h"
+
 namespace wellspace::formats {
 
 // Makes labels of the names of a file: letters, digits, '_', '-' and '.', a letter or '_' first, at most 80, and no two
@@ -18,8 +20,12 @@ class Labels {
   // The label of `name` or, where that is empty, of `kind` and `number`: "boundary_7".
   std::string Take(std::string_view name, std::string_view kind, int32_t number);
 
+  // What to tell of the names whose labels are not they themselves; empty if there are none.
+  std::string ChangesNote() const;
+
  private:
   std::set<std::string> taken_;  // in lower case
+  NameChanges changes_;
 };
 
 }  // namespace wellspace::formats

@@ -125,6 +125,7 @@ struct Mesh {
   std::vector<BoundaryPart> boundary{};
   std::vector<int32_t> simplex_regions{};
   std::vector<Region> regions{};
+  std::vector<std::string> notes{};  // what of its file was left out, a sentence each
 
   MeshView View() const {
     return {.dimension = dimension,

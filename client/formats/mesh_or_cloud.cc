@@ -13,10 +13,12 @@
 namespace wellspace::formats {
 namespace {
 
-// Takes the data of points of a .vtu: what the mesher has written there tells input points and origins, the rest are
-// attributes. A file without is a mesh all the same.
+bool IsVtkFormat(const std::string& format) { return format == "vtu" || format == "vtk" || format == "vtp"; }
+
+// Takes the data of points of a file of VTK: what the mesher has written there tells input points and origins, the rest
+// are attributes. A file without is a mesh all the same.
 void TakePointData(const std::string& path, MeshOrCloud& read) {
-  absl::StatusOr<PointCloud> cloud = ReadCloud(path, {.format = "vtu", .keep_attributes = true});
+  absl::StatusOr<PointCloud> cloud = ReadCloud(path, {.format = read.format, .keep_attributes = true});
   if (!cloud.ok() || cloud->size() != read.mesh.View().vertex_count()) {
     return;
   }
@@ -48,12 +50,18 @@ absl::StatusOr<MeshOrCloud> ReadMeshOrCloud(const std::string& path, const Cloud
       read.is_mesh = true;
       read.format = mesh_format;
       read.mesh = *std::move(mesh);
-      if (mesh_format == "vtu") {
+      read.notes = read.mesh.notes;
+      if (IsVtkFormat(mesh_format)) {
         TakePointData(path, read);
       }
       return read;
     }
     refusal = mesh.status();
+    if (mesh_format == "node" && !absl::IsNotFound(refusal)) {
+      // Both files are there: points alone would be half of it.
+      return absl::Status(refusal.code(),
+                          absl::StrCat(refusal.message(), "; --input-format node reads the points alone"));
+    }
   }
   absl::StatusOr<PointCloud> cloud = ReadCloud(path, options);
   if (!cloud.ok()) {
@@ -65,6 +73,10 @@ absl::StatusOr<MeshOrCloud> ReadMeshOrCloud(const std::string& path, const Cloud
   read.attributes = std::move(cloud->attributes);
   read.input_vertices = read.mesh.View().vertex_count();
   read.notes = std::move(cloud->notes);
+  if (!refusal.ok() && IsVtkFormat(mesh_format)) {
+    read.notes.insert(read.notes.begin(),
+                      absl::StrCat("only points are read, since it is no mesh of simplices: ", refusal.message()));
+  }
   read.skipped = cloud->skipped;
   return read;
 }

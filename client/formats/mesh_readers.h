@@ -14,6 +14,8 @@ absl::StatusOr<Mesh> ReadVtu(const std::string& path, const std::string& numbers
 // With `numbers` the simplices may be missing.
 absl::StatusOr<Mesh> ReadNpz(const std::string& path, const std::string& numbers);
 absl::StatusOr<Mesh> ReadMsh(const std::string& path, const std::string& numbers);
+absl::StatusOr<Mesh> ReadVtk(const std::string& path);
+absl::StatusOr<Mesh> ReadVtpMesh(const std::string& path);
 absl::StatusOr<Mesh> ReadMedit(const std::string& path);
 // `path` is that of either file.
 absl::StatusOr<Mesh> ReadNodeAndEle(const std::string& path);

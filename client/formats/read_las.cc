@@ -1,6 +1,7 @@
 // LAS 1.0 to 1.4 of the ASPRS: point data record formats 0 to 10.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -123,6 +124,12 @@ class LasReader {
     for (size_t axis = 0; axis < 3; ++axis) {
       scale_[axis] = LasWord<double>(header, kLasScale + axis * sizeof(double));
       offset_[axis] = LasWord<double>(header, kLasOffset + axis * sizeof(double));
+      // With a scale of 0 all points would be one.
+      if (count_ > 0 && (!std::isfinite(scale_[axis]) || scale_[axis] == 0 || !std::isfinite(offset_[axis]))) {
+        return ByteError(kLasScale + axis * sizeof(double),
+                         absl::StrCat("expected a finite scale other than 0 and a finite offset of coordinate ",
+                                      axis + 1, ", got ", scale_[axis], " and ", offset_[axis]));
+      }
     }
     std::string records;  // of variable length: they are skipped
     return SkipTo(points_at, records);

@@ -1,6 +1,8 @@
 // INRIA's MEDIT, in ascii.
 #include <array>
+#include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -11,6 +13,7 @@
 #include "client/formats/io/field_reader.h"
 #include "client/formats/io/input_file.h"
 #include "client/formats/mesh_readers.h"
+#include "client/formats/names.h"
 #include "client/formats/regions.h"
 #include "core/base/status_macros.h"
 
@@ -19,7 +22,12 @@ namespace {
 
 class MeditReader {
  public:
-  explicit MeditReader(LineReader& reader) : reader_(reader), fields_(reader) {}
+  explicit MeditReader(LineReader& reader) : reader_(reader), fields_(reader) {
+    reader_.OnComment([this](std::string_view comment) { TakeNameLine(comment, &parts_, &regions_); });
+  }
+  ~MeditReader() { reader_.OnComment(nullptr); }
+  MeditReader(const MeditReader&) = delete;
+  MeditReader& operator=(const MeditReader&) = delete;
 
   absl::StatusOr<Mesh> Read() {
     uint64_t version = 0;
@@ -38,10 +46,12 @@ class MeditReader {
         status = ReadDimension();
       } else if (word == "Vertices") {
         status = ReadVertices();
-      } else if (mesh_.dimension != 0 && word == (mesh_.dimension == 2 ? "Triangles" : "Tetrahedra")) {
-        status = ReadSimplices();
-      } else if (mesh_.dimension != 0 && word == (mesh_.dimension == 2 ? "Edges" : "Triangles")) {
-        status = ReadFacets();
+      } else if (word == "Edges") {
+        status = ReadElements(edges_, "edges");
+      } else if (word == "Triangles") {
+        status = ReadElements(triangles_, "triangles");
+      } else if (word == "Tetrahedra" && mesh_.dimension != 2) {
+        status = ReadElements(tetrahedra_, "tetrahedra");
       } else if (word == "Quadrilaterals" || word == "Hexahedra" || word == "Prisms" || word == "Pyramids" ||
                  (mesh_.dimension == 2 && word == "Tetrahedra")) {
         status = reader_.Error(
@@ -54,16 +64,60 @@ class MeditReader {
     if (!reader_.status().ok()) {
       return reader_.status();
     }
-    if (!has_vertices_ || !has_simplices_) {
+    if (!has_vertices_ || (!triangles_.is_there && !tetrahedra_.is_there)) {
       return reader_.Error(
           absl::StrCat("the file ends; expected ", has_vertices_ ? "Triangles or Tetrahedra" : "Vertices"));
     }
-    facets_.MoveTo(mesh_);
+    return MakeMesh();
+  }
+
+ private:
+  // Elements of one kind, as they are in the file.
+  struct Elements {
+    int corners;
+    bool is_there = false;
+    std::vector<uint32_t> vertices{};
+    std::vector<int32_t> references{};
+
+    std::span<const uint32_t> At(size_t i) const { return std::span(vertices).subspan(i * corners, corners); }
+  };
+
+  // Triangles alone are a mesh in the plane z = 0, whatever "Dimension" says.
+  absl::StatusOr<Mesh> MakeMesh() {
+    const bool is_flat = mesh_.dimension == 3 && tetrahedra_.vertices.empty() && !triangles_.vertices.empty();
+    if (is_flat) {
+      WELLSPACE_RETURN_IF_ERROR(Flatten());
+    }
+    Elements& simplices = mesh_.dimension == 2 ? triangles_ : tetrahedra_;
+    const Elements& facets = mesh_.dimension == 2 ? edges_ : triangles_;
+    for (size_t i = 0; i < facets.references.size(); ++i) {
+      parts_.Add(facets.At(i), facets.references[i]);
+    }
+    for (const int32_t reference : simplices.references) {
+      regions_.Add(reference);
+    }
+    mesh_.simplices = std::move(simplices.vertices);
+    parts_.MoveTo(mesh_);
     regions_.MoveTo(mesh_);
     return std::move(mesh_);
   }
 
- private:
+  absl::Status Flatten() {
+    std::vector<double> flat;
+    flat.reserve(mesh_.points.size() / 3 * 2);
+    for (size_t i = 0; i < mesh_.points.size(); i += 3) {
+      if (mesh_.points[i + 2] != 0) {
+        return absl::InvalidArgumentError(
+            absl::StrCat(reader_.name(), ": vertex ", i / 3 + 1,
+                         ": expected z = 0 in a mesh of triangles without tetrahedra, got ", mesh_.points[i + 2]));
+      }
+      flat.insert(flat.end(), {mesh_.points[i], mesh_.points[i + 1]});
+    }
+    mesh_.points = std::move(flat);
+    mesh_.dimension = 2;
+    return absl::OkStatus();
+  }
+
   absl::Status ReadDimension() {
     uint64_t dimension = 0;
     WELLSPACE_RETURN_IF_ERROR(fields_.NextWhole("the dimension", 3, dimension));
@@ -91,35 +145,19 @@ class MeditReader {
     return absl::OkStatus();
   }
 
-  absl::Status ReadSimplices() {
-    if (!has_vertices_ || std::exchange(has_simplices_, true)) {
-      return reader_.Error("expected \"Vertices\", and then the simplices once");
+  // Vertices and a reference of each. Of edges and triangles there may be several lists.
+  absl::Status ReadElements(Elements& elements, const char* what) {
+    if (!has_vertices_ || (std::exchange(elements.is_there, true) && elements.corners == mesh_.dimension + 1)) {
+      return reader_.Error(absl::StrCat("expected \"Vertices\", and then the ", what,
+                                        elements.corners == mesh_.dimension + 1 ? " once" : ""));
     }
     uint64_t count = 0;
-    WELLSPACE_RETURN_IF_ERROR(fields_.NextWhole("the number of simplices", kMaxCount, count));
-    for (uint64_t simplex = 0; simplex < count; ++simplex) {
-      WELLSPACE_RETURN_IF_ERROR(ReadCorners(mesh_.dimension + 1, mesh_.simplices));
-      int32_t region = 0;
-      WELLSPACE_RETURN_IF_ERROR(ReadReference("the reference of a simplex", region));
-      regions_.Add(region);
-    }
-    return absl::OkStatus();
-  }
-
-  // Those with another reference than 0 are the boundary.
-  absl::Status ReadFacets() {
-    uint64_t count = 0;
-    if (!has_vertices_) {
-      return reader_.Error("expected \"Vertices\", and then the facets");
-    }
-    WELLSPACE_RETURN_IF_ERROR(fields_.NextWhole("the number of facets", kMaxCount, count));
-    std::vector<uint32_t> corners;
-    for (uint64_t facet = 0; facet < count; ++facet) {
-      corners.clear();
-      WELLSPACE_RETURN_IF_ERROR(ReadCorners(mesh_.dimension, corners));
-      int32_t tag = 0;
-      WELLSPACE_RETURN_IF_ERROR(ReadReference("the reference of a facet", tag));
-      facets_.Add(corners, tag);
+    WELLSPACE_RETURN_IF_ERROR(fields_.NextWhole(absl::StrCat("the number of ", what), kMaxCount, count));
+    for (uint64_t element = 0; element < count; ++element) {
+      WELLSPACE_RETURN_IF_ERROR(ReadCorners(elements.corners, elements.vertices));
+      int32_t reference = 0;
+      WELLSPACE_RETURN_IF_ERROR(ReadReference(what, reference));
+      elements.references.push_back(reference);
     }
     return absl::OkStatus();
   }
@@ -128,7 +166,8 @@ class MeditReader {
     std::string_view field;
     return fields_.Next(field) && absl::SimpleAtoi(absl::string_view(field.data(), field.size()), &reference)
                ? absl::OkStatus()
-               : reader_.EndError(absl::StrCat("expected ", what, ", a whole number, got ", Quote(field)));
+               : reader_.EndError(absl::StrCat("expected the reference of one of the ", what, ", a whole number, got ",
+                                               Quote(field)));
   }
 
   absl::Status ReadCorners(int count, std::vector<uint32_t>& corners) {
@@ -146,11 +185,13 @@ class MeditReader {
   LineReader& reader_;
   FieldReader fields_;
   Mesh mesh_;
-  FacetSorter facets_;
+  Elements edges_{.corners = 2};
+  Elements triangles_{.corners = 3};
+  Elements tetrahedra_{.corners = 4};
+  FacetSorter parts_;  // of facets with another reference than 0
   RegionCollector regions_;
   uint64_t vertices_ = 0;
   bool has_vertices_ = false;
-  bool has_simplices_ = false;
 };
 
 }  // namespace

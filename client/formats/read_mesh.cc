@@ -25,6 +25,8 @@ absl::StatusOr<Mesh> Read(const std::string& path) {
 std::span<const Format<MeshReader>> MeshReaders() {
   static const std::vector<Format<MeshReader>> readers = {
       {"vtu", {".vtu"}, Read<ReadVtu>},
+      {"vtk", {".vtk"}, ReadVtk},
+      {"vtp", {".vtp"}, ReadVtpMesh},
       {"npz", {".npz"}, Read<ReadNpz>},
       {"msh", {".msh"}, Read<ReadMsh>},
       {"medit", {".mesh"}, ReadMedit},

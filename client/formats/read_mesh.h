@@ -1,9 +1,12 @@
 // Meshes from files.
 //
 // Formats:
-//   vtu   VTK's XML, one piece of triangles in the plane z = 0 or of tetrahedra; arrays in ascii, or inline in base64,
-//         compressed by zlib or not; either byte order. Weights are the point data "weights". With the cell data
-//         "boundary", lines beside triangles, and triangles beside tetrahedra, are the boundary where it is not 0.
+//   vtu   VTK's XML, pieces of triangles in the plane z = 0 or of tetrahedra; arrays in ascii, inline in base64, or
+//         appended as bytes or in base64, compressed by zlib or not; either byte order. Weights are the point data
+//         "weights". With the cell data "boundary", lines beside triangles, and triangles beside tetrahedra, are the
+//         boundary where it is not 0.
+//   vtk   The same in VTK's legacy format, ascii or binary, of the kinds UNSTRUCTURED_GRID and POLYDATA.
+//   vtp   VTK's XML of polygons, which are triangles in the plane z = 0.
 //   npz   numpy's archive of arrays: `points` of floating-point numbers of 4 or 8 bytes or whole ones, vertices x
 //         dimension; `simplices` of whole numbers, simplices x (dimension + 1); of either byte order, in C or Fortran
 //         order; weights are `weights`, as many numbers as there are vertices. Others are ignored.
@@ -11,15 +14,16 @@
 //   node  TetGen's and Triangle's pair of .node and .ele, given by either name. Weights are the only attribute of .node
 //         if the comment "# weights" stands before its header. If points have markers, facets with a marker other than
 //         0 of .edge (2-D) or .face beside them are the boundary.
-//   msh   Gmsh's, 2.2 in ascii, or 4.1 in ascii or little-endian binary: the tetrahedra or, if there are none, the
+//   msh   Gmsh's, 2.2 or 4.1, in ascii or little-endian binary: the tetrahedra or, if there are none, the
 //         triangles in the plane z = 0; vertices are all nodes, in the order of the file. Lines beside triangles, and
 //         triangles beside tetrahedra, are the boundary if they are of a physical group; points are skipped; other
 //         elements, also those of higher order, are refused. Weights are the $NodeData "weights".
-//   medit INRIA's .mesh in ascii, of dimension 2 with triangles or 3 with tetrahedra; edges in 2-D, and triangles in
-//         3-D, with another reference than 0 are the boundary; all else in it is skipped.
+//   medit INRIA's .mesh in ascii, of triangles, which in dimension 3 are in the plane z = 0, or of tetrahedra; edges in
+//         2-D, and triangles in 3-D, with another reference than 0 are the boundary; all else in it is skipped.
 //
-// Regions are where write_mesh.h says; in .msh that is the first physical group of a simplex, or 0. They are read if
-// simplices are of more than one. In .ele all first attributes have to be whole numbers of 32 bits for that.
+// Regions are where write_mesh.h says; in .msh that is the first physical group of a simplex, or 0. If all simplices
+// are of 0, nothing is told of regions. In .ele all first attributes have to be whole numbers of 32 bits. What is left
+// out of a file of such a mesh is told in Mesh::notes.
 #ifndef WELLSPACE_CLIENT_FORMATS_READ_MESH_H_
 #define WELLSPACE_CLIENT_FORMATS_READ_MESH_H_
 

@@ -103,6 +103,9 @@ class PcdReader {
       for (std::string_view value; splitter.Next(value);) {
         values.push_back(value);
       }
+      if (keyword == "COLUMNS") {  // as versions before 0.7 call them
+        keyword = "FIELDS";
+      }
       if (is_first && keyword != "VERSION" && keyword != "FIELDS") {
         return reader_.Error(
             absl::StrCat("expected \"VERSION\" or \"FIELDS\" at the start of the file, got ", Quote(keyword)));

@@ -25,6 +25,10 @@ constexpr size_t kStlHeaderBytes = 80;
 constexpr size_t kStlTriangleBytes = 50;  // of which three floats for the normal, then nine, then two bytes
 constexpr size_t kStlCornersAt = 12;
 
+bool Is(std::string_view word, const char* keyword) {
+  return absl::EqualsIgnoreCase(absl::string_view(word.data(), word.size()), keyword);
+}
+
 using StlPoint = std::array<double, 3>;
 
 struct StlHash {
@@ -80,11 +84,16 @@ class StlReader {
       return EndError("expected 80 bytes of a header and a number of triangles");
     }
     const auto count = LoadWord<uint32_t>({header + kStlHeaderBytes, sizeof(uint32_t)}, 0, /*big_endian=*/false);
-    for (; facets_ < count; ++facets_) {
+    // Programs that write triangles as they come leave a 0 there: then all that follow are meant.
+    for (; count == 0 || facets_ < count; ++facets_) {
       char triangle[kStlTriangleBytes];
-      if (reader_.Take(triangle, sizeof(triangle)) != sizeof(triangle)) {
-        return EndError(
-            absl::StrCat("expected ", count, " triangles, as the header says; the file ends in triangle ", facets_));
+      const size_t taken = reader_.Take(triangle, sizeof(triangle));
+      if (taken == 0 && count == 0 && reader_.status().ok()) {
+        break;
+      }
+      if (taken != sizeof(triangle)) {
+        return EndError(absl::StrCat("expected ", count == 0 ? std::string("whole") : absl::StrCat(count),
+                                     " triangles, as the header says; the file ends in triangle ", facets_));
       }
       for (size_t corner = 0; corner < 3; ++corner) {
         StlPoint point;
@@ -109,10 +118,6 @@ class StlReader {
   }
 
  private:
-  static bool Is(std::string_view word, const char* keyword) {
-    return absl::EqualsIgnoreCase(absl::string_view(word.data(), word.size()), keyword);
-  }
-
   absl::Status Begin() {
     absl::StatusOr<PointRows> rows = PointRows::Create({"x", "y", "z"}, options_, cloud_);
     if (!rows.ok()) {
@@ -183,7 +188,7 @@ absl::Status ReadStl(InputFile& file, const CloudOptions& options, PointCloud& c
   }
   const size_t word = start.find_first_not_of(" \t\r\n");
   is_text = is_text && (start.size() < kStlHeaderBytes + sizeof(uint32_t) ||
-                        (word != std::string_view::npos && start.substr(word, 5) == "solid"));
+                        (word != std::string_view::npos && Is(start.substr(word, 5), "solid")));
   LineReader reader(std::move(file));
   StlReader stl(reader, options, cloud);
   WELLSPACE_RETURN_IF_ERROR(is_text ? stl.ReadAscii() : stl.ReadBinary());

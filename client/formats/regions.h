@@ -84,20 +84,22 @@ class RegionCollector {
   void Add(int32_t region) { regions_.push_back(region); }
   void Name(int32_t region, std::string name) { names_[region] = std::move(name); }
 
-  // Sets the regions of `mesh`, by ascending ids, if its simplices are of more than one. Regions with a name and no
-  // simplices are regions too.
+  // Sets the regions of `mesh`, by ascending ids: none if all simplices are of 0, which has no name and stands for
+  // none. Regions with a name and no simplices are regions too. Simplices have no regions if there is only one.
   void MoveTo(Mesh& mesh) {
     std::set<int32_t> ids(regions_.begin(), regions_.end());
-    if (ids.size() < 2) {
-      return;
-    }
     for (const auto& [id, name] : names_) {
       ids.insert(id);
+    }
+    if (ids.size() == 1 && *ids.begin() == 0 && names_.empty()) {
+      return;
     }
     for (const int32_t id : ids) {
       mesh.regions.push_back({.id = id, .name = names_[id]});
     }
-    mesh.simplex_regions = std::move(regions_);
+    if (ids.size() > 1) {
+      mesh.simplex_regions = std::move(regions_);
+    }
   }
 
  private:

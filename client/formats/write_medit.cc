@@ -10,6 +10,7 @@
 #include "client/formats/io/number.h"
 #include "client/formats/io/output_file.h"
 #include "client/formats/mesh_writers.h"
+#include "client/formats/names.h"
 #include "client/formats/regions.h"
 #include "core/base/status_macros.h"
 
@@ -19,8 +20,10 @@ namespace {
 class MeditWriter final : public MeshWriter {
  public:
   MeditWriter(OutputFile output, const MeshShape& shape) : shape_(shape), output_(std::move(output)) {
-    output_.Write(absl::StrCat("MeshVersionFormatted 2\nDimension ", shape_.dimension, "\nVertices\n",
-                               shape_.vertex_count, "\n"));
+    const NameLines names(shape_);
+    AddNote(names.ChangesNote());
+    output_.Write(absl::StrCat("MeshVersionFormatted 2\nDimension ", shape_.dimension, "\n", names.Text("# "),
+                               "Vertices\n", shape_.vertex_count, "\n"));
   }
 
   absl::Status AddPoints(std::span<const double> points) override {

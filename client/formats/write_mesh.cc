@@ -3,11 +3,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <span>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
+#include "absl/strings/str_join.h"
 #include "client/formats/cloud.h"
 #include "client/formats/io/file_error.h"
 #include "client/formats/io/input_file.h"
@@ -29,6 +31,7 @@ struct WriterKind {
   // All files that a mesh of this name may be; null: that one.
   std::vector<std::string> (*files)(const std::string& path) = nullptr;
   bool has_attributes = false;
+  bool has_regions = true;
 };
 
 std::span<const Format<WriterKind>> Writers() {
@@ -46,10 +49,33 @@ std::span<const Format<WriterKind>> Writers() {
       {"node", {".node", ".ele"}, {CreateNodeAndEle, kMaxDimension, "node is a pair of files", true, TetgenFilesOf}},
       {"vtk", {".vtk"}, {CreateVtk, 3, nullptr, true, nullptr, true}},
       {"xdmf", {".xdmf"}, {CreateXdmf, 3, "xdmf has its arrays in a file of HDF5 beside it", true, XdmfFilesOf, true}},
-      {"su2", {".su2"}, {CreateSu2, 3, nullptr, false}},
+      {"su2", {".su2"}, {CreateSu2, 3, nullptr, false, nullptr, false, false}},
       {"abaqus", {".inp"}, {CreateAbaqus, 3, nullptr, false}},
   };
   return writers;
+}
+
+std::string Joined(const std::vector<std::string>& names) {
+  constexpr size_t kShown = 5;
+  return absl::StrCat(absl::StrJoin(names.begin(), names.begin() + std::min(names.size(), kShown), ", "),
+                      names.size() > kShown ? ", ..." : "");
+}
+
+// Notes what `kind` has no place for. A mesh without a word of regions is "domain" of the id 1 everywhere.
+void NoteLosses(const WriterKind& kind, const MeshShape& shape, MeshWriter& writer) {
+  if (!kind.has_attributes && !shape.attributes.empty()) {
+    writer.AddNote(absl::StrCat("the format has no place for attributes of vertices, which are left out: ",
+                                Joined(shape.attributes)));
+  }
+  const bool tells_regions =
+      shape.regions.size() > 1 || (shape.regions.size() == 1 && shape.regions[0] != Region{.id = 1, .name = "domain"});
+  if (!kind.has_regions && tells_regions) {
+    std::vector<std::string> names;
+    for (const Region& region : shape.regions) {
+      names.push_back(region.name.empty() ? absl::StrCat(region.id) : region.name);
+    }
+    writer.AddNote(absl::StrCat("the format has no place for regions, which are left out: ", Joined(names)));
+  }
 }
 
 // `dimension` is that of the mesh, or 0 when it is not known.
@@ -145,10 +171,13 @@ absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMesh(const std::string& path, 
   if (!writer.has_attributes) {
     held.attributes.clear();
   }
-  return writer.create(path, held, std::move(stop));
+  WELLSPACE_ASSIGN_OR_RETURN(std::unique_ptr<MeshWriter> created, writer.create(path, held, std::move(stop)));
+  NoteLosses(writer, shape, *created);
+  return created;
 }
 
-absl::Status WriteMesh(const std::string& path, const std::string& format, const MeshView& mesh, std::stop_token stop) {
+absl::Status WriteMesh(const std::string& path, const std::string& format, const MeshView& mesh, std::stop_token stop,
+                       std::vector<std::string>* notes) {
   WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<MeshWriter> writer,
                              CreateMesh(path, format, mesh.Shape(), std::move(stop)));
   MeshWriter& rows = *writer;
@@ -175,7 +204,13 @@ absl::Status WriteMesh(const std::string& path, const std::string& format, const
   if (status.ok() && !mesh.facets.empty()) {
     status = rows.AddFacets(mesh.facets);
   }
-  return status.ok() ? rows.Commit() : status;
+  if (status.ok()) {
+    status = rows.Commit();
+  }
+  if (status.ok() && notes != nullptr) {
+    notes->insert(notes->end(), rows.notes().begin(), rows.notes().end());
+  }
+  return status;
 }
 
 }  // namespace wellspace::formats

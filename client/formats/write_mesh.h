@@ -12,7 +12,7 @@
 //         its header says so.
 //   msh41 Gmsh's MSH 4.1 in binary, little-endian, 2-D and 3-D only: one block of nodes, numbered from 1, and one of
 //         triangles or tetrahedra; $NodeData "input", as in vtu, and "weights", if there are any.
-//   msh22 The same in MSH 2.2, in ascii; every simplex is of the physical group 1.
+//   msh22 The same in MSH 2.2, in ascii; every simplex is of the physical group 1 where nothing is told of regions.
 //   medit INRIA's .mesh of version 2 (double precision) in ascii, 2-D and 3-D only: the reference of a vertex is 1 if
 //         it is an input point, else 0, that of a simplex is 1. There is no place for weights.
 //   vtk   VTK's legacy format, version 3.0 in binary, 2-D and 3-D only: as vtu, arrays of the field of data.
@@ -21,7 +21,7 @@
 //   su2   SU2's, in ascii, 2-D and 3-D only. There is no place for weights, and none for regions.
 //   abaqus  The .inp of Abaqus and CalculiX, 2-D (CPS3) and 3-D (C3D4) only; *NSET "input" of the input points, *ELSET
 //         of the simplices by their regions. There is no place for weights.
-// vtk, xdmf, su2 and abaqus are not read back.
+// xdmf, su2 and abaqus are not read back.
 //
 // With a boundary there are, beside that:
 //   vtu, vtkhdf  its facets as cells after the simplices; cell data "region" and "boundary" (the tag), 0 where there is
@@ -42,11 +42,12 @@
 // Attributes of vertices, which input points have and others have not, are numbers of 8 bytes, NaN where there is none:
 // point data of vtu, vtkhdf, vtk and xdmf under their names, "attribute_NAME" in npz. Other formats leave them out.
 //
-// With several regions each simplex has the id of its own: cell data "region" of vtu and vtkhdf; `regions` of npz, with
-// names in `region_names` for the ids in `region_ids`; the attribute of .ele, with names in a comment "# regions:"; the
-// reference of medit. In msh41 and msh22 each region is a physical group with a name. Its number is the id, unless a
-// part of the boundary has that number: then it is the least that is free. In msh41 each region is an entity with a
-// block of its own: simplices stand by regions in the order of groups, otherwise in the order in which they came.
+// Where regions are told, each simplex has the id of its own: cell data "region" of vtu, vtkhdf and vtk; `regions` of
+// npz, with names in `region_names` for the ids in `region_ids`; the attribute of .ele; the reference of medit. In
+// msh41 and msh22 each region is a physical group with its id and a name, whatever the numbers of parts of the
+// boundary: Gmsh counts groups by their dimensions. With several regions, in msh41 each is an entity with a block of
+// its own: simplices stand by regions in ascending order, otherwise in the order in which they came. Names of parts and
+// regions that have no other place: see names.h.
 #ifndef WELLSPACE_CLIENT_FORMATS_WRITE_MESH_H_
 #define WELLSPACE_CLIENT_FORMATS_WRITE_MESH_H_
 
@@ -55,6 +56,7 @@
 #include <span>
 #include <stop_token>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "absl/status/status.h"
@@ -110,8 +112,20 @@ class MeshWriter {
   // Errors:     the first of all so far; INTERNAL when rows are missing.
   virtual absl::Status Commit() = 0;
 
+  // What of the mesh the file holds otherwise than it came, or not at all, a sentence each; all of it after Commit.
+  const std::vector<std::string>& notes() const { return notes_; }
+  // An empty one is none.
+  void AddNote(std::string note) {
+    if (!note.empty()) {
+      notes_.push_back(std::move(note));
+    }
+  }
+
  protected:
   MeshWriter() = default;
+
+ private:
+  std::vector<std::string> notes_;
 };
 
 // A writer to `path`; "-" is standard output. `format` empty: by the extension; standard output is vtu. Ends with
@@ -121,14 +135,15 @@ class MeshWriter {
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMesh(const std::string& path, const std::string& format,
                                                        const MeshShape& shape, std::stop_token stop = {});
 
-// Writes `mesh` to `path`; "-" is standard output. `format` empty: by the extension; standard output is vtu.
+// Writes `mesh` to `path`; "-" is standard output. `format` empty: by the extension; standard output is vtu. `notes`,
+// unless it is null, gets those of the writer.
 //
-// Guarantees: coordinates read back to the bit; on an error, or when `stop` ends it with CANCELLED, no file is left or
-//             changed.
+// Guarantees: coordinates read back to the bit; on an error, or when `stop` ends it with CANCELLED, no
+//             file is left or changed.
 // Errors:     INVALID_ARGUMENT for an unknown format, or one that cannot hold this mesh or go there; of writing, naming
 //             the file.
 absl::Status WriteMesh(const std::string& path, const std::string& format, const MeshView& mesh,
-                       std::stop_token stop = {});
+                       std::stop_token stop = {}, std::vector<std::string>* notes = nullptr);
 
 }  // namespace wellspace::formats
 

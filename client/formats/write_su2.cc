@@ -83,6 +83,7 @@ class Su2Writer final : public MeshWriter {
                                                      .simplex_regions = simplex_regions_,
                                                      .simplices = simplices_,
                                                      .facets = facets_}));
+    AddNote(labels_.ChangesNote());
     return output_.Commit();
   }
 

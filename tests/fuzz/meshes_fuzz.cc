@@ -1,13 +1,16 @@
 // Every reader of meshes, on any text, and the decoder of VTK's binary arrays.
 //
-// Input: a digit from 0 to 6, then
+// Input: a digit from 0 to 9, then
 //   0  a .vtu file;
 //   1  a .node file, '|', the .ele file;
 //   2  a byte whose lowest bits say compressed, big-endian, eight-byte header; the bytes of an array before they were
 //   put into base64; 3  a .npz file;
 //   4  two bytes, the length of the first array of a .npz in little-endian order; that array and the second one, each a
 //   .npy; 5  a .msh file;
-//   6  a .mesh file.
+//   6  a .mesh file;
+//   7  a .vtk file;
+//   8  a .vtp file;
+//   9  a byte as of 2, of which the fourth bit says base64; what follows where an array begins in appended data.
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -74,6 +77,9 @@ void ReadWriteRead(const std::string& path, const std::string& copy) {
     return;
   }
   RequireMesh(*mesh);
+  for (const std::string& note : mesh->notes) {
+    RequireClearMessage(note);
+  }
   const absl::Status written = formats::WriteMesh(copy, "", mesh->View());
   Require(written.ok(), "a mesh can be written:", written.ToString());
   const absl::StatusOr<Mesh> again = formats::ReadMesh(copy);
@@ -111,6 +117,24 @@ void ReadMedit(std::string_view content) {
   ReadWriteRead(folder.Write("mesh.mesh", content), folder.Path("again.mesh"));
 }
 
+void ReadVtk(std::string_view content) {
+  const ScratchFolder& folder = ScratchFolder::Get();
+  ReadWriteRead(folder.Write("mesh.vtk", content), folder.Path("again.vtk"));
+}
+
+void ReadVtp(std::string_view content) {
+  const ScratchFolder& folder = ScratchFolder::Get();
+  ReadWriteRead(folder.Write("mesh.vtp", content), folder.Path("again.vtu"));
+}
+
+void DecodeAppended(uint8_t flags, std::string_view data) {
+  const formats::VtkEncoding encoding = {
+      .compressed = (flags & 1) != 0, .big_endian = (flags & 2) != 0, .header_word_bytes = (flags & 4) != 0 ? 8 : 4};
+  if (const auto decoded = formats::DecodeAppendedVtkArray(data, (flags & 8) != 0, encoding); !decoded.ok()) {
+    RequireInvalidArgument(decoded.status());
+  }
+}
+
 // The checksums of an archive keep the fuzzer out: this makes them.
 void ReadArrays(std::string_view points, std::string_view simplices) {
   const ScratchFolder& folder = ScratchFolder::Get();
@@ -142,7 +166,7 @@ void DecodeArray(uint8_t flags, std::string_view array) {
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   wellspace::fuzz::ByteReader bytes(data, size);
-  switch (static_cast<uint8_t>(bytes.Next() - '0') % 7) {
+  switch (static_cast<uint8_t>(bytes.Next() - '0') % 10) {
     case 0:
       wellspace::fuzz::ReadVtu(bytes.TakeText());
       break;
@@ -163,6 +187,17 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     case 6:
       wellspace::fuzz::ReadMedit(bytes.TakeText());
       break;
+    case 7:
+      wellspace::fuzz::ReadVtk(bytes.TakeText());
+      break;
+    case 8:
+      wellspace::fuzz::ReadVtp(bytes.TakeText());
+      break;
+    case 9: {
+      const uint8_t flags = bytes.Next();
+      wellspace::fuzz::DecodeAppended(flags, bytes.TakeText());
+      break;
+    }
     default: {
       size_t length = bytes.Next();
       length += size_t{256} * bytes.Next();

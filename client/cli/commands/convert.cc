@@ -69,20 +69,26 @@ absl::Status ConvertCommand::Convert() {
   WELLSPACE_RETURN_IF_ERROR(formats::CheckMeshOutput(output, mesh_format));
   cloud_options.keep_attributes = !no_attributes;
   WELLSPACE_ASSIGN_OR_RETURN(formats::MeshOrCloud read, formats::ReadMeshOrCloud(input, cloud_options));
-  PrintNotes(ReportOf(cloud_options, read.notes, read.skipped), format, /*quiet=*/false);
   if (no_attributes) {
     read.attributes.clear();
   }
   MarkVertices(output, mesh_format, read.mesh);
   const formats::MeshView view = read.View();
-  WELLSPACE_RETURN_IF_ERROR(formats::WriteMesh(output, mesh_format, view));
+  CloudReport report = ReportOf(cloud_options, read.notes, read.skipped);
+  PrintNotes(report, format, /*quiet=*/false);
+  std::vector<std::string> losses;
+  WELLSPACE_RETURN_IF_ERROR(formats::WriteMesh(output, mesh_format, view, /*stop=*/{}, &losses));
+  PrintNotes({.notes = losses}, format, /*quiet=*/false);
   if (format == OutputFormat::kJson) {
-    PrintJson({{"input", input},
-               {"output", output},
-               {"kind", read.is_mesh ? "mesh" : "cloud"},
-               {"dimension", view.dimension},
-               {"vertices", view.vertex_count()},
-               {"simplices", view.simplex_count()}});
+    Json figures = {{"input", input},
+                    {"output", output},
+                    {"kind", read.is_mesh ? "mesh" : "cloud"},
+                    {"dimension", view.dimension},
+                    {"vertices", view.vertex_count()},
+                    {"simplices", view.simplex_count()}};
+    report.notes.insert(report.notes.end(), losses.begin(), losses.end());
+    AddNotes(report, figures);
+    PrintJson(figures);
   }
   return absl::OkStatus();
 }

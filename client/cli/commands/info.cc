@@ -74,6 +74,9 @@ Json RegionsJson(const formats::Mesh& mesh) {
   for (const int32_t region : mesh.simplex_regions) {
     ++sizes[region];
   }
+  if (mesh.simplex_regions.empty() && mesh.regions.size() == 1) {
+    sizes[mesh.regions[0].id] = mesh.View().simplex_count();  // all are of the only one
+  }
   Json regions = Json::array();
   for (const formats::Region& region : mesh.regions) {
     regions.push_back({{"id", region.id}, {"name", region.name}, {"simplices", sizes[region.id]}});

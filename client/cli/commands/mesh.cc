@@ -69,7 +69,8 @@ absl::Status MeshCommand::Mesh(client::Client& client, const client::MeshOptions
       return status;
     }
   }
-  WELLSPACE_RETURN_IF_ERROR(options.WriteStatistics(StatisticsJson(file.header(), file.input_vertex())));
+  WELLSPACE_RETURN_IF_ERROR(options.WriteStatistics(StatisticsJson(file.header(), file.input_vertex()), file.notes()));
+  PrintNotes({.notes = file.notes()}, options.remote().format(), options.remote().quiet());
   if (!options.remote().quiet()) {
     std::cerr << Summary(file.header()) << (output == formats::kStandardStream ? "" : " -> " + output) << "\n";
   }

@@ -209,10 +209,13 @@ absl::Status DownloadCommand::Download(client::Client& client, const client::Cal
     }
   }
   if (remote.json()) {
-    std::cout << StatisticsJson(file.header(), file.input_vertex(), file.moved_vertices()) << std::flush;
+    std::cout << WithNotes({.notes = file.notes()},
+                           StatisticsJson(file.header(), file.input_vertex(), file.moved_vertices()))
+              << std::flush;
   } else if (!remote.quiet()) {
     std::cerr << Summary(file.header()) << (path == formats::kStandardStream ? "" : " -> " + path) << "\n";
   }
+  PrintNotes({.notes = file.notes()}, remote.format(), remote.quiet());
   if (!remote.json()) {
     std::cerr << SliverWarning(file.header()) << (no_boundary || remote.quiet() ? "" : BoundaryWarning(file.header()));
   }

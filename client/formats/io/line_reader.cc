@@ -161,6 +161,9 @@ bool LineReader::NextContent(std::string_view& line) {
     const size_t comment = CommentStart(line);
     if (comment != std::string_view::npos) {
       comment_ = TrimBlanks(line.substr(comment + 1));
+      if (on_comment_) {
+        on_comment_(comment_);
+      }
       line = line.substr(0, comment);
     }
     whole_line_ = line;

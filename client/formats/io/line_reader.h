@@ -3,6 +3,7 @@
 #define WELLSPACE_CLIENT_FORMATS_IO_LINE_READER_H_
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -43,6 +44,8 @@ class LineReader {
   // The last comment that the last NextContent skipped or cut off, without '#' and blanks around it; empty if there was
   // none.
   const std::string& comment() const { return comment_; }
+  // From now on NextContent also hands every comment that it skips or cuts off to `use`.
+  void OnComment(std::function<void(std::string_view)> use) { on_comment_ = std::move(use); }
   // Whether comment() stands behind the line that was returned last.
   bool is_comment_behind() const { return is_comment_behind_; }
   // Reads to the end of a compressed file, whose checksum comes last, and returns status().
@@ -77,6 +80,7 @@ class LineReader {
   char usual_end_ = '\n';          // of lines, or '\r': which is looked for first
   bool has_lone_returns_ = false;  // the first line ends in CR, and what follows a CR is the next line even if it is LF
   std::string comment_;
+  std::function<void(std::string_view)> on_comment_;
   bool is_comment_behind_ = false;
   std::string_view whole_line_;
   absl::Status status_;

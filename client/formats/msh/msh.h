@@ -12,9 +12,6 @@ inline constexpr int32_t kMshTriangle = 2;
 inline constexpr int32_t kMshTetrahedron = 4;
 inline constexpr int32_t kMshPoint = 15;
 
-// The geometric entity of all simplices.
-inline constexpr int32_t kMshEntity = 1;
-
 // The name of the data of nodes that are weights.
 inline constexpr char kMshWeights[] = "weights";
 

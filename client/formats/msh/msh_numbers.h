@@ -28,7 +28,12 @@ class MshNumbers {
   // REQUIRES:   `reader` outlives this.
   explicit MshNumbers(LineReader& reader) : reader_(reader), fields_(reader) {}
 
-  void SetBinary() { is_binary_ = true; }
+  // In binary of version 2.2 counts of sections are lines of text, and all whole numbers have 4 bytes.
+  void SetBinary(bool is_2_2) {
+    is_binary_ = true;
+    is_narrow_ = is_2_2;
+  }
+  bool is_binary() const { return is_binary_; }
 
   // The next line that is not blank.
   bool NextLine(std::string_view& line) {
@@ -74,7 +79,23 @@ class MshNumbers {
   // Numbers of at most `limit` as the file has them: counts and numbers of nodes in 8 bytes; dimensions, types and
   // numbers of entities in 4. Then coordinates, and numbers that may be negative.
   absl::Status Size(const char* what, uint64_t limit, uint64_t& value) {
-    return is_binary_ ? TakeWord<int64_t>(what, limit, value) : fields_.NextWhole(what, limit, value);
+    return is_narrow_   ? Int(what, limit, value)
+           : is_binary_ ? TakeWord<int64_t>(what, limit, value)
+                        : fields_.NextWhole(what, limit, value);
+  }
+  // The count at the start of a section of version 2.2, which is text in binary, too.
+  absl::Status Count(const char* what, uint64_t limit, uint64_t& value) {
+    if (!is_narrow_) {
+      return fields_.NextWhole(what, limit, value);
+    }
+    std::string_view line;
+    if (!NextLine(line)) {
+      return reader_.EndError(absl::StrCat("the file ends; expected ", what));
+    }
+    return ParseUnsigned(line, limit, value)
+               ? absl::OkStatus()
+               : reader_.Error(
+                     absl::StrCat("expected ", what, ", a whole number of at most ", limit, ", got ", Quote(line)));
   }
   absl::Status Int(const char* what, uint64_t limit, uint64_t& value) {
     return is_binary_ ? TakeWord<int32_t>(what, limit, value) : fields_.NextWhole(what, limit, value);
@@ -133,6 +154,7 @@ class MshNumbers {
   LineReader& reader_;
   FieldReader fields_;
   bool is_binary_ = false;
+  bool is_narrow_ = false;
 };
 
 }  // namespace wellspace::formats

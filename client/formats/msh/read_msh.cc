@@ -1,4 +1,4 @@
-// Gmsh's MSH: 2.2 in ascii, 4.1 in ascii and in binary.
+// Gmsh's MSH: 2.2 and 4.1, in ascii and in binary.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -97,13 +97,12 @@ class MshReader {
     }
     is_2_2_ = words[0] == "2.2";
     const bool is_binary = words[1] == "1";
-    if ((!is_2_2_ && words[0] != "4.1") || (words[1] != "0" && words[1] != "1") || words[2] != "8" ||
-        (is_2_2_ && is_binary)) {
-      return reader_.Error(absl::StrCat(
-          "expected version 2.2 in ascii (0 8), or 4.1 in ascii (0 8) or binary (1 8), got ", Quote(line)));
+    if ((!is_2_2_ && words[0] != "4.1") || (words[1] != "0" && words[1] != "1") || words[2] != "8") {
+      return reader_.Error(
+          absl::StrCat("expected version 2.2 or 4.1, in ascii (0 8) or binary (1 8), got ", Quote(line)));
     }
     if (is_binary) {
-      file_.SetBinary();
+      file_.SetBinary(is_2_2_);
       uint64_t one = 0;
       WELLSPACE_RETURN_IF_ERROR(file_.Int("the number 1", 0x7fffffff, one));
       if (one != 1) {
@@ -198,7 +197,7 @@ class MshReader {
 
   absl::Status ReadNodes22() {
     uint64_t count = 0;
-    absl::Status status = file_.Size("the number of nodes", kMaxCount, count);
+    absl::Status status = file_.Count("the number of nodes", kMaxCount, count);
     for (uint64_t node = 0; status.ok() && node < count; ++node) {
       status = nodes_.ReadNumber();
       if (status.ok()) {
@@ -274,26 +273,53 @@ class MshReader {
 
   absl::Status ReadElements22() {
     uint64_t count = 0;
-    absl::Status status = file_.Size("the number of elements", kMaxCount, count);
-    for (uint64_t element = 0; status.ok() && element < count; ++element) {
-      uint64_t type = 0;
-      uint64_t tags = 0;
-      status = file_.SkipField("the number of an element");
-      if (status.ok()) {
-        status = file_.Int("the type of an element", 1000, type);
-      }
-      if (status.ok()) {
-        status = file_.Int("the number of tags", kMaxCount, tags);
-      }
-      int32_t group = 0;  // the first tag
-      for (uint64_t tag = 0; status.ok() && tag < tags; ++tag) {
-        status = tag == 0 ? file_.SignedInt("a tag", group) : file_.SkipField("a tag");
-      }
-      if (status.ok()) {
-        status = AddElement(type, group);
-      }
+    absl::Status status = file_.Count("the number of elements", kMaxCount, count);
+    for (uint64_t element = 0; status.ok() && element < count;) {
+      uint64_t rows = 1;
+      status = file_.is_binary() ? ReadBlock22(count - element, rows) : ReadElement22();
+      element += rows;
     }
     return status;
+  }
+
+  // Number, type, how many tags, the tags, the nodes.
+  absl::Status ReadElement22() {
+    uint64_t type = 0;
+    uint64_t tags = 0;
+    WELLSPACE_RETURN_IF_ERROR(file_.SkipField("the number of an element"));
+    WELLSPACE_RETURN_IF_ERROR(file_.Int("the type of an element", 1000, type));
+    WELLSPACE_RETURN_IF_ERROR(file_.Int("the number of tags", kMaxCount, tags));
+    return ReadTagsAndNodes22(type, tags);
+  }
+
+  // Type, how many elements, how many tags each has; then of each its number, the tags, the nodes.
+  absl::Status ReadBlock22(uint64_t most, uint64_t& rows) {
+    uint64_t type = 0;
+    uint64_t tags = 0;
+    WELLSPACE_RETURN_IF_ERROR(file_.Int("the type of elements", 1000, type));
+    WELLSPACE_RETURN_IF_ERROR(file_.Int("the number of elements of a block", most, rows));
+    WELLSPACE_RETURN_IF_ERROR(file_.Int("the number of tags", kMaxCount, tags));
+    if (rows == 0) {
+      return file_.ValueError("expected at least one element in a block, got 0");
+    }
+    for (uint64_t row = 0; row < rows; ++row) {
+      int32_t number = 0;
+      WELLSPACE_RETURN_IF_ERROR(file_.SignedInt("the number of an element", number));
+      WELLSPACE_RETURN_IF_ERROR(ReadTagsAndNodes22(type, tags));
+    }
+    return absl::OkStatus();
+  }
+
+  // The first tag is the physical group.
+  absl::Status ReadTagsAndNodes22(uint64_t type, uint64_t tags) {
+    int32_t group = 0;
+    for (uint64_t tag = 0; tag < tags; ++tag) {
+      int32_t other = 0;
+      WELLSPACE_RETURN_IF_ERROR(tag == 0            ? file_.SignedInt("a tag", group)
+                                : file_.is_binary() ? file_.SignedInt("a tag", other)
+                                                    : file_.SkipField("a tag"));
+    }
+    return AddElement(type, group);
   }
 
   absl::Status ReadElements41() {
@@ -441,8 +467,14 @@ class MshReader {
     FacetSorter sorter;
     const std::vector<uint32_t>& facets = mesh.dimension == 2 ? lines_ : triangles_;
     const std::vector<int32_t>& groups = element_groups_[mesh.dimension - 1];
+    uint64_t ungrouped = 0;
     for (size_t i = 0; i < groups.size(); ++i) {
       sorter.Add(std::span(facets).subspan(i * mesh.dimension, mesh.dimension), groups[i]);
+      ungrouped += groups[i] == 0 ? 1 : 0;
+    }
+    if (ungrouped > 0) {
+      mesh.notes.push_back(absl::StrCat(reader_.name(), ": ", ungrouped, mesh.dimension == 2 ? " lines" : " triangles",
+                                        " of no physical group are left out: they are no tagged boundary"));
     }
     for (const auto& [group, name] : names_[mesh.dimension - 1]) {
       sorter.Name(group, name);

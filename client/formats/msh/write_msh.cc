@@ -16,6 +16,7 @@
 #include "client/formats/io/output_file.h"
 #include "client/formats/mesh_writers.h"
 #include "client/formats/msh/msh.h"
+#include "client/formats/names.h"
 #include "client/formats/regions.h"
 #include "core/base/status_macros.h"
 
@@ -32,31 +33,55 @@ std::vector<Region> RegionsOf(const MeshShape& shape) {
   return shape.regions.empty() ? std::vector<Region>{{.id = 1, .name = "domain"}} : shape.regions;
 }
 
-// The physical group of each region: its id if there are several and no part of the boundary has that number, else the
-// least number that is free. There are readers that tell groups by their numbers alone, whatever their dimensions.
-std::map<int32_t, int32_t> Groups(const MeshShape& shape) {
-  std::set<int32_t> taken;
-  for (const BoundaryPart& part : shape.boundary) {
-    taken.insert(part.tag);
-  }
-  std::map<int32_t, int32_t> groups;
-  const std::vector<Region> regions = RegionsOf(shape);
-  for (const Region& region : regions) {
-    if (shape.has_simplex_regions && region.id > 0 && taken.insert(region.id).second) {
-      groups[region.id] = region.id;
+// A name as Gmsh reads it: from its quote to the next one, on a line of which it takes 127 bytes.
+constexpr size_t kMaxMshNameBytes = 112;
+std::string MshName(std::string_view name, NameChanges& changes) {
+  std::string written(CutName(name, kMaxMshNameBytes));
+  for (char& c : written) {
+    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f' || c == '"') {
+      c = '_';
     }
   }
-  int32_t free = 1;
-  for (const Region& region : regions) {
-    if (!groups.contains(region.id)) {
-      while (!taken.insert(free).second) {
-        ++free;
-      }
-      groups[region.id] = free;
-    }
-  }
-  return groups;
+  changes.Add(name, written);
+  return written;
 }
+
+// The numbers of entities that have these groups: those of the groups where these are positive, others are free ones.
+std::map<int32_t, int32_t> Entities(std::span<const int32_t> groups) {
+  std::set<int32_t> taken(groups.begin(), groups.end());
+  std::map<int32_t, int32_t> entities;
+  int32_t free = 1;
+  for (const int32_t group : groups) {
+    if (group > 0) {
+      entities[group] = group;
+      continue;
+    }
+    while (!taken.insert(free).second) {
+      ++free;
+    }
+    entities[group] = free;
+  }
+  return entities;
+}
+
+std::vector<int32_t> NumbersOf(std::span<const BoundaryPart> parts) {
+  std::vector<int32_t> numbers;
+  for (const BoundaryPart& part : parts) {
+    numbers.push_back(part.tag);
+  }
+  return numbers;
+}
+
+std::vector<int32_t> NumbersOf(std::span<const Region> regions) {
+  std::vector<int32_t> numbers;
+  for (const Region& region : regions) {
+    numbers.push_back(region.id);
+  }
+  return numbers;
+}
+
+// Whether a region is a group: simplices of the region 0 are of none if it has no name.
+bool IsGroup(const Region& region) { return region.id != 0 || !region.name.empty(); }
 
 // What both versions share: the order of the sections, and rows put together before they are written. What the versions
 // do differently is called in this order: WriteNodesHeader; AppendNode for each vertex; ElementsHeader and
@@ -82,7 +107,7 @@ class MshWriter : public MeshWriter {
 
   absl::Status AddSimplexRegions(std::span<const int32_t> regions) final {
     for (const int32_t region : regions) {
-      if (!groups_.contains(region)) {
+      if (!entities_.contains(region)) {
         return absl::InternalError(absl::StrCat("a mesh got a simplex of region ", region, ", and has no such region"));
       }
     }
@@ -95,7 +120,7 @@ class MshWriter : public MeshWriter {
     const size_t corners = shape_.dimension + 1;
     WELLSPACE_RETURN_IF_ERROR(regions_.CheckNext(shape_.has_simplex_regions ? simplices.size() / corners : 0));
     for (; !simplices.empty() && output_.status().ok(); simplices = simplices.subspan(corners)) {
-      const int32_t group = shape_.has_simplex_regions ? groups_.at(regions_.Next()) : OnlyGroup();
+      const int32_t group = shape_.has_simplex_regions ? regions_.Next() : OnlyRegion();
       row_.clear();
       WriteSimplex(simplices.first(corners), group, ++simplices_, row_);
     }
@@ -131,6 +156,10 @@ class MshWriter : public MeshWriter {
     if (shape_.has_weights) {
       WriteNodeData(kMshWeights, [this](uint64_t vertex) { return weights_[vertex]; });
     }
+    if (entities_.begin()->first < 0 || (!part_entities_.empty() && part_entities_.begin()->first < 0)) {
+      AddNote("Gmsh takes the sign of a group's number for a direction, and shows -7 as 7");
+    }
+    AddNote(changes_.Note(absl::StrCat("Gmsh reads names of at most ", kMaxMshNameBytes, " bytes, without quotes")));
     return output_.Commit();
   }
 
@@ -143,28 +172,38 @@ class MshWriter : public MeshWriter {
   uint64_t element_count() const { return shape_.simplex_count + shape_.facet_count(); }
 
   // Whether groups have names, and entities are described.
-  bool has_groups() const { return !shape_.boundary.empty() || shape_.has_simplex_regions; }
-  // The physical group of simplices that are all of one region.
-  int32_t OnlyGroup() const { return groups_.begin()->second; }
+  bool has_groups() const { return !shape_.boundary.empty() || !shape_.regions.empty(); }
+  // The region of simplices that are all of one.
+  int32_t OnlyRegion() const { return groups_.front().id; }
 
-  // The section with the names of groups, if there are any.
-  std::string PhysicalNames() const {
+  // The section with the names of groups, if there are any. Gmsh counts groups by their dimensions: a part of the
+  // boundary and a region may have the same number. Parts stand first, for gmshToFoam, which does not count so and
+  // takes the first name of a number.
+  std::string PhysicalNames() {
     if (!has_groups()) {
       return "";
     }
-    std::string text = absl::StrCat("$PhysicalNames\n", shape_.boundary.size() + groups_.size(), "\n");
+    std::string rows;
+    uint64_t count = shape_.boundary.size();
     for (const BoundaryPart& part : shape_.boundary) {
-      absl::StrAppend(&text, shape_.dimension - 1, " ", part.tag, " \"", part.name, "\"\n");
+      absl::StrAppend(&rows, shape_.dimension - 1, " ", part.tag, " \"", MshName(part.name, changes_), "\"\n");
     }
-    for (const Region& region : RegionsOf(shape_)) {
-      absl::StrAppend(&text, shape_.dimension, " ", groups_.at(region.id), " \"", region.name, "\"\n");
+    for (const Region& region : groups_) {
+      if (IsGroup(region)) {
+        ++count;
+        absl::StrAppend(&rows, shape_.dimension, " ", region.id, " \"", MshName(region.name, changes_), "\"\n");
+      }
     }
-    return text + "$EndPhysicalNames\n";
+    return absl::StrCat("$PhysicalNames\n", count, "\n", rows, "$EndPhysicalNames\n");
   }
 
   const MeshShape shape_;
-  const std::map<int32_t, int32_t> groups_ = Groups(shape_);  // the physical group of each region's id
+  const std::vector<Region> groups_ = RegionsOf(shape_);  // physical groups of simplices, and 0 for none
+  // Of the regions and of the parts of the boundary, by their numbers.
+  const std::map<int32_t, int32_t> entities_ = Entities(NumbersOf(std::span<const Region>(groups_)));
+  const std::map<int32_t, int32_t> part_entities_ = Entities(NumbersOf(std::span<const BoundaryPart>(shape_.boundary)));
   RegionQueue regions_;
+  NameChanges changes_;
   OutputFile output_;
 
  private:
@@ -249,12 +288,12 @@ class Msh22Writer final : public MshWriter {
   std::string ElementsHeader() const override { return absl::StrCat("$Elements\n", element_count(), "\n"); }
 
   void WriteSimplex(std::span<const uint32_t> corners, int32_t group, uint64_t number, std::string& row) override {
-    AppendRow(type(), corners, group, shape_.has_simplex_regions ? group : kMshEntity, number, row);
+    AppendRow(type(), corners, group, entities_.at(group), number, row);
     output_.Write(row);
   }
 
   void AppendFacet(std::span<const uint32_t> corners, int32_t tag, uint64_t number, std::string& row) const override {
-    AppendRow(facet_type(), corners, tag, tag, number, row);
+    AppendRow(facet_type(), corners, tag, part_entities_.at(tag), number, row);
   }
 
   // Two tags: the physical group and the geometric entity.
@@ -329,8 +368,8 @@ class Msh41Writer final : public MshWriter {
   void BeginSimplices() override {
     uint64_t number = 1;
     for (const auto& [region, simplices] : regions_.Sizes()) {
-      RegionBlock& block = blocks_[groups_.at(region)];
-      for (const int32_t value : {static_cast<int32_t>(shape_.dimension), groups_.at(region), type()}) {
+      RegionBlock& block = blocks_[region];
+      for (const int32_t value : {static_cast<int32_t>(shape_.dimension), entities_.at(region), type()}) {
         AppendBytes(value, block.header);
       }
       AppendBytes(simplices, block.header);
@@ -389,7 +428,8 @@ class Msh41Writer final : public MshWriter {
   }
 
   void AppendBlock(const BoundaryPart& part, std::string& row) const override {
-    for (const int32_t value : {static_cast<int32_t>(shape_.dimension - 1), part.tag, facet_type()}) {
+    for (const int32_t value :
+         {static_cast<int32_t>(shape_.dimension - 1), part_entities_.at(part.tag), facet_type()}) {
       AppendBytes(value, row);
     }
     AppendBytes<uint64_t>(part.facets, row);
@@ -413,16 +453,15 @@ class Msh41Writer final : public MshWriter {
                             text);
     }
     for (const BoundaryPart& part : shape_.boundary) {
-      AppendEntity(part.tag, part.tag, text);
+      AppendEntity(part_entities_.at(part.tag), part.tag, text);
       AppendBytes<uint64_t>(0, text);
     }
-    for (const Region& region : RegionsOf(shape_)) {
-      const int32_t group = groups_.at(region.id);
-      AppendEntity(shape_.has_simplex_regions ? group : kMshEntity, group, text);
+    for (const Region& region : groups_) {
+      AppendEntity(entities_.at(region.id), IsGroup(region) ? region.id : 0, text);
       // All parts bound the only region. Which of them bound one of several is not known.
       AppendBytes<uint64_t>(shape_.has_simplex_regions ? 0 : shape_.boundary.size(), text);
       for (size_t i = 0; i < shape_.boundary.size() && !shape_.has_simplex_regions; ++i) {
-        AppendBytes(shape_.boundary[i].tag, text);
+        AppendBytes(part_entities_.at(shape_.boundary[i].tag), text);
       }
     }
     text += "\n$EndEntities\n";
@@ -435,14 +474,15 @@ class Msh41Writer final : public MshWriter {
         AppendBytes(axis < corner->size() ? (*corner)[axis] : 0.0, text);
       }
     }
-    AppendBytes<uint64_t>(1, text);
-    AppendBytes(group, text);
+    AppendBytes<uint64_t>(group == 0 ? 0 : 1, text);
+    if (group != 0) {
+      AppendBytes(group, text);
+    }
   }
 
   // The dimension and number of the entity of nodes and of a mesh of one region; then what the section has third.
   void AppendBlockOf(int32_t third, std::string& text) const {
-    const int32_t entity = shape_.has_simplex_regions ? OnlyGroup() : kMshEntity;
-    for (const int32_t value : {static_cast<int32_t>(shape_.dimension), entity, third}) {
+    for (const int32_t value : {static_cast<int32_t>(shape_.dimension), entities_.at(OnlyRegion()), third}) {
       AppendBytes(value, text);
     }
   }
@@ -469,7 +509,7 @@ class Msh41Writer final : public MshWriter {
   }
 
   static constexpr uint64_t kBlockBytes = 1 << 12;
-  std::map<int32_t, RegionBlock> blocks_;  // by physical group; empty: one region
+  std::map<int32_t, RegionBlock> blocks_;  // by region; empty: one region
 };
 
 template <typename Writer>

@@ -8,6 +8,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/formats/io/number.h"
+#include "client/formats/names.h"
 #include "client/formats/vtk/vtk_array.h"
 #include "core/base/status_macros.h"
 
@@ -315,22 +316,16 @@ absl::Status NpyReader::ReadIndices(uint64_t limit, std::vector<uint32_t>& value
 }
 
 absl::Status NpyReader::ReadTexts(std::vector<std::string>& values) {
-  constexpr uint64_t kMostCharacters = 1024;
   const std::string_view type = header_.type;
   uint64_t characters = 0;
-  if (type.substr(0, 2) != "<U" || !ParseUnsigned(type.substr(2), kMostCharacters, characters) || characters == 0) {
-    return Error(absl::StrCat("expected texts of type <U1 to <U", kMostCharacters, ", got ", Quote(type)));
+  if (type.substr(0, 2) != "<U" || !ParseUnsigned(type.substr(2), kMaxNpyCharacters, characters) || characters == 0) {
+    return Error(absl::StrCat("expected texts of type <U1 to <U", kMaxNpyCharacters, ", got ", Quote(type)));
   }
   values.clear();
   std::u32string text(characters, U'\0');
   for (uint64_t row = 0; row < rows(); ++row) {
     WELLSPACE_RETURN_IF_ERROR(Take(reinterpret_cast<char*>(text.data()), characters * sizeof(char32_t)));
-    std::string& value = values.emplace_back();
-    for (const char32_t letter : text) {
-      if (letter != U'\0') {
-        value += letter < 0x80 ? static_cast<char>(letter) : '?';
-      }
-    }
+    values.push_back(ToUtf8(std::u32string_view(text).substr(0, text.find_last_not_of(U'\0') + 1)));
   }
   return ExpectEnd();
 }

@@ -22,6 +22,9 @@ namespace wellspace::formats {
 // Up to `size` bytes, at least one unless none are left.
 using ByteSource = std::function<absl::StatusOr<size_t>(char* buffer, size_t size)>;
 
+// The most characters of a text that is read.
+inline constexpr uint64_t kMaxNpyCharacters = 1024;
+
 struct NpyHeader {
   std::string type;  // numpy's name of it: byte order, kind, bytes of a value; "<f8"
   bool fortran_order = false;
@@ -64,7 +67,7 @@ class NpyReader {
   absl::Status ReadNumbers(std::vector<double>& values);
   // The same for whole numbers alone, from 0 to below `limit`.
   absl::Status ReadIndices(uint64_t limit, std::vector<uint32_t>& values);
-  // The same for texts of type "<U1" and longer, of one dimension. What is not ASCII becomes a question mark.
+  // The same for texts of type "<U1" and longer, of one dimension; they become UTF-8.
   absl::Status ReadTexts(std::vector<std::string>& values);
 
  private:

@@ -9,7 +9,7 @@ inline constexpr char kNpzPoints[] = "points.npy";        // vertex_count x dime
 inline constexpr char kNpzWeights[] = "weights.npy";      // vertex_count, of regular triangulations only
 inline constexpr char kNpzSimplices[] = "simplices.npy";  // simplex_count x (dimension + 1), indices of points
 
-// Only where the boundary is known.
+// Only where the boundary is known; regions also where they are.
 inline constexpr char kNpzOrigins[] = "vertex_origins.npy";         // vertex_count; numbers of input points, or below 0
 inline constexpr char kNpzVertexTags[] = "vertex_tags.npy";         // vertex_count
 inline constexpr char kNpzRegions[] = "regions.npy";                // simplex_count
@@ -18,7 +18,7 @@ inline constexpr char kNpzFacetTags[] = "facet_tags.npy";           // facet_cou
 inline constexpr char kNpzFacetNames[] = "facet_names.npy";         // of the parts of the boundary, in UTF-32
 inline constexpr char kNpzFacetNameTags[] = "facet_name_tags.npy";  // the tag of each name
 
-// Only where there are several regions.
+// Only where regions are known.
 inline constexpr char kNpzRegionIds[] = "region_ids.npy";      // a row for each region
 inline constexpr char kNpzRegionNames[] = "region_names.npy";  // of these, in UTF-32
 

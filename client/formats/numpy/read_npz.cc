@@ -58,7 +58,7 @@ absl::Status ReadTags(ZipReader& archive, const std::string& file, const std::st
   return absl::OkStatus();
 }
 
-// Texts of UTF-32, a row each, as FacetSorter wants them: what is not ASCII becomes a question mark.
+// Texts of UTF-32, a row each.
 absl::Status ReadNames(ZipReader& archive, const std::string& file, const std::string& member,
                        std::vector<std::string>& names) {
   WELLSPACE_ASSIGN_OR_RETURN(const uint64_t size, archive.Begin(member));

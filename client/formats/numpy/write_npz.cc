@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/formats/io/output_file.h"
 #include "client/formats/mesh_writers.h"
+#include "client/formats/names.h"
 #include "client/formats/numpy/npy.h"
 #include "client/formats/numpy/npz.h"
 #include "client/formats/numpy/zip_file.h"
@@ -97,9 +98,10 @@ class NpzWriter final : public MeshWriter {
       BeginFacets();
       WriteTags();
     }
-    if (shape_.has_simplex_regions) {
+    if (!shape_.regions.empty()) {
       WriteRegions();
     }
+    AddNote(changes_.Note(absl::StrCat("names are text of at most ", kMaxNpyCharacters, " characters")));
     WELLSPACE_RETURN_IF_ERROR(archive_.Finish());
     WELLSPACE_RETURN_IF_ERROR(CheckComplete(shape_, {.vertices = vertices_,
                                                      .weights = weights_,
@@ -135,7 +137,7 @@ class NpzWriter final : public MeshWriter {
     }
   }
 
-  // What is known of facets, and of the only region, beside the indices.
+  // What is known of facets beside the indices.
   void WriteTags() {
     std::vector<int32_t> tags;
     std::vector<std::string> names;
@@ -147,13 +149,14 @@ class NpzWriter final : public MeshWriter {
     }
     WriteNames(kNpzFacetNames, names);
     WriteNumbers(kNpzFacetNameTags, tags);
-    if (!shape_.regions.empty() && !shape_.has_simplex_regions) {
+  }
+
+  // Of the only region also the number, for each simplex.
+  void WriteRegions() {
+    if (!shape_.has_simplex_regions) {
       Begin(kNpzRegions, "<i4", shape_.simplex_count, std::nullopt, sizeof(int32_t));
       WriteRepeated(shape_.regions[0].id, shape_.simplex_count);
     }
-  }
-
-  void WriteRegions() {
     std::vector<int32_t> ids;
     std::vector<std::string> names;
     for (const Region& region : shape_.regions) {
@@ -171,15 +174,15 @@ class NpzWriter final : public MeshWriter {
 
   void WriteNames(const char* member, std::span<const std::string> names) {
     size_t longest = 1;
+    std::vector<std::u32string> texts;
     for (const std::string& name : names) {
-      longest = std::max(longest, name.size());
+      std::u32string& text = texts.emplace_back(ToUtf32(name));
+      text.resize(std::min<size_t>(text.size(), kMaxNpyCharacters));
+      longest = std::max(longest, text.size());
+      changes_.Add(name, ToUtf8(text));
     }
     Begin(member, absl::StrCat("<U", longest).c_str(), names.size(), std::nullopt, longest * sizeof(char32_t));
-    for (const std::string& name : names) {
-      std::u32string letters;
-      for (const char letter : name) {
-        letters += static_cast<unsigned char>(letter);
-      }
+    for (std::u32string& letters : texts) {
       letters.resize(longest, U'\0');
       Write(std::span<const char32_t>(letters));
     }
@@ -212,6 +215,7 @@ class NpzWriter final : public MeshWriter {
   bool has_facets_ = false;
   size_t attributes_begun_ = 0;  // members
   uint64_t simplex_regions_ = 0;
+  NameChanges changes_;
   uint64_t facets_ = 0;
   uint64_t attribute_values_ = 0;
 };

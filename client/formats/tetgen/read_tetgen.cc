@@ -18,6 +18,7 @@
 #include "client/formats/io/number.h"
 #include "client/formats/mesh_readers.h"
 #include "client/formats/mesh_writers.h"
+#include "client/formats/names.h"
 #include "client/formats/regions.h"
 #include "client/formats/tetgen/tetgen.h"
 #include "client/formats/tetgen/tetgen_lines.h"
@@ -41,7 +42,7 @@ absl::Status TakeNode(LineReader& reader, FieldSplitter& fields, uint64_t vertic
   return absl::OkStatus();
 }
 
-// "boundary: 1 xmin 2 xmax": the names of tags.
+// "boundary: 1 xmin 2 xmax": the names of tags, as files of 0.1 have them.
 void TakeNames(std::string_view comment, FacetSorter& sorter) {
   FieldSplitter fields(comment, ' ');
   std::string_view tag;
@@ -56,7 +57,7 @@ void TakeNames(std::string_view comment, FacetSorter& sorter) {
   }
 }
 
-// "regions: 1 domain, 2 region 7": the names of regions.
+// "regions: 1 domain, 2 region 7": the names of regions, as files of 0.1 have them.
 void TakeRegionNames(std::string_view comment, RegionCollector& collector) {
   absl::string_view rest(comment.data(), comment.size());
   if (!absl::ConsumePrefix(&rest, kRegionsComment)) {
@@ -86,13 +87,14 @@ bool ParseRegion(std::string_view field, int32_t& region) {
 // .edge or .face; facets without a marker, and those with 0, are no boundary.
 absl::Status ReadFacets(LineReader& reader, uint64_t vertices, uint64_t index_base, Mesh& mesh) {
   std::string_view line;
+  FacetSorter sorter;
+  reader.OnComment([&sorter](std::string_view comment) { TakeNameLine(comment, &sorter, nullptr); });
   if (!reader.NextContent(line)) {
     return reader.EndError("expected a header, got an empty file");
   }
   std::array<uint64_t, 2> header{};
   const std::array names = {"number of facets", "number of markers"};
   WELLSPACE_RETURN_IF_ERROR(ReadHeader(reader, line, 1, names, header));
-  FacetSorter sorter;
   TakeNames(reader.comment(), sorter);
   const auto [count, markers] = header;
   uint64_t facet_base = 0;
@@ -122,13 +124,14 @@ absl::Status ReadEle(LineReader& reader, uint64_t vertices, uint64_t index_base,
   const uint64_t corners = mesh.dimension + 1;
   const char* what = SimplexName(mesh.dimension);
   std::string_view line;
+  RegionCollector regions;
+  reader.OnComment([&regions](std::string_view comment) { TakeNameLine(comment, nullptr, &regions); });
   if (!reader.NextContent(line)) {
     return reader.EndError("expected a header, got an empty file");
   }
   std::array<uint64_t, 3> header{};
   const std::array names = {"number of simplices", "number of nodes of each", "number of attributes"};
   WELLSPACE_RETURN_IF_ERROR(ReadHeader(reader, line, 2, names, header));
-  RegionCollector regions;
   bool are_regions = true;  // the first attributes
   TakeRegionNames(reader.comment(), regions);
   const auto [count, nodes, attributes] = header;
@@ -168,6 +171,12 @@ absl::Status ReadEle(LineReader& reader, uint64_t vertices, uint64_t index_base,
   }
   if (are_regions) {
     regions.MoveTo(mesh);
+  } else {
+    mesh.notes.push_back(absl::StrCat(reader.name(), ": the first attributes of the ", what,
+                                      " are left out: not all are whole numbers of 32 bits, as regions are"));
+  }
+  if (attributes > 1 && count > 0) {
+    mesh.notes.push_back(absl::StrCat(reader.name(), ": of the attributes of the ", what, " only the first is read"));
   }
   return ExpectEnd(reader, count, what);
 }

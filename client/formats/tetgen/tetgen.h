@@ -10,9 +10,10 @@ namespace wellspace::formats {
 // The comment ahead of the header of a .node whose attribute is the weight of its points.
 inline constexpr char kWeightsComment[] = "weights";
 
-// What the comment ahead of the header of a .edge, .face or .poly begins with; then come tags, each with its name.
+// What the comment ahead of the header of a .edge, .face or .poly of 0.1 begins with; then come tags, each with its
+// name. Now every name has a comment of its own: see names.h.
 inline constexpr char kBoundaryComment[] = "boundary:";
-// The same ahead of the header of a .ele with several regions; then come ids, each with a name.
+// The same ahead of the header of a .ele of 0.1 with several regions; then come ids, each with a name.
 inline constexpr char kRegionsComment[] = "regions:";
 
 // The files beside .node and .ele that have the boundary: .edge or .face, and up to 3-D .poly.

@@ -10,6 +10,7 @@
 #include "client/formats/io/number.h"
 #include "client/formats/io/output_file.h"
 #include "client/formats/mesh_writers.h"
+#include "client/formats/names.h"
 #include "client/formats/regions.h"
 #include "client/formats/registry.h"
 #include "client/formats/tetgen/tetgen.h"
@@ -32,20 +33,21 @@ class NodeAndEleWriter final : public MeshWriter {
     files_.nodes.Write(absl::StrCat(shape.has_weights ? absl::StrCat("# ", kWeightsComment, "\n") : "",
                                     shape.vertex_count, " ", shape.dimension, shape.has_weights ? " 1" : " 0",
                                     shape.has_vertex_marks ? " 1\n" : " 0\n"));
-    if (shape.has_simplex_regions) {
-      files_.simplices.Write(absl::StrCat("# ", kRegionsComment, RegionNames(), "\n"));
-    }
+    const NameLines parts(shape, NameLines::Of::kParts);
+    const NameLines regions(shape, NameLines::Of::kRegions);
+    AddNote(parts.ChangesNote());
+    AddNote(regions.ChangesNote());
+    files_.simplices.Write(regions.Text("# "));
     files_.simplices.Write(
         absl::StrCat(shape.simplex_count, " ", shape.dimension + 1, shape.regions.empty() ? " 0\n" : " 1\n"));
     if (!shape.regions.empty()) {
       region_ = absl::StrCat(" ", shape.regions[0].id);
     }
     if (files_.facets.has_value()) {
-      files_.facets->Write(absl::StrCat("# ", kBoundaryComment, Names(), "\n", shape.facet_count(), " 1\n"));
+      files_.facets->Write(absl::StrCat(parts.Text("# "), shape.facet_count(), " 1\n"));
     }
     if (files_.poly.has_value()) {
-      files_.poly->Write(absl::StrCat("# ", kBoundaryComment, Names(), "\n0 ", shape.dimension, " 0 1\n",
-                                      shape.facet_count(), " 1\n"));
+      files_.poly->Write(absl::StrCat(parts.Text("# "), "0 ", shape.dimension, " 0 1\n", shape.facet_count(), " 1\n"));
     }
   }
 
@@ -135,28 +137,6 @@ class NodeAndEleWriter final : public MeshWriter {
   }
 
  private:
-  // " 1 xmin 2 xmax", for those that read the file.
-  std::string Names() const {
-    std::string names;
-    for (const BoundaryPart& part : shape_.boundary) {
-      if (!part.name.empty()) {
-        absl::StrAppend(&names, " ", part.tag, " ", part.name);
-      }
-    }
-    return names;
-  }
-
-  // " 1 domain, 2 region 7".
-  std::string RegionNames() const {
-    std::string names;
-    for (const Region& region : shape_.regions) {
-      if (!region.name.empty()) {
-        absl::StrAppend(&names, names.empty() ? " " : ", ", region.id, " ", region.name);
-      }
-    }
-    return names;
-  }
-
   static void AppendCorners(std::span<const uint32_t> corners, std::string& line) {
     for (const uint32_t corner : corners) {
       line += ' ';

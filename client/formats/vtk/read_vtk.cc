@@ -1,394 +1,227 @@
-// VTK's legacy format, ascii and binary, versions 1.0 to 5.1: the points and their data.
-// https://docs.vtk.org/en/latest/vtk_file_formats/vtk_legacy_file_format.html
-#include <algorithm>
-#include <array>
+// VTK's legacy format: points with their data, and meshes.
 #include <cstdint>
-#include <limits>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
-#include "absl/strings/ascii.h"
 #include "absl/strings/str_cat.h"
 #include "client/formats/cloud_readers.h"
-#include "client/formats/coordinate.h"
-#include "client/formats/io/field_reader.h"
-#include "client/formats/io/number.h"
+#include "client/formats/io/input_file.h"
+#include "client/formats/mesh_readers.h"
 #include "client/formats/point_rows.h"
-#include "client/formats/vtk/vtk_array.h"
+#include "client/formats/vtk/vtk_cells.h"
+#include "client/formats/vtk/vtk_legacy.h"
+#include "client/formats/vtk/vtk_mesh.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
 
-constexpr uint64_t kVtkMaxComponents = 64;
-// Of numbers that are skipped: cells with their vertices.
-constexpr uint64_t kVtkMaxNumbers = uint64_t{1} << 40;
-
-struct VtkType {
-  std::string_view name;
-  size_t bytes;  // 0: a bit
-  double (*value)(std::string_view bytes);
-};
-
-template <typename T>
-double VtkValue(std::string_view bytes) {
-  return static_cast<double>(LoadWord<T>(bytes, 0, /*big_endian=*/true));
-}
-
-constexpr std::array kVtkTypes = {
-    VtkType{"bit", 0, nullptr},
-    VtkType{"char", 1, VtkValue<int8_t>},
-    VtkType{"signed_char", 1, VtkValue<int8_t>},
-    VtkType{"unsigned_char", 1, VtkValue<uint8_t>},
-    VtkType{"short", 2, VtkValue<int16_t>},
-    VtkType{"unsigned_short", 2, VtkValue<uint16_t>},
-    VtkType{"int", 4, VtkValue<int32_t>},
-    VtkType{"unsigned_int", 4, VtkValue<uint32_t>},
-    VtkType{"long", 8, VtkValue<int64_t>},
-    VtkType{"unsigned_long", 8, VtkValue<uint64_t>},
-    VtkType{"vtktypeint64", 8, VtkValue<int64_t>},
-    VtkType{"vtktypeuint64", 8, VtkValue<uint64_t>},
-    VtkType{"vtkidtype", 4, VtkValue<int32_t>},
-    VtkType{"float", 4, VtkValue<float>},
-    VtkType{"double", 8, VtkValue<double>},
-};
-
-// "My%20name" as it was before.
-std::string DecodedVtkName(std::string_view name) {
-  std::string decoded;
-  for (size_t i = 0; i < name.size(); ++i) {
-    if (name[i] == '%' && i + 2 < name.size() && absl::ascii_isxdigit(static_cast<unsigned char>(name[i + 1])) &&
-        absl::ascii_isxdigit(static_cast<unsigned char>(name[i + 2]))) {
-      decoded += static_cast<char>(std::stoi(std::string(name.substr(i + 1, 2)), nullptr, 16));
-      i += 2;
-    } else {
-      decoded += name[i];
-    }
-  }
-  return decoded;
-}
-
-class VtkPointsReader {
+class VtkPointsReader final : public VtkLegacyReader {
  public:
   VtkPointsReader(LineReader& reader, const CloudOptions& options, PointCloud& cloud)
-      : reader_(reader), fields_(reader), options_(options), cloud_(cloud) {}
+      : VtkLegacyReader(reader), options_(options), cloud_(cloud) {}
 
   absl::Status Read() {
-    WELLSPACE_RETURN_IF_ERROR(ReadHeader());
-    while (NextKeyword() && !is_done_) {
-      WELLSPACE_RETURN_IF_ERROR(ReadSection());
+    const absl::Status status = ReadSections();
+    // What follows the points is only looked at to tell of it.
+    if (!status.ok() && (WantsData() || !has_points())) {
+      return status;
     }
-    WELLSPACE_RETURN_IF_ERROR(reader_.status());
-    if (!has_points_) {
-      return reader_.Error("the file ends; expected \"POINTS\"");
+    std::vector<std::string> names = {"x", "y", "z"};
+    std::vector<std::vector<double>> columns = std::move(coordinates_);
+    for (auto& [array_names, array_columns] : arrays_) {
+      names.insert(names.end(), array_names.begin(), array_names.end());
+      for (std::vector<double>& column : array_columns) {
+        columns.push_back(std::move(column));
+      }
     }
-    return AddAllRows(names_, columns_, options_, cloud_);
+    NoteCells(cells_, cloud_);
+    return AddAllRows(names, columns, options_, cloud_);
   }
 
  private:
-  absl::Status ReadHeader() {
-    std::string_view line;
-    if (!reader_.Next(line) || line.substr(0, 22) != "# vtk DataFile Version") {
-      return reader_.EndError("expected \"# vtk DataFile Version\" at the start of the file");
+  struct Array {
+    std::vector<std::string> names;
+    Columns columns;
+  };
+
+  bool WantsData() const { return options_.keep_attributes || !options_.columns.empty(); }
+  Columns& Coordinates() override { return coordinates_; }
+
+  Columns* Place(const Data& data) override {
+    if (data.of != Data::Of::kPoints || !has_points() || data.rows != point_count() || !WantsData()) {
+      is_done_ = is_done_ || (has_points() && !WantsData());
+      return nullptr;
     }
-    if (!reader_.Next(line) || !reader_.Next(line)) {  // the first is a title
-      return reader_.EndError("expected a title, and \"ASCII\" or \"BINARY\"");
-    }
-    const std::string encoding = absl::AsciiStrToUpper(std::string(TrimBlanks(line)));
-    if (encoding != "ASCII" && encoding != "BINARY") {
-      return reader_.Error(absl::StrCat("expected \"ASCII\" or \"BINARY\", got ", Quote(line)));
-    }
-    is_ascii_ = encoding == "ASCII";
-    return absl::OkStatus();
+    arrays_.push_back({DataNames(data.name, data.components), {}});
+    return &arrays_.back().columns;
   }
 
-  // The fields of the next line that has any, the first in upper case. False at the end of the file.
-  bool NextKeyword() {
-    fields_.DropLine();
-    std::string_view line;
-    if (is_done_ || !reader_.NextContent(line)) {
-      return false;
+  bool WantsCells(std::string_view keyword, uint64_t cells) override {
+    if (keyword != "CELL_TYPES" && keyword != "VERTICES") {
+      cells_ += cells;
+      is_done_ = !WantsData();
     }
-    words_.clear();
-    FieldSplitter splitter(line, ' ');
-    for (std::string_view word; splitter.Next(word) && words_.size() < kVtkMaxComponents;) {
-      words_.emplace_back(word);
-    }
-    keyword_ = absl::AsciiStrToUpper(words_[0]);
-    return true;
+    return keyword == "CELL_TYPES";
   }
 
-  absl::Status ReadSection() {
-    if (keyword_ == "DATASET") {
-      const std::string kind = absl::AsciiStrToUpper(words_.size() > 1 ? words_[1] : "");
-      return kind == "POLYDATA" || kind == "UNSTRUCTURED_GRID" || kind == "STRUCTURED_GRID"
-                 ? absl::OkStatus()
-                 : reader_.Error(absl::StrCat("expected DATASET POLYDATA, UNSTRUCTURED_GRID or STRUCTURED_GRID, got ",
-                                              Quote(words_.size() > 1 ? words_[1] : "")));
-    }
-    if (keyword_ == "POINTS") {
-      return ReadPoints();
-    }
-    if (keyword_ == "DIMENSIONS") {
-      return absl::OkStatus();
-    }
-    if (keyword_ == "METADATA") {
-      return SkipMetadata();
-    }
-    if (keyword_ == "POINT_DATA" || keyword_ == "CELL_DATA") {
-      is_of_points_ = keyword_ == "POINT_DATA";
-      WELLSPACE_RETURN_IF_ERROR(TakeCount(1, kMaxCount, data_count_));
-      return is_of_points_ && data_count_ != point_count_
-                 ? reader_.Error(absl::StrCat("expected data of ", point_count_, " points, got ", data_count_))
-                 : absl::OkStatus();
-    }
-    for (const char* cells : {"VERTICES", "LINES", "POLYGONS", "TRIANGLE_STRIPS", "CELLS", "CELL_TYPES"}) {
-      if (keyword_ == cells) {
-        return SkipCells();
-      }
-    }
-    return ReadData();
-  }
-
-  // The whole number of at most `limit` that is word number `index` of the line.
-  absl::Status TakeCount(size_t index, uint64_t limit, uint64_t& count) const {
-    return index < words_.size() && ParseUnsigned(words_[index], limit, count)
-               ? absl::OkStatus()
-               : reader_.Error(absl::StrCat("expected a whole number of at most ", limit, " as word ", index + 1,
-                                            " after ", keyword_));
-  }
-
-  absl::Status TakeType(const std::string& word, const VtkType*& type) const {
-    const std::string name = absl::AsciiStrToLower(word);
-    for (const VtkType& candidate : kVtkTypes) {
-      if (candidate.name == name) {
-        type = &candidate;
-        return absl::OkStatus();
-      }
-    }
-    return reader_.Error(
-        absl::StrCat("expected a type of numbers, such as float, double, int or unsigned_char, got ", Quote(word)));
-  }
-
-  std::string WordOr(size_t index, const char* other) const { return index < words_.size() ? words_[index] : other; }
-
-  absl::Status ReadPoints() {
-    if (has_points_) {
-      return reader_.Error("expected one list of points, got another one");
-    }
-    const VtkType* type = nullptr;
-    WELLSPACE_RETURN_IF_ERROR(TakeCount(1, kMaxCount, point_count_));
-    WELLSPACE_RETURN_IF_ERROR(TakeType(WordOr(2, ""), type));
-    WELLSPACE_RETURN_IF_ERROR(ReadArray(3, point_count_, *type, /*is_kept=*/true));
-    names_ = {"x", "y", "z"};
-    has_points_ = true;
-    is_done_ = !options_.keep_attributes && options_.columns.empty();
-    return absl::OkStatus();
-  }
-
-  // Lines up to a blank one.
-  absl::Status SkipMetadata() {
-    for (std::string_view line; reader_.Next(line) && !TrimBlanks(line).empty();) {
-    }
-    return reader_.status();
-  }
-
-  // "CELLS n size", or from version 5.0 on also "CELLS offsets connectivity" and arrays with these names.
-  absl::Status SkipCells() {
-    uint64_t count = 0;
-    uint64_t size = 0;
-    const VtkType& whole = kVtkTypes[6];
-    WELLSPACE_RETURN_IF_ERROR(TakeCount(1, kVtkMaxNumbers, count));
-    if (keyword_ == "CELL_TYPES") {
-      return ReadArray(1, count, whole, /*is_kept=*/false);
-    }
-    WELLSPACE_RETURN_IF_ERROR(TakeCount(2, kVtkMaxNumbers, size));
-    if (!reader_.NextStartsWith("OFFSETS")) {
-      return ReadArray(1, size, whole, /*is_kept=*/false);
-    }
-    for (const auto& [name, numbers] : {std::pair("OFFSETS", count), std::pair("CONNECTIVITY", size)}) {
-      const VtkType* type = nullptr;
-      if (!NextKeyword() || keyword_ != name) {
-        return reader_.EndError(absl::StrCat("expected \"", name, "\""));
-      }
-      WELLSPACE_RETURN_IF_ERROR(TakeType(WordOr(1, ""), type));
-      WELLSPACE_RETURN_IF_ERROR(ReadArray(1, numbers, *type, /*is_kept=*/false));
+  // Cells that are vertices are the points once more.
+  absl::Status UseCells(std::string_view, uint64_t, const std::vector<double>&,
+                        const std::vector<double>& types) override {
+    for (const double type : types) {
+      cells_ -= cells_ > 0 && (type == kVtkVertex || type == kVtkPolyVertex) ? 1 : 0;
     }
     return absl::OkStatus();
   }
 
-  absl::Status ReadData() {
-    if (keyword_ == "FIELD") {
-      return ReadField();
-    }
-    if (keyword_ == "LOOKUP_TABLE") {  // colours, of four bytes or four numbers
-      uint64_t size = 0;
-      WELLSPACE_RETURN_IF_ERROR(TakeCount(2, kMaxCount, size));
-      return ReadArray(4, size, is_ascii_ ? kVtkTypes.back() : kVtkTypes[3], /*is_kept=*/false);
-    }
-    if (keyword_ == "COLOR_SCALARS") {
-      uint64_t components = 0;
-      WELLSPACE_RETURN_IF_ERROR(TakeCount(2, kVtkMaxComponents, components));
-      return ReadNamed(WordOr(1, ""), components, data_count_, is_ascii_ ? kVtkTypes.back() : kVtkTypes[3]);
-    }
-    uint64_t components = 1;
-    size_t type_at = 2;
-    if (keyword_ == "SCALARS") {
-      if (words_.size() > 3) {
-        WELLSPACE_RETURN_IF_ERROR(TakeCount(3, kVtkMaxComponents, components));
-      }
-    } else if (keyword_ == "VECTORS" || keyword_ == "NORMALS") {
-      components = 3;
-    } else if (keyword_ == "TENSORS" || keyword_ == "TENSORS6") {
-      components = keyword_ == "TENSORS" ? 9 : 6;
-    } else if (keyword_ == "TEXTURE_COORDINATES") {
-      WELLSPACE_RETURN_IF_ERROR(TakeCount(2, kVtkMaxComponents, components));
-      type_at = 3;
-    } else if (keyword_ == "GLOBAL_IDS" || keyword_ == "PEDIGREE_IDS") {
-      components = 1;
-    } else {
-      return reader_.Error(
-          absl::StrCat("expected the start of a section, such as POINTS or POINT_DATA, got ", Quote(words_[0])));
-    }
-    const std::string name = WordOr(1, "");
-    const VtkType* type = nullptr;
-    WELLSPACE_RETURN_IF_ERROR(TakeType(WordOr(type_at, ""), type));
-    if (keyword_ == "SCALARS" && reader_.NextStartsWith("LOOKUP_TABLE")) {
-      std::string_view line;
-      reader_.Next(line);
-    }
-    return ReadNamed(name, components, data_count_, *type);
-  }
+  bool IsDone() const override { return is_done_; }
 
-  // "FIELD name arrays", then "name components rows type" and the numbers of each.
-  absl::Status ReadField() {
-    uint64_t arrays = 0;
-    WELLSPACE_RETURN_IF_ERROR(TakeCount(2, kMaxCount, arrays));
-    for (uint64_t i = 0; i < arrays; ++i) {
-      if (!NextKeyword()) {
-        return reader_.EndError(absl::StrCat("expected ", arrays, " arrays, as the field says, got ", i));
-      }
-      if (keyword_ == "METADATA") {
-        WELLSPACE_RETURN_IF_ERROR(SkipMetadata());
-        --i;
-        continue;
-      }
-      uint64_t components = 0;
-      uint64_t rows = 0;
-      const VtkType* type = nullptr;
-      WELLSPACE_RETURN_IF_ERROR(TakeCount(1, kMaxCount, components));
-      WELLSPACE_RETURN_IF_ERROR(TakeCount(2, kMaxCount, rows));
-      if (absl::AsciiStrToLower(WordOr(3, "")) == "string") {
-        is_done_ = true;  // how long it is nothing says
-        return absl::OkStatus();
-      }
-      WELLSPACE_RETURN_IF_ERROR(TakeType(WordOr(3, ""), type));
-      const std::string name = words_[0];
-      WELLSPACE_RETURN_IF_ERROR(ReadNamed(name, components, rows, *type));
-    }
-    return absl::OkStatus();
-  }
-
-  // An array that is kept if it is of points.
-  absl::Status ReadNamed(const std::string& name, uint64_t components, uint64_t rows, const VtkType& type) {
-    const bool is_kept =
-        has_points_ && is_of_points_ && rows == point_count_ && components > 0 && components <= kVtkMaxComponents;
-    if (is_kept) {
-      const std::vector<std::string> names = DataNames(DecodedVtkName(name), components);
-      names_.insert(names_.end(), names.begin(), names.end());
-    }
-    return ReadArray(components, rows, type, is_kept);
-  }
-
-  // Reads `rows` times `components` numbers. If they are kept, they become columns.
-  absl::Status ReadArray(uint64_t components, uint64_t rows, const VtkType& type, bool is_kept) {
-    const size_t first = columns_.size();
-    columns_.resize(first + (is_kept ? components : 0));
-    if (components != 0 && rows > kVtkMaxNumbers / components) {
-      return reader_.Error(
-          absl::StrCat("expected at most ", kVtkMaxNumbers, " numbers, got ", components, " times ", rows));
-    }
-    const uint64_t count = components * rows;
-    if (type.bytes == 0 && !is_ascii_) {
-      return ReadBits(count, first, is_kept ? components : 0);
-    }
-    std::array<char, sizeof(double)> bytes;
-    for (uint64_t i = 0; i < count; ++i) {
-      double value = 0;
-      if (is_ascii_) {
-        WELLSPACE_RETURN_IF_ERROR(NextNumber(value));
-      } else if (reader_.Take(bytes.data(), type.bytes) != type.bytes) {
-        return EndError(count, i);
-      } else {
-        value = type.value({bytes.data(), type.bytes});
-      }
-      if (is_kept) {
-        columns_[first + i % components].push_back(value);
-      }
-    }
-    return absl::OkStatus();
-  }
-
-  // Eight in a byte, the first as its highest bit.
-  absl::Status ReadBits(uint64_t count, size_t first, uint64_t components) {
-    char byte = 0;
-    for (uint64_t i = 0; i < count; ++i) {
-      if (i % 8 == 0 && reader_.Take(&byte, 1) != 1) {
-        return EndError(count, i);
-      }
-      if (components > 0) {
-        columns_[first + i % components].push_back(byte >> (7 - i % 8) & 1);
-      }
-    }
-    return absl::OkStatus();
-  }
-
-  absl::Status NextNumber(double& value) {
-    std::string_view field;
-    if (!fields_.Next(field)) {
-      return reader_.EndError("the file ends; expected a number");
-    }
-    switch (ReadCoordinate(field, value)) {
-      case CoordinateKind::kFinite:
-        return absl::OkStatus();
-      case CoordinateKind::kInvalid:
-        value = std::numeric_limits<double>::quiet_NaN();
-        return absl::OkStatus();
-      case CoordinateKind::kNone:
-        break;
-    }
-    return reader_.Error(absl::StrCat("expected a number, got ", Quote(field)));
-  }
-
-  absl::Status EndError(uint64_t count, uint64_t taken) const {
-    return reader_.status().ok() ? absl::InvalidArgumentError(
-                                       absl::StrCat(cloud_.name, ": byte ", reader_.offset(), ": expected ", count,
-                                                    " numbers after ", keyword_, ", got ", taken, "; the file ends"))
-                                 : reader_.status();
-  }
-
-  LineReader& reader_;
-  FieldReader fields_;
   const CloudOptions& options_;
   PointCloud& cloud_;
-  bool is_ascii_ = true;
-  std::string keyword_;             // of the section
-  std::vector<std::string> words_;  // of its line
-  bool has_points_ = false;
-  bool is_of_points_ = false;  // the data that come
-  bool is_done_ = false;       // what follows is not looked at
-  uint64_t point_count_ = 0;
-  uint64_t data_count_ = 0;
-  std::vector<std::string> names_;
-  std::vector<std::vector<double>> columns_;  // one of each name
+  bool is_done_ = false;
+  uint64_t cells_ = 0;
+  Columns coordinates_ = Columns(3);
+  std::vector<Array> arrays_;
+};
+
+class VtkMeshReader final : public VtkLegacyReader {
+ public:
+  explicit VtkMeshReader(LineReader& reader) : VtkLegacyReader(reader) { grid_.file = reader.name(); }
+
+  absl::StatusOr<Mesh> Read() {
+    WELLSPACE_RETURN_IF_ERROR(ReadSections());
+    if (dataset() == "STRUCTURED_GRID") {
+      return absl::InvalidArgumentError(
+          absl::StrCat(grid_.file, ": expected cells that are simplices, got a STRUCTURED_GRID"));
+    }
+    grid_.points = point_count();
+    for (uint64_t point = 0; point < grid_.points; ++point) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const double x = coordinates_[axis][point];
+        if (x - x != 0) {
+          return absl::InvalidArgumentError(
+              absl::StrCat(grid_.file, ": point ", point, ": expected finite coordinates, got ", x));
+        }
+        grid_.coordinates.push_back(x);
+      }
+    }
+    coordinates_.clear();
+    WELLSPACE_RETURN_IF_ERROR(TakeData());
+    return MakeVtkMesh(std::move(grid_));
+  }
+
+ private:
+  Columns& Coordinates() override { return coordinates_; }
+
+  Columns* Place(const Data& data) override {
+    if (data.components != 1) {
+      return nullptr;
+    }
+    Columns* place = nullptr;
+    if (data.of == Data::Of::kPoints && data.name == "weights") {
+      place = &weights_;
+      grid_.has_weights = true;
+    } else if (data.of == Data::Of::kCells && data.name == kVtkBoundary && data.is_whole) {
+      place = &tags_;
+      grid_.has_tags = true;
+    } else if (data.of == Data::Of::kCells && data.name == kVtkRegion && data.is_whole) {
+      place = &regions_;
+      grid_.has_regions = true;
+    } else if (data.of == Data::Of::kFile && data.name == kVtkNames && data.is_whole) {
+      place = &names_;
+    }
+    if (place != nullptr) {
+      *place = Columns(1);
+    }
+    return place;
+  }
+
+  bool WantsCells(std::string_view, uint64_t) override { return true; }
+
+  absl::Status UseCells(std::string_view keyword, uint64_t cells, const std::vector<double>& offsets,
+                        const std::vector<double>& numbers) override {
+    if (keyword == "CELL_TYPES") {
+      for (const double type : numbers) {
+        grid_.types.push_back(WholeOr(type, 0));
+      }
+      return absl::OkStatus();
+    }
+    size_t at = 0;
+    for (uint64_t cell = 0; cell < cells; ++cell) {
+      uint64_t size = 0;
+      if (offsets.empty()) {
+        size = at < numbers.size() ? static_cast<uint64_t>(WholeOr(numbers[at++], 0)) : 0;
+      } else {
+        const int64_t begin = WholeOr(offsets[cell], -1);
+        const int64_t end = WholeOr(offsets[cell + 1], -1);
+        size = begin == static_cast<int64_t>(at) && end >= begin ? end - begin : numbers.size() + 1;
+      }
+      if (size > numbers.size() - at || (offsets.empty() && size == 0)) {
+        return reader().Error(absl::StrCat(keyword == "CELLS" ? "CELLS" : "a list of cells", ": cell ", cell,
+                                           ": expected a number of vertices that are there, got more, or none"));
+      }
+      for (const size_t end = at + size; at < end; ++at) {
+        grid_.connectivity.push_back(WholeOr(numbers[at], -1));
+      }
+      grid_.offsets.push_back(static_cast<int64_t>(grid_.connectivity.size()));
+      if (keyword != "CELLS") {
+        grid_.types.push_back(VtkPolyDataType(keyword, size));
+      }
+    }
+    if (at != numbers.size()) {
+      return reader().Error(absl::StrCat("expected vertices of ", cells, " cells, got ", numbers.size() - at, " more"));
+    }
+    grid_.cells += cells;
+    return absl::OkStatus();
+  }
+
+  // `value` as a whole number, or `other`.
+  static int64_t WholeOr(double value, int64_t other) {
+    constexpr double kLimit = 9e15;
+    return value >= -kLimit && value <= kLimit && value == static_cast<double>(static_cast<int64_t>(value))
+               ? static_cast<int64_t>(value)
+               : other;
+  }
+
+  absl::Status TakeData() {
+    grid_.weights = grid_.has_weights ? std::move(weights_[0]) : std::vector<double>();
+    for (const double weight : grid_.weights) {
+      if (weight - weight != 0) {
+        return absl::InvalidArgumentError(absl::StrCat(grid_.file, ": weights: expected finite numbers, got ", weight));
+      }
+    }
+    for (const double tag : tags_.empty() ? std::vector<double>() : tags_[0]) {
+      grid_.tags.push_back(WholeOr(tag, 0));
+    }
+    for (const double region : regions_.empty() ? std::vector<double>() : regions_[0]) {
+      grid_.regions.push_back(WholeOr(region, 0));
+    }
+    for (const double letter : names_.empty() ? std::vector<double>() : names_[0]) {
+      grid_.names += static_cast<char>(static_cast<uint8_t>(WholeOr(letter, 0)));
+    }
+    return absl::OkStatus();
+  }
+
+  VtkGrid grid_;
+  Columns coordinates_ = Columns(3);
+  Columns weights_;
+  Columns tags_;
+  Columns regions_;
+  Columns names_;
 };
 
 }  // namespace
 
 absl::Status ReadVtkPoints(LineReader& reader, const CloudOptions& options, PointCloud& cloud) {
   return VtkPointsReader(reader, options, cloud).Read();
+}
+
+absl::StatusOr<Mesh> ReadVtk(const std::string& path) {
+  WELLSPACE_ASSIGN_OR_RETURN(InputFile file, InputFile::Open(path));
+  LineReader reader(std::move(file));
+  return VtkMeshReader(reader).Read();
 }
 
 }  // namespace wellspace::formats

@@ -1,4 +1,6 @@
-// VTK's XML for polygons and for unstructured grids: the points.
+// VTK's XML for polygons: the points, also of unstructured grids, and meshes in the plane.
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -9,7 +11,10 @@
 #include "client/formats/cloud_readers.h"
 #include "client/formats/io/input_file.h"
 #include "client/formats/io/number.h"
+#include "client/formats/mesh_readers.h"
 #include "client/formats/point_rows.h"
+#include "client/formats/vtk/vtk_cells.h"
+#include "client/formats/vtk/vtk_mesh_xml.h"
 #include "client/formats/vtk/vtk_xml.h"
 #include "core/base/status_macros.h"
 
@@ -44,6 +49,7 @@ class VtkXmlPointsReader final : public VtkXmlReader {
       const std::vector<std::string> components = DataNames(array.name, array.components);
       names.insert(names.end(), components.begin(), components.end());
     }
+    NoteCells(cell_count() - std::min(vertex_cells_, cell_count()), cloud_);
     return AddAllRows(names, columns, options_, cloud_);
   }
 
@@ -61,6 +67,14 @@ class VtkXmlPointsReader final : public VtkXmlReader {
                  : xml().Error(absl::StrCat("expected NumberOfComponents 3 for the points, got ",
                                             Quote(xml().Attribute("NumberOfComponents"))));
     }
+    if (parent == "Cells" && xml().Attribute("Name") == "types") {
+      std::vector<int64_t> types;
+      WELLSPACE_RETURN_IF_ERROR(ReadArray<int64_t>(types));
+      for (const int64_t type : types) {
+        vertex_cells_ += type == kVtkVertex || type == kVtkPolyVertex ? 1 : 0;
+      }
+      return absl::OkStatus();
+    }
     if (parent != "PointData" || (!options_.keep_attributes && options_.columns.empty()) ||
         xml().Attribute("type") == "String") {
       return absl::OkStatus();
@@ -71,6 +85,13 @@ class VtkXmlPointsReader final : public VtkXmlReader {
         (!ParseUnsigned(components, kMaxVtkComponents, array.components) || array.components == 0)) {
       return xml().Error(
           absl::StrCat("expected NumberOfComponents from 1 to ", kMaxVtkComponents, ", got ", Quote(components)));
+    }
+    // That of the pieces before goes on.
+    for (PointArray& begun : arrays_) {
+      if (first_point() > 0 && begun.name == array.name && begun.components == array.components &&
+          begun.values.size() == first_point() * begun.components) {
+        return ReadAnyNumbers(begun.values);
+      }
     }
     WELLSPACE_RETURN_IF_ERROR(ReadAnyNumbers(array.values));
     arrays_.push_back(std::move(array));
@@ -89,6 +110,49 @@ class VtkXmlPointsReader final : public VtkXmlReader {
   PointCloud& cloud_;
   std::vector<double> coordinates_;
   std::vector<PointArray> arrays_;
+  uint64_t vertex_cells_ = 0;
+};
+
+// Cells by their kinds, each with vertices and ends of its own.
+class VtpMeshReader final : public VtkMeshXmlReader {
+ public:
+  VtpMeshReader(std::string_view document, const std::string& name)
+      : VtkMeshXmlReader(document, name, "PolyData", /*numbers=*/"") {}
+
+ private:
+  struct Section {
+    std::string_view name;
+    std::vector<int64_t> connectivity{};
+    std::vector<int64_t> offsets{};
+  };
+
+  absl::Status ReadCells(const std::string& parent, std::string_view array) override {
+    for (Section& section : sections_) {
+      if (parent == section.name && (array == "connectivity" || array == "offsets")) {
+        return ReadArray<int64_t>(array == "offsets" ? section.offsets : section.connectivity);
+      }
+    }
+    return absl::OkStatus();
+  }
+
+  // Data of cells are in the order of the sections.
+  absl::Status EndPiece() override {
+    for (Section& section : sections_) {
+      int64_t begin = 0;
+      for (const int64_t end : section.offsets) {
+        grid().types.push_back(VtkPolyDataType(section.name, std::max<int64_t>(end - begin, 0)));
+        begin = end;
+      }
+      grid().cells += section.offsets.size();
+      WELLSPACE_RETURN_IF_ERROR(AddCells(section.connectivity, section.offsets));
+      section.connectivity.clear();
+      section.offsets.clear();
+    }
+    return absl::OkStatus();
+  }
+
+  // Of a piece.
+  std::array<Section, 4> sections_ = {Section{"Verts"}, Section{"Lines"}, Section{"Polys"}, Section{"Strips"}};
 };
 
 absl::Status ReadVtkXmlPoints(InputFile& file, const char* kind, const CloudOptions& options, PointCloud& cloud) {
@@ -104,6 +168,12 @@ absl::Status ReadVtp(InputFile& file, const CloudOptions& options, PointCloud& c
 
 absl::Status ReadVtuPoints(InputFile& file, const CloudOptions& options, PointCloud& cloud) {
   return ReadVtkXmlPoints(file, "UnstructuredGrid", options, cloud);
+}
+
+absl::StatusOr<Mesh> ReadVtpMesh(const std::string& path) {
+  WELLSPACE_ASSIGN_OR_RETURN(InputFile file, InputFile::Open(path));
+  WELLSPACE_ASSIGN_OR_RETURN(const std::string document, file.ReadAll());
+  return VtpMeshReader(document, file.name()).Read();
 }
 
 }  // namespace wellspace::formats

@@ -45,6 +45,34 @@ uint64_t LoadHeaderWord(std::string_view bytes, size_t i, const VtkEncoding& enc
                                          : LoadWord<uint32_t>(bytes, i, encoding.big_endian);
 }
 
+// The array that `bytes` starts with, if it is not compressed.
+absl::StatusOr<std::string> TakeUncompressed(std::string_view bytes, const VtkEncoding& encoding) {
+  const size_t header = encoding.header_word_bytes;
+  if (bytes.size() < header) {
+    return bytes.empty() ? absl::StatusOr<std::string>(std::string())
+                         : absl::InvalidArgumentError("the array ends inside its header");
+  }
+  const uint64_t size = LoadHeaderWord(bytes, 0, encoding);
+  if (size > bytes.size() - header) {
+    return absl::InvalidArgumentError(
+        absl::StrCat("the array says that it has ", size, " bytes, and has ", bytes.size() - header));
+  }
+  return std::string(bytes.substr(header, size));
+}
+
+// How many characters of base64 so many bytes are.
+uint64_t Base64Size(uint64_t bytes) { return (bytes + 2) / 3 * 4; }
+
+// Of base64 that starts with a header of `bytes` bytes, in `text`: these, and behind them what shares a group with
+// them.
+absl::StatusOr<std::string> DecodeBase64Start(std::string_view text, uint64_t bytes) {
+  if (bytes > text.size() || Base64Size(bytes) > text.size()) {
+    return absl::InvalidArgumentError("the array ends inside its header");
+  }
+  absl::StatusOr<std::string> start = DecodeBase64(text.substr(0, Base64Size(bytes)));
+  return !start.ok() || start->size() >= bytes ? start : absl::InvalidArgumentError("the array ends inside its header");
+}
+
 absl::StatusOr<std::string> Decompress(std::string_view bytes, const VtkEncoding& encoding) {
   const uint64_t word = encoding.header_word_bytes;
   if (bytes.size() < 3 * word) {
@@ -223,19 +251,49 @@ absl::StatusOr<std::string> DecodeVtkArray(std::string_view text, const VtkEncod
   if (!bytes.ok()) {
     return bytes;
   }
-  if (encoding.compressed) {
-    return Decompress(*bytes, encoding);
+  return encoding.compressed ? Decompress(*bytes, encoding) : TakeUncompressed(*bytes, encoding);
+}
+
+absl::StatusOr<std::string> DecodeAppendedVtkArray(std::string_view data, bool is_base64, const VtkEncoding& encoding) {
+  const uint64_t word = encoding.header_word_bytes;
+  if (data.size() < (encoding.compressed ? 3 * word : word)) {
+    return absl::InvalidArgumentError("the array ends inside its header");
   }
-  const size_t header = encoding.header_word_bytes;
-  if (bytes->size() < header) {
-    return bytes->empty() ? bytes : absl::InvalidArgumentError("the array ends inside its header");
+  if (!is_base64) {
+    return encoding.compressed ? Decompress(data, encoding) : TakeUncompressed(data, encoding);
   }
-  const uint64_t size = LoadHeaderWord(*bytes, 0, encoding);
-  if (size > bytes->size() - header) {
-    return absl::InvalidArgumentError(
-        absl::StrCat("the array says that it has ", size, " bytes, and has ", bytes->size() - header));
+  // Nothing but its header tells where an array ends; that of a compressed one is base64 by itself.
+  absl::StatusOr<std::string> start = DecodeBase64Start(data, encoding.compressed ? 3 * word : word);
+  if (!start.ok()) {
+    return start;
   }
-  return bytes->substr(header, size);
+  if (!encoding.compressed) {
+    const uint64_t size = LoadHeaderWord(*start, 0, encoding);
+    const bool is_apart = start->size() == word && data.substr(0, Base64Size(word)).back() == '=';
+    const uint64_t characters = size > data.size() ? data.size() + 1
+                                : is_apart         ? Base64Size(word) + Base64Size(size)
+                                                   : Base64Size(word + size);
+    return characters > data.size()
+               ? absl::InvalidArgumentError(absl::StrCat("the array says that it has ", size, " bytes, and is shorter"))
+               : DecodeVtkArray(data.substr(0, characters), encoding);
+  }
+  const uint64_t blocks = LoadHeaderWord(*start, 0, encoding);
+  if (blocks > data.size() / word) {
+    return absl::InvalidArgumentError(absl::StrCat("the array says that it has ", blocks, " blocks, and is shorter"));
+  }
+  const uint64_t header = (3 + blocks) * word;
+  start = DecodeBase64Start(data, header);
+  if (!start.ok()) {
+    return start;
+  }
+  uint64_t compressed = 0;
+  for (uint64_t block = 0; block < blocks && compressed <= data.size(); ++block) {
+    compressed += std::min<uint64_t>(LoadHeaderWord(*start, 3 + block, encoding), data.size() + 1);
+  }
+  const uint64_t characters = Base64Size(header) + Base64Size(compressed);
+  return characters > data.size() ? absl::InvalidArgumentError(absl::StrCat("the blocks of the array have ", compressed,
+                                                                            " bytes, and are shorter"))
+                                  : DecodeVtkArray(data.substr(0, characters), encoding);
 }
 
 }  // namespace wellspace::formats

@@ -1,4 +1,5 @@
-// The inline binary form of data arrays in VTK's XML files: base64 of blocks, each compressed by zlib or not at all.
+// The binary form of data arrays in VTK's XML files: blocks, each compressed by zlib or not at all. Inline it is
+// base64; appended, base64 or the bytes.
 //
 // Compressed:   base64(header) base64(blocks); header: number of blocks, bytes of a block, bytes of the last block if
 //               that is shorter (else 0), then the compressed bytes of each block.
@@ -73,6 +74,9 @@ struct VtkEncoding {
 //
 // Errors:     INVALID_ARGUMENT, a message without a location.
 absl::StatusOr<std::string> DecodeVtkArray(std::string_view text, const VtkEncoding& encoding);
+
+// The same of the array that `data` starts with, whatever follows it: bytes, or base64 without blanks.
+absl::StatusOr<std::string> DecodeAppendedVtkArray(std::string_view data, bool is_base64, const VtkEncoding& encoding);
 
 // The words of type T in `bytes`, swapped when the file is of the other byte order. REQUIRES: sizeof(T) * (i + 1) <=
 // bytes.size().

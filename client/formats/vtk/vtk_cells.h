@@ -3,12 +3,15 @@
 #define WELLSPACE_CLIENT_FORMATS_VTK_VTK_CELLS_H_
 
 #include <cstdint>
+#include <string_view>
 
 #include "client/formats/mesh.h"
 
 namespace wellspace::formats {
 
 // VTK's numbers of types.
+inline constexpr uint8_t kVtkVertex = 1;
+inline constexpr uint8_t kVtkPolyVertex = 2;
 inline constexpr uint8_t kVtkLine = 3;
 inline constexpr uint8_t kVtkTriangle = 5;
 inline constexpr uint8_t kVtkTetrahedron = 10;
@@ -30,6 +33,27 @@ inline uint8_t VtkCellType(const MeshShape& shape, uint64_t cell) {
 inline constexpr char kVtkOrigin[] = "origin";
 inline constexpr char kVtkBoundary[] = "boundary";
 inline constexpr char kVtkRegion[] = "region";
+// Of the file: bytes of the text of NameLines.
+inline constexpr char kVtkNames[] = "wellspace_names";
+
+// Whether cells have data.
+inline bool HasCellData(const MeshShape& shape) {
+  return !shape.boundary.empty() || shape.has_simplex_regions || !shape.regions.empty();
+}
+
+// The type of a cell of `size` vertices in a section of polygonal data, as either format calls it.
+inline uint8_t VtkPolyDataType(std::string_view section, uint64_t size) {
+  if (section == "VERTICES" || section == "Verts") {
+    return size == 1 ? kVtkVertex : kVtkPolyVertex;
+  }
+  if (section == "LINES" || section == "Lines") {
+    return size == 2 ? kVtkLine : 4;
+  }
+  if (section == "POLYGONS" || section == "Polys") {
+    return size == 3 ? kVtkTriangle : 7;
+  }
+  return 6;  // a strip of triangles
+}
 
 }  // namespace wellspace::formats
 

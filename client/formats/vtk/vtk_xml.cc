@@ -1,6 +1,7 @@
 #include "client/formats/vtk/vtk_xml.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <type_traits>
 
@@ -15,8 +16,31 @@ constexpr size_t kMaxDepth = 64;
 
 }  // namespace
 
+VtkXmlReader::VtkXmlReader(std::string_view document, std::string name, std::string kind)
+    : xml_(document, name), name_(std::move(name)), kind_(std::move(kind)) {
+  FindAppended(document);
+}
+
+// Arrays refer to what stands behind them, and may be bytes, which are no elements: that is looked for first.
+void VtkXmlReader::FindAppended(std::string_view document) {
+  if (document.find("<AppendedData") == std::string_view::npos) {
+    return;
+  }
+  XmlScanner scanner(document, name_);
+  for (XmlScanner::Piece piece = scanner.Next(); piece != XmlScanner::Piece::kEnd && piece != XmlScanner::Piece::kError;
+       piece = scanner.Next()) {
+    if (piece == XmlScanner::Piece::kStartTag && scanner.value() == "AppendedData") {
+      is_appended_base64_ = scanner.Attribute("encoding") != "raw";
+      const size_t mark = document.find_first_not_of(kXmlSpace, scanner.position());
+      has_appended_ = mark != std::string_view::npos && document[mark] == '_';
+      appended_ = has_appended_ ? document.substr(mark + 1) : std::string_view();
+      return;
+    }
+  }
+}
+
 absl::Status VtkXmlReader::ReadElements() {
-  while (true) {
+  while (!is_at_appended_) {
     switch (xml_.Next()) {
       case XmlScanner::Piece::kError:
         return xml_.status();
@@ -24,8 +48,8 @@ absl::Status VtkXmlReader::ReadElements() {
         if (!path_.empty()) {
           return xml_.Error(absl::StrCat("the file ends inside element ", Quote(path_.back())));
         }
-        return pieces_ == 1 ? absl::OkStatus()
-                            : FileError(absl::StrCat("expected one <Piece> of a file of ", kind_, ", got ", pieces_));
+        is_at_appended_ = true;
+        break;
       case XmlScanner::Piece::kText:
         break;
       case XmlScanner::Piece::kStartTag:
@@ -40,6 +64,8 @@ absl::Status VtkXmlReader::ReadElements() {
         break;
     }
   }
+  return pieces_ > 0 ? absl::OkStatus()
+                     : FileError(absl::StrCat("expected one <Piece> or more of a file of ", kind_, ", got none"));
 }
 
 absl::Status VtkXmlReader::EndElement() {
@@ -47,8 +73,9 @@ absl::Status VtkXmlReader::EndElement() {
     return xml_.Error(absl::StrCat("expected the end of ", path_.empty() ? "no element" : Quote(path_.back()),
                                    ", got that of ", Quote(xml_.value())));
   }
+  const bool is_piece = path_.back() == "Piece";
   path_.pop_back();
-  return absl::OkStatus();
+  return is_piece ? EndPiece() : absl::OkStatus();
 }
 
 // REQUIRES:   the start tag's name is the last of path_.
@@ -58,25 +85,39 @@ absl::Status VtkXmlReader::StartElement() {
     return StartFile();
   }
   if (element == "AppendedData") {
-    return xml_.Error("expected arrays in ascii or inline in base64 (format \"binary\"), got appended data");
+    is_at_appended_ = path_.size() == 2;
+    return is_at_appended_ ? absl::OkStatus() : xml_.Error("expected <AppendedData> right inside <VTKFile>");
   }
   if (element == "Piece") {
     return StartPiece();
   }
   const std::string parent = path_[path_.size() - 2];
-  return element == "DataArray" && pieces_ == 1 ? ReadDataArray(parent) : absl::OkStatus();
+  return element == "DataArray" ? ReadDataArray(parent) : absl::OkStatus();
 }
 
 absl::Status VtkXmlReader::StartPiece() {
+  if (std::find(path_.begin(), path_.end() - 1, "Piece") != path_.end() - 1) {
+    return xml_.Error("expected one <Piece> beside the other, got one inside of another");
+  }
   ++pieces_;
-  constexpr uint64_t kLimit = std::numeric_limits<uint32_t>::max();
-  if (!ParseUnsigned(xml_.Attribute("NumberOfPoints"), kLimit, point_count_)) {
+  uint64_t points = 0;
+  uint64_t cells = 0;
+  if (!ParseUnsigned(xml_.Attribute("NumberOfPoints"), kMaxCount - point_count_, points)) {
     return xml_.Error("expected NumberOfPoints below 2^32 in <Piece>");
   }
   const bool has_cells = kind_ == "UnstructuredGrid";
-  if (has_cells && !ParseUnsigned(xml_.Attribute("NumberOfCells"), kLimit, cell_count_)) {
+  if (has_cells && !ParseUnsigned(xml_.Attribute("NumberOfCells"), kMaxCount - cell_count_, cells)) {
     return xml_.Error("expected NumberOfPoints and NumberOfCells below 2^32 in <Piece>");
   }
+  for (const char* kind : {"NumberOfLines", "NumberOfStrips", "NumberOfPolys"}) {
+    uint64_t of_kind = 0;
+    if (!has_cells && ParseUnsigned(xml_.Attribute(kind), kMaxCount, of_kind)) {
+      cells += of_kind;
+    }
+  }
+  first_point_ = point_count_;
+  point_count_ += points;
+  cell_count_ += cells;
   return absl::OkStatus();
 }
 
@@ -114,7 +155,7 @@ absl::Status VtkXmlReader::TakeText(std::string_view& text) {
   const std::string format(xml_.Attribute("format"));
   text = {};
   if (format != "ascii" && format != "binary") {
-    return xml_.Error(absl::StrCat("expected format \"ascii\" or \"binary\", got ", Quote(format)));
+    return xml_.Error(absl::StrCat("expected format \"ascii\", \"binary\" or \"appended\", got ", Quote(format)));
   }
   const XmlScanner::Piece piece = xml_.Next();
   if (piece == XmlScanner::Piece::kEndTag) {
@@ -130,8 +171,20 @@ absl::Status VtkXmlReader::TakeText(std::string_view& text) {
   return absl::OkStatus();
 }
 
-absl::Status VtkXmlReader::Decode(std::string_view text, std::string& bytes) {
-  absl::StatusOr<std::string> decoded = DecodeVtkArray(text, encoding_);
+absl::Status VtkXmlReader::TakeBytes(std::string& bytes) {
+  const bool is_appended = xml_.Attribute("format") == "appended";
+  uint64_t offset = 0;
+  std::string_view text;
+  if (!is_appended) {
+    WELLSPACE_RETURN_IF_ERROR(TakeText(text));
+  } else if (!has_appended_ || !ParseUnsigned(xml_.Attribute("offset"), appended_.size(), offset)) {
+    return xml_.Error(absl::StrCat("expected the offset of an array in <AppendedData>, ",
+                                   has_appended_ ? absl::StrCat("at most ", appended_.size()) : "which is not there",
+                                   ", got ", Quote(xml_.Attribute("offset"))));
+  }
+  absl::StatusOr<std::string> decoded =
+      is_appended ? DecodeAppendedVtkArray(appended_.substr(offset), is_appended_base64_, encoding_)
+                  : DecodeVtkArray(text, encoding_);
   if (!decoded.ok()) {
     return xml_.Error(std::string(decoded.status().message()));
   }
@@ -142,19 +195,26 @@ absl::Status VtkXmlReader::Decode(std::string_view text, std::string& bytes) {
 template <typename Value>
 absl::Status VtkXmlReader::ReadArray(std::vector<Value>& values) {
   const std::string type(xml_.Attribute("type"));
-  const bool is_ascii = xml_.Attribute("format") == "ascii";
-  std::string_view text;
-  values.clear();
-  WELLSPACE_RETURN_IF_ERROR(TakeText(text));
-  if (text.empty() || is_ascii) {
+  if (xml_.Attribute("format") == "ascii") {
+    std::string_view text;
+    WELLSPACE_RETURN_IF_ERROR(TakeText(text));
     return ParseAscii(text, values);
   }
   std::string bytes;
-  WELLSPACE_RETURN_IF_ERROR(Decode(text, bytes));
+  WELLSPACE_RETURN_IF_ERROR(TakeBytes(bytes));
   if constexpr (std::is_same_v<Value, double>) {
-    if (type == "Float64") return ConvertWords<double>(bytes, values);
-    if (type == "Float32") return ConvertWords<float>(bytes, values);
-    return xml_.Error(absl::StrCat("expected points of type Float32 or Float64, got ", Quote(type)));
+    const size_t begin = values.size();
+    if (type != "Float64" && type != "Float32") {
+      return xml_.Error(absl::StrCat("expected points of type Float32 or Float64, got ", Quote(type)));
+    }
+    WELLSPACE_RETURN_IF_ERROR(type == "Float64" ? ConvertWords<double>(bytes, values)
+                                                : ConvertWords<float>(bytes, values));
+    for (size_t i = begin; i < values.size(); ++i) {
+      if (!std::isfinite(values[i])) {
+        return xml_.Error(absl::StrCat("expected finite numbers, got ", values[i], " as number ", i - begin));
+      }
+    }
+    return absl::OkStatus();
   } else {
     absl::Status status;
     return ConvertWhole(bytes, type, values, status)
@@ -168,11 +228,9 @@ template absl::Status VtkXmlReader::ReadArray<int64_t>(std::vector<int64_t>&);
 
 absl::Status VtkXmlReader::ReadAnyNumbers(std::vector<double>& values) {
   const std::string type(xml_.Attribute("type"));
-  const bool is_ascii = xml_.Attribute("format") == "ascii";
-  std::string_view text;
-  values.clear();
-  WELLSPACE_RETURN_IF_ERROR(TakeText(text));
-  if (is_ascii) {
+  if (xml_.Attribute("format") == "ascii") {
+    std::string_view text;
+    WELLSPACE_RETURN_IF_ERROR(TakeText(text));
     size_t begin = 0;
     while ((begin = text.find_first_not_of(kXmlSpace, begin)) != std::string_view::npos) {
       const size_t end = std::min(text.find_first_of(kXmlSpace, begin), text.size());
@@ -191,11 +249,11 @@ absl::Status VtkXmlReader::ReadAnyNumbers(std::vector<double>& values) {
     }
     return absl::OkStatus();
   }
-  if (text.empty()) {
+  std::string bytes;
+  WELLSPACE_RETURN_IF_ERROR(TakeBytes(bytes));
+  if (bytes.empty()) {
     return absl::OkStatus();
   }
-  std::string bytes;
-  WELLSPACE_RETURN_IF_ERROR(Decode(text, bytes));
   if (type == "Float64") return ConvertWords<double>(bytes, values);
   if (type == "Float32") return ConvertWords<float>(bytes, values);
   absl::Status status;
@@ -247,9 +305,10 @@ absl::Status VtkXmlReader::ConvertWords(const std::string& bytes, std::vector<Va
   if (bytes.size() % sizeof(Word) != 0) {
     return xml_.Error(absl::StrCat("expected a multiple of ", sizeof(Word), " bytes, got ", bytes.size()));
   }
-  values.resize(bytes.size() / sizeof(Word));
-  for (size_t i = 0; i < values.size(); ++i) {
-    values[i] = static_cast<Value>(LoadWord<Word>(bytes, i, encoding_.big_endian));
+  const size_t words = bytes.size() / sizeof(Word);
+  values.reserve(values.size() + words);
+  for (size_t i = 0; i < words; ++i) {
+    values.push_back(static_cast<Value>(LoadWord<Word>(bytes, i, encoding_.big_endian)));
   }
   return absl::OkStatus();
 }

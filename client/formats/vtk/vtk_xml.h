@@ -15,7 +15,8 @@
 
 namespace wellspace::formats {
 
-// Goes through the elements of a file of one piece, and reads those of its arrays that a derived class asks for.
+// Goes through the elements of a file, and reads those of its arrays that a derived class asks for. They are in ascii,
+// inline in base64, or appended to the elements, as bytes or in base64.
 //
 // Thread safety: thread-compatible.
 class VtkXmlReader {
@@ -26,30 +27,33 @@ class VtkXmlReader {
 
  protected:
   // `kind` is the type of the file, as "UnstructuredGrid". REQUIRES: `document` outlives this.
-  VtkXmlReader(std::string_view document, std::string name, std::string kind)
-      : xml_(document, name), name_(std::move(name)), kind_(std::move(kind)) {}
+  VtkXmlReader(std::string_view document, std::string name, std::string kind);
 
-  // The element <DataArray> of the piece whose start tag was read last; `parent` is the element around it. It may read
-  // the array by ReadArray or ReadAnyNumbers.
+  // The element <DataArray> whose start tag was read last; `parent` is the element around it. It may read the array by
+  // ReadArray or ReadAnyNumbers.
   virtual absl::Status ReadDataArray(const std::string& parent) = 0;
+  // All arrays of a piece have come, or been left out.
+  virtual absl::Status EndPiece() { return absl::OkStatus(); }
 
-  // All elements. Errors: INVALID_ARGUMENT, also unless there is one piece.
+  // All elements. Errors: INVALID_ARGUMENT, also if there is no piece.
   absl::Status ReadElements();
 
   const XmlScanner& xml() const { return xml_; }
   const std::string& name() const { return name_; }
-  // Of the piece.
+  // Of the pieces so far, with the one that is being read; and the points of those before that. Of polygonal data,
+  // cells that are vertices do not count.
   uint64_t point_count() const { return point_count_; }
   uint64_t cell_count() const { return cell_count_; }
+  uint64_t first_point() const { return first_point_; }
 
   absl::Status FileError(std::string_view message) const {
     return absl::InvalidArgumentError(absl::StrCat(name_, ": ", absl::string_view(message.data(), message.size())));
   }
 
-  // Coordinates of points.
+  // Coordinates of points, appended.
   absl::Status ReadPoints(std::vector<double>& coordinates);
 
-  // Reads the text of the current element into `values`, which are finite numbers of a floating-point type, or whole
+  // Appends the array of the current element to `values`, which are finite numbers of a floating-point type, or whole
   // numbers.
   template <typename Value>
   absl::Status ReadArray(std::vector<Value>& values);
@@ -65,9 +69,11 @@ class VtkXmlReader {
 
   // The text of the current element, an array; none if it has none.
   absl::Status TakeText(std::string_view& text);
+  // The bytes of the current element, an array that is not in ascii.
+  absl::Status TakeBytes(std::string& bytes);
+  void FindAppended(std::string_view document);
   template <typename Value>
   absl::Status ParseAscii(std::string_view text, std::vector<Value>& values);
-  absl::Status Decode(std::string_view text, std::string& bytes);
   template <typename Value>
   bool ConvertWhole(const std::string& bytes, const std::string& type, std::vector<Value>& values,
                     absl::Status& status);
@@ -79,7 +85,12 @@ class VtkXmlReader {
   const std::string kind_;
   std::vector<std::string> path_;  // the open elements, outermost first
   VtkEncoding encoding_;
+  bool is_at_appended_ = false;  // the end of what is looked at as elements
+  bool has_appended_ = false;
+  bool is_appended_base64_ = false;
+  std::string_view appended_;  // behind its '_'
   uint64_t pieces_ = 0;
+  uint64_t first_point_ = 0;
   uint64_t point_count_ = 0;
   uint64_t cell_count_ = 0;
 };

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -14,6 +15,7 @@
 #include "client/formats/boundary.h"
 #include "client/formats/io/output_file.h"
 #include "client/formats/mesh_writers.h"
+#include "client/formats/names.h"
 #include "client/formats/regions.h"
 #include "client/formats/vtk/vtk_cells.h"
 #include "core/base/status_macros.h"
@@ -32,25 +34,42 @@ void AppendBigEndian(T value, std::string& bytes) {
   bytes.append(word, sizeof(T));
 }
 
-// A name is one word: VTK has other bytes than those of printable ASCII by their numbers, "My%20name".
-std::string EncodedVtkName(const std::string& name) {
-  std::string encoded;
-  for (const char c : name) {
-    if (c > ' ' && c < '\x7f' && c != '%' && c != '"' && c != '#') {
-      encoded += c;
-    } else {
-      absl::StrAppend(&encoded, "%", absl::Hex(static_cast<uint8_t>(c), absl::kZeroPad2));
+bool IsPlainInVtkWord(char c) { return c > ' ' && c < '\x7f' && c != '"' && c != '#'; }
+
+// Names as words: VTK has other bytes than those of printable ASCII by their numbers, "My%20name", and reads words of
+// at most 255 bytes. No two are the same.
+std::vector<std::string> VtkNames(const std::vector<std::string>& names, NameChanges& changes) {
+  constexpr size_t kMaxWordBytes = 255;
+  std::vector<std::string> words;
+  std::set<std::string> taken;
+  for (const std::string& name : names) {
+    std::string held = name;
+    std::string word = PercentEncoded(held, IsPlainInVtkWord);
+    while (word.size() > kMaxWordBytes) {
+      held = CutName(held, held.size() - 1);
+      word = PercentEncoded(held, IsPlainInVtkWord);
     }
+    for (int number = 2; !taken.insert(word).second; ++number) {
+      held = absl::StrCat(std::string(CutName(held, std::min<size_t>(held.size(), 60))), "_", number);
+      word = PercentEncoded(held, IsPlainInVtkWord);
+    }
+    changes.Add(name, held);
+    words.push_back(word);
   }
-  return encoded;
+  return words;
 }
 
 class VtkWriter final : public MeshWriter {
  public:
   VtkWriter(OutputFile output, const MeshShape& shape) : shape_(shape), output_(std::move(output)) {
     output_.Write(absl::StrCat("# vtk DataFile Version 3.0\n", shape_.vertex_count, " vertices, ", shape_.simplex_count,
-                               " ", SimplexName(shape_.dimension), "\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS ",
-                               shape_.vertex_count, " double\n"));
+                               " ", SimplexName(shape_.dimension), "\nBINARY\nDATASET UNSTRUCTURED_GRID\n"));
+    const NameLines names(shape_);
+    AddNote(names.ChangesNote());
+    if (const std::string text = names.Text(""); !text.empty()) {
+      output_.Write(absl::StrCat("FIELD FieldData 1\n", kVtkNames, " 1 ", text.size(), " unsigned_char\n", text, "\n"));
+    }
+    output_.Write(absl::StrCat("POINTS ", shape_.vertex_count, " double\n"));
   }
 
   absl::Status AddPoints(std::span<const double> points) override {
@@ -91,7 +110,7 @@ class VtkWriter final : public MeshWriter {
   }
 
   absl::Status AddAttribute(size_t index, std::span<const double> values) override {
-    Keep<double>(values, EncodedVtkName(shape_.attributes[index]), "double");
+    Keep<double>(values, attribute_words_[index], "double");
     attribute_values_ += values.size();
     return output_.status();
   }
@@ -127,6 +146,7 @@ class VtkWriter final : public MeshWriter {
     WriteEach(cells, [this](uint64_t cell) -> int32_t { return VtkCellType(shape_, cell); });
     WriteCellData();
     WritePointData();
+    AddNote(changes_.Note("VTK reads words of at most 255 bytes as names of attributes"));
     return output_.Commit();
   }
 
@@ -180,7 +200,7 @@ class VtkWriter final : public MeshWriter {
   }
 
   void WriteCellData() {
-    if (shape_.boundary.empty() && !shape_.has_simplex_regions) {
+    if (!HasCellData(shape_)) {
       return;
     }
     const uint64_t cells = VtkCellCount(shape_);
@@ -212,6 +232,8 @@ class VtkWriter final : public MeshWriter {
   const MeshShape shape_;
   OutputFile output_;
   RegionQueue regions_;
+  NameChanges changes_;
+  const std::vector<std::string> attribute_words_ = VtkNames(shape_.attributes, changes_);
   std::vector<Field> point_data_;
   bool has_cells_ = false;  // the section
   uint64_t vertices_ = 0;

@@ -11,6 +11,7 @@
 #include "client/formats/boundary.h"
 #include "client/formats/io/output_file.h"
 #include "client/formats/mesh_writers.h"
+#include "client/formats/names.h"
 #include "client/formats/vtk/hdf_file.h"
 #include "client/formats/vtk/vtk_cells.h"
 #include "core/base/status_macros.h"
@@ -37,6 +38,13 @@ class VtkHdfWriter final : public MeshWriter {
     file_->AddArray<int64_t>(root_, "Offsets", cells + 1, [this](uint64_t cell) { return VtkOffset(shape_, cell); });
     file_->AddArray<uint8_t>(root_, "Types", cells, [this](uint64_t cell) { return VtkCellType(shape_, cell); });
     AddCellData();
+    const NameLines names(shape_);
+    AddNote(names.ChangesNote());
+    if (const std::string text = names.Text(""); !text.empty()) {
+      const Handle field_data = file_->AddGroup(root_, "FieldData");
+      file_->AddArray<uint8_t>(field_data, kVtkNames, text.size(),
+                               [&text](uint64_t at) { return static_cast<uint8_t>(text[at]); });
+    }
     Handle point_data = file_->AddGroup(root_, "PointData");
     file_->AddArray<uint8_t>(point_data, "input", shape_.vertex_count,
                              [this](uint64_t vertex) { return vertex < shape_.input_vertices ? 1 : 0; });
@@ -186,7 +194,7 @@ class VtkHdfWriter final : public MeshWriter {
 
   // Region and tag of every cell. Regions of simplices come later if there are several.
   void AddCellData() {
-    if (shape_.boundary.empty() && !shape_.has_simplex_regions) {
+    if (!HasCellData(shape_)) {
       return;
     }
     const uint64_t cells = VtkCellCount(shape_);

@@ -7,6 +7,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/formats/io/output_file.h"
 #include "client/formats/mesh_writers.h"
+#include "client/formats/names.h"
 #include "client/formats/vtk/vtk_array.h"
 #include "client/formats/vtk/vtk_cells.h"
 #include "core/base/status_macros.h"
@@ -22,6 +23,17 @@ class VtuWriter final : public MeshWriter {
         "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\" "
         "compressor=\"vtkZLibDataCompressor\">\n"
         "  <UnstructuredGrid>\n");
+    if (const std::string names = NameLines(shape_).Text(""); !names.empty()) {
+      output_.Write("    <FieldData>\n");
+      BeginArray(absl::StrCat("type=\"UInt8\" Name=\"", kVtkNames, "\" NumberOfTuples=\"", names.size(), "\""),
+                 names.size());
+      for (const char letter : names) {
+        array_->Add<uint8_t>(static_cast<uint8_t>(letter));
+      }
+      EndArray();
+      output_.Write("    </FieldData>\n");
+    }
+    AddNote(NameLines(shape_).ChangesNote());
     output_.Write(absl::StrCat("    <Piece NumberOfPoints=\"", shape_.vertex_count, "\" NumberOfCells=\"",
                                VtkCellCount(shape_), "\">\n      <Points>\n"));
     BeginArray("type=\"Float64\" Name=\"Points\" NumberOfComponents=\"3\"", shape_.vertex_count * 3 * sizeof(double));
@@ -182,7 +194,7 @@ class VtuWriter final : public MeshWriter {
 
   // Region and tag of every cell. Regions of simplices have been written if there are several.
   void WriteCellData() {
-    if (shape_.boundary.empty() && !shape_.has_simplex_regions) {
+    if (!HasCellData(shape_)) {
       EndPointData();
       return;
     }

@@ -34,6 +34,8 @@ class XmlScanner {
   std::string_view value() const { return value_; }
   // An attribute of the start tag that was returned last; empty when it has none of this name.
   std::string_view Attribute(std::string_view attribute) const;
+  // Where the piece that was returned last ends in the document.
+  size_t position() const { return position_; }
   // INVALID_ARGUMENT, at the line of the piece that was returned last.
   absl::Status Error(std::string_view message) const;
   // Why Next returned kError.

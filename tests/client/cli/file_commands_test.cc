@@ -96,6 +96,69 @@ TEST_F(FileCommandsTest, ConvertKeepsBoundaryRegionsNamesAndAttributes) {
   EXPECT_THAT(RunWellspace({"convert", Path("none.msh"), Path("d.vtu")}).err, HasSubstr("none.msh"));
 }
 
+// Two squares with one region, or one each, whose numbers are those of markers, too.
+std::string PolyWithRegions(int left, int right) {
+  return "6 2 0 0\n1 0 0\n2 1 0\n3 2 0\n4 2 1\n5 1 1\n6 0 1\n7 1\n1 1 2 1\n2 2 3 1\n3 3 4 2\n4 4 5 3\n5 5 6 3\n6 6 1 "
+         "4\n"
+         "7 2 5 9\n0\n2\n1 .5 .5 " +
+         std::to_string(left) + " -1\n2 1.5 .5 " + std::to_string(right) + " -1\n";
+}
+
+TEST_F(FileCommandsTest, RegionsKeepTheirNumbersFromFormatToFormat) {
+  for (const std::vector<int>& numbers : {std::vector{7, 7}, std::vector{1, 2}}) {
+    folder_.Write("a.poly", PolyWithRegions(numbers[0], numbers[1]));
+    ASSERT_EQ(RunWellspace({"mesh", Path("a.poly"), "-o", Path("a.msh"), "--quiet"}).exit_code, 0);
+    std::string from = "a.msh";
+    for (const char* to : {"b.mesh", "b.vtu", "b.vtk", "b.npz", "b.node", "b.msh"}) {
+      SCOPED_TRACE(to);
+      const RunResult result = RunWellspace({"convert", Path(from), Path(to)});
+      ASSERT_EQ(result.exit_code, 0) << result.err;
+      EXPECT_EQ(result.err, "");
+      const nlohmann::json info = Info(to);
+      ASSERT_EQ(info["regions"].size(), numbers[0] == numbers[1] ? 1 : 2);
+      uint64_t simplices = 0;
+      for (size_t i = 0; i < info["regions"].size(); ++i) {
+        EXPECT_EQ(info["regions"][i]["id"], numbers[i]);
+        EXPECT_EQ(info["regions"][i]["name"], "region_" + std::to_string(numbers[i]));
+        simplices += info["regions"][i]["simplices"].get<uint64_t>();
+      }
+      EXPECT_EQ(info["simplices"], simplices);
+      ASSERT_EQ(info["boundary"].size(), 5);
+      EXPECT_EQ(info["boundary"][0]["name"], "marker_1");
+      EXPECT_EQ(info["boundary"][4]["tag"], 9);
+      from = to;
+    }
+  }
+}
+
+// No simplex is lost without a word.
+TEST_F(FileCommandsTest, ConvertReadsMeshesOfVtkOrTellsWhatItLeavesOut) {
+  const std::string start =
+      "# vtk DataFile Version 3.0\ns\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n0 0 0\n"
+      "1 0 0\n1 1 0\n0 1 0\n";
+  folder_.Write("a.vtk", start +
+                             "CELLS 2 8\n3 0 1 2\n3 0 2 3\nCELL_TYPES 2\n5\n5\nCELL_DATA 2\nSCALARS region int 1\n"
+                             "LOOKUP_TABLE default\n3\n4\n");
+  const RunResult triangles = RunWellspace({"convert", Path("a.vtk"), Path("a.msh")});
+  EXPECT_EQ(triangles.exit_code, 0);
+  EXPECT_EQ(triangles.err, "");
+  const nlohmann::json info = Info("a.msh");
+  EXPECT_EQ(info["dimension"], 2);
+  EXPECT_EQ(info["simplices"], 2);
+  EXPECT_EQ(info["regions"][1]["id"], 4);
+  folder_.Write("b.vtk", start + "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n9\n");
+  const RunResult quads = RunWellspace({"convert", Path("b.vtk"), Path("b.vtu")});
+  EXPECT_EQ(quads.exit_code, 0);
+  EXPECT_THAT(quads.err, HasSubstr("note: only points are read, since it is no mesh of simplices"));
+  const RunResult json = RunWellspace({"convert", Path("b.vtk"), Path("b.vtu"), "--output", "json"});
+  EXPECT_EQ(nlohmann::json::parse(json.out)["notes"].size(), 2);
+  // What the other format has no place for.
+  Mesh(kMeasured, "measured.vtu");
+  const RunResult su2 = RunWellspace({"convert", Path("measured.vtu"), Path("measured.msh")});
+  EXPECT_THAT(su2.err,
+              HasSubstr("note: the format has no place for attributes of vertices, which are left out: id, heat"));
+}
+
 TEST_F(FileCommandsTest, ConvertMakesVerticesOfPoints) {
   folder_.Write("a.csv", kMeasured);
   const RunResult result = RunWellspace({"convert", Path("a.csv"), Path("a.vtu"), "--output", "json"});

@@ -22,12 +22,11 @@ struct Kind {
   const char* format;
   const char* file;
   int max_dimension;
-  bool has_names;  // and keeps parts without facets
 };
 
-constexpr Kind kKinds[] = {{"msh41", "mesh.msh", 3, true},   {"msh22", "old.msh", 3, true},
-                           {"medit", "mesh.mesh", 3, false}, {"vtu", "mesh.vtu", 3, false},
-                           {"npz", "mesh.npz", 6, true},     {"node", "mesh.node", 6, true}};
+constexpr Kind kKinds[] = {{"msh41", "mesh.msh", 3}, {"msh22", "old.msh", 3}, {"medit", "mesh.mesh", 3},
+                           {"vtu", "mesh.vtu", 3},   {"vtk", "mesh.vtk", 3},  {"npz", "mesh.npz", 6},
+                           {"node", "mesh.node", 6}};
 
 // Random numbers for everything; three parts, one of them empty.
 Mesh MeshWithBoundary(int dimension) {
@@ -73,11 +72,7 @@ TEST_F(BoundaryFilesTest, RoundTripsKeepFacetsAndTags) {
       EXPECT_EQ(Bits(read.points), Bits(mesh.points));
       EXPECT_EQ(read.simplices, mesh.simplices);
       EXPECT_EQ(read.facets, mesh.facets);
-      if (kind.has_names) {
-        EXPECT_EQ(read.boundary, mesh.boundary);
-      } else {
-        EXPECT_THAT(read.boundary, ElementsAre(BoundaryPart{2, "", 7}, BoundaryPart{40, "", 120}));
-      }
+      EXPECT_EQ(read.boundary, mesh.boundary);  // also parts without facets
     }
   }
 }
@@ -89,7 +84,7 @@ TEST_F(BoundaryFilesTest, NoBoundaryIsNoBoundary) {
     Write(mesh, kind.file, kind.format);
     EXPECT_TRUE(ReadGood(kind.file).boundary.empty());
   }
-  EXPECT_EQ(folder_.FileCount(), 7) << "of the pair two, and no more";
+  EXPECT_EQ(folder_.FileCount(), 8) << "of the pair two, and no more";
 }
 
 TEST_F(BoundaryFilesTest, PiecesMakeTheSameFileAndMissingFacetsNone) {
@@ -125,23 +120,23 @@ TEST_F(BoundaryFilesTest, PiecesMakeTheSameFileAndMissingFacetsNone) {
 TEST_F(BoundaryFilesTest, TheSquareAsText) {
   Write(Square(), "a.mesh");
   EXPECT_EQ(folder_.Read("a.mesh"),
-            "MeshVersionFormatted 2\nDimension 2\nVertices\n4\n0 0 0\n1 0 0\n0 1 0\n1 1 0\nTriangles\n2\n1 2 3 1\n"
+            "MeshVersionFormatted 2\nDimension 2\n# part 1: xmin\n# part 2: xmax\n# part 3: ymin\n# part 4: ymax\n"
+            "# region 1: domain\nVertices\n4\n0 0 0\n1 0 0\n0 1 0\n1 1 0\nTriangles\n2\n1 2 3 1\n"
             "2 4 3 1\nEdges\n4\n3 1 1\n2 4 2\n1 2 3\n4 3 4\nEnd\n");
   Write(Square(), "a.msh", "msh22");
   const std::string msh = folder_.Read("a.msh");
   EXPECT_EQ(
       msh.substr(0, msh.find("$NodeData")),
       "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n5\n1 1 \"xmin\"\n1 2 \"xmax\"\n1 3 \"ymin\"\n"
-      "1 4 \"ymax\"\n2 5 \"domain\"\n$EndPhysicalNames\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 1 1 0\n$EndNodes\n"
-      "$Elements\n6\n1 2 2 5 1 1 2 3\n2 2 2 5 1 2 4 3\n3 1 2 1 1 3 1\n4 1 2 2 2 2 4\n5 1 2 3 3 1 2\n"
+      "1 4 \"ymax\"\n2 1 \"domain\"\n$EndPhysicalNames\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 1 1 0\n$EndNodes\n"
+      "$Elements\n6\n1 2 2 1 1 1 2 3\n2 2 2 1 1 2 4 3\n3 1 2 1 1 3 1\n4 1 2 2 2 2 4\n5 1 2 3 3 1 2\n"
       "6 1 2 4 4 4 3\n$EndElements\n");
   Write(Square(), "a.node");
   EXPECT_EQ(folder_.Read("a.node"), "4 2 0 1\n0 0 0 1\n1 1 0 2\n2 0 1 1\n3 1 1 2\n");
-  EXPECT_EQ(folder_.Read("a.ele"), "2 3 1\n0 0 1 2 1\n1 1 3 2 1\n");
-  EXPECT_EQ(folder_.Read("a.edge"),
-            "# boundary: 1 xmin 2 xmax 3 ymin 4 ymax\n4 1\n0 2 0 1\n1 1 3 2\n2 0 1 3\n3 3 2 4\n");
-  EXPECT_EQ(folder_.Read("a.poly"),
-            "# boundary: 1 xmin 2 xmax 3 ymin 4 ymax\n0 2 0 1\n4 1\n0 2 0 1\n1 1 3 2\n2 0 1 3\n3 3 2 4\n0\n");
+  EXPECT_EQ(folder_.Read("a.ele"), "# region 1: domain\n2 3 1\n0 0 1 2 1\n1 1 3 2 1\n");
+  const std::string names = "# part 1: xmin\n# part 2: xmax\n# part 3: ymin\n# part 4: ymax\n";
+  EXPECT_EQ(folder_.Read("a.edge"), names + "4 1\n0 2 0 1\n1 1 3 2\n2 0 1 3\n3 3 2 4\n");
+  EXPECT_EQ(folder_.Read("a.poly"), names + "0 2 0 1\n4 1\n0 2 0 1\n1 1 3 2\n2 0 1 3\n3 3 2 4\n0\n");
 }
 
 TEST_F(BoundaryFilesTest, FacetsOfATetrahedron) {
@@ -151,8 +146,8 @@ TEST_F(BoundaryFilesTest, FacetsOfATetrahedron) {
   mesh.facets = {0, 2, 1};
   mesh.boundary = {{5, "zmin", 1}};
   Write(mesh, "a.ele");
-  EXPECT_EQ(folder_.Read("a.face"), "# boundary: 5 zmin\n1 1\n0 0 2 1 5\n");
-  EXPECT_EQ(folder_.Read("a.poly"), "# boundary: 5 zmin\n0 3 0 1\n1 1\n1 0 5\n3 0 2 1\n0\n");
+  EXPECT_EQ(folder_.Read("a.face"), "# part 5: zmin\n1 1\n0 0 2 1 5\n");
+  EXPECT_EQ(folder_.Read("a.poly"), "# part 5: zmin\n0 3 0 1\n1 1\n1 0 5\n3 0 2 1\n0\n");
   EXPECT_EQ(folder_.Read("a.ele"), "1 4 0\n0 0 1 2 3\n") << "no region is known";
 }
 
@@ -180,7 +175,7 @@ TEST_F(BoundaryFilesTest, WhatNobodyHasTaggedIsNoBoundary) {
 
 TEST_F(BoundaryFilesTest, Errors) {
   Write(Square(), "a.mesh");
-  EXPECT_THAT(ReadBadWith("a.mesh", "3 1 1\n", "3 1 x\n"), HasSubstr("expected the reference of a facet"));
+  EXPECT_THAT(ReadBadWith("a.mesh", "3 1 1\n", "3 1 x\n"), HasSubstr("expected the reference of one of the edges"));
   Write(Square(), "a.mesh");
   EXPECT_THAT(ReadBadWith("a.mesh", "3 1 1\n", "5 1 1\n"), HasSubstr("a vertex from 1 on"));
   Write(Square(), "a.msh", "msh22");

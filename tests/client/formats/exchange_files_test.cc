@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
+#include <cstdlib>
+#include <string>
 
 #include "client/formats/read_mesh.h"
 #include "client/formats/write_mesh.h"
@@ -144,14 +146,71 @@ TEST_F(ExchangeFilesTest, MshAsGmshWritesIt) {
   EXPECT_THAT(mesh.weights, ElementsAre(4, 1, 2, 3));
 }
 
+// Bytes of version 2.2: a node each of 4 + 24 bytes, blocks of elements of one type.
+std::string BinaryMsh22() {
+  const auto bytes = [](auto... values) {
+    std::string text;
+    (text.append(reinterpret_cast<const char*>(&values), sizeof(values)), ...);
+    return text;
+  };
+  return "$MeshFormat\n2.2 1 8\n" + bytes(int32_t{1}) + "\n$EndMeshFormat\n$PhysicalNames\n1\n2 7 \"sea\"\n" +
+         "$EndPhysicalNames\n$Nodes\n3\n" + bytes(int32_t{5}, 0.0, 0.0, 0.0) + bytes(int32_t{2}, 1.0, 0.0, 0.0) +
+         bytes(int32_t{9}, 0.0, 1.5, 0.0) + "\n$EndNodes\n$Elements\n3\n" + bytes(int32_t{1}, int32_t{2}, int32_t{2}) +
+         bytes(int32_t{1}, int32_t{4}, int32_t{1}, int32_t{5}, int32_t{2}) +
+         bytes(int32_t{2}, int32_t{3}, int32_t{1}, int32_t{2}, int32_t{9}) + bytes(int32_t{2}, int32_t{1}, int32_t{2}) +
+         bytes(int32_t{3}, int32_t{7}, int32_t{1}, int32_t{5}, int32_t{2}, int32_t{9}) + "\n$EndElements\n" +
+         "$NodeData\n1\n\"weights\"\n1\n0\n3\n0\n1\n3\n" + bytes(int32_t{9}, 4.0) + bytes(int32_t{5}, 1.0) +
+         bytes(int32_t{2}, 2.0) + "\n$EndNodeData\n";
+}
+
+TEST_F(ExchangeFilesTest, MshOfVersion22InBinary) {
+  const Mesh mesh = ReadGood("a.msh", BinaryMsh22());
+  EXPECT_EQ(mesh.dimension, 2);
+  EXPECT_THAT(mesh.points, ElementsAre(0, 0, 1, 0, 0, 1.5));
+  EXPECT_THAT(mesh.simplices, ElementsAre(0, 1, 2));
+  EXPECT_THAT(mesh.regions, ElementsAre(Region{7, "sea"}));
+  EXPECT_THAT(mesh.boundary, ElementsAre(BoundaryPart{3, "", 1}, BoundaryPart{4, "", 1}));
+  EXPECT_THAT(mesh.weights, ElementsAre(1, 2, 4));
+  const std::string good = BinaryMsh22();
+  for (size_t size = 0; size + 1 < good.find("$EndElements"); ++size) {
+    EXPECT_THAT(ReadBad("a.msh", good.substr(0, size)), HasSubstr("a.msh")) << size;
+  }
+  EXPECT_THAT(ReadBad("a.msh", Replaced(good, "$Nodes\n3", "$Nodes\nx")),
+              HasSubstr("expected the number of nodes, a whole number of at most 4294967295, got \"x\""));
+  EXPECT_THAT(ReadBad("a.msh", Replaced(good, "$Elements\n3", "$Elements\n1")),
+              HasSubstr("expected the number of elements of a block, a whole number of at most 1, got 2"));
+  const std::string data = "tests/data";
+  const char* const folder = std::getenv("WELLSPACE_DATA_DIR");
+  const absl::StatusOr<Mesh> of_gmsh = ReadMesh((folder == nullptr ? data : folder) + "/formats/gmsh22_binary.msh");
+  ASSERT_TRUE(of_gmsh.ok()) << of_gmsh.status();
+  EXPECT_EQ(of_gmsh->dimension, 2);
+  EXPECT_EQ(of_gmsh->points.size(), 24);
+  EXPECT_EQ(of_gmsh->simplices.size() / 3 + 12, 26);  // of 26 elements four are points, and eight lines
+}
+
+// Triangles alone, in a file that has a third coordinate for them.
+TEST_F(ExchangeFilesTest, MeditOfDimension3WithTrianglesAlone) {
+  const std::string text =
+      "MeshVersionFormatted 2\nDimension 3\nVertices 4\n0 0 0 1\n1 0 0 1\n0 1 0 0\n1 1 0 0\n"
+      "Edges 2\n1 2 7\n2 4 0\nTriangles\n2\n1 2 3 7\n2 4 3 5\nEnd\n";
+  const Mesh mesh = ReadGood("a.mesh", text);
+  EXPECT_EQ(mesh.dimension, 2);
+  EXPECT_THAT(mesh.points, ElementsAre(0, 0, 1, 0, 0, 1, 1, 1));
+  EXPECT_THAT(mesh.simplices, ElementsAre(0, 1, 2, 1, 3, 2));
+  EXPECT_THAT(mesh.simplex_regions, ElementsAre(7, 5));
+  EXPECT_THAT(mesh.boundary, ElementsAre(BoundaryPart{7, "", 1}));
+  EXPECT_EQ(ReadBad("a.mesh", Replaced(text, "1 1 0 0", "1 1 0.5 0")),
+            "a.mesh: vertex 4: expected z = 0 in a mesh of triangles without tetrahedra, got 0.5");
+}
+
 TEST_F(ExchangeFilesTest, MshErrors) {
   const auto message = [this](const std::string& from, const std::string& to) {
     return ReadBad("a.msh", Replaced(kMsh41, from, to));
   };
   EXPECT_EQ(ReadBad("a.msh", ""), "a.msh:1: expected \"$MeshFormat\" at the start of the file");
   EXPECT_THAT(message("4.1 0 8", "3.0 0 8"),
-              HasSubstr("a.msh:2: expected version 2.2 in ascii (0 8), or 4.1 in ascii"));
-  EXPECT_THAT(message("4.1 0 8", "2.2 1 8"), HasSubstr("a.msh:2: expected version 2.2 in ascii"));
+              HasSubstr("a.msh:2: expected version 2.2 or 4.1, in ascii (0 8) or binary (1 8), got \"3.0 0 8\""));
+  EXPECT_THAT(message("4.1 0 8", "2.2 1 8"), HasSubstr("expected little-endian numbers, a 1 first"));
   EXPECT_THAT(ReadBad("a.msh", std::string("$MeshFormat\n4.1 1 8\n\0\0\0\1\n$EndMeshFormat\n", 38)),
               HasSubstr("expected little-endian numbers, a 1 first, got 16777216"));
   EXPECT_THAT(message("2 4 7 30", "2 4000000000 7 30"),
@@ -201,7 +260,10 @@ TEST_F(ExchangeFilesTest, MeditErrors) {
   EXPECT_EQ(message("1 2 3 4 5", "0 2 3 4 5"), "a.mesh:16: expected a vertex from 1 on, got 0");
   EXPECT_THAT(message("Corners 1\n1", "Hexahedra 0"),
               HasSubstr("a.mesh:9: expected Triangles in 2-D or Tetrahedra in 3-D"));
-  EXPECT_THAT(message("Tetrahedra", "Tetras"), HasSubstr("the file ends; expected Triangles or Tetrahedra"));
+  EXPECT_THAT(message("Tetrahedra", "Tetras"),
+              HasSubstr("a.mesh: vertex 4: expected z = 0 in a mesh of triangles without tetrahedra, got 1.5"));
+  EXPECT_THAT(message("Triangles\n1\n1 2 3 7\nTetrahedra", "Tetras"),
+              HasSubstr("the file ends; expected Triangles or Tetrahedra"));
   EXPECT_THAT(message("Tetrahedra\n1\n", "Tetrahedra\n4000000000\n"),
               HasSubstr("a.mesh:17: expected a vertex from 1 on, a whole number of at most 4, got \"End\""));
 }

@@ -285,23 +285,31 @@ TEST_F(MeshFilesTest, VtuErrors) {
   EXPECT_THAT(message("NumberOfCells='1'", "NumberOfCells='2'"), HasSubstr("for each of 2 cells, got 1 types"));
   EXPECT_THAT(message("NumberOfComponents=\"3\"", "NumberOfComponents=\"2\""),
               HasSubstr("mesh.vtu:6: expected NumberOfComponents 3"));
-  EXPECT_THAT(message("format=\"ascii\">\n", "format=\"appended\" offset=\"0\">\n"),
-              HasSubstr("mesh.vtu:6: expected format \"ascii\" or \"binary\", got \"appended\""));
+  EXPECT_THAT(
+      message("format=\"ascii\">\n", "format=\"appended\" offset=\"0\">\n"),
+      HasSubstr("mesh.vtu:6: expected the offset of an array in <AppendedData>, which is not there, got \"0\""));
+  EXPECT_THAT(message("format=\"ascii\">\n", "format=\"hdf\">\n"),
+              HasSubstr("mesh.vtu:6: expected format \"ascii\", \"binary\" or \"appended\", got \"hdf\""));
   EXPECT_THAT(message("1.5", "one"), HasSubstr("expected a number, got \"one\""));
   EXPECT_THAT(message("1.5", "inf"), HasSubstr("expected a finite number, got \"inf\""));
   EXPECT_THAT(message("1.5 0\n", "1.5 0.5\n"), HasSubstr("point 2: expected z = 0"));
   EXPECT_THAT(message("0 1 2<", "0 1 3<"), HasSubstr("cell 0: expected vertices from 0 to below 3, got 3"));
   EXPECT_THAT(message("0 1 2<", "0 1 -2<"), HasSubstr("mesh.vtu:12: expected a whole number, got \"-2\""));
   EXPECT_THAT(message("0 1 2<", "0 1 2 0<"), HasSubstr("expected 3 vertices for 1 triangles, got 4"));
-  EXPECT_THAT(message(">5<", ">9<"), HasSubstr("got 3"));
+  EXPECT_THAT(message(">5<", ">9<"),
+              HasSubstr("cell 0: expected only triangles (5) or only tetrahedra (10), got type 9"));
+  EXPECT_THAT(message(">5<", ">10<"), HasSubstr("expected 4 vertices for 1 tetrahedra, got 3"));
   EXPECT_THAT(message(">3<", ">4<"), HasSubstr("cell 0: expected offset 3, got 4"));
   EXPECT_THAT(message("heat\" format=\"ascii\">1 2 3", "weights\" format=\"ascii\">1 2"),
               HasSubstr("expected a weight for each of 3 points, got 2"));
   EXPECT_THAT(message("</Cells>", "</Cell>"),
               HasSubstr("mesh.vtu:15: expected the end of \"Cells\", got that of \"Cell\""));
-  EXPECT_THAT(message("</Piece>", "</Piece><Piece NumberOfPoints=\"0\" NumberOfCells=\"0\"/>"),
-              HasSubstr("expected one <Piece>"));
-  EXPECT_THAT(message("</VTKFile>", "<AppendedData/></VTKFile>"), HasSubstr("got appended data"));
+  EXPECT_THAT(message("</Piece>", "</Piece><Piece NumberOfPoints=\"1\" NumberOfCells=\"0\"/>"),
+              HasSubstr("expected 12 coordinates for 4 points, got 9"));
+  EXPECT_THAT(message("<Cells>", "<Piece NumberOfPoints=\"1\" NumberOfCells=\"0\"/><Cells>"),
+              HasSubstr("got one inside of another"));
+  EXPECT_THAT(message("<Cells>", "<AppendedData encoding=\"raw\"/><Cells>"),
+              HasSubstr("expected <AppendedData> right inside <VTKFile>"));
   EXPECT_THAT(message("</UnstructuredGrid>\n</VTKFile>\n", "<\x01>"),
               HasSubstr("the file ends inside element \"\\x01\""));
   EXPECT_THAT(ReadBad("mesh.vtu", ""), HasSubstr("expected one <Piece>"));

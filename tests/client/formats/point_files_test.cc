@@ -93,6 +93,27 @@ TEST_F(PointFilesTest, StlInBinaryEvenIfItStartsWithSolid) {
   ExpectCutAnywhereIsNoTrouble("a.stl", BinaryStl("solid", corners));
 }
 
+TEST_F(PointFilesTest, StlInCapitals) {
+  std::string text = "SOLID S\n";
+  for (const char* corners :
+       {"VERTEX 0 0 0\nVERTEX 1 0 0\nVERTEX 0 1 0\n", "VERTEX 0 0 0\nVERTEX 0 1 0\nVERTEX 0 0 1\n"}) {
+    text += "  FACET NORMAL 0 0 0\nOUTER LOOP\n" + std::string(corners) + "ENDLOOP\nENDFACET\n";
+  }
+  EXPECT_THAT(ReadGood("a.stl", text + "ENDSOLID S\n").points, ElementsAre(0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1));
+}
+
+// Of a writer that did not know the number of triangles when it wrote the header.
+TEST_F(PointFilesTest, StlInBinaryWithACountOf0) {
+  std::string file(84, '\0');
+  for (int i = 0; i < 2; ++i) {
+    std::string triangle(50, '\0');
+    Put(triangle, 12, 1.0F + static_cast<float>(i));
+    file += triangle;
+  }
+  EXPECT_THAT(ReadGood("a.stl", file).points, ElementsAre(1, 0, 0, 0, 0, 0, 2, 0, 0));
+  EXPECT_THAT(ReadBad("a.stl", file.substr(0, 170)), HasSubstr("expected whole triangles"));
+}
+
 TEST_F(PointFilesTest, StlErrors) {
   EXPECT_EQ(ReadBad("a.stl", ""), "a.stl:1: expected \"solid\" at the start of the file");
   EXPECT_EQ(ReadBad("a.stl", Replaced(kAsciiStl, "vertex 1e0 0 0", "vertex 1e0 0")),
@@ -143,6 +164,11 @@ TEST_F(PointFilesTest, PcdInAscii) {
 
 constexpr char kBinaryPcdHeader[] =
     "VERSION .7\nFIELDS x y z _ i\nSIZE 4 8 4 1 2\nTYPE F F I U I\nCOUNT 1 1 1 3 1\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA ";
+
+TEST_F(PointFilesTest, PcdOfVersion06CallsFieldsColumns) {
+  EXPECT_EQ(ReadGood("a.pcd", Replaced(kAsciiPcd, "FIELDS", "COLUMNS"), kWithAttributes).points,
+            ReadGood("a.pcd", kAsciiPcd, kWithAttributes).points);
+}
 
 TEST_F(PointFilesTest, PcdInBinary) {
   const std::string first = Bytes(0.5F) + Bytes(0.1) + Bytes(int32_t{-7}) + "abc" + Bytes(int16_t{-2});
@@ -316,6 +342,16 @@ TEST_F(PointFilesTest, LasErrors) {
   EXPECT_EQ(with(107, uint32_t{4'000'000'000}),
             "a.las: byte 307: expected 4000000000 points of 20 bytes, as the header says, got 1; the file ends");
   EXPECT_THAT(with(131, std::numeric_limits<double>::infinity()),
+              HasSubstr("a.las: byte 131: expected a finite scale other than 0 and a finite offset of coordinate 1, "
+                        "got inf and "));
+  // All points would be one.
+  EXPECT_THAT(with(139, 0.0), HasSubstr("a.las: byte 139: expected a finite scale other than 0"));
+  EXPECT_THAT(with(155, std::numeric_limits<double>::quiet_NaN()), HasSubstr("and a finite offset of coordinate 1"));
+  // Beyond the largest double only with the scale.
+  std::string large = good;
+  Put(large, 131, 1e308);
+  Put(large, 155, 1.7e308);
+  EXPECT_THAT(ReadBad("a.las", large),
               HasSubstr("a.las: byte 287: point 0: coordinate 1: expected a finite number, got inf"));
   EXPECT_EQ(ReadGood("a.las", good).size(), 1);
   EXPECT_THAT(ReadBad("b.laz", Replaced(good, "\x14\0"s, "\x14\0"s).replace(104, 1, "\x80")), HasSubstr("LAZ"));
@@ -359,6 +395,19 @@ TEST_F(PointFilesTest, VtkInBinaryOfVersion5) {
   ExpectCutAnywhereIsNoTrouble("a.vtk", file);
   EXPECT_THAT(ReadBad("a.vtk", Replaced(file, "POINTS 2", "POINTS 4000000000")),
               HasSubstr("expected 12000000000 numbers after POINTS, got "));
+}
+
+// Words are not told apart by lines.
+TEST_F(PointFilesTest, VtkWithDataOnTheLineOfAHeader) {
+  const std::string text =
+      "# vtk DataFile Version 1.0\na track\nASCII\nDATASET POLYDATA\nPOINTS 4 float\n0 0 0\n1 0 0\n1 1 0\n0 1 1\n\n"
+      "LINES 1 5 4\n0\n1\n2\n3\n\nPOINT_DATA 4\nSCALARS t float\nLOOKUP_TABLE default\n1\n2\n3\n4\n";
+  const PointCloud cloud = ReadGood("a.vtk", text, kWithAttributes);
+  EXPECT_THAT(cloud.points, ElementsAre(0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 1));
+  ASSERT_THAT(NamesOf(cloud), ElementsAre("t"));
+  EXPECT_THAT(cloud.attributes[0].values, ElementsAre(1, 2, 3, 4));
+  EXPECT_THAT(cloud.notes, ElementsAre(EndsWith("1 cell is not used, only the points")));
+  EXPECT_THAT(ReadGood("a.vtk", text).notes, ElementsAre(EndsWith("1 cell is not used, only the points")));
 }
 
 TEST_F(PointFilesTest, VtkErrors) {

@@ -28,13 +28,13 @@ struct Kind {
   const char* format;
   const char* file;
   int max_dimension;
-  bool has_names;   // and regions without simplices
   bool is_grouped;  // simplices are written by their regions
 };
 
-constexpr Kind kKinds[] = {{"msh41", "mesh.msh", 3, true, true},    {"msh22", "old.msh", 3, true, false},
-                           {"medit", "mesh.mesh", 3, false, false}, {"vtu", "mesh.vtu", 3, false, false},
-                           {"npz", "mesh.npz", 6, true, false},     {"node", "mesh.node", 6, true, false}};
+constexpr Kind kKinds[] = {{"msh41", "mesh.msh", 3, true},   {"msh22", "old.msh", 3, false},
+                           {"medit", "mesh.mesh", 3, false}, {"vtu", "mesh.vtu", 3, false},
+                           {"vtk", "mesh.vtk", 3, false},    {"npz", "mesh.npz", 6, false},
+                           {"node", "mesh.node", 6, false}};
 
 // Random vertices in random regions, one of four without simplices.
 Mesh MeshOfRegions(int dimension, bool has_boundary) {
@@ -107,11 +107,7 @@ TEST_F(RegionFilesTest, RoundTripsKeepRegions) {
         EXPECT_EQ(read.simplices, mesh.simplices);
         EXPECT_EQ(read.simplex_regions, mesh.simplex_regions);
         EXPECT_EQ(read.facets, mesh.facets);
-        if (kind.has_names) {
-          EXPECT_EQ(read.regions, mesh.regions);
-        } else {
-          EXPECT_THAT(read.regions, ElementsAre(Region{10, ""}, Region{20, ""}, Region{30, ""}));
-        }
+        EXPECT_EQ(read.regions, mesh.regions);  // also those without simplices
       }
     }
   }
@@ -133,15 +129,19 @@ TEST_F(RegionFilesTest, TetrahedraOfThreeRegions) {
 }
 
 // Other tests have the bytes of such files.
-TEST_F(RegionFilesTest, OneRegionIsNone) {
+TEST_F(RegionFilesTest, OneRegionIsKeptAndSimplicesNeedNone) {
   for (const Kind& kind : kKinds) {
-    SCOPED_TRACE(kind.format);
-    Mesh mesh = MeshOfRegions(2, true);
-    mesh.simplex_regions.clear();
-    mesh.regions = {{1, "domain"}};
-    Write(mesh, kind.file, kind.format);
-    EXPECT_THAT(ReadGood(kind.file).simplex_regions, IsEmpty());
-    EXPECT_THAT(ReadGood(kind.file).regions, IsEmpty());
+    for (const bool has_boundary : {false, true}) {
+      for (const Region& region : {Region{1, "domain"}, Region{7, "deep sea"}, Region{-3, ""}}) {
+        SCOPED_TRACE(std::string(kind.format) + " " + std::to_string(region.id));
+        Mesh mesh = MeshOfRegions(2, has_boundary);
+        mesh.simplex_regions.clear();
+        mesh.regions = {region};
+        Write(mesh, kind.file, kind.format);
+        EXPECT_THAT(ReadGood(kind.file).simplex_regions, IsEmpty());
+        EXPECT_THAT(ReadGood(kind.file).regions, ElementsAre(region));
+      }
+    }
   }
 }
 
@@ -149,14 +149,14 @@ TEST_F(RegionFilesTest, TheSquareAsText) {
   Write(Square(), "a.mesh");
   EXPECT_THAT(folder_.Read("a.mesh"), HasSubstr("\nTriangles\n2\n1 2 3 7\n2 4 3 1\nEnd\n"));
   Write(Square(), "a.node");
-  EXPECT_EQ(folder_.Read("a.ele"), "# regions: 1 land, 7 deep sea\n2 3 1\n0 0 1 2 7\n1 1 3 2 1\n");
+  EXPECT_EQ(folder_.Read("a.ele"), "# region 1: land\n# region 7: deep sea\n2 3 1\n0 0 1 2 7\n1 1 3 2 1\n");
   Write(Square(), "a.msh", "msh22");
   EXPECT_THAT(folder_.Read("a.msh"), HasSubstr("$PhysicalNames\n2\n2 1 \"land\"\n2 7 \"deep sea\"\n$EndPhysicalNames"));
   EXPECT_THAT(folder_.Read("a.msh"), HasSubstr("$Elements\n2\n1 2 2 7 7 1 2 3\n2 2 2 1 1 2 4 3\n$EndElements"));
 }
 
-// Groups of different dimensions have different numbers in .msh: the region gives way to the part of the boundary.
-TEST_F(RegionFilesTest, RegionWithTheNumberOfAPartGetsAnotherOneInMsh) {
+// Gmsh counts groups by their dimensions: what has the number of a part of the boundary keeps its own.
+TEST_F(RegionFilesTest, RegionWithTheNumberOfAPartKeepsItInMsh) {
   Mesh mesh = Square();
   mesh.facets = {0, 1, 2, 0};
   mesh.boundary = {{1, "south", 1}, {2, "west", 1}};
@@ -164,7 +164,8 @@ TEST_F(RegionFilesTest, RegionWithTheNumberOfAPartGetsAnotherOneInMsh) {
     SCOPED_TRACE(format);
     Write(mesh, "a.msh", format);
     const Mesh read = ReadGood("a.msh");
-    EXPECT_THAT(read.regions, ElementsAre(Region{3, "land"}, Region{7, "deep sea"}));
+    EXPECT_THAT(read.regions, ElementsAre(Region{1, "land"}, Region{7, "deep sea"}));
+    EXPECT_THAT(folder_.Read("a.msh"), HasSubstr("$PhysicalNames\n4\n1 1 \"south\"\n1 2 \"west\"\n2 1 \"land\"\n"));
     EXPECT_EQ(read.boundary, mesh.boundary);
   }
 }
@@ -212,7 +213,7 @@ TEST_F(RegionFilesTest, PipesGetTheSameBytes) {
   const Mesh mesh = MeshOfRegions(2, true);
   const std::string pipe = folder_.Path("pipe");
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
-  for (const char* format : {"msh41", "msh22", "medit", "vtu"}) {
+  for (const char* format : {"msh41", "msh22", "medit", "vtu", "vtk"}) {
     SCOPED_TRACE(format);
     Write(mesh, "whole", format);
     std::string got;
@@ -287,7 +288,8 @@ TEST_F(RegionFilesTest, MshOfGmshWithOneGroup) {
 
 TEST_F(RegionFilesTest, Errors) {
   Write(Square(), "a.mesh");
-  EXPECT_THAT(ReadBadWith("a.mesh", "1 2 3 7", "1 2 3 x"), HasSubstr("a.mesh:11: expected the reference of a simplex"));
+  EXPECT_THAT(ReadBadWith("a.mesh", "1 2 3 7", "1 2 3 x"),
+              HasSubstr("a.mesh:13: expected the reference of one of the triangles"));
   Write(Square(), "a.vtu");
   const std::string array = "<DataArray type=\"Int32\" Name=\"region\" format=\"ascii\">";
   folder_.Write("a.vtu",

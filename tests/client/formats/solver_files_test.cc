@@ -123,7 +123,8 @@ TEST_F(SolverFilesTest, VtkInBytes) {
   const std::string text = folder_.Read("a.vtk");
   using std::string_literals::operator""s;
   EXPECT_THAT(text, StartsWith("# vtk DataFile Version 3.0\n4 vertices, 2 triangles\nBINARY\n"
-                               "DATASET UNSTRUCTURED_GRID\nPOINTS 4 double\n"));
+                               "DATASET UNSTRUCTURED_GRID\nFIELD FieldData 1\nwellspace_names 1 52 unsigned_char\n"
+                               "part 3: ymin\npart 7: far field, east\nregion 2: land\n\nPOINTS 4 double\n"));
   EXPECT_THAT(text, HasSubstr("\x3f\xf0\0\0\0\0\0\0\x3f\xf8\0\0\0\0\0\0\0\0\0\0\0\0\0\0\nCELLS 4 14\n"s
                               "\0\0\0\3\0\0\0\0\0\0\0\1\0\0\0\2\0\0\0\3\0\0\0\1\0\0\0\3\0\0\0\2"s
                               "\0\0\0\2\0\0\0\0\0\0\0\1\0\0\0\2\0\0\0\3\0\0\0\1\nCELL_TYPES 4\n"s
