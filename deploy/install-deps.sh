@@ -16,7 +16,7 @@ declare -A packages=(
           python3-protobuf python3-scipy python3-tqdm libisal2 mypy
           python3-build python3-pip python3-setuptools python3-venv python3-wheel"
   [interoperability]="gmsh freefem++ python3-gmsh python3-h5py python3-meshio python3-vtk9 python3-numpy fish zsh"
-  [solvers]="openfoam python3-dolfinx"
+  [solvers]="calculix-ccx openfoam python3-dolfinx"
   [lint]="git clang-format-14 python3"
   [tidy]="clang-tidy-14"
   [fuzz]="clang-14 libclang-rt-14-dev"

@@ -1,4 +1,4 @@
-// The input file of Abaqus, which CalculiX reads as well.
+// The input file of Abaqus, which CalculiX reads as well. Of a number both read 20 characters and no more.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -15,11 +15,14 @@
 #include "client/formats/io/output_file.h"
 #include "client/formats/labels.h"
 #include "client/formats/mesh_writers.h"
+#include "client/formats/orientation.h"
 #include "client/formats/regions.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::formats {
 namespace {
+
+constexpr size_t kAbaqusNumberWidth = 20;
 
 // The corners of the faces that Abaqus calls S1, S2, ... of a triangle (CPS3) and a tetrahedron (C3D4).
 constexpr uint8_t kAbaqusTriangleFaces[][2] = {{0, 1}, {1, 2}, {2, 0}};
@@ -71,7 +74,8 @@ class NumberLines {
 
 class AbaqusWriter final : public MeshWriter {
  public:
-  AbaqusWriter(OutputFile output, const MeshShape& shape) : shape_(shape), output_(std::move(output)) {
+  AbaqusWriter(OutputFile output, const MeshShape& shape, std::string path)
+      : shape_(shape), output_(std::move(output)), path_(std::move(path)) {
     output_.Write(absl::StrCat("*HEADING\n", shape_.vertex_count, " nodes, ", shape_.simplex_count, " ",
                                SimplexName(shape_.dimension), "\n*NODE\n"));
   }
@@ -80,12 +84,16 @@ class AbaqusWriter final : public MeshWriter {
     for (; !points.empty() && output_.status().ok(); points = points.subspan(shape_.dimension)) {
       line_.clear();
       AppendNumber(++vertices_, line_);
+      bool is_rounded = false;
       for (const double x : points.first(shape_.dimension)) {
         line_ += ", ";
-        AppendNumber(x, line_);
+        is_rounded |= AppendNumberWithin(x, kAbaqusNumberWidth, line_) != x;
       }
       line_ += '\n';
       output_.Write(line_);
+      points_.insert(points_.end(), points.begin(), points.begin() + shape_.dimension);
+      is_rounded_.push_back(is_rounded);
+      rounded_vertices_ += is_rounded ? 1 : 0;
     }
     return output_.status();
   }
@@ -118,6 +126,7 @@ class AbaqusWriter final : public MeshWriter {
       }
       line_ += '\n';
       output_.Write(line_);
+      WELLSPACE_RETURN_IF_ERROR(CheckOrientation(simplices.first(corners)));
       KeepIfAtBoundary(simplices.first(corners));
     }
     return output_.status();
@@ -144,6 +153,13 @@ class AbaqusWriter final : public MeshWriter {
       WriteRegions();
     }
     WriteBoundary();
+    if (rounded_vertices_ > 0) {
+      AddNote(absl::StrCat("Abaqus and CalculiX read ", kAbaqusNumberWidth, " characters of a number: coordinates of ",
+                           rounded_vertices_, rounded_vertices_ == 1 ? " vertex are" : " vertices are",
+                           " rounded to them, by less than 1e-13 of themselves; every element keeps its orientation"));
+    }
+    AddNote(region_labels_.ChangesNote());
+    AddNote(set_labels_.ChangesNote());
     return output_.Commit();
   }
 
@@ -164,6 +180,33 @@ class AbaqusWriter final : public MeshWriter {
       output_.Write(absl::StrCat(", ELSET=", region_labels_.Take(region.name, "region", region.id)));
     }
     output_.Write("\n");
+  }
+
+  // What was rounded must not turn an element over, or make it flat.
+  absl::Status CheckOrientation(std::span<const uint32_t> simplex) {
+    bool is_rounded = false;
+    for (const uint32_t corner : simplex) {
+      is_rounded |= corner < is_rounded_.size() && is_rounded_[corner];
+    }
+    if (!is_rounded) {
+      return absl::OkStatus();
+    }
+    std::vector<double> exact;
+    std::vector<double> rounded;
+    std::string digits;
+    for (const uint32_t corner : simplex) {
+      for (int axis = 0; axis < shape_.dimension; ++axis) {
+        exact.push_back(points_[size_t{corner} * shape_.dimension + axis]);
+        digits.clear();
+        rounded.push_back(AppendNumberWithin(exact.back(), kAbaqusNumberWidth, digits));
+      }
+    }
+    return OrientationSign(exact) == OrientationSign(rounded)
+               ? absl::OkStatus()
+               : absl::InvalidArgumentError(absl::StrCat(
+                     "cannot write ", path_, ": Abaqus and CalculiX read ", kAbaqusNumberWidth,
+                     " characters of a number, and element ", simplices_,
+                     " would lose its orientation by them, so close are its vertices; expected msh41, vtu or npz"));
   }
 
   // Facets come later. Only a simplex with as many tagged vertices as a facet has can have one.
@@ -268,6 +311,10 @@ class AbaqusWriter final : public MeshWriter {
 
   const MeshShape shape_;
   OutputFile output_;
+  const std::string path_;
+  std::vector<double> points_;    // all
+  std::vector<bool> is_rounded_;  // of vertices: whether a coordinate is
+  uint64_t rounded_vertices_ = 0;
   RegionQueue regions_;
   Labels region_labels_;
   Labels set_labels_;
@@ -286,7 +333,7 @@ class AbaqusWriter final : public MeshWriter {
 absl::StatusOr<std::unique_ptr<MeshWriter>> CreateAbaqus(const std::string& path, const MeshShape& shape,
                                                          std::stop_token stop) {
   WELLSPACE_ASSIGN_OR_RETURN(OutputFile output, OutputFile::Create(path, std::move(stop)));
-  return std::make_unique<AbaqusWriter>(std::move(output), shape);
+  return std::make_unique<AbaqusWriter>(std::move(output), shape, path);
 }
 
 }  // namespace wellspace::formats

@@ -20,7 +20,9 @@
 //         zlib; data as vtu. Names of parts and regions as meshio has them in <Information>.
 //   su2   SU2's, in ascii, 2-D and 3-D only. There is no place for weights, and none for regions.
 //   abaqus  The .inp of Abaqus and CalculiX, 2-D (CPS3) and 3-D (C3D4) only; *NSET "input" of the input points, *ELSET
-//         of the simplices by their regions. There is no place for weights.
+//         of the simplices by their regions. There is no place for weights. Their readers take 20 characters of a
+//         number: the shortest form of a coordinate if that fits, else the nearest number of so many. A mesh of which
+//         a simplex would lose its orientation by that is refused.
 // xdmf, su2 and abaqus are not read back.
 //
 // With a boundary there are, beside that:
@@ -86,7 +88,7 @@ absl::Status CheckMeshOutput(const std::string& path, const std::string& format,
 //         for node with weights or tags of vertices the points, for msh41 and msh22 with weights these. With several
 //         regions, for msh41, msh22, medit and node also 16 bytes for each run of simplices of one region; for msh41
 //         into a pipe or a device the simplices, and otherwise 4 KiB a region. For vtk all data of vertices; for abaqus
-//         the facets, and the simplices that may have one.
+//         the points, the facets, and the simplices that may have one.
 // Thread safety: thread-compatible.
 class MeshWriter {
  public:
@@ -138,7 +140,7 @@ absl::StatusOr<std::unique_ptr<MeshWriter>> CreateMesh(const std::string& path, 
 // Writes `mesh` to `path`; "-" is standard output. `format` empty: by the extension; standard output is vtu. `notes`,
 // unless it is null, gets those of the writer.
 //
-// Guarantees: coordinates read back to the bit; on an error, or when `stop` ends it with CANCELLED, no
+// Guarantees: coordinates read back to the bit, but for abaqus; on an error, or when `stop` ends it with CANCELLED, no
 //             file is left or changed.
 // Errors:     INVALID_ARGUMENT for an unknown format, or one that cannot hold this mesh or go there; of writing, naming
 //             the file.

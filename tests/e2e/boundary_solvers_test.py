@@ -1,7 +1,7 @@
-"""Solvers and other programs use the boundary that meshes have: FreeFEM, Gmsh, dolfinx, OpenFOAM, meshio.
+"""Solvers and other programs use the boundary that meshes have: FreeFEM, Gmsh, dolfinx, OpenFOAM, meshio, CalculiX.
 
-Wants freefem++, gmsh, python3-gmsh, python3-meshio, python3-dolfinx and openfoam, as deploy/install-deps.sh installs
-them for interoperability and solvers; what is not installed is skipped.
+Wants freefem++, gmsh, python3-gmsh, python3-meshio, python3-dolfinx, openfoam and calculix-ccx, as
+deploy/install-deps.sh installs them for interoperability and solvers; what is not installed is skipped.
 """
 import os
 import pathlib
@@ -176,6 +176,50 @@ print("cells", len(cells.values), len(set(cells.values)))
         boundary = (self.folder / "constant/polyMesh/boundary").read_text()
         patches = dict(re.findall(r"(?m)^    (\w+)\s*\{[^}]*?nFaces\s+(\d+);", boundary))
         self.assertEqual({name: int(count) for name, count in patches.items()}, dict(zip(NAMES, self.counts[3])))
+
+    @unittest.skipUnless(shutil.which("ccx"), "calculix-ccx is not installed")
+    def test_calculix_puts_vertices_where_they_are(self):
+        """A displacement that is linear on the boundary is linear everywhere, at the places that CalculiX has read.
+
+        It reads 20 characters of a number: coordinates are such that need up to 24.
+        """
+        for dimension in (2, 3):
+            with self.subTest(dimension=dimension):
+                random = numpy.random.default_rng(52)
+                points = random.uniform(-1, 1, (60, dimension)) * 1e-4
+                points[0] = -8.708810636114117e-05
+                name = f"tiny{dimension}"
+                numpy.savetxt(self.folder / f"{name}.csv", points, fmt="%.17g", delimiter=",")
+                for extension in ("inp", "npz"):
+                    self.wellspace("mesh", f"{name}.csv", "--dimension", dimension, "-o", f"{name}.{extension}",
+                                   "--quiet")
+                with numpy.load(self.folder / f"{name}.npz") as mesh:
+                    vertices, tags = mesh["points"], mesh["vertex_tags"]
+                written = (self.folder / f"{name}.inp").read_text().split("*ELEMENT")[0].split("*NODE\n")[1]
+                widths = [len(field.strip()) for line in written.splitlines() for field in line.split(",")]
+                self.assertEqual(max(widths), 20, "there are numbers of more than 20 characters")
+                gradient = random.uniform(-1, 1, (dimension, dimension)) * 1e-3
+                expected = vertices @ gradient.T
+                conditions = [f"{vertex + 1}, {axis + 1}, {axis + 1}, {float(expected[vertex, axis])!r}"
+                              for vertex in numpy.flatnonzero(tags) for axis in range(dimension)]
+                (self.folder / f"deck{dimension}.inp").write_text("\n".join(
+                    [f"*INCLUDE, INPUT={name}.inp", "*NSET, NSET=all, GENERATE", f"1, {len(vertices)}, 1",
+                     "*MATERIAL, NAME=steel", "*ELASTIC", "210000., 0.3", "*SOLID SECTION, ELSET=domain, MATERIAL=steel",
+                     *(["1e-5"] if dimension == 2 else []), "*BOUNDARY", *(line for line in self.in_width(conditions)),
+                     "*STEP", "*STATIC", "*NODE PRINT, NSET=all", "U", "*END STEP", ""]))
+                self.run_program("ccx", "-i", f"deck{dimension}")
+                text = (self.folder / f"deck{dimension}.dat").read_text()
+                rows = re.findall(r"(?m)^ +(\d+) +(\S+E\S+) +(\S+E\S+) +(\S+E\S+)$", text)
+                self.assertEqual(len(rows), len(vertices))
+                found = numpy.array([[float(x) for x in row[1:dimension + 1]] for row in rows])
+                numpy.testing.assert_allclose(found, expected, atol=1e-5 * numpy.abs(expected).max())
+
+    @staticmethod
+    def in_width(conditions):
+        """Values of conditions in the 20 characters that CalculiX reads of them."""
+        for condition in conditions:
+            start, value = condition.rsplit(", ", 1)
+            yield f"{start}, {float(value):.12e}"
 
 
 if __name__ == "__main__":

@@ -1,9 +1,11 @@
 #include "client/formats/io/number.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <system_error>
+#include <utility>
 
 #include "absl/strings/escaping.h"
 #include "absl/strings/str_cat.h"
@@ -17,6 +19,55 @@ std::string_view WithoutQuotes(std::string_view field) {
 }
 
 bool IsBlank(char c) { return c == ' ' || c == '\t'; }
+
+// A number as 0.d1d2d3... times ten to the power of `exponent`.
+struct Decimal {
+  bool is_negative = false;
+  std::string digits;  // no zero at either end, unless it is all there is
+  int exponent = 0;
+};
+
+// With the fewest digits that tell the number, or with so many.
+Decimal ToDecimal(double value, int digits) {
+  char buffer[32];
+  char* const last = buffer + sizeof(buffer);
+  const char* end = digits == 0 ? std::to_chars(buffer, last, value, std::chars_format::scientific).ptr
+                                : std::to_chars(buffer, last, value, std::chars_format::scientific, digits - 1).ptr;
+  std::string_view text(buffer, end - buffer);
+  Decimal decimal{.is_negative = text.front() == '-', .digits = {}, .exponent = 0};
+  text.remove_prefix(decimal.is_negative ? 1 : 0);
+  const size_t mark = text.find('e');
+  const std::string_view power = text.substr(mark + (text[mark + 1] == '+' ? 2 : 1));
+  std::from_chars(power.data(), power.data() + power.size(), decimal.exponent);
+  ++decimal.exponent;
+  for (const char c : text.substr(0, mark)) {
+    decimal.digits += c == '.' ? "" : std::string(1, c);
+  }
+  decimal.digits.resize(std::max<size_t>(decimal.digits.find_last_not_of('0') + 1, 1));
+  return decimal;
+}
+
+// The shortest of the forms 123.4, .01234, 1.234e-9 and 1234e-12, which C, Fortran and Python read alike.
+std::string ShortestForm(const Decimal& decimal) {
+  const auto& [is_negative, digits, exponent] = decimal;
+  const int count = static_cast<int>(digits.size());
+  std::string best = absl::StrCat(digits, "e", exponent - count);
+  const auto choose = [&best](std::string form) {
+    if (form.size() <= best.size()) {
+      best = std::move(form);
+    }
+  };
+  choose(absl::StrCat(digits.substr(0, 1), count > 1 ? "." : "", digits.substr(1), "e", exponent - 1));
+  constexpr int kMaxZeros = 20;
+  if (exponent > 0 && exponent < count) {
+    choose(absl::StrCat(digits.substr(0, exponent), ".", digits.substr(exponent)));
+  } else if (exponent >= count && exponent - count < kMaxZeros) {
+    choose(absl::StrCat(digits, std::string(exponent - count, '0')));
+  } else if (exponent <= 0 && -exponent < kMaxZeros) {
+    choose(absl::StrCat(".", std::string(-exponent, '0'), digits));
+  }
+  return is_negative ? absl::StrCat("-", best) : best;
+}
 
 enum class NumberKind { kFinite, kNotFinite, kTooLarge, kNone };
 
@@ -85,6 +136,29 @@ void AppendNumber(double value, std::string& text) {
 void AppendNumber(uint64_t value, std::string& text) {
   char buffer[32];
   text.append(buffer, std::to_chars(buffer, buffer + sizeof(buffer), value).ptr);
+}
+
+double AppendNumberWithin(double value, size_t width, std::string& text) {
+  const size_t begin = text.size();
+  AppendNumber(value, text);
+  if (text.size() - begin <= width) {
+    return value;
+  }
+  text.resize(begin);
+  const Decimal exact = ToDecimal(value, 0);
+  std::string form = ShortestForm(exact);
+  for (int digits = static_cast<int>(exact.digits.size()) - 1; form.size() > width; --digits) {
+    form = ShortestForm(ToDecimal(value, digits));
+    if (double rounded = 0; form.size() <= width && !ParseFinite(form, rounded).ok()) {
+      Decimal cut = exact;  // towards zero: rounded up, it is beyond the largest double
+      cut.digits.resize(digits);
+      form = ShortestForm(cut);
+    }
+  }
+  text += form;
+  double read = 0;
+  ParseFinite(form, read).IgnoreError();  // it is finite
+  return read;
 }
 
 std::string_view TrimBlanks(std::string_view text) {

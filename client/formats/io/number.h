@@ -37,6 +37,13 @@ bool ParseUnsigned(std::string_view text, uint64_t limit, uint64_t& value);
 void AppendNumber(double value, std::string& text);
 void AppendNumber(uint64_t value, std::string& text);
 
+// Appends a text of at most `width` characters that reads back as the same bits or, if there is none, as a number as
+// near as so many characters allow; returns what it reads back as.
+//
+// Guarantees: finite, also where rounding up would leave the range of double.
+// REQUIRES:   value is finite; width >= 12.
+double AppendNumberWithin(double value, size_t width, std::string& text);
+
 // Splits one line into fields, without copying.
 //
 // With separator ' ' a field ends at any run of blanks and tabs; with another one, a field is what stands between two

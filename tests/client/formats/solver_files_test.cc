@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <cmath>
 #include <string>
 #include <thread>
 #include <vector>
@@ -15,6 +16,7 @@
 namespace wellspace::formats {
 namespace {
 
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
@@ -83,6 +85,40 @@ TEST_F(SolverFilesTest, Abaqus) {
               HasSubstr("*ELEMENT, TYPE=C3D4, ELSET=domain\n1, 1, 2, 3, 4\n"
                         "*NSET, NSET=zmin\n1, 2, 3\n*SURFACE, NAME=zmin, TYPE=ELEMENT\n1, S1\n"
                         "*NSET, NSET=Zmin_3\n1, 2, 3, 4\n*SURFACE, NAME=Zmin_3, TYPE=ELEMENT\n1, S2\n1, S4\n1, S3\n"));
+}
+
+// CalculiX reads 20 characters of a number: of the 21 of "8.708810636114117e-05" it took 8.7 for the coordinate.
+TEST_F(SolverFilesTest, AbaqusHasNoNumberOfMoreThanTwentyCharacters) {
+  Mesh mesh = Square();
+  mesh.points = {-8.708810636114117e-05, 0, 1, 8.708810636114117e-05, -1.2345678901234567e-105, 1.5, 1, 1.5};
+  std::vector<std::string> notes;
+  ASSERT_TRUE(WriteMesh(folder_.Path("a.inp"), "", mesh.View(), {}, &notes).ok());
+  EXPECT_THAT(folder_.Read("a.inp"), HasSubstr("*NODE\n1, -8.70881063611412e-5, 0\n2, 1, 8.708810636114117e-5\n"
+                                               "3, -12345678901235e-118, 1.5\n4, 1, 1.5\n"));
+  EXPECT_THAT(notes, Contains(HasSubstr("read 20 characters of a number: coordinates of 2 vertices are rounded")));
+}
+
+// Three vertices a unit in the last place apart, where the characters do not tell that: CalculiX would get a flat
+// element.
+TEST_F(SolverFilesTest, AbaqusRefusesElementsThatRoundingWouldTurnOver) {
+  const double x = -8.708810636114117e-05;
+  const double below = std::nextafter(x, -1);
+  Mesh mesh{.dimension = 2, .points = {x, x, below, x, below, below}, .simplices = {0, 2, 1}};
+  EXPECT_THAT(std::string(WriteMesh(folder_.Path("a.inp"), "", mesh.View()).message()),
+              HasSubstr("a.inp: Abaqus and CalculiX read 20 characters of a number, and element 1 would lose its "
+                        "orientation by them"));
+  EXPECT_EQ(folder_.FileCount(), 0);
+  // A flat one has none to lose.
+  mesh.simplices = {0, 1, 1};
+  EXPECT_TRUE(WriteMesh(folder_.Path("a.inp"), "", mesh.View()).ok());
+}
+
+TEST_F(SolverFilesTest, LabelsThatAreNotTheNamesAreToldOf) {
+  for (const char* name : {"a.su2", "a.inp"}) {
+    std::vector<std::string> notes;
+    ASSERT_TRUE(WriteMesh(folder_.Path(name), "", Square().View(), {}, &notes).ok());
+    EXPECT_THAT(notes, Contains(HasSubstr("1 name is another, \"far_field__east\" for \"far field, east\"")));
+  }
 }
 
 // Without tags of vertices all simplices may have facets; sixteen numbers are a line.
