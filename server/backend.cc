@@ -1,5 +1,6 @@
 #include "server/backend.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/base/status_macros.h"
@@ -13,7 +14,7 @@ namespace {
 // A lease that has run out is noticed at once by those who ask for the session; its memory is free this much later.
 constexpr absl::Duration kExpiryInterval = absl::Seconds(1);
 
-// Files that a fault, or a death of the process, has left are removed as often.
+// Files that a fault, or a death of the process, has left are looked for as often.
 constexpr absl::Duration kGarbageInterval = absl::Hours(1);
 
 // Changes that wait for the disk at once: as many sessions can have theirs synchronised together.
@@ -126,12 +127,34 @@ absl::Status Backend::Restore() {
 Backend::~Backend() { background_.Stop(); }
 
 void Backend::RemoveExpired() {
+  std::vector<std::string> unlogged;
+  {
+    const std::lock_guard lock(unlogged_mutex_);
+    unlogged.swap(unlogged_);
+  }
+  if (!unlogged.empty()) {
+    blocking_.Run("", [this, names = std::move(unlogged)] { LogExpiries(names); });
+  }
   for (const std::shared_ptr<Session>& session : sessions_.RemoveExpired()) {
     log_->info(LogFields().Add("event", "session_expired").Add("session", session->name()).text());
     if (session_log_->is_durable()) {
-      blocking_.Run(session->name(), [session] { session->LogExpiry(); });
+      blocking_.Run(session->name(), [this, session] {
+        if (absl::IsResourceExhausted(session->LogExpiry())) {
+          const std::lock_guard lock(unlogged_mutex_);
+          unlogged_.push_back(session->name());
+        }
+      });
     }
   }
+}
+
+void Backend::LogExpiries(std::vector<std::string> names) {
+  const auto finds_no_room = [&](const std::string& name) {
+    return absl::IsResourceExhausted(session_log_->Commit({.session = name, .is_deletion = true}));
+  };
+  const auto first_left = std::ranges::find_if(names, finds_no_room);
+  const std::lock_guard lock(unlogged_mutex_);
+  unlogged_.insert(unlogged_.end(), first_left, names.end());
 }
 
 void Backend::RemoveGarbage() {
@@ -140,6 +163,9 @@ void Backend::RemoveGarbage() {
     if (!garbage.ok()) {
       log_->warn(LogFields().Add("event", "garbage_left").Add("error", std::string(garbage.status().message())).text());
       return;
+    }
+    for (const Garbage::SetAside& file : garbage->set_aside) {
+      log_->warn(LogFields().Add("event", "file_set_aside").Add("path", file.from).Add("new_path", file.to).text());
     }
     for (const std::string& path : garbage->removed) {
       log_->info(LogFields().Add("event", "file_removed").Add("path", path).text());

@@ -3,6 +3,9 @@
 #define WELLSPACE_SERVER_BACKEND_H_
 
 #include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
 
 #include "server/base/options.h"
 #include "server/calls/call_environment.h"
@@ -48,6 +51,8 @@ class Backend {
  private:
   void ScheduleExpiry();
   void RemoveExpired();
+  // Writes down that sessions are no more which have expired when the disk had no room for it.
+  void LogExpiries(std::vector<std::string> names);
   void RemoveGarbage();
   void AddMetrics(Metrics& metrics);
 
@@ -61,6 +66,8 @@ class Backend {
   RequestIds request_ids_;
   MemoryBudget memory_;
   SessionRegistry sessions_;
+  std::mutex unlogged_mutex_;
+  std::vector<std::string> unlogged_;  // names of sessions that have expired and are still written down; guarded by it
   const IdleSessions idle_sessions_;
   const CallEnvironment environment_;
   // The background thread ends first. Of the others each ends before those above it, and before what it works on.

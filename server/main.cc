@@ -195,11 +195,14 @@ absl::StatusOr<std::unique_ptr<DurableLog>> OpenSessionLog(const Flags& flags,
     return nullptr;
   }
   return DurableLog::Open(
-      {.folder = flags.data, .on_failure = [log](const absl::Status& cause) {
-         log->critical(LogFields().Add("event", "store_failed").Add("error", std::string(cause.message())).text());
-         log->flush();
-         _exit(1);
-       }});
+      {.folder = flags.data,
+       .on_failure =
+           [log](const absl::Status& cause) {
+             log->critical(LogFields().Add("event", "store_failed").Add("error", std::string(cause.message())).text());
+             log->flush();
+             _exit(1);
+           },
+       .ballast_bytes = BallastBytesFor(flags.data)});
 }
 
 // SIGTERM and SIGINT, blocked in this thread and all that it starts later, to be waited for.

@@ -136,8 +136,10 @@ class Session {
   // it, for its work to be done; or null, if none was under way.
   absl::StatusOr<std::shared_ptr<Operation>> ResumeOperation();
   // Writes down that a session which was closed by its lease is no more. Should that fail, it is there again after the
-  // next start, with a new lease.
-  void LogExpiry();
+  // next start, with a new lease; until then it may be tried again.
+  //
+  // Errors:     those of SessionLog::Commit.
+  absl::Status LogExpiry();
 
   // ---- Uploads: session_points.cc ----
 

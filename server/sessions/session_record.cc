@@ -166,11 +166,12 @@ absl::Status Session::LogCreation(const AnswerTo<v1::Session>& answer) {
   return CommitState([&](SessionChange& change) { change.answer = answer_record; });
 }
 
-void Session::LogExpiry() {
-  if (log_.is_durable()) {
-    std::lock_guard change_lock(change_mutex_);
-    (void)log_.Commit({.session = name_, .is_deletion = true});
+absl::Status Session::LogExpiry() {
+  if (!log_.is_durable()) {
+    return absl::OkStatus();
   }
+  std::lock_guard change_lock(change_mutex_);
+  return log_.Commit({.session = name_, .is_deletion = true});
 }
 
 absl::StatusOr<std::shared_ptr<Operation>> Session::ResumeOperation() {

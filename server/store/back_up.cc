@@ -1,6 +1,8 @@
 #include "server/store/back_up.h"
 
 #include <algorithm>
+#include <filesystem>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -10,6 +12,7 @@
 #include "absl/time/time.h"
 #include "core/base/status_macros.h"
 #include "server/store/data_folder.h"
+#include "server/store/write_ahead_log.h"
 
 namespace wellspace::server {
 namespace {
@@ -55,14 +58,28 @@ absl::Status CopyFiles(FileSystem& files, const DataPaths& from, const DataPaths
   return files.Link(source, target).ok() ? absl::OkStatus() : CopyFile(files, source, target, session.mesh().size());
 }
 
+using HeldLock = absl::StatusOr<std::unique_ptr<FileLock>>;
+
 // A server that looks whether it is locked has it for a moment.
-absl::StatusOr<std::unique_ptr<FileLock>> LockForBackUp(FileSystem& files, const std::string& path) {
-  auto lock = files.Lock(path);
+HeldLock LockForBackUp(const std::function<HeldLock()>& take) {
+  HeldLock lock = take();
   for (int i = 0; i < kLockAttempts && lock.status().code() == absl::StatusCode::kAborted; ++i) {
     absl::SleepFor(kBetweenLockAttempts);
-    lock = files.Lock(path);
+    lock = take();
   }
   return lock;
+}
+
+// A copy within the folder would be of the folder, and copied with it the next time.
+absl::Status CheckApart(const std::string& folder, const std::string& to) {
+  std::error_code error;
+  const std::filesystem::path outer = std::filesystem::canonical(folder, error);
+  const std::filesystem::path inner = std::filesystem::weakly_canonical(std::filesystem::absolute(to, error), error);
+  const auto [end, ignored] = std::mismatch(outer.begin(), outer.end(), inner.begin(), inner.end());
+  return error || end != outer.end()
+             ? absl::OkStatus()
+             : absl::FailedPreconditionError(
+                   absl::StrCat(to, ": is within ", folder, ", the folder that is to be backed up; name another one"));
 }
 
 absl::Status CheckEmpty(const DataPaths& to, FileSystem& files) {
@@ -77,6 +94,7 @@ absl::Status CheckEmpty(const DataPaths& to, FileSystem& files) {
 }  // namespace
 
 absl::StatusOr<DataReport> BackUp(const std::string& folder, const std::string& to, const CheckDataOptions& options) {
+  WELLSPACE_RETURN_IF_ERROR(CheckApart(folder, to));
   FileSystem& files = *options.files;
   const DataPaths from_paths{folder};
   const DataPaths to_paths{to};
@@ -84,17 +102,24 @@ absl::StatusOr<DataReport> BackUp(const std::string& folder, const std::string& 
   read_only.is_read_only = true;
   WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<SessionTables> tables,
                              SessionTables::Open(from_paths.database(), read_only));
+  WELLSPACE_RETURN_IF_ERROR(CheckLog(files, from_paths.database()));
   // Its lock keeps a server from being started with half of the copy.
   WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<DataFolder> target, DataFolder::Open(to, files));
   WELLSPACE_RETURN_IF_ERROR(CheckEmpty(to_paths, files));
 
   // A server removes no file from now on, so that all that the rows name stays until it is copied.
-  const auto keeps_files = LockForBackUp(files, from_paths.back_up_lock());
-  if (keeps_files.status().code() == absl::StatusCode::kAborted) {
-    return absl::FailedPreconditionError(absl::StrCat(folder, ": process ", std::string(keeps_files.status().message()),
-                                                      " is backing this folder up; wait for its end"));
+  // The lock of the file has the number of this process; that of the folder is held whatever becomes of names.
+  const HeldLock has_number = LockForBackUp([&] { return files.Lock(from_paths.back_up_lock()); });
+  const HeldLock keeps_files = LockForBackUp([&] { return files.LockFolder(from_paths.files()); });
+  for (const absl::Status& status : {has_number.status(), keeps_files.status()}) {
+    if (status.code() == absl::StatusCode::kAborted) {
+      const std::string holder(status.message());
+      return absl::FailedPreconditionError(absl::StrCat(folder,
+                                                        holder.empty() ? ": another process" : ": process " + holder,
+                                                        " is backing this folder up; wait for its end"));
+    }
+    WELLSPACE_RETURN_IF_ERROR(status);
   }
-  WELLSPACE_RETURN_IF_ERROR(keeps_files.status());
   WELLSPACE_RETURN_IF_ERROR(tables->BackUp(to_paths.database(), options.tables));
   {
     WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<SessionTables> copy,

@@ -15,9 +15,9 @@ namespace wellspace::server {
 // sessions.
 //
 // Complexity: O(bytes); with links, O(bytes of the database and of points), and the check.
-// Errors:     FAILED_PRECONDITION: `to` is not empty, or in use, or another back-up of `folder` is under way.
-//             DATA_LOSS: the copy is not whole, since `folder` is not. Others of CheckData, and of a FileSystem. What
-//             was copied until then is left.
+// Errors:     FAILED_PRECONDITION: `to` is not empty, in use, or within `folder`, or another back-up of `folder` is
+//             under way. FILE_DAMAGED: the write-ahead log of `folder` is. DATA_LOSS: the copy is not whole, since
+//             `folder` is not. Others of CheckData, and of a FileSystem. What was copied until then is left.
 absl::StatusOr<DataReport> BackUp(const std::string& folder, const std::string& to,
                                   const CheckDataOptions& options = {});
 

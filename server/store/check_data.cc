@@ -12,6 +12,7 @@
 #include "server/store/mesh_file.h"
 #include "server/store/point_file.h"
 #include "server/store/store_health.h"
+#include "server/store/write_ahead_log.h"
 
 namespace wellspace::server {
 namespace {
@@ -173,11 +174,16 @@ absl::StatusOr<DataReport> CheckData(const std::string& folder, const CheckDataO
   FileSystem& files = *options.files;
   DataReport report;
   WELLSPACE_ASSIGN_OR_RETURN(report.unknown, FindUnknown(paths, files));
+  // Before SQLite looks at it, and reads no more of it than it takes for whole.
+  WELLSPACE_ASSIGN_OR_RETURN(const std::string log_damage, FindLogDamage(files, paths.database()));
   SessionTablesOptions read_only = options.tables;
   read_only.is_read_only = true;
   WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<SessionTables> tables,
                              SessionTables::Open(paths.database(), read_only));
   WELLSPACE_ASSIGN_OR_RETURN(report.problems, tables->CheckFile());
+  if (!log_damage.empty()) {
+    report.problems.push_back(log_damage);
+  }
   WELLSPACE_ASSIGN_OR_RETURN(StoredSessions stored, tables->Load(&report.problems));
   Count(stored, report);
   for (int round = 1; !stored.sessions.empty(); ++round) {

@@ -31,9 +31,9 @@ struct DataReport {
   bool is_whole() const { return problems.empty(); }
 };
 
-// Checks schema, database, every record, and every byte of points and meshes that a session names. Changes nothing but
-// for sessions.db-shm beside the database, which SQLite needs to read it. A server may serve the folder meanwhile: what
-// it changes is looked at once more, as it is then.
+// Checks schema, database, write-ahead log, every record, and every byte of points and meshes that a session names.
+// Changes nothing but for sessions.db-shm beside the database, which SQLite needs to read it. A server may serve the
+// folder meanwhile: what it changes is looked at once more, as it is then.
 //
 // Complexity: O(bytes).
 // Errors:     the folder cannot be read at all: those of SessionTables::Open, and of a FileSystem.

@@ -8,8 +8,11 @@
 #include <utility>
 
 #include "absl/strings/escaping.h"
+#include "absl/strings/numbers.h"
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
+#include "server/store/write_ahead_log.h"
+#include "server/wire/errors.h"
 
 namespace wellspace::server {
 namespace {
@@ -20,6 +23,15 @@ constexpr std::string_view kMesh = ".mesh-";
 
 constexpr std::string_view kHexDigits = "0123456789abcdef";
 constexpr std::string_view kDigits = "0123456789";
+
+// Names in a folder that may not be there.
+absl::StatusOr<std::vector<std::string>> ListIfThere(FileSystem& files, const std::string& folder) {
+  absl::StatusOr<std::vector<std::string>> names = files.List(folder);
+  if (names.status().code() == absl::StatusCode::kNotFound) {
+    return std::vector<std::string>();
+  }
+  return names;
+}
 
 bool HasOnly(std::string_view text, std::string_view digits) {
   return !text.empty() && text.find_first_not_of(digits) == std::string_view::npos;
@@ -86,6 +98,17 @@ bool IsNameOfOurs(const std::string& name) {
   return HasOnly(end, kDigits);
 }
 
+std::optional<absl::Time> FoundAt(const std::string& lost_name) {
+  const size_t dot = lost_name.rfind('.');
+  int64_t seconds = 0;
+  if (dot == std::string::npos || !IsNameOfOurs(lost_name.substr(0, dot)) ||
+      !HasOnly(std::string_view(lost_name).substr(dot + 1), kDigits) ||
+      !absl::SimpleAtoi(lost_name.substr(dot + 1), &seconds)) {
+    return std::nullopt;
+  }
+  return absl::FromUnixSeconds(seconds);
+}
+
 std::vector<std::string> FilesOf(const DataPaths& paths, const store::v1::SessionRecord& session) {
   std::vector<std::string> named;
   if (session.points() > 0) {
@@ -98,8 +121,9 @@ std::vector<std::string> FilesOf(const DataPaths& paths, const store::v1::Sessio
 }
 
 absl::StatusOr<std::vector<std::string>> FindUnknown(const DataPaths& paths, FileSystem& files) {
-  static constexpr std::array<std::string_view, 7> kKnown = {
-      "lock", "back-up.lock", "files", "sessions.db", "sessions.db-journal", "sessions.db-shm", "sessions.db-wal"};
+  static constexpr std::array<std::string_view, 10> kKnown = {
+      "lock",        "back-up.lock",        "ballast",         "files",           "lost",
+      "sessions.db", "sessions.db-journal", "sessions.db-shm", "sessions.db-wal", "sessions.db-mark"};
   std::vector<std::string> unknown;
   WELLSPACE_ASSIGN_OR_RETURN(const std::vector<std::string> names, files.List(paths.root));
   for (const std::string& name : names) {
@@ -113,6 +137,12 @@ absl::StatusOr<std::vector<std::string>> FindUnknown(const DataPaths& paths, Fil
       unknown.push_back(absl::StrCat(paths.files(), "/", name));
     }
   }
+  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<std::string> lost, ListIfThere(files, paths.lost()));
+  for (const std::string& name : lost) {
+    if (!FoundAt(name).has_value()) {
+      unknown.push_back(absl::StrCat(paths.lost(), "/", name));
+    }
+  }
   std::ranges::sort(unknown);
   return unknown;
 }
@@ -120,15 +150,20 @@ absl::StatusOr<std::vector<std::string>> FindUnknown(const DataPaths& paths, Fil
 absl::StatusOr<std::unique_ptr<DataFolder>> DataFolder::Open(const std::string& root, FileSystem& files) {
   std::unique_ptr<DataFolder> folder(new DataFolder(DataPaths{root}, files));
   WELLSPACE_RETURN_IF_ERROR(WithAdvice(files.CreateFolder(root)));
+  auto folder_lock = files.LockFolder(root);
   auto lock = files.Lock(folder->paths_.lock());
-  if (lock.status().code() == absl::StatusCode::kAborted) {
-    return absl::FailedPreconditionError(
-        absl::StrCat(root, ": process ", std::string(lock.status().message()),
-                     " has this folder in use; stop it first, or name another folder"));
+  for (const absl::Status& status : {lock.status(), folder_lock.status()}) {
+    if (status.code() == absl::StatusCode::kAborted) {
+      const std::string holder(status.message());
+      return absl::FailedPreconditionError(
+          absl::StrCat(root, holder.empty() ? std::string(": another process") : ": process " + holder,
+                       " has this folder in use; stop it first, or name another folder"));
+    }
+    if (!status.ok()) {
+      return WithAdvice(status);
+    }
   }
-  if (!lock.ok()) {
-    return WithAdvice(lock.status());
-  }
+  folder->folder_lock_ = *std::move(folder_lock);
   folder->lock_ = *std::move(lock);
   WELLSPACE_RETURN_IF_ERROR(WithAdvice(files.CreateFolder(folder->paths_.files())));
   WELLSPACE_RETURN_IF_ERROR(files.SynchronizeFolder(folder->paths_.files()));
@@ -143,38 +178,113 @@ absl::StatusOr<std::unique_ptr<DataFolder>> DataFolder::Open(const std::string& 
   return folder;
 }
 
+absl::StatusOr<bool> DataFolder::FindDatabase() {
+  WELLSPACE_ASSIGN_OR_RETURN(std::vector<std::string> names, files_.List(paths_.files()));
+  std::erase_if(names, [](const std::string& name) { return !IsNameOfOurs(name); });
+  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<std::string> root, files_.List(paths_.root));
+  const auto size_of = [&](const std::string& path) -> absl::StatusOr<uint64_t> {
+    if (std::ranges::none_of(root, [&](const std::string& name) { return path.ends_with("/" + name); })) {
+      return 0;
+    }
+    WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<File> file, files_.Open(path, FileSystem::Mode::kRead));
+    return file->Size();
+  };
+  WELLSPACE_ASSIGN_OR_RETURN(const uint64_t size, size_of(paths_.database()));
+  WELLSPACE_ASSIGN_OR_RETURN(const uint64_t log_size, size_of(LogPathOf(paths_.database())));
+  WELLSPACE_ASSIGN_OR_RETURN(const uint64_t mark_size, size_of(MarkPathOf(paths_.database())));
+  // The mark is made after the tables, the log after the database.
+  const bool may_be_new = names.empty() && mark_size == 0;
+  if (size > 0) {
+    return may_be_new;
+  }
+  if (!may_be_new || log_size > 0) {
+    const std::string there = names.empty()
+                                  ? (log_size > 0 ? LogPathOf(paths_.database()) : MarkPathOf(paths_.database()))
+                                  : absl::StrCat(names.size(), " files of sessions in ", paths_.files());
+    return MakeError(v1::ERROR_REASON_FILE_DAMAGED,
+                     absl::StrCat(paths_.database(),
+                                  ": the database is missing or empty, and there is what belongs to "
+                                  "one: ",
+                                  there, "; put the database back, or restore a back-up"));
+  }
+  // Its name is there before anything that belongs to it, also after a loss of power.
+  WELLSPACE_RETURN_IF_ERROR(files_.Open(paths_.database(), FileSystem::Mode::kCreateOrWrite).status());
+  WELLSPACE_RETURN_IF_ERROR(files_.SynchronizeFolder(paths_.root));
+  return true;
+}
+
 absl::StatusOr<Garbage> DataFolder::RemoveGarbage(
-    FilesInUse& in_use, const std::function<absl::StatusOr<std::vector<store::v1::SessionRecord>>()>& read_sessions) {
+    FilesInUse& in_use, const std::function<absl::StatusOr<std::vector<store::v1::SessionRecord>>()>& read_sessions,
+    absl::Time now) {
   WELLSPACE_ASSIGN_OR_RETURN(const std::vector<std::string> names, files_.List(paths_.files()));
   // Uses keep what is written in these places from now on: only what was there before becomes obsolete.
-  std::map<std::string, std::unique_ptr<FilesInUse::Use>> candidates;  // by path
+  Candidates candidates;
   for (const std::string& name : names) {
     const std::string path = absl::StrCat(paths_.files(), "/", name);
     if (IsNameOfOurs(name) && !in_use.Contains(path)) {
-      candidates.emplace(path, in_use.Take(path, /*is_written=*/false));
+      candidates.emplace(name, in_use.Take(path, /*is_written=*/false));
     }
   }
   // After that, so that what has come to be named meanwhile is seen.
   WELLSPACE_ASSIGN_OR_RETURN(const std::vector<store::v1::SessionRecord> sessions, read_sessions());
+  const auto keep = [&](const std::string& path) { candidates.erase(path.substr(paths_.files().size() + 1)); };
   for (const store::v1::SessionRecord& session : sessions) {
-    candidates.erase(paths_.points(session.name(), session.points_file()));  // points may be on their way
-    candidates.erase(paths_.mesh(session.name(), session.mesh().revision()));
+    keep(paths_.points(session.name(), session.points_file()));  // points may be on their way
+    keep(paths_.mesh(session.name(), session.mesh().revision()));
   }
-  std::set<std::string> obsolete;
-  for (const auto& [path, use] : candidates) {
-    use->MakeObsolete();
-    obsolete.insert(path);
+  Garbage sweep;
+  WELLSPACE_ASSIGN_OR_RETURN(sweep.set_aside, SetAside(std::move(candidates), now));
+  if (has_collected_.exchange(true)) {
+    WELLSPACE_ASSIGN_OR_RETURN(sweep.removed, RemoveLost(now));
+  }
+  WELLSPACE_ASSIGN_OR_RETURN(sweep.unknown, FindUnknown(paths_, files_));
+  return sweep;
+}
+
+absl::StatusOr<std::vector<Garbage::SetAside>> DataFolder::SetAside(Candidates candidates, absl::Time now) {
+  std::vector<Garbage::SetAside> moved;
+  if (candidates.empty()) {
+    return moved;
+  }
+  WELLSPACE_RETURN_IF_ERROR(files_.CreateFolder(paths_.lost()));
+  WELLSPACE_RETURN_IF_ERROR(files_.SynchronizeFolder(paths_.root));
+  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<std::string> lost, files_.List(paths_.lost()));
+  const std::set<std::string> taken(lost.begin(), lost.end());
+  std::map<std::string, std::string> targets;  // by name
+  for (const auto& [name, use] : candidates) {
+    int64_t seconds = absl::ToUnixSeconds(now);
+    const auto target = [&] { return absl::StrCat(name, ".", seconds); };
+    while (taken.contains(target())) {
+      ++seconds;
+    }
+    targets[name] = target();
+    use->SetAside(absl::StrCat(paths_.lost(), "/", target()));
   }
   candidates.clear();
   // A back-up keeps them, or another has begun to write in their place.
   WELLSPACE_ASSIGN_OR_RETURN(const std::vector<std::string> left, files_.List(paths_.files()));
   for (const std::string& name : left) {
-    obsolete.erase(absl::StrCat(paths_.files(), "/", name));
+    targets.erase(name);
   }
-  Garbage sweep;
-  sweep.removed.assign(obsolete.begin(), obsolete.end());
-  WELLSPACE_ASSIGN_OR_RETURN(sweep.unknown, FindUnknown(paths_, files_));
-  return sweep;
+  for (const auto& [name, target] : targets) {
+    moved.push_back({.from = absl::StrCat(paths_.files(), "/", name), .to = absl::StrCat(paths_.lost(), "/", target)});
+  }
+  return moved;
+}
+
+absl::StatusOr<std::vector<std::string>> DataFolder::RemoveLost(absl::Time now) {
+  WELLSPACE_ASSIGN_OR_RETURN(const std::vector<std::string> lost, ListIfThere(files_, paths_.lost()));
+  std::vector<std::string> removed;
+  for (const std::string& name : lost) {
+    const std::optional<absl::Time> found = FoundAt(name);
+    if (!found.has_value() || now - *found < kKeptLost) {
+      continue;
+    }
+    removed.push_back(absl::StrCat(paths_.lost(), "/", name));
+    WELLSPACE_RETURN_IF_ERROR(files_.Remove(removed.back()));
+  }
+  std::ranges::sort(removed);
+  return removed;
 }
 
 }  // namespace wellspace::server

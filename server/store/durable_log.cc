@@ -1,6 +1,7 @@
 #include "server/store/durable_log.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <utility>
 
 #include "core/base/status_macros.h"
@@ -14,6 +15,13 @@ namespace {
 // Of one transaction: enough that a synchronisation costs each little, and few enough that none waits for long.
 constexpr size_t kMaxBatch = 256;
 constexpr uint64_t kMaxBatchBytes = uint64_t{8} << 20;
+
+// Of the ballast the write-ahead log takes so much, before it is taken over; a batch, and deletions, have the rest.
+constexpr uint64_t kBallastPerLog = 4;
+constexpr uint64_t kPageBytes = 4096;
+constexpr uint64_t kMostBallast = uint64_t{16} << 20;
+constexpr uint64_t kDiskPerBallast = 16;
+constexpr int kLeastLogPages = 8;
 
 uint64_t BytesOf(const SessionChange& change) {
   uint64_t bytes = change.answer.has_value() ? change.answer->ByteSizeLong() : 0;
@@ -31,7 +39,9 @@ uint64_t BytesOf(const SessionChange& change) {
 // Whether files may be removed. Not after a failure: the change that was under way may have been written down, and name
 // what its owner believes to be obsolete. Not during a back-up: its copy of the rows names what is obsolete by now.
 bool MayRemove(const StoreHealth& health, const DataPaths& paths, FileSystem& files) {
-  return health.Check().ok() && files.Lock(paths.back_up_lock()).status().code() != absl::StatusCode::kAborted;
+  const auto is_locked = [](const auto& lock) { return lock.status().code() == absl::StatusCode::kAborted; };
+  return health.Check().ok() && !is_locked(files.Lock(paths.back_up_lock())) &&
+         !is_locked(files.LockFolder(paths.files()));
 }
 
 // Whether it is not known, after this error, what is on the disk.
@@ -41,11 +51,23 @@ bool IsFailure(const absl::Status& status) {
 
 }  // namespace
 
+uint64_t BallastBytesFor(const std::string& folder) {
+  std::error_code error;
+  std::filesystem::path path = std::filesystem::absolute(folder, error);
+  while (!std::filesystem::exists(path, error) && path.has_relative_path()) {
+    path = path.parent_path();
+  }
+  const std::filesystem::space_info space = std::filesystem::space(path, error);
+  return error ? kMostBallast : std::min<uint64_t>(kMostBallast, space.capacity / kDiskPerBallast);
+}
+
 DurableLog::DurableLog(const DurableLogOptions& options, std::unique_ptr<DataFolder> folder,
                        std::unique_ptr<SessionTables> tables)
     : files_(*options.files),
+      now_(options.now),
       max_mesh_chunk_bytes_(options.max_mesh_chunk_bytes),
-      health_(std::make_shared<StoreHealth>(options.on_failure)),
+      ballast_(std::make_shared<Ballast>(files_, folder->paths().ballast(), options.ballast_bytes)),
+      health_(std::make_shared<StoreHealth>(options.on_failure, ballast_)),
       folder_(std::move(folder)),
       tables_(std::move(tables)),
       in_use_(std::make_shared<FilesInUse>(files_, [health = health_, paths = folder_->paths(), files = &files_] {
@@ -54,11 +76,21 @@ DurableLog::DurableLog(const DurableLogOptions& options, std::unique_ptr<DataFol
 
 absl::StatusOr<std::unique_ptr<DurableLog>> DurableLog::Open(const DurableLogOptions& options) {
   WELLSPACE_ASSIGN_OR_RETURN(std::unique_ptr<DataFolder> folder, DataFolder::Open(options.folder, *options.files));
+  SessionTablesOptions tables_options = options.tables;
+  tables_options.files = options.files;
+  if (options.ballast_bytes > 0) {
+    const auto pages = static_cast<int>(options.ballast_bytes / kBallastPerLog / kPageBytes);
+    tables_options.checkpoint_pages = std::min(tables_options.checkpoint_pages, std::max(pages, kLeastLogPages));
+  }
+  WELLSPACE_ASSIGN_OR_RETURN(tables_options.may_be_new, folder->FindDatabase());
+  WELLSPACE_RETURN_IF_ERROR(CheckLog(*options.files, folder->paths().database()));
   WELLSPACE_ASSIGN_OR_RETURN(std::unique_ptr<SessionTables> tables,
-                             SessionTables::Open(folder->paths().database(), options.tables));
-  // The names of the database and of its write-ahead log.
+                             SessionTables::Open(folder->paths().database(), tables_options));
+  // The names of the write-ahead log, and of its mark.
   WELLSPACE_RETURN_IF_ERROR(options.files->SynchronizeFolder(options.folder));
-  return std::unique_ptr<DurableLog>(new DurableLog(options, std::move(folder), std::move(tables)));
+  std::unique_ptr<DurableLog> log(new DurableLog(options, std::move(folder), std::move(tables)));
+  log->ballast_->Fill().IgnoreError();  // without room for it what there is can be read and deleted
+  return log;
 }
 
 absl::Status DurableLog::Commit(const SessionChange& change, Survives survives) {
@@ -158,9 +190,49 @@ absl::Status DurableLog::Apply(std::span<Waiting* const> batch, std::span<const 
     changes.push_back(waiting->change);
     survives_power_loss |= waiting->survives == Survives::kPowerLoss;
   }
-  const absl::Status status =
-      tables_->Apply(changes, forgotten, survives_power_loss ? Survives::kPowerLoss : Survives::kProcessDeath);
+  const bool frees_room = std::ranges::all_of(changes, [](const SessionChange* change) { return change->is_deletion; });
+  if (!frees_room) {
+    WELLSPACE_RETURN_IF_ERROR(CheckRoom());
+    // While the database has no room for the write-ahead log that there is, none comes behind it: what is kept for
+    // deletions has to be enough to take it over.
+    if (const absl::Status taken_over = tables_->Checkpoint(); !taken_over.ok()) {
+      return IsFailure(taken_over) ? health_->Fail(taken_over) : taken_over;
+    }
+  }
+  const absl::Status status = ApplyWithRoom(frees_room, [&] {
+    return tables_->Apply(changes, forgotten, survives_power_loss ? Survives::kPowerLoss : Survives::kProcessDeath);
+  });
   return IsFailure(status) ? health_->Fail(status) : status;
+}
+
+absl::Status DurableLog::CheckRoom() {
+  absl::Status status = health_->CheckRoom();
+  if (status.code() != absl::StatusCode::kResourceExhausted) {
+    return status;
+  }
+  if (const absl::Status shrunk = tables_->Shrink(); IsFailure(shrunk)) {
+    return health_->Fail(shrunk);
+  }
+  return health_->CheckRoom();
+}
+
+absl::Status DurableLog::ApplyWithRoom(bool frees_room, const std::function<absl::Status()>& apply) {
+  absl::Status status = apply();
+  if (status.code() != absl::StatusCode::kResourceExhausted) {
+    return status;
+  }
+  // A write-ahead log that is in the database is written over, and takes no more room.
+  if (absl::Status taken_over = tables_->CheckpointNow(); IsFailure(taken_over)) {
+    return taken_over;
+  }
+  status = apply();
+  if (status.code() != absl::StatusCode::kResourceExhausted || !frees_room || !ballast_->GiveUp()) {
+    return status;
+  }
+  if (absl::Status taken_over = tables_->CheckpointNow(); IsFailure(taken_over)) {
+    return taken_over;
+  }
+  return apply();
 }
 
 void DurableLog::Forget(std::span<const AnswerKey> answers) {
@@ -203,7 +275,8 @@ std::shared_ptr<MeshSnapshot> DurableLog::FindMesh(const std::string& session, c
 
 absl::StatusOr<Garbage> DurableLog::RemoveGarbage() {
   WELLSPACE_RETURN_IF_ERROR(health_->Check());
-  return folder_->RemoveGarbage(*in_use_, [this] { return tables_->ReadStates(); });
+  return folder_->RemoveGarbage(
+      *in_use_, [this] { return tables_->ReadStates(); }, now_());
 }
 
 }  // namespace wellspace::server

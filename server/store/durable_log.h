@@ -10,7 +10,10 @@
 #include <string>
 #include <vector>
 
+#include "absl/time/clock.h"
+#include "absl/time/time.h"
 #include "server/base/options.h"
+#include "server/store/ballast.h"
 #include "server/store/chunk_buffers.h"
 #include "server/store/data_folder.h"
 #include "server/store/file_system.h"
@@ -24,13 +27,20 @@ namespace wellspace::server {
 struct DurableLogOptions {
   std::string folder;
   FileSystem* files = &PosixFileSystem();  // outlives the log, its points and its meshes
+  absl::Time (*now)() = &absl::Now;        // the clock by which files in lost/ have their day
   // Called once, when it is not known any longer what is on the disk: the server has to end. By any thread, which may
   // hold locks of its own.
   std::function<void(const absl::Status& cause)> on_failure{};
 
+  // Room that is kept for deletions, should the disk be full; 0: none.
+  uint64_t ballast_bytes = 0;
+
   SessionTablesOptions tables{};                      // other ones: for tests
   uint64_t max_mesh_chunk_bytes = kMaxResponseBytes;  // other ones: for tests
 };
+
+// How much is kept so on the disk that has, or is to have, `folder`: 16 MiB, or of a small disk a sixteenth.
+uint64_t BallastBytesFor(const std::string& folder);
 
 // Thread safety: that of SessionLog.
 // Invariants: (1) a change that was acknowledged outlives what Survives says; (2) what a change names was synchronised
@@ -39,7 +49,7 @@ class DurableLog final : public SessionLog {
  public:
   // Opens the folder, or makes it. What is wrong with files of sessions is no error here, but of these sessions' reads.
   //
-  // Errors:     those of DataFolder::Open and SessionTables::Open.
+  // Errors:     those of DataFolder::Open, DataFolder::FindDatabase, CheckLog and SessionTables::Open.
   static absl::StatusOr<std::unique_ptr<DurableLog>> Open(const DurableLogOptions& options);
 
   bool is_durable() const override { return true; }
@@ -79,9 +89,15 @@ class DurableLog final : public SessionLog {
   std::vector<Waiting*> TakeBatch();
   void CommitBatch(std::span<Waiting* const> batch, std::vector<AnswerKey> forgotten);
   absl::Status Apply(std::span<Waiting* const> batch, std::span<const AnswerKey> forgotten);
+  // Errors:     those of StoreHealth::CheckRoom, once the database has given back what it does not need.
+  absl::Status CheckRoom();
+  // Calls `apply`, and again once there may be room for what it writes.
+  absl::Status ApplyWithRoom(bool frees_room, const std::function<absl::Status()>& apply);
 
   FileSystem& files_;
+  absl::Time (*const now_)();
   const uint64_t max_mesh_chunk_bytes_;
+  const std::shared_ptr<Ballast> ballast_;
   const std::shared_ptr<StoreHealth> health_;
   const std::unique_ptr<DataFolder> folder_;
   const std::unique_ptr<SessionTables> tables_;

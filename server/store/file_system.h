@@ -60,6 +60,10 @@ class FileSystem {
   // The names in the folder outlive a loss of power from now on.
   virtual absl::Status SynchronizeFolder(const std::string& folder) = 0;
 
+  // Locks the folder itself, whatever becomes of the names in it.
+  //
+  // Errors:     ABORTED: it is locked already; the message is empty.
+  virtual absl::StatusOr<std::unique_ptr<FileLock>> LockFolder(const std::string& folder) = 0;
   // Locks the file, which is made if it is not there yet, and writes the number of this process into it.
   //
   // Errors:     ABORTED: it is locked already; the message is what the holder has written.

@@ -14,6 +14,7 @@ std::unique_ptr<FilesInUse::Use> FilesInUse::Take(const std::string& path, bool 
   if (is_written) {
     ++state.version;
     state.is_obsolete = false;
+    state.set_aside.clear();
   }
   return std::unique_ptr<Use>(new Use(shared_from_this(), path, state.version));
 }
@@ -27,14 +28,15 @@ void FilesInUse::Remove(const std::string& path) {
   const std::lock_guard lock(mutex_);
   if (const auto state = states_.find(path); state != states_.end()) {
     state->second.is_obsolete = true;
+    state->second.set_aside.clear();
   } else {
     RemoveNow(path);
   }
 }
 
-void FilesInUse::RemoveNow(const std::string& path) {
+void FilesInUse::RemoveNow(const std::string& path, const std::string& set_aside) {
   if (!may_remove_ || may_remove_()) {
-    file_system_.Remove(path).IgnoreError();
+    (set_aside.empty() ? file_system_.Remove(path) : file_system_.Rename(path, set_aside)).IgnoreError();
   }
 }
 
@@ -45,15 +47,16 @@ void FilesInUse::Release(const std::string& path) {
     return;
   }
   if (state->second.is_obsolete) {
-    RemoveNow(path);
+    RemoveNow(path, state->second.set_aside);
   }
   states_.erase(state);
 }
 
-void FilesInUse::MakeObsolete(const std::string& path, uint64_t version) {
+void FilesInUse::MakeObsolete(const std::string& path, uint64_t version, const std::string& set_aside) {
   const std::lock_guard lock(mutex_);
-  if (State& state = states_.at(path); state.version == version) {
+  if (State& state = states_.at(path); state.version == version && !state.is_obsolete) {
     state.is_obsolete = true;
+    state.set_aside = set_aside;
   }
 }
 

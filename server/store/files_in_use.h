@@ -29,7 +29,9 @@ class FilesInUse : public std::enable_shared_from_this<FilesInUse> {
 
     const std::string& path() const { return path_; }
     // The file goes when its last use ends, unless another has been written in its place since this use began.
-    void MakeObsolete() { files_->MakeObsolete(path_, version_); }
+    void MakeObsolete() { files_->MakeObsolete(path_, version_, ""); }
+    // The same, but that the file comes to have the name `to`, which is free, instead of being removed.
+    void SetAside(const std::string& to) { files_->MakeObsolete(path_, version_, to); }
 
    private:
     friend class FilesInUse;
@@ -55,11 +57,12 @@ class FilesInUse : public std::enable_shared_from_this<FilesInUse> {
     uint64_t uses = 0;
     uint64_t version = 0;  // grows with each file that is written in this place
     bool is_obsolete = false;
+    std::string set_aside{};  // what its name is then; empty: it is removed
   };
 
-  void RemoveNow(const std::string& path);
+  void RemoveNow(const std::string& path, const std::string& set_aside = "");
   void Release(const std::string& path);
-  void MakeObsolete(const std::string& path, uint64_t version);
+  void MakeObsolete(const std::string& path, uint64_t version, const std::string& set_aside);
 
   FileSystem& file_system_;
   const std::function<bool()> may_remove_;

@@ -50,7 +50,7 @@ absl::StatusOr<std::shared_ptr<File>> PointFile::OpenToAppend() {
   auto opened = files_.Open(path_, mode);
   if (!opened.ok()) {
     return opened.status().code() == absl::StatusCode::kNotFound ? Damaged(path_, "the file is missing")
-                                                                 : health_->OfWrite(opened.status());
+                                                                 : health_->OfOpen(opened.status());
   }
   std::shared_ptr<File> file = *std::move(opened);
   if (!is_cut_) {
@@ -76,7 +76,7 @@ absl::Status PointFile::Append(std::span<const double> coordinates) {
   if (coordinates.empty()) {
     return absl::OkStatus();
   }
-  WELLSPACE_RETURN_IF_ERROR(health_->Check());
+  WELLSPACE_RETURN_IF_ERROR(health_->CheckRoom());
   WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<File> file, OpenToAppend());
   const absl::Status written =
       file->WriteAt(coordinate_count_ * sizeof(double),

@@ -237,6 +237,18 @@ class PosixFiles final : public FileSystem {
                                                                : SystemError(folder, "cannot be synchronised");
   }
 
+  absl::StatusOr<std::unique_ptr<FileLock>> LockFolder(const std::string& folder) override {
+    const int number = Uninterrupted([&] { return ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC); });
+    if (number < 0) {
+      return SystemError(folder, "cannot be opened");
+    }
+    auto descriptor = std::make_unique<Descriptor>(number);
+    if (Uninterrupted([&] { return ::flock(number, LOCK_EX | LOCK_NB); }) != 0) {
+      return errno == EWOULDBLOCK ? absl::AbortedError("") : SystemError(folder, "cannot be locked");
+    }
+    return std::make_unique<PosixLock>(std::move(descriptor));
+  }
+
   absl::StatusOr<std::unique_ptr<FileLock>> Lock(const std::string& path) override {
     const int number = Uninterrupted([&] { return ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, kFileMode); });
     if (number < 0) {

@@ -60,7 +60,12 @@ struct StoredSessions {
 
 // Files that nothing written down names.
 struct Garbage {
-  std::vector<std::string> removed;  // paths
+  struct SetAside {
+    std::string from;
+    std::string to;
+  };
+  std::vector<SetAside> set_aside;   // paths; kept for a day, should they be missed
+  std::vector<std::string> removed;  // paths; set aside a day ago or longer
   std::vector<std::string> unknown;  // paths; not ours, and left where they are
 };
 
@@ -116,7 +121,8 @@ class SessionLog {
   virtual absl::StatusOr<std::shared_ptr<MeshSnapshot>> KeepMesh(const std::string& session, uint64_t revision,
                                                                  core::Mesh mesh, const core::RunContext& context) = 0;
 
-  // Removes files that nothing written down names. To be called after the start, and hourly.
+  // Sets files aside that nothing written down names, and removes those that were a day ago. To be called after the
+  // start, and hourly; the first call removes nothing.
   virtual absl::StatusOr<Garbage> RemoveGarbage() = 0;
 
   // The mesh that `record` names. Its file is looked at when something of it is asked for.

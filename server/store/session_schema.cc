@@ -14,9 +14,6 @@ namespace {
 // In the header of the file, by which `file` and we know what it is: "WsSe".
 constexpr int64_t kApplicationId = 0x57735365;
 
-// How long a commit waits for another process that has the file locked: a check, or a back-up, as it opens the file.
-constexpr int kBusyMilliseconds = 10'000;
-
 // What makes version n + 1 of version n. A released step is never changed: there are files that it has made.
 constexpr std::array kMigrations = {
     "CREATE TABLE sessions(id INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, state BLOB NOT NULL,"
@@ -61,12 +58,25 @@ absl::StatusOr<int64_t> CheckVersion(SqliteDatabase& database, bool is_read_only
         absl::StrCat(path, ": its schema is of version ", version, ", and this program knows versions up to ",
                      SchemaVersion(), "; start the newer wellspaced, or restore a back-up that was made before it"));
   }
+  if (is_read_only && version == 0 && tables == 0) {
+    return MakeError(v1::ERROR_REASON_FILE_DAMAGED, absl::StrCat(path, ": the database is empty"));
+  }
   if (is_read_only && version != SchemaVersion()) {
     return absl::FailedPreconditionError(absl::StrCat(path, ": its schema is of version ", version,
                                                       ", and has to be brought to version ", SchemaVersion(),
                                                       " first: start wellspaced with this folder once"));
   }
   return version;
+}
+
+// Whether the database has nothing in it, though it should.
+absl::Status CheckNotEmpty(SqliteDatabase& database, int64_t version, const SessionTablesOptions& options) {
+  return version > 0 || options.may_be_new
+             ? absl::OkStatus()
+             : MakeError(v1::ERROR_REASON_FILE_DAMAGED,
+                         absl::StrCat(database.path(),
+                                      ": the database is empty, and there are files of sessions; "
+                                      "restore a back-up"));
 }
 
 // Looks at every page once, and whether the one index, that of names, has what its table has.
@@ -85,7 +95,12 @@ absl::StatusOr<std::unique_ptr<SqliteDatabase>> OpenFile(const std::string& path
   // to memory all the same: a full disk must not be met where nothing is written.
   WELLSPACE_RETURN_IF_ERROR(database->Execute(absl::StrCat(
       options.is_exclusive ? "PRAGMA locking_mode=EXCLUSIVE;" : "",
-      "PRAGMA temp_store=MEMORY;PRAGMA mmap_size=0;PRAGMA cell_size_check=ON;PRAGMA trusted_schema=OFF;")));
+      "PRAGMA temp_store=MEMORY;PRAGMA mmap_size=0;PRAGMA cell_size_check=ON;PRAGMA trusted_schema=OFF;"
+      // Else a deletion writes zeros over all that it deletes, to the write-ahead log: on a full disk it could not.
+      "PRAGMA secure_delete=FAST;")));
+  if ((flags & SQLITE_OPEN_READWRITE) != 0 && sqlite3_db_readonly(database->handle(), "main") == 1) {
+    return database->ErrorOf(SQLITE_READONLY);
+  }
   return database;
 }
 
@@ -98,9 +113,14 @@ absl::StatusOr<std::unique_ptr<SqliteDatabase>> OpenSchema(const std::string& pa
   const int flags = options.is_read_only ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
   WELLSPACE_ASSIGN_OR_RETURN(std::unique_ptr<SqliteDatabase> database, OpenFile(path, flags, options));
   WELLSPACE_ASSIGN_OR_RETURN(const int64_t version, CheckVersion(*database, options.is_read_only));
+  WELLSPACE_RETURN_IF_ERROR(CheckNotEmpty(*database, version, options));
   WELLSPACE_RETURN_IF_ERROR(CheckPages(*database));
   if (options.is_read_only) {
     return database;
+  }
+  if (version == 0) {
+    // Before anything is in it: so that it can give room back (SessionTables::Shrink).
+    WELLSPACE_RETURN_IF_ERROR(database->Execute("PRAGMA auto_vacuum=INCREMENTAL"));
   }
   WELLSPACE_ASSIGN_OR_RETURN(const std::string mode, database->QueryText("PRAGMA journal_mode=WAL"));
   if (mode != "wal") {

@@ -12,6 +12,9 @@ namespace wellspace::server {
 
 struct SessionTablesOptions;
 
+// How long a commit waits for another process that has the file locked: a check, or a back-up, as it opens the file.
+inline constexpr int kBusyMilliseconds = 10'000;
+
 // The version of the schema that this program knows.
 int SchemaVersion();
 

@@ -13,8 +13,10 @@
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "server/store/file_system.h"
 #include "server/store/session_log.h"
 #include "server/store/sqlite.h"
+#include "server/store/write_ahead_log.h"
 
 namespace wellspace::server {
 
@@ -22,6 +24,8 @@ struct SessionTablesOptions {
   const char* vfs = nullptr;    // of SQLite; null: that of the machine
   bool is_exclusive = false;    // no other process may look at it meanwhile; needs no shared memory
   bool is_read_only = false;    // has to be there; is neither changed nor migrated
+  bool may_be_new = true;       // else one without tables is refused
+  FileSystem* files = nullptr;  // where the mark of its write-ahead log is kept (LogMark); null: none is
   int checkpoint_pages = 1000;  // the write-ahead log is taken over into the database when it has as many: 4 MiB
 };
 
@@ -41,7 +45,7 @@ class SessionTables {
   ~SessionTables();
 
   // Applies `changes` in their order, and drops `forgotten`, in one transaction. With Survives::kProcessDeath it may be
-  // undone by a loss of power, until another one that is not is committed.
+  // undone by a loss of power, until another one is committed: of two that follow one another at least one is not.
   //
   // Errors:     those of SessionLog::Commit, and OUT_OF_MEMORY: nothing has changed. INTERNAL: one of the changes is
   //             of a session that is not there. STORE_FAILED, FILE_DAMAGED: it is not known what has changed.
@@ -52,6 +56,13 @@ class SessionTables {
   //
   // Errors:     DISK_FULL: later, then; STORE_FAILED, FILE_DAMAGED: nothing may be written any more.
   absl::Status Checkpoint();
+  // The same, whether it is worth it or not: the next commit is written over those that are in the database by now.
+  absl::Status CheckpointNow();
+
+  // Gives the room back that deletions have left in the database and its log, as far as no other process reads them.
+  //
+  // Errors:     those of Checkpoint.
+  absl::Status Shrink();
 
   // All records. With `problems`, damaged records are left out, and what is wrong with each is appended there.
   absl::StatusOr<StoredSessions> Load(std::vector<std::string>* problems = nullptr);
@@ -76,8 +87,15 @@ class SessionTables {
 
   SessionTables(std::unique_ptr<SqliteDatabase> database, int checkpoint_pages);
   absl::Status Prepare();
-  // Takes the write-ahead log over into the database.
+  // Takes the write-ahead log over into the database, and cuts it off.
   absl::Status TakeOver();
+  absl::Status CheckpointLocked();
+  // The salts of the write-ahead log, which has `frames` frames.
+  absl::StatusOr<LogPosition> ReadPosition(int frames);
+  // To be called once a commit is synchronised.
+  absl::Status SetMark();
+  // To be called once all `frames` of the write-ahead log are in the database, before SQLite begins it anew.
+  absl::Status MarkAsTaken(int frames);
   absl::Status ApplyOne(const SessionChange& change);
   absl::Status Delete(const std::string& session);
   absl::Status Write(const SessionChange& change);
@@ -99,11 +117,15 @@ class SessionTables {
   std::mutex mutex_;  // of all below
   const std::unique_ptr<SqliteDatabase> database_;
   std::unique_ptr<Statements> statements_;
+  std::unique_ptr<LogMark> mark_;  // may be null
+  int untold_frames_ = 0;  // are in the database, which the mark has to say before anything is committed; 0: none
   SessionLog::Survives survives_ = SessionLog::Survives::kPowerLoss;  // of what is committed now
+  bool has_unsynchronised_commit_ = false;                            // the last one
   // The write-ahead log may have bytes that are not on the disk, though they can be read: nothing may be committed
   // behind them.
   bool has_doubtful_log_ = false;
-  int log_pages_ = 0;  // in the write-ahead log, to be taken over into the database
+  int log_pages_ = 0;      // in the write-ahead log, to be taken over into the database
+  int commit_frames_ = 0;  // in the write-ahead log, those of the last commit the last of them; 0: it has written none
 };
 
 }  // namespace wellspace::server

@@ -1,5 +1,7 @@
 #include "server/store/sqlite.h"
 
+#include <cerrno>
+#include <cstring>
 #include <utility>
 
 #include "absl/strings/str_cat.h"
@@ -29,14 +31,33 @@ v1::ErrorReason ReasonOf(int code) {
   }
 }
 
-std::string WhatOf(v1::ErrorReason reason) {
-  switch (reason) {
-    case v1::ERROR_REASON_DISK_FULL:
-      return "the server has no room to write this down: ";
-    case v1::ERROR_REASON_FILE_DAMAGED:
-      return "the file is damaged, a back-up has to take its place: ";
+// What has happened, and what is to be done about it, where SQLite's own words do not say it.
+std::string WordsOf(int code, int error, const char* words) {
+  if ((code & 0xff) == SQLITE_CANTOPEN && error == ENOENT) {
+    return "the database is missing";
+  }
+  switch (code & 0xff) {
+    case SQLITE_FULL:
+      return "the server has no room to write this down";
+    case SQLITE_CORRUPT:
+      return absl::StrCat("the file is damaged, a back-up has to take its place: ", words);
+    case SQLITE_NOTADB:
+      return "the file is damaged, and no database any more: a back-up has to take its place";
+    case SQLITE_IOERR:
+      return "the database, or its write-ahead log, cannot be read or written";
+    case SQLITE_CANTOPEN:
+      return "the database, or its write-ahead log, cannot be opened; the user that the server runs as needs "
+             "permission "
+             "to read and write both, and their folder";
+    case SQLITE_PERM:
+    case SQLITE_READONLY:
+      return "the database cannot be written to; the user that the server runs as needs permission to write it, and "
+             "its folder";
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+      return "another program has the database locked";
     default:
-      return "";
+      return words;
   }
 }
 
@@ -62,10 +83,11 @@ SqliteDatabase::~SqliteDatabase() { sqlite3_close_v2(handle_); }
 
 absl::Status SqliteDatabase::ErrorOf(int code) const {
   const v1::ErrorReason reason = ReasonOf(code);
-  std::string message = absl::StrCat(path_, ": ", WhatOf(reason), sqlite3_errmsg(handle_), " (SQLite ", code);
   const int error = sqlite3_system_errno(handle_);
+  std::string message = absl::StrCat(path_, ": ", WordsOf(code, error, sqlite3_errmsg(handle_)), " (SQLite ", code);
   absl::StrAppend(&message,
-                  reason == v1::ERROR_REASON_STORE_FAILED && error != 0 ? absl::StrCat(", errno ", error) : "", ")");
+                  reason == v1::ERROR_REASON_STORE_FAILED && error != 0 ? absl::StrCat(": ", std::strerror(error)) : "",
+                  ")");
   return MakeError(reason, message);
 }
 
@@ -87,13 +109,17 @@ absl::StatusOr<SqliteStatement> SqliteDatabase::Prepare(std::string_view stateme
 absl::StatusOr<int64_t> SqliteDatabase::QueryNumber(const std::string& query) {
   WELLSPACE_ASSIGN_OR_RETURN(SqliteStatement statement, Prepare(query));
   WELLSPACE_RETURN_IF_ERROR(statement.Step().status());
-  return statement.Number(0);
+  const int64_t number = statement.Number(0);
+  WELLSPACE_RETURN_IF_ERROR(statement.Step().status());  // what it changes is committed by this step, or is not
+  return number;
 }
 
 absl::StatusOr<std::string> SqliteDatabase::QueryText(const std::string& query) {
   WELLSPACE_ASSIGN_OR_RETURN(SqliteStatement statement, Prepare(query));
   WELLSPACE_RETURN_IF_ERROR(statement.Step().status());
-  return std::string(statement.Bytes(0));
+  std::string text(statement.Bytes(0));
+  WELLSPACE_RETURN_IF_ERROR(statement.Step().status());
+  return text;
 }
 
 void SqliteStatement::BindOne(int place, std::string_view text) {

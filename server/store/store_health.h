@@ -3,9 +3,11 @@
 #define WELLSPACE_SERVER_STORE_STORE_HEALTH_H_
 
 #include <functional>
+#include <memory>
 #include <mutex>
 
 #include "absl/status/status.h"
+#include "server/store/ballast.h"
 
 namespace wellspace::server {
 
@@ -15,25 +17,37 @@ namespace wellspace::server {
 // Thread safety: thread-safe.
 class StoreHealth {
  public:
-  // `on_failure` is called once, with the cause, by the thread that meets it; it may be empty.
-  explicit StoreHealth(std::function<void(const absl::Status& cause)> on_failure);
+  // `on_failure` is called once, with the cause, by the thread that meets it; it may be empty. `ballast`: null: none.
+  explicit StoreHealth(std::function<void(const absl::Status& cause)> on_failure,
+                       std::shared_ptr<Ballast> ballast = nullptr);
 
   // Errors:     STORE_FAILED, after a failure.
   absl::Status Check() const;
 
+  // To be called before what takes up room on the disk.
+  //
+  // Errors:     STORE_FAILED, after a failure; DISK_FULL, as long as what is left is kept for deletions.
+  absl::Status CheckRoom();
+
   // Notes the failure. Returns STORE_FAILED.
   absl::Status Fail(const absl::Status& cause);
+
+  // What the opening of a file that is to be written to is to clients, if it ended with `cause`: where it may not be
+  // written to, nothing is doubtful, and others can go on.
+  absl::Status OfOpen(const absl::Status& cause);
 
   // What a write, or another change of a file, that ended with `cause` is to clients: DISK_FULL, or a failure.
   absl::Status OfWrite(const absl::Status& cause);
 
  private:
   const std::function<void(const absl::Status&)> on_failure_;
+  const std::shared_ptr<Ballast> ballast_;  // may be null
   mutable std::mutex mutex_;
   absl::Status cause_;  // guarded by mutex_; ok: none yet
 };
 
-// What a read that ended with `cause`, an error of a FileSystem, is to clients: FILE_DAMAGED, or OUT_OF_MEMORY.
+// What a read that ended with `cause`, an error of a FileSystem, is to clients: FILE_DAMAGED, OUT_OF_MEMORY, or, where
+// the server may not read the file, STORE_FAILED.
 absl::Status ErrorOfRead(const absl::Status& cause);
 
 }  // namespace wellspace::server

@@ -99,17 +99,17 @@ absl::Status WriteAll(File& file, const core::Mesh& mesh, const core::RunContext
 absl::StatusOr<store::v1::MeshRecord> WriteMeshFile(FileSystem& files, StoreHealth& health, const std::string& path,
                                                     uint64_t revision, const core::Mesh& mesh,
                                                     const core::RunContext& context, uint64_t max_chunk_bytes) {
-  WELLSPACE_RETURN_IF_ERROR(health.Check());
+  WELLSPACE_RETURN_IF_ERROR(health.CheckRoom());
   const std::string temporary = path + std::string(kTemporaryEnd);
   store::v1::MeshRecord record = RecordOf(revision, mesh);
   absl::Status stopped;
-  const auto write = [&]() -> absl::Status {
-    WELLSPACE_ASSIGN_OR_RETURN(const std::unique_ptr<File> file,
-                               files.Open(temporary, FileSystem::Mode::kCreateOrWrite));
-    return WriteAll(*file, mesh, context, max_chunk_bytes, record, stopped);
-  };
+  absl::StatusOr<std::unique_ptr<File>> file = files.Open(temporary, FileSystem::Mode::kCreateOrWrite);
+  if (!file.ok()) {
+    return health.OfOpen(file.status());
+  }
   // The bytes first, then the name, then the folder that has it: a name never shows what may still be lost.
-  absl::Status written = write();
+  absl::Status written = WriteAll(**file, mesh, context, max_chunk_bytes, record, stopped);
+  file->reset();
   if (written.ok()) {
     written = files.Rename(temporary, path);
   }

@@ -38,6 +38,9 @@ class NoLinks final : public FileSystem {
   absl::Status SynchronizeFolder(const std::string& folder) override {
     return PosixFileSystem().SynchronizeFolder(folder);
   }
+  absl::StatusOr<std::unique_ptr<FileLock>> LockFolder(const std::string& folder) override {
+    return PosixFileSystem().LockFolder(folder);
+  }
   absl::StatusOr<std::unique_ptr<FileLock>> Lock(const std::string& path) override {
     return PosixFileSystem().Lock(path);
   }
@@ -101,7 +104,7 @@ TEST_F(BackUpTest, AServerStartsOnTheCopy) {
     const auto restored = DurableLog::Open({.folder = to});
     ASSERT_TRUE(restored.ok()) << restored.status();
     EXPECT_EQ(TextOf(*(*restored)->Load()), TextOf(*log->Load()));
-    EXPECT_THAT((*restored)->RemoveGarbage()->removed, IsEmpty());
+    EXPECT_THAT((*restored)->RemoveGarbage()->set_aside, IsEmpty());
     EXPECT_EQ(std::filesystem::file_size(to + "/files/00000003.points"), 72u) << "the committed ones alone";
   }
 }
@@ -147,23 +150,30 @@ TEST_F(BackUpTest, AServerRemovesNothingMeanwhile) {
   ASSERT_TRUE(log->Commit({.session = SessionName(1), .state = MakeState(1)}).ok());
   const auto points = log->OpenPoints(SessionName(1), 3, 0, {});
   ASSERT_TRUE(Change(*log, 1, 1, *points, mesh).ok());
-  {
-    const auto back_up = PosixFileSystem().Lock(DataPaths{from_}.back_up_lock());
-    ASSERT_TRUE(back_up.ok());
+  for (const bool has_name : {true, false}) {
+    // As a back-up holds them; the name of the one is gone in the second round.
+    const auto number = PosixFileSystem().Lock(DataPaths{from_}.back_up_lock());
+    const auto back_up = PosixFileSystem().LockFolder(DataPaths{from_}.files());
+    ASSERT_TRUE(number.ok() && back_up.ok());
+    if (!has_name) {
+      std::filesystem::remove(DataPaths{from_}.back_up_lock());
+    }
     const absl::Status second = BackUp(from_, to_).status();
     EXPECT_EQ(second.code(), absl::StatusCode::kFailedPrecondition);
     EXPECT_THAT(std::string(second.message()), HasSubstr("is backing this folder up"));
-    ASSERT_TRUE(Change(*log, 1, 2, *points, mesh).ok());
-    ASSERT_TRUE(log->Commit({.session = SessionName(1), .is_deletion = true}).ok());
-    mesh.reset();
+    if (has_name) {
+      ASSERT_TRUE(Change(*log, 1, 2, *points, mesh).ok());
+      ASSERT_TRUE(log->Commit({.session = SessionName(1), .is_deletion = true}).ok());
+      mesh.reset();
+    }
     const absl::StatusOr<Garbage> kept = log->RemoveGarbage();
     ASSERT_TRUE(kept.ok());
-    EXPECT_THAT(kept->removed, IsEmpty()) << "nor does it say so";
+    EXPECT_THAT(kept->set_aside, IsEmpty()) << "nor does it say so";
     EXPECT_EQ(PosixFileSystem().List(from_ + "/files")->size(), 3u);
   }
-  const absl::StatusOr<Garbage> removed = log->RemoveGarbage();
-  ASSERT_TRUE(removed.ok());
-  EXPECT_EQ(removed->removed.size(), 3u);
+  const absl::StatusOr<Garbage> set_aside = log->RemoveGarbage();
+  ASSERT_TRUE(set_aside.ok());
+  EXPECT_EQ(set_aside->set_aside.size(), 3u);
   EXPECT_THAT(*PosixFileSystem().List(from_ + "/files"), IsEmpty());
 }
 
@@ -171,6 +181,14 @@ TEST_F(BackUpTest, WantsAFolderOfItsOwn) {
   const auto log = *DurableLog::Open({.folder = from_});
   const absl::Status self = BackUp(from_, from_).status();
   EXPECT_EQ(self.code(), absl::StatusCode::kFailedPrecondition);
+  std::filesystem::create_directory_symlink(from_, folder_.path() + "/link");
+  for (const std::string& within :
+       {from_ + "/copy", from_ + "/files/copy", from_ + "/../data/x/y", folder_.path() + "/link/copy"}) {
+    const absl::Status status = BackUp(from_ + "/", within).status();
+    EXPECT_EQ(status.code(), absl::StatusCode::kFailedPrecondition);
+    EXPECT_THAT(std::string(status.message()), HasSubstr(within + ": is within "));
+    EXPECT_FALSE(std::filesystem::exists(within)) << within;
+  }
   std::filesystem::create_directories(to_);
   WriteFile(to_ + "/letter.txt", "");
   const absl::Status full = BackUp(from_, to_).status();

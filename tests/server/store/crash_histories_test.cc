@@ -128,6 +128,7 @@ INSTANTIATE_TEST_SUITE_P(
                       PlantedBug{"RenameWithoutItsFolder", {.unsynchronised = {"/files"}}},
                       PlantedBug{"PointsWithoutSynchronisation", {.unsynchronised = {".points"}}},
                       PlantedBug{"LogWithoutSynchronisation", {.unsynchronised = {"-wal"}}},
+                      PlantedBug{"MarkWithoutSynchronisation", {.unsynchronised = {"-mark"}}},
                       PlantedBug{"FolderWithoutItsName", {.unsynchronised = {"/data"}}}),
     [](const auto& of) { return std::string(of.param.name); });
 

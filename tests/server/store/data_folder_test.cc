@@ -23,6 +23,7 @@ class DataFolderTest : public ::testing::Test {
   const TestFolder folder_;
   const std::string root_ = folder_.path() + "/var/data";
   const DataPaths paths_{root_};
+  const absl::Time now_ = absl::FromUnixSeconds(1'800'000'000);
 };
 
 TEST_F(DataFolderTest, IsMadeForThisUserAlone) {
@@ -65,7 +66,7 @@ TEST_F(DataFolderTest, FilesHaveTheirSessionsNames) {
   }
 }
 
-TEST_F(DataFolderTest, RemovesWhatNoSessionNamesAndLeavesWhatItDoesNotKnow) {
+TEST_F(DataFolderTest, SetsAsideWhatNoSessionNamesAndLeavesWhatItDoesNotKnow) {
   const auto folder = DataFolder::Open(root_, PosixFileSystem());
   ASSERT_TRUE(folder.ok());
   const auto in_use = std::make_shared<FilesInUse>(PosixFileSystem());
@@ -77,13 +78,25 @@ TEST_F(DataFolderTest, RemovesWhatNoSessionNamesAndLeavesWhatItDoesNotKnow) {
     WriteFile(paths_.files() + "/" + name, "x");
   }
   WriteFile(root_ + "/core", "x");
+  ASSERT_TRUE(PosixFileSystem().CreateFolder(paths_.lost()).ok());
+  WriteFile(paths_.lost() + "/aa.mesh-2.1800000000", "of the second before");
+  WriteFile(paths_.lost() + "/letter", "x");
   const auto use = in_use->Take(paths_.files() + "/cc.mesh-1", /*is_written=*/true);
   const auto written = in_use->Take(paths_.files() + "/cc.mesh-1.tmp", /*is_written=*/true);
-  const auto sweep = (*folder)->RemoveGarbage(*in_use, [&] { return std::vector{session}; });
+  const auto sweep = (*folder)->RemoveGarbage(
+      *in_use, [&] { return std::vector{session}; }, now_);
   ASSERT_TRUE(sweep.ok()) << sweep.status();
-  EXPECT_THAT(sweep->removed, ElementsAre(paths_.files() + "/aa.mesh-2", paths_.files() + "/aa.mesh-3.tmp",
-                                          paths_.files() + "/bb.mesh-1", paths_.files() + "/bb.points"));
-  EXPECT_THAT(sweep->unknown, ElementsAre(root_ + "/core", paths_.files() + "/notes.txt"));
+  std::vector<std::string> set_aside;
+  for (const Garbage::SetAside& file : sweep->set_aside) {
+    set_aside.push_back(file.from.substr(root_.size()) + " " + file.to.substr(root_.size()));
+  }
+  EXPECT_THAT(
+      set_aside,
+      ElementsAre("/files/aa.mesh-2 /lost/aa.mesh-2.1800000001", "/files/aa.mesh-3.tmp /lost/aa.mesh-3.tmp.1800000000",
+                  "/files/bb.mesh-1 /lost/bb.mesh-1.1800000000", "/files/bb.points /lost/bb.points.1800000000"));
+  EXPECT_EQ(BytesOfFile(paths_.lost() + "/aa.mesh-2.1800000000"), "of the second before");
+  EXPECT_THAT(sweep->removed, IsEmpty());
+  EXPECT_THAT(sweep->unknown, ElementsAre(root_ + "/core", paths_.files() + "/notes.txt", paths_.lost() + "/letter"));
   EXPECT_THAT(*PosixFileSystem().List(paths_.files()),
               UnorderedElementsAre("aa.points", "aa.mesh-3", "cc.mesh-1", "cc.mesh-1.tmp", "notes.txt"));
 }
@@ -96,12 +109,24 @@ TEST_F(DataFolderTest, LeavesAFileAloneThatIsWrittenMeanwhile) {
   for (const char* name : {"/aa.mesh-1", "/aa.mesh-1.tmp"}) {
     const std::string path = paths_.files() + name;
     WriteFile(path, "of a process that died");
-    const auto sweep = (*folder)->RemoveGarbage(*in_use, [&] {
-      in_use->Take(path, /*is_written=*/true).reset();
-      return std::vector<store::v1::SessionRecord>();
-    });
+    const auto sweep = (*folder)->RemoveGarbage(
+        *in_use,
+        [&] {
+          in_use->Take(path, /*is_written=*/true).reset();
+          return std::vector<store::v1::SessionRecord>();
+        },
+        now_);
     ASSERT_TRUE(sweep.ok()) << sweep.status();
     EXPECT_TRUE(std::filesystem::exists(path));
+  }
+}
+
+TEST_F(DataFolderTest, ALostFilesNameSaysWhenItWasFound) {
+  EXPECT_EQ(FoundAt("01ef.points.1800000000"), now_);
+  EXPECT_EQ(FoundAt("01ef.mesh-3.tmp.1800000000"), now_);
+  for (const char* name : {"01ef.points", "01ef.points.", "01ef.points.x", "01ef.points.-1", "letter.1800000000",
+                           "01ef.points.99999999999999999999"}) {
+    EXPECT_EQ(FoundAt(name), std::nullopt) << name;
   }
 }
 
@@ -110,7 +135,10 @@ TEST_F(DataFolderTest, RemovesNothingWhereTheRowsCannotBeRead) {
   ASSERT_TRUE(folder.ok());
   const auto in_use = std::make_shared<FilesInUse>(PosixFileSystem());
   WriteFile(paths_.files() + "/aa.points", "x");
-  EXPECT_FALSE((*folder)->RemoveGarbage(*in_use, [] { return absl::DataLossError("damaged"); }).ok());
+  EXPECT_FALSE((*folder)
+                   ->RemoveGarbage(
+                       *in_use, [] { return absl::DataLossError("damaged"); }, now_)
+                   .ok());
   EXPECT_TRUE(std::filesystem::exists(paths_.files() + "/aa.points"));
 }
 

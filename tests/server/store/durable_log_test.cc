@@ -3,6 +3,7 @@
 #include <atomic>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
 #include "server/store/memory_mesh.h"
+#include "server/store/sqlite.h"
 #include "tests/server/store/store_support.h"
 
 namespace wellspace::server {
@@ -17,6 +19,7 @@ namespace {
 
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::StartsWith;
 using ::testing::UnorderedElementsAre;
 
 class DurableLogTest : public ::testing::Test {
@@ -61,7 +64,7 @@ TEST_F(DurableLogTest, ASessionOutlivesIt) {
   EXPECT_EQ(*store->CopyFrom(0, core::RunContext()), points);
   EXPECT_EQ(*DownloadOf(*log->FindMesh(SessionName(1), session.state), true), *DownloadOf(MemoryMesh(2, mesh), true));
   EXPECT_EQ(log->FindMesh(SessionName(2), MakeState(2)), nullptr);
-  EXPECT_THAT(log->RemoveGarbage()->removed, IsEmpty());
+  EXPECT_THAT(log->RemoveGarbage()->set_aside, IsEmpty());
 }
 
 TEST_F(DurableLogTest, ManyCommitAtOnce) {
@@ -118,7 +121,7 @@ TEST_F(DurableLogTest, ADeletionTakesTheFiles) {
   ASSERT_TRUE(log->Commit({.session = SessionName(1), .is_deletion = true}).ok());
   EXPECT_THAT(Files(), UnorderedElementsAre("00000001.mesh-1")) << "a download has it still";
   EXPECT_TRUE(DownloadOf(*mesh, true).ok());
-  EXPECT_THAT(log->RemoveGarbage()->removed, IsEmpty());
+  EXPECT_THAT(log->RemoveGarbage()->set_aside, IsEmpty());
   mesh.reset();
   EXPECT_THAT(Files(), IsEmpty());
 }
@@ -128,11 +131,113 @@ TEST_F(DurableLogTest, AMeshThatNoChangeHasNamedIsGarbage) {
     const auto log = Open();
     ASSERT_TRUE(log->Commit({.session = SessionName(1), .state = MakeState(1)}).ok());
     const auto mesh = log->KeepMesh(SessionName(1), 1, MakeMesh({}), core::RunContext());
-    EXPECT_THAT(log->RemoveGarbage()->removed, IsEmpty()) << "it is about to be named";
+    EXPECT_THAT(log->RemoveGarbage()->set_aside, IsEmpty()) << "it is about to be named";
   }
   const auto log = Open();
-  EXPECT_EQ(log->RemoveGarbage()->removed.size(), 1u);
+  const Garbage garbage = *log->RemoveGarbage();
+  ASSERT_EQ(garbage.set_aside.size(), 1u);
+  EXPECT_EQ(garbage.set_aside[0].from, folder_.path() + "/files/00000001.mesh-1");
+  EXPECT_THAT(garbage.set_aside[0].to, StartsWith(folder_.path() + "/lost/00000001.mesh-1."));
+  EXPECT_TRUE(std::filesystem::exists(garbage.set_aside[0].to));
   EXPECT_THAT(Files(), IsEmpty());
+}
+
+// The database without its files, or with them: sessions that are gone are not made anew as none.
+TEST_F(DurableLogTest, ADatabaseThatIsMissingOrEmptyIsNotMadeAnew) {
+  {
+    const auto log = Open();
+    ASSERT_TRUE(log->Commit({.session = SessionName(1), .state = MakeState(1)}).ok());
+    const auto store = log->OpenPoints(SessionName(1), 3, 0, {});
+    ASSERT_TRUE(store->Append(std::vector<double>{1, 2, 3}).ok());
+    ASSERT_TRUE(store->Synchronize().ok());
+  }
+  const std::string database = folder_.path() + "/sessions.db";
+  const std::string mark = folder_.path() + "/sessions.db-mark";
+  const std::string whole = BytesOfFile(database);
+  const std::string whole_mark = BytesOfFile(mark);
+  // Points without a mark, as an earlier release has left them; a mark without points; the log alone.
+  for (const std::string_view there : {"points and mark", "points", "mark", "log"}) {
+    std::filesystem::remove(folder_.path() + "/files/00000001.points");
+    std::filesystem::remove(mark);
+    if (there.starts_with("points")) {
+      WriteFile(folder_.path() + "/files/00000001.points", std::string(24, 'x'));
+    }
+    if (there.ends_with("mark")) {
+      WriteFile(mark, whole_mark);
+    }
+    for (const std::string_view what : {"missing", "empty", "without tables"}) {
+      std::filesystem::remove(database);
+      std::filesystem::remove(database + "-wal");
+      if (what == "empty") {
+        WriteFile(database, "");
+      } else if (what == "without tables") {
+        const auto empty = SqliteDatabase::Open(database, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, nullptr);
+        ASSERT_TRUE((*empty)->Execute("PRAGMA journal_mode=WAL; PRAGMA user_version=0").ok());
+      }
+      if (there == "log") {
+        if (what == "without tables") {
+          continue;  // as a start leaves it that has ended before it made them
+        }
+        WriteFile(database + "-wal", "a log");
+      }
+      const absl::Status status = DurableLog::Open({.folder = folder_.path()}).status();
+      EXPECT_EQ(ReasonOf(status), "FILE_DAMAGED") << there << ", " << what;
+      EXPECT_THAT(std::string(status.message()), StartsWith(database + ": the database is "));
+      EXPECT_EQ(std::filesystem::exists(folder_.path() + "/files/00000001.points"), there.starts_with("points"));
+      EXPECT_FALSE(std::filesystem::exists(folder_.path() + "/lost"));
+    }
+  }
+  std::filesystem::remove(database + "-wal");
+  WriteFile(database, whole);
+  const auto log = Open();
+  ASSERT_NE(log, nullptr) << "the database is back";
+  EXPECT_EQ(log->Load()->sessions.size(), 1u);
+}
+
+// An old copy of the database, or one whose rows are gone, cannot be told from one after deletions. So what it does not
+// name is kept for a day, and can be put back.
+TEST_F(DurableLogTest, FilesThatTheDatabaseDoesNotNameAreKeptForADay) {
+  static absl::Time now;
+  now = absl::FromUnixSeconds(1'800'000'000);
+  const DurableLogOptions options{.folder = folder_.path(), .now = [] { return now; }};
+  const std::string database = folder_.path() + "/sessions.db";
+  DurableLog::Open(options)->reset();
+  const std::string old = BytesOfFile(database);
+  {
+    const auto log = *DurableLog::Open(options);
+    ASSERT_TRUE(log->Commit({.session = SessionName(1), .state = MakeState(1)}).ok());
+    const auto store = log->OpenPoints(SessionName(1), 3, 0, {});
+    ASSERT_TRUE(store->Append(std::vector<double>{1, 2, 3}).ok());
+    ASSERT_TRUE(store->Synchronize().ok());
+  }
+  const std::string points = BytesOfFile(folder_.path() + "/files/00000001.points");
+  const std::string last = BytesOfFile(database);
+  WriteFile(database, old);
+  const std::string lost = folder_.path() + "/lost/00000001.points.1800000000";
+  {
+    const auto log = *DurableLog::Open(options);
+    EXPECT_TRUE(log->Load()->sessions.empty());
+    const Garbage first = *log->RemoveGarbage();
+    ASSERT_EQ(first.set_aside.size(), 1u);
+    EXPECT_EQ(first.set_aside[0].to, lost);
+    EXPECT_EQ(BytesOfFile(lost), points);
+    now += absl::Hours(24) - absl::Seconds(1);
+    EXPECT_THAT(log->RemoveGarbage()->removed, IsEmpty());
+  }
+  now += absl::Hours(1);
+  {
+    const auto log = *DurableLog::Open(options);
+    EXPECT_THAT(log->RemoveGarbage()->removed, IsEmpty()) << "nothing is removed at a start";
+    EXPECT_TRUE(std::filesystem::exists(lost));
+    EXPECT_THAT(log->RemoveGarbage()->unknown, IsEmpty());
+    EXPECT_FALSE(std::filesystem::exists(lost));
+  }
+  // Put back within the day, all is as it was.
+  WriteFile(database, last);
+  WriteFile(folder_.path() + "/files/00000001.points", points);
+  const auto log = *DurableLog::Open(options);
+  EXPECT_EQ(log->Load()->sessions.size(), 1u);
+  EXPECT_THAT(log->RemoveGarbage()->set_aside, IsEmpty());
 }
 
 TEST_F(DurableLogTest, MissingFilesCostTheirSessionAlone) {
@@ -158,6 +263,15 @@ TEST_F(DurableLogTest, MissingFilesCostTheirSessionAlone) {
 TEST_F(DurableLogTest, HasOneServerAtATime) {
   const auto log = Open();
   EXPECT_EQ(DurableLog::Open({.folder = folder_.path()}).status().code(), absl::StatusCode::kFailedPrecondition);
+  // A lock whose name is gone holds, too.
+  for (int i = 0; i < 2; ++i) {
+    std::filesystem::remove(folder_.path() + "/lock");
+    const absl::Status second = DurableLog::Open({.folder = folder_.path()}).status();
+    EXPECT_EQ(second.code(), absl::StatusCode::kFailedPrecondition);
+    EXPECT_EQ(second.message(), folder_.path() +
+                                    ": another process has this folder in use; stop it first, or name "
+                                    "another folder");
+  }
 }
 
 }  // namespace

@@ -213,6 +213,32 @@ TEST_F(SessionTablesTest, AFileOfAnotherProgramIsRefused) {
   EXPECT_THAT(std::string(status.message()), HasSubstr(path_));
 }
 
+// What is to be done, not what SQLite calls it.
+TEST_F(SessionTablesTest, ADatabaseThatCannotBeUsedIsToldInOurWords) {
+  const std::string missing(SessionTables::Open(path_, {.is_read_only = true}).status().message());
+  EXPECT_EQ(missing, path_ + ": the database is missing (SQLite 14: No such file or directory)");
+  WriteFile(path_, "");
+  const absl::Status empty = SessionTables::Open(path_, {.is_read_only = true}).status();
+  EXPECT_EQ(ReasonOf(empty), "FILE_DAMAGED");
+  EXPECT_EQ(empty.message(), path_ + ": the database is empty");
+  ASSERT_TRUE(Apply(*Open(), {MakeCreation(1)}).ok());
+  {
+    const auto reader = *SqliteDatabase::Open(path_, SQLITE_OPEN_READONLY, nullptr);
+    const std::string said(reader->Execute("DELETE FROM sessions").message());
+    EXPECT_EQ(said, path_ +
+                        ": the database cannot be written to; the user that the server runs as needs permission to "
+                        "write it, and its folder (SQLite 8)");
+  }
+  const auto other = *SqliteDatabase::Open(path_, SQLITE_OPEN_READWRITE, nullptr);
+  const auto held = *SqliteDatabase::Open(path_, SQLITE_OPEN_READWRITE, nullptr);
+  ASSERT_TRUE(held->Execute("BEGIN IMMEDIATE").ok());
+  EXPECT_EQ(other->Execute("BEGIN IMMEDIATE").message(),
+            path_ + ": another program has the database locked (SQLite 5)");
+  std::filesystem::create_directory(path_ + ".folder");
+  const absl::Status folder = SqliteDatabase::Open(path_ + ".folder", SQLITE_OPEN_READWRITE, nullptr).status();
+  EXPECT_THAT(std::string(folder.message()), HasSubstr("cannot be opened; the user that the server runs as"));
+}
+
 TEST_F(SessionTablesTest, ReadOnlyChangesNothing) {
   EXPECT_FALSE(SessionTables::Open(path_, {.is_read_only = true}).ok()) << "there is nothing";
   ASSERT_TRUE(Apply(*Open(), {MakeCreation(1)}).ok());

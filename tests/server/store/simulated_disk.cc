@@ -69,6 +69,10 @@ class SimulatedFiles final : public FileSystem {
   absl::StatusOr<std::vector<std::string>> List(const std::string& folder) override { return disk_.List(folder); }
   absl::Status CreateFolder(const std::string& folder) override { return disk_.CreateFolder(folder); }
   absl::Status SynchronizeFolder(const std::string& folder) override { return disk_.SynchronizeFolder(folder); }
+  absl::StatusOr<std::unique_ptr<FileLock>> LockFolder(const std::string& folder) override {
+    WELLSPACE_RETURN_IF_ERROR(disk_.Begin("lock", folder));
+    return std::make_unique<FileLock>();
+  }
   absl::StatusOr<std::unique_ptr<FileLock>> Lock(const std::string& path) override {
     WELLSPACE_RETURN_IF_ERROR(disk_.Begin("lock", path));
     return std::make_unique<FileLock>();
@@ -106,14 +110,18 @@ absl::Status SimulatedDisk::Begin(const std::string& what, const std::string& pa
     }
     return absl::UnavailableError(path + ": the machine has no power");
   }
-  if (number < fails_at_ || number - fails_at_ >= fail_count_ || (is_read && fault_ != Fault::kBroken) ||
-      (fault_ == Fault::kNoRoom && what != "write")) {
+  const bool is_of_reads = fault_ == Fault::kBroken || fault_ == Fault::kForbidden;
+  if (number < fails_at_ || number - fails_at_ >= fail_count_ || (is_read && !is_of_reads) ||
+      (fault_ == Fault::kNoRoom && what != "write") || (fault_ == Fault::kForbidden && what != "open")) {
     return absl::OkStatus();
   }
   if (!has_failed_) {
     failed_operation_ = absl::StrCat(what, " ", path);
   }
   has_failed_ = true;
+  if (fault_ == Fault::kForbidden) {
+    return absl::PermissionDeniedError(path + ": cannot be opened: Permission denied");
+  }
   if (fault_ == Fault::kBroken) {
     return absl::UnavailableError(path + ": Input/output error");
   }
@@ -136,7 +144,11 @@ absl::StatusOr<SimulatedDisk::Entry> SimulatedDisk::Open(const std::string& path
 }
 
 absl::Status SimulatedDisk::Write(Inode& inode, const std::string& path, uint64_t offset, std::span<const char> bytes) {
-  const absl::Status begun = Begin("write", path);
+  absl::Status begun = Begin("write", path);
+  const uint64_t end = offset + bytes.size();
+  if (begun.ok() && end > inode.content.size() && UsedBytes() + end - inode.content.size() > most_bytes_) {
+    begun = absl::ResourceExhaustedError(path + ": No space left on device");
+  }
   if (!begun.ok()) {
     bytes = bytes.first(is_short_write_ ? bytes.size() / 2 : 0);
   }
@@ -145,6 +157,14 @@ absl::Status SimulatedDisk::Write(Inode& inode, const std::string& path, uint64_
     Put(inode.content, offset, inode.changes.back().bytes);
   }
   return begun;
+}
+
+uint64_t SimulatedDisk::UsedBytes() const {
+  uint64_t bytes = 0;
+  for (const auto& [path, inode] : names_) {
+    bytes += inode == nullptr ? 0 : inode->content.size();
+  }
+  return bytes;
 }
 
 absl::Status SimulatedDisk::Truncate(Inode& inode, const std::string& path, uint64_t size) {
@@ -318,6 +338,7 @@ void SimulatedDisk::Clear() {
   omitted_.clear();
   dies_at_.reset();
   fail_count_ = 0;
+  most_bytes_ = UINT64_MAX;
   operations_ = 0;
   counts_reads_ = false;
   has_failed_ = false;

@@ -34,6 +34,7 @@ class SimulatedDisk {
     kNoSpace,     // nothing is done, and the disk is full; reads go on
     kNoRoom,      // as kNoSpace, but of writes alone
     kBroken,      // nothing is done, and the disk is broken
+    kForbidden,   // files cannot be opened, for want of permission
     kShortWrite,  // half of a write is done, then the disk is full; others as kNoSpace
   };
 
@@ -53,6 +54,9 @@ class SimulatedDisk {
   bool is_dead() const { return dies_at_.has_value() && operations_ > *dies_at_; }
   // `count` operations from this one on fail.
   void FailAt(uint64_t operation, Fault fault, uint64_t count = 1);
+  // Files have so many bytes together at most from now on: a write that would make one longer finds the disk full.
+  void LimitBytes(uint64_t bytes) { most_bytes_ = bytes; }
+  uint64_t UsedBytes() const;
   bool has_failed() const { return has_failed_; }
   // What the operation that died or failed was.
   const std::string& failed_operation() const { return failed_operation_; }
@@ -126,6 +130,7 @@ class SimulatedDisk {
   uint64_t fails_at_ = 0;
   uint64_t fail_count_ = 0;
   Fault fault_ = Fault::kNoSpace;
+  uint64_t most_bytes_ = UINT64_MAX;
   bool has_failed_ = false;
   bool is_short_write_ = false;  // of the operation that has just begun
   std::string failed_operation_;

@@ -66,11 +66,11 @@ bool LiveWithFault(SimulatedDisk& disk, uint64_t operation, Fault fault, uint64_
   disk.FailAt(0, fault, 0);
   if (life.failures() == 0) {
     const std::string problem = life.Check();
-    EXPECT_TRUE(problem.empty()) << at << ": " << problem.substr(0, 1000);
+    EXPECT_TRUE(problem.empty()) << at << ": " << problem.substr(0, 9000);
   }
   test::SplitMix64 random(operation);
   const std::string problem = life.Restart(loss, random);
-  EXPECT_TRUE(problem.empty()) << at << ": " << problem.substr(0, 1000);
+  EXPECT_TRUE(problem.empty()) << at << ": " << problem.substr(0, 9000);
   return is_within;
 }
 
@@ -100,17 +100,124 @@ TEST(StoreFaults, AFullDiskPasses) {
   ASSERT_TRUE(life.Do(Action::kUpload, 0).ok());
   // Writes of the database, of points and of meshes all come first in their kind.
   for (const Action action : {Action::kUpdate, Action::kUpload, Action::kSucceed, Action::kDelete}) {
-    disk.FailAt(disk.operations(), Fault::kNoSpace, 1);
-    // The first operation may be the opening of a file, which a full disk refuses where it has to be made.
+    disk.FailAt(disk.operations(), Fault::kNoRoom, 1'000'000);
     const absl::Status status = life.Do(action, 0);
     EXPECT_EQ(ReasonOf(status), "DISK_FULL") << static_cast<int>(action);
     EXPECT_EQ(life.Check(), "");
   }
+  disk.FailAt(0, Fault::kNoRoom, 0);
   EXPECT_EQ(life.failures(), 0);
   for (const Action action : {Action::kUpdate, Action::kUpload, Action::kSucceed, Action::kDelete}) {
     EXPECT_TRUE(life.Do(action, 0).ok());
   }
   EXPECT_EQ(life.Check(), "");
+}
+
+// A file whose permission is missing is as it was: it is not called damaged, nor does the server end for it.
+TEST(StoreFaults, AFileThatMayNotBeOpenedIsNotDamaged) {
+  SimulatedDisk disk;
+  disk.CountReads();
+  StoreLife life(disk);
+  ASSERT_TRUE(life.Open().ok());
+  for (const Action action : {Action::kCreate, Action::kUpload, Action::kSucceed, Action::kSucceed}) {
+    ASSERT_TRUE(life.Do(action, 0).ok());
+  }
+  const LifeState::Session session = life.state().sessions.at(0);
+  ASSERT_TRUE(session.mesh.has_value());
+  const auto points = life.log()->OpenPoints(session.state.name(), 3, 0, {session.steps.at(0).points()});
+  const auto mesh = life.log()->FindMesh(session.state.name(), session.state);
+  disk.FailAt(disk.operations(), Fault::kForbidden, 1'000'000);
+  for (const absl::Status& status :
+       {points->CopyFrom(0, core::RunContext()).status(), points->Append(std::vector<double>{1, 2, 3}),
+        mesh->Load(core::RunContext()).status(), life.Do(Action::kUpload, 0), life.Do(Action::kSucceed, 0)}) {
+    EXPECT_EQ(ReasonOf(status), "STORE_FAILED") << status;
+    EXPECT_THAT(std::string(status.message()), ::testing::HasSubstr("Permission denied; the user that the server"));
+  }
+  EXPECT_EQ(life.failures(), 0);
+  disk.FailAt(0, Fault::kForbidden, 0);
+  EXPECT_TRUE(life.Do(Action::kUpload, 0).ok());
+  EXPECT_EQ(life.Check(), "");
+}
+
+// What tenants have filled the disk with.
+enum class Filling { kPoints, kMeshes, kRows };
+
+// One session more, and what is in it.
+absl::Status FillOnce(DurableLog& log, Filling filling, uint64_t number) {
+  SessionChange change{.session = SessionName(number), .state = MakeState(number), .answer = MakeAnswer("a", "b", "c")};
+  if (absl::Status status = log.Commit(change); !status.ok()) {
+    return status;
+  }
+  if (filling == Filling::kPoints) {
+    const std::unique_ptr<PointStore> points = log.OpenPoints(change.session, 3, 0, {});
+    const std::vector<double> coordinates(3000, static_cast<double>(number));
+    if (absl::Status status = points->Append(coordinates); !status.ok()) {
+      return status;
+    }
+    change.steps = {MakePointsStep(0, coordinates, 3)};
+    change.state->set_points(1000);
+    return points->Synchronize().ok() ? log.Commit(change) : absl::InternalError("not synchronised");
+  }
+  if (filling == Filling::kMeshes) {
+    const auto mesh = log.KeepMesh(change.session, 1, MakeMesh({.vertices = 500}), core::RunContext());
+    if (!mesh.ok()) {
+      return mesh.status();
+    }
+    *change.state->mutable_mesh() = *(*mesh)->record();
+    return log.Commit(change);
+  }
+  change.sizes = StoredSizes{.number = 1, .parts = {}};
+  store::v1::SizesRecord& part = change.sizes->parts.emplace_back();
+  for (int i = 0; i < 2000; ++i) {
+    part.mutable_samples()->add_sizes(i + static_cast<double>(number));
+  }
+  return log.Commit(change);
+}
+
+// Deletions find room on a full disk, however it came to be full, also after a start; and then all goes on.
+TEST(StoreFaults, AFullDiskIsEmptiedByThoseWhoFilledIt) {
+  for (const Filling filling : {Filling::kPoints, Filling::kMeshes, Filling::kRows}) {
+    for (const bool starts_again : {false, true}) {
+      const std::string where = absl::StrCat(static_cast<int>(filling), starts_again ? ", after a start" : "");
+      SimulatedDisk disk;
+      const DurableLogOptions options = {.folder = "/data",
+                                         .files = &disk.files(),
+                                         .ballast_bytes = 256 << 10,
+                                         .tables = {.vfs = disk.vfs(), .is_exclusive = true}};
+      absl::StatusOr<std::unique_ptr<DurableLog>> log = DurableLog::Open(options);
+      ASSERT_TRUE(log.ok()) << log.status();
+      EXPECT_GE(disk.UsedBytes(), options.ballast_bytes);
+      disk.LimitBytes(disk.UsedBytes() + (1 << 20));
+      uint64_t sessions = 0;
+      // All kinds at the end, as small as they are: no room is left for any.
+      for (int refused = 0; refused < 20; ++sessions) {
+        const absl::Status status = FillOnce(**log, filling, sessions);
+        ASSERT_TRUE(status.ok() || ReasonOf(status) == "DISK_FULL") << where << status;
+        refused += status.ok() ? 0 : 1;
+        ASSERT_LT(sessions, 1000u);
+      }
+      EXPECT_EQ(ReasonOf(FillOnce(**log, filling, sessions)), "DISK_FULL") << where;
+      if (starts_again) {
+        disk.DieAt(disk.operations());
+        log->reset();
+        disk.Restart(Loss::kProcess, 1);
+        log = DurableLog::Open(options);
+        ASSERT_TRUE(log.ok()) << where << log.status();
+      }
+      const StoredSessions stored = *(*log)->Load();
+      for (const StoredSession& session : stored.sessions) {
+        SessionChange deletion{.session = session.state.name(), .is_deletion = true};
+        deletion.answer = MakeAnswer("tenant", session.state.name(), "deleted");
+        const absl::Status deleted = (*log)->Commit(deletion);
+        ASSERT_TRUE(deleted.ok()) << where << ", " << session.state.name() << ": " << deleted;
+      }
+      EXPECT_TRUE((*log)->Load()->sessions.empty()) << where;
+      for (uint64_t number = 1000; number < 1010; ++number) {
+        const absl::Status again = FillOnce(**log, filling, number);
+        EXPECT_TRUE(again.ok()) << where << again;
+      }
+    }
+  }
 }
 
 // After a synchronisation that failed nothing is tried again on the same file: it would succeed, and be wrong.
