@@ -15,6 +15,7 @@
 #include "server/log/log_fields.h"
 #include "server/security/authenticator.h"
 #include "server/wire/errors.h"
+#include "server/wire/hidden_folders.h"
 
 namespace wellspace::server {
 
@@ -175,7 +176,11 @@ void Call<Reactor>::ReserveThen(uint64_t bytes, const std::function<absl::Status
 
 template <typename Reactor>
 void Call<Reactor>::FinishNow() {
-  environment_.observability.calls().Note(context_, Figures());
+  LogFields figures = Figures();
+  if (const std::string cause(final_status_.message()); WithoutFolders(cause) != cause) {
+    figures.Add("cause", cause);
+  }
+  environment_.observability.calls().Note(context_, figures);
   this->Finish(ToGrpcStatus(final_status_));
 }
 

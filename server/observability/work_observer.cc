@@ -2,6 +2,7 @@
 
 #include "server/log/log_fields.h"
 #include "server/wire/errors.h"
+#include "server/wire/hidden_folders.h"
 
 namespace wellspace::server {
 
@@ -24,6 +25,9 @@ void WorkObserver::OnRefinement(const RefinementReport& report) {
   }
   if (!report.status.ok()) {
     fields.Add("message", seen.message());
+    if (const std::string cause(report.status.message()); WithoutFolders(cause) != cause) {
+      fields.Add("cause", cause);
+    }
   }
   log_.log(code == absl::StatusCode::kInternal ? spdlog::level::err : spdlog::level::info, "{}", fields.text());
 }

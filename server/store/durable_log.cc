@@ -8,6 +8,7 @@
 #include "server/store/mesh_file.h"
 #include "server/store/point_file.h"
 #include "server/wire/errors.h"
+#include "server/wire/hidden_folders.h"
 
 namespace wellspace::server {
 namespace {
@@ -75,6 +76,7 @@ DurableLog::DurableLog(const DurableLogOptions& options, std::unique_ptr<DataFol
       })) {}
 
 absl::StatusOr<std::unique_ptr<DurableLog>> DurableLog::Open(const DurableLogOptions& options) {
+  HideFolder(options.folder);
   WELLSPACE_ASSIGN_OR_RETURN(std::unique_ptr<DataFolder> folder, DataFolder::Open(options.folder, *options.files));
   SessionTablesOptions tables_options = options.tables;
   tables_options.files = options.files;

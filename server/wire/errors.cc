@@ -11,6 +11,7 @@
 #include "core/mesh_parameters.h"
 #include "google/rpc/error_details.pb.h"
 #include "server/log/log_fields.h"
+#include "server/wire/hidden_folders.h"
 
 namespace wellspace::server {
 namespace {
@@ -143,7 +144,7 @@ absl::Status FromCore(const absl::Status& status) {
 google::rpc::Status DetailsOf(const absl::Status& status, const std::string& reason) {
   google::rpc::Status details;
   details.set_code(static_cast<int>(status.code()));
-  details.set_message(CutText(std::string(status.message()), kMaxErrorMessageBytes));
+  details.set_message(CutText(WithoutFolders(std::string(status.message())), kMaxErrorMessageBytes));
   google::rpc::ErrorInfo info;
   info.set_reason(reason);
   info.set_domain(kErrorDomain);
@@ -190,7 +191,7 @@ grpc::Status ToGrpcStatus(const absl::Status& status) {
   const absl::optional<absl::Cord> reason = named.GetPayload(kReason);
   const auto code = static_cast<grpc::StatusCode>(named.code());  // the numbers are the same
   if (!reason.has_value()) {
-    return grpc::Status(code, std::string(named.message()));
+    return grpc::Status(code, WithoutFolders(std::string(named.message())));
   }
   const google::rpc::Status details = DetailsOf(named, std::string(*reason));
   return grpc::Status(code, details.message(), details.SerializeAsString());

@@ -410,6 +410,10 @@ TEST_F(RestartTest, ADamagedMeshCostsItsSessionAlone) {
   EXPECT_NE(download.status.error_message().find(path.substr(path.rfind('/'))), std::string::npos)
       << download.status.error_message();
   EXPECT_TRUE(calls().DownloadMesh(other).status.ok());
+  EXPECT_TRUE(service_->log().WaitFor("cause=\"" + path)) << "where the folder is, is for the log alone";
+  EXPECT_EQ(download.status.error_message().find(folder_.path()), std::string::npos);
+  EXPECT_EQ(download.status.error_details().find(folder_.path()), std::string::npos);
+  Stop();
   FlipBit(path, 100, 3);
 }
 
