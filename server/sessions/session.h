@@ -489,6 +489,7 @@ class Session {
   FeatureSummary feature_summary_;                  // of them, read or not
   std::shared_ptr<const core::SizeSamples> sizes_;  // null: none, or not read
   SizesInUse sizes_in_use_;                         // which these are
+  uint64_t sizes_revision_ = 0;  // at which they came, or went; 0: unknown, as none are there and another process began
   bool are_inputs_loaded_ = true;  // false: features and sizes were written down by another process, and not read yet
   SessionWork work_;               // its mesher is away while an operation runs
   SessionSteps steps_;

@@ -91,6 +91,7 @@ void Session::SetState(const StoredSession& stored) {
                       .faces = state.faces(),
                       .crossings = state.crossings()};
   sizes_in_use_ = {.number = state.sizes(), .count = state.size_count()};
+  sizes_revision_ = sizes_in_use_.number;
   const std::vector<SizesInUse> sizes = UnusedSizesLocked({}, 0);  // all of them
   are_inputs_loaded_ =
       feature_summary_.segments == 0 && feature_summary_.seeds == 0 && !feature_summary_.has_rules && sizes.empty();

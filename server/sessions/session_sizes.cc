@@ -48,10 +48,14 @@ absl::Status Session::TryToSetSizes(const std::shared_ptr<const core::SizeSample
     std::lock_guard lock(mutex_);
     WELLSPACE_RETURN_IF_ERROR(CheckOpenLocked());
     WELLSPACE_RETURN_IF_ERROR(CheckIdleLocked());
-    if (AreEqual(samples.get(), sizes_.get())) {
-      return absl::OkStatus();  // a repetition, at whatever revision
+    const bool is_repetition = AreEqual(samples.get(), sizes_.get());
+    // A client whose answer was lost repeats the call, with the revision that was right the first time.
+    if (!is_repetition || sizes_revision_ == 0 || expected_revision != sizes_revision_ - 1) {
+      WELLSPACE_RETURN_IF_ERROR(CheckRevisionLocked(expected_revision));
     }
-    WELLSPACE_RETURN_IF_ERROR(CheckRevisionLocked(expected_revision));
+    if (is_repetition) {
+      return absl::OkStatus();
+    }
     if (samples != nullptr) {
       WELLSPACE_RETURN_IF_ERROR(CheckSamples(BoxLocked(), dimension_, *samples));
     }
@@ -83,7 +87,7 @@ absl::Status Session::TryToSetSizes(const std::shared_ptr<const core::SizeSample
   point_account_.ReturnSizes(dropped > count ? dropped - count : 0);
   sizes_ = samples;
   sizes_in_use_ = in_use;
-  ++revision_;
+  sizes_revision_ = ++revision_;
   return absl::OkStatus();
 }
 

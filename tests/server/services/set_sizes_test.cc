@@ -131,6 +131,37 @@ TEST_F(SetSizesTest, TheSameAgainChangesNothing) {
   EXPECT_EQ(calls_.SetSizes({edges}).revision(), first.revision() + 1);
 }
 
+TEST_F(SetSizesTest, TheSameAgainAtAnotherRevisionIsRefused) {
+  const std::string name = Create();
+  v1::SetSizesRequest none;
+  none.set_name(name);
+  v1::SetSizesRequest request = SizesRequest(name, {0.5, 0.5}, {0.02});
+  const auto expect_refused = [&](v1::SetSizesRequest& again, uint64_t revision) {
+    again.set_expected_revision(revision);
+    ExpectRefused({again}, grpc::StatusCode::ABORTED, "REVISION_MISMATCH", "",
+                  absl::StrCat("expected_revision is ", revision));
+  };
+  const uint64_t before = calls_.Get(name).revision();
+  expect_refused(none, before + 1);
+  expect_refused(none, before + 1000);
+  none.set_expected_revision(before);
+  EXPECT_EQ(calls_.SetSizes({none}).revision(), before) << "there were none";
+  const uint64_t set = calls_.SetSizes({request}).revision();
+  expect_refused(request, set + 1);
+  calls_.Upload(name, calls_.Get(name).committed_points(), {0.31, 0.32});
+  const uint64_t now = calls_.Get(name).revision();
+  ASSERT_EQ(now, set + 1);
+  expect_refused(request, set);
+  for (const uint64_t right : {now, before}) {  // the latter is that of a repetition
+    request.set_expected_revision(right);
+    EXPECT_EQ(calls_.SetSizes({request}).revision(), now);
+  }
+  none.set_expected_revision(now);
+  EXPECT_EQ(calls_.SetSizes({none}).revision(), now + 1);
+  EXPECT_EQ(calls_.SetSizes({none}).revision(), now + 1) << "a repetition";
+  expect_refused(none, set);
+}
+
 TEST_F(SetSizesTest, OfTheVerticesOfItsMesh) {
   const std::string name = Create();
   calls_.Refine(name);
