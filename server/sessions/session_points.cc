@@ -52,6 +52,7 @@ void Session::EndUpload() {
 
 absl::Status Session::CheckPrefix(const Prefix& prefix) const {
   std::lock_guard lock(mutex_);
+  WELLSPACE_RETURN_IF_ERROR(CheckOpenLocked());
   WELLSPACE_RETURN_IF_ERROR(CheckIdleLocked());
   WELLSPACE_RETURN_IF_ERROR(CheckNoGap(prefix.end, point_account_.points(), name_));
   WELLSPACE_ASSIGN_OR_RETURN(const uint32_t checksum,

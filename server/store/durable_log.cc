@@ -245,9 +245,9 @@ void DurableLog::Forget(std::span<const AnswerKey> answers) {
 std::unique_ptr<PointStore> DurableLog::OpenPoints(const std::string& session, int dimension, uint64_t number,
                                                    std::vector<store::v1::StepRecord::Points> committed) {
   std::string path = folder_->paths().points(session, number);
-  // A file that no change names yet is not garbage.
-  std::unique_ptr<FilesInUse::Use> use =
-      number != 0 && committed.empty() ? in_use_->Take(path, /*is_written=*/true) : nullptr;
+  // A file that no change names yet is not garbage, and one whose session is deleted stays for those who still have it:
+  // they are to find that the session is gone, and no damage.
+  std::unique_ptr<FilesInUse::Use> use = in_use_->Take(path, /*is_written=*/committed.empty());
   return std::make_unique<PointFile>(files_, health_, std::move(path), dimension, std::move(committed), std::move(use));
 }
 

@@ -25,7 +25,7 @@ namespace wellspace::server {
 class PointFile final : public PointStore {
  public:
   // `committed`: one behind the other, from point 0 on; their checksums are looked at when they are first read. `use`
-  // lasts as long as this.
+  // lasts as long as this, and keeps the file; it may be null.
   PointFile(FileSystem& files, std::shared_ptr<StoreHealth> health, std::string path, int dimension,
             std::vector<store::v1::StepRecord::Points> committed, std::unique_ptr<FilesInUse::Use> use = nullptr);
 

@@ -8,11 +8,13 @@
 #include <vector>
 
 #include "gtest/gtest.h"
+#include "proto/checksum.h"
 #include "server/sessions/session_registry.h"
 #include "server/store/durable_log.h"
 #include "server/wire/errors.h"
 #include "tests/server/scripted_mesher.h"
 #include "tests/server/service_harness.h"
+#include "tests/server/store/passing_log.h"
 #include "tests/server/store/store_support.h"
 
 namespace wellspace::server {
@@ -220,6 +222,42 @@ TEST_F(RestoredSessionTest, AClosedSessionIsNotTakenForADamagedOne) {
   StartProcess();
   ASSERT_TRUE(session_->Close(0).ok());
   EXPECT_EQ(DetailsOf(session_->SetSizes(sizes, 0)).reason, "SESSION_NOT_FOUND") << "its sizes were not read yet";
+}
+
+// A log in which other calls come when a session is gone from the disk, and its deletion has not returned yet.
+class AmidDeletion final : public PassingLog {
+ public:
+  using PassingLog::PassingLog;
+
+  absl::Status Commit(const SessionChange& change, Survives survives) override {
+    const absl::Status status = PassingLog::Commit(change, survives);
+    if (change.is_deletion) {
+      others();
+    }
+    return status;
+  }
+
+  std::function<void()> others;
+};
+
+TEST_F(RestoredSessionTest, WhatComesBesideADeletionFindsNoDamage) {
+  AmidDeletion log(*log_);
+  SessionRegistry registry(options_, memory_, Clock(), log);
+  const std::shared_ptr<Session> session =
+      registry.Create({.tenant = "a", .parameters = {.dimension = 2}, .labels = {}, .ttl = absl::Hours(1)}).value();
+  const std::vector<double> points = {0, 0, 1, 0};
+  ASSERT_TRUE(session->Append(0, points, 0).ok());
+  ASSERT_TRUE(session->CommitPoints().ok());
+  log.others = [&] {
+    EXPECT_TRUE(session->Append(2, std::vector<double>{0.5, 1}, 0).ok()) << "an upload that goes on";
+    EXPECT_TRUE(session->Append(0, points, 0).ok()) << "one that begins again";
+    EXPECT_TRUE(session->CheckPrefix({.first = 0, .end = 2, .crc32c = Crc32c(points.data(), 32)}).ok());
+    EXPECT_EQ(session->points().Copy(0, 4, core::RunContext()).value(), points) << "a refinement";
+  };
+  ASSERT_TRUE(session->Close(0).ok());
+  EXPECT_EQ(DetailsOf(session->Append(3, points, 0)).reason, "SESSION_NOT_FOUND");
+  EXPECT_EQ(DetailsOf(session->CheckPrefix({.first = 0, .end = 2})).reason, "SESSION_NOT_FOUND");
+  EXPECT_TRUE(session->CommitPoints().ok()) << "nothing is left to be committed";
 }
 
 TEST_F(RestoredSessionTest, AClosedSessionIsWrittenDownNoMore) {
