@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "core/base/status_macros.h"
-#include "server/base/clock.h"
 #include "server/log/log_fields.h"
 #include "server/sessions/refinement.h"
 
@@ -24,16 +23,16 @@ constexpr size_t kBlockingThreads = 64;
 
 Backend::Backend(const ServiceOptions& options, const Authenticator& authenticator, Observability& observability,
                  std::shared_ptr<spdlog::logger> log, std::unique_ptr<SessionLog> session_log, Mesher mesher,
-                 Estimator estimator, MesherFactory create_mesher)
+                 Estimator estimator, MesherFactory create_mesher, const BackendDrive& drive)
     : options_(options),
       log_(std::move(log)),
       mesher_(std::move(mesher)),
       estimator_(std::move(estimator)),
       create_mesher_(std::move(create_mesher)),
       session_log_(std::move(session_log)),
-      request_ids_(SinceBoot, *session_log_),
+      request_ids_(drive.clock.since_boot, *session_log_),
       memory_(options_.max_memory_bytes),
-      sessions_(options_, memory_, Clock(), *session_log_),
+      sessions_(options_, memory_, drive.clock, *session_log_, drive.make_session_name),
       idle_sessions_(sessions_, memory_, observability.work()),
       environment_{.options = options_,
                    .mesher = mesher_,
@@ -50,11 +49,13 @@ Backend::Backend(const ServiceOptions& options, const Authenticator& authenticat
                    .session_log = *session_log_,
                    .observability = observability,
                    .log = *log_},
-      blocking_(kBlockingThreads),
+      background_(drive.run_by),
+      blocking_(drive.run_by == RunBy::kCaller ? 0 : kBlockingThreads),
       jobs_({.workers = options_.workers,
              .max_queued = options_.max_queued_jobs,
              .max_per_tenant = options_.max_jobs_per_tenant,
-             .small_workers = options_.small_workers},
+             .small_workers = options_.small_workers,
+             .run_by = drive.run_by},
             memory_) {
   AddMetrics(observability.metrics());
   ScheduleExpiry();

@@ -2,11 +2,13 @@
 #ifndef WELLSPACE_SERVER_BACKEND_H_
 #define WELLSPACE_SERVER_BACKEND_H_
 
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
 #include <vector>
 
+#include "server/base/clock.h"
 #include "server/base/options.h"
 #include "server/calls/call_environment.h"
 #include "server/calls/call_registry.h"
@@ -15,6 +17,7 @@
 #include "server/jobs/blocking_threads.h"
 #include "server/jobs/job_pool.h"
 #include "server/jobs/memory_budget.h"
+#include "server/jobs/run_by.h"
 #include "server/observability/observability.h"
 #include "server/security/authenticator.h"
 #include "server/sessions/idle_sessions.h"
@@ -23,6 +26,13 @@
 #include "spdlog/logger.h"
 
 namespace wellspace::server {
+
+// What drives a Backend. Another than this is for tests, which decide what time it is, and what runs when.
+struct BackendDrive {
+  Clock clock{};
+  RunBy run_by = RunBy::kOwnThreads;
+  std::function<std::string()> make_session_name = UnguessableSessionName;
+};
 
 // Owns what a CallEnvironment names, and deletes sessions whose lease has run out.
 //
@@ -33,7 +43,7 @@ class Backend {
   // `authenticator` outlives this; `observability` too, but reads nothing any more when this is destroyed.
   Backend(const ServiceOptions& options, const Authenticator& authenticator, Observability& observability,
           std::shared_ptr<spdlog::logger> log, std::unique_ptr<SessionLog> session_log, Mesher mesher,
-          Estimator estimator, MesherFactory create_mesher);
+          Estimator estimator, MesherFactory create_mesher, const BackendDrive& drive = {});
 
   // Takes over what the session log has: sessions, answers, and operations that have not ended, whose work begins. To
   // be called once, before any call is served.
@@ -47,6 +57,8 @@ class Backend {
   const CallEnvironment& environment() const { return environment_; }
   CallRegistry& calls() { return calls_; }
   JobPool& jobs() { return jobs_; }
+  Background& background() { return background_; }
+  BlockingThreads& blocking() { return blocking_; }
 
  private:
   void ScheduleExpiry();

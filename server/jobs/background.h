@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "absl/time/time.h"
+#include "server/jobs/run_by.h"
 
 namespace wellspace::server {
 
@@ -19,7 +20,7 @@ namespace wellspace::server {
 // Thread safety: thread-safe. Tasks run without any lock held and may post.
 class Background {
  public:
-  Background();
+  explicit Background(RunBy run_by = RunBy::kOwnThreads);
   ~Background() { Stop(); }
   Background(const Background&) = delete;
   Background& operator=(const Background&) = delete;
@@ -28,6 +29,11 @@ class Background {
   void Post(std::function<void()> task) { PostAfter(absl::ZeroDuration(), std::move(task)); }
   void PostAfter(absl::Duration delay, std::function<void()> task);
 
+  // With RunBy::kCaller, where no time passes but in Pass: runs the first task that is due. False: there is none.
+  bool RunDue();
+  // The same: `time` passes, and what is due within it runs.
+  void Pass(absl::Duration time);
+
   // Waits for the task that runs. The others, and those that are posted from now on, do not run any more.
   void Stop();
 
@@ -35,12 +41,17 @@ class Background {
   using Clock = std::chrono::steady_clock;
 
   void Run();
+  Clock::time_point Now() const { return run_by_ == RunBy::kCaller ? passed_ : Clock::now(); }
+  // Runs the first task, with mutex_ held but for the task.
+  void RunFirst(std::unique_lock<std::mutex>& lock);
 
+  const RunBy run_by_;
   std::mutex mutex_;
   std::condition_variable wake_;
   // Guarded by mutex_.
   std::multimap<Clock::time_point, std::function<void()>> tasks_;
   bool stopping_ = false;
+  Clock::time_point passed_;  // with RunBy::kCaller: its time
 
   std::thread thread_;
 };

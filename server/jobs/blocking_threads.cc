@@ -5,6 +5,8 @@
 namespace wellspace::server {
 
 BlockingThreads::~BlockingThreads() {
+  while (most_threads_ == 0 && RunNext()) {
+  }
   std::vector<std::thread> threads;
   {
     std::unique_lock lock(mutex_);
@@ -68,16 +70,29 @@ void BlockingThreads::RunThread() {
         return;
       }
     }
-    Ready ready = std::move(ready_.front());
-    ready_.pop_front();
-    lock.unlock();
-    ready.task();
-    ready.task = nullptr;  // what it holds is freed without the lock
-    lock.lock();
-    if (!ready.key.empty()) {
-      GoOn(ready.key);
-    }
+    RunFirst(lock);
   }
+}
+
+void BlockingThreads::RunFirst(std::unique_lock<std::mutex>& lock) {
+  Ready ready = std::move(ready_.front());
+  ready_.pop_front();
+  lock.unlock();
+  ready.task();
+  ready.task = nullptr;  // what it holds is freed without the lock
+  lock.lock();
+  if (!ready.key.empty()) {
+    GoOn(ready.key);
+  }
+}
+
+bool BlockingThreads::RunNext() {
+  std::unique_lock lock(mutex_);
+  if (ready_.empty()) {
+    return false;
+  }
+  RunFirst(lock);
+  return true;
 }
 
 }  // namespace wellspace::server

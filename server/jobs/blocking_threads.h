@@ -19,7 +19,7 @@ namespace wellspace::server {
 // Thread safety: thread-safe. Tasks run without any lock held, may give others, and must not throw.
 class BlockingThreads {
  public:
-  // REQUIRES:   most_threads >= 1.
+  // `most_threads` 0: tasks run in RunNext alone, and in the destructor. For tests.
   explicit BlockingThreads(size_t most_threads) : most_threads_(most_threads) {}
   // Runs all tasks to their end.
   ~BlockingThreads();
@@ -29,6 +29,9 @@ class BlockingThreads {
   // Tasks of one `key` run in the order of these calls; the empty key is none.
   void Run(const std::string& key, std::function<void()> task);
 
+  // Without threads: runs the task whose turn it is. False: there is none.
+  bool RunNext();
+
  private:
   struct Ready {
     std::string key;
@@ -36,6 +39,8 @@ class BlockingThreads {
   };
 
   void RunThread();
+  // Runs the first task that is ready, with mutex_ held but for the task.
+  void RunFirst(std::unique_lock<std::mutex>& lock);
   // Wants mutex_ to be held.
   void MakeReady(Ready ready);
   // What follows a task of `key`. Wants mutex_ to be held.

@@ -11,6 +11,7 @@ Job::Job(JobPool& pool, JobRequest request)
     : pool_(pool),
       tenant_(std::move(request.tenant)),
       is_small_(request.is_small && pool.limits_.small_workers > 0),
+      is_alone_(request.is_alone),
       of_call_(request.of_call),
       held_(std::move(request.held)),
       work_(std::move(request.work)) {

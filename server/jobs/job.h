@@ -26,6 +26,8 @@ struct JobRequest {
   std::string tenant{};
   // Is expected to end within about a second (server/jobs/job_size.h): it need not wait for jobs that are not small.
   bool is_small = false;
+  // No other job runs beside it, and none begins before it: should it end the process, it is to take no other with it.
+  bool is_alone = false;
   // The memory of what the work brings along, such as its points; released with the work.
   MemoryReservation held{};
   // What the call has reserved that waits for the job, for longer than the work: bytes.
@@ -92,6 +94,7 @@ class Job final : private core::MemoryLender, public std::enable_shared_from_thi
   JobPool& pool_;
   const std::string tenant_;
   const bool is_small_;
+  const bool is_alone_;
   const uint64_t of_call_;
   const absl::Duration submitted_ = SinceBoot();
   core::RunContext context_;

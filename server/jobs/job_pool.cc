@@ -20,7 +20,7 @@ JobPool::JobPool(const Limits& limits, MemoryBudget& memory) : limits_(limits), 
     Dispatch();
   });
   std::lock_guard lock(mutex_);
-  for (size_t i = 0; i < Workers(); ++i) {
+  for (size_t i = 0; i < Workers() && limits_.run_by == RunBy::kOwnThreads; ++i) {
     StartThread();
   }
 }
@@ -32,6 +32,7 @@ JobPool::~JobPool() {
   std::unique_lock lock(mutex_);
   stopping_ = true;
   queue_ = FairQueue();
+  alone_.clear();
   dropped.swap(queued_);
   not_begun.swap(started_);
   for (const auto& [sequence, job] : begun_) {
@@ -69,6 +70,9 @@ absl::StatusOr<std::shared_ptr<Job>> JobPool::Submit(JobRequest request) {
       ++PartOf(jobs_of_[job->tenant_], *job);
       small_jobs_ += job->is_small_ ? 1 : 0;
       job->sequence_ = next_sequence_++;
+      if (job->is_alone_) {
+        alone_.insert(job->sequence_);
+      }
       AddToQueue(job);
       Dispatch();
       return job;
@@ -202,6 +206,10 @@ void JobPool::WaitFor(Job& job, std::unique_lock<std::mutex>& lock) {
 }
 
 void JobPool::Dispatch() {
+  if (!alone_.empty() && started_.empty() && begun_.empty()) {
+    Job& alone = *queued_.at(*alone_.begin());  // whatever it is behind
+    Start(alone, alone.is_small_);
+  }
   while (running_ < limits_.workers && !queue_.empty() && StartNext()) {
   }
   while (running_small_ < limits_.small_workers && StartSmall()) {
@@ -321,7 +329,10 @@ bool JobPool::RefuseVictim() {
 }
 
 bool JobPool::Admit(const QueuedJob& queued, uint64_t room_for_tree) {
-  return !queued.waits_for_memory || queued_.at(queued.sequence)->TakeWanted(room_for_tree);
+  if (queued.waits_for_memory) {
+    return queued_.at(queued.sequence)->TakeWanted(room_for_tree);
+  }
+  return alone_.empty();
 }
 
 void JobPool::Start(Job& job, bool small_worker) {
@@ -372,6 +383,7 @@ void JobPool::RemoveFromQueue(const Job& job) {
 
 void JobPool::EndOf(Job& job) {
   job.state_ = Job::State::kDone;
+  alone_.erase(job.sequence_);
   small_jobs_ -= job.is_small_ ? 1 : 0;
   const auto of_tenant = jobs_of_.find(job.tenant_);
   --PartOf(of_tenant->second, job);
@@ -396,25 +408,38 @@ void JobPool::RunWorker(std::list<std::thread>::iterator self) {
     if (started_.empty()) {
       break;
     }
-    const std::shared_ptr<Job> job = std::move(started_.front());
-    started_.pop_front();
-    begun_.emplace(job->sequence_, job);
-    Job::Work work = std::exchange(job->work_, nullptr);
-    lock.unlock();
-    work(*job);
-    work = nullptr;
-    if (memory_.is_limited()) {
-      malloc_trim(0);  // others may have its memory once the system has it
-    }
-    job->ReleaseAll();
-    lock.lock();
-    begun_.erase(job->sequence_);
-    --RunningLike(*job);
-    EndOf(*job);
-    Dispatch();
+    RunFirst(lock);
   }
   ended_threads_.splice(ended_threads_.end(), threads_, self);
   wake_.notify_all();
+}
+
+void JobPool::RunFirst(std::unique_lock<std::mutex>& lock) {
+  const std::shared_ptr<Job> job = std::move(started_.front());
+  started_.pop_front();
+  begun_.emplace(job->sequence_, job);
+  Job::Work work = std::exchange(job->work_, nullptr);
+  lock.unlock();
+  work(*job);
+  work = nullptr;
+  if (memory_.is_limited()) {
+    malloc_trim(0);  // others may have its memory once the system has it
+  }
+  job->ReleaseAll();
+  lock.lock();
+  begun_.erase(job->sequence_);
+  --RunningLike(*job);
+  EndOf(*job);
+  Dispatch();
+}
+
+bool JobPool::RunNext() {
+  std::unique_lock lock(mutex_);
+  if (started_.empty()) {
+    return false;
+  }
+  RunFirst(lock);
+  return true;
 }
 
 }  // namespace wellspace::server

@@ -11,6 +11,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
 
@@ -20,6 +21,7 @@
 #include "server/jobs/fair_queue.h"
 #include "server/jobs/job.h"
 #include "server/jobs/memory_budget.h"
+#include "server/jobs/run_by.h"
 
 namespace wellspace::server {
 
@@ -38,6 +40,9 @@ namespace wellspace::server {
 //
 // Where idle sessions can give up memory (MemoryBudget::MakeRoom), the thread of a job that waits has them do so.
 //
+// A job that is to run alone (JobRequest::is_alone) waits for the end of those that have begun, and all others for its
+// own.
+//
 // Thread safety: thread-safe. Work runs without any lock of the pool held.
 // Invariants: (1) at most `workers` jobs run and at most `max_queued` more are in the queue; with small workers as many
 // run besides, and as many small jobs are taken besides; of either kind `max_per_tenant` of one tenant; (2) the work of
@@ -47,10 +52,11 @@ namespace wellspace::server {
 class JobPool {
  public:
   struct Limits {
-    int workers = 1;         // at least 1
-    int max_queued = 0;      // at least 0
-    int max_per_tenant = 1;  // at least 1
-    int small_workers = 0;   // at least 0; 0: small jobs are as others
+    int workers = 1;                    // at least 1
+    int max_queued = 0;                 // at least 0
+    int max_per_tenant = 1;             // at least 1
+    int small_workers = 0;              // at least 0; 0: small jobs are as others
+    RunBy run_by = RunBy::kOwnThreads;  // kCaller: where memory is not limited
   };
 
   struct Load {
@@ -84,6 +90,10 @@ class JobPool {
   // Cancels the context of `job`; one in the queue that has not begun leaves it at once. Does not wait for one that
   // runs.
   void Cancel(const std::shared_ptr<Job>& job);
+
+  // With RunBy::kCaller: runs the job that a worker would run now. False: there is none. A job may call it, and runs
+  // beside the other then.
+  bool RunNext();
 
   Load GetLoad() const;
   Counters GetCounters() const;
@@ -151,6 +161,8 @@ class JobPool {
   void StartThread();
 
   void RunWorker(std::list<std::thread>::iterator self);
+  // Runs the first job of started_, with mutex_ held but for its work.
+  void RunFirst(std::unique_lock<std::mutex>& lock);
 
   const Limits limits_;
   MemoryBudget& memory_;
@@ -173,6 +185,7 @@ class JobPool {
   std::map<std::string, Share> jobs_of_;             // by tenant, in the queue or running; none is empty
   std::deque<std::shared_ptr<Job>> started_;         // wait for their thread to wake
   std::map<uint64_t, std::shared_ptr<Job>> begun_;   // have a thread: they run, or wait for memory
+  std::set<uint64_t> alone_;                         // those that run alone, from Submit to kDone
   int running_ = 0;                                  // have a worker: started_, and begun_ that do not wait
   int running_small_ = 0;                            // have a small worker
   int small_jobs_ = 0;                               // in the queue or running

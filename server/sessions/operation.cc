@@ -10,8 +10,8 @@
 namespace wellspace::server {
 namespace {
 
-// So often the process may die in the work of an operation.
-constexpr uint32_t kMostCrashes = 2;
+// So often the process may die in the work of an operation. The last time it has run alone, so that it is to blame.
+constexpr uint32_t kMostCrashes = 3;
 
 // Room for the numbers of the events of one process.
 constexpr int kAttemptShift = 32;
@@ -90,6 +90,8 @@ bool Operation::IsCancelled() const {
 
 bool Operation::IsSuspect() const { return crashes_ > 0; }
 
+bool Operation::RunsAlone() const { return crashes_ + 1 >= kMostCrashes; }
+
 store::v1::OperationRecord Operation::RecordLocked() const {
   store::v1::OperationRecord record;
   record.set_number(number_);
@@ -160,7 +162,8 @@ absl::Status Operation::RefusalToResume() const {
   if (crashes_ >= kMostCrashes) {
     return MakeError(v1::ERROR_REASON_WORK_CRASHED,
                      absl::StrCat("the server died ", crashes_, " times while it worked at ", name_,
-                                  ", and does not try it again; change its parameters or its points"));
+                                  ", at last with nothing beside it, and does not try it again; change its parameters "
+                                  "or its points"));
   }
   return absl::OkStatus();
 }

@@ -58,6 +58,8 @@ class Operation {
   bool IsCancelled() const;
   // Whether a process died while it worked at it.
   bool IsSuspect() const;
+  // Whether more than one did: the next try decides whether it is to blame.
+  bool RunsAlone() const;
 
   // The first kept event that is later than number `after`; nothing: there is none.
   std::optional<v1::ProgressEvent> EventAfter(std::optional<uint64_t> after) const;

@@ -1,5 +1,6 @@
 #include "server/sessions/refinement.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <deque>
@@ -232,12 +233,13 @@ absl::StatusOr<std::shared_ptr<Job>> Submit(const CallEnvironment& environment, 
   const bool is_small =
       size.points <= kMostSmallPoints && size.segments <= kMostSmallPoints &&
       IsSmallRefinement(session->ParametersOf(*operation), size.some_points, size.vertices, replayed_steps);
-  WELLSPACE_ASSIGN_OR_RETURN(
-      std::shared_ptr<Job> job,
-      environment.jobs.Submit(
-          {.tenant = session->tenant(), .is_small = is_small, .work = [&environment, session, operation](Job& self) {
-             Run(environment, session, operation, self);
-           }}));
+  WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Job> job,
+                             environment.jobs.Submit({.tenant = session->tenant(),
+                                                      .is_small = is_small,
+                                                      .is_alone = operation->RunsAlone(),
+                                                      .work = [&environment, session, operation](Job& self) {
+                                                        Run(environment, session, operation, self);
+                                                      }}));
   if (!operation->SetJob(job)) {
     environment.jobs.Cancel(job);  // the operation, which an earlier process left, was cancelled meanwhile
   }
@@ -262,8 +264,8 @@ void WhenEnded(Operation& operation, const std::function<void()>& then) {
   look();
 }
 
-// Operations in whose work a process has died come one after the other: one of them is to blame, and the others are
-// not to pay for it a second time.
+// Operations in whose work one process has died come one after the other: one of them is to blame, and the others are
+// not to pay for it a second time. They may, for what has come meanwhile and runs beside them.
 void ResumeNext(const CallEnvironment& environment, const std::shared_ptr<std::deque<ResumedOperation>>& suspects) {
   if (suspects->empty()) {
     return;
@@ -302,9 +304,11 @@ absl::StatusOr<std::shared_ptr<Operation>> StartRefinement(const CallEnvironment
 
 void ResumeRefinements(const CallEnvironment& environment, std::vector<ResumedOperation> resumed) {
   const auto suspects = std::make_shared<std::deque<ResumedOperation>>();
+  // Those that run alone first: nothing has begun yet that they would have to wait for.
+  std::ranges::stable_partition(resumed, [](const ResumedOperation& one) { return one.operation->RunsAlone(); });
   for (ResumedOperation& one : resumed) {
     StartTicking(environment.background, one.operation);
-    if (one.operation->IsSuspect()) {
+    if (one.operation->IsSuspect() && !one.operation->RunsAlone()) {
       suspects->push_back(std::move(one));
     } else {
       Resume(environment, one);

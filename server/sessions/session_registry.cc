@@ -13,10 +13,9 @@
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
-namespace {
 
 // 128 bits of the generator that the kernel has for keys; std::random_device does not promise as much.
-std::string UnguessableName() {
+std::string UnguessableSessionName() {
   std::string bits(16, '\0');
   if (getentropy(bits.data(), bits.size()) != 0) {
     std::abort();  // no kernel that this runs on is without
@@ -24,10 +23,9 @@ std::string UnguessableName() {
   return absl::StrCat("sessions/", absl::BytesToHexString(bits));
 }
 
-}  // namespace
-
-SessionRegistry::SessionRegistry(const ServiceOptions& options, MemoryBudget& memory, Clock clock, SessionLog& log)
-    : options_(options), memory_(memory), clock_(std::move(clock)), log_(log) {}
+SessionRegistry::SessionRegistry(const ServiceOptions& options, MemoryBudget& memory, Clock clock, SessionLog& log,
+                                 std::function<std::string()> make_name)
+    : options_(options), memory_(memory), clock_(std::move(clock)), log_(log), make_name_(std::move(make_name)) {}
 
 absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Create(NewSession settings,
                                                                  const AnswerTo<v1::Session>& answer) {
@@ -62,7 +60,7 @@ absl::StatusOr<std::shared_ptr<Session>> SessionRegistry::Prepare(NewSession set
   ++pending_;
   last_create_time_ = std::max(clock_.wall(), last_create_time_ + absl::Microseconds(1));
   return std::make_shared<Session>(Session::Settings{.tenant = std::move(settings.tenant),
-                                                     .name = UnguessableName(),
+                                                     .name = make_name_(),
                                                      .parameters = std::move(settings.parameters),
                                                      .labels = std::move(settings.labels),
                                                      .ttl = settings.ttl,

@@ -3,6 +3,7 @@
 #define WELLSPACE_SERVER_SESSIONS_SESSION_REGISTRY_H_
 
 #include <cstddef>
+#include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -27,6 +28,9 @@ struct NewSession {
   absl::Duration ttl;
 };
 
+// "sessions/{session}", with 128 bits of chance.
+std::string UnguessableSessionName();
+
 // The sessions of all tenants. No tenant sees those of another.
 //
 // Thread safety: thread-safe. No session is asked with the lock of the registry held: one that is written to, or read,
@@ -36,7 +40,9 @@ struct NewSession {
 class SessionRegistry {
  public:
   // REQUIRES:   `options`, `memory` and `log` outlive this and all sessions.
-  SessionRegistry(const ServiceOptions& options, MemoryBudget& memory, Clock clock, SessionLog& log);
+  // `make_name` makes the names of new sessions, no two the same; another one is for tests.
+  SessionRegistry(const ServiceOptions& options, MemoryBudget& memory, Clock clock, SessionLog& log,
+                  std::function<std::string()> make_name = UnguessableSessionName);
 
   // Makes a session without points, and has it written down.
   //
@@ -89,6 +95,7 @@ class SessionRegistry {
   MemoryBudget& memory_;
   const Clock clock_;
   SessionLog& log_;
+  const std::function<std::string()> make_name_;
   mutable std::mutex mutex_;
   // Guarded by mutex_.
   std::unordered_map<std::string, std::shared_ptr<Session>> by_name_;

@@ -6,6 +6,7 @@
 
 #include "absl/time/clock.h"
 #include "gtest/gtest.h"
+#include "server/jobs/blocking_threads.h"
 #include "tests/server/service_harness.h"
 
 namespace wellspace::server {
@@ -55,6 +56,38 @@ TEST(Background, DestructionDropsWhatIsNotDue) {
   }
   EXPECT_EQ(held.use_count(), 1);
   EXPECT_FALSE(*held);
+}
+
+TEST(Background, WithoutAThreadTasksRunAsTimePasses) {
+  std::vector<int> order;
+  Background background(RunBy::kCaller);
+  background.PostAfter(absl::Seconds(2), [&] {
+    order.push_back(2);
+    background.PostAfter(absl::Seconds(1), [&order] { order.push_back(3); });
+  });
+  background.PostAfter(absl::Seconds(9), [&order] { order.push_back(9); });
+  background.Post([&order] { order.push_back(0); });
+  EXPECT_TRUE(background.RunDue());
+  EXPECT_FALSE(background.RunDue());
+  EXPECT_EQ(order, std::vector<int>({0}));
+  background.Pass(absl::Seconds(3));
+  EXPECT_EQ(order, std::vector<int>({0, 2, 3}));
+  EXPECT_FALSE(background.RunDue());
+}
+
+TEST(BlockingThreads, WithoutThreadsTasksRunWhenTheyAreAskedTo) {
+  std::vector<int> order;
+  {
+    BlockingThreads blocking(0);
+    blocking.Run("a", [&order] { order.push_back(1); });
+    blocking.Run("a", [&order] { order.push_back(2); });
+    blocking.Run("", [&order] { order.push_back(3); });
+    EXPECT_TRUE(order.empty());
+    EXPECT_TRUE(blocking.RunNext());
+    EXPECT_TRUE(blocking.RunNext());
+    EXPECT_EQ(order, std::vector<int>({1, 3})) << "those of one key wait for one another";
+  }
+  EXPECT_EQ(order, std::vector<int>({1, 3, 2})) << "none is dropped";
 }
 
 }  // namespace

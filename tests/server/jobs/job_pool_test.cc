@@ -45,6 +45,47 @@ TEST(JobPool, HoldsNoMoreThanWorkersAndQueue) {
   EXPECT_NE(pool.Submit(WorkUntilCancelled), nullptr);
 }
 
+TEST(JobPool, OneThatRunsAloneHasNoOtherBesideIt) {
+  MemoryBudget memory(0);
+  JobPool pool({.workers = 2, .max_queued = 10, .max_per_tenant = 10, .small_workers = 2, .run_by = RunBy::kCaller},
+               memory);
+  std::string order;
+  const auto submit = [&](const std::string& name, bool is_alone, bool is_small, const std::function<void()>& work) {
+    return pool
+        .Submit({.tenant = "default",
+                 .is_small = is_small,
+                 .is_alone = is_alone,
+                 .work =
+                     [&order, name, work](Job&) {
+                       order += name;
+                       work();
+                     }})
+        .value();
+  };
+  const auto nothing = [] {};
+  const auto run_others = [&] {
+    while (pool.RunNext()) {
+    }
+    order += ".";
+  };
+  submit("a", false, false, run_others);
+  submit("b", false, false, nothing);
+  submit("c", false, false, nothing);  // waits for a worker
+  submit("d", true, false, run_others);
+  const std::shared_ptr<Job> cancelled = submit("e", true, true, nothing);
+  submit("f", true, true, run_others);
+  submit("g", false, true, nothing);
+  pool.Cancel(cancelled);
+  EXPECT_TRUE(pool.RunNext());
+  EXPECT_EQ(order, "ab.") << "what has begun ends before it";
+  EXPECT_TRUE(pool.RunNext());
+  EXPECT_EQ(order, "ab.d.") << "nothing begins beside it";
+  EXPECT_TRUE(pool.RunNext());
+  EXPECT_EQ(order, "ab.d.f.");
+  run_others();
+  EXPECT_TRUE(order == "ab.d.f.cg." || order == "ab.d.f.gc.") << order;
+}
+
 TEST(JobPool, WithoutQueueTakesAJobForEachWorker) {
   Pool pool(1, 0);
   EXPECT_NE(pool.Submit(WorkUntilCancelled), nullptr);

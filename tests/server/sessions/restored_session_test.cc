@@ -78,15 +78,18 @@ class RestoredSessionTest : public ::testing::Test {
   std::shared_ptr<Operation> resumed_;  // by the last process
 };
 
-TEST_F(RestoredSessionTest, AnOperationInWhichTwoProcessesDiedIsNotTriedAgain) {
+TEST_F(RestoredSessionTest, AnOperationInWhichThreeProcessesDiedIsNotTriedAgain) {
   const std::string name = StartOperation()->name();
   ASSERT_TRUE(session_->BeginWork(*session_->FindOperation(name).value()).has_value());
-  StartProcess();
-  ASSERT_NE(resumed_, nullptr);
-  EXPECT_EQ(resumed_->name(), name);
-  EXPECT_TRUE(resumed_->IsSuspect());
-  EXPECT_EQ(DetailsOf(session_->Append(0, std::vector<double>{0, 0}, 0)).reason, "SESSION_BUSY");
-  ASSERT_TRUE(session_->BeginWork(*resumed_).has_value());
+  for (const bool runs_alone : {false, true}) {
+    StartProcess();
+    ASSERT_NE(resumed_, nullptr);
+    EXPECT_EQ(resumed_->name(), name);
+    EXPECT_TRUE(resumed_->IsSuspect());
+    EXPECT_EQ(resumed_->RunsAlone(), runs_alone);
+    EXPECT_EQ(DetailsOf(session_->Append(0, std::vector<double>{0, 0}, 0)).reason, "SESSION_BUSY");
+    ASSERT_TRUE(session_->BeginWork(*resumed_).has_value());
+  }
   StartProcess();
   EXPECT_EQ(resumed_, nullptr);
   const v1::Operation operation = session_->FindOperation(name).value()->Describe();
