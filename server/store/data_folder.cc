@@ -166,9 +166,8 @@ absl::StatusOr<std::unique_ptr<DataFolder>> DataFolder::Open(const std::string& 
   folder->folder_lock_ = *std::move(folder_lock);
   folder->lock_ = *std::move(lock);
   WELLSPACE_RETURN_IF_ERROR(WithAdvice(files.CreateFolder(folder->paths_.files())));
-  WELLSPACE_RETURN_IF_ERROR(files.SynchronizeFolder(folder->paths_.files()));
-  WELLSPACE_RETURN_IF_ERROR(files.SynchronizeFolder(root));
-  // The name of the folder itself. Those above may be closed to this user, who has then not made it either.
+  // The name of the folder itself; the names in it are synchronised once the database is there. Folders above it may be
+  // closed to this user, who has then not made it either.
   const std::filesystem::path path(root);
   const std::string parent = (path.has_filename() ? path : path.parent_path()).parent_path().string();
   if (const absl::Status named = files.SynchronizeFolder(parent.empty() ? "." : parent);

@@ -11,6 +11,7 @@
 #include "absl/strings/str_cat.h"
 #include "gmock/gmock.h"
 #include "gtest/gtest.h"
+#include "server/store/back_up.h"
 #include "server/store/check_data.h"
 #include "tests/server/store/simulated_disk.h"
 #include "tests/server/store/store_life.h"
@@ -107,6 +108,53 @@ TEST(CrashHistories, EveryOperationMayBeTheLast) {
   EXPECT_GT(operation, 150u);
 }
 
+// Backs a life up and loses power then. What is wrong with the copy; nothing: it is whole, and has all.
+std::string LosePowerAfterBackUp(const std::string& unsynchronised, uint64_t seed) {
+  SimulatedDisk disk;
+  {
+    StoreLife life(disk);
+    absl::Status status = life.Open();
+    for (const StoreLife::Action action : {StoreLife::Action::kCreate, StoreLife::Action::kUpload,
+                                           StoreLife::Action::kUpload, StoreLife::Action::kSucceed}) {
+      for (uint64_t number = 0; number < 3 && status.ok(); ++number) {
+        status = life.Do(action, number);
+      }
+    }
+    if (!status.ok()) {
+      return status.ToString();
+    }
+  }
+  if (!unsynchronised.empty()) {
+    disk.OmitSynchronize(unsynchronised);
+  }
+  const CheckDataOptions options{.files = &disk.files(), .tables = {.vfs = disk.vfs(), .is_exclusive = true}};
+  const auto backed_up = BackUp(StoreLife::kFolder, "/copy", options);
+  if (!backed_up.ok()) {
+    return absl::StrCat("the back-up fails: ", backed_up.status().ToString());
+  }
+  disk.Restart(seed % 2 == 0 ? Loss::kAll : Loss::kSome, seed);
+  const auto report = CheckData("/copy", options);
+  if (!report.ok() || !report->is_whole()) {
+    return absl::StrCat("check-data: ", report.status().ToString(), report.ok() ? report->problems[0] : "");
+  }
+  const bool has_all = report->sessions == 3 && report->points > 0 && report->points == backed_up->points &&
+                       report->meshes > 0 && report->meshes == backed_up->meshes;
+  return has_all ? "" : "some are missing";
+}
+
+TEST(BackUp, OutlivesALossOfPower) {
+  for (uint64_t seed = 0; seed < 20; ++seed) {
+    EXPECT_EQ(LosePowerAfterBackUp("", seed), "") << seed;
+  }
+  for (const char* end : {"/copy", "/copy/files", "/copy/sessions.db", ".points", "/"}) {
+    bool is_found = false;
+    for (uint64_t seed = 0; seed < 20; ++seed) {
+      is_found |= !LosePowerAfterBackUp(end, seed).empty();
+    }
+    EXPECT_TRUE(is_found) << "without the synchronisation of " << end;
+  }
+}
+
 struct PlantedBug {
   const char* name;
   Bugs bugs;
@@ -129,7 +177,9 @@ INSTANTIATE_TEST_SUITE_P(
                       PlantedBug{"PointsWithoutSynchronisation", {.unsynchronised = {".points"}}},
                       PlantedBug{"LogWithoutSynchronisation", {.unsynchronised = {"-wal"}}},
                       PlantedBug{"MarkWithoutSynchronisation", {.unsynchronised = {"-mark"}}},
-                      PlantedBug{"FolderWithoutItsName", {.unsynchronised = {"/data"}}}),
+                      PlantedBug{"DatabaseWithoutSynchronisation", {.unsynchronised = {".db"}}},
+                      PlantedBug{"FolderWithoutTheNamesInIt", {.unsynchronised = {"/data"}}},
+                      PlantedBug{"FolderWithoutItsName", {.unsynchronised = {"/"}}}),
     [](const auto& of) { return std::string(of.param.name); });
 
 }  // namespace
