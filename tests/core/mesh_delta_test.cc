@@ -183,6 +183,36 @@ TEST_P(MeshDeltaTest, IsRefusedByAnotherMesh) {
   EXPECT_EQ(DiffMeshes(base, other_dimension, kMuch, RunContext()).status().code(), absl::StatusCode::kInvalidArgument);
 }
 
+// The difference may be right in all that it says, and of another mesh all the same: that shows only by a number of all
+// arrays.
+TEST_P(MeshDeltaTest, IsRefusedByAMeshOfWhichOneNumberOfOneArrayIsAnother) {
+  const Mesh base = RandomMesh(20, 40, true);
+  const MeshDelta delta = Diff(base, base);
+  ASSERT_TRUE(ApplyDelta(base, delta).ok());
+  const auto expect_refused = [&](const char* array, const auto& change) {
+    Mesh other = base;
+    change(other);
+    EXPECT_EQ(ApplyDelta(other, delta).status().code(), absl::StatusCode::kInvalidArgument) << array;
+  };
+  const auto expect_each_refused = [&](const char* array, auto Mesh::*values) {
+    ASSERT_FALSE((base.*values).empty()) << array;
+    for (const size_t place : {size_t{0}, (base.*values).size() / 2, (base.*values).size() - 1}) {
+      expect_refused(array, [&](Mesh& other) { (other.*values)[place] += 1; });
+    }
+  };
+  expect_each_refused("points", &Mesh::points);
+  expect_each_refused("weights", &Mesh::weights);
+  expect_each_refused("simplices", &Mesh::simplices);
+  expect_each_refused("input_vertex", &Mesh::input_vertex);
+  expect_each_refused("vertex_origins", &Mesh::vertex_origins);
+  expect_each_refused("vertex_tags", &Mesh::vertex_tags);
+  expect_each_refused("simplex_regions", &Mesh::simplex_regions);
+  expect_each_refused("facets", &Mesh::facets);
+  MeshDelta moved = delta;  // they are whole in the difference
+  moved.moved_vertices.push_back(3);
+  EXPECT_EQ(ApplyDelta(base, moved).status().code(), absl::StatusCode::kInvalidArgument) << "moved_vertices";
+}
+
 TEST_P(MeshDeltaTest, IsRefusedIfItContradictsItself) {
   for (int round = 0; round < 2000; ++round) {
     const Mesh base = RandomMesh(1 + Below(20), 1 + Below(40), Below(2) == 0);

@@ -101,6 +101,34 @@ TEST_F(DeltaSnapshotTest, MetadataAreThoseOfTheMeshItMakes) {
   EXPECT_EQ(without.delta().checksums().simplices(), with.delta().checksums().simplices());
 }
 
+// Clients know by them whether the mesh that they had was the base.
+TEST_F(DeltaSnapshotTest, EachArrayHasItsChecksum) {
+  next_.weights.assign(next_.vertex_count(), 0.5);
+  next_.simplex_regions.assign(next_.simplex_count(), 1);
+  next_.facets.assign(3 * 7, 2);
+  const auto checksums = [this] { return DeltaSnapshot(3, 5, delta_, next_).Metadata(true).delta().checksums(); };
+  const v1::MeshChecksums before = checksums();
+  const auto expect_changed = [&](const char* array, auto& values, auto of) {
+    ASSERT_FALSE(values.empty()) << array;
+    for (const size_t place : {size_t{0}, values.size() - 1}) {
+      const auto known = values[place];
+      values[place] += 1;
+      const v1::MeshChecksums after = checksums();
+      EXPECT_NE((after.*of)(), (before.*of)()) << array << " " << place;
+      values[place] = known;
+    }
+    EXPECT_EQ(checksums().SerializeAsString(), before.SerializeAsString());
+  };
+  expect_changed("points", next_.points, &v1::MeshChecksums::points);
+  expect_changed("weights", next_.weights, &v1::MeshChecksums::weights);
+  expect_changed("simplices", next_.simplices, &v1::MeshChecksums::simplices);
+  expect_changed("input_vertices", next_.input_vertex, &v1::MeshChecksums::input_vertices);
+  expect_changed("vertex_origins", next_.vertex_origins, &v1::MeshChecksums::vertex_origins);
+  expect_changed("vertex_tags", next_.vertex_tags, &v1::MeshChecksums::vertex_tags);
+  expect_changed("simplex_regions", next_.simplex_regions, &v1::MeshChecksums::simplex_regions);
+  expect_changed("facets", next_.facets, &v1::MeshChecksums::facets);
+}
+
 TEST_F(DeltaSnapshotTest, MemoryIsThatOfTheParts) {
   const DeltaSnapshot snapshot(3, 5, delta_, next_);
   uint64_t sent = 0;
