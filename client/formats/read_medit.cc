@@ -36,8 +36,10 @@ class MeditReader {
       return reader_.EndError("expected \"MeshVersionFormatted\" at the start of the file");
     }
     WELLSPACE_RETURN_IF_ERROR(fields_.NextWhole("the version", kMaxCount, version));
+    bool has_end = false;
     while (fields_.Next(word)) {
       if (word == "End") {
+        has_end = true;
         break;
       }
       // What follows a word that is not known is skipped up to the next word.
@@ -67,6 +69,11 @@ class MeditReader {
     if (!has_vertices_ || (!triangles_.is_there && !tetrahedra_.is_there)) {
       return reader_.Error(
           absl::StrCat("the file ends; expected ", has_vertices_ ? "Triangles or Tetrahedra" : "Vertices"));
+    }
+    if (has_end) {
+      // What we have written there are comments with names. It is nothing that a mesh needs, whatever it is.
+      std::string_view line;
+      reader_.NextContent(line);
     }
     return MakeMesh();
   }

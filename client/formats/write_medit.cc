@@ -20,10 +20,8 @@ namespace {
 class MeditWriter final : public MeshWriter {
  public:
   MeditWriter(OutputFile output, const MeshShape& shape) : shape_(shape), output_(std::move(output)) {
-    const NameLines names(shape_);
-    AddNote(names.ChangesNote());
-    output_.Write(absl::StrCat("MeshVersionFormatted 2\nDimension ", shape_.dimension, "\n", names.Text("# "),
-                               "Vertices\n", shape_.vertex_count, "\n"));
+    output_.Write(absl::StrCat("MeshVersionFormatted 2\nDimension ", shape_.dimension, "\nVertices\n",
+                               shape_.vertex_count, "\n"));
   }
 
   absl::Status AddPoints(std::span<const double> points) override {
@@ -86,7 +84,10 @@ class MeditWriter final : public MeshWriter {
     if (!shape_.boundary.empty()) {
       BeginFacets();
     }
-    output_.Write("End\n");
+    // Behind the end: not every reader knows comments.
+    const NameLines names(shape_);
+    AddNote(names.ChangesNote());
+    output_.Write(absl::StrCat("End\n", names.Text("# ")));
     WELLSPACE_RETURN_IF_ERROR(output_.status());
     WELLSPACE_RETURN_IF_ERROR(CheckComplete(shape_, {.vertices = vertices_,
                                                      .weights = 0,

@@ -12,7 +12,7 @@
 namespace wellspace::formats {
 namespace {
 
-constexpr size_t kChunkBytes = 1 << 18;
+constexpr size_t kLineChunkBytes = 1 << 18;
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
 }  // namespace
@@ -39,8 +39,8 @@ bool LineReader::Fill() {
   std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
   end_ -= begin_;
   begin_ = 0;
-  if (buffer_.size() < end_ + kChunkBytes) {
-    buffer_.resize(end_ + kChunkBytes);
+  if (buffer_.size() < end_ + kLineChunkBytes) {
+    buffer_.resize(end_ + kLineChunkBytes);
   }
   const absl::StatusOr<size_t> got = file_.Read(buffer_.data() + end_, buffer_.size() - end_);
   if (!got.ok()) {

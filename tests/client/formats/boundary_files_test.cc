@@ -120,9 +120,9 @@ TEST_F(BoundaryFilesTest, PiecesMakeTheSameFileAndMissingFacetsNone) {
 TEST_F(BoundaryFilesTest, TheSquareAsText) {
   Write(Square(), "a.mesh");
   EXPECT_EQ(folder_.Read("a.mesh"),
-            "MeshVersionFormatted 2\nDimension 2\n# part 1: xmin\n# part 2: xmax\n# part 3: ymin\n# part 4: ymax\n"
-            "# region 1: domain\nVertices\n4\n0 0 0\n1 0 0\n0 1 0\n1 1 0\nTriangles\n2\n1 2 3 1\n"
-            "2 4 3 1\nEdges\n4\n3 1 1\n2 4 2\n1 2 3\n4 3 4\nEnd\n");
+            "MeshVersionFormatted 2\nDimension 2\nVertices\n4\n0 0 0\n1 0 0\n0 1 0\n1 1 0\nTriangles\n2\n1 2 3 1\n"
+            "2 4 3 1\nEdges\n4\n3 1 1\n2 4 2\n1 2 3\n4 3 4\nEnd\n"
+            "# part 1: xmin\n# part 2: xmax\n# part 3: ymin\n# part 4: ymax\n# region 1: domain\n");
   Write(Square(), "a.msh", "msh22");
   const std::string msh = folder_.Read("a.msh");
   EXPECT_EQ(

@@ -150,13 +150,57 @@ class Interoperability(unittest.TestCase):
                 self.assert_blocks(mesh, *blocks)
                 numpy.testing.assert_array_equal(mesh.cell_data["su2:tag"][1], numpy.repeat([1, 2], [30, 60]))
 
+    def test_meshio_reads_our_vtu_with_boundary_and_names(self):
+        for dimension in (2, 3):
+            with self.subTest(dimension=dimension):
+                points, cells, facets, tags, regions = self.write_with_boundary(dimension)
+                self.convert("mesh.npz", "mesh.vtu")
+                mesh = meshio.read(self.folder / "mesh.vtu")
+                numpy.testing.assert_array_equal(mesh.points.view(numpy.uint64), pad(points).view(numpy.uint64))
+                self.assert_blocks(mesh, (cell_type(dimension), cells), ("line" if dimension == 2 else "triangle", facets))
+                numpy.testing.assert_array_equal(mesh.cell_data["boundary"][1], tags)
+                numpy.testing.assert_array_equal(mesh.cell_data["region"][0], regions)
+
+    def test_meshio_reads_our_mesh_with_names(self):
+        for dimension in (2, 3):
+            with self.subTest(dimension=dimension):
+                points, cells, facets, tags, regions = self.write_with_boundary(dimension)
+                self.convert("mesh.npz", "mesh.mesh")
+                mesh = meshio.read(self.folder / "mesh.mesh")
+                numpy.testing.assert_array_equal(mesh.points.view(numpy.uint64), points.view(numpy.uint64))
+                numpy.testing.assert_array_equal(mesh.cell_data["medit:ref"][0], regions)
+                numpy.testing.assert_array_equal(mesh.cell_data["medit:ref"][1], tags)
+
+    def test_we_read_the_binary_msh_22_of_meshio(self):
+        for dimension in (2, 3):
+            with self.subTest(dimension=dimension):
+                points, cells = random_mesh(dimension)
+                meshio.Mesh(pad(points), [(cell_type(dimension), cells)]).write(
+                    self.folder / "theirs.msh", file_format="gmsh22", binary=True)
+                self.convert("theirs.msh", "ours.vtu")
+                self.assert_same_bits(meshio.read(self.folder / "ours.vtu"), pad(points), cells, dimension)
+
+    def test_we_read_the_vtk_of_meshio(self):
+        for dimension, name in ((2, "vtk42"), (3, "vtk42"), (2, "vtk51"), (3, "vtk51")):
+            for binary in (False, True):
+                with self.subTest(dimension=dimension, name=name, binary=binary):
+                    points, cells = random_mesh(dimension, 300, 900)
+                    points = numpy.round(numpy.clip(points, -1e6, 1e6), 3)
+                    meshio.Mesh(pad(points), [(cell_type(dimension), cells)]).write(
+                        self.folder / "theirs.vtk", file_format=name, binary=binary)
+                    self.convert("theirs.vtk", "ours.vtu")
+                    self.assert_same_bits(meshio.read(self.folder / "ours.vtu"), pad(points), cells, dimension)
+
     def test_meshio_reads_our_inp_with_sets(self):
         for dimension in (2, 3):
             with self.subTest(dimension=dimension):
                 points, cells, facets, tags, regions = self.write_with_boundary(dimension)
                 self.convert("mesh.npz", "mesh.inp")
                 mesh = meshio.read(self.folder / "mesh.inp")
-                numpy.testing.assert_array_equal(mesh.points.view(numpy.uint64), points.view(numpy.uint64))
+                # A number has 20 characters at most, as CalculiX reads them.
+                numpy.testing.assert_allclose(mesh.points, points, rtol=1e-13, atol=0)
+                usual = (numpy.abs(points) > 0.01) & (numpy.abs(points) < 1e15)
+                numpy.testing.assert_array_equal(mesh.points[usual].view(numpy.uint64), points[usual].view(numpy.uint64))
                 self.assert_blocks(mesh, (cell_type(dimension), cells))
                 for name, tag in (("xmax", 2), ("ice___snow", 5)):
                     numpy.testing.assert_array_equal(mesh.point_sets[name], numpy.unique(facets[tags == tag]))

@@ -289,7 +289,7 @@ TEST_F(RegionFilesTest, MshOfGmshWithOneGroup) {
 TEST_F(RegionFilesTest, Errors) {
   Write(Square(), "a.mesh");
   EXPECT_THAT(ReadBadWith("a.mesh", "1 2 3 7", "1 2 3 x"),
-              HasSubstr("a.mesh:13: expected the reference of one of the triangles"));
+              HasSubstr("a.mesh:11: expected the reference of one of the triangles"));
   Write(Square(), "a.vtu");
   const std::string array = "<DataArray type=\"Int32\" Name=\"region\" format=\"ascii\">";
   folder_.Write("a.vtu",
