@@ -5,18 +5,44 @@
 #include <utility>
 #include <vector>
 
+#include "absl/synchronization/notification.h"
 #include "gtest/gtest.h"
 #include "server/store/check_data.h"
 #include "server/store/durable_log.h"
+#include "server/wire/errors.h"
 #include "tests/server/scripted_mesher.h"
 #include "tests/server/service_harness.h"
 #include "tests/server/session_calls.h"
+#include "tests/server/store/passing_log.h"
 #include "tests/server/store/store_support.h"
 
 namespace wellspace::server {
 namespace {
 
 constexpr absl::Duration kLong = absl::Minutes(1);
+
+// Has no room for the first deletions.
+class FullLog final : public PassingLog {
+ public:
+  FullLog(std::unique_ptr<DurableLog> log, int refusals) : PassingLog(*log), log_(std::move(log)), left_(refusals) {}
+
+  absl::Status Commit(const SessionChange& change, Survives survives) override {
+    if (change.is_deletion && left_-- > 0) {
+      return MakeError(v1::ERROR_REASON_DISK_FULL, "no room");
+    }
+    absl::Status status = PassingLog::Commit(change, survives);
+    if (change.is_deletion && status.ok()) {
+      is_deleted_.Notify();
+    }
+    return status;
+  }
+  bool WaitUntilDeleted() { return is_deleted_.WaitForNotificationWithTimeout(kLong); }
+
+ private:
+  const std::unique_ptr<DurableLog> log_;
+  std::atomic<int> left_;
+  absl::Notification is_deleted_;
+};
 
 // A server over the folder of the test, as often as it is started.
 class RestartTest : public ::testing::Test {
@@ -31,8 +57,12 @@ class RestartTest : public ::testing::Test {
   void Start(MesherFactory create_mesher = CreateMesher) {
     absl::StatusOr<std::unique_ptr<DurableLog>> log = DurableLog::Open({.folder = folder_.path()});
     ASSERT_TRUE(log.ok()) << log.status();
+    StartOn(*std::move(log), std::move(create_mesher));
+  }
+
+  void StartOn(std::unique_ptr<SessionLog> log, MesherFactory create_mesher = CreateMesher) {
     service_.emplace(FakeMesher, options_, Transport::kInProcess, FakeEstimator, std::move(create_mesher),
-                     SecurityOptions(), *std::move(log));
+                     SecurityOptions(), std::move(log));
     calls_.emplace(service_->channel());
   }
 
@@ -381,6 +411,20 @@ TEST_F(RestartTest, WhatAClientHasCancelledIsNotTakenUpAgain) {
   EXPECT_EQ(calls().GetOperation(operation).state(), v1::Operation::STATE_CANCELLED);
   EXPECT_EQ(calls().Get(name).state(), v1::Session::STATE_OPEN);
   EXPECT_EQ(calls().Refine(name).name(), name + "/operations/2") << "numbers are not given twice";
+}
+
+// Its end is written down once there is room, not only by the next start.
+TEST_F(RestartTest, ASessionThatExpiresOnAFullDiskIsFreedLater) {
+  auto log = std::make_unique<FullLog>(DurableLog::Open({.folder = folder_.path()}).value(), /*refusals=*/2);
+  FullLog& full = *log;
+  StartOn(std::move(log));
+  v1::CreateSessionRequest request;
+  *request.mutable_parameters() = UnitCubeParameters(2);
+  request.mutable_ttl()->set_seconds(1);
+  const std::string name = calls().Create(request).name();
+  EXPECT_TRUE(full.WaitUntilDeleted());
+  Restart();
+  EXPECT_EQ(calls().List({}).sessions_size(), 0) << name;
 }
 
 TEST_F(RestartTest, ADamagedMeshCostsItsSessionAlone) {
