@@ -196,7 +196,9 @@ absl::Status SimulatedDisk::Synchronize(Inode& inode, const std::string& path) {
 }
 
 bool SimulatedDisk::IsOmitted(const std::string& path) const {
-  return std::ranges::any_of(omitted_, [&](const std::string& end) { return path.ends_with(end); });
+  return std::ranges::any_of(omitted_, [&](const Omitted& omitted) {
+    return path.ends_with(omitted.end) && (!omitted.is_planted || omitted.is_planted());
+  });
 }
 
 void SimulatedDisk::ChangeNames(NameChange change) {

@@ -11,6 +11,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "server/store/file_system.h"
@@ -60,8 +61,11 @@ class SimulatedDisk {
   bool has_failed() const { return has_failed_; }
   // What the operation that died or failed was.
   const std::string& failed_operation() const { return failed_operation_; }
-  // From now on files and folders whose paths end so are not synchronised, though it is said.
-  void OmitSynchronize(const std::string& end) { omitted_.push_back(end); }
+  // From now on files and folders whose paths end so are not synchronised, though it is said, as long as `is_planted`
+  // says so; null: always.
+  void OmitSynchronize(const std::string& end, std::function<bool()> is_planted = nullptr) {
+    omitted_.push_back({end, std::move(is_planted)});
+  }
 
   // What the machine finds when it is started again. Ends DieAt and FailAt.
   void Restart(Loss loss, uint64_t seed);
@@ -134,7 +138,11 @@ class SimulatedDisk {
   bool has_failed_ = false;
   bool is_short_write_ = false;  // of the operation that has just begun
   std::string failed_operation_;
-  std::vector<std::string> omitted_;
+  struct Omitted {
+    std::string end;
+    std::function<bool()> is_planted;
+  };
+  std::vector<Omitted> omitted_;
 };
 
 }  // namespace wellspace::server
