@@ -54,6 +54,10 @@ struct FaceSeed {
   bool is_hole = false;
   int32_t region = 0;
   double max_area = 0;  // 0: no bound
+  // The rings of a polygon: so many segments from the first on. It stands for all faces inside of them. 0: the seed is
+  // the point, as it is to a server that is too old to know of polygons.
+  uint64_t first_segment = 0;
+  uint64_t segment_count = 0;
 };
 
 // Segments between points in 2-D, and the faces that they bound; see the proto's SegmentChunk and FaceOptions.

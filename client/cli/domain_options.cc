@@ -48,29 +48,27 @@ absl::StatusOr<client::Features> FeaturesOf(const formats::PlanarDomain& domain,
                               .y = seed.y,
                               .is_hole = seed.is_hole,
                               .region = seed.is_hole ? 0 : static_cast<int32_t>(seed.attribute),
-                              .max_area = seed.max_area});
+                              .max_area = seed.max_area,
+                              .first_segment = seed.first_segment,
+                              .segment_count = seed.segment_count});
   }
   return features;
 }
 
 }  // namespace
 
-void DomainOptions::AddTo(CLI::App& command) {
+void DomainOptions::AddReadingTo(CLI::App& command, const std::string& what) {
   command.add_flag(
       "--segments", has_segments_,
-      "IN is a domain in 2-D: lines of .obj, or polylines of .csv, become edges of the mesh. Files of .poly "
-      "and .geojson always have segments");
+      absl::StrCat(what,
+                   " is a domain in 2-D: lines of .obj, or polylines of .csv, become edges of the mesh. Files of "
+                   ".poly and .geojson always have segments"));
   command
       .add_option("--faces", faces_,
                   "Which faces, into which segments cut the plane, are meshed: box, all in the box; holes, all bounded "
                   "ones but holes; even-odd, those that an odd number of rings surrounds; default: holes for .poly, "
                   "even-odd for polygons of .geojson, box for lines")
       ->check(CLI::IsMember({kBox, kHoles, kEvenOdd}));
-  command.add_flag("--split-crossings", splits_crossings_,
-                   "Make vertices of the crossings of segments, and lead segments through points that are too near to "
-                   "them; default: both are errors");
-  command.add_flag("--snap", snaps_,
-                   "Lead segments through points that are too near to them, and leave crossings an error");
   command
       .add_option("--region-property", reading_.region_property,
                   "Of .geojson: the property, a whole number, that is the region of the triangles in a polygon")
@@ -85,11 +83,20 @@ void DomainOptions::AddTo(CLI::App& command) {
       ->type_name("NAME");
 }
 
+void DomainOptions::AddTo(CLI::App& command) {
+  AddReadingTo(command, "IN");
+  command.add_flag("--split-crossings", splits_crossings_,
+                   "Make vertices of the crossings of segments, and lead segments through points that are too near to "
+                   "them; default: both are errors");
+  command.add_flag("--snap", snaps_,
+                   "Lead segments through points that are too near to them, and leave crossings an error");
+}
+
 bool DomainOptions::IsDomain(const std::string& path, const std::string& format) const {
   return has_segments_ || (format.empty() ? formats::IsDomainPath(path) : format == "poly" || format == "geojson");
 }
 
-absl::Status DomainOptions::CheckCloud() const {
+absl::Status DomainOptions::CheckCloud(const std::string& cloud) const {
   const char* const option = !faces_.empty()                     ? "--faces"
                              : splits_crossings_                 ? "--split-crossings"
                              : snaps_                            ? "--snap"
@@ -98,7 +105,7 @@ absl::Status DomainOptions::CheckCloud() const {
                                                                  : nullptr;
   return option == nullptr ? absl::OkStatus()
                            : absl::InvalidArgumentError(absl::StrCat(
-                                 option, ": IN has points alone; give a .poly or .geojson, or --segments"));
+                                 option, ": ", cloud, " has points alone; give a .poly or .geojson, or --segments"));
 }
 
 absl::StatusOr<formats::PointCloud> DomainOptions::Read(const std::string& path, const formats::CloudOptions& options) {

@@ -25,18 +25,26 @@ class DomainOptions {
  public:
   // REQUIRES:   this outlives `command`.
   void AddTo(CLI::App& command);
+  // The same but for --split-crossings and --snap. `what` is the file, as the options say it.
+  void AddReadingTo(CLI::App& command, const std::string& what);
 
   // Whether `path`, or the format that is given, has segments.
   bool IsDomain(const std::string& path, const std::string& format) const;
 
-  // Refuses options that want segments beside a cloud.
-  absl::Status CheckCloud() const;
+  // Refuses options that want segments beside a cloud, which is what the error says.
+  absl::Status CheckCloud(const std::string& cloud = "IN") const;
 
   // Reads the domain, by the format and the columns that are given; its points alone are returned, with their origins,
   // and its segments are kept.
   //
   // Errors:     those of formats::ReadPlanarDomain; INVALID_ARGUMENT for attributes that are no region.
   absl::StatusOr<formats::PointCloud> Read(const std::string& path, const formats::CloudOptions& options);
+
+  // Whether what has been read tells the markers of segments, and the regions of faces: GeoJSON does by a property.
+  //
+  // REQUIRES:   Read is OK.
+  bool KnowsMarkers() const { return domain_->places.empty() || !reading_.marker_property.empty(); }
+  bool KnowsRegions() const { return domain_->places.empty() || !reading_.region_property.empty(); }
 
   // What has been read; null before.
   const std::shared_ptr<const client::Features>& features() const { return features_; }

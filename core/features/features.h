@@ -24,12 +24,21 @@ enum class CrossingRule : uint8_t {
   kSplit,   // the same, and a crossing, rounded, becomes a vertex
 };
 
-// A point that names the face which it lies in.
+// What is said of faces: of the one that a point lies in, or of all inside of a polygon.
 struct FaceSeed {
-  Point<2> at{};
+  Point<2> at{};                                              // the point; of a polygon not looked at
   bool is_hole = false;                                       // the face is not meshed
   int32_t region = 0;                                         // of the simplices in the face, unless a hole
   double max_area = std::numeric_limits<double>::infinity();  // of a simplex there; a squared length
+  // The rings of a polygon, so many segments from the first on. It holds the faces that an odd number of them separates
+  // from infinity. 0: it is a point.
+  uint32_t first_segment = 0;
+  uint32_t segment_count = 0;
+
+  bool IsPolygon() const { return segment_count > 0; }
+  bool SaysTheSameAs(const FaceSeed& other) const {
+    return is_hole == other.is_hole && region == other.region && max_area == other.max_area;
+  }
 };
 
 // Segments and seeds beside n given points. The spans have to outlive this.

@@ -12,12 +12,13 @@
 #include "absl/strings/str_cat.h"
 #include "core/base/status_macros.h"
 #include "core/features/place.h"
+#include "core/features/polygon_seeds.h"
 #include "core/geometry/exact_measure.h"
 
 namespace wellspace::core {
 namespace {
 
-constexpr uint32_t kNone = std::numeric_limits<uint32_t>::max();
+constexpr uint32_t kNone = GraphSegment::kNoPolygon;
 
 // Sets of numbers that are joined.
 class UnionFind {
@@ -182,7 +183,8 @@ class FaceFinder {
       const bool is_first = is_point && !has_begun[components.Find(event)];
       if (is_first || !is_point) {
         const auto above = met.lower_bound(at(event));
-        if (!is_point && ((above != met.end() && !IsBelow{this}(at(event), *above)) || IsOnEnd(at(event)))) {
+        if (!is_point && !seeds_[event - points].IsPolygon() &&
+            ((above != met.end() && !IsBelow{this}(at(event), *above)) || IsOnEnd(at(event)))) {
           const GraphSegment& on = graph_.segments[above != met.end() ? *above : 0];
           return absl::InvalidArgumentError(absl::StrCat(
               "seeds[", event - points, "] at ", PlaceText(at(event)), " lies on ",
@@ -291,20 +293,32 @@ class FaceFinder {
     return absl::OkStatus();
   }
 
+  // What a point says of a face comes before what polygons do.
   absl::Status ApplySeeds() {
+    WELLSPACE_ASSIGN_OR_RETURN(const std::vector<uint32_t> polygons,
+                               FindPolygonsOfFaces(graph_, out_, seeds_, context_));
     std::vector<uint32_t> seed_of(out_.faces.size(), kNone);
     for (uint32_t i = 0; i < seeds_.size(); ++i) {
       const FaceSeed& seed = seeds_[i];
+      if (seed.IsPolygon()) {
+        continue;
+      }
       uint32_t& first = seed_of[seed_face_[i]];
       if (first == kNone) {
         first = i;
-      } else if (seeds_[first].is_hole != seed.is_hole || seeds_[first].region != seed.region ||
-                 seeds_[first].max_area != seed.max_area) {
+      } else if (!seeds_[first].SaysTheSameAs(seed)) {
         return absl::InvalidArgumentError(absl::StrCat("seeds[", first, "] at ", PlaceText(seeds_[first].at),
                                                        " and seeds[", i, "] at ", PlaceText(seed.at),
                                                        " lie in one face and differ; leave one out"));
       }
-      Face& face = out_.faces[seed_face_[i]];
+    }
+    for (uint32_t i = 0; i < seed_of.size(); ++i) {
+      const uint32_t number = seed_of[i] != kNone ? seed_of[i] : polygons[i];
+      if (number == kNone) {
+        continue;
+      }
+      Face& face = out_.faces[i];
+      const FaceSeed& seed = seeds_[number];
       if (seed.is_hole) {
         face.is_meshed = false;
       } else {

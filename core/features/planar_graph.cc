@@ -13,6 +13,7 @@
 #include "core/base/thread_team.h"
 #include "core/features/near_segment.h"
 #include "core/features/place.h"
+#include "core/features/polygon_seeds.h"
 #include "core/features/segment_pairs.h"
 #include "core/geometry/exact_measure.h"
 #include "core/geometry/segment.h"
@@ -114,6 +115,8 @@ class GraphMaker {
 
   absl::Status TakeSegments() {
     const size_t inputs = graph_.point_of_input.size();
+    WELLSPACE_ASSIGN_OR_RETURN(const std::vector<uint32_t> polygons, PolygonsOfSegments(features_, context_));
+    graph_.seeds = static_cast<uint32_t>(features_.seeds.size());
     for (size_t s = 0; s < features_.segment_count(); ++s) {
       GraphSegment segment;
       for (const size_t end : {size_t{0}, size_t{1}}) {
@@ -128,13 +131,14 @@ class GraphMaker {
       segment.marker = features_.markers.empty() ? 0 : features_.markers[s];
       segment.source = static_cast<uint32_t>(s);
       segment.rings = features_.is_open.empty() || features_.is_open[s] == 0 ? 1 : 0;
+      segment.polygons = polygons.empty() ? GraphSegment::kNoPolygon : polygons[s];
       if (segment.a == segment.b) {
         ++graph_.counts.empty_segments;
       } else {
         graph_.segments.push_back(segment);
       }
     }
-    return absl::OkStatus();
+    return polygons.empty() ? absl::OkStatus() : CheckPolygonsClosed(graph_.point_of_input, features_, context_);
   }
 
   uint32_t AddPoint(const Point<2>& p) {
@@ -189,6 +193,7 @@ class GraphMaker {
       // A side of the box keeps the marker of a segment along it.
       graph_.counts.duplicate_segments += next.IsBoxSide() ? 0 : 1;
       first.rings += next.rings;
+      first.polygons = graph_.JoinPolygons(first.polygons, next.polygons);
       is_dropped[order[k]] = true;
       std::swap(order[k - 1], order[k]);  // the next is compared with what stays
     }

@@ -39,12 +39,14 @@ core::FaceSeed SeedFromProto(const v1::FaceSeed& seed) {
   return {.at = {seed.x(), seed.y()},
           .is_hole = seed.hole(),
           .region = seed.region(),
-          .max_area = seed.max_area() > 0 ? seed.max_area() : std::numeric_limits<double>::infinity()};
+          .max_area = seed.max_area() > 0 ? seed.max_area() : std::numeric_limits<double>::infinity(),
+          .first_segment = static_cast<uint32_t>(seed.polygon().first()),
+          .segment_count = static_cast<uint32_t>(seed.polygon().count())};
 }
 
 bool IsSame(const core::FaceSeed& a, const core::FaceSeed& b) {
-  return std::memcmp(a.at.data(), b.at.data(), sizeof(a.at)) == 0 && a.is_hole == b.is_hole && a.region == b.region &&
-         a.max_area == b.max_area;
+  return std::memcmp(a.at.data(), b.at.data(), sizeof(a.at)) == 0 && a.SaysTheSameAs(b) &&
+         a.first_segment == b.first_segment && a.segment_count == b.segment_count;
 }
 
 // Makes room for `count` in all, so that no Append copies much on average.
@@ -67,6 +69,15 @@ absl::Status CheckSeed(const v1::FaceSeed& seed, uint64_t number) {
         v1::ERROR_REASON_INVALID_SEGMENTS,
         absl::StrCat("seeds[", number, "]: max_area ", seed.max_area(), " is not a finite number of at least 0"),
         "faces.seeds");
+  }
+  constexpr uint64_t kMostSegments = std::numeric_limits<uint32_t>::max();
+  if (const v1::SegmentRange& polygon = seed.polygon();
+      seed.has_polygon() &&
+      (polygon.count() == 0 || polygon.count() > kMostSegments || polygon.first() > kMostSegments - polygon.count())) {
+    return MakeError(v1::ERROR_REASON_INVALID_SEGMENTS,
+                     absl::StrCat("seeds[", number, "]: its polygon has ", polygon.count(), " segments from number ",
+                                  polygon.first(), " on; expected at least 1, with numbers below 2^32 - 1"),
+                     "faces.seeds");
   }
   return absl::OkStatus();
 }

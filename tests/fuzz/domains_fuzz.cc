@@ -70,6 +70,9 @@ void RequireDomain(const PlanarDomain& domain) {
   for (const PlanarDomain::Seed& seed : domain.seeds) {
     Require(std::isfinite(seed.x) && std::isfinite(seed.y) && std::isfinite(seed.attribute), "seeds are finite");
     Require(seed.max_area >= 0 && std::isfinite(seed.max_area), "areas are finite, and not negative");
+    Require(seed.first_segment <= domain.segment_count() &&
+                seed.segment_count <= domain.segment_count() - seed.first_segment,
+            "polygons have segments that are there");
     Require(!seed.is_hole || !has_region, "holes come before regions");
     has_region |= !seed.is_hole;
   }

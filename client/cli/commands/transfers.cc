@@ -46,14 +46,19 @@ struct UploadCommand {
                                         uint64_t total, const client::CallOptions& call) const;
 };
 
-// Segments whose ends are numbers of points of the session, of which the first is `first`.
-absl::StatusOr<client::Features> Shifted(client::Features features, uint64_t first, uint64_t points) {
+// Segments whose ends are numbers of points of the session, of which the first is `first`, and seeds whose polygons are
+// numbers of its segments, after `segments` others.
+absl::StatusOr<client::Features> Shifted(client::Features features, uint64_t first, uint64_t points,
+                                         uint64_t segments) {
   if (first + points > client::kNoVertex) {
     return absl::InvalidArgumentError(absl::StrCat(
         "--offset: after ", first, " points no segment can name those of IN; 2^32 - 1 points have numbers"));
   }
   for (uint32_t& end : features.ends) {
     end += static_cast<uint32_t>(first);
+  }
+  for (client::FaceSeed& seed : features.seeds) {
+    seed.first_segment += segments;
   }
   return features;
 }
@@ -125,7 +130,7 @@ absl::Status UploadCommand::UploadDomain(client::Client& client, const client::S
   const uint64_t first = offset.value_or(found.committed_points);
   const client::FeatureOffset before = {.segments = segment_offset.value_or(is_first ? 0 : found.segment_count),
                                         .seeds = seed_offset.value_or(is_first ? 0 : found.seed_count)};
-  const absl::StatusOr<client::Features> features = Shifted(*domain.features(), first, cloud->size());
+  const absl::StatusOr<client::Features> features = Shifted(*domain.features(), first, cloud->size(), before.segments);
   if (!features.ok()) {
     return features.status();
   }

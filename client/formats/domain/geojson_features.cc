@@ -45,7 +45,7 @@ void GeoJsonFeatures::End(const GeoJsonLevel& feature) {
   AddRegions(feature);
 }
 
-// Adds a seed in each polygon of a feature.
+// Adds a seed for each polygon of a feature: for all of its faces, whatever else cuts it.
 void GeoJsonFeatures::AddRegions(const GeoJsonLevel& feature) {
   bool has_polygons = false;
   for (size_t at = feature.first_place; at < domain_.places.size();) {
@@ -73,7 +73,14 @@ void GeoJsonFeatures::AddRegions(const GeoJsonLevel& feature) {
       ++flat_;
       continue;
     }
-    domain_.seeds.push_back({.x = (*point)[0], .y = (*point)[1], .attribute = *feature.region});
+    const uint64_t segment = domain_.places[outer].first_segment;
+    domain_.seeds.push_back(
+        {.x = (*point)[0],
+         .y = (*point)[1],
+         .attribute = *feature.region,
+         .first_segment = segment,
+         .segment_count =
+             (at < domain_.places.size() ? domain_.places[at].first_segment : domain_.segment_count()) - segment});
     domain_.seed_places.push_back(static_cast<uint32_t>(outer));
   }
   without_region_ += has_polygons && !feature.region ? 1 : 0;

@@ -32,13 +32,16 @@ struct PlanarDomain {
   // Which faces count: the whole box; all bounded faces without a hole; those that an odd number of rings surround.
   enum class FaceRule { kBox, kHoles, kEvenOdd };
 
-  // A point that stands for the face that it is in.
+  // What stands for faces: a point for the one that it is in, or a polygon for all inside of it.
   struct Seed {
     double x = 0;
     double y = 0;
     bool is_hole = false;
     double attribute = 0;
     double max_area = 0;  // of a triangle; 0: no bound
+    // The rings of a polygon, of which (x, y) is a point inside: so many segments from the first on. 0: it is a point.
+    uint64_t first_segment = 0;
+    uint64_t segment_count = 0;
 
     bool operator==(const Seed&) const = default;
   };
@@ -51,7 +54,7 @@ struct PlanarDomain {
   // Of each segment 1 if it belongs to a line beside polygons, which does not turn inside to outside under kEvenOdd; or
   // empty if there are no such lines.
   std::vector<uint8_t> is_line;
-  std::vector<Seed> seeds;          // holes first, then regions
+  std::vector<Seed> seeds;          // holes first, then regions; of GeoJSON polygons
   FaceRule faces = FaceRule::kBox;  // what the format means: of .poly HOLES, of polygons EVEN_ODD, of lines alone BOX
 
   // What was changed, or is not used.

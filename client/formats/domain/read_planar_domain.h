@@ -36,7 +36,7 @@ struct DomainOptions {
   std::string format = {};  // empty: by the file's extension; standard input has none
   // Of geojson: the property that holds the attribute of a feature's polygons, a number, and that which holds the
   // marker of all its segments, a whole number. Empty: none. A feature may lack them, or have null. A polygon with an
-  // attribute gets a seed inside.
+  // attribute gets a seed for all inside of it.
   std::string region_property = {};
   std::string marker_property = {};
   // Of csv: the two columns that hold the coordinates, and the one that tells polylines apart; names, in any case, or

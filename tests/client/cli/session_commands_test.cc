@@ -359,6 +359,19 @@ TEST_F(DomainUploadTest, SegmentsFollowThePoints) {
   EXPECT_EQ(requests_[1].faces().crossings(), v1::CROSSING_RULE_SPLIT);
 }
 
+TEST_F(DomainUploadTest, PolygonsHaveTheSegmentsOfTheirFile) {
+  const std::string land = folder_.Write(
+      "land.geojson", R"({"type": "Feature", "properties": {"r": 7}, "geometry": {"type": "MultiPolygon", "coordinates":
+          [[[[0, 0], [1, 0], [1, 1], [0, 0]]], [[[2, 0], [3, 0], [3, 1], [2, 1], [2, 0]]]]}})");
+  ASSERT_EQ(Run({"upload", "one", land, "--region-property", "r"}).exit_code, 0);
+  ASSERT_EQ(requests_.size(), 2u);
+  ASSERT_EQ(requests_[1].faces().seeds_size(), 2);
+  EXPECT_EQ(requests_[1].faces().seeds(0).polygon().first(), 7u) << "after those of the session";
+  EXPECT_EQ(requests_[1].faces().seeds(0).polygon().count(), 3u);
+  EXPECT_EQ(requests_[1].faces().seeds(1).polygon().first(), 10u);
+  EXPECT_EQ(requests_[1].faces().seeds(1).polygon().count(), 4u);
+}
+
 TEST_F(DomainUploadTest, ARepeatedFirstUploadBeginsWithTheFirstSegment) {
   ASSERT_EQ(Run({"upload", "one", folder_.Write("triangle.poly", kTriangle), "--offset", "0"}).exit_code, 0);
   EXPECT_EQ(requests_[0].segment_offset(), 0u);

@@ -29,6 +29,8 @@ Features MakeChain() {
   for (size_t i = 0; i < kSeeds; ++i) {
     features.seeds.push_back(
         {.x = 0.5 * static_cast<double>(i), .y = 1, .is_hole = i == 0, .region = 4, .max_area = 2});
+    features.seeds.back().segment_count = i % 3;
+    features.seeds.back().first_segment = i % 3 == 0 ? 0 : i;
   }
   return features;
 }
@@ -90,7 +92,8 @@ class FakeDomain {
     for (int i = 0; i < request.faces().seeds_size(); ++i) {
       if (request.seed_offset() + i >= features_.seeds.size()) {
         const v1::FaceSeed& seed = request.faces().seeds(i);
-        features_.seeds.push_back({seed.x(), seed.y(), seed.hole(), seed.region(), seed.max_area()});
+        features_.seeds.push_back({seed.x(), seed.y(), seed.hole(), seed.region(), seed.max_area(),
+                                   seed.polygon().first(), seed.polygon().count()});
       }
     }
     if (request.has_faces()) {
@@ -115,6 +118,8 @@ void ExpectHas(const Features& held, const Features& sent) {
     EXPECT_EQ(held.seeds[i].x, sent.seeds[i].x);
     EXPECT_EQ(held.seeds[i].is_hole, sent.seeds[i].is_hole);
     EXPECT_EQ(held.seeds[i].max_area, sent.seeds[i].max_area);
+    EXPECT_EQ(held.seeds[i].first_segment, sent.seeds[i].first_segment);
+    EXPECT_EQ(held.seeds[i].segment_count, sent.seeds[i].segment_count);
   }
 }
 

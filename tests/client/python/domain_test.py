@@ -6,7 +6,7 @@ import numpy as np
 from support import Case, unit_box, volume
 
 import wellspace
-from wellspace import InvalidArgumentError, RegionSeed, WrongStateError
+from wellspace import InvalidArgumentError, RegionPolygon, RegionSeed, WrongStateError
 
 # A square of side 4 with a square hole of side 1 in its middle.
 POINTS = np.array([[0, 0], [4, 0], [4, 4], [0, 4], [1.5, 1.5], [2.5, 1.5], [2.5, 2.5], [1.5, 2.5]], float)
@@ -44,6 +44,26 @@ class DomainTest(Case):
         areas = np.linalg.det(inner[:, 1:] - inner[:, :1]) / 2
         self.assertAlmostEqual(areas.sum(), 1)
         self.assertLessEqual(areas.max(), 0.01)
+
+    def test_a_polygon_that_is_cut_is_one_region(self):
+        points = np.vstack([POINTS, [[0, 3], [4, 3]]])
+        polygons = [RegionPolygon(0, 4, region=7), RegionPolygon(4, 4, region=8)]
+        arguments = {"segments": RINGS, "open_segments": [[8, 9]], "faces": "holes", "regions": polygons}
+        with wellspace.Session(2) as session:
+            session.upload(points)
+            session.add_segments(segments=RINGS[:4])
+            session.add_segments(**arguments)  # a polygon has those of its own call, though others came before
+            session.refine()
+            of_session = session.download()
+        for mesh in (wellspace.mesh(points, **arguments), of_session):
+            for name, area in (("region_7", 15), ("region_8", 1)):
+                corners = mesh.points[mesh.region(name)]
+                self.assertAlmostEqual(np.linalg.det(corners[:, 1:] - corners[:, :1]).sum() / 2, area)
+        for polygon in (RegionPolygon(6, 4), RegionPolygon(0, 0), RegionPolygon(0, 4, region=2**31)):
+            with self.subTest(polygon), self.fails(InvalidArgumentError, "regions[0]"):
+                wellspace.mesh(POINTS, segments=RINGS, regions=[polygon])
+        with self.fails(InvalidArgumentError, "not closed", reason="INVALID_SEGMENTS"):
+            wellspace.mesh(POINTS, segments=RINGS, regions=[RegionPolygon(0, 3, region=7)])
 
     def test_open_segments(self):
         points = np.vstack([POINTS[:4], [[1, 2], [3, 2]]])

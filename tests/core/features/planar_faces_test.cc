@@ -6,10 +6,12 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <numeric>
 #include <string>
 #include <vector>
 
 #include "core/features/planar_graph.h"
+#include "core/features/polygon_seeds.h"
 #include "tests/support/seeded_test.h"
 
 namespace wellspace::core {
@@ -44,12 +46,24 @@ struct Drawing {
     return *this;
   }
 
+  // A polygon of the segments from `first` on.
+  Drawing& Polygon(uint32_t first, int32_t region) {
+    seeds.push_back(
+        {.region = region, .first_segment = first, .segment_count = static_cast<uint32_t>(ends.size() / 2) - first});
+    return *this;
+  }
+
   absl::StatusOr<PlanarFaces> Find() {
     Features features;
     features.ends = ends;
     features.is_open = is_open;
     features.crossings = CrossingRule::kSplit;
-    graph = *MakePlanarGraph(points, features, nullptr, 1e-12, 1, RunContext());
+    features.seeds = seeds;
+    absl::StatusOr<PlanarGraph> made = MakePlanarGraph(points, features, nullptr, 1e-12, 1, RunContext());
+    if (!made.ok()) {
+      return made.status();
+    }
+    graph = *std::move(made);
     return FindFaces(graph, rule, seeds, RunContext());
   }
 };
@@ -180,6 +194,91 @@ int CrossingsLeftOf(const PlanarGraph& graph, const Point<2>& p) {
   return crossings;
 }
 
+// The regions of all bounded faces, ascending.
+std::vector<int32_t> RegionsOf(const absl::StatusOr<PlanarFaces>& faces) {
+  std::vector<int32_t> regions;
+  for (size_t face = 1; faces.ok() && face < faces->faces.size(); ++face) {
+    regions.push_back(faces->faces[face].region);
+  }
+  std::sort(regions.begin(), regions.end());
+  return regions;
+}
+
+TEST(PolygonSeedsTest, APolygonHasAllFacesThatALineCutsItInto) {
+  Drawing drawing = Drawing().Square(0, 10).Polygon(0, 7).Line({{3, 0}, {3, 10}});
+  EXPECT_EQ(RegionsOf(drawing.Find()), (std::vector<int32_t>{7, 7}));
+}
+
+TEST(PolygonSeedsTest, APolygonThatIsPinchedHasBothOfItsParts) {
+  Drawing drawing = Drawing().Ring({{0, 0}, {2, 2}, {4, 0}, {4, 4}, {2, 2}, {0, 4}}).Polygon(0, 7);
+  EXPECT_EQ(RegionsOf(drawing.Find()), (std::vector<int32_t>{7, 7}));
+}
+
+TEST(PolygonSeedsTest, AHoleThatTouchesTheRingTwiceIsNotInThePolygonThatItCuts) {
+  Drawing drawing = Drawing().Square(0, 10).Ring({{5, 0}, {6, 5}, {5, 10}, {4, 5}}).Polygon(0, 7);
+  EXPECT_EQ(RegionsOf(drawing.Find()), (std::vector<int32_t>{0, 7, 7}));
+}
+
+TEST(PolygonSeedsTest, OfPolygonsThatLieOverEachOtherTheLeastHasTheFace) {
+  for (const bool is_inner_first : {false, true}) {
+    Drawing drawing;
+    if (is_inner_first) {
+      drawing.Square(3, 6).Polygon(0, 2).Square(0, 10).Polygon(4, 1);
+    } else {
+      drawing.Square(0, 10).Polygon(0, 1).Square(3, 6).Polygon(4, 2);
+    }
+    EXPECT_EQ(RegionsOf(drawing.Find()), (std::vector<int32_t>{1, 2}));
+    drawing.seeds.push_back({.at = {4, 4}, .region = 9});  // a point comes before polygons
+    EXPECT_EQ(RegionsOf(drawing.Find()), (std::vector<int32_t>{1, 9}));
+  }
+}
+
+TEST(PolygonSeedsTest, APolygonThatIsAHoleIsNotMeshed) {
+  Drawing drawing = Drawing().Square(0, 10).Line({{0, 0}, {10, 10}}).Square(20, 30);
+  drawing.seeds = {{.is_hole = true, .segment_count = 4}};
+  const auto faces = drawing.Find();
+  ASSERT_TRUE(faces.ok()) << faces.status();
+  EXPECT_EQ(MeshedCount(*faces), 1);
+}
+
+TEST(PolygonSeedsTest, NeighboursShareASide) {
+  Drawing drawing = Drawing().Square(0, 1).Polygon(0, 1).Ring({{1, 0}, {2, 0}, {2, 1}, {1, 1}}).Polygon(4, 2);
+  drawing.rule = FaceRule::kEvenOdd;
+  EXPECT_EQ(RegionsOf(drawing.Find()), (std::vector<int32_t>{1, 2}));
+}
+
+TEST(PolygonSeedsTest, EqualPolygonsHaveToSayTheSame) {
+  Drawing same = Drawing().Square(0, 1).Polygon(0, 1).Square(0, 1).Polygon(4, 1);
+  EXPECT_EQ(RegionsOf(same.Find()), (std::vector<int32_t>{1}));
+  Drawing other = Drawing().Square(0, 1).Polygon(0, 1).Square(0, 1).Polygon(4, 2);
+  EXPECT_THAT(other.Find().status().message(),
+              AllOf(HasSubstr("seeds[0]"), HasSubstr("seeds[1]"), HasSubstr("one area"), HasSubstr("differ")));
+}
+
+TEST(PolygonSeedsTest, WhatIsNoPolygonIsRefused) {
+  Drawing open = Drawing().Line({{0, 0}, {1, 0}, {1, 1}}).Polygon(0, 1).Square(0, 5);
+  EXPECT_THAT(open.Find().status().message(),
+              AllOf(HasSubstr("seeds[0]"), HasSubstr("points[0]"), HasSubstr("not closed")));
+  Drawing beyond = Drawing().Square(0, 5);
+  beyond.seeds = {{.first_segment = 2, .segment_count = 3}};
+  EXPECT_THAT(beyond.Find().status().message(), AllOf(HasSubstr("seeds[0]"), HasSubstr("segments 2 to 4")));
+  Drawing shared = Drawing().Square(0, 5).Polygon(0, 1);
+  shared.Polygon(3, 1);
+  EXPECT_THAT(shared.Find().status().message(), AllOf(HasSubstr("seeds[1]"), HasSubstr("segments[3]")));
+}
+
+// 200 triangles over one side, each in the next, with a polygon each: all bound that side.
+TEST(PolygonSeedsTest, ASideOfManyPolygonsIsEachOnesOwn) {
+  constexpr int kCount = 200;
+  Drawing drawing;
+  for (int i = 0; i < kCount; ++i) {
+    drawing.Ring({{0, 0}, {1, 0}, {0.5, 1.0 + i}}).Polygon(static_cast<uint32_t>(3 * i), i + 1);
+  }
+  std::vector<int32_t> all(kCount);
+  std::iota(all.begin(), all.end(), 1);
+  EXPECT_EQ(RegionsOf(drawing.Find()), all);
+}
+
 class PlanarFacesPropertyTest : public test::SeededTest {
  protected:
   PlanarFacesPropertyTest() : SeededTest(0xface) {}
@@ -212,6 +311,56 @@ TEST_F(PlanarFacesPropertyTest, EvenAndOddIsWhatARayCounts) {
     for (size_t i = 0; i < places.size(); ++i) {
       const uint32_t point = drawing.graph.point_of_input[first + i];
       EXPECT_EQ(faces->IsMeshed(faces->point_face[point]), CrossingsLeftOf(drawing.graph, places[i]) % 2 == 1);
+    }
+  }
+}
+
+TEST_F(PlanarFacesPropertyTest, APolygonHasWhatARayCountsInItsOwnRings) {
+  for (int run = 0; run < 100; ++run) {
+    Drawing drawing;
+    drawing.Square(-1, 10);
+    std::vector<Drawing> alone;
+    const size_t polygons = 1 + random_.Below(4);
+    for (size_t i = 0; i < polygons; ++i) {
+      alone.emplace_back();
+      const auto first = static_cast<uint32_t>(drawing.ends.size() / 2);
+      for (uint64_t ring = 0; ring < 1 + random_.Below(2); ++ring) {
+        std::vector<Point<2>> corners(3 + random_.Below(5));
+        for (Point<2>& corner : corners) {
+          corner = {static_cast<double>(random_.Below(9)), static_cast<double>(random_.Below(9))};
+        }
+        drawing.Ring(corners);
+        alone.back().Ring(corners);
+      }
+      drawing.Polygon(first, 0);  // all say the same, so that none is refused
+    }
+    for (int i = 0; i < 20; ++i) {
+      const Point<2> place = {9 * random_.Unit(), 9 * random_.Unit()};
+      drawing.points.insert(drawing.points.end(), place.begin(), place.end());
+    }
+    const size_t first = drawing.points.size() / 2 - 20;
+    const auto faces = drawing.Find();
+    ASSERT_TRUE(faces.ok()) << faces.status();
+    const auto found = FindPolygonsOfFaces(drawing.graph, *faces, drawing.seeds, RunContext());
+    ASSERT_TRUE(found.ok()) << found.status();
+    for (size_t i = first; i < first + 20; ++i) {
+      const Point<2> place = PointAt<2>(drawing.points, i);
+      const uint32_t polygon = (*found)[faces->point_face[drawing.graph.point_of_input[i]]];
+      std::vector<uint32_t> around;
+      for (uint32_t p = 0; p < polygons; ++p) {
+        Features features;
+        features.ends = alone[p].ends;
+        features.crossings = CrossingRule::kSplit;
+        const PlanarGraph graph = *MakePlanarGraph(alone[p].points, features, nullptr, 1e-12, 1, RunContext());
+        if (CrossingsLeftOf(graph, place) % 2 == 1) {
+          around.push_back(p);
+        }
+      }
+      if (around.empty()) {
+        EXPECT_EQ(polygon, GraphSegment::kNoPolygon);
+      } else {
+        EXPECT_THAT(around, ::testing::Contains(polygon));
+      }
     }
   }
 }

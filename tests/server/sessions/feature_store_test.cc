@@ -87,6 +87,14 @@ TEST(FeatureStore, FindsTheFirstThatIsAnother) {
   EXPECT_EQ(store.CountEqual(0, 2, Faces(v1::FACE_RULE_BOX, {0, 1, 2, 3})), 2u) << "rules are no part of seeds";
   EXPECT_EQ(store.CountEqual(0, 2, Faces(v1::FACE_RULE_HOLES, {-0.0, 1, 2, 3})), 0u) << "to the bit";
   EXPECT_EQ(store.CountEqual(1, 1, Faces(v1::FACE_RULE_HOLES, {2, 3}, 1)), 0u);
+  v1::FaceOptions polygon = Faces(v1::FACE_RULE_HOLES, {2, 3});
+  polygon.mutable_seeds(0)->mutable_polygon()->set_count(3);
+  EXPECT_EQ(store.CountEqual(1, 1, polygon), 0u);
+  store.Append(polygon);
+  EXPECT_EQ(store.CountEqual(2, 1, polygon), 1u);
+  EXPECT_EQ(store.View().seeds[2].segment_count, 3u);
+  polygon.mutable_seeds(0)->mutable_polygon()->set_first(1);
+  EXPECT_EQ(store.CountEqual(2, 1, polygon), 0u);
 }
 
 TEST(CheckSegments, NamesThePlaceInAll) {
@@ -94,6 +102,14 @@ TEST(CheckSegments, NamesThePlaceInAll) {
   EXPECT_THAT(CheckSegments(Chunk({1, 2, 3}), 40).message(), ::testing::HasSubstr("after segment 40"));
   EXPECT_EQ(DetailsOf(CheckSegments(Chunk({1, 2, 3, 4}, {5}), 0)).field, "segments.markers");
   EXPECT_THAT(CheckFaces(Faces(v1::FACE_RULE_BOX, {0, 0, 1, 1}, -1), 40).message(), ::testing::HasSubstr("seeds[40]"));
+  v1::FaceOptions polygon = Faces(v1::FACE_RULE_BOX, {0, 0});
+  polygon.mutable_seeds(0)->mutable_polygon();
+  EXPECT_THAT(CheckFaces(polygon, 40).message(), ::testing::HasSubstr("seeds[40]: its polygon has 0 segments"));
+  for (const uint64_t first : {uint64_t{1} << 32, ~uint64_t{0}}) {
+    polygon.mutable_seeds(0)->mutable_polygon()->set_count(2);
+    polygon.mutable_seeds(0)->mutable_polygon()->set_first(first);
+    EXPECT_EQ(DetailsOf(CheckFaces(polygon, 0)).field, "faces.seeds");
+  }
 }
 
 }  // namespace

@@ -13,7 +13,7 @@ from . import errors, statistics
 from ._cells import Cell, Cells
 from ._channel import Credentials
 from ._client import Client, MeshArguments, Server, client_of
-from ._domain import DomainArguments, RegionSeed
+from ._domain import DomainArguments, RegionPolygon, RegionSeed
 from ._dual import DualCells
 from ._locate import Located
 from ._mesh import CORNER, REPAIR, STEINER, Mesh
@@ -140,6 +140,7 @@ __all__ = [
     "Operation",
     "OutOfRangeError",
     "Progress",
+    "RegionPolygon",
     "RegionSeed",
     "RetryPolicy",
     "ServerInfo",

@@ -43,6 +43,28 @@ class RegionSeed:
 
 
 @dataclasses.dataclass(frozen=True)
+class RegionPolygon:
+    """What stands for all faces inside of a polygon, whatever else cuts it.
+
+    Where polygons lie over each other, the one with the least area has the face; a `RegionSeed` comes before them.
+
+    Parameters
+    ----------
+    first, count : int
+        The rows of `segments` that are its rings: so many from the first on. Each ring is closed.
+    region : int
+        See `RegionSeed`.
+    max_area : float
+        See `RegionSeed`.
+    """
+
+    first: int
+    count: int
+    region: int = 0
+    max_area: float = 0.0
+
+
+@dataclasses.dataclass(frozen=True)
 class Domain:
     """Segments, seeds and rules, checked; for messages."""
 
@@ -50,7 +72,7 @@ class Domain:
     markers: npt.NDArray[np.int32] | None  # (m,)
     first_open: int  # segments from this one on are part of no ring
     holes: Floats  # (k, 2)
-    regions: tuple[RegionSeed, ...]
+    regions: tuple[RegionSeed | RegionPolygon, ...]
     faces: int
     crossings: int
 
@@ -64,11 +86,16 @@ class Domain:
                     message.markers.extend(self.markers[first:last].tolist())
                 yield first, _wire.packed_field(1, self.ends[first:last]) + message.SerializeToString()
 
-    def face_options(self) -> Iterator[tuple[int, bytes]]:
+    def face_options(self, segments_before: int = 0) -> Iterator[tuple[int, bytes]]:
         """Serialized FaceOptions, at least one, and the number of the first seed of each."""
         seed = _api.message("FaceSeed")
         seeds = [seed(x=x, y=y, hole=True) for x, y in self.holes.tolist()]
-        seeds += [seed(x=r.x, y=r.y, region=r.region, max_area=r.max_area) for r in self.regions]
+        for r in self.regions:
+            seeds.append(seed(region=r.region, max_area=r.max_area))
+            if isinstance(r, RegionSeed):
+                seeds[-1].x, seeds[-1].y = r.x, r.y
+            else:
+                seeds[-1].polygon.first, seeds[-1].polygon.count = segments_before + r.first, r.count
         for first in range(0, max(1, len(seeds)), _SEEDS_OF_A_REQUEST):
             options = _api.message("FaceOptions")(faces=self.faces, crossings=self.crossings)
             options.seeds.extend(seeds[first : first + _SEEDS_OF_A_REQUEST])
@@ -87,8 +114,8 @@ class DomainArguments(TypedDict, total=False):
         Their markers.
     holes : (h, 2) float
         Points in faces that are not meshed.
-    regions : sequence of RegionSeed, or of (x, y, region, max_area)
-        Points in faces that are a region of their own, or that have a largest area of triangles.
+    regions : sequence of RegionSeed, RegionPolygon, or (x, y, region, max_area)
+        Points in faces that are a region of their own, or that have a largest area of triangles; or polygons of them.
     faces : {"box", "holes", "even-odd"}
         Which faces, into which segments cut the plane, are meshed: all in the box; all bounded ones; those that an odd
         number of segments separates from infinity. Faces with a hole never are. Default "holes", with `box` "box".
@@ -123,21 +150,37 @@ def make_domain(given: Mapping[str, Any], point_count: int | None = None, has_bo
         markers=marked,
         first_open=len(closed),
         holes=coordinates(given.get("holes", []), "holes", 2),
-        regions=tuple(_seed(one, f"regions[{row}]") for row, one in enumerate(given.get("regions", ()))),
+        regions=tuple(_seed(one, f"regions[{row}]", len(closed)) for row, one in enumerate(given.get("regions", ()))),
         faces=choice(rule, "faces", _FACES),
         crossings=choice(given.get("crossings", "refuse"), "crossings", _CROSSINGS),
     )
 
 
-def _seed(value: Any, name: str) -> RegionSeed:
-    """A RegionSeed, or (x, y[, region[, max_area]])."""
+def _whole(value: Any, name: str, what: str, low: int, high: int) -> int:
+    """A whole number from `low` to below `high`."""
+    if number(value, name) != int(number(value, name)) or not low <= value < high:
+        raise InvalidArgumentError(
+            f"{name} has the {what} {value!r}; expected a whole number from {low} to {high - 1}", field=name
+        )
+    return int(value)
+
+
+def _polygon(given: RegionPolygon, name: str, segments: int) -> RegionPolygon:
+    first = _whole(given.first, name, "first segment", 0, max(segments, 1))
+    count = _whole(given.count, name, "count of segments", 1, max(segments - first + 1, 2))
+    region = _whole(given.region, name, "region", -(2**31), 2**31)
+    return RegionPolygon(first, count, region, number(given.max_area, name))
+
+
+def _seed(value: Any, name: str, segments: int) -> RegionSeed | RegionPolygon:
+    """A RegionPolygon of so many segments, a RegionSeed, or (x, y[, region[, max_area]])."""
+    if isinstance(value, RegionPolygon):
+        return _polygon(value, name, segments)
     if isinstance(value, RegionSeed):
         value = dataclasses.astuple(value)
     row = list(value) if isinstance(value, (tuple, list, np.ndarray)) else []
     if not 2 <= len(row) <= 4:
         raise InvalidArgumentError(f"{name} is {value!r}; expected (x, y, region, max_area)", field=name)
     x, y, region, max_area = (*row, 0, 0.0)[:4] if len(row) < 3 else (*row, 0.0)[:4]
-    if number(region, name) != int(number(region, name)) or not -(2**31) <= region < 2**31:
-        raise InvalidArgumentError(f"{name} has the region {region!r}; expected a whole number of 32 bits", field=name)
     place = coordinates([[x, y]], name, 2)[0].tolist()
-    return RegionSeed(place[0], place[1], int(region), number(max_area, name))
+    return RegionSeed(place[0], place[1], _whole(region, name, "region", -(2**31), 2**31), number(max_area, name))

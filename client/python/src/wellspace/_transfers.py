@@ -119,7 +119,7 @@ class Addition:
             head.segment_offset = self._segments + first
             yield head.SerializeToString() + _wire.message_field(3, chunk)
         head.segment_offset = self._segments + len(self._domain.ends)
-        for first, chunk in self._domain.face_options():
+        for first, chunk in self._domain.face_options(self._segments):
             head.seed_offset = self._seeds + first
             yield head.SerializeToString() + _wire.message_field(5, chunk)
 

@@ -176,6 +176,13 @@ TEST_F(ReadGeoJsonTest, PropertiesAreMarkersAndAttributes) {
   EXPECT_EQ(domain.seeds[0].attribute, 1.5);
   EXPECT_EQ(domain.seeds[2].attribute, -2);
   EXPECT_EQ(domain.seeds[2].max_area, 0);
+  // All rings of a polygon, the second of which is its hole here, are its own.
+  EXPECT_EQ(domain.seeds[0].first_segment, 0u);
+  EXPECT_EQ(domain.seeds[0].segment_count, 8u);
+  EXPECT_EQ(domain.seeds[1].first_segment, 8u);
+  EXPECT_EQ(domain.seeds[1].segment_count, 4u);
+  EXPECT_EQ(domain.seeds[2].first_segment, 12u);
+  EXPECT_EQ(domain.seeds[2].segment_count, 4u);
   // In the polygon, and not in its hole.
   const auto& seed = domain.seeds[0];
   EXPECT_TRUE(seed.x > 0 && seed.x < 4 && seed.y > 0 && seed.y < 4);

@@ -1,0 +1,316 @@
+#include "core/features/polygon_seeds.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <numeric>
+#include <queue>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "absl/strings/str_cat.h"
+#include "core/base/status_macros.h"
+#include "core/features/place.h"
+#include "core/geometry/segment.h"
+
+namespace wellspace::core {
+namespace {
+
+constexpr uint32_t kOfNoPolygon = GraphSegment::kNoPolygon;
+constexpr uint32_t kStepsBetweenLooks = 1024;
+
+// Goes from face to face, over a tree of segments that it crosses there and back.
+class FaceWalk {
+ public:
+  FaceWalk(const PlanarGraph& graph, const PlanarFaces& faces, const RunContext& context)
+      : graph_(graph), faces_(faces), context_(context), first_side_(faces.faces.size() + 1) {
+    for (const uint32_t face : faces.left_face) {
+      ++first_side_[face + 1];
+    }
+    std::partial_sum(first_side_.begin(), first_side_.end(), first_side_.begin());
+    sides_.resize(faces.left_face.size());
+    std::vector<uint32_t> next(first_side_.begin(), first_side_.end() - 1);
+    for (HalfEdge h = 0; h < sides_.size(); ++h) {
+      sides_[next[faces.left_face[h]]++] = h;
+    }
+  }
+
+  // Calls visit(face, its half-edges) for each face, in the unbounded one first, and toggle(polygon) for each polygon
+  // whose ring is crossed on the way there from the face before.
+  template <typename Toggle, typename Visit>
+  absl::Status Run(const Toggle& toggle, const Visit& visit) const {
+    struct Stop {
+      uint32_t face;
+      HalfEdge entered_by;
+      uint32_t next;
+    };
+    std::vector<bool> is_visited(faces_.faces.size());
+    std::vector<Stop> way;
+    uint32_t steps = 0;
+    const auto cross = [&](HalfEdge h) {
+      for (const uint32_t polygon : graph_.PolygonsOf(graph_.segments[SegmentOf(h)])) {
+        toggle(polygon);
+        ++steps;
+      }
+    };
+    const auto enter = [&](uint32_t face, HalfEdge by) {
+      is_visited[face] = true;
+      way.push_back({face, by, first_side_[face]});
+      return visit(face, std::span<const HalfEdge>(sides_).subspan(first_side_[face],
+                                                                   first_side_[face + 1] - first_side_[face]));
+    };
+    WELLSPACE_RETURN_IF_ERROR(enter(0, 0));
+    while (!way.empty()) {
+      if (++steps >= kStepsBetweenLooks) {
+        steps = 0;
+        WELLSPACE_RETURN_IF_ERROR(context_.Check());
+      }
+      Stop& here = way.back();
+      if (here.next == first_side_[here.face + 1]) {
+        const HalfEdge back = here.entered_by;
+        way.pop_back();
+        if (!way.empty()) {
+          cross(back);
+        }
+        continue;
+      }
+      const HalfEdge h = sides_[here.next++];
+      if (const uint32_t beyond = faces_.left_face[TwinOf(h)]; !is_visited[beyond]) {
+        cross(h);
+        WELLSPACE_RETURN_IF_ERROR(enter(beyond, h));
+      }
+    }
+    return absl::OkStatus();
+  }
+
+ private:
+  const PlanarGraph& graph_;
+  const PlanarFaces& faces_;
+  const RunContext& context_;
+  std::vector<uint32_t> first_side_;  // by face, in sides_
+  std::vector<HalfEdge> sides_;       // by the face on their left
+};
+
+// A segment that bounds a polygon, which lies to the left of it.
+struct Side {
+  uint32_t polygon;
+  HalfEdge half_edge;
+};
+
+// The areas of polygons: sums of terms in the order of their size, so that equal rings have equal areas.
+std::vector<double> AreasOf(const PlanarGraph& graph, std::vector<Side>& sides, size_t seeds) {
+  const auto place_of = [&](HalfEdge h) -> const Point<2>& {
+    const GraphSegment& s = graph.segments[SegmentOf(h)];
+    return graph.points[IsFromB(h) ? s.b : s.a];
+  };
+  std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+    return std::tie(a.polygon, a.half_edge) < std::tie(b.polygon, b.half_edge);
+  });
+  std::vector<double> areas(seeds);
+  std::vector<double> terms;
+  for (auto begin = sides.begin(); begin != sides.end();) {
+    auto end = begin;
+    Point<2> lowest = place_of(begin->half_edge);
+    for (; end != sides.end() && end->polygon == begin->polygon; ++end) {
+      lowest = std::min(lowest, place_of(end->half_edge));
+    }
+    terms.clear();
+    for (auto side = begin; side != end; ++side) {
+      terms.push_back(0.5 * Cross(Difference<2>(place_of(side->half_edge), lowest),
+                                  Difference<2>(place_of(TwinOf(side->half_edge)), lowest)));
+    }
+    std::sort(terms.begin(), terms.end());
+    areas[begin->polygon] = std::accumulate(terms.begin(), terms.end(), 0.0);
+    begin = end;
+  }
+  return areas;
+}
+
+// Polygons in the order in which they have faces: by area, and those of one area by what they say.
+struct Ranks {
+  std::vector<uint32_t> rank;      // by seed
+  std::vector<uint32_t> seed;      // by rank
+  std::vector<uint32_t> area_end;  // by rank: the first rank of a larger area
+};
+
+Ranks RanksOf(std::span<const FaceSeed> seeds, const std::vector<double>& areas) {
+  Ranks ranks;
+  ranks.rank.resize(seeds.size());
+  ranks.seed.resize(seeds.size());
+  ranks.area_end.resize(seeds.size());
+  std::iota(ranks.seed.begin(), ranks.seed.end(), 0);
+  std::sort(ranks.seed.begin(), ranks.seed.end(), [&](uint32_t i, uint32_t j) {
+    const auto key = [&](uint32_t s) {
+      return std::tuple(areas[s], seeds[s].is_hole, seeds[s].region, seeds[s].max_area, s);
+    };
+    return key(i) < key(j);
+  });
+  for (auto r = static_cast<uint32_t>(seeds.size()); r-- > 0;) {
+    ranks.rank[ranks.seed[r]] = r;
+    const bool is_last = r + 1 == seeds.size() || areas[ranks.seed[r]] != areas[ranks.seed[r + 1]];
+    ranks.area_end[r] = is_last ? r + 1 : ranks.area_end[r + 1];
+  }
+  return ranks;
+}
+
+}  // namespace
+
+std::vector<uint32_t> PlanarGraph::PolygonsOf(const GraphSegment& segment) const {
+  std::vector<uint32_t> found;
+  if (segment.polygons == GraphSegment::kNoPolygon) {
+    return found;
+  }
+  // Those that two are joined of have lower numbers, so that each comes up as often as it is there, at once.
+  std::priority_queue<uint32_t> pending;
+  pending.push(segment.polygons);
+  while (!pending.empty()) {
+    const uint32_t one = pending.top();
+    bool is_odd = false;
+    for (; !pending.empty() && pending.top() == one; pending.pop()) {
+      is_odd = !is_odd;
+    }
+    if (is_odd && one < seeds) {
+      found.push_back(one);
+    } else if (is_odd) {
+      for (const uint32_t part : joined_polygons[one - seeds]) {
+        pending.push(part);
+      }
+    }
+  }
+  std::reverse(found.begin(), found.end());
+  return found;
+}
+
+uint32_t PlanarGraph::JoinPolygons(uint32_t one, uint32_t other) {
+  if (one == other) {
+    return GraphSegment::kNoPolygon;  // in and out again
+  }
+  if (one == GraphSegment::kNoPolygon || other == GraphSegment::kNoPolygon) {
+    return std::min(one, other);
+  }
+  joined_polygons.push_back({one, other});
+  return static_cast<uint32_t>(seeds + joined_polygons.size() - 1);
+}
+
+absl::StatusOr<std::vector<uint32_t>> PolygonsOfSegments(const Features& features, const RunContext& context) {
+  std::vector<uint32_t> polygons;
+  uint32_t steps = 0;
+  for (uint32_t i = 0; i < features.seeds.size(); ++i) {
+    const FaceSeed& seed = features.seeds[i];
+    if (!seed.IsPolygon()) {
+      continue;
+    }
+    const uint64_t end = uint64_t{seed.first_segment} + seed.segment_count;
+    if (end > features.segment_count()) {
+      return absl::InvalidArgumentError(absl::StrCat("seeds[", i, "]: its polygon has segments ", seed.first_segment,
+                                                     " to ", end - 1, ", and there are ", features.segment_count(),
+                                                     " segments; expected numbers of segments, which count from 0"));
+    }
+    polygons.resize(features.segment_count(), kOfNoPolygon);
+    for (uint64_t s = seed.first_segment; s < end; ++s) {
+      if (polygons[s] != kOfNoPolygon) {
+        return absl::InvalidArgumentError(absl::StrCat("seeds[", i, "]: segments[", s, "] is of the polygon of seeds[",
+                                                       polygons[s],
+                                                       "], too; a segment bounds one polygon, so give it twice"));
+      }
+      polygons[s] = i;
+      if (++steps % kStepsBetweenLooks == 0) {
+        WELLSPACE_RETURN_IF_ERROR(context.Check());
+      }
+    }
+  }
+  return polygons;
+}
+
+absl::Status CheckPolygonsClosed(std::span<const uint32_t> point_of_input, const Features& features,
+                                 const RunContext& context) {
+  struct End {
+    uint32_t point;
+    uint64_t segment;
+  };
+  std::vector<End> ends;
+  for (uint32_t i = 0; i < features.seeds.size(); ++i) {
+    const FaceSeed& seed = features.seeds[i];
+    ends.clear();
+    for (uint64_t s = seed.first_segment; s < uint64_t{seed.first_segment} + seed.segment_count; ++s) {
+      ends.push_back({point_of_input[features.ends[2 * s]], s});
+      ends.push_back({point_of_input[features.ends[2 * s + 1]], s});
+    }
+    if (i % kStepsBetweenLooks == 0 || seed.segment_count >= kStepsBetweenLooks) {
+      WELLSPACE_RETURN_IF_ERROR(context.Check());
+    }
+    std::sort(ends.begin(), ends.end(),
+              [](const End& a, const End& b) { return std::tie(a.point, a.segment) < std::tie(b.point, b.segment); });
+    for (size_t begin = 0, end = 0; begin < ends.size(); begin = end) {
+      while (end < ends.size() && ends[end].point == ends[begin].point) {
+        ++end;
+      }
+      if ((end - begin) % 2 != 0) {
+        const uint64_t s = ends[begin].segment;
+        const uint32_t first = features.ends[2 * s];
+        const uint32_t at = point_of_input[first] == ends[begin].point ? first : features.ends[2 * s + 1];
+        return absl::InvalidArgumentError(absl::StrCat("seeds[", i, "]: its polygon is not closed: at points[", at,
+                                                       "], an end of segments[", s, "], ", end - begin,
+                                                       " of its segments end; expected an even number at each point"));
+      }
+    }
+  }
+  return absl::OkStatus();
+}
+
+absl::StatusOr<std::vector<uint32_t>> FindPolygonsOfFaces(const PlanarGraph& graph, const PlanarFaces& faces,
+                                                          std::span<const FaceSeed> seeds, const RunContext& context) {
+  std::vector<uint32_t> found(faces.faces.size(), kOfNoPolygon);
+  if (std::none_of(seeds.begin(), seeds.end(), [](const FaceSeed& seed) { return seed.IsPolygon(); })) {
+    return found;
+  }
+  const FaceWalk walk(graph, faces, context);
+  std::set<uint32_t> inside;  // the polygons around the face
+  std::vector<Side> sides;
+  bool have_areas_a_say = false;
+  const auto toggle_in = [](std::set<uint32_t>& set, uint32_t one) {
+    if (set.erase(one) == 0) {
+      set.insert(one);
+    }
+  };
+  WELLSPACE_RETURN_IF_ERROR(walk.Run([&](uint32_t polygon) { toggle_in(inside, polygon); },
+                                     [&](uint32_t face, std::span<const HalfEdge> half_edges) {
+                                       have_areas_a_say = have_areas_a_say || inside.size() > 1;
+                                       if (!inside.empty()) {
+                                         found[face] = *inside.begin();
+                                       }
+                                       for (const HalfEdge h : half_edges) {
+                                         for (const uint32_t p : graph.PolygonsOf(graph.segments[SegmentOf(h)])) {
+                                           if (inside.contains(p)) {
+                                             sides.push_back({p, h});
+                                           }
+                                         }
+                                       }
+                                       return absl::OkStatus();
+                                     }));
+  if (!have_areas_a_say) {
+    return found;
+  }
+  const Ranks ranks = RanksOf(seeds, AreasOf(graph, sides, seeds.size()));
+  std::set<uint32_t> around;  // the same, by rank
+  WELLSPACE_RETURN_IF_ERROR(walk.Run([&](uint32_t polygon) { toggle_in(around, ranks.rank[polygon]); },
+                                     [&](uint32_t face, std::span<const HalfEdge> half_edges) -> absl::Status {
+                                       if (around.empty()) {
+                                         return absl::OkStatus();
+                                       }
+                                       const uint32_t least = found[face] = ranks.seed[*around.begin()];
+                                       const uint32_t last =
+                                           ranks.seed[*std::prev(around.lower_bound(ranks.area_end[*around.begin()]))];
+                                       if (seeds[least].SaysTheSameAs(seeds[last])) {
+                                         return absl::OkStatus();
+                                       }
+                                       const GraphSegment& beside = graph.segments[SegmentOf(half_edges[0])];
+                                       return absl::InvalidArgumentError(absl::StrCat(
+                                           "seeds[", std::min(least, last), "] and seeds[", std::max(least, last),
+                                           "]: their polygons have one area, lie over each other at ",
+                                           PlaceText(graph.points[beside.a]), ", and differ; leave one out"));
+                                     }));
+  return found;
+}
+
+}  // namespace wellspace::core
