@@ -69,13 +69,15 @@ absl::Status Validate(const core::Mesh& mesh, double rho, std::span<const double
     return core::ValidateMesh(view, {.rho = rho, .cloud = points});
   }
   constexpr double kTolerance = 1e-12;  // of places; the box is 1
-  if (const absl::Status status = core::ValidateDomainMesh(view, mesh.facets, rho).status(); !status.ok()) {
+  const core::RunContext context;
+  if (const absl::Status status = core::ValidateDomainMesh(view, mesh.facets, rho, context).status(); !status.ok()) {
     return status;
   }
   core::DomainView domain;
   domain.points = points;
-  domain.segments = segments;
-  return core::ValidateConformity(view, mesh.facets, domain, kTolerance);
+  domain.features.ends = segments;
+  const core::DomainParts parts = {.boundary = {.facets = mesh.facets, .tags = {}}};
+  return core::ValidateConformity(view, parts, domain, kTolerance, context);
 }
 
 int Main(int argc, char** argv) {

@@ -3,21 +3,35 @@
 #define WELLSPACE_CORE_VALIDATE_VALIDATE_DOMAIN_H_
 
 #include <cstdint>
+#include <map>
+#include <optional>
 #include <span>
+#include <string>
 
 #include "absl/status/status.h"
 #include "absl/status/statusor.h"
+#include "core/base/run_context.h"
+#include "core/features/features.h"
+#include "core/geometry/box.h"
 #include "core/validate/validate.h"
+#include "core/validate/validate_boundary.h"
 
 namespace wellspace::core {
 
 // A domain, as its file has it.
 struct DomainView {
-  std::span<const double> points;      // n x 2, row-major
-  std::span<const uint32_t> segments;  // m x 2, indices of points
-  std::span<const uint8_t> is_open;    // m, or none: 1 for a segment of no ring
-  std::span<const double> holes;       // h x 2: points in faces that are not meshed
-  bool is_even_odd = false;            // a face is meshed if an odd number of ring segments separates it from infinity
+  std::span<const double> points;  // n x 2, row-major
+  Features features{};             // crossings are not looked at
+  bool has_markers = true;         // if not, markers are not known, rather than 0
+  bool has_regions = true;         // if not, regions are not known, rather than 0
+  std::optional<Box<2>> box{};     // of FaceRule::kBox, if it is known
+};
+
+// What is told of a mesh of a domain beside its triangles.
+struct DomainParts {
+  BoundaryView boundary;                          // `tags` may be none: they are not known
+  std::span<const int32_t> regions{};             // of each triangle an id, or none: all are of one
+  std::map<int32_t, std::string> region_names{};  // of ids, where they are known
 };
 
 // What a check of a domain found, beside violations.
@@ -33,18 +47,27 @@ struct DomainReport {
 // Shapes:     facets: rows of 2 vertices.
 // Complexity: O(m log m) for most meshes.
 // Errors:     FAILED_PRECONDITION, naming the first violation (triangle, edge, vertex); INVALID_ARGUMENT for another
-//             dimension, or arrays that do not hold whole rows.
-absl::StatusOr<DomainReport> ValidateDomainMesh(const MeshView& mesh, std::span<const uint32_t> facets, double rho);
+//             dimension, or arrays that do not hold whole rows; CANCELLED, DEADLINE_EXCEEDED.
+absl::StatusOr<DomainReport> ValidateDomainMesh(const MeshView& mesh, std::span<const uint32_t> facets, double rho,
+                                                const RunContext& context);
 
-// Checks the mesh against its domain: facets lead from each end of a segment to the other, along it, if it bounds a
-// face that is meshed; no triangle holds a hole; and by even and odd, a count of the rings to the left of its centroid
-// has each triangle inside. Places are compared up to `tolerance`, which is what a split segment is bent by.
+// Checks the mesh against its domain: facets lie along segments; the faces that these cut the plane into are meshed as
+// a whole, or not at all, as the rule and the seeds have it; a point in a face that is meshed is a vertex; triangles
+// have the region of their face, and are no larger than it allows; facets have the tags of their segments, as the
+// proto's BoundaryPart says. Faces are found here once more, without the mesher's code. Each stretch of a segment is
+// looked at by itself: one may bound a face that is meshed, and the next one nothing. Places are compared up to
+// `tolerance`, which is what a split segment is bent by.
 //
-// REQUIRES:   ValidateDomainMesh is OK.
-// Complexity: O(m (segments + holes)) at worst.
-// Errors:     FAILED_PRECONDITION, naming segment, hole or triangle.
-absl::Status ValidateConformity(const MeshView& mesh, std::span<const uint32_t> facets, const DomainView& domain,
-                                double tolerance);
+// With FaceRule::kBox a box that is not known is taken for that of the mesh and the points, and for one that reaches
+// beyond seeds outside of these: what is not meshed beside its true sides may then be taken for missing. A face that is
+// not meshed is not looked at if there are polygons that are holes: it may be in one.
+//
+// REQUIRES:   ValidateDomainMesh is OK; tolerance > 0.
+// Complexity: O((m + n) log (m + n)) for most domains.
+// Errors:     FAILED_PRECONDITION, naming segment, facet, triangle, point, seed or place; INVALID_ARGUMENT for tags or
+//             regions of another number; CANCELLED, DEADLINE_EXCEEDED.
+absl::Status ValidateConformity(const MeshView& mesh, const DomainParts& parts, const DomainView& domain,
+                                double tolerance, const RunContext& context);
 
 }  // namespace wellspace::core
 

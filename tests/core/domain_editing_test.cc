@@ -18,6 +18,7 @@
 #include "core/geometry/exact_measure.h"
 #include "core/mesher.h"
 #include "core/validate/validate_domain.h"
+#include "tests/core/domain_check.h"
 #include "tests/core/domain_input.h"
 #include "tests/support/canonical.h"
 #include "tests/support/clouds.h"
@@ -75,17 +76,12 @@ class DomainEditingTest : public test::SeededTest {
   // Checks the mesh by itself and against its domain, and that inputs are where they were given.
   static void ExpectValid(const Input& input, const Mesh& mesh, const std::vector<double>& given) {
     const MeshView view{2, mesh.points, mesh.simplices};
-    const auto report = ValidateDomainMesh(view, mesh.facets, DefaultRho(2));
+    const auto report = ValidateDomainMesh(view, mesh.facets, DefaultRho(2), RunContext());
     ASSERT_TRUE(report.ok()) << report.status();
     EXPECT_EQ(report->exempt, mesh.statistics.domain->exempt_simplices);
-    std::vector<double> holes;
-    for (const FaceSeed& seed : input.seeds) {
-      if (seed.is_hole) {
-        holes.insert(holes.end(), seed.at.begin(), seed.at.end());
-      }
-    }
-    const DomainView domain{.points = input.points, .segments = input.ends, .is_open = {}, .holes = holes};
-    EXPECT_EQ(ValidateConformity(view, mesh.facets, domain, 2 * kLeastSeparation), absl::OkStatus());
+    const test::DomainMesh copy(mesh);
+    const DomainView domain{.points = input.points, .features = input.features()};
+    EXPECT_EQ(ValidateConformity(view, copy.Parts(), domain, 2 * kLeastSeparation, RunContext()), absl::OkStatus());
     test::ExpectPointsKept(given, mesh);
   }
 

@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <cmath>
 #include <iostream>
+#include <limits>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -13,6 +13,7 @@
 #include "absl/strings/str_format.h"
 #include "client/cli/cloud_options.h"
 #include "client/cli/commands/commands.h"
+#include "client/cli/domain_options.h"
 #include "client/cli/exit_codes.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/options.h"
@@ -146,6 +147,8 @@ struct WantedSizes {
 struct CheckCommand {
   std::string mesh_path;
   std::string cloud_path;
+  DomainOptions domain_options;
+  std::vector<double> domain_box;
   double merge_distance = 0;
   formats::CloudOptions cloud_options;
   double rho = 0;
@@ -161,14 +164,20 @@ struct CheckCommand {
   absl::StatusOr<WantedSizes> Sizes(int dimension);
   absl::Status CheckFiles() const;
   // The points of --cloud, none without it; `report` says how they were read.
-  absl::StatusOr<std::vector<double>> ReadCloudOf(int dimension, CloudReport& report) const;
+  absl::StatusOr<std::vector<double>> ReadCloudOf(int dimension, CloudReport& report);
+  bool IsCloudADomain() const {
+    return !cloud_path.empty() && domain_options.IsDomain(cloud_path, cloud_options.format);
+  }
   // What the mesh has to meet. REQUIRES: `sizes` and `cloud` outlive the result.
   core::ValidationOptions ValidationFor(const WantedSizes& sizes, std::span<const double> cloud) const;
   // Refuses what is asked of a box, and not of a domain with segments.
   absl::Status CheckOptionsOfDomain() const;
-  // Holds the mesh to what it has to meet, its boundary too. `domain`: that of --cloud, if it has one.
+  // Holds the mesh of a domain to what that has to be, and to the domain of --cloud, whose points are `points`.
+  absl::Status ValidateDomain(const formats::Mesh& mesh, const core::MeshView& view,
+                              std::span<const double> points) const;
+  // Holds the mesh to what it has to meet, its boundary too. `cloud`: the points of --cloud.
   absl::Status Validate(const formats::Mesh& mesh, const core::MeshView& view, const WantedSizes& sizes,
-                        std::span<const double> cloud, const std::optional<formats::PlanarDomain>& domain) const;
+                        std::span<const double> cloud) const;
   // Prints the end of the report, and returns the exit code. `json`: what is reported so far.
   int Conclude(const absl::Status& violation, const CloudReport& cloud, const formats::Mesh& mesh, Json json) const;
   int Run();
@@ -189,10 +198,16 @@ absl::StatusOr<WantedSizes> CheckCommand::Sizes(int dimension) {
   return sizes;
 }
 
-// Whether a facet lies on no face of the mesh's bounding box: then it is a domain with segments.
+// Whether a part of the boundary has a name that it has in a domain with segments alone, or a facet lies on no face of
+// the mesh's bounding box: then it is such a domain.
 bool HasSegments(const formats::Mesh& mesh) {
   if (mesh.dimension != 2 || mesh.facets.empty()) {
     return false;
+  }
+  for (const formats::BoundaryPart& part : mesh.boundary) {
+    if (part.name == "unmarked" || part.name.rfind("marker_", 0) == 0) {
+      return true;
+    }
   }
   const formats::MeshShape shape = mesh.View().Shape();
   const uint64_t vertices = mesh.View().vertex_count();
@@ -213,30 +228,69 @@ bool HasSegments(const formats::Mesh& mesh) {
   return false;
 }
 
-// What a domain has to be, and be conforming to the one that is given, if one is.
-absl::Status ValidateDomain(const formats::Mesh& mesh, const core::MeshView& view, double rho,
-                            const formats::PlanarDomain* domain) {
-  if (const absl::Status status = core::ValidateDomainMesh(view, mesh.facets, rho).status();
-      !status.ok() || domain == nullptr) {
+// The tag of each facet.
+std::vector<int32_t> TagsOf(const formats::Mesh& mesh) {
+  std::vector<int32_t> tags;
+  for (const formats::BoundaryPart& part : mesh.boundary) {
+    tags.insert(tags.end(), part.facets, part.tag);
+  }
+  return tags;
+}
+
+core::BoundaryView BoundaryOf(const formats::Mesh& mesh, std::span<const int32_t> tags) {
+  core::BoundaryView boundary{.facets = mesh.facets, .tags = tags};
+  for (const formats::BoundaryPart& part : mesh.boundary) {
+    boundary.names.emplace(part.tag, part.name);
+  }
+  return boundary;
+}
+
+// What the checks call seeds.
+std::vector<core::FaceSeed> SeedsOf(const client::Features& features) {
+  std::vector<core::FaceSeed> seeds;
+  for (const client::FaceSeed& seed : features.seeds) {
+    seeds.push_back({.at = {seed.x, seed.y},
+                     .is_hole = seed.is_hole,
+                     .region = seed.region,
+                     .max_area = seed.max_area > 0 ? seed.max_area : std::numeric_limits<double>::infinity(),
+                     .first_segment = static_cast<uint32_t>(seed.first_segment),
+                     .segment_count = static_cast<uint32_t>(seed.segment_count)});
+  }
+  return seeds;
+}
+
+absl::Status CheckCommand::ValidateDomain(const formats::Mesh& mesh, const core::MeshView& view,
+                                          std::span<const double> points) const {
+  const core::RunContext context;
+  if (const absl::Status status = core::ValidateDomainMesh(view, mesh.facets, rho, context).status();
+      !status.ok() || !IsCloudADomain()) {
     return status;
   }
-  std::vector<double> holes;
-  for (const formats::PlanarDomain::Seed& seed : domain->seeds) {
-    if (seed.is_hole) {
-      holes.insert(holes.end(), {seed.x, seed.y});
-    }
+  const client::Features& given = *domain_options.features();
+  const std::vector<core::FaceSeed> seeds = SeedsOf(given);
+  core::DomainView domain{.points = points};
+  domain.features.ends = given.ends;
+  domain.features.markers = given.markers;
+  domain.features.is_open = given.is_open;
+  domain.features.seeds = seeds;
+  domain.features.faces = given.faces == client::FaceRule::kHoles     ? core::FaceRule::kHoles
+                          : given.faces == client::FaceRule::kEvenOdd ? core::FaceRule::kEvenOdd
+                                                                      : core::FaceRule::kBox;
+  domain.has_markers = domain_options.KnowsMarkers();
+  domain.has_regions = domain_options.KnowsRegions();
+  if (!domain_box.empty()) {
+    domain.box = core::Box<2>{{domain_box[0], domain_box[1]}, {domain_box[2], domain_box[3]}};
+  }
+  const std::vector<int32_t> tags = TagsOf(mesh);
+  core::DomainParts parts{.boundary = BoundaryOf(mesh, tags), .regions = mesh.simplex_regions};
+  for (const formats::Region& region : mesh.regions) {
+    parts.region_names.emplace(region.id, region.name);
   }
   double size = 0;
-  for (const double x : domain->points) {
+  for (const double x : points) {
     size = std::max(size, std::abs(x));
   }
-  return core::ValidateConformity(view, mesh.facets,
-                                  {.points = domain->points,
-                                   .segments = domain->segments,
-                                   .is_open = domain->is_line,
-                                   .holes = holes,
-                                   .is_even_odd = domain->faces == formats::PlanarDomain::FaceRule::kEvenOdd},
-                                  kBentBy * size);
+  return domain_options.WithOrigins(core::ValidateConformity(view, parts, domain, kBentBy * size, context));
 }
 
 absl::Status CheckCommand::CheckFiles() const {
@@ -249,13 +303,17 @@ absl::Status CheckCommand::CheckFiles() const {
   return files.Check();
 }
 
-absl::StatusOr<std::vector<double>> CheckCommand::ReadCloudOf(int dimension, CloudReport& report) const {
-  if (cloud_path.empty() || formats::IsDomainPath(cloud_path)) {
+absl::StatusOr<std::vector<double>> CheckCommand::ReadCloudOf(int dimension, CloudReport& report) {
+  if (cloud_path.empty()) {
     return std::vector<double>();
   }
   formats::CloudOptions options = cloud_options;
   options.dimension = dimension;
-  WELLSPACE_ASSIGN_OR_RETURN(formats::PointCloud read, formats::ReadCloud(cloud_path, options));
+  if (!IsCloudADomain()) {
+    WELLSPACE_RETURN_IF_ERROR(domain_options.CheckCloud(absl::StrCat("--cloud ", cloud_path)));
+  }
+  WELLSPACE_ASSIGN_OR_RETURN(formats::PointCloud read, IsCloudADomain() ? domain_options.Read(cloud_path, options)
+                                                                        : formats::ReadCloud(cloud_path, options));
   report = ReportOf(options, read.notes, read.skipped);
   PrintNotes(report, format, /*quiet=*/false);
   return std::move(read.points);
@@ -281,19 +339,23 @@ absl::Status CheckCommand::CheckOptionsOfDomain() const {
   if (merge_distance != 0) {
     return absl::InvalidArgumentError("--merge: points of a domain with segments are not merged; leave it out");
   }
-  if (!cloud_path.empty() && !formats::IsDomainPath(cloud_path)) {
+  if (!cloud_path.empty() && !IsCloudADomain()) {
     return absl::InvalidArgumentError(absl::StrCat(
-        "--cloud ", cloud_path, ": the mesh is one of a domain with segments; give the domain, a .poly or .geojson"));
+        "--cloud ", cloud_path,
+        ": the mesh is one of a domain with segments; give the domain, a .poly or .geojson, or --segments"));
+  }
+  if (!domain_box.empty() &&
+      (domain_box.size() != 4 || !(domain_box[0] < domain_box[2]) || !(domain_box[1] < domain_box[3]))) {
+    return absl::InvalidArgumentError("--domain: expected the low corner and then the high one of a box in the plane");
   }
   return absl::OkStatus();
 }
 
 absl::Status CheckCommand::Validate(const formats::Mesh& mesh, const core::MeshView& view, const WantedSizes& sizes,
-                                    std::span<const double> cloud,
-                                    const std::optional<formats::PlanarDomain>& domain) const {
-  if (HasSegments(mesh) || domain.has_value()) {
+                                    std::span<const double> cloud) const {
+  if (HasSegments(mesh) || IsCloudADomain()) {
     WELLSPACE_RETURN_IF_ERROR(CheckOptionsOfDomain());
-    WELLSPACE_RETURN_IF_ERROR(ValidateDomain(mesh, view, rho, domain.has_value() ? &*domain : nullptr));
+    WELLSPACE_RETURN_IF_ERROR(ValidateDomain(mesh, view, cloud));
     const core::ValidationOptions options = ValidationFor(sizes, cloud);
     WELLSPACE_RETURN_IF_ERROR(core::ValidateSizing(
         view, {options.max_circumradius, options.size_boxes, options.size_samples, options.gradation}));
@@ -307,14 +369,8 @@ absl::Status CheckCommand::Validate(const formats::Mesh& mesh, const core::MeshV
   if (!status.ok() || mesh.boundary.empty()) {
     return status;
   }
-  core::BoundaryView boundary{.facets = mesh.facets, .tags = {}};
-  std::vector<int32_t> tags;
-  for (const formats::BoundaryPart& part : mesh.boundary) {
-    tags.insert(tags.end(), part.facets, part.tag);
-    boundary.names.emplace(part.tag, part.name);
-  }
-  boundary.tags = tags;
-  return core::ValidateBoundary(view, boundary);
+  const std::vector<int32_t> tags = TagsOf(mesh);
+  return core::ValidateBoundary(view, BoundaryOf(mesh, tags));
 }
 
 int CheckCommand::Conclude(const absl::Status& violation, const CloudReport& cloud, const formats::Mesh& mesh,
@@ -361,14 +417,6 @@ int CheckCommand::Run() {
                        format);
   }
   CloudReport cloud_report;
-  std::optional<formats::PlanarDomain> domain;
-  if (formats::IsDomainPath(cloud_path)) {
-    absl::StatusOr<formats::PlanarDomain> read = formats::ReadPlanarDomain(cloud_path);
-    if (!read.ok()) {
-      return ReportError(read.status(), format);
-    }
-    domain = *std::move(read);
-  }
   const absl::StatusOr<std::vector<double>> cloud = ReadCloudOf(mesh->dimension, cloud_report);
   if (!cloud.ok()) {
     return ReportError(cloud.status(), format);
@@ -389,7 +437,7 @@ int CheckCommand::Run() {
         return ReportError(plotted, format);
       }
     }
-    status = Validate(*mesh, view, *sizes, *cloud, domain);
+    status = Validate(*mesh, view, *sizes, *cloud);
   }
   if (absl::IsInvalidArgument(status)) {  // what was asked for cannot be
     return ReportError(size_field.WithOrigins(status), format);
@@ -410,13 +458,17 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
   AddMeshInput(*check, command->mesh_path);
   check
       ->add_option("--cloud", command->cloud_path,
-                   "File of points that must be the first vertices, to the bit; or a .poly or .geojson that the mesh "
-                   "must conform to")
+                   "File of points that must be the first vertices, to the bit; or a domain, a .poly or .geojson or "
+                   "with --segments, that the mesh must be of, with its faces, regions, largest areas and tags")
       ->type_name("FILE");
   AddNumber(*check, "--merge", command->merge_distance,
             "Points of --cloud no farther than this from a vertex that is one of them need not be vertices")
       ->needs("--cloud");
-  AddCloudOptions(*check, command->cloud_options, "the cloud");
+  AddCloudOptions(*check, command->cloud_options, "the cloud", {"poly", "geojson"});
+  command->domain_options.AddReadingTo(*check, "The cloud");
+  AddNumbers(*check, "--domain", command->domain_box,
+             "Box that lines are in, low corner then high corner; default: that of the mesh")
+      ->needs("--cloud");
   CLI::Option* rho =
       AddNumber(*check, "--rho", command->rho, "Bound that the criterion must obey; default: not checked")
           ->check(AboveZero());

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "client/formats/io/input_file.h"
+#include "client/formats/io/number.h"
 #include "client/formats/mesh_readers.h"
 #include "client/formats/vtk/vtk_mesh_xml.h"
 #include "core/base/status_macros.h"

@@ -11,6 +11,7 @@
 
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_format.h"
+#include "absl/strings/str_join.h"
 #include "client/formats/read_mesh.h"
 #include "tests/client/cli/process.h"
 #include "tests/support/temporary_folder.h"
@@ -60,9 +61,13 @@ class DomainCommandsTest : public testing::Test {
   TemporaryFolder folder_;
 };
 
-double AreaOf(const formats::Mesh& mesh) {
+// Of all triangles, or of those of a region.
+double AreaOf(const formats::Mesh& mesh, int32_t region = 0) {
   double area = 0;
   for (size_t t = 0; t < mesh.simplices.size(); t += 3) {
+    if (region != 0 && mesh.simplex_regions.at(t / 3) != region) {
+      continue;
+    }
     const double* const a = &mesh.points[2 * mesh.simplices[t]];
     const double* const b = &mesh.points[2 * mesh.simplices[t + 1]];
     const double* const c = &mesh.points[2 * mesh.simplices[t + 2]];
@@ -118,6 +123,95 @@ TEST_F(DomainCommandsTest, GeoJsonHasIslandsInLakes) {
   const auto mesh = formats::ReadMesh(Path("out.msh"));
   ASSERT_TRUE(mesh.ok()) << mesh.status();
   EXPECT_NEAR(AreaOf(*mesh), 81 - 49 + 25, 1e-10);
+}
+
+// A feature with a square, and with a property r if it is above 0.
+std::string SquareFeature(double x0, double y0, double x1, double y1, int r = 0) {
+  return absl::StrFormat(R"({"type": "Feature", "properties": {%s}, "geometry": {"type": "Polygon",)"
+                         R"( "coordinates": [[[%g,%g],[%g,%g],[%g,%g],[%g,%g],[%g,%g]]]}})",
+                         r > 0 ? absl::StrFormat("\"r\": %d", r) : "", x0, y0, x1, y0, x1, y1, x0, y1, x0, y0);
+}
+
+std::string FeaturesText(const std::vector<std::string>& features) {
+  return absl::StrCat(R"({"type": "FeatureCollection", "features": [)", absl::StrJoin(features, ","), "]}");
+}
+
+TEST_F(DomainCommandsTest, CheckTakesEachStretchOfASegmentByItself) {
+  Mesh("notch.geojson", R"({"type": "Polygon", "coordinates":
+      [[[0, 0], [10, 0], [10, 10], [0, 10], [0, 0]], [[0, 1], [3, 2], [0, 3], [0, 1]]]})");
+  ExpectValid("notch.geojson");
+  Mesh("zone.geojson", FeaturesText({SquareFeature(0, 0, 10, 10), SquareFeature(0, 1, 3, 4)}));
+  ExpectValid("zone.geojson");
+}
+
+TEST_F(DomainCommandsTest, CheckKnowsTheFaces) {
+  const std::string text = FeaturesText({SquareFeature(0, 0, 10, 10, 1), SquareFeature(3, 3, 6, 6, 2)});
+  Mesh("zone.geojson", text, {"--faces", "holes"});
+  const auto check = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"check", Path("out.msh"), "--cloud", Path("zone.geojson")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return RunWellspace(arguments);
+  };
+  EXPECT_EQ(check({"--faces", "holes"}).exit_code, 0);
+  const RunResult by_default = check({});
+  EXPECT_EQ(by_default.exit_code, 1);
+  EXPECT_THAT(by_default.out, HasSubstr("an even number of rings surrounds it"));
+  // Regions, too, if it is told where they are.
+  EXPECT_THAT(check({"--faces", "holes", "--region-property", "r"}).out, HasSubstr("the mesh has no regions"));
+  Mesh("zone.geojson", text, {"--faces", "holes", "--region-property", "r"});
+  EXPECT_EQ(check({"--faces", "holes", "--region-property", "r"}).exit_code, 0);
+  const auto mesh = formats::ReadMesh(Path("out.msh"));
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_NEAR(AreaOf(*mesh, 1), 91, 1e-9);
+  EXPECT_NEAR(AreaOf(*mesh, 2), 9, 1e-9);
+  folder_.Write("zone.geojson", FeaturesText({SquareFeature(0, 0, 10, 10, 2), SquareFeature(3, 3, 6, 6, 1)}));
+  const RunResult other = check({"--faces", "holes", "--region-property", "r"});
+  EXPECT_EQ(other.exit_code, 1);
+  EXPECT_THAT(other.out, AllOf(HasSubstr("its region is"), HasSubstr("zone.geojson:1: features[")));
+}
+
+TEST_F(DomainCommandsTest, CheckFindsWhatIsMissing) {
+  const std::string two = FeaturesText({SquareFeature(0, 0, 1, 1), SquareFeature(2, 0, 3, 1)});
+  Mesh("one.geojson", FeaturesText({SquareFeature(0, 0, 1, 1)}));
+  const RunResult missing = RunWellspace({"check", Path("out.msh"), "--cloud", folder_.Write("two.geojson", two)});
+  EXPECT_EQ(missing.exit_code, 1);
+  EXPECT_THAT(missing.out, AllOf(HasSubstr("has no triangles"), HasSubstr("two.geojson:1: features[1]")));
+  const RunResult filled = RunWellspace(
+      {"check", Path("out.msh"), "--cloud", folder_.Write("half.geojson", R"({"type": "Polygon", "coordinates":
+                        [[[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], [[0.5, 0.5], [0.75, 0.5], [0.75, 0.75], [0.5, 0.5]]]})")});
+  EXPECT_EQ(filled.exit_code, 1);
+  EXPECT_THAT(filled.out, HasSubstr("segments[4]"));
+}
+
+// A square is no box, though its sides are that of one: the tags of its facets tell.
+TEST_F(DomainCommandsTest, ASquareIsCheckedAsADomain) {
+  Mesh("square.csv", "x,y\n0,0\n1,0\n1,1\n0,1\n0,0\n", {"--segments", "--faces", "holes"});
+  EXPECT_EQ(RunWellspace({"check", Path("out.msh"), "--rho", "2"}).exit_code, 0);
+  EXPECT_EQ(RunWellspace({"check", Path("out.msh"), "--cloud", Path("square.csv")}).exit_code, 2);
+  EXPECT_EQ(RunWellspace({"check", Path("out.msh"), "--cloud", Path("square.csv"), "--segments", "--faces", "holes"})
+                .exit_code,
+            0);
+  const std::string line = folder_.Write("line.csv", "x,y\n0,0.5\n1,0.5\n");
+  const RunResult other =
+      RunWellspace({"check", Path("out.msh"), "--cloud", line, "--segments", "--domain", "0,0,1,1"});
+  EXPECT_EQ(other.exit_code, 1);
+  EXPECT_THAT(other.out, HasSubstr("segments[0]"));
+  const std::string cloud = folder_.Write("cloud.csv", "0,0\n");
+  EXPECT_THAT(RunWellspace({"check", Path("out.msh"), "--cloud", cloud, "--faces", "holes"}).err, HasSubstr("--faces"));
+}
+
+TEST_F(DomainCommandsTest, APolygonThatARiverCutsIsOneRegion) {
+  const std::string river =
+      R"({"type": "Feature", "properties": {}, "geometry": {"type": "LineString", "coordinates": [[3, 0], [3, 10]]}})";
+  Mesh("river.geojson", FeaturesText({SquareFeature(0, 0, 10, 10, 7), river, SquareFeature(10, 0, 20, 10, 8)}),
+       {"--region-property", "r"});
+  const auto mesh = formats::ReadMesh(Path("out.msh"));
+  ASSERT_TRUE(mesh.ok()) << mesh.status();
+  EXPECT_NEAR(AreaOf(*mesh, 7), 100, 1e-9);
+  EXPECT_NEAR(AreaOf(*mesh, 8), 100, 1e-9);
+  EXPECT_EQ(
+      RunWellspace({"check", Path("out.msh"), "--cloud", Path("river.geojson"), "--region-property", "r"}).exit_code,
+      0);
 }
 
 TEST_F(DomainCommandsTest, PolylinesInABox) {
