@@ -112,6 +112,9 @@ NameLines::NameLines(const MeshShape& shape, Of of) {
   for (size_t i = 0; of != Of::kParts && i < shape.regions.size(); ++i) {
     Add(kRegionWord, shape.regions[i].id, shape.regions[i].name);
   }
+  if (of == Of::kBoth && shape.dimension == 2 && shape.simplex_count == 0 && shape.vertex_count > 0) {
+    lines_.emplace_back(kFlatLine);
+  }
 }
 
 void NameLines::Add(std::string_view kind, int32_t number, std::string_view name) {

@@ -42,6 +42,7 @@ std::u32string ToUtf32(std::string_view text);
 std::string ToUtf8(std::u32string_view text);
 
 // Lines "part 7: deep sea" and "region 2: land", one for each name of a mesh: comments, or text of a file of VTK.
+// Points in the plane without simplices have the line "dimension 2", since a third coordinate is added to them.
 //
 // No line has more than kMaxNameLineBytes: MMG and Triangle take what is behind 255 or 1023 bytes of a comment for
 // data.
@@ -64,6 +65,8 @@ class NameLines {
 };
 
 inline constexpr size_t kMaxNameLineBytes = 240;
+
+inline constexpr std::string_view kFlatLine = "dimension 2";
 
 // Takes the name that `line` has, if it is one of NameLines; either may be null.
 void TakeNameLine(std::string_view line, FacetSorter* parts, RegionCollector* regions);

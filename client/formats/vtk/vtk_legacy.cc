@@ -49,7 +49,7 @@ bool IsWholeVtkType(const VtkType& type) { return type.name != "float" && type.n
 constexpr std::array<std::string_view, 6> kVtkCellSections = {"VERTICES",        "LINES", "POLYGONS",
                                                               "TRIANGLE_STRIPS", "CELLS", "CELL_TYPES"};
 
-absl::string_view Text(std::string_view text) { return {text.data(), text.size()}; }
+absl::string_view VtkText(std::string_view text) { return {text.data(), text.size()}; }
 
 }  // namespace
 
@@ -114,7 +114,7 @@ bool VtkLegacyReader::TakeWordIf(std::string_view keyword) {
   if (!NextWord(word)) {
     return false;
   }
-  if (absl::EqualsIgnoreCase(Text(word), Text(keyword))) {
+  if (absl::EqualsIgnoreCase(VtkText(word), VtkText(keyword))) {
     return true;
   }
   if (word.data() != pending_.data()) {
@@ -285,7 +285,7 @@ absl::Status VtkLegacyReader::ReadScalars(Data data) {
   WELLSPACE_RETURN_IF_ERROR(TakeType(type));
   FieldSplitter rest = line_;
   std::string_view word;
-  if (rest.Next(word) && !absl::EqualsIgnoreCase(Text(word), "LOOKUP_TABLE")) {
+  if (rest.Next(word) && !absl::EqualsIgnoreCase(VtkText(word), "LOOKUP_TABLE")) {
     WELLSPACE_RETURN_IF_ERROR(TakeCount(kVtkMaxComponents, data.components));
   }
   if (TakeWordIf("LOOKUP_TABLE")) {

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <utility>
 
+#include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "absl/strings/str_split.h"
 #include "client/formats/boundary.h"
@@ -34,6 +35,8 @@ uint64_t CornersOfVtkCell(int64_t type) {
   }
 }
 
+absl::string_view Text(std::string_view text) { return {text.data(), text.size()}; }
+
 class VtkMeshMaker {
  public:
   explicit VtkMeshMaker(VtkGrid grid) : grid_(std::move(grid)) {}
@@ -43,7 +46,8 @@ class VtkMeshMaker {
     const auto has_cell = [this](uint8_t type) {
       return std::find(grid_.types.begin(), grid_.types.end(), type) != grid_.types.end();
     };
-    mesh_.dimension = !has_cell(kVtkTetrahedron) && has_cell(kVtkTriangle) ? 2 : 3;
+    const bool are_flat_points = grid_.cells == 0 && absl::StrContains(grid_.names, Text(kFlatLine));
+    mesh_.dimension = are_flat_points || (!has_cell(kVtkTetrahedron) && has_cell(kVtkTriangle)) ? 2 : 3;
     WELLSPACE_RETURN_IF_ERROR(TakeCells());
     WELLSPACE_RETURN_IF_ERROR(TakePoints());
     mesh_.weights = std::move(grid_.weights);

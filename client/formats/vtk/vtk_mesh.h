@@ -33,7 +33,7 @@ struct VtkGrid {
 
 // The mesh of the tetrahedra of a grid or, if there are none, of its triangles in the plane z = 0. Cells of one
 // dimension less are facets where cells have tags; other points and lines are left out, with a note. Without any cells
-// the mesh has dimension 3 and no simplices.
+// the mesh has no simplices, and dimension 3 unless the names say that it is flat.
 //
 // Errors:     INVALID_ARGUMENT unless as many values have come as there are points and cells; for other cells; for
 //             indices and numbers out of their range.

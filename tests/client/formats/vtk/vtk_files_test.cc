@@ -267,6 +267,18 @@ TEST_F(VtkFilesTest, ErrorsOfLegacyMeshes) {
                                "vtk");
 }
 
+// Points in the plane stay there, though VTK's have a third coordinate.
+TEST_F(VtkFilesTest, OurFlatPointsHaveTwoCoordinates) {
+  for (const char* name : {"a.vtu", "a.vtk"}) {
+    for (const int dimension : {2, 3}) {
+      Mesh points{.dimension = dimension, .points = {0, 0, 0, 1, 0.5, 0}, .simplices = {}};
+      Write(points, name);
+      EXPECT_EQ(ReadGood(name).dimension, dimension);
+      EXPECT_EQ(ReadGood(name).points, points.points);
+    }
+  }
+}
+
 // The kind of what `convert` lost: cells that are no simplices, of which only the points are taken.
 TEST_F(VtkFilesTest, CellsThatAreNotReadAreToldOf) {
   std::string quads = kLegacySquare;
