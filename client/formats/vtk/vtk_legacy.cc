@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "absl/strings/ascii.h"
+#include "absl/strings/escaping.h"
 #include "absl/strings/match.h"
 #include "absl/strings/str_cat.h"
 #include "client/formats/coordinate.h"
@@ -99,8 +100,9 @@ bool VtkLegacyReader::NextKeyword() {
   if (!NextWord(word)) {
     return false;
   }
+  constexpr size_t kShown = 40;
   word_ = word;
-  keyword_ = absl::AsciiStrToUpper(word_);
+  keyword_ = absl::CHexEscape(absl::AsciiStrToUpper(word_.substr(0, kShown)));
   return true;
 }
 

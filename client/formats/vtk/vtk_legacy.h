@@ -106,7 +106,7 @@ class VtkLegacyReader {
   std::string pending_;          // a word that was looked at, and not taken
   bool has_pending_ = false;
   bool is_ascii_ = true;
-  std::string keyword_;  // of the section, in upper case
+  std::string keyword_;  // of the section, in upper case; of a name as messages have it
   std::string word_;     // the same as the file has it
   std::string dataset_;
   bool has_points_ = false;
