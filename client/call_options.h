@@ -3,6 +3,7 @@
 #define WELLSPACE_CLIENT_CALL_OPTIONS_H_
 
 #include <cstdint>
+#include <optional>
 #include <stop_token>
 #include <string>
 
@@ -22,8 +23,8 @@ struct CallOptions {
   // answer. Empty: one is chosen, so that what the library repeats after a lost connection is done once.
   std::string request_id;
 
-  // Of a call that changes a session: ABORTED unless the session is at this revision. 0: any.
-  uint64_t expected_revision = 0;
+  // Of a call that changes a session: ABORTED unless the session is at this revision, of which 1 is the first.
+  std::optional<uint64_t> expected_revision{};
 };
 
 }  // namespace wellspace::client

@@ -76,7 +76,7 @@ absl::StatusOr<SizesSet> Client::SetVertexSizes(const std::string& session, cons
   return connection_->SetVertexSizes(session, sizes, call);
 }
 
-absl::Status Client::DownloadMesh(const std::string& session, MeshSink& sink, uint64_t revision,
+absl::Status Client::DownloadMesh(const std::string& session, MeshSink& sink, std::optional<uint64_t> revision,
                                   const OnChunks& on_chunks, const CallOptions& call) {
   return connection_->DownloadMesh(session, sink, revision, on_chunks, call);
 }

@@ -104,9 +104,9 @@ class Client {
   absl::StatusOr<SizesSet> SetVertexSizes(const std::string& session, const VertexSizes& sizes,
                                           const CallOptions& call = {});
 
-  // Streams the mesh of a session into `sink`: that of `revision`, 0: the last one. A broken connection costs nothing
+  // Streams the mesh of a session into `sink`: that of `revision`, or the last one. A broken connection costs nothing
   // but time.
-  absl::Status DownloadMesh(const std::string& session, MeshSink& sink, uint64_t revision = 0,
+  absl::Status DownloadMesh(const std::string& session, MeshSink& sink, std::optional<uint64_t> revision = std::nullopt,
                             const OnChunks& on_chunks = nullptr, const CallOptions& call = {});
 
   // Brings `mesh`, which a MeshCollector has got of the session, up to date: what has changed since `mesh.revision` is
@@ -140,7 +140,8 @@ class Client {
   // the same mesh. ABORTED (REVISION_MISMATCH) if it is replaced meanwhile.
   absl::StatusOr<Located> Locate(const std::string& session, std::span<const double> points,
                                  const LocateOptions& options = {}, const CallOptions& call = {});
-  // `points`: k x dimension, row-major. `near`: a vertex near each, or empty.
+  // `points`: k x dimension, row-major. `near`: a vertex near each, or empty. All become vertices or none, so they have
+  // to fit into one request of 4 MiB: some 10^5 points. INVALID_ARGUMENT for more.
   absl::StatusOr<AddedVertices> AddVertices(const std::string& session, std::span<const double> points,
                                             std::span<const uint32_t> near = {}, const CallOptions& call = {});
 

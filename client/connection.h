@@ -63,7 +63,7 @@ class Connection {
                                             const CallOptions& call) = 0;
   virtual absl::StatusOr<SizesSet> SetVertexSizes(const std::string& session, const VertexSizes& sizes,
                                                   const CallOptions& call) = 0;
-  virtual absl::Status DownloadMesh(const std::string& session, MeshSink& sink, uint64_t revision,
+  virtual absl::Status DownloadMesh(const std::string& session, MeshSink& sink, std::optional<uint64_t> revision,
                                     const OnChunks& on_chunks, const CallOptions& call) = 0;
   virtual absl::Status UpdateMesh(const std::string& session, Mesh& mesh, const OnChunks& on_chunks,
                                   const CallOptions& call) = 0;

@@ -38,7 +38,7 @@ struct SizeSamples {
 struct VertexSizes {
   std::vector<double> sizes;
   SizeMeasure measure = SizeMeasure::kCircumradius;
-  uint64_t mesh_revision = 0;  // of the mesh whose vertices they are; 0: the last one
+  std::optional<uint64_t> mesh_revision{};  // of the mesh whose vertices they are; none: the last one
 };
 
 // Which faces, into which segments cut the plane, are meshed; see the proto's FaceRule.
@@ -53,7 +53,7 @@ struct FaceSeed {
   double y = 0;
   bool is_hole = false;
   int32_t region = 0;
-  double max_area = 0;  // 0: no bound
+  std::optional<double> max_area{};  // none: no bound
   // The rings of a polygon: so many segments from the first on. It stands for all faces inside of them. 0: the seed is
   // the point, as it is to a server that is too old to know of polygons.
   uint64_t first_segment = 0;
@@ -70,24 +70,25 @@ struct Features {
   CrossingRule crossings = CrossingRule::kRefuse;
 };
 
-// What to mesh and how. Zero or empty means the server's default, as the comments of the proto's MeshParameters say.
+// What to mesh and how. What is empty is the server's default, as the comments of the proto's MeshParameters say. A 0
+// is sent as it is, and refused where it can be no value.
 struct MeshOptions {
   int dimension = 3;
-  double rho = 0;
+  std::optional<double> rho;
   Criterion criterion = Criterion::kRadiusEdge;
-  double max_circumradius = 0;
-  double edge_length = 0;
+  std::optional<double> max_circumradius;
+  std::optional<double> edge_length;
   std::vector<SizeBox> size_boxes;
-  double gradation = 0;                // from boxes and samples
+  std::optional<double> gradation;     // from boxes and samples
   std::optional<double> min_dihedral;  // degrees; 0: slivers are left as they are
   bool pump_weights = false;
-  double merge_distance = 0;   // points this near to each other become one vertex
-  bool keep_vertices = false;  // of the session's last mesh: where they are
+  std::optional<double> merge_distance;  // points this near to each other become one vertex
+  bool keep_vertices = false;            // of the session's last mesh: where they are
   std::vector<double> domain_low;
   std::vector<double> domain_high;
   double margin = 0.25;
-  uint64_t max_vertices = 0;
-  int threads = 0;
+  std::optional<uint64_t> max_vertices;
+  std::optional<int> threads;
   std::shared_ptr<const Features>
       features;  // of MeshPoints and EstimateMesh, in 2-D; null: none. Those of a session: AddSegments
   std::shared_ptr<const SizeSamples>
@@ -270,13 +271,14 @@ struct Session {
   uint64_t seed_count = 0;
   std::optional<FaceRule> faces;  // none: a cloud, without segments and faces
   CrossingRule crossings = CrossingRule::kRefuse;
-  uint64_t size_count = 0;  // samples of sizes, see SetSizes
+  uint64_t size_count = 0;    // samples of sizes, see SetSizes
+  uint64_t stored_bytes = 0;  // of what it keeps
 };
 
 // Which part of a list.
 struct PageOptions {
-  int page_size = 0;       // 0: as many as the server likes
-  std::string page_token;  // `next_page_token` of the page before; empty: the first
+  std::optional<int> page_size{};  // none: as many as the server likes
+  std::string page_token;          // `next_page_token` of the page before; empty: the first
 };
 
 struct SessionPage {
@@ -350,13 +352,14 @@ struct Located {
   std::vector<uint32_t> vertices;   // n x (dimension + 1), row-major
   std::vector<double> coordinates;  // n x (dimension + 1), row-major: barycentric
   uint64_t revision = 0;            // of the mesh
+  uint64_t vertex_count = 0;        // of the mesh
 };
 inline constexpr uint32_t kNoSimplex = 0xffff'ffff;
 
 // How Locate does it.
 struct LocateOptions {
-  uint64_t revision = 0;       // of the mesh; 0: the last one
-  bool allow_outside = false;  // points in no simplex are no error
+  std::optional<uint64_t> revision{};  // of the mesh; none: the last one
+  bool allow_outside = false;          // points in no simplex are no error
 };
 
 struct AddedVertices {
@@ -392,7 +395,9 @@ struct ServerInfo {
   absl::Duration default_ttl;
   absl::Duration max_ttl;
   absl::Duration stall_limit;
-  uint64_t max_memory_bytes = 0;  // 0: no limit
+  uint64_t max_memory_bytes = 0;             // 0: no limit
+  uint64_t max_stored_bytes_per_tenant = 0;  // 0: no limit
+  uint64_t stored_bytes = 0;                 // of these, what the caller's sessions keep
 };
 
 // What a server says of its health, or of that of one of its services.

@@ -62,8 +62,7 @@ absl::Status CheckSizes(const MeshParameters& parameters) {
   const auto check_bound = [](const char* name, double bound) {
     return bound >= 0 && std::isfinite(bound)
                ? absl::OkStatus()
-               : absl::InvalidArgumentError(
-                     absl::StrCat(name, ": ", bound, " is not allowed; a number above 0 is, or 0 for no bound"));
+               : absl::InvalidArgumentError(absl::StrCat(name, ": ", bound, " is not allowed; a number above 0 is"));
   };
   WELLSPACE_RETURN_IF_ERROR(check_bound("max_circumradius", parameters.max_circumradius));
   WELLSPACE_RETURN_IF_ERROR(check_bound("edge_length", parameters.edge_length));
@@ -74,9 +73,8 @@ absl::Status CheckSizes(const MeshParameters& parameters) {
     WELLSPACE_RETURN_IF_ERROR(CheckSizeSamples(*parameters.size_samples, parameters.dimension));
   }
   if (!(parameters.gradation >= 0 && parameters.gradation <= 1)) {
-    return absl::InvalidArgumentError(absl::StrCat("gradation: ", parameters.gradation,
-                                                   " is not allowed; a number above 0 and at most 1 is, or 0 for the "
-                                                   "default"));
+    return absl::InvalidArgumentError(
+        absl::StrCat("gradation: ", parameters.gradation, " is not allowed; a number above 0 and at most 1 is"));
   }
   return absl::OkStatus();
 }

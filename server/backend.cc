@@ -81,6 +81,13 @@ void Backend::AddMetrics(Metrics& metrics) {
   add_counters("other_jobs_", "Jobs that are not small", &JobPool::Counters::others);
   metrics.AddGauge("wellspace_sessions", "Sessions of all tenants.",
                    [this] { return static_cast<double>(sessions_.Count()); });
+  metrics.AddGauge("wellspace_stored_bytes",
+                   "Points, segments, sizes and meshes that the sessions of all tenants keep.",
+                   [this] { return static_cast<double>(sessions_.StoredBytes().all); });
+  metrics.AddGauge("wellspace_stored_bytes_of_largest_tenant", "Of these, those of the tenant that keeps most.",
+                   [this] { return static_cast<double>(sessions_.StoredBytes().most); });
+  metrics.AddGauge("wellspace_stored_bytes_limit_per_tenant", "Most that one tenant may keep; 0: no limit.",
+                   [this] { return static_cast<double>(options_.max_stored_bytes_per_tenant); });
   metrics.AddGauge("wellspace_memory_reserved_bytes", "Memory that jobs, sessions and calls have reserved.",
                    [this] { return static_cast<double>(memory_.reserved()); });
   metrics.AddGauge("wellspace_memory_lasting_bytes", "Of that, what sessions keep.",

@@ -69,15 +69,20 @@ void AddCount(CLI::App& app, const std::string& name, T& value, uint64_t least, 
       ->capture_default_str();
 }
 
+// A number of bytes, perhaps with a unit; false: it is none.
+bool ParseBytes(const std::string& text, uint64_t& bytes) {
+  try {
+    std::string plain = text;
+    return CLI::AsSizeValue(/*kb_is_1000=*/false)(plain).empty() && absl::SimpleAtoi(plain, &bytes);
+  } catch (const CLI::ValidationError&) {  // an unknown unit
+    return false;
+  }
+}
+
 // An amount of memory: 0, or at least kMinMemoryBytes.
 uint64_t ParseMemory(const std::string& text) {
   uint64_t bytes = 0;
-  bool is_size = false;
-  try {
-    std::string plain = text;
-    is_size = CLI::AsSizeValue(/*kb_is_1000=*/false)(plain).empty() && absl::SimpleAtoi(plain, &bytes);
-  } catch (const CLI::ValidationError&) {  // an unknown unit
-  }
+  const bool is_size = ParseBytes(text, bytes);
   if (!is_size || (bytes != 0 && bytes < kMinMemoryBytes)) {
     throw CLI::ValidationError("--max-memory", absl::StrCat(text, " is no limit of memory; 0 (none) is, or at least ",
                                                             kMinMemoryBytes >> 20, "MB, as 512MB or 12GB"));
@@ -123,6 +128,18 @@ void DeclareLimits(CLI::App& app, ServiceOptions& service) {
   AddCount(app, "--max-vertices", service.max_vertices, 1, core::kMaxVertices, "Most vertices of a mesh");
   AddCount(app, "--max-points-per-tenant", service.max_points_per_tenant, 1, kMany,
            "Most points of all sessions of one tenant");
+  const std::string stored = "--max-stored-bytes-per-tenant";
+  const auto parse_stored = [&service, stored](const std::string& text) {
+    if (!ParseBytes(text, service.max_stored_bytes_per_tenant)) {
+      throw CLI::ValidationError(stored, absl::StrCat(text, " is no number of bytes, as 512MB or 12GB; 0: no limit"));
+    }
+  };
+  app.add_option_function<std::string>(
+         stored, parse_stored,
+         "Most bytes of points, segments, sizes and meshes that the sessions of one tenant keep, as 512MB or 12GB; 0: "
+         "no limit")
+      ->type_name("SIZE")
+      ->default_str(absl::StrCat(service.max_stored_bytes_per_tenant));
   AddCount(app, "--max-sessions", service.max_sessions, 1, kMany, "Most sessions at a time");
   AddCount(app, "--max-sessions-per-tenant", service.max_sessions_per_tenant, 1, kMany,
            "Most sessions of one tenant at a time");

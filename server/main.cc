@@ -133,6 +133,7 @@ LogFields StartOf(const Flags& flags, const Server& server) {
   fields.Add("max_memory_bytes", service.max_memory_bytes);
   fields.Add("max_points", service.max_points).Add("max_vertices", service.max_vertices);
   fields.Add("max_points_per_tenant", service.max_points_per_tenant);
+  fields.Add("max_stored_bytes_per_tenant", service.max_stored_bytes_per_tenant);
   fields.Add("max_sessions", service.max_sessions).Add("max_sessions_per_tenant", service.max_sessions_per_tenant);
   fields.Add("default_ttl_seconds", absl::ToDoubleSeconds(service.default_ttl));
   fields.Add("max_ttl_seconds", absl::ToDoubleSeconds(service.max_ttl));

@@ -73,7 +73,7 @@ std::string WithNotes(const CloudReport& report, const std::string& object) {
   if (notes.empty()) {
     return object;
   }
-  std::string text = notes.dump(2);
+  std::string text = JsonText(notes, /*indented=*/true);
   // "{\n  …\n}" and "{\n  …": the end of the one gives way to the other's members.
   text.replace(text.rfind("\n}"), std::string::npos, ",");
   return text + object.substr(object.find('\n'));

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -48,7 +49,7 @@ absl::StatusOr<client::Features> FeaturesOf(const formats::PlanarDomain& domain,
                               .y = seed.y,
                               .is_hole = seed.is_hole,
                               .region = seed.is_hole ? 0 : static_cast<int32_t>(seed.attribute),
-                              .max_area = seed.max_area,
+                              .max_area = seed.max_area > 0 ? std::optional(seed.max_area) : std::nullopt,
                               .first_segment = seed.first_segment,
                               .segment_count = seed.segment_count});
   }

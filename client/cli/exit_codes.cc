@@ -4,6 +4,7 @@
 #include <string>
 
 #include "client/cli/json.h"
+#include "client/printable.h"
 
 namespace wellspace::cli {
 
@@ -48,10 +49,10 @@ int ExitCodeOf(const absl::Status& status) {
 int ReportError(const absl::Status& status, OutputFormat format) {
   const std::string code = absl::StatusCodeToString(status.code());
   if (format == OutputFormat::kText) {
-    std::cerr << "wellspace: " << std::string(status.message()) << " [" << code << "]\n";
+    std::cerr << "wellspace: " << client::Printable(std::string(status.message())) << " [" << code << "]\n";
     return ExitCodeOf(status);
   }
-  std::cerr << nlohmann::ordered_json{{"error", ErrorJson(status)}}.dump() << "\n";
+  std::cerr << JsonText({{"error", ErrorJson(status)}}, /*indented=*/false) << "\n";
   return ExitCodeOf(status);
 }
 

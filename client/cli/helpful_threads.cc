@@ -71,8 +71,8 @@ std::vector<double> SidesOfDomain(const client::MeshOptions& options, std::span<
 
 int HelpfulThreads(const client::MeshOptions& options, std::span<const double> points) {
   double vertices = kVerticesPerPoint * static_cast<double>(points.size()) / options.dimension;
-  vertices += VerticesOfSize(SidesOfDomain(options, points), options.max_circumradius);
-  vertices += VerticesOfSize(SidesOfDomain(options, points), kRadiusOfEdge * options.edge_length);
+  vertices += VerticesOfSize(SidesOfDomain(options, points), options.max_circumradius.value_or(0));
+  vertices += VerticesOfSize(SidesOfDomain(options, points), kRadiusOfEdge * options.edge_length.value_or(0));
   if (options.size_samples != nullptr) {
     vertices += VerticesOfSamples(SidesOfDomain(options, points), *options.size_samples);
   }

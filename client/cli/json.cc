@@ -1,10 +1,19 @@
 #include "client/cli/json.h"
 
+#include <cstdint>
+
+#include "absl/strings/str_format.h"
+
 namespace wellspace::cli {
 namespace {
 
 Json OptionalTime(const std::optional<absl::Time>& time) {
   return time.has_value() ? Json(TimeText(*time)) : Json(nullptr);
+}
+
+template <typename Number>
+Json OrNull(const std::optional<Number>& number) {
+  return number.has_value() ? Json(*number) : Json(nullptr);
 }
 
 }  // namespace
@@ -65,6 +74,25 @@ const char* StateName(client::OperationState state) {
 
 std::string TimeText(absl::Time time) { return absl::FormatTime("%Y-%m-%d%ET%H:%M:%SZ", time, absl::UTCTimeZone()); }
 
+std::string JsonText(const Json& json, bool indented) {
+  const std::string text = json.dump(indented ? 2 : -1, ' ', /*ensure_ascii=*/false, Json::error_handler_t::replace);
+  // Within strings, as nlohmann leaves them: DEL, and the control characters of Latin-1, U+0080 to U+009F.
+  std::string escaped;
+  for (size_t i = 0; i < text.size(); ++i) {
+    const auto byte = static_cast<uint8_t>(text[i]);
+    const auto next = static_cast<uint8_t>(i + 1 < text.size() ? text[i + 1] : 0);
+    if (byte == 0x7f) {
+      escaped += "\\u007f";
+    } else if (byte == 0xc2 && next >= 0x80 && next < 0xa0) {
+      absl::StrAppendFormat(&escaped, "\\u%04x", next);
+      ++i;
+    } else {
+      escaped += text[i];
+    }
+  }
+  return escaped;
+}
+
 Json ErrorJson(const absl::Status& status) {
   Json json;
   json["code"] = absl::StatusCodeToString(status.code());
@@ -81,25 +109,25 @@ Json ErrorJson(const absl::Status& status) {
 Json ParametersJson(const client::MeshOptions& parameters) {
   Json json;
   json["dimension"] = parameters.dimension;
-  json["rho"] = parameters.rho;
+  json["rho"] = OrNull(parameters.rho);
   json["criterion"] = parameters.criterion == client::Criterion::kWellSpaced ? "well-spaced" : "radius-edge";
-  json["max_circumradius"] = parameters.max_circumradius;
-  json["edge_length"] = parameters.edge_length;
-  json["gradation"] = parameters.gradation;
+  json["max_circumradius"] = OrNull(parameters.max_circumradius);
+  json["edge_length"] = OrNull(parameters.edge_length);
+  json["gradation"] = OrNull(parameters.gradation);
   json["size_boxes"] = Json::array();
   for (const client::SizeBox& box : parameters.size_boxes) {
     json["size_boxes"].push_back({{"low", box.low}, {"high", box.high}, {"max_circumradius", box.max_circumradius}});
   }
-  json["min_dihedral"] = parameters.min_dihedral.has_value() ? Json(*parameters.min_dihedral) : Json(nullptr);
+  json["min_dihedral"] = OrNull(parameters.min_dihedral);
   json["pump_weights"] = parameters.pump_weights;
   json["keep_vertices"] = parameters.keep_vertices;
   const bool has_domain = !parameters.domain_low.empty();
   json["domain_low"] = has_domain ? Json(parameters.domain_low) : Json(nullptr);
   json["domain_high"] = has_domain ? Json(parameters.domain_high) : Json(nullptr);
   json["margin"] = parameters.margin;
-  json["merge_distance"] = parameters.merge_distance;
-  json["max_vertices"] = parameters.max_vertices;
-  json["threads"] = parameters.threads;
+  json["merge_distance"] = OrNull(parameters.merge_distance);
+  json["max_vertices"] = OrNull(parameters.max_vertices);
+  json["threads"] = OrNull(parameters.threads);
   return json;
 }
 
@@ -119,6 +147,7 @@ Json SessionJson(const client::Session& session) {
   json["faces"] = session.faces.has_value() ? Json(FaceRuleName(*session.faces)) : Json(nullptr);
   json["crossings"] = session.faces.has_value() ? nlohmann::ordered_json(CrossingRuleName(session.crossings)) : nullptr;
   json["size_count"] = session.size_count;
+  json["stored_bytes"] = session.stored_bytes;
   json["vertex_count"] = session.vertex_count;
   json["simplex_count"] = session.simplex_count;
   json["last_operation"] = session.last_operation.empty() ? Json(nullptr) : Json(session.last_operation);
@@ -167,6 +196,8 @@ Json ServerInfoJson(const client::ServerInfo& info) {
   json["max_ttl_seconds"] = absl::ToDoubleSeconds(info.max_ttl);
   json["stall_limit_seconds"] = absl::ToDoubleSeconds(info.stall_limit);
   json["max_memory_bytes"] = info.max_memory_bytes;
+  json["max_stored_bytes_per_tenant"] = info.max_stored_bytes_per_tenant;
+  json["stored_bytes"] = info.stored_bytes;
   return json;
 }
 

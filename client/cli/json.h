@@ -14,13 +14,17 @@ using Json = nlohmann::ordered_json;
 
 // Times are RFC 3339 in UTC, durations seconds, names of states lower case. Absent: null.
 
+// `json` as text that a terminal does not obey: control characters are escaped, bytes that are no UTF-8 replaced.
+std::string JsonText(const Json& json, bool indented);
+
 // code, reason and field (where the server gave one), message.
 Json ErrorJson(const absl::Status& status);
 // dimension, rho, criterion, max_circumradius, edge_length, gradation, size_boxes, min_dihedral, pump_weights,
 // keep_vertices, domain_low, domain_high, margin, merge_distance, max_vertices, threads.
 Json ParametersJson(const client::MeshOptions& parameters);
 // name, state, parameters, labels, ttl_seconds, create_time, expire_time, revision, committed_points, segment_count,
-// seed_count, faces (a name, or null for a cloud), crossings (likewise), vertex_count, simplex_count, last_operation.
+// seed_count, faces (a name, or null for a cloud), crossings (likewise), size_count, stored_bytes, vertex_count,
+// simplex_count, last_operation.
 Json SessionJson(const client::Session& session);
 // sequence, phase, vertices, estimated_vertices, simplices, fraction.
 Json ProgressJson(const client::Progress& progress);

@@ -83,7 +83,7 @@ absl::StatusOr<client::MeshOptions> MeshingOptions::OptionsFor(const formats::Po
   WELLSPACE_ASSIGN_OR_RETURN(client::MeshOptions options, parameters_.For(cloud.dimension));
   options.features = domain_.features();
   WELLSPACE_ASSIGN_OR_RETURN(options.size_samples, size_field_.Read(cloud.dimension));
-  if (options.threads == 0) {
+  if (!options.threads.has_value()) {
     options.threads = HelpfulThreads(options, cloud.points);
   }
   return options;

@@ -27,23 +27,23 @@ std::vector<double> ParseList(const std::string& name, const std::string& text) 
   return values;
 }
 
-template <typename Number>
-CLI::Option* AddNumberTo(CLI::App& command, const std::string& name, Number& value, const std::string& description) {
+constexpr char kNone[] = "none";
+
+}  // namespace
+
+CLI::Option* AddNumber(CLI::App& command, const std::string& name, double& value, const std::string& description) {
   return command
       .add_option_function<std::string>(
           name, [name, &value](const std::string& text) { value = ParseOption(name, text); }, description)
       ->type_name("NUMBER");
 }
 
-}  // namespace
-
-CLI::Option* AddNumber(CLI::App& command, const std::string& name, double& value, const std::string& description) {
-  return AddNumberTo(command, name, value, description);
-}
-
 CLI::Option* AddNumber(CLI::App& command, const std::string& name, std::optional<double>& value,
                        const std::string& description) {
-  return AddNumberTo(command, name, value, description);
+  const auto parse = [name, &value](const std::string& text) {
+    value = text == kNone ? std::nullopt : std::optional(ParseOption(name, text));
+  };
+  return command.add_option_function<std::string>(name, parse, description)->type_name("NUMBER");
 }
 
 CLI::Validator AboveZero() {

@@ -42,8 +42,9 @@ CLI::Option* AddCriterion(CLI::App& command, client::Criterion& criterion) {
       ->check(CLI::IsMember({kRadiusEdge, kWellSpaced}));
 }
 
-void AddSizes(CLI::App& command, double& max_circumradius, std::vector<std::vector<double>>& size_boxes) {
-  AddNumber(command, "--size", max_circumradius, "Bound on the circumradius of every simplex; default: none");
+void AddSizes(CLI::App& command, std::optional<double>& max_circumradius,
+              std::vector<std::vector<double>>& size_boxes) {
+  AddNumber(command, "--size", max_circumradius, "Bound on the circumradius of every simplex, or none; default: none");
   AddNumberLists(command, "--size-box", size_boxes,
                  "Low corner, high corner and a bound on the circumradius of every simplex whose circumball meets this "
                  "box; may be given more than once");
@@ -94,7 +95,7 @@ void ParameterOptions::AddQualityTo(CLI::App& command) {
       ->check(CLI::Range(0.001, 33.7));
   AddSizes(command, options_.max_circumradius, size_boxes_);
   AddNumber(command, "--edge-length", options_.edge_length,
-            "Length that edges have on average where the points ask for no shorter ones; default: none");
+            "Length that edges have on average where the points ask for no shorter ones, or none; default: none");
   AddGradation(command, options_.gradation);
   AddNumber(command, "--min-dihedral", options_.min_dihedral,
             "3-D: move and add vertices until no dihedral angle is smaller, in degrees, up to 18; 0: leave slivers as "

@@ -3,6 +3,7 @@
 #define WELLSPACE_CLIENT_CLI_PARAMETER_OPTIONS_H_
 
 #include <CLI/CLI.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,7 +16,7 @@ namespace wellspace::cli {
 // --criterion; default: radius-edge.
 CLI::Option* AddCriterion(CLI::App& command, client::Criterion& criterion);
 // --size and --size-box. Boxes are taken as they are written; see SizeBoxesOf.
-void AddSizes(CLI::App& command, double& max_circumradius, std::vector<std::vector<double>>& size_boxes);
+void AddSizes(CLI::App& command, std::optional<double>& max_circumradius, std::vector<std::vector<double>>& size_boxes);
 // The boxes of --size-box.
 //
 // Errors:     INVALID_ARGUMENT unless each has 2 D + 1 numbers, D = `dimension`, or any that there is when that is 0.

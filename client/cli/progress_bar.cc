@@ -23,7 +23,7 @@ std::string WithThousands(uint64_t number) {
 
 std::string ProgressLine(const std::string& phase, double fraction, const std::string& amount) {
   constexpr int kBarColumns = 30;
-  const double part = std::clamp(fraction, 0.0, 1.0);
+  const double part = fraction > 0 ? std::min(fraction, 1.0) : 0;  // also for NaN
   const int filled = static_cast<int>(part * kBarColumns);
   std::string line = absl::StrFormat("%-10.12s [%s%s] %3d%%  %s", phase, std::string(filled, '#'),
                                      std::string(kBarColumns - filled, '-'), static_cast<int>(part * 100), amount);

@@ -34,7 +34,7 @@ class ProgressBar {
   std::string drawn_;  // the line on the terminal; empty: none
 };
 
-// The line without colours and control characters, at most 79 columns wide.
+// The line without colours and control characters, at most 79 columns wide, whatever the fraction is.
 std::string ProgressLine(const std::string& phase, double fraction, const std::string& amount);
 std::string ProgressLine(const client::Progress& progress);
 

@@ -79,7 +79,7 @@ CLI::Option* AddLabels(CLI::App& command, client::Labels& labels, const std::str
       ->type_name("KEY=VALUE");
 }
 
-void AddExpectedRevision(CLI::App& command, uint64_t& revision) {
+void AddExpectedRevision(CLI::App& command, std::optional<uint64_t>& revision) {
   AddCount(
       command, "--expected-revision", [&revision](uint64_t value) { revision = value; },
       "Change nothing unless the session is at this revision; default: any", 1);

@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -30,7 +31,7 @@ absl::StatusOr<std::string> FindOperation(client::Client& client, const std::str
 CLI::Option* AddLabels(CLI::App& command, client::Labels& labels, const std::string& description);
 
 // --expected-revision.
-void AddExpectedRevision(CLI::App& command, uint64_t& revision);
+void AddExpectedRevision(CLI::App& command, std::optional<uint64_t>& revision);
 
 // The numbers of vertices in a file, separated by blanks, commas or ends of lines; "-" is standard input; '#' starts a
 // comment.

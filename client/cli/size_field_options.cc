@@ -19,10 +19,10 @@ constexpr char kEdge[] = "edge";
 
 }  // namespace
 
-CLI::Option* AddGradation(CLI::App& command, double& gradation) {
+CLI::Option* AddGradation(CLI::App& command, std::optional<double>& gradation) {
   return AddNumber(command, "--gradation", gradation,
-                   "How fast sizes, as circumradii, grow with the distance from boxes and points that have one, up to "
-                   "1; default: 1 from boxes, 0.3 from points");
+                   "How fast sizes, as circumradii, grow with the distance from boxes and points that have one, above "
+                   "0 and up to 1; default: 1 from boxes, 0.3 from points");
 }
 
 CLI::Option* SizeFieldOptions::AddTo(CLI::App& command) {

@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "absl/status/status.h"
@@ -15,7 +16,7 @@
 namespace wellspace::cli {
 
 // --gradation. Returns the option.
-CLI::Option* AddGradation(CLI::App& command, double& gradation);
+CLI::Option* AddGradation(CLI::App& command, std::optional<double>& gradation);
 
 // A file of sizes at points: --size-field and --size-unit.
 //

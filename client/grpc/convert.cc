@@ -1,11 +1,16 @@
 #include "client/grpc/convert.h"
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <numeric>
 #include <string>
+#include <utility>
 
 #include "absl/strings/str_cat.h"
 #include "client/error_details.h"
+#include "client/grpc/mesh_values.h"
+#include "client/printable.h"
 #include "google/protobuf/descriptor.h"
 #include "google/protobuf/message.h"
 
@@ -184,13 +189,18 @@ void SetDuration(absl::Duration duration, google::protobuf::Duration* message) {
 }
 
 void SetParameters(const MeshOptions& options, v1::MeshParameters* parameters) {
+  const auto set = [parameters](const auto& value, auto setter) {
+    if (value.has_value()) {
+      (parameters->*setter)(*value);
+    }
+  };
   parameters->set_dimension(options.dimension);
-  parameters->set_rho(options.rho);
+  set(options.rho, &v1::MeshParameters::set_rho);
   parameters->set_criterion(options.criterion == Criterion::kWellSpaced ? v1::CRITERION_WELL_SPACED
                                                                         : v1::CRITERION_RADIUS_EDGE);
-  parameters->set_max_circumradius(options.max_circumradius);
-  parameters->set_edge_length(options.edge_length);
-  parameters->set_gradation(options.gradation);
+  set(options.max_circumradius, &v1::MeshParameters::set_max_circumradius);
+  set(options.edge_length, &v1::MeshParameters::set_edge_length);
+  set(options.gradation, &v1::MeshParameters::set_gradation);
   for (const SizeBox& box : options.size_boxes) {
     v1::SizeBox* message = parameters->add_size_boxes();
     message->mutable_low()->Assign(box.low.begin(), box.low.end());
@@ -201,43 +211,40 @@ void SetParameters(const MeshOptions& options, v1::MeshParameters* parameters) {
     parameters->mutable_domain()->mutable_low()->Assign(options.domain_low.begin(), options.domain_low.end());
     parameters->mutable_domain()->mutable_high()->Assign(options.domain_high.begin(), options.domain_high.end());
   }
-  if (options.min_dihedral.has_value()) {
-    parameters->set_min_dihedral(*options.min_dihedral);
-  }
+  set(options.min_dihedral, &v1::MeshParameters::set_min_dihedral);
   parameters->set_pump_weights(options.pump_weights);
-  parameters->set_merge_distance(options.merge_distance);
+  set(options.merge_distance, &v1::MeshParameters::set_merge_distance);
   parameters->set_keep_vertices(options.keep_vertices);
   parameters->set_margin(options.margin);
-  parameters->set_max_vertices(options.max_vertices);
-  parameters->set_threads(options.threads);
+  set(options.max_vertices, &v1::MeshParameters::set_max_vertices);
+  set(options.threads, &v1::MeshParameters::set_threads);
 }
 
 MeshOptions OptionsFromProto(const v1::MeshParameters& parameters) {
+  const auto get = [](bool is_given, auto value) { return is_given ? std::optional(value) : std::nullopt; };
   MeshOptions options;
   options.dimension = parameters.dimension();
-  options.rho = parameters.rho();
+  options.rho = get(parameters.has_rho(), parameters.rho());
   options.criterion =
       parameters.criterion() == v1::CRITERION_WELL_SPACED ? Criterion::kWellSpaced : Criterion::kRadiusEdge;
-  options.max_circumradius = parameters.max_circumradius();
-  options.edge_length = parameters.edge_length();
-  options.gradation = parameters.gradation();
+  options.max_circumradius = get(parameters.has_max_circumradius(), parameters.max_circumradius());
+  options.edge_length = get(parameters.has_edge_length(), parameters.edge_length());
+  options.gradation = get(parameters.has_gradation(), parameters.gradation());
   for (const v1::SizeBox& box : parameters.size_boxes()) {
     options.size_boxes.push_back(
         {.low = VectorOf(box.low()), .high = VectorOf(box.high()), .max_circumradius = box.max_circumradius()});
   }
-  if (parameters.has_min_dihedral()) {
-    options.min_dihedral = parameters.min_dihedral();
-  }
+  options.min_dihedral = get(parameters.has_min_dihedral(), parameters.min_dihedral());
   options.pump_weights = parameters.pump_weights();
-  options.merge_distance = parameters.merge_distance();
+  options.merge_distance = get(parameters.has_merge_distance(), parameters.merge_distance());
   options.keep_vertices = parameters.keep_vertices();
   options.domain_low = VectorOf(parameters.domain().low());
   options.domain_high = VectorOf(parameters.domain().high());
   if (parameters.has_margin()) {
     options.margin = parameters.margin();
   }
-  options.max_vertices = parameters.max_vertices();
-  options.threads = parameters.threads();
+  options.max_vertices = get(parameters.has_max_vertices(), parameters.max_vertices());
+  options.threads = get(parameters.has_threads(), static_cast<int>(parameters.threads()));
   return options;
 }
 
@@ -246,7 +253,7 @@ Progress ProgressFromProto(const v1::ProgressEvent& event) {
                   .vertices = event.vertices(),
                   .estimated_vertices = event.estimated_vertices(),
                   .simplices = event.simplices(),
-                  .fraction = event.fraction(),
+                  .fraction = event.fraction() > 0 ? std::min(event.fraction(), 1.0) : 0,  // also for NaN
                   .sequence = event.sequence()};
 }
 
@@ -291,10 +298,16 @@ ServerInfo InfoFromProto(const v1::GetServerInfoResponse& response) {
                     .default_ttl = DurationFromProto(response.default_ttl()),
                     .max_ttl = DurationFromProto(response.max_ttl()),
                     .stall_limit = DurationFromProto(response.stall_limit()),
-                    .max_memory_bytes = response.max_memory_bytes()};
+                    .max_memory_bytes = response.max_memory_bytes(),
+                    .max_stored_bytes_per_tenant = response.max_stored_bytes_per_tenant(),
+                    .stored_bytes = response.stored_bytes()};
 }
 
-Session SessionFromProto(const v1::Session& message) {
+absl::StatusOr<Session> SessionFromProto(const v1::Session& message) {
+  // What a client reads files by, and sends arrays by. 0: not told.
+  if (message.parameters().dimension() < 0 || message.parameters().dimension() > kMaxDimension) {
+    return Contradiction("a session in ", message.parameters().dimension(), "-D");
+  }
   return Session{.name = message.name(),
                  .state = StateFromProto(message.state()),
                  .parameters = OptionsFromProto(message.parameters()),
@@ -313,7 +326,8 @@ Session SessionFromProto(const v1::Session& message) {
                  .crossings = message.crossings() == v1::CROSSING_RULE_SPLIT  ? CrossingRule::kSplit
                               : message.crossings() == v1::CROSSING_RULE_SNAP ? CrossingRule::kSnap
                                                                               : CrossingRule::kRefuse,
-                 .size_count = message.size_count()};
+                 .size_count = message.size_count(),
+                 .stored_bytes = message.stored_bytes()};
 }
 
 Operation OperationFromProto(const v1::Operation& message) {
@@ -322,7 +336,8 @@ Operation OperationFromProto(const v1::Operation& message) {
   operation.state = StateFromProto(message.state());
   operation.parameters = OptionsFromProto(message.parameters());
   operation.progress = ProgressFromProto(message.progress());
-  operation.error = absl::Status(static_cast<absl::StatusCode>(message.error().code()), message.error().message());
+  operation.error =
+      absl::Status(static_cast<absl::StatusCode>(message.error().code()), Printable(message.error().message()));
   if (!operation.error.ok()) {
     AddDetails(message.error(), operation.error);
   }
@@ -338,14 +353,17 @@ Operation OperationFromProto(const v1::Operation& message) {
   return operation;
 }
 
+absl::Status CheckNextPage(const std::string& token, const std::string& next) {
+  return next.empty() || next != token ? absl::OkStatus() : Contradiction("after a page comes the same page again");
+}
+
 absl::StatusOr<CellBatch> CellsFromProto(const v1::VoronoiCellBatch& message) {
   const int cells = message.vertices_size();
   if (message.clip_radii_size() != cells || message.is_clipped_size() != cells || message.node_counts_size() != cells ||
       message.neighbour_counts_size() != cells) {
-    return absl::DataLossError(absl::StrCat("the server's answer is damaged: ", cells, " cells with ",
-                                            message.clip_radii_size(), " radii, ", message.is_clipped_size(),
-                                            " flags, ", message.node_counts_size(), " counts of nodes and ",
-                                            message.neighbour_counts_size(), " counts of neighbours"));
+    return Contradiction(cells, " cells with ", message.clip_radii_size(), " radii, ", message.is_clipped_size(),
+                         " flags, ", message.node_counts_size(), " counts of nodes and ",
+                         message.neighbour_counts_size(), " counts of neighbours");
   }
   const uint64_t nodes = std::accumulate(message.node_counts().begin(), message.node_counts().end(), uint64_t{0});
   const uint64_t neighbours =
@@ -353,8 +371,12 @@ absl::StatusOr<CellBatch> CellsFromProto(const v1::VoronoiCellBatch& message) {
   const uint64_t coordinates = message.nodes_size();
   if (neighbours != static_cast<uint64_t>(message.neighbours_size()) ||
       (nodes == 0 ? coordinates != 0 : coordinates % nodes != 0 || coordinates == 0)) {
-    return absl::DataLossError(absl::StrCat("the server's answer is damaged: ", coordinates, " coordinates of ", nodes,
-                                            " nodes, ", message.neighbours_size(), " of ", neighbours, " neighbours"));
+    return Contradiction(coordinates, " coordinates of ", nodes, " nodes, ", message.neighbours_size(), " of ",
+                         neighbours, " neighbours");
+  }
+  const auto is_nan = [](double value) { return std::isnan(value); };
+  if (std::ranges::any_of(message.nodes(), is_nan) || std::ranges::any_of(message.clip_radii(), is_nan)) {
+    return Contradiction("a node or a radius of a cell is not a number");
   }
   return CellBatch{.dimension = nodes == 0 ? 0 : static_cast<int>(coordinates / nodes),
                    .vertices = VectorOf(message.vertices()),

@@ -2,6 +2,8 @@
 #ifndef WELLSPACE_CLIENT_GRPC_CONVERT_H_
 #define WELLSPACE_CLIENT_GRPC_CONVERT_H_
 
+#include <string>
+
 #include "absl/status/statusor.h"
 #include "client/types.h"
 #include "wellspace/v1/mesh.pb.h"
@@ -20,10 +22,16 @@ MeshOptions OptionsFromProto(const v1::MeshParameters& parameters);
 Progress ProgressFromProto(const v1::ProgressEvent& event);
 MeshHeader HeaderFromProto(const v1::MeshMetadata& metadata);
 ServerInfo InfoFromProto(const v1::GetServerInfoResponse& response);
-Session SessionFromProto(const v1::Session& message);
+// Errors:     DATA_LOSS for a dimension that no space has.
+absl::StatusOr<Session> SessionFromProto(const v1::Session& message);
 Operation OperationFromProto(const v1::Operation& message);
 
-// Errors:     DATA_LOSS when the counts do not fit the arrays.
+// Whether another page may follow that of `token`.
+//
+// Errors:     DATA_LOSS for the same page again, which would never end.
+absl::Status CheckNextPage(const std::string& token, const std::string& next);
+
+// Errors:     DATA_LOSS when the counts do not fit the arrays, or a number is none.
 absl::StatusOr<CellBatch> CellsFromProto(const v1::VoronoiCellBatch& message);
 
 }  // namespace wellspace::client

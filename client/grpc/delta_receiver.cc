@@ -9,6 +9,7 @@
 #include "absl/strings/str_cat.h"
 #include "client/grpc/convert.h"
 #include "client/grpc/mesh_receiver.h"
+#include "client/grpc/mesh_values.h"
 #include "client/mesh_sink.h"
 #include "core/base/status_macros.h"
 #include "proto/checksum.h"
@@ -165,10 +166,16 @@ bool HasChecksums(const Mesh& mesh, const v1::MeshChecksums& checksums) {
          HasChecksum(mesh.simplex_regions, checksums.simplex_regions()) && HasChecksum(mesh.facets, checksums.facets());
 }
 
-absl::Status CheckNumbers(const std::vector<uint32_t>& vertices, uint64_t count, bool may_be_none) {
-  const auto wrong = std::ranges::find_if(
-      vertices, [&](uint32_t vertex) { return vertex >= count && !(may_be_none && vertex == kNoVertex); });
-  return wrong == vertices.end() ? absl::OkStatus() : MisfitOf("names vertex ", *wrong, " of ", count);
+// Whether there can be a mesh with this header and these arrays.
+absl::Status CheckArrays(const MeshHeader& header, const Mesh& mesh) {
+  WELLSPACE_RETURN_IF_ERROR(CheckPoints(mesh.points));
+  WELLSPACE_RETURN_IF_ERROR(CheckWeights(mesh.weights));
+  WELLSPACE_RETURN_IF_ERROR(CheckVertices(header, "simplices", mesh.simplices));
+  WELLSPACE_RETURN_IF_ERROR(CheckVertices(header, "facets", mesh.facets));
+  WELLSPACE_RETURN_IF_ERROR(CheckInputVertices(header, mesh.input_vertex));
+  WELLSPACE_RETURN_IF_ERROR(CheckOrigins(header, mesh.vertex_origins));
+  WELLSPACE_RETURN_IF_ERROR(CheckTags(header, mesh.vertex_tags));
+  return CheckRegions(header, mesh.simplex_regions);
 }
 
 }  // namespace
@@ -262,9 +269,7 @@ absl::Status DeltaReceiver::Apply() {
   if (next.moved_vertices.size() != header_.moved_vertex_count || !HasChecksums(next, checksums_)) {
     return MisfitOf("that makes another mesh than that of revision ", header_.revision);
   }
-  WELLSPACE_RETURN_IF_ERROR(CheckNumbers(next.simplices, vertices, /*may_be_none=*/false));
-  WELLSPACE_RETURN_IF_ERROR(CheckNumbers(next.facets, vertices, /*may_be_none=*/false));
-  WELLSPACE_RETURN_IF_ERROR(CheckNumbers(next.input_vertex, vertices, /*may_be_none=*/true));
+  WELLSPACE_RETURN_IF_ERROR(CheckArrays(header_, next));
   SetHeader(header_, next);
   mesh_ = std::move(next);
   return absl::OkStatus();

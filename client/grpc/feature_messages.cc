@@ -46,7 +46,9 @@ size_t FillFaces(const Features& features, size_t first, v1::FaceOptions& option
     message.set_y(seed.y);
     message.set_hole(seed.is_hole);
     message.set_region(seed.region);
-    message.set_max_area(seed.max_area);
+    if (seed.max_area.has_value()) {
+      message.set_max_area(*seed.max_area);
+    }
     if (seed.segment_count > 0) {
       message.mutable_polygon()->set_first(seed.first_segment);
       message.mutable_polygon()->set_count(seed.segment_count);

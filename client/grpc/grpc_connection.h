@@ -51,8 +51,8 @@ class GrpcConnection final : public Connection {
                                     const CallOptions& call) override;
   absl::StatusOr<SizesSet> SetVertexSizes(const std::string& session, const VertexSizes& sizes,
                                           const CallOptions& call) override;
-  absl::Status DownloadMesh(const std::string& session, MeshSink& sink, uint64_t revision, const OnChunks& on_chunks,
-                            const CallOptions& call) override;
+  absl::Status DownloadMesh(const std::string& session, MeshSink& sink, std::optional<uint64_t> revision,
+                            const OnChunks& on_chunks, const CallOptions& call) override;
 
   // updates.cc
   absl::Status UpdateMesh(const std::string& session, Mesh& mesh, const OnChunks& on_chunks,
@@ -111,6 +111,14 @@ size_t RowsOfARequest(size_t row);
 
 // The id of a call that changes something: the caller's, or a random one of 128 bits.
 std::string RequestIdOf(const CallOptions& call);
+
+// Leaves the field of a request absent where nothing is expected.
+template <typename Request>
+void SetExpectedRevision(const std::optional<uint64_t>& expected, Request& request) {
+  if (expected.has_value()) {
+    request.set_expected_revision(*expected);
+  }
+}
 
 }  // namespace wellspace::client
 

@@ -1,6 +1,7 @@
 #include "client/grpc/mesh_receiver.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <set>
 #include <span>
@@ -9,22 +10,17 @@
 
 #include "absl/strings/str_cat.h"
 #include "client/grpc/convert.h"
+#include "client/grpc/mesh_values.h"
 #include "core/base/status_macros.h"
 #include "proto/checksum.h"
 
 namespace wellspace::client {
 namespace {
 
-template <typename... Parts>
-absl::Status Contradiction(const Parts&... parts) {
-  return absl::DataLossError(absl::StrCat("the server's answer is damaged: ", parts...));
-}
-
 // Vertices are numbered with 32 bits; larger counts cannot be true, and would make products of counts overflow.
 constexpr uint64_t kMaxVertices = std::numeric_limits<uint32_t>::max();
 constexpr uint64_t kMaxSimplices = uint64_t{1} << 40;
 constexpr uint64_t kMaxInputPoints = uint64_t{1} << 40;
-constexpr int kMaxDimension = 64;
 
 constexpr const char* kArrayNames[] = {"points",          "weights",   "vertex origins", "vertex tags",
                                        "simplex regions", "simplices", "input vertices", "facets"};
@@ -37,16 +33,6 @@ std::span<const T> SpanOf(const google::protobuf::RepeatedField<T>& values) {
 template <typename T>
 uint32_t ChecksumOf(const google::protobuf::RepeatedField<T>& values) {
   return Crc32c(values.data(), values.size() * sizeof(T));
-}
-
-absl::Status CheckVertices(const google::protobuf::RepeatedField<uint32_t>& vertices, uint64_t vertex_count,
-                           const char* name) {
-  for (const uint32_t vertex : vertices) {
-    if (vertex >= vertex_count) {
-      return Contradiction(name, " name vertex ", vertex, " of ", vertex_count);
-    }
-  }
-  return absl::OkStatus();
 }
 
 // Calls visit(values) with what the chunk has of the array number `array`, in the order of MeshReceiver::Array.
@@ -114,6 +100,16 @@ absl::Status CheckBoundary(const MeshHeader& header) {
   return absl::OkStatus();
 }
 
+// The slivers of the statistics have vertices of the mesh.
+absl::Status CheckLeftSlivers(const MeshHeader& header) {
+  if (header.statistics.slivers.has_value()) {
+    for (const LeftSliver& left : header.statistics.slivers->flattest_left) {
+      WELLSPACE_RETURN_IF_ERROR(CheckVertices(header, "slivers", left.vertices));
+    }
+  }
+  return absl::OkStatus();
+}
+
 }  // namespace
 
 absl::Status CheckHeader(const MeshHeader& header, const MeshExpectation& expectation) {
@@ -134,6 +130,14 @@ absl::Status CheckHeader(const MeshHeader& header, const MeshExpectation& expect
   if (expectation.input_points.has_value() && header.input_point_count != *expectation.input_points) {
     return Contradiction("a mesh of ", header.input_point_count, " points; ", *expectation.input_points, " were sent");
   }
+  for (size_t axis = 0; axis < dimension; ++axis) {
+    const double low = header.domain_low[axis];
+    const double high = header.domain_high[axis];
+    if (!std::isfinite(low) || !std::isfinite(high) || low > high) {
+      return Contradiction("a domain from ", low, " to ", high, " along axis ", axis);
+    }
+  }
+  WELLSPACE_RETURN_IF_ERROR(CheckLeftSlivers(header));
   return CheckBoundary(header);
 }
 
@@ -249,42 +253,22 @@ absl::Status MeshReceiver::AddChunk(const v1::MeshChunk& chunk) {
 
 absl::Status MeshReceiver::CheckValues(Array array, const v1::MeshChunk& chunk) const {
   switch (array) {
-    case kSimplices:
-      return CheckVertices(chunk.simplices(), header_.vertex_count, kArrayNames[array]);
-    case kInputVertices:
-      for (const uint32_t vertex : chunk.input_vertices()) {
-        if (vertex >= header_.vertex_count && vertex != kNoVertex) {
-          return Contradiction(kArrayNames[array], " name vertex ", vertex, " of ", header_.vertex_count);
-        }
-      }
-      return absl::OkStatus();
-    case kFacets:
-      return CheckVertices(chunk.facets(), header_.vertex_count, kArrayNames[array]);
+    case kPoints:
+      return CheckPoints(SpanOf(chunk.points()));
+    case kWeights:
+      return CheckWeights(SpanOf(chunk.weights()));
     case kVertexOrigins:
-      for (const uint32_t origin : chunk.vertex_origins()) {
-        if (origin >= header_.input_point_count && origin < kCornerOrigin) {
-          return Contradiction(kArrayNames[array], " name input point ", origin, " of ", header_.input_point_count);
-        }
-      }
-      return absl::OkStatus();
+      return CheckOrigins(header_, SpanOf(chunk.vertex_origins()));
     case kVertexTags:
-      for (const int32_t tag : chunk.vertex_tags()) {
-        const auto has_tag = [tag](const BoundaryPart& part) { return part.tag == tag; };
-        if (tag != 0 && std::none_of(header_.boundary.begin(), header_.boundary.end(), has_tag)) {
-          return Contradiction(kArrayNames[array], " name the tag ", tag, ", which no part of the boundary has");
-        }
-      }
-      return absl::OkStatus();
+      return CheckTags(header_, SpanOf(chunk.vertex_tags()));
     case kSimplexRegions:
-      for (const int32_t id : chunk.simplex_regions()) {
-        const auto has_id = [id](const Region& region) { return region.id == id; };
-        if (std::none_of(header_.regions.begin(), header_.regions.end(), has_id)) {
-          return Contradiction(kArrayNames[array], " name the region ", id, ", which there is not");
-        }
-      }
-      return absl::OkStatus();
+      return CheckRegions(header_, SpanOf(chunk.simplex_regions()));
+    case kSimplices:
+      return CheckVertices(header_, kArrayNames[array], SpanOf(chunk.simplices()));
+    case kInputVertices:
+      return CheckInputVertices(header_, SpanOf(chunk.input_vertices()));
     default:
-      return absl::OkStatus();
+      return CheckVertices(header_, kArrayNames[array], SpanOf(chunk.facets()));
   }
 }
 

@@ -15,7 +15,7 @@ absl::StatusOr<Operation> GrpcConnection::StartRefinement(const std::string& ses
   }
   request.set_restart(refinement.restart);
   request.set_request_id(RequestIdOf(call));
-  request.set_expected_revision(call.expected_revision);
+  SetExpectedRevision(call.expected_revision, request);
   v1::StartRefinementResponse response;
   WELLSPACE_RETURN_IF_ERROR(Call(*operations_, &v1::OperationService::Stub::StartRefinement, request, call, &response));
   return OperationFromProto(response.operation());
@@ -33,7 +33,9 @@ absl::StatusOr<OperationPage> GrpcConnection::ListOperations(const std::string& 
                                                              const CallOptions& call) {
   v1::ListOperationsRequest request;
   request.set_parent(session);
-  request.set_page_size(page.page_size);
+  if (page.page_size.has_value()) {
+    request.set_page_size(*page.page_size);
+  }
   request.set_page_token(page.page_token);
   v1::ListOperationsResponse response;
   WELLSPACE_RETURN_IF_ERROR(Call(*operations_, &v1::OperationService::Stub::ListOperations, request, call, &response));
@@ -41,6 +43,7 @@ absl::StatusOr<OperationPage> GrpcConnection::ListOperations(const std::string& 
   for (const v1::Operation& operation : response.operations()) {
     result.operations.push_back(OperationFromProto(operation));
   }
+  WELLSPACE_RETURN_IF_ERROR(CheckNextPage(page.page_token, response.next_page_token()));
   result.next_page_token = response.next_page_token();
   return result;
 }

@@ -2,6 +2,7 @@
 
 #include <time.h>
 
+#include <algorithm>
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
@@ -12,6 +13,7 @@
 
 #include "absl/time/clock.h"
 #include "client/error_details.h"
+#include "client/printable.h"
 #include "google/rpc/error_details.pb.h"
 #include "google/rpc/status.pb.h"
 
@@ -24,12 +26,15 @@ constexpr char kReaderStalled[] = "READER_STALLED";
 
 absl::Status CancelledByCaller() { return absl::CancelledError("cancelled by the caller"); }
 
+// Longer waits, which a server may ask for, would overflow the clock of the standard library.
+constexpr absl::Duration kLongestWait = absl::Hours(24 * 365);
+
 // False when a stop was asked for before the time had passed.
 bool Wait(absl::Duration time, const std::stop_token& stop) {
   std::mutex mutex;
   std::condition_variable_any never;
   std::unique_lock<std::mutex> lock(mutex);
-  never.wait_for(lock, stop, absl::ToChronoNanoseconds(time), [] { return false; });
+  never.wait_for(lock, stop, absl::ToChronoNanoseconds(std::min(time, kLongestWait)), [] { return false; });
   return !stop.stop_requested();
 }
 
@@ -41,7 +46,7 @@ double RandomHalfToOne() {
 }  // namespace
 
 absl::Status FromGrpcStatus(const grpc::Status& status) {
-  absl::Status result(static_cast<absl::StatusCode>(status.error_code()), status.error_message());
+  absl::Status result(static_cast<absl::StatusCode>(status.error_code()), Printable(status.error_message()));
   google::rpc::Status details;
   if (!result.ok() && details.ParseFromString(status.error_details())) {
     AddDetails(details, result);

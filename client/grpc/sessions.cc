@@ -1,4 +1,6 @@
 // SessionService on the client's side, but for the streams.
+#include <utility>
+
 #include "client/grpc/convert.h"
 #include "client/grpc/grpc_connection.h"
 #include "core/base/status_macros.h"
@@ -42,15 +44,19 @@ absl::StatusOr<Session> GrpcConnection::GetSession(const std::string& session, c
 absl::StatusOr<SessionPage> GrpcConnection::ListSessions(const Labels& labels, const PageOptions& page,
                                                          const CallOptions& call) {
   v1::ListSessionsRequest request;
-  request.set_page_size(page.page_size);
+  if (page.page_size.has_value()) {
+    request.set_page_size(*page.page_size);
+  }
   request.set_page_token(page.page_token);
   request.mutable_labels()->insert(labels.begin(), labels.end());
   v1::ListSessionsResponse response;
   WELLSPACE_RETURN_IF_ERROR(Call(*sessions_, &v1::SessionService::Stub::ListSessions, request, call, &response));
   SessionPage result;
   for (const v1::Session& session : response.sessions()) {
-    result.sessions.push_back(SessionFromProto(session));
+    WELLSPACE_ASSIGN_OR_RETURN(Session one, SessionFromProto(session));
+    result.sessions.push_back(std::move(one));
   }
+  WELLSPACE_RETURN_IF_ERROR(CheckNextPage(page.page_token, response.next_page_token()));
   result.next_page_token = response.next_page_token();
   return result;
 }
@@ -69,7 +75,7 @@ absl::StatusOr<Session> GrpcConnection::UpdateSession(const std::string& session
     request.mutable_update_mask()->add_paths("ttl");
   }
   request.set_request_id(RequestIdOf(call));
-  request.set_expected_revision(call.expected_revision);
+  SetExpectedRevision(call.expected_revision, request);
   v1::UpdateSessionResponse response;
   WELLSPACE_RETURN_IF_ERROR(Call(*sessions_, &v1::SessionService::Stub::UpdateSession, request, call, &response));
   return SessionFromProto(response.session());
@@ -81,7 +87,7 @@ absl::StatusOr<PointsLeft> GrpcConnection::RemovePoints(const std::string& sessi
   request.set_name(session);
   request.mutable_points()->Assign(points.begin(), points.end());
   request.set_request_id(RequestIdOf(call));
-  request.set_expected_revision(call.expected_revision);
+  SetExpectedRevision(call.expected_revision, request);
   v1::RemovePointsResponse response;
   WELLSPACE_RETURN_IF_ERROR(Call(*sessions_, &v1::SessionService::Stub::RemovePoints, request, call, &response));
   return PointsLeft{.point_count = response.committed_points(), .revision = response.revision()};
@@ -91,7 +97,7 @@ absl::Status GrpcConnection::DeleteSession(const std::string& session, const Cal
   v1::DeleteSessionRequest request;
   request.set_name(session);
   request.set_request_id(RequestIdOf(call));
-  request.set_expected_revision(call.expected_revision);
+  SetExpectedRevision(call.expected_revision, request);
   v1::DeleteSessionResponse response;
   return Call(*sessions_, &v1::SessionService::Stub::DeleteSession, request, call, &response);
 }

@@ -35,7 +35,9 @@ size_t FillSizes(const SizeSamples& samples, int dimension, size_t first, v1::Si
 
 size_t FillSizes(const VertexSizes& sizes, size_t first, v1::VertexSizes& chunk) {
   const size_t end = std::min(sizes.sizes.size(), first + RowsOfARequest(1));
-  chunk.set_mesh_revision(sizes.mesh_revision);
+  if (sizes.mesh_revision.has_value()) {
+    chunk.set_mesh_revision(*sizes.mesh_revision);
+  }
   chunk.set_measure(MeasureToProto(sizes.measure));
   chunk.mutable_sizes()->Assign(sizes.sizes.begin() + static_cast<std::ptrdiff_t>(first),
                                 sizes.sizes.begin() + static_cast<std::ptrdiff_t>(end));

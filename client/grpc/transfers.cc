@@ -40,7 +40,7 @@ class Upload {
   PointSource& source_;
   std::optional<uint64_t> offset_;
   const OnPoints& on_points_;
-  uint64_t expected_revision_;
+  std::optional<uint64_t> expected_revision_;
   uint64_t committed_ = 0;  // as far as is known
   int attempts_ = 0;
   std::vector<double> rows_;
@@ -117,7 +117,7 @@ absl::Status Upload::Run(v1::SessionService::Stub& stub, const v1::Session& sess
   request.set_name(session.name());
   request.set_point_offset(*offset_ + first);
   // What the attempts before this one committed has changed the revision.
-  request.set_expected_revision(std::exchange(expected_revision_, 0));
+  SetExpectedRevision(std::exchange(expected_revision_, std::nullopt), request);
   CallContext context(attempt);
   Stream stream(
       [&](grpc::CompletionQueue* queue) { return stub.PrepareAsyncUploadPoints(context.get(), &response_, queue); });
@@ -149,10 +149,11 @@ struct Addition {
 };
 
 // Sends everything and half-closes. Stops early when the call has ended; its status says why.
-void Send(const Addition& addition, uint64_t expected_revision, RequestWriter<v1::AddSegmentsRequest>& stream) {
+void Send(const Addition& addition, const std::optional<uint64_t>& expected_revision,
+          RequestWriter<v1::AddSegmentsRequest>& stream) {
   v1::AddSegmentsRequest request;
   request.set_name(addition.session);
-  request.set_expected_revision(expected_revision);
+  SetExpectedRevision(expected_revision, request);
   request.set_seed_offset(addition.offset.seeds);
   const size_t segments = addition.features.ends.size() / 2;
   for (size_t next = 0; next < segments;) {
@@ -176,11 +177,11 @@ void Send(const Addition& addition, uint64_t expected_revision, RequestWriter<v1
 }
 
 // Sends `count` sizes for `session` and half-closes. Stops early when the call has ended; its status says why.
-void SendSizes(const std::string& session, uint64_t expected_revision, size_t count, const FillSizesRequest& fill,
-               RequestWriter<v1::SetSizesRequest>& stream) {
+void SendSizes(const std::string& session, const std::optional<uint64_t>& expected_revision, size_t count,
+               const FillSizesRequest& fill, RequestWriter<v1::SetSizesRequest>& stream) {
   v1::SetSizesRequest request;
   request.set_name(session);
-  request.set_expected_revision(expected_revision);
+  SetExpectedRevision(expected_revision, request);
   size_t next = 0;
   do {
     next = fill(next, request);
@@ -230,7 +231,7 @@ absl::StatusOr<AddedSegments> GrpcConnection::AddSegments(const std::string& ses
                                                           const std::optional<FeatureOffset>& offset,
                                                           const CallOptions& call) {
   std::optional<FeatureOffset> begin = offset;
-  uint64_t expected_revision = call.expected_revision;
+  std::optional<uint64_t> expected_revision = call.expected_revision;
   v1::AddSegmentsResponse response;
   const absl::Status status = retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
     if (!begin.has_value()) {
@@ -245,7 +246,7 @@ absl::StatusOr<AddedSegments> GrpcConnection::AddSegments(const std::string& ses
       return sessions_->PrepareAsyncAddSegments(context.get(), &response, queue);
     });
     // What an attempt before this one committed has changed the revision.
-    Send({session, features, *begin}, std::exchange(expected_revision, 0), stream);
+    Send({session, features, *begin}, std::exchange(expected_revision, std::nullopt), stream);
     return FromGrpcStatus(stream.Finish());
   });
   if (!status.ok()) {
@@ -269,13 +270,18 @@ absl::StatusOr<Uploaded> GrpcConnection::UploadPoints(const std::string& session
   return upload.result();
 }
 
-absl::Status GrpcConnection::DownloadMesh(const std::string& session, MeshSink& sink, uint64_t revision,
+absl::Status GrpcConnection::DownloadMesh(const std::string& session, MeshSink& sink, std::optional<uint64_t> revision,
                                           const OnChunks& on_chunks, const CallOptions& call) {
   MeshReceiver receiver(sink, {.dimension = std::nullopt, .input_points = std::nullopt});
   return retrier_.Run(call.timeout, call.stop, [&](Attempt& attempt) {
     v1::DownloadMeshRequest request;
     request.set_name(session);
-    request.set_revision(receiver.has_metadata() ? receiver.header().revision : revision);
+    if (receiver.has_metadata()) {
+      revision = receiver.header().revision;
+    }
+    if (revision.has_value()) {
+      request.set_revision(*revision);
+    }
     request.set_next_chunk(receiver.next_chunk());
     request.set_with_boundary(sink.WantsBoundary());
     receiver.Continue();

@@ -38,11 +38,15 @@ class Update {
     request.set_name(session_);
     request.set_with_boundary(true);
     if (is_whole_) {
-      request.set_revision(whole_.has_metadata() ? whole_.header().revision : 0);
+      if (whole_.has_metadata()) {
+        request.set_revision(whole_.header().revision);
+      }
       request.set_next_chunk(whole_.next_chunk());
     } else {
       request.set_since_revision(mesh_.revision);
-      request.set_revision(deltas_.revision());
+      if (deltas_.revision() != 0) {
+        request.set_revision(deltas_.revision());
+      }
       request.set_next_chunk(deltas_.next_part());
     }
     return request;

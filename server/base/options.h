@@ -44,6 +44,7 @@ struct ServiceOptions {
   uint64_t max_points = 10'000'000;  // of one call, and of one session
   uint64_t max_vertices = core::kDefaultMaxVertices;
   uint64_t max_points_per_tenant = 100'000'000;  // of all its sessions
+  uint64_t max_stored_bytes_per_tenant = 0;      // of all its sessions: inputs and meshes; 0: no limit
 
   // Sessions.
   uint64_t max_sessions = 1000;

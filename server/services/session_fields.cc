@@ -73,11 +73,22 @@ absl::StatusOr<absl::Duration> TtlFromProto(const google::protobuf::Duration* me
   return ttl;
 }
 
-absl::StatusOr<size_t> PageSizeFromProto(int32_t page_size) {
-  if (page_size < 0) {
-    return Invalid(absl::StrCat("page_size is ", page_size, "; 0 or more is accepted"), "page_size");
+absl::StatusOr<size_t> PageSizeFromProto(const int32_t* page_size) {
+  if (page_size == nullptr) {
+    return kMaxPageSize;
   }
-  return page_size == 0 ? kMaxPageSize : std::min(page_size, kMaxPageSize);
+  if (*page_size < 1) {
+    return Invalid(absl::StrCat("page_size is ", *page_size, "; 1 or more is accepted, or nothing for ", kMaxPageSize),
+                   "page_size");
+  }
+  return std::min(*page_size, kMaxPageSize);
+}
+
+absl::StatusOr<uint64_t> RevisionFromProto(bool is_sent, uint64_t revision, const std::string& field) {
+  if (is_sent && revision == 0) {
+    return Invalid(absl::StrCat(field, " is 0; revisions begin with 1, and nothing stands for any"), field);
+  }
+  return revision;
 }
 
 absl::StatusOr<uint64_t> PositionFromProto(const std::string& token, const std::string& list, uint64_t begin) {
@@ -128,7 +139,7 @@ absl::StatusOr<core::MeshParameters> ParametersForSession(const v1::MeshParamete
                                   ", which cannot change as the domain depends on it; leave it out"),
                      "parameters.margin");
   }
-  if (message.merge_distance() != 0 && parameters.merge_distance != known.merge_distance) {
+  if (message.has_merge_distance() && parameters.merge_distance != known.merge_distance) {
     return MakeError(v1::ERROR_REASON_INVALID_PARAMETERS,
                      absl::StrCat("merge_distance is ", parameters.merge_distance, ", but the session has ",
                                   known.merge_distance, ", which cannot change; leave it out"),

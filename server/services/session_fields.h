@@ -33,10 +33,28 @@ absl::StatusOr<Labels> LabelsFromProto(const google::protobuf::Map<std::string, 
 absl::StatusOr<absl::Duration> TtlFromProto(const google::protobuf::Duration* message, const std::string& field,
                                             const ServiceOptions& options);
 
-// How many to list for a request of `page_size`.
+// How many to list for a request of `page_size`, null: absent.
 //
 // Errors:     INVALID_REQUEST.
-absl::StatusOr<size_t> PageSizeFromProto(int32_t page_size);
+absl::StatusOr<size_t> PageSizeFromProto(const int32_t* page_size);
+
+// The same of the request.
+template <typename Request>
+absl::StatusOr<size_t> PageSizeOf(const Request& request) {
+  const int32_t page_size = request.page_size();
+  return PageSizeFromProto(request.has_page_size() ? &page_size : nullptr);
+}
+
+// The revision that was sent in `field`; 0: none was.
+//
+// Errors:     INVALID_REQUEST for a 0 that was sent: no revision is 0.
+absl::StatusOr<uint64_t> RevisionFromProto(bool is_sent, uint64_t revision, const std::string& field);
+
+// The same of `expected_revision` of the request.
+template <typename Request>
+absl::StatusOr<uint64_t> ExpectedRevisionOf(const Request& request) {
+  return RevisionFromProto(request.has_expected_revision(), request.expected_revision(), "expected_revision");
+}
 
 // The position of `token` in `list`; `begin` if it is empty.
 //

@@ -39,7 +39,7 @@ core::FaceSeed SeedFromProto(const v1::FaceSeed& seed) {
   return {.at = {seed.x(), seed.y()},
           .is_hole = seed.hole(),
           .region = seed.region(),
-          .max_area = seed.max_area() > 0 ? seed.max_area() : std::numeric_limits<double>::infinity(),
+          .max_area = seed.has_max_area() ? seed.max_area() : std::numeric_limits<double>::infinity(),
           .first_segment = static_cast<uint32_t>(seed.polygon().first()),
           .segment_count = static_cast<uint32_t>(seed.polygon().count())};
 }
@@ -64,11 +64,11 @@ absl::Status CheckSeed(const v1::FaceSeed& seed, uint64_t number) {
         absl::StrCat("seeds[", number, "]: it is at (", seed.x(), ", ", seed.y(), "); two finite numbers are needed"),
         "faces.seeds");
   }
-  if (!(seed.max_area() >= 0) || !std::isfinite(seed.max_area())) {
-    return MakeError(
-        v1::ERROR_REASON_INVALID_SEGMENTS,
-        absl::StrCat("seeds[", number, "]: max_area ", seed.max_area(), " is not a finite number of at least 0"),
-        "faces.seeds");
+  if (seed.has_max_area() && (!(seed.max_area() > 0) || !std::isfinite(seed.max_area()))) {
+    return MakeError(v1::ERROR_REASON_INVALID_SEGMENTS,
+                     absl::StrCat("seeds[", number, "]: max_area ", seed.max_area(),
+                                  " is not a finite number above 0; leave it out for no bound"),
+                     "faces.seeds");
   }
   constexpr uint64_t kMostSegments = std::numeric_limits<uint32_t>::max();
   if (const v1::SegmentRange& polygon = seed.polygon();

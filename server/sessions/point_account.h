@@ -1,4 +1,4 @@
-// How many points, segments, seeds and sizes a session has, and may have.
+// How many points, segments, seeds and sizes a session has, how many bytes it keeps, and what it may have.
 #ifndef WELLSPACE_SERVER_SESSIONS_POINT_ACCOUNT_H_
 #define WELLSPACE_SERVER_SESSIONS_POINT_ACCOUNT_H_
 
@@ -15,37 +15,43 @@
 
 namespace wellspace::server {
 
-// The points of all sessions of one tenant; each of their segments, seeds and sizes counts as a point.
+// What sessions have.
+struct StoredAmount {
+  uint64_t points = 0;  // each segment, seed and size counts as one, too
+  uint64_t bytes = 0;   // of these and of meshes, wherever they are kept
+};
+
+// What all sessions of one tenant have.
 //
 // Thread safety: thread-safe.
-// Invariants: points() is at most the limit that Take was called with.
+// Invariants: amount() is at most the limits that Take was called with.
 class TenantPoints {
  public:
-  enum class Outcome { kTaken, kAboveLimit, kNoRoom };
+  enum class Outcome { kTaken, kTooManyPoints, kTooManyBytes, kNoRoom };
   struct Taken {
     Outcome outcome;
-    uint64_t points;  // how many there are now, or, if they were not taken, would be
+    StoredAmount amount;  // what there is now, or, if it was not taken, would be
   };
 
-  uint64_t points() const;
+  StoredAmount amount() const;
 
-  // Takes `count` more points if there are then at most `limit`, and if `reserve` says that there is room for them. It
-  // is called with the lock of this held, and may take the lock of a MemoryBudget.
+  // Takes `more` if there is then at most `limits`, and if `reserve` says that there is room for it. It is called with
+  // the lock of this held, and may take the lock of a MemoryBudget. No limit of bytes refuses what has none.
   //
-  // Guarantees: (1) what is not kTaken changes nothing; (2) in no moment do other calls see points that are not taken
-  //             in the end.
-  Taken Take(uint64_t count, uint64_t limit, const std::function<bool()>& reserve);
-  // REQUIRES:   count <= points().
-  void Return(uint64_t count);
+  // Guarantees: (1) what is not kTaken changes nothing; (2) in no moment do other calls see what is not taken in the
+  //             end.
+  Taken Take(const StoredAmount& more, const StoredAmount& limits, const std::function<bool()>& reserve);
+  // REQUIRES:   no more than amount().
+  void Return(const StoredAmount& amount);
 
  private:
   mutable std::mutex mutex_;
-  uint64_t points_ = 0;  // guarded by mutex_
+  StoredAmount amount_;  // guarded by mutex_
 };
 
-// The points, segments, seeds and sizes of one session, counted against three limits: that of a session, which holds
-// for points, segments and seeds each, and for a set of sizes where it comes, that of its tenant, which holds for their
-// sum, and the memory of the server.
+// The points, segments, seeds, sizes and mesh of one session, counted against four limits: that of a session, which
+// holds for points, segments and seeds each, and for a set of sizes where it comes; those of its tenant, for their
+// number and for the bytes of all; and the memory of the server, in which meshes are not counted here.
 //
 // Thread safety: thread-compatible; accounts of one tenant may be used on different threads.
 // Invariants: the tenant's points include all of this account until Close.
@@ -61,13 +67,15 @@ class PointAccount {
   PointAccount& operator=(const PointAccount&) = delete;
 
   uint64_t points() const { return held_.points; }
+  // What counts against the tenant's bytes.
+  uint64_t stored_bytes() const { return AmountOf(held_).bytes; }
 
   // Takes `count` more points into the account.
   //
   // REQUIRES:   Close was not called.
   // Guarantees: on an error nothing has changed; an error is due to points that some account has, never to points that
   //             are being refused on another thread.
-  // Errors:     TOO_MANY_POINTS, QUOTA_EXCEEDED, MEMORY_LIMIT.
+  // Errors:     TOO_MANY_POINTS, QUOTA_EXCEEDED, STORAGE_QUOTA_EXCEEDED, MEMORY_LIMIT.
   absl::Status Take(uint64_t count);
   // The same for so many more segments and seeds.
   absl::Status TakeFeatures(uint64_t segments, uint64_t seeds);
@@ -75,12 +83,22 @@ class PointAccount {
   // The same for `count` more sizes at points.
   absl::Status TakeSizes(uint64_t count);
 
+  // Whether a mesh of so many bytes may come in the place of the one that is there.
+  //
+  // Errors:     STORAGE_QUOTA_EXCEEDED.
+  absl::Status CheckMesh(uint64_t bytes) const;
+  // Takes what it has more than the one that is there. To be followed by SettleMesh.
+  absl::Status TakeMesh(uint64_t bytes);
+  // The mesh has so many bytes now, no more than what was taken.
+  void SettleMesh(uint64_t bytes);
+
   // What an account holds.
   struct Held {
     uint64_t points = 0;
     uint64_t segments = 0;
     uint64_t seeds = 0;
     uint64_t sizes = 0;  // of all sets that the session keeps
+    uint64_t mesh_bytes = 0;
 
     uint64_t count() const { return points + segments + seeds + sizes; }
   };
@@ -99,10 +117,21 @@ class PointAccount {
   void Close();
 
  private:
+  // In memory.
   uint64_t BytesOf(const Held& held) const {
     return held.points * bytes_per_point_ + FeatureStore::BytesOf(held.segments, held.seeds) +
            held.sizes * bytes_per_size_;
   }
+  // Wherever it is kept.
+  StoredAmount AmountOf(const Held& held) const {
+    const uint64_t bytes = held.points * stored_bytes_per_point_ + FeatureStore::BytesOf(held.segments, held.seeds) +
+                           held.sizes * bytes_per_size_ + held.mesh_bytes;
+    return {.points = held.count(), .bytes = bytes};
+  }
+  StoredAmount Limits() const;
+  // What `held` has more than there is. REQUIRES: no less.
+  StoredAmount MoreOf(const Held& held) const;
+  absl::Status AboveBytes(const StoredAmount& would_be, uint64_t more, const char* what) const;
   // Refuses `count` of `what`, if a session may not have as many.
   absl::Status CheckOne(uint64_t count, const char* what) const;
   // Makes `held` what the account has. REQUIRES: no more than it has.
@@ -111,7 +140,8 @@ class PointAccount {
   absl::Status Grow(const Held& held, const char* what);
 
   const std::string session_;
-  const uint64_t bytes_per_point_;
+  const uint64_t bytes_per_point_;  // in memory
+  const uint64_t stored_bytes_per_point_;
   const uint64_t bytes_per_size_;
   const ServiceOptions& options_;
   MemoryBudget& memory_;

@@ -58,6 +58,7 @@ v1::Session Session::DescribeWithLocked(const std::map<std::string, std::string>
     message.set_vertex_count(work_.mesh->figures().vertices);
     message.set_simplex_count(work_.mesh->figures().simplices);
   }
+  message.set_stored_bytes(point_account_.stored_bytes());
   if (!operations_.empty()) {
     message.set_last_operation(operations_.back()->name());
   }
@@ -241,6 +242,12 @@ uint64_t Session::NextMeshRevision() const {
 
 absl::StatusOr<std::shared_ptr<MeshSnapshot>> Session::KeepMesh(core::Mesh mesh,
                                                                 const core::RunContext& context) const {
+  {
+    // Before it is written anywhere. EndWork takes it into the account.
+    std::lock_guard lock(mutex_);
+    WELLSPACE_RETURN_IF_ERROR(
+        point_account_.CheckMesh(MeshSnapshot::LoadedBytes(dimension_, mesh.vertex_count(), mesh.simplex_count())));
+  }
   return log_.KeepMesh(name_, NextMeshRevision(), std::move(mesh), context);
 }
 

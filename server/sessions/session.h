@@ -287,7 +287,8 @@ class Session {
   // work; what it refuses is not begun. With `restart` the structure is made anew, in the same box.
   //
   // Errors:     SESSION_BUSY, REVISION_MISMATCH, SESSION_NOT_FOUND; INVALID_PARAMETERS, of those that a domain with
-  //             segments does not have; those of `submit`. Of a log that fails, `submit` was called, and the operation
+  //             segments does not have; STORAGE_QUOTA_EXCEEDED, where there is no byte left for a first mesh; those
+  //             of `submit`. Of a log that fails, `submit` was called, and the operation
   //             has ended without a trace.
   using SubmitWork = std::function<absl::Status(const std::shared_ptr<Operation>&)>;
   absl::StatusOr<std::shared_ptr<Operation>> StartOperation(core::MeshParameters parameters, bool restart,
@@ -324,7 +325,7 @@ class Session {
   uint64_t NextMeshRevision() const;
   // Keeps `mesh`, the work of an operation that is under way, as the log keeps meshes.
   //
-  // Errors:     those of SessionLog::KeepMesh.
+  // Errors:     those of SessionLog::KeepMesh; STORAGE_QUOTA_EXCEEDED.
   absl::StatusOr<std::shared_ptr<MeshSnapshot>> KeepMesh(core::Mesh mesh, const core::RunContext& context) const;
 
  private:
@@ -354,6 +355,8 @@ class Session {
   void AddPointsTo(SessionChange& change, uint64_t end, uint32_t crc32c) const;
   absl::Status CommitStart(const Operation& operation, uint64_t end, const AnswerTo<v1::Operation>& answer);
   absl::Status CommitSuccess(const Operation& operation, const WorkResult& result, absl::Time now);
+  // Counts the mesh of the work against the tenant's bytes, and commits it: both or, on an error, neither.
+  absl::Status TakeSuccess(const Operation& operation, const WorkResult& result, absl::Time now);
 
   // ---- For those that hold mutex_; const ones also for the work that has made the session busy, without it ----
 

@@ -19,6 +19,7 @@ absl::StatusOr<std::shared_ptr<const LocatedMesh>> MakeLocated(const MeshSnapsho
   });
   WELLSPACE_RETURN_IF_ERROR(made);
   located->revision = mesh.revision();
+  located->vertices = mesh.figures().vertices;
   located->memory = job.TakeMemory(bytes);
   located->memory.MakeLasting(lasts);
   return located;

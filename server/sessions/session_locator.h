@@ -20,6 +20,7 @@ struct LocatedMesh {
   MemoryReservation memory;  // first, so that it is given back when the locator is freed
   std::unique_ptr<const core::MeshLocator> locator;
   uint64_t revision = 0;
+  uint64_t vertices = 0;
 };
 
 // Makes the located mesh of one session when it is first asked for, and keeps it until there is another mesh, or other

@@ -36,6 +36,9 @@ absl::StatusOr<std::shared_ptr<Operation>> Session::StartOperation(core::MeshPar
     if (!features_.IsEmpty()) {
       WELLSPACE_RETURN_IF_ERROR(ValidateForDomain(parameters, features_.View()));
     }
+    if (work_.mesh == nullptr) {
+      WELLSPACE_RETURN_IF_ERROR(point_account_.CheckMesh(1));  // no mesh has fewer bytes
+    }
     if ((restart || steps_.empty()) && work_.mesh != nullptr &&
         (features_.IsEmpty() || feature_summary_.faces == v1::FACE_RULE_BOX)) {
       // The box does not change with the points that have come since.
@@ -138,6 +141,20 @@ absl::Status Session::CommitSuccess(const Operation& operation, const WorkResult
   });
 }
 
+absl::Status Session::TakeSuccess(const Operation& operation, const WorkResult& result, absl::Time now) {
+  const uint64_t bytes = result.mesh->loaded_bytes();
+  uint64_t bytes_before = 0;
+  {
+    std::lock_guard lock(mutex_);
+    bytes_before = work_.mesh == nullptr ? 0 : work_.mesh->loaded_bytes();
+    WELLSPACE_RETURN_IF_ERROR(point_account_.TakeMesh(bytes));
+  }
+  absl::Status status = CommitSuccess(operation, result, now);
+  std::lock_guard lock(mutex_);
+  point_account_.SettleMesh(status.ok() ? bytes : bytes_before);
+  return status;
+}
+
 void Session::NoteRefinementLocked(const Operation& operation) {
   if (operation.restart()) {
     for (const SizesInUse& set : UnusedSizesLocked({}, sizes_in_use_.number)) {
@@ -155,7 +172,7 @@ bool Session::EndWork(Operation& operation, WorkResult& result) {
   std::unique_lock change_lock(change_mutex_);
   const absl::Time now = clock_.wall();
   if (result.status.ok()) {
-    result.status = CommitSuccess(operation, result, now);
+    result.status = TakeSuccess(operation, result, now);
     if (!result.status.ok()) {
       result.work.mesher = nullptr;
       result.work.memory.Release();

@@ -100,12 +100,13 @@ void Session::SetState(const StoredSession& stored) {
   for (const SizesInUse& set : sizes) {
     held.sizes += set.count;
   }
-  point_account_.Restore(held);
   if (state.has_mesh()) {
     work_.mesh = log_.FindMesh(name_, state);
     work_.meshed_points = steps_.points();
     structure_version_ = 1;
+    held.mesh_bytes = work_.mesh->loaded_bytes();
   }
+  point_account_.Restore(held);
   next_operation_ = state.next_operation();
   if (!operations_.empty() && !operations_.back()->HasEnded()) {
     BeginBusyLocked(Busy::kOperation);

@@ -145,6 +145,23 @@ bool SessionRegistry::Remove(const Session& session) {
   return true;
 }
 
+uint64_t SessionRegistry::StoredBytes(const std::string& tenant) const {
+  std::lock_guard lock(mutex_);
+  const auto found = tenants_.find(tenant);
+  return found == tenants_.end() ? 0 : found->second.points->amount().bytes;
+}
+
+SessionRegistry::Stored SessionRegistry::StoredBytes() const {
+  Stored stored;
+  std::lock_guard lock(mutex_);
+  for (const auto& [name, tenant] : tenants_) {
+    const uint64_t bytes = tenant.points->amount().bytes;
+    stored.all += bytes;
+    stored.most = std::max(stored.most, bytes);
+  }
+  return stored;
+}
+
 size_t SessionRegistry::Count() const {
   std::lock_guard lock(mutex_);
   return by_name_.size();

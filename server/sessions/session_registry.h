@@ -73,6 +73,14 @@ class SessionRegistry {
   // How many there are, of all tenants.
   size_t Count() const;
 
+  // What the sessions of a tenant keep; and those of all tenants together, and of the one that keeps most.
+  uint64_t StoredBytes(const std::string& tenant) const;
+  struct Stored {
+    uint64_t all = 0;
+    uint64_t most = 0;
+  };
+  Stored StoredBytes() const;
+
   // Takes those out whose lease has run out. The caller is to have their end written down (Session::LogExpiry).
   std::vector<std::shared_ptr<Session>> RemoveExpired();
 

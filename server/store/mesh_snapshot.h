@@ -49,8 +49,10 @@ class MeshSnapshot {
   virtual uint64_t memory_bytes() const = 0;
   // What Load makes takes about as much.
   uint64_t loaded_bytes() const {
-    const uint64_t dimension = figures_.domain_low.size();
-    return figures_.vertices * dimension * sizeof(double) + figures_.simplices * (dimension + 1) * sizeof(uint32_t);
+    return LoadedBytes(figures_.domain_low.size(), figures_.vertices, figures_.simplices);
+  }
+  static uint64_t LoadedBytes(uint64_t dimension, uint64_t vertices, uint64_t simplices) {
+    return vertices * dimension * sizeof(double) + simplices * (dimension + 1) * sizeof(uint32_t);
   }
   // Keeps what is reserved for it as long as it lives. To be called once, before others know it.
   virtual void KeepMemory(MemoryReservation memory) = 0;

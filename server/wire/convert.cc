@@ -35,6 +35,28 @@ absl::Status Validate(const core::MeshParameters& parameters, const std::string&
   return InvalidParameter(message, DeepestField(message, field));
 }
 
+// Refuses a 0 that was sent for what cannot be 0: in the core it would stand for the default.
+template <typename Number>
+absl::Status RefuseZero(bool is_sent, Number value, const char* field, const char* accepted) {
+  return is_sent && value == 0 ? InvalidParameter(absl::StrCat(field, ": 0 is not allowed; expected ", accepted,
+                                                               ", or nothing for ", "the default"),
+                                                  field)
+                               : absl::OkStatus();
+}
+
+absl::Status RefuseZeros(const v1::MeshParameters& message) {
+  constexpr char kLength[] = "a number above 0";
+  constexpr char kCount[] = "at least 1";
+  WELLSPACE_RETURN_IF_ERROR(RefuseZero(message.has_rho(), message.rho(), "rho", kLength));
+  WELLSPACE_RETURN_IF_ERROR(
+      RefuseZero(message.has_max_circumradius(), message.max_circumradius(), "max_circumradius", kLength));
+  WELLSPACE_RETURN_IF_ERROR(RefuseZero(message.has_edge_length(), message.edge_length(), "edge_length", kLength));
+  WELLSPACE_RETURN_IF_ERROR(
+      RefuseZero(message.has_gradation(), message.gradation(), "gradation", "a number above 0 and at most 1"));
+  WELLSPACE_RETURN_IF_ERROR(RefuseZero(message.has_max_vertices(), message.max_vertices(), "max_vertices", kCount));
+  return RefuseZero(message.has_threads(), message.threads(), "threads", kCount);
+}
+
 // Nothing for one of a newer client.
 std::optional<core::Criterion> CriterionFromProto(v1::Criterion criterion) {
   switch (criterion) {
@@ -153,6 +175,7 @@ absl::StatusOr<core::MeshParameters> ParametersFromProto(const v1::MeshParameter
   core::MeshParameters parameters;
   parameters.dimension = message.dimension();
   WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "dimension"));
+  WELLSPACE_RETURN_IF_ERROR(RefuseZeros(message));
   const std::optional<core::Criterion> criterion = CriterionFromProto(message.criterion());
   if (!criterion.has_value()) {
     return InvalidParameter(
@@ -200,18 +223,18 @@ absl::StatusOr<core::MeshParameters> ParametersFromProto(const v1::MeshParameter
   WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "pump_weights"));
   parameters.merge_distance = message.merge_distance();
   WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "merge_distance"));
-  if (message.threads() != 0) {
+  if (message.has_threads()) {
     parameters.threads = message.threads();
     WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "threads"));
   }
   parameters.threads = std::min(parameters.threads, options.max_threads);
   if (message.max_vertices() > options.max_vertices) {
     return InvalidParameter(absl::StrCat("max_vertices is ", message.max_vertices(), "; this server accepts at most ",
-                                         options.max_vertices, ", or 0 for the default"),
+                                         options.max_vertices, ", or nothing for the default"),
                             "max_vertices");
   }
   parameters.max_vertices =
-      message.max_vertices() == 0 ? std::min(options.max_vertices, core::kDefaultMaxVertices) : message.max_vertices();
+      !message.has_max_vertices() ? std::min(options.max_vertices, core::kDefaultMaxVertices) : message.max_vertices();
   WELLSPACE_RETURN_IF_ERROR(Validate(parameters, "max_vertices"));
   return parameters;
 }
@@ -250,9 +273,15 @@ v1::MeshParameters ParametersToProto(const core::MeshParameters& parameters) {
     message.mutable_domain()->mutable_low()->Assign(parameters.domain_low.begin(), parameters.domain_low.end());
     message.mutable_domain()->mutable_high()->Assign(parameters.domain_high.begin(), parameters.domain_high.end());
   }
-  message.set_max_circumradius(parameters.max_circumradius);
-  message.set_edge_length(parameters.edge_length);
-  message.set_gradation(parameters.gradation);
+  if (parameters.max_circumradius != 0) {
+    message.set_max_circumradius(parameters.max_circumradius);
+  }
+  if (parameters.edge_length != 0) {
+    message.set_edge_length(parameters.edge_length);
+  }
+  if (parameters.gradation != 0) {
+    message.set_gradation(parameters.gradation);
+  }
   for (const core::SizeBox& box : parameters.size_boxes) {
     v1::SizeBox* size_box = message.add_size_boxes();
     size_box->mutable_low()->Assign(box.low.begin(), box.low.end());
@@ -261,9 +290,13 @@ v1::MeshParameters ParametersToProto(const core::MeshParameters& parameters) {
   }
   message.set_min_dihedral(parameters.min_dihedral.value_or(core::DefaultMinDihedral(parameters.dimension)));
   message.set_pump_weights(parameters.pump_weights);
-  message.set_merge_distance(parameters.merge_distance);
+  if (parameters.merge_distance != 0) {
+    message.set_merge_distance(parameters.merge_distance);
+  }
   message.set_keep_vertices(parameters.keep_vertices);
-  message.set_max_vertices(parameters.max_vertices);
+  if (parameters.max_vertices != 0) {
+    message.set_max_vertices(parameters.max_vertices);
+  }
   message.set_threads(parameters.threads);
   return message;
 }

@@ -50,6 +50,7 @@ absl::StatusCode CodeOf(v1::ErrorReason reason) {
     case v1::ERROR_REASON_OUT_OF_MEMORY:
     case v1::ERROR_REASON_MEMORY_LIMIT:
     case v1::ERROR_REASON_QUOTA_EXCEEDED:
+    case v1::ERROR_REASON_STORAGE_QUOTA_EXCEEDED:
     case v1::ERROR_REASON_TOO_MANY_SESSIONS:
     case v1::ERROR_REASON_DISK_FULL:
       return absl::StatusCode::kResourceExhausted;

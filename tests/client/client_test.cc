@@ -47,7 +47,8 @@ class MockConnection : public Connection {
   MOCK_METHOD(absl::StatusOr<SizesSet>, SetVertexSizes, (const std::string&, const VertexSizes&, const CallOptions&),
               (override));
   MOCK_METHOD(absl::Status, DownloadMesh,
-              (const std::string&, MeshSink&, uint64_t, const OnChunks&, const CallOptions&), (override));
+              (const std::string&, MeshSink&, std::optional<uint64_t>, const OnChunks&, const CallOptions&),
+              (override));
   MOCK_METHOD(absl::Status, UpdateMesh, (const std::string&, Mesh&, const OnChunks&, const CallOptions&), (override));
   MOCK_METHOD(absl::StatusOr<Operation>, StartRefinement,
               (const std::string&, const RefinementOptions&, const CallOptions&), (override));
@@ -78,7 +79,7 @@ TEST(Client, PassesMeshingToItsConnection) {
   MeshOptions options;
   options.dimension = 2;
   // What a call is made with reaches each of them.
-  const CallOptions call = {.timeout = absl::Seconds(3), .stop = {}, .request_id = "", .expected_revision = 0};
+  const CallOptions call = {.timeout = absl::Seconds(3), .stop = {}, .request_id = "", .expected_revision = {}};
   const auto is_call = Field(&CallOptions::timeout, absl::Seconds(3));
   EXPECT_CALL(*connection, MeshPoints(Field(&MeshOptions::dimension, 2), SizeIs(2), _, _, is_call))
       .WillOnce(Return(E("mesh")))
@@ -103,7 +104,7 @@ TEST(Client, PassesSessionsAndOperationsToItsConnection) {
   const CallOptions call = {.timeout = absl::Seconds(3), .stop = {}, .request_id = "r", .expected_revision = 4};
   const auto is_call =
       ::testing::AllOf(Field(&CallOptions::timeout, absl::Seconds(3)), Field(&CallOptions::request_id, "r"),
-                       Field(&CallOptions::expected_revision, 4));
+                       Field(&CallOptions::expected_revision, std::optional<uint64_t>(4)));
   const std::vector<double> points = {1, 2};
   SpanSource source(2, points);
   const Features features;
@@ -124,19 +125,20 @@ TEST(Client, PassesSessionsAndOperationsToItsConnection) {
   EXPECT_CALL(*connection, SetSizes("s", ::testing::Ref(samples), is_call)).WillOnce(Return(E("sizes")));
   EXPECT_CALL(*connection, SetVertexSizes("s", ::testing::Ref(vertex_sizes), is_call))
       .WillOnce(Return(E("vertex sizes")));
-  EXPECT_CALL(*connection, DownloadMesh("s", ::testing::Ref(sink), 6, _, is_call)).WillOnce(Return(E("download")));
+  EXPECT_CALL(*connection, DownloadMesh("s", ::testing::Ref(sink), std::optional<uint64_t>(6), _, is_call))
+      .WillOnce(Return(E("download")));
   Mesh mesh;
   EXPECT_CALL(*connection, UpdateMesh("s", ::testing::Ref(mesh), _, is_call)).WillOnce(Return(E("update")));
   EXPECT_CALL(*connection, StartRefinement("s", Field(&RefinementOptions::restart, true), is_call))
       .WillOnce(Return(E("start")));
   EXPECT_CALL(*connection, GetOperation("o", is_call)).WillOnce(Return(E("operation")));
-  EXPECT_CALL(*connection, ListOperations("s", Field(&PageOptions::page_size, 2), is_call))
+  EXPECT_CALL(*connection, ListOperations("s", Field(&PageOptions::page_size, std::optional<int>(2)), is_call))
       .WillOnce(Return(E("operations")));
   EXPECT_CALL(*connection, CancelOperation("o", is_call)).WillOnce(Return(E("cancel")));
   EXPECT_CALL(*connection, WatchOperation("o", _, std::optional<uint64_t>(8), is_call)).WillOnce(Return(E("watch")));
   EXPECT_EQ(client.CreateSession({}, call).status(), E("create"));
   EXPECT_EQ(client.GetSession("s", call).status(), E("get"));
-  EXPECT_EQ(client.ListSessions({{"a", "b"}}, {.page_size = 0, .page_token = "t"}, call).status(), E("list"));
+  EXPECT_EQ(client.ListSessions({{"a", "b"}}, {.page_size = {}, .page_token = "t"}, call).status(), E("list"));
   EXPECT_EQ(client.UpdateSession("s", {}, call).status(), E("update"));
   EXPECT_EQ(client.DeleteSession("s", call), E("delete"));
   EXPECT_EQ(client.RemovePoints("s", std::vector<uint64_t>{1, 2}, call).status(), E("remove"));
@@ -161,7 +163,8 @@ TEST(Client, PassesQueriesToItsConnection) {
   EXPECT_CALL(*connection, ApproximateNearestNeighbors("s", SizeIs(3), _, _)).WillOnce(Return(E("nearest")));
   EXPECT_CALL(*connection, ClippedVoronoiCells("s", SizeIs(3), 4, _, _)).WillOnce(Return(E("clipped")));
   EXPECT_CALL(*connection, VoronoiCells("s", SizeIs(3), _, _)).WillOnce(Return(E("cells")));
-  EXPECT_CALL(*connection, Locate("s", SizeIs(2), Field(&LocateOptions::revision, 5), _)).WillOnce(Return(E("locate")));
+  EXPECT_CALL(*connection, Locate("s", SizeIs(2), Field(&LocateOptions::revision, std::optional<uint64_t>(5)), _))
+      .WillOnce(Return(E("locate")));
   EXPECT_CALL(*connection, AddVertices("s", SizeIs(2), SizeIs(3), _)).WillOnce(Return(E("add")));
   EXPECT_EQ(client.ApproximateNearestNeighbors("s", vertices, nullptr), E("nearest"));
   EXPECT_EQ(client.ClippedVoronoiCells("s", vertices, 4, nullptr), E("clipped"));

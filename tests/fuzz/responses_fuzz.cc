@@ -18,6 +18,7 @@
 #include "client/client.h"
 #include "client/connection.h"
 #include "client/files/mesh_file.h"
+#include "client/interpolate.h"
 #include "grpcpp/generic/async_generic_service.h"
 #include "grpcpp/grpcpp.h"
 #include "proto/checksum.h"
@@ -148,6 +149,7 @@ class SinkCheck final : public client::MeshSink {
   absl::Status AddPoints(std::span<const double> points) override {
     Require(!points.empty() && points.size() % header_.dimension == 0, "rows of points are whole");
     Require(simplices_ == 0 && input_vertices_ == 0, "points come first");
+    Require(std::ranges::all_of(points, [](double x) { return std::isfinite(x); }), "coordinates are finite");
     points_ += points.size() / header_.dimension;
     return file_.AddPoints(points);
   }
@@ -192,6 +194,26 @@ class SinkCheck final : public client::MeshSink {
   uint64_t input_vertices_ = 0;
 };
 
+// Each point is in a simplex of vertices that there are, or in none.
+absl::Status RequirePlaces(const absl::StatusOr<client::Located>& located) {
+  if (!located.ok()) {
+    return located.status();
+  }
+  const size_t count = located->simplices.size();
+  Require(located->vertices.size() == 3 * count && located->coordinates.size() == 3 * count,
+          "there is a place for each");
+  for (size_t i = 0; i < 3 * count; ++i) {
+    const bool is_in_none = located->simplices[i / 3] == client::kNoSimplex;
+    Require(is_in_none || located->vertices[i] < located->vertex_count, "vertices are of the mesh");
+    Require(located->coordinates[i] >= 0 && located->coordinates[i] < 2, "coordinates are barycentric");
+  }
+  const std::vector<double> values(std::min<uint64_t>(located->vertex_count, 1000), 1);
+  if (const absl::StatusOr<std::vector<double>> carried = client::Interpolate(*located, values); carried.ok()) {
+    Require(carried->size() == count && located->vertex_count == values.size(), "values are of the mesh");
+  }
+  return absl::OkStatus();
+}
+
 absl::Status RequireCells(const client::CellBatch& cells) {
   const size_t count = cells.vertices.size();
   uint64_t nodes = 0;
@@ -204,10 +226,14 @@ absl::Status RequireCells(const client::CellBatch& cells) {
               cells.neighbour_counts.size() == count && cells.nodes.size() == nodes * cells.dimension &&
               cells.neighbours.size() == neighbours,
           "arrays of cells are as long as their counts say");
+  Require(std::ranges::none_of(cells.nodes, [](double x) { return std::isnan(x); }), "coordinates are numbers");
   return absl::OkStatus();
 }
 
-void RequirePhase(const client::Progress& progress) { Require(!progress.phase.empty(), "a phase has a name"); }
+void RequirePhase(const client::Progress& progress) {
+  Require(!progress.phase.empty(), "a phase has a name");
+  Require(progress.fraction >= 0 && progress.fraction <= 1, "a fraction is from 0 to 1");
+}
 
 constexpr std::array<double, 6> kPoints = {0.25, 0.25, 0.75, 0.25, 0.5, 0.75};
 constexpr std::array<uint32_t, 3> kVertices = {2, 0, 1};
@@ -286,7 +312,10 @@ constexpr std::array kCalls = {
       return c.WatchOperation(kSession, RequirePhase, std::nullopt, Patience()).status();
     }},
     Call{[](client::Connection& c) {
-      const auto take = [](std::span<const double> /*distances*/) { return absl::OkStatus(); };
+      const auto take = [](std::span<const double> distances) {
+        Require(std::ranges::all_of(distances, [](double distance) { return distance >= 0; }), "distances are numbers");
+        return absl::OkStatus();
+      };
       return c.ApproximateNearestNeighbors(kSession, kVertices, take, Patience());
     }},
     Call{[](client::Connection& c) { return c.ClippedVoronoiCells(kSession, kVertices, 2, RequireCells, Patience()); }},
@@ -295,7 +324,7 @@ constexpr std::array kCalls = {
     Call{[](client::Connection& c) {
       client::Features features;
       features.ends = {0, 1};
-      features.seeds = {{.x = 1, .y = 2, .is_hole = true, .region = 0, .max_area = 0}};
+      features.seeds = {{.x = 1, .y = 2, .is_hole = true, .region = 0, .max_area = {}}};
       return c.AddSegments(kSession, features, std::nullopt, Patience()).status();
     }},
     Call{[](client::Connection& c) {
@@ -304,6 +333,9 @@ constexpr std::array kCalls = {
       const absl::Status status = c.UpdateMesh(kSession, mesh, count, Patience());
       RequireWhole(mesh);
       return status;
+    }},
+    Call{[](client::Connection& c) {
+      return RequirePlaces(c.Locate(kSession, kPoints, {.allow_outside = true}, Patience()));
     }},
 };
 

@@ -217,7 +217,9 @@ Download SessionCalls::DownloadMesh(const std::string& name, uint64_t revision, 
   v1::DownloadMeshRequest request;
   request.set_with_boundary(with_boundary);
   request.set_name(name);
-  request.set_revision(revision);
+  if (revision != 0) {
+    request.set_revision(revision);
+  }
   request.set_next_chunk(next_chunk);
   const auto stream = sessions_->DownloadMesh(&context, request);
   Download download;

@@ -153,10 +153,10 @@ struct CheckCommand {
   formats::CloudOptions cloud_options;
   double rho = 0;
   client::Criterion criterion = client::Criterion::kRadiusEdge;
-  double max_circumradius = 0;
+  std::optional<double> max_circumradius;
   std::vector<std::vector<double>> size_boxes;
   SizeFieldOptions size_field;
-  double gradation = 0;
+  std::optional<double> gradation;
   double min_dihedral = 0;
   std::string plot_path;
   OutputFormat format = OutputFormat::kText;
@@ -323,10 +323,10 @@ core::ValidationOptions CheckCommand::ValidationFor(const WantedSizes& sizes, st
   const bool is_well_spaced = criterion == client::Criterion::kWellSpaced;
   return {.rho = rho,
           .criterion = is_well_spaced ? core::Criterion::kWellSpaced : core::Criterion::kRadiusEdge,
-          .max_circumradius = max_circumradius,
+          .max_circumradius = max_circumradius.value_or(0),
           .size_boxes = sizes.boxes,
           .size_samples = &sizes.samples,
-          .gradation = gradation,
+          .gradation = gradation.value_or(0),
           .cloud = cloud,
           .merge_distance = merge_distance,
           .min_angle_deg = min_dihedral};
@@ -476,6 +476,9 @@ void AddCheckCommand(CLI::App& app, int& exit_code) {
   AddSizes(*check, command->max_circumradius, command->size_boxes);
   command->size_field.AddTo(*check);
   AddGradation(*check, command->gradation);
+  for (const char* name : {"--size", "--gradation"}) {
+    check->get_option(name)->check(AboveZero());
+  }
   AddNumber(*check, "--min-dihedral", command->min_dihedral,
             "Bound on the dihedral angles, in 2-D on the angles, in degrees; default: not checked")
       ->check(AboveZero());

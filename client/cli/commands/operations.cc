@@ -1,6 +1,7 @@
 // wellspace refine, watch, cancel: the long work on a session.
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <string>
 
@@ -12,6 +13,7 @@
 #include "client/cli/session_options.h"
 #include "client/cli/size_field_options.h"
 #include "client/error_details.h"
+#include "client/printable.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::cli {
@@ -49,7 +51,7 @@ void PrintEnd(const RemoteCommand& remote, const client::Operation& operation, b
   if (remote.json()) {
     PrintJson(OperationJson(operation), indented);
   } else if (operation.state == client::OperationState::kSucceeded && !remote.quiet()) {
-    std::cout << operation.name << " succeeded: " << WithThousands(operation.progress.vertices)
+    std::cout << client::Printable(operation.name) << " succeeded: " << WithThousands(operation.progress.vertices)
               << " vertices, revision " << operation.mesh_revision << "\n";
   }
 }
@@ -62,7 +64,7 @@ struct OperationCommand {
   bool no_sizes = false;
   bool restart = false;
   bool detach = false;
-  uint64_t expected_revision = 0;
+  std::optional<uint64_t> expected_revision;
 
   absl::Status SetSizes(client::Client& client, client::CallOptions& call);
   absl::StatusOr<client::Operation> Start(client::Client& client, client::CallOptions call);
@@ -86,7 +88,9 @@ absl::Status OperationCommand::SetSizes(client::Client& client, client::CallOpti
   if (!set.ok()) {
     return sizes.WithOrigins(set.status());
   }
-  call.expected_revision = call.expected_revision == 0 ? 0 : set->revision;
+  if (call.expected_revision.has_value()) {
+    call.expected_revision = set->revision;
+  }
   return absl::OkStatus();
 }
 
@@ -104,7 +108,8 @@ absl::StatusOr<client::Operation> OperationCommand::Start(client::Client& client
   return started.ok() ? started : parameters.Explain(started.status());
 }
 
-// Ends an operation after Ctrl-C. Returns what the command ends with.
+// Ends an operation after Ctrl-C, and waits until it has ended: the session then takes the next command. Returns what
+// the command ends with.
 absl::Status CancelNow(client::Client& client, const std::string& operation) {
   client::CallOptions call;
   call.timeout = absl::Seconds(10);
@@ -112,6 +117,7 @@ absl::Status CancelNow(client::Client& client, const std::string& operation) {
     return absl::CancelledError(
         absl::StrCat("interrupted; ", operation, " could not be cancelled: ", cancelled.status().message()));
   }
+  (void)client.WatchOperation(operation, nullptr, std::nullopt, call);  // it is cancelled, whatever becomes of this
   return absl::CancelledError(absl::StrCat("interrupted; ", operation, " is cancelled, its session keeps its points"));
 }
 
@@ -123,7 +129,8 @@ int OperationCommand::Refine() {
                            const Interrupt& interrupt) -> absl::Status {
     WELLSPACE_ASSIGN_OR_RETURN(const client::Operation started, Start(client, call));
     if (detach) {
-      remote.json() ? PrintJson(OperationJson(started)) : static_cast<void>(std::cout << started.name << "\n");
+      remote.json() ? PrintJson(OperationJson(started))
+                    : static_cast<void>(std::cout << client::Printable(started.name) << "\n");
       return absl::OkStatus();
     }
     const absl::StatusOr<client::Operation> ended = Follow(client, remote, started.name, call, /*prints_events=*/false);
@@ -166,7 +173,7 @@ int OperationCommand::Cancel() const {
     if (remote.json()) {
       PrintJson(OperationJson(ended));
     } else if (!remote.quiet()) {
-      std::cout << ended.name << " " << StateName(ended.state) << "\n";
+      std::cout << client::Printable(ended.name) << " " << StateName(ended.state) << "\n";
     }
     return absl::OkStatus();
   });

@@ -1,8 +1,11 @@
 // wellspace cells, add: the query structure over the vertices of a session.
+#include <algorithm>
 #include <cmath>
 #include <iostream>
 #include <limits>
 #include <memory>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -14,6 +17,7 @@
 #include "client/cli/options.h"
 #include "client/cli/remote_command.h"
 #include "client/cli/session_options.h"
+#include "client/error_details.h"
 #include "client/formats/file_plan.h"
 #include "client/formats/io/input_file.h"
 #include "client/formats/io/line_reader.h"
@@ -158,16 +162,22 @@ int CellsCommand::Run() {
   });
 }
 
+// Of points, and the numbers of vertices near them, in one call; a request has 4 MiB.
+constexpr uint64_t kBytesOfABatch = uint64_t{3} << 20;
+
 struct AddCommand {
   RemoteCommand remote;
   std::string session;
   std::string input;
   formats::CloudOptions cloud_options;
   std::string near_path;
-  uint64_t expected_revision = 0;
+  std::optional<uint64_t> expected_revision;
 
   absl::Status CheckFiles() const;
   absl::Status Add(client::Client& client, client::CallOptions call) const;
+  // Adds the points in as many calls as it takes: those of each all or none. What was added is in `all`, on an error too.
+  absl::Status AddInBatches(client::Client& client, const formats::PointCloud& cloud, const std::vector<uint32_t>& near,
+                            client::CallOptions call, client::AddedVertices& all) const;
 };
 
 absl::Status AddCommand::CheckFiles() const {
@@ -196,19 +206,47 @@ absl::Status AddCommand::Add(client::Client& client, client::CallOptions call) c
     near = std::move(read);
   }
   call.expected_revision = expected_revision;
-  const absl::StatusOr<client::AddedVertices> added = client.AddVertices(session, cloud.points, near, call);
-  if (!added.ok()) {
-    return WithOrigins(added.status(), cloud);
-  }
-  if (remote.json()) {
-    Json json = {{"vertices", added->vertices}, {"revision", added->revision}};
+  client::AddedVertices all;
+  const absl::Status status = AddInBatches(client, cloud, near, call, all);
+  // What was added stays: its vertices are told, whatever became of the rest.
+  if (remote.json() && status.ok()) {
+    Json json = {{"vertices", all.vertices}, {"revision", all.revision}};
     AddNotes(report, json);
     PrintJson(json);
-    return absl::OkStatus();
+  } else {
+    for (const uint32_t vertex : all.vertices) {
+      std::cout << vertex << "\n";
+    }
   }
-  for (const uint32_t vertex : added->vertices) {
-    std::cout << vertex << "\n";
-  }
+  return status;
+}
+
+absl::Status AddCommand::AddInBatches(client::Client& client, const formats::PointCloud& cloud,
+                                      const std::vector<uint32_t>& near, client::CallOptions call,
+                                      client::AddedVertices& all) const {
+  const auto dimension = static_cast<uint64_t>(cloud.dimension);
+  const uint64_t most = kBytesOfABatch / (dimension * sizeof(double) + sizeof(uint32_t));
+  uint64_t done = 0;
+  do {
+    const uint64_t count = std::min(most, cloud.size() - done);
+    const std::span<const double> points = std::span(cloud.points).subspan(done * dimension, count * dimension);
+    const std::span<const uint32_t> hints =
+        near.empty() ? std::span<const uint32_t>() : std::span(near).subspan(done, count);
+    absl::StatusOr<client::AddedVertices> added = client.AddVertices(session, points, hints, call);
+    if (!added.ok()) {
+      const absl::Status named =
+          WithOrigins(added.status(), 0, count, [&](uint64_t point) { return cloud.Origin(done + point); });
+      return done == 0 ? named
+                       : client::WithMessage(named, absl::StrCat(named.message(), "; the first ", done, " of ",
+                                                                 cloud.size(), " points were added before"));
+    }
+    all.vertices.insert(all.vertices.end(), added->vertices.begin(), added->vertices.end());
+    all.revision = added->revision;
+    if (call.expected_revision.has_value()) {
+      call.expected_revision = added->revision;
+    }
+    done += count;
+  } while (done < cloud.size());
   return absl::OkStatus();
 }
 
@@ -245,8 +283,10 @@ void AddQueryCommands(CLI::App& app, int& exit_code) {
   cells_app->callback([cells, &exit_code] { exit_code = cells->Run(); });
 
   const auto add = std::make_shared<AddCommand>();
-  CLI::App* add_app = app.add_subcommand(
-      "add", "Add vertices at the points of a file, all or none, and print their numbers; refine makes a mesh of them");
+  CLI::App* add_app = app.add_subcommand("add",
+                                         "Add vertices at the points of a file, and print their numbers; refine makes "
+                                         "a mesh of them. All are added or none, "
+                                         "of a file of more than 3 MiB of coordinates those of each 3 MiB");
   add_app->footer(absl::StrCat(kCloudsHelp, "\n", kExitCodesHelp));
   AddSession(*add_app, add->session);
   add_app->add_option("IN", add->input, "File of points, or - for standard input")->required()->type_name("FILE");

@@ -10,6 +10,7 @@
 #include "client/cli/progress_bar.h"
 #include "client/cli/remote_command.h"
 #include "client/cli/statistics.h"
+#include "client/printable.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::cli {
@@ -25,7 +26,7 @@ absl::Status PrintInfo(const RemoteCommand& remote, client::Client& client, cons
     return absl::OkStatus();
   }
   const auto print = [](const char* name, const std::string& value) {
-    std::cout << absl::StrFormat("%-14s %s\n", name, value);
+    std::cout << absl::StrFormat("%-14s %s\n", name, client::Printable(value));
   };
   const auto seconds = [](absl::Duration duration) { return absl::StrFormat("%g s", absl::ToDoubleSeconds(duration)); };
   print("server", server);
@@ -35,6 +36,10 @@ absl::Status PrintInfo(const RemoteCommand& remote, client::Client& client, cons
   print("max vertices", WithThousands(info.max_vertices));
   print("max request", WithBinaryUnit(info.max_request_bytes));
   print("max memory", info.max_memory_bytes == 0 ? "no limit" : WithBinaryUnit(info.max_memory_bytes));
+  print("stored", absl::StrCat(WithBinaryUnit(info.stored_bytes), " of ",
+                               info.max_stored_bytes_per_tenant == 0
+                                   ? "no limit"
+                                   : absl::StrCat("at most ", WithBinaryUnit(info.max_stored_bytes_per_tenant))));
   print("max sessions",
         absl::StrCat(WithThousands(info.max_sessions), ", of a tenant ", WithThousands(info.max_sessions_per_tenant)));
   print("ttl", absl::StrCat(seconds(info.default_ttl), ", at most ", seconds(info.max_ttl)));

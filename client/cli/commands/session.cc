@@ -1,6 +1,7 @@
 // wellspace session: create, list, show, update and delete sessions of a server.
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,19 +14,24 @@
 #include "client/cli/progress_bar.h"
 #include "client/cli/remote_command.h"
 #include "client/cli/session_options.h"
+#include "client/cli/statistics.h"
 #include "client/error_details.h"
+#include "client/printable.h"
 #include "core/base/status_macros.h"
 
 namespace wellspace::cli {
 namespace {
 
-std::string LabelsText(const client::Labels& labels) { return absl::StrJoin(labels, " ", absl::PairFormatter("=")); }
+std::string LabelsText(const client::Labels& labels) {
+  return client::Printable(absl::StrJoin(labels, " ", absl::PairFormatter("=")));
+}
 
 std::string QualityText(const client::MeshOptions& parameters) {
   const bool is_well_spaced = parameters.criterion == client::Criterion::kWellSpaced;
-  std::string text = absl::StrFormat("%s, rho %g", is_well_spaced ? "well-spaced" : "radius-edge", parameters.rho);
-  if (parameters.max_circumradius != 0) {
-    absl::StrAppendFormat(&text, ", size %g", parameters.max_circumradius);
+  std::string text =
+      absl::StrFormat("%s, rho %g", is_well_spaced ? "well-spaced" : "radius-edge", parameters.rho.value_or(0));
+  if (parameters.max_circumradius.has_value()) {
+    absl::StrAppendFormat(&text, ", size %g", *parameters.max_circumradius);
   }
   if (!parameters.size_boxes.empty()) {
     absl::StrAppend(&text, ", ", parameters.size_boxes.size(), " size boxes");
@@ -48,7 +54,7 @@ void PrintSession(const client::Session& session, bool json) {
     return;
   }
   const auto print = [](const char* name, const std::string& value) {
-    std::cout << absl::StrFormat("%-16s %s\n", name, value);
+    std::cout << absl::StrFormat("%-16s %s\n", name, client::Printable(value));
   };
   print("name", session.name);
   print("state", StateName(session.state));
@@ -57,8 +63,8 @@ void PrintSession(const client::Session& session, bool json) {
                       ? absl::StrFormat("of the points, and a margin of %g", session.parameters.margin)
                       : absl::StrCat(absl::StrJoin(session.parameters.domain_low, ","), " to ",
                                      absl::StrJoin(session.parameters.domain_high, ",")));
-  if (session.parameters.merge_distance != 0) {
-    print("merged", absl::StrFormat("points up to %g apart", session.parameters.merge_distance));
+  if (session.parameters.merge_distance.value_or(0) != 0) {
+    print("merged", absl::StrFormat("points up to %g apart", *session.parameters.merge_distance));
   }
   print("quality", QualityText(session.parameters));
   print("points", WithThousands(session.committed_points));
@@ -75,6 +81,7 @@ void PrintSession(const client::Session& session, bool json) {
   }
   print("vertices", WithThousands(session.vertex_count));
   print("simplices", WithThousands(session.simplex_count));
+  print("stored", WithBinaryUnit(session.stored_bytes));
   print("revision", absl::StrCat(session.revision));
   print("last operation", session.last_operation.empty() ? "none" : session.last_operation);
   print("labels", LabelsText(session.labels));
@@ -102,7 +109,7 @@ struct SessionCommand {
   bool clear_labels = false;
   double ttl_seconds = 0;  // 0: not given
   uint64_t limit = 0;      // 0: none
-  uint64_t expected_revision = 0;
+  std::optional<uint64_t> expected_revision;
 
   std::optional<absl::Duration> Ttl() const {
     return ttl_seconds > 0 ? std::make_optional(absl::Seconds(ttl_seconds)) : std::nullopt;
@@ -133,7 +140,7 @@ int SessionCommand::Create() {
     if (remote.json()) {
       PrintJson(SessionJson(*created));
     } else {
-      std::cout << created->name << "\n";
+      std::cout << client::Printable(created->name) << "\n";
     }
     return absl::OkStatus();
   });
@@ -146,7 +153,9 @@ int SessionCommand::List() {
     uint64_t listed = 0;
     do {
       constexpr uint64_t kLargestPage = 1000;
-      page.page_size = static_cast<int>(limit == 0 ? 0 : std::min(limit - listed, kLargestPage));
+      if (limit != 0) {
+        page.page_size = static_cast<int>(std::min(limit - listed, kLargestPage));
+      }
       WELLSPACE_ASSIGN_OR_RETURN(const client::SessionPage result, client.ListSessions(labels, page, call));
       if (page.page_token.empty() && !remote.json() && !remote.quiet()) {
         std::cout << absl::StrFormat("%-44s %-9s %12s %12s  %-20s  %s\n", "NAME", "STATE", "POINTS", "VERTICES",
@@ -157,9 +166,10 @@ int SessionCommand::List() {
         if (remote.json()) {
           json.push_back(SessionJson(one));
         } else {
-          std::cout << absl::StrFormat("%-44s %-9s %12s %12s  %-20s  %s\n", one.name, StateName(one.state),
-                                       WithThousands(one.committed_points), WithThousands(one.vertex_count),
-                                       TimeText(one.expire_time), LabelsText(one.labels));
+          std::cout << absl::StrFormat("%-44s %-9s %12s %12s  %-20s  %s\n", client::Printable(one.name),
+                                       StateName(one.state), WithThousands(one.committed_points),
+                                       WithThousands(one.vertex_count), TimeText(one.expire_time),
+                                       LabelsText(one.labels));
         }
       }
       page.page_token = result.next_page_token;

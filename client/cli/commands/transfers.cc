@@ -1,4 +1,5 @@
 // wellspace upload, download: points and segments to a session, and its mesh to a file.
+#include <algorithm>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -35,7 +36,7 @@ struct UploadCommand {
   std::optional<uint64_t> offset;
   std::optional<uint64_t> segment_offset;
   std::optional<uint64_t> seed_offset;
-  uint64_t expected_revision = 0;
+  std::optional<uint64_t> expected_revision;
 
   absl::Status CheckOptions() const;
   absl::Status Upload(client::Client& client, client::CallOptions call);
@@ -50,7 +51,7 @@ struct UploadCommand {
 // numbers of its segments, after `segments` others.
 absl::StatusOr<client::Features> Shifted(client::Features features, uint64_t first, uint64_t points,
                                          uint64_t segments) {
-  if (first + points > client::kNoVertex) {
+  if (first > client::kNoVertex - std::min<uint64_t>(points, client::kNoVertex)) {
     return absl::InvalidArgumentError(absl::StrCat(
         "--offset: after ", first, " points no segment can name those of IN; 2^32 - 1 points have numbers"));
   }
@@ -146,7 +147,9 @@ absl::Status UploadCommand::UploadDomain(client::Client& client, const client::S
     return domain.WithOrigins(uploaded.status(), {first, before});
   }
   client::CallOptions next = call;
-  next.expected_revision = expected_revision == 0 ? 0 : uploaded->revision;
+  if (expected_revision.has_value()) {
+    next.expected_revision = uploaded->revision;
+  }
   const absl::StatusOr<client::AddedSegments> added = client.AddSegments(session, *features, before, next);
   if (!added.ok()) {
     return domain.WithOrigins(added.status(), {first, before});
@@ -172,7 +175,7 @@ struct DownloadCommand {
   std::string path;
   std::string format;
   bool no_boundary = false;
-  uint64_t revision = 0;
+  std::optional<uint64_t> revision;
 
   absl::Status Check() const;
   absl::Status Download(client::Client& client, const client::CallOptions& call) const;

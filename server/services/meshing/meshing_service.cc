@@ -7,6 +7,7 @@
 #include "server/security/authenticator.h"
 #include "server/services/meshing/estimate_mesh_call.h"
 #include "server/services/meshing/mesh_points_call.h"
+#include "server/sessions/session_registry.h"
 #include "server/wire/convert.h"
 #include "server/wire/errors.h"
 
@@ -26,7 +27,8 @@ grpc::ServerUnaryReactor* MeshingService::GetServerInfo(grpc::CallbackServerCont
                                                         const v1::GetServerInfoRequest* /*request*/,
                                                         v1::GetServerInfoResponse* response) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
-  if (const absl::StatusOr<Caller> caller = environment_.authenticator.Authenticate(*context); !caller.ok()) {
+  const absl::StatusOr<Caller> caller = environment_.authenticator.Authenticate(*context);
+  if (!caller.ok()) {
     reactor->Finish(ToGrpcStatus(caller.status()));
     return reactor;
   }
@@ -45,6 +47,8 @@ grpc::ServerUnaryReactor* MeshingService::GetServerInfo(grpc::CallbackServerCont
   *response->mutable_max_ttl() = DurationToProto(environment_.options.max_ttl);
   *response->mutable_stall_limit() = DurationToProto(environment_.options.stall_limit);
   response->set_max_memory_bytes(environment_.options.max_memory_bytes);
+  response->set_max_stored_bytes_per_tenant(environment_.options.max_stored_bytes_per_tenant);
+  response->set_stored_bytes(environment_.sessions.StoredBytes(caller->tenant));
   const JobPool::Load load = environment_.jobs.GetLoad();
   response->set_running_jobs(load.running);
   response->set_queued_jobs(load.queued);

@@ -27,8 +27,8 @@ absl::Status Start(const CallEnvironment& environment, const Caller& caller, con
     *response.mutable_operation() = started;
     return identified.Answer(response);
   };
-  return StartRefinement(environment, session, parameters, request.restart(), request.expected_revision(), answer)
-      .status();
+  WELLSPACE_ASSIGN_OR_RETURN(const uint64_t expected_revision, ExpectedRevisionOf(request));
+  return StartRefinement(environment, session, parameters, request.restart(), expected_revision, answer).status();
 }
 
 absl::Status Get(const CallEnvironment& environment, const Caller& caller, const v1::GetOperationRequest& request,
@@ -50,7 +50,7 @@ absl::Status List(const CallEnvironment& environment, const Caller& caller, cons
                   v1::ListOperationsResponse& response) {
   WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<Session> session,
                              FindSession(environment, caller, request.parent(), "parent"));
-  WELLSPACE_ASSIGN_OR_RETURN(const size_t count, PageSizeFromProto(request.page_size()));
+  WELLSPACE_ASSIGN_OR_RETURN(const size_t count, PageSizeOf(request));
   const std::string list = absl::StrCat("operations of ", session->name());
   WELLSPACE_ASSIGN_OR_RETURN(const uint64_t after, PositionFromProto(request.page_token(), list, 0));
   const std::vector<std::shared_ptr<Operation>> operations = session->ListOperations(after, count + 1);

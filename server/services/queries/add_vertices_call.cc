@@ -7,6 +7,7 @@
 #include "core/base/status_macros.h"
 #include "server/jobs/job_size.h"
 #include "server/services/resource_names.h"
+#include "server/services/session_fields.h"
 #include "server/sessions/session_use.h"
 #include "server/wire/errors.h"
 
@@ -72,6 +73,11 @@ void AddVerticesCall::Submit(const IdentifiedRequest& identified, RequestIds::Do
     done({std::move(session).status(), ""});
     return;
   }
+  const absl::StatusOr<uint64_t> expected_revision = ExpectedRevisionOf(*request_);
+  if (!expected_revision.ok()) {
+    done({expected_revision.status(), ""});
+    return;
+  }
   const Session::Size size = (*session)->GetSize(0);
   const bool is_small =
       IsSmallAddition(request_->points_size() / (*session)->dimension(), size.vertices, size.replayed_steps);
@@ -79,7 +85,7 @@ void AddVerticesCall::Submit(const IdentifiedRequest& identified, RequestIds::Do
       new Addition{.use = SessionUse(*std::move(session)),
                    .points = {request_->points().begin(), request_->points().end()},
                    .near = {request_->near().begin(), request_->near().end()},
-                   .expected_revision = request_->expected_revision(),
+                   .expected_revision = *expected_revision,
                    .identified = identified});
   absl::StatusOr<std::shared_ptr<Job>> job =
       environment().jobs.Submit({.tenant = caller().tenant,

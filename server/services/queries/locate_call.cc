@@ -12,6 +12,7 @@
 #include "core/mesh_locator.h"
 #include "core/simplex/locator.h"
 #include "server/services/resource_names.h"
+#include "server/services/session_fields.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -46,11 +47,10 @@ absl::Status CheckInside(const core::LocatedPoints& located, uint64_t offset) {
                    "points");
 }
 
-void Fill(const core::LocatedPoints& located, uint64_t revision, v1::LocateResponse& response) {
+void Fill(const core::LocatedPoints& located, v1::LocateResponse& response) {
   response.mutable_simplices()->Assign(located.simplices.begin(), located.simplices.end());
   response.mutable_vertices()->Assign(located.vertices.begin(), located.vertices.end());
   response.mutable_coordinates()->Assign(located.coordinates.begin(), located.coordinates.end());
-  response.set_revision(revision);
 }
 
 }  // namespace
@@ -80,7 +80,7 @@ absl::Status LocateCall::Submit() {
   points_.assign(request_->points().begin(), request_->points().end());
   offset_ = request_->point_offset();
   WELLSPACE_RETURN_IF_ERROR(CheckFinite(points_, dimension, offset_));
-  revision_ = request_->revision();
+  WELLSPACE_ASSIGN_OR_RETURN(revision_, RevisionFromProto(request_->has_revision(), request_->revision(), "revision"));
   allow_outside_ = request_->allow_outside();
   const bool is_small = session->HasLocator();
   use_.emplace(std::move(session));
@@ -94,11 +94,13 @@ absl::Status LocateCall::Submit() {
 void LocateCall::Locate(Job& job) {
   core::LocatedPoints located;
   uint64_t revision = 0;
+  uint64_t vertices = 0;
   absl::Status status = RunGuarded([&] {
     WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<const LocatedMesh> mesh,
                                use_->session().PrepareLocator(revision_, job));
     WELLSPACE_ASSIGN_OR_RETURN(located, mesh->locator->Locate(points_, job.context()));
     revision = mesh->revision;
+    vertices = mesh->vertices;
     return allow_outside_ ? absl::OkStatus() : CheckInside(located, offset_);
   });
   job.TakeMemory(std::numeric_limits<uint64_t>::max()).Release();
@@ -108,7 +110,9 @@ void LocateCall::Locate(Job& job) {
     return;
   }
   if (status.ok()) {
-    Fill(located, revision, *response_);
+    Fill(located, *response_);
+    response_->set_revision(revision);
+    response_->set_vertex_count(vertices);
   }
   End(std::move(status));
 }

@@ -5,6 +5,7 @@
 #include "core/base/status_macros.h"
 #include "server/calls/wire.h"
 #include "server/services/resource_names.h"
+#include "server/services/session_fields.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -21,9 +22,10 @@ absl::Status AddSegmentsCall::Parse(grpc::ByteBuffer* bytes, v1::AddSegmentsRequ
   WELLSPACE_RETURN_IF_ERROR(ParseRequest(bytes, request));
   if (!session_.has_value()) {
     WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, FindSession(environment(), caller(), request->name()));
+    WELLSPACE_RETURN_IF_ERROR(ExpectedRevisionOf(*request).status());
     session_.emplace(std::move(session));
   } else {
-    request->set_expected_revision(0);  // what the call has committed has changed the revision
+    request->clear_expected_revision();  // what the call has committed has changed the revision
   }
   segment_count_ += request->segments().ends_size() / 2;
   seed_count_ += request->faces().seeds_size();

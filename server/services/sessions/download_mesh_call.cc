@@ -6,6 +6,7 @@
 #include "core/base/status_macros.h"
 #include "server/calls/wire.h"
 #include "server/services/resource_names.h"
+#include "server/services/session_fields.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -20,6 +21,9 @@ void DownloadMeshCall::OnBegin() {
 
 absl::Status DownloadMeshCall::Find() {
   WELLSPACE_RETURN_IF_ERROR(ParseRequest(&bytes_, &request_));
+  WELLSPACE_RETURN_IF_ERROR(RevisionFromProto(request_.has_revision(), request_.revision(), "revision").status());
+  WELLSPACE_RETURN_IF_ERROR(
+      RevisionFromProto(request_.has_since_revision(), request_.since_revision(), "since_revision").status());
   WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, FindSession(environment(), caller(), request_.name()));
   std::shared_ptr<const MeshSnapshot> mesh = session->mesh();
   if (mesh == nullptr) {

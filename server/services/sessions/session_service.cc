@@ -53,7 +53,7 @@ std::string ListOf(const Caller& caller, const Labels& labels) {
 
 absl::Status List(const CallEnvironment& environment, const Caller& caller, const v1::ListSessionsRequest& request,
                   v1::ListSessionsResponse& response) {
-  WELLSPACE_ASSIGN_OR_RETURN(const size_t count, PageSizeFromProto(request.page_size()));
+  WELLSPACE_ASSIGN_OR_RETURN(const size_t count, PageSizeOf(request));
   WELLSPACE_ASSIGN_OR_RETURN(const Labels labels, LabelsFromProto(request.labels(), "labels"));
   const std::string list = ListOf(caller, labels);
   WELLSPACE_ASSIGN_OR_RETURN(const uint64_t after, PositionFromProto(request.page_token(), list, 0));
@@ -89,7 +89,8 @@ absl::Status Update(const CallEnvironment& environment, const Caller& caller, co
     const google::protobuf::Duration* given = request.session().has_ttl() ? &request.session().ttl() : nullptr;
     WELLSPACE_ASSIGN_OR_RETURN(ttl, TtlFromProto(given, "session.ttl", environment.options));
   }
-  return session->Update(std::move(labels), ttl, request.expected_revision(), [&](const v1::Session& updated) {
+  WELLSPACE_ASSIGN_OR_RETURN(const uint64_t expected_revision, ExpectedRevisionOf(request));
+  return session->Update(std::move(labels), ttl, expected_revision, [&](const v1::Session& updated) {
     *response.mutable_session() = updated;
     return identified.Answer(response);
   });
@@ -98,9 +99,9 @@ absl::Status Update(const CallEnvironment& environment, const Caller& caller, co
 absl::Status Delete(const CallEnvironment& environment, const Caller& caller, const v1::DeleteSessionRequest& request,
                     const IdentifiedRequest& identified) {
   WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, FindSession(environment, caller, request.name()));
-  WELLSPACE_ASSIGN_OR_RETURN(
-      const std::shared_ptr<Operation> under_way,
-      session->Close(request.expected_revision(), identified.Answer(v1::DeleteSessionResponse())));
+  WELLSPACE_ASSIGN_OR_RETURN(const uint64_t expected_revision, ExpectedRevisionOf(request));
+  WELLSPACE_ASSIGN_OR_RETURN(const std::shared_ptr<Operation> under_way,
+                             session->Close(expected_revision, identified.Answer(v1::DeleteSessionResponse())));
   environment.sessions.Remove(*session);
   if (under_way != nullptr) {
     WELLSPACE_RETURN_IF_ERROR(CancelOperation(environment, *session, *under_way));
@@ -113,6 +114,7 @@ absl::Status Delete(const CallEnvironment& environment, const Caller& caller, co
 absl::Status Remove(const CallEnvironment& environment, const Caller& caller, const v1::RemovePointsRequest& request,
                     const IdentifiedRequest& identified, v1::RemovePointsResponse& response) {
   WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, FindSession(environment, caller, request.name()));
+  WELLSPACE_ASSIGN_OR_RETURN(const uint64_t expected_revision, ExpectedRevisionOf(request));
   const SessionUse use(session);
   const auto set_response = [&](const PointsLeft& left) {
     response.set_committed_points(left.points);
@@ -123,8 +125,7 @@ absl::Status Remove(const CallEnvironment& environment, const Caller& caller, co
     set_response(left);
     return identified.Answer(response);
   };
-  WELLSPACE_ASSIGN_OR_RETURN(const PointsLeft left,
-                             session->RemovePoints(numbers, request.expected_revision(), answer));
+  WELLSPACE_ASSIGN_OR_RETURN(const PointsLeft left, session->RemovePoints(numbers, expected_revision, answer));
   set_response(left);
   return absl::OkStatus();
 }

@@ -7,6 +7,7 @@
 #include "core/base/status_macros.h"
 #include "server/calls/wire.h"
 #include "server/services/resource_names.h"
+#include "server/services/session_fields.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -40,14 +41,16 @@ absl::Status SetSizesCall::Take(grpc::ByteBuffer* bytes) {
   if (!session_.has_value()) {
     WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, FindSession(environment(), caller(), request.name()));
     session_.emplace(std::move(session));
-    expected_revision_ = request.expected_revision();
+    WELLSPACE_ASSIGN_OR_RETURN(expected_revision_, ExpectedRevisionOf(request));
   }
   if (request.sizes_case() == v1::SetSizesRequest::SIZES_NOT_SET) {
     return absl::OkStatus();
   }
   if (sizes_case_ == v1::SetSizesRequest::SIZES_NOT_SET) {
     sizes_case_ = request.sizes_case();
-    mesh_revision_ = request.vertex_sizes().mesh_revision();
+    const v1::VertexSizes& sizes = request.vertex_sizes();
+    WELLSPACE_ASSIGN_OR_RETURN(mesh_revision_, RevisionFromProto(sizes.has_mesh_revision(), sizes.mesh_revision(),
+                                                                 "vertex_sizes.mesh_revision"));
   } else if (request.sizes_case() != sizes_case_) {
     return MakeError(v1::ERROR_REASON_INVALID_SIZES,
                      "there are samples as well as vertex_sizes; send either of them in all messages",

@@ -8,6 +8,7 @@
 #include "core/base/status_macros.h"
 #include "server/calls/wire.h"
 #include "server/services/resource_names.h"
+#include "server/services/session_fields.h"
 #include "server/wire/errors.h"
 
 namespace wellspace::server {
@@ -46,6 +47,7 @@ absl::Status UploadPointsCall::Parse(grpc::ByteBuffer* bytes, v1::UploadPointsRe
   WELLSPACE_RETURN_IF_ERROR(ParseRequest(bytes, request));
   if (!session_.has_value()) {
     WELLSPACE_ASSIGN_OR_RETURN(std::shared_ptr<Session> session, FindSession(environment(), caller(), request->name()));
+    WELLSPACE_RETURN_IF_ERROR(ExpectedRevisionOf(*request).status());
     session_.emplace(std::move(session));
   }
   return absl::OkStatus();

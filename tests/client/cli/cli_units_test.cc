@@ -3,14 +3,18 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <future>
+#include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "client/cli/exit_codes.h"
 #include "client/cli/helpful_threads.h"
 #include "client/cli/interrupt.h"
+#include "client/cli/json.h"
 #include "client/cli/meshing_options.h"
 #include "client/cli/options.h"
 #include "client/cli/progress_bar.h"
@@ -47,6 +51,21 @@ TEST(ProgressLineTest, ShowsPhaseFractionAndVerticesWithin79Columns) {
                                             .sequence = 0});
   EXPECT_LE(longest.size(), 79u);
   EXPECT_THAT(longest, HasSubstr("100%"));
+}
+
+TEST(ProgressLineTest, TakesAnyFraction) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const std::string begin = ProgressLine("tree", 0, "0 vertices");
+  for (const double fraction : {std::nan(""), -std::nan(""), -kInfinity, -1e300, -0.0}) {
+    EXPECT_EQ(ProgressLine("tree", fraction, "0 vertices"), begin);
+  }
+  EXPECT_EQ(ProgressLine("tree", kInfinity, "0 vertices"), ProgressLine("tree", 1, "0 vertices"));
+  EXPECT_EQ(ProgressLine("tree", 1e300, "0 vertices"), ProgressLine("tree", 1, "0 vertices"));
+}
+
+TEST(JsonTextTest, HasNoControlCharactersAndNoBytesThatAreNoText) {
+  EXPECT_EQ(JsonText({{"a", "\x1b[2J\x7f\xc2\x9b\xc3\xa9\xff"}}, /*indented=*/false),
+            "{\"a\":\"\\u001b[2J\\u007f\\u009b\xc3\xa9\xef\xbf\xbd\"}");
 }
 
 TEST(ExitCodeTest, OfEveryKindOfError) {
@@ -210,6 +229,20 @@ TEST(OptionsTest, NumbersAreCorrectlyRoundedAndMayBeNegative) {
   }
 }
 
+// A number that is not given is told from a 0, which is refused where it can be none.
+TEST(OptionsTest, NoneStandsForAnOptionThatIsNotGiven) {
+  CLI::App app;
+  std::optional<double> number = 5;
+  AddNumber(app, "--number", number, "");
+  app.parse("--number none");
+  EXPECT_FALSE(number.has_value());
+  app.parse("--number 0.5");
+  EXPECT_EQ(number, 0.5);
+  app.parse("--number 0");
+  EXPECT_EQ(number, 0.0);
+  EXPECT_THROW(app.parse("--number nothing"), CLI::ValidationError);
+}
+
 // A cloud along the diagonal of the unit box of `dimension`.
 std::vector<double> Diagonal(int dimension, int count) {
   std::vector<double> points;
@@ -274,7 +307,7 @@ TEST(HelpfulThreadsTest, AreAskedForUnlessTheUserSays) {
     int threads = 0;
     EXPECT_EQ(
         options.Run([&](client::Client&, const client::MeshOptions& mesh, const auto&, const client::CallOptions&) {
-          threads = mesh.threads;
+          threads = mesh.threads.value_or(0);
           return absl::OkStatus();
         }),
         0);

@@ -2,6 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdint>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -107,6 +110,52 @@ TEST_F(QueryCommandsTest, AddPrintsTheVertices) {
   const RunResult outside = Run({"add", "one", "-", "--near", folder_.Write("far", "4 6")}, "1,2\n3,4\n");
   EXPECT_EQ(outside.exit_code, 2);
   EXPECT_THAT(outside.err, HasSubstr("<stdin>:2: points[1] is outside"));
+}
+
+// A request has 4 MiB: what is larger comes in several, each of the revision that the one before has made.
+TEST_F(QueryCommandsTest, AddsMorePointsThanARequestHas) {
+  constexpr size_t kCount = 300'000;
+  std::vector<int> sizes;
+  std::vector<uint64_t> expected;
+  size_t refuse_from = 2 * kCount;
+  server_.queries.add = [&](const v1::AddVerticesRequest& request, v1::AddVerticesResponse& response) {
+    EXPECT_LE(request.ByteSizeLong(), size_t{4} << 20);
+    size_t first = 0;
+    for (const int size : sizes) {
+      first += size;
+    }
+    if (first >= refuse_from) {
+      return MakeError(grpc::StatusCode::INVALID_ARGUMENT, "points[1] is outside", "ERROR_REASON_INVALID_POINTS");
+    }
+    sizes.push_back(request.points_size() / 2);
+    expected.push_back(request.expected_revision());
+    for (int i = 0; i < sizes.back(); ++i) {
+      response.add_vertices(static_cast<uint32_t>(first) + i);
+      EXPECT_EQ(request.points(2 * i), static_cast<double>(first) + i);
+    }
+    response.set_revision(10 + sizes.size());
+    return grpc::Status::OK;
+  };
+  std::string cloud;
+  std::string numbers;
+  for (size_t i = 0; i < kCount; ++i) {
+    cloud += std::to_string(i) + ",1\n";
+    numbers += std::to_string(i) + "\n";
+  }
+  const std::string path = folder_.Write("cloud.csv", cloud);
+  const RunResult added = Run({"add", "one", path, "--expected-revision", "7"});
+  EXPECT_EQ(added.exit_code, 0) << added.err;
+  EXPECT_EQ(added.out, numbers);
+  EXPECT_EQ(sizes.size(), 2u);
+  EXPECT_THAT(expected, ElementsAre(7, 11));
+  const size_t first = sizes.at(0);
+  sizes.clear();
+  refuse_from = first;
+  const RunResult refused = Run({"add", "one", path});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("cloud.csv:" + std::to_string(first + 2) + ": points[1] is outside; the first " +
+                                     std::to_string(first) + " of 300000 points were added before"));
+  EXPECT_EQ(std::count(refused.out.begin(), refused.out.end(), '\n'), static_cast<std::ptrdiff_t>(first));
 }
 
 }  // namespace

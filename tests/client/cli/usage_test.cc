@@ -143,6 +143,12 @@ TEST_F(UsageTest, WrongOptionsAreNamedWithTheirValueAndWhatWouldDo) {
       {{"--size-box", "0,0,1,1,0.1", "--size-box", "0,0.5,1,0.25,0.1"},
        "--size-box 0,0.5,1,0.25,0.1: size_boxes[1].high[1]: 0.25 is not allowed; "},
       {{"--size-box", "0,0,1,1,0"}, "--size-box 0,0,1,1,0: size_boxes[0].max_circumradius: 0 is not allowed; "},
+      // A 0 does not stand for the default.
+      {{"--gradation", "0"}, "--gradation: gradation: 0 is not allowed; expected a number above 0 and at most 1, or "},
+      {{"--gradation", "-0.0"}, "--gradation: gradation: 0 is not allowed; "},
+      {{"--size", "0"}, "--size: max_circumradius: 0 is not allowed; expected a number above 0, or "},
+      {{"--edge-length", "0"}, "--edge-length: edge_length: 0 is not allowed; "},
+      {{"--rho", "0"}, "--rho: rho: 0 is not allowed; "},
       {{"--size-box", "0,0,1,x,1"}, "--size-box: expected a number, got \"x\""},
       {{"--criterion", "round"}, "--criterion: round not in {radius-edge,well-spaced}"},
   };

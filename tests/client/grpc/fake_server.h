@@ -144,6 +144,7 @@ struct FakeQueries final : v1::QueryService::Service {
   Streaming<v1::ApproximateNearestNeighborsRequest, v1::ApproximateNearestNeighborsResponse> nearest;
   Streaming<v1::ClippedVoronoiCellsRequest, v1::ClippedVoronoiCellsResponse> clipped;
   Streaming<v1::VoronoiCellsRequest, v1::VoronoiCellsResponse> cells;
+  Unary<v1::LocateRequest, v1::LocateResponse> locate;
   Unary<v1::AddVerticesRequest, v1::AddVerticesResponse> add;
 
   grpc::Status ApproximateNearestNeighbors(
@@ -158,6 +159,10 @@ struct FakeQueries final : v1::QueryService::Service {
   grpc::Status VoronoiCells(grpc::ServerContext* context, const v1::VoronoiCellsRequest* request,
                             grpc::ServerWriter<v1::VoronoiCellsResponse>* writer) override {
     return cells(*context, *request, *writer);
+  }
+  grpc::Status Locate(grpc::ServerContext* /*context*/, const v1::LocateRequest* request,
+                      v1::LocateResponse* response) override {
+    return locate(*request, *response);
   }
   grpc::Status AddVertices(grpc::ServerContext* /*context*/, const v1::AddVerticesRequest* request,
                            v1::AddVerticesResponse* response) override {

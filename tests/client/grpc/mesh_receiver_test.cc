@@ -369,6 +369,34 @@ TEST(MeshReceiver, RefusesAChunkBeforeTheMetadata) {
   EXPECT_EQ(receiver.AddChunk(GoodAnswer().chunks[0]).code(), absl::StatusCode::kDataLoss);
 }
 
+INSTANTIATE_TEST_SUITE_P(
+    Numbers, MeshReceiverRefuses,
+    ::testing::Values(
+        Damage{"PointThatIsNoNumber", "a coordinate of a vertex is nan",
+               [](Answer& a) {
+                 a.chunks[1].set_points(1, std::numeric_limits<double>::quiet_NaN());
+                 Sign(a.chunks[1]);
+               }},
+        Damage{"PointThatIsInfinite", "a coordinate of a vertex is -inf",
+               [](Answer& a) {
+                 a.chunks[0].set_points(0, -std::numeric_limits<double>::infinity());
+                 Sign(a.chunks[0]);
+               }},
+        Damage{"WeightNegative", "the weight of a vertex is -1",
+               [](Answer& a) {
+                 a = WeightedAnswer();
+                 a.chunks[2].set_weights(0, -1);
+                 Sign(a.chunks[2]);
+               }},
+        Damage{"DomainThatIsNoNumber", "a domain from nan",
+               [](Answer& a) { a.metadata.mutable_domain()->set_low(0, std::numeric_limits<double>::quiet_NaN()); }},
+        Damage{"DomainInverted", "along axis 1", [](Answer& a) { a.metadata.mutable_domain()->set_high(1, -1e9); }},
+        Damage{"SliverOfNoVertex", "slivers name vertex 4 of 4",
+               [](Answer& a) {
+                 a.metadata.mutable_statistics()->mutable_slivers()->add_flattest_left()->add_vertices(4);
+               }}),
+    [](const auto& test) { return test.param.name; });
+
 TEST(MeshReceiver, RefusesASecondMetadata) {
   MeshCollector collector;
   MeshReceiver receiver(collector, kOnePointIn2D);

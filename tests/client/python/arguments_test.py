@@ -158,6 +158,8 @@ class ArraysTest(Case):
             ({"holes": [[0.5, 0.5, 0.5]]}, "expected 2", "holes"),
             ({"regions": [(1,)]}, "expected (x, y, region, max_area)", "regions[0]"),
             ({"regions": [(1, 1, 1), (1, 1, 0.5)]}, "region 0.5; expected a whole number", "regions[1]"),
+            ({"regions": [(1, 1, 1, 0)]}, "max_area 0; expected a number above 0, or nothing", "regions[0]"),
+            ({"regions": [(1, 1, 1, -1.0)]}, "max_area -1.0", "regions[0]"),
             ({"regions": [(1, np.nan)]}, "nan", "regions[0][0]"),
             ({"faces": "even_odd"}, "'box', 'holes', 'even-odd'", "faces"),
             ({"crossings": "ignore"}, "'refuse', 'split'", "crossings"),

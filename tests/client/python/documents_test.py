@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+from unittest import mock
 
 import numpy as np
 from support import PATIENCE, ROOT
@@ -54,6 +55,13 @@ class DocumentsTest(unittest.TestCase):
 
     def test_readme(self):
         self.run_blocks(ROOT / "README.md", 1)
+
+    def test_readmes_need_no_other_packages(self):
+        """What is read first runs with what the package needs, without what it only suggests."""
+        hidden = {name: None for name in ("meshio", "pyvista", "tqdm", "tqdm.auto", "scipy")}
+        with mock.patch.dict(sys.modules, hidden):
+            self.run_blocks(ROOT / "client" / "python" / "README.md", 1)
+            self.run_blocks(ROOT / "README.md", 1)
 
     def test_docstrings(self):
         """Their examples run; what they show is not compared."""

@@ -20,6 +20,11 @@ SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
 RING = [[0, 1], [1, 2], [2, 3], [3, 0]]
 
 
+def square():
+    """The arrays of a file with one triangle."""
+    return {"points": np.array([[0, 0], [1, 0], [0, 1]], float), "simplices": np.array([[0, 1, 2]])}
+
+
 class FilesTest(Case):
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -74,7 +79,26 @@ class FilesTest(Case):
                 wellspace.Mesh.load(path)
         points = np.zeros((3, 2))
         for arrays, message in (({"points": points}, "no array 'simplices'"),
-                                ({"points": points, "simplices": np.zeros((1, 4), int)}, "4 vertices in 2-D")):
+                                ({"points": points, "simplices": np.zeros((1, 4), int)}, "4 vertices in 2-D"),
+                                ({"points": points, "simplices": [[0, 1, 3]]},
+                                 "simplices[0] has 3; expected a vertex from 0, below 3"),
+                                ({"points": points, "simplices": [[0, 1, 2], [0, -1, 2]]}, "simplices[1] has -1"),
+                                ({"points": points, "simplices": [[0.0, 1.0, 2.5]]}, "simplices is of float64"),
+                                ({"points": [[0, 0], [0, np.nan], [1, 1]], "simplices": [[0, 1, 2]]},
+                                 "points[1] has nan; expected a finite number"),
+                                ({**square(), "weights": [1, np.inf, 1]}, "weights[1] has inf"),
+                                ({**square(), "weights": [1, 1]}, "weights has the shape (2,); expected (3,)"),
+                                ({**square(), "facets": [[0, 7]], "facet_tags": [1]}, "facets[0] has 7"),
+                                ({**square(), "facets": [[0, 1]], "facet_tags": [1, 2]}, "facet_tags has the shape"),
+                                ({**square(), "facets": [[0, 1]], "facet_tags": [2], "facet_names": ["a"],
+                                  "facet_name_tags": [1]}, "facet_tags[0] has 2; expected a tag that has a name"),
+                                ({**square(), "vertex_tags": [0, 9, 0], "facet_names": ["a"], "facet_name_tags": [1]},
+                                 "vertex_tags[1] has 9"),
+                                ({**square(), "vertex_origins": [0, 1, -4]}, "vertex_origins[2] has -4"),
+                                ({**square(), "regions": [3], "region_ids": [1], "region_names": ["a"]},
+                                 "regions[0] has 3"),
+                                ({**square(), "regions": [1, 1]}, "regions has the shape (2,)"),
+                                ({**square(), "region_ids": [1], "region_names": ["a", "b"]}, "region_ids has")):
             np.savez(path, **arrays)
             with self.fails(InvalidArgumentError, message, field="path"):
                 wellspace.Mesh.load(path)

@@ -1,6 +1,7 @@
 """Calls that are given up: by Ctrl-C, a token or a timeout. The server stops working for them."""
 
 import _thread
+import math
 import threading
 import time
 import unittest
@@ -88,6 +89,38 @@ class InterruptionTest(Case):
             after = session.info()
             self.assertEqual((after.state, after.revision), ("ready", before.revision))
             self.assertEqual(after.parameters, before.parameters)
+
+    def test_the_next_call_after_ctrl_c(self):
+        """What was given up has ended when the call has: the session is not busy."""
+        with wellspace.Session(3, server=self.client, box=unit_box(3)) as session:
+            session.upload(uniform(10, 3))
+            session.refine()
+            for _ in range(4):
+                with self.assertRaises(KeyboardInterrupt):
+                    session.refine(size=0.004, progress=self.once(_thread.interrupt_main))
+                session.refine(size=math.inf)
+                token = CancelToken()
+                with self.fails(CancelledError):
+                    session.refine(size=0.004, progress=self.once(token.cancel), cancel=token)
+                session.upload(uniform(1, 3), offset=0)
+            self.assertEqual(session.info().state, "ready")
+
+    def test_ctrl_c_before_the_start_is_answered(self):
+        """The work that the lost call has started is found, and ended."""
+        with wellspace.Session(3, server=self.client, box=unit_box(3)) as session:
+            session.upload(uniform(10, 3))
+            start = session._start
+
+            def interrupted(request, options):
+                session._start = start
+                start(request, options)
+                raise KeyboardInterrupt
+
+            session._start = interrupted
+            with self.assertRaises(KeyboardInterrupt):
+                session.refine(size=0.004)
+            self.assertEqual(session.watch().state, "cancelled")
+            session.refine()
 
     def test_a_timeout_leaves_the_work_alone(self):
         with wellspace.Session(3, server=self.client, box=unit_box(3)) as session:

@@ -44,6 +44,8 @@ class LocateTest(Case):
             np.testing.assert_allclose(found[:-1], 1)
             with self.fails(InvalidArgumentError, "values"):
                 located.interpolate([1, 2])
+            with self.fails(InvalidArgumentError, f"each of the {len(mesh.points)} vertices", field="values"):
+                located.interpolate(np.ones(len(mesh.points) + 1))
             self.assertEqual(session.locate(np.empty((0, 2))).vertices.shape, (0, 3))
 
     def test_the_mesh_has_to_be_there(self):
@@ -65,7 +67,19 @@ class LocateTest(Case):
             fine_points = uniform(1000, 2)
             carried = session.locate(fine_points).interpolate(values)
             self.assertLess(np.abs(carried - np.sin(fine_points[:, 0])).max(), 0.01)
+            # A larger mesh has a value for each vertex that is named, and they are those of other vertices.
+            old = session.locate(fine_points)
             session.refine(size=0.02)
+            finer = session.download()
+            self.assertGreater(len(finer.points), len(coarse.points))
+            with self.fails(InvalidArgumentError, f"each of the {len(coarse.points)} vertices", field="values"):
+                old.interpolate(finer.points[:, 0])
+            np.testing.assert_allclose(old.interpolate(coarse.points[:, 0], revision=coarse.revision),
+                                       fine_points[:, 0], atol=1e-12)
+            with self.fails(ConflictError, f"of the mesh of revision {finer.revision}", field="revision"):
+                old.interpolate(coarse.points[:, 0], revision=finer.revision)
+            with self.fails(InvalidArgumentError, "revision is 0", field="revision"):
+                old.interpolate(coarse.points[:, 0], revision=0)  # as that of a mesh of no session is
             self.assertGreater(session.locate([[0.5, 0.5]]).revision, coarse.revision)
 
     def test_many_points_take_little_time(self):

@@ -86,6 +86,8 @@ class MeshReceiverTest(Case):
             (3, chunk(3, "simplices", [[0, 1, 2], [0, 1, 4]]), "name vertex 4 of 4"),
             (4, chunk(4, "input_vertices", [0, 4, 1]), "name vertex 4 of 4"),
             (5, chunk(5, "facets", [[0, 1], [1, 2], [2, 9]]), "name vertex 9 of 4"),
+            (0, chunk(0, "points", [[0, 0], [0, np.nan], [0, 0], [0, 0]]), "points have the number nan"),
+            (0, chunk(0, "points", [[0, 0], [0, -np.inf], [0, 0], [0, 0]]), "points have the number -inf"),
             (0, chunk(0, "points", moved_vertices=[2, 1]), "not ascending"),
             (0, chunk(0, "points", moved_vertices=[4]), "not from 0 up to 4"),
             (0, chunk(0, "points", moved_vertices=[1, 2]), "more than the announced 1 moved"),

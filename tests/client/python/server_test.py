@@ -1,5 +1,6 @@
 """The server that a process starts for itself: it is private, shared, and gone when the process is, however it ends."""
 
+import asyncio
 import os
 import pathlib
 import signal
@@ -12,7 +13,7 @@ from unittest import mock
 from support import PATIENCE, Case, run_python, uniform
 
 import wellspace
-from wellspace import Client, CredentialsError, ServerNotInstalledError, UnavailableError, _server
+from wellspace import Client, CredentialsError, ServerNotInstalledError, UnavailableError, _server, aio
 
 # Starts a server and says where it is: its address, the process of the supervisor, and its folder.
 SHOW = """
@@ -87,6 +88,46 @@ class LocalServerTest(Case):
         self.assertFalse(first.is_running)
         wellspace.mesh(uniform(10, 2))
         self.assertNotEqual(_server.shared_server().address, first.address)
+
+    def crash(self):
+        """Kills the shared server, and does not wait for anything."""
+        server = _server.shared_server()
+        (pid,) = [pid for pid in processes_of(server._process.pid)
+                  if pathlib.Path("/proc", pid, "comm").read_text().startswith("wellspaced")]
+        os.kill(int(pid), signal.SIGKILL)
+        return server
+
+    def test_the_first_call_after_a_crash(self):
+        """It gets another server, whoever makes it: a function, or a client from before."""
+        client = Client()
+        points = uniform(10, 2)
+        for call in (lambda: wellspace.mesh(points), lambda: wellspace.estimate(points), lambda: client.mesh(points),
+                     client.info, client.sessions, lambda: wellspace.Session(2).delete(),
+                     lambda: asyncio.run(aio.mesh(points))):
+            wellspace.mesh(points)
+            first = self.crash()
+            call()
+            self.assertNotEqual(_server.shared_server().address, first.address)
+        self.assertEqual(client.info().version, wellspace.Client().info().version)
+
+    def test_a_session_ends_with_its_server(self):
+        with self.fails(UnavailableError, "has ended, and its sessions with it"):
+            with wellspace.Session(2) as session:
+                self.crash()._process.wait(PATIENCE)
+                session.info()
+
+    def test_a_crash_in_the_work_is_not_tried_again(self):
+        """The call may be what ends servers."""
+        first = []
+
+        def on_progress(progress):
+            if progress.phase == "refinement" and not first:
+                first.append(self.crash())
+
+        with self.fails(UnavailableError):
+            wellspace.mesh(uniform(10, 3), box=([0] * 3, [1] * 3), size=0.004, threads=1, progress=on_progress)
+        self.assertEqual(len(first), 1)
+        wellspace.mesh(uniform(10, 2))
 
     def test_calls_do_not_wait_for_one_that_has_crashed(self):
         with wellspace.LocalServer() as server, Client(server) as client:

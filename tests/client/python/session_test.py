@@ -1,6 +1,7 @@
 """The life of a session: what is uploaded, refined, added, asked and downloaded."""
 
 import datetime
+import math
 import unittest
 
 import numpy as np
@@ -83,7 +84,7 @@ class SessionTest(Case):
             parameters = session.info().parameters
             self.assertEqual((parameters["rho"], parameters["size"]), (1.5, 0.05))
             self.assertEqual(parameters["box"], ((0, 0), (1, 1)))
-            session.refine(size=0, size_boxes=[])
+            session.refine(size=math.inf, size_boxes=[])
             self.assertNotIn("size", session.info().parameters)
             self.assertNotIn("size_boxes", session.info().parameters)
 
@@ -234,6 +235,47 @@ class SessionTest(Case):
             with self.fails(InvalidArgumentError, "1 vertices for 2 points", field="near"):
                 session.add([[0.5, 0.5], [0.6, 0.6]], near=[0])
             self.assertEqual(len(session.add(np.empty((0, 2)))), 0)
+
+
+class ZeroTest(Case):
+    """A 0 does not stand for a number that is not given."""
+
+    def test_parameters(self):
+        for name in ("rho", "size", "edge_length", "gradation", "max_vertices", "threads"):
+            field = "parameters." + ("max_circumradius" if name == "size" else name)
+            with self.subTest(name), self.fails(InvalidArgumentError, "0 is not allowed; expected", field=field):
+                wellspace.mesh(uniform(10, 2), **{name: 0})
+        self.assertEqual(len(wellspace.mesh(uniform(10, 2), margin=0, merge_distance=0).points[0]), 2)
+        same = wellspace.mesh(uniform(10, 2), size=math.inf, edge_length=math.inf)
+        np.testing.assert_array_equal(same.points, wellspace.mesh(uniform(10, 2)).points)
+
+    def test_revisions(self):
+        loose = wellspace.mesh(uniform(10, 2))  # of no session: its revision is 0
+        with wellspace.Session(2, box=unit_box(2)) as session:
+            session.upload(uniform(10, 2))
+            session.refine()
+            mesh = session.download()
+            for call in (
+                lambda: session.sizes(np.ones(len(mesh.points)), mesh_revision=loose.revision),
+                lambda: session.download(revision=loose.revision),
+                lambda: session.locate([[0.5, 0.5]], revision=loose.revision),
+                lambda: session.upload(uniform(1, 2), expected_revision=0),
+                lambda: session.add([[0.5, 0.5]], expected_revision=0),
+                lambda: session.remove([0], expected_revision=0),
+                lambda: session.refine(expected_revision=0),
+                lambda: session.update(ttl=100, expected_revision=0),
+                lambda: session.delete(expected_revision=0),
+                lambda: session.sizes([], expected_revision=0),
+            ):
+                with self.fails(InvalidArgumentError, "revision is 0; expected a revision, which is at least 1"):
+                    call()
+            self.assertEqual(session.info().revision, mesh.revision)
+
+    def test_more_points_than_a_request_has(self):
+        with wellspace.Session(2, box=unit_box(2)) as session:
+            session.refine()
+            with self.fails(InvalidArgumentError, "300000 take 4800005 bytes in one request", field="points"):
+                session.add(np.full((300_000, 2), 0.5))
 
 
 if __name__ == "__main__":

@@ -71,6 +71,8 @@ class WireTest(unittest.TestCase):
             _wire.packed_varints(read(b"\x22\x01\x80")[0])
         with self.assertRaisesRegex(DamagedAnswerError, "above 2\\^32"):
             _wire.packed_varints(read(b"\x22\x06\x80\x80\x80\x80\x80\x01")[0])
+        with self.assertRaisesRegex(DamagedAnswerError, "above 2\\^32"):
+            _wire.packed_varints(read(b"\x20" + b"\xff" * 9 + b"\x01")[0])
 
 
 if __name__ == "__main__":

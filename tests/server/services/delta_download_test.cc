@@ -53,7 +53,9 @@ class DeltaDownloadTest : public ::testing::Test {
     v1::DownloadMeshRequest request;
     request.set_name(name);
     request.set_since_revision(since);
-    request.set_revision(revision);
+    if (revision != 0) {
+      request.set_revision(revision);
+    }
     request.set_next_chunk(next_chunk);
     request.set_with_boundary(with_boundary);
     return calls_->DownloadMesh(request);

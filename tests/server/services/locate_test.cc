@@ -59,6 +59,7 @@ TEST_F(LocateTest, PlacesAddUpToThePoints) {
   const grpc::Status status = Locate(At(name, points));
   ASSERT_TRUE(status.ok()) << status.error_message();
   EXPECT_EQ(response_.revision(), mesh.metadata.at(0).revision());
+  EXPECT_EQ(response_.vertex_count(), mesh.metadata.at(0).vertex_count());
   ASSERT_EQ(response_.simplices_size(), 300);
   ASSERT_EQ(response_.vertices_size(), 900);
   ASSERT_EQ(response_.coordinates_size(), 900);
@@ -114,6 +115,8 @@ TEST_F(LocateTest, ErrorsNameThePoint) {
   v1::LocateRequest old = At(name, {0.5, 0.5});
   old.set_revision(1);
   ExpectRefused(old, grpc::StatusCode::ABORTED, "REVISION_MISMATCH", "revision is 1");
+  old.set_revision(0);
+  ExpectRefused(old, grpc::StatusCode::INVALID_ARGUMENT, "INVALID_REQUEST", "revision is 0; revisions begin with 1");
   ExpectRefused(At(name, std::vector<double>(2 * 32'769, 0.5)), grpc::StatusCode::INVALID_ARGUMENT, "INVALID_REQUEST",
                 "at most 32768");
   EXPECT_TRUE(Locate(At(name, {})).ok());

@@ -53,7 +53,9 @@ class RemovePointsTest : public ::testing::TestWithParam<bool> {
     request.set_name(name);
     request.mutable_points()->Assign(points.begin(), points.end());
     request.set_request_id(request_id);
-    request.set_expected_revision(expected_revision);
+    if (expected_revision != 0) {
+      request.set_expected_revision(expected_revision);
+    }
     return calls().RemovePoints(request, status);
   }
 

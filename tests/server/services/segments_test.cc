@@ -231,7 +231,7 @@ TEST_F(SegmentsTest, WhatIsNotValidIsRefusedAsAWhole) {
   ExpectRefused(bad, grpc::StatusCode::INVALID_ARGUMENT, "INVALID_SEGMENTS", "faces.seeds");
   EXPECT_THAT(status_.error_message(), HasSubstr("seeds[1]"));
   bad = FrameRequest(name);
-  bad.mutable_faces()->mutable_seeds(0)->set_max_area(-1);
+  bad.mutable_faces()->mutable_seeds(0)->set_max_area(0);
   ExpectRefused(bad, grpc::StatusCode::INVALID_ARGUMENT, "INVALID_SEGMENTS", "faces.seeds");
   EXPECT_EQ(calls_.Get(name).segment_count(), 0u);
 

@@ -182,7 +182,7 @@ TEST_F(SessionServiceTest, ListsPageByPage) {
   } while (!request.page_token().empty());
   EXPECT_EQ(listed, created);
 
-  request.set_page_size(0);
+  request.clear_page_size();
   (*request.mutable_labels())["parity"] = "odd";
   EXPECT_EQ(calls_.List(request).sessions_size(), 3);
   request.set_page_token(second_page);
@@ -192,9 +192,11 @@ TEST_F(SessionServiceTest, ListsPageByPage) {
   calls_.List(request, &status_);
   ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_REQUEST", "page_token");
   request.clear_page_token();
-  request.set_page_size(-1);
-  calls_.List(request, &status_);
-  ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_REQUEST", "page_size");
+  for (const int size : {0, -1}) {
+    request.set_page_size(size);
+    calls_.List(request, &status_);
+    ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_REQUEST", "page_size");
+  }
 }
 
 TEST_F(SessionServiceTest, APageHasNoMoreThanAMessageMay) {
@@ -274,6 +276,62 @@ TEST_F(SessionServiceTest, ACallForAnotherRevisionChangesNothing) {
   EXPECT_EQ(calls_.Upload({upload, UploadRequest("", 3, {0.6, 0.5})}).revision(), 4u);
   erase.set_expected_revision(4);
   calls_.Delete(erase);
+}
+
+// No revision is 0: it would stand for any.
+TEST_F(SessionServiceTest, ACallForRevisionZeroIsRefused) {
+  const std::string name = calls_.Create(2).name();
+  calls_.Upload(name, 0, {0.25, 0.25, 0.75, 0.75});
+  calls_.Refine(name);
+  const auto expect_refused = [this](const grpc::Status& status, const std::string& field) {
+    status_ = status;
+    ExpectError(grpc::StatusCode::INVALID_ARGUMENT, "INVALID_REQUEST", field);
+    EXPECT_THAT(status.error_message(), ::testing::HasSubstr("is 0; revisions begin with 1")) << field;
+  };
+  const auto refused = [&](auto request, auto call, const std::string& field = "expected_revision") {
+    grpc::Status status;
+    call(request, &status);
+    expect_refused(status, field);
+  };
+  const auto at_zero = [&name](auto request) {
+    request.set_name(name);
+    request.set_expected_revision(0);
+    return request;
+  };
+  v1::UpdateSessionRequest update;
+  update.mutable_session()->set_name(name);
+  update.set_expected_revision(0);
+  refused(update, [this](const auto& request, grpc::Status* status) { calls_.Update(request, status); });
+  refused(at_zero(v1::DeleteSessionRequest()),
+          [this](const auto& request, grpc::Status* status) { calls_.Delete(request, status); });
+  refused(at_zero(v1::RemovePointsRequest()),
+          [this](const auto& request, grpc::Status* status) { calls_.RemovePoints(request, status); });
+  refused(at_zero(v1::StartRefinementRequest()),
+          [this](const auto& request, grpc::Status* status) { calls_.Start(request, status); });
+  refused(at_zero(v1::UploadPointsRequest()),
+          [this](const auto& request, grpc::Status* status) { calls_.Upload({request}, status); });
+  refused(at_zero(v1::AddSegmentsRequest()),
+          [this](const auto& request, grpc::Status* status) { calls_.AddSegments({request}, status); });
+  const auto set_sizes = [this](const auto& request, grpc::Status* status) { calls_.SetSizes({request}, status); };
+  refused(at_zero(v1::SetSizesRequest()), set_sizes);
+  v1::SetSizesRequest sizes;
+  sizes.set_name(name);
+  sizes.mutable_vertex_sizes()->set_mesh_revision(0);
+  refused(sizes, set_sizes, "vertex_sizes.mesh_revision");
+  const auto add = [this](const auto& request, grpc::Status* status) {
+    grpc::ClientContext context;
+    v1::AddVerticesResponse response;
+    *status = calls_.queries().AddVertices(&context, request, &response);
+  };
+  refused(at_zero(v1::AddVerticesRequest()), add);
+  v1::DownloadMeshRequest download;
+  download.set_name(name);
+  download.set_revision(0);
+  expect_refused(calls_.DownloadMesh(download).status, "revision");
+  download.clear_revision();
+  download.set_since_revision(0);
+  expect_refused(calls_.DownloadMesh(download).status, "since_revision");
+  EXPECT_EQ(calls_.Get(name).committed_points(), 2u);
 }
 
 // "Sessions leaked by clients that died".

@@ -26,7 +26,9 @@ v1::FaceOptions Faces(v1::FaceRule rule, const std::vector<double>& seeds = {}, 
     v1::FaceSeed& seed = *options.add_seeds();
     seed.set_x(seeds[i]);
     seed.set_y(seeds[i + 1]);
-    seed.set_max_area(max_area);
+    if (max_area > 0) {
+      seed.set_max_area(max_area);
+    }
   }
   return options;
 }

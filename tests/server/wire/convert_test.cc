@@ -101,6 +101,27 @@ TEST(ParametersFromProto, TakesEveryField) {
   EXPECT_TRUE(parameters->keep_vertices);
 }
 
+// What is not sent is the default; what a session says of itself can be sent as it is.
+TEST(ParametersFromProto, TellsAZeroFromNothing) {
+  v1::MeshParameters message = UnitCubeParameters();
+  message.set_gradation(0);
+  EXPECT_EQ(ParametersFromProto(message, SmallLimits()).status().message(),
+            "gradation: 0 is not allowed; expected a number above 0 and at most 1, or nothing for the default");
+  // An older client, which sends no 0, and an empty field on the wire are the same.
+  v1::MeshParameters older = UnitCubeParameters();
+  ASSERT_TRUE(older.ParseFromString(UnitCubeParameters().SerializeAsString()));
+  EXPECT_FALSE(older.has_gradation() || older.has_rho() || older.has_max_vertices() || older.has_threads());
+  const absl::StatusOr<core::MeshParameters> parameters = ParametersFromProto(older, SmallLimits());
+  ASSERT_TRUE(parameters.ok()) << parameters.status();
+  const v1::MeshParameters told = ParametersToProto(*parameters);
+  EXPECT_FALSE(told.has_max_circumradius() || told.has_edge_length() || told.has_gradation());
+  EXPECT_TRUE(ParametersFromProto(told, SmallLimits()).ok());
+  // Equal points alone: here 0 is a value.
+  message.clear_gradation();
+  message.set_merge_distance(0);
+  EXPECT_TRUE(ParametersFromProto(message, SmallLimits()).ok());
+}
+
 TEST(ParametersFromProto, EveryDimensionHasItsDefaults) {
   for (int dimension = core::kMinDimension; dimension <= core::kMaxDimension; ++dimension) {
     v1::MeshParameters message = UnitCubeParameters(dimension);
@@ -150,6 +171,12 @@ INSTANTIATE_TEST_SUITE_P(
         BadParameters{"DimensionOne", "parameters.dimension", [](auto& p) { p.set_dimension(1); }},
         BadParameters{"DimensionNegative", "parameters.dimension", [](auto& p) { p.set_dimension(-3); }},
         BadParameters{"DimensionHuge", "parameters.dimension", [](auto& p) { p.set_dimension(1 << 30); }},
+        BadParameters{"RhoZero", "parameters.rho", [](auto& p) { p.set_rho(0); }},
+        BadParameters{"MaxVerticesZero", "parameters.max_vertices", [](auto& p) { p.set_max_vertices(0); }},
+        BadParameters{"ThreadsZero", "parameters.threads", [](auto& p) { p.set_threads(0); }},
+        BadParameters{"CircumradiusZero", "parameters.max_circumradius", [](auto& p) { p.set_max_circumradius(0); }},
+        BadParameters{"EdgeLengthZero", "parameters.edge_length", [](auto& p) { p.set_edge_length(0); }},
+        BadParameters{"GradationZero", "parameters.gradation", [](auto& p) { p.set_gradation(-0.0); }},
         BadParameters{"RhoSmall", "parameters.rho", [](auto& p) { p.set_rho(0.5); }},
         BadParameters{"RhoNegative", "parameters.rho", [](auto& p) { p.set_rho(-2); }},
         BadParameters{"RhoNan", "parameters.rho", [](auto& p) { p.set_rho(std::nan("")); }},

@@ -107,6 +107,18 @@ def count(value: Any, name: str, most: int = 2**63 - 1) -> int:
     return int(value)
 
 
+def revision_of(value: Any, name: str) -> int | None:
+    """`value` as a revision, of which 1 is the first; None for none."""
+    if value is None:
+        return None
+    if count(value, name, 2**64 - 1) == 0:
+        raise InvalidArgumentError(
+            f"{name} is 0; expected a revision, which is at least 1 (a mesh of no session has none), or None for any",
+            field=name,
+        )
+    return int(value)
+
+
 def choice(value: Any, name: str, choices: dict[str, int]) -> int:
     """The number of `value` among `choices`."""
     if value not in choices:

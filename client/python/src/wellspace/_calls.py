@@ -13,7 +13,7 @@ import grpc
 
 from . import _api
 from ._channel import Credentials
-from ._retry import Attempt, CancelToken, Retrier, RetryPolicy, now
+from ._retry import Attempt, CancelToken, Retrier, now
 from .errors import CredentialsError, DamagedAnswerError, Error, UnavailableError, from_status
 
 T = TypeVar("T")
@@ -26,34 +26,64 @@ class CallOptions:
     timeout: float | None = None  # seconds for all attempts together
     cancel: CancelToken | None = None
     request_id: str = ""
-    expected_revision: int = 0
 
     def id_or_new(self) -> str:
         """One for a call that changes something, so that what is repeated after a lost connection is done once."""
         return self.request_id or uuid.uuid4().hex
 
 
-class Calls:
-    """Makes calls on a channel. Thread-safe."""
+@dataclasses.dataclass(frozen=True)
+class Link:
+    """The way to a server."""
 
-    def __init__(
-        self, channel: grpc.Channel, credentials: Credentials, policy: RetryPolicy, is_gone: Callable[[], bool]
-    ) -> None:
-        """`is_gone` says whether the server will never answer again."""
-        self._is_gone = is_gone
-        self._channel = channel
-        self._credentials = credentials
-        self._retrier = Retrier(policy)
+    channel: grpc.Channel
+    credentials: Credentials
+    is_gone: Callable[[float], bool]  # whether the server will never answer again, as is known within so many seconds
+
+
+# A connection that broke off may be the first sign of the end of a server of this process; its exit code is the next.
+_SECONDS_TO_KNOW = 1.0
+
+
+class Calls:
+    """Makes calls to a server. Thread-safe."""
+
+    def __init__(self, link: Link, retrier: Retrier, renew: Callable[[Link], Link] | None = None) -> None:
+        """`renew` gets another server in the place of that of a link which is gone."""
+        self._link = link
+        self._renew = renew
+        self._retrier = retrier
+
+    def to_this_server(self) -> Calls:
+        """The same, to no other server: for what ends with it."""
+        return Calls(self._link, self._retrier)
 
     def run(self, options: CallOptions, make: Callable[[Attempt], T]) -> T:
-        """Runs attempts until one succeeds."""
+        """Runs attempts until one succeeds.
+
+        Where the server is gone, and another can be had, that one is asked, unless the work has begun: once, as it may
+        be the call that ends servers.
+        """
         deadline = math.inf if options.timeout is None else now() + options.timeout
+        link = self._link
+        if link.is_gone(0.0):
+            if self._renew is None:
+                raise UnavailableError("the server that this process started has ended, and its sessions with it")
+            self._link = self._renew(link)
+        has_renewed = False
 
         def make_unless_gone(attempt: Attempt) -> T:
+            nonlocal has_renewed
+            used = self._link
             try:
                 return make(attempt)
             except UnavailableError:
-                attempt.is_final = attempt.is_final or self._is_gone()
+                if attempt.is_final or not used.is_gone(_SECONDS_TO_KNOW):
+                    raise
+                attempt.is_final = self._renew is None or has_renewed
+                if self._renew is not None and not has_renewed:
+                    has_renewed = True
+                    self._link = self._renew(used)
                 raise
 
         return self._retrier.run(deadline, options.cancel or CancelToken(), make_unless_gone)
@@ -67,28 +97,29 @@ class Calls:
         """The same with serialized messages."""
 
         def attempt_once(attempt: Attempt) -> bytes:
-            call = self._channel.unary_unary(_path(method)).future(request, **self._context(attempt))
+            call = self._link.channel.unary_unary(_path(method)).future(request, **self._context(attempt))
             return self._result(call, attempt)
 
         return self.run(options, attempt_once)
 
     def attempt_unary(self, method: str, request: Any, response: str, attempt: Attempt) -> Any:
         """One attempt at such a call."""
-        call = self._channel.unary_unary(_path(method)).future(request.SerializeToString(), **self._context(attempt))
+        unary = self._link.channel.unary_unary(_path(method))
+        call = unary.future(request.SerializeToString(), **self._context(attempt))
         return parse(response, self._result(call, attempt))
 
     def attempt_upload(self, method: str, requests: Iterable[bytes], response: str, attempt: Attempt) -> Any:
         """One attempt at a call with a stream of requests and one answer."""
-        call = self._channel.stream_unary(_path(method)).future(iter(requests), **self._context(attempt))
+        call = self._link.channel.stream_unary(_path(method)).future(iter(requests), **self._context(attempt))
         return parse(response, self._result(call, attempt))
 
     @contextlib.contextmanager
     def stream(self, method: str, requests: bytes | Iterable[bytes], attempt: Attempt) -> Iterator[Iterator[bytes]]:
         """One attempt at a call with a stream of answers, which ends with the block."""
         if isinstance(requests, bytes):
-            call = self._channel.unary_stream(_path(method))(requests, **self._context(attempt))
+            call = self._link.channel.unary_stream(_path(method))(requests, **self._context(attempt))
         else:
-            call = self._channel.stream_stream(_path(method))(iter(requests), **self._context(attempt))
+            call = self._link.channel.stream_stream(_path(method))(iter(requests), **self._context(attempt))
         with _cancelled_by(call, attempt):
             yield self._answers(call)
             call.cancel()
@@ -110,7 +141,7 @@ class Calls:
                 raise from_status("CANCELLED", "the call was cancelled", b"") from None
 
     def _context(self, attempt: Attempt) -> dict[str, Any]:
-        token = self._credentials.read_token()
+        token = self._link.credentials.read_token()
         metadata = [] if token is None else [("authorization", f"Bearer {token}")]
         return {"timeout": attempt.time_left(), "metadata": metadata}
 
@@ -150,3 +181,10 @@ def parse(name: str, serialized: bytes) -> Any:
         return _api.message(name).FromString(serialized)
     except Exception as error:  # of protobuf, which has several
         raise DamagedAnswerError("the server's answer is damaged: no message") from error
+
+
+def next_page(token: str, following: str) -> str:
+    """The token of the page after that of `token`; raises `DamagedAnswerError` for the same, which would never end."""
+    if following == token:
+        raise DamagedAnswerError("the server's answer is damaged: after a page comes the same page again")
+    return following

@@ -121,6 +121,8 @@ class CellReader:
             or sizes["neighbours"] != sums["neighbour_counts"]
         ):
             raise damaged(f"cells of {count} vertices whose counts do not add up")
+        if any(np.isnan(part).any() for name in ("nodes", "clip_radii") for part in found[name]):
+            raise damaged("a node or a radius of a cell is not a number")
         for name, parts in found.items():
             self._parts[name] += parts
         return count

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Union
 
 from . import _api, _wire
 from ._arrays import coordinates
-from ._calls import Calls, CallOptions, parse
+from ._calls import Calls, CallOptions, Link, next_page, parse
 from ._channel import Credentials, open_channel
 from ._domain import DomainArguments, make_domain
 from ._mesh import Mesh, mesh_of
@@ -17,8 +17,8 @@ from ._messages import messages_of, point_chunks, receive
 from ._parameters import Parameters, fill, helpful_threads, split, takes
 from ._progress import OnProgress, ProgressOption, progress_of, told
 from ._receiver import MeshReceiver
-from ._retry import Attempt, CancelToken, RetryPolicy
-from ._server import LocalServer, shared_server
+from ._retry import Attempt, CancelToken, Retrier, RetryPolicy
+from ._server import LocalServer, is_shared, shared_server
 from ._session_info import SessionInfo, info_of_session
 from ._sizes import SizeArguments, make_size_field
 from .errors import InvalidArgumentError
@@ -60,15 +60,28 @@ class Client:
     ) -> None:
         if server is None and "WELLSPACE_SERVER" not in os.environ:
             server = shared_server()
-        self.address, self._credentials = _address_of(server, credentials)
-        self._channel = open_channel(self.address, self._credentials)
+        self._lock = threading.Lock()
+        self._own = server if isinstance(server, LocalServer) else None
+        link = self._open(server, credentials)
+        renews = self._own is not None and is_shared(self._own)
+        self._calls = Calls(link, Retrier(retry or RetryPolicy()), self._renew if renews else None)
+
+    def _open(self, server: str | LocalServer | None, credentials: Credentials | None) -> Link:
+        self.address, shown = _address_of(server, credentials)
+        self._channel = open_channel(self.address, shown)
         own = server if isinstance(server, LocalServer) else None
-        self._calls = Calls(
-            self._channel,
-            self._credentials,
-            retry or RetryPolicy(),
-            is_gone=lambda: own is not None and not own.is_running,
-        )
+        return Link(self._channel, shown, lambda within: own is not None and own.has_ended(within))
+
+    def _renew(self, gone: Link) -> Link:
+        """The way to the server that is started in the place of this process's own one, which has ended."""
+        with self._lock:
+            if self._calls._link is not gone:
+                return self._calls._link  # another call was faster
+            self._own = shared_server()
+            self._own.client = self._own.client or self
+            link = self._open(self._own, None)
+            self._calls._link = link
+            return link
 
     def close(self) -> None:
         """Closes the connection; calls that are under way end with `CancelledError`."""
@@ -164,7 +177,7 @@ class Client:
             found += [info_of_session(session) for session in page.sessions]
             if not page.next_page_token:
                 return found
-            request.page_token = page.next_page_token
+            request.page_token = next_page(request.page_token, page.next_page_token)
 
 
 # What the functions of the package take for a server.

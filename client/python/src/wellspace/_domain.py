@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any, TypedDict
 
@@ -33,13 +34,13 @@ class RegionSeed:
         The region of the triangles there, see `Mesh.regions`: the name is ``"region_7"`` for 7. 0: that of faces
         without a seed.
     max_area : float
-        No triangle there is larger. In the unit of the points, squared; 0: no bound.
+        No triangle there is larger. Above 0, in the unit of the points, squared. Default: no bound.
     """
 
     x: float
     y: float
     region: int = 0
-    max_area: float = 0.0
+    max_area: float = math.inf
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,7 +62,7 @@ class RegionPolygon:
     first: int
     count: int
     region: int = 0
-    max_area: float = 0.0
+    max_area: float = math.inf
 
 
 @dataclasses.dataclass(frozen=True)
@@ -91,7 +92,8 @@ class Domain:
         seed = _api.message("FaceSeed")
         seeds = [seed(x=x, y=y, hole=True) for x, y in self.holes.tolist()]
         for r in self.regions:
-            seeds.append(seed(region=r.region, max_area=r.max_area))
+            bound = {} if math.isinf(r.max_area) else {"max_area": r.max_area}
+            seeds.append(seed(region=r.region, **bound))
             if isinstance(r, RegionSeed):
                 seeds[-1].x, seeds[-1].y = r.x, r.y
             else:
@@ -165,11 +167,20 @@ def _whole(value: Any, name: str, what: str, low: int, high: int) -> int:
     return int(value)
 
 
+def _area(value: Any, name: str) -> float:
+    """A largest area; infinite for none."""
+    if not number(value, name) > 0:
+        raise InvalidArgumentError(
+            f"{name} has the max_area {value!r}; expected a number above 0, or nothing for no bound", field=name
+        )
+    return number(value, name)
+
+
 def _polygon(given: RegionPolygon, name: str, segments: int) -> RegionPolygon:
     first = _whole(given.first, name, "first segment", 0, max(segments, 1))
     count = _whole(given.count, name, "count of segments", 1, max(segments - first + 1, 2))
     region = _whole(given.region, name, "region", -(2**31), 2**31)
-    return RegionPolygon(first, count, region, number(given.max_area, name))
+    return RegionPolygon(first, count, region, _area(given.max_area, name))
 
 
 def _seed(value: Any, name: str, segments: int) -> RegionSeed | RegionPolygon:
@@ -181,6 +192,6 @@ def _seed(value: Any, name: str, segments: int) -> RegionSeed | RegionPolygon:
     row = list(value) if isinstance(value, (tuple, list, np.ndarray)) else []
     if not 2 <= len(row) <= 4:
         raise InvalidArgumentError(f"{name} is {value!r}; expected (x, y, region, max_area)", field=name)
-    x, y, region, max_area = (*row, 0, 0.0)[:4] if len(row) < 3 else (*row, 0.0)[:4]
+    x, y, region, max_area = (*row, 0, math.inf)[:4] if len(row) < 3 else (*row, math.inf)[:4]
     place = coordinates([[x, y]], name, 2)[0].tolist()
-    return RegionSeed(place[0], place[1], _whole(region, name, "region", -(2**31), 2**31), number(max_area, name))
+    return RegionSeed(place[0], place[1], _whole(region, name, "region", -(2**31), 2**31), _area(max_area, name))

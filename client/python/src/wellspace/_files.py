@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 # By the dimension: the simplices and the facets of meshio.
 _CELLS = {2: ("triangle", "line"), 3: ("tetra", "triangle")}
 _VTK_TRIANGLE, _VTK_TETRA = 5, 10
+# The arrays of a file that are not of whole numbers.
+_REALS = {"points", "weights"}
 
 
 def save(mesh: Mesh, path: str | os.PathLike[str], options: dict[str, Any]) -> None:
@@ -74,13 +76,7 @@ def load(path: str | os.PathLike[str]) -> dict[str, Any]:
             found = {name: archive[name] for name in archive.files}
     except (zipfile.BadZipFile, ValueError, AttributeError) as error:
         raise InvalidArgumentError(f"{path}: expected .npz, with arrays of numbers: {error}", field="path") from error
-    for name in ("points", "simplices"):
-        if name not in found or found[name].ndim != 2:
-            raise InvalidArgumentError(f"{path}: no array {name!r} of two dimensions", field="path")
-    points, simplices = found["points"], found["simplices"]
-    if simplices.shape[1] != points.shape[1] + 1:
-        what = f"simplices of {simplices.shape[1]} vertices in {points.shape[1]}-D"
-        raise InvalidArgumentError(f"{path}: {what}", field="path")
+    points, simplices = _checked(found, path)
     d, kind = points.shape[1], np.int32 if len(points) <= 2**31 else np.int64
     none = np.empty(0, np.int32)
     if len(points):
@@ -105,6 +101,54 @@ def load(path: str | os.PathLike[str]) -> dict[str, Any]:
         "moved_vertices": none,
         "box": box,
     }
+
+
+def _checked(found: dict[str, Any], path: Any) -> tuple[Any, Any]:
+    """The points and simplices of a file whose arrays fit each other: none names a vertex or a part that is not there.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It names the array, the row and its value.
+    """
+
+    def wrong(what: str) -> InvalidArgumentError:
+        return InvalidArgumentError(f"{path}: {what}", field="path")
+
+    for name in ("points", "simplices"):
+        if name not in found or found[name].ndim != 2:
+            raise wrong(f"no array {name!r} of two dimensions")
+    points, simplices = found["points"], found["simplices"]
+    n, d = points.shape
+    if d < 1 or simplices.shape[1] != d + 1:
+        raise wrong(f"simplices of {simplices.shape[1]} vertices in {d}-D")
+    m, f = len(simplices), len(found.get("facets", ()))
+    shapes = {"points": (n, d), "weights": (n,), "simplices": (m, d + 1), "facets": (f, d), "facet_tags": (f,),
+              "vertex_origins": (n,), "vertex_tags": (n,), "regions": (m,),
+              "facet_name_tags": (len(found.get("facet_names", ())),),
+              "region_ids": (len(found.get("region_names", ())),)}
+    for name, shape in shapes.items():
+        array = found.get(name, np.empty(shape, np.float64 if name in _REALS else np.int32))
+        if array.shape != shape:
+            raise wrong(f"{name} has the shape {array.shape}; expected {shape}")
+        if array.size and array.dtype.kind not in ("fiu" if name in _REALS else "iu"):
+            raise wrong(f"{name} is of {array.dtype}; expected {'numbers' if name in _REALS else 'whole numbers'}")
+        bad = ~np.isfinite(array) if name in _REALS else np.zeros(shape, bool)
+        expected = "a finite number"
+        if name in ("simplices", "facets"):
+            bad, expected = (array < 0) | (array >= n), f"a vertex from 0, below {n}"
+        elif name == "facet_tags" and "facet_name_tags" in found:
+            bad, expected = ~np.isin(array, found["facet_name_tags"]), "a tag that has a name"
+        elif name == "vertex_tags" and "facet_name_tags" in found:
+            bad, expected = ~np.isin(array, [0, *found["facet_name_tags"]]), "0, or a tag that has a name"
+        elif name == "regions" and "region_ids" in found:
+            bad, expected = ~np.isin(array, found["region_ids"]), "a region that has a name"
+        elif name == "vertex_origins":
+            bad, expected = array < -3, "the number of a point, or -1, -2 or -3"
+        if bad.any():
+            place = tuple(np.argwhere(bad)[0].tolist())
+            raise wrong(f"{name}[{place[0]}] has {array[place]}; expected {expected}")
+    return points, simplices
 
 
 def _region_name(number: int) -> str:

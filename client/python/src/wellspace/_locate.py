@@ -10,12 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _api, _wire
-from ._arrays import Floats
+from ._arrays import Floats, revision_of
 from ._calls import Calls, CallOptions
 from ._mesh import signed
 from ._receiver import damaged
 from ._retry import now
-from .errors import InvalidArgumentError
+from .errors import ConflictError, InvalidArgumentError
 
 _POINTS_OF_A_REQUEST = 1 << 14
 _NONE = 2**32 - 1
@@ -37,22 +37,42 @@ class Located:
         facet opposite to the vertex. All 0 for a point in none.
     revision : int
         Of the mesh.
+    vertex_count : int
+        Vertices of the mesh.
     """
 
     simplices: npt.NDArray[Any]
     vertices: npt.NDArray[Any]
     coordinates: Floats
     revision: int
+    vertex_count: int
 
-    def interpolate(self, values: Any) -> npt.NDArray[Any]:
+    def interpolate(self, values: Any, *, revision: int | None = None) -> npt.NDArray[Any]:
         """A function with `values`, (vertices, …), at the vertices, and linear between them, at the points: (n, …).
 
         NaN at points in no simplex.
+
+        Parameters
+        ----------
+        values : (vertices, …)
+            A row for each vertex of the mesh that the points were located in.
+        revision : int
+            `Mesh.revision` of the mesh that has these values; `ConflictError` is raised if that is another mesh.
+            Default: not checked.
         """
+        wanted = revision_of(revision, "revision")
+        if wanted is not None and wanted != self.revision:
+            raise ConflictError(
+                f"the values are of the mesh of revision {wanted}, and the points were located in that of revision "
+                f"{self.revision}; locate them anew",
+                field="revision",
+            )
         given = np.asarray(values)
-        if given.ndim == 0 or self.vertices.max(initial=-1) >= len(given):
+        if given.ndim == 0 or len(given) != self.vertex_count:
             raise InvalidArgumentError(
-                f"values: an array of shape {given.shape}; expected a row for each vertex of the mesh", field="values"
+                f"values: an array of shape {given.shape}; expected a row for each of the {self.vertex_count} vertices "
+                f"of the mesh of revision {self.revision}, which the points were located in",
+                field="values",
             )
         found = np.einsum("nk,nk...->n...", self.coordinates, given[self.vertices])
         outside = self.simplices < 0
@@ -62,7 +82,7 @@ class Located:
 
 
 def locate(
-    calls: Calls, session: str, cloud: Floats, revision: int, allow_outside: bool, options: CallOptions
+    calls: Calls, session: str, cloud: Floats, revision: int | None, allow_outside: bool, options: CallOptions
 ) -> Located:
     """Locates points, some in each call, all in one mesh."""
     rows, dimension = cloud.shape
@@ -86,6 +106,25 @@ def locate(
             if found.size != target[part].size:
                 raise damaged(f"{found.size} numbers in field {number} for {part.stop - begin} points")
             target[part] = found.reshape(target[part].shape)
-        head.revision = fields[4].value if 4 in fields else 0  # all parts are of one mesh
+        found_revision, vertex_count = (int(fields[number].value) if number in fields else 0 for number in (4, 5))
+        if not found_revision or (head.HasField("revision") and found_revision != head.revision):
+            raise damaged(f"points in the mesh of revision {found_revision}, not {head.revision}")
+        _check(simplices[part], vertices[part], coordinates[part], vertex_count, allow_outside)
+        head.revision = found_revision  # all parts are of one mesh
     simplices[simplices == _NONE] = -1
-    return Located(simplices, signed(vertices, int(vertices.max(initial=0)) + 1), coordinates, head.revision)
+    return Located(simplices, signed(vertices, vertex_count), coordinates, head.revision, vertex_count)
+
+
+def _check(
+    simplices: npt.NDArray[Any], vertices: npt.NDArray[Any], coordinates: Floats, count: int, allow_outside: bool
+) -> None:
+    """Whether points can lie so in a mesh of `count` vertices."""
+    inside = simplices != _NONE
+    if not (allow_outside or inside.all()):
+        raise damaged("a point in no simplex, which was not allowed")
+    if vertices[inside].max(initial=0) >= max(1, count):
+        raise damaged(f"a point at vertex {vertices[inside].max()} of {count}")
+    most = np.where(inside, 1 + 1e-9, 0.0)[:, np.newaxis]  # but for rounding
+    if not ((coordinates >= 0) & (coordinates <= most)).all():
+        raise damaged("barycentric coordinates below 0, above 1, or not numbers")
+    vertices[~inside] = 0

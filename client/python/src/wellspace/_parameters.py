@@ -34,13 +34,15 @@ class Parameters(TypedDict, total=False):
         In 2-D, in the place of `rho`: no angle of a triangle is smaller. Degrees, above 0 and up to 33.7; above 20.7
         refinement need not end.
     size : float
-        No simplex has a larger circumradius. In the unit of the points. Default: no bound.
+        No simplex has a larger circumradius. Above 0, in the unit of the points. Default: no bound, as `math.inf` says,
+        which takes back that of a session.
     size_boxes : sequence of (low, high, size)
         Boxes with `d` low and `d` high coordinates in which circumradii are smaller still; away from a box, sizes grow
         no faster than `gradation` times the distance from it. In the unit of the points. Default: none.
     edge_length : float
         Edges have this length, on average where points ask for no shorter ones: a `size` of 0.733 times as much in 2-D,
-        0.747 in 3-D. Of both, the smaller holds. In the unit of the points. Default: no bound.
+        0.747 in 3-D. Of both, the smaller holds. Above 0, in the unit of the points. Default: no bound, as `math.inf`
+        says.
     gradation : float
         How fast sizes grow with the distance from `size_boxes` and from points that have a size: above 0 and at most 1.
         Default: 1 from boxes, 0.3 from points.
@@ -100,6 +102,10 @@ _NUMBERS = {
 }
 
 
+# Of these infinity stands for none.
+_BOUNDS = {"size", "edge_length"}
+
+
 def takes(*kinds: Any) -> Callable[[Function], Function]:
     """Has the signature and the docstring of a function, which takes the keys of `kinds` as **arguments, name them."""
 
@@ -142,7 +148,11 @@ def fill(message: Any, dimension: int, given: Mapping[str, Any]) -> Any:
     message.dimension = count(dimension, "dimension", 2**31 - 1)
     for name, field in _NUMBERS.items():
         if name in given:
-            setattr(message, field, number(given[name], name))
+            value = number(given[name], name)
+            if name in _BOUNDS and value == math.inf:
+                message.ClearField(field)
+            else:
+                setattr(message, field, value)  # 0, too: the service refuses it where it can be no value
     for name in ("pump_weights", "keep_vertices"):
         if name in given:
             setattr(message, name, bool(given[name]))
@@ -222,12 +232,11 @@ def _criterion_names() -> dict[int, str]:
 
 def read(message: Any) -> dict[str, Any]:
     """A MeshParameters by the names of this package; what is not set is left out."""
-    numbers = {name: getattr(message, field) for name, field in _NUMBERS.items()}
-    found: dict[str, Any] = {name: value for name, value in numbers.items() if value}
+    found: dict[str, Any] = {}
+    for name, field in _NUMBERS.items():
+        if message.HasField(field):
+            found[name] = getattr(message, field)
     found["criterion"] = _criterion_names().get(message.criterion, "radius-edge")
-    for name in ("min_dihedral", "margin"):
-        if message.HasField(name):
-            found[name] = getattr(message, name)
     for name in ("pump_weights", "keep_vertices", "max_vertices", "threads"):
         if getattr(message, name):
             found[name] = getattr(message, name)

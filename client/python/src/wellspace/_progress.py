@@ -49,7 +49,7 @@ def progress_of(message: Any) -> Progress:
         vertices=message.vertices,
         estimated_vertices=message.estimated_vertices,
         simplices=message.simplices,
-        fraction=message.fraction,
+        fraction=min(message.fraction, 1.0) if message.fraction > 0 else 0.0,  # also for NaN
         sequence=message.sequence,
     )
 

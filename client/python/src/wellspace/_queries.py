@@ -35,13 +35,19 @@ def stream_answers(
         nonlocal answered
         part = vertices[answered : begin + _VERTICES_OF_A_REQUEST]
         end = answered + len(part)
+        if len(vertices) and not len(part):
+            return  # a request without vertices would ask about all
         request = head + _wire.packed_field(2, part)
         try:
             with calls.stream(method, request, attempt) as answers:
                 for answer in answers:
                     answered += take(answer)
                     attempt.progressed = True
-        except Error:
+                    if len(vertices) and answered > end:
+                        raise attempt.final(damaged(f"answers about more than {end} vertices"))
+        except Error as error:
+            if len(vertices) and answered == end and error.code != "DATA_LOSS":
+                return  # a connection that breaks after the last answer costs nothing
             attempt.is_final = not len(vertices) and answered > 0 and not attempt.cancel.is_cancelled
             raise
         if len(vertices) and answered != end:
@@ -58,6 +64,8 @@ def nearest_distances(calls: Calls, session: str, vertices: Indices, options: Ca
 
     def take(answer: bytes) -> int:
         found = [_wire.packed(f, "<f8") for f in _wire.fields(memoryview(answer)) if f.number == 1]
+        if any((~(part >= 0)).any() for part in found):
+            raise damaged("a distance that is negative or not a number")
         parts.extend(found)
         return sum(map(len, found))
 

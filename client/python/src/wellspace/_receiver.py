@@ -20,7 +20,7 @@ from .errors import DamagedAnswerError, LimitError
 # Vertices are numbered with 32 bits; larger counts cannot be true.
 _MAX_VERTICES = 2**32 - 1
 _MAX_SIMPLICES = 2**40
-_MAX_DIMENSION = 64
+MAX_DIMENSION = 64
 
 NO_VERTEX = 2**32 - 1
 CORNER_ORIGIN = 2**32 - 3  # the least of the numbers that are no input points
@@ -211,7 +211,7 @@ def widths_of(m: Any) -> dict[str, int]:
 def check_metadata(m: Any, dimension: int | None, input_points: int | None) -> None:
     """Whether there can be such a mesh, of what it is known to be."""
     if (
-        not 1 <= m.dimension <= _MAX_DIMENSION
+        not 1 <= m.dimension <= MAX_DIMENSION
         or dimension not in (None, m.dimension)
         or not len(m.domain.low) == len(m.domain.high) == m.dimension
     ):
@@ -225,12 +225,22 @@ def check_metadata(m: Any, dimension: int | None, input_points: int | None) -> N
                       f"{m.input_point_count} points are more than can be")
     if input_points not in (None, m.input_point_count):
         raise damaged(f"a mesh of {m.input_point_count} points; {input_points} were sent")
+    low, high = np.array(m.domain.low), np.array(m.domain.high)
+    if not (np.isfinite(low) & np.isfinite(high) & (low <= high)).all():
+        raise damaged(f"a mesh in a box from {low} to {high}")
+    for sliver in m.statistics.slivers.flattest_left:
+        if max(sliver.vertices, default=0) >= m.vertex_count:
+            raise damaged(f"a sliver names vertex {max(sliver.vertices)} of {m.vertex_count}")
     _check_names(m)
 
 
 def check_values(m: Any, name: str, values: npt.NDArray[Any]) -> None:
-    """Whether the values can be those of the array: vertices that there are, tags that were announced."""
-    if name in ("simplices", "facets"):
+    """Whether the values can be those of the array: finite, vertices that there are, tags that were announced."""
+    if name in ("points", "weights"):
+        wrong = values[~np.isfinite(values) | ((values < 0) if name == "weights" else False)]
+        if len(wrong):
+            raise damaged(f"{name} have the number {wrong[0]}")
+    elif name in ("simplices", "facets"):
         if values.max() >= m.vertex_count:
             raise damaged(f"{name} name vertex {values.max()} of {m.vertex_count}")
     elif name == "input_vertices":

@@ -79,7 +79,7 @@ class CancelToken:
             callback()
 
     def _wait(self, seconds: float) -> bool:
-        return self._event.wait(seconds)
+        return self._event.wait(min(seconds, threading.TIMEOUT_MAX))
 
     def _add(self, callback: Callable[[], object]) -> None:
         with self._lock:

@@ -111,6 +111,14 @@ class LocalServer:
         """Whether the server has neither been closed nor ended by itself."""
         return self._process.poll() is None
 
+    def has_ended(self, within: float) -> bool:
+        """Whether the server ends within so many seconds: its supervisor needs a moment after it."""
+        try:
+            self._process.wait(within)
+        except subprocess.TimeoutExpired:
+            return False
+        return True
+
     def close(self) -> None:
         """Ends the server with all that it is doing."""
         _servers.discard(self)
@@ -149,9 +157,15 @@ def shared_server() -> LocalServer:
     with _lock:
         if _shared is None or not _shared.is_running:
             if _shared is not None:
+                _shared.client = None  # calls that are under way find out by themselves, and it goes on with the next
                 _shared.close()
             _shared = LocalServer()
         return _shared
+
+
+def is_shared(server: LocalServer) -> bool:
+    """Whether it is the one of `shared_server`, in the place of which there is another once it has ended."""
+    return server is _shared
 
 
 def _end_all() -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 from . import _api
 from ._parameters import read
+from ._receiver import MAX_DIMENSION, damaged
 from .statistics import seconds_of
 
 
@@ -35,6 +36,8 @@ class SessionInfo:
         What was uploaded, duplicates included.
     size_count : int
         Sizes at points, see `Session.sizes`.
+    stored_bytes : int
+        What it counts against `ServerInfo.max_stored_bytes_per_tenant`.
     vertex_count, simplex_count : int
         Of the last mesh; 0 before the first.
     last_operation : str
@@ -54,6 +57,7 @@ class SessionInfo:
     segment_count: int
     seed_count: int
     size_count: int
+    stored_bytes: int
     vertex_count: int
     simplex_count: int
     last_operation: str
@@ -62,7 +66,14 @@ class SessionInfo:
 def info_of_session(message: Any) -> SessionInfo:
     """Of a Session."""
     def time(stamp: Any) -> datetime.datetime:
-        return datetime.datetime.fromtimestamp(seconds_of(stamp), datetime.timezone.utc)
+        try:
+            return datetime.datetime.fromtimestamp(seconds_of(stamp), datetime.timezone.utc)
+        except (OverflowError, ValueError, OSError) as error:
+            raise damaged(f"a time {stamp.seconds} seconds after 1970") from error
+
+    # Arrays are made by it. 0: not told.
+    if not 0 <= message.parameters.dimension <= MAX_DIMENSION:
+        raise damaged(f"a session in {message.parameters.dimension}-D")
 
     return SessionInfo(
         name=message.name,
@@ -78,6 +89,7 @@ def info_of_session(message: Any) -> SessionInfo:
         segment_count=message.segment_count,
         seed_count=message.seed_count,
         size_count=message.size_count,
+        stored_bytes=message.stored_bytes,
         vertex_count=message.vertex_count,
         simplex_count=message.simplex_count,
         last_operation=message.last_operation,

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import contextlib
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _api, _wire
-from ._arrays import coordinates, indices, number
-from ._calls import CallOptions
+from ._arrays import coordinates, indices, number, revision_of
+from ._calls import CallOptions, next_page
 from ._cells import CellReader, Cells
 from ._client import Client, Server, client_of
 from ._domain import DomainArguments, make_domain
@@ -20,16 +21,18 @@ from ._operations import Operation, operation_of, watch
 from ._parameters import Parameters, fill, naming, split, takes
 from ._progress import ProgressOption, told
 from ._queries import nearest_distances, stream_cells
-from ._retry import CancelToken
+from ._receiver import damaged
+from ._retry import Attempt, CancelToken
 from ._session_info import SessionInfo, info_of_session
 from ._sizes import SizeField, check_sizes, set_sizes, unit_of
 from ._transfers import Addition, Download, Update, Upload
-from .errors import CancelledError, Error, InvalidArgumentError, NotFoundError
+from .errors import CancelledError, Error, InvalidArgumentError, NotFoundError, printable
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 _SECONDS_TO_CANCEL = 5.0
+_BYTES_OF_AN_ADDITION = (4 << 20) - 1024  # the largest request of a server, but for its other fields
 
 
 class Session:
@@ -86,7 +89,8 @@ class Session:
         self.client = client
         self.name = name
         self.dimension = dimension
-        self._calls = client._calls
+        self._was_interrupted = False  # a call that changes the session; the server may be at it
+        self._calls = client._calls.to_this_server()  # sessions end with it
 
     @classmethod
     def attach(cls, name: str, *, server: Server = None, timeout: float | None = None) -> Session:
@@ -109,7 +113,7 @@ class Session:
                 raise
 
     def __repr__(self) -> str:
-        return f"<wellspace.Session: {self.name} in {self.dimension}-D at {self.client.address}>"
+        return f"<wellspace.Session: {printable(self.name)} in {self.dimension}-D at {self.client.address}>"
 
     def info(self, *, timeout: float | None = None, cancel: CancelToken | None = None) -> SessionInfo:
         """What the session is at. Renews its lease."""
@@ -124,14 +128,14 @@ class Session:
         *,
         labels: Mapping[str, str] | None = None,
         ttl: float | None = None,
-        expected_revision: int = 0,
+        expected_revision: int | None = None,
         timeout: float | None = None,
         cancel: CancelToken | None = None,
     ) -> SessionInfo:
         """Replaces the labels, sets the `ttl` in seconds, or both."""
         options = CallOptions(timeout=timeout, cancel=cancel)
         request = _api.message("UpdateSessionRequest")(
-            request_id=options.id_or_new(), expected_revision=expected_revision
+            request_id=options.id_or_new(), expected_revision=revision_of(expected_revision, "expected_revision")
         )
         request.session.name = self.name
         request.update_mask.SetInParent()
@@ -145,12 +149,14 @@ class Session:
         return info_of_session(answer.session)
 
     def delete(
-        self, *, expected_revision: int = 0, timeout: float | None = None, cancel: CancelToken | None = None
+        self, *, expected_revision: int | None = None, timeout: float | None = None, cancel: CancelToken | None = None
     ) -> None:
         """Deletes the session with its points and its mesh; an operation that is under way is cancelled."""
         options = CallOptions(timeout=timeout, cancel=cancel)
         request = _api.message("DeleteSessionRequest")(
-            name=self.name, request_id=options.id_or_new(), expected_revision=expected_revision
+            name=self.name,
+            request_id=options.id_or_new(),
+            expected_revision=revision_of(expected_revision, "expected_revision"),
         )
         self._calls.unary("SessionService/DeleteSession", request, "DeleteSessionResponse", options)
 
@@ -160,7 +166,7 @@ class Session:
         *,
         offset: int | None = None,
         progress: ProgressOption = None,
-        expected_revision: int = 0,
+        expected_revision: int | None = None,
         timeout: float | None = None,
         cancel: CancelToken | None = None,
     ) -> int:
@@ -172,16 +178,17 @@ class Session:
         """
         cloud = coordinates(points, "points", self.dimension)
         with told(progress) as on_progress:
-            upload = Upload(self._calls, self.name, cloud, offset, expected_revision, on_progress)
-            options = CallOptions(timeout=timeout, cancel=cancel)
-            return upload.run(options)
+            expected = revision_of(expected_revision, "expected_revision")
+            upload = Upload(self._calls, self.name, cloud, offset, expected, on_progress)
+            with self._noting_interruption():
+                return upload.run(CallOptions(timeout=timeout, cancel=cancel))
 
     @takes(DomainArguments)
     def add_segments(
         self,
         *,
         offset: tuple[int, int] | None = None,
-        expected_revision: int = 0,
+        expected_revision: int | None = None,
         timeout: float | None = None,
         cancel: CancelToken | None = None,
         **arguments: Unpack[DomainArguments],
@@ -202,9 +209,8 @@ class Session:
         session = self._get(CallOptions(timeout=timeout, cancel=cancel))
         domain = make_domain(given, has_box=session.parameters.HasField("domain"))
         begin = offset if offset is not None else (session.segment_count, session.seed_count)
-        Addition(self._calls, self.name, domain, begin, expected_revision).run(
-            CallOptions(timeout=timeout, cancel=cancel)
-        )
+        expected = revision_of(expected_revision, "expected_revision")
+        Addition(self._calls, self.name, domain, begin, expected).run(CallOptions(timeout=timeout, cancel=cancel))
 
     def sizes(
         self,
@@ -212,8 +218,8 @@ class Session:
         points: Any = None,
         *,
         unit: str = "radius",
-        mesh_revision: int = 0,
-        expected_revision: int = 0,
+        mesh_revision: int | None = None,
+        expected_revision: int | None = None,
         timeout: float | None = None,
         cancel: CancelToken | None = None,
     ) -> int:
@@ -240,7 +246,9 @@ class Session:
         where = None if points is None else coordinates(points, "points", self.dimension)
         sizes = check_sizes(values, "values", None if where is None else len(where))
         field = SizeField(where, sizes, unit_of(unit))
-        return set_sizes(self._calls, self.name, field, mesh_revision, expected_revision, options)
+        of_mesh = revision_of(mesh_revision, "mesh_revision")
+        expected = revision_of(expected_revision, "expected_revision")
+        return set_sizes(self._calls, self.name, field, of_mesh, expected, options)
 
     @takes(Parameters)
     def refine(
@@ -248,7 +256,7 @@ class Session:
         *,
         restart: bool = False,
         progress: ProgressOption = None,
-        expected_revision: int = 0,
+        expected_revision: int | None = None,
         timeout: float | None = None,
         cancel: CancelToken | None = None,
         **arguments: Unpack[Parameters],
@@ -268,13 +276,15 @@ class Session:
             Called with `Progress`; True shows a bar.
         **arguments
         """
-        operation = self.start_refinement(
-            restart=restart, expected_revision=expected_revision, timeout=timeout, cancel=cancel, **arguments
-        )
+        options = CallOptions(timeout=timeout, cancel=cancel)
+        request = self._refinement(restart, expected_revision, options, arguments)
+        started: Operation | None = None
         try:
-            ended = self.watch(operation.name, progress=progress, timeout=timeout, cancel=cancel)
+            started = self._start(request, options)
+            ended = self.watch(started.name, progress=progress, timeout=timeout, cancel=cancel)
         except (KeyboardInterrupt, CancelledError):
-            self._cancel_quietly(operation.name)
+            self._was_interrupted = True
+            self._end_quietly(request, started)
             raise
         if ended.error is not None:
             raise ended.error
@@ -285,23 +295,53 @@ class Session:
         self,
         *,
         restart: bool = False,
-        expected_revision: int = 0,
+        expected_revision: int | None = None,
         timeout: float | None = None,
         cancel: CancelToken | None = None,
         **arguments: Unpack[Parameters],
     ) -> Operation:
         """As `refine`, but does not wait: `watch` does, and `cancel_operation` ends the work."""
-        (changes,) = split("refine", arguments, Parameters)
         options = CallOptions(timeout=timeout, cancel=cancel)
+        return self._start(self._refinement(restart, expected_revision, options, arguments), options)
+
+    def _refinement(
+        self, restart: bool, expected_revision: int | None, options: CallOptions, arguments: Mapping[str, Any]
+    ) -> Any:
+        """A StartRefinementRequest."""
+        (changes,) = split("refine", arguments, Parameters)
         request = _api.message("StartRefinementRequest")(
-            name=self.name, request_id=options.id_or_new(), expected_revision=expected_revision, restart=restart
+            name=self.name,
+            request_id=options.id_or_new(),
+            expected_revision=revision_of(expected_revision, "expected_revision"),
+            restart=restart,
         )
         if changes:
             request.parameters.CopyFrom(self._get(options).parameters)
             fill(request.parameters, self.dimension, changes)
+        return request
+
+    def _start(self, request: Any, options: CallOptions) -> Operation:
         method = "OperationService/StartRefinement"
-        started = self._calls.unary(method, request, "StartRefinementResponse", options)
-        return operation_of(started.operation)
+
+        def attempt_once(attempt: Attempt) -> Any:
+            try:
+                return self._calls.attempt_unary(method, request, "StartRefinementResponse", attempt)
+            except Error as error:
+                # Of what was given up before, the server may be at the end still.
+                attempt.is_worth_repeating = self._was_interrupted and error.reason == "SESSION_BUSY"
+                raise
+
+        operation = operation_of(self._calls.run(options, attempt_once).operation)
+        self._was_interrupted = False
+        return operation
+
+    @contextlib.contextmanager
+    def _noting_interruption(self) -> Iterator[None]:
+        try:
+            yield
+        except (KeyboardInterrupt, CancelledError):
+            self._was_interrupted = True
+            raise
 
     def watch(
         self,
@@ -336,20 +376,27 @@ class Session:
             found += [operation_of(one) for one in page.operations]
             if not page.next_page_token:
                 return found
-            request.page_token = page.next_page_token
+            request.page_token = next_page(request.page_token, page.next_page_token)
 
-    def _cancel_quietly(self, operation: str) -> None:
+    def _end_quietly(self, request: Any, started: Operation | None) -> None:
+        """Cancels what `request` has started, and waits for its end: then the session takes the next call.
+
+        Where the call was given up before it had an answer, its repetition tells whether the work was started.
+        """
+        options = CallOptions(timeout=_SECONDS_TO_CANCEL)
         try:
-            self.cancel_operation(operation, timeout=_SECONDS_TO_CANCEL)
+            name = (started or self._start(request, options)).name
+            self.cancel_operation(name, timeout=_SECONDS_TO_CANCEL)
+            self.watch(name, timeout=_SECONDS_TO_CANCEL)
         except Error:
-            pass
+            pass  # the work, if there is any, goes on
 
     def download(
         self,
         *,
         since: Mesh | None = None,
         boundary: bool = True,
-        revision: int = 0,
+        revision: int | None = None,
         progress: ProgressOption = None,
         timeout: float | None = None,
         cancel: CancelToken | None = None,
@@ -361,14 +408,15 @@ class Session:
         `since` is a mesh that was downloaded before: where the server knows what has changed since then, that alone is
         sent. The result is the same to the bit, and a mesh of its own; `since` stays as it is.
         """
-        if since is not None and revision:
+        wanted = revision_of(revision, "revision")
+        if since is not None and wanted is not None:
             raise InvalidArgumentError("revision and since exclude each other: what has changed leads to the last mesh",
                                        field="revision")
         with told(progress) as on_progress:
             if since is not None:
                 update = Update(self._calls, self.name, since, boundary, on_progress)
                 return update.run(CallOptions(timeout=timeout, cancel=cancel))
-            download = Download(self._calls, self.name, boundary, revision, on_progress)
+            download = Download(self._calls, self.name, boundary, wanted, on_progress)
             return download.run(CallOptions(timeout=timeout, cancel=cancel))
 
     def add(
@@ -376,13 +424,13 @@ class Session:
         points: Any,
         *,
         near: Any = None,
-        expected_revision: int = 0,
+        expected_revision: int | None = None,
         timeout: float | None = None,
         cancel: CancelToken | None = None,
     ) -> npt.NDArray[Any]:
         """Adds vertices at points, (k, d), of a session that was refined; returns their numbers, (k,).
 
-        All become vertices or, on an error, none. `near` has a vertex near each, from which the place is found in
+        All become vertices or, on an error, none; more than 4 MB of points take several calls. `near` has a vertex near each, from which the place is found in
         O(1). The session is then to be refined again, which costs their surroundings.
         """
         cloud = coordinates(points, "points", self.dimension)
@@ -391,19 +439,30 @@ class Session:
             raise InvalidArgumentError(f"near: {len(hints)} vertices for {len(cloud)} points", field="near")
         options = CallOptions(timeout=timeout, cancel=cancel)
         request = _api.message("AddVerticesRequest")(
-            name=self.name, request_id=options.id_or_new(), expected_revision=expected_revision
+            name=self.name,
+            request_id=options.id_or_new(),
+            expected_revision=revision_of(expected_revision, "expected_revision"),
         )
         arrays = _wire.packed_field(2, cloud) + _wire.packed_field(3, hints)
-        answer = self._calls.unary_bytes("QueryService/AddVertices", request.SerializeToString() + arrays, options)
+        if len(arrays) > _BYTES_OF_AN_ADDITION:
+            raise InvalidArgumentError(
+                f"points: {len(cloud)} take {len(arrays)} bytes in one request, which has at most "
+                f"{_BYTES_OF_AN_ADDITION}; add them in several calls",
+                field="points",
+            )
+        with self._noting_interruption():
+            answer = self._calls.unary_bytes("QueryService/AddVertices", request.SerializeToString() + arrays, options)
         fields = [f for f in _wire.fields(memoryview(answer)) if f.number == 1]
         vertices = np.concatenate([np.empty(0, np.uint32), *(_wire.packed(field, "<u4") for field in fields)])
+        if len(vertices) != len(cloud):
+            raise damaged(f"{len(vertices)} vertices for {len(cloud)} points")
         return signed(vertices, int(vertices.max(initial=0)) + 1)
 
     def remove(
         self,
         points: Any,
         *,
-        expected_revision: int = 0,
+        expected_revision: int | None = None,
         timeout: float | None = None,
         cancel: CancelToken | None = None,
     ) -> int:
@@ -419,7 +478,7 @@ class Session:
             name=self.name,
             points=numbers.tolist(),
             request_id=options.id_or_new(),
-            expected_revision=expected_revision,
+            expected_revision=revision_of(expected_revision, "expected_revision"),
         )
         answer = self._calls.unary("SessionService/RemovePoints", request, "RemovePointsResponse", options)
         return int(answer.committed_points)
@@ -429,7 +488,7 @@ class Session:
         points: Any,
         *,
         allow_outside: bool = False,
-        revision: int = 0,
+        revision: int | None = None,
         timeout: float | None = None,
         cancel: CancelToken | None = None,
     ) -> Located:
@@ -446,7 +505,7 @@ class Session:
         """
         cloud = coordinates(points, "points", self.dimension)
         options = CallOptions(timeout=timeout, cancel=cancel)
-        return locate(self._calls, self.name, cloud, revision, allow_outside, options)
+        return locate(self._calls, self.name, cloud, revision_of(revision, "revision"), allow_outside, options)
 
     def nearest(
         self, vertices: Any = None, *, timeout: float | None = None, cancel: CancelToken | None = None

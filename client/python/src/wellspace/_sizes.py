@@ -86,7 +86,12 @@ def unit_of(unit: str | None) -> int:
 
 
 def set_sizes(
-    calls: Calls, session: str, field: SizeField, mesh_revision: int, expected_revision: int, options: CallOptions
+    calls: Calls,
+    session: str,
+    field: SizeField,
+    mesh_revision: int | None,
+    expected_revision: int | None,
+    options: CallOptions,
 ) -> int:
     """Replaces the sizes of a session; returns how many it has then. They are taken together, so repeating is safe.
 
@@ -96,7 +101,9 @@ def set_sizes(
     def attempt_once(attempt: Attempt) -> Any:
         head = _api.message("SetSizesRequest")(name=session, expected_revision=expected_revision)
         if field.points is None:
-            head.vertex_sizes.mesh_revision = mesh_revision
+            head.vertex_sizes.SetInParent()
+            if mesh_revision is not None:
+                head.vertex_sizes.mesh_revision = mesh_revision
         number = 3 if field.points is not None else 4
         requests = [head.SerializeToString(), *(_wire.message_field(number, chunk) for chunk in field.chunks())]
         return calls.attempt_upload("SessionService/SetSizes", requests, "SetSizesResponse", attempt)

@@ -32,7 +32,7 @@ class Upload:
         session: str,
         cloud: Floats,
         offset: int | None,
-        expected_revision: int,
+        expected_revision: int | None,
         on_progress: OnProgress,
     ) -> None:
         self._calls = calls
@@ -61,7 +61,7 @@ class Upload:
         first = min(max(self._offset, committed) - self._offset, len(self._cloud))
         head = _api.message("UploadPointsRequest")(name=self._session, expected_revision=self._expected_revision)
         # What the attempts before this one committed has changed the revision.
-        self._expected_revision = 0
+        self._expected_revision = None
         if first > 0:
             head.checked_from = self._offset
             head.checked_crc32c = crc32c(self._cloud[:first])
@@ -94,7 +94,7 @@ class Addition:
     """Segments and seeds for a session, after those of `offset`."""
 
     def __init__(
-        self, calls: Calls, session: str, domain: Domain, offset: tuple[int, int], expected_revision: int
+        self, calls: Calls, session: str, domain: Domain, offset: tuple[int, int], expected_revision: int | None
     ) -> None:
         self._calls = calls
         self._session = session
@@ -109,7 +109,7 @@ class Addition:
     def _attempt(self, attempt: Attempt) -> None:
         requests = list(self._requests())
         # What an attempt before this one committed has changed the revision.
-        self._expected_revision = 0
+        self._expected_revision = None
         self._calls.attempt_upload("SessionService/AddSegments", requests, "AddSegmentsResponse", attempt)
 
     def _requests(self) -> Iterator[bytes]:
@@ -127,7 +127,9 @@ class Addition:
 class Download:
     """One download of a mesh, in as many streams as it takes."""
 
-    def __init__(self, calls: Calls, session: str, boundary: bool, revision: int, on_progress: OnProgress) -> None:
+    def __init__(
+        self, calls: Calls, session: str, boundary: bool, revision: int | None, on_progress: OnProgress
+    ) -> None:
         self._calls = calls
         self._request = _api.message("DownloadMeshRequest")(name=session, revision=revision, with_boundary=boundary)
         self._receiver = MeshReceiver()
@@ -189,10 +191,12 @@ class Update:
         request = _api.message("DownloadMeshRequest")(name=self._session, with_boundary=self._boundary)
         if self._whole is None:
             request.since_revision = self._deltas.mesh.revision
-            request.revision = self._deltas.revision
+            if self._deltas.revision:
+                request.revision = self._deltas.revision
             request.next_chunk = self._deltas.next_part
         else:
-            request.revision = 0 if self._whole.metadata is None else self._whole.metadata.revision
+            if self._whole.metadata is not None:
+                request.revision = self._whole.metadata.revision
             request.next_chunk = self._whole.next_chunk
         return bytes(request.SerializeToString())
 

@@ -86,6 +86,8 @@ def packed(field: Field, dtype: str) -> npt.NDArray[Any]:
 def packed_varints(field: Field) -> npt.NDArray[np.int64]:
     """The numbers of a packed field of varints below 2^32, or flags."""
     if field.kind == VARINT:
+        if field.value >= 1 << 35:
+            raise malformed(f"field {field.number} has a number above 2^32")
         return np.array([field.value], np.int64)
     if field.kind != BYTES:
         raise malformed(f"field {field.number} has the type {field.kind}; expected {BYTES} or {VARINT}")

@@ -6,6 +6,7 @@ do; `Error.reason` says which one.
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from . import _api
@@ -183,13 +184,22 @@ _CODES = (
 ).split()
 
 
+# What a terminal may obey: control characters of ASCII and of Latin-1; and halves of pairs, which cannot be encoded.
+_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff]")
+
+
+def printable(text: str) -> str:
+    """`text` of a server, without what a terminal may obey: \\x1b stands for an escape character."""
+    return _CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode("ascii"), text)
+
+
 def from_status(code: str, message: str, details: bytes) -> Error:
     """The exception for a status of gRPC. `details` is a serialized google.rpc.Status, or empty."""
     reason, field, retry_after = _read_details(details)
     if not reason and message.startswith("READER_STALLED"):
         reason = "READER_STALLED"
     kind = _KINDS.get(code, CredentialsError if code == "PERMISSION_DENIED" else Error)
-    return kind(message, reason=reason, field=field, retry_after=retry_after, code=code)
+    return kind(printable(message), reason=reason, field=field, retry_after=retry_after, code=code)
 
 
 def from_message(status: Any) -> Error:

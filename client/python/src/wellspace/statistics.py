@@ -162,6 +162,8 @@ class ServerInfo:
     max_ttl: float
     stall_limit: float
     max_memory_bytes: int
+    max_stored_bytes_per_tenant: int
+    stored_bytes: int
 
 
 def seconds_of(duration: Any) -> float:
