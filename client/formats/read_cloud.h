@@ -23,12 +23,13 @@
 //   off   Geomview's in ascii: "OFF", the numbers of vertices, faces and edges, then a line for each vertex. What is
 //         before OFF announces numbers after the coordinates, which are skipped: ST texture, C colour, N normal. 4OFF
 //         has four coordinates, all taken as they are; nOFF says how many before the counts.
-//   stl   In ascii or binary: the corners of the triangles, each once; -0 is 0.
+//   stl   In ascii, in any case, or binary: the corners of the triangles, each once; -0 is 0. A number of triangles of 0
+//         stands for all that follow.
 //   pcd   The Point Cloud Library's: fields x, y and, if it is there, z; data in ascii, binary or binary_compressed.
 //   las   1.0 to 1.4 of the ASPRS, point formats 0 to 10; points that are marked as withheld are left out. Compressed
 //         ones (laz) are refused: docs/adr/0034-laz-is-refused.md.
 //   vtk   VTK's legacy format in ascii or binary, of the kinds POLYDATA, UNSTRUCTURED_GRID and STRUCTURED_GRID.
-//   vtp, vtu  VTK's XML, one piece, arrays as ReadMesh takes them.
+//   vtp, vtu  VTK's XML, the points of all pieces, arrays as ReadMesh takes them.
 // Of ply and off, what follows the last vertex is not looked at.
 // In those of text lines end in LF, CRLF or CR, '#' at the start of a line or after a blank starts a comment, and blank
 // lines are skipped. Numbers may have Fortran's exponents: 1.0D+00, 1.0-100. Each may be compressed by gzip, as
